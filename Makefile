@@ -1,0 +1,164 @@
+# make             build libvg and the programs into build/$(CONFIG)
+# make deps        install the Debian packages of debian-packages.txt (root or sudo; nothing when all are there)
+# make demo        transfer an animation onto another body and draw it: says where to look
+# make check       all tests                    make CONFIG=asan check    the same under ASan and UBSan
+# make bench       throughput of every stage beside its reference
+# make fuzz        search for input that breaks the readers (clang; FUZZ_SECONDS=60 each)
+# make install     PREFIX=/usr/local DESTDIR=   make uninstall, make clean
+.DEFAULT_GOAL := all
+.SUFFIXES:
+.DELETE_ON_ERROR:
+.SECONDARY:
+
+CONFIG ?= release
+PREFIX ?= /usr/local
+FUZZ_SECONDS ?= 60
+WERROR ?= 0
+CC ?= cc
+CFLAGS ?= -O2 -g
+PKG_CONFIG ?= pkg-config
+VERSION := $(shell sed -n 's/^\#define VG_VERSION "\(.*\)"/\1/p' lib/vg.h)
+
+B := build/$(CONFIG)
+
+CHOLMOD_CFLAGS ?= -I/usr/include/suitesparse
+CHOLMOD_LIBS ?= -lcholmod
+BLAS_LIBS ?= -lopenblas
+ARCHIVE_CFLAGS ?= $(shell $(PKG_CONFIG) --cflags libarchive 2>/dev/null)
+ARCHIVE_LIBS ?= $(shell $(PKG_CONFIG) --libs libarchive 2>/dev/null || echo -larchive)
+XXHASH_LIBS ?= -lxxhash
+PNG_CFLAGS ?= $(shell $(PKG_CONFIG) --cflags libpng 2>/dev/null)
+PNG_LIBS ?= $(shell $(PKG_CONFIG) --libs libpng 2>/dev/null || echo -lpng)
+JANSSON_LIBS ?= $(shell $(PKG_CONFIG) --libs jansson 2>/dev/null || echo -ljansson)
+
+ALL_CPPFLAGS := -D_GNU_SOURCE -Ilib -include lib/core/banned.h $(CHOLMOD_CFLAGS) $(ARCHIVE_CFLAGS) $(PNG_CFLAGS) $(CPPFLAGS)
+ALL_CFLAGS := -std=gnu11 -fPIC -Wall -Wextra -Wshadow -Wvla -Wstrict-prototypes -Wmissing-prototypes -Wpointer-arith -Wwrite-strings -Wno-psabi
+ifeq ($(WERROR),1)
+ALL_CFLAGS += -Werror
+endif
+ifeq ($(CONFIG),asan)
+ALL_CFLAGS += -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
+ALL_LDFLAGS := -fsanitize=address,undefined
+else ifeq ($(CONFIG),cov)
+ALL_CFLAGS += --coverage -O0
+ALL_LDFLAGS := --coverage
+else ifeq ($(CONFIG),fuzz)
+CC := clang
+ALL_CFLAGS += -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined
+ALL_LDFLAGS := -fsanitize=address,undefined
+endif
+ALL_CFLAGS += $(CFLAGS)
+# numeric kernels: the compiler may unroll and vectorise them; nothing here reorders sums
+KERNELS := lib/method/deform_kernel lib/method/solve_kernel
+ALL_LDFLAGS += $(LDFLAGS)
+ALL_LIBS := $(CHOLMOD_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) -lpthread -lm $(LDLIBS)
+
+LIB_SRC := $(sort $(wildcard lib/*/*.c))
+LIB_OBJ := $(LIB_SRC:%.c=$(B)/%.o)
+PROGRAMS := $(patsubst cmd/%.c,%,$(sort $(wildcard cmd/vg-*.c)))
+CMD_SHARED := $(filter-out cmd/vg-%.c,$(sort $(wildcard cmd/*.c)))
+CMD_OBJ := $(CMD_SHARED:%.c=$(B)/%.o)
+UNITS := $(patsubst tests/unit/%.c,%,$(sort $(wildcard tests/unit/test_*.c)))
+FUZZERS := $(patsubst tests/fuzz/%.c,%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
+BENCHES := $(patsubst tests/bench/%.c,%,$(sort $(wildcard tests/bench/*.c)))
+
+.PHONY: all
+all: $(PROGRAMS:%=$(B)/bin/%) $(B)/libvg.a
+
+# objects depend on the flags they were made with
+FLAGS_NOW := $(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(ALL_LDFLAGS) $(ALL_LIBS)
+$(B)/flags: FORCE
+	@mkdir -p $(B)
+	@echo '$(FLAGS_NOW)' | cmp -s - $@ || echo '$(FLAGS_NOW)' > $@
+.PHONY: FORCE
+FORCE:
+
+$(KERNELS:%=$(B)/%.o): ALL_CFLAGS += -O3 -fno-math-errno -fno-trapping-math
+
+$(B)/%.o: %.c $(B)/flags
+	@mkdir -p $(@D)
+	$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
+
+$(B)/libvg.a: $(LIB_OBJ)
+	@rm -f $@
+	$(AR) rcs $@ $^
+
+$(B)/bin/%: $(B)/cmd/%.o $(CMD_OBJ) $(B)/libvg.a
+	@mkdir -p $(@D)
+	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(ALL_LIBS) $(JANSSON_LIBS)
+
+$(B)/unit/%: $(B)/tests/unit/%.o $(B)/libvg.a
+	@mkdir -p $(@D)
+	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(ALL_LIBS)
+
+$(B)/bench/%: $(B)/tests/bench/%.o $(B)/libvg.a
+	@mkdir -p $(@D)
+	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(ALL_LIBS)
+
+# with CONFIG=fuzz the engine brings main; otherwise replay.c does, and the same files run over the corpora
+ifeq ($(CONFIG),fuzz)
+FUZZ_MAIN :=
+FUZZ_LINK := -fsanitize=fuzzer
+else
+FUZZ_MAIN := $(B)/tests/fuzz/replay.o
+FUZZ_LINK :=
+endif
+$(B)/fuzz/%: $(B)/tests/fuzz/%.o $(FUZZ_MAIN) $(B)/libvg.a
+	@mkdir -p $(@D)
+	$(CC) $(ALL_CFLAGS) $(FUZZ_LINK) $(ALL_LDFLAGS) -o $@ $^ $(ALL_LIBS)
+
+.PHONY: deps
+deps:
+	@sh tests/install-packages.sh debian-packages.txt
+
+.PHONY: check
+check: all $(UNITS:%=$(B)/unit/%) $(FUZZERS:%=$(B)/fuzz/%)
+	@BUILD=$(B) CONFIG=$(CONFIG) sh tests/run.sh
+
+.PHONY: demo
+demo: all
+	@BUILD=$(B) sh examples/demo.sh $(B)/demo
+
+.PHONY: bench
+bench: all $(BENCHES:%=$(B)/bench/%)
+	@BUILD=$(B) sh tests/bench/run.sh
+
+.PHONY: fuzz
+fuzz:
+	@$(MAKE) CONFIG=fuzz fuzz-run
+.PHONY: fuzz-run
+fuzz-run: $(FUZZERS:%=$(B)/fuzz/%)
+	@for f in $(FUZZERS); do \
+	    mkdir -p build/fuzz/corpus/$$f; \
+	    dict=tests/fuzz/$$f.dict; test -f $$dict && dict=-dict=$$dict || dict=; \
+	    echo "== $$f"; \
+	    $(B)/fuzz/$$f -max_total_time=$(FUZZ_SECONDS) -max_len=16384 -rss_limit_mb=4096 -print_final_stats=1 $$dict \
+	        build/fuzz/corpus/$$f tests/corpus/accept tests/corpus/reject $$(test -d tests/corpus/$$f && echo tests/corpus/$$f) || exit 1; \
+	done
+
+.PHONY: install
+install: all
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include \
+	    $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/man/man5 $(DESTDIR)$(PREFIX)/share/man/man7
+	install -m 755 $(PROGRAMS:%=$(B)/bin/%) $(DESTDIR)$(PREFIX)/bin
+	install -m 644 $(B)/libvg.a $(DESTDIR)$(PREFIX)/lib
+	install -m 644 lib/vg.h $(DESTDIR)$(PREFIX)/include
+	sed -e 's|@PREFIX@|$(PREFIX)|' -e 's|@VERSION@|$(VERSION)|' \
+	    -e 's|@LIBS@|$(strip $(ALL_LIBS))|' lib/libvg.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/libvg.pc
+	install -m 644 man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
+	install -m 644 man/*.5 $(DESTDIR)$(PREFIX)/share/man/man5
+	install -m 644 man/*.7 $(DESTDIR)$(PREFIX)/share/man/man7
+
+.PHONY: uninstall
+uninstall:
+	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/%) $(DESTDIR)$(PREFIX)/lib/libvg.a $(DESTDIR)$(PREFIX)/include/vg.h \
+	    $(DESTDIR)$(PREFIX)/lib/pkgconfig/libvg.pc \
+	    $(patsubst man/%,$(DESTDIR)$(PREFIX)/share/man/man1/%,$(wildcard man/*.1)) \
+	    $(patsubst man/%,$(DESTDIR)$(PREFIX)/share/man/man5/%,$(wildcard man/*.5)) \
+	    $(patsubst man/%,$(DESTDIR)$(PREFIX)/share/man/man7/%,$(wildcard man/*.7))
+
+.PHONY: clean
+clean:
+	rm -rf build
+
+-include $(shell find $(B) -name '*.d' 2>/dev/null)

@@ -1,0 +1,86 @@
+/* cli.h: what all programs share: options, messages, exit. cli.c is the only file that prints to standard error.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_CLI_H
+#define VG_CLI_H
+
+#include "vg.h"
+
+/* One option of a program. Every program also has -h --help, -V --version, -q --quiet, -v --verbose and what its
+ * cli_program asks for; those are not listed. */
+typedef struct cli_option {
+    const char *name;  /* long name, without the dashes */
+    char letter;       /* 0: none */
+    const char *value; /* what -h calls the argument ("FILE"); NULL: a flag */
+    const char *help;  /* one line for -h */
+    /* what parsing does, the first that is not NULL: */
+    bool *flag;
+    const char **text;
+    double *number;
+    long *integer;
+    void (*take)(const char *value, void *context); /* repeated or structured options; dies by cli_usage */
+    void *context;
+    double least, most; /* for number and integer; both 0: any */
+} cli_option;
+
+typedef struct cli_program {
+    const char *name;     /* "vg-solve" */
+    const char *synopsis; /* "[options] [FILE]": what follows the name */
+    const char *summary;  /* one line: what it does */
+    const cli_option *options; /* ends with a NULL name */
+    size_t most_operands;
+    bool writes_stream;   /* has -o --output and --no-provenance */
+    bool writes_text;     /* has -o --output and --json */
+    bool writes_file;     /* has -o --output, whose bytes go through cli_text_open too */
+    bool threaded;        /* has -j --threads */
+} cli_program;
+
+/* What the shared options said. */
+extern struct cli_state {
+    const cli_program *program;
+    int argc; /* as the program was called, for provenance */
+    char **argv;
+    bool quiet, verbose, json, no_provenance;
+    const char *output; /* NULL: standard output */
+    int threads;        /* >= 1 */
+} cli;
+
+/* cli_start: to be called first. Parses; -h and -V print and exit 0; wrong usage prints the synopsis and exits 2.
+ * Returns the number of operands and where they are. Repairs descriptors 0 to 2, resets SIGPIPE. */
+size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands);
+
+/* cli_die: one line "PROGRAM: MESSAGE" on standard error, leave nothing half-written, exit by the code. If a stream
+ * is being written, it says in a FAIL record who failed. */
+void cli_die(const vg_err *e) __attribute__((noreturn));
+/* cli_usage: the same with exit 2 and the usage line. */
+void cli_usage(const char *format, ...) VG_PRINTF(1, 2) __attribute__((noreturn));
+/* cli_no: the same with exit 1: the answer is no. */
+void cli_no(const char *format, ...) VG_PRINTF(1, 2) __attribute__((noreturn));
+void cli_warn(const char *format, ...) VG_PRINTF(1, 2); /* unless --quiet */
+void cli_note(const char *format, ...) VG_PRINTF(1, 2); /* only with --verbose */
+/* cli_progress: "label n" on standard error, rarely, only when it is a terminal and a second has passed. */
+void cli_progress(const char *label, uint64_t n);
+
+/* cli_parse_number: the whole text as a finite number, or cli_usage naming the option. */
+double cli_parse_number(const char *option, const char *text);
+/* cli_parse_vertices: "3,17,4" to an ascending list without repetition (free with free()), or cli_usage. */
+size_t cli_parse_vertices(const char *option, const char *text, uint32_t **vertices);
+
+/* The input of a filter: its operands, or standard input when there are none. */
+vg_source *cli_source(char **operands, size_t n);
+
+/* The stream of a filter. cli_stream_open takes the head (adds this process to the provenance unless told not to) and
+ * opens the output: standard output, refused when a terminal, or a temporary file beside --output that cli_stream_end
+ * renames. */
+void cli_stream_open(vg_head *h);
+void cli_stream_put(const vg_frame *f);
+void cli_stream_end(const vg_records *tail);
+
+/* The text output of a report: standard output or a temporary file beside --output, which cli_text_end renames. */
+#include <stdio.h>
+FILE *cli_text_open(void);
+void cli_text_end(void);
+
+/* cli_finish: flush, close, check standard output; exit with `status` (0 or 1), or 4 when output was lost. */
+void cli_finish(int status) __attribute__((noreturn));
+
+#endif

@@ -1,0 +1,65 @@
+/* report.h: one builder for all reports: named values and tables, printed as aligned text or as JSON.
+ * Every item has a key, its name in JSON, and a label, its name in the text; with only one of them it is only there.
+ * Running out of memory ends the program. Numbers do not follow the locale; one that is not finite is "-" or null.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_REPORT_H
+#define VG_REPORT_H
+
+#include "vg.h"
+
+#include <stdio.h>
+
+typedef struct report report;
+
+/* A value: a cell of a table or a line of its own. Texts and lists are copied. */
+typedef enum report_type { REPORT_NOTHING, REPORT_TEXT, REPORT_COUNT, REPORT_NUMBER, REPORT_FLAG, REPORT_TEXTS,
+                           REPORT_COUNTS } report_type;
+typedef struct report_value {
+    report_type type;
+    size_t n; /* of a list */
+    union {
+        const char *text;
+        uint64_t count;
+        double number;
+        bool flag;
+        const char *const *texts;
+        const uint64_t *counts;
+    } is;
+} report_value;
+
+report_value report_nothing(void); /* null in JSON, empty in the text */
+report_value report_text(const char *s);
+report_value report_count(uint64_t n);
+report_value report_number(double x);
+report_value report_flag(bool b);
+report_value report_texts(const char *const *s, size_t n);
+report_value report_counts(const uint64_t *x, size_t n);
+
+typedef struct report_column {
+    const char *key, *title;
+    bool json_only;
+} report_column;
+
+report *report_new(void);
+void report_free(report **r);
+
+/* report_put: one named value. label NULL: only in JSON; key NULL: only in the text. */
+void report_put(report *r, const char *key, const char *label, report_value value);
+/* report_note: a line of text that JSON leaves out. report_gap: an empty one. */
+void report_note(report *r, const char *format, ...) VG_PRINTF(2, 3);
+void report_gap(report *r);
+/* report_group .. report_end: what is between is an object of its own in JSON; the text just goes on. */
+void report_group(report *r, const char *key);
+void report_end(report *r);
+
+/* report_table: rows to follow by report_row. In JSON an array of objects, or when `keyed` an object of objects named
+ * by the first column. title NULL: only in JSON; "": a table without a title. columns are borrowed until free. */
+void report_table(report *r, const char *key, const char *title, bool keyed, const report_column *columns, size_t n);
+void report_row(report *r, const report_value *cells); /* one per column */
+
+/* report_join: all of `more` behind what r has; frees `more`. */
+void report_join(report *r, report *more);
+
+void report_print(const report *r, FILE *f, bool json);
+
+#endif

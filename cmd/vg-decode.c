@@ -1,0 +1,49 @@
+/* vg-decode: write the poses of a stream as mesh files, a directory or an archive of them.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "cli.h"
+
+static vg_sink_options sink_options;
+static long first_number;
+
+static const cli_option options[] = {
+    {"output", 'o', "FILE", "a.obj, 'a-%04d.ply', DIR/, a.zip, a.tar.zst, ...; '-' is standard output",
+     .text = &cli.output},
+    {"format", 0, "FORMAT", "obj, ply, ply-ascii, ply-be or off, whatever the name says", .text = &sink_options.format},
+    {"f64", 0, NULL, "numbers that read back to the same binary64, not binary32", .flag = &sink_options.full_precision},
+    {"first-number", 0, "N", "what %d in the output's name starts at (default 0)", .integer = &first_number,
+     .least = 0, .most = 1e9},
+    {NULL}};
+
+static const cli_program program = {
+    .name = "vg-decode",
+    .synopsis = "[options] -o FILE [FILE]",
+    .summary = "write the poses of a stream as mesh files, a directory or an archive of them",
+    .options = options,
+    .most_operands = 1};
+
+int main(int argc, char **argv)
+{
+    char **operands;
+    size_t n = cli_start(&program, argc, argv, &operands);
+    vg_err e;
+    vg_sink *sink;
+    sink_options.first_number = first_number;
+    if (!cli.output) cli_usage("where to? name the output with -o");
+    if (vg_sink_check(cli.output, &sink_options, &e) < 0) cli_die(&e);
+
+    vg_source *s = cli_source(operands, n);
+    if (vg_sink_open(&sink, cli.output, vg_source_head(s), &sink_options, &e) < 0) cli_die(&e);
+    vg_frame f = {0};
+    uint64_t frames = 0;
+    int r;
+    while ((r = vg_source_next(s, &f, &e)) > 0) {
+        if ((r = vg_sink_put(sink, &f, &e)) < 0) break;
+        cli_progress("poses", ++frames);
+    }
+    if (r == 0) r = vg_sink_end(sink, &e);
+    vg_sink_close(&sink);
+    if (r < 0) cli_die(&e);
+    vg_frame_clear(&f);
+    vg_source_close(&s);
+    cli_finish(0);
+}

@@ -1,0 +1,303 @@
+/* vg-diff.c: measure how far a sequence is from the truth, and answer whether that is within a tolerance.
+ * Leaves out the measures themselves (lib/model/measures.c) and pictures of the error (vg-view --against).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "cli.h"
+#include "report.h"
+
+#include <math.h>
+
+static struct {
+    double tolerance; /* in units of D; negative: none was asked for */
+    const char *of;
+    bool centred, frames;
+} opts = {.tolerance = -1, .of = "max"};
+
+static const cli_option options[] = {
+    {.name = "tolerance", .letter = 't', .value = "X", .help = "exit 1 when the error exceeds X, in units of D",
+     .number = &opts.tolerance, .least = 0, .most = INFINITY},
+    {.name = "of", .value = "WHICH", .help = "the error it is about: mean, rms, p95 or max (default: max)",
+     .text = &opts.of},
+    {.name = "centred", .letter = 'c', .help = "move the centroid of every pose to 0 before comparing",
+     .flag = &opts.centred},
+    {.name = "frames", .help = "list the error of every frame", .flag = &opts.frames},
+    {0},
+};
+
+static const cli_program program = {
+    .name = "vg-diff",
+    .synopsis = "[options] TRUTH RESULT",
+    .summary = "Measure how far the poses of RESULT are from those of TRUTH",
+    .options = options,
+    .most_operands = 2,
+    .writes_text = true,
+};
+
+/* One of the two sequences. */
+typedef struct side {
+    const char *name;
+    vg_source *source;
+    vg_head *head;
+    vg_frame frame;
+    size_t frames;
+} side;
+
+/* What is known when both sequences have been read. */
+typedef struct findings {
+    vg_measure_report measures;
+    char *worst_frame; /* name of the frame with the largest error */
+} findings;
+
+static const report_column frame_columns[] = {
+    {.key = "frame", .title = "frame"}, {.key = "name", .title = "name"}, {.key = "mean", .title = "mean"},
+    {.key = "max", .title = "max"},     {.key = "mean_D", .title = "mean/D"}, {.key = "max_D", .title = "max/D"}};
+static const report_column error_columns[] = {
+    {.key = "measure", .title = "vertex error"}, {.key = "error", .title = "mesh units"},
+    {.key = "D", .title = "in D"},               {.title = ""},
+    {.key = "vertex", .json_only = true},        {.key = "frame", .json_only = true},
+    {.key = "frame_name", .json_only = true}};
+static const report_column face_columns[] = {
+    {.key = "measure", .title = "face error"}, {.key = "mean", .title = "mean"},
+    {.key = "sd", .title = "deviation"},       {.key = "max", .title = "max"}};
+static const report_column planarity_columns[] = {
+    {.key = "sequence", .title = "planarity"}, {.key = "faces", .title = "faces"}, {.key = "mean", .title = "mean"},
+    {.key = "max", .title = "max"}, {.key = "histogram", .title = "in tenths from 0 to 1"}};
+
+enum { COLUMNS_FRAME = 6, COLUMNS_ERROR = 7, COLUMNS_FACE = 4, COLUMNS_PLANARITY = 5 };
+
+/* The answer "these cannot be compared": a line for people, and for programs an object that says so. */
+static void cannot_compare(const char *reason) __attribute__((noreturn));
+static void cannot_compare(const char *reason)
+{
+    if (cli.json) {
+        report *r = report_new();
+        report_put(r, "comparable", NULL, report_flag(false));
+        report_put(r, "reason", NULL, report_text(reason));
+        report_print(r, cli_text_open(), true);
+        report_free(&r);
+        cli_text_end();
+    }
+    cli_no("%s", reason);
+}
+
+static void open_side(side *s, char *operand)
+{
+    s->name = strcmp(operand, "-") ? operand : "standard input";
+    s->source = cli_source(&operand, 1);
+    s->head = vg_source_head(s->source);
+    if (s->head->kind == VG_VERTICES) return;
+    vg_err e;
+    if (s->head->kind == VG_VECTORS)
+        vg_fail(&e, VG_EINPUT, "'%s' holds vectors: pipe it through 'vg-solve' first", s->name);
+    else
+        vg_fail(&e, VG_EINPUT, "'%s' holds %s, not vertices: make poses of them first", s->name,
+                vg_kind_name(s->head->kind));
+    cli_die(&e);
+}
+
+static void close_side(side *s)
+{
+    vg_frame_clear(&s->frame);
+    vg_source_close(&s->source);
+}
+
+static bool next(side *s)
+{
+    vg_err e;
+    int r = vg_source_next(s->source, &s->frame, &e);
+    if (r < 0) cli_die(&e);
+    s->frames += r > 0;
+    return r > 0;
+}
+
+static void check_same_mesh(const side *truth, const side *result)
+{
+    char names[2][200];
+    vg_err e;
+    snprintf(names[0], sizeof names[0], "'%.190s'", truth->name);
+    snprintf(names[1], sizeof names[1], "'%.190s'", result->name);
+    if (vg_mesh_same(&truth->head->mesh, names[0], &result->head->mesh, names[1], &e) < 0) cannot_compare(e.message);
+}
+
+static double in_diagonals(double x, double diagonal)
+{
+    return x == 0 ? 0 : x / diagonal; /* infinite for a mesh without extent */
+}
+
+static void report_frame(report *r, size_t i, const char *name, double mean, double max, double diagonal)
+{
+    const report_value row[COLUMNS_FRAME] = {
+        report_count(i), report_text(name), report_number(mean), report_number(max),
+        report_number(in_diagonals(mean, diagonal)), report_number(in_diagonals(max, diagonal))};
+    report_row(r, row);
+}
+
+/* Read both to their ends, so that damage is seen, and measure the frames they have in common. */
+static void compare(side *truth, side *result, findings *found, report *r)
+{
+    vg_measures *x = NULL;
+    vg_err e;
+    double worst = -1, mean, max, diagonal = vg_diagonal(truth->head->reference, truth->head->mesh.nv);
+    if (vg_measures_new(&x, &truth->head->mesh, truth->head->reference, opts.centred, &e) < 0) cli_die(&e);
+    if (opts.frames) report_table(r, "frame_errors", "", false, frame_columns, COLUMNS_FRAME);
+    for (bool more[2] = {true, true}; more[0] || more[1];) {
+        more[0] = more[0] && next(truth);
+        more[1] = more[1] && next(result);
+        if (!more[0] || !more[1]) continue;
+        const char *name = truth->frame.name;
+        if (strcmp(name, result->frame.name))
+            cli_note("frame %zu is '%s' in '%s' and '%s' in '%s'", truth->frames - 1, name, truth->name,
+                     result->frame.name, result->name);
+        if (vg_measures_add(x, truth->frame.values, result->frame.values, &mean, &max, NULL, &e) < 0) cli_die(&e);
+        if (max > worst) {
+            worst = max;
+            free(found->worst_frame);
+            found->worst_frame = strdup(name);
+        }
+        if (opts.frames) report_frame(r, truth->frames - 1, name, mean, max, diagonal);
+        cli_progress("frame", truth->frames);
+    }
+    vg_measures_get(x, &found->measures);
+    vg_measures_free(&x);
+}
+
+static void report_sides(report *r, const side *truth, const side *result, const vg_measure_report *m)
+{
+    const side *const sides[2] = {truth, result};
+    static const char *const keys[2] = {"truth", "result"};
+    report_put(r, "comparable", NULL, report_flag(true));
+    for (int i = 0; i < 2; i++) {
+        char line[600];
+        snprintf(line, sizeof line, "%.500s, %zu frame%s", sides[i]->name, sides[i]->frames,
+                 sides[i]->frames == 1 ? "" : "s");
+        report_put(r, NULL, keys[i], report_text(line));
+        report_group(r, keys[i]);
+        report_put(r, "name", NULL, report_text(sides[i]->name));
+        report_put(r, "frames", NULL, report_count(sides[i]->frames));
+        report_end(r);
+    }
+    report_put(r, "frames", "compared", report_count(m->frames));
+    report_put(r, "vertices", "vertices", report_count(m->vertices));
+    report_put(r, "faces", "faces", report_count(m->faces));
+    report_put(r, "D", "D", report_number(m->diagonal));
+    report_put(r, "centred", "centred", report_flag(opts.centred));
+}
+
+static void report_error(report *r, const char *name, double error, double diagonal, const char *where,
+                         const report_value place[3])
+{
+    const report_value row[COLUMNS_ERROR] = {
+        report_text(name), report_number(error), report_number(in_diagonals(error, diagonal)), report_text(where),
+        place[0], place[1], place[2]};
+    report_row(r, row);
+}
+
+static void report_vertices(report *r, const findings *found)
+{
+    const vg_measure_report *m = &found->measures;
+    const report_value nowhere[3] = {report_nothing(), report_nothing(), report_nothing()};
+    const char *name = found->worst_frame ? found->worst_frame : "";
+    const report_value worst[3] = {report_count(m->max_vertex), report_count(m->max_frame), report_text(name)};
+    const report_value unsteady[3] = {report_count(m->sigma_vertex), report_nothing(), report_nothing()};
+    char at_max[600] = "", at_sigma[60] = "";
+    if (m->max > 0)
+        snprintf(at_max, sizeof at_max, "vertex %zu of frame %zu '%.500s'", m->max_vertex, m->max_frame, name);
+    if (m->sigma > 0) snprintf(at_sigma, sizeof at_sigma, "vertex %zu", m->sigma_vertex);
+    report_gap(r);
+    report_table(r, "vertex_error", "", true, error_columns, COLUMNS_ERROR);
+    report_error(r, "mean", m->mean, m->diagonal, "", nowhere);
+    report_error(r, "rms", m->rms, m->diagonal, "", nowhere);
+    report_error(r, "p95", m->p95, m->diagonal, "", nowhere);
+    report_error(r, "max", m->max, m->diagonal, at_max, m->max > 0 ? worst : nowhere);
+    report_error(r, "sigma", m->sigma, m->diagonal, at_sigma, m->sigma > 0 ? unsteady : nowhere);
+}
+
+static void report_faces(report *r, const vg_measure_report *m)
+{
+    const report_value rows[2][COLUMNS_FACE] = {
+        {report_text("orientation"), report_number(m->orientation_mean), report_number(m->orientation_sd),
+         report_number(m->orientation_max)},
+        {report_text("area"), report_number(m->area_mean), report_number(m->area_sd), report_number(m->area_max)}};
+    bool any = m->faces_measured > 0;
+    if (any) report_gap(r);
+    report_put(r, "faces_measured", NULL, report_count(m->faces_measured));
+    report_table(r, "face_error", any ? "" : NULL, true, face_columns, COLUMNS_FACE);
+    report_row(r, rows[0]);
+    report_row(r, rows[1]);
+    any = m->planarity_faces[0] || m->planarity_faces[1];
+    if (any) report_gap(r);
+    report_table(r, "planarity", any ? "" : NULL, true, planarity_columns, COLUMNS_PLANARITY);
+    for (int i = 0; i < 2; i++) {
+        const report_value row[COLUMNS_PLANARITY] = {
+            report_text(i ? "result" : "truth"), report_count(m->planarity_faces[i]),
+            report_number(m->planarity_mean[i]), report_number(m->planarity_max[i]),
+            report_counts(m->planarity_histogram[i], 10)};
+        report_row(r, row);
+    }
+}
+
+static double error_asked_for(const vg_measure_report *m)
+{
+    double error = !strcmp(opts.of, "mean") ? m->mean : !strcmp(opts.of, "rms") ? m->rms
+                 : !strcmp(opts.of, "p95") ? m->p95 : m->max;
+    return in_diagonals(error, m->diagonal);
+}
+
+/* Does the result satisfy? Says so in the report when a tolerance was given. */
+static bool judge(report *r, const vg_measure_report *m)
+{
+    if (opts.tolerance < 0) return true;
+    double error = error_asked_for(m);
+    bool within = error <= opts.tolerance;
+    report_gap(r);
+    report_note(r, "%s error %.6g D %s the tolerance of %.6g D", opts.of, error, within ? "is within" : "exceeds",
+                opts.tolerance);
+    report_group(r, "tolerance");
+    report_put(r, "of", NULL, report_text(opts.of));
+    report_put(r, "limit", NULL, report_number(opts.tolerance));
+    report_put(r, "error", NULL, report_number(error));
+    report_put(r, "within", NULL, report_flag(within));
+    report_end(r);
+    return within;
+}
+
+static void parse_options(int argc, char **argv, char ***operands)
+{
+    size_t n = cli_start(&program, argc, argv, operands);
+    if (n < 2) cli_usage("two sequences are needed: TRUTH and RESULT");
+    if (!strcmp((*operands)[0], "-") && !strcmp((*operands)[1], "-"))
+        cli_usage("only one of the two sequences can be standard input");
+    if (strcmp(opts.of, "mean") && strcmp(opts.of, "rms") && strcmp(opts.of, "p95") && strcmp(opts.of, "max"))
+        cli_usage("option '--of' needs mean, rms, p95 or max, not '%s'", opts.of);
+}
+
+int main(int argc, char **argv)
+{
+    char **operands;
+    side truth = {0}, result = {0};
+    findings found = {0};
+    parse_options(argc, argv, &operands);
+    open_side(&truth, operands[0]);
+    open_side(&result, operands[1]);
+    check_same_mesh(&truth, &result);
+
+    report *frames = report_new(), *r = report_new();
+    compare(&truth, &result, &found, frames);
+    report_sides(r, &truth, &result, &found.measures);
+    report_vertices(r, &found);
+    report_faces(r, &found.measures);
+    bool same_length = truth.frames == result.frames, satisfied = judge(r, &found.measures);
+    if (opts.frames) report_gap(r);
+    report_join(r, frames);
+
+    FILE *f = cli_text_open();
+    report_print(r, f, cli.json);
+    report_free(&r);
+    free(found.worst_frame);
+    close_side(&truth);
+    close_side(&result);
+    cli_text_end();
+    if (!same_length)
+        cli_no("'%s' has %zu frames and '%s' has %zu: only the first %zu were compared", truth.name, truth.frames,
+               result.name, result.frames, found.measures.frames);
+    cli_finish(satisfied ? 0 : 1);
+}

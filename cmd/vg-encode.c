@@ -1,0 +1,154 @@
+/* vg-encode: read poses from mesh files, archives, directories or streams into one stream.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "cli.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static struct {
+    bool vectors, f32;
+    const char *faces, *reference, *anchors;
+    double fps;
+} opts;
+
+static const cli_option options[] = {
+    {"vectors", 0, NULL, "write the vectors of the vector graph instead of vertices", .flag = &opts.vectors},
+    {"faces", 0, "all|selected", "which faces carry vectors: all (default), or about half of them", .text = &opts.faces},
+    {"reference", 0, "MESH", "the undeformed pose; default: the first pose", .text = &opts.reference},
+    {"anchor", 0, "V,V,...", "vertices that vg-solve must meet exactly", .text = &opts.anchors},
+    {"fps", 0, "N", "give the poses times, N a second, from 0", .number = &opts.fps, .least = 1e-6, .most = 1e9},
+    {"f32", 0, NULL, "write binary32 instead of binary64", .flag = &opts.f32},
+    {NULL}};
+
+static const cli_program program = {
+    .name = "vg-encode",
+    .synopsis = "[options] [FILE ...]",
+    .summary = "read poses from mesh files, archives, directories or streams into one stream",
+    .options = options,
+    .most_operands = SIZE_MAX,
+    .writes_stream = true};
+
+static bool selects_faces(void)
+{
+    if (!opts.faces || !strcmp(opts.faces, "all")) return false;
+    if (strcmp(opts.faces, "selected")) cli_usage("--faces is 'all' or 'selected', not '%s'", opts.faces);
+    return true;
+}
+
+static void set_reference(vg_head *h, const char *operand)
+{
+    vg_err e;
+    vg_head r = {0};
+    if (vg_load_mesh(&r, operand, &e) < 0 ||
+        vg_mesh_same(&r.mesh, "the reference", &h->mesh, "the sequence", &e) < 0 ||
+        vg_head_merge_trace(h, &r, &e) < 0)
+        cli_die(&e);
+    free(h->reference);
+    free(h->reference_name);
+    h->reference = r.reference, h->reference_name = r.reference_name;
+    r.reference = NULL, r.reference_name = NULL;
+    if (r.attributes.ntex || r.attributes.nlabels) {
+        vg_attributes_clear(&h->attributes);
+        h->attributes = r.attributes;
+        r.attributes = (vg_attributes){0};
+    }
+    free(h->links); /* they were chosen on the other reference */
+    h->links = NULL, h->nlinks = 0, h->has_links = false;
+    vg_head_clear(&r);
+}
+
+static void set_anchors(vg_head *h, uint32_t *anchors, size_t n)
+{
+    if (n && anchors[n - 1] >= h->mesh.nv)
+        cli_usage("--anchor names vertex %u of %zu", anchors[n - 1], h->mesh.nv);
+    free(h->anchors);
+    h->anchors = anchors, h->nanchors = n;
+}
+
+static void select_faces(vg_head *h)
+{
+    vg_err e;
+    if (h->has_selection) return;
+    if (vg_select_faces(&h->mesh, &h->selected, &h->nselected, &e) < 0) cli_die(&e);
+    h->has_selection = true;
+    cli_note("%zu of %zu faces carry vectors", h->nselected, h->mesh.nf);
+}
+
+/* What the options change about a sequence is about vertices: a stream of anything else is passed on as it is. */
+static void prepare(vg_head *h, bool selects, uint32_t *anchors, size_t nanchors)
+{
+    vg_err e;
+    if (h->kind != VG_VERTICES) {
+        if (opts.vectors && h->kind == VG_VECTORS) opts.vectors = false;
+        if (opts.vectors || selects || opts.reference || opts.anchors) {
+            vg_fail(&e, VG_EINPUT, "the input holds %s: --vectors, --faces, --reference and --anchor need vertices",
+                    vg_kind_name(h->kind));
+            cli_die(&e);
+        }
+    } else {
+        if (opts.reference) set_reference(h, opts.reference);
+        if (selects) select_faces(h);
+        if (opts.anchors) set_anchors(h, anchors, nanchors);
+    }
+    if (opts.f32) h->precision = VG_F32;
+}
+
+static void write_as_is(vg_source *s, vg_head *h)
+{
+    vg_err e;
+    vg_frame f = {0};
+    uint64_t n = 0;
+    int r;
+    cli_stream_open(h);
+    for (; (r = vg_source_next(s, &f, &e)) > 0; n++) {
+        if (opts.fps > 0) f.has_time = true, f.time = (double)n / opts.fps;
+        cli_stream_put(&f);
+        cli_progress("poses", n + 1);
+    }
+    if (r < 0) cli_die(&e);
+    vg_frame_clear(&f);
+}
+
+static void write_vectors(vg_source *s, vg_head *h)
+{
+    vg_err e;
+    vg_graph *g;
+    vg_frame in = {0}, out = {0};
+    uint64_t n = 0;
+    int r;
+    if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&g, h, &e) < 0) cli_die(&e);
+    h->kind = VG_VECTORS, h->count = vg_graph_corners(g);
+    if (vg_frame_shape(&out, h, &e) < 0) cli_die(&e);
+    cli_stream_open(h);
+    for (; (r = vg_source_next(s, &in, &e)) > 0; n++) {
+        if (vg_frame_label(&out, &in, &e) < 0) cli_die(&e);
+        if (opts.fps > 0) out.has_time = true, out.time = (double)n / opts.fps;
+        vg_graph_vectors(g, in.values, out.values);
+        vg_graph_root(g, in.values, out.root);
+        vg_graph_anchors(in.values, h->anchors, h->nanchors, out.anchors);
+        cli_stream_put(&out);
+        cli_progress("poses", n + 1);
+    }
+    if (r < 0) cli_die(&e);
+    vg_frame_clear(&in);
+    vg_frame_clear(&out);
+    vg_graph_free(&g);
+}
+
+int main(int argc, char **argv)
+{
+    char **operands;
+    size_t n = cli_start(&program, argc, argv, &operands), nanchors = 0;
+    uint32_t *anchors = NULL;
+    bool selects = selects_faces();
+    if (opts.anchors) nanchors = cli_parse_vertices("--anchor", opts.anchors, &anchors);
+
+    vg_source *s = cli_source(operands, n);
+    vg_head *h = vg_source_head(s);
+    prepare(h, selects, anchors, nanchors);
+    if (opts.vectors) write_vectors(s, h);
+    else write_as_is(s, h);
+    cli_stream_end(vg_source_tail(s));
+    vg_source_close(&s);
+    cli_finish(0);
+}

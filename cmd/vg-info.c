@@ -1,0 +1,381 @@
+/* vg-info.c: say what is in a sequence, whether it is whole, and who made it.
+ * Leaves out changing anything: it writes text.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "cli.h"
+#include "report.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static struct {
+    bool check, frames, digest;
+} opts;
+
+static const cli_option options[] = {
+    {.name = "check", .help = "read everything and only say whether it is whole", .flag = &opts.check},
+    {.name = "digest", .help = "only print a fingerprint of the content: 16 hexadecimal digits",
+     .flag = &opts.digest},
+    {.name = "frames", .help = "list the frames", .flag = &opts.frames},
+    {0},
+};
+
+static const cli_program program = {
+    .name = "vg-info",
+    .synopsis = "[options] [FILE]",
+    .summary = "Say what is in a sequence, whether it is whole, and who made it",
+    .options = options,
+    .most_operands = 1,
+    .writes_text = true,
+};
+
+/* What reading all frames tells. */
+typedef struct contents {
+    uint64_t frames, timed, extra; /* extra: unknown records before frames */
+    char *first, *last;            /* names */
+    double first_time, last_time;
+    uint64_t digest;
+} contents;
+
+static const report_column size_columns[] = {{.key = "size"}, {.key = "faces"}};
+static const report_column record_columns[] = {{.key = "tag"}, {.key = "bytes"}};
+static const report_column provenance_columns[] = {
+    {.key = "program"}, {.key = "version"}, {.key = "args"}, {.key = "parents"}};
+static const report_column vertex_columns[] = {
+    {.key = "frame", .title = "frame"}, {.key = "name", .title = "name"},    {.key = "time", .title = "time"},
+    {.key = "x", .title = "centroid x"}, {.key = "y", .title = "centroid y"}, {.key = "z", .title = "centroid z"}};
+static const report_column value_columns[] = {
+    {.key = "frame", .title = "frame"}, {.key = "name", .title = "name"}, {.key = "time", .title = "time"},
+    {.key = "least", .title = "least"}, {.key = "most", .title = "most"}};
+
+static void replace_text(char **to, const char *from)
+{
+    free(*to);
+    *to = strdup(from);
+    if (*to) return;
+    vg_err e;
+    vg_fail(&e, VG_ENOMEM, "not enough memory for the name of a frame");
+    cli_die(&e);
+}
+
+/* ---------------------------------------------------------------------------------------------- frames -- */
+
+static void range_of(const double *x, size_t n, double *least, double *most)
+{
+    *least = *most = n ? x[0] : NAN;
+    for (size_t i = 1; i < n; i++) *least = fmin(*least, x[i]), *most = fmax(*most, x[i]);
+}
+
+static void list_frame(report *r, const vg_head *h, const vg_frame *f, uint64_t i)
+{
+    double at[3];
+    report_value row[6] = {report_count(i), report_text(f->name),
+                           f->has_time ? report_number(f->time) : report_nothing()};
+    if (h->kind == VG_VERTICES) {
+        vg_centroid(f->values, h->count, at);
+        for (int k = 0; k < 3; k++) row[3 + k] = report_number(at[k]);
+    } else {
+        range_of(f->values, h->count * vg_kind_width(h->kind), &at[0], &at[1]);
+        for (int k = 0; k < 2; k++) row[3 + k] = report_number(at[k]);
+    }
+    report_row(r, row);
+}
+
+static void note_frame(contents *c, const vg_frame *f)
+{
+    if (c->frames == 0) replace_text(&c->first, f->name);
+    replace_text(&c->last, f->name);
+    if (f->has_time) {
+        if (c->timed == 0) c->first_time = f->time;
+        c->last_time = f->time;
+        c->timed++;
+    }
+    c->extra += f->extra.n;
+    c->frames++;
+}
+
+/* Read to the end, which is what proves that the input is whole. `list` may be NULL. */
+static void read_all(vg_source *s, contents *c, report *list)
+{
+    const vg_head *h = vg_source_head(s);
+    vg_frame f = {0};
+    vg_digest *digest = NULL;
+    vg_err e;
+    int r;
+    bool poses = h->kind == VG_VERTICES;
+    if (list) report_table(list, "frame_list", "", false, poses ? vertex_columns : value_columns, poses ? 6 : 5);
+    if (vg_digest_new(&digest, h, &e) < 0) cli_die(&e);
+    while ((r = vg_source_next(s, &f, &e)) > 0) {
+        if (opts.digest) vg_digest_add(digest, &f);
+        if (list) list_frame(list, h, &f, c->frames);
+        note_frame(c, &f);
+        cli_progress("frame", c->frames);
+    }
+    if (r < 0) cli_die(&e);
+    c->digest = vg_digest_get(digest);
+    c->extra += vg_source_tail(s)->n;
+    vg_digest_free(&digest);
+    vg_frame_clear(&f);
+}
+
+static void report_frames(report *r, const vg_head *h, const contents *c)
+{
+    char line[700];
+    size_t most = SIZE_MAX / 64, bytes = h->count < most ? h->count * vg_kind_width(h->kind) * h->precision : 0;
+    report_put(r, "kind", NULL, report_text(vg_kind_name(h->kind)));
+    report_put(r, "precision", NULL, report_count(8 * h->precision));
+    report_put(r, "elements", NULL, report_count(h->count));
+    snprintf(line, sizeof line, "%zu %s, binary%d", h->count, vg_kind_name(h->kind), 8 * (int)h->precision);
+    report_put(r, NULL, "a frame", report_text(line));
+    report_put(r, "frame_bytes", "its bytes", report_count(bytes));
+    report_put(r, "frames", NULL, report_count(c->frames));
+    report_put(r, "first", NULL, c->frames ? report_text(c->first) : report_nothing());
+    report_put(r, "last", NULL, c->frames ? report_text(c->last) : report_nothing());
+    report_put(r, "first_time", NULL, c->timed ? report_number(c->first_time) : report_nothing());
+    report_put(r, "last_time", NULL, c->timed ? report_number(c->last_time) : report_nothing());
+    if (c->frames == 0) snprintf(line, sizeof line, "0");
+    else if (c->frames == 1) snprintf(line, sizeof line, "1: '%.300s'", c->first);
+    else snprintf(line, sizeof line, "%" PRIu64 ": '%.300s' to '%.300s'", c->frames, c->first, c->last);
+    report_put(r, NULL, "frames", report_text(line));
+    if (!c->timed) return;
+    snprintf(line, sizeof line, "%.6g s to %.6g s", c->first_time, c->last_time);
+    report_put(r, NULL, "times", report_text(line));
+}
+
+/* ------------------------------------------------------------------------------------------------ mesh -- */
+
+static uint32_t face_size(const vg_mesh *m, size_t f)
+{
+    return m->start[f + 1] - m->start[f];
+}
+
+enum { SIZES_SHOWN = 3 };
+
+/* "838: 134 of 3, 626 of 4, 78 of 5 to 21": more than a few sizes are put together. */
+static char *size_line(const vg_mesh *m, const uint64_t *count, size_t largest)
+{
+    char *line = NULL;
+    size_t bytes, kinds = 0, at = 0, first = 0;
+    uint64_t rest = 0;
+    FILE *f = open_memstream(&line, &bytes);
+    if (!f) return NULL;
+    for (size_t k = 2; k <= largest; k++) kinds += count[k] > 0;
+    fprintf(f, "%zu", m->nf);
+    for (size_t k = 2; k <= largest; k++) {
+        if (!count[k]) continue;
+        if (kinds <= SIZES_SHOWN || at < SIZES_SHOWN - 1)
+            fprintf(f, "%s%" PRIu64 " of %zu", at ? ", " : ": ", count[k], k);
+        else rest += count[k], first = first ? first : k;
+        at++;
+    }
+    if (rest) fprintf(f, ", %" PRIu64 " of %zu to %zu", rest, first, largest);
+    return fclose(f) ? NULL : line;
+}
+
+/* How many faces there are of each size, as rows in JSON and as one line in the text. */
+static void report_faces(report *r, const vg_mesh *m)
+{
+    size_t largest = 0;
+    for (size_t f = 0; f < m->nf; f++) largest = face_size(m, f) > largest ? face_size(m, f) : largest;
+    uint64_t *count = calloc(largest + 1, sizeof *count);
+    for (size_t f = 0; count && f < m->nf; f++) count[face_size(m, f)]++;
+    char *line = count ? size_line(m, count, largest) : NULL;
+    if (!line) {
+        vg_err e;
+        vg_fail(&e, VG_ENOMEM, "not enough memory to count faces of up to %zu corners", largest);
+        cli_die(&e);
+    }
+    report_put(r, "faces", NULL, report_count(m->nf));
+    report_put(r, NULL, "faces", report_text(line));
+    report_table(r, "face_sizes", NULL, false, size_columns, 2);
+    for (size_t k = 2; k <= largest; k++) {
+        const report_value row[2] = {report_count(k), report_count(count[k])};
+        if (count[k]) report_row(r, row);
+    }
+    free(line);
+    free(count);
+}
+
+static void report_components(report *r, const vg_mesh *m)
+{
+    size_t components = 0, isolated = 0;
+    vg_err e;
+    uint32_t *label = calloc(m->nv + 1, sizeof *label);
+    int ok = label ? vg_mesh_components(m, label, &components, &e) : vg_fail(&e, VG_ENOMEM, "not enough memory");
+    if (ok < 0) cli_die(&e);
+    for (size_t v = 0; v < m->nv; v++) isolated += label[v] == UINT32_MAX;
+    free(label);
+    report_put(r, "components", "components", report_count(components));
+    report_put(r, "isolated_vertices", isolated ? "isolated" : NULL, report_count(isolated));
+}
+
+static void report_mesh(report *r, const vg_head *h)
+{
+    const vg_attributes *a = &h->attributes;
+    if (!h->reference) return;
+    report_gap(r);
+    report_group(r, "mesh");
+    report_put(r, "vertices", "vertices", report_count(h->mesh.nv));
+    report_faces(r, &h->mesh);
+    report_components(r, &h->mesh);
+    report_put(r, "D", "D", report_number(vg_diagonal(h->reference, h->mesh.nv)));
+    report_put(r, "reference", "reference", report_text(h->reference_name ? h->reference_name : ""));
+    report_put(r, "texture_coordinates", a->ntex ? "texture coordinates" : NULL, report_count(a->ntex));
+    report_put(r, "labels", a->nlabels ? "labels" : NULL, report_count(a->nlabels));
+    report_put(r, "selected_faces", h->has_selection ? "selected faces" : NULL,
+               h->has_selection ? report_count(h->nselected) : report_nothing());
+    report_put(r, "links", h->has_links ? "links" : NULL, h->has_links ? report_count(h->nlinks) : report_nothing());
+    report_put(r, "anchors", h->nanchors ? "anchors" : NULL, report_count(h->nanchors));
+    report_end(r);
+}
+
+/* ------------------------------------------------------------------------------------------ provenance -- */
+
+/* An argument as a person would have to type it. */
+static void print_quoted(FILE *f, const char *s)
+{
+    static const char plain[] =
+        "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_@%+=:,./-";
+    if (*s && !s[strspn(s, plain)]) {
+        fputs(s, f);
+        return;
+    }
+    fputc('\'', f);
+    for (; *s; s++) *s == '\'' ? fputs("'\\''", f) : fputc(*s, f);
+    fputc('\'', f);
+}
+
+static void note_process(report *r, const vg_provenance *p, size_t depth)
+{
+    char *line = NULL;
+    size_t size;
+    FILE *f = open_memstream(&line, &size);
+    if (!f) return;
+    if (p->nargs == 0) print_quoted(f, p->program);
+    for (size_t i = 0; i < p->nargs; i++) {
+        if (i) fputc(' ', f);
+        print_quoted(f, p->args[i]);
+    }
+    fclose(f);
+    report_note(r, "  %*s%s", (int)(2 * (depth < 20 ? depth : 20)), "", line);
+    free(line);
+}
+
+typedef struct step {
+    size_t process, depth;
+} step;
+
+/* The last process first, and below each what it read from. Every process is shown once, so that the tree is never
+ * longer than the list. */
+static void note_tree(report *r, const vg_head *h)
+{
+    size_t n = h->nprovenance, nedges = n;
+    for (size_t i = 0; i < n; i++) nedges += h->provenance[i].nparents;
+    step *todo = calloc(nedges + 1, sizeof *todo);
+    bool *shown = calloc(n + 1, sizeof *shown);
+    for (size_t root = n; todo && shown && root-- > 0;) {
+        size_t open = 0;
+        if (!shown[root]) todo[open++] = (step){root, 0};
+        while (open) {
+            step s = todo[--open];
+            const vg_provenance *p = &h->provenance[s.process];
+            if (shown[s.process]) continue;
+            shown[s.process] = true;
+            note_process(r, p, s.depth);
+            for (size_t i = 0; i < p->nparents; i++) todo[open++] = (step){p->parents[i], s.depth + 1};
+        }
+    }
+    free(todo);
+    free(shown);
+}
+
+static void report_provenance(report *r, const vg_head *h)
+{
+    if (h->nprovenance) {
+        report_gap(r);
+        report_note(r, "made by");
+        note_tree(r, h);
+    }
+    report_table(r, "provenance", NULL, false, provenance_columns, 4);
+    for (size_t i = 0; i < h->nprovenance; i++) {
+        const vg_provenance *p = &h->provenance[i];
+        uint64_t *parents = calloc(p->nparents + 1, sizeof *parents);
+        for (size_t k = 0; parents && k < p->nparents; k++) parents[k] = p->parents[k];
+        const report_value row[4] = {report_text(p->program), report_text(p->version),
+                                     report_texts((const char *const *)p->args, p->nargs),
+                                     report_counts(parents, parents ? p->nparents : 0)};
+        report_row(r, row);
+        free(parents);
+    }
+}
+
+static void report_unknown(report *r, const vg_head *h, const contents *c)
+{
+    report_put(r, "unknown_records", NULL, report_count(h->extra.n + c->extra));
+    report_table(r, "unknown_head_records", NULL, false, record_columns, 2);
+    for (size_t i = 0; i < h->extra.n; i++) {
+        const report_value row[2] = {report_text(h->extra.at[i].tag), report_count(h->extra.at[i].payload.size)};
+        report_row(r, row);
+    }
+    if (h->extra.n + c->extra == 0) return;
+    report_gap(r);
+    report_note(r, "records this version does not know: %zu before the frames, %" PRIu64 " between and behind them",
+                h->extra.n, c->extra);
+}
+
+/* ------------------------------------------------------------------------------------------------ main -- */
+
+/* operand NULL: standard input. Archives and streams have a size worth telling; a pipe has none. */
+static void report_name(report *r, const char *operand)
+{
+    struct stat st;
+    bool file = !(operand ? stat(operand, &st) : fstat(STDIN_FILENO, &st)) && S_ISREG(st.st_mode);
+    report_put(r, "name", "name", report_text(operand ? operand : "standard input"));
+    report_put(r, "bytes", file ? "bytes" : NULL, file ? report_count((uint64_t)st.st_size) : report_nothing());
+}
+
+static void report_all(report *r, const char *operand, const vg_head *h, const contents *c)
+{
+    report_name(r, operand);
+    report_frames(r, h, c);
+    report_mesh(r, h);
+    report_provenance(r, h);
+    report_unknown(r, h, c);
+}
+
+static void report_check(report *r)
+{
+    report_put(r, "whole", NULL, report_flag(true));
+    if (!cli.quiet) report_note(r, "whole");
+}
+
+static void report_digest(report *r, const contents *c)
+{
+    char text[20];
+    snprintf(text, sizeof text, "%016" PRIx64, c->digest);
+    report_put(r, "digest", NULL, report_text(text));
+    report_note(r, "%s", text);
+}
+
+int main(int argc, char **argv)
+{
+    char **operands;
+    contents c = {0};
+    size_t n = cli_start(&program, argc, argv, &operands);
+    if (opts.check + opts.digest + opts.frames > 1)
+        cli_usage("only one of --check, --digest and --frames can be asked for");
+    vg_source *s = cli_source(operands, n);
+    report *r = report_new(), *list = opts.frames ? report_new() : NULL;
+    read_all(s, &c, list);
+    const char *operand = n && strcmp(operands[0], "-") ? operands[0] : NULL;
+    if (opts.check) report_check(r);
+    else if (opts.digest) report_digest(r, &c);
+    else if (!list || cli.json) report_all(r, operand, vg_source_head(s), &c);
+    if (list) report_join(r, list);
+    report_print(r, cli_text_open(), cli.json);
+    cli_text_end();
+    report_free(&r);
+    vg_source_close(&s);
+    cli_finish(0);
+}

@@ -1,0 +1,651 @@
+#!/usr/bin/env python3
+"""read_stream.py: a stand-alone reader of the vg stream, version 1: Python 3.9 or later, standard library only.
+
+It was written from fmt/STREAM.md and shares no code with the programs, so it is their independent witness: it checks
+everything the specification demands. It leaves out writing, and reconstruction (that takes a sparse solver).
+
+    python3 read_stream.py [FILE]           what is in it, in a few lines ("-" or nothing: standard input)
+    python3 read_stream.py --json [FILE]    the whole content as JSON
+    python3 read_stream.py --check [FILE]   say nothing when it is whole
+
+Exit status: 0 whole, 2 wrong usage, 3 malformed or truncated, 4 the system refused.
+
+As a module: read_stream(path or binary file) gives a Stream, or raises StreamError.
+
+SPDX-License-Identifier: GPL-3.0-or-later
+"""
+from __future__ import annotations
+
+import json
+import math
+import struct
+import sys
+from array import array
+from dataclasses import dataclass, field
+
+MAGIC = b"\x89VGS\r\n\x1a1"
+CRITICAL, COPY_SAFE, MUST_BE_ZERO = 1, 2, 0xFFFC
+LENGTH_LIMIT = 1 << 40
+INDEX_LIMIT = (1 << 32) - 1  # vertices and corners are fewer
+NO_TEXTURE = 0xFFFFFFFF
+KINDS = {1: "vertices", 2: "vectors", 3: "deformations", 4: "transforms"}
+WIDTH = {"vertices": 3, "vectors": 3, "deformations": 4, "transforms": 7}
+LABEL_KINDS = {1: "object", 2: "group", 3: "material", 4: "smoothing", 5: "library"}
+TAG_BYTES = frozenset(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 ")
+
+
+class StreamError(ValueError):
+    """The input is not a whole and valid stream."""
+
+
+# ---- what was read -------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Record:
+    """One record as it stands in the stream; payload only of records whose tag this reader does not know."""
+    tag: str
+    flags: int
+    offset: int
+    length: int
+    payload: bytes = b""
+
+
+@dataclass
+class Mesh:
+    nv: int
+    start: array  # 'I' or 'L', nf + 1 entries
+    vert: array
+
+    @property
+    def nf(self) -> int:
+        return len(self.start) - 1
+
+    def face(self, f: int) -> array:
+        return self.vert[self.start[f]:self.start[f + 1]]
+
+    def faces(self):
+        return [list(self.face(f)) for f in range(self.nf)]
+
+
+@dataclass
+class Texture:
+    dim: int
+    coordinates: array  # 'd', nt * dim
+    corners: array      # per corner an index, or NO_TEXTURE
+
+
+@dataclass
+class Provenance:
+    program: str
+    version: str
+    parents: list
+    args: list
+
+
+@dataclass
+class Frame:
+    name: str
+    time: object  # seconds, or None
+    root: object  # [x, y, z] for vectors and deformations, else None
+    anchors: object  # array 'd', or None
+    values: array
+    extra: list = field(default_factory=list)
+
+
+@dataclass
+class Stream:
+    minor: int = 0
+    records: list = field(default_factory=list)  # all of them, END too
+    provenance: list = field(default_factory=list)
+    mesh: object = None
+    texture: object = None
+    labels: object = None     # list of (face, kind name, text)
+    selection: object = None  # array, or None: all faces
+    links: object = None      # array of pairs
+    anchors: object = None
+    reference: object = None  # array 'd'
+    reference_name: object = None
+    kind: str = ""
+    precision: int = 0
+    count: int = -1
+    frames: list = field(default_factory=list)
+    extra: list = field(default_factory=list)
+    tail: list = field(default_factory=list)
+    checksum: int = 0
+
+    def graph(self):
+        """The faces that carry vectors, as lists of vertices: the selected ones in order, then the links."""
+        chosen = range(self.mesh.nf) if self.selection is None else self.selection
+        links = self.links if self.links is not None else ()
+        return [list(self.mesh.face(f)) for f in chosen] + [list(links[i:i + 2]) for i in range(0, len(links), 2)]
+
+    def vectors_of(self, positions) -> list:
+        """The vector of every corner of the graph at these vertex positions (x y z x y z ...), flat."""
+        out = []
+        for face in self.graph():
+            for_axis = [[positions[3 * v + k] for v in face] for k in range(3)]
+            mean = [math.fsum(a) / len(face) for a in for_axis]
+            for i in range(len(face)):
+                out += [for_axis[k][i] - mean[k] for k in range(3)]
+        return out
+
+    def root_of(self, positions) -> list:
+        """The mean position of the vertices that are in a face of the graph."""
+        used = sorted({v for face in self.graph() for v in face})
+        return [math.fsum(positions[3 * v + k] for v in used) / max(len(used), 1) for k in range(3)]
+
+
+def rotate(q, r) -> list:
+    """Q r Q*: the vector r turned by the quaternion q = w x y z and scaled by |q|^2."""
+    w, x, y, z = q
+    tx, ty, tz = y * r[2] - z * r[1], z * r[0] - x * r[2], x * r[1] - y * r[0]
+    dot = x * r[0] + y * r[1] + z * r[2]
+    square = w * w - x * x - y * y - z * z
+    return [square * r[0] + 2 * (dot * x + w * tx),
+            square * r[1] + 2 * (dot * y + w * ty),
+            square * r[2] + 2 * (dot * z + w * tz)]
+
+
+# ---- XXH64 with seed 0 (github.com/Cyan4973/xxHash, doc/xxhash_spec.md) -----------------------------------------
+
+_M = 0xFFFFFFFFFFFFFFFF
+_P1, _P2, _P3 = 0x9E3779B185EBCA87, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9
+_P4, _P5 = 0x85EBCA77C2B2AE63, 0x27D4EB2F165667C5
+
+
+def _rotl(x: int, n: int) -> int:
+    return (x << n | x >> (64 - n)) & _M
+
+
+def _stripes(data) -> int:
+    a, b, c, d = (_P1 + _P2) & _M, _P2, 0, -_P1 & _M
+    for p, q, r, s in struct.iter_unpack("<4Q", data):  # the hot loop: four lanes, written out
+        a = a + p * _P2 & _M
+        a = (a << 31 | a >> 33) * _P1 & _M
+        b = b + q * _P2 & _M
+        b = (b << 31 | b >> 33) * _P1 & _M
+        c = c + r * _P2 & _M
+        c = (c << 31 | c >> 33) * _P1 & _M
+        d = d + s * _P2 & _M
+        d = (d << 31 | d >> 33) * _P1 & _M
+    h = (_rotl(a, 1) + _rotl(b, 7) + _rotl(c, 12) + _rotl(d, 18)) & _M
+    for lane in (a, b, c, d):
+        h = ((h ^ _rotl(lane * _P2 & _M, 31) * _P1 & _M) * _P1 + _P4) & _M
+    return h
+
+
+def xxh64(data) -> int:
+    n = len(data)
+    whole = n & ~31
+    h = _stripes(memoryview(data)[:whole]) if whole else _P5
+    h = (h + n) & _M
+    at = whole
+    while at + 8 <= n:
+        lane = int.from_bytes(data[at:at + 8], "little")
+        h = (_rotl(h ^ _rotl(lane * _P2 & _M, 31) * _P1 & _M, 27) * _P1 + _P4) & _M
+        at += 8
+    if at + 4 <= n:
+        h = (_rotl(h ^ int.from_bytes(data[at:at + 4], "little") * _P1 & _M, 23) * _P2 + _P3) & _M
+        at += 4
+    while at < n:
+        h = _rotl(h ^ data[at] * _P5 & _M, 11) * _P1 & _M
+        at += 1
+    h = (h ^ h >> 33) * _P2 & _M
+    h = (h ^ h >> 29) * _P3 & _M
+    return h ^ h >> 32
+
+
+# ---- bytes ---------------------------------------------------------------------------------------------------------
+
+_U32 = next(code for code in "IL" if array(code).itemsize == 4)
+
+
+def _numbers(code: str, data) -> array:
+    a = array(code)
+    a.frombytes(data)
+    if sys.byteorder == "big":
+        a.byteswap()
+    return a
+
+
+class _Payload:
+    """The payload of one record, taken from front to back. What it cannot give is an error of that record."""
+
+    def __init__(self, record: Record, data: bytes):
+        self.data, self.at = data, 0
+        self.where = f"record {record.tag}"  # how messages call it
+        self.short = "it is shorter than its counts say"
+        self.long = "bytes are left over"
+
+    def fail(self, what: str):
+        raise StreamError(f"{self.where}: {what}")
+
+    def left(self) -> int:
+        return len(self.data) - self.at
+
+    def take(self, n: int):
+        if n > self.left():
+            self.fail(self.short)
+        self.at += n
+        return memoryview(self.data)[self.at - n:self.at]
+
+    def u32(self) -> int:
+        return int.from_bytes(self.take(4), "little")
+
+    def u64(self) -> int:
+        return int.from_bytes(self.take(8), "little")
+
+    def f64(self) -> float:
+        return struct.unpack("<d", self.take(8))[0]
+
+    def u32s(self, n: int) -> array:
+        return _numbers(_U32, self.take(4 * n))
+
+    def f64s(self, n: int, what: str, code: str = "d") -> array:
+        a = _numbers(code, self.take((8 if code == "d" else 4) * n))
+        if not all(map(math.isfinite, a)):
+            self.fail(f"{what} is not finite")
+        return a
+
+    def zero(self, n: int, what: str):
+        if any(self.take(n)):
+            self.fail(f"{what} not zero")
+
+    def text(self, n: int, long: str = "a text is longer than its record", bad: str = "a text is no UTF-8") -> str:
+        if n > self.left():
+            self.fail(long)
+        data = bytes(self.take(n))
+        try:
+            s = data.decode("utf-8")
+        except UnicodeDecodeError:
+            self.fail(bad)
+        if "\0" in s:  # NUL is not allowed either
+            self.fail(bad)
+        return s
+
+    def string(self) -> str:
+        if self.left() < 4:
+            self.fail("a text is longer than its record")
+        return self.text(self.u32())
+
+    def pad(self):
+        self.zero(-self.at % 8, "padding is missing or")
+
+    def end(self):
+        if self.left():
+            self.fail(self.long)
+
+    def fits(self, message: str):
+        """From here on it is this that is wrong when the payload is too short or too long."""
+        self.short = self.long = message
+
+
+class _Input:
+    """A binary file read forward only, in pieces, so that a false length cannot ask for memory."""
+
+    def __init__(self, file):
+        self.file, self.at = file, 0
+
+    def upto(self, n: int) -> bytes:
+        parts = []
+        while n > 0:
+            part = self.file.read(min(n, 1 << 20))
+            if not part:
+                break
+            parts.append(part)
+            n -= len(part)
+            self.at += len(part)
+        return b"".join(parts)
+
+
+# ---- the reader ----------------------------------------------------------------------------------------------------
+
+
+class _Reader:
+    def __init__(self, file):
+        self.input = _Input(file)
+        self.stream = Stream()
+        self.pending = []  # unknown records since the last frame
+        self.seen = set()
+        self.sums = bytearray()
+        self.done = False
+
+    def read(self) -> Stream:
+        self.file_header()
+        while not self.done:
+            self.record()
+        if self.input.upto(1):
+            raise StreamError("it goes on behind the END mark")
+        return self.stream
+
+    def file_header(self):
+        head = self.input.upto(16)
+        if not head:
+            raise StreamError("it is empty: did the program before it fail?")
+        if len(head) >= 4 and head[:4] != MAGIC[:4]:
+            raise StreamError("it is no vg stream")
+        if len(head) >= 7 and head[:7] != MAGIC[:7]:
+            raise StreamError("it was damaged by a transfer that changes line ends")
+        if len(head) < 16:
+            raise StreamError("it ends inside the stream's first 16 bytes")
+        if head[7] != MAGIC[7]:
+            raise StreamError(f"it is a stream of major version {chr(head[7])!r}: this program reads version 1")
+        self.stream.minor, reserved = struct.unpack("<II", head[8:])
+        if reserved:
+            raise StreamError("reserved bytes of the file header are not zero")
+
+    def truncated(self):
+        raise StreamError(f"it is cut short: it ends at byte {self.input.at}, without the END mark")
+
+    def record(self):
+        offset, index = self.input.at, self.index()
+        head = self.input.upto(32)
+        if len(head) < 32:
+            self.truncated()
+        tag, flags, length, payload_sum, head_sum = struct.unpack("<4sIQQQ", head)
+        if xxh64(head[:24]) != head_sum:
+            raise StreamError(f"the header of record {index} is damaged (checksum), at byte {offset}")
+        if not TAG_BYTES.issuperset(tag):
+            raise StreamError(f"the tag of record {index} is malformed, at byte {offset}")
+        record = Record(tag.decode("ascii"), flags, offset, length)
+        if flags & MUST_BE_ZERO:
+            raise StreamError(f"record {index} ({record.tag}) has reserved flags set")
+        if length > LENGTH_LIMIT:
+            raise StreamError(f"record {index} ({record.tag}) claims {length} bytes; the limit is 2^40")
+        self.payload(record, payload_sum)
+        self.sums += head[24:]
+        self.stream.records.append(record)
+
+    def index(self) -> int:
+        return len(self.stream.records)
+
+    def payload(self, record: Record, payload_sum: int):
+        handler = self.HANDLERS.get(record.tag)
+        if handler is None and record.flags & CRITICAL:
+            raise StreamError(f"it has a record '{record.tag}' that must be understood, and is not known here")
+        padding = -record.length % 8
+        data = self.input.upto(record.length + padding)
+        if len(data) < record.length + padding:
+            self.truncated()
+        if any(data[record.length:]):
+            raise StreamError(f"the padding of record {self.index()} ({record.tag}) is not zero")
+        data = data[:record.length]
+        if xxh64(data) != payload_sum:
+            raise StreamError(f"record {self.index()} ({record.tag}) is damaged (checksum)")
+        if handler is None:
+            record.payload = data
+            self.pending.append(record)
+            return
+        p = _Payload(record, data)
+        self.order(record.tag)
+        handler(self, p)
+        self.seen.add(record.tag)
+
+    def order(self, tag: str):
+        formed = "FORM" in self.seen
+        if tag in ("FRAM", "END ") and not formed:
+            raise StreamError("it has a frame before its FORM record" if tag == "FRAM" else "it has no FORM record")
+        if tag in ("FRAM", "END ", "FAIL"):
+            return
+        if formed:
+            raise StreamError(f"record {tag} must come before FORM" if tag != "FORM" else "it has two FORM records")
+        if tag in self.seen and tag != "PROV":
+            raise StreamError(f"it has two {tag} records")
+        if tag in ("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP") and "MESH" not in self.seen:
+            raise StreamError(f"record {tag} must come after MESH")
+
+    def prov(self, p: _Payload):
+        nparents, nargs = p.u32(), p.u32()
+        parents = list(p.u32s(nparents))
+        if any(x >= len(self.stream.provenance) for x in parents):
+            p.fail("it names a parent that does not come before it")
+        program, version = p.string(), p.string()
+        args = [p.string() for _ in range(nargs)]
+        p.end()
+        self.stream.provenance.append(Provenance(program, version, parents, args))
+
+    def mesh(self, p: _Payload):
+        nv, nf = p.u64(), p.u64()
+        if nv >= INDEX_LIMIT:
+            p.fail("more than 2^32 - 2 vertices")
+        sizes = p.u32s(nf)
+        start = array("Q", [0])
+        for f, size in enumerate(sizes):
+            if size < 2:
+                p.fail(f"face {f} has fewer than 2 vertices")
+            start.append(start[-1] + size)
+        if start[-1] >= INDEX_LIMIT:
+            p.fail("more than 2^32 - 2 corners")
+        p.fits("its length and its counts do not agree")
+        vert = p.u32s(start[-1])
+        p.end()
+        mesh = Mesh(nv, start, vert)
+        for f in range(nf):
+            face = mesh.face(f)
+            if max(face) >= nv:
+                p.fail(f"face {f} names vertex {max(face)} of {nv}")
+            if len(set(face)) < len(face):
+                p.fail(f"face {f} names a vertex twice")
+        self.stream.mesh = mesh
+
+    def texc(self, p: _Payload):
+        dim = p.u32()
+        p.zero(4, "a texture coordinate must have 1 to 3 numbers, or reserved bytes are")
+        if not 1 <= dim <= 3:
+            p.fail("a texture coordinate must have 1 to 3 numbers")
+        nt = p.u64()
+        p.fits("its length and its counts do not agree")
+        coordinates = p.f64s(nt * dim, "a number")
+        corners = p.u32s(len(self.stream.mesh.vert))
+        p.end()
+        if any(c >= nt and c != NO_TEXTURE for c in corners):
+            p.fail("a corner names a texture coordinate that is not there")
+        self.stream.texture = Texture(dim, coordinates, corners)
+
+    def labl(self, p: _Payload):
+        labels, last = [], 0
+        while p.left():
+            face, kind, length = p.u64(), p.u32(), p.u32()
+            if face > self.stream.mesh.nf or face < last:
+                p.fail("labels are not in the order of their faces, or of a face that is not there")
+            if kind not in LABEL_KINDS:
+                p.fail(f"a label is of unknown kind {kind}")
+            labels.append((face, LABEL_KINDS[kind], p.text(length)))
+            p.pad()
+            last = face
+        self.stream.labels = labels
+
+    def indices(self, p: _Payload, limit: int, size: int) -> array:
+        if p.left() % size:
+            p.fail("its length is no whole number of entries")
+        a = p.u32s(p.left() // 4)
+        if any(x >= limit for x in a):
+            p.fail("an index is out of range")
+        return a
+
+    def ascending(self, p: _Payload, limit: int) -> array:
+        a = self.indices(p, limit, 4)
+        if any(x >= y for x, y in zip(a, a[1:])):
+            p.fail("indices are not ascending")
+        return a
+
+    def sele(self, p: _Payload):
+        self.stream.selection = self.ascending(p, self.stream.mesh.nf)
+
+    def anch(self, p: _Payload):
+        self.stream.anchors = self.ascending(p, self.stream.mesh.nv)
+
+    def link(self, p: _Payload):
+        self.stream.links = a = self.indices(p, self.stream.mesh.nv, 8)
+        if any(x == y for x, y in zip(a[::2], a[1::2])):
+            p.fail("a link joins a vertex to itself")
+
+    def refp(self, p: _Payload):
+        length = p.u32()
+        p.zero(4, "reserved bytes are")
+        self.stream.reference_name = p.text(length)
+        p.pad()
+        p.fits("its length does not fit the number of vertices")
+        self.stream.reference = p.f64s(3 * self.stream.mesh.nv, "a position")
+        p.end()
+
+    def form(self, p: _Payload):
+        s = self.stream
+        p.fits("it has a wrong length")
+        kind, precision, s.count = p.u32(), p.u32(), p.u64()
+        p.end()
+        if kind not in KINDS:
+            p.fail("frames are of unknown kind")
+        if precision not in (4, 8):
+            p.fail("numbers are of unknown precision")
+        s.kind, s.precision = KINDS[kind], precision
+        if s.reference is None and (s.mesh is not None or s.kind != "transforms"):
+            p.fail("a MESH and a REFP record must come before it")
+        if s.kind != "transforms":
+            if s.kind != "vertices" and s.links is None:
+                p.fail("a LINK record must come before it")
+            want = s.mesh.nv if s.kind == "vertices" else sum(map(len, s.graph()))
+            if s.count != want:
+                p.fail(f"its count does not fit the mesh: {s.count}, not {want}")
+        s.extra, self.pending = self.pending, []
+
+    def fram(self, p: _Payload):
+        s = self.stream
+        p.where = f"frame {len(s.frames)}"
+        p.fits("it is too short, or unknown flags are set")
+        name_length, flags, time = p.u32(), p.u32(), p.f64()
+        if flags & ~1:
+            p.fail("it is too short, or unknown flags are set")
+        if not math.isfinite(time) or (not flags & 1 and time != 0):
+            p.fail("its time is not finite, or set without its flag")
+        wrong = "its name is longer than the record, or no UTF-8"
+        name = p.text(name_length, wrong, wrong)
+        p.pad()
+        p.where += f" ('{name}')"
+        root = anchors = None
+        if s.kind in ("vectors", "deformations"):
+            p.fits("it ends before its root and anchors")
+            root = list(p.f64s(3, "its root or an anchor"))
+            anchors = p.f64s(3 * len(s.anchors or ()), "its root or an anchor")
+        width = WIDTH[s.kind]
+        p.fits("its length does not fit the count of FORM")
+        values = p.f64s(s.count * width, "a value", "d" if s.precision == 8 else "f")
+        p.end()
+        if width > 3:
+            for i in range(0, len(values), width):
+                if not any(values[i:i + 4]):
+                    p.fail("a quaternion is zero")
+        s.frames.append(Frame(name, time if flags & 1 else None, root, anchors, values, self.pending))
+        self.pending = []
+
+    def fail(self, p: _Payload):
+        status, program, message = p.u32(), p.string(), p.string()
+        p.end()
+        raise StreamError(f"it was cut short: {program} failed with status {status}: {message}")
+
+    def end(self, p: _Payload):
+        if p.left() != 16:
+            raise StreamError("the END record has a wrong length")
+        count, running = p.u64(), p.u64()
+        if count != self.index():
+            raise StreamError(f"the END mark counts {count} records, {self.index()} came")
+        if running != xxh64(bytes(self.sums)):
+            raise StreamError("the END mark's checksum is wrong: records were changed or moved")
+        self.stream.tail, self.stream.checksum, self.done = self.pending, running, True
+
+    HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "SELE": sele, "LINK": link, "ANCH": anch,
+                "REFP": refp, "FORM": form, "FRAM": fram, "FAIL": fail, "END ": end}
+
+
+def read_stream(file) -> Stream:
+    """Read a whole stream from a path or an open binary file; StreamError unless it is valid to the last byte."""
+    if hasattr(file, "read"):
+        return _Reader(file).read()
+    with open(file, "rb") as opened:
+        return _Reader(opened).read()
+
+
+# ---- the command ---------------------------------------------------------------------------------------------------
+
+
+def _rows(a, width: int) -> list:
+    return [list(a[i:i + width]) for i in range(0, len(a), width)]
+
+
+def _extra_json(records) -> list:
+    return [{"tag": r.tag, "flags": r.flags, "payload": r.payload.hex()} for r in records]
+
+
+def _frame_json(f: Frame, width: int) -> dict:
+    anchors = None if f.anchors is None else _rows(f.anchors, 3)
+    return {"name": f.name, "time": f.time, "root": f.root, "anchors": anchors,
+            "values": _rows(f.values, width), "extra": _extra_json(f.extra)}
+
+
+def to_json(s: Stream) -> dict:
+    """The whole content as plain lists, dictionaries and numbers; what is absent is None."""
+    m, t = s.mesh, s.texture
+    return {
+        "minor": s.minor,
+        "provenance": [{"program": p.program, "version": p.version, "parents": p.parents, "args": p.args}
+                       for p in s.provenance],
+        "mesh": m and {"vertices": m.nv, "faces": m.faces()},
+        "texture": t and {"dim": t.dim, "coordinates": _rows(t.coordinates, t.dim),
+                          "corners": [None if c == NO_TEXTURE else c for c in t.corners]},
+        "labels": None if s.labels is None else [{"face": f, "kind": k, "text": x} for f, k, x in s.labels],
+        "selection": None if s.selection is None else list(s.selection),
+        "links": None if s.links is None else _rows(s.links, 2),
+        "anchors": None if s.anchors is None else list(s.anchors),
+        "reference": m and {"name": s.reference_name, "positions": _rows(s.reference, 3)},
+        "kind": s.kind, "precision": s.precision, "count": s.count,
+        "extra": _extra_json(s.extra),
+        "frames": [_frame_json(f, WIDTH[s.kind]) for f in s.frames],
+        "tail": _extra_json(s.tail),
+        "records": len(s.records) - 1, "checksum": f"{s.checksum:016x}",
+    }
+
+
+def _summary(s: Stream) -> str:
+    lines = [f"{len(s.frames)} frames of {s.count} {s.kind}, binary{8 * s.precision}"]
+    if s.mesh is not None:
+        m = s.mesh
+        lines.append(f"{m.nv} vertices, {m.nf} faces, {len(m.vert)} corners, reference '{s.reference_name}'")
+    for what, n in (("selected faces", s.selection and len(s.selection)), ("links", s.links and len(s.links) // 2),
+                    ("anchors", s.anchors and len(s.anchors)), ("labels", s.labels and len(s.labels))):
+        if n:
+            lines.append(f"{n} {what}")
+    lines += [f"made by {p.program} {p.version}: {' '.join(p.args)}" for p in s.provenance]
+    unknown = s.extra + [r for f in s.frames for r in f.extra] + s.tail
+    if unknown:
+        lines.append("unknown records: " + " ".join(sorted({r.tag.strip() for r in unknown})))
+    return "\n".join(lines)
+
+
+def main(argv) -> int:
+    options = {a for a in argv[1:] if a.startswith("-") and a != "-"}
+    files = [a for a in argv[1:] if a not in options]
+    if options - {"--json", "--check"} or len(files) > 1:
+        print("usage: read_stream.py [--json | --check] [FILE]", file=sys.stderr)
+        return 2
+    name = files[0] if files else "-"
+    try:
+        stream = read_stream(sys.stdin.buffer if name == "-" else name)
+        if "--json" in options:
+            json.dump(to_json(stream), sys.stdout, indent=1)
+            print()
+        elif "--check" not in options:
+            print(_summary(stream))
+        sys.stdout.flush()
+    except StreamError as error:
+        shown = "standard input" if name == "-" else name
+        print(f"read_stream.py: '{shown}': {error}", file=sys.stderr)
+        return 3
+    except OSError as error:
+        print(f"read_stream.py: {error}", file=sys.stderr)
+        return 4
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv))

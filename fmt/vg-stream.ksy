@@ -1,0 +1,283 @@
+# The vg stream for Kaitai Struct: what STREAM.md says, but for what it checks (checksums, ranges, order of records).
+# SPDX-License-Identifier: GPL-3.0-or-later
+meta:
+  id: vg_stream
+  title: vg stream, major version 1
+  file-extension: vgs
+  license: GPL-3.0-or-later
+  ks-version: 0.9
+  endian: le
+doc: |
+  A mesh, its reference pose and a sequence of frames that hold vertices, vectors, deformations or transforms:
+  a file header, then records of tag, flags, length, checksums and payload, up to the END record.
+doc-ref: STREAM.md
+seq:
+  - id: file_header
+    type: file_header
+  - id: head
+    type: record
+    repeat: until
+    repeat-until: _.tag == "FORM" or _.tag == "FAIL"
+    doc: everything before the frames; the last one is FORM
+  - id: body
+    type: record
+    repeat: until
+    repeat-until: _.tag == "END " or _.tag == "FAIL"
+    if: head.last.tag == "FORM"
+    doc: frames and unknown records; the last one is END, or FAIL when the writer failed
+instances:
+  form:
+    value: head.last.payload.as<form>
+    if: head.last.tag == "FORM"
+enums:
+  kind:
+    1: vertices
+    2: vectors
+    3: deformations
+    4: transforms
+  label_kind:
+    1: object
+    2: group
+    3: material
+    4: smoothing
+    5: library
+types:
+  file_header:
+    seq:
+      - id: magic
+        contents: [0x89, 0x56, 0x47, 0x53, 0x0d, 0x0a, 0x1a, 0x31]
+      - id: minor
+        type: u4
+      - id: reserved
+        contents: [0, 0, 0, 0]
+  record:
+    seq:
+      - id: tag
+        type: str
+        size: 4
+        encoding: ASCII
+      - id: flags
+        type: u4
+      - id: len_payload
+        type: u8
+      - id: payload_sum
+        type: u8
+        doc: XXH64, seed 0, of the payload
+      - id: header_sum
+        type: u8
+        doc: XXH64, seed 0, of the 24 bytes before
+      - id: payload
+        size: len_payload
+        type:
+          switch-on: tag
+          cases:
+            '"PROV"': prov
+            '"MESH"': mesh
+            '"TEXC"': texc
+            '"LABL"': labl
+            '"SELE"': indices
+            '"LINK"': link
+            '"ANCH"': indices
+            '"REFP"': refp
+            '"FORM"': form
+            '"FRAM"': fram
+            '"FAIL"': fail
+            '"END "': end_mark
+      - id: padding
+        size: (8 - len_payload % 8) % 8
+    instances:
+      critical:
+        value: (flags & 1) != 0
+      copy_safe:
+        value: (flags & 2) != 0
+  string:
+    seq:
+      - id: len
+        type: u4
+      - id: text
+        type: str
+        size: len
+        encoding: UTF-8
+    -webide-representation: '{text}'
+  point:
+    seq:
+      - id: x
+        type: f8
+      - id: y
+        type: f8
+      - id: z
+        type: f8
+  prov:
+    seq:
+      - id: num_parents
+        type: u4
+      - id: num_args
+        type: u4
+      - id: parents
+        type: u4
+        repeat: expr
+        repeat-expr: num_parents
+        doc: positions among the PROV records
+      - id: program
+        type: string
+      - id: version
+        type: string
+      - id: args
+        type: string
+        repeat: expr
+        repeat-expr: num_args
+  mesh:
+    seq:
+      - id: num_vertices
+        type: u8
+      - id: num_faces
+        type: u8
+      - id: sizes
+        type: u4
+        repeat: expr
+        repeat-expr: num_faces
+      - id: vertices
+        type: u4
+        repeat: eos
+        doc: the vertices of all faces, one face after the other
+  texc:
+    seq:
+      - id: dimension
+        type: u4
+      - id: reserved
+        type: u4
+      - id: num_coordinates
+        type: u8
+      - id: coordinates
+        type: f8
+        repeat: expr
+        repeat-expr: num_coordinates * dimension
+      - id: corners
+        type: u4
+        repeat: eos
+        doc: one for each corner of the mesh; 0xffffffff is none
+  labl:
+    seq:
+      - id: labels
+        type: label
+        repeat: eos
+  label:
+    seq:
+      - id: face
+        type: u8
+        doc: holds from this face on
+      - id: kind
+        type: u4
+        enum: label_kind
+      - id: len_text
+        type: u4
+      - id: text
+        type: str
+        size: len_text
+        encoding: UTF-8
+      - id: padding
+        size: (8 - len_text % 8) % 8
+  indices:
+    seq:
+      - id: indices
+        type: u4
+        repeat: eos
+  link:
+    seq:
+      - id: pairs
+        type: pair
+        repeat: eos
+    types:
+      pair:
+        seq:
+          - id: a
+            type: u4
+          - id: b
+            type: u4
+  refp:
+    seq:
+      - id: len_name
+        type: u4
+      - id: reserved
+        type: u4
+      - id: name
+        type: str
+        size: len_name
+        encoding: UTF-8
+      - id: padding
+        size: (8 - len_name % 8) % 8
+      - id: positions
+        type: point
+        repeat: eos
+  form:
+    seq:
+      - id: kind
+        type: u4
+        enum: kind
+      - id: precision
+        type: u4
+        doc: 4 binary32, 8 binary64
+      - id: count
+        type: u8
+        doc: elements of a frame
+    instances:
+      width:
+        value: 'kind == kind::transforms ? 7 : (kind == kind::deformations ? 4 : 3)'
+        doc: numbers of an element
+      on_graph:
+        value: kind == kind::vectors or kind == kind::deformations
+  fram:
+    seq:
+      - id: len_name
+        type: u4
+      - id: flags
+        type: u4
+      - id: time
+        type: f8
+        doc: seconds, if has_time
+      - id: name
+        type: str
+        size: len_name
+        encoding: UTF-8
+      - id: padding
+        size: (8 - len_name % 8) % 8
+      - id: root
+        type: point
+        if: _root.form.on_graph
+      - id: anchors
+        type: point
+        repeat: expr
+        repeat-expr: num_anchors
+        if: _root.form.on_graph
+      - id: values
+        type:
+          switch-on: _root.form.precision
+          cases:
+            4: f4
+            8: f8
+        repeat: expr
+        repeat-expr: _root.form.count * _root.form.width
+    instances:
+      has_time:
+        value: (flags & 1) != 0
+      len_values:
+        value: _root.form.count * _root.form.width * _root.form.precision
+      num_anchors:
+        value: (_io.size - 16 - len_name - (8 - len_name % 8) % 8 - 24 - len_values) / 24
+        doc: as many as ANCH has vertices, which is what is left beside name, root and values
+  fail:
+    seq:
+      - id: exit_status
+        type: u4
+      - id: program
+        type: string
+      - id: message
+        type: string
+  end_mark:
+    seq:
+      - id: num_records
+        type: u8
+        doc: before this one
+      - id: running_sum
+        type: u8
+        doc: XXH64, seed 0, over the header_sum of all records before

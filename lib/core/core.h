@@ -1,0 +1,61 @@
+/* core.h: what every layer of libvg leans on: memory with checked sizes, growing bytes, threads, byte order, checksums.
+ * Internal; nothing here knows a mesh or a file.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_CORE_H
+#define VG_CORE_H
+
+#include "vg.h"
+
+#include <string.h>
+
+/* vgi_array: n elements of `size` bytes, zeroed; VG_ENOMEM in *e and NULL when there is no room or n * size overflows.
+ * n = 0 gives a valid pointer. Release with free(). */
+void *vgi_array(size_t n, size_t size, vg_err *e);
+/* vgi_array_raw: the same, contents undefined. */
+void *vgi_array_raw(size_t n, size_t size, vg_err *e);
+/* vgi_copy_array: a copy of n elements. */
+void *vgi_copy_array(const void *from, size_t n, size_t size, vg_err *e);
+/* vgi_copy_string: a copy of the first n bytes, with a terminator. */
+char *vgi_copy_string(const char *s, size_t n, vg_err *e);
+/* vgi_grow: make room for `need` elements in *array (realloc, at least doubling); VG_OK or VG_ENOMEM. */
+int vgi_grow(void *array_address, size_t *cap, size_t need, size_t size, vg_err *e) VG_MUST_CHECK;
+bool vgi_mul(size_t a, size_t b, size_t *product); /* false on overflow */
+
+int vgi_bytes_reserve(vg_bytes *b, size_t cap, vg_err *e) VG_MUST_CHECK;
+int vgi_bytes_append(vg_bytes *b, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
+
+/* vgi_is_utf8: is it valid UTF-8 without NUL? */
+bool vgi_is_utf8(const char *s, size_t n);
+
+/* vgi_finite: are all n numbers finite? */
+bool vgi_finite(const double *x, size_t n);
+
+/* vgi_parallel: call task(context, i) for i in 0..n-1 from up to `threads` threads, the caller's among them, and wait.
+ * Tasks are handed out in order; they must not depend on one another. With one thread it is a loop. */
+void vgi_parallel(int threads, size_t n, void (*task)(void *context, size_t i), void *context);
+
+/* Little-endian numbers. */
+static inline uint32_t vgi_get32(const unsigned char *p)
+{
+    return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
+}
+static inline uint64_t vgi_get64(const unsigned char *p)
+{
+    return (uint64_t)vgi_get32(p) | (uint64_t)vgi_get32(p + 4) << 32;
+}
+static inline void vgi_put32(unsigned char *p, uint32_t x)
+{
+    p[0] = (unsigned char)x, p[1] = (unsigned char)(x >> 8), p[2] = (unsigned char)(x >> 16), p[3] = (unsigned char)(x >> 24);
+}
+static inline void vgi_put64(unsigned char *p, uint64_t x)
+{
+    vgi_put32(p, (uint32_t)x);
+    vgi_put32(p + 4, (uint32_t)(x >> 32));
+}
+
+/* Eight poses side by side: the unit of every numeric kernel. GCC and Clang lower it to what the machine has. */
+enum { VGI_LANES = 8 };
+typedef double vgi_lanes __attribute__((vector_size(64)));
+typedef int64_t vgi_mask __attribute__((vector_size(64))); /* what comparing lanes gives: -1 or 0 */
+
+#endif

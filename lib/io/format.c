@@ -1,0 +1,97 @@
+/* format.c: the table of mesh formats, and reading and writing one mesh file in memory.
+ * Leaves out the formats themselves (obj.c, ply.c, off.c) and where the bytes come from and go to.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/io.h"
+
+#include <math.h>
+
+/* By content the first that says yes is taken, so those with a signature come before OBJ, which has none. By suffix, the
+ * first with that suffix. */
+static const vgi_format *const formats[] = {&vgi_format_ply, &vgi_format_ply_ascii, &vgi_format_ply_be, &vgi_format_off,
+                                            &vgi_format_obj};
+enum { FORMATS = sizeof formats / sizeof *formats };
+
+const vgi_format *vgi_format_by_name(const char *name, size_t n)
+{
+    for (size_t i = 0; i < FORMATS; i++)
+        if (strlen(formats[i]->name) == n && !memcmp(formats[i]->name, name, n)) return formats[i];
+    return NULL;
+}
+
+const vgi_format *vgi_format_by_suffix(const char *file_name)
+{
+    size_t n = strlen(file_name);
+    for (size_t i = 0; i < FORMATS; i++)
+        if (vgi_has_suffix(file_name, n, formats[i]->suffix)) return formats[i];
+    return NULL;
+}
+
+const vgi_format *vgi_format_by_content(const unsigned char *data, size_t n)
+{
+    for (size_t i = 0; i < FORMATS; i++)
+        if (formats[i]->sniff(data, n)) return formats[i];
+    return NULL;
+}
+
+const char *vgi_format_names(void)
+{
+    return "obj, ply, ply-ascii, ply-be, off";
+}
+
+static int unknown_format(const char *format, vg_err *e)
+{
+    return vg_fail(e, VG_EARG, "unknown mesh format '%s' (known: %s)", format ? format : "", vgi_format_names());
+}
+
+int vgi_model_read(vg_model *m, const void *data, size_t n, const vgi_format *format, const char *file_name,
+                   const char *subject, vg_err *e)
+{
+    *m = (vg_model){0};
+    if (n == 0) return vg_fail(e, VG_ETRUNC, "%s is empty", subject);
+    if (!format) format = vgi_format_by_content(data, n);
+    if (!format) format = vgi_format_by_suffix(file_name);
+    if (!format) return vg_fail(e, VG_EINPUT, "%s is no mesh file (read: OBJ, PLY, OFF)", subject);
+    int result = format->read(m, data, n, subject, e);
+    if (result == VG_OK) result = vg_mesh_check(&m->mesh, subject, e);
+    if (result < 0) vg_model_clear(m);
+    return result;
+}
+
+int vg_model_read(vg_model *m, const void *data, size_t n, const char *format, const char *name, vg_err *e)
+{
+    *m = (vg_model){0};
+    const vgi_format *known = format ? vgi_format_by_name(format, strlen(format)) : NULL;
+    if (format && !known) return unknown_format(format, e);
+    char subject[300];
+    snprintf(subject, sizeof subject, "'%.290s'", name);
+    return vgi_model_read(m, data, n, known, name, subject, e);
+}
+
+/* Are n numbers finite in the precision asked for? */
+static int check_range(const double *x, size_t n, size_t per_item, const char *what, bool full_precision, vg_err *e)
+{
+    for (size_t i = 0; i < n; i++) {
+        if (isfinite(full_precision ? x[i] : (double)(float)x[i])) continue;
+        if (isfinite(x[i]))
+            return vg_fail(e, VG_EINPUT, "%s %zu does not fit single precision (%g): ask for full precision", what,
+                           i / per_item, x[i]);
+        return vg_fail(e, VG_EINPUT, "%s %zu is not finite", what, i / per_item);
+    }
+    return VG_OK;
+}
+
+int vg_model_write(vg_bytes *out, const char *format, const vg_mesh *mesh, const double *vertices,
+                   const vg_attributes *attributes, bool full_precision, vg_err *e)
+{
+    const vgi_format *known = format ? vgi_format_by_name(format, strlen(format)) : NULL;
+    if (!known) return unknown_format(format, e);
+    size_t size = out->size;
+    vgi_writing w = {mesh, vertices, attributes, full_precision};
+    int result = check_range(vertices, 3 * mesh->nv, 3, "vertex", full_precision, e);
+    if (result == VG_OK && attributes)
+        result = check_range(attributes->tex, attributes->ntex * attributes->tex_dim, attributes->tex_dim,
+                             "texture coordinate", full_precision, e);
+    if (result == VG_OK) result = known->write(out, &w, e);
+    if (result < 0) out->size = size; /* nothing was appended */
+    return result;
+}

@@ -1,0 +1,181 @@
+/* input.c: bytes from a descriptor or from memory, with a look ahead; nothing is trusted before it has arrived.
+ * Leaves out what the bytes mean.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/io.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+/* Small reads go through a buffer of this size; larger ones straight to their place. */
+enum { BUFFER = 256 * 1024, AHEAD = 4096 };
+
+struct vgi_input {
+    int fd; /* -1: memory only */
+    bool own, ended;
+    char *name;
+    unsigned char *buffer;     /* NULL for memory */
+    const unsigned char *data; /* what has been read and not taken */
+    size_t size;
+};
+
+static int make(vgi_input **in, const char *name, vg_err *e)
+{
+    *in = vgi_array(1, sizeof **in, e);
+    if (!*in) return VG_ENOMEM;
+    (*in)->fd = -1;
+    (*in)->name = vgi_copy_string(name, strlen(name), e);
+    if ((*in)->name) return VG_OK;
+    vgi_input_free(in);
+    return VG_ENOMEM;
+}
+
+int vgi_input_fd(vgi_input **in, int fd, bool own, const char *name, vg_err *e)
+{
+    int r = make(in, name, e);
+    if (r == VG_OK && !((*in)->buffer = vgi_array_raw(BUFFER, 1, e))) vgi_input_free(in), r = VG_ENOMEM;
+    if (r < 0) {
+        if (own) close(fd);
+        return r;
+    }
+    (*in)->fd = fd, (*in)->own = own, (*in)->data = (*in)->buffer;
+    return VG_OK;
+}
+
+int vgi_input_memory(vgi_input **in, const void *data, size_t n, const char *name, vg_err *e)
+{
+    int r = make(in, name, e);
+    if (r == VG_OK) (*in)->data = data, (*in)->size = n, (*in)->ended = true;
+    return r;
+}
+
+int vgi_input_file(vgi_input **in, const char *path, vg_err *e)
+{
+    *in = NULL;
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0) return vg_fail(e, VG_ESYS, "cannot open '%s': %s", path, strerror(errno));
+    return vgi_input_fd(in, fd, true, path, e);
+}
+
+void vgi_input_free(vgi_input **in)
+{
+    if (!*in) return;
+    if ((*in)->own) close((*in)->fd);
+    free((*in)->buffer);
+    free((*in)->name);
+    free(*in);
+    *in = NULL;
+}
+
+const char *vgi_input_name(const vgi_input *in)
+{
+    return in->name;
+}
+
+/* One read; 0 at the end. */
+static ssize_t read_some(vgi_input *in, void *to, size_t n, vg_err *e)
+{
+    if (in->ended) return 0;
+    ssize_t got;
+    do got = read(in->fd, to, n);
+    while (got < 0 && errno == EINTR);
+    if (got < 0) return vg_fail(e, VG_ESYS, "cannot read '%s': %s", in->name, strerror(errno));
+    if (got == 0) in->ended = true;
+    return got;
+}
+
+int vgi_input_peek(vgi_input *in, size_t n, const unsigned char **data, size_t *got, vg_err *e)
+{
+    if (n > AHEAD) n = AHEAD;
+    if (in->size < n && !in->ended) {
+        memmove(in->buffer, in->data, in->size);
+        in->data = in->buffer;
+        while (in->size < n) {
+            ssize_t more = read_some(in, in->buffer + in->size, BUFFER - in->size, e);
+            if (more < 0) return (int)more;
+            if (more == 0) break;
+            in->size += (size_t)more;
+        }
+    }
+    *data = in->data;
+    *got = in->size < n ? in->size : n;
+    return VG_OK;
+}
+
+static size_t take_buffered(vgi_input *in, void *to, size_t n)
+{
+    if (n > in->size) n = in->size;
+    if (n) memcpy(to, in->data, n);
+    in->data += n;
+    in->size -= n;
+    return n;
+}
+
+int vgi_input_read(vgi_input *in, void *to, size_t n, size_t *got, vg_err *e)
+{
+    unsigned char *p = to;
+    size_t have = take_buffered(in, p, n);
+    while (have < n) {
+        ssize_t more;
+        if (n - have >= BUFFER / 4 || !in->buffer) {
+            more = read_some(in, p + have, n - have, e);
+            if (more > 0) have += (size_t)more;
+        } else {
+            more = read_some(in, in->buffer, BUFFER, e);
+            if (more > 0) {
+                in->data = in->buffer, in->size = (size_t)more;
+                have += take_buffered(in, p + have, n - have);
+            }
+        }
+        if (got) *got = have;
+        if (more < 0) return (int)more;
+        if (more == 0) return vg_fail(e, VG_ETRUNC, "'%s' ends too early", in->name);
+    }
+    if (got) *got = have;
+    return VG_OK;
+}
+
+int vgi_input_take(vgi_input *in, vg_bytes *b, size_t n, size_t *got, vg_err *e)
+{
+    size_t piece = 1u << 20, have = 0, some = 0;
+    int r = VG_OK;
+    while (r == VG_OK && have < n) {
+        /* what the buffer already has room for costs nothing; beyond it, at most as much again as has arrived */
+        size_t room = b->cap - b->size, step = room > piece ? room : piece;
+        if (step > n - have) step = n - have;
+        if ((r = vgi_bytes_reserve(b, b->size + step, e)) < 0) break;
+        r = vgi_input_read(in, b->data + b->size, step, &some, e);
+        b->size += some;
+        have += some;
+    }
+    if (got) *got = have;
+    return r;
+}
+
+int vgi_input_slurp(vgi_input *in, vg_bytes *b, vg_err *e)
+{
+    int r = vgi_bytes_append(b, in->data, in->size, e);
+    if (r < 0) return r;
+    in->size = 0;
+    while (!in->ended) {
+        if (b->cap - b->size < 64 * 1024 && (r = vgi_bytes_reserve(b, b->size + (1u << 20), e)) < 0) return r;
+        ssize_t more = read_some(in, b->data + b->size, b->cap - b->size, e);
+        if (more < 0) return (int)more;
+        b->size += (size_t)more;
+    }
+    return VG_OK;
+}
+
+int vgi_write_all(int fd, const void *data, size_t n, const char *name, vg_err *e)
+{
+    const unsigned char *p = data;
+    while (n > 0) {
+        ssize_t done = write(fd, p, n);
+        if (done < 0 && errno == EINTR) continue;
+        if (done < 0) return vg_fail(e, VG_ESYS, "cannot write to '%s': %s", name, strerror(errno));
+        p += done;
+        n -= (size_t)done;
+    }
+    return VG_OK;
+}

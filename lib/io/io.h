@@ -1,0 +1,127 @@
+/* io.h: what the files of lib/io share: bytes in, numbers as text, the table of mesh formats, archives.
+ * Internal; what a C program may call is in vg.h.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_IO_H
+#define VG_IO_H
+
+#include "core/core.h"
+
+/* ---- input.c: bytes from a descriptor or from memory, with a look ahead ---- */
+
+typedef struct vgi_input vgi_input;
+int vgi_input_fd(vgi_input **in, int fd, bool own, const char *name, vg_err *e) VG_MUST_CHECK; /* own: close it in the end */
+int vgi_input_memory(vgi_input **in, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK; /* borrowed */
+/* vgi_input_file: open a file for reading; VG_ESYS naming it when it cannot be. */
+int vgi_input_file(vgi_input **in, const char *path, vg_err *e) VG_MUST_CHECK;
+void vgi_input_free(vgi_input **in);
+const char *vgi_input_name(const vgi_input *in);
+/* vgi_input_peek: the next bytes without taking them, up to n <= 4096; *got is less only at the end of input. */
+int vgi_input_peek(vgi_input *in, size_t n, const unsigned char **data, size_t *got, vg_err *e) VG_MUST_CHECK;
+/* vgi_input_read: exactly n bytes; VG_ETRUNC when the input ends before. *got (may be NULL): how many came. */
+int vgi_input_read(vgi_input *in, void *to, size_t n, size_t *got, vg_err *e) VG_MUST_CHECK;
+/* vgi_input_take: append exactly n bytes to b, which grows as they arrive (a false n costs no memory). */
+int vgi_input_take(vgi_input *in, vg_bytes *b, size_t n, size_t *got, vg_err *e) VG_MUST_CHECK;
+/* vgi_input_slurp: append all that is left. */
+int vgi_input_slurp(vgi_input *in, vg_bytes *b, vg_err *e) VG_MUST_CHECK;
+/* vg_reader over an input; the reader takes the input over, also when it fails. */
+int vgi_reader_open_input(vg_reader **r, vgi_input *in, vg_err *e) VG_MUST_CHECK;
+/* Does data start like a stream? */
+bool vgi_is_stream(const unsigned char *data, size_t n);
+
+/* vgi_write_all: write n bytes to fd, whatever the interruptions; VG_ESYS naming `name`. */
+int vgi_write_all(int fd, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
+
+/* ---- number.c: numbers as text, whatever the locale ---- */
+
+/* vgi_parse_double: the number at the start of [s, end): decimal, exponent, sign; "nan" and "inf" are read as such. The
+ * result is correctly rounded. Returns the first byte behind it, or NULL when there is none. */
+const char *vgi_parse_double(const char *s, const char *end, double *x);
+/* vgi_parse_int: the same for a decimal integer that fits in int64_t. */
+const char *vgi_parse_int(const char *s, const char *end, int64_t *x);
+/* vgi_print_float: the shortest text that reads back to the same binary32 as (float)x; returns its length, <= 16, no terminator. */
+size_t vgi_print_float(char *to, double x);
+/* vgi_print_double: the same for binary64; at most 25 bytes. */
+size_t vgi_print_double(char *to, double x);
+size_t vgi_print_uint(char *to, uint64_t x); /* at most 20 bytes */
+
+/* ---- format.c: the table of mesh formats; obj.c ply.c off.c: one each ---- */
+
+typedef struct vgi_writing {
+    const vg_mesh *mesh;
+    const double *vertices;
+    const vg_attributes *attributes; /* may be NULL */
+    bool full_precision;
+} vgi_writing;
+
+typedef struct vgi_format {
+    const char *name;   /* what --format and NAME:format call it */
+    const char *suffix; /* ".obj" */
+    bool (*sniff)(const unsigned char *data, size_t n); /* does it start like one? (first 4096 bytes or all) */
+    /* read: fill *m, which is empty, from the whole file; on failure the caller clears it. `subject` is how messages call
+     * the file, quotes included: "'a.obj'" or "'b.obj' in 'a.zip'"; they add the line. The model is checked by the caller
+     * with vg_mesh_check; NaN and Inf are refused here. */
+    int (*read)(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e);
+    int (*write)(vg_bytes *out, const vgi_writing *w, vg_err *e);
+} vgi_format;
+
+extern const vgi_format vgi_format_obj, vgi_format_ply, vgi_format_ply_ascii, vgi_format_ply_be, vgi_format_off;
+const vgi_format *vgi_format_by_name(const char *name, size_t n);     /* NULL: none */
+const vgi_format *vgi_format_by_suffix(const char *file_name);        /* case does not matter; NULL: none */
+const vgi_format *vgi_format_by_content(const unsigned char *data, size_t n);
+const char *vgi_format_names(void); /* "obj, ply, ply-ascii, ply-be, off" for messages */
+/* vgi_model_read: vg_model_read for a file that messages call `subject` (quotes included). format NULL: told by content, then
+ * by file_name. */
+int vgi_model_read(vg_model *m, const void *data, size_t n, const vgi_format *format, const char *file_name,
+                   const char *subject, vg_err *e) VG_MUST_CHECK;
+
+/* ---- names.c: lists of names and their order; names of poses ---- */
+
+typedef struct vgi_names {
+    size_t n, cap;
+    char **at;
+} vgi_names;
+void vgi_names_clear(vgi_names *names);
+int vgi_names_add(vgi_names *names, const char *s, size_t n, vg_err *e) VG_MUST_CHECK;
+void vgi_names_sort(vgi_names *names); /* in natural order */
+/* vgi_natural_compare: order of names as people expect it: runs of digits by value, the rest by byte; ties by strcmp. */
+int vgi_natural_compare(const char *a, const char *b);
+const char *vgi_base_name(const char *path); /* behind the last '/' */
+bool vgi_has_suffix(const char *name, size_t n, const char *suffix); /* of the first n bytes, with something before it; any case */
+size_t vgi_packed_stem(const char *name);    /* length of name without ".gz" or another suffix of one compressed file */
+/* vgi_pose_name: what a pose from this file is called: "dir/pose1.obj.gz" is "pose1". Valid UTF-8; free it; NULL: no memory. */
+char *vgi_pose_name(const char *path, vg_err *e);
+
+/* ---- archive.c: the one file that knows libarchive ---- */
+
+/* Where reading stops, so that a small archive cannot fill a machine. */
+typedef struct vgi_limits {
+    uint64_t member_bytes, total_bytes; /* unpacked */
+    size_t members;                     /* mesh files */
+} vgi_limits;
+extern const vgi_limits vgi_archive_limits; /* what all programs use */
+
+/* The mesh files of an archive, or the single one that was compressed without an archive, in natural order. */
+typedef struct vgi_archive vgi_archive;
+/* vgi_is_archive: does data start like an archive or a compressed file? (first 4096 bytes or all) */
+bool vgi_is_archive(const unsigned char *data, size_t n);
+/* vgi_archive_open: list what is there. fd is a regular file that is read from byte `base` on; it is taken over, also on
+ * failure. name is what messages call the archive. VG_EINPUT when there is no mesh file in it. */
+int vgi_archive_open(vgi_archive **a, int fd, int64_t base, const char *name, const vgi_limits *limits,
+                     vg_err *e) VG_MUST_CHECK;
+/* vgi_archive_next: 1, path (borrowed until the next call) and contents of the next file; 0 behind the last one. */
+int vgi_archive_next(vgi_archive *a, const char **path, vg_bytes *data, vg_err *e) VG_MUST_CHECK;
+void vgi_archive_close(vgi_archive **a);
+/* vgi_spool: copy what is left of an input that can be read only once into a file without a name. */
+int vgi_spool(vgi_input *in, uint64_t limit, int *fd, vg_err *e) VG_MUST_CHECK;
+
+/* Writing. The bytes depend on names and contents only. */
+typedef struct vgi_packer vgi_packer;
+bool vgi_packer_knows(const char *name, size_t n); /* do the first n bytes of name end like an archive we write? */
+const char *vgi_packer_suffixes(void);             /* ".zip .tar ..." for messages */
+/* vgi_packer_open: the kind is told by the first n bytes of `name`, which is also what messages call it. fd is borrowed. */
+int vgi_packer_open(vgi_packer **p, int fd, const char *name, size_t n, vg_err *e) VG_MUST_CHECK;
+int vgi_packer_add(vgi_packer *p, const char *path, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
+int vgi_packer_end(vgi_packer *p, vg_err *e) VG_MUST_CHECK;
+void vgi_packer_close(vgi_packer **p);
+
+#endif

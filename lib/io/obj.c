@@ -1,0 +1,659 @@
+/* obj.c: Wavefront OBJ: vertices, texture coordinates, faces, lines, and the names of groups and materials.
+ * Leaves out normals (they change with the pose), vertex colours, points, free-form surfaces and the material files.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/io.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum {
+    MOST_NUMBER = 26,      /* bytes of a printed number and the blank before it */
+    MOST_REFERENCE = 22,   /* " v/vt", two 32-bit numbers */
+    SMALL_FACE = 16,       /* up to here pairs of vertices are compared directly */
+    SHOWN = 40             /* bytes of the input that a message shows */
+};
+
+/* ------------------------------------------------------------------------------------------- reading -- */
+
+/* A file being read. Arrays are those of the model; these are their capacities. */
+struct reading {
+    const char *data, *end;
+    char line_end; /* '\n', or '\r' in a file that has no '\n' */
+    const char *subject;
+    vg_err *e;
+    vg_model *m;
+    size_t vertices_cap, start_cap, vert_cap, tex_cap, labels_cap;
+    size_t corners;
+    bool textured;      /* corner_tex is there, vert_cap long */
+    size_t sought_face; /* find_face: stop behind this face ... */
+    const char *found;  /* ... and say where its statement is */
+    uint32_t *scratch;  /* a large face, sorted */
+    size_t scratch_cap;
+};
+
+static size_t line_of(const struct reading *r, const char *p)
+{
+    size_t n = 1;
+    for (const char *q = r->data; q < p && (q = memchr(q, r->line_end, (size_t)(p - q))); q++) n++;
+    return n;
+}
+
+static bool is_line_end(const struct reading *r, const char *p)
+{
+    return p == r->end || *p == r->line_end;
+}
+
+/* A backslash before a line end joins the lines: the first byte of the next line, or NULL. */
+static const char *continuation(const struct reading *r, const char *p)
+{
+    if (*p++ != '\\') return NULL;
+    if (p < r->end && *p == '\r' && r->line_end != '\r') p++;
+    if (p == r->end) return p;
+    return *p == r->line_end ? p + 1 : NULL;
+}
+
+static const char *skip_odd_blanks(const struct reading *r, const char *p)
+{
+    while (p < r->end) {
+        const char *next;
+        if (*p == ' ' || *p == '\t' || (*p == '\r' && r->line_end != '\r'))
+            p++;
+        else if (*p == '\\' && (next = continuation(r, p)))
+            p = next;
+        else
+            break;
+    }
+    return p;
+}
+
+/* Blanks and joined lines. One blank before something visible is what nearly all files have. */
+static inline const char *skip_blanks(const struct reading *r, const char *p)
+{
+    if (p < r->end && *p == ' ') p++;
+    if (p < r->end && *p > ' ' && *p != '\\') return p;
+    return skip_odd_blanks(r, p);
+}
+
+static inline bool at_end(const struct reading *r, const char *p)
+{
+    return is_line_end(r, p) || *p == '#';
+}
+
+/* The next line, which joined lines are part of. */
+static const char *skip_statement(const struct reading *r, const char *p)
+{
+    while (p < r->end) {
+        const char *q = memchr(p, r->line_end, (size_t)(r->end - p));
+        if (!q) return r->end;
+        const char *last = q;
+        if (last > p && last[-1] == '\r') last--;
+        p = q + 1;
+        if (last == r->data || last[-1] != '\\') break;
+    }
+    return p;
+}
+
+static const char *skip_comment(const struct reading *r, const char *p)
+{
+    const char *q = memchr(p, r->line_end, (size_t)(r->end - p));
+    return q ? q + 1 : r->end;
+}
+
+/* Does the word at p equal `word`? */
+static bool is_word(const struct reading *r, const char *p, const char *word)
+{
+    size_t n = strlen(word);
+    if ((size_t)(r->end - p) < n || memcmp(p, word, n)) return false;
+    p += n;
+    return is_line_end(r, p) || *p == ' ' || *p == '\t' || *p == '\r' || *p == '\\';
+}
+
+/* VG_EINPUT: what stands at p, as the file has it, is not what was expected. */
+static int fail_at(const struct reading *r, const char *p, const char *expected)
+{
+    size_t n = 0;
+    while (n < SHOWN && !is_line_end(r, p + n) && p[n] != ' ' && p[n] != '\t' && p[n] != '\r') n++;
+    if (n == 0) return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s expected", r->subject, line_of(r, p), expected);
+    return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s expected, not '%.*s'", r->subject, line_of(r, p), expected, (int)n, p);
+}
+
+/* Up to `most` numbers into x, and how many there were into *n; all that follow must be numbers too, if `extra`. */
+static const char *read_numbers(struct reading *r, const char *p, double *x, size_t most, bool extra, size_t *n)
+{
+    *n = 0;
+    for (;;) {
+        const char *word = skip_blanks(r, p);
+        if (at_end(r, word)) return word;
+        double value;
+        const char *next = word > p && (*n < most || extra) ? vgi_parse_double(word, r->end, &value) : NULL;
+        if (!next) {
+            fail_at(r, word, *n < most || extra ? "a number" : "end of line");
+            return NULL;
+        }
+        if (*n < most) {
+            if (!isfinite(value)) {
+                vg_fail(r->e, VG_EINPUT, "%s line %zu: '%.*s' is not a finite number", r->subject, line_of(r, word),
+                        next - word > SHOWN ? SHOWN : (int)(next - word), word);
+                return NULL;
+            }
+            x[*n] = value;
+        }
+        ++*n;
+        p = next;
+    }
+}
+
+static const char *read_vertex(struct reading *r, const char *p)
+{
+    vg_model *m = r->m;
+    if (m->mesh.nv >= UINT32_MAX - 1) {
+        vg_fail(r->e, VG_EINPUT, "%s has too many vertices (the limit is 2^32 - 2)", r->subject);
+        return NULL;
+    }
+    if (m->mesh.nv >= r->vertices_cap &&
+        vgi_grow(&m->vertices, &r->vertices_cap, m->mesh.nv + 1, 3 * sizeof *m->vertices, r->e) < 0)
+        return NULL;
+    size_t n;
+    const char *next = read_numbers(r, p, m->vertices + 3 * m->mesh.nv, 3, true, &n);
+    if (!next) return NULL;
+    if (n < 3) {
+        vg_fail(r->e, VG_EINPUT, "%s line %zu: vertex with %zu numbers (expected x y z)", r->subject, line_of(r, p), n);
+        return NULL;
+    }
+    m->mesh.nv++;
+    return next;
+}
+
+/* Three numbers are kept of each; finish_tex packs them to what the file has. */
+static const char *read_tex(struct reading *r, const char *p)
+{
+    vg_attributes *a = &r->m->attributes;
+    if (a->ntex >= UINT32_MAX - 1) {
+        vg_fail(r->e, VG_EINPUT, "%s has too many texture coordinates (the limit is 2^32 - 2)", r->subject);
+        return NULL;
+    }
+    if (a->ntex >= r->tex_cap && vgi_grow(&a->tex, &r->tex_cap, a->ntex + 1, 3 * sizeof *a->tex, r->e) < 0) return NULL;
+    double *x = a->tex + 3 * a->ntex;
+    x[0] = x[1] = x[2] = 0;
+    size_t n;
+    const char *next = read_numbers(r, p, x, 3, false, &n);
+    if (!next) return NULL;
+    if (n == 0) {
+        fail_at(r, skip_blanks(r, p), "a number");
+        return NULL;
+    }
+    if (n > a->tex_dim) a->tex_dim = (uint32_t)n;
+    a->ntex++;
+    return next;
+}
+
+/* An index at p, counted from 1, or from the end when negative, into *index, counted from 0. Whether it is below the
+ * final count is seen at the end of the file: it may come before what it names. */
+static inline const char *read_index(struct reading *r, const char *p, size_t count, uint32_t *index)
+{
+    const char *s = p, *end = r->end;
+    bool negative = s < end && *s == '-';
+    s += negative;
+    uint64_t x = 0;
+    const char *digits = s;
+    for (unsigned c; s < end && (c = (unsigned char)*s - (unsigned)'0') < 10; s++) x = x * 10 + c;
+    if (s == digits) {
+        fail_at(r, p, "an index");
+        return NULL;
+    }
+    bool huge = s - digits > 18;
+    if (!huge && !negative && x - 1 < UINT32_MAX - 1) {
+        *index = (uint32_t)(x - 1);
+        return s;
+    }
+    if (!huge && negative && x > 0 && x <= count) {
+        *index = (uint32_t)(count - x);
+        return s;
+    }
+    if (x == 0 && !huge)
+        vg_fail(r->e, VG_EINPUT, "%s line %zu: index 0 (indices count from 1, or back from -1)", r->subject, line_of(r, p));
+    else
+        vg_fail(r->e, VG_EINPUT, "%s line %zu: index %.*s is out of range", r->subject, line_of(r, p),
+                s - p > SHOWN ? SHOWN : (int)(s - p), p);
+    return NULL;
+}
+
+static int grow_corners(struct reading *r, size_t need)
+{
+    vg_model *m = r->m;
+    size_t old_cap = r->vert_cap, tex_cap = old_cap;
+    if (need >= UINT32_MAX)
+        return vg_fail(r->e, VG_EINPUT, "%s has too many corners of faces (the limit is 2^32 - 2)", r->subject);
+    if (vgi_grow(&m->mesh.vert, &r->vert_cap, need, sizeof *m->mesh.vert, r->e) < 0) return VG_ENOMEM;
+    if (r->textured &&
+        vgi_grow(&m->attributes.corner_tex, &tex_cap, r->vert_cap, sizeof *m->attributes.corner_tex, r->e) < 0)
+        return VG_ENOMEM;
+    return VG_OK;
+}
+
+/* From now on every corner has a texture coordinate, or UINT32_MAX. */
+static int start_texture(struct reading *r)
+{
+    uint32_t *tex = vgi_array_raw(r->vert_cap, sizeof *tex, r->e);
+    if (!tex) return VG_ENOMEM;
+    for (size_t c = 0; c <= r->corners && c < r->vert_cap; c++) tex[c] = UINT32_MAX;
+    r->m->attributes.corner_tex = tex;
+    r->textured = true;
+    return VG_OK;
+}
+
+/* One corner: v, v/vt, v//vn or v/vt/vn, any of the latter left empty. The normal is read and forgotten. */
+static inline const char *read_corner(struct reading *r, const char *p)
+{
+    vg_model *m = r->m;
+    if (r->corners >= r->vert_cap && grow_corners(r, r->corners + 1) < 0) return NULL;
+    p = read_index(r, p, m->mesh.nv, &m->mesh.vert[r->corners]);
+    if (!p) return NULL;
+    uint32_t tex = UINT32_MAX;
+    if (p < r->end && *p == '/') {
+        p++;
+        if (p < r->end && (unsigned char)*p > ' ' && *p != '/' && *p != '\\') {
+            p = read_index(r, p, m->attributes.ntex, &tex);
+            if (!p || (!r->textured && start_texture(r) < 0)) return NULL;
+        }
+        if (p < r->end && *p == '/') {
+            p++;
+            if (p < r->end && *p == '-') p++;
+            while (p < r->end && (unsigned char)(*p - '0') < 10) p++;
+        }
+    }
+    if (r->textured) m->attributes.corner_tex[r->corners] = tex;
+    r->corners++;
+    return p;
+}
+
+static int compare_indices(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Is a vertex twice among these? *which says which. Negative: no memory. */
+static int has_repeated(struct reading *r, const uint32_t *vert, size_t n, uint32_t *which)
+{
+    if (n <= SMALL_FACE) {
+        for (size_t i = 1; i < n; i++)
+            for (size_t j = 0; j < i; j++)
+                if (vert[i] == vert[j]) return *which = vert[i], 1;
+        return 0;
+    }
+    if (vgi_grow(&r->scratch, &r->scratch_cap, n, sizeof *vert, r->e) < 0) return VG_ENOMEM;
+    memcpy(r->scratch, vert, n * sizeof *vert);
+    qsort(r->scratch, n, sizeof *vert, compare_indices);
+    for (size_t i = 1; i < n; i++)
+        if (r->scratch[i] == r->scratch[i - 1]) return *which = r->scratch[i], 1;
+    return 0;
+}
+
+/* The corners from `first` on are a new face. */
+static inline int end_face(struct reading *r, const char *p, size_t first, size_t size)
+{
+    vg_mesh *mesh = &r->m->mesh;
+    uint32_t which = 0;
+    int repeated = has_repeated(r, mesh->vert + first, size, &which);
+    if (repeated < 0) return repeated;
+    if (repeated)
+        return vg_fail(r->e, VG_EINPUT, "%s line %zu: vertex %zu is twice in one face", r->subject, line_of(r, p),
+                       (size_t)which + 1);
+    if (mesh->nf + 2 > r->start_cap && vgi_grow(&mesh->start, &r->start_cap, mesh->nf + 2, sizeof *mesh->start, r->e) < 0)
+        return VG_ENOMEM;
+    mesh->start[++mesh->nf] = (uint32_t)(first + size);
+    return VG_OK;
+}
+
+/* The n corners from `first` on are a polyline: every two of them are a face. */
+static int end_line(struct reading *r, const char *p, size_t first, size_t n)
+{
+    size_t segments = n - 1;
+    if (first + 2 * segments > r->vert_cap && grow_corners(r, first + 2 * segments) < 0) return VG_ENOMEM;
+    uint32_t *vert = r->m->mesh.vert + first, *tex = r->textured ? r->m->attributes.corner_tex + first : NULL;
+    for (size_t i = segments; i-- > 0;) { /* backwards, since they move apart in place */
+        uint32_t a = vert[i], b = vert[i + 1];
+        vert[2 * i] = a, vert[2 * i + 1] = b;
+        if (!tex) continue;
+        a = tex[i], b = tex[i + 1];
+        tex[2 * i] = a, tex[2 * i + 1] = b;
+    }
+    r->corners = first + 2 * segments;
+    for (size_t i = 0; i < segments; i++) {
+        int result = end_face(r, p, first + 2 * i, 2);
+        if (result < 0) return result;
+    }
+    return VG_OK;
+}
+
+static const char *read_face(struct reading *r, const char *p, bool line)
+{
+    const char *statement = p;
+    size_t first = r->corners;
+    for (;;) {
+        const char *word = skip_blanks(r, p);
+        if (at_end(r, word)) {
+            p = word;
+            break;
+        }
+        if (word == p) {
+            fail_at(r, word, "a blank between corners");
+            return NULL;
+        }
+        p = read_corner(r, word);
+        if (!p) return NULL;
+    }
+    size_t n = r->corners - first;
+    if (n < 2) {
+        vg_fail(r->e, VG_EINPUT, "%s line %zu: %s with %zu vertices", r->subject, line_of(r, statement),
+                line ? "line" : "face", n);
+        return NULL;
+    }
+    if ((line ? end_line(r, statement, first, n) : end_face(r, statement, first, n)) < 0) return NULL;
+    if (r->m->mesh.nf > r->sought_face) {
+        r->found = statement;
+        return r->end;
+    }
+    return p;
+}
+
+/* The text [p, end) as UTF-8, trimmed, joined lines as one blank. Bytes that are no UTF-8 are taken for Latin-1, which
+ * is what old exporters write. */
+static char *label_text(struct reading *r, const char *p, const char *end)
+{
+    size_t n = 0;
+    char *text = vgi_array_raw((size_t)(end - p) * 2 + 1, 1, r->e);
+    if (!text) return NULL;
+    bool utf8 = vgi_is_utf8(p, (size_t)(end - p));
+    while (p < end) {
+        const char *next = *p == '\\' ? continuation(r, p) : NULL;
+        if (next) {
+            text[n++] = ' ';
+            p = next < end ? next : end;
+            continue;
+        }
+        unsigned char c = (unsigned char)*p++;
+        if (c < 0x80 || utf8) {
+            text[n++] = c == '\r' ? ' ' : (char)c;
+        } else {
+            text[n++] = (char)(0xc0 | c >> 6);
+            text[n++] = (char)(0x80 | (c & 0x3f));
+        }
+    }
+    size_t first = 0;
+    while (first < n && (text[first] == ' ' || text[first] == '\t')) first++;
+    while (n > first && (text[n - 1] == ' ' || text[n - 1] == '\t')) n--;
+    memmove(text, text + first, n - first);
+    text[n - first] = 0;
+    char *fitting = realloc(text, n - first + 1);
+    return fitting ? fitting : text;
+}
+
+static const char *read_label(struct reading *r, const char *p, vg_label_kind kind)
+{
+    vg_attributes *a = &r->m->attributes;
+    const char *next = skip_statement(r, p);
+    const char *end = next > p && next[-1] == r->line_end ? next - 1 : next;
+    if (memchr(p, 0, (size_t)(end - p))) {
+        vg_fail(r->e, VG_EINPUT, "%s line %zu: a name with a zero byte", r->subject, line_of(r, p));
+        return NULL;
+    }
+    if (a->nlabels >= r->labels_cap && vgi_grow(&a->labels, &r->labels_cap, a->nlabels + 1, sizeof *a->labels, r->e) < 0)
+        return NULL;
+    char *text = label_text(r, p, end);
+    if (!text) return NULL;
+    a->labels[a->nlabels++] = (vg_label){r->m->mesh.nf, kind, text};
+    return next;
+}
+
+/* One statement at p, which is no blank; what follows it. NULL: failed. */
+static const char *read_statement(struct reading *r, const char *p)
+{
+    static const struct {
+        const char *word;
+        vg_label_kind kind;
+    } labels[] = {{"o", VG_LABEL_OBJECT}, {"g", VG_LABEL_GROUP}, {"usemtl", VG_LABEL_MATERIAL},
+                  {"s", VG_LABEL_SMOOTHING}, {"mtllib", VG_LABEL_LIBRARY}};
+    switch (*p) {
+    case 'v':
+        if (is_word(r, p, "v")) return read_vertex(r, p + 1);
+        if (is_word(r, p, "vt")) return read_tex(r, p + 2);
+        break;
+    case 'f':
+        if (is_word(r, p, "f")) return read_face(r, p + 1, false);
+        if (is_word(r, p, "fo")) return read_face(r, p + 2, false); /* what version 2 of the format called it */
+        break;
+    case 'l':
+        if (is_word(r, p, "l")) return read_face(r, p + 1, true);
+        break;
+    case '#': return skip_comment(r, p);
+    default:
+        for (size_t i = 0; i < sizeof labels / sizeof *labels; i++)
+            if (is_word(r, p, labels[i].word)) return read_label(r, p + strlen(labels[i].word), labels[i].kind);
+    }
+    return skip_statement(r, p);
+}
+
+static int read_statements(struct reading *r)
+{
+    const char *p = r->data;
+    if (r->end - p >= 3 && !memcmp(p, "\xef\xbb\xbf", 3)) p += 3;
+    if (vgi_grow(&r->m->mesh.start, &r->start_cap, 1, sizeof *r->m->mesh.start, r->e) < 0) return VG_ENOMEM;
+    r->m->mesh.start[0] = 0;
+    while (p < r->end) {
+        if (*p == r->line_end) {
+            p++;
+            continue;
+        }
+        p = skip_blanks(r, p);
+        if (p < r->end && *p != r->line_end) p = read_statement(r, p);
+        if (!p) return r->e->code;
+    }
+    return VG_OK;
+}
+
+static struct reading start_reading(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
+{
+    bool unix_lines = memchr(data, '\n', n) || !memchr(data, '\r', n);
+    return (struct reading){.data = data, .end = data + n, .line_end = unix_lines ? '\n' : '\r', .subject = subject,
+                            .e = e, .m = m, .sought_face = SIZE_MAX};
+}
+
+/* The line of a face that turned out to be wrong: found by reading again, so that good files pay nothing for it. */
+static size_t line_of_face(const struct reading *r, size_t face)
+{
+    vg_model again = {0};
+    vg_err ignored;
+    struct reading s = start_reading(&again, r->data, (size_t)(r->end - r->data), r->subject, &ignored);
+    s.sought_face = face;
+    size_t line = read_statements(&s) == VG_OK && s.found ? line_of(r, s.found) : 0;
+    vg_model_clear(&again);
+    free(s.scratch);
+    return line;
+}
+
+static size_t face_of_corner(const vg_mesh *m, size_t corner)
+{
+    size_t low = 0, high = m->nf;
+    while (high - low > 1) {
+        size_t middle = low + (high - low) / 2;
+        if (m->start[middle] <= corner) low = middle;
+        else high = middle;
+    }
+    return low;
+}
+
+/* Every index below `count`, or (for texture coordinates) UINT32_MAX. */
+static int check_indices(const struct reading *r, const uint32_t *index, size_t count, bool may_miss, const char *what)
+{
+    for (size_t c = 0; c < r->corners; c++) {
+        if (index[c] < count || (may_miss && index[c] == UINT32_MAX)) continue;
+        return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s %zu of %zu", r->subject,
+                       line_of_face(r, face_of_corner(&r->m->mesh, c)), what, (size_t)index[c] + 1, count);
+    }
+    return VG_OK;
+}
+
+/* Texture coordinates to as many numbers as the longest has, and an entry for each corner. */
+static int finish_tex(struct reading *r)
+{
+    vg_attributes *a = &r->m->attributes;
+    if (!a->ntex) return VG_OK;
+    if (!r->textured) {
+        a->corner_tex = vgi_array_raw(r->corners, sizeof *a->corner_tex, r->e);
+        if (!a->corner_tex) return VG_ENOMEM;
+        memset(a->corner_tex, 0xff, r->corners * sizeof *a->corner_tex);
+    }
+    if (a->tex_dim == 3) return VG_OK;
+    for (size_t i = 0; i < a->ntex; i++)
+        for (size_t k = 0; k < a->tex_dim; k++) a->tex[i * a->tex_dim + k] = a->tex[3 * i + k];
+    double *fitting = realloc(a->tex, a->ntex * a->tex_dim * sizeof *a->tex);
+    if (fitting) a->tex = fitting;
+    return VG_OK;
+}
+
+static int read_obj(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
+{
+    vg_err own;
+    struct reading r = start_reading(m, data, n, subject, e ? e : &own);
+    int result = read_statements(&r);
+    free(r.scratch);
+    if (result < 0) return result;
+    if (m->mesh.nv == 0) return vg_fail(e, VG_EINPUT, "%s has no vertices (no line 'v x y z')", subject);
+    result = check_indices(&r, m->mesh.vert, m->mesh.nv, false, "vertex");
+    if (result == VG_OK && r.textured)
+        result = check_indices(&r, m->attributes.corner_tex, m->attributes.ntex, true, "texture coordinate");
+    return result == VG_OK ? finish_tex(&r) : result;
+}
+
+/* Is the first statement one of OBJ? Text that has comments only is left to its name. */
+static bool sniff_obj(const unsigned char *data, size_t n)
+{
+    static const char *const numeric[] = {"v", "vt", "vn", "vp", "f", "l", "p"};
+    static const char *const named[] = {"o", "g", "s", "usemtl", "mtllib", "cstype", "deg"};
+    struct reading r = start_reading(NULL, (const char *)data, n, NULL, NULL);
+    const char *p = r.data;
+    if (n >= 3 && !memcmp(p, "\xef\xbb\xbf", 3)) p += 3;
+    for (;;) {
+        while ((p = skip_blanks(&r, p)) < r.end && *p == r.line_end) p++;
+        if (p == r.end) return false;
+        if (*p != '#') break;
+        p = skip_comment(&r, p);
+    }
+    if (memchr(data, 0, (size_t)(skip_comment(&r, p) - r.data))) return false;
+    for (size_t i = 0; i < sizeof named / sizeof *named; i++)
+        if (is_word(&r, p, named[i])) return true;
+    for (size_t i = 0; i < sizeof numeric / sizeof *numeric; i++) {
+        if (!is_word(&r, p, numeric[i])) continue;
+        p = skip_blanks(&r, p + strlen(numeric[i]));
+        return p < r.end && (*p == '-' || *p == '+' || *p == '.' || (unsigned char)(*p - '0') < 10);
+    }
+    return false;
+}
+
+/* ------------------------------------------------------------------------------------------- writing -- */
+
+static const char *label_word(uint32_t kind)
+{
+    switch (kind) {
+    case VG_LABEL_OBJECT: return "o";
+    case VG_LABEL_GROUP: return "g";
+    case VG_LABEL_MATERIAL: return "usemtl";
+    case VG_LABEL_SMOOTHING: return "s";
+    case VG_LABEL_LIBRARY: return "mtllib";
+    default: return NULL;
+    }
+}
+
+static int write_label(vg_bytes *out, const vg_label *label, vg_err *e)
+{
+    const char *word = label_word(label->kind);
+    size_t n = strlen(label->text);
+    if (!word) return VG_OK; /* a kind that OBJ does not have */
+    if (strpbrk(label->text, "\r\n"))
+        return vg_fail(e, VG_EINPUT, "%s '%s' has a line break, which OBJ cannot hold", word, label->text);
+    int result = vgi_bytes_append(out, word, strlen(word), e);
+    if (result == VG_OK && n) result = vgi_bytes_append(out, " ", 1, e);
+    if (result == VG_OK) result = vgi_bytes_append(out, label->text, n, e);
+    /* a blank keeps a backslash at the end from joining the next line */
+    const char *stop = n && label->text[n - 1] == '\\' ? " \n" : "\n";
+    return result == VG_OK ? vgi_bytes_append(out, stop, strlen(stop), e) : result;
+}
+
+/* Lines of `dim` numbers behind a keyword. */
+static int write_numbers(vg_bytes *out, const char *word, const double *x, size_t n, size_t dim, bool full, vg_err *e)
+{
+    size_t length = strlen(word);
+    for (size_t i = 0; i < n; i++, x += dim) {
+        if (vgi_bytes_reserve(out, out->size + length + dim * MOST_NUMBER + 1, e) < 0) return VG_ENOMEM;
+        char *to = (char *)out->data + out->size;
+        memcpy(to, word, length);
+        to += length;
+        for (size_t k = 0; k < dim; k++) {
+            *to++ = ' ';
+            to += full ? vgi_print_double(to, x[k]) : vgi_print_float(to, x[k]);
+        }
+        *to++ = '\n';
+        out->size = (size_t)(to - (char *)out->data);
+    }
+    return VG_OK;
+}
+
+static int write_face(vg_bytes *out, const uint32_t *vert, const uint32_t *tex, size_t n, vg_err *e)
+{
+    if (vgi_bytes_reserve(out, out->size + n * MOST_REFERENCE + 2, e) < 0) return VG_ENOMEM;
+    char *to = (char *)out->data + out->size;
+    *to++ = n == 2 ? 'l' : 'f';
+    for (size_t i = 0; i < n; i++) {
+        *to++ = ' ';
+        to += vgi_print_uint(to, (uint64_t)vert[i] + 1);
+        if (!tex || tex[i] == UINT32_MAX) continue;
+        *to++ = '/';
+        to += vgi_print_uint(to, (uint64_t)tex[i] + 1);
+    }
+    *to++ = '\n';
+    out->size = (size_t)(to - (char *)out->data);
+    return VG_OK;
+}
+
+/* Labels of which the face comes at or before f, from *next on. Libraries stand at the head of the file. */
+static int write_labels(vg_bytes *out, const vg_attributes *a, size_t f, size_t *next, vg_err *e)
+{
+    for (; *next < a->nlabels && a->labels[*next].face <= f; ++*next) {
+        if (a->labels[*next].kind == VG_LABEL_LIBRARY) continue;
+        int result = write_label(out, &a->labels[*next], e);
+        if (result < 0) return result;
+    }
+    return VG_OK;
+}
+
+static int write_libraries(vg_bytes *out, const vg_attributes *a, vg_err *e)
+{
+    for (size_t i = 0; i < a->nlabels; i++) {
+        int result = a->labels[i].kind == VG_LABEL_LIBRARY ? write_label(out, &a->labels[i], e) : VG_OK;
+        if (result < 0) return result;
+    }
+    return VG_OK;
+}
+
+static int write_obj(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    static const vg_attributes none;
+    const vg_attributes *a = w->attributes ? w->attributes : &none;
+    const vg_mesh *m = w->mesh;
+    const uint32_t *tex = a->ntex ? a->corner_tex : NULL;
+    int result = write_libraries(out, a, e);
+    if (result == VG_OK) result = write_numbers(out, "v", w->vertices, m->nv, 3, w->full_precision, e);
+    if (result == VG_OK) result = write_numbers(out, "vt", a->tex, a->ntex, a->tex_dim, w->full_precision, e);
+    size_t next_label = 0;
+    for (size_t f = 0; f < m->nf && result == VG_OK; f++) {
+        uint32_t first = m->start[f];
+        result = write_labels(out, a, f, &next_label, e);
+        if (result == VG_OK)
+            result = write_face(out, m->vert + first, tex ? tex + first : NULL, m->start[f + 1] - first, e);
+    }
+    return result == VG_OK ? write_labels(out, a, SIZE_MAX, &next_label, e) : result;
+}
+
+const vgi_format vgi_format_obj = {"obj", ".obj", sniff_obj, read_obj, write_obj};

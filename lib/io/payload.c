@@ -1,0 +1,563 @@
+/* payload.c: what is in each kind of record, both directions side by side (fmt/STREAM.md, section 3).
+ * Leaves out record headers and checksums (record.c) and the order of records (stream.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/payload.h"
+
+#include <stdlib.h>
+
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+enum { NATIVE = 1 };
+#else
+enum { NATIVE = 0 };
+#endif
+
+/* ---- a cursor that cannot run over, and never reports more than is there ---- */
+
+typedef struct cursor {
+    const unsigned char *at, *end;
+    bool bad;
+} cursor;
+
+static cursor start(const vgi_payload *p)
+{
+    return (cursor){p->data, p->data + p->size, false};
+}
+
+static const unsigned char *take(cursor *c, size_t n)
+{
+    if (c->bad || (size_t)(c->end - c->at) < n) {
+        c->bad = true;
+        return NULL;
+    }
+    const unsigned char *p = c->at;
+    c->at += n;
+    return p;
+}
+
+static uint32_t take32(cursor *c)
+{
+    const unsigned char *p = take(c, 4);
+    return p ? vgi_get32(p) : 0;
+}
+
+static uint64_t take64(cursor *c)
+{
+    const unsigned char *p = take(c, 8);
+    return p ? vgi_get64(p) : 0;
+}
+
+static double take_double(cursor *c)
+{
+    uint64_t bits = take64(c);
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+/* n elements of `size` bytes, but only if they are really there */
+static const unsigned char *take_array(cursor *c, uint64_t n, size_t size)
+{
+    if (n > (size_t)(c->end - c->at) / size) {
+        c->bad = true;
+        return NULL;
+    }
+    return take(c, (size_t)n * size);
+}
+
+static size_t left(const cursor *c)
+{
+    return (size_t)(c->end - c->at);
+}
+
+static void copy32(uint32_t *to, const unsigned char *from, size_t n)
+{
+    for (size_t i = 0; i < n; i++) to[i] = vgi_get32(from + 4 * i);
+}
+
+static void copy_doubles(double *to, const unsigned char *from, size_t n)
+{
+    if (n == 0) return;
+    if (NATIVE) {
+        memcpy(to, from, n * sizeof *to);
+        return;
+    }
+    for (size_t i = 0; i < n; i++) {
+        uint64_t bits = vgi_get64(from + 8 * i);
+        memcpy(&to[i], &bits, sizeof bits);
+    }
+}
+
+static void copy_floats(double *to, const unsigned char *from, size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        uint32_t bits = vgi_get32(from + 4 * i);
+        float x;
+        memcpy(&x, &bits, sizeof x);
+        to[i] = (double)x;
+    }
+}
+
+static int put32(vg_bytes *b, uint32_t x, vg_err *e)
+{
+    unsigned char p[4];
+    vgi_put32(p, x);
+    return vgi_bytes_append(b, p, sizeof p, e);
+}
+
+static int put64(vg_bytes *b, uint64_t x, vg_err *e)
+{
+    unsigned char p[8];
+    vgi_put64(p, x);
+    return vgi_bytes_append(b, p, sizeof p, e);
+}
+
+static int put_doubles(vg_bytes *b, const double *x, size_t n, vg_err *e)
+{
+    if (NATIVE) return vgi_bytes_append(b, x, n * sizeof *x, e);
+    int r = vgi_bytes_reserve(b, b->size + 8 * n, e);
+    for (size_t i = 0; r == VG_OK && i < n; i++) {
+        uint64_t bits;
+        memcpy(&bits, &x[i], sizeof bits);
+        vgi_put64(b->data + b->size, bits);
+        b->size += 8;
+    }
+    return r;
+}
+
+static int put_string(vg_bytes *b, const char *s, vg_err *e)
+{
+    size_t n = strlen(s);
+    if (n > UINT32_MAX) return vg_fail(e, VG_EARG, "a text of %zu bytes is too long for a stream", n);
+    int r = put32(b, (uint32_t)n, e);
+    return r < 0 ? r : vgi_bytes_append(b, s, n, e);
+}
+
+/* zero bytes up to the next multiple of 8, counted from `from` */
+static int put_padding(vg_bytes *b, size_t from, vg_err *e)
+{
+    static const unsigned char zeros[8];
+    return vgi_bytes_append(b, zeros, (from - b->size) & 7, e);
+}
+
+static int wrong(const vgi_payload *p, const char *what, vg_err *e)
+{
+    return vg_fail(e, VG_EINPUT, "%s: %s", p->where, what);
+}
+
+/* A text of n bytes; NULL and *r set when it is not there, no UTF-8, or memory ran out. */
+static char *take_text(cursor *c, size_t n, const vgi_payload *p, int *r, vg_err *e)
+{
+    const char *s = (const char *)take(c, n);
+    if (!s) {
+        *r = wrong(p, "a text is longer than its record", e);
+        return NULL;
+    }
+    if (!vgi_is_utf8(s, n)) {
+        *r = wrong(p, "a text is no UTF-8", e);
+        return NULL;
+    }
+    char *copy = vgi_copy_string(s, n, e);
+    if (!copy) *r = VG_ENOMEM;
+    return copy;
+}
+
+static bool take_padding(cursor *c, size_t n)
+{
+    const unsigned char *p = take(c, n);
+    for (size_t i = 0; p && i < n; i++)
+        if (p[i]) return false;
+    return p != NULL;
+}
+
+/* ---- PROV ---- */
+
+static int decode_arguments(cursor *c, vg_provenance *v, uint32_t nargs, const vgi_payload *p, vg_err *e)
+{
+    int r = VG_OK;
+    size_t cap = 0;
+    v->program = take_text(c, take32(c), p, &r, e);
+    if (v->program) v->version = take_text(c, take32(c), p, &r, e);
+    while (r == VG_OK && v->nargs < nargs) {
+        if ((r = vgi_grow(&v->args, &cap, v->nargs + 1, sizeof *v->args, e)) < 0) break;
+        char *text = take_text(c, take32(c), p, &r, e);
+        if (text) v->args[v->nargs++] = text;
+    }
+    return r;
+}
+
+int vgi_prov_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    size_t cap = h->nprovenance;
+    int r = vgi_grow(&h->provenance, &cap, h->nprovenance + 1, sizeof *h->provenance, e);
+    if (r < 0) return r;
+    vg_provenance *v = &h->provenance[h->nprovenance++]; /* counted at once, so that clearing h frees it in any case */
+    *v = (vg_provenance){0};
+    cursor c = start(p);
+    uint32_t nparents = take32(&c), nargs = take32(&c);
+    const unsigned char *parents = take_array(&c, nparents, 4);
+    if (c.bad) return wrong(p, "it is shorter than its counts say", e);
+    v->parents = vgi_array_raw(nparents, sizeof *v->parents, e);
+    if (!v->parents) return VG_ENOMEM;
+    copy32(v->parents, parents, nparents);
+    v->nparents = nparents;
+    for (size_t i = 0; i < nparents; i++)
+        if (v->parents[i] >= h->nprovenance - 1) return wrong(p, "it names a parent that does not come before it", e);
+    if ((r = decode_arguments(&c, v, nargs, p, e)) < 0) return r;
+    return left(&c) ? wrong(p, "bytes are left over", e) : VG_OK;
+}
+
+int vgi_prov_encode(vg_bytes *b, const vg_provenance *v, vg_err *e)
+{
+    int r = put32(b, (uint32_t)v->nparents, e);
+    if (r == VG_OK) r = put32(b, (uint32_t)v->nargs, e);
+    if (r == VG_OK) r = vgi_indices_encode(b, v->parents, v->nparents, e);
+    if (r == VG_OK) r = put_string(b, v->program, e);
+    if (r == VG_OK) r = put_string(b, v->version, e);
+    for (size_t i = 0; r == VG_OK && i < v->nargs; i++) r = put_string(b, v->args[i], e);
+    return r;
+}
+
+/* ---- MESH ---- */
+
+int vgi_mesh_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    cursor c = start(p);
+    uint64_t nv = take64(&c), nf = take64(&c), corners = 0;
+    const unsigned char *sizes = take_array(&c, nf, 4);
+    if (c.bad) return wrong(p, "it is shorter than its counts say", e);
+    if (nv >= UINT32_MAX || nf >= UINT32_MAX) return wrong(p, "more than 2^32 - 2 vertices or faces", e);
+    vg_mesh *m = &h->mesh;
+    m->start = vgi_array_raw((size_t)nf + 1, sizeof *m->start, e);
+    if (!m->start) return VG_ENOMEM;
+    m->start[0] = 0;
+    for (size_t f = 0; f < nf; f++) {
+        corners += vgi_get32(sizes + 4 * f);
+        if (corners >= UINT32_MAX) return wrong(p, "more than 2^32 - 2 corners", e);
+        m->start[f + 1] = (uint32_t)corners;
+    }
+    const unsigned char *vert = take_array(&c, corners, 4);
+    if (c.bad || left(&c)) return wrong(p, "its length and its counts do not agree", e);
+    m->vert = vgi_array_raw((size_t)corners, sizeof *m->vert, e);
+    if (!m->vert) return VG_ENOMEM;
+    copy32(m->vert, vert, (size_t)corners);
+    m->nv = (size_t)nv, m->nf = (size_t)nf;
+    return vg_mesh_check(m, p->where, e);
+}
+
+int vgi_mesh_encode(vg_bytes *b, const vg_mesh *m, vg_err *e)
+{
+    int r = put64(b, m->nv, e);
+    if (r == VG_OK) r = put64(b, m->nf, e);
+    if (r == VG_OK) r = vgi_bytes_reserve(b, b->size + 4 * (m->nf + vg_mesh_corners(m)), e);
+    for (size_t f = 0; r == VG_OK && f < m->nf; f++) r = put32(b, m->start[f + 1] - m->start[f], e);
+    return r < 0 ? r : vgi_indices_encode(b, m->vert, vg_mesh_corners(m), e);
+}
+
+/* ---- TEXC, LABL ---- */
+
+int vgi_texc_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    cursor c = start(p);
+    vg_attributes *a = &h->attributes;
+    size_t corners = vg_mesh_corners(&h->mesh);
+    uint32_t dim = take32(&c), zero = take32(&c);
+    uint64_t nt = take64(&c);
+    if (c.bad || dim < 1 || dim > 3 || zero) return wrong(p, "a texture coordinate must have 1 to 3 numbers", e);
+    const unsigned char *tex = take_array(&c, nt, 8 * (size_t)dim), *corner = take_array(&c, corners, 4);
+    if (c.bad || left(&c)) return wrong(p, "its length and its counts do not agree", e);
+    a->tex = vgi_array_raw((size_t)nt * dim, sizeof *a->tex, e);
+    a->corner_tex = vgi_array_raw(corners, sizeof *a->corner_tex, e);
+    if (!a->tex || !a->corner_tex) return VG_ENOMEM;
+    a->tex_dim = dim;
+    copy_doubles(a->tex, tex, (size_t)nt * dim);
+    copy32(a->corner_tex, corner, corners);
+    a->ntex = (size_t)nt;
+    if (!vgi_finite(a->tex, a->ntex * dim)) return wrong(p, "a number is not finite", e);
+    for (size_t i = 0; i < corners; i++)
+        if (a->corner_tex[i] >= nt && a->corner_tex[i] != UINT32_MAX)
+            return wrong(p, "a corner names a texture coordinate that is not there", e);
+    return VG_OK;
+}
+
+int vgi_texc_encode(vg_bytes *b, const vg_head *h, vg_err *e)
+{
+    const vg_attributes *a = &h->attributes;
+    int r = put32(b, a->tex_dim, e);
+    if (r == VG_OK) r = put32(b, 0, e);
+    if (r == VG_OK) r = put64(b, a->ntex, e);
+    if (r == VG_OK) r = put_doubles(b, a->tex, a->ntex * a->tex_dim, e);
+    return r < 0 ? r : vgi_indices_encode(b, a->corner_tex, vg_mesh_corners(&h->mesh), e);
+}
+
+int vgi_labl_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    cursor c = start(p);
+    vg_attributes *a = &h->attributes;
+    size_t cap = 0;
+    int r = VG_OK;
+    while (r == VG_OK && left(&c)) {
+        uint64_t face = take64(&c);
+        uint32_t kind = take32(&c), n = take32(&c);
+        if (c.bad) return wrong(p, "it ends inside a label", e);
+        if (face > h->mesh.nf || (a->nlabels && face < a->labels[a->nlabels - 1].face))
+            return wrong(p, "labels are not in the order of their faces", e);
+        if (kind < VG_LABEL_OBJECT || kind > VG_LABEL_LIBRARY) return wrong(p, "a label is of unknown kind", e);
+        char *text = take_text(&c, n, p, &r, e);
+        if (!text) return r;
+        r = vgi_grow(&a->labels, &cap, a->nlabels + 1, sizeof *a->labels, e);
+        if (r < 0) free(text);
+        else a->labels[a->nlabels++] = (vg_label){.face = face, .kind = kind, .text = text};
+        if (r == VG_OK && !take_padding(&c, -n & 7)) return wrong(p, "padding is missing or not zero", e);
+    }
+    return r;
+}
+
+int vgi_labl_encode(vg_bytes *b, const vg_attributes *a, vg_err *e)
+{
+    int r = VG_OK;
+    for (size_t i = 0; r == VG_OK && i < a->nlabels; i++) {
+        r = put64(b, a->labels[i].face, e);
+        if (r == VG_OK) r = put32(b, a->labels[i].kind, e);
+        if (r == VG_OK) r = put_string(b, a->labels[i].text, e);
+        if (r == VG_OK) r = put_padding(b, 0, e);
+    }
+    return r;
+}
+
+/* ---- SELE, LINK, ANCH: lists of indices ---- */
+
+static int decode_indices(const vgi_payload *p, size_t multiple, uint32_t **list, size_t *n, vg_err *e)
+{
+    if (p->size % (4 * multiple)) return wrong(p, "its length is no whole number of entries", e);
+    *list = vgi_array_raw(p->size / 4, sizeof **list, e);
+    if (!*list) return VG_ENOMEM;
+    copy32(*list, p->data, p->size / 4);
+    *n = p->size / 4 / multiple;
+    return VG_OK;
+}
+
+static int check_ascending(const vgi_payload *p, const uint32_t *list, size_t n, size_t limit, vg_err *e)
+{
+    for (size_t i = 0; i < n; i++) {
+        if (list[i] >= limit) return wrong(p, "an index is out of range", e);
+        if (i && list[i] <= list[i - 1]) return wrong(p, "indices are not ascending", e);
+    }
+    return VG_OK;
+}
+
+int vgi_sele_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    h->has_selection = true;
+    int r = decode_indices(p, 1, &h->selected, &h->nselected, e);
+    return r < 0 ? r : check_ascending(p, h->selected, h->nselected, h->mesh.nf, e);
+}
+
+int vgi_anch_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    int r = decode_indices(p, 1, &h->anchors, &h->nanchors, e);
+    return r < 0 ? r : check_ascending(p, h->anchors, h->nanchors, h->mesh.nv, e);
+}
+
+int vgi_link_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    h->has_links = true;
+    int r = decode_indices(p, 2, &h->links, &h->nlinks, e);
+    for (size_t i = 0; r == VG_OK && i < h->nlinks; i++) {
+        uint32_t a = h->links[2 * i], b = h->links[2 * i + 1];
+        if (a >= h->mesh.nv || b >= h->mesh.nv) return wrong(p, "an index is out of range", e);
+        if (a == b) return wrong(p, "a link joins a vertex to itself", e);
+    }
+    return r;
+}
+
+int vgi_indices_encode(vg_bytes *b, const uint32_t *x, size_t n, vg_err *e)
+{
+    int r = vgi_bytes_reserve(b, b->size + 4 * n, e);
+    if (r < 0) return r;
+    for (size_t i = 0; i < n; i++) vgi_put32(b->data + b->size + 4 * i, x[i]);
+    b->size += 4 * n;
+    return VG_OK;
+}
+
+/* ---- REFP, FORM ---- */
+
+int vgi_refp_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    cursor c = start(p);
+    int r = VG_OK;
+    uint32_t n = take32(&c), zero = take32(&c);
+    if (c.bad || zero) return wrong(p, "it is too short, or reserved bytes are not zero", e);
+    if (!(h->reference_name = take_text(&c, n, p, &r, e))) return r;
+    if (!take_padding(&c, -n & 7)) return wrong(p, "padding is missing or not zero", e);
+    const unsigned char *xyz = take_array(&c, 3 * (uint64_t)h->mesh.nv, 8);
+    if (c.bad || left(&c)) return wrong(p, "its length does not fit the number of vertices", e);
+    h->reference = vgi_array_raw(3 * h->mesh.nv, sizeof *h->reference, e);
+    if (!h->reference) return VG_ENOMEM;
+    copy_doubles(h->reference, xyz, 3 * h->mesh.nv);
+    return vgi_finite(h->reference, 3 * h->mesh.nv) ? VG_OK : wrong(p, "a position is not finite", e);
+}
+
+int vgi_refp_encode(vg_bytes *b, const vg_head *h, vg_err *e)
+{
+    const char *name = h->reference_name ? h->reference_name : "";
+    int r = put32(b, (uint32_t)strlen(name), e);
+    if (r == VG_OK) r = put32(b, 0, e);
+    if (r == VG_OK) r = vgi_bytes_append(b, name, strlen(name), e);
+    if (r == VG_OK) r = put_padding(b, 0, e);
+    return r < 0 ? r : put_doubles(b, h->reference, 3 * h->mesh.nv, e);
+}
+
+size_t vgi_graph_count(const vg_head *h, vg_kind kind)
+{
+    const vg_mesh *m = &h->mesh;
+    if (kind == VG_VERTICES) return m->nv;
+    if (!h->has_selection) return vg_mesh_corners(m) + 2 * h->nlinks;
+    size_t corners = 2 * h->nlinks;
+    for (size_t i = 0; i < h->nselected; i++) corners += m->start[h->selected[i] + 1] - m->start[h->selected[i]];
+    return corners;
+}
+
+int vgi_form_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    cursor c = start(p);
+    uint32_t kind = take32(&c), precision = take32(&c);
+    uint64_t count = take64(&c);
+    if (c.bad || left(&c)) return wrong(p, "it has a wrong length", e);
+    if (kind < VG_VERTICES || kind > VG_TRANSFORMS) return wrong(p, "frames are of unknown kind", e);
+    if (precision != VG_F32 && precision != VG_F64) return wrong(p, "numbers are of unknown precision", e);
+    h->kind = (vg_kind)kind, h->precision = (vg_precision)precision, h->count = (size_t)count;
+    if (kind == VG_TRANSFORMS) return VG_OK;
+    if (!h->reference) return wrong(p, "a MESH and a REFP record must come before it", e);
+    if (kind != VG_VERTICES && !h->has_links) return wrong(p, "a LINK record must come before it", e);
+    if (count != vgi_graph_count(h, h->kind)) return wrong(p, "its count does not fit the mesh", e);
+    return VG_OK;
+}
+
+int vgi_form_encode(vg_bytes *b, const vg_head *h, vg_err *e)
+{
+    int r = put32(b, h->kind, e);
+    if (r == VG_OK) r = put32(b, h->precision, e);
+    return r < 0 ? r : put64(b, h->count, e);
+}
+
+/* ---- FRAM ---- */
+
+static bool on_graph(const vg_head *h)
+{
+    return h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS;
+}
+
+static int take_values(cursor *c, vg_frame *f, const vg_head *h, const vgi_payload *p, vg_err *e)
+{
+    size_t n, width = vg_kind_width(h->kind);
+    if (!vgi_mul(h->count, width, &n)) return wrong(p, "its length does not fit the count of FORM", e);
+    const unsigned char *data = take_array(c, n, h->precision);
+    if (c->bad || left(c)) return wrong(p, "its length does not fit the count of FORM", e);
+    if (h->precision == VG_F64 && NATIVE && (uintptr_t)data % _Alignof(double) == 0) {
+        f->values = (double *)(uintptr_t)data;
+    } else {
+        int r = vgi_grow(&f->values_own, &f->values_cap, n, sizeof *f->values, e);
+        if (r < 0) return r;
+        f->values = f->values_own;
+        if (h->precision == VG_F64) copy_doubles(f->values, data, n);
+        else copy_floats(f->values, data, n);
+    }
+    return VG_OK;
+}
+
+int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e)
+{
+    vgi_payload p = {f->raw.data, f->raw.size, where};
+    cursor c = start(&p);
+    uint32_t n = take32(&c), flags = take32(&c);
+    double time = take_double(&c);
+    if (c.bad || (flags & ~1u)) return wrong(&p, "it is too short, or unknown flags are set", e);
+    if (!vgi_finite(&time, 1) || (!flags && time != 0)) return wrong(&p, "its time is not finite, or set without its flag", e);
+    const char *name = (const char *)take(&c, n);
+    if (!name || !vgi_is_utf8(name, n)) return wrong(&p, "its name is longer than the record, or no UTF-8", e);
+    int r = vgi_grow(&f->name, &f->name_cap, (size_t)n + 1, 1, e);
+    if (r < 0) return r;
+    memcpy(f->name, name, n);
+    f->name[n] = 0;
+    f->has_time = flags & 1, f->time = time;
+    if (!take_padding(&c, -n & 7)) return wrong(&p, "padding is missing or not zero", e);
+    if (on_graph(h)) {
+        const unsigned char *root = take(&c, 24), *anchors = take_array(&c, h->nanchors, 24);
+        if (c.bad) return wrong(&p, "it ends before its root and anchors", e);
+        if ((r = vgi_grow(&f->anchors, &f->anchors_cap, 3 * h->nanchors, sizeof *f->anchors, e)) < 0) return r;
+        copy_doubles(f->root, root, 3);
+        copy_doubles(f->anchors, anchors, 3 * h->nanchors);
+        if (!vgi_finite(f->root, 3) || !vgi_finite(f->anchors, 3 * h->nanchors))
+            return wrong(&p, "its root or an anchor is not finite", e);
+    }
+    if ((r = take_values(&c, f, h, &p, e)) < 0) return r;
+    size_t width = vg_kind_width(h->kind);
+    if (!vgi_finite(f->values, h->count * width)) return wrong(&p, "a value is not finite", e);
+    if (width > 3) /* deformations and transforms start with a quaternion */
+        for (size_t i = 0; i < h->count; i++) {
+            const double *q = f->values + i * width;
+            if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) return wrong(&p, "a quaternion is zero", e);
+        }
+    return VG_OK;
+}
+
+int vgi_fram_encode(vg_bytes *b, const vg_head *h, const vg_frame *f, vg_err *e)
+{
+    const char *name = f->name ? f->name : "";
+    double time = f->has_time ? f->time : 0;
+    int r = put32(b, (uint32_t)strlen(name), e);
+    if (r == VG_OK) r = put32(b, f->has_time, e);
+    if (r == VG_OK) r = put_doubles(b, &time, 1, e);
+    if (r == VG_OK) r = vgi_bytes_append(b, name, strlen(name), e);
+    if (r == VG_OK) r = put_padding(b, 0, e);
+    if (r == VG_OK && on_graph(h)) {
+        r = put_doubles(b, f->root, 3, e);
+        if (r == VG_OK) r = put_doubles(b, f->anchors, 3 * h->nanchors, e);
+    }
+    return r;
+}
+
+int vgi_values_encode(vg_bytes *b, const double *x, size_t n, vg_precision precision, const void **data, size_t *bytes,
+                      vg_err *e)
+{
+    *bytes = n * (size_t)precision;
+    *data = x;
+    if (precision == VG_F64 && NATIVE) return VG_OK;
+    b->size = 0;
+    int r = vgi_bytes_reserve(b, *bytes, e);
+    if (r < 0) return r;
+    *data = b->data;
+    if (precision == VG_F64) return put_doubles(b, x, n, e);
+    for (size_t i = 0; i < n; i++) {
+        float y = (float)x[i];
+        uint32_t bits;
+        if (!(y - y == 0)) return vg_fail(e, VG_EINPUT, "%g does not fit into binary32: write binary64", x[i]);
+        memcpy(&bits, &y, sizeof bits);
+        vgi_put32(b->data + 4 * i, bits);
+    }
+    return VG_OK;
+}
+
+/* ---- FAIL ---- */
+
+int vgi_fail_decode(const vgi_payload *p, const char *stream, vg_err *e)
+{
+    cursor c = start(p);
+    int r = VG_OK;
+    uint32_t status = take32(&c);
+    char *program = take_text(&c, take32(&c), p, &r, e);
+    char *message = program ? take_text(&c, take32(&c), p, &r, e) : NULL;
+    if (message && left(&c)) r = wrong(p, "bytes are left over", e);
+    else if (message)
+        r = vg_fail(e, VG_ETRUNC, "'%s' was cut short: %s failed with status %u: %s", stream, program, status, message);
+    free(program);
+    free(message);
+    return r;
+}
+
+int vgi_fail_encode(vg_bytes *b, const char *program, int status, const char *message, vg_err *e)
+{
+    int r = put32(b, (uint32_t)status, e);
+    if (r == VG_OK) r = put_string(b, program, e);
+    return r < 0 ? r : put_string(b, message, e);
+}

@@ -1,0 +1,42 @@
+/* payload.h: the typed contents of records (fmt/STREAM.md, section 3): each has a _decode into a head or frame, which
+ * checks everything, and an _encode that appends to bytes. `where` is how messages call the record.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_PAYLOAD_H
+#define VG_PAYLOAD_H
+
+#include "core/core.h"
+
+typedef struct vgi_payload {
+    const unsigned char *data;
+    size_t size;
+    const char *where;
+} vgi_payload;
+
+typedef int vgi_decoder(const vgi_payload *p, vg_head *h, vg_err *e);
+vgi_decoder vgi_prov_decode, vgi_mesh_decode, vgi_texc_decode, vgi_labl_decode, vgi_sele_decode, vgi_link_decode,
+    vgi_anch_decode, vgi_refp_decode, vgi_form_decode;
+
+int vgi_prov_encode(vg_bytes *b, const vg_provenance *p, vg_err *e) VG_MUST_CHECK;
+int vgi_mesh_encode(vg_bytes *b, const vg_mesh *m, vg_err *e) VG_MUST_CHECK;
+int vgi_texc_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+int vgi_labl_encode(vg_bytes *b, const vg_attributes *a, vg_err *e) VG_MUST_CHECK;
+int vgi_indices_encode(vg_bytes *b, const uint32_t *x, size_t n, vg_err *e) VG_MUST_CHECK;
+int vgi_refp_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+int vgi_form_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+
+/* vgi_graph_count: elements that a frame of this kind must have on h's mesh, selection and links. */
+size_t vgi_graph_count(const vg_head *h, vg_kind kind);
+
+/* vgi_fram_decode: f->raw holds the payload. On a little-endian machine binary64 values are used where they lie. */
+int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e) VG_MUST_CHECK;
+/* vgi_fram_encode: everything before the values. */
+int vgi_fram_encode(vg_bytes *b, const vg_head *h, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
+/* vgi_values_encode: n numbers as they lie in the stream: x itself if it already is, else converted into b. */
+int vgi_values_encode(vg_bytes *b, const double *x, size_t n, vg_precision precision, const void **data, size_t *bytes,
+                      vg_err *e) VG_MUST_CHECK;
+
+/* FAIL: VG_ETRUNC with the story of who failed. */
+int vgi_fail_decode(const vgi_payload *p, const char *stream, vg_err *e) VG_MUST_CHECK;
+int vgi_fail_encode(vg_bytes *b, const char *program, int status, const char *message, vg_err *e) VG_MUST_CHECK;
+
+#endif

@@ -1,0 +1,675 @@
+/* ply.c: PLY polygon files, text and binary in both byte orders: vertices, faces, edges.
+ * Leaves out every other element and property (colours, normals, user data: skipped) and triangle strips (refused).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/io.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { MOST_WORDS = 6, MOST_NUMBER = 26, MOST_SMALL_FACE = 255, SHOWN = 40 };
+
+/* ------------------------------------------------------------------------------------------- reading -- */
+
+enum type { NO_TYPE, I8, U8, I16, U16, I32, U32, F32, F64 };
+static const unsigned char type_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
+
+/* What a property is to us. X, Y, Z in this order. */
+enum role { PASSED_OVER, X, Y, Z, INDICES, FROM, TO };
+enum kind { OTHER, VERTEX, FACE, EDGE, STRIPS };
+
+struct property {
+    enum type count, item; /* count: NO_TYPE for a scalar */
+    enum role role;
+};
+
+struct element {
+    enum kind kind;
+    char name[SHOWN + 1];
+    uint64_t count;
+    size_t first, n; /* its properties */
+    size_t least;    /* bytes that one needs at least */
+    bool fixed;      /* binary, no lists: exactly `least` bytes each */
+};
+
+struct reading {
+    const char *p, *end;
+    bool text, swap; /* swap: numbers are big-endian */
+    const char *subject;
+    vg_err *e;
+    vg_model *m;
+    struct element *elements;
+    size_t nelements, elements_cap;
+    struct property *properties;
+    size_t nproperties, properties_cap;
+    size_t start_cap, vert_cap, corners;
+    bool has_vertices;
+};
+
+struct word {
+    const char *at;
+    size_t n;
+};
+
+static bool word_is(struct word w, const char *text)
+{
+    return strlen(text) == w.n && !memcmp(w.at, text, w.n);
+}
+
+static int shown(struct word w)
+{
+    return w.n > SHOWN ? SHOWN : (int)w.n;
+}
+
+static enum type type_named(struct word w)
+{
+    static const struct {
+        const char *name;
+        enum type type;
+    } names[] = {{"char", I8},    {"int8", I8},   {"uchar", U8},  {"uint8", U8},   {"short", I16}, {"int16", I16},
+                 {"ushort", U16}, {"uint16", U16}, {"int", I32},   {"int32", I32},  {"uint", U32},  {"uint32", U32},
+                 {"float", F32},  {"float32", F32}, {"double", F64}, {"float64", F64}};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (word_is(w, names[i].name)) return names[i].type;
+    return NO_TYPE;
+}
+
+static bool is_integer(enum type t)
+{
+    return t >= I8 && t <= U32;
+}
+
+/* One line of the header, cut into words; lines end as the first one does. False at the end of the file. */
+static bool next_line(struct reading *r, char line_end, struct word words[MOST_WORDS], size_t *n)
+{
+    const char *stop = memchr(r->p, line_end, (size_t)(r->end - r->p));
+    if (!stop) return false;
+    const char *p = r->p;
+    r->p = stop + 1;
+    *n = 0;
+    for (;;) {
+        while (p < stop && (*p == ' ' || *p == '\t' || *p == '\r')) p++;
+        if (p == stop) return true;
+        struct word w = {p, 0};
+        while (p < stop && *p != ' ' && *p != '\t' && *p != '\r') p++;
+        w.n = (size_t)(p - w.at);
+        if (*n < MOST_WORDS) words[*n] = w;
+        ++*n;
+    }
+}
+
+static int read_encoding(struct reading *r, const struct word *words, size_t n)
+{
+    if (n != 3 || !word_is(words[2], "1.0"))
+        return vg_fail(r->e, VG_EINPUT, "%s: the PLY header has no format and version 1.0", r->subject);
+    r->text = word_is(words[1], "ascii");
+    r->swap = word_is(words[1], "binary_big_endian");
+    if (r->text || r->swap || word_is(words[1], "binary_little_endian")) return VG_OK;
+    return vg_fail(r->e, VG_EINPUT, "%s: unknown PLY format '%.*s'", r->subject, shown(words[1]), words[1].at);
+}
+
+static int read_element_line(struct reading *r, const struct word *words, size_t n)
+{
+    static const struct {
+        const char *name;
+        enum kind kind;
+    } kinds[] = {{"vertex", VERTEX}, {"face", FACE}, {"edge", EDGE}, {"tristrips", STRIPS}};
+    int64_t count = -1;
+    const char *stop = n == 3 ? vgi_parse_int(words[2].at, words[2].at + words[2].n, &count) : NULL;
+    if (n != 3 || stop != words[2].at + words[2].n || count < 0)
+        return vg_fail(r->e, VG_EINPUT, "%s: the PLY header has an element without name and count", r->subject);
+    if (vgi_grow(&r->elements, &r->elements_cap, r->nelements + 1, sizeof *r->elements, r->e) < 0) return VG_ENOMEM;
+    struct element *el = &r->elements[r->nelements++];
+    *el = (struct element){.count = (uint64_t)count, .first = r->nproperties};
+    memcpy(el->name, words[1].at, (size_t)shown(words[1]));
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
+        if (word_is(words[1], kinds[i].name)) el->kind = kinds[i].kind;
+    if (el->kind == VERTEX && r->has_vertices)
+        return vg_fail(r->e, VG_EINPUT, "%s: the PLY header announces vertices twice", r->subject);
+    r->has_vertices |= el->kind == VERTEX;
+    return VG_OK;
+}
+
+static enum role role_named(enum kind kind, struct word name, bool list)
+{
+    static const struct {
+        enum kind kind;
+        bool list;
+        const char *name;
+        enum role role;
+    } roles[] = {{VERTEX, false, "x", X},
+                 {VERTEX, false, "y", Y},
+                 {VERTEX, false, "z", Z},
+                 {FACE, true, "vertex_indices", INDICES},
+                 {FACE, true, "vertex_index", INDICES},
+                 {EDGE, false, "vertex1", FROM},
+                 {EDGE, false, "vertex2", TO}};
+    for (size_t i = 0; i < sizeof roles / sizeof *roles; i++)
+        if (roles[i].kind == kind && roles[i].list == list && word_is(name, roles[i].name)) return roles[i].role;
+    return PASSED_OVER;
+}
+
+static int read_property_line(struct reading *r, const struct word *words, size_t n)
+{
+    bool list = n == 5 && word_is(words[1], "list");
+    if (!list && n != 3) return vg_fail(r->e, VG_EINPUT, "%s: the PLY header has an incomplete property", r->subject);
+    if (r->nelements == 0)
+        return vg_fail(r->e, VG_EINPUT, "%s: the PLY header has a property before any element", r->subject);
+    struct word type = words[list ? 3 : 1], name = words[list ? 4 : 2];
+    struct element *el = &r->elements[r->nelements - 1];
+    struct property p = {list ? type_named(words[2]) : NO_TYPE, type_named(type), role_named(el->kind, name, list)};
+    if (p.item == NO_TYPE || (list && !is_integer(p.count)))
+        return vg_fail(r->e, VG_EINPUT, "%s: PLY property '%.*s' has an unknown type", r->subject, shown(name), name.at);
+    if (p.role >= INDICES && !is_integer(p.item))
+        return vg_fail(r->e, VG_EINPUT, "%s: PLY property '%.*s' is not of an integer type", r->subject, shown(name), name.at);
+    for (size_t i = 0; i < el->n; i++)
+        if (p.role && r->properties[el->first + i].role == p.role)
+            return vg_fail(r->e, VG_EINPUT, "%s: PLY element '%s' has '%.*s' twice", r->subject, el->name, shown(name),
+                           name.at);
+    if (vgi_grow(&r->properties, &r->properties_cap, r->nproperties + 1, sizeof *r->properties, r->e) < 0)
+        return VG_ENOMEM;
+    r->properties[r->nproperties++] = p;
+    el->n++;
+    return VG_OK;
+}
+
+static bool has_role(const struct reading *r, const struct element *el, enum role role)
+{
+    for (size_t i = 0; i < el->n; i++)
+        if (r->properties[el->first + i].role == role) return true;
+    return false;
+}
+
+/* Do the elements have what is needed of them? And how many bytes does each need? */
+static int finish_element(struct reading *r, struct element *el)
+{
+    el->fixed = !r->text;
+    for (size_t i = 0; i < el->n; i++) {
+        const struct property *p = &r->properties[el->first + i];
+        el->least += r->text ? 2 : type_bytes[p->count ? p->count : p->item]; /* text: a digit and a blank */
+        if (p->count) el->fixed = false;
+    }
+    if (el->kind == STRIPS && el->count)
+        return vg_fail(r->e, VG_EINPUT, "%s holds triangle strips, which are not read: write it with a list of faces",
+                       r->subject);
+    if (el->kind == VERTEX && !(has_role(r, el, X) && has_role(r, el, Y) && has_role(r, el, Z)))
+        return vg_fail(r->e, VG_EINPUT, "%s: its vertices have no x, y and z", r->subject);
+    if (el->kind == VERTEX && el->count >= UINT32_MAX)
+        return vg_fail(r->e, VG_EINPUT, "%s has too many vertices (the limit is 2^32 - 2)", r->subject);
+    if (el->kind == FACE && el->count && !has_role(r, el, INDICES))
+        return vg_fail(r->e, VG_EINPUT, "%s: its faces have no list vertex_indices", r->subject);
+    if (el->kind == EDGE && !(has_role(r, el, FROM) && has_role(r, el, TO))) el->kind = OTHER;
+    return VG_OK;
+}
+
+static int read_header(struct reading *r)
+{
+    struct word words[MOST_WORDS];
+    size_t n = 0;
+    bool formatted = false;
+    const char *first = r->p;
+    char line_end = r->end - first > 3 && first[3] == '\r' && !(r->end - first > 4 && first[4] == '\n') ? '\r' : '\n';
+    if (!next_line(r, line_end, words, &n) || n != 1 || !word_is(words[0], "ply"))
+        return vg_fail(r->e, VG_EINPUT, "%s does not start like PLY", r->subject);
+    for (;;) {
+        if (!next_line(r, line_end, words, &n))
+            return vg_fail(r->e, VG_ETRUNC, "%s ends inside the PLY header", r->subject);
+        int result = VG_OK;
+        if (n == 0 || word_is(words[0], "comment") || word_is(words[0], "obj_info")) continue;
+        if (word_is(words[0], "end_header")) break;
+        if (word_is(words[0], "format"))
+            result = read_encoding(r, words, n), formatted = true;
+        else if (word_is(words[0], "element"))
+            result = read_element_line(r, words, n);
+        else if (word_is(words[0], "property"))
+            result = read_property_line(r, words, n);
+        else
+            result = vg_fail(r->e, VG_EINPUT, "%s: unknown word '%.*s' in the PLY header", r->subject, shown(words[0]),
+                             words[0].at);
+        if (result < 0) return result;
+    }
+    if (!formatted) return vg_fail(r->e, VG_EINPUT, "%s: the PLY header has no format line", r->subject);
+    for (size_t i = 0; i < r->nelements; i++) {
+        int result = finish_element(r, &r->elements[i]);
+        if (result < 0) return result;
+    }
+    return VG_OK;
+}
+
+static bool is_space(char c)
+{
+    return c == ' ' || c == '\n' || c == '\r' || c == '\t';
+}
+
+/* The next word of a text body; false at the end of the file. */
+static bool next_word(struct reading *r, struct word *w)
+{
+    const char *p = r->p;
+    while (p < r->end && is_space(*p)) p++;
+    w->at = p;
+    while (p < r->end && !is_space(*p)) p++;
+    w->n = (size_t)(p - w->at);
+    r->p = p;
+    return w->n > 0;
+}
+
+static int fail_word(struct reading *r, const struct element *el, uint64_t i, struct word w)
+{
+    if (w.n == 0)
+        return vg_fail(r->e, VG_ETRUNC, "%s ends in %s %llu of %llu", r->subject, el->name, (unsigned long long)i,
+                       (unsigned long long)el->count);
+    return vg_fail(r->e, VG_EINPUT, "%s: '%.*s' in %s %llu is no number that fits there", r->subject, shown(w), w.at,
+                   el->name, (unsigned long long)i);
+}
+
+static inline uint64_t load(const char *p, size_t bytes, bool swap)
+{
+    const unsigned char *u = (const unsigned char *)p;
+    switch (bytes) {
+    case 1: return u[0];
+    case 2: return swap ? (uint64_t)u[0] << 8 | u[1] : (uint64_t)u[1] << 8 | u[0];
+    case 4: return swap ? __builtin_bswap32(vgi_get32(u)) : vgi_get32(u);
+    default: return swap ? __builtin_bswap64(vgi_get64(u)) : vgi_get64(u);
+    }
+}
+
+static inline int64_t integer_at(const char *p, enum type t, bool swap)
+{
+    uint64_t x = load(p, type_bytes[t], swap);
+    switch (t) {
+    case I8: return (int8_t)x;
+    case I16: return (int16_t)x;
+    case I32: return (int32_t)x;
+    default: return (int64_t)x;
+    }
+}
+
+static inline double number_at(const char *p, enum type t, bool swap)
+{
+    if (t == F32) {
+        uint32_t bits = (uint32_t)load(p, 4, swap);
+        float x;
+        memcpy(&x, &bits, sizeof x);
+        return x;
+    }
+    if (t == F64) {
+        uint64_t bits = load(p, 8, swap);
+        double x;
+        memcpy(&x, &bits, sizeof x);
+        return x;
+    }
+    return (double)integer_at(p, t, swap);
+}
+
+static inline int read_integer(struct reading *r, enum type t, const struct element *el, uint64_t i, int64_t *x)
+{
+    if (r->text) {
+        struct word w;
+        if (!next_word(r, &w) || vgi_parse_int(w.at, w.at + w.n, x) != w.at + w.n) return fail_word(r, el, i, w);
+        return VG_OK;
+    }
+    if ((size_t)(r->end - r->p) < type_bytes[t]) return fail_word(r, el, i, (struct word){0});
+    *x = integer_at(r->p, t, r->swap);
+    r->p += type_bytes[t];
+    return VG_OK;
+}
+
+static inline int read_number(struct reading *r, enum type t, const struct element *el, uint64_t i, double *x)
+{
+    if (r->text) {
+        struct word w;
+        if (!next_word(r, &w) || vgi_parse_double(w.at, w.at + w.n, x) != w.at + w.n) return fail_word(r, el, i, w);
+        return VG_OK;
+    }
+    if ((size_t)(r->end - r->p) < type_bytes[t]) return fail_word(r, el, i, (struct word){0});
+    *x = number_at(r->p, t, r->swap);
+    r->p += type_bytes[t];
+    return VG_OK;
+}
+
+/* n numbers that nobody wants. n is what the file says: it is compared with what is there. */
+static int skip_numbers(struct reading *r, enum type t, uint64_t n, const struct element *el, uint64_t i)
+{
+    if (r->text) {
+        struct word w;
+        for (; n > 0; n--)
+            if (!next_word(r, &w)) return fail_word(r, el, i, w);
+        return VG_OK;
+    }
+    if (n > (uint64_t)(r->end - r->p) / type_bytes[t]) return fail_word(r, el, i, (struct word){0});
+    r->p += n * type_bytes[t];
+    return VG_OK;
+}
+
+static int list_length(struct reading *r, const struct property *p, const struct element *el, uint64_t i, uint64_t *n)
+{
+    int64_t length;
+    int result = read_integer(r, p->count, el, i, &length);
+    if (result < 0) return result;
+    if (length < 0)
+        return vg_fail(r->e, VG_EINPUT, "%s: %s %llu has a list of negative length", r->subject, el->name,
+                       (unsigned long long)i);
+    *n = (uint64_t)length;
+    return VG_OK;
+}
+
+static int skip_property(struct reading *r, const struct property *p, const struct element *el, uint64_t i)
+{
+    uint64_t n = 1;
+    int result = p->count ? list_length(r, p, el, i, &n) : VG_OK;
+    return result == VG_OK ? skip_numbers(r, p->item, n, el, i) : result;
+}
+
+static int add_corner(struct reading *r, enum type t, const struct element *el, uint64_t i)
+{
+    int64_t v;
+    int result = read_integer(r, t, el, i, &v);
+    if (result < 0) return result;
+    if (v < 0 || v >= UINT32_MAX - 1)
+        return vg_fail(r->e, VG_EINPUT, "%s: %s %llu names vertex %lld", r->subject, el->name, (unsigned long long)i,
+                       (long long)v);
+    r->m->mesh.vert[r->corners++] = (uint32_t)v;
+    return VG_OK;
+}
+
+static int grow_corners(struct reading *r, uint64_t more)
+{
+    if (more >= UINT32_MAX - r->corners)
+        return vg_fail(r->e, VG_EINPUT, "%s has too many corners of faces (the limit is 2^32 - 2)", r->subject);
+    return vgi_grow(&r->m->mesh.vert, &r->vert_cap, r->corners + (size_t)more, sizeof *r->m->mesh.vert, r->e);
+}
+
+static int end_face(struct reading *r)
+{
+    vg_mesh *m = &r->m->mesh;
+    if (vgi_grow(&m->start, &r->start_cap, m->nf + 2, sizeof *m->start, r->e) < 0) return VG_ENOMEM;
+    m->start[++m->nf] = (uint32_t)r->corners;
+    return VG_OK;
+}
+
+static int read_indices(struct reading *r, const struct property *p, const struct element *el, uint64_t i)
+{
+    uint64_t n = 0;
+    int result = list_length(r, p, el, i, &n);
+    if (result < 0) return result;
+    size_t left = (size_t)(r->end - r->p), bytes = r->text ? 2 : type_bytes[p->item];
+    if (n > left / bytes + 1) return fail_word(r, el, i, (struct word){0});
+    if (n < 2)
+        return vg_fail(r->e, VG_EINPUT, "%s: face %llu has %llu vertices", r->subject, (unsigned long long)i,
+                       (unsigned long long)n);
+    result = grow_corners(r, n);
+    for (uint64_t k = 0; k < n && result == VG_OK; k++) result = add_corner(r, p->item, el, i);
+    return result == VG_OK ? end_face(r) : result;
+}
+
+static int read_face(struct reading *r, const struct element *el, uint64_t i)
+{
+    for (size_t k = 0; k < el->n; k++) {
+        const struct property *p = &r->properties[el->first + k];
+        int result = p->role == INDICES ? read_indices(r, p, el, i) : skip_property(r, p, el, i);
+        if (result < 0) return result;
+    }
+    return VG_OK;
+}
+
+static int read_edge(struct reading *r, const struct element *el, uint64_t i)
+{
+    int result = grow_corners(r, 2);
+    size_t first = r->corners;
+    bool reversed = false;
+    for (size_t k = 0; k < el->n && result == VG_OK; k++) {
+        const struct property *p = &r->properties[el->first + k];
+        if (p->role == TO && r->corners == first) reversed = true;
+        result = p->role ? add_corner(r, p->item, el, i) : skip_property(r, p, el, i);
+    }
+    if (result < 0) return result;
+    uint32_t *v = r->m->mesh.vert + first;
+    if (reversed) {
+        uint32_t from = v[1];
+        v[1] = v[0], v[0] = from;
+    }
+    return end_face(r);
+}
+
+static int read_vertex(struct reading *r, const struct element *el, uint64_t i)
+{
+    double *to = r->m->vertices + 3 * i;
+    for (size_t k = 0; k < el->n; k++) {
+        const struct property *p = &r->properties[el->first + k];
+        int result = p->role ? read_number(r, p->item, el, i, to + (p->role - X)) : skip_property(r, p, el, i);
+        if (result < 0) return result;
+    }
+    if (isfinite(to[0]) && isfinite(to[1]) && isfinite(to[2])) return VG_OK;
+    return vg_fail(r->e, VG_EINPUT, "%s: vertex %llu is not finite", r->subject, (unsigned long long)i);
+}
+
+static int read_other(struct reading *r, const struct element *el, uint64_t i)
+{
+    for (size_t k = 0; k < el->n; k++) {
+        int result = skip_property(r, &r->properties[el->first + k], el, i);
+        if (result < 0) return result;
+    }
+    return VG_OK;
+}
+
+/* Vertices of fixed size in binary: their place is known, so nothing is checked in the loop. */
+static void read_fixed_vertices(struct reading *r, const struct element *el)
+{
+    size_t offset[3] = {0}, at = 0;
+    enum type type[3] = {F32, F32, F32};
+    for (size_t k = 0; k < el->n; k++) {
+        const struct property *p = &r->properties[el->first + k];
+        if (p->role) offset[p->role - X] = at, type[p->role - X] = p->item;
+        at += type_bytes[p->item];
+    }
+    double *to = r->m->vertices;
+    const char *p = r->p;
+    for (uint64_t i = 0; i < el->count; i++, to += 3, p += at)
+        for (int k = 0; k < 3; k++) to[k] = number_at(p + offset[k], type[k], r->swap);
+    r->p = p;
+}
+
+static int read_vertices(struct reading *r, const struct element *el)
+{
+    size_t n = (size_t)el->count;
+    r->m->vertices = vgi_array_raw(n, 3 * sizeof *r->m->vertices, r->e);
+    if (!r->m->vertices) return VG_ENOMEM;
+    r->m->mesh.nv = n;
+    if (el->fixed) {
+        read_fixed_vertices(r, el);
+        if (vgi_finite(r->m->vertices, 3 * n)) return VG_OK;
+        for (size_t i = 0; i < 3 * n; i++)
+            if (!isfinite(r->m->vertices[i])) return vg_fail(r->e, VG_EINPUT, "%s: vertex %zu is not finite", r->subject, i / 3);
+    }
+    int result = VG_OK;
+    for (uint64_t i = 0; i < el->count && result == VG_OK; i++) result = read_vertex(r, el, i);
+    return result;
+}
+
+static int read_element(struct reading *r, const struct element *el)
+{
+    size_t left = (size_t)(r->end - r->p);
+    /* the last number of a text needs no blank behind it */
+    if (el->least && el->count > (left + (r->text ? 1 : 0)) / el->least)
+        return vg_fail(r->e, VG_ETRUNC, "%s announces %llu of element '%s', but ends before", r->subject,
+                       (unsigned long long)el->count, el->name);
+    if (el->kind == VERTEX) return read_vertices(r, el);
+    if (el->n == 0) return VG_OK;
+    if (el->kind == OTHER && el->fixed) {
+        r->p += el->count * el->least;
+        return VG_OK;
+    }
+    int result = VG_OK;
+    for (uint64_t i = 0; i < el->count && result == VG_OK; i++)
+        result = el->kind == FACE ? read_face(r, el, i) : el->kind == EDGE ? read_edge(r, el, i) : read_other(r, el, i);
+    return result;
+}
+
+static int read_body(struct reading *r)
+{
+    if (vgi_grow(&r->m->mesh.start, &r->start_cap, 1, sizeof *r->m->mesh.start, r->e) < 0) return VG_ENOMEM;
+    r->m->mesh.start[0] = 0;
+    for (size_t i = 0; i < r->nelements; i++) {
+        int result = read_element(r, &r->elements[i]);
+        if (result < 0) return result;
+    }
+    while (r->text && r->p < r->end && is_space(*r->p)) r->p++;
+    if (r->p < r->end)
+        return vg_fail(r->e, VG_EINPUT, "%s has %zu bytes behind its last element", r->subject, (size_t)(r->end - r->p));
+    if (r->m->mesh.nv == 0) return vg_fail(r->e, VG_EINPUT, "%s has no vertices", r->subject);
+    return VG_OK;
+}
+
+static int read_ply(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
+{
+    struct reading r = {.p = data, .end = data + n, .subject = subject, .e = e, .m = m};
+    int result = read_header(&r);
+    if (result == VG_OK) result = read_body(&r);
+    free(r.elements);
+    free(r.properties);
+    return result;
+}
+
+static bool sniff_ply(const unsigned char *data, size_t n)
+{
+    return n >= 4 && !memcmp(data, "ply", 3) && (data[3] == '\n' || data[3] == '\r');
+}
+
+/* ------------------------------------------------------------------------------------------- writing -- */
+
+enum encoding { TEXT, LITTLE, BIG };
+
+struct writing {
+    vg_bytes *out;
+    const vgi_writing *w;
+    enum encoding encoding;
+    size_t nfaces;  /* the faces before nfaces are element face, those behind element edge */
+    bool long_list; /* list lengths need 32 bits */
+    vg_err *e;
+};
+
+static void put(char **to, uint64_t x, size_t bytes, enum encoding encoding)
+{
+    for (size_t i = 0; i < bytes; i++) (*to)[encoding == BIG ? bytes - 1 - i : i] = (char)(x >> 8 * i);
+    *to += bytes;
+}
+
+static void put_integer(char **to, uint64_t x, size_t bytes, enum encoding encoding, char separator)
+{
+    if (encoding != TEXT) {
+        put(to, x, bytes, encoding);
+        return;
+    }
+    *to += vgi_print_uint(*to, x);
+    *(*to)++ = separator;
+}
+
+static void put_number(char **to, double x, bool full, enum encoding encoding, char separator)
+{
+    if (encoding == TEXT) {
+        *to += full ? vgi_print_double(*to, x) : vgi_print_float(*to, x);
+        *(*to)++ = separator;
+    } else if (full) {
+        uint64_t bits;
+        memcpy(&bits, &x, sizeof bits);
+        put(to, bits, 8, encoding);
+    } else {
+        float f = (float)x;
+        uint32_t bits;
+        memcpy(&bits, &f, sizeof bits);
+        put(to, bits, 4, encoding);
+    }
+}
+
+/* Two-vertex faces become edges when that keeps the order: when all of them come last. */
+static void divide_faces(struct writing *x)
+{
+    const vg_mesh *m = x->w->mesh;
+    x->nfaces = m->nf;
+    while (x->nfaces > 0 && m->start[x->nfaces] - m->start[x->nfaces - 1] == 2) x->nfaces--;
+    size_t pairs = 0;
+    for (size_t f = 0; f < x->nfaces; f++) {
+        size_t size = m->start[f + 1] - m->start[f];
+        pairs += size == 2;
+        x->long_list |= size > MOST_SMALL_FACE;
+    }
+    if (pairs) x->nfaces = m->nf;
+}
+
+static int write_header(struct writing *x)
+{
+    static const char *const names[] = {"ascii", "binary_little_endian", "binary_big_endian"};
+    const vg_mesh *m = x->w->mesh;
+    const char *real = x->w->full_precision ? "double" : "float", *index = m->nv > (size_t)INT32_MAX + 1 ? "uint" : "int";
+    char text[512];
+    int n = snprintf(text, sizeof text,
+                     "ply\nformat %s 1.0\nelement vertex %zu\nproperty %s x\nproperty %s y\nproperty %s z\n"
+                     "element face %zu\nproperty list %s %s vertex_indices\n",
+                     names[x->encoding], m->nv, real, real, real, x->nfaces, x->long_list ? "uint" : "uchar", index);
+    int result = vgi_bytes_append(x->out, text, (size_t)n, x->e);
+    if (result == VG_OK && x->nfaces < m->nf) {
+        n = snprintf(text, sizeof text, "element edge %zu\nproperty %s vertex1\nproperty %s vertex2\n", m->nf - x->nfaces,
+                     index, index);
+        result = vgi_bytes_append(x->out, text, (size_t)n, x->e);
+    }
+    return result == VG_OK ? vgi_bytes_append(x->out, "end_header\n", 11, x->e) : result;
+}
+
+/* Room for n numbers of at most `most` bytes; where to write them. NULL: no memory. */
+static char *room(struct writing *x, size_t n, size_t most)
+{
+    if (vgi_bytes_reserve(x->out, x->out->size + n * most, x->e) < 0) return NULL;
+    return (char *)x->out->data + x->out->size;
+}
+
+static void wrote(struct writing *x, const char *to)
+{
+    x->out->size = (size_t)(to - (char *)x->out->data);
+}
+
+static int write_body(struct writing *x)
+{
+    const vg_mesh *m = x->w->mesh;
+    for (size_t v = 0; v < m->nv; v++) {
+        char *to = room(x, 3, MOST_NUMBER);
+        if (!to) return VG_ENOMEM;
+        for (int k = 0; k < 3; k++)
+            put_number(&to, x->w->vertices[3 * v + k], x->w->full_precision, x->encoding, k < 2 ? ' ' : '\n');
+        wrote(x, to);
+    }
+    for (size_t f = 0; f < m->nf; f++) {
+        uint32_t first = m->start[f], end = m->start[f + 1];
+        char *to = room(x, (size_t)(end - first) + 1, MOST_NUMBER);
+        if (!to) return VG_ENOMEM;
+        if (f < x->nfaces) put_integer(&to, end - first, x->long_list ? 4 : 1, x->encoding, ' ');
+        for (uint32_t c = first; c < end; c++) put_integer(&to, m->vert[c], 4, x->encoding, c + 1 < end ? ' ' : '\n');
+        wrote(x, to);
+    }
+    return VG_OK;
+}
+
+static int write_ply(vg_bytes *out, const vgi_writing *w, enum encoding encoding, vg_err *e)
+{
+    struct writing x = {.out = out, .w = w, .encoding = encoding, .e = e};
+    divide_faces(&x);
+    int result = write_header(&x);
+    return result == VG_OK ? write_body(&x) : result;
+}
+
+static int write_little(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    return write_ply(out, w, LITTLE, e);
+}
+
+static int write_text(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    return write_ply(out, w, TEXT, e);
+}
+
+static int write_big(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    return write_ply(out, w, BIG, e);
+}
+
+const vgi_format vgi_format_ply = {"ply", ".ply", sniff_ply, read_ply, write_little};
+const vgi_format vgi_format_ply_ascii = {"ply-ascii", ".ply", sniff_ply, read_ply, write_text};
+const vgi_format vgi_format_ply_be = {"ply-be", ".ply", sniff_ply, read_ply, write_big};

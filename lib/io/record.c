@@ -1,0 +1,193 @@
+/* record.c: the bytes of the stream's file header, records and END mark, both directions (fmt/STREAM.md).
+ * Leaves out what is in a record: payload.c; and in which order they may stand: stream.c.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/record.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <sys/uio.h>
+#include <xxhash.h>
+
+enum { FILE_HEADER = 16, RECORD_HEADER = 32, MINOR = 0, END_PAYLOAD = 16, MOST_PARTS = 3 };
+static const uint64_t longest_payload = (uint64_t)1 << 40;
+static const uint32_t reserved_flags = 0xfffc;
+static const unsigned char magic[8] = {0x89, 'V', 'G', 'S', '\r', '\n', 0x1a, '1'};
+
+bool vgi_is_stream(const unsigned char *data, size_t n)
+{
+    return n >= 4 && !memcmp(data, magic, 4);
+}
+
+int vgi_tally_init(vgi_tally *t, vg_err *e)
+{
+    t->records = 0;
+    t->sum = XXH64_createState();
+    if (!t->sum) return vg_fail(e, VG_ENOMEM, "not enough memory for a checksum");
+    XXH64_reset(t->sum, 0);
+    return VG_OK;
+}
+
+void vgi_tally_clear(vgi_tally *t)
+{
+    XXH64_freeState(t->sum);
+    t->sum = NULL;
+}
+
+static void tally(vgi_tally *t, const unsigned char header[RECORD_HEADER])
+{
+    t->records++;
+    XXH64_update(t->sum, header + 24, 8);
+}
+
+/* ---- reading ---- */
+
+int vgi_record_begin_read(vgi_input *in, vg_err *e)
+{
+    const char *name = vgi_input_name(in);
+    unsigned char h[FILE_HEADER];
+    size_t got = 0;
+    int r = vgi_input_read(in, h, sizeof h, &got, e);
+    if (r == VG_ETRUNC && got == 0)
+        return vg_fail(e, VG_ETRUNC, "'%s' is empty: did the program before it fail?", name);
+    if (got >= 4 && memcmp(h, magic, 4)) return vg_fail(e, VG_EINPUT, "'%s' is no vg stream", name);
+    if (got >= 7 && memcmp(h, magic, 7))
+        return vg_fail(e, VG_EINPUT, "'%s' was damaged by a transfer that changes line ends", name);
+    if (r < 0) return r == VG_ETRUNC ? vg_fail(e, r, "'%s' ends inside the stream's first 16 bytes", name) : r;
+    if (h[7] != magic[7])
+        return vg_fail(e, VG_EINPUT, "'%s' is a stream of major version '%c': this program reads version 1", name, h[7]);
+    if (vgi_get32(h + 12)) return vg_fail(e, VG_EINPUT, "'%s': reserved bytes of the file header are not zero", name);
+    return VG_OK;
+}
+
+static bool is_tag(const unsigned char *t)
+{
+    for (int i = 0; i < 4; i++)
+        if (!((t[i] >= 'A' && t[i] <= 'Z') || (t[i] >= '0' && t[i] <= '9') || t[i] == ' ')) return false;
+    return true;
+}
+
+static int cut_short(const char *name, const vgi_tally *t, const char *where, vg_err *e)
+{
+    return vg_fail(e, VG_ETRUNC, "'%s' is cut short: it ends %s %llu, without the END mark", name, where,
+                   (unsigned long long)t->records);
+}
+
+static int check_end(vgi_input *in, const vgi_tally *t, const vg_record *r, vg_err *e)
+{
+    const char *name = vgi_input_name(in);
+    if (r->payload.size != END_PAYLOAD) return vg_fail(e, VG_EINPUT, "'%s': the END record has a wrong length", name);
+    uint64_t count = vgi_get64(r->payload.data);
+    if (count != t->records)
+        return vg_fail(e, VG_EINPUT, "'%s': the END mark counts %llu records, %llu came", name,
+                       (unsigned long long)count, (unsigned long long)t->records);
+    if (vgi_get64(r->payload.data + 8) != XXH64_digest(t->sum))
+        return vg_fail(e, VG_EINPUT, "'%s': the END mark's checksum is wrong: records were changed or moved", name);
+    const unsigned char *more;
+    size_t n;
+    int ok = vgi_input_peek(in, 1, &more, &n, e);
+    if (ok < 0) return ok;
+    if (n) return vg_fail(e, VG_EINPUT, "'%s' goes on behind the END mark: join streams with vg-encode, not cat", name);
+    return 0;
+}
+
+int vgi_record_read(vgi_input *in, vgi_tally *t, vg_record *r, vg_err *e)
+{
+    const char *name = vgi_input_name(in);
+    unsigned char h[RECORD_HEADER], padding[8];
+    size_t got = 0;
+    int ok = vgi_input_read(in, h, sizeof h, &got, e);
+    if (ok == VG_ETRUNC)
+        return got ? cut_short(name, t, "inside the header of record", e) : cut_short(name, t, "before record", e);
+    if (ok < 0) return ok;
+    unsigned long long index = t->records;
+    if (vgi_get64(h + 24) != XXH64(h, 24, 0))
+        return vg_fail(e, VG_EINPUT, "'%s': the header of record %llu is damaged (checksum)", name, index);
+    if (!is_tag(h)) return vg_fail(e, VG_EINPUT, "'%s': the tag of record %llu is malformed", name, index);
+    memcpy(r->tag, h, 4);
+    r->tag[4] = 0;
+    r->flags = vgi_get32(h + 4);
+    uint64_t length = vgi_get64(h + 8);
+    if (r->flags & reserved_flags)
+        return vg_fail(e, VG_EINPUT, "'%s': record %llu (%s) has reserved flags set", name, index, r->tag);
+    if (length > longest_payload)
+        return vg_fail(e, VG_EINPUT, "'%s': record %llu (%s) claims %llu bytes", name, index, r->tag,
+                       (unsigned long long)length);
+
+    r->payload.size = 0;
+    ok = vgi_input_take(in, &r->payload, (size_t)length, NULL, e);
+    if (ok == VG_OK) ok = vgi_input_read(in, padding, (size_t)(-length & 7), NULL, e);
+    if (ok == VG_ETRUNC) return cut_short(name, t, "inside record", e);
+    if (ok < 0) return ok;
+    for (size_t i = 0; i < (size_t)(-length & 7); i++)
+        if (padding[i]) return vg_fail(e, VG_EINPUT, "'%s': the padding of record %llu (%s) is not zero", name, index, r->tag);
+    if (vgi_get64(h + 16) != XXH64(r->payload.data, (size_t)length, 0))
+        return vg_fail(e, VG_EINPUT, "'%s': record %llu (%s) is damaged (checksum)", name, index, r->tag);
+    if (!strcmp(r->tag, "END ")) return check_end(in, t, r, e);
+    tally(t, h);
+    return 1;
+}
+
+/* ---- writing ---- */
+
+int vgi_record_begin_write(int fd, const char *name, vg_err *e)
+{
+    unsigned char h[FILE_HEADER] = {0};
+    memcpy(h, magic, sizeof magic);
+    vgi_put32(h + 8, MINOR);
+    return vgi_write_all(fd, h, sizeof h, name, e);
+}
+
+static int write_vector(int fd, const char *name, struct iovec *v, int n, vg_err *e)
+{
+    while (n > 0) {
+        ssize_t done = writev(fd, v, n);
+        if (done < 0 && errno == EINTR) continue;
+        if (done < 0) return vg_fail(e, VG_ESYS, "cannot write to '%s': %s", name, strerror(errno));
+        while (n > 0 && (size_t)done >= v->iov_len) done -= (ssize_t)v->iov_len, v++, n--;
+        if (n > 0) v->iov_base = (char *)v->iov_base + done, v->iov_len -= (size_t)done;
+    }
+    return VG_OK;
+}
+
+int vgi_record_write(int fd, const char *name, vgi_tally *t, const char *tag, uint32_t flags, const vgi_part *parts,
+                     size_t nparts, vg_err *e)
+{
+    static const unsigned char zeros[8];
+    unsigned char h[RECORD_HEADER];
+    struct iovec v[MOST_PARTS + 2];
+    int n = 0;
+    uint64_t length = 0, sum;
+    for (size_t i = 0; i < nparts; i++) length += parts[i].size;
+    if (length > longest_payload) return vg_fail(e, VG_EARG, "a %s record of %llu bytes is too large for a stream", tag, (unsigned long long)length);
+    if (nparts == 1) {
+        sum = XXH64(parts[0].data, parts[0].size, 0);
+    } else {
+        XXH64_state_t *s = XXH64_createState();
+        if (!s) return vg_fail(e, VG_ENOMEM, "not enough memory for a checksum");
+        XXH64_reset(s, 0);
+        for (size_t i = 0; i < nparts; i++)
+            if (parts[i].size) XXH64_update(s, parts[i].data, parts[i].size);
+        sum = XXH64_digest(s);
+        XXH64_freeState(s);
+    }
+    memcpy(h, tag, 4);
+    vgi_put32(h + 4, flags);
+    vgi_put64(h + 8, length);
+    vgi_put64(h + 16, sum);
+    vgi_put64(h + 24, XXH64(h, 24, 0));
+    tally(t, h);
+    v[n++] = (struct iovec){h, sizeof h};
+    for (size_t i = 0; i < nparts; i++)
+        if (parts[i].size) v[n++] = (struct iovec){(void *)parts[i].data, parts[i].size};
+    if (length & 7) v[n++] = (struct iovec){(void *)zeros, (size_t)(-length & 7)};
+    return write_vector(fd, name, v, n, e);
+}
+
+int vgi_record_end_write(int fd, const char *name, vgi_tally *t, vg_err *e)
+{
+    unsigned char payload[END_PAYLOAD];
+    vgi_put64(payload, t->records);
+    vgi_put64(payload + 8, XXH64_digest(t->sum));
+    vgi_part part = {payload, sizeof payload};
+    return vgi_record_write(fd, name, t, "END ", VGI_CRITICAL, &part, 1, e);
+}

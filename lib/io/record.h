@@ -1,0 +1,35 @@
+/* record.h: the outer layer of the stream: file header, records, checksums, END (fmt/STREAM.md, sections 1 and 2).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_RECORD_H
+#define VG_RECORD_H
+
+#include "io/io.h"
+
+enum { VGI_CRITICAL = 1u, VGI_COPY_SAFE = 2u };
+
+/* What both directions keep count of. */
+typedef struct vgi_tally {
+    uint64_t records;
+    void *sum; /* running XXH64 over header checksums */
+} vgi_tally;
+
+int vgi_tally_init(vgi_tally *t, vg_err *e) VG_MUST_CHECK;
+void vgi_tally_clear(vgi_tally *t);
+
+/* vgi_record_begin_read: check the file header. */
+int vgi_record_begin_read(vgi_input *in, vg_err *e) VG_MUST_CHECK;
+/* vgi_record_read: the next record into *r (its payload buffer is reused). 1: a record; 0: the END mark, checked, with
+ * nothing behind it. `subject` for messages. *expect: when not 0 and the tag is FRAM, the only length that is right. */
+int vgi_record_read(vgi_input *in, vgi_tally *t, vg_record *r, vg_err *e) VG_MUST_CHECK;
+
+int vgi_record_begin_write(int fd, const char *name, vg_err *e) VG_MUST_CHECK;
+/* vgi_record_write: the payload is given in up to 3 parts, so that large ones need not be copied together. */
+typedef struct vgi_part {
+    const void *data;
+    size_t size;
+} vgi_part;
+int vgi_record_write(int fd, const char *name, vgi_tally *t, const char *tag, uint32_t flags, const vgi_part *parts,
+                     size_t nparts, vg_err *e) VG_MUST_CHECK;
+int vgi_record_end_write(int fd, const char *name, vgi_tally *t, vg_err *e) VG_MUST_CHECK;
+
+#endif

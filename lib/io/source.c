@@ -1,0 +1,496 @@
+/* source.c: the door in: whatever the operands are, the caller gets one head and frame after frame.
+ * Leaves out how a stream, an archive or a mesh file is read; it only tells them apart and joins them.
+ *
+ * Operands are first expanded (directories, patterns) and looked at, so that a missing file or a stream that does not
+ * fit is told before any work; files are opened again one after another when it is their turn. What can be read only
+ * once (standard input, a pipe named by the shell) stays open in between.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/io.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <glob.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static const char standard_input[] = "standard input";
+
+enum content { MESH, ARCHIVE, STREAM };
+
+typedef struct item {
+    char *path;      /* NULL: standard input */
+    bool regular;    /* a file that can be opened, or read from `base` on, a second time */
+    int64_t base;    /* where standard input stood */
+    enum content content;
+    vgi_input *input;  /* kept from the first look, when there can be no second */
+    vg_reader *reader; /* the same, when it is a stream */
+} item;
+
+struct vg_source {
+    item *items;
+    size_t n, cap, next; /* next: the item to be opened */
+    bool stdin_named;
+    bool through;        /* one stream: handed on as it is */
+    vg_head head;        /* of the joined sequence; the caller may change it */
+    vg_head own;         /* what frames are measured by: mesh, kind, count */
+    char *own_name;      /* who brought the mesh, quoted for messages; NULL: nobody yet */
+    vg_records tail;
+    /* the item being read: */
+    vg_reader *reader;
+    vgi_archive *archive;
+    const char *archive_name;
+    vg_bytes data;       /* a mesh file */
+    bool waiting;        /* `model` and `pose` hold a pose that has not been handed out */
+    vg_model model;
+    char *pose;
+};
+
+static const char *item_name(const item *it)
+{
+    return it->path ? it->path : standard_input;
+}
+
+/* ---- operands to items ---- */
+
+static int add_item(vg_source *s, const char *path, vg_err *e)
+{
+    item it = {0};
+    int r = vgi_grow(&s->items, &s->cap, s->n + 1, sizeof *s->items, e);
+    if (r < 0) return r;
+    if (path && !(it.path = vgi_copy_string(path, strlen(path), e))) return VG_ENOMEM;
+    s->items[s->n++] = it;
+    return VG_OK;
+}
+
+static int add_standard_input(vg_source *s, vg_err *e)
+{
+    if (s->stdin_named) return vg_fail(e, VG_EARG, "standard input ('-') can be named only once");
+    s->stdin_named = true;
+    return add_item(s, NULL, e);
+}
+
+static bool is_mesh_file(DIR *dir, const char *name)
+{
+    char stem[NAME_MAX + 1];
+    struct stat st;
+    size_t n = vgi_packed_stem(name);
+    if (*name == '.' || n >= sizeof stem) return false;
+    memcpy(stem, name, n);
+    stem[n] = 0;
+    return vgi_format_by_suffix(stem) && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISREG(st.st_mode);
+}
+
+static int list_directory(vgi_names *names, const char *path, vg_err *e)
+{
+    DIR *dir = opendir(path);
+    if (!dir) return vg_fail(e, VG_ESYS, "cannot open directory '%s': %s", path, strerror(errno));
+    int r = VG_OK;
+    struct dirent *d;
+    while (r == VG_OK && (errno = 0, d = readdir(dir)))
+        if (is_mesh_file(dir, d->d_name)) r = vgi_names_add(names, d->d_name, strlen(d->d_name), e);
+    if (r == VG_OK && errno) r = vg_fail(e, VG_ESYS, "cannot read directory '%s': %s", path, strerror(errno));
+    closedir(dir);
+    if (r == VG_OK && names->n == 0)
+        r = vg_fail(e, VG_EINPUT, "directory '%s' holds no mesh file (%s)", path, vgi_format_names());
+    vgi_names_sort(names);
+    return r;
+}
+
+static int add_directory(vg_source *s, const char *path, vg_err *e)
+{
+    vgi_names names = {0};
+    vg_bytes full = {0};
+    size_t n = strlen(path);
+    int r = list_directory(&names, path, e);
+    while (n > 1 && path[n - 1] == '/') n--;
+    for (size_t i = 0; r == VG_OK && i < names.n; i++) {
+        full.size = 0;
+        r = vgi_bytes_append(&full, path, n, e);
+        if (r == VG_OK && path[n - 1] != '/') r = vgi_bytes_append(&full, "/", 1, e);
+        if (r == VG_OK) r = vgi_bytes_append(&full, names.at[i], strlen(names.at[i]) + 1, e);
+        if (r == VG_OK) r = add_item(s, (char *)full.data, e);
+    }
+    vg_bytes_clear(&full);
+    vgi_names_clear(&names);
+    return r;
+}
+
+static int add_existing(vg_source *s, const char *path, const struct stat *st, vg_err *e)
+{
+    return S_ISDIR(st->st_mode) ? add_directory(s, path, e) : add_item(s, path, e);
+}
+
+static int list_pattern(vgi_names *names, const char *pattern, vg_err *e)
+{
+    glob_t g = {0};
+    int found = glob(pattern, GLOB_NOSORT, NULL, &g), r = VG_OK;
+    if (found == GLOB_NOSPACE) r = vg_fail(e, VG_ENOMEM, "not enough memory for the files of '%s'", pattern);
+    else if (found != 0) r = vg_fail(e, VG_ESYS, "no file matches '%s'", pattern);
+    for (size_t i = 0; r == VG_OK && i < g.gl_pathc; i++)
+        r = vgi_names_add(names, g.gl_pathv[i], strlen(g.gl_pathv[i]), e);
+    globfree(&g);
+    vgi_names_sort(names);
+    return r;
+}
+
+static int add_pattern(vg_source *s, const char *pattern, vg_err *e)
+{
+    vgi_names names = {0};
+    struct stat st;
+    int r = list_pattern(&names, pattern, e);
+    for (size_t i = 0; r == VG_OK && i < names.n; i++) {
+        if (stat(names.at[i], &st) < 0) r = vg_fail(e, VG_ESYS, "cannot open '%s': %s", names.at[i], strerror(errno));
+        else r = add_existing(s, names.at[i], &st, e);
+    }
+    vgi_names_clear(&names);
+    return r;
+}
+
+static int add_operand(vg_source *s, const char *operand, vg_err *e)
+{
+    struct stat st;
+    if (!strcmp(operand, "-")) return add_standard_input(s, e);
+    if (stat(operand, &st) == 0) return add_existing(s, operand, &st, e);
+    if (errno == ENOENT && strpbrk(operand, "*?[")) return add_pattern(s, operand, e);
+    return vg_fail(e, VG_ESYS, "cannot open '%s': %s", operand, strerror(errno));
+}
+
+/* ---- the first look ---- */
+
+static int open_input(item *it, vgi_input **in, vg_err *e)
+{
+    if (it->input) {
+        *in = it->input;
+        it->input = NULL;
+        return VG_OK;
+    }
+    return it->path ? vgi_input_file(in, it->path, e) : vgi_input_fd(in, STDIN_FILENO, false, standard_input, e);
+}
+
+static void note_file(item *it)
+{
+    struct stat st;
+    bool known = (it->path ? stat(it->path, &st) : fstat(STDIN_FILENO, &st)) == 0;
+    it->regular = known && S_ISREG(st.st_mode);
+    if (it->path || !it->regular) return;
+    it->base = lseek(STDIN_FILENO, 0, SEEK_CUR);
+    it->regular = it->base >= 0;
+}
+
+/* What is known to be no mesh comes first: a tar may begin with the name of a mesh, and a compressed file may be called
+ * like one. What nothing else claims is left to libarchive, which knows more kinds than can be told here. */
+static int tell_content(item *it, vgi_input *in, vg_err *e)
+{
+    const unsigned char *data;
+    size_t n;
+    int r = vgi_input_peek(in, 4096, &data, &n, e);
+    if (r < 0) return r;
+    if (n == 0 && !it->path)
+        return vg_fail(e, VG_ETRUNC, "standard input is empty: look at the program before in the pipe");
+    if (n == 0) return vg_fail(e, VG_ETRUNC, "'%s' is empty", it->path);
+    if (vgi_is_stream(data, n)) it->content = STREAM;
+    else if (vgi_is_archive(data, n)) it->content = ARCHIVE;
+    else if (vgi_format_by_content(data, n) || (it->path && vgi_format_by_suffix(it->path))) it->content = MESH;
+    else it->content = ARCHIVE;
+    return VG_OK;
+}
+
+static int open_reader(item *it, vg_reader **reader, vg_err *e)
+{
+    if (it->reader) {
+        *reader = it->reader;
+        it->reader = NULL;
+        return VG_OK;
+    }
+    vgi_input *in;
+    int r = open_input(it, &in, e);
+    return r < 0 ? r : vgi_reader_open_input(reader, in, e);
+}
+
+/* What messages call a file, or a member of an archive. */
+static char *subject_of(const char *archive, const char *path, vg_err *e)
+{
+    size_t n = strlen(path) + (archive ? strlen(archive) : 0) + 16;
+    char *s = vgi_array_raw(n, 1, e);
+    if (s && archive) snprintf(s, n, "'%s' in '%s'", path, archive);
+    else if (s) snprintf(s, n, "'%s'", path);
+    return s;
+}
+
+/* The mesh that every further pose must have. */
+static int settle_mesh(vg_source *s, const vg_mesh *mesh, const char *archive, const char *path, vg_err *e)
+{
+    int r = vg_mesh_copy(&s->own.mesh, mesh, e);
+    if (r < 0) return r;
+    s->own.kind = s->head.kind = VG_VERTICES;
+    s->own.precision = s->head.precision = VG_F64;
+    s->own.count = s->head.count = mesh->nv;
+    return (s->own_name = subject_of(archive, path, e)) ? VG_OK : VG_ENOMEM;
+}
+
+/* The head of a stream among several operands: the first one's is taken over, of later ones only the provenance. */
+static int join_head(vg_source *s, const item *it, const vg_head *h, vg_err *e)
+{
+    if (h->kind != VG_VERTICES)
+        return vg_fail(e, VG_EINPUT, "'%s' holds %s: only streams of vertices can be joined with other inputs",
+                       item_name(it), vg_kind_name(h->kind));
+    if (it != s->items) return vg_head_merge_trace(&s->head, h, e);
+    int r = vg_head_copy(&s->head, h, e);
+    return r < 0 ? r : settle_mesh(s, &h->mesh, NULL, item_name(it), e);
+}
+
+static int look_at_stream(vg_source *s, item *it, vg_err *e)
+{
+    vg_reader *reader = NULL;
+    int r = open_reader(it, &reader, e);
+    if (r < 0) return r;
+    if (s->n == 1) {
+        s->reader = reader;
+        s->through = true;
+        return VG_OK;
+    }
+    r = join_head(s, it, vg_reader_head(reader), e);
+    if (it->regular && it->path) vg_reader_close(&reader);
+    else it->reader = reader;
+    return r;
+}
+
+static int look_at(vg_source *s, item *it, vg_err *e)
+{
+    vgi_input *in = NULL;
+    note_file(it);
+    int r = open_input(it, &in, e);
+    if (r < 0) return r;
+    r = tell_content(it, in, e);
+    /* standard input has been read from: its bytes are in `in`, even when the file could be read again */
+    if (r < 0 || (it->regular && it->path)) vgi_input_free(&in);
+    else it->input = in;
+    return r == VG_OK && it->content == STREAM ? look_at_stream(s, it, e) : r;
+}
+
+/* ---- one item after another ---- */
+
+static int open_archive(vg_source *s, item *it, vg_err *e)
+{
+    int fd = -1, r = VG_OK;
+    if (!it->regular) {
+        vgi_input *in;
+        if ((r = open_input(it, &in, e)) < 0) return r;
+        r = vgi_spool(in, vgi_archive_limits.total_bytes, &fd, e);
+        vgi_input_free(&in);
+    } else {
+        fd = it->path ? open(it->path, O_RDONLY | O_CLOEXEC) : fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
+        if (fd < 0) r = vg_fail(e, VG_ESYS, "cannot open '%s': %s", item_name(it), strerror(errno));
+    }
+    if (r < 0) return r;
+    s->archive_name = item_name(it);
+    return vgi_archive_open(&s->archive, fd, it->base, s->archive_name, &vgi_archive_limits, e);
+}
+
+static int take_over_model(vg_source *s, const char *archive, const char *path, vg_err *e)
+{
+    size_t n = s->model.mesh.nv;
+    int r = settle_mesh(s, &s->model.mesh, archive, path, e);
+    if (r < 0) return r;
+    s->head.mesh = s->model.mesh;
+    s->head.attributes = s->model.attributes;
+    s->model.mesh = (vg_mesh){0};
+    s->model.attributes = (vg_attributes){0};
+    s->head.reference = vgi_copy_array(s->model.vertices, 3 * n, sizeof(double), e);
+    s->head.reference_name = vgi_copy_string(s->pose, strlen(s->pose), e);
+    return s->head.reference && s->head.reference_name ? VG_OK : VG_ENOMEM;
+}
+
+/* The mesh file in s->data becomes the pose that is handed out next. */
+static int take_pose(vg_source *s, const char *archive, const char *path, vg_err *e)
+{
+    char *subject = subject_of(archive, path, e);
+    if (!subject) return VG_ENOMEM;
+    free(s->pose);
+    s->pose = path == standard_input ? vgi_copy_string("stdin", 5, e) : vgi_pose_name(path, e);
+    vg_model_clear(&s->model);
+    int r = s->pose ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK && vgi_is_stream(s->data.data, s->data.size))
+        r = vg_fail(e, VG_EINPUT, "%s is a compressed stream: unpack it in the pipe before", subject);
+    if (r == VG_OK) r = vgi_model_read(&s->model, s->data.data, s->data.size, NULL, path, subject, e);
+    if (r == VG_OK) r = s->own_name ? vg_mesh_same(&s->own.mesh, s->own_name, &s->model.mesh, subject, e)
+                                    : take_over_model(s, archive, path, e);
+    s->waiting = r == VG_OK;
+    free(subject);
+    return r;
+}
+
+static int open_mesh(vg_source *s, item *it, vg_err *e)
+{
+    vgi_input *in;
+    int r = open_input(it, &in, e);
+    if (r < 0) return r;
+    s->data.size = 0;
+    r = vgi_input_slurp(in, &s->data, e);
+    vgi_input_free(&in);
+    return r < 0 ? r : take_pose(s, NULL, item_name(it), e);
+}
+
+static int open_stream(vg_source *s, item *it, vg_err *e)
+{
+    int r = open_reader(it, &s->reader, e);
+    if (r < 0) return r;
+    const vg_head *h = vg_reader_head(s->reader);
+    char *subject = subject_of(NULL, item_name(it), e);
+    if (!subject) return VG_ENOMEM;
+    r = s->own_name ? vg_mesh_same(&s->own.mesh, s->own_name, &h->mesh, subject, e) : VG_OK;
+    free(subject);
+    return r;
+}
+
+static int open_next(vg_source *s, vg_err *e)
+{
+    item *it = &s->items[s->next++];
+    switch (it->content) {
+    case STREAM: return open_stream(s, it, e);
+    case ARCHIVE: return open_archive(s, it, e);
+    default: return open_mesh(s, it, e);
+    }
+}
+
+static int next_member(vg_source *s, vg_err *e)
+{
+    const char *path;
+    int r = vgi_archive_next(s->archive, &path, &s->data, e);
+    if (r > 0) return take_pose(s, s->archive_name, path, e);
+    if (r == 0) vgi_archive_close(&s->archive);
+    return r;
+}
+
+/* ---- the door ---- */
+
+/* Until the mesh is known: a stream among several operands brings it when it is looked at. */
+static int find_mesh(vg_source *s, vg_err *e)
+{
+    int r = VG_OK;
+    while (r == VG_OK && !s->through && !s->own_name) r = s->archive ? next_member(s, e) : open_next(s, e);
+    return r;
+}
+
+/* first_only: no more than the first item is wanted, so the others are not even looked at. */
+static int open_source(vg_source **out, const char *const *operands, size_t n, bool first_only, vg_err *e)
+{
+    vg_source *s = *out = vgi_array(1, sizeof *s, e);
+    if (!s) return VG_ENOMEM;
+    int r = n ? VG_OK : vg_fail(e, VG_EARG, "no input is named");
+    for (size_t i = 0; r == VG_OK && i < n; i++) r = add_operand(s, operands[i], e);
+    while (first_only && s->n > 1) free(s->items[--s->n].path);
+    for (size_t i = 0; r == VG_OK && i < s->n; i++) r = look_at(s, &s->items[i], e);
+    if (r == VG_OK) r = find_mesh(s, e);
+    if (r < 0) vg_source_close(out);
+    return r;
+}
+
+int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err *e)
+{
+    return open_source(s, operands, n, false, e);
+}
+
+vg_head *vg_source_head(vg_source *s)
+{
+    return s->through ? vg_reader_head(s->reader) : &s->head;
+}
+
+vg_records *vg_source_tail(vg_source *s)
+{
+    return s->through ? vg_reader_tail(s->reader) : &s->tail;
+}
+
+static int hand_out(vg_source *s, vg_frame *f, vg_err *e)
+{
+    int r = vg_frame_shape(f, &s->own, e);
+    if (r == VG_OK) r = vg_frame_rename(f, s->pose, e);
+    if (r < 0) return r;
+    memcpy(f->values, s->model.vertices, 3 * s->own.count * sizeof *f->values);
+    vg_records_clear(&f->extra);
+    f->has_time = false;
+    f->time = 0;
+    s->waiting = false;
+    return 1;
+}
+
+static int append_records(vg_records *to, vg_records *from, vg_err *e)
+{
+    size_t cap = to->n;
+    if (from->n == 0) return VG_OK;
+    int r = vgi_grow(&to->at, &cap, to->n + from->n, sizeof *to->at, e);
+    if (r < 0) return r;
+    memcpy(to->at + to->n, from->at, from->n * sizeof *to->at);
+    to->n += from->n;
+    free(from->at); /* the payloads have moved */
+    *from = (vg_records){0};
+    return VG_OK;
+}
+
+static int end_reader(vg_source *s, vg_err *e)
+{
+    int r = append_records(&s->tail, vg_reader_tail(s->reader), e);
+    vg_reader_close(&s->reader);
+    return r;
+}
+
+int vg_source_next(vg_source *s, vg_frame *f, vg_err *e)
+{
+    if (s->through) return vg_reader_next(s->reader, f, e);
+    for (int r = VG_OK; r == VG_OK;) {
+        if (s->waiting) return hand_out(s, f, e);
+        if (s->reader) {
+            if ((r = vg_reader_next(s->reader, f, e)) == 0) r = end_reader(s, e);
+        } else if (s->archive) {
+            r = next_member(s, e);
+        } else if (s->next < s->n) {
+            r = open_next(s, e);
+        } else {
+            return 0;
+        }
+        if (r != VG_OK) return r;
+    }
+    return VG_OK;
+}
+
+static void clear_item(item *it)
+{
+    free(it->path);
+    vgi_input_free(&it->input);
+    vg_reader_close(&it->reader);
+}
+
+void vg_source_close(vg_source **source)
+{
+    vg_source *s = *source;
+    if (!s) return;
+    for (size_t i = 0; i < s->n; i++) clear_item(&s->items[i]);
+    free(s->items);
+    vg_reader_close(&s->reader);
+    vgi_archive_close(&s->archive);
+    vg_head_clear(&s->head);
+    vg_head_clear(&s->own);
+    vg_records_clear(&s->tail);
+    vg_bytes_clear(&s->data);
+    vg_model_clear(&s->model);
+    free(s->own_name);
+    free(s->pose);
+    free(s);
+    *source = NULL;
+}
+
+int vg_load_mesh(vg_head *h, const char *operand, vg_err *e)
+{
+    vg_source *s;
+    *h = (vg_head){0};
+    int r = open_source(&s, &operand, 1, true, e);
+    if (r < 0) return r;
+    vg_head *from = vg_source_head(s);
+    if (from->mesh.nv == 0 || !from->reference) r = vg_fail(e, VG_EINPUT, "'%s' holds no mesh", operand);
+    else if (s->through) r = vg_head_copy(h, from, e);
+    else *h = *from, *from = (vg_head){0};
+    vg_source_close(&s);
+    return r;
+}

@@ -1,0 +1,298 @@
+/* stream.c: reader and writer of whole streams: which records may stand where, what is passed on, what stops.
+ * Leaves out bytes of records (record.c) and of their contents (payload.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/payload.h"
+#include "io/record.h"
+
+#include <stdlib.h>
+
+/* The header records, in the order they are written. */
+enum { FORM = 8, KNOWN = 9 };
+static const struct {
+    const char *tag;
+    uint32_t flags;
+    vgi_decoder *decode;
+    bool repeats, needs_mesh;
+} known[KNOWN] = {
+    {"PROV", VGI_COPY_SAFE, vgi_prov_decode, true, false},
+    {"MESH", VGI_CRITICAL, vgi_mesh_decode, false, false},
+    {"TEXC", 0, vgi_texc_decode, false, true},
+    {"LABL", 0, vgi_labl_decode, false, true},
+    {"SELE", VGI_CRITICAL, vgi_sele_decode, false, true},
+    {"LINK", VGI_CRITICAL, vgi_link_decode, false, true},
+    {"ANCH", VGI_CRITICAL, vgi_anch_decode, false, true},
+    {"REFP", VGI_CRITICAL, vgi_refp_decode, false, true},
+    {"FORM", VGI_CRITICAL, vgi_form_decode, false, false},
+};
+enum { MESH = 1 };
+
+/* ---- reader ---- */
+
+struct vg_reader {
+    vgi_input *in;
+    vgi_tally tally;
+    vg_head head;
+    bool seen[KNOWN];
+    vg_head form; /* kind, precision, counts of the frames as they come: the caller may change `head` */
+    vg_records tail;
+    uint64_t frames;
+    bool ended;
+};
+
+static void remember_form(vg_reader *r)
+{
+    r->form = (vg_head){.kind = r->head.kind, .precision = r->head.precision, .count = r->head.count,
+                            .nanchors = r->head.nanchors};
+}
+
+static int keep_unknown(vg_reader *r, vg_record *record, vg_records *list, vg_err *e)
+{
+    if (record->flags & VGI_CRITICAL)
+        return vg_fail(e, VG_EINPUT, "'%s' needs a newer version of this program: it has a record '%s' that must be understood",
+                       vgi_input_name(r->in), record->tag);
+    if (!(record->flags & VGI_COPY_SAFE)) return VG_OK;
+    size_t cap = list->n;
+    int ok = vgi_grow(&list->at, &cap, list->n + 1, sizeof *list->at, e);
+    if (ok < 0) return ok;
+    list->at[list->n++] = *record;
+    record->payload = (vg_bytes){0};
+    return VG_OK;
+}
+
+static int find_known(const char *tag)
+{
+    for (int i = 0; i < KNOWN; i++)
+        if (!strcmp(tag, known[i].tag)) return i;
+    return -1;
+}
+
+static int stopped_by_failure(vg_reader *r, const vg_record *record, vg_err *e)
+{
+    vgi_payload p = {record->payload.data, record->payload.size, "record FAIL"};
+    return vgi_fail_decode(&p, vgi_input_name(r->in), e);
+}
+
+static int read_head_record(vg_reader *r, vg_record *record, vg_err *e)
+{
+    const char *name = vgi_input_name(r->in);
+    int i = find_known(record->tag);
+    if (!strcmp(record->tag, "FAIL")) return stopped_by_failure(r, record, e);
+    if (!strcmp(record->tag, "FRAM")) return vg_fail(e, VG_EINPUT, "'%s' has a frame before its FORM record", name);
+    if (i < 0) return keep_unknown(r, record, &r->head.extra, e);
+    if (r->seen[i] && !known[i].repeats) return vg_fail(e, VG_EINPUT, "'%s' has two %s records", name, record->tag);
+    if (known[i].needs_mesh && !r->seen[MESH])
+        return vg_fail(e, VG_EINPUT, "'%s': record %s must come after MESH", name, record->tag);
+    r->seen[i] = true;
+    char where[200];
+    snprintf(where, sizeof where, "'%.150s': record %s", name, record->tag);
+    vgi_payload p = {record->payload.data, record->payload.size, where};
+    return known[i].decode(&p, &r->head, e);
+}
+
+static int read_head(vg_reader *r, vg_err *e)
+{
+    int ok = vgi_tally_init(&r->tally, e);
+    if (ok == VG_OK) ok = vgi_record_begin_read(r->in, e);
+    vg_record record = {.payload = {0}};
+    while (ok == VG_OK && !r->seen[FORM]) {
+        ok = vgi_record_read(r->in, &r->tally, &record, e);
+        if (ok == 0) ok = vg_fail(e, VG_EINPUT, "'%s' has no FORM record", vgi_input_name(r->in));
+        else if (ok > 0) ok = read_head_record(r, &record, e);
+    }
+    vg_bytes_clear(&record.payload);
+    if (ok < 0) return ok;
+    if (r->seen[MESH] && !r->head.reference)
+        return vg_fail(e, VG_EINPUT, "'%s' has a MESH but no REFP record before FORM", vgi_input_name(r->in));
+    if (!r->head.reference_name && !(r->head.reference_name = vgi_copy_string("", 0, e))) return VG_ENOMEM;
+    remember_form(r);
+    return VG_OK;
+}
+
+int vgi_reader_open_input(vg_reader **out, vgi_input *in, vg_err *e)
+{
+    vg_reader *r = *out = vgi_array(1, sizeof *r, e);
+    if (!r) return vgi_input_free(&in), VG_ENOMEM;
+    r->in = in;
+    int ok = read_head(r, e);
+    if (ok < 0) vg_reader_close(out);
+    return ok;
+}
+
+int vg_reader_open(vg_reader **r, int fd, const char *name, vg_err *e)
+{
+    vgi_input *in;
+    *r = NULL;
+    int ok = vgi_input_fd(&in, fd, false, name, e);
+    return ok < 0 ? ok : vgi_reader_open_input(r, in, e);
+}
+
+int vg_reader_open_memory(vg_reader **r, const void *data, size_t n, const char *name, vg_err *e)
+{
+    vgi_input *in;
+    *r = NULL;
+    int ok = vgi_input_memory(&in, data, n, name, e);
+    return ok < 0 ? ok : vgi_reader_open_input(r, in, e);
+}
+
+vg_head *vg_reader_head(vg_reader *r)
+{
+    return &r->head;
+}
+
+vg_records *vg_reader_tail(vg_reader *r)
+{
+    return &r->tail;
+}
+
+/* The frame's raw buffer takes part in reading, so that a large payload is read straight to where it stays. */
+int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
+{
+    vg_records_clear(&f->extra);
+    if (r->ended) return 0;
+    vg_record record = {.payload = f->raw};
+    vg_records before = {0};
+    int ok;
+    while ((ok = vgi_record_read(r->in, &r->tally, &record, e)) > 0) {
+        if (!strcmp(record.tag, "FRAM")) break;
+        if (!strcmp(record.tag, "FAIL")) ok = stopped_by_failure(r, &record, e);
+        else if (find_known(record.tag) >= 0)
+            ok = vg_fail(e, VG_EINPUT, "'%s': record %s must come before FORM", vgi_input_name(r->in), record.tag);
+        else ok = keep_unknown(r, &record, &before, e);
+        if (ok < 0) break;
+    }
+    f->raw = record.payload;
+    if (ok <= 0) {
+        if (ok == 0) r->ended = true, r->tail = before;
+        else vg_records_clear(&before);
+        return ok;
+    }
+    f->extra = before;
+    char where[200];
+    snprintf(where, sizeof where, "'%.150s': frame %llu", vgi_input_name(r->in), (unsigned long long)r->frames);
+    ok = vgi_fram_decode(f, &r->form, where, e);
+    if (ok < 0) return ok;
+    r->frames++;
+    return 1;
+}
+
+void vg_reader_close(vg_reader **r)
+{
+    if (!*r) return;
+    vgi_input_free(&(*r)->in);
+    vgi_tally_clear(&(*r)->tally);
+    vg_head_clear(&(*r)->head);
+    vg_records_clear(&(*r)->tail);
+    free(*r);
+    *r = NULL;
+}
+
+/* ---- writer ---- */
+
+struct vg_writer {
+    int fd;
+    char *name;
+    const vg_head *head;
+    vgi_tally tally;
+    vg_bytes front, values; /* reused from record to record */
+};
+
+static int write_record(vg_writer *w, const char *tag, uint32_t flags, const vg_bytes *b, vg_err *e)
+{
+    vgi_part part = {b->data, b->size};
+    return vgi_record_write(w->fd, w->name, &w->tally, tag, flags, &part, 1, e);
+}
+
+static int write_extra(vg_writer *w, const vg_records *list, vg_err *e)
+{
+    int r = VG_OK;
+    for (size_t i = 0; r == VG_OK && i < list->n; i++)
+        r = write_record(w, list->at[i].tag, list->at[i].flags, &list->at[i].payload, e);
+    return r;
+}
+
+static int encode_known(vg_bytes *b, const vg_head *h, int i, vg_err *e)
+{
+    switch (i) {
+    case 1: return vgi_mesh_encode(b, &h->mesh, e);
+    case 2: return vgi_texc_encode(b, h, e);
+    case 3: return vgi_labl_encode(b, &h->attributes, e);
+    case 4: return vgi_indices_encode(b, h->selected, h->nselected, e);
+    case 5: return vgi_indices_encode(b, h->links, 2 * h->nlinks, e);
+    case 6: return vgi_indices_encode(b, h->anchors, h->nanchors, e);
+    case 7: return vgi_refp_encode(b, h, e);
+    default: return vgi_form_encode(b, h, e);
+    }
+}
+
+static int write_head(vg_writer *w, vg_err *e)
+{
+    const vg_head *h = w->head;
+    bool mesh = h->reference != NULL;
+    const bool present[KNOWN] = {false, mesh, mesh && h->attributes.ntex > 0, mesh && h->attributes.nlabels > 0,
+                                 mesh && h->has_selection, mesh && h->has_links, mesh && h->nanchors > 0, mesh, true};
+    int r = vgi_record_begin_write(w->fd, w->name, e);
+    for (size_t i = 0; r == VG_OK && i < h->nprovenance; i++) {
+        w->front.size = 0;
+        r = vgi_prov_encode(&w->front, &h->provenance[i], e);
+        if (r == VG_OK) r = write_record(w, known[0].tag, known[0].flags, &w->front, e);
+    }
+    for (int i = 1; r == VG_OK && i < KNOWN; i++) {
+        if (!present[i]) continue;
+        if (i == FORM) r = write_extra(w, &h->extra, e);
+        w->front.size = 0;
+        if (r == VG_OK) r = encode_known(&w->front, h, i, e);
+        if (r == VG_OK) r = write_record(w, known[i].tag, known[i].flags, &w->front, e);
+    }
+    return r;
+}
+
+int vg_writer_open(vg_writer **out, int fd, const char *name, const vg_head *h, vg_err *e)
+{
+    vg_writer *w = *out = vgi_array(1, sizeof *w, e);
+    if (!w) return VG_ENOMEM;
+    w->fd = fd, w->head = h;
+    int r = (w->name = vgi_copy_string(name, strlen(name), e)) ? vgi_tally_init(&w->tally, e) : VG_ENOMEM;
+    if (r == VG_OK) r = write_head(w, e);
+    if (r < 0) vg_writer_close(out);
+    return r;
+}
+
+int vg_writer_put(vg_writer *w, const vg_frame *f, vg_err *e)
+{
+    const vg_head *h = w->head;
+    size_t n = h->count * vg_kind_width(h->kind);
+    vgi_part parts[2];
+    int r = write_extra(w, &f->extra, e);
+    if (r == VG_OK && !vgi_finite(f->values, n))
+        r = vg_fail(e, VG_EINPUT, "frame '%s' holds a number that is not finite", f->name ? f->name : "");
+    w->front.size = 0;
+    if (r == VG_OK) r = vgi_fram_encode(&w->front, h, f, e);
+    if (r == VG_OK) r = vgi_values_encode(&w->values, f->values, n, h->precision, &parts[1].data, &parts[1].size, e);
+    if (r < 0) return r;
+    parts[0] = (vgi_part){w->front.data, w->front.size};
+    return vgi_record_write(w->fd, w->name, &w->tally, "FRAM", VGI_CRITICAL, parts, 2, e);
+}
+
+int vg_writer_end(vg_writer *w, const vg_records *tail, vg_err *e)
+{
+    int r = tail ? write_extra(w, tail, e) : VG_OK;
+    return r < 0 ? r : vgi_record_end_write(w->fd, w->name, &w->tally, e);
+}
+
+void vg_writer_abandon(vg_writer *w, const char *program, int exit_status, const char *message)
+{
+    w->front.size = 0;
+    if (vgi_fail_encode(&w->front, program, exit_status, message, NULL) == VG_OK)
+        if (write_record(w, "FAIL", VGI_CRITICAL, &w->front, NULL) < 0) return; /* nothing more can be said */
+}
+
+void vg_writer_close(vg_writer **w)
+{
+    if (!*w) return;
+    vgi_tally_clear(&(*w)->tally);
+    vg_bytes_clear(&(*w)->front);
+    vg_bytes_clear(&(*w)->values);
+    free((*w)->name);
+    free(*w);
+    *w = NULL;
+}

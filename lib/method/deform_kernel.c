@@ -1,0 +1,136 @@
+/* deform_kernel.c: the inner loop of deformation transfer.
+ *
+ * With the frame F = [u b n] of a corner in the deformed pose and the coordinates k of the target's reference vector in the
+ * frame of the source's reference corner, the wanted vector a J r_t = (|d|/|r|) F_d F_r' r_t is |d| (k_u u + k_b b + k_n n),
+ * k already divided by |r|: one normalisation, one cross product and three multiply-adds a corner. Poses stand side by side
+ * in the lanes of a vector, so nothing has to be shuffled. Leaves out degenerate corners: it only finds them (deform.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/deform_kernel.h"
+
+#include <math.h>
+
+#define INLINE static inline __attribute__((always_inline))
+
+/* the face has no normal when |n| <= 1e-12 sum |d|^2, a corner no frame when it stands on its face's normal to 1e-12 */
+static const double flat2 = 1e-24;
+
+INLINE vgi_lanes lane_sqrt(vgi_lanes a)
+{
+    vgi_lanes r;
+    for (int i = 0; i < VGI_LANES; i++) r[i] = sqrt(a[i]);
+    return r;
+}
+
+INLINE vgi_lanes dot(vgi_vec a, vgi_vec b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+INLINE vgi_vec cross(vgi_vec a, vgi_vec b)
+{
+    return (vgi_vec){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+INLINE vgi_vec times(vgi_vec a, vgi_lanes s)
+{
+    return (vgi_vec){a.x * s, a.y * s, a.z * s};
+}
+
+INLINE vgi_vec add(vgi_vec a, vgi_vec b)
+{
+    return (vgi_vec){a.x + b.x, a.y + b.y, a.z + b.z};
+}
+
+INLINE vgi_vec load(const double *const *p, size_t i)
+{
+    vgi_vec v;
+    for (int k = 0; k < VGI_LANES; k++) v.x[k] = p[k][3 * i], v.y[k] = p[k][3 * i + 1], v.z[k] = p[k][3 * i + 2];
+    return v;
+}
+
+/* vectors of the face into w[0 .. r-1], and w[r] = w[0] */
+INLINE void load_face(const vgi_transfer *t, uint32_t begin, size_t r, vgi_vec *w)
+{
+    if (t->vertices) {
+        vgi_vec centre = {{0}, {0}, {0}};
+        for (size_t i = 0; i < r; i++) {
+            w[i] = load(t->poses, t->vert[begin + i]);
+            centre = add(centre, w[i]);
+        }
+        vgi_vec back = times(centre, (vgi_lanes){0} - 1.0 / (double)r);
+        for (size_t i = 0; i < r; i++) w[i] = add(w[i], back);
+    } else {
+        for (size_t i = 0; i < r; i++) w[i] = load(t->poses, begin + i);
+    }
+    w[r] = w[0];
+}
+
+INLINE unsigned lanes_of(vgi_mask m)
+{
+    unsigned bits = 0;
+    for (int i = 0; i < VGI_LANES; i++) bits |= (unsigned)(m[i] & 1) << i;
+    return bits;
+}
+
+INLINE void transfer_face(const vgi_transfer *t, size_t f, vgi_vec *w)
+{
+    uint32_t begin = t->start[f];
+    size_t r = t->start[f + 1] - begin;
+    load_face(t, begin, r, w);
+
+    vgi_vec n = {{0}, {0}, {0}};
+    vgi_lanes spread = {0};
+    for (size_t i = 0; i < r; i++) {
+        n = add(n, cross(w[i], w[i + 1]));
+        spread += dot(w[i], w[i]);
+    }
+    vgi_lanes n2 = dot(n, n);
+    vgi_mask bad = ~(n2 > flat2 * spread * spread);
+    n = times(n, 1.0 / lane_sqrt(n2));
+
+    for (size_t i = 0; i < r; i++) {
+        const double *k = t->coordinates + 3 * (size_t)(begin + i);
+        vgi_lanes d2 = dot(w[i], w[i]), length = lane_sqrt(d2), along = dot(n, w[i]);
+        /* m = n - (n.u) u; |m|^2 = 1 - (n.u)^2 */
+        vgi_lanes part = along / d2;
+        vgi_vec m = add(n, times(w[i], -part));
+        vgi_lanes m2 = dot(m, m);
+        bad |= ~(d2 > t->shortest2) | ~(m2 > flat2);
+        m = times(m, length / lane_sqrt(m2));          /* |d| times the unit normal of the corner */
+        vgi_vec b = times(cross(m, w[i]), 1.0 / length); /* n x u, times |d| */
+        w[i] = add(times(w[i], (vgi_lanes){0} + k[0]), add(times(b, (vgi_lanes){0} + k[1]), times(m, (vgi_lanes){0} + k[2])));
+    }
+    for (size_t k = 0; k < t->lanes; k++) {
+        double *to = t->out[k] + 3 * (size_t)begin;
+        for (size_t i = 0; i < r; i++) to[3 * i] = w[i].x[k], to[3 * i + 1] = w[i].y[k], to[3 * i + 2] = w[i].z[k];
+    }
+    unsigned which = lanes_of(bad) & (0xffu >> (VGI_LANES - t->lanes));
+    if (which) t->bad(t->context, f, which);
+}
+
+INLINE void transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w)
+{
+    for (size_t f = first; f < last; f++)
+        if (!t->skip[f]) transfer_face(t, f, w);
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx512f,avx512dq,fma"))) static void transfer_avx512(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w)
+{
+    transfer_faces(t, first, last, w);
+}
+
+__attribute__((target("avx2,fma"))) static void transfer_avx2(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w)
+{
+    transfer_faces(t, first, last, w);
+}
+#endif
+
+void vgi_transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w)
+{
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) return transfer_avx512(t, first, last, w);
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return transfer_avx2(t, first, last, w);
+#endif
+    transfer_faces(t, first, last, w);
+}

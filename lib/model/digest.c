@@ -1,0 +1,109 @@
+/* digest.c: one number that tells whether two sequences say the same, whatever commands and precision made them.
+ * Leaves out the checksums of records, which guard bytes and not meaning (io/record.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/core.h"
+
+#include <xxhash.h>
+
+struct vg_digest {
+    const vg_head *head;
+    XXH64_state_t *state;
+};
+
+/* All data goes in as little-endian 64-bit words, with a count before everything of variable length, so that two
+ * different contents never give the same bytes. */
+enum { WORDS = 512 };
+
+static void mix_words(vg_digest *d, const uint64_t *words, size_t n)
+{
+    unsigned char bytes[8 * WORDS];
+    for (size_t i = 0; i < n; i++) vgi_put64(bytes + 8 * i, words[i]);
+    XXH64_update(d->state, bytes, 8 * n);
+}
+
+static void mix_count(vg_digest *d, uint64_t n)
+{
+    mix_words(d, &n, 1);
+}
+
+static void mix_doubles(vg_digest *d, const double *x, size_t n)
+{
+    uint64_t words[WORDS];
+    for (size_t i = 0; i < n;) {
+        size_t k = 0;
+        for (; k < WORDS && i < n; k++, i++) {
+            double value = x[i] + 0.0; /* -0 becomes 0 */
+            memcpy(&words[k], &value, sizeof value);
+        }
+        mix_words(d, words, k);
+    }
+}
+
+static void mix_indices(vg_digest *d, const uint32_t *x, size_t n)
+{
+    uint64_t words[WORDS];
+    mix_count(d, n);
+    for (size_t i = 0; i < n;) {
+        size_t k = 0;
+        for (; k < WORDS && i < n; k++, i++) words[k] = x[i];
+        mix_words(d, words, k);
+    }
+}
+
+static void mix_text(vg_digest *d, const char *s)
+{
+    size_t n = s ? strlen(s) : 0;
+    mix_count(d, n);
+    if (n) XXH64_update(d->state, s, n);
+}
+
+int vg_digest_new(vg_digest **out, const vg_head *h, vg_err *e)
+{
+    vg_digest *d = *out = vgi_array(1, sizeof *d, e);
+    if (!d) return VG_ENOMEM;
+    d->head = h;
+    d->state = XXH64_createState();
+    if (!d->state) {
+        vg_digest_free(out);
+        return vg_fail(e, VG_ENOMEM, "not enough memory for a digest");
+    }
+    XXH64_reset(d->state, 0);
+    mix_count(d, h->kind);
+    mix_count(d, h->count);
+    mix_count(d, h->mesh.nv);
+    mix_count(d, h->mesh.nf);
+    for (size_t f = 0; f < h->mesh.nf; f++)
+        mix_indices(d, h->mesh.vert + h->mesh.start[f], h->mesh.start[f + 1] - h->mesh.start[f]);
+    mix_count(d, h->has_selection);
+    mix_indices(d, h->selected, h->has_selection ? h->nselected : 0);
+    mix_indices(d, h->links, 2 * h->nlinks);
+    mix_indices(d, h->anchors, h->nanchors);
+    if (h->reference) mix_doubles(d, h->reference, 3 * h->mesh.nv);
+    return VG_OK;
+}
+
+void vg_digest_free(vg_digest **d)
+{
+    if (!*d) return;
+    if ((*d)->state) XXH64_freeState((*d)->state);
+    free(*d);
+    *d = NULL;
+}
+
+void vg_digest_add(vg_digest *d, const vg_frame *f)
+{
+    const vg_head *h = d->head;
+    mix_text(d, f->name);
+    mix_count(d, f->has_time);
+    if (f->has_time) mix_doubles(d, &f->time, 1);
+    if (h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS) {
+        mix_doubles(d, f->root, 3);
+        mix_doubles(d, f->anchors, 3 * h->nanchors);
+    }
+    mix_doubles(d, f->values, h->count * vg_kind_width(h->kind));
+}
+
+uint64_t vg_digest_get(const vg_digest *d)
+{
+    return XXH64_digest(d->state);
+}

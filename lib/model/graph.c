@@ -1,0 +1,98 @@
+/* graph.c: the vector graph of a sequence: the faces that carry vectors, and the vectors of a pose (T 3.1).
+ * Leaves out which faces and links those are (select.c, link.c) and how vectors deform (deform.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/core.h"
+
+#include <stdlib.h>
+
+static void mark_attached(vg_graph *g)
+{
+    size_t corners = vg_graph_corners(g);
+    for (size_t c = 0; c < corners; c++) {
+        bool *in = &g->in_face[g->vert[c]];
+        g->attached += !*in;
+        *in = true;
+    }
+    for (size_t f = 0; f < g->nf; f++) {
+        size_t size = g->start[f + 1] - g->start[f];
+        if (size > g->max_corners) g->max_corners = size;
+    }
+}
+
+int vg_graph_new(vg_graph **out, const vg_head *h, vg_err *e)
+{
+    const vg_mesh *m = &h->mesh;
+    size_t faces = h->has_selection ? h->nselected : m->nf, corners = 0;
+    for (size_t i = 0; i < faces; i++) {
+        size_t f = h->has_selection ? h->selected[i] : i;
+        corners += m->start[f + 1] - m->start[f];
+    }
+    corners += 2 * h->nlinks;
+    if (corners >= UINT32_MAX) return vg_fail(e, VG_EINPUT, "too many corners: %zu (the limit is 2^32 - 2)", corners);
+
+    vg_graph *g = *out = vgi_array(1, sizeof *g, e);
+    if (!g) return VG_ENOMEM;
+    g->nv = m->nv, g->nf = faces + h->nlinks, g->nlinks = h->nlinks;
+    g->start = vgi_array(g->nf + 1, sizeof *g->start, e);
+    g->vert = vgi_array(corners, sizeof *g->vert, e);
+    g->in_face = vgi_array(g->nv, sizeof *g->in_face, e);
+    if (!g->start || !g->vert || !g->in_face) return vg_graph_free(out), VG_ENOMEM;
+
+    uint32_t at = 0;
+    for (size_t i = 0; i < faces; i++) {
+        size_t f = h->has_selection ? h->selected[i] : i;
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) g->vert[at++] = m->vert[c];
+        g->start[i + 1] = at;
+    }
+    for (size_t i = 0; i < h->nlinks; i++) {
+        g->vert[at++] = h->links[2 * i];
+        g->vert[at++] = h->links[2 * i + 1];
+        g->start[faces + i + 1] = at;
+    }
+    mark_attached(g);
+    return VG_OK;
+}
+
+void vg_graph_free(vg_graph **g)
+{
+    if (!*g) return;
+    free((*g)->start);
+    free((*g)->vert);
+    free((*g)->in_face);
+    free(*g);
+    *g = NULL;
+}
+
+size_t vg_graph_corners(const vg_graph *g)
+{
+    return g->start[g->nf];
+}
+
+void vg_graph_vectors(const vg_graph *g, const double *vertices, double *vectors)
+{
+    for (size_t f = 0; f < g->nf; f++) {
+        uint32_t begin = g->start[f], end = g->start[f + 1];
+        double centre[3] = {0, 0, 0}, share = 1.0 / (double)(end - begin);
+        for (uint32_t c = begin; c < end; c++)
+            for (int k = 0; k < 3; k++) centre[k] += vertices[3 * (size_t)g->vert[c] + k];
+        for (int k = 0; k < 3; k++) centre[k] *= share;
+        for (uint32_t c = begin; c < end; c++)
+            for (int k = 0; k < 3; k++)
+                vectors[3 * (size_t)c + k] = vertices[3 * (size_t)g->vert[c] + k] - centre[k];
+    }
+}
+
+void vg_graph_root(const vg_graph *g, const double *vertices, double root[3])
+{
+    double sum[3] = {0, 0, 0};
+    for (size_t v = 0; v < g->nv; v++)
+        if (g->in_face[v])
+            for (int k = 0; k < 3; k++) sum[k] += vertices[3 * v + k];
+    for (int k = 0; k < 3; k++) root[k] = g->attached ? sum[k] / (double)g->attached : 0;
+}
+
+void vg_graph_anchors(const double *vertices, const uint32_t *anchors, size_t n, double *positions)
+{
+    for (size_t i = 0; i < n; i++)
+        for (int k = 0; k < 3; k++) positions[3 * i + k] = vertices[3 * (size_t)anchors[i] + k];
+}

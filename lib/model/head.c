@@ -1,0 +1,257 @@
+/* head.c: what is known of a sequence before its frames, and the frame itself: making, copying, releasing.
+ * Leaves out how either is written down (io) and what is computed from it (method).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/core.h"
+
+#include <stdlib.h>
+
+void vg_attributes_clear(vg_attributes *a)
+{
+    free(a->tex);
+    free(a->corner_tex);
+    for (size_t i = 0; i < a->nlabels; i++) free(a->labels[i].text);
+    free(a->labels);
+    *a = (vg_attributes){0};
+}
+
+int vg_attributes_copy(vg_attributes *to, const vg_attributes *from, const vg_mesh *mesh, vg_err *e)
+{
+    *to = (vg_attributes){.ntex = from->ntex, .tex_dim = from->tex_dim};
+    if (from->ntex) {
+        to->tex = vgi_copy_array(from->tex, from->ntex * from->tex_dim, sizeof *to->tex, e);
+        to->corner_tex = vgi_copy_array(from->corner_tex, vg_mesh_corners(mesh), sizeof *to->corner_tex, e);
+        if (!to->tex || !to->corner_tex) goto failed;
+    }
+    if (from->nlabels && !(to->labels = vgi_array(from->nlabels, sizeof *to->labels, e))) goto failed;
+    for (; to->nlabels < from->nlabels; to->nlabels++) {
+        const vg_label *l = &from->labels[to->nlabels];
+        char *text = vgi_copy_string(l->text, strlen(l->text), e);
+        if (!text) goto failed;
+        to->labels[to->nlabels] = (vg_label){.face = l->face, .kind = l->kind, .text = text};
+    }
+    return VG_OK;
+failed:
+    vg_attributes_clear(to);
+    return VG_ENOMEM;
+}
+
+void vg_model_clear(vg_model *m)
+{
+    vg_mesh_clear(&m->mesh);
+    free(m->vertices);
+    m->vertices = NULL;
+    vg_attributes_clear(&m->attributes);
+}
+
+void vg_records_clear(vg_records *r)
+{
+    for (size_t i = 0; i < r->n; i++) vg_bytes_clear(&r->at[i].payload);
+    free(r->at);
+    *r = (vg_records){0};
+}
+
+static int copy_records(vg_records *to, const vg_records *from, vg_err *e)
+{
+    *to = (vg_records){0};
+    if (from->n == 0) return VG_OK;
+    if (!(to->at = vgi_array(from->n, sizeof *to->at, e))) return VG_ENOMEM;
+    for (; to->n < from->n; to->n++) {
+        vg_record *r = &to->at[to->n];
+        *r = from->at[to->n];
+        r->payload = (vg_bytes){0};
+        if (vgi_bytes_append(&r->payload, from->at[to->n].payload.data, from->at[to->n].payload.size, e) < 0) {
+            vg_records_clear(to);
+            return VG_ENOMEM;
+        }
+    }
+    return VG_OK;
+}
+
+static const struct { size_t width; const char *name; } kinds[] = {
+    [VG_VERTICES] = {3, "vertices"}, [VG_VECTORS] = {3, "vectors"},
+    [VG_DEFORMATIONS] = {4, "deformations"}, [VG_TRANSFORMS] = {7, "transforms"}};
+
+static bool is_kind(vg_kind k)
+{
+    return k >= VG_VERTICES && k <= VG_TRANSFORMS;
+}
+
+size_t vg_kind_width(vg_kind k)
+{
+    return is_kind(k) ? kinds[k].width : 0;
+}
+
+const char *vg_kind_name(vg_kind k)
+{
+    return is_kind(k) ? kinds[k].name : "unknown";
+}
+
+/* ---- provenance ---- */
+
+static void clear_provenance(vg_provenance *p)
+{
+    free(p->program);
+    free(p->version);
+    for (size_t i = 0; i < p->nargs; i++) free(p->args[i]);
+    free(p->args);
+    free(p->parents);
+    *p = (vg_provenance){0};
+}
+
+/* A copy of s in which bytes that are not part of valid UTF-8 stand as '?'. */
+static char *clean_string(const char *s, vg_err *e)
+{
+    size_t n = strlen(s);
+    char *copy = vgi_copy_string(s, n, e);
+    if (!copy || vgi_is_utf8(copy, n)) return copy;
+    for (size_t i = 0; i < n;) {
+        size_t length = 1;
+        while (length < 4 && i + length <= n && !vgi_is_utf8(copy + i, length)) length++;
+        if (i + length <= n && vgi_is_utf8(copy + i, length)) i += length;
+        else copy[i++] = '?';
+    }
+    return copy;
+}
+
+static int fill_provenance(vg_provenance *p, const char *program, const char *version, size_t argc, char *const *argv,
+                           size_t nparents, vg_err *e)
+{
+    *p = (vg_provenance){0};
+    p->program = clean_string(program, e);
+    p->version = clean_string(version, e);
+    p->args = vgi_array(argc, sizeof *p->args, e);
+    p->parents = vgi_array(nparents, sizeof *p->parents, e);
+    bool ok = p->program && p->version && p->args && p->parents;
+    for (; ok && p->nargs < argc; p->nargs++)
+        if (!(p->args[p->nargs] = clean_string(argv[p->nargs], e))) ok = false;
+    p->nparents = nparents;
+    if (ok) return VG_OK;
+    clear_provenance(p);
+    return VG_ENOMEM;
+}
+
+static int append_provenance(vg_head *h, vg_provenance *p, vg_err *e)
+{
+    size_t cap = h->nprovenance;
+    int r = vgi_grow(&h->provenance, &cap, h->nprovenance + 1, sizeof *p, e);
+    if (r < 0) clear_provenance(p);
+    else h->provenance[h->nprovenance++] = *p;
+    return r;
+}
+
+/* Records that no later record names as a parent are the ends of their lines: the new process continues them all. */
+int vg_head_trace(vg_head *h, const char *program, int argc, char *const *argv, vg_err *e)
+{
+    bool *has_child = vgi_array(h->nprovenance, sizeof *has_child, e);
+    if (!has_child) return VG_ENOMEM;
+    size_t ends = h->nprovenance;
+    for (size_t i = 0; i < h->nprovenance; i++)
+        for (size_t k = 0; k < h->provenance[i].nparents; k++) {
+            bool *c = &has_child[h->provenance[i].parents[k]];
+            if (!*c) ends--, *c = true;
+        }
+    vg_provenance p;
+    int r = fill_provenance(&p, program, VG_VERSION, (size_t)argc, argv, ends, e);
+    if (r == VG_OK) {
+        size_t n = 0;
+        for (size_t i = 0; i < h->nprovenance; i++)
+            if (!has_child[i]) p.parents[n++] = (uint32_t)i;
+        r = append_provenance(h, &p, e);
+    }
+    free(has_child);
+    return r;
+}
+
+int vg_head_merge_trace(vg_head *h, const vg_head *other, vg_err *e)
+{
+    size_t base = h->nprovenance;
+    for (size_t i = 0; i < other->nprovenance; i++) {
+        const vg_provenance *from = &other->provenance[i];
+        vg_provenance p;
+        int r = fill_provenance(&p, from->program, from->version, from->nargs, from->args, from->nparents, e);
+        if (r < 0) return r;
+        for (size_t k = 0; k < from->nparents; k++) p.parents[k] = from->parents[k] + (uint32_t)base;
+        if ((r = append_provenance(h, &p, e)) < 0) return r;
+    }
+    return VG_OK;
+}
+
+/* ---- head ---- */
+
+void vg_head_clear(vg_head *h)
+{
+    vg_mesh_clear(&h->mesh);
+    free(h->reference);
+    free(h->reference_name);
+    vg_attributes_clear(&h->attributes);
+    free(h->selected);
+    free(h->links);
+    free(h->anchors);
+    for (size_t i = 0; i < h->nprovenance; i++) clear_provenance(&h->provenance[i]);
+    free(h->provenance);
+    vg_records_clear(&h->extra);
+    *h = (vg_head){0};
+}
+
+int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e)
+{
+    *to = (vg_head){.has_selection = from->has_selection, .has_links = from->has_links, .kind = from->kind,
+                    .precision = from->precision, .count = from->count};
+    const char *name = from->reference_name ? from->reference_name : "";
+    bool ok = vg_mesh_copy(&to->mesh, &from->mesh, e) == VG_OK &&
+              vg_attributes_copy(&to->attributes, &from->attributes, &from->mesh, e) == VG_OK &&
+              (to->reference_name = vgi_copy_string(name, strlen(name), e));
+    if (ok && from->reference)
+        ok = (to->reference = vgi_copy_array(from->reference, 3 * from->mesh.nv, sizeof *to->reference, e));
+    if (ok && (ok = (to->selected = vgi_copy_array(from->selected, from->nselected, sizeof *to->selected, e))))
+        to->nselected = from->nselected;
+    if (ok && (ok = (to->links = vgi_copy_array(from->links, 2 * from->nlinks, sizeof *to->links, e))))
+        to->nlinks = from->nlinks;
+    if (ok && (ok = (to->anchors = vgi_copy_array(from->anchors, from->nanchors, sizeof *to->anchors, e))))
+        to->nanchors = from->nanchors;
+    ok = ok && vg_head_merge_trace(to, from, e) == VG_OK && copy_records(&to->extra, &from->extra, e) == VG_OK;
+    if (ok) return VG_OK;
+    vg_head_clear(to);
+    return VG_ENOMEM;
+}
+
+/* ---- frame ---- */
+
+void vg_frame_clear(vg_frame *f)
+{
+    free(f->name);
+    free(f->anchors);
+    free(f->values_own);
+    vg_bytes_clear(&f->raw);
+    vg_records_clear(&f->extra);
+    *f = (vg_frame){0};
+}
+
+int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e)
+{
+    size_t n, anchors;
+    if (!vgi_mul(h->count, vg_kind_width(h->kind), &n) || !vgi_mul(h->nanchors, 3, &anchors))
+        return vg_fail(e, VG_ENOMEM, "not enough memory for a frame of %zu elements", h->count);
+    int r = vgi_grow(&f->values_own, &f->values_cap, n, sizeof *f->values, e);
+    if (r == VG_OK) r = vgi_grow(&f->anchors, &f->anchors_cap, anchors, sizeof *f->anchors, e);
+    if (r == VG_OK) f->values = f->values_own;
+    return r;
+}
+
+int vg_frame_rename(vg_frame *f, const char *name, vg_err *e)
+{
+    size_t n = strlen(name) + 1;
+    int r = vgi_grow(&f->name, &f->name_cap, n, 1, e);
+    if (r == VG_OK) memcpy(f->name, name, n);
+    return r;
+}
+
+int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e)
+{
+    f->has_time = from->has_time;
+    f->time = from->time;
+    vg_records_clear(&f->extra);
+    f->extra = from->extra;
+    from->extra = (vg_records){0};
+    return vg_frame_rename(f, from->name ? from->name : "", e);
+}

@@ -1,0 +1,30 @@
+/* incidence.h: which faces, and which of their corners, stand around a vertex.
+ * Internal. Leaves out edges: the two at a corner are its neighbours in the face's cycle.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_INCIDENCE_H
+#define VG_INCIDENCE_H
+
+#include "core/core.h"
+
+/* The corners of vertex v are corner[first[v]] .. corner[first[v + 1] - 1], ascending; face[] is the face of each. */
+typedef struct vgi_incidence {
+    uint32_t *first; /* nv + 1 */
+    uint32_t *corner, *face; /* one per corner of the mesh */
+} vgi_incidence;
+
+/* vgi_incidence_make: of a vg_mesh or vg_graph (nv, nf, start, vert as there). O(nv + corners). Failed: *x is 0. */
+int vgi_incidence_make(vgi_incidence *x, size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert,
+                       vg_err *e) VG_MUST_CHECK;
+void vgi_incidence_clear(vgi_incidence *x);
+
+/* vgi_corner_edges: the vertices before and after a corner in its face: the other ends of the two edges that meet
+ * there (the same vertex twice in a line segment). */
+static inline void vgi_corner_edges(const uint32_t *start, const uint32_t *vert, uint32_t face, uint32_t corner,
+                                    uint32_t ends[2])
+{
+    uint32_t begin = start[face], end = start[face + 1];
+    ends[0] = vert[(corner == begin ? end : corner) - 1];
+    ends[1] = vert[corner + 1 == end ? begin : corner + 1];
+}
+
+#endif

@@ -1,0 +1,451 @@
+/* vg.h: the one public header of libvg, the library under the vg-* programs.
+ *
+ * The layers, each knowing only those above it in this file: core (errors, memory), model (mesh, head and
+ * frame of a sequence, vector graph, rotations, measures), method (selection, deformation, reconstruction),
+ * io (stream, mesh files, archives; the two doors `vg_source` and `vg_sink`), view (pictures).
+ *
+ * Conventions. Arrays of points and vectors are interleaved: xyzxyz... Index base is 0. Lengths are in the
+ * unit of the mesh. D is the diagonal of the bounding box of the reference pose. Functions that can fail return
+ * an int: VG_OK or more on success, a negative vg_code on failure, with the details in *e (e may be NULL).
+ * Whoever calls _new or _open calls _free or _close, which take the address of the pointer and leave NULL there.
+ * Structs are prepared by = {0} and released by _clear, which leaves them zero. The library never prints and
+ * never exits. The mathematics is cited as (T n) from the thesis on vector graphs that the man page vg(7) names.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_H
+#define VG_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define VG_VERSION "0.1.0"
+
+#if defined(__GNUC__)
+#define VG_MUST_CHECK __attribute__((warn_unused_result))
+#define VG_PRINTF(a, b) __attribute__((format(printf, a, b)))
+#else
+#define VG_MUST_CHECK
+#define VG_PRINTF(a, b)
+#endif
+
+/* ------------------------------------------------------------------------------------------------ core -- */
+
+/* The exit status of a program that stops on an error follows from the code: VG_EARG 2, VG_EINPUT and VG_ETRUNC 3,
+ * VG_ESYS and VG_ENOMEM 4. */
+typedef enum vg_code {
+    VG_OK = 0,
+    VG_EARG = -1,   /* the caller asked for something that does not exist or does not fit */
+    VG_EINPUT = -2, /* malformed input, or inputs that do not fit one another */
+    VG_ETRUNC = -3, /* input that ends too early */
+    VG_ESYS = -4,   /* the system refused: open, read, write, ... */
+    VG_ENOMEM = -5
+} vg_code;
+
+/* What went wrong: one line without a final full stop, with the file or frame it is about. Control characters of
+ * the input are replaced by '?'. */
+typedef struct vg_err {
+    int code;
+    char message[480];
+} vg_err;
+
+/* vg_fail: fill *e (unless NULL) and return `code`. Control characters are stripped from the result. */
+int vg_fail(vg_err *e, int code, const char *format, ...) VG_PRINTF(3, 4);
+
+/* vg_exit_status: the exit status that STYLE gives to a code (see vg_code). */
+int vg_exit_status(int code);
+
+/* Bytes that grow. data is NULL while cap is 0. */
+typedef struct vg_bytes {
+    unsigned char *data;
+    size_t size, cap;
+} vg_bytes;
+
+void vg_bytes_clear(vg_bytes *b);
+
+/* ----------------------------------------------------------------------------------------------- model -- */
+
+/* A mesh: nf faces of any mix of sizes >= 2 (2 = line segment or bone). Face f is the cycle of vertices
+ * vert[start[f]] .. vert[start[f + 1] - 1]; start has nf + 1 entries, vert has start[nf] entries, each < nv.
+ * A corner is a position in vert. A valid mesh names no vertex twice in one face. nv and corners are < 2^32 - 1. */
+typedef struct vg_mesh {
+    size_t nv, nf;
+    uint32_t *start;
+    uint32_t *vert;
+} vg_mesh;
+
+size_t vg_mesh_corners(const vg_mesh *m); /* start[nf], or 0 for a mesh without faces */
+void vg_mesh_clear(vg_mesh *m);
+int vg_mesh_copy(vg_mesh *to, const vg_mesh *from, vg_err *e) VG_MUST_CHECK;
+
+/* vg_mesh_check: VG_OK, or VG_EINPUT naming the first face that is too small, has an index out of range, or names a
+ * vertex twice. `subject` is what the message calls the mesh ("file 'a.obj'"). O(corners). */
+int vg_mesh_check(const vg_mesh *m, const char *subject, vg_err *e) VG_MUST_CHECK;
+
+/* vg_mesh_same: VG_OK when both have the same vertex count and the same faces in the same order; else VG_EINPUT, and
+ * the message says what differs first ("'b.obj' has 12 vertices where 'a.obj' has 8"). */
+int vg_mesh_same(const vg_mesh *a, const char *a_name, const vg_mesh *b, const char *b_name,
+                 vg_err *e) VG_MUST_CHECK;
+
+/* vg_mesh_components: label[v] (length nv) = number of the connected component of vertex v, in order of first vertex;
+ * every vertex in no face has label UINT32_MAX. *count = number of components. */
+int vg_mesh_components(const vg_mesh *m, uint32_t *label, size_t *count, vg_err *e) VG_MUST_CHECK;
+
+/* vg_diagonal: D, the diagonal of the bounding box of n points. 0 for n = 0. */
+double vg_diagonal(const double *points, size_t n);
+
+/* vg_centroid: mean of n points; zeros for n = 0. */
+void vg_centroid(const double *points, size_t n, double centroid[3]);
+
+/* What a mesh file says beside positions and faces, kept so that it can be written again. */
+typedef enum vg_label_kind {
+    VG_LABEL_OBJECT = 1,    /* OBJ o */
+    VG_LABEL_GROUP = 2,     /* OBJ g */
+    VG_LABEL_MATERIAL = 3,  /* OBJ usemtl */
+    VG_LABEL_SMOOTHING = 4, /* OBJ s */
+    VG_LABEL_LIBRARY = 5    /* OBJ mtllib */
+} vg_label_kind;
+
+typedef struct vg_label { /* holds from face `face` on, until the next label of its kind; labels are in face order */
+    uint64_t face;        /* 0 .. nf */
+    uint32_t kind;
+    char *text; /* UTF-8 */
+} vg_label;
+
+typedef struct vg_attributes {
+    size_t ntex;         /* texture coordinates */
+    uint32_t tex_dim;    /* 1 to 3 numbers each */
+    double *tex;         /* ntex * tex_dim */
+    uint32_t *corner_tex; /* per corner its texture coordinate, UINT32_MAX = none; NULL when ntex is 0 */
+    size_t nlabels;
+    vg_label *labels;
+} vg_attributes;
+
+void vg_attributes_clear(vg_attributes *a);
+int vg_attributes_copy(vg_attributes *to, const vg_attributes *from, const vg_mesh *mesh, vg_err *e) VG_MUST_CHECK;
+
+/* One process that took part in making a stream. parents are positions in the same list, each before its own. */
+typedef struct vg_provenance {
+    char *program, *version;
+    size_t nargs;
+    char **args;
+    size_t nparents;
+    uint32_t *parents;
+} vg_provenance;
+
+/* A record of the stream that this version does not know and passes on. */
+typedef struct vg_record {
+    char tag[5];
+    uint32_t flags;
+    vg_bytes payload;
+} vg_record;
+
+typedef struct vg_records {
+    size_t n;
+    vg_record *at;
+} vg_records;
+
+void vg_records_clear(vg_records *r);
+
+/* What the values of a frame are, per element. */
+typedef enum vg_kind {
+    VG_VERTICES = 1,     /* 3 numbers per vertex: position */
+    VG_VECTORS = 2,      /* 3 per corner of the vector graph: from the face's centroid to the vertex */
+    VG_DEFORMATIONS = 3, /* 4 per corner of the vector graph: quaternion w x y z, squared length = scale */
+    VG_TRANSFORMS = 4    /* 7 per bone or patch: quaternion w x y z as above, then translation */
+} vg_kind;
+
+size_t vg_kind_width(vg_kind k);         /* 3, 3, 4, 7 */
+const char *vg_kind_name(vg_kind k);     /* "vertices", ... ; "unknown" */
+
+typedef enum vg_precision { VG_F32 = 4, VG_F64 = 8 } vg_precision;
+
+/* All that is known of a sequence before its frames. Frames carry vertices of `mesh`, or values on its vector graph
+ * (see vg_graph), or transforms. */
+typedef struct vg_head {
+    vg_mesh mesh;
+    double *reference;    /* nv points: the undeformed pose. Always there when the mesh has vertices */
+    char *reference_name; /* never NULL in a head that was read */
+    vg_attributes attributes;
+    bool has_selection;   /* only the faces `selected` (ascending) carry vectors; else all do */
+    size_t nselected;
+    uint32_t *selected;
+    bool has_links;       /* links were chosen (perhaps none were needed) */
+    size_t nlinks;
+    uint32_t *links;      /* nlinks pairs of vertices: virtual 2-vertex faces that join components */
+    size_t nanchors;
+    uint32_t *anchors;    /* vertices (ascending) whose position each frame of vectors or deformations gives */
+    size_t nprovenance;
+    vg_provenance *provenance;
+    vg_records extra;     /* unknown records, in order */
+    vg_kind kind;
+    vg_precision precision;
+    size_t count;         /* elements of a frame: nv, corners of the graph, or number of transforms */
+} vg_head;
+
+void vg_head_clear(vg_head *h);
+int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e) VG_MUST_CHECK;
+
+/* vg_head_trace: append the record of this process. Its parents are the last record already there (if any) and
+ * `other_last` of every stream merged by vg_head_merge_trace. argv is argc strings; bytes that are no UTF-8 become '?'. */
+int vg_head_trace(vg_head *h, const char *program, int argc, char *const *argv, vg_err *e) VG_MUST_CHECK;
+
+/* vg_head_merge_trace: put the provenance of a second input before that of this process (call before vg_head_trace). */
+int vg_head_merge_trace(vg_head *h, const vg_head *other, vg_err *e) VG_MUST_CHECK;
+
+/* One pose. The struct is reused from frame to frame; its arrays grow and stay. */
+typedef struct vg_frame {
+    char *name; /* UTF-8, never NULL in a frame that was read */
+    bool has_time;
+    double time; /* seconds */
+    double root[3];  /* vectors, deformations: mean of the vertices that are in the vector graph */
+    double *anchors; /* vectors, deformations: head.nanchors points */
+    double *values;  /* head.count * vg_kind_width(head.kind) */
+    vg_records extra; /* unknown records that came before this frame */
+    /* private to the reader and to vg_frame_*: */
+    vg_bytes raw;
+    size_t name_cap, anchors_cap, values_cap;
+    double *values_own;
+} vg_frame;
+
+void vg_frame_clear(vg_frame *f);
+/* vg_frame_shape: make room for the values and anchors of a frame of h; contents undefined. */
+int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+int vg_frame_rename(vg_frame *f, const char *name, vg_err *e) VG_MUST_CHECK;
+/* vg_frame_label: take over name, time and unknown records of `from`, but no numbers; `from` loses its records. */
+int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e) VG_MUST_CHECK;
+
+/* The vector graph of a sequence: the faces that carry vectors, in order (all, or the selected ones), then the links.
+ * Layout as in vg_mesh; corner c of the graph is a position in vert. `attached` counts the vertices that are in a face. */
+typedef struct vg_graph {
+    size_t nv, nf, nlinks; /* nf includes the links, which are the last */
+    uint32_t *start, *vert;
+    size_t attached, max_corners;
+    bool *in_face; /* nv */
+} vg_graph;
+
+/* vg_graph_new: the graph of h's mesh, selection and links. h must hold links (vg_link_components) when it has more
+ * than one component; this is not checked here. O(corners). */
+int vg_graph_new(vg_graph **g, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+void vg_graph_free(vg_graph **g);
+size_t vg_graph_corners(const vg_graph *g);
+
+/* vg_graph_vectors: w_c = v(c) - C_f (T 3.1). vertices: nv points in; vectors: one per corner out. */
+void vg_graph_vectors(const vg_graph *g, const double *vertices, double *vectors);
+/* vg_graph_root: the mean of the attached vertices (zeros when there are none). */
+void vg_graph_root(const vg_graph *g, const double *vertices, double root[3]);
+/* vg_graph_anchors: positions of the n anchors out of nv points. */
+void vg_graph_anchors(const double *vertices, const uint32_t *anchors, size_t n, double *positions);
+
+/* Rotations. A deformation is a quaternion w x y z whose squared length is the scale a > 0: r -> Q r Q* (T 3.19). */
+void vg_quat_multiply(const double a[4], const double b[4], double ab[4]);
+void vg_quat_apply(const double q[4], const double r[3], double d[3]); /* Q r Q*: rotates, and scales by |Q|^2 */
+void vg_quat_matrix(const double unit[4], double m[9]);                /* row-major rotation matrix */
+void vg_quat_from_matrix(const double m[9], double unit[4]);           /* of a rotation; Shepperd's choice of branch */
+void vg_quat_log(const double q[4], double l[4]); /* q != 0. l[0] = ln|q|, l[1..3] = half angle * axis, w >= 0 or not */
+void vg_quat_exp(const double l[4], double q[4]);
+/* vg_quat_between: smallest rotation taking r to d (Rodrigues; MATH 4), scale |d|/|r|. r and d must not be 0. */
+void vg_quat_between(const double r[3], const double d[3], double q[4]);
+
+/* ---------------------------------------------------------------------------------------------- method -- */
+
+/* vg_select_faces: fewer faces that still determine the mesh (T 3.2, Algorithm 1), completed so that every vertex that
+ * is in a face stays in one and every component stays connected. *faces (ascending, caller frees with free()) and *n. */
+int vg_select_faces(const vg_mesh *m, uint32_t **faces, size_t *n, vg_err *e) VG_MUST_CHECK;
+
+/* vg_link_components: the fewest virtual line segments that join all components of m, between nearby vertices of
+ * `vertices` (nv points): a minimum spanning tree of the components, where a link that would be shorter than the edges
+ * beside it (but not zero) is moved on to the next vertex of the face. *pairs (2 per link, caller frees) and *n. */
+int vg_link_components(const vg_mesh *m, const double *vertices, uint32_t **pairs, size_t *n, vg_err *e) VG_MUST_CHECK;
+
+/* vg_head_prepare_vectors: choose h's links from its reference pose unless it has them. Every program that derives
+ * vectors from vertices calls this before vg_graph_new. */
+int vg_head_prepare_vectors(vg_head *h, vg_err *e) VG_MUST_CHECK;
+
+/* Deformation of vectors, reference pose to deformed pose (MATH 4): Frames (T 3.12 ff.) on faces of 3 or more, Rodrigues on
+ * line segments, and on links the mean turn of the faces at their ends followed by Rodrigues. Degenerate corners take
+ * the rotation of their face's other corners and scale 1. */
+typedef struct vg_deformer vg_deformer;
+typedef struct vg_deform_counts {
+    uint64_t corners;    /* degenerate corners met, over all poses */
+    uint64_t first_face; /* the first face of the graph that has one; UINT64_MAX: none */
+} vg_deform_counts;
+
+/* vg_deformer_new: g borrowed until free; reference: nv points, copied in part. threads >= 1. */
+int vg_deformer_new(vg_deformer **d, const vg_graph *g, const double *reference, int threads, vg_err *e) VG_MUST_CHECK;
+void vg_deformer_free(vg_deformer **d);
+/* vg_deformer_target: apply to these reference vectors (one per corner of the graph, copied) from now on. */
+int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_err *e) VG_MUST_CHECK;
+/* vg_deformer_measure: n poses in (kind VG_VERTICES: nv points each, or VG_VECTORS: one vector per corner), n arrays of a
+ * quaternion per corner out. vg_deformer_transfer: the same in, the deformed target vectors out, never worse than
+ * measuring and applying by more than rounding. vg_deformer_apply: quaternions in, deformed target vectors out. */
+void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses, double *const *quaternions);
+void vg_deformer_transfer(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses, double *const *vectors);
+void vg_deformer_apply(vg_deformer *d, size_t n, const double *const *quaternions, double *const *vectors);
+vg_deform_counts vg_deformer_counts(const vg_deformer *d);
+
+/* Reconstruction: min over V of the squared difference between the vectors of V and the given ones (MATH 2; T 3.7-3.9),
+ * by one sparse Cholesky factorisation, many poses per solve. */
+typedef struct vg_solver vg_solver;
+typedef struct vg_solver_facts {
+    size_t unknowns, factor_entries; /* entries of the factor, explicit zeros included */
+    double analyse_seconds, factor_seconds;
+} vg_solver_facts;
+
+/* vg_solver_new: g borrowed until free; anchors (n ascending vertices, each attached) are met exactly; without any, the mean of
+ * the attached vertices is. reference (nv points, copied in part) places the vertices that are in no face.
+ * VG_EINPUT when the graph is not connected. */
+int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
+                  int threads, vg_err *e) VG_MUST_CHECK;
+void vg_solver_free(vg_solver **s);
+/* vg_solver_rhs: fold one pose's vectors into the nv x 3 right-hand side (A W*; MATH 2). */
+void vg_solver_rhs(const vg_solver *s, const double *vectors, double *rhs);
+/* vg_solver_solve: n right-hand sides (nv x 3 each) become n poses in place. anchors[i]: nanchors points of pose i, or
+ * roots[i]: its root; the other may be NULL. Best when n is a multiple of vg_solver_batch. */
+void vg_solver_solve(vg_solver *s, size_t n, double *const *x, const double *const *anchors, const double *const *roots);
+size_t vg_solver_batch(const vg_solver *s);
+vg_solver_facts vg_solver_get_facts(const vg_solver *s);
+
+/* Measures of two sequences of one connectivity (MATH 8), accumulated pose by pose in bounded memory. */
+typedef struct vg_measures vg_measures;
+typedef struct vg_measure_report {
+    size_t frames, vertices, faces;
+    double diagonal; /* D of the truth's reference pose */
+    double mean, rms, max, p95; /* vertex error, mesh units */
+    size_t max_vertex, max_frame;
+    double sigma;              /* largest over vertices of the standard deviation over poses (T 5.36) */
+    size_t sigma_vertex;
+    double orientation_mean, orientation_sd, orientation_max; /* 1 - N.N~ per face of 3 or more (T 6.42) */
+    double area_mean, area_sd, area_max;                      /* |1 - A/A~| (T 6.44) */
+    size_t faces_measured;                                    /* faces with a normal, summed over poses */
+    double planarity_mean[2], planarity_max[2];               /* truth, result: faces of 4 or more, in [0, 1] (T 4.2.6) */
+    size_t planarity_faces[2];
+    uint64_t planarity_histogram[2][10];
+} vg_measure_report;
+
+/* vg_measures_new: m borrowed until free. centred: compare poses after moving each one's centroid to 0.
+ * p95 is exact to 0.4 % (a histogram of 1/256 octaves). */
+int vg_measures_new(vg_measures **x, const vg_mesh *m, const double *reference, bool centred, vg_err *e) VG_MUST_CHECK;
+void vg_measures_free(vg_measures **x);
+/* vg_measures_add: one pose of the truth and of the result (nv points each); frame_mean, frame_max (may be NULL): this
+ * pose's error. errors (may be NULL): nv distances out. */
+int vg_measures_add(vg_measures *x, const double *truth, const double *result, double *frame_mean, double *frame_max,
+                    double *errors, vg_err *e) VG_MUST_CHECK;
+void vg_measures_get(const vg_measures *x, vg_measure_report *r);
+
+/* A fingerprint of what a sequence says, whoever made it: XXH64 over kind, faces, selection, links, anchors, reference
+ * positions, and of every frame name, time, root, anchors and values, all numbers as binary64 (-0 as 0). Provenance,
+ * attributes, unknown records and the precision they are written in do not count. */
+typedef struct vg_digest vg_digest;
+int vg_digest_new(vg_digest **d, const vg_head *h, vg_err *e) VG_MUST_CHECK; /* h is borrowed until free */
+void vg_digest_free(vg_digest **d);
+void vg_digest_add(vg_digest *d, const vg_frame *f);
+uint64_t vg_digest_get(const vg_digest *d); /* of all that was added so far */
+
+/* -------------------------------------------------------------------------------------------------- io -- */
+
+/* The stream (fmt/STREAM.md). A reader takes it from a descriptor or from memory and checks every byte. */
+typedef struct vg_reader vg_reader;
+/* vg_reader_open: read up to the FORM record. fd is borrowed and read to the END mark by vg_reader_next. `name` is what messages call it. */
+int vg_reader_open(vg_reader **r, int fd, const char *name, vg_err *e) VG_MUST_CHECK;
+int vg_reader_open_memory(vg_reader **r, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
+/* vg_reader_head: what was read; the caller may change it (it is what a filter hands to its writer). */
+vg_head *vg_reader_head(vg_reader *r);
+/* vg_reader_next: 1 and the next frame; 0 at the END mark, nothing left behind it; negative on damage. */
+int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e) VG_MUST_CHECK;
+vg_records *vg_reader_tail(vg_reader *r); /* unknown records after the last frame, valid when next has given 0 */
+void vg_reader_close(vg_reader **r);
+
+typedef struct vg_writer vg_writer;
+/* vg_writer_open: write everything up to FORM. fd is borrowed. h is borrowed until close and must not change. */
+int vg_writer_open(vg_writer **w, int fd, const char *name, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+int vg_writer_put(vg_writer *w, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
+/* vg_writer_end: unknown records left over (may be NULL), END, flush. Without it the stream is not whole. */
+int vg_writer_end(vg_writer *w, const vg_records *tail, vg_err *e) VG_MUST_CHECK;
+/* vg_writer_abandon: say in a FAIL record who failed and why; best effort; no END will follow. */
+void vg_writer_abandon(vg_writer *w, const char *program, int exit_status, const char *message);
+void vg_writer_close(vg_writer **w);
+
+/* The door in. Operands are streams, mesh files, archives of mesh files, directories, or "-" (standard input: a stream,
+ * mesh text or an archive); what each one is, is told by its content, for OBJ by its name or content. Directories and archives give their mesh
+ * files in natural order ("pose2" before "pose10"); other files in them are passed over. One operand that is a stream
+ * gives that stream as it is. More operands are joined into one sequence of vertices of one mesh. The first pose is the
+ * reference unless a stream brings its own. */
+typedef struct vg_source vg_source;
+int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err *e) VG_MUST_CHECK;
+vg_head *vg_source_head(vg_source *s);
+int vg_source_next(vg_source *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
+vg_records *vg_source_tail(vg_source *s);
+void vg_source_close(vg_source **s);
+
+/* vg_load_mesh: the mesh behind one operand, as a head whose reference is the operand's reference pose (for a mesh
+ * file its only pose; for a stream its reference; for an archive or directory the first pose). The rest is not read. */
+int vg_load_mesh(vg_head *h, const char *operand, vg_err *e) VG_MUST_CHECK;
+
+/* The door out for mesh files: one file, a '%04d' pattern, a directory ("out/"), or an archive, told by the name and
+ * checked at once; "NAME:ply" chooses what is inside an archive or directory, `format` (may be NULL) overrides. Everything is written under
+ * temporary names and takes its final name in vg_sink_end. */
+typedef struct vg_sink vg_sink;
+typedef struct vg_sink_options {
+    const char *format;  /* obj, ply, ply-ascii, ply-be, off; NULL: told by the name */
+    bool full_precision; /* numbers read back to the same binary64, not binary32 */
+    long first_number;   /* what %d starts at; 0 */
+} vg_sink_options;
+/* vg_sink_check: is this a name and format that can be written? To be called before any work. */
+int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;
+int vg_sink_open(vg_sink **s, const char *output, const vg_head *h, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;
+int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK; /* a frame of vertices */
+int vg_sink_end(vg_sink *s, vg_err *e) VG_MUST_CHECK;
+void vg_sink_close(vg_sink **s); /* without _end: nothing is left behind */
+
+/* A mesh file in memory, read or written as a whole. */
+typedef struct vg_model {
+    vg_mesh mesh;
+    double *vertices;
+    vg_attributes attributes;
+} vg_model;
+
+void vg_model_clear(vg_model *m);
+/* vg_model_read: format NULL: told by content, then by the name. name is what messages call it. */
+int vg_model_read(vg_model *m, const void *data, size_t n, const char *format, const char *name, vg_err *e) VG_MUST_CHECK;
+/* vg_model_write: append to out. attributes may be NULL. */
+int vg_model_write(vg_bytes *out, const char *format, const vg_mesh *mesh, const double *vertices,
+                   const vg_attributes *attributes, bool full_precision, vg_err *e) VG_MUST_CHECK;
+
+/* ------------------------------------------------------------------------------------------------ view -- */
+
+/* A contact sheet: evenly spaced frames of a sequence side by side, drawn without display or GPU, as PNG. */
+typedef struct vg_sheet vg_sheet;
+typedef struct vg_sheet_options {
+    size_t frames;        /* how many are shown, at most: >= 1 */
+    size_t columns;       /* 0: as many as make the sheet about 16 : 9 */
+    size_t width, height; /* of the picture of one frame, in pixels: 16 .. 4096 */
+    double azimuth, elevation; /* of the viewer, in degrees: 0, 0 is before the front, 90, 0 at +x, 0, 90 above */
+    bool z_up;            /* z is up and the front at -y; else y is up and the front at +z */
+    bool follow;          /* the figure's centroid stays in the middle; else the camera stays where it is */
+    bool edges, ground;   /* draw edges of polygons; a grid where the reference stands, with the figure's shadow */
+    bool compare;         /* colours are vertex errors against a truth */
+    bool centred;         /* of which the shift of the centroid is no part */
+    double scale;         /* the end of the colours, in D; 0: the 99th percentile of what is shown, rounded up */
+    int threads;
+} vg_sheet_options;
+
+/* vg_sheet_new: m borrowed until free. reference (nv points) gives D and the height of the ground. */
+int vg_sheet_new(vg_sheet **s, const vg_mesh *m, const double *reference, const vg_sheet_options *o, vg_err *e) VG_MUST_CHECK;
+void vg_sheet_free(vg_sheet **s);
+/* vg_sheet_add: the next frame of the sequence (nv points, copied); truth: what it is compared with, NULL unless o.compare.
+ * Keeps at most 4 * frames + 2 poses in binary32, whatever the length, at a stride that is 1 as long as they fit and at most half the
+ * spacing of what is shown: the spacing is even to within half a stride at each end. */
+int vg_sheet_add(vg_sheet *s, const char *name, const double *vertices, const double *truth, vg_err *e) VG_MUST_CHECK;
+/* vg_sheet_write: draw what was added and write it to fd (borrowed); `name` is what messages call it. Once. VG_EINPUT when
+ * nothing was added, VG_EARG when the sheet would be larger than a PNG can be. */
+int vg_sheet_write(vg_sheet *s, int fd, const char *name, vg_err *e) VG_MUST_CHECK;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

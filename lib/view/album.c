@@ -1,0 +1,83 @@
+/* album.c: evenly spaced frames of a sequence whose length is not known before its end, in bounded memory.
+ * Of every `stride` frames one is kept; when there is no more room every second one is let go and the stride doubles. The last
+ * frame is always kept. Leaves out what is in a shot.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "view/view.h"
+
+static void clear_shot(vgi_shot *s)
+{
+    free(s->name);
+    free(s->points);
+    free(s->errors);
+    *s = (vgi_shot){0};
+}
+
+static int make_shot(const vgi_album *a, vgi_shot *s, vg_err *e)
+{
+    if (!s->points) s->points = vgi_array(a->nv, 3 * sizeof *s->points, e);
+    if (!s->errors && a->compare) s->errors = vgi_array(a->nv, sizeof *s->errors, e);
+    return s->points && (s->errors || !a->compare) ? VG_OK : VG_ENOMEM;
+}
+
+int vgi_album_init(vgi_album *a, size_t nv, size_t want, bool compare, vg_err *e)
+{
+    *a = (vgi_album){.nv = nv, .want = want, .stride = 1, .compare = compare};
+    /* one more: the last frame may join those that were kept */
+    a->at = vgi_array(4 * want + 1, sizeof *a->at, e);
+    a->cap = 4 * want;
+    return a->at ? VG_OK : VG_ENOMEM;
+}
+
+void vgi_album_clear(vgi_album *a)
+{
+    for (size_t i = 0; a->at && i <= a->cap; i++) clear_shot(a->at + i);
+    free(a->at);
+    clear_shot(&a->last);
+    *a = (vgi_album){0};
+}
+
+static void swap_shots(vgi_shot *a, vgi_shot *b)
+{
+    vgi_shot t = *a;
+    *a = *b, *b = t;
+}
+
+static void thin_out(vgi_album *a)
+{
+    size_t kept = (a->n + 1) / 2;
+    for (size_t i = 1; i < kept; i++) swap_shots(a->at + i, a->at + 2 * i); /* their memory is used again */
+    a->n = kept;
+    a->stride *= 2;
+}
+
+int vgi_album_next(vgi_album *a, vgi_shot **shot, vg_err *e)
+{
+    size_t index = a->seen;
+    if (index % a->stride == 0 && a->n == a->cap) thin_out(a);
+    bool keep = index % a->stride == 0;
+    vgi_shot *s = keep ? a->at + a->n : &a->last;
+    int r = make_shot(a, s, e);
+    if (r < 0) return r;
+    if (keep) a->n++;
+    s->index = index;
+    a->seen++;
+    *shot = s;
+    return VG_OK;
+}
+
+size_t vgi_album_close(vgi_album *a)
+{
+    if (a->seen == 0) return 0;
+    size_t last = a->seen - 1;
+    if (a->at[a->n - 1].index != last) swap_shots(a->at + a->n++, &a->last);
+    if (a->n <= a->want) return a->n;
+    for (size_t i = 0, from = 0; i < a->want; i++) {
+        /* the frame nearest to the i-th of `want` evenly spaced ones; wanted ones are more than a stride apart, so that
+         * none is taken twice */
+        double at = a->want > 1 ? (double)i * (double)last / (double)(a->want - 1) : 0;
+        while (from + 1 < a->n && (double)a->at[from + 1].index - at < at - (double)a->at[from].index) from++;
+        if (from < i) from = i;
+        swap_shots(a->at + i, a->at + from);
+    }
+    return a->want;
+}

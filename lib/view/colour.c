@@ -1,0 +1,56 @@
+/* colour.c: the error colours and the way from linear light to the bytes of a picture.
+ * The colour map is of our own making: a path in OKLab (Ottosson 2020) whose lightness grows evenly from a deep
+ * indigo over teal to a light yellow, so that it also reads in grey and with colour-deficient eyes. Leaves out lights.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "view/view.h"
+
+#include <math.h>
+
+typedef struct stop { /* lightness, chroma, hue in degrees */
+    double l, c, h;
+} stop;
+
+/* The darkest is light enough to be shaded and still show its shape. Chroma stays inside sRGB. */
+static const stop path[] = {
+    {0.380, 0.130, 284}, {0.490, 0.115, 258}, {0.590, 0.105, 220}, {0.690, 0.120, 178},
+    {0.780, 0.150, 150}, {0.860, 0.170, 125}, {0.930, 0.175, 105},
+};
+
+static void from_oklab(double l, double a, double b, float linear[3])
+{
+    double x = l + 0.3963377774 * a + 0.2158037573 * b;
+    double y = l - 0.1055613458 * a - 0.0638541728 * b;
+    double z = l - 0.0894841775 * a - 1.2914855480 * b;
+    x *= x * x, y *= y * y, z *= z * z;
+    double rgb[3] = {4.0767416621 * x - 3.3077115913 * y + 0.2309699292 * z,
+                     -1.2684380046 * x + 2.6097574011 * y - 0.3413193965 * z,
+                     -0.0041960863 * x - 0.7034186147 * y + 1.7076147010 * z};
+    for (int k = 0; k < 3; k++) linear[k] = (float)fmin(fmax(rgb[k], 0), 1);
+}
+
+void vgi_map_colour(double t, float linear[3])
+{
+    size_t last = sizeof path / sizeof *path - 1;
+    double at = fmin(fmax(t, 0), 1) * (double)last;
+    size_t i = at >= (double)last ? last - 1 : (size_t)at;
+    double u = at - (double)i, w = 1 - u;
+    const stop *p = path + i, *q = p + 1;
+    double c = w * p->c + u * q->c, h = (w * p->h + u * q->h) * (M_PI / 180);
+    from_oklab(w * p->l + u * q->l, c * cos(h), c * sin(h), linear);
+}
+
+float vgi_linear(unsigned char srgb)
+{
+    double x = srgb / 255.0;
+    return (float)(x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4));
+}
+
+void vgi_palette_init(vgi_palette *p)
+{
+    for (int i = 0; i < VGI_MAP_STEPS; i++) vgi_map_colour(i / (VGI_MAP_STEPS - 1.0), p->map[i]);
+    for (int i = 0; i <= VGI_GAMMA_STEPS; i++) {
+        double x = i / (double)VGI_GAMMA_STEPS;
+        double y = x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055;
+        p->encode[i] = (unsigned char)(y * 255 + 0.5);
+    }
+}

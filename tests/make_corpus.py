@@ -1,0 +1,605 @@
+#!/usr/bin/env python3
+"""make_corpus.py: writes the golden streams and the corpora of streams to take and to refuse.
+
+    python3 tests/make_corpus.py [ROOT]     writes ROOT/fmt/golden, ROOT/tests/corpus/accept, ROOT/tests/corpus/reject
+
+It is a second writer of the stream, made from fmt/STREAM.md and sharing no code with the programs or with
+examples/read_stream.py, so that the readers are checked against something else than their own writer. Same bytes
+every time. It leaves out what readers have to say about the streams to refuse: reject/expected.txt, kept by hand.
+
+SPDX-License-Identifier: GPL-3.0-or-later
+"""
+import copy
+import json
+import os
+import struct
+import sys
+
+MAGIC = b"\x89VGS\r\n\x1a1"
+CRITICAL, COPY_SAFE = 1, 2
+KINDS = {"vertices": 1, "vectors": 2, "deformations": 3, "transforms": 4}
+LABELS = {"object": 1, "group": 2, "material": 3, "smoothing": 4, "library": 5}
+NAN, INF = float("nan"), float("inf")
+
+
+def xxh64(data):
+    """XXH64 with seed 0, step by step as the public specification numbers them."""
+    mask = (1 << 64) - 1
+    p1, p2, p3 = 11400714785074694791, 14029467366897019727, 1609587929392839161
+    p4, p5 = 9650029242287828579, 2870177450012600261
+
+    def rotl(x, n):
+        return (x << n | x >> (64 - n)) & mask
+
+    def turn(acc, lane):
+        return rotl((acc + lane * p2) & mask, 31) * p1 & mask
+
+    at = 0
+    if len(data) < 32:  # step 1
+        acc = p5
+    else:
+        accs = [(p1 + p2) & mask, p2, 0, -p1 & mask]
+        while len(data) - at >= 32:  # step 2
+            accs = [turn(a, lane) for a, lane in zip(accs, struct.unpack_from("<4Q", data, at))]
+            at += 32
+        acc = sum(rotl(a, n) for a, n in zip(accs, (1, 7, 12, 18))) & mask  # step 3
+        for a in accs:
+            acc = ((acc ^ turn(0, a)) * p1 + p4) & mask
+    acc = (acc + len(data)) & mask  # step 4
+    while len(data) - at >= 8:  # step 5
+        acc = (rotl(acc ^ turn(0, struct.unpack_from("<Q", data, at)[0]), 27) * p1 + p4) & mask
+        at += 8
+    if len(data) - at >= 4:
+        acc = (rotl(acc ^ struct.unpack_from("<I", data, at)[0] * p1 & mask, 23) * p2 + p3) & mask
+        at += 4
+    for byte in data[at:]:
+        acc = rotl(acc ^ byte * p5 & mask, 11) * p1 & mask
+    acc = (acc ^ acc >> 33) * p2 & mask  # step 6
+    acc = (acc ^ acc >> 29) * p3 & mask
+    return acc ^ acc >> 32
+
+
+# ---- from content to records ---------------------------------------------------------------------------------------
+
+
+def u32(*x):
+    return struct.pack(f"<{len(x)}I", *x)
+
+
+def u64(*x):
+    return struct.pack(f"<{len(x)}Q", *x)
+
+
+def f64(*x):
+    return struct.pack(f"<{len(x)}d", *x)
+
+
+def string(s):
+    return u32(len(s.encode())) + s.encode()
+
+
+def pad(data):
+    return data + bytes(-len(data) % 8)
+
+
+def flat(rows):
+    return [x for row in rows for x in row]
+
+
+class Record:
+    """A record about to be written. Any of its fields may be made to lie before that."""
+
+    def __init__(self, tag, payload, flags):
+        self.tag, self.payload, self.flags = tag.encode(), payload, flags
+        self.length = self.payload_sum = self.header_sum = self.padding = None
+
+    def bytes(self):
+        length = len(self.payload) if self.length is None else self.length
+        payload_sum = xxh64(self.payload) if self.payload_sum is None else self.payload_sum
+        head = self.tag + u32(self.flags) + u64(length, payload_sum)
+        head += u64(xxh64(head) if self.header_sum is None else self.header_sum)
+        padding = bytes(-len(self.payload) % 8) if self.padding is None else self.padding
+        return head + self.payload + padding
+
+
+def unknown(records):
+    return [Record(r["tag"], bytes.fromhex(r["payload"]), r["flags"]) for r in records]
+
+
+def provenance(p):
+    head = u32(len(p["parents"]), len(p["args"]), *p["parents"])
+    texts = [p["program"], p["version"], *p["args"]]
+    return Record("PROV", head + b"".join(map(string, texts)), COPY_SAFE)
+
+
+def mesh(m):
+    sizes = [len(f) for f in m["faces"]]
+    return Record("MESH", u64(m["vertices"], len(sizes)) + u32(*sizes, *flat(m["faces"])), CRITICAL)
+
+
+def texture(t):
+    corners = [0xFFFFFFFF if c is None else c for c in t["corners"]]
+    head = u32(t["dim"], 0) + u64(len(t["coordinates"]))
+    return Record("TEXC", head + f64(*flat(t["coordinates"])) + u32(*corners), 0)
+
+
+def labels(entries):
+    out = b""
+    for label in entries:
+        text = label["text"].encode()
+        out += pad(u64(label["face"]) + u32(LABELS[label["kind"]], len(text)) + text)
+    return Record("LABL", out, 0)
+
+
+def reference(r):
+    name = r["name"].encode()
+    return Record("REFP", pad(u32(len(name), 0) + name) + f64(*flat(r["positions"])), CRITICAL)
+
+
+def frame(c, f):
+    name = f["name"].encode()
+    head = pad(u32(len(name), f["time"] is not None) + f64(f["time"] or 0) + name)
+    if f["root"] is not None:
+        head += f64(*f["root"], *flat(f["anchors"]))
+    values = flat(f["values"])
+    code = "d" if c["precision"] == 8 else "f"
+    return Record("FRAM", head + struct.pack(f"<{len(values)}{code}", *values), CRITICAL)
+
+
+def records_of(c):
+    """The records of a content, END left out. `order` of the content moves header records about."""
+    out = [provenance(p) for p in c["provenance"]]
+    if c["mesh"] is not None:
+        out.append(mesh(c["mesh"]))
+    if c["texture"] is not None:
+        out.append(texture(c["texture"]))
+    if c["labels"] is not None:
+        out.append(labels(c["labels"]))
+    for tag, value in (("SELE", c["selection"]), ("LINK", c["links"]), ("ANCH", c["anchors"])):
+        if value is not None:
+            out.append(Record(tag, u32(*(flat(value) if tag == "LINK" else value)), CRITICAL))
+    if c["reference"] is not None:
+        out.append(reference(c["reference"]))
+    out += unknown(c["extra"])
+    out.append(Record("FORM", u32(KINDS[c["kind"]], c["precision"]) + u64(c["count"]), CRITICAL))
+    for f in c["frames"]:
+        out += unknown(f["extra"]) + [frame(c, f)]
+    return out + unknown(c["tail"])
+
+
+def end_of(records):
+    sums = b"".join(r.bytes()[24:32] for r in records)
+    return Record("END ", u64(len(records), xxh64(sums)), CRITICAL)
+
+
+def assemble(records, minor=0, reserved=0, magic=MAGIC):
+    return magic + u32(minor, reserved) + b"".join(r.bytes() for r in records)
+
+
+def whole(c, records=None):
+    records = records_of(c) if records is None else records
+    return assemble(records + [end_of(records)], c["minor"])
+
+
+# ---- contents ------------------------------------------------------------------------------------------------------
+
+# a quad, a triangle that shares its edge 2-1, and a line segment that hangs on it
+QUAD, TRIANGLE, SEGMENT = [0, 1, 2, 3], [2, 1, 4], [4, 5]
+FACES = [QUAD, TRIANGLE, SEGMENT]
+POINTS = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [1.5, 0.5, 0.25], [2, 0.5, 0.75]]
+BENT = [[0, 0, 0.5], [1, 0, 0], [1, 1, 0], [0, 1, 0.5], [1.5, 0.5, 0.75], [1.75, 0.5, 1.5]]
+
+
+def content(**changes):
+    """A stream of vertices, as small as it gets: a mesh of two triangles, one frame. With `changes`."""
+    c = {
+        "minor": 0, "provenance": [], "mesh": {"vertices": 4, "faces": [[0, 1, 2], [0, 2, 3]]}, "texture": None,
+        "labels": None, "selection": None, "links": None, "anchors": None,
+        "reference": {"name": "rest", "positions": POINTS[:4]},
+        "kind": "vertices", "precision": 8, "count": 4, "extra": [],
+        "frames": [pose("pose1", BENT[:4])], "tail": [],
+    }
+    c.update(changes)
+    return c
+
+
+def pose(name, values, time=None, root=None, anchors=None, extra=()):
+    return {"name": name, "time": time, "root": root, "anchors": anchors, "values": values, "extra": list(extra)}
+
+
+def mixed(**changes):
+    """A mesh of a quad, a triangle and a line segment."""
+    return content(mesh={"vertices": 6, "faces": FACES}, reference={"name": "rest", "positions": POINTS}, count=6,
+                   frames=[pose("bent", BENT)], **changes)
+
+
+def corner_vectors(faces, points):
+    """Vertex minus mean, per corner. Exact on faces of 2 and 4 corners, since the points are multiples of 1/4."""
+    out = []
+    for face in faces:
+        mean = [sum(points[v][k] for v in face) / len(face) for k in range(3)]
+        out += [[points[v][k] - mean[k] for k in range(3)] for v in face]
+    return out
+
+
+def mean_of(points):
+    return [sum(p[k] for p in points) / len(points) for k in range(3)]
+
+
+def graph_content(kind, **changes):
+    """Two components, a quad and a segment, joined by one link; anchors 0 and 5."""
+    faces, links = [QUAD, SEGMENT], [[1, 4]]
+    vectors = corner_vectors(faces + links, BENT)
+    turn = [0.5, 0.5, 0.5, 0.5]  # a third of a turn about 1 1 1, scale 1
+    values = vectors if kind == "vectors" else [turn, [1, 0, 0, 0], [0, 0, 0, -2], [-1, 0, 0, 0], [0.5, 0, 0, 0.5],
+                                                [1, 1, 0, 0], [0.25, 0, 0.5, 0], [2, 0, 0, 0]]
+    root = mean_of(BENT) if kind == "vectors" else [0.5, 0.25, -1]
+    c = content(mesh={"vertices": 6, "faces": faces}, reference={"name": "rest", "positions": POINTS}, kind=kind,
+                links=links, anchors=[0, 5], count=8,
+                frames=[pose("bent", values, time=0.5, root=root, anchors=[BENT[0], BENT[5]])])
+    c.update(changes)
+    return c
+
+
+NOTE = {"tag": "XNOT", "flags": COPY_SAFE, "payload": b"copied".hex()}
+FUTURE = {"tag": "X 1 ", "flags": COPY_SAFE | 0xABCD0000, "payload": bytes(range(8)).hex()}
+DROPPED = {"tag": "XTMP", "flags": 0, "payload": b"a filter drops this".hex()}
+EMPTY = {"tag": "XNON", "flags": COPY_SAFE, "payload": ""}
+
+
+def golden():
+    """name -> (what it shows, content)"""
+    prov = [{"program": "vg-encode", "version": "0.1.0", "parents": [], "args": ["vg-encode", "a.obj"]},
+            {"program": "vg-encode", "version": "0.1.0", "parents": [], "args": ["vg-encode", "b c.obj", ""]},
+            {"program": "vg-deform", "version": "0.1.0", "parents": [0, 1],
+             "args": ["vg-deform", "--onto", "t\u00eate-\u5934.vgs"]}]
+    two = [pose("pose1", BENT[:4], time=0), pose("pose2", POINTS[:4], time=1 / 24)]
+    selected = [QUAD, SEGMENT]
+    vectors = corner_vectors(selected, BENT)
+    used = mean_of(BENT)
+    return {
+        "smallest": ("one frame of vertices, nothing that may be left out", content()),
+        "f32": ("values in binary32; the reference stays binary64", content(precision=4)),
+        "times": ("two named frames with times in seconds", content(frames=two)),
+        "empty-sequence": ("a mesh and no frame: valid", content(frames=[])),
+        "every-header-record": (
+            "PROV three times with a merge, TEXC, LABL, SELE, LINK, ANCH; a face of 4, of 3 and of 2 vertices",
+            mixed(provenance=prov, selection=[0, 2], links=[[1, 4]], anchors=[3],
+                  texture={"dim": 2, "coordinates": [[0, 0], [1, 0], [1, 1], [0, 1]],
+                           "corners": [0, 1, 2, 3, 2, 1, None, None, None]},
+                  labels=[{"face": 0, "kind": "library", "text": "cloth.mtl"},
+                          {"face": 0, "kind": "group", "text": "body"},
+                          {"face": 1, "kind": "material", "text": "d\u00fcnn"},
+                          {"face": 3, "kind": "object", "text": "nothing follows"}])),
+        "vectors": ("two components joined by a link, two anchors, a root", graph_content("vectors")),
+        "vectors-selected-f32": (
+            "vectors of the selected faces 0 and 2 only, binary32; the triangle carries none",
+            dict(mixed(selection=[0, 2], links=[[1, 4]], precision=4), kind="vectors", count=8,
+                 frames=[pose("bent", vectors + corner_vectors([[1, 4]], BENT), root=used, anchors=[])])),
+        "deformations": ("a quaternion w x y z per corner, squared length = scale", graph_content("deformations")),
+        "transforms": (
+            "two transforms a frame, no mesh at all",
+            content(mesh=None, reference=None, kind="transforms", count=2,
+                    frames=[pose("t", [[1, 0, 0, 0, 0, 0, 0], [0.5, 0.5, -0.5, 0.5, 1, 2, 3]], time=-1.5)])),
+        "unknown-records": (
+            "copy-safe records before FORM, between frames and at the end; one that a filter drops",
+            content(extra=[NOTE, DROPPED], tail=[NOTE],
+                    frames=[pose("a", BENT[:4], extra=[FUTURE]), pose("b", POINTS[:4], extra=[EMPTY])])),
+        "future-minor": ("minor version 7: read like minor 0", content(minor=7)),
+    }
+
+
+def accept():
+    """name -> bytes: valid, and odd."""
+    moved = records_of(mixed(provenance=[{"program": "p", "version": "", "parents": [], "args": []}], anchors=[],
+                             labels=[], links=[], selection=[2]))
+    by_tag = {r.tag.strip().decode(): r for r in moved}
+    order = ["MESH", "REFP", "ANCH", "LABL", "LINK", "PROV", "SELE", "FORM", "FRAM"]
+    names = ["", "", "dup", "dup", "\u00e4\u4e2d\U0001f40e", "x" * 300, "a/b", "%n %s"]
+    points = {"vertices": 3, "faces": []}
+    ignored = records_of(content())
+    for r in ignored:
+        r.flags |= 0xFFFF0000
+    return {
+        "header-in-another-order": whole(content(), [by_tag[t] for t in order]),
+        "names": whole(content(frames=[pose(n, BENT[:4]) for n in names])),
+        "points-without-faces": whole(content(mesh=points, count=3, reference={"name": "", "positions": POINTS[:3]},
+                                              frames=[pose("p", BENT[:3])])),
+        "no-vertices": whole(content(mesh={"vertices": 0, "faces": []}, reference={"name": "", "positions": []},
+                                     count=0, frames=[pose("nothing", [])])),
+        "vectors-of-nothing": whole(content(mesh=points, kind="vectors", count=0, links=[], frames=[
+            pose("p", [], root=[0, 0, 0], anchors=[])], reference={"name": "", "positions": POINTS[:3]})),
+        "no-transforms": whole(content(mesh=None, reference=None, kind="transforms", count=0,
+                                       frames=[pose("t", [])])),
+        "transforms-with-mesh": whole(content(kind="transforms", count=1,
+                                              frames=[pose("t", [[1, 0, 0, 0, 1, 2, 3]])])),
+        "line-segments-only": whole(content(mesh={"vertices": 4, "faces": [[0, 1], [1, 2], [3, 1]]})),
+        "ignored-flags": whole(content(), ignored),
+        "extreme-numbers": whole(content(frames=[pose("x", [
+            [1.7976931348623157e308, -1.7976931348623157e308, 5e-324], [-0.0, 0.0, 2.2250738585072014e-308],
+            [1, 2, 3], [4, 5, 6]], time=-1e300)])),
+        "minor-4294967295": whole(content(minor=0xFFFFFFFF)),
+        "texture-of-three": whole(content(texture={"dim": 3, "coordinates": [[0, 1, 2]],
+                                                   "corners": [0, None, 0, 0, None, 0]})),
+        "texture-of-none": whole(content(texture={"dim": 1, "coordinates": [], "corners": [None] * 6})),
+    }
+
+
+# ---- streams to refuse ---------------------------------------------------------------------------------------------
+
+
+def lie(c, tag, **fields):
+    """The content with fields of its first record of that tag made false."""
+    records = records_of(c)
+    record = next(r for r in records if r.tag.decode() == tag)
+    for name, value in fields.items():
+        setattr(record, name, value(record) if callable(value) else value)
+    return whole(c, records)
+
+
+def patched(c, tag, at, data):
+    """The content with bytes of a payload replaced, and checksums that agree with that."""
+    def change(record):
+        where = at if at >= 0 else len(record.payload) + at
+        return record.payload[:where] + data + record.payload[where + len(data):]
+    return lie(c, tag, payload=change)
+
+
+def flipped(data, at):
+    return data[:at] + bytes([data[at] ^ 1]) + data[at + 1:]
+
+
+def without(c, tag):
+    return whole(c, [r for r in records_of(c) if r.tag.decode() != tag])
+
+
+def inserted(c, before, record):
+    records = records_of(c)
+    at = len(records) if before is None else next(i for i, r in enumerate(records) if r.tag.decode() == before)
+    return whole(c, records[:at] + [record] + records[at:])
+
+
+def bad_end(count=0, running=0, length=None, **fields):
+    records = records_of(content())
+    end = end_of(records)
+    right_count, right_sum = struct.unpack("<QQ", end.payload)
+    end.payload = u64(right_count + count, right_sum ^ running)
+    if length is not None:
+        end.payload = (end.payload + bytes(8))[:length]
+    for name, value in fields.items():
+        setattr(end, name, value)
+    return assemble(records + [end])
+
+
+def failed(message=string("frame 'x' is not finite"), after=None):
+    fail = Record("FAIL", u32(3) + string("vg-solve") + message, CRITICAL)
+    return assemble(records_of(content())[:after] + [fail])
+
+
+def reject_container():
+    """Faults of the file header, record headers and the end: name -> bytes"""
+    c = content()
+    good = whole(c)
+    records = records_of(c)
+    size = {r.tag.decode(): len(r.bytes()) for r in records}
+    form_at = 16 + size["MESH"] + size["REFP"]
+    return {
+        "empty": b"",
+        "zero-byte": b"\0",
+        "magic-wrong": b"\x88" + good[1:],
+        "magic-text-mode": good.replace(b"\r\n", b"\n", 1),
+        "magic-cut": good[:5],
+        "major-2": assemble(records, magic=MAGIC[:7] + b"2"),
+        "file-header-cut": good[:15],
+        "file-header-reserved": assemble(records + [end_of(records)], reserved=1),
+        "only-file-header": good[:16],
+        "cut-in-record-header": good[:16 + 31],
+        "cut-in-payload": good[:16 + 40],
+        "cut-before-form": good[:form_at],
+        "cut-before-frames": good[:form_at + size["FORM"]],
+        "cut-in-frame": good[:-60],
+        "cut-before-end": good[:-48],
+        "cut-in-end": good[:-1],
+        "no-end": assemble(records),
+        "end-count": bad_end(count=1),
+        "end-sum": bad_end(running=1),
+        "end-short": bad_end(length=8),
+        "end-long": bad_end(length=24),
+        "end-not-critical-and-damaged": flipped(good, len(good) - 48 + 4),
+        "trailing-byte": good + b"\n",
+        "trailing-stream": good + good,
+        "trailing-zeros": good + bytes(512),
+        "header-checksum": lie(c, "MESH", header_sum=0),
+        "payload-checksum": lie(c, "REFP", payload_sum=0),
+        "bit-in-payload": flipped(good, 16 + size["MESH"] + 32 + 20),
+        "bit-in-tag": flipped(good, 16),
+        "padding-not-zero": lie(c, "FRAM", payload=lambda r: r.payload[:-4], padding=b"\0\0\0\1"),
+        "tag-lower-case": inserted(c, "FORM", Record("note", b"", COPY_SAFE)),
+        "tag-nul": inserted(c, "FORM", Record("AB\0\0", b"", COPY_SAFE)),
+        "flags-reserved": inserted(c, "FORM", Record("XNOT", b"", COPY_SAFE | 4)),
+        "length-2-31": lie(c, "MESH", length=1 << 31),
+        "length-2-40": lie(c, "FRAM", length=1 << 40),
+        "length-2-40-and-one": lie(c, "FRAM", length=(1 << 40) + 1),
+        "length-2-63": lie(c, "FRAM", length=1 << 63),
+        "length-2-64-less-1": lie(c, "REFP", length=(1 << 64) - 1),
+        "critical-before-form": inserted(c, "FORM", Record("XCRI", b"1234", CRITICAL)),
+        "critical-and-copy-safe": inserted(c, "FORM", Record("XBOT", b"", CRITICAL | COPY_SAFE)),
+        "critical-between-frames": inserted(c, "FRAM", Record("X 2 ", b"", CRITICAL)),
+        "critical-before-end": inserted(c, None, Record("XEND", b"", CRITICAL)),
+        "fail": failed(),
+        "fail-before-form": failed(after=1),
+        "fail-cut": failed(u32(0xFFFFFFFF)),
+    }
+
+
+def reject_order():
+    """Records that are missing, there twice, or in the wrong place."""
+    c, v = content(), graph_content("vectors")
+    of = {r.tag.decode(): r for r in records_of(c)}
+    first = [Record("SELE", u32(0), CRITICAL), Record("LINK", b"", CRITICAL), Record("ANCH", b"", CRITICAL),
+             Record("TEXC", u32(1, 0) + u64(0) + u32(0xFFFFFFFF) * 6, 0), Record("LABL", b"", 0), of["REFP"]]
+    out = {f"{r.tag.decode().lower()}-before-mesh": whole(c, [r, of["MESH"], of["FORM"]]) for r in first}
+    for r in first[:-1]:
+        out[f"{r.tag.decode().lower()}-twice"] = whole(c, [of["MESH"], r, r, of["REFP"], of["FORM"], of["FRAM"]])
+    orphan = Record("PROV", u32(1, 0, 0) + string("p") + string("1"), COPY_SAFE)
+    late = Record("PROV", u32(0, 0) + string("p") + string("1"), COPY_SAFE)
+    out.update({
+        "mesh-twice": inserted(c, "REFP", of["MESH"]),
+        "refp-twice": inserted(c, "FORM", of["REFP"]),
+        "form-twice": inserted(c, "FRAM", of["FORM"]),
+        "mesh-after-form": whole(c, [of["FORM"], of["MESH"], of["REFP"], of["FRAM"]]),
+        "prov-after-form": inserted(c, "FRAM", late),
+        "no-form": without(c, "FORM"),
+        "nothing-but-end": whole(c, []),
+        "no-mesh": whole(c, [of["FORM"], of["FRAM"]]),
+        "no-refp": without(c, "REFP"),
+        "no-refp-transforms": without(content(kind="transforms", count=0, frames=[pose("t", [])]), "REFP"),
+        "no-link": without(v, "LINK"),
+        "prov-parent-itself": inserted(c, "MESH", orphan),
+    })
+    return out
+
+
+def reject_header():
+    """Header records with content that does not hold."""
+    c, m = content(), mixed()
+
+    def with_record(tag, payload, flags=CRITICAL):
+        return inserted(c, "REFP", Record(tag, payload, flags))
+
+    tex_head = u32(2, 0) + u64(1) + f64(0, 0)
+    label = u64(0) + u32(2, 3) + b"abc"
+    prov = u32(0, 1) + string("p") + string("1")
+    return {
+        "mesh-length-short": lie(c, "MESH", payload=lambda r: r.payload[:-4]),
+        "mesh-length-long": lie(c, "MESH", payload=lambda r: r.payload + u32(0)),
+        "mesh-empty": lie(c, "MESH", payload=b""),
+        "mesh-nv-2-32-less-1": patched(c, "MESH", 0, u64(0xFFFFFFFF)),
+        "mesh-nv-2-63": patched(c, "MESH", 0, u64(1 << 63)),
+        "mesh-nf-2-31": patched(c, "MESH", 8, u64(1 << 31)),
+        "mesh-nf-2-62": patched(c, "MESH", 8, u64(1 << 62)),
+        "mesh-nf-2-64-less-1": patched(c, "MESH", 8, u64((1 << 64) - 1)),
+        "mesh-face-size-0": patched(c, "MESH", 16, u32(0, 6)),
+        "mesh-face-size-1": patched(c, "MESH", 16, u32(1, 5)),
+        "mesh-face-size-2-32-less-1": patched(c, "MESH", 20, u32(0xFFFFFFFF)),
+        "mesh-index-out-of-range": patched(c, "MESH", -4, u32(4)),
+        "mesh-index-2-32-less-1": patched(c, "MESH", -4, u32(0xFFFFFFFF)),
+        "mesh-vertex-twice": patched(c, "MESH", -4, u32(0)),
+        "mesh-segment-twice": patched(m, "MESH", -4, u32(4)),
+        "texc-dim-0": with_record("TEXC", u32(0, 0) + u64(0) + u32(0xFFFFFFFF) * 6, 0),
+        "texc-dim-4": with_record("TEXC", u32(4, 0) + u64(0) + u32(0xFFFFFFFF) * 6, 0),
+        "texc-reserved": with_record("TEXC", u32(2, 1) + u64(1) + f64(0, 0) + u32(0) * 6, 0),
+        "texc-corner-out-of-range": with_record("TEXC", tex_head + u32(0, 0, 0, 0, 0, 1), 0),
+        "texc-corner-missing": with_record("TEXC", tex_head + u32(0) * 5, 0),
+        "texc-nan": with_record("TEXC", u32(1, 0) + u64(1) + f64(NAN) + u32(0) * 6, 0),
+        "texc-nt-2-61": with_record("TEXC", u32(1, 0) + u64(1 << 61) + u32(0) * 6, 0),
+        "labl-kind-0": with_record("LABL", pad(u64(0) + u32(0, 1) + b"a"), 0),
+        "labl-kind-6": with_record("LABL", pad(u64(0) + u32(6, 1) + b"a"), 0),
+        "labl-face-out-of-range": with_record("LABL", pad(u64(3) + u32(2, 1) + b"a"), 0),
+        "labl-order": with_record("LABL", pad(u64(2) + u32(2, 1) + b"a") + pad(label), 0),
+        "labl-length-2-31": with_record("LABL", u64(0) + u32(2, 1 << 31) + bytes(8), 0),
+        "labl-cut": with_record("LABL", pad(label)[:-8], 0),
+        "labl-padding": with_record("LABL", label + b"\1\0\0\0\0", 0),
+        "labl-utf8": with_record("LABL", pad(u64(0) + u32(2, 2) + b"\xc3\x28"), 0),
+        "sele-order": with_record("SELE", u32(1, 0)),
+        "sele-twice-the-same": with_record("SELE", u32(1, 1)),
+        "sele-out-of-range": with_record("SELE", u32(2)),
+        "sele-length": with_record("SELE", u32(0) + b"\1"),
+        "link-to-itself": with_record("LINK", u32(2, 2)),
+        "link-out-of-range": with_record("LINK", u32(0, 4)),
+        "link-length": with_record("LINK", u32(0)),
+        "anch-order": with_record("ANCH", u32(2, 1)),
+        "anch-out-of-range": with_record("ANCH", u32(4)),
+        "anch-length": with_record("ANCH", u32(0) + b"\0\0"),
+        "refp-short": lie(c, "REFP", payload=lambda r: r.payload[:-8]),
+        "refp-long": lie(c, "REFP", payload=lambda r: r.payload + bytes(8)),
+        "refp-nan": patched(c, "REFP", -8, f64(NAN)),
+        "refp-reserved": patched(c, "REFP", 4, u32(1)),
+        "refp-name-2-32-less-1": patched(c, "REFP", 0, u32(0xFFFFFFFF)),
+        "refp-name-padding": patched(c, "REFP", 12, b"\0\0\0\1"),
+        "refp-name-utf8": patched(c, "REFP", 8, b"\xff"),
+        "refp-name-nul": patched(c, "REFP", 9, b"\0"),
+        "form-kind-0": patched(c, "FORM", 0, u32(0)),
+        "form-kind-5": patched(c, "FORM", 0, u32(5)),
+        "form-precision-2": patched(c, "FORM", 4, u32(2)),
+        "form-precision-16": patched(c, "FORM", 4, u32(16)),
+        "form-count-less": patched(c, "FORM", 8, u64(3)),
+        "form-count-2-63": patched(c, "FORM", 8, u64(1 << 63)),
+        "form-count-of-vectors": patched(graph_content("vectors"), "FORM", 8, u64(6)),
+        "form-transforms-2-63": patched(c, "FORM", 0, u32(4, 8) + u64(1 << 63)),
+        "form-length": lie(c, "FORM", payload=lambda r: r.payload + bytes(8)),
+        "prov-args-missing": inserted(c, "MESH", Record("PROV", prov, COPY_SAFE)),
+        "prov-args-2-32-less-1": inserted(c, "MESH", Record("PROV", patch32(prov, 4), COPY_SAFE)),
+        "prov-parents-2-32-less-1": inserted(c, "MESH", Record("PROV", patch32(prov, 0), COPY_SAFE)),
+        "prov-string-2-32-less-1": inserted(c, "MESH", Record("PROV", patch32(prov, 8), COPY_SAFE)),
+        "prov-too-long": inserted(c, "MESH", Record("PROV", prov + string("a") + b"x", COPY_SAFE)),
+        "prov-utf8": inserted(c, "MESH", Record("PROV", prov + u32(3) + b"\xed\xa0\x80", COPY_SAFE)),
+    }
+
+
+def patch32(data, at):
+    return data[:at] + u32(0xFFFFFFFF) + data[at + 4:]
+
+
+def reject_frames():
+    """Frames with content that does not hold."""
+    c, v, q = content(), graph_content("vectors"), graph_content("deformations")
+    t = content(mesh=None, reference=None, kind="transforms", count=1, frames=[pose("t", [[1, 0, 0, 0, 1, 2, 3]])])
+    timed = content(frames=[pose("pose1", BENT[:4], time=1)])
+    second = content(frames=[pose("fine", BENT[:4]), pose("broken", BENT[:4])])
+    records = records_of(second)
+    records[-1].payload = records[-1].payload[:-8] + f64(INF)
+    swapped = copy.deepcopy(c)
+    return {
+        "fram-before-form": whole(c, [records_of(swapped)[i] for i in (0, 1, 3, 2)]),
+        "fram-short": lie(c, "FRAM", payload=lambda r: r.payload[:-8]),
+        "fram-long": lie(c, "FRAM", payload=lambda r: r.payload + bytes(8)),
+        "fram-empty": lie(c, "FRAM", payload=b""),
+        "fram-flags": patched(c, "FRAM", 4, u32(2)),
+        "fram-name-2-32-less-1": patched(c, "FRAM", 0, u32(0xFFFFFFFF)),
+        "fram-name-utf8": patched(c, "FRAM", 16, b"\xc0\x80"),
+        "fram-name-nul": patched(c, "FRAM", 17, b"\0"),
+        "fram-name-padding": patched(c, "FRAM", 21, b"\0\0\1"),
+        "fram-value-nan": patched(c, "FRAM", -8, f64(NAN)),
+        "fram-second-inf": whole(second, records),
+        "fram-f32-inf": patched(content(precision=4), "FRAM", -4, struct.pack("<f", -INF)),
+        "fram-time-nan": patched(timed, "FRAM", 8, f64(NAN)),
+        "fram-time-unmarked": patched(timed, "FRAM", 4, u32(0)),
+        "fram-root-nan": patched(v, "FRAM", 24, f64(NAN)),
+        "fram-anchor-inf": patched(v, "FRAM", 48, f64(INF)),
+        "fram-without-root": lie(v, "FRAM", payload=lambda r: r.payload[:24] + r.payload[48:]),
+        "fram-quaternion-zero": patched(q, "FRAM", -32, f64(0, 0, 0, 0)),
+        "fram-transform-zero": patched(t, "FRAM", -56, f64(0, 0, 0, -0.0)),
+    }
+
+
+# ---- files ---------------------------------------------------------------------------------------------------------
+
+
+def write(path, data):
+    os.makedirs(os.path.dirname(path), exist_ok=True)
+    with open(path, "wb") as f:
+        f.write(data)
+
+
+def expected_json(c, data):
+    """The content as examples/read_stream.py --json shows it."""
+    records = records_of(c)
+    out = dict(c, records=len(records), checksum=f"{struct.unpack('<Q', data[-8:])[0]:016x}")
+    return (json.dumps(out, indent=1, sort_keys=True, ensure_ascii=False) + "\n").encode()
+
+
+def main(root):
+    for name, (_, c) in golden().items():
+        data = whole(c)
+        write(f"{root}/fmt/golden/{name}.vgs", data)
+        write(f"{root}/fmt/golden/{name}.json", expected_json(c, data))
+    for name, data in accept().items():
+        write(f"{root}/tests/corpus/accept/{name}.vgs", data)
+    rejected = {**reject_container(), **reject_order(), **reject_header(), **reject_frames()}
+    for name, data in rejected.items():
+        write(f"{root}/tests/corpus/reject/{name}.vgs", data)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1] if len(sys.argv) > 1 else os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
