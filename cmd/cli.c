@@ -693,10 +693,16 @@ size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands)
     return n;
 }
 
+/* An option's name, whether it was given with its dashes or without. */
+static const char *bare(const char *option)
+{
+    return option + strspn(option, "-");
+}
+
 double cli_parse_number(const char *option, const char *text)
 {
     double x;
-    if (!parse_number(text, &x)) cli_usage("option '--%s' needs a number, not '%s'", option, text);
+    if (!parse_number(text, &x)) cli_usage("option '--%s' needs a number, not '%s'", bare(option), text);
     return x;
 }
 
@@ -710,13 +716,13 @@ size_t cli_parse_vertices(const char *option, const char *text, uint32_t **verti
 {
     size_t n = 0, unique = 0;
     *vertices = calloc(strlen(text) / 2 + 1, sizeof **vertices);
-    if (!*vertices) die(VG_ENOMEM, "not enough memory for the vertices of option '--%s'", option);
+    if (!*vertices) die(VG_ENOMEM, "not enough memory for the vertices of option '--%s'", bare(option));
     for (const char *p = text;; p++) {
         char *end;
         errno = 0;
         unsigned long long x = *p >= '0' && *p <= '9' ? strtoull(p, &end, 10) : ULLONG_MAX;
         if (errno || x >= UINT32_MAX || (*end && *end != ','))
-            cli_usage("option '--%s' needs vertex numbers from 0 with commas between, not '%s'", option, text);
+            cli_usage("option '--%s' needs vertex numbers from 0 with commas between, not '%s'", bare(option), text);
         (*vertices)[n++] = (uint32_t)x;
         p = end;
         if (!*p) break;

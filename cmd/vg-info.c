@@ -113,6 +113,7 @@ static void read_all(vg_source *s, contents *c, report *list)
         cli_progress("frame", c->frames);
     }
     if (r < 0) cli_die(&e);
+    cli_note("%" PRIu64 " frames read, and the end mark where there has to be one", c->frames);
     c->digest = vg_digest_get(digest);
     c->extra += vg_source_tail(s)->n;
     vg_digest_free(&digest);

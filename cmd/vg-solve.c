@@ -15,21 +15,23 @@ static const cli_program program = {
     .writes_stream = true,
     .threaded = true};
 
-/* Poses that wait for a solve. Only right-hand sides are kept, so a pose costs 3 numbers a vertex, not 3 a corner. */
+/* Poses that wait for a solve. Their vectors are not kept: a pose costs 6 numbers a vertex, not 3 a corner. */
 typedef struct batch {
     size_t n, most;
-    vg_frame *frame;  /* values: right-hand side, then vertices */
-    double **x;
+    vg_frame *frame; /* values: first guess, then vertices */
+    double **rhs, **x;
     const double **anchors, **roots;
 } batch;
 
 static void make_batch(batch *b, size_t most, const vg_head *out)
 {
     vg_err e = {.code = VG_ENOMEM, .message = "not enough memory for a batch of poses"};
-    *b = (batch){.most = most, .frame = calloc(most, sizeof *b->frame), .x = calloc(most, sizeof *b->x),
-                 .anchors = calloc(most, sizeof *b->anchors), .roots = calloc(most, sizeof *b->roots)};
-    if (!b->frame || !b->x || !b->anchors || !b->roots) cli_die(&e);
+    *b = (batch){.most = most, .frame = calloc(most, sizeof *b->frame), .rhs = calloc(most, sizeof *b->rhs),
+                 .x = calloc(most, sizeof *b->x), .anchors = calloc(most, sizeof *b->anchors),
+                 .roots = calloc(most, sizeof *b->roots)};
+    if (!b->frame || !b->rhs || !b->x || !b->anchors || !b->roots) cli_die(&e);
     for (size_t i = 0; i < most; i++) {
+        if (!(b->rhs[i] = calloc(3 * out->mesh.nv + 1, sizeof *b->rhs[i]))) cli_die(&e);
         if (vg_frame_shape(&b->frame[i], out, &e) < 0) cli_die(&e);
         b->x[i] = b->frame[i].values, b->anchors[i] = b->frame[i].anchors, b->roots[i] = b->frame[i].root;
     }
@@ -37,8 +39,9 @@ static void make_batch(batch *b, size_t most, const vg_head *out)
 
 static void free_batch(batch *b)
 {
-    for (size_t i = 0; i < b->most; i++) vg_frame_clear(&b->frame[i]);
+    for (size_t i = 0; i < b->most; i++) vg_frame_clear(&b->frame[i]), free(b->rhs[i]);
     free(b->frame);
+    free(b->rhs);
     free(b->x);
     free(b->anchors);
     free(b->roots);
@@ -46,7 +49,7 @@ static void free_batch(batch *b)
 
 static void solve_batch(vg_solver *solver, batch *b)
 {
-    vg_solver_solve(solver, b->n, b->x, b->anchors, b->roots);
+    vg_solver_solve(solver, b->n, (const double *const *)b->rhs, b->x, b->anchors, b->roots);
     for (size_t i = 0; i < b->n; i++) cli_stream_put(&b->frame[i]);
     b->n = 0;
 }
@@ -89,7 +92,7 @@ static void run(vg_source *s, vg_head *h)
             vg_graph_root(g, in.values, f->root);
             vg_graph_anchors(in.values, h->anchors, h->nanchors, f->anchors);
         }
-        vg_solver_rhs(solver, kind == VG_VECTORS ? in.values : vectors, f->values);
+        vg_solver_load(solver, kind == VG_VECTORS ? in.values : vectors, f->anchors, f->values, b.rhs[b.n]);
         if (++b.n == b.most) solve_batch(solver, &b);
         cli_progress("poses", ++n);
     }

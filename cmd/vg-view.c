@@ -21,17 +21,18 @@ static const cli_option options[] = {
      .integer = &opts.frames, .least = 1, .most = 10000},
     {.name = "columns", .value = "N", .help = "frames side by side (default: what makes the sheet about 16 : 9)",
      .integer = &opts.columns, .least = 1, .most = 10000},
-    {.name = "size", .value = "WxH", .help = "of the picture of one frame, in pixels (default: 360x360)", .text = &opts.size},
-    {.name = "view", .value = "VIEW",
-     .help = "front, back, left, right, top, iso, or AZIMUTH,ELEVATION in degrees (default: 30,15)", .text = &opts.view},
+    {.name = "size", .value = "WxH", .help = "of the picture of one frame, in pixels (default: 360x360)",
+     .text = &opts.size},
+    {.name = "view", .value = "VIEW", .text = &opts.view,
+     .help = "front, back, left, right, top, iso, or AZIMUTH,ELEVATION in degrees (default: 30,15)"},
     {.name = "up", .value = "AXIS", .help = "y or z: the axis that points up (default: y)", .text = &opts.up},
     {.name = "follow", .help = "keep the figure in the middle of its picture", .flag = &opts.follow},
     {.name = "ground", .help = "draw a grid where the reference pose stands, and a shadow", .flag = &opts.ground},
     {.name = "edges", .help = "draw the edges of the polygons", .flag = &opts.edges},
     {.name = "against", .value = "TRUTH", .help = "colour by the distance of each vertex from its place in TRUTH",
      .text = &opts.against},
-    {.name = "centred", .letter = 'c', .help = "with --against: move the centroid of every pose to 0 before comparing",
-     .flag = &opts.centred},
+    {.name = "centred", .letter = 'c', .flag = &opts.centred,
+     .help = "with --against: move the centroid of every pose to 0 before comparing"},
     {.name = "scale", .value = "X", .help = "with --against: the error, in units of D, where the colours end",
      .number = &opts.scale, .least = 1e-12, .most = 1e12},
     {0},
@@ -53,8 +54,8 @@ static void parse_size(const char *text, vg_sheet_options *o)
 {
     unsigned w, h;
     char rest;
-    if (strspn(text, "0123456789x") != strlen(text) || sscanf(text, "%5ux%5u%c", &w, &h, &rest) != 2 || w < 16 || h < 16 ||
-        w > 4096 || h > 4096)
+    if (strspn(text, "0123456789x") != strlen(text) || sscanf(text, "%5ux%5u%c", &w, &h, &rest) != 2 || w < 16 ||
+        h < 16 || w > 4096 || h > 4096)
         cli_usage("option '--size' needs WIDTHxHEIGHT, each from 16 to 4096, not '%s'", text);
     o->width = w, o->height = h;
 }
@@ -80,7 +81,8 @@ static void parse_view(const char *text, vg_sheet_options *o)
     o->azimuth = cli_parse_number("view", azimuth);
     o->elevation = cli_parse_number("view", text + n + 1);
     if (o->azimuth < -360 || o->azimuth > 360 || o->elevation < -90 || o->elevation > 90)
-        cli_usage("option '--view' needs an azimuth from -360 to 360 and an elevation from -90 to 90, not '%s'", text);
+        cli_usage("option '--view' needs an azimuth from -360 to 360 and an elevation from -90 to 90, not '%s'",
+                  text);
 }
 
 static vg_sheet_options sheet_options(void)
@@ -114,24 +116,33 @@ static void check_output(void)
 /* ---- sequences ---- */
 
 typedef struct side {
-    const char *name;
+    char name[420]; /* what messages call it, quotes included */
     vg_source *source;
     vg_head *head;
     vg_frame frame;
     size_t frames;
 } side;
 
+static bool reads_standard_input(char **operands, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!strcmp(operands[i], "-")) return true;
+    return n == 0;
+}
+
 static void open_side(side *s, char **operands, size_t n)
 {
     vg_err e;
-    s->name = n && strcmp(operands[0], "-") ? operands[0] : "standard input";
+    if (n > 1) snprintf(s->name, sizeof s->name, "'%.200s' to '%.200s'", operands[0], operands[n - 1]);
+    else if (reads_standard_input(operands, n)) snprintf(s->name, sizeof s->name, "standard input");
+    else snprintf(s->name, sizeof s->name, "'%.400s'", operands[0]);
     s->source = cli_source(operands, n);
     s->head = vg_source_head(s->source);
     if (s->head->kind == VG_VERTICES) return;
     if (s->head->kind == VG_VECTORS)
-        vg_fail(&e, VG_EINPUT, "'%s' holds vectors: pipe it through 'vg-solve' first", s->name);
+        vg_fail(&e, VG_EINPUT, "%s holds vectors: pipe it through 'vg-solve' first", s->name);
     else
-        vg_fail(&e, VG_EINPUT, "'%s' holds %s, not vertices: make poses of them first", s->name,
+        vg_fail(&e, VG_EINPUT, "%s holds %s, not vertices: make poses of them first", s->name,
                 vg_kind_name(s->head->kind));
     cli_die(&e);
 }
@@ -153,14 +164,10 @@ static void close_side(side *s)
 
 static void open_truth(side *truth, const side *result)
 {
-    char *operand = (char *)(uintptr_t)opts.against, names[2][200];
+    char *operand = (char *)(uintptr_t)opts.against;
     vg_err e;
-    if (!strcmp(operand, "-") && !strcmp(result->name, "standard input"))
-        cli_usage("standard input cannot be both the result and the truth");
     open_side(truth, &operand, 1);
-    snprintf(names[0], sizeof names[0], "'%.190s'", truth->name);
-    snprintf(names[1], sizeof names[1], "'%.190s'", result->name);
-    if (vg_mesh_same(&truth->head->mesh, names[0], &result->head->mesh, names[1], &e) < 0) cli_die(&e);
+    if (vg_mesh_same(&truth->head->mesh, truth->name, &result->head->mesh, result->name, &e) < 0) cli_die(&e);
 }
 
 /* All frames of both, to their ends, so that damage is seen. */
@@ -171,17 +178,18 @@ static void add_frames(vg_sheet *sheet, side *result, side *truth)
         more[0] = more[0] && next(result);
         more[1] = more[1] && next(truth);
         if (!more[0] || (opts.against && !more[1])) continue;
-        if (vg_sheet_add(sheet, result->frame.name, result->frame.values, opts.against ? truth->frame.values : NULL, &e) < 0)
+        if (vg_sheet_add(sheet, result->frame.name, result->frame.values, opts.against ? truth->frame.values : NULL,
+                         &e) < 0)
             cli_die(&e);
         cli_progress("frames", result->frames);
     }
     if (opts.against && result->frames != truth->frames) {
-        vg_fail(&e, VG_EINPUT, "'%s' has %zu frames where '%s' has %zu: frames are compared by their order", result->name,
+        vg_fail(&e, VG_EINPUT, "%s has %zu frames where %s has %zu: frames are compared by their order", result->name,
                 result->frames, truth->name, truth->frames);
         cli_die(&e);
     }
     if (result->frames == 0) {
-        vg_fail(&e, VG_EINPUT, "'%s' has no frames: there is nothing to draw", result->name);
+        vg_fail(&e, VG_EINPUT, "%s has no frames: there is nothing to draw", result->name);
         cli_die(&e);
     }
 }
@@ -192,6 +200,8 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_sheet_options o = sheet_options();
     check_output();
+    if (opts.against && !strcmp(opts.against, "-") && reads_standard_input(operands, n))
+        cli_usage("standard input cannot be both the result and the truth");
     side result = {0}, truth = {0};
     open_side(&result, operands, n);
     if (opts.against) open_truth(&truth, &result);

@@ -302,11 +302,13 @@ typedef struct vg_solver_facts {
 int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
                   int threads, vg_err *e) VG_MUST_CHECK;
 void vg_solver_free(vg_solver **s);
-/* vg_solver_rhs: fold one pose's vectors into the nv x 3 right-hand side (A W*; MATH 2). */
-void vg_solver_rhs(const vg_solver *s, const double *vectors, double *rhs);
-/* vg_solver_solve: n right-hand sides (nv x 3 each) become n poses in place. anchors[i]: nanchors points of pose i, or
- * roots[i]: its root; the other may be NULL. Best when n is a multiple of vg_solver_batch. */
-void vg_solver_solve(vg_solver *s, size_t n, double *const *x, const double *const *anchors, const double *const *roots);
+/* vg_solver_load: one pose's vectors (and anchors, nanchors points, if any) become a first guess x and a right-hand side, nv x 3
+ * each: what the guess misses. */
+void vg_solver_load(const vg_solver *s, const double *vectors, const double *anchors, double *x, double *rhs);
+/* vg_solver_solve: n guesses x, with their right-hand sides, become n poses in place. anchors[i]: nanchors points of pose i, or
+ * roots[i]: its root; the other is not looked at. Best when n is a multiple of vg_solver_batch. */
+void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *const *x, const double *const *anchors,
+                     const double *const *roots);
 size_t vg_solver_batch(const vg_solver *s);
 vg_solver_facts vg_solver_get_facts(const vg_solver *s);
 

@@ -125,7 +125,7 @@ END
 @test "a number that binary32 cannot hold is refused, not written as infinity" {
     printf 'v 0 0 0\nv 1e300 0 0\nv 0 1 0\nf 1 2 3\n' >far.obj
     must_fail 3 vg-encode --f32 far.obj -o far.vgs
-    says far
+    says 1e+300 binary32
     nothing_but far.obj
 }
 

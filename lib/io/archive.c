@@ -1,11 +1,11 @@
 /* archive.c: mesh files in and out of archives; the one file that knows libarchive.
  * Leaves out what the files mean: contents are bytes here.
  *
- * Reading lists the names first. When the archive has its mesh files in natural order, as nearly all do, a second pass
- * hands them out one by one; otherwise they are unpacked once into a file without a name. A compressed archive is read
- * by two readers of libarchive, one behind the other: the first unpacks, and its bytes are summed and read to the last
- * one before anything is handed out, because libarchive neither compares the checksum of gzip nor looks behind the end
- * mark of a tar.
+ * Reading lists the names first. When the archive has its mesh files in natural order, as nearly all do, a second
+ * pass hands them out one by one; otherwise they are unpacked once into a file without a name. A compressed archive
+ * is read by two readers of libarchive, one behind the other: the first unpacks, and its bytes are summed and read to
+ * the last one before anything is handed out, because libarchive neither compares the checksum of gzip nor looks
+ * behind the end mark of a tar.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -26,8 +26,8 @@ const vgi_limits vgi_archive_limits = {
 enum { BLOCK = 256 * 1024 };
 
 /* libarchive turns names into the encoding of the thread's locale and loses what does not fit. Around every call that
- * touches names the thread speaks UTF-8, whatever the program's locale is; without such a locale on the machine, ASCII
- * names still work. */
+ * touches names the thread speaks UTF-8, whatever the program's locale is; without such a locale on the machine,
+ * ASCII names still work. */
 static locale_t utf8_locale(void)
 {
     return newlocale(LC_CTYPE_MASK, "C.UTF-8", (locale_t)0);
@@ -416,7 +416,8 @@ static int judge_member(vgi_archive *a, struct archive_entry *entry, vg_err *e)
     const char *path = (char *)a->path.data;
     if (!is_mesh_name(path)) return 0;
     if (archive_entry_hardlink(entry))
-        return vg_fail(e, VG_EINPUT, "'%s' in '%s' is a link to another member: pack the files themselves", path, a->name);
+        return vg_fail(e, VG_EINPUT, "'%s' in '%s' is a link to another member: pack the files themselves "
+                       "(tar --hard-dereference)", path, a->name);
     if (archive_entry_filetype(entry) != AE_IFREG) return 0;
     if (archive_entry_is_encrypted(entry))
         return vg_fail(e, VG_EINPUT, "'%s' in '%s' is encrypted: unpack it first", path, a->name);
@@ -490,8 +491,8 @@ static int64_t next_gzip(const vgi_archive *a, unsigned char *block, int64_t fro
     return end;
 }
 
-/* Several gzip streams joined into one file: each must agree with its own trailer. Only reached when the file is not one
- * whole stream. */
+/* Several gzip streams joined into one file: each must agree with its own trailer. Only reached when the file is not
+ * one whole stream. */
 static bool gzip_parts_whole(const vgi_archive *a, int64_t end)
 {
     enum { SHORTEST = 18 };
@@ -550,8 +551,8 @@ static int check_tar_end(const vgi_archive *a, vg_err *e)
     if ((archive_format(a->la) & ARCHIVE_FORMAT_BASE_MASK) != ARCHIVE_FORMAT_TAR) return VG_OK;
     unsigned char last[512], zeros[512] = {0};
     size_t got = 0;
-    if (a->file.size < 512 || read_at(a->file.fd, last, 512, a->file.base + a->file.size - 512, &got) < 0 || got < 512 ||
-        memcmp(last, zeros, 512) != 0)
+    if (a->file.size < 512 || read_at(a->file.fd, last, 512, a->file.base + a->file.size - 512, &got) < 0 ||
+        got < 512 || memcmp(last, zeros, 512) != 0)
         return vg_fail(e, VG_ETRUNC, "'%s' is cut short: the end mark of the archive is missing", a->name);
     return VG_OK;
 }
@@ -588,7 +589,8 @@ static int list_members(vgi_archive *a, vg_err *e)
         r = add_member(a, e);
     }
     if (r == VG_OK) r = a->packed ? check_packed_end(a, e) : check_tar_end(a, e);
-    if (r == VG_OK && a->n == 0) r = vg_fail(e, VG_EINPUT, "archive '%s' holds no mesh file (%s)", a->name, vgi_format_names());
+    if (r == VG_OK && a->n == 0)
+        r = vg_fail(e, VG_EINPUT, "archive '%s' holds no mesh file (%s)", a->name, vgi_format_names());
     return r;
 }
 
@@ -745,17 +747,21 @@ const char *vgi_packer_suffixes(void)
     return ".zip .tar .tar.gz .tgz .tar.xz .txz .tar.zst .7z";
 }
 
+/* libarchive is not told of a failure: it would then never free its buffers. What comes after one goes nowhere, and
+ * check_packer says so. */
 static la_ssize_t packer_write(struct archive *la, void *context, const void *data, size_t n)
 {
+    (void)la;
     vgi_packer *p = context;
-    if (vgi_write_all(p->fd, data, n, p->name, &p->failure) == VG_OK) return (la_ssize_t)n;
-    archive_set_error(la, EIO, "%s", p->failure.message);
-    return -1;
+    if (!p->failure.code) p->failure.code = vgi_write_all(p->fd, data, n, p->name, &p->failure);
+    return (la_ssize_t)n;
 }
 
-static int packer_failed(vgi_packer *p, vg_err *e)
+/* ok: what libarchive thinks of its last call. */
+static int check_packer(vgi_packer *p, bool ok, vg_err *e)
 {
     if (p->failure.code) return vg_fail(e, p->failure.code, "%s", p->failure.message);
+    if (ok) return VG_OK;
     const char *why = archive_error_string(p->la);
     if (archive_errno(p->la) == ENOMEM) return vg_fail(e, VG_ENOMEM, "not enough memory to write '%s'", p->name);
     return vg_fail(e, VG_ESYS, "cannot write '%s': %s", p->name, why ? why : "archive library failed");
@@ -791,12 +797,14 @@ int vgi_packer_open(vgi_packer **out, int fd, const char *name, size_t n, vg_err
     p->la = archive_write_new();
     int r = VG_OK;
     if (!p->name || !p->entry || !p->la) r = vg_fail(e, VG_ENOMEM, "not enough memory to write '%.*s'", (int)n, name);
-    else if (!k) r = vg_fail(e, VG_EARG, "'%s' is no archive that can be written: %s can", p->name, vgi_packer_suffixes());
+    else if (!k)
+        r = vg_fail(e, VG_EARG, "'%s' is no archive that can be written: %s can", p->name, vgi_packer_suffixes());
     if (r == VG_OK) {
         locale_t before = enter_utf8(p->utf8);
-        bool ok = configure(p->la, k) == ARCHIVE_OK && archive_write_open2(p->la, p, NULL, packer_write, NULL, NULL) == ARCHIVE_OK;
+        bool ok = configure(p->la, k) == ARCHIVE_OK &&
+                  archive_write_open2(p->la, p, NULL, packer_write, NULL, NULL) == ARCHIVE_OK;
         leave_utf8(before);
-        if (!ok) r = packer_failed(p, e);
+        r = check_packer(p, ok, e);
     }
     if (r < 0) vgi_packer_close(out);
     return r;
@@ -825,7 +833,7 @@ int vgi_packer_add(vgi_packer *p, const char *path, const void *data, size_t n, 
     locale_t before = enter_utf8(p->utf8);
     bool ok = add_entry(p, path, data, n);
     leave_utf8(before);
-    return ok ? VG_OK : packer_failed(p, e);
+    return check_packer(p, ok, e);
 }
 
 int vgi_packer_end(vgi_packer *p, vg_err *e)
@@ -833,17 +841,15 @@ int vgi_packer_end(vgi_packer *p, vg_err *e)
     locale_t before = enter_utf8(p->utf8);
     bool ok = archive_write_close(p->la) == ARCHIVE_OK;
     leave_utf8(before);
-    return ok ? VG_OK : packer_failed(p, e);
+    return check_packer(p, ok, e);
 }
 
 void vgi_packer_close(vgi_packer **packer)
 {
     vgi_packer *p = *packer;
     if (!p) return;
-    if (p->la) {
-        archive_write_fail(p->la); /* so that freeing writes no end; harmless after vgi_packer_end */
-        archive_write_free(p->la);
-    }
+    p->failure.code = VG_ESYS; /* freeing writes an end unless vgi_packer_end has: it goes nowhere */
+    if (p->la) archive_write_free(p->la);
     archive_entry_free(p->entry);
     if (p->utf8) freelocale(p->utf8);
     free(p->name);

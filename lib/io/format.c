@@ -5,10 +5,10 @@
 
 #include <math.h>
 
-/* By content the first that says yes is taken, so those with a signature come before OBJ, which has none. By suffix, the
- * first with that suffix. */
-static const vgi_format *const formats[] = {&vgi_format_ply, &vgi_format_ply_ascii, &vgi_format_ply_be, &vgi_format_off,
-                                            &vgi_format_obj};
+/* By content the first that says yes is taken, so those with a signature come before OBJ, which has none. By suffix,
+ * the first with that suffix. */
+static const vgi_format *const formats[] = {&vgi_format_ply, &vgi_format_ply_ascii, &vgi_format_ply_be,
+                                            &vgi_format_off, &vgi_format_obj};
 enum { FORMATS = sizeof formats / sizeof *formats };
 
 const vgi_format *vgi_format_by_name(const char *name, size_t n)

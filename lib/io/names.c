@@ -89,8 +89,8 @@ size_t vgi_packed_stem(const char *name)
     return n;
 }
 
-/* Old archives and file systems hold names in other encodings, mostly Latin-1: each byte becomes the letter it is there,
- * so that different names stay different. */
+/* Old archives and file systems hold names in other encodings, mostly Latin-1: each byte becomes the letter it is
+ * there, so that different names stay different. */
 static char *from_latin1(const char *s, size_t n, vg_err *e)
 {
     size_t twice;

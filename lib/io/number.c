@@ -14,6 +14,7 @@ typedef unsigned __int128 wide;
  * exactly, so that rounding is decided by integers alone. */
 enum { MOST_FIVES = 27 };
 static const uint64_t five[MOST_FIVES + 1] = {
+    /* clang-format off */
     1ull, 5ull, 25ull, 125ull,
     625ull, 3125ull, 15625ull, 78125ull,
     390625ull, 1953125ull, 9765625ull, 48828125ull,
@@ -21,12 +22,13 @@ static const uint64_t five[MOST_FIVES + 1] = {
     152587890625ull, 762939453125ull, 3814697265625ull, 19073486328125ull,
     95367431640625ull, 476837158203125ull, 2384185791015625ull, 11920928955078125ull,
     59604644775390625ull, 298023223876953125ull, 1490116119384765625ull, 7450580596923828125ull,
+    /* clang-format on */
 };
 
 static const double ten[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
                              1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
-/* 10^22 is the last power of ten that is a binary64; where the machine computes in a longer format, rounding twice would
- * make even these inexact. */
+/* 10^22 is the last power of ten that is a binary64; where the machine computes in a longer format, rounding twice
+ * would make even these inexact. */
 enum { MOST_EXACT_TEN = FLT_EVAL_METHOD == 0 ? 22 : -1 };
 
 /* ------------------------------------------------------------------------------------------- reading -- */
@@ -52,8 +54,8 @@ static inline uint64_t load_eight(const char *s)
     return x;
 }
 
-/* The value of the digits at the start of eight characters, without a branch on how many there are: their number in *n.
- * The first character is the lowest byte; shifting left puts zeros before the digits that there are. */
+/* The value of the digits at the start of eight characters, without a branch on how many there are: their number in
+ * *n. The first character is the lowest byte; shifting left puts zeros before the digits that there are. */
 static inline uint64_t eight_digits(uint64_t text, unsigned *n)
 {
     uint64_t x = text ^ 0x3030303030303030ull;
@@ -133,10 +135,8 @@ static double read_exactly(const char *s, const char *end, int64_t q)
     int64_t dropped = 0;
     for (; s < end; s++) {
         if (*s == '.' || (n == 0 && *s == '0')) continue;
-        if (n < EXACT_DIGITS)
-            text[n++] = *s;
-        else
-            dropped++, more |= *s != '0';
+        if (n < EXACT_DIGITS) text[n++] = *s;
+        else dropped++, more |= *s != '0';
     }
     if (n == 0) return 0;
     if (more) text[n++] = '1', dropped--;
@@ -227,16 +227,12 @@ const char *vgi_parse_double(const char *s, const char *end, double *x)
     } else {
         const char *digits_end = p;
         if (p < end && (*p | 0x20) == 'e') p = read_exponent(p, end, &q);
-        if (n > MOST_DIGITS)
-            value = read_decimal(s, digits_end, q);
+        if (n > MOST_DIGITS) value = read_decimal(s, digits_end, q);
         else if (w <= 1ull << 53 && q <= 0 && q >= -MOST_EXACT_TEN) /* both exact: one rounding, in the division */
             value = (double)w / ten[-q];
-        else if (w <= 1ull << 53 && q > 0 && q <= MOST_EXACT_TEN)
-            value = (double)w * ten[q];
-        else if (w != 0 && q >= -MOST_FIVES && q <= MOST_FIVES)
-            value = scale_decimal(w, (int)q);
-        else
-            value = w == 0 ? 0 : read_exactly(s, digits_end, q);
+        else if (w <= 1ull << 53 && q > 0 && q <= MOST_EXACT_TEN) value = (double)w * ten[q];
+        else if (w != 0 && q >= -MOST_FIVES && q <= MOST_FIVES) value = scale_decimal(w, (int)q);
+        else value = w == 0 ? 0 : read_exactly(s, digits_end, q);
     }
     *x = negative ? -value : value;
     return p;
@@ -282,17 +278,15 @@ size_t vgi_print_uint(char *to, uint64_t x)
         memcpy(p, pair + 2 * (x % 100), 2);
         x /= 100;
     }
-    if (x >= 10)
-        p -= 2, memcpy(p, pair + 2 * x, 2);
-    else
-        *--p = (char)('0' + x);
+    if (x >= 10) p -= 2, memcpy(p, pair + 2 * x, 2);
+    else *--p = (char)('0' + x);
     size_t n = (size_t)(text + sizeof text - p);
     memcpy(to, p, n);
     return n;
 }
 
-/* Of the integers in lo .. hi that which ends in the most zeros, and of those the nearest to the true value, which is v
- * plus a fraction, v_rounded when rounded. False when there is none. */
+/* Of the integers in lo .. hi that which ends in the most zeros, and of those the nearest to the true value, which is
+ * v plus a fraction, v_rounded when rounded. False when there is none. */
 static bool shortest_between(uint64_t lo, uint64_t hi, uint64_t v, uint64_t v_rounded, int power, struct decimal *d)
 {
     if (lo > hi) return false;
@@ -313,14 +307,14 @@ static bool shortest_between(uint64_t lo, uint64_t hi, uint64_t v, uint64_t v_ro
 }
 
 /* The shortest decimal by exact integers; false when the number is too large or small for them.
- * With k such that x * 10^k has most_digits digits before the point, all numbers that read back as x lie between lo and
- * hi, half-way to the neighbours, which are counted in quarters of a unit of m: 4m - 2 (or 4m - 1) and 4m + 2.
+ * With k such that x * 10^k has most_digits digits before the point, all numbers that read back as x lie between lo
+ * and hi, half-way to the neighbours, which are counted in quarters of a unit of m: 4m - 2 (or 4m - 1) and 4m + 2.
  * Scaling them is multiplying by `up` and dividing by `down`, one a power of 2, the other of 5. */
 static bool shortest_by_integers(const struct binary *x, struct decimal *d)
 {
-    int top = 63 - __builtin_clzll(x->m) + x->e;          /* x is in [2^top, 2^(top+1)) */
-    int tens = (int)((top * 78913ll) >> 18);              /* floor(top * log10(2)), exact for |top| < 1650 */
-    int k = x->most_digits - 1 - tens;                    /* one digit too many at times: it does no harm */
+    int top = 63 - __builtin_clzll(x->m) + x->e; /* x is in [2^top, 2^(top+1)) */
+    int tens = (int)((top * 78913ll) >> 18);     /* floor(top * log10(2)), exact for |top| < 1650 */
+    int k = x->most_digits - 1 - tens;           /* one digit too many at times: it does no harm */
     if (k > MOST_FIVES || k < -MOST_FIVES) return false;
     int shift = x->e - 2 + k;
     if (k >= 0 ? (shift > 0 || shift < -100) : (shift < 0 || shift > 64)) return false;
@@ -442,7 +436,8 @@ size_t vgi_print_float(char *to, double x)
     if (sign) *to++ = '-';
     size_t n = print_special(to, !exponent && !m, exponent == 0xff && !m, exponent == 0xff && m);
     if (n) return sign + n;
-    struct binary b = {exponent ? m | 1u << 23 : m, exponent ? (int)exponent - 150 : -149, exponent > 1 && !m, 9, true};
+    struct binary b = {exponent ? m | 1u << 23 : m, exponent ? (int)exponent - 150 : -149, exponent > 1 && !m, 9,
+                       true};
     return sign + print_binary(to, &b, 15);
 }
 
@@ -455,7 +450,7 @@ size_t vgi_print_double(char *to, double x)
     if (sign) *to++ = '-';
     size_t n = print_special(to, !exponent && !m, exponent == 0x7ff && !m, exponent == 0x7ff && m);
     if (n) return sign + n;
-    struct binary b = {exponent ? m | 1ull << 52 : m, exponent ? (int)exponent - 1075 : -1074, exponent > 1 && !m,
-                       17, false};
+    struct binary b = {exponent ? m | 1ull << 52 : m, exponent ? (int)exponent - 1075 : -1074, exponent > 1 && !m, 17,
+                       false};
     return sign + print_binary(to, &b, 17);
 }

@@ -7,10 +7,10 @@
 #include <stdlib.h>
 
 enum {
-    MOST_NUMBER = 26,      /* bytes of a printed number and the blank before it */
-    MOST_REFERENCE = 22,   /* " v/vt", two 32-bit numbers */
-    SMALL_FACE = 16,       /* up to here pairs of vertices are compared directly */
-    SHOWN = 40             /* bytes of the input that a message shows */
+    MOST_NUMBER = 26,    /* bytes of a printed number and the blank before it */
+    MOST_REFERENCE = 22, /* " v/vt", two 32-bit numbers */
+    SMALL_FACE = 16,     /* up to here pairs of vertices are compared directly */
+    SHOWN = 40           /* bytes of the input that a message shows */
 };
 
 /* ------------------------------------------------------------------------------------------- reading -- */
@@ -56,12 +56,9 @@ static const char *skip_odd_blanks(const struct reading *r, const char *p)
 {
     while (p < r->end) {
         const char *next;
-        if (*p == ' ' || *p == '\t' || (*p == '\r' && r->line_end != '\r'))
-            p++;
-        else if (*p == '\\' && (next = continuation(r, p)))
-            p = next;
-        else
-            break;
+        if (*p == ' ' || *p == '\t' || (*p == '\r' && r->line_end != '\r')) p++;
+        else if (*p == '\\' && (next = continuation(r, p))) p = next;
+        else break;
     }
     return p;
 }
@@ -70,7 +67,7 @@ static const char *skip_odd_blanks(const struct reading *r, const char *p)
 static inline const char *skip_blanks(const struct reading *r, const char *p)
 {
     if (p < r->end && *p == ' ') p++;
-    if (p < r->end && *p > ' ' && *p != '\\') return p;
+    if (p < r->end && (unsigned char)*p > ' ' && *p != '\\') return p;
     return skip_odd_blanks(r, p);
 }
 
@@ -99,13 +96,17 @@ static const char *skip_comment(const struct reading *r, const char *p)
     return q ? q + 1 : r->end;
 }
 
+/* Does a word end before p? */
+static inline bool ends_word(const struct reading *r, const char *p)
+{
+    return is_line_end(r, p) || *p == ' ' || *p == '\t' || *p == '\r' || *p == '\\';
+}
+
 /* Does the word at p equal `word`? */
 static bool is_word(const struct reading *r, const char *p, const char *word)
 {
     size_t n = strlen(word);
-    if ((size_t)(r->end - p) < n || memcmp(p, word, n)) return false;
-    p += n;
-    return is_line_end(r, p) || *p == ' ' || *p == '\t' || *p == '\r' || *p == '\\';
+    return (size_t)(r->end - p) >= n && !memcmp(p, word, n) && ends_word(r, p + n);
 }
 
 /* VG_EINPUT: what stands at p, as the file has it, is not what was expected. */
@@ -114,7 +115,8 @@ static int fail_at(const struct reading *r, const char *p, const char *expected)
     size_t n = 0;
     while (n < SHOWN && !is_line_end(r, p + n) && p[n] != ' ' && p[n] != '\t' && p[n] != '\r') n++;
     if (n == 0) return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s expected", r->subject, line_of(r, p), expected);
-    return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s expected, not '%.*s'", r->subject, line_of(r, p), expected, (int)n, p);
+    return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s expected, not '%.*s'", r->subject, line_of(r, p), expected,
+                   (int)n, p);
 }
 
 /* Up to `most` numbers into x, and how many there were into *n; all that follow must be numbers too, if `extra`. */
@@ -157,7 +159,8 @@ static const char *read_vertex(struct reading *r, const char *p)
     const char *next = read_numbers(r, p, m->vertices + 3 * m->mesh.nv, 3, true, &n);
     if (!next) return NULL;
     if (n < 3) {
-        vg_fail(r->e, VG_EINPUT, "%s line %zu: vertex with %zu numbers (expected x y z)", r->subject, line_of(r, p), n);
+        vg_fail(r->e, VG_EINPUT, "%s line %zu: vertex with %zu numbers (expected x y z)", r->subject, line_of(r, p),
+                n);
         return NULL;
     }
     m->mesh.nv++;
@@ -172,7 +175,8 @@ static const char *read_tex(struct reading *r, const char *p)
         vg_fail(r->e, VG_EINPUT, "%s has too many texture coordinates (the limit is 2^32 - 2)", r->subject);
         return NULL;
     }
-    if (a->ntex >= r->tex_cap && vgi_grow(&a->tex, &r->tex_cap, a->ntex + 1, 3 * sizeof *a->tex, r->e) < 0) return NULL;
+    if (a->ntex >= r->tex_cap && vgi_grow(&a->tex, &r->tex_cap, a->ntex + 1, 3 * sizeof *a->tex, r->e) < 0)
+        return NULL;
     double *x = a->tex + 3 * a->ntex;
     x[0] = x[1] = x[2] = 0;
     size_t n;
@@ -211,7 +215,8 @@ static inline const char *read_index(struct reading *r, const char *p, size_t co
         return s;
     }
     if (x == 0 && !huge)
-        vg_fail(r->e, VG_EINPUT, "%s line %zu: index 0 (indices count from 1, or back from -1)", r->subject, line_of(r, p));
+        vg_fail(r->e, VG_EINPUT, "%s line %zu: index 0 (indices count from 1, or back from -1)", r->subject,
+                line_of(r, p));
     else
         vg_fail(r->e, VG_EINPUT, "%s line %zu: index %.*s is out of range", r->subject, line_of(r, p),
                 s - p > SHOWN ? SHOWN : (int)(s - p), p);
@@ -300,7 +305,8 @@ static inline int end_face(struct reading *r, const char *p, size_t first, size_
     if (repeated)
         return vg_fail(r->e, VG_EINPUT, "%s line %zu: vertex %zu is twice in one face", r->subject, line_of(r, p),
                        (size_t)which + 1);
-    if (mesh->nf + 2 > r->start_cap && vgi_grow(&mesh->start, &r->start_cap, mesh->nf + 2, sizeof *mesh->start, r->e) < 0)
+    if (mesh->nf + 2 > r->start_cap &&
+        vgi_grow(&mesh->start, &r->start_cap, mesh->nf + 2, sizeof *mesh->start, r->e) < 0)
         return VG_ENOMEM;
     mesh->start[++mesh->nf] = (uint32_t)(first + size);
     return VG_OK;
@@ -358,8 +364,8 @@ static const char *read_face(struct reading *r, const char *p, bool line)
     return p;
 }
 
-/* The text [p, end) as UTF-8, trimmed, joined lines as one blank. Bytes that are no UTF-8 are taken for Latin-1, which
- * is what old exporters write. */
+/* The text [p, end) as UTF-8, trimmed, joined lines as one blank. Bytes that are no UTF-8 are taken for Latin-1,
+ * which is what old exporters write. */
 static char *label_text(struct reading *r, const char *p, const char *end)
 {
     size_t n = 0;
@@ -399,7 +405,8 @@ static const char *read_label(struct reading *r, const char *p, vg_label_kind ki
         vg_fail(r->e, VG_EINPUT, "%s line %zu: a name with a zero byte", r->subject, line_of(r, p));
         return NULL;
     }
-    if (a->nlabels >= r->labels_cap && vgi_grow(&a->labels, &r->labels_cap, a->nlabels + 1, sizeof *a->labels, r->e) < 0)
+    if (a->nlabels >= r->labels_cap &&
+        vgi_grow(&a->labels, &r->labels_cap, a->nlabels + 1, sizeof *a->labels, r->e) < 0)
         return NULL;
     char *text = label_text(r, p, end);
     if (!text) return NULL;
@@ -413,19 +420,22 @@ static const char *read_statement(struct reading *r, const char *p)
     static const struct {
         const char *word;
         vg_label_kind kind;
-    } labels[] = {{"o", VG_LABEL_OBJECT}, {"g", VG_LABEL_GROUP}, {"usemtl", VG_LABEL_MATERIAL},
-                  {"s", VG_LABEL_SMOOTHING}, {"mtllib", VG_LABEL_LIBRARY}};
+    } labels[] = {{"o", VG_LABEL_OBJECT},
+                  {"g", VG_LABEL_GROUP},
+                  {"usemtl", VG_LABEL_MATERIAL},
+                  {"s", VG_LABEL_SMOOTHING},
+                  {"mtllib", VG_LABEL_LIBRARY}};
     switch (*p) {
     case 'v':
-        if (is_word(r, p, "v")) return read_vertex(r, p + 1);
+        if (ends_word(r, p + 1)) return read_vertex(r, p + 1);
         if (is_word(r, p, "vt")) return read_tex(r, p + 2);
         break;
     case 'f':
-        if (is_word(r, p, "f")) return read_face(r, p + 1, false);
+        if (ends_word(r, p + 1)) return read_face(r, p + 1, false);
         if (is_word(r, p, "fo")) return read_face(r, p + 2, false); /* what version 2 of the format called it */
         break;
     case 'l':
-        if (is_word(r, p, "l")) return read_face(r, p + 1, true);
+        if (ends_word(r, p + 1)) return read_face(r, p + 1, true);
         break;
     case '#': return skip_comment(r, p);
     default:
@@ -456,8 +466,13 @@ static int read_statements(struct reading *r)
 static struct reading start_reading(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
 {
     bool unix_lines = memchr(data, '\n', n) || !memchr(data, '\r', n);
-    return (struct reading){.data = data, .end = data + n, .line_end = unix_lines ? '\n' : '\r', .subject = subject,
-                            .e = e, .m = m, .sought_face = SIZE_MAX};
+    return (struct reading){.data = data,
+                            .end = data + n,
+                            .line_end = unix_lines ? '\n' : '\r',
+                            .subject = subject,
+                            .e = e,
+                            .m = m,
+                            .sought_face = SIZE_MAX};
 }
 
 /* The line of a face that turned out to be wrong: found by reading again, so that good files pay nothing for it. */
@@ -485,11 +500,12 @@ static size_t face_of_corner(const vg_mesh *m, size_t corner)
 }
 
 /* Every index below `count`, or (for texture coordinates) UINT32_MAX. */
-static int check_indices(const struct reading *r, const uint32_t *index, size_t count, bool may_miss, const char *what)
+static int check_indices(const struct reading *r, const uint32_t *index, size_t count, bool may_miss,
+                         const char *what)
 {
     for (size_t c = 0; c < r->corners; c++) {
         if (index[c] < count || (may_miss && index[c] == UINT32_MAX)) continue;
-        return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s %zu of %zu", r->subject,
+        return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s %zu is out of range, there are %zu", r->subject,
                        line_of_face(r, face_of_corner(&r->m->mesh, c)), what, (size_t)index[c] + 1, count);
     }
     return VG_OK;

@@ -12,7 +12,7 @@ enum { MOST_NUMBER = 26, MOST_INDEX = 11, SHOWN = 40 };
 
 struct reading {
     const char *data, *end;
-    char line_end; /* '\n', or '\r' in a file that has no '\n' */
+    char line_end;                /* '\n', or '\r' in a file that has no '\n' */
     const char *line, *line_stop; /* the present line without its comment; */
     const char *p;                /* what is not read of it yet */
     const char *next;             /* and the line behind it */
@@ -61,7 +61,8 @@ static int fail_here(struct reading *r, const char *expected)
     int n = 0;
     while (n < SHOWN && r->p + n < r->line_stop && !is_blank(r->p[n])) n++;
     if (n == 0) return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s expected", r->subject, line_number(r), expected);
-    return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s expected, not '%.*s'", r->subject, line_number(r), expected, n, r->p);
+    return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s expected, not '%.*s'", r->subject, line_number(r), expected, n,
+                   r->p);
 }
 
 /* Is the present line read up to a blank or its end? */
@@ -116,8 +117,8 @@ static int read_header(struct reading *r, size_t *nv, size_t *nf)
     size_t n = keyword(r->p, r->line_stop);
     if (n == 0) return fail_here(r, "OFF");
     if (memchr(r->p, 'n', n) || memchr(r->p, '4', n))
-        return vg_fail(r->e, VG_EINPUT, "%s is %.*s, with vertices of other than 3 coordinates, which is not read", r->subject,
-                       (int)n, r->p);
+        return vg_fail(r->e, VG_EINPUT, "%s is %.*s, with vertices of other than 3 coordinates, which is not read",
+                       r->subject, (int)n, r->p);
     r->p += n;
     skip_blanks(r);
     if (r->line_stop - r->p >= 6 && !memcmp(r->p, "BINARY", 6))
@@ -133,13 +134,14 @@ static int read_header(struct reading *r, size_t *nv, size_t *nf)
     return result == VG_OK && r->p < r->line_stop ? fail_here(r, "end of line") : result;
 }
 
-/* The shortest lines are "0 0 0" and "2 0 1", with a line end that the last may lack. Counts beyond what is left are refused
- * before there is memory for them. */
+/* The shortest lines are "0 0 0" and "2 0 1", with a line end that the last may lack. Counts beyond what is left are
+ * refused before there is memory for them. */
 static int check_counts(struct reading *r, size_t nv, size_t nf)
 {
     size_t left = (size_t)(r->end - r->next) / 6 + 1;
     if (nv > left || nf > left - nv)
-        return vg_fail(r->e, VG_ETRUNC, "%s announces %zu vertices and %zu faces, but ends before", r->subject, nv, nf);
+        return vg_fail(r->e, VG_ETRUNC, "%s announces %zu vertices and %zu faces, but ends before", r->subject, nv,
+                       nf);
     if (nv >= UINT32_MAX || nf >= UINT32_MAX)
         return vg_fail(r->e, VG_EINPUT, "%s has too many vertices or faces (the limit is 2^32 - 2)", r->subject);
     if (nv == 0) return vg_fail(r->e, VG_EINPUT, "%s has no vertices", r->subject);
@@ -221,7 +223,8 @@ static int read_body(struct reading *r, size_t nv, size_t nf)
         int result = read_face(r);
         if (result < 0) return result;
     }
-    if (next_line(r)) return vg_fail(r->e, VG_EINPUT, "%s line %zu: more lines than announced", r->subject, line_number(r));
+    if (next_line(r))
+        return vg_fail(r->e, VG_EINPUT, "%s line %zu: more lines than announced", r->subject, line_number(r));
     return VG_OK;
 }
 
@@ -233,8 +236,14 @@ static const char *behind_mark(const char *data, size_t n)
 static int read_off(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
 {
     bool unix_lines = memchr(data, '\n', n) || !memchr(data, '\r', n);
-    struct reading r = {.data = data, .end = data + n, .line_end = unix_lines ? '\n' : '\r', .subject = subject, .e = e,
-                        .m = m, .line = data, .next = behind_mark(data, n)};
+    struct reading r = {.data = data,
+                        .end = data + n,
+                        .line_end = unix_lines ? '\n' : '\r',
+                        .subject = subject,
+                        .e = e,
+                        .m = m,
+                        .line = data,
+                        .next = behind_mark(data, n)};
     size_t nv = 0, nf = 0;
     int result = read_header(&r, &nv, &nf);
     if (result == VG_OK) result = check_counts(&r, nv, nf);

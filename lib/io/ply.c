@@ -65,8 +65,8 @@ static enum type type_named(struct word w)
     static const struct {
         const char *name;
         enum type type;
-    } names[] = {{"char", I8},    {"int8", I8},   {"uchar", U8},  {"uint8", U8},   {"short", I16}, {"int16", I16},
-                 {"ushort", U16}, {"uint16", U16}, {"int", I32},   {"int32", I32},  {"uint", U32},  {"uint32", U32},
+    } names[] = {{"char", I8},    {"int8", I8},     {"uchar", U8},   {"uint8", U8},   {"short", I16}, {"int16", I16},
+                 {"ushort", U16}, {"uint16", U16},  {"int", I32},    {"int32", I32},  {"uint", U32},  {"uint32", U32},
                  {"float", F32},  {"float32", F32}, {"double", F64}, {"float64", F64}};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (word_is(w, names[i].name)) return names[i].type;
@@ -158,13 +158,15 @@ static int read_property_line(struct reading *r, const struct word *words, size_
     struct element *el = &r->elements[r->nelements - 1];
     struct property p = {list ? type_named(words[2]) : NO_TYPE, type_named(type), role_named(el->kind, name, list)};
     if (p.item == NO_TYPE || (list && !is_integer(p.count)))
-        return vg_fail(r->e, VG_EINPUT, "%s: PLY property '%.*s' has an unknown type", r->subject, shown(name), name.at);
+        return vg_fail(r->e, VG_EINPUT, "%s: PLY property '%.*s' has an unknown type", r->subject, shown(name),
+                       name.at);
     if (p.role >= INDICES && !is_integer(p.item))
-        return vg_fail(r->e, VG_EINPUT, "%s: PLY property '%.*s' is not of an integer type", r->subject, shown(name), name.at);
+        return vg_fail(r->e, VG_EINPUT, "%s: PLY property '%.*s' is not of an integer type", r->subject, shown(name),
+                       name.at);
     for (size_t i = 0; i < el->n; i++)
         if (p.role && r->properties[el->first + i].role == p.role)
-            return vg_fail(r->e, VG_EINPUT, "%s: PLY element '%s' has '%.*s' twice", r->subject, el->name, shown(name),
-                           name.at);
+            return vg_fail(r->e, VG_EINPUT, "%s: PLY element '%s' has '%.*s' twice", r->subject, el->name,
+                           shown(name), name.at);
     if (vgi_grow(&r->properties, &r->properties_cap, r->nproperties + 1, sizeof *r->properties, r->e) < 0)
         return VG_ENOMEM;
     r->properties[r->nproperties++] = p;
@@ -216,15 +218,12 @@ static int read_header(struct reading *r)
         int result = VG_OK;
         if (n == 0 || word_is(words[0], "comment") || word_is(words[0], "obj_info")) continue;
         if (word_is(words[0], "end_header")) break;
-        if (word_is(words[0], "format"))
-            result = read_encoding(r, words, n), formatted = true;
-        else if (word_is(words[0], "element"))
-            result = read_element_line(r, words, n);
-        else if (word_is(words[0], "property"))
-            result = read_property_line(r, words, n);
+        if (word_is(words[0], "format")) result = read_encoding(r, words, n), formatted = true;
+        else if (word_is(words[0], "element")) result = read_element_line(r, words, n);
+        else if (word_is(words[0], "property")) result = read_property_line(r, words, n);
         else
-            result = vg_fail(r->e, VG_EINPUT, "%s: unknown word '%.*s' in the PLY header", r->subject, shown(words[0]),
-                             words[0].at);
+            result = vg_fail(r->e, VG_EINPUT, "%s: unknown word '%.*s' in the PLY header", r->subject,
+                             shown(words[0]), words[0].at);
         if (result < 0) return result;
     }
     if (!formatted) return vg_fail(r->e, VG_EINPUT, "%s: the PLY header has no format line", r->subject);
@@ -478,7 +477,8 @@ static int read_vertices(struct reading *r, const struct element *el)
         read_fixed_vertices(r, el);
         if (vgi_finite(r->m->vertices, 3 * n)) return VG_OK;
         for (size_t i = 0; i < 3 * n; i++)
-            if (!isfinite(r->m->vertices[i])) return vg_fail(r->e, VG_EINPUT, "%s: vertex %zu is not finite", r->subject, i / 3);
+            if (!isfinite(r->m->vertices[i]))
+                return vg_fail(r->e, VG_EINPUT, "%s: vertex %zu is not finite", r->subject, i / 3);
     }
     int result = VG_OK;
     for (uint64_t i = 0; i < el->count && result == VG_OK; i++) result = read_vertex(r, el, i);
@@ -498,9 +498,11 @@ static int read_element(struct reading *r, const struct element *el)
         r->p += el->count * el->least;
         return VG_OK;
     }
+    int (*one)(struct reading *, const struct element *, uint64_t) = read_other;
+    if (el->kind == FACE) one = read_face;
+    if (el->kind == EDGE) one = read_edge;
     int result = VG_OK;
-    for (uint64_t i = 0; i < el->count && result == VG_OK; i++)
-        result = el->kind == FACE ? read_face(r, el, i) : el->kind == EDGE ? read_edge(r, el, i) : read_other(r, el, i);
+    for (uint64_t i = 0; i < el->count && result == VG_OK; i++) result = one(r, el, i);
     return result;
 }
 
@@ -514,7 +516,8 @@ static int read_body(struct reading *r)
     }
     while (r->text && r->p < r->end && is_space(*r->p)) r->p++;
     if (r->p < r->end)
-        return vg_fail(r->e, VG_EINPUT, "%s has %zu bytes behind its last element", r->subject, (size_t)(r->end - r->p));
+        return vg_fail(r->e, VG_EINPUT, "%s has %zu bytes behind its last element", r->subject,
+                       (size_t)(r->end - r->p));
     if (r->m->mesh.nv == 0) return vg_fail(r->e, VG_EINPUT, "%s has no vertices", r->subject);
     return VG_OK;
 }
@@ -599,7 +602,8 @@ static int write_header(struct writing *x)
 {
     static const char *const names[] = {"ascii", "binary_little_endian", "binary_big_endian"};
     const vg_mesh *m = x->w->mesh;
-    const char *real = x->w->full_precision ? "double" : "float", *index = m->nv > (size_t)INT32_MAX + 1 ? "uint" : "int";
+    const char *real = x->w->full_precision ? "double" : "float";
+    const char *index = m->nv > (size_t)INT32_MAX + 1 ? "uint" : "int";
     char text[512];
     int n = snprintf(text, sizeof text,
                      "ply\nformat %s 1.0\nelement vertex %zu\nproperty %s x\nproperty %s y\nproperty %s z\n"
@@ -607,8 +611,8 @@ static int write_header(struct writing *x)
                      names[x->encoding], m->nv, real, real, real, x->nfaces, x->long_list ? "uint" : "uchar", index);
     int result = vgi_bytes_append(x->out, text, (size_t)n, x->e);
     if (result == VG_OK && x->nfaces < m->nf) {
-        n = snprintf(text, sizeof text, "element edge %zu\nproperty %s vertex1\nproperty %s vertex2\n", m->nf - x->nfaces,
-                     index, index);
+        n = snprintf(text, sizeof text, "element edge %zu\nproperty %s vertex1\nproperty %s vertex2\n",
+                     m->nf - x->nfaces, index, index);
         result = vgi_bytes_append(x->out, text, (size_t)n, x->e);
     }
     return result == VG_OK ? vgi_bytes_append(x->out, "end_header\n", 11, x->e) : result;

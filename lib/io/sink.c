@@ -84,7 +84,8 @@ static int split_choice(plan *p, const char *output, vg_err *e)
 
 static int bad_pattern(const char *output, vg_err *e)
 {
-    return vg_fail(e, VG_EARG, "'%s' needs exactly one %%d or %%04d for the number of the pose (%%%% for a percent sign)",
+    return vg_fail(e, VG_EARG,
+                   "'%s' needs exactly one %%d or %%04d for the number of the pose (%%%% for a percent sign)",
                    output);
 }
 
@@ -99,7 +100,8 @@ static int find_number(plan *p, vg_err *e)
         if (i < p->length && s[i] == '%') continue;
         int width = 0;
         if (i < p->length && s[i] == '0')
-            for (i++; i < p->length && s[i] >= '0' && s[i] <= '9' && width < 100; i++) width = 10 * width + s[i] - '0';
+            for (i++; i < p->length && s[i] >= '0' && s[i] <= '9' && width < 100; i++)
+                width = 10 * width + s[i] - '0';
         if (i >= p->length || s[i] != 'd' || width > 20 || found++) return bad_pattern(s, e);
         p->at = start, p->behind = i + 1, p->width = width;
     }
@@ -108,7 +110,8 @@ static int find_number(plan *p, vg_err *e)
 
 static int unknown_kind(const char *output, vg_err *e)
 {
-    return vg_fail(e, VG_EARG, "cannot tell the format of '%s': known are .obj .ply .off, archives %s, or name it with --format",
+    return vg_fail(e, VG_EARG,
+                   "cannot tell the format of '%s': known are .obj .ply .off, archives %s, or name it with --format",
                    output, vgi_packer_suffixes());
 }
 
@@ -131,7 +134,8 @@ static int make_plan(plan *p, const char *output, const vg_sink_options *o, vg_e
     if (o->first_number < 0) return vg_fail(e, VG_EARG, "the first number must not be negative");
     int r = split_choice(p, output, e);
     if (r < 0) return r;
-    if (o->format && !(p->format = vgi_format_by_name(o->format, strlen(o->format)))) return unknown_format(o->format, e);
+    if (o->format && !(p->format = vgi_format_by_name(o->format, strlen(o->format))))
+        return unknown_format(o->format, e);
     r = tell_kind(p, output, e);
     if (!p->format) p->format = &vgi_format_obj;
     return r;
@@ -161,7 +165,8 @@ static int check_directory(const char *dir, const char *output, vg_err *e)
 static int check_file(const char *path, vg_err *e)
 {
     struct stat st;
-    if (stat(path, &st) == 0 && S_ISDIR(st.st_mode)) return vg_fail(e, VG_ESYS, "cannot write '%s': it is a directory", path);
+    if (stat(path, &st) == 0 && S_ISDIR(st.st_mode))
+        return vg_fail(e, VG_ESYS, "cannot write '%s': it is a directory", path);
     if (stat(path, &st) == 0 && !S_ISREG(st.st_mode))
         return access(path, W_OK) == 0 ? VG_OK : vg_fail(e, VG_ESYS, "cannot write '%s': %s", path, strerror(errno));
     char *real = realpath(path, NULL);
@@ -182,7 +187,9 @@ static int check_place(const plan *p, vg_err *e)
         r = check_directory(name, name, e);
     } else if (p->kind == DIRECTORY || p->kind == SERIES) {
         if (!(dir = parent_of(name, p->length, e))) r = VG_ENOMEM;
-        else r = strchr(dir, '%') ? VG_OK : check_directory(dir, name, e); /* numbered directories are met when written */
+        else
+            r = strchr(dir, '%') ? VG_OK
+                                 : check_directory(dir, name, e); /* numbered directories are met when written */
     } else {
         r = check_file(name, e);
     }
@@ -201,9 +208,10 @@ int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e)
 static int check_kind(const vg_head *h, const char *output, vg_err *e)
 {
     if (h->kind == VG_VERTICES) return VG_OK;
-    const char *advice = h->kind == VG_VECTORS        ? "pipe it through vg-solve first"
-                         : h->kind == VG_DEFORMATIONS ? "apply them with vg-deform and pipe that through vg-solve first"
-                                                      : "only vertices can be written as meshes";
+    const char *advice = h->kind == VG_VECTORS ? "pipe it through vg-solve first"
+                         : h->kind == VG_DEFORMATIONS
+                             ? "apply them with vg-deform and pipe that through vg-solve first"
+                             : "only vertices can be written as meshes";
     return vg_fail(e, VG_EARG, "cannot write '%s': the input holds %s: %s", output, vg_kind_name(h->kind), advice);
 }
 
@@ -228,8 +236,8 @@ static int create_beside(vg_sink *s, const char *final, char **temporary, vg_err
     return fd;
 }
 
-/* Open what will be `path`: a descriptor, or negative. The target is remembered. A link is followed: what it points to
- * is replaced, not the link. */
+/* Open what will be `path`: a descriptor, or negative. The target is remembered. A link is followed: what it points
+ * to is replaced, not the link. */
 static int open_target(vg_sink *s, const char *path, vg_err *e)
 {
     struct stat st;
@@ -310,13 +318,16 @@ static int grow_slots(vg_sink *s, vg_err *e)
 static int take_name(vg_sink *s, const char *name, vg_err *e)
 {
     if (!*name || !strcmp(name, ".") || !strcmp(name, "..") || strchr(name, '/'))
-        return vg_fail(e, VG_EINPUT, "frame %llu is called '%s', which is no file name: number the files with a pattern like "
-                       "'pose-%%04d.obj'", (unsigned long long)s->frames, name);
+        return vg_fail(e, VG_EINPUT,
+                       "frame %llu is called '%s', which is no file name: number the files with a pattern like "
+                       "'pose-%%04d.obj'",
+                       (unsigned long long)s->frames, name);
     int r = grow_slots(s, e);
     if (r < 0) return r;
     size_t slot = find_slot(s, name);
     if (s->slots[slot])
-        return vg_fail(e, VG_EINPUT, "two frames are called '%s': number the files with a pattern like 'pose-%%04d.obj'", name);
+        return vg_fail(e, VG_EINPUT,
+                       "two frames are called '%s': number the files with a pattern like 'pose-%%04d.obj'", name);
     if ((r = vgi_names_add(&s->names, name, strlen(name), e)) == VG_OK) s->slots[slot] = s->names.n;
     return r;
 }
@@ -407,13 +418,16 @@ static int put_file(vg_sink *s, vg_err *e)
 static int more_than_one(const vg_sink *s, vg_err *e)
 {
     if (s->plan.kind == STDOUT)
-        return vg_fail(e, VG_EARG, "more than one pose does not fit onto standard output: name a pattern like 'pose-%%04d.obj', "
+        return vg_fail(e, VG_EARG,
+                       "more than one pose does not fit onto standard output: name a pattern like 'pose-%%04d.obj', "
                        "a directory or an archive");
     const char *suffix = s->plan.format->suffix;
     size_t n = s->plan.length;
     if (vgi_has_suffix(s->output, n, suffix)) n -= strlen(suffix);
-    return vg_fail(e, VG_EARG, "more than one pose does not fit into '%s': use a pattern like '%.*s-%%04d%s', a directory or an "
-                   "archive", s->output, (int)n, s->output, suffix);
+    return vg_fail(e, VG_EARG,
+                   "more than one pose does not fit into '%s': use a pattern like '%.*s-%%04d%s', a directory or an "
+                   "archive",
+                   s->output, (int)n, s->output, suffix);
 }
 
 static int put_frame(vg_sink *s, const char *name, vg_err *e)
@@ -445,8 +459,8 @@ int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
     if (r < 0) return r;
     vg_err cause;
     s->text.size = 0;
-    r = vg_model_write(&s->text, s->plan.format->name, &s->head->mesh, f->values, &s->head->attributes, s->full_precision,
-                       &cause);
+    r = vg_model_write(&s->text, s->plan.format->name, &s->head->mesh, f->values, &s->head->attributes,
+                       s->full_precision, &cause);
     if (r < 0) return vg_fail(e, r, "cannot write frame '%s' to '%s': %s", name, s->output, cause.message);
     if ((r = put_frame(s, name, e)) == VG_OK) s->frames++;
     return r;

@@ -179,8 +179,8 @@ static void note_file(item *it)
     it->regular = it->base >= 0;
 }
 
-/* What is known to be no mesh comes first: a tar may begin with the name of a mesh, and a compressed file may be called
- * like one. What nothing else claims is left to libarchive, which knows more kinds than can be told here. */
+/* What is known to be no mesh comes first: a tar may begin with the name of a mesh, and a compressed file may be
+ * called like one. What nothing else claims is left to libarchive, which knows more kinds than can be told here. */
 static int tell_content(item *it, vgi_input *in, vg_err *e)
 {
     const unsigned char *data;

@@ -3,10 +3,17 @@
  * The normal matrix is the sum over faces of I - 11'/r on the face's own vertices (MATH 2): a graph Laplacian with weight
  * 1/r on every pair. A face of many corners would fill r^2/2 entries; there the centroid is an unknown of its own,
  * joined to each corner with weight 1, which has the same minimum (eliminating it gives I - 11'/r back) and r entries.
- * Without anchors one vertex is pinned at 0 and the pose is moved to its root in the end. Leaves out the triangular solves
+ *
+ * What is solved for is not V but its difference from a first guess: the pose that one gets by walking from corner to corner along
+ * a spanning tree, adding up vectors. Where the vectors are consistent the guess is right to the last digits and the
+ * solve has nothing to do; where they are not, it spreads what does not fit. A solve for V itself would lose two to four digits
+ * on long meshes, for its rounding errors are those of positions, not of vectors.
+ *
+ * Without anchors one vertex is held at 0 and the pose is moved to its root in the end. Leaves out the triangular solves
  * (solve_kernel.c). The only file that knows CHOLMOD; it calls Core, Cholesky, Partition (LGPL) and Supernodal (GPL).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/solve_kernel.h"
+#include "model/incidence.h"
 
 #include <cholmod.h>
 #include <stdlib.h>
@@ -14,19 +21,24 @@
 
 enum {
     STAR = 12,         /* from this many corners on a face gets its centroid as an unknown */
-    SMALL = 500,       /* below this many unknowns a minimum-degree order is as good as nested dissection, and faster */
-    PASSES = 2         /* solve, then correct by the residual: the first alone loses a digit or two on long thin meshes */
+    SMALL = 500        /* below this many unknowns a minimum-degree order is as good as nested dissection, and faster */
 };
 #define NO_ROW UINT32_MAX
+
+/* One step of the walk: x(vertex of `corner`) = x(vertex of `from`) + w(corner) - w(from), both corners of one face. */
+typedef struct step {
+    uint32_t corner, from;
+} step;
 
 struct vg_solver {
     const vg_graph *g;
     int threads;
     size_t unknowns;  /* attached vertices that are no anchors, then centroids */
     size_t vertices_unknown;
-    size_t nheld;     /* anchors, or the one pinned vertex */
-    uint32_t *row;    /* nv: unknowns in the factor's order, then held vertices; NO_ROW if isolated */
-    uint32_t *corner_row, *centre; /* the stencil's arrays: per corner, per face */
+    uint32_t pinned;  /* without anchors: the vertex that is held at 0 */
+    uint32_t *row;    /* nv: row in the factor's order; NO_ROW if held or isolated */
+    size_t nsteps;
+    step *walk;       /* from the held vertices to all others */
     uint32_t *anchors;
     size_t nanchors;  /* those the caller gave; 0: one vertex is pinned */
     size_t nisolated;
@@ -36,7 +48,7 @@ struct vg_solver {
     bool started;
     cholmod_factor *L;
     vgi_factor factor;
-    vgi_row *x, *r;   /* threads * (unknowns + held) each: solution and residual */
+    vgi_row *x;       /* threads * unknowns */
     vg_solver_facts facts;
 };
 
@@ -52,21 +64,7 @@ static size_t face_size(const vg_graph *g, size_t f)
     return g->start[f + 1] - g->start[f];
 }
 
-/* Every attached vertex must hang together, or the matrix is singular. */
-static int check_connected(const vg_graph *g, vg_err *e)
-{
-    vg_mesh m = {g->nv, g->nf, g->start, g->vert};
-    size_t n = 0;
-    uint32_t *label = vgi_array_raw(g->nv, sizeof *label, e);
-    if (!label) return VG_ENOMEM;
-    int r = vg_mesh_components(&m, label, &n, e);
-    free(label);
-    if (r == VG_OK && n > 1)
-        r = vg_fail(e, VG_EINPUT, "the vectors leave the mesh in %zu pieces that nothing joins: a link is missing", n);
-    return r;
-}
-
-/* Number the unknowns: row[v] counts up over attached vertices that are not held; held ones come after the unknowns. */
+/* Number the unknowns: row[v] counts up over attached vertices that are not held. */
 static int number_unknowns(vg_solver *s, const uint32_t *anchors, size_t n, const double *reference, vg_err *e)
 {
     const vg_graph *g = s->g;
@@ -96,9 +94,46 @@ static int number_unknowns(vg_solver *s, const uint32_t *anchors, size_t n, cons
     s->vertices_unknown = s->unknowns;
     for (size_t f = 0; f < g->nf; f++) s->unknowns += face_size(g, f) >= STAR;
     if (s->unknowns > INT32_MAX / 2) return vg_fail(e, VG_EINPUT, "a mesh of %zu unknowns is too large", s->unknowns);
-    for (size_t i = 0; i < n; i++) s->row[anchors[i]] = (uint32_t)(s->unknowns + s->nheld++);
-    if (pinned < g->nv) s->row[pinned] = (uint32_t)(s->unknowns + s->nheld++);
+    if (pinned < g->nv) s->row[pinned] = NO_ROW;
+    s->pinned = (uint32_t)pinned;
     return VG_OK;
+}
+
+/* Breadth first from the held vertices, so that paths are short and few roundings add up. */
+static int plan_walk(vg_solver *s, vg_err *e)
+{
+    const vg_graph *g = s->g;
+    vgi_incidence around;
+    if (vgi_incidence_make(&around, g->nv, g->nf, g->start, g->vert, e) < 0) return VG_ENOMEM;
+    bool *reached = vgi_array(g->nv, sizeof *reached, e), *used = vgi_array(g->nf, sizeof *used, e);
+    uint32_t *queue = vgi_array_raw(g->nv, sizeof *queue, e);
+    s->walk = vgi_array_raw(g->attached, sizeof *s->walk, e);
+    size_t head = 0, tail = 0;
+    int r = reached && used && queue && s->walk ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; r == VG_OK && i < s->nanchors; i++) queue[tail++] = s->anchors[i], reached[s->anchors[i]] = true;
+    if (r == VG_OK && s->pinned < g->nv) queue[tail++] = s->pinned, reached[s->pinned] = true;
+    while (r == VG_OK && head < tail) {
+        uint32_t v = queue[head++];
+        for (uint32_t i = around.first[v]; i < around.first[v + 1]; i++) {
+            uint32_t f = around.face[i];
+            if (used[f]) continue;
+            used[f] = true;
+            for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
+                if (reached[g->vert[c]]) continue;
+                reached[g->vert[c]] = true;
+                queue[tail++] = g->vert[c];
+                s->walk[s->nsteps++] = (step){c, around.corner[i]};
+            }
+        }
+    }
+    if (r == VG_OK && tail < g->attached)
+        r = vg_fail(e, VG_EINPUT, "the vectors leave %zu vertices in pieces that nothing joins to the rest: a link is missing",
+                    g->attached - tail);
+    vgi_incidence_clear(&around);
+    free(reached);
+    free(used);
+    free(queue);
+    return r;
 }
 
 /* Upper bound of the entries of the lower triangle, duplicates counted. */
@@ -188,21 +223,15 @@ static int factorize(vg_solver *s, cholmod_sparse *N, vg_err *e)
     return VG_OK;
 }
 
-/* From now on row[v] is the row in the factor's order; and the faces as the stencil wants them. */
+/* From now on row[v] is the row in the factor's order. */
 static int permute_rows(vg_solver *s, vg_err *e)
 {
-    const vg_graph *g = s->g;
     uint32_t *inverse = vgi_array_raw(s->unknowns, sizeof *inverse, e);
-    s->corner_row = vgi_array_raw(vg_graph_corners(g), sizeof *s->corner_row, e);
-    s->centre = vgi_array_raw(g->nf, sizeof *s->centre, e);
-    if (!inverse || !s->corner_row || !s->centre) return free(inverse), VG_ENOMEM;
+    if (!inverse) return VG_ENOMEM;
     const int *perm = s->L->Perm;
     for (size_t i = 0; i < s->unknowns; i++) inverse[perm[i]] = (uint32_t)i;
-    for (size_t v = 0; v < g->nv; v++)
-        if (s->row[v] < s->unknowns) s->row[v] = inverse[s->row[v]];
-    for (size_t c = 0; c < vg_graph_corners(g); c++) s->corner_row[c] = s->row[g->vert[c]];
-    size_t star = s->vertices_unknown;
-    for (size_t f = 0; f < g->nf; f++) s->centre[f] = face_size(g, f) >= STAR ? inverse[star++] : UINT32_MAX;
+    for (size_t v = 0; v < s->g->nv; v++)
+        if (s->row[v] != NO_ROW) s->row[v] = inverse[s->row[v]];
     free(inverse);
     return VG_OK;
 }
@@ -210,11 +239,9 @@ static int permute_rows(vg_solver *s, vg_err *e)
 static int make_workspace(vg_solver *s, vg_err *e)
 {
     size_t rows;
-    if (vgi_mul(s->unknowns + s->nheld, (size_t)s->threads, &rows) && rows < SIZE_MAX / sizeof *s->x) {
+    if (vgi_mul(s->unknowns, (size_t)s->threads, &rows) && rows < SIZE_MAX / sizeof *s->x)
         s->x = aligned_alloc(sizeof(vgi_lanes), rows * sizeof *s->x);
-        s->r = aligned_alloc(sizeof(vgi_lanes), rows * sizeof *s->r);
-    }
-    return s->x && s->r ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", s->unknowns);
+    return s->x ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", s->unknowns);
 }
 
 int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
@@ -228,8 +255,8 @@ int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, s
     s->common.print = 0;
     s->common.error_handler = NULL;
     cholmod_sparse *N = NULL;
-    int r = check_connected(g, e);
-    if (r == VG_OK) r = number_unknowns(s, anchors, nanchors, reference, e);
+    int r = number_unknowns(s, anchors, nanchors, reference, e);
+    if (r == VG_OK) r = plan_walk(s, e);
     if (r == VG_OK && s->unknowns) {
         r = assemble(s, &N, e);
         if (r == VG_OK) r = factorize(s, N, e);
@@ -251,12 +278,10 @@ void vg_solver_free(vg_solver **out)
     }
     free(s->row);
     free(s->anchors);
-    free(s->corner_row);
-    free(s->centre);
+    free(s->walk);
     free(s->isolated);
     free(s->isolated_at);
     free(s->x);
-    free(s->r);
     free(s);
     *out = NULL;
 }
@@ -273,97 +298,65 @@ vg_solver_facts vg_solver_get_facts(const vg_solver *s)
     return s->facts;
 }
 
-void vg_solver_rhs(const vg_solver *s, const double *vectors, double *rhs)
+/* The first guess, relative to the first anchor or the pinned vertex, so that a pose far from the origin loses no digits. */
+static void walk(const vg_solver *s, const double *w, const double *anchors, double *x)
 {
-    const vg_graph *g = s->g;
+    const uint32_t *vert = s->g->vert;
+    if (s->pinned < s->g->nv) memset(x + 3 * (size_t)s->pinned, 0, 3 * sizeof *x);
+    for (size_t i = 0; i < s->nanchors; i++)
+        for (size_t k = 0; k < 3; k++) x[3 * (size_t)s->anchors[i] + k] = anchors[3 * i + k] - anchors[k];
+    for (size_t i = 0; i < s->nsteps; i++) {
+        size_t c = s->walk[i].corner, from = s->walk[i].from, to = 3 * (size_t)vert[c], base = 3 * (size_t)vert[from];
+        for (size_t k = 0; k < 3; k++) x[to + k] = x[base + k] + (w[3 * c + k] - w[3 * from + k]);
+    }
+}
+
+/* What the guess misses: A (W* - A' x). Only differences within a face are formed, so it rounds like vectors. */
+static void fold(const vg_graph *g, const double *w, const double *x, double *rhs)
+{
     memset(rhs, 0, 3 * g->nv * sizeof *rhs);
     for (size_t f = 0; f < g->nf; f++) {
-        uint32_t begin = g->start[f], end = g->start[f + 1];
-        double x = 0, y = 0, z = 0, share = 1.0 / (double)(end - begin);
-        for (uint32_t c = begin; c < end; c++) {
-            const double *w = vectors + 3 * (size_t)c;
-            x += w[0], y += w[1], z += w[2];
+        size_t begin = g->start[f], end = g->start[f + 1];
+        const double *w0 = w + 3 * begin, *x0 = x + 3 * (size_t)g->vert[begin];
+        double mean[3] = {0, 0, 0}, share = 1.0 / (double)(end - begin);
+        for (size_t c = begin; c < end; c++) {
+            const double *wc = w + 3 * c, *xc = x + 3 * (size_t)g->vert[c];
+            for (int k = 0; k < 3; k++) mean[k] += (wc[k] - w0[k]) - (xc[k] - x0[k]);
         }
-        x *= share, y *= share, z *= share;
-        for (uint32_t c = begin; c < end; c++) {
-            const double *w = vectors + 3 * (size_t)c;
+        for (int k = 0; k < 3; k++) mean[k] *= share;
+        for (size_t c = begin; c < end; c++) {
+            const double *wc = w + 3 * c, *xc = x + 3 * (size_t)g->vert[c];
             double *to = rhs + 3 * (size_t)g->vert[c];
-            to[0] += w[0] - x, to[1] += w[1] - y, to[2] += w[2] - z;
+            for (int k = 0; k < 3; k++) to[k] += (wc[k] - w0[k]) - (xc[k] - x0[k]) - mean[k];
         }
     }
+}
+
+void vg_solver_load(const vg_solver *s, const double *vectors, const double *anchors, double *x, double *rhs)
+{
+    walk(s, vectors, anchors, x);
+    fold(s->g, vectors, x, rhs);
 }
 
 typedef struct solve_job {
     vg_solver *s;
     size_t n;
+    const double *const *rhs;
     double *const *x;
     const double *const *anchors, *const *roots;
-    size_t first;   /* first block of this round */
+    size_t first; /* first block of this round */
 } solve_job;
 
-/* The start: unknowns at 0; anchors relative to the first one, so that a pose far from the origin loses no digits. */
-static void start_solution(const vg_solver *s, vgi_row *x, const double *const *anchors, size_t lanes)
-{
-    memset(x, 0, (s->unknowns + s->nheld) * sizeof *x);
-    for (size_t i = 0; i < s->nanchors; i++)
-        for (int c = 0; c < 3; c++)
-            for (size_t k = 0; k < lanes; k++)
-                x[s->unknowns + i].xyz[c][k] = anchors[k][3 * i + (size_t)c] - anchors[k][c];
-}
-
-static void load_rhs(const vg_solver *s, vgi_row *r, double *const *rhs, size_t lanes)
-{
-    if (s->unknowns > s->vertices_unknown) memset(r, 0, s->unknowns * sizeof *r); /* the centroids' are 0 */
-    for (size_t v = 0; v < s->g->nv; v++) {
-        if (s->row[v] >= s->unknowns) continue;
-        vgi_row *to = &r[s->row[v]];
-        for (int c = 0; c < 3; c++)
-            for (size_t k = 0; k < VGI_LANES; k++) to->xyz[c][k] = rhs[k < lanes ? k : lanes - 1][3 * v + (size_t)c];
-    }
-    memset(r + s->unknowns, 0, s->nheld * sizeof *r);
-}
-
-static void solve_rows(const vg_solver *s, vgi_row *x, vgi_row *r, double *const *rhs, const double *const *anchors, size_t lanes)
-{
-    const vgi_stencil stencil = {s->g->nf, s->g->start, s->corner_row, s->centre};
-    start_solution(s, x, anchors, lanes);
-    for (int pass = 0; pass < PASSES; pass++) {
-        load_rhs(s, r, rhs, lanes);
-        if (pass > 0 || s->nanchors) vgi_residual(&stencil, x, r);
-        vgi_factor_solve(&s->factor, r);
-        for (size_t i = 0; i < s->unknowns; i++)
-            for (int c = 0; c < 3; c++) x[i].xyz[c] += r[i].xyz[c];
-    }
-}
-
-/* Where the pose's zero goes: to the first anchor, or to wherever its mean becomes the root. */
-static void find_shift(const vg_solver *s, const double *x, const double *anchor, const double *root, double shift[3])
-{
-    if (s->nanchors) {
-        for (int c = 0; c < 3; c++) shift[c] = anchor[c];
-        return;
-    }
-    double mean[3];
-    vg_graph_root(s->g, x, mean);
-    for (int c = 0; c < 3; c++) shift[c] = root[c] - mean[c];
-}
-
-static void store(const vg_solver *s, const vgi_row *row, double *const *x, size_t lanes)
-{
-    for (size_t v = 0; v < s->g->nv; v++) {
-        const vgi_row *from = row && s->row[v] != NO_ROW ? &row[s->row[v]] : NULL;
-        for (size_t k = 0; k < lanes; k++)
-            for (int c = 0; c < 3; c++) x[k][3 * v + (size_t)c] = from ? from->xyz[c][k] : 0;
-    }
-}
-
+/* Move a pose whose held vertex is at 0 to its place: to the first anchor, or so that its mean becomes the root. */
 static void place(const vg_solver *s, double *x, const double *anchor, const double *root)
 {
     const vg_graph *g = s->g;
+    double mean[3] = {0, 0, 0};
+    if (!s->nanchors) vg_graph_root(g, x, mean);
     double shift[3];
-    find_shift(s, x, anchor, root, shift);
+    for (int k = 0; k < 3; k++) shift[k] = s->nanchors ? anchor[k] : root[k] - mean[k];
     for (size_t v = 0; v < g->nv; v++)
-        for (int c = 0; c < 3; c++) x[3 * v + (size_t)c] += shift[c];
+        for (size_t k = 0; k < 3; k++) x[3 * v + k] += shift[k];
     for (size_t i = 0; i < s->nanchors; i++) memcpy(x + 3 * (size_t)s->anchors[i], anchor + 3 * i, 3 * sizeof *x);
     for (size_t i = 0; i < s->nisolated; i++)
         memcpy(x + 3 * (size_t)s->isolated[i], s->isolated_at + 3 * i, 3 * sizeof *x);
@@ -372,19 +365,25 @@ static void place(const vg_solver *s, double *x, const double *anchor, const dou
 static void solve_block(void *context, size_t i)
 {
     const solve_job *j = context;
-    vg_solver *s = j->s;
+    const vg_solver *s = j->s;
     size_t first = (j->first + i) * VGI_LANES, lanes = j->n - first < VGI_LANES ? j->n - first : VGI_LANES;
-    size_t buffer = i * (s->unknowns + s->nheld);
-    vgi_row *x = s->x ? s->x + buffer : NULL;
-    if (x) solve_rows(s, x, s->r + buffer, j->x + first, s->nanchors ? j->anchors + first : NULL, lanes);
-    store(s, x, j->x + first, lanes);
-    for (size_t k = 0; k < lanes; k++)
-        place(s, j->x[first + k], s->nanchors ? j->anchors[first + k] : NULL, s->nanchors ? NULL : j->roots[first + k]);
+    if (s->unknowns) {
+        vgi_row *x = s->x + i * s->unknowns;
+        const double *rhs[VGI_LANES];
+        for (size_t k = 0; k < VGI_LANES; k++) rhs[k] = j->rhs[first + (k < lanes ? k : lanes - 1)];
+        if (s->unknowns > s->vertices_unknown) memset(x, 0, s->unknowns * sizeof *x); /* the centroids' are 0 */
+        vgi_load_rows(x, s->row, s->g->nv, s->unknowns, rhs);
+        vgi_factor_solve(&s->factor, x);
+        vgi_add_rows(x, s->row, s->g->nv, s->unknowns, j->x + first, lanes);
+    }
+    for (size_t k = first; k < first + lanes; k++)
+        place(s, j->x[k], s->nanchors ? j->anchors[k] : NULL, s->nanchors ? NULL : j->roots[k]);
 }
 
-void vg_solver_solve(vg_solver *s, size_t n, double *const *x, const double *const *anchors, const double *const *roots)
+void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *const *x, const double *const *anchors,
+                     const double *const *roots)
 {
-    solve_job j = {.s = s, .n = n, .x = x, .anchors = anchors, .roots = roots};
+    solve_job j = {.s = s, .n = n, .rhs = rhs, .x = x, .anchors = anchors, .roots = roots};
     size_t blocks = (n + VGI_LANES - 1) / VGI_LANES;
     for (; j.first < blocks; j.first += (size_t)s->threads) {
         size_t round = blocks - j.first < (size_t)s->threads ? blocks - j.first : (size_t)s->threads;

@@ -3,7 +3,8 @@
  * A sparse triangular solve is bound by loading and storing x: with one column at a time every entry of the factor costs a
  * load and a store of its row of x. Here the columns of a supernode share their rows, so a row is loaded once, takes all the
  * columns of the supernode while it stays in registers, and is stored once; a few rows (forward) or columns (backward)
- * go together, so that what they share is loaded once too. Leaves out assembly and factorisation: reconstruct.c.
+ * go together, so that what they share is loaded once too. Also the way of the numbers from the poses into the
+ * rows and back. Leaves out assembly and factorisation: reconstruct.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/solve_kernel.h"
 
@@ -95,23 +96,34 @@ INLINE void backward(const vgi_factor *f, vgi_row *x, int width)
     }
 }
 
-INLINE void residual(const vgi_stencil *s, const vgi_row *x, vgi_row *r)
+/* Rows are met in the order of vertices, which is not theirs: ask for the lines of one ahead. */
+INLINE void ask(const vgi_row *x, const uint32_t *row, size_t v, size_t nv, size_t rows)
 {
-    for (size_t f = 0; f < s->faces; f++) {
-        const uint32_t *rows = s->rows + s->start[f];
-        uint32_t size = s->start[f + 1] - s->start[f], centre = s->centre[f];
-        /* distances from the first corner, or from the centre of a star; the pull of each corner is its distance from the mean */
-        const vgi_row *from = &x[centre == UINT32_MAX ? rows[0] : centre];
-        vgi_row mean = {{{0}, {0}, {0}}};
-        for (uint32_t i = 0; i < size; i++)
-            for (int c = 0; c < 3; c++) mean.xyz[c] += x[rows[i]].xyz[c] - from->xyz[c];
-        if (centre != UINT32_MAX) {
-            for (int c = 0; c < 3; c++) r[centre].xyz[c] += mean.xyz[c], mean.xyz[c] = (vgi_lanes){0};
-        } else {
-            for (int c = 0; c < 3; c++) mean.xyz[c] *= 1.0 / size;
-        }
-        for (uint32_t i = 0; i < size; i++)
-            for (int c = 0; c < 3; c++) r[rows[i]].xyz[c] -= (x[rows[i]].xyz[c] - from->xyz[c]) - mean.xyz[c];
+    enum { AHEAD = 8 };
+    if (v + AHEAD >= nv || row[v + AHEAD] >= rows) return;
+    const char *p = (const char *)&x[row[v + AHEAD]];
+    for (size_t i = 0; i < sizeof *x; i += 64) __builtin_prefetch(p + i, 1);
+}
+
+INLINE void load_rows(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs)
+{
+    for (size_t v = 0; v < nv; v++) {
+        ask(x, row, v, nv, rows);
+        if (row[v] >= rows) continue;
+        vgi_row *to = &x[row[v]];
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < VGI_LANES; k++) to->xyz[c][k] = rhs[k][3 * v + (size_t)c];
+    }
+}
+
+INLINE void add_rows(const vgi_row *x, const uint32_t *row, size_t nv, size_t rows, double *const *pose, size_t lanes)
+{
+    for (size_t v = 0; v < nv; v++) {
+        ask(x, row, v, nv, rows);
+        if (row[v] >= rows) continue;
+        const double *from = (const double *)&x[row[v]];
+        for (size_t k = 0; k < lanes; k++)
+            for (size_t c = 0; c < 3; c++) pose[k][3 * v + c] += from[c * VGI_LANES + k];
     }
 }
 
@@ -126,20 +138,15 @@ AVX512 static void solve_avx512(const vgi_factor *f, vgi_row *x)
     backward(f, x, 4);
 }
 
-AVX512 static void residual_avx512(const vgi_stencil *s, const vgi_row *x, vgi_row *r)
+AVX512 static void load_avx512(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs)
 {
-    residual(s, x, r);
+    load_rows(x, row, nv, rows, rhs);
 }
 
 AVX2 static void solve_avx2(const vgi_factor *f, vgi_row *x)
 {
     forward(f, x, 2);
     backward(f, x, 2);
-}
-
-AVX2 static void residual_avx2(const vgi_stencil *s, const vgi_row *x, vgi_row *r)
-{
-    residual(s, x, r);
 }
 
 static bool has_avx512(void)
@@ -163,11 +170,15 @@ void vgi_factor_solve(const vgi_factor *f, vgi_row *x)
     backward(f, x, 1);
 }
 
-void vgi_residual(const vgi_stencil *s, const vgi_row *x, vgi_row *r)
+void vgi_load_rows(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs)
 {
 #if defined(__x86_64__)
-    if (has_avx512()) return residual_avx512(s, x, r);
-    if (has_avx2()) return residual_avx2(s, x, r);
+    if (has_avx512()) return load_avx512(x, row, nv, rows, rhs);
 #endif
-    residual(s, x, r);
+    load_rows(x, row, nv, rows, rhs);
+}
+
+void vgi_add_rows(const vgi_row *x, const uint32_t *row, size_t nv, size_t rows, double *const *pose, size_t lanes)
+{
+    add_rows(x, row, nv, rows, pose, lanes);
 }

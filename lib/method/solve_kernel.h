@@ -22,14 +22,9 @@ typedef struct vgi_row {
 /* vgi_factor_solve: x := (L L')^-1 x, n rows in the factor's order. */
 void vgi_factor_solve(const vgi_factor *f, vgi_row *x);
 
-/* The normal matrix as what it is, a sum over faces: face f stands on rows[start[f]] .. rows[start[f+1]-1]. Of a star (see
- * reconstruct.c) the centre is one more row: centre[f]; of others UINT32_MAX. */
-typedef struct vgi_stencil {
-    size_t faces;
-    const uint32_t *start, *rows, *centre;
-} vgi_stencil;
-
-/* vgi_residual: r -= N x. Rounds like the vectors of x, not like x: only differences within a face are formed. */
-void vgi_residual(const vgi_stencil *s, const vgi_row *x, vgi_row *r);
+/* vgi_load_rows: x[row[v]] := rhs of vertex v in 8 poses (nv x 3 each), for every v with row[v] < rows. */
+void vgi_load_rows(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs);
+/* vgi_add_rows: the way back, for the first `lanes` poses: pose[k] of v += x[row[v]]. */
+void vgi_add_rows(const vgi_row *x, const uint32_t *row, size_t nv, size_t rows, double *const *pose, size_t lanes);
 
 #endif

@@ -1,7 +1,6 @@
 /* album.c: evenly spaced frames of a sequence whose length is not known before its end, in bounded memory.
- * Of every `stride` frames one is kept; when there is no more room every second one is let go and the stride doubles. The last
- * frame is always kept. Leaves out what is in a shot.
- * SPDX-License-Identifier: GPL-3.0-or-later */
+ * Of every `stride` frames one is kept; when there is no more room every second one is let go and the stride doubles.
+ * The last frame is always kept. Leaves out what is in a shot. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 static void clear_shot(vgi_shot *s)
@@ -72,8 +71,8 @@ size_t vgi_album_close(vgi_album *a)
     if (a->at[a->n - 1].index != last) swap_shots(a->at + a->n++, &a->last);
     if (a->n <= a->want) return a->n;
     for (size_t i = 0, from = 0; i < a->want; i++) {
-        /* the frame nearest to the i-th of `want` evenly spaced ones; wanted ones are more than a stride apart, so that
-         * none is taken twice */
+        /* the frame nearest to the i-th of `want` evenly spaced ones; wanted ones are more than a stride apart, so
+         * that none is taken twice */
         double at = a->want > 1 ? (double)i * (double)last / (double)(a->want - 1) : 0;
         while (from + 1 < a->n && (double)a->at[from + 1].index - at < at - (double)a->at[from].index) from++;
         if (from < i) from = i;

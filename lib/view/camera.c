@@ -34,7 +34,8 @@ static double along(const float axis[3], const float p[3])
     return (double)axis[0] * p[0] + (double)axis[1] * p[1] + (double)axis[2] * p[2];
 }
 
-void vgi_camera_measure(const vgi_camera *c, const vgi_figure *g, const float *points, const double shift[2], vgi_box *box)
+void vgi_camera_measure(const vgi_camera *c, const vgi_figure *g, const float *points, const double shift[2],
+                        vgi_box *box)
 {
     for (size_t v = 0; v < g->mesh->nv; v++) {
         if (!g->drawn[v]) continue;

@@ -1,7 +1,7 @@
 /* colour.c: the error colours and the way from linear light to the bytes of a picture.
  * The colour map is of our own making: a path in OKLab (Ottosson 2020) whose lightness grows evenly from a deep
- * indigo over teal to a light yellow, so that it also reads in grey and with colour-deficient eyes. Leaves out lights.
- * SPDX-License-Identifier: GPL-3.0-or-later */
+ * indigo over teal to a light yellow, so that it also reads in grey and with colour-deficient eyes. Leaves out
+ * lights. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>

@@ -1,12 +1,11 @@
-/* figure.c: what of a mesh is seen: the faces around its vertices, smooth normals that respect creases, and triangles.
- * Leaves out where things are on the picture.
- * SPDX-License-Identifier: GPL-3.0-or-later */
+/* figure.c: what of a mesh is seen: the faces around its vertices, smooth normals that respect creases, and
+ * triangles. Leaves out where things are on the picture. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
 
-/* Faces that meet at less than this angle are smoothed into one another: the limbs of a coarse figure with eight faces around
- * stay round (45 degrees each), the sides of a box stay flat. */
+/* Faces that meet at less than this angle are smoothed into one another: the limbs of a coarse figure with eight
+ * faces around stay round (45 degrees each), the sides of a box stay flat. */
 #define CREASE_COSINE 0.64f /* 50 degrees */
 
 /* Around a vertex of more faces than this all are smoothed: comparing each with each would take too long. */
@@ -18,7 +17,6 @@ static void count_ring(vgi_figure *g)
     for (size_t f = 0; f < m->nf; f++) {
         size_t n = m->start[f + 1] - m->start[f];
         if (n > g->max_corners) g->max_corners = n;
-        if (n == 2) g->nwires++;
         for (size_t c = m->start[f]; c < m->start[f + 1]; c++) {
             g->drawn[m->vert[c]] = true;
             if (n > 2) g->ring_start[m->vert[c] + 1]++;

@@ -1,6 +1,5 @@
-/* ground.c: a grid where the reference pose stands, and the shadow of the figure straight above it: they show whether a
- * figure walks, jumps or slides. Leaves out shadows of the lights.
- * SPDX-License-Identifier: GPL-3.0-or-later */
+/* ground.c: a grid where the reference pose stands, and the shadow of the figure straight above it: they show whether
+ * a figure walks, jumps or slides. Leaves out shadows of the lights. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
@@ -79,7 +78,8 @@ static float shadow_at(const vgi_ground *g, double across, double along)
     float u = (float)(x - (double)i), v = (float)(y - (double)j);
     const float *p = g->shadow + j * g->n + i, *q = p + g->n;
     float mean = (1 - v) * ((1 - u) * p[0] + u * p[1]) + v * ((1 - u) * q[0] + u * q[1]);
-    return fminf(2 * mean, 1) * (1 - 0.25f * fminf(2 * mean, 1)); /* small feet are lost in the blur: raised, and its top rounded */
+    float raised = fminf(2 * mean, 1); /* small feet are lost in the blur */
+    return raised * (1 - 0.25f * raised);
 }
 
 /* ---- grid ---- */

@@ -80,8 +80,8 @@ int vgi_png_open(vgi_png **out, int fd, const char *name, size_t w, size_t h, vg
 {
     *out = NULL;
     if (w == 0 || h == 0 || w > PNG_USER_WIDTH_MAX || h > PNG_USER_HEIGHT_MAX)
-        return vg_fail(e, VG_EARG, "the picture '%s' would be %zu x %zu pixels, and a PNG has at most %d each way", name, w, h,
-                       PNG_USER_WIDTH_MAX);
+        return vg_fail(e, VG_EARG, "the picture '%s' would be %zu x %zu pixels, and a PNG has at most %d each way",
+                       name, w, h, PNG_USER_WIDTH_MAX);
     vgi_png *p = vgi_array(1, sizeof *p, e);
     if (!p) return VG_ENOMEM;
     p->fd = fd;

@@ -5,10 +5,11 @@
 
 #include <math.h>
 
-/* Positions are rounded to 1/256 of a sample, and the sides of triangles are evaluated in integers: two faces that share a
- * side then leave no gap between them. */
+/* Positions are rounded to 1/256 of a sample, and the sides of triangles are evaluated in integers: two faces that
+ * share a side then leave no gap between them. */
 enum { GRID = 256 };
-/* Pictures are at most 2^15 samples wide; what is farther out than this is not drawn, so that products fit 64 bits. */
+/* Pictures are at most 2^15 samples wide; what is farther out than this is not drawn, so that products fit 64 bits.
+ */
 #define FAR_OUT 1e6f
 
 /* A concave face of more corners than this is drawn as if it were convex. */
@@ -127,8 +128,8 @@ void vgi_raster_triangle(vgi_raster *r, const vgi_corner *const corner[3], unsig
 
 /* ---- wires ---- */
 
-/* Where a row meets the strip of the given radius around the line through a and b; the caller has clipped to the box of
- * the rounded ends. */
+/* Where a row meets the strip of the given radius around the line through a and b; the caller has clipped to the box
+ * of the rounded ends. */
 static void strip(const vgi_corner *a, float dx, float dy, float reach, double y, size_t *x0, size_t *x1)
 {
     if (fabsf(dy) < 1e-3f) return;
@@ -281,6 +282,28 @@ static void draw_face(work *k, size_t f)
     }
 }
 
+static bool is_empty(const vgi_raster *r)
+{
+    for (size_t i = 0; i < r->w * r->h; i++)
+        if (r->at[i].kind != VGI_EMPTY) return false;
+    return true;
+}
+
+/* A flat figure seen from its side covers no sample, nor does one that has shrunk to a line or a point: draw its
+ * edges. */
+static void draw_edges(work *k, float radius)
+{
+    const vg_mesh *m = k->drawing->figure->mesh;
+    for (size_t f = 0; f < m->nf; f++) {
+        size_t first = m->start[f], n = m->start[f + 1] - first;
+        for (size_t i = 0; i < n; i++) {
+            load_corner(k, m->vert[first + i], NULL, k->corner);
+            load_corner(k, m->vert[first + (i + 1) % n], NULL, k->corner + 1);
+            vgi_raster_wire(k->raster, k->corner, k->corner + 1, radius);
+        }
+    }
+}
+
 static int make_work(work *k, vg_err *e)
 {
     const vgi_figure *g = k->drawing->figure;
@@ -315,6 +338,7 @@ int vgi_draw(vgi_raster *r, const vgi_drawing *d, vg_err *e)
         vgi_camera_project(d->camera, d->points, m->nv, k.seen);
         vgi_figure_normals(d->figure, d->points, k.face, k.normals);
         for (size_t f = 0; f < m->nf; f++) draw_face(&k, f);
+        if (m->nf > 0 && is_empty(r)) draw_edges(&k, d->wire);
         for (size_t v = 0; m->nf == 0 && v < m->nv; v++) {
             load_corner(&k, (uint32_t)v, NULL, k.corner);
             vgi_raster_wire(r, k.corner, k.corner, 1.6f * d->wire);

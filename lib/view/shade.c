@@ -70,7 +70,8 @@ static float sky_seen(const pixels *p, size_t x, size_t y, const float taps[][2]
     float angle = (float)((x % PATTERN) * PATTERN + y % PATTERN) * (float)(2 * M_PI / (PATTERN * PATTERN));
     float cosine = cosf(angle), sine = sinf(angle);
     for (int i = 0; i < TAPS; i++) {
-        float dx = reach * (taps[i][0] * cosine - taps[i][1] * sine), dy = reach * (taps[i][0] * sine + taps[i][1] * cosine);
+        float dx = reach * (taps[i][0] * cosine - taps[i][1] * sine),
+              dy = reach * (taps[i][0] * sine + taps[i][1] * cosine);
         long px = (long)x + lrintf(dx / (float)p->step), py = (long)y - lrintf(dy / (float)p->step);
         if (px < 0 || py < 0 || px >= (long)p->w || py >= (long)p->h) continue;
         sum += hidden(s, n, middle_sample(p, (size_t)px, (size_t)py), (float)(px - (long)x) * (float)p->step,
@@ -133,8 +134,8 @@ static float corner_light(const pixels *p, size_t x, size_t y)
 /* ---- outlines ---- */
 
 /* How much nearer a sample is than what its neighbours on both sides of it let expect, along one axis. */
-static float depth_step(const vgi_raster *r, size_t at, size_t room_before, size_t room_after, size_t stride, size_t reach,
-                        float limit)
+static float depth_step(const vgi_raster *r, size_t at, size_t room_before, size_t room_after, size_t stride,
+                        size_t reach, float limit)
 {
     float z = r->at[at].z, floor = z - 4 * limit;
     float a = room_before >= reach ? r->at[at - reach * stride].z : floor;
@@ -160,7 +161,8 @@ static void light_clay(const float n[3], const float albedo[3], float sky_seen_h
     float gloss = h * h, edge = r * r * 0.55f * sky_seen_here;
     gloss *= gloss, gloss *= gloss, gloss *= gloss, gloss *= gloss; /* to the power 32 */
     gloss *= 0.055f * sky_seen_here;
-    const float warm[3] = {1.02f, 0.97f, 0.90f}, above[3] = {0.31f, 0.36f, 0.44f}, below[3] = {0.115f, 0.095f, 0.085f};
+    const float warm[3] = {1.02f, 0.97f, 0.90f}, above[3] = {0.31f, 0.36f, 0.44f},
+                below[3] = {0.115f, 0.095f, 0.085f};
     const float cool[3] = {0.065f, 0.085f, 0.12f};
     for (int i = 0; i < 3; i++) {
         float light = 1.08f * k * warm[i] * (0.35f + 0.65f * sky_seen_here) +
@@ -212,7 +214,8 @@ static void light_background(const background *b, double x, double y, float out[
     for (int k = 0; k < 3; k++) out[k] = light * (page_top[k] + down * down * (page_bottom[k] - page_top[k]));
 }
 
-static void shade_pixel(const vgi_look *l, const pixels *p, const background *b, size_t x, size_t y, unsigned char rgb[3])
+static void shade_pixel(const vgi_look *l, const pixels *p, const background *b, size_t x, size_t y,
+                        unsigned char rgb[3])
 {
     const vgi_raster *r = p->r;
     float sum[3] = {0, 0, 0}, page[3], sky = -1;

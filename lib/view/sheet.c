@@ -44,10 +44,11 @@ struct vg_sheet {
 
 static int check_options(const vg_sheet_options *o, vg_err *e)
 {
-    if (o->frames < 1 || o->frames > 1000000) return vg_fail(e, VG_EARG, "a sheet needs between 1 and 1000000 frames");
+    if (o->frames < 1 || o->frames > 1000000)
+        return vg_fail(e, VG_EARG, "a sheet needs between 1 and 1000000 frames");
     if (o->width < LEAST_SIDE || o->width > MOST_SIDE || o->height < LEAST_SIDE || o->height > MOST_SIDE)
-        return vg_fail(e, VG_EARG, "a picture of %zu x %zu pixels is not possible: %d to %d each way", o->width, o->height,
-                       LEAST_SIDE, MOST_SIDE);
+        return vg_fail(e, VG_EARG, "a picture of %zu x %zu pixels is not possible: %d to %d each way", o->width,
+                       o->height, LEAST_SIDE, MOST_SIDE);
     if (!(o->scale >= 0 && o->scale < INFINITY) || !isfinite(o->azimuth) || !isfinite(o->elevation))
         return vg_fail(e, VG_EARG, "scale, azimuth and elevation must be numbers, and the scale not negative");
     return VG_OK;
@@ -200,7 +201,8 @@ static size_t caption_height(const vg_sheet *s)
 static size_t choose_columns(const vg_sheet *s)
 {
     size_t best = 1;
-    double least = INFINITY, w = (double)(s->o.width + MARGIN), h = (double)(s->o.height + caption_height(s) + MARGIN);
+    double least = INFINITY, w = (double)(s->o.width + MARGIN),
+           h = (double)(s->o.height + caption_height(s) + MARGIN);
     for (size_t c = 1; c <= s->n; c++) {
         size_t rows = (s->n + c - 1) / c;
         double shape = fabs(log((double)c * w / ((double)rows * h) / (16.0 / 9)));
@@ -294,7 +296,8 @@ static int draw_shot(const vg_sheet *s, size_t i, unsigned char *rgb, vg_err *e)
     }
     vgi_drawing drawing = {&s->figure, &camera, shot->points, values, (float)(0.9 * pixel),
                            s->o.edges ? (float)(0.45 * pixel) : 0};
-    vgi_look look = {&s->palette, NULL, s->o.compare, s->oversampling, 0.5f, (float)(0.02 * side), (float)(0.07 * side)};
+    vgi_look look = {&s->palette,         NULL, s->o.compare, s->oversampling, 0.5f, (float)(0.02 * side),
+                     (float)(0.07 * side)};
     if (s->o.ground && s->figure.mesh->nv > 0) {
         place_ground(s, i, &ground);
         r = vgi_ground_shadow(&ground, &drawing, e);
@@ -330,7 +333,8 @@ static void clear_canvas(vgi_canvas *c)
     for (size_t i = 0; i < c->w * c->h; i++) memcpy(c->rgb + 3 * i, page, 3);
 }
 
-static void centre_text(vgi_canvas *c, double middle, double y, double dot, const unsigned char colour[3], const char *text)
+static void centre_text(vgi_canvas *c, double middle, double y, double dot, const unsigned char colour[3],
+                        const char *text)
 {
     vgi_text(c, floor(middle - vgi_text_width(dot, text) / 2), y, dot, colour, text);
 }
@@ -340,12 +344,20 @@ static void paste(vgi_canvas *c, size_t x, size_t y, const unsigned char *rgb, s
     for (size_t j = 0; j < h; j++) memcpy(c->rgb + 3 * ((y + j) * c->w + x), rgb + 3 * j * w, 3 * w);
 }
 
+/* The name of a frame, or its number when it has none. */
+static void print_label(char *to, size_t size, const vgi_shot *shot)
+{
+    if (*shot->name)
+        snprintf(to, size, "%s", shot->name);
+    else
+        snprintf(to, size, "frame %zu", shot->index);
+}
+
 static void put_caption(const vg_sheet *s, vgi_canvas *c, size_t x, const vgi_shot *shot)
 {
     char text[TEXT_BYTES], number[TEXT_BYTES], mean[32], max[32];
     double middle = (double)x + (double)s->o.width / 2, y = (double)s->o.height + 8;
-    if (*shot->name) snprintf(number, sizeof number, "%s", shot->name);
-    else snprintf(number, sizeof number, "frame %zu", shot->index);
+    print_label(number, sizeof number, shot);
     vgi_text_fit(text, sizeof text, caption_dot, (double)s->o.width, number);
     centre_text(c, middle, y, caption_dot, ink, text);
     if (!s->o.compare) return;
@@ -383,20 +395,22 @@ static void put_ticks(const vg_sheet *s, vgi_canvas *c, size_t x, size_t y, size
 
 static void put_legend(const vg_sheet *s, vgi_canvas *c)
 {
-    char text[TEXT_BYTES], number[TEXT_BYTES], largest[32], diagonal[32];
+    char text[TEXT_BYTES], number[2 * TEXT_BYTES], label[TEXT_BYTES], largest[32], diagonal[32];
     size_t room = c->w - 2 * MARGIN, w = room < BAR_WIDTH ? room : BAR_WIDTH;
     print_number(largest, sizeof largest, "%.3g", s->largest);
     print_number(diagonal, sizeof diagonal, "%.4g", s->diagonal);
-    if (s->diagonal > 0) snprintf(number, sizeof number, "vertex error%s in units of D = %s (diagonal of the reference)",
-                                  s->o.centred ? ", centred," : "", diagonal);
-    else snprintf(number, sizeof number, "vertex error%s", s->o.centred ? ", centred" : "");
+    if (s->diagonal > 0)
+        snprintf(number, sizeof number, "vertex error%s in units of D = %s (diagonal of the reference)",
+                 s->o.centred ? ", centred," : "", diagonal);
+    else
+        snprintf(number, sizeof number, "vertex error%s", s->o.centred ? ", centred" : "");
     vgi_text_fit(text, sizeof text, small_dot, (double)room, number);
     vgi_text(c, MARGIN, 4, small_dot, ink, text);
     put_bar(s, c, MARGIN, 20, w);
     put_ticks(s, c, MARGIN, 20 + BAR_HEIGHT, w);
+    print_label(label, sizeof label, s->album.at + s->largest_shot);
     const char *end = s->o.scale > 0 ? "given" : "99% of the vertices shown are below";
-    snprintf(number, sizeof number, "end of the colours: %s; largest %s in '%s'", end, largest,
-             s->album.at[s->largest_shot].name);
+    snprintf(number, sizeof number, "end of the colours: %s; largest %s in '%s'", end, largest, label);
     vgi_text_fit(text, sizeof text, small_dot, (double)room, number);
     vgi_text(c, MARGIN, 20 + BAR_HEIGHT + 24, small_dot, soft_ink, text);
 }

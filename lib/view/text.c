@@ -7,7 +7,8 @@
 
 enum { COLUMNS = 5, ROWS = 9, FIRST = 32, LAST = 126 };
 
-/* One row of a glyph is five bits, the highest to the left. Capitals stand on row 6; rows 7 and 8 are below the line. */
+/* One row of a glyph is five bits, the highest to the left. Capitals stand on row 6; rows 7 and 8 are below the line.
+ */
 static const unsigned char glyphs[LAST - FIRST + 1][ROWS] = {
     {0},                                    /* space */
     {4, 4, 4, 4, 4, 0, 4},                  /* ! */
@@ -161,7 +162,8 @@ static void draw_glyph(vgi_canvas *c, double x, double y, double dot, const unsi
     long y0 = (long)floor(y - 1), y1 = (long)ceil(y + ROWS * dot + 1);
     for (long py = y0 < 0 ? 0 : y0; py < y1 && py < (long)c->h; py++)
         for (long px = x0 < 0 ? 0 : x0; px < x1 && px < (long)c->w; px++) {
-            double off = to_glyph(glyph, ((double)px + 0.5 - x) / dot - 0.5, ((double)py + 0.5 - y) / dot - 0.5) * dot;
+            double off =
+                to_glyph(glyph, ((double)px + 0.5 - x) / dot - 0.5, ((double)py + 0.5 - y) / dot - 0.5) * dot;
             double cover = fmin(fmax(thick + 0.5 - off, 0), 1);
             unsigned char *p = c->rgb + 3 * ((size_t)py * c->w + (size_t)px);
             for (int k = 0; k < 3 && cover > 0; k++) p[k] = (unsigned char)(p[k] + cover * (colour[k] - p[k]) + 0.5);

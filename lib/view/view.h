@@ -1,9 +1,9 @@
 /* view.h: what the files of lib/view share: figure, camera, samples, colours, text, the frames that are shown, PNG.
  * Internal; the picture a C program may ask for is vg_sheet in vg.h.
  *
- * Units: points are kept in D from the first pose's middle, in binary32, which is enough for a picture. A camera takes them to
- * samples: x to the right, y down, z towards the viewer, all three in samples. `oversampling` samples in each
- * direction make a pixel. Colours are linear red, green, blue in [0, 1] until they become a pixel.
+ * Units: points are kept in D from the first pose's middle, in binary32, which is enough for a picture. A camera
+ * takes them to samples: x to the right, y down, z towards the viewer, all three in samples. `oversampling` samples
+ * in each direction make a pixel. Colours are linear red, green, blue in [0, 1] until they become a pixel.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_VIEW_H
 #define VG_VIEW_H
@@ -18,14 +18,14 @@ typedef struct vgi_figure {
     uint32_t *ring;         /* ring[ring_start[v]] .. ring[ring_start[v + 1] - 1] */
     bool *drawn;            /* nv: vertices that are seen: those in a face, or all when there is no face */
     size_t max_corners;
-    size_t nwires;          /* faces of 2 vertices */
 } vgi_figure;
 
 int vgi_figure_init(vgi_figure *g, const vg_mesh *m, vg_err *e) VG_MUST_CHECK;
 void vgi_figure_clear(vgi_figure *g);
 
 /* vgi_figure_normals: a unit normal per corner: the mean of the faces around the vertex, by area, that turn less
- * than the crease angle from the corner's own face. points: nv, any unit. face: 3 * nf work; normals: 3 * corners out. */
+ * than the crease angle from the corner's own face. points: nv, any unit. face: 3 * nf work; normals: 3 * corners
+ * out. */
 void vgi_figure_normals(const vgi_figure *g, const float *points, float *face, float *normals);
 
 /* vgi_ear_clip: cut a polygon of n >= 3 corners in the plane (xy: n pairs, counter-clockwise when area > 0, else
@@ -48,7 +48,8 @@ typedef struct vgi_box { /* of points seen by a camera, along right and up */
 
 void vgi_camera_turn(vgi_camera *c, double azimuth, double elevation, bool z_up);
 vgi_box vgi_box_empty(void);
-void vgi_camera_measure(const vgi_camera *c, const vgi_figure *g, const float *points, const double shift[2], vgi_box *box);
+void vgi_camera_measure(const vgi_camera *c, const vgi_figure *g, const float *points, const double shift[2],
+                        vgi_box *box);
 /* vgi_camera_fit: place and scale so that the box fills the picture but for a margin, a share of its smaller side. */
 void vgi_camera_fit(vgi_camera *c, const vgi_box *box, double margin);
 /* vgi_camera_project: nv points to samples. */
@@ -118,7 +119,8 @@ typedef struct vgi_ground { /* a grid on the plane where the reference pose stan
     float *shadow, origin[2], step;
 } vgi_ground;
 int vgi_ground_shadow(vgi_ground *g, const vgi_drawing *d, vg_err *e) VG_MUST_CHECK;
-/* vgi_ground_light: what a sample of the background at (x, y) of the camera, in D, is multiplied by; 1 = nothing there. */
+/* vgi_ground_light: what a sample of the background at (x, y) of the camera, in D, is multiplied by; 1 = nothing
+ * there. */
 float vgi_ground_light(const vgi_ground *g, const vgi_camera *c, double x, double y, double pixel);
 
 typedef struct vgi_look {
@@ -131,7 +133,8 @@ typedef struct vgi_look {
     float reach;              /* how far one surface shades another, in samples */
 } vgi_look;
 /* vgi_shade: w x h pixels (RGB) of a raster that is `oversampling` times larger each way. */
-int vgi_shade(const vgi_look *l, const vgi_raster *r, const vgi_camera *c, unsigned char *rgb, vg_err *e) VG_MUST_CHECK;
+int vgi_shade(const vgi_look *l, const vgi_raster *r, const vgi_camera *c, unsigned char *rgb,
+              vg_err *e) VG_MUST_CHECK;
 
 /* ---- text.c ---- */
 
@@ -140,7 +143,8 @@ typedef struct vgi_canvas {
     unsigned char *rgb;
 } vgi_canvas;
 enum { VGI_TEXT_ADVANCE = 6, VGI_TEXT_HEIGHT = 7 }; /* in dots */
-/* vgi_text: draw UTF-8 text, dots `dot` pixels apart, with its left top at (x, y); what is not ASCII becomes a box. */
+/* vgi_text: draw UTF-8 text, dots `dot` pixels apart, with its left top at (x, y); what is not ASCII becomes a box.
+ */
 void vgi_text(vgi_canvas *c, double x, double y, double dot, const unsigned char colour[3], const char *text);
 double vgi_text_width(double dot, const char *text);
 /* vgi_text_fit: copy text, with ".." in place of its middle when it is wider than `width` pixels. size >= 4. */

@@ -48,10 +48,8 @@ static void there_and_back(const vg_model *m, const char *format, bool full)
     demand(result == VG_OK);
     demand(vg_model_read(&back, once.data, once.size, NULL, "written", &e) == VG_OK);
     demand(vg_mesh_same(&m->mesh, "first", &back.mesh, "second", &e) == VG_OK);
-    if (full)
-        demand(same_bits(m->vertices, back.vertices, 3 * m->mesh.nv * sizeof *m->vertices));
-    else
-        demand(same_single(m->vertices, back.vertices, 3 * m->mesh.nv));
+    if (full) demand(same_bits(m->vertices, back.vertices, 3 * m->mesh.nv * sizeof *m->vertices));
+    else demand(same_single(m->vertices, back.vertices, 3 * m->mesh.nv));
     if (full && !strcmp(format, "obj")) {
         demand(same_texture(m, &back));
         demand(m->attributes.nlabels == back.attributes.nlabels);

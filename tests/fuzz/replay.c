@@ -26,7 +26,8 @@ static void run_file(const char *path)
     long size = ftell(f);
     if (size < 0) fail(path);
     rewind(f);
-    uint8_t *data = malloc((size_t)size ? (size_t)size : 1); /* exactly so long that a sanitizer sees reading beyond */
+    /* exactly so long that a sanitizer sees reading beyond */
+    uint8_t *data = malloc((size_t)size ? (size_t)size : 1);
     if (!data || fread(data, 1, (size_t)size, f) != (size_t)size) fail(path);
     fclose(f);
     /* the name comes before the run, so that a crash says which input it was */

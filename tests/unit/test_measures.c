@@ -140,7 +140,7 @@ static void a_scaled_mesh_differs_by_the_square(void)
 
 static void planarity_of_a_bent_quad(void)
 {
-    /* corners at (+-1, 0, h) and (0, +-1, -h): centroid 0, normal z; at every corner |z| / length = h / sqrt(1 + h^2) */
+    /* corners at (+-1, 0, h) and (0, +-1, -h): centroid 0, normal z; |z| / length = h / sqrt(1 + h^2) at every one */
     static uint32_t start[] = {0, 4, 7}, vert[] = {0, 1, 2, 3, 0, 1, 2};
     const vg_mesh m = {4, 2, start, vert};
     const double flat[12] = {1, 0, 0, 0, 1, 0, -1, 0, 0, 0, -1, 0}, h = 0.75;

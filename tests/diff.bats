@@ -1,0 +1,326 @@
+# diff.bats: vg-diff: measures whose value is known by hand, answers, and what cannot be compared.
+# SPDX-License-Identifier: GPL-3.0-or-later
+# shellcheck shell=bash disable=SC2154
+
+load lib
+
+# near FILE PATH VALUE TOLERANCE: the number at a.b.c of a JSON file
+near() {
+    python3 - "$@" <<'END'
+import json, sys
+x = json.load(open(sys.argv[1]), parse_constant=lambda name: sys.exit("not JSON: " + name))
+for key in sys.argv[2].split("."):
+    x = x[int(key)] if isinstance(x, list) else x[key]
+if not abs(x - float(sys.argv[3])) <= float(sys.argv[4]):
+    sys.exit("%s is %r, not %s" % (sys.argv[2], x, sys.argv[3]))
+END
+}
+
+# is FILE PATH JSON: exactly this value
+is() {
+    python3 - "$@" <<'END'
+import json, sys
+x = json.load(open(sys.argv[1]), parse_constant=lambda name: sys.exit("not JSON: " + name))
+for key in sys.argv[2].split("."):
+    x = x[int(key)] if isinstance(x, list) else x[key]
+if x != json.loads(sys.argv[3]) or type(x) != type(json.loads(sys.argv[3])):
+    sys.exit("%s is %r, not %s" % (sys.argv[2], x, sys.argv[3]))
+END
+}
+
+@test "a sequence equals itself, with a tolerance of 0" {
+    mesh cube >a.obj
+    must vg-diff -t 0 a.obj a.obj
+    shows 'max error 0 D is within the tolerance of 0 D' 'vertices  8' 'faces     6'
+    must vg-diff --tolerance 0 --of rms --centred "$DATA/horse-run.tar.xz" "$DATA/horse-run.tar.xz"
+}
+
+@test "one vertex moved by d: mean d/nv, rms d/sqrt(nv), max d, and where" {
+    mesh cube >a.obj
+    sed 's/^v 1.000000 1.000000 1.000000/v 1 1 1.25/' a.obj >b.obj
+    must vg-diff --json a.obj b.obj -o r.json
+    near r.json D 1.7320508075688772 1e-15
+    near r.json vertex_error.mean.error 0.03125 1e-17
+    near r.json vertex_error.mean.D 0.01804219591217581 1e-16
+    near r.json vertex_error.rms.error 0.08838834764831845 1e-16
+    near r.json vertex_error.max.error 0.25 0
+    near r.json vertex_error.p95.error 0.25 0.001
+    near r.json vertex_error.sigma.error 0 0
+    is r.json vertex_error.max.vertex 6
+    is r.json vertex_error.max.frame 0
+    is r.json vertex_error.max.frame_name '"a"'
+    is r.json vertex_error.mean.vertex null
+    must vg-diff a.obj b.obj
+    shows "vertex 6 of frame 0 'a'"
+}
+
+@test "sigma: the deviation of the errors 0 and d is d/2, at that vertex" {
+    mesh cube >p1.obj
+    cp p1.obj q1.obj
+    cp p1.obj p2.obj
+    sed 's/^v 0.000000 1.000000 1.000000/v 0 1.5 1/' p2.obj >q2.obj
+    vg-encode p1.obj p2.obj >p.vgs
+    vg-encode q1.obj q2.obj >q.vgs
+    must vg-diff --json p.vgs q.vgs -o r.json
+    near r.json vertex_error.sigma.error 0.25 1e-16
+    is r.json vertex_error.sigma.vertex 7
+    is r.json vertex_error.max.frame 1
+    is r.json vertex_error.max.frame_name '"p2"'
+}
+
+@test "a face turned by an angle has orientation error 1 - cos" {
+    printf 'v 0 0 0\nv 2 0 0\nv 0 3 0\nf 1 2 3\n' >a.obj
+    printf 'v 0 0 0\nv 2 0 0\nv 0 1.5 2.598076211353316\nf 1 2 3\n' >b.obj # 60 degrees about x
+    printf 'v 0 0 0\nv 2 0 0\nv 0 -3 0\nf 1 2 3\n' >c.obj                  # turned over
+    must vg-diff --json a.obj b.obj -o r.json
+    near r.json face_error.orientation.mean 0.5 1e-15
+    near r.json face_error.orientation.max 0.5 1e-15
+    near r.json face_error.area.max 0 1e-15
+    must vg-diff --json a.obj c.obj -o r.json
+    near r.json face_error.orientation.max 2 0
+}
+
+@test "a mesh scaled by s has area error |1 - s^2|" {
+    mesh cube >a.obj
+    awk '/^v/ { $2 *= 1.5; $3 *= 1.5; $4 *= 1.5 } 1' a.obj >b.obj
+    must vg-diff --json a.obj b.obj -o r.json
+    near r.json face_error.area.mean 1.25 1e-14
+    near r.json face_error.area.sd 0 1e-14
+    near r.json face_error.orientation.max 0 1e-15
+    is r.json faces_measured 6
+}
+
+@test "planarity of a quad bent by h is h / sqrt(1 + h^2)" {
+    printf 'v 1 0 0\nv 0 1 0\nv -1 0 0\nv 0 -1 0\nf 1 2 3 4\n' >a.obj
+    printf 'v 1 0 0.75\nv 0 1 -0.75\nv -1 0 0.75\nv 0 -1 -0.75\nf 1 2 3 4\n' >b.obj
+    must vg-diff --json a.obj b.obj -o r.json
+    near r.json planarity.truth.max 0 0
+    near r.json planarity.result.mean 0.6 1e-15
+    is r.json planarity.truth.histogram '[1, 0, 0, 0, 0, 0, 0, 0, 0, 0]'
+    near r.json planarity.result.faces 1 0
+}
+
+@test "line segments have vertices to measure, but no faces" {
+    printf 'v 0 0 0\nv 0 0 1\nv 0 0 2\nl 1 2\nl 2 3\n' >a.obj
+    printf 'v 0 0 0\nv 0 0 1\nv 0 1 2\nl 1 2\nl 2 3\n' >b.obj
+    must vg-diff a.obj b.obj
+    shows 'max                    1       0.5  vertex 2 of frame 0'
+    [[ $output != *orientation* && $output != *planarity* ]]
+}
+
+@test "--centred takes a shift out, and only that" {
+    mesh cube >a.obj
+    mesh cube 0 5 >b.obj
+    must_fail 1 vg-diff -t 0.1 a.obj b.obj
+    must vg-diff -c -t 1e-15 a.obj b.obj
+    must vg-diff --centred --json a.obj b.obj -o r.json
+    is r.json centred true
+}
+
+@test "the tolerance is about the error that --of names" {
+    mesh cube >a.obj
+    sed 's/^v 1.000000 1.000000 1.000000/v 1 1 1.25/' a.obj >b.obj # in D: mean 0.018, rms 0.051, max 0.144
+    must vg-diff --of mean -t 0.0181 a.obj b.obj
+    must_fail 1 vg-diff --of mean -t 0.0180 a.obj b.obj
+    says 'mean error 0.0180422 D exceeds the tolerance of 0.018 D'
+    must vg-diff --of rms -t 0.052 a.obj b.obj
+    must_fail 1 vg-diff --of rms -t 0.051 a.obj b.obj
+    must vg-diff --of max -t 0.1444 a.obj b.obj
+    must_fail 1 vg-diff -t 0.1443 a.obj b.obj
+    must_fail 1 vg-diff --of p95 -t 0.143 a.obj b.obj
+    must_fail 1 vg-diff --json -t 0.1 a.obj b.obj
+    printf '%s' "$output" >r.json
+    is r.json tolerance.within false
+    is r.json tolerance.of '"max"'
+    must_fail 1 vg-diff -t 0 a.obj b.obj
+    must vg-diff a.obj b.obj # a report, no question
+}
+
+@test "other vertices or faces: the answer is no, in one line" {
+    mesh cube >a.obj
+    mesh tetra >b.obj
+    must_fail 1 vg-diff a.obj b.obj
+    one_line
+    says "vg-diff: 'b.obj' has 4 vertices where 'a.obj' has 8"
+    [ -z "$output" ]
+    sed 's/^f 1 4 3 2$/f 4 3 2 1/' a.obj >c.obj
+    must_fail 1 vg-diff a.obj c.obj
+    one_line
+    says 'face 0'
+    must_fail 1 vg-diff --json a.obj b.obj
+    printf '%s' "$output" >r.json
+    is r.json comparable false
+    is r.json reason "\"'b.obj' has 4 vertices where 'a.obj' has 8\""
+}
+
+@test "another number of frames: the common ones are reported, and the answer is no" {
+    poses cube 3
+    vg-encode pose1.obj pose2.obj pose3.obj >long.vgs
+    vg-encode pose1.obj pose2.obj >short.vgs
+    must_fail 1 vg-diff -t 0 long.vgs short.vgs
+    one_line
+    says "'long.vgs' has 3 frames and 'short.vgs' has 2: only the first 2 were compared"
+    shows 'max error 0 D is within' 'compared  2'
+    must_fail 1 vg-diff short.vgs long.vgs
+    must_fail 1 vg-diff --json short.vgs long.vgs
+    printf '%s' "$output" >r.json
+    is r.json frames 2
+    is r.json result.frames 3
+}
+
+@test "--frames has a line for every frame, with its own error" {
+    poses cube 3
+    sed '1s/.*/v 1 0 -0.5/' pose2.obj >other.obj
+    vg-encode pose1.obj pose2.obj pose3.obj >a.vgs
+    vg-encode pose1.obj other.obj pose3.obj >b.vgs
+    must vg-diff --frames --json a.vgs b.vgs -o r.json
+    is r.json frame_errors.0.max 0.0
+    is r.json frame_errors.1.name '"pose2"'
+    is r.json frame_errors.1.frame 1
+    is r.json frame_errors.2.mean 0.0
+    python3 - <<'END'
+import json
+r = json.load(open("r.json"))
+worst = r["frame_errors"][1]
+assert len(r["frame_errors"]) == 3
+assert worst["max"] == r["vertex_error"]["max"]["error"] > 0
+assert abs(worst["mean"] * 8 - worst["max"]) < 1e-15
+assert abs(worst["mean_D"] * r["D"] - worst["mean"]) < 1e-15
+END
+    must vg-diff --frames a.vgs b.vgs
+    [ "$(printf '%s\n' "$output" | grep -c ' pose[123] ')" = 3 ]
+}
+
+@test "names of frames do not matter, and -v says which differ" {
+    mesh cube >a.obj
+    cp a.obj b.obj
+    capture vg-diff -v -t 0 a.obj b.obj
+    [ "$status" = 0 ]
+    says "frame 0 is 'a' in 'a.obj' and 'b' in 'b.obj'"
+}
+
+@test "one operand may be standard input" {
+    poses cube 2
+    vg-encode pose1.obj pose2.obj >a.vgs
+    pipe 'vg-encode pose1.obj pose2.obj | vg-diff -t 0 a.vgs -'
+    shows 'standard input, 2 frames'
+    pipe 'vg-encode pose1.obj pose2.obj | vg-diff -t 0 - a.vgs'
+    pipe 'cat pose1.obj | vg-diff -t 0 - pose1.obj'
+}
+
+@test "vectors and deformations are refused, with advice" {
+    poses cube 2
+    vg-encode --vectors pose1.obj pose2.obj >w.vgs
+    vg-encode pose1.obj pose2.obj >a.vgs
+    must_fail 3 vg-diff a.vgs w.vgs
+    one_line
+    says "'w.vgs' holds vectors" vg-solve
+    must_fail 3 vg-diff w.vgs a.vgs
+}
+
+@test "wrong usage" {
+    mesh cube >a.obj
+    must_fail 2 vg-diff
+    says 'TRUTH' 'usage: vg-diff [options] TRUTH RESULT'
+    must_fail 2 vg-diff a.obj
+    must_fail 2 vg-diff a.obj a.obj a.obj
+    must_fail 2 vg-diff - -
+    says 'only one of the two'
+    must_fail 2 vg-diff --of median a.obj a.obj
+    says "'median'"
+    must_fail 2 vg-diff -t -1 a.obj a.obj
+    must_fail 2 vg-diff -t nan a.obj a.obj
+    must_fail 2 vg-diff -t 1x a.obj a.obj
+    must_fail 2 vg-diff -t 0x1 a.obj a.obj
+    must_fail 2 vg-diff -t '' a.obj a.obj
+    must_fail 2 vg-diff a.obj a.obj -t
+    must_fail 2 vg-diff --no-provenance a.obj a.obj
+    must_fail 2 vg-diff -j 2 a.obj a.obj
+}
+
+@test "damaged, missing and empty input" {
+    poses cube 2
+    vg-encode pose1.obj pose2.obj >a.vgs
+    head -c -40 a.vgs >cut.vgs
+    must_fail 3 vg-diff a.vgs cut.vgs
+    one_line
+    says 'cut.vgs'
+    must_fail 3 vg-diff cut.vgs a.vgs
+    must_fail 4 vg-diff a.vgs missing.vgs
+    says "'missing.vgs'"
+    must_fail 3 vg-diff a.vgs - </dev/null
+    says 'empty'
+}
+
+@test "damage behind the last common frame is found" {
+    poses cube 3
+    vg-encode pose1.obj >short.vgs
+    vg-encode pose1.obj pose2.obj pose3.obj >long.vgs
+    head -c -8 long.vgs >cut.vgs
+    must_fail 3 vg-diff short.vgs cut.vgs
+    must_fail 3 vg-diff cut.vgs short.vgs
+}
+
+@test "a report replaces its file only when it is whole" {
+    mesh cube >a.obj
+    mesh tetra >b.obj
+    printf 'old\n' >r.txt
+    must_fail 1 vg-diff a.obj b.obj -o r.txt
+    [ "$(cat r.txt)" = old ]
+    must_fail 4 vg-diff a.obj missing.obj -o r.txt
+    [ "$(cat r.txt)" = old ]
+    nothing_but a.obj b.obj r.txt
+    must vg-diff a.obj a.obj -o r.txt
+    [ -z "$output" ]
+    grep -q '^vertices  8$' r.txt
+    must_fail 4 vg-diff a.obj a.obj -o no/such/dir.txt
+    nothing_but a.obj b.obj r.txt
+}
+
+@test "a full device and a closed pipe" {
+    mesh cube >a.obj
+    must_fail 4 bash -c 'vg-diff a.obj a.obj >/dev/full'
+    says 'cannot write to standard output: No space left on device'
+    must_fail 4 vg-diff a.obj a.obj -o /dev/full
+    must_fail 4 bash -c 'vg-diff a.obj a.obj >&-'
+    says 'standard output'
+}
+
+@test "a mesh without extent has no D: null, never NaN, and only equality is within" {
+    printf 'v 1 2 3\n' >a.obj
+    printf 'v 1 2 4\n' >b.obj
+    must vg-encode a.obj -o a.vgs
+    must vg-encode b.obj -o b.vgs
+    must vg-diff --json a.vgs b.vgs -o r.json
+    is r.json vertex_error.max.error 1.0
+    is r.json vertex_error.max.D null
+    must vg-diff a.vgs b.vgs
+    [[ $output != *nan* && $output != *inf* ]]
+    must vg-diff -t 0 a.vgs a.vgs
+    must_fail 1 vg-diff -t 1000 a.vgs b.vgs
+}
+
+@test "numbers do not follow the locale" {
+    mesh cube >a.obj
+    mesh cube 0.3 >b.obj
+    must vg-diff --json a.obj b.obj -o c.json
+    for locale in de_DE.UTF-8 fr_FR.UTF-8 tr_TR.UTF-8; do
+        LC_ALL=$locale must vg-diff --json a.obj b.obj -o l.json
+        same_file c.json l.json
+    done
+}
+
+@test "real data: the two bodies of one motion differ, by the same in both orders" {
+    must vg-diff -c --json "$DATA/human-man-poses.tar.xz" "$DATA/human-heavy-poses.tar.xz" -o ab.json
+    must vg-diff -c --json "$DATA/human-heavy-poses.tar.xz" "$DATA/human-man-poses.tar.xz" -o ba.json
+    python3 - <<'END'
+import json
+a, b = json.load(open("ab.json")), json.load(open("ba.json"))
+for k in ("mean", "rms", "max", "p95"):
+    x, y = a["vertex_error"][k]["error"], b["vertex_error"][k]["error"]
+    assert x > 0 and abs(x - y) <= 1e-12 * x, (k, x, y)
+assert a["vertex_error"]["max"]["vertex"] == b["vertex_error"]["max"]["vertex"]
+assert abs(a["face_error"]["orientation"]["mean"] - b["face_error"]["orientation"]["mean"]) < 1e-12
+assert a["planarity"]["truth"] == b["planarity"]["result"]
+END
+}

@@ -1,0 +1,147 @@
+/* fuzz_stream.c: the stream reader: it takes or refuses, with a reason; what it takes comes back the same from the writer.
+ * Each input is tried as it is and with its checksums mended, since no search finds a checksum by itself.
+ * Leaves out what the programs do with a stream.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/core.h"
+
+#include <stdlib.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+enum { MOST_BYTES = 1 << 16, FILE_HEADER = 16, RECORD_HEADER = 32 };
+
+static void demand(bool holds)
+{
+    if (!holds) abort();
+}
+
+/* ---- mending ---- */
+
+static void mend_end(unsigned char *payload, uint64_t records, XXH64_state_t *running)
+{
+    vgi_put64(payload, records);
+    vgi_put64(payload + 8, XXH64_digest(running));
+}
+
+/* Make the checksums of all records that are there right, and count and sum of END. What else is wrong stays wrong. */
+static void mend(unsigned char *p, size_t size)
+{
+    XXH64_state_t *running = XXH64_createState();
+    uint64_t records = 0;
+    demand(running != NULL);
+    XXH64_reset(running, 0);
+    for (size_t at = FILE_HEADER; size >= RECORD_HEADER && at <= size - RECORD_HEADER; records++) {
+        unsigned char *h = p + at, *payload = h + RECORD_HEADER;
+        size_t rest = size - at - RECORD_HEADER;
+        uint64_t length = vgi_get64(h + 8);
+        if (length <= rest) {
+            if (!memcmp(h, "END ", 4) && length == 16) mend_end(payload, records, running);
+            vgi_put64(h + 16, XXH64(payload, (size_t)length, 0));
+        }
+        vgi_put64(h + 24, XXH64(h, 24, 0));
+        XXH64_update(running, h + 24, 8);
+        uint64_t padded = (length + 7) & ~(uint64_t)7;
+        if (length > rest || padded > rest) break;
+        memset(payload + length, 0, (size_t)(padded - length));
+        at += RECORD_HEADER + (size_t)padded;
+    }
+    XXH64_freeState(running);
+}
+
+/* ---- reading and writing ---- */
+
+/* A head or frame is used as programs use it: copied, and its vector graph built. */
+static void use_head(const vg_head *h)
+{
+    vg_err e = {0};
+    vg_head copy = {0};
+    vg_graph *g = NULL;
+    demand(vg_head_copy(&copy, h, &e) == VG_OK);
+    if (h->reference) {
+        demand(vg_mesh_check(&h->mesh, "it", &e) == VG_OK);
+        demand(vg_mesh_same(&h->mesh, "first", &copy.mesh, "second", &e) == VG_OK);
+    }
+    if (h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS) {
+        demand(vg_graph_new(&g, h, &e) == VG_OK && vg_graph_corners(g) == h->count);
+        vg_graph_free(&g);
+    }
+    vg_head_clear(&copy);
+}
+
+static void use_frame(const vg_frame *f, const vg_head *h)
+{
+    demand(f->name != NULL && vgi_is_utf8(f->name, strlen(f->name)));
+    demand(vgi_finite(f->values, h->count * vg_kind_width(h->kind)));
+    if (h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS) demand(vgi_finite(f->anchors, 3 * h->nanchors));
+}
+
+/* Read all of data; with fd >= 0 also write it there as a filter would. True when it was a whole stream. */
+static bool pass(const unsigned char *data, size_t size, int fd)
+{
+    vg_err e = {0};
+    vg_reader *r = NULL;
+    vg_writer *w = NULL;
+    vg_frame f = {0};
+    int ok = vg_reader_open_memory(&r, data, size, "fuzz", &e);
+    if (ok == VG_OK) {
+        vg_head *h = vg_reader_head(r);
+        use_head(h);
+        if (fd >= 0) demand(vg_writer_open(&w, fd, "memory", h, &e) == VG_OK);
+        while ((ok = vg_reader_next(r, &f, &e)) > 0) {
+            use_frame(&f, h);
+            if (w) demand(vg_writer_put(w, &f, &e) == VG_OK);
+        }
+        if (ok == VG_OK && w) demand(vg_writer_end(w, vg_reader_tail(r), &e) == VG_OK);
+        if (ok < 0 && w) vg_writer_abandon(w, "fuzz", 3, e.message);
+        vg_writer_close(&w);
+    }
+    if (ok < 0) demand((e.code == VG_EINPUT || e.code == VG_ETRUNC) && e.code == ok && e.message[0]);
+    vg_frame_clear(&f);
+    vg_reader_close(&r);
+    return ok == VG_OK;
+}
+
+/* What pass() writes, in memory of its own; free with munmap. */
+static unsigned char *rewritten(const unsigned char *data, size_t size, size_t *n, bool *whole)
+{
+    struct stat st;
+    int fd = memfd_create("fuzz_stream", MFD_CLOEXEC);
+    demand(fd >= 0);
+    *whole = pass(data, size, fd);
+    demand(fstat(fd, &st) == 0);
+    *n = (size_t)st.st_size;
+    unsigned char *p = *n ? mmap(NULL, *n, PROT_READ, MAP_PRIVATE, fd, 0) : NULL;
+    demand(p != MAP_FAILED);
+    close(fd);
+    return p;
+}
+
+/* A whole stream is written as a whole stream, which is written as itself. A broken one is written as a broken one. */
+static void there_and_back(const unsigned char *data, size_t size)
+{
+    size_t n, again_n = 0;
+    bool whole, again_whole = false;
+    unsigned char *once = rewritten(data, size, &n, &whole), *again = NULL;
+    if (once) again = rewritten(once, n, &again_n, &again_whole);
+    demand(again_whole == whole);
+    if (whole) demand(n == again_n && !memcmp(once, again, n));
+    if (once) munmap(once, n);
+    if (again) munmap(again, again_n);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    if (size > MOST_BYTES) return 0;
+    there_and_back(data, size);
+    unsigned char *copy = malloc(size ? size : 1);
+    demand(copy != NULL);
+    if (size) memcpy(copy, data, size);
+    mend(copy, size);
+    there_and_back(copy, size);
+    free(copy);
+    return 0;
+}

@@ -1,0 +1,323 @@
+# info.bats: vg-info: what it tells of a sequence, --check, --digest, --frames; and what all programs share (cli.c).
+# SPDX-License-Identifier: GPL-3.0-or-later
+# shellcheck shell=bash disable=SC2154
+
+load lib
+
+# is FILE PATH JSON: exactly this value
+is() {
+    python3 - "$@" <<'END'
+import json, sys
+x = json.load(open(sys.argv[1]), parse_constant=lambda name: sys.exit("not JSON: " + name))
+for key in sys.argv[2].split("."):
+    x = x[int(key)] if isinstance(x, list) else x[key]
+if x != json.loads(sys.argv[3]):
+    sys.exit("%s is %r, not %s" % (sys.argv[2], x, sys.argv[3]))
+END
+}
+
+@test "it tells what is in a stream" {
+    mesh strip >a.obj
+    echo 'v 9 9 9' >>a.obj # in no face
+    sed 's/^v 0.000000/v 0.5/' a.obj >b.obj
+    vg-encode a.obj b.obj >s.vgs
+    must vg-info s.vgs
+    shows "bytes      $(stat -c %s s.vgs)" "7 vertices, binary64" "frames     2: 'a' to 'b'" \
+        '3: 1 of 2, 1 of 3, 1 of 4' 'components  1' 'isolated    1' 'reference   a' '  vg-encode a.obj b.obj'
+    must vg-info --json s.vgs -o s.json
+    is s.json kind '"vertices"'
+    is s.json precision 64
+    is s.json frames 2
+    is s.json elements 7
+    is s.json mesh.vertices 7
+    is s.json mesh.faces 3
+    is s.json mesh.face_sizes '[{"size": 2, "faces": 1}, {"size": 3, "faces": 1}, {"size": 4, "faces": 1}]'
+    is s.json mesh.components 1
+    is s.json mesh.isolated_vertices 1
+    is s.json mesh.selected_faces null
+    is s.json provenance.0.args '["vg-encode", "a.obj", "b.obj"]'
+    is s.json provenance.0.parents '[]'
+    is s.json unknown_records 0
+    is s.json last '"b"'
+}
+
+@test "D is the diagonal of the reference's bounding box" {
+    mesh cube >a.obj
+    must vg-info --json a.obj -o a.json
+    python3 -c 'import json; assert json.load(open("a.json"))["mesh"]["D"] == 3 ** 0.5'
+}
+
+@test "mesh files, archives and standard input are described as sequences" {
+    must vg-info --json "$DATA/trex-walk.tar.xz" -o t.json
+    is t.json frames 34
+    is t.json mesh.vertices 912
+    is t.json mesh.faces 838
+    must vg-info "$DATA/trex-walk.tar.xz"
+    shows '134 of 3, 626 of 4, 78 of 5 to 21'
+    must vg-info --json "$DATA/woman-tanktop-jump.tar.xz" -o w.json
+    is w.json mesh.components 6
+    mesh two >a.obj
+    pipe 'vg-encode a.obj | vg-info --json -o s.json'
+    is s.json name '"standard input"'
+    is s.json bytes null
+    is s.json mesh.components 2
+    vg-encode a.obj >s.vgs
+    pipe 'vg-info - <s.vgs'
+    shows "bytes      $(stat -c %s s.vgs)"
+}
+
+@test "vectors: their links, selection and precision" {
+    mesh two >a.obj
+    vg-encode --vectors --f32 a.obj >w.vgs
+    must vg-info --json w.vgs -o w.json
+    is w.json kind '"vectors"'
+    is w.json precision 32
+    is w.json mesh.links 1
+    is w.json elements 38 # 6 * 4 + 4 * 3 corners, and a link of 2
+    is w.json frame_bytes 456
+    vg-encode --vectors --faces selected "$DATA/horse-run.tar.xz" >h.vgs
+    must vg-info --json h.vgs -o h.json
+    python3 -c 'import json; m = json.load(open("h.json"))["mesh"]; assert 0 < m["selected_faces"] < m["faces"]'
+}
+
+@test "--check says whole, and only that; -q not even that" {
+    poses cube 2
+    vg-encode pose1.obj pose2.obj >s.vgs
+    must vg-info --check s.vgs
+    [ "$output" = whole ]
+    must vg-info --check -q s.vgs
+    [ -z "$output" ]
+    must vg-info --check --json s.vgs -o s.json
+    is s.json whole true
+    must vg-info --check "$DATA/horse-run.tar.xz"
+}
+
+@test "every way to describe a stream fails when it is cut short or changed" {
+    poses cube 2
+    vg-encode pose1.obj pose2.obj >s.vgs
+    size=$(stat -c %s s.vgs)
+    for n in 0 1 8 16 40 200 $((size / 2)) $((size - 33)) $((size - 1)); do
+        head -c "$n" s.vgs >cut.vgs
+        for option in --check --digest --frames --json -v; do
+            must_fail 3 vg-info $option cut.vgs
+            one_line
+            [ -z "$output" ]
+        done
+    done
+    for at in 3 20 100 $((size / 2)) $((size - 4)); do
+        python3 - "$at" <<'END'
+import sys
+b = bytearray(open("s.vgs", "rb").read())
+b[int(sys.argv[1])] ^= 0x40
+open("bad.vgs", "wb").write(b)
+END
+        must_fail 3 vg-info --check bad.vgs
+        one_line
+        says bad.vgs
+    done
+    cat s.vgs s.vgs >twice.vgs
+    must_fail 3 vg-info --check twice.vgs
+}
+
+@test "missing, empty and foreign input" {
+    must_fail 4 vg-info missing.vgs
+    says "'missing.vgs'"
+    must_fail 3 vg-info - </dev/null
+    says empty
+    must_fail 3 bash -c 'vg-info </dev/null'
+    printf 'hello\n' >text
+    must_fail 3 vg-info text
+    one_line
+    must_fail 4 bash -c 'vg-info <&-'
+}
+
+@test "--digest: one number for one content, whoever made it and however exactly it is written" {
+    poses cube 3
+    vg-encode pose1.obj pose2.obj pose3.obj >a.vgs
+    vg-encode --no-provenance pose1.obj pose2.obj pose3.obj >b.vgs
+    must vg-info --digest a.vgs
+    [[ $output =~ ^[0-9a-f]{16}$ ]]
+    d=$output
+    [ "$(vg-info --digest b.vgs)" = "$d" ]
+    [ "$(vg-info --digest <b.vgs)" = "$d" ]
+    mkdir poses && mv pose?.obj poses
+    [ "$(vg-info --digest poses)" = "$d" ]
+    # coordinates that are binary32 numbers
+    mesh cube >flat.obj
+    sed 's/^v 1.000000/v 1.5/' flat.obj >wide.obj
+    must vg-encode --f32 flat.obj wide.obj -o single.vgs
+    must vg-encode flat.obj wide.obj -o double.vgs
+    must vg-info --digest single.vgs
+    d=$output
+    must vg-info --digest double.vgs
+    [ "$output" = "$d" ]
+}
+
+@test "--digest: other content, another number" {
+    poses cube 3
+    cp pose2.obj other.obj
+    {
+        vg-encode pose1.obj pose2.obj pose3.obj | vg-info --digest
+        vg-encode pose1.obj pose2.obj | vg-info --digest
+        vg-encode pose1.obj pose3.obj pose2.obj | vg-info --digest            # order
+        vg-encode pose1.obj other.obj pose3.obj | vg-info --digest            # a name
+        vg-encode --vectors pose1.obj pose2.obj pose3.obj | vg-info --digest  # a kind
+        sed -i 's/^f 1 4 3 2/f 4 3 2 1/' pose1.obj pose2.obj pose3.obj
+        vg-encode pose1.obj pose2.obj pose3.obj | vg-info --digest            # a face
+        sed -i '1s/.*/v 0 0 1e-9/' pose3.obj
+        vg-encode pose1.obj pose2.obj pose3.obj | vg-info --digest            # a number
+    } >digests
+    [ "$(grep -c '^[0-9a-f]\{16\}$' digests)" = 7 ]
+    [ "$(sort -u digests | wc -l)" = 7 ]
+}
+
+@test "--frames lists every frame with its centroid" {
+    mesh cube >first.obj
+    mesh cube 0 2 >second.obj
+    vg-encode first.obj second.obj >s.vgs
+    must vg-info --frames --json s.vgs -o s.json
+    is s.json frame_list '[{"frame": 0, "name": "first", "time": null, "x": 0.5, "y": 0.5, "z": 0.5},
+                           {"frame": 1, "name": "second", "time": null, "x": 2.5, "y": 0.5, "z": 0.5}]'
+    is s.json frames 2
+    must vg-info --frames s.vgs
+    [ "$(printf '%s\n' "$output" | wc -l)" = 3 ]
+    shows 'centroid x' '1  second'
+    must vg-encode --vectors first.obj second.obj -o w.vgs
+    must vg-info --frames --json w.vgs -o w.json
+    is w.json frame_list.1.least -0.5
+    is w.json frame_list.1.most 0.5
+}
+
+@test "the processes that made it, as a tree of commands that can be typed again" {
+    mesh cube >"a b.obj"
+    mesh cube 0.2 >"it's.obj"
+    vg-encode "a b.obj" "it's.obj" | vg-deform --onto "a b.obj" >s.vgs
+    must vg-info s.vgs
+    shows "made by
+  vg-deform --onto 'a b.obj'
+    vg-encode 'a b.obj' 'it'\\''s.obj'"
+    must vg-info --json s.vgs -o s.json
+    is s.json provenance.0.args.2 "\"it's.obj\""
+    is s.json provenance.1.parents '[0]'
+    is s.json provenance.1.program '"vg-deform"'
+}
+
+@test "names are shown, not obeyed" {
+    mesh cube >a.obj
+    name=$(printf 'x\033[31mred')
+    cp a.obj "$name.obj"
+    must vg-info "$name.obj"
+    [[ $output != *$'\033'* ]]
+    shows 'x?[31mred'
+    must_fail 4 vg-info "$name"
+    [[ $stderr != *$'\033'* ]]
+    latin=$(printf 'caf\351.obj')
+    cp a.obj "$latin"
+    must vg-info --json "$latin" -o n.json
+    is n.json name '"caf?.obj"'
+}
+
+@test "wrong usage of vg-info" {
+    mesh cube >a.obj
+    must_fail 2 vg-info a.obj a.obj
+    says 'one operand too many' 'usage: vg-info [options] [FILE]'
+    must_fail 2 vg-info --check --digest a.obj
+    must_fail 2 vg-info --no-such-option
+    says "'--no-such-option'"
+    must_fail 2 vg-info -x
+    says "'-x'"
+    must_fail 2 vg-info --check=yes a.obj
+    says 'takes no value'
+    must_fail 2 vg-info a.obj -o
+    must_fail 2 vg-info a.obj -o ''
+    [ -z "$output" ]
+}
+
+@test "options may stand behind operands, and -- ends them" {
+    mesh cube >-a.obj
+    must vg-info ./-a.obj --digest
+    d=$output
+    must vg-info --digest -- -a.obj
+    [ "$output" = "$d" ]
+    must_fail 2 vg-info --digest -a.obj
+}
+
+@test "every program: -h, -V, and no writing to a full device unseen" {
+    for p in $(each_program); do
+        must "$p" -h
+        shows "usage: $p " '--help' '--version' '--quiet' '--verbose' '--output'
+        must "$p" --version
+        [ "$output" = "$p (vg) $(sed -n 's/^#define VG_VERSION "\(.*\)"/\1/p' "$ROOT/lib/vg.h")
+stream 1.0" ]
+        must_fail 4 bash -c "$p -h >/dev/full"
+    done
+}
+
+@test "a stream has its own names: mesh names are refused before any work, with advice" {
+    mesh cube >a.obj
+    for name in out.obj out.PLY out.tar.gz out.zip:ply out.glb; do
+        must_fail 2 vg-encode missing.obj -o "$name"
+        says "vg-encode writes a stream: pipe it into 'vg-decode -o $name'"
+    done
+    nothing_but a.obj
+}
+
+@test "no stream goes to a terminal, and no program waits for one" {
+    mesh cube >a.obj
+    cat >term.py <<'END'
+import os, pty, sys
+status = pty.spawn(sys.argv[1:], lambda fd: os.read(fd, 65536), lambda fd: b"")
+sys.exit(os.waitstatus_to_exitcode(status))
+END
+    status=0
+    python3 term.py vg-encode a.obj >out </dev/null || status=$?
+    [ $status = 2 ]
+    grep -q 'a stream is not written to a terminal: use -o FILE or a pipe' out
+    status=0
+    timeout 20 python3 term.py vg-info >out </dev/null || status=$?
+    [ $status = 2 ]
+    grep -q 'no input: name a stream' out
+}
+
+@test "output through a link, to a pipe, and with the mode it had" {
+    mesh cube >a.obj
+    : >real.txt
+    chmod 640 real.txt
+    ln -s real.txt link.txt
+    must vg-info a.obj -o link.txt
+    [ -L link.txt ]
+    [ "$(stat -c %a real.txt)" = 640 ]
+    grep -q '^vertices    8$' real.txt
+    mkfifo pipe
+    cat pipe >copy.txt &
+    must vg-info a.obj -o pipe
+    wait $!
+    same_file copy.txt real.txt
+    [ -p pipe ]
+    mkdir dir
+    must_fail 4 vg-info a.obj -o dir
+    must_fail 4 vg-info a.obj -o real.txt/x
+    nothing_but a.obj copy.txt dir link.txt pipe real.txt
+}
+
+@test "a signal leaves no temporary file, and is what the process ends by" {
+    vg-encode "$DATA/horse-run.tar.xz" >one.vgs
+    mkfifo in
+    for signal in TERM HUP; do
+        vg-encode - -o late.vgs <in & # it has the head, and waits for the rest
+        waiting=$!
+        exec 7>in
+        head -c 60000 one.vgs >&7
+        for _ in $(seq 100); do
+            compgen -G '.late.vgs.*.tmp' >/dev/null && break
+            sleep 0.05
+        done
+        compgen -G '.late.vgs.*.tmp'
+        kill -$signal $waiting
+        status=0
+        wait $waiting || status=$?
+        exec 7>&-
+        [ $status = $((128 + $(kill -l $signal))) ]
+        nothing_but in one.vgs
+    done
+}

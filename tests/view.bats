@@ -1,0 +1,207 @@
+#!/usr/bin/env bats
+# vg-view: the picture, what may be asked of it, and what happens when it cannot be made.
+
+load lib
+
+# png FILE: "WIDTH HEIGHT" when the file is a whole PNG whose checksums and pixels are right
+png() {
+    python3 - "$1" <<'PY'
+import struct, sys, zlib
+data = open(sys.argv[1], "rb").read()
+assert data[:8] == b"\x89PNG\r\n\x1a\n"
+at, pixels, tags = 8, b"", []
+while at < len(data):
+    size, tag = struct.unpack(">I4s", data[at:at + 8])
+    body = data[at + 8:at + 8 + size]
+    assert zlib.crc32(tag + body) == struct.unpack(">I", data[at + 8 + size:at + 12 + size])[0]
+    if tag == b"IHDR":
+        width, height, depth, colour = struct.unpack(">IIBB", body[:10])
+    if tag == b"IDAT":
+        pixels += body
+    tags.append(tag)
+    at += 12 + size
+assert tags[0] == b"IHDR" and tags[-1] == b"IEND" and (depth, colour) == (8, 2)
+assert b"tIME" not in tags and b"tEXt" not in tags
+assert len(zlib.decompress(pixels)) == height * (1 + 3 * width)
+print(width, height)
+PY
+}
+
+@test "a mesh file becomes a picture of the right size" {
+    mesh cube >cube.obj
+    must vg-view cube.obj -o cube.png
+    must png cube.png
+    [ "$output" = "392 414" ]
+    must vg-view cube.obj --size 100x50 -o small.png
+    must png small.png
+    [ "$output" = "132 104" ]
+    nothing_but cube.obj cube.png small.png
+}
+
+@test "several poses stand in columns, and no more than were asked for" {
+    poses cube 5
+    must vg-view pose*.obj --size 32x32 --columns 2 -o sheet.png
+    must png sheet.png
+    [ "$output" = "112 226" ]
+    must vg-view pose*.obj --size 32x32 --frames 3 --columns 9 -o sheet.png
+    must png sheet.png
+    [ "$output" = "160 86" ]
+}
+
+@test "a stream from a pipe gives the same picture as its files" {
+    poses two 3
+    must vg-view pose*.obj --size 64x64 -o files.png
+    pipe 'vg-encode pose1.obj pose2.obj pose3.obj | vg-view --size 64x64 -o pipe.png'
+    same_file files.png pipe.png
+    pipe 'vg-encode pose1.obj pose2.obj pose3.obj | vg-view --size 64x64 - -o - >out.png'
+    same_file files.png out.png
+}
+
+@test "the same input gives the same bytes with any number of threads" {
+    poses cube 4
+    must vg-view pose*.obj --ground --edges --size 64x64 -j 1 -o one.png
+    must vg-view pose*.obj --ground --edges --size 64x64 -j 3 -o three.png
+    same_file one.png three.png
+}
+
+@test "every view is another picture, and its name means its angles" {
+    mesh two >two.obj
+    local view
+    for view in front back left right top iso; do must vg-view two.obj --size 48x48 --view "$view" -o "$view.png"; done
+    [ "$(for view in front back left right top iso; do cksum <"$view.png"; done | sort -u | wc -l)" = 6 ]
+    must vg-view two.obj --size 48x48 --view 90,0 -o angle.png
+    same_file right.png angle.png
+    must vg-view two.obj --size 48x48 --view=-90,0 -o angle.png
+    same_file left.png angle.png
+    must vg-view two.obj --size 48x48 --view front --up z -o angle.png
+    [ "$(cksum <angle.png)" != "$(cksum <front.png)" ]
+}
+
+@test "errors are drawn with a legend; those of a sequence against itself are its lowest colour" {
+    poses cube 2
+    must vg-view pose*.obj --size 40x40 -o plain.png
+    must_fail 3 vg-view pose*.obj --against pose1.obj -o errors.png
+    says "'pose1.obj' to 'pose2.obj' has 2 frames where 'pose1.obj' has 1"
+    one_line
+    mkdir truth
+    cp pose*.obj truth
+    must vg-view pose*.obj --size 40x40 --against truth -o errors.png
+    must png errors.png
+    [ "$output" = "128 186" ]
+    must png plain.png
+    [ "$output" = "128 94" ]
+}
+
+@test "--centred forgives a shift, --scale sets the end of the colours" {
+    mesh cube >a.obj
+    mesh cube 0 5 >b.obj
+    must vg-view b.obj --against a.obj --scale 0.5 --size 40x40 -o far.png
+    must vg-view b.obj --against a.obj --scale 0.5 --size 40x40 --centred -o near.png
+    must vg-view b.obj --against b.obj --scale 0.5 --size 40x40 --centred -o same.png
+    [ "$(cksum <far.png)" != "$(cksum <near.png)" ]
+    same_file near.png same.png
+}
+
+@test "meshes that do not fit are refused before anything is written" {
+    mesh cube >cube.obj
+    mesh tetra >tetra.obj
+    must_fail 3 vg-view cube.obj --against tetra.obj -o out.png
+    says "'cube.obj' has 8 vertices where 'tetra.obj' has 4"
+    one_line
+    nothing_but cube.obj tetra.obj
+}
+
+@test "a stream of vectors is sent to vg-solve" {
+    mesh cube >cube.obj
+    pipe 'vg-encode --vectors cube.obj >cube.vgs'
+    must_fail 3 vg-view cube.vgs -o out.png
+    says "'cube.vgs' holds vectors: pipe it through 'vg-solve' first"
+    one_line
+    nothing_but cube.obj cube.vgs
+}
+
+@test "a truncated stream gives no picture" {
+    poses cube 3
+    pipe 'vg-encode pose1.obj pose2.obj pose3.obj >whole.vgs'
+    head -c $(($(wc -c <whole.vgs) - 40)) whole.vgs >cut.vgs
+    must_fail 3 vg-view cut.vgs -o out.png
+    one_line
+    [ ! -e out.png ]
+    must_fail 3 vg-view /dev/null -o out.png
+    one_line
+    nothing_but pose1.obj pose2.obj pose3.obj whole.vgs cut.vgs
+}
+
+@test "wrong names and values are told before the input is read" {
+    local arguments
+    must_fail 2 vg-view missing.obj -o out.obj
+    says "'out.obj'" ".png"
+    must_fail 2 vg-view missing.obj -o .png
+    for arguments in '--frames 0' '--frames two' '--columns 0' '--size 8x8' '--size 64' '--size 64x64x' '--size 5000x64' \
+        '--view up' '--view 30' '--view 30,' '--view 30,91' '--up x' '--scale 0' '--scale 1' '--centred'; do
+        # shellcheck disable=SC2086
+        must_fail 2 vg-view missing.obj -o out.png $arguments
+        says "option '"
+    done
+    must_fail 2 vg-view --against - -o out.png
+    says "both"
+    must_fail 4 vg-view missing.obj -o out.png
+    says "'missing.obj'"
+    must_fail 4 vg-view missing.obj -o nowhere/out.png
+    says "'nowhere/out.png'"
+    nothing_but
+}
+
+@test "a full device and a closed pipe are no success" {
+    mesh cube >cube.obj
+    must_fail 4 bash -c 'vg-view cube.obj >/dev/full'
+    says "standard output"
+    one_line
+    must_fail 4 vg-view cube.obj -o /dev/full
+    says "/dev/full"
+    one_line
+    run bash -c 'set -o pipefail; vg-view cube.obj --size 2000x2000 --ground | head -c 1 >/dev/null'
+    [ "$status" = 141 ]
+}
+
+@test "an existing picture stays when the new one fails" {
+    mesh cube >cube.obj
+    must vg-view cube.obj --size 40x40 -o out.png
+    cp out.png before.png
+    printf 'v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n' >bad.obj
+    must_fail 3 vg-view bad.obj -o out.png
+    same_file before.png out.png
+    nothing_but cube.obj out.png before.png bad.obj
+}
+
+@test "lines, points and figures without extent are drawn" {
+    printf 'v 0 0 0\nv 0 1 0\nv 1 1 0\nl 1 2\nl 2 3\n' >bones.obj
+    printf 'v 0 0 0\nv 1 2 3\n' >points.obj
+    printf 'v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n' >same.obj
+    printf 'v 4 5 6\n' >point.obj
+    local name
+    for name in bones points same point; do
+        must vg-view "$name.obj" --size 48x48 --ground --edges -o "$name.png"
+        must png "$name.png"
+        [ "$output" = "80 126" ]
+        must vg-view "$name.obj" --against "$name.obj" --follow --size 48x48 -o "$name.png"
+        must png "$name.png"
+    done
+}
+
+@test "of a long sequence as many frames are shown as were asked for" {
+    poses cube 4
+    local i files=()
+    for ((i = 0; i < 100; i++)); do files+=(pose1.obj pose2.obj pose3.obj pose4.obj); done
+    must vg-encode "${files[@]}" -o long.vgs
+    must vg-view long.vgs --frames 5 --columns 5 --size 32x32 -o long.png
+    must png long.png
+    [ "$output" = "256 86" ]
+}
+
+@test "-h and -V" {
+    must vg-view -h
+    shows "usage: vg-view [options] [FILE ...]" --against --frames
+    must vg-view --version
+    shows "vg-view"
+}
