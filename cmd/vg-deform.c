@@ -6,11 +6,12 @@
 #include <string.h>
 
 static struct {
-    const char *onto, *root;
+    const char *onto, *root, *by;
 } opts;
 
 static const cli_option options[] = {
     {"onto", 0, "MESH", "apply to this mesh and write its vectors; without it, write the deformations", .text = &opts.onto},
+    {"by", 0, "pose|gradient|blend", "what is carried over: the turn and stretch of each corner (default), ...", .text = &opts.by},
     {"root", 0, "WHERE", "where the body goes: centroid (default), stay, or the number of a vertex to follow",
      .text = &opts.root},
     {NULL}};
@@ -95,6 +96,7 @@ typedef struct work {
     vg_deformer *d;
     vg_kind from;      /* what comes in */
     bool onto;
+    vg_method method;
     root_motion root;
     size_t n;          /* poses in hand */
     vg_frame in[BATCH], out[BATCH];
@@ -183,7 +185,7 @@ static void prepare(work *w, vg_head *target)
         double *vectors = malloc((3 * vg_graph_corners(w->g) + 1) * sizeof *vectors);
         if (!vectors) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the target's vectors"});
         vg_graph_vectors(w->g, target->reference, vectors);
-        if (vg_deformer_target(w->d, vectors, &e) < 0) cli_die(&e);
+        if (vg_deformer_target(w->d, vectors, w->method, &e) < 0) cli_die(&e);
         free(vectors);
         compare_references(&w->root, w->g, h, target);
         take_target(h, target);
@@ -204,6 +206,16 @@ static void clear(work *w)
     vg_source_close(&w->s);
 }
 
+static vg_method parse_method(void)
+{
+    static const char *const names[] = {[VG_BY_POSE] = "pose", [VG_BY_GRADIENT] = "gradient", [VG_BY_BLEND] = "blend"};
+    if (!opts.by) return VG_BY_POSE;
+    if (!opts.onto) cli_usage("--by needs --onto");
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (!strcmp(opts.by, names[i])) return (vg_method)i;
+    cli_usage("--by is 'pose', 'gradient' or 'blend', not '%s'", opts.by);
+}
+
 int main(int argc, char **argv)
 {
     char **operands;
@@ -213,7 +225,7 @@ int main(int argc, char **argv)
     if (opts.root && !opts.onto) cli_usage("--root needs --onto");
     if (opts.onto && vg_load_mesh(&target, opts.onto, &e) < 0) cli_die(&e);
 
-    work w = {.s = cli_source(operands, n)};
+    work w = {.method = parse_method(), .s = cli_source(operands, n)};
     w.h = vg_source_head(w.s);
     if (opts.onto && vg_mesh_same(&w.h->mesh, "the sequence", &target.mesh, "the target", &e) < 0) cli_die(&e);
     prepare(&w, &target);

@@ -278,8 +278,11 @@ typedef struct vg_deform_counts {
 /* vg_deformer_new: g borrowed until free; reference: nv points, copied in part. threads >= 1. */
 int vg_deformer_new(vg_deformer **d, const vg_graph *g, const double *reference, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_deformer_free(vg_deformer **d);
+/* What is carried over to the target (MATH 5): the corner's turn and stretch (T 4.2); the face's deformation gradient (Sumner and
+ * Popovic 2004), by polygons; the mean of both. Line segments and links always go by pose. */
+typedef enum vg_method { VG_BY_POSE = 0, VG_BY_GRADIENT = 1, VG_BY_BLEND = 2 } vg_method;
 /* vg_deformer_target: apply to these reference vectors (one per corner of the graph, copied) from now on. */
-int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_err *e) VG_MUST_CHECK;
+int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_method method, vg_err *e) VG_MUST_CHECK;
 /* vg_deformer_measure: n poses in (kind VG_VERTICES: nv points each, or VG_VECTORS: one vector per corner), n arrays of a
  * quaternion per corner out. vg_deformer_transfer: the same in, the deformed target vectors out, never worse than
  * measuring and applying by more than rounding. vg_deformer_apply: quaternions in, deformed target vectors out. */

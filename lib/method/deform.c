@@ -28,7 +28,10 @@ struct vg_deformer {
     unsigned char *slow; /* per face: the kernel cannot do it */
     vgi_incidence around; /* faces at each vertex, only if there are links */
     double *target;   /* per corner: the target's vector */
+    vgi_method method;
     double *coordinates; /* see vgi_transfer */
+    vgi_gradient *gradient;
+    vgi_gradient_face *gradient_face;
     atomic_uint_fast64_t degenerate, first_face;
     /* one piece per thread: vectors and quaternions of the largest face (work_scalars numbers), then the kernel's lanes */
     double *work;
@@ -259,7 +262,7 @@ static int make_workspace(vg_deformer *d, vg_err *e)
 {
     size_t r = d->g->max_corners + 1, per_lane = sizeof(vgi_lanes) / sizeof(double);
     d->work_scalars = (7 * r + per_lane - 1) / per_lane * per_lane;
-    d->work_size = d->work_scalars + r * (sizeof(vgi_vec) / sizeof(double));
+    d->work_size = d->work_scalars + 2 * r * (sizeof(vgi_vec) / sizeof(double));
     d->work = aligned_alloc(sizeof(vgi_lanes), (size_t)d->threads * d->work_size * sizeof *d->work);
     return d->work ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory for faces of %zu corners", r - 1);
 }
@@ -297,6 +300,8 @@ void vg_deformer_free(vg_deformer **out)
     vgi_incidence_clear(&d->around);
     free(d->target);
     free(d->coordinates);
+    free(d->gradient);
+    free(d->gradient_face);
     free(d->work);
     free(d);
     *out = NULL;
@@ -313,7 +318,69 @@ static void make_coordinates(vg_deformer *d)
     }
 }
 
-int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_err *e)
+/* inverse of a symmetric matrix xx xy xz yy yz zz; false when it has none */
+static bool invert_symmetric(const double a[6], double inverse[6])
+{
+    double c0 = a[3] * a[5] - a[4] * a[4], c1 = a[2] * a[4] - a[1] * a[5], c2 = a[1] * a[4] - a[2] * a[3];
+    double det = a[0] * c0 + a[1] * c1 + a[2] * c2, size = a[0] + a[3] + a[5];
+    if (!(det > 1e-18 * size * size * size)) return false;
+    inverse[0] = c0 / det, inverse[1] = c1 / det, inverse[2] = c2 / det;
+    inverse[3] = (a[0] * a[5] - a[2] * a[2]) / det, inverse[4] = (a[1] * a[2] - a[0] * a[4]) / det;
+    inverse[5] = (a[0] * a[3] - a[1] * a[1]) / det;
+    return true;
+}
+
+static void symmetric_times(const double a[6], const double x[3], double y[3])
+{
+    y[0] = a[0] * x[0] + a[1] * x[1] + a[2] * x[2];
+    y[1] = a[1] * x[0] + a[3] * x[1] + a[4] * x[2];
+    y[2] = a[2] * x[0] + a[4] * x[1] + a[5] * x[2];
+}
+
+/* A face whose gradient cannot be had (nearly a line) is done the slow way, by its corners. */
+static void make_gradient(vg_deformer *d, size_t f)
+{
+    const vg_graph *g = d->g;
+    size_t begin = g->start[f], r = face_size(g, f);
+    double sum[6] = {0, 0, 0, 0, 0, 0}, inverse[6], n[3], target2 = 0;
+    for (size_t c = begin; c < begin + r; c++) {
+        const double *v = d->vector + 3 * c, *t = d->target + 3 * c;
+        sum[0] += v[0] * v[0], sum[1] += v[0] * v[1], sum[2] += v[0] * v[2];
+        sum[3] += v[1] * v[1], sum[4] += v[1] * v[2], sum[5] += v[2] * v[2];
+        target2 += t[0] * t[0] + t[1] * t[1] + t[2] * t[2];
+    }
+    double source2 = sum[0] + sum[3] + sum[5], h = source2 / 2;
+    vgi_gradient_face *face = &d->gradient_face[f];
+    if (!unit_normal(d->vector + 3 * begin, r, n)) {
+        d->slow[f] = 1;
+        return;
+    }
+    sum[0] += h * n[0] * n[0], sum[1] += h * n[0] * n[1], sum[2] += h * n[0] * n[2];
+    sum[3] += h * n[1] * n[1], sum[4] += h * n[1] * n[2], sum[5] += h * n[2] * n[2];
+    if (!invert_symmetric(sum, inverse)) {
+        d->slow[f] = 1;
+        return;
+    }
+    symmetric_times(inverse, n, face->q);
+    for (int k = 0; k < 3; k++) face->q[k] *= h;
+    face->rho = sqrt(target2 / source2);
+    for (size_t c = begin; c < begin + r; c++) {
+        symmetric_times(inverse, d->vector + 3 * c, d->gradient[c].p);
+        for (size_t k = 0; k < 3; k++) d->gradient[c].b[k] = d->target[3 * c + k] - face->rho * d->vector[3 * c + k];
+    }
+}
+
+static int make_gradients(vg_deformer *d, vg_err *e)
+{
+    if (!d->gradient) d->gradient = vgi_array(vg_graph_corners(d->g), sizeof *d->gradient, e);
+    if (!d->gradient_face) d->gradient_face = vgi_array(d->g->nf, sizeof *d->gradient_face, e);
+    if (!d->gradient || !d->gradient_face) return VG_ENOMEM;
+    for (size_t f = 0; f < d->faces; f++)
+        if (!d->slow[f]) make_gradient(d, f);
+    return VG_OK;
+}
+
+int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_method method, vg_err *e)
 {
     size_t corners = vg_graph_corners(d->g);
     free(d->target);
@@ -321,7 +388,8 @@ int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_err *e)
     if (!d->coordinates) d->coordinates = vgi_array_raw(3 * corners, sizeof *d->coordinates, e);
     if (!d->target || !d->coordinates) return VG_ENOMEM;
     make_coordinates(d);
-    return VG_OK;
+    d->method = method == VG_BY_GRADIENT ? VGI_GRADIENT : method == VG_BY_BLEND ? VGI_BLEND : VGI_POSE;
+    return d->method == VGI_POSE ? VG_OK : make_gradients(d, e);
 }
 
 vg_deform_counts vg_deformer_counts(const vg_deformer *d)
@@ -418,10 +486,11 @@ static void transfer_step(deform_job *j, double *work, size_t first, size_t last
         for (size_t k = 0; k < VGI_LANES; k++) poses[k] = j->in[p + (k < n ? k : n - 1)];
         redo again = {j, work, p};
         const vgi_transfer t = {.start = d->g->start, .vert = d->g->vert, .poses = poses,
-                                .vertices = j->kind == VG_VERTICES, .coordinates = d->coordinates,
+                                .vertices = j->kind == VG_VERTICES, .method = d->method,
+                                .coordinates = d->coordinates, .gradient = d->gradient, .gradient_face = d->gradient_face,
                                 .shortest2 = d->shortest2, .skip = d->slow, .out = j->out + p, .lanes = n,
                                 .bad = redo_slowly, .context = &again};
-        vgi_transfer_faces(&t, first, last, lanes);
+        vgi_transfer_faces(&t, first, last, lanes, d->g->max_corners);
         for (size_t f = first; f < last; f++)
             for (size_t k = 0; k < n && d->slow[f]; k++) transfer_slowly(j, work, f, p + k);
     }

@@ -72,7 +72,45 @@ INLINE unsigned lanes_of(vgi_mask m)
     return bits;
 }
 
-INLINE void transfer_face(const vgi_transfer *t, size_t f, vgi_vec *w)
+INLINE vgi_lanes same(double x)
+{
+    return (vgi_lanes){0} + x;
+}
+
+/* Wanted vectors by the corners' frames, w in place; returns which lanes have a corner without a frame. */
+INLINE vgi_mask by_pose(const vgi_transfer *t, uint32_t begin, size_t r, vgi_vec n, vgi_vec *w)
+{
+    vgi_mask bad = {0};
+    for (size_t i = 0; i < r; i++) {
+        const double *k = t->coordinates + 3 * (size_t)(begin + i);
+        vgi_lanes d2 = dot(w[i], w[i]), length = lane_sqrt(d2), along = dot(n, w[i]);
+        /* m = n - (n.u) u; |m|^2 = 1 - (n.u)^2 */
+        vgi_vec m = add(n, times(w[i], -along / d2));
+        vgi_lanes m2 = dot(m, m);
+        bad |= ~(d2 > t->shortest2) | ~(m2 > flat2);
+        m = times(m, length / lane_sqrt(m2));            /* |d| times the unit normal of the corner */
+        vgi_vec b = times(cross(m, w[i]), 1.0 / length); /* n x u, times |d| */
+        w[i] = add(times(w[i], same(k[0])), add(times(b, same(k[1])), times(m, same(k[2]))));
+    }
+    return bad;
+}
+
+/* Wanted vectors by the face's deformation gradient, out of w into g. */
+INLINE void by_gradient(const vgi_transfer *t, size_t f, uint32_t begin, size_t r, vgi_vec n, const vgi_vec *w, vgi_vec *g)
+{
+    vgi_vec y[3] = {{{0}, {0}, {0}}, {{0}, {0}, {0}}, {{0}, {0}, {0}}}; /* columns of sum d_k p_k' */
+    for (size_t i = 0; i < r; i++)
+        for (int k = 0; k < 3; k++) y[k] = add(y[k], times(w[i], same(t->gradient[begin + i].p[k])));
+    const vgi_gradient_face *face = &t->gradient_face[f];
+    for (size_t i = 0; i < r; i++) {
+        const double *b = t->gradient[begin + i].b;
+        g[i] = times(n, same(face->q[0] * b[0] + face->q[1] * b[1] + face->q[2] * b[2]));
+        for (int k = 0; k < 3; k++) g[i] = add(g[i], times(y[k], same(b[k])));
+        g[i] = add(g[i], times(w[i], same(face->rho)));
+    }
+}
+
+INLINE void transfer_face(const vgi_transfer *t, size_t f, vgi_vec *w, vgi_vec *g, vgi_method method)
 {
     uint32_t begin = t->start[f];
     size_t r = t->start[f + 1] - begin;
@@ -88,49 +126,59 @@ INLINE void transfer_face(const vgi_transfer *t, size_t f, vgi_vec *w)
     vgi_mask bad = ~(n2 > flat2 * spread * spread);
     n = times(n, 1.0 / lane_sqrt(n2));
 
-    for (size_t i = 0; i < r; i++) {
-        const double *k = t->coordinates + 3 * (size_t)(begin + i);
-        vgi_lanes d2 = dot(w[i], w[i]), length = lane_sqrt(d2), along = dot(n, w[i]);
-        /* m = n - (n.u) u; |m|^2 = 1 - (n.u)^2 */
-        vgi_lanes part = along / d2;
-        vgi_vec m = add(n, times(w[i], -part));
-        vgi_lanes m2 = dot(m, m);
-        bad |= ~(d2 > t->shortest2) | ~(m2 > flat2);
-        m = times(m, length / lane_sqrt(m2));          /* |d| times the unit normal of the corner */
-        vgi_vec b = times(cross(m, w[i]), 1.0 / length); /* n x u, times |d| */
-        w[i] = add(times(w[i], (vgi_lanes){0} + k[0]), add(times(b, (vgi_lanes){0} + k[1]), times(m, (vgi_lanes){0} + k[2])));
-    }
+    if (method != VGI_POSE) by_gradient(t, f, begin, r, n, w, g);
+    if (method != VGI_GRADIENT) bad |= by_pose(t, begin, r, n, w);
+    const vgi_vec *wanted = method == VGI_GRADIENT ? g : w;
+    if (method == VGI_BLEND)
+        for (size_t i = 0; i < r; i++) w[i] = times(add(w[i], g[i]), same(0.5));
+
     for (size_t k = 0; k < t->lanes; k++) {
         double *to = t->out[k] + 3 * (size_t)begin;
-        for (size_t i = 0; i < r; i++) to[3 * i] = w[i].x[k], to[3 * i + 1] = w[i].y[k], to[3 * i + 2] = w[i].z[k];
+        for (size_t i = 0; i < r; i++)
+            to[3 * i] = wanted[i].x[k], to[3 * i + 1] = wanted[i].y[k], to[3 * i + 2] = wanted[i].z[k];
     }
     unsigned which = lanes_of(bad) & (0xffu >> (VGI_LANES - t->lanes));
     if (which) t->bad(t->context, f, which);
 }
 
-INLINE void transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w)
+INLINE void transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w, vgi_vec *g)
 {
-    for (size_t f = first; f < last; f++)
-        if (!t->skip[f]) transfer_face(t, f, w);
+    switch (t->method) { /* once, so that each loop is compiled for its method */
+    case VGI_POSE:
+        for (size_t f = first; f < last; f++)
+            if (!t->skip[f]) transfer_face(t, f, w, g, VGI_POSE);
+        break;
+    case VGI_GRADIENT:
+        for (size_t f = first; f < last; f++)
+            if (!t->skip[f]) transfer_face(t, f, w, g, VGI_GRADIENT);
+        break;
+    case VGI_BLEND:
+        for (size_t f = first; f < last; f++)
+            if (!t->skip[f]) transfer_face(t, f, w, g, VGI_BLEND);
+        break;
+    }
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx512f,avx512dq,fma"))) static void transfer_avx512(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w)
+__attribute__((target("avx512f,avx512dq,fma"))) static void transfer_avx512(const vgi_transfer *t, size_t first, size_t last,
+                                                                           vgi_vec *w, vgi_vec *g)
 {
-    transfer_faces(t, first, last, w);
+    transfer_faces(t, first, last, w, g);
 }
 
-__attribute__((target("avx2,fma"))) static void transfer_avx2(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w)
+__attribute__((target("avx2,fma"))) static void transfer_avx2(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w,
+                                                             vgi_vec *g)
 {
-    transfer_faces(t, first, last, w);
+    transfer_faces(t, first, last, w, g);
 }
 #endif
 
-void vgi_transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w)
+void vgi_transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w, size_t max_corners)
 {
+    vgi_vec *g = w + max_corners + 1;
 #if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) return transfer_avx512(t, first, last, w);
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return transfer_avx2(t, first, last, w);
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) return transfer_avx512(t, first, last, w, g);
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return transfer_avx2(t, first, last, w, g);
 #endif
-    transfer_faces(t, first, last, w);
+    transfer_faces(t, first, last, w, g);
 }
