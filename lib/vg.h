@@ -128,6 +128,40 @@ typedef struct vg_attributes {
 void vg_attributes_clear(vg_attributes *a);
 int vg_attributes_copy(vg_attributes *to, const vg_attributes *from, const vg_mesh *mesh, vg_err *e) VG_MUST_CHECK;
 
+/* A skeleton: joint j is vertex j of the mesh, whose faces are the bones (parent, child) in the order of their children. */
+typedef struct vg_joint {
+    char *name;       /* UTF-8; an end site has its parent's name with ".end" behind it */
+    uint32_t parent;  /* less than its own number; UINT32_MAX: a root */
+    double offset[3]; /* from the parent, in the reference pose */
+    uint32_t nchannels;
+    uint8_t channels[6]; /* 1 2 3: x y z position, 4 5 6: x y z rotation, in the order of the file; none: an end site */
+} vg_joint;
+
+typedef struct vg_skeleton {
+    size_t njoints; /* 0: the sequence has no skeleton */
+    vg_joint *joints;
+} vg_skeleton;
+
+void vg_skeleton_clear(vg_skeleton *s);
+int vg_skeleton_copy(vg_skeleton *to, const vg_skeleton *from, vg_err *e) VG_MUST_CHECK;
+
+/* Which faces of a source mesh drive each face of a target mesh (MATH 9). */
+typedef struct vg_correspondence {
+    size_t source_nv, source_nf, target_nv, target_nf;
+    uint64_t source_digest, target_digest; /* vg_mesh_digest of both */
+    uint32_t *first;    /* target_nf + 1; NULL: there is no correspondence. first[f] < first[f + 1]: every face is driven */
+    uint32_t *source;   /* pairs of target face f: source[first[f]] .. source[first[f + 1] - 1] */
+    double *weight;     /* of each pair, > 0; of one target face they sum to 1 */
+    double *distance;   /* target_nf: from its centroid to the matched source face's, after fitting, mesh units of the target */
+    uint8_t *matched;   /* target_nf: 1: found near by; 0: rides with the nearest matched face */
+} vg_correspondence;
+
+void vg_correspondence_clear(vg_correspondence *c);
+int vg_correspondence_copy(vg_correspondence *to, const vg_correspondence *from, vg_err *e) VG_MUST_CHECK;
+
+/* vg_mesh_digest: a number that tells meshes apart by their vertex count and faces (XXH64, fmt/STREAM.md). */
+uint64_t vg_mesh_digest(const vg_mesh *m);
+
 /* One process that took part in making a stream. parents are positions in the same list, each before its own. */
 typedef struct vg_provenance {
     char *program, *version;
@@ -171,6 +205,8 @@ typedef struct vg_head {
     double *reference;    /* nv points: the undeformed pose. Always there when the mesh has vertices */
     char *reference_name; /* never NULL in a head that was read */
     vg_attributes attributes;
+    vg_skeleton skeleton;
+    vg_correspondence correspondence; /* a stream of vg-register: mesh and reference are the source's, its frame is fitted to the target */
     bool has_selection;   /* only the faces `selected` (ascending) carry vectors; else all do */
     size_t nselected;
     uint32_t *selected;

@@ -440,6 +440,120 @@ int vgi_form_encode(vg_bytes *b, const vg_head *h, vg_err *e)
     return r < 0 ? r : put64(b, h->count, e);
 }
 
+/* ---- SKEL ---- */
+
+static int decode_joint(cursor *c, const vgi_payload *p, vg_joint *j, size_t index, vg_err *e)
+{
+    int r = VG_OK;
+    j->parent = take32(c), j->nchannels = take32(c);
+    const unsigned char *channels = take(c, 8), *offset = take(c, 24);
+    uint32_t n = take32(c);
+    if (c->bad) return wrong(p, "it ends inside a joint", e);
+    if (j->parent != UINT32_MAX && j->parent >= index) return wrong(p, "a joint's parent does not come before it", e);
+    if (j->nchannels > 6) return wrong(p, "a joint has more than 6 channels", e);
+    for (uint32_t i = 0; i < 8; i++)
+        if (i < j->nchannels ? channels[i] < 1 || channels[i] > 6 : channels[i] != 0)
+            return wrong(p, "a joint has an unknown channel", e);
+    memcpy(j->channels, channels, sizeof j->channels);
+    copy_doubles(j->offset, offset, 3);
+    if (!vgi_finite(j->offset, 3)) return wrong(p, "an offset is not finite", e);
+    if (!(j->name = take_text(c, n, p, &r, e))) return r;
+    return take_padding(c, (4 - n) & 7) ? VG_OK : wrong(p, "padding is missing or not zero", e);
+}
+
+int vgi_skel_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    cursor c = start(p);
+    vg_skeleton *s = &h->skeleton;
+    size_t cap = 0;
+    while (left(&c)) {
+        int r = vgi_grow(&s->joints, &cap, s->njoints + 1, sizeof *s->joints, e);
+        if (r < 0) return r;
+        vg_joint *j = &s->joints[s->njoints++]; /* counted at once, so that clearing frees it in any case */
+        *j = (vg_joint){0};
+        if ((r = decode_joint(&c, p, j, s->njoints - 1, e)) < 0) return r;
+    }
+    return s->njoints == h->mesh.nv ? VG_OK : wrong(p, "it does not have one joint for each vertex", e);
+}
+
+int vgi_skel_encode(vg_bytes *b, const vg_skeleton *s, vg_err *e)
+{
+    int r = VG_OK;
+    for (size_t i = 0; r == VG_OK && i < s->njoints; i++) {
+        const vg_joint *j = &s->joints[i];
+        unsigned char channels[8] = {0};
+        memcpy(channels, j->channels, j->nchannels);
+        r = put32(b, j->parent, e);
+        if (r == VG_OK) r = put32(b, j->nchannels, e);
+        if (r == VG_OK) r = vgi_bytes_append(b, channels, sizeof channels, e);
+        if (r == VG_OK) r = put_doubles(b, j->offset, 3, e);
+        if (r == VG_OK) r = put_string(b, j->name, e);
+        if (r == VG_OK) r = put_padding(b, 0, e);
+    }
+    return r;
+}
+
+/* ---- CORR ---- */
+
+static int check_pairs(const vgi_payload *p, const vg_correspondence *c, vg_err *e)
+{
+    for (size_t f = 0; f < c->target_nf; f++) {
+        double sum = 0;
+        if (c->first[f] >= c->first[f + 1]) return wrong(p, "a target face is driven by none", e);
+        for (uint32_t i = c->first[f]; i < c->first[f + 1]; i++) {
+            if (c->source[i] >= c->source_nf) return wrong(p, "a source face is out of range", e);
+            if (!(c->weight[i] > 0)) return wrong(p, "a weight is not positive", e);
+            sum += c->weight[i];
+        }
+        if (!(sum > 1 - 1e-9 && sum < 1 + 1e-9)) return wrong(p, "the weights of a face do not sum to 1", e);
+        if (!(c->distance[f] >= 0) || c->matched[f] > 1) return wrong(p, "a distance or mark is out of range", e);
+    }
+    return VG_OK;
+}
+
+int vgi_corr_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    cursor c = start(p);
+    vg_correspondence *k = &h->correspondence;
+    k->source_nv = (size_t)take64(&c), k->source_nf = (size_t)take64(&c), k->source_digest = take64(&c);
+    k->target_nv = (size_t)take64(&c), k->target_nf = (size_t)take64(&c), k->target_digest = take64(&c);
+    uint64_t pairs = take64(&c);
+    if (c.bad || k->target_nf >= UINT32_MAX || pairs >= UINT32_MAX) return wrong(p, "its counts are out of range", e);
+    const unsigned char *first = take_array(&c, (uint64_t)k->target_nf + 1, 4), *source = take_array(&c, pairs, 4);
+    if (c.bad || !take_padding(&c, -(4 * (k->target_nf + 1 + pairs)) & 7)) return wrong(p, "its length and counts do not agree", e);
+    const unsigned char *weight = take_array(&c, pairs, 8), *distance = take_array(&c, k->target_nf, 8);
+    const unsigned char *matched = take_array(&c, k->target_nf, 1);
+    if (c.bad || !take_padding(&c, -k->target_nf & 7) || left(&c)) return wrong(p, "its length and counts do not agree", e);
+    size_t nf = k->target_nf, n = (size_t)pairs;
+    k->first = vgi_array_raw(nf + 1, sizeof *k->first, e), k->source = vgi_array_raw(n, sizeof *k->source, e);
+    k->weight = vgi_array_raw(n, sizeof *k->weight, e), k->distance = vgi_array_raw(nf, sizeof *k->distance, e);
+    k->matched = vgi_copy_array(matched, nf, 1, e);
+    if (!k->first || !k->source || !k->weight || !k->distance || !k->matched) return VG_ENOMEM;
+    copy32(k->first, first, nf + 1);
+    copy32(k->source, source, n);
+    copy_doubles(k->weight, weight, n);
+    copy_doubles(k->distance, distance, nf);
+    for (size_t f = 0; f < nf; f++)
+        if (k->first[f] > k->first[f + 1]) return wrong(p, "its lists of pairs are not in order", e);
+    if (k->first[0] != 0 || k->first[nf] != n) return wrong(p, "its lists of pairs are not in order", e);
+    return check_pairs(p, k, e);
+}
+
+int vgi_corr_encode(vg_bytes *b, const vg_correspondence *c, vg_err *e)
+{
+    size_t pairs = c->first[c->target_nf];
+    const uint64_t head[7] = {c->source_nv, c->source_nf, c->source_digest, c->target_nv, c->target_nf, c->target_digest, pairs};
+    int r = VG_OK;
+    for (int i = 0; r == VG_OK && i < 7; i++) r = put64(b, head[i], e);
+    if (r == VG_OK) r = vgi_indices_encode(b, c->first, c->target_nf + 1, e);
+    if (r == VG_OK) r = vgi_indices_encode(b, c->source, pairs, e);
+    if (r == VG_OK) r = put_padding(b, 0, e);
+    if (r == VG_OK) r = put_doubles(b, c->weight, pairs, e);
+    if (r == VG_OK) r = put_doubles(b, c->distance, c->target_nf, e);
+    if (r == VG_OK) r = vgi_bytes_append(b, c->matched, c->target_nf, e);
+    return r < 0 ? r : put_padding(b, 0, e);
+}
+
 /* ---- FRAM ---- */
 
 static bool on_graph(const vg_head *h)

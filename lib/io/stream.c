@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 /* The header records, in the order they are written. */
-enum { FORM = 8, KNOWN = 9 };
+enum { FORM = 10, KNOWN = 11 };
 static const struct {
     const char *tag;
     uint32_t flags;
@@ -22,6 +22,8 @@ static const struct {
     {"LINK", VGI_CRITICAL, vgi_link_decode, false, true},
     {"ANCH", VGI_CRITICAL, vgi_anch_decode, false, true},
     {"REFP", VGI_CRITICAL, vgi_refp_decode, false, true},
+    {"SKEL", 0, vgi_skel_decode, false, true},
+    {"CORR", VGI_CRITICAL, vgi_corr_decode, false, false},
     {"FORM", VGI_CRITICAL, vgi_form_decode, false, false},
 };
 enum { MESH = 1 };
@@ -220,6 +222,8 @@ static int encode_known(vg_bytes *b, const vg_head *h, int i, vg_err *e)
     case 5: return vgi_indices_encode(b, h->links, 2 * h->nlinks, e);
     case 6: return vgi_indices_encode(b, h->anchors, h->nanchors, e);
     case 7: return vgi_refp_encode(b, h, e);
+    case 8: return vgi_skel_encode(b, &h->skeleton, e);
+    case 9: return vgi_corr_encode(b, &h->correspondence, e);
     default: return vgi_form_encode(b, h, e);
     }
 }
@@ -229,7 +233,8 @@ static int write_head(vg_writer *w, vg_err *e)
     const vg_head *h = w->head;
     bool mesh = h->reference != NULL;
     const bool present[KNOWN] = {false, mesh, mesh && h->attributes.ntex > 0, mesh && h->attributes.nlabels > 0,
-                                 mesh && h->has_selection, mesh && h->has_links, mesh && h->nanchors > 0, mesh, true};
+                                 mesh && h->has_selection, mesh && h->has_links, mesh && h->nanchors > 0, mesh,
+                                 mesh && h->skeleton.njoints > 0, h->correspondence.first != NULL, true};
     int r = vgi_record_begin_write(w->fd, w->name, e);
     for (size_t i = 0; r == VG_OK && i < h->nprovenance; i++) {
         w->front.size = 0;

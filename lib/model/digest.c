@@ -107,3 +107,16 @@ uint64_t vg_digest_get(const vg_digest *d)
 {
     return XXH64_digest(d->state);
 }
+
+uint64_t vg_mesh_digest(const vg_mesh *m)
+{
+    vg_digest d = {.state = XXH64_createState()};
+    if (!d.state) return 0; /* a few hundred bytes: whoever fails here fails everywhere */
+    XXH64_reset(d.state, 0);
+    mix_count(&d, m->nv);
+    mix_count(&d, m->nf);
+    for (size_t f = 0; f < m->nf; f++) mix_indices(&d, m->vert + m->start[f], m->start[f + 1] - m->start[f]);
+    uint64_t sum = XXH64_digest(d.state);
+    XXH64_freeState(d.state);
+    return sum;
+}

@@ -35,6 +35,56 @@ failed:
     return VG_ENOMEM;
 }
 
+void vg_skeleton_clear(vg_skeleton *s)
+{
+    for (size_t i = 0; i < s->njoints; i++) free(s->joints[i].name);
+    free(s->joints);
+    *s = (vg_skeleton){0};
+}
+
+int vg_skeleton_copy(vg_skeleton *to, const vg_skeleton *from, vg_err *e)
+{
+    *to = (vg_skeleton){0};
+    if (!(to->joints = vgi_array(from->njoints, sizeof *to->joints, e))) return VG_ENOMEM;
+    for (; to->njoints < from->njoints; to->njoints++) {
+        const vg_joint *j = &from->joints[to->njoints];
+        char *name = vgi_copy_string(j->name, strlen(j->name), e);
+        if (!name) {
+            vg_skeleton_clear(to);
+            return VG_ENOMEM;
+        }
+        to->joints[to->njoints] = *j;
+        to->joints[to->njoints].name = name;
+    }
+    return VG_OK;
+}
+
+void vg_correspondence_clear(vg_correspondence *c)
+{
+    free(c->first);
+    free(c->source);
+    free(c->weight);
+    free(c->distance);
+    free(c->matched);
+    *c = (vg_correspondence){0};
+}
+
+int vg_correspondence_copy(vg_correspondence *to, const vg_correspondence *from, vg_err *e)
+{
+    *to = *from;
+    to->first = NULL, to->source = NULL, to->weight = NULL, to->distance = NULL, to->matched = NULL;
+    if (!from->first) return VG_OK;
+    size_t nf = from->target_nf, pairs = from->first[nf];
+    to->first = vgi_copy_array(from->first, nf + 1, sizeof *to->first, e);
+    to->source = vgi_copy_array(from->source, pairs, sizeof *to->source, e);
+    to->weight = vgi_copy_array(from->weight, pairs, sizeof *to->weight, e);
+    to->distance = vgi_copy_array(from->distance, nf, sizeof *to->distance, e);
+    to->matched = vgi_copy_array(from->matched, nf, sizeof *to->matched, e);
+    if (to->first && to->source && to->weight && to->distance && to->matched) return VG_OK;
+    vg_correspondence_clear(to);
+    return VG_ENOMEM;
+}
+
 void vg_model_clear(vg_model *m)
 {
     vg_mesh_clear(&m->mesh);
@@ -184,6 +234,8 @@ void vg_head_clear(vg_head *h)
     free(h->reference);
     free(h->reference_name);
     vg_attributes_clear(&h->attributes);
+    vg_skeleton_clear(&h->skeleton);
+    vg_correspondence_clear(&h->correspondence);
     free(h->selected);
     free(h->links);
     free(h->anchors);
@@ -200,6 +252,8 @@ int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e)
     const char *name = from->reference_name ? from->reference_name : "";
     bool ok = vg_mesh_copy(&to->mesh, &from->mesh, e) == VG_OK &&
               vg_attributes_copy(&to->attributes, &from->attributes, &from->mesh, e) == VG_OK &&
+              vg_skeleton_copy(&to->skeleton, &from->skeleton, e) == VG_OK &&
+              vg_correspondence_copy(&to->correspondence, &from->correspondence, e) == VG_OK &&
               (to->reference_name = vgi_copy_string(name, strlen(name), e));
     if (ok && from->reference)
         ok = (to->reference = vgi_copy_array(from->reference, 3 * from->mesh.nv, sizeof *to->reference, e));

@@ -1,0 +1,465 @@
+/* test_reconstruct.c: vectors become the vertices they came from, on every kind of mesh, and vectors that fit no mesh become the
+ * least-squares answer; anchors are met; threads and batches change nothing.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "meshes.h"
+
+static const double tight = 1e-12; /* of D: MATH 2 */
+
+typedef struct answer {
+    int code;
+    vg_err e;
+    size_t n;
+    double **x;
+} answer;
+
+static void clear(answer *a)
+{
+    for (size_t i = 0; i < a->n; i++) free(a->x[i]);
+    free(a->x);
+    *a = (answer){0};
+}
+
+/* n poses' vectors, with anchors or roots, solved in calls of `batch` poses. */
+static answer solve(const vg_graph *g, const double *reference, const uint32_t *anchors, size_t nanchors, size_t n,
+                    const double *const *vectors, const double *const *at, int threads, size_t batch)
+{
+    answer a = {.n = n, .x = room(n, sizeof *a.x)};
+    double **rhs = room(n, sizeof *rhs);
+    vg_solver *s = NULL;
+    for (size_t i = 0; i < n; i++) a.x[i] = room(3 * g->nv, sizeof(double)), rhs[i] = room(3 * g->nv, sizeof(double));
+    a.code = vg_solver_new(&s, g, anchors, nanchors, reference, threads, &a.e);
+    for (size_t i = 0; a.code == VG_OK && i < n; i++)
+        vg_solver_load(s, vectors[i], nanchors ? at[i] : NULL, a.x[i], rhs[i]);
+    for (size_t i = 0; a.code == VG_OK && i < n; i += batch)
+        vg_solver_solve(s, n - i < batch ? n - i : batch, (const double *const *)rhs + i, a.x + i,
+                        nanchors ? at + i : NULL, nanchors ? NULL : at + i);
+    vg_solver_free(&s);
+    CHECK(s == NULL);
+    for (size_t i = 0; i < n; i++) free(rhs[i]);
+    free(rhs);
+    return a;
+}
+
+/* One pose there and back, its root given; the error in units of the pose's D. Isolated vertices are expected where the
+ * reference has them. */
+static double there_and_back(vg_head *h, const double *pose)
+{
+    vg_graph *g = graph_of(h);
+    double *w = vectors_of(g, pose), *want = room(3 * g->nv, sizeof *want), root[3];
+    const double *at = root;
+    vg_graph_root(g, pose, root);
+    for (size_t v = 0; v < g->nv; v++)
+        memcpy(want + 3 * v, (g->in_face[v] ? pose : h->reference) + 3 * v, 3 * sizeof *want);
+    answer a = solve(g, h->reference, NULL, 0, 1, (const double *const *)&w, &at, 1, 1);
+    if (a.code < 0) printf("%s\n", a.e.message);
+    double error = a.code < 0 ? INFINITY : farthest(a.x[0], want, g->nv) / vg_diagonal(want, g->nv);
+    clear(&a);
+    free(w);
+    free(want);
+    vg_graph_free(&g);
+    return error;
+}
+
+static void select_faces(vg_head *h)
+{
+    vg_err e;
+    CHECK(vg_select_faces(&h->mesh, &h->selected, &h->nselected, &e) == VG_OK);
+    h->has_selection = true;
+}
+
+/* the reference and a strongly bent pose, through all faces and through the selected ones */
+static void gives_back(vg_head *h, const char *name)
+{
+    double *bent = warp(h->reference, h->mesh.nv, 1.5);
+    for (int pass = 0; pass < 2; pass++) {
+        double at_rest = there_and_back(h, h->reference), moved = there_and_back(h, bent);
+        if (!(at_rest <= tight) || !(moved <= tight)) printf("%s%s:\n", name, pass ? ", selected faces" : "");
+        CHECK_NEAR(at_rest, 0, tight);
+        CHECK_NEAR(moved, 0, tight);
+        if (pass == 0) select_faces(h);
+    }
+    free(bent);
+}
+
+static void test_generated(void)
+{
+    vg_head h;
+    const char *name;
+    for (size_t i = 0; make_any(i, &h, &name); i++) {
+        gives_back(&h, name);
+        vg_head_clear(&h);
+    }
+    h = make_degenerate();
+    gives_back(&h, "degenerate");
+    vg_head_clear(&h);
+}
+
+static void test_long_and_large(void)
+{
+    vg_head shapes[] = {make_chain(10000), make_rod(250, 200, false), make_rod(3000, 5, true), make_ngon(10000, 0.4, 0.1)};
+    const char *names[] = {"chain of 10000", "rod 250 x 200", "rod 3000 x 5", "face of 10000"};
+    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+        gives_back(&shapes[i], names[i]);
+        vg_head_clear(&shapes[i]);
+    }
+}
+
+static void test_units(void)
+{
+    static const double units[] = {1e-20, 1e-6, 1e6, 1e20};
+    for (size_t u = 0; u < sizeof units / sizeof *units; u++) {
+        vg_head shapes[] = {make_flower(15), make_mixed(6), make_pieces(), make_chain(50)};
+        for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+            for (size_t k = 0; k < 3 * shapes[i].mesh.nv; k++) shapes[i].reference[k] *= units[u];
+            gives_back(&shapes[i], "in another unit");
+            vg_head_clear(&shapes[i]);
+        }
+    }
+}
+
+static void test_data(void)
+{
+    static const struct {
+        const char *poses, *rest;
+        size_t most;
+    } all[] = {{"trex-walk.tar.xz", "trex.rest.obj", 34}, {"horse-run.tar.xz", "horse.rest.obj", 21},
+               {"woman-tanktop-jump.tar.xz", "woman-tanktop.rest.obj", 4}, {"human-man-poses.tar.xz", NULL, 3},
+               {"faceA.tar.xz", NULL, 3}};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+        film f = load_film(all[i].poses, all[i].rest, all[i].most);
+        for (int pass = 0; pass < 2; pass++) {
+            double worst = 0;
+            for (size_t k = 0; k < f.n; k++) worst = fmax(worst, there_and_back(&f.h, f.pose[k]));
+            if (!(worst <= tight)) printf("%s, pass %d:\n", all[i].poses, pass);
+            CHECK_NEAR(worst, 0, tight);
+            if (pass == 0) select_faces(&f.h);
+        }
+        CHECK(f.h.nselected < f.h.mesh.nf && 2 * f.h.nselected > f.h.mesh.nf);
+        film_clear(&f);
+    }
+}
+
+/* ---- vectors that fit no mesh, against a dense solution ---- */
+
+/* Gaussian elimination with row pivoting: a (n x n) and b (n x 3) become the solution in b. */
+static void eliminate(double *a, double *b, size_t n)
+{
+    for (size_t k = 0; k < n; k++) {
+        size_t p = k;
+        for (size_t i = k + 1; i < n; i++)
+            if (fabs(a[i * n + k]) > fabs(a[p * n + k])) p = i;
+        for (size_t j = 0; j < n; j++) {
+            double t = a[k * n + j];
+            a[k * n + j] = a[p * n + j], a[p * n + j] = t;
+        }
+        for (size_t j = 0; j < 3; j++) {
+            double t = b[3 * k + j];
+            b[3 * k + j] = b[3 * p + j], b[3 * p + j] = t;
+        }
+        for (size_t i = 0; i < n; i++) {
+            double f = i == k ? 0 : a[i * n + k] / a[k * n + k];
+            for (size_t j = k; f != 0 && j < n; j++) a[i * n + j] -= f * a[k * n + j];
+            for (size_t j = 0; f != 0 && j < 3; j++) b[3 * i + j] -= f * b[3 * k + j];
+        }
+    }
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < 3; j++) b[3 * i + j] /= a[i * n + i];
+}
+
+/* The minimum of sum |v - C - w|^2 by writing A' out as MATH 1 has it: row c is 1 at its own vertex and -1/r at all of its
+ * face. Anchored and isolated vertices get a row of their own; without anchors the mean is put into the matrix. */
+static double *least_squares(const vg_graph *g, const double *reference, const double *w, const uint32_t *anchors,
+                             size_t nanchors, const double *at)
+{
+    size_t q = g->nv, n = vg_graph_corners(g);
+    double *A = room(n * q, sizeof *A), *N = room(q * q, sizeof *N), *b = room(3 * q, sizeof *b);
+    for (size_t f = 0; f < g->nf; f++)
+        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
+            A[c * q + g->vert[c]] += 1;
+            for (uint32_t d = g->start[f]; d < g->start[f + 1]; d++)
+                A[c * q + g->vert[d]] -= 1.0 / (g->start[f + 1] - g->start[f]);
+        }
+    for (size_t c = 0; c < n; c++)
+        for (size_t i = 0; i < q; i++) {
+            double aci = A[c * q + i];
+            if (aci == 0) continue;
+            for (size_t j = 0; j < q; j++) N[i * q + j] += aci * A[c * q + j];
+            for (size_t k = 0; k < 3; k++) b[3 * i + k] += aci * w[3 * c + k];
+        }
+    for (size_t i = 0; i < q; i++)
+        for (size_t j = 0; j < q && !nanchors; j++) {
+            if (!g->in_face[i] || !g->in_face[j]) continue;
+            N[i * q + j] += 1;
+            for (size_t k = 0; k < 3; k++) b[3 * i + k] += at[k];
+        }
+    for (size_t i = 0; i < nanchors + q; i++) {
+        size_t v = i < nanchors ? anchors[i] : i - nanchors;
+        if (i >= nanchors && g->in_face[v]) continue;
+        memset(N + v * q, 0, q * sizeof *N);
+        N[v * q + v] = 1;
+        memcpy(b + 3 * v, i < nanchors ? at + 3 * i : reference + 3 * v, 3 * sizeof *b);
+    }
+    eliminate(N, b, q);
+    free(A);
+    free(N);
+    return b;
+}
+
+static void against_dense(vg_head *h, const char *name, const uint32_t *anchors, size_t nanchors)
+{
+    vg_graph *g = graph_of(h);
+    double D = vg_diagonal(h->reference, g->nv), *w = vectors_of(g, h->reference);
+    double at[64] = {0.3 * D, -0.2 * D, D};
+    const double *where = at;
+    for (size_t i = 0; i < 3 * nanchors; i++) at[i] = 0.4 * D * noise();
+    for (size_t i = 0; i < 3 * vg_graph_corners(g); i++) w[i] += 0.2 * D * noise(); /* no longer a mesh's, nor centred */
+    double *want = least_squares(g, h->reference, w, anchors, nanchors, at);
+    answer a = solve(g, h->reference, anchors, nanchors, 1, (const double *const *)&w, &where, 1, 1);
+    CHECK(a.code == VG_OK);
+    double error = farthest(a.x[0], want, g->nv) / D;
+    if (!(error <= 1e-10)) printf("%s with %zu anchors:\n", name, nanchors);
+    CHECK_NEAR(error, 0, 1e-10);
+    clear(&a);
+    free(want);
+    free(w);
+    vg_graph_free(&g);
+}
+
+static void test_least_squares(void)
+{
+    vg_head h;
+    const char *name;
+    static const uint32_t one[] = {1}, several[] = {0, 1, 2};
+    for (size_t i = 0; make_any(i, &h, &name); i++) {
+        if (h.mesh.nv <= 200) {
+            bool isolated = !strcmp(name, "mixed");
+            against_dense(&h, name, NULL, 0);
+            against_dense(&h, name, one, 1);
+            if (h.mesh.nv > 3 && !isolated) against_dense(&h, name, several, 3);
+            select_faces(&h);
+            against_dense(&h, name, NULL, 0);
+        }
+        vg_head_clear(&h);
+    }
+    h = make_degenerate();
+    against_dense(&h, "degenerate", NULL, 0);
+    vg_head_clear(&h);
+}
+
+/* On large meshes: the gradient of the energy vanishes, A (A' V - W) = 0, and the mean is the root. */
+static void test_normal_equations(void)
+{
+    film f = load_film("human-man-poses.tar.xz", NULL, 1);
+    vg_head rod = make_rod(200, 60, true), *shapes[] = {&f.h, &rod};
+    for (size_t i = 0; i < 2; i++) {
+        if (i == 0) select_faces(shapes[i]);
+        vg_graph *g = graph_of(shapes[i]);
+        double D = vg_diagonal(shapes[i]->reference, g->nv), *w = vectors_of(g, shapes[i]->reference);
+        double root[3] = {D, 2 * D, -D}, mean[3], *left = room(3 * g->nv, sizeof *left);
+        const double *at = root;
+        for (size_t c = 0; c < 3 * vg_graph_corners(g); c++) w[c] *= 1 + 0.3 * noise();
+        answer a = solve(g, shapes[i]->reference, NULL, 0, 1, (const double *const *)&w, &at, 2, 1);
+        CHECK(a.code == VG_OK);
+        double *x = vectors_of(g, a.x[0]), most = 0;
+        for (size_t face = 0; face < g->nf; face++) {
+            double off[3] = {0, 0, 0}, r = g->start[face + 1] - g->start[face];
+            for (size_t c = g->start[face]; c < g->start[face + 1]; c++)
+                for (size_t k = 0; k < 3; k++) off[k] += (x[3 * c + k] - w[3 * c + k]) / r;
+            for (size_t c = g->start[face]; c < g->start[face + 1]; c++)
+                for (size_t k = 0; k < 3; k++) left[3 * g->vert[c] + k] += x[3 * c + k] - w[3 * c + k] - off[k];
+        }
+        for (size_t k = 0; k < 3 * g->nv; k++) most = fmax(most, fabs(left[k]));
+        CHECK_NEAR(most, 0, 1e-13 * D);
+        vg_graph_root(g, a.x[0], mean);
+        for (int k = 0; k < 3; k++) CHECK_NEAR(mean[k], root[k], 1e-12 * D);
+        clear(&a);
+        free(x);
+        free(w);
+        free(left);
+        vg_graph_free(&g);
+    }
+    film_clear(&f);
+    vg_head_clear(&rod);
+}
+
+/* ---- anchors ---- */
+
+/* `count` anchors spread over the attached vertices, ascending */
+static size_t spread_anchors(const vg_graph *g, size_t count, uint32_t *anchors)
+{
+    size_t n = 0, seen = 0;
+    for (size_t v = 0; v < g->nv; v++)
+        if (g->in_face[v] && seen++ * count / g->attached >= n && n < count) anchors[n++] = (uint32_t)v;
+    return n;
+}
+
+static void test_anchors(void)
+{
+    enum { POSES = 11 };
+    vg_head h;
+    const char *name;
+    for (size_t i = 0; make_any(i, &h, &name); i++) {
+        vg_graph *g = graph_of(&h);
+        for (size_t count = 1; count <= 7 && count <= g->attached; count += 3) {
+            uint32_t anchors[8];
+            double *pose[POSES], *w[POSES], *at[POSES], worst = 0;
+            CHECK(spread_anchors(g, count, anchors) == count);
+            for (size_t k = 0; k < POSES; k++) {
+                pose[k] = warp(h.reference, g->nv, 0.2 * (double)k);
+                for (size_t v = 0; v < 3 * g->nv; v++) pose[k][v] += (double)k; /* each pose has its anchors elsewhere */
+                w[k] = vectors_of(g, pose[k]), at[k] = room(3 * count, sizeof(double));
+                vg_graph_anchors(pose[k], anchors, count, at[k]);
+            }
+            answer a = solve(g, h.reference, anchors, count, POSES, (const double *const *)w, (const double *const *)at, 2, POSES);
+            CHECK(a.code == VG_OK);
+            for (size_t k = 0; k < POSES; k++) {
+                bool met = true, kept = true;
+                for (size_t j = 0; j < count; j++)
+                    met &= !memcmp(a.x[k] + 3 * (size_t)anchors[j], at[k] + 3 * j, 3 * sizeof(double));
+                for (size_t v = 0; v < g->nv; v++) {
+                    if (g->in_face[v]) continue;
+                    kept &= !memcmp(a.x[k] + 3 * v, h.reference + 3 * v, 3 * sizeof(double));
+                    memcpy(a.x[k] + 3 * v, pose[k] + 3 * v, 3 * sizeof(double));
+                }
+                CHECK(met);
+                CHECK(kept);
+                worst = fmax(worst, farthest(a.x[k], pose[k], g->nv) / vg_diagonal(pose[k], g->nv));
+                free(pose[k]), free(w[k]), free(at[k]);
+            }
+            /* positions of the size of 10 + D are given in 53 bits: that much of D cannot be had back */
+            double D = vg_diagonal(h.reference, g->nv), lost = 2e-15 * (10 + D) / D;
+            if (!(worst <= tight + lost)) printf("%s, %zu anchors:\n", name, count);
+            CHECK_NEAR(worst, 0, tight + lost);
+            clear(&a);
+        }
+        vg_graph_free(&g);
+        vg_head_clear(&h);
+    }
+}
+
+/* Anchors that contradict the vectors are met to the bit, and everything may be anchored. */
+static void test_contradicting_anchors(void)
+{
+    vg_head h = make_flower(14);
+    vg_graph *g = graph_of(&h);
+    double *w = vectors_of(g, h.reference), *at = room(3 * g->nv, sizeof *at);
+    uint32_t *all = room(g->nv, sizeof *all);
+    const double *where = at;
+    for (size_t v = 0; v < g->nv; v++) all[v] = (uint32_t)v;
+    for (size_t i = 0; i < 3 * g->nv; i++) at[i] = 1e3 * noise() / 3;
+    for (size_t n = 1; n <= g->nv; n += 9) {
+        answer a = solve(g, h.reference, all, n, 1, (const double *const *)&w, &where, 1, 1);
+        CHECK(a.code == VG_OK && !memcmp(a.x[0], at, 3 * n * sizeof *at));
+        clear(&a);
+    }
+    free(w);
+    free(at);
+    free(all);
+    vg_graph_free(&g);
+    vg_head_clear(&h);
+}
+
+/* ---- threads and batches ---- */
+
+static void test_threads_and_batches(void)
+{
+    enum { POSES = 17 };
+    film film = load_film("woman-tanktop-jump.tar.xz", "woman-tanktop.rest.obj", POSES);
+    vg_head flower = make_flower(40), *shapes[] = {&film.h, &flower};
+    CHECK(film.n == POSES);
+    for (size_t i = 0; i < 2; i++) {
+        vg_graph *g = graph_of(shapes[i]);
+        double *w[POSES], roots[POSES][3];
+        const double *at[POSES];
+        for (size_t k = 0; k < POSES; k++) {
+            w[k] = vectors_of(g, i == 0 ? film.pose[k] : flower.reference);
+            for (size_t c = 0; c < 3 * vg_graph_corners(g); c++) w[k][c] *= 1 + 0.2 * noise();
+            for (int j = 0; j < 3; j++) roots[k][j] = noise();
+            at[k] = roots[k];
+        }
+        answer one = solve(g, shapes[i]->reference, NULL, 0, POSES, (const double *const *)w, at, 1, 1);
+        CHECK(one.code == VG_OK);
+        for (int threads = 1; threads <= 3; threads++)
+            for (size_t batch = 1; batch <= POSES; batch += batch < 9 || i == 1 ? 1 : 4) {
+                answer a = solve(g, shapes[i]->reference, NULL, 0, POSES, (const double *const *)w, at, threads, batch);
+                bool same = a.code == VG_OK;
+                for (size_t k = 0; same && k < POSES; k++) same = !memcmp(a.x[k], one.x[k], 3 * g->nv * sizeof(double));
+                if (!same) printf("%d threads, %zu poses a call:\n", threads, batch);
+                CHECK(same);
+                clear(&a);
+            }
+        clear(&one);
+        for (size_t k = 0; k < POSES; k++) free(w[k]);
+        vg_graph_free(&g);
+    }
+    film_clear(&film);
+    vg_head_clear(&flower);
+}
+
+static void test_batch_size_and_facts(void)
+{
+    vg_head h = make_torus(20, 15);
+    vg_graph *g = graph_of(&h);
+    vg_solver *s;
+    vg_err e;
+    for (int threads = 1; threads <= 3; threads++) {
+        if (vg_solver_new(&s, g, NULL, 0, h.reference, threads, &e) < 0) abort();
+        CHECK(vg_solver_batch(s) >= 8 && vg_solver_batch(s) % (size_t)threads == 0);
+        vg_solver_facts facts = vg_solver_get_facts(s);
+        CHECK(facts.unknowns == 299); /* one vertex is held */
+        CHECK(facts.factor_entries >= 299 && facts.analyse_seconds >= 0 && facts.factor_seconds >= 0);
+        vg_solver_free(&s);
+    }
+    vg_graph_free(&g);
+    vg_head_clear(&h);
+}
+
+/* ---- what there is nothing to solve for, and what is refused ---- */
+
+static void test_without_faces(void)
+{
+    vg_head h = new_shape();
+    vg_err e;
+    for (int points = 0; points < 2; points++) {
+        if (points) add_isolated(&h);
+        vg_graph *g;
+        CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK && vg_graph_new(&g, &h, &e) == VG_OK);
+        double none = 0, root[3] = {1, 2, 3};
+        const double *w = &none, *at = root;
+        answer a = solve(g, h.reference, NULL, 0, 1, &w, &at, 1, 1);
+        CHECK(a.code == VG_OK && !memcmp(a.x[0], h.reference, 3 * h.mesh.nv * sizeof(double)));
+        clear(&a);
+        vg_graph_free(&g);
+    }
+    vg_head_clear(&h);
+}
+
+static void test_refused(void)
+{
+    vg_head h = make_pieces();
+    uint32_t lone = add_vertex(&h, 0, 0, 0);
+    vg_graph *g;
+    vg_solver *s;
+    vg_err e;
+    h.has_links = true; /* and none are there */
+    CHECK(vg_graph_new(&g, &h, &e) == VG_OK);
+    CHECK(vg_solver_new(&s, g, NULL, 0, h.reference, 1, &e) == VG_EINPUT && !s && strstr(e.message, "link is missing"));
+    uint32_t anchors[] = {0, 1};
+    CHECK(vg_solver_new(&s, g, anchors, 2, h.reference, 1, &e) == VG_EINPUT && !s);
+    vg_graph_free(&g);
+    h.has_links = false;
+    g = graph_of(&h);
+    CHECK(vg_solver_new(&s, g, &lone, 1, h.reference, 1, &e) == VG_EINPUT && !s && strstr(e.message, "in no face"));
+    vg_graph_free(&g);
+    vg_head_clear(&h);
+}
+
+TESTS({"every generated mesh comes back", test_generated}, {"long and large meshes come back", test_long_and_large},
+      {"in tiny and huge units", test_units}, {"the data come back, from all and from selected faces", test_data},
+      {"inconsistent vectors: the dense least-squares answer", test_least_squares},
+      {"inconsistent vectors: the gradient vanishes on large meshes", test_normal_equations},
+      {"anchors are met to the bit, isolated vertices stay", test_anchors},
+      {"anchors that contradict the vectors", test_contradicting_anchors},
+      {"threads and batches change no bit", test_threads_and_batches},
+      {"batch size and facts", test_batch_size_and_facts}, {"meshes without faces", test_without_faces},
+      {"what is refused", test_refused})
