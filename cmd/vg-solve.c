@@ -3,8 +3,15 @@
 #include "cli.h"
 
 #include <stdlib.h>
+#include <string.h>
 
-static const cli_option options[] = {{NULL}};
+static struct {
+    const char *weights;
+} opts;
+
+static const cli_option options[] = {
+    {"weights", 0, "uniform|area", "every corner counts alike (default), or by the reference surface's metric", .text = &opts.weights},
+    {NULL}};
 
 static const cli_program program = {
     .name = "vg-solve",
@@ -54,6 +61,13 @@ static void solve_batch(vg_solver *solver, batch *b)
     b->n = 0;
 }
 
+static vg_weights parse_weights(void)
+{
+    if (!opts.weights || !strcmp(opts.weights, "uniform")) return VG_WEIGHTS_UNIFORM;
+    if (!strcmp(opts.weights, "area")) return VG_WEIGHTS_AREA;
+    cli_usage("--weights is 'uniform' or 'area', not '%s'", opts.weights);
+}
+
 static void run(vg_source *s, vg_head *h)
 {
     vg_err e;
@@ -66,7 +80,7 @@ static void run(vg_source *s, vg_head *h)
         cli_die(&e);
     }
     if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&g, h, &e) < 0 ||
-        vg_solver_new(&solver, g, h->anchors, h->nanchors, h->reference, cli.threads, &e) < 0)
+        vg_solver_new(&solver, g, h->anchors, h->nanchors, h->reference, parse_weights(), cli.threads, &e) < 0)
         cli_die(&e);
     vg_solver_facts facts = vg_solver_get_facts(solver);
     cli_note("%zu unknowns, %zu entries in the factor, analysed in %.3f s, factorized in %.3f s", facts.unknowns,

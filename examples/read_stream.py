@@ -31,6 +31,7 @@ NO_TEXTURE = 0xFFFFFFFF
 KINDS = {1: "vertices", 2: "vectors", 3: "deformations", 4: "transforms"}
 WIDTH = {"vertices": 3, "vectors": 3, "deformations": 4, "transforms": 7}
 LABEL_KINDS = {1: "object", 2: "group", 3: "material", 4: "smoothing", 5: "library"}
+NO_PARENT = 0xFFFFFFFF
 TAG_BYTES = frozenset(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 ")
 
 
@@ -76,6 +77,27 @@ class Texture:
 
 
 @dataclass
+class Joint:
+    """Joint j of a skeleton is vertex j of the mesh."""
+    name: str
+    parent: object   # None: a root
+    offset: list     # from the parent, in the reference pose
+    channels: list   # 1 2 3: x y z position, 4 5 6: x y z rotation
+
+
+@dataclass
+class Correspondence:
+    """Which faces of a source mesh drive face f of a target mesh: pairs first[f] .. first[f + 1] - 1."""
+    source: tuple     # vertices, faces, digest
+    target: tuple
+    first: array
+    source_face: array
+    weight: array
+    distance: array
+    matched: list
+
+
+@dataclass
 class Provenance:
     program: str
     version: str
@@ -106,6 +128,8 @@ class Stream:
     anchors: object = None
     reference: object = None  # array 'd'
     reference_name: object = None
+    skeleton: object = None   # list of Joint
+    correspondence: object = None
     kind: str = ""
     precision: int = 0
     count: int = -1
@@ -119,6 +143,13 @@ class Stream:
         chosen = range(self.mesh.nf) if self.selection is None else self.selection
         links = self.links if self.links is not None else ()
         return [list(self.mesh.face(f)) for f in chosen] + [list(links[i:i + 2]) for i in range(0, len(links), 2)]
+
+    def digest(self) -> int:
+        """What a correspondence calls this mesh: XXH64 over its counts and faces as 64-bit words."""
+        words = [self.mesh.nv, self.mesh.nf]
+        for f in range(self.mesh.nf):
+            words += [len(self.mesh.face(f)), *self.mesh.face(f)]
+        return xxh64(struct.pack(f"<{len(words)}Q", *words))
 
     def vectors_of(self, positions) -> list:
         """The vector of every corner of the graph at these vertex positions (x y z x y z ...), flat."""
@@ -392,7 +423,7 @@ class _Reader:
             raise StreamError(f"record {tag} must come before FORM" if tag != "FORM" else "it has two FORM records")
         if tag in self.seen and tag != "PROV":
             raise StreamError(f"it has two {tag} records")
-        if tag in ("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP") and "MESH" not in self.seen:
+        if tag in ("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP", "SKEL") and "MESH" not in self.seen:
             raise StreamError(f"record {tag} must come after MESH")
 
     def prov(self, p: _Payload):
@@ -490,6 +521,62 @@ class _Reader:
         self.stream.reference = p.f64s(3 * self.stream.mesh.nv, "a position")
         p.end()
 
+    def joint(self, p: _Payload, index: int) -> Joint:
+        p.fits("it ends inside a joint")
+        parent, n = p.u32(), p.u32()
+        channels, offset = list(p.take(8)), p.take(24)
+        length = p.u32()
+        if parent != NO_PARENT and parent >= index:
+            p.fail("a joint's parent does not come before it")
+        if n > 6:
+            p.fail("a joint has more than 6 channels")
+        if any(not 1 <= c <= 6 for c in channels[:n]) or any(channels[n:]):
+            p.fail("a joint has an unknown channel")
+        offset = list(struct.unpack("<3d", offset))
+        if not all(map(math.isfinite, offset)):
+            p.fail("an offset is not finite")
+        name = p.text(length)
+        p.fits("padding is missing or not zero")
+        p.pad()
+        return Joint(name, None if parent == NO_PARENT else parent, offset, channels[:n])
+
+    def skel(self, p: _Payload):
+        joints = []
+        while p.left():
+            joints.append(self.joint(p, len(joints)))
+        if len(joints) != self.stream.mesh.nv:
+            p.fail("it does not have one joint for each vertex")
+        self.stream.skeleton = joints
+
+    def corr(self, p: _Payload):
+        p.fits("its counts are out of range")
+        source, target = (p.u64(), p.u64(), p.u64()), (p.u64(), p.u64(), p.u64())
+        pairs, nf = p.u64(), target[1]
+        if nf >= INDEX_LIMIT or pairs >= INDEX_LIMIT:
+            p.fail("its counts are out of range")
+        p.fits("its length and counts do not agree")
+        first, source_face = p.u32s(nf + 1), p.u32s(pairs)
+        p.pad()
+        weight, distance = p.f64s(pairs, "a weight is not positive, or"), p.f64s(nf, "a distance or mark is out of range, or")
+        matched = list(p.take(nf))
+        p.pad()
+        p.end()
+        if first[0] != 0 or first[nf] != pairs or any(a > b for a, b in zip(first, first[1:])):
+            p.fail("its lists of pairs are not in order")
+        for f in range(nf):
+            mine = slice(first[f], first[f + 1])
+            if first[f] == first[f + 1]:
+                p.fail("a target face is driven by none")
+            if any(s >= source[1] for s in source_face[mine]):
+                p.fail("a source face is out of range")
+            if not all(w > 0 for w in weight[mine]):
+                p.fail("a weight is not positive")
+            if abs(sum(weight[mine]) - 1) >= 1e-9:
+                p.fail("the weights of a face do not sum to 1")
+            if distance[f] < 0 or matched[f] > 1:
+                p.fail("a distance or mark is out of range")
+        self.stream.correspondence = Correspondence(source, target, first, source_face, weight, distance, matched)
+
     def form(self, p: _Payload):
         s = self.stream
         p.fits("it has a wrong length")
@@ -555,7 +642,7 @@ class _Reader:
         self.stream.tail, self.stream.checksum, self.done = self.pending, running, True
 
     HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "SELE": sele, "LINK": link, "ANCH": anch,
-                "REFP": refp, "FORM": form, "FRAM": fram, "FAIL": fail, "END ": end}
+                "REFP": refp, "SKEL": skel, "CORR": corr, "FORM": form, "FRAM": fram, "FAIL": fail, "END ": end}
 
 
 def read_stream(file) -> Stream:
@@ -583,6 +670,16 @@ def _frame_json(f: Frame, width: int) -> dict:
             "values": _rows(f.values, width), "extra": _extra_json(f.extra)}
 
 
+def _correspondence_json(c: Correspondence) -> dict:
+    pairs = list(zip(c.source_face, c.weight))
+    return {
+        "source": {"vertices": c.source[0], "faces": c.source[1], "digest": f"{c.source[2]:016x}"},
+        "target": {"vertices": c.target[0], "faces": c.target[1], "digest": f"{c.target[2]:016x}"},
+        "faces": [{"driven_by": [list(x) for x in pairs[c.first[f]:c.first[f + 1]]], "distance": c.distance[f],
+                   "matched": bool(c.matched[f])} for f in range(c.target[1])],
+    }
+
+
 def to_json(s: Stream) -> dict:
     """The whole content as plain lists, dictionaries and numbers; what is absent is None."""
     m, t = s.mesh, s.texture
@@ -598,6 +695,8 @@ def to_json(s: Stream) -> dict:
         "links": None if s.links is None else _rows(s.links, 2),
         "anchors": None if s.anchors is None else list(s.anchors),
         "reference": m and {"name": s.reference_name, "positions": _rows(s.reference, 3)},
+        "skeleton": None if s.skeleton is None else [vars(j) for j in s.skeleton],
+        "correspondence": s.correspondence and _correspondence_json(s.correspondence),
         "kind": s.kind, "precision": s.precision, "count": s.count,
         "extra": _extra_json(s.extra),
         "frames": [_frame_json(f, WIDTH[s.kind]) for f in s.frames],
@@ -612,7 +711,8 @@ def _summary(s: Stream) -> str:
         m = s.mesh
         lines.append(f"{m.nv} vertices, {m.nf} faces, {len(m.vert)} corners, reference '{s.reference_name}'")
     for what, n in (("selected faces", s.selection and len(s.selection)), ("links", s.links and len(s.links) // 2),
-                    ("anchors", s.anchors and len(s.anchors)), ("labels", s.labels and len(s.labels))):
+                    ("anchors", s.anchors and len(s.anchors)), ("joints", s.skeleton and len(s.skeleton)),
+                    ("target faces driven", s.correspondence and s.correspondence.target[1]), ("labels", s.labels and len(s.labels))):
         if n:
             lines.append(f"{n} {what}")
     lines += [f"made by {p.program} {p.version}: {' '.join(p.args)}" for p in s.provenance]

@@ -330,6 +330,9 @@ vg_deform_counts vg_deformer_counts(const vg_deformer *d);
 /* Reconstruction: min over V of the squared difference between the vectors of V and the given ones (MATH 2; T 3.7-3.9),
  * by one sparse Cholesky factorisation, many poses per solve. */
 typedef struct vg_solver vg_solver;
+/* What a difference counts: every corner alike (T 3.7), or in the reference surface's own metric, which does not depend on how the
+ * surface is cut into faces (on triangles the cotangent weights). Consistent vectors are met exactly by both. */
+typedef enum vg_weights { VG_WEIGHTS_UNIFORM = 0, VG_WEIGHTS_AREA = 1 } vg_weights;
 typedef struct vg_solver_facts {
     size_t unknowns, factor_entries; /* entries of the factor, explicit zeros included */
     double analyse_seconds, factor_seconds;
@@ -339,7 +342,7 @@ typedef struct vg_solver_facts {
  * the attached vertices is. reference (nv points, copied in part) places the vertices that are in no face.
  * VG_EINPUT when the graph is not connected. */
 int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
-                  int threads, vg_err *e) VG_MUST_CHECK;
+                  vg_weights weights, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_solver_free(vg_solver **s);
 /* vg_solver_load: one pose's vectors (and anchors, nanchors points, if any) become a first guess x and a right-hand side, nv x 3
  * each: what the guess misses. */

@@ -151,8 +151,7 @@ prepare_examples() {
         name=$(basename "$page")
         cp -r files run
         for script in scripts/"$name".*; do
-            (cd run && capture bash -e -u -o pipefail "../$script" && { [ "$status" = 0 ] || [ "$status" = 1 ]; } && [ -z "$stderr" ]) ||
-                fail "an example of $page does not run:" "$(cat "$script")" "$stderr" "$(cat .stderr)"
+            must env -C run bash -e -u -o pipefail "$PWD/$script" || fail "an example of $page does not run:" "$(cat "$script")"
         done
         rm -rf run
     done

@@ -38,7 +38,7 @@ capture() {
 # must CMD...: status 0 and nothing on standard error
 must() {
     capture "$@" || return 1
-    [ "$status" = 0 ] || fail "'$*' ended with status $status" "$stderr" || return 1
+    [ "$status" = 0 ] || fail "'$*' ended with status $status" "$stderr" "$output" || return 1
     [ -z "$stderr" ] || fail "'$*' wrote to standard error" "$stderr"
 }
 

@@ -136,6 +136,35 @@ def reference(r):
     return Record("REFP", pad(u32(len(name), 0) + name) + f64(*flat(r["positions"])), CRITICAL)
 
 
+def skeleton(joints):
+    out = b""
+    for j in joints:
+        parent = 0xFFFFFFFF if j["parent"] is None else j["parent"]
+        channels = bytes(j["channels"]) + bytes(8 - len(j["channels"]))
+        out += pad(u32(parent, len(j["channels"])) + channels + f64(*j["offset"]) + string(j["name"]))
+    return Record("SKEL", out, 0)
+
+
+def digest(m):
+    """What a correspondence calls a mesh."""
+    words = [m["vertices"], len(m["faces"])]
+    for face in m["faces"]:
+        words += [len(face), *face]
+    return xxh64(u64(*words))
+
+
+def correspondence(c):
+    ends = [u64(m["vertices"], m["faces"], int(m["digest"], 16)) for m in (c["source"], c["target"])]
+    pairs = flat(f["driven_by"] for f in c["faces"])
+    first = [0]
+    for f in c["faces"]:
+        first.append(first[-1] + len(f["driven_by"]))
+    indices = pad(u32(*first, *(s for s, _ in pairs)))
+    numbers = f64(*(w for _, w in pairs), *(f["distance"] for f in c["faces"]))
+    matched = pad(bytes(f["matched"] for f in c["faces"]))
+    return Record("CORR", b"".join(ends) + u64(len(pairs)) + indices + numbers + matched, CRITICAL)
+
+
 def frame(c, f):
     name = f["name"].encode()
     head = pad(u32(len(name), f["time"] is not None) + f64(f["time"] or 0) + name)
@@ -160,6 +189,10 @@ def records_of(c):
             out.append(Record(tag, u32(*(flat(value) if tag == "LINK" else value)), CRITICAL))
     if c["reference"] is not None:
         out.append(reference(c["reference"]))
+    if c["skeleton"] is not None:
+        out.append(skeleton(c["skeleton"]))
+    if c["correspondence"] is not None:
+        out.append(correspondence(c["correspondence"]))
     out += unknown(c["extra"])
     out.append(Record("FORM", u32(KINDS[c["kind"]], c["precision"]) + u64(c["count"]), CRITICAL))
     for f in c["frames"]:
@@ -195,7 +228,7 @@ def content(**changes):
     c = {
         "minor": 0, "provenance": [], "mesh": {"vertices": 4, "faces": [[0, 1, 2], [0, 2, 3]]}, "texture": None,
         "labels": None, "selection": None, "links": None, "anchors": None,
-        "reference": {"name": "rest", "positions": POINTS[:4]},
+        "reference": {"name": "rest", "positions": POINTS[:4]}, "skeleton": None, "correspondence": None,
         "kind": "vertices", "precision": 8, "count": 4, "extra": [],
         "frames": [pose("pose1", BENT[:4])], "tail": [],
     }
@@ -241,6 +274,30 @@ def graph_content(kind, **changes):
     return c
 
 
+def skeleton_content(**changes):
+    """Hips, a spine with its end, and a leg; the mesh has the bones as its faces."""
+    joints = [("Hips", None, [0, 1, 0], [1, 2, 3, 6, 4, 5]), ("Spine", 0, [0, 0.5, 0], [6, 4, 5]),
+              ("Spine.end", 1, [0, 0.25, 0], []), ("K\u00fcken", 0, [0.125, -1, 0], [4])]
+    rest = [[0, 1, 0], [0, 1.5, 0], [0, 1.75, 0], [0.125, 0, 0]]
+    bent = [[0, 1, 0], [0.5, 1, 0], [0.75, 1, 0], [0.125, 0, 0]]
+    return content(mesh={"vertices": 4, "faces": [[0, 1], [1, 2], [0, 3]]}, frames=[pose("bent", bent)],
+                   reference={"name": "rest", "positions": rest},
+                   skeleton=[dict(zip(("name", "parent", "offset", "channels"), j)) for j in joints], **changes)
+
+
+def driven(by, distance=0.0, matched=True):
+    return {"driven_by": by, "distance": distance, "matched": matched}
+
+
+def register_content(**changes):
+    """What vg-register writes: source mesh and reference, one frame of it fitted to the target (here: three faces)."""
+    c = content(frames=[pose("fitted", BENT[:4])])
+    target = {"vertices": 5, "faces": [[0, 1, 2], [0, 2, 3], [0, 3, 4]]}
+    ends = [{"vertices": m["vertices"], "faces": len(m["faces"]), "digest": f"{digest(m):016x}"} for m in (c["mesh"], target)]
+    faces = [driven([[0, 1.0]], 0.25), driven([[1, 0.75], [0, 0.25]]), driven([[1, 1.0]], 2.5, False)]
+    return dict(c, correspondence={"source": ends[0], "target": ends[1], "faces": faces}, **changes)
+
+
 NOTE = {"tag": "XNOT", "flags": COPY_SAFE, "payload": b"copied".hex()}
 FUTURE = {"tag": "X 1 ", "flags": COPY_SAFE | 0xABCD0000, "payload": bytes(range(8)).hex()}
 DROPPED = {"tag": "XTMP", "flags": 0, "payload": b"a filter drops this".hex()}
@@ -281,6 +338,8 @@ def golden():
             "two transforms a frame, no mesh at all",
             content(mesh=None, reference=None, kind="transforms", count=2,
                     frames=[pose("t", [[1, 0, 0, 0, 0, 0, 0], [0.5, 0.5, -0.5, 0.5, 1, 2, 3]], time=-1.5)])),
+        "skeleton": ("the joints of a skeleton, whose bones are the mesh's faces", skeleton_content()),
+        "correspondence": ("three faces of a target driven by two faces of a source", register_content()),
         "unknown-records": (
             "copy-safe records before FORM, between frames and at the end; one that a filter drops",
             content(extra=[NOTE, DROPPED], tail=[NOTE],
@@ -315,6 +374,13 @@ def accept():
                                               frames=[pose("t", [[1, 0, 0, 0, 1, 2, 3]])])),
         "line-segments-only": whole(content(mesh={"vertices": 4, "faces": [[0, 1], [1, 2], [3, 1]]})),
         "ignored-flags": whole(content(), ignored),
+        "skeleton-of-nothing": whole(content(mesh={"vertices": 0, "faces": []}, reference={"name": "", "positions": []},
+                                             count=0, frames=[], skeleton=[])),
+        "correspondence-without-mesh": whole(content(mesh=None, reference=None, kind="transforms", count=0, frames=[],
+                                                     correspondence=register_content()["correspondence"])),
+        "correspondence-of-nothing": whole(content(correspondence={
+            "source": {"vertices": 0, "faces": 0, "digest": "0"}, "target": {"vertices": 0, "faces": 0, "digest": "0"},
+            "faces": []})),
         "extreme-numbers": whole(content(frames=[pose("x", [
             [1.7976931348623157e308, -1.7976931348623157e308, 5e-324], [-0.0, 0.0, 2.2250738585072014e-308],
             [1, 2, 3], [4, 5, 6]], time=-1e300)])),
@@ -353,10 +419,10 @@ def without(c, tag):
     return whole(c, [r for r in records_of(c) if r.tag.decode() != tag])
 
 
-def inserted(c, before, record):
+def inserted(c, before, *more):
     records = records_of(c)
     at = len(records) if before is None else next(i for i, r in enumerate(records) if r.tag.decode() == before)
-    return whole(c, records[:at] + [record] + records[at:])
+    return whole(c, records[:at] + list(more) + records[at:])
 
 
 def bad_end(count=0, running=0, length=None, **fields):
@@ -438,12 +504,18 @@ def reject_order():
     of = {r.tag.decode(): r for r in records_of(c)}
     first = [Record("SELE", u32(0), CRITICAL), Record("LINK", b"", CRITICAL), Record("ANCH", b"", CRITICAL),
              Record("TEXC", u32(1, 0) + u64(0) + u32(0xFFFFFFFF) * 6, 0), Record("LABL", b"", 0), of["REFP"]]
+    joints = skeleton(skeleton_content()["skeleton"])
+    drives = correspondence(register_content()["correspondence"])
     out = {f"{r.tag.decode().lower()}-before-mesh": whole(c, [r, of["MESH"], of["FORM"]]) for r in first}
     for r in first[:-1]:
         out[f"{r.tag.decode().lower()}-twice"] = whole(c, [of["MESH"], r, r, of["REFP"], of["FORM"], of["FRAM"]])
     orphan = Record("PROV", u32(1, 0, 0) + string("p") + string("1"), COPY_SAFE)
     late = Record("PROV", u32(0, 0) + string("p") + string("1"), COPY_SAFE)
     out.update({
+        "skel-before-mesh": whole(c, [joints, of["MESH"], of["REFP"], of["FORM"]]),
+        "skel-twice": inserted(c, "FORM", joints, joints),
+        "corr-twice": inserted(c, "FORM", drives, drives),
+        "corr-after-form": inserted(c, "FRAM", drives),
         "mesh-twice": inserted(c, "REFP", of["MESH"]),
         "refp-twice": inserted(c, "FORM", of["REFP"]),
         "form-twice": inserted(c, "FRAM", of["FORM"]),
@@ -541,6 +613,60 @@ def patch32(data, at):
     return data[:at] + u32(0xFFFFFFFF) + data[at + 4:]
 
 
+def joint(parent=None, channels=(), offset=(0, 0, 0), name="j"):
+    return {"parent": parent, "channels": channels, "offset": offset, "name": name}
+
+
+def reject_attachments():
+    """Skeletons and correspondences with content that does not hold."""
+    s, r = skeleton_content(), register_content()
+    # payload of CORR: 7 numbers of 8 bytes, first[4] from 56, source[4] from 72, weight[4] from 88, distance[3] from 120,
+    # matched[3] from 144, padding[5]
+
+    def skeleton_of(*joints):
+        return whole(dict(s, skeleton=list(joints)))
+
+    def driving(*faces):
+        return whole(dict(r, correspondence=dict(r["correspondence"], faces=list(faces))))
+
+    one = driven([[0, 1.0]])
+    return {
+        "skel-joint-missing": skeleton_of(*s["skeleton"][:3]),
+        "skel-joint-too-many": skeleton_of(*s["skeleton"], joint(0)),
+        "skel-parent-itself": skeleton_of(joint(), joint(1), joint(0), joint(0)),
+        "skel-parent-after": skeleton_of(joint(), joint(2), joint(0), joint(0)),
+        "skel-channel-7": skeleton_of(joint(), joint(0, [7]), joint(0), joint(0)),
+        "skel-channel-0": skeleton_of(joint(), joint(0, [4, 0, 5]), joint(0), joint(0)),
+        "skel-channels-7": patched(s, "SKEL", 4, u32(7)),
+        "skel-channel-unused": patched(s, "SKEL", 15, b"\1"),
+        "skel-offset-nan": skeleton_of(joint(), joint(0, offset=(0, NAN, 0)), joint(0), joint(0)),
+        "skel-name-2-32-less-1": patched(s, "SKEL", 40, u32(0xFFFFFFFF)),
+        "skel-name-utf8": patched(s, "SKEL", 44, b"\xff"),
+        "skel-padding": patched(skeleton_content(), "SKEL", -1, b"\1"),
+        "skel-cut": lie(s, "SKEL", payload=lambda record: record.payload[:-20]),
+        "corr-cut": lie(r, "CORR", payload=lambda record: record.payload[:-8]),
+        "corr-long": lie(r, "CORR", payload=lambda record: record.payload + bytes(8)),
+        "corr-empty": lie(r, "CORR", payload=b""),
+        "corr-target-faces-2-32-less-1": patched(r, "CORR", 32, u64(0xFFFFFFFF)),
+        "corr-target-faces-2-31": patched(r, "CORR", 32, u64(1 << 31)),
+        "corr-pairs-2-63": patched(r, "CORR", 48, u64(1 << 63)),
+        "corr-pairs-2-31": patched(r, "CORR", 48, u64(1 << 31)),
+        "corr-first-not-zero": patched(r, "CORR", 56, u32(1)),
+        "corr-first-descends": patched(r, "CORR", 60, u32(3, 1)),
+        "corr-first-last": patched(r, "CORR", 68, u32(3)),
+        "corr-driven-by-none": driving(one, driven([]), one),
+        "corr-source-out-of-range": driving(one, one, driven([[2, 1.0]])),
+        "corr-padding": patched(r, "CORR", -1, b"\1"),
+        "corr-weight-zero": driving(one, one, driven([[0, 1.0], [1, 0.0]])),
+        "corr-weight-negative": driving(one, one, driven([[0, 1.5], [1, -0.5]])),
+        "corr-weight-nan": driving(one, one, driven([[0, NAN]])),
+        "corr-weights-sum": driving(one, one, driven([[0, 0.5], [1, 0.25]])),
+        "corr-distance-negative": driving(one, one, driven([[0, 1.0]], -1.0)),
+        "corr-distance-inf": driving(one, one, driven([[0, 1.0]], INF)),
+        "corr-matched-2": patched(r, "CORR", 144, b"\2"),
+    }
+
+
 def reject_frames():
     """Frames with content that does not hold."""
     c, v, q = content(), graph_content("vectors"), graph_content("deformations")
@@ -596,7 +722,7 @@ def main(root):
         write(f"{root}/fmt/golden/{name}.json", expected_json(c, data))
     for name, data in accept().items():
         write(f"{root}/tests/corpus/accept/{name}.vgs", data)
-    rejected = {**reject_container(), **reject_order(), **reject_header(), **reject_frames()}
+    rejected = {**reject_container(), **reject_order(), **reject_header(), **reject_attachments(), **reject_frames()}
     for name, data in rejected.items():
         write(f"{root}/tests/corpus/reject/{name}.vgs", data)
 

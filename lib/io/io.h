@@ -74,6 +74,65 @@ const char *vgi_format_names(void); /* "obj, ply, ply-ascii, ply-be, off" for me
 int vgi_model_read(vg_model *m, const void *data, size_t n, const vgi_format *format, const char *file_name,
                    const char *subject, vg_err *e) VG_MUST_CHECK;
 
+/* ---- sequence.c: the table of formats whose one file holds a whole sequence; caches.c npy.c npz.c usda.c bvh.c ... ---- */
+
+/* The bytes of a file that is being made: collected, and written from byte 0 on of a regular file. What a header says of the
+ * whole is set at last, by patching. */
+typedef struct vgi_output {
+    int fd;
+    const char *name; /* what messages call it, borrowed */
+    vg_bytes waiting;
+    uint64_t size;    /* of all that was put */
+} vgi_output;
+int vgi_output_put(vgi_output *o, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
+int vgi_output_patch(vgi_output *o, uint64_t off, const void *data, size_t n, vg_err *e) VG_MUST_CHECK; /* of what was put */
+int vgi_output_flush(vgi_output *o, vg_err *e) VG_MUST_CHECK;
+void vgi_output_clear(vgi_output *o);
+
+enum { /* what a format keeps of a sequence beside its numbers; of what it does not, the program warns */
+    VGI_KEEPS_FACES = 1,    /* which are split into triangles without VGI_KEEPS_POLYGONS */
+    VGI_KEEPS_POLYGONS = 2,
+    VGI_KEEPS_ORDER = 4,    /* vertices keep their numbers, those in no face too */
+    VGI_KEEPS_TEXTURE = 8,
+    VGI_KEEPS_LABELS = 16,
+    VGI_KEEPS_NAMES = 32,   /* of frames */
+    VGI_KEEPS_TIMES = 64    /* of frames, any; a format that keeps only some says so in warning() */
+};
+
+typedef struct vgi_sequence_format {
+    const char *name, *suffix;
+    unsigned keeps;
+    bool (*sniff)(const unsigned char *data, size_t n); /* the first 4096 bytes or all; NULL: nothing tells it but its name */
+
+    /* Reading. Whatever the file says, memory grows only as bytes arrive: open has the first frame at hand before it gives a
+     * count. open: fill h, which is empty: kind, count, mesh.nv; what the file knows of faces, attributes, skeleton,
+     * reference, reference_name. No faces: they come from beside. No reference: it is the one from there, or the first pose.
+     * The caller checks the mesh. in is borrowed until close; subject is how messages call the file, quotes included,
+     * borrowed too. next: 1 and values of a frame that has been shaped, its time, and its name if the format keeps names (else
+     * it is called after the file); 0 when the file is read to its end, nothing behind it. close takes what open made, also
+     * when open failed. */
+    int (*open)(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e); /* NULL: only written */
+    int (*next)(void *state, vg_frame *f, vg_err *e);
+    void (*close)(void *state);
+
+    /* Writing. kinds: which kinds of frames, 1 << VG_VERTICES and so on. h, o and out are borrowed until release. check (may
+     * be NULL): can this head be written? end comes only after at least one put; the caller flushes. warning (may be NULL):
+     * what was lost, after end; a text that lives in the state, or NULL. */
+    unsigned kinds;
+    int (*check)(const vg_head *h, const char *output, vg_err *e);
+    int (*begin)(void **state, const vg_head *h, const vg_sink_options *o, vgi_output *out, vg_err *e); /* NULL: only read */
+    int (*put)(void *state, const vg_frame *f, vg_err *e);
+    int (*end)(void *state, vg_err *e);
+    const char *(*warning)(void *state);
+    void (*release)(void *state);
+} vgi_sequence_format;
+
+extern const vgi_sequence_format vgi_sequence_pc2, vgi_sequence_mdd, vgi_sequence_npy, vgi_sequence_npz, vgi_sequence_usda;
+const vgi_sequence_format *vgi_sequence_by_name(const char *name, size_t n);   /* NULL: none */
+const vgi_sequence_format *vgi_sequence_by_suffix(const char *file_name);      /* case does not matter; NULL: none */
+const vgi_sequence_format *vgi_sequence_by_content(const unsigned char *data, size_t n);
+const char *vgi_sequence_names(void); /* "pc2, mdd, ..." for messages, those that are written */
+
 /* ---- names.c: lists of names and their order; names of poses ---- */
 
 typedef struct vgi_names {

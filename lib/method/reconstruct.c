@@ -12,6 +12,7 @@
  * Without anchors one vertex is held at 0 and the pose is moved to its root in the end. Leaves out the triangular solves
  * (solve_kernel.c). The only file that knows CHOLMOD; it calls Core, Cholesky, Partition (LGPL) and Supernodal (GPL).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/metric.h"
 #include "method/solve_kernel.h"
 #include "model/incidence.h"
 
@@ -20,7 +21,8 @@
 #include <time.h>
 
 enum {
-    STAR = 12,         /* from this many corners on a face gets its centroid as an unknown */
+    STAR = 12,         /* from this many corners on a face gets its centroid as an unknown ... */
+    STAR_METRIC = 200, /* ... or from this many, if it has a metric of its own; then its metric is the weight alone */
     SMALL = 500        /* below this many unknowns a minimum-degree order is as good as nested dissection, and faster */
 };
 #define NO_ROW UINT32_MAX
@@ -37,6 +39,7 @@ struct vg_solver {
     size_t vertices_unknown;
     uint32_t pinned;  /* without anchors: the vertex that is held at 0 */
     uint32_t *row;    /* nv: row in the factor's order; NO_ROW if held or isolated */
+    vgi_metric metric;
     size_t nsteps;
     step *walk;       /* from the held vertices to all others */
     uint32_t *anchors;
@@ -62,6 +65,11 @@ static double seconds(void)
 static size_t face_size(const vg_graph *g, size_t f)
 {
     return g->start[f + 1] - g->start[f];
+}
+
+static bool is_star(const vg_solver *s, size_t f)
+{
+    return face_size(s->g, f) >= (s->metric.face ? STAR_METRIC : STAR);
 }
 
 /* Number the unknowns: row[v] counts up over attached vertices that are not held. */
@@ -92,7 +100,7 @@ static int number_unknowns(vg_solver *s, const uint32_t *anchors, size_t n, cons
         }
     }
     s->vertices_unknown = s->unknowns;
-    for (size_t f = 0; f < g->nf; f++) s->unknowns += face_size(g, f) >= STAR;
+    for (size_t f = 0; f < g->nf; f++) s->unknowns += is_star(s, f);
     if (s->unknowns > INT32_MAX / 2) return vg_fail(e, VG_EINPUT, "a mesh of %zu unknowns is too large", s->unknowns);
     if (pinned < g->nv) s->row[pinned] = NO_ROW;
     s->pinned = (uint32_t)pinned;
@@ -137,12 +145,12 @@ static int plan_walk(vg_solver *s, vg_err *e)
 }
 
 /* Upper bound of the entries of the lower triangle, duplicates counted. */
-static size_t count_entries(const vg_graph *g)
+static size_t count_entries(const vg_solver *s)
 {
     size_t n = 0;
-    for (size_t f = 0; f < g->nf; f++) {
-        size_t r = face_size(g, f);
-        n += r >= STAR ? 2 * r + 1 : r * (r + 1) / 2;
+    for (size_t f = 0; f < s->g->nf; f++) {
+        size_t r = face_size(s->g, f);
+        n += is_star(s, f) ? 2 * r + 1 : r * (r + 1) / 2;
     }
     return n;
 }
@@ -159,42 +167,56 @@ static void put(assembly *a, size_t i, size_t j, double x)
     a->n++;
 }
 
-static void assemble_pairs(assembly *a, const vg_solver *s, const uint32_t *vert, size_t r)
+static double quadratic(const double s[6], const double *a, const double *b)
 {
-    double share = 1.0 / (double)r;
+    return a[0] * (s[0] * b[0] + s[1] * b[1] + s[2] * b[2]) + a[1] * (s[1] * b[0] + s[3] * b[1] + s[4] * b[2]) +
+           a[2] * (s[2] * b[0] + s[4] * b[1] + s[5] * b[2]);
+}
+
+static void assemble_pairs(assembly *a, const vg_solver *s, size_t f)
+{
+    size_t begin = s->g->start[f], r = face_size(s->g, f);
+    const uint32_t *vert = s->g->vert + begin;
+    const vgi_face_metric *m = s->metric.face ? &s->metric.face[f] : NULL;
+    const double *plane = m ? s->metric.plane + 3 * begin : NULL;
+    double weight = m ? m->weight : 1, share = weight / (double)r;
     for (size_t p = 0; p < r; p++) {
         size_t i = s->row[vert[p]];
         if (i >= s->unknowns) continue;
-        put(a, i, i, 1 - share);
-        for (size_t q = 0; q < p; q++)
-            if (s->row[vert[q]] < s->unknowns) put(a, i, s->row[vert[q]], -share);
+        for (size_t q = 0; q <= p; q++) {
+            if (s->row[vert[q]] >= s->unknowns) continue;
+            double x = (p == q ? weight : 0) - share;
+            put(a, i, s->row[vert[q]], m ? x + quadratic(m->s, plane + 3 * p, plane + 3 * q) : x);
+        }
     }
 }
 
-static void assemble_star(assembly *a, const vg_solver *s, const uint32_t *vert, size_t r, size_t centre)
+static void assemble_star(assembly *a, const vg_solver *s, size_t f, size_t centre)
 {
-    put(a, centre, centre, (double)r);
+    size_t r = face_size(s->g, f);
+    const uint32_t *vert = s->g->vert + s->g->start[f];
+    double weight = s->metric.face ? s->metric.face[f].weight : 1;
+    put(a, centre, centre, weight * (double)r);
     for (size_t p = 0; p < r; p++) {
         size_t i = s->row[vert[p]];
         if (i >= s->unknowns) continue;
-        put(a, i, i, 1);
-        put(a, i, centre, -1);
+        put(a, i, i, weight);
+        put(a, i, centre, -weight);
     }
 }
 
 static int assemble(vg_solver *s, cholmod_sparse **N, vg_err *e)
 {
     const vg_graph *g = s->g;
-    size_t most = count_entries(g), n = s->unknowns;
+    size_t most = count_entries(s), n = s->unknowns;
     if (most > INT32_MAX) return vg_fail(e, VG_EINPUT, "a mesh of %zu matrix entries is too large", most);
     cholmod_triplet *T = cholmod_allocate_triplet(n, n, most, -1, CHOLMOD_REAL, &s->common);
     if (!T) return vg_fail(e, VG_ENOMEM, "not enough memory for a matrix of %zu entries", most);
     assembly a = {T->i, T->j, T->x, 0};
     size_t centre = s->vertices_unknown;
     for (size_t f = 0; f < g->nf; f++) {
-        size_t r = face_size(g, f);
-        if (r >= STAR) assemble_star(&a, s, g->vert + g->start[f], r, centre++);
-        else assemble_pairs(&a, s, g->vert + g->start[f], r);
+        if (is_star(s, f)) assemble_star(&a, s, f, centre++);
+        else assemble_pairs(&a, s, f);
     }
     T->nnz = a.n;
     *N = cholmod_triplet_to_sparse(T, 0, &s->common);
@@ -244,8 +266,16 @@ static int make_workspace(vg_solver *s, vg_err *e)
     return s->x ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", s->unknowns);
 }
 
+static int make_metric(vg_solver *s, const double *reference, vg_err *e)
+{
+    int r = vgi_metric_make(&s->metric, s->g, reference, e);
+    for (size_t f = 0; r == VG_OK && f < s->g->nf; f++)
+        if (is_star(s, f)) memset(s->metric.face[f].s, 0, sizeof s->metric.face[f].s);
+    return r;
+}
+
 int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
-                  int threads, vg_err *e)
+                  vg_weights weights, int threads, vg_err *e)
 {
     vg_solver *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
@@ -255,7 +285,8 @@ int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, s
     s->common.print = 0;
     s->common.error_handler = NULL;
     cholmod_sparse *N = NULL;
-    int r = number_unknowns(s, anchors, nanchors, reference, e);
+    int r = weights == VG_WEIGHTS_AREA ? make_metric(s, reference, e) : VG_OK;
+    if (r == VG_OK) r = number_unknowns(s, anchors, nanchors, reference, e);
     if (r == VG_OK) r = plan_walk(s, e);
     if (r == VG_OK && s->unknowns) {
         r = assemble(s, &N, e);
@@ -279,6 +310,7 @@ void vg_solver_free(vg_solver **out)
     free(s->row);
     free(s->anchors);
     free(s->walk);
+    vgi_metric_clear(&s->metric);
     free(s->isolated);
     free(s->isolated_at);
     free(s->x);
@@ -311,31 +343,58 @@ static void walk(const vg_solver *s, const double *w, const double *anchors, dou
     }
 }
 
-/* What the guess misses: A (W* - A' x). Only differences within a face are formed, so it rounds like vectors. */
-static void fold(const vg_graph *g, const double *w, const double *x, double *rhs)
+/* What a face's corners miss, in units of its own: G e for e = (w - w0) - (x - x0), e of the first corner being 0. Only
+ * differences within a face are formed, so it rounds like vectors. */
+static inline __attribute__((always_inline)) void add_pull(const vg_graph *g, const vgi_metric *metric, size_t f, const double *w, const double *x, double *rhs)
 {
-    memset(rhs, 0, 3 * g->nv * sizeof *rhs);
-    for (size_t f = 0; f < g->nf; f++) {
-        size_t begin = g->start[f], end = g->start[f + 1];
-        const double *w0 = w + 3 * begin, *x0 = x + 3 * (size_t)g->vert[begin];
-        double mean[3] = {0, 0, 0}, share = 1.0 / (double)(end - begin);
-        for (size_t c = begin; c < end; c++) {
-            const double *wc = w + 3 * c, *xc = x + 3 * (size_t)g->vert[c];
-            for (int k = 0; k < 3; k++) mean[k] += (wc[k] - w0[k]) - (xc[k] - x0[k]);
+    size_t begin = g->start[f], end = g->start[f + 1];
+    const double *w0 = w + 3 * begin, *x0 = x + 3 * (size_t)g->vert[begin];
+    double mean[3] = {0, 0, 0}, share = 1.0 / (double)(end - begin);
+    for (size_t c = begin; c < end; c++) {
+        const double *wc = w + 3 * c, *xc = x + 3 * (size_t)g->vert[c];
+        for (int k = 0; k < 3; k++) mean[k] += (wc[k] - w0[k]) - (xc[k] - x0[k]);
+    }
+    for (int k = 0; k < 3; k++) mean[k] *= share;
+    const vgi_face_metric *m = metric->face ? &metric->face[f] : NULL;
+    double weight = m ? m->weight : 1, y[3][3] = {{0}}, z[3][3]; /* y[k] = sum over corners of plane e_k; z = S y */
+    for (size_t c = begin; m && c < end; c++) {
+        const double *wc = w + 3 * c, *xc = x + 3 * (size_t)g->vert[c], *plane = metric->plane + 3 * c;
+        for (int k = 0; k < 3; k++) {
+            double e = (wc[k] - w0[k]) - (xc[k] - x0[k]);
+            for (int i = 0; i < 3; i++) y[k][i] += plane[i] * e;
         }
-        for (int k = 0; k < 3; k++) mean[k] *= share;
-        for (size_t c = begin; c < end; c++) {
-            const double *wc = w + 3 * c, *xc = x + 3 * (size_t)g->vert[c];
-            double *to = rhs + 3 * (size_t)g->vert[c];
-            for (int k = 0; k < 3; k++) to[k] += (wc[k] - w0[k]) - (xc[k] - x0[k]) - mean[k];
+    }
+    for (int k = 0; m && k < 3; k++) {
+        z[k][0] = m->s[0] * y[k][0] + m->s[1] * y[k][1] + m->s[2] * y[k][2];
+        z[k][1] = m->s[1] * y[k][0] + m->s[3] * y[k][1] + m->s[4] * y[k][2];
+        z[k][2] = m->s[2] * y[k][0] + m->s[4] * y[k][1] + m->s[5] * y[k][2];
+    }
+    for (size_t c = begin; c < end; c++) {
+        const double *wc = w + 3 * c, *xc = x + 3 * (size_t)g->vert[c], *plane = m ? metric->plane + 3 * c : NULL;
+        double *to = rhs + 3 * (size_t)g->vert[c];
+        for (int k = 0; k < 3; k++) {
+            to[k] += weight * ((wc[k] - w0[k]) - (xc[k] - x0[k]) - mean[k]);
+            if (m) to[k] += plane[0] * z[k][0] + plane[1] * z[k][1] + plane[2] * z[k][2];
         }
+    }
+}
+
+/* The right-hand side of what the guess misses: A G (W* - A' x). */
+static void fold(const vg_solver *s, const double *w, const double *x, double *rhs)
+{
+    memset(rhs, 0, 3 * s->g->nv * sizeof *rhs);
+    if (s->metric.face) {
+        for (size_t f = 0; f < s->g->nf; f++) add_pull(s->g, &s->metric, f, w, x, rhs);
+    } else {
+        static const vgi_metric uniform; /* known to the compiler, which makes the plain loop of it */
+        for (size_t f = 0; f < s->g->nf; f++) add_pull(s->g, &uniform, f, w, x, rhs);
     }
 }
 
 void vg_solver_load(const vg_solver *s, const double *vectors, const double *anchors, double *x, double *rhs)
 {
     walk(s, vectors, anchors, x);
-    fold(s->g, vectors, x, rhs);
+    fold(s, vectors, x, rhs);
 }
 
 typedef struct solve_job {

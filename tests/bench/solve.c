@@ -108,7 +108,7 @@ static void measure_ours(problem *p, int threads, double *load, double *solve)
 {
     vg_err e;
     ours o = {.p = p};
-    check(vg_solver_new(&o.solver, p->g, NULL, 0, p->reference, threads, &e), &e);
+    check(vg_solver_new(&o.solver, p->g, NULL, 0, p->reference, VG_WEIGHTS_UNIFORM, threads, &e), &e);
     *load = rate(load_poses, &o, POSES);
     *solve = rate(solve_poses, &o, POSES);
     load_poses(&o); /* what is compared was solved once */

@@ -27,7 +27,7 @@ static answer solve(const vg_graph *g, const double *reference, const uint32_t *
     double **rhs = room(n, sizeof *rhs);
     vg_solver *s = NULL;
     for (size_t i = 0; i < n; i++) a.x[i] = room(3 * g->nv, sizeof(double)), rhs[i] = room(3 * g->nv, sizeof(double));
-    a.code = vg_solver_new(&s, g, anchors, nanchors, reference, threads, &a.e);
+    a.code = vg_solver_new(&s, g, anchors, nanchors, reference, VG_WEIGHTS_UNIFORM, threads, &a.e);
     for (size_t i = 0; a.code == VG_OK && i < n; i++)
         vg_solver_load(s, vectors[i], nanchors ? at[i] : NULL, a.x[i], rhs[i]);
     for (size_t i = 0; a.code == VG_OK && i < n; i += batch)
@@ -364,15 +364,15 @@ static void test_contradicting_anchors(void)
 static void test_threads_and_batches(void)
 {
     enum { POSES = 17 };
-    film film = load_film("woman-tanktop-jump.tar.xz", "woman-tanktop.rest.obj", POSES);
-    vg_head flower = make_flower(40), *shapes[] = {&film.h, &flower};
-    CHECK(film.n == POSES);
+    film f = load_film("woman-tanktop-jump.tar.xz", "woman-tanktop.rest.obj", POSES);
+    vg_head flower = make_flower(40), *shapes[] = {&f.h, &flower};
+    CHECK(f.n == POSES);
     for (size_t i = 0; i < 2; i++) {
         vg_graph *g = graph_of(shapes[i]);
         double *w[POSES], roots[POSES][3];
         const double *at[POSES];
         for (size_t k = 0; k < POSES; k++) {
-            w[k] = vectors_of(g, i == 0 ? film.pose[k] : flower.reference);
+            w[k] = vectors_of(g, i == 0 ? f.pose[k] : flower.reference);
             for (size_t c = 0; c < 3 * vg_graph_corners(g); c++) w[k][c] *= 1 + 0.2 * noise();
             for (int j = 0; j < 3; j++) roots[k][j] = noise();
             at[k] = roots[k];
@@ -392,7 +392,7 @@ static void test_threads_and_batches(void)
         for (size_t k = 0; k < POSES; k++) free(w[k]);
         vg_graph_free(&g);
     }
-    film_clear(&film);
+    film_clear(&f);
     vg_head_clear(&flower);
 }
 
@@ -403,7 +403,7 @@ static void test_batch_size_and_facts(void)
     vg_solver *s;
     vg_err e;
     for (int threads = 1; threads <= 3; threads++) {
-        if (vg_solver_new(&s, g, NULL, 0, h.reference, threads, &e) < 0) abort();
+        if (vg_solver_new(&s, g, NULL, 0, h.reference, VG_WEIGHTS_UNIFORM, threads, &e) < 0) abort();
         CHECK(vg_solver_batch(s) >= 8 && vg_solver_batch(s) % (size_t)threads == 0);
         vg_solver_facts facts = vg_solver_get_facts(s);
         CHECK(facts.unknowns == 299); /* one vertex is held */
@@ -443,13 +443,13 @@ static void test_refused(void)
     vg_err e;
     h.has_links = true; /* and none are there */
     CHECK(vg_graph_new(&g, &h, &e) == VG_OK);
-    CHECK(vg_solver_new(&s, g, NULL, 0, h.reference, 1, &e) == VG_EINPUT && !s && strstr(e.message, "link is missing"));
+    CHECK(vg_solver_new(&s, g, NULL, 0, h.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_EINPUT && !s && strstr(e.message, "link is missing"));
     uint32_t anchors[] = {0, 1};
-    CHECK(vg_solver_new(&s, g, anchors, 2, h.reference, 1, &e) == VG_EINPUT && !s);
+    CHECK(vg_solver_new(&s, g, anchors, 2, h.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_EINPUT && !s);
     vg_graph_free(&g);
     h.has_links = false;
     g = graph_of(&h);
-    CHECK(vg_solver_new(&s, g, &lone, 1, h.reference, 1, &e) == VG_EINPUT && !s && strstr(e.message, "in no face"));
+    CHECK(vg_solver_new(&s, g, &lone, 1, h.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_EINPUT && !s && strstr(e.message, "in no face"));
     vg_graph_free(&g);
     vg_head_clear(&h);
 }

@@ -1,0 +1,67 @@
+#!/usr/bin/env bats
+# make install: everything is there, a C program of somebody else builds against it, and uninstall takes all of it away.
+# SPDX-License-Identifier: GPL-3.0-or-later
+load lib.bash
+
+# make_into_root TARGET: with the build that is being tested, into ./root
+make_into_root() {
+    capture make -s --no-print-directory -C "$ROOT" "$1" B="$BUILD" CONFIG="${CONFIG:-release}" DESTDIR="$PWD/root" PREFIX=/usr
+    [ "$status" = 0 ] || fail "make $1 ended with status $status" "$output" "$stderr"
+}
+
+# flags --cflags|--libs: of libvg as installed in ./root
+flags() {
+    PKG_CONFIG_LIBDIR=$PWD/root/usr/lib/pkgconfig PKG_CONFIG_SYSROOT_DIR=$PWD/root \
+        PKG_CONFIG_ALLOW_SYSTEM_CFLAGS=1 PKG_CONFIG_ALLOW_SYSTEM_LIBS=1 pkg-config "$1" libvg
+}
+
+@test "install, use from C, uninstall" {
+    make_into_root install
+
+    # programs and pages
+    must diff <(each_program) <(ls root/usr/bin)
+    must diff <(each_program | sed 's/$/.1/') <(ls root/usr/share/man/man1)
+    [ -s root/usr/share/man/man5/vg-stream.5 ] && [ -s root/usr/share/man/man7/vg.7 ]
+    must root/usr/bin/vg-info --check "$GOLDEN/smallest.vgs"
+
+    # the library, from a program that knows only its header and its .pc file
+    cat >count.c <<'END'
+#include <fcntl.h>
+#include <stdio.h>
+#include <vg.h>
+
+int main(int argc, char **argv)
+{
+    vg_reader *r;
+    vg_frame f = {0};
+    vg_err e;
+    int n = 0, more, fd = argc == 2 ? open(argv[1], O_RDONLY) : -1;
+    if (vg_reader_open(&r, fd, argv[1], &e) < 0) return fprintf(stderr, "%s\n", e.message), vg_exit_status(e.code);
+    while ((more = vg_reader_next(r, &f, &e)) > 0) printf("%d %s %.17g\n", n++, f.name, f.values[0]);
+    if (more < 0) return fprintf(stderr, "%s\n", e.message), vg_exit_status(e.code);
+    printf("%d frames of %zu %s\n", n, vg_reader_head(r)->count, vg_kind_name(vg_reader_head(r)->kind));
+    vg_frame_clear(&f);
+    vg_reader_close(&r);
+    return 0;
+}
+END
+    sanitize=
+    case ${CONFIG:-} in asan) sanitize=-fsanitize=address,undefined ;; cov) sanitize=--coverage ;; esac
+    must flags --cflags
+    shows "-I$PWD/root/usr/include"
+    # shellcheck disable=SC2046 # words are wanted
+    must ${CC:-cc} -Wall -Wextra -Werror -std=c11 $sanitize $(flags --cflags) -o count count.c $(flags --libs)
+    must ./count "$GOLDEN/times.vgs"
+    [ "$output" = $'0 pose1 0\n1 pose2 0\n2 frames of 4 vertices' ]
+    must_fail 3 ./count "$CORPUS/reject/no-end.vgs"
+    says "no-end.vgs" "cut short"
+    [ "$(PKG_CONFIG_LIBDIR=root/usr/lib/pkgconfig pkg-config --modversion libvg)" = "$(sed -n 's/^#define VG_VERSION "\(.*\)"/\1/p' "$ROOT/lib/vg.h")" ]
+
+    # nothing of where it was built
+    capture grep -l -r -F -e "$ROOT" root/usr/lib/pkgconfig root/usr/include root/usr/share
+    [ "$status" = 1 ] || fail "these name the directory of the sources: $output"
+
+    make_into_root uninstall
+    must find root ! -type d
+    [ -z "$output" ] || fail "left behind: $output"
+}

@@ -1,0 +1,569 @@
+/* test_deform.c: how vectors turn and stretch (Frames, Rodrigues, links), and the same done to another mesh: against the
+ * formulas of MATH 4 written out, on every kind of mesh, with degenerate faces, rigid motions, threads and batches.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "meshes.h"
+
+static double **lists(size_t n, size_t size)
+{
+    double **p = room(n, sizeof *p);
+    for (size_t i = 0; i < n; i++) p[i] = room(size, sizeof **p);
+    return p;
+}
+
+static void free_lists(double **p, size_t n)
+{
+    for (size_t i = 0; i < n; i++) free(p[i]);
+    free(p);
+}
+
+#define CONST(p) ((const double *const *)(p))
+
+static vg_deformer *deformer(const vg_graph *g, const double *reference, int threads)
+{
+    vg_deformer *d;
+    vg_err e = {0, ""};
+    if (vg_deformer_new(&d, g, reference, threads, &e) < 0) printf("%s\n", e.message), exit(1);
+    return d;
+}
+
+static void aim(vg_deformer *d, const vg_graph *g, const double *target)
+{
+    double *w = vectors_of(g, target);
+    vg_err e;
+    CHECK(vg_deformer_target(d, w, &e) == VG_OK);
+    free(w);
+}
+
+static double *measure(vg_head *h, const vg_graph *g, const double *pose)
+{
+    double *q = room(4 * vg_graph_corners(g), sizeof *q);
+    vg_deformer *d = deformer(g, h->reference, 1);
+    const double *in = pose;
+    vg_deformer_measure(d, 1, VG_VERTICES, &in, &q);
+    vg_deformer_free(&d);
+    return q;
+}
+
+static double dot(const double *a, const double *b, size_t n)
+{
+    double sum = 0;
+    for (size_t i = 0; i < n; i++) sum += a[i] * b[i];
+    return sum;
+}
+
+static void cross(const double a[3], const double b[3], double c[3])
+{
+    for (int k = 0; k < 3; k++) c[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+}
+
+/* ---- against the formulas ---- */
+
+/* Columns u, b, n of the frame of corner c, from positions: Newell's normal as the sum over edges of
+ * (y - y')(z + z') etc., made perpendicular to u; b = n x u. */
+static void frame_of(const vg_graph *g, size_t f, uint32_t c, const double *x, double F[9])
+{
+    double n[3] = {0, 0, 0}, u[3], b[3], centre[3] = {0, 0, 0}, r = g->start[f + 1] - g->start[f];
+    for (uint32_t i = g->start[f]; i < g->start[f + 1]; i++)
+        for (int k = 0; k < 3; k++) centre[k] += x[3 * (size_t)g->vert[i] + (size_t)k] / r;
+    for (uint32_t i = g->start[f]; i < g->start[f + 1]; i++) {
+        uint32_t j = i + 1 < g->start[f + 1] ? i + 1 : g->start[f];
+        double p[3], s[3];
+        for (int k = 0; k < 3; k++) {
+            p[k] = x[3 * (size_t)g->vert[i] + (size_t)k] - centre[k];
+            s[k] = x[3 * (size_t)g->vert[j] + (size_t)k] - centre[k];
+        }
+        for (int k = 0; k < 3; k++) n[k] += (p[(k + 1) % 3] - s[(k + 1) % 3]) * (p[(k + 2) % 3] + s[(k + 2) % 3]);
+    }
+    for (int k = 0; k < 3; k++) u[k] = x[3 * (size_t)g->vert[c] + (size_t)k] - centre[k];
+    double length = sqrt(dot(u, u, 3)), along;
+    for (int k = 0; k < 3; k++) u[k] /= length;
+    along = dot(n, u, 3);
+    for (int k = 0; k < 3; k++) n[k] -= along * u[k];
+    length = sqrt(dot(n, n, 3));
+    for (int k = 0; k < 3; k++) n[k] /= length;
+    cross(n, u, b);
+    for (int k = 0; k < 3; k++) F[3 * k] = u[k], F[3 * k + 1] = b[k], F[3 * k + 2] = n[k];
+}
+
+/* J = cos t I + sin t [k]x + (1 - cos t) k k', k = r x d / |r x d| */
+static void rodrigues(const double r[3], const double d[3], double J[9])
+{
+    double k[3], rl = sqrt(dot(r, r, 3)), dl = sqrt(dot(d, d, 3));
+    cross(r, d, k);
+    double kl = sqrt(dot(k, k, 3)), s = kl / (rl * dl), c = dot(r, d, 3) / (rl * dl);
+    for (int i = 0; i < 3; i++) k[i] = kl > 0 ? k[i] / kl : 0;
+    const double K[9] = {0, -k[2], k[1], k[2], 0, -k[0], -k[1], k[0], 0};
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) J[3 * i + j] = (i == j ? c : 0) + s * K[3 * i + j] + (1 - c) * k[i] * k[j];
+}
+
+/* Largest difference between the measured deformation of every corner and the formula; links are left out. */
+static double against_formulas(vg_head *h, const double *pose)
+{
+    vg_graph *g = graph_of(h);
+    double *q = measure(h, g, pose), *r = vectors_of(g, h->reference), *d = vectors_of(g, pose), worst = 0;
+    for (size_t f = 0; f < g->nf - g->nlinks; f++)
+        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
+            double J[9] = {0}, F[9], R[9], M[9], unit[4], scale = dot(q + 4 * c, q + 4 * c, 4);
+            if (g->start[f + 1] - g->start[f] == 2) {
+                rodrigues(r + 3 * c, d + 3 * c, J);
+            } else {
+                frame_of(g, f, c, pose, F);
+                frame_of(g, f, c, h->reference, R);
+                for (int k = 0; k < 27; k++) J[k / 3] += F[k / 9 * 3 + k % 3] * R[k / 3 % 3 * 3 + k % 3];
+            }
+            for (int k = 0; k < 4; k++) unit[k] = q[4 * c + (size_t)k] / sqrt(scale);
+            vg_quat_matrix(unit, M);
+            for (int k = 0; k < 9; k++) worst = fmax(worst, fabs(M[k] - J[k]));
+            double a = sqrt(dot(d + 3 * c, d + 3 * c, 3) / dot(r + 3 * c, r + 3 * c, 3));
+            worst = fmax(worst, fabs(scale / a - 1));
+            if (isnan(scale)) worst = INFINITY;
+        }
+    free(q);
+    free(r);
+    free(d);
+    vg_graph_free(&g);
+    return worst;
+}
+
+static void test_formulas(void)
+{
+    vg_head h;
+    const char *name;
+    for (size_t i = 0; make_any(i, &h, &name); i++) {
+        for (double amount = 0; amount < 1; amount += 0.4) {
+            double *pose = warp(h.reference, h.mesh.nv, amount), worst = against_formulas(&h, pose);
+            if (!(worst <= 1e-11)) printf("%s, warped by %g:\n", name, amount);
+            CHECK_NEAR(worst, 0, 1e-11);
+            free(pose);
+        }
+        vg_head_clear(&h);
+    }
+}
+
+/* a J r = d for every corner that is not degenerate, links included */
+static double misses(vg_head *h, const double *pose)
+{
+    vg_graph *g = graph_of(h);
+    double *q = measure(h, g, pose), *r = vectors_of(g, h->reference), *d = vectors_of(g, pose);
+    size_t n = vg_graph_corners(g);
+    double D = fmax(vg_diagonal(h->reference, g->nv), vg_diagonal(pose, g->nv)), worst = 0;
+    for (size_t c = 0; c < n; c++) {
+        double got[3];
+        vg_quat_apply(q + 4 * c, r + 3 * c, got);
+        worst = fmax(worst, farthest(got, d + 3 * c, 1) / D);
+    }
+    free(q);
+    free(r);
+    free(d);
+    vg_graph_free(&g);
+    return worst;
+}
+
+static void test_turned_and_scaled(void)
+{
+    static const double units[] = {1, 1e-20, 1e20};
+    vg_head h;
+    const char *name;
+    for (size_t i = 0; make_any(i, &h, &name); i++) {
+        for (size_t u = 0; u < 3; u++) {
+            for (size_t k = 0; k < 3 * h.mesh.nv; k++) h.reference[k] *= units[u];
+            double *bent = warp(h.reference, h.mesh.nv, 2);
+            CHECK_NEAR(misses(&h, h.reference), 0, 1e-12);
+            CHECK_NEAR(misses(&h, bent), 0, 1e-12);
+            for (size_t k = 0; k < 3 * h.mesh.nv; k++) bent[k] = -h.reference[k]; /* turned inside out: half turns */
+            CHECK_NEAR(misses(&h, bent), 0, 1e-12);
+            free(bent);
+            for (size_t k = 0; k < 3 * h.mesh.nv; k++) h.reference[k] /= units[u];
+        }
+        if (test_bad) printf("%s\n", name);
+        vg_head_clear(&h);
+    }
+}
+
+/* ---- rigid motions ---- */
+
+/* the distance of q from +-s */
+static double away(const double q[4], const double s[4])
+{
+    double plus = 0, minus = 0;
+    for (int k = 0; k < 4; k++) plus += (q[k] - s[k]) * (q[k] - s[k]), minus += (q[k] + s[k]) * (q[k] + s[k]);
+    return sqrt(plus < minus ? plus : minus);
+}
+
+static void rotates_all(vg_head *h, const char *name, double angle, double scale)
+{
+    vg_graph *g = graph_of(h);
+    motion t = turn(angle, scale, 3 * vg_diagonal(h->reference, g->nv)), only = turn(angle, 1, 0);
+    double *pose = move_points(&t, h->reference, g->nv), *q = measure(h, g, pose), want[4], worst = 0;
+    vg_quat_from_matrix(only.m, want);
+    for (int k = 0; k < 4; k++) want[k] *= sqrt(scale);
+    for (size_t f = 0; f < g->nf; f++) {
+        if (f < g->nf - g->nlinks && g->start[f + 1] - g->start[f] == 2) continue; /* a bone has no roll */
+        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
+            const uint32_t *v = g->vert + g->start[f];
+            /* a link between coincident vertices has no length to scale */
+            bool no_length = f >= g->nf - g->nlinks &&
+                             farthest(h->reference + 3 * (size_t)v[0], h->reference + 3 * (size_t)v[1], 1) < 1e-9;
+            if (!no_length) worst = fmax(worst, away(q + 4 * c, want) / sqrt(scale));
+        }
+    }
+    if (!(worst <= 1e-11)) printf("%s turned by %g, scaled by %g:\n", name, angle, scale);
+    CHECK_NEAR(worst, 0, 1e-11);
+    free(pose);
+    free(q);
+    vg_graph_free(&g);
+}
+
+static void test_rigid(void)
+{
+    vg_head h;
+    const char *name;
+    static const double angles[] = {0, 1e-9, 0.7, 2.9, M_PI, -M_PI + 1e-9};
+    for (size_t i = 0; make_any(i, &h, &name); i++) {
+        for (size_t k = 0; k < sizeof angles / sizeof *angles; k++) {
+            rotates_all(&h, name, angles[k], 1);
+            rotates_all(&h, name, angles[k], k % 2 ? 0.3 : 40);
+        }
+        vg_head_clear(&h);
+    }
+}
+
+/* A source that is only turned, scaled and moved does that to another body's vectors, bones aside. */
+static void test_rigid_transfer(void)
+{
+    static const struct {
+        const char *source, *target;
+    } pairs[] = {{"human-man-poses.tar.xz", "human-heavy-poses.tar.xz"}, {"faceA.tar.xz", "faceB.tar.xz"},
+                 {"woman-tanktop-jump.tar.xz", NULL}, {"trex-walk.tar.xz", NULL}};
+    for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
+        film s = load_film(pairs[i].source, NULL, 1), t = load_film(pairs[i].target ? pairs[i].target : pairs[i].source, NULL, 1);
+        vg_graph *g = graph_of(&s.h);
+        size_t n = 3 * vg_graph_corners(g);
+        motion by = turn(2, 1.5, 4);
+        double *target = pairs[i].target ? t.pose[0] : warp(t.pose[0], g->nv, 0.3), *pose = move_points(&by, s.pose[0], g->nv);
+        double *w = vectors_of(g, target), *got = room(n, sizeof *got);
+        vg_deformer *d = deformer(g, s.h.reference, 2);
+        aim(d, g, target);
+        for (size_t c = 0; c < n / 3; c++) move_vector(&by, w + 3 * c, w + 3 * c);
+        vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &got);
+        CHECK_NEAR(farthest(got, w, n / 3) / vg_diagonal(target, g->nv), 0, 1e-11);
+        CHECK(vg_deformer_counts(d).corners == 0);
+        vg_deformer_free(&d);
+        vg_graph_free(&g);
+        if (!pairs[i].target) free(target);
+        free(pose);
+        free(w);
+        free(got);
+        film_clear(&s);
+        film_clear(&t);
+    }
+}
+
+/* A source in another unit (reference and poses) is the same source. */
+static void test_unit_of_source(void)
+{
+    vg_head h;
+    const char *name;
+    for (size_t i = 0; make_any(i, &h, &name); i++) {
+        vg_graph *g = graph_of(&h);
+        size_t n = 4 * vg_graph_corners(g), nv = g->nv;
+        double *pose = warp(h.reference, nv, 0.8), *before = measure(&h, g, pose), worst = 0;
+        static const double units[] = {2, 0x1p-70, 0x1p70, 1e-3};
+        for (size_t u = 0; u < sizeof units / sizeof *units; u++) {
+            for (size_t k = 0; k < 3 * nv; k++) h.reference[k] *= units[u], pose[k] *= units[u];
+            double *after = measure(&h, g, pose);
+            for (size_t k = 0; k < n; k += 4) worst = fmax(worst, away(before + k, after + k));
+            free(after);
+            for (size_t k = 0; k < 3 * nv; k++) h.reference[k] /= units[u], pose[k] /= units[u];
+        }
+        if (!(worst <= 1e-12)) printf("%s:\n", name);
+        CHECK_NEAR(worst, 0, 1e-12);
+        free(pose);
+        free(before);
+        vg_graph_free(&g);
+        vg_head_clear(&h);
+    }
+}
+
+/* ---- the two ways: measured and applied, or transferred at once ---- */
+
+/* poses as vertices and as vectors, through both ways onto a warped target; the largest difference in D */
+static double ways_differ(vg_head *h, size_t n, const double *const *poses, const double *target)
+{
+    vg_graph *g = graph_of(h);
+    size_t corners = vg_graph_corners(g);
+    double **q = lists(n, 4 * corners), **a = lists(n, 3 * corners), **b = lists(n, 3 * corners), **w = lists(n, 3 * corners);
+    double D = vg_diagonal(target, g->nv), worst = 0;
+    vg_deformer *d = deformer(g, h->reference, 1);
+    aim(d, g, target);
+    vg_deformer_measure(d, n, VG_VERTICES, poses, q);
+    vg_deformer_apply(d, n, CONST(q), a);
+    vg_deformer_transfer(d, n, VG_VERTICES, poses, b);
+    for (size_t i = 0; i < n; i++) {
+        double stretch = 1;
+        for (size_t c = 0; c < corners; c++) stretch = fmax(stretch, dot(q[i] + 4 * c, q[i] + 4 * c, 4));
+        worst = fmax(worst, farthest(a[i], b[i], corners) / (D * stretch));
+        vg_graph_vectors(g, poses[i], w[i]);
+        memset(b[i], 0, 3 * corners * sizeof(double));
+    }
+    vg_deformer_transfer(d, n, VG_VECTORS, CONST(w), b);
+    for (size_t i = 0; i < n; i++) worst = fmax(worst, farthest(a[i], b[i], corners) / D);
+    vg_deformer_measure(d, n, VG_VECTORS, CONST(w), q);
+    vg_deformer_apply(d, n, CONST(q), b);
+    for (size_t i = 0; i < n; i++) worst = fmax(worst, farthest(a[i], b[i], corners) / D);
+    vg_deformer_free(&d);
+    free_lists(q, n), free_lists(a, n), free_lists(b, n), free_lists(w, n);
+    vg_graph_free(&g);
+    return worst;
+}
+
+static void test_two_ways(void)
+{
+    enum { POSES = 9 };
+    vg_head h;
+    const char *name;
+    for (size_t i = 0; make_any(i, &h, &name); i++) {
+        double *poses[POSES], *target = warp(h.reference, h.mesh.nv, 0.3);
+        for (size_t k = 0; k < POSES; k++) poses[k] = warp(h.reference, h.mesh.nv, 0.15 * (double)k);
+        double differ = ways_differ(&h, POSES, CONST(poses), target);
+        if (!(differ <= 1e-12)) printf("%s:\n", name);
+        CHECK_NEAR(differ, 0, 1e-12);
+        for (size_t k = 0; k < POSES; k++) free(poses[k]);
+        free(target);
+        vg_head_clear(&h);
+    }
+    film f = load_film("trex-walk.tar.xz", "trex.rest.obj", 12);
+    double *target = warp(f.h.reference, f.h.mesh.nv, 0.2);
+    CHECK_NEAR(ways_differ(&f.h, f.n, CONST(f.pose), target), 0, 1e-12);
+    free(target);
+    film_clear(&f);
+}
+
+static void test_threads_and_batches(void)
+{
+    enum { POSES = 17 };
+    vg_head shapes[] = {make_rod(70, 40, true), make_pieces(), make_degenerate()};
+    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+        vg_graph *g = graph_of(&shapes[i]);
+        size_t corners = vg_graph_corners(g);
+        double *poses[POSES], **q = lists(POSES, 4 * corners), **w = lists(POSES, 3 * corners);
+        double **q1 = lists(POSES, 4 * corners), **w1 = lists(POSES, 3 * corners);
+        for (size_t k = 0; k < POSES; k++) poses[k] = warp(shapes[i].reference, g->nv, 0.1 * (double)k);
+        vg_deformer *d = deformer(g, shapes[i].reference, 1);
+        aim(d, g, poses[2]);
+        for (size_t k = 0; k < POSES; k++) {
+            vg_deformer_measure(d, 1, VG_VERTICES, CONST(poses + k), q1 + k);
+            vg_deformer_transfer(d, 1, VG_VERTICES, CONST(poses + k), w1 + k);
+        }
+        vg_deform_counts counts = vg_deformer_counts(d);
+        vg_deformer_free(&d);
+        for (int threads = 1; threads <= 3; threads++) {
+            for (size_t batch = 1; batch <= POSES; batch++) {
+                d = deformer(g, shapes[i].reference, threads);
+                aim(d, g, poses[2]);
+                for (size_t k = 0; k < POSES; k += batch) {
+                    size_t n = POSES - k < batch ? POSES - k : batch;
+                    vg_deformer_measure(d, n, VG_VERTICES, CONST(poses + k), q + k);
+                    vg_deformer_transfer(d, n, VG_VERTICES, CONST(poses + k), w + k);
+                }
+                bool same = true;
+                for (size_t k = 0; k < POSES; k++)
+                    same &= !memcmp(q[k], q1[k], 4 * corners * sizeof(double)) &&
+                            !memcmp(w[k], w1[k], 3 * corners * sizeof(double));
+                if (!same) printf("shape %zu, %d threads, %zu poses a call:\n", i, threads, batch);
+                CHECK(same);
+                CHECK(vg_deformer_counts(d).corners == counts.corners);
+                CHECK(vg_deformer_counts(d).first_face == counts.first_face);
+                vg_deformer_free(&d);
+            }
+        }
+        for (size_t k = 0; k < POSES; k++) free(poses[k]);
+        free_lists(q, POSES), free_lists(w, POSES), free_lists(q1, POSES), free_lists(w1, POSES);
+        vg_graph_free(&g);
+        vg_head_clear(&shapes[i]);
+    }
+}
+
+/* ---- degenerate corners ---- */
+
+static void test_degenerate(void)
+{
+    vg_head h = make_degenerate();
+    vg_graph *g = graph_of(&h);
+    size_t corners = vg_graph_corners(g), nv = g->nv;
+    CHECK(g->nlinks == 0);
+    motion t = turn(1.1, 1, 2);
+    double *pose = move_points(&t, h.reference, nv), *q = room(4 * corners, sizeof *q), want[4];
+    static const double identity[4] = {1, 0, 0, 0};
+    vg_quat_from_matrix(t.m, want);
+    vg_deformer *d = deformer(g, h.reference, 1);
+    CHECK(vg_deformer_counts(d).corners == 0 && vg_deformer_counts(d).first_face == UINT64_MAX);
+    vg_deformer_measure(d, 1, VG_VERTICES, CONST(&pose), &q);
+    /* three on the face without area, three on the point, two on the segment without length, one at its face's centroid */
+    CHECK(vg_deformer_counts(d).corners == 9 && vg_deformer_counts(d).first_face == 1);
+    for (size_t f = 0; f < g->nf; f++)
+        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
+            bool alone = f >= 1 && f <= 3, bone = f == 4;
+            if (!bone) CHECK_NEAR(away(q + 4 * c, alone ? identity : want), 0, 1e-12);
+        }
+    aim(d, g, h.reference);
+    double *w = vectors_of(g, pose), *got = room(3 * corners, sizeof *got);
+    vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &got);
+    CHECK(vg_deformer_counts(d).corners == 18);
+    for (size_t f = 0; f < g->nf; f++)
+        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++)
+            if (f != 1) CHECK_NEAR(farthest(got + 3 * c, w + 3 * c, 1), 0, 1e-12); /* face 1 has vectors, but no turn */
+    vg_deformer_free(&d);
+    free(pose);
+    free(q);
+    free(w);
+    free(got);
+    vg_graph_free(&g);
+    vg_head_clear(&h);
+}
+
+/* A face that collapses in one pose of a block is mended there and nowhere else. */
+static void test_collapsed_in_one_pose(void)
+{
+    enum { POSES = 8, BAD = 3 };
+    vg_head h = make_torus(12, 9);
+    vg_graph *g = graph_of(&h);
+    size_t corners = vg_graph_corners(g);
+    double *poses[POSES], **good = lists(POSES, 3 * corners), **bad = lists(POSES, 3 * corners);
+    for (size_t k = 0; k < POSES; k++) poses[k] = warp(h.reference, g->nv, 0.1 * (double)k);
+    vg_deformer *d = deformer(g, h.reference, 1);
+    aim(d, g, poses[1]);
+    vg_deformer_transfer(d, POSES, VG_VERTICES, CONST(poses), good);
+    CHECK(vg_deformer_counts(d).corners == 0);
+    for (uint32_t c = 4 * 50; c < 4 * 51; c++) memcpy(poses[BAD] + 3 * g->vert[c], poses[BAD], 3 * sizeof(double));
+    vg_deformer_transfer(d, POSES, VG_VERTICES, CONST(poses), bad);
+    CHECK(vg_deformer_counts(d).corners >= 4 && vg_deformer_counts(d).corners < 40);
+    CHECK(vg_deformer_counts(d).first_face <= 50 && vg_deformer_counts(d).first_face > 20);
+    for (size_t k = 0; k < POSES; k++) {
+        if (k != BAD) CHECK(!memcmp(good[k], bad[k], 3 * corners * sizeof(double)));
+        CHECK(vgi_finite(bad[k], 3 * corners));
+    }
+    /* its own corners are not turned, for there is nothing to tell how */
+    double *target = vectors_of(g, poses[1]);
+    CHECK_NEAR(farthest(bad[BAD] + 3 * 200, target + 3 * 200, 4), 0, 1e-14);
+    free(target);
+    vg_deformer_free(&d);
+    for (size_t k = 0; k < POSES; k++) free(poses[k]);
+    free_lists(good, POSES), free_lists(bad, POSES);
+    vg_graph_free(&g);
+    vg_head_clear(&h);
+}
+
+/* 1e-9 D is where a vector stops having a direction, in the reference as in a pose. */
+static void test_where_degenerate_begins(void)
+{
+    for (int factor = 0; factor < 2; factor++) {
+        vg_head h = new_shape();
+        double tiny = factor ? 1e-8 : 1e-10; /* D is about 1 */
+        add_vertex(&h, 0, 0, 0), add_vertex(&h, 0.6, 0, 0), add_vertex(&h, 0, 0.8, 0), add_vertex(&h, tiny, 0, 0);
+        FACE(&h, 0, 1, 2);
+        FACE(&h, 0, 3);
+        vg_graph *g = graph_of(&h);
+        double *q = room(4 * vg_graph_corners(g), sizeof *q);
+        vg_deformer *d = deformer(g, h.reference, 1);
+        vg_deformer_measure(d, 1, VG_VERTICES, CONST(&h.reference), &q);
+        CHECK(vg_deformer_counts(d).corners == (factor ? 0 : 2));
+        CHECK(vg_deformer_counts(d).first_face == (factor ? UINT64_MAX : 1));
+        vg_deformer_free(&d);
+        free(q);
+        vg_graph_free(&g);
+        vg_head_clear(&h);
+    }
+}
+
+/* Whatever stands in a pose, no number comes out that is not finite. */
+static void test_nothing_but_finite(void)
+{
+    vg_head h = make_degenerate();
+    static const double values[] = {0, 1, -1, 1e-300, 1e-12, 1e9, 0.5};
+    vg_graph *g = graph_of(&h);
+    size_t corners = vg_graph_corners(g);
+    double *pose = room(3 * g->nv, sizeof *pose), *q = room(4 * corners, sizeof *q), *w = room(3 * corners, sizeof *w);
+    vg_deformer *d = deformer(g, h.reference, 1);
+    aim(d, g, h.reference);
+    for (int trial = 0; trial < 3000; trial++) {
+        for (size_t i = 0; i < 3 * g->nv; i++) pose[i] = values[(size_t)((noise() + 1) * 3.4999)];
+        vg_deformer_measure(d, 1, VG_VERTICES, CONST(&pose), &q);
+        vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &w);
+        CHECK(vgi_finite(q, 4 * corners) && vgi_finite(w, 3 * corners));
+        for (size_t c = 0; c < corners; c++) CHECK(dot(q + 4 * c, q + 4 * c, 4) > 0);
+    }
+    vg_deformer_free(&d);
+    free(pose);
+    free(q);
+    free(w);
+    vg_graph_free(&g);
+    vg_head_clear(&h);
+}
+
+/* ---- target = source, through the solve ---- */
+
+static double self_transfer(vg_head *h, size_t n, const double *const *poses, int threads)
+{
+    vg_graph *g = graph_of(h);
+    size_t corners = vg_graph_corners(g);
+    double **w = lists(n, 3 * corners), **x = lists(n, 3 * g->nv), **rhs = lists(n, 3 * g->nv), **root = lists(n, 3), worst = 0;
+    vg_err e;
+    vg_solver *s;
+    vg_deformer *d = deformer(g, h->reference, threads);
+    aim(d, g, h->reference);
+    vg_deformer_transfer(d, n, VG_VERTICES, poses, w);
+    if (vg_solver_new(&s, g, NULL, 0, h->reference, threads, &e) < 0) abort();
+    for (size_t i = 0; i < n; i++) {
+        vg_graph_root(g, poses[i], root[i]);
+        vg_solver_load(s, w[i], NULL, x[i], rhs[i]);
+    }
+    vg_solver_solve(s, n, CONST(rhs), x, NULL, CONST(root));
+    for (size_t i = 0; i < n; i++) {
+        for (size_t v = 0; v < g->nv; v++)
+            if (!g->in_face[v]) memcpy(x[i] + 3 * v, poses[i] + 3 * v, 3 * sizeof(double));
+        worst = fmax(worst, farthest(x[i], poses[i], g->nv) / vg_diagonal(poses[i], g->nv));
+    }
+    vg_solver_free(&s);
+    vg_deformer_free(&d);
+    free_lists(w, n), free_lists(x, n), free_lists(rhs, n), free_lists(root, n);
+    vg_graph_free(&g);
+    return worst;
+}
+
+static void test_onto_itself(void)
+{
+    vg_head h;
+    const char *name;
+    for (size_t i = 0; make_any(i, &h, &name); i++) {
+        double *pose = warp(h.reference, h.mesh.nv, 1), worst = self_transfer(&h, 1, CONST(&pose), 1);
+        if (!(worst <= 1e-10)) printf("%s:\n", name);
+        CHECK_NEAR(worst, 0, 1e-10);
+        free(pose);
+        vg_head_clear(&h);
+    }
+    static const struct {
+        const char *poses, *rest;
+        size_t most;
+    } all[] = {{"trex-walk.tar.xz", "trex.rest.obj", 34}, {"horse-run.tar.xz", "horse.rest.obj", 21},
+               {"woman-tanktop-jump.tar.xz", "woman-tanktop.rest.obj", 26}, {"human-man-poses.tar.xz", NULL, 8},
+               {"faceB.tar.xz", NULL, 6}};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+        film f = load_film(all[i].poses, all[i].rest, all[i].most);
+        double worst = self_transfer(&f.h, f.n, CONST(f.pose), 2);
+        if (!(worst <= 1e-10)) printf("%s:\n", all[i].poses);
+        CHECK_NEAR(worst, 0, 1e-10);
+        film_clear(&f);
+    }
+}
+
+TESTS({"Frames and Rodrigues as the formulas have them", test_formulas}, {"a J r = d", test_turned_and_scaled},
+      {"rigid motions turn every corner alike, links too", test_rigid},
+      {"a rigid source moves another body rigidly", test_rigid_transfer},
+      {"the unit of the source does not matter", test_unit_of_source},
+      {"measured and applied is transferred", test_two_ways}, {"threads and batches change no bit", test_threads_and_batches},
+      {"degenerate corners take the turn of their face", test_degenerate},
+      {"a face that collapses in one pose", test_collapsed_in_one_pose},
+      {"where degenerate begins", test_where_degenerate_begins}, {"nothing but finite numbers", test_nothing_but_finite},
+      {"onto itself", test_onto_itself})
