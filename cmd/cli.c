@@ -735,12 +735,18 @@ size_t cli_parse_vertices(const char *option, const char *text, uint32_t **verti
 
 vg_source *cli_source(char **operands, size_t n)
 {
+    return cli_source_with(operands, n, NULL);
+}
+
+vg_source *cli_source_with(char **operands, size_t n, const char *mesh)
+{
     static const char *const standard_input[] = {"-"};
+    const char *const *from = n ? (const char *const *)operands : standard_input;
     vg_source *s = NULL;
     vg_err e;
     if (n == 0 && isatty(STDIN_FILENO))
         cli_usage("no input: name a stream, mesh file, archive or directory, or pipe one into %s", cli.program->name);
-    int r = n ? vg_source_open(&s, (const char *const *)operands, n, &e) : vg_source_open(&s, standard_input, 1, &e);
-    if (r < 0) cli_die(&e);
+    if (vg_source_open_with(&s, from, n ? n : 1, mesh, &e) < 0) cli_die(&e);
+    if (vg_source_warning(s)) cli_warn("%s", vg_source_warning(s));
     return s;
 }

@@ -67,6 +67,8 @@ size_t cli_parse_vertices(const char *option, const char *text, uint32_t **verti
 
 /* The input of a filter: its operands, or standard input when there are none. */
 vg_source *cli_source(char **operands, size_t n);
+/* The same; mesh (may be NULL): the faces and reference pose of operands without faces. */
+vg_source *cli_source_with(char **operands, size_t n, const char *mesh);
 
 /* The stream of a filter. cli_stream_open takes the head (adds this process to the provenance unless told not to) and
  * opens the output: standard output, refused when a terminal, or a temporary file beside --output that cli_stream_end

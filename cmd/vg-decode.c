@@ -4,14 +4,19 @@
 
 static vg_sink_options sink_options;
 static long first_number;
+static const char *output; /* not cli.output, which is NULL for "-" as for none */
 
 static const cli_option options[] = {
-    {"output", 'o', "FILE", "a.obj, 'a-%04d.ply', DIR/, a.zip, a.tar.zst, ...; '-' is standard output",
-     .text = &cli.output},
-    {"format", 0, "FORMAT", "obj, ply, ply-ascii, ply-be or off, whatever the name says", .text = &sink_options.format},
+    {"output", 'o', "FILE", "a.obj, 'a-%04d.ply', DIR/, a.zip, a.pc2, a.npz, ...; '-' is standard output",
+     .text = &output},
+    {"format", 0, "FORMAT", "obj, ply, off, stl, pc2, npz, ..., whatever the name says", .text = &sink_options.format},
     {"f64", 0, NULL, "numbers that read back to the same binary64, not binary32", .flag = &sink_options.full_precision},
     {"first-number", 0, "N", "what %d in the output's name starts at (default 0)", .integer = &first_number,
      .least = 0, .most = 1e9},
+    {"mesh", 0, "MESH", "where the mesh of a point cache or array goes; default: beside it, as NAME.obj",
+     .text = &sink_options.mesh},
+    {"no-mesh", 0, NULL, "write no mesh beside a point cache or array", .flag = &sink_options.no_mesh},
+    {"drop-loose", 0, NULL, "leave out the vertices that are in no face", .flag = &sink_options.drop_loose},
     {NULL}};
 
 static const cli_program program = {
@@ -28,11 +33,11 @@ int main(int argc, char **argv)
     vg_err e;
     vg_sink *sink;
     sink_options.first_number = first_number;
-    if (!cli.output) cli_usage("where to? name the output with -o");
-    if (vg_sink_check(cli.output, &sink_options, &e) < 0) cli_die(&e);
+    if (!output) cli_usage("where to? name the output with -o");
+    if (vg_sink_check(output, &sink_options, &e) < 0) cli_die(&e);
 
     vg_source *s = cli_source(operands, n);
-    if (vg_sink_open(&sink, cli.output, vg_source_head(s), &sink_options, &e) < 0) cli_die(&e);
+    if (vg_sink_open(&sink, output, vg_source_head(s), &sink_options, &e) < 0) cli_die(&e);
     vg_frame f = {0};
     uint64_t frames = 0;
     int r;
@@ -41,6 +46,7 @@ int main(int argc, char **argv)
         cli_progress("poses", ++frames);
     }
     if (r == 0) r = vg_sink_end(sink, &e);
+    for (size_t i = 0; r == 0 && vg_sink_warning(sink, i); i++) cli_warn("%s", vg_sink_warning(sink, i));
     vg_sink_close(&sink);
     if (r < 0) cli_die(&e);
     vg_frame_clear(&f);

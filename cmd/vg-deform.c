@@ -2,18 +2,22 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 static struct {
-    const char *onto, *root, *by;
+    const char *onto, *correspondence, *by, *root, *pin;
 } opts;
 
 static const cli_option options[] = {
     {"onto", 0, "MESH", "apply to this mesh and write its vectors; without it, write the deformations", .text = &opts.onto},
-    {"by", 0, "pose|gradient|blend", "what is carried over: the turn and stretch of each corner (default), ...", .text = &opts.by},
+    {"correspondence", 0, "FILE", "the target has another connectivity: what vg-register found", .text = &opts.correspondence},
+    {"by", 0, "pose|shape|gradient|blend", "what is carried over (default pose)", .text = &opts.by},
     {"root", 0, "WHERE", "where the body goes: centroid (default), stay, or the number of a vertex to follow",
      .text = &opts.root},
+    {"pin", 0, "auto|always|none", "hold what does not move in the source: where it is much of the mesh (default), ...",
+     .text = &opts.pin},
     {NULL}};
 
 static const cli_program program = {
@@ -25,44 +29,125 @@ static const cli_program program = {
     .writes_stream = true,
     .threaded = true};
 
-enum { BATCH = 8 }; /* poses of one call: the lanes of the kernel */
+enum { BATCH = 8 }; /* poses of one call: the lanes of the kernels */
+
+/* How poses become what is written. */
+typedef enum way { MEASURE, APPLY, TRANSFER, CARRY, SHAPE } way;
+typedef enum by { BY_POSE, BY_SHAPE, BY_GRADIENT, BY_BLEND } by;
+typedef enum pin { PIN_AUTO, PIN_ALWAYS, PIN_NONE } pin;
 
 /* Where the whole body goes (MATH 5): at the target's reference place plus `ratio` times the way the source has gone. */
 typedef struct root_motion {
     bool stay;
-    uint32_t *vertex; /* --root V: the one anchor; NULL: the sequence's own anchors, if any */
     double ratio;
-    double source[3], target[3];          /* roots of the references */
+    double source[3], target[3];             /* roots of the references */
     double *source_anchors, *target_anchors; /* positions in the references */
 } root_motion;
 
+/* Vertices that stay: those of the target all of whose faces are driven only by faces of the source that do not move. */
+typedef struct pinning {
+    pin mode;
+    double least;      /* a vertex that moves less does not move */
+    double *reference; /* the source's */
+    bool *moves;       /* per source vertex, then per source face, in the pose at hand */
+    bool *face_moves;
+    bool *free;        /* per target vertex */
+    uint32_t *list;
+} pinning;
+
+typedef struct work {
+    vg_source *s;
+    vg_head *h;            /* the source's until the output's is made of it */
+    vg_head target;
+    vg_head pairs;         /* holds the correspondence */
+    vg_mesh source_mesh;   /* only with a correspondence: the source's faces outlive its head */
+    double *source_reference;
+    vg_graph *from, *to;   /* graphs of source and target: the same one without a correspondence */
+    way way;
+    by by;
+    vg_kind kind;          /* what comes in */
+    vg_deformer *deformer;
+    vg_carrier *carrier;
+    vg_shaper *shaper;
+    root_motion root;
+    pinning pins;
+    size_t n;              /* poses in hand */
+    vg_frame in[BATCH], out[BATCH];
+} work;
+
+static void die(int code, const char *message)
+{
+    vg_err e;
+    vg_fail(&e, code, "%s", message);
+    cli_die(&e);
+}
+
+static void *allocate(size_t n, size_t size)
+{
+    void *p = calloc(n + 1, size);
+    if (!p) die(VG_ENOMEM, "not enough memory for the sequence's mesh");
+    return p;
+}
+
+/* ---- options ---- */
+
+static size_t choose(const char *option, const char *text, const char *const *names, size_t n, const char *all)
+{
+    for (size_t i = 0; text && i < n; i++)
+        if (!strcmp(text, names[i])) return i;
+    if (text) cli_usage("--%s is %s, not '%s'", option, all, text);
+    return 0;
+}
+
+static void parse_options(work *w)
+{
+    static const char *const by_names[] = {"pose", "shape", "gradient", "blend"};
+    static const char *const pin_names[] = {"auto", "always", "none"};
+    const struct { const char *name, *value; } need_onto[] = {
+        {"root", opts.root}, {"by", opts.by}, {"correspondence", opts.correspondence}, {"pin", opts.pin}};
+    for (size_t i = 0; i < 4; i++)
+        if (need_onto[i].value && !opts.onto) cli_usage("--%s needs --onto", need_onto[i].name);
+    w->by = (by)choose("by", opts.by, by_names, 4, "'pose', 'shape', 'gradient' or 'blend'");
+    w->pins.mode = (pin)choose("pin", opts.pin, pin_names, 3, "'auto', 'always' or 'none'");
+    if (w->by == BY_SHAPE && opts.correspondence)
+        cli_usage("--by shape needs one connectivity: it takes no --correspondence");
+}
+
+/* ---- where the body goes ---- */
+
 static double *positions(const double *vertices, const uint32_t *list, size_t n)
 {
-    double *p = malloc((3 * n + 1) * sizeof *p);
-    if (!p) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the anchors"});
+    double *p = allocate(3 * n, sizeof *p);
     vg_graph_anchors(vertices, list, n, p);
     return p;
 }
 
-static void parse_root(root_motion *m, const vg_head *h)
+/* --root V: the sequence's anchors give way to this one vertex, of both meshes. */
+static void set_root(work *w)
 {
-    *m = (root_motion){0};
+    uint32_t *vertex;
     if (!opts.root || !strcmp(opts.root, "centroid")) return;
-    if ((m->stay = !strcmp(opts.root, "stay"))) return;
-    if (cli_parse_vertices("--root", opts.root, &m->vertex) != 1)
+    if ((w->root.stay = !strcmp(opts.root, "stay"))) return;
+    if (cli_parse_vertices("--root", opts.root, &vertex) != 1)
         cli_usage("--root is 'centroid', 'stay' or one vertex number, not '%s'", opts.root);
-    if (m->vertex[0] >= h->mesh.nv) cli_usage("--root names vertex %u of %zu", m->vertex[0], h->mesh.nv);
+    if (vertex[0] >= w->h->mesh.nv) cli_usage("--root names vertex %u of %zu", vertex[0], w->h->mesh.nv);
+    if (opts.correspondence) cli_usage("--root V needs one connectivity: with --correspondence it is 'centroid' or 'stay'");
+    if (w->kind != VG_VERTICES)
+        cli_usage("--root %u needs a sequence of vertices, this one holds %s", vertex[0], vg_kind_name(w->kind));
+    free(w->h->anchors);
+    w->h->anchors = vertex, w->h->nanchors = 1;
 }
 
-/* before h's reference becomes the target's */
-static void compare_references(root_motion *m, const vg_graph *g, const vg_head *h, const vg_head *target)
+static void compare_references(work *w)
 {
-    double before = vg_diagonal(h->reference, h->mesh.nv), after = vg_diagonal(target->reference, h->mesh.nv);
+    root_motion *m = &w->root;
+    const vg_head *h = w->h, *t = &w->target;
+    double before = vg_diagonal(h->reference, h->mesh.nv), after = vg_diagonal(t->reference, t->mesh.nv);
     m->ratio = before > 0 ? after / before : 1;
-    vg_graph_root(g, h->reference, m->source);
-    vg_graph_root(g, target->reference, m->target);
+    vg_graph_root(w->from, h->reference, m->source);
+    vg_graph_root(w->to, t->reference, m->target);
     m->source_anchors = positions(h->reference, h->anchors, h->nanchors);
-    m->target_anchors = positions(target->reference, h->anchors, h->nanchors);
+    m->target_anchors = positions(t->reference, h->anchors, h->nanchors);
 }
 
 static void move(const root_motion *m, const double *source, const double *target, const double *now, double *to)
@@ -70,55 +155,102 @@ static void move(const root_motion *m, const double *source, const double *targe
     for (int k = 0; k < 3; k++) to[k] = target[k] + (m->stay ? 0 : m->ratio * (now[k] - source[k]));
 }
 
-static void move_body(const root_motion *m, const vg_head *h, const vg_frame *in, vg_frame *out)
+static void move_body(const work *w, const vg_frame *in, vg_frame *out)
 {
-    move(m, m->source, m->target, in->root, out->root);
-    for (size_t i = 0; i < h->nanchors; i++)
-        move(m, m->source_anchors + 3 * i, m->target_anchors + 3 * i, in->anchors + 3 * i, out->anchors + 3 * i);
+    move(&w->root, w->root.source, w->root.target, in->root, out->root);
+    for (size_t i = 0; i < w->h->nanchors; i++)
+        move(&w->root, w->root.source_anchors + 3 * i, w->root.target_anchors + 3 * i, in->anchors + 3 * i,
+             out->anchors + 3 * i);
 }
 
-/* The head becomes the target's: its reference, its attributes, its provenance beside ours. */
-static void take_target(vg_head *h, vg_head *target)
+/* A pose of vertices is moved as a whole until its root is where it belongs; vertices in no face stay. */
+static void place_vertices(const work *w, vg_frame *out)
 {
+    double now[3];
+    vg_graph_root(w->to, out->values, now);
+    for (size_t v = 0; v < w->to->nv; v++)
+        for (size_t k = 0; k < 3 && w->to->in_face[v]; k++) out->values[3 * v + k] += out->root[k] - now[k];
+}
+
+/* ---- what does not move ---- */
+
+static void prepare_pins(work *w)
+{
+    pinning *p = &w->pins;
+    if (w->kind != VG_VERTICES || (w->way != TRANSFER && w->way != CARRY)) p->mode = PIN_NONE;
+    if (p->mode == PIN_NONE) return;
+    static const double still = 1e-6; /* of D */
+    p->reference = w->source_reference;
+    p->least = still * vg_diagonal(p->reference, w->from->nv);
+    p->moves = allocate(w->from->nv, sizeof *p->moves);
+    p->face_moves = allocate(w->from->nf, sizeof *p->face_moves);
+    p->free = allocate(w->to->nv, sizeof *p->free);
+    p->list = allocate(w->to->nv, sizeof *p->list);
+}
+
+static bool driven_by_moving(const work *w, size_t face)
+{
+    const vg_correspondence *k = &w->pairs.correspondence;
+    if (!k->first) return w->pins.face_moves[face];
+    for (uint32_t i = k->first[face]; i < k->first[face + 1]; i++)
+        if (w->pins.face_moves[k->source[i]]) return true;
+    return false;
+}
+
+static void pin_still_vertices(work *w, const double *pose, vg_frame *out)
+{
+    pinning *p = &w->pins;
+    const vg_graph *a = w->from, *b = w->to;
+    size_t still = 0, n = 0;
+    for (size_t v = 0; v < a->nv; v++) {
+        p->moves[v] = false;
+        for (size_t k = 0; k < 3; k++) p->moves[v] |= !(fabs(pose[3 * v + k] - p->reference[3 * v + k]) <= p->least);
+        still += !p->moves[v];
+    }
+    if (p->mode == PIN_AUTO && still < a->nv / 10) still = 0;
+    for (size_t f = 0; still && f < a->nf; f++) {
+        p->face_moves[f] = false;
+        for (uint32_t c = a->start[f]; c < a->start[f + 1]; c++) p->face_moves[f] |= p->moves[a->vert[c]];
+    }
+    if (still) memset(p->free, 0, b->nv * sizeof *p->free);
+    for (size_t f = 0; still && f < b->nf - b->nlinks; f++)
+        for (uint32_t c = b->start[f]; driven_by_moving(w, f) && c < b->start[f + 1]; c++) p->free[b->vert[c]] = true;
+    for (size_t v = 0; still && v < b->nv; v++)
+        if (b->in_face[v] && !p->free[v]) p->list[n++] = (uint32_t)v;
     vg_err e;
-    if (vg_head_merge_trace(h, target, &e) < 0) cli_die(&e);
-    free(h->reference);
-    free(h->reference_name);
-    vg_attributes_clear(&h->attributes);
-    h->reference = target->reference, h->reference_name = target->reference_name, h->attributes = target->attributes;
-    target->reference = NULL, target->reference_name = NULL, target->attributes = (vg_attributes){0};
+    if (vg_frame_pin(out, p->list, n, &e) < 0) cli_die(&e);
 }
 
-typedef struct work {
-    vg_source *s;
-    vg_head *h;
-    vg_graph *g;
-    vg_deformer *d;
-    vg_kind from;      /* what comes in */
-    bool onto;
-    vg_method method;
-    root_motion root;
-    size_t n;          /* poses in hand */
-    vg_frame in[BATCH], out[BATCH];
-} work;
+/* ---- frames ---- */
+
+static void run_batch(work *w, const double *const *in, double *const *out)
+{
+    switch (w->way) {
+    case MEASURE: vg_deformer_measure(w->deformer, w->n, w->kind, in, out); break;
+    case APPLY: vg_deformer_apply(w->deformer, w->n, in, out); break;
+    case TRANSFER: vg_deformer_transfer(w->deformer, w->n, w->kind, in, out); break;
+    case CARRY: vg_carrier_transfer(w->carrier, w->n, in, out); break;
+    case SHAPE: vg_shaper_transfer(w->shaper, w->n, in, out); break;
+    }
+}
 
 static void deform_batch(work *w)
 {
     const double *in[BATCH];
     double *out[BATCH];
+    vg_err e;
     for (size_t i = 0; i < w->n; i++) in[i] = w->in[i].values, out[i] = w->out[i].values;
-    if (!w->onto) vg_deformer_measure(w->d, w->n, w->from, in, out);
-    else if (w->from == VG_DEFORMATIONS) vg_deformer_apply(w->d, w->n, in, out);
-    else vg_deformer_transfer(w->d, w->n, w->from, in, out);
+    if (w->n) run_batch(w, in, out);
     for (size_t i = 0; i < w->n; i++) {
-        vg_err e;
         if (vg_frame_label(&w->out[i], &w->in[i], &e) < 0) cli_die(&e);
-        if (w->onto) {
-            move_body(&w->root, w->h, &w->in[i], &w->out[i]);
-        } else {
+        if (w->way == MEASURE) {
             memcpy(w->out[i].root, w->in[i].root, sizeof w->out[i].root);
             if (w->h->nanchors) memcpy(w->out[i].anchors, w->in[i].anchors, 3 * w->h->nanchors * sizeof(double));
+        } else {
+            move_body(w, &w->in[i], &w->out[i]);
         }
+        if (w->way == SHAPE) place_vertices(w, &w->out[i]);
+        if (w->pins.mode != PIN_NONE) pin_still_vertices(w, in[i], &w->out[i]);
         cli_stream_put(&w->out[i]);
     }
     w->n = 0;
@@ -127,8 +259,8 @@ static void deform_batch(work *w)
 /* Frames of vertices carry neither root nor anchors: they are measured here, as vg-encode --vectors does. */
 static void fill_body(const work *w, vg_frame *f)
 {
-    if (w->from != VG_VERTICES) return;
-    vg_graph_root(w->g, f->values, f->root);
+    if (w->kind != VG_VERTICES) return;
+    vg_graph_root(w->from, f->values, f->root);
     vg_graph_anchors(f->values, w->h->anchors, w->h->nanchors, f->anchors);
 }
 
@@ -148,92 +280,153 @@ static void deform_all(work *w)
 
 static void warn_degenerate(const work *w)
 {
-    vg_deform_counts c = vg_deformer_counts(w->d);
+    vg_deform_counts c = {0};
+    if (w->deformer) c = vg_deformer_counts(w->deformer);
     if (c.corners)
         cli_warn("%llu corners without a direction took the turn of their face (the first in face %llu)",
                  (unsigned long long)c.corners, (unsigned long long)c.first_face);
+    if (!w->carrier) return;
+    c = vg_carrier_counts(w->carrier);
+    if (c.corners)
+        cli_warn("%llu times a face of the source had no direction and drove nothing (the first is face %llu)",
+                 (unsigned long long)c.corners, (unsigned long long)c.first_face);
 }
 
-/* --root V: the sequence's anchors give way to this one. */
-static void set_root_anchor(work *w)
-{
-    if (!w->root.vertex) return;
-    if (w->from != VG_VERTICES)
-        cli_usage("--root %u needs a sequence of vertices, this one holds %s", w->root.vertex[0], vg_kind_name(w->from));
-    free(w->h->anchors);
-    w->h->anchors = w->root.vertex, w->h->nanchors = 1;
-}
+/* ---- setting up ---- */
 
-static void prepare(work *w, vg_head *target)
+static void check_kind(const work *w)
 {
     vg_err e;
-    vg_head *h = w->h;
-    w->from = h->kind, w->onto = opts.onto != NULL;
-    if (h->kind == VG_TRANSFORMS || (h->kind == VG_DEFORMATIONS && !opts.onto)) {
-        vg_fail(&e, VG_EINPUT, "the input holds %s: %s", vg_kind_name(h->kind),
-                h->kind == VG_TRANSFORMS ? "they need a map" : "name the mesh to apply them to with --onto");
+    const char *advice = NULL;
+    if (w->kind == VG_TRANSFORMS) advice = "they need a map";
+    else if (w->kind == VG_DEFORMATIONS && !opts.onto) advice = "name the mesh to apply them to with --onto";
+    else if (w->kind == VG_DEFORMATIONS && w->by != BY_POSE) advice = "they go --by pose only";
+    else if (w->kind != VG_VERTICES && (w->by == BY_SHAPE || opts.correspondence))
+        advice = "--by shape and --correspondence need vertices";
+    if (!advice) return;
+    vg_fail(&e, VG_EINPUT, "the input holds %s: %s", vg_kind_name(w->kind), advice);
+    cli_die(&e);
+}
+
+static void load_target(work *w)
+{
+    vg_err e;
+    if (!opts.onto) return;
+    if (vg_load_mesh(&w->target, opts.onto, &e) < 0) cli_die(&e);
+    if (!opts.correspondence) return;
+    if (vg_load_mesh(&w->pairs, opts.correspondence, &e) < 0) cli_die(&e);
+    if (!w->pairs.correspondence.first) {
+        vg_fail(&e, VG_EINPUT, "'%s' holds no correspondence: make one with vg-register", opts.correspondence);
         cli_die(&e);
     }
-    parse_root(&w->root, h);
-    set_root_anchor(w);
-    if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&w->g, h, &e) < 0 ||
-        vg_deformer_new(&w->d, w->g, h->reference, cli.threads, &e) < 0)
-        cli_die(&e);
-    for (size_t i = 0; i < BATCH && w->from == VG_VERTICES; i++)
-        if (vg_frame_shape(&w->in[i], h, &e) < 0) cli_die(&e);
-    if (w->onto) {
-        double *vectors = malloc((3 * vg_graph_corners(w->g) + 1) * sizeof *vectors);
-        if (!vectors) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the target's vectors"});
-        vg_graph_vectors(w->g, target->reference, vectors);
-        if (vg_deformer_target(w->d, vectors, w->method, &e) < 0) cli_die(&e);
+}
+
+/* The graphs: of a pair with one connectivity, the source's serves both. */
+static void make_graphs(work *w)
+{
+    vg_err e;
+    if (opts.correspondence) {
+        w->h->has_selection = false; /* every face may drive one */
+        w->target.has_selection = false;
+        w->h->nanchors = 0;
+        if (vg_head_prepare_vectors(&w->target, &e) < 0 || vg_graph_new(&w->to, &w->target, &e) < 0) cli_die(&e);
+    } else if (opts.onto) {
+        char name[200];
+        snprintf(name, sizeof name, "'%.190s'", opts.onto);
+        if (vg_mesh_same(&w->h->mesh, "the sequence", &w->target.mesh, name, &e) < 0) {
+            size_t n = strlen(e.message);
+            snprintf(e.message + n, sizeof e.message - n, ": pair them with vg-register and --correspondence");
+            cli_die(&e);
+        }
+    }
+    if (vg_head_prepare_vectors(w->h, &e) < 0 || vg_graph_new(&w->from, w->h, &e) < 0) cli_die(&e);
+    if (!w->to) w->to = w->from;
+}
+
+static void make_step(work *w)
+{
+    static const vg_method methods[] = {[BY_POSE] = VG_BY_POSE, [BY_SHAPE] = VG_BY_POSE, [BY_GRADIENT] = VG_BY_GRADIENT,
+                                        [BY_BLEND] = VG_BY_BLEND};
+    vg_err e;
+    const vg_head *h = w->h, *t = &w->target;
+    vg_method method = methods[w->by];
+    int r = VG_OK;
+    w->way = !opts.onto ? MEASURE : opts.correspondence ? CARRY : w->by == BY_SHAPE ? SHAPE
+             : w->kind == VG_DEFORMATIONS ? APPLY : TRANSFER;
+    if (w->way == CARRY) {
+        r = vg_carrier_new(&w->carrier, &h->mesh, h->reference, &w->pairs.correspondence, w->to, t->reference, method,
+                           cli.threads, &e);
+    } else if (w->way == SHAPE) {
+        r = vg_shaper_new(&w->shaper, w->to, h->reference, t->reference, cli.threads, &e);
+    } else {
+        r = vg_deformer_new(&w->deformer, w->from, h->reference, cli.threads, &e);
+        double *vectors = allocate(3 * vg_graph_corners(w->from), sizeof *vectors);
+        if (r == VG_OK && opts.onto) {
+            vg_graph_vectors(w->from, t->reference, vectors);
+            r = vg_deformer_target(w->deformer, vectors, method, &e);
+        }
         free(vectors);
-        compare_references(&w->root, w->g, h, target);
-        take_target(h, target);
     }
-    h->kind = w->onto ? VG_VECTORS : VG_DEFORMATIONS;
-    h->count = vg_graph_corners(w->g);
+    if (r < 0) cli_die(&e);
+}
+
+/* The output's head: the sequence's provenance and records, the target's mesh, reference and what its file said. */
+static void make_head(work *w)
+{
+    vg_err e;
+    vg_head *h = w->h, *t = &w->target;
+    w->source_reference = h->reference;
+    if (opts.onto) {
+        if (vg_head_merge_trace(h, t, &e) < 0 || vg_head_merge_trace(h, &w->pairs, &e) < 0) cli_die(&e);
+        free(h->reference_name);
+        vg_attributes_clear(&h->attributes);
+        vg_skeleton_clear(&h->skeleton);
+        h->reference = t->reference, h->reference_name = t->reference_name;
+        h->attributes = t->attributes, h->skeleton = t->skeleton;
+        t->reference = NULL, t->reference_name = NULL;
+        t->attributes = (vg_attributes){0}, t->skeleton = (vg_skeleton){0};
+    }
+    if (w->way == CARRY) { /* the source's mesh stays with its carrier, which borrows its arrays */
+        w->source_mesh = h->mesh;
+        h->mesh = t->mesh;
+        free(h->links);
+        h->has_links = t->has_links, h->links = t->links, h->nlinks = t->nlinks;
+        t->mesh = (vg_mesh){0}, t->links = NULL;
+    }
+    h->kind = w->way == MEASURE ? VG_DEFORMATIONS : w->way == SHAPE ? VG_VERTICES : VG_VECTORS;
+    h->count = h->kind == VG_VERTICES ? h->mesh.nv : vg_graph_corners(w->to);
+}
+
+static void prepare(work *w)
+{
+    vg_err e;
+    w->kind = w->h->kind;
+    check_kind(w);
+    set_root(w);
+    make_graphs(w);
+    for (size_t i = 0; i < BATCH && w->kind == VG_VERTICES; i++) /* room for the anchors that fill_body measures */
+        if (vg_frame_shape(&w->in[i], w->h, &e) < 0) cli_die(&e);
+    make_step(w);
+    if (opts.onto) compare_references(w);
+    make_head(w);
+    prepare_pins(w);
     for (size_t i = 0; i < BATCH; i++)
-        if (vg_frame_shape(&w->out[i], h, &e) < 0) cli_die(&e);
-}
-
-static void clear(work *w)
-{
-    for (size_t i = 0; i < BATCH; i++) vg_frame_clear(&w->in[i]), vg_frame_clear(&w->out[i]);
-    vg_deformer_free(&w->d);
-    vg_graph_free(&w->g);
-    free(w->root.source_anchors);
-    free(w->root.target_anchors);
-    vg_source_close(&w->s);
-}
-
-static vg_method parse_method(void)
-{
-    static const char *const names[] = {[VG_BY_POSE] = "pose", [VG_BY_GRADIENT] = "gradient", [VG_BY_BLEND] = "blend"};
-    if (!opts.by) return VG_BY_POSE;
-    if (!opts.onto) cli_usage("--by needs --onto");
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (!strcmp(opts.by, names[i])) return (vg_method)i;
-    cli_usage("--by is 'pose', 'gradient' or 'blend', not '%s'", opts.by);
+        if (vg_frame_shape(&w->out[i], w->h, &e) < 0) cli_die(&e);
 }
 
 int main(int argc, char **argv)
 {
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
-    vg_err e;
-    vg_head target = {0};
-    if (opts.root && !opts.onto) cli_usage("--root needs --onto");
-    if (opts.onto && vg_load_mesh(&target, opts.onto, &e) < 0) cli_die(&e);
-
-    work w = {.method = parse_method(), .s = cli_source(operands, n)};
+    static work w; /* lives until the end: what it holds goes with the process */
+    parse_options(&w);
+    load_target(&w);
+    w.s = cli_source(operands, n);
     w.h = vg_source_head(w.s);
-    if (opts.onto && vg_mesh_same(&w.h->mesh, "the sequence", &target.mesh, "the target", &e) < 0) cli_die(&e);
-    prepare(&w, &target);
-    vg_head_clear(&target);
+    prepare(&w);
     cli_stream_open(w.h);
     deform_all(&w);
     warn_degenerate(&w);
     cli_stream_end(vg_source_tail(w.s));
-    clear(&w);
     cli_finish(0);
 }

@@ -7,7 +7,7 @@
 
 static struct {
     bool vectors, f32;
-    const char *faces, *reference, *anchors;
+    const char *faces, *reference, *anchors, *mesh;
     double fps;
 } opts;
 
@@ -15,6 +15,7 @@ static const cli_option options[] = {
     {"vectors", 0, NULL, "write the vectors of the vector graph instead of vertices", .flag = &opts.vectors},
     {"faces", 0, "all|selected", "which faces carry vectors: all (default), or about half of them", .text = &opts.faces},
     {"reference", 0, "MESH", "the undeformed pose; default: the first pose", .text = &opts.reference},
+    {"mesh", 0, "MESH", "the faces and reference pose of point caches and arrays, which hold none", .text = &opts.mesh},
     {"anchor", 0, "V,V,...", "vertices that vg-solve must meet exactly", .text = &opts.anchors},
     {"fps", 0, "N", "give the poses times, N a second, from 0", .number = &opts.fps, .least = 1e-6, .most = 1e9},
     {"f32", 0, NULL, "write binary32 instead of binary64", .flag = &opts.f32},
@@ -143,7 +144,7 @@ int main(int argc, char **argv)
     bool selects = selects_faces();
     if (opts.anchors) nanchors = cli_parse_vertices("--anchor", opts.anchors, &anchors);
 
-    vg_source *s = cli_source(operands, n);
+    vg_source *s = cli_source_with(operands, n, opts.mesh);
     vg_head *h = vg_source_head(s);
     prepare(h, selects, anchors, nanchors);
     if (opts.vectors) write_vectors(s, h);

@@ -7,10 +7,32 @@
 
 static struct {
     const char *weights;
-} opts;
+    bool planar;
+    double fidelity, planarity;
+    bool planar_weights;
+} opts = {.fidelity = 0.5, .planarity = 1};
+
+static void take_planar_weights(const char *text, void *context)
+{
+    (void)context;
+    char first[64];
+    const char *comma = strchr(text, ',');
+    size_t n = comma ? (size_t)(comma - text) : 0;
+    if (!n || n >= sizeof first) cli_usage("option '--planar-weights' needs two numbers with a comma between, not '%s'", text);
+    memcpy(first, text, n);
+    first[n] = 0;
+    opts.fidelity = cli_parse_number("--planar-weights", first);
+    opts.planarity = cli_parse_number("--planar-weights", comma + 1);
+    opts.planar_weights = true;
+    if (!(opts.fidelity > 0) || !(opts.planarity >= 0))
+        cli_usage("option '--planar-weights' needs a number above 0 and one of at least 0, not '%s'", text);
+}
 
 static const cli_option options[] = {
     {"weights", 0, "uniform|area", "every corner counts alike (default), or by the reference surface's metric", .text = &opts.weights},
+    {"planar", 0, NULL, "make faces of four and more corners more nearly plane", .flag = &opts.planar},
+    {"planar-weights", 0, "W1,W2", "how much the vectors and how much the planes count (default: 0.5,1)",
+     .take = take_planar_weights},
     {NULL}};
 
 static const cli_program program = {
@@ -22,43 +44,39 @@ static const cli_program program = {
     .writes_stream = true,
     .threaded = true};
 
-/* Poses that wait for a solve. Their vectors are not kept: a pose costs 6 numbers a vertex, not 3 a corner. */
-typedef struct batch {
+/* A solver and the vertices it holds: the sequence's anchors, or those and the pins of some frames. */
+typedef struct machine {
+    vg_solver *solver;
+    vg_planar *planar; /* with --planar */
+    uint32_t *held;    /* ascending */
+    size_t nheld;
+} machine;
+
+/* A pose that waits for its solve. Its vectors are not kept: it costs 6 numbers a vertex, not 3 a corner. */
+typedef struct waiting {
+    vg_frame frame; /* values: first guess, then vertices */
+    double *rhs, *held, *normals; /* held: where the held vertices go; normals: with --planar */
+    size_t held_cap;
+} waiting;
+
+typedef struct work {
+    vg_head *h;
+    vg_graph *g;
+    vg_kind kind;            /* what comes in */
+    machine plain, pinned;   /* pinned: for the pins of the last frame that had any */
+    const machine *at;       /* what the waiting poses wait for */
+    waiting *waiting;
     size_t n, most;
-    vg_frame *frame; /* values: first guess, then vertices */
-    double **rhs, **x;
-    const double **anchors, **roots;
-} batch;
+    double *vectors;         /* of a pose that came as vertices */
+    size_t most_steps, planar_faces;
+    double worst_residual;
+} work;
 
-static void make_batch(batch *b, size_t most, const vg_head *out)
+static void *allocate(size_t n, size_t size)
 {
-    vg_err e = {.code = VG_ENOMEM, .message = "not enough memory for a batch of poses"};
-    *b = (batch){.most = most, .frame = calloc(most, sizeof *b->frame), .rhs = calloc(most, sizeof *b->rhs),
-                 .x = calloc(most, sizeof *b->x), .anchors = calloc(most, sizeof *b->anchors),
-                 .roots = calloc(most, sizeof *b->roots)};
-    if (!b->frame || !b->rhs || !b->x || !b->anchors || !b->roots) cli_die(&e);
-    for (size_t i = 0; i < most; i++) {
-        if (!(b->rhs[i] = calloc(3 * out->mesh.nv + 1, sizeof *b->rhs[i]))) cli_die(&e);
-        if (vg_frame_shape(&b->frame[i], out, &e) < 0) cli_die(&e);
-        b->x[i] = b->frame[i].values, b->anchors[i] = b->frame[i].anchors, b->roots[i] = b->frame[i].root;
-    }
-}
-
-static void free_batch(batch *b)
-{
-    for (size_t i = 0; i < b->most; i++) vg_frame_clear(&b->frame[i]), free(b->rhs[i]);
-    free(b->frame);
-    free(b->rhs);
-    free(b->x);
-    free(b->anchors);
-    free(b->roots);
-}
-
-static void solve_batch(vg_solver *solver, batch *b)
-{
-    vg_solver_solve(solver, b->n, (const double *const *)b->rhs, b->x, b->anchors, b->roots);
-    for (size_t i = 0; i < b->n; i++) cli_stream_put(&b->frame[i]);
-    b->n = 0;
+    void *p = calloc(n + 1, size);
+    if (!p) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for a batch of poses"});
+    return p;
 }
 
 static vg_weights parse_weights(void)
@@ -68,64 +86,210 @@ static vg_weights parse_weights(void)
     cli_usage("--weights is 'uniform' or 'area', not '%s'", opts.weights);
 }
 
-static void run(vg_source *s, vg_head *h)
+static void keep_planar_facts(work *w, const machine *m)
+{
+    if (!m->planar) return;
+    vg_planar_facts found = vg_planar_get_facts(m->planar);
+    if (found.most_steps > w->most_steps) w->most_steps = found.most_steps;
+    if (found.worst_residual > w->worst_residual) w->worst_residual = found.worst_residual;
+    w->planar_faces = found.faces;
+}
+
+static void free_machine(work *w, machine *m)
+{
+    keep_planar_facts(w, m);
+    vg_planar_free(&m->planar);
+    vg_solver_free(&m->solver);
+    free(m->held);
+    *m = (machine){0};
+}
+
+/* takes `held` over */
+static void make_machine(work *w, machine *m, uint32_t *held, size_t nheld)
 {
     vg_err e;
-    vg_graph *g;
-    vg_solver *solver;
-    vg_kind kind = h->kind;
-    if (kind != VG_VECTORS && kind != VG_VERTICES) {
-        vg_fail(&e, VG_EINPUT, "the input holds %s, vg-solve takes vectors: apply them with 'vg-deform --onto MESH'",
-                vg_kind_name(kind));
+    *m = (machine){.held = held, .nheld = nheld};
+    if (vg_solver_new(&m->solver, w->g, held, nheld, w->h->reference, parse_weights(), cli.threads, &e) < 0 ||
+        (opts.planar && vg_planar_new(&m->planar, m->solver, opts.fidelity, opts.planarity, &e) < 0))
         cli_die(&e);
-    }
-    if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&g, h, &e) < 0 ||
-        vg_solver_new(&solver, g, h->anchors, h->nanchors, h->reference, parse_weights(), cli.threads, &e) < 0)
-        cli_die(&e);
-    vg_solver_facts facts = vg_solver_get_facts(solver);
+    vg_solver_facts facts = vg_solver_get_facts(m->solver);
     cli_note("%zu unknowns, %zu entries in the factor, analysed in %.3f s, factorized in %.3f s", facts.unknowns,
              facts.factor_entries, facts.analyse_seconds, facts.factor_seconds);
+}
 
-    double *vectors = kind == VG_VERTICES ? malloc((3 * vg_graph_corners(g) + 1) * sizeof *vectors) : NULL;
-    h->kind = VG_VERTICES, h->count = h->mesh.nv;
-    batch b;
-    make_batch(&b, vg_solver_batch(solver), h);
-    cli_stream_open(h);
-    vg_frame in = {0};
+static void solve_waiting(work *w)
+{
+    const double **rhs = allocate(w->n, sizeof *rhs), **held = allocate(w->n, sizeof *held);
+    const double **roots = allocate(w->n, sizeof *roots), **normals = allocate(w->n, sizeof *normals);
+    double **x = allocate(w->n, sizeof *x);
+    for (size_t i = 0; i < w->n; i++) {
+        waiting *p = &w->waiting[i];
+        rhs[i] = p->rhs, held[i] = p->held, roots[i] = p->frame.root, normals[i] = p->normals, x[i] = p->frame.values;
+    }
+    if (w->n) vg_solver_solve(w->at->solver, w->n, rhs, x, held, roots);
+    size_t good = w->n && w->at->planar ? vg_planar_solve(w->at->planar, w->n, normals, x) : w->n;
+    if (good < w->n)
+        cli_no("frame '%s' is not planar yet after %zu steps: choose --planar-weights that are less far apart",
+               w->waiting[good].frame.name, vg_planar_get_facts(w->at->planar).most_steps);
+    for (size_t i = 0; i < w->n; i++) cli_stream_put(&w->waiting[i].frame);
+    w->n = 0;
+    free(rhs);
+    free(held);
+    free(roots);
+    free(normals);
+    free(x);
+}
+
+/* Anchors and pins, ascending, each once. */
+static uint32_t *unite(const work *w, const vg_frame *f, size_t *n)
+{
+    const vg_head *h = w->h;
+    uint32_t *both = allocate(h->nanchors + f->npins, sizeof *both);
+    *n = 0;
+    for (size_t a = 0, p = 0; a < h->nanchors || p < f->npins;) {
+        bool anchor = p == f->npins || (a < h->nanchors && h->anchors[a] <= f->pins[p]);
+        uint32_t v = anchor ? h->anchors[a] : f->pins[p];
+        a += a < h->nanchors && h->anchors[a] == v;
+        p += p < f->npins && f->pins[p] == v;
+        both[(*n)++] = v;
+    }
+    return both;
+}
+
+/* The machine for a frame. Poses of one batch share theirs; the pinned one is made anew when pins change. */
+static const machine *machine_for(work *w, const vg_frame *f)
+{
+    if (f->npins == 0) return &w->plain;
+    size_t n;
+    uint32_t *held = unite(w, f, &n);
+    machine *m = &w->pinned;
+    if (m->solver && m->nheld == n && !memcmp(m->held, held, n * sizeof *held)) {
+        free(held);
+    } else {
+        solve_waiting(w);
+        free_machine(w, m);
+        make_machine(w, m, held, n);
+    }
+    return m;
+}
+
+/* Where the held vertices go: anchors as the frame says, pins where the reference has them. */
+static void place_held(const work *w, const machine *m, const vg_frame *f, waiting *p)
+{
+    if (p->held_cap < 3 * m->nheld || !p->held) {
+        free(p->held);
+        p->held = allocate(3 * m->nheld, sizeof *p->held);
+        p->held_cap = 3 * m->nheld;
+    }
+    size_t a = 0;
+    for (size_t i = 0; i < m->nheld; i++) {
+        bool anchor = a < w->h->nanchors && w->h->anchors[a] == m->held[i];
+        const double *at = anchor ? f->anchors + 3 * a : w->h->reference + 3 * (size_t)m->held[i];
+        memcpy(p->held + 3 * i, at, 3 * sizeof *at);
+        a += anchor;
+    }
+}
+
+static void take_frame(work *w, vg_frame *in)
+{
+    vg_err e;
+    const double *vectors = in->values;
+    if (w->kind == VG_VERTICES) {
+        vg_graph_vectors(w->g, in->values, w->vectors);
+        vg_graph_root(w->g, in->values, in->root);
+        vg_graph_anchors(in->values, w->h->anchors, w->h->nanchors, in->anchors);
+        vectors = w->vectors;
+    }
+    const machine *m = machine_for(w, in);
+    if (m != w->at) solve_waiting(w);
+    w->at = m;
+    waiting *p = &w->waiting[w->n];
+    if (vg_frame_label(&p->frame, in, &e) < 0) cli_die(&e);
+    memcpy(p->frame.root, in->root, sizeof in->root);
+    place_held(w, m, in, p);
+    vg_solver_load(m->solver, vectors, p->held, p->frame.values, p->rhs);
+    if (m->planar) vg_planar_load(m->planar, vectors, p->normals);
+    if (++w->n == w->most) solve_waiting(w);
+}
+
+static void make_waiting(work *w)
+{
+    vg_err e;
+    w->most = vg_solver_batch(w->plain.solver);
+    w->waiting = allocate(w->most, sizeof *w->waiting);
+    for (size_t i = 0; i < w->most; i++) {
+        waiting *p = &w->waiting[i];
+        p->rhs = allocate(3 * w->h->mesh.nv, sizeof *p->rhs);
+        p->normals = allocate(w->plain.planar ? 3 * vg_planar_faces(w->plain.planar) : 0, sizeof *p->normals);
+        if (vg_frame_shape(&p->frame, w->h, &e) < 0) cli_die(&e);
+    }
+}
+
+static void prepare(work *w, vg_head *h)
+{
+    vg_err e;
+    w->h = h, w->kind = h->kind;
+    if (w->kind != VG_VECTORS && w->kind != VG_VERTICES) {
+        vg_fail(&e, VG_EINPUT, "the input holds %s, vg-solve takes vectors: apply them with 'vg-deform --onto MESH'",
+                vg_kind_name(w->kind));
+        cli_die(&e);
+    }
+    if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&w->g, h, &e) < 0) cli_die(&e);
+    uint32_t *anchors = allocate(h->nanchors, sizeof *anchors);
+    if (h->nanchors) memcpy(anchors, h->anchors, h->nanchors * sizeof *anchors);
+    make_machine(w, &w->plain, anchors, h->nanchors);
+    if (w->kind == VG_VERTICES) w->vectors = allocate(3 * vg_graph_corners(w->g), sizeof *w->vectors);
+}
+
+static void solve_all(work *w, vg_source *s, vg_frame *in)
+{
+    vg_err e;
     uint64_t n = 0;
     int r;
-    while ((r = vg_source_next(s, &in, &e)) > 0) {
-        vg_frame *f = &b.frame[b.n];
-        if (vg_frame_label(f, &in, &e) < 0) cli_die(&e);
-        if (kind == VG_VECTORS) {
-            for (int k = 0; k < 3; k++) f->root[k] = in.root[k];
-            for (size_t k = 0; k < 3 * h->nanchors; k++) f->anchors[k] = in.anchors[k];
-        } else {
-            if (!vectors) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the vectors of a pose"});
-            vg_graph_vectors(g, in.values, vectors);
-            vg_graph_root(g, in.values, f->root);
-            vg_graph_anchors(in.values, h->anchors, h->nanchors, f->anchors);
-        }
-        vg_solver_load(solver, kind == VG_VECTORS ? in.values : vectors, f->anchors, f->values, b.rhs[b.n]);
-        if (++b.n == b.most) solve_batch(solver, &b);
+    while ((r = vg_source_next(s, in, &e)) > 0) {
+        take_frame(w, in);
         cli_progress("poses", ++n);
     }
     if (r < 0) cli_die(&e);
-    solve_batch(solver, &b);
-    free(vectors);
-    free_batch(&b);
-    vg_frame_clear(&in);
-    vg_solver_free(&solver);
-    vg_graph_free(&g);
+    solve_waiting(w);
+}
+
+static void clear(work *w)
+{
+    free_machine(w, &w->plain);
+    free_machine(w, &w->pinned);
+    if (opts.planar)
+        cli_note("%zu faces of four and more, at most %zu steps to planarity, residual at most %.1e", w->planar_faces,
+                 w->most_steps, w->worst_residual);
+    for (size_t i = 0; i < w->most; i++) {
+        vg_frame_clear(&w->waiting[i].frame);
+        free(w->waiting[i].rhs);
+        free(w->waiting[i].held);
+        free(w->waiting[i].normals);
+    }
+    free(w->waiting);
+    free(w->vectors);
+    vg_graph_free(&w->g);
 }
 
 int main(int argc, char **argv)
 {
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
+    if (opts.planar_weights && !opts.planar) cli_usage("--planar-weights needs --planar");
+    vg_err e;
+    work w = {0};
+    vg_frame in = {0};
     vg_source *s = cli_source(operands, n);
-    run(s, vg_source_head(s));
+    prepare(&w, vg_source_head(s));
+    if (vg_frame_shape(&in, w.h, &e) < 0) cli_die(&e); /* room for the anchors of a pose that comes as vertices */
+    w.h->kind = VG_VERTICES, w.h->count = w.h->mesh.nv;
+    make_waiting(&w);
+    cli_stream_open(w.h);
+    solve_all(&w, s, &in);
+    clear(&w);
     cli_stream_end(vg_source_tail(s));
+    vg_frame_clear(&in);
     vg_source_close(&s);
     cli_finish(0);
 }

@@ -112,6 +112,7 @@ class Frame:
     root: object  # [x, y, z] for vectors and deformations, else None
     anchors: object  # array 'd', or None
     values: array
+    pins: object = None  # array: vertices that stay where the reference has them; None: no pins
     extra: list = field(default_factory=list)
 
 
@@ -557,7 +558,8 @@ class _Reader:
         p.fits("its length and counts do not agree")
         first, source_face = p.u32s(nf + 1), p.u32s(pairs)
         p.pad()
-        weight, distance = p.f64s(pairs, "a weight is not positive, or"), p.f64s(nf, "a distance or mark is out of range, or")
+        weight = p.f64s(pairs, "a weight is not positive, or")
+        distance = p.f64s(nf, "a distance or mark is out of range, or")
         matched = list(p.take(nf))
         p.pad()
         p.end()
@@ -597,12 +599,26 @@ class _Reader:
                 p.fail(f"its count does not fit the mesh: {s.count}, not {want}")
         s.extra, self.pending = self.pending, []
 
+    def pins(self, p: _Payload) -> array:
+        p.fits("its list of pins is cut or malformed")
+        n = p.u32()
+        if p.u32() or n == 0:
+            p.fail("its list of pins is cut or malformed")
+        pins = p.u32s(n)
+        p.zero(n % 2 * 4, "its list of pins is cut or malformed, or its padding is")
+        for i, v in enumerate(pins):
+            if v >= self.stream.mesh.nv:
+                p.fail("an index is out of range")
+            if i and v <= pins[i - 1]:
+                p.fail("indices are not ascending")
+        return pins
+
     def fram(self, p: _Payload):
         s = self.stream
         p.where = f"frame {len(s.frames)}"
         p.fits("it is too short, or unknown flags are set")
         name_length, flags, time = p.u32(), p.u32(), p.f64()
-        if flags & ~1:
+        if flags & ~3 or (flags & 2 and s.kind != "vectors"):
             p.fail("it is too short, or unknown flags are set")
         if not math.isfinite(time) or (not flags & 1 and time != 0):
             p.fail("its time is not finite, or set without its flag")
@@ -610,11 +626,13 @@ class _Reader:
         name = p.text(name_length, wrong, wrong)
         p.pad()
         p.where += f" ('{name}')"
-        root = anchors = None
+        root = anchors = pins = None
         if s.kind in ("vectors", "deformations"):
             p.fits("it ends before its root and anchors")
             root = list(p.f64s(3, "its root or an anchor"))
             anchors = p.f64s(3 * len(s.anchors or ()), "its root or an anchor")
+        if flags & 2:
+            pins = self.pins(p)
         width = WIDTH[s.kind]
         p.fits("its length does not fit the count of FORM")
         values = p.f64s(s.count * width, "a value", "d" if s.precision == 8 else "f")
@@ -623,7 +641,7 @@ class _Reader:
             for i in range(0, len(values), width):
                 if not any(values[i:i + 4]):
                     p.fail("a quaternion is zero")
-        s.frames.append(Frame(name, time if flags & 1 else None, root, anchors, values, self.pending))
+        s.frames.append(Frame(name, time if flags & 1 else None, root, anchors, values, pins, self.pending))
         self.pending = []
 
     def fail(self, p: _Payload):
@@ -667,7 +685,7 @@ def _extra_json(records) -> list:
 def _frame_json(f: Frame, width: int) -> dict:
     anchors = None if f.anchors is None else _rows(f.anchors, 3)
     return {"name": f.name, "time": f.time, "root": f.root, "anchors": anchors,
-            "values": _rows(f.values, width), "extra": _extra_json(f.extra)}
+            "pins": None if f.pins is None else list(f.pins), "values": _rows(f.values, width), "extra": _extra_json(f.extra)}
 
 
 def _correspondence_json(c: Correspondence) -> dict:
@@ -712,7 +730,8 @@ def _summary(s: Stream) -> str:
         lines.append(f"{m.nv} vertices, {m.nf} faces, {len(m.vert)} corners, reference '{s.reference_name}'")
     for what, n in (("selected faces", s.selection and len(s.selection)), ("links", s.links and len(s.links) // 2),
                     ("anchors", s.anchors and len(s.anchors)), ("joints", s.skeleton and len(s.skeleton)),
-                    ("target faces driven", s.correspondence and s.correspondence.target[1]), ("labels", s.labels and len(s.labels))):
+                    ("driven faces", s.correspondence and s.correspondence.target[1]),
+                    ("labels", s.labels and len(s.labels))):
         if n:
             lines.append(f"{n} {what}")
     lines += [f"made by {p.program} {p.version}: {' '.join(p.args)}" for p in s.provenance]

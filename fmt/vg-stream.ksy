@@ -15,12 +15,12 @@ seq:
   - id: file_header
     type: file_header
   - id: head
-    type: record
+    type: record(_index)
     repeat: until
     repeat-until: _.tag == "FORM" or _.tag == "FAIL"
     doc: everything before the frames; the last one is FORM
   - id: body
-    type: record
+    type: record(_index)
     repeat: until
     repeat-until: _.tag == "END " or _.tag == "FAIL"
     if: head.last.tag == "FORM"
@@ -51,6 +51,10 @@ types:
       - id: reserved
         contents: [0, 0, 0, 0]
   record:
+    params:
+      - id: index
+        type: s4
+        doc: position in head or body
     seq:
       - id: tag
         type: str
@@ -79,6 +83,8 @@ types:
             '"LINK"': link
             '"ANCH"': indices
             '"REFP"': refp
+            '"SKEL"': skel
+            '"CORR"': corr
             '"FORM"': form
             '"FRAM"': fram
             '"FAIL"': fail
@@ -90,6 +96,9 @@ types:
         value: (flags & 1) != 0
       copy_safe:
         value: (flags & 2) != 0
+      num_anchors:
+        value: 'tag == "ANCH" ? len_payload / 4 : (index == 0 ? 0 : _root.head[index - 1].num_anchors.as<u8>)'
+        doc: of records in head, what ANCH up to here has said
   string:
     seq:
       - id: len
@@ -209,6 +218,71 @@ types:
       - id: positions
         type: point
         repeat: eos
+  skel:
+    seq:
+      - id: joints
+        type: joint
+        repeat: eos
+        doc: joint j is vertex j of the mesh
+  joint:
+    seq:
+      - id: parent
+        type: u4
+        doc: 0xffffffff is a root
+      - id: num_channels
+        type: u4
+      - id: channels
+        type: u1
+        repeat: expr
+        repeat-expr: 8
+        doc: 1 2 3 x y z position, 4 5 6 x y z rotation, 0 behind the last
+      - id: offset
+        type: point
+      - id: name
+        type: string
+      - id: padding
+        size: (12 - name.len % 8) % 8
+  corr:
+    seq:
+      - id: source
+        type: end
+      - id: target
+        type: end
+      - id: num_pairs
+        type: u8
+      - id: first
+        type: u4
+        repeat: expr
+        repeat-expr: target.num_faces + 1
+      - id: source_faces
+        type: u4
+        repeat: expr
+        repeat-expr: num_pairs
+      - id: padding
+        size: ((target.num_faces + 1 + num_pairs) % 2) * 4
+      - id: weights
+        type: f8
+        repeat: expr
+        repeat-expr: num_pairs
+      - id: distances
+        type: f8
+        repeat: expr
+        repeat-expr: target.num_faces
+      - id: matched
+        type: u1
+        repeat: expr
+        repeat-expr: target.num_faces
+      - id: last_padding
+        size: (8 - target.num_faces % 8) % 8
+    types:
+      end:
+        seq:
+          - id: num_vertices
+            type: u8
+          - id: num_faces
+            type: u8
+          - id: digest
+            type: u8
   form:
     seq:
       - id: kind
@@ -247,8 +321,11 @@ types:
       - id: anchors
         type: point
         repeat: expr
-        repeat-expr: num_anchors
+        repeat-expr: _root.head.last.num_anchors
         if: _root.form.on_graph
+      - id: pins
+        type: pin_list
+        if: has_pins
       - id: values
         type:
           switch-on: _root.form.precision
@@ -260,11 +337,20 @@ types:
     instances:
       has_time:
         value: (flags & 1) != 0
-      len_values:
-        value: _root.form.count * _root.form.width * _root.form.precision
-      num_anchors:
-        value: (_io.size - 16 - len_name - (8 - len_name % 8) % 8 - 24 - len_values) / 24
-        doc: as many as ANCH has vertices, which is what is left beside name, root and values
+      has_pins:
+        value: (flags & 2) != 0
+  pin_list:
+    seq:
+      - id: num_vertices
+        type: u4
+      - id: reserved
+        type: u4
+      - id: vertices
+        type: u4
+        repeat: expr
+        repeat-expr: num_vertices
+      - id: padding
+        size: (num_vertices % 2) * 4
   fail:
     seq:
       - id: exit_status

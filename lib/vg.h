@@ -144,6 +144,25 @@ typedef struct vg_skeleton {
 
 void vg_skeleton_clear(vg_skeleton *s);
 int vg_skeleton_copy(vg_skeleton *to, const vg_skeleton *from, vg_err *e) VG_MUST_CHECK;
+size_t vg_skeleton_channels(const vg_skeleton *s); /* of all joints */
+/* vg_skeleton_mesh: the bones as faces. */
+int vg_skeleton_mesh(const vg_skeleton *s, vg_mesh *m, vg_err *e) VG_MUST_CHECK;
+/* vg_skeleton_pose: forward kinematics. values: one for each channel, joint after joint (NULL: the reference pose): a
+ * position stands for that coordinate of the offset, of a root for its place; the rotations of a joint, in degrees, are
+ * multiplied in their order and turn what is below it. Out: njoints positions, and njoints unit quaternions w x y z that
+ * take directions of the reference pose to where the joint has turned them. */
+void vg_skeleton_pose(const vg_skeleton *s, const double *values, double *positions, double *turns);
+
+/* The way back. A joint with children in several directions turns as they do together (least squares, lengths of the
+ * reference), one with children in one direction by the smallest turn beside its parent's, one without children not at all.
+ * Joints that lie on their parent in the reference pose pass on to it what their own children say. */
+typedef struct vg_joint_fitter vg_joint_fitter;
+int vg_joint_fitter_new(vg_joint_fitter **f, const vg_skeleton *s, vg_err *e) VG_MUST_CHECK; /* s borrowed until free */
+void vg_joint_fitter_free(vg_joint_fitter **f);
+/* vg_joint_fitter_fit: positions (njoints points) in, values out, angles as near as can be to those of the call before.
+ * Returns the largest distance of a joint from where the values put it, and that joint: bones keep their lengths
+ * unless the joint has position channels, and a joint with fewer than three rotations cannot turn every way. */
+double vg_joint_fitter_fit(vg_joint_fitter *f, const double *positions, double *values, size_t *joint);
 
 /* Which faces of a source mesh drive each face of a target mesh (MATH 9). */
 typedef struct vg_correspondence {
@@ -240,17 +259,20 @@ typedef struct vg_frame {
     double time; /* seconds */
     double root[3];  /* vectors, deformations: mean of the vertices that are in the vector graph */
     double *anchors; /* vectors, deformations: head.nanchors points */
+    size_t npins;    /* vectors: vertices (ascending) that stay where the reference has them, in this frame; set by vg_frame_pin */
+    uint32_t *pins;
     double *values;  /* head.count * vg_kind_width(head.kind) */
     vg_records extra; /* unknown records that came before this frame */
     /* private to the reader and to vg_frame_*: */
     vg_bytes raw;
-    size_t name_cap, anchors_cap, values_cap;
+    size_t name_cap, anchors_cap, pins_cap, values_cap;
     double *values_own;
 } vg_frame;
 
 void vg_frame_clear(vg_frame *f);
 /* vg_frame_shape: make room for the values and anchors of a frame of h; contents undefined. */
 int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+int vg_frame_pin(vg_frame *f, const uint32_t *vertices, size_t n, vg_err *e) VG_MUST_CHECK;
 int vg_frame_rename(vg_frame *f, const char *name, vg_err *e) VG_MUST_CHECK;
 /* vg_frame_label: take over name, time and unknown records of `from`, but no numbers; `from` loses its records. */
 int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e) VG_MUST_CHECK;
@@ -327,6 +349,29 @@ void vg_deformer_transfer(vg_deformer *d, size_t n, vg_kind kind, const double *
 void vg_deformer_apply(vg_deformer *d, size_t n, const double *const *quaternions, double *const *vectors);
 vg_deform_counts vg_deformer_counts(const vg_deformer *d);
 
+/* Transfer between meshes of different connectivity (MATH 9): each face of the target takes the deformation gradient of the source
+ * faces that drive it, and by pose its rotation (polar) with the stretch that the gradient gives the direction of each vector. Faces
+ * without a match of their own turn rigidly. Links follow the faces at their ends. */
+typedef struct vg_carrier vg_carrier;
+/* vg_carrier_new: source: the whole source mesh and its reference pose; c: fits both meshes (checked: VG_EINPUT); target: the graph of
+ * the target (all faces, then links) and its reference. All are borrowed until free. */
+int vg_carrier_new(vg_carrier **c, const vg_mesh *source, const double *source_reference, const vg_correspondence *pairs,
+                   const vg_graph *target, const double *target_reference, vg_method method, int threads,
+                   vg_err *e) VG_MUST_CHECK;
+void vg_carrier_free(vg_carrier **c);
+/* vg_carrier_transfer: n poses of the source (vertices) in, n times the target's wanted vectors out. */
+void vg_carrier_transfer(vg_carrier *c, size_t n, const double *const *poses, double *const *vectors);
+vg_deform_counts vg_carrier_counts(const vg_carrier *c); /* corners: source faces without a direction, over all poses */
+
+/* Shape deformation (T 4.1 to 4.6): what takes each source vector to the target's in the reference poses, applied to the vectors of
+ * each pose and put at the source face's centroid; corners that share a vertex are averaged. No linear system; fails for
+ * large deformations. Gives vertices: the mean of the attached ones is the source's. */
+typedef struct vg_shaper vg_shaper;
+int vg_shaper_new(vg_shaper **s, const vg_graph *g, const double *source_reference, const double *target_reference, int threads,
+                  vg_err *e) VG_MUST_CHECK;
+void vg_shaper_free(vg_shaper **s);
+void vg_shaper_transfer(vg_shaper *s, size_t n, const double *const *poses, double *const *vertices);
+
 /* Reconstruction: min over V of the squared difference between the vectors of V and the given ones (MATH 2; T 3.7-3.9),
  * by one sparse Cholesky factorisation, many poses per solve. */
 typedef struct vg_solver vg_solver;
@@ -353,6 +398,40 @@ void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *c
                      const double *const *roots);
 size_t vg_solver_batch(const vg_solver *s);
 vg_solver_facts vg_solver_get_facts(const vg_solver *s);
+
+/* Planarity (MATH 5; T 4.2.3): poses that minimise `fidelity` times the energy of the reconstruction plus `planarity` times the sum
+ * over corners of faces of four and more of (m_f . t_c)^2, t_c the corner's vector, m_f the unit mean of the cross products of
+ * successive given vectors of the face (no such term where that is 0). By conjugate gradients from the plain solution. */
+typedef struct vg_planar vg_planar;
+typedef struct vg_planar_facts {
+    size_t faces;          /* of four and more corners */
+    size_t most_steps;     /* of one pose so far */
+    double worst_residual; /* left at the end, relative to that of the plain solution; NaN if numbers overflowed */
+} vg_planar_facts;
+
+/* vg_planar_new: s borrowed until free. VG_EARG unless fidelity > 0 and planarity >= 0. */
+int vg_planar_new(vg_planar **p, const vg_solver *s, double fidelity, double planarity, vg_err *e) VG_MUST_CHECK;
+void vg_planar_free(vg_planar **p);
+size_t vg_planar_faces(const vg_planar *p);
+/* vg_planar_load: of one pose's given vectors what is needed later: the m_f, 3 numbers for each of vg_planar_faces. */
+void vg_planar_load(const vg_planar *p, const double *vectors, double *normals);
+/* vg_planar_solve: n poses x from vg_solver_solve, with their normals, become more nearly planar in place; anchors stay, or
+ * the root does, and vertices in no face. Returns the number of the first pose that did not converge; n when all did. */
+size_t vg_planar_solve(vg_planar *p, size_t n, const double *const *normals, double *const *x);
+vg_planar_facts vg_planar_get_facts(const vg_planar *p);
+
+/* Guidance in time (MATH 5; T 4.10, 4.16): a sequence keeps its second differences in time and meets given poses at keys. Between
+ * two keys a < b the pose U_k becomes U_k + ((b - k) e_a + (k - a) e_b) / (b - a), e = given - U; before the first key and
+ * after the last that key's own e is added. */
+typedef struct vg_guide vg_guide;
+int vg_guide_new(vg_guide **g, size_t nv, vg_err *e) VG_MUST_CHECK;
+void vg_guide_free(vg_guide **g);
+/* vg_guide_key: frame number `frame`, later than the key before, has this pose (nv points), which becomes the given one to
+ * the bit. Poses between both keys are to be applied before the next key is named. */
+void vg_guide_key(vg_guide *g, uint64_t frame, double *pose, const double *given);
+/* vg_guide_apply: the pose of frame number `frame` in place: one between the last two keys, or behind the last, or, when only
+ * one key was named, any. Without keys it stays. */
+void vg_guide_apply(const vg_guide *g, uint64_t frame, double *pose);
 
 /* Measures of two sequences of one connectivity (MATH 8), accumulated pose by pose in bounded memory. */
 typedef struct vg_measures vg_measures;
@@ -390,6 +469,74 @@ void vg_digest_free(vg_digest **d);
 void vg_digest_add(vg_digest *d, const vg_frame *f);
 uint64_t vg_digest_get(const vg_digest *d); /* of all that was added so far */
 
+/* -------------------------------------------------------------------------------------------- registration -- */
+
+/* A pair of vertices that belong together. */
+typedef struct vg_marker {
+    uint32_t source, target;
+    char *name;  /* NULL: it has none */
+    size_t line; /* of the file, from 1; 0: of no file */
+} vg_marker;
+
+typedef struct vg_markers {
+    size_t n;
+    vg_marker *at;
+} vg_markers;
+
+void vg_markers_clear(vg_markers *m);
+/* vg_markers_read: text with a pair per line, "SOURCE TARGET" or "NAME SOURCE TARGET"; '#' starts a comment. `base` is the number of
+ * the first vertex, 0 or 1. name: what messages call the file. */
+int vg_markers_read(vg_markers *m, const void *data, size_t n, int base, const char *name, vg_err *e) VG_MUST_CHECK;
+
+/* A point of one mesh (weighted mean of three of its vertices, which may be one thrice) for a vertex of another. */
+typedef struct vg_seed {
+    uint32_t vertex, on[3];
+    double weight[3];
+} vg_seed;
+
+/* vg_seeds_read: a dense correspondence as text: "VERTEX A B C WA WB WC" per line, '-' for a vertex that has none. *n seeds, free(). */
+int vg_seeds_read(vg_seed **seeds, size_t *n, const void *data, size_t bytes, int base, const char *name, vg_err *e) VG_MUST_CHECK;
+
+/* What is known about which point belongs to which. */
+typedef struct vg_register_input {
+    const vg_mesh *source, *target;
+    const double *source_points, *target_points;
+    const vg_markers *markers;  /* may be NULL */
+    const vg_seed *seeds;       /* may be NULL */
+    size_t nseeds;
+    bool seeds_of_source;       /* seeds are vertices of the source on the target; else vertices of the target on the source */
+    const vg_attributes *source_uv, *target_uv; /* both, or NULL: points of the same texture coordinates belong together */
+    bool aligned;               /* the two lie on one another as they are */
+    bool keep_all;              /* markers that contradict the others are not left out */
+    int threads;
+} vg_register_input;
+
+/* One round of the fit. */
+typedef struct vg_register_step {
+    size_t round, rounds;
+    size_t near;      /* source vertices that the target pulls */
+    double stiffness; /* weight of smoothness, that of the target being 1 */
+    double mean, largest; /* distance of these vertices from the target, in D */
+} vg_register_step;
+
+typedef struct vg_register_result {
+    vg_correspondence pairs;
+    double *fitted;          /* source nv points: the source on the target, in the target's place and size */
+    double scale, rotation[9], shift[3]; /* the similarity that brings the source onto the target as a whole */
+    bool flipped;            /* the faces of one mesh turn the other way round */
+    double *residual;        /* per marker: how far it is from where its neighbours expect it, in D of the target */
+    bool *left_out;          /* per marker */
+    double typical_residual; /* the median */
+    size_t uv_pairs;         /* points paired by texture coordinates */
+} vg_register_result;
+
+void vg_register_result_clear(vg_register_result *r);
+
+/* vg_register: pair the faces of two meshes (MATH 9; after Sumner and Popovic 2004, section 5). step (may be NULL) is told of each round
+ * of the fit. VG_EINPUT when the pairs given do not say how the meshes lie (three that are not in line are needed). */
+int vg_register(vg_register_result *r, const vg_register_input *in, void (*step)(void *context, const vg_register_step *step),
+                void *context, vg_err *e) VG_MUST_CHECK;
+
 /* -------------------------------------------------------------------------------------------------- io -- */
 
 /* The stream (fmt/STREAM.md). A reader takes it from a descriptor or from memory and checks every byte. */
@@ -414,13 +561,19 @@ int vg_writer_end(vg_writer *w, const vg_records *tail, vg_err *e) VG_MUST_CHECK
 void vg_writer_abandon(vg_writer *w, const char *program, int exit_status, const char *message);
 void vg_writer_close(vg_writer **w);
 
-/* The door in. Operands are streams, mesh files, archives of mesh files, directories, or "-" (standard input: a stream,
- * mesh text or an archive); what each one is, is told by its content, for OBJ by its name or content. Directories and archives give their mesh
+/* The door in. Operands are streams, mesh files, files that hold a whole sequence (point caches, arrays, ...), archives of
+ * mesh files, directories, or "-" (standard input: any of them); what each one is, is told by its content, for OBJ by its name or content. Directories and archives give their mesh
  * files in natural order ("pose2" before "pose10"); other files in them are passed over. One operand that is a stream
  * gives that stream as it is. More operands are joined into one sequence of vertices of one mesh. The first pose is the
- * reference unless a stream brings its own. */
+ * reference unless a stream or a sequence brings its own. */
 typedef struct vg_source vg_source;
 int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err *e) VG_MUST_CHECK;
+/* vg_source_open_with: `mesh` (may be NULL) is an operand whose faces and reference pose are those of operands that hold
+ * none of their own (point caches, arrays); without it they are those of the operand before, or of the file of the same name
+ * that ends in .obj or .ply. */
+int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const char *mesh, vg_err *e) VG_MUST_CHECK;
+/* vg_source_warning: what was left out of the mesh, one line; NULL: nothing. Borrowed until close. */
+const char *vg_source_warning(const vg_source *s);
 vg_head *vg_source_head(vg_source *s);
 int vg_source_next(vg_source *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
 vg_records *vg_source_tail(vg_source *s);
@@ -430,20 +583,40 @@ void vg_source_close(vg_source **s);
  * file its only pose; for a stream its reference; for an archive or directory the first pose). The rest is not read. */
 int vg_load_mesh(vg_head *h, const char *operand, vg_err *e) VG_MUST_CHECK;
 
-/* The door out for mesh files: one file, a '%04d' pattern, a directory ("out/"), or an archive, told by the name and
- * checked at once; "NAME:ply" chooses what is inside an archive or directory, `format` (may be NULL) overrides. Everything is written under
- * temporary names and takes its final name in vg_sink_end. */
+/* Frames that wait, first in, first out: in memory up to a limit, then in a file without a name in $TMPDIR (or /tmp). */
+typedef struct vg_spool vg_spool;
+typedef struct vg_spool_facts {
+    uint64_t most_frames; /* that have waited at once */
+    uint64_t file_bytes;  /* the largest size of the file; 0: there was none */
+} vg_spool_facts;
+
+/* vg_spool_new: h says what a frame holds; borrowed until free. limit: bytes of frames in memory. */
+int vg_spool_new(vg_spool **s, const vg_head *h, size_t limit, vg_err *e) VG_MUST_CHECK;
+void vg_spool_free(vg_spool **s);
+/* vg_spool_put: keep a copy of f, all of it. vg_spool_next: 1 and the frame that has waited longest; 0 when none waits. */
+int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
+int vg_spool_next(vg_spool *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
+vg_spool_facts vg_spool_get_facts(const vg_spool *s);
+
+/* The door out: one mesh file, a '%04d' pattern, a directory ("out/"), an archive, or one file that holds the whole sequence, told by
+ * the name and checked at once; "NAME:ply" chooses what is inside an archive or directory, `format` (may be NULL) overrides.
+ * Everything is written under temporary names and takes its final name in vg_sink_end. */
 typedef struct vg_sink vg_sink;
 typedef struct vg_sink_options {
-    const char *format;  /* obj, ply, ply-ascii, ply-be, off; NULL: told by the name */
+    const char *format;  /* "obj", "pc2", ...; NULL: told by the name */
     bool full_precision; /* numbers read back to the same binary64, not binary32 */
     long first_number;   /* what %d starts at; 0 */
+    const char *mesh;    /* where the mesh of a file without faces goes; NULL: beside it, NAME.obj, which must not be another mesh */
+    bool no_mesh;        /* nowhere */
+    bool drop_loose;     /* leave out the vertices that are in no face */
 } vg_sink_options;
 /* vg_sink_check: is this a name and format that can be written? To be called before any work. */
 int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;
 int vg_sink_open(vg_sink **s, const char *output, const vg_head *h, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;
-int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK; /* a frame of vertices */
+int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK; /* a frame of vertices; arrays take any kind */
 int vg_sink_end(vg_sink *s, vg_err *e) VG_MUST_CHECK;
+/* vg_sink_warning: line number i of what the output does not keep, after vg_sink_end; NULL: no more. Borrowed until close. */
+const char *vg_sink_warning(const vg_sink *s, size_t i);
 void vg_sink_close(vg_sink **s); /* without _end: nothing is left behind */
 
 /* A mesh file in memory, read or written as a whole. */
@@ -451,6 +624,7 @@ typedef struct vg_model {
     vg_mesh mesh;
     double *vertices;
     vg_attributes attributes;
+    size_t degenerate; /* triangles left out on reading: two corners were at one place (STL, whose corners have no numbers) */
 } vg_model;
 
 void vg_model_clear(vg_model *m);

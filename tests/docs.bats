@@ -180,11 +180,14 @@ for name, value, shown in rows:
     for function in (make_corpus.xxh64, read_stream.xxh64):
         assert function(data) == int(value, 16)
     assert bytes.fromhex(shown) == int(value, 16).to_bytes(8, "little")
+words, value = re.search(r"the ten words ([0-9 ]*), and the digest is `([0-9A-F]{16})`", text).groups()
+assert make_corpus.digest(make_corpus.content()["mesh"]) == int(value, 16)
+assert make_corpus.xxh64(make_corpus.u64(*map(int, words.split()))) == int(value, 16)
 END
 }
 
 @test "vg-stream.ksy names every record" {
-    for tag in PROV MESH TEXC LABL SELE LINK ANCH REFP FORM FRAM FAIL 'END '; do
+    for tag in PROV MESH TEXC LABL SELE LINK ANCH REFP SKEL CORR FORM FRAM FAIL 'END '; do
         for file in fmt/vg-stream.ksy fmt/STREAM.md man/vg-stream.5; do
             grep -q -e "\"$tag\"" -e "\`$tag\`" -e "^\.It ${tag% }\$" "$ROOT/$file" || fail "$file does not have $tag"
         done

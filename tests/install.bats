@@ -38,11 +38,11 @@ int main(int argc, char **argv)
     int n = 0, more, fd = argc == 2 ? open(argv[1], O_RDONLY) : -1;
     if (vg_reader_open(&r, fd, argv[1], &e) < 0) return fprintf(stderr, "%s\n", e.message), vg_exit_status(e.code);
     while ((more = vg_reader_next(r, &f, &e)) > 0) printf("%d %s %.17g\n", n++, f.name, f.values[0]);
-    if (more < 0) return fprintf(stderr, "%s\n", e.message), vg_exit_status(e.code);
-    printf("%d frames of %zu %s\n", n, vg_reader_head(r)->count, vg_kind_name(vg_reader_head(r)->kind));
+    if (more < 0) fprintf(stderr, "%s\n", e.message);
+    else printf("%d frames of %zu %s\n", n, vg_reader_head(r)->count, vg_kind_name(vg_reader_head(r)->kind));
     vg_frame_clear(&f);
     vg_reader_close(&r);
-    return 0;
+    return more < 0 ? vg_exit_status(e.code) : 0;
 }
 END
     sanitize=

@@ -167,9 +167,12 @@ def correspondence(c):
 
 def frame(c, f):
     name = f["name"].encode()
-    head = pad(u32(len(name), f["time"] is not None) + f64(f["time"] or 0) + name)
+    flags = (f["time"] is not None) + 2 * (f["pins"] is not None)
+    head = pad(u32(len(name), flags) + f64(f["time"] or 0) + name)
     if f["root"] is not None:
         head += f64(*f["root"], *flat(f["anchors"]))
+    if f["pins"] is not None:
+        head += pad(u32(len(f["pins"]), 0, *f["pins"]))
     values = flat(f["values"])
     code = "d" if c["precision"] == 8 else "f"
     return Record("FRAM", head + struct.pack(f"<{len(values)}{code}", *values), CRITICAL)
@@ -236,8 +239,16 @@ def content(**changes):
     return c
 
 
-def pose(name, values, time=None, root=None, anchors=None, extra=()):
-    return {"name": name, "time": time, "root": root, "anchors": anchors, "values": values, "extra": list(extra)}
+def pose(name, values, time=None, root=None, anchors=None, pins=None, extra=()):
+    return {"name": name, "time": time, "root": root, "anchors": anchors, "pins": pins, "values": values,
+            "extra": list(extra)}
+
+
+def pinned(*pins):
+    """Vectors in two frames, the first with these pins."""
+    c = graph_content("vectors")
+    free = c["frames"][0]
+    return dict(c, frames=[dict(free, name="pinned", pins=list(pins)), dict(free, name="free")])
 
 
 def mixed(**changes):
@@ -290,10 +301,11 @@ def driven(by, distance=0.0, matched=True):
 
 
 def register_content(**changes):
-    """What vg-register writes: source mesh and reference, one frame of it fitted to the target (here: three faces)."""
+    """Like what vg-register writes: source mesh and reference, one frame of it fitted to the target (three faces)."""
     c = content(frames=[pose("fitted", BENT[:4])])
     target = {"vertices": 5, "faces": [[0, 1, 2], [0, 2, 3], [0, 3, 4]]}
-    ends = [{"vertices": m["vertices"], "faces": len(m["faces"]), "digest": f"{digest(m):016x}"} for m in (c["mesh"], target)]
+    ends = [{"vertices": m["vertices"], "faces": len(m["faces"]), "digest": f"{digest(m):016x}"}
+            for m in (c["mesh"], target)]
     faces = [driven([[0, 1.0]], 0.25), driven([[1, 0.75], [0, 0.25]]), driven([[1, 1.0]], 2.5, False)]
     return dict(c, correspondence={"source": ends[0], "target": ends[1], "faces": faces}, **changes)
 
@@ -333,6 +345,7 @@ def golden():
             "vectors of the selected faces 0 and 2 only, binary32; the triangle carries none",
             dict(mixed(selection=[0, 2], links=[[1, 4]], precision=4), kind="vectors", count=8,
                  frames=[pose("bent", vectors + corner_vectors([[1, 4]], BENT), root=used, anchors=[])])),
+        "pins": ("vectors with three vertices pinned in the first frame and none in the second", pinned(1, 2, 4)),
         "deformations": ("a quaternion w x y z per corner, squared length = scale", graph_content("deformations")),
         "transforms": (
             "two transforms a frame, no mesh at all",
@@ -356,6 +369,7 @@ def accept():
     order = ["MESH", "REFP", "ANCH", "LABL", "LINK", "PROV", "SELE", "FORM", "FRAM"]
     names = ["", "", "dup", "dup", "\u00e4\u4e2d\U0001f40e", "x" * 300, "a/b", "%n %s"]
     points = {"vertices": 3, "faces": []}
+    nobody = {"vertices": 0, "faces": 0, "digest": "0"}
     ignored = records_of(content())
     for r in ignored:
         r.flags |= 0xFFFF0000
@@ -374,13 +388,13 @@ def accept():
                                               frames=[pose("t", [[1, 0, 0, 0, 1, 2, 3]])])),
         "line-segments-only": whole(content(mesh={"vertices": 4, "faces": [[0, 1], [1, 2], [3, 1]]})),
         "ignored-flags": whole(content(), ignored),
-        "skeleton-of-nothing": whole(content(mesh={"vertices": 0, "faces": []}, reference={"name": "", "positions": []},
-                                             count=0, frames=[], skeleton=[])),
+        "pins-even": whole(pinned(0, 5)),
+        "pins-with-selection": whole(dict(pinned(3), selection=[0], links=[[1, 4], [4, 5]])),
+        "skeleton-of-nothing": whole(content(mesh={"vertices": 0, "faces": []}, count=0, frames=[], skeleton=[],
+                                             reference={"name": "", "positions": []})),
         "correspondence-without-mesh": whole(content(mesh=None, reference=None, kind="transforms", count=0, frames=[],
                                                      correspondence=register_content()["correspondence"])),
-        "correspondence-of-nothing": whole(content(correspondence={
-            "source": {"vertices": 0, "faces": 0, "digest": "0"}, "target": {"vertices": 0, "faces": 0, "digest": "0"},
-            "faces": []})),
+        "correspondence-of-nothing": whole(content(correspondence={"source": nobody, "target": nobody, "faces": []})),
         "extreme-numbers": whole(content(frames=[pose("x", [
             [1.7976931348623157e308, -1.7976931348623157e308, 5e-324], [-0.0, 0.0, 2.2250738585072014e-308],
             [1, 2, 3], [4, 5, 6]], time=-1e300)])),
@@ -620,8 +634,8 @@ def joint(parent=None, channels=(), offset=(0, 0, 0), name="j"):
 def reject_attachments():
     """Skeletons and correspondences with content that does not hold."""
     s, r = skeleton_content(), register_content()
-    # payload of CORR: 7 numbers of 8 bytes, first[4] from 56, source[4] from 72, weight[4] from 88, distance[3] from 120,
-    # matched[3] from 144, padding[5]
+    # payload of CORR: 7 numbers of 8 bytes, first[4] from byte 56, source[4] from 72, weight[4] from 88, distance[3]
+    # from 120, matched[3] from 144, padding[5]
 
     def skeleton_of(*joints):
         return whole(dict(s, skeleton=list(joints)))
@@ -676,12 +690,23 @@ def reject_frames():
     records = records_of(second)
     records[-1].payload = records[-1].payload[:-8] + f64(INF)
     swapped = copy.deepcopy(c)
+    p = pinned(1, 2, 4)  # payload: 24 bytes head and name, 24 root, 48 anchors, pins from byte 96
     return {
         "fram-before-form": whole(c, [records_of(swapped)[i] for i in (0, 1, 3, 2)]),
         "fram-short": lie(c, "FRAM", payload=lambda r: r.payload[:-8]),
         "fram-long": lie(c, "FRAM", payload=lambda r: r.payload + bytes(8)),
         "fram-empty": lie(c, "FRAM", payload=b""),
-        "fram-flags": patched(c, "FRAM", 4, u32(2)),
+        "fram-flags-4": patched(c, "FRAM", 4, u32(4)),
+        "fram-pins-of-vertices": patched(c, "FRAM", 4, u32(2)),
+        "fram-pins-of-deformations": whole(dict(q, frames=[dict(q["frames"][0], pins=[0])])),
+        "fram-pins-none": whole(pinned()),
+        "fram-pins-twice": whole(pinned(2, 2)),
+        "fram-pins-order": whole(pinned(4, 1)),
+        "fram-pins-out-of-range": whole(pinned(1, 6)),
+        "fram-pins-reserved": patched(p, "FRAM", 100, u32(1)),
+        "fram-pins-padding": patched(p, "FRAM", 116, u32(1)),
+        "fram-pins-2-32-less-1": patched(p, "FRAM", 96, u32(0xFFFFFFFF)),
+        "fram-pins-missing": patched(v, "FRAM", 4, u32(3)),
         "fram-name-2-32-less-1": patched(c, "FRAM", 0, u32(0xFFFFFFFF)),
         "fram-name-utf8": patched(c, "FRAM", 16, b"\xc0\x80"),
         "fram-name-nul": patched(c, "FRAM", 17, b"\0"),

@@ -58,4 +58,10 @@ enum { VGI_LANES = 8 };
 typedef double vgi_lanes __attribute__((vector_size(64)));
 typedef int64_t vgi_mask __attribute__((vector_size(64))); /* what comparing lanes gives: -1 or 0 */
 
+/* vgi_gather: number i of eight arrays. */
+static inline __attribute__((always_inline)) vgi_lanes vgi_gather(const double *const *p, size_t i)
+{
+    return (vgi_lanes){p[0][i], p[1][i], p[2][i], p[3][i], p[4][i], p[5][i], p[6][i], p[7][i]};
+}
+
 #endif

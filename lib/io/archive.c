@@ -45,7 +45,7 @@ static void leave_utf8(locale_t before)
 
 /* ---- files without a name ---- */
 
-static int open_nameless(vg_err *e)
+int vgi_nameless_file(vg_err *e)
 {
     const char *dir = getenv("TMPDIR");
     if (!dir || !*dir) dir = "/tmp";
@@ -64,7 +64,7 @@ int vgi_spool(vgi_input *in, uint64_t limit, int *out, vg_err *e)
 {
     unsigned char *block = vgi_array_raw(BLOCK, 1, e);
     if (!block) return VG_ENOMEM;
-    int fd = open_nameless(e), r = fd < 0 ? fd : VG_OK;
+    int fd = vgi_nameless_file(e), r = fd < 0 ? fd : VG_OK;
     uint64_t total = 0;
     while (r == VG_OK) {
         size_t got = 0;
@@ -399,7 +399,7 @@ static int take_path(vgi_archive *a, struct archive_entry *entry, vg_err *e)
 /* As in directories, hidden files are none of ours: archives made on a Mac have "._pose1.obj" beside "pose1.obj". */
 static bool is_mesh_name(const char *path)
 {
-    return *vgi_base_name(path) != '.' && vgi_format_by_suffix(path);
+    return *vgi_base_name(path) != '.' && (vgi_format_by_suffix(path) || vgi_packable(path));
 }
 
 /* 1: a mesh file, whose contents can be read; 0: something else. */
@@ -622,7 +622,7 @@ static int unpack_all(vgi_archive *a, vg_err *e)
 {
     vg_bytes data = {0};
     int64_t off = 0;
-    int r = a->spool = open_nameless(e);
+    int r = a->spool = vgi_nameless_file(e);
     if (r >= 0) r = walk_open(a, e);
     for (size_t i = 0; r == VG_OK && i < a->n; i++) {
         r = read_listed(a, i, &data, e);

@@ -1,14 +1,15 @@
 /* format.c: the table of mesh formats, and reading and writing one mesh file in memory.
- * Leaves out the formats themselves (obj.c, ply.c, off.c) and where the bytes come from and go to.
+ * Leaves out the formats themselves (obj.c, ply.c, off.c, stl.c) and where the bytes come from and go to.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
 #include <math.h>
 
-/* By content the first that says yes is taken, so those with a signature come before OBJ, which has none. By suffix,
+/* By content the first that says yes is taken, so those with a signature come before STL and OBJ, which have none. By suffix,
  * the first with that suffix. */
 static const vgi_format *const formats[] = {&vgi_format_ply, &vgi_format_ply_ascii, &vgi_format_ply_be,
-                                            &vgi_format_off, &vgi_format_obj};
+                                            &vgi_format_off, &vgi_format_stl,
+                                            &vgi_format_stl_ascii, &vgi_format_obj};
 enum { FORMATS = sizeof formats / sizeof *formats };
 
 const vgi_format *vgi_format_by_name(const char *name, size_t n)
@@ -35,7 +36,7 @@ const vgi_format *vgi_format_by_content(const unsigned char *data, size_t n)
 
 const char *vgi_format_names(void)
 {
-    return "obj, ply, ply-ascii, ply-be, off";
+    return "obj, ply, ply-ascii, ply-be, off, stl, stl-ascii";
 }
 
 static int unknown_format(const char *format, vg_err *e)
@@ -50,7 +51,7 @@ int vgi_model_read(vg_model *m, const void *data, size_t n, const vgi_format *fo
     if (n == 0) return vg_fail(e, VG_ETRUNC, "%s is empty", subject);
     if (!format) format = vgi_format_by_content(data, n);
     if (!format) format = vgi_format_by_suffix(file_name);
-    if (!format) return vg_fail(e, VG_EINPUT, "%s is no mesh file (read: OBJ, PLY, OFF)", subject);
+    if (!format) return vg_fail(e, VG_EINPUT, "%s is no mesh file (read: OBJ, PLY, OFF, STL)", subject);
     int result = format->read(m, data, n, subject, e);
     if (result == VG_OK) result = vg_mesh_check(&m->mesh, subject, e);
     if (result < 0) vg_model_clear(m);

@@ -44,7 +44,19 @@ size_t vgi_print_float(char *to, double x);
 size_t vgi_print_double(char *to, double x);
 size_t vgi_print_uint(char *to, uint64_t x); /* at most 20 bytes */
 
-/* ---- format.c: the table of mesh formats; obj.c ply.c off.c: one each ---- */
+/* ---- format.c: the table of mesh formats; obj.c ply.c off.c stl.c: one each ---- */
+
+enum { /* what a format keeps of a sequence beside its numbers; of what it does not, the program warns */
+    VGI_KEEPS_FACES = 1,    /* which are split into triangles without VGI_KEEPS_POLYGONS */
+    VGI_KEEPS_POLYGONS = 2,
+    VGI_KEEPS_ORDER = 4,    /* vertices keep their numbers, those in no face too */
+    VGI_KEEPS_TEXTURE = 8,
+    VGI_KEEPS_LABELS = 16,
+    VGI_KEEPS_NAMES = 32,   /* of frames */
+    VGI_KEEPS_TIMES = 64,   /* of frames, any; a format that keeps only some says so in warning() */
+    VGI_KEEPS_SKELETON = 128,
+    VGI_KEEPS_DOUBLES = 256 /* when full precision is asked for, which is refused otherwise */
+};
 
 typedef struct vgi_writing {
     const vg_mesh *mesh;
@@ -62,13 +74,15 @@ typedef struct vgi_format {
      * with vg_mesh_check; NaN and Inf are refused here. */
     int (*read)(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e);
     int (*write)(vg_bytes *out, const vgi_writing *w, vg_err *e);
+    unsigned keeps; /* VGI_KEEPS_... */
 } vgi_format;
 
-extern const vgi_format vgi_format_obj, vgi_format_ply, vgi_format_ply_ascii, vgi_format_ply_be, vgi_format_off;
+extern const vgi_format vgi_format_obj, vgi_format_ply, vgi_format_ply_ascii, vgi_format_ply_be, vgi_format_off,
+    vgi_format_stl, vgi_format_stl_ascii;
 const vgi_format *vgi_format_by_name(const char *name, size_t n);     /* NULL: none */
 const vgi_format *vgi_format_by_suffix(const char *file_name);        /* case does not matter; NULL: none */
 const vgi_format *vgi_format_by_content(const unsigned char *data, size_t n);
-const char *vgi_format_names(void); /* "obj, ply, ply-ascii, ply-be, off" for messages */
+const char *vgi_format_names(void); /* "obj, ply, ..." for messages */
 /* vgi_model_read: vg_model_read for a file that messages call `subject` (quotes included). format NULL: told by content, then
  * by file_name. */
 int vgi_model_read(vg_model *m, const void *data, size_t n, const vgi_format *format, const char *file_name,
@@ -87,21 +101,13 @@ typedef struct vgi_output {
 int vgi_output_put(vgi_output *o, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
 int vgi_output_patch(vgi_output *o, uint64_t off, const void *data, size_t n, vg_err *e) VG_MUST_CHECK; /* of what was put */
 int vgi_output_flush(vgi_output *o, vg_err *e) VG_MUST_CHECK;
+int vgi_output_copy(vgi_output *o, int fd, uint64_t n, vg_err *e) VG_MUST_CHECK; /* the first n bytes of a regular file */
 void vgi_output_clear(vgi_output *o);
-
-enum { /* what a format keeps of a sequence beside its numbers; of what it does not, the program warns */
-    VGI_KEEPS_FACES = 1,    /* which are split into triangles without VGI_KEEPS_POLYGONS */
-    VGI_KEEPS_POLYGONS = 2,
-    VGI_KEEPS_ORDER = 4,    /* vertices keep their numbers, those in no face too */
-    VGI_KEEPS_TEXTURE = 8,
-    VGI_KEEPS_LABELS = 16,
-    VGI_KEEPS_NAMES = 32,   /* of frames */
-    VGI_KEEPS_TIMES = 64    /* of frames, any; a format that keeps only some says so in warning() */
-};
 
 typedef struct vgi_sequence_format {
     const char *name, *suffix;
     unsigned keeps;
+    bool bare; /* a file without faces is read all the same, as points */
     bool (*sniff)(const unsigned char *data, size_t n); /* the first 4096 bytes or all; NULL: nothing tells it but its name */
 
     /* Reading. Whatever the file says, memory grows only as bytes arrive: open has the first frame at hand before it gives a
@@ -110,9 +116,10 @@ typedef struct vgi_sequence_format {
      * The caller checks the mesh. in is borrowed until close; subject is how messages call the file, quotes included,
      * borrowed too. next: 1 and values of a frame that has been shaped, its time, and its name if the format keeps names (else
      * it is called after the file); 0 when the file is read to its end, nothing behind it. close takes what open made, also
-     * when open failed. */
+     * when open failed, and NULL. */
     int (*open)(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e); /* NULL: only written */
     int (*next)(void *state, vg_frame *f, vg_err *e);
+    uint64_t (*frames)(const void *state); /* how many the file announces; a single one is called like the file. NULL: unknown */
     void (*close)(void *state);
 
     /* Writing. kinds: which kinds of frames, 1 << VG_VERTICES and so on. h, o and out are borrowed until release. check (may
@@ -127,10 +134,13 @@ typedef struct vgi_sequence_format {
     void (*release)(void *state);
 } vgi_sequence_format;
 
-extern const vgi_sequence_format vgi_sequence_pc2, vgi_sequence_mdd, vgi_sequence_npy, vgi_sequence_npz, vgi_sequence_usda;
+extern const vgi_sequence_format vgi_sequence_pc2, vgi_sequence_mdd, vgi_sequence_npy, vgi_sequence_npz, vgi_sequence_usda,
+    vgi_sequence_bvh;
 const vgi_sequence_format *vgi_sequence_by_name(const char *name, size_t n);   /* NULL: none */
 const vgi_sequence_format *vgi_sequence_by_suffix(const char *file_name);      /* case does not matter; NULL: none */
 const vgi_sequence_format *vgi_sequence_by_content(const unsigned char *data, size_t n);
+/* vgi_packable: the sequence format, or NULL, of a file that can stand for poses in a directory or archive: it brings its faces. */
+const vgi_sequence_format *vgi_packable(const char *file_name);
 const char *vgi_sequence_names(void); /* "pc2, mdd, ..." for messages, those that are written */
 
 /* ---- names.c: lists of names and their order; names of poses ---- */
@@ -170,6 +180,8 @@ int vgi_archive_open(vgi_archive **a, int fd, int64_t base, const char *name, co
 /* vgi_archive_next: 1, path (borrowed until the next call) and contents of the next file; 0 behind the last one. */
 int vgi_archive_next(vgi_archive *a, const char **path, vg_bytes *data, vg_err *e) VG_MUST_CHECK;
 void vgi_archive_close(vgi_archive **a);
+/* vgi_nameless_file: a new file without a name in $TMPDIR (or /tmp), for reading and writing; its descriptor. */
+int vgi_nameless_file(vg_err *e) VG_MUST_CHECK;
 /* vgi_spool: copy what is left of an input that can be read only once into a file without a name. */
 int vgi_spool(vgi_input *in, uint64_t limit, int *fd, vg_err *e) VG_MUST_CHECK;
 

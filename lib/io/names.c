@@ -116,7 +116,9 @@ char *vgi_pose_name(const char *path, vg_err *e)
     char *name = vgi_copy_string(base, vgi_packed_stem(base), e);
     if (!name) return NULL;
     const vgi_format *format = vgi_format_by_suffix(name);
+    const vgi_sequence_format *sequence = format ? NULL : vgi_sequence_by_suffix(name);
     if (format) name[strlen(name) - strlen(format->suffix)] = 0;
+    if (sequence) name[strlen(name) - strlen(sequence->suffix)] = 0;
     if (vgi_is_utf8(name, strlen(name))) return name;
     char *utf8 = from_latin1(name, strlen(name), e);
     free(name);

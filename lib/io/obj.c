@@ -672,4 +672,6 @@ static int write_obj(vg_bytes *out, const vgi_writing *w, vg_err *e)
     return result == VG_OK ? write_labels(out, a, SIZE_MAX, &next_label, e) : result;
 }
 
-const vgi_format vgi_format_obj = {"obj", ".obj", sniff_obj, read_obj, write_obj};
+const vgi_format vgi_format_obj = {"obj", ".obj", sniff_obj, read_obj, write_obj,
+                                     VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE |
+                                         VGI_KEEPS_LABELS | VGI_KEEPS_DOUBLES};

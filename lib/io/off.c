@@ -294,4 +294,5 @@ static int write_off(vg_bytes *out, const vgi_writing *w, vg_err *e)
     return VG_OK;
 }
 
-const vgi_format vgi_format_off = {"off", ".off", sniff_off, read_off, write_off};
+const vgi_format vgi_format_off = {"off", ".off", sniff_off, read_off, write_off,
+                                     VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_DOUBLES};

@@ -3,6 +3,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/payload.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
@@ -20,7 +21,7 @@ typedef struct cursor {
 
 static cursor start(const vgi_payload *p)
 {
-    return (cursor){p->data, p->data + p->size, false};
+    return (cursor){p->data, p->size ? p->data + p->size : p->data, false};
 }
 
 static const unsigned char *take(cursor *c, size_t n)
@@ -400,6 +401,8 @@ int vgi_refp_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 int vgi_refp_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
     const char *name = h->reference_name ? h->reference_name : "";
+    if (!vgi_finite(h->reference, 3 * h->mesh.nv))
+        return vg_fail(e, VG_EINPUT, "the reference pose holds a number that is not finite");
     int r = put32(b, (uint32_t)strlen(name), e);
     if (r == VG_OK) r = put32(b, 0, e);
     if (r == VG_OK) r = vgi_bytes_append(b, name, strlen(name), e);
@@ -497,6 +500,7 @@ int vgi_skel_encode(vg_bytes *b, const vg_skeleton *s, vg_err *e)
 
 static int check_pairs(const vgi_payload *p, const vg_correspondence *c, vg_err *e)
 {
+    if (!vgi_finite(c->distance, c->target_nf)) return wrong(p, "a distance or mark is out of range", e);
     for (size_t f = 0; f < c->target_nf; f++) {
         double sum = 0;
         if (c->first[f] >= c->first[f + 1]) return wrong(p, "a target face is driven by none", e);
@@ -506,7 +510,7 @@ static int check_pairs(const vgi_payload *p, const vg_correspondence *c, vg_err 
             sum += c->weight[i];
         }
         if (!(sum > 1 - 1e-9 && sum < 1 + 1e-9)) return wrong(p, "the weights of a face do not sum to 1", e);
-        if (!(c->distance[f] >= 0) || c->matched[f] > 1) return wrong(p, "a distance or mark is out of range", e);
+        if (!(c->distance[f] >= 0 && c->distance[f] < INFINITY) || c->matched[f] > 1) return wrong(p, "a distance or mark is out of range", e);
     }
     return VG_OK;
 }
@@ -556,9 +560,36 @@ int vgi_corr_encode(vg_bytes *b, const vg_correspondence *c, vg_err *e)
 
 /* ---- FRAM ---- */
 
+enum { HAS_TIME = 1u, HAS_PINS = 2u };
+
 static bool on_graph(const vg_head *h)
 {
     return h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS;
+}
+
+static int take_pins(cursor *c, vg_frame *f, const vg_head *h, const vgi_payload *p, vg_err *e)
+{
+    uint32_t n = take32(c), zero = take32(c);
+    const unsigned char *pins = take_array(c, n, 4);
+    if (c->bad || zero || n == 0 || !take_padding(c, n % 2 * 4)) return wrong(p, "its list of pins is cut or malformed", e);
+    int r = vgi_grow(&f->pins, &f->pins_cap, n, sizeof *f->pins, e);
+    if (r < 0) return r;
+    copy32(f->pins, pins, n);
+    f->npins = n;
+    return check_ascending(p, f->pins, n, h->mesh.nv, e);
+}
+
+/* Deformations and transforms start with a quaternion. */
+static bool has_zero_quaternion(const vg_head *h, const double *values)
+{
+    size_t width = vg_kind_width(h->kind);
+    for (size_t i = 0; width > 3 && i < h->count; i++) {
+        const double *q = values + i * width;
+        bool zero = h->precision == VG_F64 ? q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0
+                                           : (float)q[0] == 0 && (float)q[1] == 0 && (float)q[2] == 0 && (float)q[3] == 0;
+        if (zero) return true;
+    }
+    return false;
 }
 
 static int take_values(cursor *c, vg_frame *f, const vg_head *h, const vgi_payload *p, vg_err *e)
@@ -585,15 +616,16 @@ int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e)
     cursor c = start(&p);
     uint32_t n = take32(&c), flags = take32(&c);
     double time = take_double(&c);
-    if (c.bad || (flags & ~1u)) return wrong(&p, "it is too short, or unknown flags are set", e);
-    if (!vgi_finite(&time, 1) || (!flags && time != 0)) return wrong(&p, "its time is not finite, or set without its flag", e);
+    if (c.bad || (flags & ~(HAS_TIME | HAS_PINS)) || (flags & HAS_PINS && h->kind != VG_VECTORS))
+        return wrong(&p, "it is too short, or unknown flags are set", e);
+    if (!vgi_finite(&time, 1) || (!(flags & HAS_TIME) && time != 0)) return wrong(&p, "its time is not finite, or set without its flag", e);
     const char *name = (const char *)take(&c, n);
     if (!name || !vgi_is_utf8(name, n)) return wrong(&p, "its name is longer than the record, or no UTF-8", e);
     int r = vgi_grow(&f->name, &f->name_cap, (size_t)n + 1, 1, e);
     if (r < 0) return r;
     memcpy(f->name, name, n);
     f->name[n] = 0;
-    f->has_time = flags & 1, f->time = time;
+    f->has_time = flags & HAS_TIME, f->time = time, f->npins = 0;
     if (!take_padding(&c, -n & 7)) return wrong(&p, "padding is missing or not zero", e);
     if (on_graph(h)) {
         const unsigned char *root = take(&c, 24), *anchors = take_array(&c, h->nanchors, 24);
@@ -604,14 +636,21 @@ int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e)
         if (!vgi_finite(f->root, 3) || !vgi_finite(f->anchors, 3 * h->nanchors))
             return wrong(&p, "its root or an anchor is not finite", e);
     }
+    if (flags & HAS_PINS && (r = take_pins(&c, f, h, &p, e)) < 0) return r;
     if ((r = take_values(&c, f, h, &p, e)) < 0) return r;
-    size_t width = vg_kind_width(h->kind);
-    if (!vgi_finite(f->values, h->count * width)) return wrong(&p, "a value is not finite", e);
-    if (width > 3) /* deformations and transforms start with a quaternion */
-        for (size_t i = 0; i < h->count; i++) {
-            const double *q = f->values + i * width;
-            if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) return wrong(&p, "a quaternion is zero", e);
-        }
+    if (!vgi_finite(f->values, h->count * vg_kind_width(h->kind))) return wrong(&p, "a value is not finite", e);
+    return has_zero_quaternion(h, f->values) ? wrong(&p, "a quaternion is zero", e) : VG_OK;
+}
+
+/* What a reader would refuse is not written. The values' own finiteness is vg_writer_put's to check. */
+static int check_frame(const vg_head *h, const vg_frame *f, vg_err *e)
+{
+    const char *name = f->name ? f->name : "";
+    bool finite = !f->has_time || vgi_finite(&f->time, 1);
+    if (on_graph(h)) finite = finite && vgi_finite(f->root, 3) && vgi_finite(f->anchors, 3 * h->nanchors);
+    if (!finite) return vg_fail(e, VG_EINPUT, "frame '%s' has a time, root or anchor that is not finite", name);
+    if (has_zero_quaternion(h, f->values))
+        return vg_fail(e, VG_EINPUT, "frame '%s' shrinks something to nothing: a quaternion is zero", name);
     return VG_OK;
 }
 
@@ -619,14 +658,22 @@ int vgi_fram_encode(vg_bytes *b, const vg_head *h, const vg_frame *f, vg_err *e)
 {
     const char *name = f->name ? f->name : "";
     double time = f->has_time ? f->time : 0;
-    int r = put32(b, (uint32_t)strlen(name), e);
-    if (r == VG_OK) r = put32(b, f->has_time, e);
+    int r = check_frame(h, f, e);
+    if (r == VG_OK) r = put32(b, (uint32_t)strlen(name), e);
+    bool pins = h->kind == VG_VECTORS && f->npins > 0;
+    if (r == VG_OK) r = put32(b, (f->has_time ? HAS_TIME : 0u) | (pins ? HAS_PINS : 0u), e);
     if (r == VG_OK) r = put_doubles(b, &time, 1, e);
     if (r == VG_OK) r = vgi_bytes_append(b, name, strlen(name), e);
     if (r == VG_OK) r = put_padding(b, 0, e);
     if (r == VG_OK && on_graph(h)) {
         r = put_doubles(b, f->root, 3, e);
         if (r == VG_OK) r = put_doubles(b, f->anchors, 3 * h->nanchors, e);
+    }
+    if (r == VG_OK && pins) {
+        r = put32(b, (uint32_t)f->npins, e);
+        if (r == VG_OK) r = put32(b, 0, e);
+        if (r == VG_OK) r = vgi_indices_encode(b, f->pins, f->npins, e);
+        if (r == VG_OK) r = put_padding(b, 0, e);
     }
     return r;
 }

@@ -674,6 +674,8 @@ static int write_big(vg_bytes *out, const vgi_writing *w, vg_err *e)
     return write_ply(out, w, BIG, e);
 }
 
-const vgi_format vgi_format_ply = {"ply", ".ply", sniff_ply, read_ply, write_little};
-const vgi_format vgi_format_ply_ascii = {"ply-ascii", ".ply", sniff_ply, read_ply, write_text};
-const vgi_format vgi_format_ply_be = {"ply-be", ".ply", sniff_ply, read_ply, write_big};
+enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_DOUBLES };
+
+const vgi_format vgi_format_ply = {"ply", ".ply", sniff_ply, read_ply, write_little, KEEPS};
+const vgi_format vgi_format_ply_ascii = {"ply-ascii", ".ply", sniff_ply, read_ply, write_text, KEEPS};
+const vgi_format vgi_format_ply_be = {"ply-be", ".ply", sniff_ply, read_ply, write_big, KEEPS};

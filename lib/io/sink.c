@@ -1,5 +1,6 @@
-/* sink.c: the door out for mesh files: one file, a numbered series, a directory, an archive, standard output.
- * Leaves out the text of a mesh file (format.c) and the bytes of an archive (archive.c).
+/* sink.c: the door out: one mesh file, a numbered series, a directory, an archive, standard output, or one file that holds
+ * the whole sequence.
+ * Leaves out the text of a mesh file (format.c), the bytes of a sequence (sequence.c) and those of an archive (archive.c).
  *
  * Everything is written beside its place under a temporary name and takes its final one in vg_sink_end; pipes and
  * devices, which cannot be replaced, are written where they are.
@@ -12,12 +13,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum kind { STDOUT, ONE_FILE, SERIES, DIRECTORY, ARCHIVE };
+enum kind { STDOUT, ONE_FILE, SERIES, DIRECTORY, ARCHIVE, SEQUENCE };
 
 /* What the name of the output asks for. */
 typedef struct plan {
     enum kind kind;
     const vgi_format *format;
+    const vgi_sequence_format *sequence; /* SEQUENCE */
+    bool to_stdout;                      /* which goes there */
     const char *name; /* the output without ":format": `length` bytes */
     size_t length;
     size_t at, behind; /* series: where %d starts, and where the name goes on */
@@ -45,6 +48,19 @@ struct vg_sink {
     size_t ntargets, targets_cap;
     int fd; /* the one file or archive; -1 */
     vgi_packer *packer;
+    /* a sequence: */
+    vg_sink_options options;
+    void *state;
+    vgi_output out;      /* fd: the file itself, or a nameless one when that is a pipe, which cannot be patched */
+    char *mesh;          /* where its mesh went; NULL: nowhere */
+    const vgi_format *mesh_format;
+    /* without the vertices that are in no face: */
+    vg_head slim;        /* head points to it then */
+    uint32_t *kept;      /* its vertices; NULL: all are kept */
+    vg_frame slim_frame;
+    size_t loose;        /* vertices in no face */
+    bool names_lost, times_lost;
+    vgi_names warnings;
 };
 
 /* ---- the name of the output ---- */
@@ -68,7 +84,17 @@ static bool holds_many(const char *name, size_t n, vg_err *e)
 
 static int unknown_format(const char *name, vg_err *e)
 {
-    return vg_fail(e, VG_EARG, "unknown format '%s': known are %s", name, vgi_format_names());
+    return vg_fail(e, VG_EARG, "unknown format '%s': known are %s, %s", name, vgi_format_names(), vgi_sequence_names());
+}
+
+static int holds_all(const char *output, const vgi_sequence_format *f, const char *what, vg_err *e)
+{
+    return vg_fail(e, VG_EARG, "cannot write '%s': a %s file holds all poses: %s", output, f->name, what);
+}
+
+static const vgi_sequence_format *writable_sequence(const vgi_sequence_format *f)
+{
+    return f && f->begin ? f : NULL;
 }
 
 static int split_choice(plan *p, const char *output, vg_err *e)
@@ -77,6 +103,8 @@ static int split_choice(plan *p, const char *output, vg_err *e)
     p->name = output;
     p->length = strlen(output);
     if (!colon || !holds_many(output, (size_t)(colon - output), e)) return VG_OK;
+    const vgi_sequence_format *sequence = vgi_sequence_by_name(colon + 1, strlen(colon + 1));
+    if (writable_sequence(sequence)) return holds_all(output, sequence, "name one file", e);
     if (!(p->format = vgi_format_by_name(colon + 1, strlen(colon + 1)))) return unknown_format(colon + 1, e);
     p->length = (size_t)(colon - output);
     return VG_OK;
@@ -111,20 +139,51 @@ static int find_number(plan *p, vg_err *e)
 static int unknown_kind(const char *output, vg_err *e)
 {
     return vg_fail(e, VG_EARG,
-                   "cannot tell the format of '%s': known are .obj .ply .off, archives %s, or name it with --format",
-                   output, vgi_packer_suffixes());
+                   "cannot tell the format of '%s': known are %s, %s, archives %s, or name it with --format", output,
+                   vgi_format_names(), vgi_sequence_names(), vgi_packer_suffixes());
+}
+
+/* One file, whatever its name: it is not numbered. */
+static int tell_sequence(plan *p, const char *output, vg_err *e)
+{
+    p->kind = SEQUENCE;
+    p->to_stdout = !strcmp(output, "-");
+    if (vgi_packer_knows(output, p->length)) return holds_all(output, p->sequence, "it does not go into an archive", e);
+    if (output[p->length - 1] == '/' || is_directory(output)) return holds_all(output, p->sequence, "name one file", e);
+    if (memchr(output, '%', p->length)) return holds_all(output, p->sequence, "leave out the %d", e);
+    return VG_OK;
 }
 
 static int tell_kind(plan *p, const char *output, vg_err *e)
 {
+    if (p->sequence) return tell_sequence(p, output, e);
     if (!strcmp(output, "-")) return p->kind = STDOUT, VG_OK;
     if (vgi_packer_knows(output, p->length)) return p->kind = ARCHIVE, VG_OK;
     if (p->length < strlen(output) || output[p->length - 1] == '/' || is_directory(output))
         return p->kind = DIRECTORY, VG_OK;
+    if (!p->format && (p->sequence = writable_sequence(vgi_sequence_by_suffix(output)))) return tell_sequence(p, output, e);
     if (!p->format && !(p->format = vgi_format_by_suffix(output))) return unknown_kind(output, e);
     if (!memchr(output, '%', p->length)) return p->kind = ONE_FILE, VG_OK;
     p->kind = SERIES;
     return find_number(p, e);
+}
+
+/* Does the file need a mesh beside it? */
+static bool lacks_faces(const plan *p)
+{
+    return p->kind == SEQUENCE && !(p->sequence->keeps & VGI_KEEPS_FACES);
+}
+
+static int check_mesh_option(const plan *p, const vg_sink_options *o, vg_err *e)
+{
+    if (!o->mesh && !o->no_mesh) return VG_OK;
+    if (o->mesh && o->no_mesh) return vg_fail(e, VG_EARG, "--mesh and --no-mesh exclude each other");
+    if (!lacks_faces(p))
+        return vg_fail(e, VG_EARG, "'%.*s' holds its faces itself: leave out %s", (int)p->length, p->name,
+                       o->mesh ? "--mesh" : "--no-mesh");
+    if (o->mesh && !vgi_format_by_suffix(o->mesh))
+        return vg_fail(e, VG_EARG, "cannot tell the format of the mesh '%s': known are %s", o->mesh, vgi_format_names());
+    return VG_OK;
 }
 
 static int make_plan(plan *p, const char *output, const vg_sink_options *o, vg_err *e)
@@ -134,11 +193,17 @@ static int make_plan(plan *p, const char *output, const vg_sink_options *o, vg_e
     if (o->first_number < 0) return vg_fail(e, VG_EARG, "the first number must not be negative");
     int r = split_choice(p, output, e);
     if (r < 0) return r;
-    if (o->format && !(p->format = vgi_format_by_name(o->format, strlen(o->format))))
-        return unknown_format(o->format, e);
+    if (o->format) {
+        p->sequence = writable_sequence(vgi_sequence_by_name(o->format, strlen(o->format)));
+        p->format = vgi_format_by_name(o->format, strlen(o->format));
+        if (!p->format && !p->sequence) return unknown_format(o->format, e);
+    }
     r = tell_kind(p, output, e);
     if (!p->format) p->format = &vgi_format_obj;
-    return r;
+    if (r == VG_OK && o->full_precision && !((p->sequence ? p->sequence->keeps : p->format->keeps) & VGI_KEEPS_DOUBLES))
+        r = vg_fail(e, VG_EARG, "cannot write '%s' in full precision: %s holds binary32 only", output,
+                    p->sequence ? p->sequence->name : p->format->name);
+    return r < 0 ? r : check_mesh_option(p, o, e);
 }
 
 /* ---- what can be told without writing ---- */
@@ -179,7 +244,7 @@ static int check_file(const char *path, vg_err *e)
 
 static int check_place(const plan *p, vg_err *e)
 {
-    if (p->kind == STDOUT) return VG_OK;
+    if (p->kind == STDOUT || p->to_stdout) return VG_OK;
     char *name = vgi_copy_string(p->name, p->length, e), *dir = NULL;
     if (!name) return VG_ENOMEM;
     int r;
@@ -202,12 +267,14 @@ int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e)
 {
     plan p;
     int r = make_plan(&p, output, o, e);
-    return r < 0 ? r : check_place(&p, e);
+    if (r == VG_OK) r = check_place(&p, e);
+    return r == VG_OK && o->mesh ? check_file(o->mesh, e) : r;
 }
 
-static int check_kind(const vg_head *h, const char *output, vg_err *e)
+static int check_kind(const plan *p, const vg_head *h, const char *output, vg_err *e)
 {
-    if (h->kind == VG_VERTICES) return VG_OK;
+    const vgi_sequence_format *f = p->sequence;
+    if (f ? f->kinds >> h->kind & 1 : h->kind == VG_VERTICES) return f && f->check ? f->check(h, output, e) : VG_OK;
     const char *advice = h->kind == VG_VECTORS ? "pipe it through vg-solve first"
                          : h->kind == VG_DEFORMATIONS
                              ? "apply them with vg-deform and pipe that through vg-solve first"
@@ -369,7 +436,16 @@ static int named_path(vg_sink *s, const char *name, vg_err *e)
     return r < 0 ? r : vgi_bytes_append(&s->path, suffix, strlen(suffix) + 1, e);
 }
 
-/* ---- the door ---- */
+/* ---- files ---- */
+
+static int put_file(vg_sink *s, const char *path, vg_err *e)
+{
+    int fd = open_target(s, path, e);
+    if (fd < 0) return fd;
+    int r = vgi_write_all(fd, s->text.data, s->text.size, path, e);
+    if (r < 0) return close(fd), r;
+    return close_target(fd, path, e);
+}
 
 static int make_directory(vg_sink *s, vg_err *e)
 {
@@ -378,9 +454,21 @@ static int make_directory(vg_sink *s, vg_err *e)
     return vg_fail(e, VG_ESYS, "cannot make directory '%s': %s", s->output, strerror(errno));
 }
 
+/* A pipe cannot be patched: what goes there waits in a file without a name. */
+static int open_sequence(vg_sink *s, vg_err *e)
+{
+    s->fd = s->plan.to_stdout ? -1 : open_target(s, s->output, e);
+    if (s->fd < 0 && !s->plan.to_stdout) return s->fd;
+    bool patchable = s->fd >= 0 && s->targets[s->ntargets - 1].temporary;
+    s->out.name = s->output;
+    s->out.fd = patchable ? s->fd : vgi_nameless_file(e);
+    return s->out.fd < 0 ? s->out.fd : s->plan.sequence->begin(&s->state, s->head, &s->options, &s->out, e);
+}
+
 static int open_place(vg_sink *s, vg_err *e)
 {
     switch (s->plan.kind) {
+    case SEQUENCE: return open_sequence(s, e);
     case DIRECTORY: return make_directory(s, e);
     case ONE_FILE:
     case ARCHIVE: s->fd = open_target(s, s->output, e); break;
@@ -390,30 +478,211 @@ static int open_place(vg_sink *s, vg_err *e)
     return s->plan.kind == ARCHIVE ? vgi_packer_open(&s->packer, s->fd, s->output, s->plan.length, e) : VG_OK;
 }
 
+/* ---- the mesh beside a sequence ---- */
+
+static bool same_singles(const double *a, const double *b, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if ((float)a[i] != (float)b[i]) return false;
+    return true;
+}
+
+/* Nobody named this file, so what is there stays: it may be the very mesh, or else the user must choose. */
+static int keep_mesh(const vg_sink *s, vg_err *e)
+{
+    vg_head there = {0};
+    int r = vg_load_mesh(&there, s->mesh, NULL);
+    bool same = r == VG_OK && vg_mesh_same(&there.mesh, "", &s->head->mesh, "", NULL) == VG_OK &&
+                same_singles(there.reference, s->head->reference, 3 * there.mesh.nv);
+    vg_head_clear(&there);
+    if (same) return VG_OK;
+    return vg_fail(e, VG_EARG, "'%s', which goes with '%s', is there already and is not the reference pose: choose where "
+                   "the mesh goes with --mesh, or --no-mesh", s->mesh, s->output);
+}
+
+static int choose_mesh(vg_sink *s, const vg_sink_options *o, vg_err *e)
+{
+    const char *from = o->mesh ? o->mesh : s->output, *suffix = s->plan.sequence->suffix;
+    size_t n = strlen(from);
+    s->mesh_format = o->mesh ? vgi_format_by_suffix(o->mesh) : &vgi_format_obj;
+    if (!o->mesh && vgi_has_suffix(from, n, suffix)) n -= strlen(suffix);
+    if (!(s->mesh = vgi_array(n + 8, 1, e))) return VG_ENOMEM;
+    memcpy(s->mesh, from, n);
+    if (!o->mesh) memcpy(s->mesh + n, ".obj", 4);
+    return VG_OK;
+}
+
+static int put_mesh(vg_sink *s, const vg_sink_options *o, vg_err *e)
+{
+    struct stat st;
+    if (!lacks_faces(&s->plan) || o->no_mesh || (s->plan.to_stdout && !o->mesh)) return VG_OK;
+    int r = choose_mesh(s, o, e);
+    if (r < 0) return r;
+    if (!o->mesh && stat(s->mesh, &st) == 0) return keep_mesh(s, e);
+    s->text.size = 0;
+    r = vg_model_write(&s->text, s->mesh_format->name, &s->head->mesh, s->head->reference, &s->head->attributes,
+                       s->full_precision, e);
+    return r < 0 ? r : put_file(s, s->mesh, e);
+}
+
+/* ---- vertices in no face ---- */
+
+static int find_loose(vg_sink *s, bool **attached, vg_err *e)
+{
+    const vg_mesh *m = &s->head->mesh;
+    bool *seen = *attached = vgi_array(m->nv, sizeof *seen, e);
+    if (!seen) return VG_ENOMEM;
+    for (size_t c = 0; c < vg_mesh_corners(m); c++) seen[m->vert[c]] = true;
+    for (size_t v = 0; v < m->nv; v++) s->loose += !seen[v];
+    return VG_OK;
+}
+
+/* The head without its loose vertices; the others close up. */
+static int slim_head(vg_sink *s, const bool *attached, vg_err *e)
+{
+    const vg_head *h = s->head;
+    size_t nv = h->mesh.nv, n = 0;
+    uint32_t *number = vgi_array_raw(nv, sizeof *number, e);
+    vg_head *to = &s->slim;
+    int r = number ? vg_head_copy(to, h, e) : VG_ENOMEM;
+    if (r == VG_OK && !(s->kept = vgi_array_raw(nv - s->loose, sizeof *s->kept, e))) r = VG_ENOMEM;
+    if (r == VG_OK) {
+        for (size_t v = 0; v < nv; v++) {
+            if (!attached[v]) continue;
+            memcpy(to->reference + 3 * n, h->reference + 3 * v, 3 * sizeof *to->reference);
+            s->kept[n] = (uint32_t)v;
+            number[v] = (uint32_t)n++;
+        }
+        for (size_t c = 0; c < vg_mesh_corners(&h->mesh); c++) to->mesh.vert[c] = number[h->mesh.vert[c]];
+        to->mesh.nv = to->count = n;
+        vg_skeleton_clear(&to->skeleton); /* its joints are vertices */
+        s->head = to;
+    }
+    free(number);
+    return r;
+}
+
+static int drop_loose(vg_sink *s, bool drop, vg_err *e)
+{
+    bool *attached = NULL;
+    if (s->head->kind != VG_VERTICES)
+        return drop ? vg_fail(e, VG_EARG, "--drop-loose is for vertices: the input holds %s", vg_kind_name(s->head->kind))
+                    : VG_OK;
+    int r = find_loose(s, &attached, e);
+    if (r == VG_OK && drop && s->loose == s->head->mesh.nv && s->loose)
+        r = vg_fail(e, VG_EARG, "--drop-loose would leave nothing: no vertex is in a face");
+    if (r == VG_OK && drop && s->loose) r = slim_head(s, attached, e);
+    if (r == VG_OK && drop) s->loose = 0;
+    free(attached);
+    return r;
+}
+
+static int slim_pose(vg_sink *s, const vg_frame *f, vg_err *e)
+{
+    vg_frame *to = &s->slim_frame;
+    int r = vg_frame_shape(to, s->head, e);
+    if (r == VG_OK) r = vg_frame_rename(to, f->name ? f->name : "", e);
+    if (r < 0) return r;
+    to->has_time = f->has_time, to->time = f->time;
+    for (size_t i = 0; i < s->head->count; i++)
+        memcpy(to->values + 3 * i, f->values + 3 * (size_t)s->kept[i], 3 * sizeof *to->values);
+    return VG_OK;
+}
+
+/* ---- what is not kept ---- */
+
+static bool has_faces_of(const vg_mesh *m, size_t least, size_t most)
+{
+    for (size_t f = 0; f < m->nf; f++) {
+        size_t n = m->start[f + 1] - m->start[f];
+        if (n >= least && n <= most) return true;
+    }
+    return false;
+}
+
+static int add_loss(vg_bytes *line, const char *what, vg_err *e)
+{
+    int r = line->size ? vgi_bytes_append(line, "; ", 2, e) : VG_OK;
+    return r < 0 ? r : vgi_bytes_append(line, what, strlen(what), e);
+}
+
+/* The sequence's own words come behind what can be told by its head. */
+static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
+{
+    const vgi_sequence_format *f = s->plan.sequence;
+    const vg_head *h = s->head;
+    unsigned keeps = f ? f->keeps : s->plan.format->keeps;
+    if (s->mesh) keeps |= s->mesh_format->keeps & (VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS);
+    bool faces = keeps & VGI_KEEPS_FACES, triangles = faces && !(keeps & VGI_KEEPS_POLYGONS);
+    const struct {
+        bool lost;
+        const char *what;
+    } all[] = {{!faces && h->mesh.nf, "the faces"},
+               {triangles && has_faces_of(&h->mesh, 4, SIZE_MAX), "polygons, which became triangles"},
+               {triangles && has_faces_of(&h->mesh, 2, 2), "line segments"},
+               {!(keeps & VGI_KEEPS_ORDER), "the numbers of the vertices, and those in no face"},
+               {!(keeps & VGI_KEEPS_TEXTURE) && h->attributes.ntex, "texture coordinates"},
+               {!(keeps & VGI_KEEPS_LABELS) && h->attributes.nlabels, "groups and materials"},
+               {!(keeps & VGI_KEEPS_SKELETON) && h->skeleton.njoints, "the skeleton"},
+               {f && !(keeps & VGI_KEEPS_NAMES) && s->names_lost, "the names of the frames"},
+               {f && !(keeps & VGI_KEEPS_TIMES) && s->times_lost, "the times of the frames"}};
+    int r = VG_OK;
+    for (size_t i = 0; r == VG_OK && i < sizeof all / sizeof *all; i++)
+        if (all[i].lost) r = add_loss(line, all[i].what, e);
+    const char *own = f && f->warning ? f->warning(s->state) : NULL;
+    return r == VG_OK && own ? add_loss(line, own, e) : r;
+}
+
+static int warn_of_losses(vg_sink *s, vg_err *e)
+{
+    vg_bytes line = {0};
+    int r = list_losses(s, &line, e);
+    if (r == VG_OK && line.size) {
+        s->text.size = 0;
+        r = vgi_bytes_append(&s->text, "not kept in '", 13, e);
+        if (r == VG_OK) r = vgi_bytes_append(&s->text, s->output, strlen(s->output), e);
+        if (r == VG_OK) r = vgi_bytes_append(&s->text, "': ", 3, e);
+        if (r == VG_OK) r = vgi_bytes_append(&s->text, line.data, line.size, e);
+        if (r == VG_OK) r = vgi_names_add(&s->warnings, (char *)s->text.data, s->text.size, e);
+    }
+    vg_bytes_clear(&line);
+    return r;
+}
+
+static int warn_of_loose(vg_sink *s, vg_err *e)
+{
+    char text[160];
+    if (!lacks_faces(&s->plan) || !s->loose || s->head->mesh.nf == 0) return VG_OK;
+    int n = snprintf(text, sizeof text, "%zu vertices are in no face: programs that drop them from the mesh, as Blender "
+                     "does, then refuse the cache (--drop-loose)", s->loose);
+    return vgi_names_add(&s->warnings, text, (size_t)n, e);
+}
+
+const char *vg_sink_warning(const vg_sink *s, size_t i)
+{
+    return i < s->warnings.n ? s->warnings.at[i] : NULL;
+}
+
+/* ---- opening ---- */
+
 int vg_sink_open(vg_sink **out, const char *output, const vg_head *h, const vg_sink_options *o, vg_err *e)
 {
     vg_sink *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
-    s->fd = -1, s->head = h, s->full_precision = o->full_precision, s->number = (uint64_t)o->first_number;
+    s->fd = s->out.fd = -1, s->head = h, s->options = *o;
+    s->full_precision = o->full_precision, s->number = (uint64_t)o->first_number;
     int r = make_plan(&s->plan, output, o, e);
     if (r == VG_OK) r = check_place(&s->plan, e);
-    if (r == VG_OK) r = check_kind(h, output, e);
+    if (r == VG_OK) r = check_kind(&s->plan, h, output, e);
     if (r == VG_OK && !(s->output = vgi_copy_string(s->plan.name, s->plan.length, e))) r = VG_ENOMEM;
+    if (r == VG_OK) r = drop_loose(s, o->drop_loose, e);
+    if (r == VG_OK) r = put_mesh(s, o, e);
     if (r == VG_OK) r = open_place(s, e);
     if (r < 0) vg_sink_close(out);
     else s->plan.name = s->output;
     return r;
 }
 
-static int put_file(vg_sink *s, vg_err *e)
-{
-    const char *path = (char *)s->path.data;
-    int fd = open_target(s, path, e);
-    if (fd < 0) return fd;
-    int r = vgi_write_all(fd, s->text.data, s->text.size, path, e);
-    if (r < 0) return close(fd), r;
-    return close_target(fd, path, e);
-}
 
 static int more_than_one(const vg_sink *s, vg_err *e)
 {
@@ -437,10 +706,10 @@ static int put_frame(vg_sink *s, const char *name, vg_err *e)
     case SERIES:
         r = series_path(s, e);
         s->number++;
-        return r < 0 ? r : put_file(s, e);
+        return r < 0 ? r : put_file(s, (char *)s->path.data, e);
     case DIRECTORY:
         r = named_path(s, name, e);
-        return r < 0 ? r : put_file(s, e);
+        return r < 0 ? r : put_file(s, (char *)s->path.data, e);
     case ARCHIVE:
         r = named_path(s, name, e);
         return r < 0 ? r : vgi_packer_add(s->packer, (char *)s->path.data, s->text.data, s->text.size, e);
@@ -449,11 +718,36 @@ static int put_frame(vg_sink *s, const char *name, vg_err *e)
     }
 }
 
+/* Is it what a reader would call the frame that comes next, of whichever file? */
+static bool is_counted_name(const vg_sink *s, const char *name)
+{
+    char number[32];
+    size_t n = (size_t)snprintf(number, sizeof number, ".%04llu", (unsigned long long)s->frames + 1);
+    return strlen(name) > n && !strcmp(name + strlen(name) - n, number);
+}
+
+static int put_into_sequence(vg_sink *s, const vg_frame *f, vg_err *e)
+{
+    const char *name = f->name ? f->name : "";
+    vg_err cause;
+    int r = s->plan.sequence->put(s->state, f, &cause);
+    if (r < 0) return vg_fail(e, r, "cannot write frame '%s' to '%s': %s", name, s->output, cause.message);
+    if (*name && !s->names_lost) s->names_lost = !is_counted_name(s, name);
+    s->times_lost |= f->has_time;
+    s->frames++;
+    return VG_OK;
+}
+
 int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
 {
     const char *name = f->name ? f->name : "";
     enum kind kind = s->plan.kind;
     int r = VG_OK;
+    if (s->kept) {
+        if ((r = slim_pose(s, f, e)) < 0) return r;
+        f = &s->slim_frame;
+    }
+    if (kind == SEQUENCE) return put_into_sequence(s, f, e);
     if ((kind == ONE_FILE || kind == STDOUT) && s->frames > 0) return more_than_one(s, e);
     if (kind == DIRECTORY || kind == ARCHIVE) r = take_name(s, name, e);
     if (r < 0) return r;
@@ -466,9 +760,28 @@ int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
     return r;
 }
 
+static int no_pose(const vg_sink *s, vg_err *e)
+{
+    return vg_fail(e, VG_EINPUT, "there is no pose to be written to '%s'", s->output);
+}
+
+static int end_sequence(vg_sink *s, vg_err *e)
+{
+    if (s->frames == 0) return no_pose(s, e);
+    int r = s->plan.sequence->end(s->state, e);
+    if (r == VG_OK) r = vgi_output_flush(&s->out, e);
+    if (r < 0 || s->out.fd == s->fd) return r;
+    vgi_output to = {.fd = s->plan.to_stdout ? STDOUT_FILENO : s->fd,
+                     .name = s->plan.to_stdout ? "standard output" : s->output};
+    r = vgi_output_copy(&to, s->out.fd, s->out.size, e);
+    if (r == VG_OK) r = vgi_output_flush(&to, e);
+    vgi_output_clear(&to);
+    return r;
+}
+
 static int end_single(vg_sink *s, vg_err *e)
 {
-    if (s->frames == 0) return vg_fail(e, VG_EINPUT, "there is no pose to be written to '%s'", s->output);
+    if (s->frames == 0) return no_pose(s, e);
     int fd = s->plan.kind == STDOUT ? STDOUT_FILENO : s->fd;
     return vgi_write_all(fd, s->text.data, s->text.size, s->plan.kind == STDOUT ? "standard output" : s->output, e);
 }
@@ -476,12 +789,16 @@ static int end_single(vg_sink *s, vg_err *e)
 int vg_sink_end(vg_sink *s, vg_err *e)
 {
     int r = VG_OK;
-    if (s->plan.kind == ARCHIVE) r = vgi_packer_end(s->packer, e);
+    if (s->plan.kind == SEQUENCE) r = end_sequence(s, e);
+    else if (s->plan.kind == ARCHIVE) r = vgi_packer_end(s->packer, e);
     else if (s->plan.kind == ONE_FILE || s->plan.kind == STDOUT) r = end_single(s, e);
     if (r == VG_OK && s->fd >= 0) {
+        if (s->out.fd == s->fd) s->out.fd = -1;
         r = close_target(s->fd, s->output, e);
         s->fd = -1;
     }
+    if (r == VG_OK && s->frames) r = warn_of_losses(s, e);
+    if (r == VG_OK) r = warn_of_loose(s, e);
     if (r == VG_OK) r = rename_targets(s, e);
     s->ended = r == VG_OK;
     return r;
@@ -492,6 +809,9 @@ void vg_sink_close(vg_sink **sink)
     vg_sink *s = *sink;
     if (!s) return;
     vgi_packer_close(&s->packer);
+    if (s->state) s->plan.sequence->release(s->state);
+    if (s->out.fd >= 0 && s->out.fd != s->fd) close(s->out.fd);
+    vgi_output_clear(&s->out);
     if (s->fd >= 0) close(s->fd);
     if (!s->ended) remove_targets(s);
     for (size_t i = 0; i < s->ntargets; i++) {
@@ -501,6 +821,11 @@ void vg_sink_close(vg_sink **sink)
     free(s->targets);
     free(s->slots);
     vgi_names_clear(&s->names);
+    vgi_names_clear(&s->warnings);
+    vg_head_clear(&s->slim);
+    vg_frame_clear(&s->slim_frame);
+    free(s->kept);
+    free(s->mesh);
     vg_bytes_clear(&s->text);
     vg_bytes_clear(&s->path);
     free(s->output);

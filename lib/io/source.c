@@ -1,5 +1,5 @@
 /* source.c: the door in: whatever the operands are, the caller gets one head and frame after frame.
- * Leaves out how a stream, an archive or a mesh file is read; it only tells them apart and joins them.
+ * Leaves out how a stream, an archive, a mesh file or a sequence is read; it only tells them apart and joins them.
  *
  * Operands are first expanded (directories, patterns) and looked at, so that a missing file or a stream that does not
  * fit is told before any work; files are opened again one after another when it is their turn. What can be read only
@@ -17,16 +17,28 @@
 
 static const char standard_input[] = "standard input";
 
-enum content { MESH, ARCHIVE, STREAM };
+enum content { MESH, ARCHIVE, STREAM, SEQUENCE };
 
 typedef struct item {
     char *path;      /* NULL: standard input */
     bool regular;    /* a file that can be opened, or read from `base` on, a second time */
     int64_t base;    /* where standard input stood */
     enum content content;
+    const vgi_sequence_format *sequence;
     vgi_input *input;  /* kept from the first look, when there can be no second */
     vg_reader *reader; /* the same, when it is a stream */
 } item;
+
+/* A file that holds a whole sequence, being read. */
+typedef struct playing {
+    const vgi_sequence_format *format; /* NULL: there is none */
+    void *state;
+    vgi_input *in;
+    char *subject, *stem; /* what messages call it; what frames without names are called after */
+    uint64_t frames;      /* read so far */
+    vg_frame first;       /* the first one, when it was needed for a reference */
+    bool waiting;         /* and has not been handed out */
+} playing;
 
 struct vg_source {
     item *items;
@@ -45,6 +57,8 @@ struct vg_source {
     bool waiting;        /* `model` and `pose` hold a pose that has not been handed out */
     vg_model model;
     char *pose;
+    playing playing;
+    char warning[160];
 };
 
 static const char *item_name(const item *it)
@@ -79,7 +93,7 @@ static bool is_mesh_file(DIR *dir, const char *name)
     if (*name == '.' || n >= sizeof stem) return false;
     memcpy(stem, name, n);
     stem[n] = 0;
-    return vgi_format_by_suffix(stem) && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISREG(st.st_mode);
+    return (vgi_format_by_suffix(stem) || vgi_packable(stem)) && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISREG(st.st_mode);
 }
 
 static int list_directory(vgi_names *names, const char *path, vg_err *e)
@@ -184,6 +198,7 @@ static void note_file(item *it)
 static int tell_content(item *it, vgi_input *in, vg_err *e)
 {
     const unsigned char *data;
+    const vgi_sequence_format *named = it->path ? vgi_sequence_by_suffix(it->path) : NULL;
     size_t n;
     int r = vgi_input_peek(in, 4096, &data, &n, e);
     if (r < 0) return r;
@@ -191,7 +206,9 @@ static int tell_content(item *it, vgi_input *in, vg_err *e)
         return vg_fail(e, VG_ETRUNC, "standard input is empty: look at the program before in the pipe");
     if (n == 0) return vg_fail(e, VG_ETRUNC, "'%s' is empty", it->path);
     if (vgi_is_stream(data, n)) it->content = STREAM;
+    else if ((it->sequence = vgi_sequence_by_content(data, n))) it->content = SEQUENCE;
     else if (vgi_is_archive(data, n)) it->content = ARCHIVE;
+    else if (named && named->open) it->content = SEQUENCE, it->sequence = named;
     else if (vgi_format_by_content(data, n) || (it->path && vgi_format_by_suffix(it->path))) it->content = MESH;
     else it->content = ARCHIVE;
     return VG_OK;
@@ -224,6 +241,7 @@ static int settle_mesh(vg_source *s, const vg_mesh *mesh, const char *archive, c
 {
     int r = vg_mesh_copy(&s->own.mesh, mesh, e);
     if (r < 0) return r;
+    free(s->own_name);
     s->own.kind = s->head.kind = VG_VERTICES;
     s->own.precision = s->head.precision = VG_F64;
     s->own.count = s->head.count = mesh->nv;
@@ -236,13 +254,15 @@ static int join_head(vg_source *s, const item *it, const vg_head *h, vg_err *e)
     if (h->kind != VG_VERTICES)
         return vg_fail(e, VG_EINPUT, "'%s' holds %s: only streams of vertices can be joined with other inputs",
                        item_name(it), vg_kind_name(h->kind));
-    if (it != s->items) return vg_head_merge_trace(&s->head, h, e);
+    if (s->own_name || it != s->items) return vg_head_merge_trace(&s->head, h, e);
     int r = vg_head_copy(&s->head, h, e);
     return r < 0 ? r : settle_mesh(s, &h->mesh, NULL, item_name(it), e);
 }
 
 static int look_at_stream(vg_source *s, item *it, vg_err *e)
 {
+    if (s->own_name && s->n == 1)
+        return vg_fail(e, VG_EARG, "'%s' is a stream, which brings its own mesh: leave out --mesh", item_name(it));
     vg_reader *reader = NULL;
     int r = open_reader(it, &reader, e);
     if (r < 0) return r;
@@ -294,6 +314,9 @@ static int take_over_model(vg_source *s, const char *archive, const char *path, 
     size_t n = s->model.mesh.nv;
     int r = settle_mesh(s, &s->model.mesh, archive, path, e);
     if (r < 0) return r;
+    if (s->model.degenerate)
+        snprintf(s->warning, sizeof s->warning, "%s: left out %zu triangles of which two corners are at one place",
+                 s->own_name, s->model.degenerate);
     s->head.mesh = s->model.mesh;
     s->head.attributes = s->model.attributes;
     s->model.mesh = (vg_mesh){0};
@@ -345,12 +368,208 @@ static int open_stream(vg_source *s, item *it, vg_err *e)
     return r;
 }
 
+/* ---- sequences ---- */
+
+static void stop_playing(playing *p)
+{
+    if (p->format) p->format->close(p->state);
+    vgi_input_free(&p->in);
+    free(p->subject);
+    free(p->stem);
+    vg_frame_clear(&p->first);
+    *p = (playing){0};
+}
+
+/* The mesh file beside: "walk.obj" or "walk.ply" for "walk.pc2"; free it. NULL with VG_OK: there is none. */
+static int find_beside(const char *file, const char *suffix, char **path, vg_err *e)
+{
+    static const char *const suffixes[] = {".obj", ".ply"};
+    *path = NULL;
+    if (file == standard_input) return VG_OK;
+    size_t n = strlen(file);
+    if (vgi_has_suffix(file, n, suffix)) n -= strlen(suffix);
+    char *to = vgi_array_raw(n + 8, 1, e);
+    if (!to) return VG_ENOMEM;
+    for (size_t i = 0; i < sizeof suffixes / sizeof *suffixes; i++) {
+        snprintf(to, n + 8, "%.*s%s", (int)n, file, suffixes[i]);
+        if (access(to, F_OK) == 0) return *path = to, VG_OK;
+    }
+    free(to);
+    return VG_OK;
+}
+
+static int different_count(const vg_head *h, const char *subject, size_t nv, const char *mesh, vg_err *e)
+{
+    return vg_fail(e, VG_EINPUT, "%s has %zu points where %s has %zu vertices", subject, h->mesh.nv, mesh, nv);
+}
+
+/* A head without faces takes them, and the reference pose, from a mesh file. */
+static int borrow_mesh(vg_source *s, vg_head *h, const char *path, vg_err *e)
+{
+    vg_head from = {0};
+    char *subject = subject_of(NULL, path, e);
+    int r = subject ? vg_load_mesh(&from, path, e) : VG_ENOMEM;
+    if (r == VG_OK && from.mesh.nv != h->mesh.nv)
+        r = different_count(h, s->playing.subject, from.mesh.nv, subject, e);
+    if (r == VG_OK) {
+        vg_mesh_clear(&h->mesh);
+        vg_attributes_clear(&h->attributes);
+        h->mesh = from.mesh, h->attributes = from.attributes;
+        from.mesh = (vg_mesh){0}, from.attributes = (vg_attributes){0};
+        if (!h->reference) {
+            free(h->reference_name);
+            h->reference = from.reference, h->reference_name = from.reference_name;
+            from.reference = NULL, from.reference_name = NULL;
+        }
+    }
+    vg_head_clear(&from);
+    free(subject);
+    return r;
+}
+
+static int find_faces(vg_source *s, const char *path, vg_head *h, vg_err *e)
+{
+    char *beside;
+    int r = find_beside(path, s->playing.format->suffix, &beside, e);
+    if (r < 0) return r;
+    if (beside) r = borrow_mesh(s, h, beside, e);
+    else if (!s->playing.format->bare)
+        r = vg_fail(e, VG_EINPUT, "%s holds no faces: put the mesh of the same name beside it, as .obj or .ply, or name it "
+                    "with --mesh", s->playing.subject);
+    free(beside);
+    return r;
+}
+
+static int name_frame(const playing *p, vg_frame *f, vg_err *e)
+{
+    size_t n = strlen(p->stem) + 32;
+    char *name = vgi_array_raw(n, 1, e);
+    if (!name) return VG_ENOMEM;
+    if (p->format->frames && p->format->frames(p->state) == 1) snprintf(name, n, "%s", p->stem);
+    else snprintf(name, n, "%s.%04llu", p->stem, (unsigned long long)p->frames);
+    int r = vg_frame_rename(f, name, e);
+    free(name);
+    return r;
+}
+
+static int read_frame(vg_source *s, vg_frame *f, vg_err *e)
+{
+    playing *p = &s->playing;
+    int r = vg_frame_shape(f, &s->own, e);
+    if (r < 0) return r;
+    vg_records_clear(&f->extra);
+    f->has_time = false, f->time = 0;
+    if ((r = p->format->next(p->state, f, e)) <= 0) return r;
+    p->frames++;
+    if (!(p->format->keeps & VGI_KEEPS_NAMES) && (r = name_frame(p, f, e)) < 0) return r;
+    return 1;
+}
+
+/* No reference came with the sequence: it is the first pose, which is handed out all the same. */
+static int reference_from_first(vg_source *s, vg_err *e)
+{
+    playing *p = &s->playing;
+    vg_head *h = &s->head;
+    int r = read_frame(s, &p->first, e);
+    if (r == 0) r = vg_fail(e, VG_EINPUT, "%s holds no pose", p->subject);
+    if (r < 0) return r;
+    p->waiting = true;
+    h->reference = vgi_copy_array(p->first.values, 3 * h->mesh.nv, sizeof(double), e);
+    h->reference_name = vgi_copy_string(p->first.name, strlen(p->first.name), e);
+    return h->reference && h->reference_name ? VG_OK : VG_ENOMEM;
+}
+
+/* The sequence brings the mesh: its head becomes that of the source. */
+static int take_over_head(vg_source *s, const char *archive, const char *path, vg_head *h, vg_err *e)
+{
+    playing *p = &s->playing;
+    vg_kind kind = h->kind;
+    vg_precision precision = h->precision;
+    size_t count = h->count;
+    if (kind != VG_VERTICES && (s->n > 1 || archive))
+        return vg_fail(e, VG_EINPUT, "%s holds %s: only vertices can be joined with other inputs", p->subject,
+                       vg_kind_name(kind));
+    int r = p->format->keeps & VGI_KEEPS_FACES ? VG_OK : find_faces(s, path, h, e);
+    if (r == VG_OK) r = settle_mesh(s, &h->mesh, archive, path, e);
+    if (r < 0) return r;
+    vg_head_clear(&s->head);
+    s->head = *h;
+    *h = (vg_head){0};
+    s->own.kind = kind, s->own.precision = precision, s->own.count = count;
+    if (s->head.nanchors && !(s->own.anchors = vgi_copy_array(s->head.anchors, s->head.nanchors, sizeof *s->head.anchors, e)))
+        return VG_ENOMEM;
+    s->own.nanchors = s->head.nanchors;
+    if (!s->head.reference) return reference_from_first(s, e);
+    if (!s->head.reference_name) s->head.reference_name = vgi_copy_string(p->stem, strlen(p->stem), e);
+    return s->head.reference_name ? VG_OK : VG_ENOMEM;
+}
+
+static int join_sequence(const vg_source *s, const vg_head *h, vg_err *e)
+{
+    const char *subject = s->playing.subject;
+    if (h->kind != VG_VERTICES)
+        return vg_fail(e, VG_EINPUT, "%s holds %s: only vertices can be joined with a mesh or other inputs", subject,
+                       vg_kind_name(h->kind));
+    if (h->mesh.nf) return vg_mesh_same(&s->own.mesh, s->own_name, &h->mesh, subject, e);
+    return h->mesh.nv == s->own.mesh.nv ? VG_OK : different_count(h, subject, s->own.mesh.nv, s->own_name, e);
+}
+
+/* Start on a sequence whose bytes are `in`, which is taken over: a file, or a member of an archive. */
+static int play(vg_source *s, const vgi_sequence_format *format, vgi_input *in, const char *archive, const char *path,
+                vg_err *e)
+{
+    playing *p = &s->playing;
+    vg_head h = {0};
+    p->in = in;
+    p->subject = subject_of(archive, path, e);
+    p->stem = path == standard_input ? vgi_copy_string("stdin", 5, e) : vgi_pose_name(path, e);
+    if (!p->subject || !p->stem) return VG_ENOMEM;
+    p->format = format;
+    int r = format->open(&p->state, &h, in, p->subject, e);
+    if (r == VG_OK && h.mesh.nf) r = vg_mesh_check(&h.mesh, p->subject, e);
+    if (r == VG_OK) r = s->own_name ? join_sequence(s, &h, e) : take_over_head(s, archive, path, &h, e);
+    vg_head_clear(&h);
+    return r;
+}
+
+static int open_sequence(vg_source *s, item *it, vg_err *e)
+{
+    vgi_input *in;
+    int r = open_input(it, &in, e);
+    return r < 0 ? r : play(s, it->sequence, in, NULL, item_name(it), e);
+}
+
+/* The member of an archive in s->data. */
+static int play_member(vg_source *s, const vgi_sequence_format *format, const char *path, vg_err *e)
+{
+    vgi_input *in;
+    int r = vgi_input_memory(&in, s->data.data, s->data.size, path, e);
+    return r < 0 ? r : play(s, format, in, s->archive_name, path, e);
+}
+
+/* 1 and a frame; 0 behind the last one of this file. */
+static int next_of_sequence(vg_source *s, vg_frame *f, vg_err *e)
+{
+    playing *p = &s->playing;
+    int r;
+    if (!p->waiting) {
+        if ((r = read_frame(s, f, e)) == 0) stop_playing(p);
+        return r;
+    }
+    p->waiting = false;
+    if ((r = vg_frame_shape(f, &s->own, e)) < 0 || (r = vg_frame_label(f, &p->first, e)) < 0) return r;
+    memcpy(f->values, p->first.values, 3 * s->own.count * sizeof *f->values);
+    vg_frame_clear(&p->first);
+    return 1;
+}
+
 static int open_next(vg_source *s, vg_err *e)
 {
     item *it = &s->items[s->next++];
     switch (it->content) {
     case STREAM: return open_stream(s, it, e);
     case ARCHIVE: return open_archive(s, it, e);
+    case SEQUENCE: return open_sequence(s, it, e);
     default: return open_mesh(s, it, e);
     }
 }
@@ -359,9 +578,10 @@ static int next_member(vg_source *s, vg_err *e)
 {
     const char *path;
     int r = vgi_archive_next(s->archive, &path, &s->data, e);
-    if (r > 0) return take_pose(s, s->archive_name, path, e);
     if (r == 0) vgi_archive_close(&s->archive);
-    return r;
+    if (r <= 0) return r;
+    const vgi_sequence_format *sequence = vgi_packable(path);
+    return sequence ? play_member(s, sequence, path, e) : take_pose(s, s->archive_name, path, e);
 }
 
 /* ---- the door ---- */
@@ -374,12 +594,30 @@ static int find_mesh(vg_source *s, vg_err *e)
     return r;
 }
 
+static int settle_named_mesh(vg_source *s, const char *mesh, vg_err *e)
+{
+    vg_head from;
+    int r = vg_load_mesh(&from, mesh, e);
+    if (r == VG_OK) r = settle_mesh(s, &from.mesh, NULL, mesh, e);
+    if (r == VG_OK) r = vg_head_merge_trace(&s->head, &from, e);
+    if (r == VG_OK) {
+        s->head.mesh = from.mesh, s->head.attributes = from.attributes;
+        s->head.reference = from.reference, s->head.reference_name = from.reference_name;
+        from.mesh = (vg_mesh){0}, from.attributes = (vg_attributes){0};
+        from.reference = NULL, from.reference_name = NULL;
+    }
+    vg_head_clear(&from);
+    return r;
+}
+
 /* first_only: no more than the first item is wanted, so the others are not even looked at. */
-static int open_source(vg_source **out, const char *const *operands, size_t n, bool first_only, vg_err *e)
+static int open_source(vg_source **out, const char *const *operands, size_t n, const char *mesh, bool first_only,
+                       vg_err *e)
 {
     vg_source *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
     int r = n ? VG_OK : vg_fail(e, VG_EARG, "no input is named");
+    if (r == VG_OK && mesh) r = settle_named_mesh(s, mesh, e);
     for (size_t i = 0; r == VG_OK && i < n; i++) r = add_operand(s, operands[i], e);
     while (first_only && s->n > 1) free(s->items[--s->n].path);
     for (size_t i = 0; r == VG_OK && i < s->n; i++) r = look_at(s, &s->items[i], e);
@@ -390,7 +628,17 @@ static int open_source(vg_source **out, const char *const *operands, size_t n, b
 
 int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err *e)
 {
-    return open_source(s, operands, n, false, e);
+    return open_source(s, operands, n, NULL, false, e);
+}
+
+int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const char *mesh, vg_err *e)
+{
+    return open_source(s, operands, n, mesh, false, e);
+}
+
+const char *vg_source_warning(const vg_source *s)
+{
+    return *s->warning ? s->warning : NULL;
 }
 
 vg_head *vg_source_head(vg_source *s)
@@ -441,7 +689,9 @@ int vg_source_next(vg_source *s, vg_frame *f, vg_err *e)
     if (s->through) return vg_reader_next(s->reader, f, e);
     for (int r = VG_OK; r == VG_OK;) {
         if (s->waiting) return hand_out(s, f, e);
-        if (s->reader) {
+        if (s->playing.format) {
+            r = next_of_sequence(s, f, e);
+        } else if (s->reader) {
             if ((r = vg_reader_next(s->reader, f, e)) == 0) r = end_reader(s, e);
         } else if (s->archive) {
             r = next_member(s, e);
@@ -470,6 +720,7 @@ void vg_source_close(vg_source **source)
     free(s->items);
     vg_reader_close(&s->reader);
     vgi_archive_close(&s->archive);
+    stop_playing(&s->playing);
     vg_head_clear(&s->head);
     vg_head_clear(&s->own);
     vg_records_clear(&s->tail);
@@ -485,7 +736,7 @@ int vg_load_mesh(vg_head *h, const char *operand, vg_err *e)
 {
     vg_source *s;
     *h = (vg_head){0};
-    int r = open_source(&s, &operand, 1, true, e);
+    int r = open_source(&s, &operand, 1, NULL, true, e);
     if (r < 0) return r;
     vg_head *from = vg_source_head(s);
     if (from->mesh.nv == 0 || !from->reference) r = vg_fail(e, VG_EINPUT, "'%s' holds no mesh", operand);

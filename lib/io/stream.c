@@ -44,7 +44,7 @@ struct vg_reader {
 static void remember_form(vg_reader *r)
 {
     r->form = (vg_head){.kind = r->head.kind, .precision = r->head.precision, .count = r->head.count,
-                            .nanchors = r->head.nanchors};
+                            .nanchors = r->head.nanchors, .mesh.nv = r->head.mesh.nv};
 }
 
 static int keep_unknown(vg_reader *r, vg_record *record, vg_records *list, vg_err *e)
@@ -70,7 +70,9 @@ static int find_known(const char *tag)
 
 static int stopped_by_failure(vg_reader *r, const vg_record *record, vg_err *e)
 {
-    vgi_payload p = {record->payload.data, record->payload.size, "record FAIL"};
+    char where[200];
+    snprintf(where, sizeof where, "'%.150s': record FAIL", vgi_input_name(r->in));
+    vgi_payload p = {record->payload.data, record->payload.size, where};
     return vgi_fail_decode(&p, vgi_input_name(r->in), e);
 }
 
@@ -157,6 +159,8 @@ int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
     while ((ok = vgi_record_read(r->in, &r->tally, &record, e)) > 0) {
         if (!strcmp(record.tag, "FRAM")) break;
         if (!strcmp(record.tag, "FAIL")) ok = stopped_by_failure(r, &record, e);
+        else if (find_known(record.tag) == FORM)
+            ok = vg_fail(e, VG_EINPUT, "'%s' has two FORM records", vgi_input_name(r->in));
         else if (find_known(record.tag) >= 0)
             ok = vg_fail(e, VG_EINPUT, "'%s': record %s must come before FORM", vgi_input_name(r->in), record.tag);
         else ok = keep_unknown(r, &record, &before, e);

@@ -6,6 +6,7 @@
  * quaternions are what is asked for.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/deform_kernel.h"
+#include "method/moments.h"
 #include "model/incidence.h"
 
 #include <math.h>
@@ -56,22 +57,6 @@ static size_t face_size(const vg_graph *g, size_t f)
 
 /* ---- one face in one pose ---- */
 
-/* Newell's normal from the vectors of a face, as a unit vector; false when it has none. */
-static bool unit_normal(const double *w, size_t r, double n[3])
-{
-    double spread = 0;
-    n[0] = n[1] = n[2] = 0;
-    for (size_t i = 0; i < r; i++) {
-        double part[3];
-        cross(w + 3 * i, w + 3 * (i + 1 < r ? i + 1 : 0), part);
-        for (int k = 0; k < 3; k++) n[k] += part[k], spread += w[3 * i + k] * w[3 * i + k];
-    }
-    double length = norm(n);
-    if (!(length > flat * spread)) return false;
-    for (int k = 0; k < 3; k++) n[k] /= length;
-    return true;
-}
-
 /* The unit quaternion of the frame [u b n] of a corner; false when the corner is degenerate. */
 static bool corner_frame(const vg_deformer *d, const double w[3], const double n[3], double *length, double q[4])
 {
@@ -112,7 +97,7 @@ static size_t measure_polygon(const vg_deformer *d, size_t f, const double *w, d
     uint32_t begin = d->g->start[f];
     size_t r = face_size(d->g, f), bad = 0;
     double n[3], mean[4] = {0, 0, 0, 0};
-    bool has_normal = unit_normal(w, r, n);
+    bool has_normal = vgi_unit_normal(w, r, n);
     for (size_t i = 0; i < r; i++) {
         double *q = quaternions + 4 * i, now[4], length, before = d->length[begin + i];
         if (!has_normal || before == 0 || !corner_frame(d, w + 3 * i, n, &length, now)) {
@@ -245,7 +230,7 @@ static void measure_reference(vg_deformer *d, const double *reference)
         size_t r = face_size(g, f);
         const double *w = d->vector + 3 * (size_t)g->start[f];
         double n[3];
-        bool good = r == 2 || unit_normal(w, r, n);
+        bool good = r == 2 || vgi_unit_normal(w, r, n);
         d->slow[f] = r == 2 || !good;
         for (size_t i = 0; i < r; i++) {
             size_t c = g->start[f] + i;
@@ -318,54 +303,24 @@ static void make_coordinates(vg_deformer *d)
     }
 }
 
-/* inverse of a symmetric matrix xx xy xz yy yz zz; false when it has none */
-static bool invert_symmetric(const double a[6], double inverse[6])
-{
-    double c0 = a[3] * a[5] - a[4] * a[4], c1 = a[2] * a[4] - a[1] * a[5], c2 = a[1] * a[4] - a[2] * a[3];
-    double det = a[0] * c0 + a[1] * c1 + a[2] * c2, size = a[0] + a[3] + a[5];
-    if (!(det > 1e-18 * size * size * size)) return false;
-    inverse[0] = c0 / det, inverse[1] = c1 / det, inverse[2] = c2 / det;
-    inverse[3] = (a[0] * a[5] - a[2] * a[2]) / det, inverse[4] = (a[1] * a[2] - a[0] * a[4]) / det;
-    inverse[5] = (a[0] * a[3] - a[1] * a[1]) / det;
-    return true;
-}
-
-static void symmetric_times(const double a[6], const double x[3], double y[3])
-{
-    y[0] = a[0] * x[0] + a[1] * x[1] + a[2] * x[2];
-    y[1] = a[1] * x[0] + a[3] * x[1] + a[4] * x[2];
-    y[2] = a[2] * x[0] + a[4] * x[1] + a[5] * x[2];
-}
-
 /* A face whose gradient cannot be had (nearly a line) is done the slow way, by its corners. */
 static void make_gradient(vg_deformer *d, size_t f)
 {
     const vg_graph *g = d->g;
     size_t begin = g->start[f], r = face_size(g, f);
-    double sum[6] = {0, 0, 0, 0, 0, 0}, inverse[6], n[3], target2 = 0;
-    for (size_t c = begin; c < begin + r; c++) {
-        const double *v = d->vector + 3 * c, *t = d->target + 3 * c;
-        sum[0] += v[0] * v[0], sum[1] += v[0] * v[1], sum[2] += v[0] * v[2];
-        sum[3] += v[1] * v[1], sum[4] += v[1] * v[2], sum[5] += v[2] * v[2];
-        target2 += t[0] * t[0] + t[1] * t[1] + t[2] * t[2];
-    }
-    double source2 = sum[0] + sum[3] + sum[5], h = source2 / 2;
+    double P[6], source2 = 0, target2 = 0;
     vgi_gradient_face *face = &d->gradient_face[f];
-    if (!unit_normal(d->vector + 3 * begin, r, n)) {
+    if (!vgi_gradient_moments(d->vector + 3 * begin, r, P, face->q)) {
         d->slow[f] = 1;
         return;
     }
-    sum[0] += h * n[0] * n[0], sum[1] += h * n[0] * n[1], sum[2] += h * n[0] * n[2];
-    sum[3] += h * n[1] * n[1], sum[4] += h * n[1] * n[2], sum[5] += h * n[2] * n[2];
-    if (!invert_symmetric(sum, inverse)) {
-        d->slow[f] = 1;
-        return;
+    for (size_t i = 3 * begin; i < 3 * (begin + r); i++) {
+        source2 += d->vector[i] * d->vector[i];
+        target2 += d->target[i] * d->target[i];
     }
-    symmetric_times(inverse, n, face->q);
-    for (int k = 0; k < 3; k++) face->q[k] *= h;
     face->rho = sqrt(target2 / source2);
     for (size_t c = begin; c < begin + r; c++) {
-        symmetric_times(inverse, d->vector + 3 * c, d->gradient[c].p);
+        vgi_symmetric_times(P, d->vector + 3 * c, d->gradient[c].p);
         for (size_t k = 0; k < 3; k++) d->gradient[c].b[k] = d->target[3 * c + k] - face->rho * d->vector[3 * c + k];
     }
 }

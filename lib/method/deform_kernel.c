@@ -43,9 +43,7 @@ INLINE vgi_vec add(vgi_vec a, vgi_vec b)
 
 INLINE vgi_vec load(const double *const *p, size_t i)
 {
-    vgi_vec v;
-    for (int k = 0; k < VGI_LANES; k++) v.x[k] = p[k][3 * i], v.y[k] = p[k][3 * i + 1], v.z[k] = p[k][3 * i + 2];
-    return v;
+    return (vgi_vec){vgi_gather(p, 3 * i), vgi_gather(p, 3 * i + 1), vgi_gather(p, 3 * i + 2)};
 }
 
 /* vectors of the face into w[0 .. r-1], and w[r] = w[0] */

@@ -13,6 +13,7 @@
  * (solve_kernel.c). The only file that knows CHOLMOD; it calls Core, Cholesky, Partition (LGPL) and Supernodal (GPL).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/metric.h"
+#include "method/planar.h"
 #include "method/solve_kernel.h"
 #include "model/incidence.h"
 
@@ -316,6 +317,12 @@ void vg_solver_free(vg_solver **out)
     free(s->x);
     free(s);
     *out = NULL;
+}
+
+vgi_solver_view vgi_solver_look(const vg_solver *s)
+{
+    return (vgi_solver_view){.g = s->g, .factor = &s->factor, .row = s->row, .rows = s->unknowns, .anchored = s->nanchors > 0,
+                             .threads = s->threads};
 }
 
 /* ---- solving ---- */

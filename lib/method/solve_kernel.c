@@ -111,8 +111,7 @@ INLINE void load_rows(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, c
         ask(x, row, v, nv, rows);
         if (row[v] >= rows) continue;
         vgi_row *to = &x[row[v]];
-        for (int c = 0; c < 3; c++)
-            for (int k = 0; k < VGI_LANES; k++) to->xyz[c][k] = rhs[k][3 * v + (size_t)c];
+        for (size_t c = 0; c < 3; c++) to->xyz[c] = vgi_gather(rhs, 3 * v + c);
     }
 }
 

@@ -275,6 +275,7 @@ void vg_frame_clear(vg_frame *f)
 {
     free(f->name);
     free(f->anchors);
+    free(f->pins);
     free(f->values_own);
     vg_bytes_clear(&f->raw);
     vg_records_clear(&f->extra);
@@ -290,6 +291,15 @@ int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e)
     if (r == VG_OK) r = vgi_grow(&f->anchors, &f->anchors_cap, anchors, sizeof *f->anchors, e);
     if (r == VG_OK) f->values = f->values_own;
     return r;
+}
+
+int vg_frame_pin(vg_frame *f, const uint32_t *vertices, size_t n, vg_err *e)
+{
+    int r = vgi_grow(&f->pins, &f->pins_cap, n, sizeof *f->pins, e);
+    if (r < 0) return r;
+    if (n) memcpy(f->pins, vertices, n * sizeof *f->pins);
+    f->npins = n;
+    return VG_OK;
 }
 
 int vg_frame_rename(vg_frame *f, const char *name, vg_err *e)

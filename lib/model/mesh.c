@@ -29,19 +29,26 @@ int vg_mesh_copy(vg_mesh *to, const vg_mesh *from, vg_err *e)
     return VG_ENOMEM;
 }
 
-/* Is a vertex twice in this face? Small faces by comparing pairs; for large ones stamp[v] remembers the last face. */
-static bool repeats(const uint32_t *vert, size_t size, uint32_t face, uint32_t *stamp)
+static int compare_indices(const void *p, const void *q)
 {
-    if (!stamp) {
+    uint32_t a = *(const uint32_t *)p, b = *(const uint32_t *)q;
+    return (a > b) - (a < b);
+}
+
+/* Is a vertex twice in this face? Small faces by comparing pairs; large ones sorted in `sorted`. No list over all vertices: their
+ * number may still be a lie. */
+static bool repeats(const uint32_t *vert, size_t size, uint32_t *sorted)
+{
+    if (!sorted) {
         for (size_t i = 1; i < size; i++)
             for (size_t j = 0; j < i; j++)
                 if (vert[i] == vert[j]) return true;
         return false;
     }
-    for (size_t i = 0; i < size; i++) {
-        if (stamp[vert[i]] == face + 1) return true;
-        stamp[vert[i]] = face + 1;
-    }
+    memcpy(sorted, vert, size * sizeof *vert);
+    qsort(sorted, size, sizeof *sorted, compare_indices);
+    for (size_t i = 1; i < size; i++)
+        if (sorted[i] == sorted[i - 1]) return true;
     return false;
 }
 
@@ -50,21 +57,22 @@ int vg_mesh_check(const vg_mesh *m, const char *subject, vg_err *e)
     enum { SMALL = 16 };
     if (m->nv >= UINT32_MAX || m->nf >= UINT32_MAX || vg_mesh_corners(m) >= UINT32_MAX)
         return vg_fail(e, VG_EINPUT, "%s has too many vertices, faces or corners (the limit is 2^32 - 2)", subject);
-    uint32_t *stamp = NULL;
+    uint32_t *sorted = NULL;
+    size_t cap = 0;
     int result = VG_OK;
     for (size_t f = 0; f < m->nf && result == VG_OK; f++) {
         size_t size = m->start[f + 1] - m->start[f];
         const uint32_t *vert = m->vert + m->start[f];
         if (m->start[f + 1] < m->start[f] || size < 2)
-            return free(stamp), vg_fail(e, VG_EINPUT, "%s: face %zu has fewer than 2 vertices", subject, f);
+            return free(sorted), vg_fail(e, VG_EINPUT, "%s: face %zu has fewer than 2 vertices", subject, f);
         for (size_t i = 0; i < size; i++)
             if (vert[i] >= m->nv)
-                return free(stamp), vg_fail(e, VG_EINPUT, "%s: face %zu names vertex %u of %zu", subject, f, vert[i], m->nv);
-        if (size > SMALL && !stamp && !(stamp = vgi_array(m->nv, sizeof *stamp, e))) return VG_ENOMEM;
-        if (repeats(vert, size, (uint32_t)f, size > SMALL ? stamp : NULL))
+                return free(sorted), vg_fail(e, VG_EINPUT, "%s: face %zu names vertex %u of %zu", subject, f, vert[i], m->nv);
+        if (size > SMALL) result = vgi_grow(&sorted, &cap, size, sizeof *sorted, e);
+        if (result == VG_OK && repeats(vert, size, size > SMALL ? sorted : NULL))
             result = vg_fail(e, VG_EINPUT, "%s: face %zu names a vertex twice", subject, f);
     }
-    free(stamp);
+    free(sorted);
     return result;
 }
 

@@ -1,7 +1,7 @@
 #!/bin/sh
 # make bench: how fast every stage is, beside a reference measured in the same run, and how much memory it holds.
 # Quick by default; BENCH=full adds meshes of 200,000 and 1,000,000 vertices. RUNS=3: a row is the best of so many.
-# Inputs are generated into a directory of its own below TMPDIR (3 GB; full: 7 GB) and removed at the end.
+# Inputs are generated into a directory of its own below TMPDIR (3 GB; full: 4 GB) and removed at the end.
 # Leaves out accuracy: make check.
 # SPDX-License-Identifier: GPL-3.0-or-later
 set -eu
@@ -39,6 +39,11 @@ calc() {
     awk "BEGIN { printf \"%.6g\", ($1) }"
 }
 
+# rounded EXPRESSION: whole from 100 on, else with one digit
+rounded() {
+    awk "BEGIN { x = $1; printf x < 99.95 ? \"%.1f\" : \"%.0f\", x }"
+}
+
 # best RUNS COMMAND: the shortest time into $seconds, the largest peak into $kib; stops the benchmark when it fails
 best() {
     took=$(measure "$1" "$2")
@@ -46,26 +51,30 @@ best() {
     kib=${took#* }
 }
 
+first=
 line() {
-    printf '%-23s %-27s %6s %9s %8s %6s  %-25s %9s %7s\n' "$@"
+    printf '%-20s %-26s %5s %8s %8s %6s %5s  %-23s %8s %6s\n' "$@"
 }
 
 # head_of TITLE
 head_of() {
     printf '\n%s\n\n' "$1"
-    line stage input poses poses/s MB/s MiB reference 'it does' ratio
-    line ----- ----- ----- ------- ---- --- --------- ------- -----
+    line stage input poses poses/s later MB/s MiB reference 'it does' ratio
+    line ----- ----- ----- ------- ----- ---- --- --------- ------- -----
 }
 
 # row STAGE INPUT POSES BYTES REFERENCE UNIT VALUE: a row for what `best` has measured. BYTES is every byte read, passed on
-# or written. UNIT of the reference: poses/s or MB/s.
+# or written. UNIT of the reference: poses/s or MB/s. $first, unless empty: what a run of one pose takes.
 row() {
     rate=$(calc "$3 / $seconds")
     mbs=$(calc "$4 / 1e6 / $seconds")
+    later=
+    [ -z "$first" ] || later=$(rounded "($3 - 1) / ($seconds - $first)")
     own=$mbs
-    [ "$6" = poses/s ] && own=$rate
-    line "$1" "$2" "$3" "$(calc "int($rate + 0.5)")" "$(calc "int($mbs + 0.5)")" "$(calc "int($kib / 1024 + 0.5)")" \
-        "$5, $6" "$(calc "int($7 + 0.5)")" "$(awk "BEGIN { printf \"%.2f\", $own / $7 }")"
+    [ "$6" != poses/s ] || own=${later:-$rate}
+    line "$1" "$2" "$3" "$(rounded "$rate")" "${later:--}" "$(rounded "$mbs")" "$((kib / 1024))" "$5, $6" \
+        "$(rounded "$7")" "$(awk "BEGIN { printf \"%.2f\", $own / $7 }")"
+    first=
 }
 
 # goal TEXT VALUE UNIT "<="|">=" LIMIT: remembered for the last table
@@ -111,34 +120,49 @@ human() {
 # solver NAME: how many poses/s the reference does on this mesh, into $cholmod; a line of the table of solves
 solver() {
     OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 solve "$1-w.vgs" >solve.out
-    read -r load one two simplicial supernodal apart <solve.out
+    read -r loading one two simplicial supernodal apart <solve.out
     cholmod=$(calc "$simplicial > $supernodal ? $simplicial : $supernodal")
-    printf '%-28s %9.0f %9.0f %9.0f %11.0f %11.0f %8.2f %8.2f %10s\n' "$2" "$load" "$one" "$two" "$simplicial" \
+    printf '%-28s %9.0f %9.0f %9.0f %11.0f %11.0f %8.2f %8.2f %10s\n' "$2" "$loading" "$one" "$two" "$simplicial" \
         "$supernodal" "$(calc "$one / $cholmod")" "$(calc "$two / $cholmod")" "$apart" >>solves
     echo "$cholmod" >"$1.cholmod"
-    echo "$(calc "$two / $cholmod")" >"$1.gain"
+    calc "$two / $cholmod" >"$1.gain"
 }
 
-# transfer NAME INPUT POSES RUNS: vg-deform, vg-solve, and both; poses/s of the pipeline into $rate
+# stage RUNS COMMAND: $seconds and $kib of COMMAND, whose inputs are NAME.vgs or NAME-w.vgs, and $first of the same with one
+# pose of each.
+stage() {
+    best "$1" "$(echo "$2" | sed 's/INPUT\.vgs/'"$mesh"'-1.vgs/; s/INPUT-w\.vgs/'"$mesh"'-1w.vgs/; s/INPUT/'"$mesh"'/g')"
+    first=$seconds
+    best "$1" "$(echo "$2" | sed "s/INPUT/$mesh/g")"
+}
+
+# transfer NAME INPUT POSES RUNS: vg-deform, vg-solve, and both; poses/s of the pipeline, set-up included, into $rate
 transfer() {
-    read -r cholmod <"$1.cholmod"
+    mesh=$1
     in=$(bytes "$1.vgs")
     between=$(bytes "$1-w.vgs")
-    best "$4" "vg-deform $1.vgs --onto $1-b.vgs >/dev/null"
+    vg-deform "$1-1.vgs" --onto "$1-b.vgs" -o "$1-1w.vgs"
+    if [ -e "$1.cholmod" ]; then
+        read -r value <"$1.cholmod"
+        set -- "$@" cholmod_solve2 poses/s "$value"
+    else
+        set -- "$@" 'pipe copy' MB/s "$pipe"
+    fi
+    stage "$4" 'vg-deform INPUT.vgs --onto INPUT-b.vgs >/dev/null'
     row vg-deform "$2" "$3" $((in + between)) 'pipe copy' MB/s "$pipe"
-    best "$4" "vg-solve $1-w.vgs >/dev/null"
-    row vg-solve "$2" "$3" $((in + between)) cholmod_solve2 poses/s "$cholmod"
-    best "$4" "vg-deform $1.vgs --onto $1-b.vgs | vg-solve >/dev/null"
-    row 'vg-deform | vg-solve' "$2" "$3" $((2 * in + between)) cholmod_solve2 poses/s "$cholmod"
+    stage "$4" 'vg-solve INPUT-w.vgs >/dev/null'
+    solve_kib=$kib
+    row vg-solve "$2" "$3" $((in + between)) "$5" "$6" "$7"
+    stage "$4" "$limit vg-deform INPUT.vgs --onto INPUT-b.vgs | vg-solve >/dev/null"
+    row 'vg-deform | vg-solve' "$2" "$3" $((2 * in + between)) "$5" "$6" "$7"
 }
 
 # setup NAME INPUT: from files to the first pose; the whole of vg-solve into $seconds
 setup() {
     best "$RUNS" "vg-deform $1-1.vgs --onto $1-b.vgs | vg-solve >/dev/null"
     both=$seconds
-    vg-deform "$1-1.vgs" --onto "$1-b.vgs" -o one.vgs
-    vg-solve -v one.vgs 2>facts >/dev/null
-    best "$RUNS" 'vg-solve one.vgs >/dev/null'
+    vg-solve -v "$1-1w.vgs" 2>facts >/dev/null
+    best "$RUNS" "vg-solve $1-1w.vgs >/dev/null"
     awk -v input="$2" -v both="$both" -v all="$seconds" -v mib=$((kib / 1024)) '/factorized in/ {
         gsub(",", ""); for (i = 1; i < NF; i++) {
             if ($i == "analysed") a = $(i + 2); if ($i == "factorized") f = $(i + 2); if ($(i + 1) == "entries") n = $i
@@ -156,8 +180,14 @@ grows() {
     worst=$(calc "$kib / $small > $worst ? $kib / $small : $worst")
 }
 
-printf 'vg bench (%s), %s processors, best of %s\n' "$BENCH" "$(getconf _NPROCESSORS_ONLN)" "$RUNS"
+# load: how many processes wanted a processor in the last minute; more than a few tenths before: others disturb
+load() {
+    cut -d ' ' -f 1 /proc/loadavg 2>/dev/null || echo unknown
+}
 
+printf 'vg bench (%s), %s processors, load before %s, best of %s\n' "$BENCH" "$(getconf _NPROCESSORS_ONLN)" "$(load)" "$RUNS"
+
+limit=
 pipe=$(pipe 1048576 2000)
 pipe_small=$(pipe 65536 2000)
 printf '\nMemory through a pipe: %s MB/s at 1 MiB, %s MB/s at 64 KiB\n' "$pipe" "$pipe_small"
@@ -169,7 +199,7 @@ for mesh in 'human 13,380' 'rod 6,890' 'tube 50,002'; do
     solver "${mesh% *}" "${mesh#* } vertices"
 done
 
-head_of 'Deformation transfer, streams on disk to /dev/null, set-up included'
+head_of 'Deformation transfer, streams on disk to /dev/null (poses/s with set-up, later: after the first pose)'
 transfer human '13,380 / 13,378 quads' 540 "$RUNS"
 human_rate=$rate
 transfer rod '6,890 / 13,776 triangles' 539 "$RUNS"
@@ -228,7 +258,7 @@ human_setup=$seconds
 setup rod '6,890 / 13,776 triangles'
 setup tube '50,002 / 100,000 triangles'
 rm -f rod.vgs rod-w.vgs tube.vgs tube-w.vgs
-read -r gain <tube.gain
+read -r gain <tube.gain || [ -n "$gain" ]
 
 if [ "$BENCH" = full ]; then
     head_of 'Large meshes'
@@ -238,16 +268,9 @@ if [ "$BENCH" = full ]; then
     setup hose '200,002 / 400,000 triangles'
     rm -f hose*.vgs
     rods cable 1000 1000 16 1
-    in=$(bytes cable.vgs)
-    between=$(bytes cable-w.vgs)
-    best 1 "vg-deform cable.vgs --onto cable-b.vgs >/dev/null"
-    row vg-deform '1,000,002 / 2,000,000 tri.' 16 $((in + between)) 'pipe copy' MB/s "$pipe"
-    best 1 "vg-solve cable-w.vgs >/dev/null"
-    solve_kib=$kib
-    row vg-solve '1,000,002 / 2,000,000 tri.' 16 $((in + between)) 'pipe copy' MB/s "$pipe"
-    rm -f cable-w.vgs
-    best 1 "ulimit -v 8388608; vg-deform cable.vgs --onto cable-b.vgs | vg-solve >/dev/null"
-    row 'vg-deform | vg-solve' '1,000,002 / 2,000,000 tri.' 16 $((2 * in + between)) 'pipe copy' MB/s "$pipe"
+    limit='ulimit -v 8388608;' # 8 GiB for each program
+    transfer cable '1,000,002 / 2,000,000 tri.' 16 1
+    limit=
     setup cable '1,000,002 / 2,000,000 tri.'
     cable_setup=$seconds
 fi

@@ -26,12 +26,19 @@ static vg_deformer *deformer(const vg_graph *g, const double *reference, int thr
     return d;
 }
 
-static void aim(vg_deformer *d, const vg_graph *g, const double *target)
+static const vg_method methods[] = {VG_BY_POSE, VG_BY_GRADIENT, VG_BY_BLEND};
+
+static void aim_by(vg_deformer *d, const vg_graph *g, const double *target, vg_method method)
 {
     double *w = vectors_of(g, target);
     vg_err e;
-    CHECK(vg_deformer_target(d, w, &e) == VG_OK);
+    CHECK(vg_deformer_target(d, w, method, &e) == VG_OK);
     free(w);
+}
+
+static void aim(vg_deformer *d, const vg_graph *g, const double *target)
+{
+    aim_by(d, g, target, VG_BY_POSE);
 }
 
 static double *measure(vg_head *h, const vg_graph *g, const double *pose)
@@ -343,7 +350,7 @@ static void test_two_ways(void)
 static void test_threads_and_batches(void)
 {
     enum { POSES = 17 };
-    vg_head shapes[] = {make_rod(70, 40, true), make_pieces(), make_degenerate()};
+    vg_head shapes[] = {make_rod(70, 40, true), make_pieces(), make_degenerate(), make_mixed(12), make_degenerate()};
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
         vg_graph *g = graph_of(&shapes[i]);
         size_t corners = vg_graph_corners(g);
@@ -351,7 +358,7 @@ static void test_threads_and_batches(void)
         double **q1 = lists(POSES, 4 * corners), **w1 = lists(POSES, 3 * corners);
         for (size_t k = 0; k < POSES; k++) poses[k] = warp(shapes[i].reference, g->nv, 0.1 * (double)k);
         vg_deformer *d = deformer(g, shapes[i].reference, 1);
-        aim(d, g, poses[2]);
+        aim_by(d, g, poses[2], methods[i % 3]);
         for (size_t k = 0; k < POSES; k++) {
             vg_deformer_measure(d, 1, VG_VERTICES, CONST(poses + k), q1 + k);
             vg_deformer_transfer(d, 1, VG_VERTICES, CONST(poses + k), w1 + k);
@@ -361,7 +368,7 @@ static void test_threads_and_batches(void)
         for (int threads = 1; threads <= 3; threads++) {
             for (size_t batch = 1; batch <= POSES; batch++) {
                 d = deformer(g, shapes[i].reference, threads);
-                aim(d, g, poses[2]);
+                aim_by(d, g, poses[2], methods[i % 3]);
                 for (size_t k = 0; k < POSES; k += batch) {
                     size_t n = POSES - k < batch ? POSES - k : batch;
                     vg_deformer_measure(d, n, VG_VERTICES, CONST(poses + k), q + k);
@@ -486,10 +493,10 @@ static void test_nothing_but_finite(void)
     size_t corners = vg_graph_corners(g);
     double *pose = room(3 * g->nv, sizeof *pose), *q = room(4 * corners, sizeof *q), *w = room(3 * corners, sizeof *w);
     vg_deformer *d = deformer(g, h.reference, 1);
-    aim(d, g, h.reference);
     for (int trial = 0; trial < 3000; trial++) {
         for (size_t i = 0; i < 3 * g->nv; i++) pose[i] = values[(size_t)((noise() + 1) * 3.4999)];
         vg_deformer_measure(d, 1, VG_VERTICES, CONST(&pose), &q);
+        if (trial % 1000 == 0) aim_by(d, g, h.reference, methods[trial / 1000]);
         vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &w);
         CHECK(vgi_finite(q, 4 * corners) && vgi_finite(w, 3 * corners));
         for (size_t c = 0; c < corners; c++) CHECK(dot(q + 4 * c, q + 4 * c, 4) > 0);
@@ -502,9 +509,89 @@ static void test_nothing_but_finite(void)
     vg_head_clear(&h);
 }
 
+/* ---- by gradient and blend ---- */
+
+/* x of A x = b, A 3 x 3 (rows), by Cramer's rule */
+static void solve3(const double A[9], const double b[3], double x[3])
+{
+    double c[9], det;
+    for (size_t i = 0; i < 3; i++) cross(A + 3 * ((i + 1) % 3), A + 3 * ((i + 2) % 3), c + 3 * i);
+    det = dot(A, c, 3);
+    for (size_t k = 0; k < 3; k++) x[k] = (b[0] * c[k] + b[1] * c[3 + k] + b[2] * c[6 + k]) / det;
+}
+
+static void newell(const double *w, size_t r, double n[3])
+{
+    n[0] = n[1] = n[2] = 0;
+    for (size_t i = 0; i < r; i++) {
+        double part[3];
+        cross(w + 3 * i, w + 3 * ((i + 1) % r), part);
+        for (int k = 0; k < 3; k++) n[k] += part[k];
+    }
+    double length = sqrt(dot(n, n, 3));
+    for (int k = 0; k < 3; k++) n[k] /= length;
+}
+
+/* D = (sum d r' + h n_d n_r') (sum r r' + h n_r n_r')^-1, h = sum |r|^2 / 2 (MATH 5); the wanted vector is D t, and of what D
+ * leaves of d the part that the target's size asks for. */
+static void by_gradient(const double *r, const double *d, const double *t, size_t n, double *wanted)
+{
+    double A[9], M[9], nr[3], nd[3], h = dot(r, r, 3 * n) / 2, rho = sqrt(dot(t, t, 3 * n) / dot(r, r, 3 * n));
+    newell(r, n, nr);
+    newell(d, n, nd);
+    for (int k = 0; k < 9; k++) A[k] = h * nr[k / 3] * nr[k % 3], M[k] = h * nd[k / 3] * nr[k % 3];
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < 9; k++) {
+            A[k] += r[3 * i + k / 3] * r[3 * i + k % 3];
+            M[k] += d[3 * i + k / 3] * r[3 * i + k % 3];
+        }
+    for (size_t i = 0; i < n; i++) {
+        double z[3], left[3];
+        solve3(A, t + 3 * i, z);
+        solve3(A, r + 3 * i, left);
+        for (size_t k = 0; k < 3; k++)
+            wanted[3 * i + k] = dot(M + 3 * k, z, 3) + rho * (d[3 * i + k] - dot(M + 3 * k, left, 3));
+    }
+}
+
+static void test_gradient(void)
+{
+    vg_head h;
+    const char *name;
+    for (size_t i = 0; make_any(i, &h, &name); i++) {
+        vg_graph *g = graph_of(&h);
+        size_t corners = vg_graph_corners(g);
+        double *pose = warp(h.reference, g->nv, 0.6), *target = warp(h.reference, g->nv, -0.3), *w[3];
+        double *r = vectors_of(g, h.reference), *p = vectors_of(g, pose), *t = vectors_of(g, target);
+        double *want = room(3 * g->max_corners, sizeof *want), D = vg_diagonal(target, g->nv), worst = 0, apart = 0;
+        vg_deformer *d = deformer(g, h.reference, 1);
+        for (int k = 0; k < 3; k++) {
+            w[k] = room(3 * corners, sizeof(double));
+            aim_by(d, g, target, methods[k]);
+            vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &w[k]);
+        }
+        for (size_t f = 0; f < g->nf; f++) {
+            size_t c = 3 * (size_t)g->start[f], n = g->start[f + 1] - g->start[f];
+            if (n > 2) by_gradient(r + c, p + c, t + c, n, want);
+            else memcpy(want, w[0] + c, 6 * sizeof *want); /* line segments go by pose */
+            worst = fmax(worst, farthest(w[1] + c, want, n));
+            for (size_t k = 0; k < 3 * n; k++) want[k] = (want[k] + w[0][c + k]) / 2;
+            worst = fmax(worst, farthest(w[2] + c, want, n));
+            apart = fmax(apart, farthest(w[1] + c, w[0] + c, n));
+        }
+        if (!(worst <= 1e-12 * D)) printf("%s:\n", name);
+        CHECK_NEAR(worst, 0, 1e-12 * D);
+        if (g->max_corners > 2) CHECK(apart > 1e-4 * D); /* the methods are not the same thing */
+        vg_deformer_free(&d);
+        free(pose), free(target), free(r), free(p), free(t), free(want), free(w[0]), free(w[1]), free(w[2]);
+        vg_graph_free(&g);
+        vg_head_clear(&h);
+    }
+}
+
 /* ---- target = source, through the solve ---- */
 
-static double self_transfer(vg_head *h, size_t n, const double *const *poses, int threads)
+static double self_transfer(vg_head *h, size_t n, const double *const *poses, vg_method method, int threads)
 {
     vg_graph *g = graph_of(h);
     size_t corners = vg_graph_corners(g);
@@ -512,9 +599,9 @@ static double self_transfer(vg_head *h, size_t n, const double *const *poses, in
     vg_err e;
     vg_solver *s;
     vg_deformer *d = deformer(g, h->reference, threads);
-    aim(d, g, h->reference);
+    aim_by(d, g, h->reference, method);
     vg_deformer_transfer(d, n, VG_VERTICES, poses, w);
-    if (vg_solver_new(&s, g, NULL, 0, h->reference, threads, &e) < 0) abort();
+    if (vg_solver_new(&s, g, NULL, 0, h->reference, VG_WEIGHTS_UNIFORM, threads, &e) < 0) abort();
     for (size_t i = 0; i < n; i++) {
         vg_graph_root(g, poses[i], root[i]);
         vg_solver_load(s, w[i], NULL, x[i], rhs[i]);
@@ -537,9 +624,12 @@ static void test_onto_itself(void)
     vg_head h;
     const char *name;
     for (size_t i = 0; make_any(i, &h, &name); i++) {
-        double *pose = warp(h.reference, h.mesh.nv, 1), worst = self_transfer(&h, 1, CONST(&pose), 1);
-        if (!(worst <= 1e-10)) printf("%s:\n", name);
-        CHECK_NEAR(worst, 0, 1e-10);
+        double *pose = warp(h.reference, h.mesh.nv, 1);
+        for (size_t k = 0; k < 3; k++) {
+            double worst = self_transfer(&h, 1, CONST(&pose), methods[k], 1);
+            if (!(worst <= 1e-10)) printf("%s, method %zu:\n", name, k);
+            CHECK_NEAR(worst, 0, 1e-10);
+        }
         free(pose);
         vg_head_clear(&h);
     }
@@ -551,9 +641,11 @@ static void test_onto_itself(void)
                {"faceB.tar.xz", NULL, 6}};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
         film f = load_film(all[i].poses, all[i].rest, all[i].most);
-        double worst = self_transfer(&f.h, f.n, CONST(f.pose), 2);
-        if (!(worst <= 1e-10)) printf("%s:\n", all[i].poses);
-        CHECK_NEAR(worst, 0, 1e-10);
+        for (size_t k = 0; k < 3; k++) {
+            double worst = self_transfer(&f.h, f.n, CONST(f.pose), methods[k], 2);
+            if (!(worst <= 1e-10)) printf("%s, method %zu:\n", all[i].poses, k);
+            CHECK_NEAR(worst, 0, 1e-10);
+        }
         film_clear(&f);
     }
 }
@@ -566,4 +658,4 @@ TESTS({"Frames and Rodrigues as the formulas have them", test_formulas}, {"a J r
       {"degenerate corners take the turn of their face", test_degenerate},
       {"a face that collapses in one pose", test_collapsed_in_one_pose},
       {"where degenerate begins", test_where_degenerate_begins}, {"nothing but finite numbers", test_nothing_but_finite},
-      {"onto itself", test_onto_itself})
+      {"gradient and blend as the formulas have them", test_gradient}, {"onto itself", test_onto_itself})

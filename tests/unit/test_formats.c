@@ -143,8 +143,8 @@ static void refuses_to_write_what_does_not_fit(void)
     CHECK(vgi_bytes_append(&out, "before", 6, &e) == VG_OK);
     CHECK(vg_model_write(&out, "obj", &mixed, x, NULL, false, &e) == VG_EINPUT);
     CHECK_TEXT(e.message, "vertex 7 does not fit single precision (1e+300): ask for full precision");
-    CHECK(vg_model_write(&out, "stl", &mixed, x, NULL, true, &e) == VG_EARG);
-    CHECK_TEXT(e.message, "unknown mesh format 'stl' (known: obj, ply, ply-ascii, ply-be, off)");
+    CHECK(vg_model_write(&out, "fbx", &mixed, x, NULL, true, &e) == VG_EARG);
+    CHECK_TEXT(e.message, "unknown mesh format 'fbx' (known: obj, ply, ply-ascii, ply-be, off, stl, stl-ascii)");
     vg_label broken = {0, VG_LABEL_GROUP, (char *)"two\nlines"};
     vg_attributes a = {.nlabels = 1, .labels = &broken};
     CHECK(vg_model_write(&out, "obj", &mixed, x, &a, true, &e) == VG_EINPUT);
@@ -559,7 +559,7 @@ static void tells_formats_apart(void)
     }
     CHECK(!vgi_format_by_content((const unsigned char *)"v 1 2 \0 3\n", 10));
     CHECK(vgi_format_by_suffix("a/b.OBJ") == &vgi_format_obj && vgi_format_by_suffix("x.ply") == &vgi_format_ply);
-    CHECK(vgi_format_by_suffix("x.off") == &vgi_format_off && !vgi_format_by_suffix("x.stl") &&
+    CHECK(vgi_format_by_suffix("x.off") == &vgi_format_off && !vgi_format_by_suffix("x.fbx") &&
           !vgi_format_by_suffix("obj"));
     for (size_t i = 0; i < FORMATS; i++) {
         const vgi_format *f = vgi_format_by_name(format_names[i], strlen(format_names[i]));
@@ -576,7 +576,7 @@ static void says_what_is_no_mesh(void)
     CHECK(vg_model_read(&m, "", 0, NULL, "a.obj", &e) == VG_ETRUNC);
     CHECK_TEXT(e.message, "'a.obj' is empty");
     CHECK(vg_model_read(&m, "hello\n", 6, NULL, "a.txt", &e) == VG_EINPUT);
-    CHECK_TEXT(e.message, "'a.txt' is no mesh file (read: OBJ, PLY, OFF)");
+    CHECK_TEXT(e.message, "'a.txt' is no mesh file (read: OBJ, PLY, OFF, STL)");
     CHECK(vg_model_read(&m, "hello\n", 6, NULL, "a.obj", &e) == VG_EINPUT); /* told by the name */
     CHECK_TEXT(e.message, "'a.obj' has no vertices (no line 'v x y z')");
     CHECK(vg_model_read(&m, "hello\n", 6, "ply", "a", &e) == VG_EINPUT);

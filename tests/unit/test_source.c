@@ -675,7 +675,7 @@ static void refused_names(void)
         CHECK(vg_sink_check(wrong[i], &plain, &e) == VG_EARG && *e.message);
         CHECK(write_frames(wrong[i], &plain, three, 1, &e) == VG_EARG);
     }
-    CHECK(vg_sink_check("out.obj", &(vg_sink_options){.format = "stl"}, &e) == VG_EARG && strstr(e.message, "'stl'"));
+    CHECK(vg_sink_check("out.obj", &(vg_sink_options){.format = "fbx"}, &e) == VG_EARG && strstr(e.message, "'fbx'"));
     CHECK(vg_sink_check("out.xyz", &(vg_sink_options){.format = "off"}, &e) == VG_OK);
     CHECK(vg_sink_check("out.obj", &(vg_sink_options){.first_number = -1}, &e) == VG_EARG);
     CHECK(vg_sink_check("missing/out.obj", &plain, &e) == VG_ESYS);

@@ -1,0 +1,318 @@
+/* vg-poisson: guide a sequence in time through given poses, keeping its second differences.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "cli.h"
+
+#include <limits.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A given pose and the frame it is for. */
+typedef struct key {
+    enum { FIRST, LAST, NAMED, NUMBERED } by; /* NAMED: FRAME may be a number all the same */
+    const char *option, *mesh;                /* "--key 40", and the operand that brings the pose */
+    char *frame;
+    bool has_number;
+    uint64_t number;
+    double *pose;
+    bool met;       /* its frame has come, as number `at` */
+    uint64_t at;
+} key;
+
+static struct {
+    size_t nkeys;
+    key *keys;
+    double memory;
+} opts = {.memory = 256.0 * (1 << 20)};
+
+static void out_of_memory(void) __attribute__((noreturn));
+static void out_of_memory(void)
+{
+    cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the given poses"});
+}
+
+static key *add_key(int by, const char *mesh)
+{
+    key *grown = realloc(opts.keys, (opts.nkeys + 1) * sizeof *grown);
+    if (!grown) out_of_memory();
+    opts.keys = grown;
+    key *k = &grown[opts.nkeys++];
+    *k = (key){.by = by, .mesh = mesh};
+    return k;
+}
+
+static void add_end(const char *mesh, int by, const char *option)
+{
+    for (size_t i = 0; i < opts.nkeys; i++)
+        if ((int)opts.keys[i].by == by) cli_usage("option '%s' is there twice", option);
+    add_key(by, mesh)->option = option;
+}
+
+static void take_first(const char *mesh, void *context)
+{
+    (void)context;
+    add_end(mesh, FIRST, "--first");
+}
+
+static void take_last(const char *mesh, void *context)
+{
+    (void)context;
+    add_end(mesh, LAST, "--last");
+}
+
+static bool parse_count(const char *text, uint64_t *x)
+{
+    *x = 0;
+    if (!*text || text[strspn(text, "0123456789")]) return false;
+    for (; *text; text++)
+        if (__builtin_mul_overflow(*x, 10, x) || __builtin_add_overflow(*x, (uint64_t)(*text - '0'), x)) return false;
+    return true;
+}
+
+/* FRAME=MESH; "#N" is number N, whatever frames are called */
+static void take_key(const char *text, void *context)
+{
+    (void)context;
+    const char *equals = strchr(text, '=');
+    if (!equals || equals == text || !equals[1]) cli_usage("option '--key' needs FRAME=MESH, not '%s'", text);
+    key *k = add_key(NAMED, equals + 1);
+    size_t n = (size_t)(equals - text);
+    char *option = malloc(n + sizeof "--key ");
+    if (!option || !(k->frame = strndup(text, n))) out_of_memory();
+    memcpy(option, "--key ", 6);
+    memcpy(option + 6, k->frame, n + 1);
+    k->option = option;
+    k->has_number = parse_count(k->frame, &k->number);
+    if (*k->frame == '#' && parse_count(k->frame + 1, &k->number)) k->by = NUMBERED, k->has_number = true;
+}
+
+static void take_memory(const char *text, void *context)
+{
+    (void)context;
+    static const char units[] = "KMGT";
+    size_t n = strlen(text);
+    const char *unit = n ? strchr(units, text[n - 1] & ~0x20) : NULL;
+    char number[32];
+    uint64_t x;
+    snprintf(number, sizeof number, "%.*s", (int)(n < 30 ? n - (unit != NULL) : 31), text);
+    if (!parse_count(number, &x)) cli_usage("option '--memory' needs a size such as 64M or 2G, not '%s'", text);
+    opts.memory = (double)x;
+    for (const char *u = units; unit && u <= unit; u++) opts.memory *= 1024;
+}
+
+static const cli_option options[] = {
+    {"first", 0, "MESH", "the first frame becomes this pose", .take = take_first},
+    {"last", 0, "MESH", "the last frame becomes this pose", .take = take_last},
+    {"key", 0, "FRAME=MESH", "this frame, by name or by number from 0, becomes this pose; repeat as needed", .take = take_key},
+    {"memory", 0, "SIZE", "hold this much of waiting frames in memory, the rest in a file (default: 256M)", .take = take_memory},
+    {NULL}};
+
+static const cli_program program = {
+    .name = "vg-poisson",
+    .synopsis = "[options] [FILE]",
+    .summary = "guide a sequence in time through given poses: exact there, second differences kept elsewhere",
+    .options = options,
+    .most_operands = 1,
+    .writes_stream = true};
+
+/* ---- the given poses ---- */
+
+static void refuse_kind(const char *subject, vg_kind kind) __attribute__((noreturn));
+static void refuse_kind(const char *subject, vg_kind kind)
+{
+    static const char *const advice[] = {[VG_VECTORS] = "pipe them through 'vg-solve' first",
+                                         [VG_DEFORMATIONS] = "apply them with 'vg-deform --onto MESH', then 'vg-solve'",
+                                         [VG_TRANSFORMS] = "they need a map"};
+    vg_err e;
+    vg_fail(&e, VG_EINPUT, "%s holds %s, and vertices are guided: %s", subject, vg_kind_name(kind), advice[kind]);
+    cli_die(&e);
+}
+
+/* The first pose of the operand; the rest is not read. */
+static void load_key(key *k, vg_head *h)
+{
+    vg_err e;
+    vg_source *s;
+    vg_frame f = {0};
+    char subject[200];
+    snprintf(subject, sizeof subject, "'%.180s'", k->mesh);
+    if (vg_source_open(&s, &k->mesh, 1, &e) < 0) cli_die(&e);
+    const vg_head *from = vg_source_head(s);
+    if (from->kind != VG_VERTICES) refuse_kind(subject, from->kind);
+    if (vg_mesh_same(&h->mesh, "the sequence", &from->mesh, subject, &e) < 0) cli_die(&e);
+    int r = vg_source_next(s, &f, &e);
+    if (r == 0) r = vg_fail(&e, VG_EINPUT, "%s holds no pose", subject);
+    if (r < 0 || vg_head_merge_trace(h, from, &e) < 0) cli_die(&e);
+    k->pose = malloc((3 * h->mesh.nv + 1) * sizeof *k->pose);
+    if (!k->pose) out_of_memory();
+    memcpy(k->pose, f.values, 3 * h->mesh.nv * sizeof *k->pose);
+    vg_frame_clear(&f);
+    vg_source_close(&s);
+}
+
+static void refuse_shared_input(char **operands, size_t n)
+{
+    size_t uses = n == 0 || !strcmp(operands[0], "-");
+    for (size_t i = 0; i < opts.nkeys; i++) uses += !strcmp(opts.keys[i].mesh, "-");
+    if (uses > 1) cli_usage("standard input can be the sequence or one given pose, not more");
+}
+
+/* ---- the sequence ---- */
+
+typedef struct work {
+    vg_source *s;
+    vg_head *h;
+    vg_guide *guide;
+    vg_spool *spool;
+    vg_frame held;     /* a frame on its way out of the spool */
+    uint64_t released; /* number of the first frame that is still held */
+    size_t ahead;      /* keys whose frames have not come */
+    bool begun;        /* a key's frame has come */
+} work;
+
+static bool is_for(const key *k, uint64_t n, const char *name, bool last)
+{
+    switch (k->by) {
+    case FIRST: return n == 0;
+    case LAST: return last;
+    case NAMED: return !strcmp(k->frame, name) || (k->has_number && k->number == n);
+    default: return k->number == n;
+    }
+}
+
+/* A key that has met its frame by number meets one of that name later. */
+static void refuse_ambiguous(const key *k, uint64_t n, const char *name)
+{
+    if (k->by != NAMED || !k->has_number || k->at != k->number || k->at == n || strcmp(k->frame, name)) return;
+    vg_err e;
+    vg_fail(&e, VG_EINPUT, "'%s' is the number of one frame and the name of a later one: write '--key #%llu=%s' or '--key #%llu=%s'",
+            k->option, (unsigned long long)k->at, k->mesh, (unsigned long long)n, k->mesh);
+    cli_die(&e);
+}
+
+/* The pose that frame n is to become, or NULL. */
+static const double *find_given(work *w, uint64_t n, const char *name, bool last)
+{
+    const key *found = NULL;
+    for (size_t i = 0; i < opts.nkeys; i++) {
+        key *k = &opts.keys[i];
+        if (k->met) refuse_ambiguous(k, n, name);
+        if (k->met || !is_for(k, n, name, last)) continue;
+        k->met = true, k->at = n;
+        w->ahead--;
+        if (found && memcmp(found->pose, k->pose, 3 * w->h->mesh.nv * sizeof *k->pose)) {
+            vg_err e;
+            vg_fail(&e, VG_EINPUT, "'%s' and '%s' give two poses to one frame, number %llu, '%s'", found->option, k->option,
+                    (unsigned long long)n, name);
+            cli_die(&e);
+        }
+        found = k;
+    }
+    return found ? found->pose : NULL;
+}
+
+static void release_held(work *w)
+{
+    vg_err e;
+    int r;
+    while ((r = vg_spool_next(w->spool, &w->held, &e)) > 0) {
+        vg_guide_apply(w->guide, w->released++, w->held.values);
+        cli_stream_put(&w->held);
+    }
+    if (r < 0) cli_die(&e);
+}
+
+static void step(work *w, vg_frame *f, uint64_t n, bool last)
+{
+    const double *given = find_given(w, n, f->name, last);
+    vg_err e;
+    if (given) {
+        vg_guide_key(w->guide, n, f->values, given);
+        w->begun = true;
+        release_held(w);
+    } else if (!w->begun || w->ahead) {
+        if (vg_spool_put(w->spool, f, &e) < 0) cli_die(&e);
+        return;
+    } else {
+        vg_guide_apply(w->guide, n, f->values);
+    }
+    w->released = n + 1;
+    cli_stream_put(f);
+}
+
+/* One frame late, so that the last is known when it is its turn. */
+static uint64_t guide_all(work *w)
+{
+    vg_err e;
+    vg_frame frames[2] = {{0}};
+    uint64_t n = 0;
+    int r;
+    for (; (r = vg_source_next(w->s, &frames[n % 2], &e)) > 0; n++) {
+        if (n > 0) step(w, &frames[(n - 1) % 2], n - 1, false);
+        cli_progress("frames", n + 1);
+    }
+    if (r < 0) cli_die(&e);
+    if (n > 0) step(w, &frames[(n - 1) % 2], n - 1, true);
+    for (int i = 0; i < 2; i++) vg_frame_clear(&frames[i]);
+    return n;
+}
+
+static void refuse_unmet(uint64_t frames)
+{
+    vg_err e;
+    char list[300] = "";
+    size_t at = 0;
+    for (size_t i = 0; i < opts.nkeys; i++) {
+        if (opts.keys[i].met || at + 1 >= sizeof list) continue;
+        int n = snprintf(list + at, sizeof list - at, "%s'%s'", at ? ", " : "", opts.keys[i].option);
+        at += n > 0 ? (size_t)n : 0;
+    }
+    if (frames == 0) vg_fail(&e, VG_EINPUT, "there is no frame for %s: the sequence is empty", list);
+    else vg_fail(&e, VG_EINPUT, "there is no frame for %s among the %llu, whose numbers are 0 to %llu", list,
+                 (unsigned long long)frames, (unsigned long long)(frames - 1));
+    cli_die(&e);
+}
+
+static void open_work(work *w)
+{
+    vg_err e;
+    size_t limit = opts.memory < (double)SIZE_MAX ? (size_t)opts.memory : SIZE_MAX;
+    for (size_t i = 0; i < opts.nkeys; i++) load_key(&opts.keys[i], w->h);
+    w->ahead = opts.nkeys;
+    if (vg_guide_new(&w->guide, w->h->mesh.nv, &e) < 0 || vg_spool_new(&w->spool, w->h, limit, &e) < 0) cli_die(&e);
+}
+
+static void close_work(work *w)
+{
+    vg_frame_clear(&w->held);
+    vg_spool_free(&w->spool);
+    vg_guide_free(&w->guide);
+    vg_source_close(&w->s);
+    for (size_t i = 0; i < opts.nkeys; i++) {
+        key *k = &opts.keys[i];
+        if (k->frame) free((char *)(uintptr_t)k->option);
+        free(k->frame);
+        free(k->pose);
+    }
+    free(opts.keys);
+}
+
+int main(int argc, char **argv)
+{
+    char **operands;
+    size_t n = cli_start(&program, argc, argv, &operands);
+    if (opts.nkeys == 0) cli_usage("name at least one given pose: --first, --last or --key");
+    refuse_shared_input(operands, n);
+    work w = {.s = cli_source(operands, n)};
+    w.h = vg_source_head(w.s);
+    if (w.h->kind != VG_VERTICES) refuse_kind("the input", w.h->kind);
+    open_work(&w);
+    cli_stream_open(w.h);
+    uint64_t frames = guide_all(&w);
+    if (w.ahead) refuse_unmet(frames);
+    vg_spool_facts facts = vg_spool_get_facts(w.spool);
+    cli_note("%llu frames, at most %llu waited, %llu bytes of them in a temporary file", (unsigned long long)frames,
+             (unsigned long long)facts.most_frames, (unsigned long long)facts.file_bytes);
+    cli_stream_end(vg_source_tail(w.s));
+    close_work(&w);
+    cli_finish(0);
+}

@@ -1,0 +1,212 @@
+/* vg-register: pair the faces of two meshes of different connectivity, from a few pairs of vertices.
+ * Leaves out what is done with the pairs: 'vg-deform --correspondence'.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "cli.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+static struct {
+    const char *markers, *dense, *dense_source;
+    long base;
+    bool uv, aligned, keep_all;
+} opts;
+
+static const cli_option options[] = {
+    {.name = "markers", .letter = 'm', .value = "FILE", .help = "pairs of vertices, one a line: [NAME] SOURCE TARGET",
+     .text = &opts.markers},
+    {.name = "index-base", .value = "N", .help = "the number of the first vertex in these files: 0 or 1 (default: 0)",
+     .integer = &opts.base, .least = 0, .most = 1},
+    {.name = "keep-all", .help = "use also markers that contradict the others", .flag = &opts.keep_all},
+    {.name = "dense", .value = "FILE", .help = "vertices of TARGET as points of SOURCE, one a line: VERTEX A B C WA WB WC",
+     .text = &opts.dense},
+    {.name = "dense-source", .value = "FILE", .help = "the same the other way round: vertices of SOURCE as points of TARGET",
+     .text = &opts.dense_source},
+    {.name = "uv", .help = "points of the same texture coordinates belong together", .flag = &opts.uv},
+    {.name = "aligned", .help = "the two lie on one another as they are; markers are not needed", .flag = &opts.aligned},
+    {0},
+};
+
+static const cli_program program = {
+    .name = "vg-register",
+    .synopsis = "[options] SOURCE TARGET",
+    .summary = "Pair the faces of two meshes of different connectivity, from a few pairs of vertices",
+    .options = options,
+    .most_operands = 2,
+    .writes_stream = true,
+    .threaded = true,
+};
+
+static void check_options(size_t operands)
+{
+    if (operands != 2) cli_usage("two meshes are needed: SOURCE and TARGET");
+    if (opts.dense && opts.dense_source) cli_usage("only one of --dense and --dense-source can be used");
+    if (!opts.markers && !opts.dense && !opts.dense_source && !opts.uv && !opts.aligned)
+        cli_usage("nothing says which point belongs to which: give --markers FILE, --dense FILE, --uv, or --aligned when the "
+                  "meshes lie on one another");
+}
+
+static void out_of_memory(const char *what) __attribute__((noreturn));
+static void out_of_memory(const char *what)
+{
+    vg_err e;
+    vg_fail(&e, VG_ENOMEM, "not enough memory for %s", what);
+    cli_die(&e);
+}
+
+static char *read_file(const char *path, size_t *n)
+{
+    vg_err e;
+    char *data = NULL;
+    size_t cap = 0;
+    FILE *f = strcmp(path, "-") ? fopen(path, "re") : stdin;
+    *n = 0;
+    errno = f ? 0 : errno;
+    while (f) {
+        if (cap - *n < 1 << 16 && !(data = realloc(data, cap = 2 * cap + (1 << 17)))) out_of_memory(path);
+        size_t got = fread(data + *n, 1, cap - *n, f);
+        *n += got;
+        if (got == 0) break;
+    }
+    if (!f || ferror(f)) {
+        vg_fail(&e, VG_ESYS, "cannot read '%s': %s", path, strerror(errno ? errno : EIO));
+        cli_die(&e);
+    }
+    if (f != stdin) fclose(f);
+    return data;
+}
+
+/* ---- what is said on standard error ---- */
+
+static void note_step(void *context, const vg_register_step *s)
+{
+    (void)context;
+    cli_note("round %zu of %zu: %zu vertices near the target, %.3g D from it on average, at most %.3g D; stiffness %.3g", s->round,
+             s->rounds, s->near, s->mean, s->largest, s->stiffness);
+}
+
+static void note_alignment(const vg_register_result *r)
+{
+    cli_note("the source as a whole: scale %.6g, rotation %.4f %.4f %.4f / %.4f %.4f %.4f / %.4f %.4f %.4f, shift %.6g %.6g %.6g",
+             r->scale, r->rotation[0], r->rotation[1], r->rotation[2], r->rotation[3], r->rotation[4], r->rotation[5],
+             r->rotation[6], r->rotation[7], r->rotation[8], r->shift[0], r->shift[1], r->shift[2]);
+    if (r->uv_pairs) cli_note("%zu vertices of the source found their texture coordinates on the target", r->uv_pairs);
+}
+
+static void report_markers(const vg_markers *m, const vg_register_result *r)
+{
+    for (size_t i = 0; i < m->n; i++) {
+        char which[100];
+        if (m->at[i].name) snprintf(which, sizeof which, "marker '%.60s' (line %zu)", m->at[i].name, m->at[i].line);
+        else snprintf(which, sizeof which, "the marker of line %zu", m->at[i].line);
+        if (r->left_out[i])
+            cli_warn("%s, vertex %ld on vertex %ld, is %.3g D from where its neighbours expect it, most are within %.2g D: %s", which,
+                     m->at[i].source + opts.base, m->at[i].target + opts.base, r->residual[i], 2 * r->typical_residual,
+                     opts.keep_all ? "it is used all the same" : "it is left out");
+        else
+            cli_note("%s: %.3g D from where its neighbours expect it", which, r->residual[i]);
+    }
+}
+
+/* Faces without counterpart, by component of the target. */
+static void report_unmatched(const vg_mesh *m, const vg_correspondence *c)
+{
+    vg_err e;
+    size_t n = 0, unmatched = 0;
+    uint32_t *label = calloc(m->nv + 1, sizeof *label);
+    if (!label) out_of_memory("the components of the target");
+    if (vg_mesh_components(m, label, &n, &e) < 0) cli_die(&e);
+    size_t *faces = calloc(n + 1, sizeof *faces), *without = calloc(n + 1, sizeof *without);
+    if (!faces || !without) out_of_memory("the components of the target");
+    for (size_t f = 0; f < m->nf; f++) {
+        uint32_t k = label[m->vert[m->start[f]]];
+        faces[k]++, without[k] += !c->matched[f], unmatched += !c->matched[f];
+    }
+    for (size_t k = 0; k < n; k++) {
+        if (!without[k]) continue;
+        cli_warn("%zu of the %zu faces of the target's component %zu have no counterpart: they ride with %s", without[k], faces[k], k,
+                 without[k] < faces[k] ? "those beside them" : "the nearest faces that have one");
+    }
+    cli_note("%zu of %zu faces of the target matched, %zu pairs", m->nf - unmatched, m->nf, (size_t)c->first[c->target_nf]);
+    free(label);
+    free(faces);
+    free(without);
+}
+
+/* ---- the work ---- */
+
+static void read_pairs(vg_register_input *in, vg_markers *markers, vg_seed **seeds)
+{
+    vg_err e;
+    size_t n;
+    const char *dense = opts.dense ? opts.dense : opts.dense_source;
+    if (opts.markers) {
+        char *data = read_file(opts.markers, &n);
+        if (vg_markers_read(markers, data, n, (int)opts.base, opts.markers, &e) < 0) cli_die(&e);
+        free(data);
+        in->markers = markers;
+    }
+    if (dense) {
+        char *data = read_file(dense, &n);
+        if (vg_seeds_read(seeds, &in->nseeds, data, n, (int)opts.base, dense, &e) < 0) cli_die(&e);
+        free(data);
+        in->seeds = *seeds, in->seeds_of_source = opts.dense_source != NULL;
+    }
+}
+
+static void load(vg_head *h, const char *operand)
+{
+    vg_err e;
+    if (vg_load_mesh(h, operand, &e) < 0) cli_die(&e);
+    if (opts.uv && h->attributes.ntex == 0) {
+        vg_fail(&e, VG_EINPUT, "'%s' has no texture coordinates: --uv needs them in both meshes", operand);
+        cli_die(&e);
+    }
+}
+
+/* The stream: the source's mesh and reference, one frame that is the source on the target, and the pairs. */
+static void write_stream(vg_head *h, const vg_head *target, vg_register_result *r)
+{
+    vg_err e;
+    vg_frame f = {0};
+    h->correspondence = r->pairs;
+    r->pairs = (vg_correspondence){0};
+    h->kind = VG_VERTICES, h->count = h->mesh.nv;
+    if (vg_head_merge_trace(h, target, &e) < 0) cli_die(&e);
+    cli_stream_open(h);
+    if (vg_frame_shape(&f, h, &e) < 0 || vg_frame_rename(&f, target->reference_name ? target->reference_name : "", &e) < 0) cli_die(&e);
+    if (h->mesh.nv) memcpy(f.values, r->fitted, 3 * h->mesh.nv * sizeof *f.values);
+    cli_stream_put(&f);
+    cli_stream_end(NULL);
+    vg_frame_clear(&f);
+}
+
+int main(int argc, char **argv)
+{
+    char **operands;
+    vg_err e;
+    vg_head source = {0}, target = {0};
+    vg_markers markers = {0};
+    vg_seed *seeds = NULL;
+    vg_register_result r;
+    check_options(cli_start(&program, argc, argv, &operands));
+    load(&source, operands[0]);
+    load(&target, operands[1]);
+    vg_register_input in = {.source = &source.mesh, .target = &target.mesh, .source_points = source.reference,
+                            .target_points = target.reference, .aligned = opts.aligned, .keep_all = opts.keep_all,
+                            .source_uv = opts.uv ? &source.attributes : NULL, .target_uv = opts.uv ? &target.attributes : NULL,
+                            .threads = cli.threads};
+    read_pairs(&in, &markers, &seeds);
+    if (vg_register(&r, &in, note_step, NULL, &e) < 0) cli_die(&e);
+    note_alignment(&r);
+    report_markers(&markers, &r);
+    report_unmatched(&target.mesh, &r.pairs);
+    write_stream(&source, &target, &r);
+    vg_register_result_clear(&r);
+    vg_markers_clear(&markers);
+    free(seeds);
+    vg_head_clear(&source);
+    vg_head_clear(&target);
+    cli_finish(0);
+}

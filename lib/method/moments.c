@@ -1,0 +1,61 @@
+/* moments.c: normal and inverse second moments of one face. Leaves out all poses but the one it is given.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/moments.h"
+
+#include <math.h>
+
+static const double flat = 1e-12; /* of the sum of squared lengths: see deform_kernel.c */
+
+bool vgi_unit_normal(const double *w, size_t r, double n[3])
+{
+    double spread = 0;
+    n[0] = n[1] = n[2] = 0;
+    for (size_t i = 0; i < r; i++) {
+        const double *a = w + 3 * i, *b = w + 3 * (i + 1 < r ? i + 1 : 0);
+        n[0] += a[1] * b[2] - a[2] * b[1];
+        n[1] += a[2] * b[0] - a[0] * b[2];
+        n[2] += a[0] * b[1] - a[1] * b[0];
+        spread += a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
+    }
+    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    if (!(length > flat * spread)) return false;
+    for (int k = 0; k < 3; k++) n[k] /= length;
+    return true;
+}
+
+/* false when it has no inverse */
+static bool invert(const double a[6], double inverse[6])
+{
+    double c0 = a[3] * a[5] - a[4] * a[4], c1 = a[2] * a[4] - a[1] * a[5], c2 = a[1] * a[4] - a[2] * a[3];
+    double det = a[0] * c0 + a[1] * c1 + a[2] * c2, size = a[0] + a[3] + a[5];
+    if (!(det > 1e-18 * size * size * size)) return false;
+    inverse[0] = c0 / det, inverse[1] = c1 / det, inverse[2] = c2 / det;
+    inverse[3] = (a[0] * a[5] - a[2] * a[2]) / det, inverse[4] = (a[1] * a[2] - a[0] * a[4]) / det;
+    inverse[5] = (a[0] * a[3] - a[1] * a[1]) / det;
+    return true;
+}
+
+void vgi_symmetric_times(const double a[6], const double x[3], double y[3])
+{
+    y[0] = a[0] * x[0] + a[1] * x[1] + a[2] * x[2];
+    y[1] = a[1] * x[0] + a[3] * x[1] + a[4] * x[2];
+    y[2] = a[2] * x[0] + a[4] * x[1] + a[5] * x[2];
+}
+
+bool vgi_gradient_moments(const double *w, size_t r, double P[6], double q[3])
+{
+    double sum[6] = {0, 0, 0, 0, 0, 0}, n[3];
+    for (size_t i = 0; i < r; i++) {
+        const double *v = w + 3 * i;
+        sum[0] += v[0] * v[0], sum[1] += v[0] * v[1], sum[2] += v[0] * v[2];
+        sum[3] += v[1] * v[1], sum[4] += v[1] * v[2], sum[5] += v[2] * v[2];
+    }
+    if (!vgi_unit_normal(w, r, n)) return false;
+    double h = (sum[0] + sum[3] + sum[5]) / 2;
+    sum[0] += h * n[0] * n[0], sum[1] += h * n[0] * n[1], sum[2] += h * n[0] * n[2];
+    sum[3] += h * n[1] * n[1], sum[4] += h * n[1] * n[2], sum[5] += h * n[2] * n[2];
+    if (!invert(sum, P)) return false;
+    vgi_symmetric_times(P, n, q);
+    for (int k = 0; k < 3; k++) q[k] *= h;
+    return true;
+}

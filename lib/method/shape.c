@@ -1,0 +1,95 @@
+/* shape.c: transfer by shape deformation (T 4.1): no linear system, straight to vertices.
+ * Leaves out where the body goes: the caller moves it.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/core.h"
+
+#include <stdlib.h>
+
+struct vg_shaper {
+    const vg_graph *g;
+    int threads;
+    double *quaternion; /* per corner: P_c, source to target in the reference poses */
+    double *share;      /* per vertex: 1 / number of its corners */
+    double *reference;  /* the target's, for vertices in no face */
+};
+
+int vg_shaper_new(vg_shaper **out, const vg_graph *g, const double *source, const double *target, int threads, vg_err *e)
+{
+    size_t corners = vg_graph_corners(g);
+    vg_shaper *s = *out = vgi_array(1, sizeof *s, e);
+    if (!s) return VG_ENOMEM;
+    s->g = g, s->threads = threads;
+    double *a = vgi_array(3 * corners, sizeof *a, e), *b = vgi_array(3 * corners, sizeof *b, e);
+    s->quaternion = vgi_array(4 * corners, sizeof *s->quaternion, e);
+    s->share = vgi_array(g->nv, sizeof *s->share, e);
+    s->reference = vgi_copy_array(target, 3 * g->nv, sizeof *s->reference, e);
+    bool ok = a && b && s->quaternion && s->share && s->reference;
+    if (ok) {
+        double least = 1e-9 * vg_diagonal(source, g->nv);
+        vg_graph_vectors(g, source, a);
+        vg_graph_vectors(g, target, b);
+        for (size_t c = 0; c < corners; c++) {
+            const double *r = a + 3 * c, *t = b + 3 * c;
+            double *q = s->quaternion + 4 * c;
+            bool has = r[0] * r[0] + r[1] * r[1] + r[2] * r[2] > least * least && (t[0] != 0 || t[1] != 0 || t[2] != 0);
+            if (has) vg_quat_between(r, t, q);
+            else q[0] = 1;
+            s->share[g->vert[c]] += 1;
+        }
+        for (size_t v = 0; v < g->nv; v++)
+            if (s->share[v] > 0) s->share[v] = 1 / s->share[v];
+    } else {
+        vg_shaper_free(out);
+    }
+    free(a);
+    free(b);
+    return ok ? VG_OK : VG_ENOMEM;
+}
+
+void vg_shaper_free(vg_shaper **s)
+{
+    if (!*s) return;
+    free((*s)->quaternion);
+    free((*s)->share);
+    free((*s)->reference);
+    free(*s);
+    *s = NULL;
+}
+
+typedef struct shape_job {
+    const vg_shaper *s;
+    const double *const *poses;
+    double *const *vertices;
+} shape_job;
+
+static void shape_pose(void *context, size_t i)
+{
+    const shape_job *j = context;
+    const vg_shaper *s = j->s;
+    const vg_graph *g = s->g;
+    const double *in = j->poses[i];
+    double *out = j->vertices[i];
+    memset(out, 0, 3 * g->nv * sizeof *out);
+    for (size_t f = 0; f < g->nf; f++) {
+        uint32_t begin = g->start[f], end = g->start[f + 1];
+        double centre[3] = {0, 0, 0}, part = 1.0 / (double)(end - begin);
+        for (uint32_t c = begin; c < end; c++)
+            for (size_t k = 0; k < 3; k++) centre[k] += in[3 * (size_t)g->vert[c] + k];
+        for (int k = 0; k < 3; k++) centre[k] *= part;
+        for (uint32_t c = begin; c < end; c++) {
+            double w[3], *to = out + 3 * (size_t)g->vert[c];
+            for (size_t k = 0; k < 3; k++) w[k] = in[3 * (size_t)g->vert[c] + k] - centre[k];
+            vg_quat_apply(s->quaternion + 4 * (size_t)c, w, w);
+            for (int k = 0; k < 3; k++) to[k] += centre[k] + w[k];
+        }
+    }
+    for (size_t v = 0; v < g->nv; v++)
+        for (size_t k = 0; k < 3; k++)
+            out[3 * v + k] = g->in_face[v] ? out[3 * v + k] * s->share[v] : s->reference[3 * v + k];
+}
+
+void vg_shaper_transfer(vg_shaper *s, size_t n, const double *const *poses, double *const *vertices)
+{
+    shape_job j = {s, poses, vertices};
+    vgi_parallel(s->threads, n, shape_pose, &j);
+}

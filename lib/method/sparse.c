@@ -1,0 +1,95 @@
+/* sparse.c: symmetric positive definite systems through CHOLMOD: one analysis, many factorisations.
+ * Leaves out assembling them. Calls Core, Cholesky, Partition (LGPL) and Supernodal (GPL) of CHOLMOD.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/sparse.h"
+
+#include <cholmod.h>
+#include <stdlib.h>
+
+enum { SMALL = 500 }; /* below this many unknowns a minimum-degree order is as good as nested dissection, and faster */
+
+struct vgi_cholesky {
+    cholmod_common common;
+    cholmod_factor *L;
+    cholmod_dense *x, *y, *e; /* kept from solve to solve by cholmod_solve2 */
+    double *b;                /* n x 3, by columns */
+};
+
+void vgi_sparse_clear(vgi_sparse *a)
+{
+    free(a->start);
+    free(a->row);
+    free(a->value);
+    *a = (vgi_sparse){0};
+}
+
+/* a as CHOLMOD sees it, borrowed. */
+static cholmod_sparse view(const vgi_sparse *a)
+{
+    return (cholmod_sparse){.nrow = a->n, .ncol = a->n, .nzmax = (size_t)a->start[a->n], .p = a->start, .i = a->row,
+                            .x = a->value, .stype = -1, .itype = CHOLMOD_INT, .xtype = CHOLMOD_REAL,
+                            .dtype = CHOLMOD_DOUBLE, .sorted = 1, .packed = 1};
+}
+
+int vgi_cholesky_new(vgi_cholesky **out, const vgi_sparse *a, vg_err *e)
+{
+    vgi_cholesky *c = *out = vgi_array(1, sizeof *c, e);
+    if (!c) return VG_ENOMEM;
+    cholmod_start(&c->common);
+    c->common.print = 0;
+    c->common.error_handler = NULL;
+    c->common.nmethods = 1;
+    c->common.method[0].ordering = a->n < SMALL ? CHOLMOD_AMD : CHOLMOD_METIS;
+    c->common.postorder = 1;
+    c->common.supernodal = CHOLMOD_SUPERNODAL;
+    cholmod_sparse A = view(a);
+    c->L = cholmod_analyze(&A, &c->common);
+    c->b = vgi_array_raw(a->n, 3 * sizeof *c->b, e);
+    if (c->L && c->b) return VG_OK;
+    vgi_cholesky_free(out);
+    return vg_fail(e, VG_ENOMEM, "not enough memory to factorize %zu unknowns", a->n);
+}
+
+void vgi_cholesky_free(vgi_cholesky **out)
+{
+    vgi_cholesky *c = *out;
+    if (!c) return;
+    cholmod_free_dense(&c->x, &c->common);
+    cholmod_free_dense(&c->y, &c->common);
+    cholmod_free_dense(&c->e, &c->common);
+    cholmod_free_factor(&c->L, &c->common);
+    cholmod_finish(&c->common);
+    free(c->b);
+    free(c);
+    *out = NULL;
+}
+
+int vgi_cholesky_factorize(vgi_cholesky *c, const vgi_sparse *a, vg_err *e)
+{
+    cholmod_sparse A = view(a);
+    cholmod_factorize(&A, c->L, &c->common);
+    if (c->common.status == CHOLMOD_OUT_OF_MEMORY)
+        return vg_fail(e, VG_ENOMEM, "not enough memory to factorize %zu unknowns", a->n);
+    if (c->common.status != CHOLMOD_OK || c->L->minor != c->L->n)
+        return vg_fail(e, VG_EINPUT, "cannot factorize: not positive definite at row %zu", c->L->minor);
+    return VG_OK;
+}
+
+int vgi_cholesky_solve(vgi_cholesky *c, double *x, vg_err *e)
+{
+    size_t n = c->L->n;
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < 3; k++) c->b[k * n + i] = x[3 * i + k];
+    cholmod_dense B = {.nrow = n, .ncol = 3, .nzmax = 3 * n, .d = n, .x = c->b, .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
+    if (!cholmod_solve2(CHOLMOD_A, c->L, &B, NULL, &c->x, NULL, &c->y, &c->e, &c->common))
+        return vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", n);
+    const double *from = c->x->x;
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < 3; k++) x[3 * i + k] = from[k * n + i];
+    return VG_OK;
+}
+
+size_t vgi_cholesky_entries(const vgi_cholesky *c)
+{
+    return c->L->xsize;
+}

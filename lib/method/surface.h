@@ -1,0 +1,35 @@
+/* surface.h: the nearest point on a surface of polygons, of those whose normal fits.
+ * Internal. A face of four corners or more is the fan of triangles around its centroid; a face of two is a line segment.
+ * Leaves out distances between surfaces and rays.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_SURFACE_H
+#define VG_SURFACE_H
+
+#include "core/core.h"
+
+typedef struct vgi_surface vgi_surface;
+
+typedef struct vgi_hit {
+    uint32_t face;
+    bool border;     /* on an edge that has only this face */
+    double square;   /* squared distance */
+    double point[3];
+} vgi_hit;
+
+/* vgi_surface_new: m borrowed until free; points (nv x 3, finite) copied in part. O(n log n). */
+int vgi_surface_new(vgi_surface **s, const vg_mesh *m, const double *points, vg_err *e) VG_MUST_CHECK;
+void vgi_surface_free(vgi_surface **s);
+const double *vgi_surface_normals(const vgi_surface *s);   /* nf x 3: unit (Newell), or 0 for a face that has none */
+const double *vgi_surface_centroids(const vgi_surface *s); /* nf x 3 */
+const double *vgi_surface_sizes(const vgi_surface *s);     /* nf: square root of the area, or the length of a line segment */
+bool vgi_surface_border(const vgi_surface *s, uint32_t corner); /* is the edge from this corner to the next one a border? */
+
+/* vgi_surface_nearest: the nearest point to p within the squared distance `limit`; false when there is none. Faces whose unit normal
+ * has less than `cosine` with `normal` are passed over; those without a normal, and all if `normal` is NULL or 0, are not. Of two
+ * at the same distance the lower face is nearer: the answer depends on no order. */
+bool vgi_surface_nearest(const vgi_surface *s, const double p[3], const double *normal, double cosine, double limit, vgi_hit *hit);
+
+/* vgi_newell: the vector area of a face, whose length is its area (0 for line segments). */
+void vgi_newell(const double *points, const uint32_t *vert, size_t r, double area[3]);
+
+#endif

@@ -1,0 +1,498 @@
+/* skeleton.c: a skeleton as a mesh of bones, its pose from the values of its channels, and the values from a pose.
+ * Leaves out the file that holds a skeleton (bvh.c) and how bones deform (deform.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/core.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static const uint32_t NONE = UINT32_MAX;
+static const double DEGREE = 0.017453292519943295769;
+
+static bool is_rotation(uint8_t channel)
+{
+    return channel >= 4;
+}
+
+size_t vg_skeleton_channels(const vg_skeleton *s)
+{
+    size_t n = 0;
+    for (size_t j = 0; j < s->njoints; j++) n += s->joints[j].nchannels;
+    return n;
+}
+
+int vg_skeleton_mesh(const vg_skeleton *s, vg_mesh *m, vg_err *e)
+{
+    *m = (vg_mesh){0};
+    size_t bones = 0;
+    for (size_t j = 0; j < s->njoints; j++) bones += s->joints[j].parent != NONE;
+    m->start = vgi_array_raw(bones + 1, sizeof *m->start, e);
+    m->vert = vgi_array_raw(bones, 2 * sizeof *m->vert, e);
+    if (!m->start || !m->vert) {
+        vg_mesh_clear(m);
+        return VG_ENOMEM;
+    }
+    m->nv = s->njoints, m->nf = bones;
+    uint32_t at = 0;
+    for (size_t j = 0; j < s->njoints; j++) {
+        if (s->joints[j].parent == NONE) continue;
+        m->start[at / 2] = at;
+        m->vert[at++] = s->joints[j].parent;
+        m->vert[at++] = (uint32_t)j;
+    }
+    m->start[bones] = at;
+    return VG_OK;
+}
+
+/* ---- forward kinematics ---- */
+
+static void copy_turn(const double from[4], double to[4])
+{
+    memcpy(to, from, 4 * sizeof *to);
+}
+
+/* q becomes q times a turn by `degrees` about axis k. */
+static void turn_on(double q[4], int k, double degrees)
+{
+    double half = fmod(degrees, 720) * (DEGREE / 2), r[4] = {cos(half), 0, 0, 0};
+    r[k + 1] = sin(half);
+    vg_quat_multiply(q, r, q);
+}
+
+/* Where joint j is and how it is turned, from its parent's and its own values. */
+static void place_joint(const vg_skeleton *s, size_t j, const double *values, double *positions, double *turns)
+{
+    const vg_joint *joint = &s->joints[j];
+    double offset[3], local[4] = {1, 0, 0, 0};
+    memcpy(offset, joint->offset, sizeof offset);
+    for (uint32_t i = 0; values && i < joint->nchannels; i++) {
+        uint8_t c = joint->channels[i];
+        if (is_rotation(c)) turn_on(local, c - 4, values[i]);
+        else offset[c - 1] = values[i];
+    }
+    if (joint->parent == NONE) {
+        memcpy(positions + 3 * j, offset, sizeof offset);
+        copy_turn(local, turns + 4 * j);
+        return;
+    }
+    const double *parent = turns + 4 * (size_t)joint->parent;
+    vg_quat_multiply(parent, local, turns + 4 * j);
+    vg_quat_apply(parent, offset, positions + 3 * j);
+    for (int k = 0; k < 3; k++) positions[3 * j + k] += positions[3 * (size_t)joint->parent + k];
+}
+
+void vg_skeleton_pose(const vg_skeleton *s, const double *values, double *positions, double *turns)
+{
+    for (size_t j = 0; j < s->njoints; j++) {
+        place_joint(s, j, values, positions, turns);
+        if (values) values += s->joints[j].nchannels;
+    }
+}
+
+/* ---- the best turn for several directions ---- */
+
+/* The unit eigenvector of the largest eigenvalue of a symmetric matrix, by cyclic Jacobi rotations. a is used up. */
+static void largest_eigenvector(double a[4][4], double x[4])
+{
+    double v[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
+    for (int sweep = 0; sweep < 32; sweep++) {
+        double off = 0, on = 0;
+        for (int p = 0; p < 4; p++)
+            for (int q = 0; q < 4; q++) *(p == q ? &on : &off) += a[p][q] * a[p][q];
+        if (!(off > 1e-34 * on)) break;
+        for (int p = 0; p < 3; p++) {
+            for (int q = p + 1; q < 4; q++) {
+                if (a[p][q] == 0) continue;
+                double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+                double t = copysign(1, theta) / (fabs(theta) + sqrt(theta * theta + 1));
+                double c = 1 / sqrt(t * t + 1), s = t * c;
+                for (int k = 0; k < 4; k++) {
+                    double kp = a[k][p], kq = a[k][q];
+                    a[k][p] = c * kp - s * kq, a[k][q] = s * kp + c * kq;
+                }
+                for (int k = 0; k < 4; k++) {
+                    double pk = a[p][k], qk = a[q][k], vp = v[k][p], vq = v[k][q];
+                    a[p][k] = c * pk - s * qk, a[q][k] = s * pk + c * qk;
+                    v[k][p] = c * vp - s * vq, v[k][q] = s * vp + c * vq;
+                }
+            }
+        }
+    }
+    int best = 0;
+    for (int k = 1; k < 4; k++)
+        if (a[k][k] > a[best][best]) best = k;
+    for (int k = 0; k < 4; k++) x[k] = v[k][best];
+}
+
+/* The rotation R that makes tr(R^T b) largest (Davenport's q-method): of all, it takes the vectors o nearest to the d
+ * when b is the sum of d o^T. */
+static void best_turn(const double b[9], double q[4])
+{
+    double xx = b[0], yy = b[4], zz = b[8];
+    double yz = b[7] - b[5], zx = b[2] - b[6], xy = b[3] - b[1];
+    double sxy = b[1] + b[3], szx = b[2] + b[6], syz = b[5] + b[7];
+    double n[4][4] = {{xx + yy + zz, yz, zx, xy},
+                      {yz, xx - yy - zz, sxy, szx},
+                      {zx, sxy, yy - xx - zz, syz},
+                      {xy, szx, syz, zz - xx - yy}};
+    largest_eigenvector(n, q);
+}
+
+/* best_turn of k + weight * (the turn `prior`) */
+static void best_turn_near(const double k[9], double weight, const double prior[4], double q[4])
+{
+    double b[9];
+    vg_quat_matrix(prior, b);
+    for (int i = 0; i < 9; i++) b[i] = k[i] + weight * b[i];
+    best_turn(b, q);
+}
+
+/* k: the sum of d o^T over directions o of the reference and d of now, divided by the sum of |o|^2. What k leaves open
+ * (all directions on one line), and what it says with less force than its own misfit, stays as in q_before: each
+ * step pulls towards the last result, so that what is well determined ends at its optimum all the same. */
+static void fit_turn(const double k[9], const double q_before[4], double q[4])
+{
+    double m[9], agreement = 0, prior[4];
+    copy_turn(q_before, prior);
+    best_turn_near(k, 1e-9, prior, q);
+    vg_quat_matrix(q, m);
+    for (int i = 0; i < 9; i++) agreement += m[i] * k[i];
+    double weight = 1e-9 + fmax(0, 2 * (1 - agreement));
+    for (int step = 0; step < 3; step++) best_turn_near(k, weight, step ? q : prior, q);
+}
+
+/* ---- angles from a turn ---- */
+
+/* Angles in degrees, a whole number of turns away, nearest to those of the pose before. */
+static double near_to(double degrees, double before)
+{
+    return degrees + 360 * nearbyint((before - degrees) / 360);
+}
+
+/* Three different axes, or the first again as the third: any turn has such angles. */
+static bool is_euler(const int axis[6], uint32_t n)
+{
+    return n == 3 && axis[0] != axis[1] && axis[1] != axis[2];
+}
+
+/* m = R_i(a) R_j(b) R_k(c) with three different axes: 3 angles in radians. false: a and c turn about one line, and only
+ * b is given. */
+static bool angles_of_three(const double m[9], int i, int j, int k, double angle[3])
+{
+    double s = (j - i + 3) % 3 == 1 ? 1 : -1; /* even or odd order of axes */
+    double cosine = hypot(m[4 * i], m[3 * i + j]);
+    angle[1] = atan2(s * m[3 * i + k], cosine);
+    angle[0] = atan2(-s * m[3 * j + k], m[4 * k]);
+    angle[2] = atan2(-s * m[3 * i + j], m[4 * i]);
+    return cosine > 1e-7;
+}
+
+/* The same for R_i(a) R_j(b) R_i(c); l is the axis that does not occur. */
+static bool angles_of_two(const double m[9], int i, int j, int l, double angle[3])
+{
+    double s = (j - i + 3) % 3 == 1 ? 1 : -1;
+    double sine = hypot(m[3 * i + j], m[3 * i + l]);
+    angle[1] = atan2(sine, m[4 * i]);
+    angle[0] = atan2(m[3 * j + i], -s * m[3 * l + i]);
+    angle[2] = atan2(m[3 * i + j], s * m[3 * i + l]);
+    return sine > 1e-7;
+}
+
+/* The angle about axis k of a turn that is about k only. */
+static double angle_about(const double q[4], int k)
+{
+    return 2 * atan2(q[k + 1], q[0]) / DEGREE;
+}
+
+static void conjugate(const double q[4], double c[4])
+{
+    c[0] = q[0], c[1] = -q[1], c[2] = -q[2], c[3] = -q[3];
+}
+
+/* Degrees of the three rotations that make the turn q: of the two ways and all whole turns, what is nearest to the
+ * angles before, which are replaced. */
+static void euler_angles(const double q[4], const int axis[3], double *angles)
+{
+    double m[9], a[2][3], distance[2] = {0, 0};
+    bool two = axis[0] == axis[2];
+    vg_quat_matrix(q, m);
+    bool free = two ? angles_of_two(m, axis[0], axis[1], 3 - axis[0] - axis[1], a[0])
+                    : angles_of_three(m, axis[0], axis[1], axis[2], a[0]);
+    if (!free) { /* gimbal lock: the first angle stays, the third takes what is left */
+        double done[4] = {1, 0, 0, 0}, back[4], rest[4];
+        angles[1] = near_to(a[0][1] / DEGREE, angles[1]);
+        turn_on(done, axis[0], angles[0]);
+        turn_on(done, axis[1], angles[1]);
+        conjugate(done, back);
+        vg_quat_multiply(back, q, rest);
+        angles[2] = near_to(angle_about(rest, axis[2]), angles[2]);
+        return;
+    }
+    a[1][0] = a[0][0] + M_PI, a[1][1] = two ? -a[0][1] : M_PI - a[0][1], a[1][2] = a[0][2] + M_PI;
+    for (int way = 0; way < 2; way++) {
+        for (int i = 0; i < 3; i++) {
+            a[way][i] = near_to(a[way][i] / DEGREE, angles[i]);
+            distance[way] += fabs(a[way][i] - angles[i]);
+        }
+    }
+    memcpy(angles, a[distance[1] < distance[0]], 3 * sizeof *angles);
+}
+
+static void multiply(const double a[9], const double b[9], double ab[9])
+{
+    double c[9];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            c[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
+    memcpy(ab, c, sizeof c);
+}
+
+static void transpose(double m[9])
+{
+    double t;
+    t = m[1], m[1] = m[3], m[3] = t;
+    t = m[2], m[2] = m[6], m[6] = t;
+    t = m[5], m[5] = m[7], m[7] = t;
+}
+
+static void matrix_of(const int *axis, const double *angles, uint32_t n, double m[9])
+{
+    double q[4] = {1, 0, 0, 0};
+    for (uint32_t i = 0; i < n; i++) turn_on(q, axis[i], angles[i]);
+    vg_quat_matrix(q, m);
+}
+
+/* Rotations that cannot make every turn (a hinge), or can in many ways: each angle in turn is set to where
+ * tr(R^T k) is largest, starting from the angles before, until nothing moves. */
+static void climb_to_angles(const double k[9], const int *axis, uint32_t n, double *angles)
+{
+    for (int round = 0; round < 200; round++) {
+        double most = 0;
+        for (uint32_t i = 0; i < n; i++) {
+            double before[9], behind[9], g[9];
+            matrix_of(axis, angles, i, before);
+            matrix_of(axis + i + 1, angles + i + 1, n - i - 1, behind);
+            transpose(before);
+            transpose(behind);
+            multiply(before, k, g);
+            multiply(g, behind, g);
+            int u = (axis[i] + 1) % 3, v = (axis[i] + 2) % 3;
+            double sine = g[3 * v + u] - g[3 * u + v], cosine = g[4 * u] + g[4 * v];
+            if (!(hypot(sine, cosine) > 1e-12)) continue;
+            double angle = near_to(atan2(sine, cosine) / DEGREE, angles[i]);
+            most = fmax(most, fabs(angle - angles[i]));
+            angles[i] = angle;
+        }
+        if (!(most > 1e-10)) break;
+    }
+}
+
+/* ---- values of the channels from a pose ---- */
+
+/* A joint that turns with another and lies away from it: a child, or one behind joints that lie on the other. Between
+ * may be a joint that turns it elsewhere: then it is loose. */
+typedef struct arm {
+    uint32_t joint;
+    bool loose;
+    double offset[3];
+} arm;
+
+struct vg_joint_fitter {
+    const vg_skeleton *s;
+    size_t *first_arm; /* njoints + 1 */
+    arm *arms;
+    double *values; /* of the pose before */
+    double *positions, *turns; /* of the joints by these values */
+};
+
+enum { MOST_STEPS = 16 }; /* up a chain of joints that lie on one another */
+
+static double length(const double v[3])
+{
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* Of whose arms is joint c? Up to MOST_STEPS into `owners`. */
+static size_t list_owners(const vg_skeleton *s, size_t c, double shortest, uint32_t owners[MOST_STEPS])
+{
+    size_t n = 0;
+    if (s->joints[c].parent == NONE || !(length(s->joints[c].offset) > shortest)) return 0;
+    for (uint32_t a = s->joints[c].parent; a != NONE && n < MOST_STEPS; a = s->joints[a].parent) {
+        owners[n++] = a;
+        if (length(s->joints[a].offset) > shortest) break;
+    }
+    return n;
+}
+
+static bool has_rotations(const vg_joint *j)
+{
+    for (uint32_t i = 0; i < j->nchannels; i++)
+        if (is_rotation(j->channels[i])) return true;
+    return false;
+}
+
+static int list_arms(vg_joint_fitter *f, double shortest, vg_err *e)
+{
+    const vg_skeleton *s = f->s;
+    uint32_t owners[MOST_STEPS];
+    for (size_t j = 0; j < s->njoints; j++)
+        for (size_t i = list_owners(s, j, shortest, owners); i-- > 0;) f->first_arm[owners[i] + 1]++;
+    for (size_t j = 0; j < s->njoints; j++) f->first_arm[j + 1] += f->first_arm[j];
+    if (!(f->arms = vgi_array_raw(f->first_arm[s->njoints], sizeof *f->arms, e))) return VG_ENOMEM;
+    size_t *next = vgi_copy_array(f->first_arm, s->njoints, sizeof *next, e);
+    if (!next) return VG_ENOMEM;
+    for (size_t j = 0; j < s->njoints; j++) {
+        size_t n = list_owners(s, j, shortest, owners);
+        bool loose = false;
+        for (size_t i = 0; i < n; i++) {
+            arm *a = &f->arms[next[owners[i]]++];
+            *a = (arm){.joint = (uint32_t)j, .loose = loose};
+            memcpy(a->offset, s->joints[j].offset, sizeof a->offset);
+            loose = loose || has_rotations(&s->joints[owners[i]]);
+        }
+    }
+    free(next);
+    return VG_OK;
+}
+
+int vg_joint_fitter_new(vg_joint_fitter **out, const vg_skeleton *s, vg_err *e)
+{
+    vg_joint_fitter *f = *out = vgi_array(1, sizeof *f, e);
+    if (!f) return VG_ENOMEM;
+    f->s = s;
+    f->first_arm = vgi_array(s->njoints + 1, sizeof *f->first_arm, e);
+    f->values = vgi_array(vg_skeleton_channels(s), sizeof *f->values, e);
+    f->positions = vgi_array(s->njoints, 3 * sizeof *f->positions, e);
+    f->turns = vgi_array(s->njoints, 4 * sizeof *f->turns, e);
+    int r = f->first_arm && f->values && f->positions && f->turns ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) {
+        vg_skeleton_pose(s, NULL, f->positions, f->turns);
+        r = list_arms(f, 1e-6 * vg_diagonal(f->positions, s->njoints), e);
+    }
+    if (r < 0) vg_joint_fitter_free(out);
+    return r;
+}
+
+void vg_joint_fitter_free(vg_joint_fitter **fitter)
+{
+    vg_joint_fitter *f = *fitter;
+    if (!f) return;
+    free(f->first_arm);
+    free(f->arms);
+    free(f->values);
+    free(f->positions);
+    free(f->turns);
+    free(f);
+    *fitter = NULL;
+}
+
+/* What the arms of joint j, all or the firm ones, say about its turn: k as fit_turn takes it, how many say something,
+ * the last of them. */
+static size_t gather_arms(const vg_joint_fitter *f, size_t j, const double *pose, bool firm, double k[9],
+                          double offset[3], double now[3])
+{
+    size_t n = 0;
+    double total = 0;
+    memset(k, 0, 9 * sizeof *k);
+    for (size_t i = f->first_arm[j]; i < f->first_arm[j + 1]; i++) {
+        const arm *a = &f->arms[i];
+        double d[3], l = length(a->offset), dl;
+        for (int x = 0; x < 3; x++) d[x] = pose[3 * (size_t)a->joint + x] - pose[3 * j + x];
+        if ((firm && a->loose) || !((dl = length(d)) > 1e-9 * l)) continue;
+        for (int x = 0; x < 3; x++)
+            for (int y = 0; y < 3; y++) k[3 * x + y] += l * d[x] / dl * a->offset[y];
+        total += l * l;
+        n++;
+        memcpy(offset, a->offset, 3 * sizeof *offset);
+        memcpy(now, d, sizeof d);
+    }
+    for (int i = 0; n && i < 9; i++) k[i] /= total;
+    return n;
+}
+
+/* q, a first guess, becomes the turn that the arms ask for, and keeps what they leave open. */
+static void turn_by_arms(const vg_joint_fitter *f, size_t j, const double *pose, bool firm, double k[9], double q[4])
+{
+    double offset[3], now[3], swing[4], carried[3];
+    size_t n = gather_arms(f, j, pose, firm, k, offset, now);
+    if (n > 1) {
+        fit_turn(k, q, q);
+    } else if (n == 1) { /* one direction: no turn about it */
+        vg_quat_apply(q, offset, carried);
+        vg_quat_between(carried, now, swing);
+        vg_quat_multiply(swing, q, q);
+    }
+    double l = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (int i = 0; i < 4; i++) q[i] /= l;
+}
+
+/* The turn of joint j, whose parent is turned by `parent`. The loose arms can still go where they belong by a turn of
+ * their own, so that they only decide what the firm ones leave open. k: of the firm ones. */
+static void turn_joint(const vg_joint_fitter *f, size_t j, const double *pose, const double parent[4], double k[9],
+                       double q[4])
+{
+    copy_turn(parent, q);
+    turn_by_arms(f, j, pose, false, k, q);
+    turn_by_arms(f, j, pose, true, k, q);
+}
+
+/* The angles of joint j's rotations, from those before. */
+static void fit_angles(const vg_joint_fitter *f, size_t j, const double *pose, double *values)
+{
+    static const double unturned[4] = {1, 0, 0, 0};
+    const vg_joint *joint = &f->s->joints[j];
+    int axis[6];
+    double angles[6], k[9], q[4], back[4], local[4];
+    uint32_t n = 0, place[6];
+    for (uint32_t i = 0; i < joint->nchannels; i++)
+        if (is_rotation(joint->channels[i])) axis[n] = joint->channels[i] - 4, angles[n] = values[i], place[n++] = i;
+    if (n == 0) return;
+    const double *parent = joint->parent == NONE ? unturned : f->turns + 4 * (size_t)joint->parent;
+    turn_joint(f, j, pose, parent, k, q);
+    conjugate(parent, back);
+    vg_quat_multiply(back, q, local);
+    if (is_euler(axis, n)) {
+        euler_angles(local, axis, angles);
+    } else {
+        double m[9], wish[9];
+        vg_quat_matrix(back, m);
+        multiply(m, k, k);
+        vg_quat_matrix(local, wish); /* decides what the directions leave open */
+        for (int i = 0; i < 9; i++) k[i] += 1e-6 * wish[i];
+        climb_to_angles(k, axis, n, angles);
+    }
+    for (uint32_t i = 0; i < n; i++) values[place[i]] = angles[i];
+}
+
+/* The positions that joint j's channels give, in its parent's frame. */
+static void fit_offset(const vg_joint_fitter *f, size_t j, const double *pose, double *values)
+{
+    const vg_joint *joint = &f->s->joints[j];
+    double d[3], local[3];
+    memcpy(local, pose + 3 * j, sizeof local);
+    if (joint->parent != NONE) {
+        double back[4];
+        for (int k = 0; k < 3; k++) d[k] = pose[3 * j + k] - f->positions[3 * (size_t)joint->parent + k];
+        conjugate(f->turns + 4 * (size_t)joint->parent, back);
+        vg_quat_apply(back, d, local);
+    }
+    for (uint32_t i = 0; i < joint->nchannels; i++)
+        if (!is_rotation(joint->channels[i])) values[i] = local[joint->channels[i] - 1];
+}
+
+double vg_joint_fitter_fit(vg_joint_fitter *f, const double *pose, double *out, size_t *joint)
+{
+    double most = 0, *values = f->values;
+    *joint = 0;
+    for (size_t j = 0; j < f->s->njoints; j++) {
+        double d[3];
+        fit_angles(f, j, pose, values);
+        fit_offset(f, j, pose, values);
+        place_joint(f->s, j, values, f->positions, f->turns);
+        for (int k = 0; k < 3; k++) d[k] = f->positions[3 * j + k] - pose[3 * j + k];
+        if (length(d) > most) most = length(d), *joint = j;
+        values += f->s->joints[j].nchannels;
+    }
+    memcpy(out, f->values, (size_t)(values - f->values) * sizeof *out);
+    return most;
+}

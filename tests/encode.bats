@@ -1,0 +1,224 @@
+#!/usr/bin/env bats
+# vg-encode: poses of files, archives, directories and streams become one stream; what is wrong with them is said.
+# SPDX-License-Identifier: GPL-3.0-or-later
+load lib.bash
+
+names() {
+    py "$1" <<'END'
+import sys, read_stream
+print(" ".join(f.name for f in read_stream.read_stream(sys.argv[1]).frames))
+END
+}
+
+@test "operands come in their order, archives and directories in natural order" {
+    poses cube 12
+    must vg-encode pose10.obj pose2.obj pose1.obj -o out.vgs
+    names out.vgs
+    [ "$output" = "pose10 pose2 pose1" ]
+    mkdir dir && mv pose*.obj dir && echo text >dir/README
+    must vg-encode dir -o out.vgs
+    names out.vgs
+    [ "$output" = "pose1 pose2 pose3 pose4 pose5 pose6 pose7 pose8 pose9 pose10 pose11 pose12" ]
+    (cd dir && tar cf ../a.tar pose11.obj pose9.obj pose10.obj README)
+    must vg-encode a.tar dir/pose1.obj -o out.vgs
+    names out.vgs
+    [ "$output" = "pose9 pose10 pose11 pose1" ]
+    pipe "vg-encode <a.tar >out.vgs"
+    names out.vgs
+    [ "$output" = "pose9 pose10 pose11" ]
+}
+
+@test "a mesh, an archive and a stream on standard input are told apart" {
+    poses cube 2
+    tar cf a.tar pose1.obj pose2.obj
+    must vg-encode pose1.obj pose2.obj --no-provenance -o a.vgs
+    pipe "vg-encode --no-provenance <a.tar >b.vgs"
+    same_file a.vgs b.vgs
+    pipe "vg-encode --no-provenance <a.vgs >b.vgs"
+    same_file a.vgs b.vgs
+    pipe "vg-encode --no-provenance - <pose1.obj >b.vgs"
+    must vg-diff -t 0 pose1.obj b.vgs
+}
+
+@test "streams, archives and files join into one sequence; the first pose is the reference unless a stream has one" {
+    poses cube 5
+    must vg-encode pose1.obj pose2.obj -o a.vgs
+    must vg-encode --reference pose5.obj pose3.obj -o b.vgs
+    must vg-encode pose4.obj b.vgs a.vgs -o out.vgs
+    names out.vgs
+    [ "$output" = "pose4 pose3 pose1 pose2" ]
+    must vg-encode pose1.obj pose2.obj -o out.vgs
+    must vg-info out.vgs
+    shows "reference   pose1"
+}
+
+@test "--reference: the undeformed pose is not a pose of the sequence" {
+    poses cube 3
+    must vg-encode --reference pose3.obj pose1.obj pose2.obj -o out.vgs
+    py <<'END'
+import read_stream
+s = read_stream.read_stream("out.vgs")
+with open("pose3.obj") as f:
+    wanted = [float(x) for line in f if line.startswith("v ") for x in line.split()[1:]]
+assert list(s.reference) == wanted and s.reference_name == "pose3" and [f.name for f in s.frames] == ["pose1", "pose2"]
+END
+    must vg-encode --reference out.vgs pose1.obj -o again.vgs # the reference of a stream
+    must vg-info again.vgs
+    shows "reference   pose3"
+    mesh two >two.obj
+    must_fail 3 vg-encode --reference two.obj pose1.obj -o bad.vgs
+    one_line
+    says "12" "8" vertices
+    must_fail 4 vg-encode --reference none.obj pose1.obj -o bad.vgs
+    says "'none.obj'"
+}
+
+@test "--reference chooses the links anew" {
+    mesh two >near.obj
+    { mesh two | awk '$1 == "v" && ++n > 8 { print "v", $2 - 2.5, $3 + 1.3, $4; next } { print }'; } >other.obj
+    must vg-encode --vectors near.obj -o a.vgs
+    must vg-encode --vectors --reference other.obj near.obj -o b.vgs
+    py <<'END'
+import read_stream
+a, b = read_stream.read_stream("a.vgs"), read_stream.read_stream("b.vgs")
+assert len(a.links) == len(b.links) == 2 and list(a.links) != list(b.links), (a.links, b.links)
+END
+    pipe "vg-encode near.obj | vg-encode --reference other.obj | vg-encode --vectors | vg-solve >out.vgs"
+    must vg-diff -t 1e-12 near.obj out.vgs
+}
+
+@test "--fps gives times from 0 on, and takes over others" {
+    poses cube 3
+    must vg-encode --fps 24 pose*.obj -o a.vgs
+    must vg-encode --fps 30 --vectors a.vgs -o b.vgs
+    py <<'END'
+import read_stream
+assert [f.time for f in read_stream.read_stream("a.vgs").frames] == [0, 1 / 24, 2 / 24]
+assert [f.time for f in read_stream.read_stream("b.vgs").frames] == [0, 1 / 30, 2 / 30]
+END
+    for n in 0 -1 nan inf 1e30 x 24x ""; do
+        must_fail 2 vg-encode --fps "$n" pose1.obj -o bad.vgs
+        says "'--fps'"
+    done
+}
+
+@test "--anchor is remembered, sorted and without repetition" {
+    mesh cube >a.obj
+    must vg-encode --anchor 5,0,5,2 a.obj -o out.vgs
+    py <<'END'
+import read_stream
+assert list(read_stream.read_stream("out.vgs").anchors) == [0, 2, 5]
+END
+    for list in 8 1,8 4294967296 -1 1,,2 "" x 1.5 "1 2"; do
+        must_fail 2 vg-encode --anchor "$list" a.obj -o bad.vgs
+        says vg-encode: usage:
+    done
+    must_fail 2 vg-encode --anchor 3,8 a.obj -o bad.vgs
+    says "vertex 8 of 8"
+    nothing_but a.obj out.vgs
+}
+
+@test "--faces selected needs fewer corners; what is selected stays selected" {
+    must vg-encode --vectors "$DATA/trex.rest.obj" -o all.vgs
+    must vg-encode --vectors --faces selected "$DATA/trex.rest.obj" -o selected.vgs
+    must vg-encode --faces selected "$DATA/trex.rest.obj" -o vertices.vgs
+    must vg-encode --vectors vertices.vgs -o again.vgs
+    py <<'END'
+import read_stream
+a, s, t = (read_stream.read_stream(n + ".vgs") for n in ("all", "selected", "again"))
+assert a.selection is None and list(s.selection) == list(t.selection) and s.count == t.count
+assert 0.4 * a.count < s.count < 0.7 * a.count, (s.count, a.count)
+END
+    capture vg-encode -v --faces selected "$DATA/trex.rest.obj" -o vertices.vgs
+    [ "$status" = 0 ]
+    says "of 838 faces"
+    must_fail 2 vg-encode --faces some "$DATA/trex.rest.obj" -o bad.vgs
+    says "'some'"
+}
+
+@test "options about vertices are refused where there are none" {
+    mesh cube >a.obj
+    must vg-encode --vectors a.obj -o vectors.vgs
+    must vg-deform a.obj -o deformations.vgs
+    must vg-encode --vectors vectors.vgs -o again.vgs # it holds them already
+    must vg-diff -t 0 a.obj <(vg-solve again.vgs)
+    for option in "--faces selected" "--reference a.obj" "--anchor 1"; do
+        for file in vectors deformations; do
+            # shellcheck disable=SC2086
+            must_fail 3 vg-encode $option $file.vgs -o bad.vgs
+            one_line
+            says "holds $file"
+        done
+    done
+    must_fail 3 vg-encode --vectors deformations.vgs -o bad.vgs
+    must_fail 3 vg-encode --vectors "$GOLDEN/transforms.vgs" -o bad.vgs
+    must_fail 3 vg-encode vectors.vgs a.obj -o bad.vgs
+    nothing_but a.obj vectors.vgs deformations.vgs again.vgs
+}
+
+@test "meshes of different faces do not join, and the message says what differs" {
+    mesh cube >a.obj
+    mesh two >b.obj
+    sed 's/^f 5 6 7 8$/f 5 6 8 7/' a.obj >c.obj
+    must_fail 3 vg-encode a.obj b.obj -o out.vgs
+    one_line
+    says "'b.obj' has 12 vertices where 'a.obj' has 8"
+    must_fail 3 vg-encode a.obj c.obj -o out.vgs
+    one_line
+    says "'c.obj'" "face 1" "names vertex 7" "names 6"
+    tar cf a.tar a.obj c.obj
+    must_fail 3 vg-encode a.tar -o out.vgs
+    one_line
+    says "c.obj" "a.tar" "face 1"
+    nothing_but a.obj b.obj c.obj a.tar
+}
+
+@test "numbers that are none, indices out of range and short faces are refused with file and line" {
+    refuses() { # TEXT EXPECTED...
+        printf '%b' "$1" >bad.obj
+        shift
+        must_fail 3 vg-encode bad.obj -o out.vgs
+        one_line
+        says "bad.obj" "$@"
+    }
+    refuses 'v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n' "line 2"
+    refuses 'v 0 0 0\nv 1 0 -inf\nv 0 1 0\nf 1 2 3\n' "line 2"
+    refuses 'v 0 0 0\nv 1e999 0 0\nv 0 1 0\nf 1 2 3\n' "line 2"
+    refuses 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n' "4"
+    refuses 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 0\n' "line 4"
+    refuses 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n' "line 4"
+    refuses 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999\n' "line 4"
+    refuses 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 2\n' "twice"
+    refuses 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1\n' "line 4"
+    refuses 'v 0 0 0\nv 1 0\nv 0 1 0\nf 1 2 3\n' "line 2"
+    nothing_but bad.obj
+}
+
+@test "missing files, directories without meshes, unknown options" {
+    mkdir empty
+    must_fail 4 vg-encode none.obj -o out.vgs
+    one_line
+    says "'none.obj'" "No such file"
+    must_fail 3 vg-encode empty -o out.vgs
+    one_line
+    says "'empty'"
+    must_fail 2 vg-encode --bogus -o out.vgs
+    must_fail 2 vg-encode --vectors=yes -o out.vgs
+    must_fail 4 vg-encode "$DATA/horse.rest.obj" -o none/out.vgs
+    says "none/out.vgs"
+    must_fail 4 vg-encode "$DATA/horse.rest.obj" -o /dev/full
+    must_fail 3 vg-encode -o out.vgs </dev/null
+    says empty
+    nothing_but empty
+}
+
+@test "a pose that fails late leaves nothing and tells the next program" {
+    poses cube 3
+    echo 'v 0 0 x' >pose4.obj
+    must_fail 3 vg-encode pose1.obj pose2.obj pose4.obj -o out.vgs
+    one_line
+    says "'pose4.obj'"
+    pipe_fail 3 "vg-encode pose1.obj pose2.obj pose4.obj | vg-decode -o out/"
+    says "vg-encode: " "vg-decode: " "vg-encode failed with status 3"
+    nothing_but pose1.obj pose2.obj pose3.obj pose4.obj
+}
