@@ -60,7 +60,7 @@ typedef struct work {
     vg_head *h;            /* the source's until the output's is made of it */
     vg_head target;
     vg_head pairs;         /* holds the correspondence */
-    vg_mesh source_mesh;   /* only with a correspondence: the source's faces outlive its head */
+    vg_mesh source_mesh;   /* arrays of the sequence's mesh; with a correspondence the head gets the target's instead */
     double *source_reference;
     vg_graph *from, *to;   /* graphs of source and target: the same one without a correspondence */
     way way;
@@ -351,10 +351,11 @@ static void make_step(work *w)
     const vg_head *h = w->h, *t = &w->target;
     vg_method method = methods[w->by];
     int r = VG_OK;
+    w->source_mesh = h->mesh;
     w->way = !opts.onto ? MEASURE : opts.correspondence ? CARRY : w->by == BY_SHAPE ? SHAPE
              : w->kind == VG_DEFORMATIONS ? APPLY : TRANSFER;
     if (w->way == CARRY) {
-        r = vg_carrier_new(&w->carrier, &h->mesh, h->reference, &w->pairs.correspondence, w->to, t->reference, method,
+        r = vg_carrier_new(&w->carrier, &w->source_mesh, h->reference, &w->pairs.correspondence, w->to, t->reference, method,
                            cli.threads, &e);
     } else if (w->way == SHAPE) {
         r = vg_shaper_new(&w->shaper, w->to, h->reference, t->reference, cli.threads, &e);
@@ -386,8 +387,7 @@ static void make_head(work *w)
         t->reference = NULL, t->reference_name = NULL;
         t->attributes = (vg_attributes){0}, t->skeleton = (vg_skeleton){0};
     }
-    if (w->way == CARRY) { /* the source's mesh stays with its carrier, which borrows its arrays */
-        w->source_mesh = h->mesh;
+    if (w->way == CARRY) {
         h->mesh = t->mesh;
         free(h->links);
         h->has_links = t->has_links, h->links = t->links, h->nlinks = t->nlinks;

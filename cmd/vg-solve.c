@@ -70,6 +70,7 @@ typedef struct work {
     double *vectors;         /* of a pose that came as vertices */
     size_t most_steps, planar_faces;
     double worst_residual;
+    vg_weights weights;
 } work;
 
 static void *allocate(size_t n, size_t size)
@@ -109,7 +110,7 @@ static void make_machine(work *w, machine *m, uint32_t *held, size_t nheld)
 {
     vg_err e;
     *m = (machine){.held = held, .nheld = nheld};
-    if (vg_solver_new(&m->solver, w->g, held, nheld, w->h->reference, parse_weights(), cli.threads, &e) < 0 ||
+    if (vg_solver_new(&m->solver, w->g, held, nheld, w->h->reference, w->weights, cli.threads, &e) < 0 ||
         (opts.planar && vg_planar_new(&m->planar, m->solver, opts.fidelity, opts.planarity, &e) < 0))
         cli_die(&e);
     vg_solver_facts facts = vg_solver_get_facts(m->solver);
@@ -278,7 +279,7 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     if (opts.planar_weights && !opts.planar) cli_usage("--planar-weights needs --planar");
     vg_err e;
-    work w = {0};
+    work w = {.weights = parse_weights()};
     vg_frame in = {0};
     vg_source *s = cli_source(operands, n);
     prepare(&w, vg_source_head(s));

@@ -580,7 +580,7 @@ vg_records *vg_source_tail(vg_source *s);
 void vg_source_close(vg_source **s);
 
 /* vg_load_mesh: the mesh behind one operand, as a head whose reference is the operand's reference pose (for a mesh
- * file its only pose; for a stream its reference; for an archive or directory the first pose). The rest is not read. */
+ * file its only pose, for BVH the one without rotations; for a stream its reference; for an archive or directory the first pose). The rest is not read. */
 int vg_load_mesh(vg_head *h, const char *operand, vg_err *e) VG_MUST_CHECK;
 
 /* Frames that wait, first in, first out: in memory up to a limit, then in a file without a name in $TMPDIR (or /tmp). */

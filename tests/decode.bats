@@ -44,9 +44,9 @@ load lib.bash
     poses two 12
     mkdir in && mv pose*.obj in
     must vg-encode in -o in.vgs
-    for output in out/ out.zip out.tar out.tar.gz out.tar.xz out.tar.zst out.7z out2.zip:ply out2/:off; do
-        must vg-decode --f64 in.vgs -o "$output"
-        must vg-encode "${output%:*}" -o back.vgs
+    for to in out/ out.zip out.tar out.tar.gz out.tar.xz out.tar.zst out.7z out2.zip:ply out2/:off; do
+        must vg-decode --f64 in.vgs -o "$to"
+        must vg-encode "${to%:*}" -o back.vgs
         py <<'END'
 import read_stream
 a, b = read_stream.read_stream("in.vgs"), read_stream.read_stream("back.vgs")
@@ -77,17 +77,17 @@ END
     must vg-encode --vectors a.obj -o vectors.vgs
     must vg-deform a.obj -o deformations.vgs
     for kind in vectors deformations; do
-        must_fail 3 vg-decode $kind.vgs -o out.obj
+        must_fail 2 vg-decode $kind.vgs -o out.obj
         one_line
-        says "$kind"
+        says "holds $kind" "through vg-solve first"
     done
-    must_fail 3 vg-decode "$GOLDEN/transforms.vgs" -o out.obj
+    must_fail 2 vg-decode "$GOLDEN/transforms.vgs" -o out.obj
     nothing_but a.obj vectors.vgs deformations.vgs
 }
 
 @test "the name of the output is checked before any work" {
-    for output in a.xyz noname a.obj.gz 'a-%s.obj' 'a-%d-%d.obj' 'a-%.obj' ''; do
-        must_fail 2 vg-decode -o "$output" none.vgs # which is not there: it was not looked at
+    for to in a.xyz noname a.obj.gz 'a-%s.obj' 'a-%d-%d.obj' 'a-%.obj' ''; do
+        must_fail 2 vg-decode -o "$to" none.vgs # which is not there: it was not looked at
         says vg-decode:
     done
     must_fail 2 vg-decode none.vgs
@@ -105,8 +105,8 @@ END
     poses cube 5
     must vg-encode pose*.obj -o in.vgs
     head -c -16 in.vgs >cut.vgs
-    for output in 'out-%d.obj' out/ out.zip out.tar.gz; do
-        must_fail 3 vg-decode cut.vgs -o "$output"
+    for to in 'out-%d.obj' out/ out.zip out.tar.gz; do
+        must_fail 3 vg-decode cut.vgs -o "$to"
         one_line
         says "cut short"
     done
@@ -133,12 +133,23 @@ END
     must_fail 3 vg-decode empty.vgs -o out.obj
 }
 
-@test "names that would leave the directory do not" {
-    py <<'END'
-import make_corpus as m
+@test "names that would leave the directory, or are none, do not make files" {
+    for name in ../out . .. a/b / "" -; do
+        py "$name" <<'END'
+import sys, make_corpus as m
+m.write("in.vgs", m.whole(m.content(frames=[m.pose(sys.argv[1], m.content()["frames"][0]["values"])])))
 END
-    must vg-decode "$CORPUS/accept/names.vgs" -o out/
-    [ "$(find . -newer out -name '*.obj' ! -path './out/*' | wc -l)" = 0 ]
-    must vg-encode out/ -o back.vgs
-    must vg-info --check back.vgs
+        mkdir -p below && cd below || return 1
+        for to in out/ out.zip; do
+            capture vg-decode ../in.vgs -o $to
+            case $status in
+            0) [ "$name" = - ] || fail "'$name' was taken as the name of a file" ;;
+            3) one_line && says "pattern" ;;
+            *) fail "status $status" "$stderr" ;;
+            esac
+        done
+        must vg-decode ../in.vgs -o 'pose-%d.obj'
+        cd .. || return 1
+        nothing_but in.vgs below
+    done
 }

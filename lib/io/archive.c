@@ -281,6 +281,7 @@ typedef struct member {
 
 struct vgi_archive {
     char *name;
+    bool (*wanted)(const char *path); /* which members are ours */
     vgi_limits limits;
     locale_t utf8;
     tap file;
@@ -414,7 +415,7 @@ static int judge_member(vgi_archive *a, struct archive_entry *entry, vg_err *e)
     int r = take_path(a, entry, e);
     if (r < 0) return r;
     const char *path = (char *)a->path.data;
-    if (!is_mesh_name(path)) return 0;
+    if (!a->wanted(path)) return 0;
     if (archive_entry_hardlink(entry))
         return vg_fail(e, VG_EINPUT, "'%s' in '%s' is a link to another member: pack the files themselves "
                        "(tar --hard-dereference)", path, a->name);
@@ -589,7 +590,9 @@ static int list_members(vgi_archive *a, vg_err *e)
         r = add_member(a, e);
     }
     if (r == VG_OK) r = a->packed ? check_packed_end(a, e) : check_tar_end(a, e);
-    if (r == VG_OK && a->n == 0)
+    if (r == VG_OK && a->n == 0 && a->wanted != is_mesh_name)
+        r = vg_fail(e, VG_EINPUT, "archive '%s' holds none of the files it should", a->name);
+    else if (r == VG_OK && a->n == 0)
         r = vg_fail(e, VG_EINPUT, "archive '%s' holds no mesh file (%s)", a->name, vgi_format_names());
     return r;
 }
@@ -652,10 +655,17 @@ static int prepare(vgi_archive *a, const char *name, vg_err *e)
     return VG_OK;
 }
 
-int vgi_archive_open(vgi_archive **out, int fd, int64_t base, const char *name, const vgi_limits *limits, vg_err *e)
+int vgi_archive_open(vgi_archive **a, int fd, int64_t base, const char *name, const vgi_limits *limits, vg_err *e)
+{
+    return vgi_archive_open_for(a, fd, base, name, is_mesh_name, limits, e);
+}
+
+int vgi_archive_open_for(vgi_archive **out, int fd, int64_t base, const char *name, bool (*wanted)(const char *path),
+                         const vgi_limits *limits, vg_err *e)
 {
     vgi_archive *a = *out = vgi_array(1, sizeof *a, e);
     if (!a) return close(fd), VG_ENOMEM;
+    a->wanted = wanted;
     a->limits = *limits, a->file.fd = fd, a->file.base = base, a->spool = -1;
     int r = prepare(a, name, e);
     if (r == VG_OK) r = list_members(a, e);
@@ -710,16 +720,20 @@ void vgi_archive_close(vgi_archive **archive)
 static const struct packing {
     const char *suffix;
     int format, filter;
+    bool stored; /* not compressed */
 } packings[] = {
-    {".zip", ARCHIVE_FORMAT_ZIP, ARCHIVE_FILTER_NONE},
-    {".tar.gz", ARCHIVE_FORMAT_TAR, ARCHIVE_FILTER_GZIP},
-    {".tgz", ARCHIVE_FORMAT_TAR, ARCHIVE_FILTER_GZIP},
-    {".tar.xz", ARCHIVE_FORMAT_TAR, ARCHIVE_FILTER_XZ},
-    {".txz", ARCHIVE_FORMAT_TAR, ARCHIVE_FILTER_XZ},
-    {".tar.zst", ARCHIVE_FORMAT_TAR, ARCHIVE_FILTER_ZSTD},
-    {".tar", ARCHIVE_FORMAT_TAR, ARCHIVE_FILTER_NONE},
-    {".7z", ARCHIVE_FORMAT_7ZIP, ARCHIVE_FILTER_NONE},
+    {".zip", ARCHIVE_FORMAT_ZIP, ARCHIVE_FILTER_NONE, false},
+    {".tar.gz", ARCHIVE_FORMAT_TAR, ARCHIVE_FILTER_GZIP, false},
+    {".tgz", ARCHIVE_FORMAT_TAR, ARCHIVE_FILTER_GZIP, false},
+    {".tar.xz", ARCHIVE_FORMAT_TAR, ARCHIVE_FILTER_XZ, false},
+    {".txz", ARCHIVE_FORMAT_TAR, ARCHIVE_FILTER_XZ, false},
+    {".tar.zst", ARCHIVE_FORMAT_TAR, ARCHIVE_FILTER_ZSTD, false},
+    {".tar", ARCHIVE_FORMAT_TAR, ARCHIVE_FILTER_NONE, false},
+    {".7z", ARCHIVE_FORMAT_7ZIP, ARCHIVE_FILTER_NONE, false},
 };
+
+/* Not told by a name, and with members as NumPy's savez writes them. */
+static const struct packing plain_zip = {"", ARCHIVE_FORMAT_ZIP, ARCHIVE_FILTER_NONE, true};
 
 struct vgi_packer {
     struct archive *la;
@@ -772,7 +786,8 @@ static int configure(struct archive *la, const struct packing *k)
     int r;
     if (k->format == ARCHIVE_FORMAT_ZIP) {
         r = archive_write_set_format_zip(la);
-        if (r == ARCHIVE_OK) r = archive_write_zip_set_compression_deflate(la);
+        if (r == ARCHIVE_OK)
+            r = k->stored ? archive_write_zip_set_compression_store(la) : archive_write_zip_set_compression_deflate(la);
         if (r == ARCHIVE_OK) r = archive_write_set_format_option(la, "zip", "hdrcharset", "UTF-8");
     } else if (k->format == ARCHIVE_FORMAT_7ZIP) {
         r = archive_write_set_format_7zip(la);
@@ -786,9 +801,8 @@ static int configure(struct archive *la, const struct packing *k)
     return r;
 }
 
-int vgi_packer_open(vgi_packer **out, int fd, const char *name, size_t n, vg_err *e)
+static int open_packer(vgi_packer **out, int fd, const char *name, size_t n, const struct packing *k, vg_err *e)
 {
-    const struct packing *k = find_packing(name, n);
     vgi_packer *p = *out = vgi_array(1, sizeof *p, e);
     if (!p) return VG_ENOMEM;
     p->fd = fd, p->utf8 = utf8_locale();
@@ -810,7 +824,17 @@ int vgi_packer_open(vgi_packer **out, int fd, const char *name, size_t n, vg_err
     return r;
 }
 
-static bool add_entry(vgi_packer *p, const char *path, const unsigned char *data, size_t n)
+int vgi_packer_open(vgi_packer **p, int fd, const char *name, size_t n, vg_err *e)
+{
+    return open_packer(p, fd, name, n, find_packing(name, n), e);
+}
+
+int vgi_packer_open_plain(vgi_packer **p, int fd, const char *name, vg_err *e)
+{
+    return open_packer(p, fd, name, strlen(name), &plain_zip, e);
+}
+
+static bool begin_entry(vgi_packer *p, const char *path, uint64_t n)
 {
     archive_entry_clear(p->entry);
     archive_entry_update_pathname_utf8(p->entry, path);
@@ -818,14 +842,41 @@ static bool add_entry(vgi_packer *p, const char *path, const unsigned char *data
     archive_entry_set_perm(p->entry, 0644);
     archive_entry_set_mtime(p->entry, 0, 0);
     archive_entry_set_size(p->entry, (la_int64_t)n);
-    if (archive_write_header(p->la, p->entry) != ARCHIVE_OK) return false;
+    return archive_write_header(p->la, p->entry) == ARCHIVE_OK;
+}
+
+static bool add_data(vgi_packer *p, const unsigned char *data, size_t n)
+{
     while (n > 0) {
         la_ssize_t done = archive_write_data(p->la, data, n);
         if (done <= 0) return false;
         data += done;
         n -= (size_t)done;
     }
-    return archive_write_finish_entry(p->la) == ARCHIVE_OK;
+    return true;
+}
+
+static bool add_entry(vgi_packer *p, const char *path, const unsigned char *data, size_t n)
+{
+    return begin_entry(p, path, n) && add_data(p, data, n) && archive_write_finish_entry(p->la) == ARCHIVE_OK;
+}
+
+int vgi_packer_begin(vgi_packer *p, const char *path, uint64_t n, vg_err *e)
+{
+    locale_t before = enter_utf8(p->utf8);
+    bool ok = begin_entry(p, path, n);
+    leave_utf8(before);
+    return check_packer(p, ok, e);
+}
+
+int vgi_packer_more(vgi_packer *p, const void *data, size_t n, vg_err *e)
+{
+    return check_packer(p, add_data(p, data, n), e);
+}
+
+int vgi_packer_finish(vgi_packer *p, vg_err *e)
+{
+    return check_packer(p, archive_write_finish_entry(p->la) == ARCHIVE_OK, e);
 }
 
 int vgi_packer_add(vgi_packer *p, const char *path, const void *data, size_t n, vg_err *e)

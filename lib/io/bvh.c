@@ -13,7 +13,7 @@ enum {
     MOST_DEPTH = 4096,  /* joints from a root to an end */
     MOST_CHANNELS = 6,
     MOST_TABS = 64,     /* what is nested deeper is not moved further to the right */
-    FIELD = 20          /* bytes kept free for a number of the head that is known in the end */
+    FIELD = 26          /* bytes kept free for a number of the head that is known in the end */
 };
 
 static const uint32_t NONE = UINT32_MAX;
@@ -305,8 +305,9 @@ static int read_motion_head(reading *b, vg_err *e)
     if (r == VG_OK) r = take_number(b, "the time of a frame", &b->frame_time, e);
     if (r < 0) return r;
     b->frames = (uint64_t)n;
-    if (!(b->frame_time > 0))
-        return vg_fail(e, VG_EINPUT, "%s line %zu: the frame time is not positive", b->subject, line_of(b, b->at));
+    if (!(b->frame_time > 0) || !isfinite((double)b->frames * b->frame_time))
+        return vg_fail(e, VG_EINPUT, "%s line %zu: the frame time is %s", b->subject, line_of(b, b->at),
+                       b->frame_time > 0 ? "too large" : "not positive");
     /* a frame is at least a line: without channels there would be no other end to a number that lies */
     if (b->channels == 0 && b->frames > (uint64_t)(b->end - b->at))
         return vg_fail(e, VG_ETRUNC, "%s has fewer than the %llu frames that it promises", b->subject,
@@ -722,10 +723,10 @@ static double frame_time(const writing *w)
     return w->timed && w->step > 0 ? w->step : 1.0 / 30;
 }
 
-/* The number in w->text goes to the right end of its field; in a field it cannot be too long. */
+/* The number in w->text goes to the right end of its field. */
 static int patch_field(writing *w, uint64_t at, vg_err *e)
 {
-    size_t n = w->text.size < FIELD ? w->text.size : FIELD;
+    size_t n = w->text.size; /* no number is longer than its field */
     return vgi_output_patch(w->out, at + FIELD - n, w->text.data, n, e);
 }
 
@@ -740,7 +741,7 @@ static int end_bvh(void *state, vg_err *e)
     if (r < 0) return r;
     w->text.size = 0;
     if (time > 1e-6 && time < 1e5) r = say_fixed(&w->text, time, 10, e);
-    else r = vgi_bytes_append(&w->text, text, vgi_print_float(text, time), e); /* at most 16 bytes */
+    else r = vgi_bytes_append(&w->text, text, vgi_print_double(text, time), e);
     return r < 0 ? r : patch_field(w, w->time_at, e);
 }
 
@@ -778,7 +779,8 @@ static void release_bvh(void *state)
 
 const vgi_sequence_format vgi_sequence_bvh = {
     .name = "bvh", .suffix = ".bvh",
-    .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TIMES | VGI_KEEPS_SKELETON,
+    .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TIMES | VGI_KEEPS_SKELETON |
+             VGI_KEEPS_DOUBLES,
     .sniff = sniff_bvh, .open = open_bvh, .next = next_frame, .close = close_bvh,
     .frames = count_frames,
     .kinds = 1 << VG_VERTICES, .check = check_skeleton, .begin = begin_bvh, .put = put_frame, .end = end_bvh,

@@ -177,6 +177,9 @@ bool vgi_is_archive(const unsigned char *data, size_t n);
  * failure. name is what messages call the archive. VG_EINPUT when there is no mesh file in it. */
 int vgi_archive_open(vgi_archive **a, int fd, int64_t base, const char *name, const vgi_limits *limits,
                      vg_err *e) VG_MUST_CHECK;
+/* vgi_archive_open_for: the same for those members whose path is wanted. */
+int vgi_archive_open_for(vgi_archive **a, int fd, int64_t base, const char *name, bool (*wanted)(const char *path),
+                         const vgi_limits *limits, vg_err *e) VG_MUST_CHECK;
 /* vgi_archive_next: 1, path (borrowed until the next call) and contents of the next file; 0 behind the last one. */
 int vgi_archive_next(vgi_archive *a, const char **path, vg_bytes *data, vg_err *e) VG_MUST_CHECK;
 void vgi_archive_close(vgi_archive **a);
@@ -191,7 +194,13 @@ bool vgi_packer_knows(const char *name, size_t n); /* do the first n bytes of na
 const char *vgi_packer_suffixes(void);             /* ".zip .tar ..." for messages */
 /* vgi_packer_open: the kind is told by the first n bytes of `name`, which is also what messages call it. fd is borrowed. */
 int vgi_packer_open(vgi_packer **p, int fd, const char *name, size_t n, vg_err *e) VG_MUST_CHECK;
+/* vgi_packer_open_plain: a zip whose members are stored as they are, whatever its name. */
+int vgi_packer_open_plain(vgi_packer **p, int fd, const char *name, vg_err *e) VG_MUST_CHECK;
 int vgi_packer_add(vgi_packer *p, const char *path, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
+/* A file in pieces: begin with its size, more until that is reached, finish. */
+int vgi_packer_begin(vgi_packer *p, const char *path, uint64_t n, vg_err *e) VG_MUST_CHECK;
+int vgi_packer_more(vgi_packer *p, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
+int vgi_packer_finish(vgi_packer *p, vg_err *e) VG_MUST_CHECK;
 int vgi_packer_end(vgi_packer *p, vg_err *e) VG_MUST_CHECK;
 void vgi_packer_close(vgi_packer **p);
 

@@ -624,7 +624,7 @@ static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
                {!(keeps & VGI_KEEPS_TEXTURE) && h->attributes.ntex, "texture coordinates"},
                {!(keeps & VGI_KEEPS_LABELS) && h->attributes.nlabels, "groups and materials"},
                {!(keeps & VGI_KEEPS_SKELETON) && h->skeleton.njoints, "the skeleton"},
-               {f && !(keeps & VGI_KEEPS_NAMES) && s->names_lost, "the names of the frames"},
+               {f && !(keeps & VGI_KEEPS_NAMES) && s->names_lost && s->frames > 1, "the names of the frames"},
                {f && !(keeps & VGI_KEEPS_TIMES) && s->times_lost, "the times of the frames"}};
     int r = VG_OK;
     for (size_t i = 0; r == VG_OK && i < sizeof all / sizeof *all; i++)

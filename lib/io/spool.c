@@ -7,10 +7,10 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-/* What precedes a frame's name, records, anchors and values. */
+/* What precedes a frame's name, records, pins, anchors and values. */
 typedef struct front {
     size_t bytes; /* of the whole frame, this included */
-    size_t name, records;
+    size_t name, records, pins;
     double time, root[3];
     bool has_time;
 } front;
@@ -78,10 +78,10 @@ static bool add(size_t *sum, size_t n, size_t size)
 
 static int measure(const vg_spool *s, const vg_frame *f, front *to, vg_err *e)
 {
-    *to = (front){.bytes = sizeof *to, .name = strlen(f->name), .records = f->extra.n, .time = f->time,
-                  .has_time = f->has_time, .root = {f->root[0], f->root[1], f->root[2]}};
-    bool ok = add(&to->bytes, to->name, 1) && add(&to->bytes, s->anchors, sizeof(double)) &&
-              add(&to->bytes, s->values, sizeof(double));
+    *to = (front){.bytes = sizeof *to, .name = strlen(f->name), .records = f->extra.n, .pins = f->npins,
+                  .time = f->time, .has_time = f->has_time, .root = {f->root[0], f->root[1], f->root[2]}};
+    bool ok = add(&to->bytes, to->name, 1) && add(&to->bytes, to->pins, sizeof *f->pins) &&
+              add(&to->bytes, s->anchors, sizeof(double)) && add(&to->bytes, s->values, sizeof(double));
     for (size_t i = 0; ok && i < f->extra.n; i++)
         ok = add(&to->bytes, 1, sizeof(vg_record)) && add(&to->bytes, f->extra.at[i].payload.size, 1);
     return ok ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory to hold frame '%s'", f->name);
@@ -101,6 +101,7 @@ static void pack(const vg_spool *s, const vg_frame *f, const front *head, unsign
         to = append(to, &f->extra.at[i], sizeof f->extra.at[i]);
         to = append(to, f->extra.at[i].payload.data, f->extra.at[i].payload.size);
     }
+    to = append(to, f->pins, head->pins * sizeof *f->pins);
     to = append(to, f->anchors, s->anchors * sizeof *f->anchors);
     append(to, f->values, s->values * sizeof *f->values);
 }
@@ -126,6 +127,16 @@ static const unsigned char *unpack_records(const unsigned char *from, size_t n, 
     return from;
 }
 
+static const unsigned char *unpack_pins(const unsigned char *from, size_t n, vg_frame *f, vg_err *e)
+{
+    uint32_t *pins = vgi_array_raw(n, sizeof *pins, e);
+    if (!pins) return NULL;
+    from = take(from, pins, n * sizeof *pins);
+    int r = vg_frame_pin(f, pins, n, e);
+    free(pins);
+    return r < 0 ? NULL : from;
+}
+
 static int unpack(const vg_spool *s, const unsigned char *from, vg_frame *f, vg_err *e)
 {
     front head;
@@ -134,8 +145,9 @@ static int unpack(const vg_spool *s, const unsigned char *from, vg_frame *f, vg_
     int r = name ? vg_frame_rename(f, name, e) : VG_ENOMEM;
     free(name);
     if (r == VG_OK) r = vg_frame_shape(f, s->h, e);
-    if (r == VG_OK && !(from = unpack_records(from + head.name, head.records, &f->extra, e))) r = VG_ENOMEM;
     if (r < 0) return r;
+    if (!(from = unpack_records(from + head.name, head.records, &f->extra, e))) return VG_ENOMEM;
+    if (!(from = unpack_pins(from, head.pins, f, e))) return VG_ENOMEM;
     f->has_time = head.has_time, f->time = head.time;
     memcpy(f->root, head.root, sizeof f->root);
     from = take(from, f->anchors, s->anchors * sizeof *f->anchors);

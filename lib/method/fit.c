@@ -19,13 +19,21 @@
 
 #include <stdlib.h>
 
-double P_alpha = 0.01, P_marker = 10, P_lim0 = 0.1, P_lim1 = 0.02, P_w0 = 0.01, P_wmul = 4, P_cos = 0.4, P_inertia = 1, P_back = 0;
-int P_rounds = 6, P_inner = 3, P_sweeps = 2, P_free = 6, P_mode = 1;
+static const double IDENTITY_TRUST = 1e-6; /* where no face tells how it is deformed */
+
+double P_len0 = 0.075, P_len1 = 0.7, P_stretch = 0.03, P_marker = 3, P_lim0 = 0.1, P_lim1 = 0.02, P_cos = 0.4, P_maplen = 0.07, P_scale = 0.8, P_back = 1, P_backlim = 1;
+int P_rounds = 8, P_inner = 4, P_free = 5;
 
 enum {
     BLOCK = 256,     /* vertices of a task */
     FULL = 8         /* larger faces have no springs between all of their corners */
 };
+
+/* A vertex of the target pulls the point of a source face that is nearest to it. */
+typedef struct reverse {
+    uint32_t face, vertex; /* of the source; of the target */
+    double weight, share[FULL]; /* of the face's corners */
+} reverse;
 
 /* A spring of the graph Laplacian. Those of vertex v are first[v] .. first[v + 1] - 1, by ascending neighbour. */
 typedef struct springs {
@@ -44,7 +52,9 @@ typedef struct fit {
     double *h_normal;  /* nf x 3: h n, of the rest */
     double *area;      /* nf: of the rest */
     double *trust;     /* nf: 1 for a round face, 0 for one without area */
-    double *face_map, *vertex_map, *turned; /* D of faces and vertices; D_v without shear */
+    double *face_map, *map; /* D of faces; of vertices, smooth and without shear */
+    double edge;       /* mean length */
+    vgi_cholesky *smoother; /* of maps */
     bool *border;      /* nv: of the source */
     vgi_sparse matrix; /* value: what is factorized */
     double *bending, *stretching; /* per entry of matrix: the two smoothness terms */
@@ -53,7 +63,10 @@ typedef struct fit {
     double *pull;      /* nv: weight of the nearest point in this round; 0: none */
     double *goal;      /* nv x 3: the nearest point */
     double *distance;  /* nv */
+    reverse *reverse;  /* per vertex of the target; weight 0: it pulls nothing */
+    vgi_surface *now;  /* the source as it lies at the start of a round */
     double limit, cosine;
+    double stretch;    /* weight of first differences */
 } fit;
 
 /* ---- the graph ---- */
@@ -261,7 +274,7 @@ static double *entry(const vgi_sparse *A, uint32_t a, uint32_t b)
 static int factorize(fit *t, double stiffness, vg_err *e)
 {
     vgi_sparse *A = &t->matrix;
-    for (int i = 0; i < A->start[A->n]; i++) A->value[i] = stiffness * (t->bending[i] + P_alpha * t->stretching[i]);
+    for (int i = 0; i < A->start[A->n]; i++) A->value[i] = stiffness * (t->bending[i] + t->stretch * t->stretching[i]);
     for (size_t v = 0; v < A->n; v++) A->value[A->start[v]] += t->L.sum[v] > 0 ? t->pull[v] : 1;
     for (size_t i = 0; i < t->in->nties; i++) {
         const vgi_tie *tie = &t->in->tie[i];
@@ -270,6 +283,13 @@ static int factorize(fit *t, double stiffness, vg_err *e)
                 double w = P_marker * tie->weight * tie->share[a] * tie->share[b];
                 *entry(A, tie->vertex[a], tie->vertex[b]) += a != b && tie->vertex[a] == tie->vertex[b] ? 2 * w : w;
             }
+    }
+    for (size_t i = 0; i < t->in->target_mesh->nv; i++) {
+        const reverse *p = &t->reverse[i];
+        if (!(p->weight > 0)) continue;
+        const uint32_t *vert = t->m->vert + t->m->start[p->face];
+        for (size_t a = 0; a < t->m->start[p->face + 1] - t->m->start[p->face]; a++)
+            for (size_t b = 0; b <= a; b++) *entry(A, vert[a], vert[b]) += p->weight * p->share[a] * p->share[b];
     }
     return vgi_cholesky_factorize(t->solver, A, e);
 }
@@ -364,39 +384,36 @@ static void face_maps(fit *t, const double *x)
     }
 }
 
-/* Of vertices: the trusted mean of the faces around. A vertex of none keeps what it has. */
-static void faces_to_vertices(fit *t, bool plain)
+/* Of vertices: the trusted mean of the faces around, smoothed: (trust + length^2 L) D = sum of trusted D. */
+static int smooth_maps(fit *t, vg_err *e)
 {
-    for (size_t v = 0; v < t->m->nv; v++) {
-        double sum = 0, D[9] = {0};
-        for (uint32_t i = t->around.first[v]; i < t->around.first[v + 1]; i++) {
-            size_t f = t->around.face[i];
-            double w = plain ? 1 : t->trust[f];
-            for (int k = 0; k < 9; k++) D[k] += w * t->face_map[9 * f + (size_t)k];
-            sum += w;
+    size_t nv = t->m->nv;
+    for (size_t row = 0; row < 3; row++) {
+        double *D = t->tmp;
+        for (size_t v = 0; v < nv; v++) {
+            double *to = D + 3 * v;
+            for (size_t k = 0; k < 3; k++) to[k] = k == row ? IDENTITY_TRUST : 0;
+            for (uint32_t i = t->around.first[v]; i < t->around.first[v + 1]; i++) {
+                size_t f = t->around.face[i];
+                for (size_t k = 0; k < 3; k++) to[k] += t->trust[f] * t->face_map[9 * f + 3 * row + k];
+            }
         }
-        if (sum > 0)
-            for (int k = 0; k < 9; k++) t->vertex_map[9 * v + (size_t)k] = D[k] / sum;
+        int r = vgi_cholesky_solve(t->smoother, D, e);
+        if (r < 0) return r;
+        for (size_t v = 0; v < nv; v++)
+            for (size_t k = 0; k < 3; k++) t->map[9 * v + 3 * row + k] = D[3 * v + k];
     }
+    return VG_OK;
 }
 
-static void vertices_to_faces(fit *t)
-{
-    const vg_mesh *m = t->m;
-    for (size_t f = 0; f < m->nf; f++) {
-        double *D = t->face_map + 9 * f, share = 1.0 / (double)(m->start[f + 1] - m->start[f]);
-        for (int k = 0; k < 9; k++) D[k] = 0;
-        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
-            for (int k = 0; k < 9; k++) D[k] += share * t->vertex_map[9 * (size_t)m->vert[c] + (size_t)k];
-    }
-}
-
-/* The rotation nearest to m by Newton's iteration (Higham 1986), times the mean stretch; false when m turns inside out. */
-static bool without_shear(const double m[9], double out[9])
+/* The rotation nearest to m by Newton's iteration (Higham 1986), times most of the mean stretch; the identity when m turns inside out. */
+static void drop_shear(double m[9])
 {
     double q[9], c[9], det = vgi_cofactors(m, c), first = det;
-    if (!(det > 1e-12)) return false;
+    static const double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     memcpy(q, m, sizeof q);
+    memcpy(m, identity, sizeof identity);
+    if (!(det > 1e-12)) return;
     for (int round = 0; round < 20; round++) {
         double change = 0, scale = 1 / cbrt(det);
         for (int k = 0; k < 9; k++) {
@@ -406,23 +423,41 @@ static bool without_shear(const double m[9], double out[9])
         }
         det = vgi_cofactors(q, c);
         if (change < 1e-9) break;
-        if (!(det > 0)) return false;
+        if (!(det > 0)) return;
     }
-    for (int k = 0; k < 9; k++) out[k] = q[k] * (P_mode == 1 || P_mode == 5 ? cbrt(first) : 1);
-    return true;
+    double scale = pow(first, P_scale / 3);
+    for (int k = 0; k < 9; k++) m[k] = q[k] * scale;
 }
 
-static void update_maps(fit *t, const double *x)
+static int update_maps(fit *t, vg_err *e)
 {
-    if (P_mode == 3) return;
-    face_maps(t, x);
-    faces_to_vertices(t, false);
-    for (int i = 0; i < P_sweeps; i++) vertices_to_faces(t), faces_to_vertices(t, true);
-    for (size_t v = 0; v < t->m->nv; v++) {
-        if (P_mode == 4 || P_mode == 5) { without_shear(t->vertex_map + 9 * v, t->turned + 9 * v); memcpy(t->vertex_map + 9 * v, t->turned + 9 * v, 72); }
-        else if (P_mode == 0) memcpy(t->turned + 9 * v, t->vertex_map + 9 * v, 72);
-        else without_shear(t->vertex_map + 9 * v, t->turned + 9 * v);
+    face_maps(t, t->x);
+    int r = smooth_maps(t, e);
+    for (size_t v = 0; v < t->m->nv && r == VG_OK; v++) drop_shear(t->map + 9 * v);
+    return r;
+}
+
+/* What smooths the maps: as the matrix, with first neighbours only. */
+static int make_smoother(fit *t, vg_err *e)
+{
+    const springs *L = &t->L;
+    size_t n = 0;
+    double strength = P_maplen / t->edge * P_maplen / t->edge;
+    vgi_sparse A = {.n = L->nv, .start = vgi_array(L->nv + 1, sizeof(int), e), .row = vgi_array(L->nv + L->first[L->nv], sizeof(int), e),
+                    .value = vgi_array(L->nv + L->first[L->nv], sizeof(double), e)};
+    int r = A.start && A.row && A.value ? VG_OK : VG_ENOMEM;
+    for (size_t v = 0; v < L->nv && r == VG_OK; v++) {
+        A.row[n] = (int)v, A.value[n] = IDENTITY_TRUST + strength * L->sum[v];
+        for (uint32_t i = t->around.first[v]; i < t->around.first[v + 1]; i++) A.value[n] += t->trust[t->around.face[i]];
+        n++;
+        for (uint32_t i = L->first[v]; i < L->first[v + 1]; i++)
+            if (L->to[i] > v) A.row[n] = (int)L->to[i], A.value[n++] = -strength * L->weight[i];
+        A.start[v + 1] = (int)n;
     }
+    if (r == VG_OK) r = vgi_cholesky_new(&t->smoother, &A, e);
+    if (r == VG_OK) r = vgi_cholesky_factorize(t->smoother, &A, e);
+    vgi_sparse_clear(&A);
+    return r;
 }
 
 /* ---- a round ---- */
@@ -433,7 +468,7 @@ static void add_smoothness(fit *t, double stiffness)
     double *wanted = t->tmp;
     for (size_t v = 0; v < L->nv; v++) {
         double *w = wanted + 3 * v;
-        vgi_multiply_vector(t->vertex_map + 9 * v, t->laplacian + 3 * v, w);
+        vgi_multiply_vector(t->map + 9 * v, t->laplacian + 3 * v, w);
         for (int k = 0; k < 3; k++) w[k] = L->sum[v] > 0 ? w[k] / L->sum[v] : 0;
     }
     apply_laplacian(L, wanted, t->rhs);
@@ -443,9 +478,9 @@ static void add_smoothness(fit *t, double stiffness)
             size_t u = L->to[i];
             double d[3], a[3], b[3];
             for (int k = 0; k < 3; k++) d[k] = t->in->rest[3 * v + (size_t)k] - t->in->rest[3 * u + (size_t)k];
-            vgi_multiply_vector(t->turned + 9 * v, d, a);
-            vgi_multiply_vector(t->turned + 9 * u, d, b);
-            for (int k = 0; k < 3; k++) to[k] += P_alpha * L->weight[i] * 0.5 * (a[k] + b[k]);
+            vgi_multiply_vector(t->map + 9 * v, d, a);
+            vgi_multiply_vector(t->map + 9 * u, d, b);
+            for (int k = 0; k < 3; k++) to[k] += t->stretch * L->weight[i] * 0.5 * (a[k] + b[k]);
         }
         for (int k = 0; k < 3; k++) to[k] *= stiffness;
     }
@@ -467,28 +502,41 @@ static void add_pulls(fit *t)
     }
 }
 
+static void add_reverse_pulls(fit *t)
+{
+    for (size_t i = 0; i < t->in->target_mesh->nv; i++) {
+        const reverse *p = &t->reverse[i];
+        if (!(p->weight > 0)) continue;
+        const uint32_t *vert = t->m->vert + t->m->start[p->face];
+        for (size_t a = 0; a < t->m->start[p->face + 1] - t->m->start[p->face]; a++)
+            for (size_t k = 0; k < 3; k++)
+                t->rhs[3 * (size_t)vert[a] + k] += p->weight * p->share[a] * t->in->target_points[3 * i + k];
+    }
+}
+
 static int solve(fit *t, double stiffness, vg_err *e)
 {
-    update_maps(t, t->x);
+    int r = update_maps(t, e);
+    if (r < 0) return r;
     add_smoothness(t, stiffness);
     add_pulls(t);
-    int r = vgi_cholesky_solve(t->solver, t->rhs, e);
+    add_reverse_pulls(t);
+    r = vgi_cholesky_solve(t->solver, t->rhs, e);
     if (r == VG_OK) memcpy(t->x, t->rhs, 3 * t->m->nv * sizeof *t->x);
     return r;
 }
 
-static void vertex_normals(fit *t)
+static void vertex_normals(const vg_mesh *m, const double *x, double sign, double *normal)
 {
-    const vg_mesh *m = t->m;
-    memset(t->normal, 0, 3 * m->nv * sizeof *t->normal);
+    memset(normal, 0, 3 * m->nv * sizeof *normal);
     for (size_t f = 0; f < m->nf; f++) {
         double n[3];
-        vgi_newell(t->x, m->vert + m->start[f], m->start[f + 1] - m->start[f], n);
+        vgi_newell(x, m->vert + m->start[f], m->start[f + 1] - m->start[f], n);
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
-            for (size_t k = 0; k < 3; k++) t->normal[3 * (size_t)m->vert[c] + k] += n[k];
+            for (size_t k = 0; k < 3; k++) normal[3 * (size_t)m->vert[c] + k] += n[k];
     }
     for (size_t v = 0; v < m->nv; v++) {
-        double *n = t->normal + 3 * v, size = length(n), sign = t->in->flipped ? -1 : 1;
+        double *n = normal + 3 * v, size = length(n);
         for (int k = 0; k < 3; k++) n[k] = size > 0 ? sign * n[k] / size : 0;
     }
 }
@@ -500,19 +548,57 @@ static void find_near(void *context, size_t block)
     size_t end = (block + 1) * BLOCK < t->m->nv ? (block + 1) * BLOCK : t->m->nv;
     for (size_t v = block * BLOCK; v < end; v++) {
         vgi_hit hit;
+        const double *at = t->x + 3 * v, *normal = t->normal + 3 * v;
+        double limit = t->limit * t->limit, known = vgi_square(at, t->goal + 3 * v);
+        bool guess = t->distance[v] < INFINITY && known < limit; /* the last answer bounds this one, if its normal still fits */
         t->distance[v] = INFINITY;
         if (!(t->L.sum[v] > 0)) continue;
-        if (!vgi_surface_nearest(t->in->target, t->x + 3 * v, t->normal + 3 * v, t->cosine, t->limit * t->limit, &hit)) continue;
+        bool found = guess && vgi_surface_nearest(t->in->target, at, normal, t->cosine, known * (1 + 1e-9), &hit);
+        if (!found && !vgi_surface_nearest(t->in->target, at, normal, t->cosine, limit, &hit)) continue;
         if (hit.border && !t->border[v]) continue;
         t->distance[v] = sqrt(hit.square);
         memcpy(t->goal + 3 * v, hit.point, sizeof hit.point);
     }
 }
 
+static void find_reverse(void *context, size_t block)
+{
+    fit *t = context;
+    const vg_mesh *target = t->in->target_mesh;
+    size_t end = (block + 1) * BLOCK < target->nv ? (block + 1) * BLOCK : target->nv;
+    for (size_t v = block * BLOCK; v < end; v++) {
+        reverse *p = &t->reverse[v];
+        const double *at = t->in->target_points + 3 * v, *n = vgi_surface_vertex_normals(t->in->target) + 3 * v;
+        double sign = t->in->flipped ? -1 : 1, normal[3] = {sign * n[0], sign * n[1], sign * n[2]};
+        vgi_hit hit;
+        p->weight = 0;
+        if (!vgi_surface_nearest(t->now, at, normal, t->cosine, t->limit * t->limit, &hit) || hit.border) continue;
+        size_t begin = t->m->start[hit.face], r = t->m->start[hit.face + 1] - begin, first = hit.corner - begin;
+        if (r < 3 || r > FULL) continue;
+        *p = (reverse){.face = hit.face, .vertex = (uint32_t)v, .weight = 1 - hit.square / (t->limit * t->limit)};
+        for (size_t k = 0; r > 3 && k < r; k++) p->share[k] = hit.u[1] / (double)r;
+        p->share[first] += 1 - hit.u[0] - hit.u[1];
+        p->share[(first + 1) % r] += hit.u[0];
+        if (r == 3) p->share[2] += hit.u[1];
+    }
+}
+
+/* What the target asks of the source, in the places that the source would not find by itself: tips, and what is drawn in. */
+static int follow_reverse(fit *t, double weight, vg_err *e)
+{
+    size_t n = t->in->target_mesh->nv;
+    vgi_surface_free(&t->now);
+    int r = vgi_surface_new(&t->now, t->m, t->x, e);
+    if (r < 0) return r;
+    vgi_parallel(t->in->threads, (n + BLOCK - 1) / BLOCK, find_reverse, t);
+    for (size_t i = 0; i < n; i++) t->reverse[i].weight *= weight * P_back * (double)t->m->nv / (double)n;
+    return VG_OK;
+}
+
 /* first: pulls are chosen anew. Later in a round the matrix stays: who has lost the target stays where it is. */
 static void follow_target(fit *t, double weight, bool first)
 {
-    vertex_normals(t);
+    vertex_normals(t->m, t->x, t->in->flipped ? -1 : 1, t->normal);
     vgi_parallel(t->in->threads, (t->m->nv + BLOCK - 1) / BLOCK, find_near, t);
     for (size_t v = 0; v < t->m->nv; v++) {
         bool found = t->distance[v] < INFINITY;
@@ -543,18 +629,34 @@ static int run(fit *t, vg_err *e)
         r = factorize(t, 1, e);
         for (int i = 0; i < P_free && r == VG_OK; i++) r = solve(t, 1, e);
     }
-    double weight = P_w0;
     for (int round = 0; round < P_rounds && r == VG_OK; round++) {
-        t->limit = P_lim0 * pow(P_lim1 / P_lim0, round / (double)(P_rounds - 1)), t->cosine = P_cos;
+        double progress = round / (double)(P_rounds - 1), first = P_len0 / t->edge;
+        double span = first > P_len1 ? first * pow(P_len1 / first, progress) : P_len1, weight = pow(span, -4);
+        t->limit = P_lim0 * pow(P_lim1 / P_lim0, progress), t->cosine = P_cos;
         for (int i = 0; i < P_inner && r == VG_OK; i++) {
             follow_target(t, weight, i == 0);
+            if (i == 0 && P_back > 0) r = follow_reverse(t, weight * progress * progress, e);
+            if (r < 0) break;
             if (i == 0) r = factorize(t, 1, e);
             if (r == VG_OK) r = solve(t, 1, e);
         }
         tell(t, (size_t)round + 1, (size_t)P_rounds, 1 / weight);
-        weight *= P_wmul;
     }
     return r;
+}
+
+/* The length scale of the mesh, which sets that of its smoothness. */
+static void measure_edges(fit *t)
+{
+    const springs *L = &t->L;
+    double sum = 0, weight = 0;
+    for (size_t v = 0; v < L->nv; v++)
+        for (uint32_t i = L->first[v]; i < L->first[v + 1]; i++) {
+            sum += L->weight[i] * sqrt(vgi_square(t->in->rest + 3 * v, t->in->rest + 3 * (size_t)L->to[i]));
+            weight += L->weight[i];
+        }
+    t->edge = weight > 0 && sum > 0 ? sum / weight : 1;
+    t->stretch = t->edge / P_stretch * t->edge / P_stretch;
 }
 
 static int prepare(fit *t, vg_err *e)
@@ -563,6 +665,7 @@ static int prepare(fit *t, vg_err *e)
     size_t nv = m->nv, nf = m->nf;
     int r = vgi_incidence_make(&t->around, nv, nf, m->start, m->vert, e);
     if (r == VG_OK) r = make_springs(t, e);
+    if (r == VG_OK) measure_edges(t);
     if (r == VG_OK) r = make_pattern(t, e);
     if (r == VG_OK) r = fill_smoothness(t, e);
     if (r == VG_OK) r = vgi_cholesky_new(&t->solver, &t->matrix, e);
@@ -574,37 +677,41 @@ static int prepare(fit *t, vg_err *e)
     t->area = vgi_array(nf, sizeof(double), e);
     t->trust = vgi_array(nf, sizeof(double), e);
     t->face_map = vgi_array(nf, 9 * sizeof(double), e);
-    t->vertex_map = vgi_array(nv, 9 * sizeof(double), e);
-    t->turned = vgi_array(nv, 9 * sizeof(double), e);
+    t->map = vgi_array(nv, 9 * sizeof(double), e);
     t->border = vgi_array(nv, sizeof *t->border, e);
+    t->reverse = vgi_array(t->in->target_mesh->nv, sizeof *t->reverse, e);
     t->pull = vgi_array(nv, sizeof(double), e);
     t->distance = vgi_array(nv, sizeof(double), e);
-    if (!t->inverse || !t->h_normal || !t->area || !t->trust || !t->face_map || !t->vertex_map || !t->turned || !t->border ||
+    if (!t->inverse || !t->h_normal || !t->area || !t->trust || !t->face_map || !t->map || !t->border || !t->reverse ||
         !t->pull || !t->distance || r < 0)
         return r < 0 ? r : VG_ENOMEM;
     for (size_t f = 0; f < nf; f++)
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
             if (vgi_surface_border(t->in->source_surface, c))
                 t->border[m->vert[c]] = t->border[m->vert[c + 1 < m->start[f + 1] ? c + 1 : m->start[f]]] = true;
+    for (size_t v = 0; v < nv; v++) t->distance[v] = INFINITY;
     for (size_t v = 0; v < nv; v++)
-        for (size_t k = 0; k < 9; k += 4) t->vertex_map[9 * v + k] = t->turned[9 * v + k] = 1;
+        for (size_t k = 0; k < 9; k += 4) t->map[9 * v + k] = 1;
     memcpy(t->x, t->in->rest, 3 * nv * sizeof *t->x);
     apply_laplacian(&t->L, t->in->rest, t->laplacian);
     prepare_faces(t);
-    return VG_OK;
+    return make_smoother(t, e);
 }
 
 static void clear(fit *t)
 {
     double *arrays[] = {t->L.weight, t->L.sum, t->laplacian, t->inverse, t->h_normal, t->area, t->trust, t->face_map,
-                        t->vertex_map, t->turned, t->bending, t->stretching, t->x, t->rhs, t->normal, t->tmp, t->pull, t->goal,
+                        t->map, t->bending, t->stretching, t->x, t->rhs, t->normal, t->tmp, t->pull, t->goal,
                         t->distance};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     free(t->L.first);
     free(t->L.to);
     free(t->border);
+    free(t->reverse);
+    vgi_surface_free(&t->now);
     vgi_sparse_clear(&t->matrix);
     vgi_cholesky_free(&t->solver);
+    vgi_cholesky_free(&t->smoother);
     vgi_incidence_clear(&t->around);
 }
 

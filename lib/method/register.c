@@ -400,7 +400,7 @@ static void find_sides(struct registration *r)
 static int bend(struct registration *r, void (*step)(void *, const vg_register_step *), void *context, vg_err *e)
 {
     const vgi_fitting f = {.source = r->in->source, .rest = r->rest, .source_surface = r->source_surface,
-                           .target = r->target_surface, .flipped = r->flipped, .links = r->links, .nlinks = r->nlinks,
+                           .target_mesh = r->in->target, .target_points = r->target, .target = r->target_surface, .flipped = r->flipped, .links = r->links, .nlinks = r->nlinks,
                            .tie = r->tie, .nties = r->nties, .threads = r->in->threads, .step = step, .context = context};
     return vgi_fit(&f, r->x, e);
 }

@@ -44,6 +44,8 @@ typedef struct vgi_fitting {
     const vg_mesh *source;
     const double *rest;         /* of the source, brought onto the target as a whole */
     const vgi_surface *source_surface; /* of rest: its borders */
+    const vg_mesh *target_mesh;
+    const double *target_points;
     const vgi_surface *target;
     bool flipped;               /* the faces of one mesh turn the other way round: normals are to be opposite */
     const uint32_t *links;      /* nlinks pairs of source vertices */

@@ -1,4 +1,5 @@
 /* sparse.c: symmetric positive definite systems through CHOLMOD: one analysis, many factorisations.
+ * BLAS runs alone here: these systems are too small for more threads, and the last digits must not depend on their number.
  * Leaves out assembling them. Calls Core, Cholesky, Partition (LGPL) and Supernodal (GPL) of CHOLMOD.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/sparse.h"
@@ -14,6 +15,18 @@ struct vgi_cholesky {
     cholmod_dense *x, *y, *e; /* kept from solve to solve by cholmod_solve2 */
     double *b;                /* n x 3, by columns */
 };
+
+/* OpenBLAS's own; with another BLAS they are not there. */
+void openblas_set_num_threads(int n) __attribute__((weak));
+int openblas_get_num_threads(void) __attribute__((weak));
+
+static int blas_threads(int n)
+{
+    if (!openblas_set_num_threads || !openblas_get_num_threads) return n;
+    int before = openblas_get_num_threads();
+    if (n != before) openblas_set_num_threads(n);
+    return before;
+}
 
 void vgi_sparse_clear(vgi_sparse *a)
 {
@@ -67,7 +80,9 @@ void vgi_cholesky_free(vgi_cholesky **out)
 int vgi_cholesky_factorize(vgi_cholesky *c, const vgi_sparse *a, vg_err *e)
 {
     cholmod_sparse A = view(a);
+    int threads = blas_threads(1);
     cholmod_factorize(&A, c->L, &c->common);
+    blas_threads(threads);
     if (c->common.status == CHOLMOD_OUT_OF_MEMORY)
         return vg_fail(e, VG_ENOMEM, "not enough memory to factorize %zu unknowns", a->n);
     if (c->common.status != CHOLMOD_OK || c->L->minor != c->L->n)
@@ -81,8 +96,9 @@ int vgi_cholesky_solve(vgi_cholesky *c, double *x, vg_err *e)
     for (size_t i = 0; i < n; i++)
         for (size_t k = 0; k < 3; k++) c->b[k * n + i] = x[3 * i + k];
     cholmod_dense B = {.nrow = n, .ncol = 3, .nzmax = 3 * n, .d = n, .x = c->b, .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
-    if (!cholmod_solve2(CHOLMOD_A, c->L, &B, NULL, &c->x, NULL, &c->y, &c->e, &c->common))
-        return vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", n);
+    int threads = blas_threads(1), done = cholmod_solve2(CHOLMOD_A, c->L, &B, NULL, &c->x, NULL, &c->y, &c->e, &c->common);
+    blas_threads(threads);
+    if (!done) return vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", n);
     const double *from = c->x->x;
     for (size_t i = 0; i < n; i++)
         for (size_t k = 0; k < 3; k++) x[3 * i + k] = from[k * n + i];

@@ -11,7 +11,7 @@ enum { LEAF = 4, DEEPEST = 34 };
 
 struct triangle {
     double a[3], ab[3], ac[3];
-    uint32_t face;
+    uint32_t face, corner;
     uint8_t borders; /* bit 0: edge ab, 1: bc, 2: ca */
     bool flat;       /* no area: only its edges count */
 };
@@ -25,6 +25,7 @@ struct vgi_surface {
     const vg_mesh *m;
     double *normal, *centroid; /* nf x 3 */
     double *size;              /* nf */
+    double *vertex_normal;     /* nv x 3 */
     uint8_t *border;           /* per corner */
     size_t n;
     int depth;
@@ -72,14 +73,15 @@ static bool find_borders(vgi_surface *s, vg_err *e)
     return true;
 }
 
-static void set_triangle(struct triangle *t, const double *a, const double *b, const double *c, size_t face, uint8_t borders)
+static void set_triangle(struct triangle *t, const double *a, const double *b, const double *c, size_t face, size_t corner,
+                         uint8_t borders)
 {
     double area[3];
     for (int k = 0; k < 3; k++) t->a[k] = a[k], t->ab[k] = b[k] - a[k], t->ac[k] = c[k] - a[k];
     area[0] = t->ab[1] * t->ac[2] - t->ab[2] * t->ac[1];
     area[1] = t->ab[2] * t->ac[0] - t->ab[0] * t->ac[2];
     area[2] = t->ab[0] * t->ac[1] - t->ab[1] * t->ac[0];
-    t->face = (uint32_t)face, t->borders = borders;
+    t->face = (uint32_t)face, t->corner = (uint32_t)corner, t->borders = borders;
     t->flat = !(dot(area, area) > 1e-24 * dot(t->ab, t->ab) * dot(t->ac, t->ac));
 }
 
@@ -105,15 +107,31 @@ static void make_triangles(vgi_surface *s, const double *points)
         for (int k = 0; k < 3; k++) n[k] = length > 0 ? n[k] / length : 0;
         const double *p = points + 3 * (size_t)vert[0], *q = points + 3 * (size_t)vert[1];
         if (r == 2) {
-            set_triangle(t++, p, q, q, f, 0);
+            set_triangle(t++, p, q, q, f, begin, 0);
             s->size[f] = sqrt(dot(t[-1].ab, t[-1].ab));
         } else if (r == 3) {
             uint8_t edges = (uint8_t)(border[0] | border[1] << 1 | border[2] << 2);
-            set_triangle(t++, p, q, points + 3 * (size_t)vert[2], f, edges);
+            set_triangle(t++, p, q, points + 3 * (size_t)vert[2], f, begin, edges);
         } else {
             for (size_t i = 0; i < r; i++)
-                set_triangle(t++, points + 3 * (size_t)vert[i], points + 3 * (size_t)vert[i + 1 < r ? i + 1 : 0], C, f, border[i]);
+                set_triangle(t++, points + 3 * (size_t)vert[i], points + 3 * (size_t)vert[i + 1 < r ? i + 1 : 0], C, f, begin + i,
+                             border[i]);
         }
+    }
+}
+
+static void make_vertex_normals(vgi_surface *s)
+{
+    const vg_mesh *m = s->m;
+    for (size_t f = 0; f < m->nf; f++) {
+        if (m->start[f + 1] - m->start[f] == 2) continue;
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
+            for (size_t k = 0; k < 3; k++)
+                s->vertex_normal[3 * (size_t)m->vert[c] + k] += s->size[f] * s->size[f] * s->normal[3 * f + k];
+    }
+    for (size_t v = 0; v < m->nv; v++) {
+        double *n = s->vertex_normal + 3 * v, length = sqrt(dot(n, n));
+        for (int k = 0; k < 3; k++) n[k] = length > 0 ? n[k] / length : 0;
     }
 }
 
@@ -245,10 +263,14 @@ int vgi_surface_new(vgi_surface **out, const vg_mesh *m, const double *points, v
     s->normal = vgi_array(m->nf, 3 * sizeof *s->normal, e);
     s->centroid = vgi_array(m->nf, 3 * sizeof *s->centroid, e);
     s->size = vgi_array(m->nf, sizeof *s->size, e);
+    s->vertex_normal = vgi_array(m->nv, 3 * sizeof *s->vertex_normal, e);
     s->border = vgi_array(vg_mesh_corners(m), 1, e);
     s->triangle = vgi_array_raw(s->n, sizeof *s->triangle, e);
-    bool ok = s->normal && s->centroid && s->size && s->border && s->triangle && find_borders(s, e);
-    if (ok) make_triangles(s, points);
+    bool ok = s->normal && s->centroid && s->size && s->vertex_normal && s->border && s->triangle && find_borders(s, e);
+    if (ok) {
+        make_triangles(s, points);
+        make_vertex_normals(s);
+    }
     if (ok && grow_tree(s, e) == VG_OK) return VG_OK;
     vgi_surface_free(out);
     return VG_ENOMEM;
@@ -261,6 +283,7 @@ void vgi_surface_free(vgi_surface **out)
     free(s->normal);
     free(s->centroid);
     free(s->size);
+    free(s->vertex_normal);
     free(s->border);
     free(s->triangle);
     free(s->box);
@@ -281,6 +304,11 @@ const double *vgi_surface_centroids(const vgi_surface *s)
 const double *vgi_surface_sizes(const vgi_surface *s)
 {
     return s->size;
+}
+
+const double *vgi_surface_vertex_normals(const vgi_surface *s)
+{
+    return s->vertex_normal;
 }
 
 bool vgi_surface_border(const vgi_surface *s, uint32_t corner)
@@ -354,10 +382,22 @@ static double triangle_distance(const struct triangle *t, const double p[3], dou
     return best;
 }
 
-static bool fits(const vgi_surface *s, uint32_t face, const double *normal, double cosine)
+static const double *corner_normal(const vgi_surface *s, uint32_t corner)
 {
-    const double *n = s->normal + 3 * (size_t)face;
-    return !normal || !(dot(n, n) > 0) || dot(n, normal) >= cosine;
+    return s->vertex_normal + 3 * (size_t)s->m->vert[corner];
+}
+
+/* On sharp edges and tips the vertex normals are those of the surface, not those of the faces that meet there. */
+static bool fits(const vgi_surface *s, const struct triangle *t, const double u[2], const double *normal, double cosine)
+{
+    const double *n = s->normal + 3 * (size_t)t->face;
+    if (!normal || !(dot(n, n) > 0) || dot(n, normal) >= cosine) return true;
+    uint32_t begin = s->m->start[t->face], r = s->m->start[t->face + 1] - begin, next = begin + (t->corner - begin + 1) % r;
+    const double *a = corner_normal(s, t->corner), *b = corner_normal(s, next), *c = r == 3 ? corner_normal(s, begin + 2) : n;
+    double smooth[3];
+    for (int k = 0; k < 3; k++) smooth[k] = (1 - u[0] - u[1]) * a[k] + u[0] * b[k] + u[1] * c[k];
+    double length = sqrt(dot(smooth, smooth));
+    return length > 0 && dot(smooth, normal) >= cosine * length;
 }
 
 static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const double p[3], const double *normal, double cosine,
@@ -368,9 +408,10 @@ static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const doubl
         double u[2] = {0, 0};
         uint8_t touched;
         double square = triangle_distance(t, p, u, &touched);
-        if (!(square <= *best) || (!(square < *best) && t->face >= hit->face) || !fits(s, t->face, normal, cosine)) continue;
+        if (!(square <= *best) || (!(square < *best) && t->face >= hit->face) || !fits(s, t, u, normal, cosine)) continue;
         *best = square;
-        *hit = (vgi_hit){.face = t->face, .square = square, .border = touched & t->borders};
+        *hit = (vgi_hit){.face = t->face, .square = square, .border = touched & t->borders,
+                         .corner = t->corner, .u = {u[0], u[1]}};
         for (int k = 0; k < 3; k++) hit->point[k] = t->a[k] + u[0] * t->ab[k] + u[1] * t->ac[k];
     }
 }

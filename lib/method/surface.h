@@ -14,6 +14,8 @@ typedef struct vgi_hit {
     bool border;     /* on an edge that has only this face */
     double square;   /* squared distance */
     double point[3];
+    uint32_t corner; /* the point is a + u0 (b - a) + u1 (c - a): a the vertex of this corner, b of the next one; c of the one after */
+    double u[2];     /* that in a triangle, the centroid in a larger face, b in a line segment */
 } vgi_hit;
 
 /* vgi_surface_new: m borrowed until free; points (nv x 3, finite) copied in part. O(n log n). */
@@ -22,11 +24,12 @@ void vgi_surface_free(vgi_surface **s);
 const double *vgi_surface_normals(const vgi_surface *s);   /* nf x 3: unit (Newell), or 0 for a face that has none */
 const double *vgi_surface_centroids(const vgi_surface *s); /* nf x 3 */
 const double *vgi_surface_sizes(const vgi_surface *s);     /* nf: square root of the area, or the length of a line segment */
+const double *vgi_surface_vertex_normals(const vgi_surface *s); /* nv x 3: unit, of the areas around; 0 where there is none */
 bool vgi_surface_border(const vgi_surface *s, uint32_t corner); /* is the edge from this corner to the next one a border? */
 
-/* vgi_surface_nearest: the nearest point to p within the squared distance `limit`; false when there is none. Faces whose unit normal
- * has less than `cosine` with `normal` are passed over; those without a normal, and all if `normal` is NULL or 0, are not. Of two
- * at the same distance the lower face is nearer: the answer depends on no order. */
+/* vgi_surface_nearest: the nearest point to p within the squared distance `limit`; false when there is none. Points where
+ * neither the normal of the face nor that of the surface, smoothed over the vertices, has `cosine` with the unit vector `normal` are passed
+ * over; faces without a normal, and all if `normal` is NULL or 0, are not. Of two at the same distance the lower face is nearer: the answer depends on no order. */
 bool vgi_surface_nearest(const vgi_surface *s, const double p[3], const double *normal, double cosine, double limit, vgi_hit *hit);
 
 /* vgi_newell: the vector area of a face, whose length is its area (0 for line segments). */

@@ -161,13 +161,21 @@ transfer() {
 setup() {
     best "$RUNS" "vg-deform $1-1.vgs --onto $1-b.vgs | vg-solve >/dev/null"
     both=$seconds
-    vg-solve -v "$1-1w.vgs" 2>facts >/dev/null
+    : >facts
+    for _ in $(repeat "$RUNS" x); do
+        vg-solve -v "$1-1w.vgs" 2>>facts >/dev/null
+    done
     best "$RUNS" "vg-solve $1-1w.vgs >/dev/null"
     awk -v input="$2" -v both="$both" -v all="$seconds" -v mib=$((kib / 1024)) '/factorized in/ {
-        gsub(",", ""); for (i = 1; i < NF; i++) {
-            if ($i == "analysed") a = $(i + 2); if ($i == "factorized") f = $(i + 2); if ($(i + 1) == "entries") n = $i
+        gsub(",", "")
+        for (i = 1; i < NF; i++) {
+            if ($i == "analysed" && (!seen || $(i + 2) < a)) a = $(i + 2)
+            if ($i == "factorized" && (!seen || $(i + 2) < f)) f = $(i + 2)
+            if ($(i + 1) == "entries") n = $i
         }
-        printf "%-28s %12.3f %10.3f %9.3f %9.3f %14d %6d\n", input, both, all, a, f, n, mib }' facts >>setups
+        seen = 1
+    }
+    END { printf "%-28s %12.3f %10.3f %9.3f %9.3f %14d %6d\n", input, both, all, a, f, n, mib }' facts >>setups
 }
 
 # grows STAGE COMMAND-FOR-N COMMAND-FOR-4N

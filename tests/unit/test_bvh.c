@@ -202,6 +202,7 @@ static void refuses(void)
     check_refused(ARM("0", "Frames: 99999999999999999999\n"), VG_EINPUT, "the number of frames expected");
     check_refused(ARM("0", "Frames: 1\nFrame Time: 0\n"), VG_EINPUT, "line 18: the frame time is not positive");
     check_refused(ARM("0", "Frames: 1\nFrame Time: -0.1\n"), VG_EINPUT, "the frame time is not positive");
+    check_refused(ARM("0", "Frames: 99999\nFrame Time: 1e307\n"), VG_EINPUT, "the frame time is too large");
     check_refused(ARM("0", "Frames: 1\nFrame Time: inf\n"), VG_EINPUT, "'inf' is not a finite number");
     check_refused(ARM("0", "Frames: 2\nFrame Time: 1\n1 2 3 4 5 6\n1 2 3 4 5\n"), VG_ETRUNC, "ends in frame 1 of 2, behind 5 of 6 values");
     check_refused(ARM("0", "Frames: 1000000000000000000\nFrame Time: 1\n1 2 3 4 5 6\n"), VG_ETRUNC, "ends in frame 1 of");
@@ -476,7 +477,7 @@ static void says_what_is_lost(void)
     s.at[1][7] = -2.5; /* the end is half a unit further away */
     char *text = write_text(&s, false, warning, &e);
     CHECK(text && strstr(warning, "joint 'Knee.end' of frame 'f1' is off by 0.5, 17 % of the figure"));
-    CHECK(text && strstr(text, "Frame Time:         0.2500000000\n") && strstr(text, "Frames:                    3\n"));
+    CHECK(text && strstr(text, "Frame Time:               0.2500000000\n") && strstr(text, "Frames:                          3\n"));
     free(text);
     s.time[2] = 0.6;
     text = write_text(&s, false, warning, &e);

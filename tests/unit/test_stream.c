@@ -199,6 +199,7 @@ static int read_rest(vg_reader *reader, content *c, vg_err *e)
         if (vg_frame_shape(to, h, e) < 0 || vg_frame_label(to, &f, e) < 0) abort();
         memcpy(to->values, f.values, h->count * vg_kind_width(h->kind) * sizeof(double));
         memcpy(to->root, f.root, sizeof f.root);
+        if (vg_frame_pin(to, f.pins, f.npins, e) < 0) abort();
         if (h->nanchors && f.anchors) memcpy(to->anchors, f.anchors, 3 * h->nanchors * sizeof(double));
     }
     if (r == 0) {
@@ -296,6 +297,7 @@ static bool same_frame(const vg_frame *a, const vg_frame *b, const vg_head *h)
     bool graph = h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS, same = same_text(a->name, b->name);
     same &= a->has_time == b->has_time && a->time == b->time && same_records(&a->extra, &b->extra);
     same &= same_memory(a->values, b->values, h->count * vg_kind_width(h->kind) * sizeof(double));
+    same &= a->npins == b->npins && same_memory(a->pins, b->pins, 4 * a->npins);
     if (graph) same &= !memcmp(a->root, b->root, 24) && same_memory(a->anchors, b->anchors, 24 * h->nanchors);
     return same;
 }
@@ -407,6 +409,8 @@ static content make(vg_kind kind, vg_precision precision, int how)
         for (size_t k = 0; k < h->count * vg_kind_width(kind); k++) f->values[k] = (double)(float)noise();
         for (size_t k = 0; k < 3; k++) f->root[k] = noise();
         for (size_t k = 0; k < 3 * h->nanchors; k++) f->anchors[k] = noise();
+        if (how == FULL && kind == VG_VECTORS) /* an even and an odd number of pins */
+            CHECK(vg_frame_pin(f, (uint32_t[]){0, 2, 6}, 2 + i, &e) == VG_OK);
         if (how == FULL && i) add_unknown(&f->extra, "MID ", COPY_SAFE, "before a frame"), add_unknown(&f->extra, "MID ", COPY_SAFE, "");
     }
     return c;
@@ -615,7 +619,8 @@ static void test_order(void)
     int n = (int)p.n - 1, order[MOST + 2], form = find(&p, "FORM"), mesh = find(&p, "MESH");
     char what[80];
     for (int i = 0; i < n; i++) {
-        const char *tag = p.at[i].tag;
+        char tag[5];
+        memcpy(tag, p.at[i].tag, 5);
         bool unknown_tag = !strcmp(tag, "NOTE") || !strcmp(tag, "X 12") || !strcmp(tag, "MID ") || !strcmp(tag, "LAST");
         bool again = unknown_tag || !strcmp(tag, "PROV") || !strcmp(tag, "FRAM");
         /* twice in a row */

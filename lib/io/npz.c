@@ -1,0 +1,698 @@
+/* npz.c: NPZ, NumPy arrays in a zip: the numbers of all frames, and beside them faces, reference, names and times, so that
+ * nothing but attributes and provenance is lost. man/vg-decode.1 lists the arrays.
+ * Leaves out the header of an array (npy.c) and the zip (archive.c).
+ *
+ * Reading keeps the whole file in memory, as NumPy does: the frames may stand in any order of axes. Writing keeps names, times,
+ * roots and anchors; the numbers wait in a file without a name until their count is known.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/npy.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+/* The arrays, in the order in which they are written: that in which archive.c hands out the members. */
+enum array {
+    ANCHOR_POSITIONS, ANCHORS, DEFORMATIONS, FACE_OFFSETS, FACE_VERTICES, FACES, GRAPH_OFFSETS, GRAPH_VERTICES, LINKS, NAMES,
+    POSITIONS, REFERENCE, REFERENCE_NAME, ROOTS, SELECTED, TIMES, TRANSFORMS, VECTORS, ARRAYS
+};
+
+static const char *const array_names[ARRAYS] = {
+    "anchor_positions", "anchors", "deformations", "face_offsets", "face_vertices", "faces", "graph_offsets",
+    "graph_vertices", "links", "names", "positions", "reference", "reference_name", "roots", "selected", "times",
+    "transforms", "vectors"};
+
+/* ------------------------------------------------------------------------------------------- reading -- */
+
+struct held {
+    bool there;
+    vgi_npy a;
+    vg_bytes data;
+};
+
+typedef struct reading {
+    const char *subject;
+    struct held held[ARRAYS];
+    enum array values; /* which of them holds the frames */
+    size_t frames, count, width, nanchors, next;
+} reading;
+
+static bool is_array_name(const char *path)
+{
+    return vgi_has_suffix(path, strlen(path), ".npy");
+}
+
+static enum array find_array(const char *path)
+{
+    size_t n = strlen(path) - 4;
+    for (int i = 0; i < ARRAYS; i++)
+        if (strlen(array_names[i]) == n && !memcmp(array_names[i], path, n)) return (enum array)i;
+    return ARRAYS;
+}
+
+/* `in` starts at an array that fills it to its end. */
+static int hold(reading *x, enum array i, vgi_input *in, const char *subject, vg_err *e)
+{
+    struct held *h = &x->held[i];
+    const unsigned char *more;
+    size_t bytes, n;
+    if (h->there) return vg_fail(e, VG_EINPUT, "%s is there twice", subject);
+    int r = vgi_npy_read(&h->a, &bytes, in, subject, e);
+    if (r < 0) return r;
+    h->there = true;
+    r = vgi_input_take(in, &h->data, bytes, NULL, e);
+    if (r == VG_ETRUNC) return vg_fail(e, r, "%s ends too early", subject);
+    if (r == VG_OK) r = vgi_input_peek(in, 1, &more, &n, e);
+    return r == VG_OK && n ? vg_fail(e, VG_EINPUT, "%s goes on behind its elements", subject) : r;
+}
+
+static int hold_member(reading *x, const char *path, const vg_bytes *data, vg_err *e)
+{
+    enum array i = find_array(path);
+    char subject[200];
+    vgi_input *in;
+    if (i == ARRAYS) return VG_OK; /* a feature of somebody else's */
+    snprintf(subject, sizeof subject, "array '%s' in %.150s", array_names[i], x->subject);
+    int r = vgi_input_memory(&in, data->data, data->size, path, e);
+    if (r == VG_OK) r = hold(x, i, in, subject, e);
+    vgi_input_free(&in);
+    return r;
+}
+
+static int hold_all(reading *x, vgi_input *in, vg_err *e)
+{
+    vgi_archive *a = NULL;
+    vg_bytes data = {0};
+    const char *path;
+    int fd = -1, r = vgi_spool(in, vgi_archive_limits.total_bytes, &fd, e);
+    if (r == VG_OK) r = vgi_archive_open_for(&a, fd, 0, vgi_input_name(in), is_array_name, &vgi_archive_limits, e);
+    while (r == VG_OK && (r = vgi_archive_next(a, &path, &data, e)) > 0) r = hold_member(x, path, &data, e);
+    vgi_archive_close(&a);
+    vg_bytes_clear(&data);
+    return r;
+}
+
+/* ---- shapes and elements ---- */
+
+static int wrong(const reading *x, enum array i, const char *what, vg_err *e)
+{
+    return vg_fail(e, VG_EINPUT, "array '%s' in %s %s", array_names[i], x->subject, what);
+}
+
+static int missing(const reading *x, enum array i, enum array because, vg_err *e)
+{
+    return vg_fail(e, VG_EINPUT, "%s has an array '%s', but none called '%s'", x->subject, array_names[because],
+                   array_names[i]);
+}
+
+/* Is it of this shape? UINT64_MAX: any. */
+static bool has_shape(const struct held *h, size_t ndim, const uint64_t *shape)
+{
+    if (h->a.ndim != ndim) return false;
+    for (size_t d = 0; d < ndim; d++)
+        if (shape[d] != UINT64_MAX && h->a.shape[d] != shape[d]) return false;
+    return true;
+}
+
+static bool is_float(const struct held *h)
+{
+    return h->a.kind == 'f' && (h->a.item == 4 || h->a.item == 8);
+}
+
+static size_t elements(const struct held *h)
+{
+    size_t n = 1;
+    for (size_t d = 0; d < h->a.ndim; d++) n *= (size_t)h->a.shape[d];
+    return n;
+}
+
+/* Where element i, counted in C order, lies. */
+static const unsigned char *element(const struct held *h, size_t i)
+{
+    size_t at = 0;
+    if (!h->a.fortran) return h->data.data + i * h->a.item;
+    for (size_t d = h->a.ndim; d-- > 0; i /= (size_t)h->a.shape[d])
+        at += i % (size_t)h->a.shape[d] * vgi_npy_stride(&h->a, d);
+    return h->data.data + at * h->a.item;
+}
+
+static int copy_floats(const reading *x, enum array i, size_t from, size_t n, double *to, vg_err *e)
+{
+    const struct held *h = &x->held[i];
+    for (size_t k = 0; k < n; k++) {
+        to[k] = vgi_npy_float(&h->a, element(h, from + k));
+        if (!isfinite(to[k])) return wrong(x, i, "holds a number that is not finite", e);
+    }
+    return VG_OK;
+}
+
+/* An integer of any size; -1 when it is negative or too large for an index. */
+static int64_t integer_at(const struct held *h, size_t i)
+{
+    const unsigned char *p = element(h, i);
+    uint64_t x = 0;
+    for (size_t k = 0; k < h->a.item; k++) x |= (uint64_t)p[h->a.big ? h->a.item - 1 - k : k] << 8 * k;
+    bool negative = h->a.kind == 'i' && x >> (8 * h->a.item - 1);
+    return negative || x > UINT32_MAX ? -1 : (int64_t)x;
+}
+
+/* All of an array of indices below `limit`; *list is NULL when it is not there. */
+static int copy_indices(const reading *x, enum array i, uint64_t limit, uint32_t **list, size_t *n, vg_err *e)
+{
+    const struct held *h = &x->held[i];
+    *list = NULL, *n = 0;
+    if (!h->there) return VG_OK;
+    if ((h->a.kind != 'i' && h->a.kind != 'u') || h->a.item > 8) return wrong(x, i, "does not hold integers", e);
+    *n = elements(h);
+    if (!(*list = vgi_array_raw(*n, sizeof **list, e))) return VG_ENOMEM;
+    for (size_t k = 0; k < *n; k++) {
+        int64_t v = integer_at(h, k);
+        if (v < 0 || (uint64_t)v >= limit) return wrong(x, i, "holds an index that is out of range", e);
+        (*list)[k] = (uint32_t)v;
+    }
+    return VG_OK;
+}
+
+static int check_ascending(const reading *x, enum array i, const uint32_t *list, size_t n, vg_err *e)
+{
+    for (size_t k = 1; k < n; k++)
+        if (list[k] <= list[k - 1]) return wrong(x, i, "is not ascending", e);
+    return VG_OK;
+}
+
+static int append_letter(vg_bytes *b, uint32_t c, vg_err *e)
+{
+    unsigned char s[4];
+    size_t n = c < 0x80 ? 1 : c < 0x800 ? 2 : c < 0x10000 ? 3 : 4;
+    static const unsigned char lead[5] = {0, 0, 0xc0, 0xe0, 0xf0};
+    for (size_t k = n; k-- > 1; c >>= 6) s[k] = (unsigned char)(0x80 | (c & 0x3f));
+    s[0] = (unsigned char)(lead[n] | c);
+    return vgi_bytes_append(b, s, n, e);
+}
+
+/* Text of 'U' or 'S', without the NULs that fill it up. */
+static char *text_at(const reading *x, enum array i, size_t k, vg_err *e)
+{
+    const struct held *h = &x->held[i];
+    const unsigned char *p = element(h, k);
+    size_t step = h->a.kind == 'U' ? 4 : 1;
+    vg_bytes b = {0};
+    int r = VG_OK;
+    for (size_t at = 0; r == VG_OK && at < h->a.item; at += step) {
+        uint32_t c = step == 1 ? p[at] : h->a.big ? __builtin_bswap32(vgi_get32(p + at)) : vgi_get32(p + at);
+        if (c == 0) break;
+        if (step == 1) r = vgi_bytes_append(&b, p + at, 1, e);
+        else if (c > 0x10ffff || (c >= 0xd800 && c < 0xe000)) r = wrong(x, i, "holds a letter that does not exist", e);
+        else r = append_letter(&b, c, e);
+    }
+    char *text = r == VG_OK ? vgi_copy_string((char *)b.data, b.size, e) : NULL;
+    vg_bytes_clear(&b);
+    if (text && !vgi_is_utf8(text, strlen(text))) {
+        wrong(x, i, "holds text that is no UTF-8", e);
+        free(text);
+        return NULL;
+    }
+    return text;
+}
+
+/* ---- the head ---- */
+
+static int choose_values(reading *x, vg_head *h, vg_err *e)
+{
+    static const enum array all[] = {POSITIONS, VECTORS, DEFORMATIONS};
+    static const vg_kind kinds[] = {VG_VERTICES, VG_VECTORS, VG_DEFORMATIONS};
+    int found = -1;
+    for (int i = 0; i < 3; i++) {
+        if (!x->held[all[i]].there) continue;
+        if (found >= 0)
+            return vg_fail(e, VG_EINPUT, "%s has both '%s' and '%s': frames are one of them", x->subject,
+                           array_names[all[found]], array_names[all[i]]);
+        found = i;
+    }
+    if (found < 0)
+        return vg_fail(e, VG_EINPUT, "%s has none of the arrays 'positions', 'vectors' and 'deformations'", x->subject);
+    struct held *v = &x->held[x->values = all[found]];
+    vgi_npy *a = &v->a;
+    x->width = vg_kind_width(kinds[found]);
+    if (!is_float(v)) return wrong(x, x->values, "holds no binary32 or binary64 numbers: store it as float32 or float64", e);
+    if (a->ndim == 2) { /* one frame */
+        a->shape[2] = a->shape[1], a->shape[1] = a->shape[0], a->shape[0] = 1;
+        a->ndim = 3;
+    }
+    if (a->ndim != 3 || a->shape[2] != x->width || a->shape[1] == 0 || a->shape[1] >= UINT32_MAX)
+        return wrong(x, x->values, x->width == 3 ? "is not of shape (frames, elements, 3)" : "is not of shape (frames, elements, 4)", e);
+    if (a->shape[0] == 0) return wrong(x, x->values, "holds no frame", e);
+    x->frames = (size_t)a->shape[0], x->count = (size_t)a->shape[1];
+    h->kind = kinds[found], h->count = x->count;
+    h->precision = a->item == 4 ? VG_F32 : VG_F64;
+    return VG_OK;
+}
+
+static int take_reference(reading *x, vg_head *h, vg_err *e)
+{
+    const struct held *r = &x->held[REFERENCE];
+    bool vertices = h->kind == VG_VERTICES;
+    const uint64_t shape[2] = {vertices ? x->count : UINT64_MAX, 3};
+    h->mesh.nv = x->count;
+    if (!r->there) return vertices ? VG_OK : missing(x, REFERENCE, x->values, e);
+    if (!is_float(r) || !has_shape(r, 2, shape) || r->a.shape[0] == 0 || r->a.shape[0] >= UINT32_MAX - 1)
+        return wrong(x, REFERENCE, "is not of shape (vertices, 3) with float32 or float64", e);
+    h->mesh.nv = (size_t)r->a.shape[0];
+    h->reference = vgi_array_raw(h->mesh.nv, 3 * sizeof *h->reference, e);
+    int result = h->reference ? copy_floats(x, REFERENCE, 0, 3 * h->mesh.nv, h->reference, e) : VG_ENOMEM;
+    const struct held *name = &x->held[REFERENCE_NAME];
+    if (result < 0 || !name->there) return result;
+    if ((name->a.kind != 'U' && name->a.kind != 'S') || elements(name) != 1)
+        return wrong(x, REFERENCE_NAME, "is not one text", e);
+    return (h->reference_name = text_at(x, REFERENCE_NAME, 0, e)) ? VG_OK : e && e->code ? e->code : VG_EINPUT;
+}
+
+/* face_offsets and face_vertices; checked so far that the source can check the rest. */
+static int take_polygons(reading *x, vg_head *h, vg_err *e)
+{
+    size_t n, corners;
+    vg_mesh *m = &h->mesh;
+    if (!x->held[FACE_VERTICES].there) return missing(x, FACE_VERTICES, FACE_OFFSETS, e);
+    if (!x->held[FACE_OFFSETS].there) return missing(x, FACE_OFFSETS, FACE_VERTICES, e);
+    int r = copy_indices(x, FACE_OFFSETS, UINT32_MAX, &m->start, &n, e);
+    if (r == VG_OK) r = copy_indices(x, FACE_VERTICES, m->nv, &m->vert, &corners, e);
+    if (r < 0) return r;
+    if (n == 0 || m->start[0] != 0 || m->start[n - 1] != corners)
+        return wrong(x, FACE_OFFSETS, "does not begin with 0 and end with the length of 'face_vertices'", e);
+    if ((r = check_ascending(x, FACE_OFFSETS, m->start, n, e)) < 0) return r;
+    m->nf = n - 1;
+    return VG_OK;
+}
+
+/* faces: as many rows as faces, all of one size. */
+static int take_equal_faces(reading *x, vg_head *h, vg_err *e)
+{
+    const struct held *f = &x->held[FACES];
+    size_t corners;
+    vg_mesh *m = &h->mesh;
+    if (x->held[FACE_OFFSETS].there) return wrong(x, FACES, "is there beside 'face_offsets': faces are told by one of them", e);
+    if (f->a.ndim != 2 || f->a.shape[1] < 2) return wrong(x, FACES, "is not of shape (faces, corners of a face)", e);
+    int r = copy_indices(x, FACES, m->nv, &m->vert, &corners, e);
+    if (r < 0) return r;
+    if (corners >= UINT32_MAX || f->a.shape[0] >= UINT32_MAX) return wrong(x, FACES, "is too long", e);
+    size_t nf = (size_t)f->a.shape[0];
+    if (!(m->start = vgi_array_raw(nf + 1, sizeof *m->start, e))) return VG_ENOMEM;
+    for (size_t i = 0; i <= nf; i++) m->start[i] = (uint32_t)(i * (size_t)f->a.shape[1]);
+    m->nf = nf;
+    return VG_OK;
+}
+
+static int take_faces(reading *x, vg_head *h, vg_err *e)
+{
+    if (x->held[FACES].there) return take_equal_faces(x, h, e);
+    if (x->held[FACE_OFFSETS].there || x->held[FACE_VERTICES].there) return take_polygons(x, h, e);
+    return h->kind == VG_VERTICES ? VG_OK : missing(x, FACE_OFFSETS, x->values, e);
+}
+
+static int take_links(reading *x, vg_head *h, vg_err *e)
+{
+    static const uint64_t pairs[2] = {UINT64_MAX, 2};
+    h->has_links = x->held[LINKS].there;
+    if (h->has_links && !has_shape(&x->held[LINKS], 2, pairs)) return wrong(x, LINKS, "is not of shape (links, 2)", e);
+    size_t n;
+    int r = copy_indices(x, LINKS, h->mesh.nv, &h->links, &n, e);
+    h->nlinks = n / 2;
+    for (size_t i = 0; r == VG_OK && i < h->nlinks; i++)
+        if (h->links[2 * i] == h->links[2 * i + 1]) return wrong(x, LINKS, "joins a vertex to itself", e);
+    return r;
+}
+
+/* The vector graph: which faces carry vectors, links, anchors. What was derived from them when it was written
+ * (graph_offsets, graph_vertices) is derived again. */
+static int take_graph(reading *x, vg_head *h, vg_err *e)
+{
+    const uint64_t roots[2] = {x->frames, 3};
+    if (h->kind == VG_VERTICES) return VG_OK;
+    int r = vg_mesh_check(&h->mesh, x->subject, e);
+    if (r == VG_OK) r = copy_indices(x, SELECTED, h->mesh.nf, &h->selected, &h->nselected, e);
+    h->has_selection = x->held[SELECTED].there;
+    if (r == VG_OK) r = check_ascending(x, SELECTED, h->selected, h->nselected, e);
+    if (r == VG_OK) r = take_links(x, h, e);
+    if (r == VG_OK) r = copy_indices(x, ANCHORS, h->mesh.nv, &h->anchors, &h->nanchors, e);
+    if (r == VG_OK) r = check_ascending(x, ANCHORS, h->anchors, h->nanchors, e);
+    if (r < 0) return r;
+    x->nanchors = h->nanchors;
+    const uint64_t places[3] = {x->frames, h->nanchors, 3};
+    if (h->nanchors && !x->held[ANCHOR_POSITIONS].there) return missing(x, ANCHOR_POSITIONS, ANCHORS, e);
+    if (h->nanchors && (!is_float(&x->held[ANCHOR_POSITIONS]) || !has_shape(&x->held[ANCHOR_POSITIONS], 3, places)))
+        return wrong(x, ANCHOR_POSITIONS, "is not of shape (frames, anchors, 3) with float32 or float64", e);
+    if (!x->held[ROOTS].there) return missing(x, ROOTS, x->values, e);
+    if (!is_float(&x->held[ROOTS]) || !has_shape(&x->held[ROOTS], 2, roots))
+        return wrong(x, ROOTS, "is not of shape (frames, 3) with float32 or float64", e);
+    vg_graph *g;
+    if ((r = vg_graph_new(&g, h, e)) < 0) return r;
+    size_t corners = vg_graph_corners(g);
+    vg_graph_free(&g);
+    if (corners == x->count) return VG_OK;
+    return vg_fail(e, VG_EINPUT, "array '%s' in %s has %zu elements where the vector graph has %zu corners",
+                   array_names[x->values], x->subject, x->count, corners);
+}
+
+static int check_labels(const reading *x, vg_err *e)
+{
+    const uint64_t shape[1] = {x->frames};
+    const struct held *names = &x->held[NAMES], *times = &x->held[TIMES];
+    if (names->there && ((names->a.kind != 'U' && names->a.kind != 'S') || !has_shape(names, 1, shape)))
+        return wrong(x, NAMES, "is not a list of texts, one for each frame", e);
+    if (times->there && (!is_float(times) || !has_shape(times, 1, shape)))
+        return wrong(x, TIMES, "is not of shape (frames) with float32 or float64", e);
+    return VG_OK;
+}
+
+static int open_npz(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)
+{
+    reading *x = *state = vgi_array(1, sizeof *x, e);
+    if (!x) return VG_ENOMEM;
+    x->subject = subject;
+    int r = hold_all(x, in, e);
+    if (r == VG_OK) r = choose_values(x, h, e);
+    if (r == VG_OK) r = take_reference(x, h, e);
+    if (r == VG_OK) r = take_faces(x, h, e);
+    if (r == VG_OK) r = take_graph(x, h, e);
+    return r < 0 ? r : check_labels(x, e);
+}
+
+static int check_quaternions(const reading *x, const double *q, vg_err *e)
+{
+    for (size_t i = 0; x->width == 4 && i < x->count; i++, q += 4)
+        if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) return wrong(x, x->values, "holds a quaternion that is zero", e);
+    return VG_OK;
+}
+
+static int take_name(reading *x, vg_frame *f, vg_err *e)
+{
+    if (!x->held[NAMES].there) return vg_frame_rename(f, "", e);
+    vg_err cause = {.code = VG_ENOMEM};
+    char *name = text_at(x, NAMES, x->next, &cause);
+    int r = name ? vg_frame_rename(f, name, e) : vg_fail(e, cause.code, "%s", cause.message);
+    free(name);
+    return r;
+}
+
+static int next_npz(void *state, vg_frame *f, vg_err *e)
+{
+    reading *x = state;
+    size_t per_frame = x->count * x->width;
+    if (x->next == x->frames) return 0;
+    int r = copy_floats(x, x->values, x->next * per_frame, per_frame, f->values, e);
+    if (r == VG_OK) r = check_quaternions(x, f->values, e);
+    if (r == VG_OK && x->values != POSITIONS) r = copy_floats(x, ROOTS, 3 * x->next, 3, f->root, e);
+    if (r == VG_OK && x->nanchors)
+        r = copy_floats(x, ANCHOR_POSITIONS, 3 * x->nanchors * x->next, 3 * x->nanchors, f->anchors, e);
+    f->has_time = x->held[TIMES].there;
+    if (r == VG_OK && f->has_time) r = copy_floats(x, TIMES, x->next, 1, &f->time, e);
+    if (r == VG_OK) r = take_name(x, f, e);
+    x->next++;
+    return r < 0 ? r : 1;
+}
+
+static uint64_t count_frames(const void *state)
+{
+    return ((const reading *)state)->frames;
+}
+
+static void close_npz(void *state)
+{
+    reading *x = state;
+    if (!x) return;
+    for (int i = 0; i < ARRAYS; i++) vg_bytes_clear(&x->held[i].data);
+    free(x);
+}
+
+/* A zip whose first member is called "... .npy". */
+static bool sniff_npz(const unsigned char *data, size_t n)
+{
+    enum { LOCAL = 30, NAME_BYTES = 26 };
+    if (n < LOCAL || memcmp(data, "PK\3\4", 4) != 0) return false;
+    size_t name = data[NAME_BYTES] | (size_t)data[NAME_BYTES + 1] << 8;
+    return name <= n - LOCAL && vgi_has_suffix((const char *)data + LOCAL, name, ".npy");
+}
+
+/* ------------------------------------------------------------------------------------------- writing -- */
+
+typedef struct writing {
+    vgi_output *out, spool; /* spool: the values */
+    const vg_head *h;
+    bool doubles, timed;
+    size_t per_frame;
+    uint64_t frames;
+    vg_bytes frame, roots, anchors, times;
+    vgi_names names;
+    vgi_packer *packer;
+} writing;
+
+static int begin_npz(void **state, const vg_head *h, const vg_sink_options *o, vgi_output *out, vg_err *e)
+{
+    writing *x = *state = vgi_array(1, sizeof *x, e);
+    if (!x) return VG_ENOMEM;
+    x->out = out, x->h = h, x->doubles = o->full_precision, x->timed = true;
+    x->per_frame = h->count * vg_kind_width(h->kind);
+    x->spool.name = "temporary file";
+    x->spool.fd = vgi_nameless_file(e);
+    return x->spool.fd < 0 ? x->spool.fd : VG_OK;
+}
+
+static bool is_rooted(const vg_head *h)
+{
+    return h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS;
+}
+
+static int put_npz(void *state, const vg_frame *f, vg_err *e)
+{
+    writing *x = state;
+    double time = f->has_time ? f->time : 0;
+    x->frame.size = 0;
+    int r = vgi_npy_store(&x->frame, f->values, x->per_frame, x->doubles, e);
+    if (r == VG_OK) r = vgi_names_add(&x->names, f->name ? f->name : "", f->name ? strlen(f->name) : 0, e);
+    x->timed &= f->has_time;
+    if (r == VG_OK) r = vgi_npy_store(&x->times, &time, 1, true, e);
+    if (r == VG_OK && is_rooted(x->h)) r = vgi_npy_store(&x->roots, f->root, 3, true, e);
+    if (r == VG_OK && is_rooted(x->h)) r = vgi_npy_store(&x->anchors, f->anchors, 3 * x->h->nanchors, true, e);
+    x->frames++;
+    return r < 0 ? r : vgi_output_put(&x->spool, x->frame.data, x->frame.size, e);
+}
+
+/* ---- one member after another ---- */
+
+static int begin_array(writing *x, enum array i, const char *descr, size_t item, size_t ndim, const uint64_t *shape, vg_err *e)
+{
+    unsigned char head[VGI_NPY_HEADER];
+    char path[32];
+    uint64_t bytes = item;
+    for (size_t d = 0; d < ndim; d++) bytes *= shape[d];
+    snprintf(path, sizeof path, "%s.npy", array_names[i]);
+    vgi_npy_write(head, descr, ndim, shape);
+    int r = vgi_packer_begin(x->packer, path, sizeof head + bytes, e);
+    return r < 0 ? r : vgi_packer_more(x->packer, head, sizeof head, e);
+}
+
+static int add_array(writing *x, enum array i, const char *descr, size_t item, size_t ndim, const uint64_t *shape,
+                     const void *data, size_t n, vg_err *e)
+{
+    int r = begin_array(x, i, descr, item, ndim, shape, e);
+    if (r == VG_OK && n) r = vgi_packer_more(x->packer, data, n, e);
+    return r < 0 ? r : vgi_packer_finish(x->packer, e);
+}
+
+static int add_doubles(writing *x, enum array i, size_t ndim, const uint64_t *shape, const vg_bytes *b, vg_err *e)
+{
+    return add_array(x, i, "<f8", 8, ndim, shape, b->data, b->size, e);
+}
+
+static int add_indices(writing *x, enum array i, size_t ndim, const uint64_t *shape, const uint32_t *list, size_t n, vg_err *e)
+{
+    vg_bytes b = {0};
+    int r = vgi_bytes_reserve(&b, 4 * n, e);
+    for (size_t k = 0; r == VG_OK && k < n; k++) vgi_put32(b.data + 4 * k, list[k]);
+    if (r == VG_OK) r = add_array(x, i, "<u4", 4, ndim, shape, b.data, 4 * n, e);
+    vg_bytes_clear(&b);
+    return r;
+}
+
+static int add_mesh(writing *x, enum array offsets, enum array vertices, const uint32_t *start, const uint32_t *vert, size_t nf,
+                    vg_err *e)
+{
+    static const uint32_t none = 0;
+    const uint64_t n = nf + 1, corners = nf ? start[nf] : 0;
+    int r = add_indices(x, offsets, 1, &n, nf ? start : &none, (size_t)n, e);
+    return r < 0 ? r : add_indices(x, vertices, 1, &corners, vert, (size_t)corners, e);
+}
+
+static int add_graph(writing *x, vg_err *e)
+{
+    vg_graph *g;
+    int r = vg_graph_new(&g, x->h, e);
+    if (r == VG_OK) r = add_mesh(x, GRAPH_OFFSETS, GRAPH_VERTICES, g->start, g->vert, g->nf, e);
+    vg_graph_free(&g);
+    return r;
+}
+
+/* The code points of valid UTF-8. */
+static uint32_t next_letter(const unsigned char **s)
+{
+    uint32_t c = *(*s)++;
+    int more = c >= 0xf0 ? 3 : c >= 0xe0 ? 2 : c >= 0xc0 ? 1 : 0;
+    if (more) c &= 0x3fu >> more;
+    while (more-- > 0) c = c << 6 | (*(*s)++ & 0x3f);
+    return c;
+}
+
+static size_t count_letters(const char *s)
+{
+    size_t n = 0;
+    for (; *s; s++) n += ((unsigned char)*s & 0xc0) != 0x80;
+    return n;
+}
+
+/* Texts of one width, as NumPy has them: UTF-32 filled up with zeros. */
+static int add_texts(writing *x, enum array i, size_t ndim, char *const *texts, size_t n, vg_err *e)
+{
+    const uint64_t shape = n;
+    char descr[32];
+    size_t width = 1;
+    for (size_t k = 0; k < n; k++) {
+        size_t letters = count_letters(texts[k]);
+        if (letters > width) width = letters;
+    }
+    snprintf(descr, sizeof descr, "<U%zu", width);
+    int r = begin_array(x, i, descr, 4 * width, ndim, &shape, e);
+    unsigned char *line = r == VG_OK ? vgi_array_raw(width, 4, e) : NULL;
+    if (r == VG_OK && !line) r = VG_ENOMEM;
+    for (size_t k = 0; k < n && r == VG_OK; k++) {
+        const unsigned char *s = (const unsigned char *)texts[k];
+        memset(line, 0, 4 * width);
+        for (size_t at = 0; *s; at += 4) vgi_put32(line + at, next_letter(&s));
+        r = vgi_packer_more(x->packer, line, 4 * width, e);
+    }
+    free(line);
+    return r < 0 ? r : vgi_packer_finish(x->packer, e);
+}
+
+static int copy_spool(writing *x, vg_err *e)
+{
+    enum { BLOCK = 1 << 20 };
+    unsigned char *block = vgi_array_raw(BLOCK, 1, e);
+    int r = block ? vgi_output_flush(&x->spool, e) : VG_ENOMEM;
+    for (uint64_t off = 0; r == VG_OK && off < x->spool.size;) {
+        ssize_t got = pread(x->spool.fd, block, BLOCK, (off_t)off);
+        if (got < 0 && errno == EINTR) continue;
+        if (got <= 0) r = vg_fail(e, VG_ESYS, "cannot read a temporary file: %s", got ? strerror(errno) : "it ends too early");
+        else r = vgi_packer_more(x->packer, block, (size_t)got, e);
+        if (got > 0) off += (uint64_t)got;
+    }
+    free(block);
+    return r;
+}
+
+static int add_values(writing *x, enum array i, vg_err *e)
+{
+    const uint64_t shape[3] = {x->frames, x->h->count, vg_kind_width(x->h->kind)};
+    int r = begin_array(x, i, x->doubles ? "<f8" : "<f4", x->doubles ? 8 : 4, 3, shape, e);
+    if (r == VG_OK) r = copy_spool(x, e);
+    return r < 0 ? r : vgi_packer_finish(x->packer, e);
+}
+
+static int add_reference(writing *x, vg_err *e)
+{
+    const uint64_t shape[2] = {x->h->mesh.nv, 3};
+    vg_bytes b = {0};
+    int r = vgi_npy_store(&b, x->h->reference, 3 * x->h->mesh.nv, true, e);
+    if (r == VG_OK) r = add_doubles(x, REFERENCE, 2, shape, &b, e);
+    vg_bytes_clear(&b);
+    return r;
+}
+
+/* Is this array part of what is written? */
+static bool belongs(const writing *x, enum array i)
+{
+    const vg_head *h = x->h;
+    switch (i) {
+    case ANCHORS: return is_rooted(h) && h->nanchors;
+    case ANCHOR_POSITIONS: return is_rooted(h) && h->nanchors;
+    case GRAPH_OFFSETS: return is_rooted(h); /* with graph_vertices */
+    case LINKS: return is_rooted(h) && h->has_links;
+    case SELECTED: return is_rooted(h) && h->has_selection;
+    case ROOTS: return is_rooted(h);
+    case FACE_OFFSETS: return h->mesh.nv > 0; /* with face_vertices */
+    case REFERENCE: return h->mesh.nv > 0 && h->reference;
+    case REFERENCE_NAME: return h->mesh.nv > 0 && h->reference_name;
+    case TIMES: return x->timed;
+    case NAMES: return true;
+    case POSITIONS: return h->kind == VG_VERTICES;
+    case VECTORS: return h->kind == VG_VECTORS;
+    case DEFORMATIONS: return h->kind == VG_DEFORMATIONS;
+    case TRANSFORMS: return h->kind == VG_TRANSFORMS;
+    default: return false;
+    }
+}
+
+static int add(writing *x, enum array i, vg_err *e)
+{
+    const vg_head *h = x->h;
+    const uint64_t places[3] = {x->frames, h->nanchors, 3}, roots[2] = {x->frames, 3}, links[2] = {h->nlinks, 2};
+    const uint64_t anchors = h->nanchors, selected = h->nselected, frames = x->frames;
+    if (!belongs(x, i)) return VG_OK;
+    switch (i) {
+    case ANCHOR_POSITIONS: return add_doubles(x, i, 3, places, &x->anchors, e);
+    case ANCHORS: return add_indices(x, i, 1, &anchors, h->anchors, h->nanchors, e);
+    case FACE_OFFSETS: return add_mesh(x, i, FACE_VERTICES, h->mesh.start, h->mesh.vert, h->mesh.nf, e);
+    case GRAPH_OFFSETS: return add_graph(x, e);
+    case LINKS: return add_indices(x, i, 2, links, h->links, 2 * h->nlinks, e);
+    case NAMES: return add_texts(x, i, 1, x->names.at, x->names.n, e);
+    case REFERENCE: return add_reference(x, e);
+    case REFERENCE_NAME: return add_texts(x, i, 0, &h->reference_name, 1, e);
+    case ROOTS: return add_doubles(x, i, 2, roots, &x->roots, e);
+    case SELECTED: return add_indices(x, i, 1, &selected, h->selected, h->nselected, e);
+    case TIMES: return add_doubles(x, i, 1, &frames, &x->times, e);
+    default: return add_values(x, i, e);
+    }
+}
+
+static int end_npz(void *state, vg_err *e)
+{
+    writing *x = state;
+    int r = vgi_packer_open_plain(&x->packer, x->out->fd, x->out->name, e);
+    for (int i = 0; i < ARRAYS && r == VG_OK; i++) r = add(x, (enum array)i, e);
+    if (r == VG_OK) r = vgi_packer_end(x->packer, e);
+    if (r < 0) return r;
+    off_t size = lseek(x->out->fd, 0, SEEK_END);
+    if (size < 0) return vg_fail(e, VG_ESYS, "cannot write to '%s': %s", x->out->name, strerror(errno));
+    x->out->size = (uint64_t)size;
+    return VG_OK;
+}
+
+static const char *warn_npz(void *state)
+{
+    const writing *x = state;
+    size_t timed = 0;
+    for (size_t i = 0; i + 8 <= x->times.size; i += 8) timed += vgi_get64(x->times.data + i) != 0;
+    return !x->timed && timed ? "the times of the frames: not every frame has one" : NULL;
+}
+
+static void release_npz(void *state)
+{
+    writing *x = state;
+    if (!x) return;
+    vgi_packer_close(&x->packer);
+    if (x->spool.fd >= 0) close(x->spool.fd);
+    vgi_output_clear(&x->spool);
+    vgi_names_clear(&x->names);
+    vg_bytes_clear(&x->frame);
+    vg_bytes_clear(&x->roots);
+    vg_bytes_clear(&x->anchors);
+    vg_bytes_clear(&x->times);
+    free(x);
+}
+
+const vgi_sequence_format vgi_sequence_npz = {
+    .name = "npz", .suffix = ".npz",
+    .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_NAMES | VGI_KEEPS_TIMES | VGI_KEEPS_DOUBLES,
+    .sniff = sniff_npz, .open = open_npz, .next = next_npz, .frames = count_frames, .close = close_npz,
+    .kinds = 1 << VG_VERTICES | 1 << VG_VECTORS | 1 << VG_DEFORMATIONS | 1 << VG_TRANSFORMS,
+    .begin = begin_npz, .put = put_npz, .end = end_npz, .warning = warn_npz, .release = release_npz};

@@ -1,0 +1,167 @@
+#!/usr/bin/env bats
+# Skeletons: BVH in and out through whole pipelines. Numbers and syntax are tested in unit/test_bvh.c.
+# SPDX-License-Identifier: GPL-3.0-or-later
+load lib.bash
+
+# walk N [LEG [DT]]: a figure of 9 joints that walks N frames, its legs LEG long, as BVH on standard output. Hips and their
+# coincident left hip joint, as motion capture has them; the right foot is a joint without a child.
+walk() {
+    LC_ALL=C awk -v n="$1" -v leg="${2:-4}" -v dt="${3:-0.04}" '
+    function joint(kind, name, x, y, z, channels) {
+        printf "%s %s\n{\nOFFSET %g %g %g\nCHANNELS %s\n", kind, name, x, y, z, channels
+    }
+    BEGIN {
+        turn = "Zrotation Xrotation Yrotation"
+        print "HIERARCHY"
+        joint("ROOT", "Hips", 0, 0, 0, "6 Xposition Yposition Zposition " turn)
+        joint("JOINT", "LHipJoint", 0, 0, 0, "3 " turn)
+        joint("JOINT", "LThigh", 1, -1, 0, "3 " turn)
+        joint("JOINT", "LFoot", 0, -leg, 0.5, "3 " turn)
+        print "End Site\n{\nOFFSET 0 -1 2\n}\n}\n}\n}"
+        joint("JOINT", "RThigh", -1, -1, 0, "3 " turn)
+        joint("JOINT", "RFoot", 0, -leg, 0.5, "0")
+        print "}\n}"
+        joint("JOINT", "Chest", 0, 3, 0.2, "3 " turn)
+        joint("JOINT", "Arm", 2, 1, 0, "1 Xrotation")
+        print "End Site\n{\nOFFSET 0 -3 0\n}\n}"
+        joint("JOINT", "Head", 0, 2, 0.3, "0")
+        print "}\n}\n}\nMOTION\nFrames: " n "\nFrame Time: " dt
+        for (i = 0; i < n; i++) {
+            s = sin(0.2 * i)
+            printf "%g %g %g 5 %g 10 0 %g 0 0 %g 0 %g 0 0 0 %g 0 %g 0 0 %g\n", 0.1 * i, leg + 2, 0.3 * i, 3 * s, 0, 40 * s, 10 * s, \
+                -40 * s, 10 * s, 30 * s
+        }
+    }'
+}
+
+# largest FILE FILE: the largest distance between two sequences, in D
+largest() {
+    vg-diff --json "$1" "$2" >.diff.json || return
+    python3 -c 'import json; d = json.load(open(".diff.json")); print(d["vertex_error"]["max"] / d["diagonal"])'
+}
+
+@test "a BVH file is a sequence of its joints" {
+    walk 12 >walk.bvh
+    must vg-info walk.bvh
+    shows "12: 'walk.0001' to 'walk.0012'" "0 s to 0.44 s" "vertices    11" "10 of 2" "reference   walk"
+    must vg-info --frames walk.bvh
+    shows 'walk.0005  0.16'
+}
+
+@test "the reference is the pose without rotations, for --onto and --reference too" {
+    walk 3 >walk.bvh
+    awk '/^MOTION/{exit} {print}' walk.bvh >rest.bvh
+    printf 'MOTION\nFrames: 1\nFrame Time: 1\n0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0\n' >>rest.bvh
+    must vg-decode -q rest.bvh -o rest.obj
+    printf 'v 0 0 0\nv 0 0 0\nv 1 -1 0\nv 1 -5 0.5\nv 1 -6 2.5\nv -1 -1 0\nv -1 -5 0.5\nv 0 3 0.2\nv 2 4 0.2\nv 2 1 0.2\nv 0 5 0.5\n' >known
+    grep ^v rest.obj >have
+    same_file known have
+    vg-encode --no-provenance walk.bvh >walk.vgs
+    vg-encode --no-provenance --reference rest.obj walk.bvh >other.vgs
+    must vg-info --json walk.vgs
+    walk=$output
+    must vg-info --json other.vgs
+    digest() { python3 -c 'import json, sys; print(json.load(sys.stdin)["digest"])'; }
+    [ "$(digest <<<"$walk")" = "$(digest <<<"$output")" ]
+    pipe 'vg-deform --onto rest.bvh -q walk.bvh | vg-solve | vg-decode -o a.bvh -q'
+    pipe 'vg-deform --onto walk.bvh -q walk.bvh | vg-solve | vg-decode -o b.bvh -q'
+    same_file a.bvh b.bvh
+}
+
+@test "there and back: the same joints" {
+    walk 40 >walk.bvh
+    must vg-decode walk.bvh -o again.bvh
+    must vg-diff -t 1e-6 walk.bvh again.bvh
+    must vg-decode --f64 walk.bvh -o exact.bvh
+    must vg-diff -t 1e-11 walk.bvh exact.bvh
+    for name in human-man-poses human-heavy-poses sit01 standing03; do
+        must vg-decode "$DATA/$name.bvh.xz" -o "$name.bvh"
+        must vg-diff -t 1e-6 "$DATA/$name.bvh.xz" "$name.bvh"
+    done
+    must grep -c '^Frames: *15$' human-man-poses.bvh
+    # hierarchy and channels are as they were: only the numbers may be written otherwise
+    xz -dc "$DATA/human-man-poses.bvh.xz" | grep -E 'ROOT|JOINT|End|CHANNELS' | tr -s ' \t' ' ' | sed 's/^ //' >before
+    grep -E 'ROOT|JOINT|End|CHANNELS' human-man-poses.bvh | tr -s ' \t' ' ' | sed 's/^ //' >after
+    same_file before after
+}
+
+@test "the skeleton and the times go through a pipeline" {
+    walk 20 4 0.0125 >walk.bvh
+    pipe 'vg-encode walk.bvh | vg-deform -q --onto walk.bvh | vg-solve | vg-decode -o out.bvh'
+    must grep -c '^Frame Time: *0.0125000000$' out.bvh
+    must vg-diff -t 1e-6 walk.bvh out.bvh
+    pipe 'vg-encode --vectors walk.bvh | vg-solve | vg-decode -o vectors.bvh'
+    must vg-diff -t 1e-6 walk.bvh vectors.bvh
+    pipe 'vg-encode walk.bvh | vg-decode -o - --format bvh >pipe.bvh'
+    must vg-decode walk.bvh -o pipe2.bvh
+    same_file pipe.bvh pipe2.bvh
+}
+
+@test "an action goes to another performer, whose bones keep their lengths" {
+    walk 30 >short.bvh
+    walk 30 6 >long.bvh
+    pipe 'vg-encode short.bvh | vg-deform -q --onto long.bvh | vg-solve | vg-decode -q -o out.bvh'
+    grep OFFSET out.bvh | awk '{print $2 + 0, $3 + 0, $4 + 0}' >out.offsets
+    grep OFFSET long.bvh | awk '{print $2 + 0, $3 + 0, $4 + 0}' >long.offsets
+    same_file out.offsets long.offsets
+    # the truth has other steps, so that the body as a whole lies elsewhere: posture is compared
+    must vg-diff --centred -t 0.02 long.bvh out.bvh
+    # no angle jumps: the source's largest step is 8 degrees, of the thigh
+    awk '/^Frame Time/{on = 1; next} on {for (i = 4; i <= NF; i++) {d = $i - last[i]; if (NR > first + 1 && seen && (d > 12 || d < -12)) bad = 1; last[i] = $i} seen = 1}
+         END {exit bad}' out.bvh
+}
+
+@test "other proportions, a known answer: a man's poses onto another's skeleton" {
+    pipe "vg-encode $DATA/human-man-poses.bvh.xz | vg-deform -q --onto $DATA/human-heavy-poses.bvh.xz | vg-solve | vg-decode -q -o out.bvh"
+    must vg-diff --centred -t 0.04 "$DATA/human-heavy-poses.bvh.xz" out.bvh
+}
+
+@test "archives and directories of poses, and several files" {
+    mkdir poses
+    cp "$DATA"/sit01.bvh.xz "$DATA"/standing03.bvh.xz poses
+    must vg-info --frames poses
+    shows sit01 standing03
+    (cd poses && xz -d ./*.xz && tar czf ../poses.tar.gz ./*.bvh)
+    must vg-diff -t 0 poses poses.tar.gz
+    walk 3 >a.bvh
+    walk 2 >b.bvh
+    pipe 'vg-encode a.bvh b.bvh | vg-info'
+    shows "5: 'a.0001' to 'b.0002'"
+    must_fail 3 vg-encode a.bvh poses/sit01.bvh -o out.vgs
+    says "has 217 vertices where 'a.bvh' has 11"
+}
+
+@test "what a BVH file cannot hold is said" {
+    mesh cube >cube.obj
+    must_fail 3 vg-decode cube.obj -o cube.bvh
+    says "cannot write 'cube.bvh'" "no skeleton"
+    one_line
+    nothing_but cube.obj
+    walk 3 >walk.bvh
+    walk 3 6 >long.bvh
+    pipe 'vg-encode walk.bvh | vg-encode --reference long.bvh >mixed.vgs' # the legs of one, the reference of the other
+    capture vg-decode mixed.vgs -o out.bvh
+    [ "$status" = 0 ]
+    says "not kept in 'out.bvh': the lengths of the bones as they change: joint '"
+    one_line
+}
+
+@test "bad files are refused by line, and leave nothing behind" {
+    walk 3 | sed 's/^CHANNELS 1 Xrotation/CHANNELS 1 Rotation/' >a.bvh
+    must_fail 3 vg-encode a.bvh -o out.vgs
+    says "'a.bvh' line" "a channel (Xposition ... Zrotation) expected, not 'Rotation'"
+    walk 3 | sed '$d' >b.bvh
+    must_fail 3 vg-decode b.bvh -o out.bvh
+    says "'b.bvh' ends in frame 2 of 3, behind 0 of 22 values"
+    walk 3 0 -1 >c.bvh
+    must_fail 3 vg-info c.bvh
+    says "the frame time is not positive"
+    nothing_but a.bvh b.bvh c.bvh
+}
+
+@test "memory does not grow with the frames that are written" {
+    walk 20000 >walk.bvh
+    pipe '(ulimit -v 400000; vg-decode walk.bvh -o out.bvh)'
+    must grep -c '^Frames: *20000$' out.bvh
+    must vg-diff -t 1e-6 walk.bvh out.bvh
+}
