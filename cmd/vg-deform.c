@@ -1,6 +1,6 @@
 /* vg-deform: measure how each vector of a sequence deforms, and do the same to another mesh.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "cli.h"
+#include "between.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -18,6 +18,11 @@ static const cli_option options[] = {
      .text = &opts.root},
     {"pin", 0, "auto|always|none", "hold what does not move in the source: where it is much of the mesh (default), ...",
      .text = &opts.pin},
+    {"interpolate", 0, "N", "write N poses, evenly from the first pose of the input to the last", .integer = &between.frames,
+     .least = 1, .most = 1e9},
+    {"at", 0, "T,...", "write the poses at these moments: 0 is the first pose, 1 the second; outside is extrapolated",
+     .text = &between.at},
+    {"smooth", 0, NULL, "let velocities not jump at the poses that are interpolated", .flag = &between.smooth},
     {NULL}};
 
 static const cli_program program = {
@@ -420,8 +425,14 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     static work w; /* lives until the end: what it holds goes with the process */
     parse_options(&w);
+    between_check();
+    if (between_wanted() && opts.onto) cli_usage("--onto takes poses as they are: pipe those of --interpolate and --at into it");
     load_target(&w);
     w.s = cli_source(operands, n);
+    if (between_wanted()) {
+        between_run(w.s);
+        cli_finish(0);
+    }
     w.h = vg_source_head(w.s);
     prepare(&w);
     cli_stream_open(w.h);

@@ -35,6 +35,7 @@ typedef struct contents {
     uint64_t frames, timed, extra; /* extra: unknown records before frames */
     char *first, *last;            /* names */
     double first_time, last_time;
+    double D; /* of the first frame of vertices */
     uint64_t digest;
 } contents;
 
@@ -109,6 +110,7 @@ static void read_all(vg_source *s, contents *c, report *list)
     while ((r = vg_source_next(s, &f, &e)) > 0) {
         if (opts.digest) vg_digest_add(digest, &f);
         if (list) list_frame(list, h, &f, c->frames);
+        if (c->frames == 0 && poses) c->D = vg_diagonal(f.values, h->count);
         note_frame(c, &f);
         cli_progress("frame", c->frames);
     }
@@ -231,6 +233,82 @@ static void report_mesh(report *r, const vg_head *h)
     report_end(r);
 }
 
+/* -------------------------------------------------------------------------------------- correspondence -- */
+
+/* What a correspondence covers: how many faces, how near, by how many. */
+typedef struct coverage {
+    uint64_t matched, most_pairs, used;
+    double sum, largest; /* distances of matched faces */
+} coverage;
+
+static coverage cover(const vg_correspondence *c)
+{
+    coverage x = {0};
+    bool *used = calloc(c->source_nf + 1, sizeof *used);
+    if (!used) {
+        vg_err e;
+        vg_fail(&e, VG_ENOMEM, "not enough memory for %zu faces", c->source_nf);
+        cli_die(&e);
+    }
+    for (size_t f = 0; f < c->target_nf; f++) {
+        uint64_t pairs = c->first[f + 1] - c->first[f];
+        if (pairs > x.most_pairs) x.most_pairs = pairs;
+        for (uint32_t i = c->first[f]; i < c->first[f + 1]; i++) x.used += !used[c->source[i]], used[c->source[i]] = true;
+        if (!c->matched[f]) continue;
+        x.matched++;
+        x.sum += c->distance[f];
+        x.largest = fmax(x.largest, c->distance[f]);
+    }
+    free(used);
+    return x;
+}
+
+static double percent(uint64_t part, uint64_t all)
+{
+    return all ? 100.0 * (double)part / (double)all : 0;
+}
+
+/* D is that of the source as it lies on the target, which is what the stream holds of the target. */
+static void report_correspondence(report *r, const vg_head *h, double D)
+{
+    const vg_correspondence *c = &h->correspondence;
+    char line[160];
+    if (!c->first) return;
+    coverage x = cover(c);
+    uint64_t pairs = c->first[c->target_nf];
+    double mean = x.matched ? x.sum / (double)x.matched : NAN, largest = x.matched ? x.largest : NAN;
+    report_gap(r);
+    report_group(r, "correspondence");
+    report_put(r, "source_vertices", NULL, report_count(c->source_nv));
+    report_put(r, "source_faces", NULL, report_count(c->source_nf));
+    report_put(r, "target_vertices", NULL, report_count(c->target_nv));
+    report_put(r, "target_faces", NULL, report_count(c->target_nf));
+    snprintf(line, sizeof line, "%zu faces, %zu vertices", c->target_nf, c->target_nv);
+    report_put(r, NULL, "target", report_text(line));
+    report_put(r, "matched_faces", NULL, report_count(x.matched));
+    report_put(r, "unmatched_faces", NULL, report_count(c->target_nf - x.matched));
+    snprintf(line, sizeof line, "%" PRIu64 " of %zu faces (%.4g %%), %" PRIu64 " ride with others", x.matched, c->target_nf,
+             percent(x.matched, c->target_nf), (uint64_t)c->target_nf - x.matched);
+    report_put(r, NULL, "matched", report_text(line));
+    report_put(r, "source_faces_used", NULL, report_count(x.used));
+    snprintf(line, sizeof line, "%" PRIu64 " of %zu faces (%.4g %%)", x.used, c->source_nf, percent(x.used, c->source_nf));
+    report_put(r, NULL, "source used", report_text(line));
+    report_put(r, "pairs", NULL, report_count(pairs));
+    report_put(r, "most_pairs", NULL, report_count(x.most_pairs));
+    snprintf(line, sizeof line, "%" PRIu64 ", %.3g a face on average, at most %" PRIu64, pairs,
+             c->target_nf ? (double)pairs / (double)c->target_nf : 0, x.most_pairs);
+    report_put(r, NULL, "pairs", report_text(line));
+    report_put(r, "mean_distance", NULL, report_number(mean));
+    report_put(r, "largest_distance", NULL, report_number(largest));
+    report_put(r, "mean_distance_D", NULL, report_number(D > 0 ? mean / D : NAN));
+    report_put(r, "largest_distance_D", NULL, report_number(D > 0 ? largest / D : NAN));
+    if (x.matched && D > 0) {
+        snprintf(line, sizeof line, "mean %.3g, at most %.3g (%.3g D and %.3g D)", mean, largest, mean / D, largest / D);
+        report_put(r, NULL, "distances", report_text(line));
+    }
+    report_end(r);
+}
+
 /* ------------------------------------------------------------------------------------------ provenance -- */
 
 /* An argument as a person would have to type it. */
@@ -341,6 +419,7 @@ static void report_all(report *r, const char *operand, const vg_head *h, const c
     report_name(r, operand);
     report_frames(r, h, c);
     report_mesh(r, h);
+    report_correspondence(r, h, c->D);
     report_provenance(r, h);
     report_unknown(r, h, c);
 }

@@ -15,6 +15,7 @@ typedef struct key {
     uint64_t number;
     double *pose;
     bool met;       /* its frame has come, as number `at` */
+    bool named;     /* and has the name FRAME */
     uint64_t at;
 } key;
 
@@ -102,9 +103,11 @@ static void take_memory(const char *text, void *context)
 static const cli_option options[] = {
     {"first", 0, "MESH", "the first frame becomes this pose", .take = take_first},
     {"last", 0, "MESH", "the last frame becomes this pose", .take = take_last},
-    {"key", 0, "FRAME=MESH", "this frame, by name or by number from 0, becomes this pose; repeat as needed", .take = take_key},
-    {"memory", 0, "SIZE", "hold this much of waiting frames in memory, the rest in a file (default: 256M)", .take = take_memory},
-    {NULL}};
+    {"key", 0, "FRAME=MESH", "this frame, by name or by number from 0, becomes this pose; repeat as needed",
+     .take = take_key},
+    {"memory", 0, "SIZE", "hold this much of waiting frames in memory, the rest in a file (default: 256M)",
+     .take = take_memory},
+    {0}};
 
 static const cli_program program = {
     .name = "vg-poisson",
@@ -119,9 +122,10 @@ static const cli_program program = {
 static void refuse_kind(const char *subject, vg_kind kind) __attribute__((noreturn));
 static void refuse_kind(const char *subject, vg_kind kind)
 {
-    static const char *const advice[] = {[VG_VECTORS] = "pipe them through 'vg-solve' first",
-                                         [VG_DEFORMATIONS] = "apply them with 'vg-deform --onto MESH', then 'vg-solve'",
-                                         [VG_TRANSFORMS] = "they need a map"};
+    static const char *const advice[] = {
+        [VG_VECTORS] = "pipe them through 'vg-solve' first",
+        [VG_DEFORMATIONS] = "apply them with 'vg-deform --onto MESH', then 'vg-solve'",
+        [VG_TRANSFORMS] = "they need a map"};
     vg_err e;
     vg_fail(&e, VG_EINPUT, "%s holds %s, and vertices are guided: %s", subject, vg_kind_name(kind), advice[kind]);
     cli_die(&e);
@@ -182,10 +186,11 @@ static bool is_for(const key *k, uint64_t n, const char *name, bool last)
 /* A key that has met its frame by number meets one of that name later. */
 static void refuse_ambiguous(const key *k, uint64_t n, const char *name)
 {
-    if (k->by != NAMED || !k->has_number || k->at != k->number || k->at == n || strcmp(k->frame, name)) return;
+    if (k->by != NAMED || k->named || strcmp(k->frame, name)) return;
     vg_err e;
-    vg_fail(&e, VG_EINPUT, "'%s' is the number of one frame and the name of a later one: write '--key #%llu=%s' or '--key #%llu=%s'",
-            k->option, (unsigned long long)k->at, k->mesh, (unsigned long long)n, k->mesh);
+    vg_fail(&e, VG_EINPUT, "'%s' is the number of one frame and the name of a later one: "
+            "write '--key #%llu=%s' or '--key #%llu=%s'", k->option, (unsigned long long)k->at, k->mesh,
+            (unsigned long long)n, k->mesh);
     cli_die(&e);
 }
 
@@ -198,11 +203,12 @@ static const double *find_given(work *w, uint64_t n, const char *name, bool last
         if (k->met) refuse_ambiguous(k, n, name);
         if (k->met || !is_for(k, n, name, last)) continue;
         k->met = true, k->at = n;
+        k->named = k->by == NAMED && !strcmp(k->frame, name);
         w->ahead--;
         if (found && memcmp(found->pose, k->pose, 3 * w->h->mesh.nv * sizeof *k->pose)) {
             vg_err e;
-            vg_fail(&e, VG_EINPUT, "'%s' and '%s' give two poses to one frame, number %llu, '%s'", found->option, k->option,
-                    (unsigned long long)n, name);
+            vg_fail(&e, VG_EINPUT, "'%s' and '%s' give two poses to one frame, number %llu, '%s'", found->option,
+                    k->option, (unsigned long long)n, name);
             cli_die(&e);
         }
         found = k;

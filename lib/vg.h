@@ -178,6 +178,46 @@ typedef struct vg_correspondence {
 void vg_correspondence_clear(vg_correspondence *c);
 int vg_correspondence_copy(vg_correspondence *to, const vg_correspondence *from, vg_err *e) VG_MUST_CHECK;
 
+/* A division of the faces into patches. */
+typedef struct vg_patches {
+    size_t n;          /* 0: there is none */
+    uint32_t *of_face; /* nf: the patch of each face, less than n */
+} vg_patches;
+
+void vg_patches_clear(vg_patches *p);
+
+/* What drives a map: the transforms of patches. */
+typedef enum vg_map_kind { VG_MAP_PATCHES = 1 } vg_map_kind;
+
+/* Vertices as a linear function of transforms (MATH 7; T 6.3): with transform p taking x to A_p x + t_p, vertex v is at
+ * sum over p of A_p e_vp + tau_vp t_p. What the operator was made of is kept, so that it can be made for another body. */
+typedef struct vg_map {
+    size_t n;            /* transforms; 0: there is no map */
+    size_t nv;           /* vertices, those of the mesh */
+    vg_map_kind kind;
+    double *weights;     /* nv x 4n: e_vp and tau_vp, p after p */
+    double *place;       /* n x 3n: where only the A are known, t_p - root = sum over j of A_j times three numbers */
+    double *centre;      /* n points: of each patch in the reference pose */
+    double *home_centre; /* the same on the body that poses are measured on */
+    double *share;       /* n, sum 1: root = sum of share_p (A_p centre_p + t_p) */
+    double size;         /* of this body beside the one that poses are measured on */
+    bool has_home;       /* the body that poses are measured on is another one: */
+    double *home;        /* its reference pose, nv points; NULL: the mesh's own */
+    size_t njoints;      /* pairs of patches that hang together */
+    uint32_t *joint;     /* two patches each */
+    double *joint_at;    /* the point in the reference pose that both move alike, as well as can be */
+    double *joint_weight;
+    size_t ncorners;     /* of the vector graph */
+    double *corner;      /* a quaternion each: A_p Q r Q* is the vector of the corner */
+    size_t nheld;        /* vertices held where their patch takes them */
+    uint32_t *held;      /* ascending */
+    double *held_at;     /* the point in the reference pose that the patch takes there */
+    size_t nnames;       /* 0 or n */
+    char **names;
+} vg_map;
+
+void vg_map_clear(vg_map *m);
+
 /* vg_mesh_digest: a number that tells meshes apart by their vertex count and faces (XXH64, fmt/STREAM.md). */
 uint64_t vg_mesh_digest(const vg_mesh *m);
 
@@ -226,6 +266,8 @@ typedef struct vg_head {
     vg_attributes attributes;
     vg_skeleton skeleton;
     vg_correspondence correspondence; /* a stream of vg-register: mesh and reference are the source's, its frame is fitted to the target */
+    vg_patches patches;   /* a stream of vg-segment, and those that come of it */
+    vg_map map;           /* a stream of vg-fitmap */
     bool has_selection;   /* only the faces `selected` (ascending) carry vectors; else all do */
     size_t nselected;
     uint32_t *selected;
@@ -317,7 +359,7 @@ int vg_select_faces(const vg_mesh *m, uint32_t **faces, size_t *n, vg_err *e) VG
 
 /* vg_link_components: the fewest virtual line segments that join all components of m, between nearby vertices of
  * `vertices` (nv points): a minimum spanning tree of the components, where a link that would be shorter than the edges
- * beside it (but not zero) is moved on to the next vertex of the face. *pairs (2 per link, caller frees) and *n. */
+ * beside it is moved on to the next vertex of the face. *pairs (2 per link, caller frees) and *n. */
 int vg_link_components(const vg_mesh *m, const double *vertices, uint32_t **pairs, size_t *n, vg_err *e) VG_MUST_CHECK;
 
 /* vg_head_prepare_vectors: choose h's links from its reference pose unless it has them. Every program that derives
@@ -349,8 +391,39 @@ void vg_deformer_transfer(vg_deformer *d, size_t n, vg_kind kind, const double *
 void vg_deformer_apply(vg_deformer *d, size_t n, const double *const *quaternions, double *const *vectors);
 vg_deform_counts vg_deformer_counts(const vg_deformer *d);
 
+/* A path through key poses (MATH 7; T 6.1): each vector turns and stretches along the geodesic from one key to the next, neighbours the
+ * same way round also beyond half a turn; the root moves straight. Outside of the keys it goes on as beside the first or last. */
+typedef struct vg_path vg_path;
+typedef struct vg_key {
+    const double *values;  /* a frame's: of vertices, vectors or deformations; borrowed as long as the path lives */
+    double root[3];
+    const double *anchors; /* nanchors points; borrowed */
+    double place;          /* grows from key to key: number, or time; says only how fast a smooth path goes by */
+} vg_key;
+typedef struct vg_path_options {
+    vg_kind kind;    /* of the keys' values */
+    size_t nanchors;
+    bool smooth;     /* velocities do not jump at keys */
+    int threads;     /* >= 1 */
+} vg_path_options;
+typedef struct vg_path_facts {
+    size_t segments; /* between keys, looked at so far, again if come back to */
+    size_t beyond;   /* of these, where something turns by more than half a turn */
+    vg_deform_counts degenerate;
+} vg_path_facts;
+
+/* vg_path_new: g and keys are borrowed until free; reference: nv points. VG_EARG with fewer than two keys. */
+int vg_path_new(vg_path **p, const vg_graph *g, const double *reference, const vg_key *keys, size_t nkeys,
+                const vg_path_options *o, vg_err *e) VG_MUST_CHECK;
+void vg_path_free(vg_path **p);
+/* vg_path_at: the pose at t: vectors (one per corner), root and anchors out. Key i is at t = i. What is between two keys is prepared when it is
+ * first asked for and kept until something else is (three stretches if smooth): ask in order. */
+int vg_path_at(vg_path *p, double t, double *vectors, double root[3], double *anchors, vg_err *e) VG_MUST_CHECK;
+vg_path_facts vg_path_get_facts(const vg_path *p);
+
 /* Transfer between meshes of different connectivity (MATH 9): each face of the target takes the deformation gradient of the source
- * faces that drive it, and by pose its rotation (polar) with the stretch that the gradient gives the direction of each vector. Faces
+ * faces that drive it, and by pose its rotation (polar) with the stretch that the gradient gives the direction of each vector. Here the
+ * normal stretches by the root of the area's ratio, for the target's vectors lie across the source's planes. Faces
  * without a match of their own turn rigidly. Links follow the faces at their ends. */
 typedef struct vg_carrier vg_carrier;
 /* vg_carrier_new: source: the whole source mesh and its reference pose; c: fits both meshes (checked: VG_EINPUT); target: the graph of
@@ -432,6 +505,54 @@ void vg_guide_key(vg_guide *g, uint64_t frame, double *pose, const double *given
 /* vg_guide_apply: the pose of frame number `frame` in place: one between the last two keys, or behind the last, or, when only
  * one key was named, any. Without keys it stays. */
 void vg_guide_apply(const vg_guide *g, uint64_t frame, double *pose);
+
+/* Segmentation (T 6.2): K-means over faces whose feature is their rotation in every pose; nothing in it is spatial. Features of more
+ * than about a hundred poses are folded into 1,024 numbers by random signs, which keeps distances within about 5 %: memory does not grow
+ * with the number of poses. The same seed gives the same patches, whatever the number of threads. */
+typedef struct vg_segmenter vg_segmenter;
+typedef struct vg_segment_report {
+    size_t patches, rounds;
+    double angle; /* in degrees: root mean square over faces and poses of the rotation between a face and its patch */
+} vg_segment_report;
+
+/* vg_segmenter_new: m is borrowed until free; reference: nv points, not kept. */
+int vg_segmenter_new(vg_segmenter **s, const vg_mesh *m, const double *reference, int threads, vg_err *e) VG_MUST_CHECK;
+void vg_segmenter_free(vg_segmenter **s);
+void vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses);
+/* vg_segmenter_cut: patches 0: as few of 4 6 8 12 16 24 ... 256 as bring the angle to 10 degrees. connected: every patch is in one
+ * piece: pieces are joined with neighbours that turn alike until `patches` are left, or no neighbours. Fewer patches than asked for
+ * when fewer faces turn differently. VG_EINPUT when there is no face. */
+int vg_segmenter_cut(vg_segmenter *s, size_t patches, uint64_t seed, bool connected, vg_patches *out, vg_segment_report *report,
+                     vg_err *e) VG_MUST_CHECK;
+
+/* The map from patch transforms to vertices (MATH 7; T 6.3), with its two remedies. */
+typedef struct vg_map_fitter vg_map_fitter;
+/* vg_map_fitter_new: h: mesh, reference, links, and patches, which are split into connected pieces: these become the patches of h. hold:
+ * share of the vertices that are held, those nearest the patches' centres; at least one a patch. h is borrowed until free. */
+int vg_map_fitter_new(vg_map_fitter **f, vg_head *h, double hold, int threads, vg_err *e) VG_MUST_CHECK;
+void vg_map_fitter_free(vg_map_fitter **f);
+int vg_map_fitter_add(vg_map_fitter *f, size_t n, const double *const *poses, vg_err *e) VG_MUST_CHECK;
+/* vg_map_fitter_finish: fill h->map. VG_EINPUT without poses. */
+int vg_map_fitter_finish(vg_map_fitter *f, vg_err *e) VG_MUST_CHECK;
+
+/* vg_map_retarget: the map of h for another body of the same faces (T 6.5), or one on the way to it (T 6.6): its vectors are those of h's
+ * reference, turned and stretched towards the target's by `morph` (1: all the way). h's reference becomes that body's. target: nv
+ * points. */
+int vg_map_retarget(vg_head *h, const double *target, double morph, int threads, vg_err *e) VG_MUST_CHECK;
+
+/* A map at work. Transforms are 7 numbers each, as in VG_TRANSFORMS. */
+typedef struct vg_player vg_player;
+/* vg_player_new: h has a map and its patches; borrowed until free. single: the product is formed in binary32. */
+int vg_player_new(vg_player **p, const vg_head *h, bool single, int threads, vg_err *e) VG_MUST_CHECK;
+void vg_player_free(vg_player **p);
+/* vg_player_measure: n poses (nv points each) to the best similarity of each patch. */
+void vg_player_measure(vg_player *p, size_t n, const double *const *poses, double *const *transforms);
+/* vg_player_place: keep rotations, scales and root, and put the patches where their joints want them, in place. */
+void vg_player_place(vg_player *p, double *transforms);
+/* vg_player_between: from a (t = 0) to b (t = 1) and beyond: rotations and scales go along geodesics, the root in a line, joints hold. */
+void vg_player_between(vg_player *p, const double *a, const double *b, double t, double *transforms);
+/* vg_player_pose: n times transforms to vertices, by one product. */
+void vg_player_pose(vg_player *p, size_t n, const double *const *transforms, double *const *vertices);
 
 /* Measures of two sequences of one connectivity (MATH 8), accumulated pose by pose in bounded memory. */
 typedef struct vg_measures vg_measures;

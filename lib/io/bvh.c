@@ -19,7 +19,8 @@ enum {
 static const uint32_t NONE = UINT32_MAX;
 static const char end_suffix[] = ".end";
 static const char byte_order_mark[] = "\xef\xbb\xbf";
-static const char *const channel_names[] = {"Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation"};
+static const char *const channel_names[] = {"Xposition", "Yposition", "Zposition",
+                                            "Xrotation", "Yrotation", "Zrotation"};
 
 /* ------------------------------------------------------------------------------------------- reading -- */
 
@@ -171,13 +172,12 @@ static int take_name(reading *b, char **name, vg_err *e)
     while (p < b->end && !is_line_end(*p) && *p != '{') p++;
     const char *stop = p;
     while (p > start && is_blank(p[-1])) p--;
-    if (p - start > MOST_NAME)
-        return vg_fail(e, VG_EINPUT, "%s line %zu: a name is longer than %d bytes", b->subject, line_of(b, start),
-                       MOST_NAME);
     b->at = stop;
-    if (!(*name = vgi_array_raw(2 * (size_t)(p - start) + 1, 1, e))) return VG_ENOMEM;
-    to_utf8(start, (size_t)(p - start), *name);
-    return VG_OK;
+    size_t n = p - start > MOST_NAME ? MOST_NAME + 1 : (size_t)(p - start);
+    if (!(*name = vgi_array_raw(2 * n + 1, 1, e))) return VG_ENOMEM;
+    to_utf8(start, n, *name);
+    if (strlen(*name) <= MOST_NAME) return VG_OK;
+    return vg_fail(e, VG_EINPUT, "%s line %zu: a name is longer than %d bytes", b->subject, line_of(b, start), MOST_NAME);
 }
 
 static char *end_name(const char *parent, vg_err *e)
@@ -200,7 +200,8 @@ static int open_joint(reading *b, bool is_end, vg_err *e)
     }
     if (r == VG_OK) r = vgi_grow(&s->joints, &b->joints_cap, s->njoints + 1, sizeof *s->joints, e);
     if (r == VG_OK) r = vgi_grow(&b->said, &b->said_cap, s->njoints + 1, 1, e);
-    if (r == VG_OK && s->njoints + 1 >= UINT32_MAX / 2) r = vg_fail(e, VG_EINPUT, "%s has too many joints", b->subject);
+    if (r == VG_OK && s->njoints + 1 >= UINT32_MAX / 2)
+        r = vg_fail(e, VG_EINPUT, "%s has too many joints", b->subject);
     if (r == VG_OK && b->depth == MOST_DEPTH)
         r = vg_fail(e, VG_EINPUT, "%s line %zu: joints are nested more than %d deep", b->subject, line_of(b, b->at),
                     MOST_DEPTH);
@@ -455,11 +456,13 @@ static int say(vg_bytes *b, const char *s, vg_err *e)
 /* x with that many decimals, without "-0". What has too many digits for that is printed as it is. */
 static int say_fixed(vg_bytes *b, double x, int decimals, vg_err *e)
 {
-    static const double ten[] = {1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
+    static const double ten[] = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
     char text[64], digits[24];
     double scaled = nearbyint(fabs(x) * ten[decimals]);
     if (!(scaled < 9e15)) return vgi_bytes_append(b, text, vgi_print_double(text, x), e);
-    size_t n = vgi_print_uint(digits, (uint64_t)scaled), at = 0, whole = n > (size_t)decimals ? n - (size_t)decimals : 0;
+    size_t n = vgi_print_uint(digits, (uint64_t)scaled), at = 0;
+    size_t whole = n > (size_t)decimals ? n - (size_t)decimals : 0;
     if (x < 0 && scaled > 0) text[at++] = '-';
     if (whole == 0) text[at++] = '0';
     memcpy(text + at, digits, whole);
@@ -607,6 +610,16 @@ static bool is_end_site(const writing *w, uint32_t j)
     return !strncmp(joint->name, parent, n) && !strcmp(joint->name + n, end_suffix);
 }
 
+/* Is every name one that would be read again? */
+static int check_names(const writing *w, vg_err *e)
+{
+    for (uint32_t j = 0; j < w->skeleton.njoints; j++)
+        if (!is_end_site(w, j) && strlen(w->skeleton.joints[j].name) > MOST_NAME)
+            return vg_fail(e, VG_EINPUT, "cannot write '%s': the name of joint %u is longer than %d bytes", w->out->name,
+                           j, MOST_NAME);
+    return VG_OK;
+}
+
 static int say_opening(writing *w, vg_bytes *b, uint32_t j, size_t depth, vg_err *e)
 {
     int r = say_tabs(b, depth, e);
@@ -697,6 +710,7 @@ static int begin_bvh(void **state, const vg_head *h, const vg_sink_options *o, v
     w->place_decimals = decimals_for(w->size, o->full_precision), w->angle_decimals = o->full_precision ? 12 : 6;
     if (!(w->values = vgi_array(vg_skeleton_channels(&w->skeleton), sizeof *w->values, e))) return VG_ENOMEM;
     r = link_kin(w, e);
+    if (r == VG_OK) r = check_names(w, e);
     if (r == VG_OK) r = list_order(w, e);
     if (r == VG_OK) r = vg_joint_fitter_new(&w->fitter, &w->skeleton, e);
     return r < 0 ? r : put_head(w, e);
@@ -752,12 +766,13 @@ static const char *warn_bvh(void *state)
     w->warning[0] = 0;
     if (w->worst > 1e-4 * w->size)
         n = (size_t)snprintf(w->warning, room,
-                             "the lengths of the bones as they change: joint '%.100s' of frame '%.100s' is off by %.3g, "
-                             "%.2g %% of the figure",
+                             "the lengths of the bones as they change: joint '%.100s' of frame '%.100s' is off by "
+                             "%.3g, %.2g %% of the figure",
                              w->skeleton.joints[w->worst_joint].name, w->worst_frame, w->worst,
                              w->size > 0 ? 100 * w->worst / w->size : 100);
     if (w->uneven)
-        snprintf(w->warning + n, room - n, "%sthe times of the frames: they are not at equal distances", n ? "; " : "");
+        snprintf(w->warning + n, room - n, "%sthe times of the frames: they are not at equal distances",
+                 n ? "; " : "");
     return w->warning[0] ? w->warning : NULL;
 }
 

@@ -81,18 +81,23 @@ static int check_range(const double *x, size_t n, size_t per_item, const char *w
     return VG_OK;
 }
 
+int vgi_model_write(vg_bytes *out, const char *format, const vgi_writing *w, vg_err *e)
+{
+    const vgi_format *known = format ? vgi_format_by_name(format, strlen(format)) : NULL;
+    const vg_attributes *a = w->attributes;
+    if (!known) return unknown_format(format, e);
+    size_t size = out->size;
+    int result = check_range(w->vertices, 3 * w->mesh->nv, 3, "vertex", w->full_precision, e);
+    if (result == VG_OK && a)
+        result = check_range(a->tex, a->ntex * a->tex_dim, a->tex_dim, "texture coordinate", w->full_precision, e);
+    if (result == VG_OK) result = known->write(out, w, e);
+    if (result < 0) out->size = size; /* nothing was appended */
+    return result;
+}
+
 int vg_model_write(vg_bytes *out, const char *format, const vg_mesh *mesh, const double *vertices,
                    const vg_attributes *attributes, bool full_precision, vg_err *e)
 {
-    const vgi_format *known = format ? vgi_format_by_name(format, strlen(format)) : NULL;
-    if (!known) return unknown_format(format, e);
-    size_t size = out->size;
-    vgi_writing w = {mesh, vertices, attributes, full_precision};
-    int result = check_range(vertices, 3 * mesh->nv, 3, "vertex", full_precision, e);
-    if (result == VG_OK && attributes)
-        result = check_range(attributes->tex, attributes->ntex * attributes->tex_dim, attributes->tex_dim,
-                             "texture coordinate", full_precision, e);
-    if (result == VG_OK) result = known->write(out, &w, e);
-    if (result < 0) out->size = size; /* nothing was appended */
-    return result;
+    const vgi_writing w = {mesh, vertices, vertices, attributes, full_precision};
+    return vgi_model_write(out, format, &w, e);
 }

@@ -61,6 +61,7 @@ enum { /* what a format keeps of a sequence beside its numbers; of what it does 
 typedef struct vgi_writing {
     const vg_mesh *mesh;
     const double *vertices;
+    const double *shape; /* a pose by which polygons are split, where they must be: the same for all poses of a sequence */
     const vg_attributes *attributes; /* may be NULL */
     bool full_precision;
 } vgi_writing;
@@ -114,8 +115,8 @@ typedef struct vgi_sequence_format {
      * count. open: fill h, which is empty: kind, count, mesh.nv; what the file knows of faces, attributes, skeleton,
      * reference, reference_name. No faces: they come from beside. No reference: it is the one from there, or the first pose.
      * The caller checks the mesh. in is borrowed until close; subject is how messages call the file, quotes included,
-     * borrowed too. next: 1 and values of a frame that has been shaped, its time, and its name if the format keeps names (else
-     * it is called after the file); 0 when the file is read to its end, nothing behind it. close takes what open made, also
+     * borrowed too. next: 1 and values of a frame that has been shaped, its time, and its name (left
+     * empty, it is called after the file); 0 when the file is read to its end, nothing behind it. close takes what open made, also
      * when open failed, and NULL. */
     int (*open)(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e); /* NULL: only written */
     int (*next)(void *state, vg_frame *f, vg_err *e);
@@ -142,6 +143,9 @@ const vgi_sequence_format *vgi_sequence_by_content(const unsigned char *data, si
 /* vgi_packable: the sequence format, or NULL, of a file that can stand for poses in a directory or archive: it brings its faces. */
 const vgi_sequence_format *vgi_packable(const char *file_name);
 const char *vgi_sequence_names(void); /* "pc2, mdd, ..." for messages, those that are written */
+
+/* vgi_model_write: vg_model_write with a shape, which is not checked. */
+int vgi_model_write(vg_bytes *out, const char *format, const vgi_writing *w, vg_err *e) VG_MUST_CHECK;
 
 /* ---- names.c: lists of names and their order; names of poses ---- */
 

@@ -58,6 +58,7 @@ static bool take_descr(struct text *t, vgi_npy *a)
     int64_t item;
     if (!take_string(t, &s, &n) || n < 3 || !strchr("<>|=", *s) || !strchr("fiubUS", s[1])) return false;
     if (vgi_parse_int(s + 2, s + n, &item) != s + n || item < 0 || item > 1 << 20) return false;
+    if (item == 0 && s[1] != 'U' && s[1] != 'S') return false;
     a->big = *s == '>';
     a->kind = s[1];
     a->item = (size_t)item * (a->kind == 'U' ? 4 : 1);
@@ -140,7 +141,7 @@ int vgi_npy_read(vgi_npy *a, size_t *bytes, vgi_input *in, const char *subject, 
     if (n > MOST) return vg_fail(e, VG_EINPUT, "%s: the header of the array is %zu bytes long", subject, n);
     vg_bytes b = {0};
     r = cut_short(vgi_input_take(in, &b, n, NULL, e), subject, e);
-    struct text t = {(const char *)b.data, (const char *)b.data + b.size};
+    struct text t = {(const char *)b.data, b.data ? (const char *)b.data + b.size : NULL};
     if (r == VG_OK && !(n && parse(&t, a)))
         r = vg_fail(e, VG_EINPUT, "%s: the header of the array is none that is understood: plain numbers or text, at "
                     "most %d dimensions", subject, VGI_NPY_DIMENSIONS);

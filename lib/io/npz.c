@@ -192,7 +192,7 @@ static int append_letter(vg_bytes *b, uint32_t c, vg_err *e)
 }
 
 /* Text of 'U' or 'S', without the NULs that fill it up. */
-static char *text_at(const reading *x, enum array i, size_t k, vg_err *e)
+static int text_at(const reading *x, enum array i, size_t k, char **text, vg_err *e)
 {
     const struct held *h = &x->held[i];
     const unsigned char *p = element(h, k);
@@ -206,14 +206,10 @@ static char *text_at(const reading *x, enum array i, size_t k, vg_err *e)
         else if (c > 0x10ffff || (c >= 0xd800 && c < 0xe000)) r = wrong(x, i, "holds a letter that does not exist", e);
         else r = append_letter(&b, c, e);
     }
-    char *text = r == VG_OK ? vgi_copy_string((char *)b.data, b.size, e) : NULL;
+    if (r == VG_OK && !vgi_is_utf8((char *)b.data, b.size)) r = wrong(x, i, "holds text that is no UTF-8", e);
+    if (r == VG_OK && !(*text = vgi_copy_string((char *)b.data, b.size, e))) r = VG_ENOMEM;
     vg_bytes_clear(&b);
-    if (text && !vgi_is_utf8(text, strlen(text))) {
-        wrong(x, i, "holds text that is no UTF-8", e);
-        free(text);
-        return NULL;
-    }
-    return text;
+    return r;
 }
 
 /* ---- the head ---- */
@@ -265,7 +261,7 @@ static int take_reference(reading *x, vg_head *h, vg_err *e)
     if (result < 0 || !name->there) return result;
     if ((name->a.kind != 'U' && name->a.kind != 'S') || elements(name) != 1)
         return wrong(x, REFERENCE_NAME, "is not one text", e);
-    return (h->reference_name = text_at(x, REFERENCE_NAME, 0, e)) ? VG_OK : e && e->code ? e->code : VG_EINPUT;
+    return text_at(x, REFERENCE_NAME, 0, &h->reference_name, e);
 }
 
 /* face_offsets and face_vertices; checked so far that the source can check the rest. */
@@ -387,10 +383,10 @@ static int check_quaternions(const reading *x, const double *q, vg_err *e)
 
 static int take_name(reading *x, vg_frame *f, vg_err *e)
 {
-    if (!x->held[NAMES].there) return vg_frame_rename(f, "", e);
-    vg_err cause = {.code = VG_ENOMEM};
-    char *name = text_at(x, NAMES, x->next, &cause);
-    int r = name ? vg_frame_rename(f, name, e) : vg_fail(e, cause.code, "%s", cause.message);
+    if (!x->held[NAMES].there) return VG_OK;
+    char *name = NULL;
+    int r = text_at(x, NAMES, x->next, &name, e);
+    if (r == VG_OK) r = vg_frame_rename(f, name, e);
     free(name);
     return r;
 }

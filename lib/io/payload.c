@@ -2,6 +2,7 @@
  * Leaves out record headers and checksums (record.c) and the order of records (stream.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/payload.h"
+#include "model/map.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -429,6 +430,8 @@ int vgi_form_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     if (kind < VG_VERTICES || kind > VG_TRANSFORMS) return wrong(p, "frames are of unknown kind", e);
     if (precision != VG_F32 && precision != VG_F64) return wrong(p, "numbers are of unknown precision", e);
     h->kind = (vg_kind)kind, h->precision = (vg_precision)precision, h->count = (size_t)count;
+    if (h->map.ncorners && h->map.ncorners != vgi_graph_count(h, VG_VECTORS))
+        return wrong(p, "the corners of record MAP do not fit the mesh", e);
     if (kind == VG_TRANSFORMS) return VG_OK;
     if (!h->reference) return wrong(p, "a MESH and a REFP record must come before it", e);
     if (kind != VG_VERTICES && !h->has_links) return wrong(p, "a LINK record must come before it", e);
@@ -556,6 +559,129 @@ int vgi_corr_encode(vg_bytes *b, const vg_correspondence *c, vg_err *e)
     if (r == VG_OK) r = put_doubles(b, c->distance, c->target_nf, e);
     if (r == VG_OK) r = vgi_bytes_append(b, c->matched, c->target_nf, e);
     return r < 0 ? r : put_padding(b, 0, e);
+}
+
+/* ---- PTCH ---- */
+
+int vgi_ptch_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    cursor c = start(p);
+    uint64_t n = take64(&c);
+    size_t nf = h->mesh.nf;
+    const unsigned char *of_face = take_array(&c, nf, 4);
+    if (c.bad || !take_padding(&c, nf % 2 * 4) || left(&c)) return wrong(p, "its length does not fit the number of faces", e);
+    if (n == 0 || n > UINT32_MAX) return wrong(p, "its count is out of range", e);
+    h->patches.of_face = vgi_array_raw(nf, sizeof *h->patches.of_face, e);
+    if (!h->patches.of_face) return VG_ENOMEM;
+    h->patches.n = (size_t)n;
+    copy32(h->patches.of_face, of_face, nf);
+    for (size_t f = 0; f < nf; f++)
+        if (h->patches.of_face[f] >= n) return wrong(p, "a face is in a patch that is not there", e);
+    return VG_OK;
+}
+
+int vgi_ptch_encode(vg_bytes *b, const vg_head *h, vg_err *e)
+{
+    int r = put64(b, h->patches.n, e);
+    if (r == VG_OK) r = vgi_indices_encode(b, h->patches.of_face, h->mesh.nf, e);
+    return r < 0 ? r : put_padding(b, 0, e);
+}
+
+/* ---- MAP ---- */
+
+enum { HAS_HOME = 1u };
+
+static int take_map_names(cursor *c, vg_map *m, size_t n, const vgi_payload *p, vg_err *e)
+{
+    int r = VG_OK;
+    size_t cap = 0;
+    while (r == VG_OK && m->nnames < n) {
+        if ((r = vgi_grow(&m->names, &cap, m->nnames + 1, sizeof *m->names, e)) < 0) break;
+        char *text = take_text(c, take32(c), p, &r, e);
+        if (text) m->names[m->nnames++] = text;
+    }
+    return r;
+}
+
+/* The arrays one after the other; each is made only when its bytes are there. */
+static int take_map_arrays(cursor *c, vg_map *m, const vgi_payload *p, vg_err *e)
+{
+    vgi_map_array list[VGI_MAP_ARRAYS];
+    size_t n = vgi_map_arrays(m, list);
+    for (size_t i = 0; i < n; i++) {
+        size_t length = vgi_map_array_length(m, &list[i]), size = list[i].real ? 8 : 4;
+        const unsigned char *data = take_array(c, length, size);
+        if (c->bad) return wrong(p, "it is shorter than its counts say", e);
+        if (!length) continue;
+        if (!(*list[i].at = vgi_array_raw(length, size, e))) return VG_ENOMEM;
+        if (!list[i].real) {
+            copy32(*list[i].at, data, length);
+            continue;
+        }
+        copy_doubles(*list[i].at, data, length);
+        if (!vgi_finite(*list[i].at, length)) return wrong(p, "a number is not finite", e);
+    }
+    return take_padding(c, m->nheld % 2 * 4) ? VG_OK : wrong(p, "padding is missing or not zero", e);
+}
+
+static int check_map(const vgi_payload *p, const vg_map *m, vg_err *e)
+{
+    double sum = 0;
+    for (size_t i = 0; i < m->n; i++) {
+        if (!(m->share[i] >= 0)) return wrong(p, "a share is negative", e);
+        sum += m->share[i];
+    }
+    if (!(sum > 1 - 1e-9 && sum < 1 + 1e-9)) return wrong(p, "the shares do not sum to 1", e);
+    for (size_t i = 0; i < m->njoints; i++)
+        if (m->joint[2 * i] >= m->n || m->joint[2 * i + 1] >= m->n || m->joint[2 * i] == m->joint[2 * i + 1] ||
+            !(m->joint_weight[i] > 0))
+            return wrong(p, "a joint is malformed", e);
+    for (size_t i = 0; i < m->ncorners; i++) {
+        const double *q = m->corner + 4 * i;
+        if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) return wrong(p, "a quaternion is zero", e);
+    }
+    return check_ascending(p, m->held, m->nheld, m->nv, e);
+}
+
+int vgi_map_decode(const vgi_payload *p, vg_head *h, vg_err *e)
+{
+    cursor c = start(p);
+    vg_map *m = &h->map;
+    uint64_t n = take64(&c), nv = take64(&c), joints = take64(&c), corners = take64(&c), held = take64(&c);
+    uint32_t kind = take32(&c), flags = take32(&c), names = take32(&c), zero = take32(&c);
+    double size = take_double(&c);
+    if (c.bad || n == 0 || n >= UINT32_MAX || joints >= UINT32_MAX || corners >= UINT32_MAX || held > nv)
+        return wrong(p, "its counts are out of range", e);
+    if (nv != h->mesh.nv) return wrong(p, "its count does not fit the mesh", e);
+    if (kind != VG_MAP_PATCHES) return wrong(p, "it is driven by something unknown", e);
+    if ((flags & ~HAS_HOME) || zero || (names && names != n)) return wrong(p, "unknown flags are set, or names are missing", e);
+    if (!vgi_finite(&size, 1) || !(size > 0)) return wrong(p, "its size is not positive", e);
+    *m = (vg_map){.n = (size_t)n, .nv = (size_t)nv, .kind = (vg_map_kind)kind, .size = size, .has_home = flags & HAS_HOME,
+                  .njoints = (size_t)joints, .ncorners = (size_t)corners, .nheld = (size_t)held};
+    int r = take_map_arrays(&c, m, p, e);
+    if (r == VG_OK) r = check_map(p, m, e);
+    if (r == VG_OK) r = take_map_names(&c, m, names, p, e);
+    return r < 0 ? r : left(&c) ? wrong(p, "bytes are left over", e) : VG_OK;
+}
+
+int vgi_map_encode(vg_bytes *b, const vg_map *m, vg_err *e)
+{
+    const uint64_t counts[5] = {m->n, m->nv, m->njoints, m->ncorners, m->nheld};
+    const uint32_t words[4] = {m->kind, m->has_home ? HAS_HOME : 0, (uint32_t)m->nnames, 0};
+    vg_map copy = *m; /* the list of arrays does not promise not to change them */
+    vgi_map_array list[VGI_MAP_ARRAYS];
+    size_t n = vgi_map_arrays(&copy, list);
+    int r = VG_OK;
+    for (int i = 0; r == VG_OK && i < 5; i++) r = put64(b, counts[i], e);
+    if (r == VG_OK) r = vgi_indices_encode(b, words, 4, e);
+    if (r == VG_OK) r = put_doubles(b, &m->size, 1, e);
+    for (size_t i = 0; r == VG_OK && i < n; i++) {
+        size_t length = vgi_map_array_length(m, &list[i]);
+        r = list[i].real ? put_doubles(b, *list[i].at, length, e) : vgi_indices_encode(b, *list[i].at, length, e);
+    }
+    if (r == VG_OK) r = put_padding(b, 0, e);
+    for (size_t i = 0; r == VG_OK && i < m->nnames; i++) r = put_string(b, m->names[i], e);
+    return r;
 }
 
 /* ---- FRAM ---- */

@@ -181,8 +181,9 @@ static int check_mesh_option(const plan *p, const vg_sink_options *o, vg_err *e)
     if (!lacks_faces(p))
         return vg_fail(e, VG_EARG, "'%.*s' holds its faces itself: leave out %s", (int)p->length, p->name,
                        o->mesh ? "--mesh" : "--no-mesh");
-    if (o->mesh && !vgi_format_by_suffix(o->mesh))
-        return vg_fail(e, VG_EARG, "cannot tell the format of the mesh '%s': known are %s", o->mesh, vgi_format_names());
+    const vgi_format *f = o->mesh ? vgi_format_by_suffix(o->mesh) : NULL;
+    if (o->mesh && !(f && f->keeps & VGI_KEEPS_ORDER))
+        return vg_fail(e, VG_EARG, "cannot write the mesh '%s': its name must end in .obj, .ply or .off", o->mesh);
     return VG_OK;
 }
 
@@ -652,7 +653,7 @@ static int warn_of_losses(vg_sink *s, vg_err *e)
 static int warn_of_loose(vg_sink *s, vg_err *e)
 {
     char text[160];
-    if (!lacks_faces(&s->plan) || !s->loose || s->head->mesh.nf == 0) return VG_OK;
+    if (!lacks_faces(&s->plan) || s->plan.sequence->bare || !s->loose || s->head->mesh.nf == 0) return VG_OK;
     int n = snprintf(text, sizeof text, "%zu vertices are in no face: programs that drop them from the mesh, as Blender "
                      "does, then refuse the cache (--drop-loose)", s->loose);
     return vgi_names_add(&s->warnings, text, (size_t)n, e);
@@ -753,8 +754,8 @@ int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
     if (r < 0) return r;
     vg_err cause;
     s->text.size = 0;
-    r = vg_model_write(&s->text, s->plan.format->name, &s->head->mesh, f->values, &s->head->attributes,
-                       s->full_precision, &cause);
+    const vgi_writing w = {&s->head->mesh, f->values, s->head->reference, &s->head->attributes, s->full_precision};
+    r = vgi_model_write(&s->text, s->plan.format->name, &w, &cause);
     if (r < 0) return vg_fail(e, r, "cannot write frame '%s' to '%s': %s", name, s->output, cause.message);
     if ((r = put_frame(s, name, e)) == VG_OK) s->frames++;
     return r;

@@ -459,9 +459,9 @@ static int read_frame(vg_source *s, vg_frame *f, vg_err *e)
     if (r < 0) return r;
     vg_records_clear(&f->extra);
     f->has_time = false, f->time = 0;
-    if ((r = p->format->next(p->state, f, e)) <= 0) return r;
+    if ((r = vg_frame_rename(f, "", e)) < 0 || (r = p->format->next(p->state, f, e)) <= 0) return r;
     p->frames++;
-    if (!(p->format->keeps & VGI_KEEPS_NAMES) && (r = name_frame(p, f, e)) < 0) return r;
+    if (!*f->name && (r = name_frame(p, f, e)) < 0) return r;
     return 1;
 }
 

@@ -1,5 +1,6 @@
-/* spool.c: frames that wait for their turn, first in, first out: in memory up to a limit, behind it in a file without a name.
- * Leaves out what they wait for. A frame is one run of bytes, the same in memory and in the file, which nobody else reads.
+/* spool.c: frames that wait for their turn, first in, first out: in memory up to a limit, behind it in a file
+ * without a name. Leaves out what they wait for. A frame is one run of bytes, the same in memory and in the file,
+ * which nobody else reads.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -181,7 +182,7 @@ static int keep_in_file(vg_spool *s, const vg_frame *f, const front *head, vg_er
         ssize_t n = pwrite(s->fd, s->frame.data + done, head->bytes - done, (off_t)(s->written + done));
         if (n < 0 && errno == EINTR) continue;
         if (n < 0)
-            return vg_fail(e, VG_ESYS, "cannot hold frame '%s' in a temporary file: %s: choose a roomier directory with $TMPDIR",
+            return vg_fail(e, VG_ESYS, "cannot hold frame '%s' in a temporary file: %s: set TMPDIR to another place",
                            f->name, strerror(errno));
         done += (size_t)n;
     }
@@ -190,7 +191,8 @@ static int keep_in_file(vg_spool *s, const vg_frame *f, const front *head, vg_er
     return VG_OK;
 }
 
-/* What is in memory is older than what is in the file: once the file is begun, it takes all until it is empty again. */
+/* What is in memory is older than what is in the file: once the file is begun, it takes all until it is empty
+ * again. */
 int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e)
 {
     front head;
@@ -210,7 +212,8 @@ static int read_back(vg_spool *s, size_t n, vg_err *e)
         ssize_t k = pread(s->fd, s->frame.data + done, n - done, (off_t)(s->read + done));
         if (k < 0 && errno == EINTR) continue;
         if (k <= 0)
-            return vg_fail(e, VG_ESYS, "cannot read a temporary file: %s", k < 0 ? strerror(errno) : "it was cut short");
+            return vg_fail(e, VG_ESYS, "cannot read a temporary file: %s",
+                           k < 0 ? strerror(errno) : "it was cut short");
         done += (size_t)k;
     }
     return r;

@@ -319,6 +319,12 @@ static const double *point(const struct writing *x, uint32_t v)
     return x->w->vertices + 3 * (size_t)v;
 }
 
+/* Where it is in the pose that decides how polygons are split. */
+static const double *place(const struct writing *x, uint32_t v)
+{
+    return x->w->shape + 3 * (size_t)v;
+}
+
 /* Words, and behind them the three numbers of p, unless NULL, and the end of the line. */
 static int put_line(struct writing *x, const char *words, const double *p, bool full)
 {
@@ -370,7 +376,7 @@ static void face_normal(const struct writing *x, const uint32_t *v, size_t n, do
     normal[0] = normal[1] = normal[2] = 0;
     for (size_t i = 1; i + 1 < n; i++) {
         double t[3];
-        turn(point(x, v[0]), point(x, v[i]), point(x, v[i + 1]), t);
+        turn(place(x, v[0]), place(x, v[i]), place(x, v[i + 1]), t);
         for (int k = 0; k < 3; k++) normal[k] += t[k];
     }
 }
@@ -378,7 +384,7 @@ static void face_normal(const struct writing *x, const uint32_t *v, size_t n, do
 static bool looks_along(const struct writing *x, uint32_t a, uint32_t b, uint32_t c, const double normal[3])
 {
     double t[3];
-    turn(point(x, a), point(x, b), point(x, c), t);
+    turn(place(x, a), place(x, b), place(x, c), t);
     return dot(t, normal) >= 0;
 }
 
@@ -402,7 +408,7 @@ static bool is_ear(const struct writing *x, size_t n, size_t i, const double nor
     const uint32_t *v = x->ring;
     uint32_t a = v[(i + n - 1) % n], b = v[i], c = v[(i + 1) % n];
     double t[3];
-    turn(point(x, a), point(x, b), point(x, c), t);
+    turn(place(x, a), place(x, b), place(x, c), t);
     if (!(dot(t, normal) > 0)) return false;
     for (size_t k = 0; k < n; k++) {
         uint32_t p = v[k];
@@ -430,7 +436,7 @@ static int clip_ears(struct writing *x, const uint32_t *v, size_t n, const doubl
     return r == VG_OK ? put_fan(x, x->ring, n) : r;
 }
 
-/* A fan where that covers the face, so that one connectivity is split alike in all poses as far as their shape allows. */
+/* A fan where that covers the face. */
 static int put_face(struct writing *x, const uint32_t *v, size_t n)
 {
     double normal[3];

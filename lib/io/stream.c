@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 /* The header records, in the order they are written. */
-enum { FORM = 10, KNOWN = 11 };
+enum { FORM = 12, KNOWN = 13 };
 static const struct {
     const char *tag;
     uint32_t flags;
@@ -24,6 +24,8 @@ static const struct {
     {"REFP", VGI_CRITICAL, vgi_refp_decode, false, true},
     {"SKEL", 0, vgi_skel_decode, false, true},
     {"CORR", VGI_CRITICAL, vgi_corr_decode, false, false},
+    {"PTCH", 0, vgi_ptch_decode, false, true},
+    {"MAP ", VGI_CRITICAL, vgi_map_decode, false, true},
     {"FORM", VGI_CRITICAL, vgi_form_decode, false, false},
 };
 enum { MESH = 1 };
@@ -228,6 +230,8 @@ static int encode_known(vg_bytes *b, const vg_head *h, int i, vg_err *e)
     case 7: return vgi_refp_encode(b, h, e);
     case 8: return vgi_skel_encode(b, &h->skeleton, e);
     case 9: return vgi_corr_encode(b, &h->correspondence, e);
+    case 10: return vgi_ptch_encode(b, h, e);
+    case 11: return vgi_map_encode(b, &h->map, e);
     default: return vgi_form_encode(b, h, e);
     }
 }
@@ -238,7 +242,8 @@ static int write_head(vg_writer *w, vg_err *e)
     bool mesh = h->reference != NULL;
     const bool present[KNOWN] = {false, mesh, mesh && h->attributes.ntex > 0, mesh && h->attributes.nlabels > 0,
                                  mesh && h->has_selection, mesh && h->has_links, mesh && h->nanchors > 0, mesh,
-                                 mesh && h->skeleton.njoints > 0, h->correspondence.first != NULL, true};
+                                 mesh && h->skeleton.njoints > 0, h->correspondence.first != NULL,
+                                 mesh && h->patches.n > 0, mesh && h->map.n > 0, true};
     int r = vgi_record_begin_write(w->fd, w->name, e);
     for (size_t i = 0; r == VG_OK && i < h->nprovenance; i++) {
         w->front.size = 0;

@@ -59,7 +59,7 @@ static void measure_source(vg_carrier *c, const double *reference, double *w)
     const vg_mesh *m = c->source;
     for (size_t f = 0; f < m->nf; f++) {
         size_t begin = m->start[f], r = source_size(c, f);
-        double centre[3] = {0, 0, 0}, P[6];
+        double centre[3] = {0, 0, 0}, P[6], size;
         for (size_t i = 0; i < r; i++)
             for (size_t k = 0; k < 3; k++) centre[k] += reference[3 * (size_t)m->vert[begin + i] + k] / (double)r;
         for (size_t i = 0; i < r; i++)
@@ -67,7 +67,8 @@ static void measure_source(vg_carrier *c, const double *reference, double *w)
         memcpy(c->segment + 3 * f, w, 3 * sizeof *w);
         if (r == 2) {
             c->slow[f] = w[0] != 0 || w[1] != 0 || w[2] != 0 ? 1 : 2;
-        } else if (vgi_gradient_moments(w, r, P, c->q + 3 * f)) {
+        } else if (vgi_gradient_moments(w, r, P, c->q + 3 * f, &size)) {
+            for (size_t k = 0; k < 3; k++) c->q[3 * f + k] /= sqrt(size);
             for (size_t i = 0; i < r; i++) vgi_symmetric_times(P, w + 3 * i, c->p + 3 * (begin + i));
         } else {
             c->slow[f] = 2;

@@ -40,10 +40,10 @@ INLINE void measure_map(const vgi_source *s, size_t f, vgi_map *map, unsigned ch
         n[2] += before[0] * x[1] - before[1] * x[0];
         for (int i = 0; i < 3; i++) before[i] = x[i];
     }
-    vgi_lanes n2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2], length = lane_sqrt(n2);
+    vgi_lanes n2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2], root = lane_sqrt(lane_sqrt(n2));
     vgi_mask none = ~(n2 > 1e-24 * spread * spread);
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) d.m[3 * i + j] += n[i] / length * s->q[3 * f + (size_t)j];
+        for (int j = 0; j < 3; j++) d.m[3 * i + j] += n[i] / root * s->q[3 * f + (size_t)j];
     *map = d;
     unsigned bits = 0;
     for (int k = 0; k < VGI_LANES; k++) bits |= (unsigned)(none[k] & 1) << k;

@@ -10,7 +10,8 @@ typedef struct vgi_map {
     vgi_lanes m[9];
 } vgi_map;
 
-/* What a source face needs to tell its map from its vertices: per corner p = P r (deform_kernel.h), per face q = h P n. */
+/* What a source face needs to tell its map from its vertices: per corner p = P r (deform_kernel.h), per face q = h P n / sqrt|N|, N the sum
+ * of cross products, so that the normal stretches by the root of the area's ratio. */
 typedef struct vgi_source {
     const uint32_t *start, *vert; /* the source mesh */
     const double *p, *q;

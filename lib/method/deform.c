@@ -5,6 +5,7 @@
  * a quaternion. The scalar way below forms them: for faces with degenerate corners, for line segments, for links, and when
  * quaternions are what is asked for.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/deform.h"
 #include "method/deform_kernel.h"
 #include "method/moments.h"
 #include "model/incidence.h"
@@ -222,10 +223,9 @@ static void count_degenerate(vg_deformer *d, size_t f, size_t bad)
 
 /* ---- making ---- */
 
-static void measure_reference(vg_deformer *d, const double *reference)
+static void measure_reference(vg_deformer *d)
 {
     const vg_graph *g = d->g;
-    vg_graph_vectors(g, reference, d->vector);
     for (size_t f = 0; f < g->nf; f++) {
         size_t r = face_size(g, f);
         const double *w = d->vector + 3 * (size_t)g->start[f];
@@ -252,14 +252,15 @@ static int make_workspace(vg_deformer *d, vg_err *e)
     return d->work ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory for faces of %zu corners", r - 1);
 }
 
-int vg_deformer_new(vg_deformer **out, const vg_graph *g, const double *reference, int threads, vg_err *e)
+/* All but what the reference says, whose D is `diagonal`. */
+static int make_deformer(vg_deformer **out, const vg_graph *g, double diagonal, int threads, vg_err *e)
 {
     size_t corners = vg_graph_corners(g);
     vg_deformer *d = *out = vgi_array(1, sizeof *d, e);
     if (!d) return VG_ENOMEM;
     d->g = g, d->threads = threads, d->faces = g->nf - g->nlinks;
     atomic_init(&d->first_face, UINT64_MAX);
-    double least = shortest * vg_diagonal(reference, g->nv);
+    double least = shortest * diagonal;
     d->shortest2 = least * least;
     d->vector = vgi_array_raw(3 * corners, sizeof *d->vector, e);
     d->length = vgi_array_raw(corners, sizeof *d->length, e);
@@ -270,7 +271,22 @@ int vg_deformer_new(vg_deformer **out, const vg_graph *g, const double *referenc
         ok = vgi_incidence_make(&d->around, g->nv, g->nf, g->start, g->vert, e) == VG_OK;
     }
     if (!ok) return vg_deformer_free(out), VG_ENOMEM;
-    measure_reference(d, reference);
+    return VG_OK;
+}
+
+int vg_deformer_new(vg_deformer **d, const vg_graph *g, const double *reference, int threads, vg_err *e)
+{
+    if (make_deformer(d, g, vg_diagonal(reference, g->nv), threads, e) < 0) return VG_ENOMEM;
+    vg_graph_vectors(g, reference, (*d)->vector);
+    measure_reference(*d);
+    return VG_OK;
+}
+
+int vgi_deformer_of_vectors(vg_deformer **d, const vg_graph *g, const double *vectors, double diagonal, int threads, vg_err *e)
+{
+    if (make_deformer(d, g, diagonal, threads, e) < 0) return VG_ENOMEM;
+    memcpy((*d)->vector, vectors, 3 * vg_graph_corners(g) * sizeof *vectors);
+    measure_reference(*d);
     return VG_OK;
 }
 
@@ -308,9 +324,9 @@ static void make_gradient(vg_deformer *d, size_t f)
 {
     const vg_graph *g = d->g;
     size_t begin = g->start[f], r = face_size(g, f);
-    double P[6], source2 = 0, target2 = 0;
+    double P[6], size, source2 = 0, target2 = 0;
     vgi_gradient_face *face = &d->gradient_face[f];
-    if (!vgi_gradient_moments(d->vector + 3 * begin, r, P, face->q)) {
+    if (!vgi_gradient_moments(d->vector + 3 * begin, r, P, face->q, &size)) {
         d->slow[f] = 1;
         return;
     }

@@ -1,15 +1,17 @@
 /* fit.c: bend one surface of polygons until it lies on another, from ties (markers, seeds) and nearest points.
  *
- * What is kept small is how much the deformation changes from place to place: per vertex v, with L a graph Laplacian of the mesh, s the
- * rest and D_v the linear map that the faces around v undergo in the present fit,
+ * What is kept small is how much the deformation changes from place to place: with L a graph Laplacian of the source, s its rest, and R_v the
+ * turn and mean stretch that the faces around vertex v undergo in the present fit,
  *
- *     sum over v of |(L x)_v - D_v (L s)_v|^2 / L_vv  +  small * first differences against turned and scaled ones
- *       +  sum of weight * |tied point - where it belongs|^2
+ *     sum over v of |(L x)_v - R_v (L s)_v|^2 / L_vv                     bending
+ *       + a * sum over edges of |(x_u - x_v) - R_uv (s_u - s_v)|^2        stretching
+ *       + sum of weight * |point of the source - where it belongs|^2      ties, nearest points both ways
  *
- * so that any affine map of the whole costs nothing, and one that changes from limb to limb costs little: what Sumner and Popovic (2004,
- * section 5.1) ask of neighbouring triangles, without extra unknowns and for faces of any number of corners. x, y and z share one matrix. It
- * is factorized once per round; inside a round D and the nearest points follow the fit. The D of a face counts a third direction,
- * its normal, stretched as its area is.
+ * so that a similarity of the whole costs nothing, and one that changes slowly from limb to limb costs little: what Sumner and Popovic
+ * (2004, section 5.1) ask of neighbouring triangles, without extra unknowns and for faces of any number of corners. x, y and z share one
+ * matrix. It is factorized once per round; inside a round R and the nearest points follow the fit. R comes from the map of each face (its
+ * vectors, and its normal stretched as the root of its area), smoothed over a length by (1 + length^2 L)^-1: from single faces it would
+ * follow every dent, and nothing would be smooth any more.
  *
  * Leaves out how the meshes come to lie roughly on one another (register.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
@@ -19,19 +21,30 @@
 
 #include <stdlib.h>
 
+static const double REST = 1e-7;           /* what holds a vertex where it is when nothing else does */
 static const double IDENTITY_TRUST = 1e-6; /* where no face tells how it is deformed */
 
-double P_len0 = 0.075, P_len1 = 0.7, P_stretch = 0.03, P_marker = 3, P_lim0 = 0.1, P_lim1 = 0.02, P_cos = 0.4, P_maplen = 0.07, P_scale = 0.8, P_back = 1, P_backlim = 1;
-int P_rounds = 8, P_inner = 4, P_free = 5;
+/* Lengths are in D. What was tried on real pairs: within a factor of two of these the results are the same. */
+static const double MARKER = 3;           /* firmness of ties, where the bending of the mesh is 1 */
+static const double STRETCH = 0.03;       /* above this length stretching counts more than bending */
+static const double FIRST_SPAN = 0.075;   /* what a nearest point pulls along with it in the first round */
+static const double LAST_SPAN = 0.7;      /* and in the last, in mean edge lengths */
+static const double FIRST_LIMIT = 0.1, LAST_LIMIT = 0.02; /* nearest points farther than this are none */
+static const double COSINE = 0.4;         /* least of normals that fit */
+static const double MAP_SPAN = 0.07;      /* over which the maps of faces are smoothed */
+static const double KEPT_STRETCH = 0.8;   /* power of a map's mean stretch that is kept: what nothing holds goes back to its size */
 
 enum {
     BLOCK = 256,     /* vertices of a task */
-    FULL = 8         /* larger faces have no springs between all of their corners */
+    FULL = 8,        /* larger faces have no springs between all of their corners */
+    TIED_SOLVES = 5, /* from the ties alone */
+    ROUNDS = 8,      /* with nearest points: one factorisation each */
+    SOLVES = 4       /* of a round */
 };
 
 /* A vertex of the target pulls the point of a source face that is nearest to it. */
 typedef struct reverse {
-    uint32_t face, vertex; /* of the source; of the target */
+    uint32_t face; /* of the source */
     double weight, share[FULL]; /* of the face's corners */
 } reverse;
 
@@ -65,7 +78,7 @@ typedef struct fit {
     double *distance;  /* nv */
     reverse *reverse;  /* per vertex of the target; weight 0: it pulls nothing */
     vgi_surface *now;  /* the source as it lies at the start of a round */
-    double limit, cosine;
+    double limit;
     double stretch;    /* weight of first differences */
 } fit;
 
@@ -271,16 +284,16 @@ static double *entry(const vgi_sparse *A, uint32_t a, uint32_t b)
     return &A->value[low];
 }
 
-static int factorize(fit *t, double stiffness, vg_err *e)
+static int factorize(fit *t, vg_err *e)
 {
     vgi_sparse *A = &t->matrix;
-    for (int i = 0; i < A->start[A->n]; i++) A->value[i] = stiffness * (t->bending[i] + t->stretch * t->stretching[i]);
-    for (size_t v = 0; v < A->n; v++) A->value[A->start[v]] += t->L.sum[v] > 0 ? t->pull[v] : 1;
+    for (int i = 0; i < A->start[A->n]; i++) A->value[i] = t->bending[i] + t->stretch * t->stretching[i];
+    for (size_t v = 0; v < A->n; v++) A->value[A->start[v]] += t->L.sum[v] > 0 ? t->pull[v] + REST : 1;
     for (size_t i = 0; i < t->in->nties; i++) {
         const vgi_tie *tie = &t->in->tie[i];
         for (int a = 0; a < 3; a++)
             for (int b = 0; b <= a; b++) {
-                double w = P_marker * tie->weight * tie->share[a] * tie->share[b];
+                double w = MARKER * tie->weight * tie->share[a] * tie->share[b];
                 *entry(A, tie->vertex[a], tie->vertex[b]) += a != b && tie->vertex[a] == tie->vertex[b] ? 2 * w : w;
             }
     }
@@ -425,7 +438,7 @@ static void drop_shear(double m[9])
         if (change < 1e-9) break;
         if (!(det > 0)) return;
     }
-    double scale = pow(first, P_scale / 3);
+    double scale = pow(first, KEPT_STRETCH / 3);
     for (int k = 0; k < 9; k++) m[k] = q[k] * scale;
 }
 
@@ -442,7 +455,7 @@ static int make_smoother(fit *t, vg_err *e)
 {
     const springs *L = &t->L;
     size_t n = 0;
-    double strength = P_maplen / t->edge * P_maplen / t->edge;
+    double strength = MAP_SPAN / t->edge * MAP_SPAN / t->edge;
     vgi_sparse A = {.n = L->nv, .start = vgi_array(L->nv + 1, sizeof(int), e), .row = vgi_array(L->nv + L->first[L->nv], sizeof(int), e),
                     .value = vgi_array(L->nv + L->first[L->nv], sizeof(double), e)};
     int r = A.start && A.row && A.value ? VG_OK : VG_ENOMEM;
@@ -462,7 +475,7 @@ static int make_smoother(fit *t, vg_err *e)
 
 /* ---- a round ---- */
 
-static void add_smoothness(fit *t, double stiffness)
+static void add_smoothness(fit *t)
 {
     const springs *L = &t->L;
     double *wanted = t->tmp;
@@ -482,7 +495,6 @@ static void add_smoothness(fit *t, double stiffness)
             vgi_multiply_vector(t->map + 9 * u, d, b);
             for (int k = 0; k < 3; k++) to[k] += t->stretch * L->weight[i] * 0.5 * (a[k] + b[k]);
         }
-        for (int k = 0; k < 3; k++) to[k] *= stiffness;
     }
 }
 
@@ -492,13 +504,13 @@ static void add_pulls(fit *t)
         bool isolated = !(t->L.sum[v] > 0);
         double w = isolated ? 1 : t->pull[v];
         const double *goal = isolated ? t->in->rest + 3 * v : t->goal + 3 * v;
-        for (size_t k = 0; k < 3; k++) t->rhs[3 * v + k] += w * goal[k];
+        for (size_t k = 0; k < 3; k++) t->rhs[3 * v + k] += w * goal[k] + (isolated ? 0 : REST * t->x[3 * v + k]);
     }
     for (size_t i = 0; i < t->in->nties; i++) {
         const vgi_tie *tie = &t->in->tie[i];
         for (int a = 0; a < 3; a++)
             for (size_t k = 0; k < 3; k++)
-                t->rhs[3 * (size_t)tie->vertex[a] + k] += P_marker * tie->weight * tie->share[a] * tie->point[k];
+                t->rhs[3 * (size_t)tie->vertex[a] + k] += MARKER * tie->weight * tie->share[a] * tie->point[k];
     }
 }
 
@@ -514,11 +526,11 @@ static void add_reverse_pulls(fit *t)
     }
 }
 
-static int solve(fit *t, double stiffness, vg_err *e)
+static int solve(fit *t, vg_err *e)
 {
     int r = update_maps(t, e);
     if (r < 0) return r;
-    add_smoothness(t, stiffness);
+    add_smoothness(t);
     add_pulls(t);
     add_reverse_pulls(t);
     r = vgi_cholesky_solve(t->solver, t->rhs, e);
@@ -553,8 +565,8 @@ static void find_near(void *context, size_t block)
         bool guess = t->distance[v] < INFINITY && known < limit; /* the last answer bounds this one, if its normal still fits */
         t->distance[v] = INFINITY;
         if (!(t->L.sum[v] > 0)) continue;
-        bool found = guess && vgi_surface_nearest(t->in->target, at, normal, t->cosine, known * (1 + 1e-9), &hit);
-        if (!found && !vgi_surface_nearest(t->in->target, at, normal, t->cosine, limit, &hit)) continue;
+        bool found = guess && vgi_surface_nearest(t->in->target, at, normal, COSINE, known * (1 + 1e-9), &hit);
+        if (!found && !vgi_surface_nearest(t->in->target, at, normal, COSINE, limit, &hit)) continue;
         if (hit.border && !t->border[v]) continue;
         t->distance[v] = sqrt(hit.square);
         memcpy(t->goal + 3 * v, hit.point, sizeof hit.point);
@@ -572,10 +584,10 @@ static void find_reverse(void *context, size_t block)
         double sign = t->in->flipped ? -1 : 1, normal[3] = {sign * n[0], sign * n[1], sign * n[2]};
         vgi_hit hit;
         p->weight = 0;
-        if (!vgi_surface_nearest(t->now, at, normal, t->cosine, t->limit * t->limit, &hit) || hit.border) continue;
+        if (!vgi_surface_nearest(t->now, at, normal, COSINE, t->limit * t->limit, &hit) || hit.border) continue;
         size_t begin = t->m->start[hit.face], r = t->m->start[hit.face + 1] - begin, first = hit.corner - begin;
         if (r < 3 || r > FULL) continue;
-        *p = (reverse){.face = hit.face, .vertex = (uint32_t)v, .weight = 1 - hit.square / (t->limit * t->limit)};
+        *p = (reverse){.face = hit.face, .weight = 1 - hit.square / (t->limit * t->limit)};
         for (size_t k = 0; r > 3 && k < r; k++) p->share[k] = hit.u[1] / (double)r;
         p->share[first] += 1 - hit.u[0] - hit.u[1];
         p->share[(first + 1) % r] += hit.u[0];
@@ -591,7 +603,7 @@ static int follow_reverse(fit *t, double weight, vg_err *e)
     int r = vgi_surface_new(&t->now, t->m, t->x, e);
     if (r < 0) return r;
     vgi_parallel(t->in->threads, (n + BLOCK - 1) / BLOCK, find_reverse, t);
-    for (size_t i = 0; i < n; i++) t->reverse[i].weight *= weight * P_back * (double)t->m->nv / (double)n;
+    for (size_t i = 0; i < n; i++) t->reverse[i].weight *= weight * (double)t->m->nv / (double)n;
     return VG_OK;
 }
 
@@ -608,10 +620,10 @@ static void follow_target(fit *t, double weight, bool first)
     }
 }
 
-static void tell(const fit *t, size_t round, size_t rounds, double stiffness)
+static void tell(const fit *t, size_t round, double stiffness)
 {
     if (!t->in->step) return;
-    vg_register_step s = {.round = round, .rounds = rounds, .stiffness = stiffness};
+    vg_register_step s = {.round = round, .rounds = ROUNDS, .stiffness = stiffness};
     for (size_t v = 0; v < t->m->nv; v++) {
         if (!(t->pull[v] > 0) || !(t->distance[v] < INFINITY)) continue;
         s.near++;
@@ -626,21 +638,21 @@ static int run(fit *t, vg_err *e)
 {
     int r = VG_OK;
     if (t->in->nties) {
-        r = factorize(t, 1, e);
-        for (int i = 0; i < P_free && r == VG_OK; i++) r = solve(t, 1, e);
+        r = factorize(t, e);
+        for (int i = 0; i < TIED_SOLVES && r == VG_OK; i++) r = solve(t, e);
     }
-    for (int round = 0; round < P_rounds && r == VG_OK; round++) {
-        double progress = round / (double)(P_rounds - 1), first = P_len0 / t->edge;
-        double span = first > P_len1 ? first * pow(P_len1 / first, progress) : P_len1, weight = pow(span, -4);
-        t->limit = P_lim0 * pow(P_lim1 / P_lim0, progress), t->cosine = P_cos;
-        for (int i = 0; i < P_inner && r == VG_OK; i++) {
+    for (int round = 0; round < ROUNDS && r == VG_OK; round++) {
+        double progress = round / (double)(ROUNDS - 1), first = FIRST_SPAN / t->edge;
+        double span = first > LAST_SPAN ? first * pow(LAST_SPAN / first, progress) : LAST_SPAN;
+        double weight = pow(span, -4); /* bending is of fourth order in length */
+        t->limit = FIRST_LIMIT * pow(LAST_LIMIT / FIRST_LIMIT, progress);
+        for (int i = 0; i < SOLVES && r == VG_OK; i++) {
             follow_target(t, weight, i == 0);
-            if (i == 0 && P_back > 0) r = follow_reverse(t, weight * progress * progress, e);
-            if (r < 0) break;
-            if (i == 0) r = factorize(t, 1, e);
-            if (r == VG_OK) r = solve(t, 1, e);
+            if (i == 0) r = follow_reverse(t, weight * progress * progress, e);
+            if (i == 0 && r == VG_OK) r = factorize(t, e);
+            if (r == VG_OK) r = solve(t, e);
         }
-        tell(t, (size_t)round + 1, (size_t)P_rounds, 1 / weight);
+        tell(t, (size_t)round + 1, 1 / weight);
     }
     return r;
 }
@@ -656,7 +668,7 @@ static void measure_edges(fit *t)
             weight += L->weight[i];
         }
     t->edge = weight > 0 && sum > 0 ? sum / weight : 1;
-    t->stretch = t->edge / P_stretch * t->edge / P_stretch;
+    t->stretch = t->edge / STRETCH * t->edge / STRETCH;
 }
 
 static int prepare(fit *t, vg_err *e)

@@ -195,17 +195,14 @@ static uint32_t farthest_around(const struct joining *j, uint32_t a, uint32_t b)
 
 /* From nearest points to a link. When two components move apart a little, a link between points that nearly touch
  * turns and stretches wildly, and what it does means nothing on another body. So a link shorter than the edges beside
- * it ends one edge further on, at the end with the longer edges, and turns about as those edges do. Points that
- * coincide (seams of a mesh that was never welded) are meant to stay together. */
-static void place_link(const struct joining *j, const struct edge *edge, double coincide, uint32_t pair[2])
+ * it ends one edge further on, at the end with the longer edges, and turns about as those edges do. This holds for points
+ * that coincide, too: a link without length could never open. */
+static void place_link(const struct joining *j, const struct edge *edge, uint32_t pair[2])
 {
     uint32_t a = j->vertex[edge->a], b = j->vertex[edge->b];
-    double length = distance(j, a, b);
-    if (length > coincide) {
-        double edge_a = mean_edge(j, a), edge_b = mean_edge(j, b);
-        if (edge_a > edge_b && length < edge_a) a = farthest_around(j, b, a);
-        else if (length < edge_b) b = farthest_around(j, a, b);
-    }
+    double length = distance(j, a, b), edge_a = mean_edge(j, a), edge_b = mean_edge(j, b);
+    if (edge_a > edge_b && length < edge_a) a = farthest_around(j, b, a);
+    else if (length < edge_b) b = farthest_around(j, a, b);
     pair[0] = a < b ? a : b;
     pair[1] = a < b ? b : a;
 }
@@ -221,8 +218,7 @@ static int list_links(const struct joining *j, uint32_t **pairs, size_t *n, vg_e
 {
     uint32_t *list = vgi_array_raw(j->nchosen, 2 * sizeof *list, e);
     if (!list) return VG_ENOMEM;
-    double coincide = 1e-9 * vg_diagonal(j->x, j->m->nv);
-    for (size_t i = 0; i < j->nchosen; i++) place_link(j, &j->chosen[i], coincide, list + 2 * i);
+    for (size_t i = 0; i < j->nchosen; i++) place_link(j, &j->chosen[i], list + 2 * i);
     qsort(list, j->nchosen, 2 * sizeof *list, compare_pairs);
     *pairs = list;
     *n = j->nchosen;

@@ -6,7 +6,8 @@
 
 static const double flat = 1e-12; /* of the sum of squared lengths: see deform_kernel.c */
 
-bool vgi_unit_normal(const double *w, size_t r, double n[3])
+/* The sum of cross products of successive vectors, twice the area times the normal; *size: its length, or 0 for none. */
+static void area_vector(const double *w, size_t r, double n[3], double *size)
 {
     double spread = 0;
     n[0] = n[1] = n[2] = 0;
@@ -17,10 +18,16 @@ bool vgi_unit_normal(const double *w, size_t r, double n[3])
         n[2] += a[0] * b[1] - a[1] * b[0];
         spread += a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
     }
-    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    if (!(length > flat * spread)) return false;
-    for (int k = 0; k < 3; k++) n[k] /= length;
-    return true;
+    *size = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    if (!(*size > flat * spread)) *size = 0;
+}
+
+bool vgi_unit_normal(const double *w, size_t r, double n[3])
+{
+    double size;
+    area_vector(w, r, n, &size);
+    for (int k = 0; k < 3 && size > 0; k++) n[k] /= size;
+    return size > 0;
 }
 
 /* false when it has no inverse */
@@ -42,7 +49,7 @@ void vgi_symmetric_times(const double a[6], const double x[3], double y[3])
     y[2] = a[2] * x[0] + a[4] * x[1] + a[5] * x[2];
 }
 
-bool vgi_gradient_moments(const double *w, size_t r, double P[6], double q[3])
+bool vgi_gradient_moments(const double *w, size_t r, double P[6], double q[3], double *size)
 {
     double sum[6] = {0, 0, 0, 0, 0, 0}, n[3];
     for (size_t i = 0; i < r; i++) {
@@ -50,7 +57,9 @@ bool vgi_gradient_moments(const double *w, size_t r, double P[6], double q[3])
         sum[0] += v[0] * v[0], sum[1] += v[0] * v[1], sum[2] += v[0] * v[2];
         sum[3] += v[1] * v[1], sum[4] += v[1] * v[2], sum[5] += v[2] * v[2];
     }
-    if (!vgi_unit_normal(w, r, n)) return false;
+    area_vector(w, r, n, size);
+    if (!(*size > 0)) return false;
+    for (int k = 0; k < 3; k++) n[k] /= *size;
     double h = (sum[0] + sum[3] + sum[5]) / 2;
     sum[0] += h * n[0] * n[0], sum[1] += h * n[0] * n[1], sum[2] += h * n[0] * n[2];
     sum[3] += h * n[1] * n[1], sum[4] += h * n[1] * n[2], sum[5] += h * n[2] * n[2];

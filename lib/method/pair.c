@@ -11,7 +11,6 @@
 #include "method/register.h"
 #include "model/incidence.h"
 #include "model/kdtree.h"
-#include "model/sets.h"
 
 #include <stdlib.h>
 
@@ -23,8 +22,8 @@ enum {
 };
 static const double COINCIDENT = 1e-6; /* in D */
 static const double COSINE = 0.5;      /* of normals that agree */
-double P_match = 0.03;     /* in D: farther is no match */
-double P_radius = 1.0;
+static const double FAR = 0.03;        /* in D: farther is no match */
+static const double REACH = 1.2;       /* radius of the kernel, in sizes of faces */
 
 struct candidate {
     uint32_t face;
@@ -129,7 +128,7 @@ static void find_drivers(const struct pairing *p, size_t g, uint32_t first, stru
 {
     const double *at = centroid(p->in->target_surface, g);
     double a = vgi_surface_sizes(p->in->source_surface)[first], b = vgi_surface_sizes(p->in->target_surface)[g];
-    double radius = P_radius * (a > b ? a : b), own = sqrt(vgi_square(centroid(p->in->source_surface, first), at));
+    double radius = REACH * (a > b ? a : b), own = sqrt(vgi_square(centroid(p->in->source_surface, first), at));
     if (1.2 * own > radius) radius = 1.2 * own;
     struct walk w;
     struct candidate found[AROUND];
@@ -151,7 +150,7 @@ static bool nearest_source(const struct pairing *p, size_t g, vgi_hit *hit)
 {
     const double *n = vgi_surface_normals(p->in->target_surface) + 3 * g;
     double sign = p->in->flipped ? -1 : 1, normal[3] = {sign * n[0], sign * n[1], sign * n[2]};
-    double limit = face_size(p->in->target, g) == 2 ? INFINITY : P_match * P_match;
+    double limit = face_size(p->in->target, g) == 2 ? INFINITY : FAR * FAR;
     if (!vgi_surface_nearest(p->in->source_surface, centroid(p->in->target_surface, g), normal, COSINE, limit, hit)) return false;
     double size = vgi_surface_sizes(p->in->target_surface)[g];
     return !hit->border || hit->square <= size * size;
@@ -168,7 +167,9 @@ static void match_block(void *context, size_t block)
         if (g < p->in->source->nf && coincide(p, g, g)) { /* the same mesh, where faces may lie on one another */
             *d = (struct drivers){1, {{(uint32_t)g, 1}}};
         } else if (nearest_source(p, g, &hit)) {
-            if (coincide(p, g, hit.face)) *d = (struct drivers){1, {{hit.face, 1}}};
+            /* bones are not mixed: that would bend the limbs between joints */
+            bool alone = face_size(p->in->target, g) == 2 || coincide(p, g, hit.face);
+            if (alone) *d = (struct drivers){1, {{hit.face, 1}}};
             else find_drivers(p, g, hit.face, d);
         }
     }
@@ -186,7 +187,7 @@ static void give_block(void *context, size_t block)
         vgi_hit hit;
         p->given[f] = UINT32_MAX;
         if (p->used[f]) continue;
-        if (vgi_surface_nearest(p->in->target_surface, centroid(p->in->source_surface, f), normal, COSINE, P_match * P_match, &hit) &&
+        if (vgi_surface_nearest(p->in->target_surface, centroid(p->in->source_surface, f), normal, COSINE, FAR * FAR, &hit) &&
             !hit.border && p->drivers[hit.face].n > 0)
             p->given[f] = hit.face;
     }
@@ -196,7 +197,7 @@ static void give_block(void *context, size_t block)
 static double given_weight(const struct pairing *p, size_t f)
 {
     const struct drivers *d = &p->drivers[p->given[f]];
-    if (d->n == 1 && coincide(p, p->given[f], d->at[0].face)) return 0;
+    if (face_size(p->in->target, p->given[f]) == 2 || (d->n == 1 && coincide(p, p->given[f], d->at[0].face))) return 0;
     return d->at[d->n - 1].weight;
 }
 

@@ -1,13 +1,15 @@
-/* planar.c: poses whose faces of four and more corners are more nearly plane: w1 times the energy of the reconstruction plus w2
- * times the sum over corners of such faces of (m_f . t_c)^2, m_f the normal of the wanted vectors (MATH 5; T 4.2.3).
+/* planar.c: poses whose faces of four and more corners are more nearly plane: w1 times the energy of the
+ * reconstruction plus w2 times the sum over corners of such faces of (m_f . t_c)^2, m_f the normal of the wanted
+ * vectors (MATH 5; T 4.2.3).
  *
- * x, y and z couple, and the matrix M = w1 N + w2 P differs from pose to pose. It is not factorized: P lies between 0 and N (of
- * uniform weights), so that conjugate gradients preconditioned by the one factor of N see eigenvalues between w1 and w1 + w2 only,
- * whatever the mesh. They start from the plain solution V, where the residual is -w2 P V, and look for the difference to it. N
- * itself is never multiplied with: as p := z + beta p with z = N^-1 r, N p := r + beta N p.
+ * x, y and z couple, and the matrix M = w1 N + w2 P differs from pose to pose. It is not factorized: P lies between
+ * 0 and N (of uniform weights), so that conjugate gradients preconditioned by the one factor of N see eigenvalues
+ * between w1 and w1 + w2 only, whatever the mesh. They start from the plain solution V, where the residual is -w2 P
+ * V, and look for the difference to it. N itself is never multiplied with: as p := z + beta p with z = N^-1 r, N p
+ * := r + beta N p.
  *
- * Eight poses go side by side, each with coefficients and an end of its own, so that a pose does not depend on its neighbours.
- * Leaves out the loops over rows: planar_kernel.c.
+ * Eight poses go side by side, each with coefficients and an end of its own, so that a pose does not depend on its
+ * neighbours. Leaves out the loops over rows: planar_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/planar.h"
 #include "method/planar_kernel.h"
@@ -130,7 +132,7 @@ static int make_rooms(vg_planar *p, vg_err *e)
 {
     size_t n = p->solver.rows, all = n + p->nheld, largest = (p->solver.g->max_corners + 2) / 3, each, total;
     size_t threads = (size_t)p->solver.threads;
-    each = 4 * n + 2 * all + p->nf + largest; /* the largest possible mesh does not overflow this: all are below 2^33 */
+    each = 4 * n + 2 * all + p->nf + largest + 1; /* of the largest mesh there can be, all are below 2^33 */
     p->rooms = vgi_array(threads, sizeof *p->rooms, e);
     p->found = vgi_array(threads, sizeof *p->found, e);
     if (!p->rooms || !p->found) return VG_ENOMEM;
@@ -150,7 +152,7 @@ int vg_planar_new(vg_planar **out, const vg_solver *s, double fidelity, double p
 {
     *out = NULL;
     if (!(fidelity > 0) || !(planarity >= 0) || !isfinite(planarity / fidelity))
-        return vg_fail(e, VG_EARG, "the weights of planarity are a number above 0 and one of at least 0, not %g and %g",
+        return vg_fail(e, VG_EARG, "the weights of planarity are one above 0 and one of at least 0, not %g and %g",
                        fidelity, planarity);
     vg_planar *p = *out = vgi_array(1, sizeof *p, e);
     if (!p) return VG_ENOMEM;
@@ -190,8 +192,9 @@ vg_planar_facts vg_planar_get_facts(const vg_planar *p)
     return p->facts;
 }
 
-/* The mean of the cross products of successive vectors, made a unit; 0 if there is none. Moving all vectors of a face by the same
- * changes nothing (they need not sum to 0), so they are taken from the first, and in units of the largest. */
+/* The mean of the cross products of successive vectors, made a unit; 0 if there is none. Moving all vectors of a
+ * face by the same changes nothing (they need not sum to 0), so they are taken from the first, and in units of the
+ * largest. */
 static void face_normal(const double *w, size_t r, double m[3])
 {
     double n[3] = {0, 0, 0}, size = 0, largest = 0;
@@ -228,8 +231,10 @@ typedef struct plane_job {
     bool *converged; /* n */
 } plane_job;
 
-/* The residual of the plain solution, -ratio P V, each pose in units of its largest entry, which is returned in `unit`. */
-static void load_residual(const vg_planar *p, const room *m, const vgi_planar_faces *f, const double *const *pose, vgi_lanes *unit)
+/* The residual of the plain solution, -ratio P V, each pose in units of its largest entry, which is returned in
+ * `unit`. */
+static void load_residual(const vg_planar *p, const room *m, const vgi_planar_faces *f, const double *const *pose,
+                          vgi_lanes *unit)
 {
     size_t n = p->solver.rows;
     vgi_lanes none, most = {0};

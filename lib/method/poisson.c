@@ -1,8 +1,10 @@
-/* poisson.c: guidance in time: a sequence keeps its second differences and meets given poses at its keys (MATH 5; T 4.1.2, 4.2.5).
+/* poisson.c: guidance in time: a sequence keeps its second differences and meets given poses at its keys (MATH 5; T
+ * 4.1.2, 4.2.5).
  *
- * The Poisson equation in time, T_(k-1) - 2 T_k + T_(k+1) = the same of U, T given at the keys, has the same matrix for every
- * coordinate of every vertex, and between two keys its solution is U plus what is linear in k and meets the keys (T 4.16).
- * Leaves out which frames are keys, and where frames wait until the next key is known: vg-poisson, spool.c.
+ * The Poisson equation in time, T_(k-1) - 2 T_k + T_(k+1) = the same of U, T given at the keys, has the same matrix
+ * for every coordinate of every vertex, and between two keys its solution is U plus what is linear in k and meets
+ * the keys (T 4.16). Leaves out which frames are keys, and where frames wait until the next key is known:
+ * vg-poisson, spool.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 

@@ -8,7 +8,6 @@
 #include <stdlib.h>
 
 enum { NEIGHBOURS = 4, ROBUST_ROUNDS = 20 };
-double P_seed = 1;
 
 /* A wrong pair is one that is this many times the typical distance from where its neighbours expect it, and this far, in D. */
 static const double WRONG_TIMES = 5, WRONG_FAR = 0.08;
@@ -171,7 +170,7 @@ static void add_seed_ties(struct registration *r)
     for (size_t i = 0; i < in->nseeds; i++) {
         const vg_seed *s = &in->seeds[i];
         vgi_tie *t = &r->tie[r->nties++];
-        *t = (vgi_tie){{s->vertex, s->vertex, s->vertex}, {1, 0, 0}, {0}, P_seed};
+        *t = (vgi_tie){{s->vertex, s->vertex, s->vertex}, {1, 0, 0}, {0}, 1};
         if (in->seeds_of_source) {
             for (int a = 0; a < 3; a++)
                 for (size_t k = 0; k < 3; k++) t->point[k] += s->weight[a] * r->target[3 * (size_t)s->on[a] + k];
@@ -239,7 +238,7 @@ static void find_texture_ties(struct registration *r, const vgi_surface *texture
         if (!vgi_surface_nearest(texture, at, NULL, 0, 1e-3 * 1e-3, &hit)) continue;
         if (!lift(r->in->target, hit.face, uv, r->target, at, point)) continue;
         vgi_tie *tie = &r->tie[r->nties++];
-        *tie = (vgi_tie){{v, v, v}, {1, 0, 0}, {point[0], point[1], point[2]}, P_seed};
+        *tie = (vgi_tie){{v, v, v}, {1, 0, 0}, {point[0], point[1], point[2]}, 1};
         r->out->uv_pairs++;
     }
 }
@@ -408,8 +407,7 @@ static int bend(struct registration *r, void (*step)(void *, const vg_register_s
 static int pair_faces(struct registration *r, vg_err *e)
 {
     const vgi_pairing p = {.source = r->in->source, .target = r->in->target, .source_surface = r->fitted_surface,
-                           .target_surface = r->target_surface, .target_points = r->target, .flipped = r->flipped,
-                           .threads = r->in->threads};
+                           .target_surface = r->target_surface, .flipped = r->flipped, .threads = r->in->threads};
     return vgi_pair(&p, &r->out->pairs, e);
 }
 

@@ -63,7 +63,6 @@ int vgi_fit(const vgi_fitting *in, double *x, vg_err *e) VG_MUST_CHECK;
 typedef struct vgi_pairing {
     const vg_mesh *source, *target;
     const vgi_surface *source_surface, *target_surface; /* the source as fitted */
-    const double *target_points;
     bool flipped;
     int threads;
 } vgi_pairing;

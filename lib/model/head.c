@@ -2,6 +2,7 @@
  * Leaves out how either is written down (io) and what is computed from it (method).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
+#include "model/map.h"
 
 #include <stdlib.h>
 
@@ -82,6 +83,75 @@ int vg_correspondence_copy(vg_correspondence *to, const vg_correspondence *from,
     to->matched = vgi_copy_array(from->matched, nf, sizeof *to->matched, e);
     if (to->first && to->source && to->weight && to->distance && to->matched) return VG_OK;
     vg_correspondence_clear(to);
+    return VG_ENOMEM;
+}
+
+void vg_patches_clear(vg_patches *p)
+{
+    free(p->of_face);
+    *p = (vg_patches){0};
+}
+
+static int copy_patches(vg_patches *to, const vg_patches *from, size_t nf, vg_err *e)
+{
+    *to = (vg_patches){0};
+    if (!from->n) return VG_OK;
+    if (!(to->of_face = vgi_copy_array(from->of_face, nf, sizeof *to->of_face, e))) return VG_ENOMEM;
+    to->n = from->n;
+    return VG_OK;
+}
+
+size_t vgi_map_arrays(vg_map *m, vgi_map_array list[VGI_MAP_ARRAYS])
+{
+    const vgi_map_array all[VGI_MAP_ARRAYS] = {
+        {(void **)&m->weights, m->nv, 4, true, true}, {(void **)&m->place, m->n, 3, true, true},
+        {(void **)&m->centre, m->n, 3, false, true}, {(void **)&m->home_centre, m->n, 3, false, true},
+        {(void **)&m->share, m->n, 1, false, true}, {(void **)&m->home, m->has_home ? m->nv : 0, 3, false, true},
+        {(void **)&m->joint_at, m->njoints, 3, false, true}, {(void **)&m->joint_weight, m->njoints, 1, false, true},
+        {(void **)&m->corner, m->ncorners, 4, false, true}, {(void **)&m->held_at, m->nheld, 3, false, true},
+        {(void **)&m->joint, m->njoints, 2, false, false}, {(void **)&m->held, m->nheld, 1, false, false}};
+    memcpy(list, all, sizeof all);
+    return VGI_MAP_ARRAYS;
+}
+
+size_t vgi_map_array_length(const vg_map *m, const vgi_map_array *a)
+{
+    size_t n;
+    if (!vgi_mul(a->count, a->width, &n) || (a->per_transform && !vgi_mul(n, m->n, &n))) return SIZE_MAX;
+    return n;
+}
+
+void vg_map_clear(vg_map *m)
+{
+    vgi_map_array list[VGI_MAP_ARRAYS];
+    size_t n = vgi_map_arrays(m, list);
+    for (size_t i = 0; i < n; i++) free(*list[i].at);
+    for (size_t i = 0; i < m->nnames; i++) free(m->names[i]);
+    free(m->names);
+    *m = (vg_map){0};
+}
+
+static int copy_map(vg_map *to, const vg_map *from, vg_err *e)
+{
+    vg_map source = *from;
+    vgi_map_array a[VGI_MAP_ARRAYS], b[VGI_MAP_ARRAYS];
+    *to = *from;
+    to->nnames = 0, to->names = NULL;
+    size_t n = vgi_map_arrays(&source, a);
+    vgi_map_arrays(to, b);
+    for (size_t i = 0; i < n; i++) *b[i].at = NULL;
+    if (!from->n) return VG_OK;
+    bool ok = true;
+    for (size_t i = 0; ok && i < n; i++) {
+        if (*a[i].at)
+            ok = (*b[i].at = vgi_copy_array(*a[i].at, vgi_map_array_length(from, &a[i]),
+                                            a[i].real ? sizeof(double) : sizeof(uint32_t), e));
+    }
+    if (ok && from->nnames) ok = (to->names = vgi_array(from->nnames, sizeof *to->names, e));
+    for (; ok && to->nnames < from->nnames; to->nnames++)
+        if (!(to->names[to->nnames] = vgi_copy_string(from->names[to->nnames], strlen(from->names[to->nnames]), e))) ok = false;
+    if (ok) return VG_OK;
+    vg_map_clear(to);
     return VG_ENOMEM;
 }
 
@@ -236,6 +306,8 @@ void vg_head_clear(vg_head *h)
     vg_attributes_clear(&h->attributes);
     vg_skeleton_clear(&h->skeleton);
     vg_correspondence_clear(&h->correspondence);
+    vg_patches_clear(&h->patches);
+    vg_map_clear(&h->map);
     free(h->selected);
     free(h->links);
     free(h->anchors);
@@ -254,6 +326,7 @@ int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e)
               vg_attributes_copy(&to->attributes, &from->attributes, &from->mesh, e) == VG_OK &&
               vg_skeleton_copy(&to->skeleton, &from->skeleton, e) == VG_OK &&
               vg_correspondence_copy(&to->correspondence, &from->correspondence, e) == VG_OK &&
+              copy_patches(&to->patches, &from->patches, from->mesh.nf, e) == VG_OK && copy_map(&to->map, &from->map, e) == VG_OK &&
               (to->reference_name = vgi_copy_string(name, strlen(name), e));
     if (ok && from->reference)
         ok = (to->reference = vgi_copy_array(from->reference, 3 * from->mesh.nv, sizeof *to->reference, e));

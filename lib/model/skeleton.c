@@ -2,6 +2,7 @@
  * Leaves out the file that holds a skeleton (bvh.c) and how bones deform (deform.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
+#include "model/turn.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -99,10 +100,13 @@ static void largest_eigenvector(double a[4][4], double x[4])
         double off = 0, on = 0;
         for (int p = 0; p < 4; p++)
             for (int q = 0; q < 4; q++) *(p == q ? &on : &off) += a[p][q] * a[p][q];
-        if (!(off > 1e-34 * on)) break;
+        if (!(off > 1e-36 * on)) break;
         for (int p = 0; p < 3; p++) {
             for (int q = p + 1; q < 4; q++) {
-                if (a[p][q] == 0) continue;
+                if (fabs(a[p][q]) <= 1e-19 * (fabs(a[p][p]) + fabs(a[q][q]))) {
+                    a[p][q] = a[q][p] = 0; /* beyond the last bit of what it stands beside */
+                    continue;
+                }
                 double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
                 double t = copysign(1, theta) / (fabs(theta) + sqrt(theta * theta + 1));
                 double c = 1 / sqrt(t * t + 1), s = t * c;
@@ -115,6 +119,7 @@ static void largest_eigenvector(double a[4][4], double x[4])
                     a[p][k] = c * pk - s * qk, a[q][k] = s * pk + c * qk;
                     v[k][p] = c * vp - s * vq, v[k][q] = s * vp + c * vq;
                 }
+                a[p][q] = a[q][p] = 0;
             }
         }
     }
@@ -126,7 +131,7 @@ static void largest_eigenvector(double a[4][4], double x[4])
 
 /* The rotation R that makes tr(R^T b) largest (Davenport's q-method): of all, it takes the vectors o nearest to the d
  * when b is the sum of d o^T. */
-static void best_turn(const double b[9], double q[4])
+void vgi_best_turn(const double b[9], double q[4])
 {
     double xx = b[0], yy = b[4], zz = b[8];
     double yz = b[7] - b[5], zx = b[2] - b[6], xy = b[3] - b[1];
@@ -138,17 +143,17 @@ static void best_turn(const double b[9], double q[4])
     largest_eigenvector(n, q);
 }
 
-/* best_turn of k + weight * (the turn `prior`) */
+/* vgi_best_turn of k + weight * (the turn `prior`) */
 static void best_turn_near(const double k[9], double weight, const double prior[4], double q[4])
 {
     double b[9];
     vg_quat_matrix(prior, b);
     for (int i = 0; i < 9; i++) b[i] = k[i] + weight * b[i];
-    best_turn(b, q);
+    vgi_best_turn(b, q);
 }
 
-/* k: the sum of d o^T over directions o of the reference and d of now, divided by the sum of |o|^2. What k leaves open
- * (all directions on one line), and what it says with less force than its own misfit, stays as in q_before: each
+/* k: the sum of d o^T over directions o of the reference and d of now, divided by the sum of |o|^2. What k leaves
+ * open (all directions on one line), and what it says with less force than its own misfit, stays as in q_before: each
  * step pulls towards the last result, so that what is well determined ends at its optimum all the same. */
 static void fit_turn(const double k[9], const double q_before[4], double q[4])
 {
@@ -175,8 +180,8 @@ static bool is_euler(const int axis[6], uint32_t n)
     return n == 3 && axis[0] != axis[1] && axis[1] != axis[2];
 }
 
-/* m = R_i(a) R_j(b) R_k(c) with three different axes: 3 angles in radians. false: a and c turn about one line, and only
- * b is given. */
+/* m = R_i(a) R_j(b) R_k(c) with three different axes: 3 angles in radians. false: a and c turn about one line, and
+ * only b is given. */
 static bool angles_of_three(const double m[9], int i, int j, int k, double angle[3])
 {
     double s = (j - i + 3) % 3 == 1 ? 1 : -1; /* even or odd order of axes */
@@ -431,8 +436,10 @@ static void turn_by_arms(const vg_joint_fitter *f, size_t j, const double *pose,
 static void turn_joint(const vg_joint_fitter *f, size_t j, const double *pose, const double parent[4], double k[9],
                        double q[4])
 {
+    bool loose = false;
+    for (size_t i = f->first_arm[j]; i < f->first_arm[j + 1]; i++) loose = loose || f->arms[i].loose;
     copy_turn(parent, q);
-    turn_by_arms(f, j, pose, false, k, q);
+    if (loose) turn_by_arms(f, j, pose, false, k, q);
     turn_by_arms(f, j, pose, true, k, q);
 }
 

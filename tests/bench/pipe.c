@@ -57,7 +57,8 @@ static double carry(int pipe_bytes, char *memory, size_t total)
 
 int main(int argc, char **argv)
 {
-    long pipe_bytes = argc == 3 ? strtol(argv[1], NULL, 10) : 0, megabytes = argc == 3 ? strtol(argv[2], NULL, 10) : 0;
+    long pipe_bytes = argc == 3 ? strtol(argv[1], NULL, 10) : 0;
+    long megabytes = argc == 3 ? strtol(argv[2], NULL, 10) : 0;
     if (pipe_bytes < 1 || pipe_bytes > 1 << 30 || megabytes < 1) {
         fprintf(stderr, "usage: pipe PIPE_BYTES MEGABYTES\n");
         return 2;

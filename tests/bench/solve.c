@@ -1,8 +1,9 @@
 /* solve: reconstruction in memory, beside CHOLMOD's own solve of the same systems on one thread.
  * usage: OPENBLAS_NUM_THREADS=1 solve VECTORS.vgs
  * Prints, in poses/s: LOAD SOLVE-1-THREAD SOLVE-2-THREADS REFERENCE-SIMPLICIAL REFERENCE-SUPERNODAL, then the largest
- * distance between a vertex of ours and of theirs, in D. Both references are METIS-ordered and take the three right-hand
- * sides of a pose in one cholmod_solve2 that reuses its workspace. Leaves out set-up, files and streams: run.sh.
+ * distance between a vertex of ours and of theirs, in D. Both references are METIS-ordered and take the three
+ * right-hand sides of a pose in one cholmod_solve2 that reuses its workspace.
+ * Leaves out set-up, files and streams: run.sh.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "vg.h"
 
@@ -14,7 +15,9 @@
 #include <time.h>
 
 enum { POSES = 16 };                /* two blocks of eight: one for each thread */
-static const double enough = 0.8;   /* seconds over which the shortest call is looked for */
+/* The shortest call counts, looked for in turns, so that what disturbs one of those compared disturbs them all. */
+enum { ROUNDS = 5 };
+static const double turn = 0.16; /* seconds */
 
 static double now(void)
 {
@@ -68,18 +71,29 @@ static void read_poses(problem *p, vg_source *s, const vg_head *h)
     vg_frame_clear(&f);
 }
 
-/* Poses/s of `call`, which does `poses` of them: from the shortest of its calls, after one that warms up. */
-static double rate(void (*call)(void *), void *context, size_t poses)
+/* One thing that is measured. */
+typedef struct entry {
+    void (*call)(void *);
+    void *context;
+    size_t poses;   /* of one call */
+    double seconds; /* of the shortest call so far */
+} entry;
+
+static void take_turn(entry *x)
 {
-    double best = INFINITY, start = now(), last;
-    call(context);
+    double start = now(), last;
+    x->call(x->context); /* warms up the caches that the others have filled */
     do {
         double before = now();
-        call(context);
+        x->call(x->context);
         last = now();
-        if (last - before < best) best = last - before;
-    } while (last - start < enough);
-    return (double)poses / best;
+        if (last - before < x->seconds) x->seconds = last - before;
+    } while (last - start < turn);
+}
+
+static double rate(const entry *x)
+{
+    return (double)x->poses / x->seconds;
 }
 
 /* ---- ours ---- */
@@ -102,20 +116,6 @@ static void solve_poses(void *context)
     const double *roots[POSES];
     for (size_t i = 0; i < POSES; i++) roots[i] = p->root[i];
     vg_solver_solve(o->solver, POSES, (const double *const *)p->rhs, p->x, NULL, roots);
-}
-
-/* load may be NULL: it knows no threads */
-static void measure_ours(problem *p, int threads, double *load, double *solve)
-{
-    vg_err e;
-    ours o = {.p = p};
-    check(vg_solver_new(&o.solver, p->g, NULL, 0, p->reference, VG_WEIGHTS_UNIFORM, threads, &e), &e);
-    if (load) *load = rate(load_poses, &o, POSES);
-    else load_poses(&o);
-    *solve = rate(solve_poses, &o, POSES);
-    load_poses(&o); /* what is compared was solved once */
-    solve_poses(&o);
-    vg_solver_free(&o.solver);
 }
 
 /* ---- the reference ---- */
@@ -197,32 +197,62 @@ static double distance(const theirs *t, const vg_graph *g, const double *pose, c
     return sqrt(worst);
 }
 
-static double measure_theirs(const problem *p, int kind, double *apart)
+static void make_theirs(theirs *t, const vg_graph *g, size_t pinned, int kind)
 {
-    theirs t = {.matrix = NULL};
+    cholmod_start(&t->common);
+    t->common.nmethods = 1;
+    t->common.method[0].ordering = CHOLMOD_METIS;
+    t->common.supernodal = kind;
+    assemble(t, g, pinned);
+    t->factor = cholmod_analyze(t->matrix, &t->common);
+    t->b = cholmod_zeros(g->nv, 3, CHOLMOD_REAL, &t->common);
+    if (!t->factor || !t->b || !cholmod_factorize(t->matrix, t->factor, &t->common) || t->factor->minor < t->factor->n)
+        die("the reference cannot factorize");
+}
+
+static void clear_theirs(theirs *t)
+{
+    cholmod_free_dense(&t->b, &t->common);
+    cholmod_free_dense(&t->x, &t->common);
+    cholmod_free_dense(&t->work[0], &t->common);
+    cholmod_free_dense(&t->work[1], &t->common);
+    cholmod_free_factor(&t->factor, &t->common);
+    cholmod_free_sparse(&t->matrix, &t->common);
+    cholmod_finish(&t->common);
+}
+
+static void compare(problem *p, double diagonal)
+{
+    enum { LOAD, ONE, TWO, SIMPLICIAL, SUPERNODAL, ENTRIES };
+    static const int kinds[2] = {CHOLMOD_SIMPLICIAL, CHOLMOD_SUPERNODAL};
+    vg_err e;
+    ours o[2] = {{.p = p}, {.p = p}};
+    theirs t[2] = {{.matrix = NULL}, {.matrix = NULL}};
     size_t pinned = 0;
     while (pinned < p->g->nv && !p->g->in_face[pinned]) pinned++;
-    cholmod_start(&t.common);
-    t.common.nmethods = 1;
-    t.common.method[0].ordering = CHOLMOD_METIS;
-    t.common.supernodal = kind;
-    assemble(&t, p->g, pinned);
-    t.factor = cholmod_analyze(t.matrix, &t.common);
-    t.b = cholmod_zeros(p->g->nv, 3, CHOLMOD_REAL, &t.common);
-    if (!t.factor || !t.b || !cholmod_factorize(t.matrix, t.factor, &t.common) || t.factor->minor < t.factor->n)
-        die("the reference cannot factorize");
-    fill(&t, p->g, pinned, p->w[0]);
-    double poses = rate(solve_theirs, &t, 1);
-    double d = distance(&t, p->g, p->x[0], p->root[0]);
-    if (!(d <= *apart)) *apart = d;
-    cholmod_free_dense(&t.b, &t.common);
-    cholmod_free_dense(&t.x, &t.common);
-    cholmod_free_dense(&t.work[0], &t.common);
-    cholmod_free_dense(&t.work[1], &t.common);
-    cholmod_free_factor(&t.factor, &t.common);
-    cholmod_free_sparse(&t.matrix, &t.common);
-    cholmod_finish(&t.common);
-    return poses;
+    for (int i = 0; i < 2; i++) {
+        check(vg_solver_new(&o[i].solver, p->g, NULL, 0, p->reference, VG_WEIGHTS_UNIFORM, i + 1, &e), &e);
+        make_theirs(&t[i], p->g, pinned, kinds[i]);
+        fill(&t[i], p->g, pinned, p->w[0]);
+    }
+    entry all[ENTRIES] = {[LOAD] = {load_poses, &o[0], POSES, INFINITY},
+                          [ONE] = {solve_poses, &o[0], POSES, INFINITY},
+                          [TWO] = {solve_poses, &o[1], POSES, INFINITY},
+                          [SIMPLICIAL] = {solve_theirs, &t[0], 1, INFINITY},
+                          [SUPERNODAL] = {solve_theirs, &t[1], 1, INFINITY}};
+    for (int round = 0; round < ROUNDS; round++)
+        for (int i = 0; i < ENTRIES; i++) take_turn(&all[i]);
+
+    double apart = 0;
+    load_poses(&o[1]); /* what is compared is solved once: a solve adds to its guess */
+    solve_poses(&o[1]);
+    for (int i = 0; i < 2; i++) {
+        double d = distance(&t[i], p->g, p->x[0], p->root[0]);
+        if (!(d <= apart)) apart = d;
+    }
+    for (int i = 0; i < ENTRIES; i++) printf("%.1f ", rate(&all[i]));
+    printf("%.1e\n", apart / diagonal);
+    for (int i = 0; i < 2; i++) vg_solver_free(&o[i].solver), clear_theirs(&t[i]);
 }
 
 int main(int argc, char **argv)
@@ -239,14 +269,7 @@ int main(int argc, char **argv)
     problem p = {.reference = h->reference};
     check(vg_graph_new(&p.g, h, &e), &e);
     read_poses(&p, s, h);
-
-    double load, one, two, apart = 0;
-    measure_ours(&p, 1, &load, &one);
-    measure_ours(&p, 2, NULL, &two);
-    double simplicial = measure_theirs(&p, CHOLMOD_SIMPLICIAL, &apart);
-    double supernodal = measure_theirs(&p, CHOLMOD_SUPERNODAL, &apart);
-    printf("%.1f %.1f %.1f %.1f %.1f %.1e\n", load, one, two, simplicial, supernodal,
-           apart / vg_diagonal(h->reference, h->mesh.nv));
+    compare(&p, vg_diagonal(h->reference, h->mesh.nv));
     for (size_t i = 0; i < POSES; i++) {
         free(p.x[i]);
         free(p.rhs[i]);

@@ -1,5 +1,5 @@
-/* fuzz_bvh.c: BVH files: what is read is a valid skeleton in finite poses; it can be written, and what was written is read.
- * Leaves out how near the second reading comes to the first, where the joints' channels cannot hold the pose (test_bvh.c).
+/* fuzz_bvh.c: BVH files: what is read is a valid skeleton in finite poses; it can be written, and what was written is
+ * read. Leaves out how near the second reading comes to the first (test_bvh.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 

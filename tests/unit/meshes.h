@@ -325,7 +325,8 @@ static inline double *warp(const double *x, size_t n, double amount)
     double D = vg_diagonal(x, n), *y = room(3 * n, sizeof *y), shake = 0.03 * amount * D / sqrt((double)n + 1);
     if (!(D > 0)) D = 1;
     for (size_t i = 0; i < n; i++) {
-        double a = 2 * amount * x[3 * i + 2] / D, c = cos(a), s = sin(a), wild = 1e3 * (x[3 * i] + 2 * x[3 * i + 1] - x[3 * i + 2]) / D;
+        double a = 2 * amount * x[3 * i + 2] / D, c = cos(a), s = sin(a);
+        double wild = 1e3 * (x[3 * i] + 2 * x[3 * i + 1] - x[3 * i + 2]) / D;
         double px = c * x[3 * i] - s * x[3 * i + 1], py = s * x[3 * i] + c * x[3 * i + 1], pz = x[3 * i + 2];
         y[3 * i] = px + amount * py * py / D + shake * sin(wild);
         y[3 * i + 1] = py * (1 + 0.3 * amount) - amount * px * pz / D + shake * sin(2 * wild);

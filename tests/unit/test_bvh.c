@@ -180,18 +180,23 @@ static void refuses(void)
     check_refused("HIERARCHY\n", VG_ETRUNC, "line 2: the file ends where ROOT is expected");
     check_refused("HIERARCHY\nMOTION\nFrames: 1\nFrame Time: 1\n", VG_EINPUT, "ROOT expected, not 'MOTION'");
     check_refused("HIERARCHY\nROOT a\nOFFSET 0 0 0\n}\n", VG_EINPUT, "line 3: '{' expected, not 'OFFSET'");
-    check_refused("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 0\nMOTION\n", VG_EINPUT, "line 6: OFFSET, CHANNELS, JOINT, End Site or '}' expected, not 'MOTION'");
+    check_refused("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 0\nMOTION\n",
+                  VG_EINPUT, "line 6: OFFSET, CHANNELS, JOINT, End Site or '}' expected, not 'MOTION'");
     check_refused("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\n", VG_ETRUNC, "line 5: the file ends where");
     check_refused("HIERARCHY\r\nROOT a\r\n{\r\nOFFSET 0 0\r\n}\r\n", VG_EINPUT, "line 5: a number expected, not '}'");
     check_refused("HIERARCHY\rROOT a\r{\rOFFSET 0 0 nan\r}\r", VG_EINPUT, "line 4: 'nan' is not a finite number");
     check_refused("HIERARCHY\nROOT a\n{\nOFFSET 0 0 1,5\n}\n", VG_EINPUT, "line 4: a number expected, not '1,5'");
     check_refused("HIERARCHY\nROOT a\n{\nCHANNELS 0\n}\nMOTION\n", VG_EINPUT, "line 5: joint 'a' has no OFFSET");
-    check_refused("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0 OFFSET 0 0 0\n}\nMOTION\n", VG_EINPUT, "joint 'a' has two OFFSETs");
+    check_refused("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0 OFFSET 0 0 0\n}\nMOTION\n",
+                  VG_EINPUT, "joint 'a' has two OFFSETs");
     check_refused("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0 CHANNELS 0 CHANNELS 0\n}\n", VG_EINPUT, "CHANNELS twice");
-    check_refused("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nEnd Site\n{\nOFFSET 0 0 0 CHANNELS 0\n}\n}\n", VG_EINPUT, "end site 'a.end' has CHANNELS");
-    check_refused("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nEnd Site\n{\nOFFSET 0 0 0 JOINT b\n}\n}\n", VG_EINPUT, "OFFSET or '}' expected, not 'JOINT'");
+    check_refused("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nEnd Site\n{\nOFFSET 0 0 0 CHANNELS 0\n}\n}\n",
+                  VG_EINPUT, "end site 'a.end' has CHANNELS");
+    check_refused("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nEnd Site\n{\nOFFSET 0 0 0 JOINT b\n}\n}\n",
+                  VG_EINPUT, "OFFSET or '}' expected, not 'JOINT'");
     check_refused("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nEnd Stop\n", VG_EINPUT, "'Site' expected, not 'Stop'");
-    check_refused(ARM("7 Xrotation Xrotation Xrotation Xrotation Xrotation Xrotation Xrotation", ""), VG_EINPUT, "line 9: joint 'Knee' has more than 6 channels");
+    check_refused(ARM("7 Xrotation Xrotation Xrotation Xrotation Xrotation Xrotation Xrotation", ""),
+                  VG_EINPUT, "line 9: joint 'Knee' has more than 6 channels");
     check_refused(ARM("2 Xrotation", ""), VG_EINPUT, "a channel (Xposition ... Zrotation) expected, not 'End'");
     check_refused(ARM("-1", ""), VG_EINPUT, "the number of channels expected, not '-1'");
     check_refused(ARM("2 Xposition Xposition", ""), VG_EINPUT, "two channels for one coordinate");
@@ -204,13 +209,19 @@ static void refuses(void)
     check_refused(ARM("0", "Frames: 1\nFrame Time: -0.1\n"), VG_EINPUT, "the frame time is not positive");
     check_refused(ARM("0", "Frames: 99999\nFrame Time: 1e307\n"), VG_EINPUT, "the frame time is too large");
     check_refused(ARM("0", "Frames: 1\nFrame Time: inf\n"), VG_EINPUT, "'inf' is not a finite number");
-    check_refused(ARM("0", "Frames: 2\nFrame Time: 1\n1 2 3 4 5 6\n1 2 3 4 5\n"), VG_ETRUNC, "ends in frame 1 of 2, behind 5 of 6 values");
-    check_refused(ARM("0", "Frames: 1000000000000000000\nFrame Time: 1\n1 2 3 4 5 6\n"), VG_ETRUNC, "ends in frame 1 of");
-    check_refused(ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 4 5 6 7\n"), VG_EINPUT, "line 19: the end of the file behind 1 frames expected, not '7'");
-    check_refused(ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 4 5 x\n"), VG_EINPUT, "line 19: a number expected, not 'x'");
+    check_refused(ARM("0", "Frames: 2\nFrame Time: 1\n1 2 3 4 5 6\n1 2 3 4 5\n"),
+                  VG_ETRUNC, "ends in frame 1 of 2, behind 5 of 6 values");
+    check_refused(ARM("0", "Frames: 1000000000000000000\nFrame Time: 1\n1 2 3 4 5 6\n"),
+                  VG_ETRUNC, "ends in frame 1 of");
+    check_refused(ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 4 5 6 7\n"),
+                  VG_EINPUT, "line 19: the end of the file behind 1 frames expected, not '7'");
+    check_refused(ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 4 5 x\n"),
+                  VG_EINPUT, "line 19: a number expected, not 'x'");
     check_refused(ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 4 5 1e999\n"), VG_EINPUT, "not a finite number");
-    check_refused("HIERARCHY ROOT a\n{ OFFSET 0 0 0 } MOTION Frames: 999999999999999999 Frame Time: 1\n", VG_ETRUNC, "fewer than the");
-    check_refused("HIERARCHY ROOT a\n{ OFFSET 0 0 1e308 JOINT b\n{ OFFSET 0 0 1e308 } } MOTION Frames: 0 Frame Time: 1\n", VG_EINPUT, "joint 'b' lies beyond all numbers");
+    check_refused("HIERARCHY ROOT a\n{ OFFSET 0 0 0 } MOTION Frames: 999999999999999999 Frame Time: 1\n",
+                  VG_ETRUNC, "fewer than the");
+    check_refused("HIERARCHY ROOT a\n{ OFFSET 0 0 1e308 JOINT b\n{ OFFSET 0 0 1e308 } } MOTION Frames: 0 Frame Time: 1\n",
+                  VG_EINPUT, "joint 'b' lies beyond all numbers");
 }
 
 /* Each prefix of a file is refused, in words, but those that only lack the line end. */
@@ -223,6 +234,34 @@ static void refuses_prefixes(void)
         int r = read_bytes(&s, text, n, &e);
         CHECK((r == VG_OK) == (n >= sizeof text - 3) && (r == VG_OK || e.message[0]));
         if (r == VG_OK) clear(&s);
+    }
+}
+
+/* Names of up to 1024 bytes, counted in UTF-8: what is read can be written and read again. */
+static void limits_names(void)
+{
+    static const struct { char c; int n, code; } cases[] = {
+        {'a', 1024, VG_OK}, {'a', 1025, VG_EINPUT}, {'\xe9', 512, VG_OK}, {'\xe9', 513, VG_EINPUT}, {'a', 3000, VG_EINPUT}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char name[3001] = {0}, text[3200];
+        sequence s, t = {0};
+        vg_err e = {0};
+        memset(name, cases[i].c, (size_t)cases[i].n);
+        snprintf(text, sizeof text, "HIERARCHY\nROOT %s\n{ OFFSET 1 2 3 End Site { OFFSET 0 0 1 } }\nMOTION Frames: 1\n"
+                 "Frame Time: 1\n\n", name);
+        CHECK(read_text(&s, text, &e) == cases[i].code);
+        if (cases[i].code != VG_OK) {
+            CHECK(strstr(e.message, "line 2: a name is longer than 1024 bytes"));
+            continue;
+        }
+        char *again = write_text(&s, false, NULL, &e);
+        CHECK(again && read_text(&t, again, &e) == VG_OK && distance(&s, &t) == 0);
+        free(again);
+        free(s.head.skeleton.joints[0].name);
+        s.head.skeleton.joints[0].name = strdup(text); /* as a stream might hold it */
+        if (strlen(text) > 1024) CHECK(!write_text(&s, false, NULL, &e) && strstr(e.message, "the name of joint 0 is longer"));
+        clear(&s);
+        clear(&t);
     }
 }
 
@@ -545,7 +584,7 @@ static void tells_its_files(void)
 }
 
 TESTS({"reads_and_poses", reads_and_poses}, {"reads_what_people_have", reads_what_people_have}, {"refuses", refuses},
-      {"refuses_prefixes", refuses_prefixes}, {"limits_depth", limits_depth}, {"there_and_back", there_and_back},
+      {"refuses_prefixes", refuses_prefixes}, {"limits_names", limits_names}, {"limits_depth", limits_depth}, {"there_and_back", there_and_back},
       {"finds_turns", finds_turns}, {"fits_what_it_can", fits_what_it_can}, {"goes_on_turning", goes_on_turning},
       {"says_what_is_lost", says_what_is_lost}, {"keeps_places_of_joints", keeps_places_of_joints},
       {"writes_any_skeleton", writes_any_skeleton}, {"tells_its_files", tells_its_files})

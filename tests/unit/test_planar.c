@@ -1,5 +1,6 @@
-/* test_planar.c: the search for planar faces finds the minimum that a dense solution of the normal equations has, keeps anchors and
- * roots, leaves alone what has no faces of four and more or is planar already, and no pose depends on those beside it.
+/* test_planar.c: the search for planar faces finds the minimum that a dense solution of the normal equations has,
+ * keeps anchors and roots, leaves alone what has no faces of four and more or is planar already, and no pose
+ * depends on those beside it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
 
@@ -128,7 +129,8 @@ static bool normalise(double *m)
     return length > 0;
 }
 
-/* The r x r matrix of a face's energy as MATH 2 writes it: the projector, or w (B B' + tr(C+) K K') on vectors in the plane. */
+/* The r x r matrix of a face's energy as MATH 2 writes it: the projector, or w (B B' + tr(C+) K K') on vectors in
+ * the plane. */
 static void face_energy(const problem *q, size_t f, double *G)
 {
     size_t begin = q->g->start[f], r = q->g->start[f + 1] - begin;

@@ -1,5 +1,6 @@
-/* test_poisson.c: the closed form of guidance is the solution of the Poisson equation in time: second differences stay, keys are met
- * to the bit, and the relaxation of the thesis ends at the same sequence. Frames come out of the spool as they went in.
+/* test_poisson.c: the closed form of guidance is the solution of the Poisson equation in time: second differences
+ * stay, keys are met to the bit, and the relaxation of the thesis ends at the same sequence. Frames come out of the
+ * spool as they went in.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
 
@@ -43,8 +44,8 @@ static bool is_key(size_t k, size_t nkeys, const size_t *keys)
     return false;
 }
 
-/* Successive over-relaxation (T 4.15) of T_(k-1) - 2 T_k + T_(k+1) = that of U, between the first and the last key; beyond them
- * the first difference is U's. */
+/* Successive over-relaxation (T 4.15) of T_(k-1) - 2 T_k + T_(k+1) = that of U, between the first and the last key;
+ * beyond them the first difference is U's. */
 static sequence relax(const sequence *u, size_t nkeys, const size_t *keys, double (*given)[N], double omega, int sweeps)
 {
     sequence t = *u;

@@ -64,6 +64,7 @@ static double there_and_back(vg_head *h, const double *pose, vg_weights weights)
 static void select_faces(vg_head *h)
 {
     vg_err e;
+    free(h->selected);
     CHECK(vg_select_faces(&h->mesh, &h->selected, &h->nselected, &e) == VG_OK);
     h->has_selection = true;
 }
@@ -212,7 +213,8 @@ static void face_metric(const double *vectors, size_t r, double *G)
 }
 
 /* The minimum of the energy by writing A' out as MATH 1 has it: row c is 1 at its own vertex and -1/r at all of its
- * face; between A and A' stands the metric of the face, if any. Anchored and isolated vertices get a row of their own; without anchors the mean is put into the matrix. */
+ * face; between A and A' stands the metric of the face, if any. Anchored and isolated vertices get a row of their own;
+ * without anchors the mean is put into the matrix. */
 static double *least_squares(const vg_graph *g, const double *reference, const double *w, const uint32_t *anchors,
                              size_t nanchors, const double *at, vg_weights weights)
 {

@@ -339,12 +339,14 @@ static void add_attributes(vg_head *h, uint32_t dim)
     a->ntex = 3, a->tex_dim = dim, a->tex = room(3 * dim, 8), a->corner_tex = room(corners, 4);
     for (size_t i = 0; i < 3 * dim; i++) a->tex[i] = 0.1 * (double)i - 0.3;
     for (size_t i = 0; i < corners; i++) a->corner_tex[i] = i % 4 == 3 ? UINT32_MAX : (uint32_t)(i % 4);
-    static const vg_label labels[] = {{0, VG_LABEL_LIBRARY, (char *)(uintptr_t) "a.mtl"}, {0, VG_LABEL_OBJECT, (char *)(uintptr_t) ""},
-                                      {1, VG_LABEL_GROUP, (char *)(uintptr_t) "k\xc3\xb6rper"},
-                                      {2, VG_LABEL_MATERIAL, (char *)(uintptr_t) "12345678"},
-                                      {3, VG_LABEL_SMOOTHING, (char *)(uintptr_t) "off"}};
+    static const struct {
+        uint64_t face;
+        uint32_t kind;
+        const char *text;
+    } labels[] = {{0, VG_LABEL_LIBRARY, "a.mtl"}, {0, VG_LABEL_OBJECT, ""}, {1, VG_LABEL_GROUP, "k\xc3\xb6rper"},
+                  {2, VG_LABEL_MATERIAL, "12345678"}, {3, VG_LABEL_SMOOTHING, "off"}};
     a->nlabels = 5, a->labels = room(5, sizeof *a->labels);
-    for (size_t i = 0; i < 5; i++) a->labels[i] = labels[i], a->labels[i].text = strdup(labels[i].text);
+    for (size_t i = 0; i < 5; i++) a->labels[i] = (vg_label){labels[i].face, labels[i].kind, strdup(labels[i].text)};
 }
 
 static void add_skeleton(vg_head *h)
@@ -364,7 +366,8 @@ static void add_correspondence(vg_head *h)
 {
     vg_correspondence *c = &h->correspondence;
     *c = (vg_correspondence){.source_nv = 9, .source_nf = 8, .target_nv = 5, .target_nf = 3, .source_digest = 1, .target_digest = 2,
-                             .first = room(4, 4), .source = room(4, 4), .weight = room(4, 8), .distance = room(3, 8), .matched = room(3, 1)};
+                             .first = room(4, 4), .source = room(4, 4), .weight = room(4, 8), .distance = room(3, 8),
+                             .matched = room(3, 1)};
     static const uint32_t first[] = {0, 1, 3, 4}, source[] = {7, 0, 5, 0};
     static const double weight[] = {1, 0.25, 0.75, 1};
     memcpy(c->first, first, sizeof first), memcpy(c->source, source, sizeof source), memcpy(c->weight, weight, sizeof weight);
@@ -373,7 +376,8 @@ static void add_correspondence(vg_head *h)
 
 enum { PLAIN, FULL };
 
-/* A stream of a kind: PLAIN has what must be there; FULL has every record, and unknown ones everywhere. Values fit into binary32. */
+/* A stream of a kind: PLAIN has what must be there; FULL has every record, and unknown ones everywhere. Values fit into
+ * binary32. */
 static content make(vg_kind kind, vg_precision precision, int how)
 {
     content c = {.n = 2};
@@ -411,7 +415,8 @@ static content make(vg_kind kind, vg_precision precision, int how)
         for (size_t k = 0; k < 3 * h->nanchors; k++) f->anchors[k] = noise();
         if (how == FULL && kind == VG_VECTORS) /* an even and an odd number of pins */
             CHECK(vg_frame_pin(f, (uint32_t[]){0, 2, 6}, 2 + i, &e) == VG_OK);
-        if (how == FULL && i) add_unknown(&f->extra, "MID ", COPY_SAFE, "before a frame"), add_unknown(&f->extra, "MID ", COPY_SAFE, "");
+        if (how == FULL && i) add_unknown(&f->extra, "MID ", COPY_SAFE, "before a frame");
+        if (how == FULL && i) add_unknown(&f->extra, "MID ", COPY_SAFE, "");
     }
     return c;
 }
@@ -474,7 +479,8 @@ static void test_there_and_back(void)
 
 static void test_numbers(void)
 {
-    static const double wild[] = {0, -0.0, 5e-324, -5e-324, 1.7976931348623157e308, -1.7976931348623157e308, 0.1, 1e-310, 1 + 0x1p-52};
+    static const double wild[] = {0, -0.0, 5e-324, -5e-324, 1.7976931348623157e308, -1.7976931348623157e308, 0.1, 1e-310,
+                                  1 + 0x1p-52};
     content c = make(VG_VERTICES, VG_F64, PLAIN);
     memcpy(c.frame[0].values, wild, sizeof wild);
     memcpy(c.head.reference, wild, sizeof wild);
@@ -590,12 +596,11 @@ static void test_end_mark(void)
         n.size = 0;
         put_file_header(&n);
         for (size_t i = 0; i < p.n; i++) {
-            const record *r = &p.at[i];
+            /* the first frame left out; there twice; replaced by the second: the count is right, the sum is not */
+            const record *r = how == 2 && i == frame ? &p.at[last - 2] : &p.at[i];
             if (how == 0 && i == frame) continue;
             put_record(&n, r->tag, r->flags, &r->payload);
             if (how == 1 && i == frame) put_record(&n, r->tag, r->flags, &r->payload);
-            /* the frames change places: the count is right, the sum is not */
-            if (how == 2 && i == frame) n.size -= 32 + (r->payload.size + 7) / 8 * 8, put_record(&n, r->tag, r->flags, &p.at[last - 2].payload);
         }
         refuse(n.data, n.size, VG_EINPUT, "records behind the END mark's back");
     }
@@ -714,8 +719,9 @@ static void test_unknown(void)
                 size_t head = back.head.extra.n, frames = 0, tail = back.tail.n, want = flags == COPY_SAFE;
                 for (size_t i = 0; i < back.n; i++) frames += back.frame[i].extra.n;
                 CHECK(r == 0 && head + frames + tail == want && back.n == c.n);
-                const vg_records *list = head ? &back.head.extra : tail ? &back.tail : frames ? &back.frame[back.frame[1].extra.n].extra : NULL;
-                if (list) CHECK(list->at[0].flags == (flags | 0x10000) && list->at[0].payload.size == 5);
+                size_t which = back.frame[1].extra.n; /* the frame it came before */
+                const vg_records *list = head ? &back.head.extra : tail ? &back.tail : &back.frame[which].extra;
+                if (want && list->n) CHECK(list->at[0].flags == (flags | 0x10000) && list->at[0].payload.size == 5);
                 /* FORM is the third record, then two frames */
                 if (want) CHECK(place <= 2 ? head == 1 : place <= 4 ? frames == 1 : tail == 1);
             }
@@ -888,8 +894,8 @@ static void test_lying_lengths(void)
 /* Records of a right length, with counts inside that do not fit. */
 static void test_lying_counts(void)
 {
-    static const uint64_t counts[] = {(uint64_t)1 << 31, UINT32_MAX - 1, UINT32_MAX, (uint64_t)1 << 32, (uint64_t)1 << 61, (uint64_t)1 << 62,
-                                      (uint64_t)1 << 63, UINT64_MAX};
+    static const uint64_t counts[] = {(uint64_t)1 << 31, UINT32_MAX - 1,    UINT32_MAX,        (uint64_t)1 << 32,
+                                      (uint64_t)1 << 61, (uint64_t)1 << 62, (uint64_t)1 << 63, UINT64_MAX};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
         for (int what = 0; what < 8; what++) {
             vg_bytes b = {0}, mesh = {0}, x = {0};

@@ -1,0 +1,174 @@
+#!/usr/bin/env bats
+# Transfer between meshes of different connectivity, blendshapes, and what is held: against ground truth where there is one.
+# SPDX-License-Identifier: GPL-3.0-or-later
+load lib.bash
+
+# error KIND TRUTH RESULT: mean, p95 or max of the centred vertex error, in D
+error() {
+    capture vg-diff -c --json "$2" "$3" || return 1
+    python3 -c 'import json, sys; print(json.load(sys.stdin)["vertex_error"][sys.argv[1]]["D"])' "$1" <<<"$output"
+}
+
+at_most() {
+    python3 -c 'import sys; a, b = map(float, sys.argv[1:]); sys.exit(not a <= b)' "$1" "$2" || fail "$1 is more than $2"
+}
+
+# markers N: every N-th vertex of the human body with itself
+markers() {
+    awk -v n="$1" 'BEGIN { for (v = 0; v < 13380; v += n) print v, v }'
+}
+
+@test "man onto heavy man through a correspondence from 67 markers: not twice the error of the shared connectivity" {
+    markers 200 >markers.txt
+    must vg-register -q "$DATA/human-man-poses.tar.xz" "$DATA/human-heavy-poses.tar.xz" --markers markers.txt -o pairs.vgs
+    pipe "vg-encode '$DATA/human-man-poses.tar.xz' |
+        vg-deform --onto '$DATA/human-heavy-poses.tar.xz' --correspondence pairs.vgs | vg-solve >out.vgs"
+    mean=$(error mean "$DATA/human-heavy-poses.tar.xz" out.vgs)
+    at_most "$mean" 0.013
+}
+
+@test "an animal onto another, 27 markers, hybrid polygons: every face is driven, the gait stays, nothing explodes" {
+    must vg-register -q "$DATA/velociraptor.rest.obj" "$DATA/trex.rest.obj" \
+        --markers "$DATA/velociraptor-trex.markers.txt" -o pairs.vgs
+    must vg-encode --reference "$DATA/velociraptor.rest.obj" "$DATA/velociraptor-run.tar.xz" -o run.vgs
+    pipe "vg-deform --onto '$DATA/trex.rest.obj' --correspondence pairs.vgs run.vgs | vg-solve >out.vgs"
+    must vg-info --json out.vgs
+    shows '"vertices": 912' '"frames": 14'
+    # no face is turned over against the rest pose carried along by its own vertices: the surface keeps its area
+    must vg-encode "$DATA/trex.rest.obj" -o rest.vgs
+    py <<'END'
+from read_stream import read_stream
+out, rest = read_stream(open("out.vgs", "rb")), read_stream(open("rest.vgs", "rb"))
+def area(mesh, x):
+    total, at = 0.0, 0
+    for face in mesh.faces():
+        n = [0.0, 0.0, 0.0]
+        p = [x[3 * v:3 * v + 3] for v in face]
+        for a, b in zip(p, p[1:] + p[:1]):
+            n[0] += a[1] * b[2] - a[2] * b[1]
+            n[1] += a[2] * b[0] - a[0] * b[2]
+            n[2] += a[0] * b[1] - a[1] * b[0]
+        total += sum(c * c for c in n) ** 0.5 / 2
+    return total
+whole = area(rest.mesh, rest.frames[0].values)
+for f in out.frames:
+    ratio = area(out.mesh, f.values) / whole
+    assert 0.9 < ratio < 1.15, (f.name, ratio)
+END
+}
+
+@test "the same through a correspondence with itself: within the flatness of its faces" {
+    must vg-register -q --aligned "$DATA/trex.rest.obj" "$DATA/trex.rest.obj" -o pairs.vgs
+    must vg-encode --reference "$DATA/trex.rest.obj" "$DATA/trex-walk.tar.xz" -o walk.vgs
+    pipe "vg-deform --by gradient --onto '$DATA/trex.rest.obj' --correspondence pairs.vgs walk.vgs | vg-solve >out.vgs"
+    at_most "$(error mean walk.vgs out.vgs)" 0.002
+}
+
+@test "a correspondence of other meshes, a stream without one, and options that do not go with it are refused" {
+    must vg-register -q --aligned "$DATA/horse.rest.obj" "$DATA/horse.rest.obj" -o pairs.vgs
+    must_fail 3 vg-deform --onto "$DATA/horse.rest.obj" --correspondence pairs.vgs "$DATA/trex.rest.obj"
+    says 'another source'
+    must_fail 3 vg-deform --onto "$DATA/trex.rest.obj" --correspondence pairs.vgs "$DATA/horse-run.tar.xz"
+    says 'another target'
+    must_fail 3 vg-deform --onto "$DATA/horse.rest.obj" --correspondence "$DATA/horse.rest.obj" "$DATA/horse-run.tar.xz"
+    says 'holds no correspondence' vg-register
+    must_fail 2 vg-deform --by shape --onto "$DATA/horse.rest.obj" --correspondence pairs.vgs "$DATA/horse-run.tar.xz"
+    must_fail 2 vg-deform --root 3 --onto "$DATA/horse.rest.obj" --correspondence pairs.vgs "$DATA/horse-run.tar.xz"
+    must_fail 2 vg-deform --correspondence pairs.vgs "$DATA/horse-run.tar.xz"
+    must_fail 3 vg-deform --onto "$DATA/trex.rest.obj" "$DATA/horse-run.tar.xz"
+    says vg-register
+}
+
+@test "blendshapes: names are kept, the neutral is the target's own, what does not move does not move" {
+    must vg-encode "$DATA/faceA.tar.xz" -o a.vgs
+    must vg-encode "$DATA/faceB.tar.xz" -o b.vgs
+    pipe "vg-deform --onto b.vgs a.vgs | vg-solve >out.vgs"
+    py <<'END'
+from read_stream import read_stream
+a, b, out = (read_stream(open(n, "rb")) for n in ("a.vgs", "b.vgs", "out.vgs"))
+assert [f.name for f in out.frames] == [f.name for f in a.frames]
+assert list(out.frames[0].values) == list(b.frames[0].values)
+faces = [[] for _ in range(out.mesh.nv)]
+face = [list(f) for f in out.mesh.faces()]
+for i, f in enumerate(face):
+    for v in f:
+        faces[v].append(i)
+ref, held = a.frames[0].values, 0
+for fa, fo in zip(a.frames, out.frames):
+    still = [fa.values[3 * v:3 * v + 3] == ref[3 * v:3 * v + 3] for v in range(out.mesh.nv)]
+    if sum(still) < out.mesh.nv / 10:
+        continue
+    for v in range(out.mesh.nv):
+        if faces[v] and all(still[u] for f in faces[v] for u in face[f]):
+            held += 1
+            assert fo.values[3 * v:3 * v + 3] == b.frames[0].values[3 * v:3 * v + 3], (fo.name, v)
+assert held > 5000, held
+END
+    # with --pin none they drift, so that the test above tests something
+    pipe "vg-deform --pin none --onto b.vgs a.vgs | vg-solve >free.vgs"
+    must_fail 1 vg-diff -t 1e-6 out.vgs free.vgs
+    at_most "$(error mean b.vgs out.vgs)" 0.0022
+}
+
+@test "pins come through the stream, and sequences without still parts have none" {
+    must vg-encode "$DATA/faceA.tar.xz" -o a.vgs
+    pipe "vg-deform --onto '$DATA/faceB.tar.xz' a.vgs >vectors.vgs"
+    py <<'END'
+from read_stream import read_stream
+s = read_stream(open("vectors.vgs", "rb"))
+assert len(s.frames[0].pins) == s.mesh.nv, len(s.frames[0].pins)
+assert 0 < min(len(f.pins) for f in s.frames[1:] if f.pins) < s.mesh.nv
+END
+    pipe "vg-encode --reference '$DATA/trex.rest.obj' '$DATA/trex-walk.tar.xz' | vg-deform --onto '$DATA/trex.rest.obj' >vectors.vgs"
+    py <<'END'
+from read_stream import read_stream
+assert not any(f.pins for f in read_stream(open("vectors.vgs", "rb")).frames)
+END
+}
+
+@test "pieces that touch and come apart are carried exactly onto themselves" {
+    printf 'v %s\n' '0 0 0' '1 0 0' '0 1 0' '0 0 1' '1 0 0' '2 0 0' '1 1 0' '1 0 1' >touch.obj
+    printf 'f %s\n' '1 3 2' '1 2 4' '2 3 4' '3 1 4' '5 7 6' '5 6 8' '6 7 8' '7 5 8' >>touch.obj
+    awk '$1 == "v" && ++n > 4 { $2 += 0.25; $4 += 0.125 } { print }' touch.obj >apart.obj
+    pipe "vg-encode touch.obj apart.obj | vg-deform --pin none --onto touch.obj | vg-solve >out.vgs"
+    must vg-encode touch.obj apart.obj -o truth.vgs
+    must vg-diff -t 1e-12 truth.vgs out.vgs
+}
+
+@test "by shape: vertices at once, a mesh onto itself exact, worse than by pose on another body" {
+    pipe "vg-encode '$DATA/trex-walk.tar.xz' | vg-deform --by shape --onto '$DATA/trex-walk.tar.xz' >out.vgs"
+    must vg-diff -t 1e-12 "$DATA/trex-walk.tar.xz" out.vgs
+    must_fail 3 bash -o pipefail -c "vg-encode --vectors '$DATA/horse-run.tar.xz' | vg-deform --by shape --onto '$DATA/horse.rest.obj' -o x.vgs"
+    says vertices
+}
+
+@test "the asset build makes all actions, again only what is out of date, and stops on a bad source" {
+    command -v make >/dev/null || skip "no make"
+    cp -r "$ROOT/examples/asset-build" build
+    mkdir data
+    cp "$DATA"/velociraptor* "$DATA/trex.rest.obj" data/
+    capture make -s -j2 -C build DATA=../data
+    [ "$status" = 0 ] || fail "$stderr"
+    for action in walk run attack; do [ -s "build/out/trex-$action.zip" ] || fail "no $action"; done
+    capture make -C build DATA=../data
+    shows 'Nothing to be done'
+    touch data/velociraptor-run.tar.xz
+    capture make -n -C build DATA=../data
+    shows velociraptor-run
+    [[ $output != *register* && $output != *walk* ]] || fail "more than the run is made again: $output"
+    head -c 20000 data/velociraptor-walk.tar.xz >data/cut && mv data/cut data/velociraptor-walk.tar.xz
+    capture make -C build DATA=../data
+    [ "$status" != 0 ] || fail "a cut archive was taken"
+    says velociraptor-walk
+}
+
+@test "walk-man onto walk-woman, other connectivity, 86 frames of truth (needs VG_DATA, the data kit)" {
+    [ -d "${VG_DATA:-}/human" ] || skip "VG_DATA does not name the data kit"
+    man=$VG_DATA/human/walk-man woman=$VG_DATA/human/walk-woman
+    must vg-register -q "$man.rest.obj" "$woman.rest.obj" \
+        --markers "$VG_DATA/correspondences/male1591-female1605.markers.txt" -o pairs.vgs
+    pipe "vg-encode --reference '$man.rest.obj' '$man.tar.gz' |
+        vg-deform --onto '$woman.rest.obj' --correspondence pairs.vgs | vg-solve >out.vgs"
+    at_most "$(error mean "$woman.tar.gz" out.vgs)" 0.012
+    at_most "$(error max "$woman.tar.gz" out.vgs)" 0.03
+}

@@ -1,0 +1,323 @@
+/* test_carry: transfer along a correspondence, by shape, by gradients, and the area metric, against what they must be.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/carry_kernel.h"
+#include "method/metric.h"
+#include "test.h"
+#include "meshes.h"
+
+/* Every target face driven by `each` source faces, chosen by chance. */
+static vg_correspondence chance_pairs(const vg_mesh *source, const vg_mesh *target, uint32_t each, bool matched)
+{
+    vg_correspondence k = {.source_nv = source->nv, .source_nf = source->nf, .source_digest = vg_mesh_digest(source),
+                           .target_nv = target->nv, .target_nf = target->nf, .target_digest = vg_mesh_digest(target)};
+    size_t nf = target->nf;
+    k.first = room(nf + 1, sizeof *k.first);
+    k.source = room(nf * each, sizeof *k.source);
+    k.weight = room(nf * each, sizeof *k.weight);
+    k.distance = room(nf, sizeof *k.distance);
+    k.matched = room(nf, 1);
+    for (size_t f = 0; f < nf; f++) {
+        k.first[f + 1] = k.first[f] + each;
+        k.matched[f] = matched;
+        for (uint32_t i = 0; i < each; i++) {
+            k.source[f * each + i] = (uint32_t)((noise() + 1) / 2 * (double)source->nf) % (uint32_t)source->nf;
+            k.weight[f * each + i] = 1.0 / each;
+        }
+    }
+    return k;
+}
+
+static vg_correspondence identity_pairs(const vg_mesh *m)
+{
+    vg_correspondence k = chance_pairs(m, m, 1, true);
+    for (size_t f = 0; f < m->nf; f++) k.source[f] = (uint32_t)f;
+    return k;
+}
+
+typedef struct carried {
+    vg_graph *g;
+    double *vectors, *expected; /* expected: the target's reference vectors */
+} carried;
+
+/* The target's wanted vectors for one pose of the source. */
+static carried carry(const vg_head *source, vg_head *target, const vg_correspondence *k, const double *pose, vg_method by, int threads)
+{
+    vg_err e;
+    vg_carrier *c;
+    carried r = {.g = graph_of(target)};
+    r.expected = vectors_of(r.g, target->reference);
+    r.vectors = room(3 * vg_graph_corners(r.g), sizeof *r.vectors);
+    int code = vg_carrier_new(&c, &source->mesh, source->reference, k, r.g, target->reference, by, threads, &e);
+    CHECK(code == VG_OK);
+    if (code < 0) abort();
+    const double *in[3] = {pose, pose, pose};
+    double *spare = room(3 * vg_graph_corners(r.g), sizeof *spare), *out[3] = {spare, spare, r.vectors};
+    vg_carrier_transfer(c, 3, in, out);
+    free(spare);
+    vg_carrier_free(&c);
+    return r;
+}
+
+static void carried_clear(carried *r)
+{
+    vg_graph_free(&r->g);
+    free(r->vectors);
+    free(r->expected);
+}
+
+static const vg_method methods[] = {VG_BY_POSE, VG_BY_GRADIENT, VG_BY_BLEND};
+
+/* A source that only turns turns every target by the same rotation, whatever drives what. */
+static void rotation_passes(void)
+{
+    vg_head source = make_torus(7, 6), target = make_mixed(6); /* a line segment of the source would not tell its turn */
+    vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 3, true);
+    motion t = turn(2.5, 1, 3);
+    double *pose = move_points(&t, source.reference, source.mesh.nv);
+    for (int i = 0; i < 3; i++) {
+        carried r = carry(&source, &target, &k, pose, methods[i], 1);
+        double worst = 0;
+        for (size_t c = 0; c < vg_graph_corners(r.g); c++) {
+            double w[3];
+            move_vector(&t, r.expected + 3 * c, w);
+            for (size_t a = 0; a < 3; a++) worst = fmax(worst, fabs(w[a] - r.vectors[3 * c + a]));
+        }
+        CHECK_NEAR(worst, 0, 1e-12 * vg_diagonal(target.reference, target.mesh.nv));
+        carried_clear(&r);
+    }
+    free(pose);
+    vg_correspondence_clear(&k);
+    vg_head_clear(&source);
+    vg_head_clear(&target);
+}
+
+/* Triangles onto themselves: the gradient is the map of the triangle, so any pose comes back exactly. */
+static void triangles_onto_themselves(void)
+{
+    vg_head h = make_rod(9, 7, true);
+    vg_correspondence k = identity_pairs(&h.mesh);
+    double *pose = warp(h.reference, h.mesh.nv, 0.3);
+    for (int i = 0; i < 3; i++) {
+        carried r = carry(&h, &h, &k, pose, methods[i], 2);
+        double *truth = vectors_of(r.g, pose), worst = 0, length = 0;
+        for (size_t f = 0; f < h.mesh.nf; f++) {
+            if (h.mesh.start[f + 1] - h.mesh.start[f] != 3) continue;
+            for (size_t c = 3 * (size_t)h.mesh.start[f]; c < 3 * (size_t)h.mesh.start[f + 1]; c++)
+                worst = fmax(worst, fabs(truth[c] - r.vectors[c])), length = fmax(length, fabs(truth[c]));
+        }
+        if (methods[i] == VG_BY_GRADIENT) CHECK_NEAR(worst, 0, 1e-12);
+        else CHECK(worst < 0.2 * length && worst > 1e-6); /* one rotation a face, not one a corner: close, not the same */
+        free(truth);
+        carried_clear(&r);
+    }
+    free(pose);
+    vg_correspondence_clear(&k);
+    vg_head_clear(&h);
+}
+
+/* A face without a match of its own turns, but keeps its size when the source grows. */
+static void unmatched_is_rigid(void)
+{
+    vg_head source = make_torus(8, 6), target = make_torus(5, 5);
+    motion t = turn(1, 2, 0), plain = turn(1, 1, 0);
+    double *pose = move_points(&t, source.reference, source.mesh.nv);
+    for (int matched = 0; matched < 2; matched++) {
+        vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 2, matched);
+        carried r = carry(&source, &target, &k, pose, VG_BY_POSE, 1);
+        double worst = 0;
+        for (size_t c = 0; c < vg_graph_corners(r.g); c++) {
+            double w[3], d2 = 0, w2 = 0;
+            move_vector(&plain, r.expected + 3 * c, w);
+            for (size_t a = 0; a < 3; a++) {
+                worst = fmax(worst, matched ? 0 : fabs(w[a] - r.vectors[3 * c + a]));
+                d2 += r.vectors[3 * c + a] * r.vectors[3 * c + a], w2 += w[a] * w[a];
+            }
+            /* matched: directions in the source's planes are doubled, those across are not */
+            if (matched) CHECK(sqrt(d2 / w2) > 1 - 1e-9 && sqrt(d2 / w2) < 2 + 1e-9);
+        }
+        CHECK_NEAR(worst, 0, 1e-12);
+        carried_clear(&r);
+        vg_correspondence_clear(&k);
+    }
+    free(pose);
+    vg_head_clear(&source);
+    vg_head_clear(&target);
+}
+
+static void threads_do_not_matter(void)
+{
+    vg_head source = make_torus(40, 30), target = make_mixed(24);
+    vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 3, true);
+    double *pose = warp(source.reference, source.mesh.nv, 0.4);
+    carried a = carry(&source, &target, &k, pose, VG_BY_BLEND, 1), b = carry(&source, &target, &k, pose, VG_BY_BLEND, 3);
+    CHECK(!memcmp(a.vectors, b.vectors, 3 * vg_graph_corners(a.g) * sizeof *a.vectors));
+    carried_clear(&a);
+    carried_clear(&b);
+    free(pose);
+    vg_correspondence_clear(&k);
+    vg_head_clear(&source);
+    vg_head_clear(&target);
+}
+
+static void degenerate_sources_are_counted(void)
+{
+    vg_head source = make_degenerate(), target = make_torus(6, 5);
+    vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 1, true);
+    vg_graph *g = graph_of(&target);
+    vg_carrier *c;
+    vg_err e;
+    double *out = room(3 * vg_graph_corners(g), sizeof *out);
+    CHECK(vg_carrier_new(&c, &source.mesh, source.reference, &k, g, target.reference, VG_BY_POSE, 1, &e) == VG_OK);
+    const double *in = source.reference;
+    vg_carrier_transfer(c, 1, &in, &out);
+    CHECK(vg_carrier_counts(c).corners > 0 && vg_carrier_counts(c).first_face < source.mesh.nf);
+    for (size_t i = 0; i < 3 * vg_graph_corners(g); i++) CHECK(isfinite(out[i]));
+    free(out);
+    vg_carrier_free(&c);
+    vg_graph_free(&g);
+    vg_correspondence_clear(&k);
+    vg_head_clear(&source);
+    vg_head_clear(&target);
+}
+
+static void other_meshes_are_refused(void)
+{
+    vg_head a = make_torus(6, 5), b = make_torus(5, 6);
+    vg_correspondence k = identity_pairs(&a.mesh);
+    vg_graph *ga = graph_of(&a), *gb = graph_of(&b);
+    vg_carrier *c;
+    vg_err e;
+    CHECK(vg_carrier_new(&c, &b.mesh, b.reference, &k, ga, a.reference, VG_BY_POSE, 1, &e) == VG_EINPUT && !c);
+    CHECK(strstr(e.message, "another source") != NULL);
+    CHECK(vg_carrier_new(&c, &a.mesh, a.reference, &k, gb, b.reference, VG_BY_POSE, 1, &e) == VG_EINPUT && !c);
+    CHECK(strstr(e.message, "another target") != NULL);
+    vg_graph_free(&ga);
+    vg_graph_free(&gb);
+    vg_correspondence_clear(&k);
+    vg_head_clear(&a);
+    vg_head_clear(&b);
+}
+
+/* R S with a known rotation and a known symmetric positive stretch: the polar rotation is R. */
+static void polar_finds_the_rotation(void)
+{
+    vgi_map a, r;
+    double truth[VGI_LANES][9];
+    for (int lane = 0; lane < VGI_LANES; lane++) {
+        double q[4], s[9], v[3] = {noise(), noise(), noise()}, length = 0;
+        for (int i = 0; i < 4; i++) q[i] = noise(), length += q[i] * q[i];
+        for (int i = 0; i < 4; i++) q[i] /= sqrt(length);
+        vg_quat_matrix(q, truth[lane]);
+        /* stretches from mild to 10^6 : 1 */
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++) s[3 * i + j] = (i == j ? pow(10, -lane * 0.7 * (i == 2)) : 0) + (lane < 3 ? v[i] * v[j] : 0);
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++) {
+                double x = 0;
+                for (int k = 0; k < 3; k++) x += truth[lane][3 * i + k] * s[3 * k + j];
+                a.m[3 * i + j][lane] = x;
+            }
+    }
+    vgi_polar(&a, &r);
+    for (int lane = 0; lane < VGI_LANES; lane++)
+        for (int i = 0; i < 9; i++) CHECK_NEAR(r.m[i][lane], truth[lane][i], 1e-9);
+}
+
+/* On triangles the area metric is the cotangent Laplacian: G_ij = -cot(opposite angle) / 2 times one and the same number. */
+static void area_metric_is_cotangents(void)
+{
+    double ratio = 0;
+    for (int trial = 0; trial < 50; trial++) {
+        vg_head h = new_shape();
+        double p[3][3];
+        for (int i = 0; i < 3; i++) {
+            for (int k = 0; k < 3; k++) p[i][k] = noise();
+            add_vertex(&h, p[i][0], p[i][1], p[i][2]);
+        }
+        add_face(&h, 3, (uint32_t[]){0, 1, 2});
+        vg_graph *g = graph_of(&h);
+        vgi_metric m;
+        vg_err e;
+        CHECK(vgi_metric_make(&m, g, h.reference, &e) == VG_OK);
+        for (int o = 0; o < 3; o++) { /* o: the corner opposite the pair i, j */
+            int i = (o + 1) % 3, j = (o + 2) % 3;
+            double a[3], b[3], dot = 0, cross[3], area, x = -m.face[0].weight / 3;
+            for (int k = 0; k < 3; k++) a[k] = p[i][k] - p[o][k], b[k] = p[j][k] - p[o][k], dot += a[k] * b[k];
+            for (int k = 0; k < 3; k++) cross[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+            area = sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
+            const double *s = m.face[0].s, *u = m.plane + 3 * i, *v = m.plane + 3 * j;
+            x += u[0] * (s[0] * v[0] + s[1] * v[1] + s[2] * v[2]) + u[1] * (s[1] * v[0] + s[3] * v[1] + s[4] * v[2]) +
+                 u[2] * (s[2] * v[0] + s[4] * v[1] + s[5] * v[2]);
+            double cot = -dot / area / 2;
+            if (trial == 0 && o == 0) ratio = x / cot;
+            CHECK_NEAR(x, ratio * cot, 1e-9 * (1 + fabs(x)));
+        }
+        vgi_metric_clear(&m);
+        vg_graph_free(&g);
+        vg_head_clear(&h);
+    }
+    CHECK(ratio > 0);
+}
+
+/* By shape a mesh onto itself is the pose. */
+static void shape_onto_itself(void)
+{
+    vg_head h = make_rod(11, 13, false);
+    vg_graph *g = graph_of(&h);
+    vg_shaper *s;
+    vg_err e;
+    CHECK(vg_shaper_new(&s, g, h.reference, h.reference, 2, &e) == VG_OK);
+    double *pose = warp(h.reference, h.mesh.nv, 0.5), *out = room(3 * h.mesh.nv, sizeof *out);
+    const double *in = pose;
+    vg_shaper_transfer(s, 1, &in, &out);
+    CHECK_NEAR(farthest(pose, out, h.mesh.nv), 0, 1e-12 * vg_diagonal(pose, h.mesh.nv));
+    vg_shaper_free(&s);
+    free(pose);
+    free(out);
+    vg_graph_free(&g);
+    vg_head_clear(&h);
+}
+
+/* The reference pose of the source gives the target's own reference, exactly where corners agree. */
+static void shape_of_the_reference(void)
+{
+    vg_head h = make_torus(12, 9);
+    motion t = turn(0, 1.5, 0);
+    double *target = move_points(&t, h.reference, h.mesh.nv), *out = room(3 * h.mesh.nv, sizeof *out);
+    vg_graph *g = graph_of(&h);
+    vg_shaper *s;
+    vg_err e;
+    CHECK(vg_shaper_new(&s, g, h.reference, target, 1, &e) == VG_OK);
+    const double *in = h.reference;
+    vg_shaper_transfer(s, 1, &in, &out);
+    /* vectors are the target's, centroids the source's: each vertex is the mean of C_f + 1.5 w_c over its corners */
+    double *truth = room(3 * h.mesh.nv, sizeof *truth), *count = room(h.mesh.nv, sizeof *count);
+    double *w = vectors_of(g, h.reference);
+    for (size_t c = 0; c < vg_graph_corners(g); c++) {
+        size_t v = g->vert[c];
+        count[v]++;
+        for (size_t k = 0; k < 3; k++) truth[3 * v + k] += h.reference[3 * v + k] + 0.5 * w[3 * c + k];
+    }
+    for (size_t v = 0; v < h.mesh.nv; v++)
+        for (size_t k = 0; k < 3; k++) truth[3 * v + k] /= count[v];
+    CHECK_NEAR(farthest(truth, out, h.mesh.nv), 0, 1e-12);
+    vg_shaper_free(&s);
+    vg_graph_free(&g);
+    free(target);
+    free(out);
+    free(truth);
+    free(count);
+    free(w);
+    vg_head_clear(&h);
+}
+
+TESTS({"a turning source turns every target", rotation_passes},
+      {"triangles onto themselves by gradients are exact", triangles_onto_themselves},
+      {"unmatched faces are rigid", unmatched_is_rigid},
+      {"the thread count changes no bit", threads_do_not_matter},
+      {"degenerate source faces are counted and drive nothing", degenerate_sources_are_counted},
+      {"a correspondence of other meshes is refused", other_meshes_are_refused},
+      {"the polar rotation of R S is R", polar_finds_the_rotation},
+      {"the area metric of triangles is the cotangent Laplacian", area_metric_is_cotangents},
+      {"by shape: a mesh onto itself is its pose", shape_onto_itself},
+      {"by shape: vectors of the target at centroids of the source", shape_of_the_reference})
