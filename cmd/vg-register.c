@@ -14,17 +14,30 @@ static struct {
 } opts;
 
 static const cli_option options[] = {
-    {.name = "markers", .letter = 'm', .value = "FILE", .help = "pairs of vertices, one a line: [NAME] SOURCE TARGET",
+    {.name = "markers",
+     .letter = 'm',
+     .value = "FILE",
+     .help = "pairs of vertices, one a line: [NAME] SOURCE TARGET",
      .text = &opts.markers},
-    {.name = "index-base", .value = "N", .help = "the number of the first vertex in these files: 0 or 1 (default: 0)",
-     .integer = &opts.base, .least = 0, .most = 1},
+    {.name = "index-base",
+     .value = "N",
+     .help = "the number of the first vertex in these files: 0 or 1 (default: 0)",
+     .integer = &opts.base,
+     .least = 0,
+     .most = 1},
     {.name = "keep-all", .help = "use also markers that contradict the others", .flag = &opts.keep_all},
-    {.name = "dense", .value = "FILE", .help = "vertices of TARGET as points of SOURCE, one a line: VERTEX A B C WA WB WC",
+    {.name = "dense",
+     .value = "FILE",
+     .help = "vertices of TARGET as points of SOURCE, one a line: VERTEX A B C WA WB WC",
      .text = &opts.dense},
-    {.name = "dense-source", .value = "FILE", .help = "the same the other way round: vertices of SOURCE as points of TARGET",
+    {.name = "dense-source",
+     .value = "FILE",
+     .help = "the same the other way round: vertices of SOURCE as points of TARGET",
      .text = &opts.dense_source},
     {.name = "uv", .help = "points of the same texture coordinates belong together", .flag = &opts.uv},
-    {.name = "aligned", .help = "the two lie on one another as they are; markers are not needed", .flag = &opts.aligned},
+    {.name = "aligned",
+     .help = "the two lie on one another as they are; markers are not needed",
+     .flag = &opts.aligned},
     {0},
 };
 
@@ -43,8 +56,8 @@ static void check_options(size_t operands)
     if (operands != 2) cli_usage("two meshes are needed: SOURCE and TARGET");
     if (opts.dense && opts.dense_source) cli_usage("only one of --dense and --dense-source can be used");
     if (!opts.markers && !opts.dense && !opts.dense_source && !opts.uv && !opts.aligned)
-        cli_usage("nothing says which point belongs to which: give --markers FILE, --dense FILE, --uv, or --aligned when the "
-                  "meshes lie on one another");
+        cli_usage("nothing says which point belongs to which: give --markers FILE, --dense FILE, --uv, or --aligned "
+                  "when the                   "meshes lie on one another");
 }
 
 static void out_of_memory(const char *what) __attribute__((noreturn));
@@ -82,16 +95,19 @@ static char *read_file(const char *path, size_t *n)
 static void note_step(void *context, const vg_register_step *s)
 {
     (void)context;
-    cli_note("round %zu of %zu: %zu vertices near the target, %.3g D from it on average, at most %.3g D; stiffness %.3g", s->round,
-             s->rounds, s->near, s->mean, s->largest, s->stiffness);
+    cli_note(
+        "round %zu of %zu: %zu vertices near the target, %.3g D from it on average, at most %.3g D; stiffness %.3g",
+        s->round, s->rounds, s->near, s->mean, s->largest, s->stiffness);
 }
 
 static void note_alignment(const vg_register_result *r)
 {
-    cli_note("the source as a whole: scale %.6g, rotation %.4f %.4f %.4f / %.4f %.4f %.4f / %.4f %.4f %.4f, shift %.6g %.6g %.6g",
+    cli_note("the source as a whole: scale %.6g, rotation %.4f %.4f %.4f / %.4f %.4f %.4f / %.4f %.4f %.4f, shift "
+             "%.6g %.6g %.6g",
              r->scale, r->rotation[0], r->rotation[1], r->rotation[2], r->rotation[3], r->rotation[4], r->rotation[5],
              r->rotation[6], r->rotation[7], r->rotation[8], r->shift[0], r->shift[1], r->shift[2]);
-    if (r->uv_pairs) cli_note("%zu vertices of the source found their texture coordinates on the target", r->uv_pairs);
+    if (r->uv_pairs)
+        cli_note("%zu vertices of the source found their texture coordinates on the target", r->uv_pairs);
 }
 
 static void report_markers(const vg_markers *m, const vg_register_result *r)
@@ -101,9 +117,10 @@ static void report_markers(const vg_markers *m, const vg_register_result *r)
         if (m->at[i].name) snprintf(which, sizeof which, "marker '%.60s' (line %zu)", m->at[i].name, m->at[i].line);
         else snprintf(which, sizeof which, "the marker of line %zu", m->at[i].line);
         if (r->left_out[i])
-            cli_warn("%s, vertex %ld on vertex %ld, is %.3g D from where its neighbours expect it, most are within %.2g D: %s", which,
-                     m->at[i].source + opts.base, m->at[i].target + opts.base, r->residual[i], 2 * r->typical_residual,
-                     opts.keep_all ? "it is used all the same" : "it is left out");
+            cli_warn("%s, vertex %ld on vertex %ld, is %.3g D from where its neighbours expect it, most are within "
+                     "%.2g D: %s",
+                     which, m->at[i].source + opts.base, m->at[i].target + opts.base, r->residual[i],
+                     2 * r->typical_residual, opts.keep_all ? "it is used all the same" : "it is left out");
         else
             cli_note("%s: %.3g D from where its neighbours expect it", which, r->residual[i]);
     }
@@ -125,10 +142,12 @@ static void report_unmatched(const vg_mesh *m, const vg_correspondence *c)
     }
     for (size_t k = 0; k < n; k++) {
         if (!without[k]) continue;
-        cli_warn("%zu of the %zu faces of the target's component %zu have no counterpart: they ride with %s", without[k], faces[k], k,
+        cli_warn("%zu of the %zu faces of the target's component %zu have no counterpart: they ride with %s",
+                 without[k], faces[k], k,
                  without[k] < faces[k] ? "those beside them" : "the nearest faces that have one");
     }
-    cli_note("%zu of %zu faces of the target matched, %zu pairs", m->nf - unmatched, m->nf, (size_t)c->first[c->target_nf]);
+    cli_note("%zu of %zu faces of the target matched, %zu pairs", m->nf - unmatched, m->nf,
+             (size_t)c->first[c->target_nf]);
     free(label);
     free(faces);
     free(without);
@@ -175,7 +194,9 @@ static void write_stream(vg_head *h, const vg_head *target, vg_register_result *
     h->kind = VG_VERTICES, h->count = h->mesh.nv;
     if (vg_head_merge_trace(h, target, &e) < 0) cli_die(&e);
     cli_stream_open(h);
-    if (vg_frame_shape(&f, h, &e) < 0 || vg_frame_rename(&f, target->reference_name ? target->reference_name : "", &e) < 0) cli_die(&e);
+    if (vg_frame_shape(&f, h, &e) < 0 ||
+        vg_frame_rename(&f, target->reference_name ? target->reference_name : "", &e) < 0)
+        cli_die(&e);
     if (h->mesh.nv) memcpy(f.values, r->fitted, 3 * h->mesh.nv * sizeof *f.values);
     cli_stream_put(&f);
     cli_stream_end(NULL);
@@ -193,9 +214,14 @@ int main(int argc, char **argv)
     check_options(cli_start(&program, argc, argv, &operands));
     load(&source, operands[0]);
     load(&target, operands[1]);
-    vg_register_input in = {.source = &source.mesh, .target = &target.mesh, .source_points = source.reference,
-                            .target_points = target.reference, .aligned = opts.aligned, .keep_all = opts.keep_all,
-                            .source_uv = opts.uv ? &source.attributes : NULL, .target_uv = opts.uv ? &target.attributes : NULL,
+    vg_register_input in = {.source = &source.mesh,
+                            .target = &target.mesh,
+                            .source_points = source.reference,
+                            .target_points = target.reference,
+                            .aligned = opts.aligned,
+                            .keep_all = opts.keep_all,
+                            .source_uv = opts.uv ? &source.attributes : NULL,
+                            .target_uv = opts.uv ? &target.attributes : NULL,
                             .threads = cli.threads};
     read_pairs(&in, &markers, &seeds);
     if (vg_register(&r, &in, note_step, NULL, &e) < 0) cli_die(&e);

@@ -57,8 +57,8 @@ static int take_vertex(const text *t, const line *l, size_t field, int base, uin
         return vg_fail(e, VG_EINPUT, "'%s' line %zu: '%.*s' is no vertex number", t->name, l->number,
                        f->end - f->begin < 40 ? (int)(f->end - f->begin) : 40, f->begin);
     if (x < base || x - base >= UINT32_MAX)
-        return vg_fail(e, VG_EINPUT, "'%s' line %zu: there is no vertex %lld: vertices are counted from %d", t->name, l->number,
-                       (long long)x, base);
+        return vg_fail(e, VG_EINPUT, "'%s' line %zu: there is no vertex %lld: vertices are counted from %d", t->name,
+                       l->number, (long long)x, base);
     *vertex = (uint32_t)(x - base);
     return VG_OK;
 }
@@ -83,7 +83,8 @@ void vg_markers_clear(vg_markers *m)
 static int take_marker(const text *t, const line *l, int base, vg_marker *m, vg_err *e)
 {
     if (l->n != 2 && l->n != 3)
-        return vg_fail(e, VG_EINPUT, "'%s' line %zu: a marker is 'SOURCE TARGET' or 'NAME SOURCE TARGET'", t->name, l->number);
+        return vg_fail(e, VG_EINPUT, "'%s' line %zu: a marker is 'SOURCE TARGET' or 'NAME SOURCE TARGET'", t->name,
+                       l->number);
     size_t first = l->n - 2;
     int r = take_vertex(t, l, first, base, &m->source, e);
     if (r == VG_OK) r = take_vertex(t, l, first + 1, base, &m->target, e);
@@ -92,7 +93,8 @@ static int take_marker(const text *t, const line *l, int base, vg_marker *m, vg_
     m->name = NULL;
     if (first == 0) return VG_OK;
     size_t n = (size_t)(l->at[0].end - l->at[0].begin);
-    if (!vgi_is_utf8(l->at[0].begin, n)) return vg_fail(e, VG_EINPUT, "'%s' line %zu: the name is not UTF-8", t->name, l->number);
+    if (!vgi_is_utf8(l->at[0].begin, n))
+        return vg_fail(e, VG_EINPUT, "'%s' line %zu: the name is not UTF-8", t->name, l->number);
     m->name = vgi_copy_string(l->at[0].begin, n, e);
     return m->name ? VG_OK : VG_ENOMEM;
 }
@@ -126,7 +128,8 @@ static int take_seed(const text *t, const line *l, int base, vg_seed *s, vg_err 
         sum += s->weight[k];
     }
     if (r < 0) return r;
-    if (!(sum > 0.5 && sum < 2)) return vg_fail(e, VG_EINPUT, "'%s' line %zu: the weights add up to %g, not 1", t->name, l->number, sum);
+    if (!(sum > 0.5 && sum < 2))
+        return vg_fail(e, VG_EINPUT, "'%s' line %zu: the weights add up to %g, not 1", t->name, l->number, sum);
     for (int k = 0; k < 3; k++) s->weight[k] /= sum;
     return VG_OK;
 }
@@ -146,7 +149,9 @@ int vg_seeds_read(vg_seed **seeds, size_t *n, const void *data, size_t bytes, in
     while (r == VG_OK && next_line(&t, &l)) {
         if (has_none(&l)) continue;
         if (l.n != 7)
-            r = vg_fail(e, VG_EINPUT, "'%s' line %zu: a point is 'VERTEX A B C WA WB WC', or 'VERTEX -' where there is none", name, l.number);
+            r = vg_fail(e, VG_EINPUT,
+                        "'%s' line %zu: a point is 'VERTEX A B C WA WB WC', or 'VERTEX -' where there is none", name,
+                        l.number);
         if (r == VG_OK) r = vgi_grow(seeds, &cap, *n + 1, sizeof **seeds, e);
         if (r == VG_OK) r = take_seed(&t, &l, base, &(*seeds)[*n], e);
         if (r == VG_OK) ++*n;

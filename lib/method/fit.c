@@ -1,17 +1,18 @@
 /* fit.c: bend one surface of polygons until it lies on another, from ties (markers, seeds) and nearest points.
  *
- * What is kept small is how much the deformation changes from place to place: with L a graph Laplacian of the source, s its rest, and R_v the
- * turn and mean stretch that the faces around vertex v undergo in the present fit,
+ * What is kept small is how much the deformation changes from place to place: with L a graph Laplacian of the source,
+ * s its rest, and R_v the turn and mean stretch that the faces around vertex v undergo in the present fit,
  *
  *     sum over v of |(L x)_v - R_v (L s)_v|^2 / L_vv                     bending
  *       + a * sum over edges of |(x_u - x_v) - R_uv (s_u - s_v)|^2        stretching
  *       + sum of weight * |point of the source - where it belongs|^2      ties, nearest points both ways
  *
- * so that a similarity of the whole costs nothing, and one that changes slowly from limb to limb costs little: what Sumner and Popovic
- * (2004, section 5.1) ask of neighbouring triangles, without extra unknowns and for faces of any number of corners. x, y and z share one
- * matrix. It is factorized once per round; inside a round R and the nearest points follow the fit. R comes from the map of each face (its
- * vectors, and its normal stretched as the root of its area), smoothed over a length by (1 + length^2 L)^-1: from single faces it would
- * follow every dent, and nothing would be smooth any more.
+ * so that a similarity of the whole costs nothing, and one that changes slowly from limb to limb costs little: what
+ * Sumner and Popovic (2004, section 5.1) ask of neighbouring triangles, without extra unknowns and for faces of any
+ * number of corners. x, y and z share one matrix. It is factorized once per round; inside a round R and the nearest
+ * points follow the fit. R comes from the map of each face (its vectors, and its normal stretched as the root of its
+ * area), smoothed over a length by (1 + length^2 L)^-1: from single faces it would follow every dent, and nothing
+ * would be smooth any more.
  *
  * Leaves out how the meshes come to lie roughly on one another (register.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
@@ -32,7 +33,7 @@ static const double LAST_SPAN = 0.7;      /* and in the last, in mean edge lengt
 static const double FIRST_LIMIT = 0.1, LAST_LIMIT = 0.02; /* nearest points farther than this are none */
 static const double COSINE = 0.4;         /* least of normals that fit */
 static const double MAP_SPAN = 0.07;      /* over which the maps of faces are smoothed */
-static const double KEPT_STRETCH = 0.8;   /* power of a map's mean stretch that is kept: what nothing holds goes back to its size */
+static const double KEPT_STRETCH = 0.8;   /* power of a map's mean stretch: what nothing holds goes back to its size */
 
 enum {
     BLOCK = 256,     /* vertices of a task */
@@ -120,8 +121,10 @@ static int gather_springs(spring_list *l, const vgi_fitting *in, vg_err *e)
 {
     const vg_mesh *m = in->source;
     int r = VG_OK;
-    for (size_t f = 0; f < m->nf && r == VG_OK; f++) r = add_face(l, m->vert + m->start[f], m->start[f + 1] - m->start[f], e);
-    for (size_t i = 0; i < in->nlinks && r == VG_OK; i++) r = add_spring(l, in->links[2 * i], in->links[2 * i + 1], 0.5, e);
+    for (size_t f = 0; f < m->nf && r == VG_OK; f++)
+        r = add_face(l, m->vert + m->start[f], m->start[f + 1] - m->start[f], e);
+    for (size_t i = 0; i < in->nlinks && r == VG_OK; i++)
+        r = add_spring(l, in->links[2 * i], in->links[2 * i + 1], 0.5, e);
     /* points that a tie joins: no force, only room in the matrix */
     for (size_t i = 0; i < in->nties; i++)
         for (int k = 0; k < 3 && r == VG_OK; k++) {
@@ -145,7 +148,8 @@ static int make_springs(fit *t, vg_err *e)
     spring_list list = {0};
     int r = gather_springs(&list, t->in, e);
     size_t n = list.n, nv = L->nv = t->m->nv;
-    for (size_t i = 0; i < n && r == VG_OK; i++) r = add_spring(&list, list.at[i].b, list.at[i].a, list.at[i].weight, e);
+    for (size_t i = 0; i < n && r == VG_OK; i++)
+        r = add_spring(&list, list.at[i].b, list.at[i].a, list.at[i].weight, e);
     L->first = vgi_array(nv + 1, sizeof *L->first, e);
     L->to = vgi_array_raw(list.n, sizeof *L->to, e);
     L->weight = vgi_array_raw(list.n, sizeof *L->weight, e);
@@ -393,7 +397,8 @@ static void face_maps(fit *t, const double *x)
         if (area > 0) vgi_add_outer(S, sqrt(area / t->area[f]) / area, n, t->h_normal + 3 * f);
         const double *P = t->inverse + 9 * f;
         for (int i = 0; i < 3; i++)
-            for (int k = 0; k < 3; k++) D[3 * i + k] = S[3 * i] * P[k] + S[3 * i + 1] * P[3 + k] + S[3 * i + 2] * P[6 + k];
+            for (int k = 0; k < 3; k++)
+                D[3 * i + k] = S[3 * i] * P[k] + S[3 * i + 1] * P[3 + k] + S[3 * i + 2] * P[6 + k];
     }
 }
 
@@ -419,7 +424,8 @@ static int smooth_maps(fit *t, vg_err *e)
     return VG_OK;
 }
 
-/* The rotation nearest to m by Newton's iteration (Higham 1986), times most of the mean stretch; the identity when m turns inside out. */
+/* The rotation nearest to m by Newton's iteration (Higham 1986), times most of the mean stretch; the identity when m
+ * turns inside out. */
 static void drop_shear(double m[9])
 {
     double q[9], c[9], det = vgi_cofactors(m, c), first = det;
@@ -456,12 +462,15 @@ static int make_smoother(fit *t, vg_err *e)
     const springs *L = &t->L;
     size_t n = 0;
     double strength = MAP_SPAN / t->edge * MAP_SPAN / t->edge;
-    vgi_sparse A = {.n = L->nv, .start = vgi_array(L->nv + 1, sizeof(int), e), .row = vgi_array(L->nv + L->first[L->nv], sizeof(int), e),
+    vgi_sparse A = {.n = L->nv,
+                    .start = vgi_array(L->nv + 1, sizeof(int), e),
+                    .row = vgi_array(L->nv + L->first[L->nv], sizeof(int), e),
                     .value = vgi_array(L->nv + L->first[L->nv], sizeof(double), e)};
     int r = A.start && A.row && A.value ? VG_OK : VG_ENOMEM;
     for (size_t v = 0; v < L->nv && r == VG_OK; v++) {
         A.row[n] = (int)v, A.value[n] = IDENTITY_TRUST + strength * L->sum[v];
-        for (uint32_t i = t->around.first[v]; i < t->around.first[v + 1]; i++) A.value[n] += t->trust[t->around.face[i]];
+        for (uint32_t i = t->around.first[v]; i < t->around.first[v + 1]; i++)
+            A.value[n] += t->trust[t->around.face[i]];
         n++;
         for (uint32_t i = L->first[v]; i < L->first[v + 1]; i++)
             if (L->to[i] > v) A.row[n] = (int)L->to[i], A.value[n++] = -strength * L->weight[i];
@@ -553,7 +562,8 @@ static void vertex_normals(const vg_mesh *m, const double *x, double sign, doubl
     }
 }
 
-/* A nearest point on the border of the target is true only for a vertex on the border of the source: others are beyond it. */
+/* A nearest point on the border of the target is true only for a vertex on the border of the source: others are
+ * beyond it. */
 static void find_near(void *context, size_t block)
 {
     fit *t = context;
@@ -562,7 +572,8 @@ static void find_near(void *context, size_t block)
         vgi_hit hit;
         const double *at = t->x + 3 * v, *normal = t->normal + 3 * v;
         double limit = t->limit * t->limit, known = vgi_square(at, t->goal + 3 * v);
-        bool guess = t->distance[v] < INFINITY && known < limit; /* the last answer bounds this one, if its normal still fits */
+        /* the last answer bounds this one, if its normal still fits */
+        bool guess = t->distance[v] < INFINITY && known < limit;
         t->distance[v] = INFINITY;
         if (!(t->L.sum[v] > 0)) continue;
         bool found = guess && vgi_surface_nearest(t->in->target, at, normal, COSINE, known * (1 + 1e-9), &hit);
@@ -595,7 +606,8 @@ static void find_reverse(void *context, size_t block)
     }
 }
 
-/* What the target asks of the source, in the places that the source would not find by itself: tips, and what is drawn in. */
+/* What the target asks of the source, in the places that the source would not find by itself: tips, and what is
+ * drawn in. */
 static int follow_reverse(fit *t, double weight, vg_err *e)
 {
     size_t n = t->in->target_mesh->nv;
@@ -694,8 +706,8 @@ static int prepare(fit *t, vg_err *e)
     t->reverse = vgi_array(t->in->target_mesh->nv, sizeof *t->reverse, e);
     t->pull = vgi_array(nv, sizeof(double), e);
     t->distance = vgi_array(nv, sizeof(double), e);
-    if (!t->inverse || !t->h_normal || !t->area || !t->trust || !t->face_map || !t->map || !t->border || !t->reverse ||
-        !t->pull || !t->distance || r < 0)
+    if (!t->inverse || !t->h_normal || !t->area || !t->trust || !t->face_map || !t->map || !t->border ||
+        !t->reverse || !t->pull || !t->distance || r < 0)
         return r < 0 ? r : VG_ENOMEM;
     for (size_t f = 0; f < nf; f++)
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)

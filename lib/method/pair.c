@@ -1,10 +1,11 @@
 /* pair.c: which source faces drive each target face, once the source lies on the target (MATH 9).
  *
- * Where a target face has a source face under its centroid that looks the same way, it takes that one and those around it whose
- * centroids are near, weighted by nearness over a radius that is the larger of the two faces' sizes: a fine source is averaged, a
- * coarse one interpolated. Neighbours are reached over the surface, so that fingers do not mix. Source faces that nobody took are given to the
- * target face they lie on. What finds nothing rides with matched faces: a hole with the nearest over its edges, a piece of its own with
- * the nearest ones in space, all of it alike so that it stays rigid.
+ * Where a target face has a source face under its centroid that looks the same way, it takes that one and those
+ * around it whose centroids are near, weighted by nearness over a radius that is the larger of the two faces' sizes:
+ * a fine source is averaged, a coarse one interpolated. Neighbours are reached over the surface, so that fingers do
+ * not mix. Source faces that nobody took are given to the target face they lie on. What finds nothing rides with
+ * matched faces: a hole with the nearest over its edges, a piece of its own with the nearest ones in space, all of it
+ * alike so that it stays rigid.
  *
  * Leaves out the fit (fit.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
@@ -151,7 +152,8 @@ static bool nearest_source(const struct pairing *p, size_t g, vgi_hit *hit)
     const double *n = vgi_surface_normals(p->in->target_surface) + 3 * g;
     double sign = p->in->flipped ? -1 : 1, normal[3] = {sign * n[0], sign * n[1], sign * n[2]};
     double limit = face_size(p->in->target, g) == 2 ? INFINITY : FAR * FAR;
-    if (!vgi_surface_nearest(p->in->source_surface, centroid(p->in->target_surface, g), normal, COSINE, limit, hit)) return false;
+    if (!vgi_surface_nearest(p->in->source_surface, centroid(p->in->target_surface, g), normal, COSINE, limit, hit))
+        return false;
     double size = vgi_surface_sizes(p->in->target_surface)[g];
     return !hit->border || hit->square <= size * size;
 }
@@ -187,7 +189,8 @@ static void give_block(void *context, size_t block)
         vgi_hit hit;
         p->given[f] = UINT32_MAX;
         if (p->used[f]) continue;
-        if (vgi_surface_nearest(p->in->target_surface, centroid(p->in->source_surface, f), normal, COSINE, FAR * FAR, &hit) &&
+        if (vgi_surface_nearest(p->in->target_surface, centroid(p->in->source_surface, f), normal, COSINE, FAR * FAR,
+                                &hit) &&
             !hit.border && p->drivers[hit.face].n > 0)
             p->given[f] = hit.face;
     }
@@ -197,13 +200,15 @@ static void give_block(void *context, size_t block)
 static double given_weight(const struct pairing *p, size_t f)
 {
     const struct drivers *d = &p->drivers[p->given[f]];
-    if (face_size(p->in->target, p->given[f]) == 2 || (d->n == 1 && coincide(p, p->given[f], d->at[0].face))) return 0;
+    if (face_size(p->in->target, p->given[f]) == 2 || (d->n == 1 && coincide(p, p->given[f], d->at[0].face)))
+        return 0;
     return d->at[d->n - 1].weight;
 }
 
 /* ---- what found nothing ---- */
 
-/* A component of the target of which less than half found something has no counterpart: what it found is of others. */
+/* A component of the target of which less than half found something has no counterpart: what it found is of
+ * others. */
 static int drop_strangers(struct pairing *p, vg_err *e)
 {
     const vg_mesh *m = p->in->target;
@@ -263,7 +268,8 @@ static void borrow(struct drivers *d, const struct drivers *host)
     }
 }
 
-static void seat_piece(struct pairing *p, const vgi_kdtree *tree, const uint32_t *matched, const uint32_t *label, uint32_t piece)
+static void seat_piece(struct pairing *p, const vgi_kdtree *tree, const uint32_t *matched, const uint32_t *label,
+                       uint32_t piece)
 {
     const vg_mesh *m = p->in->target;
     double at[3] = {0, 0, 0};
@@ -339,7 +345,8 @@ static int write_down(struct pairing *p, vg_err *e)
     for (size_t g = 0; g < c->target_nf; g++) {
         const struct drivers *d = &p->drivers[g];
         c->matched[g] = p->host[g] == g;
-        c->distance[g] = sqrt(vgi_square(centroid(p->in->target_surface, g), centroid(p->in->source_surface, d->at[0].face)));
+        c->distance[g] =
+            sqrt(vgi_square(centroid(p->in->target_surface, g), centroid(p->in->source_surface, d->at[0].face)));
         for (uint32_t i = 0; i < d->n; i++) c->source[at[g]] = d->at[i].face, c->weight[at[g]++] = d->at[i].weight;
     }
     for (size_t f = 0; f < c->source_nf; f++) {

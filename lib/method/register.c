@@ -1,7 +1,6 @@
-/* register.c: from a few pairs of points to the faces of one mesh that drive those of another: one frame for both, contradictions among the
- * pairs, the fit, the pairing.
- * Leaves out the fit itself (fit.c), the choice of pairs (pair.c), and files.
- * SPDX-License-Identifier: GPL-3.0-or-later */
+/* register.c: from a few pairs of points to the faces of one mesh that drive those of another: one frame for both,
+ * contradictions among the pairs, the fit, the pairing. Leaves out the fit itself (fit.c), the choice of pairs
+ * (pair.c), and files. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/register.h"
 #include "model/kdtree.h"
 
@@ -9,7 +8,8 @@
 
 enum { NEIGHBOURS = 4, ROBUST_ROUNDS = 20 };
 
-/* A wrong pair is one that is this many times the typical distance from where its neighbours expect it, and this far, in D. */
+/* A wrong pair is one that is this many times the typical distance from where its neighbours expect it, and this far,
+ * in D. */
 static const double WRONG_TIMES = 5, WRONG_FAR = 0.08;
 
 struct similarity {
@@ -43,7 +43,8 @@ static void largest_eigenvector(double a[4][4], double q[4])
             for (int j = i + 1; j < 4; j++) {
                 if (a[i][j] == 0) continue;
                 double theta = (a[j][j] - a[i][i]) / (2 * a[i][j]);
-                double t = (theta < 0 ? -1 : 1) / (fabs(theta) + sqrt(theta * theta + 1)), c = 1 / sqrt(t * t + 1), s = t * c;
+                double t = (theta < 0 ? -1 : 1) / (fabs(theta) + sqrt(theta * theta + 1)), c = 1 / sqrt(t * t + 1),
+                       s = t * c;
                 for (int k = 0; k < 4; k++) {
                     double x = a[k][i], y = a[k][j];
                     a[k][i] = c * x - s * y, a[k][j] = s * x + c * y;
@@ -129,7 +130,8 @@ static double median(const double *x, size_t n, double *room)
 /* Pairs that miss by much more than most count less and less (Geman and McClure). */
 static int robust_similarity(struct similarity *s, const double *from, const double *to, size_t n, vg_err *e)
 {
-    double *weight = vgi_array(n, sizeof *weight, e), *miss = vgi_array(n, sizeof *miss, e), *room = vgi_array(n, sizeof *room, e);
+    double *weight = vgi_array(n, sizeof *weight, e), *miss = vgi_array(n, sizeof *miss, e),
+           *room = vgi_array(n, sizeof *room, e);
     if (!weight || !miss || !room) return free(weight), free(miss), free(room), VG_ENOMEM;
     for (size_t i = 0; i < n; i++) weight[i] = 1;
     for (int round = 0; round < ROBUST_ROUNDS; round++) {
@@ -183,7 +185,8 @@ static void add_seed_ties(struct registration *r)
 }
 
 /* The texture of a mesh as a surface in the plane: each corner is a vertex of its own. */
-static int texture_surface(vgi_surface **s, vg_mesh *flat, double **points, const vg_mesh *m, const vg_attributes *a, vg_err *e)
+static int texture_surface(vgi_surface **s, vg_mesh *flat, double **points, const vg_mesh *m, const vg_attributes *a,
+                           vg_err *e)
 {
     size_t corners = vg_mesh_corners(m);
     if (vg_mesh_copy(flat, m, e) < 0) return VG_ENOMEM;
@@ -199,9 +202,10 @@ static int texture_surface(vgi_surface **s, vg_mesh *flat, double **points, cons
     return vgi_surface_new(s, flat, *points, e);
 }
 
-/* The point of a target face at the same place as a point of its texture: mean value coordinates would be exact for polygons;
- * least squares of an affine map of the corners is, for what a face spans. */
-static bool lift(const vg_mesh *m, uint32_t face, const double *uv, const double *points, const double at[3], double out[3])
+/* The point of a target face at the same place as a point of its texture: mean value coordinates would be exact for
+ * polygons; least squares of an affine map of the corners is, for what a face spans. */
+static bool lift(const vg_mesh *m, uint32_t face, const double *uv, const double *points, const double at[3],
+                 double out[3])
 {
     size_t begin = m->start[face], r = m->start[face + 1] - begin;
     double C[3] = {0}, P[3] = {0}, S[3] = {0}, T[6] = {0};
@@ -232,7 +236,8 @@ static void find_texture_ties(struct registration *r, const vgi_surface *texture
     for (size_t c = 0; c < vg_mesh_corners(m); c++) {
         uint32_t v = m->vert[c], t = a->corner_tex[c];
         if (done[v] || t == UINT32_MAX) continue;
-        double at[3] = {a->tex[(size_t)t * a->tex_dim], a->tex_dim > 1 ? a->tex[(size_t)t * a->tex_dim + 1] : 0, 0}, point[3];
+        double at[3] = {a->tex[(size_t)t * a->tex_dim], a->tex_dim > 1 ? a->tex[(size_t)t * a->tex_dim + 1] : 0, 0},
+               point[3];
         vgi_hit hit;
         done[v] = true;
         if (!vgi_surface_nearest(texture, at, NULL, 0, 1e-3 * 1e-3, &hit)) continue;
@@ -261,7 +266,8 @@ static int add_texture_ties(struct registration *r, vg_err *e)
 
 static int make_ties(struct registration *r, vg_err *e)
 {
-    size_t most = (r->in->markers ? r->in->markers->n : 0) + r->in->nseeds + (r->in->source_uv ? r->in->source->nv : 0);
+    size_t most =
+        (r->in->markers ? r->in->markers->n : 0) + r->in->nseeds + (r->in->source_uv ? r->in->source->nv : 0);
     r->tie = vgi_array(most, sizeof *r->tie, e);
     if (!r->tie) return VG_ENOMEM;
     add_marker_ties(r);
@@ -310,7 +316,8 @@ static int judge_markers(struct registration *r, vg_err *e)
     vg_register_result *out = r->out;
     out->residual = vgi_array(n, sizeof *out->residual, e);
     out->left_out = vgi_array(n, sizeof *out->left_out, e);
-    double *from = vgi_array(n, 3 * sizeof *from, e), *way = vgi_array(n, 3 * sizeof *way, e), *room = vgi_array(n, sizeof *room, e);
+    double *from = vgi_array(n, 3 * sizeof *from, e), *way = vgi_array(n, 3 * sizeof *way, e),
+           *room = vgi_array(n, sizeof *room, e);
     int ok = out->residual && out->left_out && from && way && room ? VG_OK : VG_ENOMEM;
     for (size_t i = 0; i < n && ok == VG_OK; i++) {
         memcpy(from + 3 * i, r->rest + 3 * (size_t)r->tie[i].vertex[0], 3 * sizeof *from);
@@ -367,12 +374,15 @@ static int align(struct registration *r, vg_err *e)
             memcpy(to + 3 * i, r->tie[i].point, 3 * sizeof *to);
         }
         if (ok == VG_OK && (r->nties < 3 || !spread_out(from, r->nties) || !spread_out(to, r->nties)))
-            ok = vg_fail(e, VG_EINPUT, "%zu pairs do not say how the meshes lie: give at least three that are not in line", r->nties);
+            ok = vg_fail(e, VG_EINPUT,
+                         "%zu pairs do not say how the meshes lie: give at least three that are not in line",
+                         r->nties);
         if (ok == VG_OK) ok = robust_similarity(&r->s, from, to, r->nties, e);
         free(from);
         free(to);
     }
-    for (size_t v = 0; v < r->in->source->nv && ok == VG_OK; v++) apply_similarity(&r->s, r->source + 3 * v, r->rest + 3 * v);
+    for (size_t v = 0; v < r->in->source->nv && ok == VG_OK; v++)
+        apply_similarity(&r->s, r->source + 3 * v, r->rest + 3 * v);
     return ok;
 }
 
@@ -382,7 +392,8 @@ static void find_sides(struct registration *r)
     double votes = 0;
     const double *n = vgi_surface_normals(r->source_surface), *c = vgi_surface_centroids(r->source_surface);
     const vg_mesh *m = r->in->source;
-    bool *tied = r->nties ? calloc(m->nv + 1, sizeof *tied) : NULL; /* without it all faces vote: as good, but slower */
+    /* without room for it all faces vote: as good, but slower */
+    bool *tied = r->nties ? calloc(m->nv + 1, sizeof *tied) : NULL;
     for (size_t i = 0; i < r->nties && tied; i++) tied[r->tie[i].vertex[0]] = r->tie[i].weight > 0;
     for (size_t f = 0; f < m->nf; f++) {
         bool asked = !tied;
@@ -398,9 +409,20 @@ static void find_sides(struct registration *r)
 
 static int bend(struct registration *r, void (*step)(void *, const vg_register_step *), void *context, vg_err *e)
 {
-    const vgi_fitting f = {.source = r->in->source, .rest = r->rest, .source_surface = r->source_surface,
-                           .target_mesh = r->in->target, .target_points = r->target, .target = r->target_surface, .flipped = r->flipped, .links = r->links, .nlinks = r->nlinks,
-                           .tie = r->tie, .nties = r->nties, .threads = r->in->threads, .step = step, .context = context};
+    const vgi_fitting f = {.source = r->in->source,
+                           .rest = r->rest,
+                           .source_surface = r->source_surface,
+                           .target_mesh = r->in->target,
+                           .target_points = r->target,
+                           .target = r->target_surface,
+                           .flipped = r->flipped,
+                           .links = r->links,
+                           .nlinks = r->nlinks,
+                           .tie = r->tie,
+                           .nties = r->nties,
+                           .threads = r->in->threads,
+                           .step = step,
+                           .context = context};
     return vgi_fit(&f, r->x, e);
 }
 
@@ -461,23 +483,26 @@ static int check_input(const vg_register_input *in, vg_err *e)
         if (!source && m->target < in->target->nv) continue;
         if (m->name) snprintf(which, sizeof which, "marker '%.60s'", m->name);
         else snprintf(which, sizeof which, "the marker of line %zu", m->line);
-        return vg_fail(e, VG_EINPUT, "%s names vertex %u, but the %s has %zu vertices", which, source ? m->source : m->target,
-                       source ? "source" : "target", source ? in->source->nv : in->target->nv);
+        return vg_fail(e, VG_EINPUT, "%s names vertex %u, but the %s has %zu vertices", which,
+                       source ? m->source : m->target, source ? "source" : "target",
+                       source ? in->source->nv : in->target->nv);
     }
     for (size_t i = 0; i < in->nseeds; i++) {
         const vg_seed *s = &in->seeds[i];
         size_t own = in->seeds_of_source ? in->source->nv : in->target->nv;
         size_t other = in->seeds_of_source ? in->target->nv : in->source->nv;
         if (s->vertex >= own || s->on[0] >= other || s->on[1] >= other || s->on[2] >= other)
-            return vg_fail(e, VG_EINPUT, "the dense correspondence of vertex %u does not fit the meshes: are the two interchanged?",
+            return vg_fail(e, VG_EINPUT,
+                           "the dense correspondence of vertex %u does not fit the meshes: are the two interchanged?",
                            s->vertex);
     }
-    if (in->source->nf == 0 || in->target->nf == 0) return vg_fail(e, VG_EINPUT, "a mesh without faces cannot be registered");
+    if (in->source->nf == 0 || in->target->nf == 0)
+        return vg_fail(e, VG_EINPUT, "a mesh without faces cannot be registered");
     return VG_OK;
 }
 
-int vg_register(vg_register_result *out, const vg_register_input *in, void (*step)(void *context, const vg_register_step *step),
-                void *context, vg_err *e)
+int vg_register(vg_register_result *out, const vg_register_input *in,
+                void (*step)(void *context, const vg_register_step *step), void *context, vg_err *e)
 {
     struct registration r = {.in = in, .out = out};
     *out = (vg_register_result){0};

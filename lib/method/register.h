@@ -1,5 +1,6 @@
-/* register.h: what the parts of registration share: 3 x 3 matrices, the fit of one surface to another, the pairing of faces.
- * Internal; what a program may call is vg_register in vg.h. All lengths in here are in units of the target's D.
+/* register.h: what the parts of registration share: 3 x 3 matrices, the fit of one surface to another, the pairing of
+ * faces. Internal; what a program may call is vg_register in vg.h. All lengths in here are in units of the target's
+ * D.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_REGISTER_H
 #define VG_REGISTER_H
@@ -15,7 +16,8 @@ static inline void vgi_multiply_vector(const double m[9], const double x[3], dou
     double c = m[6] * x[0] + m[7] * x[1] + m[8] * x[2];
     y[0] = a, y[1] = b, y[2] = c;
 }
-static inline void vgi_add_outer(double m[9], double scale, const double a[3], const double b[3]) /* m += scale a b' */
+/* m += scale a b' */
+static inline void vgi_add_outer(double m[9], double scale, const double a[3], const double b[3])
 {
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) m[3 * i + k] += scale * a[i] * b[k];
@@ -33,8 +35,8 @@ static inline double vgi_square(const double a[3], const double b[3]) /* squared
     return x * x + y * y + z * z;
 }
 
-/* A point of the source, share-weighted mean of up to three vertices (the same one thrice for a vertex), that belongs at a
- * point of space, with a weight: 1 is as firm as the surface is stiff in the end. */
+/* A point of the source, share-weighted mean of up to three vertices (the same one thrice for a vertex), that belongs
+ * at a point of space, with a weight: 1 is as firm as the surface is stiff in the end. */
 typedef struct vgi_tie {
     uint32_t vertex[3];
     double share[3], point[3], weight;

@@ -1,13 +1,14 @@
 /* sparse.c: symmetric positive definite systems through CHOLMOD: one analysis, many factorisations.
- * BLAS runs alone here: these systems are too small for more threads, and the last digits must not depend on their number.
- * Leaves out assembling them. Calls Core, Cholesky, Partition (LGPL) and Supernodal (GPL) of CHOLMOD.
+ * BLAS runs alone here: these systems are too small for more threads, and the last digits must not depend on their
+ * number. Leaves out assembling them. Calls Core, Cholesky, Partition (LGPL) and Supernodal (GPL) of CHOLMOD.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/sparse.h"
 
 #include <cholmod.h>
 #include <stdlib.h>
 
-enum { SMALL = 500 }; /* below this many unknowns a minimum-degree order is as good as nested dissection, and faster */
+/* Below this many unknowns a minimum-degree order is as good as nested dissection, and faster. */
+enum { SMALL = 500 };
 
 struct vgi_cholesky {
     cholmod_common common;
@@ -95,8 +96,10 @@ int vgi_cholesky_solve(vgi_cholesky *c, double *x, vg_err *e)
     size_t n = c->L->n;
     for (size_t i = 0; i < n; i++)
         for (size_t k = 0; k < 3; k++) c->b[k * n + i] = x[3 * i + k];
-    cholmod_dense B = {.nrow = n, .ncol = 3, .nzmax = 3 * n, .d = n, .x = c->b, .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
-    int threads = blas_threads(1), done = cholmod_solve2(CHOLMOD_A, c->L, &B, NULL, &c->x, NULL, &c->y, &c->e, &c->common);
+    cholmod_dense B = {
+        .nrow = n, .ncol = 3, .nzmax = 3 * n, .d = n, .x = c->b, .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
+    int threads = blas_threads(1);
+    int done = cholmod_solve2(CHOLMOD_A, c->L, &B, NULL, &c->x, NULL, &c->y, &c->e, &c->common);
     blas_threads(threads);
     if (!done) return vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", n);
     const double *from = c->x->x;

@@ -16,7 +16,8 @@ struct triangle {
     bool flat;       /* no area: only its edges count */
 };
 
-/* Node i has the children 2i and 2i + 1; the node at place k of depth d holds the triangles n k / 2^d to n (k + 1) / 2^d. */
+/* Node i has the children 2i and 2i + 1; the node at place k of depth d holds the triangles n k / 2^d to
+ * n (k + 1) / 2^d. */
 struct box {
     double least[3], most[3];
 };
@@ -40,7 +41,8 @@ static double dot(const double a[3], const double b[3])
 
 void vgi_newell(const double *points, const uint32_t *vert, size_t r, double area[3])
 {
-    const double *o = points + 3 * (size_t)vert[0]; /* relative to a corner, so that far from the origin no digits are lost */
+    /* relative to a corner, so that far from the origin no digits are lost */
+    const double *o = points + 3 * (size_t)vert[0];
     area[0] = area[1] = area[2] = 0;
     for (size_t i = 1; i + 1 < r; i++) {
         const double *p = points + 3 * (size_t)vert[i], *q = points + 3 * (size_t)vert[i + 1];
@@ -73,8 +75,8 @@ static bool find_borders(vgi_surface *s, vg_err *e)
     return true;
 }
 
-static void set_triangle(struct triangle *t, const double *a, const double *b, const double *c, size_t face, size_t corner,
-                         uint8_t borders)
+static void set_triangle(struct triangle *t, const double *a, const double *b, const double *c, size_t face,
+                         size_t corner, uint8_t borders)
 {
     double area[3];
     for (int k = 0; k < 3; k++) t->a[k] = a[k], t->ab[k] = b[k] - a[k], t->ac[k] = c[k] - a[k];
@@ -114,8 +116,8 @@ static void make_triangles(vgi_surface *s, const double *points)
             set_triangle(t++, p, q, points + 3 * (size_t)vert[2], f, begin, edges);
         } else {
             for (size_t i = 0; i < r; i++)
-                set_triangle(t++, points + 3 * (size_t)vert[i], points + 3 * (size_t)vert[i + 1 < r ? i + 1 : 0], C, f, begin + i,
-                             border[i]);
+                set_triangle(t++, points + 3 * (size_t)vert[i], points + 3 * (size_t)vert[i + 1 < r ? i + 1 : 0], C,
+                             f, begin + i, border[i]);
         }
     }
 }
@@ -266,7 +268,8 @@ int vgi_surface_new(vgi_surface **out, const vg_mesh *m, const double *points, v
     s->vertex_normal = vgi_array(m->nv, 3 * sizeof *s->vertex_normal, e);
     s->border = vgi_array(vg_mesh_corners(m), 1, e);
     s->triangle = vgi_array_raw(s->n, sizeof *s->triangle, e);
-    bool ok = s->normal && s->centroid && s->size && s->vertex_normal && s->border && s->triangle && find_borders(s, e);
+    bool ok =
+        s->normal && s->centroid && s->size && s->vertex_normal && s->border && s->triangle && find_borders(s, e);
     if (ok) {
         make_triangles(s, points);
         make_vertex_normals(s);
@@ -340,7 +343,8 @@ static double on_segment(const double o[3], const double d[3], const double p[3]
     return dd > 0 ? clamp01(dot(op, d) / dd) : 0;
 }
 
-static void try_edge(const struct triangle *t, const double p[3], int edge, double *best, double u[2], uint8_t *touched)
+static void try_edge(const struct triangle *t, const double p[3], int edge, double *best, double u[2],
+                     uint8_t *touched)
 {
     double bc[3], b[3], share, x[2], square = 0;
     for (int k = 0; k < 3; k++) b[k] = t->a[k] + t->ab[k], bc[k] = t->ac[k] - t->ab[k];
@@ -355,7 +359,8 @@ static void try_edge(const struct triangle *t, const double p[3], int edge, doub
     else if (!(square > *best)) *touched |= (uint8_t)(1 << edge); /* a corner: both edges */
 }
 
-/* Squared distance of p from a triangle; u: the nearest point as a + u0 ab + u1 ac; touched: the edges that it is on. */
+/* Squared distance of p from a triangle; u: the nearest point as a + u0 ab + u1 ac; touched: the edges that it is
+ * on. */
 static double triangle_distance(const struct triangle *t, const double p[3], double u[2], uint8_t *touched)
 {
     double best = INFINITY;
@@ -388,27 +393,31 @@ static const double *corner_normal(const vgi_surface *s, uint32_t corner)
 }
 
 /* On sharp edges and tips the vertex normals are those of the surface, not those of the faces that meet there. */
-static bool fits(const vgi_surface *s, const struct triangle *t, const double u[2], const double *normal, double cosine)
+static bool fits(const vgi_surface *s, const struct triangle *t, const double u[2], const double *normal,
+                 double cosine)
 {
     const double *n = s->normal + 3 * (size_t)t->face;
     if (!normal || !(dot(n, n) > 0) || dot(n, normal) >= cosine) return true;
-    uint32_t begin = s->m->start[t->face], r = s->m->start[t->face + 1] - begin, next = begin + (t->corner - begin + 1) % r;
-    const double *a = corner_normal(s, t->corner), *b = corner_normal(s, next), *c = r == 3 ? corner_normal(s, begin + 2) : n;
+    uint32_t begin = s->m->start[t->face], r = s->m->start[t->face + 1] - begin,
+             next = begin + (t->corner - begin + 1) % r;
+    const double *a = corner_normal(s, t->corner), *b = corner_normal(s, next),
+                 *c = r == 3 ? corner_normal(s, begin + 2) : n;
     double smooth[3];
     for (int k = 0; k < 3; k++) smooth[k] = (1 - u[0] - u[1]) * a[k] + u[0] * b[k] + u[1] * c[k];
     double length = sqrt(dot(smooth, smooth));
     return length > 0 && dot(smooth, normal) >= cosine * length;
 }
 
-static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const double p[3], const double *normal, double cosine,
-                     double *best, vgi_hit *hit)
+static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const double p[3], const double *normal,
+                     double cosine, double *best, vgi_hit *hit)
 {
     for (size_t i = begin; i < end; i++) {
         const struct triangle *t = &s->triangle[i];
         double u[2] = {0, 0};
         uint8_t touched;
         double square = triangle_distance(t, p, u, &touched);
-        if (!(square <= *best) || (!(square < *best) && t->face >= hit->face) || !fits(s, t, u, normal, cosine)) continue;
+        if (!(square <= *best) || (!(square < *best) && t->face >= hit->face) || !fits(s, t, u, normal, cosine))
+            continue;
         *best = square;
         *hit = (vgi_hit){.face = t->face, .square = square, .border = touched & t->borders,
                          .corner = t->corner, .u = {u[0], u[1]}};

@@ -180,7 +180,8 @@ setup() {
         if (n == most && a < analyse) analyse = a
         if (n == most && f < factor) factor = f
     }
-    END { printf "%-28s %12.3f %10.3f %9.3f %9.3f %14d %6d\n", input, both, all, analyse, factor, most, mib }' facts >>setups
+    END { printf "%-28s %12.3f %10.3f %9.3f %9.3f %14d %6d\n", input, both, all, analyse, factor, most, mib }
+    ' facts >>setups
 }
 
 # grows STAGE COMMAND-FOR-N COMMAND-FOR-4N

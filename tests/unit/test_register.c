@@ -1,6 +1,6 @@
-/* test_register.c: nearest points on polygons, sparse systems, markers as text, and registration: a mesh to itself, to a turned and
- * re-triangulated copy, to another body; wrong markers, parts without counterpart, bones, texture coordinates.
- * SPDX-License-Identifier: GPL-3.0-or-later */
+/* test_register.c: nearest points on polygons, sparse systems, markers as text, and registration: a mesh to itself,
+ * to a turned and re-triangulated copy, to another body; wrong markers, parts without counterpart, bones, texture
+ * coordinates. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
 #include "method/sparse.h"
 #include "method/surface.h"
@@ -62,7 +62,8 @@ static vg_register_result registered(const vg_register_input *in)
 /* What every correspondence keeps. */
 static void check_whole(const vg_correspondence *c, const vg_head *a, const vg_head *b)
 {
-    CHECK(c->source_nf == a->mesh.nf && c->target_nf == b->mesh.nf && c->source_nv == a->mesh.nv && c->target_nv == b->mesh.nv);
+    CHECK(c->source_nf == a->mesh.nf && c->target_nf == b->mesh.nf && c->source_nv == a->mesh.nv &&
+          c->target_nv == b->mesh.nv);
     CHECK(c->source_digest == vg_mesh_digest(&a->mesh) && c->target_digest == vg_mesh_digest(&b->mesh));
     bool driven = true, fair = true, known = true;
     for (size_t f = 0; f < c->target_nf; f++) {
@@ -167,7 +168,8 @@ static void nearest_points_by_normal(void)
     vg_head_clear(&h);
 }
 
-/* A chain of springs, both ends held: the solution is a straight line; then the numbers change and the pattern stays. */
+/* A chain of springs, both ends held: the solution is a straight line; then the numbers change and the pattern stays.
+ */
 static void sparse_systems(void)
 {
     enum { N = 700 };
@@ -246,7 +248,8 @@ static void seeds_as_text(void)
     CHECK(s[0].vertex == 3 && s[0].on[2] == 5 && s[0].weight[2] == 0.5 && s[1].vertex == 7);
     CHECK_NEAR(s[1].weight[0] + s[1].weight[1] + s[1].weight[2], 1, 1e-15);
     free(s);
-    static const char *const wrong[] = {"1 -\n", "1 2 3\n", "1 2 3 4 1 0 nan", "1 2 3 4 0 0 0", "1 2 3 4 9 9 9", "1 2 x 4 1 0 0"};
+    static const char *const wrong[] = {"1 -\n",         "1 2 3\n",       "1 2 3 4 1 0 nan",
+                                        "1 2 3 4 0 0 0", "1 2 3 4 9 9 9", "1 2 x 4 1 0 0"};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
         CHECK(vg_seeds_read(&s, &n, wrong[i], strlen(wrong[i]), 0, "f", &e) == VG_EINPUT && !s && n == 0);
 }
@@ -268,7 +271,8 @@ static void check_identity(const vg_head *h)
 
 static void identity_on_real_meshes(void)
 {
-    static const char *const names[] = {"trex.rest.obj", "horse.rest.obj", "woman-tanktop.rest.obj", "walk-man.rest.obj.xz"};
+    static const char *const names[] = {"trex.rest.obj", "horse.rest.obj", "woman-tanktop.rest.obj",
+                                        "walk-man.rest.obj.xz"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         vg_head h = load(names[i]);
         check_identity(&h);
@@ -288,7 +292,8 @@ static void identity_on_generated_meshes(void)
     }
 }
 
-/* The mesh turned, scaled, moved; larger faces split into fans from a corner of their own; vertices and faces in another order. */
+/* The mesh turned, scaled, moved; larger faces split into fans from a corner of their own; vertices and faces in
+ * another order. */
 static vg_head disguise(const vg_head *h, const motion *t, uint32_t *to, bool turn_over)
 {
     const vg_mesh *m = &h->mesh;
@@ -342,14 +347,16 @@ static double mean_edge(const vg_head *h)
     for (size_t f = 0; f < h->mesh.nf; f++)
         for (uint32_t c = h->mesh.start[f]; c < h->mesh.start[f + 1]; c++) {
             uint32_t next = c + 1 < h->mesh.start[f + 1] ? c + 1 : h->mesh.start[f];
-            sum += farthest(h->reference + 3 * (size_t)h->mesh.vert[c], h->reference + 3 * (size_t)h->mesh.vert[next], 1);
+            sum += farthest(h->reference + 3 * (size_t)h->mesh.vert[c], h->reference + 3 * (size_t)h->mesh.vert[next],
+                            1);
         }
     return sum / (double)vg_mesh_corners(&h->mesh);
 }
 
 static void disguised_copies(void)
 {
-    static const char *const names[] = {"trex.rest.obj", "horse.rest.obj", "woman-tanktop.rest.obj", "walk-man.rest.obj.xz"};
+    static const char *const names[] = {"trex.rest.obj", "horse.rest.obj", "woman-tanktop.rest.obj",
+                                        "walk-man.rest.obj.xz"};
     for (size_t i = 0; i < 2 * sizeof names / sizeof *names; i++) {
         vg_head h = load(names[i / 2]);
         uint32_t *to = room(h.mesh.nv, sizeof *to);
@@ -386,7 +393,8 @@ static void another_body(void)
     double D = vg_diagonal(woman.reference, woman.mesh.nv), worst = 0;
     for (size_t i = 0; i < m.n; i++) {
         CHECK(!r.left_out[i]);
-        worst = fmax(worst, farthest(r.fitted + 3 * (size_t)m.at[i].source, woman.reference + 3 * (size_t)m.at[i].target, 1));
+        worst = fmax(
+            worst, farthest(r.fitted + 3 * (size_t)m.at[i].source, woman.reference + 3 * (size_t)m.at[i].target, 1));
     }
     CHECK(worst < 0.01 * D);
     CHECK(median_distance(&r.pairs) < 0.25 * mean_edge(&woman));
@@ -442,11 +450,14 @@ static int refused(const vg_register_input *in, const char *message)
 static void refusals(void)
 {
     vg_head h = make_torus(9, 7), none = new_shape(), point = make_torus(9, 7);
-    vg_markers two = read_markers("0 0\n1 1\n", 0), line = read_markers("0 0\n1 1\n0 0\n1 1\n", 0), far = read_markers("a 0 63", 0);
+    vg_markers two = read_markers("0 0\n1 1\n", 0), line = read_markers("0 0\n1 1\n0 0\n1 1\n", 0),
+               far = read_markers("a 0 63", 0);
     vg_register_input in = between(&h, &h, &two);
-    CHECK(refused(&in, "2 pairs do not say how the meshes lie: give at least three that are not in line") == VG_EINPUT);
+    CHECK(refused(&in, "2 pairs do not say how the meshes lie: give at least three that are not in line") ==
+          VG_EINPUT);
     in.markers = &line;
-    CHECK(refused(&in, "4 pairs do not say how the meshes lie: give at least three that are not in line") == VG_EINPUT);
+    CHECK(refused(&in, "4 pairs do not say how the meshes lie: give at least three that are not in line") ==
+          VG_EINPUT);
     in.markers = &far;
     CHECK(refused(&in, "marker 'a' names vertex 63, but the target has 63 vertices") == VG_EINPUT);
     in = between(&h, &none, &two);
@@ -458,7 +469,8 @@ static void refusals(void)
     vg_seed seed = {0, {1, 2, 63}, {1, 0, 0}};
     in = between(&h, &h, NULL);
     in.seeds = &seed, in.nseeds = 1;
-    CHECK(refused(&in, "the dense correspondence of vertex 0 does not fit the meshes: are the two interchanged?") == VG_EINPUT);
+    CHECK(refused(&in, "the dense correspondence of vertex 0 does not fit the meshes: are the two interchanged?") ==
+          VG_EINPUT);
     vg_head away = make_torus(9, 7);
     for (size_t i = 0; i < away.mesh.nv; i++) away.reference[3 * i] += 100;
     in = between(&h, &away, NULL);
@@ -582,8 +594,13 @@ static void texture_coordinates(void)
     vg_attributes ta = torus_texture(&a, U, V), tb = torus_texture(&b, U2, V2);
     motion t = turn(2, 5, -1);
     double *moved = move_points(&t, b.reference, b.mesh.nv);
-    vg_register_input in = {.source = &a.mesh, .target = &b.mesh, .source_points = a.reference, .target_points = moved,
-                            .source_uv = &ta, .target_uv = &tb, .threads = 2};
+    vg_register_input in = {.source = &a.mesh,
+                            .target = &b.mesh,
+                            .source_points = a.reference,
+                            .target_points = moved,
+                            .source_uv = &ta,
+                            .target_uv = &tb,
+                            .threads = 2};
     vg_register_result r = registered(&in);
     check_whole(&r.pairs, &a, &b);
     CHECK(r.uv_pairs == U * V);
@@ -609,7 +626,8 @@ static void dense_seeds(void)
     for (uint32_t i = 0; i < b.mesh.nv; i++) {
         const uint32_t *v = a.mesh.vert + 4 * i; /* target vertex i: half way along the diagonal of source face i */
         seed[i] = (vg_seed){i, {v[0], v[2], v[0]}, {0.5, 0.5, 0}};
-        for (size_t k = 0; k < 3; k++) b.reference[3 * i + k] = 0.5 * (a.reference[3 * (size_t)v[0] + k] + a.reference[3 * (size_t)v[2] + k]);
+        for (size_t k = 0; k < 3; k++)
+            b.reference[3 * i + k] = 0.5 * (a.reference[3 * (size_t)v[0] + k] + a.reference[3 * (size_t)v[2] + k]);
     }
     double *moved = move_points(&t, b.reference, b.mesh.nv);
     for (int reverse = 0; reverse < 2; reverse++) {
@@ -634,8 +652,8 @@ static void dense_seeds(void)
 
 TESTS({"nearest points", nearest_points}, {"nearest points by normal", nearest_points_by_normal},
       {"sparse systems", sparse_systems}, {"markers as text", markers_as_text}, {"seeds as text", seeds_as_text},
-      {"identity on real meshes", identity_on_real_meshes}, {"identity on generated meshes", identity_on_generated_meshes},
-      {"disguised copies", disguised_copies}, {"another body", another_body}, {"wrong markers", wrong_markers},
-      {"refusals", refusals}, {"degenerate faces", degenerate_faces},
-      {"parts without counterpart", parts_without_counterpart}, {"holes", holes}, {"bones", bones},
-      {"texture coordinates", texture_coordinates}, {"dense seeds", dense_seeds})
+      {"identity on real meshes", identity_on_real_meshes},
+      {"identity on generated meshes", identity_on_generated_meshes}, {"disguised copies", disguised_copies},
+      {"another body", another_body}, {"wrong markers", wrong_markers}, {"refusals", refusals},
+      {"degenerate faces", degenerate_faces}, {"parts without counterpart", parts_without_counterpart},
+      {"holes", holes}, {"bones", bones}, {"texture coordinates", texture_coordinates}, {"dense seeds", dense_seeds})

@@ -1,0 +1,585 @@
+/* segment.c: faces that turn alike, by K-means over their rotations (T 6.2), and patches that hang together.
+ * Leaves out how the rotation of a face is measured (rotation_fit.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/segment.h"
+#include "method/product.h"
+#include "method/rotation_fit.h"
+#include "model/incidence.h"
+#include "model/sets.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum {
+    WIDTH = 1024,  /* numbers kept of a face's rotations */
+    ROUNDS = 40,
+    CHUNK = 256,   /* faces of one task */
+    STRIPE = 64    /* dimensions of one task */
+};
+static const double enough = 10; /* degrees, for the choice of the number of patches */
+
+typedef float floats __attribute__((vector_size(64)));
+enum { FLOATS = 16 };
+
+struct vg_segmenter {
+    const vg_mesh *mesh;
+    vgi_turns turns;
+    int threads;
+    size_t poses;
+    float *feature; /* nf x width */
+    size_t width;   /* WIDTH until it is cut down to what is used */
+};
+
+static uint64_t mix(uint64_t x) /* splitmix64 (Vigna, public domain) */
+{
+    x += 0x9e3779b97f4a7c15u;
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    return x ^ (x >> 31);
+}
+
+int vg_segmenter_new(vg_segmenter **out, const vg_mesh *m, const double *reference, int threads, vg_err *e)
+{
+    *out = NULL;
+    if (m->nf == 0) return vg_fail(e, VG_EINPUT, "there are no faces to make patches of");
+    vg_segmenter *s = *out = vgi_array(1, sizeof *s, e);
+    if (!s) return VG_ENOMEM;
+    s->mesh = m, s->threads = threads, s->width = WIDTH;
+    int r = vgi_turns_make(&s->turns, m->nf, m->start, m->vert, reference, e);
+    size_t n;
+    if (r == VG_OK && !vgi_mul(m->nf, WIDTH, &n)) r = vg_fail(e, VG_ENOMEM, "not enough memory for %zu faces", m->nf);
+    if (r == VG_OK && !(s->feature = vgi_array(n, sizeof *s->feature, e))) r = VG_ENOMEM;
+    if (r < 0) vg_segmenter_free(out);
+    return r;
+}
+
+void vg_segmenter_free(vg_segmenter **s)
+{
+    if (!*s) return;
+    vgi_turns_clear(&(*s)->turns);
+    free((*s)->feature);
+    free(*s);
+    *s = NULL;
+}
+
+/* ---- features ---- */
+
+typedef struct adding {
+    vg_segmenter *s;
+    const double *poses[VGI_LANES];
+    size_t lanes;
+    uint32_t at[9 * VGI_LANES]; /* where number i of pose k goes, and with which sign */
+    float sign[9 * VGI_LANES];
+} adding;
+
+static void add_chunk(void *context, size_t i)
+{
+    const adding *a = context;
+    const vg_segmenter *s = a->s;
+    size_t first = i * CHUNK, last = first + CHUNK < s->turns.nf ? first + CHUNK : s->turns.nf;
+    for (size_t f = first; f < last; f++) {
+        vgi_lanes r[9];
+        float *to = s->feature + f * WIDTH;
+        vgi_turns_measure(&s->turns, f, a->poses, r);
+        for (size_t k = 0; k < a->lanes; k++)
+            for (size_t n = 0; n < 9; n++) to[a->at[9 * k + n]] += a->sign[9 * k + n] * (float)(r[n][k] - (n % 4 == 0));
+    }
+}
+
+/* The first features have a place of their own; later ones are added to one of them, chosen by chance, with a random sign. */
+void vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses)
+{
+    for (size_t p = 0; p < n; p += VGI_LANES) {
+        adding a = {.s = s, .lanes = n - p < VGI_LANES ? n - p : VGI_LANES};
+        for (size_t k = 0; k < VGI_LANES; k++) a.poses[k] = poses[p + (k < a.lanes ? k : a.lanes - 1)];
+        for (size_t k = 0; k < 9 * a.lanes; k++) {
+            uint64_t index = 9 * (uint64_t)s->poses + k, chance = mix(index);
+            a.at[k] = (uint32_t)(index < WIDTH ? index : chance % WIDTH);
+            a.sign[k] = index < WIDTH || chance >> 63 ? 1 : -1;
+        }
+        vgi_parallel(s->threads, (s->turns.nf + CHUNK - 1) / CHUNK, add_chunk, &a);
+        s->poses += a.lanes;
+    }
+}
+
+/* Rows as short as what is in use, in whole vectors. */
+static void cut_down(vg_segmenter *s)
+{
+    size_t used = 9 * s->poses < WIDTH ? 9 * s->poses : WIDTH, width = (used + FLOATS - 1) / FLOATS * FLOATS;
+    if (width == 0) width = FLOATS;
+    if (width >= s->width) return;
+    for (size_t f = 1; f < s->turns.nf; f++) memmove(s->feature + f * width, s->feature + f * s->width, width * sizeof *s->feature);
+    s->width = width;
+}
+
+/* ---- K-means ---- */
+
+typedef struct clustering {
+    const vg_segmenter *s;
+    size_t n, k;           /* faces, patches */
+    uint32_t *label;
+    float *nearest;        /* squared distance to the nearest centre */
+    float *norm;           /* per face: squared length of its feature */
+    float *centre;         /* most x width */
+    float *centre_norm;
+    double *sums;          /* per chunk of faces */
+    uint32_t *sizes;
+    float *products;       /* a chunk's, per chunk of faces: CHUNK x most */
+    size_t most, changed;
+    uint32_t *chunk_changed;
+    const float *fresh;    /* the centre that was added last */
+    uint32_t fresh_label;
+} clustering;
+
+static size_t chunks(const clustering *c)
+{
+    return (c->n + CHUNK - 1) / CHUNK;
+}
+
+static float inner(const float *a, const float *b, size_t n)
+{
+    floats sum[2] = {{0}, {0}};
+    size_t i = 0;
+    for (; i + FLOATS <= n; i += FLOATS) {
+        floats x, y;
+        memcpy(&x, a + i, sizeof x);
+        memcpy(&y, b + i, sizeof y);
+        sum[i / FLOATS % 2] += x * y;
+    }
+    sum[0] += sum[1];
+    float total = 0;
+    for (int k = 0; k < FLOATS; k++) total += sum[0][k];
+    return total;
+}
+
+/* Distances to the centre that was added last; the sum of the nearest ones, chunk by chunk so that it does not depend on threads. */
+static void near_chunk(void *context, size_t i)
+{
+    clustering *c = context;
+    size_t first = i * CHUNK, last = first + CHUNK < c->n ? first + CHUNK : c->n, width = c->s->width;
+    float square = inner(c->fresh, c->fresh, width);
+    double sum = 0;
+    for (size_t f = first; f < last; f++) {
+        float d = c->norm[f] + square - 2 * inner(c->s->feature + f * width, c->fresh, width);
+        if (!(d > 1e-6f * (c->norm[f] + square))) d = 0; /* what rounding leaves of the same feature */
+        if (d < c->nearest[f]) c->nearest[f] = d, c->label[f] = c->fresh_label;
+        sum += (double)c->nearest[f];
+    }
+    c->sums[i] = sum;
+}
+
+static double add_up(const clustering *c)
+{
+    double sum = 0;
+    for (size_t i = 0; i < chunks(c); i++) sum += c->sums[i];
+    return sum;
+}
+
+/* The face at which the running sum of squared distances passes `at`. */
+static size_t draw(const clustering *c, double at)
+{
+    size_t i = 0, last = 0;
+    while (i + 1 < chunks(c) && at >= c->sums[i]) at -= c->sums[i++];
+    for (size_t f = i * CHUNK; f < c->n; f++) {
+        if (!(c->nearest[f] > 0)) continue;
+        last = f;
+        if ((at -= (double)c->nearest[f]) < 0) break;
+    }
+    return last;
+}
+
+static void add_centre(clustering *c, size_t face)
+{
+    size_t width = c->s->width;
+    float *to = c->centre + c->k * width;
+    memcpy(to, c->s->feature + face * width, width * sizeof *to);
+    c->fresh = to, c->fresh_label = (uint32_t)c->k++;
+    vgi_parallel(c->s->threads, chunks(c), near_chunk, c);
+}
+
+/* k-means++ (Arthur and Vassilvitskii 2007). Goes on from the centres that are there. */
+static void seed_centres(clustering *c, size_t k, uint64_t seed)
+{
+    if (c->k == 0) add_centre(c, (size_t)(mix(seed) % c->n));
+    while (c->k < k) {
+        double sum = add_up(c), share = (double)(mix(seed ^ mix(c->k)) >> 11) * 0x1p-53;
+        if (!(sum > 0)) break; /* every face turns like one of the centres */
+        size_t face = draw(c, share * sum);
+        if (!(c->nearest[face] > 0)) break;
+        add_centre(c, face);
+    }
+}
+
+static void assign_chunk(void *context, size_t i)
+{
+    clustering *c = context;
+    size_t first = i * CHUNK, n = c->n - first < CHUNK ? c->n - first : CHUNK, width = c->s->width;
+    float *dot = c->products + i * CHUNK * c->most;
+    vgi_product_single_transposed(n, c->k, width, c->s->feature + first * width, width, c->centre, width, dot, c->most);
+    double sum = 0;
+    uint32_t changed = 0;
+    for (size_t f = 0; f < n; f++) {
+        uint32_t best = 0;
+        float least = INFINITY;
+        for (size_t k = 0; k < c->k; k++) {
+            float d = c->centre_norm[k] - 2 * dot[f * c->most + k];
+            if (d < least) least = d, best = (uint32_t)k;
+        }
+        least += c->norm[first + f];
+        changed += c->label[first + f] != best;
+        c->label[first + f] = best;
+        c->nearest[first + f] = least > 0 ? least : 0;
+        sum += (double)c->nearest[first + f];
+    }
+    c->sums[i] = sum, c->chunk_changed[i] = changed;
+}
+
+static void mean_stripe(void *context, size_t i)
+{
+    clustering *c = context;
+    size_t width = c->s->width, first = i * STRIPE, n = width - first < STRIPE ? width - first : STRIPE;
+    for (size_t k = 0; k < c->k; k++) memset(c->centre + k * width + first, 0, n * sizeof *c->centre);
+    for (size_t f = 0; f < c->n; f++) {
+        const float *x = c->s->feature + f * width + first;
+        float *to = c->centre + c->label[f] * width + first;
+        for (size_t j = 0; j < n; j++) to[j] += x[j];
+    }
+    for (size_t k = 0; k < c->k; k++)
+        for (size_t j = 0; j < n && c->sizes[k]; j++) c->centre[k * width + first + j] /= (float)c->sizes[k];
+}
+
+/* A patch that has lost its faces gets the one that fits worst where it is. */
+static void fill_empty(clustering *c)
+{
+    memset(c->sizes, 0, c->k * sizeof *c->sizes);
+    for (size_t f = 0; f < c->n; f++) c->sizes[c->label[f]]++;
+    for (size_t k = 0; k < c->k; k++) {
+        if (c->sizes[k]) continue;
+        size_t worst = c->n;
+        for (size_t f = 0; f < c->n; f++)
+            if (c->sizes[c->label[f]] > 1 && (worst == c->n || c->nearest[f] > c->nearest[worst])) worst = f;
+        if (worst == c->n) continue;
+        c->sizes[c->label[worst]]--;
+        c->label[worst] = (uint32_t)k, c->nearest[worst] = 0, c->sizes[k] = 1;
+    }
+}
+
+static size_t iterate(clustering *c, double *objective)
+{
+    double before = INFINITY;
+    size_t round = 0;
+    for (; round < ROUNDS; round++) {
+        fill_empty(c);
+        vgi_parallel(c->s->threads, (c->s->width + STRIPE - 1) / STRIPE, mean_stripe, c);
+        for (size_t k = 0; k < c->k; k++)
+            c->centre_norm[k] = inner(c->centre + k * c->s->width, c->centre + k * c->s->width, c->s->width);
+        int blas = vgi_product_begin();
+        vgi_parallel(c->s->threads, chunks(c), assign_chunk, c);
+        vgi_product_end(blas);
+        *objective = add_up(c);
+        c->changed = 0;
+        for (size_t i = 0; i < chunks(c); i++) c->changed += c->chunk_changed[i];
+        if (c->changed == 0 || *objective > before * (1 - 1e-4)) break;
+        before = *objective;
+    }
+    fill_empty(c);
+    return round;
+}
+
+/* |R - S|^2 is 8 sin^2(angle / 2) for each pose. */
+static double angle_of(const clustering *c, double objective)
+{
+    double square = c->s->poses ? objective / (8.0 * (double)c->n * (double)c->s->poses) : 0;
+    return 2 * asin(sqrt(square < 1 ? square : 1)) * 57.29577951308232;
+}
+
+static void clear_clustering(clustering *c)
+{
+    free(c->label);
+    free(c->nearest);
+    free(c->norm);
+    free(c->centre);
+    free(c->centre_norm);
+    free(c->sums);
+    free(c->sizes);
+    free(c->products);
+    free(c->chunk_changed);
+}
+
+static int make_clustering(clustering *c, const vg_segmenter *s, size_t most, vg_err *e)
+{
+    size_t n = s->turns.nf;
+    *c = (clustering){.s = s, .n = n, .most = most};
+    c->label = vgi_array(n, sizeof *c->label, e);
+    c->nearest = vgi_array(n, sizeof *c->nearest, e);
+    c->norm = vgi_array(n, sizeof *c->norm, e);
+    c->centre = vgi_array(most, s->width * sizeof *c->centre, e);
+    c->centre_norm = vgi_array(most, sizeof *c->centre_norm, e);
+    c->sums = vgi_array(chunks(c), sizeof *c->sums, e);
+    c->sizes = vgi_array(most, sizeof *c->sizes, e);
+    c->products = vgi_array_raw(chunks(c) * CHUNK, most * sizeof *c->products, e);
+    c->chunk_changed = vgi_array(chunks(c), sizeof *c->chunk_changed, e);
+    if (!c->label || !c->nearest || !c->norm || !c->centre || !c->centre_norm || !c->sums || !c->sizes || !c->products ||
+        !c->chunk_changed) {
+        clear_clustering(c);
+        return VG_ENOMEM;
+    }
+    for (size_t f = 0; f < n; f++) {
+        const float *x = s->feature + f * s->width;
+        c->norm[f] = inner(x, x, s->width), c->nearest[f] = INFINITY;
+    }
+    return VG_OK;
+}
+
+/* ---- pieces ---- */
+
+int vgi_connected_pieces(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label, size_t nlabels,
+                         uint32_t *piece, size_t *count, vg_err *e)
+{
+    vgi_incidence around;
+    int r = vgi_incidence_make(&around, nv, nf, start, vert, e);
+    if (r < 0) return r;
+    uint32_t *at = vgi_array_raw(nlabels, sizeof *at, e), *last = vgi_array_raw(nlabels, sizeof *last, e);
+    uint32_t *number = vgi_array_raw(nf, sizeof *number, e);
+    if (at && last && number) {
+        memset(at, 0xff, nlabels * sizeof *at); /* the vertex at which a label was last seen, and in which face */
+        vgi_sets_init(piece, nf);
+        for (size_t v = 0; v < nv; v++)
+            for (uint32_t i = around.first[v]; i < around.first[v + 1]; i++) {
+                uint32_t f = around.face[i], k = label[f];
+                if (at[k] == v) vgi_sets_join(piece, f, last[k]);
+                at[k] = (uint32_t)v, last[k] = f;
+            }
+        *count = 0;
+        for (size_t f = 0; f < nf; f++) { /* the root of a set is its lowest face */
+            uint32_t root = vgi_sets_find(piece, (uint32_t)f);
+            if (root == f) number[f] = (uint32_t)(*count)++;
+        }
+        for (size_t f = nf; f-- > 0;) piece[f] = number[vgi_sets_find(piece, (uint32_t)f)];
+    } else {
+        r = VG_ENOMEM;
+    }
+    vgi_incidence_clear(&around);
+    free(at);
+    free(last);
+    free(number);
+    return r;
+}
+
+static int by_pair(const void *a, const void *b)
+{
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return x < y ? -1 : x > y;
+}
+
+int vgi_neighbours(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label, uint32_t (**pair)[2],
+                   uint32_t **shared, size_t *count, vg_err *e)
+{
+    enum { MOST = 32 }; /* labels looked at around one vertex */
+    vgi_incidence around;
+    uint64_t *all = NULL;
+    size_t n = 0, cap = 0;
+    *pair = NULL, *shared = NULL, *count = 0;
+    int r = vgi_incidence_make(&around, nv, nf, start, vert, e);
+    if (r < 0) return r;
+    for (size_t v = 0; r == VG_OK && v < nv; v++) {
+        uint32_t seen[MOST];
+        size_t nseen = 0;
+        for (uint32_t i = around.first[v]; i < around.first[v + 1] && nseen < MOST; i++) {
+            uint32_t k = label[around.face[i]];
+            size_t j = 0;
+            while (j < nseen && seen[j] != k) j++;
+            if (j == nseen) seen[nseen++] = k;
+        }
+        if (nseen > 1) r = vgi_grow(&all, &cap, n + nseen * nseen / 2 + 1, sizeof *all, e);
+        for (size_t a = 0; r == VG_OK && a < nseen; a++)
+            for (size_t b = 0; b < a; b++) {
+                uint32_t low = seen[a] < seen[b] ? seen[a] : seen[b], high = seen[a] ^ seen[b] ^ low;
+                all[n++] = (uint64_t)low << 32 | high;
+            }
+    }
+    vgi_incidence_clear(&around);
+    if (n) qsort(all, n, sizeof *all, by_pair);
+    if (r == VG_OK) {
+        *pair = vgi_array_raw(n, sizeof **pair, e), *shared = vgi_array(n, sizeof **shared, e);
+        if (!*pair || !*shared) r = VG_ENOMEM;
+    }
+    for (size_t i = 0; r == VG_OK && i < n; i++) {
+        if (i == 0 || all[i] != all[i - 1]) {
+            (*pair)[*count][0] = (uint32_t)(all[i] >> 32), (*pair)[*count][1] = (uint32_t)all[i];
+            (*count)++;
+        }
+        (*shared)[*count - 1]++;
+    }
+    free(all);
+    if (r < 0) {
+        free(*pair);
+        free(*shared);
+        *pair = NULL, *shared = NULL;
+    }
+    return r;
+}
+
+/* Joining pieces: the pair of neighbours whose union costs the least (Ward 1963), until `k` are left or none has a neighbour. */
+typedef struct joining {
+    const vg_segmenter *s;
+    size_t n;           /* pieces at the start */
+    double *mean;       /* n x width */
+    double *size;
+    uint32_t *set;
+    uint32_t (*pair)[2];
+    double *cost;       /* of a pair */
+    size_t npairs;
+} joining;
+
+static double cost_of(const joining *j, uint32_t a, uint32_t b)
+{
+    double square = 0;
+    const double *x = j->mean + a * j->s->width, *y = j->mean + b * j->s->width;
+    for (size_t i = 0; i < j->s->width; i++) square += (x[i] - y[i]) * (x[i] - y[i]);
+    return square * j->size[a] * j->size[b] / (j->size[a] + j->size[b]);
+}
+
+static void join_pieces(joining *j, size_t k)
+{
+    for (size_t left = j->n; left > k && j->npairs; left--) {
+        size_t best = 0, width = j->s->width;
+        for (size_t i = 1; i < j->npairs; i++)
+            if (j->cost[i] < j->cost[best]) best = i;
+        uint32_t a = j->pair[best][0], b = j->pair[best][1];
+        double sum = j->size[a] + j->size[b];
+        for (size_t i = 0; i < width; i++)
+            j->mean[a * width + i] = (j->size[a] * j->mean[a * width + i] + j->size[b] * j->mean[b * width + i]) / sum;
+        j->size[a] = sum;
+        vgi_sets_join(j->set, a, b); /* a < b stays the name of both */
+        size_t n = 0;
+        for (size_t i = 0; i < j->npairs; i++) {
+            uint32_t x = vgi_sets_find(j->set, j->pair[i][0]), y = vgi_sets_find(j->set, j->pair[i][1]);
+            if (x == y) continue;
+            bool touched = x == a || y == a;
+            j->pair[n][0] = x < y ? x : y, j->pair[n][1] = x < y ? y : x;
+            j->cost[n] = touched ? cost_of(j, x, y) : j->cost[i];
+            n++;
+        }
+        j->npairs = n;
+    }
+}
+
+static int connect(const vg_segmenter *s, uint32_t *label, size_t nlabels, size_t k, size_t *count, vg_err *e)
+{
+    const vg_mesh *m = s->mesh;
+    joining j = {.s = s};
+    uint32_t *piece = vgi_array_raw(m->nf, sizeof *piece, e), *shared = NULL;
+    if (!piece) return VG_ENOMEM;
+    int r = vgi_connected_pieces(m->nv, m->nf, m->start, m->vert, label, nlabels, piece, &j.n, e);
+    if (r == VG_OK) r = vgi_neighbours(m->nv, m->nf, m->start, m->vert, piece, &j.pair, &shared, &j.npairs, e);
+    if (r == VG_OK) {
+        j.mean = vgi_array(j.n, s->width * sizeof *j.mean, e), j.size = vgi_array(j.n, sizeof *j.size, e);
+        j.set = vgi_array_raw(j.n, sizeof *j.set, e), j.cost = vgi_array(j.npairs, sizeof *j.cost, e);
+        if (!j.mean || !j.size || !j.set || !j.cost) r = VG_ENOMEM;
+    }
+    if (r == VG_OK) {
+        vgi_sets_init(j.set, j.n);
+        for (size_t f = 0; f < m->nf; f++) {
+            j.size[piece[f]]++;
+            for (size_t i = 0; i < s->width; i++) j.mean[piece[f] * s->width + i] += (double)s->feature[f * s->width + i];
+        }
+        for (size_t p = 0; p < j.n; p++)
+            for (size_t i = 0; i < s->width; i++) j.mean[p * s->width + i] /= j.size[p];
+        for (size_t i = 0; i < j.npairs; i++) j.cost[i] = cost_of(&j, j.pair[i][0], j.pair[i][1]);
+        join_pieces(&j, k);
+        for (size_t f = 0; f < m->nf; f++) label[f] = vgi_sets_find(j.set, piece[f]);
+        r = vgi_connected_pieces(m->nv, m->nf, m->start, m->vert, label, j.n, piece, count, e);
+        if (r == VG_OK) memcpy(label, piece, m->nf * sizeof *label);
+    }
+    free(piece);
+    free(shared);
+    free(j.pair);
+    free(j.mean);
+    free(j.size);
+    free(j.set);
+    free(j.cost);
+    return r;
+}
+
+/* Patches in the order of their first faces. */
+static int renumber(uint32_t *label, size_t nf, size_t *k, vg_err *e)
+{
+    uint32_t *number = vgi_array_raw(*k, sizeof *number, e);
+    if (!number) return VG_ENOMEM;
+    memset(number, 0xff, *k * sizeof *number);
+    uint32_t n = 0;
+    for (size_t f = 0; f < nf; f++) {
+        if (number[label[f]] == UINT32_MAX) number[label[f]] = n++;
+        label[f] = number[label[f]];
+    }
+    free(number);
+    *k = n;
+    return VG_OK;
+}
+
+/* Within patches as they have become by joining. */
+static double objective_of(clustering *c, size_t k)
+{
+    c->k = k;
+    fill_empty(c);
+    vgi_parallel(c->s->threads, (c->s->width + STRIPE - 1) / STRIPE, mean_stripe, c);
+    double sum = 0;
+    for (size_t f = 0; f < c->n; f++) {
+        const float *m = c->centre + c->label[f] * c->s->width, *x = c->s->feature + f * c->s->width;
+        double d = (double)c->norm[f] + (double)inner(m, m, c->s->width) - 2 * (double)inner(x, m, c->s->width);
+        sum += d > 0 ? d : 0;
+    }
+    return sum;
+}
+
+static int cut(clustering *c, size_t k, uint64_t seed, bool connected, vg_segment_report *report, vg_err *e)
+{
+    double objective = 0;
+    int r = VG_OK;
+    seed_centres(c, k, seed);
+    report->rounds += iterate(c, &objective);
+    size_t n = c->k;
+    if (connected) {
+        size_t pieces = n;
+        r = connect(c->s, c->label, n, k, &pieces, e);
+        if (r == VG_OK && pieces > c->most) { /* more components than patches: room for all of them */
+            clustering larger;
+            if ((r = make_clustering(&larger, c->s, pieces, e)) < 0) return r;
+            memcpy(larger.label, c->label, c->n * sizeof *c->label);
+            clear_clustering(c);
+            *c = larger;
+        }
+        n = pieces;
+    }
+    if (r == VG_OK) r = renumber(c->label, c->n, &n, e);
+    if (r < 0) return r;
+    report->patches = n;
+    report->angle = angle_of(c, connected ? objective_of(c, n) : objective);
+    return VG_OK;
+}
+
+int vg_segmenter_cut(vg_segmenter *s, size_t patches, uint64_t seed, bool connected, vg_patches *out, vg_segment_report *report,
+                     vg_err *e)
+{
+    static const size_t steps[] = {4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256};
+    size_t nsteps = sizeof steps / sizeof *steps;
+    *out = (vg_patches){0};
+    *report = (vg_segment_report){0};
+    cut_down(s);
+    for (size_t i = 0;; i++) {
+        clustering c;
+        size_t k = patches ? patches : steps[i];
+        if (k > s->turns.nf) k = s->turns.nf;
+        int r = make_clustering(&c, s, k, e);
+        if (r < 0) return r;
+        r = cut(&c, k, seed, connected, report, e);
+        bool done = patches || report->angle <= enough || i + 1 == nsteps || k == s->turns.nf;
+        if (r == VG_OK && done) {
+            out->n = report->patches, out->of_face = c.label;
+            c.label = NULL;
+        }
+        clear_clustering(&c);
+        if (r < 0 || done) return r;
+    }
+}
