@@ -253,7 +253,10 @@ static coverage cover(const vg_correspondence *c)
     for (size_t f = 0; f < c->target_nf; f++) {
         uint64_t pairs = c->first[f + 1] - c->first[f];
         if (pairs > x.most_pairs) x.most_pairs = pairs;
-        for (uint32_t i = c->first[f]; i < c->first[f + 1]; i++) x.used += !used[c->source[i]], used[c->source[i]] = true;
+        for (uint32_t i = c->first[f]; i < c->first[f + 1]; i++) {
+            x.used += !used[c->source[i]];
+            used[c->source[i]] = true;
+        }
         if (!c->matched[f]) continue;
         x.matched++;
         x.sum += c->distance[f];
@@ -287,11 +290,12 @@ static void report_correspondence(report *r, const vg_head *h, double D)
     report_put(r, NULL, "target", report_text(line));
     report_put(r, "matched_faces", NULL, report_count(x.matched));
     report_put(r, "unmatched_faces", NULL, report_count(c->target_nf - x.matched));
-    snprintf(line, sizeof line, "%" PRIu64 " of %zu faces (%.4g %%), %" PRIu64 " ride with others", x.matched, c->target_nf,
-             percent(x.matched, c->target_nf), (uint64_t)c->target_nf - x.matched);
+    snprintf(line, sizeof line, "%" PRIu64 " of %zu faces (%.4g %%), %" PRIu64 " ride with others", x.matched,
+             c->target_nf, percent(x.matched, c->target_nf), (uint64_t)c->target_nf - x.matched);
     report_put(r, NULL, "matched", report_text(line));
     report_put(r, "source_faces_used", NULL, report_count(x.used));
-    snprintf(line, sizeof line, "%" PRIu64 " of %zu faces (%.4g %%)", x.used, c->source_nf, percent(x.used, c->source_nf));
+    snprintf(line, sizeof line, "%" PRIu64 " of %zu faces (%.4g %%)", x.used, c->source_nf,
+             percent(x.used, c->source_nf));
     report_put(r, NULL, "source used", report_text(line));
     report_put(r, "pairs", NULL, report_count(pairs));
     report_put(r, "most_pairs", NULL, report_count(x.most_pairs));
@@ -303,7 +307,8 @@ static void report_correspondence(report *r, const vg_head *h, double D)
     report_put(r, "mean_distance_D", NULL, report_number(D > 0 ? mean / D : NAN));
     report_put(r, "largest_distance_D", NULL, report_number(D > 0 ? largest / D : NAN));
     if (x.matched && D > 0) {
-        snprintf(line, sizeof line, "mean %.3g, at most %.3g (%.3g D and %.3g D)", mean, largest, mean / D, largest / D);
+        snprintf(line, sizeof line, "mean %.3g, at most %.3g (%.3g D and %.3g D)", mean, largest, mean / D,
+                 largest / D);
         report_put(r, NULL, "distances", report_text(line));
     }
     report_end(r);

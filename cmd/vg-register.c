@@ -57,7 +57,7 @@ static void check_options(size_t operands)
     if (opts.dense && opts.dense_source) cli_usage("only one of --dense and --dense-source can be used");
     if (!opts.markers && !opts.dense && !opts.dense_source && !opts.uv && !opts.aligned)
         cli_usage("nothing says which point belongs to which: give --markers FILE, --dense FILE, --uv, or --aligned "
-                  "when the                   "meshes lie on one another");
+                  "when the meshes lie on one another");
 }
 
 static void out_of_memory(const char *what) __attribute__((noreturn));

@@ -59,11 +59,14 @@ typedef struct waiting {
     size_t held_cap;
 } waiting;
 
+enum { MACHINES = 8, MOST_ENTRIES = 64 << 20 }; /* machines for pins that are kept, and entries of their factors */
+
 typedef struct work {
     vg_head *h;
     vg_graph *g;
     vg_kind kind;            /* what comes in */
-    machine plain, pinned;   /* pinned: for the pins of the last frame that had any */
+    machine plain;
+    machine pinned[MACHINES]; /* for pins of frames gone by, the latest first: shapes come again */
     const machine *at;       /* what the waiting poses wait for */
     waiting *waiting;
     size_t n, most;
@@ -157,21 +160,47 @@ static uint32_t *unite(const work *w, const vg_frame *f, size_t *n)
     return both;
 }
 
-/* The machine for a frame. Poses of one batch share theirs; the pinned one is made anew when pins change. */
+/* Drop the machines that have not been asked for longest, until there is room for another. */
+static void make_room(work *w)
+{
+    size_t entries = 0;
+    for (size_t i = 0; i < MACHINES; i++) {
+        if (!w->pinned[i].solver) continue;
+        entries += vg_solver_get_facts(w->pinned[i].solver).factor_entries;
+        if (i == MACHINES - 1 || entries > MOST_ENTRIES) free_machine(w, &w->pinned[i]);
+    }
+}
+
+static void bring_to_front(work *w, size_t i)
+{
+    machine m = w->pinned[i];
+    memmove(w->pinned + 1, w->pinned, i * sizeof m);
+    w->pinned[0] = m;
+}
+
+/* The machine for a frame. All poses of a batch share theirs, so a batch ends where pins change. */
 static const machine *machine_for(work *w, const vg_frame *f)
 {
     if (f->npins == 0) return &w->plain;
-    size_t n;
+    size_t n, i = 0;
     uint32_t *held = unite(w, f, &n);
-    machine *m = &w->pinned;
-    if (m->solver && m->nheld == n && !memcmp(m->held, held, n * sizeof *held)) {
+    while (i < MACHINES && !(w->pinned[i].solver && w->pinned[i].nheld == n && !memcmp(w->pinned[i].held, held, n * sizeof *held)))
+        i++;
+    if (i == 0) {
         free(held);
-    } else {
-        solve_waiting(w);
-        free_machine(w, m);
-        make_machine(w, m, held, n);
+        return w->pinned;
     }
-    return m;
+    solve_waiting(w); /* machines move */
+    if (i < MACHINES) {
+        free(held);
+        bring_to_front(w, i);
+    } else {
+        make_room(w);
+        bring_to_front(w, MACHINES - 1); /* an empty place */
+        make_machine(w, w->pinned, held, n);
+    }
+    w->at = NULL;
+    return w->pinned;
 }
 
 /* Where the held vertices go: anchors as the frame says, pins where the reference has them. */
@@ -258,7 +287,7 @@ static void solve_all(work *w, vg_source *s, vg_frame *in)
 static void clear(work *w)
 {
     free_machine(w, &w->plain);
-    free_machine(w, &w->pinned);
+    for (size_t i = 0; i < MACHINES; i++) free_machine(w, &w->pinned[i]);
     if (opts.planar)
         cli_note("%zu faces of four and more, at most %zu steps to planarity, residual at most %.1e", w->planar_faces,
                  w->most_steps, w->worst_residual);

@@ -211,6 +211,7 @@ typedef struct vg_map {
     double *corner;      /* a quaternion each: A_p Q r Q* is the vector of the corner */
     size_t nheld;        /* vertices held where their patch takes them */
     uint32_t *held;      /* ascending */
+    uint32_t *held_patch;
     double *held_at;     /* the point in the reference pose that the patch takes there */
     size_t nnames;       /* 0 or n */
     char **names;
@@ -462,9 +463,9 @@ typedef struct vg_solver_facts {
 int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
                   vg_weights weights, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_solver_free(vg_solver **s);
-/* vg_solver_load: one pose's vectors (and anchors, nanchors points, if any) become a first guess x and a right-hand side, nv x 3
+/* vg_solver_load: (one call at a time on one solver) one pose's vectors (and anchors, nanchors points, if any) become a first guess x and a right-hand side, nv x 3
  * each: what the guess misses. */
-void vg_solver_load(const vg_solver *s, const double *vectors, const double *anchors, double *x, double *rhs);
+void vg_solver_load(vg_solver *s, const double *vectors, const double *anchors, double *x, double *rhs);
 /* vg_solver_solve: n guesses x, with their right-hand sides, become n poses in place. anchors[i]: nanchors points of pose i, or
  * roots[i]: its root; the other is not looked at. Best when n is a multiple of vg_solver_batch. */
 void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *const *x, const double *const *anchors,

@@ -333,6 +333,23 @@ END
     done
 }
 
+@test "an array beside mesh files in a directory or archive is passed over; alone it is read" {
+    make_walk
+    mkdir all alone
+    decoded -o all/walk.npz
+    cp all/walk.npz alone
+    cp pose?.obj all
+    (cd all && python3 -m zipfile -c ../all.zip walk.npz pose2.obj pose1.obj)
+    (cd alone && python3 -m zipfile -c ../alone.zip walk.npz)
+    local place
+    for place in all/ alone/ alone.zip; do
+        pipe "vg-encode $place | vg-info"
+        shows "frames     3: 'pose1' to 'pose3'"
+    done
+    pipe 'vg-encode all.zip | vg-info'
+    shows "frames     2: 'pose1' to 'pose2'"
+}
+
 @test "Blender's Mesh Cache plays PC2 and MDD to the right places" {
     command -v blender >/dev/null || skip "blender is not installed"
     make_walk two

@@ -1,4 +1,4 @@
-# register.bats: vg-register: what it writes, what it says, what it refuses, and that a transfer goes through what it found.
+# register.bats: vg-register: what it writes, says and refuses, and that a transfer goes through what it found.
 # SPDX-License-Identifier: GPL-3.0-or-later
 # shellcheck shell=bash disable=SC2154
 
@@ -20,7 +20,8 @@ sheet() {
     LC_ALL=C awk -v n="$1" -v m="$2" -v turn="$3" 'BEGIN {
         for (i = 0; i <= n; i++) for (k = 0; k <= m; k++) {
             x = 3 * i / n; y = 2 * k / m
-            printf "v %.6f %.6f %.6f\n", cos(turn) * x - sin(turn) * y + turn, sin(turn) * x + cos(turn) * y, 0.3 * sin(2 * x) * cos(3 * y)
+            c = cos(turn); s = sin(turn)
+            printf "v %.6f %.6f %.6f\n", c * x - s * y + turn, s * x + c * y, 0.3 * sin(2 * x) * cos(3 * y)
             printf "vt %.6f %.6f\n", i / n, k / m
         }
         for (i = 0; i < n; i++) for (k = 0; k < m; k++) {
@@ -32,7 +33,8 @@ sheet() {
 
 # number FILE KEY: a number of the correspondence that vg-info --json tells
 number() {
-    vg-info --json "$1" | python3 -c 'import json, sys; print(json.load(sys.stdin)["correspondence"][sys.argv[1]])' "$2"
+    vg-info --json "$1" |
+        python3 -c 'import json, sys; print(json.load(sys.stdin)["correspondence"][sys.argv[1]])' "$2"
 }
 
 @test "two bodies: every face matched, the fitted source lies on the target, the stream is whole" {
@@ -41,8 +43,9 @@ number() {
     nothing_but c.vgs markers.txt walk-man.obj walk-woman.obj
     must vg-info --check c.vgs
     must vg-info c.vgs
-    shows '1591 vertices' "frames     1: 'walk-woman'" 'reference   walk-man' 'target       1584 faces, 1605 vertices' \
-        'matched      1584 of 1584 faces (100 %)' 'vg-register walk-man.obj walk-woman.obj --markers markers.txt -o c.vgs'
+    shows '1591 vertices' "frames     1: 'walk-woman'" 'reference   walk-man' \
+        'target       1584 faces, 1605 vertices' 'matched      1584 of 1584 faces (100 %)' \
+        'vg-register walk-man.obj walk-woman.obj --markers markers.txt -o c.vgs'
     python3 -c 'import sys; sys.exit(not float(sys.argv[1]) < 0.005)' "$(number c.vgs mean_distance_D)"
     pipe 'vg-register walk-man.obj walk-woman.obj -m - <markers.txt | vg-decode -o fitted.obj'
     [ "$(grep -c '^f ' fitted.obj)" = 1570 ]
@@ -57,12 +60,15 @@ number() {
 }
 
 @test "dinosaurs of mixed polygons: most faces matched, the rest reported and driven" {
-    capture vg-register "$DATA/velociraptor.rest.obj" "$DATA/trex.rest.obj" -m "$DATA/velociraptor-trex.markers.txt" -o c.vgs
+    cp "$DATA/velociraptor.rest.obj" v.obj
+    cp "$DATA/trex.rest.obj" t.obj
+    cp "$DATA/velociraptor-trex.markers.txt" m.txt
+    capture vg-register v.obj t.obj -m m.txt -o c.vgs
     [ "$status" = 0 ]
     one_line
-    says 'warning: ' " of the 838 faces of the target's component 0 have no counterpart: they ride with those beside them"
+    says " of the 838 faces of the target's component 0 have no counterpart: they ride with those beside them"
     [ "$(number c.vgs matched_faces)" -gt 700 ]
-    must vg-register -q "$DATA/velociraptor.rest.obj" "$DATA/trex.rest.obj" -m "$DATA/velociraptor-trex.markers.txt" -o c.vgs
+    must vg-register -q v.obj t.obj -m m.txt -o c.vgs
 }
 
 @test "a mesh to itself: exactly one source per face, and a transfer over it gives nearly the sequence back" {
@@ -85,12 +91,14 @@ number() {
     capture vg-register --index-base 1 walk-man.obj walk-woman.obj -m wrong.txt -o w.vgs
     [ "$status" = 0 ]
     one_line
-    says "warning: marker 'm9' (line 9), vertex " ' on vertex 660, is 0.' 'D from where its neighbours expect it' 'it is left out'
+    says "warning: marker 'm9' (line 9), vertex " ' on vertex 660, is 0.' ' D from where its neighbours expect it' \
+        'it is left out'
     capture vg-register --keep-all --index-base 1 walk-man.obj walk-woman.obj -m wrong.txt -o k.vgs
     [ "$status" = 0 ]
     says 'it is used all the same'
     capture vg-register -v walk-man.obj walk-woman.obj -m one.txt --index-base 1 -o v.vgs
-    says 'round 8 of 8: ' 'the source as a whole: scale 0.95' "marker 'm1' (line 1): " '1584 of 1584 faces of the target matched'
+    says 'round 8 of 8: ' 'the source as a whole: scale 0.95' "marker 'm1' (line 1): " \
+        '1584 of 1584 faces of the target matched'
 }
 
 @test "without markers: aligned, texture coordinates, dense" {

@@ -398,9 +398,14 @@ static int take_path(vgi_archive *a, struct archive_entry *entry, vg_err *e)
 }
 
 /* As in directories, hidden files are none of ours: archives made on a Mac have "._pose1.obj" beside "pose1.obj". */
+static bool is_pose_name(const char *path)
+{
+    return *vgi_base_name(path) != '.' && vgi_format_by_suffix(path);
+}
+
 static bool is_mesh_name(const char *path)
 {
-    return *vgi_base_name(path) != '.' && (vgi_format_by_suffix(path) || vgi_packable(path));
+    return is_pose_name(path) || (*vgi_base_name(path) != '.' && vgi_packable(path));
 }
 
 /* 1: a mesh file, whose contents can be read; 0: something else. */
@@ -582,6 +587,21 @@ static int not_an_archive(const vgi_archive *a, vg_err *e)
                    vgi_format_names());
 }
 
+/* Files of whole sequences count only where there are no mesh files, as in directories. */
+static void prefer_poses(vgi_archive *a)
+{
+    size_t poses = 0, n = 0;
+    if (a->single || a->wanted != is_mesh_name) return;
+    for (size_t i = 0; i < a->n; i++) poses += is_pose_name(a->members[i].path);
+    if (poses == 0) return;
+    a->wanted = is_pose_name;
+    for (size_t i = 0; i < a->n; i++) {
+        if (is_pose_name(a->members[i].path)) a->members[n++] = a->members[i];
+        else free(a->members[i].path);
+    }
+    a->n = n;
+}
+
 static int list_members(vgi_archive *a, vg_err *e)
 {
     int r = walk_open(a, e);
@@ -594,6 +614,7 @@ static int list_members(vgi_archive *a, vg_err *e)
         r = vg_fail(e, VG_EINPUT, "archive '%s' holds none of the files it should", a->name);
     else if (r == VG_OK && a->n == 0)
         r = vg_fail(e, VG_EINPUT, "archive '%s' holds no mesh file (%s)", a->name, vgi_format_names());
+    if (r == VG_OK) prefer_poses(a);
     return r;
 }
 
@@ -787,7 +808,8 @@ static int configure(struct archive *la, const struct packing *k)
     if (k->format == ARCHIVE_FORMAT_ZIP) {
         r = archive_write_set_format_zip(la);
         if (r == ARCHIVE_OK)
-            r = k->stored ? archive_write_zip_set_compression_store(la) : archive_write_zip_set_compression_deflate(la);
+            r = k->stored ? archive_write_zip_set_compression_store(la)
+                          : archive_write_zip_set_compression_deflate(la);
         if (r == ARCHIVE_OK) r = archive_write_set_format_option(la, "zip", "hdrcharset", "UTF-8");
     } else if (k->format == ARCHIVE_FORMAT_7ZIP) {
         r = archive_write_set_format_7zip(la);

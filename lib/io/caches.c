@@ -1,8 +1,10 @@
-/* caches.c: the point caches PC2 (3ds Max, Blender) and MDD (LightWave, Blender): binary32 positions, frame after frame.
- * Leaves out the faces, which lie in a mesh file beside the cache (source.c, sink.c), and interpolation between samples.
+/* caches.c: the point caches PC2 (3ds Max, Blender) and MDD (LightWave, Blender): binary32 positions, frame after
+ * frame.
+ * Leaves out the faces, which lie in a mesh file beside the cache (source.c, sink.c), and interpolation between
+ * samples.
  *
- * PC2, little-endian: "POINTCACHE2\0", int32 version 1, int32 points, float32 start, float32 rate, int32 samples, then the
- * positions. MDD, big-endian: int32 samples, int32 points, float32 time of each sample, then the positions.
+ * PC2, little-endian: "POINTCACHE2\0", int32 version 1, int32 points, float32 start, float32 rate, int32 samples,
+ * then the positions. MDD, big-endian: int32 samples, int32 points, float32 time of each sample, then the positions.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -114,8 +116,8 @@ static int finish_head(reading *x, vg_head *h, vg_err *e)
     return VG_OK;
 }
 
-/* The rate's unit is frames of the scene for some programs and seconds for others. Samples at whole numbers, one by one,
- * only count frames: they give no times. */
+/* The rate's unit is frames of the scene for some programs and seconds for others. Samples at whole numbers, one by
+ * one, only count frames: they give no times. */
 static void judge_times(reading *x)
 {
     x->timed = !(x->rate == 1 && x->start == floorf(x->start));

@@ -5,8 +5,8 @@
 
 #include <math.h>
 
-/* By content the first that says yes is taken, so those with a signature come before STL and OBJ, which have none. By suffix,
- * the first with that suffix. */
+/* By content the first that says yes is taken, so those with a signature come before STL and OBJ, which have none.
+ * By suffix, the first with that suffix. */
 static const vgi_format *const formats[] = {&vgi_format_ply, &vgi_format_ply_ascii, &vgi_format_ply_be,
                                             &vgi_format_off, &vgi_format_stl,
                                             &vgi_format_stl_ascii, &vgi_format_obj};

@@ -206,8 +206,8 @@ int vgi_npy_store(vg_bytes *to, const double *x, size_t n, bool doubles, vg_err 
     for (size_t i = 0; i < n; i++, p += item) {
         float f = (float)x[i];
         if (!isfinite(doubles ? x[i] : (double)f))
-            return vg_fail(e, VG_EINPUT, "number %zu of it does not fit single precision (%g): ask for full precision", i,
-                           x[i]);
+            return vg_fail(e, VG_EINPUT,
+                           "number %zu of it does not fit single precision (%g): ask for full precision", i, x[i]);
         if (doubles) {
             uint64_t bits;
             memcpy(&bits, &x[i], sizeof bits);
@@ -239,15 +239,16 @@ static int wrong_shape(const vgi_npy *a, const char *subject, vg_err *e)
     char shape[100] = "";
     for (size_t d = 0, n = 0; d < a->ndim; d++)
         n += (size_t)snprintf(shape + n, sizeof shape - n, d ? ", %llu" : "%llu", (unsigned long long)a->shape[d]);
-    return vg_fail(e, VG_EINPUT, "%s has shape (%s): positions are read, (frames, vertices, 3) or (vertices, 3)", subject,
-                   shape);
+    return vg_fail(e, VG_EINPUT, "%s has shape (%s): positions are read, (frames, vertices, 3) or (vertices, 3)",
+                   subject, shape);
 }
 
 static int judge_shape(reading *x, vg_err *e)
 {
     const vgi_npy *a = &x->a;
     if (a->kind != 'f' || (a->item != 4 && a->item != 8))
-        return vg_fail(e, VG_EINPUT, "%s holds no binary32 or binary64 numbers: store it as float32 or float64", x->subject);
+        return vg_fail(e, VG_EINPUT, "%s holds no binary32 or binary64 numbers: store it as float32 or float64",
+                       x->subject);
     if (a->ndim < 2 || a->ndim > 3 || a->shape[a->ndim - 1] != 3) return wrong_shape(a, x->subject, e);
     uint64_t points = a->shape[a->ndim - 2], frames = a->ndim == 3 ? a->shape[0] : 1;
     if (points == 0 || points >= UINT32_MAX || frames == 0) return wrong_shape(a, x->subject, e);
@@ -262,7 +263,9 @@ static int take_data(reading *x, vg_err *e)
     x->data.size = 0;
     int r = vgi_input_take(x->in, &x->data, x->whole ? bytes * x->frames : bytes, NULL, e);
     x->have_data = r == VG_OK;
-    return r == VG_ETRUNC ? vg_fail(e, r, "%s ends too early: in frame %zu of %zu", x->subject, x->next + 1, x->frames) : r;
+    return r == VG_ETRUNC
+               ? vg_fail(e, r, "%s ends too early: in frame %zu of %zu", x->subject, x->next + 1, x->frames)
+               : r;
 }
 
 static int open_npy(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)
@@ -384,7 +387,7 @@ static void release_npy(void *state)
 }
 
 const vgi_sequence_format vgi_sequence_npy = {
-    .name = "npy", .suffix = ".npy", .keeps = VGI_KEEPS_ORDER | VGI_KEEPS_DOUBLES, .bare = true, .sniff = vgi_npy_sniff,
-    .open = open_npy, .next = next_npy, .frames = count_frames, .close = close_npy,
+    .name = "npy", .suffix = ".npy", .keeps = VGI_KEEPS_ORDER | VGI_KEEPS_DOUBLES, .bare = true,
+    .sniff = vgi_npy_sniff, .open = open_npy, .next = next_npy, .frames = count_frames, .close = close_npy,
     .kinds = 1 << VG_VERTICES | 1 << VG_VECTORS | 1 << VG_DEFORMATIONS | 1 << VG_TRANSFORMS,
     .begin = begin_npy, .put = put_npy, .end = end_npy, .warning = warn_npy, .release = release_npy};

@@ -1,9 +1,9 @@
-/* npz.c: NPZ, NumPy arrays in a zip: the numbers of all frames, and beside them faces, reference, names and times, so that
- * nothing but attributes and provenance is lost. man/vg-decode.1 lists the arrays.
+/* npz.c: NPZ, NumPy arrays in a zip: the numbers of all frames, and beside them faces, reference, names and times,
+ * so that nothing but attributes and provenance is lost. man/vg-decode.1 lists the arrays.
  * Leaves out the header of an array (npy.c) and the zip (archive.c).
  *
- * Reading keeps the whole file in memory, as NumPy does: the frames may stand in any order of axes. Writing keeps names, times,
- * roots and anchors; the numbers wait in a file without a name until their count is known.
+ * Reading keeps the whole file in memory, as NumPy does: the frames may stand in any order of axes. Writing keeps
+ * names, times, roots and anchors; the numbers wait in a file without a name until their count is known.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/npy.h"
 
@@ -14,8 +14,8 @@
 
 /* The arrays, in the order in which they are written: that in which archive.c hands out the members. */
 enum array {
-    ANCHOR_POSITIONS, ANCHORS, DEFORMATIONS, FACE_OFFSETS, FACE_VERTICES, FACES, GRAPH_OFFSETS, GRAPH_VERTICES, LINKS, NAMES,
-    POSITIONS, REFERENCE, REFERENCE_NAME, ROOTS, SELECTED, TIMES, TRANSFORMS, VECTORS, ARRAYS
+    ANCHOR_POSITIONS, ANCHORS, DEFORMATIONS, FACE_OFFSETS, FACE_VERTICES, FACES, GRAPH_OFFSETS, GRAPH_VERTICES,
+    LINKS, NAMES, POSITIONS, REFERENCE, REFERENCE_NAME, ROOTS, SELECTED, TIMES, TRANSFORMS, VECTORS, ARRAYS
 };
 
 static const char *const array_names[ARRAYS] = {
@@ -203,7 +203,8 @@ static int text_at(const reading *x, enum array i, size_t k, char **text, vg_err
         uint32_t c = step == 1 ? p[at] : h->a.big ? __builtin_bswap32(vgi_get32(p + at)) : vgi_get32(p + at);
         if (c == 0) break;
         if (step == 1) r = vgi_bytes_append(&b, p + at, 1, e);
-        else if (c > 0x10ffff || (c >= 0xd800 && c < 0xe000)) r = wrong(x, i, "holds a letter that does not exist", e);
+        else if (c > 0x10ffff || (c >= 0xd800 && c < 0xe000))
+            r = wrong(x, i, "holds a letter that does not exist", e);
         else r = append_letter(&b, c, e);
     }
     if (r == VG_OK && !vgi_is_utf8((char *)b.data, b.size)) r = wrong(x, i, "holds text that is no UTF-8", e);
@@ -227,17 +228,21 @@ static int choose_values(reading *x, vg_head *h, vg_err *e)
         found = i;
     }
     if (found < 0)
-        return vg_fail(e, VG_EINPUT, "%s has none of the arrays 'positions', 'vectors' and 'deformations'", x->subject);
+        return vg_fail(e, VG_EINPUT, "%s has none of the arrays 'positions', 'vectors' and 'deformations'",
+                       x->subject);
     struct held *v = &x->held[x->values = all[found]];
     vgi_npy *a = &v->a;
     x->width = vg_kind_width(kinds[found]);
-    if (!is_float(v)) return wrong(x, x->values, "holds no binary32 or binary64 numbers: store it as float32 or float64", e);
+    if (!is_float(v))
+        return wrong(x, x->values, "holds no binary32 or binary64 numbers: store it as float32 or float64", e);
     if (a->ndim == 2) { /* one frame */
         a->shape[2] = a->shape[1], a->shape[1] = a->shape[0], a->shape[0] = 1;
         a->ndim = 3;
     }
     if (a->ndim != 3 || a->shape[2] != x->width || a->shape[1] == 0 || a->shape[1] >= UINT32_MAX)
-        return wrong(x, x->values, x->width == 3 ? "is not of shape (frames, elements, 3)" : "is not of shape (frames, elements, 4)", e);
+        return wrong(
+            x, x->values,
+            x->width == 3 ? "is not of shape (frames, elements, 3)" : "is not of shape (frames, elements, 4)", e);
     if (a->shape[0] == 0) return wrong(x, x->values, "holds no frame", e);
     x->frames = (size_t)a->shape[0], x->count = (size_t)a->shape[1];
     h->kind = kinds[found], h->count = x->count;
@@ -287,7 +292,8 @@ static int take_equal_faces(reading *x, vg_head *h, vg_err *e)
     const struct held *f = &x->held[FACES];
     size_t corners;
     vg_mesh *m = &h->mesh;
-    if (x->held[FACE_OFFSETS].there) return wrong(x, FACES, "is there beside 'face_offsets': faces are told by one of them", e);
+    if (x->held[FACE_OFFSETS].there)
+        return wrong(x, FACES, "is there beside 'face_offsets': faces are told by one of them", e);
     if (f->a.ndim != 2 || f->a.shape[1] < 2) return wrong(x, FACES, "is not of shape (faces, corners of a face)", e);
     int r = copy_indices(x, FACES, m->nv, &m->vert, &corners, e);
     if (r < 0) return r;
@@ -310,7 +316,8 @@ static int take_links(reading *x, vg_head *h, vg_err *e)
 {
     static const uint64_t pairs[2] = {UINT64_MAX, 2};
     h->has_links = x->held[LINKS].there;
-    if (h->has_links && !has_shape(&x->held[LINKS], 2, pairs)) return wrong(x, LINKS, "is not of shape (links, 2)", e);
+    if (h->has_links && !has_shape(&x->held[LINKS], 2, pairs))
+        return wrong(x, LINKS, "is not of shape (links, 2)", e);
     size_t n;
     int r = copy_indices(x, LINKS, h->mesh.nv, &h->links, &n, e);
     h->nlinks = n / 2;
@@ -377,7 +384,8 @@ static int open_npz(void **state, vg_head *h, vgi_input *in, const char *subject
 static int check_quaternions(const reading *x, const double *q, vg_err *e)
 {
     for (size_t i = 0; x->width == 4 && i < x->count; i++, q += 4)
-        if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) return wrong(x, x->values, "holds a quaternion that is zero", e);
+        if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0)
+            return wrong(x, x->values, "holds a quaternion that is zero", e);
     return VG_OK;
 }
 
@@ -476,7 +484,8 @@ static int put_npz(void *state, const vg_frame *f, vg_err *e)
 
 /* ---- one member after another ---- */
 
-static int begin_array(writing *x, enum array i, const char *descr, size_t item, size_t ndim, const uint64_t *shape, vg_err *e)
+static int begin_array(writing *x, enum array i, const char *descr, size_t item, size_t ndim, const uint64_t *shape,
+                       vg_err *e)
 {
     unsigned char head[VGI_NPY_HEADER];
     char path[32];
@@ -501,7 +510,8 @@ static int add_doubles(writing *x, enum array i, size_t ndim, const uint64_t *sh
     return add_array(x, i, "<f8", 8, ndim, shape, b->data, b->size, e);
 }
 
-static int add_indices(writing *x, enum array i, size_t ndim, const uint64_t *shape, const uint32_t *list, size_t n, vg_err *e)
+static int add_indices(writing *x, enum array i, size_t ndim, const uint64_t *shape, const uint32_t *list, size_t n,
+                       vg_err *e)
 {
     vg_bytes b = {0};
     int r = vgi_bytes_reserve(&b, 4 * n, e);
@@ -511,8 +521,8 @@ static int add_indices(writing *x, enum array i, size_t ndim, const uint64_t *sh
     return r;
 }
 
-static int add_mesh(writing *x, enum array offsets, enum array vertices, const uint32_t *start, const uint32_t *vert, size_t nf,
-                    vg_err *e)
+static int add_mesh(writing *x, enum array offsets, enum array vertices, const uint32_t *start,
+                    const uint32_t *vert, size_t nf, vg_err *e)
 {
     static const uint32_t none = 0;
     const uint64_t n = nf + 1, corners = nf ? start[nf] : 0;
@@ -578,7 +588,9 @@ static int copy_spool(writing *x, vg_err *e)
     for (uint64_t off = 0; r == VG_OK && off < x->spool.size;) {
         ssize_t got = pread(x->spool.fd, block, BLOCK, (off_t)off);
         if (got < 0 && errno == EINTR) continue;
-        if (got <= 0) r = vg_fail(e, VG_ESYS, "cannot read a temporary file: %s", got ? strerror(errno) : "it ends too early");
+        if (got <= 0)
+            r = vg_fail(e, VG_ESYS, "cannot read a temporary file: %s",
+                        got ? strerror(errno) : "it ends too early");
         else r = vgi_packer_more(x->packer, block, (size_t)got, e);
         if (got > 0) off += (uint64_t)got;
     }
@@ -688,7 +700,8 @@ static void release_npz(void *state)
 
 const vgi_sequence_format vgi_sequence_npz = {
     .name = "npz", .suffix = ".npz",
-    .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_NAMES | VGI_KEEPS_TIMES | VGI_KEEPS_DOUBLES,
+    .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_NAMES | VGI_KEEPS_TIMES |
+             VGI_KEEPS_DOUBLES,
     .sniff = sniff_npz, .open = open_npz, .next = next_npz, .frames = count_frames, .close = close_npz,
     .kinds = 1 << VG_VERTICES | 1 << VG_VECTORS | 1 << VG_DEFORMATIONS | 1 << VG_TRANSFORMS,
     .begin = begin_npz, .put = put_npz, .end = end_npz, .warning = warn_npz, .release = release_npz};

@@ -621,7 +621,7 @@ static int take_map_arrays(cursor *c, vg_map *m, const vgi_payload *p, vg_err *e
         copy_doubles(*list[i].at, data, length);
         if (!vgi_finite(*list[i].at, length)) return wrong(p, "a number is not finite", e);
     }
-    return take_padding(c, m->nheld % 2 * 4) ? VG_OK : wrong(p, "padding is missing or not zero", e);
+    return VG_OK;
 }
 
 static int check_map(const vgi_payload *p, const vg_map *m, vg_err *e)
@@ -640,6 +640,8 @@ static int check_map(const vgi_payload *p, const vg_map *m, vg_err *e)
         const double *q = m->corner + 4 * i;
         if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) return wrong(p, "a quaternion is zero", e);
     }
+    for (size_t i = 0; i < m->nheld; i++)
+        if (m->held_patch[i] >= m->n) return wrong(p, "a vertex is held by a transform that is not there", e);
     return check_ascending(p, m->held, m->nheld, m->nv, e);
 }
 
@@ -679,7 +681,6 @@ int vgi_map_encode(vg_bytes *b, const vg_map *m, vg_err *e)
         size_t length = vgi_map_array_length(m, &list[i]);
         r = list[i].real ? put_doubles(b, *list[i].at, length, e) : vgi_indices_encode(b, *list[i].at, length, e);
     }
-    if (r == VG_OK) r = put_padding(b, 0, e);
     for (size_t i = 0; r == VG_OK && i < m->nnames; i++) r = put_string(b, m->names[i], e);
     return r;
 }

@@ -1,4 +1,5 @@
-/* sequence.c: the table of formats whose one file holds a whole sequence, and the bytes of such a file while it is made.
+/* sequence.c: the table of formats whose one file holds a whole sequence, and the bytes of such a file while it is
+ * made.
  * Leaves out the formats themselves (caches.c, npy.c, npz.c, usda.c, ...) and who opens files (source.c, sink.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
@@ -7,8 +8,8 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-static const vgi_sequence_format *const formats[] = {&vgi_sequence_pc2, &vgi_sequence_mdd, &vgi_sequence_npy, &vgi_sequence_npz,
-                                                     &vgi_sequence_usda, &vgi_sequence_bvh};
+static const vgi_sequence_format *const formats[] = {&vgi_sequence_pc2, &vgi_sequence_mdd,  &vgi_sequence_npy,
+                                                     &vgi_sequence_npz, &vgi_sequence_usda, &vgi_sequence_bvh};
 enum { FORMATS = sizeof formats / sizeof *formats };
 
 const vgi_sequence_format *vgi_sequence_by_name(const char *name, size_t n)

@@ -1,6 +1,7 @@
-/* sink.c: the door out: one mesh file, a numbered series, a directory, an archive, standard output, or one file that holds
- * the whole sequence.
- * Leaves out the text of a mesh file (format.c), the bytes of a sequence (sequence.c) and those of an archive (archive.c).
+/* sink.c: the door out: one mesh file, a numbered series, a directory, an archive, standard output, or one file that
+ * holds the whole sequence.
+ * Leaves out the text of a mesh file (format.c), the bytes of a sequence (sequence.c) and those of an archive
+ * (archive.c).
  *
  * Everything is written beside its place under a temporary name and takes its final one in vg_sink_end; pipes and
  * devices, which cannot be replaced, are written where they are.
@@ -84,7 +85,8 @@ static bool holds_many(const char *name, size_t n, vg_err *e)
 
 static int unknown_format(const char *name, vg_err *e)
 {
-    return vg_fail(e, VG_EARG, "unknown format '%s': known are %s, %s", name, vgi_format_names(), vgi_sequence_names());
+    return vg_fail(e, VG_EARG, "unknown format '%s': known are %s, %s", name, vgi_format_names(),
+                   vgi_sequence_names());
 }
 
 static int holds_all(const char *output, const vgi_sequence_format *f, const char *what, vg_err *e)
@@ -148,8 +150,10 @@ static int tell_sequence(plan *p, const char *output, vg_err *e)
 {
     p->kind = SEQUENCE;
     p->to_stdout = !strcmp(output, "-");
-    if (vgi_packer_knows(output, p->length)) return holds_all(output, p->sequence, "it does not go into an archive", e);
-    if (output[p->length - 1] == '/' || is_directory(output)) return holds_all(output, p->sequence, "name one file", e);
+    if (vgi_packer_knows(output, p->length))
+        return holds_all(output, p->sequence, "it does not go into an archive", e);
+    if (output[p->length - 1] == '/' || is_directory(output))
+        return holds_all(output, p->sequence, "name one file", e);
     if (memchr(output, '%', p->length)) return holds_all(output, p->sequence, "leave out the %d", e);
     return VG_OK;
 }
@@ -161,7 +165,8 @@ static int tell_kind(plan *p, const char *output, vg_err *e)
     if (vgi_packer_knows(output, p->length)) return p->kind = ARCHIVE, VG_OK;
     if (p->length < strlen(output) || output[p->length - 1] == '/' || is_directory(output))
         return p->kind = DIRECTORY, VG_OK;
-    if (!p->format && (p->sequence = writable_sequence(vgi_sequence_by_suffix(output)))) return tell_sequence(p, output, e);
+    if (!p->format && (p->sequence = writable_sequence(vgi_sequence_by_suffix(output))))
+        return tell_sequence(p, output, e);
     if (!p->format && !(p->format = vgi_format_by_suffix(output))) return unknown_kind(output, e);
     if (!memchr(output, '%', p->length)) return p->kind = ONE_FILE, VG_OK;
     p->kind = SERIES;
@@ -201,7 +206,8 @@ static int make_plan(plan *p, const char *output, const vg_sink_options *o, vg_e
     }
     r = tell_kind(p, output, e);
     if (!p->format) p->format = &vgi_format_obj;
-    if (r == VG_OK && o->full_precision && !((p->sequence ? p->sequence->keeps : p->format->keeps) & VGI_KEEPS_DOUBLES))
+    if (r == VG_OK && o->full_precision &&
+        !((p->sequence ? p->sequence->keeps : p->format->keeps) & VGI_KEEPS_DOUBLES))
         r = vg_fail(e, VG_EARG, "cannot write '%s' in full precision: %s holds binary32 only", output,
                     p->sequence ? p->sequence->name : p->format->name);
     return r < 0 ? r : check_mesh_option(p, o, e);
@@ -497,8 +503,10 @@ static int keep_mesh(const vg_sink *s, vg_err *e)
                 same_singles(there.reference, s->head->reference, 3 * there.mesh.nv);
     vg_head_clear(&there);
     if (same) return VG_OK;
-    return vg_fail(e, VG_EARG, "'%s', which goes with '%s', is there already and is not the reference pose: choose where "
-                   "the mesh goes with --mesh, or --no-mesh", s->mesh, s->output);
+    return vg_fail(e, VG_EARG,
+                   "'%s', which goes with '%s', is there already and is not the reference pose: choose where "
+                   "the mesh goes with --mesh, or --no-mesh",
+                   s->mesh, s->output);
 }
 
 static int choose_mesh(vg_sink *s, const vg_sink_options *o, vg_err *e)
@@ -567,7 +575,8 @@ static int drop_loose(vg_sink *s, bool drop, vg_err *e)
 {
     bool *attached = NULL;
     if (s->head->kind != VG_VERTICES)
-        return drop ? vg_fail(e, VG_EARG, "--drop-loose is for vertices: the input holds %s", vg_kind_name(s->head->kind))
+        return drop ? vg_fail(e, VG_EARG, "--drop-loose is for vertices: the input holds %s",
+                              vg_kind_name(s->head->kind))
                     : VG_OK;
     int r = find_loose(s, &attached, e);
     if (r == VG_OK && drop && s->loose == s->head->mesh.nv && s->loose)
@@ -613,7 +622,9 @@ static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
     const vgi_sequence_format *f = s->plan.sequence;
     const vg_head *h = s->head;
     unsigned keeps = f ? f->keeps : s->plan.format->keeps;
-    if (s->mesh) keeps |= s->mesh_format->keeps & (VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS);
+    if (s->mesh)
+        keeps |= s->mesh_format->keeps &
+                 (VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS);
     bool faces = keeps & VGI_KEEPS_FACES, triangles = faces && !(keeps & VGI_KEEPS_POLYGONS);
     const struct {
         bool lost;
@@ -654,8 +665,10 @@ static int warn_of_loose(vg_sink *s, vg_err *e)
 {
     char text[160];
     if (!lacks_faces(&s->plan) || s->plan.sequence->bare || !s->loose || s->head->mesh.nf == 0) return VG_OK;
-    int n = snprintf(text, sizeof text, "%zu vertices are in no face: programs that drop them from the mesh, as Blender "
-                     "does, then refuse the cache (--drop-loose)", s->loose);
+    int n = snprintf(text, sizeof text,
+                     "%zu vertices are in no face: programs that drop them from the mesh, as Blender "
+                     "does, then refuse the cache (--drop-loose)",
+                     s->loose);
     return vgi_names_add(&s->warnings, text, (size_t)n, e);
 }
 

@@ -85,25 +85,43 @@ static int add_standard_input(vg_source *s, vg_err *e)
     return add_item(s, NULL, e);
 }
 
-static bool is_mesh_file(DIR *dir, const char *name)
+enum worth { NOTHING, WHOLE_SEQUENCE, ONE_POSE };
+
+static enum worth judge_file(DIR *dir, const char *name)
 {
     char stem[NAME_MAX + 1];
     struct stat st;
     size_t n = vgi_packed_stem(name);
-    if (*name == '.' || n >= sizeof stem) return false;
+    if (*name == '.' || n >= sizeof stem) return NOTHING;
     memcpy(stem, name, n);
     stem[n] = 0;
-    return (vgi_format_by_suffix(stem) || vgi_packable(stem)) && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISREG(st.st_mode);
+    enum worth worth = vgi_format_by_suffix(stem) ? ONE_POSE : vgi_packable(stem) ? WHOLE_SEQUENCE : NOTHING;
+    return worth && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISREG(st.st_mode) ? worth : NOTHING;
+}
+
+/* Files of whole sequences count only where there are no mesh files: a skeleton or an array beside them is about the
+ * same poses. */
+static int list_files(vgi_names *names, DIR *dir, vg_err *e)
+{
+    enum worth best = WHOLE_SEQUENCE;
+    struct dirent *d;
+    int r = VG_OK;
+    while (r == VG_OK && (errno = 0, d = readdir(dir))) {
+        enum worth worth = judge_file(dir, d->d_name);
+        if (worth > best) {
+            vgi_names_clear(names);
+            best = worth;
+        }
+        if (worth == best) r = vgi_names_add(names, d->d_name, strlen(d->d_name), e);
+    }
+    return r;
 }
 
 static int list_directory(vgi_names *names, const char *path, vg_err *e)
 {
     DIR *dir = opendir(path);
     if (!dir) return vg_fail(e, VG_ESYS, "cannot open directory '%s': %s", path, strerror(errno));
-    int r = VG_OK;
-    struct dirent *d;
-    while (r == VG_OK && (errno = 0, d = readdir(dir)))
-        if (is_mesh_file(dir, d->d_name)) r = vgi_names_add(names, d->d_name, strlen(d->d_name), e);
+    int r = list_files(names, dir, e);
     if (r == VG_OK && errno) r = vg_fail(e, VG_ESYS, "cannot read directory '%s': %s", path, strerror(errno));
     closedir(dir);
     if (r == VG_OK && names->n == 0)
@@ -434,8 +452,10 @@ static int find_faces(vg_source *s, const char *path, vg_head *h, vg_err *e)
     if (r < 0) return r;
     if (beside) r = borrow_mesh(s, h, beside, e);
     else if (!s->playing.format->bare)
-        r = vg_fail(e, VG_EINPUT, "%s holds no faces: put the mesh of the same name beside it, as .obj or .ply, or name it "
-                    "with --mesh", s->playing.subject);
+        r = vg_fail(e, VG_EINPUT,
+                    "%s holds no faces: put the mesh of the same name beside it, as .obj or .ply, or name it "
+                    "with --mesh",
+                    s->playing.subject);
     free(beside);
     return r;
 }
@@ -496,7 +516,8 @@ static int take_over_head(vg_source *s, const char *archive, const char *path, v
     s->head = *h;
     *h = (vg_head){0};
     s->own.kind = kind, s->own.precision = precision, s->own.count = count;
-    if (s->head.nanchors && !(s->own.anchors = vgi_copy_array(s->head.anchors, s->head.nanchors, sizeof *s->head.anchors, e)))
+    if (s->head.nanchors &&
+        !(s->own.anchors = vgi_copy_array(s->head.anchors, s->head.nanchors, sizeof *s->head.anchors, e)))
         return VG_ENOMEM;
     s->own.nanchors = s->head.nanchors;
     if (!s->head.reference) return reference_from_first(s, e);

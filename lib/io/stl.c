@@ -1,9 +1,9 @@
 /* stl.c: STL, text and binary: triangles, each with its own three corners.
  * Leaves out normals and colours (skipped), and the names of solids.
  *
- * A corner has no number in STL. Corners at exactly one place (-0 is 0) become one vertex, numbered in order of first
- * appearance; nothing is guessed from nearness. A triangle of which two corners are at one place is no face: it is left
- * out and counted.
+ * A corner has no number in STL. Corners at exactly one place (-0 is 0) become one vertex, numbered in order of
+ * first appearance; nothing is guessed from nearness. A triangle of which two corners are at one place is no face:
+ * it is left out and counted.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -65,7 +65,8 @@ static int weld(struct reading *r, const double x[3], uint32_t *v)
     size_t slot = find_slot(r, x);
     if (!r->slots[slot]) {
         if (m->nv >= UINT32_MAX - 1) return vg_fail(r->e, VG_EINPUT, "%s has too many vertices", r->subject);
-        if ((result = vgi_grow(&r->m->vertices, &r->vertices_cap, 3 * (m->nv + 1), sizeof *x, r->e)) < 0) return result;
+        if ((result = vgi_grow(&r->m->vertices, &r->vertices_cap, 3 * (m->nv + 1), sizeof *x, r->e)) < 0)
+            return result;
         memcpy(r->m->vertices + 3 * m->nv, x, 3 * sizeof *x);
         r->slots[slot] = (uint32_t)++m->nv;
     }
@@ -79,7 +80,8 @@ static int add_triangle(struct reading *r, double x[9])
     uint32_t v[3];
     for (int k = 0; k < 9; k++) {
         if (!isfinite(x[k]))
-            return vg_fail(r->e, VG_EINPUT, "%s: corner %d of triangle %zu is not finite", r->subject, k / 3, r->triangles);
+            return vg_fail(r->e, VG_EINPUT, "%s: corner %d of triangle %zu is not finite", r->subject, k / 3,
+                           r->triangles);
         x[k] += 0.0; /* -0 becomes 0 */
     }
     for (int k = 0; k < 3; k++) {
@@ -238,8 +240,8 @@ static bool starts_as_text(const unsigned char *data, size_t n)
     return n > 5 && !strncasecmp((const char *)data, "solid", 5) && is_space((char)data[5]);
 }
 
-/* Does it look like binary STL, whose header may begin like text? The count agrees with the size; or, for the start of
- * a larger file, the triangles seen have finite corners and no attribute. */
+/* Does it look like binary STL, whose header may begin like text? The count agrees with the size; or, for the start
+ * of a larger file, the triangles seen have finite corners and no attribute. */
 static bool looks_binary(const unsigned char *data, size_t n)
 {
     if (n < HEADER + FACET) return n == HEADER && vgi_get32(data + COUNT_OFF) == 0;
@@ -461,7 +463,8 @@ static int write_stl(vg_bytes *out, const vgi_writing *w, bool text, vg_err *e)
     size_t start = out->size;
     int r = text ? put_line(&x, "solid\n", NULL, false) : check_singles(w, e);
     if (r == VG_OK && !text) r = vgi_bytes_append(out, header, HEADER, e);
-    for (size_t f = 0; f < m->nf && r == VG_OK; f++) r = put_face(&x, m->vert + m->start[f], m->start[f + 1] - m->start[f]);
+    for (size_t f = 0; f < m->nf && r == VG_OK; f++)
+        r = put_face(&x, m->vert + m->start[f], m->start[f + 1] - m->start[f]);
     if (r == VG_OK && text) r = put_line(&x, "endsolid\n", NULL, false);
     free(x.ring);
     if (r < 0) return r;

@@ -1,7 +1,8 @@
 /* usda.c: USD as text, written only: one mesh whose points have a sample for every frame, polygons as they are.
  * Leaves out texture coordinates, materials and groups, skeletons, and reading.
  *
- * Samples are written as they come; what stands before them and is known later (rate, last time) has room to be patched.
+ * Samples are written as they come; what stands before them and is known later (rate, last time) has room to be
+ * patched.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -45,7 +46,8 @@ static int fill_room(writing *x, uint64_t off, double number, vg_err *e)
 
 static int put_layer(writing *x, vg_err *e)
 {
-    static const char *const fields[PLACES] = {"startTimeCode", "endTimeCode", "timeCodesPerSecond", "framesPerSecond"};
+    static const char *const fields[PLACES] = {"startTimeCode", "endTimeCode", "timeCodesPerSecond",
+                                               "framesPerSecond"};
     int r = put_text(x, "#usda 1.0\n(\n    defaultPrim = \"mesh\"\n    upAxis = \"Y\"\n", e);
     for (int i = 0; i < PLACES && r == VG_OK; i++) {
         r = put_text(x, "    ", e);
@@ -54,7 +56,9 @@ static int put_layer(writing *x, vg_err *e)
         if (r == VG_OK) r = put_room(x, &x->place_off[i], e);
         if (r == VG_OK) r = put_text(x, "\n", e);
     }
-    return r == VG_OK ? put_text(x, ")\n\ndef Mesh \"mesh\"\n{\n    uniform token subdivisionScheme = \"none\"\n", e) : r;
+    return r == VG_OK
+               ? put_text(x, ")\n\ndef Mesh \"mesh\"\n{\n    uniform token subdivisionScheme = \"none\"\n", e)
+               : r;
 }
 
 /* Numbers with commas between. */
@@ -111,9 +115,11 @@ static int check_time(writing *x, const vg_frame *f, vg_err *e)
         x->ignored_times |= f->has_time;
         return VG_OK;
     }
-    if (!f->has_time) return vg_fail(e, VG_EINPUT, "it has no time, but those before it have (vg-encode --fps gives all times)");
+    if (!f->has_time)
+        return vg_fail(e, VG_EINPUT, "it has no time, but those before it have (vg-encode --fps gives all times)");
     if (x->frames && !(f->time > x->last))
-        return vg_fail(e, VG_EINPUT, "its time %g is not later than %g, that of the frame before it", f->time, x->last);
+        return vg_fail(e, VG_EINPUT, "its time %g is not later than %g, that of the frame before it", f->time,
+                       x->last);
     return VG_OK;
 }
 

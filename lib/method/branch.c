@@ -11,10 +11,12 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { SWEEPS = 50,  /* at most, and they end when no face changes its branch */
-       ROUNDS = 12 }; /* of smoothing, when a face turns by more than half a turn */
+enum { SWEEPS = 50,      /* at most, and they end when no face changes its branch */
+       NEWTON_STEPS = 6, /* of the smooth field, at most, and in each */
+       CG_STEPS = 200 };
 static const double trust = 2.5;     /* see vgi_branch_near: x / sin x for x = 2.3, a turn by 260 degrees */
-static const double most_left = 0.5; /* half angle that smoothing may leave between a face's turn and its vector */
+static const double attachment = 0.02; /* of the smooth field to the faces' turns: it follows them over some seven faces */
+static const double usual = 0.3;       /* a face whose half angle from the field is more than this is an exception */
 
 static double dot(const double a[3], const double b[3])
 {
@@ -28,6 +30,12 @@ static double half_angle_between(const double q[4], const double l[3])
     vg_quat_exp(log, to);
     vg_quat_multiply(to, q, rest);
     return atan2(sqrt(dot(rest + 1, rest + 1)), fabs(rest[0]));
+}
+
+void vgi_shorter(double q[4])
+{
+    double sign = q[0] < 0 ? -1 : 1;
+    for (int k = 0; k < 4; k++) q[k] *= sign;
 }
 
 bool vgi_branch_near(const double q[4], const double near[3], double l[3])
@@ -53,7 +61,7 @@ static bool follow(const double q[4], const double near[3], double l[3])
     double length2 = dot(near, near), back[4] = {0, -near[0], -near[1], -near[2]}, rest[4], more[4];
     vg_quat_exp(back, back);
     vg_quat_multiply(back, q, rest);
-    for (int k = 0; k < 4 && rest[0] < 0; k++) rest[k] = -rest[k];
+    vgi_shorter(rest);
     vg_quat_log(rest, more);
     double along = length2 > 0 ? dot(more + 1, near) / length2 : 0;
     for (int k = 0; k < 3; k++) l[k] = (1 + along) * near[k];
@@ -287,20 +295,117 @@ static bool is_beyond(const choice *c, const double *corner)
     return false;
 }
 
-/* Means over vertices, then over the vertices of faces, as long as they stay near what the face does. */
-static void smooth(choice *c)
+/* ---- a smooth field of vectors (Gauss-Newton, conjugate gradients) ----
+ *
+ * Minimised is  sum_f weight_f |rest_f|^2 + smoothness,  exp(rest_f) = exp(-turn_f) q_f, smoothness = turn' L turn with L the graph Laplacian of
+ * faces that share vertices, the n faces at a vertex with weight 1/n each. A step x changes rest by -J x, J = I - (1 - cos a)/a^2 [v] +
+ * (a - sin a)/a^3 [v]^2 for the rotation vector v = 2 turn and its length a. Near a whole turn J is singular across the axis: there
+ * the axis is that of the neighbours. */
+
+typedef struct relaxation {
+    double *J;      /* 9 per face */
+    double *weight; /* per face */
+    double *b, *x, *r, *p, *Ap; /* 3 per face */
+} relaxation;
+
+static void make_jacobian(const double turn[3], double J[9])
+{
+    const double v[3] = {2 * turn[0], 2 * turn[1], 2 * turn[2]};
+    double a2 = dot(v, v), a = sqrt(a2), first = 0.5, second = 1.0 / 6;
+    if (a > 1e-4) first = (1 - cos(a)) / a2, second = (a - sin(a)) / (a2 * a);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) J[3 * i + k] = second * v[i] * v[k] + (i == k ? 1 - second * a2 : 0);
+    J[1] += first * v[2], J[2] -= first * v[1], J[3] -= first * v[2];
+    J[5] += first * v[0], J[6] += first * v[1], J[7] -= first * v[0];
+}
+
+/* y += L x; c->at is used up */
+static void add_laplacian(choice *c, const double *x, double *y)
 {
     const vg_graph *g = c->g;
-    sum_around(c);
+    memset(c->at, 0, 3 * g->nv * sizeof *c->at);
+    for (size_t f = 0; f < g->nf; f++)
+        for (size_t i = g->start[f]; i < g->start[f + 1]; i++)
+            for (size_t k = 0; k < 3; k++) c->at[3 * (size_t)g->vert[i] + k] += x[3 * f + k];
     for (size_t v = 0; v < g->nv; v++)
         for (size_t k = 0; k < 3 && faces_around(c, v); k++) c->at[3 * v + k] /= (double)faces_around(c, v);
-    for (size_t f = 0; f < g->nf; f++) {
-        double mean[3] = {0, 0, 0}, *now = c->turn + 3 * f;
+    for (size_t f = 0; f < g->nf; f++)
         for (size_t i = g->start[f]; i < g->start[f + 1]; i++)
-            for (size_t k = 0; k < 3; k++) mean[k] += c->at[3 * (size_t)g->vert[i] + k];
-        for (int k = 0; k < 3; k++) mean[k] /= (double)(g->start[f + 1] - g->start[f]);
-        if (half_angle_between(c->q + 4 * f, mean) <= most_left) memcpy(now, mean, sizeof mean);
+            for (size_t k = 0; k < 3; k++) y[3 * f + k] += x[3 * f + k] - c->at[3 * (size_t)g->vert[i] + k];
+}
+
+/* y = weight J' (J x) + L x */
+static void apply(choice *c, const relaxation *r, const double *x, double *y)
+{
+    for (size_t f = 0; f < c->g->nf; f++) {
+        const double *J = r->J + 9 * f, *xf = x + 3 * f;
+        double Jx[3];
+        for (int i = 0; i < 3; i++) Jx[i] = r->weight[f] * dot(J + 3 * i, xf);
+        for (int k = 0; k < 3; k++) y[3 * f + (size_t)k] = J[k] * Jx[0] + J[3 + k] * Jx[1] + J[6 + k] * Jx[2];
     }
+    add_laplacian(c, x, y);
+}
+
+static void linearise(choice *c, relaxation *r)
+{
+    size_t n = 3 * c->g->nf;
+    memset(r->b, 0, n * sizeof *r->b);
+    add_laplacian(c, c->turn, r->b);
+    for (size_t f = 0; f < c->g->nf; f++) {
+        double *turn = c->turn + 3 * f, *J = r->J + 9 * f, *b = r->b + 3 * f;
+        double back[4] = {0, -turn[0], -turn[1], -turn[2]}, rest[4], l[4];
+        vg_quat_exp(back, back);
+        vg_quat_multiply(back, c->q + 4 * f, rest);
+        vgi_shorter(rest);
+        vg_quat_log(rest, l);
+        make_jacobian(turn, J);
+        r->weight[f] = attachment / (1 + dot(l + 1, l + 1) / (usual * usual)); /* a face that flips does not pull much */
+        for (int k = 0; k < 3; k++)
+            b[k] = r->weight[f] * (J[k] * l[1] + J[3 + k] * l[2] + J[6 + k] * l[3]) - b[k];
+    }
+}
+
+static double product(const double *a, const double *b, size_t n)
+{
+    double sum = 0;
+    for (size_t i = 0; i < n; i++) sum += a[i] * b[i];
+    return sum;
+}
+
+static void solve_step(choice *c, relaxation *r)
+{
+    size_t n = 3 * c->g->nf;
+    memset(r->x, 0, n * sizeof *r->x);
+    memcpy(r->r, r->b, n * sizeof *r->b);
+    memcpy(r->p, r->b, n * sizeof *r->b);
+    double rr = product(r->r, r->r, n), enough = 1e-6 * rr;
+    for (int i = 0; i < CG_STEPS && rr > enough; i++) {
+        apply(c, r, r->p, r->Ap);
+        double alpha = rr / product(r->p, r->Ap, n), before_rr = rr;
+        for (size_t k = 0; k < n; k++) r->x[k] += alpha * r->p[k], r->r[k] -= alpha * r->Ap[k];
+        rr = product(r->r, r->r, n);
+        for (size_t k = 0; k < n; k++) r->p[k] = r->r[k] + rr / before_rr * r->p[k];
+    }
+}
+
+static int relax(choice *c, vg_err *e)
+{
+    size_t nf = c->g->nf;
+    double *room = vgi_array_raw(nf, 25 * sizeof *room, e);
+    if (!room) return VG_ENOMEM;
+    relaxation r = {room, room + 9 * nf, room + 10 * nf, room + 13 * nf, room + 16 * nf, room + 19 * nf, room + 22 * nf};
+    for (int step = 0; step < NEWTON_STEPS; step++) {
+        linearise(c, &r);
+        solve_step(c, &r);
+        double most = 0;
+        for (size_t i = 0; i < 3 * nf; i++) {
+            c->turn[i] += r.x[i];
+            most = fmax(most, fabs(r.x[i]));
+        }
+        if (most < 1e-3) break;
+    }
+    free(room);
+    return VG_OK;
 }
 
 int vgi_choose_turns(const vg_graph *g, const double *q, double *turn, bool *beyond, vg_err *e)
@@ -321,7 +426,7 @@ int vgi_choose_turns(const vg_graph *g, const double *q, double *turn, bool *bey
         sum_around(&c);
         for (int i = 0; i < SWEEPS && sweep(&c); i++) continue;
         *beyond = is_beyond(&c, q);
-        for (int i = 0; *beyond && i < ROUNDS; i++) smooth(&c);
+        if (*beyond) r = relax(&c, e);
     }
     vgi_incidence_clear(&c.around);
     free(c.q);

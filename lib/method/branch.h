@@ -6,6 +6,9 @@
 
 #include "core/core.h"
 
+/* vgi_shorter: of q and -q the one that turns by half a turn at most. */
+void vgi_shorter(double q[4]);
+
 /* vgi_branch_near: of all vectors l (axis times half angle) with exp(l) = q or -q the one nearest to `near`. q: unit. False when it is
  * much farther from there than the rotations are from one another, as it happens near whole turns, where the axis says nothing. */
 bool vgi_branch_near(const double q[4], const double near[3], double l[3]);

@@ -33,10 +33,11 @@ static const double LAST_SPAN = 0.7;      /* and in the last, in mean edge lengt
 static const double FIRST_LIMIT = 0.1, LAST_LIMIT = 0.02; /* nearest points farther than this are none */
 static const double COSINE = 0.4;         /* least of normals that fit */
 static const double MAP_SPAN = 0.07;      /* over which the maps of faces are smoothed */
-static const double KEPT_STRETCH = 0.8;   /* power of a map's mean stretch: what nothing holds goes back to its size */
+static const double KEPT_STRETCH = 0.8;   /* power of a map's stretch: what nothing holds goes back to its size */
 
 enum {
     BLOCK = 256,     /* vertices of a task */
+    HUB = 100,       /* a vertex of so many neighbours does not count bending: all of them would be joined */
     FULL = 8,        /* larger faces have no springs between all of their corners */
     TIED_SOLVES = 5, /* from the ties alone */
     ROUNDS = 8,      /* with nearest points: one factorisation each */
@@ -148,13 +149,15 @@ static int make_springs(fit *t, vg_err *e)
     spring_list list = {0};
     int r = gather_springs(&list, t->in, e);
     size_t n = list.n, nv = L->nv = t->m->nv;
+    if (r == VG_OK && n > INT32_MAX / 2)
+        r = vg_fail(e, VG_EINPUT, "a mesh of %zu vertices is too large to be fitted", nv);
     for (size_t i = 0; i < n && r == VG_OK; i++)
         r = add_spring(&list, list.at[i].b, list.at[i].a, list.at[i].weight, e);
     L->first = vgi_array(nv + 1, sizeof *L->first, e);
     L->to = vgi_array_raw(list.n, sizeof *L->to, e);
     L->weight = vgi_array_raw(list.n, sizeof *L->weight, e);
     L->sum = vgi_array(nv, sizeof *L->sum, e);
-    if (r < 0 || !L->first || !L->to || !L->weight || !L->sum) return free(list.at), VG_ENOMEM;
+    if (r < 0 || !L->first || !L->to || !L->weight || !L->sum) return free(list.at), r < 0 ? r : VG_ENOMEM;
     if (list.n) qsort(list.at, list.n, sizeof *list.at, compare_springs);
     size_t to = 0;
     for (size_t i = 0; i < list.n; i++) {
@@ -188,6 +191,11 @@ static void apply_laplacian(const springs *L, const double *x, double *y)
 
 /* ---- the matrix ---- */
 
+static bool is_hub(const springs *L, size_t v)
+{
+    return L->first[v + 1] - L->first[v] >= HUB;
+}
+
 static int compare_ints(const void *a, const void *b)
 {
     int x = *(const int *)a, y = *(const int *)b;
@@ -201,6 +209,7 @@ static size_t column_rows(const springs *L, uint32_t column, int *rows, uint32_t
     mark[column] = column + 1, rows[n++] = (int)column;
     for (uint32_t i = L->first[column]; i <= L->first[column + 1]; i++) {
         uint32_t k = i < L->first[column + 1] ? L->to[i] : column; /* the column itself comes last */
+        if (k != column && is_hub(L, k)) continue;
         for (uint32_t j = L->first[k]; j < L->first[k + 1]; j++) {
             uint32_t v = L->to[j];
             if (v <= column || mark[v] == column + 1) continue;
@@ -248,7 +257,7 @@ static void fill_column(fit *t, size_t j, double *bend, double *stretch)
         size_t k = self ? j : L->to[i];
         double a = self ? L->sum[j] : -L->weight[i];
         if (!self) stretch[k] = -L->weight[i];
-        if (!(L->sum[k] > 0)) continue;
+        if (!(L->sum[k] > 0) || is_hub(L, k)) continue;
         a /= L->sum[k];
         bend[k] += a * L->sum[k];
         for (uint32_t p = L->first[k]; p < L->first[k + 1]; p++) bend[L->to[p]] -= a * L->weight[p];
@@ -268,6 +277,7 @@ static int fill_smoothness(fit *t, vg_err *e)
         for (uint32_t i = L->first[j]; i <= L->first[j + 1]; i++) {
             size_t k = i < L->first[j + 1] ? L->to[i] : j;
             bend[k] = stretch[k] = 0;
+            if (is_hub(L, k)) continue;
             for (uint32_t p = L->first[k]; p < L->first[k + 1]; p++) bend[L->to[p]] = 0;
         }
     }
@@ -491,7 +501,7 @@ static void add_smoothness(fit *t)
     for (size_t v = 0; v < L->nv; v++) {
         double *w = wanted + 3 * v;
         vgi_multiply_vector(t->map + 9 * v, t->laplacian + 3 * v, w);
-        for (int k = 0; k < 3; k++) w[k] = L->sum[v] > 0 ? w[k] / L->sum[v] : 0;
+        for (int k = 0; k < 3; k++) w[k] = L->sum[v] > 0 && !is_hub(L, v) ? w[k] / L->sum[v] : 0;
     }
     apply_laplacian(L, wanted, t->rhs);
     for (size_t v = 0; v < L->nv; v++) {

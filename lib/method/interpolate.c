@@ -154,7 +154,7 @@ static void split(const double *q, const double face[3], bool beyond, double *tu
     double back[4] = {0, -face[0], -face[1], -face[2]}, left[4], l[4];
     vg_quat_exp(back, back);
     vg_quat_multiply(back, unit, left);
-    for (int k = 0; k < 4 && left[0] < 0; k++) left[k] = -left[k];
+    vgi_shorter(left);
     vg_quat_log(left, l);
     memcpy(turn, face, 3 * sizeof *turn);
     memcpy(rest, l + 1, 3 * sizeof *rest);

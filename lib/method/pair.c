@@ -101,12 +101,12 @@ static void walk_around(struct walk *w, const struct pairing *p, uint32_t first,
     w->n = 0;
     memset(w->seen, 0, sizeof w->seen);
     visit(w, first);
-    for (size_t i = 0; i < w->n; i++) {
+    for (size_t i = 0; i < w->n && w->n < AROUND; i++) {
         uint32_t f = w->face[i];
         if (f != first && vgi_square(centroid(p->in->source_surface, f), at) >= radius * radius) continue;
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
             uint32_t v = m->vert[c];
-            for (uint32_t k = p->source_around.first[v]; k < p->source_around.first[v + 1]; k++)
+            for (uint32_t k = p->source_around.first[v]; k < p->source_around.first[v + 1] && w->n < AROUND; k++)
                 visit(w, p->source_around.face[k]);
         }
     }
@@ -268,48 +268,83 @@ static void borrow(struct drivers *d, const struct drivers *host)
     }
 }
 
-static void seat_piece(struct pairing *p, const vgi_kdtree *tree, const uint32_t *matched, const uint32_t *label,
-                       uint32_t piece)
+/* The hosts of a piece: the matched faces nearest to the mean of its centroids. */
+static void find_hosts(const struct pairing *p, const vgi_kdtree *tree, const uint32_t *matched, const double at[3],
+                       struct drivers *out)
 {
-    const vg_mesh *m = p->in->target;
-    double at[3] = {0, 0, 0};
-    size_t n = 0;
-    for (size_t g = 0; g < m->nf; g++) {
-        if (label[m->vert[m->start[g]]] != piece) continue;
-        for (int k = 0; k < 3; k++) at[k] += centroid(p->in->target_surface, g)[k];
-        n++;
-    }
-    for (int k = 0; k < 3; k++) at[k] /= (double)n;
     vgi_near near[HOSTS];
     size_t hosts = vgi_kdtree_nearest(tree, at, INFINITY, HOSTS, near);
     struct drivers d = {.n = 0};
     for (size_t i = 0; i < hosts; i++) borrow(&d, &p->drivers[matched[near[i].index]]);
     qsort(d.at, d.n, sizeof *d.at, by_weight);
-    for (size_t g = 0; g < m->nf; g++)
-        if (label[m->vert[m->start[g]]] == piece) p->drivers[g] = d;
+    *out = d;
+}
+
+/* The mean centroid of the faces of each component of the target. */
+static void piece_centres(const struct pairing *p, const uint32_t *label, double *centre, size_t *faces,
+                          size_t pieces)
+{
+    const vg_mesh *m = p->in->target;
+    for (size_t g = 0; g < m->nf; g++) {
+        size_t k = label[m->vert[m->start[g]]];
+        for (size_t l = 0; l < 3; l++) centre[3 * k + l] += centroid(p->in->target_surface, g)[l];
+        faces[k]++;
+    }
+    for (size_t k = 0; k < pieces; k++)
+        for (size_t l = 0; l < 3; l++) centre[3 * k + l] /= (double)faces[k];
+}
+
+/* The matched faces and a tree of their centroids. */
+static int matched_tree(const struct pairing *p, vgi_kdtree **tree, uint32_t *matched, vg_err *e)
+{
+    size_t nf = p->in->target->nf, n = 0;
+    double *at = vgi_array_raw(nf, 3 * sizeof *at, e);
+    if (!at) return VG_ENOMEM;
+    for (size_t g = 0; g < nf; g++) {
+        if (p->host[g] != g) continue;
+        memcpy(at + 3 * n, centroid(p->in->target_surface, g), 3 * sizeof *at);
+        matched[n++] = (uint32_t)g;
+    }
+    int r = vgi_kdtree_new(tree, at, n, e);
+    free(at);
+    return r;
 }
 
 static int seat_pieces(struct pairing *p, vg_err *e)
 {
     const vg_mesh *m = p->in->target;
     uint32_t *label = vgi_array(m->nv, sizeof *label, e), *matched = vgi_array_raw(m->nf, sizeof *matched, e);
-    double *at = vgi_array_raw(m->nf, 3 * sizeof *at, e);
+    uint32_t *first = NULL; /* per piece: its first face, UINT32_MAX before it was met */
+    double *centre = NULL;
+    size_t *faces = NULL, pieces = 0;
     vgi_kdtree *tree = NULL;
-    size_t pieces, n = 0;
-    int r = label && matched && at ? vg_mesh_components(m, label, &pieces, e) : VG_ENOMEM;
-    for (size_t g = 0; g < m->nf && r == VG_OK; g++) {
-        if (p->host[g] != g) continue;
-        memcpy(at + 3 * n, centroid(p->in->target_surface, g), 3 * sizeof *at);
-        matched[n++] = (uint32_t)g;
+    int r = label && matched ? vg_mesh_components(m, label, &pieces, e) : VG_ENOMEM;
+    if (r == VG_OK) {
+        first = vgi_array_raw(pieces, sizeof *first, e);
+        centre = vgi_array(pieces, 3 * sizeof *centre, e);
+        faces = vgi_array(pieces, sizeof *faces, e);
+        r = first && centre && faces ? matched_tree(p, &tree, matched, e) : VG_ENOMEM;
     }
-    if (r == VG_OK) r = vgi_kdtree_new(&tree, at, n, e);
-    for (size_t g = 0; g < m->nf && r == VG_OK; g++)
-        if (p->host[g] == UINT32_MAX && p->drivers[g].n == 0)
-            seat_piece(p, tree, matched, label, label[m->vert[m->start[g]]]);
+    if (r == VG_OK) {
+        memset(first, 0xff, pieces * sizeof *first);
+        piece_centres(p, label, centre, faces, pieces);
+    }
+    for (size_t g = 0; g < m->nf && r == VG_OK; g++) {
+        if (p->host[g] != UINT32_MAX) continue;
+        size_t k = label[m->vert[m->start[g]]];
+        if (first[k] != UINT32_MAX) {
+            p->drivers[g] = p->drivers[first[k]];
+            continue;
+        }
+        find_hosts(p, tree, matched, centre + 3 * k, &p->drivers[g]);
+        first[k] = (uint32_t)g;
+    }
     vgi_kdtree_free(&tree);
     free(label);
     free(matched);
-    free(at);
+    free(first);
+    free(centre);
+    free(faces);
     return r;
 }
 

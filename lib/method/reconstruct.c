@@ -53,6 +53,7 @@ struct vg_solver {
     cholmod_factor *L;
     vgi_factor factor;
     vgi_row *x;       /* threads * unknowns */
+    double *spare;    /* of vg_solver_load: 3 numbers for each corner of the largest face */
     vg_solver_facts facts;
 };
 
@@ -267,6 +268,17 @@ static int make_workspace(vg_solver *s, vg_err *e)
     return s->x ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", s->unknowns);
 }
 
+/* Fronts of a surface's factor are small: BLAS threads of their own cost more than they do, and OpenMP's in CHOLMOD should not be
+ * more than there are processors. Both are called only where they exist. */
+extern void openblas_set_num_threads(int) __attribute__((weak));
+extern void omp_set_dynamic(int) __attribute__((weak));
+
+static void be_modest(void)
+{
+    if (openblas_set_num_threads) openblas_set_num_threads(1);
+    if (omp_set_dynamic) omp_set_dynamic(1);
+}
+
 static int make_metric(vg_solver *s, const double *reference, vg_err *e)
 {
     int r = vgi_metric_make(&s->metric, s->g, reference, e);
@@ -283,10 +295,12 @@ int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, s
     s->g = g, s->threads = threads;
     cholmod_start(&s->common);
     s->started = true;
+    be_modest();
     s->common.print = 0;
     s->common.error_handler = NULL;
     cholmod_sparse *N = NULL;
     int r = weights == VG_WEIGHTS_AREA ? make_metric(s, reference, e) : VG_OK;
+    if (r == VG_OK && !(s->spare = vgi_array(3 * g->max_corners, sizeof *s->spare, e))) r = VG_ENOMEM;
     if (r == VG_OK) r = number_unknowns(s, anchors, nanchors, reference, e);
     if (r == VG_OK) r = plan_walk(s, e);
     if (r == VG_OK && s->unknowns) {
@@ -311,6 +325,7 @@ void vg_solver_free(vg_solver **out)
     free(s->row);
     free(s->anchors);
     free(s->walk);
+    free(s->spare);
     vgi_metric_clear(&s->metric);
     free(s->isolated);
     free(s->isolated_at);
@@ -350,58 +365,63 @@ static void walk(const vg_solver *s, const double *w, const double *anchors, dou
     }
 }
 
-/* What a face's corners miss, in units of its own: G e for e = (w - w0) - (x - x0), e of the first corner being 0. Only
- * differences within a face are formed, so it rounds like vectors. */
-static inline __attribute__((always_inline)) void add_pull(const vg_graph *g, const vgi_metric *metric, size_t f, const double *w, const double *x, double *rhs)
+/* What a face of `size` corners misses: G e for e = (w - w0) - (x - x0), e of the first corner being 0. Only differences within
+ * a face are formed, so it rounds like vectors. `e` is room for 3 * size numbers. Called with constant sizes, this becomes
+ * straight code for triangles and quads. */
+static inline __attribute__((always_inline)) void add_pull(const vg_solver *s, size_t f, size_t size, const double *w,
+                                                          const double *x, double *e, double *rhs)
 {
-    size_t begin = g->start[f], end = g->start[f + 1];
-    const double *w0 = w + 3 * begin, *x0 = x + 3 * (size_t)g->vert[begin];
-    double mean[3] = {0, 0, 0}, share = 1.0 / (double)(end - begin);
-    for (size_t c = begin; c < end; c++) {
-        const double *wc = w + 3 * c, *xc = x + 3 * (size_t)g->vert[c];
-        for (int k = 0; k < 3; k++) mean[k] += (wc[k] - w0[k]) - (xc[k] - x0[k]);
-    }
-    for (int k = 0; k < 3; k++) mean[k] *= share;
-    const vgi_face_metric *m = metric->face ? &metric->face[f] : NULL;
-    double weight = m ? m->weight : 1, y[3][3] = {{0}}, z[3][3]; /* y[k] = sum over corners of plane e_k; z = S y */
-    for (size_t c = begin; m && c < end; c++) {
-        const double *wc = w + 3 * c, *xc = x + 3 * (size_t)g->vert[c], *plane = metric->plane + 3 * c;
-        for (int k = 0; k < 3; k++) {
-            double e = (wc[k] - w0[k]) - (xc[k] - x0[k]);
-            for (int i = 0; i < 3; i++) y[k][i] += plane[i] * e;
+    const uint32_t *vert = s->g->vert + s->g->start[f];
+    const double *wf = w + 3 * (size_t)s->g->start[f], *x0 = x + 3 * (size_t)vert[0];
+    double mean[3] = {0, 0, 0}, share = 1.0 / (double)size;
+    for (size_t i = 0; i < size; i++) {
+        const double *xi = x + 3 * (size_t)vert[i];
+        for (size_t k = 0; k < 3; k++) {
+            e[3 * i + k] = (wf[3 * i + k] - wf[k]) - (xi[k] - x0[k]);
+            mean[k] += e[3 * i + k];
         }
     }
-    for (int k = 0; m && k < 3; k++) {
+    for (int k = 0; k < 3; k++) mean[k] *= share;
+    if (!s->metric.face) {
+        for (size_t i = 0; i < size; i++)
+            for (size_t k = 0; k < 3; k++) rhs[3 * (size_t)vert[i] + k] += e[3 * i + k] - mean[k];
+        return;
+    }
+    const vgi_face_metric *m = &s->metric.face[f];
+    const double *plane = s->metric.plane + 3 * (size_t)s->g->start[f];
+    double y[3][3] = {{0}}, z[3][3]; /* y[k] = sum over corners of plane e_k; z = S y */
+    for (size_t i = 0; i < size; i++)
+        for (size_t k = 0; k < 3; k++)
+            for (size_t j = 0; j < 3; j++) y[k][j] += plane[3 * i + j] * e[3 * i + k];
+    for (int k = 0; k < 3; k++) {
         z[k][0] = m->s[0] * y[k][0] + m->s[1] * y[k][1] + m->s[2] * y[k][2];
         z[k][1] = m->s[1] * y[k][0] + m->s[3] * y[k][1] + m->s[4] * y[k][2];
         z[k][2] = m->s[2] * y[k][0] + m->s[4] * y[k][1] + m->s[5] * y[k][2];
     }
-    for (size_t c = begin; c < end; c++) {
-        const double *wc = w + 3 * c, *xc = x + 3 * (size_t)g->vert[c], *plane = m ? metric->plane + 3 * c : NULL;
-        double *to = rhs + 3 * (size_t)g->vert[c];
-        for (int k = 0; k < 3; k++) {
-            to[k] += weight * ((wc[k] - w0[k]) - (xc[k] - x0[k]) - mean[k]);
-            if (m) to[k] += plane[0] * z[k][0] + plane[1] * z[k][1] + plane[2] * z[k][2];
-        }
-    }
+    for (size_t i = 0; i < size; i++)
+        for (size_t k = 0; k < 3; k++)
+            rhs[3 * (size_t)vert[i] + k] += m->weight * (e[3 * i + k] - mean[k]) + plane[3 * i] * z[k][0] +
+                                            plane[3 * i + 1] * z[k][1] + plane[3 * i + 2] * z[k][2];
 }
 
-/* The right-hand side of what the guess misses: A G (W* - A' x). */
-static void fold(const vg_solver *s, const double *w, const double *x, double *rhs)
+/* The right-hand side of what the guess misses: A G (W* - A' x). `spare` holds
+ * 3 * max_corners numbers. */
+static void fold(const vg_solver *s, const double *w, const double *x, double *spare, double *rhs)
 {
+    double e[12];
     memset(rhs, 0, 3 * s->g->nv * sizeof *rhs);
-    if (s->metric.face) {
-        for (size_t f = 0; f < s->g->nf; f++) add_pull(s->g, &s->metric, f, w, x, rhs);
-    } else {
-        static const vgi_metric uniform; /* known to the compiler, which makes the plain loop of it */
-        for (size_t f = 0; f < s->g->nf; f++) add_pull(s->g, &uniform, f, w, x, rhs);
+    for (size_t f = 0; f < s->g->nf; f++) {
+        size_t size = face_size(s->g, f);
+        if (size == 4) add_pull(s, f, 4, w, x, e, rhs);
+        else if (size == 3) add_pull(s, f, 3, w, x, e, rhs);
+        else add_pull(s, f, size, w, x, spare, rhs);
     }
 }
 
-void vg_solver_load(const vg_solver *s, const double *vectors, const double *anchors, double *x, double *rhs)
+void vg_solver_load(vg_solver *s, const double *vectors, const double *anchors, double *x, double *rhs)
 {
     walk(s, vectors, anchors, x);
-    fold(s, vectors, x, rhs);
+    fold(s, vectors, x, s->spare, rhs);
 }
 
 typedef struct solve_job {

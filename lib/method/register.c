@@ -1,6 +1,7 @@
 /* register.c: from a few pairs of points to the faces of one mesh that drive those of another: one frame for both,
  * contradictions among the pairs, the fit, the pairing. Leaves out the fit itself (fit.c), the choice of pairs
- * (pair.c), and files. SPDX-License-Identifier: GPL-3.0-or-later */
+ * (pair.c), and files.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/register.h"
 #include "model/kdtree.h"
 

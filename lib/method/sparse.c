@@ -13,7 +13,7 @@ enum { SMALL = 500 };
 struct vgi_cholesky {
     cholmod_common common;
     cholmod_factor *L;
-    cholmod_dense *x, *y, *e; /* kept from solve to solve by cholmod_solve2 */
+    cholmod_dense *x, *y, *e; /* what cholmod_solve2 works in */
     double *b;                /* n x 3, by columns */
 };
 
@@ -45,6 +45,16 @@ static cholmod_sparse view(const vgi_sparse *a)
                             .dtype = CHOLMOD_DOUBLE, .sorted = 1, .packed = 1};
 }
 
+/* All that a solve needs: CHOLMOD 3.0 does not survive a failed allocation in there. */
+static bool make_workspace(vgi_cholesky *c)
+{
+    size_t n = c->L->n, rows = c->L->maxesize ? c->L->maxesize : 1;
+    c->x = cholmod_allocate_dense(n, 3, n, CHOLMOD_REAL, &c->common);
+    c->y = cholmod_allocate_dense(n, 3, n, CHOLMOD_REAL, &c->common);
+    c->e = cholmod_allocate_dense(rows, 3, rows, CHOLMOD_REAL, &c->common);
+    return c->x && c->y && c->e;
+}
+
 int vgi_cholesky_new(vgi_cholesky **out, const vgi_sparse *a, vg_err *e)
 {
     vgi_cholesky *c = *out = vgi_array(1, sizeof *c, e);
@@ -59,7 +69,7 @@ int vgi_cholesky_new(vgi_cholesky **out, const vgi_sparse *a, vg_err *e)
     cholmod_sparse A = view(a);
     c->L = cholmod_analyze(&A, &c->common);
     c->b = vgi_array_raw(a->n, 3 * sizeof *c->b, e);
-    if (c->L && c->b) return VG_OK;
+    if (c->L && c->b && make_workspace(c)) return VG_OK;
     vgi_cholesky_free(out);
     return vg_fail(e, VG_ENOMEM, "not enough memory to factorize %zu unknowns", a->n);
 }

@@ -64,6 +64,10 @@ static bool find_borders(vgi_surface *s, vg_err *e)
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
             uint32_t next = c + 1 < m->start[f + 1] ? c + 1 : m->start[f], v = m->vert[c], w = m->vert[next], ends[2];
             bool shared = false;
+            if (around.first[v + 1] - around.first[v] > around.first[w + 1] - around.first[w]) {
+                uint32_t swap = v; /* look around the end with fewer faces: the other may be the hub of a large fan */
+                v = w, w = swap;
+            }
             for (uint32_t i = around.first[v]; i < around.first[v + 1] && !shared; i++) {
                 if (around.face[i] == f) continue;
                 vgi_corner_edges(m->start, m->vert, around.face[i], around.corner[i], ends);

@@ -109,7 +109,8 @@ size_t vgi_map_arrays(vg_map *m, vgi_map_array list[VGI_MAP_ARRAYS])
         {(void **)&m->share, m->n, 1, false, true}, {(void **)&m->home, m->has_home ? m->nv : 0, 3, false, true},
         {(void **)&m->joint_at, m->njoints, 3, false, true}, {(void **)&m->joint_weight, m->njoints, 1, false, true},
         {(void **)&m->corner, m->ncorners, 4, false, true}, {(void **)&m->held_at, m->nheld, 3, false, true},
-        {(void **)&m->joint, m->njoints, 2, false, false}, {(void **)&m->held, m->nheld, 1, false, false}};
+        {(void **)&m->joint, m->njoints, 2, false, false}, {(void **)&m->held, m->nheld, 1, false, false},
+        {(void **)&m->held_patch, m->nheld, 1, false, false}};
     memcpy(list, all, sizeof all);
     return VGI_MAP_ARRAYS;
 }

@@ -1,4 +1,5 @@
-/* fuzz_cache.c: any bytes as a PC2 or MDD cache: what is read is finite, and comes back the same when written and read.
+/* fuzz_cache.c: any bytes as a PC2 or MDD cache: what is read is finite, and comes back the same when written and
+ * read.
  * Leaves out the mesh beside a cache.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"

@@ -1,4 +1,5 @@
-/* fuzz_npy.c: any bytes as NPY and NPZ: a head that is read is one that the stream's writer takes, and frames are finite.
+/* fuzz_npy.c: any bytes as NPY and NPZ: a head that is read is one that the stream's writer takes, and frames are
+ * finite.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 

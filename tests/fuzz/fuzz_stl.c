@@ -1,5 +1,5 @@
-/* fuzz_stl.c: any bytes as STL: what is read is a valid mesh of triangles without two vertices at one place, and comes back the
- * same, text in full precision to the bit.
+/* fuzz_stl.c: any bytes as STL: what is read is a valid mesh of triangles without two vertices at one place, and
+ * comes back the same, text in full precision to the bit.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "vg.h"
 

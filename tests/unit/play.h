@@ -86,8 +86,8 @@ static void check_prefixes(const vgi_sequence_format *format, const vg_bytes *wh
 }
 
 /* Write frames of a head; the bytes of the file. */
-static vg_bytes record(const vgi_sequence_format *format, const vg_head *h, const vg_frame *frames, size_t n, bool full,
-                       int *result, char warning[200])
+static vg_bytes record(const vgi_sequence_format *format, const vg_head *h, const vg_frame *frames, size_t n,
+                       bool full, int *result, char warning[200])
 {
     vg_bytes b = {0};
     vg_err e;

@@ -1,4 +1,5 @@
-/* test_caches.c: the bytes of PC2 and MDD, made here by hand, there and back, times, and everything that must be refused.
+/* test_caches.c: the bytes of PC2 and MDD, made here by hand, there and back, times, and everything that must be
+ * refused.
  * Leaves out the mesh beside a cache, which formats.bats has.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "play.h"
@@ -69,8 +70,10 @@ static void reads_pc2(void)
 
 static void takes_counting_for_no_time(void)
 {
-    const struct { float start, rate; bool timed; } cases[] = {{0, 1, false}, {1, 1, false}, {-3, 1, false}, {0.5f, 1, true},
-                                                               {0, 2, true}, {0, 0.04f, true}};
+    const struct {
+        float start, rate;
+        bool timed;
+    } cases[] = {{0, 1, false}, {1, 1, false}, {-3, 1, false}, {0.5f, 1, true}, {0, 2, true}, {0, 0.04f, true}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         vg_bytes b = make_pc2(cases[i].start, cases[i].rate);
         played p = play(&vgi_sequence_pc2, b.data, b.size);
@@ -131,12 +134,14 @@ static void refuses_false_numbers(void)
 
 /* ---- writing ---- */
 
-static double points[3][6] = {{0.5, 1.5, 2.5, 3.5, 4.5, 5.5}, {6.5, 7.5, 8.5, 9.5, 10.5, 11.5}, {12.5, 13.5, 14.5, 15.5, 16.5, 17.5}};
+static double points[3][6] = {
+    {0.5, 1.5, 2.5, 3.5, 4.5, 5.5}, {6.5, 7.5, 8.5, 9.5, 10.5, 11.5}, {12.5, 13.5, 14.5, 15.5, 16.5, 17.5}};
 
 static void make_frames(vg_frame frames[3], double first, double step)
 {
     for (int i = 0; i < 3; i++)
-        frames[i] = (vg_frame){.name = (char *)"f", .has_time = step != 0, .time = first + i * step, .values = points[i]};
+        frames[i] =
+            (vg_frame){.name = (char *)"f", .has_time = step != 0, .time = first + i * step, .values = points[i]};
 }
 
 static const vg_head head = {.mesh.nv = 2, .kind = VG_VERTICES, .precision = VG_F64, .count = 2};

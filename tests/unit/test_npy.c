@@ -43,7 +43,8 @@ static void reads_all_spellings(void)
         {2, "{'descr': '>f4', 'fortran_order': False, 'shape': (2, 3, 3)}\n", 4, true},
         {3, "{'descr': '>f8', 'fortran_order': False, 'shape': (2L, 3L, 3L), }\n", 8, true}};
     for (size_t i = 0; i < 4; i++) {
-        vg_bytes x = numbers(18, cases[i].item, cases[i].big), b = make(cases[i].version, cases[i].header, x.data, x.size);
+        vg_bytes x = numbers(18, cases[i].item, cases[i].big),
+                 b = make(cases[i].version, cases[i].header, x.data, x.size);
         played p = play(&vgi_sequence_npy, b.data, b.size);
         CHECK(p.result == 0 && p.frames == 2 && p.h.count == 3 && !p.timed);
         CHECK(p.h.precision == (cases[i].item == 4 ? VG_F32 : VG_F64));
@@ -78,18 +79,29 @@ static void reads_fortran_order(void)
 static void refuses_other_arrays(void)
 {
     static const char *const bad[] = {
-        "", "{", "{}", "{'descr': '<f4', 'fortran_order': False}", "{'descr': '<f4', 'fortran_order': False, 'shape': 3}",
-        "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 3)} x", "{'descr': '<f4', 'fortran_order': 0, 'shape': (2, 3, 3)}",
+        "",
+        "{",
+        "{}",
+        "{'descr': '<f4', 'fortran_order': False}",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': 3}",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 3)} x",
+        "{'descr': '<f4', 'fortran_order': 0, 'shape': (2, 3, 3)}",
         "{'descr': '<f4', 'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 3)}",
         "{'descr': '<f4', 'fortran_order': False, 'shape': (-2, 3, 3)}",
-        "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 3}", "{'descr': '<f4', 'fortran_order': False 'shape': (2, 3, 3)}",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 3}",
+        "{'descr': '<f4', 'fortran_order': False 'shape': (2, 3, 3)}",
         "{'descr': [('x', '<f4')], 'fortran_order': False, 'shape': (2, 3, 3)}",
-        "{'descr': '|O', 'fortran_order': False, 'shape': (2, 3, 3)}", "{'descr': '<i4', 'fortran_order': False, 'shape': (2, 3, 3)}",
-        "{'descr': '<f2', 'fortran_order': False, 'shape': (2, 3, 3)}", "{'descr': '<f0', 'fortran_order': False, 'shape': (2, 3, 3)}",
-        "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 4)}", "{'descr': '<f4', 'fortran_order': False, 'shape': (18,)}",
-        "{'descr': '<f4', 'fortran_order': False, 'shape': ()}", "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 3, 3)}",
+        "{'descr': '|O', 'fortran_order': False, 'shape': (2, 3, 3)}",
+        "{'descr': '<i4', 'fortran_order': False, 'shape': (2, 3, 3)}",
+        "{'descr': '<f2', 'fortran_order': False, 'shape': (2, 3, 3)}",
+        "{'descr': '<f0', 'fortran_order': False, 'shape': (2, 3, 3)}",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 4)}",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (18,)}",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': ()}",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 3, 3)}",
         "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 1, 2, 3, 3)}",
-        "{'descr': '<f4', 'fortran_order': False, 'shape': (0, 3, 3)}", "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 0, 3)}",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (0, 3, 3)}",
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 0, 3)}",
         "{'descr': '<f4', 'fortran_order': False, 'shape': (9223372036854775807, 3, 3)}",
         "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 4294967295, 3)}"};
     vg_bytes x = numbers(18, 4, false);
@@ -118,7 +130,8 @@ static void refuses_other_arrays(void)
     vg_bytes_clear(&x);
 }
 
-static uint32_t start[] = {0, 3, 7}, vert[] = {0, 1, 2, 0, 2, 3, 1}, selected[] = {1}, anchors[] = {1, 3}, links[] = {0, 3};
+static uint32_t start[] = {0, 3, 7}, vert[] = {0, 1, 2, 0, 2, 3, 1}, selected[] = {1}, anchors[] = {1, 3},
+                links[] = {0, 3};
 static double reference[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
 
 static vg_head make_head(vg_kind kind)
@@ -141,7 +154,12 @@ static void make_frames(vg_frame f[2])
     static char *const names[] = {(char *)"sm\xc3\xaele \xf0\x9f\x90\x8e", (char *)"b"};
     for (int i = 0; i < 48; i++) values[i / 24][i % 24] = i / 3.0 + 0.125;
     for (int i = 0; i < 2; i++)
-        f[i] = (vg_frame){.name = names[i], .has_time = true, .time = i + 0.5, .root = {i, 2, 3}, .anchors = places, .values = values[i]};
+        f[i] = (vg_frame){.name = names[i],
+                          .has_time = true,
+                          .time = i + 0.5,
+                          .root = {i, 2, 3},
+                          .anchors = places,
+                          .values = values[i]};
 }
 
 static void npz_there_and_back(void)
@@ -197,8 +215,8 @@ static int refused_alone(const char *name, const char *header, const void *data,
     vg_bytes a = make(1, header, data, n), b = {0};
     vgi_packer *p = NULL;
     int fd = memfd_create("zip", MFD_CLOEXEC);
-    CHECK(vgi_packer_open_plain(&p, fd, "zip", NULL) == VG_OK && vgi_packer_add(p, name, a.data, a.size, NULL) == VG_OK &&
-          vgi_packer_end(p, NULL) == VG_OK);
+    CHECK(vgi_packer_open_plain(&p, fd, "zip", NULL) == VG_OK &&
+          vgi_packer_add(p, name, a.data, a.size, NULL) == VG_OK && vgi_packer_end(p, NULL) == VG_OK);
     vgi_packer_close(&p);
     CHECK(vgi_bytes_reserve(&b, 10000, NULL) == VG_OK);
     b.size = (size_t)pread(fd, b.data, 10000, 0);
@@ -212,18 +230,25 @@ static int refused_alone(const char *name, const char *header, const void *data,
 static void npz_refuses_what_is_missing(void)
 {
     vg_bytes x = numbers(24, 4, false);
-    CHECK(refused_alone("other.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 4)}", x.data, x.size) == VG_EINPUT);
+    CHECK(refused_alone("other.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 4)}", x.data,
+                        x.size) == VG_EINPUT);
     CHECK_TEXT(message, "'x' has none of the arrays 'positions', 'vectors' and 'deformations'");
-    CHECK(refused_alone("vectors.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 2, 3)}", x.data, x.size) == VG_EINPUT);
+    CHECK(refused_alone("vectors.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 2, 3)}", x.data,
+                        x.size) == VG_EINPUT);
     CHECK_TEXT(message, "'x' has an array 'vectors', but none called 'reference'");
-    CHECK(refused_alone("positions.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (3, 2, 4)}", x.data, x.size) == VG_EINPUT);
-    CHECK(refused_alone("positions.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 2, 3)}", x.data, 92) == VG_ETRUNC);
-    CHECK(refused_alone("positions.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (3, 2, 3)}", x.data, 96) == VG_EINPUT);
+    CHECK(refused_alone("positions.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (3, 2, 4)}", x.data,
+                        x.size) == VG_EINPUT);
+    CHECK(refused_alone("positions.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 2, 3)}", x.data,
+                        92) == VG_ETRUNC);
+    CHECK(refused_alone("positions.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (3, 2, 3)}", x.data,
+                        96) == VG_EINPUT);
     CHECK_TEXT(message, "array 'positions' in 'x' goes on behind its elements");
-    CHECK(refused_alone("positions.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 2, 3)}", x.data, 96) == 0);
+    CHECK(refused_alone("positions.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 2, 3)}", x.data,
+                        96) == 0);
     vg_bytes_clear(&x);
 }
 
 TESTS({"reads all spellings", reads_all_spellings}, {"reads Fortran order", reads_fortran_order},
       {"refuses other arrays", refuses_other_arrays}, {"an NPZ there and back", npz_there_and_back},
-      {"refuses a damaged NPZ", npz_refuses_damage}, {"refuses an NPZ without what it needs", npz_refuses_what_is_missing})
+      {"refuses a damaged NPZ", npz_refuses_damage},
+      {"refuses an NPZ without what it needs", npz_refuses_what_is_missing})

@@ -1,6 +1,7 @@
 /* test_register.c: nearest points on polygons, sparse systems, markers as text, and registration: a mesh to itself,
  * to a turned and re-triangulated copy, to another body; wrong markers, parts without counterpart, bones, texture
- * coordinates. SPDX-License-Identifier: GPL-3.0-or-later */
+ * coordinates.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
 #include "method/sparse.h"
 #include "method/surface.h"
@@ -290,6 +291,18 @@ static void identity_on_generated_meshes(void)
         if (test_bad) printf("%s\n", name);
         vg_head_clear(&h);
     }
+}
+
+/* A cone whose tip joins thousands of triangles: nothing may grow with the square of their number. */
+static void fans(void)
+{
+    enum { N = 20000 };
+    vg_head h = new_shape();
+    add_vertex(&h, 0, 0, 1);
+    for (uint32_t i = 0; i < N; i++) add_vertex(&h, cos(2 * M_PI * i / N), 0.5 * sin(2 * M_PI * i / N), 0);
+    for (uint32_t i = 0; i < N; i++) FACE(&h, 0, 1 + i, 1 + (i + 1) % N);
+    check_identity(&h);
+    vg_head_clear(&h);
 }
 
 /* The mesh turned, scaled, moved; larger faces split into fans from a corner of their own; vertices and faces in
@@ -653,7 +666,8 @@ static void dense_seeds(void)
 TESTS({"nearest points", nearest_points}, {"nearest points by normal", nearest_points_by_normal},
       {"sparse systems", sparse_systems}, {"markers as text", markers_as_text}, {"seeds as text", seeds_as_text},
       {"identity on real meshes", identity_on_real_meshes},
-      {"identity on generated meshes", identity_on_generated_meshes}, {"disguised copies", disguised_copies},
+      {"identity on generated meshes", identity_on_generated_meshes}, {"fans", fans},
+      {"disguised copies", disguised_copies},
       {"another body", another_body}, {"wrong markers", wrong_markers}, {"refusals", refusals},
       {"degenerate faces", degenerate_faces}, {"parts without counterpart", parts_without_counterpart},
       {"holes", holes}, {"bones", bones}, {"texture coordinates", texture_coordinates}, {"dense seeds", dense_seeds})

@@ -3,9 +3,10 @@
 #include "io/io.h"
 #include "test.h"
 
-static const char two[] = "solid a name\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n   vertex 0 1 0\n"
-                          "  endloop\n endfacet\n FACET NORMAL nan nan nan OUTER LOOP\r\n"
-                          "   vertex 1 0 -0\n   vertex 1 1 0\n   vertex 0 1 -0.0\n  endloop endfacet\nendsolid a name\n";
+static const char two[] =
+    "solid a name\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n   vertex 0 1 0\n"
+    "  endloop\n endfacet\n FACET NORMAL nan nan nan OUTER LOOP\r\n"
+    "   vertex 1 0 -0\n   vertex 1 1 0\n   vertex 0 1 -0.0\n  endloop endfacet\nendsolid a name\n";
 
 static int read_stl(vg_model *m, const void *data, size_t n, char message[480])
 {
@@ -36,7 +37,10 @@ static void leaves_out_what_is_no_triangle(void)
 {
     vg_model m;
     char message[480], text[1000];
-    snprintf(text, sizeof text, "solid\nfacet normal 0 0 0 outer loop vertex 5 5 5 vertex 5 5 5 vertex 1 2 3 endloop endfacet\nendsolid\n%s", two);
+    snprintf(text, sizeof text,
+             "solid\nfacet normal 0 0 0 outer loop vertex 5 5 5 vertex 5 5 5 vertex 1 2 3 endloop "
+             "endfacet\nendsolid\n%s",
+             two);
     CHECK(read_stl(&m, text, strlen(text), message) == VG_OK && m.degenerate == 1 && m.mesh.nf == 2);
     vg_model_clear(&m);
     text[strlen(text) - strlen(two)] = 0;
@@ -53,10 +57,12 @@ static void refuses_text_that_breaks_off(void)
         CHECK(r < 0 && message[0]);
         if (r == VG_OK) vg_model_clear(&m);
     }
-    static const char inf[] = "solid\nfacet normal 0 0 1 outer loop vertex 0 0 inf vertex 1 0 0 vertex 0 1 0 endloop endfacet endsolid";
+    static const char inf[] =
+        "solid\nfacet normal 0 0 1 outer loop vertex 0 0 inf vertex 1 0 0 vertex 0 1 0 endloop endfacet endsolid";
     CHECK(read_stl(&m, inf, strlen(inf), message) == VG_EINPUT);
     CHECK_TEXT(message, "'x.stl': corner 0 of triangle 0 is not finite");
-    static const char word[] = "solid\nfacet normal 0 0 1 outer loop vertex 0 0 x vertex 1 0 0 vertex 0 1 0 endloop endfacet endsolid";
+    static const char word[] =
+        "solid\nfacet normal 0 0 1 outer loop vertex 0 0 x vertex 1 0 0 vertex 0 1 0 endloop endfacet endsolid";
     CHECK(read_stl(&m, word, strlen(word), message) == VG_EINPUT);
     CHECK_TEXT(message, "'x.stl', line 2: 'x' where 'a number' should come");
     CHECK(read_stl(&m, "solid\nendsolid\n", 15, message) == VG_EINPUT);
@@ -128,7 +134,8 @@ static double area(const vg_model *m, double sign)
 {
     double sum = 0;
     for (size_t f = 0; f < m->mesh.nf; f++) {
-        const double *a = m->vertices + 3 * (size_t)m->mesh.vert[3 * f], *b = m->vertices + 3 * (size_t)m->mesh.vert[3 * f + 1],
+        const double *a = m->vertices + 3 * (size_t)m->mesh.vert[3 * f],
+                     *b = m->vertices + 3 * (size_t)m->mesh.vert[3 * f + 1],
                      *c = m->vertices + 3 * (size_t)m->mesh.vert[3 * f + 2];
         double twice = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         CHECK(sign * twice > 0);
@@ -140,7 +147,8 @@ static double area(const vg_model *m, double sign)
 static void splits_polygons(void)
 {
     /* an L and a comb, whose fans from some corners would lie outside; every corner begins once, and both ways round */
-    static const double shapes[2][20] = {{0, 0, 2, 0, 2, 1, 1, 1, 1, 3, 0, 3}, {0, 0, 7, 0, 7, 3, 5, 3, 5, 1, 4, 1, 4, 3, 2, 3, 2, 1, 0, 1}};
+    static const double shapes[2][20] = {{0, 0, 2, 0, 2, 1, 1, 1, 1, 3, 0, 3},
+                                         {0, 0, 7, 0, 7, 3, 5, 3, 5, 1, 4, 1, 4, 3, 2, 3, 2, 1, 0, 1}};
     static const size_t sizes[2] = {6, 10};
     static const double areas[2] = {4, 15};
     for (int s = 0; s < 2; s++)
@@ -182,5 +190,6 @@ static void refuses_what_it_cannot_write(void)
 }
 
 TESTS({"welds to the bit", welds_to_the_bit}, {"leaves out what is no triangle", leaves_out_what_is_no_triangle},
-      {"refuses text that breaks off", refuses_text_that_breaks_off}, {"reads binary", reads_binary}, {"writes text", writes_text},
-      {"splits polygons", splits_polygons}, {"refuses what it cannot write", refuses_what_it_cannot_write})
+      {"refuses text that breaks off", refuses_text_that_breaks_off}, {"reads binary", reads_binary},
+      {"writes text", writes_text}, {"splits polygons", splits_polygons},
+      {"refuses what it cannot write", refuses_what_it_cannot_write})

@@ -1,0 +1,98 @@
+/* vg-segment: divide the faces of a sequence into patches that turn alike.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "cli.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static struct {
+    const char *patches;
+    long seed;
+    bool connected;
+} opts = {.patches = "auto", .seed = 1};
+
+static const cli_option options[] = {
+    {"patches", 'k', "K|auto", "how many patches (default auto: as few as turn within 10 degrees of their faces)", .text = &opts.patches},
+    {"connected", 0, NULL, "every patch in one piece", .flag = &opts.connected},
+    {"seed", 0, "N", "another choice of first centres (default 1)", .integer = &opts.seed, .least = 0, .most = 4294967295.0},
+    {NULL}};
+
+static const cli_program program = {
+    .name = "vg-segment",
+    .synopsis = "[options] [FILE ...]",
+    .summary = "divide the faces of a sequence into patches that turn alike",
+    .options = options,
+    .most_operands = SIZE_MAX,
+    .writes_stream = true,
+    .threaded = true};
+
+enum { BATCH = 8 };
+
+static size_t parse_patches(void)
+{
+    if (!strcmp(opts.patches, "auto")) return 0;
+    double k = cli_parse_number("--patches", opts.patches);
+    if (!(k >= 1 && k <= 4294967294.0) || k != (double)(size_t)k)
+        cli_usage("--patches is a number from 1 on or 'auto', not '%s'", opts.patches);
+    return (size_t)k;
+}
+
+static void check_head(const vg_head *h)
+{
+    vg_err e;
+    if (h->kind == VG_VERTICES) return;
+    vg_fail(&e, VG_EINPUT, "the input holds %s, vg-segment takes vertices%s", vg_kind_name(h->kind),
+            h->kind == VG_VECTORS ? ": pipe it through 'vg-solve' first" : "");
+    cli_die(&e);
+}
+
+static uint64_t add_all(vg_segmenter *s, vg_source *source)
+{
+    static vg_frame frames[BATCH];
+    const double *poses[BATCH];
+    vg_err e;
+    uint64_t total = 0;
+    size_t n = 0;
+    int r;
+    while ((r = vg_source_next(source, &frames[n], &e)) > 0) {
+        poses[n] = frames[n].values;
+        cli_progress("poses", ++total);
+        if (++n < BATCH) continue;
+        vg_segmenter_add(s, n, poses);
+        n = 0;
+    }
+    if (r < 0) cli_die(&e);
+    vg_segmenter_add(s, n, poses);
+    for (size_t i = 0; i < BATCH; i++) vg_frame_clear(&frames[i]);
+    return total;
+}
+
+int main(int argc, char **argv)
+{
+    char **operands;
+    size_t n = cli_start(&program, argc, argv, &operands), k = parse_patches();
+    vg_source *source = cli_source(operands, n);
+    vg_head *h = vg_source_head(source);
+    check_head(h);
+    vg_err e;
+    vg_segmenter *s;
+    vg_segment_report report;
+    if (vg_segmenter_new(&s, &h->mesh, h->reference, cli.threads, &e) < 0) cli_die(&e);
+    uint64_t poses = add_all(s, source);
+    if (!poses) {
+        vg_fail(&e, VG_EINPUT, "the input has no poses: what turns alike cannot be told");
+        cli_die(&e);
+    }
+    vg_patches_clear(&h->patches);
+    vg_map_clear(&h->map);
+    if (vg_segmenter_cut(s, k, (uint64_t)opts.seed, opts.connected, &h->patches, &report, &e) < 0) cli_die(&e);
+    vg_segmenter_free(&s);
+    if (k && report.patches < k) cli_warn("%zu patches instead of %zu: no more faces turn differently", report.patches, k);
+    if (k && report.patches > k) cli_warn("%zu patches instead of %zu: the mesh has more components", report.patches, k);
+    cli_note("%zu patches of %zu faces, %.2f degrees from their faces (rms), %zu rounds", report.patches, h->mesh.nf, report.angle,
+             report.rounds);
+    cli_stream_open(h);
+    cli_stream_end(vg_source_tail(source));
+    vg_source_close(&source);
+    cli_finish(0);
+}

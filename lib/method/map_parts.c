@@ -1,0 +1,308 @@
+/* map_parts.c: the geometry of patches, their joints, and the collapse of a map into one matrix (T 6.3; MATH 7).
+ * Leaves out what is fitted to poses (map.c) and how a map is played (play.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/map_parts.h"
+#include "method/rotation_fit.h"
+#include "model/incidence.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* ---- shapes ---- */
+
+static int by_number(const void *a, const void *b)
+{
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return x < y ? -1 : x > y;
+}
+
+int vgi_shape_make(vgi_shape *s, const vg_mesh *m, const vg_patches *patches, const double *points, vg_err *e)
+{
+    size_t corners = vg_mesh_corners(m), n = 0;
+    *s = (vgi_shape){.n = patches->n};
+    uint64_t *all = vgi_array_raw(corners, sizeof *all, e);
+    s->first = vgi_array(s->n + 1, sizeof *s->first, e);
+    s->centre = vgi_array(3 * s->n, sizeof *s->centre, e);
+    s->spread = vgi_array(s->n, sizeof *s->spread, e);
+    if (!all || !s->first || !s->centre || !s->spread) goto failed;
+    for (size_t f = 0; f < m->nf; f++)
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) all[c] = (uint64_t)patches->of_face[f] << 32 | m->vert[c];
+    if (corners) qsort(all, corners, sizeof *all, by_number);
+    for (size_t i = 0; i < corners; i++)
+        if (i == 0 || all[i] != all[i - 1]) all[n++] = all[i];
+    s->member = vgi_array_raw(n, sizeof *s->member, e);
+    s->local = vgi_array_raw(3 * n, sizeof *s->local, e);
+    if (!s->member || !s->local) goto failed;
+    for (size_t i = 0; i < n; i++) {
+        size_t p = (size_t)(all[i] >> 32);
+        s->member[i] = (uint32_t)all[i];
+        s->first[p + 1] = (uint32_t)i + 1;
+        for (size_t k = 0; k < 3; k++) s->centre[3 * p + k] += points[3 * (size_t)s->member[i] + k];
+    }
+    for (size_t p = 0; p < s->n; p++) {
+        if (s->first[p + 1] < s->first[p]) s->first[p + 1] = s->first[p];
+        for (size_t k = 0; k < 3 && s->first[p + 1] > s->first[p]; k++) s->centre[3 * p + k] /= s->first[p + 1] - s->first[p];
+        for (size_t i = s->first[p]; i < s->first[p + 1]; i++)
+            for (size_t k = 0; k < 3; k++) {
+                double x = points[3 * (size_t)s->member[i] + k] - s->centre[3 * p + k];
+                s->local[3 * i + k] = x;
+                s->spread[p] += x * x;
+            }
+    }
+    free(all);
+    return VG_OK;
+failed:
+    free(all);
+    vgi_shape_clear(s);
+    return VG_ENOMEM;
+}
+
+void vgi_shape_clear(vgi_shape *s)
+{
+    free(s->first);
+    free(s->member);
+    free(s->local);
+    free(s->centre);
+    free(s->spread);
+    *s = (vgi_shape){0};
+}
+
+void vgi_shape_measure(const vgi_shape *s, size_t p, const double *pose, vgi_motion *to)
+{
+    static const double least = 1e-6; /* a patch that shrinks to a point keeps a scale */
+    size_t first = s->first[p], last = s->first[p + 1];
+    double m[9] = {0}, mean[3] = {0, 0, 0}, r[9], b = 0;
+    const double *o = first < last ? pose + 3 * (size_t)s->member[first] : mean;
+    for (size_t i = first; i < last; i++) {
+        const double *x = pose + 3 * (size_t)s->member[i], *l = s->local + 3 * i;
+        for (int k = 0; k < 3; k++) {
+            double d = x[k] - o[k]; /* the local vectors sum to 0: any point will do for a centre */
+            mean[k] += d;
+            m[3 * k] += d * l[0], m[3 * k + 1] += d * l[1], m[3 * k + 2] += d * l[2];
+        }
+    }
+    vgi_fit_rotation(m, r);
+    for (int i = 0; i < 9; i++) b += r[i] * m[i];
+    b = s->spread[p] > 0 ? b / s->spread[p] : 1;
+    if (!(b > least)) b = least;
+    for (int i = 0; i < 9; i++) to->a[i] = b * r[i];
+    to->b2 = b * b;
+    const double *c = s->centre + 3 * p;
+    for (int k = 0; k < 3; k++) {
+        double at = first < last ? o[k] + mean[k] / (double)(last - first) : c[k];
+        to->t[k] = at - (to->a[3 * k] * c[0] + to->a[3 * k + 1] * c[1] + to->a[3 * k + 2] * c[2]);
+    }
+}
+
+/* ---- small dense systems ---- */
+
+bool vgi_cholesky_dense(double *a, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j <= i; j++) {
+            double sum = a[i * n + j];
+            const double *x = a + i * n, *y = a + j * n;
+            double s[4] = {0, 0, 0, 0};
+            size_t k = 0;
+            for (; k + 4 <= j; k += 4)
+                for (size_t q = 0; q < 4; q++) s[q] += x[k + q] * y[k + q];
+            for (; k < j; k++) s[0] += x[k] * y[k];
+            sum -= (s[0] + s[1]) + (s[2] + s[3]);
+            if (i == j && !(sum > 0)) return false;
+            a[i * n + j] = i == j ? sqrt(sum) : sum / a[j * n + j];
+        }
+    return true;
+}
+
+void vgi_cholesky_dense_solve(const double *l, size_t n, double *x, size_t m)
+{
+    for (size_t i = 0; i < n; i++) {
+        for (size_t k = 0; k < i; k++)
+            for (size_t c = 0; c < m; c++) x[i * m + c] -= l[i * n + k] * x[k * m + c];
+        for (size_t c = 0; c < m; c++) x[i * m + c] /= l[i * n + i];
+    }
+    for (size_t i = n; i-- > 0;) {
+        for (size_t c = 0; c < m; c++) x[i * m + c] /= l[i * n + i];
+        for (size_t k = 0; k < i; k++)
+            for (size_t c = 0; c < m; c++) x[k * m + c] -= l[i * n + k] * x[i * m + c];
+    }
+}
+
+/* ---- joints ---- */
+
+/* Least squares over the joints: t_i - t_j = A_j c - A_i c, all of them; and sum of share (A centre + t) = 0. Linear in the A. */
+int vgi_place_by_joints(const vg_map *m, const double *centre, double *place, vg_err *e)
+{
+    size_t n = m->n;
+    double *l = vgi_array(n, n * sizeof *l, e), trace = 1;
+    if (!l) return VG_ENOMEM;
+    memset(place, 0, 3 * n * n * sizeof *place);
+    for (size_t q = 0; q < m->njoints; q++) {
+        size_t i = m->joint[2 * q], j = m->joint[2 * q + 1];
+        double w = m->joint_weight[q];
+        l[i * n + i] += w, l[j * n + j] += w, l[i * n + j] -= w, l[j * n + i] -= w;
+        trace += 2 * w;
+        for (size_t k = 0; k < 3; k++) {
+            double c = w * m->joint_at[3 * q + k];
+            place[i * 3 * n + 3 * i + k] -= c, place[i * 3 * n + 3 * j + k] += c;
+            place[j * 3 * n + 3 * i + k] += c, place[j * 3 * n + 3 * j + k] -= c;
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        for (size_t j = 0; j < n; j++) {
+            l[i * n + j] += trace * m->share[i] * m->share[j];
+            for (size_t k = 0; k < 3; k++) place[i * 3 * n + 3 * j + k] -= trace * m->share[i] * m->share[j] * centre[3 * j + k];
+        }
+        l[i * n + i] += 1e-13 * trace;
+    }
+    bool ok = vgi_cholesky_dense(l, n);
+    if (ok) vgi_cholesky_dense_solve(l, n, place, 3 * n);
+    free(l);
+    return ok ? VG_OK : vg_fail(e, VG_EINPUT, "the patches do not hang together");
+}
+
+uint32_t *vgi_graph_patches(const vg_head *h, const vg_graph *g, vg_err *e)
+{
+    size_t faces = g->nf - g->nlinks;
+    uint32_t *of_face = vgi_array(g->nf, sizeof *of_face, e), *of_vertex = vgi_array(g->nv, sizeof *of_vertex, e);
+    if (of_face && of_vertex) {
+        for (size_t f = faces; f-- > 0;) {
+            of_face[f] = h->patches.of_face[h->has_selection ? h->selected[f] : f];
+            for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) of_vertex[g->vert[c]] = of_face[f];
+        }
+        for (size_t f = faces; f < g->nf; f++) of_face[f] = of_vertex[g->vert[g->start[f]]];
+    } else {
+        free(of_face);
+        of_face = NULL;
+    }
+    free(of_vertex);
+    return of_face;
+}
+
+static size_t find_pair(const uint32_t *pairs, size_t n, uint32_t a, uint32_t b)
+{
+    size_t low = 0, high = n;
+    while (low < high) {
+        size_t mid = (low + high) / 2;
+        if (pairs[2 * mid] < a || (pairs[2 * mid] == a && pairs[2 * mid + 1] < b)) low = mid + 1;
+        else high = mid;
+    }
+    return low < n && pairs[2 * low] == a && pairs[2 * low + 1] == b ? low : n;
+}
+
+int vgi_joint_points(const vg_graph *g, const uint32_t *of_face, const uint32_t *pairs, size_t n, const double *points, double *mean,
+                     vg_err *e)
+{
+    vgi_incidence around;
+    double *weight = vgi_array(n, sizeof *weight, e);
+    if (!weight) return VG_ENOMEM;
+    int r = vgi_incidence_make(&around, g->nv, g->nf, g->start, g->vert, e);
+    if (r < 0) return free(weight), r;
+    memset(mean, 0, 3 * n * sizeof *mean);
+    for (size_t v = 0; v < g->nv; v++)
+        for (uint32_t i = around.first[v]; i < around.first[v + 1]; i++)
+            for (uint32_t k = around.first[v]; k < around.first[v + 1] && k < around.first[v] + 64; k++) {
+                uint32_t a = of_face[around.face[i]], b = of_face[around.face[k]];
+                size_t at = a < b ? find_pair(pairs, n, a, b) : n;
+                if (at == n) continue;
+                weight[at]++;
+                for (size_t c = 0; c < 3; c++) mean[3 * at + c] += points[3 * v + c];
+            }
+    for (size_t i = 0; i < n; i++)
+        for (size_t c = 0; c < 3 && weight[i] > 0; c++) mean[3 * i + c] /= weight[i];
+    vgi_incidence_clear(&around);
+    free(weight);
+    return VG_OK;
+}
+
+/* ---- collapse ---- */
+
+/* Wanted vectors and held vertices when only the j-th number of A_p is at work, j = 0 1 2 at once as x y z; or t of three patches. */
+static void column_input(const vg_map *m, const vg_graph *g, const uint32_t *of_face, const double *vectors, size_t column,
+                         double *wanted, double *anchors)
+{
+    memset(wanted, 0, 3 * vg_graph_corners(g) * sizeof *wanted);
+    if (column < m->n) {
+        for (size_t f = 0; f < g->nf; f++)
+            for (size_t c = g->start[f]; of_face[f] == column && c < g->start[f + 1]; c++)
+                vg_quat_apply(m->corner + 4 * c, vectors + 3 * c, wanted + 3 * c);
+        for (size_t i = 0; i < m->nheld; i++)
+            for (size_t k = 0; k < 3; k++) anchors[3 * i + k] = m->held_patch[i] == column ? m->held_at[3 * i + k] : 0;
+    } else {
+        size_t p = 3 * (column - m->n);
+        for (size_t i = 0; i < m->nheld; i++)
+            for (size_t k = 0; k < 3; k++) anchors[3 * i + k] = m->held_patch[i] == p + k;
+    }
+}
+
+static void store_column(vg_map *m, const vg_graph *g, size_t column, const double *x)
+{
+    size_t n = m->n;
+    for (size_t v = 0; v < g->nv; v++) {
+        double *row = m->weights + v * 4 * n;
+        if (!g->in_face[v]) continue;
+        for (size_t k = 0; k < 3; k++) {
+            size_t p = 3 * (column - n) + k;
+            if (column < n) row[4 * column + k] = x[3 * v + k];
+            else if (p < n) row[4 * p + 3] = x[3 * v + k];
+        }
+    }
+}
+
+/* Vertices in no face go with the patch whose centre is nearest. */
+static void carry_loose(vg_head *h, const vg_graph *g)
+{
+    vg_map *m = &h->map;
+    for (size_t v = 0; v < g->nv; v++) {
+        if (g->in_face[v]) continue;
+        const double *x = h->reference + 3 * v;
+        size_t best = 0;
+        double least = INFINITY;
+        for (size_t p = 0; p < m->n; p++) {
+            const double *c = m->centre + 3 * p;
+            double d = (x[0] - c[0]) * (x[0] - c[0]) + (x[1] - c[1]) * (x[1] - c[1]) + (x[2] - c[2]) * (x[2] - c[2]);
+            if (d < least) least = d, best = p;
+        }
+        double *row = m->weights + v * 4 * m->n + 4 * best;
+        row[0] = x[0], row[1] = x[1], row[2] = x[2], row[3] = 1;
+    }
+}
+
+int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors, int threads, vg_err *e)
+{
+    vg_map *m = &h->map;
+    vg_solver *s;
+    int r = vg_solver_new(&s, g, m->held, m->nheld, h->reference, VG_WEIGHTS_UNIFORM, threads, e);
+    if (r < 0) return r;
+    size_t batch = vg_solver_batch(s), columns = m->n + (m->n + 2) / 3, nv = g->nv;
+    double *wanted = vgi_array(3 * vg_graph_corners(g), sizeof *wanted, e);
+    double *space = vgi_array(batch, (6 * nv + 3 * m->nheld) * sizeof *space, e);
+    double **x = vgi_array(4 * batch, sizeof *x, e), **rhs = x ? x + batch : NULL, **anchors = x ? x + 2 * batch : NULL;
+    free(m->weights);
+    m->weights = vgi_array(nv, 4 * m->n * sizeof *m->weights, e);
+    if (wanted && space && x && m->weights) {
+        static const double nowhere[3] = {0, 0, 0};
+        for (size_t i = 0; i < batch; i++) {
+            x[i] = space + i * (6 * nv + 3 * m->nheld), rhs[i] = x[i] + 3 * nv, anchors[i] = rhs[i] + 3 * nv;
+            x[3 * batch + i] = (double *)(uintptr_t)nowhere;
+        }
+        for (size_t first = 0; first < columns; first += batch) {
+            size_t n = columns - first < batch ? columns - first : batch;
+            for (size_t i = 0; i < n; i++) {
+                column_input(m, g, of_face, vectors, first + i, wanted, anchors[i]);
+                vg_solver_load(s, wanted, anchors[i], x[i], rhs[i]);
+            }
+            vg_solver_solve(s, n, (const double *const *)rhs, x, (const double *const *)anchors,
+                            (const double *const *)(x + 3 * batch));
+            for (size_t i = 0; i < n; i++) store_column(m, g, first + i, x[i]);
+        }
+        carry_loose(h, g);
+    } else {
+        r = VG_ENOMEM;
+    }
+    vg_solver_free(&s);
+    free(wanted);
+    free(space);
+    free(x);
+    return r;
+}

@@ -1,0 +1,50 @@
+/* map_parts.h: what fitting, changing and playing a map share: the geometry of patches, and where joints put them.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_MAP_PARTS_H
+#define VG_MAP_PARTS_H
+
+#include "core/core.h"
+
+/* The vertices of each patch on one body. */
+typedef struct vgi_shape {
+    size_t n;
+    uint32_t *first, *member; /* n + 1; the vertices of patch p: member[first[p]] .. */
+    double *local;            /* 3 per member: from the patch's centre */
+    double *centre, *spread;  /* n points; sums of squared local */
+} vgi_shape;
+
+int vgi_shape_make(vgi_shape *s, const vg_mesh *m, const vg_patches *patches, const double *points, vg_err *e) VG_MUST_CHECK;
+void vgi_shape_clear(vgi_shape *s);
+
+/* A similarity x -> A x + t. */
+typedef struct vgi_motion {
+    double a[9], t[3], b2; /* b2: squared scale */
+} vgi_motion;
+
+/* vgi_shape_measure: the best similarity of patch p in a pose. */
+void vgi_shape_measure(const vgi_shape *s, size_t p, const double *pose, vgi_motion *m);
+
+/* vgi_apply: y = A x + t */
+static inline void vgi_move_point(const vgi_motion *m, const double x[3], double y[3])
+{
+    for (int i = 0; i < 3; i++) y[i] = m->a[3 * i] * x[0] + m->a[3 * i + 1] * x[1] + m->a[3 * i + 2] * x[2] + m->t[i];
+}
+
+/* vgi_cholesky_dense: a (n x n, the lower triangle) becomes its factor; false when it is not positive definite. */
+bool vgi_cholesky_dense(double *a, size_t n);
+/* vgi_cholesky_dense_solve: x (n x m, row-major) := (L L')^-1 x */
+void vgi_cholesky_dense_solve(const double *l, size_t n, double *x, size_t m);
+
+/* vgi_place_by_joints: place (n x 3n) of the map from its joints, centres and shares. */
+int vgi_place_by_joints(const vg_map *m, const double *centre, double *place, vg_err *e) VG_MUST_CHECK;
+
+/* vgi_map_collapse: fill weights from corners, held vertices and the body that h's reference is. of_face: patch of each face of g. */
+int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors, int threads,
+                     vg_err *e) VG_MUST_CHECK;
+/* vgi_graph_patches: patch of each face of g, links too; free(). NULL: no memory. */
+uint32_t *vgi_graph_patches(const vg_head *h, const vg_graph *g, vg_err *e);
+/* vgi_joint_points: the mean of the vertices that both patches of each pair share. pairs ascending. */
+int vgi_joint_points(const vg_graph *g, const uint32_t *of_face, const uint32_t *pairs, size_t n, const double *points, double *mean,
+                     vg_err *e) VG_MUST_CHECK;
+
+#endif
