@@ -1,0 +1,50 @@
+/* page.h: what the files of the page share: numbers packed into text, and the page's own texts.
+ * Internal; the page a C program may ask for is vg_page in vg.h.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_PAGE_H
+#define VG_PAGE_H
+
+#include "core/core.h"
+
+/* ---- page_data.c ----
+ *
+ * A chunk holds n frames of nv x width numbers. Each axis of a chunk has an origin and a step: number = origin + step *
+ * q, q an integer of 16 bits. Frame by frame, axis by axis, vertex by vertex, q is predicted, and what is left (modulo
+ * 2^16, then 0 -1 1 -2 2 ... as 0 1 2 3 4 ...) is kept. The prediction is chosen for each frame; its number is a sum:
+ *     0 nothing, 1 the frame before, 2 that and the step that led to it (all within the chunk),
+ *     4: what is left is predicted by what was left of the vertex before (of the same axis; 0 for the first).
+ * Bytes: n of predictions, then all upper bytes, then all lower bytes; deflated with a zlib head. Lists of 32 bit
+ * numbers are four such planes, the uppermost first. In the page both are base64. */
+
+enum { VGI_PREDICT_FRAME = 1, VGI_PREDICT_MOTION = 2, VGI_PREDICT_NEIGHBOUR = 4 };
+
+typedef struct vgi_track { /* frames on their way into a chunk */
+    size_t nv, width, n, cap;
+    double *values;      /* cap frames of nv * width, as they came */
+    uint16_t *q;         /* the same, axis by axis */
+    unsigned char *left; /* cap + 2 * cap * nv * width */
+} vgi_track;
+
+typedef struct vgi_chunk {
+    size_t n;
+    double origin[3], step[3];
+    double loss; /* the largest distance of an element from what is kept of it */
+    vg_bytes packed;
+} vgi_chunk;
+
+int vgi_track_init(vgi_track *t, size_t nv, size_t width, vg_err *e) VG_MUST_CHECK;
+void vgi_track_clear(vgi_track *t);
+/* vgi_track_next: where the numbers of the next frame go. There must be room: n < cap. */
+double *vgi_track_next(vgi_track *t);
+/* vgi_track_pack: all frames into c, and none left. c->packed is overwritten; the caller clears it in the end. */
+int vgi_track_pack(vgi_track *t, vgi_chunk *c, vg_err *e) VG_MUST_CHECK;
+/* vgi_pack_list: n numbers of 32 bits, each less the one before it if `differences` (modulo 2^32). */
+int vgi_pack_list(vg_bytes *packed, const uint32_t *list, size_t n, bool differences, vg_err *e) VG_MUST_CHECK;
+/* vgi_base64: append n bytes as text; n is a multiple of 3 unless they are the last. */
+int vgi_base64(vg_bytes *text, const unsigned char *data, size_t n, vg_err *e) VG_MUST_CHECK;
+
+/* ---- page_text.c, which the Makefile makes of page.html, page.css and page.js; each ends with a 0 ---- */
+
+extern const char vgi_page_html[], vgi_page_css[], vgi_page_js[];
+
+#endif
