@@ -422,7 +422,8 @@ void vg_path_free(vg_path **p);
 int vg_path_at(vg_path *p, double t, double *vectors, double root[3], double *anchors, vg_err *e) VG_MUST_CHECK;
 vg_path_facts vg_path_get_facts(const vg_path *p);
 
-/* Transfer between meshes of different connectivity (MATH 9): each face of the target takes the deformation gradient of the source
+/* Transfer between meshes of different connectivity (MATH 9). A face that one face of as many corners drives goes corner by corner, as
+ * by vg_deformer. Each other face of the target takes the deformation gradient of the source
  * faces that drive it, and by pose its rotation (polar) with the stretch that the gradient gives the direction of each vector. Here the
  * normal stretches by the root of the area's ratio, for the target's vectors lie across the source's planes. Faces
  * without a match of their own turn rigidly. Links follow the faces at their ends. */
@@ -784,6 +785,37 @@ int vg_sheet_add(vg_sheet *s, const char *name, const double *vertices, const do
 /* vg_sheet_write: draw what was added and write it to fd (borrowed); `name` is what messages call it. Once. VG_EINPUT when
  * nothing was added, VG_EARG when the sheet would be larger than a PNG can be. */
 int vg_sheet_write(vg_sheet *s, int fd, const char *name, vg_err *e) VG_MUST_CHECK;
+
+/* A page: one HTML file that plays sequences side by side in a browser, with all that it needs inside. Written as frames come;
+ * memory holds 32 frames of each sequence, or as many as fit in 64 MiB, and the names of all. */
+typedef struct vg_page vg_page;
+typedef struct vg_page_options {
+    const char *title;           /* UTF-8; borrowed until free, as are the labels */
+    double azimuth, elevation;   /* of the viewer at first, as for a sheet; and so are: */
+    bool z_up, follow, edges, ground;
+    bool compare;  /* the first sequence is compared with the second, which has the same mesh: errors as colours and numbers */
+    bool centred;
+    double scale;  /* the end of the colours, in D; 0: the 99th percentile of all errors, rounded up */
+} vg_page_options;
+enum { VG_PAGE_SEQUENCES = 8 };
+typedef struct vg_page_facts {
+    size_t frames;      /* of the longest sequence */
+    uint64_t bytes;
+    double loss;        /* the largest distance of a vertex from where the page has it, in D of its sequence */
+    double scale;       /* the end of the colours, in D */
+    double mean, max;   /* of the errors, in D */
+} vg_page_facts;
+
+/* vg_page_new: write the beginning to fd (borrowed); `name` is what messages call it. */
+int vg_page_new(vg_page **p, int fd, const char *name, const vg_page_options *o, vg_err *e) VG_MUST_CHECK;
+void vg_page_free(vg_page **p);
+/* vg_page_sequence: the next sequence, of vertices; all come before the first frame. h is borrowed until free. */
+int vg_page_sequence(vg_page *p, const char *label, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+/* vg_page_add: the next frame of sequence number i. truth (nv points): what it is compared with, for sequence 0 of a page that
+ * compares; else NULL. */
+int vg_page_add(vg_page *p, size_t i, const vg_frame *f, const double *truth, vg_err *e) VG_MUST_CHECK;
+/* vg_page_end: the rest. Without it the page says that it is not whole. VG_EINPUT when a sequence has no frames. */
+int vg_page_end(vg_page *p, vg_page_facts *facts, vg_err *e) VG_MUST_CHECK;
 
 #ifdef __cplusplus
 }

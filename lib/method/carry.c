@@ -1,4 +1,6 @@
 /* carry.c: deformation transfer between meshes of different connectivity, face by face along a correspondence (MATH 9).
+ * Where a face is driven by one face of as many corners, corner follows corner, as between meshes of one connectivity (deform.c): so
+ * a mesh paired with itself comes back exactly, bent polygons too. Elsewhere one map of the source faces drives all corners.
  * Leaves out how the correspondence is found (register.c) and the loops over corners (carry_kernel.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/carry_kernel.h"
@@ -17,11 +19,20 @@ struct vg_carrier {
     const vg_graph *target;
     vg_method method;
     int threads;
+    const double *source_reference;
+    double ratio;          /* size of the target over that of the source */
     double *p, *q;         /* see vgi_source */
     unsigned char *slow;   /* per source face: 1: a line segment, 2: no gradient in the reference pose, never drives */
     double *segment;       /* reference vector of each source face's first corner */
     double *vectors;       /* the target's reference vectors, per corner of its graph */
     vgi_incidence around;  /* of the target, only if there are links */
+    /* target faces that go corner by corner: a graph of them over the source's vertices, and what it gives for eight poses */
+    size_t ntwins;
+    uint32_t *twin;        /* the target faces, ascending; then links between vertices of such faces */
+    unsigned char *is_twin; /* per target face */
+    vg_graph *twins;
+    vg_deformer *deformer;
+    double *twin_vectors[VGI_LANES];
     vgi_map *maps;         /* per source face */
     unsigned char *bad;    /* per source face: lanes in which it drives nothing */
     atomic_uint_fast64_t degenerate, first_face;
@@ -76,6 +87,108 @@ static void measure_source(vg_carrier *c, const double *reference, double *w)
     }
 }
 
+/* Which corner of source face s goes with the first of target face f: the turn of the cycle in which their vectors agree best. */
+static size_t best_turn(const vg_carrier *c, const double *source_reference, size_t s, size_t f)
+{
+    const uint32_t *vert = c->source->vert + c->source->start[s];
+    const double *t = c->vectors + 3 * (size_t)c->target->start[f];
+    size_t r = source_size(c, s), best = 0;
+    double most = -INFINITY;
+    for (size_t turn = 0; turn < r; turn++) {
+        double sum = 0; /* the target's vectors sum to 0, so positions do as well as vectors */
+        for (size_t i = 0; i < r; i++)
+            for (size_t k = 0; k < 3; k++) sum += t[3 * i + k] * source_reference[3 * (size_t)vert[(i + turn) % r] + k];
+        if (sum > most) most = sum, best = turn;
+    }
+    return best;
+}
+
+/* Choose the twins; the number of their corners. */
+static size_t choose_twins(vg_carrier *c)
+{
+    enum { LARGEST = 64 }; /* trying all turns of a face costs the square of its corners */
+    const vg_graph *g = c->target;
+    const vg_correspondence *k = c->pairs;
+    size_t corners = 0;
+    for (size_t f = 0; f < g->nf - g->nlinks; f++) {
+        size_t r = g->start[f + 1] - g->start[f], s = k->source[k->first[f]];
+        if (!k->matched[f] || k->first[f + 1] - k->first[f] != 1 || source_size(c, s) != r || r > LARGEST) continue;
+        c->is_twin[f] = 1;
+        c->twin[c->ntwins++] = (uint32_t)f;
+        corners += r;
+    }
+    return corners;
+}
+
+/* Fill the twins' mesh over the source's vertices; twin_of[v]: the source's vertex for target vertex v, UINT32_MAX: none. */
+static void fill_twins(const vg_carrier *c, const double *source_reference, vg_mesh *m, uint32_t *twin_of)
+{
+    const vg_graph *g = c->target;
+    size_t at = 0;
+    for (size_t v = 0; v < g->nv; v++) twin_of[v] = UINT32_MAX;
+    for (size_t i = 0; i < m->nf; i++) {
+        size_t f = c->twin[i], s = c->pairs->source[c->pairs->first[f]], r = source_size(c, s);
+        size_t turn = best_turn(c, source_reference, s, f);
+        for (size_t j = 0; j < r; j++) {
+            uint32_t v = c->source->vert[c->source->start[s] + (j + turn) % r];
+            m->vert[at++] = v;
+            twin_of[g->vert[g->start[f] + j]] = v;
+        }
+        m->start[i + 1] = (uint32_t)at;
+    }
+}
+
+/* Links between vertices that have twins have one themselves. */
+static void link_twins(vg_carrier *c, const uint32_t *twin_of, vg_head *h)
+{
+    const vg_graph *g = c->target;
+    for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
+        uint32_t a = twin_of[g->vert[g->start[f]]], b = twin_of[g->vert[g->start[f] + 1]];
+        if (a == UINT32_MAX || b == UINT32_MAX || a == b) continue;
+        h->links[2 * h->nlinks] = a, h->links[2 * h->nlinks + 1] = b;
+        h->nlinks++;
+        c->is_twin[f] = 1;
+        c->twin[c->ntwins++] = (uint32_t)f;
+    }
+}
+
+/* The faces that go corner by corner, as a graph over the source's vertices in the order of the target's corners. */
+static int find_twins(vg_carrier *c, const double *source_reference, vg_err *e)
+{
+    const vg_graph *g = c->target;
+    c->twin = vgi_array(g->nf, sizeof *c->twin, e);
+    c->is_twin = vgi_array(g->nf, 1, e);
+    if (!c->twin || !c->is_twin) return VG_ENOMEM;
+    size_t corners = choose_twins(c);
+    if (!c->ntwins) return VG_OK;
+    vg_head h = {.mesh = {c->source->nv, c->ntwins, NULL, NULL}};
+    h.mesh.start = vgi_array(c->ntwins + 1, sizeof *h.mesh.start, e);
+    h.mesh.vert = vgi_array(corners, sizeof *h.mesh.vert, e);
+    h.links = vgi_array(2 * g->nlinks, sizeof *h.links, e);
+    uint32_t *twin_of = vgi_array(g->nv, sizeof *twin_of, e);
+    corners += 2 * g->nlinks;
+    double *target = vgi_array(3 * corners, sizeof *target, e);
+    int result = h.mesh.start && h.mesh.vert && h.links && twin_of && target ? VG_OK : VG_ENOMEM;
+    if (result == VG_OK) {
+        fill_twins(c, source_reference, &h.mesh, twin_of);
+        link_twins(c, twin_of, &h);
+        result = vg_graph_new(&c->twins, &h, e);
+    }
+    for (size_t i = 0; result == VG_OK && i < c->ntwins; i++) {
+        size_t at = c->twins->start[i], n = c->twins->start[i + 1] - at;
+        memcpy(target + 3 * at, c->vectors + 3 * (size_t)g->start[c->twin[i]], 3 * n * sizeof *target);
+    }
+    if (result == VG_OK) result = vg_deformer_new(&c->deformer, c->twins, source_reference, c->threads, e);
+    if (result == VG_OK) result = vg_deformer_target(c->deformer, target, c->method, e);
+    for (size_t i = 0; result == VG_OK && i < VGI_LANES; i++)
+        if (!(c->twin_vectors[i] = vgi_array(3 * corners, sizeof *target, e))) result = VG_ENOMEM;
+    vg_mesh_clear(&h.mesh);
+    free(h.links);
+    free(twin_of);
+    free(target);
+    return result;
+}
+
 int vg_carrier_new(vg_carrier **out, const vg_mesh *source, const double *source_reference, const vg_correspondence *pairs,
                    const vg_graph *target, const double *target_reference, vg_method method, int threads, vg_err *e)
 {
@@ -86,6 +199,9 @@ int vg_carrier_new(vg_carrier **out, const vg_mesh *source, const double *source
     if (!c) return VG_ENOMEM;
     c->source = source, c->pairs = pairs, c->target = target, c->method = method, c->threads = threads;
     atomic_init(&c->first_face, UINT64_MAX);
+    double before = vg_diagonal(source_reference, source->nv);
+    c->source_reference = source_reference;
+    c->ratio = before > 0 ? vg_diagonal(target_reference, target->nv) / before : 1;
     size_t nf = source->nf, most = 0;
     for (size_t f = 0; f < nf; f++) most = source_size(c, f) > most ? source_size(c, f) : most;
     double *w = vgi_array(3 * most, sizeof *w, e);
@@ -102,6 +218,8 @@ int vg_carrier_new(vg_carrier **out, const vg_mesh *source, const double *source
     if (ok) {
         measure_source(c, source_reference, w);
         vg_graph_vectors(target, target_reference, c->vectors);
+        ok = find_twins(c, source_reference, e) == VG_OK;
+        if (!ok) vg_carrier_free(out);
     } else {
         vg_fail(e, VG_ENOMEM, "not enough memory for a transfer of %zu faces", nf);
         vg_carrier_free(out);
@@ -122,6 +240,11 @@ void vg_carrier_free(vg_carrier **out)
     free(c->vectors);
     free(c->maps);
     vgi_incidence_clear(&c->around);
+    free(c->twin);
+    free(c->is_twin);
+    vg_deformer_free(&c->deformer);
+    vg_graph_free(&c->twins);
+    for (int i = 0; i < VGI_LANES; i++) free(c->twin_vectors[i]);
     free(c);
     *out = NULL;
 }
@@ -198,6 +321,51 @@ static void finish_mean(vgi_map *sum, vgi_lanes weight)
             sum->m[e][lane] = weight[lane] > 0 ? sum->m[e][lane] / weight[lane] : e % 4 == 0;
 }
 
+/* The centre of the source faces that drive the target faces around a vertex, in eight poses. */
+static void centre_beside(const vg_carrier *c, uint32_t v, const double *const *poses, vgi_lanes centre[3])
+{
+    const vg_correspondence *k = c->pairs;
+    size_t faces = c->target->nf - c->target->nlinks;
+    uint32_t first = c->around.first[v], last = c->around.first[v + 1];
+    double total = 0;
+    if (last - first > ENOUGH) last = first + ENOUGH;
+    for (int a = 0; a < 3; a++) centre[a] = (vgi_lanes){0};
+    for (uint32_t i = first; i < last; i++) {
+        size_t f = c->around.face[i];
+        for (uint32_t p = f < faces ? k->first[f] : 0; f < faces && p < k->first[f + 1]; p++) {
+            size_t s = k->source[p], r = source_size(c, s);
+            total += k->weight[p];
+            for (uint32_t n = c->source->start[s]; n < c->source->start[s + 1]; n++)
+                for (size_t a = 0; a < 3; a++)
+                    centre[a] += k->weight[p] / (double)r * vgi_gather(poses, 3 * (size_t)c->source->vert[n] + a);
+        }
+    }
+    for (int a = 0; a < 3 && total > 0; a++) centre[a] /= total;
+}
+
+/* A link also takes part in how the source's faces at its ends have moved against each other, beyond the map that they share:
+ * eyes move in their sockets. In the target's size. */
+static void add_drift(const carry_job *j, size_t f, const vgi_map *map)
+{
+    const vg_carrier *c = j->c;
+    size_t begin = c->target->start[f];
+    const double *reference[VGI_LANES];
+    for (int k = 0; k < VGI_LANES; k++) reference[k] = c->source_reference;
+    vgi_lanes now[2][3], before[2][3];
+    for (size_t end = 0; end < 2; end++) {
+        centre_beside(c, c->target->vert[begin + end], j->poses, now[end]);
+        centre_beside(c, c->target->vert[begin + end], reference, before[end]);
+    }
+    for (size_t a = 0; a < 3; a++) {
+        vgi_lanes drift = now[0][a] - now[1][a];
+        for (size_t b = 0; b < 3; b++) drift -= map->m[3 * a + b] * (before[0][b] - before[1][b]);
+        for (size_t k = 0; k < j->lanes; k++) {
+            j->out[k][3 * begin + a] += 0.5 * c->ratio * drift[k];
+            j->out[k][3 * begin + 3 + a] -= 0.5 * c->ratio * drift[k];
+        }
+    }
+}
+
 static void follow(const carry_job *j, size_t f)
 {
     static const vgi_follow how[] = {[VG_BY_POSE] = VGI_FOLLOW_POSE, [VG_BY_GRADIENT] = VGI_FOLLOW_GRADIENT,
@@ -222,13 +390,28 @@ static void follow(const carry_job *j, size_t f)
     finish_mean(&sum, weight);
     vgi_follow_face(&sum, rigid ? VGI_FOLLOW_RIGID : how[c->method], c->vectors + 3 * begin, g->start[f + 1] - begin, j->out,
                     3 * begin, j->lanes);
+    if (f >= faces) add_drift(j, f, &sum);
 }
 
 static void follow_chunk(void *context, size_t i)
 {
     const carry_job *j = context;
     size_t nf = j->c->target->nf, first = i * CHUNK, last = first + CHUNK < nf ? first + CHUNK : nf;
-    for (size_t f = first; f < last; f++) follow(j, f);
+    for (size_t f = first; f < last; f++)
+        if (!j->c->is_twin[f]) follow(j, f);
+}
+
+/* Corner by corner, and from the order of the twins to that of the target. */
+static void transfer_twins(const carry_job *j)
+{
+    const vg_carrier *c = j->c;
+    if (!c->ntwins) return;
+    vg_deformer_transfer(c->deformer, j->lanes, VG_VERTICES, j->poses, c->twin_vectors);
+    for (size_t k = 0; k < j->lanes; k++)
+        for (size_t i = 0; i < c->ntwins; i++) {
+            size_t from = c->twins->start[i], n = c->twins->start[i + 1] - from;
+            memcpy(j->out[k] + 3 * (size_t)c->target->start[c->twin[i]], c->twin_vectors[k] + 3 * from, 3 * n * sizeof(double));
+        }
 }
 
 void vg_carrier_transfer(vg_carrier *c, size_t n, const double *const *poses, double *const *vectors)
@@ -237,6 +420,7 @@ void vg_carrier_transfer(vg_carrier *c, size_t n, const double *const *poses, do
         carry_job j = {.c = c, .out = vectors + p, .lanes = n - p < VGI_LANES ? n - p : VGI_LANES};
         for (size_t k = 0; k < VGI_LANES; k++) j.poses[k] = poses[p + (k < j.lanes ? k : j.lanes - 1)];
         vgi_parallel(c->threads, (c->source->nf + CHUNK - 1) / CHUNK, measure_chunk, &j);
+        transfer_twins(&j);
         vgi_parallel(c->threads, (c->target->nf + CHUNK - 1) / CHUNK, follow_chunk, &j);
     }
 }

@@ -91,11 +91,33 @@ static void rotation_passes(void)
     vg_head_clear(&target);
 }
 
-/* Triangles onto themselves: the gradient is the map of the triangle, so any pose comes back exactly. */
+/* A mesh paired with itself goes corner by corner: any pose comes back, bent polygons, pieces and all. */
+static void identity_is_exact(void)
+{
+    vg_head all[] = {make_pieces(), make_rod(9, 7, false), make_flower(9)};
+    for (int n = 0; n < 3; n++) {
+        vg_head *h = &all[n];
+        vg_correspondence k = identity_pairs(&h->mesh);
+        double *pose = warp(h->reference, h->mesh.nv, 0.3);
+        for (int i = 0; i < 3; i++) {
+            carried r = carry(h, h, &k, pose, methods[i], 2);
+            double *truth = vectors_of(r.g, pose);
+            CHECK_NEAR(farthest(truth, r.vectors, vg_graph_corners(r.g)), 0, 1e-12 * vg_diagonal(pose, h->mesh.nv));
+            free(truth);
+            carried_clear(&r);
+        }
+        free(pose);
+        vg_correspondence_clear(&k);
+        vg_head_clear(h);
+    }
+}
+
+/* Triangles driven by themselves twice, so that one map serves all corners: the gradient is the map of the triangle, and exact. */
 static void triangles_onto_themselves(void)
 {
     vg_head h = make_rod(9, 7, true);
-    vg_correspondence k = identity_pairs(&h.mesh);
+    vg_correspondence k = chance_pairs(&h.mesh, &h.mesh, 2, true);
+    for (size_t f = 0; f < h.mesh.nf; f++) k.source[2 * f] = k.source[2 * f + 1] = (uint32_t)f;
     double *pose = warp(h.reference, h.mesh.nv, 0.3);
     for (int i = 0; i < 3; i++) {
         carried r = carry(&h, &h, &k, pose, methods[i], 2);
@@ -312,6 +334,7 @@ static void shape_of_the_reference(void)
 }
 
 TESTS({"a turning source turns every target", rotation_passes},
+      {"a mesh paired with itself comes back exactly", identity_is_exact},
       {"triangles onto themselves by gradients are exact", triangles_onto_themselves},
       {"unmatched faces are rigid", unmatched_is_rigid},
       {"the thread count changes no bit", threads_do_not_matter},
