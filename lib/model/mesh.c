@@ -2,6 +2,7 @@
  * Leaves out attributes and poses (head.c) and vectors (graph.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
+#include "model/sets.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -100,33 +101,23 @@ int vg_mesh_same(const vg_mesh *a, const char *a_name, const vg_mesh *b, const c
     return VG_OK;
 }
 
-static uint32_t find_root(uint32_t *parent, uint32_t v)
-{
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-}
-
 int vg_mesh_components(const vg_mesh *m, uint32_t *label, size_t *count, vg_err *e)
 {
     uint32_t *parent = vgi_array_raw(m->nv, sizeof *parent, e);
     if (!parent) return VG_ENOMEM;
-    /* the root of a set is its least vertex, so labels come out in order of first vertex */
-    for (size_t v = 0; v < m->nv; v++) parent[v] = (uint32_t)v, label[v] = UINT32_MAX;
-    for (size_t f = 0; f < m->nf; f++) {
-        uint32_t a = find_root(parent, m->vert[m->start[f]]);
-        label[m->vert[m->start[f]]] = 0;
-        for (uint32_t c = m->start[f] + 1; c < m->start[f + 1]; c++) {
-            uint32_t b = find_root(parent, m->vert[c]);
+    vgi_sets_init(parent, m->nv);
+    for (size_t v = 0; v < m->nv; v++) label[v] = UINT32_MAX;
+    for (size_t f = 0; f < m->nf; f++)
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
             label[m->vert[c]] = 0;
-            if (b < a) parent[a] = b, a = b;
-            else parent[b] = a;
+            vgi_sets_join(parent, m->vert[m->start[f]], m->vert[c]);
         }
-    }
+    /* a set is known by its lowest vertex, so labels come out in order of first vertex */
     size_t n = 0;
     for (uint32_t v = 0; v < m->nv; v++) {
         if (label[v] == UINT32_MAX) continue;
-        uint32_t root = find_root(parent, v);
-        label[v] = root == v ? (uint32_t)n++ : label[root];
+        uint32_t lowest = vgi_sets_find(parent, v);
+        label[v] = lowest == v ? (uint32_t)n++ : label[lowest];
     }
     free(parent);
     *count = n;
