@@ -218,7 +218,8 @@ static int tell_content(item *it, vgi_input *in, vg_err *e)
     const unsigned char *data;
     const vgi_sequence_format *named = it->path ? vgi_sequence_by_suffix(it->path) : NULL;
     size_t n;
-    int r = vgi_input_peek(in, 4096, &data, &n, e);
+    int r = vgi_input_peek(in, 8, &data, &n, e); /* enough for a stream: who writes one frame by frame is not kept waiting */
+    if (r == VG_OK && !vgi_is_stream(data, n)) r = vgi_input_peek(in, 4096, &data, &n, e);
     if (r < 0) return r;
     if (n == 0 && !it->path)
         return vg_fail(e, VG_ETRUNC, "standard input is empty: look at the program before in the pipe");
