@@ -29,6 +29,7 @@ ARCHIVE_LIBS ?= $(shell $(PKG_CONFIG) --libs libarchive 2>/dev/null || echo -lar
 XXHASH_LIBS ?= -lxxhash
 PNG_CFLAGS ?= $(shell $(PKG_CONFIG) --cflags libpng 2>/dev/null)
 PNG_LIBS ?= $(shell $(PKG_CONFIG) --libs libpng 2>/dev/null || echo -lpng)
+ZLIB_LIBS ?= $(shell $(PKG_CONFIG) --libs zlib 2>/dev/null || echo -lz)
 JANSSON_LIBS ?= $(shell $(PKG_CONFIG) --libs jansson 2>/dev/null || echo -ljansson)
 
 ALL_CPPFLAGS := -D_GNU_SOURCE -Ilib -include lib/core/banned.h $(CHOLMOD_CFLAGS) $(ARCHIVE_CFLAGS) $(PNG_CFLAGS) $(CPPFLAGS)
@@ -51,10 +52,10 @@ ALL_CFLAGS += $(CFLAGS)
 # numeric kernels: the compiler may unroll and vectorise them; nothing here reorders sums
 KERNELS := $(addprefix lib/method/,deform_kernel solve_kernel carry_kernel planar_kernel reconstruct) lib/model/graph lib/core/memory
 ALL_LDFLAGS += $(LDFLAGS)
-ALL_LIBS := $(CHOLMOD_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) -lpthread -lm $(LDLIBS)
+ALL_LIBS := $(CHOLMOD_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) -lpthread -lm $(LDLIBS)
 
 LIB_SRC := $(sort $(wildcard lib/*/*.c))
-LIB_OBJ := $(LIB_SRC:%.c=$(B)/%.o)
+LIB_OBJ := $(LIB_SRC:%.c=$(B)/%.o) $(B)/page_text.o
 PROGRAMS := $(patsubst cmd/%.c,%,$(sort $(wildcard cmd/vg-*.c)))
 CMD_SHARED := $(filter-out cmd/vg-%.c,$(sort $(wildcard cmd/*.c)))
 CMD_OBJ := $(CMD_SHARED:%.c=$(B)/%.o)
@@ -79,13 +80,27 @@ $(B)/%.o: %.c $(B)/flags
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
 
+# what the pages of vg-view are made of, as strings of C; all ASCII
+PAGE_PARTS := html css js
+$(B)/page_text.c: $(PAGE_PARTS:%=lib/view/page.%) Makefile
+	@mkdir -p $(@D)
+	@{ echo '#include "view/page.h"'; \
+	   for part in $(PAGE_PARTS); do \
+	       echo "const char vgi_page_$$part[] = {"; \
+	       od -An -v -tu1 lib/view/page.$$part | sed 's/[0-9][0-9]*/&,/g'; \
+	       echo '0};'; \
+	   done; } > $@
+
+$(B)/page_text.o: $(B)/page_text.c $(B)/flags
+	$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
+
 $(B)/libvg.a: $(LIB_OBJ)
 	@rm -f $@
 	$(AR) rcs $@ $^
 
 $(B)/bin/%: $(B)/cmd/%.o $(CMD_OBJ) $(B)/libvg.a
 	@mkdir -p $(@D)
-	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(ALL_LIBS) $(JANSSON_LIBS)
+	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(ALL_LIBS)
 
 $(B)/unit/%: $(B)/tests/unit/%.o $(B)/libvg.a
 	@mkdir -p $(@D)

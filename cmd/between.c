@@ -1,4 +1,5 @@
-/* between.c: --interpolate, --at and --smooth of vg-deform: collect the key poses, write the poses between them as vectors.
+/* between.c: --interpolate, --at and --smooth of vg-deform: collect the key poses, write the poses between them as
+ * vectors.
  * Leaves out the mathematics (lib/method/interpolate.c), and paths of transforms, which need a map.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "between.h"
@@ -143,7 +144,8 @@ static void keep(poses *p, const vg_frame *f)
 static void place_keys(poses *p)
 {
     bool timed = true;
-    for (size_t i = 0; i < p->n; i++) timed = timed && p->labels[i].has_time && (i == 0 || p->labels[i].time > p->labels[i - 1].time);
+    for (size_t i = 0; i < p->n; i++)
+        timed = timed && p->labels[i].has_time && (i == 0 || p->labels[i].time > p->labels[i - 1].time);
     for (size_t i = 0; i < p->n; i++) p->keys[i].place = timed ? p->labels[i].time : (double)i;
 }
 
@@ -155,7 +157,8 @@ static void collect(poses *p, vg_source *s)
     while ((r = vg_source_next(s, &f, &e)) > 0) keep(p, &f);
     if (r < 0) cli_die(&e);
     if (p->n < 2) {
-        vg_fail(&e, VG_EINPUT, "there is %s in the input, and a path needs two or more", p->n ? "one pose" : "no pose");
+        vg_fail(&e, VG_EINPUT, "there is %s in the input, and a path needs two or more",
+                p->n ? "one pose" : "no pose");
         cli_die(&e);
     }
     vg_frame_clear(&f);
@@ -168,7 +171,8 @@ static void check_finite(const poses *p, const vg_frame *f)
     bool finite = isfinite(f->root[0]) && isfinite(f->root[1]) && isfinite(f->root[2]);
     for (size_t i = 0; i < 3 * p->h->count; i++) finite &= isfinite(f->values[i]) != 0;
     if (finite) return;
-    vg_fail(&e, VG_EARG, "frame '%s' is so far outside that numbers overflow: choose --at nearer to the keys", f->name);
+    vg_fail(&e, VG_EARG, "frame '%s' is so far outside that numbers overflow: choose --at nearer to the keys",
+            f->name);
     cli_die(&e);
 }
 
@@ -218,7 +222,8 @@ void between_run(vg_source *s)
     prepare(&p, s);
     cli_stream_open(p.h);
     collect(&p, s);
-    const vg_path_options o = {.kind = p.kind, .nanchors = p.h->nanchors, .smooth = between.smooth, .threads = cli.threads};
+    const vg_path_options o = {.kind = p.kind, .nanchors = p.h->nanchors, .smooth = between.smooth,
+                               .threads = cli.threads};
     if (vg_path_new(&path, p.g, p.h->reference, p.keys, p.n, &o, &e) < 0) cli_die(&e);
     write_poses(&p, path);
     report(path);

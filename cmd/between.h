@@ -1,4 +1,5 @@
-/* between.h: --interpolate, --at and --smooth of vg-deform: which moments are asked for, and the path through vectors.
+/* between.h: --interpolate, --at and --smooth of vg-deform: which moments are asked for, and the path through
+ * vectors.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_BETWEEN_H
 #define VG_BETWEEN_H
@@ -15,7 +16,8 @@ extern struct between_options {
 void between_check(void);
 /* between_wanted: is --interpolate or --at there? */
 bool between_wanted(void);
-/* between_count, between_moment: how many moments are asked for, and number i of them, in keys (0: the first) when there are `keys` >= 1. */
+/* between_count, between_moment: how many moments are asked for, and number i of them, in keys (0: the first) when
+ * there are `keys` >= 1. */
 size_t between_count(void);
 double between_moment(size_t i, size_t keys);
 
@@ -28,7 +30,8 @@ typedef struct between_key {
 /* between_label: name f after moment t of the keys ("a~b@0.25", at a key the key's own) and give it its time. */
 void between_label(vg_frame *f, const between_key *keys, size_t nkeys, double t);
 
-/* between_run: the whole job for a sequence of vertices, vectors or deformations, from its head to the end of the output. */
+/* between_run: the whole job for a sequence of vertices, vectors or deformations, from its head to the end of the
+ * output. */
 void between_run(vg_source *s);
 
 #endif

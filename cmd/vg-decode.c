@@ -3,7 +3,7 @@
 #include "cli.h"
 
 static vg_sink_options sink_options;
-static long first_number;
+static long first_number, most_targets;
 static const char *output; /* not cli.output, which is NULL for "-" as for none */
 
 static const cli_option options[] = {
@@ -17,6 +17,8 @@ static const cli_option options[] = {
      .text = &sink_options.mesh},
     {"no-mesh", 0, NULL, "write no mesh beside a point cache or array", .flag = &sink_options.no_mesh},
     {"drop-loose", 0, NULL, "leave out the vertices that are in no face", .flag = &sink_options.drop_loose},
+    {"max-targets", 0, "N", "morph targets of a GLB or glTF; further frames are mixed from them (default 100)",
+     .integer = &most_targets, .least = 2, .most = 1e6},
     {NULL}};
 
 static const cli_program program = {
@@ -32,7 +34,7 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_err e;
     vg_sink *sink;
-    sink_options.first_number = first_number;
+    sink_options.first_number = first_number, sink_options.most_targets = (size_t)most_targets;
     if (!output) cli_usage("where to? name the output with -o");
     if (vg_sink_check(output, &sink_options, &e) < 0) cli_die(&e);
 

@@ -1,6 +1,7 @@
 /* vg-deform: measure how each vector of a sequence deforms, and do the same to another mesh.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "between.h"
+#include "mapped.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -23,6 +24,10 @@ static const cli_option options[] = {
     {"at", 0, "T,...", "write the poses at these moments: 0 is the first pose, 1 the second; outside is extrapolated",
      .text = &between.at},
     {"smooth", 0, NULL, "let velocities not jump at the poses that are interpolated", .flag = &between.smooth},
+    {"map", 0, "MAP", "write the vertices that this map, made by vg-fitmap, gives to the motions of the patches", .text = &mapped.map},
+    {"joints", 0, NULL, "with --map: only rotations and scales of the patches count; joints say where they are", .flag = &mapped.joints},
+    {"transforms", 0, NULL, "with --map: write the motions of the patches, not vertices", .flag = &mapped.transforms},
+    {"live", 0, NULL, "with --map: write each frame at once, before the next is read", .flag = &mapped.live},
     {NULL}};
 
 static const cli_program program = {
@@ -303,7 +308,7 @@ static void check_kind(const work *w)
 {
     vg_err e;
     const char *advice = NULL;
-    if (w->kind == VG_TRANSFORMS) advice = "they need a map";
+    if (w->kind == VG_TRANSFORMS) advice = "name the map that turns them into vertices with --map";
     else if (w->kind == VG_DEFORMATIONS && !opts.onto) advice = "name the mesh to apply them to with --onto";
     else if (w->kind == VG_DEFORMATIONS && w->by != BY_POSE) advice = "they go --by pose only";
     else if (w->kind != VG_VERTICES && (w->by == BY_SHAPE || opts.correspondence))
@@ -392,7 +397,9 @@ static void make_head(work *w)
         t->reference = NULL, t->reference_name = NULL;
         t->attributes = (vg_attributes){0}, t->skeleton = (vg_skeleton){0};
     }
+    vg_map_clear(&h->map); /* it is no property of the mesh */
     if (w->way == CARRY) {
+        vg_patches_clear(&h->patches);
         h->mesh = t->mesh;
         free(h->links);
         h->has_links = t->has_links, h->links = t->links, h->nlinks = t->nlinks;
@@ -427,8 +434,13 @@ int main(int argc, char **argv)
     parse_options(&w);
     between_check();
     if (between_wanted() && opts.onto) cli_usage("--onto takes poses as they are: pipe those of --interpolate and --at into it");
+    mapped_check(opts.onto ? "onto" : NULL);
     load_target(&w);
     w.s = cli_source(operands, n);
+    if (mapped.map) {
+        mapped_run(w.s);
+        cli_finish(0);
+    }
     if (between_wanted()) {
         between_run(w.s);
         cli_finish(0);

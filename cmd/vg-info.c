@@ -272,6 +272,24 @@ static double percent(uint64_t part, uint64_t all)
 }
 
 /* D is that of the source as it lies on the target, which is what the stream holds of the target. */
+static void report_patches(report *r, const vg_head *h)
+{
+    const vg_map *m = &h->map;
+    if (!h->patches.n) return;
+    report_gap(r);
+    report_group(r, "patches");
+    report_put(r, "count", "patches", report_count(h->patches.n));
+    report_end(r);
+    if (!m->n) return;
+    report_group(r, "map");
+    report_put(r, "transforms", "map of", report_count(m->n));
+    report_put(r, "joints", "joints", report_count(m->njoints));
+    report_put(r, "held_vertices", "held", report_count(m->nheld));
+    report_put(r, "retargeted", NULL, report_count(m->has_home));
+    if (m->has_home) report_put(r, NULL, "body", report_text("another one than its poses are measured on"));
+    report_end(r);
+}
+
 static void report_correspondence(report *r, const vg_head *h, double D)
 {
     const vg_correspondence *c = &h->correspondence;
@@ -425,6 +443,7 @@ static void report_all(report *r, const char *operand, const vg_head *h, const c
     report_frames(r, h, c);
     report_mesh(r, h);
     report_correspondence(r, h, c->D);
+    report_patches(r, h);
     report_provenance(r, h);
     report_unknown(r, h, c);
 }

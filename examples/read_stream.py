@@ -98,6 +98,27 @@ class Correspondence:
 
 
 @dataclass
+class Map:
+    """Vertices as a linear function of n transforms."""
+    n: int
+    size: float
+    names: list
+    weights: array       # nv x 4 n
+    place: array         # n x 3 n
+    centre: array
+    home_centre: array
+    share: array
+    home: object         # array, or None
+    joint_at: array
+    joint_weight: array
+    corners: array
+    held_at: array
+    joints: array
+    held: array
+    held_patch: array
+
+
+@dataclass
 class Provenance:
     program: str
     version: str
@@ -131,6 +152,8 @@ class Stream:
     reference_name: object = None
     skeleton: object = None   # list of Joint
     correspondence: object = None
+    patches: object = None    # (count, array with the patch of each face)
+    map: object = None
     kind: str = ""
     precision: int = 0
     count: int = -1
@@ -424,7 +447,7 @@ class _Reader:
             raise StreamError(f"record {tag} must come before FORM" if tag != "FORM" else "it has two FORM records")
         if tag in self.seen and tag != "PROV":
             raise StreamError(f"it has two {tag} records")
-        if tag in ("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP", "SKEL") and "MESH" not in self.seen:
+        if tag in ("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "MAP ") and "MESH" not in self.seen:
             raise StreamError(f"record {tag} must come after MESH")
 
     def prov(self, p: _Payload):
@@ -579,6 +602,51 @@ class _Reader:
                 p.fail("a distance or mark is out of range")
         self.stream.correspondence = Correspondence(source, target, first, source_face, weight, distance, matched)
 
+    def ptch(self, p: _Payload):
+        p.fits("its length does not fit the number of faces")
+        count, patches = p.u64(), p.u32s(self.stream.mesh.nf)
+        p.pad()
+        p.end()
+        if not 1 <= count <= INDEX_LIMIT:
+            p.fail("its count is out of range")
+        if any(x >= count for x in patches):
+            p.fail("a face is in a patch that is not there")
+        self.stream.patches = (count, patches)
+
+    def map(self, p: _Payload):
+        n, nv, nj, nc, nh = (p.u64() for _ in range(5))
+        kind, flags, names, zero = (p.u32() for _ in range(4))
+        size = p.f64()
+        if not 1 <= n < INDEX_LIMIT or nj >= INDEX_LIMIT or nc >= INDEX_LIMIT or nh > nv:
+            p.fail("its counts are out of range")
+        if nv != self.stream.mesh.nv:
+            p.fail("its count does not fit the mesh")
+        if kind != 1:
+            p.fail("it is driven by something unknown")
+        if flags & ~1 or zero or names not in (0, n):
+            p.fail("unknown flags are set, or names are missing")
+        if not (math.isfinite(size) and size > 0):
+            p.fail("its size is not positive")
+        lengths = (4 * nv * n, 3 * n * n, 3 * n, 3 * n, n, 3 * nv if flags & 1 else 0, 3 * nj, nj, 4 * nc, 3 * nh)
+        weights, place, centre, home_centre, share, home, joint_at, joint_weight, corners, held_at = (
+            p.f64s(length, "a number") for length in lengths)
+        joints, held, held_patch = p.u32s(2 * nj), p.u32s(nh), p.u32s(nh)
+        if min(share) < 0 or abs(sum(share) - 1) >= 1e-9:
+            p.fail("a share is negative, or the shares do not sum to 1")
+        pairs = list(zip(joints[::2], joints[1::2]))
+        if any(a >= n or b >= n or a == b for a, b in pairs) or any(w <= 0 for w in joint_weight):
+            p.fail("a joint is malformed")
+        if any(not any(corners[i:i + 4]) for i in range(0, 4 * nc, 4)):
+            p.fail("a quaternion is zero")
+        if any(x >= n for x in held_patch):
+            p.fail("a vertex is held by a transform that is not there")
+        if any(a >= b for a, b in zip(held, held[1:])) or (nh and held[-1] >= nv):
+            p.fail("held vertices are not ascending, or out of range")
+        names = [p.string() for _ in range(names)]
+        p.end()
+        self.stream.map = Map(n, size, names, weights, place, centre, home_centre, share, home if flags & 1 else None,
+                              joint_at, joint_weight, corners, held_at, joints, held, held_patch)
+
     def form(self, p: _Payload):
         s = self.stream
         p.fits("it has a wrong length")
@@ -589,6 +657,8 @@ class _Reader:
         if precision not in (4, 8):
             p.fail("numbers are of unknown precision")
         s.kind, s.precision = KINDS[kind], precision
+        if s.map and len(s.map.corners) not in (0, 4 * sum(map(len, s.graph()))):
+            p.fail("the corners of record MAP do not fit the mesh")
         if s.reference is None and (s.mesh is not None or s.kind != "transforms"):
             p.fail("a MESH and a REFP record must come before it")
         if s.kind != "transforms":
@@ -660,7 +730,8 @@ class _Reader:
         self.stream.tail, self.stream.checksum, self.done = self.pending, running, True
 
     HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "SELE": sele, "LINK": link, "ANCH": anch,
-                "REFP": refp, "SKEL": skel, "CORR": corr, "FORM": form, "FRAM": fram, "FAIL": fail, "END ": end}
+                "REFP": refp, "SKEL": skel, "CORR": corr, "PTCH": ptch,
+                "MAP ": map, "FORM": form, "FRAM": fram, "FAIL": fail, "END ": end}
 
 
 def read_stream(file) -> Stream:
@@ -698,6 +769,14 @@ def _correspondence_json(c: Correspondence) -> dict:
     }
 
 
+def _map_json(m: Map) -> dict:
+    return {"size": m.size, "names": m.names, "weights": _rows(m.weights, 4 * m.n), "place": _rows(m.place, 3 * m.n),
+            "centre": _rows(m.centre, 3), "home_centre": _rows(m.home_centre, 3), "share": list(m.share),
+            "home": m.home and _rows(m.home, 3), "joint_at": _rows(m.joint_at, 3), "joint_weight": list(m.joint_weight),
+            "corners": _rows(m.corners, 4), "held_at": _rows(m.held_at, 3), "joints": _rows(m.joints, 2),
+            "held": list(m.held), "held_patch": list(m.held_patch)}
+
+
 def to_json(s: Stream) -> dict:
     """The whole content as plain lists, dictionaries and numbers; what is absent is None."""
     m, t = s.mesh, s.texture
@@ -715,6 +794,8 @@ def to_json(s: Stream) -> dict:
         "reference": m and {"name": s.reference_name, "positions": _rows(s.reference, 3)},
         "skeleton": None if s.skeleton is None else [vars(j) for j in s.skeleton],
         "correspondence": s.correspondence and _correspondence_json(s.correspondence),
+        "patches": s.patches and {"count": s.patches[0], "of_face": list(s.patches[1])},
+        "map": s.map and _map_json(s.map),
         "kind": s.kind, "precision": s.precision, "count": s.count,
         "extra": _extra_json(s.extra),
         "frames": [_frame_json(f, WIDTH[s.kind]) for f in s.frames],
@@ -731,6 +812,7 @@ def _summary(s: Stream) -> str:
     for what, n in (("selected faces", s.selection and len(s.selection)), ("links", s.links and len(s.links) // 2),
                     ("anchors", s.anchors and len(s.anchors)), ("joints", s.skeleton and len(s.skeleton)),
                     ("driven faces", s.correspondence and s.correspondence.target[1]),
+                    ("patches", s.patches and s.patches[0]), ("transforms of a map", s.map and s.map.n),
                     ("labels", s.labels and len(s.labels))):
         if n:
             lines.append(f"{n} {what}")

@@ -85,6 +85,8 @@ types:
             '"REFP"': refp
             '"SKEL"': skel
             '"CORR"': corr
+            '"PTCH"': ptch
+            '"MAP "': map
             '"FORM"': form
             '"FRAM"': fram
             '"FAIL"': fail
@@ -283,6 +285,92 @@ types:
             type: u8
           - id: digest
             type: u8
+  ptch:
+    seq:
+      - id: num_patches
+        type: u8
+      - id: patches_and_padding
+        type: u4
+        repeat: eos
+        doc: one for each face, then a zero if their number is odd
+  map:
+    seq:
+      - id: num_transforms
+        type: u8
+      - id: num_vertices
+        type: u8
+      - id: num_joints
+        type: u8
+      - id: num_corners
+        type: u8
+      - id: num_held
+        type: u8
+      - id: kind
+        type: u4
+      - id: map_flags
+        type: u4
+      - id: num_names
+        type: u4
+      - id: reserved
+        type: u4
+      - id: size
+        type: f8
+      - id: weights
+        type: f8
+        repeat: expr
+        repeat-expr: num_vertices * 4 * num_transforms
+      - id: place
+        type: f8
+        repeat: expr
+        repeat-expr: 3 * num_transforms * num_transforms
+      - id: centre
+        type: point
+        repeat: expr
+        repeat-expr: num_transforms
+      - id: home_centre
+        type: point
+        repeat: expr
+        repeat-expr: num_transforms
+      - id: share
+        type: f8
+        repeat: expr
+        repeat-expr: num_transforms
+      - id: home
+        type: point
+        repeat: expr
+        repeat-expr: (map_flags & 1) * num_vertices
+      - id: joint_positions
+        type: point
+        repeat: expr
+        repeat-expr: num_joints
+      - id: joint_weights
+        type: f8
+        repeat: expr
+        repeat-expr: num_joints
+      - id: corners
+        type: f8
+        repeat: expr
+        repeat-expr: 4 * num_corners
+      - id: held_positions
+        type: point
+        repeat: expr
+        repeat-expr: num_held
+      - id: joints
+        type: u4
+        repeat: expr
+        repeat-expr: 2 * num_joints
+      - id: held_vertices
+        type: u4
+        repeat: expr
+        repeat-expr: num_held
+      - id: held_patches
+        type: u4
+        repeat: expr
+        repeat-expr: num_held
+      - id: names
+        type: string
+        repeat: expr
+        repeat-expr: num_names
   form:
     seq:
       - id: kind

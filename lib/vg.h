@@ -732,6 +732,7 @@ typedef struct vg_sink_options {
     const char *mesh;    /* where the mesh of a file without faces goes; NULL: beside it, NAME.obj, which must not be another mesh */
     bool no_mesh;        /* nowhere */
     bool drop_loose;     /* leave out the vertices that are in no face */
+    size_t most_targets; /* GLB, glTF: morph targets; more frames are mixed from so many. 0: 100 */
 } vg_sink_options;
 /* vg_sink_check: is this a name and format that can be written? To be called before any work. */
 int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;

@@ -165,6 +165,21 @@ def correspondence(c):
     return Record("CORR", b"".join(ends) + u64(len(pairs)) + indices + numbers + matched, CRITICAL)
 
 
+def patches(p):
+    return Record("PTCH", pad(u64(p["count"]) + u32(*p["of_face"])), 0)
+
+
+def fitted(m):
+    n, corners, held = len(m["share"]), len(m["corners"]), len(m["held"])
+    counts = u64(n, len(m["weights"]), len(m["joints"]), corners, held)
+    words = u32(1, m["home"] is not None, len(m["names"]), 0)
+    rows = ("weights", "place", "centre", "home_centre")
+    numbers = [f64(m["size"])] + [f64(*flat(m[k])) for k in rows] + [f64(*m["share"]), f64(*flat(m["home"] or []))]
+    numbers += [f64(*flat(m["joint_at"])), f64(*m["joint_weight"]), f64(*flat(m["corners"])), f64(*flat(m["held_at"]))]
+    indices = u32(*flat(m["joints"]), *m["held"], *m["held_patch"])
+    return Record("MAP ", counts + words + b"".join(numbers) + indices + b"".join(map(string, m["names"])), CRITICAL)
+
+
 def frame(c, f):
     name = f["name"].encode()
     flags = (f["time"] is not None) + 2 * (f["pins"] is not None)
@@ -196,6 +211,10 @@ def records_of(c):
         out.append(skeleton(c["skeleton"]))
     if c["correspondence"] is not None:
         out.append(correspondence(c["correspondence"]))
+    if c["patches"] is not None:
+        out.append(patches(c["patches"]))
+    if c["map"] is not None:
+        out.append(fitted(c["map"]))
     out += unknown(c["extra"])
     out.append(Record("FORM", u32(KINDS[c["kind"]], c["precision"]) + u64(c["count"]), CRITICAL))
     for f in c["frames"]:
@@ -232,6 +251,7 @@ def content(**changes):
         "minor": 0, "provenance": [], "mesh": {"vertices": 4, "faces": [[0, 1, 2], [0, 2, 3]]}, "texture": None,
         "labels": None, "selection": None, "links": None, "anchors": None,
         "reference": {"name": "rest", "positions": POINTS[:4]}, "skeleton": None, "correspondence": None,
+        "patches": None, "map": None,
         "kind": "vertices", "precision": 8, "count": 4, "extra": [],
         "frames": [pose("pose1", BENT[:4])], "tail": [],
     }
@@ -310,6 +330,21 @@ def register_content(**changes):
     return dict(c, correspondence={"source": ends[0], "target": ends[1], "faces": faces}, **changes)
 
 
+def map_content(home=False, **changes):
+    """Two triangles, a patch each: vertices 0 and 3 go with one patch, 1 and 2 half with each."""
+    rest, half = POINTS[:4], [[0, 0, 0, 0], [0, 0, 0, 0]]
+    half = [[x / 2 for x in p] + [0.5] for p in rest]
+    nobody, whole_of = [0, 0, 0, 0], [[*p, 1] for p in rest]
+    weights = [whole_of[0] + nobody, half[1] + half[1], half[2] + half[2], nobody + whole_of[3]]
+    centre = [[0.75, 0.25, 0], [0.25, 0.75, 0]]
+    m = {"size": 1.5 if home else 1.0, "names": ["left", "r\u00e9st"] if home else [], "weights": weights,
+         "place": [[-0.5, -0.25, 0, -0.25, -0.25, 0], [-0.5, -0.25, 0, -0.25, -0.25, 0]], "centre": centre,
+         "home_centre": centre, "share": [0.5, 0.5], "home": [[2, 0, 0], [3, 0, 0], [3, 1, 0], [2, 1, 0]] if home else None,
+         "joint_at": [[0.5, 0.5, 0]], "joint_weight": [2.0], "corners": [[1, 0, 0, 0]] * 6, "held_at": [[0, 0, 0], [0, 1, 0]],
+         "joints": [[0, 1]], "held": [0, 3], "held_patch": [0, 1]}
+    return content(links=[], frames=[], patches={"count": 2, "of_face": [0, 1]}, map=m, **changes)
+
+
 NOTE = {"tag": "XNOT", "flags": COPY_SAFE, "payload": b"copied".hex()}
 FUTURE = {"tag": "X 1 ", "flags": COPY_SAFE | 0xABCD0000, "payload": bytes(range(8)).hex()}
 DROPPED = {"tag": "XTMP", "flags": 0, "payload": b"a filter drops this".hex()}
@@ -353,6 +388,8 @@ def golden():
                     frames=[pose("t", [[1, 0, 0, 0, 0, 0, 0], [0.5, 0.5, -0.5, 0.5, 1, 2, 3]], time=-1.5)])),
         "skeleton": ("the joints of a skeleton, whose bones are the mesh's faces", skeleton_content()),
         "correspondence": ("three faces of a target driven by two faces of a source", register_content()),
+        "patches": ("three faces in two patches", mixed(patches={"count": 2, "of_face": [1, 0, 1]})),
+        "map": ("two transforms, half of a quad each", map_content()),
         "unknown-records": (
             "copy-safe records before FORM, between frames and at the end; one that a filter drops",
             content(extra=[NOTE, DROPPED], tail=[NOTE],
@@ -395,6 +432,8 @@ def accept():
         "correspondence-without-mesh": whole(content(mesh=None, reference=None, kind="transforms", count=0, frames=[],
                                                      correspondence=register_content()["correspondence"])),
         "correspondence-of-nothing": whole(content(correspondence={"source": nobody, "target": nobody, "faces": []})),
+        "map-with-home-and-names": whole(map_content(home=True)),
+        "patch-without-face": whole(content(patches={"count": 9, "of_face": [8, 0]})),
         "extreme-numbers": whole(content(frames=[pose("x", [
             [1.7976931348623157e308, -1.7976931348623157e308, 5e-324], [-0.0, 0.0, 2.2250738585072014e-308],
             [1, 2, 3], [4, 5, 6]], time=-1e300)])),
@@ -658,6 +697,31 @@ def reject_attachments():
         "skel-name-utf8": patched(s, "SKEL", 44, b"\xff"),
         "skel-padding": patched(skeleton_content(), "SKEL", -1, b"\1"),
         "skel-cut": lie(s, "SKEL", payload=lambda record: record.payload[:-20]),
+        "ptch-cut": lie(content(patches={"count": 2, "of_face": [0, 1]}), "PTCH", payload=lambda record: record.payload[:-4]),
+        "ptch-long": lie(content(patches={"count": 2, "of_face": [0, 1]}), "PTCH", payload=lambda record: record.payload + bytes(8)),
+        "ptch-none": whole(content(patches={"count": 0, "of_face": [0, 0]})),
+        "ptch-out-of-range": whole(content(patches={"count": 2, "of_face": [0, 2]})),
+        "ptch-padding": patched(mixed(patches={"count": 2, "of_face": [1, 0, 1]}), "PTCH", -1, b"\1"),
+        "map-cut": lie(map_content(), "MAP ", payload=lambda record: record.payload[:-4]),
+        "map-long": lie(map_content(), "MAP ", payload=lambda record: record.payload + bytes(4)),
+        "map-empty": lie(map_content(), "MAP ", payload=b""),
+        "map-transforms-0": patched(map_content(), "MAP ", 0, u64(0)),
+        "map-transforms-2-31": patched(map_content(), "MAP ", 0, u64(1 << 31)),
+        "map-vertices": patched(map_content(), "MAP ", 8, u64(5)),
+        "map-joints-2-31": patched(map_content(), "MAP ", 16, u64(1 << 31)),
+        "map-corners": patched(map_content(), "MAP ", 24, u64(7)),
+        "map-held-2-63": patched(map_content(), "MAP ", 32, u64(1 << 63)),
+        "map-kind-2": patched(map_content(), "MAP ", 40, u32(2)),
+        "map-flag": patched(map_content(), "MAP ", 44, u32(2)),
+        "map-name-missing": patched(map_content(home=True), "MAP ", 48, u32(1)),
+        "map-reserved": patched(map_content(), "MAP ", 52, u32(1)),
+        "map-size-0": patched(map_content(), "MAP ", 56, f64(0)),
+        "map-weight-nan": patched(map_content(), "MAP ", 64, f64(NAN)),
+        "map-held-patch": patched(map_content(), "MAP ", -4, u32(2)),
+        "map-held-vertex": patched(map_content(), "MAP ", -12, u32(4)),
+        "map-joint-itself": patched(map_content(), "MAP ", -24, u32(1)),
+        "map-corners-of-another-graph": whole(dict(map_content(), selection=[0])),
+        "map-without-mesh": whole(content(mesh=None, reference=None, kind="transforms", count=0, frames=[], map=map_content()["map"])),
         "corr-cut": lie(r, "CORR", payload=lambda record: record.payload[:-8]),
         "corr-long": lie(r, "CORR", payload=lambda record: record.payload + bytes(8)),
         "corr-empty": lie(r, "CORR", payload=b""),

@@ -34,6 +34,19 @@ bool vgi_finite(const double *x, size_t n);
  * Tasks are handed out in order; they must not depend on one another. With one thread it is a loop. */
 void vgi_parallel(int threads, size_t n, void (*task)(void *context, size_t i), void *context);
 
+/* vgi_patch_colour: sRGB, far from those of the numbers before and after: hues by the golden ratio, in three shades. */
+static inline void vgi_patch_colour(uint32_t patch, unsigned char rgb[3])
+{
+    static const unsigned char light[3] = {230, 190, 250}, dark[3] = {90, 50, 140};
+    unsigned hue = (unsigned)((patch * 0x9e3779b9u) >> 16) * 6, part = hue >> 16, at = hue >> 8 & 255, shade = patch % 3;
+    unsigned char up = (unsigned char)(dark[shade] + (light[shade] - dark[shade]) * (int)at / 255);
+    unsigned char down = (unsigned char)(light[shade] - (light[shade] - dark[shade]) * (int)at / 255);
+    const unsigned char of_part[6][3] = {{light[shade], up, dark[shade]}, {down, light[shade], dark[shade]},
+                                         {dark[shade], light[shade], up}, {dark[shade], down, light[shade]},
+                                         {up, dark[shade], light[shade]}, {light[shade], dark[shade], down}};
+    memcpy(rgb, of_part[part], 3);
+}
+
 /* Little-endian numbers. */
 static inline uint32_t vgi_get32(const unsigned char *p)
 {

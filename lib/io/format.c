@@ -98,6 +98,6 @@ int vgi_model_write(vg_bytes *out, const char *format, const vgi_writing *w, vg_
 int vg_model_write(vg_bytes *out, const char *format, const vg_mesh *mesh, const double *vertices,
                    const vg_attributes *attributes, bool full_precision, vg_err *e)
 {
-    const vgi_writing w = {mesh, vertices, vertices, attributes, full_precision};
+    const vgi_writing w = {mesh, vertices, vertices, attributes, full_precision, NULL};
     return vgi_model_write(out, format, &w, e);
 }

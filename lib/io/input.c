@@ -73,6 +73,11 @@ const char *vgi_input_name(const vgi_input *in)
     return in->name;
 }
 
+const char *vgi_input_path(const vgi_input *in)
+{
+    return in->own ? in->name : NULL;
+}
+
 /* One read; 0 at the end. */
 static ssize_t read_some(vgi_input *in, void *to, size_t n, vg_err *e)
 {

@@ -15,6 +15,7 @@ int vgi_input_memory(vgi_input **in, const void *data, size_t n, const char *nam
 int vgi_input_file(vgi_input **in, const char *path, vg_err *e) VG_MUST_CHECK;
 void vgi_input_free(vgi_input **in);
 const char *vgi_input_name(const vgi_input *in);
+const char *vgi_input_path(const vgi_input *in); /* of the file it was opened from; NULL: it is none */
 /* vgi_input_peek: the next bytes without taking them, up to n <= 4096; *got is less only at the end of input. */
 int vgi_input_peek(vgi_input *in, size_t n, const unsigned char **data, size_t *got, vg_err *e) VG_MUST_CHECK;
 /* vgi_input_read: exactly n bytes; VG_ETRUNC when the input ends before. *got (may be NULL): how many came. */
@@ -64,6 +65,7 @@ typedef struct vgi_writing {
     const double *shape; /* a pose by which polygons are split, where they must be: the same for all poses of a sequence */
     const vg_attributes *attributes; /* may be NULL */
     bool full_precision;
+    const vg_patches *patches; /* may be NULL: a colour for each face, where the format has them */
 } vgi_writing;
 
 typedef struct vgi_format {
@@ -136,7 +138,7 @@ typedef struct vgi_sequence_format {
 } vgi_sequence_format;
 
 extern const vgi_sequence_format vgi_sequence_pc2, vgi_sequence_mdd, vgi_sequence_npy, vgi_sequence_npz, vgi_sequence_usda,
-    vgi_sequence_bvh;
+    vgi_sequence_bvh, vgi_sequence_glb, vgi_sequence_gltf;
 const vgi_sequence_format *vgi_sequence_by_name(const char *name, size_t n);   /* NULL: none */
 const vgi_sequence_format *vgi_sequence_by_suffix(const char *file_name);      /* case does not matter; NULL: none */
 const vgi_sequence_format *vgi_sequence_by_content(const unsigned char *data, size_t n);

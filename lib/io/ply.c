@@ -598,6 +598,11 @@ static void divide_faces(struct writing *x)
     if (pairs) x->nfaces = m->nf;
 }
 
+static bool has_colours(const struct writing *x)
+{
+    return x->w->patches && x->w->patches->n;
+}
+
 static int write_header(struct writing *x)
 {
     static const char *const names[] = {"ascii", "binary_little_endian", "binary_big_endian"};
@@ -607,8 +612,9 @@ static int write_header(struct writing *x)
     char text[512];
     int n = snprintf(text, sizeof text,
                      "ply\nformat %s 1.0\nelement vertex %zu\nproperty %s x\nproperty %s y\nproperty %s z\n"
-                     "element face %zu\nproperty list %s %s vertex_indices\n",
-                     names[x->encoding], m->nv, real, real, real, x->nfaces, x->long_list ? "uint" : "uchar", index);
+                     "element face %zu\nproperty list %s %s vertex_indices\n%s",
+                     names[x->encoding], m->nv, real, real, real, x->nfaces, x->long_list ? "uint" : "uchar", index,
+                     has_colours(x) ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "");
     int result = vgi_bytes_append(x->out, text, (size_t)n, x->e);
     if (result == VG_OK && x->nfaces < m->nf) {
         n = snprintf(text, sizeof text, "element edge %zu\nproperty %s vertex1\nproperty %s vertex2\n",
@@ -642,10 +648,16 @@ static int write_body(struct writing *x)
     }
     for (size_t f = 0; f < m->nf; f++) {
         uint32_t first = m->start[f], end = m->start[f + 1];
-        char *to = room(x, (size_t)(end - first) + 1, MOST_NUMBER);
+        bool coloured = f < x->nfaces && has_colours(x);
+        char *to = room(x, (size_t)(end - first) + 4, MOST_NUMBER);
         if (!to) return VG_ENOMEM;
         if (f < x->nfaces) put_integer(&to, end - first, x->long_list ? 4 : 1, x->encoding, ' ');
-        for (uint32_t c = first; c < end; c++) put_integer(&to, m->vert[c], 4, x->encoding, c + 1 < end ? ' ' : '\n');
+        for (uint32_t c = first; c < end; c++) put_integer(&to, m->vert[c], 4, x->encoding, c + 1 < end || coloured ? ' ' : '\n');
+        if (coloured) {
+            unsigned char colour[3];
+            vgi_patch_colour(x->w->patches->of_face[f], colour);
+            for (int k = 0; k < 3; k++) put_integer(&to, colour[k], 1, x->encoding, k < 2 ? ' ' : '\n');
+        }
         wrote(x, to);
     }
     return VG_OK;

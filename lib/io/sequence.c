@@ -9,7 +9,8 @@
 #include <unistd.h>
 
 static const vgi_sequence_format *const formats[] = {&vgi_sequence_pc2, &vgi_sequence_mdd,  &vgi_sequence_npy,
-                                                     &vgi_sequence_npz, &vgi_sequence_usda, &vgi_sequence_bvh};
+                                                     &vgi_sequence_npz, &vgi_sequence_usda, &vgi_sequence_bvh, &vgi_sequence_glb,
+                                                     &vgi_sequence_gltf};
 enum { FORMATS = sizeof formats / sizeof *formats };
 
 const vgi_sequence_format *vgi_sequence_by_name(const char *name, size_t n)
@@ -42,7 +43,7 @@ const vgi_sequence_format *vgi_sequence_by_content(const unsigned char *data, si
 
 const char *vgi_sequence_names(void)
 {
-    return "pc2, mdd, npy, npz, usda, bvh";
+    return "pc2, mdd, npy, npz, usda, bvh, glb, gltf";
 }
 
 /* ---- output ---- */

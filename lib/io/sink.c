@@ -210,6 +210,8 @@ static int make_plan(plan *p, const char *output, const vg_sink_options *o, vg_e
         !((p->sequence ? p->sequence->keeps : p->format->keeps) & VGI_KEEPS_DOUBLES))
         r = vg_fail(e, VG_EARG, "cannot write '%s' in full precision: %s holds binary32 only", output,
                     p->sequence ? p->sequence->name : p->format->name);
+    if (r == VG_OK && o->most_targets && p->sequence != &vgi_sequence_glb && p->sequence != &vgi_sequence_gltf)
+        r = vg_fail(e, VG_EARG, "--max-targets is for GLB and glTF: '%s' has no morph targets", output);
     return r < 0 ? r : check_mesh_option(p, o, e);
 }
 
@@ -767,7 +769,8 @@ int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
     if (r < 0) return r;
     vg_err cause;
     s->text.size = 0;
-    const vgi_writing w = {&s->head->mesh, f->values, s->head->reference, &s->head->attributes, s->full_precision};
+    const vgi_writing w = {&s->head->mesh, f->values, s->head->reference, &s->head->attributes, s->full_precision,
+                           &s->head->patches};
     r = vgi_model_write(&s->text, s->plan.format->name, &w, &cause);
     if (r < 0) return vg_fail(e, r, "cannot write frame '%s' to '%s': %s", name, s->output, cause.message);
     if ((r = put_frame(s, name, e)) == VG_OK) s->frames++;

@@ -1,9 +1,12 @@
-/* branch.c: how far, and which way round, each face has turned: a rotation by a about an axis is also one by a - 2 pi or a + 2 pi, and
- * neighbours have to choose alike (MATH 7). A minimum spanning tree over faces and vertices, whose edges cost what the rotations
- * at their ends differ, from the face that turns least; then sweeps that put right what the tree joined badly.
+/* branch.c: how far, and which way round, each face has turned: a rotation by a about an axis is also one by a - 2
+ * pi or a + 2 pi, and neighbours have to choose alike (MATH 7). A minimum spanning tree over faces and vertices,
+ * whose edges cost what the rotations at their ends differ, from the face that turns least; then sweeps that put
+ * right what the tree joined badly; and where something turns by more than half a turn, a smooth field of such
+ * vectors that is fitted to the faces.
  * Leaves out what is done with it (interpolate.c).
  *
- * Vectors are axis times half the angle, the logarithms of unit quaternions: the next branch along the axis is pi away.
+ * Vectors are axis times half the angle, the logarithms of unit quaternions: the next branch along the axis is pi
+ * away.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/branch.h"
 #include "model/incidence.h"
@@ -11,12 +14,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { SWEEPS = 50,      /* at most, and they end when no face changes its branch */
-       NEWTON_STEPS = 6, /* of the smooth field, at most, and in each */
+enum { SWEEPS = 50,       /* at most, and they end when no face changes its branch */
+       NEWTON_STEPS = 20, /* of the smooth field, at most, and in each */
        CG_STEPS = 200 };
-static const double trust = 2.5;     /* see vgi_branch_near: x / sin x for x = 2.3, a turn by 260 degrees */
-static const double attachment = 0.02; /* of the smooth field to the faces' turns: it follows them over some seven faces */
-static const double usual = 0.3;       /* a face whose half angle from the field is more than this is an exception */
+static const double trust = 2.5;        /* see vgi_branch_near: x / sin x for x = 2.15, a turn by 246 degrees */
+static const double sideways = 0.1;     /* how much the axes of faces count for the smooth field, beside their angles */
+static const double longest_step = 0.3; /* of a vector's coordinate */
+static const double usual = 0.3;        /* a face whose half angle from the field is more than this is an exception */
 
 static double dot(const double a[3], const double b[3])
 {
@@ -53,8 +57,8 @@ bool vgi_branch_near(const double q[4], const double near[3], double l[3])
     return sqrt(gap2) <= trust * half_angle_between(q, near) + tiny;
 }
 
-/* What a face that turns by q is given beside a neighbour, or neighbours' mean, at `near`: the branch, or where that cannot be trusted
- * the neighbour's axis, and by how much more q turns about it. */
+/* What a face that turns by q is given beside a neighbour, or neighbours' mean, at `near`: the branch, or where
+ * that cannot be trusted the neighbour's axis, and by how much more q turns about it. */
 static bool follow(const double q[4], const double near[3], double l[3])
 {
     if (vgi_branch_near(q, near, l)) return true;
@@ -70,7 +74,8 @@ static bool follow(const double q[4], const double near[3], double l[3])
 
 /* ---- what is known of faces and vertices ---- */
 
-/* An edge of the tree's graph, between a face and one of its vertices, on its way into the heap. Nodes: faces, then vertices. */
+/* An edge of the tree's graph, between a face and one of its vertices, on its way into the heap. Nodes: faces,
+ * then vertices. */
 typedef struct edge {
     double cost;
     uint32_t from, to;
@@ -89,11 +94,11 @@ typedef struct choice {
 } choice;
 
 /* Add to a sum of quaternions, in the sign that agrees with it. */
-static void add(double sum[4], const double q[4], double weight)
+static void add(double sum[4], const double q[4])
 {
     double along = 0;
     for (int k = 0; k < 4; k++) along += sum[k] * q[k];
-    for (int k = 0; k < 4; k++) sum[k] += along < 0 ? -weight * q[k] : weight * q[k];
+    for (int k = 0; k < 4; k++) sum[k] += along < 0 ? -q[k] : q[k];
 }
 
 static void make_unit(double q[4])
@@ -113,13 +118,14 @@ static void make_means(choice *c, const double *corner)
             double unit[4];
             memcpy(unit, corner + 4 * i, sizeof unit);
             make_unit(unit);
-            add(mean, unit, 1);
+            add(mean, unit);
         }
         make_unit(mean);
     }
     for (size_t v = 0; v < g->nv; v++) {
         double *mean = c->q + 4 * (g->nf + v);
-        for (size_t i = c->around.first[v]; i < c->around.first[v + 1]; i++) add(mean, c->q + 4 * (size_t)c->around.face[i], 1);
+        for (size_t i = c->around.first[v]; i < c->around.first[v + 1]; i++)
+            add(mean, c->q + 4 * (size_t)c->around.face[i]);
         make_unit(mean);
     }
 }
@@ -168,7 +174,8 @@ static int push_neighbours(choice *c, size_t node, vg_err *e)
     const vg_graph *g = c->g;
     int r = VG_OK;
     if (node < g->nf) {
-        for (size_t i = g->start[node]; r == VG_OK && i < g->start[node + 1]; i++) r = push(c, node, g->nf + g->vert[i], e);
+        for (size_t i = g->start[node]; r == VG_OK && i < g->start[node + 1]; i++)
+            r = push(c, node, g->nf + g->vert[i], e);
     } else {
         const vgi_incidence *x = &c->around;
         size_t v = node - g->nf;
@@ -251,8 +258,8 @@ static bool mean_beside(const choice *c, size_t f, double mean[3])
     return n > 0;
 }
 
-/* Each face to the branch with the least sum of squared differences from its neighbours, which is the one nearest to their mean; how
- * many changed. */
+/* Each face to the branch with the least sum of squared differences from its neighbours, which is the one nearest
+ * to their mean; how many changed. */
 static size_t sweep(choice *c)
 {
     const vg_graph *g = c->g;
@@ -297,14 +304,15 @@ static bool is_beyond(const choice *c, const double *corner)
 
 /* ---- a smooth field of vectors (Gauss-Newton, conjugate gradients) ----
  *
- * Minimised is  sum_f weight_f |rest_f|^2 + smoothness,  exp(rest_f) = exp(-turn_f) q_f, smoothness = turn' L turn with L the graph Laplacian of
- * faces that share vertices, the n faces at a vertex with weight 1/n each. A step x changes rest by -J x, J = I - (1 - cos a)/a^2 [v] +
- * (a - sin a)/a^3 [v]^2 for the rotation vector v = 2 turn and its length a. Near a whole turn J is singular across the axis: there
- * the axis is that of the neighbours. */
+ * Minimised is  sum_f rest_f' W_f rest_f + turn' L turn,  exp(rest_f) = exp(-turn_f) q_f, with L the graph
+ * Laplacian of faces that share vertices, the n faces at a vertex with weight 1/n each. A step x changes rest by
+ * -J x, J = I - (1 - cos a)/a^2 [v] + (a - sin a)/a^3 [v]^2 for the rotation vector v = 2 turn and its length a.
+ * Near a whole turn J is singular across the axis: there the axis is that of the neighbours. */
 
 typedef struct relaxation {
     double *J;      /* 9 per face */
     double *weight; /* per face */
+    double *axis;   /* 3 per face: unit vector */
     double *b, *x, *r, *p, *Ap; /* 3 per face */
 } relaxation;
 
@@ -334,14 +342,24 @@ static void add_laplacian(choice *c, const double *x, double *y)
             for (size_t k = 0; k < 3; k++) y[3 * f + k] += x[3 * f + k] - c->at[3 * (size_t)g->vert[i] + k];
 }
 
-/* y = weight J' (J x) + L x */
+/* y = J' W rest, W being `weight` along the axis, which J leaves as it is, and `sideways` of that across it. */
+static void pull(const relaxation *r, size_t f, const double rest[3], double y[3])
+{
+    const double *J = r->J + 9 * f, *axis = r->axis + 3 * f;
+    double along = (1 - sideways) * dot(axis, rest);
+    for (int k = 0; k < 3; k++) {
+        double turned = J[k] * rest[0] + J[3 + k] * rest[1] + J[6 + k] * rest[2];
+        y[k] = r->weight[f] * (sideways * turned + along * axis[k]);
+    }
+}
+
+/* y = J' W (J x) + L x */
 static void apply(choice *c, const relaxation *r, const double *x, double *y)
 {
     for (size_t f = 0; f < c->g->nf; f++) {
         const double *J = r->J + 9 * f, *xf = x + 3 * f;
-        double Jx[3];
-        for (int i = 0; i < 3; i++) Jx[i] = r->weight[f] * dot(J + 3 * i, xf);
-        for (int k = 0; k < 3; k++) y[3 * f + (size_t)k] = J[k] * Jx[0] + J[3 + k] * Jx[1] + J[6 + k] * Jx[2];
+        const double Jx[3] = {dot(J, xf), dot(J + 3, xf), dot(J + 6, xf)};
+        pull(r, f, Jx, y + 3 * f);
     }
     add_laplacian(c, x, y);
 }
@@ -359,9 +377,11 @@ static void linearise(choice *c, relaxation *r)
         vgi_shorter(rest);
         vg_quat_log(rest, l);
         make_jacobian(turn, J);
-        r->weight[f] = attachment / (1 + dot(l + 1, l + 1) / (usual * usual)); /* a face that flips does not pull much */
-        for (int k = 0; k < 3; k++)
-            b[k] = r->weight[f] * (J[k] * l[1] + J[3 + k] * l[2] + J[6 + k] * l[3]) - b[k];
+        r->weight[f] = 1 / (1 + dot(l + 1, l + 1) / (usual * usual)); /* a face that flips does not pull much */
+        double length = sqrt(dot(turn, turn)), y[3];
+        for (int k = 0; k < 3; k++) r->axis[3 * f + (size_t)k] = length > 0 ? turn[k] / length : 0;
+        pull(r, f, l + 1, y);
+        for (int k = 0; k < 3; k++) b[k] = y[k] - b[k];
     }
 }
 
@@ -378,7 +398,7 @@ static void solve_step(choice *c, relaxation *r)
     memset(r->x, 0, n * sizeof *r->x);
     memcpy(r->r, r->b, n * sizeof *r->b);
     memcpy(r->p, r->b, n * sizeof *r->b);
-    double rr = product(r->r, r->r, n), enough = 1e-6 * rr;
+    double rr = product(r->r, r->r, n), enough = 1e-4 * rr;
     for (int i = 0; i < CG_STEPS && rr > enough; i++) {
         apply(c, r, r->p, r->Ap);
         double alpha = rr / product(r->p, r->Ap, n), before_rr = rr;
@@ -391,18 +411,17 @@ static void solve_step(choice *c, relaxation *r)
 static int relax(choice *c, vg_err *e)
 {
     size_t nf = c->g->nf;
-    double *room = vgi_array_raw(nf, 25 * sizeof *room, e);
+    double *room = vgi_array_raw(nf, 28 * sizeof *room, e);
     if (!room) return VG_ENOMEM;
-    relaxation r = {room, room + 9 * nf, room + 10 * nf, room + 13 * nf, room + 16 * nf, room + 19 * nf, room + 22 * nf};
+    relaxation r = {.J = room, .weight = room + 9 * nf, .axis = room + 10 * nf, .b = room + 13 * nf, .x = room + 16 * nf,
+                    .r = room + 19 * nf, .p = room + 22 * nf, .Ap = room + 25 * nf};
     for (int step = 0; step < NEWTON_STEPS; step++) {
         linearise(c, &r);
         solve_step(c, &r);
         double most = 0;
-        for (size_t i = 0; i < 3 * nf; i++) {
-            c->turn[i] += r.x[i];
-            most = fmax(most, fabs(r.x[i]));
-        }
-        if (most < 1e-3) break;
+        for (size_t i = 0; i < 3 * nf; i++) most = fmax(most, fabs(r.x[i]));
+        for (size_t i = 0; i < 3 * nf; i++) c->turn[i] += most > longest_step ? longest_step / most * r.x[i] : r.x[i];
+        if (most < 1e-2) break;
     }
     free(room);
     return VG_OK;

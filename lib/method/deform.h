@@ -6,7 +6,8 @@
 
 #include "core/core.h"
 
-/* vgi_deformer_of_vectors: vg_deformer_new for a reference of which only the vectors are known (one per corner, copied), and D. */
+/* vgi_deformer_of_vectors: vg_deformer_new for a reference of which only the vectors are known (one per corner,
+ * copied), and D. */
 int vgi_deformer_of_vectors(vg_deformer **d, const vg_graph *g, const double *vectors, double diagonal, int threads,
                             vg_err *e) VG_MUST_CHECK;
 

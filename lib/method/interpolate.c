@@ -1,13 +1,14 @@
-/* interpolate.c: a path through poses: each vector turns and stretches from one key pose to the next along the geodesic (MATH 7; T 6.1),
- * or on a curve whose velocity does not jump at the keys.
+/* interpolate.c: a path through poses: each vector turns and stretches from one key pose to the next along the
+ * geodesic (MATH 7; T 6.1), or on a curve whose velocity does not jump at the keys.
  * Leaves out which way round to turn (branch.c) and the way back to vertices (reconstruct.c).
  *
  * Logarithms are those of quaternions: axis times half angle, and half the logarithm of the scale.
  *
- * From key a to key b a corner turns by Q = exp(turn) exp(rest), and at u in [0, 1] by exp(u turn) exp(u rest). Where nothing turns by
- * more than half a turn, turn is the logarithm of Q and rest is 0: the geodesic of (T 6.25). Beyond, the logarithm of single
- * corners is of no use, for near a whole turn its axis is whatever small differences there are between neighbours; there turn is
- * a vector field that varies smoothly over the mesh, and rest, applied first, is what each corner does beside it.
+ * From key a to key b a corner turns by Q = exp(turn) exp(rest), and at u in [0, 1] by exp(u turn) exp(u rest).
+ * Where nothing turns by more than half a turn, turn is the logarithm of Q and rest is 0: the geodesic of (T
+ * 6.25). Beyond, the logarithm of single corners is of no use, for near a whole turn its axis is whatever small
+ * differences there are between neighbours; there turn is a vector field that varies smoothly over the mesh, and
+ * rest, applied first, is what each corner does beside it.
  *
  * Vectors of anchors, from the anchors' mean, go through all this behind the corners', with the mean turn of all.
  * SPDX-License-Identifier: GPL-3.0-or-later */
@@ -81,8 +82,8 @@ static double length_of(const vg_path *p, size_t s)
 
 /* ---- line segments ---- */
 
-/* Two vectors leave open how far a line segment turns about itself. It does as the vectors around it do together, and what these
- * leave open as the whole body does; then comes the smallest rotation for the rest. */
+/* Two vectors leave open how far a line segment turns about itself. It does as the vectors around it do together,
+ * and what these leave open as the whole body does; then comes the smallest rotation for the rest. */
 static void add_moment(const vg_path *p, const double *from, size_t f, double b[9], double *size)
 {
     for (size_t c = p->g->start[f]; c < p->g->start[f + 1]; c++) {
@@ -241,8 +242,9 @@ static int get_segment(vg_path *p, size_t number, const segment **s, vg_err *e)
 
 /* ---- velocities at keys ---- */
 
-/* At a key, between segments of lengths h0 and h1 whose velocities (per segment) are v0 and v1: that of the parabola through three keys,
- * v = before v0 + after v1, per unit of place. At the first and the last key it is that of the parabola next to it. */
+/* At a key, between segments of lengths h0 and h1 whose velocities (per segment) are v0 and v1: that of the
+ * parabola through three keys, v = before v0 + after v1, per unit of place. At the first and the last key it is
+ * that of the parabola next to it. */
 typedef struct knot {
     const segment *first, *second;
     double before, after;
@@ -259,15 +261,16 @@ static void make_knot(const vg_path *p, size_t key, knot *x)
 
 /* ---- a pose ---- */
 
-/* Where a pose is. Q(u) = exp(A) exp(along turn) exp(along rest) exp(B). Straight on, A = B = 0. On a curve through keys, with
- * velocities alpha and beta more than the segment has of itself at its last and its first key, A = (u^3 - u^2) alpha and B = u (1 - u)^2 beta: a
- * cubic Hermite curve on the group, and the usual one when all have one axis. Outside of the first and last key it goes on with the velocity there. */
+/* Where a pose is. Q(u) = exp(A) exp(along turn) exp(along rest) exp(B). Straight on, A = B = 0. On a curve
+ * through keys, with velocities alpha and beta more than the segment has of itself at its last and its first key,
+ * A = (u^3 - u^2) alpha and B = u (1 - u)^2 beta: a cubic Hermite curve on the group, and the usual one when all
+ * have one axis. Outside of the first and last key it goes on with the velocity there. */
 typedef struct moment {
     const vg_path *p;
     const segment *s;
     bool bent;
     double along, drift;
-    double alpha, last_own, beta, first_own; /* weights in A and B of the difference and of the segment's own velocity */
+    double alpha, last_own, beta, first_own; /* weights in A and in B: of the difference, of the segment's own velocity */
     double length; /* of s in places */
     knot first, last;
     double *vectors, *offsets;
@@ -330,7 +333,8 @@ static void turn_element(const moment *m, size_t i, double *to)
     if (m->bent) {
         turn_bent(m, i, q);
     } else {
-        const double *turn = s->turn + 3 * i, l[4] = {m->along * s->scale[i], m->along * turn[0], m->along * turn[1], m->along * turn[2]};
+        double l[4] = {m->along * s->scale[i]};
+        for (size_t k = 0; k < 3; k++) l[k + 1] = m->along * s->turn[3 * i + k];
         vg_quat_exp(l, q);
         if (s->has_rest) turn_by(m->along, s->rest + 3 * i, q);
     }
@@ -342,7 +346,8 @@ static void turn_chunk(void *context, size_t chunk)
     const moment *m = context;
     size_t corners = m->p->corners, first = chunk * CHUNK, end = first + CHUNK;
     if (end > m->p->elements) end = m->p->elements;
-    for (size_t i = first; i < end; i++) turn_element(m, i, i < corners ? m->vectors + 3 * i : m->offsets + 3 * (i - corners));
+    for (size_t i = first; i < end; i++)
+        turn_element(m, i, i < corners ? m->vectors + 3 * i : m->offsets + 3 * (i - corners));
 }
 
 /* The same for a point that does not turn: points are those of a segment at both its keys. */

@@ -121,12 +121,12 @@ static void quantise(vgi_track *t, vgi_chunk *c)
     c->loss = sqrt(worst);
 }
 
-/* What is left of value i of a frame; everything is modulo 2^16. */
-static inline uint16_t remainder_at(const uint16_t *q, size_t frame, unsigned how, size_t i)
+/* What is left of a value that stands `frame` values behind that of the frame before; everything is modulo 2^16. */
+static inline uint16_t remainder_of(const uint16_t *q, ptrdiff_t frame, unsigned how)
 {
-    unsigned x = q[i];
-    if (how & VGI_PREDICT_FRAME) x -= q[i - frame];
-    if (how & VGI_PREDICT_MOTION) x -= 2U * q[i - frame] - q[i - 2 * frame];
+    unsigned x = *q;
+    if (how & VGI_PREDICT_FRAME) x -= q[-frame];
+    if (how & VGI_PREDICT_MOTION) x -= 2U * q[-frame] - q[-2 * frame];
     return (uint16_t)x;
 }
 
@@ -135,17 +135,17 @@ static inline uint16_t fold(uint16_t x) /* 0 -1 1 -2 2 ... to 0 1 2 3 4 ... */
     return (uint16_t)(x & 0x8000 ? ~(x << 1) : x << 1);
 }
 
-/* Predict a frame, q its first value; the bits that are left, and the two bytes of each value unless upper is NULL. The offsets q[i -
- * frame] are of the frames before. */
-static inline __attribute__((always_inline)) uint64_t predict(const uint16_t *values, const vgi_track *t, unsigned how,
-                                                              unsigned char *upper, unsigned char *lower)
+/* Predict a frame: the bits that are left, or, unless upper is NULL, the two bytes of each value. */
+static inline __attribute__((always_inline)) uint64_t predict(const uint16_t *values, const vgi_track *t,
+                                                              unsigned how, unsigned char *upper,
+                                                              unsigned char *lower)
 {
     size_t frame = t->nv * t->width, i = 0;
     uint64_t bits = 0;
     for (size_t k = 0; k < t->width; k++) {
         uint16_t before = 0;
         for (size_t v = 0; v < t->nv; v++, i++) {
-            uint16_t x = remainder_at(values + i, frame, how, 0), rest = x;
+            uint16_t x = remainder_of(values + i, (ptrdiff_t)frame, how), rest = x;
             if (how & VGI_PREDICT_NEIGHBOUR) rest = (uint16_t)(x - before);
             before = x;
             rest = fold(rest);
@@ -225,7 +225,8 @@ int vgi_base64(vg_bytes *text, const unsigned char *data, size_t n, vg_err *e)
     unsigned char *to = text->data + text->size;
     for (size_t i = 0; i < n; i += 3) {
         size_t here = n - i < 3 ? n - i : 3;
-        unsigned x = (unsigned)data[i] << 16 | (here > 1 ? (unsigned)data[i + 1] << 8 : 0) | (here > 2 ? data[i + 2] : 0U);
+        unsigned second = here > 1 ? data[i + 1] : 0, third = here > 2 ? data[i + 2] : 0;
+        unsigned x = (unsigned)data[i] << 16 | second << 8 | third;
         *to++ = (unsigned char)digits[x >> 18];
         *to++ = (unsigned char)digits[x >> 12 & 63];
         *to++ = here > 1 ? (unsigned char)digits[x >> 6 & 63] : '=';

@@ -1,5 +1,5 @@
-/* Paths through poses (MATH 7): ends exact, rigid turns rigid, limbs keep their volume, bars unwind evenly beyond a whole turn, smooth
- * paths without jumps of velocity.
+/* Paths through poses (MATH 7): ends exact, rigid turns rigid, limbs keep their volume, bars unwind evenly beyond
+ * a whole turn, smooth paths without jumps of velocity.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
 #include "method/branch.h"
@@ -161,8 +161,10 @@ static double volume(const vg_mesh *m, const double *x)
     double sum = 0;
     for (size_t f = 0; f < m->nf; f++)
         for (size_t i = m->start[f] + 1; i + 1 < m->start[f + 1]; i++) {
-            const double *a = x + 3 * (size_t)m->vert[m->start[f]], *b = x + 3 * (size_t)m->vert[i], *c = x + 3 * (size_t)m->vert[i + 1];
-            sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+            const double *a = x + 3 * (size_t)m->vert[m->start[f]], *b = x + 3 * (size_t)m->vert[i];
+            const double *c = x + 3 * (size_t)m->vert[i + 1];
+            sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+                   a[2] * (b[0] * c[1] - b[1] * c[0]);
         }
     return sum / 6;
 }
@@ -184,7 +186,8 @@ static double twist_of_ring(const vg_head *h, const double *x, size_t ring, size
 
 enum { RINGS = 61, SIDES = 12 };
 
-/* the largest difference of a ring's twist from u times its twist, in degrees, and of a vertex from where an even twist puts it, in D */
+/* the largest difference of a ring's twist from u times its twist, in degrees, and of a vertex from where an even
+ * twist puts it, in D */
 static double uneven(trial *t, const double *x, double angle, double u, double *off)
 {
     double most = 0, root[3], mine[3];
@@ -223,7 +226,8 @@ static void ends_are_exact(void)
                 /* vertices in no face are placed by the solver, at the reference */
                 for (size_t v = 0; v < h.mesh.nv; v++) {
                     if (!t.g->in_face[v]) continue;
-                    double off = farthest(x + 3 * v, t.keys[k].values + 3 * v, 1), near = farthest(y + 3 * v, t.keys[k].values + 3 * v, 1);
+                    const double *key = t.keys[k].values + 3 * v;
+                    double off = farthest(x + 3 * v, key, 1), near = farthest(y + 3 * v, key, 1);
                     if (!(off <= 1e-12 * t.D) || !(near <= 1e-10 * t.D))
                         printf("%s: %g %g\n", name, off / t.D, near / t.D), test_bad++;
                 }
@@ -290,7 +294,8 @@ static void rigid_turns_stay_rigid(void)
             trial_open(&t, k % 2, 1);
             for (double u = -0.5; u < 1.6; u += 0.25) {
                 double *x = at(&t, u), change = shape_change(h.reference, x, h.mesh.nv) / t.D;
-                if (!(change <= 1e-9)) printf("%s, %g degrees at %g: %g D\n", name, angles[k / 2], u, change), test_bad++;
+                if (!(change <= 1e-9))
+                    printf("%s, %g degrees at %g: %g D\n", name, angles[k / 2], u, change), test_bad++;
                 free(x);
             }
             trial_end(&t);
@@ -393,7 +398,8 @@ static void smooth_paths_have_no_jumps(void)
             double jump = 0, first = 0, step = 1e-4;
             for (size_t key = 0; key < 4; key++) {
                 double *a = at(&t, (double)key - step), *b = at(&t, (double)key), *c = at(&t, (double)key + step);
-                double before = key ? t.keys[key].place - t.keys[key - 1].place : t.keys[1].place, after = key < 3 ? t.keys[key + 1].place - t.keys[key].place : before;
+                double before = t.keys[key ? key : 1].place - t.keys[key ? key - 1 : 0].place;
+                double after = key < 3 ? t.keys[key + 1].place - t.keys[key].place : before;
                 for (size_t i = 0; i < 3 * h.mesh.nv; i++) {
                     double v0 = (b[i] - a[i]) / step / before, v1 = (c[i] - b[i]) / step / after;
                     jump = fmax(jump, fabs(v1 - v0) / t.D), first = fmax(first, fabs(v0) / t.D);

@@ -1,0 +1,204 @@
+/* mapped.c: --map of vg-deform: measures patches or takes their transforms, interpolates them, and makes vertices of them by one product.
+ * Leaves out fitting the map (vg-fitmap) and paths through vectors (between.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "mapped.h"
+#include "between.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct mapped_options mapped;
+
+enum { BATCH = 32 };
+
+typedef struct playback {
+    vg_source *source;
+    vg_head *h;       /* the input's, then the output's */
+    vg_head map;
+    vg_kind kind;     /* what comes in */
+    size_t count;     /* transforms */
+    vg_player *player;
+    size_t n, most;   /* frames in hand */
+    vg_frame in[BATCH], out[BATCH];
+    double *transforms[BATCH];
+} playback;
+
+void mapped_check(const char *others)
+{
+    if (!mapped.map) {
+        if (mapped.live) cli_usage("--live needs --map");
+        if (mapped.joints) cli_usage("--joints needs --map");
+        if (mapped.transforms) cli_usage("--transforms needs --map");
+        return;
+    }
+    if (others) cli_usage("--%s does not go with --map", others);
+    if (between.smooth) cli_usage("--smooth does not go with --map");
+    if (mapped.live && between_wanted()) cli_usage("--live does not go with --interpolate and --at, which need all keys first");
+}
+
+static void load_map(playback *p)
+{
+    vg_err e;
+    if (vg_load_mesh(&p->map, mapped.map, &e) < 0) cli_die(&e);
+    if (!p->map.map.n) {
+        vg_fail(&e, VG_EINPUT, "'%s' holds no map: make one with vg-fitmap", mapped.map);
+        cli_die(&e);
+    }
+}
+
+static void check_input(playback *p)
+{
+    vg_err e;
+    const vg_head *h = p->h;
+    char name[200];
+    snprintf(name, sizeof name, "'%.190s'", mapped.map);
+    p->kind = h->kind, p->count = p->map.map.n;
+    int r = VG_OK;
+    if (p->kind == VG_VERTICES) {
+        r = vg_mesh_same(&h->mesh, "the sequence", &p->map.mesh, name, &e);
+    } else if (p->kind != VG_TRANSFORMS) {
+        r = vg_fail(&e, VG_EINPUT, "the input holds %s: --map takes vertices or transforms", vg_kind_name(p->kind));
+    } else if (h->count != p->count) {
+        r = vg_fail(&e, VG_EINPUT, "the input has %zu transforms a frame, the map %s takes %zu", h->count, name, p->count);
+    }
+    if (r < 0) cli_die(&e);
+}
+
+/* The output's head: the input's provenance, records and precision, the map's mesh with all that describes it. */
+static void make_head(playback *p)
+{
+    vg_err e;
+    vg_head old = *p->h, *h = p->h;
+    if (vg_head_merge_trace(&old, &p->map, &e) < 0) cli_die(&e);
+    *h = p->map;
+    h->nprovenance = old.nprovenance, h->provenance = old.provenance;
+    h->extra = old.extra, h->precision = old.precision;
+    h->map = (vg_map){0}; /* stays with p->map, where the player has it */
+    old.provenance = NULL, old.nprovenance = 0, old.extra = (vg_records){0};
+    vg_head_clear(&old);
+    h->kind = mapped.transforms ? VG_TRANSFORMS : VG_VERTICES;
+    h->count = mapped.transforms ? p->count : h->mesh.nv;
+}
+
+static double *room(size_t n)
+{
+    double *x = calloc(n + 1, sizeof *x);
+    if (!x) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the transforms"});
+    return x;
+}
+
+static void put_batch(playback *p)
+{
+    const double *from[BATCH];
+    double *to[BATCH];
+    for (size_t i = 0; i < p->n; i++) {
+        from[i] = p->transforms[i], to[i] = p->out[i].values;
+        if (mapped.joints) vg_player_place(p->player, p->transforms[i]);
+        if (mapped.transforms) memcpy(to[i], from[i], 7 * p->count * sizeof *to[i]);
+    }
+    if (!mapped.transforms) vg_player_pose(p->player, p->n, from, to);
+    for (size_t i = 0; i < p->n; i++) cli_stream_put(&p->out[i]);
+    p->n = 0;
+}
+
+/* The transforms of n frames in hand, measured or as they came. */
+static void take_transforms(playback *p, size_t n, double *const *to)
+{
+    const double *poses[BATCH] = {NULL};
+    for (size_t i = 0; i < n; i++) poses[i] = p->in[i].values;
+    if (p->kind == VG_VERTICES) vg_player_measure(p->player, n, poses, to);
+    for (size_t i = 0; i < n && p->kind == VG_TRANSFORMS; i++) memcpy(to[i], poses[i], 7 * p->count * sizeof *to[i]);
+}
+
+static void play_batch(playback *p)
+{
+    vg_err e;
+    take_transforms(p, p->n, p->transforms);
+    for (size_t i = 0; i < p->n; i++)
+        if (vg_frame_label(&p->out[i], &p->in[i], &e) < 0) cli_die(&e);
+    put_batch(p);
+}
+
+static void play_all(playback *p)
+{
+    vg_err e;
+    uint64_t n = 0;
+    int r;
+    while ((r = vg_source_next(p->source, &p->in[p->n], &e)) > 0) {
+        if (++p->n == p->most) play_batch(p);
+        cli_progress("poses", ++n);
+    }
+    if (r < 0) cli_die(&e);
+    play_batch(p);
+}
+
+/* ---- between keys ---- */
+
+typedef struct key_list {
+    between_key *label;
+    double **transforms;
+    size_t n, cap;
+} key_list;
+
+static void add_key(playback *p, key_list *k)
+{
+    const vg_frame *f = &p->in[0];
+    if (k->n == k->cap) {
+        k->cap = 2 * k->cap + 16;
+        k->label = realloc(k->label, k->cap * sizeof *k->label);
+        k->transforms = realloc(k->transforms, k->cap * sizeof *k->transforms);
+    }
+    char *name = strdup(f->name);
+    if (!k->label || !k->transforms || !name) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the keys"});
+    k->label[k->n] = (between_key){name, f->has_time, f->time};
+    k->transforms[k->n] = room(7 * p->count);
+    take_transforms(p, 1, &k->transforms[k->n++]);
+}
+
+static void put_moment(playback *p, const key_list *k, double t)
+{
+    size_t last = k->n - 1, i = t > 0 ? (size_t)floor(t < (double)last ? t : (double)last) : 0;
+    if (i == last && i > 0) i--;
+    if (k->n == 1) memcpy(p->transforms[p->n], k->transforms[0], 7 * p->count * sizeof(double));
+    else vg_player_between(p->player, k->transforms[i], k->transforms[i + 1], t - (double)i, p->transforms[p->n]);
+    between_label(&p->out[p->n], k->label, k->n, t);
+    if (++p->n == p->most) put_batch(p);
+}
+
+static void play_between(playback *p)
+{
+    vg_err e;
+    key_list k = {0};
+    int r;
+    while ((r = vg_source_next(p->source, &p->in[0], &e)) > 0) add_key(p, &k);
+    if (r < 0) cli_die(&e);
+    if (k.n == 0) {
+        vg_fail(&e, VG_EINPUT, "the input has no poses to interpolate");
+        cli_die(&e);
+    }
+    for (size_t i = 0; i < between_count(); i++) {
+        put_moment(p, &k, between_moment(i, k.n));
+        cli_progress("poses", i + 1);
+    }
+    put_batch(p);
+}
+
+void mapped_run(vg_source *s)
+{
+    static playback p; /* lives until the end: what it holds goes with the process */
+    vg_err e;
+    p.source = s, p.h = vg_source_head(s), p.most = mapped.live ? 1 : BATCH;
+    load_map(&p);
+    check_input(&p);
+    if (vg_player_new(&p.player, &p.map, p.h->precision == VG_F32, cli.threads, &e) < 0) cli_die(&e);
+    make_head(&p);
+    for (size_t i = 0; i < p.most; i++) {
+        p.transforms[i] = room(7 * p.count);
+        if (vg_frame_shape(&p.out[i], p.h, &e) < 0) cli_die(&e);
+    }
+    cli_stream_open(p.h);
+    if (between_wanted()) play_between(&p);
+    else play_all(&p);
+    cli_stream_end(vg_source_tail(s));
+}

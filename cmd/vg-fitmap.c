@@ -1,0 +1,249 @@
+/* vg-fitmap: fit a map from the motions of patches to the vertices of a body, or bring one to another body.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "cli.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static struct {
+    const char *patches, *retarget;
+    long holdout;
+    double hold, morph;
+} opts = {.hold = 0.03, .morph = NAN};
+
+static const cli_option options[] = {
+    {"patches", 0, "FILE", "the patches: what vg-segment wrote; default: those of the input", .text = &opts.patches},
+    {"holdout", 0, "N", "leave every Nth pose out of the fit, and report the error there", .integer = &opts.holdout, .least = 2,
+     .most = 1000000000},
+    {"hold", 0, "SHARE", "of the vertices, those that go where their patch takes them (default 0.03)", .number = &opts.hold,
+     .least = 0, .most = 1},
+    {"retarget", 0, "MESH", "no fit: bring the map that is the input to this body of the same faces", .text = &opts.retarget},
+    {"morph", 0, "T", "with --retarget: how far on the way to that body (default 1)", .number = &opts.morph},
+    {NULL}};
+
+static const cli_program program = {
+    .name = "vg-fitmap",
+    .synopsis = "[options] [FILE ...]",
+    .summary = "fit a map from the motions of patches to vertices",
+    .options = options,
+    .most_operands = SIZE_MAX,
+    .writes_stream = true,
+    .threaded = true};
+
+enum { BATCH = 32 };
+static const size_t in_memory = (size_t)256 << 20; /* bytes of poses that wait for the second pass */
+
+static void stop(int code, const char *message)
+{
+    vg_err e;
+    vg_fail(&e, code, "%s", message);
+    cli_die(&e);
+}
+
+/* ---- fitting ---- */
+
+static void take_patches(vg_head *h)
+{
+    vg_err e;
+    vg_head from = {0};
+    char name[200];
+    if (!opts.patches) {
+        if (!h->patches.n) cli_usage("the input has no patches: name them with --patches, made by vg-segment");
+        return;
+    }
+    snprintf(name, sizeof name, "'%.190s'", opts.patches);
+    if (vg_load_mesh(&from, opts.patches, &e) < 0) cli_die(&e);
+    if (!from.patches.n) {
+        vg_fail(&e, VG_EINPUT, "%s holds no patches: make them with vg-segment", name);
+        cli_die(&e);
+    }
+    if (vg_mesh_same(&h->mesh, "the sequence", &from.mesh, name, &e) < 0 || vg_head_merge_trace(h, &from, &e) < 0) cli_die(&e);
+    vg_patches_clear(&h->patches);
+    h->patches = from.patches;
+    from.patches = (vg_patches){0};
+    vg_head_clear(&from);
+}
+
+static bool is_left_out(uint64_t i)
+{
+    return opts.holdout && i % (uint64_t)opts.holdout == (uint64_t)opts.holdout - 1;
+}
+
+/* Poses that are fitted to go to the fitter; all go to the spool, for the report. */
+static uint64_t read_poses(vg_source *s, vg_map_fitter *f, vg_spool *spool)
+{
+    static vg_frame frames[8];
+    const double *poses[8];
+    vg_err e;
+    uint64_t total = 0;
+    size_t n = 0;
+    int r;
+    while ((r = vg_source_next(s, &frames[n], &e)) > 0) {
+        if (vg_spool_put(spool, &frames[n], &e) < 0) cli_die(&e);
+        cli_progress("poses", total + 1);
+        if (is_left_out(total++)) continue;
+        poses[n] = frames[n].values;
+        if (++n < 8) continue;
+        if (vg_map_fitter_add(f, n, poses, &e) < 0) cli_die(&e);
+        n = 0;
+    }
+    if (r < 0 || vg_map_fitter_add(f, n, poses, &e) < 0) cli_die(&e);
+    for (size_t i = 0; i < 8; i++) vg_frame_clear(&frames[i]);
+    return total;
+}
+
+/* ---- the report ---- */
+
+/* Sums over vertices of the distance between poses whose centroids have been laid on one another. */
+typedef struct errors {
+    double sum, most;
+    uint64_t poses;
+} errors;
+
+static void compare(errors *x, const double *truth, const double *result, size_t nv)
+{
+    double a[3], b[3];
+    vg_centroid(truth, nv, a);
+    vg_centroid(result, nv, b);
+    for (size_t v = 0; v < nv; v++) {
+        double square = 0;
+        for (size_t k = 0; k < 3; k++) {
+            double d = (truth[3 * v + k] - a[k]) - (result[3 * v + k] - b[k]);
+            square += d * d;
+        }
+        double far = sqrt(square);
+        x->sum += far / (double)nv;
+        if (far > x->most) x->most = far;
+    }
+    x->poses++;
+}
+
+typedef struct judging {
+    const vg_head *h;
+    vg_player *player;
+    vg_frame truth[BATCH];
+    double *transforms[BATCH], *vertices[BATCH];
+    errors x[2][2]; /* given motions, rotations alone; fitted, left out */
+} judging;
+
+static void judge_batch(judging *j, size_t n, uint64_t first)
+{
+    const double *truth[BATCH];
+    for (size_t i = 0; i < n; i++) truth[i] = j->truth[i].values;
+    vg_player_measure(j->player, n, truth, j->transforms);
+    for (int way = 0; way < 2; way++) {
+        for (size_t i = 0; i < n && way == 1; i++) vg_player_place(j->player, j->transforms[i]);
+        vg_player_pose(j->player, n, (const double *const *)j->transforms, j->vertices);
+        for (size_t i = 0; i < n; i++)
+            compare(&j->x[way][is_left_out(first + i)], truth[i], j->vertices[i], j->h->mesh.nv);
+    }
+}
+
+static void describe(const errors *x, double d, const char *what, const char *which)
+{
+    bool verbose = cli.verbose;
+    cli.verbose = true; /* the report is said unless --quiet */
+    if (x->poses)
+        cli_note("%s, %s: mean error %.3g D, largest %.3g D, %llu poses", which, what, x->sum / (double)x->poses / d, x->most / d,
+                 (unsigned long long)x->poses);
+    cli.verbose = verbose;
+}
+
+static void report(const vg_head *h, vg_spool *spool)
+{
+    static judging j;
+    vg_err e;
+    double d = vg_diagonal(h->reference, h->mesh.nv);
+    if (cli.quiet || !(d > 0)) return;
+    j.h = h;
+    if (vg_player_new(&j.player, h, false, cli.threads, &e) < 0) cli_die(&e);
+    for (size_t i = 0; i < BATCH; i++) {
+        j.transforms[i] = calloc(7 * h->map.n, sizeof(double)), j.vertices[i] = calloc(3 * h->mesh.nv + 1, sizeof(double));
+        if (!j.transforms[i] || !j.vertices[i]) stop(VG_ENOMEM, "not enough memory for the report");
+    }
+    uint64_t first = 0;
+    int r;
+    do {
+        size_t n = 0;
+        while (n < BATCH && (r = vg_spool_next(spool, &j.truth[n], &e)) > 0) n++;
+        if (r < 0) cli_die(&e);
+        judge_batch(&j, n, first);
+        first += n;
+    } while (r > 0);
+    for (size_t i = 0; i < BATCH; i++) {
+        vg_frame_clear(&j.truth[i]);
+        free(j.transforms[i]);
+        free(j.vertices[i]);
+    }
+    vg_player_free(&j.player);
+    for (int left = 0; left < 2; left++) {
+        const char *which = left ? "left out" : "fitted";
+        describe(&j.x[0][left], d, "patch motions given", which);
+        describe(&j.x[1][left], d, "rotations alone", which);
+    }
+}
+
+static void fit(vg_source *s)
+{
+    vg_err e;
+    vg_head *h = vg_source_head(s);
+    if (h->kind != VG_VERTICES) {
+        vg_fail(&e, VG_EINPUT, "the input holds %s, vg-fitmap takes vertices%s", vg_kind_name(h->kind),
+                h->kind == VG_VECTORS ? ": pipe it through 'vg-solve' first" : "");
+        cli_die(&e);
+    }
+    take_patches(h);
+    size_t before = h->patches.n;
+    vg_map_fitter *f;
+    vg_spool *spool;
+    if (vg_map_fitter_new(&f, h, opts.hold, cli.threads, &e) < 0 || vg_spool_new(&spool, h, in_memory, &e) < 0) cli_die(&e);
+    if (h->patches.n != before)
+        cli_note("%zu patches are in %zu pieces, each of which is a patch of the map", before, h->patches.n);
+    if (!read_poses(s, f, spool)) stop(VG_EINPUT, "the input has no poses to fit a map to");
+    if (vg_map_fitter_finish(f, &e) < 0) cli_die(&e);
+    vg_map_fitter_free(&f);
+    report(h, spool);
+    vg_spool_free(&spool);
+}
+
+/* ---- another body ---- */
+
+static void retarget(vg_source *s)
+{
+    vg_err e;
+    vg_head *h = vg_source_head(s), target = {0};
+    char name[200];
+    snprintf(name, sizeof name, "'%.190s'", opts.retarget);
+    if (!h->map.n) stop(VG_EINPUT, "the input holds no map: make one with vg-fitmap");
+    if (vg_load_mesh(&target, opts.retarget, &e) < 0 ||
+        vg_mesh_same(&h->mesh, "the map", &target.mesh, name, &e) < 0 ||
+        vg_map_retarget(h, target.reference, isnan(opts.morph) ? 1 : opts.morph, cli.threads, &e) < 0 ||
+        vg_head_merge_trace(h, &target, &e) < 0)
+        cli_die(&e);
+    free(h->reference_name);
+    h->reference_name = target.reference_name, target.reference_name = NULL;
+    vg_attributes_clear(&h->attributes);
+    h->attributes = target.attributes, target.attributes = (vg_attributes){0};
+    vg_head_clear(&target);
+    vg_frame frame = {0};
+    int r;
+    while ((r = vg_source_next(s, &frame, &e)) > 0) continue; /* to the end, so that damage is seen; a map has no frames */
+    if (r < 0) cli_die(&e);
+    vg_frame_clear(&frame);
+}
+
+int main(int argc, char **argv)
+{
+    char **operands;
+    size_t n = cli_start(&program, argc, argv, &operands);
+    if (!isnan(opts.morph) && !opts.retarget) cli_usage("--morph needs --retarget");
+    if (opts.retarget && (opts.patches || opts.holdout)) cli_usage("--retarget fits nothing: no --patches and --holdout with it");
+    vg_source *s = cli_source(operands, n);
+    if (opts.retarget) retarget(s);
+    else fit(s);
+    cli_stream_open(vg_source_head(s));
+    cli_stream_end(vg_source_tail(s));
+    vg_source_close(&s);
+    cli_finish(0);
+}

@@ -1,0 +1,84 @@
+/* gltf.h: what gltf.c, gltf_read.c and gltf_write.c share: a glTF file as JSON with its buffers, and accessors into
+ * them.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_GLTF_H
+#define VG_GLTF_H
+
+#include "io/io.h"
+#include "io/json.h"
+
+enum { VGI_GLTF_HEADER = 12, VGI_GLTF_CHUNK = 8, VGI_GLTF_JSON = 0x4E4F534A, VGI_GLTF_BIN = 0x004E4942 };
+
+enum { VGI_GLTF_BYTE = 5120, VGI_GLTF_UBYTE, VGI_GLTF_SHORT, VGI_GLTF_USHORT, VGI_GLTF_UINT = 5125, VGI_GLTF_FLOAT };
+
+enum {
+    VGI_GLTF_POINTS,
+    VGI_GLTF_LINES,
+    VGI_GLTF_LINE_LOOP,
+    VGI_GLTF_LINE_STRIP,
+    VGI_GLTF_TRIANGLES,
+    VGI_GLTF_STRIP,
+    VGI_GLTF_FAN
+};
+
+/* Where our own files say of what sizes the faces are: extras of the mesh, pairs of a count and a size. The triangles
+ * of a face follow one another, the first begins with the face's first corner. And names of frames: extras of the
+ * animation. */
+#define VGI_GLTF_FACES "vg_faces"
+#define VGI_GLTF_FRAMES "vg_frames"
+
+typedef struct vgi_gltf_buffer {
+    const unsigned char *data;
+    size_t size;
+    vg_bytes own; /* what was decoded, or read from a file beside */
+} vgi_gltf_buffer;
+
+typedef struct vgi_gltf {
+    const char *subject; /* borrowed */
+    vg_bytes file;
+    vgi_json *json;
+    size_t nbuffers;
+    vgi_gltf_buffer *buffers;
+} vgi_gltf;
+
+/* vgi_gltf_open: read a whole file, .glb or .gltf, with the buffers it needs. Cleared by the caller, on failure too. */
+int vgi_gltf_open(vgi_gltf *g, vgi_input *in, const char *subject, vg_err *e) VG_MUST_CHECK;
+void vgi_gltf_clear(vgi_gltf *g);
+
+/* An accessor: count elements of `width` numbers. Nothing is copied, so that many accessors of the same bytes cost
+ * nothing. */
+typedef struct vgi_accessor {
+    size_t count, width, stride;
+    const unsigned char *data; /* NULL: zeros */
+    int component;
+    bool normalized;
+    size_t nsparse; /* elements that are replaced, ascending */
+    const unsigned char *sparse, *replaced;
+    int sparse_component;
+} vgi_accessor;
+
+/* vgi_gltf_accessor: the one whose number `ref` is; it must have this width, and this count unless 0. what is for
+ * messages. Without a count what it says must be backed by bytes. */
+int vgi_gltf_accessor(const vgi_gltf *g, const vgi_json *ref, size_t width, size_t count, const char *what,
+                      vgi_accessor *a, vg_err *e) VG_MUST_CHECK;
+void vgi_accessor_get(const vgi_accessor *a, size_t i, double *to); /* width numbers */
+bool vgi_accessor_is_index(const vgi_accessor *a);                  /* whole numbers from 0 on */
+
+/* vgi_gltf_item: the element of the list `list` of the file whose number `ref` is. VG_EINPUT when there is none. */
+int vgi_gltf_item(const vgi_gltf *g, const vgi_json *ref, const char *list, const vgi_json **item, size_t *number,
+                  vg_err *e) VG_MUST_CHECK;
+
+/* ---- gltf_read.c, gltf_write.c: for the tables in gltf.c ---- */
+int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e);
+int vgi_gltf_next(void *state, vg_frame *f, vg_err *e);
+uint64_t vgi_gltf_frames(const void *state);
+void vgi_gltf_close(void *state);
+
+int vgi_gltf_check(const vg_head *h, const char *output, vg_err *e);
+int vgi_gltf_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi_output *out, bool binary, vg_err *e);
+int vgi_gltf_put(void *state, const vg_frame *f, vg_err *e);
+int vgi_gltf_end(void *state, vg_err *e);
+const char *vgi_gltf_warning(void *state);
+void vgi_gltf_release(void *state);
+
+#endif

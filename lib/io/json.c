@@ -1,0 +1,74 @@
+/* json.c: JSON through Jansson. Leaves out writing: text is put together where it is known what it says.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/json.h"
+
+#include <jansson.h>
+
+int vgi_json_parse(vgi_json **j, const void *text, size_t n, const char *subject, vg_err *e)
+{
+    json_error_t cause;
+    *j = json_loadb(text, n, 0, &cause);
+    if (*j) return VG_OK;
+    return vg_fail(e, VG_EINPUT, "%s: wrong JSON in line %d: %s", subject, cause.line, cause.text);
+}
+
+void vgi_json_free(vgi_json **j)
+{
+    json_decref(*j);
+    *j = NULL;
+}
+
+const vgi_json *vgi_json_get(const vgi_json *object, const char *key)
+{
+    return json_object_get(object, key);
+}
+
+const vgi_json *vgi_json_at(const vgi_json *array, size_t i)
+{
+    return json_array_get(array, i);
+}
+
+size_t vgi_json_count(const vgi_json *array)
+{
+    return json_array_size(array);
+}
+
+bool vgi_json_is_object(const vgi_json *j)
+{
+    return json_is_object(j);
+}
+
+bool vgi_json_is_array(const vgi_json *j)
+{
+    return json_is_array(j);
+}
+
+bool vgi_json_is_true(const vgi_json *j)
+{
+    return json_is_true(j);
+}
+
+bool vgi_json_number(const vgi_json *j, double *x)
+{
+    if (!json_is_number(j)) return false;
+    *x = json_number_value(j);
+    return true;
+}
+
+bool vgi_json_whole(const vgi_json *j, uint64_t *x)
+{
+    double value;
+    if (!vgi_json_number(j, &value) || !(value >= 0 && value <= 9007199254740992.0)) return false;
+    *x = (uint64_t)value;
+    return (double)*x == value;
+}
+
+const char *vgi_json_text(const vgi_json *j)
+{
+    return json_string_value(j);
+}
+
+bool vgi_json_same(const vgi_json *a, const vgi_json *b)
+{
+    return a == b || json_equal(a, b);
+}

@@ -1,0 +1,26 @@
+/* json.h: JSON that was read, as values to be looked up. json.c is the one file of the library that knows Jansson.
+ * Lookups take NULL, for what was not found before, and find nothing in it.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_JSON_H
+#define VG_JSON_H
+
+#include "core/core.h"
+
+typedef struct json_t vgi_json;
+
+/* vgi_json_parse: one JSON text, nothing behind it; VG_EINPUT naming `subject` (quotes included) otherwise. */
+int vgi_json_parse(vgi_json **j, const void *text, size_t n, const char *subject, vg_err *e) VG_MUST_CHECK;
+void vgi_json_free(vgi_json **j);
+
+const vgi_json *vgi_json_get(const vgi_json *object, const char *key); /* NULL: there is none, or it is no object */
+const vgi_json *vgi_json_at(const vgi_json *array, size_t i);          /* NULL: the same for an array */
+size_t vgi_json_count(const vgi_json *array);                          /* 0: it is no array, or empty */
+bool vgi_json_is_object(const vgi_json *j);
+bool vgi_json_is_array(const vgi_json *j);
+bool vgi_json_is_true(const vgi_json *j);
+bool vgi_json_number(const vgi_json *j, double *x);
+bool vgi_json_whole(const vgi_json *j, uint64_t *x); /* a whole number from 0 to 2^53 */
+const char *vgi_json_text(const vgi_json *j);        /* NULL: it is no string. Valid UTF-8, borrowed */
+bool vgi_json_same(const vgi_json *a, const vgi_json *b);
+
+#endif

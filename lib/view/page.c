@@ -1,0 +1,586 @@
+/* page.c: the page that plays sequences in a browser: takes frames, packs them, says what was lost, and puts the
+ * player to them. Leaves out how numbers are packed (page_data.c) and how they are drawn (page.js).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "view/page.h"
+
+#include "io/io.h"
+#include "view/view.h"
+
+#include <math.h>
+
+enum {
+    FLUSH_BYTES = 1 << 18,
+    LINE_BYTES = 1 << 20,   /* of the data of a block that become text at once; a multiple of 3 */
+    MOST_CLIPPED = 4096,    /* corners of a face that is cut by ear clipping */
+    MAP_STEPS = 64,         /* colours of the map that the page gets */
+    DECADES = 20, PER_DECADE = 200, /* of the histogram of errors */
+};
+#define LEAST_SCALE 1e-9 /* D: errors below this are rounding */
+
+typedef struct sequence {
+    const char *label;
+    const vg_head *head;
+    bool *drawn;               /* nv: in a face, or all when there is no face */
+    double centre[3], diagonal, unit, ground;
+    vgi_track places, errors;
+    vgi_chunk chunk;
+    vg_bytes names, times, means, maxima; /* of the frames, as JSON lists that are open at their end */
+    bool timed;
+    double last_time, loss;
+    size_t frames;
+} sequence;
+
+struct vg_page {
+    vg_page_options o;
+    int fd;
+    char *name;
+    const char *rest;          /* of the template, not yet written */
+    vg_bytes out;
+    uint64_t bytes;
+    size_t n;
+    sequence at[VG_PAGE_SEQUENCES];
+    uint64_t histogram[DECADES * PER_DECADE + 1], counted;
+    double sum, max;           /* of the errors */
+};
+
+/* ---- writing ---- */
+
+static int flush(vg_page *p, vg_err *e)
+{
+    p->bytes += p->out.size;
+    int r = vgi_write_all(p->fd, p->out.data, p->out.size, p->name, e);
+    p->out.size = 0;
+    return r;
+}
+
+static int put(vg_page *p, const void *data, size_t n, vg_err *e)
+{
+    int r = vgi_bytes_append(&p->out, data, n, e);
+    return r == VG_OK && p->out.size >= FLUSH_BYTES ? flush(p, e) : r;
+}
+
+static int put_text(vg_page *p, const char *text, vg_err *e)
+{
+    return put(p, text, strlen(text), e);
+}
+
+/* The template up to a mark, which is left out; or to its end. */
+static int put_template(vg_page *p, const char *mark, vg_err *e)
+{
+    const char *at = mark ? strstr(p->rest, mark) : p->rest + strlen(p->rest);
+    if (!at) return vg_fail(e, VG_EARG, "the template of the page has no %s", mark);
+    int r = put(p, p->rest, (size_t)(at - p->rest), e);
+    p->rest = at + (mark ? strlen(mark) : 0);
+    return r;
+}
+
+static int put_escaped(vg_page *p, const char *text, vg_err *e)
+{
+    int r = VG_OK;
+    for (const char *c = text; *c && r == VG_OK; c++) {
+        switch (*c) {
+        case '<': r = put_text(p, "&lt;", e); break;
+        case '>': r = put_text(p, "&gt;", e); break;
+        case '&': r = put_text(p, "&amp;", e); break;
+        case '"': r = put_text(p, "&quot;", e); break;
+        default: r = put(p, c, 1, e);
+        }
+    }
+    return r;
+}
+
+/* JSON that may stand inside of a script element: no '<', so that nothing ends it. */
+static int json_string(vg_bytes *b, const char *text, vg_err *e)
+{
+    int r = vgi_bytes_append(b, "\"", 1, e);
+    for (const char *c = text; *c && r == VG_OK; c++) {
+        char code[8];
+        unsigned char u = (unsigned char)*c;
+        if (u < 0x20 || u == '"' || u == '\\' || u == '<' || u == 0x7f) {
+            snprintf(code, sizeof code, "\\u%04x", u);
+            r = vgi_bytes_append(b, code, 6, e);
+        } else {
+            r = vgi_bytes_append(b, c, 1, e);
+        }
+    }
+    return r == VG_OK ? vgi_bytes_append(b, "\"", 1, e) : r;
+}
+
+static int json_text(vg_bytes *b, const char *text, vg_err *e)
+{
+    return vgi_bytes_append(b, text, strlen(text), e);
+}
+
+static int json_number(vg_bytes *b, double x, vg_err *e)
+{
+    char text[32];
+    return isfinite(x) ? vgi_bytes_append(b, text, vgi_print_double(text, x), e) : json_text(b, "null", e);
+}
+
+static int json_short(vg_bytes *b, double x, vg_err *e) /* to be shown */
+{
+    char text[32];
+    return vgi_bytes_append(b, text, vgi_print_float(text, x), e);
+}
+
+/* Fields: the name, and what it is. */
+static int field(vg_bytes *b, const char *name, vg_err *e)
+{
+    bool first = b->size == 0 || b->data[b->size - 1] == '{';
+    int r = first ? VG_OK : vgi_bytes_append(b, ",", 1, e);
+    if (r == VG_OK) r = json_string(b, name, e);
+    return r == VG_OK ? vgi_bytes_append(b, ":", 1, e) : r;
+}
+
+static int field_text(vg_bytes *b, const char *name, const char *text, vg_err *e)
+{
+    int r = field(b, name, e);
+    return r == VG_OK ? json_string(b, text, e) : r;
+}
+
+static int field_number(vg_bytes *b, const char *name, double x, vg_err *e)
+{
+    int r = field(b, name, e);
+    return r == VG_OK ? json_number(b, x, e) : r;
+}
+
+static int field_flag(vg_bytes *b, const char *name, bool x, vg_err *e)
+{
+    int r = field(b, name, e);
+    return r == VG_OK ? json_text(b, x ? "true" : "false", e) : r;
+}
+
+static int field_list(vg_bytes *b, const char *name, const vg_bytes *open_list, vg_err *e)
+{
+    int r = field(b, name, e);
+    if (r == VG_OK) r = json_text(b, open_list->size ? "" : "[", e);
+    if (r == VG_OK) r = vgi_bytes_append(b, open_list->data, open_list->size, e);
+    return r == VG_OK ? json_text(b, "]", e) : r;
+}
+
+static int list_next(vg_bytes *list, vg_err *e)
+{
+    return json_text(list, list->size ? "," : "[", e);
+}
+
+/* A block of packed data. */
+static int put_packed(vg_page *p, const vg_bytes *packed, vg_err *e)
+{
+    int r = VG_OK;
+    size_t line = LINE_BYTES - LINE_BYTES % 3;
+    for (size_t at = 0; at < packed->size && r == VG_OK; at += line) {
+        r = vgi_base64(&p->out, packed->data + at, packed->size - at < line ? packed->size - at : line, e);
+        if (r == VG_OK) r = flush(p, e);
+    }
+    return r == VG_OK ? put_text(p, "</script>\n", e) : r;
+}
+
+/* ---- the mesh of a sequence ---- */
+
+static int put_list(vg_page *p, size_t i, const char *what, const uint32_t *list, size_t n, bool differences,
+                    vg_err *e)
+{
+    char head[128];
+    vg_bytes packed = {0};
+    snprintf(head, sizeof head, "<script type=\"text/plain\" data-sequence=\"%zu\" data-list=\"%s\">", i, what);
+    int r = vgi_pack_list(&packed, list, n, differences, e);
+    if (r == VG_OK) r = put_text(p, head, e);
+    if (r == VG_OK) r = put_packed(p, &packed, e);
+    vg_bytes_clear(&packed);
+    return r;
+}
+
+/* A face in a plane: seen along the axis that its normal is nearest to. That distorts angles, which do not matter. */
+static bool flatten_face(const uint32_t *v, size_t n, const double *points, double *xy)
+{
+    double normal[3] = {0, 0, 0};
+    const double *o = points + 3 * (size_t)v[0];
+    for (size_t i = 1; i + 1 < n; i++) {
+        double a[3], b[3];
+        for (size_t k = 0; k < 3; k++)
+            a[k] = points[3 * (size_t)v[i] + k] - o[k], b[k] = points[3 * (size_t)v[i + 1] + k] - o[k];
+        for (size_t k = 0; k < 3; k++) normal[k] += a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+    }
+    size_t along = 0;
+    for (size_t k = 1; k < 3; k++)
+        if (fabs(normal[k]) > fabs(normal[along])) along = k;
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < 2; k++) {
+            size_t axis = (along + 1 + k) % 3;
+            xy[2 * i + k] = points[3 * (size_t)v[i] + axis] - o[axis];
+        }
+    return fabs(normal[along]) > 0 && isfinite(normal[along]);
+}
+
+typedef struct cutter {
+    double *xy;
+    size_t *work, *triangles;
+} cutter;
+
+/* The positions of the corners of n - 2 triangles. */
+static void cut_face(const cutter *k, const uint32_t *v, size_t n, const double *points, uint32_t *out)
+{
+    bool fan = n == 3 || n > MOST_CLIPPED || !flatten_face(v, n, points, k->xy);
+    if (!fan) vgi_ear_clip(k->xy, n, k->work, k->triangles);
+    for (size_t i = 0; i + 2 < n; i++)
+        for (size_t j = 0; j < 3; j++)
+            out[3 * i + j] = fan ? (uint32_t)(j ? i + j : 0) : (uint32_t)k->triangles[3 * i + j];
+}
+
+static int put_triangles(vg_page *p, size_t i, const vg_mesh *m, const double *points, vg_err *e)
+{
+    size_t largest = 3, total = 0;
+    for (size_t f = 0; f < m->nf; f++) {
+        size_t n = m->start[f + 1] - m->start[f];
+        largest = n > largest ? n : largest;
+        total += n > 2 ? n - 2 : 0;
+    }
+    cutter k = {vgi_array_raw(2 * largest, sizeof(double), e), vgi_array_raw(3 * largest, sizeof(size_t), e),
+                vgi_array_raw(3 * largest, sizeof(size_t), e)};
+    uint32_t *out = vgi_array_raw(total, 3 * sizeof *out, e);
+    int r = k.xy && k.work && k.triangles && out ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) {
+        size_t at = 0;
+        for (size_t f = 0; f < m->nf; f++) {
+            size_t n = m->start[f + 1] - m->start[f];
+            if (n > 2) cut_face(&k, m->vert + m->start[f], n, points, out + at), at += 3 * (n - 2);
+        }
+        r = put_list(p, i, "triangles", out, at, false, e);
+    }
+    free(k.xy);
+    free(k.work);
+    free(k.triangles);
+    free(out);
+    return r;
+}
+
+static int put_mesh(vg_page *p, size_t i, const vg_head *h, vg_err *e)
+{
+    const vg_mesh *m = &h->mesh;
+    uint32_t *sizes = vgi_array_raw(m->nf, sizeof *sizes, e);
+    if (!sizes) return VG_ENOMEM;
+    for (size_t f = 0; f < m->nf; f++) sizes[f] = m->start[f + 1] - m->start[f];
+    int r = put_list(p, i, "sizes", sizes, m->nf, false, e);
+    free(sizes);
+    if (r == VG_OK) r = put_list(p, i, "corners", m->vert, vg_mesh_corners(m), true, e);
+    if (r == VG_OK) r = put_triangles(p, i, m, h->reference, e);
+    if (r == VG_OK && h->patches.n) r = put_list(p, i, "patches", h->patches.of_face, m->nf, false, e);
+    return r;
+}
+
+/* ---- sequences ---- */
+
+static int measure(sequence *s, bool z_up, vg_err *e)
+{
+    const vg_mesh *m = &s->head->mesh;
+    s->drawn = vgi_array(m->nv, sizeof *s->drawn, e);
+    if (!s->drawn) return VG_ENOMEM;
+    for (size_t c = 0; c < vg_mesh_corners(m); c++) s->drawn[m->vert[c]] = true;
+    for (size_t v = 0; m->nf == 0 && v < m->nv; v++) s->drawn[v] = true;
+    vg_centroid(s->head->reference, m->nv, s->centre);
+    s->diagonal = vg_diagonal(s->head->reference, m->nv);
+    s->unit = s->diagonal > 0 ? s->diagonal : 1;
+    s->ground = INFINITY;
+    for (size_t v = 0; v < m->nv; v++)
+        if (s->drawn[v]) s->ground = fmin(s->ground, s->head->reference[3 * v + (z_up ? 2 : 1)]);
+    if (!isfinite(s->ground)) s->ground = 0;
+    return VG_OK;
+}
+
+int vg_page_sequence(vg_page *p, const char *label, const vg_head *h, vg_err *e)
+{
+    if (p->n == VG_PAGE_SEQUENCES) return vg_fail(e, VG_EARG, "a page has at most %d sequences", VG_PAGE_SEQUENCES);
+    if (h->kind != VG_VERTICES) return vg_fail(e, VG_EARG, "a page shows vertices, not %s", vg_kind_name(h->kind));
+    sequence *s = p->at + p->n;
+    *s = (sequence){.label = label, .head = h, .timed = true, .last_time = -INFINITY};
+    size_t i = p->n++;
+    int r = measure(s, p->o.z_up, e);
+    if (r == VG_OK) r = vgi_track_init(&s->places, h->mesh.nv, 3, e);
+    if (r == VG_OK && p->o.compare && i == 0) r = vgi_track_init(&s->errors, h->mesh.nv, 1, e);
+    return r == VG_OK ? put_mesh(p, i, h, e) : r;
+}
+
+static int put_chunk(vg_page *p, size_t i, const char *what, vgi_track *t, vg_err *e)
+{
+    sequence *s = p->at + i;
+    vg_bytes head = {0};
+    vgi_chunk *c = &s->chunk;
+    char text[160];
+    int r = vgi_track_pack(t, c, e);
+    if (r < 0) return r;
+    if (t == &s->places) s->loss = fmax(s->loss, c->loss);
+    snprintf(text, sizeof text,
+             "<script type=\"text/plain\" data-sequence=\"%zu\" data-frames=\"%s\" data-count=\"%zu\" "
+             "data-origin=\"", i, what, c->n);
+    r = json_text(&head, text, e);
+    for (size_t k = 0; k < t->width && r == VG_OK; k++) {
+        if (k) r = json_text(&head, " ", e);
+        if (r == VG_OK) r = json_number(&head, c->origin[k], e);
+    }
+    if (r == VG_OK) r = json_text(&head, "\" data-step=\"", e);
+    for (size_t k = 0; k < t->width && r == VG_OK; k++) {
+        if (k) r = json_text(&head, " ", e);
+        if (r == VG_OK) r = json_number(&head, c->step[k], e);
+    }
+    if (r == VG_OK) r = json_text(&head, "\">", e);
+    if (r == VG_OK) r = put(p, head.data, head.size, e);
+    if (r == VG_OK) r = put_packed(p, &c->packed, e);
+    vg_bytes_clear(&head);
+    return r;
+}
+
+/* Which errors there are: the lower end of each step of the histogram is LEAST_SCALE * 10^(step / PER_DECADE). */
+static void count_error(vg_page *p, double error)
+{
+    double at = error > LEAST_SCALE ? ceil(log10(error / LEAST_SCALE) * PER_DECADE) : 0;
+    p->histogram[at < DECADES * PER_DECADE ? (size_t)at : DECADES * PER_DECADE]++;
+    p->counted++;
+}
+
+static int add_errors(vg_page *p, sequence *s, const double *points, const double *truth, vg_err *e)
+{
+    size_t nv = s->head->mesh.nv;
+    double shift[3] = {0, 0, 0}, a[3], b[3], sum = 0, max = 0, *errors = vgi_track_next(&s->errors);
+    if (p->o.centred) {
+        vg_centroid(points, nv, a);
+        vg_centroid(truth, nv, b);
+        for (int k = 0; k < 3; k++) shift[k] = a[k] - b[k];
+    }
+    for (size_t v = 0; v < nv; v++) {
+        double d[3];
+        for (size_t k = 0; k < 3; k++) d[k] = (points[3 * v + k] - truth[3 * v + k] - shift[k]) / p->at[1].unit;
+        errors[v] = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        max = fmax(max, errors[v]);
+        sum += errors[v];
+        if (s->drawn[v]) count_error(p, errors[v]);
+    }
+    double mean = nv ? sum / (double)nv : 0;
+    p->sum += mean;
+    p->max = fmax(p->max, max);
+    int r = list_next(&s->means, e);
+    if (r == VG_OK) r = json_short(&s->means, mean, e);
+    if (r == VG_OK) r = list_next(&s->maxima, e);
+    return r == VG_OK ? json_short(&s->maxima, max, e) : r;
+}
+
+static int add_label(sequence *s, const vg_frame *f, vg_err *e)
+{
+    int r = list_next(&s->names, e);
+    if (r == VG_OK) r = json_string(&s->names, f->name, e);
+    /* times that do not grow are no times to play by */
+    s->timed = s->timed && f->has_time && isfinite(f->time) && f->time > s->last_time;
+    s->last_time = f->time;
+    if (r < 0 || !s->timed) return r;
+    r = list_next(&s->times, e);
+    return r == VG_OK ? json_number(&s->times, f->time, e) : r;
+}
+
+int vg_page_add(vg_page *p, size_t i, const vg_frame *f, const double *truth, vg_err *e)
+{
+    if (i >= p->n || (p->o.compare && (p->n < 2 || p->at[0].head->mesh.nv != p->at[1].head->mesh.nv)))
+        return vg_fail(e, VG_EARG, "a frame is for a sequence that the page does not have");
+    sequence *s = p->at + i;
+    bool compared = p->o.compare && i == 0;
+    if (compared && !truth) return vg_fail(e, VG_EARG, "a frame that is compared needs a truth");
+    int r = add_label(s, f, e);
+    if (r < 0) return r;
+    memcpy(vgi_track_next(&s->places), f->values, 3 * s->head->mesh.nv * sizeof *f->values);
+    s->frames++;
+    if (compared) r = add_errors(p, s, f->values, truth, e);
+    if (r == VG_OK && s->places.n == s->places.cap) r = put_chunk(p, i, "places", &s->places, e);
+    if (r == VG_OK && compared && s->errors.n == s->errors.cap) r = put_chunk(p, i, "errors", &s->errors, e);
+    return r;
+}
+
+/* ---- the page ---- */
+
+int vg_page_new(vg_page **out, int fd, const char *name, const vg_page_options *o, vg_err *e)
+{
+    *out = NULL;
+    if (!(o->scale >= 0 && o->scale < INFINITY) || !isfinite(o->azimuth) || !isfinite(o->elevation))
+        return vg_fail(e, VG_EARG, "scale, azimuth and elevation must be numbers, and the scale not negative");
+    vg_page *p = vgi_array(1, sizeof *p, e);
+    if (!p) return VG_ENOMEM;
+    p->o = *o;
+    p->fd = fd;
+    p->rest = vgi_page_html;
+    p->name = vgi_copy_string(name, strlen(name), e);
+    int r = p->name ? put_template(p, "@TITLE@", e) : VG_ENOMEM;
+    if (r == VG_OK) r = put_escaped(p, o->title, e);
+    if (r == VG_OK) r = put_template(p, "@STYLE@", e);
+    if (r == VG_OK) r = put_text(p, vgi_page_css, e);
+    if (r == VG_OK) r = put_template(p, "@DATA@", e);
+    if (r < 0) {
+        vg_page_free(&p);
+        return r;
+    }
+    *out = p;
+    return VG_OK;
+}
+
+void vg_page_free(vg_page **address)
+{
+    vg_page *p = *address;
+    if (!p) return;
+    for (size_t i = 0; i < p->n; i++) {
+        sequence *s = p->at + i;
+        free(s->drawn);
+        vgi_track_clear(&s->places);
+        vgi_track_clear(&s->errors);
+        vg_bytes_clear(&s->chunk.packed);
+        vg_bytes_clear(&s->names);
+        vg_bytes_clear(&s->times);
+        vg_bytes_clear(&s->means);
+        vg_bytes_clear(&s->maxima);
+    }
+    vg_bytes_clear(&p->out);
+    free(p->name);
+    free(p);
+    *address = NULL;
+}
+
+/* The end of the colours: what 99 % of the errors do not exceed, then the next of some numbers that are short. */
+static double find_scale(const vg_page *p)
+{
+    static const double steps[] = {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10};
+    if (p->o.scale > 0) return p->o.scale;
+    uint64_t seen = p->histogram[0], want = p->counted - p->counted / 100;
+    size_t at = 0;
+    while (seen < want && at < DECADES * PER_DECADE) seen += p->histogram[++at];
+    double error = fmin(LEAST_SCALE * pow(10, (double)at / PER_DECADE), fmax(p->max, LEAST_SCALE));
+    double power = pow(10, floor(log10(error) + 1e-9));
+    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++)
+        if (steps[i] * power >= error * (1 - 1e-9)) return steps[i] * power;
+    return 10 * power;
+}
+
+/* Who made the sequence: the command lines, in order. */
+static int json_provenance(vg_bytes *b, const vg_head *h, vg_err *e)
+{
+    int r = field(b, "provenance", e);
+    vg_bytes list = {0};
+    for (size_t i = 0; i < h->nprovenance && r == VG_OK; i++) {
+        const vg_provenance *p = h->provenance + i;
+        vg_bytes line = {0};
+        for (size_t j = 0; j < p->nargs && r == VG_OK; j++) {
+            if (j) r = json_text(&line, " ", e);
+            if (r == VG_OK) r = json_text(&line, p->args[j], e);
+        }
+        if (r == VG_OK) r = vgi_bytes_append(&line, "", 1, e);
+        if (r == VG_OK) r = list_next(&list, e);
+        if (r == VG_OK) r = json_string(&list, (char *)line.data, e);
+        vg_bytes_clear(&line);
+    }
+    if (r == VG_OK && !list.size) r = json_text(&list, "[", e);
+    if (r == VG_OK) r = json_text(&list, "]", e);
+    if (r == VG_OK) r = vgi_bytes_append(b, list.data, list.size, e);
+    vg_bytes_clear(&list);
+    return r;
+}
+
+static int json_sequence(vg_bytes *b, const vg_page *p, size_t i, vg_err *e)
+{
+    const sequence *s = p->at + i;
+    const sequence *frame = p->o.compare && i == 0 ? p->at + 1 : s; /* compared in one place and unit */
+    const vg_mesh *m = &s->head->mesh;
+    vg_bytes centre = {0};
+    int r = json_text(b, i ? ",{" : "{", e);
+    if (r == VG_OK) r = field_text(b, "label", s->label, e);
+    if (r == VG_OK) r = field_number(b, "vertices", (double)m->nv, e);
+    if (r == VG_OK) r = field_number(b, "faces", (double)m->nf, e);
+    if (r == VG_OK) r = field_number(b, "patches", (double)s->head->patches.n, e);
+    if (r == VG_OK) r = field_number(b, "diagonal", frame->diagonal, e);
+    for (int k = 0; k < 3 && r == VG_OK; k++) {
+        r = list_next(&centre, e);
+        if (r == VG_OK) r = json_number(&centre, frame->centre[k], e);
+    }
+    if (r == VG_OK) r = field_list(b, "centre", &centre, e);
+    if (r == VG_OK) r = field_number(b, "ground", frame->ground, e);
+    if (r == VG_OK) r = field_number(b, "loss", s->loss / frame->unit, e);
+    if (r == VG_OK) r = json_provenance(b, s->head, e);
+    if (r == VG_OK) r = field_list(b, "names", &s->names, e);
+    if (r == VG_OK && s->timed) r = field_list(b, "times", &s->times, e);
+    if (r == VG_OK && p->o.compare && i == 0) r = field_list(b, "means", &s->means, e);
+    if (r == VG_OK && p->o.compare && i == 0) r = field_list(b, "maxima", &s->maxima, e);
+    if (r == VG_OK) r = json_text(b, "}", e);
+    vg_bytes_clear(&centre);
+    return r;
+}
+
+static int json_map(vg_bytes *b, vg_err *e)
+{
+    vgi_palette *palette = vgi_array_raw(1, sizeof *palette, e);
+    if (!palette) return VG_ENOMEM;
+    vgi_palette_init(palette);
+    char text[6 * MAP_STEPS + 1];
+    for (int i = 0; i < MAP_STEPS; i++) {
+        float c[3];
+        vgi_map_colour(i / (MAP_STEPS - 1.0), c);
+        snprintf(text + (size_t)i * 6, 7, "%02x%02x%02x", vgi_encode(palette, c[0]), vgi_encode(palette, c[1]),
+                 vgi_encode(palette, c[2]));
+    }
+    free(palette);
+    return field_text(b, "map", text, e);
+}
+
+static int json_page(vg_bytes *b, const vg_page *p, const vg_page_facts *facts, vg_err *e)
+{
+    int r = json_text(b, "{", e);
+    if (r == VG_OK) r = field_text(b, "version", VG_VERSION, e);
+    if (r == VG_OK) r = field_text(b, "title", p->o.title, e);
+    if (r == VG_OK) r = field_number(b, "azimuth", p->o.azimuth, e);
+    if (r == VG_OK) r = field_number(b, "elevation", p->o.elevation, e);
+    if (r == VG_OK) r = field_flag(b, "zUp", p->o.z_up, e);
+    if (r == VG_OK) r = field_flag(b, "follow", p->o.follow, e);
+    if (r == VG_OK) r = field_flag(b, "edges", p->o.edges, e);
+    if (r == VG_OK) r = field_flag(b, "ground", p->o.ground, e);
+    if (r == VG_OK) r = field_flag(b, "compare", p->o.compare, e);
+    if (r == VG_OK) r = field_flag(b, "centred", p->o.centred, e);
+    if (r == VG_OK) r = field_number(b, "scale", facts->scale, e);
+    if (r == VG_OK) r = field_number(b, "mean", facts->mean, e);
+    if (r == VG_OK) r = field_number(b, "max", facts->max, e);
+    if (r == VG_OK) r = json_map(b, e);
+    if (r == VG_OK) r = field(b, "sequences", e);
+    if (r == VG_OK) r = json_text(b, "[", e);
+    for (size_t i = 0; i < p->n && r == VG_OK; i++) r = json_sequence(b, p, i, e);
+    return r == VG_OK ? json_text(b, "]}", e) : r;
+}
+
+static int put_remaining(vg_page *p, vg_page_facts *facts, vg_err *e)
+{
+    int r = VG_OK;
+    for (size_t i = 0; i < p->n && r == VG_OK; i++) {
+        sequence *s = p->at + i;
+        const sequence *frame = p->o.compare && i == 0 ? p->at + 1 : s;
+        if (!s->frames) return vg_fail(e, VG_EINPUT, "'%s' has no frames: there is nothing to show", s->label);
+        if (s->places.n) r = put_chunk(p, i, "places", &s->places, e);
+        if (r == VG_OK && s->errors.n) r = put_chunk(p, i, "errors", &s->errors, e);
+        facts->frames = s->frames > facts->frames ? s->frames : facts->frames;
+        facts->loss = fmax(facts->loss, s->loss / frame->unit);
+    }
+    return r;
+}
+
+int vg_page_end(vg_page *p, vg_page_facts *facts, vg_err *e)
+{
+    vg_bytes json = {0};
+    *facts = (vg_page_facts){0};
+    if (p->n == 0) return vg_fail(e, VG_EINPUT, "there is no sequence to show");
+    int r = put_remaining(p, facts, e);
+    if (r < 0) return r;
+    if (p->o.compare) {
+        facts->scale = find_scale(p);
+        facts->mean = p->sum / (double)p->at[0].frames;
+        facts->max = p->max;
+    }
+    r = put_template(p, "@FACTS@", e);
+    if (r == VG_OK) r = json_page(&json, p, facts, e);
+    if (r == VG_OK) r = put(p, json.data, json.size, e);
+    if (r == VG_OK) r = put_template(p, "@SCRIPT@", e);
+    if (r == VG_OK) r = put_text(p, vgi_page_js, e);
+    if (r == VG_OK) r = put_template(p, NULL, e);
+    if (r == VG_OK) r = flush(p, e);
+    vg_bytes_clear(&json);
+    facts->bytes = p->bytes;
+    return r;
+}

@@ -1,0 +1,311 @@
+#!/usr/bin/env bats
+# vg-view -o NAME.html: what is in a page, what is lost in it, and what a browser makes of it.
+# SPDX-License-Identifier: GPL-3.0-or-later
+load lib.bash
+
+# check_places PAGE OBJ...: every position of sequence 0 is as near to that of the OBJ files as the page states
+check_places() {
+    py "$@" <<'END'
+import base64, html.parser, json, re, struct, sys, zlib
+
+class Scripts(html.parser.HTMLParser):
+    found, now = [], None
+    def handle_starttag(self, tag, attributes):
+        if tag == "script":
+            self.now = [dict(attributes), ""]
+    def handle_data(self, data):
+        if self.now:
+            self.now[1] += data
+    def handle_endtag(self, tag):
+        if tag == "script":
+            self.found.append(self.now)
+            self.now = None
+
+scripts = Scripts()
+scripts.feed(open(sys.argv[1], encoding="utf-8").read())
+facts = json.loads(next(text for a, text in scripts.found if a.get("id") == "facts"))
+about = facts["sequences"][0]
+nv, frames, lists = about["vertices"], [], {}
+for a, text in scripts.found:
+    if a.get("data-sequence") != "0":
+        continue
+    data = zlib.decompress(base64.b64decode(text, validate=True))
+    if "data-list" in a:
+        n = len(data) // 4
+        lists[a["data-list"]] = [int.from_bytes(bytes(data[k * n + i] for k in range(4)), "big") for i in range(n)]
+    elif a["data-frames"] == "places":
+        n, origin, step = int(a["data-count"]), [float(x) for x in a["data-origin"].split()], [float(x) for x in a["data-step"].split()]
+        size, total, q = 3 * nv, n * 3 * nv, []
+        assert len(data) == n + 2 * total
+        for f in range(n):
+            for k in range(3):
+                before = 0
+                for v in range(nv):
+                    i = len(q)
+                    rest = data[n + i] << 8 | data[n + total + i]
+                    x = ~(rest >> 1) if rest & 1 else rest >> 1
+                    before = x = x + (before if data[f] & 4 else 0)
+                    if data[f] & 1:
+                        x += q[i - size]
+                    if data[f] & 2:
+                        x += 2 * q[i - size] - q[i - 2 * size]
+                    q.append(x & 0xFFFF)
+            frames.append([[origin[k] + step[k] * q[f * size + k * nv + v] for k in range(3)] for v in range(nv)])
+truths = []
+for name in sys.argv[2:]:
+    lines = [line.split() for line in open(name)]
+    truths.append([[float(x) for x in line[1:4]] for line in lines if line[:1] == ["v"]])
+    faces = [[int(x) - 1 for x in line[1:]] for line in lines if line[:1] in (["f"], ["l"])]
+assert len(frames) == len(truths) == len(about["names"])
+worst = max(sum((a - b) ** 2 for a, b in zip(p, q)) ** 0.5 for f, t in zip(frames, truths) for p, q in zip(f, t))
+assert worst <= about["loss"] * about["diagonal"] * (1 + 1e-9) + 1e-15, (worst, about["loss"] * about["diagonal"])
+assert 0 < worst < 1e-5 * max(max(abs(x) for x in q) for t in truths for q in t)
+at, got = 0, []
+for size in lists["sizes"]:
+    face = []
+    for _ in range(size):
+        last = (lists["corners"][at] + (last if at else 0)) % 2 ** 32
+        face.append(last)
+        at += 1
+    got.append(face)
+assert got == faces, (got, faces)
+assert len(lists["triangles"]) == 3 * sum(max(len(f) - 2, 0) for f in faces)
+END
+}
+
+# browse PAGE <<END: Python with `page` open in a browser, and what page_driver.py has
+browse() {
+    command -v chromium >/dev/null || command -v chromium-browser >/dev/null || command -v google-chrome >/dev/null ||
+        skip "needs chromium (not in debian-packages.txt: it is large)"
+    { printf 'import sys\nfrom page_driver import *\nwith Page(*sys.argv[1:]) as page:\n    page.loaded()\n' && sed 's/^/    /' &&
+        printf '    assert not page.trouble, page.trouble\n    assert all(r.startswith(("file:", "data:")) for r in page.requests), page.requests\n'; } >drive.py
+    must env PYTHONPATH="$ROOT/tests" python3 drive.py "$@"
+}
+
+@test "a page holds the positions, within what it states, and the faces" {
+    poses strip 40
+    local files=()
+    for ((i = 1; i <= 40; i++)); do files+=("pose$i.obj"); done
+    must vg-view "${files[@]}" -o page.html
+    check_places page.html "${files[@]}"
+    poses two 3
+    must vg-view pose1.obj pose2.obj pose3.obj -o page.html
+    check_places page.html pose1.obj pose2.obj pose3.obj
+}
+
+@test "-v states the loss; the same input gives the same bytes, through a pipe too" {
+    poses cube 3
+    capture vg-view -v pose*.obj -o page.html
+    [ "$status" = 0 ]
+    says "3 frames in" "positions are within" "D of the input"
+    pipe 'vg-encode pose1.obj pose2.obj pose3.obj | vg-view --format html --title pipe >pipe.html'
+    [ "$(grep -c '<title>pipe</title>' pipe.html)" = 1 ]
+    grep -q '<title>pose1.obj to pose3.obj</title>' page.html
+    must vg-view pose*.obj -o again.html
+    same_file page.html again.html
+    grep -q 'vg-encode pose1.obj pose2.obj pose3.obj' pipe.html
+}
+
+@test "a page loads nothing from outside" {
+    poses cube 2
+    must vg-view pose1.obj --against pose2.obj --beside pose2.obj -o page.html
+    ! grep -E -i 'https?://|src=|@import|url\(|fetch\(|XMLHttpRequest|WebSocket' page.html
+    [ "$(grep -o 'href="[^"]*"' page.html)" = 'href="data:,"' ]
+    grep -q "default-src 'none'" page.html
+}
+
+@test "nothing that the input says becomes markup" {
+    poses cube 1
+    cp pose1.obj '<b>&"x.obj'
+    must vg-view '<b>&"x.obj' --title '</title><script>alert(1)</script>' -o page.html
+    ! grep -q -e '<script>alert' -e '<b>' page.html
+    grep -qF '&lt;/title&gt;&lt;script&gt;alert(1)' page.html
+}
+
+@test "errors: numbers are those of vg-diff, the colours end where --scale says" {
+    poses cube 3
+    mkdir truth
+    cp pose*.obj truth
+    for i in 1 2 3; do mesh cube 0.2 0.01 >"pose$i.obj"; done
+    must vg-view pose*.obj --against truth -o page.html
+    must vg-view pose*.obj --against truth --scale 0.25 -o scaled.html
+    py page.html scaled.html <<'END'
+import json, re, sys
+facts, scaled = (json.loads(re.search(r'id="facts">(.*?)</script>', open(p).read()).group(1)) for p in sys.argv[1:])
+means, maxima = facts["sequences"][0]["means"], facts["sequences"][0]["maxima"]
+assert len(means) == len(maxima) == 3 and all(m <= x for m, x in zip(means, maxima))
+import math
+points = lambda name: [[float(x) for x in l.split()[1:]] for l in open(name) if l.startswith("v ")]
+D = math.dist((0, 0, 0), (1, 1, 1))
+for i in range(3):
+    errors = [math.dist(a, b) / D for a, b in zip(points(f"pose{i+1}.obj"), points(f"truth/pose{i+1}.obj"))]
+    assert abs(sum(errors) / 8 - means[i]) < 1e-6 and abs(max(errors) - maxima[i]) < 1e-6
+assert facts["max"] <= facts["scale"] <= 1.5 * facts["max"] and scaled["scale"] == 0.25
+END
+}
+
+@test "a page takes its name when it is whole, and an older one stays when it fails" {
+    poses cube 3
+    must vg-view pose1.obj -o page.html
+    cp page.html before.html
+    pipe 'vg-encode pose1.obj pose2.obj pose3.obj >whole.vgs'
+    head -c $(($(wc -c <whole.vgs) - 40)) whole.vgs >cut.vgs
+    must_fail 3 vg-view cut.vgs -o page.html
+    one_line
+    must_fail 3 vg-view pose*.obj --against pose1.obj -o page.html
+    says "has 3 frames where 'pose1.obj' has 1"
+    must_fail 4 vg-view pose1.obj --format html -o /dev/full
+    same_file page.html before.html
+    nothing_but pose1.obj pose2.obj pose3.obj page.html before.html whole.vgs cut.vgs
+}
+
+@test "options of the other kind, and what cannot be read twice, are refused before the input is read" {
+    local arguments
+    for arguments in '--frames 3' '--columns 2' '--size 64x64' '--format gif'; do
+        # shellcheck disable=SC2086
+        must_fail 2 vg-view missing.obj -o out.html $arguments
+        says "option '"
+    done
+    must_fail 2 vg-view missing.obj -o out.png --beside x.obj
+    must_fail 2 vg-view missing.obj -o out.png --title x
+    must_fail 2 vg-view - --beside - -o out.html
+    must_fail 2 vg-view missing.obj --against - --beside - -o out.html
+    must_fail 4 vg-view missing.obj -o out.html
+    says "'missing.obj'"
+    mesh cube >cube.obj
+    must_fail 4 vg-view cube.obj --beside missing.obj -o out.html
+    mesh tetra >tetra.obj
+    must_fail 3 vg-view cube.obj --against tetra.obj -o out.html
+    must vg-view cube.obj --beside tetra.obj -o out.html
+}
+
+@test "browser: a page shows the mesh, and another picture for another frame" {
+    poses two 4
+    must vg-view pose*.obj -o page.html
+    browse page.html '#frame=2&view=20,10' <<'END'
+assert page.value("document.documentElement.dataset.frame") == "2"
+assert page.value("document.querySelector('#message').hidden")
+assert "pose3" in page.value("document.querySelector('#frame').textContent")
+pictures = [page.picture()]
+assert 0.02 < share_drawn(pictures[0]) < 0.9, share_drawn(pictures[0])
+page.key("ArrowRight")
+pictures.append(page.picture())
+page.value("location.hash = '#frame=0'")
+page.wait("document.documentElement.dataset.drawn === '0'")
+pictures.append(page.picture())
+assert pictures[0][2] != pictures[1][2] and pictures[1][2] != pictures[2][2] and pictures[0][2] != pictures[2][2]
+page.value("location.hash = '#frame=2'")
+page.wait("document.documentElement.dataset.drawn === '2'")
+assert page.picture()[2] == pictures[0][2]
+END
+}
+
+@test "browser: keys, mouse and slider do what they say" {
+    poses cube 6
+    must vg-view pose*.obj -o page.html
+    browse page.html <<'END'
+data = lambda name: page.value(f"document.documentElement.dataset.{name}")
+page.key(" ")
+assert data("playing") == "true"
+page.wait("document.documentElement.dataset.drawn > '1'")
+page.key(" ")
+assert data("playing") == "false"
+page.key("Home")
+assert data("frame") == "0"
+plain = page.picture()
+page.key("w")
+over = page.picture()
+page.key("w")
+alone = page.picture()
+assert plain[2] != over[2] != alone[2] and share_drawn(alone) < share_drawn(over)
+page.key("w")
+assert page.picture()[2] == plain[2]
+page.drag(400, 300, 500, 330)
+assert page.picture()[2] != plain[2]
+page.key("r")
+assert page.picture()[2] == plain[2]
+page.key("g")
+assert share_drawn(page.picture()) > share_drawn(plain)
+page.key("g")
+page.key("+")
+assert share_drawn(page.picture()) > share_drawn(plain)
+page.click("#scrub")
+assert data("frame") in "23", data("frame")
+page.click("#forth")
+page.key("End")
+assert data("frame") == "5"
+page.key("?")
+assert page.value("document.querySelector('#help').open")
+END
+}
+
+@test "browser: two sequences side by side, errors with a legend, and each can be picked" {
+    poses cube 3
+    mkdir truth
+    cp pose*.obj truth
+    for i in 1 2 3; do mesh cube 0.4 0.1 >"pose$i.obj"; done
+    mesh tetra >other.obj
+    must vg-view pose*.obj --against truth --beside other.obj -o page.html
+    browse page.html '#frame=1' <<'END'
+shown = lambda: page.value("document.documentElement.dataset.shown")
+text = lambda at: page.value(f"document.querySelector('{at}').textContent")
+assert shown() == "1,2,3"
+picture = page.picture()
+assert all(share_drawn(picture, i / 3, (i + 1) / 3) > 0.01 for i in range(3))
+assert "mean error" in text("#captions") and "truth" in text("#captions") and "other.obj" in text("#captions")
+assert page.value("document.querySelector('#legend').offsetHeight") > 20 and "truth" in text("#legend")
+assert page.value("document.querySelector('#graph').getBoundingClientRect().height") > 10
+page.key("c")
+assert page.picture()[2] != picture[2] and page.value("document.querySelector('#legend').offsetHeight") == 0
+page.key("1")
+page.click("#shown button:nth-child(3)")
+assert shown() == "2"
+assert share_drawn(page.picture()) > 0.02
+page.key("2")
+assert shown() == "2" # one stays
+page.key("0")
+assert shown() == "1,2,3"
+END
+}
+
+@test "patches are colours: those of the stream, or others that fit it" {
+    poses cube 3
+    mesh tetra >tetra.obj
+    pipe 'vg-encode pose1.obj pose2.obj pose3.obj | vg-segment --patches 3 -o cube.patches'
+    must vg-view cube.patches -o reference.html
+    must vg-view pose*.obj --patches cube.patches -o page.html
+    grep -q '"patches":3' reference.html
+    grep -q 'data-list="patches"' page.html
+    must_fail 3 vg-view pose1.obj --patches pose2.obj -o none.html
+    says "'pose2.obj' holds no patches: make them with 'vg-segment'"
+    must_fail 3 vg-view tetra.obj --patches cube.patches -o none.html
+    must_fail 2 vg-view pose1.obj --patches cube.patches -o none.png
+    [ ! -e none.html ]
+    browse page.html <<'END'
+assert page.value("document.querySelector('#legend-text').textContent") == "3 patches, a colour each"
+coloured = page.picture()
+page.key("c")
+assert page.picture()[2] != coloured[2]
+END
+}
+
+@test "browser: bones, points, no extent, and a page that is cut short" {
+    printf 'v 0 0 0\nv 0 1 0\nv 1 1 0\nl 1 2\nl 2 3\n' >bones.obj
+    printf 'v 0 0 0\nv 1 2 3\nv 1 0 0\n' >points.obj
+    printf 'v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n' >same.obj
+    local name
+    for name in bones points; do
+        must vg-view "$name.obj" -o "$name.html"
+        browse "$name.html" <<<'assert 0.0001 < share_drawn(page.picture()) < 0.3'
+    done
+    must vg-view same.obj -o same.html
+    browse same.html <<<'page.picture()'
+    head -c 20000 bones.html >cut.html
+    must env PYTHONPATH="$ROOT/tests" python3 - cut.html <<'END'
+import sys
+from page_driver import *
+with Page(sys.argv[1]) as page:
+    page.wait("document.body && document.querySelector('#message')")
+    assert "not whole" in page.value("document.querySelector('#message').innerText")
+END
+}

@@ -1,0 +1,305 @@
+/* test_map.c: a map is its uncollapsed chain; bodies that move rigidly by patches are met; joints, paths, and other bodies.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "meshes.h"
+#include "method/map_parts.h"
+
+enum { POSES = 7 };
+
+/* A rod whose faces are in `n` patches along z. */
+static vg_head make_body(size_t n)
+{
+    vg_head h = make_rod(24, 8, false);
+    vg_err e;
+    h.patches.n = n;
+    h.patches.of_face = room(h.mesh.nf, sizeof *h.patches.of_face);
+    for (size_t f = 0; f < h.mesh.nf; f++) {
+        double z = 0, most = 2 * M_PI * 24 / 8;
+        for (uint32_t c = h.mesh.start[f]; c < h.mesh.start[f + 1]; c++)
+            z += h.reference[3 * (size_t)h.mesh.vert[c] + 2] / (h.mesh.start[f + 1] - h.mesh.start[f]);
+        h.patches.of_face[f] = (uint32_t)fmin((double)n - 1, floor(z / most * (double)n));
+    }
+    CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK);
+    return h;
+}
+
+/* Bent about x by an angle that grows along z, and moved away. */
+static void bend(const vg_head *h, double angle, double *pose)
+{
+    double most = 2 * M_PI * 24 / 8, r = most / angle;
+    for (size_t v = 0; v < h->mesh.nv; v++) {
+        const double *x = h->reference + 3 * v;
+        double a = angle * x[2] / most;
+        pose[3 * v] = x[0] + angle;
+        pose[3 * v + 1] = r * (1 - cos(a)) + x[1] * cos(a) - 3 * angle;
+        pose[3 * v + 2] = r * sin(a) - x[1] * sin(a);
+    }
+}
+
+static void turn_all(const vg_head *h, double angle, double *pose)
+{
+    for (size_t v = 0; v < h->mesh.nv; v++) {
+        const double *x = h->reference + 3 * v;
+        pose[3 * v] = x[0] * cos(angle) - x[1] * sin(angle) + 5;
+        pose[3 * v + 1] = x[0] * sin(angle) + x[1] * cos(angle) - 1;
+        pose[3 * v + 2] = x[2] + 2;
+    }
+}
+
+static void fit(vg_head *h, void (*make)(const vg_head *, double, double *))
+{
+    vg_map_fitter *f;
+    vg_err e;
+    double *pose = room(3 * h->mesh.nv, sizeof *pose);
+    CHECK(vg_map_fitter_new(&f, h, 0.03, 2, &e) == VG_OK);
+    for (int i = 0; i < POSES; i++) {
+        const double *poses[1] = {pose};
+        make(h, 0.2 * (i + 1), pose);
+        CHECK(vg_map_fitter_add(f, 1, poses, &e) == VG_OK);
+    }
+    CHECK(vg_map_fitter_finish(f, &e) == VG_OK);
+    vg_map_fitter_free(&f);
+    free(pose);
+}
+
+static double apart(const double *a, const double *b, size_t n)
+{
+    double d = 0;
+    for (size_t i = 0; i < n; i++) d = fmax(d, fabs(a[i] - b[i]));
+    return d;
+}
+
+typedef struct played {
+    vg_player *p;
+    double *transforms, *vertices;
+} played;
+
+static played open_player(const vg_head *h, bool single, int threads)
+{
+    vg_err e;
+    played x = {NULL, room(7 * h->map.n, sizeof(double)), room(3 * h->mesh.nv, sizeof(double))};
+    CHECK(vg_player_new(&x.p, h, single, threads, &e) == VG_OK);
+    return x;
+}
+
+static void measure(played *x, const double *pose)
+{
+    vg_player_measure(x->p, 1, &pose, &x->transforms);
+}
+
+static void play(played *x)
+{
+    vg_player_pose(x->p, 1, (const double *const *)&x->transforms, &x->vertices);
+}
+
+static void close_player(played *x)
+{
+    vg_player_free(&x->p);
+    free(x->transforms);
+    free(x->vertices);
+}
+
+/* The whole moves rigidly: so do all patches, and the map follows exactly, also where it was not fitted, and by joints. */
+static void rigid_bodies(void)
+{
+    vg_head h = make_body(5);
+    fit(&h, turn_all);
+    double D = vg_diagonal(h.reference, h.mesh.nv), *pose = room(3 * h.mesh.nv, sizeof *pose);
+    played x = open_player(&h, false, 1);
+    for (int i = 0; i < 10; i++) {
+        turn_all(&h, 0.7 * i - 2, pose);
+        measure(&x, pose);
+        play(&x);
+        CHECK_NEAR(apart(x.vertices, pose, 3 * h.mesh.nv), 0, 1e-9 * D);
+        vg_player_place(x.p, x.transforms);
+        play(&x);
+        CHECK_NEAR(apart(x.vertices, pose, 3 * h.mesh.nv), 0, 1e-9 * D);
+    }
+    free(pose);
+    close_player(&x);
+    vg_head_clear(&h);
+}
+
+/* vgi_map_collapse against one reconstruction from the vectors that the same transforms give. */
+static void collapsed_is_uncollapsed(void)
+{
+    vg_head h = make_body(4);
+    vg_graph *g;
+    vg_solver *s;
+    vg_err e;
+    fit(&h, bend);
+    CHECK(vg_graph_new(&g, &h, &e) == VG_OK);
+    uint32_t *of_face = vgi_graph_patches(&h, g, &e);
+    size_t corners = vg_graph_corners(g), nv = h.mesh.nv;
+    double *vectors = room(3 * corners, sizeof *vectors), *wanted = room(3 * corners, sizeof *wanted);
+    double *anchors = room(3 * h.map.nheld, sizeof *anchors), *x = room(3 * nv, sizeof *x), *rhs = room(3 * nv, sizeof *rhs);
+    double *pose = room(3 * nv, sizeof *pose);
+    vg_graph_vectors(g, h.reference, vectors);
+    CHECK(vgi_map_collapse(&h, g, of_face, vectors, 2, &e) == VG_OK);
+    played p = open_player(&h, false, 2);
+    bend(&h, 1.3, pose);
+    measure(&p, pose);
+    play(&p);
+    for (size_t f = 0; f < g->nf; f++)
+        for (size_t c = g->start[f]; c < g->start[f + 1]; c++) {
+            double u[3];
+            vg_quat_apply(h.map.corner + 4 * c, vectors + 3 * c, u);
+            vg_quat_apply(p.transforms + 7 * of_face[f], u, wanted + 3 * c);
+        }
+    for (size_t i = 0; i < h.map.nheld; i++) {
+        const double *t = p.transforms + 7 * h.map.held_patch[i];
+        vg_quat_apply(t, h.map.held_at + 3 * i, anchors + 3 * i);
+        for (size_t k = 0; k < 3; k++) anchors[3 * i + k] += t[4 + k];
+    }
+    CHECK(vg_solver_new(&s, g, h.map.held, h.map.nheld, h.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_OK);
+    vg_solver_load(s, wanted, anchors, x, rhs);
+    vg_solver_solve(s, 1, (const double *const *)&rhs, &x, (const double *const *)&anchors, (const double *const *)&anchors);
+    CHECK_NEAR(apart(x, p.vertices, 3 * nv), 0, 1e-9 * vg_diagonal(h.reference, nv));
+    vg_solver_free(&s);
+    close_player(&p);
+    free(of_face);
+    free(vectors);
+    free(wanted);
+    free(anchors);
+    free(x);
+    free(rhs);
+    free(pose);
+    vg_graph_free(&g);
+    vg_head_clear(&h);
+}
+
+static void paths(void)
+{
+    vg_head h = make_body(6);
+    fit(&h, bend);
+    size_t n = h.map.n, nv = h.mesh.nv;
+    double D = vg_diagonal(h.reference, nv), *a = room(7 * n, sizeof *a), *b = room(7 * n, sizeof *b), *pose = room(3 * nv, sizeof *pose);
+    played x = open_player(&h, false, 1), single = open_player(&h, true, 2);
+    bend(&h, 0.4, pose);
+    measure(&x, pose);
+    memcpy(a, x.transforms, 7 * n * sizeof *a);
+    bend(&h, 1.2, pose);
+    measure(&x, pose);
+    memcpy(b, x.transforms, 7 * n * sizeof *b);
+    play(&x);
+    CHECK_NEAR(apart(x.vertices, pose, 3 * nv), 0, 3e-3 * D); /* training error */
+    memcpy(single.transforms, b, 7 * n * sizeof *b);
+    play(&single);
+    CHECK_NEAR(apart(x.vertices, single.vertices, 3 * nv), 0, 1e-5 * D);
+    vg_player_between(x.p, a, b, 1, x.transforms); /* both ends to rounding */
+    play(&single);
+    play(&x);
+    memcpy(pose, x.vertices, 3 * nv * sizeof *pose);
+    memcpy(x.transforms, b, 7 * n * sizeof *b);
+    play(&x);
+    CHECK_NEAR(apart(x.vertices, pose, 3 * nv), 0, 1e-9 * D);
+    vg_player_between(x.p, a, b, 0, x.transforms);
+    play(&x);
+    memcpy(pose, x.vertices, 3 * nv * sizeof *pose);
+    memcpy(x.transforms, a, 7 * n * sizeof *a);
+    play(&x);
+    CHECK_NEAR(apart(x.vertices, pose, 3 * nv), 0, 1e-9 * D);
+    vg_player_between(x.p, a, b, 0.5, x.transforms); /* the middle of a bend is the bend by the middle angle, but for the root */
+    play(&x);
+    bend(&h, 0.8, pose);
+    double c0[3], c1[3], worst = 0;
+    vg_centroid(pose, nv, c0);
+    vg_centroid(x.vertices, nv, c1);
+    for (size_t i = 0; i < 3 * nv; i++) worst = fmax(worst, fabs(pose[i] - c0[i % 3] - x.vertices[i] + c1[i % 3]));
+    CHECK_NEAR(worst, 0, 5e-3 * D);
+    free(a);
+    free(b);
+    free(pose);
+    close_player(&x);
+    close_player(&single);
+    vg_head_clear(&h);
+}
+
+/* The body turned by 170 degrees is on the way to it a rigid body, whatever t. */
+static void half_turns(void)
+{
+    vg_head h = make_body(5);
+    fit(&h, bend);
+    size_t n = h.map.n, nv = h.mesh.nv;
+    double *a = room(7 * n, sizeof *a), *b = room(7 * n, sizeof *b), *pose = room(3 * nv, sizeof *pose), *start = room(3 * nv, sizeof *start);
+    played x = open_player(&h, false, 1);
+    measure(&x, h.reference);
+    memcpy(a, x.transforms, 7 * n * sizeof *a);
+    play(&x);
+    memcpy(start, x.vertices, 3 * nv * sizeof *start);
+    turn_all(&h, 170 * M_PI / 180, pose);
+    measure(&x, pose);
+    memcpy(b, x.transforms, 7 * n * sizeof *b);
+    for (double t = -0.5; t < 1.6; t += 0.25) {
+        vg_player_between(x.p, a, b, t, x.transforms);
+        play(&x);
+        for (size_t v = 1; v < nv; v++) {
+            double before = 0, after = 0;
+            for (size_t k = 0; k < 3; k++) {
+                before += pow(start[3 * v + k] - start[k], 2);
+                after += pow(x.vertices[3 * v + k] - x.vertices[k], 2);
+            }
+            CHECK_NEAR(sqrt(after), sqrt(before), 1e-9 * vg_diagonal(h.reference, nv));
+        }
+    }
+    free(a);
+    free(b);
+    free(pose);
+    free(start);
+    close_player(&x);
+    vg_head_clear(&h);
+}
+
+/* A body of twice the size: poses of the first one give poses twice the size. Half way there: 2^0.5. */
+static void other_bodies(void)
+{
+    for (int half = 0; half < 2; half++) {
+        vg_head h = make_body(5);
+        vg_err e;
+        fit(&h, bend);
+        size_t nv = h.mesh.nv;
+        double D = vg_diagonal(h.reference, nv), c0[3], c1[3], scale = half ? sqrt(2) : 2;
+        double *pose = room(3 * nv, sizeof *pose), *target = room(3 * nv, sizeof *target), *own = room(3 * nv, sizeof *own);
+        bend(&h, 0.9, pose);
+        played x = open_player(&h, false, 1);
+        measure(&x, pose);
+        vg_player_place(x.p, x.transforms);
+        play(&x);
+        memcpy(own, x.vertices, 3 * nv * sizeof *own);
+        close_player(&x);
+        for (size_t i = 0; i < 3 * nv; i++) target[i] = 2 * h.reference[i] + 1;
+        CHECK(vg_map_retarget(&h, target, half ? 0.5 : 1, 2, &e) == VG_OK);
+        x = open_player(&h, false, 1);
+        measure(&x, pose);
+        play(&x);
+        vg_centroid(own, nv, c0);
+        vg_centroid(x.vertices, nv, c1);
+        double worst = 0;
+        for (size_t i = 0; i < 3 * nv; i++) worst = fmax(worst, fabs(scale * (own[i] - c0[i % 3]) - (x.vertices[i] - c1[i % 3])));
+        CHECK_NEAR(worst, 0, 1e-8 * D);
+        free(pose);
+        free(target);
+        free(own);
+        close_player(&x);
+        vg_head_clear(&h);
+    }
+}
+
+static void refusals(void)
+{
+    vg_head h = make_rod(5, 4, true);
+    vg_map_fitter *f;
+    vg_player *p;
+    vg_err e;
+    CHECK(vg_map_fitter_new(&f, &h, 0.03, 1, &e) == VG_EINPUT && !f);
+    CHECK(vg_player_new(&p, &h, false, 1, &e) == VG_EINPUT && !p);
+    CHECK(vg_map_retarget(&h, h.reference, 1, 1, &e) == VG_EINPUT);
+    vg_head body = make_body(3);
+    CHECK(vg_map_fitter_new(&f, &body, 0.03, 1, &e) == VG_OK);
+    CHECK(vg_map_fitter_finish(f, &e) == VG_EINPUT && !body.map.n);
+    vg_map_fitter_free(&f);
+    vg_head_clear(&body);
+    vg_head_clear(&h);
+}
+
+TESTS({"rigid bodies", rigid_bodies}, {"collapsed is uncollapsed", collapsed_is_uncollapsed}, {"paths", paths},
+      {"half turns", half_turns}, {"other bodies", other_bodies}, {"refusals", refusals})

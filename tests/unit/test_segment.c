@@ -1,0 +1,140 @@
+/* test_segment.c: rotations nearest to matrices; patches of bars that turn in known pieces; pieces; threads.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "meshes.h"
+#include "method/rotation_fit.h"
+#include "method/segment.h"
+
+static void turn_about(const double axis[3], double angle, double m[9])
+{
+    double l[4] = {0, axis[0] * angle / 2, axis[1] * angle / 2, axis[2] * angle / 2}, q[4];
+    vg_quat_exp(l, q);
+    vg_quat_matrix(q, m);
+}
+
+static void any_axis(double axis[3])
+{
+    double n = 0;
+    for (int k = 0; k < 3; k++) axis[k] = noise(), n += axis[k] * axis[k];
+    for (int k = 0; k < 3; k++) axis[k] /= sqrt(n);
+}
+
+static double difference(const double *a, const double *b)
+{
+    double d = 0;
+    for (int i = 0; i < 9; i++) d = fmax(d, fabs(a[i] - b[i]));
+    return d;
+}
+
+/* R S with S symmetric positive (semi)definite has R as its nearest rotation, also when S has rank 2; -S of rank 3 turns inside out. */
+static void nearest_rotations(void)
+{
+    for (int trial = 0; trial < 300; trial++) {
+        double axis[3], other[3], r[9], v[9], m[9] = {0}, found[9], inverse[9] = {0};
+        double s[3] = {1 + fabs(noise()), 0.1 + fabs(noise()), trial % 3 ? 0.01 + fabs(noise()) : 0};
+        any_axis(axis);
+        any_axis(other);
+        turn_about(axis, 3.1 * noise(), r);
+        turn_about(other, 3.1 * noise(), v);
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < 3; k++)
+                for (int j = 0; j < 3; j++)
+                    for (int q = 0; q < 3; q++) m[3 * i + k] += r[3 * i + q] * v[3 * q + j] * s[j] * v[3 * k + j];
+        vgi_fit_rotation(m, found);
+        CHECK_NEAR(difference(found, r), 0, 1e-10);
+        for (int i = 0; i < 9; i++) inverse[i] = -m[i];
+        vgi_fit_rotation(inverse, found); /* a rotation all the same */
+        double det = found[0] * (found[4] * found[8] - found[5] * found[7]) - found[1] * (found[3] * found[8] - found[5] * found[6]) +
+                     found[2] * (found[3] * found[7] - found[4] * found[6]);
+        CHECK_NEAR(det, 1, 1e-12);
+    }
+    double zero[9] = {0}, r[9], unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, line[9] = {0, 0, 0, 2, 0, 0, 0, 0, 0};
+    vgi_fit_rotation(zero, r);
+    CHECK_NEAR(difference(r, unit), 0, 0);
+    vgi_fit_rotation(line, r); /* x goes to y: the smallest turn that does it is about z */
+    const double quarter[9] = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+    CHECK_NEAR(difference(r, quarter), 0, 1e-5);
+}
+
+/* A strip of quads along x; from `hinge` on it turns about z by `angle`, and the last third besides about x. */
+enum { LONG = 30 };
+
+static void strip(vg_head *h)
+{
+    for (int i = 0; i <= LONG; i++)
+        for (int k = 0; k < 2; k++) add_vertex(h, i, k, 0.1 * i * k);
+    for (uint32_t i = 0; i < LONG; i++) {
+        const uint32_t face[4] = {2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1};
+        add_face(h, 4, face);
+    }
+}
+
+static void fold(const vg_head *h, double angle, double *pose)
+{
+    double r[9], z[3] = {0, 0, 1};
+    turn_about(z, angle, r);
+    for (size_t v = 0; v < h->mesh.nv; v++) {
+        const double *x = h->reference + 3 * v;
+        double d[3] = {x[0] - LONG / 3, x[1], x[2]};
+        bool middle = x[0] > LONG / 3 && x[0] <= 2 * LONG / 3, far = x[0] > 2 * LONG / 3;
+        for (size_t i = 0; i < 3; i++)
+            pose[3 * v + i] = middle || far ? r[3 * i] * d[0] + r[3 * i + 1] * d[1] + r[3 * i + 2] * d[2] + (i == 0) * LONG / 3 : x[i];
+        if (far) { /* back again: as the first third */
+            double at[3] = {LONG / 3 * r[0] + LONG / 3, LONG / 3 * r[3], 0};
+            for (size_t i = 0; i < 3; i++) pose[3 * v + i] = at[i] + x[i] - (i == 0) * 2 * LONG / 3;
+        }
+    }
+}
+
+static vg_patches cut(const vg_head *h, size_t k, bool connected, int threads)
+{
+    vg_segmenter *s;
+    vg_err e;
+    vg_patches p = {0};
+    vg_segment_report report;
+    double *pose = room(3 * h->mesh.nv, sizeof *pose);
+    CHECK(vg_segmenter_new(&s, &h->mesh, h->reference, threads, &e) == VG_OK);
+    for (int i = 1; i < 6; i++) {
+        const double *poses[1] = {pose};
+        fold(h, 0.3 * i, pose);
+        vg_segmenter_add(s, 1, poses);
+    }
+    CHECK(vg_segmenter_cut(s, k, 7, connected, &p, &report, &e) == VG_OK);
+    CHECK(report.patches == p.n);
+    vg_segmenter_free(&s);
+    free(pose);
+    return p;
+}
+
+static void thirds(void)
+{
+    vg_head h = new_shape();
+    strip(&h);
+    vg_patches two = cut(&h, 2, false, 1), three = cut(&h, 3, true, 2), many = cut(&h, 12, false, 2), same = cut(&h, 12, false, 1);
+    CHECK(two.n == 2);
+    CHECK(two.of_face[0] == two.of_face[LONG - 1] && two.of_face[0] != two.of_face[LONG / 2]); /* far ends turn alike */
+    CHECK(three.n == 3 && three.of_face[0] != three.of_face[LONG - 1]);
+    for (int f = 1; f < LONG; f++) CHECK(three.of_face[f] >= three.of_face[f - 1]);
+    CHECK(many.n == same.n && !memcmp(many.of_face, same.of_face, h.mesh.nf * sizeof *many.of_face));
+    vg_patches_clear(&two);
+    vg_patches_clear(&three);
+    vg_patches_clear(&many);
+    vg_patches_clear(&same);
+    vg_head_clear(&h);
+}
+
+static void pieces(void)
+{
+    const uint32_t start[] = {0, 3, 6, 9, 11}, vert[] = {0, 1, 2, 2, 1, 3, 4, 5, 6, 6, 3}, label[] = {0, 0, 0, 1};
+    uint32_t piece[4], (*pair)[2], *shared;
+    size_t n, npairs;
+    vg_err e;
+    CHECK(vgi_connected_pieces(7, 4, start, vert, label, 2, piece, &n, &e) == VG_OK);
+    CHECK(n == 3 && piece[0] == 0 && piece[1] == 0 && piece[2] == 1 && piece[3] == 2);
+    CHECK(vgi_neighbours(7, 4, start, vert, piece, &pair, &shared, &npairs, &e) == VG_OK);
+    CHECK(npairs == 2 && pair[0][0] == 0 && pair[0][1] == 2 && pair[1][0] == 1 && pair[1][1] == 2);
+    CHECK(npairs == 2 && shared[0] == 1 && shared[1] == 1);
+    free(pair);
+    free(shared);
+}
+
+TESTS({"nearest rotations", nearest_rotations}, {"thirds of a strip", thirds}, {"pieces and neighbours", pieces})
