@@ -605,7 +605,8 @@ class _Reader:
     def ptch(self, p: _Payload):
         p.fits("its length does not fit the number of faces")
         count, patches = p.u64(), p.u32s(self.stream.mesh.nf)
-        p.pad()
+        if any(p.take(-p.at % 8)):
+            p.fail(p.short)
         p.end()
         if not 1 <= count <= INDEX_LIMIT:
             p.fail("its count is out of range")
@@ -614,6 +615,7 @@ class _Reader:
         self.stream.patches = (count, patches)
 
     def map(self, p: _Payload):
+        p.fits("its counts are out of range")
         n, nv, nj, nc, nh = (p.u64() for _ in range(5))
         kind, flags, names, zero = (p.u32() for _ in range(4))
         size = p.f64()
@@ -627,6 +629,8 @@ class _Reader:
             p.fail("unknown flags are set, or names are missing")
         if not (math.isfinite(size) and size > 0):
             p.fail("its size is not positive")
+        p.fits("it is shorter than its counts say")
+        p.long = "bytes are left over"
         lengths = (4 * nv * n, 3 * n * n, 3 * n, 3 * n, n, 3 * nv if flags & 1 else 0, 3 * nj, nj, 4 * nc, 3 * nh)
         weights, place, centre, home_centre, share, home, joint_at, joint_weight, corners, held_at = (
             p.f64s(length, "a number") for length in lengths)
@@ -640,8 +644,10 @@ class _Reader:
             p.fail("a quaternion is zero")
         if any(x >= n for x in held_patch):
             p.fail("a vertex is held by a transform that is not there")
-        if any(a >= b for a, b in zip(held, held[1:])) or (nh and held[-1] >= nv):
-            p.fail("held vertices are not ascending, or out of range")
+        if any(v >= nv for v in held):
+            p.fail("an index is out of range")
+        if any(a >= b for a, b in zip(held, held[1:])):
+            p.fail("indices are not ascending")
         names = [p.string() for _ in range(names)]
         p.end()
         self.stream.map = Map(n, size, names, weights, place, centre, home_centre, share, home if flags & 1 else None,

@@ -41,7 +41,7 @@ typedef struct vgi_gltf {
     vgi_gltf_buffer *buffers;
 } vgi_gltf;
 
-/* vgi_gltf_open: read a whole file, .glb or .gltf, with the buffers it needs. Cleared by the caller, on failure too. */
+/* vgi_gltf_open: read a whole file, .glb or .gltf, with the buffers it needs. The caller clears it, come what may. */
 int vgi_gltf_open(vgi_gltf *g, vgi_input *in, const char *subject, vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_clear(vgi_gltf *g);
 
