@@ -35,7 +35,7 @@ static const cli_option options[] = {
     {.name = "edges", .help = "draw the edges of the polygons", .flag = &opts.edges},
     {.name = "beside", .value = "OTHER", .text = &opts.beside,
      .help = "page: show another sequence beside, with the same camera"},
-    {.name = "patches", .value = "PATCHES", .help = "page: colour the faces by the patches of a stream of vg-segment",
+    {.name = "patches", .value = "PATCHES", .help = "colour the faces by the patches of a stream of vg-segment",
      .text = &opts.patches},
     {.name = "title", .value = "TEXT", .help = "page: its title (default: the name of the sequence)",
      .text = &opts.title},
@@ -130,9 +130,8 @@ static void choose_kind(void)
     if (opts.page && (opts.frames || opts.columns || opts.size))
         cli_usage("option '--%s' is about a sheet: the output is a page",
                   opts.frames ? "frames" : opts.columns ? "columns" : "size");
-    if (!opts.page && (opts.beside || opts.patches || opts.title))
-        cli_usage("option '--%s' is about a page: use -o FILE.html",
-                  opts.beside ? "beside" : opts.patches ? "patches" : "title");
+    if (!opts.page && (opts.beside || opts.title))
+        cli_usage("option '--%s' is about a page: use -o FILE.html", opts.beside ? "beside" : "title");
     if (!cli.output && isatty(STDOUT_FILENO))
         cli_usage("a %s is not written to a terminal: use -o FILE.html or -o FILE.png", opts.page ? "page" : "picture");
 }
@@ -249,17 +248,43 @@ static void check_counts(const side *result, const side *truth)
 
 /* ---- sheet ---- */
 
+/* Patches that were kept apart from the sequence. */
+static void take_patches(side *s)
+{
+    vg_head h = {0};
+    vg_err e;
+    char name[420];
+    snprintf(name, sizeof name, "'%.400s'", opts.patches);
+    if (vg_load_mesh(&h, opts.patches, &e) < 0 ||
+        vg_mesh_same(&h.mesh, name, &s->head->mesh, s->name, &e) < 0)
+        cli_die(&e);
+    if (!h.patches.n) {
+        vg_fail(&e, VG_EINPUT, "%s holds no patches: make them with 'vg-segment'", name);
+        cli_die(&e);
+    }
+    vg_patches_clear(&s->head->patches);
+    s->head->patches = h.patches;
+    h.patches = (vg_patches){0};
+    vg_head_clear(&h);
+}
+
 static void make_sheet(side *result, side *truth)
 {
     vg_sheet_options o = sheet_options();
     vg_sheet *sheet;
     vg_err e;
+    if (opts.patches) take_patches(result);
+    if (result->head->patches.n) o.patches = &result->head->patches;
     const double *reference = opts.against ? truth->head->reference : result->head->reference;
     if (vg_sheet_new(&sheet, &result->head->mesh, reference, &o, &e) < 0) cli_die(&e);
     for (int more; (more = next_pair(result, truth)) != 0;) {
         if (more > 0 && vg_sheet_add(sheet, result->frame.name, result->frame.values,
                                      opts.against ? truth->frame.values : NULL, &e) < 0)
             cli_die(&e);
+    }
+    if (!result->frames && o.patches && !opts.against) { /* patches alone are shown on the reference pose */
+        if (vg_sheet_add(sheet, result->head->reference_name, result->head->reference, NULL, &e) < 0) cli_die(&e);
+        result->frames++;
     }
     check_counts(result, truth);
     FILE *out = cli_text_open();
@@ -297,26 +322,6 @@ static void note_facts(const vg_page_facts *facts)
              (double)facts->bytes / 1e6, facts->loss);
     if (opts.against)
         cli_note("errors: mean %.3g D, max %.3g D; the colours end at %.3g D", facts->mean, facts->max, facts->scale);
-}
-
-/* Patches that were kept apart from the sequence. */
-static void take_patches(side *s)
-{
-    vg_head h = {0};
-    vg_err e;
-    char name[420];
-    snprintf(name, sizeof name, "'%.400s'", opts.patches);
-    if (vg_load_mesh(&h, opts.patches, &e) < 0 ||
-        vg_mesh_same(&h.mesh, name, &s->head->mesh, s->name, &e) < 0)
-        cli_die(&e);
-    if (!h.patches.n) {
-        vg_fail(&e, VG_EINPUT, "%s holds no patches: make them with 'vg-segment'", name);
-        cli_die(&e);
-    }
-    vg_patches_clear(&s->head->patches);
-    s->head->patches = h.patches;
-    h.patches = (vg_patches){0};
-    vg_head_clear(&h);
 }
 
 /* A stream of patches has no frames: they are shown on the reference pose. */

@@ -773,6 +773,7 @@ typedef struct vg_sheet_options {
     bool compare;         /* colours are vertex errors against a truth */
     bool centred;         /* of which the shift of the centroid is no part */
     double scale;         /* the end of the colours, in D; 0: the 99th percentile of what is shown, rounded up */
+    const vg_patches *patches; /* colours are patches, unless compare; borrowed until free; NULL: none */
     int threads;
 } vg_sheet_options;
 

@@ -48,7 +48,7 @@ int vgi_ground_shadow(vgi_ground *g, const vgi_drawing *d, vg_err *e)
     vgi_box box = vgi_box_empty();
     vgi_camera_measure(&below, d->figure, d->points, (double[2]){0, 0}, &box);
     vgi_camera_fit(&below, &box, 0.12);
-    vgi_drawing drawing = {d->figure, &below, d->points, NULL, 0.6f, 0};
+    vgi_drawing drawing = {.figure = d->figure, .camera = &below, .points = d->points, .wire = 0.6f};
     vgi_raster r = {0};
     g->shadow = vgi_array(SHADOW_SIZE * SHADOW_SIZE, sizeof *g->shadow, e);
     int status = g->shadow ? vgi_raster_init(&r, SHADOW_SIZE, SHADOW_SIZE, e) : VG_ENOMEM;

@@ -267,6 +267,8 @@ static void draw_face(work *k, size_t f)
     size_t first = m->start[f], n = m->start[f + 1] - first;
     for (size_t i = 0; i < n; i++)
         load_corner(k, m->vert[first + i], n > 2 ? k->normals + 3 * (first + i) : NULL, k->corner + i);
+    for (size_t i = 0; k->drawing->patches && i < n; i++)
+        k->corner[i].value = (float)(k->drawing->patches[f] & 0xffff) / 65535;
     if (n == 2) {
         vgi_raster_wire(k->raster, k->corner, k->corner + 1, k->drawing->wire);
         for (int i = 0; i < 2; i++) vgi_raster_wire(k->raster, k->corner + i, k->corner + i, 1.6f * k->drawing->wire);

@@ -178,12 +178,21 @@ static float light_error(const float n[3], float sky_seen_here)
     return (0.38f + 0.62f * fminf(k, 1.12f)) * (0.25f + 0.75f * sky_seen_here);
 }
 
+static void patch_colour(uint32_t number, float linear[3])
+{
+    unsigned char rgb[3];
+    vgi_patch_colour(number, rgb);
+    for (int k = 0; k < 3; k++) linear[k] = vgi_linear(rgb[k]);
+}
+
 static void light_sample(const vgi_look *l, const vgi_sample *s, float sky_seen_here, float line, float out[3])
 {
     float n[3];
     unit_normal(s, n);
-    if (l->errors) {
-        const float *colour = l->palette->map[(size_t)s->value * (VGI_MAP_STEPS - 1) / 65535];
+    float patch[3];
+    if (l->patches) patch_colour(s->value, patch);
+    if (l->errors || l->patches) {
+        const float *colour = l->patches ? patch : l->palette->map[(size_t)s->value * (VGI_MAP_STEPS - 1) / 65535];
         float factor = light_error(n, sky_seen_here) * (s->kind == VGI_BACK ? 0.75f : 1);
         for (int k = 0; k < 3; k++) out[k] = colour[k] * factor;
     } else {

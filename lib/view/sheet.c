@@ -294,10 +294,13 @@ static int draw_shot(const vg_sheet *s, size_t i, unsigned char *rgb, vg_err *e)
         if (!values) return VG_ENOMEM;
         for (size_t v = 0; v < nv; v++) values[v] = fminf((float)(shot->errors[v] / s->scale), 1);
     }
-    vgi_drawing drawing = {&s->figure, &camera, shot->points, values, (float)(0.9 * pixel),
-                           s->o.edges ? (float)(0.45 * pixel) : 0};
-    vgi_look look = {&s->palette,         NULL, s->o.compare, s->oversampling, 0.5f, (float)(0.02 * side),
-                     (float)(0.07 * side)};
+    const vg_patches *patches = s->o.compare ? NULL : s->o.patches;
+    vgi_drawing drawing = {.figure = &s->figure, .camera = &camera, .points = shot->points, .values = values,
+                           .patches = patches ? patches->of_face : NULL, .wire = (float)(0.9 * pixel),
+                           .edge = s->o.edges ? (float)(0.45 * pixel) : 0};
+    vgi_look look = {.palette = &s->palette, .errors = s->o.compare, .patches = patches != NULL,
+                     .oversampling = s->oversampling, .edge_strength = 0.5f, .outline = (float)(0.02 * side),
+                     .reach = (float)(0.07 * side)};
     if (s->o.ground && s->figure.mesh->nv > 0) {
         place_ground(s, i, &ground);
         r = vgi_ground_shadow(&ground, &drawing, e);

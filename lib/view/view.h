@@ -81,6 +81,7 @@ typedef struct vgi_drawing { /* one pose to be drawn */
     const vgi_camera *camera;
     const float *points; /* nv, in D */
     const float *values; /* nv in [0, 1], or NULL */
+    const uint32_t *patches; /* per face, or NULL: samples get the number of their face's patch (modulo 2^16) for a value */
     float wire;          /* radius of 2-vertex faces, in samples */
     float edge;          /* half the width of a drawn edge, in samples; 0: edges are not marked */
 } vgi_drawing;
@@ -127,6 +128,7 @@ typedef struct vgi_look {
     const vgi_palette *palette;
     const vgi_ground *ground; /* or NULL */
     bool errors;              /* colours by value, else clay */
+    bool patches;             /* ... or value is the number of a patch */
     size_t oversampling;
     float edge_strength;      /* 0 to 1 */
     float outline;            /* a step in depth that is drawn as an outline, in samples */

@@ -99,7 +99,7 @@ static void draw(drawn *d, const shape *s, double azimuth, double elevation, siz
     vgi_box box = vgi_box_empty();
     vgi_camera_measure(&d->camera, &d->figure, d->points, (double[2]){0, 0}, &box);
     vgi_camera_fit(&d->camera, &box, 0.1);
-    vgi_drawing drawing = {&d->figure, &d->camera, d->points, values, 2, 0};
+    vgi_drawing drawing = {.figure = &d->figure, .camera = &d->camera, .points = d->points, .values = values, .wire = 2};
     CHECK(vgi_raster_init(&d->raster, side, side, NULL) == VG_OK);
     CHECK(vgi_draw(&d->raster, &drawing, NULL) == VG_OK);
 }
