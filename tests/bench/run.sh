@@ -277,6 +277,29 @@ setup tube '50,002 / 100,000 triangles'
 rm -f rod.vgs rod-w.vgs tube.vgs tube-w.vgs
 read -r gain <tube.gain || [ -n "$gain" ]
 
+head_of 'Patches and maps, 50 patches (reference: sgemm of the same shape, blocks of 32 poses)'
+rod A tri 84 82 11 >eleven.vgs
+copies 44 eleven.vgs many.vgs
+# playing a map: the motions of the patches, as binary32, many times over
+read -r product single <<EOF
+$(product 50 6890)
+EOF
+best 1 'vg-segment many.vgs -k 50 -q -o rod.patches'
+row vg-segment '6,890 / 13,776, 484 poses' 484 "$(bytes many.vgs)" 'pipe copy' MB/s "$pipe"
+goal 'segmentation of 484 poses, 6,890 vertices' "$seconds" s '<=' 2
+best 1 'vg-fitmap -q --patches rod.patches many.vgs -o rod.map'
+row vg-fitmap '6,890 / 13,776, 484 poses' 484 "$(bytes many.vgs)" 'pipe copy' MB/s "$pipe"
+goal 'fit of a map to 484 poses, 6,890 vertices' "$seconds" s '<=' 5
+best 1 'vg-fitmap -q --patches rod.patches eleven.vgs -o eleven.map'
+goal 'fit of a map to 11 poses, 6,890 vertices' "$seconds" s '<=' 0.3
+# shellcheck disable=SC2046
+vg-encode --f32 $(repeat 440 eleven.vgs) | vg-deform --map rod.map --transforms -o motions.vgs
+best "$RUNS" 'vg-deform --map rod.map motions.vgs >/dev/null'
+row 'vg-deform --map' '6,890, binary32' 4840 $((4840 * 6890 * 12)) sgemm poses/s "$product"
+goal 'playing a map, 6,890 vertices' "$(calc "int($rate)")" poses/s '>=' 10000
+printf 'sgemm one pose at a time: %s poses/s\n' "$single"
+rm -f many.vgs motions.vgs
+
 if [ "$BENCH" = full ]; then
     head_of 'Large meshes'
     rods hose 500 400 11 2
