@@ -10,7 +10,7 @@ page_section() {
 
 # synopsis_of_page PAGE, synopsis_of_help PROGRAM: what follows the program's name, blanks squeezed
 synopsis_of_page() {
-    mandoc -Tascii -O width=200 "$1" | col -b | awk '/^[A-Z]/{on = ($0 == "SYNOPSIS")} on && !/^[A-Z]/' |
+    mandoc -Tascii -O width=200 "$1" | sed 's|.\x08||g' | awk '/^[A-Z]/{on = ($0 == "SYNOPSIS")} on && !/^[A-Z]/' |
         tr -s ' \t\n' ' ' | sed 's/^ *[a-z-]* //; s/ $//'
 }
 synopsis_of_help() {

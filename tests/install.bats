@@ -58,7 +58,7 @@ END
     [ "$(PKG_CONFIG_LIBDIR=root/usr/lib/pkgconfig pkg-config --modversion libvg)" = "$(sed -n 's/^#define VG_VERSION "\(.*\)"/\1/p' "$ROOT/lib/vg.h")" ]
 
     # nothing of where it was built
-    capture grep -l -r -F -e "$ROOT" root/usr/lib/pkgconfig root/usr/include root/usr/share
+    capture grep -l -r -F -e "$ROOT/" root/usr/lib/pkgconfig root/usr/include root/usr/share
     [ "$status" = 1 ] || fail "these name the directory of the sources: $output"
 
     make_into_root uninstall
