@@ -374,21 +374,21 @@ static void note_tree(report *r, const vg_head *h)
 {
     size_t n = h->nprovenance, nedges = n;
     for (size_t i = 0; i < n; i++) nedges += h->provenance[i].nparents;
-    step *todo = calloc(nedges + 1, sizeof *todo);
+    step *pending = calloc(nedges + 1, sizeof *pending);
     bool *shown = calloc(n + 1, sizeof *shown);
-    for (size_t root = n; todo && shown && root-- > 0;) {
+    for (size_t root = n; pending && shown && root-- > 0;) {
         size_t open = 0;
-        if (!shown[root]) todo[open++] = (step){root, 0};
+        if (!shown[root]) pending[open++] = (step){root, 0};
         while (open) {
-            step s = todo[--open];
+            step s = pending[--open];
             const vg_provenance *p = &h->provenance[s.process];
             if (shown[s.process]) continue;
             shown[s.process] = true;
             note_process(r, p, s.depth);
-            for (size_t i = 0; i < p->nparents; i++) todo[open++] = (step){p->parents[i], s.depth + 1};
+            for (size_t i = 0; i < p->nparents; i++) pending[open++] = (step){p->parents[i], s.depth + 1};
         }
     }
-    free(todo);
+    free(pending);
     free(shown);
 }
 

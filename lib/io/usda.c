@@ -29,7 +29,7 @@ static int put_text(writing *x, const char *s, vg_err *e)
     return vgi_output_put(x->out, s, strlen(s), e);
 }
 
-/* Room for a number, blank for now. */
+/* Room for a number, blank at first. */
 static int put_room(writing *x, uint64_t *off, vg_err *e)
 {
     char blank[ROOM];
