@@ -279,11 +279,6 @@ END
     must_fail 3 vg-view pose1.obj --patches pose2.obj -o none.html
     says "'pose2.obj' holds no patches: make them with 'vg-segment'"
     must_fail 3 vg-view tetra.obj --patches cube.patches -o none.html
-    # on a sheet: each patch has its colour, and there are as many as patches
-    must vg-view cube.patches -o patches.png
-    must vg-view pose*.obj --patches cube.patches -o poses.png
-    must vg-view pose1.obj -o clay.png
-    ! cmp -s patches.png clay.png || fail 'patches are not coloured'
     [ ! -e none.html ]
     browse page.html <<'END'
 assert page.value("document.querySelector('#legend-text').textContent") == "3 patches, a colour each"

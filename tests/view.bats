@@ -205,3 +205,46 @@ PY
     must vg-view --version
     shows "vg-view"
 }
+
+# hues FILE: how many of the six sectors of the colour circle hold at least 200 strongly coloured pixels
+hues() {
+    python3 - "$1" <<'PY'
+import colorsys, struct, sys, zlib
+data = open(sys.argv[1], "rb").read()
+at, packed = 8, b""
+while at < len(data):
+    n, kind = struct.unpack(">I4s", data[at:at + 8])
+    body = data[at + 8:at + 8 + n]
+    if kind == b"IHDR":
+        width, height, depth, colour = struct.unpack(">IIBB", body[:10])
+        assert (depth, colour) == (8, 2)
+    packed += body if kind == b"IDAT" else b""
+    at += 12 + n
+raw, step = zlib.decompress(packed), 3 * width
+before, count = bytearray(step), [0] * 6
+for y in range(height):
+    how, line = raw[y * (step + 1)], bytearray(raw[y * (step + 1) + 1:(y + 1) * (step + 1)])
+    for i in range(step):
+        a, b, c = line[i - 3] if i > 2 else 0, before[i], before[i - 3] if i > 2 else 0
+        p = a + b - c
+        paeth = a if abs(p - a) <= abs(p - b) and abs(p - a) <= abs(p - c) else b if abs(p - b) <= abs(p - c) else c
+        line[i] = (line[i] + (0, a, b, (a + b) // 2, paeth)[how]) & 255
+    before = line
+    for x in range(0, step, 3):
+        h, s, v = colorsys.rgb_to_hsv(*(c / 255 for c in line[x:x + 3]))
+        if s > 0.35 and v > 0.2:
+            count[int(h * 6) % 6] += 1
+print(sum(n >= 200 for n in count))
+PY
+}
+
+@test "patches are colours on a sheet: of a stream without frames, and of one that is given beside the poses" {
+    poses cube 3
+    must vg-segment --patches 3 pose1.obj pose2.obj pose3.obj -o cube.patches
+    must vg-view pose1.obj -o clay.png
+    must vg-view pose1.obj --patches cube.patches -o poses.png
+    must vg-view cube.patches -o patches.png
+    [ "$(hues clay.png)" = 0 ] || fail "clay has $(hues clay.png) hues"
+    [ "$(hues poses.png)" -ge 2 ] || fail "the poses have $(hues poses.png) hues"
+    [ "$(hues patches.png)" -ge 2 ] || fail "the patches have $(hues patches.png) hues"
+}
