@@ -186,8 +186,31 @@ typedef struct vg_patches {
 
 void vg_patches_clear(vg_patches *p);
 
-/* What drives a map: the transforms of patches. */
-typedef enum vg_map_kind { VG_MAP_PATCHES = 1 } vg_map_kind;
+/* A skeleton that drives the mesh, and linear blend skinning with it (MATH 6; T 5). Transform b of the rig is the motion of joint
+ * bone[b]: what takes a point of the reference pose that is rigid with it to where it is now. */
+enum { VG_SKIN = 4 };
+typedef struct vg_rig {
+    vg_skeleton skeleton; /* njoints 0: there is no rig */
+    double *at;           /* a point for each joint: where it is in the reference pose of the mesh */
+    double *turn;         /* a unit quaternion for each joint: how it is turned there, beside the skeleton's pose without rotations */
+    size_t nbones;
+    uint32_t *bone;       /* the joints that have channels, ascending: those that turn */
+    uint32_t *skin_bone;  /* VG_SKIN bones for each vertex of the mesh; NULL: there are no weights */
+    double *skin_weight;  /* VG_SKIN for each vertex: >= 0, sum 1, the largest first; 0 where fewer bones move it */
+} vg_rig;
+
+void vg_rig_clear(vg_rig *r);
+int vg_rig_copy(vg_rig *to, const vg_rig *from, size_t nv, vg_err *e) VG_MUST_CHECK;
+/* vg_rig_make: a rig without weights; the skeleton is copied. positions, turns: of its joints in the reference pose of the mesh, as
+ * vg_skeleton_pose gives them. VG_EINPUT when no joint has channels. */
+int vg_rig_make(vg_rig *r, const vg_skeleton *s, const double *positions, const double *turns, vg_err *e) VG_MUST_CHECK;
+/* vg_rig_transforms: positions and turns of all joints in a pose to nbones transforms of 7 numbers, as in VG_TRANSFORMS. */
+void vg_rig_transforms(const vg_rig *r, const double *positions, const double *turns, double *transforms);
+/* vg_rig_skin: linear blend skinning of n vertices' reference pose by transforms. */
+void vg_rig_skin(const vg_rig *r, size_t nv, const double *reference, const double *transforms, double *vertices);
+
+/* What drives a map: the transforms of patches, or of the bones of a rig. */
+typedef enum vg_map_kind { VG_MAP_PATCHES = 1, VG_MAP_BONES = 2 } vg_map_kind;
 
 /* Vertices as a linear function of transforms (MATH 7; T 6.3): with transform p taking x to A_p x + t_p, vertex v is at
  * sum over p of A_p e_vp + tau_vp t_p. What the operator was made of is kept, so that it can be made for another body. */
@@ -203,16 +226,18 @@ typedef struct vg_map {
     double size;         /* of this body beside the one that poses are measured on */
     bool has_home;       /* the body that poses are measured on is another one: */
     double *home;        /* its reference pose, nv points; NULL: the mesh's own */
-    size_t njoints;      /* pairs of patches that hang together */
+    size_t njoints;      /* pairs of patches that hang together; of bones none: their skeleton says how they do */
     uint32_t *joint;     /* two patches each */
     double *joint_at;    /* the point in the reference pose that both move alike, as well as can be */
     double *joint_weight;
-    size_t ncorners;     /* of the vector graph */
-    double *corner;      /* a quaternion each: A_p Q r Q* is the vector of the corner */
-    size_t nheld;        /* vertices held where their patch takes them */
+    size_t ncorners;     /* of the vector graph; 0: vertices follow the skin of the rig alone */
+    size_t per_corner;   /* transforms that drive a corner: 1, or 2 bones */
+    double *corner;      /* per_corner quaternions each: the vector of the corner is the sum of A_p Q r Q* over its p */
+    uint32_t *corner_bone; /* bones: per_corner p for each corner; patches: NULL, p is that of the face */
+    size_t nheld;        /* vertices held where their patch takes them, or the skin of the rig */
     uint32_t *held;      /* ascending */
-    uint32_t *held_patch;
-    double *held_at;     /* the point in the reference pose that the patch takes there */
+    uint32_t *held_patch; /* patches only */
+    double *held_at;     /* patches only: the point in the reference pose that the patch takes there */
     size_t nnames;       /* 0 or n */
     char **names;
 } vg_map;
@@ -268,6 +293,7 @@ typedef struct vg_head {
     vg_skeleton skeleton;
     vg_correspondence correspondence; /* a stream of vg-register: mesh and reference are the source's, its frame is fitted to the target */
     vg_patches patches;   /* a stream of vg-segment, and those that come of it */
+    vg_rig rig;           /* of a map of bones; also in streams of transforms of bones */
     vg_map map;           /* a stream of vg-fitmap */
     bool has_selection;   /* only the faces `selected` (ascending) carry vectors; else all do */
     size_t nselected;
@@ -304,11 +330,13 @@ typedef struct vg_frame {
     double *anchors; /* vectors, deformations: head.nanchors points */
     size_t npins;    /* vectors: vertices (ascending) that stay where the reference has them, in this frame; set by vg_frame_pin */
     uint32_t *pins;
+    size_t nturns;   /* vertices of a skeleton: number of joints when it is known how they have turned, else 0; set by vg_frame_turn */
+    double *turns;   /* a unit quaternion w x y z each, beside the skeleton's pose without rotations: positions do not say it all */
     double *values;  /* head.count * vg_kind_width(head.kind) */
     vg_records extra; /* unknown records that came before this frame */
     /* private to the reader and to vg_frame_*: */
     vg_bytes raw;
-    size_t name_cap, anchors_cap, pins_cap, values_cap;
+    size_t name_cap, anchors_cap, pins_cap, turns_cap, values_cap;
     double *values_own;
 } vg_frame;
 
@@ -316,8 +344,9 @@ void vg_frame_clear(vg_frame *f);
 /* vg_frame_shape: make room for the values and anchors of a frame of h; contents undefined. */
 int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 int vg_frame_pin(vg_frame *f, const uint32_t *vertices, size_t n, vg_err *e) VG_MUST_CHECK;
+int vg_frame_turn(vg_frame *f, const double *turns, size_t njoints, vg_err *e) VG_MUST_CHECK;
 int vg_frame_rename(vg_frame *f, const char *name, vg_err *e) VG_MUST_CHECK;
-/* vg_frame_label: take over name, time and unknown records of `from`, but no numbers; `from` loses its records. */
+/* vg_frame_label: take over name, time and unknown records of `from`, but no numbers, pins or turns; `from` loses its records. */
 int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e) VG_MUST_CHECK;
 
 /* The vector graph of a sequence: the faces that carry vectors, in order (all, or the selected ones), then the links.

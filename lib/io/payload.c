@@ -659,7 +659,7 @@ int vgi_map_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     if ((flags & ~HAS_HOME) || zero || (names && names != n)) return wrong(p, "unknown flags are set, or names are missing", e);
     if (!vgi_finite(&size, 1) || !(size > 0)) return wrong(p, "its size is not positive", e);
     *m = (vg_map){.n = (size_t)n, .nv = (size_t)nv, .kind = (vg_map_kind)kind, .size = size, .has_home = flags & HAS_HOME,
-                  .njoints = (size_t)joints, .ncorners = (size_t)corners, .nheld = (size_t)held};
+                  .njoints = (size_t)joints, .ncorners = (size_t)corners, .per_corner = 1, .nheld = (size_t)held};
     int r = take_map_arrays(&c, m, p, e);
     if (r == VG_OK) r = check_map(p, m, e);
     if (r == VG_OK) r = take_map_names(&c, m, names, p, e);

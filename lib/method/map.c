@@ -610,7 +610,8 @@ static int fit_skin(const vg_map_fitter *f, vg_map *m, vg_err *e)
 static int make_arrays(vg_map *m, const vg_map_fitter *f, vg_err *e)
 {
     size_t n = f->shape.n;
-    *m = (vg_map){.n = n, .nv = f->g->nv, .kind = VG_MAP_PATCHES, .size = 1, .ncorners = vg_graph_corners(f->g), .nheld = f->nheld};
+    *m = (vg_map){.n = n, .nv = f->g->nv, .kind = VG_MAP_PATCHES, .size = 1, .ncorners = vg_graph_corners(f->g), .per_corner = 1,
+                  .nheld = f->nheld};
     m->place = vgi_array(n, 3 * n * sizeof *m->place, e);
     m->centre = vgi_copy_array(f->shape.centre, 3 * n, sizeof *m->centre, e);
     m->home_centre = vgi_copy_array(f->shape.centre, 3 * n, sizeof *m->centre, e);

@@ -103,14 +103,17 @@ static int copy_patches(vg_patches *to, const vg_patches *from, size_t nf, vg_er
 
 size_t vgi_map_arrays(vg_map *m, vgi_map_array list[VGI_MAP_ARRAYS])
 {
+    bool bones = m->kind == VG_MAP_BONES;
+    size_t placed = bones ? 0 : m->nheld;
     const vgi_map_array all[VGI_MAP_ARRAYS] = {
         {(void **)&m->weights, m->nv, 4, true, true}, {(void **)&m->place, m->n, 3, true, true},
         {(void **)&m->centre, m->n, 3, false, true}, {(void **)&m->home_centre, m->n, 3, false, true},
         {(void **)&m->share, m->n, 1, false, true}, {(void **)&m->home, m->has_home ? m->nv : 0, 3, false, true},
         {(void **)&m->joint_at, m->njoints, 3, false, true}, {(void **)&m->joint_weight, m->njoints, 1, false, true},
-        {(void **)&m->corner, m->ncorners, 4, false, true}, {(void **)&m->held_at, m->nheld, 3, false, true},
+        {(void **)&m->corner, m->ncorners, 4 * m->per_corner, false, true}, {(void **)&m->held_at, placed, 3, false, true},
         {(void **)&m->joint, m->njoints, 2, false, false}, {(void **)&m->held, m->nheld, 1, false, false},
-        {(void **)&m->held_patch, m->nheld, 1, false, false}};
+        {(void **)&m->held_patch, placed, 1, false, false},
+        {(void **)&m->corner_bone, bones ? m->ncorners : 0, m->per_corner, false, false}};
     memcpy(list, all, sizeof all);
     return VGI_MAP_ARRAYS;
 }
@@ -308,6 +311,7 @@ void vg_head_clear(vg_head *h)
     vg_skeleton_clear(&h->skeleton);
     vg_correspondence_clear(&h->correspondence);
     vg_patches_clear(&h->patches);
+    vg_rig_clear(&h->rig);
     vg_map_clear(&h->map);
     free(h->selected);
     free(h->links);
@@ -328,7 +332,7 @@ int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e)
               vg_skeleton_copy(&to->skeleton, &from->skeleton, e) == VG_OK &&
               vg_correspondence_copy(&to->correspondence, &from->correspondence, e) == VG_OK &&
               copy_patches(&to->patches, &from->patches, from->mesh.nf, e) == VG_OK && copy_map(&to->map, &from->map, e) == VG_OK &&
-              (to->reference_name = vgi_copy_string(name, strlen(name), e));
+              vg_rig_copy(&to->rig, &from->rig, from->mesh.nv, e) == VG_OK && (to->reference_name = vgi_copy_string(name, strlen(name), e));
     if (ok && from->reference)
         ok = (to->reference = vgi_copy_array(from->reference, 3 * from->mesh.nv, sizeof *to->reference, e));
     if (ok && (ok = (to->selected = vgi_copy_array(from->selected, from->nselected, sizeof *to->selected, e))))
@@ -350,6 +354,7 @@ void vg_frame_clear(vg_frame *f)
     free(f->name);
     free(f->anchors);
     free(f->pins);
+    free(f->turns);
     free(f->values_own);
     vg_bytes_clear(&f->raw);
     vg_records_clear(&f->extra);
@@ -373,6 +378,15 @@ int vg_frame_pin(vg_frame *f, const uint32_t *vertices, size_t n, vg_err *e)
     if (r < 0) return r;
     if (n) memcpy(f->pins, vertices, n * sizeof *f->pins);
     f->npins = n;
+    return VG_OK;
+}
+
+int vg_frame_turn(vg_frame *f, const double *turns, size_t njoints, vg_err *e)
+{
+    int r = vgi_grow(&f->turns, &f->turns_cap, 4 * njoints, sizeof *f->turns, e);
+    if (r < 0) return r;
+    if (njoints) memcpy(f->turns, turns, 4 * njoints * sizeof *f->turns);
+    f->nturns = njoints;
     return VG_OK;
 }
 

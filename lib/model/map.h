@@ -5,7 +5,7 @@
 
 #include "core/core.h"
 
-enum { VGI_MAP_ARRAYS = 13 };
+enum { VGI_MAP_ARRAYS = 14 };
 
 typedef struct vgi_map_array {
     void **at;          /* where the map keeps it */

@@ -1,0 +1,76 @@
+/* rig.c: a skeleton in the reference pose of a mesh, its motions as transforms, and linear blend skinning.
+ * Leaves out how weights and transforms are fitted (method/skin.c, method/bend.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/core.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+void vg_rig_clear(vg_rig *r)
+{
+    vg_skeleton_clear(&r->skeleton);
+    free(r->at);
+    free(r->turn);
+    free(r->bone);
+    free(r->skin_bone);
+    free(r->skin_weight);
+    *r = (vg_rig){0};
+}
+
+int vg_rig_make(vg_rig *r, const vg_skeleton *s, const double *positions, const double *turns, vg_err *e)
+{
+    *r = (vg_rig){0};
+    size_t bones = 0;
+    for (size_t j = 0; j < s->njoints; j++) bones += s->joints[j].nchannels > 0;
+    if (!bones) return vg_fail(e, VG_EINPUT, "the skeleton has no joint that turns");
+    r->at = vgi_copy_array(positions, 3 * s->njoints, sizeof *r->at, e);
+    r->turn = vgi_copy_array(turns, 4 * s->njoints, sizeof *r->turn, e);
+    r->bone = vgi_array_raw(bones, sizeof *r->bone, e);
+    if (!r->at || !r->turn || !r->bone || vg_skeleton_copy(&r->skeleton, s, e) < 0) {
+        vg_rig_clear(r);
+        return VG_ENOMEM;
+    }
+    for (size_t j = 0; j < s->njoints; j++)
+        if (s->joints[j].nchannels > 0) r->bone[r->nbones++] = (uint32_t)j;
+    return VG_OK;
+}
+
+int vg_rig_copy(vg_rig *to, const vg_rig *from, size_t nv, vg_err *e)
+{
+    *to = (vg_rig){0};
+    if (!from->skeleton.njoints) return VG_OK;
+    int r = vg_rig_make(to, &from->skeleton, from->at, from->turn, e);
+    if (r < 0 || !from->skin_bone) return r;
+    to->skin_bone = vgi_copy_array(from->skin_bone, VG_SKIN * nv, sizeof *to->skin_bone, e);
+    to->skin_weight = vgi_copy_array(from->skin_weight, VG_SKIN * nv, sizeof *to->skin_weight, e);
+    if (to->skin_bone && to->skin_weight) return VG_OK;
+    vg_rig_clear(to);
+    return VG_ENOMEM;
+}
+
+void vg_rig_transforms(const vg_rig *r, const double *positions, const double *turns, double *transforms)
+{
+    for (size_t b = 0; b < r->nbones; b++) {
+        size_t j = r->bone[b];
+        const double *q = r->turn + 4 * j, back[4] = {q[0], -q[1], -q[2], -q[3]};
+        double *to = transforms + 7 * b, moved[3];
+        vg_quat_multiply(turns + 4 * j, back, to);
+        vg_quat_apply(to, r->at + 3 * j, moved);
+        for (size_t k = 0; k < 3; k++) to[4 + k] = positions[3 * j + k] - moved[k];
+    }
+}
+
+void vg_rig_skin(const vg_rig *r, size_t nv, const double *reference, const double *transforms, double *vertices)
+{
+    for (size_t v = 0; v < nv; v++) {
+        double sum[3] = {0, 0, 0};
+        for (size_t i = 0; i < VG_SKIN; i++) {
+            double w = r->skin_weight[VG_SKIN * v + i], moved[3];
+            if (!(w > 0)) break;
+            const double *t = transforms + 7 * (size_t)r->skin_bone[VG_SKIN * v + i];
+            vg_quat_apply(t, reference + 3 * v, moved);
+            for (int k = 0; k < 3; k++) sum[k] += w * (moved[k] + t[4 + k]);
+        }
+        memcpy(vertices + 3 * v, sum, sizeof sum);
+    }
+}
