@@ -4,7 +4,9 @@
 # make check       all tests                    make CONFIG=asan check    the same under ASan and UBSan
 # make bench       throughput of every stage beside its reference
 # make fuzz        search for input that breaks the readers (clang; FUZZ_SECONDS=60 each)
-# make install     PREFIX=/usr/local DESTDIR=   make uninstall, make clean
+# make install     PREFIX=/usr/local LIBDIR=$(PREFIX)/lib DESTDIR=   make uninstall, make clean
+# make dist        build/vg-VERSION.tar.xz, the same bytes each time; make distcheck builds and tests from it (TESTS=)
+# make deb         Debian packages into build/deb (what it takes: debian/control)
 .DEFAULT_GOAL := all
 .SUFFIXES:
 .DELETE_ON_ERROR:
@@ -12,6 +14,7 @@
 
 CONFIG ?= release
 PREFIX ?= /usr/local
+LIBDIR ?= $(PREFIX)/lib
 FUZZ_SECONDS ?= 60
 WERROR ?= 0
 CC ?= cc
@@ -151,26 +154,43 @@ fuzz-run: $(FUZZERS:%=$(B)/fuzz/%)
 	        build/fuzz/corpus/$$f tests/corpus/accept tests/corpus/reject $$(test -d tests/corpus/$$f && echo tests/corpus/$$f) || exit 1; \
 	done
 
+BIN_TO := $(DESTDIR)$(PREFIX)/bin
+LIB_TO := $(DESTDIR)$(LIBDIR)
+INCLUDE_TO := $(DESTDIR)$(PREFIX)/include
+MAN_TO := $(DESTDIR)$(PREFIX)/share/man
+COMPLETION_TO := $(DESTDIR)$(PREFIX)/share/bash-completion/completions
+
 .PHONY: install
 install: all
-	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include \
-	    $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/man/man5 $(DESTDIR)$(PREFIX)/share/man/man7
-	install -m 755 $(PROGRAMS:%=$(B)/bin/%) $(DESTDIR)$(PREFIX)/bin
-	install -m 644 $(B)/libvg.a $(DESTDIR)$(PREFIX)/lib
-	install -m 644 lib/vg.h $(DESTDIR)$(PREFIX)/include
-	sed -e 's|@PREFIX@|$(PREFIX)|' -e 's|@VERSION@|$(VERSION)|' \
-	    -e 's|@LIBS@|$(strip $(ALL_LIBS))|' lib/libvg.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/libvg.pc
-	install -m 644 man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
-	install -m 644 man/*.5 $(DESTDIR)$(PREFIX)/share/man/man5
-	install -m 644 man/*.7 $(DESTDIR)$(PREFIX)/share/man/man7
+	install -d $(BIN_TO) $(LIB_TO)/pkgconfig $(INCLUDE_TO) $(MAN_TO)/man1 $(MAN_TO)/man5 $(MAN_TO)/man7 $(COMPLETION_TO)
+	install -m 755 $(PROGRAMS:%=$(B)/bin/%) $(BIN_TO)
+	install -m 644 $(B)/libvg.a $(LIB_TO)
+	install -m 644 lib/vg.h $(INCLUDE_TO)
+	sed -e 's|@PREFIX@|$(PREFIX)|' -e 's|@LIBDIR@|$(LIBDIR)|' -e 's|@VERSION@|$(VERSION)|' \
+	    -e 's|@LIBS@|$(strip $(ALL_LIBS))|' lib/libvg.pc.in > $(LIB_TO)/pkgconfig/libvg.pc
+	for page in man/*.[1-9]; do install -m 644 $$page $(MAN_TO)/man$${page##*.} || exit 1; done
+	install -m 644 completion/vg.bash $(COMPLETION_TO)/vg
+	for program in $(PROGRAMS); do ln -sf vg $(COMPLETION_TO)/$$program || exit 1; done
 
 .PHONY: uninstall
 uninstall:
-	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/%) $(DESTDIR)$(PREFIX)/lib/libvg.a $(DESTDIR)$(PREFIX)/include/vg.h \
-	    $(DESTDIR)$(PREFIX)/lib/pkgconfig/libvg.pc \
-	    $(patsubst man/%,$(DESTDIR)$(PREFIX)/share/man/man1/%,$(wildcard man/*.1)) \
-	    $(patsubst man/%,$(DESTDIR)$(PREFIX)/share/man/man5/%,$(wildcard man/*.5)) \
-	    $(patsubst man/%,$(DESTDIR)$(PREFIX)/share/man/man7/%,$(wildcard man/*.7))
+	rm -f $(PROGRAMS:%=$(BIN_TO)/%) $(LIB_TO)/libvg.a $(INCLUDE_TO)/vg.h $(LIB_TO)/pkgconfig/libvg.pc \
+	    $(foreach page,$(notdir $(wildcard man/*.[1-9])),$(MAN_TO)/man$(subst .,,$(suffix $(page)))/$(page)) \
+	    $(COMPLETION_TO)/vg $(PROGRAMS:%=$(COMPLETION_TO)/%)
+
+# The same tree gives the same bytes: names sorted, nobody's user and mask, one time for all files. DIST tells where it is.
+DIST := build/vg-$(VERSION).tar.xz
+.PHONY: dist
+dist:
+	@sh tests/dist.sh pack $(DIST) vg-$(VERSION)
+
+.PHONY: distcheck
+distcheck: dist
+	@MAKE='$(MAKE)' sh tests/dist.sh check $(DIST) vg-$(VERSION)
+
+.PHONY: deb
+deb: dist
+	@sh tests/dist.sh deb $(DIST) vg-$(VERSION)
 
 .PHONY: clean
 clean:

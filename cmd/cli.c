@@ -18,7 +18,8 @@
 enum {
     PIPE_BYTES = 1 << 20, /* a pipe of this size carries three to four times what one of 64 KiB does */
     MOST_THREADS = 256,
-    MESSAGE_BYTES = 1024
+    MESSAGE_BYTES = 1024,
+    HELP_COLUMN = 32
 };
 
 struct cli_state cli;
@@ -533,18 +534,20 @@ static int option_text(const cli_option *o, char *to, size_t n)
     return snprintf(to, n, "  %s--%s%s%s", letter, o->name, o->value ? " " : "", o->value ? o->value : "");
 }
 
+/* An option that is too long for the column has its explanation on a line of its own. */
 static void print_help(const cli_program *p, const cli_option *const *all, size_t n)
 {
     char text[128];
     int width = 0;
     for (size_t i = 0; i < n; i++) {
         int w = option_text(all[i], text, sizeof text);
-        if (w > width) width = w;
+        if (w > width && w <= HELP_COLUMN) width = w;
     }
     printf("usage: %s %s\n%s\n\n", p->name, p->synopsis, p->summary);
     for (size_t i = 0; i < n; i++) {
-        option_text(all[i], text, sizeof text);
-        printf("%-*s  %s\n", width, text, all[i]->help);
+        bool fits = option_text(all[i], text, sizeof text) <= width;
+        if (!fits) printf("%s\n", text);
+        printf("%-*s  %s\n", width, fits ? text : "", all[i]->help);
     }
 }
 

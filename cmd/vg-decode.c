@@ -9,7 +9,8 @@ static const char *output; /* not cli.output, which is NULL for "-" as for none 
 static const cli_option options[] = {
     {"output", 'o', "FILE", "a.obj, 'a-%04d.ply', DIR/, a.zip, a.pc2, a.npz, ...; '-' is standard output",
      .text = &output},
-    {"format", 0, "FORMAT", "obj, ply, off, stl, pc2, npz, ..., whatever the name says", .text = &sink_options.format},
+    {"format", 0, "obj|ply|ply-ascii|ply-be|off|stl|stl-ascii|pc2|mdd|npy|npz|usda|glb|gltf|bvh",
+     "whatever the name says", .text = &sink_options.format},
     {"f64", 0, NULL, "numbers that read back to the same binary64, not binary32", .flag = &sink_options.full_precision},
     {"first-number", 0, "N", "what %d in the output's name starts at (default 0)", .integer = &first_number,
      .least = 0, .most = 1e9},

@@ -15,7 +15,7 @@ static const cli_option options[] = {
     {"onto", 0, "MESH", "apply to this mesh and write its vectors; without it, write the deformations", .text = &opts.onto},
     {"correspondence", 0, "FILE", "the target has another connectivity: what vg-register found", .text = &opts.correspondence},
     {"by", 0, "pose|shape|gradient|blend", "what is carried over (default pose)", .text = &opts.by},
-    {"root", 0, "WHERE", "where the body goes: centroid (default), stay, or the number of a vertex to follow",
+    {"root", 0, "centroid|stay|V", "where the body goes: as the centroid does (default), nowhere, or as vertex V does",
      .text = &opts.root},
     {"pin", 0, "auto|always|none", "hold what does not move in the source: where it is much of the mesh (default), ...",
      .text = &opts.pin},

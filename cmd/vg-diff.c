@@ -15,7 +15,7 @@ static struct {
 static const cli_option options[] = {
     {.name = "tolerance", .letter = 't', .value = "X", .help = "exit 1 when the error exceeds X, in units of D",
      .number = &opts.tolerance, .least = 0, .most = INFINITY},
-    {.name = "of", .value = "WHICH", .help = "the error it is about: mean, rms, p95 or max (default: max)",
+    {.name = "of", .value = "mean|rms|p95|max", .help = "the error it is about (default: max)",
      .text = &opts.of},
     {.name = "centred", .letter = 'c', .help = "move the centroid of every pose to 0 before comparing",
      .flag = &opts.centred},
@@ -26,7 +26,7 @@ static const cli_option options[] = {
 static const cli_program program = {
     .name = "vg-diff",
     .synopsis = "[options] TRUTH RESULT",
-    .summary = "Measure how far the poses of RESULT are from those of TRUTH",
+    .summary = "measure how far the poses of RESULT are from those of TRUTH",
     .options = options,
     .most_operands = 2,
     .writes_text = true,

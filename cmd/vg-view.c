@@ -18,8 +18,8 @@ static struct {
 } opts = {.view = "30,15", .up = "y"};
 
 static const cli_option options[] = {
-    {.name = "format", .value = "KIND", .text = &opts.format,
-     .help = "png or html, whatever the name of the output (default: told by it, else png)"},
+    {.name = "format", .value = "png|html", .text = &opts.format,
+     .help = "whatever the name of the output (default: told by it, else png)"},
     {.name = "frames", .value = "N",
      .help = "sheet: N evenly spaced frames, or all when there are fewer (default: 8)",
      .integer = &opts.frames, .least = 1, .most = 10000},
@@ -27,9 +27,9 @@ static const cli_option options[] = {
      .integer = &opts.columns, .least = 1, .most = 10000},
     {.name = "size", .value = "WxH", .help = "sheet: of the picture of one frame, in pixels (default: 360x360)",
      .text = &opts.size},
-    {.name = "view", .value = "VIEW", .text = &opts.view,
-     .help = "front, back, left, right, top, iso, or AZIMUTH,ELEVATION in degrees (default: 30,15)"},
-    {.name = "up", .value = "AXIS", .help = "y or z: the axis that points up (default: y)", .text = &opts.up},
+    {.name = "view", .value = "front|back|left|right|top|iso|A,E", .text = &opts.view,
+     .help = "from where, or azimuth and elevation in degrees (default: 30,15)"},
+    {.name = "up", .value = "y|z", .help = "the axis that points up (default: y)", .text = &opts.up},
     {.name = "follow", .help = "keep the figure in the middle of its picture", .flag = &opts.follow},
     {.name = "ground", .help = "draw a grid where the reference pose stands, and a shadow", .flag = &opts.ground},
     {.name = "edges", .help = "draw the edges of the polygons", .flag = &opts.edges},
@@ -51,7 +51,7 @@ static const cli_option options[] = {
 static const cli_program program = {
     .name = "vg-view",
     .synopsis = "[options] [FILE ...]",
-    .summary = "Make a page (HTML) that plays a sequence, or a contact sheet (PNG) of it, with its shape or its errors",
+    .summary = "make a page (HTML) that plays a sequence, or a contact sheet (PNG) of it, with its shape or its errors",
     .options = options,
     .most_operands = (size_t)-1,
     .writes_file = true,
