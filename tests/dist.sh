@@ -75,7 +75,7 @@ deb() {
     (cd "build/deb/$name" && dpkg-buildpackage --no-sign --build=binary)
     rm -rf "build/deb/$name"
     if command -v lintian >/dev/null; then
-        lintian --fail-on error --info --display-info --tag-display-limit 0 build/deb/*.changes
+        lintian --fail-on error,warning build/deb/*.changes
     fi
     ls -l build/deb/*.deb
 }
