@@ -649,6 +649,27 @@ typedef struct vg_seed {
 /* vg_seeds_read: a dense correspondence as text: "VERTEX A B C WA WB WC" per line, '-' for a vertex that has none. *n seeds, free(). */
 int vg_seeds_read(vg_seed **seeds, size_t *n, const void *data, size_t bytes, int base, const char *name, vg_err *e) VG_MUST_CHECK;
 
+/* Joints as groups of mesh vertices (T 5.1): a joint is the mean of its vertices, in whatever pose they are; the roll of its bone is
+ * told by the first of them. */
+typedef struct vg_joint_group {
+    char *name;
+    uint32_t parent;    /* less than its own number; UINT32_MAX: a root */
+    size_t nvertices;   /* > 0 */
+    uint32_t *vertices; /* in the order of the file; none twice */
+    size_t line;        /* of the file, from 1 */
+} vg_joint_group;
+
+typedef struct vg_joint_groups {
+    size_t n;
+    vg_joint_group *at;
+} vg_joint_groups;
+
+void vg_joint_groups_clear(vg_joint_groups *g);
+/* vg_joint_groups_read: text with a joint per line, "JOINT PARENT vertices VERTEX VERTEX ...", '-' for no parent, '#' starts a comment.
+ * Parents may stand behind their children: they are put before them. Whether the vertices exist is left to who has the mesh.
+ * `base` is the number of the first vertex, 0 or 1. name: what messages call the file. */
+int vg_joint_groups_read(vg_joint_groups *g, const void *data, size_t n, int base, const char *name, vg_err *e) VG_MUST_CHECK;
+
 /* What is known about which point belongs to which. */
 typedef struct vg_register_input {
     const vg_mesh *source, *target;

@@ -45,6 +45,41 @@ size_t vgi_print_float(char *to, double x);
 size_t vgi_print_double(char *to, double x);
 size_t vgi_print_uint(char *to, uint64_t x); /* at most 20 bytes */
 
+/* ---- lines.c: text of fields between blanks, a thing per line; '#' begins a comment ---- */
+
+enum { VGI_FIELDS = 8, VGI_SUBJECT = 300 };
+
+typedef struct vgi_field {
+    const char *begin, *end;
+} vgi_field;
+
+typedef struct vgi_line {
+    size_t number, n; /* of the line, from 1; of its fields, of which no more than VGI_FIELDS are kept */
+    vgi_field at[VGI_FIELDS];
+    const char *begin, *end; /* the whole line, comment included */
+} vgi_line;
+
+typedef struct vgi_lines {
+    const char *at, *end;
+    size_t number;       /* of the last line taken */
+    const char *subject; /* how messages call the text, quotes included; borrowed */
+} vgi_lines;
+
+vgi_lines vgi_lines_of(const void *data, size_t n, const char *subject);
+/* vgi_quote: how messages call a file of this name; in `subject`. */
+const char *vgi_quote(const char *name, char subject[VGI_SUBJECT]);
+/* vgi_lines_next: the next line that says something; false at the end. Blanks are space, tab, CR, comma and semicolon. */
+bool vgi_lines_next(vgi_lines *t, vgi_line *l);
+/* vgi_line_more: the next field at or behind *at, which goes on behind it; for lines of any number of fields. */
+bool vgi_line_more(const vgi_line *l, const char **at, vgi_field *f);
+bool vgi_field_is(const vgi_field *f, const char *word);
+bool vgi_field_number(const vgi_field *f, double *x); /* is it one, and finite? */
+/* A field as what it has to be, or VG_EINPUT naming the line. vertex: `base` is the number of the first one. */
+int vgi_field_vertex(const vgi_lines *t, const vgi_line *l, const vgi_field *f, int base, uint32_t *vertex, vg_err *e) VG_MUST_CHECK;
+int vgi_line_vertex(const vgi_lines *t, const vgi_line *l, size_t field, int base, uint32_t *vertex, vg_err *e) VG_MUST_CHECK;
+int vgi_line_number(const vgi_lines *t, const vgi_line *l, size_t field, double *x, vg_err *e) VG_MUST_CHECK;
+int vgi_line_name(const vgi_lines *t, const vgi_line *l, size_t field, char **name, vg_err *e) VG_MUST_CHECK; /* free it */
+
 /* ---- format.c: the table of mesh formats; obj.c ply.c off.c stl.c: one each ---- */
 
 enum { /* what a format keeps of a sequence beside its numbers; of what it does not, the program warns */
