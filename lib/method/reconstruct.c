@@ -10,21 +10,19 @@
  * on long meshes, for its rounding errors are those of positions, not of vectors.
  *
  * Without anchors one vertex is held at 0 and the pose is moved to its root in the end. Leaves out the triangular solves
- * (solve_kernel.c). The only file that knows CHOLMOD; it calls Core, Cholesky, Partition (LGPL) and Supernodal (GPL).
+ * (solve_kernel.c) and the factorisation (sparse.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/metric.h"
 #include "method/planar.h"
-#include "method/solve_kernel.h"
+#include "method/sparse.h"
 #include "model/incidence.h"
 
-#include <cholmod.h>
 #include <stdlib.h>
 #include <time.h>
 
 enum {
     STAR = 12,         /* from this many corners on a face gets its centroid as an unknown ... */
-    STAR_METRIC = 200, /* ... or from this many, if it has a metric of its own; then its metric is the weight alone */
-    SMALL = 500        /* below this many unknowns a minimum-degree order is as good as nested dissection, and faster */
+    STAR_METRIC = 200  /* ... or from this many, if it has a metric of its own; then its metric is the weight alone */
 };
 #define NO_ROW UINT32_MAX
 
@@ -48,9 +46,7 @@ struct vg_solver {
     size_t nisolated;
     uint32_t *isolated;
     double *isolated_at;
-    cholmod_common common;
-    bool started;
-    cholmod_factor *L;
+    vgi_cholesky *cholesky;
     vgi_factor factor;
     vgi_row *x;       /* threads * unknowns */
     double *spare;    /* of vg_solver_load: 3 numbers for each corner of the largest face */
@@ -157,25 +153,13 @@ static size_t count_entries(const vg_solver *s)
     return n;
 }
 
-typedef struct assembly {
-    int *i, *j;
-    double *x;
-    size_t n;
-} assembly;
-
-static void put(assembly *a, size_t i, size_t j, double x)
-{
-    a->i[a->n] = (int)(i > j ? i : j), a->j[a->n] = (int)(i > j ? j : i), a->x[a->n] = x;
-    a->n++;
-}
-
 static double quadratic(const double s[6], const double *a, const double *b)
 {
     return a[0] * (s[0] * b[0] + s[1] * b[1] + s[2] * b[2]) + a[1] * (s[1] * b[0] + s[3] * b[1] + s[4] * b[2]) +
            a[2] * (s[2] * b[0] + s[4] * b[1] + s[5] * b[2]);
 }
 
-static void assemble_pairs(assembly *a, const vg_solver *s, size_t f)
+static void assemble_pairs(vgi_triplets *t, const vg_solver *s, size_t f)
 {
     size_t begin = s->g->start[f], r = face_size(s->g, f);
     const uint32_t *vert = s->g->vert + begin;
@@ -188,63 +172,58 @@ static void assemble_pairs(assembly *a, const vg_solver *s, size_t f)
         for (size_t q = 0; q <= p; q++) {
             if (s->row[vert[q]] >= s->unknowns) continue;
             double x = (p == q ? weight : 0) - share;
-            put(a, i, s->row[vert[q]], m ? x + quadratic(m->s, plane + 3 * p, plane + 3 * q) : x);
+            vgi_triplets_put(t, i, s->row[vert[q]], m ? x + quadratic(m->s, plane + 3 * p, plane + 3 * q) : x);
         }
     }
 }
 
-static void assemble_star(assembly *a, const vg_solver *s, size_t f, size_t centre)
+static void assemble_star(vgi_triplets *t, const vg_solver *s, size_t f, size_t centre)
 {
     size_t r = face_size(s->g, f);
     const uint32_t *vert = s->g->vert + s->g->start[f];
     double weight = s->metric.face ? s->metric.face[f].weight : 1;
-    put(a, centre, centre, weight * (double)r);
+    vgi_triplets_put(t, centre, centre, weight * (double)r);
     for (size_t p = 0; p < r; p++) {
         size_t i = s->row[vert[p]];
         if (i >= s->unknowns) continue;
-        put(a, i, i, weight);
-        put(a, i, centre, -weight);
+        vgi_triplets_put(t, i, i, weight);
+        vgi_triplets_put(t, i, centre, -weight);
     }
 }
 
-static int assemble(vg_solver *s, cholmod_sparse **N, vg_err *e)
+static int assemble(const vg_solver *s, vgi_sparse *N, vg_err *e)
 {
     const vg_graph *g = s->g;
-    size_t most = count_entries(s), n = s->unknowns;
-    if (most > INT32_MAX) return vg_fail(e, VG_EINPUT, "a mesh of %zu matrix entries is too large", most);
-    cholmod_triplet *T = cholmod_allocate_triplet(n, n, most, -1, CHOLMOD_REAL, &s->common);
-    if (!T) return vg_fail(e, VG_ENOMEM, "not enough memory for a matrix of %zu entries", most);
-    assembly a = {T->i, T->j, T->x, 0};
+    vgi_triplets t;
+    int r = vgi_triplets_make(&t, count_entries(s), e);
+    if (r < 0) return r;
     size_t centre = s->vertices_unknown;
     for (size_t f = 0; f < g->nf; f++) {
-        if (is_star(s, f)) assemble_star(&a, s, f, centre++);
-        else assemble_pairs(&a, s, f);
+        if (is_star(s, f)) assemble_star(&t, s, f, centre++);
+        else assemble_pairs(&t, s, f);
     }
-    T->nnz = a.n;
-    *N = cholmod_triplet_to_sparse(T, 0, &s->common);
-    cholmod_free_triplet(&T, &s->common);
-    return *N ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory for a matrix of %zu rows", n);
+    r = vgi_triplets_sum(&t, s->unknowns, N, e);
+    vgi_triplets_clear(&t);
+    return r;
 }
 
-static int factorize(vg_solver *s, cholmod_sparse *N, vg_err *e)
+static int factorize(vg_solver *s, vg_err *e)
 {
-    cholmod_common *c = &s->common;
-    c->nmethods = 1;
-    c->method[0].ordering = s->unknowns < SMALL ? CHOLMOD_AMD : CHOLMOD_METIS;
-    c->postorder = 1;
-    c->supernodal = CHOLMOD_SUPERNODAL;
-    double t0 = seconds();
-    s->L = cholmod_analyze(N, c);
-    double t1 = seconds();
-    if (!s->L) return vg_fail(e, VG_ENOMEM, "not enough memory to factorize %zu unknowns", s->unknowns);
-    cholmod_factorize(N, s->L, c);
-    s->facts = (vg_solver_facts){s->unknowns, s->L->xsize, t1 - t0, seconds() - t1};
-    if (c->status == CHOLMOD_OUT_OF_MEMORY)
-        return vg_fail(e, VG_ENOMEM, "not enough memory to factorize %zu unknowns", s->unknowns);
-    if (c->status != CHOLMOD_OK || s->L->minor != s->L->n)
-        return vg_fail(e, VG_EINPUT, "cannot factorize: not positive definite at row %zu", s->L->minor);
-    s->factor = (vgi_factor){s->unknowns, s->L->nsuper, s->L->super, s->L->pi, s->L->px, s->L->s, s->L->x};
-    return VG_OK;
+    vgi_sparse N;
+    int r = assemble(s, &N, e);
+    if (r < 0) return r;
+    double t0 = seconds(), t1 = t0;
+    r = vgi_cholesky_new(&s->cholesky, &N, e);
+    if (r == VG_OK) {
+        t1 = seconds();
+        r = vgi_cholesky_factorize(s->cholesky, &N, e);
+    }
+    if (r == VG_OK) {
+        s->facts = (vg_solver_facts){s->unknowns, vgi_cholesky_entries(s->cholesky), t1 - t0, seconds() - t1};
+        s->factor = vgi_cholesky_factor(s->cholesky);
+    }
+    vgi_sparse_clear(&N);
+    return r;
 }
 
 /* From now on row[v] is the row in the factor's order. */
@@ -252,7 +231,7 @@ static int permute_rows(vg_solver *s, vg_err *e)
 {
     uint32_t *inverse = vgi_array_raw(s->unknowns, sizeof *inverse, e);
     if (!inverse) return VG_ENOMEM;
-    const int *perm = s->L->Perm;
+    const int *perm = vgi_cholesky_order(s->cholesky);
     for (size_t i = 0; i < s->unknowns; i++) inverse[perm[i]] = (uint32_t)i;
     for (size_t v = 0; v < s->g->nv; v++)
         if (s->row[v] != NO_ROW) s->row[v] = inverse[s->row[v]];
@@ -266,17 +245,6 @@ static int make_workspace(vg_solver *s, vg_err *e)
     if (vgi_mul(s->unknowns, (size_t)s->threads, &rows) && rows < SIZE_MAX / sizeof *s->x)
         s->x = aligned_alloc(sizeof(vgi_lanes), rows * sizeof *s->x);
     return s->x ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", s->unknowns);
-}
-
-/* Fronts of a surface's factor are small: BLAS threads of their own cost more than they do, and OpenMP's in CHOLMOD should not be
- * more than there are processors. Both are called only where they exist. */
-extern void openblas_set_num_threads(int) __attribute__((weak));
-extern void omp_set_dynamic(int) __attribute__((weak));
-
-static void be_modest(void)
-{
-    if (openblas_set_num_threads) openblas_set_num_threads(1);
-    if (omp_set_dynamic) omp_set_dynamic(1);
 }
 
 static int make_metric(vg_solver *s, const double *reference, vg_err *e)
@@ -293,21 +261,13 @@ int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, s
     vg_solver *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
     s->g = g, s->threads = threads;
-    cholmod_start(&s->common);
-    s->started = true;
-    be_modest();
-    s->common.print = 0;
-    s->common.error_handler = NULL;
-    cholmod_sparse *N = NULL;
     int r = weights == VG_WEIGHTS_AREA ? make_metric(s, reference, e) : VG_OK;
     if (r == VG_OK && !(s->spare = vgi_array(3 * g->max_corners, sizeof *s->spare, e))) r = VG_ENOMEM;
     if (r == VG_OK) r = number_unknowns(s, anchors, nanchors, reference, e);
     if (r == VG_OK) r = plan_walk(s, e);
     if (r == VG_OK && s->unknowns) {
-        r = assemble(s, &N, e);
-        if (r == VG_OK) r = factorize(s, N, e);
+        r = factorize(s, e);
         if (r == VG_OK) r = permute_rows(s, e);
-        cholmod_free_sparse(&N, &s->common);
         if (r == VG_OK) r = make_workspace(s, e);
     }
     if (r < 0) vg_solver_free(out);
@@ -318,10 +278,7 @@ void vg_solver_free(vg_solver **out)
 {
     vg_solver *s = *out;
     if (!s) return;
-    if (s->started) {
-        cholmod_free_factor(&s->L, &s->common);
-        cholmod_finish(&s->common);
-    }
+    vgi_cholesky_free(&s->cholesky);
     free(s->row);
     free(s->anchors);
     free(s->walk);
