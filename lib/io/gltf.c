@@ -1,13 +1,12 @@
 /* gltf.c: glTF 2.0 as a container: GLB chunks, JSON, buffers inside or beside, accessors; the tables of both formats.
- * Leaves out what a scene is (gltf_read.c), how a sequence becomes one (gltf_write.c), and compressed geometry.
+ * Leaves out what a scene is (gltf_play.c), how a sequence becomes one (gltf_write.c), and compressed geometry.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf.h"
 
 #include <stdarg.h>
 #include <stdlib.h>
 
-static int refuse(const vgi_gltf *g, vg_err *e, const char *format, ...) VG_PRINTF(3, 4);
-static int refuse(const vgi_gltf *g, vg_err *e, const char *format, ...)
+int vgi_gltf_bad(const vgi_gltf *g, vg_err *e, const char *format, ...)
 {
     char text[256];
     va_list list;
@@ -29,11 +28,11 @@ static int take_chunk(const vgi_gltf *g, size_t *off, uint32_t *type, const unsi
                       vg_err *e)
 {
     size_t left = g->file.size - *off;
-    if (left < VGI_GLTF_CHUNK) return refuse(g, e, "there are bytes behind the last chunk");
+    if (left < VGI_GLTF_CHUNK) return vgi_gltf_bad(g, e, "there are bytes behind the last chunk");
     *n = vgi_get32(g->file.data + *off);
     *type = vgi_get32(g->file.data + *off + 4);
     *data = g->file.data + *off + VGI_GLTF_CHUNK;
-    if (*n > left - VGI_GLTF_CHUNK) return refuse(g, e, "a chunk of %zu bytes does not fit into the file", *n);
+    if (*n > left - VGI_GLTF_CHUNK) return vgi_gltf_bad(g, e, "a chunk of %zu bytes does not fit into the file", *n);
     *off += VGI_GLTF_CHUNK + *n;
     return VG_OK;
 }
@@ -45,11 +44,11 @@ static int read_binary(vgi_gltf *g, const unsigned char **bin, size_t *nbin, vg_
     uint32_t type;
     if (g->file.size < VGI_GLTF_HEADER) return cut_short(g, e);
     if (vgi_get32(p + 4) != 2)
-        return refuse(g, e, "it is GLB version %u, and only version 2 is known", vgi_get32(p + 4));
+        return vgi_gltf_bad(g, e, "it is GLB version %u, and only version 2 is known", vgi_get32(p + 4));
     if (vgi_get32(p + 8) > g->file.size) return cut_short(g, e);
-    if (vgi_get32(p + 8) < g->file.size) return refuse(g, e, "there are bytes behind the end of the GLB");
+    if (vgi_get32(p + 8) < g->file.size) return vgi_gltf_bad(g, e, "there are bytes behind the end of the GLB");
     int r = take_chunk(g, &off, &type, &data, &n, e);
-    if (r == VG_OK && type != VGI_GLTF_JSON) r = refuse(g, e, "its first chunk is not JSON");
+    if (r == VG_OK && type != VGI_GLTF_JSON) r = vgi_gltf_bad(g, e, "its first chunk is not JSON");
     if (r == VG_OK) r = vgi_json_parse(&g->json, data, n, g->subject, e);
     for (bool first = true; r == VG_OK && off < g->file.size; first = false) {
         r = take_chunk(g, &off, &type, &data, &n, e);
@@ -77,14 +76,15 @@ static int check_claims(const vgi_gltf *g, vg_err *e)
 {
     const char *version = vgi_json_text(vgi_json_get(vgi_json_get(g->json, "asset"), "version"));
     const vgi_json *required = vgi_json_get(g->json, "extensionsRequired");
-    if (!version) return refuse(g, e, "it is no glTF: asset.version is missing");
+    if (!version) return vgi_gltf_bad(g, e, "it is no glTF: asset.version is missing");
     if (!starts_with(version, "2."))
-        return refuse(g, e, "it is glTF version '%.20s', and only version 2 is known", version);
+        return vgi_gltf_bad(g, e, "it is glTF version '%.20s', and only version 2 is known", version);
     for (size_t i = 0; i < vgi_json_count(required); i++) {
         const char *name = vgi_json_text(vgi_json_at(required, i));
         if (!name || !is_harmless(name))
-            return refuse(g, e, "it requires the extension '%.60s', which is not known: export without compression",
-                          name ? name : "?");
+            return vgi_gltf_bad(g, e,
+                                "it requires the extension '%.60s', which is not known: export without compression",
+                                name ? name : "?");
     }
     return VG_OK;
 }
@@ -104,11 +104,11 @@ static int decode_base64(const vgi_gltf *g, const char *s, vg_bytes *to, vg_err 
     size_t n = strlen(s);
     uint32_t bits = 0;
     while (n > 0 && s[n - 1] == '=') n--;
-    if (n % 4 == 1) return refuse(g, e, "a buffer's base64 is cut short");
+    if (n % 4 == 1) return vgi_gltf_bad(g, e, "a buffer's base64 is cut short");
     int r = vgi_bytes_reserve(to, n / 4 * 3 + 3, e);
     for (size_t i = 0; i < n && r == VG_OK; i++) {
         int digit = digit_of((unsigned char)s[i]);
-        if (digit < 0) return refuse(g, e, "a buffer's base64 has a character that does not belong there");
+        if (digit < 0) return vgi_gltf_bad(g, e, "a buffer's base64 has a character that does not belong there");
         bits = bits << 6 | (uint32_t)digit;
         size_t have = i % 4; /* digits before: with 1, 2 and 3 of them this one completes a byte */
         if (have) to->data[to->size++] = (unsigned char)(bits >> (6 - 2 * have));
@@ -131,14 +131,14 @@ static int path_beside(const vgi_gltf *g, const char *from, const char *uri, vg_
     for (const char *s = uri; *s && r == VG_OK; s++) {
         char c = *s;
         if (c == '%' && hex_of(s[1]) >= 0 && hex_of(s[2]) >= 0) c = (char)(hex_of(s[1]) << 4 | hex_of(s[2])), s += 2;
-        if (!c) return refuse(g, e, "a buffer has the URI '%.100s', which is no file name", uri);
+        if (!c) return vgi_gltf_bad(g, e, "a buffer has the URI '%.100s', which is no file name", uri);
         r = vgi_bytes_append(path, &c, 1, e);
     }
     if (r == VG_OK) r = vgi_bytes_append(path, "", 1, e);
     if (r < 0) return r;
     const char *name = (const char *)path->data + start;
     if (*name == '/' || !*name || strstr(name, "..") || strchr(name, ':') || strchr(name, '\\'))
-        return refuse(g, e, "a buffer is at '%.100s': only files beside or below are read", uri);
+        return vgi_gltf_bad(g, e, "a buffer is at '%.100s': only files beside or below are read", uri);
     return VG_OK;
 }
 
@@ -148,7 +148,8 @@ static int read_beside(const vgi_gltf *g, vgi_input *in, const char *uri, size_t
     vg_bytes path = {0};
     vgi_input *beside = NULL;
     if (!from)
-        return refuse(g, e, "its buffer '%.100s' is a file beside, which cannot be found from here: use a .glb", uri);
+        return vgi_gltf_bad(g, e, "its buffer '%.100s' is a file beside, which cannot be found from here: use a .glb",
+                            uri);
     int r = path_beside(g, from, uri, &path, e);
     if (r == VG_OK) r = vgi_input_file(&beside, (char *)path.data, e);
     if (r == VG_OK) r = vgi_input_take(beside, to, n, NULL, e);
@@ -162,17 +163,18 @@ static int read_buffer(const vgi_gltf *g, vgi_gltf_buffer *b, const vgi_json *fr
     const char *uri = vgi_json_text(vgi_json_get(from, "uri"));
     uint64_t n;
     if (!vgi_json_whole(vgi_json_get(from, "byteLength"), &n) || n > SIZE_MAX)
-        return refuse(g, e, "a buffer has no valid byteLength");
+        return vgi_gltf_bad(g, e, "a buffer has no valid byteLength");
     if (uri) {
         const char *comma = starts_with(uri, "data:") ? strchr(uri, ',') : NULL;
         bool base64 = comma && comma - uri >= 7 && !memcmp(comma - 7, ";base64", 7);
-        if (starts_with(uri, "data:") && !base64) return refuse(g, e, "a buffer is in a data URI that is not base64");
+        if (starts_with(uri, "data:") && !base64)
+            return vgi_gltf_bad(g, e, "a buffer is in a data URI that is not base64");
         int r = base64 ? decode_base64(g, comma + 1, &b->own, e) : read_beside(g, in, uri, (size_t)n, &b->own, e);
         if (r < 0) return r;
         b->data = b->own.data, b->size = b->own.size;
     }
     if (n > b->size)
-        return refuse(g, e, "a buffer is to have %llu bytes and has %zu", (unsigned long long)n, b->size);
+        return vgi_gltf_bad(g, e, "a buffer is to have %llu bytes and has %zu", (unsigned long long)n, b->size);
     b->size = (size_t)n;
     return VG_OK;
 }
@@ -221,10 +223,10 @@ int vgi_gltf_item(const vgi_gltf *g, const vgi_json *ref, const char *list, cons
     const vgi_json *all = vgi_json_get(g->json, list);
     uint64_t i;
     if (!vgi_json_whole(ref, &i) || i >= vgi_json_count(all))
-        return refuse(g, e, "something refers to an element of '%s' that is not there", list);
+        return vgi_gltf_bad(g, e, "something refers to an element of '%s' that is not there", list);
     *item = vgi_json_at(all, (size_t)i);
     if (!vgi_json_is_object(*item))
-        return refuse(g, e, "element %llu of '%s' is no object", (unsigned long long)i, list);
+        return vgi_gltf_bad(g, e, "element %llu of '%s' is no object", (unsigned long long)i, list);
     if (number) *number = (size_t)i;
     return VG_OK;
 }
@@ -234,7 +236,8 @@ static int take_whole(const vgi_gltf *g, const vgi_json *from, const char *key, 
 {
     const vgi_json *j = vgi_json_get(from, key);
     uint64_t value = 0;
-    if (j && (!vgi_json_whole(j, &value) || value > SIZE_MAX)) return refuse(g, e, "'%s' is not a whole number", key);
+    if (j && (!vgi_json_whole(j, &value) || value > SIZE_MAX))
+        return vgi_gltf_bad(g, e, "'%s' is not a whole number", key);
     *x = (size_t)value;
     return VG_OK;
 }
@@ -257,7 +260,7 @@ static int take_component(const vgi_gltf *g, const vgi_json *from, int *componen
     size_t x = 0;
     int r = take_whole(g, from, "componentType", &x, e);
     if (r == VG_OK && (x > INT32_MAX || !component_bytes((int)x)))
-        r = refuse(g, e, "an accessor's componentType is not known");
+        r = vgi_gltf_bad(g, e, "an accessor's componentType is not known");
     if (r == VG_OK) *component = (int)x;
     return r;
 }
@@ -276,11 +279,12 @@ static int find_bytes(const vgi_gltf *g, const vgi_json *from, size_t count, siz
     if (r == VG_OK) r = take_whole(g, from, "byteOffset", &off, e);
     if (r < 0) return r;
     const vgi_gltf_buffer *b = &g->buffers[number];
-    if (start > b->size || length > b->size - start) return refuse(g, e, "a buffer view goes beyond its buffer");
+    if (start > b->size || length > b->size - start)
+        return vgi_gltf_bad(g, e, "a buffer view goes beyond its buffer");
     *stride = own ? own : element;
-    if (own && own < element) return refuse(g, e, "a buffer view's byteStride is less than an element");
+    if (own && own < element) return vgi_gltf_bad(g, e, "a buffer view's byteStride is less than an element");
     if (off > length || element > length - off || (count - 1) > (length - off - element) / *stride)
-        return refuse(g, e, "an accessor of %zu elements goes beyond its buffer view", count);
+        return vgi_gltf_bad(g, e, "an accessor of %zu elements goes beyond its buffer view", count);
     *data = b->data + start + off;
     return VG_OK;
 }
@@ -313,21 +317,21 @@ static int take_sparse(const vgi_gltf *g, const vgi_json *from, vgi_accessor *a,
     size_t stride;
     int r = take_whole(g, from, "count", &a->nsparse, e);
     if (r == VG_OK && (a->nsparse == 0 || a->nsparse > a->count))
-        r = refuse(g, e, "a sparse accessor's count is not valid");
+        r = vgi_gltf_bad(g, e, "a sparse accessor's count is not valid");
     if (r == VG_OK) r = take_component(g, indices, &a->sparse_component, e);
     if (r == VG_OK && a->sparse_component != VGI_GLTF_UBYTE && a->sparse_component != VGI_GLTF_USHORT &&
         a->sparse_component != VGI_GLTF_UINT)
-        r = refuse(g, e, "a sparse accessor's indices are no whole numbers");
+        r = vgi_gltf_bad(g, e, "a sparse accessor's indices are no whole numbers");
     if (r == VG_OK)
         r = find_bytes(g, indices, a->nsparse, component_bytes(a->sparse_component), &a->sparse, &stride, e);
     if (r == VG_OK && stride != component_bytes(a->sparse_component))
-        r = refuse(g, e, "a sparse accessor's indices have a stride");
+        r = vgi_gltf_bad(g, e, "a sparse accessor's indices have a stride");
     const size_t element = a->width * component_bytes(a->component);
     if (r == VG_OK) r = find_bytes(g, vgi_json_get(from, "values"), a->nsparse, element, &a->replaced, &stride, e);
-    if (r == VG_OK && stride != element) r = refuse(g, e, "a sparse accessor's values have a stride");
+    if (r == VG_OK && stride != element) r = vgi_gltf_bad(g, e, "a sparse accessor's values have a stride");
     for (size_t i = 0; i < a->nsparse && r == VG_OK; i++)
         if (sparse_number(a, i) >= (double)a->count || (i > 0 && sparse_number(a, i) <= sparse_number(a, i - 1)))
-            r = refuse(g, e, "a sparse accessor's indices do not ascend, or go beyond its count");
+            r = vgi_gltf_bad(g, e, "a sparse accessor's indices do not ascend, or go beyond its count");
     return r;
 }
 
@@ -353,12 +357,12 @@ int vgi_gltf_accessor(const vgi_gltf *g, const vgi_json *ref, size_t width, size
     if (r < 0) return r;
     a->width = width_of(vgi_json_text(vgi_json_get(from, "type")));
     a->normalized = vgi_json_is_true(vgi_json_get(from, "normalized"));
-    if (a->width != width) return refuse(g, e, "the accessor of %s is of another type", what);
+    if (a->width != width) return vgi_gltf_bad(g, e, "the accessor of %s is of another type", what);
     if (a->count == 0 || (count && a->count != count))
-        return refuse(g, e, "the accessor of %s has %zu elements, not %zu", what, a->count, count);
+        return vgi_gltf_bad(g, e, "the accessor of %s has %zu elements, not %zu", what, a->count, count);
     if (vgi_json_get(from, "bufferView"))
         r = find_bytes(g, from, a->count, width * component_bytes(a->component), &a->data, &a->stride, e);
-    else if (!count) return refuse(g, e, "the accessor of %s has no bytes", what);
+    else if (!count) return vgi_gltf_bad(g, e, "the accessor of %s has no bytes", what);
     if (r == VG_OK && vgi_json_get(from, "sparse")) r = take_sparse(g, vgi_json_get(from, "sparse"), a, e);
     return r;
 }

@@ -1,4 +1,4 @@
-/* gltf.h: what gltf.c, gltf_read.c and gltf_write.c share: a glTF file as JSON with its buffers, and accessors into
+/* gltf.h: what the files of glTF share: a file as JSON with its buffers, and accessors into
  * them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_GLTF_H
@@ -44,6 +44,8 @@ typedef struct vgi_gltf {
 /* vgi_gltf_open: read a whole file, .glb or .gltf, with the buffers it needs. The caller clears it, come what may. */
 int vgi_gltf_open(vgi_gltf *g, vgi_input *in, const char *subject, vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_clear(vgi_gltf *g);
+/* vgi_gltf_bad: VG_EINPUT, with the name of the file in front. */
+int vgi_gltf_bad(const vgi_gltf *g, vg_err *e, const char *format, ...) VG_PRINTF(3, 4);
 
 /* An accessor: count elements of `width` numbers. Nothing is copied, so that many accessors of the same bytes cost
  * nothing. */
@@ -68,7 +70,7 @@ bool vgi_accessor_is_index(const vgi_accessor *a);                  /* whole num
 int vgi_gltf_item(const vgi_gltf *g, const vgi_json *ref, const char *list, const vgi_json **item, size_t *number,
                   vg_err *e) VG_MUST_CHECK;
 
-/* ---- gltf_read.c, gltf_write.c: for the tables in gltf.c ---- */
+/* ---- gltf_play.c, gltf_write.c: for the tables in gltf.c ---- */
 int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e);
 int vgi_gltf_next(void *state, vg_frame *f, vg_err *e);
 uint64_t vgi_gltf_frames(const void *state);

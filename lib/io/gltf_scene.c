@@ -1,0 +1,346 @@
+/* gltf_scene.c: what a scene of glTF shows: nodes, skins, and the vertices and faces of its meshes.
+ * Leaves out cameras, materials, normals and texture coordinates; welding (gltf_weld.c), and what moves
+ * (gltf_play.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf_scene.h"
+
+#include <stdlib.h>
+
+void vgi_gltf_from_columns(const double c[16], double m[12])
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 4; j++) m[4 * i + j] = c[4 * j + i];
+}
+
+/* ---- nodes ---- */
+
+/* A list of n numbers that may be missing. */
+static int take_numbers(const vgi_gltf_scene *x, const vgi_json *from, const char *key, size_t n, double *to,
+                        vg_err *e)
+{
+    const vgi_json *list = vgi_json_get(from, key);
+    if (!list) return VG_OK;
+    bool good = vgi_json_count(list) == n;
+    for (size_t i = 0; i < n && good; i++) good = vgi_json_number(vgi_json_at(list, i), &to[i]);
+    return good ? VG_OK : vgi_gltf_bad(&x->g, e, "a node's or mesh's '%s' is not %zu numbers", key, n);
+}
+
+static int read_node(vgi_gltf_scene *x, vgi_gltf_node *n, vg_err *e)
+{
+    double columns[16];
+    n->rest = (vgi_gltf_placed){.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
+    n->fixed = vgi_json_get(n->json, "matrix");
+    int r = take_numbers(x, n->json, "matrix", 16, columns, e);
+    if (r == VG_OK && n->fixed) vgi_gltf_from_columns(columns, n->matrix);
+    if (r == VG_OK) r = take_numbers(x, n->json, "translation", 3, n->rest.translation, e);
+    if (r == VG_OK) r = take_numbers(x, n->json, "rotation", 4, n->rest.rotation, e);
+    if (r == VG_OK) r = take_numbers(x, n->json, "scale", 3, n->rest.scale, e);
+    n->now = n->rest;
+    return r;
+}
+
+static int adopt_children(vgi_gltf_scene *x, size_t parent, vg_err *e)
+{
+    const vgi_json *children = vgi_json_get(x->nodes[parent].json, "children"), *child;
+    for (size_t i = 0; i < vgi_json_count(children); i++) {
+        size_t number = 0;
+        int r = vgi_gltf_item(&x->g, vgi_json_at(children, i), "nodes", &child, &number, e);
+        if (r < 0) return r;
+        if (x->nodes[number].parent != SIZE_MAX) return vgi_gltf_bad(&x->g, e, "node %zu has two parents", number);
+        x->nodes[number].parent = parent;
+    }
+    return VG_OK;
+}
+
+/* Parents before children; nodes in a cycle are never reached. */
+static int order_nodes(vgi_gltf_scene *x, vg_err *e)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < x->nnodes; i++)
+        if (x->nodes[i].parent == SIZE_MAX) x->order[n++] = i;
+    for (size_t i = 0; i < n; i++) {
+        const vgi_json *children = vgi_json_get(x->nodes[x->order[i]].json, "children");
+        for (size_t c = 0; c < vgi_json_count(children); c++) {
+            uint64_t number;
+            if (vgi_json_whole(vgi_json_at(children, c), &number)) x->order[n++] = (size_t)number;
+        }
+    }
+    return n == x->nnodes ? VG_OK : vgi_gltf_bad(&x->g, e, "its nodes are in a cycle");
+}
+
+/* What the scene shows; without scenes, everything. */
+static int show_nodes(vgi_gltf_scene *x, vg_err *e)
+{
+    static const char scenes[] = "scenes";
+    const vgi_json *scene = NULL, *chosen = vgi_json_get(x->g.json, "scene"), *list = vgi_json_get(x->g.json, scenes);
+    int r = chosen ? vgi_gltf_item(&x->g, chosen, scenes, &scene, NULL, e) : VG_OK;
+    if (r == VG_OK && !chosen) scene = vgi_json_at(list, 0);
+    const vgi_json *roots = vgi_json_get(scene, "nodes"), *item;
+    for (size_t i = 0; i < vgi_json_count(roots) && r == VG_OK; i++) {
+        size_t number = 0;
+        r = vgi_gltf_item(&x->g, vgi_json_at(roots, i), "nodes", &item, &number, e);
+        if (r == VG_OK) x->nodes[number].shown = true;
+    }
+    for (size_t i = 0; i < x->nnodes; i++) {
+        vgi_gltf_node *n = &x->nodes[x->order[i]];
+        n->shown |= !scene || (n->parent != SIZE_MAX && x->nodes[n->parent].shown);
+    }
+    return r;
+}
+
+static int read_nodes(vgi_gltf_scene *x, vg_err *e)
+{
+    const vgi_json *list = vgi_json_get(x->g.json, "nodes");
+    size_t n = vgi_json_count(list);
+    x->nodes = vgi_array(n, sizeof *x->nodes, e), x->order = vgi_array(n, sizeof *x->order, e);
+    if (!x->nodes || !x->order) return VG_ENOMEM;
+    x->nnodes = n;
+    int r = VG_OK;
+    for (size_t i = 0; i < n && r == VG_OK; i++) {
+        x->nodes[i] = (vgi_gltf_node){.json = vgi_json_at(list, i), .parent = SIZE_MAX};
+        r = read_node(x, &x->nodes[i], e);
+    }
+    for (size_t i = 0; i < n && r == VG_OK; i++) r = adopt_children(x, i, e);
+    if (r == VG_OK) r = order_nodes(x, e);
+    return r < 0 ? r : show_nodes(x, e);
+}
+
+/* A node and all above it move a vertex. */
+static void mark(vgi_gltf_scene *x, size_t i)
+{
+    for (; i != SIZE_MAX && !x->nodes[i].matters; i = x->nodes[i].parent) x->nodes[i].matters = true;
+}
+
+/* ---- skins ---- */
+
+static int read_skin(vgi_gltf_scene *x, vgi_gltf_skin *k, const vgi_json *from, vg_err *e)
+{
+    const vgi_json *joints = vgi_json_get(from, "joints"), *item,
+                   *inverse = vgi_json_get(from, "inverseBindMatrices");
+    k->n = vgi_json_count(joints);
+    if (k->n == 0) return vgi_gltf_bad(&x->g, e, "a skin has no joints");
+    k->joints = vgi_array(k->n, sizeof *k->joints, e), k->matrices = vgi_array(k->n, 12 * sizeof(double), e);
+    int r = k->joints && k->matrices ? VG_OK : VG_ENOMEM;
+    for (size_t j = 0; j < k->n && r == VG_OK; j++)
+        r = vgi_gltf_item(&x->g, vgi_json_at(joints, j), "nodes", &item, &k->joints[j], e);
+    k->bound = inverse;
+    if (r == VG_OK && inverse)
+        r = vgi_gltf_accessor(&x->g, inverse, 16, k->n, "inverse bind matrices", &k->inverse, e);
+    return r;
+}
+
+static int read_skins(vgi_gltf_scene *x, vg_err *e)
+{
+    const vgi_json *list = vgi_json_get(x->g.json, "skins");
+    size_t n = vgi_json_count(list);
+    if (!(x->skins = vgi_array(n, sizeof *x->skins, e))) return VG_ENOMEM;
+    int r = VG_OK;
+    while (x->nskins < n && r == VG_OK) {
+        vgi_gltf_skin *k = &x->skins[x->nskins];
+        r = read_skin(x, k, vgi_json_at(list, x->nskins++), e);
+    }
+    return r;
+}
+
+/* ---- parts ---- */
+
+static int read_targets(vgi_gltf_scene *x, vgi_gltf_part *p, vg_err *e)
+{
+    const size_t n = vgi_json_count(p->targets);
+    if (!(p->moved = vgi_array(n, sizeof *p->moved, e))) return VG_ENOMEM;
+    p->ntargets = n;
+    if (n != x->nodes[p->node].nweights)
+        return vgi_gltf_bad(&x->g, e, "the primitives of a mesh have different numbers of morph targets");
+    int r = VG_OK;
+    for (size_t t = 0; t < n && r == VG_OK; t++) {
+        const vgi_json *ref = vgi_json_get(vgi_json_at(p->targets, t), "POSITION");
+        if (ref) r = vgi_gltf_accessor(&x->g, ref, 3, p->count, "a morph target", &p->moved[t], e);
+        else p->moved[t] = (vgi_accessor){.count = p->count, .width = 3, .component = VGI_GLTF_FLOAT};
+    }
+    return r;
+}
+
+static int check_joints(const vgi_gltf_scene *x, const vgi_gltf_part *p, const vgi_accessor *joints, vg_err *e)
+{
+    double n = (double)x->skins[p->skin].n, j[4];
+    for (size_t i = 0; i < p->count; i++) {
+        vgi_accessor_get(joints, i, j);
+        if (!(j[0] < n && j[1] < n && j[2] < n && j[3] < n))
+            return vgi_gltf_bad(&x->g, e, "a vertex hangs on a joint that its skin has not");
+    }
+    return VG_OK;
+}
+
+static int read_influences(vgi_gltf_scene *x, vgi_gltf_part *p, vg_err *e)
+{
+    int r = VG_OK;
+    for (; r == VG_OK; p->nsets++) {
+        char joints[32], weights[32];
+        snprintf(joints, sizeof joints, "JOINTS_%zu", p->nsets);
+        snprintf(weights, sizeof weights, "WEIGHTS_%zu", p->nsets);
+        const vgi_json *j = vgi_json_get(p->attributes, joints), *w = vgi_json_get(p->attributes, weights);
+        if (!j || !w) break;
+        if (p->nsets == VGI_GLTF_SETS)
+            return vgi_gltf_bad(&x->g, e, "vertices hang on more than %d joints", 4 * VGI_GLTF_SETS);
+        vgi_accessor *a = &p->joints[p->nsets];
+        r = vgi_gltf_accessor(&x->g, j, 4, p->count, "joints", a, e);
+        if (r == VG_OK && !vgi_accessor_is_index(a))
+            r = vgi_gltf_bad(&x->g, e, "the joints of a vertex are no whole numbers");
+        if (r == VG_OK) r = check_joints(x, p, a, e);
+        if (r == VG_OK) r = vgi_gltf_accessor(&x->g, w, 4, p->count, "weights", &p->shares[p->nsets], e);
+    }
+    return r;
+}
+
+static int add_part(vgi_gltf_scene *x, size_t at, int64_t skinned, const vgi_json *primitive, vg_err *e)
+{
+    int r = vgi_grow(&x->parts, &x->parts_cap, x->nparts + 1, sizeof *x->parts, e);
+    if (r < 0) return r;
+    vgi_gltf_part *p = &x->parts[x->nparts++];
+    *p = (vgi_gltf_part){.node = at,
+                         .first = x->all,
+                         .skin = skinned,
+                         .attributes = vgi_json_get(primitive, "attributes"),
+                         .targets = vgi_json_get(primitive, "targets")};
+    r = vgi_gltf_accessor(&x->g, vgi_json_get(p->attributes, "POSITION"), 3, 0, "positions", &p->position, e);
+    if (r < 0) return r;
+    p->count = p->position.count;
+    if (p->count > vgi_gltf_most - x->all)
+        return vgi_gltf_bad(&x->g, e, "it shows more than %zu vertices", vgi_gltf_most);
+    x->all += p->count;
+    r = read_targets(x, p, e);
+    return r < 0 || p->skin == VGI_GLTF_NONE ? r : read_influences(x, p, e);
+}
+
+/* Primitives of a mesh may share their vertices: the part among those from `from` on that has them. */
+static vgi_gltf_part *sharing(const vgi_gltf_scene *x, size_t from, const vgi_json *primitive)
+{
+    for (size_t i = from; i < x->nparts; i++)
+        if (vgi_json_same(x->parts[i].attributes, vgi_json_get(primitive, "attributes")) &&
+            vgi_json_same(x->parts[i].targets, vgi_json_get(primitive, "targets")))
+            return &x->parts[i];
+    return NULL;
+}
+
+/* ---- faces, before welding ---- */
+
+static int corner(const vgi_gltf_scene *x, const vgi_gltf_faces *f, size_t i, uint32_t *to, vg_err *e)
+{
+    double v = (double)i;
+    if (f->indexed) vgi_accessor_get(&f->index, i, &v);
+    if (v >= (double)f->part->count)
+        return vgi_gltf_bad(&x->g, e, "an index is %.0f where there are %zu vertices", v, f->part->count);
+    *to = (uint32_t)(f->part->first + (size_t)v);
+    return VG_OK;
+}
+
+static int add_face(const vgi_gltf_scene *x, vgi_gltf_faces *f, const size_t *at, size_t n, vg_err *e)
+{
+    vg_mesh *m = &f->mesh;
+    size_t corners = vg_mesh_corners(m);
+    if (corners > vgi_gltf_most) return vgi_gltf_bad(&x->g, e, "it shows more than %zu corners", vgi_gltf_most);
+    int r = vgi_grow(&m->start, &f->start_cap, m->nf + 2, sizeof *m->start, e);
+    if (r == VG_OK) r = vgi_grow(&m->vert, &f->vert_cap, corners + n, sizeof *m->vert, e);
+    for (size_t k = 0; k < n && r == VG_OK; k++) r = corner(x, f, at[k], &m->vert[corners + k], e);
+    if (r < 0) return r;
+    m->start[m->nf] = (uint32_t)corners;
+    m->start[++m->nf] = (uint32_t)(corners + n);
+    return VG_OK;
+}
+
+static int add_faces(const vgi_gltf_scene *x, vgi_gltf_faces *f, size_t n, uint64_t mode, vg_err *e)
+{
+    const bool lines = mode <= VGI_GLTF_LINE_STRIP;
+    const size_t size = lines ? 2 : 3;
+    const bool apart = mode == VGI_GLTF_LINES || mode == VGI_GLTF_TRIANGLES;
+    size_t count = apart ? n / size : mode == VGI_GLTF_LINE_LOOP ? n : n >= size ? n - size + 1 : 0;
+    int r = VG_OK;
+    if (mode == VGI_GLTF_POINTS) return VG_OK;
+    if (apart && n % size)
+        return vgi_gltf_bad(&x->g, e, "%zu indices do not make whole %s", n, lines ? "lines" : "triangles");
+    if (mode == VGI_GLTF_LINE_LOOP && n < 2) return vgi_gltf_bad(&x->g, e, "a loop has %zu vertices", n);
+    for (size_t i = 0; i < count && r == VG_OK; i++) {
+        const size_t a = apart ? size * i : i, odd = mode == VGI_GLTF_STRIP && i % 2;
+        const size_t at[3] = {mode == VGI_GLTF_FAN ? 0 : a, (a + 1 + odd) % n, a + 2 - odd};
+        r = add_face(x, f, at, size, e);
+    }
+    return r;
+}
+
+static int read_faces(const vgi_gltf_scene *x, vgi_gltf_faces *f, const vgi_gltf_part *p, const vgi_json *primitive,
+                      vg_err *e)
+{
+    const vgi_json *indices = vgi_json_get(primitive, "indices"), *given = vgi_json_get(primitive, "mode");
+    uint64_t mode = VGI_GLTF_TRIANGLES;
+    if (given && (!vgi_json_whole(given, &mode) || mode > VGI_GLTF_FAN))
+        return vgi_gltf_bad(&x->g, e, "a primitive's mode is not known");
+    f->part = p, f->indexed = indices;
+    int r = indices ? vgi_gltf_accessor(&x->g, indices, 1, 0, "indices", &f->index, e) : VG_OK;
+    if (r == VG_OK && indices && !vgi_accessor_is_index(&f->index))
+        r = vgi_gltf_bad(&x->g, e, "indices are no whole numbers");
+    return r < 0 ? r : add_faces(x, f, indices ? f->index.count : p->count, mode, e);
+}
+
+static int take_weights(vgi_gltf_scene *x, size_t at, const vgi_json *mesh, vg_err *e)
+{
+    vgi_gltf_node *n = &x->nodes[at];
+    n->nweights = vgi_json_count(vgi_json_get(vgi_json_at(vgi_json_get(mesh, "primitives"), 0), "targets"));
+    if (n->nweights > x->most_targets) x->most_targets = n->nweights;
+    return (n->weights = vgi_array(n->nweights, sizeof *n->weights, e)) ? VG_OK : VG_ENOMEM;
+}
+
+static int read_mesh(vgi_gltf_scene *x, vgi_gltf_faces *f, size_t at, vg_err *e)
+{
+    const vgi_json *n = x->nodes[at].json, *mesh, *k = vgi_json_get(n, "skin"), *item;
+    size_t skinned = 0;
+    int r = vgi_gltf_item(&x->g, vgi_json_get(n, "mesh"), "meshes", &mesh, NULL, e);
+    if (r == VG_OK && k) r = vgi_gltf_item(&x->g, k, "skins", &item, &skinned, e);
+    if (r == VG_OK) r = take_weights(x, at, mesh, e);
+    if (r < 0) return r;
+    mark(x, at);
+    for (size_t j = 0; k && j < x->skins[skinned].n; j++) mark(x, x->skins[skinned].joints[j]);
+    const vgi_json *primitives = vgi_json_get(mesh, "primitives");
+    const size_t from = x->nparts;
+    if (vgi_json_count(primitives) == 0) return vgi_gltf_bad(&x->g, e, "a mesh has no primitives");
+    for (size_t i = 0; i < vgi_json_count(primitives) && r == VG_OK; i++) {
+        const vgi_json *primitive = vgi_json_at(primitives, i);
+        vgi_gltf_part *p = sharing(x, from, primitive);
+        if (!p && (r = add_part(x, at, k ? (int64_t)skinned : VGI_GLTF_NONE, primitive, e)) == VG_OK)
+            p = &x->parts[x->nparts - 1];
+        if (r == VG_OK) r = read_faces(x, f, p, primitive, e);
+    }
+    return r;
+}
+
+static int read_meshes(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e)
+{
+    int r = VG_OK;
+    for (size_t i = 0; i < x->nnodes && r == VG_OK; i++)
+        if (x->nodes[i].shown && vgi_json_get(x->nodes[i].json, "mesh")) r = read_mesh(x, f, i, e);
+    return r == VG_OK && x->nparts == 0 ? vgi_gltf_bad(&x->g, e, "its scene shows no mesh") : r;
+}
+
+/* ---- the whole ---- */
+
+int vgi_gltf_scene_read(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e)
+{
+    int r = read_nodes(x, e);
+    if (r == VG_OK) r = read_skins(x, e);
+    return r < 0 ? r : read_meshes(x, f, e);
+}
+
+void vgi_gltf_scene_clear(vgi_gltf_scene *x)
+{
+    for (size_t i = 0; i < x->nnodes; i++) free(x->nodes[i].weights);
+    for (size_t i = 0; i < x->nskins; i++) {
+        free(x->skins[i].joints);
+        free(x->skins[i].matrices);
+    }
+    for (size_t i = 0; i < x->nparts; i++) {
+        free(x->parts[i].moved);
+        free(x->parts[i].kept);
+    }
+    void *const arrays[] = {x->nodes, x->order, x->skins, x->parts, x->channels, x->clips, x->moments};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
+    vgi_gltf_clear(&x->g);
+}

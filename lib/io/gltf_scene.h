@@ -1,0 +1,110 @@
+/* gltf_scene.h: what gltf_scene.c, gltf_weld.c and gltf_play.c share: a scene of glTF as it is read.
+ *
+ * Nothing is unpacked: a frame is computed from the bytes of the file when it is asked for.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_GLTF_SCENE_H
+#define VG_GLTF_SCENE_H
+
+#include "io/gltf.h"
+
+enum { VGI_GLTF_SETS = 8, VGI_GLTF_CLIPPED = 512, VGI_GLTF_NONE = -1 };
+
+/* Many nodes may show one mesh, so that a small file could ask for more than any memory. */
+static const size_t vgi_gltf_most = (size_t)1 << 27;
+
+typedef enum vgi_gltf_path {
+    VGI_GLTF_TRANSLATION,
+    VGI_GLTF_ROTATION,
+    VGI_GLTF_SCALE,
+    VGI_GLTF_WEIGHTS
+} vgi_gltf_path;
+
+typedef struct vgi_gltf_placed { /* rotation: x y z w */
+    double translation[3], rotation[4], scale[3];
+} vgi_gltf_placed;
+
+typedef struct vgi_gltf_node {
+    const vgi_json *json;
+    size_t parent;         /* SIZE_MAX: none */
+    bool shown, matters;   /* matters: it moves a vertex */
+    bool fixed;            /* by a matrix */
+    double matrix[12];     /* three rows of four */
+    vgi_gltf_placed rest, now;
+    double world[12];
+    size_t nweights;       /* morph targets of its mesh */
+    double *weights;
+} vgi_gltf_node;
+
+typedef struct vgi_gltf_skin {
+    size_t n;
+    size_t *joints;
+    bool bound;
+    vgi_accessor inverse; /* bind matrices, if bound */
+    double *matrices;     /* n x 12 */
+} vgi_gltf_skin;
+
+/* The vertices of a primitive as a node shows it; or of several that share them. */
+typedef struct vgi_gltf_part {
+    size_t node, count, first; /* first: number of its first vertex among all, before welding */
+    int64_t skin;              /* VGI_GLTF_NONE */
+    const vgi_json *attributes, *targets;
+    vgi_accessor position;
+    size_t ntargets, nsets;
+    vgi_accessor *moved, joints[VGI_GLTF_SETS], shares[VGI_GLTF_SETS];
+    uint32_t *kept;            /* those that are vertices of the mesh, ascending */
+    size_t nkept;
+} vgi_gltf_part;
+
+typedef struct vgi_gltf_channel {
+    size_t node, width;
+    vgi_gltf_path path;
+    bool cubic, step;
+    vgi_accessor in, out;
+} vgi_gltf_channel;
+
+typedef struct vgi_gltf_clip {
+    size_t first, nchannels, frames;
+    const vgi_json *names; /* of its frames; NULL */
+} vgi_gltf_clip;
+
+typedef struct vgi_gltf_moment {
+    size_t clip;
+    double time;
+} vgi_gltf_moment;
+
+typedef struct vgi_gltf_scene {
+    vgi_gltf g;
+    size_t nnodes, nskins, nparts, parts_cap, nchannels, channels_cap, nclips, clips_cap, nmoments, moments_cap;
+    vgi_gltf_node *nodes;
+    size_t *order; /* nodes, parents first */
+    vgi_gltf_skin *skins;
+    vgi_gltf_part *parts;
+    size_t all;    /* vertices of all parts, before welding */
+    vgi_gltf_channel *channels;
+    vgi_gltf_clip *clips;
+    vgi_gltf_moment *moments;
+    size_t most_targets, frames, next;
+    bool own;      /* our own file: its vertices and faces stay as they are */
+} vgi_gltf_scene;
+
+/* The faces of all parts, of vertices before welding. */
+typedef struct vgi_gltf_faces {
+    vg_mesh mesh;
+    size_t start_cap, vert_cap;
+    vgi_accessor index;
+    bool indexed;
+    const vgi_gltf_part *part;
+} vgi_gltf_faces;
+
+/* ---- gltf_scene.c ---- */
+/* vgi_gltf_scene_read: nodes, skins and meshes of an open file. The caller clears both, come what may. */
+int vgi_gltf_scene_read(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e) VG_MUST_CHECK;
+void vgi_gltf_scene_clear(vgi_gltf_scene *x);
+void vgi_gltf_from_columns(const double c[16], double m[12]); /* the upper rows of a matrix of 16, columns first */
+
+/* ---- gltf_weld.c ---- */
+/* vgi_gltf_mend: put the mesh together as it was before it was exported: polygons of our own files, and vertices that
+ * were cut apart. Fills kept of the parts, and m->nv. */
+int vgi_gltf_mend(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e) VG_MUST_CHECK;
+
+#endif

@@ -1,0 +1,257 @@
+/* gltf_weld.c: a mesh of glTF as it was before it was exported: triangles of our own files become the polygons
+ * that they were, and vertices that were cut apart become one.
+ * Leaves out where vertices and faces come from (gltf_scene.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf_scene.h"
+
+#include <stdlib.h>
+
+/* ---- polygons of our own files ---- */
+
+typedef struct restoring {
+    const vg_mesh *from;
+    size_t triangle, line; /* the faces of three and two that come next */
+    vg_mesh to;
+    size_t start_cap, vert_cap;
+    uint32_t edge[3 * VGI_GLTF_CLIPPED][2];
+} restoring;
+
+static const uint32_t *next_of_size(const vg_mesh *m, size_t *at, size_t size)
+{
+    while (*at < m->nf && m->start[*at + 1] - m->start[*at] != size) ++*at;
+    return *at < m->nf ? m->vert + m->start[(*at)++] : NULL;
+}
+
+static bool is_inner(const restoring *k, size_t n, size_t edge)
+{
+    for (size_t i = 0; i < n; i++)
+        if (k->edge[i][0] == k->edge[edge][1] && k->edge[i][1] == k->edge[edge][0]) return true;
+    return false;
+}
+
+/* Once around the triangles, along edges that belong to one of them only. */
+static bool walk_around(const restoring *k, size_t n, uint32_t *face)
+{
+    const size_t edges = 3 * (n - 2);
+    uint32_t v = face[0] = k->edge[0][0];
+    for (size_t i = 1; i <= n; i++) {
+        size_t found = edges;
+        for (size_t s = 0; s < edges && found == edges; s++)
+            if (k->edge[s][0] == v && !is_inner(k, edges, s)) found = s;
+        if (found == edges) return false;
+        v = k->edge[found][1];
+        if (i < n) face[i] = v;
+    }
+    return v == face[0];
+}
+
+/* One face of n corners from the n - 2 triangles that come next; false: they are not one. */
+static bool take_polygon(restoring *k, size_t n, uint32_t *face)
+{
+    bool fan = true;
+    for (size_t t = 0; t + 2 < n; t++) {
+        const uint32_t *v = next_of_size(k->from, &k->triangle, 3);
+        if (!v) return false;
+        fan &= t == 0 || (v[0] == face[0] && v[1] == face[t + 1]);
+        if (!fan && n > VGI_GLTF_CLIPPED) return false;
+        if (fan && t == 0) face[0] = v[0], face[1] = v[1];
+        if (fan) face[t + 2] = v[2];
+        for (size_t s = 0; s < 3 && n <= VGI_GLTF_CLIPPED; s++)
+            k->edge[3 * t + s][0] = v[s], k->edge[3 * t + s][1] = v[(s + 1) % 3];
+    }
+    return fan || walk_around(k, n, face);
+}
+
+/* 1: done; 0: it cannot be. The arrays never grow beyond what the triangles fill. */
+static int take_face(restoring *k, size_t n, vg_err *e)
+{
+    vg_mesh *m = &k->to;
+    const size_t corners = vg_mesh_corners(m);
+    if (n < 2 || n > k->from->nf + 2) return 0;
+    int r = vgi_grow(&m->start, &k->start_cap, m->nf + 2, sizeof *m->start, e);
+    if (r == VG_OK) r = vgi_grow(&m->vert, &k->vert_cap, corners + n, sizeof *m->vert, e);
+    if (r < 0) return r;
+    if (n == 2) {
+        const uint32_t *v = next_of_size(k->from, &k->line, 2);
+        if (!v) return 0;
+        memcpy(m->vert + corners, v, 2 * sizeof *v);
+    } else if (!take_polygon(k, n, m->vert + corners)) {
+        return 0;
+    }
+    m->start[m->nf] = (uint32_t)corners;
+    m->start[++m->nf] = (uint32_t)(corners + n);
+    return 1;
+}
+
+static int take_runs(restoring *k, const vgi_json *runs, vg_err *e)
+{
+    int r = 1;
+    for (size_t i = 0; i < vgi_json_count(runs) && r == 1; i += 2) {
+        uint64_t count, size;
+        if (!vgi_json_whole(vgi_json_at(runs, i), &count) || !vgi_json_whole(vgi_json_at(runs, i + 1), &size))
+            return 0;
+        for (; count && r == 1; count--) r = take_face(k, (size_t)size, e);
+    }
+    if (r == 1 && (next_of_size(k->from, &k->triangle, 3) || next_of_size(k->from, &k->line, 2))) r = 0;
+    return r;
+}
+
+/* If the extras of the only mesh tell of polygons, and its triangles agree, they become polygons again. */
+static int restore_polygons(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e)
+{
+    const vgi_json *mesh, *runs;
+    if (x->nparts != 1 || x->parts[0].skin != VGI_GLTF_NONE) return VG_OK;
+    int r = vgi_gltf_item(&x->g, vgi_json_get(x->nodes[x->parts[0].node].json, "mesh"), "meshes", &mesh, NULL, e);
+    if (r < 0 || !vgi_json_is_array(runs = vgi_json_get(vgi_json_get(mesh, "extras"), VGI_GLTF_FACES))) return r;
+    restoring *k = vgi_array(1, sizeof *k, e);
+    if (!k) return VG_ENOMEM;
+    k->from = &f->mesh;
+    r = take_runs(k, runs, e);
+    if (r == 1 && vgi_json_count(runs) == 0) x->own = true;
+    else if (r == 1) r = vg_mesh_check(&(vg_mesh){x->all, k->to.nf, k->to.start, k->to.vert}, "it", NULL) == VG_OK;
+    if (r == 1 && k->to.nf) {
+        const vg_mesh old = f->mesh;
+        f->mesh = k->to, k->to = old;
+        x->own = true;
+    }
+    vg_mesh_clear(&k->to);
+    free(k);
+    return r < 0 ? r : VG_OK;
+}
+
+/* ---- welding: exporters cut a mesh where normals or texture coordinates jump ---- */
+
+typedef struct welding {
+    const vgi_gltf_scene *x;
+    uint32_t *slots;  /* positions among all vertices, + 1; 0: free */
+    uint32_t *number; /* which vertex of the mesh each becomes */
+    size_t nslots;
+} welding;
+
+static const vgi_gltf_part *part_of(const vgi_gltf_scene *x, size_t v)
+{
+    size_t low = 0, high = x->nparts;
+    while (high - low > 1) {
+        size_t mid = low + (high - low) / 2;
+        if (x->parts[mid].first <= v) low = mid;
+        else high = mid;
+    }
+    return &x->parts[low];
+}
+
+static uint64_t mix(uint64_t hash, const double *p, size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        double y = p[i] + 0.0; /* -0 is 0 */
+        uint64_t bits;
+        memcpy(&bits, &y, sizeof bits);
+        hash = (hash ^ bits) * 0x9e3779b97f4a7c15u;
+        hash ^= hash >> 29;
+    }
+    return hash;
+}
+
+static uint64_t hash_of(const vgi_gltf_part *p, size_t v)
+{
+    double at[4];
+    vgi_accessor_get(&p->position, v, at);
+    uint64_t hash = mix(p->node + 1, at, 3);
+    for (size_t s = 0; s < p->nsets; s++) {
+        vgi_accessor_get(&p->shares[s], v, at);
+        hash = mix(hash, at, 4);
+    }
+    for (size_t t = 0; t < p->ntargets; t++) {
+        vgi_accessor_get(&p->moved[t], v, at);
+        hash = mix(hash, at, 3);
+    }
+    return hash;
+}
+
+static bool same_element(const vgi_accessor *a, size_t i, const vgi_accessor *b, size_t j)
+{
+    double p[4], q[4];
+    vgi_accessor_get(a, i, p);
+    vgi_accessor_get(b, j, q);
+    for (size_t k = 0; k < a->width; k++)
+        if (!(p[k] == q[k])) return false;
+    return true;
+}
+
+/* Do they stay together whatever moves? */
+static bool are_one(const vgi_gltf_part *p, size_t v, const vgi_gltf_part *q, size_t w)
+{
+    if (p->node != q->node || p->nsets != q->nsets || p->ntargets != q->ntargets) return false;
+    if (!same_element(&p->position, v, &q->position, w)) return false;
+    for (size_t s = 0; s < p->nsets; s++)
+        if (!same_element(&p->joints[s], v, &q->joints[s], w) || !same_element(&p->shares[s], v, &q->shares[s], w))
+            return false;
+    for (size_t t = 0; t < p->ntargets; t++)
+        if (!same_element(&p->moved[t], v, &q->moved[t], w)) return false;
+    return true;
+}
+
+static uint32_t *find_slot(const welding *k, const vgi_gltf_part *p, size_t v)
+{
+    size_t i = (size_t)hash_of(p, v) & (k->nslots - 1);
+    for (; k->slots[i]; i = (i + 1) & (k->nslots - 1)) {
+        size_t other = k->slots[i] - 1;
+        const vgi_gltf_part *q = part_of(k->x, other);
+        if (are_one(p, v, q, other - q->first)) break;
+    }
+    return &k->slots[i];
+}
+
+static int weld_part(vgi_gltf_scene *x, const welding *k, vgi_gltf_part *p, size_t *n, vg_err *e)
+{
+    if (!(p->kept = vgi_array_raw(p->count, sizeof *p->kept, e))) return VG_ENOMEM;
+    for (size_t v = 0; v < p->count; v++) {
+        uint32_t *slot = x->own ? NULL : find_slot(k, p, v);
+        if (slot && *slot) {
+            k->number[p->first + v] = k->number[*slot - 1];
+            continue;
+        }
+        if (slot) *slot = (uint32_t)(p->first + v) + 1;
+        k->number[p->first + v] = (uint32_t)(*n)++;
+        p->kept[p->nkept++] = (uint32_t)v;
+    }
+    return VG_OK;
+}
+
+/* Faces of the welded vertices; those that have shrunk to nothing are left out, as strips have them too. */
+static void renumber(vg_mesh *m, const uint32_t *number)
+{
+    size_t nf = 0, corners = 0;
+    for (size_t f = 0; f < m->nf; f++) {
+        const size_t start = m->start[f], n = m->start[f + 1] - start;
+        bool distinct = true;
+        for (size_t k = 0; k < n; k++) m->vert[corners + k] = number[m->vert[start + k]];
+        if (n <= 3)
+            for (size_t k = 0; k < n; k++) distinct &= m->vert[corners + k] != m->vert[corners + (k + 1) % n];
+        if (!distinct) continue;
+        m->start[nf++] = (uint32_t)corners;
+        corners += n;
+    }
+    if (m->start) m->start[nf] = (uint32_t)corners;
+    m->nf = nf;
+}
+
+static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
+{
+    welding k = {.x = x, .nslots = 4};
+    while (k.nslots < 2 * x->all) k.nslots *= 2;
+    k.slots = vgi_array(k.nslots, sizeof *k.slots, e), k.number = vgi_array_raw(x->all, sizeof *k.number, e);
+    int r = k.slots && k.number ? VG_OK : VG_ENOMEM;
+    size_t n = 0;
+    for (size_t i = 0; i < x->nparts && r == VG_OK; i++) r = weld_part(x, &k, &x->parts[i], &n, e);
+    if (r == VG_OK) renumber(m, k.number);
+    m->nv = n;
+    free(k.slots);
+    free(k.number);
+    return r;
+}
+
+int vgi_gltf_mend(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e)
+{
+    int r = restore_polygons(x, f, e);
+    return r < 0 ? r : weld(x, &f->mesh, e);
+}
