@@ -585,6 +585,49 @@ void vg_player_between(vg_player *p, const double *a, const double *b, double t,
 /* vg_player_pose: n times transforms to vertices, by one product. */
 void vg_player_pose(vg_player *p, size_t n, const double *const *transforms, double *const *vertices);
 
+/* Enveloping (MATH 6; T 5): a skeleton drives the mesh, learned from example poses.
+ *
+ * vg_bender: the other way round: the motions of the bones in a pose of vertices, joints staying together, so that linear blend skinning comes as
+ * near to the vertices as it can (damped Gauss-Newton over all bones at once). Bones that no vertex tells about go with their parents. */
+typedef struct vg_bender vg_bender;
+/* vg_bender_new: r has weights; it and reference (nv points) are not kept. */
+int vg_bender_new(vg_bender **b, const vg_rig *r, size_t nv, const double *reference, int threads, vg_err *e) VG_MUST_CHECK;
+void vg_bender_free(vg_bender **b);
+/* vg_bender_fit: n poses (nv points each) to n times nbones transforms of 7 numbers. */
+void vg_bender_fit(vg_bender *b, size_t n, const double *const *poses, double *const *transforms);
+
+/* vg_rig_learn: give h's rig weights when the motions of its bones are not known: weights and motions are fitted in turn to n poses.
+ * miss: the mean distance that linear blend skinning leaves, in mesh units. */
+int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, double *miss, vg_err *e) VG_MUST_CHECK;
+/* vg_rig_locate: a skeleton whose root is not known to the mesh (in BVH it has no place of its own): shift is what has to be added to the positions
+ * of its reference pose. n poses of the mesh with the positions and turns of all joints in the same poses. spread: how far the
+ * vertices disagree about it (median), in mesh units. */
+int vg_rig_locate(const vg_skeleton *s, size_t nv, const double *reference, size_t n, const double *const *poses,
+                  const double *const *positions, const double *const *turns, int threads, double shift[3], double *spread,
+                  vg_err *e) VG_MUST_CHECK;
+
+/* The fit of a map of bones. Corner i has the vector A u_i, A that of the bone with which it moves most nearly rigidly, and u_i what fits
+ * best over the poses; kept as the turn of its face beside the bone (T 5.12, without reflections), the rest by the smallest rotation, and
+ * a stretch. Some vertices go where linear blend skinning, fitted to the same poses, takes them: those that move most nearly
+ * rigidly with one bone, spread over the mesh, on every component and bone. Both together are reconstructed once for each number of each
+ * transform. */
+typedef struct vg_rig_fitter vg_rig_fitter;
+typedef enum vg_rig_method { VG_RIG_ENVELOPE = 0, VG_RIG_LBS = 1 } vg_rig_method;
+typedef struct vg_rig_options {
+    size_t bones_per_corner; /* 1, or 2 */
+    double hold;             /* share of the vertices that are held; at least one for each bone and component */
+    double refine;           /* how willingly what that leaves of the poses is taken up by the bones near by: 0 .. 1 */
+    int threads;
+} vg_rig_options;
+
+/* vg_rig_fitter_new: h: mesh, reference and a rig (its weights, if any, are replaced); borrowed until free. */
+int vg_rig_fitter_new(vg_rig_fitter **f, vg_head *h, const vg_rig_options *o, vg_err *e) VG_MUST_CHECK;
+void vg_rig_fitter_free(vg_rig_fitter **f);
+/* vg_rig_fitter_add: n poses (nv points) and the transforms of the bones in them. Poses that are the reference are passed over. */
+void vg_rig_fitter_add(vg_rig_fitter *f, size_t n, const double *const *poses, const double *const *transforms);
+/* vg_rig_fitter_finish: fill h->map and the weights of h->rig. May be called again for another method. VG_EINPUT without poses. */
+int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_err *e) VG_MUST_CHECK;
+
 /* Measures of two sequences of one connectivity (MATH 8), accumulated pose by pose in bounded memory. */
 typedef struct vg_measures vg_measures;
 typedef struct vg_measure_report {

@@ -4,6 +4,7 @@
 #include "method/map_parts.h"
 #include "method/rotation_fit.h"
 #include "model/incidence.h"
+#include "model/rig.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -215,24 +216,84 @@ int vgi_joint_points(const vg_graph *g, const uint32_t *of_face, const uint32_t 
     return VG_OK;
 }
 
+int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *e)
+{
+    size_t n = r->nbones, width = 3 * n;
+    uint32_t *parent = vgi_array(n, sizeof *parent, e);
+    double *mean = vgi_array(width, sizeof *mean, e);
+    int code = parent && mean ? vgi_rig_parents(r, parent, e) : VG_ENOMEM;
+    for (size_t b = 0; code == VG_OK && b < n; b++) { /* where the joint is, from the first one */
+        double *row = place + b * width;
+        if (b) memcpy(row, place + parent[b] * width, width * sizeof *row);
+        else memset(row, 0, width * sizeof *row);
+        for (size_t k = 0; b && k < 3; k++) row[3 * parent[b] + k] += m->centre[3 * b + k] - m->centre[3 * (size_t)parent[b] + k];
+        for (size_t i = 0; i < width; i++) mean[i] += m->share[b] * row[i];
+    }
+    for (size_t b = 0; code == VG_OK && b < n; b++) {
+        for (size_t i = 0; i < width; i++) place[b * width + i] -= mean[i];
+        for (size_t k = 0; k < 3; k++) place[b * width + 3 * b + k] -= m->centre[3 * b + k];
+    }
+    free(parent);
+    free(mean);
+    return code;
+}
+
 /* ---- collapse ---- */
 
-/* Wanted vectors and held vertices when only the j-th number of A_p is at work, j = 0 1 2 at once as x y z; or t of three patches. */
-static void column_input(const vg_map *m, const vg_graph *g, const uint32_t *of_face, const double *vectors, size_t column,
-                         double *wanted, double *anchors)
+/* The vectors that transform p alone makes, when it is the identity. */
+static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *of_face, const double *vectors, size_t p, double *wanted)
 {
     memset(wanted, 0, 3 * vg_graph_corners(g) * sizeof *wanted);
-    if (column < m->n) {
+    if (m->kind == VG_MAP_PATCHES) {
         for (size_t f = 0; f < g->nf; f++)
-            for (size_t c = g->start[f]; of_face[f] == column && c < g->start[f + 1]; c++)
+            for (size_t c = g->start[f]; of_face[f] == p && c < g->start[f + 1]; c++)
                 vg_quat_apply(m->corner + 4 * c, vectors + 3 * c, wanted + 3 * c);
-        for (size_t i = 0; i < m->nheld; i++)
-            for (size_t k = 0; k < 3; k++) anchors[3 * i + k] = m->held_patch[i] == column ? m->held_at[3 * i + k] : 0;
-    } else {
-        size_t p = 3 * (column - m->n);
-        for (size_t i = 0; i < m->nheld; i++)
-            for (size_t k = 0; k < 3; k++) anchors[3 * i + k] = m->held_patch[i] == p + k;
+        return;
     }
+    for (size_t i = 0; i < m->ncorners * m->per_corner; i++) {
+        if (m->corner_bone[i] != p) continue;
+        double *to = wanted + 3 * (i / m->per_corner), d[3];
+        vg_quat_apply(m->corner + 4 * i, vectors + 3 * (i / m->per_corner), d);
+        for (int k = 0; k < 3; k++) to[k] += d[k];
+    }
+}
+
+/* How much transform p counts for held vertex i; the point that it takes along. */
+static double hold_of(const vg_head *h, size_t i, size_t p, const double **at)
+{
+    const vg_map *m = &h->map;
+    if (m->kind == VG_MAP_PATCHES) {
+        *at = m->held_at + 3 * i;
+        return m->held_patch[i] == p;
+    }
+    size_t v = m->held[i];
+    double w = 0;
+    *at = h->reference + 3 * v;
+    for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++)
+        if (h->rig.skin_bone[s] == p) w += h->rig.skin_weight[s];
+    return w;
+}
+
+/* Wanted vectors and held vertices when only the j-th number of A_p is at work, j = 0 1 2 at once as x y z; or t of three transforms. */
+static void column_input(const vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors, size_t column,
+                         double *wanted, double *anchors)
+{
+    const vg_map *m = &h->map;
+    const double *at;
+    if (column < m->n) {
+        driven_vectors(m, g, of_face, vectors, column, wanted);
+        for (size_t i = 0; i < m->nheld; i++) {
+            double w = hold_of(h, i, column, &at);
+            for (size_t k = 0; k < 3; k++) anchors[3 * i + k] = w * at[k];
+        }
+        return;
+    }
+    memset(wanted, 0, 3 * vg_graph_corners(g) * sizeof *wanted);
+    for (size_t i = 0; i < m->nheld; i++)
+        for (size_t k = 0; k < 3; k++) {
+            size_t p = 3 * (column - m->n) + k;
+            anchors[3 * i + k] = p < m->n ? hold_of(h, i, p, &at) : 0;
+        }
 }
 
 static void store_column(vg_map *m, const vg_graph *g, size_t column, const double *x)
@@ -249,12 +310,27 @@ static void store_column(vg_map *m, const vg_graph *g, size_t column, const doub
     }
 }
 
-/* Vertices in no face go with the patch whose centre is nearest. */
+void vgi_map_skin_row(vg_head *h, size_t v)
+{
+    double *row = h->map.weights + v * 4 * h->map.n;
+    memset(row, 0, 4 * h->map.n * sizeof *row);
+    for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++) {
+        double w = h->rig.skin_weight[s], *to = row + 4 * (size_t)h->rig.skin_bone[s];
+        for (size_t k = 0; k < 3; k++) to[k] += w * h->reference[3 * v + k];
+        to[3] += w;
+    }
+}
+
+/* Vertices in no face go with the patch whose centre is nearest, or as their skin does. */
 static void carry_loose(vg_head *h, const vg_graph *g)
 {
     vg_map *m = &h->map;
     for (size_t v = 0; v < g->nv; v++) {
         if (g->in_face[v]) continue;
+        if (m->kind == VG_MAP_BONES) {
+            vgi_map_skin_row(h, v);
+            continue;
+        }
         const double *x = h->reference + 3 * v;
         size_t best = 0;
         double least = INFINITY;
@@ -289,7 +365,7 @@ int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, con
         for (size_t first = 0; first < columns; first += batch) {
             size_t n = columns - first < batch ? columns - first : batch;
             for (size_t i = 0; i < n; i++) {
-                column_input(m, g, of_face, vectors, first + i, wanted, anchors[i]);
+                column_input(h, g, of_face, vectors, first + i, wanted, anchors[i]);
                 vg_solver_load(s, wanted, anchors[i], x[i], rhs[i]);
             }
             vg_solver_solve(s, n, (const double *const *)rhs, x, (const double *const *)anchors,

@@ -1,8 +1,9 @@
-/* play.c: a map at work: patch transforms measured, placed by joints, interpolated, and turned into vertices by one product.
+/* play.c: a map at work: transforms of patches or bones measured, placed by joints, interpolated, and turned into vertices by one product.
  * Leaves out fitting (map.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/map_parts.h"
 #include "method/product.h"
+#include "model/rig.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -15,7 +16,8 @@ struct vg_player {
     size_t nv;
     int threads;
     bool single;
-    vgi_shape shape;    /* of the body that poses are measured on */
+    vgi_shape shape;    /* patches: of the body that poses are measured on */
+    vg_bender *bender;  /* bones */
     float *weights_single;
     void *columns;      /* 4n x 3 BLOCK: what the product multiplies, float or double */
     void *product;      /* nv x 3 BLOCK */
@@ -24,14 +26,24 @@ struct vg_player {
     uint32_t *order, *parent; /* patches along a tree of joints, parents first; a root is its own parent */
 };
 
-/* Breadth first from the largest patch; what it does not reach starts anew. */
-static int plan_tree(vg_player *p, vg_err *e)
+/* Of bones: as their skeleton says. */
+static int plan_bones(vg_player *p, const vg_rig *r, vg_err *e)
+{
+    int code = vgi_rig_parents(r, p->parent, e);
+    for (size_t b = 0; code == VG_OK && b < r->nbones; b++) {
+        p->order[b] = (uint32_t)b;
+        if (p->parent[b] == VGI_NO_BONE) p->parent[b] = (uint32_t)b;
+    }
+    return code;
+}
+
+/* Of patches: breadth first from the largest; what it does not reach starts anew. */
+static int plan_patches(vg_player *p, vg_err *e)
 {
     const vg_map *m = p->m;
     size_t n = m->n, tail = 0, head = 0;
     bool *seen = vgi_array(n, sizeof *seen, e);
-    p->order = vgi_array(n, sizeof *p->order, e), p->parent = vgi_array(n, sizeof *p->parent, e);
-    if (!seen || !p->order || !p->parent) return free(seen), VG_ENOMEM;
+    if (!seen) return VG_ENOMEM;
     while (tail < n) {
         size_t first = n;
         for (size_t i = 0; i < n; i++)
@@ -54,15 +66,23 @@ int vg_player_new(vg_player **out, const vg_head *h, bool single, int threads, v
     const vg_map *m = &h->map;
     *out = NULL;
     if (!m->n) return vg_fail(e, VG_EINPUT, "there is no map: make one with vg-fitmap");
-    if (h->patches.n != m->n) return vg_fail(e, VG_EINPUT, "the map has %zu transforms, the mesh %zu patches", m->n, h->patches.n);
+    bool bones = m->kind == VG_MAP_BONES;
+    if (!bones && h->patches.n != m->n)
+        return vg_fail(e, VG_EINPUT, "the map has %zu transforms, the mesh %zu patches", m->n, h->patches.n);
+    if (bones && (h->rig.nbones != m->n || !h->rig.skin_bone))
+        return vg_fail(e, VG_EINPUT, "the map has %zu transforms, its skeleton %zu bones", m->n, h->rig.nbones);
     if (m->n > INT32_MAX / 4 || h->mesh.nv > INT32_MAX / (3 * BLOCK))
         return vg_fail(e, VG_EINPUT, "a map of %zu transforms and %zu vertices is too large", m->n, h->mesh.nv);
     vg_player *p = *out = vgi_array(1, sizeof *p, e);
     if (!p) return VG_ENOMEM;
     p->m = m, p->nv = h->mesh.nv, p->threads = threads, p->single = single;
     size_t size = single ? sizeof(float) : sizeof(double);
-    int r = vgi_shape_make(&p->shape, &h->mesh, &h->patches, m->home ? m->home : h->reference, e);
-    if (r == VG_OK) r = plan_tree(p, e);
+    const double *measured = m->home ? m->home : h->reference;
+    p->order = vgi_array(m->n, sizeof *p->order, e), p->parent = vgi_array(m->n, sizeof *p->parent, e);
+    int r = p->order && p->parent ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) r = bones ? plan_bones(p, &h->rig, e) : plan_patches(p, e);
+    if (r == VG_OK && bones) r = vg_bender_new(&p->bender, &h->rig, p->nv, measured, threads, e);
+    else if (r == VG_OK) r = vgi_shape_make(&p->shape, &h->mesh, &h->patches, measured, e);
     if (r == VG_OK) {
         p->columns = vgi_array(4 * m->n, 3 * BLOCK * size, e);
         p->product = vgi_array(p->nv, 3 * BLOCK * size, e);
@@ -81,6 +101,7 @@ void vg_player_free(vg_player **out)
     vg_player *p = *out;
     if (!p) return;
     vgi_shape_clear(&p->shape);
+    vg_bender_free(&p->bender);
     free(p->weights_single);
     free(p->columns);
     free(p->product);
@@ -119,6 +140,10 @@ static void measure_some(void *context, size_t task)
 
 void vg_player_measure(vg_player *p, size_t n, const double *const *poses, double *const *transforms)
 {
+    if (p->bender) {
+        vg_bender_fit(p->bender, n, poses, transforms);
+        return;
+    }
     measuring x = {p, poses, transforms, (p->m->n + SOME - 1) / SOME};
     vgi_parallel(n * x.groups < 4 ? 1 : p->threads, n * x.groups, measure_some, &x);
 }

@@ -12,6 +12,8 @@ void vgi_product_end(int before);
 /* c (m x n, row stride ldc) := a (m x k) b (k x n), all row-major */
 void vgi_product_single(size_t m, size_t n, size_t k, const float *a, size_t lda, const float *b, size_t ldb, float *c, size_t ldc);
 void vgi_product_double(size_t m, size_t n, size_t k, const double *a, size_t lda, const double *b, size_t ldb, double *c, size_t ldc);
+/* the same, added to c */
+void vgi_product_add(size_t m, size_t n, size_t k, const double *a, size_t lda, const double *b, size_t ldb, double *c, size_t ldc);
 /* c (m x n) := a (m x k) b', b n x k */
 void vgi_product_single_transposed(size_t m, size_t n, size_t k, const float *a, size_t lda, const float *b, size_t ldb, float *c,
                                    size_t ldc);

@@ -1,9 +1,8 @@
 /* rig.c: a skeleton in the reference pose of a mesh, its motions as transforms, and linear blend skinning.
  * Leaves out how weights and transforms are fitted (method/skin.c, method/bend.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "core/core.h"
+#include "model/rig.h"
 
-#include <math.h>
 #include <stdlib.h>
 
 void vg_rig_clear(vg_rig *r)
@@ -46,6 +45,29 @@ int vg_rig_copy(vg_rig *to, const vg_rig *from, size_t nv, vg_err *e)
     if (to->skin_bone && to->skin_weight) return VG_OK;
     vg_rig_clear(to);
     return VG_ENOMEM;
+}
+
+void vgi_rig_movers(const vg_rig *r, uint32_t *mover)
+{
+    size_t b = 0;
+    for (size_t j = 0; j < r->skeleton.njoints; j++) {
+        uint32_t parent = r->skeleton.joints[j].parent;
+        if (b < r->nbones && r->bone[b] == j) mover[j] = (uint32_t)b++;
+        else mover[j] = parent == UINT32_MAX ? VGI_NO_BONE : mover[parent];
+    }
+}
+
+int vgi_rig_parents(const vg_rig *r, uint32_t *parent, vg_err *e)
+{
+    uint32_t *mover = vgi_array(r->skeleton.njoints, sizeof *mover, e);
+    if (!mover) return VG_ENOMEM;
+    vgi_rig_movers(r, mover);
+    for (size_t b = 0; b < r->nbones; b++) {
+        uint32_t above = r->skeleton.joints[r->bone[b]].parent, up = above == UINT32_MAX ? VGI_NO_BONE : mover[above];
+        parent[b] = up != VGI_NO_BONE || b == 0 ? up : 0;
+    }
+    free(mover);
+    return VG_OK;
 }
 
 void vg_rig_transforms(const vg_rig *r, const double *positions, const double *turns, double *transforms)
