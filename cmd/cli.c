@@ -258,13 +258,13 @@ static const char *split_path(const char *path, char directory[PATH_MAX])
 }
 
 /* Look at --output before any work: what is wrong with it now will be wrong then. */
-static void check_output(void)
+static void check_output(bool stream)
 {
     const char *name = cli.output;
     struct stat st;
-    if (cli.program->writes_stream && name && names_meshes(name))
+    if (stream && name && names_meshes(name))
         cli_usage("%s writes a stream: pipe it into 'vg-decode -o %s'", cli.program->name, name);
-    if (cli.program->writes_stream && !name && isatty(STDOUT_FILENO))
+    if (stream && !name && isatty(STDOUT_FILENO))
         cli_usage("a stream is not written to a terminal: use -o FILE or a pipe");
     if (!name) return;
     if (!*name) cli_usage("option '--output' needs the name of a file");
@@ -333,6 +333,13 @@ static void close_output(void)
     }
     out.fd = -1;
     out.text = NULL;
+}
+
+void cli_redirect(const char *file, bool stream)
+{
+    cli.output = file && strcmp(file, "-") ? file : NULL;
+    *out.final = 0;
+    check_output(stream);
 }
 
 void cli_stream_open(vg_head *h)
@@ -690,7 +697,7 @@ size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands)
     }
     cli.threads = threads_asked ? (int)threads_asked : default_threads();
     if (cli.output && !strcmp(cli.output, "-")) cli.output = NULL;
-    if (p->writes_stream || p->writes_text || p->writes_file) check_output();
+    if (p->writes_stream || p->writes_text || p->writes_file) check_output(p->writes_stream);
     widen_pipe(STDIN_FILENO);
     widen_pipe(STDOUT_FILENO);
     return n;

@@ -82,6 +82,10 @@ void cli_stream_end(const vg_records *tail);
 FILE *cli_text_open(void);
 void cli_text_end(void);
 
+/* cli_redirect: what is opened next goes to `file` ("-" or NULL: standard output), which is looked at now. For a program that writes
+ * a stream and a report, one after the other. */
+void cli_redirect(const char *file, bool stream);
+
 /* cli_finish: flush, close, check standard output; exit with `status` (0 or 1), or 4 when output was lost. */
 void cli_finish(int status) __attribute__((noreturn));
 

@@ -62,6 +62,11 @@ report_value report_counts(const uint64_t *x, size_t n)
     return (report_value){.type = REPORT_COUNTS, .n = n, .is.counts = x};
 }
 
+report_value report_numbers(const double *x, size_t n)
+{
+    return (report_value){.type = REPORT_NUMBERS, .n = n, .is.numbers = x};
+}
+
 static void *checked(void *p)
 {
     if (p) return p;
@@ -87,6 +92,10 @@ static report_value keep(report_value v)
         uint64_t *copy = checked(calloc(v.n + 1, sizeof *copy));
         for (size_t i = 0; i < v.n; i++) copy[i] = v.is.counts[i];
         v.is.counts = copy;
+    } else if (v.type == REPORT_NUMBERS) {
+        double *copy = checked(calloc(v.n + 1, sizeof *copy));
+        for (size_t i = 0; i < v.n; i++) copy[i] = v.is.numbers[i];
+        v.is.numbers = copy;
     }
     return v;
 }
@@ -95,7 +104,7 @@ static void drop(report_value *v)
 {
     if (v->type == REPORT_TEXTS)
         for (size_t i = 0; i < v->n; i++) free((void *)(uintptr_t)v->is.texts[i]);
-    if (v->type == REPORT_TEXT || v->type == REPORT_TEXTS || v->type == REPORT_COUNTS)
+    if (v->type == REPORT_TEXT || v->type == REPORT_TEXTS || v->type == REPORT_COUNTS || v->type == REPORT_NUMBERS)
         free((void *)(uintptr_t)v->is.text);
 }
 
@@ -222,6 +231,9 @@ static char *shown(const report_value *v)
         break;
     case REPORT_COUNTS:
         for (size_t i = 0; i < v->n; i++) fprintf(f, "%s%llu", i ? " " : "", (unsigned long long)v->is.counts[i]);
+        break;
+    case REPORT_NUMBERS:
+        for (size_t i = 0; i < v->n; i++) fprintf(f, "%s%.6g", i ? " " : "", v->is.numbers[i]);
         break;
     }
     if (fclose(f)) checked(NULL);
@@ -365,6 +377,10 @@ static json_t *json_of(const report_value *v)
     case REPORT_COUNTS:
         j = json_array();
         for (size_t i = 0; i < v->n; i++) json_array_append_new(j, json_integer((json_int_t)v->is.counts[i]));
+        break;
+    case REPORT_NUMBERS:
+        j = json_array();
+        for (size_t i = 0; i < v->n; i++) json_array_append_new(j, json_real(v->is.numbers[i]));
         break;
     }
     return checked(j);

@@ -13,7 +13,7 @@ typedef struct report report;
 
 /* A value: a cell of a table or a line of its own. Texts and lists are copied. */
 typedef enum report_type { REPORT_NOTHING, REPORT_TEXT, REPORT_COUNT, REPORT_NUMBER, REPORT_FLAG, REPORT_TEXTS,
-                           REPORT_COUNTS } report_type;
+                           REPORT_COUNTS, REPORT_NUMBERS } report_type;
 typedef struct report_value {
     report_type type;
     size_t n; /* of a list */
@@ -24,6 +24,7 @@ typedef struct report_value {
         bool flag;
         const char *const *texts;
         const uint64_t *counts;
+        const double *numbers;
     } is;
 } report_value;
 
@@ -34,6 +35,7 @@ report_value report_number(double x);
 report_value report_flag(bool b);
 report_value report_texts(const char *const *s, size_t n);
 report_value report_counts(const uint64_t *x, size_t n);
+report_value report_numbers(const double *x, size_t n); /* all finite */
 
 typedef struct report_column {
     const char *key, *title;

@@ -1,5 +1,5 @@
-/* vg-diff.c: measure how far a sequence is from the truth, and answer whether that is within a tolerance.
- * Leaves out the measures themselves (lib/model/measures.c) and pictures of the error (vg-view --against).
+/* vg-diff.c: measure how far a sequence is from the truth, and answer whether that is within a tolerance; the error of each vertex
+ * goes into a stream. Leaves out the measures themselves (lib/model/measures.c) and pictures of the error (vg-view).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 #include "report.h"
@@ -8,9 +8,10 @@
 
 static struct {
     double tolerance; /* in units of D; negative: none was asked for */
-    const char *of;
+    const char *of, *heat;
     bool centred, frames;
 } opts = {.tolerance = -1, .of = "max"};
+static const char *report_file; /* NULL: standard output */
 
 static const cli_option options[] = {
     {.name = "tolerance", .letter = 't', .value = "X", .help = "exit 1 when the error exceeds X, in units of D",
@@ -20,6 +21,8 @@ static const cli_option options[] = {
     {.name = "centred", .letter = 'c', .help = "move the centroid of every pose to 0 before comparing",
      .flag = &opts.centred},
     {.name = "frames", .help = "list the error of every frame", .flag = &opts.frames},
+    {.name = "heat", .value = "FILE", .text = &opts.heat,
+     .help = "write RESULT with the error of each vertex as a stream, which vg-view colours; '-': instead of the report"},
     {0},
 };
 
@@ -48,8 +51,9 @@ typedef struct findings {
 } findings;
 
 static const report_column frame_columns[] = {
-    {.key = "frame", .title = "frame"}, {.key = "name", .title = "name"}, {.key = "mean", .title = "mean"},
-    {.key = "max", .title = "max"},     {.key = "mean_D", .title = "mean/D"}, {.key = "max_D", .title = "max/D"}};
+    {.key = "frame", .title = "frame"},   {.key = "name", .title = "name"},     {.key = "mean", .title = "mean"},
+    {.key = "p95", .title = "p95"},       {.key = "max", .title = "max"},       {.key = "mean_D", .title = "mean/D"},
+    {.key = "p95_D", .title = "p95/D"},   {.key = "max_D", .title = "max/D"}};
 static const report_column error_columns[] = {
     {.key = "measure", .title = "vertex error"}, {.key = "error", .title = "mesh units"},
     {.key = "D", .title = "in D"},               {.title = ""},
@@ -62,7 +66,7 @@ static const report_column planarity_columns[] = {
     {.key = "sequence", .title = "planarity"}, {.key = "faces", .title = "faces"}, {.key = "mean", .title = "mean"},
     {.key = "max", .title = "max"}, {.key = "histogram", .title = "in tenths from 0 to 1"}};
 
-enum { COLUMNS_FRAME = 6, COLUMNS_ERROR = 7, COLUMNS_FACE = 4, COLUMNS_PLANARITY = 5 };
+enum { COLUMNS_FRAME = 8, COLUMNS_ERROR = 7, COLUMNS_FACE = 4, COLUMNS_PLANARITY = 5 };
 
 /* The answer "these cannot be compared": a line for people, and for programs an object that says so. */
 static void cannot_compare(const char *reason) __attribute__((noreturn));
@@ -123,12 +127,34 @@ static double in_diagonals(double x, double diagonal)
     return x == 0 ? 0 : x / diagonal; /* infinite for a mesh without extent */
 }
 
-static void report_frame(report *r, size_t i, const char *name, double mean, double max, double diagonal)
+static void report_frame(report *r, size_t i, const char *name, const double x[3], double diagonal)
 {
     const report_value row[COLUMNS_FRAME] = {
-        report_count(i), report_text(name), report_number(mean), report_number(max),
-        report_number(in_diagonals(mean, diagonal)), report_number(in_diagonals(max, diagonal))};
+        report_count(i), report_text(name), report_number(x[0]), report_number(x[1]), report_number(x[2]),
+        report_number(in_diagonals(x[0], diagonal)), report_number(in_diagonals(x[1], diagonal)),
+        report_number(in_diagonals(x[2], diagonal))};
     report_row(r, row);
+}
+
+/* ---- heat: the result, with the error of each vertex ---- */
+
+static void open_heat(side *result, const side *truth)
+{
+    vg_err e;
+    if (!opts.heat) return;
+    cli_redirect(opts.heat, true);
+    if (vg_head_merge_trace(result->head, truth->head, &e) < 0) cli_die(&e);
+    cli_stream_open(result->head);
+}
+
+static void put_heat(side *result, const double *errors, double diagonal)
+{
+    const char *name = opts.centred ? "centred error" : "error", *unit = diagonal > 0 ? "D" : "";
+    size_t nv = result->head->mesh.nv;
+    vg_err e;
+    if (vg_frame_scalars(&result->frame, name, unit, errors, nv, &e) < 0) cli_die(&e);
+    for (size_t v = 0; v < nv && diagonal > 0; v++) result->frame.scalars[v] /= diagonal;
+    cli_stream_put(&result->frame);
 }
 
 /* Read both to their ends, so that damage is seen, and measure the frames they have in common. */
@@ -136,9 +162,16 @@ static void compare(side *truth, side *result, findings *found, report *r)
 {
     vg_measures *x = NULL;
     vg_err e;
-    double worst = -1, mean, max, diagonal = vg_diagonal(truth->head->reference, truth->head->mesh.nv);
+    size_t nv = truth->head->mesh.nv;
+    double worst = -1, mean, max, diagonal = vg_diagonal(truth->head->reference, nv);
+    double *errors = calloc(nv + 1, sizeof *errors);
+    if (!errors) {
+        vg_fail(&e, VG_ENOMEM, "not enough memory for the errors of %zu vertices", nv);
+        cli_die(&e);
+    }
     if (vg_measures_new(&x, &truth->head->mesh, truth->head->reference, opts.centred, &e) < 0) cli_die(&e);
     if (opts.frames) report_table(r, "frame_errors", "", false, frame_columns, COLUMNS_FRAME);
+    open_heat(result, truth);
     for (bool more[2] = {true, true}; more[0] || more[1];) {
         more[0] = more[0] && next(truth);
         more[1] = more[1] && next(result);
@@ -147,17 +180,23 @@ static void compare(side *truth, side *result, findings *found, report *r)
         if (strcmp(name, result->frame.name))
             cli_note("frame %zu is '%s' in '%s' and '%s' in '%s'", truth->frames - 1, name, truth->name,
                      result->frame.name, result->name);
-        if (vg_measures_add(x, truth->frame.values, result->frame.values, &mean, &max, NULL, &e) < 0) cli_die(&e);
+        if (vg_measures_add(x, truth->frame.values, result->frame.values, &mean, &max, errors, &e) < 0) cli_die(&e);
         if (max > worst) {
             worst = max;
             free(found->worst_frame);
             found->worst_frame = strdup(name);
         }
-        if (opts.frames) report_frame(r, truth->frames - 1, name, mean, max, diagonal);
+        if (opts.heat) put_heat(result, errors, diagonal);
+        if (opts.frames)
+            report_frame(r, truth->frames - 1, name, (double[3]){mean, vg_error_p95(errors, nv), max}, diagonal);
         cli_progress("frame", truth->frames);
     }
     vg_measures_get(x, &found->measures);
     vg_measures_free(&x);
+    free(errors);
+    if (!opts.heat) return;
+    cli_stream_end(vg_source_tail(result->source));
+    cli_redirect(report_file, false);
 }
 
 static void report_sides(report *r, const side *truth, const side *result, const vg_measure_report *m)
@@ -211,6 +250,14 @@ static void report_vertices(report *r, const findings *found)
     report_error(r, "sigma", m->sigma, m->diagonal, at_sigma, m->sigma > 0 ? unsteady : nowhere);
 }
 
+static void report_histogram(report *r, const vg_measure_report *m)
+{
+    report_group(r, "histogram");
+    report_put(r, "edges_D", NULL, report_numbers(vg_error_edges, VG_ERROR_BINS));
+    report_put(r, "counts", NULL, report_counts(m->histogram, VG_ERROR_BINS));
+    report_end(r);
+}
+
 static void report_faces(report *r, const vg_measure_report *m)
 {
     const report_value rows[2][COLUMNS_FACE] = {
@@ -261,6 +308,12 @@ static bool judge(report *r, const vg_measure_report *m, char *line, size_t size
     return within;
 }
 
+/* The stream goes where the report would. */
+static bool replaces_report(void)
+{
+    return opts.heat && !strcmp(opts.heat, "-") && !report_file;
+}
+
 static void parse_options(int argc, char **argv, char ***operands)
 {
     size_t n = cli_start(&program, argc, argv, operands);
@@ -269,6 +322,14 @@ static void parse_options(int argc, char **argv, char ***operands)
         cli_usage("only one of the two sequences can be standard input");
     if (strcmp(opts.of, "mean") && strcmp(opts.of, "rms") && strcmp(opts.of, "p95") && strcmp(opts.of, "max"))
         cli_usage("option '--of' needs mean, rms, p95 or max, not '%s'", opts.of);
+    report_file = cli.output;
+    if (!opts.heat) return;
+    if (replaces_report() && (cli.json || opts.frames))
+        cli_usage("option '--%s' is about the report, which needs a file: -o FILE", cli.json ? "json" : "frames");
+    if (report_file && !strcmp(opts.heat, report_file))
+        cli_usage("'%s' cannot be both the stream and the report", report_file);
+    cli_redirect(opts.heat, true); /* what is wrong with the name is told now */
+    cli_redirect(report_file, false);
 }
 
 int main(int argc, char **argv)
@@ -285,19 +346,21 @@ int main(int argc, char **argv)
     compare(&truth, &result, &found, frames);
     report_sides(r, &truth, &result, &found.measures);
     report_vertices(r, &found);
+    report_histogram(r, &found.measures);
     report_faces(r, &found.measures);
     char answer[200];
     bool within = judge(r, &found.measures, answer, sizeof answer);
     if (opts.frames) report_gap(r);
     report_join(r, frames);
 
-    FILE *f = cli_text_open();
-    report_print(r, f, cli.json);
+    if (!replaces_report()) {
+        report_print(r, cli_text_open(), cli.json);
+        cli_text_end();
+    }
     report_free(&r);
     free(found.worst_frame);
     close_side(&truth);
     close_side(&result);
-    cli_text_end();
     if (truth.frames != result.frames)
         cli_no("'%s' has %zu frames and '%s' has %zu: only the first %zu were compared", truth.name, truth.frames,
                result.name, result.frames, found.measures.frames);

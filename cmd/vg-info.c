@@ -36,6 +36,9 @@ typedef struct contents {
     char *first, *last;            /* names */
     double first_time, last_time;
     double D; /* of the first frame of vertices */
+    uint64_t scalars;              /* frames that bring them */
+    char *scalars_name, *scalars_unit; /* of the first of these */
+    double scalars_least, scalars_most;
     uint64_t digest;
 } contents;
 
@@ -96,6 +99,19 @@ static void note_frame(contents *c, const vg_frame *f)
     c->frames++;
 }
 
+static void note_scalars(contents *c, const vg_frame *f, size_t nv)
+{
+    double least, most;
+    if (!f->has_scalars) return;
+    range_of(f->scalars, nv, &least, &most);
+    if (c->scalars++ == 0) {
+        replace_text(&c->scalars_name, f->scalars_name);
+        replace_text(&c->scalars_unit, f->scalars_unit);
+        c->scalars_least = least, c->scalars_most = most;
+    }
+    c->scalars_least = fmin(c->scalars_least, least), c->scalars_most = fmax(c->scalars_most, most);
+}
+
 /* Read to the end, which is what proves that the input is whole. `list` may be NULL. */
 static void read_all(vg_source *s, contents *c, report *list)
 {
@@ -112,6 +128,7 @@ static void read_all(vg_source *s, contents *c, report *list)
         if (list) list_frame(list, h, &f, c->frames);
         if (c->frames == 0 && poses) c->D = vg_diagonal(f.values, h->count);
         note_frame(c, &f);
+        note_scalars(c, &f, h->mesh.nv);
         cli_progress("frame", c->frames);
     }
     if (r < 0) cli_die(&e);
@@ -144,6 +161,22 @@ static void report_frames(report *r, const vg_head *h, const contents *c)
     if (!c->timed) return;
     snprintf(line, sizeof line, "%.6g s to %.6g s", c->first_time, c->last_time);
     report_put(r, NULL, "times", report_text(line));
+}
+
+static void report_scalars(report *r, const contents *c)
+{
+    char line[300];
+    if (!c->scalars) return;
+    snprintf(line, sizeof line, "'%.100s' of each vertex in %" PRIu64 " of the frames: %.6g to %.6g %.60s",
+             c->scalars_name, c->scalars, c->scalars_least, c->scalars_most, c->scalars_unit);
+    report_put(r, NULL, "with them", report_text(line));
+    report_group(r, "scalars");
+    report_put(r, "name", NULL, report_text(c->scalars_name));
+    report_put(r, "unit", NULL, report_text(c->scalars_unit));
+    report_put(r, "frames", NULL, report_count(c->scalars));
+    report_put(r, "least", NULL, report_number(c->scalars_least));
+    report_put(r, "most", NULL, report_number(c->scalars_most));
+    report_end(r);
 }
 
 /* ------------------------------------------------------------------------------------------------ mesh -- */
@@ -441,6 +474,7 @@ static void report_all(report *r, const char *operand, const vg_head *h, const c
 {
     report_name(r, operand);
     report_frames(r, h, c);
+    report_scalars(r, c);
     report_mesh(r, h);
     report_correspondence(r, h, c->D);
     report_patches(r, h);

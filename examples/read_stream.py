@@ -135,6 +135,7 @@ class Frame:
     values: array
     pins: object = None  # array: vertices that stay where the reference has them; None: no pins
     extra: list = field(default_factory=list)
+    scalars: object = None  # (name, unit, array with the number of each vertex), or None
 
 
 @dataclass
@@ -362,6 +363,7 @@ class _Reader:
         self.input = _Input(file)
         self.stream = Stream()
         self.pending = []  # unknown records since the last frame
+        self.scalars = None  # what SCAL has said of the next frame
         self.seen = set()
         self.sums = bytearray()
         self.done = False
@@ -441,7 +443,11 @@ class _Reader:
         formed = "FORM" in self.seen
         if tag in ("FRAM", "END ") and not formed:
             raise StreamError("it has a frame before its FORM record" if tag == "FRAM" else "it has no FORM record")
-        if tag in ("FRAM", "END ", "FAIL"):
+        if tag == "SCAL" and not formed:
+            raise StreamError("record SCAL must come after FORM")
+        if tag == "END " and self.scalars is not None:
+            raise StreamError("no frame comes behind the last SCAL record")
+        if tag in ("FRAM", "SCAL", "END ", "FAIL"):
             return
         if formed:
             raise StreamError(f"record {tag} must come before FORM" if tag != "FORM" else "it has two FORM records")
@@ -689,6 +695,24 @@ class _Reader:
                 p.fail("indices are not ascending")
         return pins
 
+    def scal(self, p: _Payload):
+        s = self.stream
+        p.where = f"record SCAL of frame {len(s.frames)}"
+        if s.kind != "vertices":
+            p.fail("frames are no vertices")
+        if self.scalars is not None:
+            p.fail("the frame has another one")
+        p.fits("it is too short, or reserved bytes are not zero")
+        name_length, unit_length = p.u32(), p.u32()
+        p.zero(8, "it is too short, or reserved bytes are")
+        if name_length == 0:
+            p.fail("it has no name")
+        name, unit = p.text(name_length), p.text(unit_length)
+        p.pad()
+        p.fits("its length does not fit the number of vertices")
+        self.scalars = (name, unit, p.f64s(s.mesh.nv, "a number", "d" if s.precision == 8 else "f"))
+        p.end()
+
     def fram(self, p: _Payload):
         s = self.stream
         p.where = f"frame {len(s.frames)}"
@@ -717,8 +741,8 @@ class _Reader:
             for i in range(0, len(values), width):
                 if not any(values[i:i + 4]):
                     p.fail("a quaternion is zero")
-        s.frames.append(Frame(name, time if flags & 1 else None, root, anchors, values, pins, self.pending))
-        self.pending = []
+        s.frames.append(Frame(name, time if flags & 1 else None, root, anchors, values, pins, self.pending, self.scalars))
+        self.pending, self.scalars = [], None
 
     def fail(self, p: _Payload):
         status, program, message = p.u32(), p.string(), p.string()
@@ -737,7 +761,7 @@ class _Reader:
 
     HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "SELE": sele, "LINK": link, "ANCH": anch,
                 "REFP": refp, "SKEL": skel, "CORR": corr, "PTCH": ptch,
-                "MAP ": map, "FORM": form, "FRAM": fram, "FAIL": fail, "END ": end}
+                "MAP ": map, "FORM": form, "SCAL": scal, "FRAM": fram, "FAIL": fail, "END ": end}
 
 
 def read_stream(file) -> Stream:
@@ -761,8 +785,12 @@ def _extra_json(records) -> list:
 
 def _frame_json(f: Frame, width: int) -> dict:
     anchors = None if f.anchors is None else _rows(f.anchors, 3)
-    return {"name": f.name, "time": f.time, "root": f.root, "anchors": anchors,
-            "pins": None if f.pins is None else list(f.pins), "values": _rows(f.values, width), "extra": _extra_json(f.extra)}
+    out = {"name": f.name, "time": f.time, "root": f.root, "anchors": anchors,
+           "pins": None if f.pins is None else list(f.pins), "values": _rows(f.values, width), "extra": _extra_json(f.extra)}
+    if f.scalars:
+        name, unit, numbers = f.scalars
+        out["scalars"] = {"name": name, "unit": unit, "numbers": list(numbers)}
+    return out
 
 
 def _correspondence_json(c: Correspondence) -> dict:

@@ -88,6 +88,7 @@ types:
             '"PTCH"': ptch
             '"MAP "': map
             '"FORM"': form
+            '"SCAL"': scal
             '"FRAM"': fram
             '"FAIL"': fail
             '"END "': end_mark
@@ -388,6 +389,32 @@ types:
         doc: numbers of an element
       on_graph:
         value: kind == kind::vectors or kind == kind::deformations
+  scal:
+    seq:
+      - id: len_name
+        type: u4
+      - id: len_unit
+        type: u4
+      - id: reserved
+        type: u8
+      - id: name
+        type: str
+        size: len_name
+        encoding: UTF-8
+      - id: unit
+        type: str
+        size: len_unit
+        encoding: UTF-8
+      - id: padding
+        size: (8 - (len_name + len_unit) % 8) % 8
+      - id: numbers
+        type:
+          switch-on: _root.form.precision
+          cases:
+            4: f4
+            8: f8
+        repeat: eos
+        doc: one for each vertex of the mesh
   fram:
     seq:
       - id: len_name

@@ -332,21 +332,26 @@ typedef struct vg_frame {
     uint32_t *pins;
     size_t nturns;   /* vertices of a skeleton: number of joints when it is known how they have turned, else 0; set by vg_frame_turn */
     double *turns;   /* a unit quaternion w x y z each, beside the skeleton's pose without rotations: positions do not say it all */
+    bool has_scalars; /* vertices: a number for each vertex comes with the frame, such as its error; set by vg_frame_scalars */
+    char *scalars_name, *scalars_unit; /* UTF-8: "error", never ""; "D", or "" */
+    double *scalars;  /* mesh.nv */
     double *values;  /* head.count * vg_kind_width(head.kind) */
     vg_records extra; /* unknown records that came before this frame */
     /* private to the reader and to vg_frame_*: */
     vg_bytes raw;
-    size_t name_cap, anchors_cap, pins_cap, turns_cap, values_cap;
+    size_t name_cap, anchors_cap, pins_cap, turns_cap, values_cap, scalars_name_cap, scalars_unit_cap, scalars_cap;
     double *values_own;
 } vg_frame;
 
 void vg_frame_clear(vg_frame *f);
-/* vg_frame_shape: make room for the values and anchors of a frame of h; contents undefined. */
+/* vg_frame_shape: make room for the values and anchors of a frame of h; contents undefined, no scalars. */
 int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 int vg_frame_pin(vg_frame *f, const uint32_t *vertices, size_t n, vg_err *e) VG_MUST_CHECK;
 int vg_frame_turn(vg_frame *f, const double *turns, size_t njoints, vg_err *e) VG_MUST_CHECK;
 int vg_frame_rename(vg_frame *f, const char *name, vg_err *e) VG_MUST_CHECK;
-/* vg_frame_label: take over name, time and unknown records of `from`, but no numbers, pins or turns; `from` loses its records. */
+/* vg_frame_scalars: numbers (nv of them, copied) come with the frame from now on, until it is shaped or labelled again. */
+int vg_frame_scalars(vg_frame *f, const char *name, const char *unit, const double *numbers, size_t nv, vg_err *e) VG_MUST_CHECK;
+/* vg_frame_label: take over name, time and unknown records of `from`, but no numbers, pins, turns or scalars; `from` loses its records. */
 int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e) VG_MUST_CHECK;
 
 /* The vector graph of a sequence: the faces that carry vectors, in order (all, or the selected ones), then the links.
@@ -630,11 +635,14 @@ int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_err *e) VG_M
 
 /* Measures of two sequences of one connectivity (MATH 8), accumulated pose by pose in bounded memory. */
 typedef struct vg_measures vg_measures;
+enum { VG_ERROR_BINS = 40 };
+extern const double vg_error_edges[VG_ERROR_BINS]; /* in D: bin i holds what is at least edge i and less than the next, the last one all from 5 on */
 typedef struct vg_measure_report {
     size_t frames, vertices, faces;
     double diagonal; /* D of the truth's reference pose */
     double mean, rms, max, p95; /* vertex error, mesh units */
     size_t max_vertex, max_frame;
+    uint64_t histogram[VG_ERROR_BINS]; /* vertex errors, by vg_error_edges */
     double sigma;              /* largest over vertices of the standard deviation over poses (T 5.36) */
     size_t sigma_vertex;
     double orientation_mean, orientation_sd, orientation_max; /* 1 - N.N~ per face of 3 or more (T 6.42) */
@@ -654,6 +662,8 @@ void vg_measures_free(vg_measures **x);
 int vg_measures_add(vg_measures *x, const double *truth, const double *result, double *frame_mean, double *frame_max,
                     double *errors, vg_err *e) VG_MUST_CHECK;
 void vg_measures_get(const vg_measures *x, vg_measure_report *r);
+/* vg_error_p95: the least of n numbers that 95 of 100 do not exceed; 0 for none. Changes their order. O(n). */
+double vg_error_p95(double *numbers, size_t n);
 
 /* A fingerprint of what a sequence says, whoever made it: XXH64 over kind, faces, selection, links, anchors, reference
  * positions, and of every frame name, time, root, anchors and values, all numbers as binary64 (-0 as 0). Provenance,

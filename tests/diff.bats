@@ -324,3 +324,122 @@ assert abs(a["face_error"]["orientation"]["mean"] - b["face_error"]["orientation
 assert a["planarity"]["truth"] == b["planarity"]["result"]
 END
 }
+
+@test "--json has a histogram of the vertex errors and, with --frames, p95 of each: those that Python finds" {
+    poses cube 4
+    vg-encode pose1.obj pose2.obj pose3.obj pose4.obj >a.vgs
+    py <<'END'
+import random, re
+random.seed(7)
+for i in range(1, 5):
+    lines = open(f"pose{i}.obj").read().splitlines()
+    for k, line in enumerate(lines):
+        if line.startswith("v ") and k != 3:
+            x = [float(t) + random.choice([-1, 1]) * 10 ** random.uniform(-14, 1.5) for t in line.split()[1:]]
+            lines[k] = "v " + " ".join(map(repr, x))
+    open(f"moved{i}.obj", "w").write("\n".join(lines) + "\n")
+END
+    vg-encode moved1.obj moved2.obj moved3.obj moved4.obj >b.vgs
+    must vg-diff --json --frames a.vgs b.vgs -o r.json
+    py <<'END'
+import bisect, json, math, read_stream
+a, b, r = read_stream.read_stream("a.vgs"), read_stream.read_stream("b.vgs"), json.load(open("r.json"))
+box = [[f(a.reference[k::3]) for k in range(3)] for f in (min, max)]
+D = math.dist(*box)
+edges = [0.0] + [float(f"{m}e{e}") for e in range(-12, 1) for m in (1, 2, 5)]
+counts, touched = [0] * len(edges), 0
+for p, q, row in zip(a.frames, b.frames, r["frame_errors"]):
+    errors = [math.dist(p.values[3 * v:3 * v + 3], q.values[3 * v:3 * v + 3]) for v in range(8)]
+    for x in errors:
+        counts[bisect.bisect_right(edges, x / D) - 1] += 1
+    ranked = sorted(errors)
+    assert abs(row["p95"] - ranked[7]) <= 1e-15 * ranked[7] and abs(row["p95_D"] - ranked[7] / D) < 1e-14 * ranked[7]
+    assert abs(row["mean"] - sum(errors) / 8) < 1e-14
+assert r["histogram"]["edges_D"] == edges
+assert r["histogram"]["counts"] == counts and sum(counts) == 32 and sum(c > 0 for c in counts) > 8, counts
+END
+}
+
+@test "--heat writes the result with the error of each vertex: frames and names are the result's, the numbers those of Python" {
+    poses two 3
+    vg-encode --fps 10 pose1.obj pose2.obj pose3.obj >result.vgs
+    mkdir truth
+    for i in 1 2 3; do mesh two 0.05 "0.$i" >"truth/t$i.obj"; done
+    must vg-diff truth result.vgs --heat heat.vgs -o report.txt
+    grep -q 'vertex error' report.txt
+    must vg-diff truth result.vgs --heat centred.vgs -c
+    shows 'vertex error'
+    must_fail 1 bash -c 'vg-diff truth result.vgs --heat - -t 0.001 >piped.vgs'
+    says 'exceeds the tolerance'
+    must witness --check heat.vgs
+    py <<'END'
+import math, read_stream
+points = lambda i: [[float(x) for x in l.split()[1:]] for l in open(f"truth/t{i}.obj") if l.startswith("v ")]
+r, heat, centred, piped = (read_stream.read_stream(n) for n in ("result.vgs", "heat.vgs", "centred.vgs", "piped.vgs"))
+D = math.dist(*[[f(p[k] for p in points(1)) for k in range(3)] for f in (min, max)])
+assert [f.name for f in heat.frames] == ["pose1", "pose2", "pose3"] and [f.time for f in heat.frames] == [0, 0.1, 0.2]
+assert heat.mesh.faces() == r.mesh.faces() and heat.reference == r.reference and len(piped.frames) == 3
+assert heat.provenance[-1].program == "vg-diff" and "--heat" in heat.provenance[-1].args
+mean = lambda p: [sum(x[k] for x in p) / len(p) for k in range(3)]
+for i, (f, g, c, p) in enumerate(zip(r.frames, heat.frames, centred.frames, piped.frames), 1):
+    assert f.values == g.values == c.values and p.scalars == g.scalars
+    pose = [list(f.values[k:k + 3]) for k in range(0, len(f.values), 3)]
+    name, unit, errors = g.scalars
+    assert (name, unit) == ("error", "D") and len(errors) == 12
+    assert all(abs(x * D - math.dist(a, b)) < 1e-14 for x, a, b in zip(errors, pose, points(i)))
+    shift = [a - b for a, b in zip(mean(points(i)), mean(pose))]
+    assert c.scalars[0] == "centred error"
+    assert all(abs(x * D - math.dist([u + s for u, s in zip(a, shift)], b)) < 1e-14
+               for x, a, b in zip(c.scalars[2], pose, points(i)))
+END
+    must vg-info heat.vgs
+    shows "'error' of each vertex in 3 of the frames"
+    must vg-info --json heat.vgs -o info.json
+    is info.json scalars.unit '"D"'
+    is info.json scalars.frames 3
+}
+
+@test "heat passes where vertices stay, and goes where they move or a format cannot hold it" {
+    poses cube 3
+    vg-encode pose1.obj pose2.obj pose3.obj >a.vgs
+    must vg-diff --heat heat.vgs -q -o report pose1.obj pose1.obj
+    capture vg-diff a.vgs pose1.obj --heat short.vgs -o report
+    [ "$status" = 1 ]
+    must vg-diff a.vgs a.vgs --heat heat.vgs -o report
+    must vg-encode --f32 heat.vgs -o f32.vgs
+    must vg-encode heat.vgs a.vgs -o joined.vgs
+    must vg-encode --vectors heat.vgs -o vectors.vgs
+    must vg-poisson --last pose1.obj heat.vgs -o guided.vgs
+    py <<'END'
+import read_stream
+has = lambda name: [bool(f.scalars) for f in read_stream.read_stream(name).frames]
+assert has("heat.vgs") == has("f32.vgs") == [True] * 3
+assert has("short.vgs") == [True], has("short.vgs")
+assert has("joined.vgs") == [True] * 3 + [False] * 3, has("joined.vgs")
+assert has("vectors.vgs") == has("guided.vgs") == [False] * 3
+END
+    capture vg-decode heat.vgs -o heat.pc2
+    [ "$status" = 0 ]
+    says "not kept in 'heat.pc2'" "the 'error' of the vertices"
+    capture vg-decode heat.vgs -o 'h-%d.obj'
+    [ "$status" = 0 ]
+    says "the 'error' of the vertices"
+}
+
+@test "--heat: a stream is no report, and neither is written for what cannot be compared" {
+    mesh cube >a.obj
+    mesh tetra >b.obj
+    must_fail 2 vg-diff a.obj a.obj --heat - --json
+    says "option '--json' is about the report"
+    must_fail 2 vg-diff a.obj a.obj --heat x -o x
+    must_fail 2 vg-diff a.obj a.obj --heat x.png
+    says "writes a stream"
+    must_fail 1 vg-diff a.obj b.obj --heat x --json
+    printf '%s' "$output" >r.json
+    is r.json comparable false
+    must_fail 4 vg-diff a.obj a.obj --heat /dev/full
+    must_fail 4 vg-diff a.obj a.obj --heat nowhere/x
+    nothing_but a.obj b.obj r.json
+    must vg-diff a.obj a.obj --heat - --json -o report.json
+    is report.json comparable true
+}

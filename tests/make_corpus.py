@@ -193,6 +193,13 @@ def frame(c, f):
     return Record("FRAM", head + struct.pack(f"<{len(values)}{code}", *values), CRITICAL)
 
 
+def scalars(c, s):
+    name, unit = s["name"].encode(), s["unit"].encode()
+    code = "d" if c["precision"] == 8 else "f"
+    return Record("SCAL", pad(u32(len(name), len(unit), 0, 0) + name + unit) +
+                  struct.pack(f"<{len(s['numbers'])}{code}", *s["numbers"]), 0)
+
+
 def records_of(c):
     """The records of a content, END left out. `order` of the content moves header records about."""
     out = [provenance(p) for p in c["provenance"]]
@@ -218,7 +225,7 @@ def records_of(c):
     out += unknown(c["extra"])
     out.append(Record("FORM", u32(KINDS[c["kind"]], c["precision"]) + u64(c["count"]), CRITICAL))
     for f in c["frames"]:
-        out += unknown(f["extra"]) + [frame(c, f)]
+        out += unknown(f["extra"]) + ([scalars(c, f["scalars"])] if "scalars" in f else []) + [frame(c, f)]
     return out + unknown(c["tail"])
 
 
@@ -262,6 +269,12 @@ def content(**changes):
 def pose(name, values, time=None, root=None, anchors=None, pins=None, extra=()):
     return {"name": name, "time": time, "root": root, "anchors": anchors, "pins": pins, "values": values,
             "extra": list(extra)}
+
+
+def scaled(numbers=(0, 0.25, -1, 5e-324), name="error", unit="D", **changes):
+    """Two frames of vertices, the first with a number for each vertex."""
+    first = dict(pose("pose1", BENT[:4]), scalars={"name": name, "unit": unit, "numbers": list(numbers)})
+    return content(frames=[first, pose("pose2", POINTS[:4])], **changes)
 
 
 def pinned(*pins):
@@ -381,6 +394,7 @@ def golden():
             dict(mixed(selection=[0, 2], links=[[1, 4]], precision=4), kind="vectors", count=8,
                  frames=[pose("bent", vectors + corner_vectors([[1, 4]], BENT), root=used, anchors=[])])),
         "pins": ("vectors with three vertices pinned in the first frame and none in the second", pinned(1, 2, 4)),
+        "scalars": ("two frames of vertices, the first with a number for each vertex", scaled()),
         "deformations": ("a quaternion w x y z per corner, squared length = scale", graph_content("deformations")),
         "transforms": (
             "two transforms a frame, no mesh at all",
@@ -426,6 +440,11 @@ def accept():
         "line-segments-only": whole(content(mesh={"vertices": 4, "faces": [[0, 1], [1, 2], [3, 1]]})),
         "ignored-flags": whole(content(), ignored),
         "pins-even": whole(pinned(0, 5)),
+        "scalars-f32-without-unit": whole(scaled(numbers=(1, 2, 3, 0.5), name="t\u00eate 1", unit="", precision=4)),
+        "scalars-of-nothing": whole(content(
+            mesh={"vertices": 0, "faces": []}, reference={"name": "", "positions": []}, count=0,
+            frames=[dict(pose("nothing", []), scalars={"name": "x", "unit": "m/s", "numbers": []})])),
+        "scalars-behind-unknown": whole(dict(scaled(), frames=[dict(scaled()["frames"][0], extra=[FUTURE])])),
         "pins-with-selection": whole(dict(pinned(3), selection=[0], links=[[1, 4], [4, 5]])),
         "skeleton-of-nothing": whole(content(mesh={"vertices": 0, "faces": []}, count=0, frames=[], skeleton=[],
                                              reference={"name": "", "positions": []})),
@@ -754,6 +773,7 @@ def reject_frames():
     records = records_of(second)
     records[-1].payload = records[-1].payload[:-8] + f64(INF)
     swapped = copy.deepcopy(c)
+    k = scaled()
     p = pinned(1, 2, 4)  # payload: 24 bytes head and name, 24 root, 48 anchors, pins from byte 96
     return {
         "fram-before-form": whole(c, [records_of(swapped)[i] for i in (0, 1, 3, 2)]),
@@ -783,6 +803,22 @@ def reject_frames():
         "fram-root-nan": patched(v, "FRAM", 24, f64(NAN)),
         "fram-anchor-inf": patched(v, "FRAM", 48, f64(INF)),
         "fram-without-root": lie(v, "FRAM", payload=lambda r: r.payload[:24] + r.payload[48:]),
+        "scal-before-form": inserted(c, "FORM", scalars(k, k["frames"][0]["scalars"])),
+        "scal-twice": inserted(k, "FRAM", scalars(k, k["frames"][0]["scalars"])),
+        "scal-behind-the-last-frame": inserted(k, None, scalars(k, k["frames"][0]["scalars"])),
+        "scal-of-vectors": inserted(v, "FRAM", scalars(k, {"name": "e", "unit": "", "numbers": [0] * 6})),
+        "scal-short": lie(k, "SCAL", payload=lambda r: r.payload[:-8]),
+        "scal-long": lie(k, "SCAL", payload=lambda r: r.payload + bytes(8)),
+        "scal-empty": lie(k, "SCAL", payload=b""),
+        "scal-reserved": patched(k, "SCAL", 12, u32(1)),
+        "scal-no-name": whole(scaled(name="")),
+        "scal-name-2-32-less-1": patched(k, "SCAL", 0, u32(0xFFFFFFFF)),
+        "scal-unit-2-32-less-1": patched(k, "SCAL", 4, u32(0xFFFFFFFF)),
+        "scal-name-utf8": patched(k, "SCAL", 16, b"\xc0\x80"),
+        "scal-unit-nul": patched(k, "SCAL", 21, b"\0"),
+        "scal-padding": patched(k, "SCAL", 22, b"\0\1"),
+        "scal-nan": patched(k, "SCAL", -8, f64(NAN)),
+        "scal-f32-inf": patched(scaled(numbers=(1, 2, 3, 4), precision=4), "SCAL", -4, struct.pack("<f", INF)),
         "fram-quaternion-zero": patched(q, "FRAM", -32, f64(0, 0, 0, 0)),
         "fram-transform-zero": patched(t, "FRAM", -56, f64(0, 0, 0, -0.0)),
     }

@@ -34,6 +34,10 @@ bool vgi_finite(const double *x, size_t n);
  * Tasks are handed out in order; they must not depend on one another. With one thread it is a loop. */
 void vgi_parallel(int threads, size_t n, void (*task)(void *context, size_t i), void *context);
 
+/* vgi_frame_scalars: vg_frame_scalars whose numbers are still to be set. */
+int vgi_frame_scalars(vg_frame *f, const char *name, size_t name_bytes, const char *unit, size_t unit_bytes, size_t nv,
+                      vg_err *e) VG_MUST_CHECK;
+
 /* vgi_patch_colour: sRGB, far from those of the numbers before and after: hues by the golden ratio, in three shades. */
 static inline void vgi_patch_colour(uint32_t patch, unsigned char rgb[3])
 {

@@ -40,6 +40,10 @@ int vgi_fram_encode(vg_bytes *b, const vg_head *h, const vg_frame *f, vg_err *e)
 int vgi_values_encode(vg_bytes *b, const double *x, size_t n, vg_precision precision, const void **data, size_t *bytes,
                       vg_err *e) VG_MUST_CHECK;
 
+/* SCAL, which belongs to the frame behind it: vgi_scal_encode is everything before the numbers. */
+int vgi_scal_decode(const vgi_payload *p, const vg_head *h, vg_frame *f, vg_err *e) VG_MUST_CHECK;
+int vgi_scal_encode(vg_bytes *b, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
+
 /* FAIL: VG_ETRUNC with the story of who failed. */
 int vgi_fail_decode(const vgi_payload *p, const char *stream, vg_err *e) VG_MUST_CHECK;
 int vgi_fail_encode(vg_bytes *b, const char *program, int status, const char *message, vg_err *e) VG_MUST_CHECK;

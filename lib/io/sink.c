@@ -61,6 +61,7 @@ struct vg_sink {
     vg_frame slim_frame;
     size_t loose;        /* vertices in no face */
     bool names_lost, times_lost;
+    char scalars_lost[80]; /* what comes with the vertices: no format keeps it */
     vgi_names warnings;
 };
 
@@ -627,6 +628,8 @@ static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
     if (s->mesh)
         keeps |= s->mesh_format->keeps &
                  (VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS);
+    char scalars[120];
+    snprintf(scalars, sizeof scalars, "the '%s' of the vertices", s->scalars_lost);
     bool faces = keeps & VGI_KEEPS_FACES, triangles = faces && !(keeps & VGI_KEEPS_POLYGONS);
     const struct {
         bool lost;
@@ -639,7 +642,8 @@ static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
                {!(keeps & VGI_KEEPS_LABELS) && h->attributes.nlabels, "groups and materials"},
                {!(keeps & VGI_KEEPS_SKELETON) && h->skeleton.njoints, "the skeleton"},
                {f && !(keeps & VGI_KEEPS_NAMES) && s->names_lost && s->frames > 1, "the names of the frames"},
-               {f && !(keeps & VGI_KEEPS_TIMES) && s->times_lost, "the times of the frames"}};
+               {f && !(keeps & VGI_KEEPS_TIMES) && s->times_lost, "the times of the frames"},
+               {*s->scalars_lost, scalars}};
     int r = VG_OK;
     for (size_t i = 0; r == VG_OK && i < sizeof all / sizeof *all; i++)
         if (all[i].lost) r = add_loss(line, all[i].what, e);
@@ -759,6 +763,8 @@ int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
     const char *name = f->name ? f->name : "";
     enum kind kind = s->plan.kind;
     int r = VG_OK;
+    if (f->has_scalars && !*s->scalars_lost)
+        snprintf(s->scalars_lost, sizeof s->scalars_lost, "%s", f->scalars_name);
     if (s->kept) {
         if ((r = slim_pose(s, f, e)) < 0) return r;
         f = &s->slim_frame;

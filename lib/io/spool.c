@@ -8,10 +8,11 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-/* What precedes a frame's name, records, pins, anchors and values. */
+/* What precedes a frame's name, records, pins, anchors, values and scalars. */
 typedef struct front {
     size_t bytes; /* of the whole frame, this included */
     size_t name, records, pins;
+    size_t scalars, scalars_name, scalars_unit; /* 0 numbers, or those of the mesh; their texts with terminators */
     double time, root[3];
     bool has_time;
 } front;
@@ -83,6 +84,12 @@ static int measure(const vg_spool *s, const vg_frame *f, front *to, vg_err *e)
                   .time = f->time, .has_time = f->has_time, .root = {f->root[0], f->root[1], f->root[2]}};
     bool ok = add(&to->bytes, to->name, 1) && add(&to->bytes, to->pins, sizeof *f->pins) &&
               add(&to->bytes, s->anchors, sizeof(double)) && add(&to->bytes, s->values, sizeof(double));
+    if (f->has_scalars) {
+        to->scalars = s->h->mesh.nv;
+        to->scalars_name = strlen(f->scalars_name) + 1, to->scalars_unit = strlen(f->scalars_unit) + 1;
+        ok = ok && add(&to->bytes, to->scalars_name, 1) && add(&to->bytes, to->scalars_unit, 1) &&
+             add(&to->bytes, to->scalars, sizeof(double));
+    }
     for (size_t i = 0; ok && i < f->extra.n; i++)
         ok = add(&to->bytes, 1, sizeof(vg_record)) && add(&to->bytes, f->extra.at[i].payload.size, 1);
     return ok ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory to hold frame '%s'", f->name);
@@ -104,7 +111,10 @@ static void pack(const vg_spool *s, const vg_frame *f, const front *head, unsign
     }
     to = append(to, f->pins, head->pins * sizeof *f->pins);
     to = append(to, f->anchors, s->anchors * sizeof *f->anchors);
-    append(to, f->values, s->values * sizeof *f->values);
+    to = append(to, f->values, s->values * sizeof *f->values);
+    to = append(to, f->scalars_name, head->scalars_name);
+    to = append(to, f->scalars_unit, head->scalars_unit);
+    append(to, f->scalars, head->scalars * sizeof *f->scalars);
 }
 
 static const unsigned char *take(const unsigned char *from, void *to, size_t n)
@@ -138,6 +148,14 @@ static const unsigned char *unpack_pins(const unsigned char *from, size_t n, vg_
     return r < 0 ? NULL : from;
 }
 
+static int unpack_scalars(const unsigned char *from, const front *head, vg_frame *f, vg_err *e)
+{
+    const char *name = (const char *)from, *unit = name + head->scalars_name;
+    int r = vgi_frame_scalars(f, name, head->scalars_name - 1, unit, head->scalars_unit - 1, head->scalars, e);
+    if (r == VG_OK) take(from + head->scalars_name + head->scalars_unit, f->scalars, head->scalars * sizeof *f->scalars);
+    return r;
+}
+
 static int unpack(const vg_spool *s, const unsigned char *from, vg_frame *f, vg_err *e)
 {
     front head;
@@ -152,8 +170,8 @@ static int unpack(const vg_spool *s, const unsigned char *from, vg_frame *f, vg_
     f->has_time = head.has_time, f->time = head.time;
     memcpy(f->root, head.root, sizeof f->root);
     from = take(from, f->anchors, s->anchors * sizeof *f->anchors);
-    take(from, f->values, s->values * sizeof *f->values);
-    return VG_OK;
+    from = take(from, f->values, s->values * sizeof *f->values);
+    return head.scalars_name ? unpack_scalars(from, &head, f, e) : VG_OK;
 }
 
 /* ---- in and out ---- */

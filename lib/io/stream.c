@@ -84,6 +84,7 @@ static int read_head_record(vg_reader *r, vg_record *record, vg_err *e)
     int i = find_known(record->tag);
     if (!strcmp(record->tag, "FAIL")) return stopped_by_failure(r, record, e);
     if (!strcmp(record->tag, "FRAM")) return vg_fail(e, VG_EINPUT, "'%s' has a frame before its FORM record", name);
+    if (!strcmp(record->tag, "SCAL")) return vg_fail(e, VG_EINPUT, "'%s': record SCAL must come after FORM", name);
     if (i < 0) return keep_unknown(r, record, &r->head.extra, e);
     if (r->seen[i] && !known[i].repeats) return vg_fail(e, VG_EINPUT, "'%s' has two %s records", name, record->tag);
     if (known[i].needs_mesh && !r->seen[MESH])
@@ -150,10 +151,19 @@ vg_records *vg_reader_tail(vg_reader *r)
     return &r->tail;
 }
 
+static int read_scalars(const vg_reader *r, const vg_record *record, vg_frame *f, vg_err *e)
+{
+    char where[240];
+    snprintf(where, sizeof where, "'%.150s': record SCAL of frame %llu", vgi_input_name(r->in), (unsigned long long)r->frames);
+    vgi_payload p = {record->payload.data, record->payload.size, where};
+    return vgi_scal_decode(&p, &r->form, f, e);
+}
+
 /* The frame's raw buffer takes part in reading, so that a large payload is read straight to where it stays. */
 int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
 {
     vg_records_clear(&f->extra);
+    f->has_scalars = false;
     if (r->ended) return 0;
     vg_record record = {.payload = f->raw};
     vg_records before = {0};
@@ -161,6 +171,7 @@ int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
     while ((ok = vgi_record_read(r->in, &r->tally, &record, e)) > 0) {
         if (!strcmp(record.tag, "FRAM")) break;
         if (!strcmp(record.tag, "FAIL")) ok = stopped_by_failure(r, &record, e);
+        else if (!strcmp(record.tag, "SCAL")) ok = read_scalars(r, &record, f, e);
         else if (find_known(record.tag) == FORM)
             ok = vg_fail(e, VG_EINPUT, "'%s' has two FORM records", vgi_input_name(r->in));
         else if (find_known(record.tag) >= 0)
@@ -169,6 +180,8 @@ int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
         if (ok < 0) break;
     }
     f->raw = record.payload;
+    if (ok == 0 && f->has_scalars)
+        ok = vg_fail(e, VG_EINPUT, "'%s': no frame comes behind the last SCAL record", vgi_input_name(r->in));
     if (ok <= 0) {
         if (ok == 0) r->ended = true, r->tail = before;
         else vg_records_clear(&before);
@@ -271,12 +284,29 @@ int vg_writer_open(vg_writer **out, int fd, const char *name, const vg_head *h, 
     return r;
 }
 
+static int write_scalars(vg_writer *w, const vg_frame *f, vg_err *e)
+{
+    const vg_head *h = w->head;
+    vgi_part parts[2];
+    if (h->kind != VG_VERTICES || !f->has_scalars) return VG_OK;
+    w->front.size = 0;
+    int r = vgi_scal_encode(&w->front, f, e);
+    if (r == VG_OK && !vgi_finite(f->scalars, h->mesh.nv))
+        r = vg_fail(e, VG_EINPUT, "a '%s' of frame '%s' is not finite", f->scalars_name, f->name ? f->name : "");
+    if (r == VG_OK)
+        r = vgi_values_encode(&w->values, f->scalars, h->mesh.nv, h->precision, &parts[1].data, &parts[1].size, e);
+    if (r < 0) return r;
+    parts[0] = (vgi_part){w->front.data, w->front.size};
+    return vgi_record_write(w->fd, w->name, &w->tally, "SCAL", 0, parts, 2, e);
+}
+
 int vg_writer_put(vg_writer *w, const vg_frame *f, vg_err *e)
 {
     const vg_head *h = w->head;
     size_t n = h->count * vg_kind_width(h->kind);
     vgi_part parts[2];
     int r = write_extra(w, &f->extra, e);
+    if (r == VG_OK) r = write_scalars(w, f, e);
     if (r == VG_OK && !vgi_finite(f->values, n))
         r = vg_fail(e, VG_EINPUT, "frame '%s' holds a number that is not finite", f->name ? f->name : "");
     w->front.size = 0;

@@ -355,6 +355,9 @@ void vg_frame_clear(vg_frame *f)
     free(f->anchors);
     free(f->pins);
     free(f->turns);
+    free(f->scalars_name);
+    free(f->scalars_unit);
+    free(f->scalars);
     free(f->values_own);
     vg_bytes_clear(&f->raw);
     vg_records_clear(&f->extra);
@@ -369,6 +372,7 @@ int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e)
     int r = vgi_grow(&f->values_own, &f->values_cap, n, sizeof *f->values, e);
     if (r == VG_OK) r = vgi_grow(&f->anchors, &f->anchors_cap, anchors, sizeof *f->anchors, e);
     if (r == VG_OK) f->values = f->values_own;
+    f->has_scalars = false;
     return r;
 }
 
@@ -398,9 +402,37 @@ int vg_frame_rename(vg_frame *f, const char *name, vg_err *e)
     return r;
 }
 
+static int put_text(char **to, size_t *cap, const char *text, size_t n, vg_err *e)
+{
+    int r = vgi_grow(to, cap, n + 1, 1, e);
+    if (r < 0) return r;
+    if (n) memcpy(*to, text, n);
+    (*to)[n] = 0;
+    return VG_OK;
+}
+
+int vgi_frame_scalars(vg_frame *f, const char *name, size_t name_bytes, const char *unit, size_t unit_bytes, size_t nv,
+                      vg_err *e)
+{
+    f->has_scalars = false;
+    int r = put_text(&f->scalars_name, &f->scalars_name_cap, name, name_bytes, e);
+    if (r == VG_OK) r = put_text(&f->scalars_unit, &f->scalars_unit_cap, unit, unit_bytes, e);
+    if (r == VG_OK) r = vgi_grow(&f->scalars, &f->scalars_cap, nv, sizeof *f->scalars, e);
+    f->has_scalars = r == VG_OK;
+    return r;
+}
+
+int vg_frame_scalars(vg_frame *f, const char *name, const char *unit, const double *numbers, size_t nv, vg_err *e)
+{
+    int r = vgi_frame_scalars(f, name, strlen(name), unit, strlen(unit), nv, e);
+    if (r == VG_OK && nv) memcpy(f->scalars, numbers, nv * sizeof *numbers);
+    return r;
+}
+
 int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e)
 {
     f->has_time = from->has_time;
+    f->has_scalars = false;
     f->time = from->time;
     vg_records_clear(&f->extra);
     f->extra = from->extra;

@@ -12,6 +12,12 @@ enum { BIN_SHIFT = 64 - 1 - 11 - 8, NBINS = 1 << (11 + 8) };
 /* A face has a normal when its area exceeds this times D times its perimeter: below, it is rounding. */
 static const double FLAT = 1e-14;
 
+const double vg_error_edges[VG_ERROR_BINS] = {
+    0, 1e-12, 2e-12, 5e-12, 1e-11, 2e-11, 5e-11, 1e-10, 2e-10, 5e-10, 1e-9, 2e-9, 5e-9, 1e-8, 2e-8, 5e-8, 1e-7,
+    2e-7, 5e-7, 1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1,
+    2e-1, 5e-1, 1e0, 2e0, 5e0,
+};
+
 typedef struct running { /* Welford: mean and squared deviations without cancellation */
     size_t n;
     double mean, squares, max;
@@ -26,6 +32,7 @@ struct vg_measures {
     size_t max_vertex, max_frame;
     double *vertex_mean, *vertex_squares; /* nv: Welford over poses */
     uint64_t *bins;                       /* NBINS */
+    uint64_t histogram[VG_ERROR_BINS];
     running orientation, area, planarity[2];
     uint64_t planarity_histogram[2][10];
 };
@@ -94,6 +101,39 @@ static double bin_middle(size_t bin)
     return 0.5 * (a + b);
 }
 
+/* The last edge that is not above the error; one without D is nothing or beyond all. */
+static size_t edge_below(double error, double diagonal)
+{
+    double in_diagonals = error == 0 ? 0 : error / diagonal;
+    size_t low = 0, high = VG_ERROR_BINS - 1;
+    while (low < high) {
+        size_t middle = (low + high + 1) / 2;
+        if (vg_error_edges[middle] <= in_diagonals) low = middle;
+        else high = middle - 1;
+    }
+    return low;
+}
+
+double vg_error_p95(double *x, size_t n)
+{
+    if (n == 0) return 0;
+    size_t low = 0, high = n - 1, rank = n - n / 20 - 1;
+    while (low < high) { /* Hoare: only the part that holds the rank is looked at again */
+        double pivot = x[low + (high - low) / 2];
+        size_t i = low, j = high;
+        for (;;) {
+            while (x[i] < pivot) i++;
+            while (x[j] > pivot) j--;
+            if (i >= j) break;
+            double t = x[i];
+            x[i++] = x[j], x[j--] = t;
+        }
+        if (rank <= j) high = j;
+        else low = j + 1;
+    }
+    return x[rank];
+}
+
 /* Vertex errors of one pose; shift is what centring adds to the result. Returns the pose's largest error. */
 static double add_vertices(vg_measures *x, const double *truth, const double *result, const double shift[3],
                            double *frame_mean, double *errors)
@@ -108,6 +148,7 @@ static double add_vertices(vg_measures *x, const double *truth, const double *re
         x->vertex_mean[v] += d / poses;
         x->vertex_squares[v] += d * (error - x->vertex_mean[v]);
         x->bins[bin_of(error)]++;
+        x->histogram[edge_below(error, x->diagonal)]++;
         if (error > largest) largest = error;
         if (error > x->max) x->max = error, x->max_vertex = v, x->max_frame = x->frames;
         if (errors) errors[v] = error;
@@ -232,6 +273,7 @@ void vg_measures_get(const vg_measures *x, vg_measure_report *r)
     r->rms = n > 0 ? sqrt(x->sum_squares / n) : 0;
     r->max = x->max, r->max_vertex = x->max_vertex, r->max_frame = x->max_frame;
     r->p95 = percentile_95(x);
+    memcpy(r->histogram, x->histogram, sizeof r->histogram);
     double worst = 0;
     for (size_t v = 0; v < x->m->nv; v++)
         if (x->vertex_squares[v] > worst) worst = x->vertex_squares[v], r->sigma_vertex = v;

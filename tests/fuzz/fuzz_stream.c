@@ -76,6 +76,7 @@ static void use_frame(const vg_frame *f, const vg_head *h)
 {
     demand(f->name != NULL && vgi_is_utf8(f->name, strlen(f->name)));
     demand(vgi_finite(f->values, h->count * vg_kind_width(h->kind)));
+    if (f->has_scalars) demand(*f->scalars_name && vgi_is_utf8(f->scalars_unit, strlen(f->scalars_unit)) && vgi_finite(f->scalars, h->mesh.nv));
     if (h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS) demand(vgi_finite(f->anchors, 3 * h->nanchors));
 }
 

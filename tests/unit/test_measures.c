@@ -215,9 +215,52 @@ static void numbers_too_large_are_refused(void)
     vg_measures_free(&x);
 }
 
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Of lists of all lengths, with and without ties, in order, in reverse and mixed. */
+static void p95_of_one_frame_is_that_of_the_sorted_numbers(void)
+{
+    double list[300], sorted[300];
+    uint32_t seed = 5;
+    CHECK(vg_error_p95(list, 0) == 0);
+    for (size_t n = 1; n < 300; n++)
+        for (int how = 0; how < 4; how++) {
+            for (size_t i = 0; i < n; i++) {
+                seed = seed * 1664525u + 1013904223u;
+                list[i] = how == 0 ? (double)i : how == 1 ? -(double)i : (double)(seed >> (how == 2 ? 8 : 30));
+            }
+            memcpy(sorted, list, sizeof sorted);
+            qsort(sorted, n, sizeof *sorted, compare_doubles);
+            CHECK(vg_error_p95(list, n) == sorted[n - n / 20 - 1]);
+        }
+}
+
+static void the_histogram_counts_in_units_of_the_diagonal(void)
+{
+    double moved[24];
+    memcpy(moved, cube_points, sizeof moved);
+    moved[0] += 0.02 * sqrt(3) * 1.001; /* D is sqrt 3 */
+    moved[3] -= 0.5 * sqrt(3) * 1.001, moved[6] += 100;
+    vg_measures *x = begin(&cube, cube_points, false);
+    add(x, cube_points, moved);
+    vg_measure_report r = finish(x);
+    CHECK(vg_error_edges[0] == 0 && vg_error_edges[1] == 1e-12 && vg_error_edges[VG_ERROR_BINS - 1] == 5);
+    for (size_t i = 0; i < VG_ERROR_BINS; i++) {
+        double edge = vg_error_edges[i];
+        CHECK(i == 0 || edge > vg_error_edges[i - 1]);
+        CHECK(r.histogram[i] == (edge == 0 ? 5 : edge == 0.02 || edge == 0.5 || edge == 5));
+    }
+}
+
 TESTS({"equal sequences have no error", equal_sequences_have_no_error},
       {"one moved vertex", one_moved_vertex},
       {"p95 is that of the sorted errors", percentile_is_that_of_the_sorted_errors},
+      {"p95 of one frame is that of the sorted numbers", p95_of_one_frame_is_that_of_the_sorted_numbers},
+      {"the histogram counts in units of the diagonal", the_histogram_counts_in_units_of_the_diagonal},
       {"centring takes the shift out", centring_takes_the_shift_out},
       {"a turned face differs by its angle", a_turned_face_differs_by_its_angle},
       {"a scaled mesh differs by the square", a_scaled_mesh_differs_by_the_square},

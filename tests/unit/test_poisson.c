@@ -110,7 +110,8 @@ static void test_same_offset(void)
 static vg_head graph_head(vg_kind kind)
 {
     static uint32_t anchors[2] = {0, 3};
-    return (vg_head){.kind = kind, .precision = VG_F64, .count = POINTS, .nanchors = 2, .anchors = anchors};
+    return (vg_head){.kind = kind, .precision = VG_F64, .count = POINTS, .nanchors = 2, .anchors = anchors,
+                     .mesh.nv = POINTS};
 }
 
 static void fill(vg_frame *f, const vg_head *h, size_t k)
@@ -124,6 +125,9 @@ static void fill(vg_frame *f, const vg_head *h, size_t k)
     for (size_t i = 0; i < 6; i++) f->anchors[i] = (double)(k * i) + 0.5;
     for (size_t i = 0; i < POINTS * vg_kind_width(h->kind); i++) f->values[i] = (double)k + 0.001 * (double)i;
     if (vg_frame_pin(f, (uint32_t[]){1, 4, 6}, h->kind == VG_VECTORS ? k % 4 : 0, &e) < 0) abort();
+    if (h->kind == VG_VERTICES && k % 3 &&
+        vg_frame_scalars(f, name, k % 2 ? "D" : "", f->values + k % 3, POINTS, &e) < 0)
+        abort();
     vg_records_clear(&f->extra);
     f->extra.at = room(k % 3, sizeof *f->extra.at);
     for (; f->extra.n < k % 3; f->extra.n++) {
@@ -140,6 +144,10 @@ static bool same_frame(const vg_frame *a, const vg_frame *b, const vg_head *h)
     bool same = !strcmp(a->name, b->name) && a->has_time == b->has_time && a->time == b->time && a->extra.n == b->extra.n &&
                 !memcmp(a->values, b->values, POINTS * vg_kind_width(h->kind) * sizeof(double));
     same = same && a->npins == b->npins && (!a->npins || !memcmp(a->pins, b->pins, a->npins * sizeof *a->pins));
+    same = same && a->has_scalars == b->has_scalars;
+    if (same && a->has_scalars)
+        same = !strcmp(a->scalars_name, b->scalars_name) && !strcmp(a->scalars_unit, b->scalars_unit) &&
+               !memcmp(a->scalars, b->scalars, POINTS * sizeof(double));
     if (graph) same = same && !memcmp(a->root, b->root, sizeof a->root) && !memcmp(a->anchors, b->anchors, 6 * sizeof(double));
     for (size_t i = 0; same && i < a->extra.n; i++) {
         const vg_record *x = &a->extra.at[i], *y = &b->extra.at[i];

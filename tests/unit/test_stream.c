@@ -200,6 +200,7 @@ static int read_rest(vg_reader *reader, content *c, vg_err *e)
         memcpy(to->values, f.values, h->count * vg_kind_width(h->kind) * sizeof(double));
         memcpy(to->root, f.root, sizeof f.root);
         if (vg_frame_pin(to, f.pins, f.npins, e) < 0) abort();
+        if (f.has_scalars && vg_frame_scalars(to, f.scalars_name, f.scalars_unit, f.scalars, h->mesh.nv, e) < 0) abort();
         if (h->nanchors && f.anchors) memcpy(to->anchors, f.anchors, 3 * h->nanchors * sizeof(double));
     }
     if (r == 0) {
@@ -298,6 +299,10 @@ static bool same_frame(const vg_frame *a, const vg_frame *b, const vg_head *h)
     same &= a->has_time == b->has_time && a->time == b->time && same_records(&a->extra, &b->extra);
     same &= same_memory(a->values, b->values, h->count * vg_kind_width(h->kind) * sizeof(double));
     same &= a->npins == b->npins && same_memory(a->pins, b->pins, 4 * a->npins);
+    same &= a->has_scalars == b->has_scalars;
+    if (same && a->has_scalars)
+        same = same_text(a->scalars_name, b->scalars_name) && same_text(a->scalars_unit, b->scalars_unit) &&
+               same_memory(a->scalars, b->scalars, h->mesh.nv * sizeof(double));
     if (graph) same &= !memcmp(a->root, b->root, 24) && same_memory(a->anchors, b->anchors, 24 * h->nanchors);
     return same;
 }
@@ -415,6 +420,8 @@ static content make(vg_kind kind, vg_precision precision, int how)
         for (size_t k = 0; k < 3 * h->nanchors; k++) f->anchors[k] = noise();
         if (how == FULL && kind == VG_VECTORS) /* an even and an odd number of pins */
             CHECK(vg_frame_pin(f, (uint32_t[]){0, 2, 6}, 2 + i, &e) == VG_OK);
+        if (how == FULL && kind == VG_VERTICES && i) /* any numbers will do: the first of the frame */
+            CHECK(vg_frame_scalars(f, "error", i == 1 ? "D" : "", f->values, h->mesh.nv, &e) == VG_OK);
         if (how == FULL && i) add_unknown(&f->extra, "MID ", COPY_SAFE, "before a frame");
         if (how == FULL && i) add_unknown(&f->extra, "MID ", COPY_SAFE, "");
     }
