@@ -52,9 +52,10 @@ typedef struct machine {
     size_t nheld;
 } machine;
 
-/* A pose that waits for its solve. Its vectors are not kept: it costs 6 numbers a vertex, not 3 a corner. */
+/* A pose that waits for its solve. Its vectors are not kept so long: it costs 6 numbers a vertex, not 3 a corner. */
 typedef struct waiting {
     vg_frame frame; /* values: first guess, then vertices */
+    const double *vectors; /* until it is loaded: of one of the frames that came in */
     double *rhs, *held, *normals; /* held: where the held vertices go; normals: with --planar */
     size_t held_cap;
 } waiting;
@@ -70,7 +71,10 @@ typedef struct work {
     const machine *at;       /* what the waiting poses wait for */
     waiting *waiting;
     size_t n, most;
-    double *vectors;         /* of a pose that came as vertices */
+    size_t loaded;           /* of the n */
+    vg_frame *in;            /* one for each thread, so that so many are loaded at once */
+    double **vectors;        /* of those that come as vertices */
+    size_t slot;             /* the next of these to be used */
     size_t most_steps, planar_faces;
     double worst_residual;
     vg_weights weights;
@@ -121,8 +125,27 @@ static void make_machine(work *w, machine *m, uint32_t *held, size_t nheld)
              facts.factor_entries, facts.analyse_seconds, facts.factor_seconds);
 }
 
+/* Frames that came in become guesses and right-hand sides, and may be used again. */
+static void load_taken(work *w)
+{
+    size_t n = w->n - w->loaded;
+    const double **vectors = allocate(n, sizeof *vectors), **held = allocate(n, sizeof *held);
+    double **x = allocate(n, sizeof *x), **rhs = allocate(n, sizeof *rhs);
+    for (size_t i = 0; i < n; i++) {
+        waiting *p = &w->waiting[w->loaded + i];
+        vectors[i] = p->vectors, held[i] = p->held, x[i] = p->frame.values, rhs[i] = p->rhs;
+    }
+    if (n) vg_solver_load(w->at->solver, n, vectors, held, x, rhs);
+    w->loaded = w->n;
+    free(vectors);
+    free(held);
+    free(x);
+    free(rhs);
+}
+
 static void solve_waiting(work *w)
 {
+    load_taken(w);
     const double **rhs = allocate(w->n, sizeof *rhs), **held = allocate(w->n, sizeof *held);
     const double **roots = allocate(w->n, sizeof *roots), **normals = allocate(w->n, sizeof *normals);
     double **x = allocate(w->n, sizeof *x);
@@ -136,7 +159,7 @@ static void solve_waiting(work *w)
         cli_no("frame '%s' is not planar yet after %zu steps: choose --planar-weights that are less far apart",
                w->waiting[good].frame.name, vg_planar_get_facts(w->at->planar).most_steps);
     for (size_t i = 0; i < w->n; i++) cli_stream_put(&w->waiting[i].frame);
-    w->n = 0;
+    w->n = w->loaded = 0;
     free(rhs);
     free(held);
     free(roots);
@@ -220,15 +243,17 @@ static void place_held(const work *w, const machine *m, const vg_frame *f, waiti
     }
 }
 
-static void take_frame(work *w, vg_frame *in)
+/* The frame that has come into w->in[w->slot]. */
+static void take_frame(work *w)
 {
     vg_err e;
+    vg_frame *in = &w->in[w->slot];
     const double *vectors = in->values;
     if (w->kind == VG_VERTICES) {
-        vg_graph_vectors(w->g, in->values, w->vectors);
+        vg_graph_vectors(w->g, in->values, w->vectors[w->slot]);
         vg_graph_root(w->g, in->values, in->root);
         vg_graph_anchors(in->values, w->h->anchors, w->h->nanchors, in->anchors);
-        vectors = w->vectors;
+        vectors = w->vectors[w->slot];
     }
     const machine *m = machine_for(w, in);
     if (m != w->at) solve_waiting(w);
@@ -237,9 +262,11 @@ static void take_frame(work *w, vg_frame *in)
     if (vg_frame_label(&p->frame, in, &e) < 0) cli_die(&e);
     memcpy(p->frame.root, in->root, sizeof in->root);
     place_held(w, m, in, p);
-    vg_solver_load(m->solver, vectors, p->held, p->frame.values, p->rhs);
+    p->vectors = vectors;
     if (m->planar) vg_planar_load(m->planar, vectors, p->normals);
+    w->slot = (w->slot + 1) % (size_t)cli.threads;
     if (++w->n == w->most) solve_waiting(w);
+    else if (w->n - w->loaded == (size_t)cli.threads) load_taken(w);
 }
 
 static void make_waiting(work *w)
@@ -252,6 +279,20 @@ static void make_waiting(work *w)
         p->rhs = allocate(3 * w->h->mesh.nv, sizeof *p->rhs);
         p->normals = allocate(w->plain.planar ? 3 * vg_planar_faces(w->plain.planar) : 0, sizeof *p->normals);
         if (vg_frame_shape(&p->frame, w->h, &e) < 0) cli_die(&e);
+    }
+}
+
+/* before the head becomes that of the output */
+static void make_slots(work *w)
+{
+    vg_err e;
+    size_t n = (size_t)cli.threads;
+    w->in = allocate(n, sizeof *w->in);
+    w->vectors = allocate(n, sizeof *w->vectors);
+    for (size_t i = 0; i < n; i++) {
+        if (w->kind != VG_VERTICES) continue;
+        w->vectors[i] = allocate(3 * vg_graph_corners(w->g), sizeof **w->vectors);
+        if (vg_frame_shape(&w->in[i], w->h, &e) < 0) cli_die(&e); /* room for the anchors */
     }
 }
 
@@ -268,16 +309,16 @@ static void prepare(work *w, vg_head *h)
     uint32_t *anchors = allocate(h->nanchors, sizeof *anchors);
     if (h->nanchors) memcpy(anchors, h->anchors, h->nanchors * sizeof *anchors);
     make_machine(w, &w->plain, anchors, h->nanchors);
-    if (w->kind == VG_VERTICES) w->vectors = allocate(3 * vg_graph_corners(w->g), sizeof *w->vectors);
+    make_slots(w);
 }
 
-static void solve_all(work *w, vg_source *s, vg_frame *in)
+static void solve_all(work *w, vg_source *s)
 {
     vg_err e;
     uint64_t n = 0;
     int r;
-    while ((r = vg_source_next(s, in, &e)) > 0) {
-        take_frame(w, in);
+    while ((r = vg_source_next(s, &w->in[w->slot], &e)) > 0) {
+        take_frame(w);
         cli_progress("poses", ++n);
     }
     if (r < 0) cli_die(&e);
@@ -298,6 +339,11 @@ static void clear(work *w)
         free(w->waiting[i].normals);
     }
     free(w->waiting);
+    for (size_t i = 0; i < (size_t)cli.threads; i++) {
+        vg_frame_clear(&w->in[i]);
+        free(w->vectors[i]);
+    }
+    free(w->in);
     free(w->vectors);
     vg_graph_free(&w->g);
 }
@@ -307,19 +353,15 @@ int main(int argc, char **argv)
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     if (opts.planar_weights && !opts.planar) cli_usage("--planar-weights needs --planar");
-    vg_err e;
     work w = {.weights = parse_weights()};
-    vg_frame in = {0};
     vg_source *s = cli_source(operands, n);
     prepare(&w, vg_source_head(s));
-    if (vg_frame_shape(&in, w.h, &e) < 0) cli_die(&e); /* room for the anchors of a pose that comes as vertices */
     w.h->kind = VG_VERTICES, w.h->count = w.h->mesh.nv;
     make_waiting(&w);
     cli_stream_open(w.h);
-    solve_all(&w, s, &in);
+    solve_all(&w, s);
     clear(&w);
     cli_stream_end(vg_source_tail(s));
-    vg_frame_clear(&in);
     vg_source_close(&s);
     cli_finish(0);
 }

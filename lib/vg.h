@@ -498,9 +498,10 @@ typedef struct vg_solver_facts {
 int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
                   vg_weights weights, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_solver_free(vg_solver **s);
-/* vg_solver_load: (one call at a time on one solver) one pose's vectors (and anchors, nanchors points, if any) become a first guess x and a right-hand side, nv x 3
- * each: what the guess misses. */
-void vg_solver_load(vg_solver *s, const double *vectors, const double *anchors, double *x, double *rhs);
+/* vg_solver_load: the vectors of n poses (and their anchors, nanchors points each; NULL when there are none) become first guesses x and
+ * right-hand sides, nv x 3 each: what the guesses miss. One call at a time on one solver; the threads share the poses. */
+void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const double *const *anchors, double *const *x,
+                    double *const *rhs);
 /* vg_solver_solve: n guesses x, with their right-hand sides, become n poses in place. anchors[i]: nanchors points of pose i, or
  * roots[i]: its root; the other is not looked at. Best when n is a multiple of vg_solver_batch. */
 void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *const *x, const double *const *anchors,

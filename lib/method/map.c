@@ -675,9 +675,9 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
         vg_graph_root(g, h->reference, roots[0]);
         vg_graph_root(g, target, roots[1]);
         for (int k = 0; k < 3; k++) root[k] = roots[0][k] + morph * (roots[1][k] - roots[0][k]);
-        vg_solver_load(s, a, NULL, body, rhs);
-        const double *rhs_list[1] = {rhs}, *root_list[1] = {root};
+                const double *rhs_list[1] = {rhs}, *root_list[1] = {root};
         double *body_list[1] = {body};
+        vg_solver_load(s, 1, (const double *const *)&a, NULL, body_list, &rhs);
         vg_solver_solve(s, 1, rhs_list, body_list, NULL, root_list);
     }
     vg_solver_free(&s);

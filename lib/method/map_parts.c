@@ -366,7 +366,7 @@ int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, con
             size_t n = columns - first < batch ? columns - first : batch;
             for (size_t i = 0; i < n; i++) {
                 column_input(h, g, of_face, vectors, first + i, wanted, anchors[i]);
-                vg_solver_load(s, wanted, anchors[i], x[i], rhs[i]);
+                vg_solver_load(s, 1, (const double *const *)&wanted, (const double *const *)anchors + i, x + i, rhs + i);
             }
             vg_solver_solve(s, n, (const double *const *)rhs, x, (const double *const *)anchors,
                             (const double *const *)(x + 3 * batch));

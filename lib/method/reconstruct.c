@@ -10,9 +10,9 @@
  * on long meshes, for its rounding errors are those of positions, not of vectors.
  *
  * Without anchors one vertex is held at 0 and the pose is moved to its root in the end. Leaves out the triangular solves
- * (solve_kernel.c) and the factorisation (sparse.c).
+ * (solve_kernel.c), that guess (guess_kernel.c) and the factorisation (sparse.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "method/metric.h"
+#include "method/guess.h"
 #include "method/planar.h"
 #include "method/sparse.h"
 #include "model/incidence.h"
@@ -26,11 +26,6 @@ enum {
 };
 #define NO_ROW UINT32_MAX
 
-/* One step of the walk: x(vertex of `corner`) = x(vertex of `from`) + w(corner) - w(from), both corners of one face. */
-typedef struct step {
-    uint32_t corner, from;
-} step;
-
 struct vg_solver {
     const vg_graph *g;
     int threads;
@@ -40,7 +35,7 @@ struct vg_solver {
     uint32_t *row;    /* nv: row in the factor's order; NO_ROW if held or isolated */
     vgi_metric metric;
     size_t nsteps;
-    step *walk;       /* from the held vertices to all others */
+    vgi_step *walk;       /* from the held vertices to all others */
     uint32_t *anchors;
     size_t nanchors;  /* those the caller gave; 0: one vertex is pinned */
     size_t nisolated;
@@ -49,7 +44,7 @@ struct vg_solver {
     vgi_cholesky *cholesky;
     vgi_factor factor;
     vgi_row *x;       /* threads * unknowns */
-    double *spare;    /* of vg_solver_load: 3 numbers for each corner of the largest face */
+    vgi_point *spare; /* of vg_solver_load: nv + max_corners for each thread */
     vg_solver_facts facts;
 };
 
@@ -128,7 +123,7 @@ static int plan_walk(vg_solver *s, vg_err *e)
                 if (reached[g->vert[c]]) continue;
                 reached[g->vert[c]] = true;
                 queue[tail++] = g->vert[c];
-                s->walk[s->nsteps++] = (step){c, around.corner[i]};
+                s->walk[s->nsteps++] = (vgi_step){c, around.corner[i]};
             }
         }
     }
@@ -239,12 +234,27 @@ static int permute_rows(vg_solver *s, vg_err *e)
     return VG_OK;
 }
 
+/* n elements for each thread, aligned for vectors; sizes of elements are multiples of 32 */
+static void *for_threads(const vg_solver *s, size_t n, size_t size, vg_err *e)
+{
+    size_t all;
+    void *p = NULL;
+    if (vgi_mul(n, (size_t)s->threads, &all) && vgi_mul(all, size, &all) && all <= SIZE_MAX - sizeof(vgi_lanes))
+        p = aligned_alloc(sizeof(vgi_lanes), (all + sizeof(vgi_lanes)) / sizeof(vgi_lanes) * sizeof(vgi_lanes));
+    if (!p) vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", s->unknowns);
+    return p;
+}
+
+static int make_spare(vg_solver *s, vg_err *e)
+{
+    s->spare = for_threads(s, s->g->nv + s->g->max_corners, sizeof *s->spare, e);
+    return s->spare ? VG_OK : VG_ENOMEM;
+}
+
 static int make_workspace(vg_solver *s, vg_err *e)
 {
-    size_t rows;
-    if (vgi_mul(s->unknowns, (size_t)s->threads, &rows) && rows < SIZE_MAX / sizeof *s->x)
-        s->x = aligned_alloc(sizeof(vgi_lanes), rows * sizeof *s->x);
-    return s->x ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", s->unknowns);
+    s->x = for_threads(s, s->unknowns, sizeof *s->x, e);
+    return s->x ? VG_OK : VG_ENOMEM;
 }
 
 static int make_metric(vg_solver *s, const double *reference, vg_err *e)
@@ -262,9 +272,9 @@ int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, s
     if (!s) return VG_ENOMEM;
     s->g = g, s->threads = threads;
     int r = weights == VG_WEIGHTS_AREA ? make_metric(s, reference, e) : VG_OK;
-    if (r == VG_OK && !(s->spare = vgi_array(3 * g->max_corners, sizeof *s->spare, e))) r = VG_ENOMEM;
     if (r == VG_OK) r = number_unknowns(s, anchors, nanchors, reference, e);
     if (r == VG_OK) r = plan_walk(s, e);
+    if (r == VG_OK) r = make_spare(s, e);
     if (r == VG_OK && s->unknowns) {
         r = factorize(s, e);
         if (r == VG_OK) r = permute_rows(s, e);
@@ -309,76 +319,30 @@ vg_solver_facts vg_solver_get_facts(const vg_solver *s)
     return s->facts;
 }
 
-/* The first guess, relative to the first anchor or the pinned vertex, so that a pose far from the origin loses no digits. */
-static void walk(const vg_solver *s, const double *w, const double *anchors, double *x)
+typedef struct load_job {
+    const vg_solver *s;
+    size_t n, share; /* poses, and how many of them are one task */
+    const double *const *vectors, *const *anchors;
+    double *const *x, *const *rhs;
+} load_job;
+
+static void load_share(void *context, size_t task)
 {
-    const uint32_t *vert = s->g->vert;
-    if (s->pinned < s->g->nv) memset(x + 3 * (size_t)s->pinned, 0, 3 * sizeof *x);
-    for (size_t i = 0; i < s->nanchors; i++)
-        for (size_t k = 0; k < 3; k++) x[3 * (size_t)s->anchors[i] + k] = anchors[3 * i + k] - anchors[k];
-    for (size_t i = 0; i < s->nsteps; i++) {
-        size_t c = s->walk[i].corner, from = s->walk[i].from, to = 3 * (size_t)vert[c], base = 3 * (size_t)vert[from];
-        for (size_t k = 0; k < 3; k++) x[to + k] = x[base + k] + (w[3 * c + k] - w[3 * from + k]);
-    }
+    const load_job *j = context;
+    const vg_solver *s = j->s;
+    vgi_guesser g = {.g = s->g, .metric = &s->metric, .walk = s->walk, .nsteps = s->nsteps, .pinned = s->pinned,
+                     .anchors = s->anchors, .nanchors = s->nanchors};
+    for (size_t i = task * j->share; i < j->n && i < (task + 1) * j->share; i++)
+        vgi_guess(&g, j->vectors[i], s->nanchors ? j->anchors[i] : NULL, j->x[i], j->rhs[i],
+                  s->spare + task * (s->g->nv + s->g->max_corners));
 }
 
-/* What a face of `size` corners misses: G e for e = (w - w0) - (x - x0), e of the first corner being 0. Only differences within
- * a face are formed, so it rounds like vectors. `e` is room for 3 * size numbers. Called with constant sizes, this becomes
- * straight code for triangles and quads. */
-static inline __attribute__((always_inline)) void add_pull(const vg_solver *s, size_t f, size_t size, const double *w,
-                                                          const double *x, double *e, double *rhs)
+void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const double *const *anchors, double *const *x,
+                    double *const *rhs)
 {
-    const uint32_t *vert = s->g->vert + s->g->start[f];
-    const double *wf = w + 3 * (size_t)s->g->start[f], *x0 = x + 3 * (size_t)vert[0];
-    double mean[3] = {0, 0, 0}, share = 1.0 / (double)size;
-    for (size_t i = 0; i < size; i++) {
-        const double *xi = x + 3 * (size_t)vert[i];
-        for (size_t k = 0; k < 3; k++) {
-            e[3 * i + k] = (wf[3 * i + k] - wf[k]) - (xi[k] - x0[k]);
-            mean[k] += e[3 * i + k];
-        }
-    }
-    for (int k = 0; k < 3; k++) mean[k] *= share;
-    if (!s->metric.face) {
-        for (size_t i = 0; i < size; i++)
-            for (size_t k = 0; k < 3; k++) rhs[3 * (size_t)vert[i] + k] += e[3 * i + k] - mean[k];
-        return;
-    }
-    const vgi_face_metric *m = &s->metric.face[f];
-    const double *plane = s->metric.plane + 3 * (size_t)s->g->start[f];
-    double y[3][3] = {{0}}, z[3][3]; /* y[k] = sum over corners of plane e_k; z = S y */
-    for (size_t i = 0; i < size; i++)
-        for (size_t k = 0; k < 3; k++)
-            for (size_t j = 0; j < 3; j++) y[k][j] += plane[3 * i + j] * e[3 * i + k];
-    for (int k = 0; k < 3; k++) {
-        z[k][0] = m->s[0] * y[k][0] + m->s[1] * y[k][1] + m->s[2] * y[k][2];
-        z[k][1] = m->s[1] * y[k][0] + m->s[3] * y[k][1] + m->s[4] * y[k][2];
-        z[k][2] = m->s[2] * y[k][0] + m->s[4] * y[k][1] + m->s[5] * y[k][2];
-    }
-    for (size_t i = 0; i < size; i++)
-        for (size_t k = 0; k < 3; k++)
-            rhs[3 * (size_t)vert[i] + k] += m->weight * (e[3 * i + k] - mean[k]) + plane[3 * i] * z[k][0] +
-                                            plane[3 * i + 1] * z[k][1] + plane[3 * i + 2] * z[k][2];
-}
-
-/* The right-hand side of what the guess misses: A G (W* - A' x). `spare` holds
- * 3 * max_corners numbers. */
-static void fold(const vg_solver *s, const double *w, const double *x, double *spare, double *rhs)
-{
-    double e[12];
-    memset(rhs, 0, 3 * s->g->nv * sizeof *rhs);
-    for (size_t f = 0; f < s->g->nf; f++) {
-        size_t size = face_size(s->g, f);
-        if (size == 4) add_pull(s, f, 4, w, x, e, rhs);
-        else if (size == 3) add_pull(s, f, 3, w, x, e, rhs);
-        else add_pull(s, f, size, w, x, spare, rhs);
-    }
-}
-
-void vg_solver_load(vg_solver *s, const double *vectors, const double *anchors, double *x, double *rhs)
-{
-    walk(s, vectors, anchors, x);
-    fold(s, vectors, x, s->spare, rhs);
+    size_t tasks = (size_t)s->threads < n ? (size_t)s->threads : n;
+    load_job j = {s, n, tasks ? (n + tasks - 1) / tasks : 0, vectors, anchors, x, rhs};
+    vgi_parallel(s->threads, tasks, load_share, &j);
 }
 
 typedef struct solve_job {

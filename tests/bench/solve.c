@@ -106,7 +106,7 @@ typedef struct ours {
 static void load_poses(void *context)
 {
     ours *o = context;
-    for (size_t i = 0; i < POSES; i++) vg_solver_load(o->solver, o->p->w[i], NULL, o->p->x[i], o->p->rhs[i]);
+    vg_solver_load(o->solver, POSES, (const double *const *)o->p->w, NULL, o->p->x, o->p->rhs);
 }
 
 static void solve_poses(void *context)

@@ -602,10 +602,8 @@ static double self_transfer(vg_head *h, size_t n, const double *const *poses, vg
     aim_by(d, g, h->reference, method);
     vg_deformer_transfer(d, n, VG_VERTICES, poses, w);
     if (vg_solver_new(&s, g, NULL, 0, h->reference, VG_WEIGHTS_UNIFORM, threads, &e) < 0) abort();
-    for (size_t i = 0; i < n; i++) {
-        vg_graph_root(g, poses[i], root[i]);
-        vg_solver_load(s, w[i], NULL, x[i], rhs[i]);
-    }
+    for (size_t i = 0; i < n; i++) vg_graph_root(g, poses[i], root[i]);
+    vg_solver_load(s, n, CONST(w), NULL, x, rhs);
     vg_solver_solve(s, n, CONST(rhs), x, NULL, CONST(root));
     for (size_t i = 0; i < n; i++) {
         for (size_t v = 0; v < g->nv; v++)

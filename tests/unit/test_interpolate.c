@@ -55,7 +55,7 @@ static double *solve(trial *t, const double *w, const double *root, const double
 {
     double *x = room(3 * t->h.mesh.nv, sizeof *x);
     const double *rhs = t->rhs;
-    vg_solver_load(t->solver, w, anchors, x, t->rhs);
+    vg_solver_load(t->solver, 1, &w, &anchors, &x, &t->rhs);
     vg_solver_solve(t->solver, 1, &rhs, &x, &anchors, &root);
     return x;
 }

@@ -151,7 +151,7 @@ static void collapsed_is_uncollapsed(void)
         for (size_t k = 0; k < 3; k++) anchors[3 * i + k] += t[4 + k];
     }
     CHECK(vg_solver_new(&s, g, h.map.held, h.map.nheld, h.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_OK);
-    vg_solver_load(s, wanted, anchors, x, rhs);
+    vg_solver_load(s, 1, (const double *const *)&wanted, (const double *const *)&anchors, &x, &rhs);
     vg_solver_solve(s, 1, (const double *const *)&rhs, &x, (const double *const *)&anchors, (const double *const *)&anchors);
     CHECK_NEAR(apart(x, p.vertices, 3 * nv), 0, 1e-9 * vg_diagonal(h.reference, nv));
     vg_solver_free(&s);

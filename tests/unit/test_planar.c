@@ -42,10 +42,10 @@ static answer solve(const problem *q, int threads, size_t batch)
     for (size_t i = 0; i < q->n; i++) {
         a.x[i] = room(3 * q->g->nv, sizeof(double)), rhs[i] = room(3 * q->g->nv, sizeof(double));
         normals[i] = room(3 * vg_planar_faces(p), sizeof(double));
-        vg_solver_load(s, q->w[i], q->nanchors ? q->at[i] : NULL, a.x[i], rhs[i]);
         vg_planar_load(p, q->w[i], normals[i]);
     }
     const double *const *at = (const double *const *)q->at;
+    vg_solver_load(s, q->n, (const double *const *)q->w, q->nanchors ? at : NULL, a.x, rhs);
     vg_solver_solve(s, q->n, (const double *const *)rhs, a.x, q->nanchors ? at : NULL, q->nanchors ? NULL : at);
     for (size_t i = 0; i < q->n; i++) {
         a.plain[i] = room(3 * q->g->nv, sizeof(double));

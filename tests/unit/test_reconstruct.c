@@ -29,11 +29,11 @@ static answer solve(const vg_graph *g, const double *reference, const uint32_t *
     vg_solver *s = NULL;
     for (size_t i = 0; i < n; i++) a.x[i] = room(3 * g->nv, sizeof(double)), rhs[i] = room(3 * g->nv, sizeof(double));
     a.code = vg_solver_new(&s, g, anchors, nanchors, reference, weights, threads, &a.e);
-    for (size_t i = 0; a.code == VG_OK && i < n; i++)
-        vg_solver_load(s, vectors[i], nanchors ? at[i] : NULL, a.x[i], rhs[i]);
-    for (size_t i = 0; a.code == VG_OK && i < n; i += batch)
-        vg_solver_solve(s, n - i < batch ? n - i : batch, (const double *const *)rhs + i, a.x + i,
-                        nanchors ? at + i : NULL, nanchors ? NULL : at + i);
+    for (size_t i = 0; a.code == VG_OK && i < n; i += batch) {
+        size_t some = n - i < batch ? n - i : batch;
+        vg_solver_load(s, some, vectors + i, nanchors ? at + i : NULL, a.x + i, rhs + i);
+        vg_solver_solve(s, some, (const double *const *)rhs + i, a.x + i, nanchors ? at + i : NULL, nanchors ? NULL : at + i);
+    }
     vg_solver_free(&s);
     CHECK(s == NULL);
     for (size_t i = 0; i < n; i++) free(rhs[i]);
