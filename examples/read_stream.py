@@ -98,8 +98,19 @@ class Correspondence:
 
 
 @dataclass
+class Rig:
+    """Joints that are no vertices of the mesh; those with channels are bones, which move it."""
+    joints: list      # of Joint
+    at: array         # where each joint is in the reference pose of the mesh
+    turns: array      # how it is turned there
+    skin_bone: object  # array: 4 bones for each vertex, or None
+    skin_weight: object
+
+
+@dataclass
 class Map:
     """Vertices as a linear function of n transforms."""
+    kind: str            # "patches" or "bones": what is transformed
     n: int
     size: float
     names: list
@@ -116,6 +127,8 @@ class Map:
     joints: array
     held: array
     held_patch: array
+    per_corner: int
+    corner_bones: array  # of bones: per_corner for each corner
 
 
 @dataclass
@@ -134,6 +147,7 @@ class Frame:
     anchors: object  # array 'd', or None
     values: array
     pins: object = None  # array: vertices that stay where the reference has them; None: no pins
+    turns: object = None  # array 'd': a unit quaternion for each joint of the skeleton; None: not known
     extra: list = field(default_factory=list)
     scalars: object = None  # (name, unit, array with the number of each vertex), or None
 
@@ -154,6 +168,7 @@ class Stream:
     skeleton: object = None   # list of Joint
     correspondence: object = None
     patches: object = None    # (count, array with the patch of each face)
+    rig: object = None
     map: object = None
     kind: str = ""
     precision: int = 0
@@ -453,7 +468,7 @@ class _Reader:
             raise StreamError(f"record {tag} must come before FORM" if tag != "FORM" else "it has two FORM records")
         if tag in self.seen and tag != "PROV":
             raise StreamError(f"it has two {tag} records")
-        if tag in ("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "MAP ") and "MESH" not in self.seen:
+        if tag in ("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP ") and "MESH" not in self.seen:
             raise StreamError(f"record {tag} must come after MESH")
 
     def prov(self, p: _Payload):
@@ -608,6 +623,55 @@ class _Reader:
                 p.fail("a distance or mark is out of range")
         self.stream.correspondence = Correspondence(source, target, first, source_face, weight, distance, matched)
 
+    def unit_turns(self, p: _Payload, n: int, what: str = "a number") -> array:
+        turns = p.f64s(4 * n, what)
+        for i in range(0, 4 * n, 4):
+            if abs(sum(x * x for x in turns[i:i + 4]) - 1) > 2e-6:
+                p.fail("a turn is no unit quaternion")
+        return turns
+
+    def rig(self, p: _Payload):
+        p.fits("it has no joints")
+        n, nv, joints = p.u64(), self.stream.mesh.nv, []
+        if n == 0:
+            p.fail("it has no joints")
+        while len(joints) < n and p.left():
+            joints.append(self.joint(p, len(joints)))
+        p.fits("it is shorter than its counts say")
+        at = p.f64s(3 * n, "a position")
+        turns = self.unit_turns(p, n, "a turn is no unit quaternion:")
+        bones = sum(1 for j in joints if j.channels)
+        if bones == 0:
+            p.fail("none of its joints turns")
+        p.fits("it is too short, or reserved bytes are not zero")
+        skin, zero = p.u32(), p.u32()
+        if skin > 1 or zero:
+            p.fail("it is too short, or reserved bytes are not zero")
+        bone = weight = None
+        if skin:
+            p.fits("its length does not fit the number of vertices")
+            bone, weight = p.u32s(4 * nv), p.f64s(4 * nv, "weights are negative, or do not descend, or a weight")
+            for v in range(0, 4 * nv, 4):
+                if any(b >= bones for b in bone[v:v + 4]):
+                    p.fail("a vertex is moved by a bone that is not there")
+                if weight[v + 3] < 0 or any(a < b for a, b in zip(weight[v:v + 3], weight[v + 1:v + 4])):
+                    p.fail("weights are negative, or do not descend")
+                if abs(sum(weight[v:v + 4]) - 1) >= 1e-9:
+                    p.fail("the weights of a vertex do not sum to 1")
+        p.long = "bytes are left over"
+        p.end()
+        self.stream.rig = Rig(joints, at, turns, bone, weight)
+
+    def map_of_bones(self, p: _Payload, n: int, nj: int, per_corner: int):
+        if self.stream.rig is None:
+            p.fail("a RIG record must come before it")
+        if n != sum(1 for j in self.stream.rig.joints if j.channels):
+            p.fail("it has not as many bones as the rig")
+        if not 1 <= per_corner <= 2:
+            p.fail("a corner must have 1 or 2 bones")
+        if nj:
+            p.fail("pairs of patches stand in a map of bones")
+
     def ptch(self, p: _Payload):
         p.fits("its length does not fit the number of faces")
         count, patches = p.u64(), p.u32s(self.stream.mesh.nf)
@@ -623,31 +687,41 @@ class _Reader:
     def map(self, p: _Payload):
         p.fits("its counts are out of range")
         n, nv, nj, nc, nh = (p.u64() for _ in range(5))
-        kind, flags, names, zero = (p.u32() for _ in range(4))
+        kind, flags, names, per_corner = (p.u32() for _ in range(4))
         size = p.f64()
         if not 1 <= n < INDEX_LIMIT or nj >= INDEX_LIMIT or nc >= INDEX_LIMIT or nh > nv:
             p.fail("its counts are out of range")
         if nv != self.stream.mesh.nv:
             p.fail("its count does not fit the mesh")
-        if kind != 1:
+        if kind not in (1, 2):
             p.fail("it is driven by something unknown")
-        if flags & ~1 or zero or names not in (0, n):
+        if flags & ~1 or names not in (0, n):
             p.fail("unknown flags are set, or names are missing")
         if not (math.isfinite(size) and size > 0):
             p.fail("its size is not positive")
+        bones = kind == 2
+        if bones:
+            self.map_of_bones(p, n, nj, per_corner)
+        elif per_corner > 1:
+            p.fail("a corner has more than one patch")
+        per_corner = per_corner or 1
         p.fits("it is shorter than its counts say")
         p.long = "bytes are left over"
-        lengths = (4 * nv * n, 3 * n * n, 3 * n, 3 * n, n, 3 * nv if flags & 1 else 0, 3 * nj, nj, 4 * nc, 3 * nh)
+        lengths = (4 * nv * n, 3 * n * n, 3 * n, 3 * n, n, 3 * nv if flags & 1 else 0, 3 * nj, nj,
+                   4 * per_corner * nc, 0 if bones else 3 * nh)
         weights, place, centre, home_centre, share, home, joint_at, joint_weight, corners, held_at = (
             p.f64s(length, "a number") for length in lengths)
-        joints, held, held_patch = p.u32s(2 * nj), p.u32s(nh), p.u32s(nh)
+        joints, held, held_patch = p.u32s(2 * nj), p.u32s(nh), p.u32s(0 if bones else nh)
+        corner_bones = p.u32s(per_corner * nc if bones else 0)
         if min(share) < 0 or abs(sum(share) - 1) >= 1e-9:
             p.fail("a share is negative, or the shares do not sum to 1")
         pairs = list(zip(joints[::2], joints[1::2]))
         if any(a >= n or b >= n or a == b for a, b in pairs) or any(w <= 0 for w in joint_weight):
             p.fail("a joint is malformed")
-        if any(not any(corners[i:i + 4]) for i in range(0, 4 * nc, 4)):
+        if any(not any(corners[i:i + 4 * per_corner]) for i in range(0, len(corners), 4 * per_corner)):
             p.fail("a quaternion is zero")
+        if any(x >= n for x in corner_bones):
+            p.fail("a corner is moved by a bone that is not there")
         if any(x >= n for x in held_patch):
             p.fail("a vertex is held by a transform that is not there")
         if any(v >= nv for v in held):
@@ -656,8 +730,8 @@ class _Reader:
             p.fail("indices are not ascending")
         names = [p.string() for _ in range(names)]
         p.end()
-        self.stream.map = Map(n, size, names, weights, place, centre, home_centre, share, home if flags & 1 else None,
-                              joint_at, joint_weight, corners, held_at, joints, held, held_patch)
+        self.stream.map = Map("bones" if bones else "patches", n, size, names, weights, place, centre, home_centre, share, home if flags & 1 else None,
+                              joint_at, joint_weight, corners, held_at, joints, held, held_patch, per_corner, corner_bones)
 
     def form(self, p: _Payload):
         s = self.stream
@@ -669,7 +743,7 @@ class _Reader:
         if precision not in (4, 8):
             p.fail("numbers are of unknown precision")
         s.kind, s.precision = KINDS[kind], precision
-        if s.map and len(s.map.corners) not in (0, 4 * sum(map(len, s.graph()))):
+        if s.map and len(s.map.corners) not in (0, 4 * s.map.per_corner * sum(map(len, s.graph()))):
             p.fail("the corners of record MAP do not fit the mesh")
         if s.reference is None and (s.mesh is not None or s.kind != "transforms"):
             p.fail("a MESH and a REFP record must come before it")
@@ -718,7 +792,8 @@ class _Reader:
         p.where = f"frame {len(s.frames)}"
         p.fits("it is too short, or unknown flags are set")
         name_length, flags, time = p.u32(), p.u32(), p.f64()
-        if flags & ~3 or (flags & 2 and s.kind != "vectors"):
+        turned = s.kind == "vertices" and s.skeleton
+        if flags & ~7 or (flags & 2 and s.kind != "vectors") or (flags & 4 and not turned):
             p.fail("it is too short, or unknown flags are set")
         if not math.isfinite(time) or (not flags & 1 and time != 0):
             p.fail("its time is not finite, or set without its flag")
@@ -726,13 +801,16 @@ class _Reader:
         name = p.text(name_length, wrong, wrong)
         p.pad()
         p.where += f" ('{name}')"
-        root = anchors = pins = None
+        root = anchors = pins = turns = None
         if s.kind in ("vectors", "deformations"):
             p.fits("it ends before its root and anchors")
             root = list(p.f64s(3, "its root or an anchor"))
             anchors = p.f64s(3 * len(s.anchors or ()), "its root or an anchor")
         if flags & 2:
             pins = self.pins(p)
+        if flags & 4:
+            p.fits("it ends before its turns")
+            turns = self.unit_turns(p, len(s.skeleton), "a turn is no unit quaternion:")
         width = WIDTH[s.kind]
         p.fits("its length does not fit the count of FORM")
         values = p.f64s(s.count * width, "a value", "d" if s.precision == 8 else "f")
@@ -741,7 +819,7 @@ class _Reader:
             for i in range(0, len(values), width):
                 if not any(values[i:i + 4]):
                     p.fail("a quaternion is zero")
-        s.frames.append(Frame(name, time if flags & 1 else None, root, anchors, values, pins, self.pending, self.scalars))
+        s.frames.append(Frame(name, time if flags & 1 else None, root, anchors, values, pins, turns, self.pending, self.scalars))
         self.pending, self.scalars = [], None
 
     def fail(self, p: _Payload):
@@ -761,7 +839,7 @@ class _Reader:
 
     HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "SELE": sele, "LINK": link, "ANCH": anch,
                 "REFP": refp, "SKEL": skel, "CORR": corr, "PTCH": ptch,
-                "MAP ": map, "FORM": form, "SCAL": scal, "FRAM": fram, "FAIL": fail, "END ": end}
+                "RIG ": rig, "MAP ": map, "FORM": form, "SCAL": scal, "FRAM": fram, "FAIL": fail, "END ": end}
 
 
 def read_stream(file) -> Stream:
@@ -786,7 +864,8 @@ def _extra_json(records) -> list:
 def _frame_json(f: Frame, width: int) -> dict:
     anchors = None if f.anchors is None else _rows(f.anchors, 3)
     out = {"name": f.name, "time": f.time, "root": f.root, "anchors": anchors,
-           "pins": None if f.pins is None else list(f.pins), "values": _rows(f.values, width), "extra": _extra_json(f.extra)}
+           "pins": None if f.pins is None else list(f.pins), "turns": None if f.turns is None else _rows(f.turns, 4),
+           "values": _rows(f.values, width), "extra": _extra_json(f.extra)}
     if f.scalars:
         name, unit, numbers = f.scalars
         out["scalars"] = {"name": name, "unit": unit, "numbers": list(numbers)}
@@ -803,8 +882,13 @@ def _correspondence_json(c: Correspondence) -> dict:
     }
 
 
+def _rig_json(r: Rig) -> dict:
+    skin = r.skin_bone and {"bones": _rows(r.skin_bone, 4), "weights": _rows(r.skin_weight, 4)}
+    return {"joints": [vars(j) for j in r.joints], "at": _rows(r.at, 3), "turns": _rows(r.turns, 4), "skin": skin}
+
+
 def _map_json(m: Map) -> dict:
-    return {"size": m.size, "names": m.names, "weights": _rows(m.weights, 4 * m.n), "place": _rows(m.place, 3 * m.n),
+    return {"kind": m.kind, "per_corner": m.per_corner, "corner_bones": _rows(m.corner_bones, m.per_corner), "size": m.size, "names": m.names, "weights": _rows(m.weights, 4 * m.n), "place": _rows(m.place, 3 * m.n),
             "centre": _rows(m.centre, 3), "home_centre": _rows(m.home_centre, 3), "share": list(m.share),
             "home": m.home and _rows(m.home, 3), "joint_at": _rows(m.joint_at, 3), "joint_weight": list(m.joint_weight),
             "corners": _rows(m.corners, 4), "held_at": _rows(m.held_at, 3), "joints": _rows(m.joints, 2),
@@ -829,6 +913,7 @@ def to_json(s: Stream) -> dict:
         "skeleton": None if s.skeleton is None else [vars(j) for j in s.skeleton],
         "correspondence": s.correspondence and _correspondence_json(s.correspondence),
         "patches": s.patches and {"count": s.patches[0], "of_face": list(s.patches[1])},
+        "rig": s.rig and _rig_json(s.rig),
         "map": s.map and _map_json(s.map),
         "kind": s.kind, "precision": s.precision, "count": s.count,
         "extra": _extra_json(s.extra),

@@ -86,6 +86,7 @@ types:
             '"SKEL"': skel
             '"CORR"': corr
             '"PTCH"': ptch
+            '"RIG "': rig
             '"MAP "': map
             '"FORM"': form
             '"SCAL"': scal
@@ -286,6 +287,30 @@ types:
             type: u8
           - id: digest
             type: u8
+  rig:
+    seq:
+      - id: num_joints
+        type: u8
+      - id: joints
+        type: joint
+        repeat: expr
+        repeat-expr: num_joints
+      - id: positions
+        type: point
+        repeat: expr
+        repeat-expr: num_joints
+      - id: turns
+        type: f8
+        repeat: expr
+        repeat-expr: 4 * num_joints
+      - id: has_skin
+        type: u4
+      - id: reserved
+        type: u4
+      - id: skin
+        type: u1
+        repeat: eos
+        doc: of each vertex 4 bones (u4), then of each vertex 4 weights (f8), if has_skin
   ptch:
     seq:
       - id: num_patches
@@ -308,11 +333,12 @@ types:
         type: u8
       - id: kind
         type: u4
+        doc: 1 patches, 2 bones
       - id: map_flags
         type: u4
       - id: num_names
         type: u4
-      - id: reserved
+      - id: said_per_corner
         type: u4
       - id: size
         type: f8
@@ -351,11 +377,11 @@ types:
       - id: corners
         type: f8
         repeat: expr
-        repeat-expr: 4 * num_corners
+        repeat-expr: 4 * per_corner * num_corners
       - id: held_positions
         type: point
         repeat: expr
-        repeat-expr: num_held
+        repeat-expr: 'kind == 1 ? num_held : 0'
       - id: joints
         type: u4
         repeat: expr
@@ -367,11 +393,18 @@ types:
       - id: held_patches
         type: u4
         repeat: expr
-        repeat-expr: num_held
+        repeat-expr: 'kind == 1 ? num_held : 0'
+      - id: corner_bones
+        type: u4
+        repeat: expr
+        repeat-expr: 'kind == 2 ? per_corner * num_corners : 0'
       - id: names
         type: string
         repeat: expr
         repeat-expr: num_names
+    instances:
+      per_corner:
+        value: 'said_per_corner == 0 ? 1 : said_per_corner'
   form:
     seq:
       - id: kind
@@ -441,6 +474,12 @@ types:
       - id: pins
         type: pin_list
         if: has_pins
+      - id: turns
+        type: f8
+        repeat: expr
+        repeat-expr: 4 * _root.form.count
+        if: has_turns
+        doc: a joint is a vertex
       - id: values
         type:
           switch-on: _root.form.precision
@@ -454,6 +493,8 @@ types:
         value: (flags & 1) != 0
       has_pins:
         value: (flags & 2) != 0
+      has_turns:
+        value: (flags & 4) != 0
   pin_list:
     seq:
       - id: num_vertices

@@ -136,13 +136,25 @@ def reference(r):
     return Record("REFP", pad(u32(len(name), 0) + name) + f64(*flat(r["positions"])), CRITICAL)
 
 
-def skeleton(joints):
+def joint_list(joints):
     out = b""
     for j in joints:
         parent = 0xFFFFFFFF if j["parent"] is None else j["parent"]
         channels = bytes(j["channels"]) + bytes(8 - len(j["channels"]))
         out += pad(u32(parent, len(j["channels"])) + channels + f64(*j["offset"]) + string(j["name"]))
-    return Record("SKEL", out, 0)
+    return out
+
+
+def skeleton(joints):
+    return Record("SKEL", joint_list(joints), 0)
+
+
+def rig(r):
+    out = u64(len(r["joints"])) + joint_list(r["joints"]) + f64(*flat(r["at"]), *flat(r["turns"]))
+    out += u32(r["skin"] is not None, 0)
+    if r["skin"] is not None:
+        out += u32(*flat(r["skin"]["bones"])) + f64(*flat(r["skin"]["weights"]))
+    return Record("RIG ", out, 0)
 
 
 def digest(m):
@@ -171,23 +183,25 @@ def patches(p):
 
 def fitted(m):
     n, corners, held = len(m["share"]), len(m["corners"]), len(m["held"])
-    counts = u64(n, len(m["weights"]), len(m["joints"]), corners, held)
-    words = u32(1, m["home"] is not None, len(m["names"]), 0)
+    counts = u64(n, len(m["weights"]), len(m["joints"]), corners // m["per_corner"], held)
+    words = u32({"patches": 1, "bones": 2}[m["kind"]], m["home"] is not None, len(m["names"]), m["per_corner"])
     rows = ("weights", "place", "centre", "home_centre")
     numbers = [f64(m["size"])] + [f64(*flat(m[k])) for k in rows] + [f64(*m["share"]), f64(*flat(m["home"] or []))]
     numbers += [f64(*flat(m["joint_at"])), f64(*m["joint_weight"]), f64(*flat(m["corners"])), f64(*flat(m["held_at"]))]
-    indices = u32(*flat(m["joints"]), *m["held"], *m["held_patch"])
+    indices = u32(*flat(m["joints"]), *m["held"], *m["held_patch"], *flat(m["corner_bones"]))
     return Record("MAP ", counts + words + b"".join(numbers) + indices + b"".join(map(string, m["names"])), CRITICAL)
 
 
 def frame(c, f):
     name = f["name"].encode()
-    flags = (f["time"] is not None) + 2 * (f["pins"] is not None)
+    flags = (f["time"] is not None) + 2 * (f["pins"] is not None) + 4 * (f["turns"] is not None)
     head = pad(u32(len(name), flags) + f64(f["time"] or 0) + name)
     if f["root"] is not None:
         head += f64(*f["root"], *flat(f["anchors"]))
     if f["pins"] is not None:
         head += pad(u32(len(f["pins"]), 0, *f["pins"]))
+    if f["turns"] is not None:
+        head += f64(*flat(f["turns"]))
     values = flat(f["values"])
     code = "d" if c["precision"] == 8 else "f"
     return Record("FRAM", head + struct.pack(f"<{len(values)}{code}", *values), CRITICAL)
@@ -220,6 +234,8 @@ def records_of(c):
         out.append(correspondence(c["correspondence"]))
     if c["patches"] is not None:
         out.append(patches(c["patches"]))
+    if c["rig"] is not None:
+        out.append(rig(c["rig"]))
     if c["map"] is not None:
         out.append(fitted(c["map"]))
     out += unknown(c["extra"])
@@ -258,7 +274,7 @@ def content(**changes):
         "minor": 0, "provenance": [], "mesh": {"vertices": 4, "faces": [[0, 1, 2], [0, 2, 3]]}, "texture": None,
         "labels": None, "selection": None, "links": None, "anchors": None,
         "reference": {"name": "rest", "positions": POINTS[:4]}, "skeleton": None, "correspondence": None,
-        "patches": None, "map": None,
+        "patches": None, "rig": None, "map": None,
         "kind": "vertices", "precision": 8, "count": 4, "extra": [],
         "frames": [pose("pose1", BENT[:4])], "tail": [],
     }
@@ -266,8 +282,8 @@ def content(**changes):
     return c
 
 
-def pose(name, values, time=None, root=None, anchors=None, pins=None, extra=()):
-    return {"name": name, "time": time, "root": root, "anchors": anchors, "pins": pins, "values": values,
+def pose(name, values, time=None, root=None, anchors=None, pins=None, turns=None, extra=()):
+    return {"name": name, "time": time, "root": root, "anchors": anchors, "pins": pins, "turns": turns, "values": values,
             "extra": list(extra)}
 
 
@@ -318,15 +334,45 @@ def graph_content(kind, **changes):
     return c
 
 
-def skeleton_content(**changes):
+JOINTS = [dict(zip(("name", "parent", "offset", "channels"), j)) for j in (
+    ("Hips", None, [0, 1, 0], [1, 2, 3, 6, 4, 5]), ("Spine", 0, [0, 0.5, 0], [6, 4, 5]),
+    ("Spine.end", 1, [0, 0.25, 0], []), ("K\u00fcken", 0, [0.125, -1, 0], [4]))]
+
+
+def skeleton_content(turns=None, **changes):
     """Hips, a spine with its end, and a leg; the mesh has the bones as its faces."""
-    joints = [("Hips", None, [0, 1, 0], [1, 2, 3, 6, 4, 5]), ("Spine", 0, [0, 0.5, 0], [6, 4, 5]),
-              ("Spine.end", 1, [0, 0.25, 0], []), ("K\u00fcken", 0, [0.125, -1, 0], [4])]
     rest = [[0, 1, 0], [0, 1.5, 0], [0, 1.75, 0], [0.125, 0, 0]]
     bent = [[0, 1, 0], [0.5, 1, 0], [0.75, 1, 0], [0.125, 0, 0]]
-    return content(mesh={"vertices": 4, "faces": [[0, 1], [1, 2], [0, 3]]}, frames=[pose("bent", bent)],
-                   reference={"name": "rest", "positions": rest},
-                   skeleton=[dict(zip(("name", "parent", "offset", "channels"), j)) for j in joints], **changes)
+    return content(mesh={"vertices": 4, "faces": [[0, 1], [1, 2], [0, 3]]}, frames=[pose("bent", bent, turns=turns)],
+                   reference={"name": "rest", "positions": rest}, skeleton=JOINTS, **changes)
+
+
+HALF = [0.5, 0.5, 0.5, 0.5]  # a third of a turn
+STRAIGHT = [1.0, 0.0, 0.0, 0.0]
+TURNED = [HALF, [0.6, 0.8, 0.0, 0.0], [0.6, 0.8, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0]]
+
+
+def rig_content(skin=True, **changes):
+    """Three bones, of which one has an end site, move the four vertices of two triangles; the joints are no vertices."""
+    bones = [[0, 1, 2, 0], [2, 0, 0, 0], [1, 0, 2, 0], [0, 0, 0, 0]]
+    weights = [[0.5, 0.25, 0.25, 0], [1, 0, 0, 0], [0.375, 0.375, 0.25, 0], [0.25, 0.25, 0.25, 0.25]]
+    r = {"joints": JOINTS, "at": [[0, 1, 0], [0, 1.5, 0], [0, 1.5, 0.25], [0.125, 0, 0]],
+         "turns": [STRAIGHT, HALF, HALF, STRAIGHT], "skin": {"bones": bones, "weights": weights} if skin else None}
+    return content(rig=r, **changes)
+
+
+def bone_map_content(per_corner=2, corners=True, **changes):
+    """A map of the three bones of that rig, whose corners go with two bones each, the last with the second alone."""
+    two = [[0.5, 0.5, 0, 0], [0, 0, 0.25, 1]]
+    lists = [two] * 5 + [[[0, 0, 0, 0], [1, 0, 0, 0]]]
+    rest = POINTS[:4]
+    m = {"kind": "bones", "per_corner": per_corner, "size": 1.0, "names": [],
+         "weights": [[*[x / 2 for x in p], 0.5, 0, 0, 0, 0, *[x / 2 for x in p], 0.5] for p in rest],
+         "place": [[0.25 * k for k in range(9)]] * 3, "centre": rest[:3], "home_centre": rest[:3], "share": [0.5, 0.25, 0.25],
+         "home": None, "joint_at": [], "joint_weight": [], "held_at": [], "joints": [], "held": [1, 3], "held_patch": [],
+         "corners": [q for c in lists for q in c[-per_corner:]] if corners else [],
+         "corner_bones": [[0, 1, 2][-per_corner:] if per_corner < 3 else [0, 1, 2]] * 6 if corners else []}
+    return rig_content(links=[], frames=[], map=m, **changes)
 
 
 def driven(by, distance=0.0, matched=True):
@@ -350,7 +396,7 @@ def map_content(home=False, **changes):
     nobody, whole_of = [0, 0, 0, 0], [[*p, 1] for p in rest]
     weights = [whole_of[0] + nobody, half[1] + half[1], half[2] + half[2], nobody + whole_of[3]]
     centre = [[0.75, 0.25, 0], [0.25, 0.75, 0]]
-    m = {"size": 1.5 if home else 1.0, "names": ["left", "r\u00e9st"] if home else [], "weights": weights,
+    m = {"kind": "patches", "per_corner": 1, "corner_bones": [], "size": 1.5 if home else 1.0, "names": ["left", "r\u00e9st"] if home else [], "weights": weights,
          "place": [[-0.5, -0.25, 0, -0.25, -0.25, 0], [-0.5, -0.25, 0, -0.25, -0.25, 0]], "centre": centre,
          "home_centre": centre, "share": [0.5, 0.5], "home": [[2, 0, 0], [3, 0, 0], [3, 1, 0], [2, 1, 0]] if home else None,
          "joint_at": [[0.5, 0.5, 0]], "joint_weight": [2.0], "corners": [[1, 0, 0, 0]] * 6, "held_at": [[0, 0, 0], [0, 1, 0]],
@@ -403,7 +449,10 @@ def golden():
         "skeleton": ("the joints of a skeleton, whose bones are the mesh's faces", skeleton_content()),
         "correspondence": ("three faces of a target driven by two faces of a source", register_content()),
         "patches": ("three faces in two patches", mixed(patches={"count": 2, "of_face": [1, 0, 1]})),
+        "turns": ("a skeleton whose frame says how its joints have turned", skeleton_content(TURNED)),
         "map": ("two transforms, half of a quad each", map_content()),
+        "rig": ("three bones that move the vertices of two triangles: their skin, and a map with two bones a corner",
+                bone_map_content()),
         "unknown-records": (
             "copy-safe records before FORM, between frames and at the end; one that a filter drops",
             content(extra=[NOTE, DROPPED], tail=[NOTE],
@@ -452,6 +501,13 @@ def accept():
                                                      correspondence=register_content()["correspondence"])),
         "correspondence-of-nothing": whole(content(correspondence={"source": nobody, "target": nobody, "faces": []})),
         "map-with-home-and-names": whole(map_content(home=True)),
+        "map-per-corner-0": patched(map_content(), "MAP ", 52, u32(0)),
+        "map-of-bones-one-per-corner": whole(bone_map_content(per_corner=1)),
+        "map-of-bones-without-corners": whole(bone_map_content(corners=False)),
+        "rig-without-skin": whole(rig_content(skin=False)),
+        "rig-of-transforms": whole(rig_content(kind="transforms", count=3, frames=[pose("t", [[1, 0, 0, 0, 1, 2, 3]] * 3)])),
+        "turns-f32": whole(skeleton_content(TURNED, precision=4)),
+        "turns-in-one-frame": whole(dict(skeleton_content(), frames=skeleton_content(TURNED)["frames"] + skeleton_content()["frames"])),
         "patch-without-face": whole(content(patches={"count": 9, "of_face": [8, 0]})),
         "extreme-numbers": whole(content(frames=[pose("x", [
             [1.7976931348623157e308, -1.7976931348623157e308, 5e-324], [-0.0, 0.0, 2.2250738585072014e-308],
@@ -577,6 +633,8 @@ def reject_order():
     first = [Record("SELE", u32(0), CRITICAL), Record("LINK", b"", CRITICAL), Record("ANCH", b"", CRITICAL),
              Record("TEXC", u32(1, 0) + u64(0) + u32(0xFFFFFFFF) * 6, 0), Record("LABL", b"", 0), of["REFP"]]
     joints = skeleton(skeleton_content()["skeleton"])
+    b = bone_map_content()
+    by = {r.tag.strip().decode(): r for r in records_of(b)}
     drives = correspondence(register_content()["correspondence"])
     out = {f"{r.tag.decode().lower()}-before-mesh": whole(c, [r, of["MESH"], of["FORM"]]) for r in first}
     for r in first[:-1]:
@@ -584,6 +642,10 @@ def reject_order():
     orphan = Record("PROV", u32(1, 0, 0) + string("p") + string("1"), COPY_SAFE)
     late = Record("PROV", u32(0, 0) + string("p") + string("1"), COPY_SAFE)
     out.update({
+        "rig-before-mesh": whole(c, [rig(rig_content()["rig"]), of["MESH"], of["REFP"], of["FORM"]]),
+        "rig-twice": inserted(rig_content(), "FORM", rig(rig_content()["rig"])),
+        "rig-after-map": whole(b, [by[t] for t in ("MESH", "LINK", "REFP", "MAP", "RIG", "FORM")]),
+        "rig-missing": without(b, "RIG "),
         "skel-before-mesh": whole(c, [joints, of["MESH"], of["REFP"], of["FORM"]]),
         "skel-twice": inserted(c, "FORM", joints, joints),
         "corr-twice": inserted(c, "FORM", drives, drives),
@@ -701,6 +763,15 @@ def reject_attachments():
     def driving(*faces):
         return whole(dict(r, correspondence=dict(r["correspondence"], faces=list(faces))))
 
+    g, b = rig_content(), bone_map_content()
+
+    def rigged(**fields):
+        return whole(dict(g, rig=dict(g["rig"], skin=None, **fields)))
+
+    def skinned(**fields):
+        return whole(dict(g, rig=dict(g["rig"], skin=dict(g["rig"]["skin"], **fields))))
+
+    joints_but_one = [dict(j, channels=[] if i == 3 else j["channels"]) for i, j in enumerate(JOINTS)]
     one = driven([[0, 1.0]])
     return {
         "skel-joint-missing": skeleton_of(*s["skeleton"][:3]),
@@ -730,10 +801,37 @@ def reject_attachments():
         "map-joints-2-31": patched(map_content(), "MAP ", 16, u64(1 << 31)),
         "map-corners": patched(map_content(), "MAP ", 24, u64(7)),
         "map-held-2-63": patched(map_content(), "MAP ", 32, u64(1 << 63)),
-        "map-kind-2": patched(map_content(), "MAP ", 40, u32(2)),
+        "map-kind-3": patched(map_content(), "MAP ", 40, u32(3)),
+        "map-kind-2-without-rig": patched(map_content(), "MAP ", 40, u32(2)),
         "map-flag": patched(map_content(), "MAP ", 44, u32(2)),
         "map-name-missing": patched(map_content(home=True), "MAP ", 48, u32(1)),
-        "map-reserved": patched(map_content(), "MAP ", 52, u32(1)),
+        "map-per-corner-2": patched(map_content(), "MAP ", 52, u32(2)),
+        "map-of-bones-per-corner-0": patched(b, "MAP ", 52, u32(0)),
+        "map-of-bones-per-corner-3": whole(bone_map_content(per_corner=3)),
+        "map-of-bones-of-another-rig": whole(dict(b, rig=dict(b["rig"], joints=joints_but_one, skin=None))),
+        "map-of-bones-with-joints": whole(dict(b, map=dict(b["map"], joints=[[0, 1]], joint_at=[[0, 0, 0]], joint_weight=[1.0]))),
+        "map-of-bones-corner-bone": patched(b, "MAP ", -4, u32(3)),
+        "map-of-bones-corner-zero": whole(dict(b, map=dict(b["map"], corners=[[0, 0, 0, 0]] * 12))),
+        "map-of-bones-held-twice": whole(dict(b, map=dict(b["map"], held=[1, 1]))),
+        "rig-cut": lie(g, "RIG ", payload=lambda record: record.payload[:-8]),
+        "rig-long": lie(g, "RIG ", payload=lambda record: record.payload + bytes(8)),
+        "rig-empty": lie(g, "RIG ", payload=b""),
+        "rig-joints-0": whole(dict(g, rig={"joints": [], "at": [], "turns": [], "skin": None})),
+        "rig-joints-2-63": patched(g, "RIG ", 0, u64(1 << 63)),
+        "rig-joints-less": patched(g, "RIG ", 0, u64(3)),
+        "rig-parent-itself": rigged(joints=[dict(j, parent=i) for i, j in enumerate(JOINTS)]),
+        "rig-without-channels": rigged(joints=[dict(j, channels=[]) for j in JOINTS]),
+        "rig-position-inf": rigged(at=[[0, 0, 0], [0, INF, 0], [0, 0, 0], [0, 0, 0]]),
+        "rig-turn-long": rigged(turns=[STRAIGHT, [1, 0.01, 0, 0], STRAIGHT, STRAIGHT]),
+        "rig-turn-nan": rigged(turns=[STRAIGHT, [NAN, 0, 0, 0], STRAIGHT, STRAIGHT]),
+        "rig-skin-2": patched(rig_content(skin=False), "RIG ", -8, u32(2)),
+        "rig-reserved": patched(rig_content(skin=False), "RIG ", -4, u32(1)),
+        "rig-skin-missing": patched(rig_content(skin=False), "RIG ", -8, u32(1)),
+        "rig-bone-out-of-range": skinned(bones=[[0, 1, 2, 3]] * 4),
+        "rig-weights-ascend": skinned(weights=[[0.25, 0.5, 0.25, 0]] * 4),
+        "rig-weight-negative": skinned(weights=[[1, 0.5, -0.5, 0]] * 4),
+        "rig-weight-nan": skinned(weights=[[NAN, 0, 0, 0]] * 4),
+        "rig-weights-sum": skinned(weights=[[0.5, 0.25, 0.125, 0]] * 4),
         "map-size-0": patched(map_content(), "MAP ", 56, f64(0)),
         "map-weight-nan": patched(map_content(), "MAP ", 64, f64(NAN)),
         "map-held-patch": patched(map_content(), "MAP ", -4, u32(2)),
@@ -780,9 +878,15 @@ def reject_frames():
         "fram-short": lie(c, "FRAM", payload=lambda r: r.payload[:-8]),
         "fram-long": lie(c, "FRAM", payload=lambda r: r.payload + bytes(8)),
         "fram-empty": lie(c, "FRAM", payload=b""),
-        "fram-flags-4": patched(c, "FRAM", 4, u32(4)),
         "fram-pins-of-vertices": patched(c, "FRAM", 4, u32(2)),
         "fram-pins-of-deformations": whole(dict(q, frames=[dict(q["frames"][0], pins=[0])])),
+        "fram-flags-8": patched(c, "FRAM", 4, u32(8)),
+        "fram-turns-without-skeleton": patched(c, "FRAM", 4, u32(4)),
+        "fram-turns-of-vectors": patched(v, "FRAM", 4, u32(5)),
+        "fram-turns-missing": patched(skeleton_content(), "FRAM", 4, u32(4)),
+        "fram-turns-unmarked": patched(skeleton_content(TURNED), "FRAM", 4, u32(0)),
+        "fram-turn-short": whole(skeleton_content([[0.9, 0, 0, 0]] + TURNED[1:])),
+        "fram-turn-nan": whole(skeleton_content(TURNED[:3] + [[NAN, 0, 0, 0]])),
         "fram-pins-none": whole(pinned()),
         "fram-pins-twice": whole(pinned(2, 2)),
         "fram-pins-order": whole(pinned(4, 1)),

@@ -37,12 +37,13 @@ END
 
 @test "a stream that is passed through comes out as it was" {
     for name in smallest f32 times empty-sequence every-header-record vectors vectors-selected-f32 pins scalars deformations transforms \
-        skeleton correspondence; do
+        skeleton correspondence patches map turns rig; do
         must vg-encode --no-provenance "$GOLDEN/$name.vgs" -o "$name.vgs"
         same_file "$GOLDEN/$name.vgs" "$name.vgs"
     done
     for name in extreme-numbers names line-segments-only points-without-faces transforms-with-mesh no-transforms \
-        correspondence-without-mesh scalars-f32-without-unit scalars-of-nothing scalars-behind-unknown; do
+        correspondence-without-mesh scalars-f32-without-unit scalars-of-nothing scalars-behind-unknown \
+        map-of-bones-one-per-corner map-of-bones-without-corners rig-without-skin rig-of-transforms turns-f32 turns-in-one-frame; do
         must vg-encode --no-provenance "$CORPUS/accept/$name.vgs" -o "$name.vgs"
         same_file "$CORPUS/accept/$name.vgs" "$name.vgs"
     done

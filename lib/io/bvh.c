@@ -387,6 +387,7 @@ static int next_frame(void *state, vg_frame *f, vg_err *e)
     vg_skeleton_pose(&b->skeleton, b->values, f->values, b->turns);
     snprintf(what, sizeof what, "in frame %llu", (unsigned long long)b->next);
     int r = check_places(b, f->values, what, e);
+    if (r == VG_OK) r = vg_frame_turn(f, b->turns, b->skeleton.njoints, e);
     if (r < 0) return r;
     f->has_time = b->frames > 1; /* a single frame is a pose */
     f->time = f->has_time ? (double)b->next * b->frame_time : 0;

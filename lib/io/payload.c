@@ -1,175 +1,10 @@
 /* payload.c: what is in each kind of record, both directions side by side (fmt/STREAM.md, section 3).
- * Leaves out record headers and checksums (record.c) and the order of records (stream.c).
+ * Leaves out skeletons, patches and maps (payload_rig.c), record headers and checksums (record.c) and the order of records (stream.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "io/payload.h"
-#include "model/map.h"
+#include "io/cursor.h"
 
 #include <math.h>
 #include <stdlib.h>
-
-#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-enum { NATIVE = 1 };
-#else
-enum { NATIVE = 0 };
-#endif
-
-/* ---- a cursor that cannot run over, and never reports more than is there ---- */
-
-typedef struct cursor {
-    const unsigned char *at, *end;
-    bool bad;
-} cursor;
-
-static cursor start(const vgi_payload *p)
-{
-    return (cursor){p->data, p->size ? p->data + p->size : p->data, false};
-}
-
-static const unsigned char *take(cursor *c, size_t n)
-{
-    if (c->bad || (size_t)(c->end - c->at) < n) {
-        c->bad = true;
-        return NULL;
-    }
-    const unsigned char *p = c->at;
-    c->at += n;
-    return p;
-}
-
-static uint32_t take32(cursor *c)
-{
-    const unsigned char *p = take(c, 4);
-    return p ? vgi_get32(p) : 0;
-}
-
-static uint64_t take64(cursor *c)
-{
-    const unsigned char *p = take(c, 8);
-    return p ? vgi_get64(p) : 0;
-}
-
-static double take_double(cursor *c)
-{
-    uint64_t bits = take64(c);
-    double x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
-}
-
-/* n elements of `size` bytes, but only if they are really there */
-static const unsigned char *take_array(cursor *c, uint64_t n, size_t size)
-{
-    if (n > (size_t)(c->end - c->at) / size) {
-        c->bad = true;
-        return NULL;
-    }
-    return take(c, (size_t)n * size);
-}
-
-static size_t left(const cursor *c)
-{
-    return (size_t)(c->end - c->at);
-}
-
-static void copy32(uint32_t *to, const unsigned char *from, size_t n)
-{
-    for (size_t i = 0; i < n; i++) to[i] = vgi_get32(from + 4 * i);
-}
-
-static void copy_doubles(double *to, const unsigned char *from, size_t n)
-{
-    if (n == 0) return;
-    if (NATIVE) {
-        memcpy(to, from, n * sizeof *to);
-        return;
-    }
-    for (size_t i = 0; i < n; i++) {
-        uint64_t bits = vgi_get64(from + 8 * i);
-        memcpy(&to[i], &bits, sizeof bits);
-    }
-}
-
-static void copy_floats(double *to, const unsigned char *from, size_t n)
-{
-    for (size_t i = 0; i < n; i++) {
-        uint32_t bits = vgi_get32(from + 4 * i);
-        float x;
-        memcpy(&x, &bits, sizeof x);
-        to[i] = (double)x;
-    }
-}
-
-static int put32(vg_bytes *b, uint32_t x, vg_err *e)
-{
-    unsigned char p[4];
-    vgi_put32(p, x);
-    return vgi_bytes_append(b, p, sizeof p, e);
-}
-
-static int put64(vg_bytes *b, uint64_t x, vg_err *e)
-{
-    unsigned char p[8];
-    vgi_put64(p, x);
-    return vgi_bytes_append(b, p, sizeof p, e);
-}
-
-static int put_doubles(vg_bytes *b, const double *x, size_t n, vg_err *e)
-{
-    if (NATIVE) return vgi_bytes_append(b, x, n * sizeof *x, e);
-    int r = vgi_bytes_reserve(b, b->size + 8 * n, e);
-    for (size_t i = 0; r == VG_OK && i < n; i++) {
-        uint64_t bits;
-        memcpy(&bits, &x[i], sizeof bits);
-        vgi_put64(b->data + b->size, bits);
-        b->size += 8;
-    }
-    return r;
-}
-
-static int put_string(vg_bytes *b, const char *s, vg_err *e)
-{
-    size_t n = strlen(s);
-    if (n > UINT32_MAX) return vg_fail(e, VG_EARG, "a text of %zu bytes is too long for a stream", n);
-    int r = put32(b, (uint32_t)n, e);
-    return r < 0 ? r : vgi_bytes_append(b, s, n, e);
-}
-
-/* zero bytes up to the next multiple of 8, counted from `from` */
-static int put_padding(vg_bytes *b, size_t from, vg_err *e)
-{
-    static const unsigned char zeros[8];
-    return vgi_bytes_append(b, zeros, (from - b->size) & 7, e);
-}
-
-static int wrong(const vgi_payload *p, const char *what, vg_err *e)
-{
-    return vg_fail(e, VG_EINPUT, "%s: %s", p->where, what);
-}
-
-/* A text of n bytes; NULL and *r set when it is not there, no UTF-8, or memory ran out. */
-static char *take_text(cursor *c, size_t n, const vgi_payload *p, int *r, vg_err *e)
-{
-    const char *s = (const char *)take(c, n);
-    if (!s) {
-        *r = wrong(p, "a text is longer than its record", e);
-        return NULL;
-    }
-    if (!vgi_is_utf8(s, n)) {
-        *r = wrong(p, "a text is no UTF-8", e);
-        return NULL;
-    }
-    char *copy = vgi_copy_string(s, n, e);
-    if (!copy) *r = VG_ENOMEM;
-    return copy;
-}
-
-static bool take_padding(cursor *c, size_t n)
-{
-    const unsigned char *p = take(c, n);
-    for (size_t i = 0; p && i < n; i++)
-        if (p[i]) return false;
-    return p != NULL;
-}
 
 /* ---- PROV ---- */
 
@@ -338,15 +173,6 @@ static int decode_indices(const vgi_payload *p, size_t multiple, uint32_t **list
     return VG_OK;
 }
 
-static int check_ascending(const vgi_payload *p, const uint32_t *list, size_t n, size_t limit, vg_err *e)
-{
-    for (size_t i = 0; i < n; i++) {
-        if (list[i] >= limit) return wrong(p, "an index is out of range", e);
-        if (i && list[i] <= list[i - 1]) return wrong(p, "indices are not ascending", e);
-    }
-    return VG_OK;
-}
-
 int vgi_sele_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 {
     h->has_selection = true;
@@ -446,59 +272,6 @@ int vgi_form_encode(vg_bytes *b, const vg_head *h, vg_err *e)
     return r < 0 ? r : put64(b, h->count, e);
 }
 
-/* ---- SKEL ---- */
-
-static int decode_joint(cursor *c, const vgi_payload *p, vg_joint *j, size_t index, vg_err *e)
-{
-    int r = VG_OK;
-    j->parent = take32(c), j->nchannels = take32(c);
-    const unsigned char *channels = take(c, 8), *offset = take(c, 24);
-    uint32_t n = take32(c);
-    if (c->bad) return wrong(p, "it ends inside a joint", e);
-    if (j->parent != UINT32_MAX && j->parent >= index) return wrong(p, "a joint's parent does not come before it", e);
-    if (j->nchannels > 6) return wrong(p, "a joint has more than 6 channels", e);
-    for (uint32_t i = 0; i < 8; i++)
-        if (i < j->nchannels ? channels[i] < 1 || channels[i] > 6 : channels[i] != 0)
-            return wrong(p, "a joint has an unknown channel", e);
-    memcpy(j->channels, channels, sizeof j->channels);
-    copy_doubles(j->offset, offset, 3);
-    if (!vgi_finite(j->offset, 3)) return wrong(p, "an offset is not finite", e);
-    if (!(j->name = take_text(c, n, p, &r, e))) return r;
-    return take_padding(c, (4 - n) & 7) ? VG_OK : wrong(p, "padding is missing or not zero", e);
-}
-
-int vgi_skel_decode(const vgi_payload *p, vg_head *h, vg_err *e)
-{
-    cursor c = start(p);
-    vg_skeleton *s = &h->skeleton;
-    size_t cap = 0;
-    while (left(&c)) {
-        int r = vgi_grow(&s->joints, &cap, s->njoints + 1, sizeof *s->joints, e);
-        if (r < 0) return r;
-        vg_joint *j = &s->joints[s->njoints++]; /* counted at once, so that clearing frees it in any case */
-        *j = (vg_joint){0};
-        if ((r = decode_joint(&c, p, j, s->njoints - 1, e)) < 0) return r;
-    }
-    return s->njoints == h->mesh.nv ? VG_OK : wrong(p, "it does not have one joint for each vertex", e);
-}
-
-int vgi_skel_encode(vg_bytes *b, const vg_skeleton *s, vg_err *e)
-{
-    int r = VG_OK;
-    for (size_t i = 0; r == VG_OK && i < s->njoints; i++) {
-        const vg_joint *j = &s->joints[i];
-        unsigned char channels[8] = {0};
-        memcpy(channels, j->channels, j->nchannels);
-        r = put32(b, j->parent, e);
-        if (r == VG_OK) r = put32(b, j->nchannels, e);
-        if (r == VG_OK) r = vgi_bytes_append(b, channels, sizeof channels, e);
-        if (r == VG_OK) r = put_doubles(b, j->offset, 3, e);
-        if (r == VG_OK) r = put_string(b, j->name, e);
-        if (r == VG_OK) r = put_padding(b, 0, e);
-    }
-    return r;
-}
-
 /* ---- CORR ---- */
 
 static int check_pairs(const vgi_payload *p, const vg_correspondence *c, vg_err *e)
@@ -561,133 +334,9 @@ int vgi_corr_encode(vg_bytes *b, const vg_correspondence *c, vg_err *e)
     return r < 0 ? r : put_padding(b, 0, e);
 }
 
-/* ---- PTCH ---- */
-
-int vgi_ptch_decode(const vgi_payload *p, vg_head *h, vg_err *e)
-{
-    cursor c = start(p);
-    uint64_t n = take64(&c);
-    size_t nf = h->mesh.nf;
-    const unsigned char *of_face = take_array(&c, nf, 4);
-    if (c.bad || !take_padding(&c, nf % 2 * 4) || left(&c)) return wrong(p, "its length does not fit the number of faces", e);
-    if (n == 0 || n > UINT32_MAX) return wrong(p, "its count is out of range", e);
-    h->patches.of_face = vgi_array_raw(nf, sizeof *h->patches.of_face, e);
-    if (!h->patches.of_face) return VG_ENOMEM;
-    h->patches.n = (size_t)n;
-    copy32(h->patches.of_face, of_face, nf);
-    for (size_t f = 0; f < nf; f++)
-        if (h->patches.of_face[f] >= n) return wrong(p, "a face is in a patch that is not there", e);
-    return VG_OK;
-}
-
-int vgi_ptch_encode(vg_bytes *b, const vg_head *h, vg_err *e)
-{
-    int r = put64(b, h->patches.n, e);
-    if (r == VG_OK) r = vgi_indices_encode(b, h->patches.of_face, h->mesh.nf, e);
-    return r < 0 ? r : put_padding(b, 0, e);
-}
-
-/* ---- MAP ---- */
-
-enum { HAS_HOME = 1u };
-
-static int take_map_names(cursor *c, vg_map *m, size_t n, const vgi_payload *p, vg_err *e)
-{
-    int r = VG_OK;
-    size_t cap = 0;
-    while (r == VG_OK && m->nnames < n) {
-        if ((r = vgi_grow(&m->names, &cap, m->nnames + 1, sizeof *m->names, e)) < 0) break;
-        char *text = take_text(c, take32(c), p, &r, e);
-        if (text) m->names[m->nnames++] = text;
-    }
-    return r;
-}
-
-/* The arrays one after the other; each is made only when its bytes are there. */
-static int take_map_arrays(cursor *c, vg_map *m, const vgi_payload *p, vg_err *e)
-{
-    vgi_map_array list[VGI_MAP_ARRAYS];
-    size_t n = vgi_map_arrays(m, list);
-    for (size_t i = 0; i < n; i++) {
-        size_t length = vgi_map_array_length(m, &list[i]), size = list[i].real ? 8 : 4;
-        const unsigned char *data = take_array(c, length, size);
-        if (c->bad) return wrong(p, "it is shorter than its counts say", e);
-        if (!length) continue;
-        if (!(*list[i].at = vgi_array_raw(length, size, e))) return VG_ENOMEM;
-        if (!list[i].real) {
-            copy32(*list[i].at, data, length);
-            continue;
-        }
-        copy_doubles(*list[i].at, data, length);
-        if (!vgi_finite(*list[i].at, length)) return wrong(p, "a number is not finite", e);
-    }
-    return VG_OK;
-}
-
-static int check_map(const vgi_payload *p, const vg_map *m, vg_err *e)
-{
-    double sum = 0;
-    for (size_t i = 0; i < m->n; i++) {
-        if (!(m->share[i] >= 0)) return wrong(p, "a share is negative", e);
-        sum += m->share[i];
-    }
-    if (!(sum > 1 - 1e-9 && sum < 1 + 1e-9)) return wrong(p, "the shares do not sum to 1", e);
-    for (size_t i = 0; i < m->njoints; i++)
-        if (m->joint[2 * i] >= m->n || m->joint[2 * i + 1] >= m->n || m->joint[2 * i] == m->joint[2 * i + 1] ||
-            !(m->joint_weight[i] > 0))
-            return wrong(p, "a joint is malformed", e);
-    for (size_t i = 0; i < m->ncorners; i++) {
-        const double *q = m->corner + 4 * i;
-        if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) return wrong(p, "a quaternion is zero", e);
-    }
-    for (size_t i = 0; i < m->nheld; i++)
-        if (m->held_patch[i] >= m->n) return wrong(p, "a vertex is held by a transform that is not there", e);
-    return check_ascending(p, m->held, m->nheld, m->nv, e);
-}
-
-int vgi_map_decode(const vgi_payload *p, vg_head *h, vg_err *e)
-{
-    cursor c = start(p);
-    vg_map *m = &h->map;
-    uint64_t n = take64(&c), nv = take64(&c), joints = take64(&c), corners = take64(&c), held = take64(&c);
-    uint32_t kind = take32(&c), flags = take32(&c), names = take32(&c), zero = take32(&c);
-    double size = take_double(&c);
-    if (c.bad || n == 0 || n >= UINT32_MAX || joints >= UINT32_MAX || corners >= UINT32_MAX || held > nv)
-        return wrong(p, "its counts are out of range", e);
-    if (nv != h->mesh.nv) return wrong(p, "its count does not fit the mesh", e);
-    if (kind != VG_MAP_PATCHES) return wrong(p, "it is driven by something unknown", e);
-    if ((flags & ~HAS_HOME) || zero || (names && names != n)) return wrong(p, "unknown flags are set, or names are missing", e);
-    if (!vgi_finite(&size, 1) || !(size > 0)) return wrong(p, "its size is not positive", e);
-    *m = (vg_map){.n = (size_t)n, .nv = (size_t)nv, .kind = (vg_map_kind)kind, .size = size, .has_home = flags & HAS_HOME,
-                  .njoints = (size_t)joints, .ncorners = (size_t)corners, .per_corner = 1, .nheld = (size_t)held};
-    int r = take_map_arrays(&c, m, p, e);
-    if (r == VG_OK) r = check_map(p, m, e);
-    if (r == VG_OK) r = take_map_names(&c, m, names, p, e);
-    return r < 0 ? r : left(&c) ? wrong(p, "bytes are left over", e) : VG_OK;
-}
-
-int vgi_map_encode(vg_bytes *b, const vg_map *m, vg_err *e)
-{
-    const uint64_t counts[5] = {m->n, m->nv, m->njoints, m->ncorners, m->nheld};
-    const uint32_t words[4] = {m->kind, m->has_home ? HAS_HOME : 0, (uint32_t)m->nnames, 0};
-    vg_map copy = *m; /* the list of arrays does not promise not to change them */
-    vgi_map_array list[VGI_MAP_ARRAYS];
-    size_t n = vgi_map_arrays(&copy, list);
-    int r = VG_OK;
-    for (int i = 0; r == VG_OK && i < 5; i++) r = put64(b, counts[i], e);
-    if (r == VG_OK) r = vgi_indices_encode(b, words, 4, e);
-    if (r == VG_OK) r = put_doubles(b, &m->size, 1, e);
-    for (size_t i = 0; r == VG_OK && i < n; i++) {
-        size_t length = vgi_map_array_length(m, &list[i]);
-        r = list[i].real ? put_doubles(b, *list[i].at, length, e) : vgi_indices_encode(b, *list[i].at, length, e);
-    }
-    for (size_t i = 0; r == VG_OK && i < m->nnames; i++) r = put_string(b, m->names[i], e);
-    return r;
-}
-
 /* ---- FRAM ---- */
 
-enum { HAS_TIME = 1u, HAS_PINS = 2u };
+enum { HAS_TIME = 1u, HAS_PINS = 2u, HAS_TURNS = 4u };
 
 static bool on_graph(const vg_head *h)
 {
@@ -704,6 +353,23 @@ static int take_pins(cursor *c, vg_frame *f, const vg_head *h, const vgi_payload
     copy32(f->pins, pins, n);
     f->npins = n;
     return check_ascending(p, f->pins, n, h->mesh.nv, e);
+}
+
+/* Are these the vertices of a skeleton, whose joints can say how they have turned? */
+static bool may_turn(const vg_head *h)
+{
+    return h->kind == VG_VERTICES && h->skeleton.njoints > 0;
+}
+
+static int take_turns(cursor *c, vg_frame *f, size_t njoints, const vgi_payload *p, vg_err *e)
+{
+    const unsigned char *turns = take_array(c, njoints, 32);
+    if (c->bad) return wrong(p, "it ends before its turns", e);
+    int r = vgi_grow(&f->turns, &f->turns_cap, 4 * njoints, sizeof *f->turns, e);
+    if (r < 0) return r;
+    copy_doubles(f->turns, turns, 4 * njoints);
+    f->nturns = njoints;
+    return are_turns(f->turns, njoints) ? VG_OK : wrong(p, "a turn is no unit quaternion", e);
 }
 
 /* Deformations and transforms start with a quaternion. */
@@ -743,7 +409,8 @@ int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e)
     cursor c = start(&p);
     uint32_t n = take32(&c), flags = take32(&c);
     double time = take_double(&c);
-    if (c.bad || (flags & ~(HAS_TIME | HAS_PINS)) || (flags & HAS_PINS && h->kind != VG_VECTORS))
+    if (c.bad || (flags & ~(HAS_TIME | HAS_PINS | HAS_TURNS)) || (flags & HAS_PINS && h->kind != VG_VECTORS) ||
+        (flags & HAS_TURNS && !may_turn(h)))
         return wrong(&p, "it is too short, or unknown flags are set", e);
     if (!vgi_finite(&time, 1) || (!(flags & HAS_TIME) && time != 0)) return wrong(&p, "its time is not finite, or set without its flag", e);
     const char *name = (const char *)take(&c, n);
@@ -752,7 +419,7 @@ int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e)
     if (r < 0) return r;
     memcpy(f->name, name, n);
     f->name[n] = 0;
-    f->has_time = flags & HAS_TIME, f->time = time, f->npins = 0;
+    f->has_time = flags & HAS_TIME, f->time = time, f->npins = 0, f->nturns = 0;
     if (!take_padding(&c, -n & 7)) return wrong(&p, "padding is missing or not zero", e);
     if (on_graph(h)) {
         const unsigned char *root = take(&c, 24), *anchors = take_array(&c, h->nanchors, 24);
@@ -764,9 +431,16 @@ int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e)
             return wrong(&p, "its root or an anchor is not finite", e);
     }
     if (flags & HAS_PINS && (r = take_pins(&c, f, h, &p, e)) < 0) return r;
+    if (flags & HAS_TURNS && (r = take_turns(&c, f, h->skeleton.njoints, &p, e)) < 0) return r;
     if ((r = take_values(&c, f, h, &p, e)) < 0) return r;
     if (!vgi_finite(f->values, h->count * vg_kind_width(h->kind))) return wrong(&p, "a value is not finite", e);
     return has_zero_quaternion(h, f->values) ? wrong(&p, "a quaternion is zero", e) : VG_OK;
+}
+
+/* Turns of other joints than the head's are those of a skeleton that was replaced: they are left out. */
+static bool has_turns(const vg_head *h, const vg_frame *f)
+{
+    return may_turn(h) && f->nturns == h->skeleton.njoints;
 }
 
 /* What a reader would refuse is not written. The values' own finiteness is vg_writer_put's to check. */
@@ -778,6 +452,8 @@ static int check_frame(const vg_head *h, const vg_frame *f, vg_err *e)
     if (!finite) return vg_fail(e, VG_EINPUT, "frame '%s' has a time, root or anchor that is not finite", name);
     if (has_zero_quaternion(h, f->values))
         return vg_fail(e, VG_EINPUT, "frame '%s' shrinks something to nothing: a quaternion is zero", name);
+    if (has_turns(h, f) && !are_turns(f->turns, f->nturns))
+        return vg_fail(e, VG_EINPUT, "frame '%s' has a joint whose turn is no unit quaternion", name);
     return VG_OK;
 }
 
@@ -787,8 +463,8 @@ int vgi_fram_encode(vg_bytes *b, const vg_head *h, const vg_frame *f, vg_err *e)
     double time = f->has_time ? f->time : 0;
     int r = check_frame(h, f, e);
     if (r == VG_OK) r = put32(b, (uint32_t)strlen(name), e);
-    bool pins = h->kind == VG_VECTORS && f->npins > 0;
-    if (r == VG_OK) r = put32(b, (f->has_time ? HAS_TIME : 0u) | (pins ? HAS_PINS : 0u), e);
+    bool pins = h->kind == VG_VECTORS && f->npins > 0, turns = has_turns(h, f);
+    if (r == VG_OK) r = put32(b, (f->has_time ? HAS_TIME : 0u) | (pins ? HAS_PINS : 0u) | (turns ? HAS_TURNS : 0u), e);
     if (r == VG_OK) r = put_doubles(b, &time, 1, e);
     if (r == VG_OK) r = vgi_bytes_append(b, name, strlen(name), e);
     if (r == VG_OK) r = put_padding(b, 0, e);
@@ -802,6 +478,7 @@ int vgi_fram_encode(vg_bytes *b, const vg_head *h, const vg_frame *f, vg_err *e)
         if (r == VG_OK) r = vgi_indices_encode(b, f->pins, f->npins, e);
         if (r == VG_OK) r = put_padding(b, 0, e);
     }
+    if (r == VG_OK && turns) r = put_doubles(b, f->turns, 4 * f->nturns, e);
     return r;
 }
 

@@ -14,7 +14,8 @@ typedef struct vgi_payload {
 
 typedef int vgi_decoder(const vgi_payload *p, vg_head *h, vg_err *e);
 vgi_decoder vgi_prov_decode, vgi_mesh_decode, vgi_texc_decode, vgi_labl_decode, vgi_sele_decode, vgi_link_decode,
-    vgi_anch_decode, vgi_refp_decode, vgi_form_decode, vgi_skel_decode, vgi_corr_decode, vgi_ptch_decode, vgi_map_decode;
+    vgi_anch_decode, vgi_refp_decode, vgi_form_decode, vgi_skel_decode, vgi_corr_decode, vgi_ptch_decode, vgi_rig_decode,
+    vgi_map_decode;
 
 int vgi_prov_encode(vg_bytes *b, const vg_provenance *p, vg_err *e) VG_MUST_CHECK;
 int vgi_mesh_encode(vg_bytes *b, const vg_mesh *m, vg_err *e) VG_MUST_CHECK;
@@ -27,6 +28,7 @@ int vgi_form_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 int vgi_skel_encode(vg_bytes *b, const vg_skeleton *s, vg_err *e) VG_MUST_CHECK;
 int vgi_corr_encode(vg_bytes *b, const vg_correspondence *c, vg_err *e) VG_MUST_CHECK;
 int vgi_ptch_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+int vgi_rig_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 int vgi_map_encode(vg_bytes *b, const vg_map *m, vg_err *e) VG_MUST_CHECK;
 
 /* vgi_graph_count: elements that a frame of this kind must have on h's mesh, selection and links. */

@@ -479,7 +479,7 @@ static int read_frame(vg_source *s, vg_frame *f, vg_err *e)
     int r = vg_frame_shape(f, &s->own, e);
     if (r < 0) return r;
     vg_records_clear(&f->extra);
-    f->has_time = false, f->time = 0;
+    f->has_time = false, f->time = 0, f->nturns = 0;
     if ((r = vg_frame_rename(f, "", e)) < 0 || (r = p->format->next(p->state, f, e)) <= 0) return r;
     p->frames++;
     if (!*f->name && (r = name_frame(p, f, e)) < 0) return r;
@@ -580,6 +580,7 @@ static int next_of_sequence(vg_source *s, vg_frame *f, vg_err *e)
     }
     p->waiting = false;
     if ((r = vg_frame_shape(f, &s->own, e)) < 0 || (r = vg_frame_label(f, &p->first, e)) < 0) return r;
+    if ((r = vg_frame_turn(f, p->first.turns, p->first.nturns, e)) < 0) return r;
     memcpy(f->values, p->first.values, 3 * s->own.count * sizeof *f->values);
     vg_frame_clear(&p->first);
     return 1;
@@ -682,6 +683,7 @@ static int hand_out(vg_source *s, vg_frame *f, vg_err *e)
     vg_records_clear(&f->extra);
     f->has_time = false;
     f->time = 0;
+    f->nturns = 0;
     s->waiting = false;
     return 1;
 }

@@ -8,10 +8,10 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-/* What precedes a frame's name, records, pins, anchors, values and scalars. */
+/* What precedes a frame's name, records, pins, turns, anchors, values and scalars. */
 typedef struct front {
     size_t bytes; /* of the whole frame, this included */
-    size_t name, records, pins;
+    size_t name, records, pins, turns;
     size_t scalars, scalars_name, scalars_unit; /* 0 numbers, or those of the mesh; their texts with terminators */
     double time, root[3];
     bool has_time;
@@ -80,9 +80,9 @@ static bool add(size_t *sum, size_t n, size_t size)
 
 static int measure(const vg_spool *s, const vg_frame *f, front *to, vg_err *e)
 {
-    *to = (front){.bytes = sizeof *to, .name = strlen(f->name), .records = f->extra.n, .pins = f->npins,
+    *to = (front){.bytes = sizeof *to, .name = strlen(f->name), .records = f->extra.n, .pins = f->npins, .turns = f->nturns,
                   .time = f->time, .has_time = f->has_time, .root = {f->root[0], f->root[1], f->root[2]}};
-    bool ok = add(&to->bytes, to->name, 1) && add(&to->bytes, to->pins, sizeof *f->pins) &&
+    bool ok = add(&to->bytes, to->name, 1) && add(&to->bytes, to->pins, sizeof *f->pins) && add(&to->bytes, to->turns, 4 * sizeof *f->turns) &&
               add(&to->bytes, s->anchors, sizeof(double)) && add(&to->bytes, s->values, sizeof(double));
     if (f->has_scalars) {
         to->scalars = s->h->mesh.nv;
@@ -110,6 +110,7 @@ static void pack(const vg_spool *s, const vg_frame *f, const front *head, unsign
         to = append(to, f->extra.at[i].payload.data, f->extra.at[i].payload.size);
     }
     to = append(to, f->pins, head->pins * sizeof *f->pins);
+    to = append(to, f->turns, head->turns * 4 * sizeof *f->turns);
     to = append(to, f->anchors, s->anchors * sizeof *f->anchors);
     to = append(to, f->values, s->values * sizeof *f->values);
     to = append(to, f->scalars_name, head->scalars_name);
@@ -148,6 +149,16 @@ static const unsigned char *unpack_pins(const unsigned char *from, size_t n, vg_
     return r < 0 ? NULL : from;
 }
 
+static const unsigned char *unpack_turns(const unsigned char *from, size_t n, vg_frame *f, vg_err *e)
+{
+    double *turns = vgi_array_raw(n, 4 * sizeof *turns, e);
+    if (!turns) return NULL;
+    from = take(from, turns, n * 4 * sizeof *turns);
+    int r = vg_frame_turn(f, turns, n, e);
+    free(turns);
+    return r < 0 ? NULL : from;
+}
+
 static int unpack_scalars(const unsigned char *from, const front *head, vg_frame *f, vg_err *e)
 {
     const char *name = (const char *)from, *unit = name + head->scalars_name;
@@ -167,6 +178,7 @@ static int unpack(const vg_spool *s, const unsigned char *from, vg_frame *f, vg_
     if (r < 0) return r;
     if (!(from = unpack_records(from + head.name, head.records, &f->extra, e))) return VG_ENOMEM;
     if (!(from = unpack_pins(from, head.pins, f, e))) return VG_ENOMEM;
+    if (!(from = unpack_turns(from, head.turns, f, e))) return VG_ENOMEM;
     f->has_time = head.has_time, f->time = head.time;
     memcpy(f->root, head.root, sizeof f->root);
     from = take(from, f->anchors, s->anchors * sizeof *f->anchors);

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 /* The header records, in the order they are written. */
-enum { FORM = 12, KNOWN = 13 };
+enum { FORM = 13, KNOWN = 14 };
 static const struct {
     const char *tag;
     uint32_t flags;
@@ -25,6 +25,7 @@ static const struct {
     {"SKEL", 0, vgi_skel_decode, false, true},
     {"CORR", VGI_CRITICAL, vgi_corr_decode, false, false},
     {"PTCH", 0, vgi_ptch_decode, false, true},
+    {"RIG ", 0, vgi_rig_decode, false, true},
     {"MAP ", VGI_CRITICAL, vgi_map_decode, false, true},
     {"FORM", VGI_CRITICAL, vgi_form_decode, false, false},
 };
@@ -37,7 +38,7 @@ struct vg_reader {
     vgi_tally tally;
     vg_head head;
     bool seen[KNOWN];
-    vg_head form; /* kind, precision, counts of the frames as they come: the caller may change `head` */
+    vg_head form; /* kind, precision, counts of the frames as they come (no arrays): the caller may change `head` */
     vg_records tail;
     uint64_t frames;
     bool ended;
@@ -46,7 +47,8 @@ struct vg_reader {
 static void remember_form(vg_reader *r)
 {
     r->form = (vg_head){.kind = r->head.kind, .precision = r->head.precision, .count = r->head.count,
-                            .nanchors = r->head.nanchors, .mesh.nv = r->head.mesh.nv};
+                            .nanchors = r->head.nanchors, .mesh.nv = r->head.mesh.nv,
+                            .skeleton.njoints = r->head.skeleton.njoints};
 }
 
 static int keep_unknown(vg_reader *r, vg_record *record, vg_records *list, vg_err *e)
@@ -244,7 +246,8 @@ static int encode_known(vg_bytes *b, const vg_head *h, int i, vg_err *e)
     case 8: return vgi_skel_encode(b, &h->skeleton, e);
     case 9: return vgi_corr_encode(b, &h->correspondence, e);
     case 10: return vgi_ptch_encode(b, h, e);
-    case 11: return vgi_map_encode(b, &h->map, e);
+    case 11: return vgi_rig_encode(b, h, e);
+    case 12: return vgi_map_encode(b, &h->map, e);
     default: return vgi_form_encode(b, h, e);
     }
 }
@@ -256,7 +259,7 @@ static int write_head(vg_writer *w, vg_err *e)
     const bool present[KNOWN] = {false, mesh, mesh && h->attributes.ntex > 0, mesh && h->attributes.nlabels > 0,
                                  mesh && h->has_selection, mesh && h->has_links, mesh && h->nanchors > 0, mesh,
                                  mesh && h->skeleton.njoints > 0, h->correspondence.first != NULL,
-                                 mesh && h->patches.n > 0, mesh && h->map.n > 0, true};
+                                 mesh && h->patches.n > 0, mesh && h->rig.skeleton.njoints > 0, mesh && h->map.n > 0, true};
     int r = vgi_record_begin_write(w->fd, w->name, e);
     for (size_t i = 0; r == VG_OK && i < h->nprovenance; i++) {
         w->front.size = 0;

@@ -100,6 +100,10 @@ void vg_digest_add(vg_digest *d, const vg_frame *f)
         mix_doubles(d, f->root, 3);
         mix_doubles(d, f->anchors, 3 * h->nanchors);
     }
+    if (h->kind == VG_VERTICES && h->skeleton.njoints) {
+        mix_count(d, f->nturns);
+        mix_doubles(d, f->turns, 4 * f->nturns);
+    }
     mix_doubles(d, f->values, h->count * vg_kind_width(h->kind));
 }
 

@@ -199,7 +199,7 @@ static int read_rest(vg_reader *reader, content *c, vg_err *e)
         if (vg_frame_shape(to, h, e) < 0 || vg_frame_label(to, &f, e) < 0) abort();
         memcpy(to->values, f.values, h->count * vg_kind_width(h->kind) * sizeof(double));
         memcpy(to->root, f.root, sizeof f.root);
-        if (vg_frame_pin(to, f.pins, f.npins, e) < 0) abort();
+        if (vg_frame_pin(to, f.pins, f.npins, e) < 0 || vg_frame_turn(to, f.turns, f.nturns, e) < 0) abort();
         if (f.has_scalars && vg_frame_scalars(to, f.scalars_name, f.scalars_unit, f.scalars, h->mesh.nv, e) < 0) abort();
         if (h->nanchors && f.anchors) memcpy(to->anchors, f.anchors, 3 * h->nanchors * sizeof(double));
     }
@@ -282,6 +282,11 @@ static bool same_head(const vg_head *a, const vg_head *b)
         same = !strcmp(u->name, v->name) && u->parent == v->parent && u->nchannels == v->nchannels &&
                !memcmp(u->offset, v->offset, sizeof u->offset) && !memcmp(u->channels, v->channels, u->nchannels);
     }
+    const vg_rig *g = &a->rig, *k = &b->rig;
+    size_t n = g->skeleton.njoints, skin = g->skin_bone ? VG_SKIN * a->mesh.nv : 0;
+    same = same && n == k->skeleton.njoints && g->nbones == k->nbones && !g->skin_bone == !k->skin_bone &&
+           same_memory(g->at, k->at, 24 * n) && same_memory(g->turn, k->turn, 32 * n) && same_memory(g->bone, k->bone, 4 * g->nbones) &&
+           same_memory(g->skin_bone, k->skin_bone, 4 * skin) && same_memory(g->skin_weight, k->skin_weight, 8 * skin);
     const vg_correspondence *c = &a->correspondence, *d = &b->correspondence;
     same = same && !c->first == !d->first;
     if (!same || !c->first) return same;
@@ -299,6 +304,7 @@ static bool same_frame(const vg_frame *a, const vg_frame *b, const vg_head *h)
     same &= a->has_time == b->has_time && a->time == b->time && same_records(&a->extra, &b->extra);
     same &= same_memory(a->values, b->values, h->count * vg_kind_width(h->kind) * sizeof(double));
     same &= a->npins == b->npins && same_memory(a->pins, b->pins, 4 * a->npins);
+    same &= a->nturns == b->nturns && same_memory(a->turns, b->turns, 32 * a->nturns);
     same &= a->has_scalars == b->has_scalars;
     if (same && a->has_scalars)
         same = same_text(a->scalars_name, b->scalars_name) && same_text(a->scalars_unit, b->scalars_unit) &&
@@ -367,6 +373,24 @@ static void add_skeleton(vg_head *h)
     }
 }
 
+/* The same skeleton moves the mesh; the weights are those of one bone, or of two. */
+static void add_rig(vg_head *h)
+{
+    size_t n = h->skeleton.njoints;
+    double *at = room(3 * n, 8), *turns = room(4 * n, 8);
+    vg_err e;
+    for (size_t k = 0; k < 3 * n; k++) at[k] = noise();
+    for (size_t j = 0; j < n; j++) turns[4 * j] = 0.6, turns[4 * j + 1 + j % 3] = -0.8;
+    if (vg_rig_make(&h->rig, &h->skeleton, at, turns, &e) < 0) abort();
+    h->rig.skin_bone = room(VG_SKIN * h->mesh.nv, 4), h->rig.skin_weight = room(VG_SKIN * h->mesh.nv, 8);
+    for (size_t v = 0; v < h->mesh.nv; v++) {
+        h->rig.skin_bone[VG_SKIN * v] = (uint32_t)(v % n), h->rig.skin_weight[VG_SKIN * v] = v % 2 ? 1 : 0.75;
+        h->rig.skin_weight[VG_SKIN * v + 1] = v % 2 ? 0 : 0.25;
+    }
+    free(at);
+    free(turns);
+}
+
 static void add_correspondence(vg_head *h)
 {
     vg_correspondence *c = &h->correspondence;
@@ -399,6 +423,7 @@ static content make(vg_kind kind, vg_precision precision, int how)
         h->has_selection = true, h->nselected = 2, h->selected = room(2, 4), h->selected[1] = 1;
         h->nanchors = 2, h->anchors = room(2, 4), h->anchors[0] = 1, h->anchors[1] = 4;
         add_skeleton(h);
+        add_rig(h);
         add_correspondence(h);
         add_unknown(&h->extra, "NOTE", COPY_SAFE, "in the head");
         add_unknown(&h->extra, "X 12", COPY_SAFE | 0xabcd0000, "");
@@ -420,6 +445,7 @@ static content make(vg_kind kind, vg_precision precision, int how)
         for (size_t k = 0; k < 3 * h->nanchors; k++) f->anchors[k] = noise();
         if (how == FULL && kind == VG_VECTORS) /* an even and an odd number of pins */
             CHECK(vg_frame_pin(f, (uint32_t[]){0, 2, 6}, 2 + i, &e) == VG_OK);
+        if (how == FULL && kind == VG_VERTICES && i) CHECK(vg_frame_turn(f, h->rig.turn, h->rig.skeleton.njoints, &e) == VG_OK);
         if (how == FULL && kind == VG_VERTICES && i) /* any numbers will do: the first of the frame */
             CHECK(vg_frame_scalars(f, "error", i == 1 ? "D" : "", f->values, h->mesh.nv, &e) == VG_OK);
         if (how == FULL && i) add_unknown(&f->extra, "MID ", COPY_SAFE, "before a frame");
@@ -649,7 +675,8 @@ static void test_order(void)
         else refuse(x.data, x.size, VG_EINPUT, what);
         vg_bytes_clear(&x);
         /* left out: SELE and LINK change how many corners there are, ANCH the size of a frame */
-        bool may_miss = again || !strcmp(tag, "TEXC") || !strcmp(tag, "LABL") || !strcmp(tag, "SKEL") || !strcmp(tag, "CORR");
+        bool may_miss = again || !strcmp(tag, "TEXC") || !strcmp(tag, "LABL") || !strcmp(tag, "SKEL") || !strcmp(tag, "CORR") ||
+                        !strcmp(tag, "RIG ");
         if (!strcmp(tag, "PROV")) may_miss = i != 0; /* the second names the first as its parent */
         k = 0;
         for (int j = 0; j < n; j++)
@@ -661,7 +688,7 @@ static void test_order(void)
         else refuse(x.data, x.size, VG_EINPUT, what);
         vg_bytes_clear(&x);
         /* before MESH, and behind FORM */
-        bool needs_mesh = strstr("TEXC LABL SELE LINK ANCH REFP SKEL FORM FRAM", tag) && !unknown_tag;
+        bool needs_mesh = strstr("TEXC LABL SELE LINK ANCH REFP SKEL RIG  FORM FRAM", tag) && !unknown_tag;
         for (int place = 0; place < 2 && i != mesh; place++) {
             k = 0;
             for (int j = 0; j < n; j++) {

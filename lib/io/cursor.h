@@ -1,0 +1,194 @@
+/* cursor.h: what the files that know the contents of records share (payload.c, payload_rig.c): a cursor that takes numbers, lists and
+ * texts from a payload, and the same for writing. No other file includes it.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_CURSOR_H
+#define VG_CURSOR_H
+
+#include "io/payload.h"
+
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+enum { NATIVE = 1 };
+#else
+enum { NATIVE = 0 };
+#endif
+
+/* ---- a cursor that cannot run over, and never reports more than is there ---- */
+
+typedef struct cursor {
+    const unsigned char *at, *end;
+    bool bad;
+} cursor;
+
+static inline cursor start(const vgi_payload *p)
+{
+    return (cursor){p->data, p->size ? p->data + p->size : p->data, false};
+}
+
+static inline const unsigned char *take(cursor *c, size_t n)
+{
+    if (c->bad || (size_t)(c->end - c->at) < n) {
+        c->bad = true;
+        return NULL;
+    }
+    const unsigned char *p = c->at;
+    c->at += n;
+    return p;
+}
+
+static inline uint32_t take32(cursor *c)
+{
+    const unsigned char *p = take(c, 4);
+    return p ? vgi_get32(p) : 0;
+}
+
+static inline uint64_t take64(cursor *c)
+{
+    const unsigned char *p = take(c, 8);
+    return p ? vgi_get64(p) : 0;
+}
+
+static inline double take_double(cursor *c)
+{
+    uint64_t bits = take64(c);
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+/* n elements of `size` bytes, but only if they are really there */
+static inline const unsigned char *take_array(cursor *c, uint64_t n, size_t size)
+{
+    if (n > (size_t)(c->end - c->at) / size) {
+        c->bad = true;
+        return NULL;
+    }
+    return take(c, (size_t)n * size);
+}
+
+static inline size_t left(const cursor *c)
+{
+    return (size_t)(c->end - c->at);
+}
+
+static inline void copy32(uint32_t *to, const unsigned char *from, size_t n)
+{
+    for (size_t i = 0; i < n; i++) to[i] = vgi_get32(from + 4 * i);
+}
+
+static inline void copy_doubles(double *to, const unsigned char *from, size_t n)
+{
+    if (n == 0) return;
+    if (NATIVE) {
+        memcpy(to, from, n * sizeof *to);
+        return;
+    }
+    for (size_t i = 0; i < n; i++) {
+        uint64_t bits = vgi_get64(from + 8 * i);
+        memcpy(&to[i], &bits, sizeof bits);
+    }
+}
+
+static inline void copy_floats(double *to, const unsigned char *from, size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        uint32_t bits = vgi_get32(from + 4 * i);
+        float x;
+        memcpy(&x, &bits, sizeof x);
+        to[i] = (double)x;
+    }
+}
+
+static inline int put32(vg_bytes *b, uint32_t x, vg_err *e)
+{
+    unsigned char p[4];
+    vgi_put32(p, x);
+    return vgi_bytes_append(b, p, sizeof p, e);
+}
+
+static inline int put64(vg_bytes *b, uint64_t x, vg_err *e)
+{
+    unsigned char p[8];
+    vgi_put64(p, x);
+    return vgi_bytes_append(b, p, sizeof p, e);
+}
+
+static inline int put_doubles(vg_bytes *b, const double *x, size_t n, vg_err *e)
+{
+    if (NATIVE) return vgi_bytes_append(b, x, n * sizeof *x, e);
+    int r = vgi_bytes_reserve(b, b->size + 8 * n, e);
+    for (size_t i = 0; r == VG_OK && i < n; i++) {
+        uint64_t bits;
+        memcpy(&bits, &x[i], sizeof bits);
+        vgi_put64(b->data + b->size, bits);
+        b->size += 8;
+    }
+    return r;
+}
+
+static inline int put_string(vg_bytes *b, const char *s, vg_err *e)
+{
+    size_t n = strlen(s);
+    if (n > UINT32_MAX) return vg_fail(e, VG_EARG, "a text of %zu bytes is too long for a stream", n);
+    int r = put32(b, (uint32_t)n, e);
+    return r < 0 ? r : vgi_bytes_append(b, s, n, e);
+}
+
+/* zero bytes up to the next multiple of 8, counted from `from` */
+static inline int put_padding(vg_bytes *b, size_t from, vg_err *e)
+{
+    static const unsigned char zeros[8];
+    return vgi_bytes_append(b, zeros, (from - b->size) & 7, e);
+}
+
+static inline int wrong(const vgi_payload *p, const char *what, vg_err *e)
+{
+    return vg_fail(e, VG_EINPUT, "%s: %s", p->where, what);
+}
+
+/* A text of n bytes; NULL and *r set when it is not there, no UTF-8, or memory ran out. */
+static inline char *take_text(cursor *c, size_t n, const vgi_payload *p, int *r, vg_err *e)
+{
+    const char *s = (const char *)take(c, n);
+    if (!s) {
+        *r = wrong(p, "a text is longer than its record", e);
+        return NULL;
+    }
+    if (!vgi_is_utf8(s, n)) {
+        *r = wrong(p, "a text is no UTF-8", e);
+        return NULL;
+    }
+    char *copy = vgi_copy_string(s, n, e);
+    if (!copy) *r = VG_ENOMEM;
+    return copy;
+}
+
+static inline bool take_padding(cursor *c, size_t n)
+{
+    const unsigned char *p = take(c, n);
+    for (size_t i = 0; p && i < n; i++)
+        if (p[i]) return false;
+    return p != NULL;
+}
+
+/* Indices below a limit, each greater than the one before. */
+static inline int check_ascending(const vgi_payload *p, const uint32_t *list, size_t n, size_t limit, vg_err *e)
+{
+    for (size_t i = 0; i < n; i++) {
+        if (list[i] >= limit) return wrong(p, "an index is out of range", e);
+        if (i && list[i] <= list[i - 1]) return wrong(p, "indices are not ascending", e);
+    }
+    return VG_OK;
+}
+
+
+/* Unit quaternions, to 1e-6; false for NaN. */
+static inline bool are_turns(const double *q, size_t n)
+{
+    for (size_t i = 0; i < n; i++, q += 4) {
+        double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+        if (!(square >= 1 - 2e-6 && square <= 1 + 2e-6)) return false;
+    }
+    return true;
+}
+
+#endif
