@@ -125,12 +125,17 @@ $(B)/fuzz/%: $(B)/tests/fuzz/%.o $(FUZZ_MAIN) $(B)/libvg.a
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CFLAGS) $(FUZZ_LINK) $(ALL_LDFLAGS) -o $@ $^ $(ALL_LIBS)
 
+# preloaded into the programs by tests/alloc.bats; without sanitizers, whatever they have
+$(B)/tools/%.so: tests/tools/%.c $(B)/flags
+	@mkdir -p $(@D)
+	$(CC) -std=gnu11 -D_GNU_SOURCE -Wall -Wextra -Wshadow -fPIC -shared -O1 -g -o $@ $< -ldl
+
 .PHONY: deps
 deps:
 	@sh tests/install-packages.sh debian-packages.txt
 
 .PHONY: check
-check: all $(UNITS:%=$(B)/unit/%) $(FUZZERS:%=$(B)/fuzz/%)
+check: all $(UNITS:%=$(B)/unit/%) $(FUZZERS:%=$(B)/fuzz/%) $(B)/tools/fail_malloc.so
 	@BUILD=$(B) CONFIG=$(CONFIG) sh tests/run.sh
 
 .PHONY: demo

@@ -257,6 +257,13 @@ static const char *split_path(const char *path, char directory[PATH_MAX])
     return path + n;
 }
 
+/* Programs leave by leave(): whoever calls exit() is a library that gives up, as libarchive does without memory. Its status
+ * would say something else, and half a file would stay. */
+static void library_gave_up(void)
+{
+    die(VG_ENOMEM, "a library gave up, for lack of memory most likely");
+}
+
 /* Look at --output before any work: what is wrong with it now will be wrong then. */
 static void check_output(bool stream)
 {
@@ -682,6 +689,7 @@ size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands)
     started = seconds();
     cli.program = p, cli.argc = argc, cli.argv = argv;
     repair_descriptors();
+    if (atexit(library_gave_up)) die(VG_ENOMEM, "not enough memory to start");
     signal(SIGPIPE, SIG_DFL); /* a parent may have ignored it */
     signal(SIGXFSZ, SIG_IGN); /* a file size limit is a failed write, with a message */
     size_t nall = gather_options(p, all);

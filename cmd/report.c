@@ -236,7 +236,8 @@ static char *shown(const report_value *v)
         for (size_t i = 0; i < v->n; i++) fprintf(f, "%s%.6g", i ? " " : "", v->is.numbers[i]);
         break;
     }
-    if (fclose(f)) checked(NULL);
+    bool lost = ferror(f);
+    if (fclose(f) || lost) checked(NULL);
     checked(text);
     strip_controls(text);
     return text;
@@ -352,6 +353,7 @@ static void print_text(const report *r, FILE *f)
 static json_t *json_of_text(const char *s)
 {
     json_t *j = json_string(s);
+    if (!j) j = json_string(s); /* that may have been for lack of memory; where it lasts, the copy is not to be had either */
     if (j) return j;
     char *copy = copy_text(s);
     for (char *p = copy; *p; p++)
@@ -359,6 +361,11 @@ static json_t *json_of_text(const char *s)
     j = checked(json_string(copy));
     free(copy);
     return j;
+}
+
+static void append(json_t *array, json_t *value)
+{
+    if (json_array_append_new(array, value)) checked(NULL);
 }
 
 static json_t *json_of(const report_value *v)
@@ -371,12 +378,12 @@ static json_t *json_of(const report_value *v)
     case REPORT_NUMBER: j = isfinite(v->is.number) ? json_real(v->is.number) : json_null(); break;
     case REPORT_FLAG: j = json_boolean(v->is.flag); break;
     case REPORT_TEXTS:
-        j = json_array();
-        for (size_t i = 0; i < v->n; i++) json_array_append_new(j, json_of_text(v->is.texts[i]));
+        j = checked(json_array());
+        for (size_t i = 0; i < v->n; i++) append(j, json_of_text(v->is.texts[i]));
         break;
     case REPORT_COUNTS:
-        j = json_array();
-        for (size_t i = 0; i < v->n; i++) json_array_append_new(j, json_integer((json_int_t)v->is.counts[i]));
+        j = checked(json_array());
+        for (size_t i = 0; i < v->n; i++) append(j, json_integer((json_int_t)v->is.counts[i]));
         break;
     case REPORT_NUMBERS:
         j = json_array();
@@ -400,7 +407,7 @@ static json_t *json_of_table(const item *t)
         for (size_t c = t->keyed; c < t->ncolumns; c++)
             if (t->columns[c].key) set(row, t->columns[c].key, json_of(&cells[c]));
         if (t->keyed) set(all, cells[0].is.text, row);
-        else if (json_array_append_new(all, row)) checked(NULL);
+        else append(all, row);
     }
     return all;
 }

@@ -3,12 +3,33 @@
 #include "io/json.h"
 
 #include <jansson.h>
+#include <pthread.h>
+#include <stdlib.h>
+
+/* Jansson takes the lack of memory for wrong JSON in most places, so it is noted where it is met. */
+static _Thread_local bool out_of_memory;
+
+static void *noting_malloc(size_t n)
+{
+    void *p = malloc(n);
+    if (!p) out_of_memory = true;
+    return p;
+}
+
+static void note_memory(void)
+{
+    json_set_alloc_funcs(noting_malloc, free); /* what is used anyway, for those who use Jansson beside us */
+}
 
 int vgi_json_parse(vgi_json **j, const void *text, size_t n, const char *subject, vg_err *e)
 {
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
     json_error_t cause;
+    pthread_once(&once, note_memory);
+    out_of_memory = false;
     *j = json_loadb(text, n, 0, &cause);
     if (*j) return VG_OK;
+    if (out_of_memory) return vg_fail(e, VG_ENOMEM, "not enough memory to read %s", subject);
     return vg_fail(e, VG_EINPUT, "%s: wrong JSON in line %d: %s", subject, cause.line, cause.text);
 }
 

@@ -3,11 +3,12 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 
+#define XXH_STATIC_LINKING_ONLY /* the state as a value, so that there is nothing to allocate; its layout is of the ABI */
 #include <xxhash.h>
 
 struct vg_digest {
     const vg_head *head;
-    XXH64_state_t *state;
+    XXH64_state_t state;
 };
 
 /* All data goes in as little-endian 64-bit words, with a count before everything of variable length, so that two
@@ -18,7 +19,7 @@ static void mix_words(vg_digest *d, const uint64_t *words, size_t n)
 {
     unsigned char bytes[8 * WORDS];
     for (size_t i = 0; i < n; i++) vgi_put64(bytes + 8 * i, words[i]);
-    XXH64_update(d->state, bytes, 8 * n);
+    XXH64_update(&d->state, bytes, 8 * n);
 }
 
 static void mix_count(vg_digest *d, uint64_t n)
@@ -54,7 +55,7 @@ static void mix_text(vg_digest *d, const char *s)
 {
     size_t n = s ? strlen(s) : 0;
     mix_count(d, n);
-    if (n) XXH64_update(d->state, s, n);
+    if (n) XXH64_update(&d->state, s, n);
 }
 
 int vg_digest_new(vg_digest **out, const vg_head *h, vg_err *e)
@@ -62,12 +63,7 @@ int vg_digest_new(vg_digest **out, const vg_head *h, vg_err *e)
     vg_digest *d = *out = vgi_array(1, sizeof *d, e);
     if (!d) return VG_ENOMEM;
     d->head = h;
-    d->state = XXH64_createState();
-    if (!d->state) {
-        vg_digest_free(out);
-        return vg_fail(e, VG_ENOMEM, "not enough memory for a digest");
-    }
-    XXH64_reset(d->state, 0);
+    XXH64_reset(&d->state, 0);
     mix_count(d, h->kind);
     mix_count(d, h->count);
     mix_count(d, h->mesh.nv);
@@ -84,8 +80,6 @@ int vg_digest_new(vg_digest **out, const vg_head *h, vg_err *e)
 
 void vg_digest_free(vg_digest **d)
 {
-    if (!*d) return;
-    if ((*d)->state) XXH64_freeState((*d)->state);
     free(*d);
     *d = NULL;
 }
@@ -109,18 +103,15 @@ void vg_digest_add(vg_digest *d, const vg_frame *f)
 
 uint64_t vg_digest_get(const vg_digest *d)
 {
-    return XXH64_digest(d->state);
+    return XXH64_digest(&d->state);
 }
 
 uint64_t vg_mesh_digest(const vg_mesh *m)
 {
-    vg_digest d = {.state = XXH64_createState()};
-    if (!d.state) return 0; /* a few hundred bytes: whoever fails here fails everywhere */
-    XXH64_reset(d.state, 0);
+    vg_digest d;
+    XXH64_reset(&d.state, 0);
     mix_count(&d, m->nv);
     mix_count(&d, m->nf);
     for (size_t f = 0; f < m->nf; f++) mix_indices(&d, m->vert + m->start[f], m->start[f + 1] - m->start[f]);
-    uint64_t sum = XXH64_digest(d.state);
-    XXH64_freeState(d.state);
-    return sum;
+    return XXH64_digest(&d.state);
 }
