@@ -10,16 +10,18 @@ case ${1-} in
     ;;
 esac
 root=$(cd "$(dirname "$0")/.." && pwd)
+data=$root/tests/data
+[ -d "$data" ] || data=$root/examples/data # as a package installs it
 BUILD=${BUILD:-$root/build/release}
-if [ ! -x "$BUILD/bin/vg-encode" ]; then
-    echo "$0: no programs in '$BUILD/bin': run 'make' first" >&2
+if [ -x "$BUILD/bin/vg-encode" ]; then
+    BUILD=$(cd "$BUILD" && pwd)
+    PATH=$BUILD/bin:$PATH
+elif ! command -v vg-encode >/dev/null; then
+    echo "$0: no programs in '$BUILD/bin', and none installed: run 'make' first" >&2
     exit 2
 fi
-BUILD=$(cd "$BUILD" && pwd)
-PATH=$BUILD/bin:$PATH
 LC_ALL=C # awk writes numbers, and in some languages with a comma
 export BUILD PATH LC_ALL
-data=$root/tests/data
 mkdir -p -- "$1"
 out=$(cd -- "$1" && pwd)
 cd "$out"

@@ -193,3 +193,21 @@ END
         done
     done
 }
+
+# blocks_of FILE: the blocks of shell commands of a text in Markdown, one after the other
+blocks_of() {
+    awk '/^```sh$/{on = 1; next} /^```$/{on = 0} on' "$1"
+}
+
+@test "the tutorial: every command runs, every picture is there and is one that it makes" {
+    blocks_of "$ROOT/examples/tutorial.md" >script
+    [ "$(grep -c '^vg-' script)" -ge 15 ]
+    mkdir work
+    must env -C work data="$DATA" bash -e -u -o pipefail ../script
+    for picture in $(grep -o '](pictures/[^)]*)' "$ROOT/examples/tutorial.md" | sed 's/](//; s/)//'); do
+        [ -s "$ROOT/examples/$picture" ] || fail "there is no $picture"
+        made=work/$(basename "$picture" | sed 's/^tutorial-//')
+        [ "$(head -c 24 "$made" | tail -c 8 | od -An -tx1)" = "$(head -c 24 "$ROOT/examples/$picture" | tail -c 8 | od -An -tx1)" ] ||
+            fail "$picture has another size than what the tutorial makes"
+    done
+}
