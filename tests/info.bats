@@ -263,6 +263,7 @@ stream 1.0" ]
 }
 
 @test "no stream goes to a terminal, and no program waits for one" {
+    needs_terminal
     mesh cube >a.obj
     cat >term.py <<'END'
 import os, pty, sys

@@ -55,6 +55,14 @@ END
     [ "$output" = $'0 pose1 0\n1 pose2 0\n2 frames of 4 vertices' ]
     must_fail 3 ./count "$CORPUS/reject/no-end.vgs"
     says "no-end.vgs" "cut short"
+
+    # the program of the README
+    sed -n '/^    #include <stdio.h>/,/^    }/s/^    //p' "$ROOT/README.md" >centroids.c
+    # shellcheck disable=SC2046 # words are wanted
+    must ${CC:-cc} -Wall -Wextra -Werror -std=c11 $sanitize $(flags --cflags) -o centroids centroids.c $(flags --libs)
+    must ./centroids "$DATA/horse.rest.obj"
+    [[ $output == 'horse.rest '* ]]
+
     [ "$(PKG_CONFIG_LIBDIR=root/usr/lib/pkgconfig pkg-config --modversion libvg)" = "$(sed -n 's/^#define VG_VERSION "\(.*\)"/\1/p' "$ROOT/lib/vg.h")" ]
 
     # nothing of where it was built

@@ -90,6 +90,11 @@ nothing_but() {
     [ "$have" = "$want" ] || fail "in the directory: $have" "expected: $want"
 }
 
+# needs_terminal: some containers have no pseudo-terminals to give
+needs_terminal() {
+    python3 -c 'import os; os.openpty()' 2>/dev/null || skip "there is no terminal to be had: is /dev/pts mounted?"
+}
+
 each_program() {
     local source
     for source in "$ROOT"/cmd/vg-*.c; do basename "$source" .c; done

@@ -190,6 +190,7 @@ END
 }
 
 @test "a stream is not written to a terminal" {
+    needs_terminal
     mesh tetra >a.obj
     must python3 - <<'END'
 import os, pty, sys
