@@ -16,6 +16,7 @@ enum {
     CHUNK = 256,   /* faces of one task */
     STRIPE = 64    /* dimensions of one task */
 };
+#define NONE UINT32_MAX
 static const double enough = 10; /* degrees, for the choice of the number of patches */
 
 typedef float floats __attribute__((vector_size(64)));
@@ -122,6 +123,10 @@ typedef struct clustering {
     float *norm;           /* per face: squared length of its feature */
     float *centre;         /* most x width */
     float *centre_norm;
+    double *total;         /* most x width: sums of features, of the faces as they were ... */
+    uint32_t *counted;     /* ... with these labels; NONE: not counted yet */
+    uint32_t *moved;       /* the faces that have another label now */
+    size_t nmoved;
     double *sums;          /* per chunk of faces */
     uint32_t *sizes;
     float *products;       /* a chunk's, per chunk of faces: CHUNK x most */
@@ -236,16 +241,36 @@ static void assign_chunk(void *context, size_t i)
 
 static void mean_stripe(void *context, size_t i)
 {
-    clustering *c = context;
+    const clustering *c = context;
     size_t width = c->s->width, first = i * STRIPE, n = width - first < STRIPE ? width - first : STRIPE;
-    for (size_t k = 0; k < c->k; k++) memset(c->centre + k * width + first, 0, n * sizeof *c->centre);
-    for (size_t f = 0; f < c->n; f++) {
+    for (size_t m = 0; m < c->nmoved; m++) {
+        uint32_t f = c->moved[m], before = c->counted[f];
         const float *x = c->s->feature + f * width + first;
-        float *to = c->centre + c->label[f] * width + first;
-        for (size_t j = 0; j < n; j++) to[j] += x[j];
+        double *to = c->total + c->label[f] * width + first, *from = before == NONE ? NULL : c->total + before * width + first;
+        for (size_t j = 0; j < n; j++) to[j] += (double)x[j];
+        for (size_t j = 0; from && j < n; j++) from[j] -= (double)x[j];
     }
-    for (size_t k = 0; k < c->k; k++)
-        for (size_t j = 0; j < n && c->sizes[k]; j++) c->centre[k * width + first + j] /= (float)c->sizes[k];
+    for (size_t k = 0; k < c->k; k++) {
+        double share = c->sizes[k] ? 1 / (double)c->sizes[k] : 0;
+        for (size_t j = first; j < first + n; j++) c->centre[k * width + j] = (float)(share * c->total[k * width + j]);
+    }
+}
+
+/* Few faces move in later rounds: only they are looked at. */
+static void find_means(clustering *c)
+{
+    c->nmoved = 0;
+    for (size_t f = 0; f < c->n; f++)
+        if (c->label[f] != c->counted[f]) c->moved[c->nmoved++] = (uint32_t)f;
+    vgi_parallel(c->s->threads, (c->s->width + STRIPE - 1) / STRIPE, mean_stripe, c);
+    memcpy(c->counted, c->label, c->n * sizeof *c->counted);
+}
+
+/* before labels get another meaning */
+static void forget_means(clustering *c)
+{
+    memset(c->counted, 0xff, c->n * sizeof *c->counted);
+    memset(c->total, 0, c->most * c->s->width * sizeof *c->total);
 }
 
 /* A patch that has lost its faces gets the one that fits worst where it is. */
@@ -270,7 +295,7 @@ static size_t iterate(clustering *c, double *objective)
     size_t round = 0;
     for (; round < ROUNDS; round++) {
         fill_empty(c);
-        vgi_parallel(c->s->threads, (c->s->width + STRIPE - 1) / STRIPE, mean_stripe, c);
+        find_means(c);
         for (size_t k = 0; k < c->k; k++)
             c->centre_norm[k] = inner(c->centre + k * c->s->width, c->centre + k * c->s->width, c->s->width);
         int blas = vgi_product_begin();
@@ -300,6 +325,9 @@ static void clear_clustering(clustering *c)
     free(c->norm);
     free(c->centre);
     free(c->centre_norm);
+    free(c->total);
+    free(c->counted);
+    free(c->moved);
     free(c->sums);
     free(c->sizes);
     free(c->products);
@@ -315,15 +343,19 @@ static int make_clustering(clustering *c, const vg_segmenter *s, size_t most, vg
     c->norm = vgi_array(n, sizeof *c->norm, e);
     c->centre = vgi_array(most, s->width * sizeof *c->centre, e);
     c->centre_norm = vgi_array(most, sizeof *c->centre_norm, e);
+    c->total = vgi_array_raw(most, s->width * sizeof *c->total, e);
+    c->counted = vgi_array_raw(n, sizeof *c->counted, e);
+    c->moved = vgi_array_raw(n, sizeof *c->moved, e);
     c->sums = vgi_array(chunks(c), sizeof *c->sums, e);
     c->sizes = vgi_array(most, sizeof *c->sizes, e);
     c->products = vgi_array_raw(chunks(c) * CHUNK, most * sizeof *c->products, e);
     c->chunk_changed = vgi_array(chunks(c), sizeof *c->chunk_changed, e);
-    if (!c->label || !c->nearest || !c->norm || !c->centre || !c->centre_norm || !c->sums || !c->sizes || !c->products ||
-        !c->chunk_changed) {
+    if (!c->label || !c->nearest || !c->norm || !c->centre || !c->centre_norm || !c->total || !c->counted || !c->moved ||
+        !c->sums || !c->sizes || !c->products || !c->chunk_changed) {
         clear_clustering(c);
         return VG_ENOMEM;
     }
+    forget_means(c);
     for (size_t f = 0; f < n; f++) {
         const float *x = s->feature + f * s->width;
         c->norm[f] = inner(x, x, s->width), c->nearest[f] = INFINITY;
@@ -522,8 +554,9 @@ static int renumber(uint32_t *label, size_t nf, size_t *k, vg_err *e)
 static double objective_of(clustering *c, size_t k)
 {
     c->k = k;
+    forget_means(c);
     fill_empty(c);
-    vgi_parallel(c->s->threads, (c->s->width + STRIPE - 1) / STRIPE, mean_stripe, c);
+    find_means(c);
     double sum = 0;
     for (size_t f = 0; f < c->n; f++) {
         const float *m = c->centre + c->label[f] * c->s->width, *x = c->s->feature + f * c->s->width;
