@@ -159,10 +159,11 @@ void vg_skeleton_pose(const vg_skeleton *s, const double *values, double *positi
 typedef struct vg_joint_fitter vg_joint_fitter;
 int vg_joint_fitter_new(vg_joint_fitter **f, const vg_skeleton *s, vg_err *e) VG_MUST_CHECK; /* s borrowed until free */
 void vg_joint_fitter_free(vg_joint_fitter **f);
-/* vg_joint_fitter_fit: positions (njoints points) in, values out, angles as near as can be to those of the call before.
+/* vg_joint_fitter_fit: positions (njoints points) in, values out, angles as near as can be to those of the call before. turns (may be
+ * NULL): how the joints are turned, as vg_skeleton_pose gives it, where that is known: then nothing of it has to be found.
  * Returns the largest distance of a joint from where the values put it, and that joint: bones keep their lengths
  * unless the joint has position channels, and a joint with fewer than three rotations cannot turn every way. */
-double vg_joint_fitter_fit(vg_joint_fitter *f, const double *positions, double *values, size_t *joint);
+double vg_joint_fitter_fit(vg_joint_fitter *f, const double *positions, const double *turns, double *values, size_t *joint);
 
 /* Which faces of a source mesh drive each face of a target mesh (MATH 9). */
 typedef struct vg_correspondence {

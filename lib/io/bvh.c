@@ -722,7 +722,8 @@ static int put_frame(void *state, const vg_frame *f, vg_err *e)
     writing *w = state;
     size_t joint;
     note_time(w, f);
-    double distance = vg_joint_fitter_fit(w->fitter, f->values, w->values, &joint);
+    const double *turns = f->nturns && f->nturns == w->skeleton.njoints ? f->turns : NULL;
+    double distance = vg_joint_fitter_fit(w->fitter, f->values, turns, w->values, &joint);
     if (!vgi_finite(w->values, vg_skeleton_channels(&w->skeleton)))
         return vg_fail(e, VG_EINPUT, "its joints lie too far apart for a skeleton");
     int r = note_distance(w, distance, joint, f->name ? f->name : "", e);

@@ -443,19 +443,20 @@ static void turn_joint(const vg_joint_fitter *f, size_t j, const double *pose, c
     turn_by_arms(f, j, pose, true, k, q);
 }
 
-/* The angles of joint j's rotations, from those before. */
-static void fit_angles(const vg_joint_fitter *f, size_t j, const double *pose, double *values)
+/* The angles of joint j's rotations, from those before. turn: how it is turned; NULL: that is to be found. */
+static void fit_angles(const vg_joint_fitter *f, size_t j, const double *pose, const double *turn, double *values)
 {
     static const double unturned[4] = {1, 0, 0, 0};
     const vg_joint *joint = &f->s->joints[j];
     int axis[6];
-    double angles[6], k[9], q[4], back[4], local[4];
+    double angles[6], k[9] = {0}, q[4], back[4], local[4];
     uint32_t n = 0, place[6];
     for (uint32_t i = 0; i < joint->nchannels; i++)
         if (is_rotation(joint->channels[i])) axis[n] = joint->channels[i] - 4, angles[n] = values[i], place[n++] = i;
     if (n == 0) return;
     const double *parent = joint->parent == NONE ? unturned : f->turns + 4 * (size_t)joint->parent;
-    turn_joint(f, j, pose, parent, k, q);
+    if (turn) copy_turn(turn, q);
+    else turn_joint(f, j, pose, parent, k, q);
     conjugate(parent, back);
     vg_quat_multiply(back, q, local);
     if (is_euler(axis, n)) {
@@ -464,8 +465,8 @@ static void fit_angles(const vg_joint_fitter *f, size_t j, const double *pose, d
         double m[9], wish[9];
         vg_quat_matrix(back, m);
         multiply(m, k, k);
-        vg_quat_matrix(local, wish); /* decides what the directions leave open */
-        for (int i = 0; i < 9; i++) k[i] += 1e-6 * wish[i];
+        vg_quat_matrix(local, wish); /* of a turn that was found: decides what the directions leave open */
+        for (int i = 0; i < 9; i++) k[i] += (turn ? 1 : 1e-6) * wish[i];
         climb_to_angles(k, axis, n, angles);
     }
     for (uint32_t i = 0; i < n; i++) values[place[i]] = angles[i];
@@ -487,13 +488,13 @@ static void fit_offset(const vg_joint_fitter *f, size_t j, const double *pose, d
         if (!is_rotation(joint->channels[i])) values[i] = local[joint->channels[i] - 1];
 }
 
-double vg_joint_fitter_fit(vg_joint_fitter *f, const double *pose, double *out, size_t *joint)
+double vg_joint_fitter_fit(vg_joint_fitter *f, const double *pose, const double *turns, double *out, size_t *joint)
 {
     double most = 0, *values = f->values;
     *joint = 0;
     for (size_t j = 0; j < f->s->njoints; j++) {
         double d[3];
-        fit_angles(f, j, pose, values);
+        fit_angles(f, j, pose, turns ? turns + 4 * j : NULL, values);
         fit_offset(f, j, pose, values);
         place_joint(f->s, j, values, f->positions, f->turns);
         for (int k = 0; k < 3; k++) d[k] = f->positions[3 * j + k] - pose[3 * j + k];

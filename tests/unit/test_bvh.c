@@ -8,17 +8,17 @@
 
 enum { MOST_FRAMES = 64 };
 
-/* A sequence in memory: its head and the positions and times of its frames. */
+/* A sequence in memory: its head and the positions, turns and times of its frames. */
 typedef struct sequence {
     vg_head head;
     size_t n;
-    double *at[MOST_FRAMES], time[MOST_FRAMES];
+    double *at[MOST_FRAMES], *turns[MOST_FRAMES], time[MOST_FRAMES];
     bool timed[MOST_FRAMES];
 } sequence;
 
 static void clear(sequence *s)
 {
-    for (size_t i = 0; i < s->n; i++) free(s->at[i]);
+    for (size_t i = 0; i < s->n; i++) free(s->at[i]), free(s->turns[i]);
     vg_head_clear(&s->head);
     *s = (sequence){0};
 }
@@ -39,6 +39,9 @@ static int read_bytes(sequence *s, const char *text, size_t n, vg_err *e)
         size_t size = 3 * s->head.count * sizeof(double);
         s->at[s->n] = malloc(size ? size : 1);
         memcpy(s->at[s->n], frame.values, size);
+        CHECK(frame.nturns == s->head.count);
+        s->turns[s->n] = malloc(32 * frame.nturns + 1);
+        memcpy(s->turns[s->n], frame.turns, 32 * frame.nturns);
         s->time[s->n] = frame.time, s->timed[s->n++] = frame.has_time;
     }
     f->close(state);
@@ -53,8 +56,8 @@ static int read_text(sequence *s, const char *text, vg_err *e)
     return read_bytes(s, text, strlen(text), e);
 }
 
-/* Write it; the text is the caller's, NULL on failure. *warning (may be NULL): what was lost. */
-static char *write_text(const sequence *s, bool full, char *warning, vg_err *e)
+/* Write it, with its turns or positions only; the text is the caller's, NULL on failure. *warning (may be NULL): what was lost. */
+static char *write_turned(const sequence *s, bool turned, bool full, char *warning, vg_err *e)
 {
     const vgi_sequence_format *f = &vgi_sequence_bvh;
     vg_sink_options o = {.full_precision = full};
@@ -66,6 +69,7 @@ static char *write_text(const sequence *s, bool full, char *warning, vg_err *e)
         char name[32];
         snprintf(name, sizeof name, "f%zu", i);
         vg_frame frame = {.name = name, .has_time = s->timed[i], .time = s->time[i], .values = s->at[i]};
+        if (turned) frame.nturns = s->head.count, frame.turns = s->turns[i];
         r = f->put(state, &frame, e);
     }
     if (r == VG_OK) r = f->end(state, e);
@@ -78,6 +82,11 @@ static char *write_text(const sequence *s, bool full, char *warning, vg_err *e)
     if (out.fd >= 0) close(out.fd);
     vgi_output_clear(&out);
     return text;
+}
+
+static char *write_text(const sequence *s, bool full, char *warning, vg_err *e)
+{
+    return write_turned(s, false, full, warning, e);
 }
 
 /* The largest distance between the joints of two sequences. */
@@ -405,6 +414,52 @@ static void there_and_back(void)
     vg_bytes_clear(&b);
 }
 
+/* Frames that say how their joints have turned: every angle comes back, also those about a bone itself and of a joint at the end,
+ * of hinges and of joints with rotations about two axes. */
+static void brings_turns_back(void)
+{
+    static const char head[] =
+        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n"
+        "JOINT b\n{\nOFFSET 0 2 0\nCHANNELS 3 Yrotation Xrotation Zrotation\n"
+        "JOINT hinge\n{\nOFFSET 0 2 0\nCHANNELS 1 Yrotation\n"
+        "JOINT two\n{\nOFFSET 0 2 0\nCHANNELS 2 Zrotation Yrotation\n"
+        "JOINT end\n{\nOFFSET 0 1 0\nCHANNELS 3 Xrotation Yrotation Zrotation\n}\n}\n}\n}\n"
+        "JOINT alone\n{\nOFFSET 1 0 0\nCHANNELS 3 Zrotation Xrotation Zrotation\n}\n}\nMOTION\nFrames: 30\nFrame Time: 1\n";
+    enum { CHANNELS = 18, FRAMES = 30 };
+    double want[FRAMES][CHANNELS], x;
+    char number[32];
+    vg_bytes b = {0};
+    sequence s, t = {0};
+    vg_err e = {0};
+    append(&b, head);
+    for (int f = 0; f < FRAMES; f++)
+        for (int i = 0; i < CHANNELS; i++) { /* the middle angle of z x z keeps its sign: 0 would be gimbal lock */
+            want[f][i] = i == CHANNELS - 2 ? uniform(20, 80) : uniform(-40, 40);
+            snprintf(number, sizeof number, "%.12f%s", want[f][i], i + 1 < CHANNELS ? " " : "\n");
+            append(&b, number);
+        }
+    CHECK(read_bytes(&s, (char *)b.data, b.size, &e) == VG_OK);
+    char *text = write_turned(&s, true, true, NULL, &e);
+    CHECK_TEXT(e.message, "");
+    CHECK(text && read_text(&t, text, &e) == VG_OK);
+    CHECK(distance(&s, &t) < 1e-9);
+    const char *p = strchr(strstr(text, "Frame Time:"), '\n') + 1, *end = text + strlen(text);
+    for (int f = 0; f < FRAMES; f++)
+        for (int i = 0; i < CHANNELS; i++) {
+            while (p < end && (*p == ' ' || *p == '\n')) p++;
+            const char *next = vgi_parse_double(p, end, &x);
+            CHECK(next != NULL);
+            if (!next) goto done;
+            CHECK_NEAR(x, want[f][i], 1e-8);
+            p = next;
+        }
+done:
+    free(text);
+    clear(&s);
+    clear(&t);
+    vg_bytes_clear(&b);
+}
+
 /* A joint with arms in two directions turns as it was turned, one with one arm without twist, one without any not at all. */
 static void finds_turns(void)
 {
@@ -422,10 +477,10 @@ static void finds_turns(void)
     CHECK(vg_skeleton_channels(&s.head.skeleton) == 12);
     CHECK(vg_joint_fitter_new(&f, &s.head.skeleton, &e) == VG_OK);
     /* b lies on a: that it turns with a is seen from its end */
-    CHECK_NEAR(vg_joint_fitter_fit(f, s.at[0], values, &joint), 0, 1e-8);
+    CHECK_NEAR(vg_joint_fitter_fit(f, s.at[0], NULL, values, &joint), 0, 1e-8);
     static const double first[] = {1, 2, 3, 30, 40, 50, 0, 0, 0, 0, 70, 0};
     for (int i = 0; i < 12; i++) CHECK_NEAR(values[i], first[i], 1e-6);
-    CHECK_NEAR(vg_joint_fitter_fit(f, s.at[1], values, &joint), 0, 1e-8);
+    CHECK_NEAR(vg_joint_fitter_fit(f, s.at[1], NULL, values, &joint), 0, 1e-8);
     for (int i = 3; i < 9; i++) CHECK_NEAR(values[i], first[i], 1e-6);
     double down[3] = {0, 1, 0}, now[3], q[4] = {cos(10 * M_PI / 180), 0, 0, sin(10 * M_PI / 180)}; /* 20 about z, ... */
     double x[4] = {cos(15 * M_PI / 180), sin(15 * M_PI / 180), 0, 0};                              /* ... then 30 about x */
@@ -474,7 +529,7 @@ static void fits_what_it_can(void)
         size_t joint;
         CHECK(vg_joint_fitter_new(&f, &s.head.skeleton, &e) == VG_OK);
         for (int k = 0; k < 3; k++) {
-            double d = vg_joint_fitter_fit(f, pose, values, &joint);
+            double d = vg_joint_fitter_fit(f, pose, NULL, values, &joint);
             CHECK(vgi_finite(values, vg_skeleton_channels(&s.head.skeleton)));
             if (cases[i].reached == 0) CHECK_NEAR(d, 0, 1e-5);
             else CHECK(d > 0.5 && d <= cases[i].reached + 1 && joint == 2);
@@ -585,6 +640,6 @@ static void tells_its_files(void)
 
 TESTS({"reads_and_poses", reads_and_poses}, {"reads_what_people_have", reads_what_people_have}, {"refuses", refuses},
       {"refuses_prefixes", refuses_prefixes}, {"limits_names", limits_names}, {"limits_depth", limits_depth}, {"there_and_back", there_and_back},
-      {"finds_turns", finds_turns}, {"fits_what_it_can", fits_what_it_can}, {"goes_on_turning", goes_on_turning},
+      {"finds_turns", finds_turns}, {"brings_turns_back", brings_turns_back}, {"fits_what_it_can", fits_what_it_can}, {"goes_on_turning", goes_on_turning},
       {"says_what_is_lost", says_what_is_lost}, {"keeps_places_of_joints", keeps_places_of_joints},
       {"writes_any_skeleton", writes_any_skeleton}, {"tells_its_files", tells_its_files})
