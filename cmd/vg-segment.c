@@ -58,11 +58,11 @@ static uint64_t add_all(vg_segmenter *s, vg_source *source)
         poses[n] = frames[n].values;
         cli_progress("poses", ++total);
         if (++n < BATCH) continue;
-        vg_segmenter_add(s, n, poses);
+        if (vg_segmenter_add(s, n, poses, &e) < 0) cli_die(&e);
         n = 0;
     }
     if (r < 0) cli_die(&e);
-    vg_segmenter_add(s, n, poses);
+    if (vg_segmenter_add(s, n, poses, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < BATCH; i++) vg_frame_clear(&frames[i]);
     return total;
 }

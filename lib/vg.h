@@ -556,7 +556,7 @@ typedef struct vg_segment_report {
 /* vg_segmenter_new: m is borrowed until free; reference: nv points, not kept. */
 int vg_segmenter_new(vg_segmenter **s, const vg_mesh *m, const double *reference, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_segmenter_free(vg_segmenter **s);
-void vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses);
+int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_err *e) VG_MUST_CHECK;
 /* vg_segmenter_cut: patches 0: as few of 4 6 8 12 16 24 ... 256 as bring the angle to 10 degrees. connected: every patch is in one
  * piece: pieces are joined with neighbours that turn alike until `patches` are left, or no neighbours. Fewer patches than asked for
  * when fewer faces turn differently. VG_EINPUT when there is no face. */

@@ -11,7 +11,8 @@
 #include <stdlib.h>
 
 enum {
-    WIDTH = 1024,  /* numbers kept of a face's rotations */
+    WIDTH = 1024,  /* numbers kept of a face's rotations, at most, */
+    NARROW = 128,  /* and at first */
     ROUNDS = 40,
     CHUNK = 256,   /* faces of one task */
     STRIPE = 64    /* dimensions of one task */
@@ -28,7 +29,7 @@ struct vg_segmenter {
     int threads;
     size_t poses;
     float *feature; /* nf x width */
-    size_t width;   /* WIDTH until it is cut down to what is used */
+    size_t width;   /* grows with the poses; in the end it is cut down to what is used */
 };
 
 static uint64_t mix(uint64_t x) /* splitmix64 (Vigna, public domain) */
@@ -45,10 +46,10 @@ int vg_segmenter_new(vg_segmenter **out, const vg_mesh *m, const double *referen
     if (m->nf == 0) return vg_fail(e, VG_EINPUT, "there are no faces to make patches of");
     vg_segmenter *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
-    s->mesh = m, s->threads = threads, s->width = WIDTH;
+    s->mesh = m, s->threads = threads, s->width = NARROW;
     int r = vgi_turns_make(&s->turns, m->nf, m->start, m->vert, reference, e);
     size_t n;
-    if (r == VG_OK && !vgi_mul(m->nf, WIDTH, &n)) r = vg_fail(e, VG_ENOMEM, "not enough memory for %zu faces", m->nf);
+    if (r == VG_OK && !vgi_mul(m->nf, NARROW, &n)) r = vg_fail(e, VG_ENOMEM, "not enough memory for %zu faces", m->nf);
     if (r == VG_OK && !(s->feature = vgi_array(n, sizeof *s->feature, e))) r = VG_ENOMEM;
     if (r < 0) vg_segmenter_free(out);
     return r;
@@ -80,16 +81,34 @@ static void add_chunk(void *context, size_t i)
     size_t first = i * CHUNK, last = first + CHUNK < s->turns.nf ? first + CHUNK : s->turns.nf;
     for (size_t f = first; f < last; f++) {
         vgi_lanes r[9];
-        float *to = s->feature + f * WIDTH;
+        float *to = s->feature + f * s->width;
         vgi_turns_measure(&s->turns, f, a->poses, r);
         for (size_t k = 0; k < a->lanes; k++)
             for (size_t n = 0; n < 9; n++) to[a->at[9 * k + n]] += a->sign[9 * k + n] * (float)(r[n][k] - (n % 4 == 0));
     }
 }
 
-/* The first features have a place of their own; later ones are added to one of them, chosen by chance, with a random sign. */
-void vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses)
+/* Rows of at least `numbers` numbers, or WIDTH. */
+static int widen(vg_segmenter *s, uint64_t numbers, vg_err *e)
 {
+    size_t nf = s->turns.nf, width = s->width, old = s->width, n;
+    while (width < numbers && width < WIDTH) width *= 2;
+    if (width == old) return VG_OK;
+    float *wider = vgi_mul(nf, width * sizeof *wider, &n) ? realloc(s->feature, n) : NULL;
+    if (!wider) return vg_fail(e, VG_ENOMEM, "not enough memory for %zu numbers of %zu faces each", width, nf);
+    for (size_t f = nf; f-- > 0;) {
+        memmove(wider + f * width, wider + f * old, old * sizeof *wider);
+        memset(wider + f * width + old, 0, (width - old) * sizeof *wider);
+    }
+    s->feature = wider, s->width = width;
+    return VG_OK;
+}
+
+/* The first features have a place of their own; later ones are added to one of them, chosen by chance, with a random sign. */
+int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_err *e)
+{
+    int r = widen(s, 9 * ((uint64_t)s->poses + n), e);
+    if (r < 0) return r;
     for (size_t p = 0; p < n; p += VGI_LANES) {
         adding a = {.s = s, .lanes = n - p < VGI_LANES ? n - p : VGI_LANES};
         for (size_t k = 0; k < VGI_LANES; k++) a.poses[k] = poses[p + (k < a.lanes ? k : a.lanes - 1)];
@@ -101,6 +120,7 @@ void vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses)
         vgi_parallel(s->threads, (s->turns.nf + CHUNK - 1) / CHUNK, add_chunk, &a);
         s->poses += a.lanes;
     }
+    return VG_OK;
 }
 
 /* Rows as short as what is in use, in whole vectors. */

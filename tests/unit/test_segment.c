@@ -96,7 +96,7 @@ static vg_patches cut(const vg_head *h, size_t k, bool connected, int threads)
     for (int i = 1; i < 6; i++) {
         const double *poses[1] = {pose};
         fold(h, 0.3 * i, pose);
-        vg_segmenter_add(s, 1, poses);
+        CHECK(vg_segmenter_add(s, 1, poses, NULL) == VG_OK);
     }
     CHECK(vg_segmenter_cut(s, k, 7, connected, &p, &report, &e) == VG_OK);
     CHECK(report.patches == p.n);
