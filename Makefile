@@ -2,7 +2,7 @@
 # make deps        install the Debian packages of debian-packages.txt (root or sudo; nothing when all are there)
 # make demo        transfer an animation onto another body and draw it: says where to look
 # make check       all tests                    make CONFIG=asan check    the same under ASan and UBSan
-# make bench       throughput of every stage beside its reference
+# make bench       throughput of every stage beside its limit; BENCH=full: up to 1,000,002 vertices; JSON=FILE: also as JSON
 # make fuzz        search for input that breaks the readers (clang; FUZZ_SECONDS=60 each)
 # make install     PREFIX=/usr/local LIBDIR=$(PREFIX)/lib DESTDIR=   make uninstall, make clean
 # make dist        build/vg-VERSION.tar.xz, the same bytes each time; make distcheck builds and tests from it (TESTS=)
@@ -144,7 +144,7 @@ demo: all
 
 .PHONY: bench
 bench: all $(BENCHES:%=$(B)/bench/%)
-	@BUILD=$(B) sh tests/bench/run.sh
+	@BUILD=$(B) BENCH='$(BENCH)' RUNS='$(RUNS)' JSON='$(JSON)' sh tests/bench/run.sh
 
 .PHONY: fuzz
 fuzz:
