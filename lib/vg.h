@@ -210,6 +210,24 @@ void vg_rig_transforms(const vg_rig *r, const double *positions, const double *t
 /* vg_rig_skin: linear blend skinning of n vertices' reference pose by transforms. */
 void vg_rig_skin(const vg_rig *r, size_t nv, const double *reference, const double *transforms, double *vertices);
 
+/* vg_rig_find: the bone of this name; nbones: there is none. */
+size_t vg_rig_find(const vg_rig *r, const char *name);
+/* vg_rig_axis: where bone b points in the reference pose, a unit vector: to what is below its joint. false: nothing is. */
+bool vg_rig_axis(const vg_rig *r, size_t b, double axis[3]);
+/* vg_rig_edit: turn bone b, and all that hangs on it, by degrees about its joint; the axis, in the reference pose, turns with the bone. In place. */
+void vg_rig_edit(const vg_rig *r, size_t b, const double axis[3], double degrees, double *transforms);
+
+/* A rig driven by a skeleton of its own or another one; joints belong together by name. Joints of the rig that the other does not have follow
+ * those above them. The rig keeps the lengths of its bones and goes as far as its size, beside the other's, wants. */
+typedef struct vg_driver vg_driver;
+/* vg_driver_new: both are borrowed until free. align: the skeletons do not rest alike: bones of the rig point where those of the other one do.
+ * VG_EINPUT when no names fit. */
+int vg_driver_new(vg_driver **d, const vg_rig *r, const vg_skeleton *by, bool align, vg_err *e) VG_MUST_CHECK;
+void vg_driver_free(vg_driver **d);
+size_t vg_driver_missing(const vg_driver *d); /* bones of the rig that follow others */
+/* vg_driver_pose: positions and turns of the other skeleton's joints to nbones transforms. */
+void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, double *transforms);
+
 /* What drives a map: the transforms of patches, or of the bones of a rig. */
 typedef enum vg_map_kind { VG_MAP_PATCHES = 1, VG_MAP_BONES = 2 } vg_map_kind;
 
@@ -724,6 +742,12 @@ void vg_joint_groups_clear(vg_joint_groups *g);
  * Parents may stand behind their children: they are put before them. Whether the vertices exist is left to who has the mesh.
  * `base` is the number of the first vertex, 0 or 1. name: what messages call the file. */
 int vg_joint_groups_read(vg_joint_groups *g, const void *data, size_t n, int base, const char *name, vg_err *e) VG_MUST_CHECK;
+
+/* vg_joint_groups_skeleton: the joints in a pose of nv vertices as a skeleton. VG_EINPUT when a vertex is not there. */
+int vg_joint_groups_skeleton(const vg_joint_groups *g, size_t nv, const double *reference, vg_skeleton *s, vg_err *e) VG_MUST_CHECK;
+/* vg_joint_groups_pose: positions of the joints in a pose, and their turns beside the reference pose: with one joint below, that of the
+ * frame of bone and roll (T 5.1); else what takes joints below and the group's vertices nearest to where they are. */
+void vg_joint_groups_pose(const vg_joint_groups *g, const double *reference, const double *pose, double *positions, double *turns);
 
 /* What is known about which point belongs to which. */
 typedef struct vg_register_input {

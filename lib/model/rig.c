@@ -1,8 +1,9 @@
-/* rig.c: a skeleton in the reference pose of a mesh, its motions as transforms, and linear blend skinning.
- * Leaves out how weights and transforms are fitted (method/skin.c, method/bend.c).
+/* rig.c: a skeleton in the reference pose of a mesh, its motions as transforms, editing them, and linear blend skinning.
+ * Leaves out how weights and transforms are fitted (method/skin.c, method/bend.c) and other skeletons (drive.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/rig.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 void vg_rig_clear(vg_rig *r)
@@ -94,5 +95,56 @@ void vg_rig_skin(const vg_rig *r, size_t nv, const double *reference, const doub
             for (int k = 0; k < 3; k++) sum[k] += w * (moved[k] + t[4 + k]);
         }
         memcpy(vertices + 3 * v, sum, sizeof sum);
+    }
+}
+
+/* ---- editing ---- */
+
+size_t vg_rig_find(const vg_rig *r, const char *name)
+{
+    size_t b = 0;
+    while (b < r->nbones && strcmp(r->skeleton.joints[r->bone[b]].name, name)) b++;
+    return b;
+}
+
+bool vg_rig_axis(const vg_rig *r, size_t b, double axis[3])
+{
+    double sum[3] = {0, 0, 0}, length = 0;
+    size_t own = r->bone[b];
+    bool ends = false;
+    for (size_t j = 0; j < r->skeleton.njoints; j++) /* an end site says it, when there is one */
+        ends |= r->skeleton.joints[j].parent == own && !r->skeleton.joints[j].nchannels;
+    for (size_t j = 0; j < r->skeleton.njoints; j++) {
+        const vg_joint *joint = &r->skeleton.joints[j];
+        if (joint->parent != own || (ends && joint->nchannels)) continue;
+        for (size_t k = 0; k < 3; k++) sum[k] += r->at[3 * j + k] - r->at[3 * own + k];
+    }
+    for (int k = 0; k < 3; k++) length += sum[k] * sum[k];
+    for (int k = 0; k < 3; k++) axis[k] = length > 0 ? sum[k] / sqrt(length) : 0;
+    return length > 0;
+}
+
+static bool hangs_on(const vg_rig *r, size_t joint, size_t above)
+{
+    while (joint != above && r->skeleton.joints[joint].parent != UINT32_MAX) joint = r->skeleton.joints[joint].parent;
+    return joint == above;
+}
+
+void vg_rig_edit(const vg_rig *r, size_t b, const double axis[3], double degrees, double *transforms)
+{
+    const double *own = transforms + 7 * b;
+    double now[3], centre[3], half = degrees * (3.14159265358979323846 / 360), q[4] = {cos(half)}, size = 0;
+    vg_quat_apply(own, axis, now);
+    for (int k = 0; k < 3; k++) size += now[k] * now[k];
+    for (int k = 0; k < 3 && size > 0; k++) q[k + 1] = sin(half) * now[k] / sqrt(size);
+    vg_quat_apply(own, r->at + 3 * (size_t)r->bone[b], centre);
+    for (int k = 0; k < 3; k++) centre[k] += own[4 + k];
+    for (size_t d = 0; d < r->nbones; d++) {
+        if (!hangs_on(r, r->bone[d], r->bone[b])) continue;
+        double *t = transforms + 7 * d, from[3], to[3];
+        for (int k = 0; k < 3; k++) from[k] = t[4 + k] - centre[k];
+        vg_quat_apply(q, from, to);
+        for (int k = 0; k < 3; k++) t[4 + k] = to[k] + centre[k];
+        vg_quat_multiply(q, t, t);
     }
 }

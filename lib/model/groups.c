@@ -1,0 +1,106 @@
+/* groups.c: a skeleton that finds itself in every pose of a mesh: its joints are means of vertices (T 5.1).
+ * Leaves out the text that names the vertices (io).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/core.h"
+#include "model/turn.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static void place(const vg_joint_group *group, const double *pose, double at[3])
+{
+    at[0] = at[1] = at[2] = 0;
+    for (size_t i = 0; i < group->nvertices; i++)
+        for (size_t k = 0; k < 3; k++) at[k] += pose[3 * (size_t)group->vertices[i] + k] / (double)group->nvertices;
+}
+
+int vg_joint_groups_skeleton(const vg_joint_groups *g, size_t nv, const double *reference, vg_skeleton *s, vg_err *e)
+{
+    *s = (vg_skeleton){0};
+    for (size_t j = 0; j < g->n; j++)
+        for (size_t i = 0; i < g->at[j].nvertices; i++)
+            if (g->at[j].vertices[i] >= nv)
+                return vg_fail(e, VG_EINPUT, "joint '%.80s' names vertex %u, the mesh has %zu", g->at[j].name, g->at[j].vertices[i], nv);
+    if (!(s->joints = vgi_array(g->n, sizeof *s->joints, e))) return VG_ENOMEM;
+    for (; s->njoints < g->n; s->njoints++) {
+        const vg_joint_group *group = &g->at[s->njoints];
+        vg_joint *joint = &s->joints[s->njoints];
+        bool root = group->parent == UINT32_MAX;
+        static const uint8_t channels[6] = {1, 2, 3, 6, 4, 5};
+        double above[3] = {0, 0, 0};
+        if (!(joint->name = vgi_copy_string(group->name, strlen(group->name), e))) {
+            vg_skeleton_clear(s);
+            return VG_ENOMEM;
+        }
+        joint->parent = group->parent;
+        joint->nchannels = root ? 6 : 3;
+        memcpy(joint->channels, root ? channels : channels + 3, joint->nchannels);
+        place(group, reference, joint->offset);
+        if (!root) place(&g->at[group->parent], reference, above);
+        for (int k = 0; k < 3; k++) joint->offset[k] -= above[k];
+    }
+    return VG_OK;
+}
+
+/* b += weight * d r', both made unit vectors */
+static void add_pair(double b[9], double weight, const double d[3], const double r[3])
+{
+    double x = 0, y = 0;
+    for (int k = 0; k < 3; k++) x += d[k] * d[k], y += r[k] * r[k];
+    if (!(x > 0 && y > 0)) return;
+    for (int k = 0; k < 3; k++)
+        for (int l = 0; l < 3; l++) b[3 * k + l] += weight * d[k] * r[l] / sqrt(x * y);
+}
+
+static void subtract(const double *a, const double *b, double d[3])
+{
+    for (int k = 0; k < 3; k++) d[k] = a[k] - b[k];
+}
+
+/* x without its part along u */
+static void reject(const double u[3], double x[3])
+{
+    double along = 0, square = 0;
+    for (int k = 0; k < 3; k++) along += u[k] * x[k], square += u[k] * u[k];
+    for (int k = 0; k < 3 && square > 0; k++) x[k] -= along / square * u[k];
+}
+
+static void turn_joint(const vg_joint_groups *g, size_t j, const double *reference, const double *pose, const double *positions,
+                       double *turns)
+{
+    const vg_joint_group *group = &g->at[j];
+    double b[9] = {0}, rest[3], d[3], r[3], below[2][3];
+    size_t children = 0;
+    place(group, reference, rest);
+    for (size_t c = j + 1; c < g->n; c++) {
+        double at[3];
+        if (g->at[c].parent != j) continue;
+        place(&g->at[c], reference, at);
+        subtract(at, rest, r);
+        subtract(positions + 3 * c, positions + 3 * j, d);
+        add_pair(b, 1, d, r);
+        memcpy(below[0], d, sizeof d);
+        memcpy(below[1], r, sizeof r);
+        children++;
+    }
+    for (size_t i = 0; i < (children == 1 ? 1 : group->nvertices); i++) {
+        subtract(pose + 3 * (size_t)group->vertices[i], positions + 3 * j, d);
+        subtract(reference + 3 * (size_t)group->vertices[i], rest, r);
+        if (children == 1) reject(below[0], d), reject(below[1], r); /* perpendicular to the bone: the frame is met exactly */
+        add_pair(b, children == 1 ? 1 : 0.01, d, r);
+    }
+    if (group->parent != UINT32_MAX) { /* what all of this leaves open goes with the parent */
+        double m[9];
+        vg_quat_matrix(turns + 4 * (size_t)group->parent, m);
+        for (int i = 0; i < 9; i++) b[i] += 1e-9 * m[i];
+    } else {
+        for (int i = 0; i < 9; i += 4) b[i] += 1e-9;
+    }
+    vgi_best_turn(b, turns + 4 * j);
+}
+
+void vg_joint_groups_pose(const vg_joint_groups *g, const double *reference, const double *pose, double *positions, double *turns)
+{
+    for (size_t j = 0; j < g->n; j++) place(&g->at[j], pose, positions + 3 * j);
+    for (size_t j = 0; j < g->n; j++) turn_joint(g, j, reference, pose, positions, turns);
+}
