@@ -91,6 +91,15 @@ void cli_warn(const char *format, ...)
     va_end(ap);
 }
 
+void cli_say(const char *format, ...)
+{
+    if (cli.quiet) return;
+    va_list ap;
+    va_start(ap, format);
+    say_line("", format, ap);
+    va_end(ap);
+}
+
 void cli_note(const char *format, ...)
 {
     if (!cli.verbose) return;
@@ -405,6 +414,28 @@ void cli_finish(int status)
     /* some file systems tell only here that the disk is full; a descriptor that was never open is no loss */
     if (close(STDOUT_FILENO) && errno != EBADF) die_writing(errno);
     leave(status);
+}
+
+char *cli_read_file(const char *path, size_t *n)
+{
+    vg_err e;
+    char *data = NULL;
+    size_t cap = 0;
+    FILE *f = strcmp(path, "-") ? fopen(path, "re") : stdin;
+    *n = 0;
+    errno = f ? 0 : errno;
+    while (f) {
+        if (cap - *n < 1 << 16 && !(data = realloc(data, cap = 2 * cap + (1 << 17)))) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for a file"});
+        size_t got = fread(data + *n, 1, cap - *n, f);
+        *n += got;
+        if (got == 0) break;
+    }
+    if (!f || ferror(f)) {
+        vg_fail(&e, VG_ESYS, "cannot read '%s': %s", path, strerror(errno ? errno : EIO));
+        cli_die(&e);
+    }
+    if (f != stdin) fclose(f);
+    return data;
 }
 
 /* -------------------------------------------------------------------------------------------- threads -- */

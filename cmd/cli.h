@@ -57,6 +57,7 @@ void cli_usage(const char *format, ...) VG_PRINTF(1, 2) __attribute__((noreturn)
 void cli_no(const char *format, ...) VG_PRINTF(1, 2) __attribute__((noreturn));
 void cli_warn(const char *format, ...) VG_PRINTF(1, 2); /* unless --quiet */
 void cli_note(const char *format, ...) VG_PRINTF(1, 2); /* only with --verbose */
+void cli_say(const char *format, ...) VG_PRINTF(1, 2);  /* what the user waits for on standard error; unless --quiet */
 /* cli_progress: "label n" on standard error, rarely, only when it is a terminal and a second has passed. */
 void cli_progress(const char *label, uint64_t n);
 
@@ -69,6 +70,9 @@ size_t cli_parse_vertices(const char *option, const char *text, uint32_t **verti
 vg_source *cli_source(char **operands, size_t n);
 /* The same; mesh (may be NULL): the faces and reference pose of operands without faces. */
 vg_source *cli_source_with(char **operands, size_t n, const char *mesh);
+
+/* cli_read_file: a whole file ("-": standard input); free(). Dies when it cannot be read. */
+char *cli_read_file(const char *path, size_t *n);
 
 /* The stream of a filter. cli_stream_open takes the head (adds this process to the provenance unless told not to) and
  * opens the output: standard output, refused when a terminal, or a temporary file beside --output that cli_stream_end

@@ -1,6 +1,6 @@
-/* vg-fitmap: fit a map from the motions of patches to the vertices of a body, or bring one to another body.
+/* vg-fitmap: fit a map from the motions of patches or bones to the vertices of a body, or bring one to another body.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "cli.h"
+#include "rigging.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -14,9 +14,19 @@ static struct {
 
 static const cli_option options[] = {
     {"patches", 0, "FILE", "the patches: what vg-segment wrote; default: those of the input", .text = &opts.patches},
+    {"skeleton", 0, "FILE", "a skeleton drives the mesh: BVH, a stream of it, or lines of text", .text = &rigging.skeleton},
+    {"groups", 0, "FILE", "a skeleton drives the mesh: each joint is the mean of some of its vertices", .text = &rigging.groups},
+    {"learn", 0, NULL, "with --skeleton: find its motion from the poses, whatever motion it comes with", .flag = &rigging.learn},
+    {"root-at", 0, "X,Y,Z", "with --skeleton: where its root is in the reference pose", .text = &rigging.root_at},
+    {"method", 0, "envelope|lbs", "with a skeleton: vectors and held vertices (default), or linear blend skinning alone",
+     .text = &rigging.method},
+    {"bones-per-corner", 0, "N", "with a skeleton: how many bones drive a corner, 1 or 2 (default 2)",
+     .integer = &rigging.bones_per_corner, .least = 1, .most = 2},
+    {"refine", 0, "RIDGE", "with a skeleton: the ridge with which bones take up what is left (default 0.003; 0: they do not)",
+     .number = &rigging.refine, .least = 0, .most = 1e6},
     {"holdout", 0, "N", "leave every Nth pose out of the fit, and report the error there", .integer = &opts.holdout, .least = 2,
      .most = 1000000000},
-    {"hold", 0, "SHARE", "of the vertices, those that go where their patch takes them (default 0.03)", .number = &opts.hold,
+    {"hold", 0, "SHARE", "of the vertices, those that go where their patch or bones take them (default 0.03)", .number = &opts.hold,
      .least = 0, .most = 1},
     {"retarget", 0, "MESH", "no fit: bring the map that is the input to this body of the same faces", .text = &opts.retarget},
     {"morph", 0, "T", "with --retarget: how far on the way to that body (default 1)", .number = &opts.morph},
@@ -25,7 +35,7 @@ static const cli_option options[] = {
 static const cli_program program = {
     .name = "vg-fitmap",
     .synopsis = "[options] [FILE ...]",
-    .summary = "fit a map from the motions of patches to vertices",
+    .summary = "fit a map from the motions of patches or bones to vertices",
     .options = options,
     .most_operands = SIZE_MAX,
     .writes_stream = true,
@@ -142,12 +152,9 @@ static void judge_batch(judging *j, size_t n, uint64_t first)
 
 static void describe(const errors *x, double d, const char *what, const char *which)
 {
-    bool verbose = cli.verbose;
-    cli.verbose = true; /* the report is said unless --quiet */
     if (x->poses)
-        cli_note("%s, %s: mean error %.3g D, largest %.3g D, %llu poses", which, what, x->sum / (double)x->poses / d, x->most / d,
-                 (unsigned long long)x->poses);
-    cli.verbose = verbose;
+        cli_say("%s, %s: mean error %.3g D, largest %.3g D, %llu poses", which, what, x->sum / (double)x->poses / d, x->most / d,
+                (unsigned long long)x->poses);
 }
 
 static void report(const vg_head *h, vg_spool *spool)
@@ -192,6 +199,10 @@ static void fit(vg_source *s)
         vg_fail(&e, VG_EINPUT, "the input holds %s, vg-fitmap takes vertices%s", vg_kind_name(h->kind),
                 h->kind == VG_VECTORS ? ": pipe it through 'vg-solve' first" : "");
         cli_die(&e);
+    }
+    if (rigging_wanted()) {
+        rigging_run(s, opts.hold, opts.holdout);
+        return;
     }
     take_patches(h);
     size_t before = h->patches.n;
@@ -238,7 +249,11 @@ int main(int argc, char **argv)
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     if (!isnan(opts.morph) && !opts.retarget) cli_usage("--morph needs --retarget");
-    if (opts.retarget && (opts.patches || opts.holdout)) cli_usage("--retarget fits nothing: no --patches and --holdout with it");
+    rigging_check();
+    if (opts.patches && rigging_wanted()) cli_usage("patches or bones drive a map: --patches does not go with --%s",
+                                                    rigging.skeleton ? "skeleton" : "groups");
+    if (opts.retarget && (opts.patches || opts.holdout || rigging_wanted()))
+        cli_usage("--retarget fits nothing: no --patches, --skeleton, --groups and --holdout with it");
     vg_source *s = cli_source(operands, n);
     if (opts.retarget) retarget(s);
     else fit(s);

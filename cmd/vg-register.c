@@ -3,7 +3,6 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -66,28 +65,6 @@ static void out_of_memory(const char *what)
     vg_err e;
     vg_fail(&e, VG_ENOMEM, "not enough memory for %s", what);
     cli_die(&e);
-}
-
-static char *read_file(const char *path, size_t *n)
-{
-    vg_err e;
-    char *data = NULL;
-    size_t cap = 0;
-    FILE *f = strcmp(path, "-") ? fopen(path, "re") : stdin;
-    *n = 0;
-    errno = f ? 0 : errno;
-    while (f) {
-        if (cap - *n < 1 << 16 && !(data = realloc(data, cap = 2 * cap + (1 << 17)))) out_of_memory(path);
-        size_t got = fread(data + *n, 1, cap - *n, f);
-        *n += got;
-        if (got == 0) break;
-    }
-    if (!f || ferror(f)) {
-        vg_fail(&e, VG_ESYS, "cannot read '%s': %s", path, strerror(errno ? errno : EIO));
-        cli_die(&e);
-    }
-    if (f != stdin) fclose(f);
-    return data;
 }
 
 /* ---- what is said on standard error ---- */
@@ -161,13 +138,13 @@ static void read_pairs(vg_register_input *in, vg_markers *markers, vg_seed **see
     size_t n;
     const char *dense = opts.dense ? opts.dense : opts.dense_source;
     if (opts.markers) {
-        char *data = read_file(opts.markers, &n);
+        char *data = cli_read_file(opts.markers, &n);
         if (vg_markers_read(markers, data, n, (int)opts.base, opts.markers, &e) < 0) cli_die(&e);
         free(data);
         in->markers = markers;
     }
     if (dense) {
-        char *data = read_file(dense, &n);
+        char *data = cli_read_file(dense, &n);
         if (vg_seeds_read(seeds, &in->nseeds, data, n, (int)opts.base, dense, &e) < 0) cli_die(&e);
         free(data);
         in->seeds = *seeds, in->seeds_of_source = opts.dense_source != NULL;

@@ -159,11 +159,13 @@ void vg_skeleton_pose(const vg_skeleton *s, const double *values, double *positi
 typedef struct vg_joint_fitter vg_joint_fitter;
 int vg_joint_fitter_new(vg_joint_fitter **f, const vg_skeleton *s, vg_err *e) VG_MUST_CHECK; /* s borrowed until free */
 void vg_joint_fitter_free(vg_joint_fitter **f);
-/* vg_joint_fitter_fit: positions (njoints points) in, values out, angles as near as can be to those of the call before. turns (may be
+/* vg_joint_fitter_fit: positions (njoints points) in, values (may be NULL) out, angles as near as can be to those of the call before. turns (may be
  * NULL): how the joints are turned, as vg_skeleton_pose gives it, where that is known: then nothing of it has to be found.
  * Returns the largest distance of a joint from where the values put it, and that joint: bones keep their lengths
  * unless the joint has position channels, and a joint with fewer than three rotations cannot turn every way. */
 double vg_joint_fitter_fit(vg_joint_fitter *f, const double *positions, const double *turns, double *values, size_t *joint);
+/* vg_joint_fitter_turns: the turns of all joints by the last fit. Borrowed until the next. */
+const double *vg_joint_fitter_turns(const vg_joint_fitter *f);
 
 /* Which faces of a source mesh drive each face of a target mesh (MATH 9). */
 typedef struct vg_correspondence {
@@ -593,7 +595,8 @@ int vg_map_fitter_finish(vg_map_fitter *f, vg_err *e) VG_MUST_CHECK;
 
 /* vg_map_retarget: the map of h for another body of the same faces (T 6.5), or one on the way to it (T 6.6): its vectors are those of h's
  * reference, turned and stretched towards the target's by `morph` (1: all the way). h's reference becomes that body's. target: nv
- * points. */
+ * points. Patches are still measured on the body that the map was fitted on; the joints of a rig go with the vertices around them, and its
+ * transforms are those of the other body. */
 int vg_map_retarget(vg_head *h, const double *target, double morph, int threads, vg_err *e) VG_MUST_CHECK;
 
 /* A map at work. Transforms are 7 numbers each, as in VG_TRANSFORMS. */

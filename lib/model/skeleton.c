@@ -501,6 +501,11 @@ double vg_joint_fitter_fit(vg_joint_fitter *f, const double *pose, const double 
         if (length(d) > most) most = length(d), *joint = j;
         values += f->s->joints[j].nchannels;
     }
-    memcpy(out, f->values, (size_t)(values - f->values) * sizeof *out);
+    if (out) memcpy(out, f->values, (size_t)(values - f->values) * sizeof *out);
     return most;
+}
+
+const double *vg_joint_fitter_turns(const vg_joint_fitter *f)
+{
+    return f->turns;
 }
