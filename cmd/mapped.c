@@ -1,4 +1,5 @@
-/* mapped.c: --map of vg-deform: measures patches or takes their transforms, interpolates them, and makes vertices of them by one product.
+/* mapped.c: --map of vg-deform: measures patches or bones, takes their transforms or what a skeleton says, edits or interpolates them, and
+ * makes vertices of them by one product.
  * Leaves out fitting the map (vg-fitmap) and paths through vectors (between.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "mapped.h"
@@ -12,6 +13,14 @@ struct mapped_options mapped;
 
 enum { BATCH = 32 };
 
+struct mapped_edit {
+    char *bone;
+    char axis;      /* 'x', 'y', 'z'; 't': about the bone itself */
+    double degrees;
+    size_t number;  /* of the bone; found when the rig is there */
+    double around[3];
+};
+
 typedef struct playback {
     vg_source *source;
     vg_head *h;       /* the input's, then the output's */
@@ -19,14 +28,40 @@ typedef struct playback {
     vg_kind kind;     /* what comes in */
     size_t count;     /* transforms */
     vg_player *player;
+    vg_driver *driver; /* a skeleton comes in */
+    vg_joint_fitter *fitter; /* for frames that do not say how joints have turned */
+    vg_skeleton skeleton; /* the input's */
     size_t n, most;   /* frames in hand */
     vg_frame in[BATCH], out[BATCH];
     double *transforms[BATCH];
 } playback;
 
+void mapped_take_edit(const char *text, void *context)
+{
+    (void)context;
+    char *copy = strdup(text);
+    mapped.edits = realloc(mapped.edits, (mapped.nedits + 1) * sizeof *mapped.edits);
+    if (!copy || !mapped.edits) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the edits"});
+    char *angle = strrchr(copy, ' ');
+    if (angle) *angle++ = 0;
+    char *axis = angle ? strrchr(copy, ' ') : NULL;
+    if (axis) *axis++ = 0;
+    bool twist = axis && !strcmp(axis, "twist");
+    if (!axis || !*copy || !(twist || (strlen(axis) == 1 && strchr("xyz", *axis))))
+        cli_usage("--edit is 'BONE x|y|z|twist DEGREES', not '%s'", text);
+    mapped.edits[mapped.nedits++] = (struct mapped_edit){.bone = copy, .axis = twist ? 't' : *axis, .degrees = cli_parse_number("--edit", angle)};
+}
+
+bool mapped_needs_input(size_t operands)
+{
+    return operands > 0 || !mapped.nedits;
+}
+
 void mapped_check(const char *others)
 {
     if (!mapped.map) {
+        if (mapped.nedits) cli_usage("--edit needs --map");
+        if (mapped.align) cli_usage("--align needs --map");
         if (mapped.live) cli_usage("--live needs --map");
         if (mapped.joints) cli_usage("--joints needs --map");
         if (mapped.transforms) cli_usage("--transforms needs --map");
@@ -47,6 +82,49 @@ static void load_map(playback *p)
     }
 }
 
+/* Edits speak of bones by name and of their axes in the skeleton's pose without rotations. */
+static void find_bones(playback *p)
+{
+    vg_err e;
+    const vg_rig *r = &p->map.rig;
+    if (!mapped.nedits) return;
+    if (p->map.map.kind != VG_MAP_BONES) {
+        vg_fail(&e, VG_EINPUT, "'%s' is a map of patches, --edit needs one of bones: make it with vg-fitmap --skeleton", mapped.map);
+        cli_die(&e);
+    }
+    for (size_t i = 0; i < mapped.nedits; i++) {
+        struct mapped_edit *edit = &mapped.edits[i];
+        edit->number = vg_rig_find(r, edit->bone);
+        if (edit->number == r->nbones) cli_usage("the rig has no bone '%s': 'vg-info %s' lists them", edit->bone, mapped.map);
+        if (edit->axis != 't') {
+            double unit[3] = {edit->axis == 'x', edit->axis == 'y', edit->axis == 'z'};
+            vg_quat_apply(r->turn + 4 * (size_t)r->bone[edit->number], unit, edit->around);
+        } else if (!vg_rig_axis(r, edit->number, edit->around)) {
+            cli_usage("bone '%s' has no end to twist towards: turn it about x, y or z", edit->bone);
+        }
+    }
+}
+
+static void apply_edits(const playback *p, double *transforms)
+{
+    for (size_t i = 0; i < mapped.nedits; i++)
+        vg_rig_edit(&p->map.rig, mapped.edits[i].number, mapped.edits[i].around, mapped.edits[i].degrees, transforms);
+}
+
+static void take_skeleton(playback *p)
+{
+    vg_err e;
+    if (p->map.map.kind != VG_MAP_BONES) {
+        vg_fail(&e, VG_EINPUT, "the input is a skeleton, and '%s' is a map of patches: make one of bones with vg-fitmap --skeleton", mapped.map);
+        cli_die(&e);
+    }
+    if (vg_skeleton_copy(&p->skeleton, &p->h->skeleton, &e) < 0 || vg_joint_fitter_new(&p->fitter, &p->skeleton, &e) < 0 ||
+        vg_driver_new(&p->driver, &p->map.rig, &p->skeleton, mapped.align, &e) < 0)
+        cli_die(&e);
+    size_t missing = vg_driver_missing(p->driver);
+    if (missing) cli_warn("%zu of %zu bones are not in the skeleton by their names: they follow those above them", missing, p->count);
+}
+
 static void check_input(playback *p)
 {
     vg_err e;
@@ -55,7 +133,11 @@ static void check_input(playback *p)
     snprintf(name, sizeof name, "'%.190s'", mapped.map);
     p->kind = h->kind, p->count = p->map.map.n;
     int r = VG_OK;
-    if (p->kind == VG_VERTICES) {
+    if (p->kind == VG_VERTICES && h->skeleton.njoints) {
+        take_skeleton(p);
+    } else if (mapped.align) {
+        cli_usage("--align is for a skeleton that comes in, this input holds %s", vg_kind_name(p->kind));
+    } else if (p->kind == VG_VERTICES) {
         r = vg_mesh_same(&h->mesh, "the sequence", &p->map.mesh, name, &e);
     } else if (p->kind != VG_TRANSFORMS) {
         r = vg_fail(&e, VG_EINPUT, "the input holds %s: --map takes vertices or transforms", vg_kind_name(p->kind));
@@ -71,7 +153,10 @@ static void make_head(playback *p)
     vg_err e;
     vg_head old = *p->h, *h = p->h;
     if (vg_head_merge_trace(&old, &p->map, &e) < 0) cli_die(&e);
+    vg_rig rig = {0}; /* of transforms it says what they move; the player has the other one */
+    if (mapped.transforms && vg_rig_copy(&rig, &p->map.rig, p->map.mesh.nv, &e) < 0) cli_die(&e);
     *h = p->map;
+    h->rig = rig;
     h->nprovenance = old.nprovenance, h->provenance = old.provenance;
     h->extra = old.extra, h->precision = old.precision;
     h->map = (vg_map){0}; /* stays with p->map, where the player has it */
@@ -94,6 +179,7 @@ static void put_batch(playback *p)
     double *to[BATCH];
     for (size_t i = 0; i < p->n; i++) {
         from[i] = p->transforms[i], to[i] = p->out[i].values;
+        apply_edits(p, p->transforms[i]);
         if (mapped.joints) vg_player_place(p->player, p->transforms[i]);
         if (mapped.transforms) memcpy(to[i], from[i], 7 * p->count * sizeof *to[i]);
     }
@@ -107,6 +193,16 @@ static void take_transforms(playback *p, size_t n, double *const *to)
 {
     const double *poses[BATCH] = {NULL};
     for (size_t i = 0; i < n; i++) poses[i] = p->in[i].values;
+    for (size_t i = 0; i < n && p->driver; i++) {
+        const double *turns = p->in[i].turns;
+        size_t joint;
+        if (!p->in[i].nturns) {
+            vg_joint_fitter_fit(p->fitter, poses[i], NULL, &joint);
+            turns = vg_joint_fitter_turns(p->fitter);
+        }
+        vg_driver_pose(p->driver, poses[i], turns, to[i]);
+    }
+    if (p->driver) return;
     if (p->kind == VG_VERTICES) vg_player_measure(p->player, n, poses, to);
     for (size_t i = 0; i < n && p->kind == VG_TRANSFORMS; i++) memcpy(to[i], poses[i], 7 * p->count * sizeof *to[i]);
 }
@@ -184,13 +280,26 @@ static void play_between(playback *p)
     put_batch(p);
 }
 
+/* The reference pose, edited, is all there is. */
+static void play_reference(playback *p)
+{
+    vg_err e;
+    for (size_t i = 0; i < p->count; i++) p->transforms[0][7 * i] = 1;
+    if (vg_frame_rename(&p->out[0], p->h->reference_name, &e) < 0) cli_die(&e);
+    p->n = 1;
+    put_batch(p);
+}
+
 void mapped_run(vg_source *s)
 {
     static playback p; /* lives until the end: what it holds goes with the process */
+    static vg_head alone;
     vg_err e;
-    p.source = s, p.h = vg_source_head(s), p.most = mapped.live ? 1 : BATCH;
+    p.source = s, p.h = s ? vg_source_head(s) : &alone, p.most = mapped.live ? 1 : BATCH;
     load_map(&p);
-    check_input(&p);
+    if (s) check_input(&p);
+    else p.count = p.map.map.n, alone.precision = p.map.precision;
+    find_bones(&p);
     if (vg_player_new(&p.player, &p.map, p.h->precision == VG_F32, cli.threads, &e) < 0) cli_die(&e);
     make_head(&p);
     for (size_t i = 0; i < p.most; i++) {
@@ -198,7 +307,8 @@ void mapped_run(vg_source *s)
         if (vg_frame_shape(&p.out[i], p.h, &e) < 0) cli_die(&e);
     }
     cli_stream_open(p.h);
-    if (between_wanted()) play_between(&p);
+    if (!s) play_reference(&p);
+    else if (between_wanted()) play_between(&p);
     else play_all(&p);
-    cli_stream_end(vg_source_tail(s));
+    cli_stream_end(s ? vg_source_tail(s) : NULL);
 }

@@ -24,9 +24,13 @@ static const cli_option options[] = {
     {"at", 0, "T,...", "write the poses at these moments: 0 is the first pose, 1 the second; outside is extrapolated",
      .text = &between.at},
     {"smooth", 0, NULL, "let velocities not jump at the poses that are interpolated", .flag = &between.smooth},
-    {"map", 0, "MAP", "write the vertices that this map, made by vg-fitmap, gives to the motions of the patches", .text = &mapped.map},
-    {"joints", 0, NULL, "with --map: only rotations and scales of the patches count; joints say where they are", .flag = &mapped.joints},
-    {"transforms", 0, NULL, "with --map: write the motions of the patches, not vertices", .flag = &mapped.transforms},
+    {"map", 0, "MAP", "write the vertices that this map, made by vg-fitmap, gives to motions of patches or bones", .text = &mapped.map},
+    {"edit", 0, "EDIT", "with --map: turn a bone, 'BONE x|y|z|twist DEGREES'; may be repeated; without input, of the reference pose",
+     .take = mapped_take_edit},
+    {"align", 0, NULL, "with --map: the skeleton that comes in rests in another pose than the rig: make its limbs point alike",
+     .flag = &mapped.align},
+    {"joints", 0, NULL, "with --map: only rotations and scales count; joints say where patches and bones are", .flag = &mapped.joints},
+    {"transforms", 0, NULL, "with --map: write the motions of the patches or bones, not vertices", .flag = &mapped.transforms},
     {"live", 0, NULL, "with --map: write each frame at once, before the next is read", .flag = &mapped.live},
     {NULL}};
 
@@ -436,7 +440,8 @@ int main(int argc, char **argv)
     if (between_wanted() && opts.onto) cli_usage("--onto takes poses as they are: pipe those of --interpolate and --at into it");
     mapped_check(opts.onto ? "onto" : NULL);
     load_target(&w);
-    w.s = cli_source(operands, n);
+    if (mapped.map && between_wanted() && !mapped_needs_input(n)) cli_usage("--interpolate and --at need the poses between which they are");
+    if (!mapped.map || mapped_needs_input(n)) w.s = cli_source(operands, n);
     if (mapped.map) {
         mapped_run(w.s);
         cli_finish(0);
