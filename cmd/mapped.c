@@ -197,7 +197,7 @@ static void take_transforms(playback *p, size_t n, double *const *to)
         const double *turns = p->in[i].turns;
         size_t joint;
         if (!p->in[i].nturns) {
-            vg_joint_fitter_fit(p->fitter, poses[i], NULL, &joint);
+            vg_joint_fitter_fit(p->fitter, poses[i], NULL, NULL, &joint);
             turns = vg_joint_fitter_turns(p->fitter);
         }
         vg_driver_pose(p->driver, poses[i], turns, to[i]);
