@@ -24,19 +24,24 @@ static size_t find_joint(const vg_skeleton *s, const char *name)
     return j;
 }
 
-/* Mean distance of a joint from its parent, over the joints that both have: the ratio of the two. */
-static double compare_sizes(const vg_driver *d)
+/* How far the joints that both have lie from their mean at rest: the ratio of the two. */
+static double compare_sizes(const vg_driver *d, const double *rest, const double *theirs)
 {
-    double own = 0, other = 0;
-    for (size_t j = 0; j < d->r->skeleton.njoints; j++) {
-        const vg_joint *joint = &d->r->skeleton.joints[j];
-        if (d->from[j] == UINT32_MAX || joint->parent == UINT32_MAX) continue;
-        const vg_joint *theirs = &d->by->joints[d->from[j]];
-        if (theirs->parent == UINT32_MAX) continue;
-        const double *a = joint->offset, *b = theirs->offset;
-        own += sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]), other += sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2]);
-    }
-    return own > 0 && other > 0 ? own / other : 1;
+    double mean[2][3] = {{0}}, spread[2] = {0, 0};
+    size_t n = 0;
+    for (int pass = 0; pass < 2; pass++)
+        for (size_t j = 0; j < d->r->skeleton.njoints; j++) {
+            if (d->from[j] == UINT32_MAX) continue;
+            const double *x[2] = {rest + 3 * j, theirs + 3 * (size_t)d->from[j]};
+            n += pass == 0;
+            for (int i = 0; i < 2; i++)
+                for (int k = 0; k < 3; k++) {
+                    double gap = x[i][k] - mean[i][k] / (double)n;
+                    if (pass == 0) mean[i][k] += x[i][k];
+                    else spread[i] += gap * gap;
+                }
+        }
+    return spread[0] > 0 && spread[1] > 0 ? sqrt(spread[0] / spread[1]) : 1;
 }
 
 /* The turn of the rig's joint j, at rest, that makes what is below it point where the other's does at rest. */
@@ -66,14 +71,15 @@ static void align_joint(const vg_driver *d, size_t j, const double *rest, const 
     for (int k = 0; k < 4; k++) q[k] /= size;
 }
 
-static int align_all(vg_driver *d, vg_err *e)
+static int compare_rests(vg_driver *d, bool align, vg_err *e)
 {
     size_t n = d->r->skeleton.njoints, m = d->by->njoints;
     double *rest = vgi_array(7 * n, sizeof *rest, e), *theirs = vgi_array(7 * m, sizeof *theirs, e);
     if (rest && theirs) {
         vg_skeleton_pose(&d->r->skeleton, NULL, rest, rest + 3 * n);
         vg_skeleton_pose(d->by, NULL, theirs, theirs + 3 * m);
-        for (size_t j = 0; j < n; j++) {
+        d->scale = compare_sizes(d, rest, theirs);
+        for (size_t j = 0; j < n && align; j++) {
             uint32_t parent = d->r->skeleton.joints[j].parent;
             if (parent != UINT32_MAX) memcpy(d->before + 4 * j, d->before + 4 * (size_t)parent, 4 * sizeof(double));
             if (d->from[j] != UINT32_MAX) align_joint(d, j, rest, theirs);
@@ -104,8 +110,7 @@ int vg_driver_new(vg_driver **out, const vg_rig *r, const vg_skeleton *by, bool 
     if (code == VG_OK && !found)
         code = vg_fail(e, VG_EINPUT, "no joint of the skeleton has the name of a bone of the rig, such as '%.80s'",
                        r->skeleton.joints[r->bone[0]].name);
-    if (code == VG_OK) d->scale = compare_sizes(d);
-    if (code == VG_OK && align) code = align_all(d, e);
+    if (code == VG_OK) code = compare_rests(d, align, e);
     if (code < 0) vg_driver_free(out);
     return code;
 }
