@@ -157,6 +157,9 @@ typedef struct vgi_sequence_format {
      * when open failed, and NULL. */
     int (*open)(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e); /* NULL: only written */
     int (*next)(void *state, vg_frame *f, vg_err *e);
+    /* join (else NULL): for a file that says by name which joint is meant. Called once before next with the skeleton (there is one)
+     * and reference that the frames are of; open then says nothing of the mesh. `with` is borrowed for the call only. */
+    int (*join)(void *state, const vg_head *with, vg_err *e);
     uint64_t (*frames)(const void *state); /* how many the file announces; a single one is called like the file. NULL: unknown */
     void (*close)(void *state);
 
@@ -173,7 +176,7 @@ typedef struct vgi_sequence_format {
 } vgi_sequence_format;
 
 extern const vgi_sequence_format vgi_sequence_pc2, vgi_sequence_mdd, vgi_sequence_npy, vgi_sequence_npz, vgi_sequence_usda,
-    vgi_sequence_bvh, vgi_sequence_glb, vgi_sequence_gltf;
+    vgi_sequence_bvh, vgi_sequence_glb, vgi_sequence_gltf, vgi_sequence_skeleton, vgi_sequence_joints;
 const vgi_sequence_format *vgi_sequence_by_name(const char *name, size_t n);   /* NULL: none */
 const vgi_sequence_format *vgi_sequence_by_suffix(const char *file_name);      /* case does not matter; NULL: none */
 const vgi_sequence_format *vgi_sequence_by_content(const unsigned char *data, size_t n);

@@ -8,6 +8,7 @@
 
 static const uint32_t NONE = UINT32_MAX;
 static const char groups_word[] = "vertices";
+static const char end_suffix[] = ".end";
 
 enum { BONE_FIELDS = 8, FIRST_NUMBER = 2 };
 
@@ -191,6 +192,144 @@ static int take_entries(entries *s, vgi_lines *t, int base, vg_err *e)
     if (r == VG_OK) r = find_parents(s, t->subject, e);
     return r < 0 ? r : order_entries(s, t->subject, e);
 }
+
+/* ---- bones as a sequence of one pose ---- */
+
+typedef struct reading {
+    vg_bytes text;
+    entries bones;
+    vg_skeleton skeleton; /* each bone's head, and its tail as an end site */
+    double *places;       /* of its joints */
+    bool done;
+} reading;
+
+static char *end_name(const char *bone, vg_err *e)
+{
+    size_t n = strlen(bone) + sizeof end_suffix;
+    char *name = vgi_array_raw(n, 1, e);
+    if (name) snprintf(name, n, "%s%s", bone, end_suffix);
+    return name;
+}
+
+/* The next joint, which takes the name over (NULL: there was no memory for it). */
+static int add_joint(reading *b, char *name, uint32_t parent, const double at[3], vg_err *e)
+{
+    vg_skeleton *s = &b->skeleton;
+    vg_joint *j = &s->joints[s->njoints];
+    if (!name) return VG_ENOMEM;
+    *j = (vg_joint){.name = name, .parent = parent};
+    memcpy(b->places + 3 * s->njoints++, at, 3 * sizeof *at);
+    for (int k = 0; k < 3; k++) j->offset[k] = at[k] - (parent == NONE ? 0 : b->places[3 * (size_t)parent + k]);
+    return vgi_finite(j->offset, 3) ? VG_OK : vg_fail(e, VG_EINPUT, "joint '%.80s' lies beyond all numbers from its parent", name);
+}
+
+static int add_head(reading *b, entry *bone, uint32_t parent, vg_err *e)
+{
+    static const uint8_t channels[6] = {1, 2, 3, 6, 4, 5}; /* place, then z x y */
+    char *name = bone->name;
+    bone->name = NULL;
+    vg_joint *j = &b->skeleton.joints[b->skeleton.njoints];
+    int r = add_joint(b, name, parent, bone->head, e);
+    size_t skip = parent == NONE ? 0 : 3;
+    j->nchannels = (uint32_t)(6 - skip);
+    memcpy(j->channels, channels + skip, 6 - skip);
+    return r;
+}
+
+/* From bone i on upward to bone `up`, not included: all that is below them is there, so that their ends come. */
+static int add_ends(reading *b, const uint32_t *place, uint32_t i, uint32_t up, vg_err *e)
+{
+    int r = VG_OK;
+    for (; r == VG_OK && i != up; i = b->bones.at[i].parent)
+        r = add_joint(b, end_name(b->skeleton.joints[place[i]].name, e), place[i], b->bones.at[i].tail, e);
+    return r;
+}
+
+static int make_skeleton(reading *b, vg_err *e)
+{
+    entries *s = &b->bones;
+    uint32_t *place = vgi_array_raw(s->n, sizeof *place, e), last = NONE; /* of each bone: its joint */
+    b->skeleton.joints = vgi_array(2 * s->n, sizeof *b->skeleton.joints, e);
+    b->places = vgi_array(2 * s->n, 3 * sizeof *b->places, e);
+    int r = place && b->skeleton.joints && b->places ? VG_OK : VG_ENOMEM;
+    for (size_t k = 0; r == VG_OK && k < s->n; k++) {
+        uint32_t i = s->order[k], above = s->at[i].parent;
+        if (last != above) r = add_ends(b, place, last, above, e);
+        place[i] = (uint32_t)b->skeleton.njoints;
+        if (r == VG_OK) r = add_head(b, &s->at[i], above == NONE ? NONE : place[above], e);
+        last = i;
+    }
+    if (r == VG_OK) r = add_ends(b, place, last, NONE, e);
+    free(place);
+    return r;
+}
+
+static int open_skeleton(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)
+{
+    reading *b = *state = vgi_array(1, sizeof *b, e);
+    if (!b) return VG_ENOMEM;
+    int r = vgi_input_slurp(in, &b->text, e);
+    if (r < 0) return r;
+    vgi_lines t = vgi_lines_of(b->text.data, b->text.size, subject);
+    if ((r = take_entries(&b->bones, &t, -1, e)) < 0 || (r = make_skeleton(b, e)) < 0) return r;
+    size_t n = b->skeleton.njoints;
+    r = vg_skeleton_mesh(&b->skeleton, &h->mesh, e);
+    if (r == VG_OK) r = vg_skeleton_copy(&h->skeleton, &b->skeleton, e);
+    if (r == VG_OK && !(h->reference = vgi_copy_array(b->places, n, 3 * sizeof *b->places, e))) r = VG_ENOMEM;
+    h->kind = VG_VERTICES, h->precision = VG_F64, h->count = n;
+    return r;
+}
+
+/* The rest pose: nothing has turned. */
+static int next_pose(void *state, vg_frame *f, vg_err *e)
+{
+    reading *b = state;
+    if (b->done) return 0;
+    size_t n = b->skeleton.njoints;
+    double *turns = vgi_array(n, 4 * sizeof *turns, e);
+    if (!turns) return VG_ENOMEM;
+    for (size_t j = 0; j < n; j++) turns[4 * j] = 1;
+    int r = vg_frame_turn(f, turns, n, e);
+    free(turns);
+    memcpy(f->values, b->places, 3 * n * sizeof *f->values);
+    b->done = true;
+    return r < 0 ? r : 1;
+}
+
+static uint64_t one_frame(const void *state)
+{
+    (void)state;
+    return 1;
+}
+
+static void close_skeleton(void *state)
+{
+    reading *b = state;
+    if (!b) return;
+    vg_bytes_clear(&b->text);
+    clear_entries(&b->bones);
+    vg_skeleton_clear(&b->skeleton);
+    free(b->places);
+    free(b);
+}
+
+/* Its first line is a bone, or a group, which is refused by its right name. */
+static bool sniff_skeleton(const unsigned char *data, size_t n)
+{
+    vgi_lines t = vgi_lines_of(data, n, "");
+    vgi_line l;
+    double x;
+    if (!vgi_lines_next(&t, &l) || l.n < 4 || vgi_field_number(&l.at[1], &x)) return false;
+    if (says_group(&l)) return vgi_field_number(&l.at[3], &x);
+    bool bone = l.n == BONE_FIELDS;
+    for (size_t i = FIRST_NUMBER; bone && i < BONE_FIELDS; i++) bone = vgi_field_number(&l.at[i], &x);
+    return bone;
+}
+
+const vgi_sequence_format vgi_sequence_skeleton = {
+    .name = "skeleton", .suffix = ".skeleton.txt",
+    .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_SKELETON,
+    .sniff = sniff_skeleton, .open = open_skeleton, .next = next_pose, .close = close_skeleton, .frames = one_frame};
 
 /* ---- groups of vertices ---- */
 

@@ -46,7 +46,7 @@ struct vg_source {
     bool stdin_named;
     bool through;        /* one stream: handed on as it is */
     vg_head head;        /* of the joined sequence; the caller may change it */
-    vg_head own;         /* what frames are measured by: mesh, kind, count */
+    vg_head own;         /* what frames are measured by: mesh, kind, count; of a skeleton also its joints and reference */
     char *own_name;      /* who brought the mesh, quoted for messages; NULL: nobody yet */
     vg_records tail;
     /* the item being read: */
@@ -267,6 +267,15 @@ static int settle_mesh(vg_source *s, const vg_mesh *mesh, const char *archive, c
     return (s->own_name = subject_of(archive, path, e)) ? VG_OK : VG_ENOMEM;
 }
 
+/* The skeleton that files of joints by name are about, when the mesh is one. */
+static int keep_skeleton(vg_source *s, const vg_head *h, vg_err *e)
+{
+    if (!h->skeleton.njoints) return VG_OK;
+    int r = vg_skeleton_copy(&s->own.skeleton, &h->skeleton, e);
+    if (r == VG_OK && !(s->own.reference = vgi_copy_array(h->reference, 3 * h->mesh.nv, sizeof *h->reference, e))) r = VG_ENOMEM;
+    return r;
+}
+
 /* The head of a stream among several operands: the first one's is taken over, of later ones only the provenance. */
 static int join_head(vg_source *s, const item *it, const vg_head *h, vg_err *e)
 {
@@ -275,7 +284,8 @@ static int join_head(vg_source *s, const item *it, const vg_head *h, vg_err *e)
                        item_name(it), vg_kind_name(h->kind));
     if (s->own_name || it != s->items) return vg_head_merge_trace(&s->head, h, e);
     int r = vg_head_copy(&s->head, h, e);
-    return r < 0 ? r : settle_mesh(s, &h->mesh, NULL, item_name(it), e);
+    if (r == VG_OK) r = settle_mesh(s, &h->mesh, NULL, item_name(it), e);
+    return r < 0 ? r : keep_skeleton(s, h, e);
 }
 
 static int look_at_stream(vg_source *s, item *it, vg_err *e)
@@ -521,6 +531,7 @@ static int take_over_head(vg_source *s, const char *archive, const char *path, v
         !(s->own.anchors = vgi_copy_array(s->head.anchors, s->head.nanchors, sizeof *s->head.anchors, e)))
         return VG_ENOMEM;
     s->own.nanchors = s->head.nanchors;
+    if (s->head.reference && (r = keep_skeleton(s, &s->head, e)) < 0) return r;
     if (!s->head.reference) return reference_from_first(s, e);
     if (!s->head.reference_name) s->head.reference_name = vgi_copy_string(p->stem, strlen(p->stem), e);
     return s->head.reference_name ? VG_OK : VG_ENOMEM;
@@ -529,6 +540,7 @@ static int take_over_head(vg_source *s, const char *archive, const char *path, v
 static int join_sequence(const vg_source *s, const vg_head *h, vg_err *e)
 {
     const char *subject = s->playing.subject;
+    if (s->playing.format->join) return s->playing.format->join(s->playing.state, &s->own, e);
     if (h->kind != VG_VERTICES)
         return vg_fail(e, VG_EINPUT, "%s holds %s: only vertices can be joined with a mesh or other inputs", subject,
                        vg_kind_name(h->kind));
@@ -549,6 +561,8 @@ static int play(vg_source *s, const vgi_sequence_format *format, vgi_input *in, 
     p->format = format;
     int r = format->open(&p->state, &h, in, p->subject, e);
     if (r == VG_OK && h.mesh.nf) r = vg_mesh_check(&h.mesh, p->subject, e);
+    if (r == VG_OK && format->join && !s->own.skeleton.njoints)
+        r = vg_fail(e, VG_EINPUT, "%s holds joints by name: name the file of their skeleton with --mesh", p->subject);
     if (r == VG_OK) r = s->own_name ? join_sequence(s, &h, e) : take_over_head(s, archive, path, &h, e);
     vg_head_clear(&h);
     return r;
@@ -622,9 +636,11 @@ static int settle_named_mesh(vg_source *s, const char *mesh, vg_err *e)
     vg_head from;
     int r = vg_load_mesh(&from, mesh, e);
     if (r == VG_OK) r = settle_mesh(s, &from.mesh, NULL, mesh, e);
+    if (r == VG_OK) r = keep_skeleton(s, &from, e);
     if (r == VG_OK) r = vg_head_merge_trace(&s->head, &from, e);
     if (r == VG_OK) {
-        s->head.mesh = from.mesh, s->head.attributes = from.attributes;
+        s->head.mesh = from.mesh, s->head.attributes = from.attributes, s->head.skeleton = from.skeleton;
+        from.skeleton = (vg_skeleton){0};
         s->head.reference = from.reference, s->head.reference_name = from.reference_name;
         from.mesh = (vg_mesh){0}, from.attributes = (vg_attributes){0};
         from.reference = NULL, from.reference_name = NULL;
