@@ -168,11 +168,17 @@ static void catch_signals(void)
         if (!sigaction(numbers[i], NULL, &old) && old.sa_handler != SIG_IGN) sigaction(numbers[i], &handler, NULL);
 }
 
-/* Leave nothing half-written: no temporary file, and no stream that only stops. */
-static void abandon_output(int status, const char *message)
+static vg_source *upstream; /* of cli_source: it may know of a program before this one that failed */
+
+/* Leave nothing half-written: no temporary file, and no stream that only stops. Of a pipe's programs the first that failed is
+ * named to all behind it. */
+static void abandon_output(int code, int status, const char *message)
 {
+    const vg_failure *before = code == VG_ETRUNC && upstream ? vg_source_failure(upstream) : NULL;
     if (out.has_temporary)
         remove_temporary();
+    else if (out.writer && before)
+        vg_writer_abandon(out.writer, before->program, (int)before->status, before->message);
     else if (out.writer)
         vg_writer_abandon(out.writer, cli.program->name, status, message);
 }
@@ -183,7 +189,7 @@ void cli_die(const vg_err *e)
     if (status < 2) status = 4;
     remove_temporary();
     say_error("%s", e->message);
-    abandon_output(status, e->message);
+    abandon_output(e->code, status, e->message);
     leave(status);
 }
 
@@ -197,7 +203,7 @@ void cli_no(const char *format, ...)
     strip_controls(text);
     remove_temporary();
     say_error("%s", text);
-    abandon_output(1, text);
+    abandon_output(VG_OK, 1, text);
     leave(1);
 }
 
@@ -226,7 +232,7 @@ void cli_usage(const char *format, ...)
     say_error("%s", text);
     int n = snprintf(usage, sizeof usage, "usage: %s %s\n", cli.program->name, cli.program->synopsis);
     if (n > 0) print_error(usage, (size_t)n < sizeof usage ? (size_t)n : sizeof usage - 1);
-    abandon_output(2, text);
+    abandon_output(VG_EARG, 2, text);
     leave(2);
 }
 
@@ -242,12 +248,17 @@ static bool ends_with(const char *s, size_t n, const char *suffix)
     return n > k && !strncasecmp(s + n - k, suffix, k);
 }
 
-/* A name that promises something else than a stream: better said before an hour of work than after it. */
+/* Names that promise something else than a stream: better said before an hour of work than after it. */
+static bool names_picture(const char *name)
+{
+    return ends_with(name, strlen(name), ".png") || ends_with(name, strlen(name), ".html");
+}
+
 static bool names_meshes(const char *name)
 {
     static const char *const suffixes[] = {".obj", ".ply", ".off", ".stl", ".glb", ".gltf", ".pc2", ".mdd", ".npy",
         ".npz", ".bvh", ".fbx", ".dae", ".abc", ".usd", ".zip", ".7z", ".tar", ".tgz", ".tar.gz", ".tar.xz",
-        ".tar.zst", ".tar.bz2", ".png", ".html"};
+        ".tar.zst", ".tar.bz2"};
     size_t n = strlen(name);
     const char *colon = strrchr(name, ':'); /* "out.zip:ply" */
     for (size_t i = 0; i < sizeof suffixes / sizeof *suffixes; i++)
@@ -278,8 +289,8 @@ static void check_output(bool stream)
 {
     const char *name = cli.output;
     struct stat st;
-    if (stream && name && names_meshes(name))
-        cli_usage("%s writes a stream: pipe it into 'vg-decode -o %s'", cli.program->name, name);
+    if (stream && name && (names_meshes(name) || names_picture(name)))
+        cli_usage("the output is a stream: pipe it into '%s -o %s'", names_picture(name) ? "vg-view" : "vg-decode", name);
     if (stream && !name && isatty(STDOUT_FILENO))
         cli_usage("a stream is not written to a terminal: use -o FILE or a pipe");
     if (!name) return;
@@ -659,6 +670,41 @@ static const cli_option *find_option(const cli_option *const *all, size_t n, int
     return NULL;
 }
 
+/* The least number of letters to insert, drop, replace or swap with a neighbour that makes `text` of `name`. */
+static size_t edit_distance(const char *text, size_t n, const char *name)
+{
+    enum { MOST = 32 };
+    size_t row[MOST + 1], last[MOST + 1] = {0}, before[MOST + 1], k = strlen(name);
+    if (n > MOST || k > MOST) return SIZE_MAX;
+    for (size_t j = 0; j <= k; j++) row[j] = j;
+    for (size_t i = 1; i <= n; i++) {
+        memcpy(before, last, sizeof before);
+        memcpy(last, row, sizeof last);
+        row[0] = i;
+        for (size_t j = 1; j <= k; j++) {
+            size_t best = last[j - 1] + (text[i - 1] != name[j - 1]);
+            if (last[j] + 1 < best) best = last[j] + 1;
+            if (row[j - 1] + 1 < best) best = row[j - 1] + 1;
+            bool swapped = i > 1 && j > 1 && text[i - 1] == name[j - 2] && text[i - 2] == name[j - 1];
+            if (swapped && before[j - 2] + 1 < best) best = before[j - 2] + 1;
+            row[j] = best;
+        }
+    }
+    return row[k];
+}
+
+/* The option that was meant, most likely: the nearest, unless a third of it or more would be wrong. */
+static const cli_option *likely_option(const cli_option *const *all, size_t n, const char *text, size_t length)
+{
+    const cli_option *likely = NULL;
+    size_t least = length / 3 + 1;
+    for (size_t i = 0; i < n; i++) {
+        size_t d = edit_distance(text, length, all[i]->name);
+        if (d < least) least = d, likely = all[i];
+    }
+    return likely;
+}
+
 /* What getopt did not like, in our words. */
 static void refuse_option(const cli_option *const *all, size_t n, int problem, char **argv) __attribute__((noreturn));
 static void refuse_option(const cli_option *const *all, size_t n, int problem, char **argv)
@@ -666,9 +712,16 @@ static void refuse_option(const cli_option *const *all, size_t n, int problem, c
     const cli_option *o = find_option(all, n, optopt);
     if (problem == ':' && o) cli_usage("option '--%s' needs a value: %s", o->name, o->value);
     if (o) cli_usage("option '--%s' takes no value", o->name);
-    if (optopt) cli_usage("unknown option '-%c'", optopt);
+    if (optopt) cli_usage("unknown option '-%c': '%s --help' lists them", optopt, cli.program->name);
     const char *text = argv[optind - 1];
-    cli_usage("unknown or ambiguous option '%.*s'", (int)strcspn(text, "="), text);
+    int length = (int)strcspn(text, "=");
+    const cli_option *first = NULL, *second = NULL;
+    for (size_t i = 0; i < n; i++)
+        if (length > 2 && !strncmp(all[i]->name, text + 2, (size_t)length - 2)) *(first ? &second : &first) = all[i];
+    if (second) cli_usage("ambiguous option '%.*s': it could be '--%s' or '--%s'", length, text, first->name, second->name);
+    if (length > 2 && (o = likely_option(all, n, text + 2, (size_t)length - 2)))
+        cli_usage("unknown option '%.*s': did you mean '--%s'?", length, text, o->name);
+    cli_usage("unknown option '%.*s': '%s --help' lists them", length, text, cli.program->name);
 }
 
 /* Operands are collected in order, options may stand between them; what follows "--" are operands. */
@@ -797,5 +850,5 @@ vg_source *cli_source_with(char **operands, size_t n, const char *mesh)
         cli_usage("no input: name a stream, mesh file, archive or directory, or pipe one into %s", cli.program->name);
     if (vg_source_open_with(&s, from, n ? n : 1, mesh, &e) < 0) cli_die(&e);
     if (vg_source_warning(s)) cli_warn("%s", vg_source_warning(s));
-    return s;
+    return upstream = s;
 }

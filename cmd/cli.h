@@ -66,7 +66,8 @@ double cli_parse_number(const char *option, const char *text);
 /* cli_parse_vertices: "3,17,4" to an ascending list without repetition (free with free()), or cli_usage. */
 size_t cli_parse_vertices(const char *option, const char *text, uint32_t **vertices);
 
-/* The input of a filter: its operands, or standard input when there are none. */
+/* The input of a filter: its operands, or standard input when there are none. To be closed when nothing is left to be read: what
+ * cli_die says of a program before this one comes from it. */
 vg_source *cli_source(char **operands, size_t n);
 /* The same; mesh (may be NULL): the faces and reference pose of operands without faces. */
 vg_source *cli_source_with(char **operands, size_t n, const char *mesh);

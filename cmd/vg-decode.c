@@ -36,7 +36,7 @@ int main(int argc, char **argv)
     vg_err e;
     vg_sink *sink;
     sink_options.first_number = first_number, sink_options.most_targets = (size_t)most_targets;
-    if (!output) cli_usage("where to? name the output with -o");
+    if (!output) cli_usage("name the output: -o poses.zip, -o 'pose-%%04d.obj', or -o poses/");
     if (vg_sink_check(output, &sink_options, &e) < 0) cli_die(&e);
 
     vg_source *s = cli_source(operands, n);
@@ -49,6 +49,8 @@ int main(int argc, char **argv)
         cli_progress("poses", ++frames);
     }
     if (r == 0) r = vg_sink_end(sink, &e);
+    if (r == 0 && !frames)
+        cli_warn("the input has no poses: '%s' holds none%s", output, vg_source_head(s)->map.n ? "; vg-deform --map plays a map" : "");
     for (size_t i = 0; r == 0 && vg_sink_warning(sink, i); i++) cli_warn("%s", vg_sink_warning(sink, i));
     vg_sink_close(&sink);
     if (r < 0) cli_die(&e);

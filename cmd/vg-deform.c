@@ -142,9 +142,9 @@ static void set_root(work *w)
     uint32_t *vertex;
     if (!opts.root || !strcmp(opts.root, "centroid")) return;
     if ((w->root.stay = !strcmp(opts.root, "stay"))) return;
-    if (cli_parse_vertices("--root", opts.root, &vertex) != 1)
-        cli_usage("--root is 'centroid', 'stay' or one vertex number, not '%s'", opts.root);
-    if (vertex[0] >= w->h->mesh.nv) cli_usage("--root names vertex %u of %zu", vertex[0], w->h->mesh.nv);
+    if (opts.root[strspn(opts.root, "0123456789")] || cli_parse_vertices("--root", opts.root, &vertex) != 1)
+        cli_usage("--root is 'centroid', 'stay' or the number of a vertex, not '%s'", opts.root);
+    if (vertex[0] >= w->h->mesh.nv) cli_usage("--root names vertex %u, but there are %zu, counted from 0", vertex[0], w->h->mesh.nv);
     if (opts.correspondence) cli_usage("--root V needs one connectivity: with --correspondence it is 'centroid' or 'stay'");
     if (w->kind != VG_VERTICES)
         cli_usage("--root %u needs a sequence of vertices, this one holds %s", vertex[0], vg_kind_name(w->kind));

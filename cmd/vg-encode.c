@@ -61,7 +61,7 @@ static void set_reference(vg_head *h, const char *operand)
 static void set_anchors(vg_head *h, uint32_t *anchors, size_t n)
 {
     if (n && anchors[n - 1] >= h->mesh.nv)
-        cli_usage("--anchor names vertex %u of %zu", anchors[n - 1], h->mesh.nv);
+        cli_usage("--anchor names vertex %u, but there are %zu, counted from 0", anchors[n - 1], h->mesh.nv);
     free(h->anchors);
     h->anchors = anchors, h->nanchors = n;
 }

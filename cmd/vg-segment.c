@@ -31,9 +31,10 @@ enum { BATCH = 8 };
 static size_t parse_patches(void)
 {
     if (!strcmp(opts.patches, "auto")) return 0;
-    double k = cli_parse_number("--patches", opts.patches);
-    if (!(k >= 1 && k <= 4294967294.0) || k != (double)(size_t)k)
-        cli_usage("--patches is a number from 1 on or 'auto', not '%s'", opts.patches);
+    char *end;
+    double k = strtod(opts.patches, &end);
+    if (*end || opts.patches[strspn(opts.patches, "0123456789")] || !(k >= 1 && k <= 4294967294.0))
+        cli_usage("--patches is a whole number from 1 on or 'auto', not '%s'", opts.patches);
     return (size_t)k;
 }
 

@@ -801,9 +801,18 @@ int vg_reader_open(vg_reader **r, int fd, const char *name, vg_err *e) VG_MUST_C
 int vg_reader_open_memory(vg_reader **r, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
 /* vg_reader_head: what was read; the caller may change it (it is what a filter hands to its writer). */
 vg_head *vg_reader_head(vg_reader *r);
+/* What a stream says that its writer gave up on: the record FAIL. */
+typedef struct vg_failure {
+    char *program; /* NULL: there is no such record */
+    uint32_t status; /* exit status */
+    char *message; /* one line */
+} vg_failure;
+
 /* vg_reader_next: 1 and the next frame; 0 at the END mark, nothing left behind it; negative on damage. */
 int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e) VG_MUST_CHECK;
 vg_records *vg_reader_tail(vg_reader *r); /* unknown records after the last frame, valid when next has given 0 */
+/* vg_reader_failure: why vg_reader_next gave VG_ETRUNC, if the stream says it; else NULL. Borrowed until close. */
+const vg_failure *vg_reader_failure(const vg_reader *r);
 void vg_reader_close(vg_reader **r);
 
 typedef struct vg_writer vg_writer;
@@ -832,6 +841,7 @@ const char *vg_source_warning(const vg_source *s);
 vg_head *vg_source_head(vg_source *s);
 int vg_source_next(vg_source *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
 vg_records *vg_source_tail(vg_source *s);
+const vg_failure *vg_source_failure(const vg_source *s); /* as vg_reader_failure */
 void vg_source_close(vg_source **s);
 
 /* vg_load_mesh: the mesh behind one operand, as a head whose reference is the operand's reference pose (for a mesh

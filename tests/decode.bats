@@ -77,11 +77,11 @@ END
     must vg-encode --vectors a.obj -o vectors.vgs
     must vg-deform a.obj -o deformations.vgs
     for kind in vectors deformations; do
-        must_fail 2 vg-decode $kind.vgs -o out.obj
+        must_fail 3 vg-decode $kind.vgs -o out.obj
         one_line
-        says "holds $kind" "through vg-solve first"
+        says "holds $kind" "through 'vg-solve' first"
     done
-    must_fail 2 vg-decode "$GOLDEN/transforms.vgs" -o out.obj
+    must_fail 3 vg-decode "$GOLDEN/transforms.vgs" -o out.obj
     nothing_but a.obj vectors.vgs deformations.vgs
 }
 

@@ -138,7 +138,7 @@ END
     must_fail 2 vg-deform --root stay cube.obj
     says "--root needs --onto"
     must_fail 2 vg-deform --onto cube.obj --root 8 cube.obj
-    says "vertex 8 of 8"
+    says "vertex 8, but there are 8"
     must vg-encode --vectors cube.obj -o vectors.vgs
     must_fail 2 vg-deform --onto cube.obj --root 1 vectors.vgs
     says "needs a sequence of vertices" "vectors"

@@ -433,7 +433,7 @@ END
     says "option '--json' is about the report"
     must_fail 2 vg-diff a.obj a.obj --heat x -o x
     must_fail 2 vg-diff a.obj a.obj --heat x.png
-    says "writes a stream"
+    says "the output is a stream"
     must_fail 1 vg-diff a.obj b.obj --heat x --json
     printf '%s' "$output" >r.json
     is r.json comparable false

@@ -116,7 +116,7 @@ END
         says vg-encode: usage:
     done
     must_fail 2 vg-encode --anchor 3,8 a.obj -o bad.vgs
-    says "vertex 8 of 8"
+    says "vertex 8, but there are 8"
     nothing_but a.obj out.vgs
 }
 

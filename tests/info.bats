@@ -257,8 +257,10 @@ stream 1.0" ]
     mesh cube >a.obj
     for name in out.obj out.PLY out.tar.gz out.zip:ply out.glb; do
         must_fail 2 vg-encode missing.obj -o "$name"
-        says "vg-encode writes a stream: pipe it into 'vg-decode -o $name'"
+        says "vg-encode: the output is a stream: pipe it into 'vg-decode -o $name'"
     done
+    must_fail 2 vg-encode missing.obj -o look.html
+    says "pipe it into 'vg-view -o look.html'"
     nothing_but a.obj
 }
 

@@ -583,8 +583,8 @@ static int not_an_archive(const vgi_archive *a, vg_err *e)
     size_t got = 0;
     if (read_at(a->file.fd, start, sizeof start, a->file.base, &got) == 0 && vgi_is_archive(start, got))
         return vg_fail(e, VG_ETRUNC, "archive '%s' is damaged or cut short", a->name);
-    return vg_fail(e, VG_EINPUT, "cannot tell what '%s' is: no stream, no archive, no mesh file (%s)", a->name,
-                   vgi_format_names());
+    return vg_fail(e, VG_EINPUT, "cannot tell what '%s' is: no stream, no archive, none of %s; export other kinds as one of them",
+                   a->name, vgi_kinds_read());
 }
 
 /* Files of whole sequences count only where there are no mesh files, as in directories. */
@@ -613,7 +613,7 @@ static int list_members(vgi_archive *a, vg_err *e)
     if (r == VG_OK && a->n == 0 && a->wanted != is_mesh_name)
         r = vg_fail(e, VG_EINPUT, "archive '%s' holds none of the files it should", a->name);
     else if (r == VG_OK && a->n == 0)
-        r = vg_fail(e, VG_EINPUT, "archive '%s' holds no mesh file (%s)", a->name, vgi_format_names());
+        r = vg_fail(e, VG_EINPUT, "archive '%s' holds no mesh file (%s)", a->name, vgi_kinds_read());
     if (r == VG_OK) prefer_poses(a);
     return r;
 }

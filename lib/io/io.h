@@ -183,6 +183,7 @@ const vgi_sequence_format *vgi_sequence_by_content(const unsigned char *data, si
 /* vgi_packable: the sequence format, or NULL, of a file that can stand for poses in a directory or archive: it brings its faces. */
 const vgi_sequence_format *vgi_packable(const char *file_name);
 const char *vgi_sequence_names(void); /* "pc2, mdd, ..." for messages, those that are written */
+const char *vgi_kinds_read(void); /* "OBJ, PLY, ..." for messages: all that is read, but for streams and archives */
 
 /* vgi_model_write: vg_model_write with a shape, which is not checked. */
 int vgi_model_write(vg_bytes *out, const char *format, const vgi_writing *w, vg_err *e) VG_MUST_CHECK;

@@ -505,19 +505,25 @@ int vgi_values_encode(vg_bytes *b, const double *x, size_t n, vg_precision preci
 
 /* ---- FAIL ---- */
 
-int vgi_fail_decode(const vgi_payload *p, const char *stream, vg_err *e)
+int vgi_fail_decode(vg_failure *f, const vgi_payload *p, const char *stream, vg_err *e)
 {
     cursor c = start(p);
     int r = VG_OK;
-    uint32_t status = take32(&c);
-    char *program = take_text(&c, take32(&c), p, &r, e);
-    char *message = program ? take_text(&c, take32(&c), p, &r, e) : NULL;
-    if (message && left(&c)) r = wrong(p, "bytes are left over", e);
-    else if (message)
-        r = vg_fail(e, VG_ETRUNC, "'%s' was cut short: %s failed with status %u: %s", stream, program, status, message);
-    free(program);
-    free(message);
+    f->status = take32(&c);
+    f->program = take_text(&c, take32(&c), p, &r, e);
+    f->message = f->program ? take_text(&c, take32(&c), p, &r, e) : NULL;
+    if (f->message && left(&c)) r = wrong(p, "bytes are left over", e);
+    else if (f->message)
+        return vg_fail(e, VG_ETRUNC, "'%s' was cut short: %s failed with status %u: %s", stream, f->program, f->status, f->message);
+    vgi_failure_clear(f);
     return r;
+}
+
+void vgi_failure_clear(vg_failure *f)
+{
+    free(f->program);
+    free(f->message);
+    *f = (vg_failure){0};
 }
 
 int vgi_fail_encode(vg_bytes *b, const char *program, int status, const char *message, vg_err *e)

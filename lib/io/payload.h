@@ -47,7 +47,8 @@ int vgi_scal_decode(const vgi_payload *p, const vg_head *h, vg_frame *f, vg_err 
 int vgi_scal_encode(vg_bytes *b, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
 
 /* FAIL: VG_ETRUNC with the story of who failed. */
-int vgi_fail_decode(const vgi_payload *p, const char *stream, vg_err *e) VG_MUST_CHECK;
+int vgi_fail_decode(vg_failure *f, const vgi_payload *p, const char *stream, vg_err *e) VG_MUST_CHECK;
+void vgi_failure_clear(vg_failure *f);
 int vgi_fail_encode(vg_bytes *b, const char *program, int status, const char *message, vg_err *e) VG_MUST_CHECK;
 
 #endif

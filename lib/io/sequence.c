@@ -46,6 +46,11 @@ const char *vgi_sequence_names(void)
     return "pc2, mdd, npy, npz, usda, bvh, glb, gltf";
 }
 
+const char *vgi_kinds_read(void)
+{
+    return "OBJ, PLY, OFF, STL, GLB, glTF, BVH, PC2, MDD, NPY, NPZ";
+}
+
 /* ---- output ---- */
 
 enum { BLOCK = 1 << 20 };

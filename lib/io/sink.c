@@ -142,7 +142,7 @@ static int find_number(plan *p, vg_err *e)
 static int unknown_kind(const char *output, vg_err *e)
 {
     return vg_fail(e, VG_EARG,
-                   "cannot tell the format of '%s': known are %s, %s, archives %s, or name it with --format", output,
+                   "cannot tell the format of '%s': known are %s, %s, archives %s; a directory ends in '/'", output,
                    vgi_format_names(), vgi_sequence_names(), vgi_packer_suffixes());
 }
 
@@ -285,11 +285,11 @@ static int check_kind(const plan *p, const vg_head *h, const char *output, vg_er
 {
     const vgi_sequence_format *f = p->sequence;
     if (f ? f->kinds >> h->kind & 1 : h->kind == VG_VERTICES) return f && f->check ? f->check(h, output, e) : VG_OK;
-    const char *advice = h->kind == VG_VECTORS ? "pipe it through vg-solve first"
+    const char *advice = h->kind == VG_VECTORS ? "pipe it through 'vg-solve' first"
                          : h->kind == VG_DEFORMATIONS
-                             ? "apply them with vg-deform and pipe that through vg-solve first"
+                             ? "apply them with 'vg-deform --onto MESH' and pipe that through 'vg-solve' first"
                              : "only vertices can be written as meshes";
-    return vg_fail(e, VG_EARG, "cannot write '%s': the input holds %s: %s", output, vg_kind_name(h->kind), advice);
+    return vg_fail(e, VG_EINPUT, "cannot write '%s': the input holds %s: %s", output, vg_kind_name(h->kind), advice);
 }
 
 /* ---- temporary files ---- */

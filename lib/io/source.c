@@ -125,7 +125,7 @@ static int list_directory(vgi_names *names, const char *path, vg_err *e)
     if (r == VG_OK && errno) r = vg_fail(e, VG_ESYS, "cannot read directory '%s': %s", path, strerror(errno));
     closedir(dir);
     if (r == VG_OK && names->n == 0)
-        r = vg_fail(e, VG_EINPUT, "directory '%s' holds no mesh file (%s)", path, vgi_format_names());
+        r = vg_fail(e, VG_EINPUT, "directory '%s' holds no mesh file (%s)", path, vgi_kinds_read());
     vgi_names_sort(names);
     return r;
 }
@@ -355,6 +355,15 @@ static int take_over_model(vg_source *s, const char *archive, const char *path, 
     return s->head.reference && s->head.reference_name ? VG_OK : VG_ENOMEM;
 }
 
+/* Does what comes next have the faces of what came before? */
+static int check_joins(const vg_source *s, const vg_mesh *next, const char *subject, vg_err *e)
+{
+    int r = vg_mesh_same(&s->own.mesh, s->own_name, next, subject, e);
+    size_t n = r < 0 && e ? strlen(e->message) : 0;
+    if (n) snprintf(e->message + n, sizeof e->message - n, ": all poses of a sequence have the same vertices and faces");
+    return r;
+}
+
 /* The mesh file in s->data becomes the pose that is handed out next. */
 static int take_pose(vg_source *s, const char *archive, const char *path, vg_err *e)
 {
@@ -367,7 +376,7 @@ static int take_pose(vg_source *s, const char *archive, const char *path, vg_err
     if (r == VG_OK && vgi_is_stream(s->data.data, s->data.size))
         r = vg_fail(e, VG_EINPUT, "%s is a compressed stream: unpack it in the pipe before", subject);
     if (r == VG_OK) r = vgi_model_read(&s->model, s->data.data, s->data.size, NULL, path, subject, e);
-    if (r == VG_OK) r = s->own_name ? vg_mesh_same(&s->own.mesh, s->own_name, &s->model.mesh, subject, e)
+    if (r == VG_OK) r = s->own_name ? check_joins(s, &s->model.mesh, subject, e)
                                     : take_over_model(s, archive, path, e);
     s->waiting = r == VG_OK;
     free(subject);
@@ -392,7 +401,7 @@ static int open_stream(vg_source *s, item *it, vg_err *e)
     const vg_head *h = vg_reader_head(s->reader);
     char *subject = subject_of(NULL, item_name(it), e);
     if (!subject) return VG_ENOMEM;
-    r = s->own_name ? vg_mesh_same(&s->own.mesh, s->own_name, &h->mesh, subject, e) : VG_OK;
+    r = s->own_name ? check_joins(s, &h->mesh, subject, e) : VG_OK;
     free(subject);
     return r;
 }
@@ -544,7 +553,7 @@ static int join_sequence(const vg_source *s, const vg_head *h, vg_err *e)
     if (h->kind != VG_VERTICES)
         return vg_fail(e, VG_EINPUT, "%s holds %s: only vertices can be joined with a mesh or other inputs", subject,
                        vg_kind_name(h->kind));
-    if (h->mesh.nf) return vg_mesh_same(&s->own.mesh, s->own_name, &h->mesh, subject, e);
+    if (h->mesh.nf) return check_joins(s, &h->mesh, subject, e);
     return h->mesh.nv == s->own.mesh.nv ? VG_OK : different_count(h, subject, s->own.mesh.nv, s->own_name, e);
 }
 
@@ -683,6 +692,11 @@ const char *vg_source_warning(const vg_source *s)
 vg_head *vg_source_head(vg_source *s)
 {
     return s->through ? vg_reader_head(s->reader) : &s->head;
+}
+
+const vg_failure *vg_source_failure(const vg_source *s)
+{
+    return s->reader ? vg_reader_failure(s->reader) : NULL;
 }
 
 vg_records *vg_source_tail(vg_source *s)

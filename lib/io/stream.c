@@ -42,6 +42,7 @@ struct vg_reader {
     vg_records tail;
     uint64_t frames;
     bool ended;
+    vg_failure failure;
 };
 
 static void remember_form(vg_reader *r)
@@ -77,7 +78,8 @@ static int stopped_by_failure(vg_reader *r, const vg_record *record, vg_err *e)
     char where[200];
     snprintf(where, sizeof where, "'%.150s': record FAIL", vgi_input_name(r->in));
     vgi_payload p = {record->payload.data, record->payload.size, where};
-    return vgi_fail_decode(&p, vgi_input_name(r->in), e);
+    vgi_failure_clear(&r->failure);
+    return vgi_fail_decode(&r->failure, &p, vgi_input_name(r->in), e);
 }
 
 static int read_head_record(vg_reader *r, vg_record *record, vg_err *e)
@@ -198,9 +200,15 @@ int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
     return 1;
 }
 
+const vg_failure *vg_reader_failure(const vg_reader *r)
+{
+    return r->failure.program ? &r->failure : NULL;
+}
+
 void vg_reader_close(vg_reader **r)
 {
     if (!*r) return;
+    vgi_failure_clear(&(*r)->failure);
     vgi_input_free(&(*r)->in);
     vgi_tally_clear(&(*r)->tally);
     vg_head_clear(&(*r)->head);

@@ -1,0 +1,92 @@
+#!/usr/bin/env bats
+# The mistakes that are made most: what a program says then names what to do next. One line, and the status of the manual.
+# SPDX-License-Identifier: GPL-3.0-or-later
+load lib.bash
+
+# mistake STATUS COMMANDLINE TEXT...: it fails so, and says each TEXT
+mistake() {
+    local want=$1 line=$2
+    shift 2
+    must_fail "$want" bash -c "$line"
+    says "$@"
+    [ "$(grep -c -v '^usage: ' <<<"$stderr")" = 1 ] || fail "more than one line:" "$stderr"
+    [[ $stderr != *.$'\n'* && $stderr != *: ]] || fail "a full stop or nothing at the end:" "$stderr"
+}
+
+@test "the likely mistakes" {
+    poses cube 2
+    mesh tetra >tetra.obj
+    echo hello >notes.txt
+    mkdir empty
+    vg-encode pose1.obj pose2.obj -o walk.vgs
+    vg-encode --vectors walk.vgs -o vectors.vgs
+    vg-deform walk.vgs -o deformations.vgs
+
+    # files that are not there, are no meshes, are of different meshes
+    mistake 4 'vg-encode missing.obj' "cannot open 'missing.obj': No such file or directory"
+    mistake 4 'vg-encode "*.fbx"' "no file matches '*.fbx'"
+    mistake 3 'vg-encode notes.txt' "cannot tell what 'notes.txt' is" "OBJ, PLY" "GLB" "export other kinds"
+    mistake 3 'vg-encode empty' "directory 'empty' holds no mesh file (OBJ"
+    mistake 3 'vg-encode pose1.obj tetra.obj' "has 4 vertices where 'pose1.obj' has 8: all poses of a sequence have the same vertices"
+    mistake 3 'vg-deform --onto tetra.obj walk.vgs' "pair them with vg-register and --correspondence"
+    mistake 3 'vg-deform --onto pose2.obj --correspondence walk.vgs walk.vgs' "make one with vg-register"
+    mistake 2 'vg-register pose1.obj tetra.obj' "--markers FILE"
+
+    # a program of the pipe is forgotten
+    mistake 3 'vg-decode vectors.vgs -o out.zip' "holds vectors: pipe it through 'vg-solve' first"
+    mistake 3 'vg-decode deformations.vgs -o out.zip' "holds deformations: apply them with 'vg-deform --onto MESH'"
+    mistake 3 'vg-view vectors.vgs -o out.png' "pipe it through 'vg-solve' first"
+    mistake 3 'vg-diff walk.vgs vectors.vgs' "pipe it through 'vg-solve' first"
+    mistake 3 'vg-poisson --first pose1.obj vectors.vgs' "'vg-solve' first"
+    mistake 3 'vg-solve deformations.vgs' "apply them with 'vg-deform --onto MESH'"
+    mistake 3 'vg-deform --map walk.vgs walk.vgs' "make one with vg-fitmap"
+    mistake 2 'vg-fitmap walk.vgs' "--patches, made by vg-segment"
+    mistake 3 'true | vg-solve' "standard input is empty: look at the program before in the pipe"
+
+    # the output's name
+    mistake 2 'vg-decode walk.vgs' "name the output: -o poses.zip, -o 'pose-%04d.obj', or -o poses/"
+    mistake 2 'vg-decode walk.vgs -o out' "cannot tell the format of 'out'" "a directory ends in '/'"
+    mistake 2 'vg-decode walk.vgs -o out.fbx' "known are obj, ply"
+    mistake 2 'vg-decode walk.vgs -o out.obj' "use a pattern like 'out-%04d.obj', a directory or an archive"
+    mistake 2 'vg-solve vectors.vgs -o out.obj' "the output is a stream: pipe it into 'vg-decode -o out.obj'"
+    mistake 2 'vg-solve vectors.vgs -o out.png' "the output is a stream: pipe it into 'vg-view -o out.png'"
+    mistake 2 'vg-view walk.vgs -o out.jpg' "must end in .html or .png"
+    mistake 4 'vg-decode walk.vgs -o nowhere/out.zip' "nowhere" "No such file or directory"
+
+    # options
+    mistake 2 'vg-solve --wieghts area vectors.vgs' "unknown option '--wieghts': did you mean '--weights'?"
+    mistake 2 'vg-deform --on-to=pose2.obj walk.vgs' "did you mean '--onto'?"
+    mistake 2 'vg-info --ver walk.vgs' "ambiguous option '--ver': it could be '--verbose' or '--version'"
+    mistake 2 'vg-solve --nonsense vectors.vgs' "unknown option '--nonsense': 'vg-solve --help' lists them"
+    mistake 2 'vg-solve -x vectors.vgs' "'vg-solve --help' lists them"
+    mistake 2 'vg-solve vectors.vgs -o' "option '--output' needs a value: FILE"
+    mistake 2 'vg-deform --by poses --onto pose2.obj walk.vgs' "'pose', 'shape', 'gradient' or 'blend', not 'poses'"
+    mistake 2 'vg-deform --root x --onto pose2.obj walk.vgs' "'centroid', 'stay' or the number of a vertex, not 'x'"
+    mistake 2 'vg-deform --root 99 --onto pose2.obj walk.vgs' "vertex 99, but there are 8, counted from 0"
+    mistake 2 'vg-deform --by shape walk.vgs' "--by needs --onto"
+    mistake 2 'vg-segment -k many walk.vgs' "a whole number from 1 on or 'auto', not 'many'"
+    mistake 2 'vg-diff walk.vgs' "two sequences are needed"
+    mistake 3 'vg-poisson --key 99=pose1.obj walk.vgs' "whose numbers are 0 to 1"
+    [ ! -e out.zip ] && [ ! -e out.obj ] && [ ! -e out ]
+}
+
+@test "in a pipe every program names the one that failed first, and its reason, once" {
+    poses cube 2
+    mesh tetra >tetra.obj
+    pipe_fail 3 'vg-encode pose1.obj pose2.obj tetra.obj | vg-deform --onto pose2.obj | vg-solve | vg-poisson --first pose1.obj |
+        vg-decode -o out.zip'
+    reason="'tetra.obj' has 4 vertices where 'pose1.obj' has 8: all poses of a sequence have the same vertices and faces"
+    says "vg-encode: $reason"
+    for program in vg-deform vg-solve vg-poisson vg-decode; do
+        says "$program: 'standard input' was cut short: vg-encode failed with status 3: $reason"
+    done
+    [ "$(wc -l <<<"$stderr")" = 5 ]
+    [ ! -e out.zip ]
+}
+
+@test "no poses to write is said" {
+    must vg-encode "$GOLDEN/empty-sequence.vgs" -o empty.vgs
+    capture vg-decode empty.vgs -o out.zip
+    [ "$status" = 0 ]
+    says "vg-decode: warning: the input has no poses: 'out.zip' holds none"
+}
