@@ -434,14 +434,16 @@ static int begin_gltf(void **state, const vg_head *h, const vg_sink_options *o, 
 
 enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_NAMES | VGI_KEEPS_TIMES };
 
+enum { KINDS = 1 << VG_VERTICES | 1 << VG_TRANSFORMS }; /* the latter of a rig */
+
 const vgi_sequence_format vgi_sequence_glb = {
     .name = "glb", .suffix = ".glb", .keeps = KEEPS, .bare = true, .sniff = sniff_glb,
     .open = vgi_gltf_play, .next = vgi_gltf_next, .frames = vgi_gltf_frames, .close = vgi_gltf_close,
-    .kinds = 1 << VG_VERTICES, .check = vgi_gltf_check, .begin = begin_glb, .put = vgi_gltf_put, .end = vgi_gltf_end,
+    .kinds = KINDS, .check = vgi_gltf_check, .begin = begin_glb, .put = vgi_gltf_put, .end = vgi_gltf_end,
     .warning = vgi_gltf_warning, .release = vgi_gltf_release};
 
 const vgi_sequence_format vgi_sequence_gltf = {
     .name = "gltf", .suffix = ".gltf", .keeps = KEEPS, .bare = true, .sniff = sniff_gltf,
     .open = vgi_gltf_play, .next = vgi_gltf_next, .frames = vgi_gltf_frames, .close = vgi_gltf_close,
-    .kinds = 1 << VG_VERTICES, .check = vgi_gltf_check, .begin = begin_gltf, .put = vgi_gltf_put, .end = vgi_gltf_end,
+    .kinds = KINDS, .check = vgi_gltf_check, .begin = begin_gltf, .put = vgi_gltf_put, .end = vgi_gltf_end,
     .warning = vgi_gltf_warning, .release = vgi_gltf_release};

@@ -100,7 +100,7 @@ static int take_runs(restoring *k, const vgi_json *runs, vg_err *e)
 static int restore_polygons(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e)
 {
     const vgi_json *mesh, *runs;
-    if (x->nparts != 1 || x->parts[0].skin != VGI_GLTF_NONE) return VG_OK;
+    if (x->nparts != 1) return VG_OK;
     int r = vgi_gltf_item(&x->g, vgi_json_get(x->nodes[x->parts[0].node].json, "mesh"), "meshes", &mesh, NULL, e);
     if (r < 0 || !vgi_json_is_array(runs = vgi_json_get(vgi_json_get(mesh, "extras"), VGI_GLTF_FACES))) return r;
     restoring *k = vgi_array(1, sizeof *k, e);

@@ -288,7 +288,7 @@ static int check_kind(const plan *p, const vg_head *h, const char *output, vg_er
     const char *advice = h->kind == VG_VECTORS ? "pipe it through 'vg-solve' first"
                          : h->kind == VG_DEFORMATIONS
                              ? "apply them with 'vg-deform --onto MESH' and pipe that through 'vg-solve' first"
-                             : "only vertices can be written as meshes";
+                             : "make vertices of them with 'vg-deform --map MAP' first, or of a rig's a skin in a .glb";
     return vg_fail(e, VG_EINPUT, "cannot write '%s': the input holds %s: %s", output, vg_kind_name(h->kind), advice);
 }
 

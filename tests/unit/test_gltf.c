@@ -97,6 +97,96 @@ static void text_comes_back(void)
     comes_back(&vgi_sequence_gltf);
 }
 
+/* ---- skins of ours ---- */
+
+/* Two roots: hip (bone 0), of which spine, which turns nothing, and head (bone 1) with an end; and tail (bone 2). */
+static vg_joint rig_joints[] = {
+    {(char[]){"hip"}, UINT32_MAX, {0, 1, 0}, 6, {1, 2, 3, 6, 4, 5}}, {(char[]){"spine"}, 0, {0, 1, 0}, 0, {0}},
+    {(char[]){"head \"x\""}, 1, {0.1, 1, 0}, 3, {6, 4, 5}},
+    {(char[]){"head.end"}, 2, {0, 0.5, 0}, 0, {0}}, {(char[]){"tail"}, UINT32_MAX, {3, 0, 0.3}, 3, {6, 4, 5}}};
+static double rig_at[] = {0, 1, 0, 0, 2, 0, 0.1, 3, 0, 0.1, 3.5, 0, 3, 0, 0.3};
+static double rig_turns[] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+
+/* A weight that is split between two places of one bone, places without weight whose bone says anything, thirds. */
+static void hang(vg_rig *rig, uint32_t bones[48], double weights[48])
+{
+    for (size_t v = 0; v < 12; v++) {
+        const double third[4] = {1. / 3, 1. / 3, 1. / 3, 0}, twice[4] = {0.5, 0.3, 0.2, 0}, alone[4] = {1, 0, 0, 0};
+        memcpy(weights + 4 * v, v % 3 == 0 ? third : v % 3 == 1 ? twice : alone, sizeof third);
+        const uint32_t of[3][4] = {{0, 1, 2, 2}, {1, 2, 1, 2}, {(uint32_t)v % 3, 1, 2, 2}};
+        memcpy(bones + 4 * v, of[v % 3], sizeof of[0]);
+    }
+    rig->skin_bone = bones, rig->skin_weight = weights;
+}
+
+static void turn(const double axis[3], double angle, double scale, double to[4])
+{
+    double length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+    to[0] = sqrt(scale) * cos(angle / 2);
+    for (int k = 0; k < 3; k++) to[k + 1] = sqrt(scale) * sin(angle / 2) * axis[k] / length;
+}
+
+/* Transforms that turn about the joint, and push it; of frame 0 none at all. */
+static void move_bones(const vg_rig *rig, int frame, double scale, double to[21])
+{
+    for (size_t b = 0; b < 3; b++) {
+        double *t = to + 7 * b, moved[3];
+        const double *at = rig->at + 3 * rig->bone[b], axis[3] = {1, 0.3 * (double)b, -0.5};
+        turn(axis, frame * (0.7 + (double)b), frame && b == 1 ? scale : 1, t);
+        vg_quat_apply(t, at, moved);
+        for (size_t k = 0; k < 3; k++) t[4 + k] = at[k] - moved[k] + (b == 0 ? 0.2 * frame * (double)(k + 1) : 0.01 * frame);
+    }
+}
+
+static bool has(const vg_bytes *b, const char *text)
+{
+    return memmem(b->data, b->size, text, strlen(text));
+}
+
+static void skin_comes_back(const vgi_sequence_format *format, double scale)
+{
+    vg_head h;
+    vg_frame frames[3];
+    double values[3][36], transforms[3][21], weights[48], truth[36];
+    uint32_t bones[48];
+    int r;
+    const vg_skeleton skeleton = {5, rig_joints};
+    fill(&h, frames, values);
+    CHECK(vg_rig_make(&h.rig, &skeleton, rig_at, rig_turns, NULL) == VG_OK && h.rig.nbones == 3);
+    hang(&h.rig, bones, weights);
+    h.kind = VG_TRANSFORMS, h.count = 3;
+    CHECK(format->check(&h, "out", NULL) == VG_OK);
+    for (int i = 0; i < 3; i++) {
+        move_bones(&h.rig, i, scale, transforms[i]);
+        frames[i].values = transforms[i];
+    }
+    vg_bytes b = record(format, &h, frames, 3, false, &r, NULL);
+    CHECK(r == VG_OK && has(&b, "head \\u0022x") && has(&b, "\"skeleton\"") && has(&b, "JOINTS_0"));
+    CHECK(has(&b, "\"path\":\"scale\"") == (scale != 1));
+    if (format == &vgi_sequence_gltf) b.size--;
+    played p = play(format, b.data, b.size);
+    CHECK(p.result == 0 && p.frames == 3 && p.timed && p.times[1] == 0.5 && p.h.kind == VG_VERTICES);
+    CHECK(vg_mesh_same(&h.mesh, "a", &p.h.mesh, "b", NULL) == VG_OK);
+    CHECK_TEXT(p.names, "a\"b \xc3\xa4\\ c ");
+    for (int i = 0; i < 3; i++) {
+        vg_rig_skin(&h.rig, 12, h.reference, transforms[i], truth);
+        for (int k = 0; k < 36; k++) CHECK_NEAR(p.values[36 * i + k], truth[k], 2e-6 * 15); /* the mesh is 15 across */
+    }
+    h.rig.skin_bone = NULL, h.rig.skin_weight = NULL;
+    CHECK(format->check(&h, "out", NULL) == VG_EINPUT);
+    vg_rig_clear(&h.rig);
+    CHECK(format->check(&h, "out", NULL) == VG_EINPUT);
+    played_clear(&p);
+    vg_bytes_clear(&b);
+}
+
+static void skins_come_back(void)
+{
+    skin_comes_back(&vgi_sequence_glb, 1);
+    skin_comes_back(&vgi_sequence_gltf, 1);
+    skin_comes_back(&vgi_sequence_glb, 1.7);
+}
+
 static void points_come_back(void)
 {
     vg_head h;
@@ -342,6 +432,7 @@ static void wrong_texts_are_refused(void)
 }
 
 TESTS({"a GLB of ours comes back whole", binary_comes_back}, {"a glTF of ours comes back whole", text_comes_back},
+       {"a rig that moves comes back as its vertices", skins_come_back},
       {"points without faces come back", points_come_back}, {"morph targets are frames", targets_are_frames},
       {"only equal vertices are welded", only_equal_vertices_are_welded}, {"weights are played", weights_are_played},
       {"nodes move", nodes_move}, {"skins bend", skins_bend}, {"all kinds of primitives", all_kinds_of_primitives},

@@ -1,0 +1,167 @@
+/* gltf_faces.c: faces of any size as the triangles and lines of glTF, so that our own reader can put them together
+ * again.
+ * Leaves out vertices, and where the indices go in a file (gltf_write.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf_write.h"
+
+enum { MOST_CLIPPED = 512 };
+
+typedef struct shaping {
+    const vg_mesh *mesh;
+    const double *reference;
+    vgi_gltf_shape *to;
+} shaping;
+
+static void area(const double *p, const double *q, const double *r, double n[3])
+{
+    double a[3], b[3];
+    for (int k = 0; k < 3; k++) a[k] = q[k] - p[k], b[k] = r[k] - p[k];
+    n[0] = a[1] * b[2] - a[2] * b[1], n[1] = a[2] * b[0] - a[0] * b[2], n[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static const double *place(const shaping *x, uint32_t v)
+{
+    return x->reference + 3 * (size_t)v;
+}
+
+/* Does the triangle look where the face does, or nowhere? */
+static double facing(const shaping *x, uint32_t a, uint32_t b, uint32_t c, const double normal[3])
+{
+    double n[3];
+    area(place(x, a), place(x, b), place(x, c), n);
+    return n[0] * normal[0] + n[1] * normal[1] + n[2] * normal[2];
+}
+
+static void face_normal(const shaping *x, const uint32_t *v, size_t n, double normal[3])
+{
+    normal[0] = normal[1] = normal[2] = 0;
+    for (size_t i = 1; i + 1 < n; i++) {
+        double t[3];
+        area(place(x, v[0]), place(x, v[i]), place(x, v[i + 1]), t);
+        for (int k = 0; k < 3; k++) normal[k] += t[k];
+    }
+}
+
+static int put_index(vg_bytes *to, uint32_t v, vg_err *e)
+{
+    unsigned char p[VGI_GLTF_ITEM];
+    vgi_put32(p, v);
+    return vgi_bytes_append(to, p, sizeof p, e);
+}
+
+static int put_triangle(const shaping *x, uint32_t a, uint32_t b, uint32_t c, vg_err *e)
+{
+    int r = put_index(&x->to->triangles, a, e);
+    if (r == VG_OK) r = put_index(&x->to->triangles, b, e);
+    return r < 0 ? r : put_index(&x->to->triangles, c, e);
+}
+
+static bool is_ear(const shaping *x, const uint32_t *ring, size_t n, size_t b, const double normal[3])
+{
+    uint32_t p = ring[(b + n - 1) % n], q = ring[b], s = ring[(b + 1) % n];
+    if (!(facing(x, p, q, s, normal) > 0)) return false;
+    for (size_t i = 0; i < n; i++) {
+        uint32_t v = ring[i];
+        if (v != p && v != q && v != s && facing(x, p, q, v, normal) >= 0 && facing(x, q, s, v, normal) >= 0 &&
+            facing(x, s, p, v, normal) >= 0)
+            return false;
+    }
+    return true;
+}
+
+static bool is_fan(const shaping *x, const uint32_t *v, size_t n, const double normal[3])
+{
+    for (size_t i = 1; i + 1 < n; i++)
+        if (!(facing(x, v[0], v[i], v[i + 1], normal) >= 0)) return false;
+    return true;
+}
+
+static int put_fan(const shaping *x, const uint32_t *v, size_t n, vg_err *e)
+{
+    int r = VG_OK;
+    for (size_t i = 1; i + 1 < n && r == VG_OK; i++) r = put_triangle(x, v[0], v[i], v[i + 1], e);
+    return r;
+}
+
+static size_t find_ear(const shaping *x, const uint32_t *ring, size_t n, const double normal[3])
+{
+    for (size_t b = 1; b < n; b++)
+        if (is_ear(x, ring, n, b, normal)) return b;
+    return is_ear(x, ring, n, 0, normal) ? 0 : 1; /* it touches or crosses itself: any will do */
+}
+
+/* The triangle with the face's first corner goes first and begins with it, so that the face can be put together
+ * again. */
+static void begin_with(unsigned char *triangles, size_t n, uint32_t v)
+{
+    for (size_t i = 0; i < 3 * n; i++) {
+        if (vgi_get32(triangles + VGI_GLTF_ITEM * i) != v) continue;
+        unsigned char *t = triangles + VGI_GLTF_POINT * (i / 3), first[VGI_GLTF_POINT];
+        for (size_t k = 0; k < 3; k++)
+            memcpy(first + VGI_GLTF_ITEM * k, t + VGI_GLTF_ITEM * ((i + k) % 3), VGI_GLTF_ITEM);
+        memmove(triangles + VGI_GLTF_POINT, triangles, VGI_GLTF_POINT * (i / 3));
+        memcpy(triangles, first, VGI_GLTF_POINT);
+        return;
+    }
+}
+
+static int put_ears(const shaping *x, const uint32_t *v, size_t n, const double normal[3], vg_err *e)
+{
+    uint32_t ring[MOST_CLIPPED];
+    const size_t start = x->to->triangles.size;
+    int r = VG_OK;
+    memcpy(ring, v, n * sizeof *v);
+    for (size_t left = n; left > 2 && r == VG_OK; left--) {
+        size_t b = find_ear(x, ring, left, normal);
+        r = put_triangle(x, ring[(b + left - 1) % left], ring[b], ring[(b + 1) % left], e);
+        memmove(ring + b, ring + b + 1, (left - 1 - b) * sizeof *ring);
+    }
+    if (r == VG_OK) begin_with(x->to->triangles.data + start, n - 2, v[0]);
+    return r;
+}
+
+static int put_face(const shaping *x, const uint32_t *v, size_t n, vg_err *e)
+{
+    double normal[3];
+    if (n == 2) {
+        int r = put_index(&x->to->lines, v[0], e);
+        return r < 0 ? r : put_index(&x->to->lines, v[1], e);
+    }
+    face_normal(x, v, n, normal);
+    if (n == 3 || n > MOST_CLIPPED || is_fan(x, v, n, normal)) return put_fan(x, v, n, e);
+    return put_ears(x, v, n, normal, e);
+}
+
+static int put_run(const shaping *x, size_t count, size_t size, vg_err *e)
+{
+    char text[64];
+    int n = snprintf(text, sizeof text, "%s%zu,%zu", x->to->runs.size ? "," : "", count, size);
+    return vgi_bytes_append(&x->to->runs, text, (size_t)n, e);
+}
+
+static int put_faces(const shaping *x, vg_err *e)
+{
+    const vg_mesh *m = x->mesh;
+    size_t count = 0, size = 0;
+    int r = VG_OK;
+    for (size_t f = 0; f < m->nf && r == VG_OK; f++) {
+        size_t n = m->start[f + 1] - m->start[f];
+        if (n != size && count) r = put_run(x, count, size, e);
+        count = n == size ? count + 1 : 1, size = n;
+        if (r == VG_OK) r = put_face(x, m->vert + m->start[f], n, e);
+    }
+    return r == VG_OK && count ? put_run(x, count, size, e) : r;
+}
+
+int vgi_gltf_shape_make(vgi_gltf_shape *s, const vg_mesh *m, const double *reference, vg_err *e)
+{
+    *s = (vgi_gltf_shape){0};
+    return put_faces(&(shaping){m, reference, s}, e);
+}
+
+void vgi_gltf_shape_clear(vgi_gltf_shape *s)
+{
+    vg_bytes_clear(&s->triangles);
+    vg_bytes_clear(&s->lines);
+    vg_bytes_clear(&s->runs);
+}

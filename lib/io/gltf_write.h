@@ -1,0 +1,83 @@
+/* gltf_write.h: what gltf_write.c, gltf_faces.c, gltf_morph.c and gltf_skin.c share: a glTF file that is being made.
+ * gltf_write.c is the file; how a mesh moves in it is one of two manners.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_GLTF_WRITE_H
+#define VG_GLTF_WRITE_H
+
+#include "io/gltf.h"
+
+enum { VGI_GLTF_ITEM = 4, VGI_GLTF_POINT = 12 }; /* bytes of a number, and of three */
+
+/* ---- gltf_faces.c: faces as triangles and lines ---- */
+typedef struct vgi_gltf_shape {
+    vg_bytes triangles, lines; /* indices of 32 bits */
+    vg_bytes runs;             /* for VGI_GLTF_FACES: count, size, count, size, ... as text */
+} vgi_gltf_shape;
+int vgi_gltf_shape_make(vgi_gltf_shape *s, const vg_mesh *m, const double *reference, vg_err *e) VG_MUST_CHECK;
+void vgi_gltf_shape_clear(vgi_gltf_shape *s);
+
+/* ---- gltf_write.c ---- */
+typedef struct vgi_gltf_writing vgi_gltf_writing;
+
+/* How the mesh moves. begin makes own, before the first frame; put notes a frame in the spool. describe comes when
+ * all frames are there, and behind the views and accessors of faces and times: it adds its own, and says scene,
+ * nodes, meshes and animation. emit puts the bytes of its views, in their order. warning (may be NULL) says what was
+ * lost. release takes own, NULL too. */
+typedef struct vgi_gltf_manner {
+    int (*begin)(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e);
+    int (*put)(vgi_gltf_writing *w, const vg_frame *f, vg_err *e);
+    int (*describe)(vgi_gltf_writing *w, vg_err *e);
+    int (*emit)(vgi_gltf_writing *w, vg_err *e);
+    void (*warning)(const vgi_gltf_writing *w, char *to, size_t room);
+    void (*release)(void *own);
+    const char *too_big; /* what to do about it */
+} vgi_gltf_manner;
+extern const vgi_gltf_manner vgi_gltf_morphs, vgi_gltf_skin;
+
+struct vgi_gltf_writing {
+    const vgi_gltf_manner *manner;
+    void *own;                 /* of the manner */
+    vgi_output *out, spool;    /* spool: frames as they wait, in a file without a name */
+    const vg_head *h;
+    bool binary, timed, some_timed;
+    size_t frames;
+    vgi_names names;
+    double *times;
+    size_t times_cap;
+    float *base;               /* the reference pose as it will be read */
+    vgi_gltf_shape shape;
+    vg_bytes json, views, accessors; /* text */
+    size_t nviews, naccessors, bytes;
+    size_t triangles, lines, moments; /* numbers of their accessors; those of no bytes have none */
+    unsigned char carry[3];    /* base64: bytes that wait for their third */
+    size_t ncarry;
+    char warning[280];
+};
+
+int vgi_gltf_say(vg_bytes *to, vg_err *e, const char *format, ...) VG_PRINTF(3, 4);
+int vgi_gltf_say_text(vg_bytes *to, const char *s, vg_err *e) VG_MUST_CHECK; /* in quotes */
+int vgi_gltf_say_numbers(vg_bytes *to, const char *before, const double *p, size_t n, const char *behind,
+                         vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_say_names: "KEY":[names of frames `which`, or of the first n]. */
+int vgi_gltf_say_names(vgi_gltf_writing *w, const char *key, const size_t *which, size_t n, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_say_primitives: "primitives":[...], one for each kind of face; moving: what is said of attributes and
+ * targets. */
+int vgi_gltf_say_primitives(vgi_gltf_writing *w, const vg_bytes *moving, vg_err *e) VG_MUST_CHECK;
+int vgi_gltf_say_mesh_name(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_view: the next bytes of the buffer; more: further JSON. */
+int vgi_gltf_view(vgi_gltf_writing *w, size_t bytes, const char *more, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_say_accessor: one into the last view; bounds (may be NULL): least and most, `width` numbers each. Its
+ * number is w->naccessors before the call. */
+int vgi_gltf_say_accessor(vgi_gltf_writing *w, size_t off, int component, size_t count, const char *type,
+                          const double *bounds, size_t width, vg_err *e) VG_MUST_CHECK;
+
+void vgi_gltf_put_single(unsigned char *to, float x);
+float vgi_gltf_get_single(const unsigned char *p);
+/* vgi_gltf_emit: bytes of the buffer: as they are, or as base64. */
+int vgi_gltf_emit(vgi_gltf_writing *w, const unsigned char *p, size_t n, vg_err *e) VG_MUST_CHECK;
+int vgi_gltf_emit_singles(vgi_gltf_writing *w, const float *p, size_t n, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_load: n bytes of the spool. */
+int vgi_gltf_load(const vgi_gltf_writing *w, uint64_t off, unsigned char *to, size_t n, vg_err *e) VG_MUST_CHECK;
+void vgi_gltf_bounds(const float *p, size_t points, double bounds[6]); /* least x y z, most x y z */
+
+#endif
