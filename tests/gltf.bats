@@ -122,6 +122,46 @@ END
     [ ! -e out.vgs ] || fail "something was written"
 }
 
+@test "transforms of a rig become a skin: joints, weights and turns as Python reads them, and back as its vertices" {
+    py <<'END'
+import make_skin
+make_skin.make()
+END
+    local file
+    must vg-info --check bar.vgs
+    must vg-decode -o bar.glb bar.vgs
+    must vg-decode -o bar.gltf bar.vgs
+    for file in bar.glb bar.gltf; do
+        must vg-encode $file -o back.vgs
+        py <<'END'
+import json
+from read_stream import read_stream
+s, truth = read_stream('back.vgs'), json.load(open('truth.json'))
+assert [list(s.mesh.vert[a:b]) for a, b in zip(s.mesh.start, s.mesh.start[1:])] == truth['faces']
+assert [f.name for f in s.frames] == ['bend %d' % i for i in range(5)]
+assert max(abs(f.time - i / 25) for i, f in enumerate(s.frames)) < 1e-7
+size = max(abs(c) for f in truth['frames'] for c in f)
+worst = max(abs(a - b) for f, t in zip(s.frames, truth['frames']) for a, b in zip(f.values, t))
+assert worst <= 1e-6 * size, worst
+END
+    done
+    py <<'END'
+import json
+j = json.load(open('bar.gltf'))
+assert [n.get('name') for n in j['nodes']] == ['bar', 'low', 'mid', 'top', 'top.end']
+assert [n.get('children') for n in j['nodes']] == [None, [2], [3], [4], None]
+assert j['skins'][0]['joints'] == [1, 2, 3] and j['scenes'][0]['nodes'] == [0, 1]
+paths = [(c['target']['node'], c['target']['path']) for c in j['animations'][0]['channels']]
+assert paths == [(1, 'rotation'), (1, 'translation'), (2, 'rotation'), (3, 'rotation')], paths
+END
+    must_fail 2 vg-decode --max-targets 12 -o bar2.glb bar.vgs
+    says 'leave out --max-targets'
+    must_fail 2 vg-decode -o bar-%d.obj bar.vgs
+    says 'make vertices of them with vg-deform --map first'
+    must_fail 3 vg-decode -o none.glb "$GOLDEN/transforms.vgs"
+    says 'transforms of no skeleton'
+}
+
 @test "the Khronos validator finds neither error nor warning" {
     command -v node >/dev/null || skip "node is not installed"
     node -e 'require("gltf-validator")' 2>/dev/null || skip "the node module gltf-validator is not installed"
@@ -134,6 +174,11 @@ END
     must vg-decode -o lines.glb lines.obj
     printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\n' >points.obj
     must vg-decode -o points.glb points.obj
+    py <<'END'
+import make_skin
+make_skin.make()
+END
+    must vg-decode -o bar.glb bar.vgs
     cat >validate.js <<'END'
 const validator = require('gltf-validator'), fs = require('fs');
 (async () => {
@@ -144,7 +189,7 @@ const validator = require('gltf-validator'), fs = require('fs');
     }
 })();
 END
-    must node validate.js walk.glb walk.gltf horse.glb lines.glb points.glb
+    must node validate.js walk.glb walk.gltf horse.glb lines.glb points.glb bar.glb
     local file
-    for file in walk.glb walk.gltf horse.glb lines.glb points.glb; do shows "$file 0 errors 0 warnings"; done
+    for file in walk.glb walk.gltf horse.glb lines.glb points.glb bar.glb; do shows "$file 0 errors 0 warnings"; done
 }

@@ -30,8 +30,9 @@ static int check_skin(const vg_head *h, const char *output, vg_err *e)
 
 int vgi_gltf_check(const vg_head *h, const char *output, vg_err *e)
 {
-    if (!h->mesh.nv) return vg_fail(e, VG_EINPUT, "cannot write '%s': a mesh of glTF must have vertices", output);
-    return h->kind == VG_TRANSFORMS ? check_skin(h, output, e) : VG_OK;
+    int r = h->kind == VG_TRANSFORMS ? check_skin(h, output, e) : VG_OK;
+    return r < 0 || h->mesh.nv ? r
+                               : vg_fail(e, VG_EINPUT, "cannot write '%s': a mesh of glTF must have vertices", output);
 }
 
 /* ---- frames ---- */
