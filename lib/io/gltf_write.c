@@ -21,9 +21,9 @@ static int check_skin(const vg_head *h, const char *output, vg_err *e)
 {
     const char *lacks = NULL;
     if (!h->rig.skeleton.njoints)
-        lacks = "the input holds transforms of no skeleton: make vertices of them with vg-deform --map first";
+        lacks = "the input holds transforms of no skeleton: make vertices of them with 'vg-deform --map MAP' first";
     else if (!h->rig.skin_bone)
-        lacks = "the rig of the input has no weights: make vertices of its transforms with vg-deform --map first";
+        lacks = "the rig of the input has no weights: make vertices of it with 'vg-deform --map MAP' first";
     else if (h->count != h->rig.nbones) lacks = "the input has not as many transforms as its rig has bones";
     return lacks ? vg_fail(e, VG_EINPUT, "cannot write '%s': %s", output, lacks) : VG_OK;
 }
@@ -31,8 +31,8 @@ static int check_skin(const vg_head *h, const char *output, vg_err *e)
 int vgi_gltf_check(const vg_head *h, const char *output, vg_err *e)
 {
     int r = h->kind == VG_TRANSFORMS ? check_skin(h, output, e) : VG_OK;
-    return r < 0 || h->mesh.nv ? r
-                               : vg_fail(e, VG_EINPUT, "cannot write '%s': a mesh of glTF must have vertices", output);
+    if (r < 0 || h->mesh.nv) return r;
+    return vg_fail(e, VG_EINPUT, "cannot write '%s': a mesh of glTF must have vertices", output);
 }
 
 /* ---- frames ---- */

@@ -285,10 +285,10 @@ static int check_kind(const plan *p, const vg_head *h, const char *output, vg_er
 {
     const vgi_sequence_format *f = p->sequence;
     if (f ? f->kinds >> h->kind & 1 : h->kind == VG_VERTICES) return f && f->check ? f->check(h, output, e) : VG_OK;
-    const char *advice = h->kind == VG_VECTORS ? "pipe it through 'vg-solve' first"
-                         : h->kind == VG_DEFORMATIONS
-                             ? "apply them with 'vg-deform --onto MESH' and pipe that through 'vg-solve' first"
-                             : "make vertices of them with 'vg-deform --map MAP' first, or of a rig's a skin in a .glb";
+    const char *advice = "make vertices of them with 'vg-deform --map MAP' first, or of a rig's a skin in a .glb";
+    if (h->kind == VG_VECTORS) advice = "pipe it through 'vg-solve' first";
+    if (h->kind == VG_DEFORMATIONS)
+        advice = "apply them with 'vg-deform --onto MESH' and pipe that through 'vg-solve' first";
     return vg_fail(e, VG_EINPUT, "cannot write '%s': the input holds %s: %s", output, vg_kind_name(h->kind), advice);
 }
 
