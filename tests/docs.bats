@@ -246,3 +246,14 @@ commands_of_readme() {
         [ "$status" = 0 ] || fail "status $status: $line" "$stderr"
     done <../script
 }
+
+@test "every format that is known is in vg(7), in the help of vg-decode, and completed" {
+    must_fail 2 vg-decode --format nonsense -o out x
+    known=$(sed -n "s/.*known are //p" <<<"$stderr" | tr -d ' ' | tr ',' '\n')
+    [ "$(wc -l <<<"$known")" -ge 15 ]
+    [ "$(LC_ALL=C sort <<<"$known")" = "$(vg-decode --help | sed -n 's/^ *--format //p' | tr '|' '\n' | LC_ALL=C sort)" ]
+    table=$(awk '/^\.Ss Formats/{on = 1; next} /^\.S[sh]/{on = 0} on' "$ROOT/man/vg.7")
+    for format in $(sed 's/-.*//' <<<"$known" | sort -u); do
+        grep -q -i "^\.It .*\<$format\>" <<<"$table" || fail "vg(7) does not have $format"
+    done
+}

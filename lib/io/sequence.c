@@ -48,7 +48,7 @@ const char *vgi_sequence_names(void)
 
 const char *vgi_kinds_read(void)
 {
-    return "OBJ, PLY, OFF, STL, GLB, glTF, BVH, PC2, MDD, NPY, NPZ";
+    return "OBJ, PLY, OFF, STL, GLB, glTF, BVH, skeletons as text, PC2, MDD, NPY, NPZ";
 }
 
 /* ---- output ---- */
