@@ -1,4 +1,4 @@
-/* vg-view.c: a sequence as a page that plays it or as a contact sheet, with its shape or its errors.
+/* vg-view.c: sequences as a page that plays them or as a contact sheet, with their shape, errors or scales.
  * Leaves out how a pose becomes pixels, and what is in a page: that is lib/view.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
@@ -11,11 +11,21 @@
 
 static struct {
     long frames, columns;
-    const char *size, *view, *up, *against, *beside, *patches, *title, *format;
-    double scale;
-    bool edges, ground, follow, centred;
+    const char *size, *view, *up, *against, *patches, *title, *format;
+    const char *beside[VG_PAGE_SEQUENCES];
+    size_t nbeside;
+    double scale, zoom;
+    bool edges, ground, follow, centred, silhouettes, scales, plain;
     bool page; /* what is made, else a sheet */
 } opts = {.view = "30,15", .up = "y"};
+
+static void take_beside(const char *value, void *context)
+{
+    (void)context;
+    if (opts.nbeside == VG_PAGE_SEQUENCES - 2) /* the result and the truth are sequences, too */
+        cli_usage("option '--beside' can be given %d times, not more", VG_PAGE_SEQUENCES - 2);
+    opts.beside[opts.nbeside++] = value;
+}
 
 static const cli_option options[] = {
     {.name = "format", .value = "png|html", .text = &opts.format,
@@ -29,12 +39,15 @@ static const cli_option options[] = {
      .text = &opts.size},
     {.name = "view", .value = "front|back|left|right|top|iso|A,E", .text = &opts.view,
      .help = "from where, or azimuth and elevation in degrees (default: 30,15)"},
+    {.name = "zoom", .value = "X", .help = "how large: 1 (the default) is what fits", .number = &opts.zoom, .least = 1e-3,
+     .most = 1e3},
     {.name = "up", .value = "y|z", .help = "the axis that points up (default: y)", .text = &opts.up},
     {.name = "follow", .help = "keep the figure in the middle of its picture", .flag = &opts.follow},
     {.name = "ground", .help = "draw a grid where the reference pose stands, and a shadow", .flag = &opts.ground},
     {.name = "edges", .help = "draw the edges of the polygons", .flag = &opts.edges},
-    {.name = "beside", .value = "OTHER", .text = &opts.beside,
-     .help = "page: show another sequence beside, with the same camera"},
+    {.name = "silhouettes", .help = "sheet: draw the contours of surfaces as lines", .flag = &opts.silhouettes},
+    {.name = "beside", .value = "OTHER", .take = take_beside,
+     .help = "show another sequence with the same camera: beside, or in a sheet below; repeatable"},
     {.name = "patches", .value = "PATCHES", .help = "colour the faces by the patches of a stream of vg-segment",
      .text = &opts.patches},
     {.name = "title", .value = "TEXT", .help = "page: its title (default: the name of the sequence)",
@@ -43,8 +56,11 @@ static const cli_option options[] = {
      .text = &opts.against},
     {.name = "centred", .letter = 'c', .flag = &opts.centred,
      .help = "with --against: move the centroid of every pose to 0 before comparing"},
-    {.name = "scale", .value = "X", .help = "with --against: the error, in units of D, where the colours end",
-     .number = &opts.scale, .least = 1e-12, .most = 1e12},
+    {.name = "scales", .flag = &opts.scales,
+     .help = "colour by how much longer or shorter the vectors of each vertex are than in the reference pose"},
+    {.name = "plain", .help = "no colours, whatever the sequence brings", .flag = &opts.plain},
+    {.name = "scale", .value = "X", .number = &opts.scale, .least = 1e-12, .most = 1e12,
+     .help = "where the colours end: an error in units of D, with --scales a factor (default: 2)"},
     {0},
 };
 
@@ -95,18 +111,29 @@ static void parse_view(const char *text, vg_sheet_options *o)
                   text);
 }
 
+static vg_tint choose_tint(void)
+{
+    if (opts.against && (opts.scales || opts.plain))
+        cli_usage("option '--%s' leaves no colour for --against", opts.scales ? "scales" : "plain");
+    if (opts.plain && (opts.scales || opts.patches))
+        cli_usage("option '--plain' leaves no colour for --%s", opts.scales ? "scales" : "patches");
+    if (opts.scales && opts.scale > 0 && opts.scale <= 1)
+        cli_usage("option '--scale' needs a factor above 1 with --scales, not %g", opts.scale);
+    if (opts.plain && opts.scale > 0) cli_usage("option '--scale' is about colours: --plain has none");
+    return opts.against ? VG_TINT_ERRORS : opts.scales ? VG_TINT_SCALES : opts.plain ? VG_TINT_PLAIN : VG_TINT_SCALARS;
+}
+
 static vg_sheet_options sheet_options(void)
 {
     vg_sheet_options o = {.frames = opts.frames ? (size_t)opts.frames : 8, .columns = (size_t)opts.columns,
                           .edges = opts.edges,
-                          .ground = opts.ground, .follow = opts.follow, .compare = opts.against != NULL,
-                          .centred = opts.centred, .scale = opts.scale, .threads = cli.threads};
+                          .ground = opts.ground, .follow = opts.follow, .silhouettes = opts.silhouettes,
+                          .zoom = opts.zoom, .tint = choose_tint(), .centred = opts.centred, .scale = opts.scale, .threads = cli.threads};
     parse_size(opts.size ? opts.size : "360x360", &o);
     parse_view(opts.view, &o);
     if (strcmp(opts.up, "y") && strcmp(opts.up, "z")) cli_usage("option '--up' needs y or z, not '%s'", opts.up);
     o.z_up = *opts.up == 'z';
     if (!opts.against && opts.centred) cli_usage("option '--centred' is about errors: name the truth with --against");
-    if (!opts.against && opts.scale > 0) cli_usage("option '--scale' is about errors: name the truth with --against");
     return o;
 }
 
@@ -127,11 +154,10 @@ static void choose_kind(void)
     if (named && !html && !ends_with(cli.output, ".png") && !opts.format)
         cli_usage("cannot write '%s': the name must end in .html or .png, or be '-' for standard output", cli.output);
     opts.page = opts.format ? !strcmp(opts.format, "html") : html;
-    if (opts.page && (opts.frames || opts.columns || opts.size))
+    if (opts.page && (opts.frames || opts.columns || opts.size || opts.silhouettes))
         cli_usage("option '--%s' is about a sheet: the output is a page",
-                  opts.frames ? "frames" : opts.columns ? "columns" : "size");
-    if (!opts.page && (opts.beside || opts.title))
-        cli_usage("option '--%s' is about a page: use -o FILE.html", opts.beside ? "beside" : "title");
+                  opts.frames ? "frames" : opts.columns ? "columns" : opts.size ? "size" : "silhouettes");
+    if (!opts.page && opts.title) cli_usage("option '--title' is about a page: use -o FILE.html");
     if (!cli.output && isatty(STDOUT_FILENO))
         cli_usage("a %s is not written to a terminal: use -o FILE.html or -o FILE.png", opts.page ? "page" : "picture");
 }
@@ -223,27 +249,89 @@ static void open_truth(side *truth, const side *result)
     if (vg_mesh_same(&truth->head->mesh, truth->name, &result->head->mesh, result->name, &e) < 0) cli_die(&e);
 }
 
-/* The next frames of both, which are read to their ends, so that damage is seen: 1, 0 behind the last of both, -1 when
- * only one has a frame. */
-static int next_pair(side *result, side *truth)
+/* All that is shown: the result, the truth it is compared with, if any, and what stands beside. */
+typedef struct cast {
+    side result, truth, beside[VG_PAGE_SEQUENCES];
+    bool compared[VG_PAGE_SEQUENCES]; /* of beside: it is of the truth's mesh */
+} cast;
+
+static void open_cast(cast *c, char **operands, size_t n)
 {
-    bool a = next(result), b = opts.against && next(truth);
-    if (a) cli_progress("frames", result->frames);
-    return a && (b || !opts.against) ? 1 : a || b ? -1 : 0;
+    open_side(&c->result, operands, n);
+    if (opts.against) open_truth(&c->truth, &c->result);
+    for (size_t i = 0; i < opts.nbeside; i++) {
+        side *s = &c->beside[i];
+        open_operand(s, opts.beside[i]);
+        c->compared[i] = opts.against && vg_mesh_same(&c->truth.head->mesh, "", &s->head->mesh, "", NULL) == VG_OK;
+    }
 }
 
-static void check_counts(const side *result, const side *truth)
+static void close_cast(cast *c)
+{
+    close_side(&c->result);
+    close_side(&c->truth);
+    for (size_t i = 0; i < opts.nbeside; i++) close_side(&c->beside[i]);
+}
+
+/* The next frame of what stands beside. Behind the end of the truth there is nothing to compare it with; check_counts says so. */
+static bool put_beside(cast *c, size_t i, const double *truth, bool truth_is_shown,
+                       void (*put)(void *context, size_t i, const side *s, const double *truth), void *context)
+{
+    side *s = &c->beside[i];
+    if (!next(s)) return false;
+    if (truth || !c->compared[i]) put(context, i + 1 + truth_is_shown, s, c->compared[i] ? truth : NULL);
+    return true;
+}
+
+/* All are read to their ends, so that damage is seen, and side by side, so that each is read once. */
+static void read_cast(cast *c, bool shows_truth, void (*put)(void *context, size_t i, const side *s, const double *truth),
+                      void *context)
+{
+    for (bool more = true; more;) {
+        bool a = next(&c->result), b = opts.against && next(&c->truth);
+        const double *truth = b ? c->truth.frame.values : NULL;
+        if (a) cli_progress("frames", c->result.frames);
+        if (a && (b || !opts.against)) put(context, 0, &c->result, truth);
+        if (a && b && shows_truth) put(context, 1, &c->truth, NULL);
+        more = a || b;
+        for (size_t i = 0; i < opts.nbeside; i++) more |= put_beside(c, i, truth, shows_truth && opts.against, put, context);
+    }
+}
+
+static void refuse_count(const side *s, const side *truth)
 {
     vg_err e;
-    if (opts.against && result->frames != truth->frames) {
-        vg_fail(&e, VG_EINPUT, "%s has %zu frames where %s has %zu: frames are compared by their order", result->name,
-                result->frames, truth->name, truth->frames);
+    vg_fail(&e, VG_EINPUT, "%s has %zu frames where %s has %zu: frames are compared by their order", s->name, s->frames,
+            truth->name, truth->frames);
+    cli_die(&e);
+}
+
+/* What is compared beside may end before the truth, and then stays at its last frame. */
+static void check_counts(const cast *c)
+{
+    vg_err e;
+    if (opts.against && c->result.frames != c->truth.frames) refuse_count(&c->result, &c->truth);
+    for (size_t i = 0; i < opts.nbeside; i++)
+        if (c->compared[i] && c->beside[i].frames > c->truth.frames) refuse_count(&c->beside[i], &c->truth);
+    if (c->result.frames == 0) {
+        vg_fail(&e, VG_EINPUT, "%s has no frames: there is nothing to draw", c->result.name);
         cli_die(&e);
     }
-    if (result->frames == 0) {
-        vg_fail(&e, VG_EINPUT, "%s has no frames: there is nothing to draw", result->name);
-        cli_die(&e);
-    }
+}
+
+/* A stream of patches has no frames: they are shown on the reference pose. */
+static bool shows_reference(const cast *c)
+{
+    return !c->result.frames && !opts.against && c->result.head->patches.n;
+}
+
+static void put_reference(side *s, void (*put)(void *context, size_t i, const side *s, const double *truth), void *context)
+{
+    vg_frame frame = s->frame;
+    s->frame = (vg_frame){.name = s->head->reference_name, .values = s->head->reference};
+    put(context, 0, s, NULL);
+    s->frame = frame;
+    s->frames++;
 }
 
 /* ---- sheet ---- */
@@ -268,25 +356,30 @@ static void take_patches(side *s)
     vg_head_clear(&h);
 }
 
-static void make_sheet(side *result, side *truth)
+static void add_row(vg_sheet *sheet, const side *s, const side *truth)
+{
+    vg_err e;
+    if (vg_sheet_sequence(sheet, s->label, s->head, truth ? truth->head : NULL, &e) < 0) cli_die(&e);
+}
+
+static void sheet_frame(void *sheet, size_t i, const side *s, const double *truth)
+{
+    vg_err e;
+    if (vg_sheet_add(sheet, i, &s->frame, truth, &e) < 0) cli_die(&e);
+}
+
+static void make_sheet(cast *c)
 {
     vg_sheet_options o = sheet_options();
     vg_sheet *sheet;
     vg_err e;
-    if (opts.patches) take_patches(result);
-    if (result->head->patches.n) o.patches = &result->head->patches;
-    const double *reference = opts.against ? truth->head->reference : result->head->reference;
-    if (vg_sheet_new(&sheet, &result->head->mesh, reference, &o, &e) < 0) cli_die(&e);
-    for (int more; (more = next_pair(result, truth)) != 0;) {
-        if (more > 0 && vg_sheet_add(sheet, result->frame.name, result->frame.values,
-                                     opts.against ? truth->frame.values : NULL, &e) < 0)
-            cli_die(&e);
-    }
-    if (!result->frames && o.patches && !opts.against) { /* patches alone are shown on the reference pose */
-        if (vg_sheet_add(sheet, result->head->reference_name, result->head->reference, NULL, &e) < 0) cli_die(&e);
-        result->frames++;
-    }
-    check_counts(result, truth);
+    if (opts.patches) take_patches(&c->result);
+    if (vg_sheet_new(&sheet, &o, &e) < 0) cli_die(&e);
+    add_row(sheet, &c->result, opts.against ? &c->truth : NULL);
+    for (size_t i = 0; i < opts.nbeside; i++) add_row(sheet, &c->beside[i], c->compared[i] ? &c->truth : NULL);
+    read_cast(c, false, sheet_frame, sheet);
+    if (shows_reference(c)) put_reference(&c->result, sheet_frame, sheet);
+    check_counts(c);
     FILE *out = cli_text_open();
     if (vg_sheet_write(sheet, fileno(out), cli.output ? cli.output : "standard output", &e) < 0) cli_die(&e);
     cli_text_end();
@@ -300,7 +393,7 @@ static vg_page_options page_options(const side *result)
     vg_sheet_options view = sheet_options();
     return (vg_page_options){.title = opts.title ? opts.title : result->label, .azimuth = view.azimuth,
                              .elevation = view.elevation, .z_up = view.z_up, .follow = opts.follow, .edges = opts.edges,
-                             .ground = opts.ground, .compare = opts.against != NULL, .centred = opts.centred,
+                             .ground = opts.ground, .zoom = view.zoom, .tint = view.tint, .centred = opts.centred,
                              .scale = opts.scale};
 }
 
@@ -310,7 +403,7 @@ static void add_sequence(vg_page *page, const side *s)
     if (vg_page_sequence(page, s->label, s->head, &e) < 0) cli_die(&e);
 }
 
-static void add_frame(vg_page *page, size_t i, const side *s, const double *truth)
+static void page_frame(void *page, size_t i, const side *s, const double *truth)
 {
     vg_err e;
     if (vg_page_add(page, i, &s->frame, truth, &e) < 0) cli_die(&e);
@@ -322,37 +415,26 @@ static void note_facts(const vg_page_facts *facts)
              (double)facts->bytes / 1e6, facts->loss);
     if (opts.against)
         cli_note("errors: mean %.3g D, max %.3g D; the colours end at %.3g D", facts->mean, facts->max, facts->scale);
+    else if (facts->tinted)
+        cli_note("colours: from %.3g to %.3g, mean %.3g; they end at %.3g", facts->least, facts->max, facts->mean,
+                 facts->scale);
 }
 
-/* A stream of patches has no frames: they are shown on the reference pose. */
-static void add_reference(vg_page *page, side *s)
+static void make_page(cast *c)
 {
-    vg_frame f = {.name = s->head->reference_name, .values = s->head->reference};
-    vg_err e;
-    if (vg_page_add(page, 0, &f, NULL, &e) < 0) cli_die(&e);
-    s->frames++;
-}
-
-static void make_page(side *result, side *truth, side *other)
-{
-    vg_page_options o = page_options(result);
+    vg_page_options o = page_options(&c->result);
     vg_page *page;
     vg_page_facts facts;
     vg_err e;
-    if (opts.patches) take_patches(result);
+    if (opts.patches) take_patches(&c->result);
     FILE *out = cli_text_open();
     if (vg_page_new(&page, fileno(out), cli.output ? cli.output : "standard output", &o, &e) < 0) cli_die(&e);
-    add_sequence(page, result);
-    if (opts.against) add_sequence(page, truth);
-    if (opts.beside) add_sequence(page, other);
-    for (int more; (more = next_pair(result, truth)) != 0;) {
-        if (more < 0) continue;
-        add_frame(page, 0, result, opts.against ? truth->frame.values : NULL);
-        if (opts.against) add_frame(page, 1, truth, NULL);
-    }
-    if (!result->frames && !opts.against && result->head->patches.n) add_reference(page, result);
-    check_counts(result, truth);
-    while (opts.beside && next(other)) add_frame(page, opts.against ? 2 : 1, other, NULL);
+    add_sequence(page, &c->result);
+    if (opts.against) add_sequence(page, &c->truth);
+    for (size_t i = 0; i < opts.nbeside; i++) add_sequence(page, &c->beside[i]);
+    read_cast(c, true, page_frame, page);
+    if (shows_reference(c)) put_reference(&c->result, page_frame, page);
+    check_counts(c);
     if (vg_page_end(page, &facts, &e) < 0) cli_die(&e);
     cli_text_end();
     vg_page_free(&page);
@@ -363,27 +445,27 @@ static void make_page(side *result, side *truth, side *other)
 static void check_inputs(char **operands, size_t n)
 {
     bool input = reads_standard_input(operands, n), truth = opts.against && !strcmp(opts.against, "-");
-    bool other = opts.beside && !strcmp(opts.beside, "-"), patches = opts.patches && !strcmp(opts.patches, "-");
+    bool other = false, patches = opts.patches && !strcmp(opts.patches, "-");
     if (truth && input) cli_usage("standard input cannot be both the result and the truth");
-    if (other && (input || truth)) cli_usage("standard input cannot be two sequences");
+    for (size_t i = 0; i < opts.nbeside; i++) {
+        if (strcmp(opts.beside[i], "-")) continue;
+        if (other || input || truth) cli_usage("standard input cannot be two sequences");
+        other = true;
+    }
     if (patches && (input || truth || other)) cli_usage("standard input cannot be both a sequence and its patches");
 }
 
 int main(int argc, char **argv)
 {
+    static cast c;
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     sheet_options(); /* what is wrong with them is told before the input is opened */
     choose_kind();
     check_inputs(operands, n);
-    side result = {0}, truth = {0}, other = {0};
-    open_side(&result, operands, n);
-    if (opts.against) open_truth(&truth, &result);
-    if (opts.beside) open_operand(&other, opts.beside);
-    if (opts.page) make_page(&result, &truth, &other);
-    else make_sheet(&result, &truth);
-    close_side(&result);
-    close_side(&truth);
-    close_side(&other);
+    open_cast(&c, operands, n);
+    if (opts.page) make_page(&c);
+    else make_sheet(&c);
+    close_cast(&c);
     cli_finish(0);
 }

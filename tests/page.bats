@@ -161,12 +161,11 @@ END
 
 @test "options of the other kind, and what cannot be read twice, are refused before the input is read" {
     local arguments
-    for arguments in '--frames 3' '--columns 2' '--size 64x64' '--format gif'; do
+    for arguments in '--frames 3' '--columns 2' '--size 64x64' '--silhouettes' '--format gif'; do
         # shellcheck disable=SC2086
         must_fail 2 vg-view missing.obj -o out.html $arguments
         says "option '"
     done
-    must_fail 2 vg-view missing.obj -o out.png --beside x.obj
     must_fail 2 vg-view missing.obj -o out.png --title x
     must_fail 2 vg-view - --beside - -o out.html
     must_fail 2 vg-view missing.obj --against - --beside - -o out.html
@@ -306,5 +305,81 @@ from page_driver import *
 with Page(sys.argv[1]) as page:
     page.wait("document.body && document.querySelector('#message')")
     assert "not whole" in page.value("document.querySelector('#message').innerText")
+END
+}
+
+@test "scales and heat: the numbers of a page are those that Python finds, and the ends of the colours fit them" {
+    poses strip 4
+    mkdir truth
+    for i in 1 2 3 4; do mesh strip "0.0$i" 0.5 >"truth/t$i.obj"; done
+    must vg-view pose*.obj --scales --beside truth -o scales.html
+    must vg-encode pose1.obj pose2.obj pose3.obj pose4.obj -o poses.vgs
+    pipe 'vg-diff truth poses.vgs --heat - | vg-view -o heat.html'
+    must vg-view poses.vgs --against truth -o against.html
+    py scales.html heat.html against.html <<'END'
+import json, math, re, sys
+scales, heat, against = (json.loads(re.search(r'id="facts">(.*?)</script>', open(p).read()).group(1)) for p in sys.argv[1:])
+def load(name):
+    lines = [l.split() for l in open(name)]
+    return [[float(x) for x in l[1:]] for l in lines if l[0] == "v"], [[int(x) - 1 for x in l[1:]] for l in lines if l[0] in "fl"]
+def lengths(points, faces):
+    out = []
+    for face in faces:
+        mean = [sum(points[v][k] for v in face) / len(face) for k in range(3)]
+        out += [(v, math.dist(points[v], mean)) for v in face]
+    return out
+assert scales["tint"]["kind"] == "scales" and (scales["tint"]["low"], scales["tint"]["high"]) == (-1, 1)
+for number, name in ((0, "pose%d.obj"), (1, "truth/t%d.obj")):
+    about, (rest, faces) = scales["sequences"][number], load(name % 1)
+    reference = lengths(rest, faces)
+    for i in range(4):
+        ratios = {}
+        for (v, a), (_, b) in zip(reference, lengths(load(name % (i + 1))[0], faces)):
+            ratios.setdefault(v, []).append(b / a)
+        mean = lambda x: math.exp(sum(map(math.log, x)) / len(x))
+        each = [mean(r) for r in ratios.values()]
+        for key, want in (("means", mean(each)), ("minima", min(each)), ("maxima", max(each))):
+            assert abs(about[key][i] - want) < 1e-6, (name, i, key, about[key][i], want)
+assert scales["least"] < 1 < scales["max"]
+tint = heat["tint"]
+assert (tint["kind"], tint["unit"], tint["low"], tint["diverging"]) == ("scalars", "D", 0, False) and tint["title"].startswith("error")
+assert heat["sequences"][0]["means"] == against["sequences"][0]["means"] and heat["scale"] == against["scale"] == tint["high"]
+assert "tint" in against and len(heat["sequences"]) == 1
+END
+}
+
+@test "browser: heat and scales as colours with their legends; they can be switched off" {
+    poses cube 3
+    mkdir truth
+    for i in 1 2 3; do mesh cube "0.2$i" "0.0$i" >"truth/t$i.obj"; done
+    pipe 'vg-encode pose1.obj pose2.obj pose3.obj | vg-diff truth - --heat heat.vgs -o report'
+    must vg-view heat.vgs -o heat.html
+    browse heat.html '#frame=2' <<'END'
+text = lambda at: page.value(f"document.querySelector('{at}').textContent")
+assert text("#legend-text").startswith("error in units of D") and page.value("document.querySelector('#legend').offsetHeight") > 20
+assert text("#captions").startswith("mean ") and " D, max " in text("#captions")
+assert page.value("document.querySelector('#colour').value") == "scalars"
+coloured = page.picture()
+page.key("c")
+assert page.picture()[2] != coloured[2] and page.value("document.querySelector('#legend').offsetHeight") == 0
+page.key("c")
+assert page.picture()[2] == coloured[2]
+END
+    must vg-view heat.vgs --scales --beside truth --zoom 1.5 -o scales.html
+    browse scales.html '#frame=2&colour=scales' <<'END'
+text = lambda at: page.value(f"document.querySelector('{at}').textContent")
+assert text("#legend-text").startswith("length of vectors")
+numbers = page.value("[...document.querySelector('#legend-numbers').children].map((x) => x.textContent).join(' ')")
+assert numbers == "0.5\u00d7 0.707\u00d7 1\u00d7 1.41\u00d7 2\u00d7", numbers
+assert text("#captions").count(" to ") == 2
+coloured = page.picture()
+page.key("c")
+plain = page.picture()
+assert plain[2] != coloured[2]
+END
+    must vg-view heat.vgs --plain -o plain.html
+    browse plain.html <<'END'
+assert page.value("document.querySelector('#legend').offsetHeight") == 0
+assert page.value("document.querySelector('#colour').options.length") == 1
 END
 }

@@ -138,7 +138,8 @@ PY
     says "'out.obj'" ".png"
     must_fail 2 vg-view missing.obj -o .png
     for arguments in '--frames 0' '--frames two' '--columns 0' '--size 8x8' '--size 64' '--size 64x64x' '--size 5000x64' \
-        '--view up' '--view 30' '--view 30,' '--view 30,91' '--up x' '--scale 0' '--scale 1' '--centred'; do
+        '--view up' '--view 30' '--view 30,' '--view 30,91' '--up x' '--scale 0' '--centred' '--zoom 0' '--scales --scale 1' \
+        '--plain --scales' '--plain --scale 2' '--plain --patches x' '--scales --against x' '--plain --against x'; do
         # shellcheck disable=SC2086
         must_fail 2 vg-view missing.obj -o out.png $arguments
         says "option '"
@@ -247,4 +248,138 @@ PY
     [ "$(hues clay.png)" = 0 ] || fail "clay has $(hues clay.png) hues"
     [ "$(hues poses.png)" -ge 2 ] || fail "the poses have $(hues poses.png) hues"
     [ "$(hues patches.png)" -ge 2 ] || fail "the patches have $(hues patches.png) hues"
+}
+
+# crops PNG WIDTH HEIGHT X Y ...: one line for each corner: the checksum of that part of the picture
+crops() {
+    PYTHONPATH="$ROOT/tests" python3 - "$@" <<'PY'
+import sys, zlib
+from page_driver import read_png
+width, height, rows = read_png(open(sys.argv[1], "rb").read())
+w, h, corners = int(sys.argv[2]), int(sys.argv[3]), [int(x) for x in sys.argv[4:]]
+for x, y in zip(corners[::2], corners[1::2]):
+    assert x + w <= width and y + h <= height
+    print(zlib.crc32(b"".join(rows[y + j][3 * x:3 * (x + w)] for j in range(h))))
+PY
+}
+
+@test "rows: a sequence each, the same frames below one another, drawn as in a sheet of its own" {
+    poses cube 5
+    must vg-encode pose1.obj pose2.obj pose3.obj pose4.obj pose5.obj -o five.vgs
+    must vg-encode pose1.obj pose2.obj pose3.obj -o three.vgs
+    must vg-view five.vgs --frames 3 --columns 3 --size 48x48 -o alone.png
+    must vg-view five.vgs --beside five.vgs --beside three.vgs --frames 3 --size 48x48 -o rows.png
+    must png rows.png
+    [ "$output" = "$((16 + 3 * 64)) $((16 + 3 * (48 + 22 + 16 + 24)))" ]
+    # three rows: that of the single sheet, again, and one that stays at its last frame: frames 0, 2, 2
+    crops alone.png 48 70 16 16 80 16 144 16 >single
+    crops rows.png 48 70 16 40 80 40 144 40 >first
+    crops rows.png 48 70 16 150 80 150 144 150 >second
+    crops rows.png 48 70 16 260 80 260 144 260 >third
+    same_file single first
+    same_file single second
+    [ "$(sed -n 1p third)" = "$(sed -n 1p single)" ]
+    [ "$(sed -n 2p third)" = "$(sed -n 2p single)" ]
+    [ "$(sed -n 3p third)" = "$(sed -n 2p single)" ]
+    [ "$(sort -u single | wc -l)" = 3 ]
+    # in two blocks of two columns, the first row of each is that of the first sequence
+    must vg-view five.vgs --beside three.vgs --frames 3 --columns 2 --size 48x48 -o blocks.png
+    must png blocks.png
+    [ "$output" = "144 $((16 + 4 * 110))" ]
+    crops blocks.png 48 70 16 40 80 40 16 260 >blocks
+    same_file single blocks
+    must_fail 2 vg-view - --beside - -o out.png
+    must_fail 4 vg-view five.vgs --beside missing.vgs -o out.png
+    mesh tetra >tetra.obj
+    must vg-view five.vgs --beside tetra.obj --size 40x40 -o other.png
+}
+
+@test "the heat of vg-diff looks as --against does, without the truth; one scale for all rows" {
+    poses two 4
+    mkdir truth off
+    cp pose*.obj truth
+    cp pose1.obj off/pose1.obj
+    for i in 2 3 4; do mesh two "0.$i" "$i" >"off/pose$i.obj"; done
+    must vg-view off --against truth --frames 4 --columns 4 --size 64x64 -o against.png
+    pipe 'vg-diff truth off --heat - | vg-view --frames 4 --columns 4 --size 64x64 -o heat.png'
+    crops against.png 64 110 16 16 96 16 176 16 256 16 >a
+    crops heat.png 64 110 16 16 96 16 176 16 256 16 >b
+    same_file a b
+    # rows: the better one is darker than it would be alone, and the same as with --against for both
+    mkdir near
+    cp pose1.obj near
+    for i in 2 3 4; do mesh two "0.0$i" "$((i - 1))" >"near/pose$i.obj"; done
+    must vg-diff truth off --heat off.vgs -o report
+    must vg-diff truth near --heat near.vgs -o report
+    must vg-view off.vgs --beside near.vgs --size 64x64 -o rows.png
+    must vg-view off --beside near --against truth --size 64x64 -o both.png
+    crops rows.png 64 110 16 40 96 40 256 40 >a
+    crops both.png 64 110 16 40 96 40 256 40 >b
+    same_file a b
+    must vg-view near.vgs --columns 4 --size 64x64 -o alone.png
+    [ "$(crops alone.png 64 64 256 16)" != "$(crops rows.png 64 64 256 184)" ]
+    must vg-view near.vgs --plain --columns 4 --size 64x64 -o plain.png
+    must png plain.png
+    [ "$output" = "336 118" ]
+    [ "$(hues plain.png)" = 0 ] || fail "plain has $(hues plain.png) hues"
+    # frames without numbers among those with them, or with others, have no colour to say so
+    must vg-encode near.vgs truth -o mixed.vgs
+    must_fail 3 vg-view mixed.vgs -o mixed.png
+    says "brings no 'error' to be coloured"
+    must vg-diff -c truth off --heat centred.vgs -o report
+    must_fail 3 vg-view off.vgs --beside centred.vgs -o mixed.png
+    says "brings 'centred error' in 'D'"
+    must_fail 3 vg-view off --against truth --beside mixed.vgs -o mixed.png
+    says "'mixed.vgs' has 8 frames where 'truth' has 4"
+    [ ! -e mixed.png ]
+}
+
+@test "--scales: twice as long is the one end of the colours, half the other, as long as it was the middle" {
+    mesh cube >one.obj
+    awk '/^v/ { print "v", 2 * $2, 2 * $3, 2 * $4; next } { print }' one.obj >twice.obj
+    awk '/^v/ { print "v", $2 / 2, $3 / 2, $4 / 2; next } { print }' one.obj >half.obj
+    must vg-view one.obj twice.obj half.obj --scales --view front --columns 3 --size 96x96 -o scales.png
+    PYTHONPATH="$ROOT/tests" must python3 - scales.png <<'END'
+import sys
+from page_driver import read_png
+width, height, rows = read_png(open(sys.argv[1], "rb").read())
+at = lambda x, y: rows[y][3 * x:3 * x + 3]
+row = height - 74 + 27  # through the bar
+bar = [at(x, row) for x in range(16, width - 16)]
+low, high, middle = bar[0], bar[-1], [bar[len(bar) // 2], bar[len(bar) // 2 - 1]]
+assert low[2] > 1.5 * low[0] and high[0] > 1.5 * high[2], (low, high)
+# the square of each pose is in the middle of its picture, or from there to the right and up: the origin is its corner
+found = [[at(x, y) for x in range(16 + 112 * i, 112 + 112 * i) for y in range(16, 112)] for i in range(3)]
+as_middle = lambda p: all(abs(a - b) < 6 for a, b in zip(p, middle[0]))  # the bar has no pixel right there
+assert sum(map(as_middle, found[0])) > 100 and high not in found[0] and low not in found[0]
+assert found[1].count(high) > 2000 and low not in found[1]
+assert found[2].count(low) > 100 and high not in found[2]
+END
+    must vg-view one.obj twice.obj --scales --scale 4 --view front --size 96x96 -o four.png
+    must_fail 2 vg-view one.obj --scales --scale 0.5 -o four.png
+}
+
+@test "--silhouettes draws the contour, and nothing on a plain face; --zoom scales the figure" {
+    mesh cube >cube.obj
+    local name
+    must vg-view cube.obj --view front --size 210x210 -o plain.png
+    must vg-view cube.obj --view front --size 210x210 --silhouettes -o lines.png
+    must vg-view cube.obj --view iso --size 210x210 --silhouettes -o iso.png
+    must vg-view cube.obj --view front --size 210x210 --zoom 0.5 -o small.png
+    PYTHONPATH="$ROOT/tests" must python3 - <<'END'
+from page_driver import read_png
+def load(name):
+    rows = read_png(open(name, "rb").read())[2]
+    return [[row[3 * x:3 * x + 3] for x in range(16, 226)] for row in rows[16:226]]
+dark = lambda picture: [(x, y) for y, row in enumerate(picture) for x, p in enumerate(row) if max(p) < 60]
+figure = lambda picture: sum(max(abs(a - b) for a, b in zip(p, row[0])) > 12 for row in picture for p in row)
+plain, lines, iso, small = (load(n + ".png") for n in ("plain", "lines", "iso", "small"))
+assert not dark(plain)
+found = dark(lines)
+assert len(found) >= 4 * 170 and all(min(abs(x - e) for e in (12, 197)) < 3 or min(abs(y - e) for e in (12, 197)) < 3
+                                     for x, y in found), len(found)
+assert not [p for p in dark(iso) if abs(p[0] - 105) < 30 and abs(p[1] - 105) < 30]  # edges between fronts are no contour
+assert len(dark(iso)) > 120  # six sides, most of them slanted
+assert abs(figure(plain) / figure(small) - 4) < 0.2, (figure(plain), figure(small))
+END
 }

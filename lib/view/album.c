@@ -7,20 +7,20 @@ static void clear_shot(vgi_shot *s)
 {
     free(s->name);
     free(s->points);
-    free(s->errors);
+    free(s->numbers);
     *s = (vgi_shot){0};
 }
 
 static int make_shot(const vgi_album *a, vgi_shot *s, vg_err *e)
 {
     if (!s->points) s->points = vgi_array(a->nv, 3 * sizeof *s->points, e);
-    if (!s->errors && a->compare) s->errors = vgi_array(a->nv, sizeof *s->errors, e);
-    return s->points && (s->errors || !a->compare) ? VG_OK : VG_ENOMEM;
+    s->has_numbers = false;
+    return s->points ? VG_OK : VG_ENOMEM;
 }
 
-int vgi_album_init(vgi_album *a, size_t nv, size_t want, bool compare, vg_err *e)
+int vgi_album_init(vgi_album *a, size_t nv, size_t want, vg_err *e)
 {
-    *a = (vgi_album){.nv = nv, .want = want, .stride = 1, .compare = compare};
+    *a = (vgi_album){.nv = nv, .want = want, .stride = 1};
     /* one more: the last frame may join those that were kept */
     a->at = vgi_array(4 * want + 1, sizeof *a->at, e);
     a->cap = 4 * want;
@@ -64,11 +64,30 @@ int vgi_album_next(vgi_album *a, vgi_shot **shot, vg_err *e)
     return VG_OK;
 }
 
-size_t vgi_album_close(vgi_album *a)
+/* The last frame joins those that were kept; its number. */
+static size_t add_last(vgi_album *a)
 {
     if (a->seen == 0) return 0;
     size_t last = a->seen - 1;
     if (a->at[a->n - 1].index != last) swap_shots(a->at + a->n++, &a->last);
+    return last;
+}
+
+void vgi_album_match(vgi_album *a, const size_t *frames, size_t n, size_t *shots)
+{
+    add_last(a);
+    for (size_t i = 0, at = 0; i < n; i++) {
+        while (at + 1 < a->n && (a->at[at + 1].index <= frames[i] ||
+                                 a->at[at + 1].index - frames[i] < frames[i] - a->at[at].index))
+            at++;
+        shots[i] = at;
+    }
+}
+
+size_t vgi_album_close(vgi_album *a)
+{
+    size_t last = add_last(a);
+    if (a->n == 0) return 0;
     if (a->n <= a->want) return a->n;
     for (size_t i = 0, from = 0; i < a->want; i++) {
         /* the frame nearest to the i-th of `want` evenly spaced ones; wanted ones are more than a stride apart, so

@@ -1,7 +1,7 @@
-/* colour.c: the error colours and the way from linear light to the bytes of a picture.
+/* colour.c: the colours of numbers and the way from linear light to the bytes of a picture.
  * The colour map is of our own making: a path in OKLab (Ottosson 2020) whose lightness grows evenly from a deep
- * indigo over teal to a light yellow, so that it also reads in grey and with colour-deficient eyes. Leaves out
- * lights. SPDX-License-Identifier: GPL-3.0-or-later */
+ * indigo over teal to a light yellow, so that it also reads in grey and with colour-deficient eyes; and one with a middle: from
+ * blue over a light grey to orange. Leaves out lights. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
@@ -11,9 +11,15 @@ typedef struct stop { /* lightness, chroma, hue in degrees */
 } stop;
 
 /* The darkest is light enough to be shaded and still show its shape. Chroma stays inside sRGB. */
-static const stop path[] = {
+static const stop rising[] = {
     {0.380, 0.130, 284}, {0.490, 0.115, 258}, {0.590, 0.105, 220}, {0.690, 0.120, 178},
     {0.780, 0.150, 150}, {0.860, 0.170, 125}, {0.930, 0.175, 105},
+};
+
+/* Both ends are of one lightness, so that neither counts more; in the middle the hue may jump, for there is no chroma. */
+static const stop parting[] = {
+    {0.450, 0.150, 262}, {0.600, 0.130, 255}, {0.765, 0.080, 245}, {0.930, 0.000, 240},
+    {0.930, 0.000, 62},  {0.790, 0.095, 62},  {0.640, 0.150, 50},  {0.480, 0.160, 36},
 };
 
 static void from_oklab(double l, double a, double b, float linear[3])
@@ -28,15 +34,24 @@ static void from_oklab(double l, double a, double b, float linear[3])
     for (int k = 0; k < 3; k++) linear[k] = (float)fmin(fmax(rgb[k], 0), 1);
 }
 
-void vgi_map_colour(double t, float linear[3])
+/* A path of n stops, t from 0 to 1. */
+static void follow(const stop *path, size_t n, double t, float linear[3])
 {
-    size_t last = sizeof path / sizeof *path - 1;
-    double at = fmin(fmax(t, 0), 1) * (double)last;
-    size_t i = at >= (double)last ? last - 1 : (size_t)at;
+    double at = t * (double)(n - 1);
+    size_t i = at >= (double)(n - 1) ? n - 2 : (size_t)at;
     double u = at - (double)i, w = 1 - u;
     const stop *p = path + i, *q = p + 1;
     double c = w * p->c + u * q->c, h = (w * p->h + u * q->h) * (M_PI / 180);
     from_oklab(w * p->l + u * q->l, c * cos(h), c * sin(h), linear);
+}
+
+void vgi_map_colour(double t, bool diverging, float linear[3])
+{
+    enum { RISING = sizeof rising / sizeof *rising, HALF = sizeof parting / sizeof *parting / 2 };
+    double x = fmin(fmax(t, 0), 1);
+    if (!diverging) follow(rising, RISING, x, linear);
+    else if (x < 0.5) follow(parting, HALF, 2 * x, linear);
+    else follow(parting + HALF, HALF, 2 * x - 1, linear);
 }
 
 float vgi_linear(unsigned char srgb)
@@ -45,9 +60,9 @@ float vgi_linear(unsigned char srgb)
     return (float)(x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4));
 }
 
-void vgi_palette_init(vgi_palette *p)
+void vgi_palette_init(vgi_palette *p, bool diverging)
 {
-    for (int i = 0; i < VGI_MAP_STEPS; i++) vgi_map_colour(i / (VGI_MAP_STEPS - 1.0), p->map[i]);
+    for (int i = 0; i < VGI_MAP_STEPS; i++) vgi_map_colour(i / (VGI_MAP_STEPS - 1.0), diverging, p->map[i]);
     for (int i = 0; i <= VGI_GAMMA_STEPS; i++) {
         double x = i / (double)VGI_GAMMA_STEPS;
         double y = x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055;

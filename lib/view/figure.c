@@ -57,7 +57,33 @@ void vgi_figure_clear(vgi_figure *g)
     free(g->ring_start);
     free(g->ring);
     free(g->drawn);
+    free(g->side);
     *g = (vgi_figure){0};
+}
+
+/* ---- sides ---- */
+
+static int compare_sides(const void *a, const void *b)
+{
+    const vgi_side *p = a, *q = b;
+    if (p->a != q->a) return p->a < q->a ? -1 : 1;
+    if (p->b != q->b) return p->b < q->b ? -1 : 1;
+    return (p->face > q->face) - (p->face < q->face);
+}
+
+int vgi_figure_sides(vgi_figure *g, vg_err *e)
+{
+    const vg_mesh *m = g->mesh;
+    if (!(g->side = vgi_array_raw(vg_mesh_corners(m), sizeof *g->side, e))) return VG_ENOMEM;
+    for (size_t f = 0; f < m->nf; f++) {
+        size_t first = m->start[f], n = m->start[f + 1] - first;
+        for (size_t i = 0; n > 2 && i < n; i++) {
+            uint32_t a = m->vert[first + i], b = m->vert[first + (i + 1) % n];
+            g->side[g->nsides++] = (vgi_side){a < b ? a : b, a < b ? b : a, (uint32_t)f, a < b};
+        }
+    }
+    qsort(g->side, g->nsides, sizeof *g->side, compare_sides);
+    return VG_OK;
 }
 
 /* ---- normals ---- */

@@ -12,19 +12,21 @@ enum {
     FLUSH_BYTES = 1 << 18,
     LINE_BYTES = 1 << 20,   /* of the data of a block that become text at once; a multiple of 3 */
     MOST_CLIPPED = 4096,    /* corners of a face that is cut by ear clipping */
-    MAP_STEPS = 64,         /* colours of the map that the page gets */
-    DECADES = 20, PER_DECADE = 200, /* of the histogram of errors */
+    MAP_STEPS = 65,         /* colours of the map that the page gets: one is its middle */
+    DECADES = 60, PER_DECADE = 200, /* of the histogram of what is coloured */
 };
-#define LEAST_SCALE 1e-9 /* D: errors below this are rounding */
+#define LEAST_COUNTED 1e-30
 
 typedef struct sequence {
     const char *label;
     const vg_head *head;
     bool *drawn;               /* nv: in a face, or all when there is no face */
     double centre[3], diagonal, unit, ground;
-    vgi_track places, errors;
+    vgi_track places, numbers;
+    vgi_meter meter;
+    bool tinted, compared;     /* colours say something of it; they say errors */
     vgi_chunk chunk;
-    vg_bytes names, times, means, maxima; /* of the frames, as JSON lists that are open at their end */
+    vg_bytes names, times, means, minima, maxima; /* of the frames, as JSON lists that are open at their end */
     bool timed;
     double last_time, loss;
     size_t frames;
@@ -40,7 +42,9 @@ struct vg_page {
     size_t n;
     sequence at[VG_PAGE_SEQUENCES];
     uint64_t histogram[DECADES * PER_DECADE + 1], counted;
-    double sum, max;           /* of the errors */
+    uint64_t counted_frames;
+    vgi_tint tint;
+    vgi_spread spread;         /* of what is coloured: mean is a sum until the end */
 };
 
 /* ---- writing ---- */
@@ -296,7 +300,6 @@ int vg_page_sequence(vg_page *p, const char *label, const vg_head *h, vg_err *e)
     size_t i = p->n++;
     int r = measure(s, p->o.z_up, e);
     if (r == VG_OK) r = vgi_track_init(&s->places, h->mesh.nv, 3, e);
-    if (r == VG_OK && p->o.compare && i == 0) r = vgi_track_init(&s->errors, h->mesh.nv, 1, e);
     return r == VG_OK ? put_mesh(p, i, h, e) : r;
 }
 
@@ -329,38 +332,56 @@ static int put_chunk(vg_page *p, size_t i, const char *what, vgi_track *t, vg_er
     return r;
 }
 
-/* Which errors there are: the lower end of each step of the histogram is LEAST_SCALE * 10^(step / PER_DECADE). */
-static void count_error(vg_page *p, double error)
+/* Which numbers there are: the upper end of each step of the histogram is LEAST_COUNTED * 10^(step / PER_DECADE). */
+static void count_number(vg_page *p, double number)
 {
-    double at = error > LEAST_SCALE ? ceil(log10(error / LEAST_SCALE) * PER_DECADE) : 0;
+    double size = fabs(number), at = size > LEAST_COUNTED ? ceil(log10(size / LEAST_COUNTED) * PER_DECADE) : 0;
     p->histogram[at < DECADES * PER_DECADE ? (size_t)at : DECADES * PER_DECADE]++;
     p->counted++;
 }
 
-static int add_errors(vg_page *p, sequence *s, const double *points, const double *truth, vg_err *e)
+static int list_spread(sequence *s, const vgi_tint *t, const vgi_spread *x, vg_err *e)
 {
+    vg_bytes *const lists[3] = {&s->means, &s->minima, &s->maxima};
+    const double numbers[3] = {x->mean, x->least, x->most};
+    int r = VG_OK;
+    for (int i = 0; i < 3 && r == VG_OK; i++) {
+        r = list_next(lists[i], e);
+        if (r == VG_OK) r = json_short(lists[i], vgi_tint_shown(t, numbers[i]), e);
+    }
+    return r;
+}
+
+/* Whether colours say something of a sequence is known by its first frame. */
+static int begin_numbers(vg_page *p, sequence *s, const vg_frame *f, const double *truth, vg_err *e)
+{
+    s->tinted = vgi_tint_has(&p->tint, f, truth);
+    s->compared = s->tinted && p->tint.what == VG_TINT_ERRORS;
+    if (!s->tinted) return VG_OK;
+    double unit = s->compared ? p->at[1].unit : s->unit;
+    int r = vgi_track_init(&s->numbers, s->head->mesh.nv, 1, e);
+    return r == VG_OK ? vgi_meter_init(&s->meter, &p->tint, &s->head->mesh, s->head->reference, unit, e) : r;
+}
+
+static int add_numbers(vg_page *p, sequence *s, const vg_frame *f, const double *truth, vg_err *e)
+{
+    vgi_spread x;
     size_t nv = s->head->mesh.nv;
-    double shift[3] = {0, 0, 0}, a[3], b[3], sum = 0, max = 0, *errors = vgi_track_next(&s->errors);
-    if (p->o.centred) {
-        vg_centroid(points, nv, a);
-        vg_centroid(truth, nv, b);
-        for (int k = 0; k < 3; k++) shift[k] = a[k] - b[k];
-    }
-    for (size_t v = 0; v < nv; v++) {
-        double d[3];
-        for (size_t k = 0; k < 3; k++) d[k] = (points[3 * v + k] - truth[3 * v + k] - shift[k]) / p->at[1].unit;
-        errors[v] = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-        max = fmax(max, errors[v]);
-        sum += errors[v];
-        if (s->drawn[v]) count_error(p, errors[v]);
-    }
-    double mean = nv ? sum / (double)nv : 0;
-    p->sum += mean;
-    p->max = fmax(p->max, max);
-    int r = list_next(&s->means, e);
-    if (r == VG_OK) r = json_short(&s->means, mean, e);
-    if (r == VG_OK) r = list_next(&s->maxima, e);
-    return r == VG_OK ? json_short(&s->maxima, max, e) : r;
+    if (!s->tinted) return VG_OK;
+    if (!vgi_tint_has(&p->tint, f, truth))
+        return vg_fail(e, VG_EINPUT, "frame '%s' brings no '%s' to be coloured, as those before it do", f->name,
+                       p->tint.name ? p->tint.name : "error");
+    int r = vgi_tint_read(&p->tint, &s->meter, f, truth, &x, e);
+    if (r < 0) return r;
+    if (nv) memcpy(vgi_track_next(&s->numbers), s->meter.numbers, nv * sizeof(double));
+    else vgi_track_next(&s->numbers);
+    for (size_t v = 0; v < nv; v++)
+        if (s->drawn[v]) count_number(p, s->meter.numbers[v]);
+    bool first = p->counted_frames++ == 0;
+    p->spread.mean += x.mean;
+    p->spread.least = first ? x.least : fmin(p->spread.least, x.least);
+    p->spread.most = first ? x.most : fmax(p->spread.most, x.most);
+    return list_spread(s, &p->tint, &x, e);
 }
 
 static int add_label(sequence *s, const vg_frame *f, vg_err *e)
@@ -377,18 +398,18 @@ static int add_label(sequence *s, const vg_frame *f, vg_err *e)
 
 int vg_page_add(vg_page *p, size_t i, const vg_frame *f, const double *truth, vg_err *e)
 {
-    if (i >= p->n || (p->o.compare && (p->n < 2 || p->at[0].head->mesh.nv != p->at[1].head->mesh.nv)))
+    if (i >= p->n || (truth && (p->n < 2 || p->at[i].head->mesh.nv != p->at[1].head->mesh.nv)))
         return vg_fail(e, VG_EARG, "a frame is for a sequence that the page does not have");
     sequence *s = p->at + i;
-    bool compared = p->o.compare && i == 0;
-    if (compared && !truth) return vg_fail(e, VG_EARG, "a frame that is compared needs a truth");
+    if (s->compared && !truth) return vg_fail(e, VG_EARG, "a frame that is compared needs a truth");
     int r = add_label(s, f, e);
+    if (r == VG_OK && s->frames == 0) r = begin_numbers(p, s, f, truth, e);
     if (r < 0) return r;
     memcpy(vgi_track_next(&s->places), f->values, 3 * s->head->mesh.nv * sizeof *f->values);
     s->frames++;
-    if (compared) r = add_errors(p, s, f->values, truth, e);
+    r = add_numbers(p, s, f, truth, e);
     if (r == VG_OK && s->places.n == s->places.cap) r = put_chunk(p, i, "places", &s->places, e);
-    if (r == VG_OK && compared && s->errors.n == s->errors.cap) r = put_chunk(p, i, "errors", &s->errors, e);
+    if (r == VG_OK && s->tinted && s->numbers.n == s->numbers.cap) r = put_chunk(p, i, "numbers", &s->numbers, e);
     return r;
 }
 
@@ -397,11 +418,15 @@ int vg_page_add(vg_page *p, size_t i, const vg_frame *f, const double *truth, vg
 int vg_page_new(vg_page **out, int fd, const char *name, const vg_page_options *o, vg_err *e)
 {
     *out = NULL;
-    if (!(o->scale >= 0 && o->scale < INFINITY) || !isfinite(o->azimuth) || !isfinite(o->elevation))
-        return vg_fail(e, VG_EARG, "scale, azimuth and elevation must be numbers, and the scale not negative");
+    if (!(o->scale >= 0 && o->scale < INFINITY) || !(o->zoom >= 0 && o->zoom < INFINITY) || !isfinite(o->azimuth) ||
+        !isfinite(o->elevation))
+        return vg_fail(e, VG_EARG, "scale, zoom, azimuth and elevation must be numbers, scale and zoom not negative");
+    if (o->tint == VG_TINT_SCALES && o->scale > 0 && !(o->scale > 1))
+        return vg_fail(e, VG_EARG, "the colours of scales end at a factor above 1, not at %g", o->scale);
     vg_page *p = vgi_array(1, sizeof *p, e);
     if (!p) return VG_ENOMEM;
     p->o = *o;
+    p->tint = (vgi_tint){.what = o->tint, .centred = o->centred};
     p->fd = fd;
     p->rest = vgi_page_html;
     p->name = vgi_copy_string(name, strlen(name), e);
@@ -426,32 +451,42 @@ void vg_page_free(vg_page **address)
         sequence *s = p->at + i;
         free(s->drawn);
         vgi_track_clear(&s->places);
-        vgi_track_clear(&s->errors);
+        vgi_track_clear(&s->numbers);
+        vgi_meter_clear(&s->meter);
         vg_bytes_clear(&s->chunk.packed);
         vg_bytes_clear(&s->names);
         vg_bytes_clear(&s->times);
         vg_bytes_clear(&s->means);
+        vg_bytes_clear(&s->minima);
         vg_bytes_clear(&s->maxima);
     }
     vg_bytes_clear(&p->out);
+    vgi_tint_clear(&p->tint);
     free(p->name);
     free(p);
     *address = NULL;
 }
 
-/* The end of the colours: what 99 % of the errors do not exceed, then the next of some numbers that are short. */
-static double find_scale(const vg_page *p)
+/* The absolute value that 99 % of the numbers do not exceed. */
+static double find_percentile(const vg_page *p)
 {
-    static const double steps[] = {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10};
-    if (p->o.scale > 0) return p->o.scale;
+    double largest = fmax(fabs(p->spread.least), fabs(p->spread.most));
     uint64_t seen = p->histogram[0], want = p->counted - p->counted / 100;
     size_t at = 0;
     while (seen < want && at < DECADES * PER_DECADE) seen += p->histogram[++at];
-    double error = fmin(LEAST_SCALE * pow(10, (double)at / PER_DECADE), fmax(p->max, LEAST_SCALE));
-    double power = pow(10, floor(log10(error) + 1e-9));
-    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++)
-        if (steps[i] * power >= error * (1 - 1e-9)) return steps[i] * power;
-    return 10 * power;
+    return fmin(at ? LEAST_COUNTED * pow(10, (double)at / PER_DECADE) : 0, largest);
+}
+
+static void end_tint(vg_page *p, vg_page_facts *facts)
+{
+    vgi_tint_end(&p->tint, p->o.scale, find_percentile(p), p->spread.least);
+    facts->tinted = p->counted_frames > 0;
+    if (!facts->tinted) return;
+    p->spread.mean /= (double)p->counted_frames;
+    facts->scale = vgi_tint_shown(&p->tint, p->tint.high);
+    facts->mean = vgi_tint_shown(&p->tint, p->spread.mean);
+    facts->least = vgi_tint_shown(&p->tint, p->spread.least);
+    facts->max = vgi_tint_shown(&p->tint, p->spread.most);
 }
 
 /* Who made the sequence: the command lines, in order. */
@@ -478,10 +513,16 @@ static int json_provenance(vg_bytes *b, const vg_head *h, vg_err *e)
     return r;
 }
 
+/* What is compared is shown in the place and unit of the truth. */
+static const sequence *frame_of(const vg_page *p, const sequence *s)
+{
+    return s->compared ? p->at + 1 : s;
+}
+
 static int json_sequence(vg_bytes *b, const vg_page *p, size_t i, vg_err *e)
 {
     const sequence *s = p->at + i;
-    const sequence *frame = p->o.compare && i == 0 ? p->at + 1 : s; /* compared in one place and unit */
+    const sequence *frame = frame_of(p, s);
     const vg_mesh *m = &s->head->mesh;
     vg_bytes centre = {0};
     int r = json_text(b, i ? ",{" : "{", e);
@@ -500,27 +541,46 @@ static int json_sequence(vg_bytes *b, const vg_page *p, size_t i, vg_err *e)
     if (r == VG_OK) r = json_provenance(b, s->head, e);
     if (r == VG_OK) r = field_list(b, "names", &s->names, e);
     if (r == VG_OK && s->timed) r = field_list(b, "times", &s->times, e);
-    if (r == VG_OK && p->o.compare && i == 0) r = field_list(b, "means", &s->means, e);
-    if (r == VG_OK && p->o.compare && i == 0) r = field_list(b, "maxima", &s->maxima, e);
+    if (r == VG_OK && s->tinted) r = field_list(b, "means", &s->means, e);
+    if (r == VG_OK && s->tinted) r = field_list(b, "minima", &s->minima, e);
+    if (r == VG_OK && s->tinted) r = field_list(b, "maxima", &s->maxima, e);
     if (r == VG_OK) r = json_text(b, "}", e);
     vg_bytes_clear(&centre);
     return r;
 }
 
-static int json_map(vg_bytes *b, vg_err *e)
+static int json_map(vg_bytes *b, bool diverging, vg_err *e)
 {
     vgi_palette *palette = vgi_array_raw(1, sizeof *palette, e);
     if (!palette) return VG_ENOMEM;
-    vgi_palette_init(palette);
+    vgi_palette_init(palette, diverging);
     char text[6 * MAP_STEPS + 1];
     for (int i = 0; i < MAP_STEPS; i++) {
         float c[3];
-        vgi_map_colour(i / (MAP_STEPS - 1.0), c);
+        vgi_map_colour(i / (MAP_STEPS - 1.0), diverging, c);
         snprintf(text + (size_t)i * 6, 7, "%02x%02x%02x", vgi_encode(palette, c[0]), vgi_encode(palette, c[1]),
                  vgi_encode(palette, c[2]));
     }
     free(palette);
     return field_text(b, "map", text, e);
+}
+
+/* What the colours of the page say, and where they end; numbers of scales are logarithms to base 2. */
+static int json_tint(vg_bytes *b, const vg_page *p, vg_err *e)
+{
+    static const char *const kinds[] = {"scalars", "errors", "scales", "plain"};
+    char title[256];
+    const vgi_tint *t = &p->tint;
+    vgi_tint_title(t, 0, title, sizeof title);
+    int r = field(b, "tint", e);
+    if (r == VG_OK) r = json_text(b, "{", e);
+    if (r == VG_OK) r = field_text(b, "kind", kinds[t->what], e);
+    if (r == VG_OK) r = field_text(b, "title", title, e);
+    if (r == VG_OK) r = field_text(b, "unit", t->what == VG_TINT_ERRORS ? "D" : t->unit ? t->unit : "", e);
+    if (r == VG_OK) r = field_number(b, "low", t->low, e);
+    if (r == VG_OK) r = field_number(b, "high", t->high, e);
+    if (r == VG_OK) r = field_flag(b, "diverging", t->diverging, e);
+    return r == VG_OK ? json_text(b, "}", e) : r;
 }
 
 static int json_page(vg_bytes *b, const vg_page *p, const vg_page_facts *facts, vg_err *e)
@@ -534,12 +594,15 @@ static int json_page(vg_bytes *b, const vg_page *p, const vg_page_facts *facts, 
     if (r == VG_OK) r = field_flag(b, "follow", p->o.follow, e);
     if (r == VG_OK) r = field_flag(b, "edges", p->o.edges, e);
     if (r == VG_OK) r = field_flag(b, "ground", p->o.ground, e);
-    if (r == VG_OK) r = field_flag(b, "compare", p->o.compare, e);
+    if (r == VG_OK) r = field_number(b, "zoom", p->o.zoom > 0 ? p->o.zoom : 1, e);
+    if (r == VG_OK) r = field_flag(b, "patches", p->o.tint != VG_TINT_PLAIN, e);
+    if (r == VG_OK && facts->tinted) r = json_tint(b, p, e);
     if (r == VG_OK) r = field_flag(b, "centred", p->o.centred, e);
     if (r == VG_OK) r = field_number(b, "scale", facts->scale, e);
     if (r == VG_OK) r = field_number(b, "mean", facts->mean, e);
+    if (r == VG_OK) r = field_number(b, "least", facts->least, e);
     if (r == VG_OK) r = field_number(b, "max", facts->max, e);
-    if (r == VG_OK) r = json_map(b, e);
+    if (r == VG_OK) r = json_map(b, p->tint.diverging, e);
     if (r == VG_OK) r = field(b, "sequences", e);
     if (r == VG_OK) r = json_text(b, "[", e);
     for (size_t i = 0; i < p->n && r == VG_OK; i++) r = json_sequence(b, p, i, e);
@@ -551,10 +614,10 @@ static int put_remaining(vg_page *p, vg_page_facts *facts, vg_err *e)
     int r = VG_OK;
     for (size_t i = 0; i < p->n && r == VG_OK; i++) {
         sequence *s = p->at + i;
-        const sequence *frame = p->o.compare && i == 0 ? p->at + 1 : s;
+        const sequence *frame = frame_of(p, s);
         if (!s->frames) return vg_fail(e, VG_EINPUT, "'%s' has no frames: there is nothing to show", s->label);
         if (s->places.n) r = put_chunk(p, i, "places", &s->places, e);
-        if (r == VG_OK && s->errors.n) r = put_chunk(p, i, "errors", &s->errors, e);
+        if (r == VG_OK && s->numbers.n) r = put_chunk(p, i, "numbers", &s->numbers, e);
         facts->frames = s->frames > facts->frames ? s->frames : facts->frames;
         facts->loss = fmax(facts->loss, s->loss / frame->unit);
     }
@@ -568,11 +631,7 @@ int vg_page_end(vg_page *p, vg_page_facts *facts, vg_err *e)
     if (p->n == 0) return vg_fail(e, VG_EINPUT, "there is no sequence to show");
     int r = put_remaining(p, facts, e);
     if (r < 0) return r;
-    if (p->o.compare) {
-        facts->scale = find_scale(p);
-        facts->mean = p->sum / (double)p->at[0].frames;
-        facts->max = p->max;
-    }
+    end_tint(p, facts);
     r = put_template(p, "@FACTS@", e);
     if (r == VG_OK) r = json_page(&json, p, facts, e);
     if (r == VG_OK) r = put(p, json.data, json.size, e);

@@ -8,10 +8,11 @@ const $ = (id) => document.getElementById(id);
 const facts = JSON.parse($("facts").textContent);
 const canvas = $("canvas");
 const CREASE = Math.cos(50 * Math.PI / 180), MOST_RING = 64, TEXTURE_WIDTH = 2048, FRAMES_PER_SECOND = 25;
+const TINT = facts.tint || null; /* what colours say: numbers of vertices, of scales their logarithms to base 2 */
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 const state = {
     frame: 0, playing: false, speed: 1, wire: facts.edges ? 1 : 0, ground: facts.ground, follow: facts.follow, colour: "plain",
-    shown: facts.sequences.map(() => true), azimuth: facts.azimuth, elevation: facts.elevation, zoom: 1, shift: [0, 0],
+    shown: facts.sequences.map(() => true), azimuth: facts.azimuth, elevation: facts.elevation, zoom: facts.zoom, shift: [0, 0],
 };
 let sequences = [], frames = 0, gl = null, programs = null, wanted = false, clock = null;
 
@@ -67,7 +68,7 @@ function predictBack(bytes, n, nv, width) {
 function readChunks(s) {
     const numbers = (text) => text.split(" ").map(Number);
     for (const element of document.querySelectorAll(`script[data-sequence="${s.number}"][data-frames]`)) {
-        const d = element.dataset, list = d.frames === "places" ? s.places : s.errors;
+        const d = element.dataset, list = d.frames === "places" ? s.places : s.numbers;
         const first = list.length ? list[list.length - 1].first + list[list.length - 1].n : 0;
         list.push({element, first, n: +d.count, origin: numbers(d.origin), step: numbers(d.step), q: null, waits: null});
     }
@@ -98,10 +99,10 @@ const AXES = facts.zUp ? [[0, 1], [2, 1], [1, -1]] : [[0, 1], [1, 1], [2, 1]];
 
 async function makeSequence(number) {
     const about = facts.sequences[number];
-    const s = {number, about, nv: about.vertices, unit: about.diagonal || 1, places: [], errors: []};
+    const s = {number, about, nv: about.vertices, unit: about.diagonal || 1, places: [], numbers: []};
     const sizes = await unpackList(number, "sizes", false), triangles = await unpackList(number, "triangles", false);
     s.corners = await unpackList(number, "corners", true);
-    s.patches = await unpackList(number, "patches", false);
+    s.patches = facts.patches ? await unpackList(number, "patches", false) : null;
     s.nf = sizes.length;
     s.start = new Uint32Array(s.nf + 1);
     for (let f = 0; f < s.nf; f++) s.start[f + 1] = s.start[f] + sizes[f];
@@ -185,9 +186,9 @@ function findNormals(s) {
 function take(s, frame) {
     const i = Math.min(frame, s.frames - 1);
     if (s.have === i) return true;
-    const chunk = chunkOf(s.places, i), errors = s.errors.length ? chunkOf(s.errors, i) : null;
-    if (!chunk.q || (errors && !errors.q)) {
-        Promise.all([need(chunk, s.nv, 3), errors && need(errors, s.nv, 1)]).then(draw);
+    const chunk = chunkOf(s.places, i), numbers = s.numbers.length ? chunkOf(s.numbers, i) : null;
+    if (!chunk.q || (numbers && !numbers.q)) {
+        Promise.all([need(chunk, s.nv, 3), numbers && need(numbers, s.nv, 1)]).then(draw);
         return false;
     }
     const nv = s.nv, at = (i - chunk.first) * 3 * nv, {xyz} = s, sum = [0, 0, 0];
@@ -202,8 +203,10 @@ function take(s, frame) {
         }
         sum[k] = nv ? total / nv : 0;
     }
-    for (let v = 0; errors && v < nv; v++)
-        xyz[4 * v + 3] = (errors.origin[0] + errors.step[0] * errors.q[(i - errors.first) * nv + v]) / facts.scale;
+    for (let v = 0; numbers && v < nv; v++) {
+        const x = numbers.origin[0] + numbers.step[0] * numbers.q[(i - numbers.first) * nv + v];
+        xyz[4 * v + 3] = (x - TINT.low) / (TINT.high - TINT.low);
+    }
     s.middle = sum;
     s.have = i;
     findNormals(s);
@@ -530,7 +533,7 @@ function drawGround(cam, s, ink) {
 }
 
 function modeOf(s) {
-    if (state.colour === "errors") return s.errors.length ? 1 : 0;
+    if (TINT && state.colour === TINT.kind) return s.numbers.length ? 1 : 0;
     return state.colour === "patches" && s.patches ? 2 : 0;
 }
 
@@ -591,6 +594,10 @@ function draw() {
 const short = (x) => x === 0 ? "0" : x.toExponential(x < 1e-3 || x >= 1e3 ? 2 : 0).includes("e+0") ? String(+x.toPrecision(3)) :
     x < 1e-3 || x >= 1e3 ? x.toExponential(2) : String(+x.toPrecision(3));
 
+/* A number that colours show, as people read it: scales are factors. */
+const amount = (x) => x < 0 ? `\u2212${short(-x)}` : TINT.kind === "scales" ? `${short(x)}\u00d7` : short(x);
+const unit = () => TINT.unit ? ` ${TINT.unit}` : "";
+
 function longest() {
     return sequences.reduce((a, b) => b.frames > a.frames ? b : a);
 }
@@ -606,11 +613,12 @@ function showCaptions() {
             caption.append(document.createElement("b"), document.createElement("span"));
             at.append(caption);
         }
-        const f = Math.min(state.frame, s.frames - 1), {means, maxima, names} = s.about;
+        const f = Math.min(state.frame, s.frames - 1), {means, minima, maxima, names} = s.about;
         caption.style.left = x + "px", caption.style.top = y + "px", caption.style.width = w + "px";
         caption.children[0].textContent = list.length > 1 || sequences.length > 1 ? s.about.label : "";
-        caption.children[1].textContent = means ? `mean error ${short(means[f])} D, max ${short(maxima[f])} D` :
-            sequences.length > 1 ? names[f] : "";
+        caption.children[1].textContent = !means ? sequences.length > 1 ? names[f] : "" :
+            TINT.diverging ? `${amount(minima[f])} to ${amount(maxima[f])}, mean ${amount(means[f])}` :
+                `mean ${TINT.kind === "errors" ? "error " : ""}${amount(means[f])}${unit()}, max ${amount(maxima[f])}${unit()}`;
     });
 }
 
@@ -636,12 +644,14 @@ function showControls() {
     $("colour").value = state.colour;
     $("speed").value = String(state.speed);
     for (const button of $("shown").children) button.setAttribute("aria-pressed", String(state.shown[button.dataset.number]));
-    const legend = state.colour === "errors" && state.wire < 2 && state.shown[0];
+    const legend = TINT && state.colour === TINT.kind && state.wire < 2 && shownSequences().some((s) => s.numbers.length);
     const counts = state.colour === "patches" && state.wire < 2 ? shownSequences().filter((s) => s.patches).map((s) => s.about.patches) : [];
     $("legend").hidden = !legend && !counts.length;
     $("legend-bar").hidden = $("legend-numbers").hidden = !legend;
-    $("legend-text").textContent = legend ? `Distance from ${sequences[1].about.label}${facts.centred ? ", centred" : ""}, in D. ` +
-        `All frames: mean ${short(facts.mean)}, max ${short(facts.max)}` : `${counts.join(" and ")} patches, a colour each`;
+    const what = () => TINT.kind === "errors" ? `Distance from ${sequences[1].about.label}${facts.centred ? ", centred" : ""}, in D` : TINT.title;
+    const spread = () => TINT.diverging ? `${amount(facts.least)} to ${amount(facts.max)}, mean ${amount(facts.mean)}` :
+        `mean ${amount(facts.mean)}, max ${amount(facts.max)}`;
+    $("legend-text").textContent = legend ? `${what()}. All frames: ${spread()}` : `${counts.join(" and ")} patches, a colour each`;
     document.documentElement.dataset.playing = String(state.playing);
     document.documentElement.dataset.shown = shownSequences().map((s) => s.number + 1).join(",");
 }
@@ -654,12 +664,13 @@ function refresh() {
 
 /* The errors of all frames as two lines over the slider. */
 function showGraph() {
-    const {means, maxima} = sequences[0].about, svg = $("graph"), n = means ? means.length : 0;
+    const {means, minima, maxima} = sequences[0].about, svg = $("graph"), n = means ? means.length : 0;
     if (n < 2) return;
-    const top = maxima.reduce((a, b) => Math.max(a, b), 0) || 1;
-    const path = (list) => list.map((x, i) => `${i ? "L" : "M"}${(i / (n - 1) * 1000).toFixed(1)} ${(98 - 96 * x / top).toFixed(2)}`).join("");
+    const low = TINT.diverging ? minima.reduce((a, b) => Math.min(a, b)) : 0;
+    const top = maxima.reduce((a, b) => Math.max(a, b), low), range = top - low || 1;
+    const path = (list) => list.map((x, i) => `${i ? "L" : "M"}${(i / (n - 1) * 1000).toFixed(1)} ${(98 - 96 * (x - low) / range).toFixed(2)}`).join("");
     svg.setAttribute("viewBox", "0 0 1000 100");
-    svg.setAttribute("aria-label", `Errors of the frames: mean (blue) and largest (grey), up to ${short(top)} D`);
+    svg.setAttribute("aria-label", `${TINT.kind === "errors" ? "Errors" : TINT.title} of the frames: mean (blue) and largest (grey), up to ${amount(top)}${unit()}`);
     $("graph-mean").setAttribute("d", path(means));
     $("graph-max").setAttribute("d", path(maxima));
     svg.removeAttribute("hidden"); /* an SVG element has no property of this name */
@@ -678,7 +689,10 @@ function showAbout() {
     $("legend-bar").style.background = `linear-gradient(to right, ${colours.join(",")})`;
     for (let i = 0; i <= 4; i++) {
         const number = document.createElement("span");
-        number.textContent = (i === 4 && facts.max > facts.scale ? "\u2265 " : "") + short(i * facts.scale / 4);
+        if (!TINT) break;
+        const at = TINT.low + (TINT.high - TINT.low) * i / 4, shown = TINT.kind === "scales" ? 2 ** at : at;
+        const beyond = i === 4 && facts.max > facts.scale ? "\u2265 " : i === 0 && facts.least < shown ? "\u2264 " : "";
+        number.textContent = beyond + amount(shown);
         $("legend-numbers").append(number);
     }
 }
@@ -743,7 +757,7 @@ function nextColour() {
 }
 
 function resetView() {
-    Object.assign(state, {azimuth: facts.azimuth, elevation: facts.elevation, zoom: 1, shift: [0, 0]});
+    Object.assign(state, {azimuth: facts.azimuth, elevation: facts.elevation, zoom: facts.zoom, shift: [0, 0]});
     refresh();
 }
 
@@ -838,7 +852,7 @@ function option(select, value, text) {
 function listen() {
     for (const x of SPEEDS) option($("speed"), String(x), x + "\u00d7");
     option($("colour"), "plain", "plain");
-    if (facts.compare) option($("colour"), "errors", "errors");
+    if (TINT) option($("colour"), TINT.kind, TINT.kind === "scalars" ? TINT.title.split(" in units")[0] : TINT.kind);
     if (sequences.some((s) => s.patches)) option($("colour"), "patches", "patches");
     $("colour-label").hidden = $("colour").options.length < 2;
     sequences.forEach((s, i) => {
@@ -887,17 +901,17 @@ async function main() {
     }
     frames = longest().frames;
     $("scrub").max = frames - 1;
-    state.colour = facts.compare ? "errors" : sequences.some((s) => s.patches) ? "patches" : "plain";
+    state.colour = TINT ? TINT.kind : sequences.some((s) => s.patches) ? "patches" : "plain";
     listen();
     showAbout();
     showGraph();
     readHash();
-    await Promise.all(sequences.flatMap((s) => [[s.places, 3], [s.errors, 1]].filter(([list]) => list.length)
+    await Promise.all(sequences.flatMap((s) => [[s.places, 3], [s.numbers, 1]].filter(([list]) => list.length)
         .map(([list, width]) => need(chunkOf(list, Math.min(state.frame, s.frames - 1)), s.nv, width))));
     tell("");
     draw();
     for (const s of sequences) /* the others, one after the other, so that the page answers meanwhile */
-        for (const [list, width] of [[s.places, 3], [s.errors, 1]])
+        for (const [list, width] of [[s.places, 3], [s.numbers, 1]])
             for (const chunk of list) await need(chunk, s.nv, width);
     document.documentElement.dataset.whole = "true";
 }

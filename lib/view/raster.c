@@ -138,7 +138,7 @@ static void strip(const vgi_corner *a, float dx, float dy, float reach, double y
     if (middle + half < (double)*x1) *x1 = (size_t)fmax(ceil(middle + half), (double)*x0);
 }
 
-void vgi_raster_wire(vgi_raster *r, const vgi_corner *a, const vgi_corner *b, float radius)
+void vgi_raster_wire(vgi_raster *r, const vgi_corner *a, const vgi_corner *b, float radius, int kind)
 {
     span s;
     if (!(fabsf(a->x) < FAR_OUT && fabsf(a->y) < FAR_OUT && fabsf(b->x) < FAR_OUT && fabsf(b->y) < FAR_OUT)) return;
@@ -157,7 +157,7 @@ void vgi_raster_wire(vgi_raster *r, const vgi_corner *a, const vgi_corner *b, fl
             if (off > 1) continue;
             float n[3] = {ox, -oy, sqrtf(1 - off)}, z = a->z + t * (b->z - a->z) + radius * n[2];
             vgi_sample *sample = r->at + y * r->w + x;
-            if (z > sample->z) put(sample, z, n, a->value + t * (b->value - a->value), VGI_WIRE);
+            if (z > sample->z) put(sample, z, n, a->value + t * (b->value - a->value), kind);
         }
     }
 }
@@ -270,8 +270,9 @@ static void draw_face(work *k, size_t f)
     for (size_t i = 0; k->drawing->patches && i < n; i++)
         k->corner[i].value = (float)(k->drawing->patches[f] & 0xffff) / 65535;
     if (n == 2) {
-        vgi_raster_wire(k->raster, k->corner, k->corner + 1, k->drawing->wire);
-        for (int i = 0; i < 2; i++) vgi_raster_wire(k->raster, k->corner + i, k->corner + i, 1.6f * k->drawing->wire);
+        vgi_raster_wire(k->raster, k->corner, k->corner + 1, k->drawing->wire, VGI_WIRE);
+        for (int i = 0; i < 2; i++)
+            vgi_raster_wire(k->raster, k->corner + i, k->corner + i, 1.6f * k->drawing->wire, VGI_WIRE);
     } else if (n == 3) {
         const vgi_corner *c[3] = {k->corner, k->corner + 1, k->corner + 2};
         vgi_raster_triangle(k->raster, c, 7, k->drawing->edge);
@@ -301,8 +302,38 @@ static void draw_edges(work *k, float radius)
         for (size_t i = 0; i < n; i++) {
             load_corner(k, m->vert[first + i], NULL, k->corner);
             load_corner(k, m->vert[first + (i + 1) % n], NULL, k->corner + 1);
-            vgi_raster_wire(k->raster, k->corner, k->corner + 1, radius);
+            vgi_raster_wire(k->raster, k->corner, k->corner + 1, radius, VGI_WIRE);
         }
+    }
+}
+
+/* Does the face turn its front to the viewer? Seen along an edge of it, it does not. */
+static bool faces_viewer(const work *k, const vgi_side *s)
+{
+    const float *area = k->face + 3 * (size_t)s->face, *toward = k->drawing->camera->toward;
+    return area[0] * toward[0] + area[1] * toward[1] + area[2] * toward[2] > 0;
+}
+
+/* An edge is on the contour when a front meets a back there, or a surface ends. Faces that go the same way along their edge are
+ * of different orientation: what is front of one is back of the other. */
+static bool is_contour(const work *k, const vgi_side *s, size_t n)
+{
+    if (n == 1) return true;
+    for (size_t i = 1; i < n; i++)
+        if (faces_viewer(k, s + i) != (faces_viewer(k, s) != (s[i].forth == s->forth))) return true;
+    return false;
+}
+
+/* Contours are wires around their edges: what lies before a surface hides them with it. */
+static void draw_contours(work *k, float radius)
+{
+    const vgi_figure *g = k->drawing->figure;
+    for (size_t i = 0, n; i < g->nsides; i += n) {
+        for (n = 1; i + n < g->nsides && g->side[i + n].a == g->side[i].a && g->side[i + n].b == g->side[i].b;) n++;
+        if (!is_contour(k, g->side + i, n)) continue;
+        load_corner(k, g->side[i].a, NULL, k->corner);
+        load_corner(k, g->side[i].b, NULL, k->corner + 1);
+        vgi_raster_wire(k->raster, k->corner, k->corner + 1, radius, VGI_CONTOUR);
     }
 }
 
@@ -341,9 +372,10 @@ int vgi_draw(vgi_raster *r, const vgi_drawing *d, vg_err *e)
         vgi_figure_normals(d->figure, d->points, k.face, k.normals);
         for (size_t f = 0; f < m->nf; f++) draw_face(&k, f);
         if (m->nf > 0 && is_empty(r)) draw_edges(&k, d->wire);
+        else if (d->contour > 0) draw_contours(&k, d->contour);
         for (size_t v = 0; m->nf == 0 && v < m->nv; v++) {
             load_corner(&k, (uint32_t)v, NULL, k.corner);
-            vgi_raster_wire(r, k.corner, k.corner, 1.6f * d->wire);
+            vgi_raster_wire(r, k.corner, k.corner, 1.6f * d->wire, VGI_WIRE);
         }
     }
     free_work(&k);

@@ -15,7 +15,7 @@ static const float rim[3] = {0.5902f, 0.5202f, -0.6173f};
 
 static const float clay_front[3] = {0.630f, 0.525f, 0.437f};
 static const float clay_back[3] = {0.265f, 0.375f, 0.545f};
-static const float wire_colour[3] = {0.110f, 0.150f, 0.220f};
+static const float wire_colour[3] = {0.110f, 0.150f, 0.220f}, contour_colour[3] = {0.012f, 0.014f, 0.020f};
 static const float page_top[3] = {0.905f, 0.913f, 0.930f}, page_bottom[3] = {0.740f, 0.757f, 0.785f};
 
 static float dot(const float a[3], const float b[3])
@@ -63,7 +63,7 @@ static float hidden(const vgi_sample *s, const float n[3], const vgi_sample *t, 
 static float sky_seen(const pixels *p, size_t x, size_t y, const float taps[][2], float reach)
 {
     const vgi_sample *s = middle_sample(p, x, y);
-    if (s->kind == VGI_EMPTY || s->kind == VGI_WIRE) return 1;
+    if (s->kind == VGI_EMPTY || s->kind >= VGI_WIRE) return 1;
     float n[3], sum = 0;
     unit_normal(s, n);
     /* as few taps would show as rings: their start turns from pixel to pixel, and the blur takes it out */
@@ -188,10 +188,14 @@ static void patch_colour(uint32_t number, float linear[3])
 static void light_sample(const vgi_look *l, const vgi_sample *s, float sky_seen_here, float line, float out[3])
 {
     float n[3];
+    if (s->kind == VGI_CONTOUR) {
+        memcpy(out, contour_colour, sizeof contour_colour);
+        return;
+    }
     unit_normal(s, n);
     float patch[3];
     if (l->patches) patch_colour(s->value, patch);
-    if (l->errors || l->patches) {
+    if (l->numbers || l->patches) {
         const float *colour = l->patches ? patch : l->palette->map[(size_t)s->value * (VGI_MAP_STEPS - 1) / 65535];
         float factor = light_error(n, sky_seen_here) * (s->kind == VGI_BACK ? 0.75f : 1);
         for (int k = 0; k < 3; k++) out[k] = colour[k] * factor;
@@ -239,7 +243,7 @@ static void shade_pixel(const vgi_look *l, const pixels *p, const background *b,
                 continue;
             }
             if (sky < 0) sky = corner_light(p, x, y);
-            float line = sample->kind == VGI_WIRE ? 0 : outline(r, sx, sy, s > 2 ? s - 1 : 1, l->outline);
+            float line = sample->kind >= VGI_WIRE ? 0 : outline(r, sx, sy, s > 2 ? s - 1 : 1, l->outline);
             light_sample(l, sample, sky, line, c);
             for (int k = 0; k < 3; k++) sum[k] += fminf(c[k], 1);
         }

@@ -18,8 +18,18 @@ typedef struct vgi_figure {
     uint32_t *ring;         /* ring[ring_start[v]] .. ring[ring_start[v + 1] - 1] */
     bool *drawn;            /* nv: vertices that are seen: those in a face, or all when there is no face */
     size_t max_corners;
+    size_t nsides;          /* made by vgi_figure_sides */
+    struct vgi_side *side;  /* by their vertices */
 } vgi_figure;
 
+typedef struct vgi_side { /* of a face of 3 or more */
+    uint32_t a, b; /* a < b */
+    uint32_t face;
+    bool forth;    /* the face goes from a to b */
+} vgi_side;
+
+/* vgi_figure_sides: the sides of all faces, those of one edge one after the other: to be called once, for silhouettes. */
+int vgi_figure_sides(vgi_figure *g, vg_err *e) VG_MUST_CHECK;
 int vgi_figure_init(vgi_figure *g, const vg_mesh *m, vg_err *e) VG_MUST_CHECK;
 void vgi_figure_clear(vgi_figure *g);
 
@@ -57,7 +67,7 @@ void vgi_camera_project(const vgi_camera *c, const float *points, size_t nv, flo
 
 /* ---- raster.c: visibility ---- */
 
-enum { VGI_EMPTY, VGI_FRONT, VGI_BACK, VGI_WIRE };
+enum { VGI_EMPTY, VGI_FRONT, VGI_BACK, VGI_WIRE, VGI_CONTOUR };
 
 typedef struct vgi_sample {
     float z;            /* towards the viewer; -INFINITY when empty */
@@ -84,30 +94,76 @@ typedef struct vgi_drawing { /* one pose to be drawn */
     const uint32_t *patches; /* per face, or NULL: samples get the number of their face's patch (modulo 2^16) for a value */
     float wire;          /* radius of 2-vertex faces, in samples */
     float edge;          /* half the width of a drawn edge, in samples; 0: edges are not marked */
+    float contour;       /* half the width of silhouettes, in samples; 0: none. Needs vgi_figure_sides */
 } vgi_drawing;
 
 int vgi_raster_init(vgi_raster *r, size_t w, size_t h, vg_err *e) VG_MUST_CHECK;
 void vgi_raster_clear(vgi_raster *r);
 /* edges: bit i marks the side opposite corner i as an edge of the face. */
 void vgi_raster_triangle(vgi_raster *r, const vgi_corner *const corner[3], unsigned edges, float edge_width);
-void vgi_raster_wire(vgi_raster *r, const vgi_corner *a, const vgi_corner *b, float radius);
+void vgi_raster_wire(vgi_raster *r, const vgi_corner *a, const vgi_corner *b, float radius, int kind);
 int vgi_draw(vgi_raster *r, const vgi_drawing *d, vg_err *e) VG_MUST_CHECK;
 
 /* ---- colour.c ---- */
 
 enum { VGI_MAP_STEPS = 1024, VGI_GAMMA_STEPS = 4096 };
 typedef struct vgi_palette {
-    float map[VGI_MAP_STEPS][3];                 /* the error colours, lowest first, linear */
+    float map[VGI_MAP_STEPS][3];                 /* the colours of numbers, lowest first, linear */
     unsigned char encode[VGI_GAMMA_STEPS + 1];   /* linear to sRGB */
 } vgi_palette;
-void vgi_palette_init(vgi_palette *p);
-void vgi_map_colour(double t, float linear[3]);  /* t in [0, 1] */
+void vgi_palette_init(vgi_palette *p, bool diverging);
+void vgi_map_colour(double t, bool diverging, float linear[3]);  /* t in [0, 1] */
 float vgi_linear(unsigned char srgb);
 static inline unsigned char vgi_encode(const vgi_palette *p, float linear)
 {
     float x = linear < 0 ? 0 : linear > 1 ? 1 : linear;
     return p->encode[(int)(x * VGI_GAMMA_STEPS + 0.5f)];
 }
+
+/* ---- tint.c: the number of each vertex that becomes its colour ---- */
+
+typedef struct vgi_tint { /* of all that is on a sheet or page */
+    vg_tint what;
+    bool centred;
+    char *name, *unit; /* of scalars; NULL: no frame has brought any */
+    bool diverging;    /* the colours have a middle: 0, or for scales 1 */
+    double low, high;  /* where they end; of scales the logarithms to base 2, as all their numbers */
+} vgi_tint;
+
+typedef struct vgi_meter { /* of one sequence */
+    const vg_mesh *mesh;
+    double unit;      /* what errors are divided by */
+    double *numbers;  /* nv: of the last frame */
+    double *lengths, *now; /* scales: of the vector of each corner in the reference and the present pose */
+    uint32_t *count;  /* nv: corners that have a length in the reference */
+} vgi_meter;
+
+typedef struct vgi_spread {
+    double mean, least, most;
+} vgi_spread;
+
+int vgi_meter_init(vgi_meter *m, const vgi_tint *t, const vg_mesh *mesh, const double *reference, double unit,
+                   vg_err *e) VG_MUST_CHECK;
+void vgi_meter_clear(vgi_meter *m);
+/* vgi_corner_lengths: the distance of each corner from the centroid of its face. */
+void vgi_corner_lengths(const vg_mesh *m, const double *points, double *lengths);
+/* vgi_tint_has: is there a number for each vertex of this frame? */
+bool vgi_tint_has(const vgi_tint *t, const vg_frame *f, const double *truth);
+/* vgi_tint_read: the numbers of a frame that has them, into m->numbers. VG_EINPUT when they have another name than those before. */
+int vgi_tint_read(vgi_tint *t, vgi_meter *m, const vg_frame *f, const double *truth, vgi_spread *s, vg_err *e) VG_MUST_CHECK;
+/* vgi_round_up: the next of 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8 times a power of ten: five parts of it have short numbers. x > 0. */
+double vgi_round_up(double x);
+/* vgi_tint_end: where the colours end: given (> 0), or by what is common: the absolute value that 99 % do not exceed. */
+void vgi_tint_end(vgi_tint *t, double given, double common, double least);
+double vgi_tint_place(const vgi_tint *t, double x); /* 0 to 1 */
+double vgi_tint_shown(const vgi_tint *t, double x); /* a number as people read it: of scales the factor */
+void vgi_tint_clear(vgi_tint *t);
+enum { VGI_NUMBER = 32 };
+/* Words for them, whatever the locale. */
+void vgi_print_number(char *to, size_t size, const char *format, double x);
+void vgi_tint_number(const vgi_tint *t, double x, char to[VGI_NUMBER]);
+void vgi_tint_caption(const vgi_tint *t, const vgi_spread *s, char *to, size_t size);
+void vgi_tint_title(const vgi_tint *t, double diagonal, char *to, size_t size); /* diagonal: D, where errors are in D */
 
 /* ---- shade.c and ground.c: from samples to pixels ---- */
 
@@ -127,7 +183,7 @@ float vgi_ground_light(const vgi_ground *g, const vgi_camera *c, double x, doubl
 typedef struct vgi_look {
     const vgi_palette *palette;
     const vgi_ground *ground; /* or NULL */
-    bool errors;              /* colours by value, else clay */
+    bool numbers;             /* colours by value, else clay */
     bool patches;             /* ... or value is the number of a patch */
     size_t oversampling;
     float edge_strength;      /* 0 to 1 */
@@ -152,28 +208,35 @@ double vgi_text_width(double dot, const char *text);
 /* vgi_text_fit: copy text, with ".." in place of its middle when it is wider than `width` pixels. size >= 4. */
 void vgi_text_fit(char *to, size_t size, double dot, double width, const char *text);
 
+/* ---- legend.c: on a canvas of at least VGI_LEGEND rows ---- */
+
+enum { VGI_LEGEND = 74 };
+void vgi_legend(vgi_canvas *c, const vgi_tint *t, const vgi_palette *p, size_t margin, const char *title, const char *note);
+
 /* ---- album.c: which frames are shown ---- */
 
 typedef struct vgi_shot {
     char *name;
     size_t index;   /* of the frame in the sequence */
     float *points;  /* nv */
-    float *errors;  /* nv, in D; NULL without comparison */
-    double mean, max;
+    float *numbers; /* nv: what is coloured; its contents do not count unless has_numbers */
+    bool has_numbers;
+    vgi_spread spread;
 } vgi_shot;
 
 typedef struct vgi_album { /* at most 4 * want shots, `stride` frames apart, and the last frame */
     size_t nv, want, seen, stride, n, cap;
-    bool compare;
     vgi_shot *at, last;
 } vgi_album;
 
-int vgi_album_init(vgi_album *a, size_t nv, size_t want, bool compare, vg_err *e) VG_MUST_CHECK;
+int vgi_album_init(vgi_album *a, size_t nv, size_t want, vg_err *e) VG_MUST_CHECK;
 void vgi_album_clear(vgi_album *a);
 /* vgi_album_next: the shot to be filled with the next frame. It is found in place by vgi_album_close. */
 int vgi_album_next(vgi_album *a, vgi_shot **shot, vg_err *e) VG_MUST_CHECK;
 /* vgi_album_close: move the best `want` shots to the front; returns how many they are. */
 size_t vgi_album_close(vgi_album *a);
+/* vgi_album_match: instead of that: which shots are nearest to n frames, ascending; behind the end it is the last. */
+void vgi_album_match(vgi_album *a, const size_t *frames, size_t n, size_t *shots);
 
 /* ---- png.c: the one file that knows libpng ---- */
 

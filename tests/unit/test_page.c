@@ -180,7 +180,7 @@ static void test_page(void)
     vg_page_facts facts;
     vg_err e;
     vg_head h = make_head();
-    vg_page_options o = {.title = "a <b> & \"c\"", .compare = true};
+    vg_page_options o = {.title = "a <b> & \"c\"", .tint = VG_TINT_ERRORS};
     int fd = memfd_create("page", MFD_CLOEXEC);
     CHECK(vg_page_new(&p, fd, "page", &o, &e) == VG_OK);
     CHECK(vg_page_sequence(p, "x</script>", &h, &e) == VG_OK);
@@ -209,8 +209,8 @@ static void test_page(void)
     /* lists 2 x 3, chunks 3 x 2; facts, player */
     CHECK(count(text, "<script") == 12 + 2 && count(text, "</script") == 12 + 2);
     CHECK(!strstr(text, "<!--") && !strstr(text, "@TITLE@") && !strstr(text, "@FACTS@") && !strstr(text, "@SCRIPT@"));
-    CHECK(strstr(text, "data-frames=\"errors\" data-count=\"32\""));
-    CHECK(strstr(text, "data-frames=\"errors\" data-count=\"8\""));
+    CHECK(strstr(text, "data-frames=\"numbers\" data-count=\"32\""));
+    CHECK(strstr(text, "data-frames=\"numbers\" data-count=\"8\""));
     free(text);
     vg_page_free(&p);
     close(fd);

@@ -295,7 +295,7 @@ static void sphere_is_brighter_towards_the_key(void)
     enum { SIDE = 90 };
     static unsigned char rgb[3 * SIDE * SIDE];
     static vgi_palette palette;
-    vgi_palette_init(&palette);
+    vgi_palette_init(&palette, false);
     make_sphere(&s);
     draw(&d, &s, 0, 0, 3 * SIDE, NULL);
     CHECK(count_kind(&d.raster, VGI_BACK) == 0);
@@ -319,13 +319,13 @@ static double lightness(const float linear[3]) /* CIE L* */
 static void colour_map_gets_lighter_evenly(void)
 {
     float colour[3];
-    vgi_map_colour(0, colour);
+    vgi_map_colour(0, false, colour);
     double first = lightness(colour);
-    vgi_map_colour(1, colour);
+    vgi_map_colour(1, false, colour);
     double last = lightness(colour), before = first;
     CHECK(last - first > 55);
     for (int i = 1; i <= 20; i++) {
-        vgi_map_colour(i / 20.0, colour);
+        vgi_map_colour(i / 20.0, false, colour);
         CHECK(lightness(colour) > before + 0.3 * (last - first) / 20);
         CHECK(lightness(colour) < before + 2 * (last - first) / 20);
         before = lightness(colour);
@@ -339,6 +339,11 @@ typedef struct picture {
     unsigned w, h;
     unsigned char *rgb;
 } picture;
+
+static vg_head head_of(const shape *f)
+{
+    return (vg_head){.mesh = f->mesh, .reference = (double *)(uintptr_t)f->points, .kind = VG_VERTICES, .count = f->mesh.nv};
+}
 
 static vg_sheet_options options(void)
 {
@@ -377,7 +382,10 @@ static int write_sheet(const vg_sheet_options *o, const shape *shape_, size_t n,
 {
     static double pose[3 * 2000], truth[3 * 2000];
     vg_sheet *sheet = NULL;
-    int r = vg_sheet_new(&sheet, &shape_->mesh, shape_->points, o, e);
+    vg_frame frame = {0};
+    vg_head head = head_of(shape_);
+    int r = vg_sheet_new(&sheet, o, e);
+    if (r == VG_OK) r = vg_sheet_sequence(sheet, "shape", &head, NULL, e);
     for (size_t f = 0; r == VG_OK && f < n; f++) {
         char name[32];
         snprintf(name, sizeof name, "frame%zu", f);
@@ -385,7 +393,8 @@ static int write_sheet(const vg_sheet_options *o, const shape *shape_, size_t n,
         for (size_t v = 0; v < shape_->mesh.nv; v++) pose[3 * v] += step * (double)f;
         memcpy(truth, pose, sizeof truth);
         for (size_t v = 0; v < shape_->mesh.nv; v++) truth[3 * v + 1] -= off;
-        r = vg_sheet_add(sheet, name, pose, o->compare ? truth : NULL, e);
+        frame.name = name, frame.values = pose;
+        r = vg_sheet_add(sheet, 0, &frame, o->tint == VG_TINT_ERRORS ? truth : NULL, e);
     }
     if (r == VG_OK) r = vg_sheet_write(sheet, fd, "test.png", e);
     vg_sheet_free(&sheet);
@@ -405,7 +414,7 @@ static size_t count_colour(const picture *p, const float linear[3])
 {
     static vgi_palette palette;
     size_t n = 0;
-    vgi_palette_init(&palette);
+    vgi_palette_init(&palette, false);
     for (size_t i = 0; i < (size_t)p->w * p->h; i++)
         n += p->rgb[3 * i] == vgi_encode(&palette, linear[0]) &&
              p->rgb[3 * i + 1] == vgi_encode(&palette, linear[1]) &&
@@ -429,12 +438,12 @@ static void sheet_has_the_size_of_its_frames(void)
 static void zero_error_has_the_lowest_colour(void)
 {
     vg_sheet_options o = options();
-    o.compare = true;
+    o.tint = VG_TINT_ERRORS;
     make_square(&s);
     picture p = make_sheet(&o, &s, 1, 0, 0);
     float lowest[3], highest[3];
-    vgi_map_colour(0, lowest);
-    vgi_map_colour(1, highest);
+    vgi_map_colour(0, false, lowest);
+    vgi_map_colour(1, false, highest);
     /* 56 x 56 pixels face the viewer; the bar is 14 high and at least a pixel wide */
     CHECK(count_colour(&p, lowest) > 50 * 50);
     CHECK(count_colour(&p, highest) >= 14 && count_colour(&p, highest) < 200);
@@ -456,14 +465,14 @@ static void legend_is_there_only_for_errors(void)
 {
     vg_sheet_options o = options();
     float highest[3], middle[3];
-    vgi_map_colour(1, highest);
-    vgi_map_colour(0.5, middle);
+    vgi_map_colour(1, false, highest);
+    vgi_map_colour(0.5, false, middle);
     make_cube(&s);
     picture p = make_sheet(&o, &s, 1, 0, 0);
     unsigned plain = p.h;
     CHECK(count_colour(&p, highest) == 0);
     free(p.rgb);
-    o.compare = true;
+    o.tint = VG_TINT_ERRORS;
     p = make_sheet(&o, &s, 1, 0, 0);
     CHECK(p.h == plain + 18 + 74);
     CHECK(count_colour(&p, highest) >= 14);
@@ -548,17 +557,21 @@ static void refusals(void)
     CHECK(write_sheet(&o, &s, 20000, 0, 0, fd, &e) == VG_EARG);
     close(fd);
     o = options(), o.width = 8;
-    CHECK(vg_sheet_new(&sheet, &s.mesh, s.points, &o, &e) == VG_EARG && !sheet);
+    CHECK(vg_sheet_new(&sheet, &o, &e) == VG_EARG && !sheet);
     o = options(), o.frames = 0;
-    CHECK(vg_sheet_new(&sheet, &s.mesh, s.points, &o, &e) == VG_EARG && !sheet);
+    CHECK(vg_sheet_new(&sheet, &o, &e) == VG_EARG && !sheet);
     o = options(), o.azimuth = NAN;
-    CHECK(vg_sheet_new(&sheet, &s.mesh, s.points, &o, &e) == VG_EARG && !sheet);
+    CHECK(vg_sheet_new(&sheet, &o, &e) == VG_EARG && !sheet);
     o = options();
-    CHECK(vg_sheet_new(&sheet, &s.mesh, s.points, &o, &e) == VG_OK);
+    CHECK(vg_sheet_new(&sheet, &o, &e) == VG_OK);
     double far[24];
     memcpy(far, s.points, sizeof far);
     far[7] = 1e12;
-    CHECK(vg_sheet_add(sheet, "a", far, NULL, &e) == VG_EINPUT);
+    vg_head head = head_of(&s);
+    vg_frame frame = {.name = (char *)(uintptr_t)"a", .values = far};
+    CHECK(vg_sheet_sequence(sheet, "s", &head, NULL, &e) == VG_OK);
+    CHECK(vg_sheet_add(sheet, 1, &frame, NULL, &e) == VG_EARG);
+    CHECK(vg_sheet_add(sheet, 0, &frame, NULL, &e) == VG_EINPUT);
     CHECK_TEXT(e.message, "vertex 2 of frame 'a' is too far away to be drawn");
     vg_sheet_free(&sheet);
     int full = open("/dev/full", O_WRONLY);
@@ -573,7 +586,7 @@ static void refusals(void)
 static void check_album(size_t want, size_t frames)
 {
     vgi_album a;
-    CHECK(vgi_album_init(&a, 1, want, false, NULL) == VG_OK);
+    CHECK(vgi_album_init(&a, 1, want, NULL) == VG_OK);
     for (size_t f = 0; f < frames; f++) {
         vgi_shot *shot;
         CHECK(vgi_album_next(&a, &shot, NULL) == VG_OK);
