@@ -199,7 +199,10 @@ transfer() {
 every_stage() {
     n=$1 poses=$2 some=$3 runs=$4
     few=$(bytes "$n-some.vgs")
-    vg-decode "$n-some.vgs" -o "$n.tar:obj"
+    mkdir "$n-obj"
+    vg-decode "$n-some.vgs" -o "$n-obj/%04d.obj"
+    tar -cf "$n.tar" "$n-obj"
+    rm -r "$n-obj"
     text=$(bytes "$n.tar")
     best "$runs" "vg-encode $n.tar >/dev/null"
     by_pipe "$text"
@@ -244,7 +247,7 @@ every_stage() {
     best "$runs" "vg-view -q $n-some.vgs -o out/page.html"
     by_pipe "$few"
     row 'vg-view, page' "$some" "$few"
-    best "$runs" "$ulimit vg-encode $n.tar | vg-deform --onto $n-b.vgs | vg-solve | vg-decode -o out/result.ply.tar:ply"
+    best "$runs" "$ulimit vg-encode $n.tar | vg-deform --onto $n-b.vgs | vg-solve | vg-decode -o 'out/%04d.ply'"
     by_cholmod "$some"
     row 'encode | deform | solve | decode' "$some" $((text + few))
     rm -rf out "$n.tar"
