@@ -159,29 +159,41 @@ static double add_vertices(vg_measures *x, const double *truth, const double *re
     return largest;
 }
 
-/* A face of one pose: its centroid, unit normal (Newell's: the sum of the cross products of successive corner
- * vectors) and area. Returns false when it has no normal; then normal and area are 0. */
-static bool face_shape(const vg_measures *x, const uint32_t *vert, size_t r, const double *points, double centroid[3],
-                       double normal[3], double *area)
+static double perimeter_of(const uint32_t *vert, size_t r, const double *points)
 {
-    double n[3] = {0, 0, 0}, perimeter = 0;
-    centroid[0] = centroid[1] = centroid[2] = 0;
-    for (size_t i = 0; i < r; i++)
-        for (int k = 0; k < 3; k++) centroid[k] += points[3 * (size_t)vert[i] + k] / (double)r;
+    double sum = 0;
     for (size_t i = 0; i < r; i++) {
         const double *p = points + 3 * (size_t)vert[i], *q = points + 3 * (size_t)vert[i + 1 < r ? i + 1 : 0];
-        double a[3] = {p[0] - centroid[0], p[1] - centroid[1], p[2] - centroid[2]};
+        sum += length_of((double[3]){q[0] - p[0], q[1] - p[1], q[2] - p[2]});
+    }
+    return sum;
+}
+
+/* A face of one pose: its centroid, unit normal (Newell's: the sum of the cross products of successive corner
+ * vectors, here those from the centroid) and area. Returns false when it has no normal; then normal and area are 0. Called with
+ * a constant r for triangles and quads. */
+static inline __attribute__((always_inline)) bool face_shape(const vg_measures *x, const uint32_t *vert, size_t r,
+                                                            const double *points, double centroid[3], double normal[3], double *area)
+{
+    double n[3] = {0, 0, 0}, edges = 0, a[3], share = 1 / (double)r;
+    centroid[0] = centroid[1] = centroid[2] = 0;
+    for (size_t i = 0; i < r; i++)
+        for (int k = 0; k < 3; k++) centroid[k] += share * points[3 * (size_t)vert[i] + k];
+    for (int k = 0; k < 3; k++) a[k] = points[3 * (size_t)vert[r - 1] + k] - centroid[k];
+    for (size_t i = 0; i < r; i++) {
+        const double *q = points + 3 * (size_t)vert[i];
         double b[3] = {q[0] - centroid[0], q[1] - centroid[1], q[2] - centroid[2]};
         n[0] += a[1] * b[2] - a[2] * b[1];
         n[1] += a[2] * b[0] - a[0] * b[2];
         n[2] += a[0] * b[1] - a[1] * b[0];
-        double edge[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-        perimeter += length_of(edge);
+        for (int k = 0; k < 3; k++) edges += (b[k] - a[k]) * (b[k] - a[k]), a[k] = b[k];
     }
-    double length = length_of(n);
-    bool ok = 0.5 * length > FLAT * x->diagonal * perimeter;
-    *area = ok ? 0.5 * length : 0;
-    for (int k = 0; k < 3; k++) normal[k] = ok ? n[k] / length : 0;
+    double length = length_of(n), least = FLAT * x->diagonal, half = 0.5 * length;
+    /* the perimeter is no longer than the root of r times the squared edges: most faces need no roots of their edges */
+    bool ok = half * half > 1.001 * least * least * (double)r * edges || half > least * perimeter_of(vert, r, points);
+    double scale = ok ? 1 / length : 0;
+    *area = ok ? half : 0;
+    for (int k = 0; k < 3; k++) normal[k] = scale * n[k];
     return ok;
 }
 
@@ -209,26 +221,32 @@ static double normals_apart(const double a[3], const double b[3])
     return fmin(0.5 * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), 2);
 }
 
+static inline __attribute__((always_inline)) void add_face(vg_measures *x, const uint32_t *vert, size_t r, const double *const *poses)
+{
+    double centroid[2][3], normal[2][3], area[2];
+    bool has_normal[2];
+    for (int i = 0; i < 2; i++) {
+        has_normal[i] = face_shape(x, vert, r, poses[i], centroid[i], normal[i], &area[i]);
+        if (r < 4 || !has_normal[i]) continue;
+        double p = face_planarity(vert, r, poses[i], centroid[i], normal[i]);
+        running_add(&x->planarity[i], p);
+        x->planarity_histogram[i][p < 1 ? (int)(10 * p) : 9]++;
+    }
+    if (!has_normal[0]) return;
+    /* a result that collapsed a face has no normal there: N.N~ is 0, and all of its area is wrong */
+    running_add(&x->orientation, has_normal[1] ? normals_apart(normal[0], normal[1]) : 1);
+    running_add(&x->area, fabs(1 - area[1] / area[0]));
+}
+
 static void add_faces(vg_measures *x, const double *truth, const double *result)
 {
     const double *const poses[2] = {truth, result};
     for (size_t f = 0; f < x->m->nf; f++) {
         const uint32_t *vert = x->m->vert + x->m->start[f];
         size_t r = x->m->start[f + 1] - x->m->start[f];
-        double centroid[2][3], normal[2][3], area[2];
-        bool has_normal[2];
-        if (r < 3) continue;
-        for (int i = 0; i < 2; i++) {
-            has_normal[i] = face_shape(x, vert, r, poses[i], centroid[i], normal[i], &area[i]);
-            if (r < 4 || !has_normal[i]) continue;
-            double p = face_planarity(vert, r, poses[i], centroid[i], normal[i]);
-            running_add(&x->planarity[i], p);
-            x->planarity_histogram[i][p < 1 ? (int)(10 * p) : 9]++;
-        }
-        if (!has_normal[0]) continue;
-        /* a result that collapsed a face has no normal there: N.N~ is 0, and all of its area is wrong */
-        running_add(&x->orientation, has_normal[1] ? normals_apart(normal[0], normal[1]) : 1);
-        running_add(&x->area, fabs(1 - area[1] / area[0]));
+        if (r == 3) add_face(x, vert, 3, poses);
+        else if (r == 4) add_face(x, vert, 4, poses);
+        else if (r > 4) add_face(x, vert, r, poses);
     }
 }
 
