@@ -4,11 +4,12 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/map_parts.h"
 #include "method/skin.h"
+#include "model/rig.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-enum { CHUNK = 64, MOST_HELD = 2048, NEAR = 32 };
+enum { CHUNK = 64, MOST_HELD = 2048, NEAR = 32, AROUND = 8 };
 
 struct vg_rig_fitter {
     vg_head *h;
@@ -182,7 +183,7 @@ static void fit_faces(void *context, size_t task)
     const cornering *x = context;
     const vg_graph *g = x->f->g;
     const vgi_rig_sums *s = &x->f->sums;
-    size_t first = task * g->nf / x->chunks, last = (task + 1) * g->nf / x->chunks, width = 4 * s->n;
+    size_t faces = g->nf - g->nlinks, first = task * faces / x->chunks, last = (task + 1) * faces / x->chunks, width = 4 * s->n;
     double *raw = x->space + task * 2 * width, *mean = raw + width;
     for (size_t face = first; face < last; face++) {
         uint32_t list[NEAR];
@@ -205,6 +206,8 @@ static int fit_corners(const vg_rig_fitter *f, vg_map *m, vg_err *e)
     cornering x = {f, m, f->g->nf < CHUNK ? 1 : CHUNK, NULL};
     if (!(x.space = vgi_array(x.chunks, 8 * m->n * sizeof *x.space, e))) return VG_ENOMEM;
     vgi_parallel(f->o.threads, x.chunks, fit_faces, &x);
+    for (size_t i = m->per_corner * (size_t)f->g->start[f->g->nf - f->g->nlinks]; i < m->per_corner * m->ncorners; i++)
+        m->corner[4 * i] = 1; /* links follow the skin of their ends */
     free(x.space);
     return VG_OK;
 }
@@ -311,6 +314,7 @@ typedef struct refining {
     const vg_rig_fitter *f;
     vg_map *m;
     double origin[3]; /* of the reference pose */
+    uint32_t *parent; /* of each bone */
     size_t chunks;
     double *space;    /* per chunk: 4 n */
 } refining;
@@ -341,20 +345,36 @@ static double missing(const refining *x, size_t v, const double *z, size_t i, si
     return sum;
 }
 
+/* The vertex's own bones, then those above and below the first two. */
+static size_t bones_around(const refining *x, size_t v, uint32_t *list)
+{
+    const vg_rig *r = &x->f->h->rig;
+    size_t n = 0, own;
+    while (n < VG_SKIN && r->skin_weight[VG_SKIN * v + n] > 0) list[n] = r->skin_bone[VG_SKIN * v + n], n++;
+    own = n < 2 ? n : 2;
+    for (size_t i = 0; i < own; i++)
+        for (size_t b = 0; b < r->nbones && n < AROUND; b++) {
+            if (x->parent[b] != list[i] && x->parent[list[i]] != b) continue;
+            bool there = false;
+            for (size_t k = 0; k < n; k++) there |= list[k] == b;
+            if (!there) list[n++] = (uint32_t)b;
+        }
+    return n;
+}
+
 /* Ridge regression on the motions of the vertex's own bones; of their places only differences count, so that what moves as a whole does so
  * still. */
 static void refine_vertex(const refining *x, size_t v, double *z)
 {
-    enum { MOST = 4 * VG_SKIN };
-    const vg_rig *r = &x->f->h->rig;
+    enum { MOST = 4 * AROUND };
     size_t n = x->m->n, bones = 0, unknowns = 0, bone[MOST], number[MOST];
-    double *row = x->m->weights + v * 4 * n, s[MOST * MOST], y[MOST], d[VG_SKIN][4] = {{0}};
+    double *row = x->m->weights + v * 4 * n, s[MOST * MOST], y[MOST], d[AROUND][4] = {{0}};
+    uint32_t own[AROUND];
     for (size_t j = 0; j < n; j++) {
         for (size_t k = 0; k < 3; k++) z[4 * j + k] = row[4 * j + k] - row[4 * j + 3] * x->f->sums.at[3 * j + k];
         z[4 * j + 3] = row[4 * j + 3];
     }
-    const uint32_t *own = r->skin_bone + VG_SKIN * v;
-    while (bones < VG_SKIN && r->skin_weight[VG_SKIN * v + bones] > 0) bones++;
+    bones = bones_around(x, v, own);
     for (size_t b = 0; b < bones; b++)
         for (size_t k = 0; k < 4; k++)
             if (b || k < 3) bone[unknowns] = b, number[unknowns++] = k;
@@ -397,11 +417,14 @@ static int refine(const vg_rig_fitter *f, vg_map *m, vg_err *e)
 {
     refining x = {.f = f, .m = m, .chunks = m->nv < CHUNK ? 1 : CHUNK};
     if (!(f->o.refine > 0)) return VG_OK;
-    if (!(x.space = vgi_array(x.chunks, 4 * m->n * sizeof *x.space, e))) return VG_ENOMEM;
+    x.space = vgi_array(x.chunks, 4 * m->n * sizeof *x.space, e);
+    x.parent = vgi_array(m->n, sizeof *x.parent, e);
+    int r = x.space && x.parent ? vgi_rig_parents(&f->h->rig, x.parent, e) : VG_ENOMEM;
     vg_centroid(f->h->reference, m->nv, x.origin);
-    vgi_parallel(f->o.threads, x.chunks, refine_chunk, &x);
+    if (r == VG_OK) vgi_parallel(f->o.threads, x.chunks, refine_chunk, &x);
     free(x.space);
-    return VG_OK;
+    free(x.parent);
+    return r;
 }
 
 /* ---- the map ---- */

@@ -240,6 +240,15 @@ int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *
 
 /* ---- collapse ---- */
 
+/* How much of vertex v goes with bone p, by its skin. */
+static double skin_share(const vg_rig *r, size_t v, size_t p)
+{
+    double w = 0;
+    for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++)
+        if (r->skin_bone[s] == p) w += r->skin_weight[s];
+    return w;
+}
+
 /* The vectors that transform p alone makes, when it is the identity. */
 static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *of_face, const double *vectors, size_t p, double *wanted)
 {
@@ -250,7 +259,7 @@ static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *o
                 vg_quat_apply(m->corner + 4 * c, vectors + 3 * c, wanted + 3 * c);
         return;
     }
-    for (size_t i = 0; i < m->ncorners * m->per_corner; i++) {
+    for (size_t i = 0; i < m->per_corner * (size_t)g->start[g->nf - g->nlinks]; i++) {
         if (m->corner_bone[i] != p) continue;
         double *to = wanted + 3 * (i / m->per_corner), d[3];
         vg_quat_apply(m->corner + 4 * i, vectors + 3 * (i / m->per_corner), d);
@@ -258,20 +267,27 @@ static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *o
     }
 }
 
+/* The links of a map of bones go from where the skin takes one end to where it takes the other. at: of the ends, nv points, or NULL: 1, into
+ * number k. */
+static void link_vectors(const vg_head *h, const vg_graph *g, size_t p, const double *at, size_t k, double *wanted)
+{
+    for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
+        const uint32_t *end = g->vert + g->start[f];
+        double w[2] = {0.5 * skin_share(&h->rig, end[0], p), 0.5 * skin_share(&h->rig, end[1], p)};
+        for (size_t i = at ? 0 : k; i < (at ? 3 : k + 1); i++) {
+            double d = at ? w[0] * at[3 * (size_t)end[0] + i] - w[1] * at[3 * (size_t)end[1] + i] : w[0] - w[1];
+            wanted[3 * (size_t)g->start[f] + i] = d, wanted[3 * (size_t)g->start[f] + 3 + i] = -d;
+        }
+    }
+}
+
 /* How much transform p counts for held vertex i; the point that it takes along. */
 static double hold_of(const vg_head *h, size_t i, size_t p, const double **at)
 {
     const vg_map *m = &h->map;
-    if (m->kind == VG_MAP_PATCHES) {
-        *at = m->held_at + 3 * i;
-        return m->held_patch[i] == p;
-    }
-    size_t v = m->held[i];
-    double w = 0;
-    *at = h->reference + 3 * v;
-    for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++)
-        if (h->rig.skin_bone[s] == p) w += h->rig.skin_weight[s];
-    return w;
+    bool bones = m->kind == VG_MAP_BONES;
+    *at = bones ? h->reference + 3 * (size_t)m->held[i] : m->held_at + 3 * i;
+    return bones ? skin_share(&h->rig, m->held[i], p) : m->held_patch[i] == p;
 }
 
 /* Wanted vectors and held vertices when only the j-th number of A_p is at work, j = 0 1 2 at once as x y z; or t of three transforms. */
@@ -280,8 +296,10 @@ static void column_input(const vg_head *h, const vg_graph *g, const uint32_t *of
 {
     const vg_map *m = &h->map;
     const double *at;
+    bool bones = m->kind == VG_MAP_BONES;
     if (column < m->n) {
         driven_vectors(m, g, of_face, vectors, column, wanted);
+        if (bones) link_vectors(h, g, column, h->reference, 0, wanted);
         for (size_t i = 0; i < m->nheld; i++) {
             double w = hold_of(h, i, column, &at);
             for (size_t k = 0; k < 3; k++) anchors[3 * i + k] = w * at[k];
@@ -289,11 +307,11 @@ static void column_input(const vg_head *h, const vg_graph *g, const uint32_t *of
         return;
     }
     memset(wanted, 0, 3 * vg_graph_corners(g) * sizeof *wanted);
-    for (size_t i = 0; i < m->nheld; i++)
-        for (size_t k = 0; k < 3; k++) {
-            size_t p = 3 * (column - m->n) + k;
-            anchors[3 * i + k] = p < m->n ? hold_of(h, i, p, &at) : 0;
-        }
+    for (size_t k = 0; k < 3; k++) {
+        size_t p = 3 * (column - m->n) + k;
+        if (bones && p < m->n) link_vectors(h, g, p, NULL, k, wanted);
+        for (size_t i = 0; i < m->nheld; i++) anchors[3 * i + k] = p < m->n ? hold_of(h, i, p, &at) : 0;
+    }
 }
 
 static void store_column(vg_map *m, const vg_graph *g, size_t column, const double *x)

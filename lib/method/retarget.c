@@ -159,6 +159,20 @@ static int move_bones(vg_head *h, const double *body, vg_err *e)
     return vgi_place_by_bones(&h->rig, m, m->place, e);
 }
 
+/* What regression has added grows with the body; of a bone it is about its joint, so that what it adds to the share of a bone stays. */
+static void add_regression(const vg_map *m, const double *skin, const double *joints_before, double ratio)
+{
+    for (size_t i = 0; i < m->nv * m->n; i++) {
+        double *to = m->weights + 4 * i, more = skin[4 * i + 3];
+        bool bones = m->kind == VG_MAP_BONES;
+        for (size_t k = 0; k < 3; k++) {
+            double before = bones ? more * joints_before[3 * (i % m->n) + k] : 0, after = bones ? more * m->centre[3 * (i % m->n) + k] : 0;
+            to[k] += ratio * (skin[4 * i + k] - before) + after;
+        }
+        to[3] += bones ? more : ratio * more;
+    }
+}
+
 /* ---- the whole ---- */
 
 /* The rows that skinning alone gives, for a map without corners. */
@@ -176,7 +190,8 @@ int vg_map_retarget(vg_head *h, const double *target, double morph, int threads,
     bool bones = m->kind == VG_MAP_BONES, corners = m->ncorners > 0;
     if (!m->n || (bones ? h->rig.nbones : h->patches.n) != m->n) return vg_fail(e, VG_EINPUT, "there is no map to retarget");
     double *body = vgi_copy_array(target, 3 * nv, sizeof *body, e), *vectors = NULL, *home = NULL, *skin = NULL, ratio = 1;
-    int r = body ? vg_graph_new(&g, h, e) : VG_ENOMEM;
+    double *joints = vgi_copy_array(m->centre, 3 * m->n, sizeof *joints, e);
+    int r = body && joints ? vg_graph_new(&g, h, e) : VG_ENOMEM;
     if (r == VG_OK && corners && m->ncorners != vg_graph_corners(g)) r = vg_fail(e, VG_EINPUT, "the map does not say how its corners turn");
     if (r == VG_OK && !bones && !(of_face = vgi_graph_patches(h, g, e))) r = VG_ENOMEM;
     if (r == VG_OK && !(vectors = vgi_array(3 * vg_graph_corners(g), sizeof *vectors, e))) r = VG_ENOMEM;
@@ -199,13 +214,14 @@ int vg_map_retarget(vg_head *h, const double *target, double morph, int threads,
         vg_graph_vectors(g, body, vectors);
         if (corners) r = vgi_map_collapse(h, g, of_face, vectors, threads, e);
         else skin_rows(h);
-        for (size_t i = 0; r == VG_OK && corners && i < size; i++) m->weights[i] += ratio * skin[i];
+        if (r == VG_OK && corners) add_regression(m, skin, joints, ratio);
     }
     vg_graph_free(&g);
     free(of_face);
     free(skin);
     free(vectors);
     free(body);
+    free(joints);
     free(home);
     return r;
 }

@@ -1,0 +1,533 @@
+/* test_rig.c: rigs: bodies that move rigidly with their bones are met, weights and motions are found again, a map is its uncollapsed chain,
+ * other skeletons drive it, and edits, joints of vertices and other bodies.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "meshes.h"
+
+
+enum { JOINTS = 5, BONES = 4, POSES = 9 };
+static const double LENGTH = 3;
+
+/* Four bones in a row along z, and an end. */
+static vg_skeleton make_skeleton(double length)
+{
+    static const char *const names[JOINTS] = {"hip", "knee", "foot", "toe", "toe.end"};
+    vg_skeleton s = {.njoints = JOINTS, .joints = room(JOINTS, sizeof *s.joints)};
+    for (size_t j = 0; j < JOINTS; j++) {
+        vg_joint *joint = &s.joints[j];
+        *joint = (vg_joint){.name = strdup(names[j]), .parent = j ? (uint32_t)j - 1 : UINT32_MAX, .offset = {0, 0, j ? length : 0}};
+        if (j < BONES) {
+            joint->nchannels = j ? 3 : 6;
+            memcpy(joint->channels, j ? (const uint8_t[]){6, 4, 5, 0, 0, 0} : (const uint8_t[]){1, 2, 3, 6, 4, 5}, 6);
+        }
+    }
+    return s;
+}
+
+static void draw_values(double *values, double degrees)
+{
+    for (size_t i = 0; i < 3; i++) values[i] = 2 * noise();
+    for (size_t i = 3; i < 6 + 3 * (BONES - 1); i++) values[i] = degrees * noise();
+}
+
+typedef struct stage {
+    vg_head h;
+    vg_skeleton s;
+    double values[POSES][6 + 3 * (BONES - 1)];
+    double *positions[POSES], *turns[POSES], *transforms[POSES], *poses[POSES];
+} stage;
+
+/* A mesh with its skeleton, and random motions of it. `shift`: where the root is in the mesh. */
+static void set_stage(stage *x, vg_head h, double degrees)
+{
+    vg_err e;
+    double positions[3 * JOINTS], turns[4 * JOINTS];
+    *x = (stage){.h = h, .s = make_skeleton(LENGTH)};
+    vg_skeleton_pose(&x->s, NULL, positions, turns);
+    CHECK(vg_rig_make(&x->h.rig, &x->s, positions, turns, &e) == VG_OK);
+    CHECK(x->h.rig.nbones == BONES);
+    for (size_t k = 0; k < POSES; k++) {
+        x->positions[k] = room(3 * JOINTS, sizeof(double)), x->turns[k] = room(4 * JOINTS, sizeof(double));
+        x->transforms[k] = room(7 * BONES, sizeof(double)), x->poses[k] = room(3 * h.mesh.nv, sizeof(double));
+        draw_values(x->values[k], degrees);
+        vg_skeleton_pose(&x->s, x->values[k], x->positions[k], x->turns[k]);
+        vg_rig_transforms(&x->h.rig, x->positions[k], x->turns[k], x->transforms[k]);
+    }
+}
+
+static void strike(stage *x)
+{
+    for (size_t k = 0; k < POSES; k++) {
+        free(x->positions[k]);
+        free(x->turns[k]);
+        free(x->transforms[k]);
+        free(x->poses[k]);
+    }
+    vg_skeleton_clear(&x->s);
+    vg_head_clear(&x->h);
+}
+
+/* Weights by hand: along z, from bone to bone over the joint. */
+static void paint(vg_rig *r, size_t nv, const double *reference, double blend)
+{
+    free(r->skin_bone);
+    free(r->skin_weight);
+    r->skin_bone = room(VG_SKIN * nv, sizeof *r->skin_bone), r->skin_weight = room(VG_SKIN * nv, sizeof *r->skin_weight);
+    for (size_t v = 0; v < nv; v++) {
+        double at = reference[3 * v + 2] / LENGTH, near = round(at);
+        double t = blend > 0 ? (at - near) / (2 * blend) + 0.5 : at > near;
+        t = near < 1 ? 1 : near > BONES - 1 ? 0 : fmax(0, fmin(1, t));
+        uint32_t up = (uint32_t)fmin(BONES - 1, fmax(0, near)), low = up ? up - 1 : 0;
+        bool first = t >= 0.5;
+        r->skin_bone[VG_SKIN * v] = first ? up : low, r->skin_weight[VG_SKIN * v] = first ? t : 1 - t;
+        if (t > 0 && t < 1) r->skin_bone[VG_SKIN * v + 1] = first ? low : up, r->skin_weight[VG_SKIN * v + 1] = first ? 1 - t : t;
+    }
+}
+
+static void skin_poses(stage *x)
+{
+    for (size_t k = 0; k < POSES; k++) vg_rig_skin(&x->h.rig, x->h.mesh.nv, x->h.reference, x->transforms[k], x->poses[k]);
+}
+
+static vg_rig_fitter *fit(stage *x, vg_rig_method method, size_t bones, double refine, int threads)
+{
+    vg_err e;
+    vg_rig_fitter *f;
+    const vg_rig_options o = {bones, 0.03, refine, threads};
+    CHECK(vg_rig_fitter_new(&f, &x->h, &o, &e) == VG_OK);
+    vg_rig_fitter_add(f, POSES, (const double *const *)x->poses, (const double *const *)x->transforms);
+    CHECK(vg_rig_fitter_finish(f, method, &e) == VG_OK);
+    return f;
+}
+
+/* The farthest that the map is from the poses. */
+static double misses(const stage *x)
+{
+    vg_err e;
+    vg_player *p;
+    double most = 0, *out = room(3 * x->h.mesh.nv, sizeof *out), *outs[1] = {out};
+    CHECK(vg_player_new(&p, &x->h, false, 2, &e) == VG_OK);
+    for (size_t k = 0; k < POSES; k++) {
+        const double *t[1] = {x->transforms[k]};
+        vg_player_pose(p, 1, t, outs);
+        most = fmax(most, farthest(out, x->poses[k], x->h.mesh.nv));
+    }
+    vg_player_free(&p);
+    free(out);
+    return most;
+}
+
+/* One torus on each bone: components that move rigidly. */
+static vg_head make_beads(void)
+{
+    vg_head h = new_shape();
+    for (size_t b = 0; b < BONES; b++) add_torus(&h, 9, 7, (const double[3]){0, 0.3, LENGTH * ((double)b + 0.5)});
+    return h;
+}
+
+static vg_head make_limb(void)
+{
+    return make_rod(16, 8, false); /* 2 pi * 16 / 8 = 12.57 long: the chain is 12 */
+}
+
+static void rigid_bodies_are_met(void)
+{
+    for (size_t bones = 1; bones <= 2; bones++)
+        for (int method = 0; method < 2; method++) {
+            stage x;
+            set_stage(&x, make_beads(), 50);
+            for (size_t k = 0; k < POSES; k++)
+                for (size_t v = 0; v < x.h.mesh.nv; v++) { /* by another road than the library's: two columns of a rotation matrix at a time */
+                    double m[9], d[3];
+                    size_t b = v / (x.h.mesh.nv / BONES);
+                    vg_quat_matrix(x.turns[k] + 4 * b, m);
+                    for (size_t i = 0; i < 3; i++) d[i] = x.h.reference[3 * v + i] - x.h.rig.at[3 * b + i];
+                    for (size_t i = 0; i < 3; i++)
+                        x.poses[k][3 * v + i] = x.positions[k][3 * b + i] + m[3 * i] * d[0] + m[3 * i + 1] * d[1] + m[3 * i + 2] * d[2];
+                }
+            vg_rig_fitter *f = fit(&x, method ? VG_RIG_LBS : VG_RIG_ENVELOPE, bones, 0.003, 2);
+            CHECK_NEAR(misses(&x), 0, 1e-9 * vg_diagonal(x.h.reference, x.h.mesh.nv));
+            vg_rig_fitter_free(&f);
+            strike(&x);
+        }
+}
+
+static void weights_are_found_again(void)
+{
+    stage x;
+    set_stage(&x, make_limb(), 40);
+    size_t nv = x.h.mesh.nv;
+    paint(&x.h.rig, nv, x.h.reference, 0.3);
+    skin_poses(&x);
+    double *truth = room(nv * BONES, sizeof *truth), most = 0;
+    for (size_t s = 0; s < VG_SKIN * nv; s++) truth[s / VG_SKIN * BONES + x.h.rig.skin_bone[s]] += x.h.rig.skin_weight[s];
+    vg_rig_fitter *f = fit(&x, VG_RIG_LBS, 1, 0, 2);
+    for (size_t v = 0; v < nv; v++) {
+        double sum = 0;
+        for (size_t s = VG_SKIN * v; s < VG_SKIN * (v + 1); s++) {
+            double w = x.h.rig.skin_weight[s];
+            CHECK(w >= 0 && (s % VG_SKIN == 0 || w <= x.h.rig.skin_weight[s - 1]));
+            truth[v * BONES + x.h.rig.skin_bone[s]] -= w, sum += w;
+        }
+        CHECK_NEAR(sum, 1, 1e-12);
+    }
+    for (size_t i = 0; i < nv * BONES; i++) most = fmax(most, fabs(truth[i]));
+    CHECK_NEAR(most, 0, 1e-5);
+    CHECK_NEAR(misses(&x), 0, 1e-5);
+    vg_rig_fitter_free(&f);
+    free(truth);
+    strike(&x);
+}
+
+static void motions_are_found_again(void)
+{
+    stage x;
+    vg_err e;
+    vg_bender *b;
+    set_stage(&x, make_limb(), 60);
+    paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.2);
+    skin_poses(&x);
+    double *found[POSES];
+    for (size_t k = 0; k < POSES; k++) found[k] = room(7 * BONES, sizeof(double));
+    CHECK(vg_bender_new(&b, &x.h.rig, x.h.mesh.nv, x.h.reference, 2, &e) == VG_OK);
+    vg_bender_fit(b, POSES, (const double *const *)x.poses, found);
+    for (size_t k = 0; k < POSES; k++)
+        for (size_t j = 0; j < BONES; j++) {
+            double *p = found[k] + 7 * j, *q = x.transforms[k] + 7 * j, dot = 0;
+            for (int i = 0; i < 4; i++) dot += p[i] * q[i];
+            CHECK_NEAR(fabs(dot), 1, 1e-13);
+            for (int i = 4; i < 7; i++) CHECK_NEAR(p[i], q[i], 1e-6);
+        }
+    vg_bender_free(&b);
+    for (size_t k = 0; k < POSES; k++) free(found[k]);
+    strike(&x);
+}
+
+static void a_rig_is_learned_from_poses_alone(void)
+{
+    stage x;
+    vg_err e;
+    double miss;
+    set_stage(&x, make_limb(), 40);
+    paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.2);
+    skin_poses(&x);
+    CHECK(vg_rig_learn(&x.h, POSES, (const double *const *)x.poses, 2, &miss, &e) == VG_OK);
+    CHECK_NEAR(miss, 0, 1e-3 * vg_diagonal(x.h.reference, x.h.mesh.nv));
+    strike(&x);
+}
+
+/* Wanted vectors by each corner's own bones, held vertices by their skin, and the solver: what the matrix stands for. */
+static void the_map_is_its_chain(void)
+{
+    for (size_t per = 1; per <= 2; per++) {
+        stage x;
+        vg_err e;
+        set_stage(&x, make_limb(), 40);
+        paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.2);
+        skin_poses(&x);
+        for (size_t k = 0; k < POSES; k++) /* skin that skinning does not know */
+            for (size_t i = 0; i < 3 * x.h.mesh.nv; i++) x.poses[k][i] += 0.05 * sin(x.poses[k][i] * 3);
+        vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, per, 0, 2);
+        const vg_map *m = &x.h.map;
+        size_t nv = x.h.mesh.nv;
+        vg_graph *g = graph_of(&x.h);
+        vg_solver *s;
+        vg_player *p;
+        CHECK(m->nheld >= BONES && m->per_corner == per && m->ncorners == vg_graph_corners(g));
+        CHECK(vg_solver_new(&s, g, m->held, m->nheld, x.h.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_OK);
+        CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
+        double *vectors = vectors_of(g, x.h.reference), *wanted = room(3 * m->ncorners, sizeof *wanted);
+        double *held = room(3 * m->nheld, sizeof *held), *skin = room(3 * nv, sizeof *skin);
+        double *chain = room(3 * nv, sizeof *chain), *rhs = room(3 * nv, sizeof *rhs), *out = room(3 * nv, sizeof *out), *outs[1] = {out};
+        for (size_t k = 0; k < POSES; k++) {
+            const double *t[1] = {x.transforms[k]}, *w[1] = {wanted}, *r[1] = {rhs}, *a[1] = {held};
+            double *c[1] = {chain}, *load[1] = {rhs};
+            CHECK(g->nlinks == 0);
+            memset(wanted, 0, 3 * m->ncorners * sizeof *wanted);
+            for (size_t i = 0; i < m->ncorners * per; i++) {
+                double d[3];
+                vg_quat_apply(m->corner + 4 * i, vectors + 3 * (i / per), d);
+                vg_quat_apply(x.transforms[k] + 7 * m->corner_bone[i], d, d);
+                for (size_t q = 0; q < 3; q++) wanted[3 * (i / per) + q] += d[q];
+            }
+            vg_rig_skin(&x.h.rig, nv, x.h.reference, x.transforms[k], skin);
+            vg_graph_anchors(skin, m->held, m->nheld, held);
+            vg_solver_load(s, 1, w, a, c, load);
+            vg_solver_solve(s, 1, r, c, a, NULL);
+            vg_player_pose(p, 1, t, outs);
+            CHECK_NEAR(farthest(out, chain, nv), 0, 1e-9 * vg_diagonal(x.h.reference, nv));
+        }
+        free(vectors);
+        free(wanted);
+        free(held);
+        free(skin);
+        free(chain);
+        free(rhs);
+        free(out);
+        vg_player_free(&p);
+        vg_solver_free(&s);
+        vg_graph_free(&g);
+        vg_rig_fitter_free(&f);
+        strike(&x);
+    }
+}
+
+static void refinement_brings_nearer(void)
+{
+    double miss[2];
+    for (int i = 0; i < 2; i++) {
+        stage x;
+        meshes_state = 7;
+        set_stage(&x, make_limb(), 40);
+        paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.4);
+        skin_poses(&x);
+        vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, 1, i ? 0.003 : 0, 2);
+        miss[i] = misses(&x);
+        vg_rig_fitter_free(&f);
+        strike(&x);
+    }
+    CHECK(miss[0] > 1e-3);
+    CHECK_NEAR(miss[1], 0, 0.6 * miss[0]);
+}
+
+static void the_root_is_found(void)
+{
+    stage x;
+    vg_err e;
+    double shift[3], spread;
+    static const double away[3] = {0.7, -2, 0.4};
+    set_stage(&x, make_limb(), 40);
+    size_t nv = x.h.mesh.nv;
+    paint(&x.h.rig, nv, x.h.reference, 0.2);
+    skin_poses(&x);
+    for (size_t i = 0; i < 3 * nv; i++) x.h.reference[i] += away[i % 3]; /* the skeleton does not know */
+    CHECK(vg_rig_locate(&x.s, nv, x.h.reference, POSES, (const double *const *)x.poses, (const double *const *)x.positions,
+                        (const double *const *)x.turns, 2, shift, &spread, &e) == VG_OK);
+    for (int k = 0; k < 3; k++) CHECK_NEAR(shift[k], away[k], 1e-9);
+    CHECK_NEAR(spread, 0, 1e-9);
+    strike(&x);
+}
+
+/* The same skeleton gives the transforms back; a larger one, too; one that rests in another pose when they are aligned. */
+static void other_skeletons_drive(void)
+{
+    stage x;
+    vg_err e;
+    vg_driver *d;
+    double t[7 * BONES];
+    set_stage(&x, make_limb(), 40);
+    CHECK(vg_driver_new(&d, &x.h.rig, &x.s, false, &e) == VG_OK);
+    CHECK(vg_driver_missing(d) == 0);
+    for (size_t k = 0; k < POSES; k++) {
+        vg_driver_pose(d, x.positions[k], x.turns[k], t);
+        for (size_t i = 0; i < 7 * BONES; i++) CHECK_NEAR(t[i], x.transforms[k][i], 1e-12);
+    }
+    vg_driver_free(&d);
+    vg_skeleton large = make_skeleton(10 * LENGTH), bent = make_skeleton(LENGTH);
+    double positions[3 * JOINTS], turns[4 * JOINTS], values[6 + 3 * (BONES - 1)];
+    CHECK(vg_driver_new(&d, &x.h.rig, &large, false, &e) == VG_OK);
+    memcpy(values, x.values[0], sizeof values);
+    for (int k = 0; k < 3; k++) values[k] *= 10;
+    vg_skeleton_pose(&large, values, positions, turns);
+    vg_driver_pose(d, positions, turns, t);
+    for (size_t i = 0; i < 7 * BONES; i++) CHECK_NEAR(t[i], x.transforms[0][i], 1e-12);
+    vg_driver_free(&d);
+    for (size_t j = 1; j < JOINTS; j++) memcpy(bent.joints[j].offset, (const double[3]){LENGTH, 0, 0}, sizeof bent.joints[j].offset);
+    CHECK(vg_driver_new(&d, &x.h.rig, &bent, true, &e) == VG_OK);
+    vg_skeleton_pose(&bent, NULL, positions, turns);
+    vg_driver_pose(d, positions, turns, t);
+    for (size_t b = 0; b < BONES; b++) { /* every joint of the rig is where the other's is */
+        double at[3];
+        vg_quat_apply(t + 7 * b, x.h.rig.at + 3 * b, at);
+        for (size_t k = 0; k < 3; k++) CHECK_NEAR(at[k] + t[7 * b + 4 + k], positions[3 * b + k], 1e-12);
+    }
+    vg_driver_free(&d);
+    free(large.joints[1].name);
+    large.joints[1].name = strdup("nothing alike");
+    CHECK(vg_driver_new(&d, &x.h.rig, &large, false, &e) == VG_OK);
+    CHECK(vg_driver_missing(d) == 1);
+    vg_driver_free(&d);
+    for (size_t j = 0; j < JOINTS; j++) large.joints[j].name[0] = '?';
+    CHECK(vg_driver_new(&d, &x.h.rig, &large, false, &e) == VG_EINPUT && strstr(e.message, "'hip'"));
+    vg_skeleton_clear(&large);
+    vg_skeleton_clear(&bent);
+    strike(&x);
+}
+
+static void edits_turn_what_hangs_on_a_bone(void)
+{
+    stage x;
+    double t[7 * BONES] = {0}, axis[3], at[3];
+    set_stage(&x, make_limb(), 40);
+    for (size_t b = 0; b < BONES; b++) t[7 * b] = 1;
+    CHECK(vg_rig_find(&x.h.rig, "knee") == 1 && vg_rig_find(&x.h.rig, "toe.end") == BONES);
+    CHECK(vg_rig_axis(&x.h.rig, 3, axis));
+    CHECK_NEAR(axis[2], 1, 1e-15);
+    vg_rig_edit(&x.h.rig, 1, (const double[3]){1, 0, 0}, 90, t);
+    CHECK_NEAR(t[0], 1, 0); /* the hip stays */
+    vg_quat_apply(t + 7 * 3, (const double[3]){0, 0, 3 * LENGTH}, at); /* the toe, 2 bones beyond the knee, goes from z to -y */
+    CHECK_NEAR(at[0] + t[25], 0, 1e-12);
+    CHECK_NEAR(at[1] + t[26], -2 * LENGTH, 1e-12);
+    CHECK_NEAR(at[2] + t[27], LENGTH, 1e-12);
+    vg_rig_edit(&x.h.rig, 2, axis, 30, t); /* a twist leaves the bone where it is */
+    vg_quat_apply(t + 7 * 3, (const double[3]){0, 0, 3 * LENGTH}, at);
+    CHECK_NEAR(at[1] + t[26], -2 * LENGTH, 1e-12);
+    vg_quat_apply(t + 7 * 2, (const double[3]){1, 0, 2 * LENGTH}, at); /* and turns what is beside it about it: -y here */
+    CHECK_NEAR(at[0] + t[18], cos(M_PI / 6), 1e-12);
+    CHECK_NEAR(at[2] + t[20], LENGTH + sin(M_PI / 6), 1e-12);
+    strike(&x);
+}
+
+static void rotations_alone_say_where_bones_are(void)
+{
+    stage x;
+    vg_err e;
+    vg_player *p;
+    set_stage(&x, make_limb(), 40);
+    paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.2);
+    skin_poses(&x);
+    vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, 2, 0.003, 1);
+    CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
+    double t[7 * BONES], shift[3];
+    memcpy(t, x.transforms[0], sizeof t);
+    vg_player_place(p, t); /* they hang together already: nothing moves */
+    for (size_t i = 0; i < 7 * BONES; i++) CHECK_NEAR(t[i], x.transforms[0][i], 1e-9);
+    for (size_t b = 0; b < BONES; b++)
+        for (size_t k = 0; k < 3; k++) t[7 * b + 4 + k] += noise();
+    vg_player_place(p, t);
+    for (size_t k = 0; k < 3; k++) shift[k] = t[4 + k] - x.transforms[0][4 + k];
+    for (size_t b = 0; b < BONES; b++) /* they hang together again: all are shifted alike */
+        for (size_t k = 0; k < 3; k++) CHECK_NEAR(t[7 * b + 4 + k] - x.transforms[0][7 * b + 4 + k], shift[k], 1e-9);
+    vg_player_free(&p);
+    vg_rig_fitter_free(&f);
+    strike(&x);
+}
+
+/* Onto a body that is twice as large and elsewhere: everything is twice as large. */
+static void a_rig_serves_another_body(void)
+{
+    for (int method = 0; method < 2; method++) {
+        stage x;
+        vg_err e;
+        set_stage(&x, make_limb(), 40);
+        size_t nv = x.h.mesh.nv;
+        paint(&x.h.rig, nv, x.h.reference, 0.2);
+        skin_poses(&x);
+        vg_rig_fitter *f = fit(&x, method ? VG_RIG_LBS : VG_RIG_ENVELOPE, 2, 0.003, 1);
+        vg_rig_fitter_free(&f);
+        double *target = room(3 * nv, sizeof *target), *before = room(3 * nv, sizeof *before), *after = room(3 * nv, sizeof *after);
+        double *list[1] = {before}, t[7 * BONES];
+        vg_player *p;
+        for (size_t i = 0; i < 3 * nv; i++) target[i] = 2 * x.h.reference[i] + (double)(i % 3);
+        const double *from[1] = {x.transforms[0]};
+        CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
+        vg_player_pose(p, 1, from, list);
+        vg_player_free(&p);
+        CHECK(vg_map_retarget(&x.h, target, 1, 1, &e) == VG_OK);
+        for (size_t j = 0; j < JOINTS; j++)
+            for (size_t k = 0; k < 3; k++)
+                CHECK_NEAR(x.h.rig.at[3 * j + k], (k == 2 ? 2 * LENGTH * (double)j : 0) + (double)k, 1e-6);
+        for (size_t j = 0; j < JOINTS; j++)
+            for (size_t k = 0; k < 3; k++) x.positions[0][3 * j + k] = 2 * x.positions[0][3 * j + k] + (double)k;
+        vg_rig_transforms(&x.h.rig, x.positions[0], x.turns[0], t);
+        from[0] = t, list[0] = after;
+        CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
+        vg_player_pose(p, 1, from, list);
+        vg_player_free(&p);
+        for (size_t i = 0; i < 3 * nv; i++) before[i] = 2 * before[i] + (double)(i % 3);
+        CHECK_NEAR(farthest(before, after, nv), 0, 1e-5);
+        free(target);
+        free(before);
+        free(after);
+        strike(&x);
+    }
+}
+
+/* Groups of four vertices of a limb that bends rigidly: turns and places by an independent formula. */
+static void joints_of_vertices_find_themselves(void)
+{
+    stage x;
+    vg_err e;
+    set_stage(&x, make_beads(), 50);
+    size_t each = x.h.mesh.nv / BONES;
+    uint32_t list[BONES][4];
+    vg_joint_group groups[BONES];
+    for (uint32_t b = 0; b < BONES; b++) {
+        for (uint32_t i = 0; i < 4; i++) list[b][i] = (uint32_t)(b * each + i * 11);
+        groups[b] = (vg_joint_group){.name = x.s.joints[b].name, .parent = b ? b - 1 : UINT32_MAX, .nvertices = 4, .vertices = list[b]};
+    }
+    vg_joint_groups g = {BONES, groups};
+    vg_skeleton s;
+    double positions[3 * BONES], turns[4 * BONES], *pose = room(3 * x.h.mesh.nv, sizeof *pose), q[4] = {0.8, 0.36, 0, 0.48};
+    CHECK(vg_joint_groups_skeleton(&g, x.h.mesh.nv, x.h.reference, &s, &e) == VG_OK);
+    CHECK(s.njoints == BONES && s.joints[2].parent == 1 && s.joints[2].nchannels == 3 && s.joints[0].nchannels == 6);
+    for (size_t v = 0; v < x.h.mesh.nv; v++) { /* all of it turned and moved */
+        vg_quat_apply(q, x.h.reference + 3 * v, pose + 3 * v);
+        pose[3 * v] += 4;
+    }
+    vg_joint_groups_pose(&g, x.h.reference, pose, positions, turns);
+    for (size_t b = 0; b < BONES; b++) {
+        double dot = 0, at[3] = {0, 0, 0};
+        for (int i = 0; i < 4; i++) dot += q[i] * turns[4 * b + (size_t)i];
+        CHECK_NEAR(fabs(dot), 1, 1e-12);
+        for (int i = 0; i < 4; i++)
+            for (size_t k = 0; k < 3; k++) at[k] += pose[3 * (size_t)list[b][i] + k] / 4;
+        for (size_t k = 0; k < 3; k++) CHECK_NEAR(positions[3 * b + k], at[k], 1e-12);
+    }
+    list[3][0] = (uint32_t)x.h.mesh.nv;
+    vg_skeleton_clear(&s);
+    CHECK(vg_joint_groups_skeleton(&g, x.h.mesh.nv, x.h.reference, &s, &e) == VG_EINPUT && strstr(e.message, "'toe'"));
+    free(pose);
+    strike(&x);
+}
+
+static void threads_do_not_matter(void)
+{
+    double *first = NULL;
+    for (int threads = 1; threads <= 3; threads++) {
+        stage x;
+        meshes_state = 3;
+        set_stage(&x, make_limb(), 40);
+        paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.3);
+        skin_poses(&x);
+        vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, 2, 0.003, threads);
+        size_t n = x.h.mesh.nv * 4 * BONES;
+        if (!first) {
+            first = room(n, sizeof *first);
+            memcpy(first, x.h.map.weights, n * sizeof *first);
+        }
+        CHECK(!memcmp(first, x.h.map.weights, n * sizeof *first));
+        vg_rig_fitter_free(&f);
+        strike(&x);
+    }
+    free(first);
+}
+
+static void what_cannot_be_fitted_is_refused(void)
+{
+    stage x;
+    vg_err e;
+    vg_rig_fitter *f;
+    set_stage(&x, make_limb(), 40);
+    const vg_rig_options three = {3, 0.03, 0, 1}, one = {1, 0.03, 0, 1};
+    CHECK(vg_rig_fitter_new(&f, &x.h, &three, &e) == VG_EARG);
+    CHECK(vg_rig_fitter_new(&f, &x.h, &one, &e) == VG_OK);
+    const double *poses[1] = {x.h.reference}, *transforms[1] = {x.transforms[0]};
+    vg_rig_fitter_add(f, 1, poses, transforms); /* the reference says nothing */
+    CHECK(vg_rig_fitter_finish(f, VG_RIG_ENVELOPE, &e) == VG_EINPUT && strstr(e.message, "no poses"));
+    vg_rig_fitter_free(&f);
+    vg_rig_clear(&x.h.rig);
+    CHECK(vg_rig_fitter_new(&f, &x.h, &one, &e) == VG_EINPUT);
+    for (size_t j = 0; j < JOINTS; j++) x.s.joints[j].nchannels = 0;
+    CHECK(vg_rig_make(&x.h.rig, &x.s, x.positions[0], x.turns[0], &e) == VG_EINPUT);
+    strike(&x);
+}
+
+TESTS({"rigid bodies are met", rigid_bodies_are_met}, {"weights are found again", weights_are_found_again},
+      {"motions are found again", motions_are_found_again}, {"a rig is learned from poses alone", a_rig_is_learned_from_poses_alone},
+      {"the map is its chain", the_map_is_its_chain}, {"refinement brings nearer", refinement_brings_nearer},
+      {"the root is found", the_root_is_found}, {"other skeletons drive", other_skeletons_drive},
+      {"edits turn what hangs on a bone", edits_turn_what_hangs_on_a_bone},
+      {"rotations alone say where bones are", rotations_alone_say_where_bones_are},
+      {"a rig serves another body", a_rig_serves_another_body},
+      {"joints of vertices find themselves", joints_of_vertices_find_themselves}, {"threads do not matter", threads_do_not_matter},
+      {"what cannot be fitted is refused", what_cannot_be_fitted_is_refused})
