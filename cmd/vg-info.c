@@ -3,6 +3,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 #include "report.h"
+#include "skeletons.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -10,7 +11,7 @@
 #include <unistd.h>
 
 static struct {
-    bool check, frames, digest;
+    bool check, frames, digest, weights;
 } opts;
 
 static const cli_option options[] = {
@@ -18,6 +19,7 @@ static const cli_option options[] = {
     {.name = "digest", .help = "only print a fingerprint of the content: 16 hexadecimal digits",
      .flag = &opts.digest},
     {.name = "frames", .help = "list the frames", .flag = &opts.frames},
+    {.name = "weights", .help = "only print the skinning weights of a rig, a vertex per line", .flag = &opts.weights},
     {0},
 };
 
@@ -32,7 +34,7 @@ static const cli_program program = {
 
 /* What reading all frames tells. */
 typedef struct contents {
-    uint64_t frames, timed, extra; /* extra: unknown records before frames */
+    uint64_t frames, timed, turned, extra; /* turned: that say how joints have turned; extra: unknown records before frames */
     char *first, *last;            /* names */
     double first_time, last_time;
     double D; /* of the first frame of vertices */
@@ -107,6 +109,7 @@ static void note_frame(contents *c, const vg_frame *f)
         c->last_time = f->time;
         c->timed++;
     }
+    c->turned += f->nturns > 0;
     c->extra += f->extra.n;
     c->frames++;
 }
@@ -309,25 +312,59 @@ static double percent(uint64_t part, uint64_t all)
     return all ? 100.0 * (double)part / (double)all : 0;
 }
 
-/* D is that of the source as it lies on the target, which is what the stream holds of the target. */
-static void report_patches(report *r, const vg_head *h)
+static void report_skeletons(report *r, const vg_head *h, const contents *c)
 {
-    const vg_map *m = &h->map;
-    if (!h->patches.n) return;
+    const vg_rig *g = &h->rig;
+    char line[80];
+    if (h->skeleton.njoints) {
+        report_gap(r);
+        report_group(r, "skeleton");
+        report_skeleton(r, "skeleton", &h->skeleton);
+        report_put(r, "turned_frames", NULL, report_count(c->turned));
+        snprintf(line, sizeof line, "known in %" PRIu64 " of %" PRIu64 " frames", c->turned, c->frames);
+        report_put(r, NULL, "turns", report_text(line));
+        report_end(r);
+    }
+    if (!g->skeleton.njoints) return;
     report_gap(r);
-    report_group(r, "patches");
-    report_put(r, "count", "patches", report_count(h->patches.n));
+    report_group(r, "rig");
+    report_skeleton(r, "rig", &g->skeleton);
+    report_put(r, "skinned", NULL, report_flag(g->skin_weight != NULL));
+    report_put(r, NULL, "skin", report_text(g->skin_weight ? "weights of linear blend skinning: --weights" : "no weights"));
     report_end(r);
+}
+
+static void report_map(report *r, const vg_map *m)
+{
+    char line[160];
+    bool bones = m->kind == VG_MAP_BONES;
     if (!m->n) return;
+    report_gap(r);
     report_group(r, "map");
-    report_put(r, "transforms", "map of", report_count(m->n));
-    report_put(r, "joints", "joints", report_count(m->njoints));
+    report_put(r, "kind", NULL, report_text(bones ? "bones" : "patches"));
+    report_put(r, "transforms", NULL, report_count(m->n));
+    report_put(r, "per_corner", NULL, report_count(m->ncorners ? m->per_corner : 0));
+    if (!bones) snprintf(line, sizeof line, "%zu patches", m->n);
+    else if (!m->ncorners) snprintf(line, sizeof line, "%zu bones, by linear blend skinning alone", m->n);
+    else snprintf(line, sizeof line, "%zu bones, %zu for each corner", m->n, m->per_corner);
+    report_put(r, NULL, "map of", report_text(line));
+    report_put(r, "joints", bones ? NULL : "joints", report_count(m->njoints));
     report_put(r, "held_vertices", "held", report_count(m->nheld));
     report_put(r, "retargeted", NULL, report_count(m->has_home));
     if (m->has_home) report_put(r, NULL, "body", report_text("another one than its poses are measured on"));
     report_end(r);
 }
 
+static void report_patches(report *r, const vg_head *h)
+{
+    if (!h->patches.n) return;
+    report_gap(r);
+    report_group(r, "patches");
+    report_put(r, "count", "patches", report_count(h->patches.n));
+    report_end(r);
+}
+
+/* D is that of the source as it lies on the target, which is what the stream holds of the target. */
 static void report_correspondence(report *r, const vg_head *h, double D)
 {
     const vg_correspondence *c = &h->correspondence;
@@ -485,6 +522,8 @@ static void report_all(report *r, const char *operand, const vg_head *h, const c
     report_mesh(r, h);
     report_correspondence(r, h, c->D);
     report_patches(r, h);
+    report_skeletons(r, h, c);
+    report_map(r, &h->map);
     report_provenance(r, h);
     report_unknown(r, h, c);
 }
@@ -503,22 +542,34 @@ static void report_digest(report *r, const contents *c)
     report_note(r, "%s", text);
 }
 
+static void print_weights(const vg_head *h, const char *operand)
+{
+    vg_err e;
+    if (!h->rig.skin_weight) {
+        vg_fail(&e, VG_EINPUT, "'%s' holds no skinning weights: vg-fitmap --skeleton makes them", operand ? operand : "standard input");
+        cli_die(&e);
+    }
+    write_weights(cli_text_open(), &h->rig, h->mesh.nv);
+}
+
 int main(int argc, char **argv)
 {
     char **operands;
     contents c = {0};
     size_t n = cli_start(&program, argc, argv, &operands);
-    if (opts.check + opts.digest + opts.frames > 1)
-        cli_usage("only one of --check, --digest and --frames can be asked for");
+    if (opts.check + opts.digest + opts.frames + opts.weights > 1)
+        cli_usage("only one of --check, --digest, --frames and --weights can be asked for");
+    if (opts.weights && cli.json) cli_usage("--weights is text: leave out --json");
     vg_source *s = cli_source(operands, n);
     report *r = report_new(), *list = opts.frames ? report_new() : NULL;
     read_all(s, &c, list);
     const char *operand = n && strcmp(operands[0], "-") ? operands[0] : NULL;
     if (opts.check) report_check(r);
     else if (opts.digest) report_digest(r, &c);
-    else if (!list || cli.json) report_all(r, operand, vg_source_head(s), &c);
+    else if ((!list || cli.json) && !opts.weights) report_all(r, operand, vg_source_head(s), &c);
     if (list) report_join(r, list);
-    report_print(r, cli_text_open(), cli.json);
+    if (opts.weights) print_weights(vg_source_head(s), operand);
+    else report_print(r, cli_text_open(), cli.json);
     cli_text_end();
     report_free(&r);
     vg_source_close(&s);

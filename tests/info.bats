@@ -324,3 +324,47 @@ END
         nothing_but in one.vgs
     done
 }
+
+@test "the joints of a skeleton are shown as a tree, and in how many frames their turns are known" {
+    must vg-info "$GOLDEN/turns.vgs"
+    [[ $output == *$'\n'"skeleton  4 joints, 3 of them turn"$'\n'"  Hips: position xyz, rotation zxy"$'\n'"    Spine: rotation zxy, end"$'\n'"    Küken: rotation x"$'\n'* ]] ||
+        fail "$output"
+    [[ $output == *"known in 1 of 1 frames"* ]] || fail "$output"
+    must vg-info "$CORPUS/accept/turns-in-one-frame.vgs"
+    [[ $output == *"known in 1 of 2 frames"* ]] || fail "$output"
+    vg-info --json "$GOLDEN/turns.vgs" >turns.json
+    py "$GOLDEN/turns.json" <<'END'
+import json, sys
+got, want = json.load(open("turns.json"))["skeleton"], json.load(open(sys.argv[1]))["skeleton"]
+assert (got["joints"], got["bones"], got["ends"], got["channels"], got["turned_frames"]) == (4, 3, 1, 10, 1)
+names = [None, "Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation"]
+assert got["tree"] == [dict(j, channels=[names[c] for c in j["channels"]]) for j in want]
+END
+}
+
+@test "a rig and its map are described, and its weights printed" {
+    must vg-info "$GOLDEN/rig.vgs"
+    [[ $output == *"rig  4 joints, 3 of them turn"* && $output == *"3 bones, 2 for each corner"* ]] || fail "$output"
+    must vg-info "$CORPUS/accept/map-of-bones-without-corners.vgs"
+    [[ $output == *"3 bones, by linear blend skinning alone"* ]] || fail "$output"
+    must vg-info "$GOLDEN/map.vgs"
+    [[ $output == *"2 patches"* ]] || fail "$output"
+    must vg-info --weights "$GOLDEN/rig.vgs" -o weights.txt
+    vg-info --json "$GOLDEN/rig.vgs" >rig.json
+    py "$GOLDEN/rig.json" <<'END'
+import json, sys
+truth, told = json.load(open(sys.argv[1])), json.load(open("rig.json"))
+assert told["rig"]["skinned"] is True and told["map"]["kind"] == "bones" and told["map"]["per_corner"] == 2
+names = [j["name"] for j in truth["rig"]["joints"] if j["channels"]]
+skin = truth["rig"]["skin"]
+lines = [line.split() for line in open("weights.txt") if not line.startswith("#")]
+assert len(lines) == 4
+for v, (number, *pairs) in enumerate(lines):
+    want = [(names[b], w) for b, w in zip(skin["bones"][v], skin["weights"][v]) if w > 0]
+    assert int(number) == v and list(zip(pairs[::2], map(float, pairs[1::2]))) == want
+END
+    must_fail 3 vg-info --weights "$CORPUS/accept/rig-without-skin.vgs"
+    must_fail 3 vg-info --weights "$GOLDEN/smallest.vgs"
+    must_fail 2 vg-info --weights --json "$GOLDEN/rig.vgs"
+    must_fail 2 vg-info --weights --digest "$GOLDEN/rig.vgs"
+}

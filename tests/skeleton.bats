@@ -1,6 +1,7 @@
-#!/usr/bin/env bats
 # skeleton.bats: skeletons and motions of joints as text.
 # SPDX-License-Identifier: GPL-3.0-or-later
+# shellcheck shell=bash disable=SC2154
+
 load lib
 
 # A body whose joints lie apart from each other, the hand before its arm; a leg whose end lies at a foot that hangs on the root.

@@ -88,9 +88,9 @@ static int join_skeleton(void *state, const vg_head *with, vg_err *e)
 
 static int compare_field(const char *name, const vgi_field *f)
 {
-    size_t n = (size_t)(f->end - f->begin);
-    int order = strncmp(name, f->begin, n);
-    return order ? order : name[n] != 0;
+    size_t n = (size_t)(f->end - f->begin), m = strlen(name); /* a field may hold NUL */
+    int order = memcmp(name, f->begin, m < n ? m : n);
+    return order ? order : (m > n) - (m < n);
 }
 
 /* The first joint of that name; NONE. */
