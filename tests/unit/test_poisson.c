@@ -128,6 +128,8 @@ static void fill(vg_frame *f, const vg_head *h, size_t k)
     if (h->kind == VG_VERTICES && k % 3 &&
         vg_frame_scalars(f, name, k % 2 ? "D" : "", f->values + k % 3, POINTS, &e) < 0)
         abort();
+    static const double turns[12] = {1, 0, 0, 0, 0.6, 0.8, 0, 0, 0, 0, -0.6, 0.8};
+    if (vg_frame_turn(f, turns, h->kind == VG_VERTICES ? k % 4 : 0, &e) < 0) abort();
     vg_records_clear(&f->extra);
     f->extra.at = room(k % 3, sizeof *f->extra.at);
     for (; f->extra.n < k % 3; f->extra.n++) {
@@ -144,6 +146,7 @@ static bool same_frame(const vg_frame *a, const vg_frame *b, const vg_head *h)
     bool same = !strcmp(a->name, b->name) && a->has_time == b->has_time && a->time == b->time && a->extra.n == b->extra.n &&
                 !memcmp(a->values, b->values, POINTS * vg_kind_width(h->kind) * sizeof(double));
     same = same && a->npins == b->npins && (!a->npins || !memcmp(a->pins, b->pins, a->npins * sizeof *a->pins));
+    same = same && a->nturns == b->nturns && (!a->nturns || !memcmp(a->turns, b->turns, 4 * a->nturns * sizeof *a->turns));
     same = same && a->has_scalars == b->has_scalars;
     if (same && a->has_scalars)
         same = !strcmp(a->scalars_name, b->scalars_name) && !strcmp(a->scalars_unit, b->scalars_unit) &&
