@@ -305,6 +305,11 @@ static void add_sources(const vg_carrier *c, size_t f, vgi_map *sum, vgi_lanes *
     for (uint32_t i = k->first[f]; i < k->first[f + 1]; i++) {
         const vgi_map *map = &c->maps[k->source[i]];
         unsigned bad = c->bad[k->source[i]];
+        if (!bad) {
+            for (int e = 0; e < 9; e++) sum->m[e] += k->weight[i] * map->m[e];
+            *weight += k->weight[i];
+            continue;
+        }
         for (int lane = 0; lane < VGI_LANES; lane++) {
             if (bad >> lane & 1) continue;
             for (int e = 0; e < 9; e++) sum->m[e][lane] += k->weight[i] * map->m[e][lane];
@@ -316,9 +321,10 @@ static void add_sources(const vg_carrier *c, size_t f, vgi_map *sum, vgi_lanes *
 /* Nothing to follow: stay as it is. */
 static void finish_mean(vgi_map *sum, vgi_lanes weight)
 {
+    vgi_lanes share = 1 / weight;
+    for (int e = 0; e < 9; e++) sum->m[e] *= share;
     for (int lane = 0; lane < VGI_LANES; lane++)
-        for (int e = 0; e < 9; e++)
-            sum->m[e][lane] = weight[lane] > 0 ? sum->m[e][lane] / weight[lane] : e % 4 == 0;
+        for (int e = 0; e < 9 && !(weight[lane] > 0); e++) sum->m[e][lane] = e % 4 == 0;
 }
 
 /* The centre of the source faces that drive the target faces around a vertex, in eight poses. */
