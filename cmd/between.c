@@ -15,13 +15,6 @@ static struct {
     size_t n;
 } at;
 
-static void *allocate(size_t n, size_t size)
-{
-    void *p = calloc(n + 1, size);
-    if (!p) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the key poses"});
-    return p;
-}
-
 /* ---- moments ---- */
 
 static void parse_at(const char *list)
@@ -72,7 +65,7 @@ void between_label(vg_frame *f, const between_key *keys, size_t nkeys, double t)
     const between_key *a = &keys[number], *b = &keys[nkeys > 1 ? number + 1 : number];
     double u = t - (double)number;
     size_t room = strlen(a->name) + strlen(b->name) + 40;
-    char *name = allocate(room, 1);
+    char *name = cli_allocate(room, 1, "the key poses");
     if (u == 0 || u == 1) snprintf(name, room, "%s", u == 0 ? a->name : b->name);
     else snprintf(name, room, "%s~%s@%.6g", a->name, b->name, u);
     if (vg_frame_rename(f, name, &e) < 0) cli_die(&e);
@@ -122,7 +115,7 @@ static void grow(poses *p)
 static void keep(poses *p, const vg_frame *f)
 {
     const vg_head *h = p->h;
-    double *values = allocate(p->numbers, sizeof *values), *anchors = allocate(3 * h->nanchors, sizeof *anchors);
+    double *values = cli_allocate(p->numbers, sizeof *values, "the key poses"), *anchors = cli_allocate(3 * h->nanchors, sizeof *anchors, "the key poses");
     grow(p);
     vg_key *k = &p->keys[p->n];
     *k = (vg_key){.values = values, .anchors = anchors};
@@ -135,7 +128,7 @@ static void keep(poses *p, const vg_frame *f)
         if (h->nanchors) memcpy(anchors, f->anchors, 3 * h->nanchors * sizeof *anchors);
     }
     size_t length = strlen(f->name);
-    char *name = allocate(length, 1);
+    char *name = cli_allocate(length, 1, "the key poses");
     memcpy(name, f->name, length);
     p->labels[p->n++] = (between_key){name, f->has_time, f->time};
 }

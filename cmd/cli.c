@@ -207,8 +207,7 @@ void cli_no(const char *format, ...)
     leave(1);
 }
 
-static void die(int code, const char *format, ...) VG_PRINTF(2, 3) __attribute__((noreturn));
-static void die(int code, const char *format, ...)
+void cli_stop(int code, const char *format, ...)
 {
     char text[MESSAGE_BYTES];
     va_list ap;
@@ -218,6 +217,13 @@ static void die(int code, const char *format, ...)
     vg_err e;
     vg_fail(&e, code, "%s", text);
     cli_die(&e);
+}
+
+void *cli_allocate(size_t n, size_t size, const char *what)
+{
+    void *p = calloc(n + 1, size);
+    if (!p) cli_stop(VG_ENOMEM, "not enough memory for %s", what);
+    return p;
 }
 
 void cli_usage(const char *format, ...)
@@ -239,7 +245,7 @@ void cli_usage(const char *format, ...)
 static void die_writing(int error) __attribute__((noreturn));
 static void die_writing(int error)
 {
-    die(VG_ESYS, "cannot write to %s: %s", out.shown, strerror(error));
+    cli_stop(VG_ESYS, "cannot write to %s: %s", out.shown, strerror(error));
 }
 
 static bool ends_with(const char *s, size_t n, const char *suffix)
@@ -281,7 +287,7 @@ static const char *split_path(const char *path, char directory[PATH_MAX])
  * would say something else, and half a file would stay. */
 static void library_gave_up(void)
 {
-    die(VG_ENOMEM, "a library gave up, for lack of memory most likely");
+    cli_stop(VG_ENOMEM, "a library gave up, for lack of memory most likely");
 }
 
 /* Look at --output before any work: what is wrong with it now will be wrong then. */
@@ -295,7 +301,7 @@ static void check_output(bool stream)
         cli_usage("a stream is not written to a terminal: use -o FILE or a pipe");
     if (!name) return;
     if (!*name) cli_usage("option '--output' needs the name of a file");
-    if (strlen(name) > PATH_MAX - 64) die(VG_ESYS, "cannot write to '%.40s...': %s", name, strerror(ENAMETOOLONG));
+    if (strlen(name) > PATH_MAX - 64) cli_stop(VG_ESYS, "cannot write to '%.40s...': %s", name, strerror(ENAMETOOLONG));
     snprintf(out.shown, sizeof out.shown, "'%s'", name);
     if (!stat(name, &st)) {
         if (S_ISDIR(st.st_mode)) die_writing(EISDIR);
@@ -773,12 +779,12 @@ size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands)
     started = seconds();
     cli.program = p, cli.argc = argc, cli.argv = argv;
     repair_descriptors();
-    if (atexit(library_gave_up)) die(VG_ENOMEM, "not enough memory to start");
+    if (atexit(library_gave_up)) cli_stop(VG_ENOMEM, "not enough memory to start");
     signal(SIGPIPE, SIG_DFL); /* a parent may have ignored it */
     signal(SIGXFSZ, SIG_IGN); /* a file size limit is a failed write, with a message */
     size_t nall = gather_options(p, all);
     *operands = calloc((size_t)argc + 1, sizeof **operands);
-    if (!*operands) die(VG_ENOMEM, "not enough memory for %d operands", argc);
+    if (!*operands) cli_stop(VG_ENOMEM, "not enough memory for %d operands", argc);
     size_t n = parse(all, nall, argc, argv, *operands);
     if (want_help) print_help(p, all, nall);
     if (want_version && !want_help) printf("%s (vg) %s\nstream 1.0\n", p->name, VG_VERSION);
@@ -818,7 +824,7 @@ size_t cli_parse_vertices(const char *option, const char *text, uint32_t **verti
 {
     size_t n = 0, unique = 0;
     *vertices = calloc(strlen(text) / 2 + 1, sizeof **vertices);
-    if (!*vertices) die(VG_ENOMEM, "not enough memory for the vertices of option '--%s'", bare(option));
+    if (!*vertices) cli_stop(VG_ENOMEM, "not enough memory for the vertices of option '--%s'", bare(option));
     for (const char *p = text;; p++) {
         char *end;
         errno = 0;

@@ -51,6 +51,10 @@ size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands);
 /* cli_die: one line "PROGRAM: MESSAGE" on standard error, leave nothing half-written, exit by the code. If a stream
  * is being written, it says in a FAIL record who failed. */
 void cli_die(const vg_err *e) __attribute__((noreturn));
+/* cli_stop: the same of a message of its own. */
+void cli_stop(int code, const char *format, ...) VG_PRINTF(2, 3) __attribute__((noreturn));
+/* cli_allocate: n zeroed elements, and room for one more; stops when there is no memory for what it is for. */
+void *cli_allocate(size_t n, size_t size, const char *what);
 /* cli_usage: the same with exit 2 and the usage line. */
 void cli_usage(const char *format, ...) VG_PRINTF(1, 2) __attribute__((noreturn));
 /* cli_no: the same with exit 1: the answer is no. */

@@ -166,13 +166,6 @@ static void make_head(playback *p)
     h->count = mapped.transforms ? p->count : h->mesh.nv;
 }
 
-static double *room(size_t n)
-{
-    double *x = calloc(n + 1, sizeof *x);
-    if (!x) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the transforms"});
-    return x;
-}
-
 static void put_batch(playback *p)
 {
     const double *from[BATCH];
@@ -248,7 +241,7 @@ static void add_key(playback *p, key_list *k)
     char *name = strdup(f->name);
     if (!k->label || !k->transforms || !name) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the keys"});
     k->label[k->n] = (between_key){name, f->has_time, f->time};
-    k->transforms[k->n] = room(7 * p->count);
+    k->transforms[k->n] = cli_allocate(7 * p->count, sizeof(double), "the transforms");
     take_transforms(p, 1, &k->transforms[k->n++]);
 }
 
@@ -303,7 +296,7 @@ void mapped_run(vg_source *s)
     if (vg_player_new(&p.player, &p.map, p.h->precision == VG_F32, cli.threads, &e) < 0) cli_die(&e);
     make_head(&p);
     for (size_t i = 0; i < p.most; i++) {
-        p.transforms[i] = room(7 * p.count);
+        p.transforms[i] = cli_allocate(7 * p.count, sizeof(double), "the transforms");
         if (vg_frame_shape(&p.out[i], p.h, &e) < 0) cli_die(&e);
     }
     cli_stream_open(p.h);

@@ -63,20 +63,6 @@ typedef struct work {
     errors errors[2][2];       /* envelope, skinning; fitted, left out */
 } work;
 
-static void stop(int code, const char *message)
-{
-    vg_err e;
-    vg_fail(&e, code, "%s", message);
-    cli_die(&e);
-}
-
-static void *room(size_t n, size_t size)
-{
-    void *p = calloc(n + 1, size);
-    if (!p) stop(VG_ENOMEM, "not enough memory for the rig and its poses");
-    return p;
-}
-
 static bool is_left_out(const work *w, uint64_t i)
 {
     return w->holdout && i % (uint64_t)w->holdout == (uint64_t)w->holdout - 1;
@@ -103,7 +89,7 @@ static void sample_pose(work *w, uint64_t i, const double *pose)
         if (i % w->stride) return;
     }
     double **to = &w->sample[w->nsample];
-    if (!*to) *to = room(3 * w->h->mesh.nv, sizeof **to);
+    if (!*to) *to = cli_allocate(3 * w->h->mesh.nv, sizeof **to, "the rig and its poses");
     w->sample_at[w->nsample++] = i;
     memcpy(*to, pose, bytes);
 }
@@ -124,7 +110,7 @@ static void read_poses(work *w, vg_source *s)
     if (r < 0) cli_die(&e);
     if (!found) w->reference = w->total;
     vg_frame_clear(&f);
-    if (!w->total) stop(VG_EINPUT, "the input has no poses to fit a rig to");
+    if (!w->total) cli_stop(VG_EINPUT, "the input has no poses to fit a rig to");
 }
 
 /* All poses once more, in batches; they go back into the spool. */
@@ -153,7 +139,7 @@ static void keep_motion(motion *m, const vg_frame *f, vg_joint_fitter *fitter)
         m->cap = 2 * m->cap + 16;
         m->positions = realloc(m->positions, m->cap * 3 * joints * sizeof *m->positions);
         m->turns = realloc(m->turns, m->cap * 4 * joints * sizeof *m->turns);
-        if (!m->positions || !m->turns) stop(VG_ENOMEM, "not enough memory for the skeleton's motion");
+        if (!m->positions || !m->turns) cli_stop(VG_ENOMEM, "not enough memory for the skeleton's motion");
     }
     if (!f->nturns) {
         vg_joint_fitter_fit(fitter, f->values, NULL, NULL, &which);
@@ -188,7 +174,7 @@ static void read_skeleton(work *w)
 static void parse_point(const char *text, double at[3])
 {
     char *copy = strdup(text), *rest = copy;
-    if (!copy) stop(VG_ENOMEM, "not enough memory for an option");
+    if (!copy) cli_stop(VG_ENOMEM, "not enough memory for an option");
     for (int k = 0; k < 3; k++) {
         char *word = strsep(&rest, ",");
         if (!word || (k == 2 && rest)) cli_usage("--root-at is 'X,Y,Z', not '%s'", text);
@@ -254,7 +240,7 @@ static void place_skeleton(work *w)
     vg_err e;
     const motion *m = &w->given;
     size_t joints = m->skeleton.njoints;
-    double *positions = room(3 * joints, sizeof *positions), *turns = room(4 * joints, sizeof *turns), at[3];
+    double *positions = cli_allocate(3 * joints, sizeof *positions, "the rig and its poses"), *turns = cli_allocate(4 * joints, sizeof *turns, "the rig and its poses"), at[3];
     bool known = m->n == w->total && !rigging.learn;
     vg_skeleton_pose(&m->skeleton, NULL, positions, turns);
     if (!known && !rigging.learn && m->n > 1) {
@@ -295,7 +281,7 @@ static void read_groups(work *w)
     if (vg_joint_groups_read(&w->groups, text, n, 0, name, &e) < 0 ||
         vg_joint_groups_skeleton(&w->groups, w->h->mesh.nv, w->h->reference, &s, &e) < 0)
         cli_die(&e);
-    double *positions = room(3 * s.njoints, sizeof *positions), *turns = room(4 * s.njoints, sizeof *turns);
+    double *positions = cli_allocate(3 * s.njoints, sizeof *positions, "the rig and its poses"), *turns = cli_allocate(4 * s.njoints, sizeof *turns, "the rig and its poses");
     vg_skeleton_pose(&s, NULL, positions, turns);
     if (vg_rig_make(&w->h->rig, &s, positions, turns, &e) < 0) cli_die(&e);
     vg_skeleton_clear(&s);
@@ -319,7 +305,7 @@ static void measure_transforms(work *w, uint64_t first, size_t n, const vg_frame
         return;
     }
     double *positions = NULL, *turns = NULL;
-    if (rigging.groups) positions = room(3 * joints, sizeof *positions), turns = room(4 * joints, sizeof *turns);
+    if (rigging.groups) positions = cli_allocate(3 * joints, sizeof *positions, "the rig and its poses"), turns = cli_allocate(4 * joints, sizeof *turns, "the rig and its poses");
     for (size_t i = 0; i < n; i++) {
         size_t k = (size_t)first + i;
         if (rigging.groups) {
@@ -337,7 +323,7 @@ static void fit_batch(work *w, uint64_t first, size_t n, const vg_frame *frames)
 {
     const double *poses[BATCH], *transforms[BATCH];
     size_t count = 0;
-    for (size_t i = 0; i < n; i++) w->transforms[first + i] = room(7 * w->h->rig.nbones, sizeof(double));
+    for (size_t i = 0; i < n; i++) w->transforms[first + i] = cli_allocate(7 * w->h->rig.nbones, sizeof(double), "the rig and its poses");
     measure_transforms(w, first, n, frames);
     for (size_t i = 0; i < n; i++) {
         if (is_left_out(w, first + i)) continue;
@@ -368,7 +354,7 @@ static void judge_batch(work *w, uint64_t first, size_t n, const vg_frame *frame
     static double *vertices[BATCH];
     size_t nv = w->h->mesh.nv;
     for (size_t i = 0; i < n; i++)
-        if (!vertices[i]) vertices[i] = room(3 * nv, sizeof(double));
+        if (!vertices[i]) vertices[i] = cli_allocate(3 * nv, sizeof(double), "the rig and its poses");
     for (int method = 0; method < 2; method++) {
         if (!players[method]) continue;
         vg_player_pose(players[method], n, (const double *const *)w->transforms + first, vertices);
@@ -403,7 +389,7 @@ static void report(work *w)
         cli_die(&e);
     for (int i = 0; i < 4; i++) {
         errors *x = &w->errors[i / 2][i % 2];
-        x->first = room(nv, sizeof *x->first), x->second = room(nv, sizeof *x->second);
+        x->first = cli_allocate(nv, sizeof *x->first, "the rig and its poses"), x->second = cli_allocate(nv, sizeof *x->second, "the rig and its poses");
     }
     pass(w, judge_batch);
     cli_say("%zu bones, %zu vertices, %llu poses; errors in 1e-3 D:  mean  sigma largest", w->h->rig.nbones, nv,
@@ -424,7 +410,7 @@ static void fit(work *w, double hold)
     const vg_rig_options o = {.bones_per_corner = (size_t)rigging.bones_per_corner, .hold = hold, .refine = rigging.refine,
                               .threads = cli.threads};
     if (vg_rig_fitter_new(&fitter, h, &o, &e) < 0) cli_die(&e);
-    w->transforms = room((size_t)w->total, sizeof *w->transforms);
+    w->transforms = cli_allocate((size_t)w->total, sizeof *w->transforms, "the rig and its poses");
     pass(w, fit_batch);
     if (vg_rig_fitter_finish(fitter, VG_RIG_LBS, &e) < 0) cli_die(&e);
     if (!by_skinning()) {
@@ -440,12 +426,12 @@ void rigging_run(vg_source *s, double hold, long holdout)
     static work w; /* lives until the end: what it holds goes with the process */
     vg_err e;
     w.h = vg_source_head(s), w.holdout = holdout;
-    if (!w.h->mesh.nf) stop(VG_EINPUT, "the input has no faces");
+    if (!w.h->mesh.nf) cli_stop(VG_EINPUT, "the input has no faces");
     vg_rig_clear(&w.h->rig);
     vg_map_clear(&w.h->map);
     if (rigging.skeleton) read_skeleton(&w);
     read_poses(&w, s);
-    if (!w.nsample) stop(VG_EINPUT, "all poses are left out of the fit: raise --holdout");
+    if (!w.nsample) cli_stop(VG_EINPUT, "all poses are left out of the fit: raise --holdout");
     if (rigging.groups) read_groups(&w);
     else place_skeleton(&w);
     if (w.h->skeleton.njoints) { /* the mesh is itself a skeleton */

@@ -89,20 +89,6 @@ typedef struct work {
     vg_frame in[BATCH], out[BATCH];
 } work;
 
-static void die(int code, const char *message)
-{
-    vg_err e;
-    vg_fail(&e, code, "%s", message);
-    cli_die(&e);
-}
-
-static void *allocate(size_t n, size_t size)
-{
-    void *p = calloc(n + 1, size);
-    if (!p) die(VG_ENOMEM, "not enough memory for the sequence's mesh");
-    return p;
-}
-
 /* ---- options ---- */
 
 static size_t choose(const char *option, const char *text, const char *const *names, size_t n, const char *all)
@@ -131,7 +117,7 @@ static void parse_options(work *w)
 
 static double *positions(const double *vertices, const uint32_t *list, size_t n)
 {
-    double *p = allocate(3 * n, sizeof *p);
+    double *p = cli_allocate(3 * n, sizeof *p, "the mesh of the sequence");
     vg_graph_anchors(vertices, list, n, p);
     return p;
 }
@@ -196,10 +182,10 @@ static void prepare_pins(work *w)
     static const double still = 1e-6; /* of D */
     p->reference = w->source_reference;
     p->least = still * vg_diagonal(p->reference, w->from->nv);
-    p->moves = allocate(w->from->nv, sizeof *p->moves);
-    p->face_moves = allocate(w->from->nf, sizeof *p->face_moves);
-    p->free = allocate(w->to->nv, sizeof *p->free);
-    p->list = allocate(w->to->nv, sizeof *p->list);
+    p->moves = cli_allocate(w->from->nv, sizeof *p->moves, "the mesh of the sequence");
+    p->face_moves = cli_allocate(w->from->nf, sizeof *p->face_moves, "the mesh of the sequence");
+    p->free = cli_allocate(w->to->nv, sizeof *p->free, "the mesh of the sequence");
+    p->list = cli_allocate(w->to->nv, sizeof *p->list, "the mesh of the sequence");
 }
 
 static bool driven_by_moving(const work *w, size_t face)
@@ -375,7 +361,7 @@ static void make_step(work *w)
         r = vg_shaper_new(&w->shaper, w->to, h->reference, t->reference, cli.threads, &e);
     } else {
         r = vg_deformer_new(&w->deformer, w->from, h->reference, cli.threads, &e);
-        double *vectors = allocate(3 * vg_graph_corners(w->from), sizeof *vectors);
+        double *vectors = cli_allocate(3 * vg_graph_corners(w->from), sizeof *vectors, "the mesh of the sequence");
         if (r == VG_OK && opts.onto) {
             vg_graph_vectors(w->from, t->reference, vectors);
             r = vg_deformer_target(w->deformer, vectors, method, &e);

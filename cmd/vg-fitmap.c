@@ -44,13 +44,6 @@ static const cli_program program = {
 enum { BATCH = 32 };
 static const size_t in_memory = (size_t)256 << 20; /* bytes of poses that wait for the second pass */
 
-static void stop(int code, const char *message)
-{
-    vg_err e;
-    vg_fail(&e, code, "%s", message);
-    cli_die(&e);
-}
-
 /* ---- fitting ---- */
 
 static void take_patches(vg_head *h)
@@ -167,7 +160,7 @@ static void report(const vg_head *h, vg_spool *spool)
     if (vg_player_new(&j.player, h, false, cli.threads, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < BATCH; i++) {
         j.transforms[i] = calloc(7 * h->map.n, sizeof(double)), j.vertices[i] = calloc(3 * h->mesh.nv + 1, sizeof(double));
-        if (!j.transforms[i] || !j.vertices[i]) stop(VG_ENOMEM, "not enough memory for the report");
+        if (!j.transforms[i] || !j.vertices[i]) cli_stop(VG_ENOMEM, "not enough memory for the report");
     }
     uint64_t first = 0;
     int r;
@@ -211,7 +204,7 @@ static void fit(vg_source *s)
     if (vg_map_fitter_new(&f, h, opts.hold, cli.threads, &e) < 0 || vg_spool_new(&spool, h, in_memory, &e) < 0) cli_die(&e);
     if (h->patches.n != before)
         cli_note("%zu patches are in %zu pieces, each of which is a patch of the map", before, h->patches.n);
-    if (!read_poses(s, f, spool)) stop(VG_EINPUT, "the input has no poses to fit a map to");
+    if (!read_poses(s, f, spool)) cli_stop(VG_EINPUT, "the input has no poses to fit a map to");
     if (vg_map_fitter_finish(f, &e) < 0) cli_die(&e);
     vg_map_fitter_free(&f);
     report(h, spool);
@@ -226,7 +219,7 @@ static void retarget(vg_source *s)
     vg_head *h = vg_source_head(s), target = {0};
     char name[200];
     snprintf(name, sizeof name, "'%.190s'", opts.retarget);
-    if (!h->map.n) stop(VG_EINPUT, "the input holds no map: make one with vg-fitmap");
+    if (!h->map.n) cli_stop(VG_EINPUT, "the input holds no map: make one with vg-fitmap");
     if (vg_load_mesh(&target, opts.retarget, &e) < 0 ||
         vg_mesh_same(&h->mesh, "the map", &target.mesh, name, &e) < 0 ||
         vg_map_retarget(h, target.reference, isnan(opts.morph) ? 1 : opts.morph, cli.threads, &e) < 0 ||

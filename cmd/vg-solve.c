@@ -80,13 +80,6 @@ typedef struct work {
     vg_weights weights;
 } work;
 
-static void *allocate(size_t n, size_t size)
-{
-    void *p = calloc(n + 1, size);
-    if (!p) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for a batch of poses"});
-    return p;
-}
-
 static vg_weights parse_weights(void)
 {
     if (!opts.weights || !strcmp(opts.weights, "uniform")) return VG_WEIGHTS_UNIFORM;
@@ -129,8 +122,8 @@ static void make_machine(work *w, machine *m, uint32_t *held, size_t nheld)
 static void load_taken(work *w)
 {
     size_t n = w->n - w->loaded;
-    const double **vectors = allocate(n, sizeof *vectors), **held = allocate(n, sizeof *held);
-    double **x = allocate(n, sizeof *x), **rhs = allocate(n, sizeof *rhs);
+    const double **vectors = cli_allocate(n, sizeof *vectors, "a batch of poses"), **held = cli_allocate(n, sizeof *held, "a batch of poses");
+    double **x = cli_allocate(n, sizeof *x, "a batch of poses"), **rhs = cli_allocate(n, sizeof *rhs, "a batch of poses");
     for (size_t i = 0; i < n; i++) {
         waiting *p = &w->waiting[w->loaded + i];
         vectors[i] = p->vectors, held[i] = p->held, x[i] = p->frame.values, rhs[i] = p->rhs;
@@ -146,9 +139,9 @@ static void load_taken(work *w)
 static void solve_waiting(work *w)
 {
     load_taken(w);
-    const double **rhs = allocate(w->n, sizeof *rhs), **held = allocate(w->n, sizeof *held);
-    const double **roots = allocate(w->n, sizeof *roots), **normals = allocate(w->n, sizeof *normals);
-    double **x = allocate(w->n, sizeof *x);
+    const double **rhs = cli_allocate(w->n, sizeof *rhs, "a batch of poses"), **held = cli_allocate(w->n, sizeof *held, "a batch of poses");
+    const double **roots = cli_allocate(w->n, sizeof *roots, "a batch of poses"), **normals = cli_allocate(w->n, sizeof *normals, "a batch of poses");
+    double **x = cli_allocate(w->n, sizeof *x, "a batch of poses");
     for (size_t i = 0; i < w->n; i++) {
         waiting *p = &w->waiting[i];
         rhs[i] = p->rhs, held[i] = p->held, roots[i] = p->frame.root, normals[i] = p->normals, x[i] = p->frame.values;
@@ -171,7 +164,7 @@ static void solve_waiting(work *w)
 static uint32_t *unite(const work *w, const vg_frame *f, size_t *n)
 {
     const vg_head *h = w->h;
-    uint32_t *both = allocate(h->nanchors + f->npins, sizeof *both);
+    uint32_t *both = cli_allocate(h->nanchors + f->npins, sizeof *both, "a batch of poses");
     *n = 0;
     for (size_t a = 0, p = 0; a < h->nanchors || p < f->npins;) {
         bool anchor = p == f->npins || (a < h->nanchors && h->anchors[a] <= f->pins[p]);
@@ -231,7 +224,7 @@ static void place_held(const work *w, const machine *m, const vg_frame *f, waiti
 {
     if (p->held_cap < 3 * m->nheld || !p->held) {
         free(p->held);
-        p->held = allocate(3 * m->nheld, sizeof *p->held);
+        p->held = cli_allocate(3 * m->nheld, sizeof *p->held, "a batch of poses");
         p->held_cap = 3 * m->nheld;
     }
     size_t a = 0;
@@ -273,11 +266,11 @@ static void make_waiting(work *w)
 {
     vg_err e;
     w->most = vg_solver_batch(w->plain.solver);
-    w->waiting = allocate(w->most, sizeof *w->waiting);
+    w->waiting = cli_allocate(w->most, sizeof *w->waiting, "a batch of poses");
     for (size_t i = 0; i < w->most; i++) {
         waiting *p = &w->waiting[i];
-        p->rhs = allocate(3 * w->h->mesh.nv, sizeof *p->rhs);
-        p->normals = allocate(w->plain.planar ? 3 * vg_planar_faces(w->plain.planar) : 0, sizeof *p->normals);
+        p->rhs = cli_allocate(3 * w->h->mesh.nv, sizeof *p->rhs, "a batch of poses");
+        p->normals = cli_allocate(w->plain.planar ? 3 * vg_planar_faces(w->plain.planar) : 0, sizeof *p->normals, "a batch of poses");
         if (vg_frame_shape(&p->frame, w->h, &e) < 0) cli_die(&e);
     }
 }
@@ -287,11 +280,11 @@ static void make_slots(work *w)
 {
     vg_err e;
     size_t n = (size_t)cli.threads;
-    w->in = allocate(n, sizeof *w->in);
-    w->vectors = allocate(n, sizeof *w->vectors);
+    w->in = cli_allocate(n, sizeof *w->in, "a batch of poses");
+    w->vectors = cli_allocate(n, sizeof *w->vectors, "a batch of poses");
     for (size_t i = 0; i < n; i++) {
         if (w->kind != VG_VERTICES) continue;
-        w->vectors[i] = allocate(3 * vg_graph_corners(w->g), sizeof **w->vectors);
+        w->vectors[i] = cli_allocate(3 * vg_graph_corners(w->g), sizeof **w->vectors, "a batch of poses");
         if (vg_frame_shape(&w->in[i], w->h, &e) < 0) cli_die(&e); /* room for the anchors */
     }
 }
@@ -306,7 +299,7 @@ static void prepare(work *w, vg_head *h)
         cli_die(&e);
     }
     if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&w->g, h, &e) < 0) cli_die(&e);
-    uint32_t *anchors = allocate(h->nanchors, sizeof *anchors);
+    uint32_t *anchors = cli_allocate(h->nanchors, sizeof *anchors, "a batch of poses");
     if (h->nanchors) memcpy(anchors, h->anchors, h->nanchors * sizeof *anchors);
     make_machine(w, &w->plain, anchors, h->nanchors);
     make_slots(w);
