@@ -647,8 +647,36 @@ static bool in_range(const cli_option *o, double x)
     return (o->least == 0 && o->most == 0) || (x >= o->least && x <= o->most);
 }
 
+/* "a|b|c" as "'a', 'b' or 'c'" */
+static void list_choices(const char *choices, char *to, size_t size)
+{
+    size_t at = 0;
+    to[0] = 0;
+    for (const char *p = choices; *p && at < size;) {
+        size_t n = strcspn(p, "|");
+        const char *before = p == choices ? "" : p[n] ? ", " : " or ";
+        at += (size_t)snprintf(to + at, size - at, "%s'%.*s'", before, (int)n, p);
+        p += n + (p[n] != 0);
+    }
+}
+
+static size_t choose(const cli_option *o, const char *value)
+{
+    size_t number = 0, length = strlen(value);
+    for (const char *p = o->value;; number++) {
+        size_t n = strcspn(p, "|");
+        if (n == length && !memcmp(p, value, n)) return number;
+        if (!p[n]) break;
+        p += n + 1;
+    }
+    char all[200];
+    list_choices(o->value, all, sizeof all);
+    cli_usage("option '--%s' needs %s, not '%s'", o->name, all, value);
+}
+
 static void take_option(const cli_option *o, const char *value)
 {
+    if (o->choice) *o->choice = choose(o, value);
     if (o->flag) {
         *o->flag = true;
     } else if (o->text) {

@@ -12,7 +12,8 @@ typedef struct cli_option {
     char letter;       /* 0: none */
     const char *value; /* what -h calls the argument ("FILE"); NULL: a flag */
     const char *help;  /* one line for -h */
-    /* what parsing does, the first that is not NULL: */
+    size_t *choice;    /* not NULL: value is "a|b|c", nothing else is taken, and its number from 0 is put here */
+    /* what parsing does besides, the first that is not NULL: */
     bool *flag;
     const char **text;
     double *number;

@@ -9,16 +9,18 @@
 
 static struct {
     const char *onto, *correspondence, *by, *root, *pin;
+    size_t by_choice, pin_choice; /* of enum by and enum pin */
 } opts;
 
 static const cli_option options[] = {
     {"onto", 0, "MESH", "apply to this mesh and write its vectors; without it, write the deformations", .text = &opts.onto},
     {"correspondence", 0, "FILE", "the target has another connectivity: what vg-register found", .text = &opts.correspondence},
-    {"by", 0, "pose|shape|gradient|blend", "what is carried over (default pose)", .text = &opts.by},
+    {"by", 0, "pose|shape|gradient|blend", "what is carried over (default pose)", .text = &opts.by,
+     .choice = &opts.by_choice},
     {"root", 0, "centroid|stay|V", "where the body goes: as the centroid does (default), nowhere, or as vertex V does",
      .text = &opts.root},
     {"pin", 0, "auto|always|none", "hold what does not move in the source: where it is much of the mesh (default), ...",
-     .text = &opts.pin},
+     .text = &opts.pin, .choice = &opts.pin_choice},
     {"interpolate", 0, "N", "write N poses, evenly from the first pose of the input to the last", .integer = &between.frames,
      .least = 1, .most = 1e9},
     {"at", 0, "T,...", "write the poses at these moments: 0 is the first pose, 1 the second; outside is extrapolated",
@@ -91,24 +93,14 @@ typedef struct work {
 
 /* ---- options ---- */
 
-static size_t choose(const char *option, const char *text, const char *const *names, size_t n, const char *all)
-{
-    for (size_t i = 0; text && i < n; i++)
-        if (!strcmp(text, names[i])) return i;
-    if (text) cli_usage("--%s is %s, not '%s'", option, all, text);
-    return 0;
-}
-
 static void parse_options(work *w)
 {
-    static const char *const by_names[] = {"pose", "shape", "gradient", "blend"};
-    static const char *const pin_names[] = {"auto", "always", "none"};
     const struct { const char *name, *value; } need_onto[] = {
         {"root", opts.root}, {"by", opts.by}, {"correspondence", opts.correspondence}, {"pin", opts.pin}};
     for (size_t i = 0; i < 4; i++)
         if (need_onto[i].value && !opts.onto) cli_usage("--%s needs --onto", need_onto[i].name);
-    w->by = (by)choose("by", opts.by, by_names, 4, "'pose', 'shape', 'gradient' or 'blend'");
-    w->pins.mode = (pin)choose("pin", opts.pin, pin_names, 3, "'auto', 'always' or 'none'");
+    w->by = (by)opts.by_choice;
+    w->pins.mode = (pin)opts.pin_choice;
     if (w->by == BY_SHAPE && opts.correspondence)
         cli_usage("--by shape needs one connectivity: it takes no --correspondence");
 }

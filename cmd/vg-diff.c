@@ -6,18 +6,21 @@
 
 #include <math.h>
 
+enum which { MEAN, RMS, P95, MAX };
+
 static struct {
     double tolerance; /* in units of D; negative: none was asked for */
     const char *of, *heat;
+    size_t which; /* of enum which */
     bool centred, frames;
-} opts = {.tolerance = -1, .of = "max"};
+} opts = {.tolerance = -1, .of = "max", .which = MAX};
 static const char *report_file; /* NULL: standard output */
 
 static const cli_option options[] = {
     {.name = "tolerance", .letter = 't', .value = "X", .help = "exit 1 when the error exceeds X, in units of D",
      .number = &opts.tolerance, .least = 0, .most = INFINITY},
     {.name = "of", .value = "mean|rms|p95|max", .help = "the error it is about (default: max)",
-     .text = &opts.of},
+     .text = &opts.of, .choice = &opts.which},
     {.name = "centred", .letter = 'c', .help = "move the centroid of every pose to 0 before comparing",
      .flag = &opts.centred},
     {.name = "frames", .help = "list the error of every frame", .flag = &opts.frames},
@@ -284,8 +287,8 @@ static void report_faces(report *r, const vg_measure_report *m)
 
 static double error_asked_for(const vg_measure_report *m)
 {
-    double error = !strcmp(opts.of, "mean") ? m->mean : !strcmp(opts.of, "rms") ? m->rms
-                 : !strcmp(opts.of, "p95") ? m->p95 : m->max;
+    const double errors[] = {[MEAN] = m->mean, [RMS] = m->rms, [P95] = m->p95, [MAX] = m->max};
+    double error = errors[opts.which];
     return in_diagonals(error, m->diagonal);
 }
 
@@ -320,8 +323,6 @@ static void parse_options(int argc, char **argv, char ***operands)
     if (n < 2) cli_usage("two sequences are needed: TRUTH and RESULT");
     if (!strcmp((*operands)[0], "-") && !strcmp((*operands)[1], "-"))
         cli_usage("only one of the two sequences can be standard input");
-    if (strcmp(opts.of, "mean") && strcmp(opts.of, "rms") && strcmp(opts.of, "p95") && strcmp(opts.of, "max"))
-        cli_usage("option '--of' needs mean, rms, p95 or max, not '%s'", opts.of);
     report_file = cli.output;
     if (!opts.heat) return;
     if (replaces_report() && (cli.json || opts.frames))

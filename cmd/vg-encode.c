@@ -7,13 +7,14 @@
 
 static struct {
     bool vectors, f32;
-    const char *faces, *reference, *anchors, *mesh;
+    const char *reference, *anchors, *mesh;
     double fps;
+    size_t faces; /* 1: selected */
 } opts;
 
 static const cli_option options[] = {
     {"vectors", 0, NULL, "write the vectors of the vector graph instead of vertices", .flag = &opts.vectors},
-    {"faces", 0, "all|selected", "which faces carry vectors: all (default), or about half of them", .text = &opts.faces},
+    {"faces", 0, "all|selected", "which faces carry vectors: all (default), or about half of them", .choice = &opts.faces},
     {"reference", 0, "MESH", "the undeformed pose; default: the first pose", .text = &opts.reference},
     {"mesh", 0, "MESH", "the faces and reference pose of point caches and arrays, which hold none", .text = &opts.mesh},
     {"anchor", 0, "V,V,...", "vertices that vg-solve must meet exactly", .text = &opts.anchors},
@@ -28,13 +29,6 @@ static const cli_program program = {
     .options = options,
     .most_operands = SIZE_MAX,
     .writes_stream = true};
-
-static bool selects_faces(void)
-{
-    if (!opts.faces || !strcmp(opts.faces, "all")) return false;
-    if (strcmp(opts.faces, "selected")) cli_usage("--faces is 'all' or 'selected', not '%s'", opts.faces);
-    return true;
-}
 
 static void set_reference(vg_head *h, const char *operand)
 {
@@ -141,7 +135,7 @@ int main(int argc, char **argv)
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands), nanchors = 0;
     uint32_t *anchors = NULL;
-    bool selects = selects_faces();
+    bool selects = opts.faces == 1;
     if (opts.anchors) nanchors = cli_parse_vertices("--anchor", opts.anchors, &anchors);
 
     vg_source *s = cli_source_with(operands, n, opts.mesh);

@@ -6,7 +6,7 @@
 #include <string.h>
 
 static struct {
-    const char *weights;
+    size_t weights; /* 1: area */
     bool planar;
     double fidelity, planarity;
     bool planar_weights;
@@ -29,7 +29,7 @@ static void take_planar_weights(const char *text, void *context)
 }
 
 static const cli_option options[] = {
-    {"weights", 0, "uniform|area", "every corner counts alike (default), or by the reference surface's metric", .text = &opts.weights},
+    {"weights", 0, "uniform|area", "every corner counts alike (default), or by the reference surface's metric", .choice = &opts.weights},
     {"planar", 0, NULL, "make faces of four and more corners more nearly plane", .flag = &opts.planar},
     {"planar-weights", 0, "W1,W2", "how much the vectors and how much the planes count (default: 0.5,1)",
      .take = take_planar_weights},
@@ -79,13 +79,6 @@ typedef struct work {
     double worst_residual;
     vg_weights weights;
 } work;
-
-static vg_weights parse_weights(void)
-{
-    if (!opts.weights || !strcmp(opts.weights, "uniform")) return VG_WEIGHTS_UNIFORM;
-    if (!strcmp(opts.weights, "area")) return VG_WEIGHTS_AREA;
-    cli_usage("--weights is 'uniform' or 'area', not '%s'", opts.weights);
-}
 
 static void keep_planar_facts(work *w, const machine *m)
 {
@@ -346,7 +339,7 @@ int main(int argc, char **argv)
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     if (opts.planar_weights && !opts.planar) cli_usage("--planar-weights needs --planar");
-    work w = {.weights = parse_weights()};
+    work w = {.weights = opts.weights == 1 ? VG_WEIGHTS_AREA : VG_WEIGHTS_UNIFORM};
     vg_source *s = cli_source(operands, n);
     prepare(&w, vg_source_head(s));
     w.h->kind = VG_VERTICES, w.h->count = w.h->mesh.nv;

@@ -11,13 +11,14 @@
 
 static struct {
     long frames, columns;
-    const char *size, *view, *up, *against, *patches, *title, *format;
+    const char *size, *view, *against, *patches, *title, *format;
     const char *beside[VG_PAGE_SEQUENCES];
     size_t nbeside;
     double scale, zoom;
     bool edges, ground, follow, centred, silhouettes, scales, plain;
+    size_t kind, up; /* 1: html, z */
     bool page; /* what is made, else a sheet */
-} opts = {.view = "30,15", .up = "y"};
+} opts = {.view = "30,15"};
 
 static void take_beside(const char *value, void *context)
 {
@@ -28,7 +29,7 @@ static void take_beside(const char *value, void *context)
 }
 
 static const cli_option options[] = {
-    {.name = "format", .value = "png|html", .text = &opts.format,
+    {.name = "format", .value = "png|html", .text = &opts.format, .choice = &opts.kind,
      .help = "whatever the name of the output (default: told by it, else png)"},
     {.name = "frames", .value = "N",
      .help = "sheet: N evenly spaced frames, or all when there are fewer (default: 8)",
@@ -41,7 +42,7 @@ static const cli_option options[] = {
      .help = "from where, or azimuth and elevation in degrees (default: 30,15)"},
     {.name = "zoom", .value = "X", .help = "how large: 1 (the default) is what fits", .number = &opts.zoom, .least = 1e-3,
      .most = 1e3},
-    {.name = "up", .value = "y|z", .help = "the axis that points up (default: y)", .text = &opts.up},
+    {.name = "up", .value = "y|z", .help = "the axis that points up (default: y)", .choice = &opts.up},
     {.name = "follow", .help = "keep the figure in the middle of its picture", .flag = &opts.follow},
     {.name = "ground", .help = "draw a grid where the reference pose stands, and a shadow", .flag = &opts.ground},
     {.name = "edges", .help = "draw the edges of the polygons", .flag = &opts.edges},
@@ -131,8 +132,7 @@ static vg_sheet_options sheet_options(void)
                           .zoom = opts.zoom, .tint = choose_tint(), .centred = opts.centred, .scale = opts.scale, .threads = cli.threads};
     parse_size(opts.size ? opts.size : "360x360", &o);
     parse_view(opts.view, &o);
-    if (strcmp(opts.up, "y") && strcmp(opts.up, "z")) cli_usage("option '--up' needs y or z, not '%s'", opts.up);
-    o.z_up = *opts.up == 'z';
+    o.z_up = opts.up == 1;
     if (!opts.against && opts.centred) cli_usage("option '--centred' is about errors: name the truth with --against");
     return o;
 }
@@ -147,13 +147,11 @@ static bool ends_with(const char *name, const char *suffix)
 static void choose_kind(void)
 {
     struct stat st;
-    if (opts.format && strcmp(opts.format, "png") && strcmp(opts.format, "html"))
-        cli_usage("option '--format' needs png or html, not '%s'", opts.format);
     bool named = cli.output && (stat(cli.output, &st) || S_ISREG(st.st_mode)); /* not a pipe or device */
     bool html = named && (ends_with(cli.output, ".html") || ends_with(cli.output, ".htm"));
     if (named && !html && !ends_with(cli.output, ".png") && !opts.format)
         cli_usage("cannot write '%s': the name must end in .html or .png, or be '-' for standard output", cli.output);
-    opts.page = opts.format ? !strcmp(opts.format, "html") : html;
+    opts.page = opts.format ? opts.kind == 1 : html;
     if (opts.page && (opts.frames || opts.columns || opts.size || opts.silhouettes))
         cli_usage("option '--%s' is about a sheet: the output is a page",
                   opts.frames ? "frames" : opts.columns ? "columns" : opts.size ? "size" : "silhouettes");
