@@ -1,5 +1,5 @@
-/* mapped.c: --map of vg-deform: measures patches or bones, takes their transforms or what a skeleton says, edits or interpolates them, and
- * makes vertices of them by one product.
+/* mapped.c: --map of vg-deform: measures patches or bones, takes their transforms or what a skeleton says, edits or
+ * interpolates them, and makes vertices of them by one product.
  * Leaves out fitting the map (vg-fitmap) and paths through vectors (between.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "mapped.h"
@@ -15,23 +15,23 @@ enum { BATCH = 32 };
 
 struct mapped_edit {
     char *bone;
-    char axis;      /* 'x', 'y', 'z'; 't': about the bone itself */
+    char axis; /* 'x', 'y', 'z'; 't': about the bone itself */
     double degrees;
-    size_t number;  /* of the bone; found when the rig is there */
+    size_t number; /* of the bone; found when the rig is there */
     double around[3];
 };
 
 typedef struct playback {
     vg_source *source;
-    vg_head *h;       /* the input's, then the output's */
+    vg_head *h; /* the input's, then the output's */
     vg_head map;
-    vg_kind kind;     /* what comes in */
-    size_t count;     /* transforms */
+    vg_kind kind; /* what comes in */
+    size_t count; /* transforms */
     vg_player *player;
-    vg_driver *driver; /* a skeleton comes in */
+    vg_driver *driver;       /* a skeleton comes in */
     vg_joint_fitter *fitter; /* for frames that do not say how joints have turned */
-    vg_skeleton skeleton; /* the input's */
-    size_t n, most;   /* frames in hand */
+    vg_skeleton skeleton;    /* the input's */
+    size_t n, most;          /* frames in hand */
     vg_frame in[BATCH], out[BATCH];
     double *transforms[BATCH];
 } playback;
@@ -49,7 +49,8 @@ void mapped_take_edit(const char *text, void *context)
     bool twist = axis && !strcmp(axis, "twist");
     if (!axis || !*copy || !(twist || (strlen(axis) == 1 && strchr("xyz", *axis))))
         cli_usage("--edit is 'BONE x|y|z|twist DEGREES', not '%s'", text);
-    mapped.edits[mapped.nedits++] = (struct mapped_edit){.bone = copy, .axis = twist ? 't' : *axis, .degrees = cli_parse_number("--edit", angle)};
+    mapped.edits[mapped.nedits++] =
+        (struct mapped_edit){.bone = copy, .axis = twist ? 't' : *axis, .degrees = cli_parse_number("--edit", angle)};
 }
 
 bool mapped_needs_input(size_t operands)
@@ -69,7 +70,8 @@ void mapped_check(const char *others)
     }
     if (others) cli_usage("--%s does not go with --map", others);
     if (between.smooth) cli_usage("--smooth does not go with --map");
-    if (mapped.live && between_wanted()) cli_usage("--live does not go with --interpolate and --at, which need all keys first");
+    if (mapped.live && between_wanted())
+        cli_usage("--live does not go with --interpolate and --at, which need all keys first");
 }
 
 static void load_map(playback *p)
@@ -89,13 +91,15 @@ static void find_bones(playback *p)
     const vg_rig *r = &p->map.rig;
     if (!mapped.nedits) return;
     if (p->map.map.kind != VG_MAP_BONES) {
-        vg_fail(&e, VG_EINPUT, "'%s' is a map of patches, --edit needs one of bones: make it with vg-fitmap --skeleton", mapped.map);
+        vg_fail(&e, VG_EINPUT,
+                "'%s' is a map of patches, --edit needs one of bones: make it with vg-fitmap --skeleton", mapped.map);
         cli_die(&e);
     }
     for (size_t i = 0; i < mapped.nedits; i++) {
         struct mapped_edit *edit = &mapped.edits[i];
         edit->number = vg_rig_find(r, edit->bone);
-        if (edit->number == r->nbones) cli_usage("the rig has no bone '%s': 'vg-info %s' lists them", edit->bone, mapped.map);
+        if (edit->number == r->nbones)
+            cli_usage("the rig has no bone '%s': 'vg-info %s' lists them", edit->bone, mapped.map);
         if (edit->axis != 't') {
             double unit[3] = {edit->axis == 'x', edit->axis == 'y', edit->axis == 'z'};
             vg_quat_apply(r->turn + 4 * (size_t)r->bone[edit->number], unit, edit->around);
@@ -115,14 +119,19 @@ static void take_skeleton(playback *p)
 {
     vg_err e;
     if (p->map.map.kind != VG_MAP_BONES) {
-        vg_fail(&e, VG_EINPUT, "the input is a skeleton, and '%s' is a map of patches: make one of bones with vg-fitmap --skeleton", mapped.map);
+        vg_fail(&e, VG_EINPUT,
+                "the input is a skeleton, and '%s' is a map of patches: make one of bones with vg-fitmap --skeleton",
+                mapped.map);
         cli_die(&e);
     }
-    if (vg_skeleton_copy(&p->skeleton, &p->h->skeleton, &e) < 0 || vg_joint_fitter_new(&p->fitter, &p->skeleton, &e) < 0 ||
+    if (vg_skeleton_copy(&p->skeleton, &p->h->skeleton, &e) < 0 ||
+        vg_joint_fitter_new(&p->fitter, &p->skeleton, &e) < 0 ||
         vg_driver_new(&p->driver, &p->map.rig, &p->skeleton, mapped.align, &e) < 0)
         cli_die(&e);
     size_t missing = vg_driver_missing(p->driver);
-    if (missing) cli_warn("%zu of %zu bones are not in the skeleton by their names: they follow those above them", missing, p->count);
+    if (missing)
+        cli_warn("%zu of %zu bones are not in the skeleton by their names: they follow those above them", missing,
+                 p->count);
 }
 
 static void check_input(playback *p)
@@ -142,7 +151,8 @@ static void check_input(playback *p)
     } else if (p->kind != VG_TRANSFORMS) {
         r = vg_fail(&e, VG_EINPUT, "the input holds %s: --map takes vertices or transforms", vg_kind_name(p->kind));
     } else if (h->count != p->count) {
-        r = vg_fail(&e, VG_EINPUT, "the input has %zu transforms a frame, the map %s takes %zu", h->count, name, p->count);
+        r = vg_fail(&e, VG_EINPUT, "the input has %zu transforms a frame, the map %s takes %zu", h->count, name,
+                    p->count);
     }
     if (r < 0) cli_die(&e);
 }

@@ -24,7 +24,8 @@ static bool by_skinning(void)
 
 void rigging_check(void)
 {
-    if (rigging.skeleton && rigging.groups) cli_usage("--skeleton and --groups are two ways to say where the bones are: give one");
+    if (rigging.skeleton && rigging.groups)
+        cli_usage("--skeleton and --groups are two ways to say where the bones are: give one");
     if (rigging.method && !by_skinning() && strcmp(rigging.method, "envelope"))
         cli_usage("--method is 'envelope' or 'lbs', not '%s'", rigging.method);
     if (rigging.method && !rigging_wanted()) cli_usage("--method needs --skeleton or --groups");
@@ -57,15 +58,20 @@ typedef struct work {
     double *sample[2 * SAMPLE];
     motion given;
     vg_joint_groups groups;
-    vg_bender *bender;         /* NULL: motions are known */
-    double **transforms;       /* of each pose */
-    vg_map skinning;           /* linear blend skinning as a map, beside the envelope */
-    errors errors[2][2];       /* envelope, skinning; fitted, left out */
+    vg_bender *bender;   /* NULL: motions are known */
+    double **transforms; /* of each pose */
+    vg_map skinning;     /* linear blend skinning as a map, beside the envelope */
+    errors errors[2][2]; /* envelope, skinning; fitted, left out */
 } work;
 
 static bool is_left_out(const work *w, uint64_t i)
 {
     return w->holdout && i % (uint64_t)w->holdout == (uint64_t)w->holdout - 1;
+}
+
+static void *room(size_t n, size_t size)
+{
+    return cli_allocate(n, size, "the rig and its poses");
 }
 
 /* ---- poses ---- */
@@ -89,7 +95,7 @@ static void sample_pose(work *w, uint64_t i, const double *pose)
         if (i % w->stride) return;
     }
     double **to = &w->sample[w->nsample];
-    if (!*to) *to = cli_allocate(3 * w->h->mesh.nv, sizeof **to, "the rig and its poses");
+    if (!*to) *to = room(3 * w->h->mesh.nv, sizeof **to);
     w->sample_at[w->nsample++] = i;
     memcpy(*to, pose, bytes);
 }
@@ -103,7 +109,8 @@ static void read_poses(work *w, vg_source *s)
     if (vg_spool_new(&w->spool, w->h, in_memory, &e) < 0) cli_die(&e);
     for (w->stride = 1; (r = vg_source_next(s, &f, &e)) > 0; w->total++) {
         if (vg_spool_put(w->spool, &f, &e) < 0) cli_die(&e);
-        if (!found && !memcmp(f.values, w->h->reference, 3 * w->h->mesh.nv * sizeof *f.values)) found = true, w->reference = w->total;
+        if (!found && !memcmp(f.values, w->h->reference, 3 * w->h->mesh.nv * sizeof *f.values))
+            found = true, w->reference = w->total;
         sample_pose(w, w->total, f.values);
         cli_progress("poses", w->total + 1);
     }
@@ -159,10 +166,12 @@ static void read_skeleton(work *w)
     if (vg_source_open(&s, &rigging.skeleton, 1, &e) < 0) cli_die(&e);
     vg_head *h = vg_source_head(s);
     if (!h->skeleton.njoints || h->kind != VG_VERTICES) {
-        vg_fail(&e, VG_EINPUT, "'%s' holds no skeleton: give a BVH file, or lines of 'bone parent head tail'", rigging.skeleton);
+        vg_fail(&e, VG_EINPUT, "'%s' holds no skeleton: give a BVH file, or lines of 'bone parent head tail'",
+                rigging.skeleton);
         cli_die(&e);
     }
-    if (vg_skeleton_copy(&w->given.skeleton, &h->skeleton, &e) < 0 || vg_joint_fitter_new(&fitter, &w->given.skeleton, &e) < 0)
+    if (vg_skeleton_copy(&w->given.skeleton, &h->skeleton, &e) < 0 ||
+        vg_joint_fitter_new(&fitter, &w->given.skeleton, &e) < 0)
         cli_die(&e);
     while ((r = vg_source_next(s, &f, &e)) > 0) keep_motion(&w->given, &f, fitter);
     if (r < 0 || vg_head_merge_trace(w->h, h, &e) < 0) cli_die(&e);
@@ -203,15 +212,18 @@ static void locate_root(work *w, double *positions)
         poses[i] = w->sample[i];
         at[i] = m->positions + 3 * joints * w->sample_at[i], turns[i] = m->turns + 4 * joints * w->sample_at[i];
     }
-    if (vg_rig_locate(&m->skeleton, w->h->mesh.nv, w->h->reference, w->nsample, poses, at, turns, cli.threads, shift, &spread, &e) < 0)
+    if (vg_rig_locate(&m->skeleton, w->h->mesh.nv, w->h->reference, w->nsample, poses, at, turns, cli.threads, shift,
+                      &spread, &e) < 0)
         cli_die(&e);
     for (size_t j = 0; j < joints; j++)
         for (size_t k = 0; k < 3; k++) positions[3 * j + k] += shift[k];
-    cli_note("the root of the skeleton is at %.6g %.6g %.6g in the reference pose, the vertices agree to %.2g D", positions[0],
-             positions[1], positions[2], d > 0 ? spread / d : 0);
+    cli_note("the root of the skeleton is at %.6g %.6g %.6g in the reference pose, the vertices agree to %.2g D",
+             positions[0], positions[1], positions[2], d > 0 ? spread / d : 0);
     if (d > 0 && spread > 0.05 * d)
-        cli_warn("the vertices do not agree about where the skeleton is in the reference pose (%.2g D): does its motion belong to these "
-                 "poses? if not, --learn", spread / d);
+        cli_warn("the vertices do not agree about where the skeleton is in the reference pose (%.2g D): does its "
+                 "motion belong to these "
+                 "poses? if not, --learn",
+                 spread / d);
 }
 
 static void warn_outside(const work *w)
@@ -231,7 +243,9 @@ static void warn_outside(const work *w)
         outside += !in;
     }
     if (2 * outside > r->nbones)
-        cli_warn("%zu of %zu bones are outside of the mesh in the reference pose: say where the root is with --root-at", outside, r->nbones);
+        cli_warn(
+            "%zu of %zu bones are outside of the mesh in the reference pose: say where the root is with --root-at",
+            outside, r->nbones);
 }
 
 /* The skeleton in the reference pose of the mesh, and whether its motion is that of the poses. */
@@ -240,11 +254,13 @@ static void place_skeleton(work *w)
     vg_err e;
     const motion *m = &w->given;
     size_t joints = m->skeleton.njoints;
-    double *positions = cli_allocate(3 * joints, sizeof *positions, "the rig and its poses"), *turns = cli_allocate(4 * joints, sizeof *turns, "the rig and its poses"), at[3];
+    double *positions = room(3 * joints, sizeof *positions), *turns = room(4 * joints, sizeof *turns), at[3];
     bool known = m->n == w->total && !rigging.learn;
     vg_skeleton_pose(&m->skeleton, NULL, positions, turns);
     if (!known && !rigging.learn && m->n > 1) {
-        vg_fail(&e, VG_EINPUT, "'%s' has %zu frames and there are %llu poses: give one frame for each pose, or --learn the motion from the poses",
+        vg_fail(&e, VG_EINPUT,
+                "'%s' has %zu frames and there are %llu poses: give one frame for each pose, or --learn the motion "
+                "from the poses",
                 rigging.skeleton, m->n, (unsigned long long)w->total);
         cli_die(&e);
     }
@@ -268,7 +284,8 @@ static void place_skeleton(work *w)
     if (vg_rig_learn(w->h, w->nsample, (const double *const *)w->sample, cli.threads, &miss, &e) < 0 ||
         vg_bender_new(&w->bender, &w->h->rig, w->h->mesh.nv, w->h->reference, cli.threads, &e) < 0)
         cli_die(&e);
-    cli_note("the motion of the bones is learned from %zu poses: what skinning leaves is %.3g D", w->nsample, d > 0 ? miss / d : 0);
+    cli_note("the motion of the bones is learned from %zu poses: what skinning leaves is %.3g D", w->nsample,
+             d > 0 ? miss / d : 0);
 }
 
 static void read_groups(work *w)
@@ -281,7 +298,7 @@ static void read_groups(work *w)
     if (vg_joint_groups_read(&w->groups, text, n, 0, name, &e) < 0 ||
         vg_joint_groups_skeleton(&w->groups, w->h->mesh.nv, w->h->reference, &s, &e) < 0)
         cli_die(&e);
-    double *positions = cli_allocate(3 * s.njoints, sizeof *positions, "the rig and its poses"), *turns = cli_allocate(4 * s.njoints, sizeof *turns, "the rig and its poses");
+    double *positions = room(3 * s.njoints, sizeof *positions), *turns = room(4 * s.njoints, sizeof *turns);
     vg_skeleton_pose(&s, NULL, positions, turns);
     if (vg_rig_make(&w->h->rig, &s, positions, turns, &e) < 0) cli_die(&e);
     vg_skeleton_clear(&s);
@@ -305,14 +322,15 @@ static void measure_transforms(work *w, uint64_t first, size_t n, const vg_frame
         return;
     }
     double *positions = NULL, *turns = NULL;
-    if (rigging.groups) positions = cli_allocate(3 * joints, sizeof *positions, "the rig and its poses"), turns = cli_allocate(4 * joints, sizeof *turns, "the rig and its poses");
+    if (rigging.groups) positions = room(3 * joints, sizeof *positions), turns = room(4 * joints, sizeof *turns);
     for (size_t i = 0; i < n; i++) {
         size_t k = (size_t)first + i;
         if (rigging.groups) {
             vg_joint_groups_pose(&w->groups, w->h->reference, poses[i], positions, turns);
             vg_rig_transforms(r, positions, turns, w->transforms[k]);
         } else {
-            vg_rig_transforms(r, w->given.positions + 3 * joints * k, w->given.turns + 4 * joints * k, w->transforms[k]);
+            vg_rig_transforms(r, w->given.positions + 3 * joints * k, w->given.turns + 4 * joints * k,
+                              w->transforms[k]);
         }
     }
     free(positions);
@@ -323,7 +341,7 @@ static void fit_batch(work *w, uint64_t first, size_t n, const vg_frame *frames)
 {
     const double *poses[BATCH], *transforms[BATCH];
     size_t count = 0;
-    for (size_t i = 0; i < n; i++) w->transforms[first + i] = cli_allocate(7 * w->h->rig.nbones, sizeof(double), "the rig and its poses");
+    for (size_t i = 0; i < n; i++) w->transforms[first + i] = room(7 * w->h->rig.nbones, sizeof(double));
     measure_transforms(w, first, n, frames);
     for (size_t i = 0; i < n; i++) {
         if (is_left_out(w, first + i)) continue;
@@ -341,7 +359,8 @@ static void compare(errors *x, const double *truth, const double *result, size_t
 {
     for (size_t v = 0; v < nv; v++) {
         double square = 0;
-        for (size_t k = 0; k < 3; k++) square += (truth[3 * v + k] - result[3 * v + k]) * (truth[3 * v + k] - result[3 * v + k]);
+        for (size_t k = 0; k < 3; k++)
+            square += (truth[3 * v + k] - result[3 * v + k]) * (truth[3 * v + k] - result[3 * v + k]);
         double far = sqrt(square);
         x->sum += far / (double)nv, x->first[v] += far, x->second[v] += square;
         if (far > x->most) x->most = far;
@@ -354,7 +373,7 @@ static void judge_batch(work *w, uint64_t first, size_t n, const vg_frame *frame
     static double *vertices[BATCH];
     size_t nv = w->h->mesh.nv;
     for (size_t i = 0; i < n; i++)
-        if (!vertices[i]) vertices[i] = cli_allocate(3 * nv, sizeof(double), "the rig and its poses");
+        if (!vertices[i]) vertices[i] = room(3 * nv, sizeof(double));
     for (int method = 0; method < 2; method++) {
         if (!players[method]) continue;
         vg_player_pose(players[method], n, (const double *const *)w->transforms + first, vertices);
@@ -378,7 +397,8 @@ static void report(work *w)
 {
     vg_err e;
     static vg_head skinning; /* h with another map */
-    static const char *const names[2][2] = {{"envelope, fitted", "envelope, left out"}, {"skinning, fitted", "skinning, left out"}};
+    static const char *const names[2][2] = {{"envelope, fitted", "envelope, left out"},
+                                            {"skinning, fitted", "skinning, left out"}};
     size_t nv = w->h->mesh.nv;
     double d = vg_diagonal(w->h->reference, nv);
     if (cli.quiet || !(d > 0)) return;
@@ -389,7 +409,7 @@ static void report(work *w)
         cli_die(&e);
     for (int i = 0; i < 4; i++) {
         errors *x = &w->errors[i / 2][i % 2];
-        x->first = cli_allocate(nv, sizeof *x->first, "the rig and its poses"), x->second = cli_allocate(nv, sizeof *x->second, "the rig and its poses");
+        x->first = room(nv, sizeof *x->first), x->second = room(nv, sizeof *x->second);
     }
     pass(w, judge_batch);
     cli_say("%zu bones, %zu vertices, %llu poses; errors in 1e-3 D:  mean  sigma largest", w->h->rig.nbones, nv,
@@ -407,10 +427,12 @@ static void fit(work *w, double hold)
 {
     vg_err e;
     vg_head *h = w->h;
-    const vg_rig_options o = {.bones_per_corner = (size_t)rigging.bones_per_corner, .hold = hold, .refine = rigging.refine,
+    const vg_rig_options o = {.bones_per_corner = (size_t)rigging.bones_per_corner,
+                              .hold = hold,
+                              .refine = rigging.refine,
                               .threads = cli.threads};
     if (vg_rig_fitter_new(&fitter, h, &o, &e) < 0) cli_die(&e);
-    w->transforms = cli_allocate((size_t)w->total, sizeof *w->transforms, "the rig and its poses");
+    w->transforms = room((size_t)w->total, sizeof *w->transforms);
     pass(w, fit_batch);
     if (vg_rig_fitter_finish(fitter, VG_RIG_LBS, &e) < 0) cli_die(&e);
     if (!by_skinning()) {

@@ -17,7 +17,8 @@ extern struct rigging_options {
 bool rigging_wanted(void);
 /* rigging_check: wrong usage ends the program. To be called after cli_start. */
 void rigging_check(void);
-/* rigging_run: the fit, into the head of s: hold: share of the vertices; holdout: every so manieth pose is left out, 0: none. */
+/* rigging_run: the fit, into the head of s: hold: share of the vertices; holdout: every so manieth pose is left out,
+ * 0: none. */
 void rigging_run(vg_source *s, double hold, long holdout);
 
 #endif

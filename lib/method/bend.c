@@ -1,9 +1,11 @@
-/* bend.c: the motions of the bones of a rig in poses that are known by their vertices only, and weights for such a rig.
+/* bend.c: the motions of the bones of a rig in poses that are known by their vertices only, and weights for such a
+ * rig.
  *
- * With the joints together, linear blend skinning is linear in the rotations R_j of the bones: vertex v is at p + sum of R_j q_vj, p the place of the
- * first joint, q_vj made of the weights and the reference pose. So over all vertices the squared distance is a quadratic
- * tr(R G R') - 2 tr(R B') in R = [R_1 R_2 ...], whose G belongs to the rig and whose B is one pass over the pose. It is minimised
- * over rotations: each bone in turn at first, then all at once by damped Gauss-Newton steps.
+ * With the joints together, linear blend skinning is linear in the rotations R_j of the bones: vertex v is at p + sum
+ * of R_j q_vj, p the place of the first joint, q_vj made of the weights and the reference pose. So over all vertices
+ * the squared distance is a quadratic tr(R G R') - 2 tr(R B') in R = [R_1 R_2 ...], whose G belongs to the rig and
+ * whose B is one pass over the pose. It is minimised over rotations: each bone in turn at first, then all at once by
+ * damped Gauss-Newton steps.
  * Leaves out how weights are fitted to known motions (skin.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/map_parts.h"
@@ -15,21 +17,23 @@
 #include <stdlib.h>
 
 enum { BLOCK = 8, SWEEPS = 8, STEPS = 30, ROUNDS = 12 };
-static const double FIRST_PRIOR = 1e-3, LAST_PRIOR = 1e-10; /* pull of a bone towards its parent, beside that of the vertices */
+static const double FIRST_PRIOR = 1e-3,
+                    LAST_PRIOR = 1e-10; /* pull of a bone towards its parent, beside that of the vertices */
 
 struct vg_bender {
-    size_t nv, n;        /* vertices, bones */
+    size_t nv, n; /* vertices, bones */
     int threads;
-    uint32_t *parent;    /* of each bone; each before its children */
-    double *at;          /* 3 n: the joints */
-    double *offset;      /* 3 n: from the parent's joint */
-    uint32_t *bone;      /* VG_SKIN per vertex */
-    double *weight, *local; /* per bone of a vertex: its weight, and weight times the vertex, seen from the joint: 3 numbers */
-    double *g;           /* 3 n x 3 n */
-    double *mean;        /* 3 n: mean of q */
-    double *size;        /* n: trace of the diagonal blocks of g */
-    double *own;         /* 4 n: sums over a bone's own vertices of local and of the weight */
-    double *space;       /* BLOCK times working space */
+    uint32_t *parent; /* of each bone; each before its children */
+    double *at;       /* 3 n: the joints */
+    double *offset;   /* 3 n: from the parent's joint */
+    uint32_t *bone;   /* VG_SKIN per vertex */
+    double *weight,
+        *local;    /* per bone of a vertex: its weight, and weight times the vertex, seen from the joint: 3 numbers */
+    double *g;     /* 3 n x 3 n */
+    double *mean;  /* 3 n: mean of q */
+    double *size;  /* n: trace of the diagonal blocks of g */
+    double *own;   /* 4 n: sums over a bone's own vertices of local and of the weight */
+    double *space; /* BLOCK times working space */
 };
 
 /* Working space of one pose. */
@@ -85,7 +89,8 @@ static int make_quadratic(vg_bender *x, vg_err *e)
             for (size_t b = 0; b < count; b++) {
                 size_t j = list[b];
                 for (size_t k = 0; k < 3; k++)
-                    for (size_t l = 0; l < 3; l++) x->g[(3 * i + k) * width + 3 * j + l] += q[3 * i + k] * q[3 * j + l] / (double)x->nv;
+                    for (size_t l = 0; l < 3; l++)
+                        x->g[(3 * i + k) * width + 3 * j + l] += q[3 * i + k] * q[3 * j + l] / (double)x->nv;
             }
         }
     }
@@ -120,7 +125,8 @@ int vg_bender_new(vg_bender **out, const vg_rig *r, size_t nv, const double *ref
     x->g = vgi_array(3 * n, 3 * n * sizeof *x->g, e), x->mean = vgi_array(3 * n, sizeof *x->mean, e);
     x->size = vgi_array(n, sizeof *x->size, e), x->own = vgi_array(4 * n, sizeof *x->own, e);
     x->space = vgi_array(BLOCK, space_of(n) * sizeof *x->space, e);
-    bool ok = x->parent && x->at && x->offset && x->bone && x->weight && x->local && x->g && x->mean && x->size && x->own && x->space;
+    bool ok = x->parent && x->at && x->offset && x->bone && x->weight && x->local && x->g && x->mean && x->size &&
+              x->own && x->space;
     int code = ok ? vgi_rig_parents(r, x->parent, e) : VG_ENOMEM;
     for (size_t b = 0; code == VG_OK && b < n; b++)
         for (size_t k = 0; k < 3; k++) {
@@ -129,7 +135,8 @@ int vg_bender_new(vg_bender **out, const vg_rig *r, size_t nv, const double *ref
         }
     for (size_t s = 0; code == VG_OK && s < VG_SKIN * nv; s++)
         for (size_t k = 0; k < 3; k++)
-            x->local[3 * s + k] = x->weight[s] * (reference[3 * (s / VG_SKIN) + k] - x->at[3 * (size_t)x->bone[s] + k]);
+            x->local[3 * s + k] =
+                x->weight[s] * (reference[3 * (s / VG_SKIN) + k] - x->at[3 * (size_t)x->bone[s] + k]);
     for (size_t s = 0; code == VG_OK && s < VG_SKIN * nv; s++) {
         double *own = x->own + 4 * (size_t)x->bone[s];
         for (size_t k = 0; k < 3; k++) own[k] += x->local[3 * s + k];
@@ -159,7 +166,8 @@ void vg_bender_free(vg_bender **out)
     *out = NULL;
 }
 
-/* B of a pose whose centroid is taken for the origin: 3 x 3 for each bone, first what its own vertices say, then what it carries. */
+/* B of a pose whose centroid is taken for the origin: 3 x 3 for each bone, first what its own vertices say, then what
+ * it carries. */
 static void load(const vg_bender *x, const double *pose, const double centre[3], bending *w)
 {
     size_t n = x->n;
@@ -198,7 +206,8 @@ static void left_for(const vg_bender *x, const bending *w, const double *r, size
         const double *a = r + 9 * i, *g = x->g + 3 * i * width + 3 * j;
         for (int c = 0; c < 3; c++)
             for (int k = 0; k < 3; k++)
-                m[3 * c + k] -= a[3 * c] * g[k] + a[3 * c + 1] * g[width + (size_t)k] + a[3 * c + 2] * g[2 * width + (size_t)k];
+                m[3 * c + k] -=
+                    a[3 * c] * g[k] + a[3 * c + 1] * g[width + (size_t)k] + a[3 * c + 2] * g[2 * width + (size_t)k];
     }
 }
 
@@ -240,13 +249,15 @@ static void sweep(const vg_bender *x, bending *w, double prior)
 static void multiply(const double a[9], const double b[9], double ab[9])
 {
     for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) ab[3 * i + k] = a[3 * i] * b[k] + a[3 * i + 1] * b[3 + k] + a[3 * i + 2] * b[6 + k];
+        for (int k = 0; k < 3; k++)
+            ab[3 * i + k] = a[3 * i] * b[k] + a[3 * i + 1] * b[3 + k] + a[3 * i + 2] * b[6 + k];
 }
 
 static void multiply_back(const double a[9], const double b[9], double ab[9]) /* a b' */
 {
     for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) ab[3 * i + k] = a[3 * i] * b[3 * k] + a[3 * i + 1] * b[3 * k + 1] + a[3 * i + 2] * b[3 * k + 2];
+        for (int k = 0; k < 3; k++)
+            ab[3 * i + k] = a[3 * i] * b[3 * k] + a[3 * i + 1] * b[3 * k + 1] + a[3 * i + 2] * b[3 * k + 2];
 }
 
 /* The Gauss-Newton system in small turns of all bones: the lower triangle of h, and the right-hand side. */
@@ -263,7 +274,8 @@ static void make_system(const vg_bender *x, bending *w, double prior, double dam
             multiply_back(t, w->r + 9 * j, s);
             trace = s[0] + s[4] + s[8];
             for (size_t k = 0; k < 3; k++)
-                for (size_t l = 0; l < 3; l++) w->h[(3 * i + k) * width + 3 * j + l] = (k == l ? trace : 0) - s[3 * l + k];
+                for (size_t l = 0; l < 3; l++)
+                    w->h[(3 * i + k) * width + 3 * j + l] = (k == l ? trace : 0) - s[3 * l + k];
         }
         left_for(x, w, w->r, i, true, m);
         add_prior(x, w->r, i, prior, m);
@@ -339,7 +351,8 @@ static void start(const vg_bender *x, bending *w, size_t j)
         return;
     }
     for (size_t c = 0; c < 3; c++)
-        for (size_t k = 0; k < 3; k++) m[3 * c + k] = w->b[9 * j + 3 * c + k] - (own[3] > 0 ? sum[c] * own[k] / own[3] : 0);
+        for (size_t k = 0; k < 3; k++)
+            m[3 * c + k] = w->b[9 * j + 3 * c + k] - (own[3] > 0 ? sum[c] * own[k] / own[3] : 0);
     vgi_fit_rotation(m, w->r + 9 * j);
 }
 
@@ -367,7 +380,8 @@ static void fit_pose(void *context, size_t k)
         vg_quat_from_matrix(r, to);
         for (size_t c = 0; c < 3; c++) {
             p[c] = from[c] + above[3 * c] * o[0] + above[3 * c + 1] * o[1] + above[3 * c + 2] * o[2];
-            to[4 + c] = p[c] - (r[3 * c] * x->at[3 * j] + r[3 * c + 1] * x->at[3 * j + 1] + r[3 * c + 2] * x->at[3 * j + 2]);
+            to[4 + c] =
+                p[c] - (r[3 * c] * x->at[3 * j] + r[3 * c + 1] * x->at[3 * j + 1] + r[3 * c + 2] * x->at[3 * j + 2]);
         }
     }
 }
@@ -386,12 +400,14 @@ int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, 
 {
     vg_rig *r = &h->rig;
     size_t nv = h->mesh.nv, bones = r->nbones;
-    double before = INFINITY, **transforms = vgi_array(n, sizeof *transforms, e), *space = vgi_array(n, 7 * bones * sizeof *space, e);
+    double before = INFINITY, **transforms = vgi_array(n, sizeof *transforms, e),
+           *space = vgi_array(n, 7 * bones * sizeof *space, e);
     double *at = vgi_array(3 * bones, sizeof *at, e), *left = vgi_array(nv, sizeof *left, e);
     int code = transforms && space && at && left ? VG_OK : VG_ENOMEM;
     if (code == VG_OK) code = vgi_skin_near(r, nv, h->reference, e);
     for (size_t i = 0; code == VG_OK && i < n; i++) transforms[i] = space + 7 * bones * i;
-    for (size_t b = 0; code == VG_OK && b < bones; b++) memcpy(at + 3 * b, r->at + 3 * (size_t)r->bone[b], 3 * sizeof *at);
+    for (size_t b = 0; code == VG_OK && b < bones; b++)
+        memcpy(at + 3 * b, r->at + 3 * (size_t)r->bone[b], 3 * sizeof *at);
     *miss = 0;
     for (int round = 0; code == VG_OK && round < ROUNDS; round++) {
         vg_bender *x = NULL;

@@ -1,5 +1,5 @@
-/* envelope.c: the fit of a map of bones to poses (MATH 6; T 5): which bone each corner goes with and how it lies in it, the vertices that
- * are held, and the operator that all of it collapses into.
+/* envelope.c: the fit of a map of bones to poses (MATH 6; T 5): which bone each corner goes with and how it lies in
+ * it, the vertices that are held, and the operator that all of it collapses into.
  * Leaves out the sums over the poses (rig_sums.c), weights (skin.c), and motions that are not known (bend.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/map_parts.h"
@@ -31,7 +31,8 @@ int vg_rig_fitter_new(vg_rig_fitter **out, vg_head *h, const vg_rig_options *o, 
     f->h = h, f->o = *o;
     double *at = vgi_array(3 * h->rig.nbones, sizeof *at, e);
     int r = at ? vg_head_prepare_vectors(h, e) : VG_ENOMEM;
-    for (size_t b = 0; r == VG_OK && b < h->rig.nbones; b++) memcpy(at + 3 * b, h->rig.at + 3 * (size_t)h->rig.bone[b], 3 * sizeof *at);
+    for (size_t b = 0; r == VG_OK && b < h->rig.nbones; b++)
+        memcpy(at + 3 * b, h->rig.at + 3 * (size_t)h->rig.bone[b], 3 * sizeof *at);
     if (r == VG_OK) r = vg_graph_new(&f->g, h, e);
     if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->nf, f->g->start, f->g->vert, h->reference, e);
     if (r == VG_OK) r = vgi_rig_sums_make(&f->sums, h->mesh.nv, h->rig.nbones, at, &f->turns, e);
@@ -100,7 +101,8 @@ static void face_turn(const vgi_rig_sums *s, size_t face, size_t j, double q[4])
 }
 
 /* The quaternion that takes reference vector r to u: as its face turns, then by the smallest rotation. */
-static void corner_quaternion(const vgi_rig_sums *s, size_t face, size_t j, const double r[3], const double u[3], double q[4])
+static void corner_quaternion(const vgi_rig_sums *s, size_t face, size_t j, const double r[3], const double u[3],
+                              double q[4])
 {
     double turn[4], turned[3], rest[4] = {1, 0, 0, 0};
     face_turn(s, face, j, turn);
@@ -124,8 +126,8 @@ static size_t face_bones(const vg_rig_fitter *f, size_t face, uint32_t *list)
     return n;
 }
 
-/* Least squares for d = A_a x + A_b y over the poses: x and y; returns how much of sum |d|^2 they explain. The unknowns are x + y and y, the
- * latter with a ridge: where both bones move alike the first has it all. */
+/* Least squares for d = A_a x + A_b y over the poses: x and y; returns how much of sum |d|^2 they explain. The
+ * unknowns are x + y and y, the latter with a ridge: where both bones move alike the first has it all. */
 static double pair_vectors(const vgi_rig_sums *s, size_t a, size_t b, const double *raw, double x[3], double y[3])
 {
     static const double ridge = 1e-4;
@@ -183,7 +185,8 @@ static void fit_faces(void *context, size_t task)
     const cornering *x = context;
     const vg_graph *g = x->f->g;
     const vgi_rig_sums *s = &x->f->sums;
-    size_t faces = g->nf - g->nlinks, first = task * faces / x->chunks, last = (task + 1) * faces / x->chunks, width = 4 * s->n;
+    size_t faces = g->nf - g->nlinks, first = task * faces / x->chunks, last = (task + 1) * faces / x->chunks,
+           width = 4 * s->n;
     double *raw = x->space + task * 2 * width, *mean = raw + width;
     for (size_t face = first; face < last; face++) {
         uint32_t list[NEAR];
@@ -195,7 +198,8 @@ static void fit_faces(void *context, size_t task)
             }
         for (size_t c = begin; c < begin + r; c++) {
             for (size_t b = 0; b < n; b++)
-                for (size_t i = 4 * list[b]; i < 4 * (size_t)list[b] + 3; i++) raw[i] = s->pull[g->vert[c] * width + i] - mean[i];
+                for (size_t i = 4 * list[b]; i < 4 * (size_t)list[b] + 3; i++)
+                    raw[i] = s->pull[g->vert[c] * width + i] - mean[i];
             fit_corner(x, face, c, raw, list, n);
         }
     }
@@ -206,7 +210,8 @@ static int fit_corners(const vg_rig_fitter *f, vg_map *m, vg_err *e)
     cornering x = {f, m, f->g->nf < CHUNK ? 1 : CHUNK, NULL};
     if (!(x.space = vgi_array(x.chunks, 8 * m->n * sizeof *x.space, e))) return VG_ENOMEM;
     vgi_parallel(f->o.threads, x.chunks, fit_faces, &x);
-    for (size_t i = m->per_corner * (size_t)f->g->start[f->g->nf - f->g->nlinks]; i < m->per_corner * m->ncorners; i++)
+    for (size_t i = m->per_corner * (size_t)f->g->start[f->g->nf - f->g->nlinks]; i < m->per_corner * m->ncorners;
+         i++)
         m->corner[4 * i] = 1; /* links follow the skin of their ends */
     free(x.space);
     return VG_OK;
@@ -241,7 +246,8 @@ static void hold(choosing *x, size_t v)
     const double *p = x->f->h->reference, *at = p + 3 * v;
     x->list[x->n++] = (uint32_t)v;
     for (size_t i = 0; i < x->f->g->nv; i++, p += 3) {
-        double d = (p[0] - at[0]) * (p[0] - at[0]) + (p[1] - at[1]) * (p[1] - at[1]) + (p[2] - at[2]) * (p[2] - at[2]);
+        double d =
+            (p[0] - at[0]) * (p[0] - at[0]) + (p[1] - at[1]) * (p[1] - at[1]) + (p[2] - at[2]) * (p[2] - at[2]);
         if (d < x->distance[i]) x->distance[i] = d;
     }
     x->distance[v] = -1;
@@ -280,7 +286,9 @@ static int choose_held(const vg_rig_fitter *f, vg_map *m, vg_err *e)
     static const double tolerance = 1e-3; /* of D: doubts below it do not count */
     size_t nv = f->g->nv, want = (size_t)(f->o.hold * (double)f->g->attached + 0.5);
     double d = vg_diagonal(f->h->reference, nv);
-    choosing x = {.f = f, .doubt = vgi_array(nv, sizeof *x.doubt, e), .distance = vgi_array(nv, sizeof *x.distance, e),
+    choosing x = {.f = f,
+                  .doubt = vgi_array(nv, sizeof *x.doubt, e),
+                  .distance = vgi_array(nv, sizeof *x.distance, e),
                   .list = vgi_array(nv, sizeof *x.list, e)};
     int r = x.doubt && x.distance && x.list ? VG_OK : VG_ENOMEM;
     for (size_t v = 0; r == VG_OK && v < nv; v++) {
@@ -316,7 +324,7 @@ typedef struct refining {
     double origin[3]; /* of the reference pose */
     uint32_t *parent; /* of each bone */
     size_t chunks;
-    double *space;    /* per chunk: 4 n */
+    double *space; /* per chunk: 4 n */
 } refining;
 
 /* Element (i, k) x (j, l) of the sums of T_i' T_j, the reference pose among the poses. */
@@ -362,8 +370,8 @@ static size_t bones_around(const refining *x, size_t v, uint32_t *list)
     return n;
 }
 
-/* Ridge regression on the motions of the vertex's own bones; of their places only differences count, so that what moves as a whole does so
- * still. */
+/* Ridge regression on the motions of the vertex's own bones; of their places only differences count, so that what
+ * moves as a whole does so still. */
 static void refine_vertex(const refining *x, size_t v, double *z)
 {
     enum { MOST = 4 * AROUND };
@@ -433,7 +441,11 @@ static int make_arrays(const vg_rig_fitter *f, vg_map *m, bool corners, vg_err *
 {
     const vg_rig *r = &f->h->rig;
     size_t n = r->nbones, nv = f->g->nv;
-    *m = (vg_map){.n = n, .nv = nv, .kind = VG_MAP_BONES, .size = 1, .per_corner = corners ? f->o.bones_per_corner : 1,
+    *m = (vg_map){.n = n,
+                  .nv = nv,
+                  .kind = VG_MAP_BONES,
+                  .size = 1,
+                  .per_corner = corners ? f->o.bones_per_corner : 1,
                   .ncorners = corners ? vg_graph_corners(f->g) : 0};
     m->place = vgi_array(n, 3 * n * sizeof *m->place, e);
     m->centre = vgi_copy_array(f->sums.at, 3 * n, sizeof *m->centre, e);
@@ -442,7 +454,8 @@ static int make_arrays(const vg_rig_fitter *f, vg_map *m, bool corners, vg_err *
     m->weights = vgi_array(nv, 4 * n * sizeof *m->weights, e);
     m->corner = vgi_array(m->ncorners * m->per_corner, 4 * sizeof *m->corner, e);
     m->corner_bone = vgi_array(m->ncorners, m->per_corner * sizeof *m->corner_bone, e);
-    if (!m->place || !m->centre || !m->home_centre || !m->share || !m->weights || !m->corner || !m->corner_bone) return VG_ENOMEM;
+    if (!m->place || !m->centre || !m->home_centre || !m->share || !m->weights || !m->corner || !m->corner_bone)
+        return VG_ENOMEM;
     for (size_t s = 0; s < VG_SKIN * nv; s++) m->share[r->skin_bone[s]] += r->skin_weight[s] / (double)nv;
     return vgi_place_by_bones(r, m, m->place, e);
 }

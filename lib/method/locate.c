@@ -1,7 +1,8 @@
 /* locate.c: where the root of a skeleton is in a mesh, from poses of both.
  *
- * A vertex that is rigid with joint j is at R (x - at_j) + p in every pose: R and p are known, x too, and at_j but for a shift that all joints
- * share. So every vertex has an opinion, x - offset_j - mean of R' (y - p), of the joint that it moves most nearly rigidly with.
+ * A vertex that is rigid with joint j is at R (x - at_j) + p in every pose: R and p are known, x too, and at_j but
+ * for a shift that all joints share. So every vertex has an opinion, x - offset_j - mean of R' (y - p), of the joint
+ * that it moves most nearly rigidly with.
  * Leaves out everything else about rigs (envelope.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
@@ -26,7 +27,8 @@ static double try_joint(const locating *x, size_t v, size_t j, double mean[3])
     double square = 0;
     mean[0] = mean[1] = mean[2] = 0;
     for (size_t k = 0; k < x->n; k++) {
-        const double *y = x->poses[k] + 3 * v, *p = x->positions[k] + 3 * j, *r = x->turns + 9 * (k * x->s->njoints + j);
+        const double *y = x->poses[k] + 3 * v, *p = x->positions[k] + 3 * j,
+                     *r = x->turns + 9 * (k * x->s->njoints + j);
         const double d[3] = {y[0] - p[0], y[1] - p[1], y[2] - p[2]};
         for (int i = 0; i < 3; i++) {
             double back = r[i] * d[0] + r[3 + i] * d[1] + r[6 + i] * d[2];
@@ -50,7 +52,8 @@ static void ask_vertices(void *context, size_t task)
             double square = x->s->joints[j].nchannels ? try_joint(x, v, j, local) : INFINITY;
             if (!(square < least)) continue;
             least = square;
-            for (size_t i = 0; i < 3; i++) x->opinion[3 * v + i] = x->reference[3 * v + i] - x->rest[3 * j + i] - local[i];
+            for (size_t i = 0; i < 3; i++)
+                x->opinion[3 * v + i] = x->reference[3 * v + i] - x->rest[3 * j + i] - local[i];
         }
         x->spread[v] = least > 0 ? sqrt(least / (double)x->n) : 0;
     }
@@ -83,20 +86,24 @@ static void agree(const locating *x, double *list, double shift[3], double *spre
     n = 0;
     for (size_t v = 0; v < x->nv; v++) {
         const double *o = x->opinion + 3 * v;
-        if (x->spread[v] <= limit) list[n++] = sqrt((o[0] - shift[0]) * (o[0] - shift[0]) + (o[1] - shift[1]) * (o[1] - shift[1]) +
-                                                    (o[2] - shift[2]) * (o[2] - shift[2]));
+        if (x->spread[v] <= limit)
+            list[n++] = sqrt((o[0] - shift[0]) * (o[0] - shift[0]) + (o[1] - shift[1]) * (o[1] - shift[1]) +
+                             (o[2] - shift[2]) * (o[2] - shift[2]));
     }
     *spread = median(list, n);
 }
 
 int vg_rig_locate(const vg_skeleton *s, size_t nv, const double *reference, size_t n, const double *const *poses,
-                  const double *const *positions, const double *const *turns, int threads, double shift[3], double *spread, vg_err *e)
+                  const double *const *positions, const double *const *turns, int threads, double shift[3],
+                  double *spread, vg_err *e)
 {
     size_t joints = s->njoints;
-    if (!n || !nv || !joints) return vg_fail(e, VG_EINPUT, "there are no poses to find the root of the skeleton with");
+    if (!n || !nv || !joints)
+        return vg_fail(e, VG_EINPUT, "there are no poses to find the root of the skeleton with");
     double *rest = vgi_array(3 * joints, sizeof *rest, e), *turned = vgi_array(4 * joints, sizeof *turned, e);
     double *list = vgi_array(nv, sizeof *list, e);
-    locating x = {.s = s, .nv = nv, .n = n, .reference = reference, .rest = rest, .poses = poses, .positions = positions};
+    locating x = {
+        .s = s, .nv = nv, .n = n, .reference = reference, .rest = rest, .poses = poses, .positions = positions};
     x.turns = vgi_array(n, 9 * joints * sizeof *x.turns, e);
     x.opinion = vgi_array(nv, 3 * sizeof *x.opinion, e), x.spread = vgi_array(nv, sizeof *x.spread, e);
     bool ok = rest && turned && list && x.turns && x.opinion && x.spread;

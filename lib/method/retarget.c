@@ -12,15 +12,18 @@ static double length2(const double x[3])
     return x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
 }
 
-/* The body on the way: vectors turned and stretched along geodesics, then reconstructed; its root on the line between both. */
-static int morph_body(const vg_head *h, const vg_graph *g, const double *target, double morph, double *body, int threads, vg_err *e)
+/* The body on the way: vectors turned and stretched along geodesics, then reconstructed; its root on the line between
+ * both. */
+static int morph_body(const vg_head *h, const vg_graph *g, const double *target, double morph, double *body,
+                      int threads, vg_err *e)
 {
     size_t corners = vg_graph_corners(g), nv = g->nv;
     vg_solver *s = NULL;
     double *a = vgi_array(3 * corners, sizeof *a, e), *b = vgi_array(3 * corners, sizeof *b, e);
     double *rhs = vgi_array(3 * nv, sizeof *rhs, e), roots[2][3], root[3];
     int r = a && b && rhs ? VG_OK : VG_ENOMEM;
-    for (size_t i = 0; r == VG_OK && i < 3 * nv; i++) body[i] = h->reference[i] + morph * (target[i] - h->reference[i]);
+    for (size_t i = 0; r == VG_OK && i < 3 * nv; i++)
+        body[i] = h->reference[i] + morph * (target[i] - h->reference[i]);
     if (r == VG_OK) r = vg_solver_new(&s, g, NULL, 0, body, VG_WEIGHTS_UNIFORM, threads, e);
     if (r == VG_OK) {
         vg_graph_vectors(g, h->reference, a);
@@ -40,7 +43,7 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
         vg_graph_root(g, h->reference, roots[0]);
         vg_graph_root(g, target, roots[1]);
         for (int k = 0; k < 3; k++) root[k] = roots[0][k] + morph * (roots[1][k] - roots[0][k]);
-                const double *rhs_list[1] = {rhs}, *root_list[1] = {root};
+        const double *rhs_list[1] = {rhs}, *root_list[1] = {root};
         double *body_list[1] = {body};
         vg_solver_load(s, 1, (const double *const *)&a, NULL, body_list, &rhs);
         vg_solver_solve(s, 1, rhs_list, body_list, NULL, root_list);
@@ -53,7 +56,8 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
 }
 
 /* Joints, centres and held points go with the body; corrections of what joints say grow with it. */
-static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *body, double ratio, vg_err *e)
+static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *body, double ratio,
+                       vg_err *e)
 {
     vg_map *m = &h->map;
     size_t n = m->n;
@@ -88,9 +92,10 @@ static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, c
 
 /* ---- joints of a rig ---- */
 
-/* A joint goes with the vertices around it: those that its bone and the one above share, or else its own; the nearest count most, and
- * it keeps its place among them as they grow. */
-static void move_joint(const vg_rig *r, size_t nv, const double *from, const double *to, uint32_t bone, uint32_t above, double *at)
+/* A joint goes with the vertices around it: those that its bone and the one above share, or else its own; the nearest
+ * count most, and it keeps its place among them as they grow. */
+static void move_joint(const vg_rig *r, size_t nv, const double *from, const double *to, uint32_t bone,
+                       uint32_t above, double *at)
 {
     static const double soft = 1e-4; /* of D squared */
     double d = vg_diagonal(from, nv), before[3] = {0, 0, 0}, after[3] = {0, 0, 0}, sum = 0, spread[2] = {0, 0};
@@ -155,18 +160,21 @@ static int move_bones(vg_head *h, const double *body, vg_err *e)
     int r = move_joints(&h->rig, m->nv, h->reference, body, e);
     if (r < 0) return r;
     for (size_t b = 0; b < m->n; b++)
-        for (size_t k = 0; k < 3; k++) m->centre[3 * b + k] = m->home_centre[3 * b + k] = h->rig.at[3 * (size_t)h->rig.bone[b] + k];
+        for (size_t k = 0; k < 3; k++)
+            m->centre[3 * b + k] = m->home_centre[3 * b + k] = h->rig.at[3 * (size_t)h->rig.bone[b] + k];
     return vgi_place_by_bones(&h->rig, m, m->place, e);
 }
 
-/* What regression has added grows with the body; of a bone it is about its joint, so that what it adds to the share of a bone stays. */
+/* What regression has added grows with the body; of a bone it is about its joint, so that what it adds to the share
+ * of a bone stays. */
 static void add_regression(const vg_map *m, const double *skin, const double *joints_before, double ratio)
 {
     for (size_t i = 0; i < m->nv * m->n; i++) {
         double *to = m->weights + 4 * i, more = skin[4 * i + 3];
         bool bones = m->kind == VG_MAP_BONES;
         for (size_t k = 0; k < 3; k++) {
-            double before = bones ? more * joints_before[3 * (i % m->n) + k] : 0, after = bones ? more * m->centre[3 * (i % m->n) + k] : 0;
+            double before = bones ? more * joints_before[3 * (i % m->n) + k] : 0,
+                   after = bones ? more * m->centre[3 * (i % m->n) + k] : 0;
             to[k] += ratio * (skin[4 * i + k] - before) + after;
         }
         to[3] += bones ? more : ratio * more;
@@ -188,11 +196,14 @@ int vg_map_retarget(vg_head *h, const double *target, double morph, int threads,
     uint32_t *of_face = NULL;
     size_t nv = h->mesh.nv, size = nv * 4 * m->n;
     bool bones = m->kind == VG_MAP_BONES, corners = m->ncorners > 0;
-    if (!m->n || (bones ? h->rig.nbones : h->patches.n) != m->n) return vg_fail(e, VG_EINPUT, "there is no map to retarget");
-    double *body = vgi_copy_array(target, 3 * nv, sizeof *body, e), *vectors = NULL, *home = NULL, *skin = NULL, ratio = 1;
+    if (!m->n || (bones ? h->rig.nbones : h->patches.n) != m->n)
+        return vg_fail(e, VG_EINPUT, "there is no map to retarget");
+    double *body = vgi_copy_array(target, 3 * nv, sizeof *body, e), *vectors = NULL, *home = NULL, *skin = NULL,
+           ratio = 1;
     double *joints = vgi_copy_array(m->centre, 3 * m->n, sizeof *joints, e);
     int r = body && joints ? vg_graph_new(&g, h, e) : VG_ENOMEM;
-    if (r == VG_OK && corners && m->ncorners != vg_graph_corners(g)) r = vg_fail(e, VG_EINPUT, "the map does not say how its corners turn");
+    if (r == VG_OK && corners && m->ncorners != vg_graph_corners(g))
+        r = vg_fail(e, VG_EINPUT, "the map does not say how its corners turn");
     if (r == VG_OK && !bones && !(of_face = vgi_graph_patches(h, g, e))) r = VG_ENOMEM;
     if (r == VG_OK && !(vectors = vgi_array(3 * vg_graph_corners(g), sizeof *vectors, e))) r = VG_ENOMEM;
     if (r == VG_OK && corners && !(skin = vgi_copy_array(m->weights, size, sizeof *skin, e))) r = VG_ENOMEM;
@@ -201,7 +212,8 @@ int vg_map_retarget(vg_head *h, const double *target, double morph, int threads,
         r = vgi_map_collapse(h, g, of_face, vectors, threads, e);
         for (size_t i = 0; r == VG_OK && i < size; i++) skin[i] -= m->weights[i];
     }
-    if (r == VG_OK && !bones && !m->has_home && !(home = vgi_copy_array(h->reference, 3 * nv, sizeof *home, e))) r = VG_ENOMEM;
+    if (r == VG_OK && !bones && !m->has_home && !(home = vgi_copy_array(h->reference, 3 * nv, sizeof *home, e)))
+        r = VG_ENOMEM;
     if (r == VG_OK && morph != 1) r = morph_body(h, g, target, morph, body, threads, e);
     if (r == VG_OK) {
         double before = vg_diagonal(h->reference, nv), after = vg_diagonal(body, nv);

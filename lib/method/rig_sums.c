@@ -1,4 +1,5 @@
-/* rig_sums.c: the sums over poses that weights and corners of a rig are fitted from, each one matrix product per block of poses.
+/* rig_sums.c: the sums over poses that weights and corners of a rig are fitted from, each one matrix product per
+ * block of poses.
  * Leaves out what is made of them (skin.c, envelope.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig_sums.h"
@@ -62,7 +63,8 @@ static void place_motions(vgi_rig_sums *s, size_t k, const double *transforms)
         const double unit[4] = {q[0] / root, q[1] / root, q[2] / root, q[3] / root};
         vg_quat_matrix(unit, a);
         for (size_t c = 0; c < 3; c++) {
-            double *row = s->motions + (3 * k + c) * 4 * s->n + 4 * j, *turned = s->turned + (3 * k + c) * 3 * s->n + 3 * j;
+            double *row = s->motions + (3 * k + c) * 4 * s->n + 4 * j,
+                   *turned = s->turned + (3 * k + c) * 3 * s->n + 3 * j;
             for (size_t i = 0; i < 3; i++) turned[i] = row[i] = square * a[3 * c + i];
             row[3] = row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + q[4 + c] - s->origin[k][c];
         }
@@ -108,7 +110,8 @@ static void add_faces(void *context, size_t task)
 {
     const adding *a = context;
     vgi_rig_sums *s = a->s;
-    size_t first = task * FACES, faces = s->turns->nf - first < FACES ? s->turns->nf - first : FACES, width = 3 * a->count;
+    size_t first = task * FACES, faces = s->turns->nf - first < FACES ? s->turns->nf - first : FACES,
+           width = 3 * a->count;
     double f[3 * FACES * 3 * BLOCK];
     for (size_t i = 0; i < faces; i++) {
         add_lengths(a, first + i);
@@ -122,7 +125,8 @@ static void add_faces(void *context, size_t task)
                     for (size_t q = 0; q < 3; q++) f[(3 * i + q) * width + 3 * (k + l) + c] = turn[3 * c + q][l];
         }
     }
-    vgi_product_add(3 * faces, 3 * s->n, width, f, width, s->turned, 3 * s->n, s->turn + 3 * first * 3 * s->n, 3 * s->n);
+    vgi_product_add(3 * faces, 3 * s->n, width, f, width, s->turned, 3 * s->n, s->turn + 3 * first * 3 * s->n,
+                    3 * s->n);
 }
 
 static void add_cross(void *context, size_t task)
@@ -130,11 +134,12 @@ static void add_cross(void *context, size_t task)
     const adding *a = context;
     vgi_rig_sums *s = a->s;
     size_t first = task * ROWS, rows = 4 * s->n - first < ROWS ? 4 * s->n - first : ROWS, width = 3 * a->count;
-    vgi_product_add(rows, 4 * s->n, width, s->transposed + first * width, width, s->motions, 4 * s->n, s->cross + first * 4 * s->n,
-                    4 * s->n);
+    vgi_product_add(rows, 4 * s->n, width, s->transposed + first * width, width, s->motions, 4 * s->n,
+                    s->cross + first * 4 * s->n, 4 * s->n);
 }
 
-void vgi_rig_sums_add(vgi_rig_sums *s, size_t count, const double *const *poses, const double *const *transforms, int threads)
+void vgi_rig_sums_add(vgi_rig_sums *s, size_t count, const double *const *poses, const double *const *transforms,
+                      int threads)
 {
     int blas = vgi_product_begin();
     for (size_t first = 0; first < count; first += BLOCK) {
@@ -144,7 +149,8 @@ void vgi_rig_sums_add(vgi_rig_sums *s, size_t count, const double *const *poses,
             place_motions(s, k, transforms[first + k]);
         }
         for (size_t i = 0; i < 4 * s->n; i++)
-            for (size_t r = 0; r < 3 * a.count; r++) s->transposed[i * 3 * a.count + r] = s->motions[r * 4 * s->n + i];
+            for (size_t r = 0; r < 3 * a.count; r++)
+                s->transposed[i * 3 * a.count + r] = s->motions[r * 4 * s->n + i];
         vgi_parallel(threads, (s->nv + ROWS - 1) / ROWS, add_vertices, &a);
         vgi_parallel(threads, (4 * s->n + ROWS - 1) / ROWS, add_cross, &a);
         if (s->turns) vgi_parallel(threads, (s->turns->nf + FACES - 1) / FACES, add_faces, &a);

@@ -1,7 +1,9 @@
-/* skin.c: linear blend skinning fitted to poses: at most four bones per vertex, weights >= 0 that sum to 1, least squares.
+/* skin.c: linear blend skinning fitted to poses: at most four bones per vertex, weights >= 0 that sum to 1, least
+ * squares.
  *
- * For one vertex the squared distance over all poses is the quadratic w' G w - 2 b' w + c, whose numbers are products of the sums with the
- * vertex's place. Bones are taken up one by one, each time the one that helps most, then exchanged as long as that helps.
+ * For one vertex the squared distance over all poses is the quadratic w' G w - 2 b' w + c, whose numbers are products
+ * of the sums with the vertex's place. Bones are taken up one by one, each time the one that helps most, then
+ * exchanged as long as that helps.
  * Leaves out where the motions of bones come from (bend.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/skin.h"
@@ -16,7 +18,7 @@ enum { CHUNK = 64, MOST = 20, BEST = 14 }; /* bones that a vertex considers; of 
 typedef struct bones {
     const vg_rig *r;
     size_t nsegments;
-    uint32_t *of;     /* bone of each segment */
+    uint32_t *of; /* bone of each segment */
     double *from, *to;
 } bones;
 
@@ -203,7 +205,8 @@ static void choose(const quadratic *q, double least_gain, choice *best)
         choice next = *best;
         for (size_t k = 0; k < q->n; k++) {
             if (has(best, k)) continue;
-            for (size_t out = best->n < VG_SKIN ? VG_SKIN : 0; out < (best->n < VG_SKIN ? VG_SKIN + 1 : best->n); out++) {
+            for (size_t out = best->n < VG_SKIN ? VG_SKIN : 0; out < (best->n < VG_SKIN ? VG_SKIN + 1 : best->n);
+                 out++) {
                 choice c = *best;
                 c.at[out < VG_SKIN ? out : c.n++] = k;
                 weigh(q, &c);
@@ -244,7 +247,8 @@ static double product(const skinning *x, size_t i, size_t j, const double *v)
     const double p[4] = {v[0] - a[0], v[1] - a[1], v[2] - a[2], 1}, q[4] = {v[0] - b[0], v[1] - b[1], v[2] - b[2], 1};
     double sum = 0;
     for (size_t k = 0; k < 4; k++)
-        sum += p[k] * (c[k * width] * q[0] + c[k * width + 1] * q[1] + c[k * width + 2] * q[2] + c[k * width + 3] * q[3]);
+        sum += p[k] *
+               (c[k * width] * q[0] + c[k * width + 1] * q[1] + c[k * width + 2] * q[2] + c[k * width + 3] * q[3]);
     return sum;
 }
 
@@ -285,8 +289,8 @@ static void find_candidates(const skinning *x, const double *alone, quadratic *q
 
 static void skin_vertex(const skinning *x, size_t v, double *far, double *alone)
 {
-    /* Per pose, what a bone has to gain for each squared distance from the vertex, and at least (of D^2); and the way, in D, that a bone has to
-     * go apart from the vertex's first one to count beside it. */
+    /* Per pose, what a bone has to gain for each squared distance from the vertex, and at least (of D^2); and the
+     * way, in D, that a bone has to go apart from the vertex's first one to count beside it. */
     static const double nearness = 1e-8, least_gain = 1e-13, apart = 1e-5;
     const vgi_rig_sums *s = x->s;
     const double *p = x->reference + 3 * v;
@@ -337,7 +341,12 @@ int vgi_skin_fit(vg_rig *r, const vgi_rig_sums *s, const double *reference, int 
     bones b;
     int code = make_skin(r, s->nv, e);
     if (code < 0 || (code = make_bones(&b, r, e)) < 0) return code;
-    skinning x = {.r = r, .s = s, .reference = reference, .b = &b, .diagonal = vg_diagonal(reference, s->nv), .miss = miss,
+    skinning x = {.r = r,
+                  .s = s,
+                  .reference = reference,
+                  .b = &b,
+                  .diagonal = vg_diagonal(reference, s->nv),
+                  .miss = miss,
                   .chunks = s->nv < CHUNK ? 1 : CHUNK};
     x.mover = vgi_array(r->skeleton.njoints, sizeof *x.mover, e);
     x.space = vgi_array(x.chunks, 2 * s->n * sizeof *x.space, e);

@@ -10,8 +10,8 @@
 struct vg_driver {
     const vg_rig *r;
     const vg_skeleton *by;
-    uint32_t *from;     /* of each joint of the rig: the other's joint; UINT32_MAX: none */
-    double *before;     /* of each joint of the rig: a turn that comes before the other's: 4 numbers */
+    uint32_t *from; /* of each joint of the rig: the other's joint; UINT32_MAX: none */
+    double *before; /* of each joint of the rig: a turn that comes before the other's: 4 numbers */
     double scale;
     size_t missing;
     double *positions, *turns; /* of the rig's joints */
@@ -138,7 +138,8 @@ static void read_slip(const vg_driver *d, size_t k, const double *positions, con
     uint32_t parent = d->by->joints[k].parent;
     double at[3] = {0, 0, 0};
     if (parent != UINT32_MAX) vg_quat_apply(turns + 4 * (size_t)parent, d->by->joints[k].offset, at);
-    for (size_t i = 0; i < 3; i++) slip[i] = positions[3 * k + i] - at[i] - (parent != UINT32_MAX ? positions[3 * (size_t)parent + i] : 0);
+    for (size_t i = 0; i < 3; i++)
+        slip[i] = positions[3 * k + i] - at[i] - (parent != UINT32_MAX ? positions[3 * (size_t)parent + i] : 0);
 }
 
 void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, double *transforms)
@@ -149,7 +150,8 @@ void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, 
         double *q = d->turns + 4 * j, *p = d->positions + 3 * j, slip[3] = {0, 0, 0};
         if (from != UINT32_MAX) {
             vg_quat_multiply(turns + 4 * (size_t)from, d->before + 4 * j, q);
-            if (parent == UINT32_MAX || d->by->joints[from].parent != UINT32_MAX) read_slip(d, from, positions, turns, slip);
+            if (parent == UINT32_MAX || d->by->joints[from].parent != UINT32_MAX)
+                read_slip(d, from, positions, turns, slip);
         } else if (parent != UINT32_MAX) {
             memcpy(q, d->turns + 4 * (size_t)parent, 4 * sizeof *q);
         } else {

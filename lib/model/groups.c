@@ -20,7 +20,8 @@ int vg_joint_groups_skeleton(const vg_joint_groups *g, size_t nv, const double *
     for (size_t j = 0; j < g->n; j++)
         for (size_t i = 0; i < g->at[j].nvertices; i++)
             if (g->at[j].vertices[i] >= nv)
-                return vg_fail(e, VG_EINPUT, "joint '%.80s' names vertex %u, the mesh has %zu", g->at[j].name, g->at[j].vertices[i], nv);
+                return vg_fail(e, VG_EINPUT, "joint '%.80s' names vertex %u, the mesh has %zu", g->at[j].name,
+                               g->at[j].vertices[i], nv);
     if (!(s->joints = vgi_array(g->n, sizeof *s->joints, e))) return VG_ENOMEM;
     for (; s->njoints < g->n; s->njoints++) {
         const vg_joint_group *group = &g->at[s->njoints];
@@ -65,8 +66,8 @@ static void reject(const double u[3], double x[3])
     for (int k = 0; k < 3 && square > 0; k++) x[k] -= along / square * u[k];
 }
 
-static void turn_joint(const vg_joint_groups *g, size_t j, const double *reference, const double *pose, const double *positions,
-                       double *turns)
+static void turn_joint(const vg_joint_groups *g, size_t j, const double *reference, const double *pose,
+                       const double *positions, double *turns)
 {
     const vg_joint_group *group = &g->at[j];
     double b[9] = {0}, rest[3], d[3], r[3], below[2][3];
@@ -86,7 +87,8 @@ static void turn_joint(const vg_joint_groups *g, size_t j, const double *referen
     for (size_t i = 0; i < (children == 1 ? 1 : group->nvertices); i++) {
         subtract(pose + 3 * (size_t)group->vertices[i], positions + 3 * j, d);
         subtract(reference + 3 * (size_t)group->vertices[i], rest, r);
-        if (children == 1) reject(below[0], d), reject(below[1], r); /* perpendicular to the bone: the frame is met exactly */
+        if (children == 1)
+            reject(below[0], d), reject(below[1], r); /* perpendicular to the bone: the frame is met exactly */
         add_pair(b, children == 1 ? 1 : 0.01, d, r);
     }
     if (group->parent != UINT32_MAX) { /* what all of this leaves open goes with the parent */
@@ -99,7 +101,8 @@ static void turn_joint(const vg_joint_groups *g, size_t j, const double *referen
     vgi_best_turn(b, turns + 4 * j);
 }
 
-void vg_joint_groups_pose(const vg_joint_groups *g, const double *reference, const double *pose, double *positions, double *turns)
+void vg_joint_groups_pose(const vg_joint_groups *g, const double *reference, const double *pose, double *positions,
+                          double *turns)
 {
     for (size_t j = 0; j < g->n; j++) place(&g->at[j], pose, positions + 3 * j);
     for (size_t j = 0; j < g->n; j++) turn_joint(g, j, reference, pose, positions, turns);

@@ -1,8 +1,7 @@
-/* test_rig.c: rigs: bodies that move rigidly with their bones are met, weights and motions are found again, a map is its uncollapsed chain,
- * other skeletons drive it, and edits, joints of vertices and other bodies.
+/* test_rig.c: rigs: bodies that move rigidly with their bones are met, weights and motions are found again, a map is
+ * its uncollapsed chain, other skeletons drive it, and edits, joints of vertices and other bodies.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
-
 
 enum { JOINTS = 5, BONES = 4, POSES = 9 };
 static const double LENGTH = 3;
@@ -14,7 +13,8 @@ static vg_skeleton make_skeleton(double length)
     vg_skeleton s = {.njoints = JOINTS, .joints = room(JOINTS, sizeof *s.joints)};
     for (size_t j = 0; j < JOINTS; j++) {
         vg_joint *joint = &s.joints[j];
-        *joint = (vg_joint){.name = strdup(names[j]), .parent = j ? (uint32_t)j - 1 : UINT32_MAX, .offset = {0, 0, j ? length : 0}};
+        *joint = (vg_joint){
+            .name = strdup(names[j]), .parent = j ? (uint32_t)j - 1 : UINT32_MAX, .offset = {0, 0, j ? length : 0}};
         if (j < BONES) {
             joint->nchannels = j ? 3 : 6;
             memcpy(joint->channels, j ? (const uint8_t[]){6, 4, 5, 0, 0, 0} : (const uint8_t[]){1, 2, 3, 6, 4, 5}, 6);
@@ -71,7 +71,8 @@ static void paint(vg_rig *r, size_t nv, const double *reference, double blend)
 {
     free(r->skin_bone);
     free(r->skin_weight);
-    r->skin_bone = room(VG_SKIN * nv, sizeof *r->skin_bone), r->skin_weight = room(VG_SKIN * nv, sizeof *r->skin_weight);
+    r->skin_bone = room(VG_SKIN * nv, sizeof *r->skin_bone),
+    r->skin_weight = room(VG_SKIN * nv, sizeof *r->skin_weight);
     for (size_t v = 0; v < nv; v++) {
         double at = reference[3 * v + 2] / LENGTH, near = round(at);
         double t = blend > 0 ? (at - near) / (2 * blend) + 0.5 : at > near;
@@ -79,13 +80,15 @@ static void paint(vg_rig *r, size_t nv, const double *reference, double blend)
         uint32_t up = (uint32_t)fmin(BONES - 1, fmax(0, near)), low = up ? up - 1 : 0;
         bool first = t >= 0.5;
         r->skin_bone[VG_SKIN * v] = first ? up : low, r->skin_weight[VG_SKIN * v] = first ? t : 1 - t;
-        if (t > 0 && t < 1) r->skin_bone[VG_SKIN * v + 1] = first ? low : up, r->skin_weight[VG_SKIN * v + 1] = first ? 1 - t : t;
+        if (t > 0 && t < 1)
+            r->skin_bone[VG_SKIN * v + 1] = first ? low : up, r->skin_weight[VG_SKIN * v + 1] = first ? 1 - t : t;
     }
 }
 
 static void skin_poses(stage *x)
 {
-    for (size_t k = 0; k < POSES; k++) vg_rig_skin(&x->h.rig, x->h.mesh.nv, x->h.reference, x->transforms[k], x->poses[k]);
+    for (size_t k = 0; k < POSES; k++)
+        vg_rig_skin(&x->h.rig, x->h.mesh.nv, x->h.reference, x->transforms[k], x->poses[k]);
 }
 
 static vg_rig_fitter *fit(stage *x, vg_rig_method method, size_t bones, double refine, int threads)
@@ -136,13 +139,15 @@ static void rigid_bodies_are_met(void)
             stage x;
             set_stage(&x, make_beads(), 50);
             for (size_t k = 0; k < POSES; k++)
-                for (size_t v = 0; v < x.h.mesh.nv; v++) { /* by another road than the library's: two columns of a rotation matrix at a time */
+                for (size_t v = 0; v < x.h.mesh.nv;
+                     v++) { /* by another road than the library's: two columns of a rotation matrix at a time */
                     double m[9], d[3];
                     size_t b = v / (x.h.mesh.nv / BONES);
                     vg_quat_matrix(x.turns[k] + 4 * b, m);
                     for (size_t i = 0; i < 3; i++) d[i] = x.h.reference[3 * v + i] - x.h.rig.at[3 * b + i];
                     for (size_t i = 0; i < 3; i++)
-                        x.poses[k][3 * v + i] = x.positions[k][3 * b + i] + m[3 * i] * d[0] + m[3 * i + 1] * d[1] + m[3 * i + 2] * d[2];
+                        x.poses[k][3 * v + i] =
+                            x.positions[k][3 * b + i] + m[3 * i] * d[0] + m[3 * i + 1] * d[1] + m[3 * i + 2] * d[2];
                 }
             vg_rig_fitter *f = fit(&x, method ? VG_RIG_LBS : VG_RIG_ENVELOPE, bones, 0.003, 2);
             CHECK_NEAR(misses(&x), 0, 1e-9 * vg_diagonal(x.h.reference, x.h.mesh.nv));
@@ -159,7 +164,8 @@ static void weights_are_found_again(void)
     paint(&x.h.rig, nv, x.h.reference, 0.3);
     skin_poses(&x);
     double *truth = room(nv * BONES, sizeof *truth), most = 0;
-    for (size_t s = 0; s < VG_SKIN * nv; s++) truth[s / VG_SKIN * BONES + x.h.rig.skin_bone[s]] += x.h.rig.skin_weight[s];
+    for (size_t s = 0; s < VG_SKIN * nv; s++)
+        truth[s / VG_SKIN * BONES + x.h.rig.skin_bone[s]] += x.h.rig.skin_weight[s];
     vg_rig_fitter *f = fit(&x, VG_RIG_LBS, 1, 0, 2);
     for (size_t v = 0; v < nv; v++) {
         double sum = 0;
@@ -215,7 +221,8 @@ static void a_rig_is_learned_from_poses_alone(void)
     strike(&x);
 }
 
-/* Wanted vectors by each corner's own bones, held vertices by their skin, and the solver: what the matrix stands for. */
+/* Wanted vectors by each corner's own bones, held vertices by their skin, and the solver: what the matrix stands
+ * for. */
 static void the_map_is_its_chain(void)
 {
     for (size_t per = 1; per <= 2; per++) {
@@ -237,7 +244,8 @@ static void the_map_is_its_chain(void)
         CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
         double *vectors = vectors_of(g, x.h.reference), *wanted = room(3 * m->ncorners, sizeof *wanted);
         double *held = room(3 * m->nheld, sizeof *held), *skin = room(3 * nv, sizeof *skin);
-        double *chain = room(3 * nv, sizeof *chain), *rhs = room(3 * nv, sizeof *rhs), *out = room(3 * nv, sizeof *out), *outs[1] = {out};
+        double *chain = room(3 * nv, sizeof *chain), *rhs = room(3 * nv, sizeof *rhs),
+               *out = room(3 * nv, sizeof *out), *outs[1] = {out};
         for (size_t k = 0; k < POSES; k++) {
             const double *t[1] = {x.transforms[k]}, *w[1] = {wanted}, *r[1] = {rhs}, *a[1] = {held};
             double *c[1] = {chain}, *load[1] = {rhs};
@@ -300,14 +308,16 @@ static void the_root_is_found(void)
     paint(&x.h.rig, nv, x.h.reference, 0.2);
     skin_poses(&x);
     for (size_t i = 0; i < 3 * nv; i++) x.h.reference[i] += away[i % 3]; /* the skeleton does not know */
-    CHECK(vg_rig_locate(&x.s, nv, x.h.reference, POSES, (const double *const *)x.poses, (const double *const *)x.positions,
-                        (const double *const *)x.turns, 2, shift, &spread, &e) == VG_OK);
+    CHECK(vg_rig_locate(&x.s, nv, x.h.reference, POSES, (const double *const *)x.poses,
+                        (const double *const *)x.positions, (const double *const *)x.turns, 2, shift, &spread,
+                        &e) == VG_OK);
     for (int k = 0; k < 3; k++) CHECK_NEAR(shift[k], away[k], 1e-9);
     CHECK_NEAR(spread, 0, 1e-9);
     strike(&x);
 }
 
-/* The same skeleton gives the transforms back; a larger one, too; one that rests in another pose when they are aligned. */
+/* The same skeleton gives the transforms back; a larger one, too; one that rests in another pose when they are
+ * aligned. */
 static void other_skeletons_drive(void)
 {
     stage x;
@@ -331,7 +341,8 @@ static void other_skeletons_drive(void)
     vg_driver_pose(d, positions, turns, t);
     for (size_t i = 0; i < 7 * BONES; i++) CHECK_NEAR(t[i], x.transforms[0][i], 1e-12);
     vg_driver_free(&d);
-    for (size_t j = 1; j < JOINTS; j++) memcpy(bent.joints[j].offset, (const double[3]){LENGTH, 0, 0}, sizeof bent.joints[j].offset);
+    for (size_t j = 1; j < JOINTS; j++)
+        memcpy(bent.joints[j].offset, (const double[3]){LENGTH, 0, 0}, sizeof bent.joints[j].offset);
     CHECK(vg_driver_new(&d, &x.h.rig, &bent, true, &e) == VG_OK);
     vg_skeleton_pose(&bent, NULL, positions, turns);
     vg_driver_pose(d, positions, turns, t);
@@ -364,14 +375,16 @@ static void edits_turn_what_hangs_on_a_bone(void)
     CHECK_NEAR(axis[2], 1, 1e-15);
     vg_rig_edit(&x.h.rig, 1, (const double[3]){1, 0, 0}, 90, t);
     CHECK_NEAR(t[0], 1, 0); /* the hip stays */
-    vg_quat_apply(t + 7 * 3, (const double[3]){0, 0, 3 * LENGTH}, at); /* the toe, 2 bones beyond the knee, goes from z to -y */
+    vg_quat_apply(t + 7 * 3, (const double[3]){0, 0, 3 * LENGTH},
+                  at); /* the toe, 2 bones beyond the knee, goes from z to -y */
     CHECK_NEAR(at[0] + t[25], 0, 1e-12);
     CHECK_NEAR(at[1] + t[26], -2 * LENGTH, 1e-12);
     CHECK_NEAR(at[2] + t[27], LENGTH, 1e-12);
     vg_rig_edit(&x.h.rig, 2, axis, 30, t); /* a twist leaves the bone where it is */
     vg_quat_apply(t + 7 * 3, (const double[3]){0, 0, 3 * LENGTH}, at);
     CHECK_NEAR(at[1] + t[26], -2 * LENGTH, 1e-12);
-    vg_quat_apply(t + 7 * 2, (const double[3]){1, 0, 2 * LENGTH}, at); /* and turns what is beside it about it: -y here */
+    vg_quat_apply(t + 7 * 2, (const double[3]){1, 0, 2 * LENGTH},
+                  at); /* and turns what is beside it about it: -y here */
     CHECK_NEAR(at[0] + t[18], cos(M_PI / 6), 1e-12);
     CHECK_NEAR(at[2] + t[20], LENGTH + sin(M_PI / 6), 1e-12);
     strike(&x);
@@ -414,7 +427,8 @@ static void a_rig_serves_another_body(void)
         skin_poses(&x);
         vg_rig_fitter *f = fit(&x, method ? VG_RIG_LBS : VG_RIG_ENVELOPE, 2, 0.003, 1);
         vg_rig_fitter_free(&f);
-        double *target = room(3 * nv, sizeof *target), *before = room(3 * nv, sizeof *before), *after = room(3 * nv, sizeof *after);
+        double *target = room(3 * nv, sizeof *target), *before = room(3 * nv, sizeof *before),
+               *after = room(3 * nv, sizeof *after);
         double *list[1] = {before}, t[7 * BONES];
         vg_player *p;
         for (size_t i = 0; i < 3 * nv; i++) target[i] = 2 * x.h.reference[i] + (double)(i % 3);
@@ -453,11 +467,13 @@ static void joints_of_vertices_find_themselves(void)
     vg_joint_group groups[BONES];
     for (uint32_t b = 0; b < BONES; b++) {
         for (uint32_t i = 0; i < 4; i++) list[b][i] = (uint32_t)(b * each + i * 11);
-        groups[b] = (vg_joint_group){.name = x.s.joints[b].name, .parent = b ? b - 1 : UINT32_MAX, .nvertices = 4, .vertices = list[b]};
+        groups[b] = (vg_joint_group){
+            .name = x.s.joints[b].name, .parent = b ? b - 1 : UINT32_MAX, .nvertices = 4, .vertices = list[b]};
     }
     vg_joint_groups g = {BONES, groups};
     vg_skeleton s;
-    double positions[3 * BONES], turns[4 * BONES], *pose = room(3 * x.h.mesh.nv, sizeof *pose), q[4] = {0.8, 0.36, 0, 0.48};
+    double positions[3 * BONES], turns[4 * BONES], *pose = room(3 * x.h.mesh.nv, sizeof *pose),
+                                                   q[4] = {0.8, 0.36, 0, 0.48};
     CHECK(vg_joint_groups_skeleton(&g, x.h.mesh.nv, x.h.reference, &s, &e) == VG_OK);
     CHECK(s.njoints == BONES && s.joints[2].parent == 1 && s.joints[2].nchannels == 3 && s.joints[0].nchannels == 6);
     for (size_t v = 0; v < x.h.mesh.nv; v++) { /* all of it turned and moved */
@@ -475,7 +491,8 @@ static void joints_of_vertices_find_themselves(void)
     }
     list[3][0] = (uint32_t)x.h.mesh.nv;
     vg_skeleton_clear(&s);
-    CHECK(vg_joint_groups_skeleton(&g, x.h.mesh.nv, x.h.reference, &s, &e) == VG_EINPUT && strstr(e.message, "'toe'"));
+    CHECK(vg_joint_groups_skeleton(&g, x.h.mesh.nv, x.h.reference, &s, &e) == VG_EINPUT &&
+          strstr(e.message, "'toe'"));
     free(pose);
     strike(&x);
 }
@@ -523,11 +540,13 @@ static void what_cannot_be_fitted_is_refused(void)
 }
 
 TESTS({"rigid bodies are met", rigid_bodies_are_met}, {"weights are found again", weights_are_found_again},
-      {"motions are found again", motions_are_found_again}, {"a rig is learned from poses alone", a_rig_is_learned_from_poses_alone},
+      {"motions are found again", motions_are_found_again},
+      {"a rig is learned from poses alone", a_rig_is_learned_from_poses_alone},
       {"the map is its chain", the_map_is_its_chain}, {"refinement brings nearer", refinement_brings_nearer},
       {"the root is found", the_root_is_found}, {"other skeletons drive", other_skeletons_drive},
       {"edits turn what hangs on a bone", edits_turn_what_hangs_on_a_bone},
       {"rotations alone say where bones are", rotations_alone_say_where_bones_are},
       {"a rig serves another body", a_rig_serves_another_body},
-      {"joints of vertices find themselves", joints_of_vertices_find_themselves}, {"threads do not matter", threads_do_not_matter},
+      {"joints of vertices find themselves", joints_of_vertices_find_themselves},
+      {"threads do not matter", threads_do_not_matter},
       {"what cannot be fitted is refused", what_cannot_be_fitted_is_refused})
