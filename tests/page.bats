@@ -296,6 +296,16 @@ END
         must vg-view "$name.obj" -o "$name.html"
         browse "$name.html" <<<'assert 0.0001 < share_drawn(page.picture()) < 0.3'
     done
+    printf 'v 0 0 0\nv 0 1 0\nv 1 1.3 0\nl 1 2\nl 2 3\n' >moved.obj
+    must vg-view bones.obj --against moved.obj -o compared.html
+    browse compared.html '#show=1&view=0,0' <<'END'
+def yellow():  # above the legend
+    width, height, rows = page.picture()
+    return sum(row[i + 1] > 180 and row[i] > 150 and row[i + 2] < 110 for row in rows[:height // 2] for i in range(0, 3 * width, 3))
+assert yellow() > 20, yellow()
+page.key("c")
+assert yellow() == 0
+END
     must vg-view same.obj -o same.html
     browse same.html <<<'page.picture()'
     head -c 20000 bones.html >cut.html

@@ -267,9 +267,10 @@ const LINE = [HEAD + PLACE + `
 layout(location = 0) in uvec2 ends;
 uniform vec2 size;
 uniform float width, lift;
-out float across;
+out float across, value;
 void main() {
-    vec4 a = view * vec4(placeOf(ends.x).xyz, 1.0), b = view * vec4(placeOf(ends.y).xyz, 1.0);
+    vec4 first = placeOf(ends.x), second = placeOf(ends.y);
+    vec4 a = view * vec4(first.xyz, 1.0), b = view * vec4(second.xyz, 1.0);
     float near = -0.001;
     if (a.z > near) a = mix(b, a, (near - b.z) / (a.z - b.z));
     if (b.z > near) b = mix(a, b, (near - a.z) / (b.z - a.z));
@@ -277,20 +278,23 @@ void main() {
     vec2 s = p.xy / p.w * size, t = q.xy / q.w * size, along = t - s;
     along = dot(along, along) > 1e-12 ? normalize(along) : vec2(1.0, 0.0);
     bool last = gl_VertexID > 1;
+    value = last ? second.w : first.w;
     float side = gl_VertexID % 2 == 0 ? -1.0 : 1.0, reach = width / 2.0 + 1.0;
     across = side * reach;
     vec2 at = (last ? t : s) + side * reach * vec2(-along.y, along.x);
     vec4 e = last ? b : a, lifted = projection * vec4(e.xyz * (1.0 - lift), 1.0), whole = last ? q : p;
     gl_Position = vec4(at / size * whole.w, lifted.z / lifted.w * whole.w, whole.w);
 }`, HEAD + `
+uniform sampler2D map;
+uniform int mode;
 uniform float width;
 uniform vec4 ink;
-in float across;
+in float across, value;
 out vec4 colour;
 void main() {
     float cover = clamp(width / 2.0 + 0.5 - abs(across), 0.0, 1.0);
     if (cover <= 0.0) discard;
-    colour = vec4(ink.rgb, ink.a * cover);
+    colour = vec4(mode == 1 ? texture(map, vec2(clamp(value, 0.0, 1.0), 0.5)).rgb : ink.rgb, ink.a * cover);
 }`];
 const POINT = [HEAD + PLACE + `
 uniform float width;
@@ -507,8 +511,9 @@ function use(program, cam) {
     return program.at;
 }
 
-function drawLines(cam, array, n, size, width, ink, lift) {
+function drawLines(cam, array, n, size, width, ink, lift, mode = 0) {
     const at = use(programs.line, cam);
+    gl.uniform1i(at.mode, mode);
     gl.uniform2f(at.size, size[0] / 2, size[1] / 2);
     gl.uniform1f(at.width, width);
     gl.uniform1f(at.lift, lift);
@@ -553,7 +558,7 @@ function drawPanel(panel, scale) {
         gl.drawElements(gl.TRIANGLES, s.index.length, gl.UNSIGNED_INT, 0);
     }
     if (state.ground) drawGround(cam, s, [...ink, 0.3]);
-    if (s.bones.length) drawLines(cam, s.boneArray, s.bones.length / 2, [w, h], 3 * scale, dark.matches ? [0.85, 0.72, 0.6, 1] : [0.45, 0.33, 0.25, 1], 0);
+    if (s.bones.length) drawLines(cam, s.boneArray, s.bones.length / 2, [w, h], 3 * scale, dark.matches ? [0.85, 0.72, 0.6, 1] : [0.45, 0.33, 0.25, 1], 0, modeOf(s));
     if (state.wire && s.edges.length)
         drawLines(cam, s.edgeArray, s.edges.length / 2, [w, h], scale, alone ? [...ink, 0.7] : [0.05, 0.05, 0.08, 0.55], alone ? 0 : 0.0015);
     if (s.points) {

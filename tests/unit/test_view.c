@@ -613,6 +613,111 @@ static void album_is_evenly_spaced(void)
     check_album(8, 100000);
 }
 
+/* What is shown of a shorter sequence, kept at its own stride, are the same frames, and behind its end the last. */
+static void albums_match(void)
+{
+    static const size_t lengths[] = {1, 2, 7, 40, 41, 300};
+    for (size_t want = 1; want <= 9; want += 4)
+        for (size_t k = 0; k < 36; k++) {
+            size_t frames[9], shots[9];
+            vgi_album a, b;
+            CHECK(vgi_album_init(&a, 1, want, NULL) == VG_OK && vgi_album_init(&b, 1, want, NULL) == VG_OK);
+            for (size_t i = 0; i < 2; i++)
+                for (size_t f = 0; f < lengths[i ? k % 6 : k / 6]; f++) {
+                    vgi_shot *shot;
+                    CHECK(vgi_album_next(i ? &b : &a, &shot, NULL) == VG_OK);
+                }
+            size_t n = vgi_album_close(&a), last = lengths[k % 6] - 1;
+            for (size_t i = 0; i < n; i++) frames[i] = a.at[i].index;
+            vgi_album_match(&b, frames, n, shots);
+            for (size_t i = 0; i < n && lengths[k % 6] <= lengths[k / 6]; i++)
+                CHECK(b.at[shots[i]].index == (frames[i] < last ? frames[i] : last));
+            vgi_album_clear(&a);
+            vgi_album_clear(&b);
+        }
+}
+
+/* ---- what colours say ---- */
+
+static void colours_end_at_short_numbers(void)
+{
+    static const double given[][2] = {{1, 1}, {1.01, 1.2}, {0.00447, 0.005}, {8.1, 10}, {99, 100}, {1e-9, 1e-9}, {2.5e12, 2.5e12}};
+    for (size_t i = 0; i < sizeof given / sizeof *given; i++) CHECK_NEAR(vgi_round_up(given[i][0]), given[i][1], 1e-9 * given[i][1]);
+    vgi_tint t = {.what = VG_TINT_ERRORS};
+    vgi_tint_end(&t, 0, 0.00447, 0);
+    CHECK(t.low == 0 && !t.diverging);
+    CHECK_NEAR(vgi_tint_place(&t, 0.0025), 0.5, 1e-12);
+    vgi_tint_end(&t, 0, 1e-14, 0); /* rounding */
+    CHECK(t.high == 1e-9);
+    t.what = VG_TINT_SCALARS;
+    vgi_tint_end(&t, 0, 3.2, -0.5);
+    CHECK(t.diverging && t.low == -4 && t.high == 4 && vgi_tint_place(&t, 0) == 0.5 && vgi_tint_place(&t, -9) == 0);
+    vgi_tint_end(&t, 0, 0, 0); /* all are 0: there is an end nevertheless */
+    CHECK(t.high == 1 && vgi_tint_place(&t, 0) == 0);
+    t.what = VG_TINT_SCALES;
+    vgi_tint_end(&t, 0, 123, -5);
+    CHECK(t.diverging && t.low == -1 && t.high == 1 && vgi_tint_shown(&t, t.low) == 0.5);
+    vgi_tint_end(&t, 4, 123, -5);
+    CHECK(t.low == -2 && t.high == 2);
+}
+
+static void map_with_a_middle_is_grey_there(void)
+{
+    float low[3], middle[3], high[3], near[3];
+    vgi_map_colour(0, true, low);
+    vgi_map_colour(0.5, true, middle);
+    vgi_map_colour(1, true, high);
+    vgi_map_colour(0.5 - 1e-9, true, near);
+    for (int k = 0; k < 3; k++) CHECK(fabsf(middle[k] - middle[0]) < 1e-3f && fabsf(middle[k] - near[k]) < 1e-3f && middle[k] > 0.7f);
+    CHECK(low[2] > 4 * low[0] && high[0] > 4 * high[2]);
+}
+
+/* Vectors of a vertex: one halved and one four times as long are together as long again by the square root of 2. */
+static void scales_are_geometric_means(void)
+{
+    static const double rest[] = {-1, 0, 0, 1, 0, 0, 0, 3, 0, 5, 5, 5}, pose[] = {-0.5, 0, 0, 0.5, 0, 0, -0.5, 4, 0, 5, 5, 5};
+    static uint32_t start[] = {0, 2, 4}, vert[] = {0, 1, 0, 2};
+    const vg_mesh m = {4, 2, start, vert};
+    vgi_tint t = {.what = VG_TINT_SCALES};
+    vgi_meter meter;
+    vgi_spread spread;
+    vg_frame f = {.name = (char *)(uintptr_t)"p", .values = (double *)(uintptr_t)pose};
+    CHECK(vgi_meter_init(&meter, &t, &m, rest, 1, NULL) == VG_OK);
+    CHECK(vgi_tint_read(&t, &meter, &f, NULL, &spread, NULL) == VG_OK);
+    double second = log2(4 / sqrt(10)); /* from (-1 0 0)-(0 3 0) to (-0.5 0 0)-(-0.5 4 0) */
+    CHECK_NEAR(meter.numbers[0], (-1 + second) / 2, 1e-14);
+    CHECK_NEAR(meter.numbers[1], -1, 1e-14);
+    CHECK_NEAR(meter.numbers[2], second, 1e-14);
+    CHECK(meter.numbers[3] == 0 && spread.least == -1); /* in no face */
+    double gone[12] = {0}; /* vectors that have shrunk to nothing are no infinity */
+    f.values = gone;
+    CHECK(vgi_tint_read(&t, &meter, &f, NULL, &spread, NULL) == VG_OK && spread.least == -20 && isfinite(spread.mean));
+    vgi_meter_clear(&meter);
+}
+
+/* Of a square and its two sides: contours are where it ends; an edge between two fronts is none, one that is folded over is. */
+static void contours_are_where_fronts_end(void)
+{
+    begin(&s); /* two triangles that share the edge 0-2 */
+    point(&s, 0, 0, 0), point(&s, 1, 0, 0), point(&s, 1, 1, 0), point(&s, 0, 1, 0);
+    FACE(&s, 0, 1, 2);
+    FACE(&s, 0, 2, 3);
+    size_t lines[2];
+    for (int folded = 0; folded < 2; folded++) {
+        if (folded) memcpy(s.points + 9, (double[]){0.9, 0.1, 0.5}, 3 * sizeof(double)); /* 3 comes before 1: 0 2 3 is a back */
+        draw(&d, &s, 0, 0, 200, NULL);
+        CHECK(vgi_figure_sides(&d.figure, NULL) == VG_OK && d.figure.nsides == 6);
+        vgi_drawing drawing = {.figure = &d.figure, .camera = &d.camera, .points = d.points, .contour = 1.5f};
+        vgi_raster_clear(&d.raster);
+        CHECK(vgi_raster_init(&d.raster, 200, 200, NULL) == VG_OK && vgi_draw(&d.raster, &drawing, NULL) == VG_OK);
+        lines[folded] = 0;
+        for (size_t i = 60; i < 140; i++) lines[folded] += d.raster.at[(199 - i) * 200 + i].kind == VGI_CONTOUR; /* the diagonal */
+        CHECK(count_kind(&d.raster, VGI_CONTOUR) > 3 * 160 * 2);
+        undraw(&d);
+    }
+    CHECK(lines[0] == 0 && lines[1] > 70);
+}
+
 /* ---- text ---- */
 
 static void every_character_has_its_own_shape(void)
@@ -662,5 +767,10 @@ TESTS({"cube covers its area", cube_covers_its_area}, {"views show their side", 
       {"options change the picture", options_change_the_picture},
       {"threads do not change bytes", threads_do_not_change_bytes}, {"refusals", refusals},
       {"album is evenly spaced", album_is_evenly_spaced},
+      {"albums match", albums_match},
+      {"colours end at short numbers", colours_end_at_short_numbers},
+      {"the map with a middle is grey there", map_with_a_middle_is_grey_there},
+      {"scales are geometric means", scales_are_geometric_means},
+      {"contours are where fronts end", contours_are_where_fronts_end},
       {"every character has its own shape", every_character_has_its_own_shape},
       {"long names lose their middle", long_names_lose_their_middle})
