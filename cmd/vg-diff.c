@@ -1,5 +1,5 @@
-/* vg-diff.c: measure how far a sequence is from the truth, and answer whether that is within a tolerance; the error of each vertex
- * goes into a stream. Leaves out the measures themselves (lib/model/measures.c) and pictures of the error (vg-view).
+/* vg-diff.c: measure how far a sequence is from the truth, and answer whether that is within a tolerance; the error of
+ * each vertex goes into a stream. Leaves out the measures themselves (lib/model/measures.c) and pictures of the error (vg-view).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 #include "report.h"

@@ -40,8 +40,8 @@ static const cli_option options[] = {
      .text = &opts.size},
     {.name = "view", .value = "front|back|left|right|top|iso|A,E", .text = &opts.view,
      .help = "from where, or azimuth and elevation in degrees (default: 30,15)"},
-    {.name = "zoom", .value = "X", .help = "how large: 1 (the default) is what fits", .number = &opts.zoom, .least = 1e-3,
-     .most = 1e3},
+    {.name = "zoom", .value = "X", .help = "how large: 1 (the default) is what fits", .number = &opts.zoom,
+     .least = 1e-3, .most = 1e3},
     {.name = "up", .value = "y|z", .help = "the axis that points up (default: y)", .choice = &opts.up},
     {.name = "follow", .help = "keep the figure in the middle of its picture", .flag = &opts.follow},
     {.name = "ground", .help = "draw a grid where the reference pose stands, and a shadow", .flag = &opts.ground},
@@ -121,7 +121,8 @@ static vg_tint choose_tint(void)
     if (opts.scales && opts.scale > 0 && opts.scale <= 1)
         cli_usage("option '--scale' needs a factor above 1 with --scales, not %g", opts.scale);
     if (opts.plain && opts.scale > 0) cli_usage("option '--scale' is about colours: --plain has none");
-    return opts.against ? VG_TINT_ERRORS : opts.scales ? VG_TINT_SCALES : opts.plain ? VG_TINT_PLAIN : VG_TINT_SCALARS;
+    if (opts.against) return VG_TINT_ERRORS;
+    return opts.scales ? VG_TINT_SCALES : opts.plain ? VG_TINT_PLAIN : VG_TINT_SCALARS;
 }
 
 static vg_sheet_options sheet_options(void)
@@ -129,7 +130,8 @@ static vg_sheet_options sheet_options(void)
     vg_sheet_options o = {.frames = opts.frames ? (size_t)opts.frames : 8, .columns = (size_t)opts.columns,
                           .edges = opts.edges,
                           .ground = opts.ground, .follow = opts.follow, .silhouettes = opts.silhouettes,
-                          .zoom = opts.zoom, .tint = choose_tint(), .centred = opts.centred, .scale = opts.scale, .threads = cli.threads};
+                          .zoom = opts.zoom, .tint = choose_tint(), .centred = opts.centred, .scale = opts.scale,
+                          .threads = cli.threads};
     parse_size(opts.size ? opts.size : "360x360", &o);
     parse_view(opts.view, &o);
     o.z_up = opts.up == 1;
@@ -271,9 +273,12 @@ static void close_cast(cast *c)
     for (size_t i = 0; i < opts.nbeside; i++) close_side(&c->beside[i]);
 }
 
-/* The next frame of what stands beside. Behind the end of the truth there is nothing to compare it with; check_counts says so. */
-static bool put_beside(cast *c, size_t i, const double *truth, bool truth_is_shown,
-                       void (*put)(void *context, size_t i, const side *s, const double *truth), void *context)
+/* Takes a frame of sequence number i; truth: what it is compared with, or NULL. */
+typedef void take_frame(void *context, size_t i, const side *s, const double *truth);
+
+/* The next frame of what stands beside. Behind the end of the truth there is nothing to compare it with; check_counts
+ * says so. */
+static bool put_beside(cast *c, size_t i, const double *truth, bool truth_is_shown, take_frame *put, void *context)
 {
     side *s = &c->beside[i];
     if (!next(s)) return false;
@@ -282,8 +287,7 @@ static bool put_beside(cast *c, size_t i, const double *truth, bool truth_is_sho
 }
 
 /* All are read to their ends, so that damage is seen, and side by side, so that each is read once. */
-static void read_cast(cast *c, bool shows_truth, void (*put)(void *context, size_t i, const side *s, const double *truth),
-                      void *context)
+static void read_cast(cast *c, bool shows_truth, take_frame *put, void *context)
 {
     for (bool more = true; more;) {
         bool a = next(&c->result), b = opts.against && next(&c->truth);
@@ -292,7 +296,8 @@ static void read_cast(cast *c, bool shows_truth, void (*put)(void *context, size
         if (a && (b || !opts.against)) put(context, 0, &c->result, truth);
         if (a && b && shows_truth) put(context, 1, &c->truth, NULL);
         more = a || b;
-        for (size_t i = 0; i < opts.nbeside; i++) more |= put_beside(c, i, truth, shows_truth && opts.against, put, context);
+        for (size_t i = 0; i < opts.nbeside; i++)
+            more |= put_beside(c, i, truth, shows_truth && opts.against, put, context);
     }
 }
 
@@ -323,7 +328,7 @@ static bool shows_reference(const cast *c)
     return !c->result.frames && !opts.against && c->result.head->patches.n;
 }
 
-static void put_reference(side *s, void (*put)(void *context, size_t i, const side *s, const double *truth), void *context)
+static void put_reference(side *s, take_frame *put, void *context)
 {
     vg_frame frame = s->frame;
     s->frame = (vg_frame){.name = s->head->reference_name, .values = s->head->reference};

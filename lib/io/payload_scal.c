@@ -37,7 +37,8 @@ int vgi_scal_decode(const vgi_payload *p, const vg_head *h, vg_frame *f, vg_err 
     size_t nv = h->mesh.nv, values;
     if (h->kind != VG_VERTICES) return wrong(p, "frames are no vertices", e);
     if (f->has_scalars) return wrong(p, "the frame has another one", e);
-    if (p->size < FRONT || !is_zero(p->data + 8, 8)) return wrong(p, "it is too short, or reserved bytes are not zero", e);
+    if (p->size < FRONT || !is_zero(p->data + 8, 8))
+        return wrong(p, "it is too short, or reserved bytes are not zero", e);
     size_t name = vgi_get32(p->data), unit = vgi_get32(p->data + 4), left = p->size - FRONT;
     if (name == 0) return wrong(p, "it has no name", e);
     if (name > left || unit > left - name) return wrong(p, "a text is longer than its record", e);
@@ -60,7 +61,8 @@ int vgi_scal_encode(vg_bytes *b, const vg_frame *f, vg_err *e)
     size_t name = strlen(f->scalars_name), unit = strlen(f->scalars_unit);
     unsigned char front[FRONT] = {0};
     if (name == 0) return vg_fail(e, VG_EARG, "numbers of vertices need a name");
-    if (name > UINT32_MAX || unit > UINT32_MAX) return vg_fail(e, VG_EARG, "a text of more than 4 GB is too long for a stream");
+    if (name > UINT32_MAX || unit > UINT32_MAX)
+        return vg_fail(e, VG_EARG, "a text of more than 4 GB is too long for a stream");
     vgi_put32(front, (uint32_t)name);
     vgi_put32(front + 4, (uint32_t)unit);
     int r = vgi_bytes_append(b, front, sizeof front, e);

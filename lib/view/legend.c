@@ -35,7 +35,8 @@ static void put_ticks(vgi_canvas *c, const vgi_tint *t, size_t x, size_t y, size
     }
 }
 
-void vgi_legend(vgi_canvas *c, const vgi_tint *t, const vgi_palette *p, size_t margin, const char *title, const char *note)
+void vgi_legend(vgi_canvas *c, const vgi_tint *t, const vgi_palette *p, size_t margin, const char *title,
+                const char *note)
 {
     char text[512];
     size_t room = c->w - 2 * margin, w = room < BAR_WIDTH ? room : BAR_WIDTH;

@@ -1,6 +1,6 @@
-/* sheet.c: the contact sheet: takes frames of one sequence or several, chooses, draws them row by row and puts captions and a
- * legend to them. Leaves out how a pose becomes pixels (raster.c, shade.c), what its colours say (tint.c), and how pixels become a
- * file (png.c). SPDX-License-Identifier: GPL-3.0-or-later */
+/* sheet.c: the contact sheet: takes frames of one sequence or several, chooses, draws them row by row and puts captions
+ * and a legend to them. Leaves out how a pose becomes pixels (raster.c, shade.c), what its colours say (tint.c), and how
+ * pixels become a file (png.c). SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
@@ -241,7 +241,8 @@ static int choose_colours(vg_sheet *s, vg_err *e)
     for (size_t k = 0; k < s->nsequences; k++)
         for (size_t i = 0; s->at[k].tinted && i < s->n; i++) {
             const vgi_shot *shot = shot_of(s->at + k, i);
-            if (!s->largest || shot->spread.most > s->largest->spread.most) s->largest = shot, s->largest_of = s->at + k;
+            if (!s->largest || shot->spread.most > s->largest->spread.most)
+                s->largest = shot, s->largest_of = s->at + k;
             if (!s->least || shot->spread.least < s->least->spread.least) s->least = shot, s->least_of = s->at + k;
         }
     int r = s->tinted && !(s->o.scale > 0) ? find_percentile(s, &common, e) : VG_OK;
@@ -436,7 +437,8 @@ static void put_caption(const vg_sheet *s, vgi_canvas *c, size_t x, const vgi_sh
 }
 
 /* Where a number is: "1.5 in 'pose3'", and of several sequences in which. */
-static void print_place(const vg_sheet *s, char *to, size_t size, double number, const sequence *q, const vgi_shot *shot)
+static void print_place(const vg_sheet *s, char *to, size_t size, double number, const sequence *q,
+                        const vgi_shot *shot)
 {
     char text[VGI_NUMBER], label[TEXT_BYTES];
     vgi_tint_number(&s->tint, number, text);
@@ -492,7 +494,8 @@ static int open_press(press *p, const vg_sheet *s, int fd, const char *name, vg_
 {
     size_t rows = (s->n + s->columns - 1) / s->columns * s->nsequences;
     size_t line = s->o.height + caption_height(s) + MARGIN;
-    size_t w = s->columns * (s->o.width + MARGIN) + MARGIN, h = MARGIN + rows * (line + title_height(s)) + footer_height(s);
+    size_t w = s->columns * (s->o.width + MARGIN) + MARGIN;
+    size_t h = MARGIN + rows * (line + title_height(s)) + footer_height(s);
     int r = vgi_png_open(&p->png, fd, name, w, h, e);
     if (r < 0) return r;
     p->canvas = (vgi_canvas){w, line > VGI_LEGEND ? line : VGI_LEGEND, NULL};

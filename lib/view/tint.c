@@ -1,5 +1,5 @@
-/* tint.c: the number of each vertex that becomes its colour: the distance from a truth, what came with the frame, or how much
- * longer its vectors are than in the reference pose; and where the colours end. Sheets and pages share it.
+/* tint.c: the number of each vertex that becomes its colour: the distance from a truth, what came with the frame, or how
+ * much longer its vectors are than in the reference pose; and where the colours end. Sheets and pages share it.
  * Leaves out the colours: colour.c. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
@@ -23,7 +23,8 @@ static int measure_lengths(vgi_meter *m, const double *reference, vg_err *e)
     return VG_OK;
 }
 
-int vgi_meter_init(vgi_meter *m, const vgi_tint *t, const vg_mesh *mesh, const double *reference, double unit, vg_err *e)
+int vgi_meter_init(vgi_meter *m, const vgi_tint *t, const vg_mesh *mesh, const double *reference, double unit,
+                   vg_err *e)
 {
     *m = (vgi_meter){.mesh = mesh, .unit = unit};
     m->numbers = vgi_array(mesh->nv, sizeof *m->numbers, e);
@@ -58,7 +59,7 @@ void vgi_corner_lengths(const vg_mesh *m, const double *points, double *lengths)
     }
 }
 
-/* The mean over the vectors of a vertex of how often they have doubled, which is the geometric mean of their scales. */
+/* The mean over the vectors of a vertex of how often they have doubled: the geometric mean of their scales. */
 static void measure_scales(vgi_meter *m, const double *points)
 {
     const vg_mesh *mesh = m->mesh;
@@ -96,8 +97,9 @@ static int same_name(vgi_tint *t, const vg_frame *f, vg_err *e)
         return t->name && t->unit ? VG_OK : VG_ENOMEM;
     }
     if (!strcmp(t->name, f->scalars_name) && !strcmp(t->unit, f->scalars_unit)) return VG_OK;
-    return vg_fail(e, VG_EINPUT, "frame '%s' brings '%s' in '%s', those before it '%s' in '%s': colours cannot say both",
-                   f->name, f->scalars_name, f->scalars_unit, t->name, t->unit);
+    return vg_fail(e, VG_EINPUT,
+                   "frame '%s' brings '%s' in '%s', those before it '%s' in '%s': colours cannot say both", f->name,
+                   f->scalars_name, f->scalars_unit, t->name, t->unit);
 }
 
 bool vgi_tint_has(const vgi_tint *t, const vg_frame *f, const double *truth)
@@ -196,8 +198,8 @@ void vgi_tint_title(const vgi_tint *t, double diagonal, char *to, size_t size)
         snprintf(to, size, "%s%s%s%s", t->name, *t->unit ? " in units of " : "", t->unit,
                  strcmp(t->unit, "D") ? "" : " (diagonal of the reference)");
     else if (diagonal > 0)
-        snprintf(to, size, "vertex error%s in units of D = %s (diagonal of the reference)", t->centred ? ", centred," : "",
-                 number);
+        snprintf(to, size, "vertex error%s in units of D = %s (diagonal of the reference)",
+                 t->centred ? ", centred," : "", number);
     else
         snprintf(to, size, "vertex error%s", centred);
 }
