@@ -4,6 +4,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/register.h"
 #include "model/kdtree.h"
+#include "model/turn.h"
 
 #include <stdlib.h>
 
@@ -35,34 +36,6 @@ struct registration {
 
 /* ---- the similarity ---- */
 
-/* The eigenvector of the largest eigenvalue of a symmetric 4 x 4 matrix, by Jacobi's rotations. */
-static void largest_eigenvector(double a[4][4], double q[4])
-{
-    double v[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
-    for (int sweep = 0; sweep < 30; sweep++)
-        for (int i = 0; i < 3; i++)
-            for (int j = i + 1; j < 4; j++) {
-                if (a[i][j] == 0) continue;
-                double theta = (a[j][j] - a[i][i]) / (2 * a[i][j]);
-                double t = (theta < 0 ? -1 : 1) / (fabs(theta) + sqrt(theta * theta + 1)), c = 1 / sqrt(t * t + 1),
-                       s = t * c;
-                for (int k = 0; k < 4; k++) {
-                    double x = a[k][i], y = a[k][j];
-                    a[k][i] = c * x - s * y, a[k][j] = s * x + c * y;
-                }
-                for (int k = 0; k < 4; k++) {
-                    double x = a[i][k], y = a[j][k];
-                    a[i][k] = c * x - s * y, a[j][k] = s * x + c * y;
-                    x = v[k][i], y = v[k][j];
-                    v[k][i] = c * x - s * y, v[k][j] = s * x + c * y;
-                }
-            }
-    int best = 0;
-    for (int k = 1; k < 4; k++)
-        if (a[k][k] > a[best][best]) best = k;
-    for (int k = 0; k < 4; k++) q[k] = v[k][best];
-}
-
 /* Least squares (Horn 1987): n weighted pairs of points; the scale treats both sides alike. */
 static void fit_similarity(struct similarity *s, const double *from, const double *to, const double *weight, size_t n)
 {
@@ -78,16 +51,10 @@ static void fit_similarity(struct similarity *s, const double *from, const doubl
             x[k] = from[3 * i + k] - a[k], y[k] = to[3 * i + k] - b[k];
             aa += weight[i] * x[k] * x[k], bb += weight[i] * y[k] * y[k];
         }
-        vgi_add_outer(S, weight[i], x, y);
+        vgi_add_outer(S, weight[i], y, x);
     }
-    double N[4][4] = {
-        {S[0] + S[4] + S[8], S[5] - S[7], S[6] - S[2], S[1] - S[3]},
-        {S[5] - S[7], S[0] - S[4] - S[8], S[1] + S[3], S[6] + S[2]},
-        {S[6] - S[2], S[1] + S[3], S[4] - S[0] - S[8], S[5] + S[7]},
-        {S[1] - S[3], S[6] + S[2], S[5] + S[7], S[8] - S[0] - S[4]},
-    };
     double q[4], turned[3];
-    largest_eigenvector(N, q);
+    vgi_best_turn(S, q);
     vg_quat_matrix(q, s->rotation);
     s->scale = sqrt(bb / aa);
     vgi_multiply_vector(s->rotation, a, turned);

@@ -3,6 +3,7 @@
  * Leaves out what the matrices are made of, but for the rotations of faces.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rotation_fit.h"
+#include "model/turn.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -40,41 +41,13 @@ static void newton(double x[9])
     }
 }
 
-/* One rotation of Jacobi's method: makes a[p][q] vanish. */
-static void jacobi_turn(double a[4][4], double v[4][4], int p, int q)
-{
-    if (a[p][q] == 0) return;
-    double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-    double t = (theta >= 0 ? 1 : -1) / (fabs(theta) + sqrt(theta * theta + 1)), c = 1 / sqrt(t * t + 1), s = t * c;
-    for (int k = 0; k < 4; k++) {
-        double x = a[k][p], y = a[k][q];
-        a[k][p] = c * x - s * y, a[k][q] = s * x + c * y;
-    }
-    for (int k = 0; k < 4; k++) {
-        double x = a[p][k], y = a[q][k];
-        a[p][k] = c * x - s * y, a[q][k] = s * x + c * y;
-        x = v[k][p], y = v[k][q];
-        v[k][p] = c * x - s * y, v[k][q] = s * x + c * y;
-    }
-}
-
+/* The largest eigenvector of Horn's matrix: for any m. */
 static void horn(const double m[9], double r[9])
 {
-    static const double bias = 1e-12; /* of several best rotations the one that turns least */
-    double n[4][4] = {{m[0] + m[4] + m[8] + bias, m[7] - m[5], m[2] - m[6], m[3] - m[1]},
-                      {0, m[0] - m[4] - m[8], m[3] + m[1], m[2] + m[6]},
-                      {0, 0, m[4] - m[0] - m[8], m[7] + m[5]},
-                      {0, 0, 0, m[8] - m[0] - m[4]}};
-    double v[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
-    for (int i = 0; i < 4; i++)
-        for (int k = 0; k < i; k++) n[i][k] = n[k][i];
-    for (int sweep = 0; sweep < 12; sweep++)
-        for (int p = 0; p < 4; p++)
-            for (int q = p + 1; q < 4; q++) jacobi_turn(n, v, p, q);
-    int best = 0;
-    for (int i = 1; i < 4; i++)
-        if (n[i][i] > n[best][best]) best = i;
-    const double q[4] = {v[0][best], v[1][best], v[2][best], v[3][best]};
+    static const double bias = 0.25e-12; /* of several best rotations the one that turns least */
+    double biased[9], q[4];
+    for (int i = 0; i < 9; i++) biased[i] = m[i] + (i % 4 == 0 ? bias : 0);
+    vgi_best_turn(biased, q);
     vg_quat_matrix(q, r);
 }
 
