@@ -130,8 +130,8 @@ one() {
 }
 
 # rods NAME RINGS SEGMENTS TIMES SOME: NAME-11.vgs, eleven poses of body A; NAME.vgs and NAME-some.vgs, so many times the same;
-# NAME-1.vgs, one pose; NAME-b.vgs, the target B; NAME-w.vgs, the vectors of the transfer; NAME-q.vgs, another cut of A into quads; NAME-c.vgs,
-# which faces of A drive it; NAME-p.vgs, vectors of A as quads, which are not planar, NAME-p1.vgs, one pose of them
+# NAME-1.vgs, one pose; NAME-b.vgs, the target B; NAME-w.vgs, the vectors of the transfer; NAME-q.vgs, another cut of A into
+# quads; NAME-p.vgs, vectors of A as quads, which are not planar, NAME-p1.vgs, one pose of them
 rods() {
     rod A tri "$2" "$3" 11 >"$1-11.vgs"
     rod A tri "$2" "$3" 1 >"$1-1.vgs"
@@ -142,7 +142,6 @@ rods() {
     copies "$4" "$1-11.vgs" "$1.vgs"
     copies "$5" "$1-11.vgs" "$1-some.vgs"
     vg-deform "$1.vgs" --onto "$1-b.vgs" -o "$1-w.vgs"
-    vg-register --aligned "$1-1.vgs" "$1-q.vgs" -o "$1-c.vgs"
     one "$1"
 }
 
@@ -216,6 +215,10 @@ every_stage() {
     row 'vg-encode --vectors, stream' "$poses" $(($(bytes "$n.vgs") + $(bytes "$n-w.vgs")))
     transfer "$n" "$poses" "$runs"
     transfer_rate=$rate
+    pair=$(bytes "$n-1.vgs" "$n-q.vgs")
+    best 1 "vg-register -q --aligned $n-1.vgs $n-q.vgs -o $n-c.vgs"
+    by_memory "$pair"
+    row 'vg-register --aligned' 1 "$pair"
     best "$runs" "vg-deform $n-some.vgs --onto $n-q.vgs --correspondence $n-c.vgs -o $n-cw.vgs"
     by_pipe $((few + $(bytes "$n-cw.vgs")))
     row 'vg-deform --correspondence' "$some" $((few + $(bytes "$n-cw.vgs")))
