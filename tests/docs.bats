@@ -70,6 +70,19 @@ prepare_examples() {
     for name in truth result poses dance; do cp walk.zip $name.zip; done
     vg-encode walk.zip -o result.vgs
     for name in walk poses truth; do cp result.vgs $name.vgs; done
+    # the skeleton that twists the cube as walk.zip does, pose by pose
+    twisting_skeleton 9 5.7295780 >man.bvh
+    twisting_skeleton 4 10 >dance.bvh
+}
+
+# twisting_skeleton FRAMES DEGREES: BVH whose upper joint turns by so much more about y in each frame
+twisting_skeleton() {
+    local i
+    printf '%s\n' HIERARCHY 'ROOT spine' '{' 'OFFSET 0 0 0' \
+        'CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation' 'JOINT elbow.L' '{' 'OFFSET 0 1 0' \
+        'CHANNELS 3 Zrotation Xrotation Yrotation' 'End Site' '{' 'OFFSET 0 1 0' '}' '}' '}' \
+        MOTION "Frames: $1" 'Frame Time: 0.04'
+    for ((i = 1; i <= $1; i++)); do echo "0 0 0 0 0 0 0 0 $(LC_ALL=C awk "BEGIN { print $i * $2 }")"; done
 }
 
 @test "every program has a page, and every page of section 1 a program" {
