@@ -349,23 +349,23 @@ static void print_text(const report *r, FILE *f)
 
 /* ----------------------------------------------------------------------------------------------- JSON -- */
 
+/* Jansson goes on without what it did not get, and gives half a text. */
+static void *json_memory(size_t n)
+{
+    return checked(malloc(n));
+}
+
 /* JSON is UTF-8; a file name need not be: what is not becomes '?'. */
 static json_t *json_of_text(const char *s)
 {
     json_t *j = json_string(s);
-    if (!j) j = json_string(s); /* that may have been for lack of memory; where it lasts, the copy is not to be had either */
     if (j) return j;
     char *copy = copy_text(s);
     for (char *p = copy; *p; p++)
         if ((unsigned char)*p >= 0x80) *p = '?';
-    j = checked(json_string(copy));
+    j = json_string(copy);
     free(copy);
     return j;
-}
-
-static void append(json_t *array, json_t *value)
-{
-    if (json_array_append_new(array, value)) checked(NULL);
 }
 
 static json_t *json_of(const report_value *v)
@@ -378,19 +378,19 @@ static json_t *json_of(const report_value *v)
     case REPORT_NUMBER: j = isfinite(v->is.number) ? json_real(v->is.number) : json_null(); break;
     case REPORT_FLAG: j = json_boolean(v->is.flag); break;
     case REPORT_TEXTS:
-        j = checked(json_array());
-        for (size_t i = 0; i < v->n; i++) append(j, json_of_text(v->is.texts[i]));
+        j = json_array();
+        for (size_t i = 0; i < v->n; i++) json_array_append_new(j, json_of_text(v->is.texts[i]));
         break;
     case REPORT_COUNTS:
-        j = checked(json_array());
-        for (size_t i = 0; i < v->n; i++) append(j, json_integer((json_int_t)v->is.counts[i]));
+        j = json_array();
+        for (size_t i = 0; i < v->n; i++) json_array_append_new(j, json_integer((json_int_t)v->is.counts[i]));
         break;
     case REPORT_NUMBERS:
         j = json_array();
         for (size_t i = 0; i < v->n; i++) json_array_append_new(j, json_real(v->is.numbers[i]));
         break;
     }
-    return checked(j);
+    return j;
 }
 
 static void set(json_t *object, const char *key, json_t *value)
@@ -400,14 +400,14 @@ static void set(json_t *object, const char *key, json_t *value)
 
 static json_t *json_of_table(const item *t)
 {
-    json_t *all = checked(t->keyed ? json_object() : json_array());
+    json_t *all = t->keyed ? json_object() : json_array();
     for (size_t i = 0; i < t->nrows; i++) {
         const report_value *cells = t->cells + i * t->ncolumns;
-        json_t *row = checked(json_object());
+        json_t *row = json_object();
         for (size_t c = t->keyed; c < t->ncolumns; c++)
             if (t->columns[c].key) set(row, t->columns[c].key, json_of(&cells[c]));
         if (t->keyed) set(all, cells[0].is.text, row);
-        else append(all, row);
+        else json_array_append_new(all, row);
     }
     return all;
 }
@@ -416,20 +416,21 @@ enum { MOST_DEPTH = 8 };
 
 static void print_json(const report *r, FILE *f)
 {
-    json_t *open[MOST_DEPTH] = {checked(json_object())};
+    json_set_alloc_funcs(json_memory, free);
+    json_t *open[MOST_DEPTH] = {json_object()};
     int depth = 0;
     for (size_t i = 0; i < r->n; i++) {
         const item *t = &r->items[i];
         if (t->kind == PUT && t->key) set(open[depth], t->key, json_of(&t->value));
         if (t->kind == TABLE && t->key) set(open[depth], t->key, json_of_table(t));
         if (t->kind == GROUP && depth + 1 < MOST_DEPTH) {
-            open[depth + 1] = checked(json_object());
+            open[depth + 1] = json_object();
             set(open[depth], t->key, open[depth + 1]); /* takes the reference over; it lives as long as its parent */
             depth++;
         }
         if (t->kind == END && depth > 0) depth--;
     }
-    char *text = checked(json_dumps(open[0], JSON_INDENT(2)));
+    char *text = json_dumps(open[0], JSON_INDENT(2));
     fprintf(f, "%s\n", text);
     free(text);
     json_decref(open[0]);

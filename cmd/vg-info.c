@@ -70,11 +70,11 @@ static void replace_text(char **to, const char *from)
     if (!*to) no_memory("the name of a frame");
 }
 
-/* Close a stream that wrote into memory; false: something of it was lost. */
-static bool close_line(FILE *f)
+/* Close a stream that wrote into *line; false: something of it was lost. glibc may close well and have no line. */
+static bool close_line(FILE *f, char *const *line)
 {
     bool lost = ferror(f) != 0;
-    return fclose(f) == 0 && !lost;
+    return fclose(f) == 0 && !lost && *line;
 }
 
 /* ---------------------------------------------------------------------------------------------- frames -- */
@@ -221,7 +221,7 @@ static char *size_line(const vg_mesh *m, const uint64_t *count, size_t largest)
         at++;
     }
     if (rest) fprintf(f, ", %" PRIu64 " of %zu to %zu", rest, first, largest);
-    if (!close_line(f)) no_memory("the sizes of faces");
+    if (!close_line(f, &line)) no_memory("the sizes of faces");
     return line;
 }
 
@@ -434,7 +434,7 @@ static void note_process(report *r, const vg_provenance *p, size_t depth)
         if (i) fputc(' ', f);
         print_quoted(f, p->args[i]);
     }
-    if (!close_line(f)) no_memory("the command lines");
+    if (!close_line(f, &line)) no_memory("the command lines");
     report_note(r, "  %*s%s", (int)(2 * (depth < 20 ? depth : 20)), "", line);
     free(line);
 }

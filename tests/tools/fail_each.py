@@ -59,7 +59,7 @@ def judge(result, before, whole, whole_output):
         return None if after == whole and result.stdout == whole_output else "done, but with another result"
     if result.returncode != 4:
         return f"status {result.returncode}"
-    lines = said.splitlines()
+    lines = [line for line in said.splitlines() if line]
     if len(lines) > 1 and any(lines[0].startswith(name) for name in TALKERS):
         lines = lines[1:]
     if len(lines) != 1 or not lines[0].startswith("vg-") or "memory" not in lines[0]:

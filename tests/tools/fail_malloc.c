@@ -55,7 +55,7 @@ static bool is_early(const void *p)
     return (const char *)p >= early.bytes && (const char *)p < early.bytes + sizeof early.bytes;
 }
 
-static bool looking;
+static volatile bool looking; /* volatile: dlsym is declared as a function that does not come back here, but it does */
 static void *next(void **cached, const char *name)
 {
     if (*cached || looking) return *cached;
