@@ -842,6 +842,20 @@ double cli_parse_number(const char *option, const char *text)
     return x;
 }
 
+uint64_t cli_parse_size(const char *option, const char *text)
+{
+    static const char units[] = "KMGT";
+    char *end;
+    errno = 0;
+    unsigned long long x = strtoull(text, &end, 10);
+    const char *unit = *end ? strchr(units, *end & ~0x20) : NULL;
+    if (errno || *text < '0' || *text > '9' || (*end && (!unit || end[1])))
+        cli_usage("option '--%s' needs a size such as 64M or 2G, not '%s'", bare(option), text);
+    for (const char *u = units; unit && u <= unit; u++)
+        if (__builtin_mul_overflow(x, 1024, &x)) return UINT64_MAX;
+    return x;
+}
+
 static int compare_vertices(const void *a, const void *b)
 {
     uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
@@ -874,7 +888,7 @@ vg_source *cli_source(char **operands, size_t n)
     return cli_source_with(operands, n, NULL);
 }
 
-vg_source *cli_source_with(char **operands, size_t n, const char *mesh)
+vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o)
 {
     static const char *const standard_input[] = {"-"};
     const char *const *from = n ? (const char *const *)operands : standard_input;
@@ -882,7 +896,7 @@ vg_source *cli_source_with(char **operands, size_t n, const char *mesh)
     vg_err e;
     if (n == 0 && isatty(STDIN_FILENO))
         cli_usage("no input: name a stream, mesh file, archive or directory, or pipe one into %s", cli.program->name);
-    if (vg_source_open_with(&s, from, n ? n : 1, mesh, &e) < 0) cli_die(&e);
+    if (vg_source_open_with(&s, from, n ? n : 1, o, &e) < 0) cli_die(&e);
     if (vg_source_warning(s)) cli_warn("%s", vg_source_warning(s));
     return upstream = s;
 }

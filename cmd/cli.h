@@ -68,14 +68,16 @@ void cli_progress(const char *label, uint64_t n);
 
 /* cli_parse_number: the whole text as a finite number, or cli_usage naming the option. */
 double cli_parse_number(const char *option, const char *text);
+/* cli_parse_size: "4096", "64K", "2G" to bytes, UINT64_MAX when that is more, or cli_usage naming the option. */
+uint64_t cli_parse_size(const char *option, const char *text);
 /* cli_parse_vertices: "3,17,4" to an ascending list without repetition (free with free()), or cli_usage. */
 size_t cli_parse_vertices(const char *option, const char *text, uint32_t **vertices);
 
 /* The input of a filter: its operands, or standard input when there are none. To be closed when nothing is left to be read: what
  * cli_die says of a program before this one comes from it. */
 vg_source *cli_source(char **operands, size_t n);
-/* The same; mesh (may be NULL): the faces and reference pose of operands without faces. */
-vg_source *cli_source_with(char **operands, size_t n, const char *mesh);
+/* The same, with options (may be NULL). */
+vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o);
 
 /* cli_read_file: a whole file ("-": standard input); free(). Dies when it cannot be read. */
 char *cli_read_file(const char *path, size_t *n);

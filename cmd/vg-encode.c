@@ -7,7 +7,7 @@
 
 static struct {
     bool vectors, f32;
-    const char *reference, *anchors, *mesh;
+    const char *reference, *anchors, *mesh, *most_bytes;
     double fps;
     size_t faces; /* 1: selected */
 } opts;
@@ -17,6 +17,8 @@ static const cli_option options[] = {
     {"faces", 0, "all|selected", "which faces carry vectors: all (default), or about half of them", .choice = &opts.faces},
     {"reference", 0, "MESH", "the undeformed pose; default: the first pose", .text = &opts.reference},
     {"mesh", 0, "MESH", "the faces and reference pose of point caches and arrays, which hold none", .text = &opts.mesh},
+    {"max-bytes", 0, "SIZE", "what an archive or compressed file may unpack to (default: 1G in one file, 64G in all)",
+     .text = &opts.most_bytes},
     {"anchor", 0, "V,V,...", "vertices that vg-solve must meet exactly", .text = &opts.anchors},
     {"fps", 0, "N", "give the poses times, N a second, from 0", .number = &opts.fps, .least = 1e-6, .most = 1e9},
     {"f32", 0, NULL, "write binary32 instead of binary64", .flag = &opts.f32},
@@ -138,7 +140,10 @@ int main(int argc, char **argv)
     bool selects = opts.faces == 1;
     if (opts.anchors) nanchors = cli_parse_vertices("--anchor", opts.anchors, &anchors);
 
-    vg_source *s = cli_source_with(operands, n, opts.mesh);
+    vg_source_options from = {.mesh = opts.mesh};
+    if (opts.most_bytes && !(from.most_bytes = cli_parse_size("max-bytes", opts.most_bytes)))
+        cli_usage("option '--max-bytes' needs a size of at least 1");
+    vg_source *s = cli_source_with(operands, n, &from);
     vg_head *h = vg_source_head(s);
     prepare(h, selects, anchors, nanchors);
     if (opts.vectors) write_vectors(s, h);

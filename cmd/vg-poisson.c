@@ -89,15 +89,7 @@ static void take_key(const char *text, void *context)
 static void take_memory(const char *text, void *context)
 {
     (void)context;
-    static const char units[] = "KMGT";
-    size_t n = strlen(text);
-    const char *unit = n ? strchr(units, text[n - 1] & ~0x20) : NULL;
-    char number[32];
-    uint64_t x;
-    snprintf(number, sizeof number, "%.*s", (int)(n < 30 ? n - (unit != NULL) : 31), text);
-    if (!parse_count(number, &x)) cli_usage("option '--memory' needs a size such as 64M or 2G, not '%s'", text);
-    opts.memory = (double)x;
-    for (const char *u = units; unit && u <= unit; u++) opts.memory *= 1024;
+    opts.memory = (double)cli_parse_size("memory", text);
 }
 
 static const cli_option options[] = {

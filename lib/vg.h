@@ -832,10 +832,15 @@ void vg_writer_close(vg_writer **w);
  * reference unless a stream or a sequence brings its own. */
 typedef struct vg_source vg_source;
 int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err *e) VG_MUST_CHECK;
-/* vg_source_open_with: `mesh` (may be NULL) is an operand whose faces and reference pose are those of operands that hold
- * none of their own (point caches, arrays); without it they are those of the operand before, or of the file of the same name
- * that ends in .obj or .ply. */
-int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const char *mesh, vg_err *e) VG_MUST_CHECK;
+typedef struct vg_source_options {
+    const char *mesh;    /* an operand whose faces and reference pose are those of operands that hold none of their own (point
+                            caches, arrays); NULL: those of the operand before, or of the file of the same name that ends in
+                            .obj or .ply */
+    uint64_t most_bytes; /* what an archive, a compressed file, or a mesh file from a pipe may hold, unpacked; 0: 1 GiB in one
+                            file, 64 GiB in all */
+} vg_source_options;
+/* vg_source_open_with: o may be NULL. */
+int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const vg_source_options *o, vg_err *e) VG_MUST_CHECK;
 /* vg_source_warning: what was left out of the mesh, one line; NULL: nothing. Borrowed until close. */
 const char *vg_source_warning(const vg_source *s);
 vg_head *vg_source_head(vg_source *s);

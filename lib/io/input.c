@@ -18,6 +18,7 @@ struct vgi_input {
     unsigned char *buffer;     /* NULL for memory */
     const unsigned char *data; /* what has been read and not taken */
     size_t size;
+    uint64_t most; /* that vgi_input_slurp takes */
 };
 
 static int make(vgi_input **in, const char *name, vg_err *e)
@@ -25,6 +26,7 @@ static int make(vgi_input **in, const char *name, vg_err *e)
     *in = vgi_array(1, sizeof **in, e);
     if (!*in) return VG_ENOMEM;
     (*in)->fd = -1;
+    (*in)->most = UINT64_MAX;
     (*in)->name = vgi_copy_string(name, strlen(name), e);
     if ((*in)->name) return VG_OK;
     vgi_input_free(in);
@@ -158,6 +160,17 @@ int vgi_input_take(vgi_input *in, vg_bytes *b, size_t n, size_t *got, vg_err *e)
     return r;
 }
 
+void vgi_input_limit(vgi_input *in, uint64_t most)
+{
+    in->most = most;
+}
+
+static int larger_than(const vgi_input *in, uint64_t most, vg_err *e)
+{
+    return vg_fail(e, VG_EINPUT, "'%s' holds more than %llu bytes: allow more with 'vg-encode --max-bytes'", in->name,
+                   (unsigned long long)most);
+}
+
 int vgi_input_slurp(vgi_input *in, vg_bytes *b, vg_err *e)
 {
     int r = vgi_bytes_append(b, in->data, in->size, e);
@@ -168,8 +181,48 @@ int vgi_input_slurp(vgi_input *in, vg_bytes *b, vg_err *e)
         ssize_t more = read_some(in, b->data + b->size, b->cap - b->size, e);
         if (more < 0) return (int)more;
         b->size += (size_t)more;
+        if (b->size > in->most) return larger_than(in, in->most, e);
     }
     return VG_OK;
+}
+
+/* ---- files without a name ---- */
+
+int vgi_nameless_file(vg_err *e)
+{
+    const char *dir = getenv("TMPDIR");
+    if (!dir || !*dir) dir = "/tmp";
+    int fd = open(dir, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+    if (fd >= 0) return fd;
+    char path[4096]; /* not every file system knows O_TMPFILE */
+    int n = snprintf(path, sizeof path, "%s/vg-XXXXXX", dir);
+    if (n > 0 && (size_t)n < sizeof path && (fd = mkostemp(path, O_CLOEXEC)) >= 0) {
+        unlink(path);
+        return fd;
+    }
+    return vg_fail(e, VG_ESYS, "cannot make a temporary file in '%s': %s", dir, strerror(errno));
+}
+
+int vgi_spool(vgi_input *in, uint64_t limit, int *out, vg_err *e)
+{
+    unsigned char *block = vgi_array_raw(BUFFER, 1, e);
+    if (!block) return VG_ENOMEM;
+    int fd = vgi_nameless_file(e), r = fd < 0 ? fd : VG_OK;
+    uint64_t total = 0;
+    while (r == VG_OK) {
+        size_t got = 0;
+        r = vgi_input_read(in, block, BUFFER, &got, e);
+        bool end = r == VG_ETRUNC;
+        if (r < 0 && !end) break;
+        total += got;
+        r = total > limit ? larger_than(in, limit, e)
+                          : vgi_write_all(fd, block, got, "temporary file", e);
+        if (end) break;
+    }
+    free(block);
+    if (r < 0 && fd >= 0) close(fd);
+    else *out = fd;
+    return r;
 }
 
 int vgi_write_all(int fd, const void *data, size_t n, const char *name, vg_err *e)

@@ -22,6 +22,8 @@ int vgi_input_peek(vgi_input *in, size_t n, const unsigned char **data, size_t *
 int vgi_input_read(vgi_input *in, void *to, size_t n, size_t *got, vg_err *e) VG_MUST_CHECK;
 /* vgi_input_take: append exactly n bytes to b, which grows as they arrive (a false n costs no memory). */
 int vgi_input_take(vgi_input *in, vg_bytes *b, size_t n, size_t *got, vg_err *e) VG_MUST_CHECK;
+/* vgi_input_limit: where vgi_input_slurp stops, with VG_EINPUT. */
+void vgi_input_limit(vgi_input *in, uint64_t most);
 /* vgi_input_slurp: append all that is left. */
 int vgi_input_slurp(vgi_input *in, vg_bytes *b, vg_err *e) VG_MUST_CHECK;
 /* vg_reader over an input; the reader takes the input over, also when it fails. */
@@ -29,6 +31,10 @@ int vgi_reader_open_input(vg_reader **r, vgi_input *in, vg_err *e) VG_MUST_CHECK
 /* Does data start like a stream? */
 bool vgi_is_stream(const unsigned char *data, size_t n);
 
+/* vgi_nameless_file: a new file without a name in $TMPDIR (or /tmp), for reading and writing; its descriptor. */
+int vgi_nameless_file(vg_err *e) VG_MUST_CHECK;
+/* vgi_spool: copy what is left of an input that can be read only once into a file without a name. */
+int vgi_spool(vgi_input *in, uint64_t limit, int *fd, vg_err *e) VG_MUST_CHECK;
 /* vgi_write_all: write n bytes to fd, whatever the interruptions; VG_ESYS naming `name`. */
 int vgi_write_all(int fd, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
 
@@ -205,12 +211,12 @@ size_t vgi_packed_stem(const char *name);    /* length of name without ".gz" or 
 /* vgi_pose_name: what a pose from this file is called: "dir/pose1.obj.gz" is "pose1". Valid UTF-8; free it; NULL: no memory. */
 char *vgi_pose_name(const char *path, vg_err *e);
 
-/* ---- archive.c: the one file that knows libarchive ---- */
+/* ---- archive.c, pack.c: files out of archives and into them; with unpack.c, the files that know libarchive ---- */
 
 /* Where reading stops, so that a small archive cannot fill a machine. */
 typedef struct vgi_limits {
     uint64_t member_bytes, total_bytes; /* unpacked */
-    size_t members;                     /* mesh files */
+    size_t members;                     /* entries of any kind */
 } vgi_limits;
 extern const vgi_limits vgi_archive_limits; /* what all programs use */
 
@@ -228,11 +234,6 @@ int vgi_archive_open_for(vgi_archive **a, int fd, int64_t base, const char *name
 /* vgi_archive_next: 1, path (borrowed until the next call) and contents of the next file; 0 behind the last one. */
 int vgi_archive_next(vgi_archive *a, const char **path, vg_bytes *data, vg_err *e) VG_MUST_CHECK;
 void vgi_archive_close(vgi_archive **a);
-/* vgi_nameless_file: a new file without a name in $TMPDIR (or /tmp), for reading and writing; its descriptor. */
-int vgi_nameless_file(vg_err *e) VG_MUST_CHECK;
-/* vgi_spool: copy what is left of an input that can be read only once into a file without a name. */
-int vgi_spool(vgi_input *in, uint64_t limit, int *fd, vg_err *e) VG_MUST_CHECK;
-
 /* Writing. The bytes depend on names and contents only. */
 typedef struct vgi_packer vgi_packer;
 bool vgi_packer_knows(const char *name, size_t n); /* do the first n bytes of name end like an archive we write? */

@@ -1,7 +1,7 @@
 /* sink.c: the door out: one mesh file, a numbered series, a directory, an archive, standard output, or one file that
  * holds the whole sequence.
  * Leaves out the text of a mesh file (format.c), the bytes of a sequence (sequence.c) and those of an archive
- * (archive.c).
+ * (pack.c).
  *
  * Everything is written beside its place under a temporary name and takes its final one in vg_sink_end; pipes and
  * devices, which cannot be replaced, are written where they are.

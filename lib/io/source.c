@@ -44,6 +44,7 @@ struct vg_source {
     item *items;
     size_t n, cap, next; /* next: the item to be opened */
     bool stdin_named;
+    vgi_limits limits;
     bool through;        /* one stream: handed on as it is */
     vg_head head;        /* of the joined sequence; the caller may change it */
     vg_head own;         /* what frames are measured by: mesh, kind, count; of a skeleton also its joints and reference */
@@ -327,7 +328,7 @@ static int open_archive(vg_source *s, item *it, vg_err *e)
     if (!it->regular) {
         vgi_input *in;
         if ((r = open_input(it, &in, e)) < 0) return r;
-        r = vgi_spool(in, vgi_archive_limits.total_bytes, &fd, e);
+        r = vgi_spool(in, s->limits.total_bytes, &fd, e);
         vgi_input_free(&in);
     } else {
         fd = it->path ? open(it->path, O_RDONLY | O_CLOEXEC) : fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
@@ -335,7 +336,7 @@ static int open_archive(vg_source *s, item *it, vg_err *e)
     }
     if (r < 0) return r;
     s->archive_name = item_name(it);
-    return vgi_archive_open(&s->archive, fd, it->base, s->archive_name, &vgi_archive_limits, e);
+    return vgi_archive_open(&s->archive, fd, it->base, s->archive_name, &s->limits, e);
 }
 
 static int take_over_model(vg_source *s, const char *archive, const char *path, vg_err *e)
@@ -389,6 +390,7 @@ static int open_mesh(vg_source *s, item *it, vg_err *e)
     int r = open_input(it, &in, e);
     if (r < 0) return r;
     s->data.size = 0;
+    if (!it->regular) vgi_input_limit(in, s->limits.member_bytes);
     r = vgi_input_slurp(in, &s->data, e);
     vgi_input_free(&in);
     return r < 0 ? r : take_pose(s, NULL, item_name(it), e);
@@ -659,11 +661,14 @@ static int settle_named_mesh(vg_source *s, const char *mesh, vg_err *e)
 }
 
 /* first_only: no more than the first item is wanted, so the others are not even looked at. */
-static int open_source(vg_source **out, const char *const *operands, size_t n, const char *mesh, bool first_only,
+static int open_source(vg_source **out, const char *const *operands, size_t n, const vg_source_options *o, bool first_only,
                        vg_err *e)
 {
+    const char *mesh = o ? o->mesh : NULL;
     vg_source *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
+    s->limits = vgi_archive_limits;
+    if (o && o->most_bytes) s->limits.member_bytes = s->limits.total_bytes = o->most_bytes;
     int r = n ? VG_OK : vg_fail(e, VG_EARG, "no input is named");
     if (r == VG_OK && mesh) r = settle_named_mesh(s, mesh, e);
     for (size_t i = 0; r == VG_OK && i < n; i++) r = add_operand(s, operands[i], e);
@@ -679,9 +684,9 @@ int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err 
     return open_source(s, operands, n, NULL, false, e);
 }
 
-int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const char *mesh, vg_err *e)
+int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const vg_source_options *o, vg_err *e)
 {
-    return open_source(s, operands, n, mesh, false, e);
+    return open_source(s, operands, n, o, false, e);
 }
 
 const char *vg_source_warning(const vg_source *s)
