@@ -1,0 +1,227 @@
+#!/usr/bin/env bats
+# Files that mean no good, and meshes that nobody models: a defined answer or a clear refusal, in bounded time and memory; no NaN,
+# no half a file. What is refused on the level of a format is in formats.bats and the corpora.
+# SPDX-License-Identifier: GPL-3.0-or-later
+load lib.bash
+
+hostile() {
+    must python3 "$ROOT/tests/tools/hostile.py" "$@"
+}
+
+# soon COMMAND...: within a minute, and within 2 GB of memory where no sanitizer needs more
+soon() {
+    case ${CONFIG:-release} in
+    release) timeout 60 bash -c 'ulimit -v 2000000; "$@"' bash "$@" ;;
+    *) timeout 240 "$@" ;;
+    esac
+}
+
+# answers COMMAND...: status 0, or 1 or 3 with one line; and what it wrote with -o is whole
+answers() {
+    local out=
+    capture soon "$@" || return 1
+    case $status in
+    0) ;;
+    1 | 3) one_line && [ -n "$stderr" ] || return 1 ;;
+    *) fail "'$*' ended with status $status" "$stderr" || return 1 ;;
+    esac
+    [[ $output != *[nN]a[nN]* && $stderr != *[nN]a[nN]* ]] || fail "'$*' speaks of NaN" "$output" "$stderr" || return 1
+    while [ $# -gt 1 ]; do
+        [ "$1" != -o ] || out=$2
+        shift
+    done
+    if [ "$status" = 0 ] && [[ $out == *.vgs ]]; then must vg-info --check "$out"; fi # which refuses what is not finite
+}
+
+# ---- archives ---------------------------------------------------------------------------------------------------------
+
+@test "names that lead out of the archive are names only" {
+    hostile names
+    must soon vg-encode names.tar.gz -o t.vgs
+    must soon vg-encode names.zip -o z.vgs
+    must vg-info --json t.vgs
+    [ "$(python3 -c 'import json,sys; print(json.load(sys.stdin)["frames"])' <.stdout)" = 5 ]
+    [[ $output != *$'\033'* ]]
+    pipe "vg-encode names.tar.gz | vg-decode -o out/"
+    [ "$(find out -type f -printf x)" = xxxxx ]
+    nothing_but names.tar.gz names.zip t.vgs z.vgs out
+}
+
+@test "links, devices, pipes and directories in an archive are not followed" {
+    hostile links
+    must soon vg-encode symbolic.tar.gz -o out.vgs
+    must vg-info --json out.vgs
+    [ "$(python3 -c 'import json,sys; print(json.load(sys.stdin)["frames"])' <.stdout)" = 1 ]
+    must_fail 3 soon vg-encode hard.tar.gz -o no.vgs
+    says "'b.obj' in 'hard.tar.gz' is a link"
+    must_fail 3 soon vg-encode devices.tar.gz -o no.vgs
+    says "devices.tar.gz"
+}
+
+@test "archives in archives are not opened" {
+    hostile nested
+    must_fail 3 soon vg-encode nested.zip -o out.vgs
+    says "archive 'nested.zip' holds no mesh file"
+    must_fail 3 soon vg-encode nested.obj.gz -o out.vgs
+    one_line
+}
+
+@test "encrypted members are refused by name" {
+    hostile encrypted
+    must_fail 3 soon vg-encode encrypted.zip -o out.vgs
+    says "encrypted: unpack it first"
+    [ ! -e out.vgs ]
+}
+
+@test "a member that expands without end stops at --max-bytes" {
+    hostile bomb
+    [ "$(stat -c %s bomb.obj.gz)" -lt 1000000 ]
+    for file in bomb.obj.gz bomb.zip; do
+        must_fail 3 soon vg-encode --max-bytes 16M $file -o out.vgs
+        says "$file" "unpacks to more than 16777216 bytes" "--max-bytes"
+        one_line
+    done
+    must_fail 3 soon vg-encode --max-bytes 16M between.tar.gz -o out.vgs
+    says "'between.tar.gz' unpacks to more than 16777216 bytes"
+    must_fail 3 soon vg-encode liar.zip -o out.vgs
+    must soon vg-encode --max-bytes 300M between.tar.gz -o out.vgs
+    pipe_fail 3 "yes 'v 0 0 0' 2>/dev/null | vg-encode --max-bytes 16M -o no.vgs"
+    says "'standard input' holds more than 16777216 bytes"
+    pipe_fail 3 "cat bomb.zip | vg-encode --max-bytes 100K -o no.vgs"
+    [ ! -e no.vgs ]
+    for size in 0 '' x 1X -1; do must_fail 2 vg-encode --max-bytes "$size" bomb.zip -o no.vgs; done
+}
+
+@test "without --max-bytes a file in an archive may hold 1 GiB" {
+    [ "${CONFIG:-release}" = release ] || skip "a sanitizer takes too long"
+    python3 - <<'END'
+import gzip
+chunk = b"v 0 0 0\n" * 131072
+with gzip.GzipFile("giant.obj.gz", "wb", compresslevel=1) as f:
+    for _ in range(1025):
+        f.write(chunk)
+END
+    must_fail 3 bash -c 'ulimit -v 4000000; timeout 100 vg-encode giant.obj.gz -o out.vgs'
+    says "unpacks to more than 1073741824 bytes"
+}
+
+@test "millions of entries are refused, none of them a mesh" {
+    hostile many
+    must_fail 3 soon vg-encode many.tar.gz -o out.vgs
+    says "'many.tar.gz' holds more than 2097152 files"
+}
+
+# ---- geometry ---------------------------------------------------------------------------------------------------------
+
+# there_and_back KIND: vectors, solved, are the poses again
+there_and_back() {
+    must vg-encode "$1"-[123].obj -o "$1.vgs"
+    for faces in all selected; do
+        must soon vg-encode --vectors --faces $faces "$1"-[123].obj -o vectors.vgs
+        must soon vg-solve vectors.vgs -o again.vgs
+        must vg-diff -t 1e-7 "$1.vgs" again.vgs
+    done
+}
+
+# every_program KIND: whatever it is asked for
+every_program() {
+    local k=$1 by
+    answers vg-encode "$k"-[123].obj -o "$k.vgs" && [ "$status" = 0 ] || return 1
+    answers vg-encode --vectors "$k.vgs" -o v.vgs || return 1
+    answers vg-solve v.vgs -o s.vgs || return 1
+    answers vg-solve --weights area --planar v.vgs -o s.vgs || return 1
+    answers vg-deform "$k.vgs" -o d.vgs || return 1
+    for by in pose gradient blend shape; do
+        answers vg-deform --onto "$k-target.obj" --by $by "$k.vgs" -o d.vgs || return 1
+        if [ "$status" = 0 ]; then answers vg-solve d.vgs -o s.vgs || return 1; fi
+    done
+    answers vg-deform --at -1,0.5,2.5 --smooth "$k.vgs" -o i.vgs || return 1
+    if [ "$status" = 0 ]; then answers vg-solve i.vgs -o s.vgs || return 1; fi
+    answers vg-poisson --first "$k-target.obj" "$k.vgs" -o p.vgs || return 1
+    answers vg-segment -k 2 "$k.vgs" -o seg.vgs || return 1
+    if [ "$status" = 0 ] && [ "$2" != no-map ]; then
+        answers vg-fitmap -q --patches seg.vgs "$k.vgs" -o map.vgs || return 1
+        if [ "$status" = 0 ]; then answers vg-deform --map map.vgs --interpolate 4 "$k.vgs" -o m.vgs || return 1; fi
+    fi
+    printf '0 0\n1 1\n2 2\n' >markers.txt
+    [ "$3" = no-pairs ] || answers vg-register -q "$k-1.obj" "$k-target.obj" --markers markers.txt -o c.vgs || return 1
+    if [ "$status" = 0 ] && [ -f c.vgs ]; then
+        answers vg-deform --onto "$k-target.obj" --correspondence c.vgs "$k.vgs" -o d.vgs || return 1
+    fi
+    answers vg-diff "$k.vgs" s.vgs || return 1
+    answers vg-diff --json "$k.vgs" s.vgs || return 1
+    answers vg-info "$k.vgs" || return 1
+    answers vg-view "$k.vgs" -o a.png || return 1
+    answers vg-view "$k.vgs" -o a.html || return 1
+    answers vg-decode -q "$k.vgs" -o 'a-%d.stl' || return 1
+    for out in a.zip:ply a.glb a.usda; do answers vg-decode -q "$k.vgs" -o $out || return 1; done
+    answers vg-decode -q --no-mesh "$k.vgs" -o a.pc2 || return 1
+}
+
+@test "edges with three faces, faces there twice, flipped faces, duplicate vertices" {
+    hostile nonmanifold flipped duplicates
+    for kind in nonmanifold flipped duplicates; do
+        there_and_back $kind
+        every_program $kind
+    done
+}
+
+@test "faces without area, vertices without a face, all vertices at one place" {
+    hostile zeroarea isolated onepoint
+    there_and_back zeroarea
+    for kind in zeroarea isolated onepoint; do every_program $kind; done
+}
+
+@test "one face, no face" {
+    hostile oneface noface
+    there_and_back oneface
+    for kind in oneface noface; do every_program $kind; done
+}
+
+@test "lengths of 1e-20 and 1e20, a small thing far away" {
+    hostile tiny huge far
+    for kind in tiny huge; do
+        there_and_back $kind
+        must vg-diff -t 1e-7 $kind.vgs $kind.vgs
+    done
+    for kind in tiny huge far; do every_program $kind; done
+}
+
+@test "what is transferred at 1e-20 and 1e20 is what is transferred at 1" {
+    hostile tiny huge
+    for i in 1 2 3; do awk '/^v/ { printf "v %.17g %.17g %.17g\n", $2 / 1e20, $3 / 1e20, $4 / 1e20; next } { print }' huge-$i.obj >one-$i.obj; done
+    awk '/^v/ { printf "v %.17g %.17g %.17g\n", $2 / 1e20, $3 / 1e20, $4 / 1e20; next } { print }' huge-target.obj >one-target.obj
+    for kind in tiny huge one; do
+        pipe "vg-encode $kind-[123].obj | vg-deform --onto $kind-target.obj | vg-solve -o $kind.vgs"
+    done
+    py <<'END'
+import read_stream
+one, tiny, huge = (read_stream.read_stream(k + ".vgs").frames for k in ("one", "tiny", "huge"))
+for a, b, c in zip(one, tiny, huge):
+    for x, y, z in zip(a.values, b.values, c.values):
+        assert abs(x - y * 1e20) < 1e-9 and abs(x - z / 1e20) < 1e-9, (a.name, x, y, z)
+END
+}
+
+@test "lengths whose squares are no numbers: refused, or finite" {
+    hostile beyond
+    every_program beyond
+    every_program beneath
+}
+
+@test "100,000 components" {
+    hostile islands=100000
+    there_and_back islands
+    every_program islands no-map no-pairs # a map's memory is components times vertices; pairs take a minute
+    hostile islands=10000
+    must vg-encode islands-[123].obj -o islands.vgs
+    must soon vg-register -q islands-1.obj islands-target.obj --markers markers.txt -o c.vgs
+    capture soon vg-register islands-1.obj islands-target.obj --markers markers.txt -o c.vgs
+    [ "$(wc -l <.stderr)" -lt 20 ] # not a warning for each component
+}
+
+@test "a face of 10,000 corners" {
+    hostile polygon
+    there_and_back polygon
+    every_program polygon
+}
