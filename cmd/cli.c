@@ -147,6 +147,8 @@ static struct {
     volatile sig_atomic_t has_temporary;
 } out = {.fd = -1};
 
+static void (*discard_other)(void); /* output that is not ours; NULL: none */
+
 static void remove_temporary(void)
 {
     if (out.has_temporary) unlink(out.temporary);
@@ -156,6 +158,7 @@ static void remove_temporary(void)
 static void end_by_signal(int number)
 {
     if (out.has_temporary) unlink(out.temporary);
+    if (discard_other) discard_other();
     raise(number); /* the handler was one-shot: the second time ends the process, and by the right signal */
 }
 
@@ -166,6 +169,12 @@ static void catch_signals(void)
     sigemptyset(&handler.sa_mask);
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         if (!sigaction(numbers[i], NULL, &old) && old.sa_handler != SIG_IGN) sigaction(numbers[i], &handler, NULL);
+}
+
+void cli_discard_by(void (*discard)(void))
+{
+    discard_other = discard;
+    catch_signals();
 }
 
 static vg_source *upstream; /* of cli_source: it may know of a program before this one that failed */
@@ -287,6 +296,7 @@ static const char *split_path(const char *path, char directory[PATH_MAX])
  * would say something else, and half a file would stay. */
 static void library_gave_up(void)
 {
+    if (discard_other) discard_other();
     cli_stop(VG_ENOMEM, "a library gave up, for lack of memory most likely");
 }
 

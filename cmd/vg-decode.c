@@ -29,17 +29,23 @@ static const cli_program program = {
     .options = options,
     .most_operands = 1};
 
+static vg_sink *sink;
+static void discard(void)
+{
+    vg_sink_discard(sink);
+}
+
 int main(int argc, char **argv)
 {
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_err e;
-    vg_sink *sink;
     sink_options.first_number = first_number, sink_options.most_targets = (size_t)most_targets;
     if (!output) cli_usage("name the output: -o poses.zip, -o 'pose-%%04d.obj', or -o poses/");
     if (vg_sink_check(output, &sink_options, &e) < 0) cli_die(&e);
 
     vg_source *s = cli_source(operands, n);
+    cli_discard_by(discard);
     if (vg_sink_open(&sink, output, vg_source_head(s), &sink_options, &e) < 0) cli_die(&e);
     vg_frame f = {0};
     uint64_t frames = 0;

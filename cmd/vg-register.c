@@ -103,6 +103,8 @@ static void report_markers(const vg_markers *m, const vg_register_result *r)
     }
 }
 
+enum { MOST_WARNINGS = 10 };
+
 /* Faces without counterpart, by component of the target. */
 static void report_unmatched(const vg_mesh *m, const vg_correspondence *c)
 {
@@ -117,12 +119,16 @@ static void report_unmatched(const vg_mesh *m, const vg_correspondence *c)
         uint32_t k = label[m->vert[m->start[f]]];
         faces[k]++, without[k] += !c->matched[f], unmatched += !c->matched[f];
     }
+    size_t told = 0;
     for (size_t k = 0; k < n; k++) {
         if (!without[k]) continue;
-        cli_warn("%zu of the %zu faces of the target's component %zu have no counterpart: they ride with %s",
-                 without[k], faces[k], k,
-                 without[k] < faces[k] ? "those beside them" : "the nearest faces that have one");
+        if (told++ < MOST_WARNINGS)
+            cli_warn("%zu of the %zu faces of the target's component %zu have no counterpart: they ride with %s",
+                     without[k], faces[k], k,
+                     without[k] < faces[k] ? "those beside them" : "the nearest faces that have one");
     }
+    if (told > MOST_WARNINGS)
+        cli_warn("so it is with faces of %zu more components of the target", told - MOST_WARNINGS);
     cli_note("%zu of %zu faces of the target matched, %zu pairs", m->nf - unmatched, m->nf,
              (size_t)c->first[c->target_nf]);
     free(label);

@@ -886,6 +886,9 @@ int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e) VG_MU
 int vg_sink_open(vg_sink **s, const char *output, const vg_head *h, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;
 int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK; /* a frame of vertices; arrays take any kind */
 int vg_sink_end(vg_sink *s, vg_err *e) VG_MUST_CHECK;
+/* vg_sink_discard: remove what was written, unless vg_sink_end has given it its names. For the handler of a signal that ends the
+ * program: it calls nothing but unlink and rmdir, and leaves the sink as it is. */
+void vg_sink_discard(const vg_sink *s);
 /* vg_sink_warning: line number i of what the output does not keep, after vg_sink_end; NULL: no more. Borrowed until close. */
 const char *vg_sink_warning(const vg_sink *s, size_t i);
 void vg_sink_close(vg_sink **s); /* without _end: nothing is left behind */

@@ -313,12 +313,25 @@ static int create_beside(vg_sink *s, const char *final, char **temporary, vg_err
     return fd;
 }
 
+/* One more target. The list is whole at any moment, for vg_sink_discard may look at it from a signal's handler. */
+static int make_room(vg_sink *s, vg_err *e)
+{
+    if (s->ntargets < s->targets_cap) return VG_OK;
+    size_t cap = s->targets_cap ? 2 * s->targets_cap : 16;
+    target *grown = vgi_array(cap, sizeof *grown, e), *old = s->targets;
+    if (!grown) return VG_ENOMEM;
+    if (s->ntargets) memcpy(grown, old, s->ntargets * sizeof *grown);
+    s->targets = grown, s->targets_cap = cap;
+    free(old);
+    return VG_OK;
+}
+
 /* Open what will be `path`: a descriptor, or negative. The target is remembered. A link is followed: what it points
  * to is replaced, not the link. */
 static int open_target(vg_sink *s, const char *path, vg_err *e)
 {
     struct stat st;
-    int fd, r = vgi_grow(&s->targets, &s->targets_cap, s->ntargets + 1, sizeof *s->targets, e);
+    int fd, r = make_room(s, e);
     if (r < 0) return r;
     bool exists = stat(path, &st) == 0;
     if (exists && S_ISDIR(st.st_mode)) return vg_fail(e, VG_ESYS, "cannot write '%s': it is a directory", path);
@@ -332,7 +345,7 @@ static int open_target(vg_sink *s, const char *path, vg_err *e)
         fd = create_beside(s, t.final, &t.temporary, e);
     }
     if (fd < 0) free(t.final);
-    else s->targets[s->ntargets++] = t;
+    else s->targets[s->ntargets] = t, s->ntargets++;
     return fd;
 }
 
@@ -354,10 +367,10 @@ static int rename_targets(vg_sink *s, vg_err *e)
 }
 
 /* Of a failed run nothing stays: half a series under final names would look like a whole one. */
-static void remove_targets(vg_sink *s)
+static void remove_targets(const vg_sink *s)
 {
     for (size_t i = 0; i < s->ntargets; i++) {
-        target *t = &s->targets[i];
+        const target *t = &s->targets[i];
         if (t->renamed) unlink(t->final);
         else if (t->temporary) unlink(t->temporary);
     }
@@ -827,16 +840,22 @@ int vg_sink_end(vg_sink *s, vg_err *e)
     return r;
 }
 
+void vg_sink_discard(const vg_sink *s)
+{
+    if (s && !s->ended) remove_targets(s);
+}
+
 void vg_sink_close(vg_sink **sink)
 {
     vg_sink *s = *sink;
     if (!s) return;
+    if (!s->ended) remove_targets(s);
+    *sink = NULL; /* before anything is freed: vg_sink_discard may come at any moment */
     vgi_packer_close(&s->packer);
     if (s->state) s->plan.sequence->release(s->state);
     if (s->out.fd >= 0 && s->out.fd != s->fd) close(s->out.fd);
     vgi_output_clear(&s->out);
     if (s->fd >= 0) close(s->fd);
-    if (!s->ended) remove_targets(s);
     for (size_t i = 0; i < s->ntargets; i++) {
         free(s->targets[i].final);
         free(s->targets[i].temporary);
@@ -853,5 +872,4 @@ void vg_sink_close(vg_sink **sink)
     vg_bytes_clear(&s->path);
     free(s->output);
     free(s);
-    *sink = NULL;
 }
