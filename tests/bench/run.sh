@@ -194,6 +194,18 @@ transfer() {
     row 'vg-deform --onto | vg-solve' "$2" $((2 * in + between))
 }
 
+# pairs NAME POSES RUNS: a correspondence, and the transfer by it
+pairs() {
+    pair=$(bytes "$1-1.vgs" "$1-q.vgs")
+    best 1 "vg-register -q --aligned $1-1.vgs $1-q.vgs -o $1-c.vgs"
+    by_memory "$pair"
+    row 'vg-register --aligned' 1 "$pair"
+    best "$3" "vg-deform $1-some.vgs --onto $1-q.vgs --correspondence $1-c.vgs -o $1-cw.vgs"
+    by_pipe $(($(bytes "$1-some.vgs") + $(bytes "$1-cw.vgs")))
+    row 'vg-deform --correspondence' "$2" $(($(bytes "$1-some.vgs") + $(bytes "$1-cw.vgs")))
+    rm "$1-cw.vgs"
+}
+
 # every_stage NAME POSES SOME RUNS: each program on one mesh; SOME poses where it takes longer
 every_stage() {
     n=$1 poses=$2 some=$3 runs=$4
@@ -215,14 +227,7 @@ every_stage() {
     row 'vg-encode --vectors, stream' "$poses" $(($(bytes "$n.vgs") + $(bytes "$n-w.vgs")))
     transfer "$n" "$poses" "$runs"
     transfer_rate=$rate
-    pair=$(bytes "$n-1.vgs" "$n-q.vgs")
-    best 1 "vg-register -q --aligned $n-1.vgs $n-q.vgs -o $n-c.vgs"
-    by_memory "$pair"
-    row 'vg-register --aligned' 1 "$pair"
-    best "$runs" "vg-deform $n-some.vgs --onto $n-q.vgs --correspondence $n-c.vgs -o $n-cw.vgs"
-    by_pipe $((few + $(bytes "$n-cw.vgs")))
-    row 'vg-deform --correspondence' "$some" $((few + $(bytes "$n-cw.vgs")))
-    rm "$n-cw.vgs"
+    [ "$n" = cable ] || pairs "$n" "$some" "$runs" # the fit of a million vertices takes many minutes, and 5 GB
     stage "$runs" "vg-solve --planar $n-p.vgs >/dev/null" "vg-solve --planar $n-p1.vgs >/dev/null"
     by_cholmod 11
     row 'vg-solve --planar, quads' 11 $(($(bytes "$n-11.vgs") + $(bytes "$n-p.vgs")))
