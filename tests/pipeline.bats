@@ -415,3 +415,128 @@ END
     must vg-info b.vgs
     [[ $output != *$'\033'* ]]
 }
+
+# ---- ends that come early, and sequences that do not end ----------------------------------------------------------------
+
+@test "any stage killed at any time: all others fail, soon, and no file is left under its name" {
+    py <<'END'
+import os, signal, subprocess, time
+import make_corpus
+
+frames = [make_corpus.pose(f"p{i}", make_corpus.BENT[:4] if i % 2 else make_corpus.POINTS[:4]) for i in range(3000)]
+records = make_corpus.records_of(make_corpus.content(frames=frames))  # no END: there is always more
+head, more = make_corpus.assemble(records[:-len(frames)]), b"".join(r.bytes() for r in records[-len(frames):])
+with open("pose1.obj", "w") as f:
+    f.writelines("v %g %g %g\n" % tuple(point) for point in make_corpus.POINTS[:4])
+    f.write("f 1 2 3\nf 1 3 4\n")
+
+def start(commands):
+    """A pipe; its input stays open, so that no stage ends by itself before it is told."""
+    before, stages = subprocess.PIPE, []
+    for i, c in enumerate(commands):
+        last = i + 1 == len(commands)
+        stages.append(subprocess.Popen(c, stdin=before, stdout=None if last else subprocess.PIPE, stderr=subprocess.PIPE))
+        if i:
+            before.close()
+        before = stages[-1].stdout
+    return stages
+
+COMMANDS = [["vg-encode", "--vectors"], ["vg-deform", "--onto", "pose1.obj"], ["vg-solve"],
+            ["vg-poisson", "--first", "pose1.obj"]]
+here = sorted(os.listdir("."))
+for out in (["vg-decode", "-q", "-o", "out.zip"], ["vg-decode", "-q", "-o", "out-%d.obj"], ["vg-decode", "-q", "-o", "out/"],
+            ["vg-view", "-o", "out.html"], ["vg-info", "-o", "out.txt"], ["vg-encode", "-o", "out.vgs"]):
+    for victim in range(len(COMMANDS) + 1):
+        for number in (signal.SIGKILL, signal.SIGTERM):
+            stages = start(COMMANDS + [out])
+            try:
+                stages[0].stdin.write(head + more[:len(more) * (victim + 1) // 7])
+                stages[0].stdin.flush()
+                time.sleep(0.02 * victim)
+                stages[victim].send_signal(number)
+                stages[victim].wait()
+                stages[0].stdin.write(more[len(more) * (victim + 1) // 7:])
+                while True:  # a writer that nobody reads from any more is told so when it writes
+                    stages[0].stdin.write(more)
+            except BrokenPipeError:
+                pass
+            began = time.monotonic()
+            for i, stage in enumerate(stages):
+                said = stage.stderr.read().decode()
+                status = stage.wait(timeout=20)
+                want = (-number,) if i == victim else (-signal.SIGPIPE,) if i < victim else (3,)
+                assert status in want, (out, victim, number, i, status, said)
+                assert i <= victim or (said.startswith("vg-") and said.count("\n") == 1), (out, victim, i, said)
+                try:
+                    stage.stdin and stage.stdin.close()
+                except BrokenPipeError:
+                    pass
+            assert time.monotonic() - began < 10, (out, victim)
+            left = sorted(os.listdir("."))
+            if number == signal.SIGKILL and victim == len(COMMANDS):  # who is killed like this cannot clean up
+                for name in set(left) - set(here):
+                    assert name.startswith(".") or name == "out", left
+                    os.rmdir(name) if name == "out" and not os.listdir(name) else None
+                for name in os.listdir("."):
+                    if name.startswith(".") and name not in here:
+                        os.remove(name)
+                if os.path.isdir("out"):
+                    assert all(name.startswith(".") for name in os.listdir("out")), os.listdir("out")
+                    subprocess.run(["rm", "-r", "out"], check=True)
+                left = sorted(os.listdir("."))
+            assert left == here, (out, victim, number, left, os.path.isdir("out") and os.listdir("out"))
+END
+}
+
+@test "a disk that is full at any byte: status 4, and nothing under the final name" {
+    poses cube 3
+    must vg-encode --vectors pose*.obj -o v.vgs
+    must vg-encode pose*.obj -o p.vgs
+    must vg-register -q pose1.obj pose2.obj --markers <(printf '0 0\n1 1\n3 3\n4 4\n') -o c.vgs
+    py <<'END'
+import os, resource, subprocess
+COMMANDS = ["vg-encode p.vgs -o out.vgs", "vg-solve v.vgs -o out.vgs", "vg-deform p.vgs -o out.vgs",
+            "vg-poisson --first pose2.obj p.vgs -o out.vgs", "vg-segment -k 2 p.vgs -o out.vgs",
+            "vg-info p.vgs -o out.txt", "vg-diff p.vgs p.vgs -o out.txt", "vg-view p.vgs -o out.png",
+            "vg-view p.vgs -o out.html", "vg-decode -q p.vgs -o out.zip", "vg-decode -q p.vgs -o out.tar.gz",
+            "vg-decode -q p.vgs -o out.npz", "vg-decode -q p.vgs -o out.npy", "vg-decode -q p.vgs -o out.glb",
+            "vg-decode -q p.vgs -o out.gltf", "vg-decode -q p.vgs -o out.usda", "vg-decode -q --no-mesh p.vgs -o out.pc2",
+            "vg-decode -q p.vgs -o out.mdd", "vg-decode -q p.vgs -o out-%d.obj"]
+here = set(os.listdir("."))
+for command in COMMANDS:
+    words = command.split()
+    subprocess.run(words, check=True, capture_output=True)
+    made = set(os.listdir(".")) - here
+    size = max(os.path.getsize(name) for name in made)
+    for name in made:
+        os.remove(name)
+    for limit in sorted({0, 1, 7, 16, 100, size // 3, size // 2, size - 8, size - 1} & set(range(size))):
+        run = subprocess.run(words, capture_output=True,
+                             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+        said = run.stderr.decode()
+        assert run.returncode == 4, (command, limit, size, run.returncode, said)
+        assert said.startswith(words[0] + ": ") and said.count("\n") == 1, (command, limit, said)
+        assert set(os.listdir(".")) == here, (command, limit, set(os.listdir(".")) - here)
+END
+}
+
+@test "100,000 frames through the whole pipe take no more memory than 1,000" {
+    [ -n "${VG_LONG:-}" ] || skip "takes a minute: set VG_LONG=1"
+    poses cube 4
+    must vg-encode --no-provenance pose*.obj -o four.vgs
+    for frames in 1000 100000; do
+        many=()
+        for ((i = 0; i < frames; i += 4)); do many+=(four.vgs); done
+        must vg-encode --no-provenance "${many[@]}" -o many.vgs
+        for stage in 'vg-encode --vectors' 'vg-deform --onto pose2.obj' vg-solve 'vg-poisson --first pose2.obj' \
+            'vg-decode -q --no-mesh --format pc2 -o out.pc2'; do
+            python3 -c '
+import resource, subprocess, sys
+subprocess.run(sys.argv[2:], check=True, stdin=open("many.vgs"), stdout=open("next.vgs", "w"))
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)' "$stage" $stage >>kilobytes.$frames
+            [ ! -s next.vgs ] || mv next.vgs many.vgs
+        done
+    done
+    must paste kilobytes.1000 kilobytes.100000
+    echo "$output" | awk '$2 > $1 + 4096 { exit 1 }' || fail "kB at 1,000 and 100,000 frames:" "$output"
+}

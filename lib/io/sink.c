@@ -294,21 +294,23 @@ static int check_kind(const plan *p, const vg_head *h, const char *output, vg_er
 
 /* ---- temporary files ---- */
 
-/* A name beside `final` that nobody has. mkstemp would do, but for the mode, which is the user's choice (umask). */
-static int create_beside(vg_sink *s, const char *final, char **temporary, vg_err *e)
+/* A file beside t->final under a name that nobody has. mkstemp would do, but for the mode, which is the user's choice (umask).
+ * The target knows the name before there is a file, so that vg_sink_discard misses none. */
+static int create_beside(vg_sink *s, target *t, vg_err *e)
 {
+    const char *final = t->final;
     char *dir = parent_of(final, strlen(final), e);
     size_t n = dir ? strlen(dir) + 64 : 0;
     char *path = dir ? vgi_array_raw(n, 1, e) : NULL;
     int fd = path ? -1 : VG_ENOMEM;
+    if (path) *path = 0, t->temporary = path;
     for (int attempt = 0; path && fd < 0 && attempt < 1000; attempt++) {
         snprintf(path, n, "%s/.vg-%ld-%llu.tmp", dir, (long)getpid(), (unsigned long long)s->temporaries++);
         fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
         if (fd < 0 && errno != EEXIST) break;
     }
     if (path && fd < 0) fd = vg_fail(e, VG_ESYS, "cannot create a file for '%s': %s", final, strerror(errno));
-    if (fd < 0) free(path);
-    else *temporary = path;
+    if (fd < 0) t->temporary = NULL, free(path);
     free(dir);
     return fd;
 }
@@ -336,16 +338,17 @@ static int open_target(vg_sink *s, const char *path, vg_err *e)
     bool exists = stat(path, &st) == 0;
     if (exists && S_ISDIR(st.st_mode)) return vg_fail(e, VG_ESYS, "cannot write '%s': it is a directory", path);
     char *real = exists ? realpath(path, NULL) : NULL;
-    target t = {.final = real ? real : vgi_copy_string(path, strlen(path), e)};
-    if (!t.final) return VG_ENOMEM;
+    target *t = &s->targets[s->ntargets];
+    *t = (target){.final = real ? real : vgi_copy_string(path, strlen(path), e)};
+    if (!t->final) return VG_ENOMEM;
+    s->ntargets++;
     if (exists && !S_ISREG(st.st_mode)) {
         fd = open(path, O_WRONLY | O_CLOEXEC);
         if (fd < 0) fd = vg_fail(e, VG_ESYS, "cannot open '%s': %s", path, strerror(errno));
     } else {
-        fd = create_beside(s, t.final, &t.temporary, e);
+        fd = create_beside(s, t, e);
     }
-    if (fd < 0) free(t.final);
-    else s->targets[s->ntargets] = t, s->ntargets++;
+    if (fd < 0) s->ntargets--, free(t->final);
     return fd;
 }
 
