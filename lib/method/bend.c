@@ -9,6 +9,7 @@
  * Leaves out how weights are fitted to known motions (skin.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/map_parts.h"
+#include "method/product.h"
 #include "method/rotation_fit.h"
 #include "method/skin.h"
 #include "model/rig.h"
@@ -23,6 +24,7 @@ static const double FIRST_PRIOR = 1e-3,
 struct vg_bender {
     size_t nv, n; /* vertices, bones */
     int threads;
+    double least; /* turns smaller than this, in radians, are none */
     uint32_t *parent; /* of each bone; each before its children */
     double *at;       /* 3 n: the joints */
     double *offset;   /* 3 n: from the parent's joint */
@@ -116,7 +118,7 @@ int vg_bender_new(vg_bender **out, const vg_rig *r, size_t nv, const double *ref
     vg_bender *x = *out = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
     size_t n = x->n = r->nbones;
-    x->nv = nv, x->threads = threads;
+    x->nv = nv, x->threads = threads, x->least = 1e-7;
     x->parent = vgi_array(n, sizeof *x->parent, e);
     x->at = vgi_array(3 * n, sizeof *x->at, e), x->offset = vgi_array(3 * n, sizeof *x->offset, e);
     x->bone = vgi_copy_array(r->skin_bone, VG_SKIN * nv, sizeof *x->bone, e);
@@ -311,8 +313,9 @@ static double turn_bones(const vg_bender *x, bending *w)
 
 static void descend(const vg_bender *x, bending *w, double prior)
 {
+    static const double noise = 1e-16; /* of the objective */
     double damping = 1e-6, f = objective(x, w, w->r, prior), turn = 1;
-    for (int step = 0; step < STEPS && turn > 1e-7 && damping < 1e6; step++) {
+    for (int step = 0; step < STEPS && turn > x->least && damping < 1e6; step++) {
         make_system(x, w, prior, damping);
         if (!vgi_cholesky_dense(w->h, 3 * x->n)) {
             damping = 10 * damping + 1e-9;
@@ -320,13 +323,14 @@ static void descend(const vg_bender *x, bending *w, double prior)
         }
         vgi_cholesky_dense_solve(w->h, 3 * x->n, w->step, 1);
         turn = turn_bones(x, w);
-        double now = objective(x, w, w->trial, prior);
-        if (now < f || turn < 1e-7) {
-            memcpy(w->r, w->trial, 9 * x->n * sizeof *w->r);
-            f = now, damping *= 0.1;
-        } else {
+        double now = objective(x, w, w->trial, prior), gain = f - now;
+        if (gain < -noise * fabs(f)) {
             damping = 10 * damping + 1e-9;
+            continue;
         }
+        memcpy(w->r, w->trial, 9 * x->n * sizeof *w->r);
+        f = now, damping *= 0.1;
+        if (gain < noise * fabs(f)) break; /* the step that was just taken is the last that can be told from rounding */
     }
     for (size_t j = 0; j < x->n; j++) { /* what rounding has done to the products */
         double m[9];
@@ -388,10 +392,12 @@ static void fit_pose(void *context, size_t k)
 
 void vg_bender_fit(vg_bender *x, size_t n, const double *const *poses, double *const *transforms)
 {
+    int blas = vgi_product_begin();
     for (size_t first = 0; first < n; first += BLOCK) {
         fitting f = {x, poses + first, transforms + first};
         vgi_parallel(x->threads, n - first < BLOCK ? n - first : BLOCK, fit_pose, &f);
     }
+    vgi_product_end(blas);
 }
 
 /* ---- weights without motions ---- */
@@ -413,7 +419,7 @@ int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, 
         vg_bender *x = NULL;
         vgi_rig_sums s = {0};
         code = vg_bender_new(&x, r, nv, h->reference, threads, e);
-        if (code == VG_OK) vg_bender_fit(x, n, poses, transforms);
+        if (code == VG_OK) x->least = 1e-4, vg_bender_fit(x, n, poses, transforms);
         if (code == VG_OK) code = vgi_rig_sums_make(&s, nv, bones, at, NULL, e);
         if (code == VG_OK) vgi_rig_sums_add(&s, n, poses, (const double *const *)transforms, threads);
         if (code == VG_OK) code = vgi_skin_fit(r, &s, h->reference, threads, left, e);

@@ -13,6 +13,7 @@
  * show beyond that: a ridge regression of what joints miss on the A of all patches, as strong as makes it predict left-out poses best.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/map_parts.h"
+#include "method/product.h"
 #include "method/rotation_fit.h"
 #include "method/segment.h"
 #include "model/sets.h"
@@ -633,13 +634,14 @@ int vg_map_fitter_finish(vg_map_fitter *f, vg_err *e)
     vg_map *m = &f->h->map;
     if (!f->poses) return vg_fail(e, VG_EINPUT, "there are no poses to fit a map to");
     vg_map_clear(m);
-    int r = make_arrays(m, f, e);
+    int blas = vgi_product_begin(), r = make_arrays(m, f, e);
     if (r == VG_OK) fit_corners(f, m);
     if (r == VG_OK) r = vgi_map_collapse(f->h, f->g, f->of_face, f->turns.vector, f->threads, e);
     if (r == VG_OK) r = fit_skin(f, m, e);
     if (r == VG_OK) r = fit_joints(f, m, e);
     if (r == VG_OK) r = vgi_place_by_joints(m, m->centre, m->place, e);
     if (r == VG_OK) r = correct_place(f, m, e);
+    vgi_product_end(blas);
     if (r < 0) vg_map_clear(m);
     return r;
 }

@@ -2,6 +2,7 @@
  * Leaves out what is fitted to poses (map.c) and how a map is played (play.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/map_parts.h"
+#include "method/product.h"
 #include "method/rotation_fit.h"
 #include "model/incidence.h"
 #include "model/rig.h"
@@ -97,12 +98,12 @@ void vgi_shape_measure(const vgi_shape *s, size_t p, const double *pose, vgi_mot
 
 /* ---- small dense systems ---- */
 
-bool vgi_cholesky_dense(double *a, size_t n)
+static bool factor_block(double *a, size_t stride, size_t n)
 {
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j <= i; j++) {
-            double sum = a[i * n + j];
-            const double *x = a + i * n, *y = a + j * n;
+            double sum = a[i * stride + j];
+            const double *x = a + i * stride, *y = a + j * stride;
             double s[4] = {0, 0, 0, 0};
             size_t k = 0;
             for (; k + 4 <= j; k += 4)
@@ -110,8 +111,22 @@ bool vgi_cholesky_dense(double *a, size_t n)
             for (; k < j; k++) s[0] += x[k] * y[k];
             sum -= (s[0] + s[1]) + (s[2] + s[3]);
             if (i == j && !(sum > 0)) return false;
-            a[i * n + j] = i == j ? sqrt(sum) : sum / a[j * n + j];
+            a[i * stride + j] = i == j ? sqrt(sum) : sum / a[j * stride + j];
         }
+    return true;
+}
+
+bool vgi_cholesky_dense(double *a, size_t n)
+{
+    enum { WIDTH = 64 };
+    for (size_t k = 0; k < n; k += WIDTH) {
+        size_t width = n - k < WIDTH ? n - k : WIDTH, below = n - k - width;
+        double *block = a + k * n + k, *panel = block + width * n;
+        if (!factor_block(block, n, width)) return false;
+        if (!below) break;
+        vgi_product_divide(below, width, block, n, panel, n);
+        vgi_product_downdate(below, width, panel, n, panel + width, n);
+    }
     return true;
 }
 

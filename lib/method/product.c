@@ -42,3 +42,13 @@ void vgi_product_single_transposed(size_t m, size_t n, size_t k, const float *a,
 {
     cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)m, (int)n, (int)k, 1, a, (int)lda, b, (int)ldb, 0, c, (int)ldc);
 }
+
+void vgi_product_downdate(size_t m, size_t k, const double *p, size_t ldp, double *a, size_t lda)
+{
+    cblas_dsyrk(CblasRowMajor, CblasLower, CblasNoTrans, (int)m, (int)k, -1, p, (int)ldp, 1, a, (int)lda);
+}
+
+void vgi_product_divide(size_t m, size_t k, const double *l, size_t ldl, double *x, size_t ldx)
+{
+    cblas_dtrsm(CblasRowMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, (int)m, (int)k, 1, l, (int)ldl, x, (int)ldx);
+}

@@ -18,4 +18,9 @@ void vgi_product_add(size_t m, size_t n, size_t k, const double *a, size_t lda, 
 void vgi_product_single_transposed(size_t m, size_t n, size_t k, const float *a, size_t lda, const float *b, size_t ldb, float *c,
                                    size_t ldc);
 
+/* a (lower triangle of m x m, row stride lda) -= p p', p m x k */
+void vgi_product_downdate(size_t m, size_t k, const double *p, size_t ldp, double *a, size_t lda);
+/* x (m x k) := x l'^-1, l a lower triangle of k x k */
+void vgi_product_divide(size_t m, size_t k, const double *l, size_t ldl, double *x, size_t ldx);
+
 #endif

@@ -2,6 +2,7 @@
  * Leaves out how maps are fitted (map.c of patches, envelope.c of bones).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/map_parts.h"
+#include "method/product.h"
 #include "model/rig.h"
 
 #include <math.h>
@@ -64,6 +65,7 @@ static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, c
     vgi_shape shape = {0};
     double *before = vgi_array(n, 3 * n * sizeof *before, e), *after = vgi_array(n, 3 * n * sizeof *after, e);
     double *old = vgi_array(3 * m->njoints, sizeof *old, e), *now = vgi_array(3 * m->njoints, sizeof *now, e);
+    int blas = vgi_product_begin();
     int r = before && after && old && now ? vgi_place_by_joints(m, m->centre, before, e) : VG_ENOMEM;
     if (r == VG_OK) r = vgi_joint_points(g, of_face, m->joint, m->njoints, h->reference, old, e);
     if (r == VG_OK) r = vgi_joint_points(g, of_face, m->joint, m->njoints, body, now, e);
@@ -77,6 +79,7 @@ static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, c
             }
         r = vgi_place_by_joints(m, shape.centre, after, e);
     }
+    vgi_product_end(blas);
     if (r == VG_OK) {
         memcpy(m->centre, shape.centre, 3 * n * sizeof *m->centre);
         for (size_t i = 0; i < 3 * n * n; i++) m->place[i] = after[i] + ratio * (m->place[i] - before[i]);
