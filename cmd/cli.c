@@ -357,8 +357,12 @@ static void open_output(void)
     /* through a symbolic link to the file it means, or the link itself would be replaced */
     if (!exists || !realpath(cli.output, out.final)) snprintf(out.final, sizeof out.final, "%s", cli.output);
     catch_signals();
+    sigset_t all, before; /* a signal between the two would leave a file that nobody knows of */
+    sigfillset(&all);
+    sigprocmask(SIG_BLOCK, &all, &before);
     out.fd = open_temporary();
     out.has_temporary = 1;
+    sigprocmask(SIG_SETMASK, &before, NULL);
     if (exists && fchmod(out.fd, st.st_mode & 07777)) { /* keeps the mode where it can; not worth failing for */
     }
 }
