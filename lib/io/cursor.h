@@ -1,5 +1,5 @@
-/* cursor.h: what the files that know the contents of records share (payload.c, payload_rig.c): a cursor that takes numbers, lists and
- * texts from a payload, and the same for writing. No other file includes it.
+/* cursor.h: what the files that know the contents of records share (payload.c, payload_rig.c, payload_scal.c): a cursor
+ * that takes numbers, lists and texts from a payload, and the same for writing. No other file includes it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CURSOR_H
 #define VG_CURSOR_H
@@ -179,7 +179,6 @@ static inline int check_ascending(const vgi_payload *p, const uint32_t *list, si
     }
     return VG_OK;
 }
-
 
 /* Unit quaternions, to 1e-6; false for NaN. */
 static inline bool are_turns(const double *q, size_t n)
