@@ -2,7 +2,7 @@
  * keeps anchors and roots, leaves alone what has no faces of four and more or is planar already, and no pose
  * depends on those beside it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "meshes.h"
+#include "dense.h"
 
 enum { POSES = 11 };
 
@@ -90,32 +90,6 @@ static void clear_problem(problem *q)
 
 /* ---- the dense solution ---- */
 
-/* a (n x n) and b become the solution in b */
-static void eliminate(double *a, double *b, size_t n)
-{
-    for (size_t k = 0; k < n; k++) {
-        size_t p = k;
-        for (size_t i = k + 1; i < n; i++)
-            if (fabs(a[i * n + k]) > fabs(a[p * n + k])) p = i;
-        for (size_t j = 0; j < n; j++) {
-            double t = a[k * n + j];
-            a[k * n + j] = a[p * n + j], a[p * n + j] = t;
-        }
-        double t = b[k];
-        b[k] = b[p], b[p] = t;
-        for (size_t i = k + 1; i < n; i++) {
-            double f = a[i * n + k] / a[k * n + k];
-            if (f == 0) continue;
-            for (size_t j = k; j < n; j++) a[i * n + j] -= f * a[k * n + j];
-            b[i] -= f * b[k];
-        }
-    }
-    for (size_t i = n; i-- > 0;) {
-        for (size_t j = i + 1; j < n; j++) b[i] -= a[i * n + j] * b[j];
-        b[i] /= a[i * n + i];
-    }
-}
-
 static void cross(const double *a, const double *b, double *c)
 {
     double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
@@ -129,43 +103,12 @@ static bool normalise(double *m)
     return length > 0;
 }
 
-/* The r x r matrix of a face's energy as MATH 2 writes it: the projector, or w (B B' + tr(C+) K K') on vectors in
- * the plane. */
-static void face_energy(const problem *q, size_t f, double *G)
+/* The r x r matrix of a face's energy: its metric, or the projector that takes the mean away. */
+static void face_energy(const problem *q, const double *rest, size_t f, double *G)
 {
     size_t begin = q->g->start[f], r = q->g->start[f + 1] - begin;
-    double *all = vectors_of(q->g, q->reference), *R = all + 3 * begin, n[3] = {0, 0, 0}, u[3], v[3] = {0, 0, 0};
-    for (size_t i = 0; i < r; i++)
-        for (size_t j = 0; j < r; j++) G[i * r + j] = (i == j) - 1.0 / (double)r;
-    for (size_t i = 0; i < r && r > 2; i++) cross(R + 3 * i, R + 3 * ((i + 1) % r), n);
-    double area = 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    if (q->weights == VG_WEIGHTS_AREA && r > 2) {
-        double *xy = room(2 * r, sizeof *xy), *K = room(r * r, sizeof *K), c[3] = {0, 0, 0}, along = 0;
-        normalise(n);
-        for (int k = 0; k < 3; k++) along += R[k] * n[k];
-        for (int k = 0; k < 3; k++) u[k] = R[k] - along * n[k];
-        normalise(u);
-        cross(n, u, v);
-        for (size_t i = 0; i < r; i++)
-            for (size_t k = 0; k < 3; k++) xy[2 * i] += R[3 * i + k] * u[k], xy[2 * i + 1] += R[3 * i + k] * v[k];
-        for (size_t i = 0; i < r; i++)
-            c[0] += xy[2 * i] * xy[2 * i], c[1] += xy[2 * i] * xy[2 * i + 1], c[2] += xy[2 * i + 1] * xy[2 * i + 1];
-        double det = c[0] * c[2] - c[1] * c[1], inv[3] = {c[2] / det, -c[1] / det, c[0] / det}, trace = inv[0] + inv[2];
-        double sq[3] = {inv[0] * inv[0] + inv[1] * inv[1], inv[1] * trace, inv[1] * inv[1] + inv[2] * inv[2]};
-#define FORM(s, a, b) ((a)[0] * ((s)[0] * (b)[0] + (s)[1] * (b)[1]) + (a)[1] * ((s)[1] * (b)[0] + (s)[2] * (b)[1]))
-        for (size_t i = 0; i < r; i++)
-            for (size_t j = 0; j < r; j++) K[i * r + j] = G[i * r + j] - FORM(inv, xy + 2 * i, xy + 2 * j);
-        for (size_t i = 0; i < r; i++)
-            for (size_t j = 0; j < r; j++) {
-                double KK = 0;
-                for (size_t k = 0; k < r; k++) KK += K[i * r + k] * K[j * r + k];
-                G[i * r + j] = area * (FORM(sq, xy + 2 * i, xy + 2 * j) + trace * KK);
-            }
-#undef FORM
-        free(xy);
-        free(K);
-    }
-    free(all);
+    for (size_t i = 0; i < r * r; i++) G[i] = (i % (r + 1) == 0) - 1.0 / (double)r;
+    if (q->weights == VG_WEIGHTS_AREA && r > 2) face_metric(rest + 3 * begin, r, G);
 }
 
 /* The 3q x 3q normal equations of pose k, from the definition of the energy. */
@@ -173,12 +116,12 @@ static double *dense(const problem *q, size_t k)
 {
     const vg_graph *g = q->g;
     size_t n = 3 * g->nv;
-    double *M = room(n * n, sizeof *M), *b = room(n, sizeof *b), *w = q->w[k];
+    double *M = room(n * n, sizeof *M), *b = room(n, sizeof *b), *w = q->w[k], *rest = vectors_of(g, q->reference);
     for (size_t f = 0; f < g->nf; f++) {
         size_t begin = g->start[f], r = g->start[f + 1] - begin;
         const uint32_t *vert = g->vert + begin;
         double *G = room(r * r, sizeof *G), mean[3] = {0, 0, 0}, m[3] = {0, 0, 0};
-        face_energy(q, f, G);
+        face_energy(q, rest, f, G);
         for (size_t c = 0; c < r; c++)
             for (size_t i = 0; i < 3; i++) mean[i] += w[3 * (begin + c) + i] / (double)r;
         for (size_t c = 0; c < r; c++) { /* cross products of vectors about their mean: MATH's, whose own mean is 0 */
@@ -214,7 +157,8 @@ static double *dense(const problem *q, size_t k)
         }
         a += anchor;
     }
-    eliminate(M, b, n);
+    eliminate(M, b, n, 1);
+    free(rest);
     free(M);
     return b;
 }

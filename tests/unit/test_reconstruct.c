@@ -1,7 +1,7 @@
 /* test_reconstruct.c: vectors become the vertices they came from, on every kind of mesh, and vectors that fit no mesh become the
  * least-squares answer in either metric; anchors are met; threads and batches change nothing.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "meshes.h"
+#include "dense.h"
 
 static const double tight = 1e-12; /* of D: MATH 2 */
 static const vg_weights all_weights[] = {VG_WEIGHTS_UNIFORM, VG_WEIGHTS_AREA};
@@ -145,73 +145,6 @@ static void test_data(void)
 
 /* ---- vectors that fit no mesh, against a dense solution ---- */
 
-/* Gaussian elimination with row pivoting: a (n x n) and b (n x 3) become the solution in b. */
-static void eliminate(double *a, double *b, size_t n)
-{
-    for (size_t k = 0; k < n; k++) {
-        size_t p = k;
-        for (size_t i = k + 1; i < n; i++)
-            if (fabs(a[i * n + k]) > fabs(a[p * n + k])) p = i;
-        for (size_t j = 0; j < n; j++) {
-            double t = a[k * n + j];
-            a[k * n + j] = a[p * n + j], a[p * n + j] = t;
-        }
-        for (size_t j = 0; j < 3; j++) {
-            double t = b[3 * k + j];
-            b[3 * k + j] = b[3 * p + j], b[3 * p + j] = t;
-        }
-        for (size_t i = 0; i < n; i++) {
-            double f = i == k ? 0 : a[i * n + k] / a[k * n + k];
-            for (size_t j = k; f != 0 && j < n; j++) a[i * n + j] -= f * a[k * n + j];
-            for (size_t j = 0; f != 0 && j < 3; j++) b[3 * i + j] -= f * b[3 * k + j];
-        }
-    }
-    for (size_t i = 0; i < n; i++)
-        for (size_t j = 0; j < 3; j++) b[3 * i + j] /= a[i * n + i];
-}
-
-/* G of a face as MATH 2 writes it, r x r: w (B B' + tr(C+) K K') with R the vectors in the face's plane, C = R R', B = R' C+,
- * K = I - 11'/r - B R, w its area. */
-static void face_metric(const double *vectors, size_t r, double *G)
-{
-    double n[3] = {0, 0, 0}, C[9] = {0}, *R = room(3 * r, sizeof *R), *B = room(3 * r, sizeof *B), *K = room(r * r, sizeof *K);
-    for (size_t i = 0; i < r; i++)
-        for (int k = 0; k < 3; k++) {
-            const double *a = vectors + 3 * i, *b = vectors + 3 * ((i + 1) % r);
-            n[k] += a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
-        }
-    double twice = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    for (size_t i = 0; i < r; i++) {
-        double along = 0;
-        for (size_t k = 0; k < 3; k++) along += vectors[3 * i + k] * n[k] / twice;
-        for (size_t k = 0; k < 3; k++) R[3 * i + k] = vectors[3 * i + k] - along * n[k] / twice;
-        for (size_t k = 0; k < 9; k++) C[k] += R[3 * i + k / 3] * R[3 * i + k % 3];
-    }
-    /* C has rank 2, with eigenvalues p and q in the plane: C+ = ((p + q) P - C) / (p q), P = I - nn' */
-    double trace = C[0] + C[4] + C[8], square = 0, inverse[9];
-    for (int k = 0; k < 9; k++) square += C[k] * C[k];
-    for (int k = 0; k < 9; k++)
-        inverse[k] = 2 * (trace * ((k % 4 == 0) - n[k / 3] * n[k % 3] / (twice * twice)) - C[k]) / (trace * trace - square);
-    for (size_t i = 0; i < r; i++)
-        for (size_t k = 0; k < 9; k++) B[3 * i + k / 3] += inverse[k] * R[3 * i + k % 3];
-    for (size_t i = 0; i < r; i++)
-        for (size_t j = 0; j < r; j++) {
-            K[i * r + j] = (i == j) - 1.0 / (double)r;
-            for (size_t k = 0; k < 3; k++) K[i * r + j] -= B[3 * i + k] * R[3 * j + k];
-        }
-    for (size_t i = 0; i < r; i++)
-        for (size_t j = 0; j < r; j++) {
-            double sum = 0;
-            for (size_t k = 0; k < r; k++) sum += K[i * r + k] * K[j * r + k];
-            sum *= inverse[0] + inverse[4] + inverse[8];
-            for (size_t k = 0; k < 3; k++) sum += B[3 * i + k] * B[3 * j + k];
-            G[i * r + j] = twice / 2 * sum;
-        }
-    free(R);
-    free(B);
-    free(K);
-}
-
 /* The minimum of the energy by writing A' out as MATH 1 has it: row c is 1 at its own vertex and -1/r at all of its
  * face; between A and A' stands the metric of the face, if any. Anchored and isolated vertices get a row of their own;
  * without anchors the mean is put into the matrix. */
@@ -253,7 +186,7 @@ static double *least_squares(const vg_graph *g, const double *reference, const d
         N[v * q + v] = 1;
         memcpy(b + 3 * v, i < nanchors ? at + 3 * i : reference + 3 * v, 3 * sizeof *b);
     }
-    eliminate(N, b, q);
+    eliminate(N, b, q, 3);
     free(A);
     free(N);
     return b;
