@@ -21,6 +21,7 @@ write_chain() {
 import argparse, math, os, random
 NAMES = ("hip", "knee", "foot", "toe")
 ROOT, LENGTH = (0.3, 0.1, -0.2), 1.0
+BOTTOM = float(os.environ.get("BOTTOM", 0.05)) # where boxes begin along their bones
 def times(a, b): return [[sum(a[i][k] * b[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
 def apply(a, x): return [sum(a[i][k] * x[k] for k in range(3)) for i in range(3)]
 def turn(axis, degrees):
@@ -32,7 +33,7 @@ def turn(axis, degrees):
 def local(zxy): return times(times(turn("z", zxy[0]), turn("x", zxy[1])), turn("y", zxy[2]))
 def boxes():
     for b in range(len(NAMES)):
-        for y in (0.0, 0.9): # the middle of the lower four is the joint
+        for y in (BOTTOM, 0.9):
             for x, z in ((-0.2, -0.1), (0.2, -0.1), (0.2, 0.1), (-0.2, 0.1)): yield b, (x, y, z)
 def forward(angles, root=ROOT):
     """angles: z x y of each joint -> vertices, joints, rotations"""
@@ -172,6 +173,8 @@ END
 
 @test "joints that are means of vertices find themselves: the toy to 1e-7 D" {
     made
+    export BOTTOM=0 # the middle of the lower four vertices of a box is the joint
+    chain at-joints --rest --frames 12 --seed 1
     py <<'END'
 import sys
 sys.path.insert(0, ".")
@@ -181,14 +184,14 @@ with open("groups.txt", "w") as f:
     for b, name in reversed(list(enumerate(NAMES))): # parents behind their children
         f.write("%s %s vertices %s # four corners\n" % (name, NAMES[b - 1] if b else "-", " ".join(map(str, lower(b)))))
 END
-    must vg-fitmap -q --groups groups.txt fit/ -o groups.rig
+    must vg-fitmap -q --groups groups.txt at-joints/ -o groups.rig
     chain other --frames 9 --seed 2
-    must vg-deform --map groups.rig fit.bvh -o again.vgs # the joints have the names of the skeleton
-    must vg-diff -t 1e-7 fit/ again.vgs # a joint with none below is drawn to the one above by 1e-9, beside 0.04 from its vertices
+    must vg-deform --map groups.rig at-joints.bvh -o again.vgs # the joints have the names of the skeleton
+    must vg-diff -t 1e-7 at-joints/ again.vgs # a joint with none below is drawn to the one above by 1e-9, beside 0.04 from its vertices
     must vg-deform --map groups.rig other.bvh -o driven.vgs
     must vg-diff -t 1e-7 other/ driven.vgs
     echo 'hip - vertices 0 1 32' >bad.txt
-    must_fail 3 vg-fitmap --groups bad.txt fit/ -o no.rig
+    must_fail 3 vg-fitmap --groups bad.txt at-joints/ -o no.rig
     says 'vertex 32'
 }
 
@@ -454,6 +457,18 @@ END
     must_fail 3 vg-deform --map patches.map fit.bvh -o no.vgs
     says 'map of patches'
     [ ! -e no.rig ] && [ ! -e no.vgs ]
+}
+
+@test "the example: every command runs, and the pictures in the repository are those it makes" {
+    capture sh "$ROOT/examples/envelope.sh" out
+    [ "$status" = 0 ] || fail "$stderr"
+    for picture in envelope foot; do
+        [ "$(head -c 24 "out/$picture.png" | tail -c 8 | od -An -tx1)" = \
+            "$(head -c 24 "$ROOT/examples/pictures/$picture.png" | tail -c 8 | od -An -tx1)" ] || fail "$picture.png has another size"
+    done
+    must vg-diff --of mean -t 4e-4 out/truth.vgs out/envelope.vgs # poses that were set aside
+    must_fail 1 vg-diff --of mean -t 4e-4 out/truth.vgs out/edited.vgs
+    head -c 4 out/skin.glb | grep -q glTF
 }
 
 @test "a walk of which every fifth pose is fitted, or every fifth is not (needs VG_DATA, the data kit)" {
