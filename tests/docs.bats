@@ -250,6 +250,9 @@ commands_of_readme() {
     cp a.obj bar0.obj && cp b.obj bar400.obj
     xz -dc "$DATA/human-man-poses.bvh.xz" >walk.bvh
     xz -dc "$DATA/human-heavy-poses.bvh.xz" >actor2.bvh
+    # a skeleton that stands still, with a frame for each pose of the run, and one that moves
+    twisting_skeleton 21 0 >man.bvh
+    twisting_skeleton 4 10 >dance.bvh
     cp "$DATA/velociraptor.rest.obj" velociraptor.obj
     cp "$DATA/trex.rest.obj" trex.obj
     cp "$DATA/velociraptor-trex.markers.txt" markers.txt
