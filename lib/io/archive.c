@@ -203,14 +203,14 @@ static int judge_member(vgi_archive *a, struct archive_entry *entry, vg_err *e)
 /* 1: at the next mesh file; 0: there is none. */
 static int walk_next(vgi_archive *a, vg_err *e)
 {
-    for (;; a->entries++) {
+    for (;;) {
         struct archive_entry *entry;
         locale_t before = vgi_enter_utf8(a->utf8);
         int r = archive_read_next_header(a->la, &entry);
         vgi_leave_utf8(before);
         if (r == ARCHIVE_EOF) return 0;
         if (r < ARCHIVE_WARN) return damaged(a, a->la, NULL, e);
-        if (a->entries > a->limits.members)
+        if (++a->entries > a->limits.members)
             return vg_fail(e, VG_EINPUT, "'%s' holds more than %zu files", a->name, a->limits.members);
         if ((r = check_total(a, e)) < 0 || (r = judge_member(a, entry, e)) != 0) return r;
     }
