@@ -2,6 +2,8 @@
 # make deps        install the Debian packages of debian-packages.txt (root or sudo; nothing when all are there)
 # make demo        transfer an animation onto another body and draw it: says where to look
 # make check       all tests                    make CONFIG=asan check    the same under ASan and UBSan
+# make coverage    lines of lib that make check runs, file by file
+# make lint        the static analysers that are installed
 # make bench       throughput of every stage beside its limit; BENCH=full: up to 1,000,002 vertices; JSON=FILE: also as JSON
 # make fuzz        search for input that breaks the readers (clang; FUZZ_SECONDS=60 each)
 # make install     PREFIX=/usr/local LIBDIR=$(PREFIX)/lib DESTDIR=   make uninstall, make clean
@@ -45,7 +47,7 @@ ALL_CFLAGS += -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-
 ALL_LDFLAGS := -fsanitize=address,undefined
 else ifeq ($(CONFIG),cov)
 ALL_CFLAGS += --coverage -O0
-ALL_LDFLAGS := --coverage
+ALL_LDFLAGS := --coverage -Wl,-u,__gcov_dump
 else ifeq ($(CONFIG),fuzz)
 CC := clang
 ALL_CFLAGS += -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined
@@ -137,6 +139,15 @@ deps:
 .PHONY: check
 check: all $(UNITS:%=$(B)/unit/%) $(FUZZERS:%=$(B)/fuzz/%) $(B)/tools/fail_malloc.so
 	@BUILD=$(B) CONFIG=$(CONFIG) sh tests/run.sh
+
+.PHONY: coverage
+coverage:
+	@$(MAKE) CONFIG=cov check
+	@BUILD=$(B:$(CONFIG)=cov) sh tests/coverage.sh
+
+.PHONY: lint
+lint:
+	@sh tests/lint.sh
 
 .PHONY: demo
 demo: all

@@ -49,7 +49,7 @@ END
     case ${CONFIG:-} in asan) sanitize=-fsanitize=address,undefined ;; cov) sanitize=--coverage ;; esac
     must flags --cflags
     shows "-I$PWD/root/usr/include"
-    # shellcheck disable=SC2046 # words are wanted
+    # shellcheck disable=SC2046,SC2086 # words
     must ${CC:-cc} -Wall -Wextra -Werror -std=c11 $sanitize $(flags --cflags) -o count count.c $(flags --libs)
     must ./count "$GOLDEN/times.vgs"
     [ "$output" = $'0 pose1 0\n1 pose2 0\n2 frames of 4 vertices' ]
@@ -58,7 +58,7 @@ END
 
     # the program of the README
     sed -n '/^    #include <stdio.h>/,/^    }/s/^    //p' "$ROOT/README.md" >centroids.c
-    # shellcheck disable=SC2046 # words are wanted
+    # shellcheck disable=SC2046,SC2086 # words
     must ${CC:-cc} -Wall -Wextra -Werror -std=c11 $sanitize $(flags --cflags) -o centroids centroids.c $(flags --libs)
     must ./centroids "$DATA/horse.rest.obj"
     [[ $output == 'horse.rest '* ]]

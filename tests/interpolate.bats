@@ -172,7 +172,7 @@ END
     must_fail 2 vg-deform --smooth pose1.obj
     says "--smooth needs --interpolate or --at"
     must_fail 2 vg-deform --interpolate 0 pose1.obj
-    for list in '' , 0, ,1 x 0.5,nan 1e999; do must_fail 2 vg-deform --at "$list" pose1.obj; done
+    for list in '' ',' '0,' ,1 x 0.5,nan 1e999; do must_fail 2 vg-deform --at "$list" pose1.obj; done
     must_fail 2 vg-deform --interpolate 3 --onto pose2.obj pose1.obj
     says "pipe"
 }

@@ -5,7 +5,7 @@ load lib.bash
 bats_require_minimum_version 1.5.0
 
 setup_file() {
-    cd "$BATS_FILE_TMPDIR"
+    cd "$BATS_FILE_TMPDIR" || return 1
     vg-encode --reference "$DATA/trex.rest.obj" "$DATA/trex-walk.tar.xz" -o trex.vgs
     vg-segment -k 50 --connected trex.vgs -o trex.patches
     vg-fitmap -q --patches trex.patches trex.vgs -o trex.map

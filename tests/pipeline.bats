@@ -530,6 +530,7 @@ END
         must vg-encode --no-provenance "${many[@]}" -o many.vgs
         for stage in 'vg-encode --vectors' 'vg-deform --onto pose2.obj' vg-solve 'vg-poisson --first pose2.obj' \
             'vg-decode -q --no-mesh --format pc2 -o out.pc2'; do
+            # shellcheck disable=SC2086 # words
             python3 -c '
 import resource, subprocess, sys
 subprocess.run(sys.argv[2:], check=True, stdin=open("many.vgs"), stdout=open("next.vgs", "w"))

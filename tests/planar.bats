@@ -103,7 +103,7 @@ END
 @test "usage" {
     roof >roof.obj
     vg-encode --vectors roof.obj -o v.vgs
-    for weights in '' 1 1, ,1 1,2,3 0,1 -1,1 1,-1 a,b inf,1; do
+    for weights in '' 1 '1,' ,1 1,2,3 0,1 -1,1 1,-1 a,b inf,1; do
         must_fail 2 vg-solve --planar --planar-weights "$weights" v.vgs -o r.vgs
     done
     must_fail 2 vg-solve --planar-weights 1,1 v.vgs -o r.vgs

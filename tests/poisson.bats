@@ -229,6 +229,7 @@ for i in range(3900):
 END
     sed '/^v/s/ 0$/ 1/' u.obj >a.obj
     vg-encode u.obj -o one.vgs
+    # shellcheck disable=SC2046 # words
     vg-encode $(for _ in {1..200}; do echo one.vgs; done) -o part.vgs
     parts='part.vgs part.vgs part.vgs part.vgs part.vgs' # 1000 frames of 96 kB
     short=$(peak_kilobytes 'vg-encode one.vgs | vg-poisson --first a.obj -o t.vgs')

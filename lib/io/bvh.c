@@ -244,7 +244,7 @@ static int read_offset(reading *b, vg_err *e)
 
 static int read_channel(reading *b, vg_joint *j, vg_err *e)
 {
-    for (uint8_t c = 0; c < MOST_CHANNELS; c++) {
+    for (int c = 0; c < MOST_CHANNELS; c++) {
         if (!take_word(b, channel_names[c])) continue;
         uint8_t channel = (uint8_t)(c + 1);
         if (channel <= 3 && memchr(j->channels, channel, j->nchannels))

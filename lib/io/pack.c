@@ -104,7 +104,7 @@ static int open_packer(vgi_packer **out, int fd, const char *name, size_t n, con
     if (!p->name || !p->entry || !p->la) r = vg_fail(e, VG_ENOMEM, "not enough memory to write '%.*s'", (int)n, name);
     else if (!k)
         r = vg_fail(e, VG_EARG, "'%s' is no archive that can be written: %s can", p->name, vgi_packer_suffixes());
-    if (r == VG_OK) {
+    if (r == VG_OK && k) {
         locale_t before = vgi_enter_utf8(p->utf8);
         bool ok = configure(p->la, k) == ARCHIVE_OK &&
                   archive_write_open2(p->la, p, NULL, packer_write, NULL, NULL) == ARCHIVE_OK;

@@ -56,8 +56,8 @@ int vgi_ground_shadow(vgi_ground *g, const vgi_drawing *d, vg_err *e)
     if (status == VG_OK) {
         g->n = SHADOW_SIZE;
         g->step = (float)(1 / below.scale);
-        g->origin[0] = (float)(below.x - SHADOW_SIZE / 2 / below.scale);
-        g->origin[1] = (float)(below.y + SHADOW_SIZE / 2 / below.scale); /* rows go down */
+        g->origin[0] = (float)(below.x - 0.5 * SHADOW_SIZE / below.scale);
+        g->origin[1] = (float)(below.y + 0.5 * SHADOW_SIZE / below.scale); /* rows go down */
         for (size_t i = 0; i < SHADOW_SIZE * SHADOW_SIZE; i++) {
             if (r.at[i].kind == VGI_EMPTY) continue;
             double height = -r.at[i].z / below.scale - g->height;
