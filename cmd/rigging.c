@@ -19,15 +19,13 @@ bool rigging_wanted(void)
 
 static bool by_skinning(void)
 {
-    return rigging.method && !strcmp(rigging.method, "lbs");
+    return rigging.method_choice == VG_RIG_LBS;
 }
 
 void rigging_check(void)
 {
     if (rigging.skeleton && rigging.groups)
         cli_usage("--skeleton and --groups are two ways to say where the bones are: give one");
-    if (rigging.method && !by_skinning() && strcmp(rigging.method, "envelope"))
-        cli_usage("--method is 'envelope' or 'lbs', not '%s'", rigging.method);
     if (rigging.method && !rigging_wanted()) cli_usage("--method needs --skeleton or --groups");
     if (rigging.learn && !rigging.skeleton) cli_usage("--learn needs --skeleton");
     if (rigging.root_at && !rigging.skeleton) cli_usage("--root-at needs --skeleton");

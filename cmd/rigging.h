@@ -8,6 +8,7 @@
 extern struct rigging_options {
     const char *skeleton, *groups; /* NULL: not given */
     const char *root_at, *method;
+    size_t method_choice; /* a vg_rig_method */
     bool learn;
     long bones_per_corner;
     double refine;

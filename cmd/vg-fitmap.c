@@ -19,7 +19,7 @@ static const cli_option options[] = {
     {"learn", 0, NULL, "with --skeleton: find its motion from the poses, whatever motion it comes with", .flag = &rigging.learn},
     {"root-at", 0, "X,Y,Z", "with --skeleton: where its root is in the reference pose", .text = &rigging.root_at},
     {"method", 0, "envelope|lbs", "with a skeleton: vectors and held vertices (default), or linear blend skinning alone",
-     .text = &rigging.method},
+     .text = &rigging.method, .choice = &rigging.method_choice},
     {"bones-per-corner", 0, "N", "with a skeleton: how many bones drive a corner, 1 or 2 (default 2)",
      .integer = &rigging.bones_per_corner, .least = 1, .most = 2},
     {"refine", 0, "RIDGE", "with a skeleton: the ridge with which bones take up what is left (default 0.003; 0: they do not)",

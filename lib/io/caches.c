@@ -80,12 +80,11 @@ static int take_sample(reading *x, vg_err *e)
     return r;
 }
 
-static int check_end(reading *x, vg_err *e)
+/* 0, which ends the sequence, if the file ends too. */
+static int finish(reading *x, vg_err *e)
 {
-    const unsigned char *data;
-    size_t n;
-    int r = vgi_input_peek(x->in, 1, &data, &n, e);
-    if (r < 0 || n == 0) return r;
+    int r = vgi_input_ended(x->in, e);
+    if (r != 0) return r < 0 ? r : 0;
     return vg_fail(e, VG_EINPUT, "%s goes on behind its %u samples of %u points", x->subject, x->samples, x->points);
 }
 
@@ -171,10 +170,7 @@ static int next_sample(void *state, vg_frame *f, vg_err *e)
 {
     reading *x = state;
     int r;
-    if (x->next == x->samples) {
-        r = check_end(x, e);
-        return r < 0 ? r : 0;
-    }
+    if (x->next == x->samples) return finish(x, e);
     if (!x->have_ahead && (r = take_sample(x, e)) < 0) return r;
     const unsigned char *p = x->ahead.data;
     for (size_t i = 0; i < 3 * (size_t)x->points; i++, p += 4) f->values[i] = load_float(p, x->big);

@@ -110,6 +110,14 @@ int vgi_input_peek(vgi_input *in, size_t n, const unsigned char **data, size_t *
     return VG_OK;
 }
 
+int vgi_input_ended(vgi_input *in, vg_err *e)
+{
+    const unsigned char *data;
+    size_t n;
+    int r = vgi_input_peek(in, 1, &data, &n, e);
+    return r < 0 ? r : n == 0;
+}
+
 static size_t take_buffered(vgi_input *in, void *to, size_t n)
 {
     if (n > in->size) n = in->size;

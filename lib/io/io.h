@@ -18,6 +18,8 @@ const char *vgi_input_name(const vgi_input *in);
 const char *vgi_input_path(const vgi_input *in); /* of the file it was opened from; NULL: it is none */
 /* vgi_input_peek: the next bytes without taking them, up to n <= 4096; *got is less only at the end of input. */
 int vgi_input_peek(vgi_input *in, size_t n, const unsigned char **data, size_t *got, vg_err *e) VG_MUST_CHECK;
+/* vgi_input_ended: 1 when nothing is left, 0 when something is, negative when it cannot be read. */
+int vgi_input_ended(vgi_input *in, vg_err *e) VG_MUST_CHECK;
 /* vgi_input_read: exactly n bytes; VG_ETRUNC when the input ends before. *got (may be NULL): how many came. */
 int vgi_input_read(vgi_input *in, void *to, size_t n, size_t *got, vg_err *e) VG_MUST_CHECK;
 /* vgi_input_take: append exactly n bytes to b, which grows as they arrive (a false n costs no memory). */

@@ -282,12 +282,11 @@ static int open_npy(void **state, vg_head *h, vgi_input *in, const char *subject
     return r;
 }
 
-static int check_end(reading *x, vg_err *e)
+/* 0, which ends the sequence, if the file ends too. */
+static int finish(reading *x, vg_err *e)
 {
-    const unsigned char *data;
-    size_t n;
-    int r = vgi_input_peek(x->in, 1, &data, &n, e);
-    if (r < 0 || n == 0) return r;
+    int r = vgi_input_ended(x->in, e);
+    if (r != 0) return r < 0 ? r : 0;
     return vg_fail(e, VG_EINPUT, "%s goes on behind its %zu frames of %zu points", x->subject, x->frames, x->points);
 }
 
@@ -296,10 +295,7 @@ static int next_npy(void *state, vg_frame *f, vg_err *e)
     reading *x = state;
     const vgi_npy *a = &x->a;
     int r;
-    if (x->next == x->frames) {
-        r = check_end(x, e);
-        return r < 0 ? r : 0;
-    }
+    if (x->next == x->frames) return finish(x, e);
     if (!x->have_data && (r = take_data(x, e)) < 0) return r;
     size_t per_point = vgi_npy_stride(a, a->ndim - 2), per_axis = vgi_npy_stride(a, a->ndim - 1);
     size_t first = x->whole ? x->next * vgi_npy_stride(a, 0) : 0;

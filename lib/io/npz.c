@@ -55,16 +55,16 @@ static enum array find_array(const char *path)
 static int hold(reading *x, enum array i, vgi_input *in, const char *subject, vg_err *e)
 {
     struct held *h = &x->held[i];
-    const unsigned char *more;
-    size_t bytes, n;
+    size_t bytes;
     if (h->there) return vg_fail(e, VG_EINPUT, "%s is there twice", subject);
     int r = vgi_npy_read(&h->a, &bytes, in, subject, e);
     if (r < 0) return r;
     h->there = true;
     r = vgi_input_take(in, &h->data, bytes, NULL, e);
     if (r == VG_ETRUNC) return vg_fail(e, r, "%s ends too early", subject);
-    if (r == VG_OK) r = vgi_input_peek(in, 1, &more, &n, e);
-    return r == VG_OK && n ? vg_fail(e, VG_EINPUT, "%s goes on behind its elements", subject) : r;
+    if (r == VG_OK) r = vgi_input_ended(in, e);
+    if (r != 0) return r < 0 ? r : VG_OK;
+    return vg_fail(e, VG_EINPUT, "%s goes on behind its elements", subject);
 }
 
 static int hold_member(reading *x, const char *path, const vg_bytes *data, vg_err *e)

@@ -82,12 +82,9 @@ static int check_end(vgi_input *in, const vgi_tally *t, const vg_record *r, vg_e
                        (unsigned long long)count, (unsigned long long)t->records);
     if (vgi_get64(r->payload.data + 8) != XXH64_digest(t->sum))
         return vg_fail(e, VG_EINPUT, "'%s': the END mark's checksum is wrong: records were changed or moved", name);
-    const unsigned char *more;
-    size_t n;
-    int ok = vgi_input_peek(in, 1, &more, &n, e);
-    if (ok < 0) return ok;
-    if (n) return vg_fail(e, VG_EINPUT, "'%s' goes on behind the END mark: join streams with vg-encode, not cat", name);
-    return 0;
+    int ended = vgi_input_ended(in, e);
+    if (ended != 0) return ended < 0 ? ended : 0;
+    return vg_fail(e, VG_EINPUT, "'%s' goes on behind the END mark: join streams with vg-encode, not cat", name);
 }
 
 int vgi_record_read(vgi_input *in, vgi_tally *t, vg_record *r, vg_err *e)
