@@ -27,7 +27,7 @@ static void parse_at(const char *list)
         memcpy(number, text, n);
         number[n] = 0;
         double *grown = realloc(at.t, (at.n + 1) * sizeof *grown);
-        if (!grown) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the list of --at"});
+        if (!grown) cli_stop(VG_ENOMEM, "not enough memory for the list of --at");
         at.t = grown;
         at.t[at.n] = cli_parse_number("--at", number);
         text = comma ? comma + 1 : NULL;
@@ -88,7 +88,7 @@ typedef struct poses {
 
 static void refuse_transforms(const vg_head *h)
 {
-    if (h->kind == VG_TRANSFORMS) cli_die(&(vg_err){VG_EINPUT, "the input holds transforms: they need a map"});
+    if (h->kind == VG_TRANSFORMS) cli_stop(VG_EINPUT, "the input holds transforms: they need a map");
 }
 
 static void prepare(poses *p, vg_source *s)
@@ -109,7 +109,7 @@ static void grow(poses *p)
     p->cap = p->cap ? 2 * p->cap : 16;
     p->keys = realloc(p->keys, p->cap * sizeof *p->keys);
     p->labels = realloc(p->labels, p->cap * sizeof *p->labels);
-    if (!p->keys || !p->labels) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the key poses"});
+    if (!p->keys || !p->labels) cli_stop(VG_ENOMEM, "not enough memory for the key poses");
 }
 
 static void keep(poses *p, const vg_frame *f)
@@ -149,24 +149,18 @@ static void collect(poses *p, vg_source *s)
     int r;
     while ((r = vg_source_next(s, &f, &e)) > 0) keep(p, &f);
     if (r < 0) cli_die(&e);
-    if (p->n < 2) {
-        vg_fail(&e, VG_EINPUT, "there is %s in the input, and a path needs two or more",
-                p->n ? "one pose" : "no pose");
-        cli_die(&e);
-    }
+    if (p->n < 2)
+        cli_stop(VG_EINPUT, "there is %s in the input, and a path needs two or more", p->n ? "one pose" : "no pose");
     vg_frame_clear(&f);
     place_keys(p);
 }
 
 static void check_finite(const poses *p, const vg_frame *f)
 {
-    vg_err e;
     bool finite = isfinite(f->root[0]) && isfinite(f->root[1]) && isfinite(f->root[2]);
     for (size_t i = 0; i < 3 * p->h->count; i++) finite &= isfinite(f->values[i]) != 0;
     if (finite) return;
-    vg_fail(&e, VG_EARG, "frame '%s' is so far outside that numbers overflow: choose --at nearer to the keys",
-            f->name);
-    cli_die(&e);
+    cli_stop(VG_EARG, "frame '%s' is so far outside that numbers overflow: choose --at nearer to the keys", f->name);
 }
 
 static void write_poses(const poses *p, vg_path *path)

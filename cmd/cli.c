@@ -449,22 +449,18 @@ void cli_finish(int status)
 
 char *cli_read_file(const char *path, size_t *n)
 {
-    vg_err e;
     char *data = NULL;
     size_t cap = 0;
     FILE *f = strcmp(path, "-") ? fopen(path, "re") : stdin;
     *n = 0;
     errno = f ? 0 : errno;
     while (f) {
-        if (cap - *n < 1 << 16 && !(data = realloc(data, cap = 2 * cap + (1 << 17)))) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for a file"});
+        if (cap - *n < 1 << 16 && !(data = realloc(data, cap = 2 * cap + (1 << 17)))) cli_stop(VG_ENOMEM, "not enough memory for a file");
         size_t got = fread(data + *n, 1, cap - *n, f);
         *n += got;
         if (got == 0) break;
     }
-    if (!f || ferror(f)) {
-        vg_fail(&e, VG_ESYS, "cannot read '%s': %s", path, strerror(errno ? errno : EIO));
-        cli_die(&e);
-    }
+    if (!f || ferror(f)) cli_stop(VG_ESYS, "cannot read '%s': %s", path, strerror(errno ? errno : EIO));
     if (f != stdin) fclose(f);
     return data;
 }

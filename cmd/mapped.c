@@ -41,7 +41,7 @@ void mapped_take_edit(const char *text, void *context)
     (void)context;
     char *copy = strdup(text);
     mapped.edits = realloc(mapped.edits, (mapped.nedits + 1) * sizeof *mapped.edits);
-    if (!copy || !mapped.edits) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the edits"});
+    if (!copy || !mapped.edits) cli_stop(VG_ENOMEM, "not enough memory for the edits");
     char *angle = strrchr(copy, ' ');
     if (angle) *angle++ = 0;
     char *axis = angle ? strrchr(copy, ' ') : NULL;
@@ -78,23 +78,17 @@ static void load_map(playback *p)
 {
     vg_err e;
     if (vg_load_mesh(&p->map, mapped.map, &e) < 0) cli_die(&e);
-    if (!p->map.map.n) {
-        vg_fail(&e, VG_EINPUT, "'%s' holds no map: make one with vg-fitmap", mapped.map);
-        cli_die(&e);
-    }
+    if (!p->map.map.n) cli_stop(VG_EINPUT, "'%s' holds no map: make one with vg-fitmap", mapped.map);
 }
 
 /* Edits speak of bones by name and of their axes in the skeleton's pose without rotations. */
 static void find_bones(playback *p)
 {
-    vg_err e;
     const vg_rig *r = &p->map.rig;
     if (!mapped.nedits) return;
-    if (p->map.map.kind != VG_MAP_BONES) {
-        vg_fail(&e, VG_EINPUT,
-                "'%s' is a map of patches, --edit needs one of bones: make it with vg-fitmap --skeleton", mapped.map);
-        cli_die(&e);
-    }
+    if (p->map.map.kind != VG_MAP_BONES)
+        cli_stop(VG_EINPUT, "'%s' is a map of patches, --edit needs one of bones: make it with vg-fitmap --skeleton",
+                 mapped.map);
     for (size_t i = 0; i < mapped.nedits; i++) {
         struct mapped_edit *edit = &mapped.edits[i];
         edit->number = vg_rig_find(r, edit->bone);
@@ -118,12 +112,10 @@ static void apply_edits(const playback *p, double *transforms)
 static void take_skeleton(playback *p)
 {
     vg_err e;
-    if (p->map.map.kind != VG_MAP_BONES) {
-        vg_fail(&e, VG_EINPUT,
-                "the input is a skeleton, and '%s' is a map of patches: make one of bones with vg-fitmap --skeleton",
-                mapped.map);
-        cli_die(&e);
-    }
+    if (p->map.map.kind != VG_MAP_BONES)
+        cli_stop(VG_EINPUT,
+                 "the input is a skeleton, and '%s' is a map of patches: make one of bones with vg-fitmap --skeleton",
+                 mapped.map);
     if (vg_skeleton_copy(&p->skeleton, &p->h->skeleton, &e) < 0 ||
         vg_joint_fitter_new(&p->fitter, &p->skeleton, &e) < 0 ||
         vg_driver_new(&p->driver, &p->map.rig, &p->skeleton, mapped.align, &e) < 0)
@@ -249,7 +241,7 @@ static void add_key(playback *p, key_list *k)
         k->transforms = realloc(k->transforms, k->cap * sizeof *k->transforms);
     }
     char *name = strdup(f->name);
-    if (!k->label || !k->transforms || !name) cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the keys"});
+    if (!k->label || !k->transforms || !name) cli_stop(VG_ENOMEM, "not enough memory for the keys");
     k->label[k->n] = (between_key){name, f->has_time, f->time};
     k->transforms[k->n] = cli_allocate(7 * p->count, sizeof(double), "the transforms");
     take_transforms(p, 1, &k->transforms[k->n++]);
@@ -272,10 +264,7 @@ static void play_between(playback *p)
     int r;
     while ((r = vg_source_next(p->source, &p->in[0], &e)) > 0) add_key(p, &k);
     if (r < 0) cli_die(&e);
-    if (k.n == 0) {
-        vg_fail(&e, VG_EINPUT, "the input has no poses to interpolate");
-        cli_die(&e);
-    }
+    if (k.n == 0) cli_stop(VG_EINPUT, "the input has no poses to interpolate");
     for (size_t i = 0; i < between_count(); i++) {
         put_moment(p, &k, between_moment(i, k.n));
         cli_progress("poses", i + 1);

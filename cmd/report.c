@@ -70,9 +70,7 @@ report_value report_numbers(const double *x, size_t n)
 static void *checked(void *p)
 {
     if (p) return p;
-    vg_err e;
-    vg_fail(&e, VG_ENOMEM, "not enough memory for the report");
-    cli_die(&e);
+    cli_stop(VG_ENOMEM, "not enough memory for the report");
 }
 
 static char *copy_text(const char *s)

@@ -163,11 +163,9 @@ static void read_skeleton(work *w)
     int r;
     if (vg_source_open(&s, &rigging.skeleton, 1, &e) < 0) cli_die(&e);
     vg_head *h = vg_source_head(s);
-    if (!h->skeleton.njoints || h->kind != VG_VERTICES) {
-        vg_fail(&e, VG_EINPUT, "'%s' holds no skeleton: give a BVH file, or lines of 'bone parent head tail'",
-                rigging.skeleton);
-        cli_die(&e);
-    }
+    if (!h->skeleton.njoints || h->kind != VG_VERTICES)
+        cli_stop(VG_EINPUT, "'%s' holds no skeleton: give a BVH file, or lines of 'bone parent head tail'",
+                 rigging.skeleton);
     if (vg_skeleton_copy(&w->given.skeleton, &h->skeleton, &e) < 0 ||
         vg_joint_fitter_new(&fitter, &w->given.skeleton, &e) < 0)
         cli_die(&e);
@@ -255,13 +253,11 @@ static void place_skeleton(work *w)
     double *positions = room(3 * joints, sizeof *positions), *turns = room(4 * joints, sizeof *turns), at[3];
     bool known = m->n == w->total && !rigging.learn;
     vg_skeleton_pose(&m->skeleton, NULL, positions, turns);
-    if (!known && !rigging.learn && m->n > 1) {
-        vg_fail(&e, VG_EINPUT,
-                "'%s' has %zu frames and there are %llu poses: give one frame for each pose, or --learn the motion "
-                "from the poses",
-                rigging.skeleton, m->n, (unsigned long long)w->total);
-        cli_die(&e);
-    }
+    if (!known && !rigging.learn && m->n > 1)
+        cli_stop(VG_EINPUT,
+                 "'%s' has %zu frames and there are %llu poses: give one frame for each pose, or --learn the "
+                 "motion from the poses",
+                 rigging.skeleton, m->n, (unsigned long long)w->total);
     if (known ? w->reference < w->total : m->n == 1) {
         size_t frame = known ? (size_t)w->reference : 0;
         memcpy(positions, m->positions + 3 * joints * frame, 3 * joints * sizeof *positions);
@@ -444,8 +440,8 @@ static void fit(work *w, double hold)
 void rigging_run(vg_source *s, double hold, long holdout)
 {
     static work w; /* lives until the end: what it holds goes with the process */
-    vg_err e;
     w.h = vg_source_head(s), w.holdout = holdout;
+    if (w.h->skeleton.njoints) cli_stop(VG_EINPUT, "the input is a skeleton: vg-fitmap takes poses of a mesh");
     if (!w.h->mesh.nf) cli_stop(VG_EINPUT, "the input has no faces");
     vg_rig_clear(&w.h->rig);
     vg_map_clear(&w.h->map);
@@ -454,10 +450,6 @@ void rigging_run(vg_source *s, double hold, long holdout)
     if (!w.nsample) cli_stop(VG_EINPUT, "all poses are left out of the fit: raise --holdout");
     if (rigging.groups) read_groups(&w);
     else place_skeleton(&w);
-    if (w.h->skeleton.njoints) { /* the mesh is itself a skeleton */
-        vg_fail(&e, VG_EINPUT, "the input is a skeleton: vg-fitmap takes poses of a mesh");
-        cli_die(&e);
-    }
     fit(&w, hold);
     report(&w);
     vg_spool_free(&w.spool);

@@ -288,7 +288,6 @@ static void warn_degenerate(const work *w)
 
 static void check_kind(const work *w)
 {
-    vg_err e;
     const char *advice = NULL;
     if (w->kind == VG_TRANSFORMS) advice = "name the map that turns them into vertices with --map";
     else if (w->kind == VG_DEFORMATIONS && !opts.onto) advice = "name the mesh to apply them to with --onto";
@@ -296,8 +295,7 @@ static void check_kind(const work *w)
     else if (w->kind != VG_VERTICES && (w->by == BY_SHAPE || opts.correspondence))
         advice = "--by shape and --correspondence need vertices";
     if (!advice) return;
-    vg_fail(&e, VG_EINPUT, "the input holds %s: %s", vg_kind_name(w->kind), advice);
-    cli_die(&e);
+    cli_stop(VG_EINPUT, "the input holds %s: %s", vg_kind_name(w->kind), advice);
 }
 
 static void load_target(work *w)
@@ -307,10 +305,8 @@ static void load_target(work *w)
     if (vg_load_mesh(&w->target, opts.onto, &e) < 0) cli_die(&e);
     if (!opts.correspondence) return;
     if (vg_load_mesh(&w->pairs, opts.correspondence, &e) < 0) cli_die(&e);
-    if (!w->pairs.correspondence.first) {
-        vg_fail(&e, VG_EINPUT, "'%s' holds no correspondence: make one with vg-register", opts.correspondence);
-        cli_die(&e);
-    }
+    if (!w->pairs.correspondence.first)
+        cli_stop(VG_EINPUT, "'%s' holds no correspondence: make one with vg-register", opts.correspondence);
 }
 
 /* The graphs: of a pair with one connectivity, the source's serves both. */

@@ -92,13 +92,9 @@ static void open_side(side *s, char *operand)
     s->source = cli_source(&operand, 1);
     s->head = vg_source_head(s->source);
     if (s->head->kind == VG_VERTICES) return;
-    vg_err e;
     if (s->head->kind == VG_VECTORS)
-        vg_fail(&e, VG_EINPUT, "'%s' holds vectors: pipe it through 'vg-solve' first", s->name);
-    else
-        vg_fail(&e, VG_EINPUT, "'%s' holds %s, not vertices: make poses of them first", s->name,
-                vg_kind_name(s->head->kind));
-    cli_die(&e);
+        cli_stop(VG_EINPUT, "'%s' holds vectors: pipe it through 'vg-solve' first", s->name);
+    cli_stop(VG_EINPUT, "'%s' holds %s, not vertices: make poses of them first", s->name, vg_kind_name(s->head->kind));
 }
 
 static void close_side(side *s)
@@ -168,10 +164,7 @@ static void compare(side *truth, side *result, findings *found, report *r)
     size_t nv = truth->head->mesh.nv;
     double worst = -1, mean, max, diagonal = vg_diagonal(truth->head->reference, nv);
     double *errors = calloc(nv + 1, sizeof *errors);
-    if (!errors) {
-        vg_fail(&e, VG_ENOMEM, "not enough memory for the errors of %zu vertices", nv);
-        cli_die(&e);
-    }
+    if (!errors) cli_stop(VG_ENOMEM, "not enough memory for the errors of %zu vertices", nv);
     if (vg_measures_new(&x, &truth->head->mesh, truth->head->reference, opts.centred, &e) < 0) cli_die(&e);
     if (opts.frames) report_table(r, "frame_errors", "", false, frame_columns, COLUMNS_FRAME);
     open_heat(result, truth);

@@ -74,14 +74,11 @@ static void select_faces(vg_head *h)
 /* What the options change about a sequence is about vertices: a stream of anything else is passed on as it is. */
 static void prepare(vg_head *h, bool selects, uint32_t *anchors, size_t nanchors)
 {
-    vg_err e;
     if (h->kind != VG_VERTICES) {
         if (opts.vectors && h->kind == VG_VECTORS) opts.vectors = false;
-        if (opts.vectors || selects || opts.reference || opts.anchors) {
-            vg_fail(&e, VG_EINPUT, "the input holds %s: --vectors, --faces, --reference and --anchor need vertices",
-                    vg_kind_name(h->kind));
-            cli_die(&e);
-        }
+        if (opts.vectors || selects || opts.reference || opts.anchors)
+            cli_stop(VG_EINPUT, "the input holds %s: --vectors, --faces, --reference and --anchor need vertices",
+                     vg_kind_name(h->kind));
     } else {
         if (opts.reference) set_reference(h, opts.reference);
         if (selects) select_faces(h);

@@ -57,10 +57,7 @@ static void take_patches(vg_head *h)
     }
     snprintf(name, sizeof name, "'%.190s'", opts.patches);
     if (vg_load_mesh(&from, opts.patches, &e) < 0) cli_die(&e);
-    if (!from.patches.n) {
-        vg_fail(&e, VG_EINPUT, "%s holds no patches: make them with vg-segment", name);
-        cli_die(&e);
-    }
+    if (!from.patches.n) cli_stop(VG_EINPUT, "%s holds no patches: make them with vg-segment", name);
     if (vg_mesh_same(&h->mesh, "the sequence", &from.mesh, name, &e) < 0 || vg_head_merge_trace(h, &from, &e) < 0) cli_die(&e);
     vg_patches_clear(&h->patches);
     h->patches = from.patches;
@@ -188,11 +185,9 @@ static void fit(vg_source *s)
 {
     vg_err e;
     vg_head *h = vg_source_head(s);
-    if (h->kind != VG_VERTICES) {
-        vg_fail(&e, VG_EINPUT, "the input holds %s, vg-fitmap takes vertices%s", vg_kind_name(h->kind),
-                h->kind == VG_VECTORS ? ": pipe it through 'vg-solve' first" : "");
-        cli_die(&e);
-    }
+    if (h->kind != VG_VERTICES)
+        cli_stop(VG_EINPUT, "the input holds %s, vg-fitmap takes vertices%s", vg_kind_name(h->kind),
+                 h->kind == VG_VECTORS ? ": pipe it through 'vg-solve' first" : "");
     if (rigging_wanted()) {
         rigging_run(s, opts.hold, opts.holdout);
         return;

@@ -55,19 +55,11 @@ static const report_column value_columns[] = {
     {.key = "frame", .title = "frame"}, {.key = "name", .title = "name"}, {.key = "time", .title = "time"},
     {.key = "least", .title = "least"}, {.key = "most", .title = "most"}};
 
-static void no_memory(const char *what) __attribute__((noreturn));
-static void no_memory(const char *what)
-{
-    vg_err e;
-    vg_fail(&e, VG_ENOMEM, "not enough memory for %s", what);
-    cli_die(&e);
-}
-
 static void replace_text(char **to, const char *from)
 {
     free(*to);
     *to = strdup(from);
-    if (!*to) no_memory("the name of a frame");
+    if (!*to) cli_stop(VG_ENOMEM, "not enough memory for the name of a frame");
 }
 
 /* Close a stream that wrote into *line; false: something of it was lost. glibc may close well and have no line. */
@@ -210,7 +202,7 @@ static char *size_line(const vg_mesh *m, const uint64_t *count, size_t largest)
     size_t bytes, kinds = 0, at = 0, first = 0;
     uint64_t rest = 0;
     FILE *f = open_memstream(&line, &bytes);
-    if (!f) no_memory("the sizes of faces");
+    if (!f) cli_stop(VG_ENOMEM, "not enough memory for the sizes of faces");
     for (size_t k = 2; k <= largest; k++) kinds += count[k] > 0;
     fprintf(f, "%zu", m->nf);
     for (size_t k = 2; k <= largest; k++) {
@@ -221,7 +213,7 @@ static char *size_line(const vg_mesh *m, const uint64_t *count, size_t largest)
         at++;
     }
     if (rest) fprintf(f, ", %" PRIu64 " of %zu to %zu", rest, first, largest);
-    if (!close_line(f, &line)) no_memory("the sizes of faces");
+    if (!close_line(f, &line)) cli_stop(VG_ENOMEM, "not enough memory for the sizes of faces");
     return line;
 }
 
@@ -231,7 +223,7 @@ static void report_faces(report *r, const vg_mesh *m)
     size_t largest = 0;
     for (size_t f = 0; f < m->nf; f++) largest = face_size(m, f) > largest ? face_size(m, f) : largest;
     uint64_t *count = calloc(largest + 1, sizeof *count);
-    if (!count) no_memory("the sizes of faces");
+    if (!count) cli_stop(VG_ENOMEM, "not enough memory for the sizes of faces");
     for (size_t f = 0; f < m->nf; f++) count[face_size(m, f)]++;
     char *line = size_line(m, count, largest);
     report_put(r, "faces", NULL, report_count(m->nf));
@@ -290,7 +282,7 @@ static coverage cover(const vg_correspondence *c)
 {
     coverage x = {0};
     bool *used = calloc(c->source_nf + 1, sizeof *used);
-    if (!used) no_memory("the faces of the source");
+    if (!used) cli_stop(VG_ENOMEM, "not enough memory for the faces of the source");
     for (size_t f = 0; f < c->target_nf; f++) {
         uint64_t pairs = c->first[f + 1] - c->first[f];
         if (pairs > x.most_pairs) x.most_pairs = pairs;
@@ -428,13 +420,13 @@ static void note_process(report *r, const vg_provenance *p, size_t depth)
     char *line = NULL;
     size_t size;
     FILE *f = open_memstream(&line, &size);
-    if (!f) no_memory("the command lines");
+    if (!f) cli_stop(VG_ENOMEM, "not enough memory for the command lines");
     if (p->nargs == 0) print_quoted(f, p->program);
     for (size_t i = 0; i < p->nargs; i++) {
         if (i) fputc(' ', f);
         print_quoted(f, p->args[i]);
     }
-    if (!close_line(f, &line)) no_memory("the command lines");
+    if (!close_line(f, &line)) cli_stop(VG_ENOMEM, "not enough memory for the command lines");
     report_note(r, "  %*s%s", (int)(2 * (depth < 20 ? depth : 20)), "", line);
     free(line);
 }
@@ -451,7 +443,7 @@ static void note_tree(report *r, const vg_head *h)
     for (size_t i = 0; i < n; i++) nedges += h->provenance[i].nparents;
     step *pending = calloc(nedges + 1, sizeof *pending);
     bool *shown = calloc(n + 1, sizeof *shown);
-    if (!pending || !shown) no_memory("the command lines");
+    if (!pending || !shown) cli_stop(VG_ENOMEM, "not enough memory for the command lines");
     for (size_t root = n; root-- > 0;) {
         size_t open = 0;
         if (!shown[root]) pending[open++] = (step){root, 0};
@@ -479,7 +471,7 @@ static void report_provenance(report *r, const vg_head *h)
     for (size_t i = 0; i < h->nprovenance; i++) {
         const vg_provenance *p = &h->provenance[i];
         uint64_t *parents = calloc(p->nparents + 1, sizeof *parents);
-        if (!parents) no_memory("the command lines");
+        if (!parents) cli_stop(VG_ENOMEM, "not enough memory for the command lines");
         for (size_t k = 0; k < p->nparents; k++) parents[k] = p->parents[k];
         const report_value row[4] = {report_text(p->program), report_text(p->version),
                                      report_texts((const char *const *)p->args, p->nargs),
@@ -544,11 +536,9 @@ static void report_digest(report *r, const contents *c)
 
 static void print_weights(const vg_head *h, const char *operand)
 {
-    vg_err e;
-    if (!h->rig.skin_weight) {
-        vg_fail(&e, VG_EINPUT, "'%s' holds no skinning weights: vg-fitmap --skeleton makes them", operand ? operand : "standard input");
-        cli_die(&e);
-    }
+    if (!h->rig.skin_weight)
+        cli_stop(VG_EINPUT, "'%s' holds no skinning weights: vg-fitmap --skeleton makes them",
+                 operand ? operand : "standard input");
     write_weights(cli_text_open(), &h->rig, h->mesh.nv);
 }
 

@@ -25,16 +25,10 @@ static struct {
     double memory;
 } opts = {.memory = 256.0 * (1 << 20)};
 
-static void out_of_memory(void) __attribute__((noreturn));
-static void out_of_memory(void)
-{
-    cli_die(&(vg_err){VG_ENOMEM, "not enough memory for the given poses"});
-}
-
 static key *add_key(int by, const char *mesh)
 {
     key *grown = realloc(opts.keys, (opts.nkeys + 1) * sizeof *grown);
-    if (!grown) out_of_memory();
+    if (!grown) cli_stop(VG_ENOMEM, "not enough memory for the given poses");
     opts.keys = grown;
     key *k = &grown[opts.nkeys++];
     *k = (key){.by = by, .mesh = mesh};
@@ -78,7 +72,7 @@ static void take_key(const char *text, void *context)
     key *k = add_key(NAMED, equals + 1);
     size_t n = (size_t)(equals - text);
     char *option = malloc(n + sizeof "--key ");
-    if (!option || !(k->frame = strndup(text, n))) out_of_memory();
+    if (!option || !(k->frame = strndup(text, n))) cli_stop(VG_ENOMEM, "not enough memory for the given poses");
     memcpy(option, "--key ", 6);
     memcpy(option + 6, k->frame, n + 1);
     k->option = option;
@@ -118,9 +112,7 @@ static void refuse_kind(const char *subject, vg_kind kind)
         [VG_VECTORS] = "pipe them through 'vg-solve' first",
         [VG_DEFORMATIONS] = "apply them with 'vg-deform --onto MESH', then 'vg-solve'",
         [VG_TRANSFORMS] = "they need a map"};
-    vg_err e;
-    vg_fail(&e, VG_EINPUT, "%s holds %s, and vertices are guided: %s", subject, vg_kind_name(kind), advice[kind]);
-    cli_die(&e);
+    cli_stop(VG_EINPUT, "%s holds %s, and vertices are guided: %s", subject, vg_kind_name(kind), advice[kind]);
 }
 
 /* The first pose of the operand; the rest is not read. */
@@ -139,7 +131,7 @@ static void load_key(key *k, vg_head *h)
     if (r == 0) r = vg_fail(&e, VG_EINPUT, "%s holds no pose", subject);
     if (r < 0 || vg_head_merge_trace(h, from, &e) < 0) cli_die(&e);
     k->pose = malloc((3 * h->mesh.nv + 1) * sizeof *k->pose);
-    if (!k->pose) out_of_memory();
+    if (!k->pose) cli_stop(VG_ENOMEM, "not enough memory for the given poses");
     memcpy(k->pose, f.values, 3 * h->mesh.nv * sizeof *k->pose);
     vg_frame_clear(&f);
     vg_source_close(&s);
@@ -179,11 +171,10 @@ static bool is_for(const key *k, uint64_t n, const char *name, bool last)
 static void refuse_ambiguous(const key *k, uint64_t n, const char *name)
 {
     if (k->by != NAMED || k->named || strcmp(k->frame, name)) return;
-    vg_err e;
-    vg_fail(&e, VG_EINPUT, "'%s' is the number of one frame and the name of a later one: "
-            "write '--key #%llu=%s' or '--key #%llu=%s'", k->option, (unsigned long long)k->at, k->mesh,
-            (unsigned long long)n, k->mesh);
-    cli_die(&e);
+    cli_stop(VG_EINPUT,
+             "'%s' is the number of one frame and the name of a later one: "
+             "write '--key #%llu=%s' or '--key #%llu=%s'",
+             k->option, (unsigned long long)k->at, k->mesh, (unsigned long long)n, k->mesh);
 }
 
 /* The pose that frame n is to become, or NULL. */
@@ -198,10 +189,8 @@ static const double *find_given(work *w, uint64_t n, const char *name, bool last
         k->named = k->by == NAMED && !strcmp(k->frame, name);
         w->ahead--;
         if (found && memcmp(found->pose, k->pose, 3 * w->h->mesh.nv * sizeof *k->pose)) {
-            vg_err e;
-            vg_fail(&e, VG_EINPUT, "'%s' and '%s' give two poses to one frame, number %llu, '%s'", found->option,
-                    k->option, (unsigned long long)n, name);
-            cli_die(&e);
+            cli_stop(VG_EINPUT, "'%s' and '%s' give two poses to one frame, number %llu, '%s'", found->option,
+                     k->option, (unsigned long long)n, name);
         }
         found = k;
     }
@@ -258,7 +247,6 @@ static uint64_t guide_all(work *w)
 
 static void refuse_unmet(uint64_t frames)
 {
-    vg_err e;
     char list[300] = "";
     size_t at = 0;
     for (size_t i = 0; i < opts.nkeys; i++) {
@@ -266,10 +254,9 @@ static void refuse_unmet(uint64_t frames)
         int n = snprintf(list + at, sizeof list - at, "%s'%s'", at ? ", " : "", opts.keys[i].option);
         at += n > 0 ? (size_t)n : 0;
     }
-    if (frames == 0) vg_fail(&e, VG_EINPUT, "there is no frame for %s: the sequence is empty", list);
-    else vg_fail(&e, VG_EINPUT, "there is no frame for %s among the %llu, whose numbers are 0 to %llu", list,
-                 (unsigned long long)frames, (unsigned long long)(frames - 1));
-    cli_die(&e);
+    if (frames == 0) cli_stop(VG_EINPUT, "there is no frame for %s: the sequence is empty", list);
+    cli_stop(VG_EINPUT, "there is no frame for %s among the %llu, whose numbers are 0 to %llu", list,
+             (unsigned long long)frames, (unsigned long long)(frames - 1));
 }
 
 static void open_work(work *w)

@@ -59,14 +59,6 @@ static void check_options(size_t operands)
                   "when the meshes lie on one another");
 }
 
-static void out_of_memory(const char *what) __attribute__((noreturn));
-static void out_of_memory(const char *what)
-{
-    vg_err e;
-    vg_fail(&e, VG_ENOMEM, "not enough memory for %s", what);
-    cli_die(&e);
-}
-
 /* ---- what is said on standard error ---- */
 
 static void note_step(void *context, const vg_register_step *s)
@@ -111,10 +103,10 @@ static void report_unmatched(const vg_mesh *m, const vg_correspondence *c)
     vg_err e;
     size_t n = 0, unmatched = 0;
     uint32_t *label = calloc(m->nv + 1, sizeof *label);
-    if (!label) out_of_memory("the components of the target");
+    if (!label) cli_stop(VG_ENOMEM, "not enough memory for the components of the target");
     if (vg_mesh_components(m, label, &n, &e) < 0) cli_die(&e);
     size_t *faces = calloc(n + 1, sizeof *faces), *without = calloc(n + 1, sizeof *without);
-    if (!faces || !without) out_of_memory("the components of the target");
+    if (!faces || !without) cli_stop(VG_ENOMEM, "not enough memory for the components of the target");
     for (size_t f = 0; f < m->nf; f++) {
         uint32_t k = label[m->vert[m->start[f]]];
         faces[k]++, without[k] += !c->matched[f], unmatched += !c->matched[f];
@@ -161,10 +153,8 @@ static void load(vg_head *h, const char *operand)
 {
     vg_err e;
     if (vg_load_mesh(h, operand, &e) < 0) cli_die(&e);
-    if (opts.uv && h->attributes.ntex == 0) {
-        vg_fail(&e, VG_EINPUT, "'%s' has no texture coordinates: --uv needs them in both meshes", operand);
-        cli_die(&e);
-    }
+    if (opts.uv && h->attributes.ntex == 0)
+        cli_stop(VG_EINPUT, "'%s' has no texture coordinates: --uv needs them in both meshes", operand);
 }
 
 /* The stream: the source's mesh and reference, one frame that is the source on the target, and the pairs. */

@@ -40,11 +40,9 @@ static size_t parse_patches(void)
 
 static void check_head(const vg_head *h)
 {
-    vg_err e;
     if (h->kind == VG_VERTICES) return;
-    vg_fail(&e, VG_EINPUT, "the input holds %s, vg-segment takes vertices%s", vg_kind_name(h->kind),
-            h->kind == VG_VECTORS ? ": pipe it through 'vg-solve' first" : "");
-    cli_die(&e);
+    cli_stop(VG_EINPUT, "the input holds %s, vg-segment takes vertices%s", vg_kind_name(h->kind),
+             h->kind == VG_VECTORS ? ": pipe it through 'vg-solve' first" : "");
 }
 
 static uint64_t add_all(vg_segmenter *s, vg_source *source)
@@ -80,10 +78,7 @@ int main(int argc, char **argv)
     vg_segment_report report;
     if (vg_segmenter_new(&s, &h->mesh, h->reference, cli.threads, &e) < 0) cli_die(&e);
     uint64_t poses = add_all(s, source);
-    if (!poses) {
-        vg_fail(&e, VG_EINPUT, "the input has no poses: what turns alike cannot be told");
-        cli_die(&e);
-    }
+    if (!poses) cli_stop(VG_EINPUT, "the input has no poses: what turns alike cannot be told");
     vg_patches_clear(&h->patches);
     vg_map_clear(&h->map);
     if (vg_segmenter_cut(s, k, (uint64_t)opts.seed, opts.connected, &h->patches, &report, &e) < 0) cli_die(&e);

@@ -286,11 +286,9 @@ static void prepare(work *w, vg_head *h)
 {
     vg_err e;
     w->h = h, w->kind = h->kind;
-    if (w->kind != VG_VECTORS && w->kind != VG_VERTICES) {
-        vg_fail(&e, VG_EINPUT, "the input holds %s, vg-solve takes vectors: apply them with 'vg-deform --onto MESH'",
-                vg_kind_name(w->kind));
-        cli_die(&e);
-    }
+    if (w->kind != VG_VECTORS && w->kind != VG_VERTICES)
+        cli_stop(VG_EINPUT, "the input holds %s, vg-solve takes vectors: apply them with 'vg-deform --onto MESH'",
+                 vg_kind_name(w->kind));
     if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&w->g, h, &e) < 0) cli_die(&e);
     uint32_t *anchors = cli_allocate(h->nanchors, sizeof *anchors, "a batch of poses");
     if (h->nanchors) memcpy(anchors, h->anchors, h->nanchors * sizeof *anchors);

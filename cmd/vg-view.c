@@ -205,7 +205,6 @@ static void set_label(side *s, char **operands, size_t n)
 
 static void open_side(side *s, char **operands, size_t n)
 {
-    vg_err e;
     set_label(s, operands, n);
     if (n > 1) snprintf(s->name, sizeof s->name, "'%.200s' to '%.200s'", operands[0], operands[n - 1]);
     else if (reads_standard_input(operands, n)) snprintf(s->name, sizeof s->name, "standard input");
@@ -214,11 +213,8 @@ static void open_side(side *s, char **operands, size_t n)
     s->head = vg_source_head(s->source);
     if (s->head->kind == VG_VERTICES) return;
     if (s->head->kind == VG_VECTORS)
-        vg_fail(&e, VG_EINPUT, "%s holds vectors: pipe it through 'vg-solve' first", s->name);
-    else
-        vg_fail(&e, VG_EINPUT, "%s holds %s, not vertices: make poses of them first", s->name,
-                vg_kind_name(s->head->kind));
-    cli_die(&e);
+        cli_stop(VG_EINPUT, "%s holds vectors: pipe it through 'vg-solve' first", s->name);
+    cli_stop(VG_EINPUT, "%s holds %s, not vertices: make poses of them first", s->name, vg_kind_name(s->head->kind));
 }
 
 static bool next(side *s)
@@ -303,23 +299,17 @@ static void read_cast(cast *c, bool shows_truth, take_frame *put, void *context)
 
 static void refuse_count(const side *s, const side *truth)
 {
-    vg_err e;
-    vg_fail(&e, VG_EINPUT, "%s has %zu frames where %s has %zu: frames are compared by their order", s->name, s->frames,
-            truth->name, truth->frames);
-    cli_die(&e);
+    cli_stop(VG_EINPUT, "%s has %zu frames where %s has %zu: frames are compared by their order", s->name, s->frames,
+             truth->name, truth->frames);
 }
 
 /* What is compared beside may end before the truth, and then stays at its last frame. */
 static void check_counts(const cast *c)
 {
-    vg_err e;
     if (opts.against && c->result.frames != c->truth.frames) refuse_count(&c->result, &c->truth);
     for (size_t i = 0; i < opts.nbeside; i++)
         if (c->compared[i] && c->beside[i].frames > c->truth.frames) refuse_count(&c->beside[i], &c->truth);
-    if (c->result.frames == 0) {
-        vg_fail(&e, VG_EINPUT, "%s has no frames: there is nothing to draw", c->result.name);
-        cli_die(&e);
-    }
+    if (c->result.frames == 0) cli_stop(VG_EINPUT, "%s has no frames: there is nothing to draw", c->result.name);
 }
 
 /* A stream of patches has no frames: they are shown on the reference pose. */
@@ -349,10 +339,7 @@ static void take_patches(side *s)
     if (vg_load_mesh(&h, opts.patches, &e) < 0 ||
         vg_mesh_same(&h.mesh, name, &s->head->mesh, s->name, &e) < 0)
         cli_die(&e);
-    if (!h.patches.n) {
-        vg_fail(&e, VG_EINPUT, "%s holds no patches: make them with 'vg-segment'", name);
-        cli_die(&e);
-    }
+    if (!h.patches.n) cli_stop(VG_EINPUT, "%s holds no patches: make them with 'vg-segment'", name);
     vg_patches_clear(&s->head->patches);
     s->head->patches = h.patches;
     h.patches = (vg_patches){0};
