@@ -109,7 +109,7 @@ browse() {
 @test "a page loads nothing from outside" {
     poses cube 2
     must vg-view pose1.obj --against pose2.obj --beside pose2.obj -o page.html
-    if grep -E -i 'https?://|src=|@import|url\(|fetch\(|XMLHttpRequest|WebSocket' page.html; then fail 'the page looks outside'; fi
+    if grep -E -i 'https?://|src=|@import|url\(|\bfetch\(|XMLHttpRequest|WebSocket' page.html; then fail 'the page looks outside'; fi
     [ "$(grep -o 'href="[^"]*"' page.html)" = 'href="data:,"' ]
     grep -q "default-src 'none'" page.html
 }
