@@ -3,7 +3,6 @@
 #include "between.h"
 #include "mapped.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -52,42 +51,23 @@ typedef enum way { MEASURE, APPLY, TRANSFER, CARRY, SHAPE } way;
 typedef enum by { BY_POSE, BY_SHAPE, BY_GRADIENT, BY_BLEND } by;
 typedef enum pin { PIN_AUTO, PIN_ALWAYS, PIN_NONE } pin;
 
-/* Where the whole body goes (MATH 5): at the target's reference place plus `ratio` times the way the source has gone. */
-typedef struct root_motion {
-    bool stay;
-    double ratio;
-    double source[3], target[3];             /* roots of the references */
-    double *source_anchors, *target_anchors; /* positions in the references */
-} root_motion;
-
-/* Vertices that stay: those of the target all of whose faces are driven only by faces of the source that do not move. */
-typedef struct pinning {
-    pin mode;
-    double least;      /* a vertex that moves less does not move */
-    double *reference; /* the source's */
-    bool *moves;       /* per source vertex, then per source face, in the pose at hand */
-    bool *face_moves;
-    bool *free;        /* per target vertex */
-    uint32_t *list;
-} pinning;
-
 typedef struct work {
     vg_source *s;
-    vg_head *h;            /* the source's until the output's is made of it */
+    vg_head *h;               /* the source's until the output's is made of it */
     vg_head target;
-    vg_head pairs;         /* holds the correspondence */
-    vg_mesh source_mesh;   /* arrays of the sequence's mesh; with a correspondence the head gets the target's instead */
-    double *source_reference;
-    vg_graph *from, *to;   /* graphs of source and target: the same one without a correspondence */
+    vg_head pairs;            /* holds the correspondence */
+    vg_mesh source_mesh;      /* arrays of the sequence's mesh; with a correspondence the head gets the target's instead */
+    double *source_reference; /* the steps borrow it */
+    vg_graph *from, *to;      /* graphs of source and target: the same one without a correspondence */
     way way;
     by by;
-    vg_kind kind;          /* what comes in */
+    vg_kind kind;             /* what comes in */
     vg_deformer *deformer;
     vg_carrier *carrier;
     vg_shaper *shaper;
-    root_motion root;
-    pinning pins;
-    size_t n;              /* poses in hand */
+    vg_mover *mover;          /* NULL: poses are measured */
+    vg_pinner *pinner;        /* NULL: nothing is held */
+    size_t n;                 /* poses in hand */
     vg_frame in[BATCH], out[BATCH];
 } work;
 
@@ -100,26 +80,22 @@ static void parse_options(work *w)
     for (size_t i = 0; i < 4; i++)
         if (need_onto[i].value && !opts.onto) cli_usage("--%s needs --onto", need_onto[i].name);
     w->by = (by)opts.by_choice;
-    w->pins.mode = (pin)opts.pin_choice;
     if (w->by == BY_SHAPE && opts.correspondence)
         cli_usage("--by shape needs one connectivity: it takes no --correspondence");
 }
 
 /* ---- where the body goes ---- */
 
-static double *positions(const double *vertices, const uint32_t *list, size_t n)
+static bool root_stays(void)
 {
-    double *p = cli_allocate(3 * n, sizeof *p, "the mesh of the sequence");
-    vg_graph_anchors(vertices, list, n, p);
-    return p;
+    return opts.root && !strcmp(opts.root, "stay");
 }
 
 /* --root V: the sequence's anchors give way to this one vertex, of both meshes. */
 static void set_root(work *w)
 {
     uint32_t *vertex;
-    if (!opts.root || !strcmp(opts.root, "centroid")) return;
-    if ((w->root.stay = !strcmp(opts.root, "stay"))) return;
+    if (!opts.root || !strcmp(opts.root, "centroid") || root_stays()) return;
     if (opts.root[strspn(opts.root, "0123456789")] || cli_parse_vertices("--root", opts.root, &vertex) != 1)
         cli_usage("--root is 'centroid', 'stay' or the number of a vertex, not '%s'", opts.root);
     if (vertex[0] >= w->h->mesh.nv) cli_usage("--root names vertex %u, but there are %zu, counted from 0", vertex[0], w->h->mesh.nv);
@@ -128,89 +104,6 @@ static void set_root(work *w)
         cli_usage("--root %u needs a sequence of vertices, this one holds %s", vertex[0], vg_kind_name(w->kind));
     free(w->h->anchors);
     w->h->anchors = vertex, w->h->nanchors = 1;
-}
-
-static void compare_references(work *w)
-{
-    root_motion *m = &w->root;
-    const vg_head *h = w->h, *t = &w->target;
-    double before = vg_diagonal(h->reference, h->mesh.nv), after = vg_diagonal(t->reference, t->mesh.nv);
-    m->ratio = before > 0 ? after / before : 1;
-    vg_graph_root(w->from, h->reference, m->source);
-    vg_graph_root(w->to, t->reference, m->target);
-    m->source_anchors = positions(h->reference, h->anchors, h->nanchors);
-    m->target_anchors = positions(t->reference, h->anchors, h->nanchors);
-}
-
-static void move(const root_motion *m, const double *source, const double *target, const double *now, double *to)
-{
-    for (int k = 0; k < 3; k++) to[k] = target[k] + (m->stay ? 0 : m->ratio * (now[k] - source[k]));
-}
-
-static void move_body(const work *w, const vg_frame *in, vg_frame *out)
-{
-    move(&w->root, w->root.source, w->root.target, in->root, out->root);
-    for (size_t i = 0; i < w->h->nanchors; i++)
-        move(&w->root, w->root.source_anchors + 3 * i, w->root.target_anchors + 3 * i, in->anchors + 3 * i,
-             out->anchors + 3 * i);
-}
-
-/* A pose of vertices is moved as a whole until its root is where it belongs; vertices in no face stay. */
-static void place_vertices(const work *w, vg_frame *out)
-{
-    double now[3];
-    vg_graph_root(w->to, out->values, now);
-    for (size_t v = 0; v < w->to->nv; v++)
-        for (size_t k = 0; k < 3 && w->to->in_face[v]; k++) out->values[3 * v + k] += out->root[k] - now[k];
-}
-
-/* ---- what does not move ---- */
-
-static void prepare_pins(work *w)
-{
-    pinning *p = &w->pins;
-    if (w->kind != VG_VERTICES || (w->way != TRANSFER && w->way != CARRY)) p->mode = PIN_NONE;
-    if (p->mode == PIN_NONE) return;
-    static const double still = 1e-6; /* of D */
-    p->reference = w->source_reference;
-    p->least = still * vg_diagonal(p->reference, w->from->nv);
-    p->moves = cli_allocate(w->from->nv, sizeof *p->moves, "the mesh of the sequence");
-    p->face_moves = cli_allocate(w->from->nf, sizeof *p->face_moves, "the mesh of the sequence");
-    p->free = cli_allocate(w->to->nv, sizeof *p->free, "the mesh of the sequence");
-    p->list = cli_allocate(w->to->nv, sizeof *p->list, "the mesh of the sequence");
-}
-
-static bool driven_by_moving(const work *w, size_t face)
-{
-    const vg_correspondence *k = &w->pairs.correspondence;
-    if (!k->first) return w->pins.face_moves[face];
-    for (uint32_t i = k->first[face]; i < k->first[face + 1]; i++)
-        if (w->pins.face_moves[k->source[i]]) return true;
-    return false;
-}
-
-static void pin_still_vertices(work *w, const double *pose, vg_frame *out)
-{
-    pinning *p = &w->pins;
-    const vg_graph *a = w->from, *b = w->to;
-    size_t still = 0, n = 0;
-    for (size_t v = 0; v < a->nv; v++) {
-        p->moves[v] = false;
-        for (size_t k = 0; k < 3; k++) p->moves[v] |= !(fabs(pose[3 * v + k] - p->reference[3 * v + k]) <= p->least);
-        still += !p->moves[v];
-    }
-    if (p->mode == PIN_AUTO && still < a->nv / 10) still = 0;
-    for (size_t f = 0; still && f < a->nf; f++) {
-        p->face_moves[f] = false;
-        for (uint32_t c = a->start[f]; c < a->start[f + 1]; c++) p->face_moves[f] |= p->moves[a->vert[c]];
-    }
-    if (still) memset(p->free, 0, b->nv * sizeof *p->free);
-    for (size_t f = 0; still && f < b->nf - b->nlinks; f++)
-        for (uint32_t c = b->start[f]; driven_by_moving(w, f) && c < b->start[f + 1]; c++) p->free[b->vert[c]] = true;
-    for (size_t v = 0; still && v < b->nv; v++)
-        if (b->in_face[v] && !p->free[v]) p->list[n++] = (uint32_t)v;
-    vg_err e;
-    if (vg_frame_pin(out, p->list, n, &e) < 0) cli_die(&e);
 }
 
 /* ---- frames ---- */
@@ -226,23 +119,32 @@ static void run_batch(work *w, const double *const *in, double *const *out)
     }
 }
 
+/* What a frame says beside its values. */
+static void finish_frame(work *w, vg_frame *in, vg_frame *out)
+{
+    vg_err e;
+    const uint32_t *still;
+    if (vg_frame_label(out, in, &e) < 0) cli_die(&e);
+    if (w->mover) {
+        vg_mover_move(w->mover, in, out);
+    } else {
+        memcpy(out->root, in->root, sizeof out->root);
+        if (w->h->nanchors) memcpy(out->anchors, in->anchors, 3 * w->h->nanchors * sizeof(double));
+    }
+    if (w->way == SHAPE) vg_mover_place(w->mover, out->root, out->values);
+    if (!w->pinner) return;
+    size_t n = vg_pinner_find(w->pinner, in->values, &still);
+    if (vg_frame_pin(out, still, n, &e) < 0) cli_die(&e);
+}
+
 static void deform_batch(work *w)
 {
     const double *in[BATCH];
     double *out[BATCH];
-    vg_err e;
     for (size_t i = 0; i < w->n; i++) in[i] = w->in[i].values, out[i] = w->out[i].values;
     if (w->n) run_batch(w, in, out);
     for (size_t i = 0; i < w->n; i++) {
-        if (vg_frame_label(&w->out[i], &w->in[i], &e) < 0) cli_die(&e);
-        if (w->way == MEASURE) {
-            memcpy(w->out[i].root, w->in[i].root, sizeof w->out[i].root);
-            if (w->h->nanchors) memcpy(w->out[i].anchors, w->in[i].anchors, 3 * w->h->nanchors * sizeof(double));
-        } else {
-            move_body(w, &w->in[i], &w->out[i]);
-        }
-        if (w->way == SHAPE) place_vertices(w, &w->out[i]);
-        if (w->pins.mode != PIN_NONE) pin_still_vertices(w, in[i], &w->out[i]);
+        finish_frame(w, &w->in[i], &w->out[i]);
         cli_stream_put(&w->out[i]);
     }
     w->n = 0;
@@ -331,6 +233,22 @@ static void make_graphs(work *w)
     if (!w->to) w->to = w->from;
 }
 
+/* What follows the source as a whole: the body, and what does not move. */
+static void make_followers(work *w)
+{
+    vg_err e;
+    const vg_head *h = w->h;
+    const vg_correspondence *pairs = opts.correspondence ? &w->pairs.correspondence : NULL;
+    bool pins = w->kind == VG_VERTICES && (w->way == TRANSFER || w->way == CARRY) && opts.pin_choice != PIN_NONE;
+    int r = VG_OK;
+    if (opts.onto)
+        r = vg_mover_new(&w->mover, w->from, h->reference, w->to, w->target.reference, h->anchors, h->nanchors,
+                         root_stays(), &e);
+    if (r == VG_OK && pins)
+        r = vg_pinner_new(&w->pinner, w->from, h->reference, w->to, pairs, opts.pin_choice == PIN_ALWAYS, &e);
+    if (r < 0) cli_die(&e);
+}
+
 static void make_step(work *w)
 {
     static const vg_method methods[] = {[BY_POSE] = VG_BY_POSE, [BY_SHAPE] = VG_BY_POSE, [BY_GRADIENT] = VG_BY_GRADIENT,
@@ -357,6 +275,7 @@ static void make_step(work *w)
         free(vectors);
     }
     if (r < 0) cli_die(&e);
+    make_followers(w);
 }
 
 /* The output's head: the sequence's provenance and records, the target's mesh, reference and what its file said. */
@@ -397,9 +316,7 @@ static void prepare(work *w)
     for (size_t i = 0; i < BATCH && w->kind == VG_VERTICES; i++) /* room for the anchors that fill_body measures */
         if (vg_frame_shape(&w->in[i], w->h, &e) < 0) cli_die(&e);
     make_step(w);
-    if (opts.onto) compare_references(w);
     make_head(w);
-    prepare_pins(w);
     for (size_t i = 0; i < BATCH; i++)
         if (vg_frame_shape(&w->out[i], w->h, &e) < 0) cli_die(&e);
 }

@@ -502,6 +502,30 @@ int vg_shaper_new(vg_shaper **s, const vg_graph *g, const double *source_referen
 void vg_shaper_free(vg_shaper **s);
 void vg_shaper_transfer(vg_shaper *s, size_t n, const double *const *poses, double *const *vertices);
 
+/* Where the whole body goes when a motion is carried over (MATH 5): each root or anchor is as far from its place in the
+ * target's reference as the source's is from its own, by the ratio of the diagonals of the references; or it stays. */
+typedef struct vg_mover vg_mover;
+/* vg_mover_new: to is borrowed until free. anchors: of both, when they have the same vertices. */
+int vg_mover_new(vg_mover **m, const vg_graph *from, const double *source_reference, const vg_graph *to,
+                 const double *target_reference, const uint32_t *anchors, size_t nanchors, bool stay,
+                 vg_err *e) VG_MUST_CHECK;
+void vg_mover_free(vg_mover **m);
+/* vg_mover_move: root and anchors of `in` become those of `out`. */
+void vg_mover_move(const vg_mover *m, const vg_frame *in, vg_frame *out);
+/* vg_mover_place: move a pose of the target as a whole until its root is there; vertices in no face stay. */
+void vg_mover_place(const vg_mover *m, const double root[3], double *vertices);
+
+/* Which vertices of the target stay in a pose: those all of whose faces are driven only by faces of the source none of whose
+ * vertices is further than 1e-6 D from its place in the reference. */
+typedef struct vg_pinner vg_pinner;
+/* vg_pinner_new: all is borrowed until free. pairs NULL: one connectivity. always: even when less than a tenth of the source's
+ * vertices stay. */
+int vg_pinner_new(vg_pinner **p, const vg_graph *from, const double *source_reference, const vg_graph *to,
+                  const vg_correspondence *pairs, bool always, vg_err *e) VG_MUST_CHECK;
+void vg_pinner_free(vg_pinner **p);
+/* vg_pinner_find: for a pose of the source, how many they are and which, ascending; borrowed until the next call. */
+size_t vg_pinner_find(vg_pinner *p, const double *pose, const uint32_t **vertices);
+
 /* Reconstruction: min over V of the squared difference between the vectors of V and the given ones (MATH 2; T 3.7-3.9),
  * by one sparse Cholesky factorisation, many poses per solve. */
 typedef struct vg_solver vg_solver;
