@@ -287,6 +287,34 @@ patches() {
     rm -f motions.vgs "$n.map" "$n.patches"
 }
 
+# bones N: a skeleton of N bones in a row along a rod, as text
+bones() {
+    awk -v n="$1" 'BEGIN { for (i = 0; i < n; i++) {
+        printf "b%d %s 0 0 %g 0 0 %g\n", i, i ? "b" (i - 1) : "-", -1 + 2 * i / n, -1 + 2 * (i + 1) / n } }'
+}
+
+# rigs NAME INPUT POSES PLAYED RUNS FACES VERTICES: a skeleton of 33 bones without motion, learned from the POSES of INPUT, and the rig at
+# work on PLAYED poses (a multiple of eleven)
+rigs() {
+    n=$1 in=$2 poses=$3 played=$4 runs=$5 k=33
+    bones $k >bones.txt
+    best "$runs" "vg-fitmap -q --skeleton bones.txt $in -o $n.rig"
+    rig_seconds=$seconds
+    by_sgemm "6 * $poses * $k * (4 * $7 + 9 * $6)"
+    row 'vg-fitmap --skeleton, learned' "$poses" "$(bytes "$in")"
+    # shellcheck disable=SC2046
+    vg-encode --f32 $(repeat $((played / 11)) "$n-11.vgs") | vg-deform --map "$n.rig" --transforms -o motions.vgs
+    product=$(product "$k" "$7")
+    best "$runs" "vg-deform --map $n.rig motions.vgs >/dev/null"
+    limit=sgemm least=$(calc "$played / ${product% *}")
+    row 'vg-deform --map, rig, binary32' "$played" $((played * $7 * 12))
+    rig_rate=$rate
+    best "$runs" "vg-deform --live --map $n.rig motions.vgs >/dev/null"
+    row 'vg-deform --map --live, rig' "$played" $((played * $7 * 12))
+    live_seconds=$(calc "1000 * $seconds / $played")
+    rm -f motions.vgs "$n.rig" bones.txt
+}
+
 # setup NAME TEXT: from files to the first pose; the whole of vg-solve into $seconds
 setup() {
     best "$RUNS" "vg-deform $1-1.vgs --onto $1-b.vgs | vg-solve >/dev/null"
@@ -378,6 +406,10 @@ goal 'segmentation of 484 poses, 6,890 vertices' "$segment_seconds" s '<=' 2
 goal '... with --connected' "$connected_seconds" s '<=' 2
 goal 'fit of a map to 484 poses, 6,890 vertices' "$fit_seconds" s '<=' 5
 goal 'playing a map, 6,890 vertices' "$(calc "int($rate)")" poses/s '>=' 10000
+rigs rod many.vgs 484 4840 "$RUNS" 13776 6890
+goal 'rig of 33 bones learned from 484 poses, 6,890 vertices' "$rig_seconds" s '<=' 3
+goal 'playing a rig, 6,890 vertices' "$(calc "int($rig_rate)")" poses/s '>=' 10000
+goal '... frame by frame, a pose' "$live_seconds" ms '<=' 1
 vg-segment rod-11.vgs -k 50 -q -o eleven.patches
 best "$RUNS" 'vg-fitmap -q --patches eleven.patches rod-11.vgs -o eleven.map'
 goal 'fit of a map to 11 poses, 6,890 vertices' "$seconds" s '<=' 0.3
