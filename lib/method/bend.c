@@ -17,14 +17,14 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { BLOCK = 8, SWEEPS = 8, STEPS = 30, ROUNDS = 12 };
+enum { BLOCK = 8, SHARES = 8, SWEEPS = 8, STEPS = 30, ROUNDS = 30 };
 static const double FIRST_PRIOR = 1e-3,
                     LAST_PRIOR = 1e-10; /* pull of a bone towards its parent, beside that of the vertices */
 
 struct vg_bender {
     size_t nv, n; /* vertices, bones */
     int threads;
-    double least; /* turns smaller than this, in radians, are none */
+    double least;     /* turns smaller than this, in radians, are none */
     uint32_t *parent; /* of each bone; each before its children */
     double *at;       /* 3 n: the joints */
     double *offset;   /* 3 n: from the parent's joint */
@@ -76,38 +76,74 @@ static size_t vertex_row(const vg_bender *x, size_t v, uint32_t *list, double *q
     return count;
 }
 
-static int make_quadratic(vg_bender *x, vg_err *e)
+/* The sums over one share of the vertices; shares are fixed, so that the threads do not change the result. */
+typedef struct summing {
+    const vg_bender *x;
+    uint32_t *list; /* n for each share, as all else */
+    bool *seen;
+    double *q, *mean, *g; /* 3 n, 3 n, 3 n x 3 n: blocks with row >= column */
+} summing;
+
+static void sum_share(void *context, size_t share)
 {
-    size_t n = x->n, width = 3 * n;
-    uint32_t *list = vgi_array(n, sizeof *list, e);
-    double *q = vgi_array(width, sizeof *q, e);
-    bool *seen = vgi_array(n, sizeof *seen, e);
-    bool ok = list && q && seen;
-    for (size_t v = 0; ok && v < x->nv; v++) {
-        size_t count = vertex_row(x, v, list, q, seen);
+    const summing *s = context;
+    const vg_bender *x = s->x;
+    size_t n = x->n, width = 3 * n, last = (share + 1) * x->nv / SHARES;
+    uint32_t *list = s->list + share * n;
+    double *q = s->q + share * width, *mean = s->mean + share * width, *g = s->g + share * width * width;
+    for (size_t v = share * x->nv / SHARES; v < last; v++) {
+        size_t count = vertex_row(x, v, list, q, s->seen + share * n);
         for (size_t a = 0; a < count; a++) {
-            size_t i = list[a];
-            for (size_t k = 0; k < 3; k++) x->mean[3 * i + k] += q[3 * i + k] / (double)x->nv;
+            const double *p = q + 3 * (size_t)list[a];
+            for (size_t k = 0; k < 3; k++) mean[3 * list[a] + k] += p[k];
             for (size_t b = 0; b < count; b++) {
-                size_t j = list[b];
-                for (size_t k = 0; k < 3; k++)
-                    for (size_t l = 0; l < 3; l++)
-                        x->g[(3 * i + k) * width + 3 * j + l] += q[3 * i + k] * q[3 * j + l] / (double)x->nv;
+                if (list[b] > list[a]) continue;
+                const double *r = q + 3 * (size_t)list[b];
+                double *to = g + 3 * list[a] * width + 3 * list[b];
+                for (size_t k = 0; k < 3; k++, to += width)
+                    to[0] += p[k] * r[0], to[1] += p[k] * r[1], to[2] += p[k] * r[2];
             }
         }
     }
-    for (size_t i = 0; ok && i < width; i++)
-        for (size_t j = 0; j < width; j++) x->g[i * width + j] -= x->mean[i] * x->mean[j];
-    double largest = 0;
-    for (size_t j = 0; ok && j < n; j++) {
-        for (size_t k = 0; k < 3; k++) x->size[j] += x->g[(3 * j + k) * width + 3 * j + k];
+}
+
+static void finish_quadratic(vg_bender *x, const summing *s)
+{
+    size_t n = x->n, width = 3 * n;
+    double count = (double)x->nv, largest = 0;
+    for (size_t k = 0; k < SHARES; k++)
+        for (size_t i = 0; i < width; i++) x->mean[i] += s->mean[k * width + i] / count;
+    for (size_t i = 0; i < width; i++)
+        for (size_t j = 0; j < 3 * (i / 3 + 1); j++) {
+            double sum = 0;
+            for (size_t k = 0; k < SHARES; k++) sum += s->g[(k * width + i) * width + j];
+            x->g[i * width + j] = x->g[j * width + i] = sum / count - x->mean[i] * x->mean[j];
+        }
+    for (size_t j = 0; j < n; j++) {
+        for (size_t k = 0; k < 3; k++) x->size[j] += x->g[(3 * j + k) * (width + 1)];
         if (x->size[j] > largest) largest = x->size[j];
     }
-    for (size_t j = 0; ok && j < n; j++) /* bones that move nothing */
+    for (size_t j = 0; j < n; j++) /* bones that move nothing */
         if (!(x->size[j] > 1e-6 * largest)) x->size[j] = largest > 0 ? 1e-6 * largest : 1;
-    free(list);
-    free(q);
-    free(seen);
+}
+
+static int make_quadratic(vg_bender *x, vg_err *e)
+{
+    size_t n = x->n, width = 3 * n;
+    summing s = {.x = x};
+    s.list = vgi_array(SHARES * n, sizeof *s.list, e), s.seen = vgi_array(SHARES * n, sizeof *s.seen, e);
+    s.q = vgi_array(SHARES * width, sizeof *s.q, e), s.mean = vgi_array(SHARES * width, sizeof *s.mean, e);
+    s.g = vgi_array(SHARES * width, width * sizeof *s.g, e);
+    bool ok = s.list && s.seen && s.q && s.mean && s.g;
+    if (ok) {
+        vgi_parallel(x->threads, SHARES, sum_share, &s);
+        finish_quadratic(x, &s);
+    }
+    free(s.list);
+    free(s.seen);
+    free(s.q);
+    free(s.mean);
+    free(s.g);
     return ok ? VG_OK : VG_ENOMEM;
 }
 
@@ -330,7 +366,8 @@ static void descend(const vg_bender *x, bending *w, double prior)
         }
         memcpy(w->r, w->trial, 9 * x->n * sizeof *w->r);
         f = now, damping *= 0.1;
-        if (gain < noise * fabs(f)) break; /* the step that was just taken is the last that can be told from rounding */
+        if (gain < noise * fabs(f))
+            break; /* the step that was just taken is the last that can be told from rounding */
     }
     for (size_t j = 0; j < x->n; j++) { /* what rounding has done to the products */
         double m[9];
@@ -415,11 +452,12 @@ int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, 
     for (size_t b = 0; code == VG_OK && b < bones; b++)
         memcpy(at + 3 * b, r->at + 3 * (size_t)r->bone[b], 3 * sizeof *at);
     *miss = 0;
+    bool fine = false;
     for (int round = 0; code == VG_OK && round < ROUNDS; round++) {
         vg_bender *x = NULL;
         vgi_rig_sums s = {0};
         code = vg_bender_new(&x, r, nv, h->reference, threads, e);
-        if (code == VG_OK) x->least = 1e-4, vg_bender_fit(x, n, poses, transforms);
+        if (code == VG_OK) x->least = fine ? x->least : 1e-4, vg_bender_fit(x, n, poses, transforms);
         if (code == VG_OK) code = vgi_rig_sums_make(&s, nv, bones, at, NULL, e);
         if (code == VG_OK) vgi_rig_sums_add(&s, n, poses, (const double *const *)transforms, threads);
         if (code == VG_OK) code = vgi_skin_fit(r, &s, h->reference, threads, left, e);
@@ -427,7 +465,8 @@ int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, 
         vg_bender_free(&x);
         *miss = 0;
         for (size_t v = 0; code == VG_OK && v < nv; v++) *miss += left[v] / (double)nv;
-        if (!(*miss < 0.98 * before)) break;
+        if (!(*miss < 0.995 * before) && fine) break;
+        fine = fine || !(*miss < 0.995 * before); /* roughly at first, then exactly */
         before = *miss;
     }
     free(transforms);
