@@ -1,4 +1,4 @@
-/* report.c: named values and tables, printed as aligned text or as JSON; the one file that knows jansson.
+/* report.c: named values and tables, printed as aligned text or as JSON; of cmd/ the one file that knows Jansson.
  * Leaves out what is reported and where it goes.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "report.h"

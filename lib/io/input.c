@@ -211,7 +211,7 @@ int vgi_nameless_file(vg_err *e)
     return vg_fail(e, VG_ESYS, "cannot make a temporary file in '%s': %s", dir, strerror(errno));
 }
 
-int vgi_spool(vgi_input *in, uint64_t limit, int *out, vg_err *e)
+int vgi_input_spool(vgi_input *in, uint64_t limit, int *out, vg_err *e)
 {
     unsigned char *block = vgi_array_raw(BUFFER, 1, e);
     if (!block) return VG_ENOMEM;

@@ -35,8 +35,8 @@ bool vgi_is_stream(const unsigned char *data, size_t n);
 
 /* vgi_nameless_file: a new file without a name in $TMPDIR (or /tmp), for reading and writing; its descriptor. */
 int vgi_nameless_file(vg_err *e) VG_MUST_CHECK;
-/* vgi_spool: copy what is left of an input that can be read only once into a file without a name. */
-int vgi_spool(vgi_input *in, uint64_t limit, int *fd, vg_err *e) VG_MUST_CHECK;
+/* vgi_input_spool: copy what is left of an input that can be read only once into a file without a name. */
+int vgi_input_spool(vgi_input *in, uint64_t limit, int *fd, vg_err *e) VG_MUST_CHECK;
 /* vgi_write_all: write n bytes to fd, whatever the interruptions; VG_ESYS naming `name`. */
 int vgi_write_all(int fd, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
 

@@ -123,6 +123,11 @@ static int count_bytes(const vgi_npy *a, size_t *bytes, const char *subject, vg_
     return VG_OK;
 }
 
+static bool sniff_npy(const unsigned char *data, size_t n)
+{
+    return n >= sizeof magic && !memcmp(data, magic, sizeof magic);
+}
+
 int vgi_npy_read(vgi_npy *a, size_t *bytes, vgi_input *in, const char *subject, vg_err *e)
 {
     enum { MOST = 1 << 16 };
@@ -130,7 +135,7 @@ int vgi_npy_read(vgi_npy *a, size_t *bytes, vgi_input *in, const char *subject, 
     *a = (vgi_npy){0};
     int r = cut_short(vgi_input_read(in, head, 10, NULL, e), subject, e);
     if (r < 0) return r;
-    if (!vgi_npy_sniff(head, 10)) return vg_fail(e, VG_EINPUT, "%s is no NumPy array", subject);
+    if (!sniff_npy(head, 10)) return vg_fail(e, VG_EINPUT, "%s is no NumPy array", subject);
     if (head[6] < 1 || head[6] > 3)
         return vg_fail(e, VG_EINPUT, "%s is a NumPy array of version %d: 1 to 3 are known", subject, head[6]);
     size_t n = head[8] | (size_t)head[9] << 8;
@@ -147,11 +152,6 @@ int vgi_npy_read(vgi_npy *a, size_t *bytes, vgi_input *in, const char *subject, 
                     "most %d dimensions", subject, VGI_NPY_DIMENSIONS);
     vg_bytes_clear(&b);
     return r < 0 ? r : count_bytes(a, bytes, subject, e);
-}
-
-bool vgi_npy_sniff(const unsigned char *data, size_t n)
-{
-    return n >= sizeof magic && !memcmp(data, magic, sizeof magic);
 }
 
 void vgi_npy_write(unsigned char to[VGI_NPY_HEADER], const char *descr, size_t ndim, const uint64_t *shape)
@@ -384,6 +384,6 @@ static void release_npy(void *state)
 
 const vgi_sequence_format vgi_sequence_npy = {
     .name = "npy", .suffix = ".npy", .keeps = VGI_KEEPS_ORDER | VGI_KEEPS_DOUBLES, .bare = true,
-    .sniff = vgi_npy_sniff, .open = open_npy, .next = next_npy, .frames = count_frames, .close = close_npy,
+    .sniff = sniff_npy, .open = open_npy, .next = next_npy, .frames = count_frames, .close = close_npy,
     .kinds = 1 << VG_VERTICES | 1 << VG_VECTORS | 1 << VG_DEFORMATIONS | 1 << VG_TRANSFORMS,
     .begin = begin_npy, .put = put_npy, .end = end_npy, .warning = warn_npy, .release = release_npy};

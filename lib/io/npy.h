@@ -18,7 +18,6 @@ typedef struct vgi_npy {
 /* vgi_npy_read: magic and header, versions 1 to 3; the elements come next. VG_EINPUT for objects, structures and
  * more than four dimensions. The number of bytes that the elements would take fits in a size_t: it is *bytes. */
 int vgi_npy_read(vgi_npy *a, size_t *bytes, vgi_input *in, const char *subject, vg_err *e) VG_MUST_CHECK;
-bool vgi_npy_sniff(const unsigned char *data, size_t n);
 /* vgi_npy_write: VGI_NPY_HEADER bytes of version 1. */
 void vgi_npy_write(unsigned char to[VGI_NPY_HEADER], const char *descr, size_t ndim, const uint64_t *shape);
 /* vgi_npy_float: the element at p, of kind 'f', 4 or 8 bytes. */

@@ -1,6 +1,6 @@
 /* npz.c: NPZ, NumPy arrays in a zip: the numbers of all frames, and beside them faces, reference, names and times,
  * so that nothing but attributes and provenance is lost. man/vg-decode.1 lists the arrays.
- * Leaves out the header of an array (npy.c) and the zip (archive.c).
+ * Leaves out the header of an array (npy.c) and the zip (archive.c, pack.c).
  *
  * Reading keeps the whole file in memory, as NumPy does: the frames may stand in any order of axes. Writing keeps
  * names, times, roots and anchors; the numbers wait in a file without a name until their count is known.
@@ -85,7 +85,7 @@ static int hold_all(reading *x, vgi_input *in, vg_err *e)
     vgi_archive *a = NULL;
     vg_bytes data = {0};
     const char *path;
-    int fd = -1, r = vgi_spool(in, vgi_archive_limits.total_bytes, &fd, e);
+    int fd = -1, r = vgi_input_spool(in, vgi_archive_limits.total_bytes, &fd, e);
     if (r == VG_OK) r = vgi_archive_open_for(&a, fd, 0, vgi_input_name(in), is_array_name, &vgi_archive_limits, e);
     while (r == VG_OK && (r = vgi_archive_next(a, &path, &data, e)) > 0) r = hold_member(x, path, &data, e);
     vgi_archive_close(&a);

@@ -1,5 +1,6 @@
 /* payload.c: what is in each kind of record, both directions side by side (fmt/STREAM.md, section 3).
- * Leaves out skeletons, patches and maps (payload_rig.c), record headers and checksums (record.c) and the order of records (stream.c).
+ * Leaves out skeletons, rigs, patches and maps (payload_rig.c), numbers of vertices (payload_scal.c), record headers and
+ * checksums (record.c) and the order of records (stream.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/cursor.h"
 
@@ -237,7 +238,8 @@ int vgi_refp_encode(vg_bytes *b, const vg_head *h, vg_err *e)
     return r < 0 ? r : put_doubles(b, h->reference, 3 * h->mesh.nv, e);
 }
 
-size_t vgi_graph_count(const vg_head *h, vg_kind kind)
+/* Elements that a frame of this kind must have on h's mesh, selection and links. */
+static size_t graph_count(const vg_head *h, vg_kind kind)
 {
     const vg_mesh *m = &h->mesh;
     if (kind == VG_VERTICES) return m->nv;
@@ -256,12 +258,12 @@ int vgi_form_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     if (kind < VG_VERTICES || kind > VG_TRANSFORMS) return wrong(p, "frames are of unknown kind", e);
     if (precision != VG_F32 && precision != VG_F64) return wrong(p, "numbers are of unknown precision", e);
     h->kind = (vg_kind)kind, h->precision = (vg_precision)precision, h->count = (size_t)count;
-    if (h->map.ncorners && h->map.ncorners != vgi_graph_count(h, VG_VECTORS))
+    if (h->map.ncorners && h->map.ncorners != graph_count(h, VG_VECTORS))
         return wrong(p, "the corners of record MAP do not fit the mesh", e);
     if (kind == VG_TRANSFORMS) return VG_OK;
     if (!h->reference) return wrong(p, "a MESH and a REFP record must come before it", e);
     if (kind != VG_VERTICES && !h->has_links) return wrong(p, "a LINK record must come before it", e);
-    if (count != vgi_graph_count(h, h->kind)) return wrong(p, "its count does not fit the mesh", e);
+    if (count != graph_count(h, h->kind)) return wrong(p, "its count does not fit the mesh", e);
     return VG_OK;
 }
 

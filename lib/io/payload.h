@@ -31,9 +31,6 @@ int vgi_ptch_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 int vgi_rig_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 int vgi_map_encode(vg_bytes *b, const vg_map *m, vg_err *e) VG_MUST_CHECK;
 
-/* vgi_graph_count: elements that a frame of this kind must have on h's mesh, selection and links. */
-size_t vgi_graph_count(const vg_head *h, vg_kind kind);
-
 /* vgi_fram_decode: f->raw holds the payload. On a little-endian machine binary64 values are used where they lie. */
 int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e) VG_MUST_CHECK;
 /* vgi_fram_encode: everything before the values. */

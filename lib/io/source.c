@@ -328,7 +328,7 @@ static int open_archive(vg_source *s, item *it, vg_err *e)
     if (!it->regular) {
         vgi_input *in;
         if ((r = open_input(it, &in, e)) < 0) return r;
-        r = vgi_spool(in, s->limits.total_bytes, &fd, e);
+        r = vgi_input_spool(in, s->limits.total_bytes, &fd, e);
         vgi_input_free(&in);
     } else {
         fd = it->path ? open(it->path, O_RDONLY | O_CLOEXEC) : fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);

@@ -87,7 +87,8 @@ static bool near_edge(const float w[3], const float height[3], unsigned edges, f
     return false;
 }
 
-void vgi_raster_triangle(vgi_raster *r, const vgi_corner *const corner[3], unsigned edges, float edge_width)
+/* edges: bit i marks the side opposite corner i as an edge of the face. */
+static void draw_triangle(vgi_raster *r, const vgi_corner *const corner[3], unsigned edges, float edge_width)
 {
     const vgi_corner *c[3] = {corner[0], corner[1], corner[2]};
     int64_t p[3][2];
@@ -138,7 +139,7 @@ static void strip(const vgi_corner *a, float dx, float dy, float reach, double y
     if (middle + half < (double)*x1) *x1 = (size_t)fmax(ceil(middle + half), (double)*x0);
 }
 
-void vgi_raster_wire(vgi_raster *r, const vgi_corner *a, const vgi_corner *b, float radius, int kind)
+static void draw_wire(vgi_raster *r, const vgi_corner *a, const vgi_corner *b, float radius, int kind)
 {
     span s;
     if (!(fabsf(a->x) < FAR_OUT && fabsf(a->y) < FAR_OUT && fabsf(b->x) < FAR_OUT && fabsf(b->y) < FAR_OUT)) return;
@@ -235,7 +236,7 @@ static void draw_fan(work *k, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
         const vgi_corner *c[3] = {k->corner + n, k->corner + i, k->corner + (i + 1 == n ? 0 : i + 1)};
-        vgi_raster_triangle(k->raster, c, 1, k->drawing->edge);
+        draw_triangle(k->raster, c, 1, k->drawing->edge);
     }
 }
 
@@ -257,7 +258,7 @@ static void draw_ears(work *k, size_t n, const float area[3])
         unsigned edges = 0;
         for (int i = 0; i < 3; i++)
             if ((p[(i + 1) % 3] + 1) % n == p[(i + 2) % 3]) edges |= 1u << i;
-        vgi_raster_triangle(k->raster, c, edges, k->drawing->edge);
+        draw_triangle(k->raster, c, edges, k->drawing->edge);
     }
 }
 
@@ -270,12 +271,12 @@ static void draw_face(work *k, size_t f)
     for (size_t i = 0; k->drawing->patches && i < n; i++)
         k->corner[i].value = (float)(k->drawing->patches[f] & 0xffff) / 65535;
     if (n == 2) {
-        vgi_raster_wire(k->raster, k->corner, k->corner + 1, k->drawing->wire, VGI_WIRE);
+        draw_wire(k->raster, k->corner, k->corner + 1, k->drawing->wire, VGI_WIRE);
         for (int i = 0; i < 2; i++)
-            vgi_raster_wire(k->raster, k->corner + i, k->corner + i, 1.6f * k->drawing->wire, VGI_WIRE);
+            draw_wire(k->raster, k->corner + i, k->corner + i, 1.6f * k->drawing->wire, VGI_WIRE);
     } else if (n == 3) {
         const vgi_corner *c[3] = {k->corner, k->corner + 1, k->corner + 2};
-        vgi_raster_triangle(k->raster, c, 7, k->drawing->edge);
+        draw_triangle(k->raster, c, 7, k->drawing->edge);
     } else {
         float area[3];
         seen_area(k->corner, n, area);
@@ -302,7 +303,7 @@ static void draw_edges(work *k, float radius)
         for (size_t i = 0; i < n; i++) {
             load_corner(k, m->vert[first + i], NULL, k->corner);
             load_corner(k, m->vert[first + (i + 1) % n], NULL, k->corner + 1);
-            vgi_raster_wire(k->raster, k->corner, k->corner + 1, radius, VGI_WIRE);
+            draw_wire(k->raster, k->corner, k->corner + 1, radius, VGI_WIRE);
         }
     }
 }
@@ -333,7 +334,7 @@ static void draw_contours(work *k, float radius)
         if (!is_contour(k, g->side + i, n)) continue;
         load_corner(k, g->side[i].a, NULL, k->corner);
         load_corner(k, g->side[i].b, NULL, k->corner + 1);
-        vgi_raster_wire(k->raster, k->corner, k->corner + 1, radius, VGI_CONTOUR);
+        draw_wire(k->raster, k->corner, k->corner + 1, radius, VGI_CONTOUR);
     }
 }
 
@@ -375,7 +376,7 @@ int vgi_draw(vgi_raster *r, const vgi_drawing *d, vg_err *e)
         else if (d->contour > 0) draw_contours(&k, d->contour);
         for (size_t v = 0; m->nf == 0 && v < m->nv; v++) {
             load_corner(&k, (uint32_t)v, NULL, k.corner);
-            vgi_raster_wire(r, k.corner, k.corner, 1.6f * d->wire, VGI_WIRE);
+            draw_wire(r, k.corner, k.corner, 1.6f * d->wire, VGI_WIRE);
         }
     }
     free_work(&k);

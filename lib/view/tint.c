@@ -13,12 +13,26 @@
 
 /* ---- numbers ---- */
 
+/* The distance of each corner from the centroid of its face. */
+static void corner_lengths(const vg_mesh *m, const double *points, double *lengths)
+{
+    for (size_t f = 0; f < m->nf; f++) {
+        double centre[3] = {0, 0, 0}, share = 1 / (double)(m->start[f + 1] - m->start[f]);
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
+            for (size_t k = 0; k < 3; k++) centre[k] += share * points[3 * (size_t)m->vert[c] + k];
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
+            const double *p = points + 3 * (size_t)m->vert[c];
+            lengths[c] = hypot(hypot(p[0] - centre[0], p[1] - centre[1]), p[2] - centre[2]);
+        }
+    }
+}
+
 static int measure_lengths(vgi_meter *m, const double *reference, vg_err *e)
 {
     m->lengths = vgi_array_raw(vg_mesh_corners(m->mesh), sizeof *m->lengths, e);
     m->count = vgi_array(m->mesh->nv, sizeof *m->count, e);
     if (!m->lengths || !m->count) return VG_ENOMEM;
-    vgi_corner_lengths(m->mesh, reference, m->lengths);
+    corner_lengths(m->mesh, reference, m->lengths);
     for (size_t c = 0; c < vg_mesh_corners(m->mesh); c++) m->count[m->mesh->vert[c]] += m->lengths[c] > 0;
     return VG_OK;
 }
@@ -46,25 +60,12 @@ void vgi_meter_clear(vgi_meter *m)
     *m = (vgi_meter){0};
 }
 
-void vgi_corner_lengths(const vg_mesh *m, const double *points, double *lengths)
-{
-    for (size_t f = 0; f < m->nf; f++) {
-        double centre[3] = {0, 0, 0}, share = 1 / (double)(m->start[f + 1] - m->start[f]);
-        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
-            for (size_t k = 0; k < 3; k++) centre[k] += share * points[3 * (size_t)m->vert[c] + k];
-        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
-            const double *p = points + 3 * (size_t)m->vert[c];
-            lengths[c] = hypot(hypot(p[0] - centre[0], p[1] - centre[1]), p[2] - centre[2]);
-        }
-    }
-}
-
 /* The mean over the vectors of a vertex of how often they have doubled: the geometric mean of their scales. */
 static void measure_scales(vgi_meter *m, const double *points)
 {
     const vg_mesh *mesh = m->mesh;
     memset(m->numbers, 0, mesh->nv * sizeof *m->numbers);
-    vgi_corner_lengths(mesh, points, m->now);
+    corner_lengths(mesh, points, m->now);
     for (size_t c = 0; c < vg_mesh_corners(mesh); c++) {
         if (!(m->lengths[c] > 0)) continue;
         double doubled = log2(m->now[c] / m->lengths[c]);

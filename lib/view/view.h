@@ -99,9 +99,6 @@ typedef struct vgi_drawing { /* one pose to be drawn */
 
 int vgi_raster_init(vgi_raster *r, size_t w, size_t h, vg_err *e) VG_MUST_CHECK;
 void vgi_raster_clear(vgi_raster *r);
-/* edges: bit i marks the side opposite corner i as an edge of the face. */
-void vgi_raster_triangle(vgi_raster *r, const vgi_corner *const corner[3], unsigned edges, float edge_width);
-void vgi_raster_wire(vgi_raster *r, const vgi_corner *a, const vgi_corner *b, float radius, int kind);
 int vgi_draw(vgi_raster *r, const vgi_drawing *d, vg_err *e) VG_MUST_CHECK;
 
 /* ---- colour.c ---- */
@@ -145,8 +142,6 @@ typedef struct vgi_spread {
 int vgi_meter_init(vgi_meter *m, const vgi_tint *t, const vg_mesh *mesh, const double *reference, double unit,
                    vg_err *e) VG_MUST_CHECK;
 void vgi_meter_clear(vgi_meter *m);
-/* vgi_corner_lengths: the distance of each corner from the centroid of its face. */
-void vgi_corner_lengths(const vg_mesh *m, const double *points, double *lengths);
 /* vgi_tint_has: is there a number for each vertex of this frame? */
 bool vgi_tint_has(const vgi_tint *t, const vg_frame *f, const double *truth);
 /* vgi_tint_read: the numbers of a frame that has them, into m->numbers. VG_EINPUT when they have another name than those
