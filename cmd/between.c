@@ -115,7 +115,8 @@ static void grow(poses *p)
 static void keep(poses *p, const vg_frame *f)
 {
     const vg_head *h = p->h;
-    double *values = cli_allocate(p->numbers, sizeof *values, "the key poses"), *anchors = cli_allocate(3 * h->nanchors, sizeof *anchors, "the key poses");
+    double *values = cli_allocate(p->numbers, sizeof *values, "the key poses"),
+           *anchors = cli_allocate(3 * h->nanchors, sizeof *anchors, "the key poses");
     grow(p);
     vg_key *k = &p->keys[p->n];
     *k = (vg_key){.values = values, .anchors = anchors};

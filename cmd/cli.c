@@ -179,8 +179,8 @@ void cli_discard_by(void (*discard)(void))
 
 static vg_source *upstream; /* of cli_source: it may know of a program before this one that failed */
 
-/* Leave nothing half-written: no temporary file, and no stream that only stops. Of a pipe's programs the first that failed is
- * named to all behind it. */
+/* Leave nothing half-written: no temporary file, and no stream that only stops. Of a pipe's programs the first that
+ * failed is named to all behind it. */
 static void abandon_output(int code, int status, const char *message)
 {
     const vg_failure *before = code == VG_ETRUNC && upstream ? vg_source_failure(upstream) : NULL;
@@ -292,8 +292,8 @@ static const char *split_path(const char *path, char directory[PATH_MAX])
     return path + n;
 }
 
-/* Programs leave by leave(): whoever calls exit() is a library that gives up, as libarchive does without memory. Its status
- * would say something else, and half a file would stay. */
+/* Programs leave by leave(): whoever calls exit() is a library that gives up, as libarchive does without memory. Its
+ * status would say something else, and half a file would stay. */
 static void library_gave_up(void)
 {
     if (discard_other) discard_other();
@@ -306,12 +306,14 @@ static void check_output(bool stream)
     const char *name = cli.output;
     struct stat st;
     if (stream && name && (names_meshes(name) || names_picture(name)))
-        cli_usage("the output is a stream: pipe it into '%s -o %s'", names_picture(name) ? "vg-view" : "vg-decode", name);
+        cli_usage("the output is a stream: pipe it into '%s -o %s'", names_picture(name) ? "vg-view" : "vg-decode",
+                  name);
     if (stream && !name && isatty(STDOUT_FILENO))
         cli_usage("a stream is not written to a terminal: use -o FILE or a pipe");
     if (!name) return;
     if (!*name) cli_usage("option '--output' needs the name of a file");
-    if (strlen(name) > PATH_MAX - 64) cli_stop(VG_ESYS, "cannot write to '%.40s...': %s", name, strerror(ENAMETOOLONG));
+    if (strlen(name) > PATH_MAX - 64)
+        cli_stop(VG_ESYS, "cannot write to '%.40s...': %s", name, strerror(ENAMETOOLONG));
     snprintf(out.shown, sizeof out.shown, "'%s'", name);
     if (!stat(name, &st)) {
         if (S_ISDIR(st.st_mode)) die_writing(EISDIR);
@@ -455,7 +457,8 @@ char *cli_read_file(const char *path, size_t *n)
     *n = 0;
     errno = f ? 0 : errno;
     while (f) {
-        if (cap - *n < 1 << 16 && !(data = realloc(data, cap = 2 * cap + (1 << 17)))) cli_stop(VG_ENOMEM, "not enough memory for a file");
+        if (cap - *n < 1 << 16 && !(data = realloc(data, cap = 2 * cap + (1 << 17))))
+            cli_stop(VG_ENOMEM, "not enough memory for a file");
         size_t got = fread(data + *n, 1, cap - *n, f);
         *n += got;
         if (got == 0) break;
@@ -762,7 +765,8 @@ static void refuse_option(const cli_option *const *all, size_t n, int problem, c
     const cli_option *first = NULL, *second = NULL;
     for (size_t i = 0; i < n; i++)
         if (length > 2 && !strncmp(all[i]->name, text + 2, (size_t)length - 2)) *(first ? &second : &first) = all[i];
-    if (second) cli_usage("ambiguous option '%.*s': it could be '--%s' or '--%s'", length, text, first->name, second->name);
+    if (second)
+        cli_usage("ambiguous option '%.*s': it could be '--%s' or '--%s'", length, text, first->name, second->name);
     if (length > 2 && (o = likely_option(all, n, text + 2, (size_t)length - 2)))
         cli_usage("unknown option '%.*s': did you mean '--%s'?", length, text, o->name);
     cli_usage("unknown option '%.*s': '%s --help' lists them", length, text, cli.program->name);

@@ -62,7 +62,8 @@ void cli_usage(const char *format, ...) VG_PRINTF(1, 2) __attribute__((noreturn)
 void cli_no(const char *format, ...) VG_PRINTF(1, 2) __attribute__((noreturn));
 void cli_warn(const char *format, ...) VG_PRINTF(1, 2); /* unless --quiet */
 void cli_note(const char *format, ...) VG_PRINTF(1, 2); /* only with --verbose */
-void cli_say(const char *format, ...) VG_PRINTF(1, 2);  /* what the user waits for on standard error; unless --quiet */
+/* what the user waits for on standard error; unless --quiet */
+void cli_say(const char *format, ...) VG_PRINTF(1, 2);
 /* cli_progress: "label n" on standard error, rarely, only when it is a terminal and a second has passed. */
 void cli_progress(const char *label, uint64_t n);
 
@@ -73,8 +74,8 @@ uint64_t cli_parse_size(const char *option, const char *text);
 /* cli_parse_vertices: "3,17,4" to an ascending list without repetition (free with free()), or cli_usage. */
 size_t cli_parse_vertices(const char *option, const char *text, uint32_t **vertices);
 
-/* The input of a filter: its operands, or standard input when there are none. To be closed when nothing is left to be read: what
- * cli_die says of a program before this one comes from it. */
+/* The input of a filter: its operands, or standard input when there are none. To be closed when nothing is left to be
+ * read: what cli_die says of a program before this one comes from it. */
 vg_source *cli_source(char **operands, size_t n);
 /* The same, with options (may be NULL). */
 vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o);
@@ -89,8 +90,8 @@ void cli_stream_open(vg_head *h);
 void cli_stream_put(const vg_frame *f);
 void cli_stream_end(const vg_records *tail);
 
-/* cli_discard_by: what a program writes by other means than these: called when it is ended by a signal or by a library that gives
- * up, and may call only what a signal's handler may. */
+/* cli_discard_by: what a program writes by other means than these: called when it is ended by a signal or by a
+ * library that gives up, and may call only what a signal's handler may. */
 void cli_discard_by(void (*discard)(void));
 
 /* The text output of a report: standard output or a temporary file beside --output, which cli_text_end renames. */
@@ -98,8 +99,8 @@ void cli_discard_by(void (*discard)(void));
 FILE *cli_text_open(void);
 void cli_text_end(void);
 
-/* cli_redirect: what is opened next goes to `file` ("-" or NULL: standard output), which is looked at now. For a program that writes
- * a stream and a report, one after the other. */
+/* cli_redirect: what is opened next goes to `file` ("-" or NULL: standard output), which is looked at now. For a
+ * program that writes a stream and a report, one after the other. */
 void cli_redirect(const char *file, bool stream);
 
 /* cli_finish: flush, close, check standard output; exit with `status` (0 or 1), or 4 when output was lost. */

@@ -13,7 +13,8 @@ enum {
     CHANNELS_LINE = 128 /* six times ", rotation x" and some */
 };
 
-static const char *const channel_names[] = {"Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation"};
+static const char *const channel_names[] = {"Xposition", "Yposition", "Zposition",
+                                            "Xrotation", "Yrotation", "Zrotation"};
 static const report_column columns[] = {{.key = "name"}, {.key = "parent"}, {.key = "channels"}, {.key = "offset"}};
 
 /* Who is below whom: children of j, or the roots (at njoints), are a list. */
@@ -56,7 +57,8 @@ static const char *channels_line(const vg_joint *j, char line[CHANNELS_LINE])
     for (uint32_t i = 0; i < j->nchannels; i++) {
         int kind = j->channels[i] > 3;
         if (kind != last)
-            at += (size_t)snprintf(line + at, CHANNELS_LINE - at, "%s%s ", i ? ", " : "", kind ? "rotation" : "position");
+            at += (size_t)snprintf(line + at, CHANNELS_LINE - at, "%s%s ", i ? ", " : "",
+                                   kind ? "rotation" : "position");
         line[at++] = axes[(j->channels[i] - 1) % 3];
         line[at] = 0;
         last = kind;
@@ -96,7 +98,8 @@ static void list_joints(report *r, const vg_skeleton *s)
         const vg_joint *joint = &s->joints[j];
         const char *channels[6];
         for (uint32_t i = 0; i < joint->nchannels; i++) channels[i] = channel_names[joint->channels[i] - 1];
-        const report_value row[4] = {report_text(joint->name), joint->parent == NONE ? report_nothing() : report_count(joint->parent),
+        const report_value row[4] = {report_text(joint->name),
+                                     joint->parent == NONE ? report_nothing() : report_count(joint->parent),
                                      report_texts(channels, joint->nchannels), report_numbers(joint->offset, 3)};
         report_row(r, row);
     }

@@ -5,7 +5,8 @@
 
 #include "report.h"
 
-/* report_skeleton: its joints as a tree, in a group that the caller has begun. label: what it is called in the text. */
+/* report_skeleton: its joints as a tree, in a group that the caller has begun. label: what it is called in the
+ * text. */
 void report_skeleton(report *r, const char *label, const vg_skeleton *s);
 /* write_weights: the skin of a rig as text, a vertex per line. */
 void write_weights(FILE *f, const vg_rig *g, size_t nv);

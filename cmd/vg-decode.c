@@ -11,7 +11,8 @@ static const cli_option options[] = {
      .text = &output},
     {"format", 0, "obj|ply|ply-ascii|ply-be|off|stl|stl-ascii|pc2|mdd|npy|npz|usda|glb|gltf|bvh",
      "whatever the name says", .text = &sink_options.format},
-    {"f64", 0, NULL, "numbers that read back to the same binary64, not binary32", .flag = &sink_options.full_precision},
+    {"f64", 0, NULL, "numbers that read back to the same binary64, not binary32",
+     .flag = &sink_options.full_precision},
     {"first-number", 0, "N", "what %d in the output's name starts at (default 0)", .integer = &first_number,
      .least = 0, .most = 1e9},
     {"mesh", 0, "MESH", "where the mesh of a point cache or array goes; default: beside it, as NAME.obj",
@@ -56,7 +57,8 @@ int main(int argc, char **argv)
     }
     if (r == 0) r = vg_sink_end(sink, &e);
     if (r == 0 && !frames)
-        cli_warn("the input has no poses: '%s' holds none%s", output, vg_source_head(s)->map.n ? "; vg-deform --map plays a map" : "");
+        cli_warn("the input has no poses: '%s' holds none%s", output,
+                 vg_source_head(s)->map.n ? "; vg-deform --map plays a map" : "");
     for (size_t i = 0; r == 0 && vg_sink_warning(sink, i); i++) cli_warn("%s", vg_sink_warning(sink, i));
     vg_sink_close(&sink);
     if (r < 0) cli_die(&e);

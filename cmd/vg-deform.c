@@ -12,26 +12,34 @@ static struct {
 } opts;
 
 static const cli_option options[] = {
-    {"onto", 0, "MESH", "apply to this mesh and write its vectors; without it, write the deformations", .text = &opts.onto},
-    {"correspondence", 0, "FILE", "the target has another connectivity: what vg-register found", .text = &opts.correspondence},
+    {"onto", 0, "MESH", "apply to this mesh and write its vectors; without it, write the deformations",
+     .text = &opts.onto},
+    {"correspondence", 0, "FILE", "the target has another connectivity: what vg-register found",
+     .text = &opts.correspondence},
     {"by", 0, "pose|shape|gradient|blend", "what is carried over (default pose)", .text = &opts.by,
      .choice = &opts.by_choice},
-    {"root", 0, "centroid|stay|V", "where the body goes: as the centroid does (default), nowhere, or as vertex V does",
-     .text = &opts.root},
-    {"pin", 0, "auto|always|none", "hold what does not move in the source: where it is much of the mesh (default), ...",
-     .text = &opts.pin, .choice = &opts.pin_choice},
-    {"interpolate", 0, "N", "write N poses, evenly from the first pose of the input to the last", .integer = &between.frames,
-     .least = 1, .most = 1e9},
+    {"root", 0, "centroid|stay|V",
+     "where the body goes: as the centroid does (default), nowhere, or as vertex V does", .text = &opts.root},
+    {"pin", 0, "auto|always|none",
+     "hold what does not move in the source: where it is much of the mesh (default), ...", .text = &opts.pin,
+     .choice = &opts.pin_choice},
+    {"interpolate", 0, "N", "write N poses, evenly from the first pose of the input to the last",
+     .integer = &between.frames, .least = 1, .most = 1e9},
     {"at", 0, "T,...", "write the poses at these moments: 0 is the first pose, 1 the second; outside is extrapolated",
      .text = &between.at},
     {"smooth", 0, NULL, "let velocities not jump at the poses that are interpolated", .flag = &between.smooth},
-    {"map", 0, "MAP", "write the vertices that this map, made by vg-fitmap, gives to motions of patches or bones", .text = &mapped.map},
-    {"edit", 0, "EDIT", "with --map: turn a bone, 'BONE x|y|z|twist DEGREES'; may be repeated; without input, of the reference pose",
+    {"map", 0, "MAP", "write the vertices that this map, made by vg-fitmap, gives to motions of patches or bones",
+     .text = &mapped.map},
+    {"edit", 0, "EDIT",
+     "with --map: turn a bone, 'BONE x|y|z|twist DEGREES'; may be repeated; without input, of the reference pose",
      .take = mapped_take_edit},
-    {"align", 0, NULL, "with --map: the skeleton that comes in rests in another pose than the rig: make its limbs point alike",
+    {"align", 0, NULL,
+     "with --map: the skeleton that comes in rests in another pose than the rig: make its limbs point alike",
      .flag = &mapped.align},
-    {"joints", 0, NULL, "with --map: only rotations and scales count; joints say where patches and bones are", .flag = &mapped.joints},
-    {"transforms", 0, NULL, "with --map: write the motions of the patches or bones, not vertices", .flag = &mapped.transforms},
+    {"joints", 0, NULL, "with --map: only rotations and scales count; joints say where patches and bones are",
+     .flag = &mapped.joints},
+    {"transforms", 0, NULL, "with --map: write the motions of the patches or bones, not vertices",
+     .flag = &mapped.transforms},
     {"live", 0, NULL, "with --map: write each frame at once, before the next is read", .flag = &mapped.live},
     {NULL}};
 
@@ -56,7 +64,8 @@ typedef struct work {
     vg_head *h;               /* the source's until the output's is made of it */
     vg_head target;
     vg_head pairs;            /* holds the correspondence */
-    vg_mesh source_mesh;      /* arrays of the sequence's mesh; with a correspondence the head gets the target's instead */
+    vg_mesh source_mesh;      /* arrays of the sequence's mesh; with a correspondence the head gets the target's
+                                 instead */
     double *source_reference; /* the steps borrow it */
     vg_graph *from, *to;      /* graphs of source and target: the same one without a correspondence */
     way way;
@@ -98,8 +107,10 @@ static void set_root(work *w)
     if (!opts.root || !strcmp(opts.root, "centroid") || root_stays()) return;
     if (opts.root[strspn(opts.root, "0123456789")] || cli_parse_vertices("--root", opts.root, &vertex) != 1)
         cli_usage("--root is 'centroid', 'stay' or the number of a vertex, not '%s'", opts.root);
-    if (vertex[0] >= w->h->mesh.nv) cli_usage("--root names vertex %u, but there are %zu, counted from 0", vertex[0], w->h->mesh.nv);
-    if (opts.correspondence) cli_usage("--root V needs one connectivity: with --correspondence it is 'centroid' or 'stay'");
+    if (vertex[0] >= w->h->mesh.nv)
+        cli_usage("--root names vertex %u, but there are %zu, counted from 0", vertex[0], w->h->mesh.nv);
+    if (opts.correspondence)
+        cli_usage("--root V needs one connectivity: with --correspondence it is 'centroid' or 'stay'");
     if (w->kind != VG_VERTICES)
         cli_usage("--root %u needs a sequence of vertices, this one holds %s", vertex[0], vg_kind_name(w->kind));
     free(w->h->anchors);
@@ -251,8 +262,8 @@ static void make_followers(work *w)
 
 static void make_step(work *w)
 {
-    static const vg_method methods[] = {[BY_POSE] = VG_BY_POSE, [BY_SHAPE] = VG_BY_POSE, [BY_GRADIENT] = VG_BY_GRADIENT,
-                                        [BY_BLEND] = VG_BY_BLEND};
+    static const vg_method methods[] = {
+        [BY_POSE] = VG_BY_POSE, [BY_SHAPE] = VG_BY_POSE, [BY_GRADIENT] = VG_BY_GRADIENT, [BY_BLEND] = VG_BY_BLEND};
     vg_err e;
     const vg_head *h = w->h, *t = &w->target;
     vg_method method = methods[w->by];
@@ -261,8 +272,8 @@ static void make_step(work *w)
     w->way = !opts.onto ? MEASURE : opts.correspondence ? CARRY : w->by == BY_SHAPE ? SHAPE
              : w->kind == VG_DEFORMATIONS ? APPLY : TRANSFER;
     if (w->way == CARRY) {
-        r = vg_carrier_new(&w->carrier, &w->source_mesh, h->reference, &w->pairs.correspondence, w->to, t->reference, method,
-                           cli.threads, &e);
+        r = vg_carrier_new(&w->carrier, &w->source_mesh, h->reference, &w->pairs.correspondence, w->to, t->reference,
+                           method, cli.threads, &e);
     } else if (w->way == SHAPE) {
         r = vg_shaper_new(&w->shaper, w->to, h->reference, t->reference, cli.threads, &e);
     } else {
@@ -328,10 +339,12 @@ int main(int argc, char **argv)
     static work w; /* lives until the end: what it holds goes with the process */
     parse_options(&w);
     between_check();
-    if (between_wanted() && opts.onto) cli_usage("--onto takes poses as they are: pipe those of --interpolate and --at into it");
+    if (between_wanted() && opts.onto)
+        cli_usage("--onto takes poses as they are: pipe those of --interpolate and --at into it");
     mapped_check(opts.onto ? "onto" : NULL);
     load_target(&w);
-    if (mapped.map && between_wanted() && !mapped_needs_input(n)) cli_usage("--interpolate and --at need the poses between which they are");
+    if (mapped.map && between_wanted() && !mapped_needs_input(n))
+        cli_usage("--interpolate and --at need the poses between which they are");
     if (!mapped.map || mapped_needs_input(n)) w.s = cli_source(operands, n);
     if (mapped.map) {
         mapped_run(w.s);

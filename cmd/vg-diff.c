@@ -1,5 +1,6 @@
-/* vg-diff.c: measure how far a sequence is from the truth, and answer whether that is within a tolerance; the error of
- * each vertex goes into a stream. Leaves out the measures themselves (lib/model/measures.c) and pictures of the error (vg-view).
+/* vg-diff.c: measure how far a sequence is from the truth, and answer whether that is within a tolerance; the error
+ * of each vertex goes into a stream. Leaves out the measures themselves (lib/model/measures.c) and pictures of the
+ * error (vg-view).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 #include "report.h"
@@ -25,7 +26,8 @@ static const cli_option options[] = {
      .flag = &opts.centred},
     {.name = "frames", .help = "list the error of every frame", .flag = &opts.frames},
     {.name = "heat", .value = "FILE", .text = &opts.heat,
-     .help = "write RESULT with the error of each vertex as a stream, which vg-view colours; '-': instead of the report"},
+     .help = "write RESULT with the error of each vertex as a stream, which vg-view colours; "
+             "'-': instead of the report"},
     {0},
 };
 
@@ -94,7 +96,8 @@ static void open_side(side *s, char *operand)
     if (s->head->kind == VG_VERTICES) return;
     if (s->head->kind == VG_VECTORS)
         cli_stop(VG_EINPUT, "'%s' holds vectors: pipe it through 'vg-solve' first", s->name);
-    cli_stop(VG_EINPUT, "'%s' holds %s, not vertices: make poses of them first", s->name, vg_kind_name(s->head->kind));
+    cli_stop(VG_EINPUT, "'%s' holds %s, not vertices: make poses of them first", s->name,
+             vg_kind_name(s->head->kind));
 }
 
 static void close_side(side *s)

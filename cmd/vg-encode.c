@@ -14,9 +14,11 @@ static struct {
 
 static const cli_option options[] = {
     {"vectors", 0, NULL, "write the vectors of the vector graph instead of vertices", .flag = &opts.vectors},
-    {"faces", 0, "all|selected", "which faces carry vectors: all (default), or about half of them", .choice = &opts.faces},
+    {"faces", 0, "all|selected", "which faces carry vectors: all (default), or about half of them",
+     .choice = &opts.faces},
     {"reference", 0, "MESH", "the undeformed pose; default: the first pose", .text = &opts.reference},
-    {"mesh", 0, "MESH", "the faces and reference pose of point caches and arrays, which hold none", .text = &opts.mesh},
+    {"mesh", 0, "MESH", "the faces and reference pose of point caches and arrays, which hold none",
+     .text = &opts.mesh},
     {"max-bytes", 0, "SIZE", "what an archive or compressed file may unpack to (default: 1G in one file, 64G in all)",
      .text = &opts.most_bytes},
     {"anchor", 0, "V,V,...", "vertices that vg-solve must meet exactly", .text = &opts.anchors},

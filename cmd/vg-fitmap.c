@@ -14,21 +14,27 @@ static struct {
 
 static const cli_option options[] = {
     {"patches", 0, "FILE", "the patches: what vg-segment wrote; default: those of the input", .text = &opts.patches},
-    {"skeleton", 0, "FILE", "a skeleton drives the mesh: BVH, a stream of it, or lines of text", .text = &rigging.skeleton},
-    {"groups", 0, "FILE", "a skeleton drives the mesh: each joint is the mean of some of its vertices", .text = &rigging.groups},
-    {"learn", 0, NULL, "with --skeleton: find its motion from the poses, whatever motion it comes with", .flag = &rigging.learn},
+    {"skeleton", 0, "FILE", "a skeleton drives the mesh: BVH, a stream of it, or lines of text",
+     .text = &rigging.skeleton},
+    {"groups", 0, "FILE", "a skeleton drives the mesh: each joint is the mean of some of its vertices",
+     .text = &rigging.groups},
+    {"learn", 0, NULL, "with --skeleton: find its motion from the poses, whatever motion it comes with",
+     .flag = &rigging.learn},
     {"root-at", 0, "X,Y,Z", "with --skeleton: where its root is in the reference pose", .text = &rigging.root_at},
-    {"method", 0, "envelope|lbs", "with a skeleton: vectors and held vertices (default), or linear blend skinning alone",
-     .text = &rigging.method, .choice = &rigging.method_choice},
+    {"method", 0, "envelope|lbs",
+     "with a skeleton: vectors and held vertices (default), or linear blend skinning alone", .text = &rigging.method,
+     .choice = &rigging.method_choice},
     {"bones-per-corner", 0, "N", "with a skeleton: how many bones drive a corner, 1 or 2 (default 2)",
      .integer = &rigging.bones_per_corner, .least = 1, .most = 2},
-    {"refine", 0, "RIDGE", "with a skeleton: the ridge with which bones take up what is left (default 0.003; 0: they do not)",
+    {"refine", 0, "RIDGE",
+     "with a skeleton: the ridge with which bones take up what is left (default 0.003; 0: they do not)",
      .number = &rigging.refine, .least = 0, .most = 1e6},
-    {"holdout", 0, "N", "leave every Nth pose out of the fit, and report the error there", .integer = &opts.holdout, .least = 2,
-     .most = 1000000000},
-    {"hold", 0, "SHARE", "of the vertices, those that go where their patch or bones take them (default 0.03)", .number = &opts.hold,
-     .least = 0, .most = 1},
-    {"retarget", 0, "MESH", "no fit: bring the map that is the input to this body of the same faces", .text = &opts.retarget},
+    {"holdout", 0, "N", "leave every Nth pose out of the fit, and report the error there", .integer = &opts.holdout,
+     .least = 2, .most = 1000000000},
+    {"hold", 0, "SHARE", "of the vertices, those that go where their patch or bones take them (default 0.03)",
+     .number = &opts.hold, .least = 0, .most = 1},
+    {"retarget", 0, "MESH", "no fit: bring the map that is the input to this body of the same faces",
+     .text = &opts.retarget},
     {"morph", 0, "T", "with --retarget: how far on the way to that body (default 1)", .number = &opts.morph},
     {NULL}};
 
@@ -58,7 +64,8 @@ static void take_patches(vg_head *h)
     snprintf(name, sizeof name, "'%.190s'", opts.patches);
     if (vg_load_mesh(&from, opts.patches, &e) < 0) cli_die(&e);
     if (!from.patches.n) cli_stop(VG_EINPUT, "%s holds no patches: make them with vg-segment", name);
-    if (vg_mesh_same(&h->mesh, "the sequence", &from.mesh, name, &e) < 0 || vg_head_merge_trace(h, &from, &e) < 0) cli_die(&e);
+    if (vg_mesh_same(&h->mesh, "the sequence", &from.mesh, name, &e) < 0 || vg_head_merge_trace(h, &from, &e) < 0)
+        cli_die(&e);
     vg_patches_clear(&h->patches);
     h->patches = from.patches;
     from.patches = (vg_patches){0};
@@ -143,8 +150,8 @@ static void judge_batch(judging *j, size_t n, uint64_t first)
 static void describe(const errors *x, double d, const char *what, const char *which)
 {
     if (x->poses)
-        cli_say("%s, %s: mean error %.3g D, largest %.3g D, %llu poses", which, what, x->sum / (double)x->poses / d, x->most / d,
-                (unsigned long long)x->poses);
+        cli_say("%s, %s: mean error %.3g D, largest %.3g D, %llu poses", which, what, x->sum / (double)x->poses / d,
+                x->most / d, (unsigned long long)x->poses);
 }
 
 static void report(const vg_head *h, vg_spool *spool)
@@ -156,7 +163,8 @@ static void report(const vg_head *h, vg_spool *spool)
     j.h = h;
     if (vg_player_new(&j.player, h, false, cli.threads, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < BATCH; i++) {
-        j.transforms[i] = calloc(7 * h->map.n, sizeof(double)), j.vertices[i] = calloc(3 * h->mesh.nv + 1, sizeof(double));
+        j.transforms[i] = calloc(7 * h->map.n, sizeof(double)),
+        j.vertices[i] = calloc(3 * h->mesh.nv + 1, sizeof(double));
         if (!j.transforms[i] || !j.vertices[i]) cli_stop(VG_ENOMEM, "not enough memory for the report");
     }
     uint64_t first = 0;
@@ -196,7 +204,8 @@ static void fit(vg_source *s)
     size_t before = h->patches.n;
     vg_map_fitter *f;
     vg_spool *spool;
-    if (vg_map_fitter_new(&f, h, opts.hold, cli.threads, &e) < 0 || vg_spool_new(&spool, h, in_memory, &e) < 0) cli_die(&e);
+    if (vg_map_fitter_new(&f, h, opts.hold, cli.threads, &e) < 0 || vg_spool_new(&spool, h, in_memory, &e) < 0)
+        cli_die(&e);
     if (h->patches.n != before)
         cli_note("%zu patches are in %zu pieces, each of which is a patch of the map", before, h->patches.n);
     if (!read_poses(s, f, spool)) cli_stop(VG_EINPUT, "the input has no poses to fit a map to");
@@ -227,7 +236,8 @@ static void retarget(vg_source *s)
     vg_head_clear(&target);
     vg_frame frame = {0};
     int r;
-    while ((r = vg_source_next(s, &frame, &e)) > 0) continue; /* to the end, so that damage is seen; a map has no frames */
+    /* to the end, so that damage is seen; a map has no frames */
+    while ((r = vg_source_next(s, &frame, &e)) > 0) continue;
     if (r < 0) cli_die(&e);
     vg_frame_clear(&frame);
 }

@@ -34,7 +34,8 @@ static const cli_program program = {
 
 /* What reading all frames tells. */
 typedef struct contents {
-    uint64_t frames, timed, turned, extra; /* turned: that say how joints have turned; extra: unknown records before frames */
+    uint64_t frames, timed, turned, extra; /* turned: that say how joints have turned; extra: unknown records before
+                                              frames */
     char *first, *last;            /* names */
     double first_time, last_time;
     double D; /* of the first frame of vertices */
@@ -322,7 +323,8 @@ static void report_skeletons(report *r, const vg_head *h, const contents *c)
     report_group(r, "rig");
     report_skeleton(r, "rig", &g->skeleton);
     report_put(r, "skinned", NULL, report_flag(g->skin_weight != NULL));
-    report_put(r, NULL, "skin", report_text(g->skin_weight ? "weights of linear blend skinning: --weights" : "no weights"));
+    report_put(r, NULL, "skin",
+               report_text(g->skin_weight ? "weights of linear blend skinning: --weights" : "no weights"));
     report_end(r);
 }
 

@@ -12,9 +12,11 @@ static struct {
 } opts = {.patches = "auto", .seed = 1};
 
 static const cli_option options[] = {
-    {"patches", 'k', "K|auto", "how many patches (default auto: as few as turn within 10 degrees of their faces)", .text = &opts.patches},
+    {"patches", 'k', "K|auto", "how many patches (default auto: as few as turn within 10 degrees of their faces)",
+     .text = &opts.patches},
     {"connected", 0, NULL, "every patch in one piece", .flag = &opts.connected},
-    {"seed", 0, "N", "another choice of first centres (default 1)", .integer = &opts.seed, .least = 0, .most = 4294967295.0},
+    {"seed", 0, "N", "another choice of first centres (default 1)", .integer = &opts.seed, .least = 0,
+     .most = 4294967295.0},
     {NULL}};
 
 static const cli_program program = {
@@ -83,10 +85,12 @@ int main(int argc, char **argv)
     vg_map_clear(&h->map);
     if (vg_segmenter_cut(s, k, (uint64_t)opts.seed, opts.connected, &h->patches, &report, &e) < 0) cli_die(&e);
     vg_segmenter_free(&s);
-    if (k && report.patches < k) cli_warn("%zu patches instead of %zu: no more faces turn differently", report.patches, k);
-    if (k && report.patches > k) cli_warn("%zu patches instead of %zu: the mesh has more components", report.patches, k);
-    cli_note("%zu patches of %zu faces, %.2f degrees from their faces (rms), %zu rounds", report.patches, h->mesh.nf, report.angle,
-             report.rounds);
+    if (k && report.patches < k)
+        cli_warn("%zu patches instead of %zu: no more faces turn differently", report.patches, k);
+    if (k && report.patches > k)
+        cli_warn("%zu patches instead of %zu: the mesh has more components", report.patches, k);
+    cli_note("%zu patches of %zu faces, %.2f degrees from their faces (rms), %zu rounds", report.patches, h->mesh.nf,
+             report.angle, report.rounds);
     cli_stream_open(h);
     cli_stream_end(vg_source_tail(source));
     vg_source_close(&source);

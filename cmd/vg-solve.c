@@ -18,7 +18,8 @@ static void take_planar_weights(const char *text, void *context)
     char first[64];
     const char *comma = strchr(text, ',');
     size_t n = comma ? (size_t)(comma - text) : 0;
-    if (!n || n >= sizeof first) cli_usage("option '--planar-weights' needs two numbers with a comma between, not '%s'", text);
+    if (!n || n >= sizeof first)
+        cli_usage("option '--planar-weights' needs two numbers with a comma between, not '%s'", text);
     memcpy(first, text, n);
     first[n] = 0;
     opts.fidelity = cli_parse_number("--planar-weights", first);
@@ -29,7 +30,8 @@ static void take_planar_weights(const char *text, void *context)
 }
 
 static const cli_option options[] = {
-    {"weights", 0, "uniform|area", "every corner counts alike (default), or by the reference surface's metric", .choice = &opts.weights},
+    {"weights", 0, "uniform|area", "every corner counts alike (default), or by the reference surface's metric",
+     .choice = &opts.weights},
     {"planar", 0, NULL, "make faces of four and more corners more nearly plane", .flag = &opts.planar},
     {"planar-weights", 0, "W1,W2", "how much the vectors and how much the planes count (default: 0.5,1)",
      .take = take_planar_weights},
@@ -115,8 +117,10 @@ static void make_machine(work *w, machine *m, uint32_t *held, size_t nheld)
 static void load_taken(work *w)
 {
     size_t n = w->n - w->loaded;
-    const double **vectors = cli_allocate(n, sizeof *vectors, "a batch of poses"), **held = cli_allocate(n, sizeof *held, "a batch of poses");
-    double **x = cli_allocate(n, sizeof *x, "a batch of poses"), **rhs = cli_allocate(n, sizeof *rhs, "a batch of poses");
+    const double **vectors = cli_allocate(n, sizeof *vectors, "a batch of poses"),
+                 **held = cli_allocate(n, sizeof *held, "a batch of poses");
+    double **x = cli_allocate(n, sizeof *x, "a batch of poses"),
+           **rhs = cli_allocate(n, sizeof *rhs, "a batch of poses");
     for (size_t i = 0; i < n; i++) {
         waiting *p = &w->waiting[w->loaded + i];
         vectors[i] = p->vectors, held[i] = p->held, x[i] = p->frame.values, rhs[i] = p->rhs;
@@ -132,8 +136,10 @@ static void load_taken(work *w)
 static void solve_waiting(work *w)
 {
     load_taken(w);
-    const double **rhs = cli_allocate(w->n, sizeof *rhs, "a batch of poses"), **held = cli_allocate(w->n, sizeof *held, "a batch of poses");
-    const double **roots = cli_allocate(w->n, sizeof *roots, "a batch of poses"), **normals = cli_allocate(w->n, sizeof *normals, "a batch of poses");
+    const double **rhs = cli_allocate(w->n, sizeof *rhs, "a batch of poses"),
+                 **held = cli_allocate(w->n, sizeof *held, "a batch of poses");
+    const double **roots = cli_allocate(w->n, sizeof *roots, "a batch of poses"),
+                 **normals = cli_allocate(w->n, sizeof *normals, "a batch of poses");
     double **x = cli_allocate(w->n, sizeof *x, "a batch of poses");
     for (size_t i = 0; i < w->n; i++) {
         waiting *p = &w->waiting[i];
@@ -193,7 +199,8 @@ static const machine *machine_for(work *w, const vg_frame *f)
     if (f->npins == 0) return &w->plain;
     size_t n, i = 0;
     uint32_t *held = unite(w, f, &n);
-    while (i < MACHINES && !(w->pinned[i].solver && w->pinned[i].nheld == n && !memcmp(w->pinned[i].held, held, n * sizeof *held)))
+    while (i < MACHINES &&
+           !(w->pinned[i].solver && w->pinned[i].nheld == n && !memcmp(w->pinned[i].held, held, n * sizeof *held)))
         i++;
     if (i == 0) {
         free(held);
@@ -263,7 +270,8 @@ static void make_waiting(work *w)
     for (size_t i = 0; i < w->most; i++) {
         waiting *p = &w->waiting[i];
         p->rhs = cli_allocate(3 * w->h->mesh.nv, sizeof *p->rhs, "a batch of poses");
-        p->normals = cli_allocate(w->plain.planar ? 3 * vg_planar_faces(w->plain.planar) : 0, sizeof *p->normals, "a batch of poses");
+        p->normals = cli_allocate(w->plain.planar ? 3 * vg_planar_faces(w->plain.planar) : 0, sizeof *p->normals,
+                                  "a batch of poses");
         if (vg_frame_shape(&p->frame, w->h, &e) < 0) cli_die(&e);
     }
 }

@@ -68,7 +68,8 @@ static const cli_option options[] = {
 static const cli_program program = {
     .name = "vg-view",
     .synopsis = "[options] [FILE ...]",
-    .summary = "make a page (HTML) that plays a sequence, or a contact sheet (PNG) of it, with its shape or its errors",
+    .summary =
+        "make a page (HTML) that plays a sequence, or a contact sheet (PNG) of it, with its shape or its errors",
     .options = options,
     .most_operands = (size_t)-1,
     .writes_file = true,
@@ -159,7 +160,8 @@ static void choose_kind(void)
                   opts.frames ? "frames" : opts.columns ? "columns" : opts.size ? "size" : "silhouettes");
     if (!opts.page && opts.title) cli_usage("option '--title' is about a page: use -o FILE.html");
     if (!cli.output && isatty(STDOUT_FILENO))
-        cli_usage("a %s is not written to a terminal: use -o FILE.html or -o FILE.png", opts.page ? "page" : "picture");
+        cli_usage("a %s is not written to a terminal: use -o FILE.html or -o FILE.png",
+                  opts.page ? "page" : "picture");
 }
 
 /* ---- sequences ---- */
@@ -381,9 +383,16 @@ static void make_sheet(cast *c)
 static vg_page_options page_options(const side *result)
 {
     vg_sheet_options view = sheet_options();
-    return (vg_page_options){.title = opts.title ? opts.title : result->label, .azimuth = view.azimuth,
-                             .elevation = view.elevation, .z_up = view.z_up, .follow = opts.follow, .edges = opts.edges,
-                             .ground = opts.ground, .zoom = view.zoom, .tint = view.tint, .centred = opts.centred,
+    return (vg_page_options){.title = opts.title ? opts.title : result->label,
+                             .azimuth = view.azimuth,
+                             .elevation = view.elevation,
+                             .z_up = view.z_up,
+                             .follow = opts.follow,
+                             .edges = opts.edges,
+                             .ground = opts.ground,
+                             .zoom = view.zoom,
+                             .tint = view.tint,
+                             .centred = opts.centred,
                              .scale = opts.scale};
 }
 

@@ -128,13 +128,15 @@ typedef struct vg_attributes {
 void vg_attributes_clear(vg_attributes *a);
 int vg_attributes_copy(vg_attributes *to, const vg_attributes *from, const vg_mesh *mesh, vg_err *e) VG_MUST_CHECK;
 
-/* A skeleton: joint j is vertex j of the mesh, whose faces are the bones (parent, child) in the order of their children. */
+/* A skeleton: joint j is vertex j of the mesh, whose faces are the bones (parent, child) in the order of their
+ * children. */
 typedef struct vg_joint {
     char *name;       /* UTF-8; an end site has its parent's name with ".end" behind it */
     uint32_t parent;  /* less than its own number; UINT32_MAX: a root */
     double offset[3]; /* from the parent, in the reference pose */
     uint32_t nchannels;
-    uint8_t channels[6]; /* 1 2 3: x y z position, 4 5 6: x y z rotation, in the order of the file; none: an end site */
+    uint8_t channels[6]; /* 1 2 3: x y z position, 4 5 6: x y z rotation, in the order of the file; none: an end
+                            site */
 } vg_joint;
 
 typedef struct vg_skeleton {
@@ -148,22 +150,25 @@ size_t vg_skeleton_channels(const vg_skeleton *s); /* of all joints */
 /* vg_skeleton_mesh: the bones as faces. */
 int vg_skeleton_mesh(const vg_skeleton *s, vg_mesh *m, vg_err *e) VG_MUST_CHECK;
 /* vg_skeleton_pose: forward kinematics. values: one for each channel, joint after joint (NULL: the reference pose): a
- * position stands for that coordinate of the offset, of a root for its place; the rotations of a joint, in degrees, are
- * multiplied in their order and turn what is below it. Out: njoints positions, and njoints unit quaternions w x y z that
- * take directions of the reference pose to where the joint has turned them. */
+ * position stands for that coordinate of the offset, of a root for its place; the rotations of a joint, in degrees,
+ * are multiplied in their order and turn what is below it. Out: njoints positions, and njoints unit quaternions w x y
+ * z that take directions of the reference pose to where the joint has turned them. */
 void vg_skeleton_pose(const vg_skeleton *s, const double *values, double *positions, double *turns);
 
 /* The way back. A joint with children in several directions turns as they do together (least squares, lengths of the
- * reference), one with children in one direction by the smallest turn beside its parent's, one without children not at all.
- * Joints that lie on their parent in the reference pose pass on to it what their own children say. */
+ * reference), one with children in one direction by the smallest turn beside its parent's, one without children not
+ * at all. Joints that lie on their parent in the reference pose pass on to it what their own children say. */
 typedef struct vg_joint_fitter vg_joint_fitter;
-int vg_joint_fitter_new(vg_joint_fitter **f, const vg_skeleton *s, vg_err *e) VG_MUST_CHECK; /* s borrowed until free */
+/* s borrowed until free */
+int vg_joint_fitter_new(vg_joint_fitter **f, const vg_skeleton *s, vg_err *e) VG_MUST_CHECK;
 void vg_joint_fitter_free(vg_joint_fitter **f);
-/* vg_joint_fitter_fit: positions (njoints points) in, values (may be NULL) out, angles as near as can be to those of the call before. turns (may be
- * NULL): how the joints are turned, as vg_skeleton_pose gives it, where that is known: then nothing of it has to be found.
- * Returns the largest distance of a joint from where the values put it, and that joint: bones keep their lengths
- * unless the joint has position channels, and a joint with fewer than three rotations cannot turn every way. */
-double vg_joint_fitter_fit(vg_joint_fitter *f, const double *positions, const double *turns, double *values, size_t *joint);
+/* vg_joint_fitter_fit: positions (njoints points) in, values (may be NULL) out, angles as near as can be to those of
+ * the call before. turns (may be NULL): how the joints are turned, as vg_skeleton_pose gives it, where that is known:
+ * then nothing of it has to be found. Returns the largest distance of a joint from where the values put it, and that
+ * joint: bones keep their lengths unless the joint has position channels, and a joint with fewer than three rotations
+ * cannot turn every way. */
+double vg_joint_fitter_fit(vg_joint_fitter *f, const double *positions, const double *turns, double *values,
+                           size_t *joint);
 /* vg_joint_fitter_turns: the turns of all joints by the last fit. Borrowed until the next. */
 const double *vg_joint_fitter_turns(const vg_joint_fitter *f);
 
@@ -171,10 +176,12 @@ const double *vg_joint_fitter_turns(const vg_joint_fitter *f);
 typedef struct vg_correspondence {
     size_t source_nv, source_nf, target_nv, target_nf;
     uint64_t source_digest, target_digest; /* vg_mesh_digest of both */
-    uint32_t *first;    /* target_nf + 1; NULL: there is no correspondence. first[f] < first[f + 1]: every face is driven */
+    uint32_t *first;    /* target_nf + 1; NULL: there is no correspondence. first[f] < first[f + 1]: every face is
+                           driven */
     uint32_t *source;   /* pairs of target face f: source[first[f]] .. source[first[f + 1] - 1] */
     double *weight;     /* of each pair, > 0; of one target face they sum to 1 */
-    double *distance;   /* target_nf: from its centroid to the matched source face's, after fitting, mesh units of the target */
+    double *distance;   /* target_nf: from its centroid to the matched source face's, after fitting, mesh units of the
+                           target */
     uint8_t *matched;   /* target_nf: 1: found near by; 0: rides with the nearest matched face */
 } vg_correspondence;
 
@@ -189,13 +196,14 @@ typedef struct vg_patches {
 
 void vg_patches_clear(vg_patches *p);
 
-/* A skeleton that drives the mesh, and linear blend skinning with it (MATH 6; T 5). Transform b of the rig is the motion of joint
- * bone[b]: what takes a point of the reference pose that is rigid with it to where it is now. */
+/* A skeleton that drives the mesh, and linear blend skinning with it (MATH 6; T 5). Transform b of the rig is the
+ * motion of joint bone[b]: what takes a point of the reference pose that is rigid with it to where it is now. */
 enum { VG_SKIN = 4 };
 typedef struct vg_rig {
     vg_skeleton skeleton; /* njoints 0: there is no rig */
     double *at;           /* a point for each joint: where it is in the reference pose of the mesh */
-    double *turn;         /* a unit quaternion for each joint: how it is turned there, beside the skeleton's pose without rotations */
+    double *turn;         /* a unit quaternion for each joint: how it is turned there, beside the skeleton's pose
+                             without rotations */
     size_t nbones;
     uint32_t *bone;       /* the joints that have channels, ascending: those that turn */
     uint32_t *skin_bone;  /* VG_SKIN bones for each vertex of the mesh; NULL: there are no weights */
@@ -204,26 +212,31 @@ typedef struct vg_rig {
 
 void vg_rig_clear(vg_rig *r);
 int vg_rig_copy(vg_rig *to, const vg_rig *from, size_t nv, vg_err *e) VG_MUST_CHECK;
-/* vg_rig_make: a rig without weights; the skeleton is copied. positions, turns: of its joints in the reference pose of the mesh, as
- * vg_skeleton_pose gives them. VG_EINPUT when no joint has channels. */
-int vg_rig_make(vg_rig *r, const vg_skeleton *s, const double *positions, const double *turns, vg_err *e) VG_MUST_CHECK;
-/* vg_rig_transforms: positions and turns of all joints in a pose to nbones transforms of 7 numbers, as in VG_TRANSFORMS. */
+/* vg_rig_make: a rig without weights; the skeleton is copied. positions, turns: of its joints in the reference pose
+ * of the mesh, as vg_skeleton_pose gives them. VG_EINPUT when no joint has channels. */
+int vg_rig_make(vg_rig *r, const vg_skeleton *s, const double *positions, const double *turns,
+                vg_err *e) VG_MUST_CHECK;
+/* vg_rig_transforms: positions and turns of all joints in a pose to nbones transforms of 7 numbers, as in
+ * VG_TRANSFORMS. */
 void vg_rig_transforms(const vg_rig *r, const double *positions, const double *turns, double *transforms);
 /* vg_rig_skin: linear blend skinning of n vertices' reference pose by transforms. */
 void vg_rig_skin(const vg_rig *r, size_t nv, const double *reference, const double *transforms, double *vertices);
 
 /* vg_rig_find: the bone of this name; nbones: there is none. */
 size_t vg_rig_find(const vg_rig *r, const char *name);
-/* vg_rig_axis: where bone b points in the reference pose, a unit vector: to what is below its joint. false: nothing is. */
+/* vg_rig_axis: where bone b points in the reference pose, a unit vector: to what is below its joint. false: nothing
+ * is. */
 bool vg_rig_axis(const vg_rig *r, size_t b, double axis[3]);
-/* vg_rig_edit: turn bone b, and all that hangs on it, by degrees about its joint; the axis, in the reference pose, turns with the bone. In place. */
+/* vg_rig_edit: turn bone b, and all that hangs on it, by degrees about its joint; the axis, in the reference pose,
+ * turns with the bone. In place. */
 void vg_rig_edit(const vg_rig *r, size_t b, const double axis[3], double degrees, double *transforms);
 
-/* A rig driven by a skeleton of its own or another one; joints belong together by name. Joints of the rig that the other does not have follow
- * those above them. The rig keeps the lengths of its bones and goes as far as its size, beside the other's, wants. */
+/* A rig driven by a skeleton of its own or another one; joints belong together by name. Joints of the rig that the
+ * other does not have follow those above them. The rig keeps the lengths of its bones and goes as far as its size,
+ * beside the other's, wants. */
 typedef struct vg_driver vg_driver;
-/* vg_driver_new: both are borrowed until free. align: the skeletons do not rest alike: bones of the rig point where those of the other one do.
- * VG_EINPUT when no names fit. */
+/* vg_driver_new: both are borrowed until free. align: the skeletons do not rest alike: bones of the rig point where
+ * those of the other one do. VG_EINPUT when no names fit. */
 int vg_driver_new(vg_driver **d, const vg_rig *r, const vg_skeleton *by, bool align, vg_err *e) VG_MUST_CHECK;
 void vg_driver_free(vg_driver **d);
 size_t vg_driver_missing(const vg_driver *d); /* bones of the rig that follow others */
@@ -233,8 +246,9 @@ void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, 
 /* What drives a map: the transforms of patches, or of the bones of a rig. */
 typedef enum vg_map_kind { VG_MAP_PATCHES = 1, VG_MAP_BONES = 2 } vg_map_kind;
 
-/* Vertices as a linear function of transforms (MATH 7; T 6.3): with transform p taking x to A_p x + t_p, vertex v is at
- * sum over p of A_p e_vp + tau_vp t_p. What the operator was made of is kept, so that it can be made for another body. */
+/* Vertices as a linear function of transforms (MATH 7; T 6.3): with transform p taking x to A_p x + t_p, vertex v is
+ * at sum over p of A_p e_vp + tau_vp t_p. What the operator was made of is kept, so that it can be made for another
+ * body. */
 typedef struct vg_map {
     size_t n;            /* transforms; 0: there is no map */
     size_t nv;           /* vertices, those of the mesh */
@@ -253,7 +267,8 @@ typedef struct vg_map {
     double *joint_weight;
     size_t ncorners;     /* of the vector graph; 0: vertices follow the skin of the rig alone */
     size_t per_corner;   /* transforms that drive a corner: 1, or 2 bones */
-    double *corner;      /* per_corner quaternions each: the vector of the corner is the sum of A_p Q r Q* over its p */
+    double *corner;      /* per_corner quaternions each: the vector of the corner is the sum of A_p Q r Q* over its
+                            p */
     uint32_t *corner_bone; /* bones: per_corner p for each corner; patches: NULL, p is that of the face */
     size_t nheld;        /* vertices held where their patch takes them, or the skin of the rig */
     uint32_t *held;      /* ascending */
@@ -312,7 +327,8 @@ typedef struct vg_head {
     char *reference_name; /* never NULL in a head that was read */
     vg_attributes attributes;
     vg_skeleton skeleton;
-    vg_correspondence correspondence; /* a stream of vg-register: mesh and reference are the source's, its frame is fitted to the target */
+    vg_correspondence correspondence; /* a stream of vg-register: mesh and reference are the source's, its frame is
+                                         fitted to the target */
     vg_patches patches;   /* a stream of vg-segment, and those that come of it */
     vg_rig rig;           /* of a map of bones; also in streams of transforms of bones */
     vg_map map;           /* a stream of vg-fitmap */
@@ -336,10 +352,12 @@ void vg_head_clear(vg_head *h);
 int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e) VG_MUST_CHECK;
 
 /* vg_head_trace: append the record of this process. Its parents are the last record already there (if any) and
- * `other_last` of every stream merged by vg_head_merge_trace. argv is argc strings; bytes that are no UTF-8 become '?'. */
+ * `other_last` of every stream merged by vg_head_merge_trace. argv is argc strings; bytes that are no UTF-8 become
+ * '?'. */
 int vg_head_trace(vg_head *h, const char *program, int argc, char *const *argv, vg_err *e) VG_MUST_CHECK;
 
-/* vg_head_merge_trace: put the provenance of a second input before that of this process (call before vg_head_trace). */
+/* vg_head_merge_trace: put the provenance of a second input before that of this process (call before
+ * vg_head_trace). */
 int vg_head_merge_trace(vg_head *h, const vg_head *other, vg_err *e) VG_MUST_CHECK;
 
 /* One pose. The struct is reused from frame to frame; its arrays grow and stay. */
@@ -349,11 +367,15 @@ typedef struct vg_frame {
     double time; /* seconds */
     double root[3];  /* vectors, deformations: mean of the vertices that are in the vector graph */
     double *anchors; /* vectors, deformations: head.nanchors points */
-    size_t npins;    /* vectors: vertices (ascending) that stay where the reference has them, in this frame; set by vg_frame_pin */
+    size_t npins;    /* vectors: vertices (ascending) that stay where the reference has them, in this frame; set by
+                        vg_frame_pin */
     uint32_t *pins;
-    size_t nturns;   /* vertices of a skeleton: number of joints when it is known how they have turned, else 0; set by vg_frame_turn */
-    double *turns;   /* a unit quaternion w x y z each, beside the skeleton's pose without rotations: positions do not say it all */
-    bool has_scalars; /* vertices: a number for each vertex comes with the frame, such as its error; set by vg_frame_scalars */
+    size_t nturns;   /* vertices of a skeleton: number of joints when it is known how they have turned, else 0; set by
+                        vg_frame_turn */
+    double *turns;   /* a unit quaternion w x y z each, beside the skeleton's pose without rotations: positions do not
+                        say it all */
+    bool has_scalars; /* vertices: a number for each vertex comes with the frame, such as its error; set by
+                         vg_frame_scalars */
     char *scalars_name, *scalars_unit; /* UTF-8: "error", never ""; "D", or "" */
     double *scalars;  /* mesh.nv */
     double *values;  /* head.count * vg_kind_width(head.kind) */
@@ -370,13 +392,17 @@ int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 int vg_frame_pin(vg_frame *f, const uint32_t *vertices, size_t n, vg_err *e) VG_MUST_CHECK;
 int vg_frame_turn(vg_frame *f, const double *turns, size_t njoints, vg_err *e) VG_MUST_CHECK;
 int vg_frame_rename(vg_frame *f, const char *name, vg_err *e) VG_MUST_CHECK;
-/* vg_frame_scalars: numbers (nv of them, copied) come with the frame from now on, until it is shaped or labelled again. */
-int vg_frame_scalars(vg_frame *f, const char *name, const char *unit, const double *numbers, size_t nv, vg_err *e) VG_MUST_CHECK;
-/* vg_frame_label: take over name, time and unknown records of `from`, but no numbers, pins, turns or scalars; `from` loses its records. */
+/* vg_frame_scalars: numbers (nv of them, copied) come with the frame from now on, until it is shaped or labelled
+ * again. */
+int vg_frame_scalars(vg_frame *f, const char *name, const char *unit, const double *numbers, size_t nv,
+                     vg_err *e) VG_MUST_CHECK;
+/* vg_frame_label: take over name, time and unknown records of `from`, but no numbers, pins, turns or scalars; `from`
+ * loses its records. */
 int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e) VG_MUST_CHECK;
 
 /* The vector graph of a sequence: the faces that carry vectors, in order (all, or the selected ones), then the links.
- * Layout as in vg_mesh; corner c of the graph is a position in vert. `attached` counts the vertices that are in a face. */
+ * Layout as in vg_mesh; corner c of the graph is a position in vert. `attached` counts the vertices that are in a
+ * face. */
 typedef struct vg_graph {
     size_t nv, nf, nlinks; /* nf includes the links, which are the last */
     uint32_t *start, *vert;
@@ -401,30 +427,34 @@ void vg_graph_anchors(const double *vertices, const uint32_t *anchors, size_t n,
 void vg_quat_multiply(const double a[4], const double b[4], double ab[4]);
 void vg_quat_apply(const double q[4], const double r[3], double d[3]); /* Q r Q*: rotates, and scales by |Q|^2 */
 void vg_quat_matrix(const double unit[4], double m[9]);                /* row-major rotation matrix */
-void vg_quat_from_matrix(const double m[9], double unit[4]);           /* of a rotation; Shepperd's choice of branch */
-void vg_quat_log(const double q[4], double l[4]); /* q != 0. l[0] = ln|q|, l[1..3] = half angle * axis, w >= 0 or not */
+/* of a rotation; Shepperd's choice of branch */
+void vg_quat_from_matrix(const double m[9], double unit[4]);
+/* q != 0. l[0] = ln|q|, l[1..3] = half angle * axis, w >= 0 or not */
+void vg_quat_log(const double q[4], double l[4]);
 void vg_quat_exp(const double l[4], double q[4]);
 /* vg_quat_between: smallest rotation taking r to d (Rodrigues; MATH 4), scale |d|/|r|. r and d must not be 0. */
 void vg_quat_between(const double r[3], const double d[3], double q[4]);
 
 /* ---------------------------------------------------------------------------------------------- method -- */
 
-/* vg_select_faces: fewer faces that still determine the mesh (T 3.2, Algorithm 1), completed so that every vertex that
- * is in a face stays in one and every component stays connected. *faces (ascending, caller frees with free()) and *n. */
+/* vg_select_faces: fewer faces that still determine the mesh (T 3.2, Algorithm 1), completed so that every vertex
+ * that is in a face stays in one and every component stays connected. *faces (ascending, caller frees with free())
+ * and *n. */
 int vg_select_faces(const vg_mesh *m, uint32_t **faces, size_t *n, vg_err *e) VG_MUST_CHECK;
 
 /* vg_link_components: the fewest virtual line segments that join all components of m, between nearby vertices of
- * `vertices` (nv points): a minimum spanning tree of the components, where a link that would be shorter than the edges
- * beside it is moved on to the next vertex of the face. *pairs (2 per link, caller frees) and *n. */
-int vg_link_components(const vg_mesh *m, const double *vertices, uint32_t **pairs, size_t *n, vg_err *e) VG_MUST_CHECK;
+ * `vertices` (nv points): a minimum spanning tree of the components, where a link that would be shorter than the
+ * edges beside it is moved on to the next vertex of the face. *pairs (2 per link, caller frees) and *n. */
+int vg_link_components(const vg_mesh *m, const double *vertices, uint32_t **pairs, size_t *n,
+                       vg_err *e) VG_MUST_CHECK;
 
 /* vg_head_prepare_vectors: choose h's links from its reference pose unless it has them. Every program that derives
  * vectors from vertices calls this before vg_graph_new. */
 int vg_head_prepare_vectors(vg_head *h, vg_err *e) VG_MUST_CHECK;
 
-/* Deformation of vectors, reference pose to deformed pose (MATH 4): Frames (T 3.12 ff.) on faces of 3 or more, Rodrigues on
- * line segments, and on links the mean turn of the faces at their ends followed by Rodrigues. Degenerate corners take
- * the rotation of their face's other corners and scale 1. */
+/* Deformation of vectors, reference pose to deformed pose (MATH 4): Frames (T 3.12 ff.) on faces of 3 or more,
+ * Rodrigues on line segments, and on links the mean turn of the faces at their ends followed by Rodrigues. Degenerate
+ * corners take the rotation of their face's other corners and scale 1. */
 typedef struct vg_deformer vg_deformer;
 typedef struct vg_deform_counts {
     uint64_t corners;    /* degenerate corners met, over all poses */
@@ -432,23 +462,27 @@ typedef struct vg_deform_counts {
 } vg_deform_counts;
 
 /* vg_deformer_new: g borrowed until free; reference: nv points, copied in part. threads >= 1. */
-int vg_deformer_new(vg_deformer **d, const vg_graph *g, const double *reference, int threads, vg_err *e) VG_MUST_CHECK;
+int vg_deformer_new(vg_deformer **d, const vg_graph *g, const double *reference, int threads,
+                    vg_err *e) VG_MUST_CHECK;
 void vg_deformer_free(vg_deformer **d);
-/* What is carried over to the target (MATH 5): the corner's turn and stretch (T 4.2); the face's deformation gradient (Sumner and
- * Popovic 2004), by polygons; the mean of both. Line segments and links always go by pose. */
+/* What is carried over to the target (MATH 5): the corner's turn and stretch (T 4.2); the face's deformation gradient
+ * (Sumner and Popovic 2004), by polygons; the mean of both. Line segments and links always go by pose. */
 typedef enum vg_method { VG_BY_POSE = 0, VG_BY_GRADIENT = 1, VG_BY_BLEND = 2 } vg_method;
 /* vg_deformer_target: apply to these reference vectors (one per corner of the graph, copied) from now on. */
 int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_method method, vg_err *e) VG_MUST_CHECK;
-/* vg_deformer_measure: n poses in (kind VG_VERTICES: nv points each, or VG_VECTORS: one vector per corner), n arrays of a
- * quaternion per corner out. vg_deformer_transfer: the same in, the deformed target vectors out, never worse than
- * measuring and applying by more than rounding. vg_deformer_apply: quaternions in, deformed target vectors out. */
-void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses, double *const *quaternions);
+/* vg_deformer_measure: n poses in (kind VG_VERTICES: nv points each, or VG_VECTORS: one vector per corner), n arrays
+ * of a quaternion per corner out. vg_deformer_transfer: the same in, the deformed target vectors out, never worse
+ * than measuring and applying by more than rounding. vg_deformer_apply: quaternions in, deformed target vectors
+ * out. */
+void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses,
+                         double *const *quaternions);
 void vg_deformer_transfer(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses, double *const *vectors);
 void vg_deformer_apply(vg_deformer *d, size_t n, const double *const *quaternions, double *const *vectors);
 vg_deform_counts vg_deformer_counts(const vg_deformer *d);
 
-/* A path through key poses (MATH 7; T 6.1): each vector turns and stretches along the geodesic from one key to the next, neighbours the
- * same way round also beyond half a turn; the root moves straight. Outside of the keys it goes on as beside the first or last. */
+/* A path through key poses (MATH 7; T 6.1): each vector turns and stretches along the geodesic from one key to the
+ * next, neighbours the same way round also beyond half a turn; the root moves straight. Outside of the keys it goes
+ * on as beside the first or last. */
 typedef struct vg_path vg_path;
 typedef struct vg_key {
     const double *values;  /* a frame's: of vertices, vectors or deformations; borrowed as long as the path lives */
@@ -472,38 +506,41 @@ typedef struct vg_path_facts {
 int vg_path_new(vg_path **p, const vg_graph *g, const double *reference, const vg_key *keys, size_t nkeys,
                 const vg_path_options *o, vg_err *e) VG_MUST_CHECK;
 void vg_path_free(vg_path **p);
-/* vg_path_at: the pose at t: vectors (one per corner), root and anchors out. Key i is at t = i. What is between two keys is prepared when it is
- * first asked for and kept until something else is (three stretches if smooth): ask in order. */
+/* vg_path_at: the pose at t: vectors (one per corner), root and anchors out. Key i is at t = i. What is between two
+ * keys is prepared when it is first asked for and kept until something else is (three stretches if smooth): ask in
+ * order. */
 int vg_path_at(vg_path *p, double t, double *vectors, double root[3], double *anchors, vg_err *e) VG_MUST_CHECK;
 vg_path_facts vg_path_get_facts(const vg_path *p);
 
-/* Transfer between meshes of different connectivity (MATH 9). A face that one face of as many corners drives goes corner by corner, as
- * by vg_deformer. Each other face of the target takes the deformation gradient of the source
- * faces that drive it, and by pose its rotation (polar) with the stretch that the gradient gives the direction of each vector. Here the
- * normal stretches by the root of the area's ratio, for the target's vectors lie across the source's planes. Faces
- * without a match of their own turn rigidly. Links follow the faces at their ends. */
+/* Transfer between meshes of different connectivity (MATH 9). A face that one face of as many corners drives goes
+ * corner by corner, as by vg_deformer. Each other face of the target takes the deformation gradient of the source
+ * faces that drive it, and by pose its rotation (polar) with the stretch that the gradient gives the direction of
+ * each vector. Here the normal stretches by the root of the area's ratio, for the target's vectors lie across the
+ * source's planes. Faces without a match of their own turn rigidly. Links follow the faces at their ends. */
 typedef struct vg_carrier vg_carrier;
-/* vg_carrier_new: source: the whole source mesh and its reference pose; c: fits both meshes (checked: VG_EINPUT); target: the graph of
- * the target (all faces, then links) and its reference. All are borrowed until free. */
-int vg_carrier_new(vg_carrier **c, const vg_mesh *source, const double *source_reference, const vg_correspondence *pairs,
-                   const vg_graph *target, const double *target_reference, vg_method method, int threads,
-                   vg_err *e) VG_MUST_CHECK;
+/* vg_carrier_new: source: the whole source mesh and its reference pose; c: fits both meshes (checked: VG_EINPUT);
+ * target: the graph of the target (all faces, then links) and its reference. All are borrowed until free. */
+int vg_carrier_new(vg_carrier **c, const vg_mesh *source, const double *source_reference,
+                   const vg_correspondence *pairs, const vg_graph *target, const double *target_reference,
+                   vg_method method, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_carrier_free(vg_carrier **c);
 /* vg_carrier_transfer: n poses of the source (vertices) in, n times the target's wanted vectors out. */
 void vg_carrier_transfer(vg_carrier *c, size_t n, const double *const *poses, double *const *vectors);
-vg_deform_counts vg_carrier_counts(const vg_carrier *c); /* corners: source faces without a direction, over all poses */
+/* corners: source faces without a direction, over all poses */
+vg_deform_counts vg_carrier_counts(const vg_carrier *c);
 
-/* Shape deformation (T 4.1 to 4.6): what takes each source vector to the target's in the reference poses, applied to the vectors of
- * each pose and put at the source face's centroid; corners that share a vertex are averaged. No linear system; fails for
- * large deformations. Gives vertices: the mean of the attached ones is the source's. */
+/* Shape deformation (T 4.1 to 4.6): what takes each source vector to the target's in the reference poses, applied to
+ * the vectors of each pose and put at the source face's centroid; corners that share a vertex are averaged. No linear
+ * system; fails for large deformations. Gives vertices: the mean of the attached ones is the source's. */
 typedef struct vg_shaper vg_shaper;
-int vg_shaper_new(vg_shaper **s, const vg_graph *g, const double *source_reference, const double *target_reference, int threads,
-                  vg_err *e) VG_MUST_CHECK;
+int vg_shaper_new(vg_shaper **s, const vg_graph *g, const double *source_reference, const double *target_reference,
+                  int threads, vg_err *e) VG_MUST_CHECK;
 void vg_shaper_free(vg_shaper **s);
 void vg_shaper_transfer(vg_shaper *s, size_t n, const double *const *poses, double *const *vertices);
 
-/* Where the whole body goes when a motion is carried over (MATH 5): each root or anchor is as far from its place in the
- * target's reference as the source's is from its own, by the ratio of the diagonals of the references; or it stays. */
+/* Where the whole body goes when a motion is carried over (MATH 5): each root or anchor is as far from its place in
+ * the target's reference as the source's is from its own, by the ratio of the diagonals of the references; or it
+ * stays. */
 typedef struct vg_mover vg_mover;
 /* vg_mover_new: to is borrowed until free. anchors: of both, when they have the same vertices. */
 int vg_mover_new(vg_mover **m, const vg_graph *from, const double *source_reference, const vg_graph *to,
@@ -515,48 +552,51 @@ void vg_mover_move(const vg_mover *m, const vg_frame *in, vg_frame *out);
 /* vg_mover_place: move a pose of the target as a whole until its root is there; vertices in no face stay. */
 void vg_mover_place(const vg_mover *m, const double root[3], double *vertices);
 
-/* Which vertices of the target stay in a pose: those all of whose faces are driven only by faces of the source none of whose
- * vertices is further than 1e-6 D from its place in the reference. */
+/* Which vertices of the target stay in a pose: those all of whose faces are driven only by faces of the source none
+ * of whose vertices is further than 1e-6 D from its place in the reference. */
 typedef struct vg_pinner vg_pinner;
-/* vg_pinner_new: all is borrowed until free. pairs NULL: one connectivity. always: even when less than a tenth of the source's
- * vertices stay. */
+/* vg_pinner_new: all is borrowed until free. pairs NULL: one connectivity. always: even when less than a tenth of the
+ * source's vertices stay. */
 int vg_pinner_new(vg_pinner **p, const vg_graph *from, const double *source_reference, const vg_graph *to,
                   const vg_correspondence *pairs, bool always, vg_err *e) VG_MUST_CHECK;
 void vg_pinner_free(vg_pinner **p);
 /* vg_pinner_find: for a pose of the source, how many they are and which, ascending; borrowed until the next call. */
 size_t vg_pinner_find(vg_pinner *p, const double *pose, const uint32_t **vertices);
 
-/* Reconstruction: min over V of the squared difference between the vectors of V and the given ones (MATH 2; T 3.7-3.9),
- * by one sparse Cholesky factorisation, many poses per solve. */
+/* Reconstruction: min over V of the squared difference between the vectors of V and the given ones (MATH 2; T
+ * 3.7-3.9), by one sparse Cholesky factorisation, many poses per solve. */
 typedef struct vg_solver vg_solver;
-/* What a difference counts: every corner alike (T 3.7), or in the reference surface's own metric, which does not depend on how the
- * surface is cut into faces (on triangles the cotangent weights). Consistent vectors are met exactly by both. */
+/* What a difference counts: every corner alike (T 3.7), or in the reference surface's own metric, which does not
+ * depend on how the surface is cut into faces (on triangles the cotangent weights). Consistent vectors are met
+ * exactly by both. */
 typedef enum vg_weights { VG_WEIGHTS_UNIFORM = 0, VG_WEIGHTS_AREA = 1 } vg_weights;
 typedef struct vg_solver_facts {
     size_t unknowns, factor_entries; /* entries of the factor, explicit zeros included */
     double analyse_seconds, factor_seconds;
 } vg_solver_facts;
 
-/* vg_solver_new: g borrowed until free; anchors (n ascending vertices, each attached) are met exactly; without any, the mean of
- * the attached vertices is. reference (nv points, copied in part) places the vertices that are in no face.
- * VG_EINPUT when the graph is not connected. */
+/* vg_solver_new: g borrowed until free; anchors (n ascending vertices, each attached) are met exactly; without any,
+ * the mean of the attached vertices is. reference (nv points, copied in part) places the vertices that are in no
+ * face. VG_EINPUT when the graph is not connected. */
 int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
                   vg_weights weights, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_solver_free(vg_solver **s);
-/* vg_solver_load: the vectors of n poses (and their anchors, nanchors points each; NULL when there are none) become first guesses x and
- * right-hand sides, nv x 3 each: what the guesses miss. One call at a time on one solver; the threads share the poses. */
-void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const double *const *anchors, double *const *x,
-                    double *const *rhs);
-/* vg_solver_solve: n guesses x, with their right-hand sides, become n poses in place. anchors[i]: nanchors points of pose i, or
- * roots[i]: its root; the other is not looked at. Best when n is a multiple of vg_solver_batch. */
+/* vg_solver_load: the vectors of n poses (and their anchors, nanchors points each; NULL when there are none) become
+ * first guesses x and right-hand sides, nv x 3 each: what the guesses miss. One call at a time on one solver; the
+ * threads share the poses. */
+void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const double *const *anchors,
+                    double *const *x, double *const *rhs);
+/* vg_solver_solve: n guesses x, with their right-hand sides, become n poses in place. anchors[i]: nanchors points of
+ * pose i, or roots[i]: its root; the other is not looked at. Best when n is a multiple of vg_solver_batch. */
 void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *const *x, const double *const *anchors,
                      const double *const *roots);
 size_t vg_solver_batch(const vg_solver *s);
 vg_solver_facts vg_solver_get_facts(const vg_solver *s);
 
-/* Planarity (MATH 5; T 4.2.3): poses that minimise `fidelity` times the energy of the reconstruction plus `planarity` times the sum
- * over corners of faces of four and more of (m_f . t_c)^2, t_c the corner's vector, m_f the unit mean of the cross products of
- * successive given vectors of the face (no such term where that is 0). By conjugate gradients from the plain solution. */
+/* Planarity (MATH 5; T 4.2.3): poses that minimise `fidelity` times the energy of the reconstruction plus `planarity`
+ * times the sum over corners of faces of four and more of (m_f . t_c)^2, t_c the corner's vector, m_f the unit mean
+ * of the cross products of successive given vectors of the face (no such term where that is 0). By conjugate
+ * gradients from the plain solution. */
 typedef struct vg_planar vg_planar;
 typedef struct vg_planar_facts {
     size_t faces;          /* of four and more corners */
@@ -568,29 +608,32 @@ typedef struct vg_planar_facts {
 int vg_planar_new(vg_planar **p, const vg_solver *s, double fidelity, double planarity, vg_err *e) VG_MUST_CHECK;
 void vg_planar_free(vg_planar **p);
 size_t vg_planar_faces(const vg_planar *p);
-/* vg_planar_load: of one pose's given vectors what is needed later: the m_f, 3 numbers for each of vg_planar_faces. */
+/* vg_planar_load: of one pose's given vectors what is needed later: the m_f, 3 numbers for each of
+ * vg_planar_faces. */
 void vg_planar_load(const vg_planar *p, const double *vectors, double *normals);
-/* vg_planar_solve: n poses x from vg_solver_solve, with their normals, become more nearly planar in place; anchors stay, or
- * the root does, and vertices in no face. Returns the number of the first pose that did not converge; n when all did. */
+/* vg_planar_solve: n poses x from vg_solver_solve, with their normals, become more nearly planar in place; anchors
+ * stay, or the root does, and vertices in no face. Returns the number of the first pose that did not converge; n when
+ * all did. */
 size_t vg_planar_solve(vg_planar *p, size_t n, const double *const *normals, double *const *x);
 vg_planar_facts vg_planar_get_facts(const vg_planar *p);
 
-/* Guidance in time (MATH 5; T 4.10, 4.16): a sequence keeps its second differences in time and meets given poses at keys. Between
- * two keys a < b the pose U_k becomes U_k + ((b - k) e_a + (k - a) e_b) / (b - a), e = given - U; before the first key and
- * after the last that key's own e is added. */
+/* Guidance in time (MATH 5; T 4.10, 4.16): a sequence keeps its second differences in time and meets given poses at
+ * keys. Between two keys a < b the pose U_k becomes U_k + ((b - k) e_a + (k - a) e_b) / (b - a), e = given - U;
+ * before the first key and after the last that key's own e is added. */
 typedef struct vg_guide vg_guide;
 int vg_guide_new(vg_guide **g, size_t nv, vg_err *e) VG_MUST_CHECK;
 void vg_guide_free(vg_guide **g);
-/* vg_guide_key: frame number `frame`, later than the key before, has this pose (nv points), which becomes the given one to
- * the bit. Poses between both keys are to be applied before the next key is named. */
+/* vg_guide_key: frame number `frame`, later than the key before, has this pose (nv points), which becomes the given
+ * one to the bit. Poses between both keys are to be applied before the next key is named. */
 void vg_guide_key(vg_guide *g, uint64_t frame, double *pose, const double *given);
-/* vg_guide_apply: the pose of frame number `frame` in place: one between the last two keys, or behind the last, or, when only
- * one key was named, any. Without keys it stays. */
+/* vg_guide_apply: the pose of frame number `frame` in place: one between the last two keys, or behind the last, or,
+ * when only one key was named, any. Without keys it stays. */
 void vg_guide_apply(const vg_guide *g, uint64_t frame, double *pose);
 
-/* Segmentation (T 6.2): K-means over faces whose feature is their rotation in every pose; nothing in it is spatial. Features of more
- * than about a hundred poses are folded into 1,024 numbers by random signs, which keeps distances within about 5 %: memory does not grow
- * with the number of poses. The same seed gives the same patches, whatever the number of threads. */
+/* Segmentation (T 6.2): K-means over faces whose feature is their rotation in every pose; nothing in it is spatial.
+ * Features of more than about a hundred poses are folded into 1,024 numbers by random signs, which keeps distances
+ * within about 5 %: memory does not grow with the number of poses. The same seed gives the same patches, whatever the
+ * number of threads. */
 typedef struct vg_segmenter vg_segmenter;
 typedef struct vg_segment_report {
     size_t patches, rounds;
@@ -598,29 +641,31 @@ typedef struct vg_segment_report {
 } vg_segment_report;
 
 /* vg_segmenter_new: m is borrowed until free; reference: nv points, not kept. */
-int vg_segmenter_new(vg_segmenter **s, const vg_mesh *m, const double *reference, int threads, vg_err *e) VG_MUST_CHECK;
+int vg_segmenter_new(vg_segmenter **s, const vg_mesh *m, const double *reference, int threads,
+                     vg_err *e) VG_MUST_CHECK;
 void vg_segmenter_free(vg_segmenter **s);
 int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_err *e) VG_MUST_CHECK;
-/* vg_segmenter_cut: patches 0: as few of 4 6 8 12 16 24 ... 256 as bring the angle to 10 degrees. connected: every patch is in one
- * piece: pieces are joined with neighbours that turn alike until `patches` are left, or no neighbours. Fewer patches than asked for
- * when fewer faces turn differently. VG_EINPUT when there is no face. */
-int vg_segmenter_cut(vg_segmenter *s, size_t patches, uint64_t seed, bool connected, vg_patches *out, vg_segment_report *report,
-                     vg_err *e) VG_MUST_CHECK;
+/* vg_segmenter_cut: patches 0: as few of 4 6 8 12 16 24 ... 256 as bring the angle to 10 degrees. connected: every
+ * patch is in one piece: pieces are joined with neighbours that turn alike until `patches` are left, or no
+ * neighbours. Fewer patches than asked for when fewer faces turn differently. VG_EINPUT when there is no face. */
+int vg_segmenter_cut(vg_segmenter *s, size_t patches, uint64_t seed, bool connected, vg_patches *out,
+                     vg_segment_report *report, vg_err *e) VG_MUST_CHECK;
 
 /* The map from patch transforms to vertices (MATH 7; T 6.3), with its two remedies. */
 typedef struct vg_map_fitter vg_map_fitter;
-/* vg_map_fitter_new: h: mesh, reference, links, and patches, which are split into connected pieces: these become the patches of h. hold:
- * share of the vertices that are held, those nearest the patches' centres; at least one a patch. h is borrowed until free. */
+/* vg_map_fitter_new: h: mesh, reference, links, and patches, which are split into connected pieces: these become the
+ * patches of h. hold: share of the vertices that are held, those nearest the patches' centres; at least one a patch.
+ * h is borrowed until free. */
 int vg_map_fitter_new(vg_map_fitter **f, vg_head *h, double hold, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_map_fitter_free(vg_map_fitter **f);
 int vg_map_fitter_add(vg_map_fitter *f, size_t n, const double *const *poses, vg_err *e) VG_MUST_CHECK;
 /* vg_map_fitter_finish: fill h->map. VG_EINPUT without poses. */
 int vg_map_fitter_finish(vg_map_fitter *f, vg_err *e) VG_MUST_CHECK;
 
-/* vg_map_retarget: the map of h for another body of the same faces (T 6.5), or one on the way to it (T 6.6): its vectors are those of h's
- * reference, turned and stretched towards the target's by `morph` (1: all the way). h's reference becomes that body's. target: nv
- * points. Patches are still measured on the body that the map was fitted on; the joints of a rig go with the vertices around them, and its
- * transforms are those of the other body. */
+/* vg_map_retarget: the map of h for another body of the same faces (T 6.5), or one on the way to it (T 6.6): its
+ * vectors are those of h's reference, turned and stretched towards the target's by `morph` (1: all the way). h's
+ * reference becomes that body's. target: nv points. Patches are still measured on the body that the map was fitted
+ * on; the joints of a rig go with the vertices around them, and its transforms are those of the other body. */
 int vg_map_retarget(vg_head *h, const double *target, double morph, int threads, vg_err *e) VG_MUST_CHECK;
 
 /* A map at work. Transforms are 7 numbers each, as in VG_TRANSFORMS. */
@@ -632,58 +677,66 @@ void vg_player_free(vg_player **p);
 void vg_player_measure(vg_player *p, size_t n, const double *const *poses, double *const *transforms);
 /* vg_player_place: keep rotations, scales and root, and put the patches where their joints want them, in place. */
 void vg_player_place(vg_player *p, double *transforms);
-/* vg_player_between: from a (t = 0) to b (t = 1) and beyond: rotations and scales go along geodesics, the root in a line, joints hold. */
+/* vg_player_between: from a (t = 0) to b (t = 1) and beyond: rotations and scales go along geodesics, the root in a
+ * line, joints hold. */
 void vg_player_between(vg_player *p, const double *a, const double *b, double t, double *transforms);
 /* vg_player_pose: n times transforms to vertices, by one product. */
 void vg_player_pose(vg_player *p, size_t n, const double *const *transforms, double *const *vertices);
 
 /* Enveloping (MATH 6; T 5): a skeleton drives the mesh, learned from example poses.
  *
- * vg_bender: the other way round: the motions of the bones in a pose of vertices, joints staying together, so that linear blend skinning comes as
- * near to the vertices as it can (damped Gauss-Newton over all bones at once). Bones that no vertex tells about go with their parents. */
+ * vg_bender: the other way round: the motions of the bones in a pose of vertices, joints staying together, so that
+ * linear blend skinning comes as near to the vertices as it can (damped Gauss-Newton over all bones at once). Bones
+ * that no vertex tells about go with their parents. */
 typedef struct vg_bender vg_bender;
 /* vg_bender_new: r has weights; it and reference (nv points) are not kept. */
-int vg_bender_new(vg_bender **b, const vg_rig *r, size_t nv, const double *reference, int threads, vg_err *e) VG_MUST_CHECK;
+int vg_bender_new(vg_bender **b, const vg_rig *r, size_t nv, const double *reference, int threads,
+                  vg_err *e) VG_MUST_CHECK;
 void vg_bender_free(vg_bender **b);
 /* vg_bender_fit: n poses (nv points each) to n times nbones transforms of 7 numbers. */
 void vg_bender_fit(vg_bender *b, size_t n, const double *const *poses, double *const *transforms);
 
-/* vg_rig_learn: give h's rig weights when the motions of its bones are not known: weights and motions are fitted in turn to n poses.
- * miss: the mean distance that linear blend skinning leaves, in mesh units. */
-int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, double *miss, vg_err *e) VG_MUST_CHECK;
-/* vg_rig_locate: a skeleton whose root is not known to the mesh (in BVH it has no place of its own): shift is what has to be added to the positions
- * of its reference pose. n poses of the mesh with the positions and turns of all joints in the same poses. spread: how far the
- * vertices disagree about it (median), in mesh units. */
+/* vg_rig_learn: give h's rig weights when the motions of its bones are not known: weights and motions are fitted in
+ * turn to n poses. miss: the mean distance that linear blend skinning leaves, in mesh units. */
+int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, double *miss,
+                 vg_err *e) VG_MUST_CHECK;
+/* vg_rig_locate: a skeleton whose root is not known to the mesh (in BVH it has no place of its own): shift is what
+ * has to be added to the positions of its reference pose. n poses of the mesh with the positions and turns of all
+ * joints in the same poses. spread: how far the vertices disagree about it (median), in mesh units. */
 int vg_rig_locate(const vg_skeleton *s, size_t nv, const double *reference, size_t n, const double *const *poses,
-                  const double *const *positions, const double *const *turns, int threads, double shift[3], double *spread,
-                  vg_err *e) VG_MUST_CHECK;
+                  const double *const *positions, const double *const *turns, int threads, double shift[3],
+                  double *spread, vg_err *e) VG_MUST_CHECK;
 
-/* The fit of a map of bones. Corner i has the vector A u_i, A that of the bone with which it moves most nearly rigidly, and u_i what fits
- * best over the poses; kept as the turn of its face beside the bone (T 5.12, without reflections), the rest by the smallest rotation, and
- * a stretch. Some vertices go where linear blend skinning, fitted to the same poses, takes them: those that move most nearly
- * rigidly with one bone, spread over the mesh, on every component and bone. Both together are reconstructed once for each number of each
- * transform. */
+/* The fit of a map of bones. Corner i has the vector A u_i, A that of the bone with which it moves most nearly
+ * rigidly, and u_i what fits best over the poses; kept as the turn of its face beside the bone (T 5.12, without
+ * reflections), the rest by the smallest rotation, and a stretch. Some vertices go where linear blend skinning,
+ * fitted to the same poses, takes them: those that move most nearly rigidly with one bone, spread over the mesh, on
+ * every component and bone. Both together are reconstructed once for each number of each transform. */
 typedef struct vg_rig_fitter vg_rig_fitter;
 typedef enum vg_rig_method { VG_RIG_ENVELOPE = 0, VG_RIG_LBS = 1 } vg_rig_method;
 typedef struct vg_rig_options {
     size_t bones_per_corner; /* 1, or 2 */
     double hold;             /* share of the vertices that are held; at least one for each bone and component */
-    double refine;           /* how willingly what that leaves of the poses is taken up by the bones near by: 0 .. 1 */
+    double refine;           /* how willingly what that leaves of the poses is taken up by the bones near by: 0 ..
+                                1 */
     int threads;
 } vg_rig_options;
 
 /* vg_rig_fitter_new: h: mesh, reference and a rig (its weights, if any, are replaced); borrowed until free. */
 int vg_rig_fitter_new(vg_rig_fitter **f, vg_head *h, const vg_rig_options *o, vg_err *e) VG_MUST_CHECK;
 void vg_rig_fitter_free(vg_rig_fitter **f);
-/* vg_rig_fitter_add: n poses (nv points) and the transforms of the bones in them. Poses that are the reference are passed over. */
+/* vg_rig_fitter_add: n poses (nv points) and the transforms of the bones in them. Poses that are the reference are
+ * passed over. */
 void vg_rig_fitter_add(vg_rig_fitter *f, size_t n, const double *const *poses, const double *const *transforms);
-/* vg_rig_fitter_finish: fill h->map and the weights of h->rig. May be called again for another method. VG_EINPUT without poses. */
+/* vg_rig_fitter_finish: fill h->map and the weights of h->rig. May be called again for another method. VG_EINPUT
+ * without poses. */
 int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_err *e) VG_MUST_CHECK;
 
 /* Measures of two sequences of one connectivity (MATH 8), accumulated pose by pose in bounded memory. */
 typedef struct vg_measures vg_measures;
 enum { VG_ERROR_BINS = 40 };
-extern const double vg_error_edges[VG_ERROR_BINS]; /* in D: bin i holds what is at least edge i and less than the next, the last one all from 5 on */
+/* in D: bin i holds what is at least edge i and less than the next, the last one all from 5 on */
+extern const double vg_error_edges[VG_ERROR_BINS];
 typedef struct vg_measure_report {
     size_t frames, vertices, faces;
     double diagonal; /* D of the truth's reference pose */
@@ -695,26 +748,28 @@ typedef struct vg_measure_report {
     double orientation_mean, orientation_sd, orientation_max; /* 1 - N.N~ per face of 3 or more (T 6.42) */
     double area_mean, area_sd, area_max;                      /* |1 - A/A~| (T 6.44) */
     size_t faces_measured;                                    /* faces with a normal, summed over poses */
-    double planarity_mean[2], planarity_max[2];               /* truth, result: faces of 4 or more, in [0, 1] (T 4.2.6) */
+    /* truth, result: faces of 4 or more, in [0, 1] (T 4.2.6) */
+    double planarity_mean[2], planarity_max[2];
     size_t planarity_faces[2];
     uint64_t planarity_histogram[2][10];
 } vg_measure_report;
 
 /* vg_measures_new: m borrowed until free. centred: compare poses after moving each one's centroid to 0.
  * p95 is exact to 0.4 % (a histogram of 1/256 octaves). */
-int vg_measures_new(vg_measures **x, const vg_mesh *m, const double *reference, bool centred, vg_err *e) VG_MUST_CHECK;
+int vg_measures_new(vg_measures **x, const vg_mesh *m, const double *reference, bool centred,
+                    vg_err *e) VG_MUST_CHECK;
 void vg_measures_free(vg_measures **x);
-/* vg_measures_add: one pose of the truth and of the result (nv points each); frame_mean, frame_max (may be NULL): this
- * pose's error. errors (may be NULL): nv distances out. */
+/* vg_measures_add: one pose of the truth and of the result (nv points each); frame_mean, frame_max (may be NULL):
+ * this pose's error. errors (may be NULL): nv distances out. */
 int vg_measures_add(vg_measures *x, const double *truth, const double *result, double *frame_mean, double *frame_max,
                     double *errors, vg_err *e) VG_MUST_CHECK;
 void vg_measures_get(const vg_measures *x, vg_measure_report *r);
 /* vg_error_p95: the least of n numbers that 95 of 100 do not exceed; 0 for none. Changes their order. O(n). */
 double vg_error_p95(double *numbers, size_t n);
 
-/* A fingerprint of what a sequence says, whoever made it: XXH64 over kind, faces, selection, links, anchors, reference
- * positions, and of every frame name, time, root, anchors and values, all numbers as binary64 (-0 as 0). Provenance,
- * attributes, unknown records and the precision they are written in do not count. */
+/* A fingerprint of what a sequence says, whoever made it: XXH64 over kind, faces, selection, links, anchors,
+ * reference positions, and of every frame name, time, root, anchors and values, all numbers as binary64 (-0 as 0).
+ * Provenance, attributes, unknown records and the precision they are written in do not count. */
 typedef struct vg_digest vg_digest;
 int vg_digest_new(vg_digest **d, const vg_head *h, vg_err *e) VG_MUST_CHECK; /* h is borrowed until free */
 void vg_digest_free(vg_digest **d);
@@ -736,8 +791,8 @@ typedef struct vg_markers {
 } vg_markers;
 
 void vg_markers_clear(vg_markers *m);
-/* vg_markers_read: text with a pair per line, "SOURCE TARGET" or "NAME SOURCE TARGET"; '#' starts a comment. `base` is the number of
- * the first vertex, 0 or 1. name: what messages call the file. */
+/* vg_markers_read: text with a pair per line, "SOURCE TARGET" or "NAME SOURCE TARGET"; '#' starts a comment. `base`
+ * is the number of the first vertex, 0 or 1. name: what messages call the file. */
 int vg_markers_read(vg_markers *m, const void *data, size_t n, int base, const char *name, vg_err *e) VG_MUST_CHECK;
 
 /* A point of one mesh (weighted mean of three of its vertices, which may be one thrice) for a vertex of another. */
@@ -746,11 +801,13 @@ typedef struct vg_seed {
     double weight[3];
 } vg_seed;
 
-/* vg_seeds_read: a dense correspondence as text: "VERTEX A B C WA WB WC" per line, '-' for a vertex that has none. *n seeds, free(). */
-int vg_seeds_read(vg_seed **seeds, size_t *n, const void *data, size_t bytes, int base, const char *name, vg_err *e) VG_MUST_CHECK;
+/* vg_seeds_read: a dense correspondence as text: "VERTEX A B C WA WB WC" per line, '-' for a vertex that has none. *n
+ * seeds, free(). */
+int vg_seeds_read(vg_seed **seeds, size_t *n, const void *data, size_t bytes, int base, const char *name,
+                  vg_err *e) VG_MUST_CHECK;
 
-/* Joints as groups of mesh vertices (T 5.1): a joint is the mean of its vertices, in whatever pose they are; the roll of its bone is
- * told by the first of them. */
+/* Joints as groups of mesh vertices (T 5.1): a joint is the mean of its vertices, in whatever pose they are; the roll
+ * of its bone is told by the first of them. */
 typedef struct vg_joint_group {
     char *name;
     uint32_t parent;    /* less than its own number; UINT32_MAX: a root */
@@ -765,16 +822,21 @@ typedef struct vg_joint_groups {
 } vg_joint_groups;
 
 void vg_joint_groups_clear(vg_joint_groups *g);
-/* vg_joint_groups_read: text with a joint per line, "JOINT PARENT vertices VERTEX VERTEX ...", '-' for no parent, '#' starts a comment.
- * Parents may stand behind their children: they are put before them. Whether the vertices exist is left to who has the mesh.
- * `base` is the number of the first vertex, 0 or 1. name: what messages call the file. */
-int vg_joint_groups_read(vg_joint_groups *g, const void *data, size_t n, int base, const char *name, vg_err *e) VG_MUST_CHECK;
+/* vg_joint_groups_read: text with a joint per line, "JOINT PARENT vertices VERTEX VERTEX ...", '-' for no parent, '#'
+ * starts a comment. Parents may stand behind their children: they are put before them. Whether the vertices exist is
+ * left to who has the mesh. `base` is the number of the first vertex, 0 or 1. name: what messages call the file. */
+int vg_joint_groups_read(vg_joint_groups *g, const void *data, size_t n, int base, const char *name,
+                         vg_err *e) VG_MUST_CHECK;
 
-/* vg_joint_groups_skeleton: the joints in a pose of nv vertices as a skeleton. VG_EINPUT when a vertex is not there. */
-int vg_joint_groups_skeleton(const vg_joint_groups *g, size_t nv, const double *reference, vg_skeleton *s, vg_err *e) VG_MUST_CHECK;
-/* vg_joint_groups_pose: positions of the joints in a pose, and their turns beside the reference pose: with one joint below, that of the
- * frame of bone and roll (T 5.1); else what takes joints below and the group's vertices nearest to where they are. */
-void vg_joint_groups_pose(const vg_joint_groups *g, const double *reference, const double *pose, double *positions, double *turns);
+/* vg_joint_groups_skeleton: the joints in a pose of nv vertices as a skeleton. VG_EINPUT when a vertex is not
+ * there. */
+int vg_joint_groups_skeleton(const vg_joint_groups *g, size_t nv, const double *reference, vg_skeleton *s,
+                             vg_err *e) VG_MUST_CHECK;
+/* vg_joint_groups_pose: positions of the joints in a pose, and their turns beside the reference pose: with one joint
+ * below, that of the frame of bone and roll (T 5.1); else what takes joints below and the group's vertices nearest to
+ * where they are. */
+void vg_joint_groups_pose(const vg_joint_groups *g, const double *reference, const double *pose, double *positions,
+                          double *turns);
 
 /* What is known about which point belongs to which. */
 typedef struct vg_register_input {
@@ -783,8 +845,10 @@ typedef struct vg_register_input {
     const vg_markers *markers;  /* may be NULL */
     const vg_seed *seeds;       /* may be NULL */
     size_t nseeds;
-    bool seeds_of_source;       /* seeds are vertices of the source on the target; else vertices of the target on the source */
-    const vg_attributes *source_uv, *target_uv; /* both, or NULL: points of the same texture coordinates belong together */
+    bool seeds_of_source;       /* seeds are vertices of the source on the target; else vertices of the target on the
+                                   source */
+    const vg_attributes *source_uv, *target_uv; /* both, or NULL: points of the same texture coordinates belong
+                                                   together */
     bool aligned;               /* the two lie on one another as they are */
     bool keep_all;              /* markers that contradict the others are not left out */
     int threads;
@@ -811,16 +875,18 @@ typedef struct vg_register_result {
 
 void vg_register_result_clear(vg_register_result *r);
 
-/* vg_register: pair the faces of two meshes (MATH 9; after Sumner and Popovic 2004, section 5). step (may be NULL) is told of each round
- * of the fit. VG_EINPUT when the pairs given do not say how the meshes lie (three that are not in line are needed). */
-int vg_register(vg_register_result *r, const vg_register_input *in, void (*step)(void *context, const vg_register_step *step),
-                void *context, vg_err *e) VG_MUST_CHECK;
+/* vg_register: pair the faces of two meshes (MATH 9; after Sumner and Popovic 2004, section 5). step (may be NULL) is
+ * told of each round of the fit. VG_EINPUT when the pairs given do not say how the meshes lie (three that are not in
+ * line are needed). */
+int vg_register(vg_register_result *r, const vg_register_input *in,
+                void (*step)(void *context, const vg_register_step *step), void *context, vg_err *e) VG_MUST_CHECK;
 
 /* -------------------------------------------------------------------------------------------------- io -- */
 
 /* The stream (fmt/STREAM.md). A reader takes it from a descriptor or from memory and checks every byte. */
 typedef struct vg_reader vg_reader;
-/* vg_reader_open: read up to the FORM record. fd is borrowed and read to the END mark by vg_reader_next. `name` is what messages call it. */
+/* vg_reader_open: read up to the FORM record. fd is borrowed and read to the END mark by vg_reader_next. `name` is
+ * what messages call it. */
 int vg_reader_open(vg_reader **r, int fd, const char *name, vg_err *e) VG_MUST_CHECK;
 int vg_reader_open_memory(vg_reader **r, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
 /* vg_reader_head: what was read; the caller may change it (it is what a filter hands to its writer). */
@@ -849,22 +915,24 @@ int vg_writer_end(vg_writer *w, const vg_records *tail, vg_err *e) VG_MUST_CHECK
 void vg_writer_abandon(vg_writer *w, const char *program, int exit_status, const char *message);
 void vg_writer_close(vg_writer **w);
 
-/* The door in. Operands are streams, mesh files, files that hold a whole sequence (point caches, arrays, ...), archives of
- * mesh files, directories, or "-" (standard input: any of them); what each one is, is told by its content, for OBJ by its name or content. Directories and archives give their mesh
- * files in natural order ("pose2" before "pose10"); other files in them are passed over. One operand that is a stream
- * gives that stream as it is. More operands are joined into one sequence of vertices of one mesh. The first pose is the
- * reference unless a stream or a sequence brings its own. */
+/* The door in. Operands are streams, mesh files, files that hold a whole sequence (point caches, arrays, ...),
+ * archives of mesh files, directories, or "-" (standard input: any of them); what each one is, is told by its
+ * content, for OBJ by its name or content. Directories and archives give their mesh files in natural order ("pose2"
+ * before "pose10"); other files in them are passed over. One operand that is a stream gives that stream as it is.
+ * More operands are joined into one sequence of vertices of one mesh. The first pose is the reference unless a stream
+ * or a sequence brings its own. */
 typedef struct vg_source vg_source;
 int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err *e) VG_MUST_CHECK;
 typedef struct vg_source_options {
-    const char *mesh;    /* an operand whose faces and reference pose are those of operands that hold none of their own (point
-                            caches, arrays); NULL: those of the operand before, or of the file of the same name that ends in
-                            .obj or .ply */
-    uint64_t most_bytes; /* what an archive, a compressed file, or a mesh file from a pipe may hold, unpacked; 0: 1 GiB in one
-                            file, 64 GiB in all */
+    const char *mesh;    /* an operand whose faces and reference pose are those of operands that hold none of their
+                            own (point caches, arrays); NULL: those of the operand before, or of the file of the same
+                            name that ends in .obj or .ply */
+    uint64_t most_bytes; /* what an archive, a compressed file, or a mesh file from a pipe may hold, unpacked; 0: 1
+                            GiB in one file, 64 GiB in all */
 } vg_source_options;
 /* vg_source_open_with: o may be NULL. */
-int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const vg_source_options *o, vg_err *e) VG_MUST_CHECK;
+int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const vg_source_options *o,
+                        vg_err *e) VG_MUST_CHECK;
 /* vg_source_warning: what was left out of the mesh, one line; NULL: nothing. Borrowed until close. */
 const char *vg_source_warning(const vg_source *s);
 vg_head *vg_source_head(vg_source *s);
@@ -874,10 +942,12 @@ const vg_failure *vg_source_failure(const vg_source *s); /* as vg_reader_failure
 void vg_source_close(vg_source **s);
 
 /* vg_load_mesh: the mesh behind one operand, as a head whose reference is the operand's reference pose (for a mesh
- * file its only pose, for BVH the one without rotations; for a stream its reference; for an archive or directory the first pose). The rest is not read. */
+ * file its only pose, for BVH the one without rotations; for a stream its reference; for an archive or directory the
+ * first pose). The rest is not read. */
 int vg_load_mesh(vg_head *h, const char *operand, vg_err *e) VG_MUST_CHECK;
 
-/* Frames that wait, first in, first out: in memory up to a limit, then in a file without a name in $TMPDIR (or /tmp). */
+/* Frames that wait, first in, first out: in memory up to a limit, then in a file without a name in $TMPDIR (or
+ * /tmp). */
 typedef struct vg_spool vg_spool;
 typedef struct vg_spool_facts {
     uint64_t most_frames; /* that have waited at once */
@@ -887,33 +957,38 @@ typedef struct vg_spool_facts {
 /* vg_spool_new: h says what a frame holds; borrowed until free. limit: bytes of frames in memory. */
 int vg_spool_new(vg_spool **s, const vg_head *h, size_t limit, vg_err *e) VG_MUST_CHECK;
 void vg_spool_free(vg_spool **s);
-/* vg_spool_put: keep a copy of f, all of it. vg_spool_next: 1 and the frame that has waited longest; 0 when none waits. */
+/* vg_spool_put: keep a copy of f, all of it. vg_spool_next: 1 and the frame that has waited longest; 0 when none
+ * waits. */
 int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
 int vg_spool_next(vg_spool *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
 vg_spool_facts vg_spool_get_facts(const vg_spool *s);
 
-/* The door out: one mesh file, a '%04d' pattern, a directory ("out/"), an archive, or one file that holds the whole sequence, told by
- * the name and checked at once; "NAME:ply" chooses what is inside an archive or directory, `format` (may be NULL) overrides.
- * Everything is written under temporary names and takes its final name in vg_sink_end. */
+/* The door out: one mesh file, a '%04d' pattern, a directory ("out/"), an archive, or one file that holds the whole
+ * sequence, told by the name and checked at once; "NAME:ply" chooses what is inside an archive or directory, `format`
+ * (may be NULL) overrides. Everything is written under temporary names and takes its final name in vg_sink_end. */
 typedef struct vg_sink vg_sink;
 typedef struct vg_sink_options {
     const char *format;  /* "obj", "pc2", ...; NULL: told by the name */
     bool full_precision; /* numbers read back to the same binary64, not binary32 */
     long first_number;   /* what %d starts at; 0 */
-    const char *mesh;    /* where the mesh of a file without faces goes; NULL: beside it, NAME.obj, which must not be another mesh */
+    const char *mesh;    /* where the mesh of a file without faces goes; NULL: beside it, NAME.obj, which must not be
+                            another mesh */
     bool no_mesh;        /* nowhere */
     bool drop_loose;     /* leave out the vertices that are in no face */
     size_t most_targets; /* GLB, glTF: morph targets; more frames are mixed from so many. 0: 100 */
 } vg_sink_options;
 /* vg_sink_check: is this a name and format that can be written? To be called before any work. */
 int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;
-int vg_sink_open(vg_sink **s, const char *output, const vg_head *h, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;
-int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK; /* a frame of vertices; arrays take any kind */
+int vg_sink_open(vg_sink **s, const char *output, const vg_head *h, const vg_sink_options *o,
+                 vg_err *e) VG_MUST_CHECK;
+/* a frame of vertices; arrays take any kind */
+int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
 int vg_sink_end(vg_sink *s, vg_err *e) VG_MUST_CHECK;
-/* vg_sink_discard: remove what was written, unless vg_sink_end has given it its names. For the handler of a signal that ends the
- * program: it calls nothing but unlink and rmdir, and leaves the sink as it is. */
+/* vg_sink_discard: remove what was written, unless vg_sink_end has given it its names. For the handler of a signal
+ * that ends the program: it calls nothing but unlink and rmdir, and leaves the sink as it is. */
 void vg_sink_discard(const vg_sink *s);
-/* vg_sink_warning: line number i of what the output does not keep, after vg_sink_end; NULL: no more. Borrowed until close. */
+/* vg_sink_warning: line number i of what the output does not keep, after vg_sink_end; NULL: no more. Borrowed until
+ * close. */
 const char *vg_sink_warning(const vg_sink *s, size_t i);
 void vg_sink_close(vg_sink **s); /* without _end: nothing is left behind */
 
@@ -922,28 +997,32 @@ typedef struct vg_model {
     vg_mesh mesh;
     double *vertices;
     vg_attributes attributes;
-    size_t degenerate; /* triangles left out on reading: two corners were at one place (STL, whose corners have no numbers) */
+    size_t degenerate; /* triangles left out on reading: two corners were at one place (STL, whose corners have no
+                          numbers) */
 } vg_model;
 
 void vg_model_clear(vg_model *m);
 /* vg_model_read: format NULL: told by content, then by the name. name is what messages call it. */
-int vg_model_read(vg_model *m, const void *data, size_t n, const char *format, const char *name, vg_err *e) VG_MUST_CHECK;
+int vg_model_read(vg_model *m, const void *data, size_t n, const char *format, const char *name,
+                  vg_err *e) VG_MUST_CHECK;
 /* vg_model_write: append to out. attributes may be NULL. */
 int vg_model_write(vg_bytes *out, const char *format, const vg_mesh *mesh, const double *vertices,
                    const vg_attributes *attributes, bool full_precision, vg_err *e) VG_MUST_CHECK;
 
 /* ------------------------------------------------------------------------------------------------ view -- */
 
-/* What the colours of a picture say. A sequence for which they say nothing has those of its patches, or is of clay. */
+/* What the colours of a picture say. A sequence for which they say nothing has those of its patches, or is of
+ * clay. */
 typedef enum vg_tint {
     VG_TINT_SCALARS = 0, /* the scalars that frames bring; nothing, when the first of a sequence brings none */
     VG_TINT_ERRORS,      /* the distance of a vertex from its place in a truth, in D */
-    VG_TINT_SCALES,      /* how much longer the vectors of a vertex are than in the reference pose: their geometric mean */
+    VG_TINT_SCALES,      /* how much longer the vectors of a vertex are than in the reference pose: their geometric
+                            mean */
     VG_TINT_PLAIN        /* nothing, not even patches */
 } vg_tint;
 
-/* A contact sheet: evenly spaced frames of a sequence side by side, drawn without display or GPU, as PNG; of several sequences
- * the same frames below one another. */
+/* A contact sheet: evenly spaced frames of a sequence side by side, drawn without display or GPU, as PNG; of several
+ * sequences the same frames below one another. */
 typedef struct vg_sheet vg_sheet;
 typedef struct vg_sheet_options {
     size_t frames;        /* how many are shown, at most: >= 1 */
@@ -957,27 +1036,31 @@ typedef struct vg_sheet_options {
     bool silhouettes;     /* draw the contours of surfaces as lines */
     vg_tint tint;
     bool centred;         /* of errors the shift of the centroid is no part */
-    double scale;         /* the end of the colours: in D, in the unit of the scalars, or a factor > 1; 0: the 99th percentile of what is
-                             shown, rounded up, or the factor 2 */
+    double scale;         /* the end of the colours: in D, in the unit of the scalars, or a factor > 1; 0: the 99th
+                             percentile of what is shown, rounded up, or the factor 2 */
     int threads;
 } vg_sheet_options;
 enum { VG_SHEET_SEQUENCES = 8 };
 
 int vg_sheet_new(vg_sheet **s, const vg_sheet_options *o, vg_err *e) VG_MUST_CHECK;
 void vg_sheet_free(vg_sheet **s);
-/* vg_sheet_sequence: the next sequence, of vertices; all come before the first frame. h is borrowed until free. truth (may be NULL):
- * what its frames are compared with; its reference, and not h's, gives D, place and the height of the ground. */
-int vg_sheet_sequence(vg_sheet *s, const char *label, const vg_head *h, const vg_head *truth, vg_err *e) VG_MUST_CHECK;
-/* vg_sheet_add: the next frame of sequence number i (copied). truth (nv points): what it is compared with; NULL unless the sequence is.
- * Keeps at most 4 * frames + 2 poses of a sequence in binary32, whatever the length, at a stride that is 1 as long as they fit and at
- * most half the spacing of what is shown: the spacing is even to within half a stride at each end. */
+/* vg_sheet_sequence: the next sequence, of vertices; all come before the first frame. h is borrowed until free. truth
+ * (may be NULL): what its frames are compared with; its reference, and not h's, gives D, place and the height of the
+ * ground. */
+int vg_sheet_sequence(vg_sheet *s, const char *label, const vg_head *h, const vg_head *truth,
+                      vg_err *e) VG_MUST_CHECK;
+/* vg_sheet_add: the next frame of sequence number i (copied). truth (nv points): what it is compared with; NULL
+ * unless the sequence is. Keeps at most 4 * frames + 2 poses of a sequence in binary32, whatever the length, at a
+ * stride that is 1 as long as they fit and at most half the spacing of what is shown: the spacing is even to within
+ * half a stride at each end. */
 int vg_sheet_add(vg_sheet *s, size_t i, const vg_frame *f, const double *truth, vg_err *e) VG_MUST_CHECK;
-/* vg_sheet_write: draw what was added and write it to fd (borrowed); `name` is what messages call it. Once. VG_EINPUT when
- * nothing was added, VG_EARG when the sheet would be larger than a PNG can be. A sequence that is shorter stays at its last frame. */
+/* vg_sheet_write: draw what was added and write it to fd (borrowed); `name` is what messages call it. Once. VG_EINPUT
+ * when nothing was added, VG_EARG when the sheet would be larger than a PNG can be. A sequence that is shorter stays
+ * at its last frame. */
 int vg_sheet_write(vg_sheet *s, int fd, const char *name, vg_err *e) VG_MUST_CHECK;
 
-/* A page: one HTML file that plays sequences side by side in a browser, with all that it needs inside. Written as frames come;
- * memory holds 32 frames of each sequence, or as many as fit in 64 MiB, and the names of all. */
+/* A page: one HTML file that plays sequences side by side in a browser, with all that it needs inside. Written as
+ * frames come; memory holds 32 frames of each sequence, or as many as fit in 64 MiB, and the names of all. */
 typedef struct vg_page vg_page;
 typedef struct vg_page_options {
     const char *title;           /* UTF-8; borrowed until free, as are the labels */
@@ -1003,8 +1086,8 @@ int vg_page_new(vg_page **p, int fd, const char *name, const vg_page_options *o,
 void vg_page_free(vg_page **p);
 /* vg_page_sequence: the next sequence, of vertices; all come before the first frame. h is borrowed until free. */
 int vg_page_sequence(vg_page *p, const char *label, const vg_head *h, vg_err *e) VG_MUST_CHECK;
-/* vg_page_add: the next frame of sequence number i. truth (nv points): what it is compared with, the second sequence's frame; NULL: it is
- * not. What has a truth, or scalars, in its first frame must have it in all. */
+/* vg_page_add: the next frame of sequence number i. truth (nv points): what it is compared with, the second
+ * sequence's frame; NULL: it is not. What has a truth, or scalars, in its first frame must have it in all. */
 int vg_page_add(vg_page *p, size_t i, const vg_frame *f, const double *truth, vg_err *e) VG_MUST_CHECK;
 /* vg_page_end: the rest. Without it the page says that it is not whole. VG_EINPUT when a sequence has no frames. */
 int vg_page_end(vg_page *p, vg_page_facts *facts, vg_err *e) VG_MUST_CHECK;

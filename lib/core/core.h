@@ -1,5 +1,5 @@
-/* core.h: what every layer of libvg leans on: memory with checked sizes, growing bytes, threads, byte order, checksums.
- * Internal; nothing here knows a mesh or a file.
+/* core.h: what every layer of libvg leans on: memory with checked sizes, growing bytes, threads, byte order,
+ * checksums. Internal; nothing here knows a mesh or a file.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CORE_H
 #define VG_CORE_H
@@ -8,8 +8,8 @@
 
 #include <string.h>
 
-/* vgi_array: n elements of `size` bytes, zeroed; VG_ENOMEM in *e and NULL when there is no room or n * size overflows.
- * n = 0 gives a valid pointer. Release with free(). */
+/* vgi_array: n elements of `size` bytes, zeroed; VG_ENOMEM in *e and NULL when there is no room or n * size
+ * overflows. n = 0 gives a valid pointer. Release with free(). */
 void *vgi_array(size_t n, size_t size, vg_err *e);
 /* vgi_array_raw: the same, contents undefined. */
 void *vgi_array_raw(size_t n, size_t size, vg_err *e);
@@ -30,19 +30,21 @@ bool vgi_is_utf8(const char *s, size_t n);
 /* vgi_finite: are all n numbers finite? */
 bool vgi_finite(const double *x, size_t n);
 
-/* vgi_parallel: call task(context, i) for i in 0..n-1 from up to `threads` threads, the caller's among them, and wait.
- * Tasks are handed out in order; they must not depend on one another. With one thread it is a loop. */
+/* vgi_parallel: call task(context, i) for i in 0..n-1 from up to `threads` threads, the caller's among them, and
+ * wait. Tasks are handed out in order; they must not depend on one another. With one thread it is a loop. */
 void vgi_parallel(int threads, size_t n, void (*task)(void *context, size_t i), void *context);
 
 /* vgi_frame_scalars: vg_frame_scalars whose numbers are still to be set. */
-int vgi_frame_scalars(vg_frame *f, const char *name, size_t name_bytes, const char *unit, size_t unit_bytes, size_t nv,
-                      vg_err *e) VG_MUST_CHECK;
+int vgi_frame_scalars(vg_frame *f, const char *name, size_t name_bytes, const char *unit, size_t unit_bytes,
+                      size_t nv, vg_err *e) VG_MUST_CHECK;
 
-/* vgi_patch_colour: sRGB, far from those of the numbers before and after: hues by the golden ratio, in three shades. */
+/* vgi_patch_colour: sRGB, far from those of the numbers before and after: hues by the golden ratio, in three
+ * shades. */
 static inline void vgi_patch_colour(uint32_t patch, unsigned char rgb[3])
 {
     static const unsigned char light[3] = {230, 190, 250}, dark[3] = {90, 50, 140};
-    unsigned hue = (unsigned)((patch * 0x9e3779b9u) >> 16) * 6, part = hue >> 16, at = hue >> 8 & 255, shade = patch % 3;
+    unsigned hue = (unsigned)((patch * 0x9e3779b9u) >> 16) * 6, part = hue >> 16, at = hue >> 8 & 255,
+             shade = patch % 3;
     unsigned char up = (unsigned char)(dark[shade] + (light[shade] - dark[shade]) * (int)at / 255);
     unsigned char down = (unsigned char)(light[shade] - (light[shade] - dark[shade]) * (int)at / 255);
     const unsigned char of_part[6][3] = {{light[shade], up, dark[shade]}, {down, light[shade], dark[shade]},
@@ -62,7 +64,8 @@ static inline uint64_t vgi_get64(const unsigned char *p)
 }
 static inline void vgi_put32(unsigned char *p, uint32_t x)
 {
-    p[0] = (unsigned char)x, p[1] = (unsigned char)(x >> 8), p[2] = (unsigned char)(x >> 16), p[3] = (unsigned char)(x >> 24);
+    p[0] = (unsigned char)x, p[1] = (unsigned char)(x >> 8), p[2] = (unsigned char)(x >> 16),
+    p[3] = (unsigned char)(x >> 24);
 }
 static inline void vgi_put64(unsigned char *p, uint64_t x)
 {

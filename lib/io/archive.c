@@ -1,5 +1,5 @@
-/* archive.c: mesh files out of archives. Leaves out what the files mean: contents are bytes here; how a compressed file is
- * unpacked (unpack.c) and writing (pack.c).
+/* archive.c: mesh files out of archives. Leaves out what the files mean: contents are bytes here; how a compressed
+ * file is unpacked (unpack.c) and writing (pack.c).
  *
  * Reading lists the names first. When the archive has its mesh files in natural order, as nearly all do, a second
  * pass hands them out one by one; otherwise they are unpacked once into a file without a name. A compressed archive
@@ -16,8 +16,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* A member is in memory as a whole, and as a mesh takes several times its size; the total guards the spool; all three guard
- * the time. */
+/* A member is in memory as a whole, and as a mesh takes several times its size; the total guards the spool; all three
+ * guard the time. */
 const vgi_limits vgi_archive_limits = {
     .member_bytes = (uint64_t)1 << 30, .total_bytes = (uint64_t)64 << 30, .members = (size_t)1 << 21};
 
@@ -136,13 +136,14 @@ static int check_total(const vgi_archive *a, vg_err *e)
 {
     uint64_t seen = a->packed ? a->unpacker.sum->bytes : a->total;
     if (seen <= a->limits.total_bytes) return VG_OK;
-    return vg_fail(e, VG_EINPUT, "'%s' unpacks to more than %llu bytes: allow more with 'vg-encode --max-bytes'", a->name,
-                   (unsigned long long)a->limits.total_bytes);
+    return vg_fail(e, VG_EINPUT, "'%s' unpacks to more than %llu bytes: allow more with 'vg-encode --max-bytes'",
+                   a->name, (unsigned long long)a->limits.total_bytes);
 }
 
 static int too_large(const vgi_archive *a, vg_err *e)
 {
-    return vg_fail(e, VG_EINPUT, "'%s' in '%s' unpacks to more than %llu bytes: allow more with 'vg-encode --max-bytes'",
+    return vg_fail(e, VG_EINPUT,
+                   "'%s' in '%s' unpacks to more than %llu bytes: allow more with 'vg-encode --max-bytes'",
                    (char *)a->path.data, a->name, (unsigned long long)a->limits.member_bytes);
 }
 
@@ -251,7 +252,8 @@ static int check_packed_end(vgi_archive *a, vg_err *e)
         return vg_fail(e, VG_ETRUNC, "'%s' is cut short", a->name);
     if (!vgi_sum_agrees(u->sum, trailer) && !vgi_gzip_parts_whole(&a->file, end))
         return vg_fail(e, VG_EINPUT, "'%s' is damaged: its contents do not agree with its checksum", a->name);
-    if (!vgi_zero_to_end(&a->file, end)) return vg_fail(e, VG_EINPUT, "'%s' is damaged: it goes on behind its end", a->name);
+    if (!vgi_zero_to_end(&a->file, end))
+        return vg_fail(e, VG_EINPUT, "'%s' is damaged: it goes on behind its end", a->name);
     return VG_OK;
 }
 
@@ -285,7 +287,8 @@ static int not_an_archive(const vgi_archive *a, vg_err *e)
     size_t got = 0;
     if (vgi_read_at(a->file.fd, start, sizeof start, a->file.base, &got) == 0 && vgi_is_archive(start, got))
         return vg_fail(e, VG_ETRUNC, "archive '%s' is damaged or cut short", a->name);
-    return vg_fail(e, VG_EINPUT, "cannot tell what '%s' is: no stream, no archive, none of %s; export other kinds as one of them",
+    return vg_fail(e, VG_EINPUT,
+                   "cannot tell what '%s' is: no stream, no archive, none of %s; export other kinds as one of them",
                    a->name, vgi_kinds_read());
 }
 

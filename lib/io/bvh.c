@@ -177,7 +177,8 @@ static int take_name(reading *b, char **name, vg_err *e)
     if (!(*name = vgi_array_raw(2 * n + 1, 1, e))) return VG_ENOMEM;
     to_utf8(start, n, *name);
     if (strlen(*name) <= MOST_NAME) return VG_OK;
-    return vg_fail(e, VG_EINPUT, "%s line %zu: a name is longer than %d bytes", b->subject, line_of(b, start), MOST_NAME);
+    return vg_fail(e, VG_EINPUT, "%s line %zu: a name is longer than %d bytes", b->subject, line_of(b, start),
+                   MOST_NAME);
 }
 
 static char *end_name(const char *parent, vg_err *e)
@@ -616,8 +617,8 @@ static int check_names(const writing *w, vg_err *e)
 {
     for (uint32_t j = 0; j < w->skeleton.njoints; j++)
         if (!is_end_site(w, j) && strlen(w->skeleton.joints[j].name) > MOST_NAME)
-            return vg_fail(e, VG_EINPUT, "cannot write '%s': the name of joint %u is longer than %d bytes", w->out->name,
-                           j, MOST_NAME);
+            return vg_fail(e, VG_EINPUT, "cannot write '%s': the name of joint %u is longer than %d bytes",
+                           w->out->name, j, MOST_NAME);
     return VG_OK;
 }
 

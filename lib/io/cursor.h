@@ -1,5 +1,5 @@
-/* cursor.h: what the files that know the contents of records share (payload.c, payload_rig.c, payload_scal.c): a cursor
- * that takes numbers, lists and texts from a payload, and the same for writing. No other file includes it.
+/* cursor.h: what the files that know the contents of records share (payload.c, payload_rig.c, payload_scal.c): a
+ * cursor that takes numbers, lists and texts from a payload, and the same for writing. No other file includes it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CURSOR_H
 #define VG_CURSOR_H

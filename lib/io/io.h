@@ -9,8 +9,10 @@
 /* ---- input.c: bytes from a descriptor or from memory, with a look ahead ---- */
 
 typedef struct vgi_input vgi_input;
-int vgi_input_fd(vgi_input **in, int fd, bool own, const char *name, vg_err *e) VG_MUST_CHECK; /* own: close it in the end */
-int vgi_input_memory(vgi_input **in, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK; /* borrowed */
+/* own: close it in the end */
+int vgi_input_fd(vgi_input **in, int fd, bool own, const char *name, vg_err *e) VG_MUST_CHECK;
+/* data is borrowed */
+int vgi_input_memory(vgi_input **in, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
 /* vgi_input_file: open a file for reading; VG_ESYS naming it when it cannot be. */
 int vgi_input_file(vgi_input **in, const char *path, vg_err *e) VG_MUST_CHECK;
 void vgi_input_free(vgi_input **in);
@@ -42,12 +44,13 @@ int vgi_write_all(int fd, const void *data, size_t n, const char *name, vg_err *
 
 /* ---- number.c: numbers as text, whatever the locale ---- */
 
-/* vgi_parse_double: the number at the start of [s, end): decimal, exponent, sign; "nan" and "inf" are read as such. The
- * result is correctly rounded. Returns the first byte behind it, or NULL when there is none. */
+/* vgi_parse_double: the number at the start of [s, end): decimal, exponent, sign; "nan" and "inf" are read as such.
+ * The result is correctly rounded. Returns the first byte behind it, or NULL when there is none. */
 const char *vgi_parse_double(const char *s, const char *end, double *x);
 /* vgi_parse_int: the same for a decimal integer that fits in int64_t. */
 const char *vgi_parse_int(const char *s, const char *end, int64_t *x);
-/* vgi_print_float: the shortest text that reads back to the same binary32 as (float)x; returns its length, <= 16, no terminator. */
+/* vgi_print_float: the shortest text that reads back to the same binary32 as (float)x; returns its length, <= 16, no
+ * terminator. */
 size_t vgi_print_float(char *to, double x);
 /* vgi_print_double: the same for binary64; at most 25 bytes. */
 size_t vgi_print_double(char *to, double x);
@@ -76,17 +79,21 @@ typedef struct vgi_lines {
 vgi_lines vgi_lines_of(const void *data, size_t n, const char *subject);
 /* vgi_quote: how messages call a file of this name; in `subject`. */
 const char *vgi_quote(const char *name, char subject[VGI_SUBJECT]);
-/* vgi_lines_next: the next line that says something; false at the end. Blanks are space, tab, CR, comma and semicolon. */
+/* vgi_lines_next: the next line that says something; false at the end. Blanks are space, tab, CR, comma and
+ * semicolon. */
 bool vgi_lines_next(vgi_lines *t, vgi_line *l);
 /* vgi_line_more: the next field at or behind *at, which goes on behind it; for lines of any number of fields. */
 bool vgi_line_more(const vgi_line *l, const char **at, vgi_field *f);
 bool vgi_field_is(const vgi_field *f, const char *word);
 bool vgi_field_number(const vgi_field *f, double *x); /* is it one, and finite? */
 /* A field as what it has to be, or VG_EINPUT naming the line. vertex: `base` is the number of the first one. */
-int vgi_field_vertex(const vgi_lines *t, const vgi_line *l, const vgi_field *f, int base, uint32_t *vertex, vg_err *e) VG_MUST_CHECK;
-int vgi_line_vertex(const vgi_lines *t, const vgi_line *l, size_t field, int base, uint32_t *vertex, vg_err *e) VG_MUST_CHECK;
+int vgi_field_vertex(const vgi_lines *t, const vgi_line *l, const vgi_field *f, int base, uint32_t *vertex,
+                     vg_err *e) VG_MUST_CHECK;
+int vgi_line_vertex(const vgi_lines *t, const vgi_line *l, size_t field, int base, uint32_t *vertex,
+                    vg_err *e) VG_MUST_CHECK;
 int vgi_line_number(const vgi_lines *t, const vgi_line *l, size_t field, double *x, vg_err *e) VG_MUST_CHECK;
-int vgi_line_name(const vgi_lines *t, const vgi_line *l, size_t field, char **name, vg_err *e) VG_MUST_CHECK; /* free it */
+/* free it */
+int vgi_line_name(const vgi_lines *t, const vgi_line *l, size_t field, char **name, vg_err *e) VG_MUST_CHECK;
 
 /* ---- format.c: the table of mesh formats; obj.c ply.c off.c stl.c: one each ---- */
 
@@ -105,7 +112,8 @@ enum { /* what a format keeps of a sequence beside its numbers; of what it does 
 typedef struct vgi_writing {
     const vg_mesh *mesh;
     const double *vertices;
-    const double *shape; /* a pose by which polygons are split, where they must be: the same for all poses of a sequence */
+    const double *shape; /* a pose by which polygons are split, where they must be: the same for all poses of a
+                            sequence */
     const vg_attributes *attributes; /* may be NULL */
     bool full_precision;
     const vg_patches *patches; /* may be NULL: a colour for each face, where the format has them */
@@ -115,9 +123,9 @@ typedef struct vgi_format {
     const char *name;   /* what --format and NAME:format call it */
     const char *suffix; /* ".obj" */
     bool (*sniff)(const unsigned char *data, size_t n); /* does it start like one? (first 4096 bytes or all) */
-    /* read: fill *m, which is empty, from the whole file; on failure the caller clears it. `subject` is how messages call
-     * the file, quotes included: "'a.obj'" or "'b.obj' in 'a.zip'"; they add the line. The model is checked by the caller
-     * with vg_mesh_check; NaN and Inf are refused here. */
+    /* read: fill *m, which is empty, from the whole file; on failure the caller clears it. `subject` is how messages
+     * call the file, quotes included: "'a.obj'" or "'b.obj' in 'a.zip'"; they add the line. The model is checked by
+     * the caller with vg_mesh_check; NaN and Inf are refused here. */
     int (*read)(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e);
     int (*write)(vg_bytes *out, const vgi_writing *w, vg_err *e);
     unsigned keeps; /* VGI_KEEPS_... */
@@ -129,15 +137,15 @@ const vgi_format *vgi_format_by_name(const char *name, size_t n);     /* NULL: n
 const vgi_format *vgi_format_by_suffix(const char *file_name);        /* case does not matter; NULL: none */
 const vgi_format *vgi_format_by_content(const unsigned char *data, size_t n);
 const char *vgi_format_names(void); /* "obj, ply, ..." for messages */
-/* vgi_model_read: vg_model_read for a file that messages call `subject` (quotes included). format NULL: told by content, then
- * by file_name. */
+/* vgi_model_read: vg_model_read for a file that messages call `subject` (quotes included). format NULL: told by
+ * content, then by file_name. */
 int vgi_model_read(vg_model *m, const void *data, size_t n, const vgi_format *format, const char *file_name,
                    const char *subject, vg_err *e) VG_MUST_CHECK;
 
-/* ---- sequence.c: the table of formats whose one file holds a whole sequence; caches.c npy.c npz.c usda.c bvh.c ... ---- */
+/* ---- sequence.c: the table of formats whose one file holds a sequence; caches.c npy.c bvh.c ...: each one ---- */
 
-/* The bytes of a file that is being made: collected, and written from byte 0 on of a regular file. What a header says of the
- * whole is set at last, by patching. */
+/* The bytes of a file that is being made: collected, and written from byte 0 on of a regular file. What a header says
+ * of the whole is set at last, by patching. */
 typedef struct vgi_output {
     int fd;
     const char *name; /* what messages call it, borrowed */
@@ -145,50 +153,58 @@ typedef struct vgi_output {
     uint64_t size;    /* of all that was put */
 } vgi_output;
 int vgi_output_put(vgi_output *o, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
-int vgi_output_patch(vgi_output *o, uint64_t off, const void *data, size_t n, vg_err *e) VG_MUST_CHECK; /* of what was put */
+/* of what was put */
+int vgi_output_patch(vgi_output *o, uint64_t off, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
 int vgi_output_flush(vgi_output *o, vg_err *e) VG_MUST_CHECK;
-int vgi_output_copy(vgi_output *o, int fd, uint64_t n, vg_err *e) VG_MUST_CHECK; /* the first n bytes of a regular file */
+/* the first n bytes of a regular file */
+int vgi_output_copy(vgi_output *o, int fd, uint64_t n, vg_err *e) VG_MUST_CHECK;
 void vgi_output_clear(vgi_output *o);
 
 typedef struct vgi_sequence_format {
     const char *name, *suffix;
     unsigned keeps;
     bool bare; /* a file without faces is read all the same, as points */
-    bool (*sniff)(const unsigned char *data, size_t n); /* the first 4096 bytes or all; NULL: nothing tells it but its name */
+    /* the first 4096 bytes or all; NULL: nothing tells it but its name */
+    bool (*sniff)(const unsigned char *data, size_t n);
 
-    /* Reading. Whatever the file says, memory grows only as bytes arrive: open has the first frame at hand before it gives a
-     * count. open: fill h, which is empty: kind, count, mesh.nv; what the file knows of faces, attributes, skeleton,
-     * reference, reference_name. No faces: they come from beside. No reference: it is the one from there, or the first pose.
-     * The caller checks the mesh. in is borrowed until close; subject is how messages call the file, quotes included,
-     * borrowed too. next: 1 and values of a frame that has been shaped, its time, and its name (left
-     * empty, it is called after the file); 0 when the file is read to its end, nothing behind it. close takes what open made, also
-     * when open failed, and NULL. */
+    /* Reading. Whatever the file says, memory grows only as bytes arrive: open has the first frame at hand before it
+     * gives a count. open: fill h, which is empty: kind, count, mesh.nv; what the file knows of faces, attributes,
+     * skeleton, reference, reference_name. No faces: they come from beside. No reference: it is the one from there,
+     * or the first pose. The caller checks the mesh. in is borrowed until close; subject is how messages call the
+     * file, quotes included, borrowed too. next: 1 and values of a frame that has been shaped, its time, and its name
+     * (left empty, it is called after the file); 0 when the file is read to its end, nothing behind it. close takes
+     * what open made, also when open failed, and NULL. */
     int (*open)(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e); /* NULL: only written */
     int (*next)(void *state, vg_frame *f, vg_err *e);
-    /* join (else NULL): for a file that says by name which joint is meant. Called once before next with the skeleton (there is one)
-     * and reference that the frames are of; open then says nothing of the mesh. `with` is borrowed for the call only. */
+    /* join (else NULL): for a file that says by name which joint is meant. Called once before next with the skeleton
+     * (there is one) and reference that the frames are of; open then says nothing of the mesh. `with` is borrowed for
+     * the call only. */
     int (*join)(void *state, const vg_head *with, vg_err *e);
-    uint64_t (*frames)(const void *state); /* how many the file announces; a single one is called like the file. NULL: unknown */
+    /* how many the file announces; a single one is called like the file. NULL: unknown */
+    uint64_t (*frames)(const void *state);
     void (*close)(void *state);
 
-    /* Writing. kinds: which kinds of frames, 1 << VG_VERTICES and so on. h, o and out are borrowed until release. check (may
-     * be NULL): can this head be written? end comes only after at least one put; the caller flushes. warning (may be NULL):
-     * what was lost, after end; a text that lives in the state, or NULL. */
+    /* Writing. kinds: which kinds of frames, 1 << VG_VERTICES and so on. h, o and out are borrowed until release.
+     * check (may be NULL): can this head be written? end comes only after at least one put; the caller flushes.
+     * warning (may be NULL): what was lost, after end; a text that lives in the state, or NULL. */
     unsigned kinds;
     int (*check)(const vg_head *h, const char *output, vg_err *e);
-    int (*begin)(void **state, const vg_head *h, const vg_sink_options *o, vgi_output *out, vg_err *e); /* NULL: only read */
+    /* NULL: only read */
+    int (*begin)(void **state, const vg_head *h, const vg_sink_options *o, vgi_output *out, vg_err *e);
     int (*put)(void *state, const vg_frame *f, vg_err *e);
     int (*end)(void *state, vg_err *e);
     const char *(*warning)(void *state);
     void (*release)(void *state);
 } vgi_sequence_format;
 
-extern const vgi_sequence_format vgi_sequence_pc2, vgi_sequence_mdd, vgi_sequence_npy, vgi_sequence_npz, vgi_sequence_usda,
-    vgi_sequence_bvh, vgi_sequence_glb, vgi_sequence_gltf, vgi_sequence_skeleton, vgi_sequence_joints;
+extern const vgi_sequence_format vgi_sequence_pc2, vgi_sequence_mdd, vgi_sequence_npy, vgi_sequence_npz,
+    vgi_sequence_usda, vgi_sequence_bvh, vgi_sequence_glb, vgi_sequence_gltf, vgi_sequence_skeleton,
+    vgi_sequence_joints;
 const vgi_sequence_format *vgi_sequence_by_name(const char *name, size_t n);   /* NULL: none */
 const vgi_sequence_format *vgi_sequence_by_suffix(const char *file_name);      /* case does not matter; NULL: none */
 const vgi_sequence_format *vgi_sequence_by_content(const unsigned char *data, size_t n);
-/* vgi_packable: the sequence format, or NULL, of a file that can stand for poses in a directory or archive: it brings its faces. */
+/* vgi_packable: the sequence format, or NULL, of a file that can stand for poses in a directory or archive: it brings
+ * its faces. */
 const vgi_sequence_format *vgi_packable(const char *file_name);
 const char *vgi_sequence_names(void); /* "pc2, mdd, ..." for messages, those that are written */
 const char *vgi_kinds_read(void); /* "OBJ, PLY, ..." for messages: all that is read, but for streams and archives */
@@ -205,12 +221,16 @@ typedef struct vgi_names {
 void vgi_names_clear(vgi_names *names);
 int vgi_names_add(vgi_names *names, const char *s, size_t n, vg_err *e) VG_MUST_CHECK;
 void vgi_names_sort(vgi_names *names); /* in natural order */
-/* vgi_natural_compare: order of names as people expect it: runs of digits by value, the rest by byte; ties by strcmp. */
+/* vgi_natural_compare: order of names as people expect it: runs of digits by value, the rest by byte; ties by
+ * strcmp. */
 int vgi_natural_compare(const char *a, const char *b);
 const char *vgi_base_name(const char *path); /* behind the last '/' */
-bool vgi_has_suffix(const char *name, size_t n, const char *suffix); /* of the first n bytes, with something before it; any case */
-size_t vgi_packed_stem(const char *name);    /* length of name without ".gz" or another suffix of one compressed file */
-/* vgi_pose_name: what a pose from this file is called: "dir/pose1.obj.gz" is "pose1". Valid UTF-8; free it; NULL: no memory. */
+/* of the first n bytes, with something before it; any case */
+bool vgi_has_suffix(const char *name, size_t n, const char *suffix);
+/* length of name without ".gz" or another suffix of one compressed file */
+size_t vgi_packed_stem(const char *name);
+/* vgi_pose_name: what a pose from this file is called: "dir/pose1.obj.gz" is "pose1". Valid UTF-8; free it; NULL: no
+ * memory. */
 char *vgi_pose_name(const char *path, vg_err *e);
 
 /* ---- archive.c, pack.c: files out of archives and into them; with unpack.c, the files that know libarchive ---- */
@@ -226,8 +246,8 @@ extern const vgi_limits vgi_archive_limits; /* what all programs use */
 typedef struct vgi_archive vgi_archive;
 /* vgi_is_archive: does data start like an archive or a compressed file? (first 4096 bytes or all) */
 bool vgi_is_archive(const unsigned char *data, size_t n);
-/* vgi_archive_open: list what is there. fd is a regular file that is read from byte `base` on; it is taken over, also on
- * failure. name is what messages call the archive. VG_EINPUT when there is no mesh file in it. */
+/* vgi_archive_open: list what is there. fd is a regular file that is read from byte `base` on; it is taken over, also
+ * on failure. name is what messages call the archive. VG_EINPUT when there is no mesh file in it. */
 int vgi_archive_open(vgi_archive **a, int fd, int64_t base, const char *name, const vgi_limits *limits,
                      vg_err *e) VG_MUST_CHECK;
 /* vgi_archive_open_for: the same for those members whose path is wanted. */
@@ -240,7 +260,8 @@ void vgi_archive_close(vgi_archive **a);
 typedef struct vgi_packer vgi_packer;
 bool vgi_packer_knows(const char *name, size_t n); /* do the first n bytes of name end like an archive we write? */
 const char *vgi_packer_suffixes(void);             /* ".zip .tar ..." for messages */
-/* vgi_packer_open: the kind is told by the first n bytes of `name`, which is also what messages call it. fd is borrowed. */
+/* vgi_packer_open: the kind is told by the first n bytes of `name`, which is also what messages call it. fd is
+ * borrowed. */
 int vgi_packer_open(vgi_packer **p, int fd, const char *name, size_t n, vg_err *e) VG_MUST_CHECK;
 /* vgi_packer_open_plain: a zip whose members are stored as they are, whatever its name. */
 int vgi_packer_open_plain(vgi_packer **p, int fd, const char *name, vg_err *e) VG_MUST_CHECK;

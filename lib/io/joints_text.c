@@ -1,7 +1,8 @@
-/* joints_text.c: where the joints of a skeleton are over time, a joint of a frame per line: "FRAME BONE X Y Z".
- * The skeleton comes from elsewhere (--mesh). Joints that are not in the file, the ends of bones, go rigidly with the one above them,
- * which is turned as the joints below it ask. A bone without joints below it, whose end lies at the joint of another bone, reaches for
- * that: so a leg for its foot, where animators have the feet hang on the ground. Leaves out how turns are found (model/skeleton.c).
+/* joints_text.c: where the joints of a skeleton are over time, a joint of a frame per line: "FRAME BONE X Y Z". The
+ * skeleton comes from elsewhere (--mesh). Joints that are not in the file, the ends of bones, go rigidly with the one
+ * above them, which is turned as the joints below it ask. A bone without joints below it, whose end lies at the joint
+ * of another bone, reaches for that: so a leg for its foot, where animators have the feet hang on the ground. Leaves
+ * out how turns are found (model/skeleton.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -130,9 +131,11 @@ static void find_aims(reading *b)
     for (size_t j = 0; j < n; j++) b->aim[j] = NONE; /* at first: whether a given joint is below it */
     for (size_t j = 0; j < n; j++)
         if (b->met[j] && b->skeleton.joints[j].parent != NONE) b->aim[b->skeleton.joints[j].parent] = 0;
-    for (size_t j = n; j-- > 0;) { /* children come behind their parents: what those say of themselves is still there */
+    /* children come behind their parents: what those say of themselves is still there */
+    for (size_t j = n; j-- > 0;) {
         uint32_t above = b->skeleton.joints[j].parent;
-        bool free_end = !b->met[j] && b->aim[j] == NONE && !b->skeleton.joints[j].nchannels && above != NONE && b->met[above];
+        bool free_end =
+            !b->met[j] && b->aim[j] == NONE && !b->skeleton.joints[j].nchannels && above != NONE && b->met[above];
         b->aim[j] = free_end && b->aim[above] == NONE ? find_aim(b, j, above) : NONE;
     }
 }
@@ -171,7 +174,8 @@ static int frame_number(const reading *b, int64_t *number, vg_err *e)
     const vgi_field *f = &b->line.at[0];
     const char *next = vgi_parse_int(f->begin, f->end, number);
     if (b->line.n == FIELDS && next == f->end && *number >= 0) return VG_OK;
-    return vg_fail(e, VG_EINPUT, "%s line %zu: a joint is 'FRAME BONE X Y Z', FRAME a number from 0", b->lines.subject, b->line.number);
+    return vg_fail(e, VG_EINPUT, "%s line %zu: a joint is 'FRAME BONE X Y Z', FRAME a number from 0",
+                   b->lines.subject, b->line.number);
 }
 
 static int take_joint(reading *b, double *places, vg_err *e)
@@ -181,15 +185,18 @@ static int take_joint(reading *b, double *places, vg_err *e)
     int shown = f->end - f->begin < SHOWN ? (int)(f->end - f->begin) : SHOWN;
     uint32_t j = find_joint(b, f);
     if (j == NONE)
-        return vg_fail(e, VG_EINPUT, "%s line %zu: the skeleton has no joint '%.*s'", b->lines.subject, l->number, shown, f->begin);
+        return vg_fail(e, VG_EINPUT, "%s line %zu: the skeleton has no joint '%.*s'", b->lines.subject, l->number,
+                       shown, f->begin);
     if (b->met[j] == b->frames + 1)
-        return vg_fail(e, VG_EINPUT, "%s line %zu: joint '%.*s' is there already in this frame", b->lines.subject, l->number, shown,
-                       f->begin);
+        return vg_fail(e, VG_EINPUT, "%s line %zu: joint '%.*s' is there already in this frame", b->lines.subject,
+                       l->number, shown, f->begin);
     if (b->frames && !b->met[j])
-        return vg_fail(e, VG_EINPUT, "%s line %zu: joint '%.*s' is not in the frames before", b->lines.subject, l->number, shown, f->begin);
+        return vg_fail(e, VG_EINPUT, "%s line %zu: joint '%.*s' is not in the frames before", b->lines.subject,
+                       l->number, shown, f->begin);
     b->met[j] = b->frames + 1;
     int r = VG_OK;
-    for (size_t k = 0; r == VG_OK && k < 3; k++) r = vgi_line_number(&b->lines, l, FIRST_NUMBER + k, &places[3 * (size_t)j + k], e);
+    for (size_t k = 0; r == VG_OK && k < 3; k++)
+        r = vgi_line_number(&b->lines, l, FIRST_NUMBER + k, &places[3 * (size_t)j + k], e);
     return r;
 }
 
@@ -201,10 +208,11 @@ static int take_frame(reading *b, vg_frame *f, vg_err *e)
     int r = frame_number(b, &number, e);
     if (r < 0) return r;
     const vgi_field *first = &b->line.at[0];
-    snprintf(name, sizeof name, "%.*s", (int)(first->end - first->begin < 31 ? first->end - first->begin : 31), first->begin);
+    snprintf(name, sizeof name, "%.*s", (int)(first->end - first->begin < 31 ? first->end - first->begin : 31),
+             first->begin);
     if (number <= b->number)
-        return vg_fail(e, VG_EINPUT, "%s line %zu: frame %s comes after frame %lld", b->lines.subject, b->line.number, name,
-                       (long long)b->number);
+        return vg_fail(e, VG_EINPUT, "%s line %zu: frame %s comes after frame %lld", b->lines.subject, b->line.number,
+                       name, (long long)b->number);
     for (next = number; b->waiting && next == number;) {
         if ((r = take_joint(b, f->values, e)) < 0) return r;
         b->waiting = vgi_lines_next(&b->lines, &b->line);
@@ -213,7 +221,8 @@ static int take_frame(reading *b, vg_frame *f, vg_err *e)
     for (size_t j = 0; j < b->skeleton.njoints; j++) {
         bool wanted = b->frames ? b->met[j] > 0 : b->skeleton.joints[j].nchannels > 0;
         if (wanted && b->met[j] <= b->frames)
-            return vg_fail(e, VG_EINPUT, "%s has no joint '%.80s' in frame %s", b->lines.subject, b->skeleton.joints[j].name, name);
+            return vg_fail(e, VG_EINPUT, "%s has no joint '%.80s' in frame %s", b->lines.subject,
+                           b->skeleton.joints[j].name, name);
     }
     b->number = number;
     return vg_frame_rename(f, name, e);
@@ -226,7 +235,8 @@ static int turn_joints(reading *b, vg_frame *f, vg_err *e)
     for (size_t j = 0; j < n; j++) {
         size_t from = b->met[j] ? j : b->aim[j];
         for (size_t k = 0; k < 3 && from != NONE; k++)
-            b->part_places[3 * (size_t)b->place[j] + k] = f->values[3 * from + k] + b->reference[3 * j + k] - b->reference[3 * from + k];
+            b->part_places[3 * (size_t)b->place[j] + k] =
+                f->values[3 * from + k] + b->reference[3 * j + k] - b->reference[3 * from + k];
     }
     vg_joint_fitter_fit(b->fitter, b->part_places, NULL, b->values, &joint);
     vg_skeleton_pose(&b->part, b->values, b->part_places, b->part_turns);
@@ -238,7 +248,8 @@ static int turn_joints(reading *b, vg_frame *f, vg_err *e)
         memcpy(b->turns + 4 * j, turn, 4 * sizeof *turn);
         if (b->met[j]) continue;
         double offset[3];
-        for (size_t k = 0; k < 3; k++) offset[k] = b->reference[3 * j + k] - (alone ? 0 : b->reference[3 * guide + k]);
+        for (size_t k = 0; k < 3; k++)
+            offset[k] = b->reference[3 * j + k] - (alone ? 0 : b->reference[3 * guide + k]);
         vg_quat_apply(turn, offset, f->values + 3 * j);
         for (size_t k = 0; k < 3 && !alone; k++) f->values[3 * j + k] += f->values[3 * guide + k];
     }

@@ -67,7 +67,8 @@ int vgi_field_vertex(const vgi_lines *t, const vgi_line *l, const vgi_field *f, 
 {
     int64_t x;
     if (vgi_parse_int(f->begin, f->end, &x) != f->end)
-        return vg_fail(e, VG_EINPUT, "%s line %zu: '%.*s' is no vertex number", t->subject, l->number, shown(f), f->begin);
+        return vg_fail(e, VG_EINPUT, "%s line %zu: '%.*s' is no vertex number", t->subject, l->number, shown(f),
+                       f->begin);
     if (x < base || x - base >= UINT32_MAX)
         return vg_fail(e, VG_EINPUT, "%s line %zu: there is no vertex %lld: vertices are counted from %d", t->subject,
                        l->number, (long long)x, base);

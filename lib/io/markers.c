@@ -57,7 +57,8 @@ static int take_seed(const vgi_lines *t, const vgi_line *l, int base, vg_seed *s
         if (r == VG_OK) r = vgi_line_number(t, l, 4 + k, &s->weight[k], e);
         /* of a point on or near the triangle; larger ones of both signs could add up to anything */
         if (r == VG_OK && !(s->weight[k] >= -1 && s->weight[k] <= 2))
-            r = vg_fail(e, VG_EINPUT, "%s line %zu: weight %g is not from -1 to 2", t->subject, l->number, s->weight[k]);
+            r = vg_fail(e, VG_EINPUT, "%s line %zu: weight %g is not from -1 to 2", t->subject, l->number,
+                        s->weight[k]);
         sum += s->weight[k];
     }
     if (r < 0) return r;

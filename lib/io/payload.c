@@ -1,6 +1,6 @@
 /* payload.c: what is in each kind of record, both directions side by side (fmt/STREAM.md, section 3).
- * Leaves out skeletons, rigs, patches and maps (payload_rig.c), numbers of vertices (payload_scal.c), record headers and
- * checksums (record.c) and the order of records (stream.c).
+ * Leaves out skeletons, rigs, patches and maps (payload_rig.c), numbers of vertices (payload_scal.c), record headers
+ * and checksums (record.c) and the order of records (stream.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/cursor.h"
 
@@ -28,7 +28,8 @@ int vgi_prov_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     size_t cap = h->nprovenance;
     int r = vgi_grow(&h->provenance, &cap, h->nprovenance + 1, sizeof *h->provenance, e);
     if (r < 0) return r;
-    vg_provenance *v = &h->provenance[h->nprovenance++]; /* counted at once, so that clearing h frees it in any case */
+    /* counted at once, so that clearing h frees it in any case */
+    vg_provenance *v = &h->provenance[h->nprovenance++];
     *v = (vg_provenance){0};
     cursor c = start(p);
     uint32_t nparents = take32(&c), nargs = take32(&c);
@@ -288,7 +289,8 @@ static int check_pairs(const vgi_payload *p, const vg_correspondence *c, vg_err 
             sum += c->weight[i];
         }
         if (!(sum > 1 - 1e-9 && sum < 1 + 1e-9)) return wrong(p, "the weights of a face do not sum to 1", e);
-        if (!(c->distance[f] >= 0 && c->distance[f] < INFINITY) || c->matched[f] > 1) return wrong(p, "a distance or mark is out of range", e);
+        if (!(c->distance[f] >= 0 && c->distance[f] < INFINITY) || c->matched[f] > 1)
+            return wrong(p, "a distance or mark is out of range", e);
     }
     return VG_OK;
 }
@@ -302,10 +304,12 @@ int vgi_corr_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     uint64_t pairs = take64(&c);
     if (c.bad || k->target_nf >= UINT32_MAX || pairs >= UINT32_MAX) return wrong(p, "its counts are out of range", e);
     const unsigned char *first = take_array(&c, (uint64_t)k->target_nf + 1, 4), *source = take_array(&c, pairs, 4);
-    if (c.bad || !take_padding(&c, -(4 * (k->target_nf + 1 + pairs)) & 7)) return wrong(p, "its length and counts do not agree", e);
+    if (c.bad || !take_padding(&c, -(4 * (k->target_nf + 1 + pairs)) & 7))
+        return wrong(p, "its length and counts do not agree", e);
     const unsigned char *weight = take_array(&c, pairs, 8), *distance = take_array(&c, k->target_nf, 8);
     const unsigned char *matched = take_array(&c, k->target_nf, 1);
-    if (c.bad || !take_padding(&c, -k->target_nf & 7) || left(&c)) return wrong(p, "its length and counts do not agree", e);
+    if (c.bad || !take_padding(&c, -k->target_nf & 7) || left(&c))
+        return wrong(p, "its length and counts do not agree", e);
     size_t nf = k->target_nf, n = (size_t)pairs;
     k->first = vgi_array_raw(nf + 1, sizeof *k->first, e), k->source = vgi_array_raw(n, sizeof *k->source, e);
     k->weight = vgi_array_raw(n, sizeof *k->weight, e), k->distance = vgi_array_raw(nf, sizeof *k->distance, e);
@@ -324,7 +328,8 @@ int vgi_corr_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 int vgi_corr_encode(vg_bytes *b, const vg_correspondence *c, vg_err *e)
 {
     size_t pairs = c->first[c->target_nf];
-    const uint64_t head[7] = {c->source_nv, c->source_nf, c->source_digest, c->target_nv, c->target_nf, c->target_digest, pairs};
+    const uint64_t head[7] = {c->source_nv,     c->source_nf, c->source_digest, c->target_nv, c->target_nf,
+                              c->target_digest, pairs};
     int r = VG_OK;
     for (int i = 0; r == VG_OK && i < 7; i++) r = put64(b, head[i], e);
     if (r == VG_OK) r = vgi_indices_encode(b, c->first, c->target_nf + 1, e);
@@ -349,7 +354,8 @@ static int take_pins(cursor *c, vg_frame *f, const vg_head *h, const vgi_payload
 {
     uint32_t n = take32(c), zero = take32(c);
     const unsigned char *pins = take_array(c, n, 4);
-    if (c->bad || zero || n == 0 || !take_padding(c, n % 2 * 4)) return wrong(p, "its list of pins is cut or malformed", e);
+    if (c->bad || zero || n == 0 || !take_padding(c, n % 2 * 4))
+        return wrong(p, "its list of pins is cut or malformed", e);
     int r = vgi_grow(&f->pins, &f->pins_cap, n, sizeof *f->pins, e);
     if (r < 0) return r;
     copy32(f->pins, pins, n);
@@ -380,8 +386,9 @@ static bool has_zero_quaternion(const vg_head *h, const double *values)
     size_t width = vg_kind_width(h->kind);
     for (size_t i = 0; width > 3 && i < h->count; i++) {
         const double *q = values + i * width;
-        bool zero = h->precision == VG_F64 ? q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0
-                                           : (float)q[0] == 0 && (float)q[1] == 0 && (float)q[2] == 0 && (float)q[3] == 0;
+        bool zero = h->precision == VG_F64
+                        ? q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0
+                        : (float)q[0] == 0 && (float)q[1] == 0 && (float)q[2] == 0 && (float)q[3] == 0;
         if (zero) return true;
     }
     return false;
@@ -414,7 +421,8 @@ int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e)
     if (c.bad || (flags & ~(HAS_TIME | HAS_PINS | HAS_TURNS)) || (flags & HAS_PINS && h->kind != VG_VECTORS) ||
         (flags & HAS_TURNS && !may_turn(h)))
         return wrong(&p, "it is too short, or unknown flags are set", e);
-    if (!vgi_finite(&time, 1) || (!(flags & HAS_TIME) && time != 0)) return wrong(&p, "its time is not finite, or set without its flag", e);
+    if (!vgi_finite(&time, 1) || (!(flags & HAS_TIME) && time != 0))
+        return wrong(&p, "its time is not finite, or set without its flag", e);
     const char *name = (const char *)take(&c, n);
     if (!name || !vgi_is_utf8(name, n)) return wrong(&p, "its name is longer than the record, or no UTF-8", e);
     int r = vgi_grow(&f->name, &f->name_cap, (size_t)n + 1, 1, e);
@@ -466,7 +474,8 @@ int vgi_fram_encode(vg_bytes *b, const vg_head *h, const vg_frame *f, vg_err *e)
     int r = check_frame(h, f, e);
     if (r == VG_OK) r = put32(b, (uint32_t)strlen(name), e);
     bool pins = h->kind == VG_VECTORS && f->npins > 0, turns = has_turns(h, f);
-    if (r == VG_OK) r = put32(b, (f->has_time ? HAS_TIME : 0u) | (pins ? HAS_PINS : 0u) | (turns ? HAS_TURNS : 0u), e);
+    if (r == VG_OK)
+        r = put32(b, (f->has_time ? HAS_TIME : 0u) | (pins ? HAS_PINS : 0u) | (turns ? HAS_TURNS : 0u), e);
     if (r == VG_OK) r = put_doubles(b, &time, 1, e);
     if (r == VG_OK) r = vgi_bytes_append(b, name, strlen(name), e);
     if (r == VG_OK) r = put_padding(b, 0, e);
@@ -484,8 +493,8 @@ int vgi_fram_encode(vg_bytes *b, const vg_head *h, const vg_frame *f, vg_err *e)
     return r;
 }
 
-int vgi_values_encode(vg_bytes *b, const double *x, size_t n, vg_precision precision, const void **data, size_t *bytes,
-                      vg_err *e)
+int vgi_values_encode(vg_bytes *b, const double *x, size_t n, vg_precision precision, const void **data,
+                      size_t *bytes, vg_err *e)
 {
     *bytes = n * (size_t)precision;
     *data = x;
@@ -516,7 +525,8 @@ int vgi_fail_decode(vg_failure *f, const vgi_payload *p, const char *stream, vg_
     f->message = f->program ? take_text(&c, take32(&c), p, &r, e) : NULL;
     if (f->message && left(&c)) r = wrong(p, "bytes are left over", e);
     else if (f->message)
-        return vg_fail(e, VG_ETRUNC, "'%s' was cut short: %s failed with status %u: %s", stream, f->program, f->status, f->message);
+        return vg_fail(e, VG_ETRUNC, "'%s' was cut short: %s failed with status %u: %s", stream, f->program,
+                       f->status, f->message);
     vgi_failure_clear(f);
     return r;
 }

@@ -14,8 +14,8 @@ typedef struct vgi_payload {
 
 typedef int vgi_decoder(const vgi_payload *p, vg_head *h, vg_err *e);
 vgi_decoder vgi_prov_decode, vgi_mesh_decode, vgi_texc_decode, vgi_labl_decode, vgi_sele_decode, vgi_link_decode,
-    vgi_anch_decode, vgi_refp_decode, vgi_form_decode, vgi_skel_decode, vgi_corr_decode, vgi_ptch_decode, vgi_rig_decode,
-    vgi_map_decode;
+    vgi_anch_decode, vgi_refp_decode, vgi_form_decode, vgi_skel_decode, vgi_corr_decode, vgi_ptch_decode,
+    vgi_rig_decode, vgi_map_decode;
 
 int vgi_prov_encode(vg_bytes *b, const vg_provenance *p, vg_err *e) VG_MUST_CHECK;
 int vgi_mesh_encode(vg_bytes *b, const vg_mesh *m, vg_err *e) VG_MUST_CHECK;
@@ -36,8 +36,8 @@ int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e)
 /* vgi_fram_encode: everything before the values. */
 int vgi_fram_encode(vg_bytes *b, const vg_head *h, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
 /* vgi_values_encode: n numbers as they lie in the stream: x itself if it already is, else converted into b. */
-int vgi_values_encode(vg_bytes *b, const double *x, size_t n, vg_precision precision, const void **data, size_t *bytes,
-                      vg_err *e) VG_MUST_CHECK;
+int vgi_values_encode(vg_bytes *b, const double *x, size_t n, vg_precision precision, const void **data,
+                      size_t *bytes, vg_err *e) VG_MUST_CHECK;
 
 /* SCAL, which belongs to the frame behind it: vgi_scal_encode is everything before the numbers. */
 int vgi_scal_decode(const vgi_payload *p, const vg_head *h, vg_frame *f, vg_err *e) VG_MUST_CHECK;

@@ -153,7 +153,8 @@ int vgi_ptch_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     uint64_t n = take64(&c);
     size_t nf = h->mesh.nf;
     const unsigned char *of_face = take_array(&c, nf, 4);
-    if (c.bad || !take_padding(&c, nf % 2 * 4) || left(&c)) return wrong(p, "its length does not fit the number of faces", e);
+    if (c.bad || !take_padding(&c, nf % 2 * 4) || left(&c))
+        return wrong(p, "its length does not fit the number of faces", e);
     if (n == 0 || n > UINT32_MAX) return wrong(p, "its count is out of range", e);
     h->patches.of_face = vgi_array_raw(nf, sizeof *h->patches.of_face, e);
     if (!h->patches.of_face) return VG_ENOMEM;
@@ -246,7 +247,8 @@ static int check_map(const vgi_payload *p, const vg_map *m, vg_err *e)
 /* The counts of a map of bones and its rig's. */
 static int check_bones(const vgi_payload *p, const vg_map *m, const vg_rig *g, vg_err *e)
 {
-    if (m->kind == VG_MAP_PATCHES) return m->per_corner == 1 ? VG_OK : wrong(p, "a corner has more than one patch", e);
+    if (m->kind == VG_MAP_PATCHES)
+        return m->per_corner == 1 ? VG_OK : wrong(p, "a corner has more than one patch", e);
     if (!g->nbones) return wrong(p, "a RIG record must come before it", e);
     if (m->n != g->nbones) return wrong(p, "it has not as many bones as the rig", e);
     if (m->per_corner < 1 || m->per_corner > 2) return wrong(p, "a corner must have 1 or 2 bones", e);
@@ -264,11 +266,19 @@ int vgi_map_decode(const vgi_payload *p, vg_head *h, vg_err *e)
         return wrong(p, "its counts are out of range", e);
     if (nv != h->mesh.nv) return wrong(p, "its count does not fit the mesh", e);
     if (kind != VG_MAP_PATCHES && kind != VG_MAP_BONES) return wrong(p, "it is driven by something unknown", e);
-    if ((flags & ~HAS_HOME) || (names && names != n)) return wrong(p, "unknown flags are set, or names are missing", e);
+    if ((flags & ~HAS_HOME) || (names && names != n))
+        return wrong(p, "unknown flags are set, or names are missing", e);
     if (!vgi_finite(&size, 1) || !(size > 0)) return wrong(p, "its size is not positive", e);
     if (kind == VG_MAP_PATCHES && per_corner == 0) per_corner = 1; /* as it was written before there were bones */
-    *m = (vg_map){.n = (size_t)n, .nv = (size_t)nv, .kind = (vg_map_kind)kind, .size = size, .has_home = flags & HAS_HOME,
-                  .njoints = (size_t)joints, .ncorners = (size_t)corners, .per_corner = per_corner, .nheld = (size_t)held};
+    *m = (vg_map){.n = (size_t)n,
+                  .nv = (size_t)nv,
+                  .kind = (vg_map_kind)kind,
+                  .size = size,
+                  .has_home = flags & HAS_HOME,
+                  .njoints = (size_t)joints,
+                  .ncorners = (size_t)corners,
+                  .per_corner = per_corner,
+                  .nheld = (size_t)held};
     int r = check_bones(p, m, &h->rig, e);
     if (r == VG_OK) r = take_map_arrays(&c, m, p, e);
     if (r == VG_OK) r = check_map(p, m, e);

@@ -652,7 +652,8 @@ static int write_body(struct writing *x)
         char *to = room(x, (size_t)(end - first) + 4, MOST_NUMBER);
         if (!to) return VG_ENOMEM;
         if (f < x->nfaces) put_integer(&to, end - first, x->long_list ? 4 : 1, x->encoding, ' ');
-        for (uint32_t c = first; c < end; c++) put_integer(&to, m->vert[c], 4, x->encoding, c + 1 < end || coloured ? ' ' : '\n');
+        for (uint32_t c = first; c < end; c++)
+            put_integer(&to, m->vert[c], 4, x->encoding, c + 1 < end || coloured ? ' ' : '\n');
         if (coloured) {
             unsigned char colour[3];
             vgi_patch_colour(x->w->patches->of_face[f], colour);

@@ -54,7 +54,8 @@ int vgi_record_begin_read(vgi_input *in, vg_err *e)
         return vg_fail(e, VG_EINPUT, "'%s' was damaged by a transfer that changes line ends", name);
     if (r < 0) return r == VG_ETRUNC ? vg_fail(e, r, "'%s' ends inside the stream's first 16 bytes", name) : r;
     if (h[7] != magic[7])
-        return vg_fail(e, VG_EINPUT, "'%s' is a stream of major version '%c': this program reads version 1", name, h[7]);
+        return vg_fail(e, VG_EINPUT, "'%s' is a stream of major version '%c': this program reads version 1", name,
+                       h[7]);
     if (vgi_get32(h + 12)) return vg_fail(e, VG_EINPUT, "'%s': reserved bytes of the file header are not zero", name);
     return VG_OK;
 }
@@ -116,7 +117,8 @@ int vgi_record_read(vgi_input *in, vgi_tally *t, vg_record *r, vg_err *e)
     if (ok == VG_ETRUNC) return cut_short(name, t, "inside record", e);
     if (ok < 0) return ok;
     for (size_t i = 0; i < (size_t)(-length & 7); i++)
-        if (padding[i]) return vg_fail(e, VG_EINPUT, "'%s': the padding of record %llu (%s) is not zero", name, index, r->tag);
+        if (padding[i])
+            return vg_fail(e, VG_EINPUT, "'%s': the padding of record %llu (%s) is not zero", name, index, r->tag);
     if (vgi_get64(h + 16) != XXH64(r->payload.data, (size_t)length, 0))
         return vg_fail(e, VG_EINPUT, "'%s': record %llu (%s) is damaged (checksum)", name, index, r->tag);
     if (!strcmp(r->tag, "END ")) return check_end(in, t, r, e);
@@ -155,7 +157,9 @@ int vgi_record_write(int fd, const char *name, vgi_tally *t, const char *tag, ui
     int n = 0;
     uint64_t length = 0, sum;
     for (size_t i = 0; i < nparts; i++) length += parts[i].size;
-    if (length > longest_payload) return vg_fail(e, VG_EARG, "a %s record of %llu bytes is too large for a stream", tag, (unsigned long long)length);
+    if (length > longest_payload)
+        return vg_fail(e, VG_EARG, "a %s record of %llu bytes is too large for a stream", tag,
+                       (unsigned long long)length);
     if (nparts == 1) {
         sum = XXH64(parts[0].data, parts[0].size, 0);
     } else {

@@ -1,6 +1,7 @@
 /* sequence.c: the table of formats whose one file holds a whole sequence, and the bytes of such a file while it is
  * made.
- * Leaves out the formats themselves (caches.c, npy.c, npz.c, usda.c, skeleton_text.c, ...) and who opens files (source.c, sink.c).
+ * Leaves out the formats themselves (caches.c, npy.c, npz.c, usda.c, skeleton_text.c, ...) and who opens files
+ * (source.c, sink.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -8,9 +9,9 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-static const vgi_sequence_format *const formats[] = {&vgi_sequence_pc2, &vgi_sequence_mdd,  &vgi_sequence_npy,
-                                                     &vgi_sequence_npz, &vgi_sequence_usda, &vgi_sequence_bvh, &vgi_sequence_glb,
-                                                     &vgi_sequence_gltf, &vgi_sequence_skeleton, &vgi_sequence_joints};
+static const vgi_sequence_format *const formats[] = {
+    &vgi_sequence_pc2, &vgi_sequence_mdd, &vgi_sequence_npy,  &vgi_sequence_npz,      &vgi_sequence_usda,
+    &vgi_sequence_bvh, &vgi_sequence_glb, &vgi_sequence_gltf, &vgi_sequence_skeleton, &vgi_sequence_joints};
 enum { FORMATS = sizeof formats / sizeof *formats };
 
 const vgi_sequence_format *vgi_sequence_by_name(const char *name, size_t n)

@@ -294,8 +294,8 @@ static int check_kind(const plan *p, const vg_head *h, const char *output, vg_er
 
 /* ---- temporary files ---- */
 
-/* A file beside t->final under a name that nobody has. mkstemp would do, but for the mode, which is the user's choice (umask).
- * The target knows the name before there is a file, so that vg_sink_discard misses none. */
+/* A file beside t->final under a name that nobody has. mkstemp would do, but for the mode, which is the user's choice
+ * (umask). The target knows the name before there is a file, so that vg_sink_discard misses none. */
 static int create_beside(vg_sink *s, target *t, vg_err *e)
 {
     const char *final = t->final;

@@ -1,5 +1,5 @@
-/* skeleton_text.c: skeletons as people write them, a bone per line: "BONE PARENT HEAD_X HEAD_Y HEAD_Z TAIL_X TAIL_Y TAIL_Z",
- * and joints as groups of mesh vertices: "JOINT PARENT vertices VERTEX VERTEX ...".
+/* skeleton_text.c: skeletons as people write them, a bone per line: "BONE PARENT HEAD_X HEAD_Y HEAD_Z TAIL_X TAIL_Y
+ * TAIL_Z", and joints as groups of mesh vertices: "JOINT PARENT vertices VERTEX VERTEX ...".
  * Leaves out motion (joints_text.c, bvh.c) and where the groups are (who has the mesh knows).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
@@ -76,8 +76,8 @@ static int find_parents(entries *s, const char *subject, vg_err *e)
         const entry *above = b->above ? find_name(sorted, s->n, b->above) : NULL;
         b->parent = above ? (uint32_t)(above - s->at) : NONE;
         if (b->above && !above)
-            r = vg_fail(e, VG_EINPUT, "%s line %zu: '%.80s' hangs on '%.80s', which is not there ('-' for none)", subject, b->line,
-                        b->name, b->above);
+            r = vg_fail(e, VG_EINPUT, "%s line %zu: '%.80s' hangs on '%.80s', which is not there ('-' for none)",
+                        subject, b->line, b->name, b->above);
     }
     free(sorted);
     return r;
@@ -109,7 +109,8 @@ static int order_entries(entries *s, const char *subject, vg_err *e)
     }
     free(first);
     free(next);
-    if (r == VG_OK && met < n) r = vg_fail(e, VG_EINPUT, "%s has joints that hang on themselves, round in a circle", subject);
+    if (r == VG_OK && met < n)
+        r = vg_fail(e, VG_EINPUT, "%s has joints that hang on themselves, round in a circle", subject);
     return r;
 }
 
@@ -131,11 +132,12 @@ static int take_names(const vgi_lines *t, const vgi_line *l, entry *b, vg_err *e
 static int take_bone(const vgi_lines *t, const vgi_line *l, entry *b, vg_err *e)
 {
     if (says_group(l))
-        return vg_fail(e, VG_EINPUT, "%s line %zu names the vertices of a mesh for a joint: it is for vg-fitmap --groups", t->subject,
-                       l->number);
+        return vg_fail(e, VG_EINPUT,
+                       "%s line %zu names the vertices of a mesh for a joint: it is for vg-fitmap --groups",
+                       t->subject, l->number);
     if (l->n != BONE_FIELDS)
-        return vg_fail(e, VG_EINPUT, "%s line %zu: a bone is 'BONE PARENT HEAD_X HEAD_Y HEAD_Z TAIL_X TAIL_Y TAIL_Z'", t->subject,
-                       l->number);
+        return vg_fail(e, VG_EINPUT, "%s line %zu: a bone is 'BONE PARENT HEAD_X HEAD_Y HEAD_Z TAIL_X TAIL_Y TAIL_Z'",
+                       t->subject, l->number);
     int r = take_names(t, l, b, e);
     for (size_t k = 0; r == VG_OK && k < 3; k++) r = vgi_line_number(t, l, FIRST_NUMBER + k, &b->head[k], e);
     for (size_t k = 0; r == VG_OK && k < 3; k++) r = vgi_line_number(t, l, FIRST_NUMBER + 3 + k, &b->tail[k], e);
@@ -164,7 +166,8 @@ static int check_once(const vgi_lines *t, const entry *b, vg_err *e)
 static int take_group(const vgi_lines *t, const vgi_line *l, int base, entry *b, vg_err *e)
 {
     if (l->n < 4 || !says_group(l))
-        return vg_fail(e, VG_EINPUT, "%s line %zu: a joint is 'JOINT PARENT vertices VERTEX VERTEX ...'", t->subject, l->number);
+        return vg_fail(e, VG_EINPUT, "%s line %zu: a joint is 'JOINT PARENT vertices VERTEX VERTEX ...'", t->subject,
+                       l->number);
     int r = take_names(t, l, b, e);
     vgi_field f;
     size_t cap = 0;
@@ -176,7 +179,8 @@ static int take_group(const vgi_lines *t, const vgi_line *l, int base, entry *b,
     return r < 0 ? r : check_once(t, b, e);
 }
 
-/* All lines, in the order of the file, and their order as joints. groups: of the second kind, with this base; else base is -1. */
+/* All lines, in the order of the file, and their order as joints. groups: of the second kind, with this base; else
+ * base is -1. */
 static int take_entries(entries *s, vgi_lines *t, int base, vg_err *e)
 {
     vgi_line l;
@@ -220,7 +224,9 @@ static int add_joint(reading *b, char *name, uint32_t parent, const double at[3]
     *j = (vg_joint){.name = name, .parent = parent};
     memcpy(b->places + 3 * s->njoints++, at, 3 * sizeof *at);
     for (int k = 0; k < 3; k++) j->offset[k] = at[k] - (parent == NONE ? 0 : b->places[3 * (size_t)parent + k]);
-    return vgi_finite(j->offset, 3) ? VG_OK : vg_fail(e, VG_EINPUT, "joint '%.80s' lies beyond all numbers from its parent", name);
+    return vgi_finite(j->offset, 3)
+               ? VG_OK
+               : vg_fail(e, VG_EINPUT, "joint '%.80s' lies beyond all numbers from its parent", name);
 }
 
 static int add_head(reading *b, entry *bone, uint32_t parent, vg_err *e)

@@ -47,7 +47,8 @@ struct vg_source {
     vgi_limits limits;
     bool through;        /* one stream: handed on as it is */
     vg_head head;        /* of the joined sequence; the caller may change it */
-    vg_head own;         /* what frames are measured by: mesh, kind, count; of a skeleton also its joints and reference */
+    vg_head own;         /* what frames are measured by: mesh, kind, count; of a skeleton also its joints and
+                            reference */
     char *own_name;      /* who brought the mesh, quoted for messages; NULL: nobody yet */
     vg_records tail;
     /* the item being read: */
@@ -219,7 +220,8 @@ static int tell_content(item *it, vgi_input *in, vg_err *e)
     const unsigned char *data;
     const vgi_sequence_format *named = it->path ? vgi_sequence_by_suffix(it->path) : NULL;
     size_t n;
-    int r = vgi_input_peek(in, 8, &data, &n, e); /* enough for a stream: who writes one frame by frame is not kept waiting */
+    /* enough for a stream: who writes one frame by frame is not kept waiting */
+    int r = vgi_input_peek(in, 8, &data, &n, e);
     if (r == VG_OK && !vgi_is_stream(data, n)) r = vgi_input_peek(in, 4096, &data, &n, e);
     if (r < 0) return r;
     if (n == 0 && !it->path)
@@ -273,7 +275,8 @@ static int keep_skeleton(vg_source *s, const vg_head *h, vg_err *e)
 {
     if (!h->skeleton.njoints) return VG_OK;
     int r = vg_skeleton_copy(&s->own.skeleton, &h->skeleton, e);
-    if (r == VG_OK && !(s->own.reference = vgi_copy_array(h->reference, 3 * h->mesh.nv, sizeof *h->reference, e))) r = VG_ENOMEM;
+    if (r == VG_OK && !(s->own.reference = vgi_copy_array(h->reference, 3 * h->mesh.nv, sizeof *h->reference, e)))
+        r = VG_ENOMEM;
     return r;
 }
 
@@ -361,7 +364,8 @@ static int check_joins(const vg_source *s, const vg_mesh *next, const char *subj
 {
     int r = vg_mesh_same(&s->own.mesh, s->own_name, next, subject, e);
     size_t n = r < 0 && e ? strlen(e->message) : 0;
-    if (n) snprintf(e->message + n, sizeof e->message - n, ": all poses of a sequence have the same vertices and faces");
+    if (n)
+        snprintf(e->message + n, sizeof e->message - n, ": all poses of a sequence have the same vertices and faces");
     return r;
 }
 
@@ -661,8 +665,8 @@ static int settle_named_mesh(vg_source *s, const char *mesh, vg_err *e)
 }
 
 /* first_only: no more than the first item is wanted, so the others are not even looked at. */
-static int open_source(vg_source **out, const char *const *operands, size_t n, const vg_source_options *o, bool first_only,
-                       vg_err *e)
+static int open_source(vg_source **out, const char *const *operands, size_t n, const vg_source_options *o,
+                       bool first_only, vg_err *e)
 {
     const char *mesh = o ? o->mesh : NULL;
     vg_source *s = *out = vgi_array(1, sizeof *s, e);

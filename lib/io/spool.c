@@ -80,10 +80,17 @@ static bool add(size_t *sum, size_t n, size_t size)
 
 static int measure(const vg_spool *s, const vg_frame *f, front *to, vg_err *e)
 {
-    *to = (front){.bytes = sizeof *to, .name = strlen(f->name), .records = f->extra.n, .pins = f->npins, .turns = f->nturns,
-                  .time = f->time, .has_time = f->has_time, .root = {f->root[0], f->root[1], f->root[2]}};
-    bool ok = add(&to->bytes, to->name, 1) && add(&to->bytes, to->pins, sizeof *f->pins) && add(&to->bytes, to->turns, 4 * sizeof *f->turns) &&
-              add(&to->bytes, s->anchors, sizeof(double)) && add(&to->bytes, s->values, sizeof(double));
+    *to = (front){.bytes = sizeof *to,
+                  .name = strlen(f->name),
+                  .records = f->extra.n,
+                  .pins = f->npins,
+                  .turns = f->nturns,
+                  .time = f->time,
+                  .has_time = f->has_time,
+                  .root = {f->root[0], f->root[1], f->root[2]}};
+    bool ok = add(&to->bytes, to->name, 1) && add(&to->bytes, to->pins, sizeof *f->pins) &&
+              add(&to->bytes, to->turns, 4 * sizeof *f->turns) && add(&to->bytes, s->anchors, sizeof(double)) &&
+              add(&to->bytes, s->values, sizeof(double));
     if (f->has_scalars) {
         to->scalars = s->h->mesh.nv;
         to->scalars_name = strlen(f->scalars_name) + 1, to->scalars_unit = strlen(f->scalars_unit) + 1;
@@ -163,7 +170,8 @@ static int unpack_scalars(const unsigned char *from, const front *head, vg_frame
 {
     const char *name = (const char *)from, *unit = name + head->scalars_name;
     int r = vgi_frame_scalars(f, name, head->scalars_name - 1, unit, head->scalars_unit - 1, head->scalars, e);
-    if (r == VG_OK) take(from + head->scalars_name + head->scalars_unit, f->scalars, head->scalars * sizeof *f->scalars);
+    if (r == VG_OK)
+        take(from + head->scalars_name + head->scalars_unit, f->scalars, head->scalars * sizeof *f->scalars);
     return r;
 }
 

@@ -55,7 +55,8 @@ static void remember_form(vg_reader *r)
 static int keep_unknown(vg_reader *r, vg_record *record, vg_records *list, vg_err *e)
 {
     if (record->flags & VGI_CRITICAL)
-        return vg_fail(e, VG_EINPUT, "'%s' needs a newer version of this program: it has a record '%s' that must be understood",
+        return vg_fail(e, VG_EINPUT,
+                       "'%s' needs a newer version of this program: it has a record '%s' that must be understood",
                        vgi_input_name(r->in), record->tag);
     if (!(record->flags & VGI_COPY_SAFE)) return VG_OK;
     size_t cap = list->n;
@@ -158,7 +159,8 @@ vg_records *vg_reader_tail(vg_reader *r)
 static int read_scalars(const vg_reader *r, const vg_record *record, vg_frame *f, vg_err *e)
 {
     char where[240];
-    snprintf(where, sizeof where, "'%.150s': record SCAL of frame %llu", vgi_input_name(r->in), (unsigned long long)r->frames);
+    snprintf(where, sizeof where, "'%.150s': record SCAL of frame %llu", vgi_input_name(r->in),
+             (unsigned long long)r->frames);
     vgi_payload p = {record->payload.data, record->payload.size, where};
     return vgi_scal_decode(&p, &r->form, f, e);
 }
@@ -267,7 +269,8 @@ static int write_head(vg_writer *w, vg_err *e)
     const bool present[KNOWN] = {false, mesh, mesh && h->attributes.ntex > 0, mesh && h->attributes.nlabels > 0,
                                  mesh && h->has_selection, mesh && h->has_links, mesh && h->nanchors > 0, mesh,
                                  mesh && h->skeleton.njoints > 0, h->correspondence.first != NULL,
-                                 mesh && h->patches.n > 0, mesh && h->rig.skeleton.njoints > 0, mesh && h->map.n > 0, true};
+                                 mesh && h->patches.n > 0, mesh && h->rig.skeleton.njoints > 0, mesh && h->map.n > 0,
+                                 true};
     int r = vgi_record_begin_write(w->fd, w->name, e);
     for (size_t i = 0; r == VG_OK && i < h->nprovenance; i++) {
         w->front.size = 0;

@@ -1,5 +1,5 @@
-/* unpack.c: bytes for libarchive from a range of a file, through its decompressors, and whether a compressed file is whole:
- * libarchive neither compares the checksum of gzip nor looks behind the end of what it unpacked.
+/* unpack.c: bytes for libarchive from a range of a file, through its decompressors, and whether a compressed file is
+ * whole: libarchive neither compares the checksum of gzip nor looks behind the end of what it unpacked.
  * Leaves out archives and their members (archive.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/unpack.h"

@@ -66,8 +66,8 @@ la_ssize_t vgi_unpack_some(vgi_unpacker *u, const void **data);
 /* vgi_unpacker_read: the same as a callback of a second libarchive reader. */
 la_ssize_t vgi_unpacker_read(struct archive *la, void *context, const void **data);
 
-/* vgi_gzip_parts_whole: is the file up to end several gzip streams, each of which agrees with its own trailer? Only asked when
- * it is not one whole stream. */
+/* vgi_gzip_parts_whole: is the file up to end several gzip streams, each of which agrees with its own trailer? Only
+ * asked when it is not one whole stream. */
 bool vgi_gzip_parts_whole(const vgi_tap *file, int64_t end);
 /* vgi_zero_to_end: is there nothing but zeros from there on? */
 bool vgi_zero_to_end(const vgi_tap *file, int64_t from);

@@ -18,7 +18,8 @@ enum { SWEEPS = 50,       /* at most, and they end when no face changes its bran
        NEWTON_STEPS = 20, /* of the smooth field, at most, and in each */
        CG_STEPS = 200 };
 static const double trust = 2.5;        /* see vgi_branch_near: x / sin x for x = 2.15, a turn by 246 degrees */
-static const double sideways = 0.1;     /* how much the axes of faces count for the smooth field, beside their angles */
+/* how much the axes of faces count for the smooth field, beside their angles */
+static const double sideways = 0.1;
 static const double longest_step = 0.3; /* of a vector's coordinate */
 static const double usual = 0.3;        /* a face whose half angle from the field is more than this is an exception */
 
@@ -413,8 +414,14 @@ static int relax(choice *c, vg_err *e)
     size_t nf = c->g->nf;
     double *room = vgi_array_raw(nf, 28 * sizeof *room, e);
     if (!room) return VG_ENOMEM;
-    relaxation r = {.J = room, .weight = room + 9 * nf, .axis = room + 10 * nf, .b = room + 13 * nf, .x = room + 16 * nf,
-                    .r = room + 19 * nf, .p = room + 22 * nf, .Ap = room + 25 * nf};
+    relaxation r = {.J = room,
+                    .weight = room + 9 * nf,
+                    .axis = room + 10 * nf,
+                    .b = room + 13 * nf,
+                    .x = room + 16 * nf,
+                    .r = room + 19 * nf,
+                    .p = room + 22 * nf,
+                    .Ap = room + 25 * nf};
     for (int step = 0; step < NEWTON_STEPS; step++) {
         linearise(c, &r);
         solve_step(c, &r);

@@ -1,6 +1,7 @@
-/* carry.c: deformation transfer between meshes of different connectivity, face by face along a correspondence (MATH 9).
- * Where a face is driven by one face of as many corners, corner follows corner, as between meshes of one connectivity (deform.c): so
- * a mesh paired with itself comes back exactly, bent polygons too. Elsewhere one map of the source faces drives all corners.
+/* carry.c: deformation transfer between meshes of different connectivity, face by face along a correspondence (MATH
+ * 9). Where a face is driven by one face of as many corners, corner follows corner, as between meshes of one
+ * connectivity (deform.c): so a mesh paired with itself comes back exactly, bent polygons too. Elsewhere one map of
+ * the source faces drives all corners.
  * Leaves out how the correspondence is found (register.c) and the loops over corners (carry_kernel.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/carry_kernel.h"
@@ -22,11 +23,13 @@ struct vg_carrier {
     const double *source_reference;
     double ratio;          /* size of the target over that of the source */
     double *p, *q;         /* see vgi_source */
-    unsigned char *slow;   /* per source face: 1: a line segment, 2: no gradient in the reference pose, never drives */
+    unsigned char *slow;   /* per source face: 1: a line segment, 2: no gradient in the reference pose, never
+                              drives */
     double *segment;       /* reference vector of each source face's first corner */
     double *vectors;       /* the target's reference vectors, per corner of its graph */
     vgi_incidence around;  /* of the target, only if there are links */
-    /* target faces that go corner by corner: a graph of them over the source's vertices, and what it gives for eight poses */
+    /* target faces that go corner by corner: a graph of them over the source's vertices, and what it gives for eight
+     * poses */
     size_t ntwins;
     uint32_t *twin;        /* the target faces, ascending; then links between vertices of such faces */
     unsigned char *is_twin; /* per target face */
@@ -57,11 +60,15 @@ static int check_fit(const vg_mesh *source, const vg_correspondence *k, const vg
 {
     vg_mesh t = {target->nv, target->nf - target->nlinks, target->start, target->vert};
     if (k->source_nv != source->nv || k->source_nf != source->nf || k->source_digest != vg_mesh_digest(source))
-        return vg_fail(e, VG_EINPUT, "the correspondence was made for another source: %zu vertices and %zu faces, the sequence "
-                       "has %zu and %zu", k->source_nv, k->source_nf, source->nv, source->nf);
+        return vg_fail(e, VG_EINPUT,
+                       "the correspondence was made for another source: %zu vertices and %zu faces, the sequence "
+                       "has %zu and %zu",
+                       k->source_nv, k->source_nf, source->nv, source->nf);
     if (k->target_nv != t.nv || k->target_nf != t.nf || k->target_digest != vg_mesh_digest(&t))
-        return vg_fail(e, VG_EINPUT, "the correspondence was made for another target: %zu vertices and %zu faces, this one has "
-                       "%zu and %zu", k->target_nv, k->target_nf, t.nv, t.nf);
+        return vg_fail(e, VG_EINPUT,
+                       "the correspondence was made for another target: %zu vertices and %zu faces, this one has "
+                       "%zu and %zu",
+                       k->target_nv, k->target_nf, t.nv, t.nf);
     return VG_OK;
 }
 
@@ -87,7 +94,8 @@ static void measure_source(vg_carrier *c, const double *reference, double *w)
     }
 }
 
-/* Which corner of source face s goes with the first of target face f: the turn of the cycle in which their vectors agree best. */
+/* Which corner of source face s goes with the first of target face f: the turn of the cycle in which their vectors
+ * agree best. */
 static size_t best_turn(const vg_carrier *c, const double *source_reference, size_t s, size_t f)
 {
     const uint32_t *vert = c->source->vert + c->source->start[s];
@@ -97,7 +105,8 @@ static size_t best_turn(const vg_carrier *c, const double *source_reference, siz
     for (size_t turn = 0; turn < r; turn++) {
         double sum = 0; /* the target's vectors sum to 0, so positions do as well as vectors */
         for (size_t i = 0; i < r; i++)
-            for (size_t k = 0; k < 3; k++) sum += t[3 * i + k] * source_reference[3 * (size_t)vert[(i + turn) % r] + k];
+            for (size_t k = 0; k < 3; k++)
+                sum += t[3 * i + k] * source_reference[3 * (size_t)vert[(i + turn) % r] + k];
         if (sum > most) most = sum, best = turn;
     }
     return best;
@@ -120,7 +129,8 @@ static size_t choose_twins(vg_carrier *c)
     return corners;
 }
 
-/* Fill the twins' mesh over the source's vertices; twin_of[v]: the source's vertex for target vertex v, UINT32_MAX: none. */
+/* Fill the twins' mesh over the source's vertices; twin_of[v]: the source's vertex for target vertex v, UINT32_MAX:
+ * none. */
 static void fill_twins(const vg_carrier *c, const double *source_reference, vg_mesh *m, uint32_t *twin_of)
 {
     const vg_graph *g = c->target;
@@ -189,8 +199,9 @@ static int find_twins(vg_carrier *c, const double *source_reference, vg_err *e)
     return result;
 }
 
-int vg_carrier_new(vg_carrier **out, const vg_mesh *source, const double *source_reference, const vg_correspondence *pairs,
-                   const vg_graph *target, const double *target_reference, vg_method method, int threads, vg_err *e)
+int vg_carrier_new(vg_carrier **out, const vg_mesh *source, const double *source_reference,
+                   const vg_correspondence *pairs, const vg_graph *target, const double *target_reference,
+                   vg_method method, int threads, vg_err *e)
 {
     *out = NULL;
     int r = check_fit(source, pairs, target, e);
@@ -349,8 +360,8 @@ static void centre_beside(const vg_carrier *c, uint32_t v, const double *const *
     for (int a = 0; a < 3 && total > 0; a++) centre[a] /= total;
 }
 
-/* A link also takes part in how the source's faces at its ends have moved against each other, beyond the map that they share:
- * eyes move in their sockets. In the target's size. */
+/* A link also takes part in how the source's faces at its ends have moved against each other, beyond the map that
+ * they share: eyes move in their sockets. In the target's size. */
 static void add_drift(const carry_job *j, size_t f, const vgi_map *map)
 {
     const vg_carrier *c = j->c;
@@ -394,8 +405,8 @@ static void follow(const carry_job *j, size_t f)
         }
     }
     finish_mean(&sum, weight);
-    vgi_follow_face(&sum, rigid ? VGI_FOLLOW_RIGID : how[c->method], c->vectors + 3 * begin, g->start[f + 1] - begin, j->out,
-                    3 * begin, j->lanes);
+    vgi_follow_face(&sum, rigid ? VGI_FOLLOW_RIGID : how[c->method], c->vectors + 3 * begin, g->start[f + 1] - begin,
+                    j->out, 3 * begin, j->lanes);
     if (f >= faces) add_drift(j, f, &sum);
 }
 
@@ -416,7 +427,8 @@ static void transfer_twins(const carry_job *j)
     for (size_t k = 0; k < j->lanes; k++)
         for (size_t i = 0; i < c->ntwins; i++) {
             size_t from = c->twins->start[i], n = c->twins->start[i + 1] - from;
-            memcpy(j->out[k] + 3 * (size_t)c->target->start[c->twin[i]], c->twin_vectors[k] + 3 * from, 3 * n * sizeof(double));
+            memcpy(j->out[k] + 3 * (size_t)c->target->start[c->twin[i]], c->twin_vectors[k] + 3 * from,
+                   3 * n * sizeof(double));
         }
 }
 

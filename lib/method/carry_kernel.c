@@ -1,4 +1,5 @@
-/* carry_kernel.c: deformation gradients of polygons, their rotations, and vectors that follow them, in lanes of poses.
+/* carry_kernel.c: deformation gradients of polygons, their rotations, and vectors that follow them, in lanes of
+ * poses.
  * Leaves out which faces drive which (carry.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/carry_kernel.h"
@@ -94,8 +95,8 @@ INLINE void apply(const vgi_map *a, const double *r, vgi_lanes d[3])
     for (int i = 0; i < 3; i++) d[i] = a->m[3 * i] * r[0] + a->m[3 * i + 1] * r[1] + a->m[3 * i + 2] * r[2];
 }
 
-INLINE void follow_face(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out, size_t offset,
-                        size_t lanes)
+INLINE void follow_face(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out,
+                        size_t offset, size_t lanes)
 {
     vgi_map turn = *d;
     if (how != VGI_FOLLOW_GRADIENT) polar(d, &turn);
@@ -109,7 +110,8 @@ INLINE void follow_face(const vgi_map *d, vgi_follow how, const double *vectors,
             apply(d, v, w);
             if (how != VGI_FOLLOW_GRADIENT) {
                 apply(&turn, v, t);
-                vgi_lanes stretch = lane_sqrt((w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) / (length2 > 0 ? length2 : 1));
+                vgi_lanes stretch =
+                    lane_sqrt((w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) / (length2 > 0 ? length2 : 1));
                 for (int i = 0; i < 3; i++) {
                     t[i] *= stretch;
                     w[i] = how == VGI_FOLLOW_BLEND ? 0.5 * (t[i] + w[i]) : t[i];
@@ -132,14 +134,14 @@ AVX2 static void measure_avx2(const vgi_source *s, size_t first, size_t last, vg
     measure_maps(s, first, last, maps, bad);
 }
 
-AVX512 static void follow_avx512(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out,
-                                 size_t offset, size_t lanes)
+AVX512 static void follow_avx512(const vgi_map *d, vgi_follow how, const double *vectors, size_t r,
+                                 double *const *out, size_t offset, size_t lanes)
 {
     follow_face(d, how, vectors, r, out, offset, lanes);
 }
 
-AVX2 static void follow_avx2(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out, size_t offset,
-                             size_t lanes)
+AVX2 static void follow_avx2(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out,
+                             size_t offset, size_t lanes)
 {
     follow_face(d, how, vectors, r, out, offset, lanes);
 }
@@ -169,8 +171,8 @@ void vgi_polar(const vgi_map *a, vgi_map *rotation)
     polar(a, rotation);
 }
 
-void vgi_follow_face(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out, size_t offset,
-                     size_t lanes)
+void vgi_follow_face(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out,
+                     size_t offset, size_t lanes)
 {
 #if defined(__x86_64__)
     if (has_avx512()) return follow_avx512(d, how, vectors, r, out, offset, lanes);

@@ -1,9 +1,9 @@
-/* deform.c: how each vector of a pose has turned and stretched against the reference pose, and the same done to another
- * mesh's vectors (MATH 4 and 5, pose deformation; T 3.3, T 4.2).
+/* deform.c: how each vector of a pose has turned and stretched against the reference pose, and the same done to
+ * another mesh's vectors (MATH 4 and 5, pose deformation; T 3.3, T 4.2).
  *
- * Two ways lead to the same numbers. The kernel (deform_kernel.c) does whole faces in eight poses at once and never forms
- * a quaternion. The scalar way below forms them: for faces with degenerate corners, for line segments, for links, and when
- * quaternions are what is asked for.
+ * Two ways lead to the same numbers. The kernel (deform_kernel.c) does whole faces in eight poses at once and never
+ * forms a quaternion. The scalar way below forms them: for faces with degenerate corners, for line segments, for
+ * links, and when quaternions are what is asked for.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/deform.h"
 #include "method/deform_kernel.h"
@@ -35,7 +35,8 @@ struct vg_deformer {
     vgi_gradient *gradient;
     vgi_gradient_face *gradient_face;
     atomic_uint_fast64_t degenerate, first_face;
-    /* one piece per thread: vectors and quaternions of the largest face (work_scalars numbers), then the kernel's lanes */
+    /* one piece per thread: vectors and quaternions of the largest face (work_scalars numbers), then the kernel's
+     * lanes */
     double *work;
     size_t work_size, work_scalars;
 };
@@ -92,7 +93,8 @@ static void make_unit(double q[4])
     }
 }
 
-/* Deformation of every corner of a face of 3 or more; returns how many were degenerate. w: its vectors in the pose. */
+/* Deformation of every corner of a face of 3 or more; returns how many were degenerate. w: its vectors in the
+ * pose. */
 static size_t measure_polygon(const vg_deformer *d, size_t f, const double *w, double *quaternions)
 {
     uint32_t begin = d->g->start[f];
@@ -102,7 +104,8 @@ static size_t measure_polygon(const vg_deformer *d, size_t f, const double *w, d
     for (size_t i = 0; i < r; i++) {
         double *q = quaternions + 4 * i, now[4], length, before = d->length[begin + i];
         if (!has_normal || before == 0 || !corner_frame(d, w + 3 * i, n, &length, now)) {
-            q[0] = 0; /* to be filled in below; a good corner's Q is never all zero, but its w may be: mark all four */
+            /* to be filled in below; a good corner's Q is never all zero, but its w may be: mark all four */
+            q[0] = 0;
             q[1] = q[2] = q[3] = 0;
             bad++;
             continue;
@@ -123,8 +126,10 @@ static size_t measure_polygon(const vg_deformer *d, size_t f, const double *w, d
     return bad;
 }
 
-/* A 2-vertex face: both corners get the smallest rotation that does it, on top of the turn `base` (a unit quaternion; identity for bones). */
-static size_t measure_segment(const vg_deformer *d, size_t f, const double *w, const double base[4], double *quaternions)
+/* A 2-vertex face: both corners get the smallest rotation that does it, on top of the turn `base` (a unit quaternion;
+ * identity for bones). */
+static size_t measure_segment(const vg_deformer *d, size_t f, const double *w, const double base[4],
+                              double *quaternions)
 {
     uint32_t begin = d->g->start[f];
     double length = norm(w), before = d->length[begin];
@@ -163,15 +168,18 @@ static void face_vectors(const vg_graph *g, size_t f, vg_kind kind, const double
 static const double identity[4] = {1, 0, 0, 0};
 
 /* The deformation of face f (no link) in one pose, scalar way. `w` is workspace of its vectors. */
-static size_t measure_face(const vg_deformer *d, size_t f, vg_kind kind, const double *pose, double *w, double *quaternions)
+static size_t measure_face(const vg_deformer *d, size_t f, vg_kind kind, const double *pose, double *w,
+                           double *quaternions)
 {
     face_vectors(d->g, f, kind, pose, w);
     if (face_size(d->g, f) == 2) return measure_segment(d, f, w, identity, quaternions);
     return measure_polygon(d, f, w, quaternions);
 }
 
-/* The mean turn of the faces around both ends of a link, links left out, of at most ENOUGH corners each. w, q: workspace. */
-static void turn_beside(const vg_deformer *d, size_t link, vg_kind kind, const double *pose, double *w, double *q, double mean[4])
+/* The mean turn of the faces around both ends of a link, links left out, of at most ENOUGH corners each. w, q:
+ * workspace. */
+static void turn_beside(const vg_deformer *d, size_t link, vg_kind kind, const double *pose, double *w, double *q,
+                        double mean[4])
 {
     const vg_graph *g = d->g;
     memset(mean, 0, 4 * sizeof *mean);
@@ -282,7 +290,8 @@ int vg_deformer_new(vg_deformer **d, const vg_graph *g, const double *reference,
     return VG_OK;
 }
 
-int vgi_deformer_of_vectors(vg_deformer **d, const vg_graph *g, const double *vectors, double diagonal, int threads, vg_err *e)
+int vgi_deformer_of_vectors(vg_deformer **d, const vg_graph *g, const double *vectors, double diagonal, int threads,
+                            vg_err *e)
 {
     if (make_deformer(d, g, diagonal, threads, e) < 0) return VG_ENOMEM;
     memcpy((*d)->vector, vectors, 3 * vg_graph_corners(g) * sizeof *vectors);
@@ -402,10 +411,12 @@ static void measure_step(deform_job *j, double *work, size_t first, size_t last)
     vg_deformer *d = j->d;
     for (size_t f = first; f < last; f++)
         for (size_t p = 0; p < j->n; p++)
-            count_degenerate(d, f, measure_any(d, f, j->kind, j->in[p], work, j->out[p] + 4 * (size_t)d->g->start[f]));
+            count_degenerate(d, f,
+                             measure_any(d, f, j->kind, j->in[p], work, j->out[p] + 4 * (size_t)d->g->start[f]));
 }
 
-void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses, double *const *quaternions)
+void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses,
+                         double *const *quaternions)
 {
     deform_job j = {.d = d, .n = n, .kind = kind, .in = poses, .out = quaternions, .step = measure_step};
     run(&j);
@@ -456,11 +467,20 @@ static void transfer_step(deform_job *j, double *work, size_t first, size_t last
         const double *poses[VGI_LANES];
         for (size_t k = 0; k < VGI_LANES; k++) poses[k] = j->in[p + (k < n ? k : n - 1)];
         redo again = {j, work, p};
-        const vgi_transfer t = {.start = d->g->start, .vert = d->g->vert, .poses = poses,
-                                .vertices = j->kind == VG_VERTICES, .method = d->method,
-                                .coordinates = d->coordinates, .gradient = d->gradient, .gradient_face = d->gradient_face,
-                                .shortest2 = d->shortest2, .skip = d->slow, .out = j->out + p, .lanes = n,
-                                .bad = redo_slowly, .context = &again};
+        const vgi_transfer t = {.start = d->g->start,
+                                .vert = d->g->vert,
+                                .poses = poses,
+                                .vertices = j->kind == VG_VERTICES,
+                                .method = d->method,
+                                .coordinates = d->coordinates,
+                                .gradient = d->gradient,
+                                .gradient_face = d->gradient_face,
+                                .shortest2 = d->shortest2,
+                                .skip = d->slow,
+                                .out = j->out + p,
+                                .lanes = n,
+                                .bad = redo_slowly,
+                                .context = &again};
         vgi_transfer_faces(&t, first, last, lanes, d->g->max_corners);
         for (size_t f = first; f < last; f++)
             for (size_t k = 0; k < n && d->slow[f]; k++) transfer_slowly(j, work, f, p + k);

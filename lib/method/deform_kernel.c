@@ -1,9 +1,10 @@
 /* deform_kernel.c: the inner loop of deformation transfer.
  *
- * With the frame F = [u b n] of a corner in the deformed pose and the coordinates k of the target's reference vector in the
- * frame of the source's reference corner, the wanted vector a J r_t = (|d|/|r|) F_d F_r' r_t is |d| (k_u u + k_b b + k_n n),
- * k already divided by |r|: one normalisation, one cross product and three multiply-adds a corner. Poses stand side by side
- * in the lanes of a vector, so nothing has to be shuffled. Leaves out degenerate corners: it only finds them (deform.c).
+ * With the frame F = [u b n] of a corner in the deformed pose and the coordinates k of the target's reference vector
+ * in the frame of the source's reference corner, the wanted vector a J r_t = (|d|/|r|) F_d F_r' r_t is |d| (k_u u +
+ * k_b b + k_n n), k already divided by |r|: one normalisation, one cross product and three multiply-adds a corner.
+ * Poses stand side by side in the lanes of a vector, so nothing has to be shuffled. Leaves out degenerate corners: it
+ * only finds them (deform.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/deform_kernel.h"
 
@@ -11,7 +12,8 @@
 
 #define INLINE static inline __attribute__((always_inline))
 
-/* the face has no normal when |n| <= 1e-12 sum |d|^2, a corner no frame when it stands on its face's normal to 1e-12 */
+/* the face has no normal when |n| <= 1e-12 sum |d|^2, a corner no frame when it stands on its face's normal to
+ * 1e-12 */
 static const double flat2 = 1e-24;
 
 INLINE vgi_lanes lane_sqrt(vgi_lanes a)
@@ -94,7 +96,8 @@ INLINE vgi_mask by_pose(const vgi_transfer *t, uint32_t begin, size_t r, vgi_vec
 }
 
 /* Wanted vectors by the face's deformation gradient, out of w into g. */
-INLINE void by_gradient(const vgi_transfer *t, size_t f, uint32_t begin, size_t r, vgi_vec n, const vgi_vec *w, vgi_vec *g)
+INLINE void by_gradient(const vgi_transfer *t, size_t f, uint32_t begin, size_t r, vgi_vec n, const vgi_vec *w,
+                        vgi_vec *g)
 {
     vgi_vec y[3] = {{{0}, {0}, {0}}, {{0}, {0}, {0}}, {{0}, {0}, {0}}}; /* columns of sum d_k p_k' */
     for (size_t i = 0; i < r; i++)
@@ -158,14 +161,14 @@ INLINE void transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx512f,avx512dq,fma"))) static void transfer_avx512(const vgi_transfer *t, size_t first, size_t last,
-                                                                           vgi_vec *w, vgi_vec *g)
+__attribute__((target("avx512f,avx512dq,fma"))) static void transfer_avx512(const vgi_transfer *t, size_t first,
+                                                                            size_t last, vgi_vec *w, vgi_vec *g)
 {
     transfer_faces(t, first, last, w, g);
 }
 
-__attribute__((target("avx2,fma"))) static void transfer_avx2(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w,
-                                                             vgi_vec *g)
+__attribute__((target("avx2,fma"))) static void transfer_avx2(const vgi_transfer *t, size_t first, size_t last,
+                                                              vgi_vec *w, vgi_vec *g)
 {
     transfer_faces(t, first, last, w, g);
 }
@@ -175,7 +178,8 @@ void vgi_transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi_ve
 {
     vgi_vec *g = w + max_corners + 1;
 #if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) return transfer_avx512(t, first, last, w, g);
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
+        return transfer_avx512(t, first, last, w, g);
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return transfer_avx2(t, first, last, w, g);
 #endif
     transfer_faces(t, first, last, w, g);

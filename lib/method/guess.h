@@ -5,7 +5,8 @@
 
 #include "method/metric.h"
 
-/* One step of the walk: x(vertex of `corner`) = x(vertex of `from`) + w(corner) - w(from), both corners of one face. */
+/* One step of the walk: x(vertex of `corner`) = x(vertex of `from`) + w(corner) - w(from), both corners of one
+ * face. */
 typedef struct vgi_step {
     uint32_t corner, from;
 } vgi_step;
@@ -23,8 +24,10 @@ typedef struct vgi_guesser { /* all borrowed */
     size_t nanchors;         /* 0: one vertex is pinned */
 } vgi_guesser;
 
-/* vgi_guess: x (nv points): the pose that the walk gives, relative to the first anchor or the pinned vertex, so that a pose far from the
- * origin loses no digits. rhs (nv x 3): A G (W* - A' x), what it misses. anchors: nanchors points. space: nv + max_corners. */
-void vgi_guess(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs, vgi_point *space);
+/* vgi_guess: x (nv points): the pose that the walk gives, relative to the first anchor or the pinned vertex, so that
+ * a pose far from the origin loses no digits. rhs (nv x 3): A G (W* - A' x), what it misses. anchors: nanchors
+ * points. space: nv + max_corners. */
+void vgi_guess(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs,
+               vgi_point *space);
 
 #endif

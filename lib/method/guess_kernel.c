@@ -1,7 +1,9 @@
-/* guess_kernel.c: the first guess of a pose, by a walk that adds up vectors, and the right-hand side of what it misses.
+/* guess_kernel.c: the first guess of a pose, by a walk that adds up vectors, and the right-hand side of what it
+ * misses.
  *
- * Both are bound by reading the vectors once. A point is one register, so that a face of r corners costs about a dozen instructions
- * each, and sums at vertices are kept in points, whose last number is not used, so that none is stored across another.
+ * Both are bound by reading the vectors once. A point is one register, so that a face of r corners costs about a
+ * dozen instructions each, and sums at vertices are kept in points, whose last number is not used, so that none is
+ * stored across another.
  * Leaves out the choice of the walk, and the solve: reconstruct.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/guess.h"
@@ -31,10 +33,11 @@ INLINE void walk(const vgi_guesser *s, const double *w, const double *anchors, d
     }
 }
 
-/* What a face of `size` corners misses: G e for e = (w - w0) - (x - x0), e of the first corner being 0. Only differences within
- * a face are formed, so it rounds like vectors. e: room for `size` points. Called with constant sizes, this becomes
- * straight code for triangles and quads. */
-INLINE void add_pull(const vgi_guesser *s, size_t f, size_t size, const double *w, const double *x, vgi_point *e, vgi_point *sum)
+/* What a face of `size` corners misses: G e for e = (w - w0) - (x - x0), e of the first corner being 0. Only
+ * differences within a face are formed, so it rounds like vectors. e: room for `size` points. Called with constant
+ * sizes, this becomes straight code for triangles and quads. */
+INLINE void add_pull(const vgi_guesser *s, size_t f, size_t size, const double *w, const double *x, vgi_point *e,
+                     vgi_point *sum)
 {
     size_t begin = s->g->start[f];
     const uint32_t *vert = s->g->vert + begin;
@@ -59,7 +62,8 @@ INLINE void add_pull(const vgi_guesser *s, size_t f, size_t size, const double *
     z[1] = m->s[1] * y[0] + m->s[3] * y[1] + m->s[4] * y[2];
     z[2] = m->s[2] * y[0] + m->s[4] * y[1] + m->s[5] * y[2];
     for (size_t i = 0; i < size; i++)
-        sum[vert[i]] += m->weight * (e[i] - mean) + plane[3 * i] * z[0] + plane[3 * i + 1] * z[1] + plane[3 * i + 2] * z[2];
+        sum[vert[i]] +=
+            m->weight * (e[i] - mean) + plane[3 * i] * z[0] + plane[3 * i + 1] * z[1] + plane[3 * i + 2] * z[2];
 }
 
 INLINE void fold(const vgi_guesser *s, const double *w, const double *x, vgi_point *sum, double *rhs)
@@ -76,15 +80,16 @@ INLINE void fold(const vgi_guesser *s, const double *w, const double *x, vgi_poi
     for (size_t v = 0; v < g->nv; v++) store(rhs + 3 * v, sum[v]);
 }
 
-INLINE void guess(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs, vgi_point *space)
+INLINE void guess(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs,
+                  vgi_point *space)
 {
     walk(s, w, anchors, x);
     fold(s, w, x, space, rhs);
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx2,fma"))) static void guess_avx2(const vgi_guesser *s, const double *w, const double *anchors, double *x,
-                                                          double *rhs, vgi_point *space)
+__attribute__((target("avx2,fma"))) static void
+guess_avx2(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs, vgi_point *space)
 {
     guess(s, w, anchors, x, rhs, space);
 }
@@ -93,7 +98,8 @@ __attribute__((target("avx2,fma"))) static void guess_avx2(const vgi_guesser *s,
 void vgi_guess(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs, vgi_point *space)
 {
 #if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return guess_avx2(s, w, anchors, x, rhs, space);
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+        return guess_avx2(s, w, anchors, x, rhs, space);
 #endif
     guess(s, w, anchors, x, rhs, space);
 }

@@ -32,7 +32,8 @@ typedef struct segment {
     double *turn;  /* 3 */
     double *rest;  /* 3, if has_rest */
     double *scale; /* 1: half the logarithm */
-    double *drift; /* 3, if has_drift: what turn and stretch do not give, before the turn: degenerate corners, anchors */
+    double *drift; /* 3, if has_drift: what turn and stretch do not give, before the turn: degenerate corners,
+                      anchors */
     bool has_rest, has_drift;
     double root[2][3], middle[2][3]; /* at both keys; middle: of the anchors */
 } segment;
@@ -270,7 +271,8 @@ typedef struct moment {
     const segment *s;
     bool bent;
     double along, drift;
-    double alpha, last_own, beta, first_own; /* weights in A and in B: of the difference, of the segment's own velocity */
+    double alpha, last_own, beta, first_own; /* weights in A and in B: of the difference, of the segment's own
+                                                velocity */
     double length; /* of s in places */
     knot first, last;
     double *vectors, *offsets;

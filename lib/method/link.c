@@ -195,8 +195,8 @@ static uint32_t farthest_around(const struct joining *j, uint32_t a, uint32_t b)
 
 /* From nearest points to a link. When two components move apart a little, a link between points that nearly touch
  * turns and stretches wildly, and what it does means nothing on another body. So a link shorter than the edges beside
- * it ends one edge further on, at the end with the longer edges, and turns about as those edges do. This holds for points
- * that coincide, too: a link without length could never open. */
+ * it ends one edge further on, at the end with the longer edges, and turns about as those edges do. This holds for
+ * points that coincide, too: a link without length could never open. */
 static void place_link(const struct joining *j, const struct edge *edge, uint32_t pair[2])
 {
     uint32_t a = j->vertex[edge->a], b = j->vertex[edge->b];

@@ -1,16 +1,18 @@
 /* map.c: the fit of a map from patch transforms to vertices (T 6.3), by least squares throughout.
  *
- * In pose k patch p moves by A x + t, the best similarity of its vertices. Corner i of patch p has the vector A u_i with the u_i that
- * fits best over the poses, u_i = (sum A' d) / (sum b^2); it is kept as a quaternion, the reference vector's turn and stretch into u_i: the face's own
- * mean turn H against its patch (which minimises sum |A H - F|, F the face's rotation) and the rest by the smallest rotation, so that
- * it serves other bodies. A few vertices near the centres of the patches go where their patch takes them. Both together are reconstructed once for each
- * number of each A and t (map_parts.c).
+ * In pose k patch p moves by A x + t, the best similarity of its vertices. Corner i of patch p has the vector A u_i
+ * with the u_i that fits best over the poses, u_i = (sum A' d) / (sum b^2); it is kept as a quaternion, the reference
+ * vector's turn and stretch into u_i: the face's own mean turn H against its patch (which minimises sum |A H - F|, F
+ * the face's rotation) and the rest by the smallest rotation, so that it serves other bodies. A few vertices near the
+ * centres of the patches go where their patch takes them. Both together are reconstructed once for each number of
+ * each A and t (map_parts.c).
  *
- * What that leaves of the poses is taken up, vertex by vertex, by a ridge regression on the A of the vertex's own patch and of its
- * neighbours: skin between two bones is where patches do not move rigidly.
+ * What that leaves of the poses is taken up, vertex by vertex, by a ridge regression on the A of the vertex's own
+ * patch and of its neighbours: skin between two bones is where patches do not move rigidly.
  *
- * Where only the A are known the t follow from joints, the points that two neighbours move alike, and from what the poses
- * show beyond that: a ridge regression of what joints miss on the A of all patches, as strong as makes it predict left-out poses best.
+ * Where only the A are known the t follow from joints, the points that two neighbours move alike, and from what the
+ * poses show beyond that: a ridge regression of what joints miss on the A of all patches, as strong as makes it
+ * predict left-out poses best.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/map_parts.h"
 #include "method/product.h"
@@ -54,16 +56,19 @@ struct vg_map_fitter {
 
 /* ---- patches ---- */
 
-/* The pieces that patches consist of become the patches; crumbs join the neighbour that they share most vertices with. */
+/* The pieces that patches consist of become the patches; crumbs join the neighbour that they share most vertices
+ * with. */
 static int split_patches(vg_head *h, vg_err *e)
 {
     const vg_mesh *m = &h->mesh;
-    uint32_t *label = h->patches.of_face, *piece = vgi_array(m->nf, sizeof *piece, e), *shared = NULL, (*pair)[2] = NULL;
+    uint32_t *label = h->patches.of_face, *piece = vgi_array(m->nf, sizeof *piece, e), *shared = NULL,
+             (*pair)[2] = NULL;
     size_t n = 0, npairs = 0;
     if (!piece) return VG_ENOMEM;
     int r = vgi_connected_pieces(m->nv, m->nf, m->start, m->vert, label, h->patches.n, piece, &n, e);
     if (r == VG_OK) r = vgi_neighbours(m->nv, m->nf, m->start, m->vert, piece, &pair, &shared, &npairs, e);
-    uint32_t *size = vgi_array(n, sizeof *size, e), *set = vgi_array(n, sizeof *set, e), *best = vgi_array(n, sizeof *best, e);
+    uint32_t *size = vgi_array(n, sizeof *size, e), *set = vgi_array(n, sizeof *set, e),
+             *best = vgi_array(n, sizeof *best, e);
     if (!size || !set || !best) r = VG_ENOMEM;
     if (r == VG_OK && n > h->patches.n) { /* patches that came in one piece each stay as they are, however small */
         for (size_t f = 0; f < m->nf; f++) size[piece[f]]++;
@@ -129,11 +134,13 @@ static int choose_held(vg_map_fitter *f, vg_err *e)
             list[n++] = (candidate){l[0] * l[0] + l[1] * l[1] + l[2] * l[2] + border, v, (uint32_t)p};
         }
         if (n) qsort(list, n, sizeof *list, by_distance);
-        for (size_t i = 0; i < n && i < (want ? want : 1); i++) chosen[f->nheld++] = list[i], used[list[i].vertex] = 1;
+        for (size_t i = 0; i < n && i < (want ? want : 1); i++)
+            chosen[f->nheld++] = list[i], used[list[i].vertex] = 1;
     }
     if (ok) {
         qsort(chosen, f->nheld, sizeof *chosen, by_vertex);
-        f->held = vgi_array(f->nheld, sizeof *f->held, e), f->held_patch = vgi_array(f->nheld, sizeof *f->held_patch, e);
+        f->held = vgi_array(f->nheld, sizeof *f->held, e),
+        f->held_patch = vgi_array(f->nheld, sizeof *f->held_patch, e);
         f->held_pull = vgi_array(3 * f->nheld, sizeof *f->held_pull, e);
         ok = f->held && f->held_patch && f->held_pull;
     }
@@ -163,7 +170,8 @@ static int find_near(vg_map_fitter *f, vg_err *e)
         for (size_t i = 0; i < npairs; i++) {
             if (pair[i][0] != p && pair[i][1] != p) continue;
             size_t at = x->n < NEAR ? x->n++ : shared[i] > weight[NEAR - 1] ? NEAR - 1 : NEAR;
-            for (; at < NEAR && at > 1 && shared[i] > weight[at - 1]; at--) weight[at] = weight[at - 1], x->patch[at] = x->patch[at - 1];
+            for (; at < NEAR && at > 1 && shared[i] > weight[at - 1]; at--)
+                weight[at] = weight[at - 1], x->patch[at] = x->patch[at - 1];
             if (at < NEAR) weight[at] = shared[i], x->patch[at] = pair[i][0] ^ pair[i][1] ^ (uint32_t)p;
         }
     }
@@ -235,7 +243,8 @@ static void measure_patch(void *context, size_t p)
 {
     const adding *a = context;
     size_t n = a->f->shape.n;
-    for (size_t k = 0; k < a->lanes; k++) vgi_shape_measure(&a->f->shape, p, a->poses[k], (vgi_motion *)&a->motion[k * n + p]);
+    for (size_t k = 0; k < a->lanes; k++)
+        vgi_shape_measure(&a->f->shape, p, a->poses[k], (vgi_motion *)&a->motion[k * n + p]);
 }
 
 /* to += A' x */
@@ -341,7 +350,8 @@ static void fit_corners(const vg_map_fitter *f, vg_map *m)
                 u[k] = f->pull[3 * c + k] / f->b2[f->of_face[face]];
                 u2 += u[k] * u[k], r2 += r[k] * r[k];
             }
-            if (r2 > 0 && u2 > 1e-18 * r2) vg_quat_between(turned, u, rest); /* else it has no direction: it turns with its face */
+            /* else it has no direction: it turns with its face */
+            if (r2 > 0 && u2 > 1e-18 * r2) vg_quat_between(turned, u, rest);
             vg_quat_multiply(rest, q, m->corner + 4 * c);
         }
     }
@@ -352,7 +362,8 @@ static double length2(const double x[3])
     return x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
 }
 
-/* The point c that patches i and j move alike: least squares over the poses, near the vertices that they share where the poses do not say. */
+/* The point c that patches i and j move alike: least squares over the poses, near the vertices that they share where
+ * the poses do not say. */
 static void fit_joint(const vg_map_fitter *f, size_t i, size_t j, const double middle[3], double c[3], double *miss)
 {
     static const double firmness = 0.01;
@@ -473,7 +484,8 @@ static bool solve_ridge(ridge *x, double strength)
     return true;
 }
 
-/* The squared error of a pose predicted by the fit of all others: the residual through (I - H)^-1, H = rows S^-1 rows'. */
+/* The squared error of a pose predicted by the fit of all others: the residual through (I - H)^-1, H = rows S^-1
+ * rows'. */
 static double left_out(ridge *x, size_t k)
 {
     size_t w = x->width, n = x->n;
@@ -556,7 +568,8 @@ static void add_block(double *to, size_t stride, const double a[9], const double
         for (size_t j = 0; j < 3; j++) to[i * stride + j] += a[i] * b[j] + a[3 + i] * b[3 + j] + a[6 + i] * b[6 + j];
 }
 
-/* What the map so far gives where `want` has the poses, and the reference pose as one more: then what is missing, and who takes it up. */
+/* What the map so far gives where `want` has the poses, and the reference pose as one more: then what is missing, and
+ * who takes it up. */
 static void skin_patch(void *context, size_t p)
 {
     skinning *x = context;
@@ -610,7 +623,12 @@ static int fit_skin(const vg_map_fitter *f, vg_map *m, vg_err *e)
 static int make_arrays(vg_map *m, const vg_map_fitter *f, vg_err *e)
 {
     size_t n = f->shape.n;
-    *m = (vg_map){.n = n, .nv = f->g->nv, .kind = VG_MAP_PATCHES, .size = 1, .ncorners = vg_graph_corners(f->g), .per_corner = 1,
+    *m = (vg_map){.n = n,
+                  .nv = f->g->nv,
+                  .kind = VG_MAP_PATCHES,
+                  .size = 1,
+                  .ncorners = vg_graph_corners(f->g),
+                  .per_corner = 1,
                   .nheld = f->nheld};
     m->place = vgi_array(n, 3 * n * sizeof *m->place, e);
     m->centre = vgi_copy_array(f->shape.centre, 3 * n, sizeof *m->centre, e);
@@ -620,7 +638,8 @@ static int make_arrays(vg_map *m, const vg_map_fitter *f, vg_err *e)
     m->held = vgi_copy_array(f->held, f->nheld, sizeof *m->held, e);
     m->held_patch = vgi_copy_array(f->held_patch, f->nheld, sizeof *m->held_patch, e);
     m->held_at = vgi_array(3 * f->nheld, sizeof *m->held_at, e);
-    if (!m->place || !m->centre || !m->home_centre || !m->share || !m->corner || !m->held || !m->held_patch || !m->held_at)
+    if (!m->place || !m->centre || !m->home_centre || !m->share || !m->corner || !m->held || !m->held_patch ||
+        !m->held_at)
         return VG_ENOMEM;
     for (size_t p = 0; p < n; p++)
         m->share[p] = (double)(f->shape.first[p + 1] - f->shape.first[p]) / (double)f->shape.first[n];

@@ -28,7 +28,8 @@ int vgi_shape_make(vgi_shape *s, const vg_mesh *m, const vg_patches *patches, co
     s->spread = vgi_array(s->n, sizeof *s->spread, e);
     if (!all || !s->first || !s->centre || !s->spread) goto failed;
     for (size_t f = 0; f < m->nf; f++)
-        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) all[c] = (uint64_t)patches->of_face[f] << 32 | m->vert[c];
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
+            all[c] = (uint64_t)patches->of_face[f] << 32 | m->vert[c];
     if (corners) qsort(all, corners, sizeof *all, by_number);
     for (size_t i = 0; i < corners; i++)
         if (i == 0 || all[i] != all[i - 1]) all[n++] = all[i];
@@ -43,7 +44,8 @@ int vgi_shape_make(vgi_shape *s, const vg_mesh *m, const vg_patches *patches, co
     }
     for (size_t p = 0; p < s->n; p++) {
         if (s->first[p + 1] < s->first[p]) s->first[p + 1] = s->first[p];
-        for (size_t k = 0; k < 3 && s->first[p + 1] > s->first[p]; k++) s->centre[3 * p + k] /= s->first[p + 1] - s->first[p];
+        for (size_t k = 0; k < 3 && s->first[p + 1] > s->first[p]; k++)
+            s->centre[3 * p + k] /= s->first[p + 1] - s->first[p];
         for (size_t i = s->first[p]; i < s->first[p + 1]; i++)
             for (size_t k = 0; k < 3; k++) {
                 double x = points[3 * (size_t)s->member[i] + k] - s->centre[3 * p + k];
@@ -146,7 +148,8 @@ void vgi_cholesky_dense_solve(const double *l, size_t n, double *x, size_t m)
 
 /* ---- joints ---- */
 
-/* Least squares over the joints: t_i - t_j = A_j c - A_i c, all of them; and sum of share (A centre + t) = 0. Linear in the A. */
+/* Least squares over the joints: t_i - t_j = A_j c - A_i c, all of them; and sum of share (A centre + t) = 0. Linear
+ * in the A. */
 int vgi_place_by_joints(const vg_map *m, const double *centre, double *place, vg_err *e)
 {
     size_t n = m->n;
@@ -167,7 +170,8 @@ int vgi_place_by_joints(const vg_map *m, const double *centre, double *place, vg
     for (size_t i = 0; i < n; i++) {
         for (size_t j = 0; j < n; j++) {
             l[i * n + j] += trace * m->share[i] * m->share[j];
-            for (size_t k = 0; k < 3; k++) place[i * 3 * n + 3 * j + k] -= trace * m->share[i] * m->share[j] * centre[3 * j + k];
+            for (size_t k = 0; k < 3; k++)
+                place[i * 3 * n + 3 * j + k] -= trace * m->share[i] * m->share[j] * centre[3 * j + k];
         }
         l[i * n + i] += 1e-13 * trace;
     }
@@ -206,8 +210,8 @@ static size_t find_pair(const uint32_t *pairs, size_t n, uint32_t a, uint32_t b)
     return low < n && pairs[2 * low] == a && pairs[2 * low + 1] == b ? low : n;
 }
 
-int vgi_joint_points(const vg_graph *g, const uint32_t *of_face, const uint32_t *pairs, size_t n, const double *points, double *mean,
-                     vg_err *e)
+int vgi_joint_points(const vg_graph *g, const uint32_t *of_face, const uint32_t *pairs, size_t n,
+                     const double *points, double *mean, vg_err *e)
 {
     vgi_incidence around;
     double *weight = vgi_array(n, sizeof *weight, e);
@@ -241,7 +245,8 @@ int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *
         double *row = place + b * width;
         if (b) memcpy(row, place + parent[b] * width, width * sizeof *row);
         else memset(row, 0, width * sizeof *row);
-        for (size_t k = 0; b && k < 3; k++) row[3 * parent[b] + k] += m->centre[3 * b + k] - m->centre[3 * (size_t)parent[b] + k];
+        for (size_t k = 0; b && k < 3; k++)
+            row[3 * parent[b] + k] += m->centre[3 * b + k] - m->centre[3 * (size_t)parent[b] + k];
         for (size_t i = 0; i < width; i++) mean[i] += m->share[b] * row[i];
     }
     for (size_t b = 0; code == VG_OK && b < n; b++) {
@@ -265,7 +270,8 @@ static double skin_share(const vg_rig *r, size_t v, size_t p)
 }
 
 /* The vectors that transform p alone makes, when it is the identity. */
-static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *of_face, const double *vectors, size_t p, double *wanted)
+static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *of_face, const double *vectors,
+                           size_t p, double *wanted)
 {
     memset(wanted, 0, 3 * vg_graph_corners(g) * sizeof *wanted);
     if (m->kind == VG_MAP_PATCHES) {
@@ -282,8 +288,8 @@ static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *o
     }
 }
 
-/* The links of a map of bones go from where the skin takes one end to where it takes the other. at: of the ends, nv points, or NULL: 1, into
- * number k. */
+/* The links of a map of bones go from where the skin takes one end to where it takes the other. at: of the ends, nv
+ * points, or NULL: 1, into number k. */
 static void link_vectors(const vg_head *h, const vg_graph *g, size_t p, const double *at, size_t k, double *wanted)
 {
     for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
@@ -305,9 +311,10 @@ static double hold_of(const vg_head *h, size_t i, size_t p, const double **at)
     return bones ? skin_share(&h->rig, m->held[i], p) : m->held_patch[i] == p;
 }
 
-/* Wanted vectors and held vertices when only the j-th number of A_p is at work, j = 0 1 2 at once as x y z; or t of three transforms. */
-static void column_input(const vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors, size_t column,
-                         double *wanted, double *anchors)
+/* Wanted vectors and held vertices when only the j-th number of A_p is at work, j = 0 1 2 at once as x y z; or t of
+ * three transforms. */
+static void column_input(const vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors,
+                         size_t column, double *wanted, double *anchors)
 {
     const vg_map *m = &h->map;
     const double *at;
@@ -377,7 +384,8 @@ static void carry_loose(vg_head *h, const vg_graph *g)
     }
 }
 
-int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors, int threads, vg_err *e)
+int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors, int threads,
+                     vg_err *e)
 {
     vg_map *m = &h->map;
     vg_solver *s;
@@ -386,7 +394,8 @@ int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, con
     size_t batch = vg_solver_batch(s), columns = m->n + (m->n + 2) / 3, nv = g->nv;
     double *wanted = vgi_array(3 * vg_graph_corners(g), sizeof *wanted, e);
     double *space = vgi_array(batch, (6 * nv + 3 * m->nheld) * sizeof *space, e);
-    double **x = vgi_array(4 * batch, sizeof *x, e), **rhs = x ? x + batch : NULL, **anchors = x ? x + 2 * batch : NULL;
+    double **x = vgi_array(4 * batch, sizeof *x, e), **rhs = x ? x + batch : NULL,
+           **anchors = x ? x + 2 * batch : NULL;
     free(m->weights);
     m->weights = vgi_array(nv, 4 * m->n * sizeof *m->weights, e);
     if (wanted && space && x && m->weights) {
@@ -399,7 +408,8 @@ int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, con
             size_t n = columns - first < batch ? columns - first : batch;
             for (size_t i = 0; i < n; i++) {
                 column_input(h, g, of_face, vectors, first + i, wanted, anchors[i]);
-                vg_solver_load(s, 1, (const double *const *)&wanted, (const double *const *)anchors + i, x + i, rhs + i);
+                vg_solver_load(s, 1, (const double *const *)&wanted, (const double *const *)anchors + i, x + i,
+                               rhs + i);
             }
             vg_solver_solve(s, n, (const double *const *)rhs, x, (const double *const *)anchors,
                             (const double *const *)(x + 3 * batch));

@@ -13,7 +13,8 @@ typedef struct vgi_shape {
     double *centre, *spread;  /* n points; sums of squared local */
 } vgi_shape;
 
-int vgi_shape_make(vgi_shape *s, const vg_mesh *m, const vg_patches *patches, const double *points, vg_err *e) VG_MUST_CHECK;
+int vgi_shape_make(vgi_shape *s, const vg_mesh *m, const vg_patches *patches, const double *points,
+                   vg_err *e) VG_MUST_CHECK;
 void vgi_shape_clear(vgi_shape *s);
 
 /* A similarity x -> A x + t. */
@@ -30,8 +31,8 @@ static inline void vgi_move_point(const vgi_motion *m, const double x[3], double
     for (int i = 0; i < 3; i++) y[i] = m->a[3 * i] * x[0] + m->a[3 * i + 1] * x[1] + m->a[3 * i + 2] * x[2] + m->t[i];
 }
 
-/* vgi_cholesky_dense: a (n x n, the lower triangle) becomes its factor; false when it is not positive definite. Large ones
- * call BLAS: between vgi_product_begin and _end. */
+/* vgi_cholesky_dense: a (n x n, the lower triangle) becomes its factor; false when it is not positive definite. Large
+ * ones call BLAS: between vgi_product_begin and _end. */
 bool vgi_cholesky_dense(double *a, size_t n);
 /* vgi_cholesky_dense_solve: x (n x m, row-major) := (L L')^-1 x */
 void vgi_cholesky_dense_solve(const double *l, size_t n, double *x, size_t m);
@@ -39,19 +40,20 @@ void vgi_cholesky_dense_solve(const double *l, size_t n, double *x, size_t m);
 /* vgi_place_by_joints: place (n x 3n) of the map from its joints, centres and shares. */
 int vgi_place_by_joints(const vg_map *m, const double *centre, double *place, vg_err *e) VG_MUST_CHECK;
 
-/* vgi_place_by_bones: the same from the skeleton of r, whose joints are at the map's centres: bones keep their lengths. */
+/* vgi_place_by_bones: the same from the skeleton of r, whose joints are at the map's centres: bones keep their
+ * lengths. */
 int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *e) VG_MUST_CHECK;
 
 /* vgi_map_skin_row: the weights of vertex v of a map of bones become those of linear blend skinning by h's rig. */
 void vgi_map_skin_row(vg_head *h, size_t v);
-/* vgi_map_collapse: fill weights from corners, held vertices and the body that h's reference is. of_face: patch of each face of g; NULL for
- * a map of bones. */
+/* vgi_map_collapse: fill weights from corners, held vertices and the body that h's reference is. of_face: patch of
+ * each face of g; NULL for a map of bones. */
 int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors, int threads,
                      vg_err *e) VG_MUST_CHECK;
 /* vgi_graph_patches: patch of each face of g, links too; free(). NULL: no memory. */
 uint32_t *vgi_graph_patches(const vg_head *h, const vg_graph *g, vg_err *e);
 /* vgi_joint_points: the mean of the vertices that both patches of each pair share. pairs ascending. */
-int vgi_joint_points(const vg_graph *g, const uint32_t *of_face, const uint32_t *pairs, size_t n, const double *points, double *mean,
-                     vg_err *e) VG_MUST_CHECK;
+int vgi_joint_points(const vg_graph *g, const uint32_t *of_face, const uint32_t *pairs, size_t n,
+                     const double *points, double *mean, vg_err *e) VG_MUST_CHECK;
 
 #endif

@@ -1,4 +1,5 @@
-/* moments.h: the second moments of a face's vectors, as deformation gradients need them. Small symmetric matrices are xx xy xz yy yz zz.
+/* moments.h: the second moments of a face's vectors, as deformation gradients need them. Small symmetric matrices are
+ * xx xy xz yy yz zz.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_MOMENTS_H
 #define VG_MOMENTS_H
@@ -8,9 +9,8 @@
 /* vgi_unit_normal: Newell's, from the r vectors of a face; false when the face has none. */
 bool vgi_unit_normal(const double *w, size_t r, double n[3]);
 
-/* vgi_gradient_moments: P = (sum r r' + h n n')^-1 with h half the trace of the sum, and q = h P n (MATH 5), n the unit
- * normal; *size: |N|, twice the area; false when the face has no
- * normal or is nearly a line. */
+/* vgi_gradient_moments: P = (sum r r' + h n n')^-1 with h half the trace of the sum, and q = h P n (MATH 5), n the
+ * unit normal; *size: |N|, twice the area; false when the face has no normal or is nearly a line. */
 bool vgi_gradient_moments(const double *w, size_t r, double P[6], double q[3], double *size);
 
 void vgi_symmetric_times(const double a[6], const double x[3], double y[3]);

@@ -1,4 +1,5 @@
-/* play.c: a map at work: transforms of patches or bones measured, placed by joints, interpolated, and turned into vertices by one product.
+/* play.c: a map at work: transforms of patches or bones measured, placed by joints, interpolated, and turned into
+ * vertices by one product.
  * Leaves out fitting (map.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/map_parts.h"
@@ -125,7 +126,8 @@ typedef struct measuring {
 static void measure_some(void *context, size_t task)
 {
     const measuring *x = context;
-    size_t k = task / x->groups, first = task % x->groups * SOME, last = first + SOME < x->p->m->n ? first + SOME : x->p->m->n;
+    size_t k = task / x->groups, first = task % x->groups * SOME,
+           last = first + SOME < x->p->m->n ? first + SOME : x->p->m->n;
     for (size_t i = first; i < last; i++) {
         vgi_motion m;
         double r[9], *to = x->transforms[k] + 7 * i;
@@ -189,7 +191,8 @@ static void placed(const vg_player *p, size_t i, double t[3])
     t[0] = t[1] = t[2] = 0;
     for (size_t j = 0; j < n; j++) {
         const double *a = p->motion + 12 * j;
-        for (int k = 0; k < 3; k++) t[k] += a[3 * k] * g[3 * j] + a[3 * k + 1] * g[3 * j + 1] + a[3 * k + 2] * g[3 * j + 2];
+        for (int k = 0; k < 3; k++)
+            t[k] += a[3 * k] * g[3 * j] + a[3 * k + 1] * g[3 * j + 1] + a[3 * k + 2] * g[3 * j + 2];
     }
 }
 
@@ -221,8 +224,8 @@ static void remember_end(vg_player *p, const double *transforms, double *miss, d
     }
 }
 
-/* The logarithm of b a^-1, that branch of it which is nearest to that of a neighbour: l[1..3] is half the angle, so branches are half
- * turns apart. */
+/* The logarithm of b a^-1, that branch of it which is nearest to that of a neighbour: l[1..3] is half the angle, so
+ * branches are half turns apart. */
 static void difference(const double *a, const double *b, const double *neighbour, double l[4])
 {
     double s = a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + a[3] * a[3], q[4];
@@ -258,9 +261,11 @@ void vg_player_between(vg_player *p, const double *a, const double *b, double t,
     for (size_t i = 0; i < n; i++) {
         double at[3] = {0, 0, 0}, miss[3], turned[3];
         if (!p->m->has_home) placed(p, i, at);
-        for (size_t k = 0; k < 3; k++) miss[k] = p->ends[3 * i + k] + t * (p->ends[3 * n + 3 * i + k] - p->ends[3 * i + k]);
+        for (size_t k = 0; k < 3; k++)
+            miss[k] = p->ends[3 * i + k] + t * (p->ends[3 * n + 3 * i + k] - p->ends[3 * i + k]);
         apply(p->motion + 12 * i, miss, turned);
-        for (size_t k = 0; k < 3; k++) out[7 * i + 4 + k] = at[k] + root_a[k] + t * (root_b[k] - root_a[k]) + turned[k];
+        for (size_t k = 0; k < 3; k++)
+            out[7 * i + 4 + k] = at[k] + root_a[k] + t * (root_b[k] - root_a[k]) + turned[k];
     }
 }
 
@@ -306,10 +311,12 @@ static void play_rows(void *context, size_t task)
 {
     const playing *x = context;
     const vg_player *p = x->p;
-    size_t first = task * ROWS, rows = p->nv - first < ROWS ? p->nv - first : ROWS, width = 4 * p->m->n, stride = 3 * x->n;
+    size_t first = task * ROWS, rows = p->nv - first < ROWS ? p->nv - first : ROWS, width = 4 * p->m->n,
+           stride = 3 * x->n;
     if (p->single) {
         float *c = (float *)p->product + first * stride;
-        vgi_product_single(rows, stride, width, p->weights_single + first * width, width, p->columns, stride, c, stride);
+        vgi_product_single(rows, stride, width, p->weights_single + first * width, width, p->columns, stride, c,
+                           stride);
         for (size_t k = 0; k < x->n; k++) {
             double *to = x->vertices[k] + 3 * first;
             const double *root = x->roots[k];

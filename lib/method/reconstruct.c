@@ -1,16 +1,18 @@
-/* reconstruct.c: a mesh from its vectors: min over V of sum |v(c) - C_f - w*_c|^2 (T 3.7), one factorisation for all poses.
+/* reconstruct.c: a mesh from its vectors: min over V of sum |v(c) - C_f - w*_c|^2 (T 3.7), one factorisation for all
+ * poses.
  *
- * The normal matrix is the sum over faces of I - 11'/r on the face's own vertices (MATH 2): a graph Laplacian with weight
- * 1/r on every pair. A face of many corners would fill r^2/2 entries; there the centroid is an unknown of its own,
- * joined to each corner with weight 1, which has the same minimum (eliminating it gives I - 11'/r back) and r entries.
+ * The normal matrix is the sum over faces of I - 11'/r on the face's own vertices (MATH 2): a graph Laplacian with
+ * weight 1/r on every pair. A face of many corners would fill r^2/2 entries; there the centroid is an unknown of its
+ * own, joined to each corner with weight 1, which has the same minimum (eliminating it gives I - 11'/r back) and r
+ * entries.
  *
- * What is solved for is not V but its difference from a first guess: the pose that one gets by walking from corner to corner along
- * a spanning tree, adding up vectors. Where the vectors are consistent the guess is right to the last digits and the
- * solve has nothing to do; where they are not, it spreads what does not fit. A solve for V itself would lose two to four digits
- * on long meshes, for its rounding errors are those of positions, not of vectors.
+ * What is solved for is not V but its difference from a first guess: the pose that one gets by walking from corner to
+ * corner along a spanning tree, adding up vectors. Where the vectors are consistent the guess is right to the last
+ * digits and the solve has nothing to do; where they are not, it spreads what does not fit. A solve for V itself
+ * would lose two to four digits on long meshes, for its rounding errors are those of positions, not of vectors.
  *
- * Without anchors one vertex is held at 0 and the pose is moved to its root in the end. Leaves out the triangular solves
- * (solve_kernel.c), that guess (guess_kernel.c) and the factorisation (sparse.c).
+ * Without anchors one vertex is held at 0 and the pose is moved to its root in the end. Leaves out the triangular
+ * solves (solve_kernel.c), that guess (guess_kernel.c) and the factorisation (sparse.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/guess.h"
 #include "method/planar.h"
@@ -111,7 +113,8 @@ static int plan_walk(vg_solver *s, vg_err *e)
     s->walk = vgi_array_raw(g->attached, sizeof *s->walk, e);
     size_t head = 0, tail = 0;
     int r = reached && used && queue && s->walk ? VG_OK : VG_ENOMEM;
-    for (size_t i = 0; r == VG_OK && i < s->nanchors; i++) queue[tail++] = s->anchors[i], reached[s->anchors[i]] = true;
+    for (size_t i = 0; r == VG_OK && i < s->nanchors; i++)
+        queue[tail++] = s->anchors[i], reached[s->anchors[i]] = true;
     if (r == VG_OK && s->pinned < g->nv) queue[tail++] = s->pinned, reached[s->pinned] = true;
     while (r == VG_OK && head < tail) {
         uint32_t v = queue[head++];
@@ -128,7 +131,8 @@ static int plan_walk(vg_solver *s, vg_err *e)
         }
     }
     if (r == VG_OK && tail < g->attached)
-        r = vg_fail(e, VG_EINPUT, "the vectors leave %zu vertices in pieces that nothing joins to the rest: a link is missing",
+        r = vg_fail(e, VG_EINPUT,
+                    "the vectors leave %zu vertices in pieces that nothing joins to the rest: a link is missing",
                     g->attached - tail);
     vgi_incidence_clear(&around);
     free(reached);
@@ -265,8 +269,8 @@ static int make_metric(vg_solver *s, const double *reference, vg_err *e)
     return r;
 }
 
-int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
-                  vg_weights weights, int threads, vg_err *e)
+int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, size_t nanchors,
+                  const double *reference, vg_weights weights, int threads, vg_err *e)
 {
     vg_solver *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
@@ -303,7 +307,11 @@ void vg_solver_free(vg_solver **out)
 
 vgi_solver_view vgi_solver_look(const vg_solver *s)
 {
-    return (vgi_solver_view){.g = s->g, .factor = &s->factor, .row = s->row, .rows = s->unknowns, .anchored = s->nanchors > 0,
+    return (vgi_solver_view){.g = s->g,
+                             .factor = &s->factor,
+                             .row = s->row,
+                             .rows = s->unknowns,
+                             .anchored = s->nanchors > 0,
                              .threads = s->threads};
 }
 
@@ -337,8 +345,8 @@ static void load_share(void *context, size_t task)
                   s->spare + task * (s->g->nv + s->g->max_corners));
 }
 
-void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const double *const *anchors, double *const *x,
-                    double *const *rhs)
+void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const double *const *anchors,
+                    double *const *x, double *const *rhs)
 {
     size_t tasks = (size_t)s->threads < n ? (size_t)s->threads : n;
     load_job j = {s, n, tasks ? (n + tasks - 1) / tasks : 0, vectors, anchors, x, rhs};

@@ -1,5 +1,6 @@
-/* rotation_fit.c: the rotation nearest to a matrix: Newton's iteration for the polar decomposition (Higham 1986) where it converges to a
- * rotation, the largest eigenvector of Horn's 4 x 4 matrix (1987) where the matrix is flat, thin or turns things inside out.
+/* rotation_fit.c: the rotation nearest to a matrix: Newton's iteration for the polar decomposition (Higham 1986)
+ * where it converges to a rotation, the largest eigenvector of Horn's 4 x 4 matrix (1987) where the matrix is flat,
+ * thin or turns things inside out.
  * Leaves out what the matrices are made of, but for the rotations of faces.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rotation_fit.h"
@@ -77,7 +78,8 @@ static void newell(const double *w, size_t r, double n[3])
     }
 }
 
-int vgi_turns_make(vgi_turns *t, size_t nf, const uint32_t *start, const uint32_t *vert, const double *reference, vg_err *e)
+int vgi_turns_make(vgi_turns *t, size_t nf, const uint32_t *start, const uint32_t *vert, const double *reference,
+                   vg_err *e)
 {
     *t = (vgi_turns){.start = start, .vert = vert, .nf = nf};
     t->vector = vgi_array(3 * (size_t)start[nf], sizeof *t->vector, e);
@@ -95,7 +97,8 @@ int vgi_turns_make(vgi_turns *t, size_t nf, const uint32_t *start, const uint32_
             }
         newell(w, r, n);
         double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-        for (size_t k = 0; k < 3; k++) t->normal[3 * f + k] = length > 1e-12 * spread ? n[k] / length * (0.5 * spread) : 0;
+        for (size_t k = 0; k < 3; k++)
+            t->normal[3 * f + k] = length > 1e-12 * spread ? n[k] / length * (0.5 * spread) : 0;
     }
     return VG_OK;
 }
@@ -201,13 +204,14 @@ INLINE void measure(const vgi_turns *t, size_t f, const double *const *poses, vg
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx512f,avx512dq,fma"))) static void measure_avx512(const vgi_turns *t, size_t f, const double *const *poses,
-                                                                           vgi_lanes *x)
+__attribute__((target("avx512f,avx512dq,fma"))) static void measure_avx512(const vgi_turns *t, size_t f,
+                                                                           const double *const *poses, vgi_lanes *x)
 {
     measure(t, f, poses, x);
 }
 
-__attribute__((target("avx2,fma"))) static void measure_avx2(const vgi_turns *t, size_t f, const double *const *poses, vgi_lanes *x)
+__attribute__((target("avx2,fma"))) static void measure_avx2(const vgi_turns *t, size_t f, const double *const *poses,
+                                                             vgi_lanes *x)
 {
     measure(t, f, poses, x);
 }
@@ -216,7 +220,8 @@ __attribute__((target("avx2,fma"))) static void measure_avx2(const vgi_turns *t,
 void vgi_turns_measure(const vgi_turns *t, size_t f, const double *const *poses, vgi_lanes rotation[9])
 {
 #if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) return measure_avx512(t, f, poses, rotation);
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
+        return measure_avx512(t, f, poses, rotation);
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return measure_avx2(t, f, poses, rotation);
 #endif
     measure(t, f, poses, rotation);

@@ -1,12 +1,13 @@
-/* rotation_fit.h: the rotation nearest to a 3 x 3 matrix, whatever the matrix is; rotations of faces in eight poses at once.
+/* rotation_fit.h: the rotation nearest to a 3 x 3 matrix, whatever the matrix is; rotations of faces in eight poses
+ * at once.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_ROTATION_FIT_H
 #define VG_ROTATION_FIT_H
 
 #include "core/core.h"
 
-/* vgi_fit_rotation: the rotation R that maximises tr(R'm): for m = sum of d r' that which takes the r nearest to the d. Row-major. Where
- * several do, one that turns least; the identity for 0. */
+/* vgi_fit_rotation: the rotation R that maximises tr(R'm): for m = sum of d r' that which takes the r nearest to the
+ * d. Row-major. Where several do, one that turns least; the identity for 0. */
 void vgi_fit_rotation(const double m[9], double r[9]);
 
 /* What the rotations of faces are measured against. Faces and corners as in a vg_graph. */

@@ -49,7 +49,8 @@ int vg_segmenter_new(vg_segmenter **out, const vg_mesh *m, const double *referen
     s->mesh = m, s->threads = threads, s->width = NARROW;
     int r = vgi_turns_make(&s->turns, m->nf, m->start, m->vert, reference, e);
     size_t n;
-    if (r == VG_OK && !vgi_mul(m->nf, NARROW, &n)) r = vg_fail(e, VG_ENOMEM, "not enough memory for %zu faces", m->nf);
+    if (r == VG_OK && !vgi_mul(m->nf, NARROW, &n))
+        r = vg_fail(e, VG_ENOMEM, "not enough memory for %zu faces", m->nf);
     if (r == VG_OK && !(s->feature = vgi_array(n, sizeof *s->feature, e))) r = VG_ENOMEM;
     if (r < 0) vg_segmenter_free(out);
     return r;
@@ -84,7 +85,8 @@ static void add_chunk(void *context, size_t i)
         float *to = s->feature + f * s->width;
         vgi_turns_measure(&s->turns, f, a->poses, r);
         for (size_t k = 0; k < a->lanes; k++)
-            for (size_t n = 0; n < 9; n++) to[a->at[9 * k + n]] += a->sign[9 * k + n] * (float)(r[n][k] - (n % 4 == 0));
+            for (size_t n = 0; n < 9; n++)
+                to[a->at[9 * k + n]] += a->sign[9 * k + n] * (float)(r[n][k] - (n % 4 == 0));
     }
 }
 
@@ -104,7 +106,8 @@ static int widen(vg_segmenter *s, uint64_t numbers, vg_err *e)
     return VG_OK;
 }
 
-/* The first features have a place of their own; later ones are added to one of them, chosen by chance, with a random sign. */
+/* The first features have a place of their own; later ones are added to one of them, chosen by chance, with a random
+ * sign. */
 int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_err *e)
 {
     int r = widen(s, 9 * ((uint64_t)s->poses + n), e);
@@ -129,7 +132,8 @@ static void cut_down(vg_segmenter *s)
     size_t used = 9 * s->poses < WIDTH ? 9 * s->poses : WIDTH, width = (used + FLOATS - 1) / FLOATS * FLOATS;
     if (width == 0) width = FLOATS;
     if (width >= s->width) return;
-    for (size_t f = 1; f < s->turns.nf; f++) memmove(s->feature + f * width, s->feature + f * s->width, width * sizeof *s->feature);
+    for (size_t f = 1; f < s->turns.nf; f++)
+        memmove(s->feature + f * width, s->feature + f * s->width, width * sizeof *s->feature);
     s->width = width;
 }
 
@@ -177,7 +181,8 @@ static float inner(const float *a, const float *b, size_t n)
     return total;
 }
 
-/* Distances to the centre that was added last; the sum of the nearest ones, chunk by chunk so that it does not depend on threads. */
+/* Distances to the centre that was added last; the sum of the nearest ones, chunk by chunk so that it does not depend
+ * on threads. */
 static void near_chunk(void *context, size_t i)
 {
     clustering *c = context;
@@ -240,7 +245,8 @@ static void assign_chunk(void *context, size_t i)
     clustering *c = context;
     size_t first = i * CHUNK, n = c->n - first < CHUNK ? c->n - first : CHUNK, width = c->s->width;
     float *dot = c->products + i * CHUNK * c->most;
-    vgi_product_single_transposed(n, c->k, width, c->s->feature + first * width, width, c->centre, width, dot, c->most);
+    vgi_product_single_transposed(n, c->k, width, c->s->feature + first * width, width, c->centre, width, dot,
+                                  c->most);
     double sum = 0;
     uint32_t changed = 0;
     for (size_t f = 0; f < n; f++) {
@@ -266,13 +272,15 @@ static void mean_stripe(void *context, size_t i)
     for (size_t m = 0; m < c->nmoved; m++) {
         uint32_t f = c->moved[m], before = c->counted[f];
         const float *x = c->s->feature + f * width + first;
-        double *to = c->total + c->label[f] * width + first, *from = before == NONE ? NULL : c->total + before * width + first;
+        double *to = c->total + c->label[f] * width + first,
+               *from = before == NONE ? NULL : c->total + before * width + first;
         for (size_t j = 0; j < n; j++) to[j] += (double)x[j];
         for (size_t j = 0; from && j < n; j++) from[j] -= (double)x[j];
     }
     for (size_t k = 0; k < c->k; k++) {
         double share = c->sizes[k] ? 1 / (double)c->sizes[k] : 0;
-        for (size_t j = first; j < first + n; j++) c->centre[k * width + j] = (float)(share * c->total[k * width + j]);
+        for (size_t j = first; j < first + n; j++)
+            c->centre[k * width + j] = (float)(share * c->total[k * width + j]);
     }
 }
 
@@ -370,8 +378,8 @@ static int make_clustering(clustering *c, const vg_segmenter *s, size_t most, vg
     c->sizes = vgi_array(most, sizeof *c->sizes, e);
     c->products = vgi_array_raw(chunks(c) * CHUNK, most * sizeof *c->products, e);
     c->chunk_changed = vgi_array(chunks(c), sizeof *c->chunk_changed, e);
-    if (!c->label || !c->nearest || !c->norm || !c->centre || !c->centre_norm || !c->total || !c->counted || !c->moved ||
-        !c->sums || !c->sizes || !c->products || !c->chunk_changed) {
+    if (!c->label || !c->nearest || !c->norm || !c->centre || !c->centre_norm || !c->total || !c->counted ||
+        !c->moved || !c->sums || !c->sizes || !c->products || !c->chunk_changed) {
         clear_clustering(c);
         return VG_ENOMEM;
     }
@@ -385,8 +393,8 @@ static int make_clustering(clustering *c, const vg_segmenter *s, size_t most, vg
 
 /* ---- pieces ---- */
 
-int vgi_connected_pieces(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label, size_t nlabels,
-                         uint32_t *piece, size_t *count, vg_err *e)
+int vgi_connected_pieces(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label,
+                         size_t nlabels, uint32_t *piece, size_t *count, vg_err *e)
 {
     vgi_incidence around;
     int r = vgi_incidence_make(&around, nv, nf, start, vert, e);
@@ -424,8 +432,8 @@ static int by_pair(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-int vgi_neighbours(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label, uint32_t (**pair)[2],
-                   uint32_t **shared, size_t *count, vg_err *e)
+int vgi_neighbours(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label,
+                   uint32_t (**pair)[2], uint32_t **shared, size_t *count, vg_err *e)
 {
     enum { MOST = 32 }; /* labels looked at around one vertex */
     vgi_incidence around;
@@ -472,7 +480,8 @@ int vgi_neighbours(size_t nv, size_t nf, const uint32_t *start, const uint32_t *
     return r;
 }
 
-/* Joining pieces: the pair of neighbours whose union costs the least (Ward 1963), until `k` are left or none has a neighbour. */
+/* Joining pieces: the pair of neighbours whose union costs the least (Ward 1963), until `k` are left or none has a
+ * neighbour. */
 typedef struct joining {
     const vg_segmenter *s;
     size_t n;           /* pieces at the start */
@@ -501,7 +510,8 @@ static void join_pieces(joining *j, size_t k)
         uint32_t a = j->pair[best][0], b = j->pair[best][1];
         double sum = j->size[a] + j->size[b];
         for (size_t i = 0; i < width; i++)
-            j->mean[a * width + i] = (j->size[a] * j->mean[a * width + i] + j->size[b] * j->mean[b * width + i]) / sum;
+            j->mean[a * width + i] =
+                (j->size[a] * j->mean[a * width + i] + j->size[b] * j->mean[b * width + i]) / sum;
         j->size[a] = sum;
         vgi_sets_join(j->set, a, b); /* a < b stays the name of both */
         size_t n = 0;
@@ -534,7 +544,8 @@ static int connect(const vg_segmenter *s, uint32_t *label, size_t nlabels, size_
         vgi_sets_init(j.set, j.n);
         for (size_t f = 0; f < m->nf; f++) {
             j.size[piece[f]]++;
-            for (size_t i = 0; i < s->width; i++) j.mean[piece[f] * s->width + i] += (double)s->feature[f * s->width + i];
+            for (size_t i = 0; i < s->width; i++)
+                j.mean[piece[f] * s->width + i] += (double)s->feature[f * s->width + i];
         }
         for (size_t p = 0; p < j.n; p++)
             for (size_t i = 0; i < s->width; i++) j.mean[p * s->width + i] /= j.size[p];
@@ -612,8 +623,8 @@ static int cut(clustering *c, size_t k, uint64_t seed, bool connected, vg_segmen
     return VG_OK;
 }
 
-int vg_segmenter_cut(vg_segmenter *s, size_t patches, uint64_t seed, bool connected, vg_patches *out, vg_segment_report *report,
-                     vg_err *e)
+int vg_segmenter_cut(vg_segmenter *s, size_t patches, uint64_t seed, bool connected, vg_patches *out,
+                     vg_segment_report *report, vg_err *e)
 {
     static const size_t steps[] = {4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256};
     size_t nsteps = sizeof steps / sizeof *steps;

@@ -13,7 +13,8 @@ struct vg_shaper {
     double *reference;  /* the target's, for vertices in no face */
 };
 
-int vg_shaper_new(vg_shaper **out, const vg_graph *g, const double *source, const double *target, int threads, vg_err *e)
+int vg_shaper_new(vg_shaper **out, const vg_graph *g, const double *source, const double *target, int threads,
+                  vg_err *e)
 {
     size_t corners = vg_graph_corners(g);
     vg_shaper *s = *out = vgi_array(1, sizeof *s, e);
@@ -31,7 +32,8 @@ int vg_shaper_new(vg_shaper **out, const vg_graph *g, const double *source, cons
         for (size_t c = 0; c < corners; c++) {
             const double *r = a + 3 * c, *t = b + 3 * c;
             double *q = s->quaternion + 4 * c;
-            bool has = r[0] * r[0] + r[1] * r[1] + r[2] * r[2] > least * least && (t[0] != 0 || t[1] != 0 || t[2] != 0);
+            bool has =
+                r[0] * r[0] + r[1] * r[1] + r[2] * r[2] > least * least && (t[0] != 0 || t[1] != 0 || t[2] != 0);
             if (has) vg_quat_between(r, t, q);
             else q[0] = 1;
             s->share[g->vert[c]] += 1;

@@ -1,17 +1,19 @@
 /* solve_kernel.c: L L' x = b over a supernodal factor, 24 right-hand sides (8 poses) interleaved.
  *
- * A sparse triangular solve is bound by loading and storing x: with one column at a time every entry of the factor costs a
- * load and a store of its row of x. Here the columns of a supernode share their rows, so a row is loaded once, takes all the
- * columns of the supernode while it stays in registers, and is stored once; a few rows (forward) or columns (backward)
- * go together, so that what they share is loaded once too. Also the way of the numbers from the poses into the
- * rows and back. Leaves out assembly and factorisation: reconstruct.c.
+ * A sparse triangular solve is bound by loading and storing x: with one column at a time every entry of the factor
+ * costs a load and a store of its row of x. Here the columns of a supernode share their rows, so a row is loaded
+ * once, takes all the columns of the supernode while it stays in registers, and is stored once; a few rows (forward)
+ * or columns (backward) go together, so that what they share is loaded once too. Also the way of the numbers from the
+ * poses into the rows and back. Leaves out assembly and factorisation: reconstruct.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/solve_kernel.h"
 
 #define INLINE static inline __attribute__((always_inline))
 
-/* x[column k] for the head of the supernode; acc[i] -= L[i, k] x[k] for `n` rows starting at entry `l`, all columns. */
-INLINE void eliminate_rows(const double *l, size_t stride, size_t columns, const vgi_row *x, vgi_row *const *target, int n)
+/* x[column k] for the head of the supernode; acc[i] -= L[i, k] x[k] for `n` rows starting at entry `l`, all
+ * columns. */
+INLINE void eliminate_rows(const double *l, size_t stride, size_t columns, const vgi_row *x, vgi_row *const *target,
+                           int n)
 {
     vgi_row acc[4];
 #pragma GCC unroll 4
@@ -30,7 +32,8 @@ INLINE void eliminate_rows(const double *l, size_t stride, size_t columns, const
 }
 
 /* The transposed: acc[k] -= sum over rows of L[row, k] x[row] for `n` columns starting at entry `l`. */
-INLINE void gather_columns(const double *l, size_t stride, size_t nrows, const int *rows, const vgi_row *x, vgi_row *target, int n)
+INLINE void gather_columns(const double *l, size_t stride, size_t nrows, const int *rows, const vgi_row *x,
+                           vgi_row *target, int n)
 {
     vgi_row acc[4];
 #pragma GCC unroll 4

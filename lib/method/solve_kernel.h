@@ -5,9 +5,9 @@
 
 #include "core/core.h"
 
-/* A supernodal factor as CHOLMOD lays it out, borrowed. Supernode s holds columns super[s] .. super[s+1]-1; its rows are
- * rows[pi[s]] .. rows[pi[s+1]-1], the first of which are its own columns; its entries are a column-major block of that
- * many rows at values + px[s]. Only the lower triangle of the block's head is defined. */
+/* A supernodal factor as CHOLMOD lays it out, borrowed. Supernode s holds columns super[s] .. super[s+1]-1; its rows
+ * are rows[pi[s]] .. rows[pi[s+1]-1], the first of which are its own columns; its entries are a column-major block of
+ * that many rows at values + px[s]. Only the lower triangle of the block's head is defined. */
 typedef struct vgi_factor {
     size_t n, supernodes;
     const int *super, *pi, *px, *rows;

@@ -1,7 +1,7 @@
-/* sparse.c: symmetric positive definite systems through CHOLMOD: one analysis, many factorisations.
- * BLAS and OpenMP run alone here: fronts of a surface's factor are small, and threads of OpenMP do nothing but spin on processors
- * that the other programs of a pipe could use; nor must the last digits depend on their number. Leaves out what the entries
- * are. The only file that knows CHOLMOD; it calls Core, Cholesky, Partition (LGPL) and Supernodal (GPL).
+/* sparse.c: symmetric positive definite systems through CHOLMOD: one analysis, many factorisations. BLAS and OpenMP
+ * run alone here: fronts of a surface's factor are small, and threads of OpenMP do nothing but spin on processors
+ * that the other programs of a pipe could use; nor must the last digits depend on their number. Leaves out what the
+ * entries are. The only file that knows CHOLMOD; it calls Core, Cholesky, Partition (LGPL) and Supernodal (GPL).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/sparse.h"
 #include "method/product.h"
@@ -72,7 +72,8 @@ void vgi_triplets_clear(vgi_triplets *t)
 }
 
 /* order: the entries by `key`, those with the same key in the order of `before` (NULL: as they come). */
-static void sort_entries(size_t n, const uint32_t *key, size_t keys, const uint32_t *before, uint32_t *first, uint32_t *order)
+static void sort_entries(size_t n, const uint32_t *key, size_t keys, const uint32_t *before, uint32_t *first,
+                         uint32_t *order)
 {
     memset(first, 0, (keys + 1) * sizeof *first);
     for (size_t i = 0; i < n; i++) first[key[i] + 1]++;

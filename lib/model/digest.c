@@ -3,7 +3,8 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 
-#define XXH_STATIC_LINKING_ONLY /* the state as a value, so that there is nothing to allocate; its layout is of the ABI */
+/* the state as a value, so that there is nothing to allocate; its layout is of the ABI */
+#define XXH_STATIC_LINKING_ONLY
 #include <xxhash.h>
 
 struct vg_digest {

@@ -106,12 +106,18 @@ size_t vgi_map_arrays(vg_map *m, vgi_map_array list[VGI_MAP_ARRAYS])
     bool bones = m->kind == VG_MAP_BONES;
     size_t placed = bones ? 0 : m->nheld;
     const vgi_map_array all[VGI_MAP_ARRAYS] = {
-        {(void **)&m->weights, m->nv, 4, true, true}, {(void **)&m->place, m->n, 3, true, true},
-        {(void **)&m->centre, m->n, 3, false, true}, {(void **)&m->home_centre, m->n, 3, false, true},
-        {(void **)&m->share, m->n, 1, false, true}, {(void **)&m->home, m->has_home ? m->nv : 0, 3, false, true},
-        {(void **)&m->joint_at, m->njoints, 3, false, true}, {(void **)&m->joint_weight, m->njoints, 1, false, true},
-        {(void **)&m->corner, m->ncorners, 4 * m->per_corner, false, true}, {(void **)&m->held_at, placed, 3, false, true},
-        {(void **)&m->joint, m->njoints, 2, false, false}, {(void **)&m->held, m->nheld, 1, false, false},
+        {(void **)&m->weights, m->nv, 4, true, true},
+        {(void **)&m->place, m->n, 3, true, true},
+        {(void **)&m->centre, m->n, 3, false, true},
+        {(void **)&m->home_centre, m->n, 3, false, true},
+        {(void **)&m->share, m->n, 1, false, true},
+        {(void **)&m->home, m->has_home ? m->nv : 0, 3, false, true},
+        {(void **)&m->joint_at, m->njoints, 3, false, true},
+        {(void **)&m->joint_weight, m->njoints, 1, false, true},
+        {(void **)&m->corner, m->ncorners, 4 * m->per_corner, false, true},
+        {(void **)&m->held_at, placed, 3, false, true},
+        {(void **)&m->joint, m->njoints, 2, false, false},
+        {(void **)&m->held, m->nheld, 1, false, false},
         {(void **)&m->held_patch, placed, 1, false, false},
         {(void **)&m->corner_bone, bones ? m->ncorners : 0, m->per_corner, false, false}};
     memcpy(list, all, sizeof all);
@@ -153,7 +159,8 @@ static int copy_map(vg_map *to, const vg_map *from, vg_err *e)
     }
     if (ok && from->nnames) ok = (to->names = vgi_array(from->nnames, sizeof *to->names, e));
     for (; ok && to->nnames < from->nnames; to->nnames++)
-        if (!(to->names[to->nnames] = vgi_copy_string(from->names[to->nnames], strlen(from->names[to->nnames]), e))) ok = false;
+        if (!(to->names[to->nnames] = vgi_copy_string(from->names[to->nnames], strlen(from->names[to->nnames]), e)))
+            ok = false;
     if (ok) return VG_OK;
     vg_map_clear(to);
     return VG_ENOMEM;
@@ -331,8 +338,10 @@ int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e)
               vg_attributes_copy(&to->attributes, &from->attributes, &from->mesh, e) == VG_OK &&
               vg_skeleton_copy(&to->skeleton, &from->skeleton, e) == VG_OK &&
               vg_correspondence_copy(&to->correspondence, &from->correspondence, e) == VG_OK &&
-              copy_patches(&to->patches, &from->patches, from->mesh.nf, e) == VG_OK && copy_map(&to->map, &from->map, e) == VG_OK &&
-              vg_rig_copy(&to->rig, &from->rig, from->mesh.nv, e) == VG_OK && (to->reference_name = vgi_copy_string(name, strlen(name), e));
+              copy_patches(&to->patches, &from->patches, from->mesh.nf, e) == VG_OK &&
+              copy_map(&to->map, &from->map, e) == VG_OK &&
+              vg_rig_copy(&to->rig, &from->rig, from->mesh.nv, e) == VG_OK &&
+              (to->reference_name = vgi_copy_string(name, strlen(name), e));
     if (ok && from->reference)
         ok = (to->reference = vgi_copy_array(from->reference, 3 * from->mesh.nv, sizeof *to->reference, e));
     if (ok && (ok = (to->selected = vgi_copy_array(from->selected, from->nselected, sizeof *to->selected, e))))
@@ -411,8 +420,8 @@ static int put_text(char **to, size_t *cap, const char *text, size_t n, vg_err *
     return VG_OK;
 }
 
-int vgi_frame_scalars(vg_frame *f, const char *name, size_t name_bytes, const char *unit, size_t unit_bytes, size_t nv,
-                      vg_err *e)
+int vgi_frame_scalars(vg_frame *f, const char *name, size_t name_bytes, const char *unit, size_t unit_bytes,
+                      size_t nv, vg_err *e)
 {
     f->has_scalars = false;
     int r = put_text(&f->scalars_name, &f->scalars_name_cap, name, name_bytes, e);

@@ -170,10 +170,11 @@ static double perimeter_of(const uint32_t *vert, size_t r, const double *points)
 }
 
 /* A face of one pose: its centroid, unit normal (Newell's: the sum of the cross products of successive corner
- * vectors, here those from the centroid) and area. Returns false when it has no normal; then normal and area are 0. Called with
- * a constant r for triangles and quads. */
+ * vectors, here those from the centroid) and area. Returns false when it has no normal; then normal and area are 0.
+ * Called with a constant r for triangles and quads. */
 static inline __attribute__((always_inline)) bool face_shape(const vg_measures *x, const uint32_t *vert, size_t r,
-                                                            const double *points, double centroid[3], double normal[3], double *area)
+                                                             const double *points, double centroid[3],
+                                                             double normal[3], double *area)
 {
     double n[3] = {0, 0, 0}, edges = 0, a[3], share = 1 / (double)r;
     centroid[0] = centroid[1] = centroid[2] = 0;
@@ -189,7 +190,8 @@ static inline __attribute__((always_inline)) bool face_shape(const vg_measures *
         for (int k = 0; k < 3; k++) edges += (b[k] - a[k]) * (b[k] - a[k]), a[k] = b[k];
     }
     double length = length_of(n), least = FLAT * x->diagonal, half = 0.5 * length;
-    /* the perimeter is no longer than the root of r times the squared edges: most faces need no roots of their edges */
+    /* the perimeter is no longer than the root of r times the squared edges: most faces need no roots of their
+     * edges */
     bool ok = half * half > 1.001 * least * least * (double)r * edges || half > least * perimeter_of(vert, r, points);
     double scale = ok ? 1 / length : 0;
     *area = ok ? half : 0;
@@ -221,7 +223,8 @@ static double normals_apart(const double a[3], const double b[3])
     return fmin(0.5 * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), 2);
 }
 
-static inline __attribute__((always_inline)) void add_face(vg_measures *x, const uint32_t *vert, size_t r, const double *const *poses)
+static inline __attribute__((always_inline)) void add_face(vg_measures *x, const uint32_t *vert, size_t r,
+                                                           const double *const *poses)
 {
     double centroid[2][3], normal[2][3], area[2];
     bool has_normal[2];

@@ -36,8 +36,8 @@ static int compare_indices(const void *p, const void *q)
     return (a > b) - (a < b);
 }
 
-/* Is a vertex twice in this face? Small faces by comparing pairs; large ones sorted in `sorted`. No list over all vertices: their
- * number may still be a lie. */
+/* Is a vertex twice in this face? Small faces by comparing pairs; large ones sorted in `sorted`. No list over all
+ * vertices: their number may still be a lie. */
 static bool repeats(const uint32_t *vert, size_t size, uint32_t *sorted)
 {
     if (!sorted) {
@@ -68,7 +68,8 @@ int vg_mesh_check(const vg_mesh *m, const char *subject, vg_err *e)
             return free(sorted), vg_fail(e, VG_EINPUT, "%s: face %zu has fewer than 2 vertices", subject, f);
         for (size_t i = 0; i < size; i++)
             if (vert[i] >= m->nv)
-                return free(sorted), vg_fail(e, VG_EINPUT, "%s: face %zu names vertex %u of %zu", subject, f, vert[i], m->nv);
+                return free(sorted),
+                       vg_fail(e, VG_EINPUT, "%s: face %zu names vertex %u of %zu", subject, f, vert[i], m->nv);
         if (size > SMALL) result = vgi_grow(&sorted, &cap, size, sizeof *sorted, e);
         if (result == VG_OK && repeats(vert, size, size > SMALL ? sorted : NULL))
             result = vg_fail(e, VG_EINPUT, "%s: face %zu names a vertex twice", subject, f);
@@ -81,7 +82,8 @@ int vg_mesh_same(const vg_mesh *a, const char *a_name, const vg_mesh *b, const c
 {
     if (a->nv != b->nv)
         return vg_fail(e, VG_EINPUT, "%s has %zu vertices where %s has %zu", b_name, b->nv, a_name, a->nv);
-    if (a->nf != b->nf) return vg_fail(e, VG_EINPUT, "%s has %zu faces where %s has %zu", b_name, b->nf, a_name, a->nf);
+    if (a->nf != b->nf)
+        return vg_fail(e, VG_EINPUT, "%s has %zu faces where %s has %zu", b_name, b->nf, a_name, a->nf);
     if (a->nf == 0) return VG_OK;
     size_t corners = vg_mesh_corners(a);
     if (!memcmp(a->start, b->start, (a->nf + 1) * sizeof *a->start) &&
@@ -90,12 +92,13 @@ int vg_mesh_same(const vg_mesh *a, const char *a_name, const vg_mesh *b, const c
     for (size_t f = 0; f < a->nf; f++) {
         uint32_t na = a->start[f + 1] - a->start[f], nb = b->start[f + 1] - b->start[f];
         if (na != nb)
-            return vg_fail(e, VG_EINPUT, "face %zu of %s has %u corners where that of %s has %u", f, b_name, nb, a_name, na);
+            return vg_fail(e, VG_EINPUT, "face %zu of %s has %u corners where that of %s has %u", f, b_name, nb,
+                           a_name, na);
         for (uint32_t i = 0; i < na; i++) {
             uint32_t va = a->vert[a->start[f] + i], vb = b->vert[b->start[f] + i];
             if (va != vb)
-                return vg_fail(e, VG_EINPUT, "face %zu of %s names vertex %u where that of %s names %u", f, b_name, vb,
-                               a_name, va);
+                return vg_fail(e, VG_EINPUT, "face %zu of %s names vertex %u where that of %s names %u", f, b_name,
+                               vb, a_name, va);
         }
     }
     return VG_OK;

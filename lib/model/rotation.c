@@ -76,7 +76,8 @@ void vg_quat_exp(const double l[4], double q[4])
     for (int k = 1; k < 4; k++) q[k] = length * ratio * l[k];
 }
 
-/* A unit vector perpendicular to the unit vector r, chosen the same way every time: across the axis r has least of. */
+/* A unit vector perpendicular to the unit vector r, chosen the same way every time: across the axis r has least
+ * of. */
 static void perpendicular(const double r[3], double p[3])
 {
     int k = fabs(r[0]) <= fabs(r[1]) ? (fabs(r[0]) <= fabs(r[2]) ? 0 : 2) : (fabs(r[1]) <= fabs(r[2]) ? 1 : 2);
@@ -88,8 +89,8 @@ static void perpendicular(const double r[3], double p[3])
     for (int i = 0; i < 3; i++) p[i] /= length;
 }
 
-/* With unit vectors r and d: q = (1 + r.d, r x d), normalised, is the half-angle quaternion of Rodrigues' rotation. Near
- * half a turn 1 + r.d cancels; |r + d|^2 / 2 is the same number without cancellation. */
+/* With unit vectors r and d: q = (1 + r.d, r x d), normalised, is the half-angle quaternion of Rodrigues' rotation.
+ * Near half a turn 1 + r.d cancels; |r + d|^2 / 2 is the same number without cancellation. */
 void vg_quat_between(const double r_in[3], const double d_in[3], double q[4])
 {
     double rl = sqrt(r_in[0] * r_in[0] + r_in[1] * r_in[1] + r_in[2] * r_in[2]);

@@ -8,9 +8,10 @@
 
 /* ---- page_data.c ----
  *
- * A chunk holds n frames of nv x width numbers. Each axis of a chunk has an origin and a step: a number is
- * origin + step * q, q an integer of 16 bits. Frame by frame, axis by axis, vertex by vertex, q is predicted, and what is
- * left (modulo 2^16, then 0 -1 1 -2 2 ... as 0 1 2 3 4 ...) is kept. The prediction is chosen for each frame; its number is a sum:
+ * A chunk holds n frames of nv x width numbers. Each axis of a chunk has an origin and a step: a number is origin +
+ * step * q, q an integer of 16 bits. Frame by frame, axis by axis, vertex by vertex, q is predicted, and what is left
+ * (modulo 2^16, then 0 -1 1 -2 2 ... as 0 1 2 3 4 ...) is kept. The prediction is chosen for each frame; its number
+ * is a sum:
  *     0 nothing, 1 the frame before, 2 that and the step that led to it (all within the chunk),
  *     4: what is left is predicted by what was left of the vertex before (of the same axis; 0 for the first).
  * Bytes: n of predictions, then all upper bytes, then all lower bytes; deflated with a zlib head. Lists of 32 bit

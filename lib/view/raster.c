@@ -315,8 +315,8 @@ static bool faces_viewer(const work *k, const vgi_side *s)
     return area[0] * toward[0] + area[1] * toward[1] + area[2] * toward[2] > 0;
 }
 
-/* An edge is on the contour when a front meets a back there, or a surface ends. Faces that go the same way along their
- * edge are of different orientation: what is front of one is back of the other. */
+/* An edge is on the contour when a front meets a back there, or a surface ends. Faces that go the same way along
+ * their edge are of different orientation: what is front of one is back of the other. */
 static bool is_contour(const work *k, const vgi_side *s, size_t n)
 {
     if (n == 1) return true;

@@ -1,6 +1,6 @@
-/* sheet.c: the contact sheet: takes frames of one sequence or several, chooses, draws them row by row and puts captions
- * and a legend to them. Leaves out how a pose becomes pixels (raster.c, shade.c), what its colours say (tint.c), and how
- * pixels become a file (png.c). SPDX-License-Identifier: GPL-3.0-or-later */
+/* sheet.c: the contact sheet: takes frames of one sequence or several, chooses, draws them row by row and puts
+ * captions and a legend to them. Leaves out how a pose becomes pixels (raster.c, shade.c), what its colours say
+ * (tint.c), and how pixels become a file (png.c). SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
-/* tint.c: the number of each vertex that becomes its colour: the distance from a truth, what came with the frame, or how
- * much longer its vectors are than in the reference pose; and where the colours end. Sheets and pages share it.
+/* tint.c: the number of each vertex that becomes its colour: the distance from a truth, what came with the frame, or
+ * how much longer its vectors are than in the reference pose; and where the colours end. Sheets and pages share it.
  * Leaves out the colours: colour.c. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 

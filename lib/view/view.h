@@ -28,7 +28,8 @@ typedef struct vgi_side { /* of a face of 3 or more */
     bool forth;    /* the face goes from a to b */
 } vgi_side;
 
-/* vgi_figure_sides: the sides of all faces, those of one edge one after the other: to be called once, for silhouettes. */
+/* vgi_figure_sides: the sides of all faces, those of one edge one after the other: to be called once, for
+ * silhouettes. */
 int vgi_figure_sides(vgi_figure *g, vg_err *e) VG_MUST_CHECK;
 int vgi_figure_init(vgi_figure *g, const vg_mesh *m, vg_err *e) VG_MUST_CHECK;
 void vgi_figure_clear(vgi_figure *g);
@@ -91,7 +92,8 @@ typedef struct vgi_drawing { /* one pose to be drawn */
     const vgi_camera *camera;
     const float *points; /* nv, in D */
     const float *values; /* nv in [0, 1], or NULL */
-    const uint32_t *patches; /* per face, or NULL: samples get the number of their face's patch (modulo 2^16) for a value */
+    const uint32_t *patches; /* per face, or NULL: samples get the number of their face's patch (modulo 2^16) for a
+                                value */
     float wire;          /* radius of 2-vertex faces, in samples */
     float edge;          /* half the width of a drawn edge, in samples; 0: edges are not marked */
     float contour;       /* half the width of silhouettes, in samples; 0: none. Needs vgi_figure_sides */
@@ -144,12 +146,12 @@ int vgi_meter_init(vgi_meter *m, const vgi_tint *t, const vg_mesh *mesh, const d
 void vgi_meter_clear(vgi_meter *m);
 /* vgi_tint_has: is there a number for each vertex of this frame? */
 bool vgi_tint_has(const vgi_tint *t, const vg_frame *f, const double *truth);
-/* vgi_tint_read: the numbers of a frame that has them, into m->numbers. VG_EINPUT when they have another name than those
- * before. */
+/* vgi_tint_read: the numbers of a frame that has them, into m->numbers. VG_EINPUT when they have another name than
+ * those before. */
 int vgi_tint_read(vgi_tint *t, vgi_meter *m, const vg_frame *f, const double *truth, vgi_spread *s,
                   vg_err *e) VG_MUST_CHECK;
-/* vgi_round_up: the next of 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8 times a power of ten: five parts of it have short numbers.
- * x > 0. */
+/* vgi_round_up: the next of 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8 times a power of ten: five parts of it have short
+ * numbers. x > 0. */
 double vgi_round_up(double x);
 /* vgi_tint_end: where the colours end: given (> 0), or by what is common: the absolute value that 99 % do not
  * exceed. */
@@ -162,7 +164,8 @@ enum { VGI_NUMBER = 32 };
 void vgi_print_number(char *to, size_t size, const char *format, double x);
 void vgi_tint_number(const vgi_tint *t, double x, char to[VGI_NUMBER]);
 void vgi_tint_caption(const vgi_tint *t, const vgi_spread *s, char *to, size_t size);
-void vgi_tint_title(const vgi_tint *t, double diagonal, char *to, size_t size); /* diagonal: D, where errors are in D */
+/* diagonal: D, where errors are in D */
+void vgi_tint_title(const vgi_tint *t, double diagonal, char *to, size_t size);
 
 /* ---- shade.c and ground.c: from samples to pixels ---- */
 
@@ -210,7 +213,8 @@ void vgi_text_fit(char *to, size_t size, double dot, double width, const char *t
 /* ---- legend.c: on a canvas of at least VGI_LEGEND rows ---- */
 
 enum { VGI_LEGEND = 74 };
-void vgi_legend(vgi_canvas *c, const vgi_tint *t, const vgi_palette *p, size_t margin, const char *title, const char *note);
+void vgi_legend(vgi_canvas *c, const vgi_tint *t, const vgi_palette *p, size_t margin, const char *title,
+                const char *note);
 
 /* ---- album.c: which frames are shown ---- */
 

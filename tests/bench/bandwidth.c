@@ -1,5 +1,6 @@
-/* bandwidth: how fast memory is copied within one process, by one thread: what a stage that holds whole sequences can reach.
- * usage: bandwidth MEGABYTES    Prints MB/s (1e6 bytes) that are copied, the best of five; MEGABYTES should be beyond all caches.
+/* bandwidth: how fast memory is copied within one process, by one thread: what a stage that holds whole sequences can
+ * reach. usage: bandwidth MEGABYTES Prints MB/s (1e6 bytes) that are copied, the best of five; MEGABYTES should be
+ * beyond all caches.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include <stdio.h>
 #include <stdlib.h>

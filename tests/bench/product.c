@@ -1,5 +1,5 @@
-/* product: how many poses a plain product in binary32 gives: transforms (3 rows a pose, 4 columns a patch) times an operator.
- * usage: product PATCHES VERTICES    prints poses/s in blocks of 32 poses, and one pose at a time
+/* product: how many poses a plain product in binary32 gives: transforms (3 rows a pose, 4 columns a patch) times an
+ * operator. usage: product PATCHES VERTICES prints poses/s in blocks of 32 poses, and one pose at a time
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include <cblas.h>
 #include <stdio.h>

@@ -117,7 +117,8 @@ int main(int argc, char **argv)
         fprintf(stderr, "usage: rod A|B tri|quad RINGS SEGMENTS POSES > out.vgs\n");
         return 2;
     }
-    size_t rings = strtoul(argv[3], NULL, 10), segments = strtoul(argv[4], NULL, 10), poses = strtoul(argv[5], NULL, 10);
+    size_t rings = strtoul(argv[3], NULL, 10), segments = strtoul(argv[4], NULL, 10),
+           poses = strtoul(argv[5], NULL, 10);
     char body = argv[1][0];
     vg_err e;
     vg_head h = {.kind = VG_VERTICES, .precision = VG_F64};

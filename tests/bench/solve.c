@@ -206,7 +206,8 @@ static void make_theirs(theirs *t, const vg_graph *g, size_t pinned, int kind)
     assemble(t, g, pinned);
     t->factor = cholmod_analyze(t->matrix, &t->common);
     t->b = cholmod_zeros(g->nv, 3, CHOLMOD_REAL, &t->common);
-    if (!t->factor || !t->b || !cholmod_factorize(t->matrix, t->factor, &t->common) || t->factor->minor < t->factor->n)
+    if (!t->factor || !t->b || !cholmod_factorize(t->matrix, t->factor, &t->common) ||
+        t->factor->minor < t->factor->n)
         die("the reference cannot factorize");
 }
 

@@ -1,5 +1,5 @@
-/* fuzz_cli.c: any words as a command line: every one is parsed, or refused with exit status 2 or 4; help and version end
- * with 0. Words are lines of the input; the first chooses the program's shape.
+/* fuzz_cli.c: any words as a command line: every one is parsed, or refused with exit status 2 or 4; help and version
+ * end with 0. Words are lines of the input; the first chooses the program's shape.
  * Leaves out what the programs themselves make of their words (hostile.bats tries those).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include <math.h>

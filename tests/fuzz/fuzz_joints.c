@@ -1,4 +1,5 @@
-/* fuzz_joints.c: joints over time as text, of a skeleton that is given: refused, or finite positions and unit turns of all joints.
+/* fuzz_joints.c: joints over time as text, of a skeleton that is given: refused, or finite positions and unit turns
+ * of all joints.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 

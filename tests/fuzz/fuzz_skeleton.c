@@ -1,4 +1,5 @@
-/* fuzz_skeleton.c: skeletons and groups of vertices as text: refused, or a skeleton in a finite pose, parents before children.
+/* fuzz_skeleton.c: skeletons and groups of vertices as text: refused, or a skeleton in a finite pose, parents before
+ * children.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -24,7 +25,8 @@ static void read_skeleton(const uint8_t *data, size_t size)
     if (r == VG_OK) {
         demand(h.count > 0 && h.count % 2 == 0 && h.skeleton.njoints == h.count && h.mesh.nv == h.count);
         demand(vg_mesh_check(&h.mesh, "it", &e) == VG_OK && vgi_finite(h.reference, 3 * h.count));
-        for (size_t j = 0; j < h.count; j++) demand(h.skeleton.joints[j].parent == UINT32_MAX || h.skeleton.joints[j].parent < j);
+        for (size_t j = 0; j < h.count; j++)
+            demand(h.skeleton.joints[j].parent == UINT32_MAX || h.skeleton.joints[j].parent < j);
         demand(vg_frame_shape(&f, &h, &e) == VG_OK && format->next(state, &f, &e) == 1 && f.nturns == h.count);
         demand(!memcmp(f.values, h.reference, 3 * h.count * sizeof *f.values) && format->next(state, &f, &e) == 0);
     }

@@ -1,5 +1,5 @@
-/* fuzz_stream.c: the stream reader: it takes or refuses, with a reason; what it takes comes back the same from the writer.
- * Each input is tried as it is and with its checksums mended, since no search finds a checksum by itself.
+/* fuzz_stream.c: the stream reader: it takes or refuses, with a reason; what it takes comes back the same from the
+ * writer. Each input is tried as it is and with its checksums mended, since no search finds a checksum by itself.
  * Leaves out what the programs do with a stream.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
@@ -27,7 +27,8 @@ static void mend_end(unsigned char *payload, uint64_t records, XXH64_state_t *ru
     vgi_put64(payload + 8, XXH64_digest(running));
 }
 
-/* Make the checksums of all records that are there right, and count and sum of END. What else is wrong stays wrong. */
+/* Make the checksums of all records that are there right, and count and sum of END. What else is wrong stays
+ * wrong. */
 static void mend(unsigned char *p, size_t size)
 {
     XXH64_state_t *running = XXH64_createState();
@@ -76,7 +77,9 @@ static void use_frame(const vg_frame *f, const vg_head *h)
 {
     demand(f->name != NULL && vgi_is_utf8(f->name, strlen(f->name)));
     demand(vgi_finite(f->values, h->count * vg_kind_width(h->kind)));
-    if (f->has_scalars) demand(*f->scalars_name && vgi_is_utf8(f->scalars_unit, strlen(f->scalars_unit)) && vgi_finite(f->scalars, h->mesh.nv));
+    if (f->has_scalars)
+        demand(*f->scalars_name && vgi_is_utf8(f->scalars_unit, strlen(f->scalars_unit)) &&
+               vgi_finite(f->scalars, h->mesh.nv));
     if (h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS) demand(vgi_finite(f->anchors, 3 * h->nanchors));
 }
 
@@ -121,7 +124,8 @@ static unsigned char *rewritten(const unsigned char *data, size_t size, size_t *
     return p;
 }
 
-/* A whole stream is written as a whole stream, which is written as itself. A broken one is written as a broken one. */
+/* A whole stream is written as a whole stream, which is written as itself. A broken one is written as a broken
+ * one. */
 static void there_and_back(const unsigned char *data, size_t size)
 {
     size_t n, again_n = 0;

@@ -1,12 +1,13 @@
-/* fail_malloc.c: to be preloaded: one allocation of a program fails. Counting begins at main, since what the loader and
- * the constructors of libraries do is not ours; what libraries allocate later for us counts.
+/* fail_malloc.c: to be preloaded: one allocation of a program fails. Counting begins at main, since what the loader
+ * and the constructors of libraries do is not ours; what libraries allocate later for us counts.
  *
  *   FAIL_MALLOC=N    allocation number N, from 1, fails;  N+: and all after it
  *   FAIL_COUNT=FILE  how many there were is written there at exit
  *   FAIL_SPARE=A,B   what is asked for in calls of libraries with these in their file names neither counts nor fails
  *   FAIL_WHERE=1     where the first one failed goes to standard error
  *
- * Works under AddressSanitizer too (verify_asan_link_order=0): what is not refused goes on to the next malloc, its own.
+ * Works under AddressSanitizer too (verify_asan_link_order=0): what is not refused goes on to the next malloc, its
+ * own.
  * Leaves out mmap and what C++ operators do.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include <dlfcn.h>
@@ -55,7 +56,8 @@ static bool is_early(const void *p)
     return (const char *)p >= early.bytes && (const char *)p < early.bytes + sizeof early.bytes;
 }
 
-static volatile bool looking; /* volatile: dlsym is declared as a function that does not come back here, but it does */
+/* volatile: dlsym is declared as a function that does not come back here, but it does */
+static volatile bool looking;
 static void *next(void **cached, const char *name)
 {
     if (*cached || looking) return *cached;

@@ -161,8 +161,8 @@ static inline vg_head make_tree(uint32_t n)
     return h;
 }
 
-/* A wavy sheet of n x n cells: quads, pairs of triangles and hexagons of two cells, with line segments hanging from its
- * border, and two isolated vertices. */
+/* A wavy sheet of n x n cells: quads, pairs of triangles and hexagons of two cells, with line segments hanging from
+ * its border, and two isolated vertices. */
 static inline vg_head make_mixed(uint32_t n)
 {
     vg_head h = new_shape();
@@ -216,8 +216,8 @@ static inline vg_head make_degenerate(void)
     static const double at[][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, /* 0-3 a good quad */
                                    {2, 0, 0}, {3, 0, 0},                       /* 4, 5 with 1: a line */
                                    {2, 2, 1}, {2, 2, 1}, {2, 2, 1},            /* 6-8 one point */
-                                   {0.25, 0.25, 0},                            /* 9 with 0, 1, 3: centroid of a quad */
-                                   {0.75, 0, 0},                               /* 0.25 * (3, 0, 0) - so that 9 sits there */
+                                   {0.25, 0.25, 0}, /* 9 with 0, 1, 3: centroid of a quad */
+                                   {0.75, 0, 0},    /* 0.25 * (3, 0, 0) - so that 9 sits there */
                                    {0, 0.75, 0}, {0, 3, 0}};
     for (size_t i = 0; i < sizeof at / sizeof *at; i++) add_vertex(&h, at[i][0], at[i][1], at[i][2]);
     FACE(&h, 0, 1, 2, 3);
@@ -319,7 +319,8 @@ static inline double *move_points(const motion *t, const double *x, size_t n)
     return y;
 }
 
-/* The points twisted about z, bent, stretched, and shaken a little: no corner keeps its angles. Points that coincide still do. */
+/* The points twisted about z, bent, stretched, and shaken a little: no corner keeps its angles. Points that coincide
+ * still do. */
 static inline double *warp(const double *x, size_t n, double amount)
 {
     double D = vg_diagonal(x, n), *y = room(3 * n, sizeof *y), shake = 0.03 * amount * D / sqrt((double)n + 1);

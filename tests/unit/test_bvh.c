@@ -56,7 +56,8 @@ static int read_text(sequence *s, const char *text, vg_err *e)
     return read_bytes(s, text, strlen(text), e);
 }
 
-/* Write it, with its turns or positions only; the text is the caller's, NULL on failure. *warning (may be NULL): what was lost. */
+/* Write it, with its turns or positions only; the text is the caller's, NULL on failure. *warning (may be NULL): what
+ * was lost. */
 static char *write_turned(const sequence *s, bool turned, bool full, char *warning, vg_err *e)
 {
     const vgi_sequence_format *f = &vgi_sequence_bvh;
@@ -96,7 +97,8 @@ static double distance(const sequence *a, const sequence *b)
     for (size_t i = 0; i < a->n && most < INFINITY; i++) {
         for (size_t j = 0; j < a->head.count; j++) {
             const double *p = a->at[i] + 3 * j, *q = b->at[i] + 3 * j;
-            double d = sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) + (p[2] - q[2]) * (p[2] - q[2]));
+            double d =
+                sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) + (p[2] - q[2]) * (p[2] - q[2]));
             if (!(d <= most)) most = d;
         }
     }
@@ -137,15 +139,16 @@ static void reads_and_poses(void)
     }
     CHECK(s.timed[1] && s.time[0] == 0 && s.time[1] == 0.5);
     const vg_skeleton *k = &s.head.skeleton;
-    CHECK(k->njoints == 3 && k->joints[0].parent == UINT32_MAX && k->joints[2].parent == 1 && k->joints[2].nchannels == 0);
+    CHECK(k->njoints == 3 && k->joints[0].parent == UINT32_MAX && k->joints[2].parent == 1 &&
+          k->joints[2].nchannels == 0);
     CHECK_TEXT(k->joints[0].name, "Hip");
     CHECK_TEXT(k->joints[2].name, "Knee.end");
     CHECK(k->joints[0].nchannels == 6 && !memcmp(k->joints[0].channels, "\1\2\3\6\4\5", 6));
     clear(&s);
 }
 
-/* Capitals, CR LF, tabs, a byte order mark, exponents, names with blanks, braces in the same line, values over several
- * lines, several roots, channels of all numbers, an end site with a name. */
+/* Capitals, CR LF, tabs, a byte order mark, exponents, names with blanks, braces in the same line, values over
+ * several lines, several roots, channels of all numbers, an end site with a name. */
 static void reads_what_people_have(void)
 {
     static const char text[] =
@@ -172,11 +175,13 @@ static void reads_what_people_have(void)
     char *again = write_text(&s, true, NULL, &e);
     sequence t = {0};
     CHECK(again && read_text(&t, again, &e) == VG_OK);
-    CHECK(distance(&s, &t) < 1e-12 && t.head.skeleton.joints[1].nchannels == 0 && t.head.skeleton.joints[3].nchannels == 2);
+    CHECK(distance(&s, &t) < 1e-12 && t.head.skeleton.joints[1].nchannels == 0 &&
+          t.head.skeleton.joints[3].nchannels == 2);
     free(again);
     clear(&t);
     clear(&s);
-    CHECK(read_text(&s, ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 0 0 0"), &e) == VG_OK); /* no line end; one pose, no time */
+    /* no line end; one pose, no time */
+    CHECK(read_text(&s, ARM("0", "Frames: 1\nFrame Time: 1\n1 2 3 0 0 0"), &e) == VG_OK);
     CHECK(s.n == 1 && !s.timed[0]);
     clear(&s);
     CHECK(read_text(&s, ARM("0", "Frames: 0\nFrame Time: 1\n"), &e) == VG_OK && s.n == 0);
@@ -268,7 +273,8 @@ static void limits_names(void)
         free(again);
         free(s.head.skeleton.joints[0].name);
         s.head.skeleton.joints[0].name = strdup(text); /* as a stream might hold it */
-        if (strlen(text) > 1024) CHECK(!write_text(&s, false, NULL, &e) && strstr(e.message, "the name of joint 0 is longer"));
+        if (strlen(text) > 1024)
+            CHECK(!write_text(&s, false, NULL, &e) && strstr(e.message, "the name of joint 0 is longer"));
         clear(&s);
         clear(&t);
     }
@@ -402,7 +408,8 @@ static void there_and_back(void)
                 if (text && i < 6) CHECK(largest_step(text) < 60); /* smooth motion: no jump by half a turn */
                 char *again = text ? write_text(&t, full, warning, &e) : NULL;
                 sequence u = {0};
-                CHECK(again && read_text(&u, again, &e) == VG_OK && distance(&s, &u) / sizes[k] < (full ? 1e-10 : 1e-5));
+                CHECK(again && read_text(&u, again, &e) == VG_OK &&
+                      distance(&s, &u) / sizes[k] < (full ? 1e-10 : 1e-5));
                 free(text);
                 free(again);
                 clear(&u);
@@ -414,8 +421,8 @@ static void there_and_back(void)
     vg_bytes_clear(&b);
 }
 
-/* Frames that say how their joints have turned: every angle comes back, also those about a bone itself and of a joint at the end,
- * of hinges and of joints with rotations about two axes. */
+/* Frames that say how their joints have turned: every angle comes back, also those about a bone itself and of a joint
+ * at the end, of hinges and of joints with rotations about two axes. */
 static void brings_turns_back(void)
 {
     static const char head[] =
@@ -460,7 +467,8 @@ done:
     vg_bytes_clear(&b);
 }
 
-/* A joint with arms in two directions turns as it was turned, one with one arm without twist, one without any not at all. */
+/* A joint with arms in two directions turns as it was turned, one with one arm without twist, one without any not at
+ * all. */
 static void finds_turns(void)
 {
     static const char text[] =
@@ -482,8 +490,10 @@ static void finds_turns(void)
     for (int i = 0; i < 12; i++) CHECK_NEAR(values[i], first[i], 1e-6);
     CHECK_NEAR(vg_joint_fitter_fit(f, s.at[1], NULL, values, &joint), 0, 1e-8);
     for (int i = 3; i < 9; i++) CHECK_NEAR(values[i], first[i], 1e-6);
-    double down[3] = {0, 1, 0}, now[3], q[4] = {cos(10 * M_PI / 180), 0, 0, sin(10 * M_PI / 180)}; /* 20 about z, ... */
-    double x[4] = {cos(15 * M_PI / 180), sin(15 * M_PI / 180), 0, 0};                              /* ... then 30 about x */
+    /* 20 about z, ... */
+    double down[3] = {0, 1, 0}, now[3], q[4] = {cos(10 * M_PI / 180), 0, 0, sin(10 * M_PI / 180)};
+    /* ... then 30 about x */
+    double x[4] = {cos(15 * M_PI / 180), sin(15 * M_PI / 180), 0, 0};
     vg_quat_multiply(q, x, q);
     vg_quat_apply(q, down, now);
     vg_quat_between(down, now, x);
@@ -499,8 +509,8 @@ static void finds_turns(void)
     clear(&s);
 }
 
-/* Hinges, too few and too many rotations, gimbal lock, coincident joints, a bone that is turned over: always finite, and as near
- * as can be. */
+/* Hinges, too few and too many rotations, gimbal lock, coincident joints, a bone that is turned over: always finite,
+ * and as near as can be. */
 static void fits_what_it_can(void)
 {
     static const struct { const char *channels; double x, y, z, reached; } cases[] = {
@@ -571,18 +581,21 @@ static void says_what_is_lost(void)
     s.at[1][7] = -2.5; /* the end is half a unit further away */
     char *text = write_text(&s, false, warning, &e);
     CHECK(text && strstr(warning, "joint 'Knee.end' of frame 'f1' is off by 0.5, 17 % of the figure"));
-    CHECK(text && strstr(text, "Frame Time:               0.2500000000\n") && strstr(text, "Frames:                          3\n"));
+    CHECK(text && strstr(text, "Frame Time:               0.2500000000\n") &&
+          strstr(text, "Frames:                          3\n"));
     free(text);
     s.time[2] = 0.6;
     text = write_text(&s, false, warning, &e);
-    CHECK(text && strstr(warning, "; the times of the frames: they are not at equal distances") && strstr(text, " 0.2500000000\n"));
+    CHECK(text && strstr(warning, "; the times of the frames: they are not at equal distances") &&
+          strstr(text, " 0.2500000000\n"));
     free(text);
     s.timed[0] = s.timed[1] = s.timed[2] = false;
     text = write_text(&s, false, warning, &e);
     CHECK(text && !strstr(warning, "times") && strstr(text, " 0.0333333333\n"));
     free(text);
     vg_skeleton_clear(&s.head.skeleton);
-    CHECK(!write_text(&s, false, warning, &e) && strstr(e.message, "cannot write 't.bvh': the input holds no skeleton"));
+    CHECK(!write_text(&s, false, warning, &e) &&
+          strstr(e.message, "cannot write 't.bvh': the input holds no skeleton"));
     clear(&s);
 }
 
@@ -633,13 +646,16 @@ static void writes_any_skeleton(void)
 static void tells_its_files(void)
 {
     const vgi_sequence_format *f = &vgi_sequence_bvh;
-    CHECK(f->sniff((const unsigned char *)"HIERARCHY\nROOT", 14) && f->sniff((const unsigned char *)" \r\nhierarchy", 12));
-    CHECK(!f->sniff((const unsigned char *)"HIERARCHYX", 10) && !f->sniff((const unsigned char *)"v 0 0 0", 7) && !f->sniff(NULL, 0));
+    CHECK(f->sniff((const unsigned char *)"HIERARCHY\nROOT", 14) &&
+          f->sniff((const unsigned char *)" \r\nhierarchy", 12));
+    CHECK(!f->sniff((const unsigned char *)"HIERARCHYX", 10) && !f->sniff((const unsigned char *)"v 0 0 0", 7) &&
+          !f->sniff(NULL, 0));
     CHECK(vgi_sequence_by_suffix("a/Walk.BVH") == f && vgi_sequence_by_name("bvh", 3) == f);
 }
 
 TESTS({"reads_and_poses", reads_and_poses}, {"reads_what_people_have", reads_what_people_have}, {"refuses", refuses},
-      {"refuses_prefixes", refuses_prefixes}, {"limits_names", limits_names}, {"limits_depth", limits_depth}, {"there_and_back", there_and_back},
-      {"finds_turns", finds_turns}, {"brings_turns_back", brings_turns_back}, {"fits_what_it_can", fits_what_it_can}, {"goes_on_turning", goes_on_turning},
+      {"refuses_prefixes", refuses_prefixes}, {"limits_names", limits_names}, {"limits_depth", limits_depth},
+      {"there_and_back", there_and_back}, {"finds_turns", finds_turns}, {"brings_turns_back", brings_turns_back},
+      {"fits_what_it_can", fits_what_it_can}, {"goes_on_turning", goes_on_turning},
       {"says_what_is_lost", says_what_is_lost}, {"keeps_places_of_joints", keeps_places_of_joints},
       {"writes_any_skeleton", writes_any_skeleton}, {"tells_its_files", tells_its_files})

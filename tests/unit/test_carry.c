@@ -1,4 +1,5 @@
-/* test_carry: transfer along a correspondence, by shape, by gradients, and the area metric, against what they must be.
+/* test_carry: transfer along a correspondence, by shape, by gradients, and the area metric, against what they must
+ * be.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/carry_kernel.h"
 #include "method/metric.h"
@@ -40,7 +41,8 @@ typedef struct carried {
 } carried;
 
 /* The target's wanted vectors for one pose of the source. */
-static carried carry(const vg_head *source, vg_head *target, const vg_correspondence *k, const double *pose, vg_method by, int threads)
+static carried carry(const vg_head *source, vg_head *target, const vg_correspondence *k, const double *pose,
+                     vg_method by, int threads)
 {
     vg_err e;
     vg_carrier *c;
@@ -70,7 +72,8 @@ static const vg_method methods[] = {VG_BY_POSE, VG_BY_GRADIENT, VG_BY_BLEND};
 /* A source that only turns turns every target by the same rotation, whatever drives what. */
 static void rotation_passes(void)
 {
-    vg_head source = make_torus(7, 6), target = make_mixed(6); /* a line segment of the source would not tell its turn */
+    /* a line segment of the source would not tell its turn */
+    vg_head source = make_torus(7, 6), target = make_mixed(6);
     vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 3, true);
     motion t = turn(2.5, 1, 3);
     double *pose = move_points(&t, source.reference, source.mesh.nv);
@@ -112,7 +115,8 @@ static void identity_is_exact(void)
     }
 }
 
-/* Triangles driven by themselves twice, so that one map serves all corners: the gradient is the map of the triangle, and exact. */
+/* Triangles driven by themselves twice, so that one map serves all corners: the gradient is the map of the triangle,
+ * and exact. */
 static void triangles_onto_themselves(void)
 {
     vg_head h = make_rod(9, 7, true);
@@ -128,7 +132,7 @@ static void triangles_onto_themselves(void)
                 worst = fmax(worst, fabs(truth[c] - r.vectors[c])), length = fmax(length, fabs(truth[c]));
         }
         if (methods[i] == VG_BY_GRADIENT) CHECK_NEAR(worst, 0, 1e-12);
-        else CHECK(worst < 0.2 * length && worst > 1e-6); /* one rotation a face, not one a corner: close, not the same */
+        else CHECK(worst < 0.2 * length && worst > 1e-6); /* one rotation a face, not one a corner: close */
         free(truth);
         carried_clear(&r);
     }
@@ -171,7 +175,8 @@ static void threads_do_not_matter(void)
     vg_head source = make_torus(40, 30), target = make_mixed(24);
     vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 3, true);
     double *pose = warp(source.reference, source.mesh.nv, 0.4);
-    carried a = carry(&source, &target, &k, pose, VG_BY_BLEND, 1), b = carry(&source, &target, &k, pose, VG_BY_BLEND, 3);
+    carried a = carry(&source, &target, &k, pose, VG_BY_BLEND, 1),
+            b = carry(&source, &target, &k, pose, VG_BY_BLEND, 3);
     CHECK(!memcmp(a.vectors, b.vectors, 3 * vg_graph_corners(a.g) * sizeof *a.vectors));
     carried_clear(&a);
     carried_clear(&b);
@@ -232,7 +237,8 @@ static void polar_finds_the_rotation(void)
         vg_quat_matrix(q, truth[lane]);
         /* stretches from mild to 10^6 : 1 */
         for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++) s[3 * i + j] = (i == j ? pow(10, -lane * 0.7 * (i == 2)) : 0) + (lane < 3 ? v[i] * v[j] : 0);
+            for (int j = 0; j < 3; j++)
+                s[3 * i + j] = (i == j ? pow(10, -lane * 0.7 * (i == 2)) : 0) + (lane < 3 ? v[i] * v[j] : 0);
         for (int i = 0; i < 3; i++)
             for (int j = 0; j < 3; j++) {
                 double x = 0;
@@ -245,7 +251,8 @@ static void polar_finds_the_rotation(void)
         for (int i = 0; i < 9; i++) CHECK_NEAR(r.m[i][lane], truth[lane][i], 1e-9);
 }
 
-/* On triangles the area metric is the cotangent Laplacian: G_ij = -cot(opposite angle) / 2 times one and the same number. */
+/* On triangles the area metric is the cotangent Laplacian: G_ij = -cot(opposite angle) / 2 times one and the same
+ * number. */
 static void area_metric_is_cotangents(void)
 {
     double ratio = 0;

@@ -1,5 +1,6 @@
-/* test_deform.c: how vectors turn and stretch (Frames, Rodrigues, links), and the same done to another mesh: against the
- * formulas of MATH 4 written out, on every kind of mesh, with degenerate faces, rigid motions, threads and batches.
+/* test_deform.c: how vectors turn and stretch (Frames, Rodrigues, links), and the same done to another mesh: against
+ * the formulas of MATH 4 written out, on every kind of mesh, with degenerate faces, rigid motions, threads and
+ * batches.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
 
@@ -244,11 +245,13 @@ static void test_rigid_transfer(void)
     } pairs[] = {{"human-man-poses.tar.xz", "human-heavy-poses.tar.xz"}, {"faceA.tar.xz", "faceB.tar.xz"},
                  {"woman-tanktop-jump.tar.xz", NULL}, {"trex-walk.tar.xz", NULL}};
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
-        film s = load_film(pairs[i].source, NULL, 1), t = load_film(pairs[i].target ? pairs[i].target : pairs[i].source, NULL, 1);
+        film s = load_film(pairs[i].source, NULL, 1),
+             t = load_film(pairs[i].target ? pairs[i].target : pairs[i].source, NULL, 1);
         vg_graph *g = graph_of(&s.h);
         size_t n = 3 * vg_graph_corners(g);
         motion by = turn(2, 1.5, 4);
-        double *target = pairs[i].target ? t.pose[0] : warp(t.pose[0], g->nv, 0.3), *pose = move_points(&by, s.pose[0], g->nv);
+        double *target = pairs[i].target ? t.pose[0] : warp(t.pose[0], g->nv, 0.3),
+               *pose = move_points(&by, s.pose[0], g->nv);
         double *w = vectors_of(g, target), *got = room(n, sizeof *got);
         vg_deformer *d = deformer(g, s.h.reference, 2);
         aim(d, g, target);
@@ -300,7 +303,8 @@ static double ways_differ(vg_head *h, size_t n, const double *const *poses, cons
 {
     vg_graph *g = graph_of(h);
     size_t corners = vg_graph_corners(g);
-    double **q = lists(n, 4 * corners), **a = lists(n, 3 * corners), **b = lists(n, 3 * corners), **w = lists(n, 3 * corners);
+    double **q = lists(n, 4 * corners), **a = lists(n, 3 * corners), **b = lists(n, 3 * corners),
+           **w = lists(n, 3 * corners);
     double D = vg_diagonal(target, g->nv), worst = 0;
     vg_deformer *d = deformer(g, h->reference, 1);
     aim(d, g, target);
@@ -407,7 +411,8 @@ static void test_degenerate(void)
     vg_deformer *d = deformer(g, h.reference, 1);
     CHECK(vg_deformer_counts(d).corners == 0 && vg_deformer_counts(d).first_face == UINT64_MAX);
     vg_deformer_measure(d, 1, VG_VERTICES, CONST(&pose), &q);
-    /* three on the face without area, three on the point, two on the segment without length, one at its face's centroid */
+    /* three on the face without area, three on the point, two on the segment without length, one at its face's
+     * centroid */
     CHECK(vg_deformer_counts(d).corners == 9 && vg_deformer_counts(d).first_face == 1);
     for (size_t f = 0; f < g->nf; f++)
         for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
@@ -420,7 +425,8 @@ static void test_degenerate(void)
     CHECK(vg_deformer_counts(d).corners == 18);
     for (size_t f = 0; f < g->nf; f++)
         for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++)
-            if (f != 1) CHECK_NEAR(farthest(got + 3 * c, w + 3 * c, 1), 0, 1e-12); /* face 1 has vectors, but no turn */
+            /* face 1 has vectors, but no turn */
+            if (f != 1) CHECK_NEAR(farthest(got + 3 * c, w + 3 * c, 1), 0, 1e-12);
     vg_deformer_free(&d);
     free(pose);
     free(q);
@@ -491,7 +497,8 @@ static void test_nothing_but_finite(void)
     static const double values[] = {0, 1, -1, 1e-300, 1e-12, 1e9, 0.5};
     vg_graph *g = graph_of(&h);
     size_t corners = vg_graph_corners(g);
-    double *pose = room(3 * g->nv, sizeof *pose), *q = room(4 * corners, sizeof *q), *w = room(3 * corners, sizeof *w);
+    double *pose = room(3 * g->nv, sizeof *pose), *q = room(4 * corners, sizeof *q),
+           *w = room(3 * corners, sizeof *w);
     vg_deformer *d = deformer(g, h.reference, 1);
     for (int trial = 0; trial < 3000; trial++) {
         for (size_t i = 0; i < 3 * g->nv; i++) pose[i] = values[(size_t)((noise() + 1) * 3.4999)];
@@ -532,8 +539,8 @@ static void newell(const double *w, size_t r, double n[3])
     for (int k = 0; k < 3; k++) n[k] /= length;
 }
 
-/* D = (sum d r' + h n_d n_r') (sum r r' + h n_r n_r')^-1, h = sum |r|^2 / 2 (MATH 5); the wanted vector is D t, and of what D
- * leaves of d the part that the target's size asks for. */
+/* D = (sum d r' + h n_d n_r') (sum r r' + h n_r n_r')^-1, h = sum |r|^2 / 2 (MATH 5); the wanted vector is D t, and
+ * of what D leaves of d the part that the target's size asks for. */
 static void by_gradient(const double *r, const double *d, const double *t, size_t n, double *wanted)
 {
     double A[9], M[9], nr[3], nd[3], h = dot(r, r, 3 * n) / 2, rho = sqrt(dot(t, t, 3 * n) / dot(r, r, 3 * n));
@@ -595,7 +602,8 @@ static double self_transfer(vg_head *h, size_t n, const double *const *poses, vg
 {
     vg_graph *g = graph_of(h);
     size_t corners = vg_graph_corners(g);
-    double **w = lists(n, 3 * corners), **x = lists(n, 3 * g->nv), **rhs = lists(n, 3 * g->nv), **root = lists(n, 3), worst = 0;
+    double **w = lists(n, 3 * corners), **x = lists(n, 3 * g->nv), **rhs = lists(n, 3 * g->nv), **root = lists(n, 3),
+           worst = 0;
     vg_err e;
     vg_solver *s;
     vg_deformer *d = deformer(g, h->reference, threads);
@@ -652,8 +660,10 @@ TESTS({"Frames and Rodrigues as the formulas have them", test_formulas}, {"a J r
       {"rigid motions turn every corner alike, links too", test_rigid},
       {"a rigid source moves another body rigidly", test_rigid_transfer},
       {"the unit of the source does not matter", test_unit_of_source},
-      {"measured and applied is transferred", test_two_ways}, {"threads and batches change no bit", test_threads_and_batches},
+      {"measured and applied is transferred", test_two_ways},
+      {"threads and batches change no bit", test_threads_and_batches},
       {"degenerate corners take the turn of their face", test_degenerate},
       {"a face that collapses in one pose", test_collapsed_in_one_pose},
-      {"where degenerate begins", test_where_degenerate_begins}, {"nothing but finite numbers", test_nothing_but_finite},
+      {"where degenerate begins", test_where_degenerate_begins},
+      {"nothing but finite numbers", test_nothing_but_finite},
       {"gradient and blend as the formulas have them", test_gradient}, {"onto itself", test_onto_itself})

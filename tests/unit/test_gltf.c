@@ -1,5 +1,6 @@
-/* test_gltf.c: glTF made here by hand and read: morph targets, sparse accessors, seams, nodes, skins, animations; our own files
- * there and back; what is refused. Leaves out the validator, which is asked in gltf.bats where it is installed.
+/* test_gltf.c: glTF made here by hand and read: morph targets, sparse accessors, seams, nodes, skins, animations; our
+ * own files there and back; what is refused. Leaves out the validator, which is asked in gltf.bats where it is
+ * installed.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "play.h"
 
@@ -20,7 +21,8 @@ static vg_bytes make(const char *json, const void *bin, size_t n)
     vgi_put32(head + 12, (uint32_t)size);
     memcpy(head + 16, "JSON", 4);
     vgi_put32(chunk, (uint32_t)n);
-    CHECK(vgi_bytes_append(&b, head, sizeof head, NULL) == VG_OK && vgi_bytes_append(&b, text, (size_t)size, NULL) == VG_OK);
+    CHECK(vgi_bytes_append(&b, head, sizeof head, NULL) == VG_OK &&
+          vgi_bytes_append(&b, text, (size_t)size, NULL) == VG_OK);
     CHECK(vgi_bytes_append(&b, chunk, sizeof chunk, NULL) == VG_OK && vgi_bytes_append(&b, bin, n, NULL) == VG_OK);
     return b;
 }
@@ -50,7 +52,8 @@ static void check_point(const played *p, size_t frame, size_t v, double x, doubl
 /* A quad, a concave pentagon whose first corner sees not all, a triangle, a line, and a vertex in no face. */
 static uint32_t starts[] = {0, 4, 9, 12, 14};
 static uint32_t corners[] = {0, 1, 2, 3, 5, 6, 7, 8, 4, 2, 1, 9, 9, 10};
-static double rest_pose[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 2, 0, 0, 4, 0, 0, 4, 4, 0, 2.9, 0.5, 0, 2, 4, 0, 3, 3, 3, 5, 5, 5, 9, 9, 9};
+static double rest_pose[] = {0, 0, 0, 1,   0,   0, 1, 1, 0, 0, 1, 0, 2, 0, 0, 4, 0, 0,
+                             4, 4, 0, 2.9, 0.5, 0, 2, 4, 0, 3, 3, 3, 5, 5, 5, 9, 9, 9};
 
 static void fill(vg_head *h, vg_frame frames[3], double values[3][36])
 {
@@ -134,7 +137,8 @@ static void move_bones(const vg_rig *rig, int frame, double scale, double to[21]
         const double *at = rig->at + 3 * rig->bone[b], axis[3] = {1, 0.3 * (double)b, -0.5};
         turn(axis, frame * (0.7 + (double)b), frame && b == 1 ? scale : 1, t);
         vg_quat_apply(t, at, moved);
-        for (size_t k = 0; k < 3; k++) t[4 + k] = at[k] - moved[k] + (b == 0 ? 0.2 * frame * (double)(k + 1) : 0.01 * frame);
+        for (size_t k = 0; k < 3; k++)
+            t[4 + k] = at[k] - moved[k] + (b == 0 ? 0.2 * frame * (double)(k + 1) : 0.01 * frame);
     }
 }
 
@@ -170,7 +174,8 @@ static void skin_comes_back(const vgi_sequence_format *format, double scale)
     CHECK_TEXT(p.names, "a\"b \xc3\xa4\\ c ");
     for (int i = 0; i < 3; i++) {
         vg_rig_skin(&h.rig, 12, h.reference, transforms[i], truth);
-        for (int k = 0; k < 36; k++) CHECK_NEAR(p.values[36 * i + k], truth[k], 2e-6 * 15); /* the mesh is 15 across */
+        /* the mesh is 15 across */
+        for (int k = 0; k < 36; k++) CHECK_NEAR(p.values[36 * i + k], truth[k], 2e-6 * 15);
     }
     h.rig.skin_bone = NULL, h.rig.skin_weight = NULL;
     CHECK(format->check(&h, "out", NULL) == VG_EINPUT);
@@ -245,12 +250,14 @@ static void only_equal_vertices_are_welded(void)
     snprintf(json, sizeof json, targets, "");
     played p = play_json(json, &bin, sizeof bin);
     const uint32_t whole[] = {0, 1, 2, 0, 2, 3}, torn[] = {0, 1, 2, 0, 3, 4};
-    CHECK(p.result == 0 && p.frames == 1 && p.h.count == 4 && p.h.mesh.nf == 2 && !memcmp(p.h.mesh.vert, whole, sizeof whole));
+    CHECK(p.result == 0 && p.frames == 1 && p.h.count == 4 && p.h.mesh.nf == 2 &&
+          !memcmp(p.h.mesh.vert, whole, sizeof whole));
     check_point(&p, 0, 3, 0, 1, 0);
     played_clear(&p);
     snprintf(json, sizeof json, targets, ",'targets':[{'POSITION':1}]");
     p = play_json(json, &bin, sizeof bin);
-    CHECK(p.result == 0 && p.frames == 2 && p.h.count == 5 && p.h.mesh.nf == 2 && !memcmp(p.h.mesh.vert, torn, sizeof torn));
+    CHECK(p.result == 0 && p.frames == 2 && p.h.count == 5 && p.h.mesh.nf == 2 &&
+          !memcmp(p.h.mesh.vert, torn, sizeof torn));
     check_point(&p, 1, 2, 1, 1, 5);
     check_point(&p, 1, 3, 1, 1, 6);
     played_clear(&p);
@@ -273,7 +280,8 @@ static void weights_are_played(void)
 
 /* ---- nodes ---- */
 
-/* A point at (1, 0, 0) below a node that turns about z by 90 degrees and grows, which another one moves: times 0, 1 and 0, 2. */
+/* A point at (1, 0, 0) below a node that turns about z by 90 degrees and grows, which another one moves: times 0, 1
+ * and 0, 2. */
 static void nodes_move(void)
 {
     const float h = 0.70710678f;
@@ -290,7 +298,8 @@ static void nodes_move(void)
                          FLOATS(60, 2, "VEC3") "," FLOATS(84, 6, "VEC3") "]", &bin, sizeof bin);
     CHECK(p.result == 0 && p.frames == 3 && p.h.count == 1);
     check_point(&p, 0, 0, 1, 0, 5);
-    /* at 1, half way from 0 to 8: the scale waits; slopes 4 at the start and -8 at the end of 2 s add 2 (4 + 8) / 8 */
+    /* at 1, half way from 0 to 8: the scale waits; slopes 4 at the start and -8 at the end of 2 s add 2 (4 + 8) /
+     * 8 */
     check_point(&p, 1, 0, 7, 1, 5);
     check_point(&p, 2, 0, 8, 3, 5);
     played_clear(&p);
@@ -330,7 +339,8 @@ static void all_kinds_of_primitives(void)
                  "'accessors':[" FLOATS(0, 5, "VEC3") "]", cases[i].mode);
         played p = play_json(json, bin, sizeof bin);
         const size_t n = vg_mesh_corners(&p.h.mesh);
-        CHECK(p.result == 0 && p.h.count == 5 && p.h.mesh.nf == cases[i].faces && n == cases[i].faces * cases[i].size);
+        CHECK(p.result == 0 && p.h.count == 5 && p.h.mesh.nf == cases[i].faces &&
+              n == cases[i].faces * cases[i].size);
         if (n) CHECK(!memcmp(p.h.mesh.vert + n - cases[i].size, cases[i].last, cases[i].size * sizeof(uint32_t)));
         played_clear(&p);
     }
@@ -340,7 +350,8 @@ static void all_kinds_of_primitives(void)
 static void stale_polygons_are_passed_over(void)
 {
     float bin[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0, 1, 1, 0, 0, 1, 0}; /* a quad in two triangles, cut apart */
-    static const char *const runs[] = {"1,4", "2,4", "1,5", "1,3", "1000000000000,3", "1,1000000000000", "1", "2,2", "-1,4", "'x',3"};
+    static const char *const runs[] = {"1,4", "2,4", "1,5",  "1,3",  "1000000000000,3", "1,1000000000000",
+                                       "1",   "2,2", "-1,4", "'x',3"};
     for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
         char json[512];
         snprintf(json, sizeof json, "'nodes':[{'mesh':0}],'meshes':[{'primitives':[{'attributes':{'POSITION':0}}],"
@@ -428,7 +439,8 @@ static void wrong_texts_are_refused(void)
         "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":3,\"uri\":\"beside.bin\"}]}",
         "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":3}]}",
         "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":-3}]}"};
-    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) CHECK(refused(&vgi_sequence_gltf, bad[i], strlen(bad[i])) == VG_EINPUT);
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        CHECK(refused(&vgi_sequence_gltf, bad[i], strlen(bad[i])) == VG_EINPUT);
 }
 
 TESTS({"a GLB of ours comes back whole", binary_comes_back}, {"a glTF of ours comes back whole", text_comes_back},

@@ -177,7 +177,8 @@ static double twist_of_ring(const vg_head *h, const double *x, size_t ring, size
     vg_centroid(a, sides, was);
     vg_centroid(b, sides, centre);
     for (size_t i = 0; i < sides; i++) {
-        double ax = a[3 * i] - was[0], ay = a[3 * i + 1] - was[1], bx = b[3 * i] - centre[0], by = b[3 * i + 1] - centre[1];
+        double ax = a[3 * i] - was[0], ay = a[3 * i + 1] - was[1], bx = b[3 * i] - centre[0],
+               by = b[3 * i + 1] - centre[1];
         c += ax * bx + ay * by, s += ax * by - ay * bx;
     }
     double angle = atan2(s, c);
@@ -366,8 +367,8 @@ static void bar_unwinds_evenly(void)
                 free(x);
                 free(y);
             }
-            printf("%g degrees, %s: off by %.2f degrees, %.4f D; the plain logarithm by %.1f degrees, %.4f D\n", angles[i],
-                   split ? "triangles" : "quads", most, worst, plain, astray);
+            printf("%g degrees, %s: off by %.2f degrees, %.4f D; the plain logarithm by %.1f degrees, %.4f D\n",
+                   angles[i], split ? "triangles" : "quads", most, worst, plain, astray);
             CHECK(most < 3);
             CHECK(worst < 0.01);
             if (fabs(angles[i]) > 180) CHECK(plain > 60 || astray > 0.1);
@@ -516,6 +517,6 @@ static void nearest_branch(void)
 }
 
 #define T(x) {#x, x}
-TESTS(T(nearest_branch), T(ends_are_exact), T(degenerate_ends_are_exact), T(rigid_turns_stay_rigid), T(anchors_turn_with_the_body),
-      T(limb_keeps_its_volume), T(bar_unwinds_evenly), T(smooth_paths_have_no_jumps), T(threads_change_nothing), T(kinds_agree),
-      T(wrong_keys_are_refused))
+TESTS(T(nearest_branch), T(ends_are_exact), T(degenerate_ends_are_exact), T(rigid_turns_stay_rigid),
+      T(anchors_turn_with_the_body), T(limb_keeps_its_volume), T(bar_unwinds_evenly), T(smooth_paths_have_no_jumps),
+      T(threads_change_nothing), T(kinds_agree), T(wrong_keys_are_refused))

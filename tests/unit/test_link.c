@@ -147,8 +147,8 @@ static void nested_boxes_join_to_the_one_around(void)
     clear(&b);
 }
 
-/* Every triangle of a grid has vertices of its own: each link goes from a seam to the next vertex, so that it has a direction and
- * the seam can open. */
+/* Every triangle of a grid has vertices of its own: each link goes from a seam to the next vertex, so that it has a
+ * direction and the seam can open. */
 static void unwelded_triangles_are_joined_in_their_seams(void)
 {
     size_t side = 12;
@@ -164,7 +164,8 @@ static void unwelded_triangles_are_joined_in_their_seams(void)
     uint32_t *links;
     size_t n = link_and_check(&b, &links);
     CHECK(n == 2 * side * side - 1);
-    for (size_t i = 0; i < n; i++) CHECK(length(&b, links[2 * i], links[2 * i + 1]) > 0.5 && length(&b, links[2 * i], links[2 * i + 1]) < 2);
+    for (size_t i = 0; i < n; i++)
+        CHECK(length(&b, links[2 * i], links[2 * i + 1]) > 0.5 && length(&b, links[2 * i], links[2 * i + 1]) < 2);
     free(links);
     clear(&b);
 }

@@ -1,4 +1,5 @@
-/* test_map.c: a map is its uncollapsed chain; bodies that move rigidly by patches are met; joints, paths, and other bodies.
+/* test_map.c: a map is its uncollapsed chain; bodies that move rigidly by patches are met; joints, paths, and other
+ * bodies.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
 #include "method/map_parts.h"
@@ -98,7 +99,8 @@ static void close_player(played *x)
     free(x->vertices);
 }
 
-/* The whole moves rigidly: so do all patches, and the map follows exactly, also where it was not fitted, and by joints. */
+/* The whole moves rigidly: so do all patches, and the map follows exactly, also where it was not fitted, and by
+ * joints. */
 static void rigid_bodies(void)
 {
     vg_head h = make_body(5);
@@ -131,7 +133,8 @@ static void collapsed_is_uncollapsed(void)
     uint32_t *of_face = vgi_graph_patches(&h, g, &e);
     size_t corners = vg_graph_corners(g), nv = h.mesh.nv;
     double *vectors = room(3 * corners, sizeof *vectors), *wanted = room(3 * corners, sizeof *wanted);
-    double *anchors = room(3 * h.map.nheld, sizeof *anchors), *x = room(3 * nv, sizeof *x), *rhs = room(3 * nv, sizeof *rhs);
+    double *anchors = room(3 * h.map.nheld, sizeof *anchors), *x = room(3 * nv, sizeof *x),
+           *rhs = room(3 * nv, sizeof *rhs);
     double *pose = room(3 * nv, sizeof *pose);
     vg_graph_vectors(g, h.reference, vectors);
     CHECK(vgi_map_collapse(&h, g, of_face, vectors, 2, &e) == VG_OK);
@@ -152,7 +155,8 @@ static void collapsed_is_uncollapsed(void)
     }
     CHECK(vg_solver_new(&s, g, h.map.held, h.map.nheld, h.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_OK);
     vg_solver_load(s, 1, (const double *const *)&wanted, (const double *const *)&anchors, &x, &rhs);
-    vg_solver_solve(s, 1, (const double *const *)&rhs, &x, (const double *const *)&anchors, (const double *const *)&anchors);
+    vg_solver_solve(s, 1, (const double *const *)&rhs, &x, (const double *const *)&anchors,
+                    (const double *const *)&anchors);
     CHECK_NEAR(apart(x, p.vertices, 3 * nv), 0, 1e-9 * vg_diagonal(h.reference, nv));
     vg_solver_free(&s);
     close_player(&p);
@@ -172,7 +176,8 @@ static void paths(void)
     vg_head h = make_body(6);
     fit(&h, bend);
     size_t n = h.map.n, nv = h.mesh.nv;
-    double D = vg_diagonal(h.reference, nv), *a = room(7 * n, sizeof *a), *b = room(7 * n, sizeof *b), *pose = room(3 * nv, sizeof *pose);
+    double D = vg_diagonal(h.reference, nv), *a = room(7 * n, sizeof *a), *b = room(7 * n, sizeof *b),
+           *pose = room(3 * nv, sizeof *pose);
     played x = open_player(&h, false, 1), single = open_player(&h, true, 2);
     bend(&h, 0.4, pose);
     measure(&x, pose);
@@ -198,7 +203,8 @@ static void paths(void)
     memcpy(x.transforms, a, 7 * n * sizeof *a);
     play(&x);
     CHECK_NEAR(apart(x.vertices, pose, 3 * nv), 0, 1e-9 * D);
-    vg_player_between(x.p, a, b, 0.5, x.transforms); /* the middle of a bend is the bend by the middle angle, but for the root */
+    /* the middle of a bend is the bend by the middle angle, but for the root */
+    vg_player_between(x.p, a, b, 0.5, x.transforms);
     play(&x);
     bend(&h, 0.8, pose);
     double c0[3], c1[3], worst = 0;
@@ -220,7 +226,8 @@ static void half_turns(void)
     vg_head h = make_body(5);
     fit(&h, bend);
     size_t n = h.map.n, nv = h.mesh.nv;
-    double *a = room(7 * n, sizeof *a), *b = room(7 * n, sizeof *b), *pose = room(3 * nv, sizeof *pose), *start = room(3 * nv, sizeof *start);
+    double *a = room(7 * n, sizeof *a), *b = room(7 * n, sizeof *b), *pose = room(3 * nv, sizeof *pose),
+           *start = room(3 * nv, sizeof *start);
     played x = open_player(&h, false, 1);
     measure(&x, h.reference);
     memcpy(a, x.transforms, 7 * n * sizeof *a);
@@ -258,7 +265,8 @@ static void other_bodies(void)
         fit(&h, bend);
         size_t nv = h.mesh.nv;
         double D = vg_diagonal(h.reference, nv), c0[3], c1[3], scale = half ? sqrt(2) : 2;
-        double *pose = room(3 * nv, sizeof *pose), *target = room(3 * nv, sizeof *target), *own = room(3 * nv, sizeof *own);
+        double *pose = room(3 * nv, sizeof *pose), *target = room(3 * nv, sizeof *target),
+               *own = room(3 * nv, sizeof *own);
         bend(&h, 0.9, pose);
         played x = open_player(&h, false, 1);
         measure(&x, pose);
@@ -274,7 +282,8 @@ static void other_bodies(void)
         vg_centroid(own, nv, c0);
         vg_centroid(x.vertices, nv, c1);
         double worst = 0;
-        for (size_t i = 0; i < 3 * nv; i++) worst = fmax(worst, fabs(scale * (own[i] - c0[i % 3]) - (x.vertices[i] - c1[i % 3])));
+        for (size_t i = 0; i < 3 * nv; i++)
+            worst = fmax(worst, fabs(scale * (own[i] - c0[i % 3]) - (x.vertices[i] - c1[i % 3])));
         CHECK_NEAR(worst, 0, 1e-8 * D);
         free(pose);
         free(target);

@@ -1,5 +1,6 @@
-/* test_mesh.c: what makes a mesh valid, equal, or fall into components; the vectors of a pose (MATH 1); heads and frames as
- * values that are copied, traced and labelled. Leaves out what is computed from vectors and how they are written.
+/* test_mesh.c: what makes a mesh valid, equal, or fall into components; the vectors of a pose (MATH 1); heads and
+ * frames as values that are copied, traced and labelled. Leaves out what is computed from vectors and how they are
+ * written.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
 
@@ -97,7 +98,8 @@ static void test_same(void)
     const char *name;
     for (size_t i = 0; make_any(i, &a, &name); i++) {
         CHECK(vg_mesh_copy(&b.mesh, &a.mesh, &e) == VG_OK);
-        CHECK(vg_mesh_same(&a.mesh, "a", &b.mesh, "b", &e) == VG_OK && vg_mesh_digest(&a.mesh) == vg_mesh_digest(&b.mesh));
+        CHECK(vg_mesh_same(&a.mesh, "a", &b.mesh, "b", &e) == VG_OK &&
+              vg_mesh_digest(&a.mesh) == vg_mesh_digest(&b.mesh));
         vg_mesh_clear(&b.mesh);
         vg_head_clear(&a);
     }
@@ -182,7 +184,8 @@ static void vectors_hold(vg_head *h, const char *name)
 {
     vg_graph *g = graph_of(h);
     size_t n = vg_graph_corners(g), nv = g->nv;
-    double D = vg_diagonal(h->reference, nv), *w = vectors_of(g, h->reference), *again, *moved, root[3], turned[3], most = 0;
+    double D = vg_diagonal(h->reference, nv), *w = vectors_of(g, h->reference), *again, *moved, root[3], turned[3],
+           most = 0;
     for (size_t f = 0; f < g->nf; f++) {
         double sum[3] = {0, 0, 0};
         for (size_t c = g->start[f]; c < g->start[f + 1]; c++)
@@ -278,8 +281,12 @@ static vg_head full_head(void)
 {
     vg_head h = make_mixed(3);
     size_t corners = vg_mesh_corners(&h.mesh);
-    h.attributes = (vg_attributes){.ntex = 2, .tex_dim = 2, .tex = room(4, sizeof(double)), .nlabels = 2,
-                                   .corner_tex = room(corners, sizeof(uint32_t)), .labels = room(2, sizeof(vg_label))};
+    h.attributes = (vg_attributes){.ntex = 2,
+                                   .tex_dim = 2,
+                                   .tex = room(4, sizeof(double)),
+                                   .nlabels = 2,
+                                   .corner_tex = room(corners, sizeof(uint32_t)),
+                                   .labels = room(2, sizeof(vg_label))};
     h.attributes.tex[3] = 0.5, h.attributes.corner_tex[corners - 1] = UINT32_MAX;
     h.attributes.labels[0] = (vg_label){0, VG_LABEL_GROUP, strdup("body")};
     h.attributes.labels[1] = (vg_label){2, VG_LABEL_MATERIAL, strdup("skin")};
@@ -305,8 +312,10 @@ static void test_copy(void)
     CHECK(b.attributes.corner_tex[vg_mesh_corners(&a.mesh) - 1] == UINT32_MAX && b.attributes.nlabels == 2);
     CHECK(b.attributes.labels[1].face == 2 && b.attributes.labels[1].kind == VG_LABEL_MATERIAL);
     CHECK_TEXT(b.attributes.labels[1].text, "skin");
-    CHECK(b.has_selection && b.nselected == 2 && b.selected[1] == 3 && b.has_links && b.nlinks == 1 && b.links[1] == 5);
-    CHECK(b.nanchors == 1 && b.anchors[0] == 4 && b.kind == VG_VERTICES && b.precision == VG_F64 && b.count == a.count);
+    CHECK(b.has_selection && b.nselected == 2 && b.selected[1] == 3 && b.has_links && b.nlinks == 1 &&
+          b.links[1] == 5);
+    CHECK(b.nanchors == 1 && b.anchors[0] == 4 && b.kind == VG_VERTICES && b.precision == VG_F64 &&
+          b.count == a.count);
     CHECK(b.nprovenance == 1 && b.provenance[0].nargs == 2 && b.provenance[0].nparents == 0);
     CHECK_TEXT(b.provenance[0].args[1], "a b");
     CHECK(b.extra.n == 1 && b.extra.at[0].flags == 2 && b.extra.at[0].payload.size == 5);
@@ -377,7 +386,8 @@ static void test_kinds(void)
     CHECK_TEXT(vg_kind_name((vg_kind)5), "unknown");
 }
 
-TESTS({"which meshes are valid", test_check}, {"checking needs no memory for what is claimed", test_check_needs_no_memory},
+TESTS({"which meshes are valid", test_check},
+      {"checking needs no memory for what is claimed", test_check_needs_no_memory},
       {"which meshes are the same", test_same}, {"no faces", test_empty}, {"components", test_components},
       {"diagonal and centroid", test_size_and_centre}, {"vectors sum to 0, and move as the mesh does", test_vectors},
       {"the graph has faces, selection and links", test_graph}, {"a copy is whole and its own", test_copy},

@@ -30,7 +30,8 @@ static void moved(bool stay, double times)
             CHECK_NEAR(to[i][k], target[x] + times * (pose[x] - h.reference[x]), 1e-12);
         }
     }
-    double *placed = move_points(&step, target, g->nv), *before = vgi_copy_array(placed, 3 * g->nv, sizeof *placed, &e);
+    double *placed = move_points(&step, target, g->nv),
+           *before = vgi_copy_array(placed, 3 * g->nv, sizeof *placed, &e);
     vg_mover_place(m, out.root, placed);
     vg_graph_root(g, placed, roots[2]);
     for (int k = 0; k < 3; k++) CHECK_NEAR(roots[2][k], out.root[k], 1e-12);
@@ -150,8 +151,8 @@ static void test_correspondence(void)
     vg_head_clear(&torus), vg_head_clear(&rod);
 }
 
-/* A ring of rings of three, of which the first few stay: those between two others have only faces that stay. Less than a
- * tenth of the vertices holds nothing, unless it always shall. */
+/* A ring of rings of three, of which the first few stay: those between two others have only faces that stay. Less
+ * than a tenth of the vertices holds nothing, unless it always shall. */
 static void test_few(void)
 {
     enum { RINGS = 40 };

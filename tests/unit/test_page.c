@@ -26,7 +26,8 @@ static void unpack(const vgi_chunk *c, size_t nv, size_t width, double *values)
     for (size_t i = 0; i < total; i++) {
         unsigned how = b[i / frame], rest = (unsigned)b[c->n + i] << 8 | b[c->n + total + i];
         unsigned x = rest & 1 ? ~(rest >> 1) : rest >> 1;
-        if (how & VGI_PREDICT_NEIGHBOUR && i % nv) { /* what was left of the one before: itself less its own prediction */
+        /* what was left of the one before: itself less its own prediction */
+        if (how & VGI_PREDICT_NEIGHBOUR && i % nv) {
             size_t j = i - 1;
             x += q[j] - (how & VGI_PREDICT_FRAME ? q[j - frame] : 0U) -
                  (how & VGI_PREDICT_MOTION ? 2U * q[j - frame] - q[j - 2 * frame] : 0U);
@@ -138,8 +139,14 @@ static void test_lists(void)
 
 static void test_base64(void)
 {
-    static const char *const pairs[][2] = {{"", ""}, {"f", "Zg=="}, {"fo", "Zm8="}, {"foo", "Zm9v"}, {"foob", "Zm9vYg=="},
-                                           {"fooba", "Zm9vYmE="}, {"foobar", "Zm9vYmFy"}, {"\xfb\xff\xbf", "+/+/"}};
+    static const char *const pairs[][2] = {{"", ""},
+                                           {"f", "Zg=="},
+                                           {"fo", "Zm8="},
+                                           {"foo", "Zm9v"},
+                                           {"foob", "Zm9vYg=="},
+                                           {"fooba", "Zm9vYmE="},
+                                           {"foobar", "Zm9vYmFy"},
+                                           {"\xfb\xff\xbf", "+/+/"}};
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
         vg_bytes text = {0};
         CHECK(vgi_base64(&text, (const unsigned char *)pairs[i][0], strlen(pairs[i][0]), NULL) == VG_OK);
@@ -200,7 +207,8 @@ static void test_page(void)
     CHECK_NEAR(facts.mean, 0.01 / sqrt(5), 1e-15);
     CHECK_NEAR(facts.max, 0.01 / sqrt(5), 1e-15);
     CHECK_NEAR(facts.scale, 0.005, 1e-15); /* 0.00447, rounded up */
-    CHECK_NEAR(facts.loss, 1 / 65535.0 / sqrt(5), 1e-15); /* the middle of a side of length 2; ends of a box are exact */
+    /* the middle of a side of length 2; ends of a box are exact */
+    CHECK_NEAR(facts.loss, 1 / 65535.0 / sqrt(5), 1e-15);
     char *text = page_text(fd);
     CHECK(strlen(text) == facts.bytes);
     CHECK(strstr(text, "<title>a &lt;b&gt; &amp; &quot;c&quot;</title>"));
@@ -242,6 +250,6 @@ static void test_refusals(void)
     vg_page_free(&p);
 }
 
-TESTS({"numbers come back within the stated loss", test_what_comes_back}, {"motion costs little", test_motion_costs_little},
-      {"lists come back", test_lists}, {"base64", test_base64}, {"a page says what it holds, and nothing ends its scripts", test_page},
-      {"what a page refuses", test_refusals})
+TESTS({"numbers come back within the stated loss", test_what_comes_back},
+      {"motion costs little", test_motion_costs_little}, {"lists come back", test_lists}, {"base64", test_base64},
+      {"a page says what it holds, and nothing ends its scripts", test_page}, {"what a page refuses", test_refusals})

@@ -65,10 +65,17 @@ static answer solve(const problem *q, int threads, size_t batch)
 }
 
 /* Poses of h, warped more and more, their vectors disturbed; anchors or roots elsewhere in each. */
-static problem make_problem(const vg_head *h, const vg_graph *g, const uint32_t *anchors, size_t nanchors, double disturb)
+static problem make_problem(const vg_head *h, const vg_graph *g, const uint32_t *anchors, size_t nanchors,
+                            double disturb)
 {
-    problem q = {.g = g, .reference = h->reference, .anchors = anchors, .nanchors = nanchors, .n = POSES, .fidelity = 0.05,
-                 .planarity = 1, .weights = VG_WEIGHTS_UNIFORM};
+    problem q = {.g = g,
+                 .reference = h->reference,
+                 .anchors = anchors,
+                 .nanchors = nanchors,
+                 .n = POSES,
+                 .fidelity = 0.05,
+                 .planarity = 1,
+                 .weights = VG_WEIGHTS_UNIFORM};
     double D = vg_diagonal(h->reference, g->nv);
     for (size_t k = 0; k < POSES; k++) {
         double *pose = warp(h->reference, g->nv, 0.15 * (double)k);
@@ -259,7 +266,8 @@ static void test_anchors_roots_isolated(void)
             for (size_t i = 0; i < nanchors; i++)
                 CHECK(!memcmp(a.x[k] + 3 * (size_t)anchors[i], q.at[k] + 3 * i, 3 * sizeof(double)));
             vg_graph_root(g, a.x[k], root);
-            for (int i = 0; !nanchors && i < 3; i++) CHECK_NEAR(root[i], q.at[k][i], 1e-12 * vg_diagonal(h.reference, g->nv));
+            for (int i = 0; !nanchors && i < 3; i++)
+                CHECK_NEAR(root[i], q.at[k][i], 1e-12 * vg_diagonal(h.reference, g->nv));
             for (size_t v = 0; v < g->nv; v++)
                 CHECK(g->in_face[v] || !memcmp(a.x[k] + 3 * v, h.reference + 3 * v, 3 * sizeof(double)));
         }
@@ -393,6 +401,7 @@ static void test_weights_refused(void)
 TESTS({"the dense minimum", test_dense}, {"nothing to do: the plain solution, to the bit", test_nothing_to_do},
       {"what is planar stays", test_planar_stays},
       {"anchors are met to the bit, roots and isolated vertices stay", test_anchors_roots_isolated},
-      {"all vertices anchored", test_everything_anchored}, {"threads and batches change no bit", test_threads_and_batches},
-      {"units change nothing", test_units}, {"faces without a normal", test_degenerate},
-      {"a pose that does not converge is named", test_not_converged}, {"weights that are refused", test_weights_refused})
+      {"all vertices anchored", test_everything_anchored},
+      {"threads and batches change no bit", test_threads_and_batches}, {"units change nothing", test_units},
+      {"faces without a normal", test_degenerate}, {"a pose that does not converge is named", test_not_converged},
+      {"weights that are refused", test_weights_refused})

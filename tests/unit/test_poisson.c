@@ -46,7 +46,8 @@ static bool is_key(size_t k, size_t nkeys, const size_t *keys)
 
 /* Successive over-relaxation (T 4.15) of T_(k-1) - 2 T_k + T_(k+1) = that of U, between the first and the last key;
  * beyond them the first difference is U's. */
-static sequence relax(const sequence *u, size_t nkeys, const size_t *keys, double (*given)[N], double omega, int sweeps)
+static sequence relax(const sequence *u, size_t nkeys, const size_t *keys, double (*given)[N], double omega,
+                      int sweeps)
 {
     sequence t = *u;
     size_t first = keys[0], last = keys[nkeys - 1];
@@ -67,7 +68,8 @@ static sequence relax(const sequence *u, size_t nkeys, const size_t *keys, doubl
 
 static const struct {
     size_t n, keys[4];
-} choices[] = {{1, {0}}, {1, {5}}, {1, {FRAMES - 1}}, {2, {0, FRAMES - 1}}, {2, {3, 4}}, {3, {2, 6, 9}}, {4, {0, 1, 7, 11}}};
+} choices[] = {{1, {0}},    {1, {5}},       {1, {FRAMES - 1}}, {2, {0, FRAMES - 1}},
+               {2, {3, 4}}, {3, {2, 6, 9}}, {4, {0, 1, 7, 11}}};
 
 static void test_keys(void)
 {
@@ -143,15 +145,19 @@ static void fill(vg_frame *f, const vg_head *h, size_t k)
 static bool same_frame(const vg_frame *a, const vg_frame *b, const vg_head *h)
 {
     bool graph = h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS;
-    bool same = !strcmp(a->name, b->name) && a->has_time == b->has_time && a->time == b->time && a->extra.n == b->extra.n &&
+    bool same = !strcmp(a->name, b->name) && a->has_time == b->has_time && a->time == b->time &&
+                a->extra.n == b->extra.n &&
                 !memcmp(a->values, b->values, POINTS * vg_kind_width(h->kind) * sizeof(double));
     same = same && a->npins == b->npins && (!a->npins || !memcmp(a->pins, b->pins, a->npins * sizeof *a->pins));
-    same = same && a->nturns == b->nturns && (!a->nturns || !memcmp(a->turns, b->turns, 4 * a->nturns * sizeof *a->turns));
+    same = same && a->nturns == b->nturns &&
+           (!a->nturns || !memcmp(a->turns, b->turns, 4 * a->nturns * sizeof *a->turns));
     same = same && a->has_scalars == b->has_scalars;
     if (same && a->has_scalars)
         same = !strcmp(a->scalars_name, b->scalars_name) && !strcmp(a->scalars_unit, b->scalars_unit) &&
                !memcmp(a->scalars, b->scalars, POINTS * sizeof(double));
-    if (graph) same = same && !memcmp(a->root, b->root, sizeof a->root) && !memcmp(a->anchors, b->anchors, 6 * sizeof(double));
+    if (graph)
+        same =
+            same && !memcmp(a->root, b->root, sizeof a->root) && !memcmp(a->anchors, b->anchors, 6 * sizeof(double));
     for (size_t i = 0; same && i < a->extra.n; i++) {
         const vg_record *x = &a->extra.at[i], *y = &b->extra.at[i];
         same = !strcmp(x->tag, y->tag) && x->flags == y->flags && x->payload.size == y->payload.size &&
@@ -163,7 +169,8 @@ static bool same_frame(const vg_frame *a, const vg_frame *b, const vg_head *h)
 /* Frames go in and out in bursts of several sizes, with room in memory for none, some and all of them. */
 static void test_spool(void)
 {
-    static const size_t limits[] = {0, 1, 700, 2000, 1 << 20}, bursts[][2] = {{1, 1}, {5, 3}, {40, 40}, {7, 7}, {3, 2}};
+    static const size_t limits[] = {0, 1, 700, 2000, 1 << 20},
+                        bursts[][2] = {{1, 1}, {5, 3}, {40, 40}, {7, 7}, {3, 2}};
     static const vg_kind kinds[] = {VG_VERTICES, VG_VECTORS, VG_DEFORMATIONS, VG_TRANSFORMS};
     vg_frame in = {0}, out = {0}, want = {0};
     vg_err e;

@@ -1,5 +1,5 @@
-/* test_reconstruct.c: vectors become the vertices they came from, on every kind of mesh, and vectors that fit no mesh become the
- * least-squares answer in either metric; anchors are met; threads and batches change nothing.
+/* test_reconstruct.c: vectors become the vertices they came from, on every kind of mesh, and vectors that fit no mesh
+ * become the least-squares answer in either metric; anchors are met; threads and batches change nothing.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "dense.h"
 
@@ -22,7 +22,8 @@ static void clear(answer *a)
 
 /* n poses' vectors, with anchors or roots, solved in calls of `batch` poses. */
 static answer solve(const vg_graph *g, const double *reference, const uint32_t *anchors, size_t nanchors, size_t n,
-                    const double *const *vectors, const double *const *at, vg_weights weights, int threads, size_t batch)
+                    const double *const *vectors, const double *const *at, vg_weights weights, int threads,
+                    size_t batch)
 {
     answer a = {.n = n, .x = room(n, sizeof *a.x)};
     double **rhs = room(n, sizeof *rhs);
@@ -32,7 +33,8 @@ static answer solve(const vg_graph *g, const double *reference, const uint32_t *
     for (size_t i = 0; a.code == VG_OK && i < n; i += batch) {
         size_t some = n - i < batch ? n - i : batch;
         vg_solver_load(s, some, vectors + i, nanchors ? at + i : NULL, a.x + i, rhs + i);
-        vg_solver_solve(s, some, (const double *const *)rhs + i, a.x + i, nanchors ? at + i : NULL, nanchors ? NULL : at + i);
+        vg_solver_solve(s, some, (const double *const *)rhs + i, a.x + i, nanchors ? at + i : NULL,
+                        nanchors ? NULL : at + i);
     }
     vg_solver_free(&s);
     CHECK(s == NULL);
@@ -41,8 +43,8 @@ static answer solve(const vg_graph *g, const double *reference, const uint32_t *
     return a;
 }
 
-/* One pose there and back, its root given; the error in units of the pose's D. Isolated vertices are expected where the
- * reference has them. */
+/* One pose there and back, its root given; the error in units of the pose's D. Isolated vertices are expected where
+ * the reference has them. */
 static double there_and_back(vg_head *h, const double *pose, vg_weights weights)
 {
     vg_graph *g = graph_of(h);
@@ -99,7 +101,8 @@ static void test_generated(void)
 
 static void test_long_and_large(void)
 {
-    vg_head shapes[] = {make_chain(10000), make_rod(250, 200, false), make_rod(3000, 5, true), make_ngon(10000, 0.4, 0.1)};
+    vg_head shapes[] = {make_chain(10000), make_rod(250, 200, false), make_rod(3000, 5, true),
+                        make_ngon(10000, 0.4, 0.1)};
     const char *names[] = {"chain of 10000", "rod 250 x 200", "rod 3000 x 5", "face of 10000"};
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
         gives_back(&shapes[i], names[i]);
@@ -146,8 +149,8 @@ static void test_data(void)
 /* ---- vectors that fit no mesh, against a dense solution ---- */
 
 /* The minimum of the energy by writing A' out as MATH 1 has it: row c is 1 at its own vertex and -1/r at all of its
- * face; between A and A' stands the metric of the face, if any. Anchored and isolated vertices get a row of their own;
- * without anchors the mean is put into the matrix. */
+ * face; between A and A' stands the metric of the face, if any. Anchored and isolated vertices get a row of their
+ * own; without anchors the mean is put into the matrix. */
 static double *least_squares(const vg_graph *g, const double *reference, const double *w, const uint32_t *anchors,
                              size_t nanchors, const double *at, vg_weights weights)
 {
@@ -199,7 +202,8 @@ static void against_dense(vg_head *h, const char *name, const uint32_t *anchors,
     double at[64] = {0.3 * D, -0.2 * D, D};
     const double *where = at;
     for (size_t i = 0; i < 3 * nanchors; i++) at[i] = 0.4 * D * noise();
-    for (size_t i = 0; i < 3 * vg_graph_corners(g); i++) w[i] += 0.2 * D * noise(); /* no longer a mesh's, nor centred */
+    /* no longer a mesh's, nor centred */
+    for (size_t i = 0; i < 3 * vg_graph_corners(g); i++) w[i] += 0.2 * D * noise();
     double *want = least_squares(g, h->reference, w, anchors, nanchors, at, weights);
     answer a = solve(g, h->reference, anchors, nanchors, 1, (const double *const *)&w, &where, weights, 1, 1);
     CHECK(a.code == VG_OK);
@@ -247,7 +251,8 @@ static void test_normal_equations(void)
         double root[3] = {D, 2 * D, -D}, mean[3], *left = room(3 * g->nv, sizeof *left);
         const double *at = root;
         for (size_t c = 0; c < 3 * vg_graph_corners(g); c++) w[c] *= 1 + 0.3 * noise();
-        answer a = solve(g, shapes[i]->reference, NULL, 0, 1, (const double *const *)&w, &at, VG_WEIGHTS_UNIFORM, 2, 1);
+        answer a =
+            solve(g, shapes[i]->reference, NULL, 0, 1, (const double *const *)&w, &at, VG_WEIGHTS_UNIFORM, 2, 1);
         CHECK(a.code == VG_OK);
         double *x = vectors_of(g, a.x[0]), most = 0;
         for (size_t face = 0; face < g->nf; face++) {
@@ -295,12 +300,13 @@ static void test_anchors(void)
             CHECK(spread_anchors(g, count, anchors) == count);
             for (size_t k = 0; k < POSES; k++) {
                 pose[k] = warp(h.reference, g->nv, 0.2 * (double)k);
-                for (size_t v = 0; v < 3 * g->nv; v++) pose[k][v] += (double)k; /* each pose has its anchors elsewhere */
+                /* each pose has its anchors elsewhere */
+                for (size_t v = 0; v < 3 * g->nv; v++) pose[k][v] += (double)k;
                 w[k] = vectors_of(g, pose[k]), at[k] = room(3 * count, sizeof(double));
                 vg_graph_anchors(pose[k], anchors, count, at[k]);
             }
-            answer a = solve(g, h.reference, anchors, count, POSES, (const double *const *)w, (const double *const *)at,
-                             all_weights[count % 2], 2, POSES);
+            answer a = solve(g, h.reference, anchors, count, POSES, (const double *const *)w,
+                             (const double *const *)at, all_weights[count % 2], 2, POSES);
             CHECK(a.code == VG_OK);
             for (size_t k = 0; k < POSES; k++) {
                 bool met = true, kept = true;
@@ -372,9 +378,11 @@ static void test_threads_and_batches(void)
         CHECK(one.code == VG_OK);
         for (int threads = 1; threads <= 3; threads++)
             for (size_t batch = 1; batch <= POSES; batch += batch < 9 || i == 1 ? 1 : 4) {
-                answer a = solve(g, shapes[i]->reference, NULL, 0, POSES, (const double *const *)w, at, weights, threads, batch);
+                answer a = solve(g, shapes[i]->reference, NULL, 0, POSES, (const double *const *)w, at, weights,
+                                 threads, batch);
                 bool same = a.code == VG_OK;
-                for (size_t k = 0; same && k < POSES; k++) same = !memcmp(a.x[k], one.x[k], 3 * g->nv * sizeof(double));
+                for (size_t k = 0; same && k < POSES; k++)
+                    same = !memcmp(a.x[k], one.x[k], 3 * g->nv * sizeof(double));
                 if (!same) printf("%d threads, %zu poses a call:\n", threads, batch);
                 CHECK(same);
                 clear(&a);

@@ -25,7 +25,8 @@ static double difference(const double *a, const double *b)
     return d;
 }
 
-/* R S with S symmetric positive (semi)definite has R as its nearest rotation, also when S has rank 2; -S of rank 3 turns inside out. */
+/* R S with S symmetric positive (semi)definite has R as its nearest rotation, also when S has rank 2; -S of rank 3
+ * turns inside out. */
 static void nearest_rotations(void)
 {
     for (int trial = 0; trial < 300; trial++) {
@@ -43,7 +44,8 @@ static void nearest_rotations(void)
         CHECK_NEAR(difference(found, r), 0, 1e-10);
         for (int i = 0; i < 9; i++) inverse[i] = -m[i];
         vgi_fit_rotation(inverse, found); /* a rotation all the same */
-        double det = found[0] * (found[4] * found[8] - found[5] * found[7]) - found[1] * (found[3] * found[8] - found[5] * found[6]) +
+        double det = found[0] * (found[4] * found[8] - found[5] * found[7]) -
+                     found[1] * (found[3] * found[8] - found[5] * found[6]) +
                      found[2] * (found[3] * found[7] - found[4] * found[6]);
         CHECK_NEAR(det, 1, 1e-12);
     }
@@ -77,7 +79,9 @@ static void fold(const vg_head *h, double angle, double *pose)
         double d[3] = {x[0] - LONG / 3, x[1], x[2]};
         bool middle = x[0] > LONG / 3 && x[0] <= 2 * LONG / 3, far = x[0] > 2 * LONG / 3;
         for (size_t i = 0; i < 3; i++)
-            pose[3 * v + i] = middle || far ? r[3 * i] * d[0] + r[3 * i + 1] * d[1] + r[3 * i + 2] * d[2] + (i == 0) * LONG / 3 : x[i];
+            pose[3 * v + i] = middle || far
+                                  ? r[3 * i] * d[0] + r[3 * i + 1] * d[1] + r[3 * i + 2] * d[2] + (i == 0) * LONG / 3
+                                  : x[i];
         if (far) { /* back again: as the first third */
             double at[3] = {LONG / 3 * r[0] + LONG / 3, LONG / 3 * r[3], 0};
             for (size_t i = 0; i < 3; i++) pose[3 * v + i] = at[i] + x[i] - (i == 0) * 2 * LONG / 3;
@@ -109,9 +113,11 @@ static void thirds(void)
 {
     vg_head h = new_shape();
     strip(&h);
-    vg_patches two = cut(&h, 2, false, 1), three = cut(&h, 3, true, 2), many = cut(&h, 12, false, 2), same = cut(&h, 12, false, 1);
+    vg_patches two = cut(&h, 2, false, 1), three = cut(&h, 3, true, 2), many = cut(&h, 12, false, 2),
+               same = cut(&h, 12, false, 1);
     CHECK(two.n == 2);
-    CHECK(two.of_face[0] == two.of_face[LONG - 1] && two.of_face[0] != two.of_face[LONG / 2]); /* far ends turn alike */
+    /* far ends turn alike */
+    CHECK(two.of_face[0] == two.of_face[LONG - 1] && two.of_face[0] != two.of_face[LONG / 2]);
     CHECK(three.n == 3 && three.of_face[0] != three.of_face[LONG - 1]);
     for (int f = 1; f < LONG; f++) CHECK(three.of_face[f] >= three.of_face[f - 1]);
     CHECK(many.n == same.n && !memcmp(many.of_face, same.of_face, h.mesh.nf * sizeof *many.of_face));

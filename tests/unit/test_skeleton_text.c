@@ -14,14 +14,18 @@ static void test_groups(void)
 {
     vg_joint_groups g;
     vg_err e;
-    CHECK(read_groups(&g, "# an arm\nhand elbow vertices 7 9\nelbow arm vertices 12 13, 14 15 # bent\n\narm - vertices 3\nleg - vertices 1 2",
+    CHECK(read_groups(&g,
+                      "# an arm\nhand elbow vertices 7 9\nelbow arm vertices 12 13, 14 15 # bent\n\narm - vertices "
+                      "3\nleg - vertices 1 2",
                       0, &e) == VG_OK);
     CHECK(g.n == 4);
     if (g.n == 4) {
         CHECK_TEXT(g.at[0].name, "arm");
-        CHECK(g.at[0].parent == UINT32_MAX && g.at[0].nvertices == 1 && g.at[0].vertices[0] == 3 && g.at[0].line == 5);
+        CHECK(g.at[0].parent == UINT32_MAX && g.at[0].nvertices == 1 && g.at[0].vertices[0] == 3 &&
+              g.at[0].line == 5);
         CHECK_TEXT(g.at[1].name, "elbow");
-        CHECK(g.at[1].parent == 0 && g.at[1].nvertices == 4 && g.at[1].vertices[0] == 12 && g.at[1].vertices[3] == 15);
+        CHECK(g.at[1].parent == 0 && g.at[1].nvertices == 4 && g.at[1].vertices[0] == 12 &&
+              g.at[1].vertices[3] == 15);
         CHECK_TEXT(g.at[2].name, "hand");
         CHECK(g.at[2].parent == 1 && g.at[2].nvertices == 2 && g.at[2].line == 2);
         CHECK_TEXT(g.at[3].name, "leg");
@@ -63,4 +67,5 @@ static void test_groups_refused(void)
     }
 }
 
-TESTS({"groups of vertices are joints, parents first", test_groups}, {"groups that make no sense are refused by line", test_groups_refused})
+TESTS({"groups of vertices are joints, parents first", test_groups},
+      {"groups that make no sense are refused by line", test_groups_refused})

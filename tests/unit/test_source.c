@@ -251,7 +251,8 @@ static void mismatch_is_named(void)
     write_bytes("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 32);
     seen s = read_all_of(operands, 2);
     CHECK(s.result == VG_EINPUT && s.n == 3);
-    CHECK_TEXT(s.e.message, "'b.obj' has 3 vertices where 'pose1.obj' in 'a.zip' has 4: all poses of a sequence have the same vertices and faces");
+    CHECK_TEXT(s.e.message, "'b.obj' has 3 vertices where 'pose1.obj' in 'a.zip' has 4: all poses of a sequence have "
+                            "the same vertices and faces");
     leave_place();
 }
 

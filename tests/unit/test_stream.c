@@ -1,5 +1,6 @@
-/* test_stream.c: every kind of stream is read back as it was written; every prefix and every changed byte is refused; what
- * may stand where; lengths that lie; numbers that are none. Streams are taken apart and put together here, checksums included.
+/* test_stream.c: every kind of stream is read back as it was written; every prefix and every changed byte is refused;
+ * what may stand where; lengths that lie; numbers that are none. Streams are taken apart and put together here,
+ * checksums included.
  * Leaves out the second implementation and the corpora (stream.bats).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
@@ -200,7 +201,8 @@ static int read_rest(vg_reader *reader, content *c, vg_err *e)
         memcpy(to->values, f.values, h->count * vg_kind_width(h->kind) * sizeof(double));
         memcpy(to->root, f.root, sizeof f.root);
         if (vg_frame_pin(to, f.pins, f.npins, e) < 0 || vg_frame_turn(to, f.turns, f.nturns, e) < 0) abort();
-        if (f.has_scalars && vg_frame_scalars(to, f.scalars_name, f.scalars_unit, f.scalars, h->mesh.nv, e) < 0) abort();
+        if (f.has_scalars && vg_frame_scalars(to, f.scalars_name, f.scalars_unit, f.scalars, h->mesh.nv, e) < 0)
+            abort();
         if (h->nanchors && f.anchors) memcpy(to->anchors, f.anchors, 3 * h->nanchors * sizeof(double));
     }
     if (r == 0) {
@@ -255,9 +257,10 @@ static bool same_head(const vg_head *a, const vg_head *b)
     vg_err e;
     size_t corners = vg_mesh_corners(&a->mesh);
     bool same = vg_mesh_same(&a->mesh, "a", &b->mesh, "b", &e) == VG_OK && !a->reference == !b->reference &&
-                same_text(a->reference_name, b->reference_name) && a->kind == b->kind && a->precision == b->precision &&
-                a->count == b->count && a->nselected == b->nselected && a->nlinks == b->nlinks && a->nanchors == b->nanchors &&
-                a->has_selection == b->has_selection && a->has_links == b->has_links && a->nprovenance == b->nprovenance &&
+                same_text(a->reference_name, b->reference_name) && a->kind == b->kind &&
+                a->precision == b->precision && a->count == b->count && a->nselected == b->nselected &&
+                a->nlinks == b->nlinks && a->nanchors == b->nanchors && a->has_selection == b->has_selection &&
+                a->has_links == b->has_links && a->nprovenance == b->nprovenance &&
                 same_records(&a->extra, &b->extra);
     if (!same) return false;
     same &= same_memory(a->reference, b->reference, a->reference ? 24 * a->mesh.nv : 0);
@@ -285,17 +288,19 @@ static bool same_head(const vg_head *a, const vg_head *b)
     const vg_rig *g = &a->rig, *k = &b->rig;
     size_t n = g->skeleton.njoints, skin = g->skin_bone ? VG_SKIN * a->mesh.nv : 0;
     same = same && n == k->skeleton.njoints && g->nbones == k->nbones && !g->skin_bone == !k->skin_bone &&
-           same_memory(g->at, k->at, 24 * n) && same_memory(g->turn, k->turn, 32 * n) && same_memory(g->bone, k->bone, 4 * g->nbones) &&
-           same_memory(g->skin_bone, k->skin_bone, 4 * skin) && same_memory(g->skin_weight, k->skin_weight, 8 * skin);
+           same_memory(g->at, k->at, 24 * n) && same_memory(g->turn, k->turn, 32 * n) &&
+           same_memory(g->bone, k->bone, 4 * g->nbones) && same_memory(g->skin_bone, k->skin_bone, 4 * skin) &&
+           same_memory(g->skin_weight, k->skin_weight, 8 * skin);
     const vg_correspondence *c = &a->correspondence, *d = &b->correspondence;
     same = same && !c->first == !d->first;
     if (!same || !c->first) return same;
     size_t nf = c->target_nf;
-    same = c->source_nv == d->source_nv && c->source_nf == d->source_nf && c->target_nv == d->target_nv && nf == d->target_nf &&
-           c->source_digest == d->source_digest && c->target_digest == d->target_digest &&
+    same = c->source_nv == d->source_nv && c->source_nf == d->source_nf && c->target_nv == d->target_nv &&
+           nf == d->target_nf && c->source_digest == d->source_digest && c->target_digest == d->target_digest &&
            same_memory(c->first, d->first, 4 * (nf + 1));
-    return same && same_memory(c->source, d->source, 4 * c->first[nf]) && same_memory(c->weight, d->weight, 8 * c->first[nf]) &&
-           same_memory(c->distance, d->distance, 8 * nf) && same_memory(c->matched, d->matched, nf);
+    return same && same_memory(c->source, d->source, 4 * c->first[nf]) &&
+           same_memory(c->weight, d->weight, 8 * c->first[nf]) && same_memory(c->distance, d->distance, 8 * nf) &&
+           same_memory(c->matched, d->matched, nf);
 }
 
 static bool same_frame(const vg_frame *a, const vg_frame *b, const vg_head *h)
@@ -368,7 +373,9 @@ static void add_skeleton(vg_head *h)
         vg_joint *j = &s->joints[i];
         char name[] = "joint.";
         name[5] = (char)('a' + i);
-        *j = (vg_joint){.name = strdup(i == 1 ? "" : name), .parent = i ? (uint32_t)i - 1 : UINT32_MAX, .nchannels = i % 2 ? 3 : 6};
+        *j = (vg_joint){.name = strdup(i == 1 ? "" : name),
+                        .parent = i ? (uint32_t)i - 1 : UINT32_MAX,
+                        .nchannels = i % 2 ? 3 : 6};
         for (uint32_t k = 0; k < j->nchannels; k++) j->channels[k] = (uint8_t)(6 - k), j->offset[k % 3] = 0.25 * k;
     }
 }
@@ -394,19 +401,28 @@ static void add_rig(vg_head *h)
 static void add_correspondence(vg_head *h)
 {
     vg_correspondence *c = &h->correspondence;
-    *c = (vg_correspondence){.source_nv = 9, .source_nf = 8, .target_nv = 5, .target_nf = 3, .source_digest = 1, .target_digest = 2,
-                             .first = room(4, 4), .source = room(4, 4), .weight = room(4, 8), .distance = room(3, 8),
+    *c = (vg_correspondence){.source_nv = 9,
+                             .source_nf = 8,
+                             .target_nv = 5,
+                             .target_nf = 3,
+                             .source_digest = 1,
+                             .target_digest = 2,
+                             .first = room(4, 4),
+                             .source = room(4, 4),
+                             .weight = room(4, 8),
+                             .distance = room(3, 8),
                              .matched = room(3, 1)};
     static const uint32_t first[] = {0, 1, 3, 4}, source[] = {7, 0, 5, 0};
     static const double weight[] = {1, 0.25, 0.75, 1};
-    memcpy(c->first, first, sizeof first), memcpy(c->source, source, sizeof source), memcpy(c->weight, weight, sizeof weight);
+    memcpy(c->first, first, sizeof first), memcpy(c->source, source, sizeof source),
+        memcpy(c->weight, weight, sizeof weight);
     c->distance[1] = 0.5, c->matched[2] = 1;
 }
 
 enum { PLAIN, FULL };
 
-/* A stream of a kind: PLAIN has what must be there; FULL has every record, and unknown ones everywhere. Values fit into
- * binary32. */
+/* A stream of a kind: PLAIN has what must be there; FULL has every record, and unknown ones everywhere. Values fit
+ * into binary32. */
 static content make(vg_kind kind, vg_precision precision, int how)
 {
     content c = {.n = 2};
@@ -445,7 +461,8 @@ static content make(vg_kind kind, vg_precision precision, int how)
         for (size_t k = 0; k < 3 * h->nanchors; k++) f->anchors[k] = noise();
         if (how == FULL && kind == VG_VECTORS) /* an even and an odd number of pins */
             CHECK(vg_frame_pin(f, (uint32_t[]){0, 2, 6}, 2 + i, &e) == VG_OK);
-        if (how == FULL && kind == VG_VERTICES && i) CHECK(vg_frame_turn(f, h->rig.turn, h->rig.skeleton.njoints, &e) == VG_OK);
+        if (how == FULL && kind == VG_VERTICES && i)
+            CHECK(vg_frame_turn(f, h->rig.turn, h->rig.skeleton.njoints, &e) == VG_OK);
         if (how == FULL && kind == VG_VERTICES && i) /* any numbers will do: the first of the frame */
             CHECK(vg_frame_scalars(f, "error", i == 1 ? "D" : "", f->values, h->mesh.nv, &e) == VG_OK);
         if (how == FULL && i) add_unknown(&f->extra, "MID ", COPY_SAFE, "before a frame");
@@ -512,8 +529,8 @@ static void test_there_and_back(void)
 
 static void test_numbers(void)
 {
-    static const double wild[] = {0, -0.0, 5e-324, -5e-324, 1.7976931348623157e308, -1.7976931348623157e308, 0.1, 1e-310,
-                                  1 + 0x1p-52};
+    static const double wild[] = {0,   -0.0,   5e-324,     -5e-324, 1.7976931348623157e308, -1.7976931348623157e308,
+                                  0.1, 1e-310, 1 + 0x1p-52};
     content c = make(VG_VERTICES, VG_F64, PLAIN);
     memcpy(c.frame[0].values, wild, sizeof wild);
     memcpy(c.head.reference, wild, sizeof wild);
@@ -561,7 +578,8 @@ static void every_prefix(const vg_bytes *b)
         refuse(b->data, n, VG_ETRUNC, what);
     }
     vg_err e = {0, ""};
-    CHECK(read_memory(b->data, 0, NULL, &e) == VG_ETRUNC && strstr(e.message, "is empty: did the program before it fail?"));
+    CHECK(read_memory(b->data, 0, NULL, &e) == VG_ETRUNC &&
+          strstr(e.message, "is empty: did the program before it fail?"));
 }
 
 /* Bytes 8 to 11 are the minor version, which a reader takes as it comes. */
@@ -659,7 +677,8 @@ static void test_order(void)
     for (int i = 0; i < n; i++) {
         char tag[5];
         memcpy(tag, p.at[i].tag, 5);
-        bool unknown_tag = !strcmp(tag, "NOTE") || !strcmp(tag, "X 12") || !strcmp(tag, "MID ") || !strcmp(tag, "LAST");
+        bool unknown_tag =
+            !strcmp(tag, "NOTE") || !strcmp(tag, "X 12") || !strcmp(tag, "MID ") || !strcmp(tag, "LAST");
         bool again = unknown_tag || !strcmp(tag, "PROV") || !strcmp(tag, "FRAM");
         /* twice in a row */
         int k = 0;
@@ -675,8 +694,8 @@ static void test_order(void)
         else refuse(x.data, x.size, VG_EINPUT, what);
         vg_bytes_clear(&x);
         /* left out: SELE and LINK change how many corners there are, ANCH the size of a frame */
-        bool may_miss = again || !strcmp(tag, "TEXC") || !strcmp(tag, "LABL") || !strcmp(tag, "SKEL") || !strcmp(tag, "CORR") ||
-                        !strcmp(tag, "RIG ");
+        bool may_miss = again || !strcmp(tag, "TEXC") || !strcmp(tag, "LABL") || !strcmp(tag, "SKEL") ||
+                        !strcmp(tag, "CORR") || !strcmp(tag, "RIG ");
         if (!strcmp(tag, "PROV")) may_miss = i != 0; /* the second names the first as its parent */
         k = 0;
         for (int j = 0; j < n; j++)
@@ -815,7 +834,8 @@ static void test_not_finite_in(void)
         for (size_t at = 16; at < p.at[refp].payload.size; at += 8) refuse_number(&p, refp, at, none[i], "REFP");
         refuse_number(&p, texc, 16, none[i], "TEXC");
         refuse_number(&p, skel, 16, none[i], "SKEL"); /* an offset of the first joint */
-        for (size_t at = 88; at < 88 + 7 * 8; at += 8) refuse_number(&p, corr, at, none[i], "CORR"); /* weights, distances */
+        /* weights, distances */
+        for (size_t at = 88; at < 88 + 7 * 8; at += 8) refuse_number(&p, corr, at, none[i], "CORR");
     }
     drop(&p);
     vg_bytes_clear(&b);
@@ -841,8 +861,8 @@ static void test_not_finite_out(void)
             content c = make((vg_kind)kind, (vg_precision)precision, FULL);
             bool graph = kind == VG_VECTORS || kind == VG_DEFORMATIONS;
             size_t last = c.head.count * vg_kind_width(c.head.kind) - 1;
-            double *places[] = {&c.frame[1].values[0], &c.frame[1].values[last], &c.frame[1].time, &c.head.reference[2],
-                                &c.frame[0].root[1], &c.frame[0].anchors[5]};
+            double *places[] = {&c.frame[1].values[0], &c.frame[1].values[last], &c.frame[1].time,
+                                &c.head.reference[2],  &c.frame[0].root[1],      &c.frame[0].anchors[5]};
             for (size_t i = 0; i < (graph ? 6 : 4); i++)
                 for (size_t k = 0; k < 3; k++) {
                     double was = *places[i];
@@ -900,8 +920,9 @@ static int read_in_small_memory(const vg_bytes *b, bool from_pipe)
 
 static void test_lying_lengths(void)
 {
-    static const uint64_t claims[] = {1u << 20, (uint64_t)1 << 31, (uint64_t)1 << 32, (uint64_t)1 << 40, ((uint64_t)1 << 40) + 1,
-                                      (uint64_t)1 << 62, UINT64_MAX};
+    static const uint64_t claims[] = {1u << 20,          (uint64_t)1 << 31,       (uint64_t)1 << 32,
+                                      (uint64_t)1 << 40, ((uint64_t)1 << 40) + 1, (uint64_t)1 << 62,
+                                      UINT64_MAX};
     static const char *const tags[] = {"PROV", "MESH", "WHAT", "FRAM"};
     content c = make(VG_VERTICES, VG_F64, PLAIN);
     vg_bytes whole = written(&c), some = {0};
@@ -941,15 +962,18 @@ static void test_lying_counts(void)
             for (uint32_t k = 0; k < 17; k++) append32(&mesh, k);
             const char *tag = "REFP";
             if (what == 4) tag = "TEXC", append32(&x, 3), append32(&x, 0), append64(&x, n), append_double(&x, 0);
-            if (what == 5) tag = "PROV", append32(&x, (uint32_t)n), append32(&x, (uint32_t)n), append32(&x, 0), append32(&x, 0);
+            if (what == 5)
+                tag = "PROV", append32(&x, (uint32_t)n), append32(&x, (uint32_t)n), append32(&x, 0), append32(&x, 0);
             if (what == 6) tag = "CORR";
             for (int k = 0; k < 7 && what == 6; k++) append64(&x, k == 4 || k == 6 ? n : 1);
-            if (what == 7) tag = "LABL", append64(&x, 0), append32(&x, 1), append32(&x, (uint32_t)(n ? n : 1) | 1u << 31);
+            if (what == 7)
+                tag = "LABL", append64(&x, 0), append32(&x, 1), append32(&x, (uint32_t)(n ? n : 1) | 1u << 31);
             if (what < 4) append32(&x, what == 0 ? (uint32_t)n | 1u << 31 : 0), append32(&x, 0), append_double(&x, 0);
             put_record(&b, "MESH", CRITICAL, &mesh);
             put_record(&b, tag, 0, &x);
             put_end(&b);
-            if (read_in_small_memory(&b, false) != VG_EINPUT) printf("%d, count %llx:\n", what, (unsigned long long)n);
+            if (read_in_small_memory(&b, false) != VG_EINPUT)
+                printf("%d, count %llx:\n", what, (unsigned long long)n);
             CHECK(read_in_small_memory(&b, false) == VG_EINPUT);
             vg_bytes_clear(&b);
             vg_bytes_clear(&mesh);
@@ -1023,7 +1047,8 @@ static void test_descriptor(void)
         CHECK(same_content(&c, &back));
         content_clear(&back);
     }
-    for (size_t most = 0; most < b.size; most += most < 64 ? 1 : 41) { /* cut, it says the same wherever it comes from */
+    /* cut, it says the same wherever it comes from */
+    for (size_t most = 0; most < b.size; most += most < 64 ? 1 : 41) {
         int want = read_memory(b.data, most, NULL, &memory);
         CHECK(read_pipe(&b, 29, most, NULL, &piped) == want && want == VG_ETRUNC);
         CHECK_TEXT(piped.message, memory.message);
@@ -1089,14 +1114,16 @@ static void test_full_device(void)
     int fd = open("/dev/full", O_WRONLY);
     vg_writer *w = NULL;
     vg_err e = {0, ""};
-    CHECK(fd >= 0 && vg_writer_open(&w, fd, "the disk", &c.head, &e) == VG_ESYS && !w && strstr(e.message, "'the disk'"));
+    CHECK(fd >= 0 && vg_writer_open(&w, fd, "the disk", &c.head, &e) == VG_ESYS && !w &&
+          strstr(e.message, "'the disk'"));
     close(fd);
     content_clear(&c);
 }
 
 TESTS({"every kind there and back", test_there_and_back}, {"extreme numbers", test_numbers},
-      {"every prefix and every changed byte is refused", test_damage}, {"nothing may follow the end", test_behind_the_end},
-      {"the END mark counts", test_end_mark}, {"which record where", test_order}, {"unknown records", test_unknown},
+      {"every prefix and every changed byte is refused", test_damage},
+      {"nothing may follow the end", test_behind_the_end}, {"the END mark counts", test_end_mark},
+      {"which record where", test_order}, {"unknown records", test_unknown},
       {"the reader takes finite numbers only", test_not_finite_in}, {"the writer, too", test_not_finite_out},
       {"lengths that lie cost no memory", test_lying_lengths}, {"counts that lie", test_lying_counts},
       {"from a descriptor in pieces", test_descriptor}, {"many megabytes", test_large},

@@ -99,7 +99,8 @@ static void draw(drawn *d, const shape *s, double azimuth, double elevation, siz
     vgi_box box = vgi_box_empty();
     vgi_camera_measure(&d->camera, &d->figure, d->points, (double[2]){0, 0}, &box);
     vgi_camera_fit(&d->camera, &box, 0.1);
-    vgi_drawing drawing = {.figure = &d->figure, .camera = &d->camera, .points = d->points, .values = values, .wire = 2};
+    vgi_drawing drawing = {
+        .figure = &d->figure, .camera = &d->camera, .points = d->points, .values = values, .wire = 2};
     CHECK(vgi_raster_init(&d->raster, side, side, NULL) == VG_OK);
     CHECK(vgi_draw(&d->raster, &drawing, NULL) == VG_OK);
 }
@@ -342,7 +343,8 @@ typedef struct picture {
 
 static vg_head head_of(const shape *f)
 {
-    return (vg_head){.mesh = f->mesh, .reference = (double *)(uintptr_t)f->points, .kind = VG_VERTICES, .count = f->mesh.nv};
+    return (vg_head){
+        .mesh = f->mesh, .reference = (double *)(uintptr_t)f->points, .kind = VG_VERTICES, .count = f->mesh.nv};
 }
 
 static vg_sheet_options options(void)
@@ -641,8 +643,10 @@ static void albums_match(void)
 
 static void colours_end_at_short_numbers(void)
 {
-    static const double given[][2] = {{1, 1}, {1.01, 1.2}, {0.00447, 0.005}, {8.1, 10}, {99, 100}, {1e-9, 1e-9}, {2.5e12, 2.5e12}};
-    for (size_t i = 0; i < sizeof given / sizeof *given; i++) CHECK_NEAR(vgi_round_up(given[i][0]), given[i][1], 1e-9 * given[i][1]);
+    static const double given[][2] = {{1, 1},    {1.01, 1.2},  {0.00447, 0.005}, {8.1, 10},
+                                      {99, 100}, {1e-9, 1e-9}, {2.5e12, 2.5e12}};
+    for (size_t i = 0; i < sizeof given / sizeof *given; i++)
+        CHECK_NEAR(vgi_round_up(given[i][0]), given[i][1], 1e-9 * given[i][1]);
     vgi_tint t = {.what = VG_TINT_ERRORS};
     vgi_tint_end(&t, 0, 0.00447, 0);
     CHECK(t.low == 0 && !t.diverging);
@@ -668,14 +672,16 @@ static void map_with_a_middle_is_grey_there(void)
     vgi_map_colour(0.5, true, middle);
     vgi_map_colour(1, true, high);
     vgi_map_colour(0.5 - 1e-9, true, near);
-    for (int k = 0; k < 3; k++) CHECK(fabsf(middle[k] - middle[0]) < 1e-3f && fabsf(middle[k] - near[k]) < 1e-3f && middle[k] > 0.7f);
+    for (int k = 0; k < 3; k++)
+        CHECK(fabsf(middle[k] - middle[0]) < 1e-3f && fabsf(middle[k] - near[k]) < 1e-3f && middle[k] > 0.7f);
     CHECK(low[2] > 4 * low[0] && high[0] > 4 * high[2]);
 }
 
 /* Vectors of a vertex: one halved and one four times as long are together as long again by the square root of 2. */
 static void scales_are_geometric_means(void)
 {
-    static const double rest[] = {-1, 0, 0, 1, 0, 0, 0, 3, 0, 5, 5, 5}, pose[] = {-0.5, 0, 0, 0.5, 0, 0, -0.5, 4, 0, 5, 5, 5};
+    static const double rest[] = {-1, 0, 0, 1, 0, 0, 0, 3, 0, 5, 5, 5},
+                        pose[] = {-0.5, 0, 0, 0.5, 0, 0, -0.5, 4, 0, 5, 5, 5};
     static uint32_t start[] = {0, 2, 4}, vert[] = {0, 1, 0, 2};
     const vg_mesh m = {4, 2, start, vert};
     vgi_tint t = {.what = VG_TINT_SCALES};
@@ -691,11 +697,13 @@ static void scales_are_geometric_means(void)
     CHECK(meter.numbers[3] == 0 && spread.least == -1); /* in no face */
     double gone[12] = {0}; /* vectors that have shrunk to nothing are no infinity */
     f.values = gone;
-    CHECK(vgi_tint_read(&t, &meter, &f, NULL, &spread, NULL) == VG_OK && spread.least == -20 && isfinite(spread.mean));
+    CHECK(vgi_tint_read(&t, &meter, &f, NULL, &spread, NULL) == VG_OK && spread.least == -20 &&
+          isfinite(spread.mean));
     vgi_meter_clear(&meter);
 }
 
-/* Of a square and its two sides: contours are where it ends; an edge between two fronts is none, one that is folded over is. */
+/* Of a square and its two sides: contours are where it ends; an edge between two fronts is none, one that is folded
+ * over is. */
 static void contours_are_where_fronts_end(void)
 {
     begin(&s); /* two triangles that share the edge 0-2 */
@@ -704,14 +712,16 @@ static void contours_are_where_fronts_end(void)
     FACE(&s, 0, 2, 3);
     size_t lines[2];
     for (int folded = 0; folded < 2; folded++) {
-        if (folded) memcpy(s.points + 9, (double[]){0.9, 0.1, 0.5}, 3 * sizeof(double)); /* 3 comes before 1: 0 2 3 is a back */
+        /* 3 comes before 1: 0 2 3 is a back */
+        if (folded) memcpy(s.points + 9, (double[]){0.9, 0.1, 0.5}, 3 * sizeof(double));
         draw(&d, &s, 0, 0, 200, NULL);
         CHECK(vgi_figure_sides(&d.figure, NULL) == VG_OK && d.figure.nsides == 6);
         vgi_drawing drawing = {.figure = &d.figure, .camera = &d.camera, .points = d.points, .contour = 1.5f};
         vgi_raster_clear(&d.raster);
         CHECK(vgi_raster_init(&d.raster, 200, 200, NULL) == VG_OK && vgi_draw(&d.raster, &drawing, NULL) == VG_OK);
         lines[folded] = 0;
-        for (size_t i = 60; i < 140; i++) lines[folded] += d.raster.at[(199 - i) * 200 + i].kind == VGI_CONTOUR; /* the diagonal */
+        /* the diagonal */
+        for (size_t i = 60; i < 140; i++) lines[folded] += d.raster.at[(199 - i) * 200 + i].kind == VGI_CONTOUR;
         CHECK(count_kind(&d.raster, VGI_CONTOUR) > 3 * 160 * 2);
         undraw(&d);
     }
