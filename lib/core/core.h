@@ -84,4 +84,11 @@ static inline __attribute__((always_inline)) vgi_lanes vgi_gather(const double *
     return (vgi_lanes){p[0][i], p[1][i], p[2][i], p[3][i], p[4][i], p[5][i], p[6][i], p[7][i]};
 }
 
+/* vgi_lane_roots: the square root of each. */
+static inline __attribute__((always_inline)) vgi_lanes vgi_lane_roots(vgi_lanes a)
+{
+    for (int i = 0; i < VGI_LANES; i++) a[i] = __builtin_sqrt(a[i]);
+    return a;
+}
+
 #endif

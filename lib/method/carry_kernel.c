@@ -12,13 +12,6 @@
 #define AVX2 __attribute__((target("avx2,fma")))
 #endif
 
-INLINE vgi_lanes lane_sqrt(vgi_lanes a)
-{
-    vgi_lanes r;
-    for (int i = 0; i < VGI_LANES; i++) r[i] = sqrt(a[i]);
-    return r;
-}
-
 INLINE void measure_map(const vgi_source *s, size_t f, vgi_map *map, unsigned char *bad)
 {
     uint32_t begin = s->start[f], end = s->start[f + 1];
@@ -41,7 +34,7 @@ INLINE void measure_map(const vgi_source *s, size_t f, vgi_map *map, unsigned ch
         n[2] += before[0] * x[1] - before[1] * x[0];
         for (int i = 0; i < 3; i++) before[i] = x[i];
     }
-    vgi_lanes n2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2], root = lane_sqrt(lane_sqrt(n2));
+    vgi_lanes n2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2], root = vgi_lane_roots(vgi_lane_roots(n2));
     vgi_mask none = ~(n2 > 1e-24 * spread * spread);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) d.m[3 * i + j] += n[i] / root * s->q[3 * f + (size_t)j];
@@ -69,7 +62,7 @@ INLINE vgi_lanes newton_step(vgi_lanes *x)
     /* the scale that balances Frobenius norms of x and x^-T */
     vgi_lanes abs_det = {0};
     for (int k = 0; k < VGI_LANES; k++) abs_det[k] = fabs(det[k]);
-    vgi_lanes g = lane_sqrt(lane_sqrt(inverse_size / size) / abs_det), a = 0.5 * g, b = 0.5 / (g * det);
+    vgi_lanes g = vgi_lane_roots(vgi_lane_roots(inverse_size / size) / abs_det), a = 0.5 * g, b = 0.5 / (g * det);
     for (int i = 0; i < 9; i++) {
         vgi_lanes y = a * x[i] + b * c[i];
         change += (y - x[i]) * (y - x[i]);
@@ -111,7 +104,7 @@ INLINE void follow_face(const vgi_map *d, vgi_follow how, const double *vectors,
             if (how != VGI_FOLLOW_GRADIENT) {
                 apply(&turn, v, t);
                 vgi_lanes stretch =
-                    lane_sqrt((w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) / (length2 > 0 ? length2 : 1));
+                    vgi_lane_roots((w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) / (length2 > 0 ? length2 : 1));
                 for (int i = 0; i < 3; i++) {
                     t[i] *= stretch;
                     w[i] = how == VGI_FOLLOW_BLEND ? 0.5 * (t[i] + w[i]) : t[i];

@@ -16,13 +16,6 @@
  * 1e-12 */
 static const double flat2 = 1e-24;
 
-INLINE vgi_lanes lane_sqrt(vgi_lanes a)
-{
-    vgi_lanes r;
-    for (int i = 0; i < VGI_LANES; i++) r[i] = sqrt(a[i]);
-    return r;
-}
-
 INLINE vgi_lanes dot(vgi_vec a, vgi_vec b)
 {
     return a.x * b.x + a.y * b.y + a.z * b.z;
@@ -83,12 +76,12 @@ INLINE vgi_mask by_pose(const vgi_transfer *t, uint32_t begin, size_t r, vgi_vec
     vgi_mask bad = {0};
     for (size_t i = 0; i < r; i++) {
         const double *k = t->coordinates + 3 * (size_t)(begin + i);
-        vgi_lanes d2 = dot(w[i], w[i]), length = lane_sqrt(d2), along = dot(n, w[i]);
+        vgi_lanes d2 = dot(w[i], w[i]), length = vgi_lane_roots(d2), along = dot(n, w[i]);
         /* m = n - (n.u) u; |m|^2 = 1 - (n.u)^2 */
         vgi_vec m = add(n, times(w[i], -along / d2));
         vgi_lanes m2 = dot(m, m);
         bad |= ~(d2 > t->shortest2) | ~(m2 > flat2);
-        m = times(m, length / lane_sqrt(m2));            /* |d| times the unit normal of the corner */
+        m = times(m, length / vgi_lane_roots(m2));            /* |d| times the unit normal of the corner */
         vgi_vec b = times(cross(m, w[i]), 1.0 / length); /* n x u, times |d| */
         w[i] = add(times(w[i], same(k[0])), add(times(b, same(k[1])), times(m, same(k[2]))));
     }
@@ -125,7 +118,7 @@ INLINE void transfer_face(const vgi_transfer *t, size_t f, vgi_vec *w, vgi_vec *
     }
     vgi_lanes n2 = dot(n, n);
     vgi_mask bad = ~(n2 > flat2 * spread * spread);
-    n = times(n, 1.0 / lane_sqrt(n2));
+    n = times(n, 1.0 / vgi_lane_roots(n2));
 
     if (method != VGI_POSE) by_gradient(t, f, begin, r, n, w, g);
     if (method != VGI_GRADIENT) bad |= by_pose(t, begin, r, n, w);

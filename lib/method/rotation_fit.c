@@ -110,13 +110,6 @@ void vgi_turns_clear(vgi_turns *t)
     *t = (vgi_turns){0};
 }
 
-INLINE vgi_lanes lane_sqrt(vgi_lanes a)
-{
-    vgi_lanes r;
-    for (int i = 0; i < VGI_LANES; i++) r[i] = sqrt(a[i]);
-    return r;
-}
-
 INLINE vgi_lanes lane_squares(const vgi_lanes *x)
 {
     vgi_lanes s = {0};
@@ -157,7 +150,7 @@ INLINE void face_matrix(const vgi_turns *t, size_t f, const double *const *poses
     }
     vgi_lanes n2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
     vgi_mask sound = n2 > 1e-24 * spread * spread;
-    vgi_lanes length = lane_sqrt(n2);
+    vgi_lanes length = vgi_lane_roots(n2);
     for (int k = 0; k < VGI_LANES; k++) length[k] = sound[k] ? 1 / length[k] : 0;
     for (size_t i = 0; i < 3; i++)
         for (size_t k = 0; k < 3; k++) m[3 * i + k] += n[i] * length * t->normal[3 * f + k];
@@ -170,7 +163,7 @@ INLINE void measure(const vgi_turns *t, size_t f, const double *const *poses, vg
     face_matrix(t, f, poses, m);
     vgi_lanes size2 = lane_squares(m);
     for (int k = 0; k < VGI_LANES; k++) size2[k] = size2[k] > 0 ? 1 / size2[k] : 0;
-    vgi_lanes shrink = lane_sqrt(size2) * 1.7320508075688772;
+    vgi_lanes shrink = vgi_lane_roots(size2) * 1.7320508075688772;
     for (int i = 0; i < 9; i++) x[i] = m[i] * shrink;
     vgi_lanes det = lane_cofactors(x, c);
     vgi_mask good = det > 5.2 * thin;
@@ -180,7 +173,7 @@ INLINE void measure(const vgi_turns *t, size_t f, const double *const *poses, vg
         det = lane_cofactors(x, c);
         vgi_lanes a = {0}, b, change = {0};
         if (step < 4) {
-            vgi_lanes g = lane_sqrt(lane_sqrt(lane_squares(c) / lane_squares(x)) / det);
+            vgi_lanes g = vgi_lane_roots(vgi_lane_roots(lane_squares(c) / lane_squares(x)) / det);
             a = 0.5 * g, b = 0.5 / (g * det);
         } else {
             a += 0.5, b = 0.5 / det;
