@@ -30,8 +30,8 @@ typedef struct between_key {
 /* between_label: name f after moment t of the keys ("a~b@0.25", at a key the key's own) and give it its time. */
 void between_label(vg_frame *f, const between_key *keys, size_t nkeys, double t);
 
-/* between_run: the whole job for a sequence of vertices, vectors or deformations, from its head to the end of the
- * output. */
+/* between_run: the whole job for a sequence of vertices, vectors or deformations,
+ * from its head to the end of the output. */
 void between_run(vg_source *s);
 
 #endif

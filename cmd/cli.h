@@ -84,8 +84,8 @@ vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o
 char *cli_read_file(const char *path, size_t *n);
 
 /* The stream of a filter. cli_stream_open takes the head (adds this process to the provenance unless told not to) and
- * opens the output: standard output, refused when a terminal, or a temporary file beside --output that cli_stream_end
- * renames. */
+ * opens the output: standard output, refused when a terminal,
+ * or a temporary file beside --output that cli_stream_end renames. */
 void cli_stream_open(vg_head *h);
 void cli_stream_put(const vg_frame *f);
 void cli_stream_end(const vg_records *tail);

@@ -274,8 +274,8 @@ static void close_cast(cast *c)
 /* Takes a frame of sequence number i; truth: what it is compared with, or NULL. */
 typedef void take_frame(void *context, size_t i, const side *s, const double *truth);
 
-/* The next frame of what stands beside. Behind the end of the truth there is nothing to compare it with; check_counts
- * says so. */
+/* The next frame of what stands beside. Behind the end of the truth there is nothing to compare it with;
+ * check_counts says so. */
 static bool put_beside(cast *c, size_t i, const double *truth, bool truth_is_shown, take_frame *put, void *context)
 {
     side *s = &c->beside[i];

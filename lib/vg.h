@@ -247,8 +247,8 @@ void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, 
 typedef enum vg_map_kind { VG_MAP_PATCHES = 1, VG_MAP_BONES = 2 } vg_map_kind;
 
 /* Vertices as a linear function of transforms (MATH 7; T 6.3): with transform p taking x to A_p x + t_p, vertex v is
- * at sum over p of A_p e_vp + tau_vp t_p. What the operator was made of is kept, so that it can be made for another
- * body. */
+ * at sum over p of A_p e_vp + tau_vp t_p. What the operator was made of is kept,
+ * so that it can be made for another body. */
 typedef struct vg_map {
     size_t n;            /* transforms; 0: there is no map */
     size_t nv;           /* vertices, those of the mesh */
@@ -352,8 +352,8 @@ void vg_head_clear(vg_head *h);
 int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e) VG_MUST_CHECK;
 
 /* vg_head_trace: append the record of this process. Its parents are the last record already there (if any) and
- * `other_last` of every stream merged by vg_head_merge_trace. argv is argc strings; bytes that are no UTF-8 become
- * '?'. */
+ * `other_last` of every stream merged by vg_head_merge_trace. argv is argc strings;
+ * bytes that are no UTF-8 become '?'. */
 int vg_head_trace(vg_head *h, const char *program, int argc, char *const *argv, vg_err *e) VG_MUST_CHECK;
 
 /* vg_head_merge_trace: put the provenance of a second input before that of this process (call before
@@ -392,8 +392,8 @@ int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 int vg_frame_pin(vg_frame *f, const uint32_t *vertices, size_t n, vg_err *e) VG_MUST_CHECK;
 int vg_frame_turn(vg_frame *f, const double *turns, size_t njoints, vg_err *e) VG_MUST_CHECK;
 int vg_frame_rename(vg_frame *f, const char *name, vg_err *e) VG_MUST_CHECK;
-/* vg_frame_scalars: numbers (nv of them, copied) come with the frame from now on, until it is shaped or labelled
- * again. */
+/* vg_frame_scalars: numbers (nv of them, copied) come with the frame from now on,
+ * until it is shaped or labelled again. */
 int vg_frame_scalars(vg_frame *f, const char *name, const char *unit, const double *numbers, size_t nv,
                      vg_err *e) VG_MUST_CHECK;
 /* vg_frame_label: take over name, time and unknown records of `from`, but no numbers, pins, turns or scalars; `from`
@@ -401,8 +401,8 @@ int vg_frame_scalars(vg_frame *f, const char *name, const char *unit, const doub
 int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e) VG_MUST_CHECK;
 
 /* The vector graph of a sequence: the faces that carry vectors, in order (all, or the selected ones), then the links.
- * Layout as in vg_mesh; corner c of the graph is a position in vert. `attached` counts the vertices that are in a
- * face. */
+ * Layout as in vg_mesh; corner c of the graph is a position in vert.
+ * `attached` counts the vertices that are in a face. */
 typedef struct vg_graph {
     size_t nv, nf, nlinks; /* nf includes the links, which are the last */
     uint32_t *start, *vert;
@@ -472,8 +472,8 @@ typedef enum vg_method { VG_BY_POSE = 0, VG_BY_GRADIENT = 1, VG_BY_BLEND = 2 } v
 int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_method method, vg_err *e) VG_MUST_CHECK;
 /* vg_deformer_measure: n poses in (kind VG_VERTICES: nv points each, or VG_VECTORS: one vector per corner), n arrays
  * of a quaternion per corner out. vg_deformer_transfer: the same in, the deformed target vectors out, never worse
- * than measuring and applying by more than rounding. vg_deformer_apply: quaternions in, deformed target vectors
- * out. */
+ * than measuring and applying by more than rounding. vg_deformer_apply: quaternions in,
+ * deformed target vectors out. */
 void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses,
                          double *const *quaternions);
 void vg_deformer_transfer(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses, double *const *vectors);
@@ -725,11 +725,11 @@ typedef struct vg_rig_options {
 /* vg_rig_fitter_new: h: mesh, reference and a rig (its weights, if any, are replaced); borrowed until free. */
 int vg_rig_fitter_new(vg_rig_fitter **f, vg_head *h, const vg_rig_options *o, vg_err *e) VG_MUST_CHECK;
 void vg_rig_fitter_free(vg_rig_fitter **f);
-/* vg_rig_fitter_add: n poses (nv points) and the transforms of the bones in them. Poses that are the reference are
- * passed over. */
+/* vg_rig_fitter_add: n poses (nv points) and the transforms of the bones in them.
+ * Poses that are the reference are passed over. */
 void vg_rig_fitter_add(vg_rig_fitter *f, size_t n, const double *const *poses, const double *const *transforms);
-/* vg_rig_fitter_finish: fill h->map and the weights of h->rig. May be called again for another method. VG_EINPUT
- * without poses. */
+/* vg_rig_fitter_finish: fill h->map and the weights of h->rig. May be called again for another method.
+ * VG_EINPUT without poses. */
 int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_err *e) VG_MUST_CHECK;
 
 /* Measures of two sequences of one connectivity (MATH 8), accumulated pose by pose in bounded memory. */
@@ -828,8 +828,8 @@ void vg_joint_groups_clear(vg_joint_groups *g);
 int vg_joint_groups_read(vg_joint_groups *g, const void *data, size_t n, int base, const char *name,
                          vg_err *e) VG_MUST_CHECK;
 
-/* vg_joint_groups_skeleton: the joints in a pose of nv vertices as a skeleton. VG_EINPUT when a vertex is not
- * there. */
+/* vg_joint_groups_skeleton: the joints in a pose of nv vertices as a skeleton.
+ * VG_EINPUT when a vertex is not there. */
 int vg_joint_groups_skeleton(const vg_joint_groups *g, size_t nv, const double *reference, vg_skeleton *s,
                              vg_err *e) VG_MUST_CHECK;
 /* vg_joint_groups_pose: positions of the joints in a pose, and their turns beside the reference pose: with one joint
@@ -946,8 +946,8 @@ void vg_source_close(vg_source **s);
  * first pose). The rest is not read. */
 int vg_load_mesh(vg_head *h, const char *operand, vg_err *e) VG_MUST_CHECK;
 
-/* Frames that wait, first in, first out: in memory up to a limit, then in a file without a name in $TMPDIR (or
- * /tmp). */
+/* Frames that wait, first in, first out: in memory up to a limit,
+ * then in a file without a name in $TMPDIR (or /tmp). */
 typedef struct vg_spool vg_spool;
 typedef struct vg_spool_facts {
     uint64_t most_frames; /* that have waited at once */
@@ -957,8 +957,8 @@ typedef struct vg_spool_facts {
 /* vg_spool_new: h says what a frame holds; borrowed until free. limit: bytes of frames in memory. */
 int vg_spool_new(vg_spool **s, const vg_head *h, size_t limit, vg_err *e) VG_MUST_CHECK;
 void vg_spool_free(vg_spool **s);
-/* vg_spool_put: keep a copy of f, all of it. vg_spool_next: 1 and the frame that has waited longest; 0 when none
- * waits. */
+/* vg_spool_put: keep a copy of f, all of it. vg_spool_next: 1 and the frame that has waited longest;
+ * 0 when none waits. */
 int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
 int vg_spool_next(vg_spool *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
 vg_spool_facts vg_spool_get_facts(const vg_spool *s);
@@ -987,8 +987,8 @@ int vg_sink_end(vg_sink *s, vg_err *e) VG_MUST_CHECK;
 /* vg_sink_discard: remove what was written, unless vg_sink_end has given it its names. For the handler of a signal
  * that ends the program: it calls nothing but unlink and rmdir, and leaves the sink as it is. */
 void vg_sink_discard(const vg_sink *s);
-/* vg_sink_warning: line number i of what the output does not keep, after vg_sink_end; NULL: no more. Borrowed until
- * close. */
+/* vg_sink_warning: line number i of what the output does not keep, after vg_sink_end; NULL: no more.
+ * Borrowed until close. */
 const char *vg_sink_warning(const vg_sink *s, size_t i);
 void vg_sink_close(vg_sink **s); /* without _end: nothing is left behind */
 
@@ -1011,8 +1011,8 @@ int vg_model_write(vg_bytes *out, const char *format, const vg_mesh *mesh, const
 
 /* ------------------------------------------------------------------------------------------------ view -- */
 
-/* What the colours of a picture say. A sequence for which they say nothing has those of its patches, or is of
- * clay. */
+/* What the colours of a picture say. A sequence for which they say nothing has those of its patches,
+ * or is of clay. */
 typedef enum vg_tint {
     VG_TINT_SCALARS = 0, /* the scalars that frames bring; nothing, when the first of a sequence brings none */
     VG_TINT_ERRORS,      /* the distance of a vertex from its place in a truth, in D */
@@ -1045,8 +1045,8 @@ enum { VG_SHEET_SEQUENCES = 8 };
 int vg_sheet_new(vg_sheet **s, const vg_sheet_options *o, vg_err *e) VG_MUST_CHECK;
 void vg_sheet_free(vg_sheet **s);
 /* vg_sheet_sequence: the next sequence, of vertices; all come before the first frame. h is borrowed until free. truth
- * (may be NULL): what its frames are compared with; its reference, and not h's, gives D, place and the height of the
- * ground. */
+ * (may be NULL): what its frames are compared with; its reference, and not h's, gives D,
+ * place and the height of the ground. */
 int vg_sheet_sequence(vg_sheet *s, const char *label, const vg_head *h, const vg_head *truth,
                       vg_err *e) VG_MUST_CHECK;
 /* vg_sheet_add: the next frame of sequence number i (copied). truth (nv points): what it is compared with; NULL

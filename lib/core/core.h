@@ -38,8 +38,8 @@ void vgi_parallel(int threads, size_t n, void (*task)(void *context, size_t i), 
 int vgi_frame_scalars(vg_frame *f, const char *name, size_t name_bytes, const char *unit, size_t unit_bytes,
                       size_t nv, vg_err *e) VG_MUST_CHECK;
 
-/* vgi_patch_colour: sRGB, far from those of the numbers before and after: hues by the golden ratio, in three
- * shades. */
+/* vgi_patch_colour: sRGB, far from those of the numbers before and after: hues by the golden ratio,
+ * in three shades. */
 static inline void vgi_patch_colour(uint32_t patch, unsigned char rgb[3])
 {
     static const unsigned char light[3] = {230, 190, 250}, dark[3] = {90, 50, 140};

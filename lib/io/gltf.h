@@ -22,8 +22,8 @@ enum {
 };
 
 /* Where our own files say of what sizes the faces are: extras of the mesh, pairs of a count and a size. The triangles
- * of a face follow one another, the first begins with the face's first corner. And names of frames: extras of the
- * animation. */
+ * of a face follow one another, the first begins with the face's first corner. And names of frames:
+ * extras of the animation. */
 #define VGI_GLTF_FACES "vg_faces"
 #define VGI_GLTF_FRAMES "vg_frames"
 
@@ -47,8 +47,8 @@ void vgi_gltf_clear(vgi_gltf *g);
 /* vgi_gltf_bad: VG_EINPUT, with the name of the file in front. */
 int vgi_gltf_bad(const vgi_gltf *g, vg_err *e, const char *format, ...) VG_PRINTF(3, 4);
 
-/* An accessor: count elements of `width` numbers. Nothing is copied, so that many accessors of the same bytes cost
- * nothing. */
+/* An accessor: count elements of `width` numbers. Nothing is copied,
+ * so that many accessors of the same bytes cost nothing. */
 typedef struct vgi_accessor {
     size_t count, width, stride;
     const unsigned char *data; /* NULL: zeros */

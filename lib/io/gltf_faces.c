@@ -90,8 +90,8 @@ static size_t find_ear(const shaping *x, const uint32_t *ring, size_t n, const d
     return is_ear(x, ring, n, 0, normal) ? 0 : 1; /* it touches or crosses itself: any will do */
 }
 
-/* The triangle with the face's first corner goes first and begins with it, so that the face can be put together
- * again. */
+/* The triangle with the face's first corner goes first and begins with it,
+ * so that the face can be put together again. */
 static void begin_with(unsigned char *triangles, size_t n, uint32_t v)
 {
     for (size_t i = 0; i < 3 * n; i++) {

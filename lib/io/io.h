@@ -79,8 +79,8 @@ typedef struct vgi_lines {
 vgi_lines vgi_lines_of(const void *data, size_t n, const char *subject);
 /* vgi_quote: how messages call a file of this name; in `subject`. */
 const char *vgi_quote(const char *name, char subject[VGI_SUBJECT]);
-/* vgi_lines_next: the next line that says something; false at the end. Blanks are space, tab, CR, comma and
- * semicolon. */
+/* vgi_lines_next: the next line that says something; false at the end. Blanks are space, tab, CR,
+ * comma and semicolon. */
 bool vgi_lines_next(vgi_lines *t, vgi_line *l);
 /* vgi_line_more: the next field at or behind *at, which goes on behind it; for lines of any number of fields. */
 bool vgi_line_more(const vgi_line *l, const char **at, vgi_field *f);
@@ -177,8 +177,8 @@ typedef struct vgi_sequence_format {
     int (*open)(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e); /* NULL: only written */
     int (*next)(void *state, vg_frame *f, vg_err *e);
     /* join (else NULL): for a file that says by name which joint is meant. Called once before next with the skeleton
-     * (there is one) and reference that the frames are of; open then says nothing of the mesh. `with` is borrowed for
-     * the call only. */
+     * (there is one) and reference that the frames are of; open then says nothing of the mesh.
+     * `with` is borrowed for the call only. */
     int (*join)(void *state, const vg_head *with, vg_err *e);
     /* how many the file announces; a single one is called like the file. NULL: unknown */
     uint64_t (*frames)(const void *state);
@@ -203,8 +203,8 @@ extern const vgi_sequence_format vgi_sequence_pc2, vgi_sequence_mdd, vgi_sequenc
 const vgi_sequence_format *vgi_sequence_by_name(const char *name, size_t n);   /* NULL: none */
 const vgi_sequence_format *vgi_sequence_by_suffix(const char *file_name);      /* case does not matter; NULL: none */
 const vgi_sequence_format *vgi_sequence_by_content(const unsigned char *data, size_t n);
-/* vgi_packable: the sequence format, or NULL, of a file that can stand for poses in a directory or archive: it brings
- * its faces. */
+/* vgi_packable: the sequence format, or NULL, of a file that can stand for poses in a directory or archive:
+ * it brings its faces. */
 const vgi_sequence_format *vgi_packable(const char *file_name);
 const char *vgi_sequence_names(void); /* "pc2, mdd, ..." for messages, those that are written */
 const char *vgi_kinds_read(void); /* "OBJ, PLY, ..." for messages: all that is read, but for streams and archives */

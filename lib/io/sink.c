@@ -719,7 +719,6 @@ int vg_sink_open(vg_sink **out, const char *output, const vg_head *h, const vg_s
     return r;
 }
 
-
 static int more_than_one(const vg_sink *s, vg_err *e)
 {
     if (s->plan.kind == STDOUT)

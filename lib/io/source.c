@@ -101,8 +101,8 @@ static enum worth judge_file(DIR *dir, const char *name)
     return worth && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISREG(st.st_mode) ? worth : NOTHING;
 }
 
-/* Files of whole sequences count only where there are no mesh files: a skeleton or an array beside them is about the
- * same poses. */
+/* Files of whole sequences count only where there are no mesh files:
+ * a skeleton or an array beside them is about the same poses. */
 static int list_files(vgi_names *names, DIR *dir, vg_err *e)
 {
     enum worth best = WHOLE_SEQUENCE;

@@ -229,8 +229,8 @@ static int keep_in_file(vg_spool *s, const vg_frame *f, const front *head, vg_er
     return VG_OK;
 }
 
-/* What is in memory is older than what is in the file: once the file is begun, it takes all until it is empty
- * again. */
+/* What is in memory is older than what is in the file: once the file is begun,
+ * it takes all until it is empty again. */
 int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e)
 {
     front head;

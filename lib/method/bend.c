@@ -204,8 +204,8 @@ void vg_bender_free(vg_bender **out)
     *out = NULL;
 }
 
-/* B of a pose whose centroid is taken for the origin: 3 x 3 for each bone, first what its own vertices say, then what
- * it carries. */
+/* B of a pose whose centroid is taken for the origin: 3 x 3 for each bone, first what its own vertices say,
+ * then what it carries. */
 static void load(const vg_bender *x, const double *pose, const double centre[3], bending *w)
 {
     size_t n = x->n;

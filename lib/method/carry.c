@@ -28,8 +28,8 @@ struct vg_carrier {
     double *segment;       /* reference vector of each source face's first corner */
     double *vectors;       /* the target's reference vectors, per corner of its graph */
     vgi_incidence around;  /* of the target, only if there are links */
-    /* target faces that go corner by corner: a graph of them over the source's vertices, and what it gives for eight
-     * poses */
+    /* target faces that go corner by corner: a graph of them over the source's vertices,
+     * and what it gives for eight poses */
     size_t ntwins;
     uint32_t *twin;        /* the target faces, ascending; then links between vertices of such faces */
     unsigned char *is_twin; /* per target face */
@@ -94,8 +94,8 @@ static void measure_source(vg_carrier *c, const double *reference, double *w)
     }
 }
 
-/* Which corner of source face s goes with the first of target face f: the turn of the cycle in which their vectors
- * agree best. */
+/* Which corner of source face s goes with the first of target face f:
+ * the turn of the cycle in which their vectors agree best. */
 static size_t best_turn(const vg_carrier *c, const double *source_reference, size_t s, size_t f)
 {
     const uint32_t *vert = c->source->vert + c->source->start[s];
@@ -129,8 +129,8 @@ static size_t choose_twins(vg_carrier *c)
     return corners;
 }
 
-/* Fill the twins' mesh over the source's vertices; twin_of[v]: the source's vertex for target vertex v, UINT32_MAX:
- * none. */
+/* Fill the twins' mesh over the source's vertices; twin_of[v]: the source's vertex for target vertex v,
+ * UINT32_MAX: none. */
 static void fill_twins(const vg_carrier *c, const double *source_reference, vg_mesh *m, uint32_t *twin_of)
 {
     const vg_graph *g = c->target;

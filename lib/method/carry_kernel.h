@@ -30,8 +30,8 @@ typedef enum vgi_follow { VGI_FOLLOW_GRADIENT, VGI_FOLLOW_POSE, VGI_FOLLOW_BLEND
 /* vgi_polar: the rotation nearest to a. Scaled Newton (Higham 1986), to rounding. */
 void vgi_polar(const vgi_map *a, vgi_map *rotation);
 
-/* vgi_follow_face: wanted vectors of `r` reference vectors (xyz each), for the first `lanes` poses, to out[k] + 3
- * i. */
+/* vgi_follow_face: wanted vectors of `r` reference vectors (xyz each), for the first `lanes` poses,
+ * to out[k] + 3 i. */
 void vgi_follow_face(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out,
                      size_t offset, size_t lanes);
 

@@ -35,8 +35,8 @@ struct vg_deformer {
     vgi_gradient *gradient;
     vgi_gradient_face *gradient_face;
     atomic_uint_fast64_t degenerate, first_face;
-    /* one piece per thread: vectors and quaternions of the largest face (work_scalars numbers), then the kernel's
-     * lanes */
+    /* one piece per thread: vectors and quaternions of the largest face (work_scalars numbers),
+     * then the kernel's lanes */
     double *work;
     size_t work_size, work_scalars;
 };

@@ -572,8 +572,8 @@ static void vertex_normals(const vg_mesh *m, const double *x, double sign, doubl
     }
 }
 
-/* A nearest point on the border of the target is true only for a vertex on the border of the source: others are
- * beyond it. */
+/* A nearest point on the border of the target is true only for a vertex on the border of the source:
+ * others are beyond it. */
 static void find_near(void *context, size_t block)
 {
     fit *t = context;
@@ -616,8 +616,8 @@ static void find_reverse(void *context, size_t block)
     }
 }
 
-/* What the target asks of the source, in the places that the source would not find by itself: tips, and what is
- * drawn in. */
+/* What the target asks of the source, in the places that the source would not find by itself: tips,
+ * and what is drawn in. */
 static int follow_reverse(fit *t, double weight, vg_err *e)
 {
     size_t n = t->in->target_mesh->nv;

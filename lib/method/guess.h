@@ -5,8 +5,8 @@
 
 #include "method/metric.h"
 
-/* One step of the walk: x(vertex of `corner`) = x(vertex of `from`) + w(corner) - w(from), both corners of one
- * face. */
+/* One step of the walk: x(vertex of `corner`) = x(vertex of `from`) + w(corner) - w(from),
+ * both corners of one face. */
 typedef struct vgi_step {
     uint32_t corner, from;
 } vgi_step;

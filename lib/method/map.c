@@ -484,8 +484,8 @@ static bool solve_ridge(ridge *x, double strength)
     return true;
 }
 
-/* The squared error of a pose predicted by the fit of all others: the residual through (I - H)^-1, H = rows S^-1
- * rows'. */
+/* The squared error of a pose predicted by the fit of all others: the residual through (I - H)^-1,
+ * H = rows S^-1 rows'. */
 static double left_out(ridge *x, size_t k)
 {
     size_t w = x->width, n = x->n;

@@ -40,8 +40,8 @@ void vgi_cholesky_dense_solve(const double *l, size_t n, double *x, size_t m);
 /* vgi_place_by_joints: place (n x 3n) of the map from its joints, centres and shares. */
 int vgi_place_by_joints(const vg_map *m, const double *centre, double *place, vg_err *e) VG_MUST_CHECK;
 
-/* vgi_place_by_bones: the same from the skeleton of r, whose joints are at the map's centres: bones keep their
- * lengths. */
+/* vgi_place_by_bones: the same from the skeleton of r, whose joints are at the map's centres:
+ * bones keep their lengths. */
 int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *e) VG_MUST_CHECK;
 
 /* vgi_map_skin_row: the weights of vertex v of a map of bones become those of linear blend skinning by h's rig. */

@@ -6,8 +6,8 @@
 
 static const double flat = 1e-12; /* of the sum of squared lengths: see deform_kernel.c */
 
-/* The sum of cross products of successive vectors, twice the area times the normal; *size: its length, or 0 for
- * none. */
+/* The sum of cross products of successive vectors, twice the area times the normal; *size: its length,
+ * or 0 for none. */
 static void area_vector(const double *w, size_t r, double n[3], double *size)
 {
     double spread = 0;

@@ -207,8 +207,8 @@ static double given_weight(const struct pairing *p, size_t f)
 
 /* ---- what found nothing ---- */
 
-/* A component of the target of which less than half found something has no counterpart: what it found is of
- * others. */
+/* A component of the target of which less than half found something has no counterpart:
+ * what it found is of others. */
 static int drop_strangers(struct pairing *p, vg_err *e)
 {
     const vg_mesh *m = p->in->target;

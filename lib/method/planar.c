@@ -193,8 +193,8 @@ vg_planar_facts vg_planar_get_facts(const vg_planar *p)
 }
 
 /* The mean of the cross products of successive vectors, made a unit; 0 if there is none. Moving all vectors of a
- * face by the same changes nothing (they need not sum to 0), so they are taken from the first, and in units of the
- * largest. */
+ * face by the same changes nothing (they need not sum to 0), so they are taken from the first,
+ * and in units of the largest. */
 static void face_normal(const double *w, size_t r, double m[3])
 {
     double n[3] = {0, 0, 0}, size = 0, largest = 0;
@@ -231,8 +231,8 @@ typedef struct plane_job {
     bool *converged; /* n */
 } plane_job;
 
-/* The residual of the plain solution, -ratio P V, each pose in units of its largest entry, which is returned in
- * `unit`. */
+/* The residual of the plain solution, -ratio P V, each pose in units of its largest entry,
+ * which is returned in `unit`. */
 static void load_residual(const vg_planar *p, const room *m, const vgi_planar_faces *f, const double *const *pose,
                           vgi_lanes *unit)
 {

@@ -10,8 +10,8 @@ INLINE vgi_lanes dot(const vgi_row *a, const vgi_row *b)
     return a->xyz[0] * b->xyz[0] + a->xyz[1] * b->xyz[1] + a->xyz[2] * b->xyz[2];
 }
 
-/* One face: h_c = m.p_c less their mean is m.t_c; what it adds to y_c is (m.t_c) m, for the matrix of t in v is a
- * projector. */
+/* One face: h_c = m.p_c less their mean is m.t_c; what it adds to y_c is (m.t_c) m,
+ * for the matrix of t in v is a projector. */
 INLINE void face(const uint32_t *row, size_t corners, const vgi_row *m, const vgi_row *p, vgi_row *y, vgi_lanes *h,
                  vgi_lanes *sum)
 {

@@ -10,8 +10,8 @@
 
 enum { NEIGHBOURS = 4, ROBUST_ROUNDS = 20 };
 
-/* A wrong pair is one that is this many times the typical distance from where its neighbours expect it, and this far,
- * in D. */
+/* A wrong pair is one that is this many times the typical distance from where its neighbours expect it,
+ * and this far, in D. */
 static const double WRONG_TIMES = 5, WRONG_FAR = 0.08;
 
 struct similarity {

@@ -13,8 +13,8 @@ static double length2(const double x[3])
     return x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
 }
 
-/* The body on the way: vectors turned and stretched along geodesics, then reconstructed; its root on the line between
- * both. */
+/* The body on the way: vectors turned and stretched along geodesics, then reconstructed;
+ * its root on the line between both. */
 static int morph_body(const vg_head *h, const vg_graph *g, const double *target, double morph, double *body,
                       int threads, vg_err *e)
 {

@@ -106,8 +106,8 @@ static int widen(vg_segmenter *s, uint64_t numbers, vg_err *e)
     return VG_OK;
 }
 
-/* The first features have a place of their own; later ones are added to one of them, chosen by chance, with a random
- * sign. */
+/* The first features have a place of their own; later ones are added to one of them, chosen by chance,
+ * with a random sign. */
 int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_err *e)
 {
     int r = widen(s, 9 * ((uint64_t)s->poses + n), e);
@@ -181,8 +181,8 @@ static float inner(const float *a, const float *b, size_t n)
     return total;
 }
 
-/* Distances to the centre that was added last; the sum of the nearest ones, chunk by chunk so that it does not depend
- * on threads. */
+/* Distances to the centre that was added last; the sum of the nearest ones,
+ * chunk by chunk so that it does not depend on threads. */
 static void near_chunk(void *context, size_t i)
 {
     clustering *c = context;
@@ -480,8 +480,8 @@ int vgi_neighbours(size_t nv, size_t nf, const uint32_t *start, const uint32_t *
     return r;
 }
 
-/* Joining pieces: the pair of neighbours whose union costs the least (Ward 1963), until `k` are left or none has a
- * neighbour. */
+/* Joining pieces: the pair of neighbours whose union costs the least (Ward 1963),
+ * until `k` are left or none has a neighbour. */
 typedef struct joining {
     const vg_segmenter *s;
     size_t n;           /* pieces at the start */

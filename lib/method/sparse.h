@@ -31,8 +31,8 @@ static inline void vgi_triplets_put(vgi_triplets *t, size_t i, size_t j, double 
     t->row[t->n] = (uint32_t)(i > j ? i : j), t->column[t->n] = (uint32_t)(i > j ? j : i), t->value[t->n] = x;
     t->n++;
 }
-/* vgi_triplets_sum: the matrix of `rows` rows; every diagonal entry must have been named. VG_EINPUT when it is too
- * large. */
+/* vgi_triplets_sum: the matrix of `rows` rows; every diagonal entry must have been named.
+ * VG_EINPUT when it is too large. */
 int vgi_triplets_sum(const vgi_triplets *t, size_t rows, vgi_sparse *a, vg_err *e) VG_MUST_CHECK;
 
 typedef struct vgi_cholesky vgi_cholesky;

@@ -190,8 +190,8 @@ static inline __attribute__((always_inline)) bool face_shape(const vg_measures *
         for (int k = 0; k < 3; k++) edges += (b[k] - a[k]) * (b[k] - a[k]), a[k] = b[k];
     }
     double length = length_of(n), least = FLAT * x->diagonal, half = 0.5 * length;
-    /* the perimeter is no longer than the root of r times the squared edges: most faces need no roots of their
-     * edges */
+    /* the perimeter is no longer than the root of r times the squared edges:
+     * most faces need no roots of their edges */
     bool ok = half * half > 1.001 * least * least * (double)r * edges || half > least * perimeter_of(vert, r, points);
     double scale = ok ? 1 / length : 0;
     *area = ok ? half : 0;

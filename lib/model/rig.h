@@ -10,8 +10,8 @@
 /* vgi_rig_movers: for each joint the bone it moves with: itself, or the next above that turns; VGI_NO_BONE: there is
  * none. */
 void vgi_rig_movers(const vg_rig *r, uint32_t *mover);
-/* vgi_rig_parents: for each bone the bone that carries its joint; the first bone has none, and other roots hang on
- * the first. */
+/* vgi_rig_parents: for each bone the bone that carries its joint; the first bone has none,
+ * and other roots hang on the first. */
 int vgi_rig_parents(const vg_rig *r, uint32_t *parent, vg_err *e) VG_MUST_CHECK;
 
 #endif

@@ -5,8 +5,8 @@
 #define VG_TURN_H
 
 /* vgi_best_turn: the unit quaternion of the rotation R that makes tr(R^T b) largest (b row-major): of all, it
- * takes the vectors o nearest to the d when b is the sum of d o^T. Never a reflection; some best one where b
- * leaves it open. */
+ * takes the vectors o nearest to the d when b is the sum of d o^T. Never a reflection;
+ * some best one where b leaves it open. */
 void vgi_best_turn(const double b[9], double q[4]);
 
 #endif

@@ -16,8 +16,8 @@ static const stop rising[] = {
     {0.780, 0.150, 150}, {0.860, 0.170, 125}, {0.930, 0.175, 105},
 };
 
-/* Both ends are nearly of one lightness, so that neither counts more; in the middle the hue may jump, for there is no
- * chroma. */
+/* Both ends are nearly of one lightness, so that neither counts more; in the middle the hue may jump,
+ * for there is no chroma. */
 static const stop parting[] = {
     {0.450, 0.150, 262}, {0.600, 0.130, 255}, {0.765, 0.080, 245}, {0.930, 0.000, 240},
     {0.930, 0.000, 62},  {0.790, 0.095, 62},  {0.640, 0.150, 50},  {0.480, 0.160, 36},

@@ -93,8 +93,8 @@ static float dot(const float a[3], const float b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Newell: the area vector of a polygon that need not be planar, taken about its first corner so that far away figures
- * lose nothing. */
+/* Newell: the area vector of a polygon that need not be planar,
+ * taken about its first corner so that far away figures lose nothing. */
 static void area_vector(const vg_mesh *m, size_t f, const float *points, float area[3])
 {
     const uint32_t *v = m->vert + m->start[f];

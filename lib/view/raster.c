@@ -293,8 +293,8 @@ static bool is_empty(const vgi_raster *r)
     return true;
 }
 
-/* A flat figure seen from its side covers no sample, nor does one that has shrunk to a line or a point: draw its
- * edges. */
+/* A flat figure seen from its side covers no sample, nor does one that has shrunk to a line or a point:
+ * draw its edges. */
 static void draw_edges(work *k, float radius)
 {
     const vg_mesh *m = k->drawing->figure->mesh;

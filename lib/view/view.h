@@ -146,15 +146,15 @@ int vgi_meter_init(vgi_meter *m, const vgi_tint *t, const vg_mesh *mesh, const d
 void vgi_meter_clear(vgi_meter *m);
 /* vgi_tint_has: is there a number for each vertex of this frame? */
 bool vgi_tint_has(const vgi_tint *t, const vg_frame *f, const double *truth);
-/* vgi_tint_read: the numbers of a frame that has them, into m->numbers. VG_EINPUT when they have another name than
- * those before. */
+/* vgi_tint_read: the numbers of a frame that has them, into m->numbers.
+ * VG_EINPUT when they have another name than those before. */
 int vgi_tint_read(vgi_tint *t, vgi_meter *m, const vg_frame *f, const double *truth, vgi_spread *s,
                   vg_err *e) VG_MUST_CHECK;
 /* vgi_round_up: the next of 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8 times a power of ten: five parts of it have short
  * numbers. x > 0. */
 double vgi_round_up(double x);
-/* vgi_tint_end: where the colours end: given (> 0), or by what is common: the absolute value that 99 % do not
- * exceed. */
+/* vgi_tint_end: where the colours end: given (> 0), or by what is common:
+ * the absolute value that 99 % do not exceed. */
 void vgi_tint_end(vgi_tint *t, double given, double common, double least);
 double vgi_tint_place(const vgi_tint *t, double x); /* 0 to 1 */
 double vgi_tint_shown(const vgi_tint *t, double x); /* a number as people read it: of scales the factor */
@@ -178,8 +178,8 @@ typedef struct vgi_ground { /* a grid on the plane where the reference pose stan
     float *shadow, origin[2], step;
 } vgi_ground;
 int vgi_ground_shadow(vgi_ground *g, const vgi_drawing *d, vg_err *e) VG_MUST_CHECK;
-/* vgi_ground_light: what a sample of the background at (x, y) of the camera, in D, is multiplied by; 1 = nothing
- * there. */
+/* vgi_ground_light: what a sample of the background at (x, y) of the camera, in D, is multiplied by;
+ * 1 = nothing there. */
 float vgi_ground_light(const vgi_ground *g, const vgi_camera *c, double x, double y, double pixel);
 
 typedef struct vgi_look {

@@ -27,8 +27,8 @@ static void mend_end(unsigned char *payload, uint64_t records, XXH64_state_t *ru
     vgi_put64(payload + 8, XXH64_digest(running));
 }
 
-/* Make the checksums of all records that are there right, and count and sum of END. What else is wrong stays
- * wrong. */
+/* Make the checksums of all records that are there right, and count and sum of END.
+ * What else is wrong stays wrong. */
 static void mend(unsigned char *p, size_t size)
 {
     XXH64_state_t *running = XXH64_createState();
@@ -124,8 +124,8 @@ static unsigned char *rewritten(const unsigned char *data, size_t size, size_t *
     return p;
 }
 
-/* A whole stream is written as a whole stream, which is written as itself. A broken one is written as a broken
- * one. */
+/* A whole stream is written as a whole stream, which is written as itself.
+ * A broken one is written as a broken one. */
 static void there_and_back(const unsigned char *data, size_t size)
 {
     size_t n, again_n = 0;

@@ -319,8 +319,8 @@ static inline double *move_points(const motion *t, const double *x, size_t n)
     return y;
 }
 
-/* The points twisted about z, bent, stretched, and shaken a little: no corner keeps its angles. Points that coincide
- * still do. */
+/* The points twisted about z, bent, stretched, and shaken a little: no corner keeps its angles.
+ * Points that coincide still do. */
 static inline double *warp(const double *x, size_t n, double amount)
 {
     double D = vg_diagonal(x, n), *y = room(3 * n, sizeof *y), shake = 0.03 * amount * D / sqrt((double)n + 1);

@@ -467,8 +467,8 @@ done:
     vg_bytes_clear(&b);
 }
 
-/* A joint with arms in two directions turns as it was turned, one with one arm without twist, one without any not at
- * all. */
+/* A joint with arms in two directions turns as it was turned, one with one arm without twist,
+ * one without any not at all. */
 static void finds_turns(void)
 {
     static const char text[] =

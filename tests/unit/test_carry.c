@@ -115,8 +115,8 @@ static void identity_is_exact(void)
     }
 }
 
-/* Triangles driven by themselves twice, so that one map serves all corners: the gradient is the map of the triangle,
- * and exact. */
+/* Triangles driven by themselves twice, so that one map serves all corners:
+ * the gradient is the map of the triangle, and exact. */
 static void triangles_onto_themselves(void)
 {
     vg_head h = make_rod(9, 7, true);
@@ -251,8 +251,8 @@ static void polar_finds_the_rotation(void)
         for (int i = 0; i < 9; i++) CHECK_NEAR(r.m[i][lane], truth[lane][i], 1e-9);
 }
 
-/* On triangles the area metric is the cotangent Laplacian: G_ij = -cot(opposite angle) / 2 times one and the same
- * number. */
+/* On triangles the area metric is the cotangent Laplacian:
+ * G_ij = -cot(opposite angle) / 2 times one and the same number. */
 static void area_metric_is_cotangents(void)
 {
     double ratio = 0;

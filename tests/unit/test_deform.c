@@ -411,8 +411,8 @@ static void test_degenerate(void)
     vg_deformer *d = deformer(g, h.reference, 1);
     CHECK(vg_deformer_counts(d).corners == 0 && vg_deformer_counts(d).first_face == UINT64_MAX);
     vg_deformer_measure(d, 1, VG_VERTICES, CONST(&pose), &q);
-    /* three on the face without area, three on the point, two on the segment without length, one at its face's
-     * centroid */
+    /* three on the face without area, three on the point, two on the segment without length,
+     * one at its face's centroid */
     CHECK(vg_deformer_counts(d).corners == 9 && vg_deformer_counts(d).first_face == 1);
     for (size_t f = 0; f < g->nf; f++)
         for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {

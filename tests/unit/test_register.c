@@ -305,8 +305,8 @@ static void fans(void)
     vg_head_clear(&h);
 }
 
-/* The mesh turned, scaled, moved; larger faces split into fans from a corner of their own; vertices and faces in
- * another order. */
+/* The mesh turned, scaled, moved; larger faces split into fans from a corner of their own;
+ * vertices and faces in another order. */
 static vg_head disguise(const vg_head *h, const motion *t, uint32_t *to, bool turn_over)
 {
     const vg_mesh *m = &h->mesh;

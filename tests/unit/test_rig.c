@@ -221,8 +221,8 @@ static void a_rig_is_learned_from_poses_alone(void)
     strike(&x);
 }
 
-/* Wanted vectors by each corner's own bones, held vertices by their skin, and the solver: what the matrix stands
- * for. */
+/* Wanted vectors by each corner's own bones, held vertices by their skin, and the solver:
+ * what the matrix stands for. */
 static void the_map_is_its_chain(void)
 {
     for (size_t per = 1; per <= 2; per++) {
@@ -316,8 +316,8 @@ static void the_root_is_found(void)
     strike(&x);
 }
 
-/* The same skeleton gives the transforms back; a larger one, too; one that rests in another pose when they are
- * aligned. */
+/* The same skeleton gives the transforms back; a larger one, too;
+ * one that rests in another pose when they are aligned. */
 static void other_skeletons_drive(void)
 {
     stage x;

@@ -485,8 +485,8 @@ static bool as_written(const seen *s)
     return s->result == 0 && s->n == 3 && s->x[0] == 1 && s->x[1] == 2 && s->x[2] == 3;
 }
 
-/* A cut archive is refused, with its name. Only a tar may lose zeros behind its contents, and must then give all of
- * them. */
+/* A cut archive is refused, with its name. Only a tar may lose zeros behind its contents,
+ * and must then give all of them. */
 static void check_cut(const vg_bytes *b, size_t n, bool tar)
 {
     write_bytes("cut", b->data, n);

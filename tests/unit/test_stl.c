@@ -146,8 +146,8 @@ static double area(const vg_model *m, double sign)
 
 static void splits_polygons(void)
 {
-    /* an L and a comb, whose fans from some corners would lie outside; every corner begins once, and both ways
-     * round */
+    /* an L and a comb, whose fans from some corners would lie outside; every corner begins once,
+     * and both ways round */
     static const double shapes[2][20] = {{0, 0, 2, 0, 2, 1, 1, 1, 1, 3, 0, 3},
                                          {0, 0, 7, 0, 7, 3, 5, 3, 5, 1, 4, 1, 4, 3, 2, 3, 2, 1, 0, 1}};
     static const size_t sizes[2] = {6, 10};

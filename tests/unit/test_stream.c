@@ -421,8 +421,8 @@ static void add_correspondence(vg_head *h)
 
 enum { PLAIN, FULL };
 
-/* A stream of a kind: PLAIN has what must be there; FULL has every record, and unknown ones everywhere. Values fit
- * into binary32. */
+/* A stream of a kind: PLAIN has what must be there; FULL has every record, and unknown ones everywhere.
+ * Values fit into binary32. */
 static content make(vg_kind kind, vg_precision precision, int how)
 {
     content c = {.n = 2};

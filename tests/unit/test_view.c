@@ -702,8 +702,8 @@ static void scales_are_geometric_means(void)
     vgi_meter_clear(&meter);
 }
 
-/* Of a square and its two sides: contours are where it ends; an edge between two fronts is none, one that is folded
- * over is. */
+/* Of a square and its two sides: contours are where it ends; an edge between two fronts is none,
+ * one that is folded over is. */
 static void contours_are_where_fronts_end(void)
 {
     begin(&s); /* two triangles that share the edge 0-2 */
