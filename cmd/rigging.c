@@ -269,7 +269,8 @@ static void place_skeleton(work *w)
         parse_point(rigging.root_at, at);
         move_root(&m->skeleton, at, positions);
     } else if (!known && m->n > 1) {
-        cli_warn("the root of the skeleton is taken to be at its offset, %g %g %g, in the reference pose: --root-at says otherwise",
+        cli_warn("the root of the skeleton is taken to be at its offset, %g %g %g, in the reference pose: --root-at "
+                 "says otherwise",
                  positions[0], positions[1], positions[2]);
     }
     if (vg_rig_make(&w->h->rig, &m->skeleton, positions, turns, &e) < 0) cli_die(&e);
