@@ -586,7 +586,7 @@ static bool applies(const cli_program *p, shared_use use)
     switch (use) {
     case OUTPUT: return p->writes_stream || p->writes_text || p->writes_file;
     case TEXT: return p->writes_text;
-    case STREAM: return p->writes_stream;
+    case STREAM: return p->writes_stream || p->traces;
     case THREADS: return p->threaded;
     default: return true;
     }

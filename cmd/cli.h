@@ -32,6 +32,7 @@ typedef struct cli_program {
     bool writes_stream;   /* has -o --output and --no-provenance */
     bool writes_text;     /* has -o --output and --json */
     bool writes_file;     /* has -o --output, whose bytes go through cli_text_open too */
+    bool traces;          /* has --no-provenance also if its output is no stream: another one is */
     bool threaded;        /* has -j --threads */
 } cli_program;
 

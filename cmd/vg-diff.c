@@ -38,6 +38,7 @@ static const cli_program program = {
     .options = options,
     .most_operands = 2,
     .writes_text = true,
+    .traces = true,
 };
 
 /* One of the two sequences. */
@@ -320,6 +321,7 @@ static void parse_options(int argc, char **argv, char ***operands)
     if (!strcmp((*operands)[0], "-") && !strcmp((*operands)[1], "-"))
         cli_usage("only one of the two sequences can be standard input");
     report_file = cli.output;
+    if (!opts.heat && cli.no_provenance) cli_usage("--no-provenance is about the stream that --heat writes");
     if (!opts.heat) return;
     if (replaces_report() && (cli.json || opts.frames))
         cli_usage("option '--%s' is about the report, which needs a file: -o FILE", cli.json ? "json" : "frames");

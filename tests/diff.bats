@@ -372,8 +372,12 @@ END
     must_fail 1 bash -c 'vg-diff truth result.vgs --heat - -t 0.001 >piped.vgs'
     says 'exceeds the tolerance'
     must witness --check heat.vgs
+    must vg-diff truth result.vgs --heat untraced.vgs --no-provenance
+    must_fail 2 vg-diff truth result.vgs --no-provenance
+    says '--heat'
     py <<'END'
 import math, read_stream
+assert all(p.program != "vg-diff" for p in read_stream.read_stream("untraced.vgs").provenance)
 points = lambda i: [[float(x) for x in l.split()[1:]] for l in open(f"truth/t{i}.obj") if l.startswith("v ")]
 r, heat, centred, piped = (read_stream.read_stream(n) for n in ("result.vgs", "heat.vgs", "centred.vgs", "piped.vgs"))
 D = math.dist(*[[f(p[k] for p in points(1)) for k in range(3)] for f in (min, max)])

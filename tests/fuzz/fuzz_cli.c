@@ -92,10 +92,10 @@ static const cli_option options[] = {
     {.name = NULL}};
 
 static const cli_program programs[] = {
-    {"vg-fuzz", "[options] [FILE]", "a filter", options, 1, true, false, false, true},
-    {"vg-fuzz", "[options] FILE FILE", "a report", options, 2, false, true, false, false},
-    {"vg-fuzz", "[options] FILE...", "a writer", options, SIZE_MAX, false, false, true, true},
-    {"vg-fuzz", "[options]", "a thing", options, 0, false, false, false, false}};
+    {"vg-fuzz", "[options] [FILE]", "a filter", options, 1, .writes_stream = true, .threaded = true},
+    {"vg-fuzz", "[options] FILE FILE", "a report", options, 2, .writes_text = true, .traces = true},
+    {"vg-fuzz", "[options] FILE...", "a writer", options, SIZE_MAX, .writes_file = true, .threaded = true},
+    {.name = "vg-fuzz", .synopsis = "[options]", .summary = "a thing", .options = options}};
 
 /* The words of the input; words[0] is the program. */
 static int split(char *input, size_t size, char *words[MOST_WORDS + 2])
