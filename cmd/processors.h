@@ -1,0 +1,9 @@
+/* processors.h: how many threads a program starts unless told.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_PROCESSORS_H
+#define VG_PROCESSORS_H
+
+/* processors_count: the processors this process may use, at least 1 and at most `most`. */
+int processors_count(int most);
+
+#endif
