@@ -21,7 +21,7 @@ static const cli_option options[] = {
     {"drop-loose", 0, NULL, "leave out the vertices that are in no face", .flag = &sink_options.drop_loose},
     {"max-targets", 0, "N", "morph targets of a GLB or glTF; further frames are mixed from them (default 100)",
      .integer = &most_targets, .least = 2, .most = 1e6},
-    {NULL}};
+    {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-decode",

@@ -41,7 +41,7 @@ static const cli_option options[] = {
     {"transforms", 0, NULL, "with --map: write the motions of the patches or bones, not vertices",
      .flag = &mapped.transforms},
     {"live", 0, NULL, "with --map: write each frame at once, before the next is read", .flag = &mapped.live},
-    {NULL}};
+    {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-deform",

@@ -24,7 +24,7 @@ static const cli_option options[] = {
     {"anchor", 0, "V,V,...", "vertices that vg-solve must meet exactly", .text = &opts.anchors},
     {"fps", 0, "N", "give the poses times, N a second, from 0", .number = &opts.fps, .least = 1e-6, .most = 1e9},
     {"f32", 0, NULL, "write binary32 instead of binary64", .flag = &opts.f32},
-    {NULL}};
+    {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-encode",

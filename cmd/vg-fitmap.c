@@ -36,7 +36,7 @@ static const cli_option options[] = {
     {"retarget", 0, "MESH", "no fit: bring the map that is the input to this body of the same faces",
      .text = &opts.retarget},
     {"morph", 0, "T", "with --retarget: how far on the way to that body (default 1)", .number = &opts.morph},
-    {NULL}};
+    {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-fitmap",

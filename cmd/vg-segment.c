@@ -17,7 +17,7 @@ static const cli_option options[] = {
     {"connected", 0, NULL, "every patch in one piece", .flag = &opts.connected},
     {"seed", 0, "N", "another choice of first centres (default 1)", .integer = &opts.seed, .least = 0,
      .most = 4294967295.0},
-    {NULL}};
+    {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-segment",

@@ -35,7 +35,7 @@ static const cli_option options[] = {
     {"planar", 0, NULL, "make faces of four and more corners more nearly plane", .flag = &opts.planar},
     {"planar-weights", 0, "W1,W2", "how much the vectors and how much the planes count (default: 0.5,1)",
      .take = take_planar_weights},
-    {NULL}};
+    {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-solve",
