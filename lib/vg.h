@@ -717,8 +717,8 @@ typedef enum vg_rig_method { VG_RIG_ENVELOPE = 0, VG_RIG_LBS = 1 } vg_rig_method
 typedef struct vg_rig_options {
     size_t bones_per_corner; /* 1, or 2 */
     double hold;             /* share of the vertices that are held; at least one for each bone and component */
-    double refine;           /* how willingly what that leaves of the poses is taken up by the bones near by: 0 ..
-                                1 */
+    double refine;           /* ridge of the regression by which the bones near a vertex take up what that leaves of the
+                                poses: the larger, the less of it; 0: they take up nothing */
     int threads;
 } vg_rig_options;
 

@@ -221,13 +221,12 @@ END
     xz -dc "$DATA/trex-attack.joints.txt.xz" | grep -v '^000 ' >attack.joints.txt
     must vg-encode --mesh "$DATA/trex.skeleton.txt" attack.joints.txt -o joints.vgs
     must vg-deform --map trex.rig joints.vgs -o driven.vgs
-    # positions do not say how head, feet and the many-legged middle turn: far more than by the poses' own motion; and what is
-    # learned depends on the last digits of the machine, by a few hundredths of this
-    at_most "$(error mean "$DATA/trex-attack.tar.xz" driven.vgs)" 0.033
+    # positions do not say how head, feet and the many-legged middle turn: far more than by the poses' own motion
+    at_most "$(error mean "$DATA/trex-attack.tar.xz" driven.vgs)" 0.03
     must vg-deform --map trex.rig "$DATA/trex-attack.tar.xz" -o own.vgs
     at_most "$(error mean "$DATA/trex-attack.tar.xz" own.vgs)" 0.0105
     # the walk is farther from the attack than that, so the bound says something
-    capture bash -c 'vg-deform --map trex.rig "$DATA/trex-walk.tar.xz" | vg-diff -q -t 0.033 --of mean "$DATA/trex-attack.tar.xz" -'
+    capture bash -c 'vg-deform --map trex.rig "$DATA/trex-walk.tar.xz" | vg-diff -q -t 0.03 --of mean "$DATA/trex-attack.tar.xz" -'
     [ "$status" = 1 ]
 }
 
