@@ -221,6 +221,16 @@ typedef struct vgi_names {
 void vgi_names_clear(vgi_names *names);
 int vgi_names_add(vgi_names *names, const char *s, size_t n, vg_err *e) VG_MUST_CHECK;
 void vgi_names_sort(vgi_names *names); /* in natural order */
+
+/* Names each of which is there once. */
+typedef struct vgi_name_set {
+    vgi_names names;
+    size_t *slots, nslots; /* hash table: positions in names + 1, 0 = free; nslots is a power of two */
+} vgi_name_set;
+/* vgi_name_set_add: 1: it is new; 0: it was there. */
+int vgi_name_set_add(vgi_name_set *set, const char *name, vg_err *e) VG_MUST_CHECK;
+void vgi_name_set_clear(vgi_name_set *set);
+
 /* vgi_natural_compare: order of names as people expect it: runs of digits by value, the rest by byte; ties by
  * strcmp. */
 int vgi_natural_compare(const char *a, const char *b);

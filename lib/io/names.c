@@ -23,6 +23,50 @@ int vgi_names_add(vgi_names *names, const char *s, size_t n, vg_err *e)
     return VG_OK;
 }
 
+static size_t hash_name(const char *s)
+{
+    uint64_t h = 14695981039346656037u; /* FNV-1a */
+    for (; *s; s++) h = (h ^ (unsigned char)*s) * 1099511628211u;
+    return (size_t)(h ^ h >> 32);
+}
+
+/* Where the name is in the table, or the free slot where it belongs. */
+static size_t find_slot(const vgi_name_set *set, const char *name)
+{
+    size_t i = hash_name(name) & (set->nslots - 1);
+    while (set->slots[i] && strcmp(set->names.at[set->slots[i] - 1], name) != 0) i = (i + 1) & (set->nslots - 1);
+    return i;
+}
+
+static int grow_slots(vgi_name_set *set, vg_err *e)
+{
+    if (2 * (set->names.n + 1) <= set->nslots) return VG_OK;
+    size_t n = set->nslots ? 2 * set->nslots : 64, *slots = vgi_array(n, sizeof *slots, e);
+    if (!slots) return VG_ENOMEM;
+    free(set->slots);
+    set->slots = slots, set->nslots = n;
+    for (size_t i = 0; i < set->names.n; i++) set->slots[find_slot(set, set->names.at[i])] = i + 1;
+    return VG_OK;
+}
+
+int vgi_name_set_add(vgi_name_set *set, const char *name, vg_err *e)
+{
+    int r = grow_slots(set, e);
+    if (r < 0) return r;
+    size_t slot = find_slot(set, name);
+    if (set->slots[slot]) return 0;
+    if ((r = vgi_names_add(&set->names, name, strlen(name), e)) < 0) return r;
+    set->slots[slot] = set->names.n;
+    return 1;
+}
+
+void vgi_name_set_clear(vgi_name_set *set)
+{
+    vgi_names_clear(&set->names);
+    free(set->slots);
+    *set = (vgi_name_set){0};
+}
+
 static bool is_digit(char c)
 {
     return c >= '0' && c <= '9';
