@@ -243,6 +243,10 @@ size_t vgi_packed_stem(const char *name);
  * memory. */
 char *vgi_pose_name(const char *path, vg_err *e);
 
+/* vgi_operand_files: add the files that an operand names: itself, the mesh files of a directory, or those that match a
+ * pattern. (operands.c) */
+int vgi_operand_files(vgi_names *paths, const char *operand, vg_err *e) VG_MUST_CHECK;
+
 /* ---- archive.c, pack.c: files out of archives and into them; with unpack.c, the files that know libarchive ---- */
 
 /* Where reading stops, so that a small archive cannot fill a machine. */

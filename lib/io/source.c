@@ -1,16 +1,15 @@
 /* source.c: the door in: whatever the operands are, the caller gets one head and frame after frame.
- * Leaves out how a stream, an archive, a mesh file or a sequence is read; it only tells them apart and joins them.
+ * Leaves out which files an operand names (operands.c) and how a stream, an archive, a mesh file or a sequence
+ * (play.c) is read; it only tells them apart and joins them.
  *
- * Operands are first expanded (directories, patterns) and looked at, so that a missing file or a stream that does not
- * fit is told before any work; files are opened again one after another when it is their turn. What can be read only
- * once (standard input, a pipe named by the shell) stays open in between.
+ * All are first looked at, so that a missing file or a stream that does not fit is told before any work; files are
+ * opened again one after another when it is their turn. What can be read only once (standard input, a pipe named by
+ * the shell) stays open in between.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "io/io.h"
+#include "io/play.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <glob.h>
 #include <stdlib.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -28,17 +27,6 @@ typedef struct item {
     vgi_input *input;  /* kept from the first look, when there can be no second */
     vg_reader *reader; /* the same, when it is a stream */
 } item;
-
-/* A file that holds a whole sequence, being read. */
-typedef struct playing {
-    const vgi_sequence_format *format; /* NULL: there is none */
-    void *state;
-    vgi_input *in;
-    char *subject, *stem; /* what messages call it; what frames without names are called after */
-    uint64_t frames;      /* read so far */
-    vg_frame first;       /* the first one, when it was needed for a reference */
-    bool waiting;         /* and has not been handed out */
-} playing;
 
 struct vg_source {
     item *items;
@@ -59,7 +47,7 @@ struct vg_source {
     bool waiting;        /* `model` and `pose` hold a pose that has not been handed out */
     vg_model model;
     char *pose;
-    playing playing;
+    vgi_playing playing;
     char warning[160];
 };
 
@@ -87,108 +75,14 @@ static int add_standard_input(vg_source *s, vg_err *e)
     return add_item(s, NULL, e);
 }
 
-enum worth { NOTHING, WHOLE_SEQUENCE, ONE_POSE };
-
-static enum worth judge_file(DIR *dir, const char *name)
-{
-    char stem[NAME_MAX + 1];
-    struct stat st;
-    size_t n = vgi_packed_stem(name);
-    if (*name == '.' || n >= sizeof stem) return NOTHING;
-    memcpy(stem, name, n);
-    stem[n] = 0;
-    enum worth worth = vgi_format_by_suffix(stem) ? ONE_POSE : vgi_packable(stem) ? WHOLE_SEQUENCE : NOTHING;
-    return worth && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISREG(st.st_mode) ? worth : NOTHING;
-}
-
-/* Files of whole sequences count only where there are no mesh files:
- * a skeleton or an array beside them is about the same poses. */
-static int list_files(vgi_names *names, DIR *dir, vg_err *e)
-{
-    enum worth best = WHOLE_SEQUENCE;
-    struct dirent *d;
-    int r = VG_OK;
-    while (r == VG_OK && (errno = 0, d = readdir(dir))) {
-        enum worth worth = judge_file(dir, d->d_name);
-        if (worth > best) {
-            vgi_names_clear(names);
-            best = worth;
-        }
-        if (worth == best) r = vgi_names_add(names, d->d_name, strlen(d->d_name), e);
-    }
-    return r;
-}
-
-static int list_directory(vgi_names *names, const char *path, vg_err *e)
-{
-    DIR *dir = opendir(path);
-    if (!dir) return vg_fail(e, VG_ESYS, "cannot open directory '%s': %s", path, strerror(errno));
-    int r = list_files(names, dir, e);
-    if (r == VG_OK && errno) r = vg_fail(e, VG_ESYS, "cannot read directory '%s': %s", path, strerror(errno));
-    closedir(dir);
-    if (r == VG_OK && names->n == 0)
-        r = vg_fail(e, VG_EINPUT, "directory '%s' holds no mesh file (%s)", path, vgi_kinds_read());
-    vgi_names_sort(names);
-    return r;
-}
-
-static int add_directory(vg_source *s, const char *path, vg_err *e)
-{
-    vgi_names names = {0};
-    vg_bytes full = {0};
-    size_t n = strlen(path);
-    int r = list_directory(&names, path, e);
-    while (n > 1 && path[n - 1] == '/') n--;
-    for (size_t i = 0; r == VG_OK && i < names.n; i++) {
-        full.size = 0;
-        r = vgi_bytes_append(&full, path, n, e);
-        if (r == VG_OK && path[n - 1] != '/') r = vgi_bytes_append(&full, "/", 1, e);
-        if (r == VG_OK) r = vgi_bytes_append(&full, names.at[i], strlen(names.at[i]) + 1, e);
-        if (r == VG_OK) r = add_item(s, (char *)full.data, e);
-    }
-    vg_bytes_clear(&full);
-    vgi_names_clear(&names);
-    return r;
-}
-
-static int add_existing(vg_source *s, const char *path, const struct stat *st, vg_err *e)
-{
-    return S_ISDIR(st->st_mode) ? add_directory(s, path, e) : add_item(s, path, e);
-}
-
-static int list_pattern(vgi_names *names, const char *pattern, vg_err *e)
-{
-    glob_t g = {0};
-    int found = glob(pattern, GLOB_NOSORT, NULL, &g), r = VG_OK;
-    if (found == GLOB_NOSPACE) r = vg_fail(e, VG_ENOMEM, "not enough memory for the files of '%s'", pattern);
-    else if (found != 0) r = vg_fail(e, VG_ESYS, "no file matches '%s'", pattern);
-    for (size_t i = 0; r == VG_OK && i < g.gl_pathc; i++)
-        r = vgi_names_add(names, g.gl_pathv[i], strlen(g.gl_pathv[i]), e);
-    globfree(&g);
-    vgi_names_sort(names);
-    return r;
-}
-
-static int add_pattern(vg_source *s, const char *pattern, vg_err *e)
-{
-    vgi_names names = {0};
-    struct stat st;
-    int r = list_pattern(&names, pattern, e);
-    for (size_t i = 0; r == VG_OK && i < names.n; i++) {
-        if (stat(names.at[i], &st) < 0) r = vg_fail(e, VG_ESYS, "cannot open '%s': %s", names.at[i], strerror(errno));
-        else r = add_existing(s, names.at[i], &st, e);
-    }
-    vgi_names_clear(&names);
-    return r;
-}
-
 static int add_operand(vg_source *s, const char *operand, vg_err *e)
 {
-    struct stat st;
     if (!strcmp(operand, "-")) return add_standard_input(s, e);
-    if (stat(operand, &st) == 0) return add_existing(s, operand, &st, e);
-    if (errno == ENOENT && strpbrk(operand, "*?[")) return add_pattern(s, operand, e);
-    return vg_fail(e, VG_ESYS, "cannot open '%s': %s", operand, strerror(errno));
+    vgi_names paths = {0};
+    int r = vgi_operand_files(&paths, operand, e);
+    for (size_t i = 0; r == VG_OK && i < paths.n; i++) r = add_item(s, paths.at[i], e);
+    vgi_names_clear(&paths);
+    return r;
 }
 
 /* ---- the first look ---- */
@@ -256,6 +150,12 @@ static char *subject_of(const char *archive, const char *path, vg_err *e)
     if (s && archive) snprintf(s, n, "'%s' in '%s'", path, archive);
     else if (s) snprintf(s, n, "'%s'", path);
     return s;
+}
+
+/* What a pose from there is called; free it. */
+static char *pose_of(const char *path, vg_err *e)
+{
+    return path == standard_input ? vgi_copy_string("stdin", 5, e) : vgi_pose_name(path, e);
 }
 
 /* The mesh that every further pose must have. */
@@ -375,7 +275,7 @@ static int take_pose(vg_source *s, const char *archive, const char *path, vg_err
     char *subject = subject_of(archive, path, e);
     if (!subject) return VG_ENOMEM;
     free(s->pose);
-    s->pose = path == standard_input ? vgi_copy_string("stdin", 5, e) : vgi_pose_name(path, e);
+    s->pose = pose_of(path, e);
     vg_model_clear(&s->model);
     int r = s->pose ? VG_OK : VG_ENOMEM;
     if (r == VG_OK && vgi_is_stream(s->data.data, s->data.size))
@@ -414,128 +314,31 @@ static int open_stream(vg_source *s, item *it, vg_err *e)
 
 /* ---- sequences ---- */
 
-static void stop_playing(playing *p)
-{
-    if (p->format) p->format->close(p->state);
-    vgi_input_free(&p->in);
-    free(p->subject);
-    free(p->stem);
-    vg_frame_clear(&p->first);
-    *p = (playing){0};
-}
-
-/* The mesh file beside: "walk.obj" or "walk.ply" for "walk.pc2"; free it. NULL with VG_OK: there is none. */
-static int find_beside(const char *file, const char *suffix, char **path, vg_err *e)
-{
-    static const char *const suffixes[] = {".obj", ".ply"};
-    *path = NULL;
-    if (file == standard_input) return VG_OK;
-    size_t n = strlen(file);
-    if (vgi_has_suffix(file, n, suffix)) n -= strlen(suffix);
-    char *to = vgi_array_raw(n + 8, 1, e);
-    if (!to) return VG_ENOMEM;
-    for (size_t i = 0; i < sizeof suffixes / sizeof *suffixes; i++) {
-        snprintf(to, n + 8, "%.*s%s", (int)n, file, suffixes[i]);
-        if (access(to, F_OK) == 0) return *path = to, VG_OK;
-    }
-    free(to);
-    return VG_OK;
-}
-
-static int different_count(const vg_head *h, const char *subject, size_t nv, const char *mesh, vg_err *e)
-{
-    return vg_fail(e, VG_EINPUT, "%s has %zu points where %s has %zu vertices", subject, h->mesh.nv, mesh, nv);
-}
-
-/* A head without faces takes them, and the reference pose, from a mesh file. */
-static int borrow_mesh(vg_source *s, vg_head *h, const char *path, vg_err *e)
-{
-    vg_head from = {0};
-    char *subject = subject_of(NULL, path, e);
-    int r = subject ? vg_load_mesh(&from, path, e) : VG_ENOMEM;
-    if (r == VG_OK && from.mesh.nv != h->mesh.nv)
-        r = different_count(h, s->playing.subject, from.mesh.nv, subject, e);
-    if (r == VG_OK) {
-        vg_mesh_clear(&h->mesh);
-        vg_attributes_clear(&h->attributes);
-        h->mesh = from.mesh, h->attributes = from.attributes;
-        from.mesh = (vg_mesh){0}, from.attributes = (vg_attributes){0};
-        if (!h->reference) {
-            free(h->reference_name);
-            h->reference = from.reference, h->reference_name = from.reference_name;
-            from.reference = NULL, from.reference_name = NULL;
-        }
-    }
-    vg_head_clear(&from);
-    free(subject);
-    return r;
-}
-
-static int find_faces(vg_source *s, const char *path, vg_head *h, vg_err *e)
-{
-    char *beside;
-    int r = find_beside(path, s->playing.format->suffix, &beside, e);
-    if (r < 0) return r;
-    if (beside) r = borrow_mesh(s, h, beside, e);
-    else if (!s->playing.format->bare)
-        r = vg_fail(e, VG_EINPUT,
-                    "%s holds no faces: put the mesh of the same name beside it, as .obj or .ply, or name it "
-                    "with --mesh",
-                    s->playing.subject);
-    free(beside);
-    return r;
-}
-
-static int name_frame(const playing *p, vg_frame *f, vg_err *e)
-{
-    size_t n = strlen(p->stem) + 32;
-    char *name = vgi_array_raw(n, 1, e);
-    if (!name) return VG_ENOMEM;
-    if (p->format->frames && p->format->frames(p->state) == 1) snprintf(name, n, "%s", p->stem);
-    else snprintf(name, n, "%s.%04llu", p->stem, (unsigned long long)p->frames);
-    int r = vg_frame_rename(f, name, e);
-    free(name);
-    return r;
-}
-
-static int read_frame(vg_source *s, vg_frame *f, vg_err *e)
-{
-    playing *p = &s->playing;
-    int r = vg_frame_shape(f, &s->own, e);
-    if (r < 0) return r;
-    vg_records_clear(&f->extra);
-    f->has_time = false, f->time = 0, f->nturns = 0;
-    if ((r = vg_frame_rename(f, "", e)) < 0 || (r = p->format->next(p->state, f, e)) <= 0) return r;
-    p->frames++;
-    if (!*f->name && (r = name_frame(p, f, e)) < 0) return r;
-    return 1;
-}
-
 /* No reference came with the sequence: it is the first pose, which is handed out all the same. */
 static int reference_from_first(vg_source *s, vg_err *e)
 {
-    playing *p = &s->playing;
     vg_head *h = &s->head;
-    int r = read_frame(s, &p->first, e);
-    if (r == 0) r = vg_fail(e, VG_EINPUT, "%s holds no pose", p->subject);
+    const vg_frame *first = NULL;
+    int r = vgi_play_first(&s->playing, &s->own, &first, e);
     if (r < 0) return r;
-    p->waiting = true;
-    h->reference = vgi_copy_array(p->first.values, 3 * h->mesh.nv, sizeof(double), e);
-    h->reference_name = vgi_copy_string(p->first.name, strlen(p->first.name), e);
+    h->reference = vgi_copy_array(first->values, 3 * h->mesh.nv, sizeof(double), e);
+    h->reference_name = vgi_copy_string(first->name, strlen(first->name), e);
     return h->reference && h->reference_name ? VG_OK : VG_ENOMEM;
 }
 
 /* The sequence brings the mesh: its head becomes that of the source. */
 static int take_over_head(vg_source *s, const char *archive, const char *path, vg_head *h, vg_err *e)
 {
-    playing *p = &s->playing;
+    vgi_playing *p = &s->playing;
     vg_kind kind = h->kind;
     vg_precision precision = h->precision;
     size_t count = h->count;
     if (kind != VG_VERTICES && (s->n > 1 || archive))
         return vg_fail(e, VG_EINPUT, "%s holds %s: only vertices can be joined with other inputs", p->subject,
                        vg_kind_name(kind));
-    int r = p->format->keeps & VGI_KEEPS_FACES ? VG_OK : find_faces(s, path, h, e);
+    int r = p->format->keeps & VGI_KEEPS_FACES
+                ? VG_OK
+                : vgi_play_borrow_faces(p, path == standard_input ? NULL : path, h, e);
     if (r == VG_OK) r = settle_mesh(s, &h->mesh, archive, path, e);
     if (r < 0) return r;
     vg_head_clear(&s->head);
@@ -560,22 +363,16 @@ static int join_sequence(const vg_source *s, const vg_head *h, vg_err *e)
         return vg_fail(e, VG_EINPUT, "%s holds %s: only vertices can be joined with a mesh or other inputs", subject,
                        vg_kind_name(h->kind));
     if (h->mesh.nf) return check_joins(s, &h->mesh, subject, e);
-    return h->mesh.nv == s->own.mesh.nv ? VG_OK : different_count(h, subject, s->own.mesh.nv, s->own_name, e);
+    return h->mesh.nv == s->own.mesh.nv ? VG_OK : vgi_different_count(h, subject, s->own.mesh.nv, s->own_name, e);
 }
 
 /* Start on a sequence whose bytes are `in`, which is taken over: a file, or a member of an archive. */
 static int play(vg_source *s, const vgi_sequence_format *format, vgi_input *in, const char *archive, const char *path,
                 vg_err *e)
 {
-    playing *p = &s->playing;
+    vgi_playing *p = &s->playing;
     vg_head h = {0};
-    p->in = in;
-    p->subject = subject_of(archive, path, e);
-    p->stem = path == standard_input ? vgi_copy_string("stdin", 5, e) : vgi_pose_name(path, e);
-    if (!p->subject || !p->stem) return VG_ENOMEM;
-    p->format = format;
-    int r = format->open(&p->state, &h, in, p->subject, e);
-    if (r == VG_OK && h.mesh.nf) r = vg_mesh_check(&h.mesh, p->subject, e);
+    int r = vgi_play_open(p, format, in, subject_of(archive, path, e), pose_of(path, e), &h, e);
     if (r == VG_OK && format->join && !s->own.skeleton.njoints)
         r = vg_fail(e, VG_EINPUT, "%s holds joints by name: name the file of their skeleton with --mesh", p->subject);
     if (r == VG_OK) r = s->own_name ? join_sequence(s, &h, e) : take_over_head(s, archive, path, &h, e);
@@ -596,23 +393,6 @@ static int play_member(vg_source *s, const vgi_sequence_format *format, const ch
     vgi_input *in;
     int r = vgi_input_memory(&in, s->data.data, s->data.size, path, e);
     return r < 0 ? r : play(s, format, in, s->archive_name, path, e);
-}
-
-/* 1 and a frame; 0 behind the last one of this file. */
-static int next_of_sequence(vg_source *s, vg_frame *f, vg_err *e)
-{
-    playing *p = &s->playing;
-    int r;
-    if (!p->waiting) {
-        if ((r = read_frame(s, f, e)) == 0) stop_playing(p);
-        return r;
-    }
-    p->waiting = false;
-    if ((r = vg_frame_shape(f, &s->own, e)) < 0 || (r = vg_frame_label(f, &p->first, e)) < 0) return r;
-    if ((r = vg_frame_turn(f, p->first.turns, p->first.nturns, e)) < 0) return r;
-    memcpy(f->values, p->first.values, 3 * s->own.count * sizeof *f->values);
-    vg_frame_clear(&p->first);
-    return 1;
 }
 
 static int open_next(vg_source *s, vg_err *e)
@@ -753,7 +533,7 @@ int vg_source_next(vg_source *s, vg_frame *f, vg_err *e)
     for (int r = VG_OK; r == VG_OK;) {
         if (s->waiting) return hand_out(s, f, e);
         if (s->playing.format) {
-            r = next_of_sequence(s, f, e);
+            r = vgi_play_next(&s->playing, &s->own, f, e);
         } else if (s->reader) {
             if ((r = vg_reader_next(s->reader, f, e)) == 0) r = end_reader(s, e);
         } else if (s->archive) {
@@ -783,7 +563,7 @@ void vg_source_close(vg_source **source)
     free(s->items);
     vg_reader_close(&s->reader);
     vgi_archive_close(&s->archive);
-    stop_playing(&s->playing);
+    vgi_play_stop(&s->playing);
     vg_head_clear(&s->head);
     vg_head_clear(&s->own);
     vg_records_clear(&s->tail);
