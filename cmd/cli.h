@@ -1,9 +1,12 @@
-/* cli.h: what all programs share: options, messages, exit. cli.c is the only file that prints to standard error.
+/* cli.h: what all programs share: options (options.c), output (output.c), messages, input, exit (cli.c). cli.c is the
+ * only file that prints to standard error.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CLI_H
 #define VG_CLI_H
 
 #include "vg.h"
+
+#include <stdio.h>
 
 /* One option of a program. Every program also has -h --help, -V --version, -q --quiet, -v --verbose and what its
  * cli_program asks for; those are not listed. */
@@ -65,6 +68,8 @@ void cli_warn(const char *format, ...) VG_PRINTF(1, 2); /* unless --quiet */
 void cli_note(const char *format, ...) VG_PRINTF(1, 2); /* only with --verbose */
 /* what the user waits for on standard error; unless --quiet */
 void cli_say(const char *format, ...) VG_PRINTF(1, 2);
+/* cli_strip_controls: what a terminal would obey rather than show becomes '?'. Names come from files. */
+void cli_strip_controls(char *s);
 /* cli_progress: "label n" on standard error, rarely, only when it is a terminal and a second has passed. */
 void cli_progress(const char *label, uint64_t n);
 
@@ -96,7 +101,6 @@ void cli_stream_end(const vg_records *tail);
 void cli_discard_by(void (*discard)(void));
 
 /* The text output of a report: standard output or a temporary file beside --output, which cli_text_end renames. */
-#include <stdio.h>
 FILE *cli_text_open(void);
 void cli_text_end(void);
 

@@ -203,15 +203,6 @@ void report_row(report *r, const report_value *cells)
 
 /* ----------------------------------------------------------------------------------------------- text -- */
 
-/* Names come from files: a terminal shall show them, not obey them. */
-static void strip_controls(char *s)
-{
-    for (unsigned char *p = (unsigned char *)s; *p; p++) {
-        if (*p < 0x20 || *p == 0x7f) *p = '?';
-        if (*p == 0xc2 && p[1] >= 0x80 && p[1] < 0xa0) p[0] = p[1] = '?';
-    }
-}
-
 /* A value as text, in memory of the caller's to free. */
 static char *shown(const report_value *v)
 {
@@ -237,7 +228,7 @@ static char *shown(const report_value *v)
     bool lost = ferror(f);
     if (fclose(f) || lost) checked(NULL);
     checked(text);
-    strip_controls(text);
+    cli_strip_controls(text);
     return text;
 }
 
@@ -333,7 +324,7 @@ static void print_text(const report *r, FILE *f)
     for (size_t i = 0; i < r->n;) {
         const item *t = &r->items[i];
         if (t->kind == NOTE) {
-            strip_controls(t->label);
+            cli_strip_controls(t->label);
             fprintf(f, "%s\n", t->label);
             i++;
         } else if (ends_run(t)) {

@@ -1,0 +1,326 @@
+/* options.c: the command line: options and operands, what they may be, and -h. Leaves out what they are for.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "options.h"
+#include "processors.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <limits.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_OPTIONS = 64, MOST_THREADS = 256, HELP_COLUMN = 32 };
+
+static bool want_help, want_version;
+static long threads_asked;
+
+/* The options that programs share, and which programs have them. */
+typedef enum shared_use { ALL, OUTPUT, TEXT, STREAM, THREADS } shared_use;
+static const struct shared {
+    shared_use use;
+    cli_option option;
+} shared_options[] = {
+    {OUTPUT, {.name = "output", .letter = 'o', .value = "FILE", .help = "write to FILE instead of standard output",
+              .text = &cli.output}},
+    {TEXT, {.name = "json", .help = "print JSON", .flag = &cli.json}},
+    {STREAM, {.name = "no-provenance", .help = "do not record this command line in the stream",
+              .flag = &cli.no_provenance}},
+    {THREADS, {.name = "threads", .letter = 'j', .value = "N", .help = "use N threads (default: all processors)",
+               .integer = &threads_asked, .least = 1, .most = MOST_THREADS}},
+    {ALL, {.name = "quiet", .letter = 'q', .help = "no warnings and no progress", .flag = &cli.quiet}},
+    {ALL, {.name = "verbose", .letter = 'v', .help = "say more on standard error", .flag = &cli.verbose}},
+    {ALL, {.name = "help", .letter = 'h', .help = "print this help", .flag = &want_help}},
+    {ALL, {.name = "version", .letter = 'V', .help = "print the version", .flag = &want_version}},
+};
+
+static bool applies(const cli_program *p, shared_use use)
+{
+    switch (use) {
+    case OUTPUT: return p->writes_stream || p->writes_text || p->writes_file;
+    case TEXT: return p->writes_text;
+    case STREAM: return p->writes_stream || p->traces;
+    case THREADS: return p->threaded;
+    default: return true;
+    }
+}
+
+/* All options of p, its own first; returns how many. */
+static size_t gather_options(const cli_program *p, const cli_option *all[MOST_OPTIONS])
+{
+    size_t n = 0;
+    for (const cli_option *o = p->options; o && o->name && n < MOST_OPTIONS; o++) all[n++] = o;
+    for (size_t i = 0; i < sizeof shared_options / sizeof *shared_options && n < MOST_OPTIONS; i++)
+        if (applies(p, shared_options[i].use)) all[n++] = &shared_options[i].option;
+    return n;
+}
+
+static int option_text(const cli_option *o, char *to, size_t n)
+{
+    char letter[8] = "    ";
+    if (o->letter) snprintf(letter, sizeof letter, "-%c, ", o->letter);
+    return snprintf(to, n, "  %s--%s%s%s", letter, o->name, o->value ? " " : "", o->value ? o->value : "");
+}
+
+/* An option that is too long for the column has its explanation on a line of its own. */
+static void print_help(const cli_program *p, const cli_option *const *all, size_t n)
+{
+    char text[128];
+    int width = 0;
+    for (size_t i = 0; i < n; i++) {
+        int w = option_text(all[i], text, sizeof text);
+        if (w > width && w <= HELP_COLUMN) width = w;
+    }
+    printf("usage: %s %s\n%s\n\n", p->name, p->synopsis, p->summary);
+    for (size_t i = 0; i < n; i++) {
+        bool fits = option_text(all[i], text, sizeof text) <= width;
+        if (!fits) printf("%s\n", text);
+        printf("%-*s  %s\n", width, fits ? text : "", all[i]->help);
+    }
+}
+
+/* strtod takes more than a person means by a number: blanks before it, hexadecimal, names. */
+static bool parse_number(const char *text, double *x)
+{
+    char *end;
+    if (!*text || text[strspn(text, "+-.0123456789eE")]) return false;
+    *x = strtod(text, &end);
+    return !*end && isfinite(*x);
+}
+
+static bool parse_integer(const char *text, long *x)
+{
+    char *end;
+    if (!*text || text[strspn(text, "+-0123456789")]) return false;
+    errno = 0;
+    *x = strtol(text, &end, 10);
+    return !*end && !errno;
+}
+
+static void refuse_value(const cli_option *o, const char *what, const char *text) __attribute__((noreturn));
+static void refuse_value(const cli_option *o, const char *what, const char *text)
+{
+    char range[80] = "";
+    if ((o->least != 0 || o->most != 0) && isinf(o->most))
+        snprintf(range, sizeof range, " of at least %g", o->least);
+    else if (o->least != 0 || o->most != 0)
+        snprintf(range, sizeof range, " from %.10g to %.10g", o->least, o->most);
+    cli_usage("option '--%s' needs %s%s, not '%s'", o->name, what, range, text);
+}
+
+static bool in_range(const cli_option *o, double x)
+{
+    return (o->least == 0 && o->most == 0) || (x >= o->least && x <= o->most);
+}
+
+/* "a|b|c" as "'a', 'b' or 'c'" */
+static void list_choices(const char *choices, char *to, size_t size)
+{
+    size_t at = 0;
+    to[0] = 0;
+    for (const char *p = choices; *p && at < size;) {
+        size_t n = strcspn(p, "|");
+        const char *before = p == choices ? "" : p[n] ? ", " : " or ";
+        at += (size_t)snprintf(to + at, size - at, "%s'%.*s'", before, (int)n, p);
+        p += n + (p[n] != 0);
+    }
+}
+
+static size_t choose(const cli_option *o, const char *value)
+{
+    size_t number = 0, length = strlen(value);
+    for (const char *p = o->value;; number++) {
+        size_t n = strcspn(p, "|");
+        if (n == length && !memcmp(p, value, n)) return number;
+        if (!p[n]) break;
+        p += n + 1;
+    }
+    char all[200];
+    list_choices(o->value, all, sizeof all);
+    cli_usage("option '--%s' needs %s, not '%s'", o->name, all, value);
+}
+
+static void take_option(const cli_option *o, const char *value)
+{
+    if (o->choice) *o->choice = choose(o, value);
+    if (o->flag) {
+        *o->flag = true;
+    } else if (o->text) {
+        *o->text = value;
+    } else if (o->number) {
+        double x;
+        if (!parse_number(value, &x) || !in_range(o, x)) refuse_value(o, "a number", value);
+        *o->number = x;
+    } else if (o->integer) {
+        long x;
+        if (!parse_integer(value, &x) || !in_range(o, (double)x)) refuse_value(o, "a whole number", value);
+        *o->integer = x;
+    } else if (o->take) {
+        o->take(value, o->context);
+    }
+}
+
+enum { LONG_BASE = 256 }; /* getopt's value of option i is LONG_BASE + i, whether it has a letter or not */
+
+static const cli_option *find_option(const cli_option *const *all, size_t n, int value)
+{
+    if (value >= LONG_BASE) return (size_t)(value - LONG_BASE) < n ? all[value - LONG_BASE] : NULL;
+    for (size_t i = 0; i < n; i++)
+        if (value && all[i]->letter == value) return all[i];
+    return NULL;
+}
+
+/* The least number of letters to insert, drop, replace or swap with a neighbour that makes `text` of `name`. */
+static size_t edit_distance(const char *text, size_t n, const char *name)
+{
+    enum { MOST = 32 };
+    size_t row[MOST + 1], last[MOST + 1] = {0}, before[MOST + 1], k = strlen(name);
+    if (n > MOST || k > MOST) return SIZE_MAX;
+    for (size_t j = 0; j <= k; j++) row[j] = j;
+    for (size_t i = 1; i <= n; i++) {
+        memcpy(before, last, sizeof before);
+        memcpy(last, row, sizeof last);
+        row[0] = i;
+        for (size_t j = 1; j <= k; j++) {
+            size_t best = last[j - 1] + (text[i - 1] != name[j - 1]);
+            if (last[j] + 1 < best) best = last[j] + 1;
+            if (row[j - 1] + 1 < best) best = row[j - 1] + 1;
+            bool swapped = i > 1 && j > 1 && text[i - 1] == name[j - 2] && text[i - 2] == name[j - 1];
+            if (swapped && before[j - 2] + 1 < best) best = before[j - 2] + 1;
+            row[j] = best;
+        }
+    }
+    return row[k];
+}
+
+/* The option that was meant, most likely: the nearest, unless a third of it or more would be wrong. */
+static const cli_option *likely_option(const cli_option *const *all, size_t n, const char *text, size_t length)
+{
+    const cli_option *likely = NULL;
+    size_t least = length / 3 + 1;
+    for (size_t i = 0; i < n; i++) {
+        size_t d = edit_distance(text, length, all[i]->name);
+        if (d < least) least = d, likely = all[i];
+    }
+    return likely;
+}
+
+/* What getopt did not like, in our words. */
+static void refuse_option(const cli_option *const *all, size_t n, int problem, char **argv) __attribute__((noreturn));
+static void refuse_option(const cli_option *const *all, size_t n, int problem, char **argv)
+{
+    const cli_option *o = find_option(all, n, optopt);
+    if (problem == ':' && o) cli_usage("option '--%s' needs a value: %s", o->name, o->value);
+    if (o) cli_usage("option '--%s' takes no value", o->name);
+    if (optopt) cli_usage("unknown option '-%c': '%s --help' lists them", optopt, cli.program->name);
+    const char *text = argv[optind - 1];
+    int length = (int)strcspn(text, "=");
+    const cli_option *first = NULL, *second = NULL;
+    for (size_t i = 0; i < n; i++)
+        if (length > 2 && !strncmp(all[i]->name, text + 2, (size_t)length - 2)) *(first ? &second : &first) = all[i];
+    if (second)
+        cli_usage("ambiguous option '%.*s': it could be '--%s' or '--%s'", length, text, first->name, second->name);
+    if (length > 2 && (o = likely_option(all, n, text + 2, (size_t)length - 2)))
+        cli_usage("unknown option '%.*s': did you mean '--%s'?", length, text, o->name);
+    cli_usage("unknown option '%.*s': '%s --help' lists them", length, text, cli.program->name);
+}
+
+/* Operands are collected in order, options may stand between them; what follows "--" are operands. */
+static size_t parse(const cli_option *const *all, size_t n, int argc, char **argv, char **operands)
+{
+    struct option longs[MOST_OPTIONS + 1] = {{0}};
+    char letters[2 * MOST_OPTIONS + 4] = "-:";
+    size_t at = strlen(letters), count = 0;
+    for (size_t i = 0; i < n; i++) {
+        int takes = all[i]->value ? required_argument : no_argument;
+        longs[i] = (struct option){all[i]->name, takes, NULL, LONG_BASE + (int)i};
+        if (all[i]->letter) letters[at++] = all[i]->letter;
+        if (all[i]->letter && all[i]->value) letters[at++] = ':';
+    }
+    letters[at] = 0;
+    opterr = 0;
+    for (int c; (c = getopt_long(argc, argv, letters, longs, NULL)) != -1;) {
+        if (c == 1)
+            operands[count++] = optarg;
+        else if (c == '?' || c == ':')
+            refuse_option(all, n, c, argv);
+        else
+            take_option(find_option(all, n, c), optarg);
+        if (want_help || want_version) return 0;
+    }
+    while (optind < argc) operands[count++] = argv[optind++];
+    return count;
+}
+
+size_t options_parse(int argc, char **argv, char **operands)
+{
+    const cli_program *p = cli.program;
+    const cli_option *all[MOST_OPTIONS];
+    size_t nall = gather_options(p, all), n = parse(all, nall, argc, argv, operands);
+    if (want_help) print_help(p, all, nall);
+    if (want_version && !want_help) printf("%s (vg) %s\nstream 1.0\n", p->name, VG_VERSION);
+    if (want_help || want_version) cli_finish(0);
+    if (n > p->most_operands) {
+        if (p->most_operands == 0) cli_usage("%s takes no operands, but got '%s'", p->name, operands[0]);
+        cli_usage("one operand too many: '%s'", operands[p->most_operands]);
+    }
+    cli.threads = threads_asked ? (int)threads_asked : processors_count(MOST_THREADS);
+    if (cli.output && !strcmp(cli.output, "-")) cli.output = NULL;
+    return n;
+}
+
+/* --------------------------------------------------------------------------------------------- values -- */
+
+/* An option's name, whether it was given with its dashes or without. */
+static const char *bare(const char *option)
+{
+    return option + strspn(option, "-");
+}
+
+double cli_parse_number(const char *option, const char *text)
+{
+    double x;
+    if (!parse_number(text, &x)) cli_usage("option '--%s' needs a number, not '%s'", bare(option), text);
+    return x;
+}
+
+uint64_t cli_parse_size(const char *option, const char *text)
+{
+    static const char units[] = "KMGT";
+    char *end;
+    errno = 0;
+    unsigned long long x = strtoull(text, &end, 10);
+    const char *unit = *end ? strchr(units, *end & ~0x20) : NULL;
+    if (errno || *text < '0' || *text > '9' || (*end && (!unit || end[1])))
+        cli_usage("option '--%s' needs a size such as 64M or 2G, not '%s'", bare(option), text);
+    for (const char *u = units; unit && u <= unit; u++)
+        if (__builtin_mul_overflow(x, 1024, &x)) return UINT64_MAX;
+    return x;
+}
+
+static int compare_vertices(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+size_t cli_parse_vertices(const char *option, const char *text, uint32_t **vertices)
+{
+    size_t n = 0, unique = 0;
+    *vertices = calloc(strlen(text) / 2 + 1, sizeof **vertices);
+    if (!*vertices) cli_stop(VG_ENOMEM, "not enough memory for the vertices of option '--%s'", bare(option));
+    for (const char *p = text;; p++) {
+        char *end;
+        errno = 0;
+        unsigned long long x = *p >= '0' && *p <= '9' ? strtoull(p, &end, 10) : ULLONG_MAX;
+        if (errno || x >= UINT32_MAX || (*end && *end != ','))
+            cli_usage("option '--%s' needs vertex numbers from 0 with commas between, not '%s'", bare(option), text);
+        (*vertices)[n++] = (uint32_t)x;
+        p = end;
+        if (!*p) break;
+    }
+    qsort(*vertices, n, sizeof **vertices, compare_vertices);
+    for (size_t i = 0; i < n; i++)
+        if (i == 0 || (*vertices)[i] != (*vertices)[unique - 1]) (*vertices)[unique++] = (*vertices)[i];
+    return unique;
+}
