@@ -34,6 +34,7 @@ static const cli_program program = {
     .most_operands = SIZE_MAX,
     .writes_stream = true};
 
+/* What was made on another reference pose, or on another choice of faces, is not true of the new one. */
 static void set_reference(vg_head *h, const char *operand)
 {
     vg_err e;
@@ -51,8 +52,10 @@ static void set_reference(vg_head *h, const char *operand)
         h->attributes = r.attributes;
         r.attributes = (vg_attributes){0};
     }
-    free(h->links); /* they were chosen on the other reference */
+    free(h->links);
     h->links = NULL, h->nlinks = 0, h->has_links = false;
+    vg_rig_clear(&h->rig);
+    vg_map_clear(&h->map);
     vg_head_clear(&r);
 }
 
@@ -70,6 +73,7 @@ static void select_faces(vg_head *h)
     if (h->has_selection) return;
     if (vg_select_faces(&h->mesh, &h->selected, &h->nselected, &e) < 0) cli_die(&e);
     h->has_selection = true;
+    vg_map_clear(&h->map);
     cli_note("%zu of %zu faces carry vectors", h->nselected, h->mesh.nf);
 }
 

@@ -449,7 +449,7 @@ int vg_link_components(const vg_mesh *m, const double *vertices, uint32_t **pair
                        vg_err *e) VG_MUST_CHECK;
 
 /* vg_head_prepare_vectors: choose h's links from its reference pose unless it has them. Every program that derives
- * vectors from vertices calls this before vg_graph_new. */
+ * vectors from vertices calls this before vg_graph_new. A map whose corners the links are not among is left out. */
 int vg_head_prepare_vectors(vg_head *h, vg_err *e) VG_MUST_CHECK;
 
 /* Deformation of vectors, reference pose to deformed pose (MATH 4): Frames (T 3.12 ff.) on faces of 3 or more,

@@ -225,3 +225,35 @@ END
     there_and_back polygon
     every_program polygon
 }
+
+# ---- what is well formed, and makes no sense -----------------------------------------------------------------------
+
+# no_output STATUS COMMAND...: refused with one line, and no file called out.*
+no_output() {
+    must_fail "$@" && one_line && [ -z "$(find . -name '*out.*')" ] || fail "'${*:2}' left a file"
+}
+
+@test "a body whose size no number holds is refused by vg-fitmap --retarget" {
+    poses cube 3
+    must vg-encode pose*.obj -o cube.vgs
+    must vg-segment -k 2 cube.vgs -o patches.vgs
+    must vg-fitmap -q --patches patches.vgs cube.vgs -o cube.map
+    for size in 1e300 1e155 1e-300 1e-310; do
+        awk -v s=$size '/^v/ { printf "v %.17g %.17g %.17g\n", $2 * s, $3 * s, $4 * s; next } { print }' pose2.obj >body.obj
+        no_output 3 vg-fitmap --retarget body.obj cube.map -o out.map
+    done
+    no_output 3 vg-fitmap --retarget pose2.obj --morph 1e308 cube.map -o out.map
+}
+
+@test "a map or a rig does not stay with a mesh that it is no longer true of" {
+    for map in map rig; do
+        must vg-encode --reference "$GOLDEN/$map.vgs" "$GOLDEN/$map.vgs" -o reference.vgs
+        must vg-encode --vectors --faces selected "$GOLDEN/$map.vgs" -o selected.vgs
+        for file in reference.vgs selected.vgs; do must vg-info --check $file; done
+        py <<'END'
+import read_stream
+a, b = map(read_stream.read_stream, ("reference.vgs", "selected.vgs"))
+assert a.map is None and a.rig is None and b.map is None
+END
+    done
+}

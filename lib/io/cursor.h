@@ -112,8 +112,10 @@ static inline int put64(vg_bytes *b, uint64_t x, vg_err *e)
     return vgi_bytes_append(b, p, sizeof p, e);
 }
 
+/* What a reader would refuse is not written: all numbers are finite. */
 static inline int put_doubles(vg_bytes *b, const double *x, size_t n, vg_err *e)
 {
+    if (!vgi_finite(x, n)) return vg_fail(e, VG_EINPUT, "the result holds a number that is not finite");
     if (NATIVE) return vgi_bytes_append(b, x, n * sizeof *x, e);
     int r = vgi_bytes_reserve(b, b->size + 8 * n, e);
     for (size_t i = 0; r == VG_OK && i < n; i++) {

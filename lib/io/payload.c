@@ -250,6 +250,17 @@ static size_t graph_count(const vg_head *h, vg_kind kind)
     return corners;
 }
 
+/* Why frames of h->count elements do not go with what stands before them; NULL: they do. */
+static const char *refuse_form(const vg_head *h)
+{
+    if (h->map.ncorners && h->map.ncorners != graph_count(h, VG_VECTORS))
+        return "the corners of record MAP do not fit the mesh";
+    if (h->kind == VG_TRANSFORMS) return NULL;
+    if (!h->reference) return "a MESH and a REFP record must come before it";
+    if (h->kind != VG_VERTICES && !h->has_links) return "a LINK record must come before it";
+    return h->count != graph_count(h, h->kind) ? "its count does not fit the mesh" : NULL;
+}
+
 int vgi_form_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 {
     cursor c = start(p);
@@ -259,17 +270,14 @@ int vgi_form_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     if (kind < VG_VERTICES || kind > VG_TRANSFORMS) return wrong(p, "frames are of unknown kind", e);
     if (precision != VG_F32 && precision != VG_F64) return wrong(p, "numbers are of unknown precision", e);
     h->kind = (vg_kind)kind, h->precision = (vg_precision)precision, h->count = (size_t)count;
-    if (h->map.ncorners && h->map.ncorners != graph_count(h, VG_VECTORS))
-        return wrong(p, "the corners of record MAP do not fit the mesh", e);
-    if (kind == VG_TRANSFORMS) return VG_OK;
-    if (!h->reference) return wrong(p, "a MESH and a REFP record must come before it", e);
-    if (kind != VG_VERTICES && !h->has_links) return wrong(p, "a LINK record must come before it", e);
-    if (count != graph_count(h, h->kind)) return wrong(p, "its count does not fit the mesh", e);
-    return VG_OK;
+    const char *why = refuse_form(h);
+    return why ? wrong(p, why, e) : VG_OK;
 }
 
 int vgi_form_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
+    const char *why = refuse_form(h);
+    if (why) return vg_fail(e, VG_EINPUT, "record FORM cannot be written: %s", why);
     int r = put32(b, h->kind, e);
     if (r == VG_OK) r = put32(b, h->precision, e);
     return r < 0 ? r : put64(b, h->count, e);

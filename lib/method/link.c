@@ -255,5 +255,6 @@ int vg_head_prepare_vectors(vg_head *h, vg_err *e)
     h->links = links;
     h->nlinks = n;
     h->has_links = true;
+    if (n && h->map.ncorners) vg_map_clear(&h->map); /* its corners are those of a graph without links */
     return VG_OK;
 }

@@ -220,8 +220,11 @@ int vg_map_retarget(vg_head *h, const double *target, double morph, int threads,
     if (r == VG_OK && morph != 1) r = morph_body(h, g, target, morph, body, threads, e);
     if (r == VG_OK) {
         double before = vg_diagonal(h->reference, nv), after = vg_diagonal(body, nv);
+        ratio = after / before;
         if (!(before > 0 && after > 0)) r = vg_fail(e, VG_EINPUT, "a body without extent cannot be retargeted");
-        else ratio = after / before, r = bones ? move_bones(h, body, e) : move_points(h, g, of_face, body, ratio, e);
+        else if (!(isfinite(ratio * m->size) && ratio * m->size > 0))
+            r = vg_fail(e, VG_EINPUT, "a body of size %g cannot take the place of one of size %g", after, before);
+        else r = bones ? move_bones(h, body, e) : move_points(h, g, of_face, body, ratio, e);
     }
     if (r == VG_OK) {
         if (home) m->home = home, m->has_home = true, home = NULL;
