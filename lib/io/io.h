@@ -133,6 +133,11 @@ typedef struct vgi_format {
 
 extern const vgi_format vgi_format_obj, vgi_format_ply, vgi_format_ply_ascii, vgi_format_ply_be, vgi_format_off,
     vgi_format_stl, vgi_format_stl_ascii;
+/* obj_write.c, ply_write.c: for the tables in obj.c and ply.c */
+int vgi_obj_write(vg_bytes *out, const vgi_writing *w, vg_err *e);
+int vgi_ply_write_little(vg_bytes *out, const vgi_writing *w, vg_err *e);
+int vgi_ply_write_text(vg_bytes *out, const vgi_writing *w, vg_err *e);
+int vgi_ply_write_big(vg_bytes *out, const vgi_writing *w, vg_err *e);
 const vgi_format *vgi_format_by_name(const char *name, size_t n);     /* NULL: none */
 const vgi_format *vgi_format_by_suffix(const char *file_name);        /* case does not matter; NULL: none */
 const vgi_format *vgi_format_by_content(const unsigned char *data, size_t n);

@@ -1,5 +1,6 @@
-/* obj.c: Wavefront OBJ: vertices, texture coordinates, faces, lines, and the names of groups and materials.
- * Leaves out normals (they change with the pose), vertex colours, points, free-form surfaces and the material files.
+/* obj.c: Wavefront OBJ, read: vertices, texture coordinates, faces, lines, and the names of groups and materials.
+ * Leaves out normals (they change with the pose), vertex colours, points, free-form surfaces, the material files, and
+ * writing (obj_write.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -7,13 +8,9 @@
 #include <stdlib.h>
 
 enum {
-    MOST_NUMBER = 26,    /* bytes of a printed number and the blank before it */
-    MOST_REFERENCE = 22, /* " v/vt", two 32-bit numbers */
-    SMALL_FACE = 16,     /* up to here pairs of vertices are compared directly */
-    SHOWN = 40           /* bytes of the input that a message shows */
+    SMALL_FACE = 16, /* up to here pairs of vertices are compared directly */
+    SHOWN = 40       /* bytes of the input that a message shows */
 };
-
-/* ------------------------------------------------------------------------------------------- reading -- */
 
 /* A file being read. Arrays are those of the model; these are their capacities. */
 struct reading {
@@ -568,110 +565,6 @@ static bool sniff_obj(const unsigned char *data, size_t n)
     return false;
 }
 
-/* ------------------------------------------------------------------------------------------- writing -- */
-
-static const char *label_word(uint32_t kind)
-{
-    switch (kind) {
-    case VG_LABEL_OBJECT: return "o";
-    case VG_LABEL_GROUP: return "g";
-    case VG_LABEL_MATERIAL: return "usemtl";
-    case VG_LABEL_SMOOTHING: return "s";
-    case VG_LABEL_LIBRARY: return "mtllib";
-    default: return NULL;
-    }
-}
-
-static int write_label(vg_bytes *out, const vg_label *label, vg_err *e)
-{
-    const char *word = label_word(label->kind);
-    size_t n = strlen(label->text);
-    if (!word) return VG_OK; /* a kind that OBJ does not have */
-    if (strpbrk(label->text, "\r\n"))
-        return vg_fail(e, VG_EINPUT, "%s '%s' has a line break, which OBJ cannot hold", word, label->text);
-    int result = vgi_bytes_append(out, word, strlen(word), e);
-    if (result == VG_OK && n) result = vgi_bytes_append(out, " ", 1, e);
-    if (result == VG_OK) result = vgi_bytes_append(out, label->text, n, e);
-    /* a blank keeps a backslash at the end from joining the next line */
-    const char *stop = n && label->text[n - 1] == '\\' ? " \n" : "\n";
-    return result == VG_OK ? vgi_bytes_append(out, stop, strlen(stop), e) : result;
-}
-
-/* Lines of `dim` numbers behind a keyword. */
-static int write_numbers(vg_bytes *out, const char *word, const double *x, size_t n, size_t dim, bool full, vg_err *e)
-{
-    size_t length = strlen(word);
-    for (size_t i = 0; i < n; i++, x += dim) {
-        if (vgi_bytes_reserve(out, out->size + length + dim * MOST_NUMBER + 1, e) < 0) return VG_ENOMEM;
-        char *to = (char *)out->data + out->size;
-        memcpy(to, word, length);
-        to += length;
-        for (size_t k = 0; k < dim; k++) {
-            *to++ = ' ';
-            to += full ? vgi_print_double(to, x[k]) : vgi_print_float(to, x[k]);
-        }
-        *to++ = '\n';
-        out->size = (size_t)(to - (char *)out->data);
-    }
-    return VG_OK;
-}
-
-static int write_face(vg_bytes *out, const uint32_t *vert, const uint32_t *tex, size_t n, vg_err *e)
-{
-    if (vgi_bytes_reserve(out, out->size + n * MOST_REFERENCE + 2, e) < 0) return VG_ENOMEM;
-    char *to = (char *)out->data + out->size;
-    *to++ = n == 2 ? 'l' : 'f';
-    for (size_t i = 0; i < n; i++) {
-        *to++ = ' ';
-        to += vgi_print_uint(to, (uint64_t)vert[i] + 1);
-        if (!tex || tex[i] == UINT32_MAX) continue;
-        *to++ = '/';
-        to += vgi_print_uint(to, (uint64_t)tex[i] + 1);
-    }
-    *to++ = '\n';
-    out->size = (size_t)(to - (char *)out->data);
-    return VG_OK;
-}
-
-/* Labels of which the face comes at or before f, from *next on. Libraries stand at the head of the file. */
-static int write_labels(vg_bytes *out, const vg_attributes *a, size_t f, size_t *next, vg_err *e)
-{
-    for (; *next < a->nlabels && a->labels[*next].face <= f; ++*next) {
-        if (a->labels[*next].kind == VG_LABEL_LIBRARY) continue;
-        int result = write_label(out, &a->labels[*next], e);
-        if (result < 0) return result;
-    }
-    return VG_OK;
-}
-
-static int write_libraries(vg_bytes *out, const vg_attributes *a, vg_err *e)
-{
-    for (size_t i = 0; i < a->nlabels; i++) {
-        int result = a->labels[i].kind == VG_LABEL_LIBRARY ? write_label(out, &a->labels[i], e) : VG_OK;
-        if (result < 0) return result;
-    }
-    return VG_OK;
-}
-
-static int write_obj(vg_bytes *out, const vgi_writing *w, vg_err *e)
-{
-    static const vg_attributes none;
-    const vg_attributes *a = w->attributes ? w->attributes : &none;
-    const vg_mesh *m = w->mesh;
-    const uint32_t *tex = a->ntex ? a->corner_tex : NULL;
-    int result = write_libraries(out, a, e);
-    if (result == VG_OK) result = write_numbers(out, "v", w->vertices, m->nv, 3, w->full_precision, e);
-    if (result == VG_OK) result = write_numbers(out, "vt", a->tex, a->ntex, a->tex_dim, w->full_precision, e);
-    size_t next_label = 0;
-    for (size_t f = 0; f < m->nf && result == VG_OK; f++) {
-        uint32_t first = m->start[f];
-        result = write_labels(out, a, f, &next_label, e);
-        if (result == VG_OK)
-            result = write_face(out, m->vert + first, tex ? tex + first : NULL, m->start[f + 1] - first, e);
-    }
-    return result == VG_OK ? write_labels(out, a, SIZE_MAX, &next_label, e) : result;
-}
-
-const vgi_format vgi_format_obj = {"obj", ".obj", sniff_obj, read_obj, write_obj,
+const vgi_format vgi_format_obj = {"obj", ".obj", sniff_obj, read_obj, vgi_obj_write,
                                      VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE |
                                          VGI_KEEPS_LABELS | VGI_KEEPS_DOUBLES};

@@ -1,0 +1,154 @@
+/* ply_write.c: PLY polygon files, text and binary in both byte orders, written: vertices, faces with the colours of
+ * their patches, edges.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/io.h"
+
+enum { MOST_NUMBER = 26, MOST_SMALL_FACE = 255 }; /* bytes of a number and what follows it; a length of 8 bits */
+
+enum encoding { TEXT, LITTLE, BIG };
+
+struct writing {
+    vg_bytes *out;
+    const vgi_writing *w;
+    enum encoding encoding;
+    size_t nfaces;  /* the faces before nfaces are element face, those behind element edge */
+    bool long_list; /* list lengths need 32 bits */
+    vg_err *e;
+};
+
+static void put(char **to, uint64_t x, size_t bytes, enum encoding encoding)
+{
+    for (size_t i = 0; i < bytes; i++) (*to)[encoding == BIG ? bytes - 1 - i : i] = (char)(x >> 8 * i);
+    *to += bytes;
+}
+
+static void put_integer(char **to, uint64_t x, size_t bytes, enum encoding encoding, char separator)
+{
+    if (encoding != TEXT) {
+        put(to, x, bytes, encoding);
+        return;
+    }
+    *to += vgi_print_uint(*to, x);
+    *(*to)++ = separator;
+}
+
+static void put_number(char **to, double x, bool full, enum encoding encoding, char separator)
+{
+    if (encoding == TEXT) {
+        *to += full ? vgi_print_double(*to, x) : vgi_print_float(*to, x);
+        *(*to)++ = separator;
+    } else if (full) {
+        uint64_t bits;
+        memcpy(&bits, &x, sizeof bits);
+        put(to, bits, 8, encoding);
+    } else {
+        float f = (float)x;
+        uint32_t bits;
+        memcpy(&bits, &f, sizeof bits);
+        put(to, bits, 4, encoding);
+    }
+}
+
+/* Two-vertex faces become edges when that keeps the order: when all of them come last. */
+static void divide_faces(struct writing *x)
+{
+    const vg_mesh *m = x->w->mesh;
+    x->nfaces = m->nf;
+    while (x->nfaces > 0 && m->start[x->nfaces] - m->start[x->nfaces - 1] == 2) x->nfaces--;
+    size_t pairs = 0;
+    for (size_t f = 0; f < x->nfaces; f++) {
+        size_t size = m->start[f + 1] - m->start[f];
+        pairs += size == 2;
+        x->long_list |= size > MOST_SMALL_FACE;
+    }
+    if (pairs) x->nfaces = m->nf;
+}
+
+static bool has_colours(const struct writing *x)
+{
+    return x->w->patches && x->w->patches->n;
+}
+
+static int write_header(struct writing *x)
+{
+    static const char *const names[] = {"ascii", "binary_little_endian", "binary_big_endian"};
+    const vg_mesh *m = x->w->mesh;
+    const char *real = x->w->full_precision ? "double" : "float";
+    const char *index = m->nv > (size_t)INT32_MAX + 1 ? "uint" : "int";
+    char text[512];
+    int n = snprintf(text, sizeof text,
+                     "ply\nformat %s 1.0\nelement vertex %zu\nproperty %s x\nproperty %s y\nproperty %s z\n"
+                     "element face %zu\nproperty list %s %s vertex_indices\n%s",
+                     names[x->encoding], m->nv, real, real, real, x->nfaces, x->long_list ? "uint" : "uchar", index,
+                     has_colours(x) ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "");
+    int result = vgi_bytes_append(x->out, text, (size_t)n, x->e);
+    if (result == VG_OK && x->nfaces < m->nf) {
+        n = snprintf(text, sizeof text, "element edge %zu\nproperty %s vertex1\nproperty %s vertex2\n",
+                     m->nf - x->nfaces, index, index);
+        result = vgi_bytes_append(x->out, text, (size_t)n, x->e);
+    }
+    return result == VG_OK ? vgi_bytes_append(x->out, "end_header\n", 11, x->e) : result;
+}
+
+/* Room for n numbers of at most `most` bytes; where to write them. NULL: no memory. */
+static char *room(struct writing *x, size_t n, size_t most)
+{
+    if (vgi_bytes_reserve(x->out, x->out->size + n * most, x->e) < 0) return NULL;
+    return (char *)x->out->data + x->out->size;
+}
+
+static void wrote(struct writing *x, const char *to)
+{
+    x->out->size = (size_t)(to - (char *)x->out->data);
+}
+
+static int write_body(struct writing *x)
+{
+    const vg_mesh *m = x->w->mesh;
+    for (size_t v = 0; v < m->nv; v++) {
+        char *to = room(x, 3, MOST_NUMBER);
+        if (!to) return VG_ENOMEM;
+        for (int k = 0; k < 3; k++)
+            put_number(&to, x->w->vertices[3 * v + k], x->w->full_precision, x->encoding, k < 2 ? ' ' : '\n');
+        wrote(x, to);
+    }
+    for (size_t f = 0; f < m->nf; f++) {
+        uint32_t first = m->start[f], end = m->start[f + 1];
+        bool coloured = f < x->nfaces && has_colours(x);
+        char *to = room(x, (size_t)(end - first) + 4, MOST_NUMBER);
+        if (!to) return VG_ENOMEM;
+        if (f < x->nfaces) put_integer(&to, end - first, x->long_list ? 4 : 1, x->encoding, ' ');
+        for (uint32_t c = first; c < end; c++)
+            put_integer(&to, m->vert[c], 4, x->encoding, c + 1 < end || coloured ? ' ' : '\n');
+        if (coloured) {
+            unsigned char colour[3];
+            vgi_patch_colour(x->w->patches->of_face[f], colour);
+            for (int k = 0; k < 3; k++) put_integer(&to, colour[k], 1, x->encoding, k < 2 ? ' ' : '\n');
+        }
+        wrote(x, to);
+    }
+    return VG_OK;
+}
+
+static int write_ply(vg_bytes *out, const vgi_writing *w, enum encoding encoding, vg_err *e)
+{
+    struct writing x = {.out = out, .w = w, .encoding = encoding, .e = e};
+    divide_faces(&x);
+    int result = write_header(&x);
+    return result == VG_OK ? write_body(&x) : result;
+}
+
+int vgi_ply_write_little(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    return write_ply(out, w, LITTLE, e);
+}
+
+int vgi_ply_write_text(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    return write_ply(out, w, TEXT, e);
+}
+
+int vgi_ply_write_big(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    return write_ply(out, w, BIG, e);
+}
