@@ -55,7 +55,7 @@ ALL_LDFLAGS := -fsanitize=address,undefined
 endif
 ALL_CFLAGS += $(CFLAGS)
 # numeric kernels: the compiler may unroll and vectorise them; nothing here reorders sums
-KERNELS := $(addprefix lib/method/,deform_kernel solve_kernel carry carry_kernel planar_kernel guess_kernel reconstruct segment) lib/model/graph lib/model/measures lib/core/memory
+KERNELS := $(addprefix lib/method/,deform_kernel solve_kernel carry carry_kernel planar_kernel guess_kernel reconstruct segment) lib/model/graph lib/model/measures lib/model/measures_kernel lib/core/memory
 ALL_LDFLAGS += $(LDFLAGS)
 ALL_LIBS := $(CHOLMOD_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) -lpthread -lm $(LDLIBS)
 

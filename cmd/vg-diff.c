@@ -39,20 +39,34 @@ static const cli_program program = {
     .most_operands = 2,
     .writes_text = true,
     .traces = true,
+    .threaded = true,
 };
+
+/* Poses that are measured together: some for each thread, but no more than this holds; one for each in any case. */
+enum { POSES_PER_THREAD = 4, BATCH_BYTES = 32 << 20 };
 
 /* One of the two sequences. */
 typedef struct side {
     const char *name;
     vg_source *source;
     vg_head *head;
-    vg_frame frame;
-    size_t frames;
+    size_t frames; /* read so far */
 } side;
+
+/* Pairs of frames that are measured together. */
+typedef struct batch {
+    size_t n, most;
+    vg_frame *truth, *result;
+    const double **poses[2]; /* their values */
+    double **errors;
+    vg_pose_error *found;
+} batch;
 
 /* What is known when both sequences have been read. */
 typedef struct findings {
     vg_measure_report measures;
+    size_t frames; /* measured so far */
+    double worst;
     char *worst_frame; /* name of the frame with the largest error */
 } findings;
 
@@ -101,16 +115,10 @@ static void open_side(side *s, char *operand)
              vg_kind_name(s->head->kind));
 }
 
-static void close_side(side *s)
-{
-    vg_frame_clear(&s->frame);
-    vg_source_close(&s->source);
-}
-
-static bool next(side *s)
+static bool next(side *s, vg_frame *f)
 {
     vg_err e;
-    int r = vg_source_next(s->source, &s->frame, &e);
+    int r = vg_source_next(s->source, f, &e);
     if (r < 0) cli_die(&e);
     s->frames += r > 0;
     return r > 0;
@@ -150,50 +158,115 @@ static void open_heat(side *result, const side *truth)
     cli_stream_open(result->head);
 }
 
-static void put_heat(side *result, const double *errors, double diagonal)
+static void put_heat(vg_frame *f, size_t nv, const double *errors, double diagonal)
 {
     const char *name = opts.centred ? "centred error" : "error", *unit = diagonal > 0 ? "D" : "";
-    size_t nv = result->head->mesh.nv;
     vg_err e;
-    if (vg_frame_scalars(&result->frame, name, unit, errors, nv, &e) < 0) cli_die(&e);
-    for (size_t v = 0; v < nv && diagonal > 0; v++) result->frame.scalars[v] /= diagonal;
-    cli_stream_put(&result->frame);
+    if (vg_frame_scalars(f, name, unit, errors, nv, &e) < 0) cli_die(&e);
+    for (size_t v = 0; v < nv && diagonal > 0; v++) f->scalars[v] /= diagonal;
+    cli_stream_put(f);
 }
 
-/* Read both to their ends, so that damage is seen, and measure the frames they have in common. */
+/* ---- poses ---- */
+
+/* What --heat writes goes out frame by frame: who looks at it may be waiting. */
+static size_t batch_size(size_t nv)
+{
+    size_t threads = (size_t)cli.threads, room = BATCH_BYTES / (7 * sizeof(double)) / (nv + 1);
+    if (opts.heat) return 1;
+    return room < threads ? threads : room < POSES_PER_THREAD * threads ? room : POSES_PER_THREAD * threads;
+}
+
+static void make_batch(batch *b, size_t nv)
+{
+    static const char what[] = "a batch of poses";
+    b->most = batch_size(nv);
+    b->truth = cli_allocate(b->most, sizeof *b->truth, what);
+    b->result = cli_allocate(b->most, sizeof *b->result, what);
+    for (int i = 0; i < 2; i++) b->poses[i] = cli_allocate(b->most, sizeof *b->poses[i], what);
+    b->found = cli_allocate(b->most, sizeof *b->found, what);
+    b->errors = cli_allocate(b->most, sizeof *b->errors, what);
+    for (size_t i = 0; i < b->most; i++) b->errors[i] = cli_allocate(nv, sizeof **b->errors, what);
+}
+
+static void clear_batch(batch *b)
+{
+    for (size_t i = 0; i < b->most; i++) {
+        vg_frame_clear(&b->truth[i]);
+        vg_frame_clear(&b->result[i]);
+        free(b->errors[i]);
+    }
+    free(b->truth);
+    free(b->result);
+    for (int i = 0; i < 2; i++) free(b->poses[i]);
+    free(b->found);
+    free(b->errors);
+}
+
+/* Read frames that both have until the batch is full; false when one of them has ended. Then the other is read to its
+ * end, so that damage is seen. */
+static bool next_batch(batch *b, side *truth, side *result)
+{
+    bool more[2] = {true, true};
+    for (b->n = 0; b->n < b->most; b->n++) {
+        vg_frame *t = &b->truth[b->n], *r = &b->result[b->n];
+        more[0] = next(truth, t);
+        more[1] = next(result, r);
+        while (more[0] && !more[1]) more[0] = next(truth, t);
+        while (more[1] && !more[0]) more[1] = next(result, r);
+        if (!more[0]) return false;
+        if (strcmp(t->name, r->name))
+            cli_note("frame %zu is '%s' in '%s' and '%s' in '%s'", truth->frames - 1, t->name, truth->name, r->name,
+                     result->name);
+        b->poses[0][b->n] = t->values, b->poses[1][b->n] = r->values;
+        cli_progress("frame", truth->frames);
+    }
+    return true;
+}
+
+static void note_worst(findings *found, const vg_pose_error *error, const char *name)
+{
+    if (found->worst_frame && error->max <= found->worst) return;
+    found->worst = error->max;
+    free(found->worst_frame);
+    found->worst_frame = strdup(name);
+}
+
+static void measure_batch(vg_measures *x, batch *b, const side *result, double diagonal, findings *found, report *r)
+{
+    vg_err e;
+    size_t nv = result->head->mesh.nv;
+    if (vg_measures_add(x, b->n, b->poses[0], b->poses[1], b->errors, b->found, &e) < 0) cli_die(&e);
+    for (size_t i = 0; i < b->n; i++, found->frames++) {
+        const char *name = b->truth[i].name;
+        note_worst(found, &b->found[i], name);
+        if (opts.heat) put_heat(&b->result[i], nv, b->errors[i], diagonal);
+        if (!opts.frames) continue;
+        const double errors[3] = {b->found[i].mean, vg_error_p95(b->errors[i], nv), b->found[i].max};
+        report_frame(r, found->frames, name, errors, diagonal);
+    }
+}
+
+/* Measure the frames that both have in common. */
 static void compare(side *truth, side *result, findings *found, report *r)
 {
     vg_measures *x = NULL;
     vg_err e;
+    batch b = {0};
     size_t nv = truth->head->mesh.nv;
-    double worst = -1, mean, max, diagonal = vg_diagonal(truth->head->reference, nv);
-    double *errors = calloc(nv + 1, sizeof *errors);
-    if (!errors) cli_stop(VG_ENOMEM, "not enough memory for the errors of %zu vertices", nv);
-    if (vg_measures_new(&x, &truth->head->mesh, truth->head->reference, opts.centred, &e) < 0) cli_die(&e);
+    const double *reference = truth->head->reference;
+    double diagonal = vg_diagonal(reference, nv);
+    make_batch(&b, nv);
+    if (vg_measures_new(&x, &truth->head->mesh, reference, opts.centred, cli.threads, &e) < 0) cli_die(&e);
     if (opts.frames) report_table(r, "frame_errors", "", false, frame_columns, COLUMNS_FRAME);
     open_heat(result, truth);
-    for (bool more[2] = {true, true}; more[0] || more[1];) {
-        more[0] = more[0] && next(truth);
-        more[1] = more[1] && next(result);
-        if (!more[0] || !more[1]) continue;
-        const char *name = truth->frame.name;
-        if (strcmp(name, result->frame.name))
-            cli_note("frame %zu is '%s' in '%s' and '%s' in '%s'", truth->frames - 1, name, truth->name,
-                     result->frame.name, result->name);
-        if (vg_measures_add(x, truth->frame.values, result->frame.values, &mean, &max, errors, &e) < 0) cli_die(&e);
-        if (max > worst) {
-            worst = max;
-            free(found->worst_frame);
-            found->worst_frame = strdup(name);
-        }
-        if (opts.heat) put_heat(result, errors, diagonal);
-        if (opts.frames)
-            report_frame(r, truth->frames - 1, name, (double[3]){mean, vg_error_p95(errors, nv), max}, diagonal);
-        cli_progress("frame", truth->frames);
+    for (bool more = true; more;) {
+        more = next_batch(&b, truth, result);
+        measure_batch(x, &b, result, diagonal, found, r);
     }
     vg_measures_get(x, &found->measures);
     vg_measures_free(&x);
-    free(errors);
+    clear_batch(&b);
     if (!opts.heat) return;
     cli_stream_end(vg_source_tail(result->source));
     cli_redirect(report_file, false);
@@ -358,8 +431,8 @@ int main(int argc, char **argv)
     }
     report_free(&r);
     free(found.worst_frame);
-    close_side(&truth);
-    close_side(&result);
+    vg_source_close(&truth.source);
+    vg_source_close(&result.source);
     if (truth.frames != result.frames)
         cli_no("'%s' has %zu frames and '%s' has %zu: only the first %zu were compared", truth.name, truth.frames,
                result.name, result.frames, found.measures.frames);

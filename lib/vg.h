@@ -754,15 +754,18 @@ typedef struct vg_measure_report {
     uint64_t planarity_histogram[2][10];
 } vg_measure_report;
 
-/* vg_measures_new: m borrowed until free. centred: compare poses after moving each one's centroid to 0.
- * p95 is exact to 0.4 % (a histogram of 1/256 octaves). */
-int vg_measures_new(vg_measures **x, const vg_mesh *m, const double *reference, bool centred,
+/* vg_measures_new: m borrowed until free. centred: compare poses after moving each one's centroid to 0. threads >= 1:
+ * their number changes no digit. p95 is exact to 0.4 % (a histogram of 1/256 octaves). */
+int vg_measures_new(vg_measures **x, const vg_mesh *m, const double *reference, bool centred, int threads,
                     vg_err *e) VG_MUST_CHECK;
 void vg_measures_free(vg_measures **x);
-/* vg_measures_add: one pose of the truth and of the result (nv points each); frame_mean, frame_max (may be NULL):
- * this pose's error. errors (may be NULL): nv distances out. */
-int vg_measures_add(vg_measures *x, const double *truth, const double *result, double *frame_mean, double *frame_max,
-                    double *errors, vg_err *e) VG_MUST_CHECK;
+typedef struct vg_pose_error {
+    double mean, max;
+} vg_pose_error;
+/* vg_measures_add: n poses of the truth and of the result (nv points each); how these are added one after another or
+ * together changes no digit. errors: for each nv distances out. found (may be NULL): n. When it fails none counts. */
+int vg_measures_add(vg_measures *x, size_t n, const double *const *truth, const double *const *result,
+                    double *const *errors, vg_pose_error *found, vg_err *e) VG_MUST_CHECK;
 void vg_measures_get(const vg_measures *x, vg_measure_report *r);
 /* vg_error_p95: the least of n numbers that 95 of 100 do not exceed; 0 for none. Changes their order. O(n). */
 double vg_error_p95(double *numbers, size_t n);

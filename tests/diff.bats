@@ -235,7 +235,7 @@ END
     must_fail 2 vg-diff -t '' a.obj a.obj
     must_fail 2 vg-diff a.obj a.obj -t
     must_fail 2 vg-diff --no-provenance a.obj a.obj
-    must_fail 2 vg-diff -j 2 a.obj a.obj
+    must_fail 2 vg-diff -j 0 a.obj a.obj
 }
 
 @test "damaged, missing and empty input" {

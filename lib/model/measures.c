@@ -1,7 +1,9 @@
 /* measures.c: how far two sequences of one connectivity are apart: vertices; orientation, area, planarity of faces.
- * Leaves out pairing of frames and tolerances: those are vg-diff's.
+ * Each pose is measured by itself, several by as many threads; their sums are added in the order of the poses, so that
+ * the number of threads changes no digit. Leaves out the inner loop over faces (measures_kernel.c), pairing of frames
+ * and tolerances: those are vg-diff's.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "core/core.h"
+#include "model/measures_kernel.h"
 
 #include <math.h>
 
@@ -9,23 +11,26 @@
  * most 1/256 of its value wide; its middle is off by half of that. */
 enum { BIN_SHIFT = 64 - 1 - 11 - 8, NBINS = 1 << (11 + 8) };
 
-/* A face has a normal when its area exceeds this times D times its perimeter: below, it is rounding. */
-static const double FLAT = 1e-14;
-
 const double vg_error_edges[VG_ERROR_BINS] = {
     0, 1e-12, 2e-12, 5e-12, 1e-11, 2e-11, 5e-11, 1e-10, 2e-10, 5e-10, 1e-9, 2e-9, 5e-9, 1e-8, 2e-8, 5e-8, 1e-7,
     2e-7, 5e-7, 1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1,
     2e-1, 5e-1, 1e0, 2e0, 5e0,
 };
 
-typedef struct running { /* Welford: mean and squared deviations without cancellation */
-    size_t n;
-    double mean, squares, max;
-} running;
+/* What is measured of one pose by itself. */
+typedef struct pose {
+    double sum, squares, largest; /* of the errors of vertices */
+    uint64_t histogram[VG_ERROR_BINS];
+    vgi_face_sums faces;
+} pose;
+
+/* Where to look in the edges: for each exponent of a number the last edge below all numbers that have it. */
+enum { EXPONENT_SHIFT = 52, NEXPONENTS = 1 << 11 };
 
 struct vg_measures {
     const vg_mesh *m;
     bool centred;
+    int threads;
     size_t frames;
     double diagonal;
     double sum, sum_squares, max;
@@ -33,51 +38,128 @@ struct vg_measures {
     double *vertex_mean, *vertex_squares; /* nv: Welford over poses */
     uint64_t *bins;                       /* NBINS */
     uint64_t histogram[VG_ERROR_BINS];
-    running orientation, area, planarity[2];
-    uint64_t planarity_histogram[2][10];
+    double edges[VG_ERROR_BINS];          /* the least error in each bin of the histogram, in mesh units */
+    unsigned char edge_below[NEXPONENTS];
+    vgi_face_class *classes;              /* of faces of 3 corners and more, by their number */
+    size_t nclasses;
+    vgi_face_sums faces;
+    pose *poses; /* of one call */
+    size_t poses_cap;
 };
 
-int vg_measures_new(vg_measures **out, const vg_mesh *m, const double *reference, bool centred, vg_err *e)
+/* ---- setting up ---- */
+
+/* The least error that is `edge` or more in units of D; without D that is all but 0. */
+static double least_error(double edge, double diagonal)
 {
-    vg_measures *x = vgi_array(1, sizeof *x, e);
-    *out = NULL;
-    if (!x) return VG_ENOMEM;
-    x->m = m, x->centred = centred;
-    x->diagonal = reference ? vg_diagonal(reference, m->nv) : 0;
-    x->vertex_mean = vgi_array(m->nv, sizeof *x->vertex_mean, e);
-    x->vertex_squares = vgi_array(m->nv, sizeof *x->vertex_squares, e);
-    x->bins = vgi_array(NBINS, sizeof *x->bins, e);
-    if (!x->vertex_mean || !x->vertex_squares || !x->bins) {
-        vg_measures_free(&x);
-        return VG_ENOMEM;
+    double x = edge * diagonal;
+    if (diagonal == 0) return edge > 0 ? nextafter(0, 1) : 0;
+    while (x > 0 && x / diagonal >= edge) x = nextafter(x, 0);
+    while (x / diagonal < edge) x = nextafter(x, INFINITY);
+    return x;
+}
+
+static void place_edges(vg_measures *x)
+{
+    for (size_t i = 0; i < VG_ERROR_BINS; i++) x->edges[i] = least_error(vg_error_edges[i], x->diagonal);
+    for (uint64_t i = 0, at = 0; i < NEXPONENTS; i++) {
+        uint64_t bits = i << EXPONENT_SHIFT;
+        double least;
+        memcpy(&least, &bits, sizeof least);
+        while (at + 1 < VG_ERROR_BINS && x->edges[at + 1] <= least) at++;
+        x->edge_below[i] = (unsigned char)at;
     }
-    *out = x;
+}
+
+static size_t face_size(const vg_mesh *m, size_t f)
+{
+    return m->start[f + 1] - m->start[f];
+}
+
+/* faces[r]: how many have r corners; then the number of their class. */
+static int make_classes(vg_measures *x, size_t *faces, size_t most, vg_err *e)
+{
+    for (size_t r = 3; r <= most; r++) x->nclasses += faces[r] > 0;
+    if (!(x->classes = vgi_array(x->nclasses, sizeof *x->classes, e))) return VG_ENOMEM;
+    vgi_face_class *c = x->classes;
+    for (size_t r = 3; r <= most; r++) {
+        if (!faces[r]) continue;
+        size_t groups = (faces[r] + VGI_LANES - 1) / VGI_LANES;
+        faces[r] = (size_t)(c - x->classes);
+        c->r = r;
+        if (!(c++->corners = vgi_array_raw(groups, VGI_LANES * r * sizeof *c->corners, e))) return VG_ENOMEM;
+    }
     return VG_OK;
 }
 
-void vg_measures_free(vg_measures **x)
+static void put_face(vgi_face_class *c, size_t at, const uint32_t *vert)
 {
-    if (!*x) return;
-    free((*x)->vertex_mean);
-    free((*x)->vertex_squares);
-    free((*x)->bins);
-    free(*x);
-    *x = NULL;
+    uint32_t *to = c->corners + at / VGI_LANES * VGI_LANES * c->r + at % VGI_LANES;
+    for (size_t i = 0; i < c->r; i++) to[i * VGI_LANES] = vert[i];
 }
 
-static void running_add(running *r, double value)
+static void fill_classes(vg_measures *x, const size_t *class_of)
 {
-    double d = value - r->mean;
-    r->n++;
-    r->mean += d / (double)r->n;
-    r->squares += d * (value - r->mean);
-    if (value > r->max) r->max = value;
+    const vg_mesh *m = x->m;
+    for (size_t f = 0; f < m->nf; f++) {
+        if (face_size(m, f) < 3) continue;
+        vgi_face_class *c = &x->classes[class_of[face_size(m, f)]];
+        put_face(c, c->faces++, m->vert + m->start[f]);
+    }
+    for (size_t k = 0; k < x->nclasses; k++) {
+        vgi_face_class *c = &x->classes[k];
+        size_t lanes = c->faces % VGI_LANES;
+        uint32_t *last = c->corners + (c->faces - lanes) * c->r;
+        for (size_t i = 0; i < c->r && lanes; i++)
+            for (size_t lane = lanes; lane < VGI_LANES; lane++)
+                last[i * VGI_LANES + lane] = last[i * VGI_LANES + lanes - 1];
+    }
 }
 
-static double running_sd(const running *r)
+static int classify_faces(vg_measures *x, vg_err *e)
 {
-    return r->n ? sqrt(r->squares / (double)r->n) : 0;
+    size_t most = 0;
+    for (size_t f = 0; f < x->m->nf; f++)
+        if (face_size(x->m, f) > most) most = face_size(x->m, f);
+    size_t *faces = vgi_array(most + 1, sizeof *faces, e);
+    if (!faces) return VG_ENOMEM;
+    for (size_t f = 0; f < x->m->nf; f++) faces[face_size(x->m, f)]++;
+    int r = make_classes(x, faces, most, e);
+    if (r == VG_OK) fill_classes(x, faces);
+    free(faces);
+    return r;
 }
+
+int vg_measures_new(vg_measures **out, const vg_mesh *m, const double *reference, bool centred, int threads, vg_err *e)
+{
+    vg_measures *x = *out = vgi_array(1, sizeof *x, e);
+    if (!x) return VG_ENOMEM;
+    x->m = m, x->centred = centred, x->threads = threads;
+    x->diagonal = reference ? vg_diagonal(reference, m->nv) : 0;
+    place_edges(x);
+    x->vertex_mean = vgi_array(m->nv, sizeof *x->vertex_mean, e);
+    x->vertex_squares = vgi_array(m->nv, sizeof *x->vertex_squares, e);
+    x->bins = vgi_array(NBINS, sizeof *x->bins, e);
+    int r = x->vertex_mean && x->vertex_squares && x->bins ? classify_faces(x, e) : VG_ENOMEM;
+    if (r < 0) vg_measures_free(out);
+    return r;
+}
+
+void vg_measures_free(vg_measures **measures)
+{
+    vg_measures *x = *measures;
+    if (!x) return;
+    for (size_t i = 0; i < x->nclasses && x->classes; i++) free(x->classes[i].corners);
+    free(x->classes);
+    free(x->vertex_mean);
+    free(x->vertex_squares);
+    free(x->bins);
+    free(x->poses);
+    free(x);
+    *measures = NULL;
+}
+
+/* ---- errors and their histograms ---- */
 
 static double length_of(const double v[3])
 {
@@ -101,17 +183,14 @@ static double bin_middle(size_t bin)
     return 0.5 * (a + b);
 }
 
-/* The last edge that is not above the error; one without D is nothing or beyond all. */
-static size_t edge_below(double error, double diagonal)
+/* The last edge that is not above the error. */
+static size_t edge_below(const vg_measures *x, double error)
 {
-    double in_diagonals = error == 0 ? 0 : error / diagonal;
-    size_t low = 0, high = VG_ERROR_BINS - 1;
-    while (low < high) {
-        size_t middle = (low + high + 1) / 2;
-        if (vg_error_edges[middle] <= in_diagonals) low = middle;
-        else high = middle - 1;
-    }
-    return low;
+    uint64_t bits;
+    memcpy(&bits, &error, sizeof bits);
+    size_t at = x->edge_below[(bits >> EXPONENT_SHIFT) & (NEXPONENTS - 1)];
+    while (at + 1 < VG_ERROR_BINS && error >= x->edges[at + 1]) at++;
+    return at;
 }
 
 double vg_error_p95(double *x, size_t n)
@@ -134,143 +213,127 @@ double vg_error_p95(double *x, size_t n)
     return x[rank];
 }
 
-/* Vertex errors of one pose; shift is what centring adds to the result. Returns the pose's largest error. */
-static double add_vertices(vg_measures *x, const double *truth, const double *result, const double shift[3],
-                           double *frame_mean, double *errors)
-{
-    double sum = 0, squares = 0, largest = 0, poses = (double)(x->frames + 1);
-    for (size_t v = 0; v < x->m->nv; v++) {
-        const double *a = truth + 3 * v, *b = result + 3 * v;
-        double apart[3] = {b[0] - a[0] + shift[0], b[1] - a[1] + shift[1], b[2] - a[2] + shift[2]};
-        double error = length_of(apart), d = error - x->vertex_mean[v];
-        sum += error;
-        squares += error * error;
-        x->vertex_mean[v] += d / poses;
-        x->vertex_squares[v] += d * (error - x->vertex_mean[v]);
-        x->bins[bin_of(error)]++;
-        x->histogram[edge_below(error, x->diagonal)]++;
-        if (error > largest) largest = error;
-        if (error > x->max) x->max = error, x->max_vertex = v, x->max_frame = x->frames;
-        if (errors) errors[v] = error;
-    }
-    x->sum += sum;
-    x->sum_squares += squares;
-    *frame_mean = x->m->nv ? sum / (double)x->m->nv : 0;
-    return largest;
-}
+/* ---- poses ---- */
 
-static double perimeter_of(const uint32_t *vert, size_t r, const double *points)
-{
-    double sum = 0;
-    for (size_t i = 0; i < r; i++) {
-        const double *p = points + 3 * (size_t)vert[i], *q = points + 3 * (size_t)vert[i + 1 < r ? i + 1 : 0];
-        sum += length_of((double[3]){q[0] - p[0], q[1] - p[1], q[2] - p[2]});
-    }
-    return sum;
-}
+/* The poses of one call. */
+typedef struct call {
+    vg_measures *x;
+    size_t n;
+    const double *const *truth, *const *result;
+    double *const *errors;
+} call;
 
-/* A face of one pose: its centroid, unit normal (Newell's: the sum of the cross products of successive corner
- * vectors, here those from the centroid) and area. Returns false when it has no normal; then normal and area are 0.
- * Called with a constant r for triangles and quads. */
-static inline __attribute__((always_inline)) bool face_shape(const vg_measures *x, const uint32_t *vert, size_t r,
-                                                             const double *points, double centroid[3],
-                                                             double normal[3], double *area)
+/* What centring adds to the result. */
+static void find_shift(const vg_measures *x, const double *truth, const double *result, double shift[3])
 {
-    double n[3] = {0, 0, 0}, edges = 0, a[3], share = 1 / (double)r;
-    centroid[0] = centroid[1] = centroid[2] = 0;
-    for (size_t i = 0; i < r; i++)
-        for (int k = 0; k < 3; k++) centroid[k] += share * points[3 * (size_t)vert[i] + k];
-    for (int k = 0; k < 3; k++) a[k] = points[3 * (size_t)vert[r - 1] + k] - centroid[k];
-    for (size_t i = 0; i < r; i++) {
-        const double *q = points + 3 * (size_t)vert[i];
-        double b[3] = {q[0] - centroid[0], q[1] - centroid[1], q[2] - centroid[2]};
-        n[0] += a[1] * b[2] - a[2] * b[1];
-        n[1] += a[2] * b[0] - a[0] * b[2];
-        n[2] += a[0] * b[1] - a[1] * b[0];
-        for (int k = 0; k < 3; k++) edges += (b[k] - a[k]) * (b[k] - a[k]), a[k] = b[k];
-    }
-    double length = length_of(n), least = FLAT * x->diagonal, half = 0.5 * length;
-    /* the perimeter is no longer than the root of r times the squared edges:
-     * most faces need no roots of their edges */
-    bool ok = half * half > 1.001 * least * least * (double)r * edges || half > least * perimeter_of(vert, r, points);
-    double scale = ok ? 1 / length : 0;
-    *area = ok ? half : 0;
-    for (int k = 0; k < 3; k++) normal[k] = scale * n[k];
-    return ok;
-}
-
-/* Mean over the corners of |unit corner vector . normal|; a corner at the centroid has no direction: not counted. */
-static double face_planarity(const uint32_t *vert, size_t r, const double *points, const double centroid[3],
-                             const double normal[3])
-{
-    double sum = 0;
-    size_t n = 0;
-    for (size_t i = 0; i < r; i++) {
-        const double *p = points + 3 * (size_t)vert[i];
-        double w[3] = {p[0] - centroid[0], p[1] - centroid[1], p[2] - centroid[2]};
-        double length = length_of(w);
-        if (length <= 0) continue;
-        sum += fabs(w[0] * normal[0] + w[1] * normal[1] + w[2] * normal[2]) / length;
-        n++;
-    }
-    return n ? fmin(sum / (double)n, 1) : 0;
-}
-
-/* 1 - a.b of two unit vectors, as half the squared distance of their ends: exact near 0, and 0 for equal ones. */
-static double normals_apart(const double a[3], const double b[3])
-{
-    double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-    return fmin(0.5 * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), 2);
-}
-
-static inline __attribute__((always_inline)) void add_face(vg_measures *x, const uint32_t *vert, size_t r,
-                                                           const double *const *poses)
-{
-    double centroid[2][3], normal[2][3], area[2];
-    bool has_normal[2];
-    for (int i = 0; i < 2; i++) {
-        has_normal[i] = face_shape(x, vert, r, poses[i], centroid[i], normal[i], &area[i]);
-        if (r < 4 || !has_normal[i]) continue;
-        double p = face_planarity(vert, r, poses[i], centroid[i], normal[i]);
-        running_add(&x->planarity[i], p);
-        x->planarity_histogram[i][p < 1 ? (int)(10 * p) : 9]++;
-    }
-    if (!has_normal[0]) return;
-    /* a result that collapsed a face has no normal there: N.N~ is 0, and all of its area is wrong */
-    running_add(&x->orientation, has_normal[1] ? normals_apart(normal[0], normal[1]) : 1);
-    running_add(&x->area, fabs(1 - area[1] / area[0]));
-}
-
-static void add_faces(vg_measures *x, const double *truth, const double *result)
-{
-    const double *const poses[2] = {truth, result};
-    for (size_t f = 0; f < x->m->nf; f++) {
-        const uint32_t *vert = x->m->vert + x->m->start[f];
-        size_t r = x->m->start[f + 1] - x->m->start[f];
-        if (r == 3) add_face(x, vert, 3, poses);
-        else if (r == 4) add_face(x, vert, 4, poses);
-        else if (r > 4) add_face(x, vert, r, poses);
-    }
-}
-
-int vg_measures_add(vg_measures *x, const double *truth, const double *result, double *frame_mean, double *frame_max,
-                    double *errors, vg_err *e)
-{
-    double shift[3] = {0, 0, 0}, mean;
+    double a[3] = {0, 0, 0}, b[3] = {0, 0, 0};
     if (x->centred) {
-        double a[3], b[3];
         vg_centroid(truth, x->m->nv, a);
         vg_centroid(result, x->m->nv, b);
-        for (int k = 0; k < 3; k++) shift[k] = a[k] - b[k];
     }
-    double largest = add_vertices(x, truth, result, shift, &mean, errors);
-    if (!isfinite(x->sum_squares))
-        return vg_fail(e, VG_EINPUT, "frame %zu: its coordinates are too large to be compared", x->frames);
-    add_faces(x, truth, result);
+    for (int k = 0; k < 3; k++) shift[k] = a[k] - b[k];
+}
+
+static void measure_vertices(const vg_measures *x, const double *truth, const double *result, double *errors, pose *p)
+{
+    size_t nv = x->m->nv;
+    double shift[3];
+    find_shift(x, truth, result, shift);
+    for (size_t v = 0; v < nv; v++) {
+        const double *a = truth + 3 * v, *b = result + 3 * v;
+        errors[v] = length_of((double[3]){b[0] - a[0] + shift[0], b[1] - a[1] + shift[1], b[2] - a[2] + shift[2]});
+    }
+    for (size_t v = 0; v < nv; v++) {
+        p->sum += errors[v];
+        p->squares += errors[v] * errors[v];
+        if (errors[v] > p->largest) p->largest = errors[v];
+        p->histogram[edge_below(x, errors[v])]++;
+    }
+}
+
+static void measure_pose(void *context, size_t i)
+{
+    const call *c = context;
+    const vg_measures *x = c->x;
+    const double *const poses[2] = {c->truth[i], c->result[i]};
+    pose p = {0};
+    measure_vertices(x, poses[0], poses[1], c->errors[i], &p);
+    for (size_t k = 0; k < x->nclasses; k++) vgi_measure_faces(&x->classes[k], x->diagonal, poses, &p.faces);
+    x->poses[i] = p;
+}
+
+/* The means and deviations of some vertices over the poses. */
+enum { SOME_VERTICES = 1024 };
+static void add_vertices(const call *c, size_t first, size_t last)
+{
+    for (size_t i = 0; i < c->n; i++) {
+        const double *errors = c->errors[i], poses = (double)(c->x->frames + i + 1);
+        double *restrict mean = c->x->vertex_mean, *restrict squares = c->x->vertex_squares;
+        for (size_t v = first; v < last; v++) {
+            double d = errors[v] - mean[v];
+            mean[v] += d / poses;
+            squares[v] += d * (errors[v] - mean[v]);
+        }
+    }
+}
+
+/* What goes over all poses, in shares that do not touch one another: the bins, and then vertices. */
+static void add_share(void *context, size_t i)
+{
+    const call *c = context;
+    size_t nv = c->x->m->nv, first = (i - 1) * SOME_VERTICES;
+    if (i > 0) return add_vertices(c, first, nv - first < SOME_VERTICES ? nv : first + SOME_VERTICES);
+    for (size_t k = 0; k < c->n; k++)
+        for (size_t v = 0; v < nv; v++) c->x->bins[bin_of(c->errors[k][v])]++;
+}
+
+static size_t vertex_of(const double *errors, double error)
+{
+    size_t v = 0;
+    while (errors[v] != error) v++;
+    return v;
+}
+
+static void add_pose(vg_measures *x, const pose *p, const double *errors)
+{
+    x->sum += p->sum;
+    x->sum_squares += p->squares;
+    if (p->largest > x->max) x->max = p->largest, x->max_vertex = vertex_of(errors, x->max), x->max_frame = x->frames;
+    for (size_t i = 0; i < VG_ERROR_BINS; i++) x->histogram[i] += p->histogram[i];
+    vgi_running_merge(&x->faces.orientation, &p->faces.orientation);
+    vgi_running_merge(&x->faces.area, &p->faces.area);
+    for (int k = 0; k < 2; k++) {
+        vgi_running_merge(&x->faces.planarity[k], &p->faces.planarity[k]);
+        for (int i = 0; i < 10; i++) x->faces.planarity_histogram[k][i] += p->faces.planarity_histogram[k][i];
+    }
     x->frames++;
-    if (frame_mean) *frame_mean = mean;
-    if (frame_max) *frame_max = largest;
+}
+
+int vg_measures_add(vg_measures *x, size_t n, const double *const *truth, const double *const *result,
+                    double *const *errors, vg_pose_error *found, vg_err *e)
+{
+    call c = {x, n, truth, result, errors};
+    double nv = (double)x->m->nv;
+    int r = vgi_grow(&x->poses, &x->poses_cap, n, sizeof *x->poses, e);
+    if (r < 0) return r;
+    vgi_parallel(x->threads, n, measure_pose, &c);
+    double squares = x->sum_squares;
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(squares += x->poses[i].squares))
+            return vg_fail(e, VG_EINPUT, "frame %zu: its coordinates are too large to be compared", x->frames + i);
+    vgi_parallel(x->threads, 1 + (x->m->nv + SOME_VERTICES - 1) / SOME_VERTICES, add_share, &c);
+    for (size_t i = 0; i < n; i++) {
+        add_pose(x, &x->poses[i], errors[i]);
+        if (found) found[i] = (vg_pose_error){nv > 0 ? x->poses[i].sum / nv : 0, x->poses[i].largest};
+    }
     return VG_OK;
+}
+
+/* ---- the report ---- */
+
+static double running_sd(const vgi_running *r)
+{
+    return r->n > 0 ? sqrt(r->squares / r->n) : 0;
 }
 
 /* The smallest error that 95 of 100 do not exceed. */
@@ -299,14 +362,15 @@ void vg_measures_get(const vg_measures *x, vg_measure_report *r)
     for (size_t v = 0; v < x->m->nv; v++)
         if (x->vertex_squares[v] > worst) worst = x->vertex_squares[v], r->sigma_vertex = v;
     r->sigma = x->frames ? sqrt(worst / (double)x->frames) : 0;
-    r->orientation_mean = x->orientation.mean, r->orientation_max = x->orientation.max;
-    r->orientation_sd = running_sd(&x->orientation);
-    r->area_mean = x->area.mean, r->area_max = x->area.max, r->area_sd = running_sd(&x->area);
-    r->faces_measured = x->orientation.n;
+    const vgi_face_sums *f = &x->faces;
+    r->orientation_mean = f->orientation.mean, r->orientation_max = f->orientation.max;
+    r->orientation_sd = running_sd(&f->orientation);
+    r->area_mean = f->area.mean, r->area_max = f->area.max, r->area_sd = running_sd(&f->area);
+    r->faces_measured = (size_t)f->orientation.n;
     for (int i = 0; i < 2; i++) {
-        r->planarity_mean[i] = x->planarity[i].mean;
-        r->planarity_max[i] = x->planarity[i].max;
-        r->planarity_faces[i] = x->planarity[i].n;
-        memcpy(r->planarity_histogram[i], x->planarity_histogram[i], sizeof r->planarity_histogram[i]);
+        r->planarity_mean[i] = f->planarity[i].mean;
+        r->planarity_max[i] = f->planarity[i].max;
+        r->planarity_faces[i] = (size_t)f->planarity[i].n;
+        memcpy(r->planarity_histogram[i], f->planarity_histogram[i], sizeof r->planarity_histogram[i]);
     }
 }

@@ -13,14 +13,15 @@ static vg_measures *begin(const vg_mesh *m, const double *reference, bool centre
 {
     vg_measures *x = NULL;
     vg_err e;
-    CHECK(vg_measures_new(&x, m, reference, centred, &e) == VG_OK);
+    CHECK(vg_measures_new(&x, m, reference, centred, 1, &e) == VG_OK);
     return x;
 }
 
 static void add(vg_measures *x, const double *truth, const double *result)
 {
+    double errors[1000]; /* of the largest mesh here */
     vg_err e;
-    CHECK(vg_measures_add(x, truth, result, NULL, NULL, NULL, &e) == VG_OK);
+    CHECK(vg_measures_add(x, 1, &truth, &result, (double *[]){errors}, NULL, &e) == VG_OK);
 }
 
 static vg_measure_report finish(vg_measures *x)
@@ -46,16 +47,18 @@ static void equal_sequences_have_no_error(void)
 
 static void one_moved_vertex(void)
 {
-    double moved[24], errors[8], mean, max;
+    double moved[24], errors[8];
+    vg_pose_error found;
     const double d = 0.25;
     vg_err e;
     memcpy(moved, cube_points, sizeof moved);
     moved[3 * 6 + 1] += d;
     vg_measures *x = begin(&cube, cube_points, false);
     add(x, cube_points, cube_points);
-    CHECK(vg_measures_add(x, cube_points, moved, &mean, &max, errors, &e) == VG_OK);
-    CHECK_NEAR(mean, d / 8, 1e-16);
-    CHECK_NEAR(max, d, 1e-16);
+    CHECK(vg_measures_add(x, 1, (const double *[]){cube_points}, (const double *[]){moved}, (double *[]){errors},
+                          &found, &e) == VG_OK);
+    CHECK_NEAR(found.mean, d / 8, 1e-16);
+    CHECK_NEAR(found.max, d, 1e-16);
     CHECK(errors[6] == d && errors[0] == 0 && errors[7] == 0);
     vg_measure_report r = finish(x);
     CHECK_NEAR(r.mean, d / 16, 1e-16);
@@ -201,18 +204,144 @@ static void nothing_added(void)
     CHECK(r.frames == 1 && r.mean == 0 && r.max == 0 && r.p95 == 0);
 }
 
+static int add_one(vg_measures *x, const double *truth, const double *result, vg_err *e)
+{
+    double error;
+    return vg_measures_add(x, 1, &truth, &result, (double *[]){&error}, NULL, e);
+}
+
 static void numbers_too_large_are_refused(void)
 {
     vg_mesh m = {1, 0, NULL, NULL};
     vg_err e;
     vg_measures *x = begin(&m, (double[3]){0, 0, 0}, false);
-    CHECK(vg_measures_add(x, (double[3]){1e308, 0, 0}, (double[3]){-1e308, 0, 0}, NULL, NULL, NULL, &e) == VG_EINPUT);
+    CHECK(add_one(x, (double[3]){1e308, 0, 0}, (double[3]){-1e308, 0, 0}, &e) == VG_EINPUT);
     CHECK_TEXT(e.message, "frame 0: its coordinates are too large to be compared");
     vg_measures_free(&x);
     x = begin(&m, (double[3]){0, 0, 0}, true);
     const double endless[3] = {1, -INFINITY, 0}; /* readers refuse it; it must not break the histogram here */
-    CHECK(vg_measures_add(x, endless, endless, NULL, NULL, NULL, &e) == VG_EINPUT);
+    CHECK(add_one(x, endless, endless, &e) == VG_EINPUT);
     vg_measures_free(&x);
+}
+
+/* ---- many faces of many sizes ---- */
+
+enum { SIZES = 5, POINTS = 70, POSES = 7 };
+static const size_t faces_of[SIZES] = {19, 11, 8, 1, 2}; /* of 3, 4, ... corners: some fill eights, some do not */
+
+typedef struct many {
+    vg_mesh mesh;
+    uint32_t start[64], vert[400];
+    double truth[POSES][3 * POINTS], result[POSES][3 * POINTS];
+} many;
+
+static double random_number(uint32_t *seed)
+{
+    *seed = *seed * 1664525u + 1013904223u;
+    return (double)(*seed >> 8) / (1 << 24);
+}
+
+/* Faces of distinct vertices, sizes mixed; one triangle is without area in every truth, one in every result. */
+static void make_many(many *m)
+{
+    uint32_t seed = 3, at = 0, f = 0;
+    for (size_t round = 0; round < 19; round++)
+        for (size_t k = 0; k < SIZES; k++) {
+            if (round >= faces_of[k]) continue;
+            for (size_t i = 0; i < k + 3; i++) m->vert[at++] = (uint32_t)(f * 7 + i * 9 + k) % POINTS;
+            m->start[++f] = at;
+        }
+    m->mesh = (vg_mesh){POINTS, f, m->start, m->vert};
+    for (size_t p = 0; p < POSES; p++)
+        for (size_t i = 0; i < 3 * POINTS; i++) {
+            m->truth[p][i] = random_number(&seed);
+            m->result[p][i] = m->truth[p][i] + 0.1 * random_number(&seed);
+        }
+    for (size_t p = 0; p < POSES; p++) /* faces without area, in one of the two */
+        for (size_t i = 0; i < 3; i++) {
+            for (size_t k = 0; k < 3; k++) m->truth[p][3 * m->vert[m->start[9] + i] + k] = 0.5;
+            for (size_t k = 0; k < 3; k++) m->result[p][3 * m->vert[m->start[12] + i] + k] = 0.25;
+        }
+}
+
+/* Unit normal of a face, and its area, by its definition. */
+static bool normal_of(const many *m, size_t f, const double *points, long double n[3], long double *area)
+{
+    long double length = 0, longest = 0;
+    const uint32_t *vert = m->vert + m->start[f];
+    size_t r = m->start[f + 1] - m->start[f];
+    for (size_t k = 0; k < 3; k++) {
+        n[k] = 0;
+        for (size_t i = 0; i < r; i++) {
+            const double *p = points + 3 * vert[i], *q = points + 3 * vert[(i + 1) % r];
+            n[k] += (long double)p[(k + 1) % 3] * q[(k + 2) % 3] - (long double)p[(k + 2) % 3] * q[(k + 1) % 3];
+            if (fabsl((long double)p[k] - q[k]) > longest) longest = fabsl((long double)p[k] - q[k]);
+        }
+        length += n[k] * n[k];
+    }
+    length = sqrtl(length);
+    for (size_t k = 0; k < 3; k++) n[k] /= length;
+    *area = length / 2;
+    return length > 1e-12L * longest; /* in this test a face has a good area or none */
+}
+
+static void faces_of_many_sizes_by_their_definition(void)
+{
+    static many m;
+    long double list[2][POSES * 64], mean[2] = {0, 0}, squares[2] = {0, 0}, most[2] = {0, 0};
+    size_t n = 0;
+    make_many(&m);
+    for (size_t p = 0; p < POSES; p++)
+        for (size_t f = 0; f < m.mesh.nf; f++) {
+            long double a[3], b[3], area[2];
+            if (!normal_of(&m, f, m.truth[p], a, &area[0])) continue;
+            bool has = normal_of(&m, f, m.result[p], b, &area[1]);
+            list[0][n] = has ? 1 - a[0] * b[0] - a[1] * b[1] - a[2] * b[2] : 1;
+            list[1][n++] = has ? fabsl(1 - area[1] / area[0]) : 1;
+        }
+    CHECK(n < POSES * m.mesh.nf && 2 * n > POSES * m.mesh.nf);
+    for (int k = 0; k < 2; k++) {
+        for (size_t i = 0; i < n; i++) mean[k] += list[k][i] / n, most[k] = fmaxl(most[k], list[k][i]);
+        for (size_t i = 0; i < n; i++) squares[k] += (list[k][i] - mean[k]) * (list[k][i] - mean[k]);
+    }
+    vg_measures *x = begin(&m.mesh, m.truth[0], false);
+    for (size_t p = 0; p < POSES; p++) add(x, m.truth[p], m.result[p]);
+    vg_measure_report r = finish(x);
+    CHECK(r.faces_measured == n && r.planarity_faces[0] == POSES * 22 && r.planarity_faces[1] == POSES * 22);
+    CHECK_NEAR(r.orientation_mean, (double)mean[0], 1e-12);
+    CHECK_NEAR(r.orientation_sd, (double)sqrtl(squares[0] / n), 1e-12);
+    CHECK_NEAR(r.orientation_max, (double)most[0], 1e-12);
+    CHECK_NEAR(r.area_mean, (double)mean[1], 1e-10 * (double)most[1]);
+    CHECK_NEAR(r.area_sd, (double)sqrtl(squares[1] / n), 1e-10 * (double)most[1]);
+    CHECK_NEAR(r.area_max, (double)most[1], 1e-10 * (double)most[1]);
+}
+
+/* In batches of any size, by any number of threads: every digit of the report. */
+static void batches_and_threads_change_no_digit(void)
+{
+    static many m;
+    static double errors[POSES][POINTS];
+    const double *truth[POSES], *result[POSES];
+    double *to[POSES];
+    vg_measure_report reports[4];
+    vg_err e;
+    make_many(&m);
+    for (size_t p = 0; p < POSES; p++) truth[p] = m.truth[p], result[p] = m.result[p], to[p] = errors[p];
+    for (size_t k = 0; k < 4; k++) {
+        static const size_t sizes[4] = {1, POSES, 3, 2};
+        static const int threads[4] = {1, 3, 2, 1};
+        vg_measures *x = NULL;
+        CHECK(vg_measures_new(&x, &m.mesh, m.truth[0], true, threads[k], &e) == VG_OK);
+        for (size_t p = 0; p < POSES; p += sizes[k]) {
+            size_t n = POSES - p < sizes[k] ? POSES - p : sizes[k];
+            CHECK(vg_measures_add(x, n, truth + p, result + p, to + p, NULL, &e) == VG_OK);
+        }
+        memset(&reports[k], 0, sizeof *reports);
+        vg_measures_get(x, &reports[k]);
+        vg_measures_free(&x);
+        CHECK(reports[k].frames == POSES && reports[k].max > 0 && reports[k].sigma > 0);
+        CHECK(!memcmp(&reports[k], &reports[0], sizeof *reports));
+    }
 }
 
 static int compare_doubles(const void *a, const void *b)
@@ -268,4 +397,6 @@ TESTS({"equal sequences have no error", equal_sequences_have_no_error},
       {"faces without area are not measured", faces_without_area_are_not_measured},
       {"sigma is stable far from zero", sigma_is_stable_far_from_zero},
       {"nothing added", nothing_added},
-      {"numbers too large are refused", numbers_too_large_are_refused})
+      {"numbers too large are refused", numbers_too_large_are_refused},
+      {"faces of many sizes by their definition", faces_of_many_sizes_by_their_definition},
+      {"batches and threads change no digit", batches_and_threads_change_no_digit})
