@@ -217,7 +217,7 @@ const char *vgi_kinds_read(void); /* "OBJ, PLY, ..." for messages: all that is r
 /* vgi_model_write: vg_model_write with a shape, which is not checked. */
 int vgi_model_write(vg_bytes *out, const char *format, const vgi_writing *w, vg_err *e) VG_MUST_CHECK;
 
-/* ---- names.c: lists of names and their order; names of poses ---- */
+/* ---- names.c, operands.c: lists of names and their order; names of poses ---- */
 
 typedef struct vgi_names {
     size_t n, cap;
@@ -248,8 +248,8 @@ size_t vgi_packed_stem(const char *name);
  * memory. */
 char *vgi_pose_name(const char *path, vg_err *e);
 
-/* vgi_operand_files: add the files that an operand names: itself, the mesh files of a directory, or those that match a
- * pattern. (operands.c) */
+/* vgi_operand_files: add the files that an operand names: itself, the mesh files of a directory, or those that match
+ * a pattern. */
 int vgi_operand_files(vgi_names *paths, const char *operand, vg_err *e) VG_MUST_CHECK;
 
 /* ---- archive.c, pack.c: files out of archives and into them; with unpack.c, the files that know libarchive ---- */

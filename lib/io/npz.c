@@ -1,29 +1,18 @@
-/* npz.c: NPZ, NumPy arrays in a zip: the numbers of all frames, and beside them faces, reference, names and times,
- * so that nothing but attributes and provenance is lost. man/vg-decode.1 lists the arrays.
- * Leaves out the header of an array (npy.c) and the zip (archive.c, pack.c).
+/* npz.c: NPZ, NumPy arrays in a zip, read: the numbers of all frames, and beside them faces, reference, names and
+ * times. man/vg-decode.1 lists the arrays.
+ * Leaves out the header of an array (npy.c), the zip (archive.c) and writing (npz_write.c).
  *
- * Reading keeps the whole file in memory, as NumPy does: the frames may stand in any order of axes. Writing keeps
- * names, times, roots and anchors; the numbers wait in a file without a name until their count is known.
+ * The whole file is kept in memory, as NumPy does: the frames may stand in any order of axes.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "io/npy.h"
+#include "io/npz.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
-#include <unistd.h>
 
-/* The arrays, in the order in which they are written: that in which archive.c hands out the members. */
-enum array {
-    ANCHOR_POSITIONS, ANCHORS, DEFORMATIONS, FACE_OFFSETS, FACE_VERTICES, FACES, GRAPH_OFFSETS, GRAPH_VERTICES,
-    LINKS, NAMES, POSITIONS, REFERENCE, REFERENCE_NAME, ROOTS, SELECTED, TIMES, TRANSFORMS, VECTORS, ARRAYS
-};
-
-static const char *const array_names[ARRAYS] = {
+const char *const vgi_npz_names[ARRAYS] = {
     "anchor_positions", "anchors", "deformations", "face_offsets", "face_vertices", "faces", "graph_offsets",
     "graph_vertices", "links", "names", "positions", "reference", "reference_name", "roots", "selected", "times",
     "transforms", "vectors"};
-
-/* ------------------------------------------------------------------------------------------- reading -- */
 
 struct held {
     bool there;
@@ -47,7 +36,7 @@ static enum array find_array(const char *path)
 {
     size_t n = strlen(path) - 4;
     for (int i = 0; i < ARRAYS; i++)
-        if (strlen(array_names[i]) == n && !memcmp(array_names[i], path, n)) return (enum array)i;
+        if (strlen(vgi_npz_names[i]) == n && !memcmp(vgi_npz_names[i], path, n)) return (enum array)i;
     return ARRAYS;
 }
 
@@ -73,7 +62,7 @@ static int hold_member(reading *x, const char *path, const vg_bytes *data, vg_er
     char subject[200];
     vgi_input *in;
     if (i == ARRAYS) return VG_OK; /* a feature of somebody else's */
-    snprintf(subject, sizeof subject, "array '%s' in %.150s", array_names[i], x->subject);
+    snprintf(subject, sizeof subject, "array '%s' in %.150s", vgi_npz_names[i], x->subject);
     int r = vgi_input_memory(&in, data->data, data->size, path, e);
     if (r == VG_OK) r = hold(x, i, in, subject, e);
     vgi_input_free(&in);
@@ -97,13 +86,13 @@ static int hold_all(reading *x, vgi_input *in, vg_err *e)
 
 static int wrong(const reading *x, enum array i, const char *what, vg_err *e)
 {
-    return vg_fail(e, VG_EINPUT, "array '%s' in %s %s", array_names[i], x->subject, what);
+    return vg_fail(e, VG_EINPUT, "array '%s' in %s %s", vgi_npz_names[i], x->subject, what);
 }
 
 static int missing(const reading *x, enum array i, enum array because, vg_err *e)
 {
-    return vg_fail(e, VG_EINPUT, "%s has an array '%s', but none called '%s'", x->subject, array_names[because],
-                   array_names[i]);
+    return vg_fail(e, VG_EINPUT, "%s has an array '%s', but none called '%s'", x->subject, vgi_npz_names[because],
+                   vgi_npz_names[i]);
 }
 
 /* Is it of this shape? UINT64_MAX: any. */
@@ -224,7 +213,7 @@ static int choose_values(reading *x, vg_head *h, vg_err *e)
         if (!x->held[all[i]].there) continue;
         if (found >= 0)
             return vg_fail(e, VG_EINPUT, "%s has both '%s' and '%s': frames are one of them", x->subject,
-                           array_names[all[found]], array_names[all[i]]);
+                           vgi_npz_names[all[found]], vgi_npz_names[all[i]]);
         found = i;
     }
     if (found < 0)
@@ -354,7 +343,7 @@ static int take_graph(reading *x, vg_head *h, vg_err *e)
     vg_graph_free(&g);
     if (corners == x->count) return VG_OK;
     return vg_fail(e, VG_EINPUT, "array '%s' in %s has %zu elements where the vector graph has %zu corners",
-                   array_names[x->values], x->subject, x->count, corners);
+                   vgi_npz_names[x->values], x->subject, x->count, corners);
 }
 
 static int check_labels(const reading *x, vg_err *e)
@@ -438,270 +427,10 @@ static bool sniff_npz(const unsigned char *data, size_t n)
     return name <= n - LOCAL && vgi_has_suffix((const char *)data + LOCAL, name, ".npy");
 }
 
-/* ------------------------------------------------------------------------------------------- writing -- */
-
-typedef struct writing {
-    vgi_output *out, spool; /* spool: the values */
-    const vg_head *h;
-    bool doubles, timed;
-    size_t per_frame;
-    uint64_t frames;
-    vg_bytes frame, roots, anchors, times;
-    vgi_names names;
-    vgi_packer *packer;
-} writing;
-
-static int begin_npz(void **state, const vg_head *h, const vg_sink_options *o, vgi_output *out, vg_err *e)
-{
-    writing *x = *state = vgi_array(1, sizeof *x, e);
-    if (!x) return VG_ENOMEM;
-    x->out = out, x->h = h, x->doubles = o->full_precision, x->timed = true;
-    x->per_frame = h->count * vg_kind_width(h->kind);
-    x->spool.name = "temporary file";
-    x->spool.fd = vgi_nameless_file(e);
-    return x->spool.fd < 0 ? x->spool.fd : VG_OK;
-}
-
-static bool is_rooted(const vg_head *h)
-{
-    return h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS;
-}
-
-static int put_npz(void *state, const vg_frame *f, vg_err *e)
-{
-    writing *x = state;
-    double time = f->has_time ? f->time : 0;
-    x->frame.size = 0;
-    int r = vgi_npy_store(&x->frame, f->values, x->per_frame, x->doubles, e);
-    if (r == VG_OK) r = vgi_names_add(&x->names, f->name ? f->name : "", f->name ? strlen(f->name) : 0, e);
-    x->timed &= f->has_time;
-    if (r == VG_OK) r = vgi_npy_store(&x->times, &time, 1, true, e);
-    if (r == VG_OK && is_rooted(x->h)) r = vgi_npy_store(&x->roots, f->root, 3, true, e);
-    if (r == VG_OK && is_rooted(x->h)) r = vgi_npy_store(&x->anchors, f->anchors, 3 * x->h->nanchors, true, e);
-    x->frames++;
-    return r < 0 ? r : vgi_output_put(&x->spool, x->frame.data, x->frame.size, e);
-}
-
-/* ---- one member after another ---- */
-
-static int begin_array(writing *x, enum array i, const char *descr, size_t item, size_t ndim, const uint64_t *shape,
-                       vg_err *e)
-{
-    unsigned char head[VGI_NPY_HEADER];
-    char path[32];
-    uint64_t bytes = item;
-    for (size_t d = 0; d < ndim; d++) bytes *= shape[d];
-    snprintf(path, sizeof path, "%s.npy", array_names[i]);
-    vgi_npy_write(head, descr, ndim, shape);
-    int r = vgi_packer_begin(x->packer, path, sizeof head + bytes, e);
-    return r < 0 ? r : vgi_packer_more(x->packer, head, sizeof head, e);
-}
-
-static int add_array(writing *x, enum array i, const char *descr, size_t item, size_t ndim, const uint64_t *shape,
-                     const void *data, size_t n, vg_err *e)
-{
-    int r = begin_array(x, i, descr, item, ndim, shape, e);
-    if (r == VG_OK && n) r = vgi_packer_more(x->packer, data, n, e);
-    return r < 0 ? r : vgi_packer_finish(x->packer, e);
-}
-
-static int add_doubles(writing *x, enum array i, size_t ndim, const uint64_t *shape, const vg_bytes *b, vg_err *e)
-{
-    return add_array(x, i, "<f8", 8, ndim, shape, b->data, b->size, e);
-}
-
-static int add_indices(writing *x, enum array i, size_t ndim, const uint64_t *shape, const uint32_t *list, size_t n,
-                       vg_err *e)
-{
-    vg_bytes b = {0};
-    int r = vgi_bytes_reserve(&b, 4 * n, e);
-    for (size_t k = 0; r == VG_OK && k < n; k++) vgi_put32(b.data + 4 * k, list[k]);
-    if (r == VG_OK) r = add_array(x, i, "<u4", 4, ndim, shape, b.data, 4 * n, e);
-    vg_bytes_clear(&b);
-    return r;
-}
-
-static int add_mesh(writing *x, enum array offsets, enum array vertices, const uint32_t *start,
-                    const uint32_t *vert, size_t nf, vg_err *e)
-{
-    static const uint32_t none = 0;
-    const uint64_t n = nf + 1, corners = nf ? start[nf] : 0;
-    int r = add_indices(x, offsets, 1, &n, nf ? start : &none, (size_t)n, e);
-    return r < 0 ? r : add_indices(x, vertices, 1, &corners, vert, (size_t)corners, e);
-}
-
-static int add_graph(writing *x, vg_err *e)
-{
-    vg_graph *g;
-    int r = vg_graph_new(&g, x->h, e);
-    if (r == VG_OK) r = add_mesh(x, GRAPH_OFFSETS, GRAPH_VERTICES, g->start, g->vert, g->nf, e);
-    vg_graph_free(&g);
-    return r;
-}
-
-/* The code points of valid UTF-8. */
-static uint32_t next_letter(const unsigned char **s)
-{
-    uint32_t c = *(*s)++;
-    int more = c >= 0xf0 ? 3 : c >= 0xe0 ? 2 : c >= 0xc0 ? 1 : 0;
-    if (more) c &= 0x3fu >> more;
-    while (more-- > 0) c = c << 6 | (*(*s)++ & 0x3f);
-    return c;
-}
-
-static size_t count_letters(const char *s)
-{
-    size_t n = 0;
-    for (; *s; s++) n += ((unsigned char)*s & 0xc0) != 0x80;
-    return n;
-}
-
-/* Texts of one width, as NumPy has them: UTF-32 filled up with zeros. */
-static int add_texts(writing *x, enum array i, size_t ndim, char *const *texts, size_t n, vg_err *e)
-{
-    const uint64_t shape = n;
-    char descr[32];
-    size_t width = 1;
-    for (size_t k = 0; k < n; k++) {
-        size_t letters = count_letters(texts[k]);
-        if (letters > width) width = letters;
-    }
-    snprintf(descr, sizeof descr, "<U%zu", width);
-    int r = begin_array(x, i, descr, 4 * width, ndim, &shape, e);
-    unsigned char *line = r == VG_OK ? vgi_array_raw(width, 4, e) : NULL;
-    if (r == VG_OK && !line) r = VG_ENOMEM;
-    for (size_t k = 0; k < n && r == VG_OK; k++) {
-        const unsigned char *s = (const unsigned char *)texts[k];
-        memset(line, 0, 4 * width);
-        for (size_t at = 0; *s; at += 4) vgi_put32(line + at, next_letter(&s));
-        r = vgi_packer_more(x->packer, line, 4 * width, e);
-    }
-    free(line);
-    return r < 0 ? r : vgi_packer_finish(x->packer, e);
-}
-
-static int copy_spool(writing *x, vg_err *e)
-{
-    enum { BLOCK = 1 << 20 };
-    unsigned char *block = vgi_array_raw(BLOCK, 1, e);
-    int r = block ? vgi_output_flush(&x->spool, e) : VG_ENOMEM;
-    for (uint64_t off = 0; r == VG_OK && off < x->spool.size;) {
-        ssize_t got = pread(x->spool.fd, block, BLOCK, (off_t)off);
-        if (got < 0 && errno == EINTR) continue;
-        if (got <= 0)
-            r = vg_fail(e, VG_ESYS, "cannot read a temporary file: %s",
-                        got ? strerror(errno) : "it ends too early");
-        else r = vgi_packer_more(x->packer, block, (size_t)got, e);
-        if (got > 0) off += (uint64_t)got;
-    }
-    free(block);
-    return r;
-}
-
-static int add_values(writing *x, enum array i, vg_err *e)
-{
-    const uint64_t shape[3] = {x->frames, x->h->count, vg_kind_width(x->h->kind)};
-    int r = begin_array(x, i, x->doubles ? "<f8" : "<f4", x->doubles ? 8 : 4, 3, shape, e);
-    if (r == VG_OK) r = copy_spool(x, e);
-    return r < 0 ? r : vgi_packer_finish(x->packer, e);
-}
-
-static int add_reference(writing *x, vg_err *e)
-{
-    const uint64_t shape[2] = {x->h->mesh.nv, 3};
-    vg_bytes b = {0};
-    int r = vgi_npy_store(&b, x->h->reference, 3 * x->h->mesh.nv, true, e);
-    if (r == VG_OK) r = add_doubles(x, REFERENCE, 2, shape, &b, e);
-    vg_bytes_clear(&b);
-    return r;
-}
-
-/* Is this array part of what is written? */
-static bool belongs(const writing *x, enum array i)
-{
-    const vg_head *h = x->h;
-    switch (i) {
-    case ANCHORS: return is_rooted(h) && h->nanchors;
-    case ANCHOR_POSITIONS: return is_rooted(h) && h->nanchors;
-    case GRAPH_OFFSETS: return is_rooted(h); /* with graph_vertices */
-    case LINKS: return is_rooted(h) && h->has_links;
-    case SELECTED: return is_rooted(h) && h->has_selection;
-    case ROOTS: return is_rooted(h);
-    case FACE_OFFSETS: return h->mesh.nv > 0; /* with face_vertices */
-    case REFERENCE: return h->mesh.nv > 0 && h->reference;
-    case REFERENCE_NAME: return h->mesh.nv > 0 && h->reference_name;
-    case TIMES: return x->timed;
-    case NAMES: return true;
-    case POSITIONS: return h->kind == VG_VERTICES;
-    case VECTORS: return h->kind == VG_VECTORS;
-    case DEFORMATIONS: return h->kind == VG_DEFORMATIONS;
-    case TRANSFORMS: return h->kind == VG_TRANSFORMS;
-    default: return false;
-    }
-}
-
-static int add(writing *x, enum array i, vg_err *e)
-{
-    const vg_head *h = x->h;
-    const uint64_t places[3] = {x->frames, h->nanchors, 3}, roots[2] = {x->frames, 3}, links[2] = {h->nlinks, 2};
-    const uint64_t anchors = h->nanchors, selected = h->nselected, frames = x->frames;
-    if (!belongs(x, i)) return VG_OK;
-    switch (i) {
-    case ANCHOR_POSITIONS: return add_doubles(x, i, 3, places, &x->anchors, e);
-    case ANCHORS: return add_indices(x, i, 1, &anchors, h->anchors, h->nanchors, e);
-    case FACE_OFFSETS: return add_mesh(x, i, FACE_VERTICES, h->mesh.start, h->mesh.vert, h->mesh.nf, e);
-    case GRAPH_OFFSETS: return add_graph(x, e);
-    case LINKS: return add_indices(x, i, 2, links, h->links, 2 * h->nlinks, e);
-    case NAMES: return add_texts(x, i, 1, x->names.at, x->names.n, e);
-    case REFERENCE: return add_reference(x, e);
-    case REFERENCE_NAME: return add_texts(x, i, 0, &h->reference_name, 1, e);
-    case ROOTS: return add_doubles(x, i, 2, roots, &x->roots, e);
-    case SELECTED: return add_indices(x, i, 1, &selected, h->selected, h->nselected, e);
-    case TIMES: return add_doubles(x, i, 1, &frames, &x->times, e);
-    default: return add_values(x, i, e);
-    }
-}
-
-static int end_npz(void *state, vg_err *e)
-{
-    writing *x = state;
-    int r = vgi_packer_open_plain(&x->packer, x->out->fd, x->out->name, e);
-    for (int i = 0; i < ARRAYS && r == VG_OK; i++) r = add(x, (enum array)i, e);
-    if (r == VG_OK) r = vgi_packer_end(x->packer, e);
-    if (r < 0) return r;
-    off_t size = lseek(x->out->fd, 0, SEEK_END);
-    if (size < 0) return vg_fail(e, VG_ESYS, "cannot write to '%s': %s", x->out->name, strerror(errno));
-    x->out->size = (uint64_t)size;
-    return VG_OK;
-}
-
-static const char *warn_npz(void *state)
-{
-    const writing *x = state;
-    size_t timed = 0;
-    for (size_t i = 0; i + 8 <= x->times.size; i += 8) timed += vgi_get64(x->times.data + i) != 0;
-    return !x->timed && timed ? "the times of the frames: not every frame has one" : NULL;
-}
-
-static void release_npz(void *state)
-{
-    writing *x = state;
-    if (!x) return;
-    vgi_packer_close(&x->packer);
-    if (x->spool.fd >= 0) close(x->spool.fd);
-    vgi_output_clear(&x->spool);
-    vgi_names_clear(&x->names);
-    vg_bytes_clear(&x->frame);
-    vg_bytes_clear(&x->roots);
-    vg_bytes_clear(&x->anchors);
-    vg_bytes_clear(&x->times);
-    free(x);
-}
-
 const vgi_sequence_format vgi_sequence_npz = {
     .name = "npz", .suffix = ".npz",
     .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_NAMES | VGI_KEEPS_TIMES |
              VGI_KEEPS_DOUBLES,
     .sniff = sniff_npz, .open = open_npz, .next = next_npz, .frames = count_frames, .close = close_npz,
     .kinds = 1 << VG_VERTICES | 1 << VG_VECTORS | 1 << VG_DEFORMATIONS | 1 << VG_TRANSFORMS,
-    .begin = begin_npz, .put = put_npz, .end = end_npz, .warning = warn_npz, .release = release_npz};
+    .begin = vgi_npz_begin, .put = vgi_npz_put, .end = vgi_npz_end, .warning = vgi_npz_warning, .release = vgi_npz_release};

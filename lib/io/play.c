@@ -1,5 +1,5 @@
-/* play.c: a file that holds a whole sequence, as the door in reads it: frame after frame, with the names that the file
- * does not give and the faces that lie beside it.
+/* play.c: a file that holds a whole sequence, as the door in reads it: frame after frame, with the names that the
+ * file does not give and the faces that lie beside it.
  * Leaves out the formats (sequence.c) and how several inputs become one sequence (source.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/play.h"

@@ -129,12 +129,13 @@ static int open_place(vg_sink *s, vg_err *e)
     switch (s->plan.kind) {
     case VGI_PLAN_SEQUENCE: return open_sequence(s, e);
     case VGI_PLAN_DIRECTORY: return make_directory(s, e);
-    case VGI_PLAN_FILE:
-    case VGI_PLAN_ARCHIVE: s->fd = vgi_targets_open(&s->targets, s->output, e); break;
-    default: return VG_OK;
+    case VGI_PLAN_SERIES: return VG_OK;
+    default: break;
     }
-    if (s->fd < 0) return s->fd;
-    return s->plan.kind == VGI_PLAN_ARCHIVE ? vgi_packer_open(&s->packer, s->fd, s->output, s->plan.length, e) : VG_OK;
+    if (s->plan.to_stdout) return VG_OK;
+    if ((s->fd = vgi_targets_open(&s->targets, s->output, e)) < 0) return s->fd;
+    if (s->plan.kind != VGI_PLAN_ARCHIVE) return VG_OK;
+    return vgi_packer_open(&s->packer, s->fd, s->output, s->plan.length, e);
 }
 
 /* ---- the mesh beside a sequence ---- */
@@ -303,7 +304,7 @@ int vg_sink_open(vg_sink **out, const char *output, const vg_head *h, const vg_s
 
 static int more_than_one(const vg_sink *s, vg_err *e)
 {
-    if (s->plan.kind == VGI_PLAN_STDOUT)
+    if (s->plan.to_stdout)
         return vg_fail(e, VG_EARG,
                        "more than one pose does not fit onto standard output: name a pattern like 'pose-%%04d.obj', "
                        "a directory or an archive");
@@ -367,7 +368,7 @@ int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
         f = &s->slim.frame;
     }
     if (kind == VGI_PLAN_SEQUENCE) return put_into_sequence(s, f, e);
-    if ((kind == VGI_PLAN_FILE || kind == VGI_PLAN_STDOUT) && s->frames > 0) return more_than_one(s, e);
+    if (kind == VGI_PLAN_FILE && s->frames > 0) return more_than_one(s, e);
     if (kind == VGI_PLAN_DIRECTORY || kind == VGI_PLAN_ARCHIVE) r = take_name(s, name, e);
     if (r < 0) return r;
     vg_err cause;
@@ -378,6 +379,16 @@ int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
     if (r < 0) return vg_fail(e, r, "cannot write frame '%s' to '%s': %s", name, s->output, cause.message);
     if ((r = put_frame(s, name, e)) == VG_OK) s->frames++;
     return r;
+}
+
+static int place_fd(const vg_sink *s)
+{
+    return s->plan.to_stdout ? STDOUT_FILENO : s->fd;
+}
+
+static const char *place_name(const vg_sink *s)
+{
+    return s->plan.to_stdout ? "standard output" : s->output;
 }
 
 static int no_pose(const vg_sink *s, vg_err *e)
@@ -391,8 +402,7 @@ static int end_sequence(vg_sink *s, vg_err *e)
     int r = s->plan.sequence->end(s->state, e);
     if (r == VG_OK) r = vgi_output_flush(&s->out, e);
     if (r < 0 || s->out.fd == s->fd) return r;
-    vgi_output to = {.fd = s->plan.to_stdout ? STDOUT_FILENO : s->fd,
-                     .name = s->plan.to_stdout ? "standard output" : s->output};
+    vgi_output to = {.fd = place_fd(s), .name = place_name(s)};
     r = vgi_output_copy(&to, s->out.fd, s->out.size, e);
     if (r == VG_OK) r = vgi_output_flush(&to, e);
     vgi_output_clear(&to);
@@ -402,8 +412,7 @@ static int end_sequence(vg_sink *s, vg_err *e)
 static int end_single(vg_sink *s, vg_err *e)
 {
     if (s->frames == 0) return no_pose(s, e);
-    int fd = s->plan.kind == VGI_PLAN_STDOUT ? STDOUT_FILENO : s->fd;
-    return vgi_write_all(fd, s->text.data, s->text.size, s->plan.kind == VGI_PLAN_STDOUT ? "standard output" : s->output, e);
+    return vgi_write_all(place_fd(s), s->text.data, s->text.size, place_name(s), e);
 }
 
 int vg_sink_end(vg_sink *s, vg_err *e)
@@ -411,7 +420,7 @@ int vg_sink_end(vg_sink *s, vg_err *e)
     int r = VG_OK;
     if (s->plan.kind == VGI_PLAN_SEQUENCE) r = end_sequence(s, e);
     else if (s->plan.kind == VGI_PLAN_ARCHIVE) r = vgi_packer_end(s->packer, e);
-    else if (s->plan.kind == VGI_PLAN_FILE || s->plan.kind == VGI_PLAN_STDOUT) r = end_single(s, e);
+    else if (s->plan.kind == VGI_PLAN_FILE) r = end_single(s, e);
     if (r == VG_OK && s->fd >= 0) {
         if (s->out.fd == s->fd) s->out.fd = -1;
         r = vgi_target_close(s->fd, s->output, e);

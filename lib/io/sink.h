@@ -9,7 +9,6 @@
 /* ---- sink_plan.c: what the name of the output asks for ---- */
 
 typedef enum vgi_plan_kind {
-    VGI_PLAN_STDOUT,
     VGI_PLAN_FILE,
     VGI_PLAN_SERIES,
     VGI_PLAN_DIRECTORY,
@@ -21,7 +20,7 @@ typedef struct vgi_plan {
     vgi_plan_kind kind;
     const vgi_format *format;
     const vgi_sequence_format *sequence; /* VGI_PLAN_SEQUENCE */
-    bool to_stdout;                      /* which goes there */
+    bool to_stdout; /* VGI_PLAN_FILE, VGI_PLAN_SEQUENCE */
     const char *name; /* the output without ":format": `length` bytes */
     size_t length;
     size_t at, behind; /* series: where %d starts, and where the name goes on */

@@ -1,5 +1,5 @@
-/* sink_plan.c: what the name of an output asks for: one mesh file, a numbered series, a directory, an archive, standard
- * output or one file for all poses, and of which format; and whether it can be had, told before any work.
+/* sink_plan.c: what the name of an output asks for: one mesh file, a numbered series, a directory, an archive,
+ * standard output or one file for all poses, and of which format; and whether it can be had, told before any work.
  * Leaves out the writing (sink.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sink.h"
@@ -106,7 +106,7 @@ static int tell_sequence(vgi_plan *p, const char *output, vg_err *e)
 static int tell_kind(vgi_plan *p, const char *output, vg_err *e)
 {
     if (p->sequence) return tell_sequence(p, output, e);
-    if (!strcmp(output, "-")) return p->kind = VGI_PLAN_STDOUT, VG_OK;
+    if (!strcmp(output, "-")) return p->kind = VGI_PLAN_FILE, p->to_stdout = true, VG_OK;
     if (vgi_packer_knows(output, p->length)) return p->kind = VGI_PLAN_ARCHIVE, VG_OK;
     if (p->length < strlen(output) || output[p->length - 1] == '/' || vgi_is_directory(output))
         return p->kind = VGI_PLAN_DIRECTORY, VG_OK;
@@ -196,7 +196,7 @@ static int check_file(const char *path, vg_err *e)
 
 int vgi_plan_check_place(const vgi_plan *p, vg_err *e)
 {
-    if (p->kind == VGI_PLAN_STDOUT || p->to_stdout) return VG_OK;
+    if (p->to_stdout) return VG_OK;
     char *name = vgi_copy_string(p->name, p->length, e), *dir = NULL;
     if (!name) return VG_ENOMEM;
     int r;

@@ -1,0 +1,23 @@
+/* npz.h: what npz.c and npz_write.c share, and no other file includes: the arrays.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_NPZ_H
+#define VG_NPZ_H
+
+#include "io/npy.h"
+
+/* In the order in which they are written: that in which archive.c hands out the members. */
+enum array {
+    ANCHOR_POSITIONS, ANCHORS, DEFORMATIONS, FACE_OFFSETS, FACE_VERTICES, FACES, GRAPH_OFFSETS, GRAPH_VERTICES,
+    LINKS, NAMES, POSITIONS, REFERENCE, REFERENCE_NAME, ROOTS, SELECTED, TIMES, TRANSFORMS, VECTORS, ARRAYS
+};
+
+extern const char *const vgi_npz_names[ARRAYS];
+
+/* ---- npz_write.c: for the table in npz.c ---- */
+int vgi_npz_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi_output *out, vg_err *e);
+int vgi_npz_put(void *state, const vg_frame *f, vg_err *e);
+int vgi_npz_end(void *state, vg_err *e);
+const char *vgi_npz_warning(void *state);
+void vgi_npz_release(void *state);
+
+#endif
