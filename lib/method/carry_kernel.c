@@ -3,6 +3,7 @@
  * Leaves out which faces drive which (carry.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/carry_kernel.h"
+#include "method/rotation_fit.h"
 
 #include <math.h>
 
@@ -71,15 +72,39 @@ INLINE vgi_lanes newton_step(vgi_lanes *x)
     return change;
 }
 
+/* Lanes in which a is flat, or inside out (what opposite turns leave of one another): no step of Newton's leads from
+ * there to a rotation. */
+INLINE unsigned unsound(const vgi_lanes *x)
+{
+    static const double thin = 1e-12; /* determinant of a matrix of norm 1 */
+    vgi_lanes c0 = x[4] * x[8] - x[5] * x[7], c1 = x[5] * x[6] - x[3] * x[8], c2 = x[3] * x[7] - x[4] * x[6];
+    vgi_lanes det = x[0] * c0 + x[1] * c1 + x[2] * c2, size = {0};
+    for (int i = 0; i < 9; i++) size += x[i] * x[i];
+    vgi_mask bad = ~(det > thin * size * vgi_lane_roots(size));
+    unsigned bits = 0;
+    for (int k = 0; k < VGI_LANES; k++) bits |= (unsigned)(bad[k] & 1) << k;
+    return bits;
+}
+
 INLINE void polar(const vgi_map *a, vgi_map *r)
 {
     enum { MOST = 20 };
+    unsigned bad = unsound(a->m);
     *r = *a;
+    for (int k = 0; bad >> k; k++) /* they wait at the identity */
+        for (int i = 0; (bad >> k & 1) && i < 9; i++) r->m[i][k] = i % 4 == 0;
     for (int step = 0; step < MOST; step++) {
         vgi_lanes change = newton_step(r->m);
         double most = 0;
         for (int k = 0; k < VGI_LANES; k++) most = change[k] > most ? change[k] : most;
         if (most < 1e-20) break; /* quadratic: the next change would be below rounding */
+    }
+    for (int k = 0; bad >> k; k++) {
+        if (!(bad >> k & 1)) continue;
+        double one[9], turn[9];
+        for (int i = 0; i < 9; i++) one[i] = a->m[i][k];
+        vgi_fit_rotation(one, turn);
+        for (int i = 0; i < 9; i++) r->m[i][k] = turn[i];
     }
 }
 

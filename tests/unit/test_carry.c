@@ -251,6 +251,84 @@ static void polar_finds_the_rotation(void)
         for (int i = 0; i < 9; i++) CHECK_NEAR(r.m[i][lane], truth[lane][i], 1e-9);
 }
 
+static double determinant(const double m[9])
+{
+    return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
+
+/* What opposite turns leave of one another when they are averaged: flat, thin, inside out, nothing. It is a rotation
+ * all the same, and of all rotations none is nearer; a sound matrix in the next lane is not disturbed. */
+static void polar_of_what_cancels(void)
+{
+    static const double left[VGI_LANES][3] = {{1, 0, 0},   {1, 1, 0},       {0, 0, 0},       {-1. / 3, -1. / 3, -1. / 3},
+                                              {1, 1, -.5}, {.2, 1e-9, -.1}, {1, -1e-14, .5}, {2, 1, .5}};
+    vgi_map a, r;
+    double m[VGI_LANES][9];
+    for (int lane = 0; lane < VGI_LANES; lane++) {
+        double q[4], u[9], length = 0;
+        for (int i = 0; i < 4; i++) q[i] = noise(), length += q[i] * q[i];
+        for (int i = 0; i < 4; i++) q[i] /= sqrt(length);
+        vg_quat_matrix(q, u);
+        for (int i = 0; i < 9; i++) {
+            m[lane][i] = 0;
+            for (int k = 0; k < 3; k++) m[lane][i] += u[3 * (i / 3) + k] * left[lane][k] * u[3 * (i % 3) + k];
+            a.m[i][lane] = m[lane][i];
+        }
+    }
+    vgi_polar(&a, &r);
+    for (int lane = 0; lane < VGI_LANES; lane++) {
+        double one[9], trace = 0;
+        for (int i = 0; i < 9; i++) one[i] = r.m[i][lane], trace += one[i] * m[lane][i];
+        CHECK_NEAR(determinant(one), 1, 1e-12);
+        for (int i = 0; i < 9; i++) {
+            double dot = 0;
+            for (int k = 0; k < 3; k++) dot += one[3 * (i / 3) + k] * one[3 * (i % 3) + k];
+            CHECK_NEAR(dot, i % 4 == 0, 1e-12);
+        }
+        for (int trial = 0; trial < 1000; trial++) {
+            double q[4], other[9], length = 0, its = 0;
+            for (int i = 0; i < 4; i++) q[i] = noise(), length += q[i] * q[i];
+            for (int i = 0; i < 4; i++) q[i] /= sqrt(length);
+            vg_quat_matrix(q, other);
+            for (int i = 0; i < 9; i++) its += other[i] * m[lane][i];
+            CHECK(its <= trace + 1e-12);
+        }
+    }
+}
+
+/* A sheet that is folded flat: a target face across the crease is driven by two faces whose turns are opposite. */
+static void a_fold_is_finite(void)
+{
+    vg_head source = new_shape(), target = new_shape();
+    for (vg_head *h = &source; h; h = h == &source ? &target : NULL) {
+        add_vertex(h, 0, 0, 0), add_vertex(h, 1, 0, 0), add_vertex(h, .5, 1, 0);
+        if (h == &source) add_vertex(h, .5, -1, 0), FACE(h, 0, 1, 2), FACE(h, 1, 0, 3);
+        else FACE(h, 0, 1, 2);
+    }
+    double fold[12];
+    memcpy(fold, source.reference, sizeof fold);
+    fold[10] = 1;
+    for (int matched = 0; matched < 2; matched++) {
+        vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 2, matched);
+        k.source[0] = 0, k.source[1] = 1;
+        for (int i = 0; i < 3; i++) {
+            carried r = carry(&source, &target, &k, fold, methods[i], 1);
+            for (size_t c = 0; c < vg_graph_corners(r.g); c++) {
+                double d2 = 0, w2 = 0;
+                for (size_t x = 3 * c; x < 3 * c + 3; x++)
+                    d2 += r.vectors[x] * r.vectors[x], w2 += r.expected[x] * r.expected[x];
+                if (matched) CHECK(d2 <= w2 * (1 + 1e-12)); /* a mean of turns stretches nothing */
+                else CHECK_NEAR(d2, w2, 1e-12);
+                CHECK_NEAR(r.vectors[3 * c], r.expected[3 * c], matched ? 1 : 1e-12); /* the crease is on the x axis */
+            }
+            carried_clear(&r);
+        }
+        vg_correspondence_clear(&k);
+    }
+    vg_head_clear(&source);
+    vg_head_clear(&target);
+}
+
 /* On triangles the area metric is the cotangent Laplacian:
  * G_ij = -cot(opposite angle) / 2 times one and the same number. */
 static void area_metric_is_cotangents(void)
@@ -348,6 +426,8 @@ TESTS({"a turning source turns every target", rotation_passes},
       {"degenerate source faces are counted and drive nothing", degenerate_sources_are_counted},
       {"a correspondence of other meshes is refused", other_meshes_are_refused},
       {"the polar rotation of R S is R", polar_finds_the_rotation},
+      {"the polar rotation of what is no rotation is one", polar_of_what_cancels},
+      {"a sheet folded flat drives a face across the crease", a_fold_is_finite},
       {"the area metric of triangles is the cotangent Laplacian", area_metric_is_cotangents},
       {"by shape: a mesh onto itself is its pose", shape_onto_itself},
       {"by shape: vectors of the target at centroids of the source", shape_of_the_reference})
