@@ -323,7 +323,7 @@ static void make_system(const vg_bender *x, bending *w, double prior, double dam
     for (size_t i = 0; i < n; i++) {
         double pull = i ? 2 * prior * x->size[i] : 0;
         for (size_t k = 0; k < 3; k++) {
-            w->h[(3 * i + k) * (width + 1)] += pull + damping * x->size[i] + 1e-15;
+            w->h[(3 * i + k) * (width + 1)] += pull + (damping + 1e-15) * x->size[i];
             if (!i) continue;
             size_t up = 3 * (size_t)x->parent[i] + k;
             w->h[up * (width + 1)] += pull;

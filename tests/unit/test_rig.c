@@ -208,6 +208,62 @@ static void motions_are_found_again(void)
     strike(&x);
 }
 
+/* All of a stage in other units of length. */
+static void change_units(stage *x, double unit)
+{
+    for (size_t i = 0; i < 3 * x->h.mesh.nv; i++) x->h.reference[i] *= unit;
+    for (size_t j = 0; j < JOINTS; j++)
+        for (size_t k = 0; k < 3; k++) {
+            x->s.joints[j].offset[k] *= unit, x->h.rig.skeleton.joints[j].offset[k] *= unit;
+            x->h.rig.at[3 * j + k] *= unit;
+        }
+    for (size_t n = 0; n < POSES; n++) {
+        for (size_t i = 0; i < 3 * x->h.mesh.nv; i++) x->poses[n][i] *= unit;
+        for (size_t i = 0; i < 3 * JOINTS; i++) x->positions[n][i] *= unit;
+        for (size_t i = 0; i < 7 * BONES; i++)
+            if (i % 7 > 3) x->transforms[n][i] *= unit;
+    }
+}
+
+/* Powers of two, so that nothing is rounded: every fit gives the same but for the unit. */
+static void units_do_not_matter(void)
+{
+    double miss[3], learned[3], turned[3][7 * BONES], shift[3][3], spread;
+    for (int i = 0; i < 3; i++) {
+        stage x;
+        vg_err e;
+        vg_bender *b;
+        double unit = ldexp(1, i == 0 ? 0 : i == 1 ? -66 : 66), *found[1] = {turned[i]}; /* 1, 1e-20, 1e20 */
+        meshes_state = 9;
+        set_stage(&x, make_limb(), 60);
+        paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.2);
+        skin_poses(&x);
+        for (size_t k = 0; k < POSES; k++)
+            for (size_t v = 0; v < 3 * x.h.mesh.nv; v++) x.poses[k][v] += 0.05 * sin(x.poses[k][v] * 3);
+        change_units(&x, unit);
+        CHECK(vg_bender_new(&b, &x.h.rig, x.h.mesh.nv, x.h.reference, 1, &e) == VG_OK);
+        vg_bender_fit(b, 1, (const double *const *)x.poses, found);
+        vg_bender_free(&b);
+        CHECK(vg_rig_locate(&x.s, x.h.mesh.nv, x.h.reference, POSES, (const double *const *)x.poses,
+                            (const double *const *)x.positions, (const double *const *)x.turns, 1, shift[i], &spread,
+                            &e) == VG_OK);
+        vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, 2, 0.003, 1);
+        miss[i] = misses(&x) / unit;
+        vg_rig_fitter_free(&f);
+        CHECK(vg_rig_learn(&x.h, POSES, (const double *const *)x.poses, 1, &learned[i], &e) == VG_OK);
+        learned[i] /= unit;
+        for (size_t k = 0; k < 7 * BONES; k++) turned[i][k] /= k % 7 > 3 ? unit : 1;
+        for (int k = 0; k < 3; k++) shift[i][k] /= unit;
+        strike(&x);
+    }
+    for (int i = 1; i < 3; i++) {
+        CHECK_NEAR(miss[i], miss[0], 1e-12);
+        CHECK_NEAR(learned[i], learned[0], 1e-9);
+        for (int k = 0; k < 3; k++) CHECK_NEAR(shift[i][k], shift[0][k], 1e-12);
+        for (size_t k = 0; k < 7 * BONES; k++) CHECK_NEAR(turned[i][k], turned[0][k], 1e-9);
+    }
+}
+
 static void a_rig_is_learned_from_poses_alone(void)
 {
     stage x;
@@ -541,6 +597,7 @@ static void what_cannot_be_fitted_is_refused(void)
 
 TESTS({"rigid bodies are met", rigid_bodies_are_met}, {"weights are found again", weights_are_found_again},
       {"motions are found again", motions_are_found_again},
+      {"units do not matter", units_do_not_matter},
       {"a rig is learned from poses alone", a_rig_is_learned_from_poses_alone},
       {"the map is its chain", the_map_is_its_chain}, {"refinement brings nearer", refinement_brings_nearer},
       {"the root is found", the_root_is_found}, {"other skeletons drive", other_skeletons_drive},
