@@ -42,13 +42,12 @@ static void newton(double x[9])
     }
 }
 
-/* The largest eigenvector of Horn's matrix: for any m. */
+/* The largest eigenvector of Horn's matrix: for any m. Of several best rotations the one that turns least. */
 static void horn(const double m[9], double r[9])
 {
-    static const double bias = 0.25e-12; /* of several best rotations the one that turns least */
-    double biased[9], q[4];
-    for (int i = 0; i < 9; i++) biased[i] = m[i] + (i % 4 == 0 ? bias : 0);
-    vgi_best_turn(biased, q);
+    static const double little = 0.25e-12, unturned[4] = {1, 0, 0, 0};
+    double q[4];
+    vgi_best_turn_near(m, little, unturned, q);
     vg_quat_matrix(q, r);
 }
 

@@ -44,7 +44,8 @@ static double compare_sizes(const vg_driver *d, const double *rest, const double
     return spread[0] > 0 && spread[1] > 0 ? sqrt(spread[0] / spread[1]) : 1;
 }
 
-/* The turn of the rig's joint j, at rest, that makes what is below it point where the other's does at rest. */
+/* The turn of the rig's joint j, at rest, that makes what is below it point where the other's does at rest; what that
+ * leaves open, and what nothing is below, goes with the joint above. */
 static void align_joint(const vg_driver *d, size_t j, const double *rest, const double *their_rest)
 {
     double b[9] = {0}, one[2][3], *q = d->before + 4 * j;
@@ -64,7 +65,7 @@ static void align_joint(const vg_driver *d, size_t j, const double *rest, const 
         memcpy(one[1], o, sizeof o);
         n++;
     }
-    if (n > 1) vgi_best_turn(b, q);
+    if (n > 1) vgi_best_turn_near(b, 1e-9, q, q);
     if (n != 1) return;
     vg_quat_between(one[0], one[1], q);
     double size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);

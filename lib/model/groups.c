@@ -69,6 +69,7 @@ static void reject(const double u[3], double x[3])
 static void turn_joint(const vg_joint_groups *g, size_t j, const double *reference, const double *pose,
                        const double *positions, double *turns)
 {
+    static const double unturned[4] = {1, 0, 0, 0};
     const vg_joint_group *group = &g->at[j];
     double b[9] = {0}, rest[3], d[3], r[3], below[2][3];
     size_t children = 0;
@@ -91,14 +92,9 @@ static void turn_joint(const vg_joint_groups *g, size_t j, const double *referen
             reject(below[0], d), reject(below[1], r); /* perpendicular to the bone: the frame is met exactly */
         add_pair(b, children == 1 ? 1 : 0.01, d, r);
     }
-    if (group->parent != UINT32_MAX) { /* what all of this leaves open goes with the parent */
-        double m[9];
-        vg_quat_matrix(turns + 4 * (size_t)group->parent, m);
-        for (int i = 0; i < 9; i++) b[i] += 1e-9 * m[i];
-    } else {
-        for (int i = 0; i < 9; i += 4) b[i] += 1e-9;
-    }
-    vgi_best_turn(b, turns + 4 * j);
+    /* what all of this leaves open goes with the parent */
+    vgi_best_turn_near(b, 1e-9, group->parent == UINT32_MAX ? unturned : turns + 4 * (size_t)group->parent,
+                       turns + 4 * j);
 }
 
 void vg_joint_groups_pose(const vg_joint_groups *g, const double *reference, const double *pose, double *positions,

@@ -92,15 +92,6 @@ void vg_skeleton_pose(const vg_skeleton *s, const double *values, double *positi
 
 /* ---- the best turn for several directions ---- */
 
-/* vgi_best_turn of k + weight * (the turn `prior`) */
-static void best_turn_near(const double k[9], double weight, const double prior[4], double q[4])
-{
-    double b[9];
-    vg_quat_matrix(prior, b);
-    for (int i = 0; i < 9; i++) b[i] = k[i] + weight * b[i];
-    vgi_best_turn(b, q);
-}
-
 /* k: the sum of d o^T over directions o of the reference and d of now, divided by the sum of |o|^2. What k leaves
  * open (all directions on one line), and what it says with less force than its own misfit, stays as in q_before: each
  * step pulls towards the last result, so that what is well determined ends at its optimum all the same. */
@@ -108,11 +99,11 @@ static void fit_turn(const double k[9], const double q_before[4], double q[4])
 {
     double m[9], agreement = 0, prior[4];
     copy_turn(q_before, prior);
-    best_turn_near(k, 1e-9, prior, q);
+    vgi_best_turn_near(k, 1e-9, prior, q);
     vg_quat_matrix(q, m);
     for (int i = 0; i < 9; i++) agreement += m[i] * k[i];
     double weight = 1e-9 + fmax(0, 2 * (1 - agreement));
-    for (int step = 0; step < 3; step++) best_turn_near(k, weight, step ? q : prior, q);
+    for (int step = 0; step < 3; step++) vgi_best_turn_near(k, weight, step ? q : prior, q);
 }
 
 /* ---- angles from a turn ---- */

@@ -55,3 +55,11 @@ void vgi_best_turn(const double b[9], double q[4])
                       {xy, szx, syz, zz - xx - yy}};
     largest_eigenvector(n, q);
 }
+
+void vgi_best_turn_near(const double b[9], double weight, const double prior[4], double q[4])
+{
+    double m[9];
+    vg_quat_matrix(prior, m);
+    for (int i = 0; i < 9; i++) m[i] = b[i] + weight * m[i];
+    vgi_best_turn(m, q);
+}

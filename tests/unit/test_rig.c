@@ -420,6 +420,31 @@ static void other_skeletons_drive(void)
     strike(&x);
 }
 
+/* A joint with two children on one line, as a hip between two legs may be: what they leave open, the turn about that
+ * line, is not made up. */
+static void a_line_leaves_nothing_to_chance(void)
+{
+    for (int trial = 0; trial < 20; trial++) {
+        vg_err e;
+        vg_rig r;
+        vg_driver *d;
+        vg_skeleton s = make_skeleton(LENGTH);
+        double way[3] = {noise(), noise(), noise()}, positions[3 * JOINTS], turned[4 * JOINTS], t[7 * BONES];
+        s.joints[2].parent = 0, s.joints[3].parent = 0, s.joints[4].parent = 3;
+        for (size_t j = 2; j < JOINTS; j++)
+            for (int k = 0; k < 3; k++) s.joints[j].offset[k] = j == 2 ? 2 * way[k] : j == 3 ? -way[k] : 0.5 * way[k];
+        memcpy(s.joints[1].offset, way, sizeof way);
+        vg_skeleton_pose(&s, NULL, positions, turned);
+        CHECK(vg_rig_make(&r, &s, positions, turned, &e) == VG_OK);
+        CHECK(vg_driver_new(&d, &r, &s, true, &e) == VG_OK);
+        vg_driver_pose(d, positions, turned, t);
+        for (size_t b = 0; b < BONES; b++) CHECK_NEAR(fabs(t[7 * b]), 1, 1e-12); /* it rests as it does */
+        vg_driver_free(&d);
+        vg_rig_clear(&r);
+        vg_skeleton_clear(&s);
+    }
+}
+
 static void edits_turn_what_hangs_on_a_bone(void)
 {
     stage x;
@@ -601,6 +626,7 @@ TESTS({"rigid bodies are met", rigid_bodies_are_met}, {"weights are found again"
       {"a rig is learned from poses alone", a_rig_is_learned_from_poses_alone},
       {"the map is its chain", the_map_is_its_chain}, {"refinement brings nearer", refinement_brings_nearer},
       {"the root is found", the_root_is_found}, {"other skeletons drive", other_skeletons_drive},
+      {"a line leaves nothing to chance", a_line_leaves_nothing_to_chance},
       {"edits turn what hangs on a bone", edits_turn_what_hangs_on_a_bone},
       {"rotations alone say where bones are", rotations_alone_say_where_bones_are},
       {"a rig serves another body", a_rig_serves_another_body},
