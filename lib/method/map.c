@@ -15,9 +15,9 @@
  * predict left-out poses best.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/map_parts.h"
+#include "method/pieces.h"
 #include "method/product.h"
 #include "method/rotation_fit.h"
-#include "method/segment.h"
 #include "model/sets.h"
 
 #include <math.h>
@@ -407,7 +407,9 @@ static int fit_joints(const vg_map_fitter *f, vg_map *m, vg_err *e)
     m->joint_weight = vgi_array(m->njoints, sizeof *m->joint_weight, e);
     double *middle = vgi_array(3 * m->njoints, sizeof *middle, e);
     if (!m->joint_at || !m->joint_weight || !middle) r = VG_ENOMEM;
-    if (r == VG_OK) r = vgi_joint_points(g, f->of_face, m->joint, m->njoints, f->h->reference, middle, e);
+    if (r == VG_OK)
+        r = vgi_shared_points(g->nv, g->nf, g->start, g->vert, f->of_face, m->joint, m->njoints, f->h->reference,
+                              middle, e);
     for (size_t i = 0; r == VG_OK && i < m->njoints; i++) {
         double miss;
         fit_joint(f, pair[i][0], pair[i][1], middle + 3 * i, m->joint_at + 3 * i, &miss);

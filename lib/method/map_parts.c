@@ -4,7 +4,6 @@
 #include "method/map_parts.h"
 #include "method/product.h"
 #include "method/rotation_fit.h"
-#include "model/incidence.h"
 #include "model/rig.h"
 
 #include <math.h>
@@ -197,42 +196,6 @@ uint32_t *vgi_graph_patches(const vg_head *h, const vg_graph *g, vg_err *e)
     }
     free(of_vertex);
     return of_face;
-}
-
-static size_t find_pair(const uint32_t *pairs, size_t n, uint32_t a, uint32_t b)
-{
-    size_t low = 0, high = n;
-    while (low < high) {
-        size_t mid = (low + high) / 2;
-        if (pairs[2 * mid] < a || (pairs[2 * mid] == a && pairs[2 * mid + 1] < b)) low = mid + 1;
-        else high = mid;
-    }
-    return low < n && pairs[2 * low] == a && pairs[2 * low + 1] == b ? low : n;
-}
-
-int vgi_joint_points(const vg_graph *g, const uint32_t *of_face, const uint32_t *pairs, size_t n,
-                     const double *points, double *mean, vg_err *e)
-{
-    vgi_incidence around;
-    double *weight = vgi_array(n, sizeof *weight, e);
-    if (!weight) return VG_ENOMEM;
-    int r = vgi_incidence_make(&around, g->nv, g->nf, g->start, g->vert, e);
-    if (r < 0) return free(weight), r;
-    memset(mean, 0, 3 * n * sizeof *mean);
-    for (size_t v = 0; v < g->nv; v++)
-        for (uint32_t i = around.first[v]; i < around.first[v + 1]; i++)
-            for (uint32_t k = around.first[v]; k < around.first[v + 1] && k < around.first[v] + 64; k++) {
-                uint32_t a = of_face[around.face[i]], b = of_face[around.face[k]];
-                size_t at = a < b ? find_pair(pairs, n, a, b) : n;
-                if (at == n) continue;
-                weight[at]++;
-                for (size_t c = 0; c < 3; c++) mean[3 * at + c] += points[3 * v + c];
-            }
-    for (size_t i = 0; i < n; i++)
-        for (size_t c = 0; c < 3 && weight[i] > 0; c++) mean[3 * i + c] /= weight[i];
-    vgi_incidence_clear(&around);
-    free(weight);
-    return VG_OK;
 }
 
 int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *e)

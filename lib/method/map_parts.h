@@ -52,8 +52,5 @@ int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, con
                      vg_err *e) VG_MUST_CHECK;
 /* vgi_graph_patches: patch of each face of g, links too; free(). NULL: no memory. */
 uint32_t *vgi_graph_patches(const vg_head *h, const vg_graph *g, vg_err *e);
-/* vgi_joint_points: the mean of the vertices that both patches of each pair share. pairs ascending. */
-int vgi_joint_points(const vg_graph *g, const uint32_t *of_face, const uint32_t *pairs, size_t n,
-                     const double *points, double *mean, vg_err *e) VG_MUST_CHECK;
 
 #endif

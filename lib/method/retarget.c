@@ -2,6 +2,7 @@
  * Leaves out how maps are fitted (map.c of patches, envelope.c of bones).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/map_parts.h"
+#include "method/pieces.h"
 #include "method/product.h"
 #include "model/rig.h"
 
@@ -56,6 +57,13 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
     return r;
 }
 
+/* Of each joint, on one body: the mean of the vertices that both its patches have. */
+static int meeting_points(const vg_map *m, const vg_graph *g, const uint32_t *of_face, const double *body,
+                          double *mean, vg_err *e)
+{
+    return vgi_shared_points(g->nv, g->nf, g->start, g->vert, of_face, m->joint, m->njoints, body, mean, e);
+}
+
 /* Joints, centres and held points go with the body; corrections of what joints say grow with it. */
 static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *body, double ratio,
                        vg_err *e)
@@ -67,8 +75,8 @@ static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, c
     double *old = vgi_array(3 * m->njoints, sizeof *old, e), *now = vgi_array(3 * m->njoints, sizeof *now, e);
     int blas = vgi_product_begin();
     int r = before && after && old && now ? vgi_place_by_joints(m, m->centre, before, e) : VG_ENOMEM;
-    if (r == VG_OK) r = vgi_joint_points(g, of_face, m->joint, m->njoints, h->reference, old, e);
-    if (r == VG_OK) r = vgi_joint_points(g, of_face, m->joint, m->njoints, body, now, e);
+    if (r == VG_OK) r = meeting_points(m, g, of_face, h->reference, old, e);
+    if (r == VG_OK) r = meeting_points(m, g, of_face, body, now, e);
     if (r == VG_OK) r = vgi_shape_make(&shape, &h->mesh, &h->patches, body, e);
     if (r == VG_OK) {
         for (size_t i = 0; i < 3 * m->njoints; i++) m->joint_at[i] = now[i] + ratio * (m->joint_at[i] - old[i]);

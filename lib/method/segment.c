@@ -1,10 +1,9 @@
 /* segment.c: faces that turn alike, by K-means over their rotations (T 6.2), and patches that hang together.
- * Leaves out how the rotation of a face is measured (rotation_fit.c).
+ * Leaves out how the rotation of a face is measured (rotation_fit.c), and what hangs together (pieces.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "method/segment.h"
+#include "method/pieces.h"
 #include "method/product.h"
 #include "method/rotation_fit.h"
-#include "model/incidence.h"
 #include "model/sets.h"
 
 #include <math.h>
@@ -392,93 +391,6 @@ static int make_clustering(clustering *c, const vg_segmenter *s, size_t most, vg
 }
 
 /* ---- pieces ---- */
-
-int vgi_connected_pieces(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label,
-                         size_t nlabels, uint32_t *piece, size_t *count, vg_err *e)
-{
-    vgi_incidence around;
-    int r = vgi_incidence_make(&around, nv, nf, start, vert, e);
-    if (r < 0) return r;
-    uint32_t *at = vgi_array_raw(nlabels, sizeof *at, e), *last = vgi_array_raw(nlabels, sizeof *last, e);
-    uint32_t *number = vgi_array_raw(nf, sizeof *number, e);
-    if (at && last && number) {
-        memset(at, 0xff, nlabels * sizeof *at); /* the vertex at which a label was last seen, and in which face */
-        vgi_sets_init(piece, nf);
-        for (size_t v = 0; v < nv; v++)
-            for (uint32_t i = around.first[v]; i < around.first[v + 1]; i++) {
-                uint32_t f = around.face[i], k = label[f];
-                if (at[k] == v) vgi_sets_join(piece, f, last[k]);
-                at[k] = (uint32_t)v, last[k] = f;
-            }
-        *count = 0;
-        for (size_t f = 0; f < nf; f++) { /* the root of a set is its lowest face */
-            uint32_t root = vgi_sets_find(piece, (uint32_t)f);
-            if (root == f) number[f] = (uint32_t)(*count)++;
-        }
-        for (size_t f = nf; f-- > 0;) piece[f] = number[vgi_sets_find(piece, (uint32_t)f)];
-    } else {
-        r = VG_ENOMEM;
-    }
-    vgi_incidence_clear(&around);
-    free(at);
-    free(last);
-    free(number);
-    return r;
-}
-
-static int by_pair(const void *a, const void *b)
-{
-    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
-    return x < y ? -1 : x > y;
-}
-
-int vgi_neighbours(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label,
-                   uint32_t (**pair)[2], uint32_t **shared, size_t *count, vg_err *e)
-{
-    enum { MOST = 32 }; /* labels looked at around one vertex */
-    vgi_incidence around;
-    uint64_t *all = NULL;
-    size_t n = 0, cap = 0;
-    *pair = NULL, *shared = NULL, *count = 0;
-    int r = vgi_incidence_make(&around, nv, nf, start, vert, e);
-    if (r < 0) return r;
-    for (size_t v = 0; r == VG_OK && v < nv; v++) {
-        uint32_t seen[MOST];
-        size_t nseen = 0;
-        for (uint32_t i = around.first[v]; i < around.first[v + 1] && nseen < MOST; i++) {
-            uint32_t k = label[around.face[i]];
-            size_t j = 0;
-            while (j < nseen && seen[j] != k) j++;
-            if (j == nseen) seen[nseen++] = k;
-        }
-        if (nseen > 1) r = vgi_grow(&all, &cap, n + nseen * nseen / 2 + 1, sizeof *all, e);
-        for (size_t a = 0; r == VG_OK && a < nseen; a++)
-            for (size_t b = 0; b < a; b++) {
-                uint32_t low = seen[a] < seen[b] ? seen[a] : seen[b], high = seen[a] ^ seen[b] ^ low;
-                all[n++] = (uint64_t)low << 32 | high;
-            }
-    }
-    vgi_incidence_clear(&around);
-    if (n) qsort(all, n, sizeof *all, by_pair);
-    if (r == VG_OK) {
-        *pair = vgi_array_raw(n, sizeof **pair, e), *shared = vgi_array(n, sizeof **shared, e);
-        if (!*pair || !*shared) r = VG_ENOMEM;
-    }
-    for (size_t i = 0; r == VG_OK && i < n; i++) {
-        if (i == 0 || all[i] != all[i - 1]) {
-            (*pair)[*count][0] = (uint32_t)(all[i] >> 32), (*pair)[*count][1] = (uint32_t)all[i];
-            (*count)++;
-        }
-        (*shared)[*count - 1]++;
-    }
-    free(all);
-    if (r < 0) {
-        free(*pair);
-        free(*shared);
-        *pair = NULL, *shared = NULL;
-    }
-    return r;
-}
 
 /* Joining pieces: the pair of neighbours whose union costs the least (Ward 1963),
  * until `k` are left or none has a neighbour. */

@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
 #include "method/rotation_fit.h"
-#include "method/segment.h"
+#include "method/pieces.h"
 
 static void turn_about(const double axis[3], double angle, double m[9])
 {
@@ -143,4 +143,45 @@ static void pieces(void)
     free(shared);
 }
 
-TESTS({"nearest rotations", nearest_rotations}, {"thirds of a strip", thirds}, {"pieces and neighbours", pieces})
+/* A fan of a hundred and thirty triangles around a hub, in three sectors: a pair shares the hub and the vertex on the rim
+ * between them; those whose faces come last are no worse off. */
+static void sectors_meet(void)
+{
+    enum { RIM = 130 };
+    vg_head h = new_shape();
+    uint32_t label[RIM], (*pair)[2], *shared;
+    size_t n;
+    vg_err e;
+    add_vertex(&h, 5, 6, 7);
+    for (int i = 0; i < RIM; i++) add_vertex(&h, 5 + cos(2 * M_PI * i / RIM), 6 + sin(2 * M_PI * i / RIM), 7);
+    for (uint32_t i = 0; i < RIM; i++) {
+        FACE(&h, 0, 1 + i, 1 + (i + 1) % RIM);
+        label[i] = i < 70 ? 1 : i < 100 ? 2 : 0; /* 1 and 2 meet at rim 70, 2 and 0 at 100, 0 and 1 at 0 */
+    }
+    const uint32_t rim[3] = {0, 100, 70};
+    double mean[9];
+    const vg_mesh *m = &h.mesh;
+    CHECK(vgi_neighbours(m->nv, m->nf, m->start, m->vert, label, &pair, &shared, &n, &e) == VG_OK);
+    CHECK(n == 3 && pair[0][0] == 0 && pair[0][1] == 1 && pair[1][1] == 2 && pair[2][0] == 1 && pair[2][1] == 2);
+    CHECK(vgi_shared_points(m->nv, m->nf, m->start, m->vert, label, pair[0], n, h.reference, mean, &e) == VG_OK);
+    for (size_t i = 0; i < 3; i++) {
+        CHECK(shared[i] == 2);
+        for (size_t k = 0; k < 3; k++)
+            CHECK_NEAR(mean[3 * i + k], (h.reference[k] + h.reference[3 + 3 * rim[i] + k]) / 2, 1e-15 * 8);
+    }
+    free(pair);
+    free(shared);
+    /* every face a patch: at the hub 32 of them are looked at, which makes 31 pairs each; and those over the rim */
+    for (uint32_t i = 0; i < RIM; i++) label[i] = RIM - i;
+    CHECK(vgi_neighbours(m->nv, m->nf, m->start, m->vert, label, &pair, &shared, &n, &e) == VG_OK);
+    CHECK(n == 32 * 31 / 2 + RIM - 31);
+    for (size_t i = 1; i < n; i++)
+        CHECK(pair[i][0] > pair[i - 1][0] || (pair[i][0] == pair[i - 1][0] && pair[i][1] > pair[i - 1][1]));
+    for (size_t i = 0; i < n; i++) CHECK(pair[i][0] < pair[i][1]);
+    free(pair);
+    free(shared);
+    vg_head_clear(&h);
+}
+
+TESTS({"nearest rotations", nearest_rotations}, {"thirds of a strip", thirds}, {"pieces and neighbours", pieces},
+      {"sectors of a fan meet", sectors_meet})
