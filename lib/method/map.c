@@ -27,10 +27,10 @@
 enum { CHUNK = 256, LEAST_FACES = 3, MOST_TRIED = 48, NEAR = 7 };
 #define NOBODY UINT32_MAX
 
-/* A patch and the neighbours with which it shares most. */
+/* A patch, and the neighbours with which it shares most vertices. */
 typedef struct vicinity {
     size_t n;
-    uint32_t patch[NEAR];
+    uint32_t patch[NEAR], shared[NEAR];
 } vicinity;
 
 struct vg_map_fitter {
@@ -152,6 +152,15 @@ static int choose_held(vg_map_fitter *f, vg_err *e)
     return ok ? VG_OK : VG_ENOMEM;
 }
 
+/* A neighbour that shares so many vertices, after those that share more or as many. */
+static void come_near(vicinity *x, uint32_t patch, uint32_t shared)
+{
+    size_t at = x->n < NEAR ? x->n++ : shared > x->shared[NEAR - 1] ? NEAR - 1 : NEAR;
+    for (; at < NEAR && at > 1 && shared > x->shared[at - 1]; at--)
+        x->shared[at] = x->shared[at - 1], x->patch[at] = x->patch[at - 1];
+    if (at < NEAR) x->shared[at] = shared, x->patch[at] = patch;
+}
+
 /* The neighbours of each patch, those first with which it shares most vertices. */
 static int find_near(vg_map_fitter *f, vg_err *e)
 {
@@ -163,18 +172,9 @@ static int find_near(vg_map_fitter *f, vg_err *e)
     if (!f->near || !f->owner || !f->want) return VG_ENOMEM;
     int r = vgi_neighbours(g->nv, g->nf, g->start, g->vert, f->of_face, &pair, &shared, &npairs, e);
     if (r < 0) return r;
-    for (size_t p = 0; p < n; p++) {
-        vicinity *x = &f->near[p];
-        uint32_t weight[NEAR] = {UINT32_MAX};
-        x->patch[0] = (uint32_t)p, x->n = 1;
-        for (size_t i = 0; i < npairs; i++) {
-            if (pair[i][0] != p && pair[i][1] != p) continue;
-            size_t at = x->n < NEAR ? x->n++ : shared[i] > weight[NEAR - 1] ? NEAR - 1 : NEAR;
-            for (; at < NEAR && at > 1 && shared[i] > weight[at - 1]; at--)
-                weight[at] = weight[at - 1], x->patch[at] = x->patch[at - 1];
-            if (at < NEAR) weight[at] = shared[i], x->patch[at] = pair[i][0] ^ pair[i][1] ^ (uint32_t)p;
-        }
-    }
+    for (size_t p = 0; p < n; p++) f->near[p] = (vicinity){.n = 1, .patch = {(uint32_t)p}};
+    for (size_t i = 0; i < npairs; i++)
+        for (int k = 0; k < 2; k++) come_near(&f->near[pair[i][k]], pair[i][1 - k], shared[i]);
     memset(f->owner, 0xff, g->nv * sizeof *f->owner);
     for (size_t p = n; p-- > 0;)
         for (size_t i = f->shape.first[p]; i < f->shape.first[p + 1]; i++) f->owner[f->shape.member[i]] = (uint32_t)p;
@@ -236,7 +236,7 @@ typedef struct adding {
     vg_map_fitter *f;
     const double *poses[VGI_LANES];
     size_t lanes;
-    const vgi_motion *motion; /* lanes x patches */
+    vgi_motion *motion; /* lanes x patches */
 } adding;
 
 static void measure_patch(void *context, size_t p)
@@ -244,7 +244,7 @@ static void measure_patch(void *context, size_t p)
     const adding *a = context;
     size_t n = a->f->shape.n;
     for (size_t k = 0; k < a->lanes; k++)
-        vgi_shape_measure(&a->f->shape, p, a->poses[k], (vgi_motion *)&a->motion[k * n + p]);
+        vgi_shape_measure(&a->f->shape, p, a->poses[k], &a->motion[k * n + p]);
 }
 
 /* to += A' x */
