@@ -7,6 +7,7 @@
 #include "model/sets.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 
 enum {
@@ -152,7 +153,9 @@ typedef struct clustering {
     size_t nmoved;
     double *sums;          /* per chunk of faces */
     uint32_t *sizes;
-    float *products;       /* a chunk's, per chunk of faces: CHUNK x most */
+    float *products;       /* per worker: CHUNK x most */
+    size_t workers;
+    atomic_size_t next;    /* first chunk nobody has taken */
     size_t most, changed;
     uint32_t *chunk_changed;
     const float *fresh;    /* the centre that was added last */
@@ -226,10 +229,10 @@ static void add_centre(clustering *c, size_t face)
     vgi_parallel(c->s->threads, chunks(c), near_chunk, c);
 }
 
-/* k-means++ (Arthur and Vassilvitskii 2007). Goes on from the centres that are there. */
+/* k-means++ (Arthur and Vassilvitskii 2007). */
 static void seed_centres(clustering *c, size_t k, uint64_t seed)
 {
-    if (c->k == 0) add_centre(c, (size_t)(mix(seed) % c->n));
+    add_centre(c, (size_t)(mix(seed) % c->n));
     while (c->k < k) {
         double sum = add_up(c), share = (double)(mix(seed ^ mix(c->k)) >> 11) * 0x1p-53;
         if (!(sum > 0)) break; /* every face turns like one of the centres */
@@ -239,11 +242,9 @@ static void seed_centres(clustering *c, size_t k, uint64_t seed)
     }
 }
 
-static void assign_chunk(void *context, size_t i)
+static void assign_chunk(clustering *c, size_t i, float *dot)
 {
-    clustering *c = context;
     size_t first = i * CHUNK, n = c->n - first < CHUNK ? c->n - first : CHUNK, width = c->s->width;
-    float *dot = c->products + i * CHUNK * c->most;
     vgi_product_single_transposed(n, c->k, width, c->s->feature + first * width, width, c->centre, width, dot,
                                   c->most);
     double sum = 0;
@@ -262,6 +263,13 @@ static void assign_chunk(void *context, size_t i)
         sum += (double)c->nearest[first + f];
     }
     c->sums[i] = sum, c->chunk_changed[i] = changed;
+}
+
+static void assign_chunks(void *context, size_t worker)
+{
+    clustering *c = context;
+    for (size_t i; (i = atomic_fetch_add(&c->next, 1)) < chunks(c);)
+        assign_chunk(c, i, c->products + worker * CHUNK * c->most);
 }
 
 static void mean_stripe(void *context, size_t i)
@@ -326,7 +334,8 @@ static size_t iterate(clustering *c, double *objective)
         for (size_t k = 0; k < c->k; k++)
             c->centre_norm[k] = inner(c->centre + k * c->s->width, c->centre + k * c->s->width, c->s->width);
         int blas = vgi_product_begin();
-        vgi_parallel(c->s->threads, chunks(c), assign_chunk, c);
+        atomic_store(&c->next, 0);
+        vgi_parallel(c->s->threads, c->workers, assign_chunks, c);
         vgi_product_end(blas);
         *objective = add_up(c);
         c->changed = 0;
@@ -365,6 +374,7 @@ static int make_clustering(clustering *c, const vg_segmenter *s, size_t most, vg
 {
     size_t n = s->turns.nf;
     *c = (clustering){.s = s, .n = n, .most = most};
+    c->workers = (size_t)s->threads < chunks(c) ? (size_t)s->threads : chunks(c);
     c->label = vgi_array(n, sizeof *c->label, e);
     c->nearest = vgi_array(n, sizeof *c->nearest, e);
     c->norm = vgi_array(n, sizeof *c->norm, e);
@@ -375,7 +385,7 @@ static int make_clustering(clustering *c, const vg_segmenter *s, size_t most, vg
     c->moved = vgi_array_raw(n, sizeof *c->moved, e);
     c->sums = vgi_array(chunks(c), sizeof *c->sums, e);
     c->sizes = vgi_array(most, sizeof *c->sizes, e);
-    c->products = vgi_array_raw(chunks(c) * CHUNK, most * sizeof *c->products, e);
+    c->products = vgi_array_raw(c->workers * CHUNK, most * sizeof *c->products, e);
     c->chunk_changed = vgi_array(chunks(c), sizeof *c->chunk_changed, e);
     if (!c->label || !c->nearest || !c->norm || !c->centre || !c->centre_norm || !c->total || !c->counted ||
         !c->moved || !c->sums || !c->sizes || !c->products || !c->chunk_changed) {
