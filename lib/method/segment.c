@@ -1,10 +1,11 @@
 /* segment.c: faces that turn alike, by K-means over their rotations (T 6.2), and patches that hang together.
- * Leaves out how the rotation of a face is measured (rotation_fit.c), and what hangs together (pieces.c).
+ * Leaves out how the rotation of a face is measured (rotation_fit.c), what hangs together (pieces.c), and which pieces
+ * are joined (join.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/join.h"
 #include "method/pieces.h"
 #include "method/product.h"
 #include "method/rotation_fit.h"
-#include "model/sets.h"
 
 #include <math.h>
 #include <stdatomic.h>
@@ -402,88 +403,38 @@ static int make_clustering(clustering *c, const vg_segmenter *s, size_t most, vg
 
 /* ---- pieces ---- */
 
-/* Joining pieces: the pair of neighbours whose union costs the least (Ward 1963),
- * until `k` are left or none has a neighbour. */
-typedef struct joining {
-    const vg_segmenter *s;
-    size_t n;           /* pieces at the start */
-    double *mean;       /* n x width */
-    double *size;
-    uint32_t *set;
-    uint32_t (*pair)[2];
-    double *cost;       /* of a pair */
-    size_t npairs;
-} joining;
-
-static double cost_of(const joining *j, uint32_t a, uint32_t b)
-{
-    double square = 0;
-    const double *x = j->mean + a * j->s->width, *y = j->mean + b * j->s->width;
-    for (size_t i = 0; i < j->s->width; i++) square += (x[i] - y[i]) * (x[i] - y[i]);
-    return square * j->size[a] * j->size[b] / (j->size[a] + j->size[b]);
-}
-
-static void join_pieces(joining *j, size_t k)
-{
-    for (size_t left = j->n; left > k && j->npairs; left--) {
-        size_t best = 0, width = j->s->width;
-        for (size_t i = 1; i < j->npairs; i++)
-            if (j->cost[i] < j->cost[best]) best = i;
-        uint32_t a = j->pair[best][0], b = j->pair[best][1];
-        double sum = j->size[a] + j->size[b];
-        for (size_t i = 0; i < width; i++)
-            j->mean[a * width + i] =
-                (j->size[a] * j->mean[a * width + i] + j->size[b] * j->mean[b * width + i]) / sum;
-        j->size[a] = sum;
-        vgi_sets_join(j->set, a, b); /* a < b stays the name of both */
-        size_t n = 0;
-        for (size_t i = 0; i < j->npairs; i++) {
-            uint32_t x = vgi_sets_find(j->set, j->pair[i][0]), y = vgi_sets_find(j->set, j->pair[i][1]);
-            if (x == y) continue;
-            bool touched = x == a || y == a;
-            j->pair[n][0] = x < y ? x : y, j->pair[n][1] = x < y ? y : x;
-            j->cost[n] = touched ? cost_of(j, x, y) : j->cost[i];
-            n++;
-        }
-        j->npairs = n;
-    }
-}
-
+/* Patches in one piece each: pieces of the same label, joined with neighbours that turn alike until k are left. */
 static int connect(const vg_segmenter *s, uint32_t *label, size_t nlabels, size_t k, size_t *count, vg_err *e)
 {
     const vg_mesh *m = s->mesh;
-    joining j = {.s = s};
-    uint32_t *piece = vgi_array_raw(m->nf, sizeof *piece, e), *shared = NULL;
+    size_t width = s->width;
+    vgi_joining j = {.width = width};
+    uint32_t *piece = vgi_array_raw(m->nf, sizeof *piece, e), *shared = NULL, *set = NULL;
     if (!piece) return VG_ENOMEM;
     int r = vgi_connected_pieces(m->nv, m->nf, m->start, m->vert, label, nlabels, piece, &j.n, e);
     if (r == VG_OK) r = vgi_neighbours(m->nv, m->nf, m->start, m->vert, piece, &j.pair, &shared, &j.npairs, e);
     if (r == VG_OK) {
-        j.mean = vgi_array(j.n, s->width * sizeof *j.mean, e), j.size = vgi_array(j.n, sizeof *j.size, e);
-        j.set = vgi_array_raw(j.n, sizeof *j.set, e), j.cost = vgi_array(j.npairs, sizeof *j.cost, e);
-        if (!j.mean || !j.size || !j.set || !j.cost) r = VG_ENOMEM;
+        j.mean = vgi_array(j.n, width * sizeof *j.mean, e), j.size = vgi_array(j.n, sizeof *j.size, e);
+        set = vgi_array_raw(j.n, sizeof *set, e);
+        if (!j.mean || !j.size || !set) r = VG_ENOMEM;
     }
     if (r == VG_OK) {
-        vgi_sets_init(j.set, j.n);
         for (size_t f = 0; f < m->nf; f++) {
             j.size[piece[f]]++;
-            for (size_t i = 0; i < s->width; i++)
-                j.mean[piece[f] * s->width + i] += (double)s->feature[f * s->width + i];
+            for (size_t i = 0; i < width; i++) j.mean[piece[f] * width + i] += (double)s->feature[f * width + i];
         }
-        for (size_t p = 0; p < j.n; p++)
-            for (size_t i = 0; i < s->width; i++) j.mean[p * s->width + i] /= j.size[p];
-        for (size_t i = 0; i < j.npairs; i++) j.cost[i] = cost_of(&j, j.pair[i][0], j.pair[i][1]);
-        join_pieces(&j, k);
-        for (size_t f = 0; f < m->nf; f++) label[f] = vgi_sets_find(j.set, piece[f]);
-        r = vgi_connected_pieces(m->nv, m->nf, m->start, m->vert, label, j.n, piece, count, e);
-        if (r == VG_OK) memcpy(label, piece, m->nf * sizeof *label);
+        for (size_t i = 0; i < j.n * width; i++) j.mean[i] /= j.size[i / width];
+        r = vgi_join_pieces(&j, k, set, e);
     }
+    for (size_t f = 0; r == VG_OK && f < m->nf; f++) label[f] = set[piece[f]];
+    if (r == VG_OK) r = vgi_connected_pieces(m->nv, m->nf, m->start, m->vert, label, j.n, piece, count, e);
+    if (r == VG_OK) memcpy(label, piece, m->nf * sizeof *label);
     free(piece);
     free(shared);
+    free(set);
     free(j.pair);
     free(j.mean);
     free(j.size);
-    free(j.set);
-    free(j.cost);
     return r;
 }
 

@@ -1,8 +1,9 @@
 /* test_segment.c: rotations nearest to matrices; patches of bars that turn in known pieces; pieces; threads.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
-#include "method/rotation_fit.h"
+#include "method/join.h"
 #include "method/pieces.h"
+#include "method/rotation_fit.h"
 
 static void turn_about(const double axis[3], double angle, double m[9])
 {
@@ -183,5 +184,61 @@ static void sectors_meet(void)
     vg_head_clear(&h);
 }
 
+/* What the sum of squared distances of members from their means grows by when two sets are joined: from the members. */
+static double growth(const double *x, const double *count, const uint32_t *set, size_t n, uint32_t a, uint32_t b)
+{
+    double square[3] = {0, 0, 0};
+    for (int which = 0; which < 3; which++) { /* a, b, both */
+        double mean[2] = {0, 0}, sum = 0;
+        for (int pass = 0; pass < 2; pass++)
+            for (size_t i = 0; i < n; i++) {
+                if (!(which != 1 && set[i] == a) && !(which != 0 && set[i] == b)) continue;
+                if (pass == 0) sum += count[i];
+                for (size_t k = 0; k < 2; k++) {
+                    double d = x[2 * i + k] - mean[k] / sum;
+                    if (pass == 0) mean[k] += count[i] * x[2 * i + k];
+                    else square[which] += count[i] * d * d;
+                }
+            }
+    }
+    return square[2] - square[0] - square[1];
+}
+
+/* On a graph by chance of some parts: the pieces are those that trying all pairs again after each union gives. */
+static void joins_are_the_cheapest(void)
+{
+    enum { N = 40, PAIRS = 90 };
+    for (int trial = 0; trial < 20; trial++) {
+        double x[2 * N], mean[2 * N], count[N], size[N];
+        uint32_t pair[PAIRS][2], truth[N], set[N];
+        vg_err e;
+        vgi_joining j = {.n = N, .width = 2, .mean = mean, .size = size, .pair = pair};
+        for (size_t i = 0; i < N; i++) count[i] = size[i] = 1 + floor(3 * (noise() + 1)), truth[i] = (uint32_t)i;
+        for (size_t i = 0; i < 2 * N; i++) x[i] = mean[i] = noise();
+        for (uint32_t b = 1; b < N; b++) /* no pair joins what is left and right of 8 */
+            for (uint32_t a = 0; a < b; a++)
+                if (j.npairs < PAIRS && (a < 8) == (b < 8) && noise() > 0.8)
+                    pair[j.npairs][0] = a, pair[j.npairs++][1] = b;
+        size_t left = N, want = trial < 2 ? 1 : 2 + (size_t)trial, all = j.npairs;
+        uint32_t kept[PAIRS][2];
+        memcpy(kept, pair, sizeof kept);
+        for (;;) {
+            uint32_t best[2] = {0, 0};
+            double least = INFINITY;
+            for (size_t p = 0; p < all && left > want; p++) {
+                uint32_t a = truth[kept[p][0]], b = truth[kept[p][1]];
+                double cost = a != b ? growth(x, count, truth, N, a, b) : INFINITY;
+                if (cost < least) least = cost, best[0] = a < b ? a : b, best[1] = a < b ? b : a;
+            }
+            if (!(least < INFINITY)) break;
+            for (size_t i = 0; i < N; i++)
+                if (truth[i] == best[1]) truth[i] = best[0];
+            left--;
+        }
+        CHECK(vgi_join_pieces(&j, want, set, &e) == VG_OK);
+        for (size_t i = 0; i < N; i++) CHECK(set[i] == truth[i]);
+    }
+}
+
 TESTS({"nearest rotations", nearest_rotations}, {"thirds of a strip", thirds}, {"pieces and neighbours", pieces},
-      {"sectors of a fan meet", sectors_meet})
+      {"sectors of a fan meet", sectors_meet}, {"joins are the cheapest", joins_are_the_cheapest})
