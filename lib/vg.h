@@ -437,6 +437,11 @@ void vg_quat_between(const double r[3], const double d[3], double q[4]);
 
 /* ---------------------------------------------------------------------------------------------- method -- */
 
+/* vg_threads_with_room: how many threads, `most` at most, may multiply matrices in the address space that is left to
+ * the process; 0: not even one. OpenBLAS does not return, ever, when it is refused the memory it works in, so ask this
+ * before. */
+int vg_threads_with_room(int most);
+
 /* vg_select_faces: fewer faces that still determine the mesh (T 3.2, Algorithm 1), completed so that every vertex
  * that is in a face stays in one and every component stays connected. *faces (ascending, caller frees with free())
  * and *n. */

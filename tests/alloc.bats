@@ -77,3 +77,20 @@ each() {
 @test "memory runs out: vg-view" {
     each 'vg-view poses.vgs --against poses.zip -o out.png' 'vg-view poses.vgs -o out.html'
 }
+
+@test "little address space: fewer threads, or status 4, but no waiting" {
+    [ "${CONFIG:-release}" = release ] || skip "sanitizers take all address space"
+    local kilobytes=40000 tried=0 solved=0
+    until bash -c "ulimit -v $kilobytes && exec vg-info poses.vgs" >/dev/null 2>&1; do kilobytes=$((kilobytes + 10000)); done
+    for ((; kilobytes < 1000000; kilobytes += kilobytes / 6)); do
+        for command in 'vg-solve vectors.vgs -o out.vgs' 'vg-fitmap -q --patches patches.vgs poses.vgs -o out.vgs' \
+            'vg-deform --map map.vgs poses.vgs -o out.vgs' 'vg-segment -k 2 -j 8 poses.vgs -o out.vgs'; do
+            capture timeout 20 bash -c "ulimit -v $kilobytes && exec $command"
+            [ "$status" = 0 ] || { [ "$status" = 4 ] && one_line && [ ! -e out.vgs ]; } || fail "$kilobytes: '$command': status $status"
+            [ "$status" = 4 ] || solved=$((solved + 1))
+            tried=$((tried + 1))
+            rm -f out.vgs
+        done
+    done
+    [ "$solved" -gt 0 ] && [ "$solved" -lt "$tried" ]
+}
