@@ -745,6 +745,8 @@ class _Reader:
         s.kind, s.precision = KINDS[kind], precision
         if s.map and len(s.map.corners) not in (0, 4 * s.map.per_corner * sum(map(len, s.graph()))):
             p.fail("the corners of record MAP do not fit the mesh")
+        if s.map and s.map.kind == "patches" and (s.patches is None or s.patches[0] != len(s.map.centre) // 3):
+            p.fail("record MAP has not as many patches as record PTCH")
         if s.reference is None and (s.mesh is not None or s.kind != "transforms"):
             p.fail("a MESH and a REFP record must come before it")
         if s.kind != "transforms":

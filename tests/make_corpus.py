@@ -838,6 +838,8 @@ def reject_attachments():
         "map-held-vertex": patched(map_content(), "MAP ", -12, u32(4)),
         "map-joint-itself": patched(map_content(), "MAP ", -24, u32(1)),
         "map-corners-of-another-graph": whole(dict(map_content(), selection=[0])),
+        "map-of-other-patches": whole(dict(map_content(), patches={"count": 3, "of_face": [0, 1]})),
+        "map-of-patches-without-them": whole(dict(map_content(), patches=None)),
         "map-without-mesh": whole(content(mesh=None, reference=None, kind="transforms", count=0, frames=[], map=map_content()["map"])),
         "corr-cut": lie(r, "CORR", payload=lambda record: record.payload[:-8]),
         "corr-long": lie(r, "CORR", payload=lambda record: record.payload + bytes(8)),

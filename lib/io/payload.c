@@ -255,6 +255,8 @@ static const char *refuse_form(const vg_head *h)
 {
     if (h->map.ncorners && h->map.ncorners != graph_count(h, VG_VECTORS))
         return "the corners of record MAP do not fit the mesh";
+    if (h->map.n && h->map.kind == VG_MAP_PATCHES && h->map.n != h->patches.n)
+        return "record MAP has not as many patches as record PTCH";
     if (h->kind == VG_TRANSFORMS) return NULL;
     if (!h->reference) return "a MESH and a REFP record must come before it";
     if (h->kind != VG_VERTICES && !h->has_links) return "a LINK record must come before it";
