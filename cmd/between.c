@@ -10,28 +10,16 @@
 
 struct between_options between;
 
-static struct {
-    double *t;
-    size_t n;
-} at;
-
 /* ---- moments ---- */
 
-static void parse_at(const char *list)
+void between_take_at(const char *list, void *context)
 {
-    for (const char *text = list; text; at.n++) {
-        const char *comma = strchr(text, ',');
-        size_t n = comma ? (size_t)(comma - text) : strlen(text);
-        char number[64];
-        if (n >= sizeof number) cli_usage("option '--at' needs numbers with commas between, not '%s'", list);
-        memcpy(number, text, n);
-        number[n] = 0;
-        double *grown = realloc(at.t, (at.n + 1) * sizeof *grown);
-        if (!grown) cli_stop(VG_ENOMEM, "not enough memory for the list of --at");
-        at.t = grown;
-        at.t[at.n] = cli_parse_number("--at", number);
-        text = comma ? comma + 1 : NULL;
-    }
+    (void)context;
+    size_t most = strlen(list) / 2 + 1;
+    free(between.at);
+    between.at = cli_allocate(most, sizeof *between.at, "the list of --at");
+    between.count = cli_parse_numbers(list, between.at, most);
+    if (!between.count) cli_usage("option '--at' needs numbers with commas between, not '%s'", list);
 }
 
 bool between_wanted(void)
@@ -39,21 +27,14 @@ bool between_wanted(void)
     return between.frames || between.at;
 }
 
-void between_check(void)
-{
-    if (between.frames && between.at) cli_usage("--interpolate and --at exclude one another");
-    if (between.smooth && !between_wanted()) cli_usage("--smooth needs --interpolate or --at");
-    if (between.at) parse_at(between.at);
-}
-
 size_t between_count(void)
 {
-    return between.at ? at.n : (size_t)between.frames;
+    return between.at ? between.count : (size_t)between.frames;
 }
 
 double between_moment(size_t i, size_t keys)
 {
-    if (between.at) return at.t[i];
+    if (between.at) return between.at[i];
     size_t n = between_count();
     return n < 2 ? 0 : (double)i * (double)(keys - 1) / (double)(n - 1);
 }

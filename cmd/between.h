@@ -8,12 +8,13 @@
 
 extern struct between_options {
     long frames;    /* --interpolate; 0: not given */
-    const char *at; /* --at; NULL: not given */
+    double *at;     /* --at; NULL: not given */
+    size_t count;   /* of at */
     bool smooth;
 } between;
 
-/* between_check: parse --at; wrong usage ends the program. To be called after cli_start. */
-void between_check(void);
+/* between_take_at: "0,0.5,1" into between.at; to be given to cli_option. */
+void between_take_at(const char *list, void *context);
 /* between_wanted: is --interpolate or --at there? */
 bool between_wanted(void);
 /* between_count, between_moment: how many moments are asked for, and number i of them, in keys (0: the first) when

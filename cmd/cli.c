@@ -247,6 +247,7 @@ size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands)
     signal(SIGXFSZ, SIG_IGN); /* a file size limit is a failed write, with a message */
     *operands = cli_allocate((size_t)argc, sizeof **operands, "the operands");
     size_t n = options_parse(argc, argv, *operands);
+    for (size_t i = 0; i < n; i++) cli_claim_input(NULL, (*operands)[i]);
     if (p->writes_stream || p->writes_text || p->writes_file) output_check(p->writes_stream);
     widen_pipe(STDIN_FILENO);
     widen_pipe(STDOUT_FILENO);
@@ -254,6 +255,28 @@ size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands)
 }
 
 /* ----------------------------------------------------------------------------------------------- input -- */
+
+static char input_is_for[64]; /* what reads standard input; empty: nothing yet */
+
+void cli_claim_input(const char *option, const char *operand)
+{
+    char what[sizeof input_is_for];
+    if (strcmp(operand, "-")) return;
+    snprintf(what, sizeof what, "%s%s", option ? "--" : "", option ? option : "the input");
+    if (!strcmp(input_is_for, what)) cli_usage("standard input can be read only once: two operands are '-'");
+    if (*input_is_for) cli_usage("standard input can be read only once, not for %s and %s", input_is_for, what);
+    memcpy(input_is_for, what, sizeof what);
+}
+
+void cli_expect_input(size_t operands)
+{
+    static bool expected;
+    if (operands || expected) return;
+    expected = true;
+    cli_claim_input(NULL, "-");
+    if (isatty(STDIN_FILENO))
+        cli_usage("no input: name a stream, mesh file, archive or directory, or pipe one into %s", cli.program->name);
+}
 
 vg_source *cli_source(char **operands, size_t n)
 {
@@ -266,8 +289,7 @@ vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o
     const char *const *from = n ? (const char *const *)operands : standard_input;
     vg_source *s = NULL;
     vg_err e;
-    if (n == 0 && isatty(STDIN_FILENO))
-        cli_usage("no input: name a stream, mesh file, archive or directory, or pipe one into %s", cli.program->name);
+    cli_expect_input(n);
     if (vg_source_open_with(&s, from, n ? n : 1, o, &e) < 0) cli_die(&e);
     if (vg_source_warning(s)) cli_warn("%s", vg_source_warning(s));
     return upstream = s;

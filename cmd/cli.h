@@ -24,6 +24,9 @@ typedef struct cli_option {
     void (*take)(const char *value, void *context); /* repeated or structured options; dies by cli_usage */
     void *context;
     double least, most; /* for number and integer; both 0: any */
+    bool reads;         /* text is the name of an input: "-" is standard input */
+    const char *needs;  /* "a|b": one of these options must be there, too; NULL: none */
+    const char *excludes; /* "a|b": none of these may be; said of one option of a pair */
 } cli_option;
 
 typedef struct cli_program {
@@ -53,6 +56,16 @@ extern struct cli_state {
  * Returns the number of operands and where they are. Repairs descriptors 0 to 2, resets SIGPIPE. */
 size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands);
 
+/* cli_given: was this option on the command line? */
+bool cli_given(const char *name);
+/* cli_claim_input: the operand is going to be read, for an option (NULL: as the input). If it is standard input, and
+ * that is to be read for something else, too, this is wrong usage. Operands and options that say `reads` are claimed
+ * by cli_start. */
+void cli_claim_input(const char *option, const char *operand);
+/* cli_expect_input: with no operands, standard input is the input; wrong usage when it is a terminal. cli_source does
+ * it; before it, programs that read something else first. */
+void cli_expect_input(size_t operands);
+
 /* cli_die: one line "PROGRAM: MESSAGE" on standard error, leave nothing half-written, exit by the code. If a stream
  * is being written, it says in a FAIL record who failed. */
 void cli_die(const vg_err *e) __attribute__((noreturn));
@@ -75,6 +88,8 @@ void cli_progress(const char *label, uint64_t n);
 
 /* cli_parse_number: the whole text as a finite number, or cli_usage naming the option. */
 double cli_parse_number(const char *option, const char *text);
+/* cli_parse_numbers: "1,2.5,-3" to at most `most` numbers; how many, 0: it is something else. */
+size_t cli_parse_numbers(const char *text, double *x, size_t most);
 /* cli_parse_size: "4096", "64K", "2G" to bytes, UINT64_MAX when that is more, or cli_usage naming the option. */
 uint64_t cli_parse_size(const char *option, const char *text);
 /* cli_parse_vertices: "3,17,4" to an ascending list without repetition (free with free()), or cli_usage. */
@@ -104,6 +119,8 @@ void cli_discard_by(void (*discard)(void));
 FILE *cli_text_open(void);
 void cli_text_end(void);
 
+/* cli_same_output: would what is written to these two names be one file? */
+bool cli_same_output(const char *a, const char *b);
 /* cli_redirect: what is opened next goes to `file` ("-" or NULL: standard output), which is looked at now. For a
  * program that writes a stream and a report, one after the other. */
 void cli_redirect(const char *file, bool stream);

@@ -55,23 +55,10 @@ void mapped_take_edit(const char *text, void *context)
 
 bool mapped_needs_input(size_t operands)
 {
-    return operands > 0 || !mapped.nedits;
-}
-
-void mapped_check(const char *others)
-{
-    if (!mapped.map) {
-        if (mapped.nedits) cli_usage("--edit needs --map");
-        if (mapped.align) cli_usage("--align needs --map");
-        if (mapped.live) cli_usage("--live needs --map");
-        if (mapped.joints) cli_usage("--joints needs --map");
-        if (mapped.transforms) cli_usage("--transforms needs --map");
-        return;
-    }
-    if (others) cli_usage("--%s does not go with --map", others);
-    if (between.smooth) cli_usage("--smooth does not go with --map");
-    if (mapped.live && between_wanted())
-        cli_usage("--live does not go with --interpolate and --at, which need all keys first");
+    if (operands > 0 || !mapped.nedits) return true;
+    if (between_wanted()) cli_usage("--interpolate and --at need the poses between which they are");
+    if (mapped.align) cli_usage("--align is for a skeleton that comes in, and there is no input");
+    return false;
 }
 
 static void load_map(playback *p)

@@ -14,10 +14,8 @@ extern struct mapped_options {
 
 /* mapped_take_edit: 'BONE AXIS ANGLE'; to be given to cli_option. */
 void mapped_take_edit(const char *text, void *context);
-/* mapped_check: wrong usage ends the program. `others`: an option of another job was given.
- * To be called after cli_start. */
-void mapped_check(const char *others);
-/* mapped_needs_input: false when edits of the reference pose are all there is, with `operands` of them. */
+/* mapped_needs_input: false when edits of the reference pose are all there is, with so many operands. Options that
+ * need an input all the same are wrong usage. */
 bool mapped_needs_input(size_t operands);
 /* mapped_run: the whole job, from the input's head to the end of the output. s may be NULL unless it needs input. */
 void mapped_run(vg_source *s);

@@ -45,14 +45,32 @@ static bool applies(const cli_program *p, shared_use use)
     }
 }
 
-/* All options of p, its own first; returns how many. */
-static size_t gather_options(const cli_program *p, const cli_option *all[MOST_OPTIONS])
+/* All options of the program, its own first, and which of them were given. */
+static struct {
+    size_t n;
+    const cli_option *at[MOST_OPTIONS];
+    bool given[MOST_OPTIONS];
+} known;
+
+static void gather_options(const cli_program *p)
 {
-    size_t n = 0;
-    for (const cli_option *o = p->options; o && o->name && n < MOST_OPTIONS; o++) all[n++] = o;
-    for (size_t i = 0; i < sizeof shared_options / sizeof *shared_options && n < MOST_OPTIONS; i++)
-        if (applies(p, shared_options[i].use)) all[n++] = &shared_options[i].option;
-    return n;
+    known.n = 0;
+    for (const cli_option *o = p->options; o && o->name && known.n < MOST_OPTIONS; o++) known.at[known.n++] = o;
+    for (size_t i = 0; i < sizeof shared_options / sizeof *shared_options && known.n < MOST_OPTIONS; i++)
+        if (applies(p, shared_options[i].use)) known.at[known.n++] = &shared_options[i].option;
+    memset(known.given, 0, sizeof known.given);
+}
+
+static bool is_given(const char *name, size_t n)
+{
+    for (size_t i = 0; i < known.n; i++)
+        if (known.given[i] && strlen(known.at[i]->name) == n && !memcmp(known.at[i]->name, name, n)) return true;
+    return false;
+}
+
+bool cli_given(const char *name)
+{
+    return is_given(name, strlen(name));
 }
 
 static int option_text(const cli_option *o, char *to, size_t n)
@@ -63,19 +81,19 @@ static int option_text(const cli_option *o, char *to, size_t n)
 }
 
 /* An option that is too long for the column has its explanation on a line of its own. */
-static void print_help(const cli_program *p, const cli_option *const *all, size_t n)
+static void print_help(const cli_program *p)
 {
     char text[128];
     int width = 0;
-    for (size_t i = 0; i < n; i++) {
-        int w = option_text(all[i], text, sizeof text);
+    for (size_t i = 0; i < known.n; i++) {
+        int w = option_text(known.at[i], text, sizeof text);
         if (w > width && w <= HELP_COLUMN) width = w;
     }
     printf("usage: %s %s\n%s\n\n", p->name, p->synopsis, p->summary);
-    for (size_t i = 0; i < n; i++) {
-        bool fits = option_text(all[i], text, sizeof text) <= width;
+    for (size_t i = 0; i < known.n; i++) {
+        bool fits = option_text(known.at[i], text, sizeof text) <= width;
         if (!fits) printf("%s\n", text);
-        printf("%-*s  %s\n", width, fits ? text : "", all[i]->help);
+        printf("%-*s  %s\n", width, fits ? text : "", known.at[i]->help);
     }
 }
 
@@ -113,15 +131,15 @@ static bool in_range(const cli_option *o, double x)
     return (o->least == 0 && o->most == 0) || (x >= o->least && x <= o->most);
 }
 
-/* "a|b|c" as "'a', 'b' or 'c'" */
-static void list_choices(const char *choices, char *to, size_t size)
+/* "a|b|c" as "'a', 'b' or 'c'", or with dashes before each instead of the quotes */
+static void list_words(const char *words, bool options, char *to, size_t size)
 {
     size_t at = 0;
     to[0] = 0;
-    for (const char *p = choices; *p && at < size;) {
+    for (const char *p = words; *p && at < size;) {
         size_t n = strcspn(p, "|");
-        const char *before = p == choices ? "" : p[n] ? ", " : " or ";
-        at += (size_t)snprintf(to + at, size - at, "%s'%.*s'", before, (int)n, p);
+        const char *before = p == words ? "" : p[n] ? ", " : " or ";
+        at += (size_t)snprintf(to + at, size - at, options ? "%s--%.*s" : "%s'%.*s'", before, (int)n, p);
         p += n + (p[n] != 0);
     }
 }
@@ -136,12 +154,14 @@ static size_t choose(const cli_option *o, const char *value)
         p += n + 1;
     }
     char all[200];
-    list_choices(o->value, all, sizeof all);
+    list_words(o->value, false, all, sizeof all);
     cli_usage("option '--%s' needs %s, not '%s'", o->name, all, value);
 }
 
-static void take_option(const cli_option *o, const char *value)
+static void take_option(size_t number, const char *value)
 {
+    const cli_option *o = known.at[number];
+    known.given[number] = true;
     if (o->choice) *o->choice = choose(o, value);
     if (o->flag) {
         *o->flag = true;
@@ -162,12 +182,13 @@ static void take_option(const cli_option *o, const char *value)
 
 enum { LONG_BASE = 256 }; /* getopt's value of option i is LONG_BASE + i, whether it has a letter or not */
 
-static const cli_option *find_option(const cli_option *const *all, size_t n, int value)
+/* The number of the option that getopt means; known.n: none. */
+static size_t find_option(int value)
 {
-    if (value >= LONG_BASE) return (size_t)(value - LONG_BASE) < n ? all[value - LONG_BASE] : NULL;
-    for (size_t i = 0; i < n; i++)
-        if (value && all[i]->letter == value) return all[i];
-    return NULL;
+    if (value >= LONG_BASE) return (size_t)(value - LONG_BASE);
+    size_t i = 0;
+    while (i < known.n && !(value && known.at[i]->letter == value)) i++;
+    return i;
 }
 
 /* The least number of letters to insert, drop, replace or swap with a neighbour that makes `text` of `name`. */
@@ -194,48 +215,49 @@ static size_t edit_distance(const char *text, size_t n, const char *name)
 }
 
 /* The option that was meant, most likely: the nearest, unless a third of it or more would be wrong. */
-static const cli_option *likely_option(const cli_option *const *all, size_t n, const char *text, size_t length)
+static const cli_option *likely_option(const char *text, size_t length)
 {
     const cli_option *likely = NULL;
     size_t least = length / 3 + 1;
-    for (size_t i = 0; i < n; i++) {
-        size_t d = edit_distance(text, length, all[i]->name);
-        if (d < least) least = d, likely = all[i];
+    for (size_t i = 0; i < known.n; i++) {
+        size_t d = edit_distance(text, length, known.at[i]->name);
+        if (d < least) least = d, likely = known.at[i];
     }
     return likely;
 }
 
 /* What getopt did not like, in our words. */
-static void refuse_option(const cli_option *const *all, size_t n, int problem, char **argv) __attribute__((noreturn));
-static void refuse_option(const cli_option *const *all, size_t n, int problem, char **argv)
+static void refuse_option(int problem, char **argv) __attribute__((noreturn));
+static void refuse_option(int problem, char **argv)
 {
-    const cli_option *o = find_option(all, n, optopt);
+    size_t number = find_option(optopt);
+    const cli_option *o = number < known.n ? known.at[number] : NULL;
     if (problem == ':' && o) cli_usage("option '--%s' needs a value: %s", o->name, o->value);
     if (o) cli_usage("option '--%s' takes no value", o->name);
     if (optopt) cli_usage("unknown option '-%c': '%s --help' lists them", optopt, cli.program->name);
     const char *text = argv[optind - 1];
     int length = (int)strcspn(text, "=");
     const cli_option *first = NULL, *second = NULL;
-    for (size_t i = 0; i < n; i++)
-        if (length > 2 && !strncmp(all[i]->name, text + 2, (size_t)length - 2)) *(first ? &second : &first) = all[i];
+    for (size_t i = 0; i < known.n; i++)
+        if (length > 2 && !strncmp(known.at[i]->name, text + 2, (size_t)length - 2)) *(first ? &second : &first) = known.at[i];
     if (second)
         cli_usage("ambiguous option '%.*s': it could be '--%s' or '--%s'", length, text, first->name, second->name);
-    if (length > 2 && (o = likely_option(all, n, text + 2, (size_t)length - 2)))
+    if (length > 2 && (o = likely_option(text + 2, (size_t)length - 2)))
         cli_usage("unknown option '%.*s': did you mean '--%s'?", length, text, o->name);
     cli_usage("unknown option '%.*s': '%s --help' lists them", length, text, cli.program->name);
 }
 
 /* Operands are collected in order, options may stand between them; what follows "--" are operands. */
-static size_t parse(const cli_option *const *all, size_t n, int argc, char **argv, char **operands)
+static size_t parse(int argc, char **argv, char **operands)
 {
     struct option longs[MOST_OPTIONS + 1] = {{0}};
     char letters[2 * MOST_OPTIONS + 4] = "-:";
     size_t at = strlen(letters), count = 0;
-    for (size_t i = 0; i < n; i++) {
-        int takes = all[i]->value ? required_argument : no_argument;
-        longs[i] = (struct option){all[i]->name, takes, NULL, LONG_BASE + (int)i};
-        if (all[i]->letter) letters[at++] = all[i]->letter;
-        if (all[i]->letter && all[i]->value) letters[at++] = ':';
+    for (size_t i = 0; i < known.n; i++) {
+        int takes = known.at[i]->value ? required_argument : no_argument;
+        longs[i] = (struct option){known.at[i]->name, takes, NULL, LONG_BASE + (int)i};
+        if (known.at[i]->letter) letters[at++] = known.at[i]->letter;
+        if (known.at[i]->letter && known.at[i]->value) letters[at++] = ':';
     }
     letters[at] = 0;
     opterr = 0;
@@ -243,27 +265,56 @@ static size_t parse(const cli_option *const *all, size_t n, int argc, char **arg
         if (c == 1)
             operands[count++] = optarg;
         else if (c == '?' || c == ':')
-            refuse_option(all, n, c, argv);
+            refuse_option(c, argv);
         else
-            take_option(find_option(all, n, c), optarg);
+            take_option(find_option(c), optarg);
         if (want_help || want_version) return 0;
     }
     while (optind < argc) operands[count++] = argv[optind++];
     return count;
 }
 
+static void check_needs(const cli_option *o)
+{
+    char names[200];
+    for (const char *p = o->needs; p; p = p[strcspn(p, "|")] ? p + strcspn(p, "|") + 1 : NULL)
+        if (is_given(p, strcspn(p, "|"))) return;
+    list_words(o->needs, true, names, sizeof names);
+    cli_usage("--%s needs %s", o->name, names);
+}
+
+static void check_excludes(const cli_option *o)
+{
+    for (const char *p = o->excludes; p; p = p[strcspn(p, "|")] ? p + strcspn(p, "|") + 1 : NULL)
+        if (is_given(p, strcspn(p, "|")))
+            cli_usage("--%s does not go with --%.*s", o->name, (int)strcspn(p, "|"), p);
+}
+
+/* Do the options that were given stand together? */
+static void check_together(void)
+{
+    for (size_t i = 0; i < known.n; i++) {
+        const cli_option *o = known.at[i];
+        if (!known.given[i]) continue;
+        if (o->needs) check_needs(o);
+        check_excludes(o);
+        if (o->reads && o->text) cli_claim_input(o->name, *o->text);
+    }
+}
+
 size_t options_parse(int argc, char **argv, char **operands)
 {
     const cli_program *p = cli.program;
-    const cli_option *all[MOST_OPTIONS];
-    size_t nall = gather_options(p, all), n = parse(all, nall, argc, argv, operands);
-    if (want_help) print_help(p, all, nall);
+    gather_options(p);
+    size_t n = parse(argc, argv, operands);
+    if (want_help) print_help(p);
     if (want_version && !want_help) printf("%s (vg) %s\nstream 1.0\n", p->name, VG_VERSION);
     if (want_help || want_version) cli_finish(0);
     if (n > p->most_operands) {
         if (p->most_operands == 0) cli_usage("%s takes no operands, but got '%s'", p->name, operands[0]);
         cli_usage("one operand too many: '%s'", operands[p->most_operands]);
     }
+    check_together();
     cli.threads = threads_asked ? (int)threads_asked : processors_count(MOST_THREADS);
     if (p->threaded && !(cli.threads = vg_threads_with_room(cli.threads)))
         cli_stop(VG_ENOMEM, "not enough memory to calculate: is there a limit, such as ulimit -v?");
@@ -284,6 +335,21 @@ double cli_parse_number(const char *option, const char *text)
     double x;
     if (!parse_number(text, &x)) cli_usage("option '--%s' needs a number, not '%s'", bare(option), text);
     return x;
+}
+
+size_t cli_parse_numbers(const char *text, double *x, size_t most)
+{
+    for (size_t n = 0; n < most; n++) {
+        char one[64];
+        size_t length = strcspn(text, ",");
+        if (length >= sizeof one) return 0;
+        memcpy(one, text, length);
+        one[length] = 0;
+        if (!parse_number(one, &x[n])) return 0;
+        if (!text[length]) return n + 1;
+        text += length + 1;
+    }
+    return 0;
 }
 
 uint64_t cli_parse_size(const char *option, const char *text)

@@ -74,29 +74,29 @@ static void die_writing(int error)
     cli_stop(VG_ESYS, "cannot write to %s: %s", out.shown, strerror(error));
 }
 
-static bool ends_with(const char *s, size_t n, const char *suffix)
+static bool ends_with_one(const char *name, const char *const *suffixes)
 {
-    size_t k = strlen(suffix);
-    return n > k && !strncasecmp(s + n - k, suffix, k);
+    size_t n = strlen(name);
+    for (; *suffixes; suffixes++) {
+        size_t k = strlen(*suffixes);
+        if (n > k && !strcasecmp(name + n - k, *suffixes)) return true;
+    }
+    return false;
 }
 
 /* Names that promise something else than a stream: better said before an hour of work than after it. */
 static bool names_picture(const char *name)
 {
-    return ends_with(name, strlen(name), ".png") || ends_with(name, strlen(name), ".html");
+    static const char *const pictures[] = {".png", ".html", ".htm", NULL};
+    return ends_with_one(name, pictures);
 }
 
 static bool names_meshes(const char *name)
 {
-    static const char *const suffixes[] = {".obj", ".ply", ".off", ".stl", ".glb", ".gltf", ".pc2", ".mdd", ".npy",
-        ".npz", ".bvh", ".fbx", ".dae", ".abc", ".usd", ".zip", ".7z", ".tar", ".tgz", ".tar.gz", ".tar.xz",
-        ".tar.zst", ".tar.bz2"};
-    size_t n = strlen(name);
-    const char *colon = strrchr(name, ':'); /* "out.zip:ply" */
-    for (size_t i = 0; i < sizeof suffixes / sizeof *suffixes; i++)
-        if (ends_with(name, n, suffixes[i]) || (colon && ends_with(name, (size_t)(colon - name), suffixes[i])))
-            return true;
-    return false;
+    static const char *const foreign[] = {".fbx", ".dae", ".abc", ".usd", ".usdc", ".usdz", NULL};
+    struct stat st;
+    bool exists = !stat(name, &st) && !S_ISREG(st.st_mode); /* a directory, a pipe: what it is goes before its name */
+    return (!exists && vg_sink_check(name, &(vg_sink_options){0}, NULL) == VG_OK) || ends_with_one(name, foreign);
 }
 
 /* The directory that holds `path`, with a final slash or empty; returns where the last component starts. */
@@ -190,6 +190,19 @@ static void close_output(void)
     }
     out.fd = -1;
     out.text = NULL;
+}
+
+bool cli_same_output(const char *a, const char *b)
+{
+    struct stat s, t;
+    bool there = !stat(a, &s);
+    if (there != !stat(b, &t)) return false;
+    if (there) return S_ISREG(s.st_mode) && s.st_dev == t.st_dev && s.st_ino == t.st_ino;
+    char of_a[PATH_MAX], of_b[PATH_MAX];
+    if (strlen(a) >= PATH_MAX || strlen(b) >= PATH_MAX) return false;
+    if (strcmp(split_path(a, of_a), split_path(b, of_b))) return false;
+    return !stat(*of_a ? of_a : ".", &s) && !stat(*of_b ? of_b : ".", &t) && s.st_dev == t.st_dev &&
+           s.st_ino == t.st_ino;
 }
 
 void cli_redirect(const char *file, bool stream)

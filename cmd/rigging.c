@@ -19,16 +19,14 @@ bool rigging_wanted(void)
 
 static bool by_skinning(void)
 {
-    return rigging.method_choice == VG_RIG_LBS;
+    return rigging.method == VG_RIG_LBS;
 }
 
-void rigging_check(void)
+void rigging_take_root(const char *text, void *context)
 {
-    if (rigging.skeleton && rigging.groups)
-        cli_usage("--skeleton and --groups are two ways to say where the bones are: give one");
-    if (rigging.method && !rigging_wanted()) cli_usage("--method needs --skeleton or --groups");
-    if (rigging.learn && !rigging.skeleton) cli_usage("--learn needs --skeleton");
-    if (rigging.root_at && !rigging.skeleton) cli_usage("--root-at needs --skeleton");
+    (void)context;
+    rigging.has_root = cli_parse_numbers(text, rigging.root_at, 3) == 3;
+    if (!rigging.has_root) cli_usage("option '--root-at' needs X,Y,Z, not '%s'", text);
 }
 
 /* ---- what is at hand ---- */
@@ -176,18 +174,6 @@ static void read_skeleton(work *w)
     vg_source_close(&s);
 }
 
-static void parse_point(const char *text, double at[3])
-{
-    char *copy = strdup(text), *rest = copy;
-    if (!copy) cli_stop(VG_ENOMEM, "not enough memory for an option");
-    for (int k = 0; k < 3; k++) {
-        char *word = strsep(&rest, ",");
-        if (!word || (k == 2 && rest)) cli_usage("--root-at is 'X,Y,Z', not '%s'", text);
-        at[k] = cli_parse_number("--root-at", word);
-    }
-    free(copy);
-}
-
 /* The root to where the user says, all joints along. */
 static void move_root(const vg_skeleton *s, const double *at, double *positions)
 {
@@ -250,7 +236,7 @@ static void place_skeleton(work *w)
     vg_err e;
     const motion *m = &w->given;
     size_t joints = m->skeleton.njoints;
-    double *positions = room(3 * joints, sizeof *positions), *turns = room(4 * joints, sizeof *turns), at[3];
+    double *positions = room(3 * joints, sizeof *positions), *turns = room(4 * joints, sizeof *turns);
     bool known = m->n == w->total && !rigging.learn;
     vg_skeleton_pose(&m->skeleton, NULL, positions, turns);
     if (!known && !rigging.learn && m->n > 1)
@@ -262,12 +248,11 @@ static void place_skeleton(work *w)
         size_t frame = known ? (size_t)w->reference : 0;
         memcpy(positions, m->positions + 3 * joints * frame, 3 * joints * sizeof *positions);
         memcpy(turns, m->turns + 4 * joints * frame, 4 * joints * sizeof *turns);
-    } else if (known && !rigging.root_at) {
+    } else if (known && !rigging.has_root) {
         locate_root(w, positions);
     }
-    if (rigging.root_at) {
-        parse_point(rigging.root_at, at);
-        move_root(&m->skeleton, at, positions);
+    if (rigging.has_root) {
+        move_root(&m->skeleton, rigging.root_at, positions);
     } else if (!known && m->n > 1) {
         cli_warn("the root of the skeleton is taken to be at its offset, %g %g %g, in the reference pose: --root-at "
                  "says otherwise",

@@ -7,17 +7,17 @@
 
 extern struct rigging_options {
     const char *skeleton, *groups; /* NULL: not given */
-    const char *root_at, *method;
-    size_t method_choice; /* a vg_rig_method */
-    bool learn;
+    double root_at[3];
+    bool has_root, learn;
+    size_t method; /* a vg_rig_method */
     long bones_per_corner;
     double refine;
 } rigging;
 
 /* rigging_wanted: is --skeleton or --groups there? */
 bool rigging_wanted(void);
-/* rigging_check: wrong usage ends the program. To be called after cli_start. */
-void rigging_check(void);
+/* rigging_take_root: "X,Y,Z" into rigging.root_at; to be given to cli_option. */
+void rigging_take_root(const char *text, void *context);
 /* rigging_run: the fit, into the head of s: hold: share of the vertices; holdout: every so manieth pose is left out,
  * 0: none. */
 void rigging_run(vg_source *s, double hold, long holdout);

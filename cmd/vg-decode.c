@@ -2,6 +2,8 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 
+#include <string.h>
+
 static vg_sink_options sink_options;
 static long first_number, most_targets;
 static const char *output; /* not cli.output, which is NULL for "-" as for none */
@@ -44,6 +46,8 @@ int main(int argc, char **argv)
     sink_options.first_number = first_number, sink_options.most_targets = (size_t)most_targets;
     if (!output) cli_usage("name the output: -o poses.zip, -o 'pose-%%04d.obj', or -o poses/");
     if (vg_sink_check(output, &sink_options, &e) < 0) cli_die(&e);
+    if (cli_given("first-number") && !strchr(output, '%'))
+        cli_usage("--first-number is for files with numbers, such as 'pose-%%04d.obj': '%s' has none", output);
 
     vg_source *s = cli_source(operands, n);
     cli_discard_by(discard);

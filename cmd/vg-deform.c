@@ -7,40 +7,43 @@
 #include <string.h>
 
 static struct {
-    const char *onto, *correspondence, *by, *root, *pin;
+    const char *onto, *correspondence, *root;
     size_t by_choice, pin_choice; /* of enum by and enum pin */
 } opts;
 
 static const cli_option options[] = {
     {"onto", 0, "MESH", "apply to this mesh and write its vectors; without it, write the deformations",
-     .text = &opts.onto},
+     .text = &opts.onto, .reads = true},
     {"correspondence", 0, "FILE", "the target has another connectivity: what vg-register found",
-     .text = &opts.correspondence},
-    {"by", 0, "pose|shape|gradient|blend", "what is carried over (default pose)", .text = &opts.by,
-     .choice = &opts.by_choice},
+     .text = &opts.correspondence, .reads = true, .needs = "onto"},
+    {"by", 0, "pose|shape|gradient|blend", "what is carried over (default pose)",
+     .choice = &opts.by_choice, .needs = "onto"},
     {"root", 0, "centroid|stay|V",
-     "where the body goes: as the centroid does (default), nowhere, or as vertex V does", .text = &opts.root},
+     "where the body goes: as the centroid does (default), nowhere, or as vertex V does", .text = &opts.root,
+     .needs = "onto"},
     {"pin", 0, "auto|always|none",
-     "hold what does not move in the source: where it is much of the mesh (default), ...", .text = &opts.pin,
-     .choice = &opts.pin_choice},
+     "hold what does not move in the source: where it is much of the mesh (default), ...",
+     .choice = &opts.pin_choice, .needs = "onto"},
     {"interpolate", 0, "N", "write N poses, evenly from the first pose of the input to the last",
-     .integer = &between.frames, .least = 1, .most = 1e9},
+     .integer = &between.frames, .least = 1, .most = 1e9, .excludes = "at"},
     {"at", 0, "T,...", "write the poses at these moments: 0 is the first pose, 1 the second; outside is extrapolated",
-     .text = &between.at},
-    {"smooth", 0, NULL, "let velocities not jump at the poses that are interpolated", .flag = &between.smooth},
+     .take = between_take_at},
+    {"smooth", 0, NULL, "let velocities not jump at the poses that are interpolated", .flag = &between.smooth,
+     .needs = "interpolate|at"},
     {"map", 0, "MAP", "write the vertices that this map, made by vg-fitmap, gives to motions of patches or bones",
-     .text = &mapped.map},
+     .text = &mapped.map, .reads = true, .excludes = "onto|smooth"},
     {"edit", 0, "EDIT",
      "with --map: turn a bone, 'BONE x|y|z|twist DEGREES'; may be repeated; without input, of the reference pose",
-     .take = mapped_take_edit},
+     .take = mapped_take_edit, .needs = "map"},
     {"align", 0, NULL,
      "with --map: the skeleton that comes in rests in another pose than the rig: make its limbs point alike",
-     .flag = &mapped.align},
+     .flag = &mapped.align, .needs = "map"},
     {"joints", 0, NULL, "with --map: only rotations and scales count; joints say where patches and bones are",
-     .flag = &mapped.joints},
+     .flag = &mapped.joints, .needs = "map"},
     {"transforms", 0, NULL, "with --map: write the motions of the patches or bones, not vertices",
-     .flag = &mapped.transforms},
-    {"live", 0, NULL, "with --map: write each frame at once, before the next is read", .flag = &mapped.live},
+     .flag = &mapped.transforms, .needs = "map"},
+    {"live", 0, NULL, "with --map: write each frame at once, before the next is read", .flag = &mapped.live,
+     .needs = "map", .excludes = "interpolate|at"},
     {.name = NULL}};
 
 static const cli_program program = {
@@ -84,13 +87,13 @@ typedef struct work {
 
 static void parse_options(work *w)
 {
-    const struct { const char *name, *value; } need_onto[] = {
-        {"root", opts.root}, {"by", opts.by}, {"correspondence", opts.correspondence}, {"pin", opts.pin}};
-    for (size_t i = 0; i < 4; i++)
-        if (need_onto[i].value && !opts.onto) cli_usage("--%s needs --onto", need_onto[i].name);
     w->by = (by)opts.by_choice;
     if (w->by == BY_SHAPE && opts.correspondence)
         cli_usage("--by shape needs one connectivity: it takes no --correspondence");
+    if (w->by == BY_SHAPE && opts.pin_choice == PIN_ALWAYS)
+        cli_usage("--pin holds vertices while vg-solve looks for the others: --by shape finds all of them itself");
+    if (opts.onto && between_wanted())
+        cli_usage("--onto takes poses as they are: pipe those of --interpolate and --at into it");
 }
 
 /* ---- where the body goes ---- */
@@ -250,6 +253,8 @@ static void make_followers(work *w)
     vg_err e;
     const vg_head *h = w->h;
     const vg_correspondence *pairs = opts.correspondence ? &w->pairs.correspondence : NULL;
+    if (opts.pin_choice == PIN_ALWAYS && w->kind != VG_VERTICES)
+        cli_usage("--pin needs a sequence of vertices, this one holds %s", vg_kind_name(w->kind));
     bool pins = w->kind == VG_VERTICES && (w->way == TRANSFER || w->way == CARRY) && opts.pin_choice != PIN_NONE;
     int r = VG_OK;
     if (opts.onto)
@@ -338,14 +343,10 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     static work w; /* lives until the end: what it holds goes with the process */
     parse_options(&w);
-    between_check();
-    if (between_wanted() && opts.onto)
-        cli_usage("--onto takes poses as they are: pipe those of --interpolate and --at into it");
-    mapped_check(opts.onto ? "onto" : NULL);
+    bool reads = mapped_needs_input(n);
+    if (reads) cli_expect_input(n);
     load_target(&w);
-    if (mapped.map && between_wanted() && !mapped_needs_input(n))
-        cli_usage("--interpolate and --at need the poses between which they are");
-    if (!mapped.map || mapped_needs_input(n)) w.s = cli_source(operands, n);
+    if (reads) w.s = cli_source(operands, n);
     if (mapped.map) {
         mapped_run(w.s);
         cli_finish(0);

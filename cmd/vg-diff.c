@@ -21,7 +21,7 @@ static const cli_option options[] = {
     {.name = "tolerance", .letter = 't', .value = "X", .help = "exit 1 when the error exceeds X, in units of D",
      .number = &opts.tolerance, .least = 0, .most = INFINITY},
     {.name = "of", .value = "mean|rms|p95|max", .help = "the error it is about (default: max)",
-     .text = &opts.of, .choice = &opts.which},
+     .text = &opts.of, .choice = &opts.which, .needs = "tolerance"},
     {.name = "centred", .letter = 'c', .help = "move the centroid of every pose to 0 before comparing",
      .flag = &opts.centred},
     {.name = "frames", .help = "list the error of every frame", .flag = &opts.frames},
@@ -391,14 +391,12 @@ static void parse_options(int argc, char **argv, char ***operands)
 {
     size_t n = cli_start(&program, argc, argv, operands);
     if (n < 2) cli_usage("two sequences are needed: TRUTH and RESULT");
-    if (!strcmp((*operands)[0], "-") && !strcmp((*operands)[1], "-"))
-        cli_usage("only one of the two sequences can be standard input");
     report_file = cli.output;
     if (!opts.heat && cli.no_provenance) cli_usage("--no-provenance is about the stream that --heat writes");
     if (!opts.heat) return;
     if (replaces_report() && (cli.json || opts.frames))
         cli_usage("option '--%s' is about the report, which needs a file: -o FILE", cli.json ? "json" : "frames");
-    if (report_file && !strcmp(opts.heat, report_file))
+    if (report_file && cli_same_output(opts.heat, report_file))
         cli_usage("'%s' cannot be both the stream and the report", report_file);
     cli_redirect(opts.heat, true); /* what is wrong with the name is told now */
     cli_redirect(report_file, false);

@@ -16,9 +16,10 @@ static const cli_option options[] = {
     {"vectors", 0, NULL, "write the vectors of the vector graph instead of vertices", .flag = &opts.vectors},
     {"faces", 0, "all|selected", "which faces carry vectors: all (default), or about half of them",
      .choice = &opts.faces},
-    {"reference", 0, "MESH", "the undeformed pose; default: the first pose", .text = &opts.reference},
+    {"reference", 0, "MESH", "the undeformed pose; default: the first pose", .text = &opts.reference,
+     .reads = true},
     {"mesh", 0, "MESH", "the faces and reference pose of point caches and arrays, which hold none",
-     .text = &opts.mesh},
+     .text = &opts.mesh, .reads = true},
     {"max-bytes", 0, "SIZE", "what an archive or compressed file may unpack to (default: 1G in one file, 64G in all)",
      .text = &opts.most_bytes},
     {"anchor", 0, "V,V,...", "vertices that vg-solve must meet exactly", .text = &opts.anchors},
@@ -67,6 +68,14 @@ static void set_anchors(vg_head *h, uint32_t *anchors, size_t n)
     h->anchors = anchors, h->nanchors = n;
 }
 
+static void select_all_faces(vg_head *h)
+{
+    free(h->selected);
+    free(h->links);
+    h->has_selection = h->has_links = false;
+    h->selected = NULL, h->nselected = 0, h->links = NULL, h->nlinks = 0;
+}
+
 static void select_faces(vg_head *h)
 {
     vg_err e;
@@ -88,6 +97,7 @@ static void prepare(vg_head *h, bool selects, uint32_t *anchors, size_t nanchors
     } else {
         if (opts.reference) set_reference(h, opts.reference);
         if (selects) select_faces(h);
+        else if (cli_given("faces")) select_all_faces(h);
         if (opts.anchors) set_anchors(h, anchors, nanchors);
     }
     if (opts.f32) h->precision = VG_F32;

@@ -10,32 +10,35 @@ static struct {
     const char *patches, *retarget;
     long holdout;
     double hold, morph;
-} opts = {.hold = 0.03, .morph = NAN};
+} opts = {.hold = 0.03, .morph = 1};
 
 static const cli_option options[] = {
-    {"patches", 0, "FILE", "the patches: what vg-segment wrote; default: those of the input", .text = &opts.patches},
+    {"patches", 0, "FILE", "the patches: what vg-segment wrote; default: those of the input", .text = &opts.patches,
+     .reads = true, .excludes = "skeleton|groups"},
     {"skeleton", 0, "FILE", "a skeleton drives the mesh: BVH, a stream of it, or lines of text",
-     .text = &rigging.skeleton},
+     .text = &rigging.skeleton, .reads = true, .excludes = "groups"},
     {"groups", 0, "FILE", "a skeleton drives the mesh: each joint is the mean of some of its vertices",
-     .text = &rigging.groups},
+     .text = &rigging.groups, .reads = true},
     {"learn", 0, NULL, "with --skeleton: find its motion from the poses, whatever motion it comes with",
-     .flag = &rigging.learn},
-    {"root-at", 0, "X,Y,Z", "with --skeleton: where its root is in the reference pose", .text = &rigging.root_at},
+     .flag = &rigging.learn, .needs = "skeleton"},
+    {"root-at", 0, "X,Y,Z", "with --skeleton: where its root is in the reference pose",
+     .take = rigging_take_root, .needs = "skeleton"},
     {"method", 0, "envelope|lbs",
-     "with a skeleton: vectors and held vertices (default), or linear blend skinning alone", .text = &rigging.method,
-     .choice = &rigging.method_choice},
+     "with a skeleton: vectors and held vertices (default), or linear blend skinning alone",
+     .choice = &rigging.method, .needs = "skeleton|groups"},
     {"bones-per-corner", 0, "N", "with a skeleton: how many bones drive a corner, 1 or 2 (default 2)",
-     .integer = &rigging.bones_per_corner, .least = 1, .most = 2},
+     .integer = &rigging.bones_per_corner, .least = 1, .most = 2, .needs = "skeleton|groups"},
     {"refine", 0, "RIDGE",
      "with a skeleton: the ridge with which bones take up what is left (default 0.003; 0: they do not)",
-     .number = &rigging.refine, .least = 0, .most = 1e6},
+     .number = &rigging.refine, .least = 0, .most = 1e6, .needs = "skeleton|groups"},
     {"holdout", 0, "N", "leave every Nth pose out of the fit, and report the error there", .integer = &opts.holdout,
      .least = 2, .most = 1000000000},
     {"hold", 0, "SHARE", "of the vertices, those that go where their patch or bones take them (default 0.03)",
      .number = &opts.hold, .least = 0, .most = 1},
     {"retarget", 0, "MESH", "no fit: bring the map that is the input to this body of the same faces",
-     .text = &opts.retarget},
-    {"morph", 0, "T", "with --retarget: how far on the way to that body (default 1)", .number = &opts.morph},
+     .text = &opts.retarget, .reads = true, .excludes = "patches|skeleton|groups|holdout|hold"},
+    {"morph", 0, "T", "with --retarget: how far on the way to that body (default 1)", .number = &opts.morph,
+     .needs = "retarget"},
     {.name = NULL}};
 
 static const cli_program program = {
@@ -226,7 +229,7 @@ static void retarget(vg_source *s)
     if (!h->map.n) cli_stop(VG_EINPUT, "the input holds no map: make one with vg-fitmap");
     if (vg_load_mesh(&target, opts.retarget, &e) < 0 ||
         vg_mesh_same(&h->mesh, "the map", &target.mesh, name, &e) < 0 ||
-        vg_map_retarget(h, target.reference, isnan(opts.morph) ? 1 : opts.morph, cli.threads, &e) < 0 ||
+        vg_map_retarget(h, target.reference, opts.morph, cli.threads, &e) < 0 ||
         vg_head_merge_trace(h, &target, &e) < 0)
         cli_die(&e);
     free(h->reference_name);
@@ -246,12 +249,6 @@ int main(int argc, char **argv)
 {
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
-    if (!isnan(opts.morph) && !opts.retarget) cli_usage("--morph needs --retarget");
-    rigging_check();
-    if (opts.patches && rigging_wanted()) cli_usage("patches or bones drive a map: --patches does not go with --%s",
-                                                    rigging.skeleton ? "skeleton" : "groups");
-    if (opts.retarget && (opts.patches || opts.holdout || rigging_wanted()))
-        cli_usage("--retarget fits nothing: no --patches, --skeleton, --groups and --holdout with it");
     vg_source *s = cli_source(operands, n);
     if (opts.retarget) retarget(s);
     else fit(s);

@@ -15,11 +15,13 @@ static struct {
 } opts;
 
 static const cli_option options[] = {
-    {.name = "check", .help = "read everything and only say whether it is whole", .flag = &opts.check},
+    {.name = "check", .help = "read everything and only say whether it is whole", .flag = &opts.check,
+     .excludes = "digest|frames|weights"},
     {.name = "digest", .help = "only print a fingerprint of the content: 16 hexadecimal digits",
-     .flag = &opts.digest},
-    {.name = "frames", .help = "list the frames", .flag = &opts.frames},
-    {.name = "weights", .help = "only print the skinning weights of a rig, a vertex per line", .flag = &opts.weights},
+     .flag = &opts.digest, .excludes = "frames|weights"},
+    {.name = "frames", .help = "list the frames", .flag = &opts.frames, .excludes = "weights"},
+    {.name = "weights", .help = "only print the skinning weights of a rig, a vertex per line", .flag = &opts.weights,
+     .excludes = "json"},
     {0},
 };
 
@@ -549,9 +551,6 @@ int main(int argc, char **argv)
     char **operands;
     contents c = {0};
     size_t n = cli_start(&program, argc, argv, &operands);
-    if (opts.check + opts.digest + opts.frames + opts.weights > 1)
-        cli_usage("only one of --check, --digest, --frames and --weights can be asked for");
-    if (opts.weights && cli.json) cli_usage("--weights is text: leave out --json");
     vg_source *s = cli_source(operands, n);
     report *r = report_new(), *list = opts.frames ? report_new() : NULL;
     read_all(s, &c, list);

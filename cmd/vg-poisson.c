@@ -22,11 +22,12 @@ typedef struct key {
 static struct {
     size_t nkeys;
     key *keys;
-    double memory;
-} opts = {.memory = 256.0 * (1 << 20)};
+    uint64_t memory; /* bytes */
+} opts = {.memory = 256 << 20};
 
-static key *add_key(int by, const char *mesh)
+static key *add_key(int by, const char *option, const char *mesh)
 {
+    cli_claim_input(option, mesh);
     key *grown = realloc(opts.keys, (opts.nkeys + 1) * sizeof *grown);
     if (!grown) cli_stop(VG_ENOMEM, "not enough memory for the given poses");
     opts.keys = grown;
@@ -39,7 +40,7 @@ static void add_end(const char *mesh, int by, const char *option)
 {
     for (size_t i = 0; i < opts.nkeys; i++)
         if ((int)opts.keys[i].by == by) cli_usage("option '%s' is there twice", option);
-    add_key(by, mesh)->option = option;
+    add_key(by, option + 2, mesh)->option = option;
 }
 
 static void take_first(const char *mesh, void *context)
@@ -69,7 +70,7 @@ static void take_key(const char *text, void *context)
     (void)context;
     const char *equals = strchr(text, '=');
     if (!equals || equals == text || !equals[1]) cli_usage("option '--key' needs FRAME=MESH, not '%s'", text);
-    key *k = add_key(NAMED, equals + 1);
+    key *k = add_key(NAMED, "key", equals + 1);
     size_t n = (size_t)(equals - text);
     char *option = malloc(n + sizeof "--key ");
     if (!option || !(k->frame = strndup(text, n))) cli_stop(VG_ENOMEM, "not enough memory for the given poses");
@@ -83,7 +84,7 @@ static void take_key(const char *text, void *context)
 static void take_memory(const char *text, void *context)
 {
     (void)context;
-    opts.memory = (double)cli_parse_size("memory", text);
+    opts.memory = cli_parse_size("memory", text);
 }
 
 static const cli_option options[] = {
@@ -135,13 +136,6 @@ static void load_key(key *k, vg_head *h)
     memcpy(k->pose, f.values, 3 * h->mesh.nv * sizeof *k->pose);
     vg_frame_clear(&f);
     vg_source_close(&s);
-}
-
-static void refuse_shared_input(char **operands, size_t n)
-{
-    size_t uses = n == 0 || !strcmp(operands[0], "-");
-    for (size_t i = 0; i < opts.nkeys; i++) uses += !strcmp(opts.keys[i].mesh, "-");
-    if (uses > 1) cli_usage("standard input can be the sequence or one given pose, not more");
 }
 
 /* ---- the sequence ---- */
@@ -262,7 +256,7 @@ static void refuse_unmet(uint64_t frames)
 static void open_work(work *w)
 {
     vg_err e;
-    size_t limit = opts.memory < (double)SIZE_MAX ? (size_t)opts.memory : SIZE_MAX;
+    size_t limit = opts.memory < SIZE_MAX ? (size_t)opts.memory : SIZE_MAX;
     for (size_t i = 0; i < opts.nkeys; i++) load_key(&opts.keys[i], w->h);
     w->ahead = opts.nkeys;
     if (vg_guide_new(&w->guide, w->h->mesh.nv, &e) < 0 || vg_spool_new(&w->spool, w->h, limit, &e) < 0) cli_die(&e);
@@ -288,7 +282,6 @@ int main(int argc, char **argv)
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     if (opts.nkeys == 0) cli_usage("name at least one given pose: --first, --last or --key");
-    refuse_shared_input(operands, n);
     work w = {.s = cli_source(operands, n)};
     w.h = vg_source_head(w.s);
     if (w.h->kind != VG_VERTICES) refuse_kind("the input", w.h->kind);

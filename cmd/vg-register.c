@@ -17,22 +17,28 @@ static const cli_option options[] = {
      .letter = 'm',
      .value = "FILE",
      .help = "pairs of vertices, one a line: [NAME] SOURCE TARGET",
-     .text = &opts.markers},
+     .text = &opts.markers,
+     .reads = true},
     {.name = "index-base",
      .value = "N",
      .help = "the number of the first vertex in these files: 0 or 1 (default: 0)",
      .integer = &opts.base,
      .least = 0,
-     .most = 1},
-    {.name = "keep-all", .help = "use also markers that contradict the others", .flag = &opts.keep_all},
+     .most = 1,
+     .needs = "markers|dense|dense-source"},
+    {.name = "keep-all", .help = "use also markers that contradict the others", .flag = &opts.keep_all,
+     .needs = "markers"},
     {.name = "dense",
      .value = "FILE",
      .help = "vertices of TARGET as points of SOURCE, one a line: VERTEX A B C WA WB WC",
-     .text = &opts.dense},
+     .text = &opts.dense,
+     .reads = true,
+     .excludes = "dense-source"},
     {.name = "dense-source",
      .value = "FILE",
      .help = "the same the other way round: vertices of SOURCE as points of TARGET",
-     .text = &opts.dense_source},
+     .text = &opts.dense_source,
+     .reads = true},
     {.name = "uv", .help = "points of the same texture coordinates belong together", .flag = &opts.uv},
     {.name = "aligned",
      .help = "the two lie on one another as they are; markers are not needed",
@@ -53,7 +59,6 @@ static const cli_program program = {
 static void check_options(size_t operands)
 {
     if (operands != 2) cli_usage("two meshes are needed: SOURCE and TARGET");
-    if (opts.dense && opts.dense_source) cli_usage("only one of --dense and --dense-source can be used");
     if (!opts.markers && !opts.dense && !opts.dense_source && !opts.uv && !opts.aligned)
         cli_usage("nothing says which point belongs to which: give --markers FILE, --dense FILE, --uv, or --aligned "
                   "when the meshes lie on one another");

@@ -8,25 +8,15 @@
 static struct {
     size_t weights; /* 1: area */
     bool planar;
-    double fidelity, planarity;
-    bool planar_weights;
-} opts = {.fidelity = 0.5, .planarity = 1};
+    double planar_weights[2]; /* of the vectors, and of the planes */
+} opts = {.planar_weights = {0.5, 1}};
 
 static void take_planar_weights(const char *text, void *context)
 {
     (void)context;
-    char first[64];
-    const char *comma = strchr(text, ',');
-    size_t n = comma ? (size_t)(comma - text) : 0;
-    if (!n || n >= sizeof first)
-        cli_usage("option '--planar-weights' needs two numbers with a comma between, not '%s'", text);
-    memcpy(first, text, n);
-    first[n] = 0;
-    opts.fidelity = cli_parse_number("--planar-weights", first);
-    opts.planarity = cli_parse_number("--planar-weights", comma + 1);
-    opts.planar_weights = true;
-    if (!(opts.fidelity > 0) || !(opts.planarity >= 0))
-        cli_usage("option '--planar-weights' needs a number above 0 and one of at least 0, not '%s'", text);
+    if (cli_parse_numbers(text, opts.planar_weights, 2) != 2 || !(opts.planar_weights[0] > 0) ||
+        !(opts.planar_weights[1] >= 0))
+        cli_usage("option '--planar-weights' needs a number above 0, a comma, and one of at least 0, not '%s'", text);
 }
 
 static const cli_option options[] = {
@@ -34,7 +24,7 @@ static const cli_option options[] = {
      .choice = &opts.weights},
     {"planar", 0, NULL, "make faces of four and more corners more nearly plane", .flag = &opts.planar},
     {"planar-weights", 0, "W1,W2", "how much the vectors and how much the planes count (default: 0.5,1)",
-     .take = take_planar_weights},
+     .take = take_planar_weights, .needs = "planar"},
     {.name = NULL}};
 
 static const cli_program program = {
@@ -106,7 +96,7 @@ static void make_machine(work *w, machine *m, uint32_t *held, size_t nheld)
     vg_err e;
     *m = (machine){.held = held, .nheld = nheld};
     if (vg_solver_new(&m->solver, w->g, held, nheld, w->h->reference, w->weights, cli.threads, &e) < 0 ||
-        (opts.planar && vg_planar_new(&m->planar, m->solver, opts.fidelity, opts.planarity, &e) < 0))
+        (opts.planar && vg_planar_new(&m->planar, m->solver, opts.planar_weights[0], opts.planar_weights[1], &e) < 0))
         cli_die(&e);
     vg_solver_facts facts = vg_solver_get_facts(m->solver);
     cli_note("%zu unknowns, %zu entries in the factor, analysed in %.3f s, factorized in %.3f s", facts.unknowns,
@@ -344,7 +334,6 @@ int main(int argc, char **argv)
 {
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
-    if (opts.planar_weights && !opts.planar) cli_usage("--planar-weights needs --planar");
     work w = {.weights = opts.weights == 1 ? VG_WEIGHTS_AREA : VG_WEIGHTS_UNIFORM};
     vg_source *s = cli_source(operands, n);
     prepare(&w, vg_source_head(s));

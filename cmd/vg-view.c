@@ -3,7 +3,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 
-#include <errno.h>
+#include <math.h>
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
@@ -25,6 +25,7 @@ static void take_beside(const char *value, void *context)
     (void)context;
     if (opts.nbeside == VG_PAGE_SEQUENCES - 2) /* the result and the truth are sequences, too */
         cli_usage("option '--beside' can be given %d times, not more", VG_PAGE_SEQUENCES - 2);
+    cli_claim_input("beside", value);
     opts.beside[opts.nbeside++] = value;
 }
 
@@ -50,16 +51,17 @@ static const cli_option options[] = {
     {.name = "beside", .value = "OTHER", .take = take_beside,
      .help = "show another sequence with the same camera: beside, or in a sheet below; repeatable"},
     {.name = "patches", .value = "PATCHES", .help = "colour the faces by the patches of a stream of vg-segment",
-     .text = &opts.patches},
+     .text = &opts.patches, .reads = true},
     {.name = "title", .value = "TEXT", .help = "page: its title (default: the name of the sequence)",
      .text = &opts.title},
     {.name = "against", .value = "TRUTH", .help = "colour by the distance of each vertex from its place in TRUTH",
-     .text = &opts.against},
-    {.name = "centred", .letter = 'c', .flag = &opts.centred,
+     .text = &opts.against, .reads = true, .excludes = "scales|plain"},
+    {.name = "centred", .letter = 'c', .flag = &opts.centred, .needs = "against",
      .help = "with --against: move the centroid of every pose to 0 before comparing"},
     {.name = "scales", .flag = &opts.scales,
      .help = "colour by how much longer or shorter the vectors of each vertex are than in the reference pose"},
-    {.name = "plain", .help = "no colours, whatever the sequence brings", .flag = &opts.plain},
+    {.name = "plain", .help = "no colours, whatever the sequence brings", .flag = &opts.plain,
+     .excludes = "scales|patches|scale"},
     {.name = "scale", .value = "X", .number = &opts.scale, .least = 1e-12, .most = 1e12,
      .help = "where the colours end: an error in units of D, with --scales a factor (default: 2)"},
     {0},
@@ -100,28 +102,19 @@ static void parse_view(const char *text, vg_sheet_options *o)
             o->azimuth = views[i].azimuth, o->elevation = views[i].elevation;
             return;
         }
-    char azimuth[32];
-    size_t n = strcspn(text, ",");
-    if (!text[n] || n >= sizeof azimuth)
+    double at[2];
+    if (cli_parse_numbers(text, at, 2) != 2)
         cli_usage("option '--view' needs front, back, left, right, top, iso or AZIMUTH,ELEVATION, not '%s'", text);
-    memcpy(azimuth, text, n);
-    azimuth[n] = 0;
-    o->azimuth = cli_parse_number("view", azimuth);
-    o->elevation = cli_parse_number("view", text + n + 1);
-    if (o->azimuth < -360 || o->azimuth > 360 || o->elevation < -90 || o->elevation > 90)
+    if (fabs(at[0]) > 360 || fabs(at[1]) > 90)
         cli_usage("option '--view' needs an azimuth from -360 to 360 and an elevation from -90 to 90, not '%s'",
                   text);
+    o->azimuth = at[0], o->elevation = at[1];
 }
 
 static vg_tint choose_tint(void)
 {
-    if (opts.against && (opts.scales || opts.plain))
-        cli_usage("option '--%s' leaves no colour for --against", opts.scales ? "scales" : "plain");
-    if (opts.plain && (opts.scales || opts.patches))
-        cli_usage("option '--plain' leaves no colour for --%s", opts.scales ? "scales" : "patches");
     if (opts.scales && opts.scale > 0 && opts.scale <= 1)
         cli_usage("option '--scale' needs a factor above 1 with --scales, not %g", opts.scale);
-    if (opts.plain && opts.scale > 0) cli_usage("option '--scale' is about colours: --plain has none");
     if (opts.against) return VG_TINT_ERRORS;
     return opts.scales ? VG_TINT_SCALES : opts.plain ? VG_TINT_PLAIN : VG_TINT_SCALARS;
 }
@@ -136,7 +129,6 @@ static vg_sheet_options sheet_options(void)
     parse_size(opts.size ? opts.size : "360x360", &o);
     parse_view(opts.view, &o);
     o.z_up = opts.up == 1;
-    if (!opts.against && opts.centred) cli_usage("option '--centred' is about errors: name the truth with --against");
     return o;
 }
 
@@ -158,6 +150,8 @@ static void choose_kind(void)
     if (opts.page && (opts.frames || opts.columns || opts.size || opts.silhouettes))
         cli_usage("option '--%s' is about a sheet: the output is a page",
                   opts.frames ? "frames" : opts.columns ? "columns" : opts.size ? "size" : "silhouettes");
+    if (!opts.page && opts.patches && (opts.against || opts.scales))
+        cli_usage("a sheet has one kind of colours: leave out --patches or --%s", opts.against ? "against" : "scales");
     if (!opts.page && opts.title) cli_usage("option '--title' is about a page: use -o FILE.html");
     if (!cli.output && isatty(STDOUT_FILENO))
         cli_usage("a %s is not written to a terminal: use -o FILE.html or -o FILE.png",
@@ -173,6 +167,7 @@ typedef struct side {
     vg_head *head;
     vg_frame frame;
     size_t frames;
+    bool coloured; /* frames bring scalars */
 } side;
 
 static bool reads_standard_input(char **operands, size_t n)
@@ -225,6 +220,7 @@ static bool next(side *s)
     int r = vg_source_next(s->source, &s->frame, &e);
     if (r < 0) cli_die(&e);
     s->frames += r > 0;
+    s->coloured |= r > 0 && s->frame.has_scalars;
     return r > 0;
 }
 
@@ -312,6 +308,14 @@ static void check_counts(const cast *c)
     for (size_t i = 0; i < opts.nbeside; i++)
         if (c->compared[i] && c->beside[i].frames > c->truth.frames) refuse_count(&c->beside[i], &c->truth);
     if (c->result.frames == 0) cli_stop(VG_EINPUT, "%s has no frames: there is nothing to draw", c->result.name);
+}
+
+static void warn_scale(const cast *c)
+{
+    bool coloured = opts.against || opts.scales || c->result.coloured;
+    for (size_t i = 0; i < opts.nbeside; i++) coloured |= c->beside[i].coloured;
+    if (cli_given("scale") && !coloured)
+        cli_warn("--scale is where colours end, and there are none: the input brings no numbers of its vertices");
 }
 
 /* A stream of patches has no frames: they are shown on the reference pose. */
@@ -440,20 +444,6 @@ static void make_page(cast *c)
     note_facts(&facts);
 }
 
-/* Standard input can be read once. */
-static void check_inputs(char **operands, size_t n)
-{
-    bool input = reads_standard_input(operands, n), truth = opts.against && !strcmp(opts.against, "-");
-    bool other = false, patches = opts.patches && !strcmp(opts.patches, "-");
-    if (truth && input) cli_usage("standard input cannot be both the result and the truth");
-    for (size_t i = 0; i < opts.nbeside; i++) {
-        if (strcmp(opts.beside[i], "-")) continue;
-        if (other || input || truth) cli_usage("standard input cannot be two sequences");
-        other = true;
-    }
-    if (patches && (input || truth || other)) cli_usage("standard input cannot be both a sequence and its patches");
-}
-
 int main(int argc, char **argv)
 {
     static cast c;
@@ -461,10 +451,10 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     sheet_options(); /* what is wrong with them is told before the input is opened */
     choose_kind();
-    check_inputs(operands, n);
     open_cast(&c, operands, n);
     if (opts.page) make_page(&c);
     else make_sheet(&c);
+    warn_scale(&c);
     close_cast(&c);
     cli_finish(0);
 }

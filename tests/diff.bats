@@ -225,7 +225,7 @@ END
     must_fail 2 vg-diff a.obj
     must_fail 2 vg-diff a.obj a.obj a.obj
     must_fail 2 vg-diff - -
-    says 'only one of the two'
+    says 'standard input can be read only once'
     must_fail 2 vg-diff --of median a.obj a.obj
     says "'median'"
     must_fail 2 vg-diff -t -1 a.obj a.obj

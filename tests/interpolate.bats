@@ -168,7 +168,7 @@ END
 @test "wrong usage" {
     poses cube 2
     must_fail 2 vg-deform --interpolate 3 --at 0.5 pose1.obj
-    says "--interpolate and --at exclude one another"
+    says "--interpolate does not go with --at"
     must_fail 2 vg-deform --smooth pose1.obj
     says "--smooth needs --interpolate or --at"
     must_fail 2 vg-deform --interpolate 0 pose1.obj

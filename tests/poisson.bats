@@ -167,7 +167,7 @@ END
     is_frame t.vgs 0 c.obj
     must_fail 2 bash -c 'vg-poisson --first - --last a.obj <ba.vgs >t.vgs'
     must_fail 2 vg-poisson --first - --last - u.vgs -o t.vgs
-    says 'standard input can be the sequence or one given pose, not more'
+    says 'standard input can be read only once, not for --first and --last'
     mesh cube >cube.obj
     must_fail 3 vg-poisson --first cube.obj u.vgs -o t.vgs
     says "'cube.obj' has 8 vertices where the sequence has 12"

@@ -128,7 +128,7 @@ number() {
     must_fail 2 vg-register a.obj --aligned -o c.vgs
     says 'two meshes are needed: SOURCE and TARGET'
     must_fail 2 vg-register --dense a --dense-source b a.obj a.obj -o c.vgs
-    says 'only one of --dense and --dense-source can be used'
+    says '--dense does not go with --dense-source'
     must_fail 2 vg-register --aligned a.obj a.obj -o c.obj
     must_fail 2 vg-register --aligned --index-base 2 a.obj a.obj -o c.vgs
     nothing_but a.obj

@@ -142,10 +142,10 @@ PY
         '--plain --scales' '--plain --scale 2' '--plain --patches x' '--scales --against x' '--plain --against x'; do
         # shellcheck disable=SC2086
         must_fail 2 vg-view missing.obj -o out.png $arguments
-        says "option '"
+        says "${arguments%% *}"
     done
     must_fail 2 vg-view --against - -o out.png
-    says "both"
+    says "only once"
     must_fail 4 vg-view missing.obj -o out.png
     says "'missing.obj'"
     must_fail 4 vg-view missing.obj -o nowhere/out.png

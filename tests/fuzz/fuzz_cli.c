@@ -84,11 +84,11 @@ static void take_number(const char *value, void *context)
 
 static const cli_option options[] = {
     {"flag", 'f', NULL, "a flag", .flag = &flag},
-    {"flat", 0, NULL, "another, so that names can be ambiguous", .flag = &flag},
-    {"text", 0, "TEXT", "a text", .text = &text},
+    {"flat", 0, NULL, "another, so that names can be ambiguous", .flag = &flag, .needs = "flag|count"},
+    {"text", 0, "TEXT", "a text", .text = &text, .reads = true},
     {"number", 'n', "X", "a number", .number = &number, .least = -1, .most = 1e9},
     {"large", 0, "X", "a number without an upper end", .number = &number, .least = 1, .most = INFINITY},
-    {"count", 'c', "N", "a whole number", .integer = &integer, .least = 1, .most = 100},
+    {"count", 'c', "N", "a whole number", .integer = &integer, .least = 1, .most = 100, .excludes = "any"},
     {"any", 0, "N", "any whole number", .integer = &integer},
     {"vertices", 0, "V,V,...", "a list", .take = take, .context = &taken},
     {"factor", 0, "X", "a number by a function", .take = take_number},
@@ -125,13 +125,17 @@ static void reset(void)
     threads_asked = 0;
     number = 0, integer = 1, text = NULL;
     optind = 0; /* getopt begins anew */
+    *input_is_for = 0;
     said = 0;
 }
 
 static void check_parsed(const cli_program *p, size_t n, char **operands)
 {
     demand(n <= p->most_operands && cli.threads >= 1 && isfinite(number));
-    for (size_t i = 0; i < n; i++) demand(operands[i] != NULL);
+    size_t reads = text && !strcmp(text, "-");
+    for (size_t i = 0; i < n; i++) demand(operands[i] != NULL), reads += !strcmp(operands[i], "-");
+    demand(reads <= 1 && !(cli_given("count") && cli_given("any")));
+    demand(!cli_given("flat") || cli_given("flag") || cli_given("count"));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
