@@ -1,7 +1,7 @@
 /* measures.c: how far two sequences of one connectivity are apart: vertices; orientation, area, planarity of faces.
- * Each pose is measured by itself, several by as many threads; their sums are added in the order of the poses, so that
- * the number of threads changes no digit. Leaves out the inner loop over faces (measures_kernel.c), pairing of frames
- * and tolerances: those are vg-diff's.
+ * Each pose is measured by itself, several by as many threads; their sums are added in the order of the poses, so
+ * that the number of threads changes no digit. Leaves out the inner loop over faces (measures_kernel.c), and pairing
+ * of frames and tolerances: those are vg-diff's.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/measures_kernel.h"
 
@@ -130,7 +130,8 @@ static int classify_faces(vg_measures *x, vg_err *e)
     return r;
 }
 
-int vg_measures_new(vg_measures **out, const vg_mesh *m, const double *reference, bool centred, int threads, vg_err *e)
+int vg_measures_new(vg_measures **out, const vg_mesh *m, const double *reference, bool centred, int threads,
+                    vg_err *e)
 {
     vg_measures *x = *out = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;

@@ -1,6 +1,7 @@
 /* measures_kernel.c: the inner loop of measuring: how far the faces of two poses are apart.
- * Eight faces of one size stand side by side in the lanes of a vector, so nothing but gathering depends on where their
- * vertices are; a face that does not count is a lane of zeros. Leaves out vertices, and what becomes of the sums (measures.c).
+ * Eight faces of one size stand side by side in the lanes of a vector, so nothing but gathering depends on where
+ * their vertices are; a face that does not count is a lane of zeros. Leaves out vertices, and what becomes of the sums
+ * (measures.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/measures_kernel.h"
 
