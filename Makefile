@@ -56,7 +56,8 @@ endif
 ALL_CFLAGS += $(CFLAGS)
 # numeric kernels: the compiler may unroll and vectorise them; nothing here reorders sums
 KERNELS := $(addprefix lib/method/,deform_kernel solve_kernel carry carry_kernel planar_kernel guess_kernel reconstruct segment) lib/model/graph lib/model/measures lib/model/measures_kernel lib/core/memory
-ALL_LDFLAGS += $(LDFLAGS)
+# what a program does not call is not loaded: OpenBLAS starts threads that spin for a while as soon as it is there
+ALL_LDFLAGS += -Wl,--as-needed $(LDFLAGS)
 ALL_LIBS := $(CHOLMOD_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) -lpthread -lm $(LDLIBS)
 
 LIB_SRC := $(sort $(wildcard lib/*/*.c))
@@ -103,7 +104,11 @@ $(B)/libvg.a: $(LIB_OBJ)
 	@rm -f $@
 	$(AR) rcs $@ $^
 
-$(B)/bin/%: $(B)/cmd/%.o $(CMD_OBJ) $(B)/libvg.a
+$(B)/shared.a: $(CMD_OBJ)
+	@rm -f $@
+	$(AR) rcs $@ $^
+
+$(B)/bin/%: $(B)/cmd/%.o $(B)/shared.a $(B)/libvg.a
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(ALL_LIBS)
 
