@@ -30,7 +30,8 @@ static const cli_program program = {
     .synopsis = "[options] -o FILE [FILE]",
     .summary = "write the poses of a stream as mesh files, a directory or an archive of them",
     .options = options,
-    .most_operands = 1};
+    .most_operands = 1,
+    .threaded = true};
 
 static vg_sink *sink;
 static void discard(void)
@@ -44,6 +45,7 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_err e;
     sink_options.first_number = first_number, sink_options.most_targets = (size_t)most_targets;
+    sink_options.threads = cli.threads;
     if (!output) cli_usage("name the output: -o poses.zip, -o 'pose-%%04d.obj', or -o poses/");
     if (vg_sink_check(output, &sink_options, &e) < 0) cli_die(&e);
     if (cli_given("first-number") && !strchr(output, '%'))

@@ -984,6 +984,8 @@ typedef struct vg_sink_options {
     bool no_mesh;        /* nowhere */
     bool drop_loose;     /* leave out the vertices that are in no face */
     size_t most_targets; /* GLB, glTF: morph targets; more frames are mixed from so many. 0: 100 */
+    int threads;         /* of mesh files so many are made at a time, and one more waits: no more than 256 MiB, but two
+                            in any case, and what went wrong with one is told by a later call. 0 or 1: each at once */
 } vg_sink_options;
 /* vg_sink_check: is this a name and format that can be written? To be called before any work. */
 int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;

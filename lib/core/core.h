@@ -34,6 +34,28 @@ bool vgi_finite(const double *x, size_t n);
  * wait. Tasks are handed out in order; they must not depend on one another. With one thread it is a loop. */
 void vgi_parallel(int threads, size_t n, void (*task)(void *context, size_t i), void *context);
 
+/* A belt: things are put on it one after another, threads work on them in any order, and they are taken off in the
+ * order in which they were put. Places are numbered from 0; the things that lie there are the caller's. Memory is
+ * bounded by the number of places. One thread at a time calls what is below.
+ *
+ *     if (vgi_belt_full(b)) use(thing[vgi_belt_take(b)]);
+ *     fill(thing[vgi_belt_place(b)]);
+ *     vgi_belt_put(b);
+ */
+typedef struct vgi_belt vgi_belt;
+/* vgi_belt_new: work(context, place) is done by up to `threads` threads, the caller's among them, which works while
+ * it waits in vgi_belt_take. With one thread it is done there and nowhere else. */
+int vgi_belt_new(vgi_belt **b, int threads, size_t places, void (*work)(void *context, size_t place), void *context,
+                 vg_err *e) VG_MUST_CHECK;
+/* vgi_belt_free: waits for what is being worked on; the rest is not. */
+void vgi_belt_free(vgi_belt **b);
+size_t vgi_belt_things(const vgi_belt *b); /* how many are on it */
+bool vgi_belt_full(const vgi_belt *b);
+size_t vgi_belt_place(const vgi_belt *b);  /* where the next one goes; not when it is full */
+void vgi_belt_put(vgi_belt *b);            /* the thing at vgi_belt_place is there */
+/* vgi_belt_take: the place of the oldest, when the work on it is done; there is one. */
+size_t vgi_belt_take(vgi_belt *b);
+
 /* vgi_frame_scalars: vg_frame_scalars whose numbers are still to be set. */
 int vgi_frame_scalars(vg_frame *f, const char *name, size_t name_bytes, const char *unit, size_t unit_bytes,
                       size_t nv, vg_err *e) VG_MUST_CHECK;

@@ -13,6 +13,20 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/* A frame on its way into a mesh file: taken over, made into text, and written, by whichever thread; what goes into
+ * an archive or the one file is written in the order of the frames, when it has been taken off the belt. */
+typedef struct piece {
+    char *name;
+    double *values;
+    vg_bytes path, text;
+    int fd; /* of its file, which text is written to and which is closed then; -1: it has none of its own */
+    int result;
+    vg_err error;
+} piece;
+
+/* What may wait at a time: as many bytes, but two pieces in any case. */
+enum { MOST_WAITING = 256 << 20, TEXT_OF_VERTEX = 48 };
+
 struct vg_sink {
     vgi_plan plan;
     char *output; /* what plan.name points to */
@@ -21,11 +35,14 @@ struct vg_sink {
     uint64_t number; /* of the next file of a series */
     uint64_t frames;
     bool made_directory, ended;
-    vg_bytes text, path; /* reused */
     vgi_name_set names;  /* of frames in a directory or archive */
     vgi_targets targets;
     int fd; /* the one file or archive; -1 */
     vgi_packer *packer;
+    /* mesh files: */
+    vgi_belt *belt;      /* of pieces; NULL: no frame has come yet */
+    piece *pieces;
+    size_t npieces;
     /* a sequence: */
     vg_sink_options options;
     void *state;
@@ -64,29 +81,29 @@ static int append_unescaped(vg_bytes *path, const char *s, size_t n, vg_err *e)
     return r;
 }
 
-static int series_path(vg_sink *s, vg_err *e)
+static int series_path(const vg_sink *s, vg_bytes *path, vg_err *e)
 {
     const vgi_plan *p = &s->plan;
     char digits[24];
     size_t n = vgi_print_uint(digits, s->number);
-    s->path.size = 0;
-    int r = append_unescaped(&s->path, s->output, p->at, e);
-    for (size_t i = n; r == VG_OK && i < (size_t)p->width; i++) r = vgi_bytes_append(&s->path, "0", 1, e);
-    if (r == VG_OK) r = vgi_bytes_append(&s->path, digits, n, e);
-    if (r == VG_OK) r = append_unescaped(&s->path, s->output + p->behind, p->length - p->behind, e);
-    return r < 0 ? r : vgi_bytes_append(&s->path, "", 1, e);
+    path->size = 0;
+    int r = append_unescaped(path, s->output, p->at, e);
+    for (size_t i = n; r == VG_OK && i < (size_t)p->width; i++) r = vgi_bytes_append(path, "0", 1, e);
+    if (r == VG_OK) r = vgi_bytes_append(path, digits, n, e);
+    if (r == VG_OK) r = append_unescaped(path, s->output + p->behind, p->length - p->behind, e);
+    return r < 0 ? r : vgi_bytes_append(path, "", 1, e);
 }
 
 /* "DIR/NAME.obj"; in an archive without the directory. */
-static int named_path(vg_sink *s, const char *name, vg_err *e)
+static int named_path(const vg_sink *s, const char *name, vg_bytes *path, vg_err *e)
 {
     const char *suffix = s->plan.format->suffix;
     size_t n = s->plan.kind == VGI_PLAN_DIRECTORY ? s->plan.length : 0;
-    s->path.size = 0;
-    int r = vgi_bytes_append(&s->path, s->output, n, e);
-    if (r == VG_OK && n && s->output[n - 1] != '/') r = vgi_bytes_append(&s->path, "/", 1, e);
-    if (r == VG_OK) r = vgi_bytes_append(&s->path, name, strlen(name), e);
-    return r < 0 ? r : vgi_bytes_append(&s->path, suffix, strlen(suffix) + 1, e);
+    path->size = 0;
+    int r = vgi_bytes_append(path, s->output, n, e);
+    if (r == VG_OK && n && s->output[n - 1] != '/') r = vgi_bytes_append(path, "/", 1, e);
+    if (r == VG_OK) r = vgi_bytes_append(path, name, strlen(name), e);
+    return r < 0 ? r : vgi_bytes_append(path, suffix, strlen(suffix) + 1, e);
 }
 
 /* ---- files ---- */
@@ -97,11 +114,9 @@ static void remove_files(const vg_sink *s)
     if (s->made_directory) rmdir(s->output);
 }
 
-static int put_file(vg_sink *s, const char *path, vg_err *e)
+static int write_and_close(int fd, const vg_bytes *text, const char *path, vg_err *e)
 {
-    int fd = vgi_targets_open(&s->targets, path, e);
-    if (fd < 0) return fd;
-    int r = vgi_write_all(fd, s->text.data, s->text.size, path, e);
+    int r = vgi_write_all(fd, text->data, text->size, path, e);
     if (r < 0) return close(fd), r;
     return vgi_target_close(fd, path, e);
 }
@@ -181,10 +196,14 @@ static int put_mesh(vg_sink *s, const vg_sink_options *o, vg_err *e)
     int r = choose_mesh(s, o, e);
     if (r < 0) return r;
     if (!o->mesh && stat(s->mesh, &st) == 0) return keep_mesh(s, e);
-    s->text.size = 0;
-    r = vg_model_write(&s->text, s->mesh_format->name, &s->head->mesh, s->head->reference, &s->head->attributes,
+    vg_bytes text = {0};
+    int fd = -1;
+    r = vg_model_write(&text, s->mesh_format->name, &s->head->mesh, s->head->reference, &s->head->attributes,
                        s->full_precision, e);
-    return r < 0 ? r : put_file(s, s->mesh, e);
+    if (r == VG_OK) r = fd = vgi_targets_open(&s->targets, s->mesh, e);
+    if (r >= 0) r = write_and_close(fd, &text, s->mesh, e);
+    vg_bytes_clear(&text);
+    return r;
 }
 
 /* ---- vertices in no face ---- */
@@ -252,17 +271,17 @@ static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
 
 static int warn_of_losses(vg_sink *s, vg_err *e)
 {
-    vg_bytes line = {0};
+    vg_bytes line = {0}, text = {0};
     int r = list_losses(s, &line, e);
     if (r == VG_OK && line.size) {
-        s->text.size = 0;
-        r = vgi_bytes_append(&s->text, "not kept in '", 13, e);
-        if (r == VG_OK) r = vgi_bytes_append(&s->text, s->output, strlen(s->output), e);
-        if (r == VG_OK) r = vgi_bytes_append(&s->text, "': ", 3, e);
-        if (r == VG_OK) r = vgi_bytes_append(&s->text, line.data, line.size, e);
-        if (r == VG_OK) r = vgi_names_add(&s->warnings, (char *)s->text.data, s->text.size, e);
+        r = vgi_bytes_append(&text, "not kept in '", 13, e);
+        if (r == VG_OK) r = vgi_bytes_append(&text, s->output, strlen(s->output), e);
+        if (r == VG_OK) r = vgi_bytes_append(&text, "': ", 3, e);
+        if (r == VG_OK) r = vgi_bytes_append(&text, line.data, line.size, e);
+        if (r == VG_OK) r = vgi_names_add(&s->warnings, (char *)text.data, text.size, e);
     }
     vg_bytes_clear(&line);
+    vg_bytes_clear(&text);
     return r;
 }
 
@@ -317,25 +336,6 @@ static int more_than_one(const vg_sink *s, vg_err *e)
                    s->output, (int)n, s->output, suffix);
 }
 
-static int put_frame(vg_sink *s, const char *name, vg_err *e)
-{
-    int r;
-    switch (s->plan.kind) {
-    case VGI_PLAN_SERIES:
-        r = series_path(s, e);
-        s->number++;
-        return r < 0 ? r : put_file(s, (char *)s->path.data, e);
-    case VGI_PLAN_DIRECTORY:
-        r = named_path(s, name, e);
-        return r < 0 ? r : put_file(s, (char *)s->path.data, e);
-    case VGI_PLAN_ARCHIVE:
-        r = named_path(s, name, e);
-        return r < 0 ? r : vgi_packer_add(s->packer, (char *)s->path.data, s->text.data, s->text.size, e);
-    default: /* one file: its text waits for vg_sink_end, so that a second frame leaves nothing in a pipe */
-        return VG_OK;
-    }
-}
-
 /* Is it what a reader would call the frame that comes next, of whichever file? */
 static bool is_counted_name(const vg_sink *s, const char *name)
 {
@@ -356,6 +356,84 @@ static int put_into_sequence(vg_sink *s, const vg_frame *f, vg_err *e)
     return VG_OK;
 }
 
+/* ---- frames that become mesh files ---- */
+
+/* The work on a piece. */
+static void make_piece(void *context, size_t place)
+{
+    const vg_sink *s = context;
+    const vg_head *h = s->head;
+    piece *p = &s->pieces[place];
+    const vgi_writing w = {&h->mesh, p->values, h->reference, &h->attributes, s->full_precision, &h->patches};
+    vg_err cause;
+    p->text.size = 0;
+    p->result = vgi_model_write(&p->text, s->plan.format->name, &w, &cause);
+    if (p->result < 0) {
+        vg_fail(&p->error, p->result, "cannot write frame '%s' to '%s': %s", p->name, s->output, cause.message);
+        if (p->fd >= 0) close(p->fd);
+    } else if (p->fd >= 0) {
+        p->result = write_and_close(p->fd, &p->text, (char *)p->path.data, &p->error);
+    }
+    p->fd = -1;
+}
+
+/* Pieces wait for other threads only: a single one makes each before the next comes. */
+static int start_belt(vg_sink *s, vg_err *e)
+{
+    size_t nv = s->head->mesh.nv, room = MOST_WAITING / (3 * sizeof(double) + TEXT_OF_VERTEX) / (nv + 1);
+    int threads = s->options.threads;
+    size_t n = threads > 1 ? (size_t)threads + 1 : 1;
+    if (n > 2 && n > room) n = room < 2 ? 2 : room;
+    if (!(s->pieces = vgi_array(n, sizeof *s->pieces, e))) return VG_ENOMEM;
+    s->npieces = n;
+    for (size_t i = 0; i < n; i++) {
+        s->pieces[i].fd = -1;
+        if (!(s->pieces[i].values = vgi_array_raw(3 * nv, sizeof(double), e))) return VG_ENOMEM;
+    }
+    return vgi_belt_new(&s->belt, threads, n, make_piece, s, e);
+}
+
+static int finish_oldest(vg_sink *s, vg_err *e)
+{
+    piece *p = &s->pieces[vgi_belt_take(s->belt)];
+    if (p->result < 0 && e) *e = p->error;
+    if (p->result < 0 || s->plan.kind != VGI_PLAN_ARCHIVE) return p->result;
+    return vgi_packer_add(s->packer, (char *)p->path.data, p->text.data, p->text.size, e);
+}
+
+/* Where the piece goes. Its file is opened here, in the order of the frames. */
+static int place_piece(vg_sink *s, piece *p, vg_err *e)
+{
+    bool series = s->plan.kind == VGI_PLAN_SERIES;
+    if (s->plan.kind == VGI_PLAN_FILE)
+        return VG_OK; /* its text waits for vg_sink_end, so that a second frame leaves nothing in a pipe */
+    int r = series ? series_path(s, &p->path, e) : named_path(s, p->name, &p->path, e);
+    s->number += series;
+    if (r < 0 || s->plan.kind == VGI_PLAN_ARCHIVE) return r;
+    p->fd = vgi_targets_open(&s->targets, (char *)p->path.data, e);
+    return p->fd < 0 ? p->fd : VG_OK;
+}
+
+static int put_piece(vg_sink *s, const vg_frame *f, const char *name, vg_err *e)
+{
+    int r = s->belt ? VG_OK : start_belt(s, e);
+    if (r < 0) return r;
+    piece *p = &s->pieces[vgi_belt_place(s->belt)];
+    free(p->name);
+    if (!(p->name = vgi_copy_string(name, strlen(name), e))) return VG_ENOMEM;
+    memcpy(p->values, f->values, 3 * s->head->mesh.nv * sizeof *p->values);
+    if ((r = place_piece(s, p, e)) < 0) return r;
+    vgi_belt_put(s->belt);
+    return vgi_belt_full(s->belt) ? finish_oldest(s, e) : VG_OK;
+}
+
+static int finish_pieces(vg_sink *s, vg_err *e)
+{
+    int r = VG_OK;
+    while (r == VG_OK && s->belt && vgi_belt_things(s->belt)) r = finish_oldest(s, e);
+    return r;
+}
+
 int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
 {
     const char *name = f->name ? f->name : "";
@@ -370,14 +448,8 @@ int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
     if (kind == VGI_PLAN_SEQUENCE) return put_into_sequence(s, f, e);
     if (kind == VGI_PLAN_FILE && s->frames > 0) return more_than_one(s, e);
     if (kind == VGI_PLAN_DIRECTORY || kind == VGI_PLAN_ARCHIVE) r = take_name(s, name, e);
-    if (r < 0) return r;
-    vg_err cause;
-    s->text.size = 0;
-    const vgi_writing w = {&s->head->mesh, f->values, s->head->reference, &s->head->attributes, s->full_precision,
-                           &s->head->patches};
-    r = vgi_model_write(&s->text, s->plan.format->name, &w, &cause);
-    if (r < 0) return vg_fail(e, r, "cannot write frame '%s' to '%s': %s", name, s->output, cause.message);
-    if ((r = put_frame(s, name, e)) == VG_OK) s->frames++;
+    if (r == VG_OK) r = put_piece(s, f, name, e);
+    if (r == VG_OK) s->frames++;
     return r;
 }
 
@@ -412,12 +484,14 @@ static int end_sequence(vg_sink *s, vg_err *e)
 static int end_single(vg_sink *s, vg_err *e)
 {
     if (s->frames == 0) return no_pose(s, e);
-    return vgi_write_all(place_fd(s), s->text.data, s->text.size, place_name(s), e);
+    const vg_bytes *text = &s->pieces[0].text;
+    return vgi_write_all(place_fd(s), text->data, text->size, place_name(s), e);
 }
 
 int vg_sink_end(vg_sink *s, vg_err *e)
 {
-    int r = VG_OK;
+    int r = finish_pieces(s, e);
+    if (r < 0) return r;
     if (s->plan.kind == VGI_PLAN_SEQUENCE) r = end_sequence(s, e);
     else if (s->plan.kind == VGI_PLAN_ARCHIVE) r = vgi_packer_end(s->packer, e);
     else if (s->plan.kind == VGI_PLAN_FILE) r = end_single(s, e);
@@ -438,12 +512,27 @@ void vg_sink_discard(const vg_sink *s)
     if (s && !s->ended) remove_files(s);
 }
 
+static void clear_pieces(vg_sink *s)
+{
+    for (size_t i = 0; i < s->npieces; i++) {
+        piece *p = &s->pieces[i];
+        free(p->name);
+        free(p->values);
+        vg_bytes_clear(&p->path);
+        vg_bytes_clear(&p->text);
+        if (p->fd >= 0) close(p->fd); /* nobody came to make it */
+    }
+    free(s->pieces);
+}
+
 void vg_sink_close(vg_sink **sink)
 {
     vg_sink *s = *sink;
     if (!s) return;
+    vgi_belt_free(&s->belt);
     if (!s->ended) remove_files(s);
     *sink = NULL; /* before anything is freed: vg_sink_discard may come at any moment */
+    clear_pieces(s);
     vgi_packer_close(&s->packer);
     if (s->state) s->plan.sequence->release(s->state);
     if (s->out.fd >= 0 && s->out.fd != s->fd) close(s->out.fd);
@@ -454,8 +543,6 @@ void vg_sink_close(vg_sink **sink)
     vgi_names_clear(&s->warnings);
     vgi_slim_clear(&s->slim);
     free(s->mesh);
-    vg_bytes_clear(&s->text);
-    vg_bytes_clear(&s->path);
     free(s->output);
     free(s);
 }
