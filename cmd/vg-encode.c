@@ -1,6 +1,7 @@
 /* vg-encode: read poses from mesh files, archives, directories or streams into one stream.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
+#include "take.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +11,7 @@ static struct {
     const char *reference, *anchors, *mesh, *most_bytes;
     double fps;
     size_t faces; /* 1: selected */
+    take_list take;
 } opts;
 
 static const cli_option options[] = {
@@ -23,6 +25,8 @@ static const cli_option options[] = {
     {"max-bytes", 0, "SIZE", "what an archive or compressed file may unpack to (default: 1G in one file, 64G in all)",
      .text = &opts.most_bytes},
     {"anchor", 0, "V,V,...", "vertices that vg-solve must meet exactly", .text = &opts.anchors},
+    {"take", 0, "FRAMES", "write these frames alone, counted from 0: 12, or 3,10-20, or 0-/2 for every other",
+     .take = take_parse, .context = &opts.take},
     {"fps", 0, "N", "give the poses times, N a second, from 0", .number = &opts.fps, .least = 1e-6, .most = 1e9},
     {"f32", 0, NULL, "write binary32 instead of binary64", .flag = &opts.f32},
     {.name = NULL}};
@@ -103,14 +107,23 @@ static void prepare(vg_head *h, bool selects, uint32_t *anchors, size_t nanchors
     if (opts.f32) h->precision = VG_F32;
 }
 
+/* The next frame that is wanted: `read` of them are behind it. */
+static int next_taken(vg_source *s, vg_frame *f, uint64_t *read, vg_err *e)
+{
+    int r;
+    while ((r = vg_source_next(s, f, e)) > 0 && !take_wants(&opts.take, (*read)++)) {}
+    if (r == 0) take_end(&opts.take, *read);
+    return r;
+}
+
 static void write_as_is(vg_source *s, vg_head *h)
 {
     vg_err e;
     vg_frame f = {0};
-    uint64_t n = 0;
+    uint64_t n = 0, read = 0;
     int r;
     cli_stream_open(h);
-    for (; (r = vg_source_next(s, &f, &e)) > 0; n++) {
+    for (; (r = next_taken(s, &f, &read, &e)) > 0; n++) {
         if (opts.fps > 0) f.has_time = true, f.time = (double)n / opts.fps;
         cli_stream_put(&f);
         cli_progress("poses", n + 1);
@@ -124,13 +137,13 @@ static void write_vectors(vg_source *s, vg_head *h)
     vg_err e;
     vg_graph *g;
     vg_frame in = {0}, out = {0};
-    uint64_t n = 0;
+    uint64_t n = 0, read = 0;
     int r;
     if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&g, h, &e) < 0) cli_die(&e);
     h->kind = VG_VECTORS, h->count = vg_graph_corners(g);
     if (vg_frame_shape(&out, h, &e) < 0) cli_die(&e);
     cli_stream_open(h);
-    for (; (r = vg_source_next(s, &in, &e)) > 0; n++) {
+    for (; (r = next_taken(s, &in, &read, &e)) > 0; n++) {
         if (vg_frame_label(&out, &in, &e) < 0) cli_die(&e);
         if (opts.fps > 0) out.has_time = true, out.time = (double)n / opts.fps;
         vg_graph_vectors(g, in.values, out.values);

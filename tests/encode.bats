@@ -104,6 +104,62 @@ END
     done
 }
 
+@test "--take: frames by number, in ranges, every other one; the reference stays, times go along or are given anew" {
+    poses cube 12
+    must vg-encode --fps 10 pose1.obj pose2.obj 'pose[3-9].obj' 'pose1?.obj' -o all.vgs
+    while read -r frames expected; do
+        must vg-encode --take "$frames" all.vgs -o out.vgs
+        names out.vgs
+        [ "$output" = "$expected" ] || fail "$frames" "$output"
+        must vg-info out.vgs
+        shows "reference   pose1"
+    done <<'END'
+0 pose1
+11 pose12
+3-5 pose4 pose5 pose6
+10- pose11 pose12
+0-/4 pose1 pose5 pose9
+1-6/5,8,9- pose2 pose7 pose9 pose10 pose11 pose12
+2-4/9 pose3
+END
+    # of files, of vectors, with times
+    pipe "vg-encode --take 4- pose1.obj all.vgs | vg-encode --take 0-1 >out.vgs"
+    names out.vgs
+    [ "$output" = "pose4 pose5" ]
+    must vg-encode --vectors --take 5-6 all.vgs -o out.vgs
+    py <<'END'
+import read_stream
+a, b = read_stream.read_stream("all.vgs"), read_stream.read_stream("out.vgs")
+assert [f.time for f in b.frames] == [0.5, 0.6] and b.kind == "vectors", [f.time for f in b.frames]
+assert b.reference == a.reference
+END
+    must vg-encode --fps 4 --take 5-6 all.vgs -o out.vgs
+    py <<'END'
+import read_stream
+assert [f.time for f in read_stream.read_stream("out.vgs").frames] == [0, 0.25]
+END
+    # what stands before a frame goes with it
+    must vg-encode --take 1 "$GOLDEN/unknown-records.vgs" -o out.vgs
+    py <<'END'
+import read_stream
+s = read_stream.read_stream("out.vgs")
+assert [[x.tag for x in f.extra] for f in s.frames] == [["XNON"]] and [x.tag for x in s.tail] == ["XNOT"]
+END
+}
+
+@test "--take: what is no list of frames, or asks for a frame that is not there" {
+    poses cube 3
+    for frames in "" , 1, ,1 1,,2 a 1-a -1 2-1 2,1 1,1 0-1,1 0-,2 1/2 0-/ 0-/0 0-/-1 99999999999999999999; do
+        must_fail 2 vg-encode "--take=$frames" 'pose*.obj' -o out.vgs
+        says "needs frames like 3,10-20,30-/2"
+    done
+    for frames in 3 3- 2-3 0,7-9/9; do
+        must_fail 3 vg-encode --take "$frames" 'pose*.obj' -o out.vgs
+        says "but there are 3, counted from 0"
+    done
+    [ ! -e out.vgs ]
+}
+
 @test "--anchor is remembered, sorted and without repetition" {
     mesh cube >a.obj
     must vg-encode --anchor 5,0,5,2 a.obj -o out.vgs
