@@ -217,6 +217,15 @@ assert list(samples) == [0, 1, 2]
 x = [c for frame in samples.values() for point in frame for c in point]
 assert len(x) == 72 and all(abs(p - q) < 1e-6 for p, q in zip(x, truth))
 END
+    python3 - <<'END'
+import struct
+frames = [c for t in (0, 1, 2) for c in (t, 0, 0, t, 1, 0, t, 0, 1)]
+open('late.mdd', 'wb').write(struct.pack('>ii3f27f', 3, 3, 0.1, 0.2, 0.3, *frames)) # its first time code is known at the second frame
+END
+    printf 'v 0 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n' >late.obj
+    pipe "vg-encode late.mdd | vg-decode -o late.usda"
+    must grep -Eo '^ +[0-9.]+ *:' late.usda
+    [ "$(echo $output)" = "1 : 2: 3: 1: 2: 3:" ]
     must_fail 2 vg-decode --f64 -o wide.usda walk.vgs
     says "cannot write 'wide.usda' in full precision"
     must_fail 3 vg-encode walk.usda -o out.vgs

@@ -38,10 +38,13 @@ static int put_room(writing *x, uint64_t *off, vg_err *e)
     return vgi_output_put(x->out, blank, sizeof blank, e);
 }
 
+/* All of it: another number may have been there before. */
 static int fill_room(writing *x, uint64_t off, double number, vg_err *e)
 {
     char digits[ROOM];
-    return vgi_output_patch(x->out, off, digits, vgi_print_double(digits, number), e);
+    memset(digits, ' ', sizeof digits);
+    vgi_print_double(digits, number);
+    return vgi_output_patch(x->out, off, digits, sizeof digits, e);
 }
 
 static int put_layer(writing *x, vg_err *e)
@@ -129,7 +132,8 @@ static int settle_rate(writing *x, const vg_frame *f, vg_err *e)
     double step = f->time - x->first;
     x->rate = settled(1 / step);
     if (!(x->rate > 0 && isfinite(x->rate))) x->rate = usual_rate;
-    return fill_room(x, x->first_key_off, settled(x->first * x->rate), e);
+    x->last_key = settled(x->first * x->rate);
+    return fill_room(x, x->first_key_off, x->last_key, e);
 }
 
 /* The time code of this frame, and the start of its line. */
@@ -144,7 +148,7 @@ static int put_key(writing *x, const vg_frame *f, vg_err *e)
         if (r == VG_OK) r = fill_room(x, x->first_key_off, key, e);
     } else {
         char digits[ROOM];
-        if (x->frames > 1 && !(key > x->last_key))
+        if (!(key > x->last_key))
             return vg_fail(e, VG_EINPUT, "its time %g is too close to that of the frame before it", f->time);
         if (r == VG_OK) r = vgi_output_put(x->out, digits, vgi_print_double(digits, key), e);
     }

@@ -197,6 +197,22 @@ static void refuses_what_does_not_fit(void)
     }
 }
 
+/* USDA has one sample for a time code. */
+static void refuses_times_too_close(void)
+{
+    static const double step[] = {1e-310, 1e-310 / 24, 1e-17};
+    for (int i = 0; i < 3; i++) {
+        vg_frame frames[3];
+        int r;
+        make_frames(frames, i < 2 ? 0 : 1, step[i]);
+        if (i == 2) frames[1].time = 2, frames[2].time = 2 + 1e-15; /* in binary64 apart, as time codes not */
+        vg_bytes b = record(&vgi_sequence_usda, &head, frames, i < 2 ? 2 : 3, false, &r, NULL);
+        CHECK(r == VG_EINPUT && (strstr(message, "is too close to that of the frame before it") ||
+                                 strstr(message, "is not later than")));
+        vg_bytes_clear(&b);
+    }
+}
+
 TESTS({"reads PC2", reads_pc2}, {"takes counting for no time", takes_counting_for_no_time}, {"reads MDD", reads_mdd},
       {"refuses false numbers", refuses_false_numbers}, {"writes PC2", writes_pc2}, {"writes MDD", writes_mdd},
-      {"refuses what does not fit", refuses_what_does_not_fit})
+      {"refuses what does not fit", refuses_what_does_not_fit}, {"refuses times too close", refuses_times_too_close})
