@@ -69,9 +69,12 @@ static void place_joints(vgi_gltf_scene *x)
 
 /* ---- animations ---- */
 
-static int check_times(const vgi_gltf_scene *x, const vgi_gltf_channel *c, vg_err *e)
+static int check_times(vgi_gltf_scene *x, const vgi_gltf_channel *c, vg_err *e)
 {
     double before = -HUGE_VAL, t;
+    if (c->in.count > vgi_gltf_most - x->keys)
+        return vgi_gltf_bad(&x->g, e, "its animations have more than %zu keys", vgi_gltf_most);
+    x->keys += c->in.count;
     for (size_t i = 0; i < c->in.count; i++, before = t) {
         vgi_accessor_get(&c->in, i, &t);
         if (!(t > before) || !isfinite(t)) return vgi_gltf_bad(&x->g, e, "the times of an animation do not ascend");
@@ -79,7 +82,7 @@ static int check_times(const vgi_gltf_scene *x, const vgi_gltf_channel *c, vg_er
     return VG_OK;
 }
 
-static int read_sampler(const vgi_gltf_scene *x, vgi_gltf_channel *c, const vgi_json *sampler, vg_err *e)
+static int read_sampler(vgi_gltf_scene *x, vgi_gltf_channel *c, const vgi_json *sampler, vg_err *e)
 {
     const char *way = vgi_json_text(vgi_json_get(sampler, "interpolation"));
     c->cubic = way && !strcmp(way, "CUBICSPLINE"), c->step = way && !strcmp(way, "STEP");
@@ -149,6 +152,8 @@ static bool same_times(const vgi_gltf_channel *a, const vgi_gltf_channel *b)
 
 static int add_moments(vgi_gltf_scene *x, const vgi_gltf_channel *c, vg_err *e)
 {
+    if (c->in.count > vgi_gltf_most_moments - x->nmoments)
+        return vgi_gltf_bad(&x->g, e, "its animations have more than %zu times", vgi_gltf_most_moments);
     int r = vgi_grow(&x->moments, &x->moments_cap, x->nmoments + c->in.count, sizeof *x->moments, e);
     for (size_t i = 0; i < c->in.count && r == VG_OK; i++) {
         vgi_gltf_moment *m = &x->moments[x->nmoments++];
@@ -179,7 +184,6 @@ static int read_animation(vgi_gltf_scene *x, const vgi_json *animation, vg_err *
     for (size_t i = first; i < x->nchannels && r == VG_OK; i++) {
         if (i > first && same_times(&x->channels[i - 1], &x->channels[i])) continue;
         r = add_moments(x, &x->channels[i], e);
-        if (x->nmoments - moments > vgi_gltf_most) r = vgi_gltf_bad(&x->g, e, "an animation has too many times");
     }
     if (r == VG_OK) r = vgi_grow(&x->clips, &x->clips_cap, x->nclips + 1, sizeof *x->clips, e);
     if (r < 0) return r;
@@ -280,12 +284,13 @@ static int animate(vgi_gltf_scene *x, const vgi_gltf_moment *m, vg_err *e)
 
 /* ---- frames ---- */
 
-static void rest(vgi_gltf_scene *x)
+/* Nodes as the file has them. morphed: morph targets too, else there are none. */
+static void rest(vgi_gltf_scene *x, bool morphed)
 {
     for (size_t i = 0; i < x->nnodes; i++) {
         vgi_gltf_node *n = &x->nodes[i];
         n->now = n->rest;
-        for (size_t t = 0; t < n->nweights; t++) n->weights[t] = 0;
+        for (size_t t = 0; t < n->nweights; t++) n->weights[t] = morphed ? n->rest_weights[t] : 0;
     }
 }
 
@@ -376,7 +381,7 @@ int vgi_gltf_next(void *state, vg_frame *f, vg_err *e)
 {
     vgi_gltf_scene *x = state;
     if (x->next == x->frames) return 0;
-    rest(x);
+    rest(x, x->nclips > 0);
     int r = x->nclips ? begin_moment(x, x->next, f, e) : begin_shape(x, x->next, f, e);
     if (r == VG_OK) r = pose(x, f->values, e);
     x->next++;
@@ -398,7 +403,7 @@ static int take_reference(vgi_gltf_scene *x, vg_head *h, vg_err *e)
     const char *name = vgi_json_text(vgi_json_get(mesh, "name"));
     if (name && *name && !(h->reference_name = vgi_copy_string(name, strlen(name), e))) return VG_ENOMEM;
     if (!(h->reference = vgi_array(h->mesh.nv, 3 * sizeof *h->reference, e))) return VG_ENOMEM;
-    rest(x);
+    rest(x, false);
     return pose(x, h->reference, e);
 }
 

@@ -111,6 +111,12 @@ static void mark(vgi_gltf_scene *x, size_t i)
     for (; i != SIZE_MAX && !x->nodes[i].matters; i = x->nodes[i].parent) x->nodes[i].matters = true;
 }
 
+static void mark_joints(vgi_gltf_scene *x, vgi_gltf_skin *k)
+{
+    for (size_t j = 0; !k->used && j < k->n; j++) mark(x, k->joints[j]);
+    k->used = true;
+}
+
 /* ---- skins ---- */
 
 static int read_skin(vgi_gltf_scene *x, vgi_gltf_skin *k, const vgi_json *from, vg_err *e)
@@ -147,10 +153,13 @@ static int read_skins(vgi_gltf_scene *x, vg_err *e)
 static int read_targets(vgi_gltf_scene *x, vgi_gltf_part *p, vg_err *e)
 {
     const size_t n = vgi_json_count(p->targets);
-    if (!(p->moved = vgi_array(n, sizeof *p->moved, e))) return VG_ENOMEM;
-    p->ntargets = n;
     if (n != x->nodes[p->node].nweights)
         return vgi_gltf_bad(&x->g, e, "the primitives of a mesh have different numbers of morph targets");
+    if (n > vgi_gltf_most_targets - x->targets)
+        return vgi_gltf_bad(&x->g, e, "it shows more than %zu morph targets", vgi_gltf_most_targets);
+    x->targets += n;
+    if (!(p->moved = vgi_array(n, sizeof *p->moved, e))) return VG_ENOMEM;
+    p->ntargets = n;
     int r = VG_OK;
     for (size_t t = 0; t < n && r == VG_OK; t++) {
         const vgi_json *ref = vgi_json_get(vgi_json_at(p->targets, t), "POSITION");
@@ -212,10 +221,12 @@ static int add_part(vgi_gltf_scene *x, size_t at, int64_t skinned, const vgi_jso
     return r < 0 || p->skin == VGI_GLTF_NONE ? r : read_influences(x, p, e);
 }
 
-/* Primitives of a mesh may share their vertices: the part among those from `from` on that has them. */
+/* Primitives of a mesh may share their vertices: the part among the last of those from `from` on that has them. What
+ * is not found is welded all the same. */
 static vgi_gltf_part *sharing(const vgi_gltf_scene *x, size_t from, const vgi_json *primitive)
 {
-    for (size_t i = from; i < x->nparts; i++)
+    enum { LOOK_BACK = 64 };
+    for (size_t i = x->nparts - from > LOOK_BACK ? x->nparts - LOOK_BACK : from; i < x->nparts; i++)
         if (vgi_json_same(x->parts[i].attributes, vgi_json_get(primitive, "attributes")) &&
             vgi_json_same(x->parts[i].targets, vgi_json_get(primitive, "targets")))
             return &x->parts[i];
@@ -281,12 +292,17 @@ static int read_faces(const vgi_gltf_scene *x, vgi_gltf_faces *f, const vgi_gltf
     return r < 0 ? r : add_faces(x, f, indices ? f->index.count : p->count, mode, e);
 }
 
+/* The weights of a node's mesh as long as nothing animates them: the node's own, or else the mesh's. */
 static int take_weights(vgi_gltf_scene *x, size_t at, const vgi_json *mesh, vg_err *e)
 {
     vgi_gltf_node *n = &x->nodes[at];
     n->nweights = vgi_json_count(vgi_json_get(vgi_json_at(vgi_json_get(mesh, "primitives"), 0), "targets"));
     if (n->nweights > x->most_targets) x->most_targets = n->nweights;
-    return (n->weights = vgi_array(n->nweights, sizeof *n->weights, e)) ? VG_OK : VG_ENOMEM;
+    n->weights = vgi_array(n->nweights, sizeof *n->weights, e);
+    n->rest_weights = vgi_array(n->nweights, sizeof *n->rest_weights, e);
+    if (!n->weights || !n->rest_weights) return VG_ENOMEM;
+    return take_numbers(x, vgi_json_get(n->json, "weights") ? n->json : mesh, "weights", n->nweights,
+                        n->rest_weights, e);
 }
 
 static int read_mesh(vgi_gltf_scene *x, vgi_gltf_faces *f, size_t at, vg_err *e)
@@ -298,7 +314,7 @@ static int read_mesh(vgi_gltf_scene *x, vgi_gltf_faces *f, size_t at, vg_err *e)
     if (r == VG_OK) r = take_weights(x, at, mesh, e);
     if (r < 0) return r;
     mark(x, at);
-    for (size_t j = 0; k && j < x->skins[skinned].n; j++) mark(x, x->skins[skinned].joints[j]);
+    if (k) mark_joints(x, &x->skins[skinned]);
     const vgi_json *primitives = vgi_json_get(mesh, "primitives");
     const size_t from = x->nparts;
     if (vgi_json_count(primitives) == 0) return vgi_gltf_bad(&x->g, e, "a mesh has no primitives");
@@ -331,7 +347,10 @@ int vgi_gltf_scene_read(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e)
 
 void vgi_gltf_scene_clear(vgi_gltf_scene *x)
 {
-    for (size_t i = 0; i < x->nnodes; i++) free(x->nodes[i].weights);
+    for (size_t i = 0; i < x->nnodes; i++) {
+        free(x->nodes[i].weights);
+        free(x->nodes[i].rest_weights);
+    }
     for (size_t i = 0; i < x->nskins; i++) {
         free(x->skins[i].joints);
         free(x->skins[i].matrices);

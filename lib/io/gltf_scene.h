@@ -9,8 +9,10 @@
 
 enum { VGI_GLTF_SETS = 8, VGI_GLTF_CLIPPED = 512, VGI_GLTF_NONE = -1 };
 
-/* Many nodes may show one mesh, so that a small file could ask for more than any memory. */
-static const size_t vgi_gltf_most = (size_t)1 << 27;
+/* Many nodes may show one mesh and many channels have the times of one accessor, so that a small file could ask for
+ * more than any memory. */
+static const size_t vgi_gltf_most = (size_t)1 << 27; /* vertices, corners, keys */
+static const size_t vgi_gltf_most_targets = (size_t)1 << 21, vgi_gltf_most_moments = (size_t)1 << 24;
 
 typedef enum vgi_gltf_path {
     VGI_GLTF_TRANSLATION,
@@ -32,13 +34,13 @@ typedef struct vgi_gltf_node {
     vgi_gltf_placed rest, now;
     double world[12];
     size_t nweights;       /* morph targets of its mesh */
-    double *weights;
+    double *weights, *rest_weights;
 } vgi_gltf_node;
 
 typedef struct vgi_gltf_skin {
     size_t n;
     size_t *joints;
-    bool bound;
+    bool bound, used;     /* used: a node that is shown has it */
     vgi_accessor inverse; /* bind matrices, if bound */
     double *matrices;     /* n x 12 */
 } vgi_gltf_skin;
@@ -80,6 +82,7 @@ typedef struct vgi_gltf_scene {
     vgi_gltf_skin *skins;
     vgi_gltf_part *parts;
     size_t all;    /* vertices of all parts, before welding */
+    size_t targets, keys; /* morph targets of all parts; times of all channels */
     vgi_gltf_channel *channels;
     vgi_gltf_clip *clips;
     vgi_gltf_moment *moments;

@@ -157,6 +157,8 @@ static uint64_t hash_of(const vgi_gltf_part *p, size_t v)
     vgi_accessor_get(&p->position, v, at);
     uint64_t hash = mix(p->node + 1, at, 3);
     for (size_t s = 0; s < p->nsets; s++) {
+        vgi_accessor_get(&p->joints[s], v, at);
+        hash = mix(hash, at, 4);
         vgi_accessor_get(&p->shares[s], v, at);
         hash = mix(hash, at, 4);
     }

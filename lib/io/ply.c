@@ -147,6 +147,13 @@ static enum role role_named(enum kind kind, struct word name, bool list)
     return PASSED_OVER;
 }
 
+static bool has_role(const struct reading *r, const struct element *el, enum role role)
+{
+    for (size_t i = 0; i < el->n; i++)
+        if (r->properties[el->first + i].role == role) return true;
+    return false;
+}
+
 static int read_property_line(struct reading *r, const struct word *words, size_t n)
 {
     bool list = n == 5 && word_is(words[1], "list");
@@ -162,22 +169,14 @@ static int read_property_line(struct reading *r, const struct word *words, size_
     if (p.role >= INDICES && !is_integer(p.item))
         return vg_fail(r->e, VG_EINPUT, "%s: PLY property '%.*s' is not of an integer type", r->subject, shown(name),
                        name.at);
-    for (size_t i = 0; i < el->n; i++)
-        if (p.role && r->properties[el->first + i].role == p.role)
-            return vg_fail(r->e, VG_EINPUT, "%s: PLY element '%s' has '%.*s' twice", r->subject, el->name,
-                           shown(name), name.at);
+    if (p.role && has_role(r, el, p.role))
+        return vg_fail(r->e, VG_EINPUT, "%s: PLY element '%s' has '%.*s' twice", r->subject, el->name, shown(name),
+                       name.at);
     if (vgi_grow(&r->properties, &r->properties_cap, r->nproperties + 1, sizeof *r->properties, r->e) < 0)
         return VG_ENOMEM;
     r->properties[r->nproperties++] = p;
     el->n++;
     return VG_OK;
-}
-
-static bool has_role(const struct reading *r, const struct element *el, enum role role)
-{
-    for (size_t i = 0; i < el->n; i++)
-        if (r->properties[el->first + i].role == role) return true;
-    return false;
 }
 
 /* Do the elements have what is needed of them? And how many bytes does each need? */

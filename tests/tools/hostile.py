@@ -2,8 +2,10 @@
 each of which is a KIND. The same bytes each time.
 SPDX-License-Identifier: GPL-3.0-or-later
 """
+import base64
 import gzip
 import io
+import json
 import math
 import struct
 import sys
@@ -100,6 +102,44 @@ def encrypted():
     central = b"PK\1\2" + struct.pack("<H", 20) + head + struct.pack("<HHHII", 0, 0, 0, 0, 0) + b"a.obj"
     end = b"PK\5\6" + struct.pack("<HHHHIIH", 0, 0, 1, 1, len(central), len(local), 0)
     open("encrypted.zip", "wb").write(local + central + end)
+
+
+def write_gltf(name, data, accessors, primitive, **parts):
+    """One mesh of one primitive, from one buffer."""
+    whole = {"asset": {"version": "2.0"}, "bufferViews": [{"buffer": 0, "byteLength": len(data)}],
+             "buffers": [{"byteLength": len(data), "uri": "data:application/octet-stream;base64," +
+                          base64.b64encode(data).decode()}],
+             "accessors": [{"bufferView": 0, "byteOffset": offset, "componentType": component, "count": count, "type": kind}
+                           for offset, component, count, kind in accessors], "meshes": [{"primitives": [primitive]}], **parts}
+    json.dump(whole, open(name, "w"), separators=(",", ":"))
+
+
+def crowds():
+    """Files of a few megabytes in which everything is there a million times, or a thousand times of something is a thousand
+    times of another."""
+    floats, shorts, ubytes, n = 5126, 5123, 5121, 1000000
+    triangle, plain = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0), {"attributes": {"POSITION": 0}}
+    three = (0, floats, 3, "VEC3")
+    with open("properties.ply", "w") as f:
+        f.write("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+                "element face 0\n" + "property int a\n" * n + "end_header\n0 0 0\n")
+    write_gltf("primitives.gltf", triangle, [three], plain, nodes=[{"mesh": 0}], meshes=[
+        {"primitives": [{"attributes": {"POSITION": 0, f"_{i}": 0}} for i in range(n // 10)]}])
+    write_gltf("targets.gltf", triangle, [three], {**plain, "targets": [{}] * 10000}, nodes=[{"mesh": 0}] * 10000)
+    write_gltf("joints.gltf", triangle, [three], plain, nodes=[{"mesh": 0, "skin": 0}] * (n // 5), skins=[{"joints": [0] * n}])
+    # one place, one weight, and for each vertex another joint
+    m = 60000
+    write_gltf("pile.gltf", bytes(12 * m) + b"".join(struct.pack("<4H", i, 0, 0, 0) for i in range(m)) +
+               struct.pack("<4f", 1, 0, 0, 0) * m,
+               [(0, floats, m, "VEC3"), (12 * m, shorts, m, "VEC4"), (20 * m, floats, m, "VEC4")],
+               {"mode": 0, "attributes": {"POSITION": 0, "JOINTS_0": 1, "WEIGHTS_0": 2}},
+               nodes=[{"mesh": 0, "skin": 0}, {}], skins=[{"joints": [1] * m}])
+    keys = triangle + struct.pack(f"<{n}f", *range(n)) + bytes(3 * n)
+    list_of = [three, (36, floats, n, "SCALAR"), (36 + 4 * n, ubytes, n, "VEC3")]
+    channel = {"sampler": 0, "target": {"node": 0, "path": "scale"}}
+    for name, clips, channels in (("clips.gltf", 1000, 1), ("channels.gltf", 1, 100000)):
+        write_gltf(name, keys, list_of, plain, nodes=[{"mesh": 0}], animations=[
+            {"channels": [channel] * channels, "samplers": [{"input": 1, "output": 2}]}] * clips)
 
 
 # ---- geometry ----

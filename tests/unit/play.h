@@ -1,7 +1,7 @@
 /* play.h: a whole sequence through one of the sequence formats, in memory or through a file without a name.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#ifndef VG_PLAY_H
-#define VG_PLAY_H
+#ifndef VG_TEST_PLAY_H
+#define VG_TEST_PLAY_H
 #include "io/io.h"
 #include "test.h"
 

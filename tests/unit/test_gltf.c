@@ -278,6 +278,28 @@ static void weights_are_played(void)
     played_clear(&p);
 }
 
+/* What is not animated keeps the weights of its node, or else of its mesh; the reference has none. */
+static void weights_stay(void)
+{
+    struct { float base[3], one[3], two[3], times[2], moves[6]; } bin = {
+        {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 1}, {0, 0, 0, 5, 0, 0}};
+    static const char *const own[] = {"", ",'weights':[0,3]"};
+    for (int i = 0; i < 2; i++) {
+        char json[1024];
+        snprintf(json, sizeof json, SCENE "'nodes':[{'mesh':0%s}],'meshes':[{'weights':[0.5,2],'primitives':[{'mode':0,"
+                 "'attributes':{'POSITION':0},'targets':[{'POSITION':1},{'POSITION':2}]}]}],"
+                 "'animations':[{'channels':[{'sampler':0,'target':{'node':0,'path':'translation'}}],"
+                 "'samplers':[{'input':3,'output':4}]}],'accessors':[" FLOATS(0, 1, "VEC3") "," FLOATS(12, 1, "VEC3") ","
+                 FLOATS(24, 1, "VEC3") "," FLOATS(36, 2, "SCALAR") "," FLOATS(44, 2, "VEC3") "]", own[i]);
+        played p = play_json(json, &bin, sizeof bin);
+        CHECK(p.result == 0 && p.frames == 2);
+        check_point(&p, 0, 0, 1, i ? 0 : 0.5, i ? 3 : 2);
+        check_point(&p, 1, 0, 6, i ? 0 : 0.5, i ? 3 : 2);
+        CHECK(p.h.reference[0] == 1 && p.h.reference[1] == 0 && p.h.reference[2] == 0);
+        played_clear(&p);
+    }
+}
+
 /* ---- nodes ---- */
 
 /* A point at (1, 0, 0) below a node that turns about z by 90 degrees and grows, which another one moves: times 0, 1
@@ -446,7 +468,7 @@ static void wrong_texts_are_refused(void)
 TESTS({"a GLB of ours comes back whole", binary_comes_back}, {"a glTF of ours comes back whole", text_comes_back},
        {"a rig that moves comes back as its vertices", skins_come_back},
       {"points without faces come back", points_come_back}, {"morph targets are frames", targets_are_frames},
-      {"only equal vertices are welded", only_equal_vertices_are_welded}, {"weights are played", weights_are_played},
+      {"only equal vertices are welded", only_equal_vertices_are_welded}, {"weights are played", weights_are_played}, {"weights stay", weights_stay},
       {"nodes move", nodes_move}, {"skins bend", skins_bend}, {"all kinds of primitives", all_kinds_of_primitives},
       {"stale polygons are passed over", stale_polygons_are_passed_over},
       {"animations follow one another", animations_follow_one_another},
