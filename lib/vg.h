@@ -935,8 +935,8 @@ typedef struct vg_source_options {
     const char *mesh;    /* an operand whose faces and reference pose are those of operands that hold none of their
                             own (point caches, arrays); NULL: those of the operand before, or of the file of the same
                             name that ends in .obj or .ply */
-    uint64_t most_bytes; /* what an archive, a compressed file, or a mesh file from a pipe may hold, unpacked; 0: 1
-                            GiB in one file, 64 GiB in all */
+    uint64_t most_bytes; /* what an archive, a compressed file, or a file from a pipe that is no stream may hold,
+                            unpacked; 0: 1 GiB in one file, 64 GiB in all */
 } vg_source_options;
 /* vg_source_open_with: o may be NULL. */
 int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const vg_source_options *o,

@@ -92,6 +92,33 @@ answers() {
     for size in 0 '' x 1X -1; do must_fail 2 vg-encode --max-bytes "$size" bomb.zip -o no.vgs; done
 }
 
+@test "a pipe gives no more than --max-bytes to any reader, however short; arrays that are stored may be longer" {
+    printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >a.obj
+    pipe_fail 3 "cat a.obj | vg-encode --max-bytes 20 -o no.vgs"
+    says "'standard input' holds more than 20 bytes"
+    pipe_fail 3 "(echo HIERARCHY; yes) 2>/dev/null | vg-encode --max-bytes 16M -o no.vgs"
+    says "'standard input' holds more than 16777216 bytes"
+    pipe_fail 3 "(echo '{ \"asset\": '; yes ' ') 2>/dev/null | vg-encode --max-bytes 16M -o no.vgs"
+    says "'standard input' holds more than 16777216 bytes"
+    must vg-encode a.obj a.obj a.obj -o a.vgs
+    must vg-decode a.vgs -o a.npz
+    must vg-encode --max-bytes 100 a.npz -o b.vgs
+    must vg-diff a.vgs b.vgs
+    python3 - <<'END'
+import zipfile
+with zipfile.ZipFile('a.npz') as a, zipfile.ZipFile('bomb.npz', 'w', zipfile.ZIP_DEFLATED) as b:
+    for i in a.infolist():
+        data = a.read(i)
+        if i.filename == 'positions.npy':
+            shape = "'shape': (3, 3, 3), }" + ' ' * 20
+            data = data.replace(shape.encode(), b"'shape': (500000, 3, 3), }".ljust(len(shape)))[:128] + bytes(500000 * 36)
+        b.writestr(i.filename, data)
+END
+    must_fail 3 vg-encode --max-bytes 1M bomb.npz -o no.vgs
+    says "unpacks to more than 1048576 bytes"
+    [ ! -e no.vgs ]
+}
+
 @test "without --max-bytes a file in an archive may hold 1 GiB" {
     [ "${CONFIG:-release}" = release ] || skip "a sanitizer takes too long"
     python3 - <<'END'
@@ -109,6 +136,18 @@ END
     hostile many
     must_fail 3 soon vg-encode many.tar.gz -o out.vgs
     says "'many.tar.gz' holds more than 2097152 files"
+}
+
+@test "small files that ask for much: a million properties, nodes times targets, channels times keys" {
+    hostile crowds
+    for file in properties.ply primitives.gltf joints.gltf pile.gltf; do
+        must soon vg-encode $file -o $file.vgs
+    done
+    for file in targets clips channels; do
+        must_fail 3 soon vg-encode $file.gltf -o no.vgs
+        says "'$file.gltf': it" " more than "
+    done
+    [ ! -e no.vgs ]
 }
 
 # ---- geometry ---------------------------------------------------------------------------------------------------------

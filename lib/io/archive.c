@@ -16,11 +16,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* A member is in memory as a whole, and as a mesh takes several times its size; the total guards the spool;
- * all three guard the time. */
-const vgi_limits vgi_archive_limits = {
-    .member_bytes = (uint64_t)1 << 30, .total_bytes = (uint64_t)64 << 30, .members = (size_t)1 << 21};
-
 /* ---- one member after another ---- */
 
 static void allow_formats(struct archive *la)

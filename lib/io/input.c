@@ -6,19 +6,26 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 /* Small reads go through a buffer of this size; larger ones straight to their place. */
 enum { BUFFER = 256 * 1024, AHEAD = 4096 };
 
+/* A member of an archive is in memory as a whole, and as a mesh takes several times its size; the total guards
+ * spools; all three guard the time. */
+const vgi_limits vgi_usual_limits = {
+    .member_bytes = (uint64_t)1 << 30, .total_bytes = (uint64_t)64 << 30, .members = (size_t)1 << 21};
+
 struct vgi_input {
     int fd; /* -1: memory only */
     bool own, ended;
+    bool known; /* a regular file or memory: it holds what it holds, however often it is looked at */
     char *name;
     unsigned char *buffer;     /* NULL for memory */
     const unsigned char *data; /* what has been read and not taken */
     size_t size;
-    uint64_t most; /* that vgi_input_slurp takes */
+    vgi_limits limits;
 };
 
 static int make(vgi_input **in, const char *name, vg_err *e)
@@ -26,7 +33,7 @@ static int make(vgi_input **in, const char *name, vg_err *e)
     *in = vgi_array(1, sizeof **in, e);
     if (!*in) return VG_ENOMEM;
     (*in)->fd = -1;
-    (*in)->most = UINT64_MAX;
+    (*in)->limits = vgi_usual_limits;
     (*in)->name = vgi_copy_string(name, strlen(name), e);
     if ((*in)->name) return VG_OK;
     vgi_input_free(in);
@@ -41,14 +48,16 @@ int vgi_input_fd(vgi_input **in, int fd, bool own, const char *name, vg_err *e)
         if (own) close(fd);
         return r;
     }
+    struct stat st;
     (*in)->fd = fd, (*in)->own = own, (*in)->data = (*in)->buffer;
+    (*in)->known = fstat(fd, &st) == 0 && S_ISREG(st.st_mode);
     return VG_OK;
 }
 
 int vgi_input_memory(vgi_input **in, const void *data, size_t n, const char *name, vg_err *e)
 {
     int r = make(in, name, e);
-    if (r == VG_OK) (*in)->data = data, (*in)->size = n, (*in)->ended = true;
+    if (r == VG_OK) (*in)->data = data, (*in)->size = n, (*in)->ended = (*in)->known = true;
     return r;
 }
 
@@ -168,9 +177,14 @@ int vgi_input_take(vgi_input *in, vg_bytes *b, size_t n, size_t *got, vg_err *e)
     return r;
 }
 
-void vgi_input_limit(vgi_input *in, uint64_t most)
+void vgi_input_limit(vgi_input *in, const vgi_limits *limits)
 {
-    in->most = most;
+    in->limits = *limits;
+}
+
+const vgi_limits *vgi_input_limits(const vgi_input *in)
+{
+    return &in->limits;
 }
 
 static int larger_than(const vgi_input *in, uint64_t most, vg_err *e)
@@ -181,17 +195,18 @@ static int larger_than(const vgi_input *in, uint64_t most, vg_err *e)
 
 int vgi_input_slurp(vgi_input *in, vg_bytes *b, vg_err *e)
 {
+    const uint64_t most = in->known ? UINT64_MAX : in->limits.member_bytes;
     int r = vgi_bytes_append(b, in->data, in->size, e);
     if (r < 0) return r;
     in->size = 0;
-    while (!in->ended) {
+    while (b->size <= most) {
+        if (in->ended) return VG_OK;
         if (b->cap - b->size < 64 * 1024 && (r = vgi_bytes_reserve(b, b->size + (1u << 20), e)) < 0) return r;
         ssize_t more = read_some(in, b->data + b->size, b->cap - b->size, e);
         if (more < 0) return (int)more;
         b->size += (size_t)more;
-        if (b->size > in->most) return larger_than(in, in->most, e);
     }
-    return VG_OK;
+    return larger_than(in, most, e);
 }
 
 /* ---- files without a name ---- */
@@ -211,8 +226,9 @@ int vgi_nameless_file(vg_err *e)
     return vg_fail(e, VG_ESYS, "cannot make a temporary file in '%s': %s", dir, strerror(errno));
 }
 
-int vgi_input_spool(vgi_input *in, uint64_t limit, int *out, vg_err *e)
+int vgi_input_spool(vgi_input *in, int *out, vg_err *e)
 {
+    const uint64_t most = in->known ? UINT64_MAX : in->limits.total_bytes;
     unsigned char *block = vgi_array_raw(BUFFER, 1, e);
     if (!block) return VG_ENOMEM;
     int fd = vgi_nameless_file(e), r = fd < 0 ? fd : VG_OK;
@@ -223,8 +239,7 @@ int vgi_input_spool(vgi_input *in, uint64_t limit, int *out, vg_err *e)
         bool end = r == VG_ETRUNC;
         if (r < 0 && !end) break;
         total += got;
-        r = total > limit ? larger_than(in, limit, e)
-                          : vgi_write_all(fd, block, got, "temporary file", e);
+        r = total > most ? larger_than(in, most, e) : vgi_write_all(fd, block, got, "temporary file", e);
         if (end) break;
     }
     free(block);

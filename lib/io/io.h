@@ -26,8 +26,15 @@ int vgi_input_ended(vgi_input *in, vg_err *e) VG_MUST_CHECK;
 int vgi_input_read(vgi_input *in, void *to, size_t n, size_t *got, vg_err *e) VG_MUST_CHECK;
 /* vgi_input_take: append exactly n bytes to b, which grows as they arrive (a false n costs no memory). */
 int vgi_input_take(vgi_input *in, vg_bytes *b, size_t n, size_t *got, vg_err *e) VG_MUST_CHECK;
-/* vgi_input_limit: where vgi_input_slurp stops, with VG_EINPUT. */
-void vgi_input_limit(vgi_input *in, uint64_t most);
+/* What an input may hold, so that a small file cannot fill a machine, nor a pipe that never ends. */
+typedef struct vgi_limits {
+    uint64_t member_bytes, total_bytes; /* unpacked, of an archive; an input that is no regular file as a whole may be
+                                           slurped up to the first and spooled up to the second */
+    size_t members;                     /* entries of any kind */
+} vgi_limits;
+extern const vgi_limits vgi_usual_limits;
+void vgi_input_limit(vgi_input *in, const vgi_limits *limits); /* else the usual ones */
+const vgi_limits *vgi_input_limits(const vgi_input *in);
 /* vgi_input_slurp: append all that is left. */
 int vgi_input_slurp(vgi_input *in, vg_bytes *b, vg_err *e) VG_MUST_CHECK;
 /* vg_reader over an input; the reader takes the input over, also when it fails. */
@@ -38,7 +45,7 @@ bool vgi_is_stream(const unsigned char *data, size_t n);
 /* vgi_nameless_file: a new file without a name in $TMPDIR (or /tmp), for reading and writing; its descriptor. */
 int vgi_nameless_file(vg_err *e) VG_MUST_CHECK;
 /* vgi_input_spool: copy what is left of an input that can be read only once into a file without a name. */
-int vgi_input_spool(vgi_input *in, uint64_t limit, int *fd, vg_err *e) VG_MUST_CHECK;
+int vgi_input_spool(vgi_input *in, int *fd, vg_err *e) VG_MUST_CHECK;
 /* vgi_write_all: write n bytes to fd, whatever the interruptions; VG_ESYS naming `name`. */
 int vgi_write_all(int fd, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
 
@@ -253,13 +260,6 @@ char *vgi_pose_name(const char *path, vg_err *e);
 int vgi_operand_files(vgi_names *paths, const char *operand, vg_err *e) VG_MUST_CHECK;
 
 /* ---- archive.c, pack.c: files out of archives and into them; with unpack.c, the files that know libarchive ---- */
-
-/* Where reading stops, so that a small archive cannot fill a machine. */
-typedef struct vgi_limits {
-    uint64_t member_bytes, total_bytes; /* unpacked */
-    size_t members;                     /* entries of any kind */
-} vgi_limits;
-extern const vgi_limits vgi_archive_limits; /* what all programs use */
 
 /* The mesh files of an archive, or the single one that was compressed without an archive, in natural order. */
 typedef struct vgi_archive vgi_archive;

@@ -8,6 +8,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <sys/stat.h>
 
 const char *const vgi_npz_names[ARRAYS] = {
     "anchor_positions", "anchors", "deformations", "face_offsets", "face_vertices", "faces", "graph_offsets",
@@ -74,8 +75,14 @@ static int hold_all(reading *x, vgi_input *in, vg_err *e)
     vgi_archive *a = NULL;
     vg_bytes data = {0};
     const char *path;
-    int fd = -1, r = vgi_input_spool(in, vgi_archive_limits.total_bytes, &fd, e);
-    if (r == VG_OK) r = vgi_archive_open_for(&a, fd, 0, vgi_input_name(in), is_array_name, &vgi_archive_limits, e);
+    vgi_limits limits = *vgi_input_limits(in);
+    struct stat st;
+    int fd = -1, r = vgi_input_spool(in, &fd, e);
+    if (r == VG_OK && fstat(fd, &st) == 0) { /* an array that is stored as it is fills no machine */
+        if ((uint64_t)st.st_size > limits.member_bytes) limits.member_bytes = (uint64_t)st.st_size;
+        if ((uint64_t)st.st_size > limits.total_bytes) limits.total_bytes = (uint64_t)st.st_size;
+    }
+    if (r == VG_OK) r = vgi_archive_open_for(&a, fd, 0, vgi_input_name(in), is_array_name, &limits, e);
     while (r == VG_OK && (r = vgi_archive_next(a, &path, &data, e)) > 0) r = hold_member(x, path, &data, e);
     vgi_archive_close(&a);
     vg_bytes_clear(&data);
@@ -433,4 +440,5 @@ const vgi_sequence_format vgi_sequence_npz = {
              VGI_KEEPS_DOUBLES,
     .sniff = sniff_npz, .open = open_npz, .next = next_npz, .frames = count_frames, .close = close_npz,
     .kinds = 1 << VG_VERTICES | 1 << VG_VECTORS | 1 << VG_DEFORMATIONS | 1 << VG_TRANSFORMS,
-    .begin = vgi_npz_begin, .put = vgi_npz_put, .end = vgi_npz_end, .warning = vgi_npz_warning, .release = vgi_npz_release};
+    .begin = vgi_npz_begin, .put = vgi_npz_put, .end = vgi_npz_end, .warning = vgi_npz_warning,
+    .release = vgi_npz_release};

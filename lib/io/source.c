@@ -87,14 +87,16 @@ static int add_operand(vg_source *s, const char *operand, vg_err *e)
 
 /* ---- the first look ---- */
 
-static int open_input(item *it, vgi_input **in, vg_err *e)
+static int open_input(const vg_source *s, item *it, vgi_input **in, vg_err *e)
 {
     if (it->input) {
         *in = it->input;
         it->input = NULL;
         return VG_OK;
     }
-    return it->path ? vgi_input_file(in, it->path, e) : vgi_input_fd(in, STDIN_FILENO, false, standard_input, e);
+    int r = it->path ? vgi_input_file(in, it->path, e) : vgi_input_fd(in, STDIN_FILENO, false, standard_input, e);
+    if (r == VG_OK) vgi_input_limit(*in, &s->limits);
+    return r;
 }
 
 static void note_file(item *it)
@@ -130,7 +132,7 @@ static int tell_content(item *it, vgi_input *in, vg_err *e)
     return VG_OK;
 }
 
-static int open_reader(item *it, vg_reader **reader, vg_err *e)
+static int open_reader(const vg_source *s, item *it, vg_reader **reader, vg_err *e)
 {
     if (it->reader) {
         *reader = it->reader;
@@ -138,7 +140,7 @@ static int open_reader(item *it, vg_reader **reader, vg_err *e)
         return VG_OK;
     }
     vgi_input *in;
-    int r = open_input(it, &in, e);
+    int r = open_input(s, it, &in, e);
     return r < 0 ? r : vgi_reader_open_input(reader, in, e);
 }
 
@@ -197,7 +199,7 @@ static int look_at_stream(vg_source *s, item *it, vg_err *e)
     if (s->own_name && s->n == 1)
         return vg_fail(e, VG_EARG, "'%s' is a stream, which brings its own mesh: leave out --mesh", item_name(it));
     vg_reader *reader = NULL;
-    int r = open_reader(it, &reader, e);
+    int r = open_reader(s, it, &reader, e);
     if (r < 0) return r;
     if (s->n == 1) {
         s->reader = reader;
@@ -214,7 +216,7 @@ static int look_at(vg_source *s, item *it, vg_err *e)
 {
     vgi_input *in = NULL;
     note_file(it);
-    int r = open_input(it, &in, e);
+    int r = open_input(s, it, &in, e);
     if (r < 0) return r;
     r = tell_content(it, in, e);
     /* standard input has been read from: its bytes are in `in`, even when the file could be read again */
@@ -230,8 +232,8 @@ static int open_archive(vg_source *s, item *it, vg_err *e)
     int fd = -1, r = VG_OK;
     if (!it->regular) {
         vgi_input *in;
-        if ((r = open_input(it, &in, e)) < 0) return r;
-        r = vgi_input_spool(in, s->limits.total_bytes, &fd, e);
+        if ((r = open_input(s, it, &in, e)) < 0) return r;
+        r = vgi_input_spool(in, &fd, e);
         vgi_input_free(&in);
     } else {
         fd = it->path ? open(it->path, O_RDONLY | O_CLOEXEC) : fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
@@ -291,10 +293,9 @@ static int take_pose(vg_source *s, const char *archive, const char *path, vg_err
 static int open_mesh(vg_source *s, item *it, vg_err *e)
 {
     vgi_input *in;
-    int r = open_input(it, &in, e);
+    int r = open_input(s, it, &in, e);
     if (r < 0) return r;
     s->data.size = 0;
-    if (!it->regular) vgi_input_limit(in, s->limits.member_bytes);
     r = vgi_input_slurp(in, &s->data, e);
     vgi_input_free(&in);
     return r < 0 ? r : take_pose(s, NULL, item_name(it), e);
@@ -302,7 +303,7 @@ static int open_mesh(vg_source *s, item *it, vg_err *e)
 
 static int open_stream(vg_source *s, item *it, vg_err *e)
 {
-    int r = open_reader(it, &s->reader, e);
+    int r = open_reader(s, it, &s->reader, e);
     if (r < 0) return r;
     const vg_head *h = vg_reader_head(s->reader);
     char *subject = subject_of(NULL, item_name(it), e);
@@ -383,7 +384,7 @@ static int play(vg_source *s, const vgi_sequence_format *format, vgi_input *in, 
 static int open_sequence(vg_source *s, item *it, vg_err *e)
 {
     vgi_input *in;
-    int r = open_input(it, &in, e);
+    int r = open_input(s, it, &in, e);
     return r < 0 ? r : play(s, it->sequence, in, NULL, item_name(it), e);
 }
 
@@ -451,7 +452,7 @@ static int open_source(vg_source **out, const char *const *operands, size_t n, c
     const char *mesh = o ? o->mesh : NULL;
     vg_source *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
-    s->limits = vgi_archive_limits;
+    s->limits = vgi_usual_limits;
     if (o && o->most_bytes) s->limits.member_bytes = s->limits.total_bytes = o->most_bytes;
     int r = n ? VG_OK : vg_fail(e, VG_EARG, "no input is named");
     if (r == VG_OK && mesh) r = settle_named_mesh(s, mesh, e);
