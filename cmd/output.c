@@ -55,7 +55,7 @@ static void end_by_signal(int number)
 
 static void catch_signals(void)
 {
-    static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
+    static const int numbers[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU};
     struct sigaction handler = {.sa_handler = end_by_signal, .sa_flags = (int)SA_RESETHAND}, old;
     sigemptyset(&handler.sa_mask);
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
@@ -126,6 +126,10 @@ void output_check(bool stream)
     if (!stat(name, &st)) {
         if (S_ISDIR(st.st_mode)) die_writing(EISDIR);
         if (!S_ISREG(st.st_mode)) return; /* a pipe or device: opened and written as it is */
+    } else if (errno != ENOENT) {
+        die_writing(errno);
+    } else if (!lstat(name, &st)) { /* a file would come in its place */
+        cli_stop(VG_ESYS, "cannot write to %s: it is a link to a file that is not there", out.shown);
     }
     char directory[PATH_MAX];
     if (!*split_path(name, directory)) die_writing(EISDIR);

@@ -177,8 +177,11 @@ static void report_scalars(report *r, const contents *c)
 {
     char line[300];
     if (!c->scalars) return;
-    snprintf(line, sizeof line, "'%.100s' of each vertex in %" PRIu64 " of the frames: %.6g to %.6g %.60s",
-             c->scalars_name, c->scalars, c->scalars_least, c->scalars_most, c->scalars_unit);
+    int n = snprintf(line, sizeof line, "'%.100s' of each vertex in %" PRIu64 " of the frames", c->scalars_name,
+                     c->scalars);
+    if (c->scalars_least <= c->scalars_most) /* there are vertices */
+        snprintf(line + n, sizeof line - (size_t)n, ": %.6g to %.6g %.60s", c->scalars_least, c->scalars_most,
+                 c->scalars_unit);
     report_put(r, NULL, "with them", report_text(line));
     report_group(r, "scalars");
     report_put(r, "name", NULL, report_text(c->scalars_name));

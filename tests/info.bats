@@ -303,10 +303,29 @@ END
     nothing_but a.obj copy.txt dir link.txt pipe real.txt
 }
 
+@test "a link that leads nowhere, or to itself, is neither followed nor replaced" {
+    mesh cube >a.obj
+    mkdir d
+    ln -s nowhere dangling
+    ln -s loop loop
+    ln -s nowhere d/a.obj
+    for link in dangling loop; do
+        for command in "vg-info a.obj" "vg-encode a.obj" "vg-view a.obj --format png" "vg-decode a.obj --format ply"; do
+            must_fail 4 $command -o $link
+            says "'$link'"
+            one_line
+        done
+    done
+    must_fail 4 vg-decode a.obj -o d/
+    says "'d/a.obj': it is a link to a file that is not there"
+    [ -L dangling ] && [ -L loop ] && [ -L d/a.obj ]
+    nothing_but a.obj d dangling loop
+}
+
 @test "a signal leaves no temporary file, and is what the process ends by" {
     vg-encode "$DATA/horse-run.tar.xz" >one.vgs
     mkfifo in
-    for signal in TERM HUP; do
+    for signal in TERM HUP XCPU; do
         vg-encode - -o late.vgs <in & # it has the head, and waits for the rest
         waiting=$!
         exec 7>in
@@ -340,6 +359,14 @@ assert (got["joints"], got["bones"], got["ends"], got["channels"], got["turned_f
 names = [None, "Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation"]
 assert got["tree"] == [dict(j, channels=[names[c] for c in j["channels"]]) for j in want]
 END
+}
+
+@test "numbers of no vertices have no range" {
+    must vg-info "$CORPUS/accept/scalars-of-nothing.vgs"
+    shows "'x' of each vertex in 1 of the frames"
+    [[ $output != *nan* ]]
+    must vg-info --json "$CORPUS/accept/scalars-of-nothing.vgs" -o s.json
+    is s.json scalars.least null
 }
 
 @test "a rig and its map are described, and its weights printed" {

@@ -81,6 +81,21 @@ bool vgi_is_archive(const unsigned char *data, size_t n)
            starts(data, n, "7z\xbc\xaf\x27\x1c", 6) || (n >= 262 && !memcmp(data + 257, "ustar", 5));
 }
 
+/* The formats that one can tell from their start; libarchive takes what it does not know for raw data, and zeros for
+ * the end of a tar. */
+bool vgi_may_be_archive(const unsigned char *data, size_t n)
+{
+    struct archive_entry *entry;
+    if (n == 0 || !data[0]) return false;
+    struct archive *la = archive_read_new();
+    if (!la) return true;
+    allow_formats(la);
+    bool raw = archive_read_open_memory(la, data, n) == ARCHIVE_OK &&
+               archive_read_next_header(la, &entry) >= ARCHIVE_WARN && archive_format(la) == ARCHIVE_FORMAT_RAW;
+    archive_read_free(la);
+    return !raw;
+}
+
 static int damaged(const vgi_archive *a, struct archive *la, const char *path, vg_err *e)
 {
     const char *why = archive_error_string(la);
@@ -276,15 +291,20 @@ static int add_member(vgi_archive *a, vg_err *e)
     return VG_OK;
 }
 
+int vgi_unknown_kind(const char *name, vg_err *e)
+{
+    return vg_fail(e, VG_EINPUT,
+                   "cannot tell what '%s' is: no stream, no archive, none of %s; export other kinds as one of them",
+                   name, vgi_kinds_read());
+}
+
 static int not_an_archive(const vgi_archive *a, vg_err *e)
 {
     unsigned char start[512];
     size_t got = 0;
     if (vgi_read_at(a->file.fd, start, sizeof start, a->file.base, &got) == 0 && vgi_is_archive(start, got))
         return vg_fail(e, VG_ETRUNC, "archive '%s' is damaged or cut short", a->name);
-    return vg_fail(e, VG_EINPUT,
-                   "cannot tell what '%s' is: no stream, no archive, none of %s; export other kinds as one of them",
-                   a->name, vgi_kinds_read());
+    return vgi_unknown_kind(a->name, e);
 }
 
 /* Files of whole sequences count only where there are no mesh files, as in directories. */

@@ -265,6 +265,9 @@ int vgi_operand_files(vgi_names *paths, const char *operand, vg_err *e) VG_MUST_
 typedef struct vgi_archive vgi_archive;
 /* vgi_is_archive: does data start like an archive or a compressed file? (first 4096 bytes or all) */
 bool vgi_is_archive(const unsigned char *data, size_t n);
+/* vgi_may_be_archive: could libarchive take it for one of the rarer kinds, too? Of what nothing else claims. */
+bool vgi_may_be_archive(const unsigned char *data, size_t n);
+int vgi_unknown_kind(const char *name, vg_err *e); /* the failure of what is nothing that is known */
 /* vgi_archive_open: list what is there. fd is a regular file that is read from byte `base` on; it is taken over, also
  * on failure. name is what messages call the archive. VG_EINPUT when there is no mesh file in it. */
 int vgi_archive_open(vgi_archive **a, int fd, int64_t base, const char *name, const vgi_limits *limits,

@@ -52,6 +52,10 @@ typedef struct vgi_targets { /* whole at any moment: vgi_targets_remove may come
     uint64_t temporaries; /* names tried */
 } vgi_targets;
 
+/* vgi_target_look: 1 and *st when there is something that can be written or replaced, 0 when there is nothing;
+ * negative when there is a directory, or a link that leads nowhere, in whose place a file would come. */
+struct stat;
+int vgi_target_look(const char *path, struct stat *st, vg_err *e) VG_MUST_CHECK;
 /* vgi_targets_open: open what will be `path`: a descriptor, or negative. A link is followed: what it points to is
  * replaced, not the link. Pipes and devices, which cannot be replaced, are opened where they are. */
 int vgi_targets_open(vgi_targets *t, const char *path, vg_err *e) VG_MUST_CHECK;

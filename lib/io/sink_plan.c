@@ -182,9 +182,9 @@ static int check_directory(const char *dir, const char *output, vg_err *e)
 static int check_file(const char *path, vg_err *e)
 {
     struct stat st;
-    if (stat(path, &st) == 0 && S_ISDIR(st.st_mode))
-        return vg_fail(e, VG_ESYS, "cannot write '%s': it is a directory", path);
-    if (stat(path, &st) == 0 && !S_ISREG(st.st_mode))
+    int exists = vgi_target_look(path, &st, e);
+    if (exists < 0) return exists;
+    if (exists && !S_ISREG(st.st_mode))
         return access(path, W_OK) == 0 ? VG_OK : vg_fail(e, VG_ESYS, "cannot write '%s': %s", path, strerror(errno));
     char *real = realpath(path, NULL);
     char *dir = vgi_parent_directory(real ? real : path, strlen(real ? real : path), e);

@@ -110,7 +110,8 @@ static void note_file(item *it)
 }
 
 /* What is known to be no mesh comes first: a tar may begin with the name of a mesh, and a compressed file may be
- * called like one. What nothing else claims is left to libarchive, which knows more kinds than can be told here. */
+ * called like one. What nothing else claims is left to libarchive, which knows more kinds than can be told here; of
+ * what comes through a pipe it sees the start only, or a disk would fill with it first. */
 static int tell_content(item *it, vgi_input *in, vg_err *e)
 {
     const unsigned char *data;
@@ -128,7 +129,8 @@ static int tell_content(item *it, vgi_input *in, vg_err *e)
     else if (vgi_is_archive(data, n)) it->content = ARCHIVE;
     else if (named && named->open) it->content = SEQUENCE, it->sequence = named;
     else if (vgi_format_by_content(data, n) || (it->path && vgi_format_by_suffix(it->path))) it->content = MESH;
-    else it->content = ARCHIVE;
+    else if (it->regular || vgi_may_be_archive(data, n)) it->content = ARCHIVE;
+    else return vgi_unknown_kind(item_name(it), e);
     return VG_OK;
 }
 

@@ -43,13 +43,22 @@ static int make_room(vgi_targets *t, vg_err *e)
     return VG_OK;
 }
 
+int vgi_target_look(const char *path, struct stat *st, vg_err *e)
+{
+    struct stat link;
+    bool exists = stat(path, st) == 0;
+    if (!exists && errno != ENOENT) return vg_fail(e, VG_ESYS, "cannot write '%s': %s", path, strerror(errno));
+    if (exists && S_ISDIR(st->st_mode)) return vg_fail(e, VG_ESYS, "cannot write '%s': it is a directory", path);
+    if (!exists && lstat(path, &link) == 0)
+        return vg_fail(e, VG_ESYS, "cannot write '%s': it is a link to a file that is not there", path);
+    return exists;
+}
+
 int vgi_targets_open(vgi_targets *t, const char *path, vg_err *e)
 {
     struct stat st;
-    int fd, r = make_room(t, e);
-    if (r < 0) return r;
-    bool exists = stat(path, &st) == 0;
-    if (exists && S_ISDIR(st.st_mode)) return vg_fail(e, VG_ESYS, "cannot write '%s': it is a directory", path);
+    int fd, r = make_room(t, e), exists = r < 0 ? r : vgi_target_look(path, &st, e);
+    if (exists < 0) return exists;
     char *real = exists ? realpath(path, NULL) : NULL;
     vgi_target *target = &t->at[t->n];
     *target = (vgi_target){.final = real ? real : vgi_copy_string(path, strlen(path), e)};
