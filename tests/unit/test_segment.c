@@ -184,6 +184,197 @@ static void sectors_meet(void)
     vg_head_clear(&h);
 }
 
+/* ---- triangles that turn each by itself ---- */
+
+static vg_head make_crowd(size_t n)
+{
+    vg_head h = new_shape();
+    for (uint32_t i = 0; i < n; i++) {
+        add_vertex(&h, 3 * i, 0, 0), add_vertex(&h, 3 * i + 1, 0.2, 0), add_vertex(&h, 3 * i, 1, 0.3);
+        FACE(&h, 3 * i, 3 * i + 1, 3 * i + 2);
+    }
+    return h;
+}
+
+/* Face f turned about its first corner by rotation[f] (9 numbers). */
+static void turn_crowd(const vg_head *h, const double *rotation, double *pose)
+{
+    for (size_t v = 0; v < h->mesh.nv; v++) {
+        const double *m = rotation + 9 * (v / 3), *o = h->reference + 3 * (v - v % 3), *x = h->reference + 3 * v;
+        for (size_t i = 0; i < 3; i++) {
+            pose[3 * v + i] = o[i];
+            for (size_t k = 0; k < 3; k++) pose[3 * v + i] += m[3 * i + k] * (x[k] - o[k]);
+        }
+    }
+}
+
+static void draw_rotation(double *m)
+{
+    double axis[3] = {noise(), noise(), noise()}, length = 0;
+    for (int k = 0; k < 3; k++) length += axis[k] * axis[k];
+    for (int k = 0; k < 3; k++) axis[k] /= sqrt(length);
+    turn_about(axis, 3 * noise(), m);
+}
+
+typedef struct crowd {
+    vg_head h;
+    vg_segmenter *s;
+    double *rotation, *pose; /* of the pose that comes next */
+} crowd;
+
+static crowd open_crowd(size_t n)
+{
+    vg_err e;
+    crowd x = {.h = make_crowd(n), .rotation = room(9 * n, sizeof(double)), .pose = room(9 * n, sizeof(double))};
+    CHECK(vg_segmenter_new(&x.s, &x.h.mesh, x.h.reference, 2, &e) == VG_OK);
+    return x;
+}
+
+static void add_pose(crowd *x)
+{
+    const double *poses[1] = {x->pose};
+    turn_crowd(&x->h, x->rotation, x->pose);
+    CHECK(vg_segmenter_add(x->s, 1, poses, NULL) == VG_OK);
+}
+
+static vg_segment_report cut_crowd(crowd *x, size_t k, uint64_t seed, vg_patches *p)
+{
+    vg_segment_report report;
+    vg_err e;
+    CHECK(vg_segmenter_cut(x->s, k, seed, false, p, &report, &e) == VG_OK);
+    CHECK(report.patches == p->n);
+    uint32_t next = 0; /* every patch has faces, and they are in the order of the first ones */
+    for (size_t f = 0; f < x->h.mesh.nf; f++) {
+        CHECK(p->of_face[f] <= next);
+        next += p->of_face[f] == next;
+    }
+    CHECK(next == p->n);
+    return report;
+}
+
+static void close_crowd(crowd *x)
+{
+    vg_segmenter_free(&x->s);
+    vg_head_clear(&x->h);
+    free(x->rotation);
+    free(x->pose);
+}
+
+/* Two by three groups: early poses tell one number of a face's group, late ones the other. However many poses there
+ * are, all of them count; and where faces turn in six ways no more patches are made. */
+static void groups_are_found(void)
+{
+    enum { N = 61 };
+    static const size_t lengths[] = {2, 14, 15, 40, 150};
+    for (size_t l = 0; l < sizeof lengths / sizeof *lengths; l++) {
+        crowd x = open_crowd(N);
+        uint32_t group[N], first[6], groups = 0;
+        for (size_t f = 0; f < N; f++) group[f] = (uint32_t)(f * 17 % 6);
+        for (size_t k = 0; k < lengths[l]; k++) {
+            double m[3][9];
+            for (int i = 0; i < 3; i++) draw_rotation(m[i]);
+            for (size_t f = 0; f < N; f++)
+                memcpy(x.rotation + 9 * f, m[2 * k < lengths[l] ? group[f] % 2 : group[f] / 2], sizeof m[0]);
+            add_pose(&x);
+        }
+        for (size_t k = 6; k <= 9; k += 3) {
+            vg_patches p;
+            vg_segment_report report = cut_crowd(&x, k, 1, &p);
+            CHECK(p.n == 6);
+            CHECK_NEAR(report.angle, 0, 0.1);
+            groups = 0;
+            for (size_t f = 0; f < N && p.n == 6; f++) {
+                if (p.of_face[f] == groups) first[groups++] = group[f];
+                CHECK(group[f] == first[p.of_face[f]]);
+            }
+            vg_patches_clear(&p);
+        }
+        close_crowd(&x);
+    }
+}
+
+/* Half of the faces turned by a few degrees one way, half the other way: one patch has this angle, whether features are
+ * kept as they are or folded; and so it is where folding without signs would add up. */
+static void angles_are_kept(void)
+{
+    enum { N = 600 };
+    static const double z[3] = {0, 0, 1};
+    double folded[2][2];
+    for (int large = 0; large < 2; large++)
+        for (int many = 0; many < 2; many++) {
+            crowd x = open_crowd(N);
+            vg_patches p;
+            for (size_t f = 0; f < N; f++)
+                turn_about(z, large ? (f % 2 ? M_PI : 0) : (f % 2 ? 5 : -5) * M_PI / 180, x.rotation + 9 * f);
+            for (int k = 0; k < (many ? 300 : 10); k++) add_pose(&x);
+            folded[large][many] = cut_crowd(&x, 1, 1, &p).angle;
+            vg_patches_clear(&p);
+            close_crowd(&x);
+        }
+    CHECK_NEAR(folded[0][0], 5, 0.02);
+    CHECK_NEAR(folded[0][1], 5, 0.25);
+    CHECK_NEAR(folded[1][1], folded[1][0], 0.05 * folded[1][0]);
+}
+
+/* A fan of turns, continuous over 190 degrees: as few patches as turn within 10 degrees of their faces. */
+static void as_few_as_will_do(void)
+{
+    enum { N = 400 };
+    static const double z[3] = {0, 0, 1};
+    crowd x = open_crowd(N);
+    vg_patches p, fewer;
+    for (size_t f = 0; f < N; f++) turn_about(z, 190.0 * (double)f / N * M_PI / 180, x.rotation + 9 * f);
+    add_pose(&x);
+    vg_segment_report report = cut_crowd(&x, 0, 1, &p), before;
+    CHECK(report.angle <= 10 && (p.n == 6 || p.n == 8));
+    before = cut_crowd(&x, p.n - 2, 1, &fewer);
+    CHECK(before.angle > 10 && fewer.n == p.n - 2);
+    /* each patch is one stretch of the fan */
+    for (size_t f = 1; f < N; f++) CHECK(p.of_face[f] == p.of_face[f - 1] || p.of_face[f] == p.of_face[f - 1] + 1);
+    vg_patches_clear(&p);
+    vg_patches_clear(&fewer);
+    close_crowd(&x);
+}
+
+/* Faces that turn as they like: nearly all are nearest to the mean of their own patch, and every patch has some. */
+static void patches_are_around_their_means(void)
+{
+    enum { N = 300, K = 9, POSES = 3 };
+    for (uint64_t seed = 1; seed < 6; seed++) {
+        crowd x = open_crowd(N);
+        vg_patches p;
+        double *feature = room(N * 9 * POSES, sizeof *feature), mean[K][9 * POSES] = {{0}}, count[K] = {0};
+        size_t astray = 0;
+        for (size_t k = 0; k < POSES; k++) {
+            for (size_t f = 0; f < N; f++) {
+                draw_rotation(x.rotation + 9 * f);
+                memcpy(feature + 9 * (POSES * f + k), x.rotation + 9 * f, 9 * sizeof *feature);
+            }
+            add_pose(&x);
+        }
+        cut_crowd(&x, K, seed, &p);
+        CHECK(p.n == K);
+        for (size_t f = 0; f < N; f++) {
+            count[p.of_face[f]]++;
+            for (size_t i = 0; i < 9 * POSES; i++) mean[p.of_face[f]][i] += feature[9 * POSES * f + i];
+        }
+        for (size_t f = 0; f < N; f++) {
+            double least = INFINITY;
+            size_t best = 0;
+            for (size_t k = 0; k < K; k++) {
+                double d = 0;
+                for (size_t i = 0; i < 9 * POSES; i++) d += pow(feature[9 * POSES * f + i] - mean[k][i] / count[k], 2);
+                if (d < least) least = d, best = k;
+            }
+            astray += best != p.of_face[f];
+        }
+        CHECK(astray <= N / 50);
+        vg_patches_clear(&p);
+        free(feature);
+        close_crowd(&x);
+    }
+}
+
 /* What the sum of squared distances of members from their means grows by when two sets are joined: from the members. */
 static double growth(const double *x, const double *count, const uint32_t *set, size_t n, uint32_t a, uint32_t b)
 {
@@ -240,5 +431,8 @@ static void joins_are_the_cheapest(void)
     }
 }
 
-TESTS({"nearest rotations", nearest_rotations}, {"thirds of a strip", thirds}, {"pieces and neighbours", pieces},
+TESTS({"nearest rotations", nearest_rotations}, {"thirds of a strip", thirds},
+      {"groups are found", groups_are_found}, {"angles are kept", angles_are_kept},
+      {"as few as will do", as_few_as_will_do}, {"patches are around their means", patches_are_around_their_means},
+      {"pieces and neighbours", pieces},
       {"sectors of a fan meet", sectors_meet}, {"joins are the cheapest", joins_are_the_cheapest})
