@@ -1,7 +1,7 @@
 /* test_map.c: a map is its uncollapsed chain; bodies that move rigidly by patches are met; joints, paths, and other
  * bodies.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "meshes.h"
+#include "dense.h"
 #include "method/map_parts.h"
 
 enum { POSES = 7 };
@@ -293,6 +293,107 @@ static void other_bodies(void)
     }
 }
 
+/* Larger and smaller than the blocks of the factorisation, against elimination; what is not definite is said to be so. */
+static void dense_systems(void)
+{
+    static const size_t sizes[] = {1, 3, 64, 65, 150};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        size_t n = sizes[i], m = 2;
+        double *b = room(n * n, sizeof *b), *a = room(n * n, sizeof *a), *l = room(n * n, sizeof *l);
+        double *x = room(n * m, sizeof *x), *truth = room(n * m, sizeof *truth);
+        for (size_t k = 0; k < n * n; k++) b[k] = noise();
+        for (size_t p = 0; p < n; p++)
+            for (size_t q = 0; q < n; q++) {
+                a[p * n + q] = p == q;
+                for (size_t k = 0; k < n; k++) a[p * n + q] += b[p * n + k] * b[q * n + k];
+                l[p * n + q] = q <= p ? a[p * n + q] : NAN; /* the lower triangle is all that is looked at */
+            }
+        for (size_t k = 0; k < n * m; k++) x[k] = truth[k] = noise();
+        CHECK(vgi_cholesky_dense(l, n));
+        vgi_cholesky_dense_solve(l, n, x, m);
+        memcpy(l, a, n * n * sizeof *l);
+        l[n * n - 1] -= 1e3 * (double)n;
+        CHECK(!vgi_cholesky_dense(l, n));
+        eliminate(a, truth, n, m);
+        for (size_t k = 0; k < n * m; k++) CHECK_NEAR(x[k], truth[k], 1e-10);
+        free(b);
+        free(a);
+        free(l);
+        free(x);
+        free(truth);
+    }
+}
+
+/* Patches that turn, grow and move each by themselves are measured as they do so. */
+static void patches_are_measured(void)
+{
+    vg_head h = make_body(5);
+    vgi_shape s;
+    vg_err e;
+    motion truth[5];
+    double *pose = room(3 * h.mesh.nv, sizeof *pose);
+    CHECK(vgi_shape_make(&s, &h.mesh, &h.patches, h.reference, &e) == VG_OK);
+    for (uint32_t p = 0; p < 5; p++) {
+        vgi_motion m;
+        double b = p == 4 ? 1e-9 : 0.3 + p;
+        truth[p] = turn(0.5 * p - 1, b, p);
+        for (size_t f = 0; f < h.mesh.nf; f++)
+            for (uint32_t c = h.mesh.start[f]; h.patches.of_face[f] == p && c < h.mesh.start[f + 1]; c++) {
+                double *to = pose + 3 * (size_t)h.mesh.vert[c];
+                move_vector(&truth[p], h.reference + 3 * (size_t)h.mesh.vert[c], to);
+                for (int k = 0; k < 3; k++) to[k] += truth[p].shift[k];
+            }
+        vgi_shape_measure(&s, p, pose, &m);
+        if (p == 4) { /* it vanishes: but not altogether */
+            CHECK_NEAR(m.b2, 1e-12, 1e-15);
+            continue;
+        }
+        CHECK_NEAR(m.b2, b * b, 1e-12);
+        for (int k = 0; k < 9; k++) CHECK_NEAR(m.a[k], truth[p].m[k], 1e-12);
+        for (int k = 0; k < 3; k++) CHECK_NEAR(m.t[k], truth[p].shift[k], 1e-11);
+    }
+    vgi_shape_clear(&s);
+    free(pose);
+    vg_head_clear(&h);
+}
+
+/* A vertex in no face goes with the patch whose centre is nearest; a second component with the patch at the end of its
+ * link. */
+static void what_hangs_loose(void)
+{
+    vg_head h = make_body(5);
+    vg_err e;
+    double end = h.reference[3 * h.mesh.nv - 1];
+    add_vertex(&h, 0, 1.7, end - 2);
+    uint32_t loose = (uint32_t)h.mesh.nv - 1, a = add_vertex(&h, 0, 0, end + 0.4), b = add_vertex(&h, 0.3, 0, end + 0.4),
+             c = add_vertex(&h, 0, 0.3, end + 0.5);
+    uint32_t *of_face = room(h.mesh.nf + 1, sizeof *of_face);
+    memcpy(of_face, h.patches.of_face, h.mesh.nf * sizeof *of_face);
+    FACE(&h, a, b, c);
+    of_face[h.mesh.nf - 1] = 5, h.patches.n = 6;
+    free(h.patches.of_face);
+    h.patches.of_face = of_face;
+    h.has_links = false;
+    CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK && h.nlinks == 1);
+    fit(&h, bend);
+    vg_graph *g = graph_of(&h);
+    uint32_t *all = vgi_graph_patches(&h, g, &e);
+    CHECK(g->nlinks == 1 && all[g->nf - 1] == 4); /* the rod's vertices come first */
+    double *pose = room(3 * h.mesh.nv, sizeof *pose);
+    played x = open_player(&h, false, 1);
+    bend(&h, 0.8, pose);
+    measure(&x, pose);
+    play(&x);
+    double at[3];
+    vg_quat_apply(x.transforms + 7 * 4, h.reference + 3 * (size_t)loose, at);
+    for (size_t k = 0; k < 3; k++) CHECK_NEAR(x.vertices[3 * loose + k], at[k] + x.transforms[7 * 4 + 4 + k], 1e-9);
+    free(all);
+    free(pose);
+    vg_graph_free(&g);
+    close_player(&x);
+    vg_head_clear(&h);
+}
+
 static void refusals(void)
 {
     vg_head h = make_rod(5, 4, true);
@@ -311,4 +412,6 @@ static void refusals(void)
 }
 
 TESTS({"rigid bodies", rigid_bodies}, {"collapsed is uncollapsed", collapsed_is_uncollapsed}, {"paths", paths},
-      {"half turns", half_turns}, {"other bodies", other_bodies}, {"refusals", refusals})
+      {"half turns", half_turns}, {"other bodies", other_bodies},
+      {"dense systems", dense_systems}, {"patches are measured", patches_are_measured},
+      {"what hangs loose", what_hangs_loose}, {"refusals", refusals})
