@@ -8,7 +8,7 @@
  * damped Gauss-Newton steps.
  * Leaves out how weights are fitted to known motions (skin.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "method/map_parts.h"
+#include "method/dense.h"
 #include "method/product.h"
 #include "method/rotation_fit.h"
 #include "method/skin.h"

@@ -2,6 +2,7 @@
  * it, the vertices that are held, and the operator that all of it collapses into.
  * Leaves out the sums over the poses (rig_sums.c), weights (skin.c), and motions that are not known (bend.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/dense.h"
 #include "method/map_parts.h"
 #include "method/skin.h"
 #include "model/rig.h"

@@ -14,6 +14,7 @@
  * poses show beyond that: a ridge regression of what joints miss on the A of all patches, as strong as makes it
  * predict left-out poses best.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/dense.h"
 #include "method/map_parts.h"
 #include "method/pieces.h"
 #include "method/product.h"

@@ -31,12 +31,6 @@ static inline void vgi_move_point(const vgi_motion *m, const double x[3], double
     for (int i = 0; i < 3; i++) y[i] = m->a[3 * i] * x[0] + m->a[3 * i + 1] * x[1] + m->a[3 * i + 2] * x[2] + m->t[i];
 }
 
-/* vgi_cholesky_dense: a (n x n, the lower triangle) becomes its factor; false when it is not positive definite. Large
- * ones call BLAS: between vgi_product_begin and _end. */
-bool vgi_cholesky_dense(double *a, size_t n);
-/* vgi_cholesky_dense_solve: x (n x m, row-major) := (L L')^-1 x */
-void vgi_cholesky_dense_solve(const double *l, size_t n, double *x, size_t m);
-
 /* vgi_place_by_joints: place (n x 3n) of the map from its joints, centres and shares. */
 int vgi_place_by_joints(const vg_map *m, const double *centre, double *place, vg_err *e) VG_MUST_CHECK;
 
