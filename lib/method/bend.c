@@ -35,6 +35,7 @@ struct vg_bender {
     double *mean;  /* 3 n: mean of q */
     double *size;  /* n: trace of the diagonal blocks of g */
     double *own;   /* 4 n: sums over a bone's own vertices of local and of the weight */
+    bool *carries; /* n: whether a bone, or one below it, has vertices */
     double *space; /* BLOCK times working space */
 };
 
@@ -147,14 +148,9 @@ static int make_quadratic(vg_bender *x, vg_err *e)
     return ok ? VG_OK : VG_ENOMEM;
 }
 
-int vg_bender_new(vg_bender **out, const vg_rig *r, size_t nv, const double *reference, int threads, vg_err *e)
+static int make_arrays(vg_bender *x, const vg_rig *r, vg_err *e)
 {
-    *out = NULL;
-    if (!r->nbones || !r->skin_bone) return vg_fail(e, VG_EINPUT, "there is no rig with weights");
-    vg_bender *x = *out = vgi_array(1, sizeof *x, e);
-    if (!x) return VG_ENOMEM;
-    size_t n = x->n = r->nbones;
-    x->nv = nv, x->threads = threads, x->least = 1e-7;
+    size_t n = x->n, nv = x->nv;
     x->parent = vgi_array(n, sizeof *x->parent, e);
     x->at = vgi_array(3 * n, sizeof *x->at, e), x->offset = vgi_array(3 * n, sizeof *x->offset, e);
     x->bone = vgi_copy_array(r->skin_bone, VG_SKIN * nv, sizeof *x->bone, e);
@@ -162,25 +158,48 @@ int vg_bender_new(vg_bender **out, const vg_rig *r, size_t nv, const double *ref
     x->local = vgi_array(VG_SKIN * nv, 3 * sizeof *x->local, e);
     x->g = vgi_array(3 * n, 3 * n * sizeof *x->g, e), x->mean = vgi_array(3 * n, sizeof *x->mean, e);
     x->size = vgi_array(n, sizeof *x->size, e), x->own = vgi_array(4 * n, sizeof *x->own, e);
+    x->carries = vgi_array(n, sizeof *x->carries, e);
     x->space = vgi_array(BLOCK, space_of(n) * sizeof *x->space, e);
     bool ok = x->parent && x->at && x->offset && x->bone && x->weight && x->local && x->g && x->mean && x->size &&
-              x->own && x->space;
-    int code = ok ? vgi_rig_parents(r, x->parent, e) : VG_ENOMEM;
-    for (size_t b = 0; code == VG_OK && b < n; b++)
+              x->own && x->carries && x->space;
+    return ok ? VG_OK : VG_ENOMEM;
+}
+
+/* The rest of the bones and of the vertices, seen from them. */
+static void read_rest(vg_bender *x, const vg_rig *r, const double *reference)
+{
+    for (size_t b = 0; b < x->n; b++)
         for (size_t k = 0; k < 3; k++) {
             x->at[3 * b + k] = r->at[3 * (size_t)r->bone[b] + k];
             if (b) x->offset[3 * b + k] = x->at[3 * b + k] - x->at[3 * (size_t)x->parent[b] + k];
         }
-    for (size_t s = 0; code == VG_OK && s < VG_SKIN * nv; s++)
-        for (size_t k = 0; k < 3; k++)
-            x->local[3 * s + k] =
-                x->weight[s] * (reference[3 * (s / VG_SKIN) + k] - x->at[3 * (size_t)x->bone[s] + k]);
-    for (size_t s = 0; code == VG_OK && s < VG_SKIN * nv; s++) {
+    for (size_t s = 0; s < VG_SKIN * x->nv; s++) {
         double *own = x->own + 4 * (size_t)x->bone[s];
-        for (size_t k = 0; k < 3; k++) own[k] += x->local[3 * s + k];
+        for (size_t k = 0; k < 3; k++) {
+            double away = reference[3 * (s / VG_SKIN) + k] - x->at[3 * (size_t)x->bone[s] + k];
+            own[k] += x->local[3 * s + k] = x->weight[s] * away;
+        }
         own[3] += x->weight[s];
     }
-    if (code == VG_OK) code = make_quadratic(x, e);
+    for (size_t b = x->n; b-- > 0;) {
+        x->carries[b] = x->carries[b] || x->own[4 * b + 3] > 0;
+        if (b && x->carries[b]) x->carries[x->parent[b]] = true;
+    }
+}
+
+int vg_bender_new(vg_bender **out, const vg_rig *r, size_t nv, const double *reference, int threads, vg_err *e)
+{
+    *out = NULL;
+    if (!r->nbones || !r->skin_bone) return vg_fail(e, VG_EINPUT, "there is no rig with weights");
+    vg_bender *x = *out = vgi_array(1, sizeof *x, e);
+    if (!x) return VG_ENOMEM;
+    x->n = r->nbones, x->nv = nv, x->threads = threads, x->least = 1e-7;
+    int code = make_arrays(x, r, e);
+    if (code == VG_OK) code = vgi_rig_parents(r, x->parent, e);
+    if (code == VG_OK) {
+        read_rest(x, r, reference);
+        code = make_quadratic(x, e);
+    }
     if (code < 0) vg_bender_free(out);
     return code;
 }
@@ -199,6 +218,7 @@ void vg_bender_free(vg_bender **out)
     free(x->mean);
     free(x->size);
     free(x->own);
+    free(x->carries);
     free(x->space);
     free(x);
     *out = NULL;
@@ -410,6 +430,8 @@ static void fit_pose(void *context, size_t k)
     for (int i = 0; i < SWEEPS; i++) sweep(x, &w, FIRST_PRIOR);
     descend(x, &w, FIRST_PRIOR);
     descend(x, &w, LAST_PRIOR);
+    for (size_t j = 1; j < x->n; j++)
+        if (!x->carries[j]) memcpy(w.r + 9 * j, w.r + 9 * (size_t)x->parent[j], 9 * sizeof *w.r);
     memcpy(root, centre, sizeof root);
     for (size_t j = 0; j < x->n; j++)
         for (size_t c = 0; c < 3; c++)

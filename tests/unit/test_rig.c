@@ -208,6 +208,56 @@ static void motions_are_found_again(void)
     strike(&x);
 }
 
+/* Any turn of the whole, and joints that bend far: found from wherever they are. */
+static void far_motions_are_found_again(void)
+{
+    for (int trial = 0; trial < 5; trial++) {
+        stage x;
+        vg_err e;
+        vg_bender *b;
+        set_stage(&x, make_limb(), 150);
+        paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.1);
+        skin_poses(&x);
+        double *found[POSES], *again = room(3 * x.h.mesh.nv, sizeof *again);
+        for (size_t k = 0; k < POSES; k++) found[k] = room(7 * BONES, sizeof(double));
+        CHECK(vg_bender_new(&b, &x.h.rig, x.h.mesh.nv, x.h.reference, 2, &e) == VG_OK);
+        vg_bender_fit(b, POSES, (const double *const *)x.poses, found);
+        for (size_t k = 0; k < POSES; k++) {
+            vg_rig_skin(&x.h.rig, x.h.mesh.nv, x.h.reference, found[k], again);
+            CHECK_NEAR(farthest(again, x.poses[k], x.h.mesh.nv), 0, 1e-5);
+        }
+        vg_bender_free(&b);
+        for (size_t k = 0; k < POSES; k++) free(found[k]);
+        free(again);
+        strike(&x);
+    }
+}
+
+/* A bone that moves no vertex, nor has any below it that does, goes with its parent. */
+static void a_bone_without_vertices_goes_with_its_parent(void)
+{
+    enum { BARE = BONES - 1 };
+    stage x;
+    vg_err e;
+    vg_bender *b;
+    double found[7 * BONES], *founds[1] = {found};
+    set_stage(&x, make_limb(), 60);
+    size_t nv = x.h.mesh.nv;
+    paint(&x.h.rig, nv, x.h.reference, 0);
+    for (size_t v = 0; v < nv; v++)
+        if (x.h.rig.skin_bone[VG_SKIN * v] == BARE) x.h.rig.skin_bone[VG_SKIN * v] = BARE - 1;
+    skin_poses(&x);
+    CHECK(vg_bender_new(&b, &x.h.rig, nv, x.h.reference, 1, &e) == VG_OK);
+    for (size_t k = 0; k < POSES; k++) {
+        vg_bender_fit(b, 1, (const double *const *)x.poses + k, founds);
+        const double *p = found + 7 * BARE, *up = found + 7 * (BARE - 1), *truth = x.transforms[k] + 7 * (BARE - 1);
+        CHECK_NEAR(fabs(p[0] * up[0] + p[1] * up[1] + p[2] * up[2] + p[3] * up[3]), 1, 1e-13);
+        CHECK_NEAR(fabs(truth[0] * up[0] + truth[1] * up[1] + truth[2] * up[2] + truth[3] * up[3]), 1, 1e-13);
+    }
+    vg_bender_free(&b);
+    strike(&x);
+}
+
 /* All of a stage in other units of length. */
 static void change_units(stage *x, double unit)
 {
@@ -622,6 +672,8 @@ static void what_cannot_be_fitted_is_refused(void)
 
 TESTS({"rigid bodies are met", rigid_bodies_are_met}, {"weights are found again", weights_are_found_again},
       {"motions are found again", motions_are_found_again},
+      {"far motions are found again", far_motions_are_found_again},
+      {"a bone without vertices goes with its parent", a_bone_without_vertices_goes_with_its_parent},
       {"units do not matter", units_do_not_matter},
       {"a rig is learned from poses alone", a_rig_is_learned_from_poses_alone},
       {"the map is its chain", the_map_is_its_chain}, {"refinement brings nearer", refinement_brings_nearer},
