@@ -286,6 +286,17 @@ static void other_bodies(void)
         for (size_t i = 0; i < 3 * nv; i++)
             worst = fmax(worst, fabs(scale * (own[i] - c0[i % 3]) - (x.vertices[i] - c1[i % 3])));
         CHECK_NEAR(worst, 0, 1e-8 * D);
+        /* the body is between both as a whole, and goes as far as its size says */
+        vg_centroid(h.reference, nv, c0);
+        vg_centroid(target, nv, c1);
+        for (int k = 0; k < 3; k++) /* target = 2 reference + 1 */
+            CHECK_NEAR(c0[k], half ? (c1[k] + (c1[k] - 1) / 2) / 2 : c1[k], 1e-9);
+        memcpy(own, x.vertices, 3 * nv * sizeof *own);
+        for (size_t i = 0; i < 3 * nv; i++) pose[i] += (double)(i % 3) - 5;
+        measure(&x, pose);
+        play(&x);
+        for (size_t i = 0; i < 3 * nv; i++)
+            CHECK_NEAR(x.vertices[i] - own[i], scale * ((double)(i % 3) - 5), 1e-8 * D);
         free(pose);
         free(target);
         free(own);

@@ -422,6 +422,37 @@ static void the_root_is_found(void)
     strike(&x);
 }
 
+/* Where most vertices move in no rigid way, those that do say where the root is; and how far these are apart, their
+ * median says. */
+static void the_root_is_found_among_others(void)
+{
+    stage x;
+    vg_err e;
+    double shift[3], spread;
+    set_stage(&x, make_beads(), 40);
+    size_t nv = x.h.mesh.nv, each = nv / BONES;
+    paint(&x.h.rig, nv, x.h.reference, 0);
+    for (size_t v = 0; v < nv; v++) x.h.rig.skin_bone[VG_SKIN * v] = (uint32_t)(v / each);
+    skin_poses(&x);
+    for (size_t k = 0; k < POSES; k++)
+        for (size_t v = 0; v < nv; v++)
+            if (v % 5 < 3) x.poses[k][3 * v] += 1 + noise(); /* all the same way */
+    CHECK(vg_rig_locate(&x.s, nv, x.h.reference, POSES, (const double *const *)x.poses,
+                        (const double *const *)x.positions, (const double *const *)x.turns, 2, shift, &spread,
+                        &e) == VG_OK);
+    for (int k = 0; k < 3; k++) CHECK_NEAR(shift[k], 0, 1e-9);
+    CHECK_NEAR(spread, 0, 1e-9);
+    /* every vertex is rigid, but a reference that was stretched evenly: opinions from 0 to 1 in x */
+    skin_poses(&x);
+    for (size_t v = 0; v < nv; v++) x.h.reference[3 * v] += (double)v / (double)nv;
+    CHECK(vg_rig_locate(&x.s, nv, x.h.reference, POSES, (const double *const *)x.poses,
+                        (const double *const *)x.positions, (const double *const *)x.turns, 2, shift, &spread,
+                        &e) == VG_OK);
+    CHECK_NEAR(shift[0], 0.5, 0.1);
+    CHECK_NEAR(spread, 0.25, 0.1);
+    strike(&x);
+}
+
 /* The same skeleton gives the transforms back; a larger one, too;
  * one that rests in another pose when they are aligned. */
 static void other_skeletons_drive(void)
@@ -587,6 +618,47 @@ static void a_rig_serves_another_body(void)
     }
 }
 
+/* A joint goes with the vertices that its bones share: a second body that is near it, and another bone's, goes away
+ * alone. The reference pose is not that of the skeleton: lengths of bones are told as the skeleton tells them. */
+static void joints_go_with_their_own(void)
+{
+    stage x;
+    vg_err e;
+    vg_head h = make_limb();
+    size_t limb = h.mesh.nv;
+    add_torus(&h, 9, 7, (const double[3]){0, 0, LENGTH}); /* around the knee, a little wider than the limb */
+    for (size_t i = 3 * limb; i < 3 * h.mesh.nv; i++) h.reference[i] *= i % 3 == 2 ? 1 : 1.2;
+    set_stage(&x, h, 40);
+    size_t nv = x.h.mesh.nv;
+    paint(&x.h.rig, nv, x.h.reference, 0.3);
+    for (size_t v = limb; v < nv; v++) {
+        memset(x.h.rig.skin_weight + VG_SKIN * v, 0, VG_SKIN * sizeof(double));
+        x.h.rig.skin_bone[VG_SKIN * v] = BONES - 1, x.h.rig.skin_weight[VG_SKIN * v] = 1;
+    }
+    skin_poses(&x);
+    vg_rig turned; /* it rests in the first pose */
+    CHECK(vg_rig_make(&turned, &x.s, x.positions[0], x.turns[0], &e) == VG_OK);
+    turned.skin_bone = x.h.rig.skin_bone, turned.skin_weight = x.h.rig.skin_weight;
+    x.h.rig.skin_bone = NULL, x.h.rig.skin_weight = NULL;
+    vg_rig_clear(&x.h.rig);
+    x.h.rig = turned;
+    memcpy(x.h.reference, x.poses[0], 3 * nv * sizeof(double));
+    for (size_t k = 0; k < POSES; k++) vg_rig_transforms(&x.h.rig, x.positions[k], x.turns[k], x.transforms[k]);
+    vg_rig_fitter *f = fit(&x, VG_RIG_LBS, 1, 0, 1);
+    vg_rig_fitter_free(&f);
+    double *target = room(3 * nv, sizeof *target), positions[3 * JOINTS], turned_to[4 * JOINTS];
+    for (size_t i = 0; i < 3 * nv; i++) target[i] = (i < 3 * limb ? 2 : 1) * x.h.reference[i] + (i >= 3 * limb ? 9 : 0);
+    CHECK(vg_map_retarget(&x.h, target, 1, 1, &e) == VG_OK);
+    for (size_t i = 3; i < 9; i++) /* knee and foot are in the limb */
+        CHECK_NEAR(x.h.rig.at[i], 2 * x.positions[0][i], 0.05);
+    vg_skeleton_pose(&x.h.rig.skeleton, x.values[0], positions, turned_to);
+    for (size_t j = 1; j < JOINTS; j++)
+        for (size_t k = 0; k < 3; k++)
+            CHECK_NEAR(positions[3 * j + k] - positions[k], x.h.rig.at[3 * j + k] - x.h.rig.at[k], 1e-12);
+    free(target);
+    strike(&x);
+}
+
 /* Groups of four vertices of a limb that bends rigidly: turns and places by an independent formula. */
 static void joints_of_vertices_find_themselves(void)
 {
@@ -677,11 +749,13 @@ TESTS({"rigid bodies are met", rigid_bodies_are_met}, {"weights are found again"
       {"units do not matter", units_do_not_matter},
       {"a rig is learned from poses alone", a_rig_is_learned_from_poses_alone},
       {"the map is its chain", the_map_is_its_chain}, {"refinement brings nearer", refinement_brings_nearer},
-      {"the root is found", the_root_is_found}, {"other skeletons drive", other_skeletons_drive},
+      {"the root is found", the_root_is_found},
+      {"the root is found among others", the_root_is_found_among_others}, {"other skeletons drive", other_skeletons_drive},
       {"a line leaves nothing to chance", a_line_leaves_nothing_to_chance},
       {"edits turn what hangs on a bone", edits_turn_what_hangs_on_a_bone},
       {"rotations alone say where bones are", rotations_alone_say_where_bones_are},
       {"a rig serves another body", a_rig_serves_another_body},
+      {"joints go with their own", joints_go_with_their_own},
       {"joints of vertices find themselves", joints_of_vertices_find_themselves},
       {"threads do not matter", threads_do_not_matter},
       {"what cannot be fitted is refused", what_cannot_be_fitted_is_refused})
