@@ -143,6 +143,7 @@ END
     for file in properties.ply primitives.gltf joints.gltf pile.gltf; do
         must soon vg-encode $file -o $file.vgs
     done
+    must soon vg-encode --mesh bones.skeleton.txt bones.joints.txt -o bones.vgs
     for file in targets clips channels; do
         must_fail 3 soon vg-encode $file.gltf -o no.vgs
         says "'$file.gltf': it" " more than "

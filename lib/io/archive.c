@@ -211,6 +211,20 @@ static int judge_member(vgi_archive *a, struct archive_entry *entry, vg_err *e)
     return 1;
 }
 
+/* A member that is none of ours has to be unpacked all the same where several are packed as one. */
+static void pass_over(vgi_archive *a, struct archive_entry *entry)
+{
+    switch (archive_format(a->la)) {
+    case ARCHIVE_FORMAT_7ZIP:
+    case ARCHIVE_FORMAT_RAR:
+    case ARCHIVE_FORMAT_RAR_V5:
+    case ARCHIVE_FORMAT_CAB:
+        if (archive_entry_size(entry) > 0 &&
+            __builtin_add_overflow(a->total, (uint64_t)archive_entry_size(entry), &a->total))
+            a->total = UINT64_MAX;
+    }
+}
+
 /* 1: at the next mesh file; 0: there is none. */
 static int walk_next(vgi_archive *a, vg_err *e)
 {
@@ -223,7 +237,9 @@ static int walk_next(vgi_archive *a, vg_err *e)
         if (r < ARCHIVE_WARN) return damaged(a, a->la, NULL, e);
         if (++a->entries > a->limits.members)
             return vg_fail(e, VG_EINPUT, "'%s' holds more than %zu files", a->name, a->limits.members);
-        if ((r = check_total(a, e)) < 0 || (r = judge_member(a, entry, e)) != 0) return r;
+        if ((r = judge_member(a, entry, e)) == 0) pass_over(a, entry);
+        int within = r < 0 ? r : check_total(a, e);
+        if (within < 0 || r > 0) return within < 0 ? within : r;
     }
 }
 

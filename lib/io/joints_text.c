@@ -5,6 +5,7 @@
  * out how turns are found (model/skeleton.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
+#include "model/kdtree.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -106,38 +107,64 @@ static uint32_t find_joint(const reading *b, const vgi_field *f)
     return low < b->skeleton.njoints && !compare_field(b->by_name[low].name, f) ? b->by_name[low].joint : NONE;
 }
 
-static double distance(const double a[3], const double b[3])
+/* The joints that the file gives, as points. */
+typedef struct given {
+    size_t n;
+    uint32_t *joint; /* of each point */
+    vgi_kdtree *tree;
+} given;
+
+static int list_given(const reading *b, given *g, vg_err *e)
 {
-    return hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+    double *points = vgi_array_raw(b->skeleton.njoints, 3 * sizeof *points, e);
+    g->joint = vgi_array_raw(b->skeleton.njoints, sizeof *g->joint, e);
+    if (!points || !g->joint) return free(points), VG_ENOMEM;
+    for (size_t j = 0; j < b->skeleton.njoints; j++) {
+        if (!b->met[j]) continue;
+        memcpy(points + 3 * g->n, b->reference + 3 * j, 3 * sizeof *points);
+        g->joint[g->n++] = (uint32_t)j;
+    }
+    int r = vgi_kdtree_new(&g->tree, points, g->n, e);
+    free(points);
+    return r;
+}
+
+static double square_distance(const double a[3], const double b[3])
+{
+    double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return x * x + y * y + z * z;
 }
 
 /* The given joint at which the end j of bone `above` lies in the rest pose, or nearly; NONE. */
-static uint32_t find_aim(const reading *b, size_t j, size_t above)
+static uint32_t find_aim(const reading *b, const given *g, size_t j, size_t above)
 {
     const double near = 0.05, *at = b->reference + 3 * j; /* of the bone's length: people join by eye */
-    double least = near * distance(at, b->reference + 3 * above);
-    uint32_t aim = NONE;
-    for (size_t t = 0; t < b->skeleton.njoints; t++) {
-        if (!b->met[t] || t == above || !(distance(b->reference + 3 * t, at) < least)) continue;
-        least = distance(b->reference + 3 * t, at);
-        aim = (uint32_t)t;
-    }
-    return aim;
+    const double most = near * near * square_distance(at, b->reference + 3 * (size_t)above);
+    vgi_near found[2]; /* the bone itself may be one */
+    size_t n = vgi_kdtree_nearest(g->tree, at, most, 2, found);
+    for (size_t i = 0; i < n; i++)
+        if (g->joint[found[i].index] != above && found[i].square < most) return g->joint[found[i].index];
+    return NONE;
 }
 
-static void find_aims(reading *b)
+static int find_aims(reading *b, vg_err *e)
 {
+    given g = {0};
     size_t n = b->skeleton.njoints;
+    int r = list_given(b, &g, e);
     for (size_t j = 0; j < n; j++) b->aim[j] = NONE; /* at first: whether a given joint is below it */
     for (size_t j = 0; j < n; j++)
         if (b->met[j] && b->skeleton.joints[j].parent != NONE) b->aim[b->skeleton.joints[j].parent] = 0;
     /* children come behind their parents: what those say of themselves is still there */
-    for (size_t j = n; j-- > 0;) {
+    for (size_t j = n; r == VG_OK && j-- > 0;) {
         uint32_t above = b->skeleton.joints[j].parent;
         bool free_end =
             !b->met[j] && b->aim[j] == NONE && !b->skeleton.joints[j].nchannels && above != NONE && b->met[above];
-        b->aim[j] = free_end && b->aim[above] == NONE ? find_aim(b, j, above) : NONE;
+        b->aim[j] = free_end && b->aim[above] == NONE ? find_aim(b, &g, j, above) : NONE;
     }
+    vgi_kdtree_free(&g.tree);
+    free(g.joint);
+    return r;
 }
 
 /* The joints that the first frame has given, hung on one another: what the fitter works on. */
@@ -146,7 +173,8 @@ static int make_part(reading *b, vg_err *e)
     vg_skeleton *s = &b->part;
     size_t n = b->skeleton.njoints;
     if (!(s->joints = vgi_array(n, sizeof *s->joints, e))) return VG_ENOMEM;
-    find_aims(b);
+    int r = find_aims(b, e);
+    if (r < 0) return r;
     for (size_t j = 0; j < n; j++) {
         const vg_joint *joint = &b->skeleton.joints[j];
         uint32_t above = joint->parent == NONE ? NONE : b->guide[joint->parent];

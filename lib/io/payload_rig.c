@@ -105,8 +105,9 @@ static int take_posed(cursor *c, const vgi_payload *p, vg_skeleton *s, vg_rig *g
     if (r < 0) return r;
     const unsigned char *at = take_array(c, n, 24), *turns = take_array(c, n, 32);
     if (c->bad || s->njoints != n) return wrong(p, "it is shorter than its counts say", e);
-    double *numbers = vgi_array_raw((size_t)n, 7 * sizeof *numbers, e), *unit = numbers + 3 * (size_t)n;
+    double *numbers = vgi_array_raw((size_t)n, 7 * sizeof *numbers, e);
     if (!numbers) return VG_ENOMEM;
+    double *unit = numbers + 3 * (size_t)n;
     copy_doubles(numbers, at, 3 * (size_t)n);
     copy_doubles(unit, turns, 4 * (size_t)n);
     if (!vgi_finite(numbers, 3 * (size_t)n)) r = wrong(p, "a position is not finite", e);

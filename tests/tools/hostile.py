@@ -123,6 +123,10 @@ def crowds():
     with open("properties.ply", "w") as f:
         f.write("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
                 "element face 0\n" + "property int a\n" * n + "end_header\n0 0 0\n")
+    with open("bones.skeleton.txt", "w") as bones, open("bones.joints.txt", "w") as joints:
+        for i in range(n // 5):
+            bones.write(f"b{i} - {i} 0 0 {i} 1 0\n")
+            joints.write(f"0 b{i} {i} 0 0\n")
     write_gltf("primitives.gltf", triangle, [three], plain, nodes=[{"mesh": 0}], meshes=[
         {"primitives": [{"attributes": {"POSITION": 0, f"_{i}": 0}} for i in range(n // 10)]}])
     write_gltf("targets.gltf", triangle, [three], {**plain, "targets": [{}] * 10000}, nodes=[{"mesh": 0}] * 10000)

@@ -585,6 +585,35 @@ static void limits(void)
     leave_place();
 }
 
+/* Where members are packed as one, what is passed over is unpacked too, and counts. */
+static void limits_count_what_is_passed_over(void)
+{
+    static const struct {
+        const char *name;
+        bool solid;
+    } made[] = {{"a.7z", true}, {"a.zip", false}, {"a.tar", false}};
+    const vgi_limits tight = {1 << 20, 1 << 20, 10};
+    const size_t junk = 8 << 20;
+    unsigned char *zeros = calloc(junk, 1);
+    enter_place();
+    for (size_t i = 0; i < 3; i++) {
+        static const char mesh[] = "v 0 0 0\n";
+        vgi_packer *p;
+        vgi_archive *a;
+        vg_err e = {0};
+        int fd = open(made[i].name, O_RDWR | O_CREAT, 0600);
+        CHECK(vgi_packer_open(&p, fd, made[i].name, strlen(made[i].name), &e) == VG_OK);
+        CHECK(vgi_packer_add(p, "a.bin", zeros, junk, &e) == VG_OK);
+        CHECK(vgi_packer_add(p, "b.obj", mesh, sizeof mesh - 1, &e) == VG_OK && vgi_packer_end(p, &e) == VG_OK);
+        vgi_packer_close(&p);
+        int r = vgi_archive_open(&a, fd, 0, made[i].name, &tight, &e);
+        CHECK(made[i].solid ? r == VG_EINPUT && strstr(e.message, "unpacks to more than 1048576 bytes") : r == VG_OK);
+        vgi_archive_close(&a);
+    }
+    free(zeros);
+    leave_place();
+}
+
 /* ---- tests: standard input ---- */
 
 /* What is read when these bytes come through a pipe. Small enough to wait in the pipe. */
@@ -784,7 +813,7 @@ TESTS({"natural order of names", natural_order}, {"names of poses", pose_names},
       {"names that are not ASCII", names_of_all_scripts}, {"archives out of order", unordered_archives},
       {"odd members of archives", odd_members}, {"encrypted members", encrypted_zip},
       {"every 97th prefix of an archive", every_97th_prefix}, {"cut behind the end mark", cut_behind_the_end_mark},
-      {"changed bytes of archives", changed_bytes}, {"limits of archives", limits},
+      {"changed bytes of archives", changed_bytes}, {"limits of archives", limits}, {"limits count what is passed over", limits_count_what_is_passed_over},
       {"standard input", standard_input}, {"series and directories", series_and_directories},
       {"names of outputs that are refused", refused_names}, {"frames that are refused", refused_frames},
       {"only vertices are written", other_kinds_are_refused}, {"a full disk", full_disk},
