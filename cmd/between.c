@@ -67,30 +67,16 @@ typedef struct poses {
     size_t n, cap;
 } poses;
 
-static void refuse_transforms(const vg_head *h)
-{
-    if (h->kind == VG_TRANSFORMS) cli_stop(VG_EINPUT, "the input holds transforms: they need a map");
-}
-
 static void prepare(poses *p, vg_source *s)
 {
     vg_err e;
     p->h = vg_source_head(s);
     p->kind = p->h->kind;
-    refuse_transforms(p->h);
+    if (p->kind == VG_TRANSFORMS) cli_stop(VG_EINPUT, "the input holds transforms: name their map with --map");
     p->numbers = p->h->count * vg_kind_width(p->kind);
     if (vg_head_prepare_vectors(p->h, &e) < 0 || vg_graph_new(&p->g, p->h, &e) < 0) cli_die(&e);
     p->h->kind = VG_VECTORS;
     p->h->count = vg_graph_corners(p->g);
-}
-
-static void grow(poses *p)
-{
-    if (p->n < p->cap) return;
-    p->cap = p->cap ? 2 * p->cap : 16;
-    p->keys = realloc(p->keys, p->cap * sizeof *p->keys);
-    p->labels = realloc(p->labels, p->cap * sizeof *p->labels);
-    if (!p->keys || !p->labels) cli_stop(VG_ENOMEM, "not enough memory for the key poses");
 }
 
 static void keep(poses *p, const vg_frame *f)
@@ -98,7 +84,11 @@ static void keep(poses *p, const vg_frame *f)
     const vg_head *h = p->h;
     double *values = cli_allocate(p->numbers, sizeof *values, "the key poses"),
            *anchors = cli_allocate(3 * h->nanchors, sizeof *anchors, "the key poses");
-    grow(p);
+    if (p->n == p->cap) {
+        p->cap = 2 * p->cap + 16;
+        p->keys = cli_resize(p->keys, p->cap, sizeof *p->keys, "the key poses");
+        p->labels = cli_resize(p->labels, p->cap, sizeof *p->labels, "the key poses");
+    }
     vg_key *k = &p->keys[p->n];
     *k = (vg_key){.values = values, .anchors = anchors};
     memcpy(values, f->values, p->numbers * sizeof *values);
@@ -109,10 +99,7 @@ static void keep(poses *p, const vg_frame *f)
         memcpy(k->root, f->root, sizeof k->root);
         if (h->nanchors) memcpy(anchors, f->anchors, 3 * h->nanchors * sizeof *anchors);
     }
-    size_t length = strlen(f->name);
-    char *name = cli_allocate(length, 1, "the key poses");
-    memcpy(name, f->name, length);
-    p->labels[p->n++] = (between_key){name, f->has_time, f->time};
+    p->labels[p->n++] = (between_key){cli_copy_text(f->name, "the key poses"), f->has_time, f->time};
 }
 
 /* Speeds are by time where all keys have times, and these grow. */
@@ -126,11 +113,8 @@ static void place_keys(poses *p)
 
 static void collect(poses *p, vg_source *s)
 {
-    vg_err e;
     vg_frame f = {0};
-    int r;
-    while ((r = vg_source_next(s, &f, &e)) > 0) keep(p, &f);
-    if (r < 0) cli_die(&e);
+    while (cli_next(s, &f)) keep(p, &f);
     if (p->n < 2)
         cli_stop(VG_EINPUT, "there is %s in the input, and a path needs two or more", p->n ? "one pose" : "no pose");
     vg_frame_clear(&f);

@@ -219,6 +219,20 @@ void *cli_allocate(size_t n, size_t size, const char *what)
     return p;
 }
 
+void *cli_resize(void *p, size_t n, size_t size, const char *what)
+{
+    p = reallocarray(p, n ? n : 1, size);
+    if (!p) cli_stop(VG_ENOMEM, "not enough memory for %s", what);
+    return p;
+}
+
+char *cli_copy_text(const char *text, const char *what)
+{
+    char *copy = strdup(text);
+    if (!copy) cli_stop(VG_ENOMEM, "not enough memory for %s", what);
+    return copy;
+}
+
 /* -------------------------------------------------------------------------------------- the beginning -- */
 
 /* A descriptor that was closed by the parent would be taken by the next file we open, and be written over. It is
@@ -293,6 +307,24 @@ vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o
     if (vg_source_open_with(&s, from, n ? n : 1, o, &e) < 0) cli_die(&e);
     if (vg_source_warning(s)) cli_warn("%s", vg_source_warning(s));
     return upstream = s;
+}
+
+bool cli_next(vg_source *s, vg_frame *f)
+{
+    vg_err e;
+    int r = vg_source_next(s, f, &e);
+    if (r < 0) cli_die(&e);
+    return r > 0;
+}
+
+void cli_need_vertices(const vg_head *h, const char *subject)
+{
+    static const char *const advice[] = {
+        [VG_VECTORS] = "pipe it through 'vg-solve' first",
+        [VG_DEFORMATIONS] = "apply them with 'vg-deform --onto MESH' and pipe that through 'vg-solve' first",
+        [VG_TRANSFORMS] = "make vertices of them with 'vg-deform --map MAP' first"};
+    if (h->kind == VG_VERTICES) return;
+    cli_stop(VG_EINPUT, "%s holds %s: %s", subject, vg_kind_name(h->kind), advice[h->kind]);
 }
 
 char *cli_read_file(const char *path, size_t *n)

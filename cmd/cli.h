@@ -73,6 +73,10 @@ void cli_die(const vg_err *e) __attribute__((noreturn));
 void cli_stop(int code, const char *format, ...) VG_PRINTF(2, 3) __attribute__((noreturn));
 /* cli_allocate: n zeroed elements, and room for one more; stops when there is no memory for what it is for. */
 void *cli_allocate(size_t n, size_t size, const char *what);
+/* cli_resize: n elements of which those that were there stay, as realloc; stops like cli_allocate. */
+void *cli_resize(void *p, size_t n, size_t size, const char *what);
+/* cli_copy_text: free(); stops like cli_allocate. */
+char *cli_copy_text(const char *text, const char *what);
 /* cli_usage: the same with exit 2 and the usage line. */
 void cli_usage(const char *format, ...) VG_PRINTF(1, 2) __attribute__((noreturn));
 /* cli_no: the same with exit 1: the answer is no. */
@@ -100,6 +104,12 @@ size_t cli_parse_vertices(const char *option, const char *text, uint32_t **verti
 vg_source *cli_source(char **operands, size_t n);
 /* The same, with options (may be NULL). */
 vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o);
+
+/* cli_next: the next frame; false at the end. Damage ends the program. */
+bool cli_next(vg_source *s, vg_frame *f);
+/* cli_need_vertices: end the program unless the frames are vertices, and say what makes them so. subject: what the
+ * message calls the sequence ("the input", "'a.vgs'"). */
+void cli_need_vertices(const vg_head *h, const char *subject);
 
 /* cli_read_file: a whole file ("-": standard input); free(). Dies when it cannot be read. */
 char *cli_read_file(const char *path, size_t *n);

@@ -39,9 +39,8 @@ typedef struct playback {
 void mapped_take_edit(const char *text, void *context)
 {
     (void)context;
-    char *copy = strdup(text);
-    mapped.edits = realloc(mapped.edits, (mapped.nedits + 1) * sizeof *mapped.edits);
-    if (!copy || !mapped.edits) cli_stop(VG_ENOMEM, "not enough memory for the edits");
+    char *copy = cli_copy_text(text, "the edits");
+    mapped.edits = cli_resize(mapped.edits, mapped.nedits + 1, sizeof *mapped.edits, "the edits");
     char *angle = strrchr(copy, ' ');
     if (angle) *angle++ = 0;
     char *axis = angle ? strrchr(copy, ' ') : NULL;
@@ -200,14 +199,11 @@ static void play_batch(playback *p)
 
 static void play_all(playback *p)
 {
-    vg_err e;
     uint64_t n = 0;
-    int r;
-    while ((r = vg_source_next(p->source, &p->in[p->n], &e)) > 0) {
+    while (cli_next(p->source, &p->in[p->n])) {
         if (++p->n == p->most) play_batch(p);
         cli_progress("poses", ++n);
     }
-    if (r < 0) cli_die(&e);
     play_batch(p);
 }
 
@@ -224,12 +220,10 @@ static void add_key(playback *p, key_list *k)
     const vg_frame *f = &p->in[0];
     if (k->n == k->cap) {
         k->cap = 2 * k->cap + 16;
-        k->label = realloc(k->label, k->cap * sizeof *k->label);
-        k->transforms = realloc(k->transforms, k->cap * sizeof *k->transforms);
+        k->label = cli_resize(k->label, k->cap, sizeof *k->label, "the keys");
+        k->transforms = cli_resize(k->transforms, k->cap, sizeof *k->transforms, "the keys");
     }
-    char *name = strdup(f->name);
-    if (!k->label || !k->transforms || !name) cli_stop(VG_ENOMEM, "not enough memory for the keys");
-    k->label[k->n] = (between_key){name, f->has_time, f->time};
+    k->label[k->n] = (between_key){cli_copy_text(f->name, "the keys"), f->has_time, f->time};
     k->transforms[k->n] = cli_allocate(7 * p->count, sizeof(double), "the transforms");
     take_transforms(p, 1, &k->transforms[k->n++]);
 }
@@ -246,11 +240,8 @@ static void put_moment(playback *p, const key_list *k, double t)
 
 static void play_between(playback *p)
 {
-    vg_err e;
     key_list k = {0};
-    int r;
-    while ((r = vg_source_next(p->source, &p->in[0], &e)) > 0) add_key(p, &k);
-    if (r < 0) cli_die(&e);
+    while (cli_next(p->source, &p->in[0])) add_key(p, &k);
     if (k.n == 0) cli_stop(VG_EINPUT, "the input has no poses to interpolate");
     for (size_t i = 0; i < between_count(); i++) {
         put_moment(p, &k, between_moment(i, k.n));

@@ -100,17 +100,15 @@ static void read_poses(work *w, vg_source *s)
 {
     vg_err e;
     vg_frame f = {0};
-    int r;
     bool found = false;
     if (vg_spool_new(&w->spool, w->h, in_memory, &e) < 0) cli_die(&e);
-    for (w->stride = 1; (r = vg_source_next(s, &f, &e)) > 0; w->total++) {
+    for (w->stride = 1; cli_next(s, &f); w->total++) {
         if (vg_spool_put(w->spool, &f, &e) < 0) cli_die(&e);
         if (!found && !memcmp(f.values, w->h->reference, 3 * w->h->mesh.nv * sizeof *f.values))
             found = true, w->reference = w->total;
         sample_pose(w, w->total, f.values);
         cli_progress("poses", w->total + 1);
     }
-    if (r < 0) cli_die(&e);
     if (!found) w->reference = w->total;
     vg_frame_clear(&f);
     if (!w->total) cli_stop(VG_EINPUT, "the input has no poses to fit a rig to");
@@ -140,9 +138,8 @@ static void keep_motion(motion *m, const vg_frame *f, vg_joint_fitter *fitter)
     const double *turns = f->turns;
     if (m->n == m->cap) {
         m->cap = 2 * m->cap + 16;
-        m->positions = realloc(m->positions, m->cap * 3 * joints * sizeof *m->positions);
-        m->turns = realloc(m->turns, m->cap * 4 * joints * sizeof *m->turns);
-        if (!m->positions || !m->turns) cli_stop(VG_ENOMEM, "not enough memory for the skeleton's motion");
+        m->positions = cli_resize(m->positions, m->cap, 3 * joints * sizeof *m->positions, "the skeleton's motion");
+        m->turns = cli_resize(m->turns, m->cap, 4 * joints * sizeof *m->turns, "the skeleton's motion");
     }
     if (!f->nturns) {
         vg_joint_fitter_fit(fitter, f->values, NULL, NULL, &which);
@@ -158,7 +155,6 @@ static void read_skeleton(work *w)
     vg_source *s;
     vg_frame f = {0};
     vg_joint_fitter *fitter;
-    int r;
     if (vg_source_open(&s, &rigging.skeleton, 1, &e) < 0) cli_die(&e);
     vg_head *h = vg_source_head(s);
     if (!h->skeleton.njoints || h->kind != VG_VERTICES)
@@ -167,8 +163,8 @@ static void read_skeleton(work *w)
     if (vg_skeleton_copy(&w->given.skeleton, &h->skeleton, &e) < 0 ||
         vg_joint_fitter_new(&fitter, &w->given.skeleton, &e) < 0)
         cli_die(&e);
-    while ((r = vg_source_next(s, &f, &e)) > 0) keep_motion(&w->given, &f, fitter);
-    if (r < 0 || vg_head_merge_trace(w->h, h, &e) < 0) cli_die(&e);
+    while (cli_next(s, &f)) keep_motion(&w->given, &f, fitter);
+    if (vg_head_merge_trace(w->h, h, &e) < 0) cli_die(&e);
     vg_joint_fitter_free(&fitter);
     vg_frame_clear(&f);
     vg_source_close(&s);

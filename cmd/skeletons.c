@@ -35,8 +35,8 @@ static bool is_end(const vg_skeleton *s, size_t j)
 static kin link_joints(const vg_skeleton *s)
 {
     size_t n = s->njoints;
-    kin k = {malloc((n + 1) * sizeof *k.first), malloc((n + 1) * sizeof *k.next), calloc(n + 1, sizeof *k.folded)};
-    if (!k.first || !k.next || !k.folded) cli_stop(VG_ENOMEM, "not enough memory for %zu joints", n);
+    kin k = {cli_allocate(n, sizeof *k.first, "the joints"), cli_allocate(n, sizeof *k.next, "the joints"),
+             cli_allocate(n, sizeof *k.folded, "the joints")};
     for (size_t j = 0; j <= n; j++) k.first[j] = NONE;
     for (size_t j = n; j-- > 0;) {
         k.folded[j] = k.first[j] == NONE && is_end(s, j);

@@ -174,15 +174,12 @@ static void fill_body(const work *w, vg_frame *f)
 
 static void deform_all(work *w)
 {
-    vg_err e;
     uint64_t n = 0;
-    int r;
-    while ((r = vg_source_next(w->s, &w->in[w->n], &e)) > 0) {
+    while (cli_next(w->s, &w->in[w->n])) {
         fill_body(w, &w->in[w->n]);
         if (++w->n == BATCH) deform_batch(w);
         cli_progress("poses", ++n);
     }
-    if (r < 0) cli_die(&e);
     deform_batch(w);
 }
 

@@ -108,20 +108,16 @@ static void open_side(side *s, char *operand)
     s->name = strcmp(operand, "-") ? operand : "standard input";
     s->source = cli_source(&operand, 1);
     s->head = vg_source_head(s->source);
-    if (s->head->kind == VG_VERTICES) return;
-    if (s->head->kind == VG_VECTORS)
-        cli_stop(VG_EINPUT, "'%s' holds vectors: pipe it through 'vg-solve' first", s->name);
-    cli_stop(VG_EINPUT, "'%s' holds %s, not vertices: make poses of them first", s->name,
-             vg_kind_name(s->head->kind));
+    char subject[420];
+    snprintf(subject, sizeof subject, "'%.400s'", s->name);
+    cli_need_vertices(s->head, subject);
 }
 
 static bool next(side *s, vg_frame *f)
 {
-    vg_err e;
-    int r = vg_source_next(s->source, f, &e);
-    if (r < 0) cli_die(&e);
-    s->frames += r > 0;
-    return r > 0;
+    bool more = cli_next(s->source, f);
+    s->frames += more;
+    return more;
 }
 
 static void check_same_mesh(const side *truth, const side *result)

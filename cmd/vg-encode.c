@@ -108,27 +108,24 @@ static void prepare(vg_head *h, bool selects, uint32_t *anchors, size_t nanchors
 }
 
 /* The next frame that is wanted: `read` of them are behind it. */
-static int next_taken(vg_source *s, vg_frame *f, uint64_t *read, vg_err *e)
+static bool next_taken(vg_source *s, vg_frame *f, uint64_t *read)
 {
-    int r;
-    while ((r = vg_source_next(s, f, e)) > 0 && !take_wants(&opts.take, (*read)++)) {}
-    if (r == 0) take_end(&opts.take, *read);
-    return r;
+    while (cli_next(s, f))
+        if (take_wants(&opts.take, (*read)++)) return true;
+    take_end(&opts.take, *read);
+    return false;
 }
 
 static void write_as_is(vg_source *s, vg_head *h)
 {
-    vg_err e;
     vg_frame f = {0};
-    uint64_t n = 0, read = 0;
-    int r;
+    uint64_t read = 0;
     cli_stream_open(h);
-    for (; (r = next_taken(s, &f, &read, &e)) > 0; n++) {
+    for (uint64_t n = 0; next_taken(s, &f, &read); n++) {
         if (opts.fps > 0) f.has_time = true, f.time = (double)n / opts.fps;
         cli_stream_put(&f);
         cli_progress("poses", n + 1);
     }
-    if (r < 0) cli_die(&e);
     vg_frame_clear(&f);
 }
 
@@ -137,13 +134,12 @@ static void write_vectors(vg_source *s, vg_head *h)
     vg_err e;
     vg_graph *g;
     vg_frame in = {0}, out = {0};
-    uint64_t n = 0, read = 0;
-    int r;
+    uint64_t read = 0;
     if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&g, h, &e) < 0) cli_die(&e);
     h->kind = VG_VECTORS, h->count = vg_graph_corners(g);
     if (vg_frame_shape(&out, h, &e) < 0) cli_die(&e);
     cli_stream_open(h);
-    for (; (r = next_taken(s, &in, &read, &e)) > 0; n++) {
+    for (uint64_t n = 0; next_taken(s, &in, &read); n++) {
         if (vg_frame_label(&out, &in, &e) < 0) cli_die(&e);
         if (opts.fps > 0) out.has_time = true, out.time = (double)n / opts.fps;
         vg_graph_vectors(g, in.values, out.values);
@@ -152,7 +148,6 @@ static void write_vectors(vg_source *s, vg_head *h)
         cli_stream_put(&out);
         cli_progress("poses", n + 1);
     }
-    if (r < 0) cli_die(&e);
     vg_frame_clear(&in);
     vg_frame_clear(&out);
     vg_graph_free(&g);

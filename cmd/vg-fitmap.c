@@ -88,8 +88,7 @@ static uint64_t read_poses(vg_source *s, vg_map_fitter *f, vg_spool *spool)
     vg_err e;
     uint64_t total = 0;
     size_t n = 0;
-    int r;
-    while ((r = vg_source_next(s, &frames[n], &e)) > 0) {
+    while (cli_next(s, &frames[n])) {
         if (vg_spool_put(spool, &frames[n], &e) < 0) cli_die(&e);
         cli_progress("poses", total + 1);
         if (is_left_out(total++)) continue;
@@ -98,7 +97,7 @@ static uint64_t read_poses(vg_source *s, vg_map_fitter *f, vg_spool *spool)
         if (vg_map_fitter_add(f, n, poses, &e) < 0) cli_die(&e);
         n = 0;
     }
-    if (r < 0 || vg_map_fitter_add(f, n, poses, &e) < 0) cli_die(&e);
+    if (vg_map_fitter_add(f, n, poses, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < 8; i++) vg_frame_clear(&frames[i]);
     return total;
 }
@@ -166,9 +165,8 @@ static void report(const vg_head *h, vg_spool *spool)
     j.h = h;
     if (vg_player_new(&j.player, h, false, cli.threads, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < BATCH; i++) {
-        j.transforms[i] = calloc(7 * h->map.n, sizeof(double)),
-        j.vertices[i] = calloc(3 * h->mesh.nv + 1, sizeof(double));
-        if (!j.transforms[i] || !j.vertices[i]) cli_stop(VG_ENOMEM, "not enough memory for the report");
+        j.transforms[i] = cli_allocate(7 * h->map.n, sizeof(double), "the report");
+        j.vertices[i] = cli_allocate(3 * h->mesh.nv, sizeof(double), "the report");
     }
     uint64_t first = 0;
     int r;
@@ -196,9 +194,7 @@ static void fit(vg_source *s)
 {
     vg_err e;
     vg_head *h = vg_source_head(s);
-    if (h->kind != VG_VERTICES)
-        cli_stop(VG_EINPUT, "the input holds %s, vg-fitmap takes vertices%s", vg_kind_name(h->kind),
-                 h->kind == VG_VECTORS ? ": pipe it through 'vg-solve' first" : "");
+    cli_need_vertices(h, "the input");
     if (rigging_wanted()) {
         rigging_run(s, opts.hold, opts.holdout);
         return;
@@ -238,10 +234,7 @@ static void retarget(vg_source *s)
     h->attributes = target.attributes, target.attributes = (vg_attributes){0};
     vg_head_clear(&target);
     vg_frame frame = {0};
-    int r;
-    /* to the end, so that damage is seen; a map has no frames */
-    while ((r = vg_source_next(s, &frame, &e)) > 0) continue;
-    if (r < 0) cli_die(&e);
+    while (cli_next(s, &frame)) continue; /* to the end, so that damage is seen; a map has no frames */
     vg_frame_clear(&frame);
 }
 

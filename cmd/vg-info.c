@@ -61,8 +61,7 @@ static const report_column value_columns[] = {
 static void replace_text(char **to, const char *from)
 {
     free(*to);
-    *to = strdup(from);
-    if (!*to) cli_stop(VG_ENOMEM, "not enough memory for the name of a frame");
+    *to = cli_copy_text(from, "the name of a frame");
 }
 
 /* Close a stream that wrote into *line; false: something of it was lost. glibc may close well and have no line. */
@@ -129,11 +128,10 @@ static void read_all(vg_source *s, contents *c, report *list)
     vg_frame f = {0};
     vg_digest *digest = NULL;
     vg_err e;
-    int r;
     bool poses = h->kind == VG_VERTICES;
     if (list) report_table(list, "frame_list", "", false, poses ? vertex_columns : value_columns, poses ? 6 : 5);
     if (vg_digest_new(&digest, h, &e) < 0) cli_die(&e);
-    while ((r = vg_source_next(s, &f, &e)) > 0) {
+    while (cli_next(s, &f)) {
         if (opts.digest) vg_digest_add(digest, &f);
         if (list) list_frame(list, h, &f, c->frames);
         if (c->frames == 0 && poses) c->D = vg_diagonal(f.values, h->count);
@@ -141,7 +139,6 @@ static void read_all(vg_source *s, contents *c, report *list)
         note_scalars(c, &f, h->mesh.nv);
         cli_progress("frame", c->frames);
     }
-    if (r < 0) cli_die(&e);
     cli_note("%" PRIu64 " frames read, and the end mark where there has to be one", c->frames);
     c->digest = vg_digest_get(digest);
     c->extra += vg_source_tail(s)->n;
@@ -228,8 +225,7 @@ static void report_faces(report *r, const vg_mesh *m)
 {
     size_t largest = 0;
     for (size_t f = 0; f < m->nf; f++) largest = face_size(m, f) > largest ? face_size(m, f) : largest;
-    uint64_t *count = calloc(largest + 1, sizeof *count);
-    if (!count) cli_stop(VG_ENOMEM, "not enough memory for the sizes of faces");
+    uint64_t *count = cli_allocate(largest, sizeof *count, "the sizes of faces");
     for (size_t f = 0; f < m->nf; f++) count[face_size(m, f)]++;
     char *line = size_line(m, count, largest);
     report_put(r, "faces", NULL, report_count(m->nf));
@@ -247,9 +243,8 @@ static void report_components(report *r, const vg_mesh *m)
 {
     size_t components = 0, isolated = 0;
     vg_err e;
-    uint32_t *label = calloc(m->nv + 1, sizeof *label);
-    int ok = label ? vg_mesh_components(m, label, &components, &e) : vg_fail(&e, VG_ENOMEM, "not enough memory");
-    if (ok < 0) cli_die(&e);
+    uint32_t *label = cli_allocate(m->nv, sizeof *label, "the components of the mesh");
+    if (vg_mesh_components(m, label, &components, &e) < 0) cli_die(&e);
     for (size_t v = 0; v < m->nv; v++) isolated += label[v] == UINT32_MAX;
     free(label);
     report_put(r, "components", "components", report_count(components));
@@ -287,8 +282,7 @@ typedef struct coverage {
 static coverage cover(const vg_correspondence *c)
 {
     coverage x = {0};
-    bool *used = calloc(c->source_nf + 1, sizeof *used);
-    if (!used) cli_stop(VG_ENOMEM, "not enough memory for the faces of the source");
+    bool *used = cli_allocate(c->source_nf, sizeof *used, "the faces of the source");
     for (size_t f = 0; f < c->target_nf; f++) {
         uint64_t pairs = c->first[f + 1] - c->first[f];
         if (pairs > x.most_pairs) x.most_pairs = pairs;
@@ -448,9 +442,8 @@ static void note_tree(report *r, const vg_head *h)
 {
     size_t n = h->nprovenance, nedges = n;
     for (size_t i = 0; i < n; i++) nedges += h->provenance[i].nparents;
-    step *pending = calloc(nedges + 1, sizeof *pending);
-    bool *shown = calloc(n + 1, sizeof *shown);
-    if (!pending || !shown) cli_stop(VG_ENOMEM, "not enough memory for the command lines");
+    step *pending = cli_allocate(nedges, sizeof *pending, "the command lines");
+    bool *shown = cli_allocate(n, sizeof *shown, "the command lines");
     for (size_t root = n; root-- > 0;) {
         size_t open = 0;
         if (!shown[root]) pending[open++] = (step){root, 0};
@@ -477,12 +470,11 @@ static void report_provenance(report *r, const vg_head *h)
     report_table(r, "provenance", NULL, false, provenance_columns, 4);
     for (size_t i = 0; i < h->nprovenance; i++) {
         const vg_provenance *p = &h->provenance[i];
-        uint64_t *parents = calloc(p->nparents + 1, sizeof *parents);
-        if (!parents) cli_stop(VG_ENOMEM, "not enough memory for the command lines");
+        uint64_t *parents = cli_allocate(p->nparents, sizeof *parents, "the command lines");
         for (size_t k = 0; k < p->nparents; k++) parents[k] = p->parents[k];
         const report_value row[4] = {report_text(p->program), report_text(p->version),
                                      report_texts((const char *const *)p->args, p->nargs),
-                                     report_counts(parents, parents ? p->nparents : 0)};
+                                     report_counts(parents, p->nparents)};
         report_row(r, row);
         free(parents);
     }

@@ -28,10 +28,8 @@ static struct {
 static key *add_key(int by, const char *option, const char *mesh)
 {
     cli_claim_input(option, mesh);
-    key *grown = realloc(opts.keys, (opts.nkeys + 1) * sizeof *grown);
-    if (!grown) cli_stop(VG_ENOMEM, "not enough memory for the given poses");
-    opts.keys = grown;
-    key *k = &grown[opts.nkeys++];
+    opts.keys = cli_resize(opts.keys, opts.nkeys + 1, sizeof *opts.keys, "the given poses");
+    key *k = &opts.keys[opts.nkeys++];
     *k = (key){.by = by, .mesh = mesh};
     return k;
 }
@@ -106,16 +104,6 @@ static const cli_program program = {
 
 /* ---- the given poses ---- */
 
-static void refuse_kind(const char *subject, vg_kind kind) __attribute__((noreturn));
-static void refuse_kind(const char *subject, vg_kind kind)
-{
-    static const char *const advice[] = {
-        [VG_VECTORS] = "pipe them through 'vg-solve' first",
-        [VG_DEFORMATIONS] = "apply them with 'vg-deform --onto MESH', then 'vg-solve'",
-        [VG_TRANSFORMS] = "they need a map"};
-    cli_stop(VG_EINPUT, "%s holds %s, and vertices are guided: %s", subject, vg_kind_name(kind), advice[kind]);
-}
-
 /* The first pose of the operand; the rest is not read. */
 static void load_key(key *k, vg_head *h)
 {
@@ -126,13 +114,11 @@ static void load_key(key *k, vg_head *h)
     snprintf(subject, sizeof subject, "'%.180s'", k->mesh);
     if (vg_source_open(&s, &k->mesh, 1, &e) < 0) cli_die(&e);
     const vg_head *from = vg_source_head(s);
-    if (from->kind != VG_VERTICES) refuse_kind(subject, from->kind);
+    cli_need_vertices(from, subject);
     if (vg_mesh_same(&h->mesh, "the sequence", &from->mesh, subject, &e) < 0) cli_die(&e);
-    int r = vg_source_next(s, &f, &e);
-    if (r == 0) r = vg_fail(&e, VG_EINPUT, "%s holds no pose", subject);
-    if (r < 0 || vg_head_merge_trace(h, from, &e) < 0) cli_die(&e);
-    k->pose = malloc((3 * h->mesh.nv + 1) * sizeof *k->pose);
-    if (!k->pose) cli_stop(VG_ENOMEM, "not enough memory for the given poses");
+    if (!cli_next(s, &f)) cli_stop(VG_EINPUT, "%s holds no pose", subject);
+    if (vg_head_merge_trace(h, from, &e) < 0) cli_die(&e);
+    k->pose = cli_allocate(3 * h->mesh.nv, sizeof *k->pose, "the given poses");
     memcpy(k->pose, f.values, 3 * h->mesh.nv * sizeof *k->pose);
     vg_frame_clear(&f);
     vg_source_close(&s);
@@ -225,15 +211,12 @@ static void step(work *w, vg_frame *f, uint64_t n, bool last)
 /* One frame late, so that the last is known when it is its turn. */
 static uint64_t guide_all(work *w)
 {
-    vg_err e;
     vg_frame frames[2] = {{0}};
     uint64_t n = 0;
-    int r;
-    for (; (r = vg_source_next(w->s, &frames[n % 2], &e)) > 0; n++) {
+    for (; cli_next(w->s, &frames[n % 2]); n++) {
         if (n > 0) step(w, &frames[(n - 1) % 2], n - 1, false);
         cli_progress("frames", n + 1);
     }
-    if (r < 0) cli_die(&e);
     if (n > 0) step(w, &frames[(n - 1) % 2], n - 1, true);
     for (int i = 0; i < 2; i++) vg_frame_clear(&frames[i]);
     return n;
@@ -284,7 +267,7 @@ int main(int argc, char **argv)
     if (opts.nkeys == 0) cli_usage("name at least one given pose: --first, --last or --key");
     work w = {.s = cli_source(operands, n)};
     w.h = vg_source_head(w.s);
-    if (w.h->kind != VG_VERTICES) refuse_kind("the input", w.h->kind);
+    cli_need_vertices(w.h, "the input");
     open_work(&w);
     cli_stream_open(w.h);
     uint64_t frames = guide_all(&w);

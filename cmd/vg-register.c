@@ -107,11 +107,10 @@ static void report_unmatched(const vg_mesh *m, const vg_correspondence *c)
 {
     vg_err e;
     size_t n = 0, unmatched = 0;
-    uint32_t *label = calloc(m->nv + 1, sizeof *label);
-    if (!label) cli_stop(VG_ENOMEM, "not enough memory for the components of the target");
+    static const char what[] = "the components of the target";
+    uint32_t *label = cli_allocate(m->nv, sizeof *label, what);
     if (vg_mesh_components(m, label, &n, &e) < 0) cli_die(&e);
-    size_t *faces = calloc(n + 1, sizeof *faces), *without = calloc(n + 1, sizeof *without);
-    if (!faces || !without) cli_stop(VG_ENOMEM, "not enough memory for the components of the target");
+    size_t *faces = cli_allocate(n, sizeof *faces, what), *without = cli_allocate(n, sizeof *without, what);
     for (size_t f = 0; f < m->nf; f++) {
         uint32_t k = label[m->vert[m->start[f]]];
         faces[k]++, without[k] += !c->matched[f], unmatched += !c->matched[f];

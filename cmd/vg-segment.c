@@ -36,15 +36,8 @@ static size_t parse_patches(void)
     char *end;
     double k = strtod(opts.patches, &end);
     if (*end || opts.patches[strspn(opts.patches, "0123456789")] || !(k >= 1 && k <= 4294967294.0))
-        cli_usage("--patches is a whole number from 1 on or 'auto', not '%s'", opts.patches);
+        cli_usage("option '--patches' needs a whole number from 1 on or 'auto', not '%s'", opts.patches);
     return (size_t)k;
-}
-
-static void check_head(const vg_head *h)
-{
-    if (h->kind == VG_VERTICES) return;
-    cli_stop(VG_EINPUT, "the input holds %s, vg-segment takes vertices%s", vg_kind_name(h->kind),
-             h->kind == VG_VECTORS ? ": pipe it through 'vg-solve' first" : "");
 }
 
 static uint64_t add_all(vg_segmenter *s, vg_source *source)
@@ -54,15 +47,13 @@ static uint64_t add_all(vg_segmenter *s, vg_source *source)
     vg_err e;
     uint64_t total = 0;
     size_t n = 0;
-    int r;
-    while ((r = vg_source_next(source, &frames[n], &e)) > 0) {
+    while (cli_next(source, &frames[n])) {
         poses[n] = frames[n].values;
         cli_progress("poses", ++total);
         if (++n < BATCH) continue;
         if (vg_segmenter_add(s, n, poses, &e) < 0) cli_die(&e);
         n = 0;
     }
-    if (r < 0) cli_die(&e);
     if (vg_segmenter_add(s, n, poses, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < BATCH; i++) vg_frame_clear(&frames[i]);
     return total;
@@ -74,7 +65,7 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands), k = parse_patches();
     vg_source *source = cli_source(operands, n);
     vg_head *h = vg_source_head(source);
-    check_head(h);
+    cli_need_vertices(h, "the input");
     vg_err e;
     vg_segmenter *s;
     vg_segment_report report;

@@ -296,14 +296,11 @@ static void prepare(work *w, vg_head *h)
 
 static void solve_all(work *w, vg_source *s)
 {
-    vg_err e;
     uint64_t n = 0;
-    int r;
-    while ((r = vg_source_next(s, &w->in[w->slot], &e)) > 0) {
+    while (cli_next(s, &w->in[w->slot])) {
         take_frame(w);
         cli_progress("poses", ++n);
     }
-    if (r < 0) cli_die(&e);
     solve_waiting(w);
 }
 

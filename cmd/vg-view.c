@@ -208,20 +208,15 @@ static void open_side(side *s, char **operands, size_t n)
     else snprintf(s->name, sizeof s->name, "'%.400s'", operands[0]);
     s->source = cli_source(operands, n);
     s->head = vg_source_head(s->source);
-    if (s->head->kind == VG_VERTICES) return;
-    if (s->head->kind == VG_VECTORS)
-        cli_stop(VG_EINPUT, "%s holds vectors: pipe it through 'vg-solve' first", s->name);
-    cli_stop(VG_EINPUT, "%s holds %s, not vertices: make poses of them first", s->name, vg_kind_name(s->head->kind));
+    cli_need_vertices(s->head, s->name);
 }
 
 static bool next(side *s)
 {
-    vg_err e;
-    int r = vg_source_next(s->source, &s->frame, &e);
-    if (r < 0) cli_die(&e);
-    s->frames += r > 0;
-    s->coloured |= r > 0 && s->frame.has_scalars;
-    return r > 0;
+    bool more = cli_next(s->source, &s->frame);
+    s->frames += more;
+    s->coloured |= more && s->frame.has_scalars;
+    return more;
 }
 
 static void close_side(side *s)

@@ -173,9 +173,9 @@ END
     says "'cube.obj' has 8 vertices where the sequence has 12"
     vg-encode --vectors a.obj -o vectors.vgs
     must_fail 3 vg-poisson --first vectors.vgs u.vgs -o t.vgs
-    says "'vectors.vgs' holds vectors, and vertices are guided: pipe them through 'vg-solve' first"
+    says "'vectors.vgs' holds vectors: pipe it through 'vg-solve' first"
     must_fail 3 vg-poisson --first a.obj vectors.vgs -o t.vgs
-    says "the input holds vectors, and vertices are guided: pipe them through 'vg-solve' first"
+    says "the input holds vectors: pipe it through 'vg-solve' first"
     vg-deform vectors.vgs -o turns.vgs
     must_fail 3 vg-poisson --first a.obj turns.vgs -o t.vgs
     says 'the input holds deformations' 'vg-deform --onto MESH'
