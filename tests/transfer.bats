@@ -99,6 +99,26 @@ differ() {
     [ "$status" = 1 ] || fail "'$1' and '$2' should differ"
 }
 
+@test "a target that does not stand as the reference pose does is warned of, one of another build is not" {
+    must vg-encode --reference "$DATA/horse.rest.obj" "$DATA/horse-run.tar.xz" -o horse.vgs
+    awk '$1 == "v" {$2 *= 1.5; $4 *= 0.8} {print}' "$DATA/horse.rest.obj" >wide.obj
+    awk '$1 == "v" {y = $3; $3 = -$4; $4 = y} {print}' "$DATA/horse.rest.obj" >z-up.obj
+    must vg-deform --onto wide.obj horse.vgs -o out.vgs
+    must_fail 0 vg-deform --onto z-up.obj horse.vgs -o out.vgs
+    says "does not stand as the reference pose 'horse.rest' does: they differ by 90 degrees on average"
+    must vg-deform -q --onto z-up.obj horse.vgs -o out.vgs
+    must vg-deform horse.vgs -o measured.vgs
+    must_fail 0 vg-deform --onto z-up.obj measured.vgs -o out.vgs
+    says "differ by 90 degrees"
+    # a man who stands, and one who sits
+    must vg-encode --take 0 "$DATA/human-man-poses.tar.xz" -o standing.vgs
+    must vg-encode --take 7 "$DATA/human-heavy-poses.tar.xz" -o sitting.vgs
+    must vg-decode sitting.vgs -o sitting.obj
+    must_fail 0 vg-deform --onto sitting.obj standing.vgs -o out.vgs
+    says "reference pose 'human-man_000_rest'"
+    must vg-deform --onto "$DATA/human-heavy-poses.tar.xz" standing.vgs -o out.vgs
+}
+
 @test "the unit of the source does not matter" {
     first_poses faceA 4
     for i in 0 1 2 3; do transform 1000 0 0 <pose_$i.obj >large_$i.obj; done
