@@ -83,7 +83,7 @@ void vg_mesh_clear(vg_mesh *m);
 int vg_mesh_copy(vg_mesh *to, const vg_mesh *from, vg_err *e) VG_MUST_CHECK;
 
 /* vg_mesh_check: VG_OK, or VG_EINPUT naming the first face that is too small, has an index out of range, or names a
- * vertex twice. `subject` is what the message calls the mesh ("file 'a.obj'"). O(corners). */
+ * vertex twice, or when there are too many of anything. `subject` is what the message calls the mesh ("file 'a.obj'"). O(corners). */
 int vg_mesh_check(const vg_mesh *m, const char *subject, vg_err *e) VG_MUST_CHECK;
 
 /* vg_mesh_same: VG_OK when both have the same vertex count and the same faces in the same order; else VG_EINPUT, and
@@ -351,9 +351,9 @@ typedef struct vg_head {
 void vg_head_clear(vg_head *h);
 int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e) VG_MUST_CHECK;
 
-/* vg_head_trace: append the record of this process. Its parents are the last record already there (if any) and
- * `other_last` of every stream merged by vg_head_merge_trace. argv is argc strings;
- * bytes that are no UTF-8 become '?'. */
+/* vg_head_trace: append the record of this process. Its parents are the records that no other names as a parent: the
+ * last of the stream's own, and of every one that vg_head_merge_trace has put before it. argv is argc strings; bytes
+ * that are no UTF-8 become '?'. */
 int vg_head_trace(vg_head *h, const char *program, int argc, char *const *argv, vg_err *e) VG_MUST_CHECK;
 
 /* vg_head_merge_trace: put the provenance of a second input before that of this process (call before
@@ -449,7 +449,8 @@ int vg_select_faces(const vg_mesh *m, uint32_t **faces, size_t *n, vg_err *e) VG
 
 /* vg_link_components: the fewest virtual line segments that join all components of m, between nearby vertices of
  * `vertices` (nv points): a minimum spanning tree of the components, where a link that would be shorter than the
- * edges beside it is moved on to the next vertex of the face. *pairs (2 per link, caller frees) and *n. */
+ * edges beside it is moved on to the next vertex of the face. *pairs (2 per link, caller frees) and *n. VG_EARG when a
+ * vertex is not finite. */
 int vg_link_components(const vg_mesh *m, const double *vertices, uint32_t **pairs, size_t *n,
                        vg_err *e) VG_MUST_CHECK;
 
@@ -476,9 +477,9 @@ typedef enum vg_method { VG_BY_POSE = 0, VG_BY_GRADIENT = 1, VG_BY_BLEND = 2 } v
 /* vg_deformer_target: apply to these reference vectors (one per corner of the graph, copied) from now on. */
 int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_method method, vg_err *e) VG_MUST_CHECK;
 /* vg_deformer_measure: n poses in (kind VG_VERTICES: nv points each, or VG_VECTORS: one vector per corner), n arrays
- * of a quaternion per corner out. vg_deformer_transfer: the same in, the deformed target vectors out, never worse
- * than measuring and applying by more than rounding. vg_deformer_apply: quaternions in,
- * deformed target vectors out. */
+ * of a quaternion per corner out. With a target: vg_deformer_apply: quaternions in, deformed target vectors out;
+ * vg_deformer_transfer: poses in, deformed target vectors out: by pose what measuring and applying gives, but for
+ * rounding. One call at a time on one deformer. */
 void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses,
                          double *const *quaternions);
 void vg_deformer_transfer(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses, double *const *vectors);
@@ -511,7 +512,7 @@ typedef struct vg_path_facts {
 int vg_path_new(vg_path **p, const vg_graph *g, const double *reference, const vg_key *keys, size_t nkeys,
                 const vg_path_options *o, vg_err *e) VG_MUST_CHECK;
 void vg_path_free(vg_path **p);
-/* vg_path_at: the pose at t: vectors (one per corner), root and anchors out. Key i is at t = i. What is between two
+/* vg_path_at: the pose at t: vectors (one per corner), root and anchors (NULL if there are none) out. Key i is at t = i. What is between two
  * keys is prepared when it is first asked for and kept until something else is (three stretches if smooth): ask in
  * order. */
 int vg_path_at(vg_path *p, double t, double *vectors, double root[3], double *anchors, vg_err *e) VG_MUST_CHECK;
@@ -538,9 +539,12 @@ vg_deform_counts vg_carrier_counts(const vg_carrier *c);
  * the vectors of each pose and put at the source face's centroid; corners that share a vertex are averaged. No linear
  * system; fails for large deformations. Gives vertices: the mean of the attached ones is the source's. */
 typedef struct vg_shaper vg_shaper;
+/* vg_shaper_new: g, the graph of both, is borrowed until free; references: nv points each, not kept. */
 int vg_shaper_new(vg_shaper **s, const vg_graph *g, const double *source_reference, const double *target_reference,
                   int threads, vg_err *e) VG_MUST_CHECK;
 void vg_shaper_free(vg_shaper **s);
+/* vg_shaper_transfer: n poses of the source in, n of the target out (nv points each); what is in no face is as in the
+ * target's reference. */
 void vg_shaper_transfer(vg_shaper *s, size_t n, const double *const *poses, double *const *vertices);
 
 /* Where the whole body goes when a motion is carried over (MATH 5): each root or anchor is as far from its place in
@@ -582,7 +586,7 @@ typedef struct vg_solver_facts {
 
 /* vg_solver_new: g borrowed until free; anchors (n ascending vertices, each attached) are met exactly; without any,
  * the mean of the attached vertices is. reference (nv points, copied in part) places the vertices that are in no
- * face. VG_EINPUT when the graph is not connected. */
+ * face. VG_EINPUT when the graph is not connected, an anchor is in no face, or all of it is too large. */
 int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
                   vg_weights weights, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_solver_free(vg_solver **s);
@@ -649,8 +653,9 @@ typedef struct vg_segment_report {
 int vg_segmenter_new(vg_segmenter **s, const vg_mesh *m, const double *reference, int threads,
                      vg_err *e) VG_MUST_CHECK;
 void vg_segmenter_free(vg_segmenter **s);
+/* vg_segmenter_add: n poses, nv points each. */
 int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_err *e) VG_MUST_CHECK;
-/* vg_segmenter_cut: patches 0: as few of 4 6 8 12 16 24 ... 256 as bring the angle to 10 degrees. connected: every
+/* vg_segmenter_cut: the patches of the poses so far; may be called again, for others. patches 0: as few of 4 6 8 12 16 24 ... 256 as bring the angle to 10 degrees. connected: every
  * patch is in one piece: pieces are joined with neighbours that turn alike until `patches` are left, or no
  * neighbours. Fewer patches than asked for when fewer faces turn differently. VG_EINPUT when there is no face. */
 int vg_segmenter_cut(vg_segmenter *s, size_t patches, uint64_t seed, bool connected, vg_patches *out,
@@ -664,13 +669,14 @@ typedef struct vg_map_fitter vg_map_fitter;
 int vg_map_fitter_new(vg_map_fitter **f, vg_head *h, double hold, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_map_fitter_free(vg_map_fitter **f);
 int vg_map_fitter_add(vg_map_fitter *f, size_t n, const double *const *poses, vg_err *e) VG_MUST_CHECK;
-/* vg_map_fitter_finish: fill h->map. VG_EINPUT without poses. */
+/* vg_map_fitter_finish: fill h->map, which is empty on failure. VG_EINPUT without poses. */
 int vg_map_fitter_finish(vg_map_fitter *f, vg_err *e) VG_MUST_CHECK;
 
 /* vg_map_retarget: the map of h for another body of the same faces (T 6.5), or one on the way to it (T 6.6): its
  * vectors are those of h's reference, turned and stretched towards the target's by `morph` (1: all the way). h's
  * reference becomes that body's. target: nv points. Patches are still measured on the body that the map was fitted
- * on; the joints of a rig go with the vertices around them, and its transforms are those of the other body. */
+ * on; the joints of a rig go with the vertices around them, and its transforms are those of the other body. VG_EINPUT
+ * when there is no map, or a body has no extent. On failure h may be neither body's: it can only be cleared. */
 int vg_map_retarget(vg_head *h, const double *target, double morph, int threads, vg_err *e) VG_MUST_CHECK;
 
 /* A map at work. Transforms are 7 numbers each, as in VG_TRANSFORMS. */
@@ -683,7 +689,7 @@ void vg_player_measure(vg_player *p, size_t n, const double *const *poses, doubl
 /* vg_player_place: keep rotations, scales and root, and put the patches where their joints want them, in place. */
 void vg_player_place(vg_player *p, double *transforms);
 /* vg_player_between: from a (t = 0) to b (t = 1) and beyond: rotations and scales go along geodesics, the root in a
- * line, joints hold. */
+ * line, joints hold. transforms: neither a nor b. */
 void vg_player_between(vg_player *p, const double *a, const double *b, double t, double *transforms);
 /* vg_player_pose: n times transforms to vertices, by one product. */
 void vg_player_pose(vg_player *p, size_t n, const double *const *transforms, double *const *vertices);
@@ -776,8 +782,9 @@ void vg_measures_get(const vg_measures *x, vg_measure_report *r);
 double vg_error_p95(double *numbers, size_t n);
 
 /* A fingerprint of what a sequence says, whoever made it: XXH64 over kind, faces, selection, links, anchors,
- * reference positions, and of every frame name, time, root, anchors and values, all numbers as binary64 (-0 as 0).
- * Provenance, attributes, unknown records and the precision they are written in do not count. */
+ * reference positions, and of every frame name, time, root, anchors, turns of joints and values, all numbers as binary64
+ * (-0 as 0). Provenance, attributes, scalars, pins, unknown records and the precision they are written in do not count,
+ * nor does what is no sequence: skeletons, pairs of faces, patches, rigs and maps. */
 typedef struct vg_digest vg_digest;
 int vg_digest_new(vg_digest **d, const vg_head *h, vg_err *e) VG_MUST_CHECK; /* h is borrowed until free */
 void vg_digest_free(vg_digest **d);

@@ -1,5 +1,5 @@
-/* core.h: what every layer of libvg leans on: memory with checked sizes, growing bytes, threads, byte order,
- * checksums. Internal; nothing here knows a mesh or a file.
+/* core.h: what every layer of libvg leans on: memory with checked sizes, growing bytes, threads, byte order.
+ * Internal; nothing here knows a mesh or a file.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CORE_H
 #define VG_CORE_H
@@ -56,25 +56,6 @@ void vgi_belt_put(vgi_belt *b);            /* the thing at vgi_belt_place is the
 /* vgi_belt_take: the place of the oldest, when the work on it is done; there is one. */
 size_t vgi_belt_take(vgi_belt *b);
 
-/* vgi_frame_scalars: vg_frame_scalars whose numbers are still to be set. */
-int vgi_frame_scalars(vg_frame *f, const char *name, size_t name_bytes, const char *unit, size_t unit_bytes,
-                      size_t nv, vg_err *e) VG_MUST_CHECK;
-
-/* vgi_patch_colour: sRGB, far from those of the numbers before and after: hues by the golden ratio,
- * in three shades. */
-static inline void vgi_patch_colour(uint32_t patch, unsigned char rgb[3])
-{
-    static const unsigned char light[3] = {230, 190, 250}, dark[3] = {90, 50, 140};
-    unsigned hue = (unsigned)((patch * 0x9e3779b9u) >> 16) * 6, part = hue >> 16, at = hue >> 8 & 255,
-             shade = patch % 3;
-    unsigned char up = (unsigned char)(dark[shade] + (light[shade] - dark[shade]) * (int)at / 255);
-    unsigned char down = (unsigned char)(light[shade] - (light[shade] - dark[shade]) * (int)at / 255);
-    const unsigned char of_part[6][3] = {{light[shade], up, dark[shade]}, {down, light[shade], dark[shade]},
-                                         {dark[shade], light[shade], up}, {dark[shade], down, light[shade]},
-                                         {up, dark[shade], light[shade]}, {light[shade], dark[shade], down}};
-    memcpy(rgb, of_part[part], 3);
-}
-
 /* Little-endian numbers. */
 static inline uint32_t vgi_get32(const unsigned char *p)
 {
@@ -93,24 +74,6 @@ static inline void vgi_put64(unsigned char *p, uint64_t x)
 {
     vgi_put32(p, (uint32_t)x);
     vgi_put32(p + 4, (uint32_t)(x >> 32));
-}
-
-/* Eight poses side by side: the unit of every numeric kernel. GCC and Clang lower it to what the machine has. */
-enum { VGI_LANES = 8 };
-typedef double vgi_lanes __attribute__((vector_size(64)));
-typedef int64_t vgi_mask __attribute__((vector_size(64))); /* what comparing lanes gives: -1 or 0 */
-
-/* vgi_gather: number i of eight arrays. */
-static inline __attribute__((always_inline)) vgi_lanes vgi_gather(const double *const *p, size_t i)
-{
-    return (vgi_lanes){p[0][i], p[1][i], p[2][i], p[3][i], p[4][i], p[5][i], p[6][i], p[7][i]};
-}
-
-/* vgi_lane_roots: the square root of each. */
-static inline __attribute__((always_inline)) vgi_lanes vgi_lane_roots(vgi_lanes a)
-{
-    for (int i = 0; i < VGI_LANES; i++) a[i] = __builtin_sqrt(a[i]);
-    return a;
 }
 
 #endif

@@ -4,6 +4,7 @@
 #include "io/io.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 /* By content the first that says yes is taken, so those with a signature come before STL and OBJ, which have none.
  * By suffix, the first with that suffix. */
@@ -42,6 +43,14 @@ const char *vgi_format_names(void)
 static int unknown_format(const char *format, vg_err *e)
 {
     return vg_fail(e, VG_EARG, "unknown mesh format '%s' (known: %s)", format ? format : "", vgi_format_names());
+}
+
+void vg_model_clear(vg_model *m)
+{
+    vg_mesh_clear(&m->mesh);
+    free(m->vertices);
+    vg_attributes_clear(&m->attributes);
+    *m = (vg_model){0};
 }
 
 int vgi_model_read(vg_model *m, const void *data, size_t n, const vgi_format *format, const char *file_name,

@@ -2,6 +2,7 @@
  * Leaves out what the number means: its name and unit say so to people.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/cursor.h"
+#include "model/frame.h"
 
 /* Text of n bytes that lies in the payload; NULL when it is not there or no UTF-8. */
 static const char *peek_text(cursor *c, size_t n)

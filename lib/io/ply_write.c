@@ -2,6 +2,7 @@
  * their patches, edges.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
+#include "model/colour.h"
 
 enum { MOST_NUMBER = 26, MOST_SMALL_FACE = 255 }; /* bytes of a number and what follows it; a length of 8 bits */
 

@@ -3,6 +3,7 @@
  * which nobody else reads.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
+#include "model/frame.h"
 
 #include <errno.h>
 #include <stdlib.h>

@@ -40,9 +40,7 @@ INLINE void measure_map(const vgi_source *s, size_t f, vgi_map *map, unsigned ch
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) d.m[3 * i + j] += n[i] / root * s->q[3 * f + (size_t)j];
     *map = d;
-    unsigned bits = 0;
-    for (int k = 0; k < VGI_LANES; k++) bits |= (unsigned)(none[k] & 1) << k;
-    *bad = (unsigned char)bits;
+    *bad = (unsigned char)vgi_lane_bits(none);
 }
 
 INLINE void measure_maps(const vgi_source *s, size_t first, size_t last, vgi_map *maps, unsigned char *bad)
@@ -54,12 +52,8 @@ INLINE void measure_maps(const vgi_source *s, size_t first, size_t last, vgi_map
 /* x := (x / scale + scale x^-T) / 2 */
 INLINE vgi_lanes newton_step(vgi_lanes *x)
 {
-    vgi_lanes c[9]; /* cofactors: det x^-T */
-    c[0] = x[4] * x[8] - x[5] * x[7], c[1] = x[5] * x[6] - x[3] * x[8], c[2] = x[3] * x[7] - x[4] * x[6];
-    c[3] = x[2] * x[7] - x[1] * x[8], c[4] = x[0] * x[8] - x[2] * x[6], c[5] = x[1] * x[6] - x[0] * x[7];
-    c[6] = x[1] * x[5] - x[2] * x[4], c[7] = x[2] * x[3] - x[0] * x[5], c[8] = x[0] * x[4] - x[1] * x[3];
-    vgi_lanes det = x[0] * c[0] + x[1] * c[1] + x[2] * c[2], size = {0}, inverse_size = {0}, change = {0};
-    for (int i = 0; i < 9; i++) size += x[i] * x[i], inverse_size += c[i] * c[i];
+    vgi_lanes c[9], det = vgi_lane_cofactors(x, c); /* c: det x^-T */
+    vgi_lanes size = vgi_lane_squares(x), inverse_size = vgi_lane_squares(c), change = {0};
     /* the scale that balances Frobenius norms of x and x^-T */
     vgi_lanes abs_det = {0};
     for (int k = 0; k < VGI_LANES; k++) abs_det[k] = fabs(det[k]);
@@ -77,13 +71,8 @@ INLINE vgi_lanes newton_step(vgi_lanes *x)
 INLINE unsigned unsound(const vgi_lanes *x)
 {
     static const double thin = 1e-12; /* determinant of a matrix of norm 1 */
-    vgi_lanes c0 = x[4] * x[8] - x[5] * x[7], c1 = x[5] * x[6] - x[3] * x[8], c2 = x[3] * x[7] - x[4] * x[6];
-    vgi_lanes det = x[0] * c0 + x[1] * c1 + x[2] * c2, size = {0};
-    for (int i = 0; i < 9; i++) size += x[i] * x[i];
-    vgi_mask bad = ~(det > thin * size * vgi_lane_roots(size));
-    unsigned bits = 0;
-    for (int k = 0; k < VGI_LANES; k++) bits |= (unsigned)(bad[k] & 1) << k;
-    return bits;
+    vgi_lanes c[9], det = vgi_lane_cofactors(x, c), size = vgi_lane_squares(x);
+    return vgi_lane_bits(~(det > thin * size * vgi_lane_roots(size)));
 }
 
 INLINE void polar(const vgi_map *a, vgi_map *r)

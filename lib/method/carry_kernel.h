@@ -3,7 +3,7 @@
 #ifndef VG_CARRY_KERNEL_H
 #define VG_CARRY_KERNEL_H
 
-#include "core/core.h"
+#include "core/lanes.h"
 
 /* A linear map of space in eight poses, row-major. */
 typedef struct vgi_map {

@@ -58,13 +58,6 @@ INLINE void load_face(const vgi_transfer *t, uint32_t begin, size_t r, vgi_vec *
     w[r] = w[0];
 }
 
-INLINE unsigned lanes_of(vgi_mask m)
-{
-    unsigned bits = 0;
-    for (int i = 0; i < VGI_LANES; i++) bits |= (unsigned)(m[i] & 1) << i;
-    return bits;
-}
-
 INLINE vgi_lanes same(double x)
 {
     return (vgi_lanes){0} + x;
@@ -131,7 +124,7 @@ INLINE void transfer_face(const vgi_transfer *t, size_t f, vgi_vec *w, vgi_vec *
         for (size_t i = 0; i < r; i++)
             to[3 * i] = wanted[i].x[k], to[3 * i + 1] = wanted[i].y[k], to[3 * i + 2] = wanted[i].z[k];
     }
-    unsigned which = lanes_of(bad) & (0xffu >> (VGI_LANES - t->lanes));
+    unsigned which = vgi_lane_bits(bad) & (0xffu >> (VGI_LANES - t->lanes));
     if (which) t->bad(t->context, f, which);
 }
 

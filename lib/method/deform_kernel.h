@@ -3,7 +3,7 @@
 #ifndef VG_DEFORM_KERNEL_H
 #define VG_DEFORM_KERNEL_H
 
-#include "core/core.h"
+#include "core/lanes.h"
 
 typedef struct vgi_vec {
     vgi_lanes x, y, z;

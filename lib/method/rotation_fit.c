@@ -109,21 +109,6 @@ void vgi_turns_clear(vgi_turns *t)
     *t = (vgi_turns){0};
 }
 
-INLINE vgi_lanes lane_squares(const vgi_lanes *x)
-{
-    vgi_lanes s = {0};
-    for (int i = 0; i < 9; i++) s += x[i] * x[i];
-    return s;
-}
-
-INLINE vgi_lanes lane_cofactors(const vgi_lanes *x, vgi_lanes *c)
-{
-    c[0] = x[4] * x[8] - x[5] * x[7], c[1] = x[5] * x[6] - x[3] * x[8], c[2] = x[3] * x[7] - x[4] * x[6];
-    c[3] = x[2] * x[7] - x[1] * x[8], c[4] = x[0] * x[8] - x[2] * x[6], c[5] = x[1] * x[6] - x[0] * x[7];
-    c[6] = x[1] * x[5] - x[2] * x[4], c[7] = x[2] * x[3] - x[0] * x[5], c[8] = x[0] * x[4] - x[1] * x[3];
-    return x[0] * c[0] + x[1] * c[1] + x[2] * c[2];
-}
-
 /* sum of d r' over the corners, and of the unit normals (times the weight that the reference's carries) */
 INLINE void face_matrix(const vgi_turns *t, size_t f, const double *const *poses, vgi_lanes *m)
 {
@@ -160,19 +145,19 @@ INLINE void measure(const vgi_turns *t, size_t f, const double *const *poses, vg
     enum { MOST = 16 };
     vgi_lanes m[9], c[9];
     face_matrix(t, f, poses, m);
-    vgi_lanes size2 = lane_squares(m);
+    vgi_lanes size2 = vgi_lane_squares(m);
     for (int k = 0; k < VGI_LANES; k++) size2[k] = size2[k] > 0 ? 1 / size2[k] : 0;
     vgi_lanes shrink = vgi_lane_roots(size2) * 1.7320508075688772;
     for (int i = 0; i < 9; i++) x[i] = m[i] * shrink;
-    vgi_lanes det = lane_cofactors(x, c);
+    vgi_lanes det = vgi_lane_cofactors(x, c);
     vgi_mask good = det > 5.2 * thin;
     for (int i = 0; i < 9; i++) /* lanes that Newton is not for wait at the identity */
         for (int k = 0; k < VGI_LANES; k++) x[i][k] = good[k] ? x[i][k] : i % 4 == 0;
     for (int step = 0; step < MOST; step++) {
-        det = lane_cofactors(x, c);
+        det = vgi_lane_cofactors(x, c);
         vgi_lanes a = {0}, b, change = {0};
         if (step < 4) {
-            vgi_lanes g = vgi_lane_roots(vgi_lane_roots(lane_squares(c) / lane_squares(x)) / det);
+            vgi_lanes g = vgi_lane_roots(vgi_lane_roots(vgi_lane_squares(c) / vgi_lane_squares(x)) / det);
             a = 0.5 * g, b = 0.5 / (g * det);
         } else {
             a += 0.5, b = 0.5 / det;

@@ -4,7 +4,7 @@
 #ifndef VG_ROTATION_FIT_H
 #define VG_ROTATION_FIT_H
 
-#include "core/core.h"
+#include "core/lanes.h"
 
 /* vgi_fit_rotation: the rotation R that maximises tr(R'm): for m = sum of d r' that which takes the r nearest to the
  * d. Row-major. Where several do, one that turns least; the identity for 0. */

@@ -3,7 +3,7 @@
 #ifndef VG_SOLVE_KERNEL_H
 #define VG_SOLVE_KERNEL_H
 
-#include "core/core.h"
+#include "core/lanes.h"
 
 /* A supernodal factor as CHOLMOD lays it out, borrowed. Supernode s holds columns super[s] .. super[s+1]-1; its rows
  * are rows[pi[s]] .. rows[pi[s+1]-1], the first of which are its own columns; its entries are a column-major block of

@@ -1,7 +1,7 @@
 /* head.c: what is known of a sequence before its frames, and the frame itself: making, copying, releasing.
  * Leaves out how either is written down (io) and what is computed from it (method).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "core/core.h"
+#include "model/frame.h"
 #include "model/map.h"
 
 #include <stdlib.h>
@@ -164,14 +164,6 @@ static int copy_map(vg_map *to, const vg_map *from, vg_err *e)
     if (ok) return VG_OK;
     vg_map_clear(to);
     return VG_ENOMEM;
-}
-
-void vg_model_clear(vg_model *m)
-{
-    vg_mesh_clear(&m->mesh);
-    free(m->vertices);
-    m->vertices = NULL;
-    vg_attributes_clear(&m->attributes);
 }
 
 void vg_records_clear(vg_records *r)

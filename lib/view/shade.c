@@ -1,6 +1,7 @@
 /* shade.c: from samples to pixels: clay or error colours under fixed lights, shade in corners, outlines.
  * The lights stand around the viewer, not around the figure: every view is lit alike. Leaves out visibility.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "model/colour.h"
 #include "view/view.h"
 
 #include <math.h>

@@ -1,0 +1,25 @@
+/* colour.h: the colours of patches, in files and in pictures.
+ * Internal.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_COLOUR_H
+#define VG_COLOUR_H
+
+#include <stdint.h>
+#include <string.h>
+
+/* vgi_patch_colour: sRGB, far from those of the numbers before and after: hues by the golden ratio,
+ * in three shades. */
+static inline void vgi_patch_colour(uint32_t patch, unsigned char rgb[3])
+{
+    static const unsigned char light[3] = {230, 190, 250}, dark[3] = {90, 50, 140};
+    unsigned hue = (unsigned)((patch * 0x9e3779b9u) >> 16) * 6, part = hue >> 16, at = hue >> 8 & 255,
+             shade = patch % 3;
+    unsigned char up = (unsigned char)(dark[shade] + (light[shade] - dark[shade]) * (int)at / 255);
+    unsigned char down = (unsigned char)(light[shade] - (light[shade] - dark[shade]) * (int)at / 255);
+    const unsigned char of_part[6][3] = {{light[shade], up, dark[shade]}, {down, light[shade], dark[shade]},
+                                         {dark[shade], light[shade], up}, {dark[shade], down, light[shade]},
+                                         {up, dark[shade], light[shade]}, {light[shade], dark[shade], down}};
+    memcpy(rgb, of_part[part], 3);
+}
+
+#endif
