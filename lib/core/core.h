@@ -76,4 +76,30 @@ static inline void vgi_put64(unsigned char *p, uint64_t x)
     vgi_put32(p + 4, (uint32_t)(x >> 32));
 }
 
+/* The bits of a number, and the number that has them. */
+static inline uint32_t vgi_float_bits(float x)
+{
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+static inline uint64_t vgi_double_bits(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+static inline float vgi_as_float(uint32_t bits)
+{
+    float x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+static inline double vgi_as_double(uint64_t bits)
+{
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
 #endif

@@ -32,17 +32,12 @@ static void store(unsigned char *p, uint32_t x, bool big)
 
 static float load_float(const unsigned char *p, bool big)
 {
-    uint32_t bits = load(p, big);
-    float x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
+    return vgi_as_float(load(p, big));
 }
 
 static void store_float(unsigned char *p, float x, bool big)
 {
-    uint32_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    store(p, bits, big);
+    store(p, vgi_float_bits(x), big);
 }
 
 /* ------------------------------------------------------------------------------------------- reading -- */

@@ -49,10 +49,7 @@ static inline uint64_t take64(cursor *c)
 
 static inline double take_double(cursor *c)
 {
-    uint64_t bits = take64(c);
-    double x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
+    return vgi_as_double(take64(c));
 }
 
 /* n elements of `size` bytes, but only if they are really there */
@@ -82,20 +79,12 @@ static inline void copy_doubles(double *to, const unsigned char *from, size_t n)
         memcpy(to, from, n * sizeof *to);
         return;
     }
-    for (size_t i = 0; i < n; i++) {
-        uint64_t bits = vgi_get64(from + 8 * i);
-        memcpy(&to[i], &bits, sizeof bits);
-    }
+    for (size_t i = 0; i < n; i++) to[i] = vgi_as_double(vgi_get64(from + 8 * i));
 }
 
 static inline void copy_floats(double *to, const unsigned char *from, size_t n)
 {
-    for (size_t i = 0; i < n; i++) {
-        uint32_t bits = vgi_get32(from + 4 * i);
-        float x;
-        memcpy(&x, &bits, sizeof x);
-        to[i] = (double)x;
-    }
+    for (size_t i = 0; i < n; i++) to[i] = (double)vgi_as_float(vgi_get32(from + 4 * i));
 }
 
 static inline int put32(vg_bytes *b, uint32_t x, vg_err *e)
@@ -118,12 +107,8 @@ static inline int put_doubles(vg_bytes *b, const double *x, size_t n, vg_err *e)
     if (!vgi_finite(x, n)) return vg_fail(e, VG_EINPUT, "the result holds a number that is not finite");
     if (NATIVE) return vgi_bytes_append(b, x, n * sizeof *x, e);
     int r = vgi_bytes_reserve(b, b->size + 8 * n, e);
-    for (size_t i = 0; r == VG_OK && i < n; i++) {
-        uint64_t bits;
-        memcpy(&bits, &x[i], sizeof bits);
-        vgi_put64(b->data + b->size, bits);
-        b->size += 8;
-    }
+    for (size_t i = 0; r == VG_OK && i < n; i++, b->size += 8)
+        vgi_put64(b->data + b->size, vgi_double_bits(x[i]));
     return r;
 }
 

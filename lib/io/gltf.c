@@ -291,18 +291,13 @@ static int find_bytes(const vgi_gltf *g, const vgi_json *from, size_t count, siz
 
 static double number_at(const unsigned char *p, int component)
 {
-    uint32_t bits;
-    float f;
     switch (component) {
     case VGI_GLTF_BYTE: return (int8_t)*p;
     case VGI_GLTF_UBYTE: return *p;
     case VGI_GLTF_SHORT: return (int16_t)(p[0] | p[1] << 8);
     case VGI_GLTF_USHORT: return p[0] | p[1] << 8;
     case VGI_GLTF_UINT: return vgi_get32(p);
-    default:
-        bits = vgi_get32(p);
-        memcpy(&f, &bits, sizeof f);
-        return f;
+    default: return vgi_as_float(vgi_get32(p));
     }
 }
 

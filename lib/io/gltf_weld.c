@@ -142,10 +142,7 @@ static const vgi_gltf_part *part_of(const vgi_gltf_scene *x, size_t v)
 static uint64_t mix(uint64_t hash, const double *p, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
-        double y = p[i] + 0.0; /* -0 is 0 */
-        uint64_t bits;
-        memcpy(&bits, &y, sizeof bits);
-        hash = (hash ^ bits) * 0x9e3779b97f4a7c15u;
+        hash = (hash ^ vgi_double_bits(p[i] + 0.0)) * 0x9e3779b97f4a7c15u; /* -0 is 0 */
         hash ^= hash >> 29;
     }
     return hash;

@@ -39,17 +39,12 @@ int vgi_gltf_check(const vg_head *h, const char *output, vg_err *e)
 
 void vgi_gltf_put_single(unsigned char *to, float x)
 {
-    uint32_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    vgi_put32(to, bits);
+    vgi_put32(to, vgi_float_bits(x));
 }
 
 float vgi_gltf_get_single(const unsigned char *p)
 {
-    uint32_t bits = vgi_get32(p);
-    float x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
+    return vgi_as_float(vgi_get32(p));
 }
 
 static int round_base(vgi_gltf_writing *w, vg_err *e)

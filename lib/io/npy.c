@@ -173,18 +173,8 @@ void vgi_npy_write(unsigned char to[VGI_NPY_HEADER], const char *descr, size_t n
 
 double vgi_npy_float(const vgi_npy *a, const unsigned char *p)
 {
-    if (a->item == 4) {
-        uint32_t bits = vgi_get32(p);
-        float x;
-        if (a->big) bits = __builtin_bswap32(bits);
-        memcpy(&x, &bits, sizeof x);
-        return x;
-    }
-    uint64_t bits = vgi_get64(p);
-    double x;
-    if (a->big) bits = __builtin_bswap64(bits);
-    memcpy(&x, &bits, sizeof x);
-    return x;
+    if (a->item == 4) return vgi_as_float(a->big ? __builtin_bswap32(vgi_get32(p)) : vgi_get32(p));
+    return vgi_as_double(a->big ? __builtin_bswap64(vgi_get64(p)) : vgi_get64(p));
 }
 
 size_t vgi_npy_stride(const vgi_npy *a, size_t d)
@@ -208,15 +198,8 @@ int vgi_npy_store(vg_bytes *to, const double *x, size_t n, bool doubles, vg_err 
         if (!isfinite(doubles ? x[i] : (double)f))
             return vg_fail(e, VG_EINPUT,
                            "number %zu of it does not fit single precision (%g): ask for full precision", i, x[i]);
-        if (doubles) {
-            uint64_t bits;
-            memcpy(&bits, &x[i], sizeof bits);
-            vgi_put64(p, bits);
-        } else {
-            uint32_t bits;
-            memcpy(&bits, &f, sizeof bits);
-            vgi_put32(p, bits);
-        }
+        if (doubles) vgi_put64(p, vgi_double_bits(x[i]));
+        else vgi_put32(p, vgi_float_bits(f));
     }
     to->size += n * item;
     return VG_OK;

@@ -95,10 +95,7 @@ static double round_binary(uint64_t top, bool more, int power)
     uint64_t m = top >> 11, rest = top & 0x7ff;
     if (rest > 0x400 || (rest == 0x400 && (more || (m & 1)))) m++;
     /* m brings its own leading bit, which counts one in the exponent; a carry out of m goes there too */
-    uint64_t bits = ((uint64_t)(power + 63 + 1022) << 52) + m;
-    double x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
+    return vgi_as_double(((uint64_t)(power + 63 + 1022) << 52) + m);
 }
 
 /* w * 10^q correctly rounded, for w > 0 and |q| <= MOST_FIVES. */
@@ -428,10 +425,7 @@ static size_t print_special(char *to, bool zero, bool infinite, bool nan)
 
 size_t vgi_print_float(char *to, double x)
 {
-    float f = (float)x;
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    uint32_t exponent = bits >> 23 & 0xff, m = bits & 0x7fffff;
+    uint32_t bits = vgi_float_bits((float)x), exponent = bits >> 23 & 0xff, m = bits & 0x7fffff;
     size_t sign = bits >> 31;
     if (sign) *to++ = '-';
     size_t n = print_special(to, !exponent && !m, exponent == 0xff && !m, exponent == 0xff && m);
@@ -443,9 +437,7 @@ size_t vgi_print_float(char *to, double x)
 
 size_t vgi_print_double(char *to, double x)
 {
-    uint64_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    uint64_t exponent = bits >> 52 & 0x7ff, m = bits & ((1ull << 52) - 1);
+    uint64_t bits = vgi_double_bits(x), exponent = bits >> 52 & 0x7ff, m = bits & ((1ull << 52) - 1);
     size_t sign = bits >> 63;
     if (sign) *to++ = '-';
     size_t n = print_special(to, !exponent && !m, exponent == 0x7ff && !m, exponent == 0x7ff && m);

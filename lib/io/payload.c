@@ -516,10 +516,8 @@ int vgi_values_encode(vg_bytes *b, const double *x, size_t n, vg_precision preci
     if (precision == VG_F64) return put_doubles(b, x, n, e);
     for (size_t i = 0; i < n; i++) {
         float y = (float)x[i];
-        uint32_t bits;
         if (!(y - y == 0)) return vg_fail(e, VG_EINPUT, "%g does not fit into binary32: write binary64", x[i]);
-        memcpy(&bits, &y, sizeof bits);
-        vgi_put32(b->data + 4 * i, bits);
+        vgi_put32(b->data + 4 * i, vgi_float_bits(y));
     }
     return VG_OK;
 }

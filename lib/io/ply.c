@@ -282,18 +282,8 @@ static inline int64_t integer_at(const char *p, enum type t, bool swap)
 
 static inline double number_at(const char *p, enum type t, bool swap)
 {
-    if (t == F32) {
-        uint32_t bits = (uint32_t)load(p, 4, swap);
-        float x;
-        memcpy(&x, &bits, sizeof x);
-        return x;
-    }
-    if (t == F64) {
-        uint64_t bits = load(p, 8, swap);
-        double x;
-        memcpy(&x, &bits, sizeof x);
-        return x;
-    }
+    if (t == F32) return vgi_as_float((uint32_t)load(p, 4, swap));
+    if (t == F64) return vgi_as_double(load(p, 8, swap));
     return (double)integer_at(p, t, swap);
 }
 

@@ -39,14 +39,9 @@ static void put_number(char **to, double x, bool full, enum encoding encoding, c
         *to += full ? vgi_print_double(*to, x) : vgi_print_float(*to, x);
         *(*to)++ = separator;
     } else if (full) {
-        uint64_t bits;
-        memcpy(&bits, &x, sizeof bits);
-        put(to, bits, 8, encoding);
+        put(to, vgi_double_bits(x), 8, encoding);
     } else {
-        float f = (float)x;
-        uint32_t bits;
-        memcpy(&bits, &f, sizeof bits);
-        put(to, bits, 4, encoding);
+        put(to, vgi_float_bits((float)x), 4, encoding);
     }
 }
 

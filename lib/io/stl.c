@@ -27,10 +27,9 @@ struct reading {
 
 static size_t hash_point(const double x[3])
 {
-    uint64_t h = 0, bits;
+    uint64_t h = 0;
     for (int k = 0; k < 3; k++) {
-        memcpy(&bits, &x[k], sizeof bits);
-        h = (h ^ bits) * 0x9e3779b97f4a7c15u;
+        h = (h ^ vgi_double_bits(x[k])) * 0x9e3779b97f4a7c15u;
         h ^= h >> 29;
     }
     return (size_t)h;
@@ -106,10 +105,7 @@ static int add_triangle(struct reading *r, double x[9])
 
 static float float_at(const char *p)
 {
-    uint32_t bits = vgi_get32((const unsigned char *)p);
-    float x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
+    return vgi_as_float(vgi_get32((const unsigned char *)p));
 }
 
 static int read_binary(struct reading *r)
@@ -349,14 +345,6 @@ static int put_text(struct writing *x, const double normal[3], const uint32_t v[
     return r == VG_OK ? put_line(x, "endloop\nendfacet\n", NULL, false) : r;
 }
 
-static void store_float(unsigned char *to, double x)
-{
-    float f = (float)x;
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    vgi_put32(to, bits);
-}
-
 static int put_triangle(struct writing *x, uint32_t a, uint32_t b, uint32_t c)
 {
     const uint32_t v[3] = {a, b, c};
@@ -367,8 +355,9 @@ static int put_triangle(struct writing *x, uint32_t a, uint32_t b, uint32_t c)
     x->triangles++;
     if (x->text) return put_text(x, n, v);
     unsigned char facet[FACET] = {0};
-    for (int k = 0; k < 3; k++) store_float(facet + 4 * k, n[k]);
-    for (int i = 0; i < 9; i++) store_float(facet + 12 + 4 * i, point(x, v[i / 3])[i % 3]);
+    for (int k = 0; k < 3; k++) vgi_put32(facet + 4 * k, vgi_float_bits((float)n[k]));
+    for (int i = 0; i < 9; i++)
+        vgi_put32(facet + 12 + 4 * i, vgi_float_bits((float)point(x, v[i / 3])[i % 3]));
     return vgi_bytes_append(x->out, facet, sizeof facet, x->e);
 }
 
