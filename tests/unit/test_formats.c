@@ -158,30 +158,52 @@ static void refuses_to_write_what_does_not_fit(void)
     vg_bytes_clear(&out);
 }
 
-/* A face of 300 corners needs a longer list length in PLY, and another way of finding vertices named twice. */
-static void large_faces(void)
+/* A face of more than 255 corners needs a longer list length in PLY; large ones another way of finding vertices named
+ * twice. */
+static void large_face(uint32_t n)
 {
-    enum { N = 300 };
-    uint32_t start[] = {0, N}, vert[N];
-    double x[3 * N];
-    for (uint32_t i = 0; i < N; i++) vert[i] = N - 1 - i, x[3 * i] = i, x[3 * i + 1] = i / 3.0, x[3 * i + 2] = 0;
-    vg_mesh mesh = {N, 1, start, vert};
+    enum { MOST = 300 };
+    uint32_t start[] = {0, n}, vert[MOST];
+    double x[3 * MOST];
+    for (uint32_t i = 0; i < n; i++) vert[i] = n - 1 - i, x[3 * i] = i, x[3 * i + 1] = i / 3.0, x[3 * i + 2] = 0;
+    vg_mesh mesh = {n, 1, start, vert};
     vg_err e;
     for (size_t i = 0; i < FORMATS; i++) {
         vg_bytes out = {0};
         vg_model m;
         CHECK(vg_model_write(&out, format_names[i], &mesh, x, NULL, true, &e) == VG_OK);
         CHECK(read_bytes(&m, out.data, out.size, NULL, &e) == VG_OK);
-        CHECK(vg_mesh_same(&mesh, "a", &m.mesh, "b", &e) == VG_OK && !memcmp(x, m.vertices, sizeof x));
+        CHECK(vg_mesh_same(&mesh, "a", &m.mesh, "b", &e) == VG_OK && !memcmp(x, m.vertices, 24 * n));
         vg_model_clear(&m);
         out.size = 0;
-        vert[N / 2] = vert[3];
+        vert[n / 2] = vert[3];
         CHECK(vg_model_write(&out, format_names[i], &mesh, x, NULL, true, &e) == VG_OK);
         CHECK(read_bytes(&m, out.data, out.size, NULL, &e) == VG_EINPUT);
         CHECK(strstr(e.message, "twice"));
-        vert[N / 2] = N - 1 - N / 2;
+        vert[n / 2] = n - 1 - n / 2;
         vg_bytes_clear(&out);
     }
+}
+
+static void large_faces(void)
+{
+    large_face(255);
+    large_face(256);
+    large_face(300);
+}
+
+/* Programs that draw know edges only as an element of their own; a segment between faces keeps its place among them. */
+static void segments_of_ply_come_last_or_stay(void)
+{
+    static uint32_t start[] = {0, 2, 5, 7}, vert[] = {0, 1, 0, 1, 2, 2, 0};
+    static double x[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    const vg_mesh between = {3, 3, start, vert};
+    vg_bytes out = {0};
+    CHECK(vg_model_write(&out, "ply-ascii", &between, x, NULL, false, NULL) == VG_OK);
+    CHECK(vgi_bytes_append(&out, "", 1, NULL) == VG_OK);
+    CHECK(strstr((char *)out.data, "element face 3\n") && !strstr((char *)out.data, "element edge"));
+    CHECK(strstr((char *)out.data, "\n2 0 1\n3 0 1 2\n2 2 0\n"));
+    vg_bytes_clear(&out);
 }
 
 /* What each text must read as: faces as "0 1 2;2 3", and vertices as their x coordinates. */
@@ -656,6 +678,7 @@ TESTS({"there and back exactly", there_and_back_exactly},
       {"there and back in single precision", there_and_back_in_single_precision},
       {"written text is as promised", obj_text_is_as_promised},
       {"refuses to write what does not fit", refuses_to_write_what_does_not_fit}, {"large faces", large_faces},
+      {"segments of PLY come last or stay", segments_of_ply_come_last_or_stay},
       {"reads all forms of OBJ", reads_all_forms_of_obj},
       {"keeps labels and texture of OBJ", keeps_labels_and_texture_of_obj},
       {"refuses broken OBJ", refuses_broken_obj}, {"reads all forms of PLY", reads_all_forms_of_ply},
