@@ -433,13 +433,10 @@ int vgi_archive_open_for(vgi_archive **out, int fd, int64_t base, const char *na
 
 static int read_spooled(vgi_archive *a, const member *m, vg_bytes *data, vg_err *e)
 {
-    size_t got = 0;
     int r = vgi_bytes_reserve(data, m->bytes, e);
-    if (r < 0) return r;
-    if (vgi_read_at(a->spool, data->data, m->bytes, m->off, &got) < 0 || got < m->bytes)
-        return vg_fail(e, VG_ESYS, "cannot read the temporary file of '%s'", a->name);
-    data->size = got;
-    return VG_OK;
+    if (r == VG_OK) r = vgi_read_back(a->spool, (uint64_t)m->off, data->data, m->bytes, e);
+    if (r == VG_OK) data->size = m->bytes;
+    return r;
 }
 
 int vgi_archive_next(vgi_archive *a, const char **path, vg_bytes *data, vg_err *e)

@@ -141,23 +141,6 @@ static int take_count(reading *b, const char *what, int64_t *x, vg_err *e)
 
 /* ---- hierarchy ---- */
 
-/* Bytes that are no UTF-8 are Latin-1. `to` has room for twice as many and one more. */
-static void to_utf8(const char *s, size_t n, char *to)
-{
-    bool utf8 = vgi_is_utf8(s, n);
-    for (size_t i = 0; i < n; i++) {
-        unsigned char c = (unsigned char)s[i];
-        if (c == 0) c = '?';
-        if (c < 0x80 || utf8) {
-            *to++ = (char)c;
-        } else {
-            *to++ = (char)(0xc0 | c >> 6);
-            *to++ = (char)(0x80 | (c & 0x3f));
-        }
-    }
-    *to = 0;
-}
-
 /* The rest of the line, or up to a brace in it: names hold blanks. */
 static int take_name(reading *b, char **name, vg_err *e)
 {
@@ -168,8 +151,7 @@ static int take_name(reading *b, char **name, vg_err *e)
     while (p > start && is_blank(p[-1])) p--;
     b->at = stop;
     size_t n = p - start > VGI_BVH_NAME ? VGI_BVH_NAME + 1 : (size_t)(p - start);
-    if (!(*name = vgi_array_raw(2 * n + 1, 1, e))) return VG_ENOMEM;
-    to_utf8(start, n, *name);
+    if (!(*name = vgi_to_utf8(start, n, e))) return VG_ENOMEM;
     if (strlen(*name) <= VGI_BVH_NAME) return VG_OK;
     return vg_fail(e, VG_EINPUT, "%s line %zu: a name is longer than %d bytes", b->subject, line_of(b, start),
                    VGI_BVH_NAME);

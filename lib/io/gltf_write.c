@@ -6,7 +6,6 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
 
-#include <errno.h>
 #include <float.h>
 #include <math.h>
 #include <stdarg.h>
@@ -83,15 +82,7 @@ int vgi_gltf_put(void *state, const vg_frame *f, vg_err *e)
 
 int vgi_gltf_load(const vgi_gltf_writing *w, uint64_t off, unsigned char *to, size_t n, vg_err *e)
 {
-    for (size_t done = 0; done < n;) {
-        ssize_t got = pread(w->spool.fd, to + done, n - done, (off_t)(off + done));
-        if (got < 0 && errno == EINTR) continue;
-        if (got <= 0)
-            return vg_fail(e, VG_ESYS, "cannot read a temporary file: %s",
-                           got ? strerror(errno) : "it ends too early");
-        done += (size_t)got;
-    }
-    return VG_OK;
+    return vgi_read_back(w->spool.fd, off, to, n, e);
 }
 
 /* ---- times ---- */

@@ -226,6 +226,19 @@ int vgi_nameless_file(vg_err *e)
     return vg_fail(e, VG_ESYS, "cannot make a temporary file in '%s': %s", dir, strerror(errno));
 }
 
+int vgi_read_back(int fd, uint64_t off, void *to, size_t n, vg_err *e)
+{
+    for (size_t done = 0; done < n;) {
+        ssize_t got = pread(fd, (unsigned char *)to + done, n - done, (off_t)(off + done));
+        if (got < 0 && errno == EINTR) continue;
+        if (got <= 0)
+            return vg_fail(e, VG_ESYS, "cannot read a temporary file: %s",
+                           got ? strerror(errno) : "it ends too early");
+        done += (size_t)got;
+    }
+    return VG_OK;
+}
+
 int vgi_input_spool(vgi_input *in, int *out, vg_err *e)
 {
     const uint64_t most = in->known ? UINT64_MAX : in->limits.total_bytes;

@@ -44,6 +44,8 @@ bool vgi_is_stream(const unsigned char *data, size_t n);
 
 /* vgi_nameless_file: a new file without a name in $TMPDIR (or /tmp), for reading and writing; its descriptor. */
 int vgi_nameless_file(vg_err *e) VG_MUST_CHECK;
+/* vgi_read_back: n bytes of such a file, from off on; VG_ESYS when they are not to be had. */
+int vgi_read_back(int fd, uint64_t off, void *to, size_t n, vg_err *e) VG_MUST_CHECK;
 /* vgi_input_spool: copy what is left of an input that can be read only once into a file without a name. */
 int vgi_input_spool(vgi_input *in, int *fd, vg_err *e) VG_MUST_CHECK;
 /* vgi_write_all: write n bytes to fd, whatever the interruptions; VG_ESYS naming `name`. */
@@ -246,6 +248,9 @@ void vgi_name_set_clear(vgi_name_set *set);
 /* vgi_natural_compare: order of names as people expect it: runs of digits by value, the rest by byte; ties by
  * strcmp. */
 int vgi_natural_compare(const char *a, const char *b);
+/* vgi_to_utf8: n bytes of text as UTF-8: as they are, or else each taken for the letter that it is in Latin-1, which
+ * most old files are in, and a zero byte for '?'. Free it. */
+char *vgi_to_utf8(const char *s, size_t n, vg_err *e);
 const char *vgi_base_name(const char *path); /* behind the last '/' */
 /* of the first n bytes, with something before it; any case */
 bool vgi_has_suffix(const char *name, size_t n, const char *suffix);

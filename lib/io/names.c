@@ -133,16 +133,15 @@ size_t vgi_packed_stem(const char *name)
     return n;
 }
 
-/* Old archives and file systems hold names in other encodings, mostly Latin-1: each byte becomes the letter it is
- * there, so that different names stay different. */
-static char *from_latin1(const char *s, size_t n, vg_err *e)
+char *vgi_to_utf8(const char *s, size_t n, vg_err *e)
 {
     size_t twice;
+    if (vgi_is_utf8(s, n)) return vgi_copy_string(s, n, e);
     if (!vgi_mul(n, 2, &twice)) twice = SIZE_MAX - 1; /* fails for want of memory below */
     char *out = vgi_array_raw(twice + 1, 1, e), *to = out;
     if (!out) return NULL;
     for (size_t i = 0; i < n; i++) {
-        unsigned char c = (unsigned char)s[i];
+        unsigned char c = s[i] ? (unsigned char)s[i] : '?';
         if (c < 0x80) {
             *to++ = (char)c;
         } else {
@@ -163,8 +162,7 @@ char *vgi_pose_name(const char *path, vg_err *e)
     const vgi_sequence_format *sequence = format ? NULL : vgi_sequence_by_suffix(name);
     if (format) name[strlen(name) - strlen(format->suffix)] = 0;
     if (sequence) name[strlen(name) - strlen(sequence->suffix)] = 0;
-    if (vgi_is_utf8(name, strlen(name))) return name;
-    char *utf8 = from_latin1(name, strlen(name), e);
+    char *utf8 = vgi_to_utf8(name, strlen(name), e); /* old archives and file systems have other names */
     free(name);
     return utf8;
 }

@@ -155,14 +155,10 @@ static int copy_spool(writing *x, vg_err *e)
     enum { BLOCK = 1 << 20 };
     unsigned char *block = vgi_array_raw(BLOCK, 1, e);
     int r = block ? vgi_output_flush(&x->spool, e) : VG_ENOMEM;
-    for (uint64_t off = 0; r == VG_OK && off < x->spool.size;) {
-        ssize_t got = pread(x->spool.fd, block, BLOCK, (off_t)off);
-        if (got < 0 && errno == EINTR) continue;
-        if (got <= 0)
-            r = vg_fail(e, VG_ESYS, "cannot read a temporary file: %s",
-                        got ? strerror(errno) : "it ends too early");
-        else r = vgi_packer_more(x->packer, block, (size_t)got, e);
-        if (got > 0) off += (uint64_t)got;
+    for (uint64_t off = 0; r == VG_OK && off < x->spool.size; off += BLOCK) {
+        size_t some = x->spool.size - off < BLOCK ? (size_t)(x->spool.size - off) : BLOCK;
+        r = vgi_read_back(x->spool.fd, off, block, some, e);
+        if (r == VG_OK) r = vgi_packer_more(x->packer, block, some, e);
     }
     free(block);
     return r;

@@ -361,36 +361,22 @@ static const char *read_face(struct reading *r, const char *p, bool line)
     return p;
 }
 
-/* The text [p, end) as UTF-8, trimmed, joined lines as one blank. Bytes that are no UTF-8 are taken for Latin-1,
- * which is what old exporters write. */
+/* The text [p, end) as UTF-8, trimmed, joined lines as one blank. */
 static char *label_text(struct reading *r, const char *p, const char *end)
 {
-    size_t n = 0;
-    char *text = vgi_array_raw((size_t)(end - p) * 2 + 1, 1, r->e);
-    if (!text) return NULL;
-    bool utf8 = vgi_is_utf8(p, (size_t)(end - p));
+    size_t n = 0, first = 0;
+    char *plain = vgi_array_raw((size_t)(end - p), 1, r->e);
+    if (!plain) return NULL;
     while (p < end) {
-        const char *next = *p == '\\' ? continuation(r, p) : NULL;
-        if (next) {
-            text[n++] = ' ';
-            p = next < end ? next : end;
-            continue;
-        }
-        unsigned char c = (unsigned char)*p++;
-        if (c < 0x80 || utf8) {
-            text[n++] = c == '\r' ? ' ' : (char)c;
-        } else {
-            text[n++] = (char)(0xc0 | c >> 6);
-            text[n++] = (char)(0x80 | (c & 0x3f));
-        }
+        const char *next = continuation(r, p);
+        plain[n++] = next || *p == '\r' ? ' ' : *p;
+        p = !next ? p + 1 : next < end ? next : end;
     }
-    size_t first = 0;
-    while (first < n && (text[first] == ' ' || text[first] == '\t')) first++;
-    while (n > first && (text[n - 1] == ' ' || text[n - 1] == '\t')) n--;
-    memmove(text, text + first, n - first);
-    text[n - first] = 0;
-    char *fitting = realloc(text, n - first + 1);
-    return fitting ? fitting : text;
+    while (first < n && (plain[first] == ' ' || plain[first] == '\t')) first++;
+    while (n > first && (plain[n - 1] == ' ' || plain[n - 1] == '\t')) n--;
+    char *text = vgi_to_utf8(plain + first, n - first, r->e);
+    free(plain);
+    return text;
 }
 
 static const char *read_label(struct reading *r, const char *p, vg_label_kind kind)

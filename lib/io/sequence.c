@@ -95,13 +95,10 @@ int vgi_output_copy(vgi_output *o, int fd, uint64_t n, vg_err *e)
 {
     unsigned char *block = vgi_array_raw(BLOCK, 1, e);
     int r = block ? VG_OK : VG_ENOMEM;
-    for (uint64_t off = 0; r == VG_OK && off < n;) {
-        ssize_t got = pread(fd, block, n - off < BLOCK ? (size_t)(n - off) : BLOCK, (off_t)off);
-        if (got < 0 && errno == EINTR) continue;
-        if (got <= 0)
-            r = vg_fail(e, VG_ESYS, "cannot read a temporary file: %s", got ? strerror(errno) : "it ends too early");
-        else r = vgi_output_put(o, block, (size_t)got, e);
-        if (got > 0) off += (uint64_t)got;
+    for (uint64_t off = 0; r == VG_OK && off < n; off += BLOCK) {
+        size_t some = n - off < BLOCK ? (size_t)(n - off) : BLOCK;
+        r = vgi_read_back(fd, off, block, some, e);
+        if (r == VG_OK) r = vgi_output_put(o, block, some, e);
     }
     free(block);
     return r;

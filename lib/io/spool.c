@@ -247,15 +247,7 @@ int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e)
 static int read_back(vg_spool *s, size_t n, vg_err *e)
 {
     int r = vgi_bytes_reserve(&s->frame, n, e);
-    for (size_t done = 0; r == VG_OK && done < n;) {
-        ssize_t k = pread(s->fd, s->frame.data + done, n - done, (off_t)(s->read + done));
-        if (k < 0 && errno == EINTR) continue;
-        if (k <= 0)
-            return vg_fail(e, VG_ESYS, "cannot read a temporary file: %s",
-                           k < 0 ? strerror(errno) : "it was cut short");
-        done += (size_t)k;
-    }
-    return r;
+    return r < 0 ? r : vgi_read_back(s->fd, s->read, s->frame.data, n, e);
 }
 
 static int take_from_file(vg_spool *s, vg_frame *f, vg_err *e)
