@@ -8,6 +8,7 @@
  * damped Gauss-Newton steps.
  * Leaves out how weights are fitted to known motions (skin.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/vector.h"
 #include "method/dense.h"
 #include "method/product.h"
 #include "method/rotation_fit.h"
@@ -304,13 +305,6 @@ static void sweep(const vg_bender *x, bending *w, double prior)
     }
 }
 
-static void multiply(const double a[9], const double b[9], double ab[9])
-{
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++)
-            ab[3 * i + k] = a[3 * i] * b[k] + a[3 * i + 1] * b[3 + k] + a[3 * i + 2] * b[6 + k];
-}
-
 static void multiply_back(const double a[9], const double b[9], double ab[9]) /* a b' */
 {
     for (int i = 0; i < 3; i++)
@@ -328,7 +322,7 @@ static void make_system(const vg_bender *x, bending *w, double prior, double dam
             double g[9], s[9], trace;
             for (size_t k = 0; k < 3; k++)
                 for (size_t l = 0; l < 3; l++) g[3 * k + l] = x->g[(3 * i + k) * width + 3 * j + l];
-            multiply(w->r + 9 * i, g, t);
+            vgi_multiply(w->r + 9 * i, g, t);
             multiply_back(t, w->r + 9 * j, s);
             trace = s[0] + s[4] + s[8];
             for (size_t k = 0; k < 3; k++)
@@ -361,7 +355,7 @@ static double turn_bones(const vg_bender *x, bending *w)
         double q[4], m[9];
         vg_quat_exp(half, q);
         vg_quat_matrix(q, m);
-        multiply(m, w->r + 9 * j, w->trial + 9 * j);
+        vgi_multiply(m, w->r + 9 * j, w->trial + 9 * j);
         most = fmax(most, sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]));
     }
     return most;

@@ -9,6 +9,7 @@
  * away.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/branch.h"
+#include "core/vector.h"
 #include "model/incidence.h"
 
 #include <math.h>
@@ -23,18 +24,13 @@ static const double sideways = 0.1;
 static const double longest_step = 0.3; /* of a vector's coordinate */
 static const double usual = 0.3;        /* a face whose half angle from the field is more than this is an exception */
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* q exp(-l) or exp(-l) q have the same angle; this is half of it, in [0, pi / 2] */
 static double half_angle_between(const double q[4], const double l[3])
 {
     double to[4], log[4] = {0, -l[0], -l[1], -l[2]}, rest[4];
     vg_quat_exp(log, to);
     vg_quat_multiply(to, q, rest);
-    return atan2(sqrt(dot(rest + 1, rest + 1)), fabs(rest[0]));
+    return atan2(sqrt(vgi_dot(rest + 1, rest + 1)), fabs(rest[0]));
 }
 
 void vgi_shorter(double q[4])
@@ -46,11 +42,11 @@ void vgi_shorter(double q[4])
 bool vgi_branch_near(const double q[4], const double near[3], double l[3])
 {
     static const double tiny = 1e-9;
-    double sine = sqrt(dot(q + 1, q + 1)), length = sqrt(dot(near, near)), axis[3], gap2 = 0;
+    double sine = sqrt(vgi_dot(q + 1, q + 1)), length = sqrt(vgi_dot(near, near)), axis[3], gap2 = 0;
     double angle = atan2(sine, q[0]);
     for (int k = 0; k < 3; k++) axis[k] = sine > tiny ? q[k + 1] / sine : length > tiny ? near[k] / length : 0;
     if (!(sine > tiny)) angle = 0; /* of q and -q it is the same, and about any axis */
-    angle += M_PI * nearbyint((dot(near, axis) - angle) / M_PI);
+    angle += M_PI * nearbyint((vgi_dot(near, axis) - angle) / M_PI);
     for (int k = 0; k < 3; k++) {
         l[k] = angle * axis[k];
         gap2 += (l[k] - near[k]) * (l[k] - near[k]);
@@ -63,12 +59,12 @@ bool vgi_branch_near(const double q[4], const double near[3], double l[3])
 static bool follow(const double q[4], const double near[3], double l[3])
 {
     if (vgi_branch_near(q, near, l)) return true;
-    double length2 = dot(near, near), back[4] = {0, -near[0], -near[1], -near[2]}, rest[4], more[4];
+    double length2 = vgi_dot(near, near), back[4] = {0, -near[0], -near[1], -near[2]}, rest[4], more[4];
     vg_quat_exp(back, back);
     vg_quat_multiply(back, q, rest);
     vgi_shorter(rest);
     vg_quat_log(rest, more);
-    double along = length2 > 0 ? dot(more + 1, near) / length2 : 0;
+    double along = length2 > 0 ? vgi_dot(more + 1, near) / length2 : 0;
     for (int k = 0; k < 3; k++) l[k] = (1 + along) * near[k];
     return false;
 }
@@ -270,7 +266,7 @@ static size_t sweep(choice *c)
         if (!mean_beside(c, f, mean)) continue;
         follow(c->q + 4 * f, mean, l);
         for (int k = 0; k < 3; k++) step[k] = l[k] - now[k];
-        if (!(dot(step, step) > M_PI * M_PI / 4)) continue;
+        if (!(vgi_dot(step, step) > M_PI * M_PI / 4)) continue;
         for (size_t i = g->start[f]; i < g->start[f + 1]; i++)
             for (size_t k = 0; k < 3; k++) c->at[3 * (size_t)g->vert[i] + k] += step[k];
         memcpy(now, l, sizeof l);
@@ -289,7 +285,7 @@ static bool is_beyond(const choice *c, const double *corner)
         double l[3], shortest[3], off[3];
         vgi_branch_near(c->q + 4 * f, turn, l);
         for (int k = 0; k < 3; k++) off[k] = l[k] - turn[k];
-        if (!(dot(off, off) <= rounding) || !(sqrt(dot(turn, turn)) <= M_PI / 2 + rounding)) return true;
+        if (!(vgi_dot(off, off) <= rounding) || !(sqrt(vgi_dot(turn, turn)) <= M_PI / 2 + rounding)) return true;
         for (size_t i = g->start[f]; i < g->start[f + 1]; i++) {
             double q[4];
             memcpy(q, corner + 4 * i, sizeof q);
@@ -297,7 +293,7 @@ static bool is_beyond(const choice *c, const double *corner)
             vgi_branch_near(q, turn, l);
             vgi_branch_near(q, none, shortest);
             for (int k = 0; k < 3; k++) off[k] = l[k] - shortest[k];
-            if (dot(off, off) > 1 && !(sqrt(dot(l, l)) <= M_PI / 2 + rounding)) return true;
+            if (vgi_dot(off, off) > 1 && !(sqrt(vgi_dot(l, l)) <= M_PI / 2 + rounding)) return true;
         }
     }
     return false;
@@ -320,7 +316,7 @@ typedef struct relaxation {
 static void make_jacobian(const double turn[3], double J[9])
 {
     const double v[3] = {2 * turn[0], 2 * turn[1], 2 * turn[2]};
-    double a2 = dot(v, v), a = sqrt(a2), first = 0.5, second = 1.0 / 6;
+    double a2 = vgi_dot(v, v), a = sqrt(a2), first = 0.5, second = 1.0 / 6;
     if (a > 1e-4) first = (1 - cos(a)) / a2, second = (a - sin(a)) / (a2 * a);
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) J[3 * i + k] = second * v[i] * v[k] + (i == k ? 1 - second * a2 : 0);
@@ -347,7 +343,7 @@ static void add_laplacian(choice *c, const double *x, double *y)
 static void pull(const relaxation *r, size_t f, const double rest[3], double y[3])
 {
     const double *J = r->J + 9 * f, *axis = r->axis + 3 * f;
-    double along = (1 - sideways) * dot(axis, rest);
+    double along = (1 - sideways) * vgi_dot(axis, rest);
     for (int k = 0; k < 3; k++) {
         double turned = J[k] * rest[0] + J[3 + k] * rest[1] + J[6 + k] * rest[2];
         y[k] = r->weight[f] * (sideways * turned + along * axis[k]);
@@ -359,7 +355,7 @@ static void apply(choice *c, const relaxation *r, const double *x, double *y)
 {
     for (size_t f = 0; f < c->g->nf; f++) {
         const double *J = r->J + 9 * f, *xf = x + 3 * f;
-        const double Jx[3] = {dot(J, xf), dot(J + 3, xf), dot(J + 6, xf)};
+        const double Jx[3] = {vgi_dot(J, xf), vgi_dot(J + 3, xf), vgi_dot(J + 6, xf)};
         pull(r, f, Jx, y + 3 * f);
     }
     add_laplacian(c, x, y);
@@ -378,8 +374,8 @@ static void linearise(choice *c, relaxation *r)
         vgi_shorter(rest);
         vg_quat_log(rest, l);
         make_jacobian(turn, J);
-        r->weight[f] = 1 / (1 + dot(l + 1, l + 1) / (usual * usual)); /* a face that flips does not pull much */
-        double length = sqrt(dot(turn, turn)), y[3];
+        r->weight[f] = 1 / (1 + vgi_dot(l + 1, l + 1) / (usual * usual)); /* a face that flips does not pull much */
+        double length = sqrt(vgi_dot(turn, turn)), y[3];
         for (int k = 0; k < 3; k++) r->axis[3 * f + (size_t)k] = length > 0 ? turn[k] / length : 0;
         pull(r, f, l + 1, y);
         for (int k = 0; k < 3; k++) b[k] = y[k] - b[k];

@@ -27,7 +27,8 @@ void vgi_measure_maps(const vgi_source *s, size_t first, size_t last, vgi_map *m
  * mean of both; or R alone (rigid). */
 typedef enum vgi_follow { VGI_FOLLOW_GRADIENT, VGI_FOLLOW_POSE, VGI_FOLLOW_BLEND, VGI_FOLLOW_RIGID } vgi_follow;
 
-/* vgi_polar: the rotation nearest to a, whatever a is: scaled Newton (Higham 1986), to rounding, or vgi_fit_rotation. */
+/* vgi_polar: the rotation nearest to a, whatever a is: scaled Newton (Higham 1986), to rounding, or
+ * vgi_fit_rotation. */
 void vgi_polar(const vgi_map *a, vgi_map *rotation);
 
 /* vgi_follow_face: wanted vectors of `r` reference vectors (xyz each), for the first `lanes` poses,

@@ -6,6 +6,7 @@
  * links, and when quaternions are what is asked for.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/deform.h"
+#include "core/vector.h"
 #include "method/deform_kernel.h"
 #include "method/moments.h"
 #include "model/incidence.h"
@@ -41,17 +42,6 @@ struct vg_deformer {
     size_t work_size, work_scalars;
 };
 
-static double norm(const double a[3])
-{
-    return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
-}
-
-static void cross(const double a[3], const double b[3], double c[3])
-{
-    double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
-    c[0] = x, c[1] = y, c[2] = z;
-}
-
 static size_t face_size(const vg_graph *g, size_t f)
 {
     return g->start[f + 1] - g->start[f];
@@ -62,15 +52,15 @@ static size_t face_size(const vg_graph *g, size_t f)
 /* The unit quaternion of the frame [u b n] of a corner; false when the corner is degenerate. */
 static bool corner_frame(const vg_deformer *d, const double w[3], const double n[3], double *length, double q[4])
 {
-    *length = norm(w);
+    *length = vgi_length(w);
     if (!(*length * *length > d->shortest2)) return false;
     double u[3], m[3], b[3], along = 0;
     for (int k = 0; k < 3; k++) u[k] = w[k] / *length, along += u[k] * n[k];
     for (int k = 0; k < 3; k++) m[k] = n[k] - along * u[k];
-    double sine = norm(m);
+    double sine = vgi_length(m);
     if (!(sine > flat)) return false;
     for (int k = 0; k < 3; k++) m[k] /= sine;
-    cross(m, u, b);
+    vgi_cross(m, u, b);
     const double matrix[9] = {u[0], b[0], m[0], u[1], b[1], m[1], u[2], b[2], m[2]};
     vg_quat_from_matrix(matrix, q);
     return true;
@@ -132,7 +122,7 @@ static size_t measure_segment(const vg_deformer *d, size_t f, const double *w, c
                               double *quaternions)
 {
     uint32_t begin = d->g->start[f];
-    double length = norm(w), before = d->length[begin];
+    double length = vgi_length(w), before = d->length[begin];
     size_t bad = 0;
     if (before == 0 || !(length * length > d->shortest2)) {
         memcpy(quaternions, base, 4 * sizeof *base);
@@ -243,7 +233,7 @@ static void measure_reference(vg_deformer *d)
         for (size_t i = 0; i < r; i++) {
             size_t c = g->start[f] + i;
             double *length = &d->length[c];
-            *length = norm(d->vector + 3 * c);
+            *length = vgi_length(d->vector + 3 * c);
             bool usable = good && *length * *length > d->shortest2;
             if (usable && r > 2) usable = corner_frame(d, d->vector + 3 * c, n, length, d->frame + 4 * c);
             if (!usable) *length = 0, d->slow[f] = 1;

@@ -2,6 +2,7 @@
  * it, the vertices that are held, and the operator that all of it collapses into.
  * Leaves out the sums over the poses (rig_sums.c), weights (skin.c), and motions that are not known (bend.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/vector.h"
 #include "method/dense.h"
 #include "method/map_parts.h"
 #include "method/skin.h"
@@ -80,11 +81,6 @@ typedef struct cornering {
     double *space; /* per chunk: 4 n */
 } cornering;
 
-static double length2(const double x[3])
-{
-    return x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
-}
-
 /* The sum of squared scales of a bone. */
 static double weight_of(const vgi_rig_sums *s, size_t j)
 {
@@ -108,8 +104,8 @@ static void corner_quaternion(const vgi_rig_sums *s, size_t face, size_t j, cons
     double turn[4], turned[3], rest[4] = {1, 0, 0, 0};
     face_turn(s, face, j, turn);
     vg_quat_apply(turn, r, turned);
-    if (length2(r) > 0 && length2(u) > 1e-18 * length2(r)) vg_quat_between(turned, u, rest);
-    else if (length2(r) > 0) rest[0] = 1e-9; /* it vanishes */
+    if (vgi_dot(r, r) > 0 && vgi_dot(u, u) > 1e-18 * vgi_dot(r, r)) vg_quat_between(turned, u, rest);
+    else if (vgi_dot(r, r) > 0) rest[0] = 1e-9; /* it vanishes */
     vg_quat_multiply(rest, turn, q);
 }
 
@@ -159,7 +155,8 @@ static void fit_corner(const cornering *x, size_t face, size_t c, const double *
     size_t per = x->m->per_corner, best = list[0];
     double most = -1, u[3], w[3];
     for (size_t i = 0; i < n; i++) {
-        double explained = length2(raw + 4 * (size_t)list[i]) / weight_of(s, list[i]);
+        const double *own = raw + 4 * (size_t)list[i];
+        double explained = vgi_dot(own, own) / weight_of(s, list[i]);
         if (explained > most) most = explained, best = list[i];
     }
     for (size_t k = 0; k < 3; k++) u[k] = raw[4 * best + k] / weight_of(s, best);
@@ -228,7 +225,7 @@ static double rigidity(const vgi_rig_sums *s, size_t v)
     for (size_t j = 0; j < s->n; j++) {
         const double *c = s->cross + 4 * j * width + 4 * j, *y = s->pull + v * width + 4 * j;
         const double d[3] = {y[0] - c[3], y[1] - c[width + 3], y[2] - c[2 * width + 3]};
-        double left = s->square[v] - 2 * y[3] + c[3 * width + 3] - length2(d) / c[0];
+        double left = s->square[v] - 2 * y[3] + c[3 * width + 3] - vgi_dot(d, d) / c[0];
         if (left < least) least = left;
     }
     return least > 0 ? sqrt(least / (double)s->poses) : 0;

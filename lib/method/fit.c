@@ -323,11 +323,6 @@ static int factorize(fit *t, vg_err *e)
 
 /* ---- how the faces are deformed ---- */
 
-static double length(const double a[3])
-{
-    return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
-}
-
 static void face_centre(const double *x, const uint32_t *vert, size_t r, double centre[3])
 {
     centre[0] = centre[1] = centre[2] = 0;
@@ -349,7 +344,7 @@ static void prepare_faces(fit *t)
             vgi_add_outer(S, 1, w, w);
         }
         vgi_newell(t->in->rest, vert, r, n);
-        double area = length(n), h = 0.5 * (S[0] + S[4] + S[8]), c[9];
+        double area = vgi_length(n), h = 0.5 * (S[0] + S[4] + S[8]), c[9];
         t->area[f] = area;
         if (r == 2 || !(area > 0)) {
             t->trust[f] = r == 2 && h > 0;
@@ -375,7 +370,7 @@ static void bone_map(const double *x, const double *rest, const uint32_t *vert, 
         r[k] = rest[3 * (size_t)vert[1] + (size_t)k] - rest[3 * (size_t)vert[0] + (size_t)k];
         d[k] = x[3 * (size_t)vert[1] + (size_t)k] - x[3 * (size_t)vert[0] + (size_t)k];
     }
-    double a = length(d) / length(r);
+    double a = vgi_length(d) / vgi_length(r);
     if (!(a > 0)) d[0] = r[0], d[1] = r[1], d[2] = r[2], a = 1e-6;
     vg_quat_between(r, d, q);
     double size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -403,7 +398,7 @@ static void face_maps(fit *t, const double *x)
             vgi_add_outer(S, 1, d, t->in->rest + 3 * (size_t)vert[i]);
         }
         vgi_newell(x, vert, r, n);
-        double area = length(n);
+        double area = vgi_length(n);
         if (area > 0) vgi_add_outer(S, sqrt(area / t->area[f]) / area, n, t->h_normal + 3 * f);
         const double *P = t->inverse + 9 * f;
         for (int i = 0; i < 3; i++)
@@ -567,7 +562,7 @@ static void vertex_normals(const vg_mesh *m, const double *x, double sign, doubl
             for (size_t k = 0; k < 3; k++) normal[3 * (size_t)m->vert[c] + k] += n[k];
     }
     for (size_t v = 0; v < m->nv; v++) {
-        double *n = normal + 3 * v, size = length(n);
+        double *n = normal + 3 * v, size = vgi_length(n);
         for (int k = 0; k < 3; k++) n[k] = size > 0 ? sign * n[k] / size : 0;
     }
 }

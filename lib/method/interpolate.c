@@ -12,6 +12,7 @@
  *
  * Vectors of anchors, from the anchors' mean, go through all this behind the corners', with the mean turn of all.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/vector.h"
 #include "method/branch.h"
 #include "method/deform.h"
 #include "model/incidence.h"
@@ -51,11 +52,6 @@ struct vg_path {
     vg_path_facts facts;
 };
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* ---- keys ---- */
 
 static void load_vectors(const vg_path *p, const vg_key *key, double *w)
@@ -90,7 +86,7 @@ static void add_moment(const vg_path *p, const double *from, size_t f, double b[
     for (size_t c = p->g->start[f]; c < p->g->start[f + 1]; c++) {
         const double *was = from + 3 * c, *is = p->to + 3 * c;
         for (int i = 0; i < 9; i++) b[i] += is[i / 3] * was[i % 3];
-        *size += sqrt(dot(was, was) * dot(is, is));
+        *size += sqrt(vgi_dot(was, was) * vgi_dot(is, is));
     }
 }
 
@@ -108,7 +104,7 @@ static void turn_line(vg_path *p, const double *from, size_t f, const double bod
     for (int i = 0; i < 9; i++) b[i] = (size > 0 ? b[i] / size : 0) + little * body[i];
     vgi_best_turn(b, base);
     memcpy(q, base, sizeof base);
-    if (dot(was, was) > p->shortest2 && dot(is, is) > p->shortest2) {
+    if (vgi_dot(was, was) > p->shortest2 && vgi_dot(is, is) > p->shortest2) {
         vg_quat_apply(base, was, turned);
         vg_quat_between(turned, is, more);
         vg_quat_multiply(more, base, q);
@@ -146,7 +142,7 @@ static int measure(vg_path *p, const segment *s, vg_err *e)
 /* Q = exp(turn) exp(rest), and half the logarithm of the scale. turn: in: of the face. */
 static void split(const double *q, const double face[3], bool beyond, double *turn, double *rest, double *scale)
 {
-    double length = sqrt(q[0] * q[0] + dot(q + 1, q + 1)), unit[4];
+    double length = sqrt(q[0] * q[0] + vgi_dot(q + 1, q + 1)), unit[4];
     for (int k = 0; k < 4; k++) unit[k] = q[k] / length;
     *scale = log(length);
     if (!beyond) {
@@ -167,7 +163,7 @@ static void turn_anchors(const vg_path *p, segment *s)
 {
     double mean[4] = {0, 0, 0, 0}, weight = 0;
     for (size_t c = 0; c < p->corners; c++) {
-        double w = dot(s->from + 3 * c, s->from + 3 * c);
+        double w = vgi_dot(s->from + 3 * c, s->from + 3 * c);
         weight += w;
         for (size_t k = 0; k < 3; k++) mean[k + 1] += w * s->turn[3 * c + k];
     }

@@ -8,8 +8,8 @@
 
 #define NONE UINT32_MAX
 
-/* The pairs that are left, and those at each piece: end e of pair e / 2, in lists from first[piece] over next[e]. Pairs
- * that are gone stay in the list of the other piece until it is walked. */
+/* The pairs that are left, and those at each piece: end e of pair e / 2, in lists from first[piece] over next[e].
+ * Pairs that are gone stay in the list of the other piece until it is walked. */
 typedef struct state {
     vgi_joining *j;
     uint32_t *set;

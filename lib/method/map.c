@@ -14,6 +14,7 @@
  * poses show beyond that: a ridge regression of what joints miss on the A of all patches, as strong as makes it
  * predict left-out poses best.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/vector.h"
 #include "method/dense.h"
 #include "method/map_parts.h"
 #include "method/pieces.h"
@@ -358,11 +359,6 @@ static void fit_corners(const vg_map_fitter *f, vg_map *m)
     }
 }
 
-static double length2(const double x[3])
-{
-    return x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
-}
-
 /* The point c that patches i and j move alike: least squares over the poses, near the vertices that they share where
  * the poses do not say. */
 static void fit_joint(const vg_map_fitter *f, size_t i, size_t j, const double middle[3], double c[3], double *miss)
@@ -512,7 +508,7 @@ static double left_out(ridge *x, size_t k)
             for (size_t j = 0; j < w; j++) r[i] -= rows[i * w + j] * x->g[j * n + p];
         }
         vgi_cholesky_dense_solve(c, 3, r, 1);
-        sum += x->m->share[p] * length2(r);
+        sum += x->m->share[p] * vgi_dot(r, r);
     }
     return sum;
 }

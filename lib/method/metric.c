@@ -2,6 +2,7 @@
  * Leaves out its use: reconstruct.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/metric.h"
+#include "core/vector.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,49 +10,28 @@
 /* A thin face: its lesser moment counts as at least THIN of the greater, its area as at least SMALL of it. */
 static const double thin = 1e-4, small = 1e-3;
 
-static void cross(const double a[3], const double b[3], double c[3])
-{
-    c[0] = a[1] * b[2] - a[2] * b[1], c[1] = a[2] * b[0] - a[0] * b[2], c[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-/* Newell: twice the area times the normal */
-static void area_vector(const double *w, size_t r, double n[3])
-{
-    n[0] = n[1] = n[2] = 0;
-    for (size_t i = 0; i < r; i++) {
-        double part[3];
-        cross(w + 3 * i, w + 3 * (i + 1 < r ? i + 1 : 0), part);
-        for (int k = 0; k < 3; k++) n[k] += part[k];
-    }
-}
-
 static void make_face(vgi_face_metric *m, double *plane, const double *w, size_t r)
 {
     double n[3];
     *m = (vgi_face_metric){.weight = 1};
     memset(plane, 0, 3 * r * sizeof *plane);
-    area_vector(w, r, n);
-    double length = sqrt(dot(n, n));
+    vgi_area_vector(w, r, n);
+    double length = sqrt(vgi_dot(n, n));
     if (r < 3 || !(length > 0)) return;
     /* axes of the plane: the first vector that is not along the normal, and across */
     double a[3] = {0, 0, 0}, b[3], most = 0;
     for (int k = 0; k < 3; k++) n[k] /= length;
     for (size_t i = 0; i < r; i++) {
-        double t[3], along = dot(n, w + 3 * i);
+        double t[3], along = vgi_dot(n, w + 3 * i);
         for (size_t k = 0; k < 3; k++) plane[3 * i + k] = t[k] = w[3 * i + k] - along * n[k];
-        if (dot(t, t) > most) most = dot(t, t), memcpy(a, t, sizeof a);
+        if (vgi_dot(t, t) > most) most = vgi_dot(t, t), memcpy(a, t, sizeof a);
     }
     if (!(most > 0)) return;
     for (int k = 0; k < 3; k++) a[k] /= sqrt(most);
-    cross(n, a, b);
+    vgi_cross(n, a, b);
     double aa = 0, ab = 0, bb = 0;
     for (size_t i = 0; i < r; i++) {
-        double x = dot(a, plane + 3 * i), y = dot(b, plane + 3 * i);
+        double x = vgi_dot(a, plane + 3 * i), y = vgi_dot(b, plane + 3 * i);
         aa += x * x, ab += x * y, bb += y * y;
     }
     /* eigenvalues and the first eigenvector of [aa ab; ab bb] */

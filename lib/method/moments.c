@@ -1,32 +1,23 @@
 /* moments.c: normal and inverse second moments of one face. Leaves out all poses but the one it is given.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/moments.h"
-
-#include <math.h>
+#include "core/vector.h"
 
 static const double flat = 1e-12; /* of the sum of squared lengths: see deform_kernel.c */
 
-/* The sum of cross products of successive vectors, twice the area times the normal; *size: its length,
- * or 0 for none. */
-static void area_vector(const double *w, size_t r, double n[3], double *size)
+/* Twice the area, along the normal; its length, or 0 for none. */
+static double area_vector(const double *w, size_t r, double n[3])
 {
     double spread = 0;
-    n[0] = n[1] = n[2] = 0;
-    for (size_t i = 0; i < r; i++) {
-        const double *a = w + 3 * i, *b = w + 3 * (i + 1 < r ? i + 1 : 0);
-        n[0] += a[1] * b[2] - a[2] * b[1];
-        n[1] += a[2] * b[0] - a[0] * b[2];
-        n[2] += a[0] * b[1] - a[1] * b[0];
-        spread += a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
-    }
-    *size = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    if (!(*size > flat * spread)) *size = 0;
+    vgi_area_vector(w, r, n);
+    for (size_t i = 0; i < r; i++) spread += vgi_dot(w + 3 * i, w + 3 * i);
+    double size = vgi_length(n);
+    return size > flat * spread ? size : 0;
 }
 
 bool vgi_unit_normal(const double *w, size_t r, double n[3])
 {
-    double size;
-    area_vector(w, r, n, &size);
+    double size = area_vector(w, r, n);
     for (int k = 0; k < 3 && size > 0; k++) n[k] /= size;
     return size > 0;
 }
@@ -58,7 +49,7 @@ bool vgi_gradient_moments(const double *w, size_t r, double P[6], double q[3], d
         sum[0] += v[0] * v[0], sum[1] += v[0] * v[1], sum[2] += v[0] * v[2];
         sum[3] += v[1] * v[1], sum[4] += v[1] * v[2], sum[5] += v[2] * v[2];
     }
-    area_vector(w, r, n, size);
+    *size = area_vector(w, r, n);
     if (!(*size > 0)) return false;
     for (int k = 0; k < 3; k++) n[k] /= *size;
     double h = (sum[0] + sum[3] + sum[5]) / 2;

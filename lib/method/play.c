@@ -2,6 +2,7 @@
  * vertices by one product.
  * Leaves out fitting (map.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/vector.h"
 #include "method/map_parts.h"
 #include "method/product.h"
 #include "model/rig.h"
@@ -168,17 +169,12 @@ static void read_motion(vg_player *p, const double *transforms)
     }
 }
 
-static void apply(const double *a, const double *x, double y[3])
-{
-    for (int i = 0; i < 3; i++) y[i] = a[3 * i] * x[0] + a[3 * i + 1] * x[1] + a[3 * i + 2] * x[2];
-}
-
 static void root_of(const vg_player *p, const double *centre, double root[3])
 {
     root[0] = root[1] = root[2] = 0;
     for (size_t i = 0; i < p->m->n; i++) {
         double at[3];
-        apply(p->motion + 12 * i, centre + 3 * i, at);
+        vgi_multiply_vector(p->motion + 12 * i, centre + 3 * i, at);
         for (int k = 0; k < 3; k++) root[k] += p->m->share[i] * (at[k] + p->motion[12 * i + 9 + (size_t)k]);
     }
 }
@@ -263,7 +259,7 @@ void vg_player_between(vg_player *p, const double *a, const double *b, double t,
         if (!p->m->has_home) placed(p, i, at);
         for (size_t k = 0; k < 3; k++)
             miss[k] = p->ends[3 * i + k] + t * (p->ends[3 * n + 3 * i + k] - p->ends[3 * i + k]);
-        apply(p->motion + 12 * i, miss, turned);
+        vgi_multiply_vector(p->motion + 12 * i, miss, turned);
         for (size_t k = 0; k < 3; k++)
             out[7 * i + 4 + k] = at[k] + root_a[k] + t * (root_b[k] - root_a[k]) + turned[k];
     }

@@ -1,6 +1,7 @@
 /* retarget.c: a map for another body of the same faces (T 6.5), or for one on the way to it (T 6.6).
  * Leaves out how maps are fitted (map.c of patches, envelope.c of bones).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/vector.h"
 #include "method/map_parts.h"
 #include "method/pieces.h"
 #include "method/product.h"
@@ -8,11 +9,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-
-static double length2(const double x[3])
-{
-    return x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
-}
 
 /* The body on the way: vectors turned and stretched along geodesics, then reconstructed;
  * its root on the line between both. */
@@ -32,7 +28,7 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
         vg_graph_vectors(g, target, b);
         for (size_t c = 0; c < corners; c++) {
             double *x = a + 3 * c, *y = b + 3 * c, q[4], l[4];
-            if (!(length2(x) > 0 && length2(y) > 0)) { /* no direction: in a line */
+            if (!(vgi_dot(x, x) > 0 && vgi_dot(y, y) > 0)) { /* no direction: in a line */
                 for (size_t k = 0; k < 3; k++) x[k] += morph * (y[k] - x[k]);
                 continue;
             }
@@ -123,7 +119,7 @@ static void move_joint(const vg_rig *r, size_t nv, const double *from, const dou
             }
             const double *x = from + 3 * v, *y = to + 3 * v;
             const double gap[3] = {x[0] - at[0], x[1] - at[1], x[2] - at[2]};
-            near = length2(gap) + soft * d * d;
+            near = vgi_dot(gap, gap) + soft * d * d;
             pull = (shared > 1e-3 ? w[0] * w[1] : own > 1e-3 ? w[0] : 1) / (near * near);
             if (round == 1) {
                 sum += pull;

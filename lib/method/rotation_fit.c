@@ -4,6 +4,7 @@
  * Leaves out what the matrices are made of, but for the rotations of faces.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rotation_fit.h"
+#include "core/vector.h"
 #include "model/turn.h"
 
 #include <math.h>
@@ -11,14 +12,6 @@
 
 #define INLINE static inline __attribute__((always_inline))
 static const double thin = 1e-3; /* determinant of a matrix of norm 1 below which Newton is not asked */
-
-static double cofactors(const double x[9], double c[9])
-{
-    c[0] = x[4] * x[8] - x[5] * x[7], c[1] = x[5] * x[6] - x[3] * x[8], c[2] = x[3] * x[7] - x[4] * x[6];
-    c[3] = x[2] * x[7] - x[1] * x[8], c[4] = x[0] * x[8] - x[2] * x[6], c[5] = x[1] * x[6] - x[0] * x[7];
-    c[6] = x[1] * x[5] - x[2] * x[4], c[7] = x[2] * x[3] - x[0] * x[5], c[8] = x[0] * x[4] - x[1] * x[3];
-    return x[0] * c[0] + x[1] * c[1] + x[2] * c[2];
-}
 
 static double squares(const double x[9])
 {
@@ -32,7 +25,7 @@ static void newton(double x[9])
     enum { MOST = 30 };
     double change = 1;
     for (int step = 0; step < MOST && change > 1e-20; step++) {
-        double c[9], det = cofactors(x, c), g = sqrt(sqrt(squares(c) / squares(x)) / det);
+        double c[9], det = vgi_cofactors(x, c), g = sqrt(sqrt(squares(c) / squares(x)) / det);
         change = 0;
         for (int i = 0; i < 9; i++) {
             double y = 0.5 * (g * x[i] + c[i] / (g * det));
@@ -58,7 +51,7 @@ void vgi_fit_rotation(const double m[9], double r[9])
     if (!(size > 0 && size < INFINITY)) return;
     double x[9];
     for (int i = 0; i < 9; i++) x[i] = m[i] / size;
-    if (cofactors(x, c) > thin) {
+    if (vgi_cofactors(x, c) > thin) {
         newton(x);
         memcpy(r, x, sizeof x);
     } else {
@@ -67,15 +60,6 @@ void vgi_fit_rotation(const double m[9], double r[9])
 }
 
 /* ---- faces ---- */
-
-static void newell(const double *w, size_t r, double n[3])
-{
-    n[0] = n[1] = n[2] = 0;
-    for (size_t i = 0; i < r; i++) {
-        const double *a = w + 3 * i, *b = w + 3 * (i + 1 < r ? i + 1 : 0);
-        n[0] += a[1] * b[2] - a[2] * b[1], n[1] += a[2] * b[0] - a[0] * b[2], n[2] += a[0] * b[1] - a[1] * b[0];
-    }
-}
 
 int vgi_turns_make(vgi_turns *t, size_t nf, const uint32_t *start, const uint32_t *vert, const double *reference,
                    vg_err *e)
@@ -94,8 +78,8 @@ int vgi_turns_make(vgi_turns *t, size_t nf, const uint32_t *start, const uint32_
                 w[3 * i + k] = reference[3 * (size_t)vert[begin + i] + k] - centre[k];
                 spread += w[3 * i + k] * w[3 * i + k];
             }
-        newell(w, r, n);
-        double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        vgi_area_vector(w, r, n);
+        double length = vgi_length(n);
         for (size_t k = 0; k < 3; k++)
             t->normal[3 * f + k] = length > 1e-12 * spread ? n[k] / length * (0.5 * spread) : 0;
     }

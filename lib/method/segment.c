@@ -1,6 +1,6 @@
 /* segment.c: faces that turn alike, by K-means over their rotations (T 6.2), and patches that hang together.
- * Leaves out how the rotation of a face is measured (rotation_fit.c), what hangs together (pieces.c), and which pieces
- * are joined (join.c).
+ * Leaves out how the rotation of a face is measured (rotation_fit.c), what hangs together (pieces.c), and which
+ * pieces are joined (join.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/join.h"
 #include "method/pieces.h"

@@ -2,6 +2,7 @@
  * Leaves out what a nearest point is good for (fit.c, pair.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/surface.h"
+#include "core/vector.h"
 #include "model/incidence.h"
 
 #include <math.h>
@@ -33,11 +34,6 @@ struct vgi_surface {
     struct triangle *triangle;
     struct box *box;
 };
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 void vgi_newell(const double *points, const uint32_t *vert, size_t r, double area[3])
 {
@@ -88,7 +84,7 @@ static void set_triangle(struct triangle *t, const double *a, const double *b, c
     area[1] = t->ab[2] * t->ac[0] - t->ab[0] * t->ac[2];
     area[2] = t->ab[0] * t->ac[1] - t->ab[1] * t->ac[0];
     t->face = (uint32_t)face, t->corner = (uint32_t)corner, t->borders = borders;
-    t->flat = !(dot(area, area) > 1e-24 * dot(t->ab, t->ab) * dot(t->ac, t->ac));
+    t->flat = !(vgi_dot(area, area) > 1e-24 * vgi_dot(t->ab, t->ab) * vgi_dot(t->ac, t->ac));
 }
 
 static size_t fan_size(size_t r)
@@ -108,13 +104,13 @@ static void make_triangles(vgi_surface *s, const double *points)
         for (size_t i = 0; i < r; i++)
             for (int k = 0; k < 3; k++) C[k] += points[3 * (size_t)vert[i] + (size_t)k] / (double)r;
         vgi_newell(points, vert, r, n);
-        length = sqrt(dot(n, n));
+        length = sqrt(vgi_dot(n, n));
         s->size[f] = sqrt(length);
         for (int k = 0; k < 3; k++) n[k] = length > 0 ? n[k] / length : 0;
         const double *p = points + 3 * (size_t)vert[0], *q = points + 3 * (size_t)vert[1];
         if (r == 2) {
             set_triangle(t++, p, q, q, f, begin, 0);
-            s->size[f] = sqrt(dot(t[-1].ab, t[-1].ab));
+            s->size[f] = sqrt(vgi_dot(t[-1].ab, t[-1].ab));
         } else if (r == 3) {
             uint8_t edges = (uint8_t)(border[0] | border[1] << 1 | border[2] << 2);
             set_triangle(t++, p, q, points + 3 * (size_t)vert[2], f, begin, edges);
@@ -136,7 +132,7 @@ static void make_vertex_normals(vgi_surface *s)
                 s->vertex_normal[3 * (size_t)m->vert[c] + k] += s->size[f] * s->size[f] * s->normal[3 * f + k];
     }
     for (size_t v = 0; v < m->nv; v++) {
-        double *n = s->vertex_normal + 3 * v, length = sqrt(dot(n, n));
+        double *n = s->vertex_normal + 3 * v, length = sqrt(vgi_dot(n, n));
         for (int k = 0; k < 3; k++) n[k] = length > 0 ? n[k] / length : 0;
     }
 }
@@ -343,8 +339,8 @@ static double clamp01(double x)
 /* Nearest point of the segment from o along d to p, as a share of d. */
 static double on_segment(const double o[3], const double d[3], const double p[3])
 {
-    double dd = dot(d, d), op[3] = {p[0] - o[0], p[1] - o[1], p[2] - o[2]};
-    return dd > 0 ? clamp01(dot(op, d) / dd) : 0;
+    double dd = vgi_dot(d, d), op[3] = {p[0] - o[0], p[1] - o[1], p[2] - o[2]};
+    return dd > 0 ? clamp01(vgi_dot(op, d) / dd) : 0;
 }
 
 static void try_edge(const struct triangle *t, const double p[3], int edge, double *best, double u[2],
@@ -371,8 +367,8 @@ static double triangle_distance(const struct triangle *t, const double p[3], dou
     *touched = 0;
     if (!t->flat) {
         double ap[3] = {p[0] - t->a[0], p[1] - t->a[1], p[2] - t->a[2]};
-        double d11 = dot(t->ab, t->ab), d12 = dot(t->ab, t->ac), d22 = dot(t->ac, t->ac);
-        double r1 = dot(t->ab, ap), r2 = dot(t->ac, ap), det = d11 * d22 - d12 * d12;
+        double d11 = vgi_dot(t->ab, t->ab), d12 = vgi_dot(t->ab, t->ac), d22 = vgi_dot(t->ac, t->ac);
+        double r1 = vgi_dot(t->ab, ap), r2 = vgi_dot(t->ac, ap), det = d11 * d22 - d12 * d12;
         double v = (d22 * r1 - d12 * r2) / det, w = (d11 * r2 - d12 * r1) / det;
         if (v >= 0 && w >= 0 && v + w <= 1) {
             double square = 0;
@@ -401,15 +397,15 @@ static bool fits(const vgi_surface *s, const struct triangle *t, const double u[
                  double cosine)
 {
     const double *n = s->normal + 3 * (size_t)t->face;
-    if (!normal || !(dot(n, n) > 0) || dot(n, normal) >= cosine) return true;
+    if (!normal || !(vgi_dot(n, n) > 0) || vgi_dot(n, normal) >= cosine) return true;
     uint32_t begin = s->m->start[t->face], r = s->m->start[t->face + 1] - begin,
              next = begin + (t->corner - begin + 1) % r;
     const double *a = corner_normal(s, t->corner), *b = corner_normal(s, next),
                  *c = r == 3 ? corner_normal(s, begin + 2) : n;
     double smooth[3];
     for (int k = 0; k < 3; k++) smooth[k] = (1 - u[0] - u[1]) * a[k] + u[0] * b[k] + u[1] * c[k];
-    double length = sqrt(dot(smooth, smooth));
-    return length > 0 && dot(smooth, normal) >= cosine * length;
+    double length = sqrt(vgi_dot(smooth, smooth));
+    return length > 0 && vgi_dot(smooth, normal) >= cosine * length;
 }
 
 static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const double p[3], const double *normal,
@@ -439,7 +435,7 @@ bool vgi_surface_nearest(const vgi_surface *s, const double p[3], const double *
     } stack[DEEPEST + 2];
     double best = limit;
     int top = 0;
-    if (normal && !(dot(normal, normal) > 0)) normal = NULL;
+    if (normal && !(vgi_dot(normal, normal) > 0)) normal = NULL;
     hit->face = UINT32_MAX;
     if (s->n) stack[top++] = (struct place){1, 0, box_distance(&s->box[1], p)};
     while (top > 0) {

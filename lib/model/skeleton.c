@@ -2,6 +2,7 @@
  * Leaves out the file that holds a skeleton (bvh.c) and how bones deform (deform.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
+#include "core/vector.h"
 #include "model/turn.h"
 
 #include <math.h>
@@ -183,15 +184,6 @@ static void euler_angles(const double q[4], const int axis[3], double *angles)
     memcpy(angles, a[distance[1] < distance[0]], 3 * sizeof *angles);
 }
 
-static void multiply(const double a[9], const double b[9], double ab[9])
-{
-    double c[9];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            c[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
-    memcpy(ab, c, sizeof c);
-}
-
 static void transpose(double m[9])
 {
     double t;
@@ -219,8 +211,8 @@ static void climb_to_angles(const double k[9], const int *axis, uint32_t n, doub
             matrix_of(axis + i + 1, angles + i + 1, n - i - 1, behind);
             transpose(before);
             transpose(behind);
-            multiply(before, k, g);
-            multiply(g, behind, g);
+            vgi_multiply(before, k, g);
+            vgi_multiply(g, behind, g);
             int u = (axis[i] + 1) % 3, v = (axis[i] + 2) % 3;
             double sine = g[3 * v + u] - g[3 * u + v], cosine = g[4 * u] + g[4 * v];
             if (!(hypot(sine, cosine) > 1e-12)) continue;
@@ -252,19 +244,14 @@ struct vg_joint_fitter {
 
 enum { MOST_STEPS = 16 }; /* up a chain of joints that lie on one another */
 
-static double length(const double v[3])
-{
-    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
-
 /* Of whose arms is joint c? Up to MOST_STEPS into `owners`. */
 static size_t list_owners(const vg_skeleton *s, size_t c, double shortest, uint32_t owners[MOST_STEPS])
 {
     size_t n = 0;
-    if (s->joints[c].parent == NONE || !(length(s->joints[c].offset) > shortest)) return 0;
+    if (s->joints[c].parent == NONE || !(vgi_length(s->joints[c].offset) > shortest)) return 0;
     for (uint32_t a = s->joints[c].parent; a != NONE && n < MOST_STEPS; a = s->joints[a].parent) {
         owners[n++] = a;
-        if (length(s->joints[a].offset) > shortest) break;
+        if (vgi_length(s->joints[a].offset) > shortest) break;
     }
     return n;
 }
@@ -341,9 +328,9 @@ static size_t gather_arms(const vg_joint_fitter *f, size_t j, const double *pose
     memset(k, 0, 9 * sizeof *k);
     for (size_t i = f->first_arm[j]; i < f->first_arm[j + 1]; i++) {
         const arm *a = &f->arms[i];
-        double d[3], l = length(a->offset), dl;
+        double d[3], l = vgi_length(a->offset), dl;
         for (int x = 0; x < 3; x++) d[x] = pose[3 * (size_t)a->joint + x] - pose[3 * j + x];
-        if ((firm && a->loose) || !((dl = length(d)) > 1e-9 * l)) continue;
+        if ((firm && a->loose) || !((dl = vgi_length(d)) > 1e-9 * l)) continue;
         for (int x = 0; x < 3; x++)
             for (int y = 0; y < 3; y++) k[3 * x + y] += l * d[x] / dl * a->offset[y];
         total += l * l;
@@ -404,7 +391,7 @@ static void fit_angles(const vg_joint_fitter *f, size_t j, const double *pose, c
     } else {
         double m[9], wish[9];
         vg_quat_matrix(back, m);
-        multiply(m, k, k);
+        vgi_multiply(m, k, k);
         vg_quat_matrix(local, wish); /* of a turn that was found: decides what the directions leave open */
         for (int i = 0; i < 9; i++) k[i] += (turn ? 1 : 1e-6) * wish[i];
         climb_to_angles(k, axis, n, angles);
@@ -438,7 +425,7 @@ double vg_joint_fitter_fit(vg_joint_fitter *f, const double *pose, const double 
         fit_offset(f, j, pose, values);
         place_joint(f->s, j, values, f->positions, f->turns);
         for (int k = 0; k < 3; k++) d[k] = f->positions[3 * j + k] - pose[3 * j + k];
-        if (length(d) > most) most = length(d), *joint = j;
+        if (vgi_length(d) > most) most = vgi_length(d), *joint = j;
         values += f->s->joints[j].nchannels;
     }
     if (out) memcpy(out, f->values, (size_t)(values - f->values) * sizeof *out);

@@ -8,8 +8,8 @@
  * takes the vectors o nearest to the d when b is the sum of d o^T. Never a reflection;
  * some best one where b leaves it open. */
 void vgi_best_turn(const double b[9], double q[4]);
-/* vgi_best_turn_near: the same of b + weight * (the rotation of the unit quaternion `prior`): with a small weight, what
- * b leaves open is as in `prior`. */
+/* vgi_best_turn_near: the same of b + weight * (the rotation of the unit quaternion `prior`): with a small weight,
+ * what b leaves open is as in `prior`. */
 void vgi_best_turn_near(const double b[9], double weight, const double prior[4], double q[4]);
 
 #endif
