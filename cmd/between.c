@@ -121,11 +121,14 @@ static void collect(poses *p, vg_source *s)
     place_keys(p);
 }
 
-static void check_finite(const poses *p, const vg_frame *f)
+static void check_finite(const poses *p, const vg_frame *f, double t)
 {
     bool finite = isfinite(f->root[0]) && isfinite(f->root[1]) && isfinite(f->root[2]);
     for (size_t i = 0; i < 3 * p->h->count; i++) finite &= isfinite(f->values[i]) != 0;
     if (finite) return;
+    if (t >= 0 && t <= (double)(p->n - 1))
+        cli_stop(VG_EINPUT, "frame '%s' cannot be calculated: the poses beside it are too large, or too far apart",
+                 f->name);
     cli_stop(VG_EARG, "frame '%s' is so far outside that numbers overflow: choose --at nearer to the keys", f->name);
 }
 
@@ -138,7 +141,7 @@ static void write_poses(const poses *p, vg_path *path)
         double t = between_moment(i, p->n);
         if (vg_path_at(path, t, f.values, f.root, f.anchors, &e) < 0) cli_die(&e);
         between_label(&f, p->labels, p->n, t);
-        check_finite(p, &f);
+        check_finite(p, &f, t);
         cli_stream_put(&f);
         cli_progress("poses", i + 1);
     }

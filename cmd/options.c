@@ -3,6 +3,7 @@
 #include "options.h"
 #include "processors.h"
 
+#include <ctype.h>
 #include <errno.h>
 #include <getopt.h>
 #include <limits.h>
@@ -358,7 +359,7 @@ uint64_t cli_parse_size(const char *option, const char *text)
     char *end;
     errno = 0;
     unsigned long long x = strtoull(text, &end, 10);
-    const char *unit = *end ? strchr(units, *end & ~0x20) : NULL;
+    const char *unit = isalpha((unsigned char)*end) ? strchr(units, *end & ~0x20) : NULL;
     if (errno || *text < '0' || *text > '9' || (*end && (!unit || end[1])))
         cli_usage("option '--%s' needs a size such as 64M or 2G, not '%s'", bare(option), text);
     for (const char *u = units; unit && u <= unit; u++)

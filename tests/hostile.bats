@@ -89,7 +89,7 @@ answers() {
     says "'standard input' holds more than 16777216 bytes"
     pipe_fail 3 "cat bomb.zip | vg-encode --max-bytes 100K -o no.vgs"
     [ ! -e no.vgs ]
-    for size in 0 '' x 1X -1; do must_fail 2 vg-encode --max-bytes "$size" bomb.zip -o no.vgs; done
+    for size in 0 '' x 1X -1 '1 ' '1K '; do must_fail 2 vg-encode --max-bytes "$size" bomb.zip -o no.vgs; done
 }
 
 @test "a pipe gives no more than --max-bytes to any reader, however short; arrays that are stored may be longer" {
@@ -268,6 +268,11 @@ END
 
 # ---- what is well formed, and makes no sense -----------------------------------------------------------------------
 
+# scale FACTOR FILE: an OBJ, larger
+scale() {
+    awk -v s="$1" '/^v/ { printf "v %.17g %.17g %.17g\n", $2 * s, $3 * s, $4 * s; next } { print }' "$2"
+}
+
 # no_output STATUS COMMAND...: refused with one line, and no file called out.*
 no_output() {
     must_fail "$@" && one_line && [ -z "$(find . -name '*out.*')" ] || fail "'${*:2}' left a file"
@@ -279,7 +284,7 @@ no_output() {
     must vg-segment -k 2 cube.vgs -o patches.vgs
     must vg-fitmap -q --patches patches.vgs cube.vgs -o cube.map
     for size in 1e300 1e155 1e-300 1e-310; do
-        awk -v s=$size '/^v/ { printf "v %.17g %.17g %.17g\n", $2 * s, $3 * s, $4 * s; next } { print }' pose2.obj >body.obj
+        scale $size pose2.obj >body.obj
         no_output 3 vg-fitmap --retarget body.obj cube.map -o out.map
     done
     no_output 3 vg-fitmap --retarget pose2.obj --morph 1e308 cube.map -o out.map
@@ -296,4 +301,37 @@ a, b = map(read_stream.read_stream, ("reference.vgs", "selected.vgs"))
 assert a.map is None and a.rig is None and b.map is None
 END
     done
+}
+
+@test "joints of patches that are missed by more than any length: they count for nothing" {
+    poses cube 3
+    pipe "vg-encode pose*.obj | vg-segment -k 2 -o patches.vgs"
+    for size in 1e-100 1e-150 1e-160 1e-200; do
+        scale $size pose1.obj >reference.obj
+        must vg-encode --reference reference.obj pose*.obj -o poses.vgs
+        answers vg-fitmap -q --patches patches.vgs poses.vgs -o map.vgs
+    done
+}
+
+@test "errors and scales that no colour shows: a page of finite numbers, or a refusal" {
+    poses cube 2
+    scale 1e100 pose2.obj >large.obj
+    must vg-view --against pose1.obj large.obj -o large.html
+    grep -q '"means":\[[0-9.e+]*\]' large.html
+    scale 1e200 pose2.obj >huge.obj
+    scale 1e-200 pose1.obj >tiny.obj
+    must vg-encode --reference tiny.obj pose1.obj -o truth.vgs
+    no_output 3 vg-view --against truth.vgs huge.obj -o out.html
+    must vg-encode --reference tiny.obj huge.obj -o scales.vgs
+    answers vg-view --scales scales.vgs -o scales.html
+    ! grep -qE '[[,:]-?(inf|nan)' scales.html
+}
+
+@test "a pose between two that are too far apart is refused as input, one too far outside as usage" {
+    poses cube 2
+    scale 1.7e307 pose2.obj >huge.obj
+    must vg-encode pose1.obj huge.obj -o keys.vgs
+    no_output 3 vg-deform --at 0.25 keys.vgs -o out.vgs
+    says "too far apart"
+    no_output 2 vg-deform --at -1 keys.vgs -o out.vgs
 }

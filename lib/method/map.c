@@ -394,6 +394,7 @@ static void fit_joint(const vg_map_fitter *f, size_t i, size_t j, const double m
 static int fit_joints(const vg_map_fitter *f, vg_map *m, vg_err *e)
 {
     static const double least = 2e-3; /* of D: how exactly a joint can be known */
+    static const double nothing = 1e-12; /* weight of a joint that is missed by thousands of D, or by no number at all */
     const vg_graph *g = f->g;
     uint32_t (*pair)[2], *shared;
     double d = vg_diagonal(f->h->reference, g->nv);
@@ -411,6 +412,7 @@ static int fit_joints(const vg_map_fitter *f, vg_map *m, vg_err *e)
         double miss;
         fit_joint(f, pair[i][0], pair[i][1], middle + 3 * i, m->joint_at + 3 * i, &miss);
         m->joint_weight[i] = d > 0 ? shared[i] / (miss / (d * d) + least * least) * least * least : 1;
+        if (!(m->joint_weight[i] >= nothing)) m->joint_weight[i] = nothing;
     }
     free(middle);
     free(shared);

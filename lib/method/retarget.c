@@ -227,7 +227,7 @@ int vg_map_retarget(vg_head *h, const double *target, double morph, int threads,
         ratio = after / before;
         if (!(before > 0 && after > 0)) r = vg_fail(e, VG_EINPUT, "a body without extent cannot be retargeted");
         else if (!(isfinite(ratio * m->size) && ratio * m->size > 0))
-            r = vg_fail(e, VG_EINPUT, "a body of size %g cannot take the place of one of size %g", after, before);
+            r = vg_fail(e, VG_EINPUT, "the new body is too large or too small beside that of the map");
         else r = bones ? move_bones(h, body, e) : move_points(h, g, of_face, body, ratio, e);
     }
     if (r == VG_OK) {

@@ -124,6 +124,7 @@ static int json_number(vg_bytes *b, double x, vg_err *e)
 static int json_short(vg_bytes *b, double x, vg_err *e) /* to be shown */
 {
     char text[32];
+    if (!isfinite((float)x)) return json_number(b, x, e);
     return vgi_bytes_append(b, text, vgi_print_float(text, x), e);
 }
 

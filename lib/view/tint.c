@@ -123,6 +123,8 @@ int vgi_tint_read(vgi_tint *t, vgi_meter *m, const vg_frame *f, const double *tr
         s->mean += m->numbers[v] / (double)nv;
         s->least = fmin(s->least, m->numbers[v]), s->most = fmax(s->most, m->numbers[v]);
     }
+    if (!isfinite(s->mean))
+        return vg_fail(e, VG_EINPUT, "frame '%s': its coordinates are too large for colours", f->name ? f->name : "");
     return VG_OK;
 }
 
