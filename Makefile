@@ -42,6 +42,9 @@ ALL_CFLAGS := -std=gnu11 -fPIC -Wall -Wextra -Wshadow -Wvla -Wstrict-prototypes 
 ifeq ($(WERROR),1)
 ALL_CFLAGS += -Werror
 endif
+ifeq ($(filter $(CONFIG),release asan cov fuzz),)
+$(error CONFIG is release, asan, cov or fuzz, not '$(CONFIG)')
+endif
 ifeq ($(CONFIG),asan)
 ALL_CFLAGS += -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
 ALL_LDFLAGS := -fsanitize=address,undefined

@@ -164,8 +164,7 @@ END
     walk 3 >walk.bvh
     walk 3 6 >long.bvh
     pipe 'vg-encode walk.bvh | vg-encode --reference long.bvh >mixed.vgs' # the legs of one, the reference of the other
-    capture vg-decode mixed.vgs -o out.bvh
-    [ "$status" = 0 ]
+    must_warn vg-decode mixed.vgs -o out.bvh
     says "not kept in 'out.bvh': the lengths of the bones as they change: joint '"
     one_line
 }

@@ -187,8 +187,7 @@ a, s, t = (read_stream.read_stream(n + ".vgs") for n in ("all", "selected", "aga
 assert a.selection is None and list(s.selection) == list(t.selection) and s.count == t.count
 assert 0.4 * a.count < s.count < 0.7 * a.count, (s.count, a.count)
 END
-    capture vg-encode -v --faces selected "$DATA/trex.rest.obj" -o vertices.vgs
-    [ "$status" = 0 ]
+    must_warn vg-encode -v --faces selected "$DATA/trex.rest.obj" -o vertices.vgs
     says "of 838 faces"
     must_fail 2 vg-encode --faces some "$DATA/trex.rest.obj" -o bad.vgs
     says "'some'"

@@ -396,3 +396,21 @@ END
     must_fail 2 vg-info --weights --json "$GOLDEN/rig.vgs"
     must_fail 2 vg-info --weights --digest "$GOLDEN/rig.vgs"
 }
+
+@test "times and numbers of vertices: from the first, over all frames" {
+    poses cube 3
+    must vg-encode --fps 4 pose*.obj -o timed.vgs
+    must vg-info timed.vgs
+    shows '0 s to 0.5 s'
+    must vg-info --json timed.vgs -o timed.json
+    py <<'END'
+import json, make_corpus as m
+told = json.load(open("timed.json"))
+assert (told["first_time"], told["last_time"], told["first"], told["last"]) == (0, 0.5, "pose1", "pose3"), told
+numbers = [[0, 0.25, -1, 0.125], [0.5, -2, 0, 0], [0, 0.25, -1, 0]]
+frames = [dict(m.pose("p%d" % i, m.POINTS[:4]), scalars={"name": "load", "unit": "N", "numbers": x}) for i, x in enumerate(numbers)]
+m.write("load.vgs", m.whole(m.content(frames=frames)))
+END
+    must vg-info load.vgs
+    shows "'load' of each vertex in 3 of the frames: -2 to 0.5 N"
+}

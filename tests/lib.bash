@@ -42,13 +42,20 @@ must() {
     [ -z "$stderr" ] || fail "'$*' wrote to standard error" "$stderr"
 }
 
-# must_fail CODE CMD...: exactly this status, and one line that begins with a program's name
+# must_warn CMD...: status 0, and something is said on standard error
+must_warn() {
+    capture "$@" || return 1
+    [ "$status" = 0 ] || fail "'$*' ended with status $status" "$stderr" "$output" || return 1
+    [ -n "$stderr" ] || fail "'$*' said nothing on standard error"
+}
+
+# must_fail CODE CMD...: exactly this status, and a line on standard error that begins with a program's name
 must_fail() {
     local want=$1
     shift
     capture "$@" || return 1
     [ "$status" = "$want" ] || fail "'$*' ended with status $status, not $want" "$stderr" || return 1
-    [ -n "$stderr" ] || fail "'$*' failed without a word"
+    [[ $stderr =~ ^[a-z_.-]+:\ . ]] || fail "'$*' failed, but no program says why:" "$stderr"
 }
 
 # pipe COMMANDLINE, pipe_fail CODE COMMANDLINE: the same for a pipeline, whose status is that of the last program that failed
@@ -71,6 +78,19 @@ shows() {
     for text; do
         [[ $output == *"$text"* ]] || fail "standard output does not show: $text" "it shows: $output" || return 1
     done
+}
+
+# vertex_error mean|p95|max [OPTION...] TRUTH RESULT: as vg-diff with these options finds it, in D
+vertex_error() {
+    local which=$1
+    shift
+    must vg-diff --json "$@" || return 1
+    python3 -c 'import json, sys; print(json.load(sys.stdin)["vertex_error"][sys.argv[1]]["D"])' "$which" <<<"$output"
+}
+
+# at_most X Y: as numbers
+at_most() {
+    python3 -c 'import sys; a, b = map(float, sys.argv[1:]); sys.exit(not a <= b)' "$1" "$2" || fail "$1 is more than $2"
 }
 
 # one_line: a failure is one line. More are allowed only in a pipe, one for each program.

@@ -340,6 +340,13 @@ END
     nothing_but all.vgs fifo message
 }
 
+@test "the status that a pipe's first failure had is told by all behind it" {
+    vg-encode --vectors "$DATA/horse-run.tar.xz" -o v.vgs
+    pipe_fail 3 'vg-solve --planar --planar-weights 1e-13,1 v.vgs | vg-encode | vg-encode --f32 | vg-info --check'
+    reason="is not planar yet after 1000 steps: choose --planar-weights that are less far apart"
+    [ "$(grep -c "standard input' was cut short: vg-solve failed with status 1: .*$reason" <<<"$stderr")" = 3 ] || fail "$stderr"
+}
+
 @test "a failure leaves the old file as it was, and nothing beside it" {
     mesh cube >a1.obj
     mesh tetra >a2.obj
@@ -424,8 +431,9 @@ END
 }
 
 @test "control characters of the input do not reach the terminal" {
-    printf 'v 0 0 0\nv 1 0 0\n\033]0;owned\007 1 2\n' >a.obj
-    capture vg-encode a.obj -o out.vgs
+    printf 'v 0 0 0\nv 1 0 0\nf 1 \033]0;owned\007 2\n' >a.obj
+    must_fail 3 vg-encode a.obj -o out.vgs
+    says "not '?]0;owned?'"
     [[ $stderr != *$'\033'* ]]
     mesh tetra >$'b\033[31m.obj'
     must vg-encode $'b\033[31m.obj' -o b.vgs

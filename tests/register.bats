@@ -52,6 +52,17 @@ number() {
     must vg-view c.vgs -o c.png
 }
 
+@test "patches of the source are none of the target" {
+    bodies
+    must vg-register walk-man.obj walk-woman.obj --markers markers.txt -o c.vgs
+    must vg-encode walk-man.obj walk-man.obj -o man.vgs
+    must vg-segment -k 3 man.vgs -o patches.vgs
+    must vg-deform --onto walk-woman.obj --correspondence c.vgs patches.vgs -o out.vgs
+    must vg-info --check out.vgs
+    must vg-info --json out.vgs
+    [[ $output != *'"patches"'* && $output == *'"kind": "vectors"'* ]] || fail "$output"
+}
+
 @test "the same bytes for any number of threads" {
     bodies
     must vg-register -j 1 --no-provenance walk-man.obj walk-woman.obj -m markers.txt -o 1.vgs
@@ -93,10 +104,9 @@ number() {
     one_line
     says "warning: marker 'm9' (line 9), vertex " ' on vertex 660, is 0.' ' D from where its neighbours expect it' \
         'it is left out'
-    capture vg-register --keep-all --index-base 1 walk-man.obj walk-woman.obj -m wrong.txt -o k.vgs
-    [ "$status" = 0 ]
+    must_warn vg-register --keep-all --index-base 1 walk-man.obj walk-woman.obj -m wrong.txt -o k.vgs
     says 'it is used all the same'
-    capture vg-register -v walk-man.obj walk-woman.obj -m one.txt --index-base 1 -o v.vgs
+    must_warn vg-register -v walk-man.obj walk-woman.obj -m one.txt --index-base 1 -o v.vgs
     says 'round 8 of 8: ' 'the source as a whole: scale 0.95' "marker 'm1' (line 1): " \
         '1584 of 1584 faces of the target matched'
 }
@@ -115,7 +125,7 @@ number() {
     sheet 10 7 5 >t.obj
     must vg-register --uv s.obj t.obj -o t.vgs
     [ "$(number t.vgs matched_faces)" = 70 ]
-    capture vg-register -v --uv s.obj t.obj -o t.vgs
+    must_warn vg-register -v --uv s.obj t.obj -o t.vgs
     says '130 vertices of the source found their texture coordinates on the target'
     must_fail 3 vg-register --uv walk-man.obj t.obj -o x.vgs
     says "'walk-man.obj' has no texture coordinates: --uv needs them in both meshes"

@@ -1,6 +1,7 @@
 #!/bin/sh
 # run.sh: every test: unit tests, replays of the fuzz targets over the corpora, bats files. From the environment: BUILD (where
-# `make` put things), CONFIG, TESTS (default all: which of unit, fuzz and bats files to run, as "unit fuzz stream.bats").
+# `make` put things), CONFIG, TESTS (default all: which to run: "unit", "fuzz" and "bats" are all of a kind, "test_mesh",
+# "fuzz_obj" and "stream.bats" one each).
 # Ends with "N passed, N failed"; fails if anything failed, nothing ran, or the run left files in the tree.
 # SPDX-License-Identifier: GPL-3.0-or-later
 set -u
@@ -17,12 +18,24 @@ trap 'rm -rf "$work"' EXIT
 trap 'exit 4' HUP INT TERM
 passed=0 failed=0 skipped=0
 
+# wanted KIND NAME: is this one to be run?
 wanted() {
     case " $TESTS " in
-    *" all "* | *" $1 "*) return 0 ;;
+    *" all "* | *" $1 "* | *" $2 "*) return 0 ;;
     esac
     return 1
 }
+
+for name in $TESTS; do
+    case $name in
+    all | unit | fuzz | bats) continue ;;
+    test_*) [ ! -f "tests/unit/$name.c" ] || continue ;;
+    fuzz_*) [ ! -f "tests/fuzz/$name.c" ] || continue ;;
+    *.bats) [ ! -f "tests/$name" ] || continue ;;
+    esac
+    echo "there is no test '$name': see TESTS in tests/run.sh" >&2
+    exit 2
+done
 
 # count NAME PASSED FAILED [SKIPPED]: one line for each thing that ran
 count() {
@@ -40,7 +53,7 @@ untracked() {
 # LeakSanitizer stops where it may not trace its own process (some containers): then everything but leaks is looked for.
 sanitizers() {
     case $CONFIG in
-    asan | ubsan | fuzz) ;;
+    asan | fuzz) ;;
     *) return ;;
     esac
     leaks=1
@@ -111,19 +124,17 @@ untracked >"$work/before"
 sanitizers
 command -v pkill >/dev/null || command -v ps >/dev/null && export BATS_TEST_TIMEOUT=300 # bats needs one of them for it
 
-if wanted unit; then
-    for source in tests/unit/test_*.c; do
-        [ ! -f "$source" ] || run_unit "$(basename "$source" .c)"
-    done
-fi
-if wanted fuzz; then
-    for source in tests/fuzz/fuzz_*.c; do
-        [ ! -f "$source" ] || run_replay "$(basename "$source" .c)"
-    done
-fi
+for source in tests/unit/test_*.c; do
+    name=$(basename "$source" .c)
+    if wanted unit "$name"; then run_unit "$name"; fi
+done
+for source in tests/fuzz/fuzz_*.c; do
+    name=$(basename "$source" .c)
+    if wanted fuzz "$name"; then run_replay "$name"; fi
+done
 for file in tests/*.bats; do
     name=$(basename "$file")
-    if wanted "$name" || wanted bats; then run_bats "$name"; fi
+    if wanted bats "$name"; then run_bats "$name"; fi
 done
 
 untracked >"$work/after"

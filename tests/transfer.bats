@@ -31,17 +31,6 @@ first_poses() {
     rm -r all
 }
 
-# mean_error [OPTION...] TRUTH RESULT: in D
-mean_error() {
-    capture vg-diff --json "$@" || return 1
-    python3 -c 'import json, sys; r = json.load(sys.stdin); print(r["vertex_error"]["mean"]["D"])' <<<"$output"
-}
-
-# at_most X Y: as numbers
-at_most() {
-    python3 -c 'import sys; a, b = map(float, sys.argv[1:]); sys.exit(not a <= b)' "$1" "$2" || fail "$1 is more than $2"
-}
-
 # ---- exact ------------------------------------------------------------------------------------------------------------
 
 @test "onto itself every pose of every data set comes back within 1e-10 D" {
@@ -185,8 +174,8 @@ differ() {
     for file in all selected; do
         pipe "vg-deform --onto '$DATA/human-heavy-poses.tar.xz' $file.vgs | vg-solve >$file.out"
     done
-    all=$(mean_error -c "$DATA/human-heavy-poses.tar.xz" all.out)
-    selected=$(mean_error -c "$DATA/human-heavy-poses.tar.xz" selected.out)
+    all=$(vertex_error mean -c "$DATA/human-heavy-poses.tar.xz" all.out)
+    selected=$(vertex_error mean -c "$DATA/human-heavy-poses.tar.xz" selected.out)
     at_most "$all" 0.0074
     at_most 0.001 "$all" # as small as that it cannot be: then it is the comparison that is wrong
     at_most "$selected" "$(python3 -c "print(1.03 * $all)")"
@@ -198,8 +187,8 @@ differ() {
     for file in all selected; do
         pipe "vg-deform --onto '$DATA/faceB.tar.xz' $file.vgs | vg-solve >$file.out"
     done
-    all=$(mean_error -c "$DATA/faceB.tar.xz" all.out)
-    selected=$(mean_error -c "$DATA/faceB.tar.xz" selected.out)
+    all=$(vertex_error mean -c "$DATA/faceB.tar.xz" all.out)
+    selected=$(vertex_error mean -c "$DATA/faceB.tar.xz" selected.out)
     at_most "$all" 0.0022
     at_most 0.0001 "$all"
     at_most "$selected" "$(python3 -c "print(1.03 * $all)")"

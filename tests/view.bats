@@ -46,6 +46,10 @@ PY
     must vg-view pose*.obj --size 32x32 --frames 3 --columns 9 -o sheet.png
     must png sheet.png
     [ "$output" = "160 86" ]
+    poses cube 9
+    must vg-view pose*.obj --size 32x32 --columns 9 -o sheet.png # 8 unless told
+    must png sheet.png
+    [ "$output" = "400 86" ]
 }
 
 @test "a stream from a pipe gives the same picture as its files" {
