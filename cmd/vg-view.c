@@ -185,6 +185,7 @@ static const char *base_name(const char *path, int *length)
     const char *base = end;
     while (base > path && base[-1] != '/') base--;
     *length = end - base < 120 ? (int)(end - base) : 120;
+    while (*length > 0 && (base[*length] & 0xc0) == 0x80) --*length; /* no part of a character */
     return base;
 }
 

@@ -392,3 +392,17 @@ assert page.value("document.querySelector('#legend').offsetHeight") == 0
 assert page.value("document.querySelector('#colour').options.length") == 1
 END
 }
+
+@test "names and titles that are no UTF-8, or long, are text all the same" {
+    mesh cube >$'n\xff.obj'
+    long=$(printf 'é%.0s' {1..70}).obj
+    mesh cube 0.1 >"$long"
+    must vg-view $'n\xff.obj' --beside "$long" --title $'t\xff<é' -o out.html
+    py <<'END'
+import json, re
+page = open("out.html", "rb").read().decode()
+facts = json.loads(re.search(r'id="facts">(.*?)</script>', page).group(1))
+assert [s["label"] for s in facts["sequences"]] == ["n?.obj", "é" * 60], facts["sequences"]
+assert facts["title"] == "t?<??" and "<title>t?&lt;??</title>" in page
+END
+}

@@ -78,15 +78,23 @@ static int put_template(vg_page *p, const char *mark, vg_err *e)
     return r;
 }
 
+/* What is not ASCII in a text that is no UTF-8, such as the name of a file, becomes '?'. */
+static bool is_strange(const char *c, bool utf8)
+{
+    return (unsigned char)*c >= 0x80 && !utf8;
+}
+
 static int put_escaped(vg_page *p, const char *text, vg_err *e)
 {
     int r = VG_OK;
+    bool utf8 = vgi_is_utf8(text, strlen(text));
     for (const char *c = text; *c && r == VG_OK; c++) {
-        switch (*c) {
+        switch (is_strange(c, utf8) ? '?' : *c) {
         case '<': r = put_text(p, "&lt;", e); break;
         case '>': r = put_text(p, "&gt;", e); break;
         case '&': r = put_text(p, "&amp;", e); break;
         case '"': r = put_text(p, "&quot;", e); break;
+        case '?': r = put_text(p, "?", e); break;
         default: r = put(p, c, 1, e);
         }
     }
@@ -97,6 +105,7 @@ static int put_escaped(vg_page *p, const char *text, vg_err *e)
 static int json_string(vg_bytes *b, const char *text, vg_err *e)
 {
     int r = vgi_bytes_append(b, "\"", 1, e);
+    bool utf8 = vgi_is_utf8(text, strlen(text));
     for (const char *c = text; *c && r == VG_OK; c++) {
         char code[8];
         unsigned char u = (unsigned char)*c;
@@ -104,7 +113,7 @@ static int json_string(vg_bytes *b, const char *text, vg_err *e)
             snprintf(code, sizeof code, "\\u%04x", u);
             r = vgi_bytes_append(b, code, 6, e);
         } else {
-            r = vgi_bytes_append(b, c, 1, e);
+            r = vgi_bytes_append(b, is_strange(c, utf8) ? "?" : c, 1, e);
         }
     }
     return r == VG_OK ? vgi_bytes_append(b, "\"", 1, e) : r;
