@@ -212,6 +212,33 @@ blocks_of() {
     awk '/^```sh$/{on = 1; next} /^```$/{on = 0} on' "$1"
 }
 
+@test "every key of a report as JSON is in its page" {
+    for name in every-header-record scalars turns rig map correspondence patches transforms unknown-records vectors; do
+        must vg-info --json --frames "$GOLDEN/$name.vgs" -o "vg-info.$name.json"
+    done
+    must vg-info --json --check "$GOLDEN/smallest.vgs" -o vg-info.check.json
+    must vg-info --json --digest "$GOLDEN/smallest.vgs" -o vg-info.digest.json
+    must vg-diff --json --frames -t 1 "$GOLDEN/times.vgs" "$GOLDEN/times.vgs" -o vg-diff.all.json
+    must_fail 1 vg-diff --json "$GOLDEN/times.vgs" "$GOLDEN/turns.vgs" -o vg-diff.other.json
+    py "$ROOT" <<'END'
+import glob, json, re, sys
+def keys(value):
+    if isinstance(value, dict):
+        for key, inside in value.items():
+            yield key
+            yield from keys(inside)
+    elif isinstance(value, list):
+        for inside in value:
+            yield from keys(inside)
+for program in "vg-info", "vg-diff":
+    with open(f"{sys.argv[1]}/man/{program}.1", encoding="utf-8") as f:
+        section = f.read().split(".Ss Report as JSON")[1].split(".Sh ")[0]
+    words = set(re.findall(r"[A-Za-z0-9_]+", section))
+    said = {key for name in glob.glob(program + ".*.json") for key in keys(json.load(open(name, encoding="utf-8")))}
+    assert len(said) > 20 and said <= words, (program, sorted(said - words))
+END
+}
+
 @test "the tutorial: every command runs, every picture is there and is one that it makes" {
     blocks_of "$ROOT/examples/tutorial.md" >script
     [ "$(grep -c '^vg-' script)" -ge 15 ]
