@@ -81,7 +81,7 @@ each() {
 @test "little address space: fewer threads, or status 4, but no waiting" {
     [ "${CONFIG:-release}" = release ] || skip "sanitizers take all address space"
     local kilobytes=40000 tried=0 solved=0
-    until bash -c "ulimit -v $kilobytes && exec vg-info poses.vgs" >/dev/null 2>&1; do kilobytes=$((kilobytes + 10000)); done
+    until bash -c "ulimit -v $kilobytes && exec vg-solve --version" >/dev/null 2>&1; do kilobytes=$((kilobytes + 10000)); done
     for ((; kilobytes < 1000000; kilobytes += kilobytes / 6)); do
         for command in 'vg-solve vectors.vgs -o out.vgs' 'vg-fitmap -q --patches patches.vgs poses.vgs -o out.vgs' \
             'vg-deform --map map.vgs poses.vgs -o out.vgs' 'vg-segment -k 2 -j 8 poses.vgs -o out.vgs'; do

@@ -3,13 +3,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/product.h"
 
-#include "vg.h"
-
 #include <cblas.h>
-#include <sys/mman.h>
-
-/* What OpenBLAS sets aside for each thread that calls it: address space, of which it uses little. */
-#define BLAS_ROOM ((size_t)129 << 20)
 
 /* OpenBLAS's own; with another BLAS they are not there. */
 void openblas_set_num_threads(int n) __attribute__((weak));
@@ -26,20 +20,6 @@ int vgi_product_begin(void)
 void vgi_product_end(int before)
 {
     if (before > 1) openblas_set_num_threads(before);
-}
-
-static bool has_room(size_t n)
-{
-    void *p = mmap(NULL, n, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-    return p != MAP_FAILED && !munmap(p, n);
-}
-
-/* Half of what there is stays for the rest of the work. */
-int vg_threads_with_room(int most)
-{
-    if (!openblas_get_num_threads) return most;
-    while (most > 1 && !has_room(2 * (size_t)most * BLAS_ROOM)) most--;
-    return most > 0 && has_room(BLAS_ROOM) ? most : 0;
 }
 
 void vgi_product_single(size_t m, size_t n, size_t k, const float *a, size_t lda, const float *b, size_t ldb,
