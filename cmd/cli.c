@@ -301,10 +301,12 @@ vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o
 {
     static const char *const standard_input[] = {"-"};
     const char *const *from = n ? (const char *const *)operands : standard_input;
+    vg_source_options options = o ? *o : (vg_source_options){0};
     vg_source *s = NULL;
     vg_err e;
+    options.threads = cli.threads;
     cli_expect_input(n);
-    if (vg_source_open_with(&s, from, n ? n : 1, o, &e) < 0) cli_die(&e);
+    if (vg_source_open_with(&s, from, n ? n : 1, &options, &e) < 0) cli_die(&e);
     if (vg_source_warning(s)) cli_warn("%s", vg_source_warning(s));
     return upstream = s;
 }

@@ -102,7 +102,7 @@ size_t cli_parse_vertices(const char *option, const char *text, uint32_t **verti
 /* The input of a filter: its operands, or standard input when there are none. To be closed when nothing is left to be
  * read: what cli_die says of a program before this one comes from it. */
 vg_source *cli_source(char **operands, size_t n);
-/* The same, with options (may be NULL). */
+/* The same, with options (may be NULL), of which `threads` is set here. */
 vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o);
 
 /* cli_next: the next frame; false at the end. Damage ends the program. */

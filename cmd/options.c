@@ -316,7 +316,7 @@ size_t options_parse(int argc, char **argv, char **operands)
         cli_usage("one operand too many: '%s'", operands[p->most_operands]);
     }
     check_together();
-    cli.threads = threads_asked ? (int)threads_asked : processors_count(MOST_THREADS);
+    cli.threads = !p->threaded ? 1 : threads_asked ? (int)threads_asked : processors_count(MOST_THREADS);
     if (p->threaded && !(cli.threads = vg_threads_with_room(cli.threads)))
         cli_stop(VG_ENOMEM, "not enough memory to calculate: is there a limit, such as ulimit -v?");
     if (cli.output && !strcmp(cli.output, "-")) cli.output = NULL;

@@ -37,7 +37,8 @@ static const cli_program program = {
     .summary = "read poses from mesh files, archives, directories or streams into one stream",
     .options = options,
     .most_operands = SIZE_MAX,
-    .writes_stream = true};
+    .writes_stream = true,
+    .threaded = true};
 
 /* What was made on another reference pose, or on another choice of faces, is not true of the new one. */
 static void set_reference(vg_head *h, const char *operand)

@@ -944,6 +944,8 @@ typedef struct vg_source_options {
                             name that ends in .obj or .ply */
     uint64_t most_bytes; /* what an archive, a compressed file, or a file from a pipe that is no stream may hold,
                             unpacked; 0: 1 GiB in one file, 64 GiB in all */
+    int threads;         /* parse as many mesh files at a time; one more waits, if their bytes are less than 256 MiB.
+                            What comes through a pipe is not read before it is asked for. 0 or 1: one after another */
 } vg_source_options;
 /* vg_source_open_with: o may be NULL. */
 int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const vg_source_options *o,

@@ -41,3 +41,74 @@ same() {
     same page.html vg-view first.poses.vgs
     for kind in zip tar.gz glb usda npz npy; do same $kind vg-decode -q first.poses.vgs; done
 }
+
+# a series of files, which has no single output to compare
+@test "mesh files are the same with one thread, with three, and of any format" {
+    must vg-encode --no-provenance "$DATA/horse-run.tar.xz" -o poses.vgs
+    for format in obj ply ply-ascii ply-be off stl stl-ascii; do
+        for j in 1 3; do
+            mkdir "$j"
+            must vg-decode -q -j "$j" --format $format poses.vgs -o "$j/%02d.mesh"
+        done
+        must diff -r 1 3
+        [ "$(find 3 -type f | wc -l)" -gt 5 ]
+        rm -r 1 3
+    done
+}
+
+# alike CODE COMMAND...: fails so with one thread and with three, in the same words; what went to standard output, but for the name
+# of the program that failed, is the same
+alike() {
+    local code=$1
+    shift
+    must_fail "$code" "$@" -j1
+    said=$stderr
+    mv .stdout one
+    must_fail "$code" "$@" -j3
+    [ "$stderr" = "$said" ] || fail "with three threads: $stderr" "with one: $said"
+    same_file one .stdout
+}
+
+@test "what goes wrong is told when it is its turn, in the same words with any number of threads" {
+    cp "$DATA/horse.rest.obj" a.obj
+    cp a.obj b.obj
+    cp a.obj c.obj
+    cp a.obj e.obj
+    for wrong in 'v 1 2 x' 'f 1 1 2' 'v 0 0 0' 'f 1 2 999999'; do
+        { cat a.obj; echo "$wrong"; } >d.obj
+        alike 3 vg-encode --no-provenance ?.obj
+        says "'d.obj'"
+        tar -cf poses.tar ?.obj
+        alike 3 vg-encode --no-provenance poses.tar
+        says "'d.obj'"
+    done
+    : >d.obj # two are wrong: the first is told
+    echo 'v 1' >e.obj
+    alike 3 vg-encode --no-provenance ?.obj
+    says "'d.obj' is empty"
+    # frames that single precision cannot hold
+    sed 's/^v /v 1e39 /; s/^\(v [^ ]* [^ ]* [^ ]*\).*/\1/' a.obj >d.obj
+    must vg-encode --no-provenance [a-d].obj -o large.vgs
+    alike 3 vg-decode large.vgs -o 'out-%d.obj'
+    says "cannot write frame 'd'" single
+    [ "$(echo out-*)" = 'out-*' ]
+}
+
+@test "a pipe is not waited for before it is its turn" {
+    cp "$DATA/horse.rest.obj" a.obj
+    mkfifo later.obj
+    { head -c 5000 a.obj; for ((n = 0; n < 100; n++)); do [ -e seen ] || sleep 0.1; done; tail -c +5001 a.obj; } >later.obj 3>&- &
+    vg-encode --no-provenance -j3 a.obj a.obj later.obj a.obj >all.vgs 3>&- &
+    encoder=$!
+    must vg-encode --no-provenance a.obj a.obj -o two.vgs
+    size=$(($(wc -c <two.vgs) - 4096)) # less its end
+    for ((i = 0; i < 50 && $(wc -c <all.vgs) < size; i++)); do sleep 0.1; done
+    early=$(wc -c <all.vgs)
+    : >seen
+    wait $encoder
+    [ "$early" -ge "$size" ]
+    rm later.obj
+    cp a.obj later.obj
+    must vg-encode --no-provenance a.obj a.obj later.obj a.obj -o again.vgs
+    same_file again.vgs all.vgs
+}

@@ -2,6 +2,9 @@
  * Leaves out which files an operand names (operands.c) and how a stream, an archive, a mesh file or a sequence
  * (play.c) is read; it only tells them apart and joins them.
  *
+ * Mesh files become poses by several threads, some before they are asked for. What comes through a pipe is not waited
+ * for before its turn, and what goes wrong is told when it is its turn.
+ *
  * All are first looked at, so that a missing file or a stream that does not fit is told before any work; files are
  * opened again one after another when it is their turn. What can be read only once (standard input, a pipe named by
  * the shell) stays open in between.
@@ -28,6 +31,19 @@ typedef struct item {
     vg_reader *reader; /* the same, when it is a stream */
 } item;
 
+/* A mesh file on its way to a frame. */
+typedef struct pose {
+    char *path;          /* of the file, or of the member of an archive */
+    const char *archive; /* borrowed; NULL: none */
+    vg_bytes data;
+    char *name;
+    vg_model model;
+    int result;
+    vg_err error;
+} pose;
+
+enum { MOST_WAITING = 256 << 20 }; /* bytes of files: with as many no further one is read before it is asked for */
+
 struct vg_source {
     item *items;
     size_t n, cap, next; /* next: the item to be opened */
@@ -43,11 +59,16 @@ struct vg_source {
     vg_reader *reader;
     vgi_archive *archive;
     const char *archive_name;
-    vg_bytes data;       /* a mesh file */
-    bool waiting;        /* `model` and `pose` hold a pose that has not been handed out */
-    vg_model model;
-    char *pose;
+    vg_bytes data;       /* a mesh file, or a member that holds a sequence */
     vgi_playing playing;
+    /* poses that wait: */
+    pose *poses;
+    size_t nposes;
+    vgi_belt *belt;
+    pose *first;         /* has brought the mesh and has not been handed out; NULL: there is none */
+    uint64_t waiting;    /* bytes of their files */
+    int failed;          /* what came behind those on the belt failed so */
+    vg_err failure;
     char warning[160];
 };
 
@@ -246,20 +267,20 @@ static int open_archive(vg_source *s, item *it, vg_err *e)
     return vgi_archive_open(&s->archive, fd, it->base, s->archive_name, &s->limits, e);
 }
 
-static int take_over_model(vg_source *s, const char *archive, const char *path, vg_err *e)
+static int take_over_model(vg_source *s, pose *p, vg_err *e)
 {
-    size_t n = s->model.mesh.nv;
-    int r = settle_mesh(s, &s->model.mesh, archive, path, e);
+    vg_model *m = &p->model;
+    int r = settle_mesh(s, &m->mesh, p->archive, p->path, e);
     if (r < 0) return r;
-    if (s->model.degenerate)
+    if (m->degenerate)
         snprintf(s->warning, sizeof s->warning, "%s: left out %zu triangles of which two corners are at one place",
-                 s->own_name, s->model.degenerate);
-    s->head.mesh = s->model.mesh;
-    s->head.attributes = s->model.attributes;
-    s->model.mesh = (vg_mesh){0};
-    s->model.attributes = (vg_attributes){0};
-    s->head.reference = vgi_copy_array(s->model.vertices, 3 * n, sizeof(double), e);
-    s->head.reference_name = vgi_copy_string(s->pose, strlen(s->pose), e);
+                 s->own_name, m->degenerate);
+    s->head.mesh = m->mesh;
+    s->head.attributes = m->attributes;
+    m->mesh = (vg_mesh){0};
+    m->attributes = (vg_attributes){0};
+    s->head.reference = vgi_copy_array(m->vertices, 3 * s->own.count, sizeof(double), e);
+    s->head.reference_name = vgi_copy_string(p->name, strlen(p->name), e);
     return s->head.reference && s->head.reference_name ? VG_OK : VG_ENOMEM;
 }
 
@@ -273,22 +294,92 @@ static int check_joins(const vg_source *s, const vg_mesh *next, const char *subj
     return r;
 }
 
-/* The mesh file in s->data becomes the pose that is handed out next. */
-static int take_pose(vg_source *s, const char *archive, const char *path, vg_err *e)
+/* ---- mesh files ---- */
+
+static int read_model(const vg_source *s, pose *p, vg_err *e)
 {
-    char *subject = subject_of(archive, path, e);
+    char *subject = subject_of(p->archive, p->path, e);
     if (!subject) return VG_ENOMEM;
-    free(s->pose);
-    s->pose = pose_of(path, e);
-    vg_model_clear(&s->model);
-    int r = s->pose ? VG_OK : VG_ENOMEM;
-    if (r == VG_OK && vgi_is_stream(s->data.data, s->data.size))
+    int r = VG_OK;
+    if (vgi_is_stream(p->data.data, p->data.size))
         r = vg_fail(e, VG_EINPUT, "%s is a compressed stream: unpack it in the pipe before", subject);
-    if (r == VG_OK) r = vgi_model_read(&s->model, s->data.data, s->data.size, NULL, path, subject, e);
-    if (r == VG_OK) r = s->own_name ? check_joins(s, &s->model.mesh, subject, e)
-                                    : take_over_model(s, archive, path, e);
-    s->waiting = r == VG_OK;
+    if (r == VG_OK) r = vgi_model_read(&p->model, p->data.data, p->data.size, NULL, p->path, subject, e);
+    if (r == VG_OK && s->own_name) r = check_joins(s, &p->model.mesh, subject, e);
     free(subject);
+    return r;
+}
+
+/* The work on a pose. */
+static void make_pose(void *context, size_t place)
+{
+    const vg_source *s = context;
+    pose *p = &s->poses[place];
+    p->result = read_model(s, p, &p->error);
+}
+
+static int make_belt(vg_source *s, int threads, vg_err *e)
+{
+    size_t n = threads > 1 ? (size_t)threads + 1 : 1;
+    if (!(s->poses = vgi_array(n, sizeof *s->poses, e))) return VG_ENOMEM;
+    s->nposes = n;
+    return vgi_belt_new(&s->belt, threads, n, make_pose, s, e);
+}
+
+/* What a pose holds but its buffer, which is kept when it is no larger than its share. */
+static void clear_pose(const vg_source *s, pose *p)
+{
+    free(p->path);
+    free(p->name);
+    vg_model_clear(&p->model);
+    p->path = p->name = NULL;
+    if (p->data.cap > MOST_WAITING / s->nposes) vg_bytes_clear(&p->data);
+}
+
+/* The mesh file in s->data goes onto the belt. */
+static int put_pose(vg_source *s, const char *archive, const char *path, vg_err *e)
+{
+    pose *p = &s->poses[vgi_belt_place(s->belt)];
+    vg_bytes spare = p->data;
+    p->archive = archive;
+    if (!(p->path = vgi_copy_string(path, strlen(path), e)) || !(p->name = pose_of(path, e))) return VG_ENOMEM;
+    p->data = s->data;
+    s->data = spare;
+    s->waiting += p->data.size;
+    vgi_belt_put(s->belt);
+    return VG_OK;
+}
+
+static int take_pose(vg_source *s, pose **out, vg_err *e)
+{
+    pose *p = *out = &s->poses[vgi_belt_take(s->belt)];
+    s->waiting -= p->data.size;
+    if (p->result < 0 && e) *e = p->error;
+    return p->result;
+}
+
+/* The first one brings the mesh, unless that is known. It stays where it is until it is handed out. */
+static int take_first(vg_source *s, vg_err *e)
+{
+    int r = take_pose(s, &s->first, e);
+    return r < 0 ? r : take_over_model(s, s->first, e);
+}
+
+static int hand_out(vg_source *s, vg_frame *f, vg_err *e)
+{
+    pose *p = s->first;
+    int r = p ? VG_OK : take_pose(s, &p, e);
+    s->first = NULL;
+    if (r == VG_OK) r = vg_frame_shape(f, &s->own, e);
+    if (r == VG_OK) r = vg_frame_rename(f, p->name, e);
+    if (r == VG_OK) {
+        memcpy(f->values, p->model.vertices, 3 * s->own.count * sizeof *f->values);
+        vg_records_clear(&f->extra);
+        f->has_time = false;
+        f->time = 0;
+        f->nturns = 0;
+        r = 1;
+    }
+    clear_pose(s, p);
     return r;
 }
 
@@ -300,7 +391,7 @@ static int open_mesh(vg_source *s, item *it, vg_err *e)
     s->data.size = 0;
     r = vgi_input_slurp(in, &s->data, e);
     vgi_input_free(&in);
-    return r < 0 ? r : take_pose(s, NULL, item_name(it), e);
+    return r < 0 ? r : put_pose(s, NULL, item_name(it), e);
 }
 
 static int open_stream(vg_source *s, item *it, vg_err *e)
@@ -416,7 +507,7 @@ static int next_member(vg_source *s, vg_err *e)
     if (r == 0) vgi_archive_close(&s->archive);
     if (r <= 0) return r;
     const vgi_sequence_format *sequence = vgi_packable(path);
-    return sequence ? play_member(s, sequence, path, e) : take_pose(s, s->archive_name, path, e);
+    return sequence ? play_member(s, sequence, path, e) : put_pose(s, s->archive_name, path, e);
 }
 
 /* ---- the door ---- */
@@ -425,8 +516,9 @@ static int next_member(vg_source *s, vg_err *e)
 static int find_mesh(vg_source *s, vg_err *e)
 {
     int r = VG_OK;
-    while (r == VG_OK && !s->through && !s->own_name) r = s->archive ? next_member(s, e) : open_next(s, e);
-    return r;
+    while (r == VG_OK && !s->through && !s->own_name && !vgi_belt_things(s->belt))
+        r = s->archive ? next_member(s, e) : open_next(s, e);
+    return r == VG_OK && vgi_belt_things(s->belt) ? take_first(s, e) : r;
 }
 
 static int settle_named_mesh(vg_source *s, const char *mesh, vg_err *e)
@@ -456,7 +548,7 @@ static int open_source(vg_source **out, const char *const *operands, size_t n, c
     if (!s) return VG_ENOMEM;
     s->limits = vgi_usual_limits;
     if (o && o->most_bytes) s->limits.member_bytes = s->limits.total_bytes = o->most_bytes;
-    int r = n ? VG_OK : vg_fail(e, VG_EARG, "no input is named");
+    int r = n ? make_belt(s, o ? o->threads : 1, e) : vg_fail(e, VG_EARG, "no input is named");
     if (r == VG_OK && mesh) r = settle_named_mesh(s, mesh, e);
     for (size_t i = 0; r == VG_OK && i < n; i++) r = add_operand(s, operands[i], e);
     while (first_only && s->n > 1) free(s->items[--s->n].path);
@@ -496,20 +588,6 @@ vg_records *vg_source_tail(vg_source *s)
     return s->through ? vg_reader_tail(s->reader) : &s->tail;
 }
 
-static int hand_out(vg_source *s, vg_frame *f, vg_err *e)
-{
-    int r = vg_frame_shape(f, &s->own, e);
-    if (r == VG_OK) r = vg_frame_rename(f, s->pose, e);
-    if (r < 0) return r;
-    memcpy(f->values, s->model.vertices, 3 * s->own.count * sizeof *f->values);
-    vg_records_clear(&f->extra);
-    f->has_time = false;
-    f->time = 0;
-    f->nturns = 0;
-    s->waiting = false;
-    return 1;
-}
-
 static int append_records(vg_records *to, vg_records *from, vg_err *e)
 {
     size_t cap = to->n;
@@ -530,25 +608,39 @@ static int end_reader(vg_source *s, vg_err *e)
     return r;
 }
 
+/* May what comes next be read before it is asked for? A member of the archive that is open, or a mesh file that is
+ * there. */
+static bool may_read_ahead(const vg_source *s)
+{
+    if (s->failed || vgi_belt_full(s->belt) || s->waiting >= MOST_WAITING) return false;
+    if (s->playing.format || s->reader) return false;
+    return s->archive || (s->next < s->n && s->items[s->next].content == MESH && s->items[s->next].regular);
+}
+
+/* Take a step: 1 and a frame; VG_OK: look again. Something is left. */
+static int step(vg_source *s, vg_frame *f, vg_err *e)
+{
+    if (s->playing.format) return vgi_play_next(&s->playing, &s->own, f, e);
+    if (s->archive) return next_member(s, e);
+    if (!s->reader) return open_next(s, e);
+    int r = vg_reader_next(s->reader, f, e);
+    return r == 0 ? end_reader(s, e) : r;
+}
+
 int vg_source_next(vg_source *s, vg_frame *f, vg_err *e)
 {
     if (s->through) return vg_reader_next(s->reader, f, e);
-    for (int r = VG_OK; r == VG_OK;) {
-        if (s->waiting) return hand_out(s, f, e);
-        if (s->playing.format) {
-            r = vgi_play_next(&s->playing, &s->own, f, e);
-        } else if (s->reader) {
-            if ((r = vg_reader_next(s->reader, f, e)) == 0) r = end_reader(s, e);
-        } else if (s->archive) {
-            r = next_member(s, e);
-        } else if (s->next < s->n) {
-            r = open_next(s, e);
-        } else {
-            return 0;
+    for (;;) {
+        if (s->first || (vgi_belt_things(s->belt) && !may_read_ahead(s))) return hand_out(s, f, e);
+        if (s->failed) {
+            if (e) *e = s->failure;
+            return s->failed;
         }
-        if (r != VG_OK) return r;
+        if (!s->playing.format && !s->reader && !s->archive && s->next == s->n) return 0;
+        int r = step(s, f, &s->failure);
+        if (r > 0) return r;
+        s->failed = r; /* told behind the poses that wait */
     }
-    return VG_OK;
 }
 
 static void clear_item(item *it)
@@ -567,13 +659,17 @@ void vg_source_close(vg_source **source)
     vg_reader_close(&s->reader);
     vgi_archive_close(&s->archive);
     vgi_play_stop(&s->playing);
+    vgi_belt_free(&s->belt);
+    for (size_t i = 0; i < s->nposes; i++) {
+        clear_pose(s, &s->poses[i]);
+        vg_bytes_clear(&s->poses[i].data);
+    }
+    free(s->poses);
     vg_head_clear(&s->head);
     vg_head_clear(&s->own);
     vg_records_clear(&s->tail);
     vg_bytes_clear(&s->data);
-    vg_model_clear(&s->model);
     free(s->own_name);
-    free(s->pose);
     free(s);
     *source = NULL;
 }
