@@ -72,9 +72,13 @@ static int check_fit(const vg_mesh *source, const vg_correspondence *k, const vg
     return VG_OK;
 }
 
-static void measure_source(vg_carrier *c, const double *reference, double *w)
+static int measure_source(vg_carrier *c, const double *reference, vg_err *e)
 {
     const vg_mesh *m = c->source;
+    size_t most = 0;
+    for (size_t f = 0; f < m->nf; f++) most = source_size(c, f) > most ? source_size(c, f) : most;
+    double *w = vgi_array(3 * most, sizeof *w, e); /* the vectors of a face */
+    if (!w) return VG_ENOMEM;
     for (size_t f = 0; f < m->nf; f++) {
         size_t begin = m->start[f], r = source_size(c, f);
         double centre[3] = {0, 0, 0}, P[6], size;
@@ -92,6 +96,8 @@ static void measure_source(vg_carrier *c, const double *reference, double *w)
             c->slow[f] = 2;
         }
     }
+    free(w);
+    return VG_OK;
 }
 
 /* Which corner of source face s goes with the first of target face f:
@@ -199,6 +205,20 @@ static int find_twins(vg_carrier *c, const double *source_reference, vg_err *e)
     return result;
 }
 
+static int make_arrays(vg_carrier *c, vg_err *e)
+{
+    size_t nf = c->source->nf;
+    c->p = vgi_array(3 * vg_mesh_corners(c->source), sizeof *c->p, e);
+    c->q = vgi_array(3 * nf, sizeof *c->q, e);
+    c->slow = vgi_array(nf, 1, e);
+    c->bad = vgi_array(nf, 1, e);
+    c->segment = vgi_array(3 * nf, sizeof *c->segment, e);
+    c->vectors = vgi_array(3 * vg_graph_corners(c->target), sizeof *c->vectors, e);
+    c->maps = aligned_alloc(sizeof(vgi_lanes), (nf ? nf : 1) * sizeof *c->maps);
+    if (c->p && c->q && c->slow && c->bad && c->segment && c->vectors && c->maps) return VG_OK;
+    return vg_fail(e, VG_ENOMEM, "not enough memory for a transfer of %zu faces", nf);
+}
+
 int vg_carrier_new(vg_carrier **out, const vg_mesh *source, const double *source_reference,
                    const vg_correspondence *pairs, const vg_graph *target, const double *target_reference,
                    vg_method method, int threads, vg_err *e)
@@ -213,30 +233,16 @@ int vg_carrier_new(vg_carrier **out, const vg_mesh *source, const double *source
     double before = vg_diagonal(source_reference, source->nv);
     c->source_reference = source_reference;
     c->ratio = before > 0 ? vg_diagonal(target_reference, target->nv) / before : 1;
-    size_t nf = source->nf, most = 0;
-    for (size_t f = 0; f < nf; f++) most = source_size(c, f) > most ? source_size(c, f) : most;
-    double *w = vgi_array(3 * most, sizeof *w, e);
-    c->p = vgi_array(3 * vg_mesh_corners(source), sizeof *c->p, e);
-    c->q = vgi_array(3 * nf, sizeof *c->q, e);
-    c->slow = vgi_array(nf, 1, e);
-    c->bad = vgi_array(nf, 1, e);
-    c->segment = vgi_array(3 * nf, sizeof *c->segment, e);
-    c->vectors = vgi_array(3 * vg_graph_corners(target), sizeof *c->vectors, e);
-    c->maps = aligned_alloc(sizeof(vgi_lanes), (nf ? nf : 1) * sizeof *c->maps);
-    bool ok = w && c->p && c->q && c->slow && c->bad && c->segment && c->vectors && c->maps;
-    if (ok && target->nlinks)
-        ok = vgi_incidence_make(&c->around, target->nv, target->nf, target->start, target->vert, e) == VG_OK;
-    if (ok) {
-        measure_source(c, source_reference, w);
+    r = make_arrays(c, e);
+    if (r == VG_OK && target->nlinks)
+        r = vgi_incidence_make(&c->around, target->nv, target->nf, target->start, target->vert, e);
+    if (r == VG_OK) r = measure_source(c, source_reference, e);
+    if (r == VG_OK) {
         vg_graph_vectors(target, target_reference, c->vectors);
-        ok = find_twins(c, source_reference, e) == VG_OK;
-        if (!ok) vg_carrier_free(out);
-    } else {
-        vg_fail(e, VG_ENOMEM, "not enough memory for a transfer of %zu faces", nf);
-        vg_carrier_free(out);
+        r = find_twins(c, source_reference, e);
     }
-    free(w);
-    return ok ? VG_OK : VG_ENOMEM;
+    if (r < 0) vg_carrier_free(out);
+    return r;
 }
 
 void vg_carrier_free(vg_carrier **out)

@@ -258,7 +258,8 @@ static int hold_groups(choosing *x, vg_err *e)
     size_t nv = h->mesh.nv, bones = h->rig.nbones, components, slots;
     uint32_t *label = vgi_array(nv, sizeof *label, e), *best = NULL;
     int r = label ? vg_mesh_components(&h->mesh, label, &components, e) : VG_ENOMEM;
-    if (r == VG_OK && !vgi_mul(components, bones, &slots)) r = VG_ENOMEM;
+    if (r == VG_OK && !vgi_mul(components, bones, &slots))
+        r = vg_fail(e, VG_ENOMEM, "not enough memory for %zu bones of %zu components", bones, components);
     if (r == VG_OK && !(best = vgi_array(slots, sizeof *best, e))) r = VG_ENOMEM;
     for (size_t v = 0; r == VG_OK && v < nv; v++) {
         if (x->distance[v] < 0) continue;
