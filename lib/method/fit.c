@@ -14,10 +14,9 @@
  * area), smoothed over a length by (1 + length^2 L)^-1: from single faces it would follow every dent, and nothing
  * would be smooth any more.
  *
- * Leaves out how the meshes come to lie roughly on one another (register.c).
+ * Leaves out how the meshes come to lie roughly on one another (register.c), and L with its matrices (springs.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "method/register.h"
-#include "method/sparse.h"
+#include "method/springs.h"
 #include "model/incidence.h"
 
 #include <stdlib.h>
@@ -37,8 +36,6 @@ static const double KEPT_STRETCH = 0.8;   /* power of a map's stretch: what noth
 
 enum {
     BLOCK = 256,     /* vertices of a task */
-    HUB = 100,       /* a vertex of so many neighbours does not count bending: all of them would be joined */
-    FULL = 8,        /* larger faces have no springs between all of their corners */
     TIED_SOLVES = 5, /* from the ties alone */
     ROUNDS = 8,      /* with nearest points: one factorisation each */
     SOLVES = 4       /* of a round */
@@ -47,23 +44,16 @@ enum {
 /* A vertex of the target pulls the point of a source face that is nearest to it. */
 typedef struct reverse {
     uint32_t face; /* of the source */
-    double weight, share[FULL]; /* of the face's corners */
+    double weight, share[VGI_SMALL_FACE]; /* of the face's corners, all of which are joined by springs */
 } reverse;
-
-/* A spring of the graph Laplacian. Those of vertex v are first[v] .. first[v + 1] - 1, by ascending neighbour. */
-typedef struct springs {
-    size_t nv;
-    uint32_t *first, *to;
-    double *weight, *sum; /* per spring; per vertex: L_vv, 0 for a vertex in no face */
-} springs;
 
 typedef struct fit {
     const vgi_fitting *in;
     const vg_mesh *m;
     vgi_incidence around;
-    springs L;
+    vgi_springs L;
     double *laplacian; /* nv x 3: L s */
-    double *inverse;   /* nf x 9: (sum r r' + h n n')^-1, see gradients() */
+    double *inverse;   /* nf x 9: (sum r r' + h n n')^-1, see prepare_faces() */
     double *h_normal;  /* nf x 3: h n, of the rest */
     double *area;      /* nf: of the rest */
     double *trust;     /* nf: 1 for a round face, 0 for one without area */
@@ -71,8 +61,7 @@ typedef struct fit {
     double edge;       /* mean length */
     vgi_cholesky *smoother; /* of maps */
     bool *border;      /* nv: of the source */
-    vgi_sparse matrix; /* value: what is factorized */
-    double *bending, *stretching; /* per entry of matrix: the two smoothness terms */
+    vgi_smoothness smooth; /* its matrix.value: what is factorized */
     vgi_cholesky *solver;
     double *x, *rhs, *normal, *tmp; /* nv x 3 */
     double *pull;      /* nv: weight of the nearest point in this round; 0: none */
@@ -84,207 +73,7 @@ typedef struct fit {
     double stretch;    /* weight of first differences */
 } fit;
 
-/* ---- the graph ---- */
-
-typedef struct spring_list {
-    size_t n, cap;
-    struct spring {
-        uint32_t a, b;
-        double weight;
-    } *at;
-} spring_list;
-
-static int add_spring(spring_list *l, uint32_t a, uint32_t b, double weight, vg_err *e)
-{
-    int r = vgi_grow(&l->at, &l->cap, l->n + 1, sizeof *l->at, e);
-    if (r == VG_OK) l->at[l->n++] = (struct spring){a, b, weight};
-    return r;
-}
-
-/* Every pair of corners of a small face; of a large one the edges, the next but one, and what is opposite. */
-static int add_face(spring_list *l, const uint32_t *vert, size_t r, vg_err *e)
-{
-    int ok = VG_OK;
-    if (r <= FULL) {
-        for (size_t i = 1; i < r && ok == VG_OK; i++)
-            for (size_t j = 0; j < i && ok == VG_OK; j++) ok = add_spring(l, vert[i], vert[j], 1.0 / (double)r, e);
-        return ok;
-    }
-    for (size_t i = 0; i < r && ok == VG_OK; i++) {
-        ok = add_spring(l, vert[i], vert[(i + 1) % r], 0.25, e);
-        if (ok == VG_OK) ok = add_spring(l, vert[i], vert[(i + 2) % r], 0.125, e);
-        if (ok == VG_OK && i < r / 2) ok = add_spring(l, vert[i], vert[i + r / 2], 0.125, e);
-    }
-    return ok;
-}
-
-static int gather_springs(spring_list *l, const vgi_fitting *in, vg_err *e)
-{
-    const vg_mesh *m = in->source;
-    int r = VG_OK;
-    for (size_t f = 0; f < m->nf && r == VG_OK; f++)
-        r = add_face(l, m->vert + m->start[f], m->start[f + 1] - m->start[f], e);
-    for (size_t i = 0; i < in->nlinks && r == VG_OK; i++)
-        r = add_spring(l, in->links[2 * i], in->links[2 * i + 1], 0.5, e);
-    /* points that a tie joins: no force, only room in the matrix */
-    for (size_t i = 0; i < in->nties; i++)
-        for (int k = 0; k < 3 && r == VG_OK; k++) {
-            uint32_t a = in->tie[i].vertex[k], b = in->tie[i].vertex[(k + 1) % 3];
-            if (a != b) r = add_spring(l, a, b, 0, e);
-        }
-    return r;
-}
-
-static int compare_springs(const void *a, const void *b)
-{
-    const struct spring *x = a, *y = b;
-    if (x->a != y->a) return x->a < y->a ? -1 : 1;
-    if (x->b != y->b) return x->b < y->b ? -1 : 1;
-    return x->weight < y->weight ? -1 : x->weight > y->weight; /* sums must not depend on the sorting */
-}
-
-static int make_springs(fit *t, vg_err *e)
-{
-    springs *L = &t->L;
-    spring_list list = {0};
-    int r = gather_springs(&list, t->in, e);
-    size_t n = list.n, nv = L->nv = t->m->nv;
-    if (r == VG_OK && n > INT32_MAX / 2)
-        r = vg_fail(e, VG_EINPUT, "a mesh of %zu vertices is too large to be fitted", nv);
-    for (size_t i = 0; i < n && r == VG_OK; i++)
-        r = add_spring(&list, list.at[i].b, list.at[i].a, list.at[i].weight, e);
-    L->first = vgi_array(nv + 1, sizeof *L->first, e);
-    L->to = vgi_array_raw(list.n, sizeof *L->to, e);
-    L->weight = vgi_array_raw(list.n, sizeof *L->weight, e);
-    L->sum = vgi_array(nv, sizeof *L->sum, e);
-    if (r < 0 || !L->first || !L->to || !L->weight || !L->sum) return free(list.at), r < 0 ? r : VG_ENOMEM;
-    if (list.n) qsort(list.at, list.n, sizeof *list.at, compare_springs);
-    size_t to = 0;
-    for (size_t i = 0; i < list.n; i++) {
-        const struct spring *s = &list.at[i];
-        if (i && s[-1].a == s->a && s[-1].b == s->b) {
-            L->weight[to - 1] += s->weight;
-        } else {
-            L->to[to] = s->b, L->weight[to++] = s->weight;
-            L->first[s->a + 1]++;
-        }
-        L->sum[s->a] += s->weight;
-    }
-    for (size_t v = 0; v < nv; v++) L->first[v + 1] += L->first[v];
-    free(list.at);
-    return VG_OK;
-}
-
-/* y = L x */
-static void apply_laplacian(const springs *L, const double *x, double *y)
-{
-    for (size_t v = 0; v < L->nv; v++) {
-        double *to = y + 3 * v;
-        const double *at = x + 3 * v;
-        to[0] = to[1] = to[2] = 0;
-        for (uint32_t i = L->first[v]; i < L->first[v + 1]; i++) {
-            const double *from = x + 3 * (size_t)L->to[i];
-            for (int k = 0; k < 3; k++) to[k] += L->weight[i] * (at[k] - from[k]);
-        }
-    }
-}
-
 /* ---- the matrix ---- */
-
-static bool is_hub(const springs *L, size_t v)
-{
-    return L->first[v + 1] - L->first[v] >= HUB;
-}
-
-static int compare_ints(const void *a, const void *b)
-{
-    int x = *(const int *)a, y = *(const int *)b;
-    return x < y ? -1 : x > y;
-}
-
-/* Rows >= column of the column's neighbours' neighbours, ascending. mark[v] == column + 1: seen. */
-static size_t column_rows(const springs *L, uint32_t column, int *rows, uint32_t *mark)
-{
-    size_t n = 0;
-    mark[column] = column + 1, rows[n++] = (int)column;
-    for (uint32_t i = L->first[column]; i <= L->first[column + 1]; i++) {
-        uint32_t k = i < L->first[column + 1] ? L->to[i] : column; /* the column itself comes last */
-        if (k != column && is_hub(L, k)) continue;
-        for (uint32_t j = L->first[k]; j < L->first[k + 1]; j++) {
-            uint32_t v = L->to[j];
-            if (v <= column || mark[v] == column + 1) continue;
-            mark[v] = column + 1, rows[n++] = (int)v;
-        }
-    }
-    qsort(rows, n, sizeof *rows, compare_ints);
-    return n;
-}
-
-static int make_pattern(fit *t, vg_err *e)
-{
-    const springs *L = &t->L;
-    vgi_sparse *A = &t->matrix;
-    size_t cap = 0, n = 0, nv = L->nv;
-    uint32_t *mark = vgi_array(nv, sizeof *mark, e);
-    int *rows = vgi_array_raw(nv, sizeof *rows, e);
-    A->n = nv;
-    A->start = vgi_array(nv + 1, sizeof *A->start, e);
-    int r = mark && rows && A->start ? VG_OK : VG_ENOMEM;
-    for (size_t j = 0; j < nv && r == VG_OK; j++) {
-        size_t k = column_rows(L, (uint32_t)j, rows, mark);
-        if (n + k > INT32_MAX) r = vg_fail(e, VG_EINPUT, "a mesh of %zu vertices is too large to be fitted", nv);
-        else r = vgi_grow(&A->row, &cap, n + k, sizeof *A->row, e);
-        if (r == VG_OK) memcpy(A->row + n, rows, k * sizeof *rows);
-        n += k;
-        A->start[j + 1] = (int)n;
-    }
-    free(mark);
-    free(rows);
-    if (r < 0) return r;
-    A->value = vgi_array(n, sizeof *A->value, e);
-    t->bending = vgi_array(n, sizeof *t->bending, e);
-    t->stretching = vgi_array(n, sizeof *t->stretching, e);
-    return A->value && t->bending && t->stretching ? VG_OK : VG_ENOMEM;
-}
-
-/* L_ij with L_ii = sum */
-static void fill_column(fit *t, size_t j, double *bend, double *stretch)
-{
-    const springs *L = &t->L;
-    stretch[j] = L->sum[j];
-    for (uint32_t i = L->first[j]; i <= L->first[j + 1]; i++) {
-        bool self = i == L->first[j + 1];
-        size_t k = self ? j : L->to[i];
-        double a = self ? L->sum[j] : -L->weight[i];
-        if (!self) stretch[k] = -L->weight[i];
-        if (!(L->sum[k] > 0) || is_hub(L, k)) continue;
-        a /= L->sum[k];
-        bend[k] += a * L->sum[k];
-        for (uint32_t p = L->first[k]; p < L->first[k + 1]; p++) bend[L->to[p]] -= a * L->weight[p];
-    }
-}
-
-static int fill_smoothness(fit *t, vg_err *e)
-{
-    const springs *L = &t->L;
-    const vgi_sparse *A = &t->matrix;
-    double *bend = vgi_array(L->nv, sizeof *bend, e), *stretch = vgi_array(L->nv, sizeof *stretch, e);
-    if (!bend || !stretch) return free(bend), free(stretch), VG_ENOMEM;
-    for (size_t j = 0; j < L->nv; j++) {
-        fill_column(t, j, bend, stretch);
-        for (int i = A->start[j]; i < A->start[j + 1]; i++)
-            t->bending[i] = bend[A->row[i]], t->stretching[i] = stretch[A->row[i]];
-        for (uint32_t i = L->first[j]; i <= L->first[j + 1]; i++) {
-            size_t k = i < L->first[j + 1] ? L->to[i] : j;
-            bend[k] = stretch[k] = 0;
-            if (is_hub(L, k)) continue;
-            for (uint32_t p = L->first[k]; p < L->first[k + 1]; p++) bend[L->to[p]] = 0;
-        }
-    }
-    free(bend);
-    free(stretch);
-    return VG_OK;
-}
 
 static double *entry(const vgi_sparse *A, uint32_t a, uint32_t b)
 {
@@ -300,8 +89,9 @@ static double *entry(const vgi_sparse *A, uint32_t a, uint32_t b)
 
 static int factorize(fit *t, vg_err *e)
 {
-    vgi_sparse *A = &t->matrix;
-    for (int i = 0; i < A->start[A->n]; i++) A->value[i] = t->bending[i] + t->stretch * t->stretching[i];
+    const vgi_smoothness *s = &t->smooth;
+    const vgi_sparse *A = &s->matrix;
+    for (int i = 0; i < A->start[A->n]; i++) A->value[i] = s->bending[i] + t->stretch * s->stretching[i];
     for (size_t v = 0; v < A->n; v++) A->value[A->start[v]] += t->L.sum[v] > 0 ? t->pull[v] + REST : 1;
     for (size_t i = 0; i < t->in->nties; i++) {
         const vgi_tie *tie = &t->in->tie[i];
@@ -464,7 +254,7 @@ static int update_maps(fit *t, vg_err *e)
 /* What smooths the maps: as the matrix, with first neighbours only. */
 static int make_smoother(fit *t, vg_err *e)
 {
-    const springs *L = &t->L;
+    const vgi_springs *L = &t->L;
     size_t n = 0;
     double strength = MAP_SPAN / t->edge * MAP_SPAN / t->edge;
     vgi_sparse A = {.n = L->nv,
@@ -491,14 +281,14 @@ static int make_smoother(fit *t, vg_err *e)
 
 static void add_smoothness(fit *t)
 {
-    const springs *L = &t->L;
+    const vgi_springs *L = &t->L;
     double *wanted = t->tmp;
     for (size_t v = 0; v < L->nv; v++) {
         double *w = wanted + 3 * v;
         vgi_multiply_vector(t->map + 9 * v, t->laplacian + 3 * v, w);
-        for (int k = 0; k < 3; k++) w[k] = L->sum[v] > 0 && !is_hub(L, v) ? w[k] / L->sum[v] : 0;
+        for (int k = 0; k < 3; k++) w[k] = L->sum[v] > 0 && !vgi_is_hub(L, v) ? w[k] / L->sum[v] : 0;
     }
-    apply_laplacian(L, wanted, t->rhs);
+    vgi_springs_apply(L, wanted, t->rhs);
     for (size_t v = 0; v < L->nv; v++) {
         double *to = t->rhs + 3 * v;
         for (uint32_t i = L->first[v]; i < L->first[v + 1]; i++) {
@@ -602,7 +392,7 @@ static void find_reverse(void *context, size_t block)
         p->weight = 0;
         if (!vgi_surface_nearest(t->now, at, normal, COSINE, t->limit * t->limit, &hit) || hit.border) continue;
         size_t begin = t->m->start[hit.face], r = t->m->start[hit.face + 1] - begin, first = hit.corner - begin;
-        if (r < 3 || r > FULL) continue;
+        if (r < 3 || r > VGI_SMALL_FACE) continue;
         *p = (reverse){.face = hit.face, .weight = 1 - hit.square / (t->limit * t->limit)};
         for (size_t k = 0; r > 3 && k < r; k++) p->share[k] = hit.u[1] / (double)r;
         p->share[first] += 1 - hit.u[0] - hit.u[1];
@@ -677,7 +467,7 @@ static int run(fit *t, vg_err *e)
 /* The length scale of the mesh, which sets that of its smoothness. */
 static void measure_edges(fit *t)
 {
-    const springs *L = &t->L;
+    const vgi_springs *L = &t->L;
     double sum = 0, weight = 0;
     for (size_t v = 0; v < L->nv; v++)
         for (uint32_t i = L->first[v]; i < L->first[v + 1]; i++) {
@@ -693,11 +483,10 @@ static int prepare(fit *t, vg_err *e)
     const vg_mesh *m = t->m;
     size_t nv = m->nv, nf = m->nf;
     int r = vgi_incidence_make(&t->around, nv, nf, m->start, m->vert, e);
-    if (r == VG_OK) r = make_springs(t, e);
+    if (r == VG_OK) r = vgi_springs_make(&t->L, t->in, e);
     if (r == VG_OK) measure_edges(t);
-    if (r == VG_OK) r = make_pattern(t, e);
-    if (r == VG_OK) r = fill_smoothness(t, e);
-    if (r == VG_OK) r = vgi_cholesky_new(&t->solver, &t->matrix, e);
+    if (r == VG_OK) r = vgi_smoothness_make(&t->smooth, &t->L, e);
+    if (r == VG_OK) r = vgi_cholesky_new(&t->solver, &t->smooth.matrix, e);
     double **points[] = {&t->laplacian, &t->x, &t->rhs, &t->normal, &t->tmp, &t->goal};
     for (size_t i = 0; i < sizeof points / sizeof *points; i++)
         if (!(*points[i] = vgi_array(nv, 3 * sizeof(double), e))) return VG_ENOMEM;
@@ -722,23 +511,22 @@ static int prepare(fit *t, vg_err *e)
     for (size_t v = 0; v < nv; v++)
         for (size_t k = 0; k < 9; k += 4) t->map[9 * v + k] = 1;
     memcpy(t->x, t->in->rest, 3 * nv * sizeof *t->x);
-    apply_laplacian(&t->L, t->in->rest, t->laplacian);
+    vgi_springs_apply(&t->L, t->in->rest, t->laplacian);
     prepare_faces(t);
     return make_smoother(t, e);
 }
 
 static void clear(fit *t)
 {
-    double *arrays[] = {t->L.weight, t->L.sum, t->laplacian, t->inverse, t->h_normal, t->area, t->trust, t->face_map,
-                        t->map, t->bending, t->stretching, t->x, t->rhs, t->normal, t->tmp, t->pull, t->goal,
+    double *arrays[] = {t->laplacian, t->inverse, t->h_normal, t->area, t->trust, t->face_map,
+                        t->map, t->x, t->rhs, t->normal, t->tmp, t->pull, t->goal,
                         t->distance};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
-    free(t->L.first);
-    free(t->L.to);
+    vgi_springs_clear(&t->L);
+    vgi_smoothness_clear(&t->smooth);
     free(t->border);
     free(t->reverse);
     vgi_surface_free(&t->now);
-    vgi_sparse_clear(&t->matrix);
     vgi_cholesky_free(&t->solver);
     vgi_cholesky_free(&t->smoother);
     vgi_incidence_clear(&t->around);
