@@ -129,6 +129,34 @@ END
     [ "$output" = "$(vg-info --digest straight.vgs)" ] || fail "deformations do something else"
 }
 
+@test "NPZ: arrays that say what cannot be are refused by name; names may have any letters" {
+    cat >bad.py <<'END'
+import struct, zipfile
+def npz(name, **arrays):
+    with zipfile.ZipFile(name + '.npz', 'w') as z:
+        for key, (descr, shape, data) in arrays.items():
+            head = repr({'descr': descr, 'fortran_order': False, 'shape': shape}).encode()
+            z.writestr(key + '.npy', b'\x93NUMPY\1\0' + struct.pack('<H', len(head)) + head + data)
+points = ('<f4', (300, 3), struct.pack('<900f', *range(900)))
+npz('indices', positions=points, faces=('|i1', (1, 3), struct.pack('3b', 0, 1, -1)))
+npz('letters', positions=points, names=('<U2', (1,), struct.pack('<2I', 0xd800, 65)))
+npz('horse', positions=points, names=('>U2', (1,), struct.pack('>2I', 0x1f40e, 0xfc)))
+corners = ('<f8', (1, 3, 4), struct.pack('<12d', 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0))
+npz('quaternion', deformations=corners, reference=('<f8', (3, 3), struct.pack('<9d', 0, 0, 0, 1, 0, 0, 0, 1, 0)),
+    faces=('<i4', (1, 3), struct.pack('<3i', 0, 1, 2)), links=('<u4', (0, 2), b''), roots=('<f8', (1, 3), bytes(24)))
+END
+    py <bad.py
+    must_fail 3 vg-encode indices.npz -o no.vgs
+    says "array 'faces' in 'indices.npz' holds an index that is out of range"
+    must_fail 3 vg-encode letters.npz -o no.vgs
+    says "array 'names' in 'letters.npz' holds a letter that does not exist"
+    must_fail 3 vg-encode quaternion.npz -o no.vgs
+    says "array 'deformations' in 'quaternion.npz' holds a quaternion that is zero"
+    pipe "vg-encode horse.npz | vg-info --frames"
+    shows 🐎ü
+    [ ! -e no.vgs ]
+}
+
 @test "NumPy loads our arrays, and we its own, stored and deflated" {
     python_with numpy
     make_walk

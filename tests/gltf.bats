@@ -73,6 +73,16 @@ import json, sys
 said, found = float(sys.argv[1]) / 100, json.load(open('diff.json'))['vertex_error']['max']['D']
 assert 0 < said < 0.1 and abs(found - said) < 0.01 * said, (said, found)
 END
+    for x in 0 5 2; do printf 'v 0 0 %s\nv 1 0 %s\nv 0 1 %s\nf 1 2 3\n' $x $x $x >far$x.obj; done
+    capture bash -c 'vg-encode far0.obj far5.obj far2.obj | vg-decode -q --max-targets 2 -o far.gltf'
+    [ "$status" = 0 ]
+    py <<'END'
+import base64, json, struct
+j = json.load(open('far.gltf')) # beyond both targets: the nearer one, not more than all of it
+a = j['accessors'][j['animations'][0]['samplers'][0]['output']]
+data = base64.b64decode(j['buffers'][0]['uri'].partition(',')[2])
+assert struct.unpack_from('<6f', data, j['bufferViews'][a['bufferView']]['byteOffset']) == (1, 0, 0, 1, 0, 1)
+END
     must_fail 2 vg-decode --max-targets 12 -o horse.npz horse.vgs
     says "--max-targets is for GLB and glTF"
     pipe 'vg-encode horse.glb | vg-info --frames'
@@ -103,6 +113,19 @@ END
     head -c 100 'my data.bin' >short && mv short 'my data.bin'
     must_fail 3 vg-encode beside.gltf -o out.vgs
     [ ! -e out.vgs ]
+}
+
+@test "a GLB of other faces does not join, one of the same does" {
+    printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\n' >a.obj
+    printf 'v 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\nf 1 2 4\n' >b.obj
+    printf 'v 0 0 2\nv 1 0 2\nv 0 1 2\nv 1 1 2\nf 1 2 3\n' >c.obj
+    pipe "vg-encode b.obj | vg-decode -o b.glb"
+    pipe "vg-encode c.obj | vg-decode -o c.glb"
+    must_fail 3 vg-encode a.obj b.glb -o no.vgs
+    says "all poses of a sequence have the same vertices and faces"
+    must vg-encode a.obj c.glb -o ac.vgs
+    pipe "vg-encode a.obj c.obj | vg-diff -t 0 ac.vgs -"
+    [ ! -e no.vgs ]
 }
 
 @test "a GLB that was cut, or lies, is refused, and nothing stays" {
@@ -146,8 +169,14 @@ assert worst <= 1e-6 * size, worst
 END
     done
     py <<'END'
-import json
+import base64, json, struct
 j = json.load(open('bar.gltf'))
+data = base64.b64decode(j['buffers'][0]['uri'].partition(',')[2])
+for channel, sampler in zip(j['animations'][0]['channels'], j['animations'][0]['samplers']): # by the short way between two keys
+    if channel['target']['path'] != 'rotation': continue
+    a = j['accessors'][sampler['output']]
+    q = struct.unpack_from('<%df' % (4 * a['count']), data, j['bufferViews'][a['bufferView']]['byteOffset'] + a['byteOffset'])
+    assert all(sum(q[i + k] * q[i + 4 + k] for k in range(4)) > 0 for i in range(0, len(q) - 4, 4)), q
 assert [n.get('name') for n in j['nodes']] == ['bar', 'low', 'mid', 'top', 'top.end']
 assert [n.get('children') for n in j['nodes']] == [None, [2], [3], [4], None]
 assert j['skins'][0]['joints'] == [1, 2, 3] and j['scenes'][0]['nodes'] == [0, 1]

@@ -45,12 +45,13 @@ def skin(points):
 
 
 def motion(frame):
-    """Each bone turns about its joint, which stays at its parent; the root moves too."""
+    """Each bone turns about its joint, which stays at its parent; the root moves too. A turn is written as either of its two
+    quaternions, one frame after the other."""
     found, turn, at = [], [1.0, 0.0, 0.0, 0.0], [0.1 * frame, 0.05 * frame, 0.0]
     for b in range(3):
         turn = times(turn, axis_angle(([0, 0, 1], [1, 0, 0], [0.6, 0.8, 0])[b], 0.3 * frame))
         moved = turned(turn, [0, b, 0])
-        found.append([*turn, *(at[k] - moved[k] for k in range(3))])
+        found.append([*(-c if frame % 2 else c for c in turn), *(at[k] - moved[k] for k in range(3))])
         at = [a + s for a, s in zip(at, turned(turn, [0, 1, 0]))]
     return found
 

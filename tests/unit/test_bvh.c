@@ -643,6 +643,21 @@ static void writes_any_skeleton(void)
     clear(&t);
 }
 
+/* A hair below zero is zero, without a sign. */
+static void writes_no_minus_zero(void)
+{
+    vg_joint joints[] = {{.name = (char *)"a", .parent = UINT32_MAX, .nchannels = 3, .channels = {1, 2, 3}},
+                         {.name = (char *)"b", .parent = 0, .offset = {10, -1e-12, 0}}};
+    double pose[] = {-1e-12, -0.0, 3, 10, -1e-12, 3};
+    sequence s = {.n = 1, .at = {pose}};
+    vg_err e = {0};
+    s.head.skeleton = (vg_skeleton){2, joints};
+    s.head.reference = pose, s.head.count = s.head.mesh.nv = 2;
+    char *text = write_text(&s, false, NULL, &e);
+    CHECK(text && !strstr(text, "-0"));
+    free(text);
+}
+
 static void tells_its_files(void)
 {
     const vgi_sequence_format *f = &vgi_sequence_bvh;
@@ -658,4 +673,5 @@ TESTS({"reads_and_poses", reads_and_poses}, {"reads_what_people_have", reads_wha
       {"there_and_back", there_and_back}, {"finds_turns", finds_turns}, {"brings_turns_back", brings_turns_back},
       {"fits_what_it_can", fits_what_it_can}, {"goes_on_turning", goes_on_turning},
       {"says_what_is_lost", says_what_is_lost}, {"keeps_places_of_joints", keeps_places_of_joints},
-      {"writes_any_skeleton", writes_any_skeleton}, {"tells_its_files", tells_its_files})
+      {"writes_any_skeleton", writes_any_skeleton}, {"writes_no_minus_zero", writes_no_minus_zero},
+      {"tells_its_files", tells_its_files})

@@ -350,6 +350,23 @@ static void skins_bend(void)
     played_clear(&p);
 }
 
+/* The least of the normalized signed integers is -1, not a little less, as the next one is. */
+static void normalized_numbers_end_at_minus_one(void)
+{
+    const int16_t shorts[] = {-32768, -32767, 32767, 0, 0, 0, 16384, 0, 0};
+    const int8_t bytes[] = {-128, -127, 127, 0, 0, 0, 64, 0, 0};
+    for (int i = 0; i < 2; i++) {
+        char json[512];
+        snprintf(json, sizeof json, "'nodes':[{'mesh':0}],'meshes':[{'primitives':[{'attributes':{'POSITION':0}}]}],'accessors':["
+                 "{'bufferView':0,'componentType':%d,'normalized':true,'count':3,'type':'VEC3'}]", i ? 5120 : 5122);
+        played p = play_json(json, i ? (const void *)bytes : shorts, i ? sizeof bytes : sizeof shorts);
+        CHECK(p.result == 0 && p.h.count == 3);
+        check_point(&p, 0, 0, -1, -1, 1);
+        check_point(&p, 0, 2, i ? 64 / 127.0 : 16384 / 32767.0, 0, 0);
+        played_clear(&p);
+    }
+}
+
 static void all_kinds_of_primitives(void)
 {
     float bin[] = {0, 0, 0, 1, 0, 0, 2, 0, 0, 3, 0, 0, 4, 1, 0};
@@ -429,6 +446,7 @@ static void malformed_is_refused(void)
         {NODE MESH "'accessors':[{'componentType':5126,'count':9000000000,'type':'VEC3'}]", "has no bytes"},
         {NODE MESH "'accessors':[{'bufferView':0,'componentType':5130,'count':3,'type':'VEC3'}]", "componentType is not known"},
         {NODE MESH "'accessors':[{'bufferView':7,'componentType':5126,'count':3,'type':'VEC3'}]", "'bufferViews' that is not there"},
+        {NODE MESH GOOD ",'bufferViews':[{'buffer':0,'byteLength':60,'byteStride':8}]", "byteStride is less than an element"},
         {NODE MESH GOOD ",'extensionsRequired':['KHR_draco_mesh_compression']", "requires the extension 'KHR_draco_mesh_compression'"},
         {NODE "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':1}]}],'accessors':[" FLOATS(0, 3, "VEC3")
          ",{'bufferView':0,'byteOffset':48,'componentType':5125,'count':3,'type':'SCALAR'}]", "an index is 1084227584 where there are 3"},
@@ -469,6 +487,7 @@ TESTS({"a GLB of ours comes back whole", binary_comes_back}, {"a glTF of ours co
        {"a rig that moves comes back as its vertices", skins_come_back},
       {"points without faces come back", points_come_back}, {"morph targets are frames", targets_are_frames},
       {"only equal vertices are welded", only_equal_vertices_are_welded}, {"weights are played", weights_are_played}, {"weights stay", weights_stay},
+      {"normalized numbers end at minus one", normalized_numbers_end_at_minus_one},
       {"nodes move", nodes_move}, {"skins bend", skins_bend}, {"all kinds of primitives", all_kinds_of_primitives},
       {"stale polygons are passed over", stale_polygons_are_passed_over},
       {"animations follow one another", animations_follow_one_another},

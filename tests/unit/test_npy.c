@@ -56,6 +56,26 @@ static void reads_all_spellings(void)
     }
 }
 
+/* From version 2 on a header may be longer than 65535 bytes; beyond 65536 there is nothing that we would read. */
+static void reads_long_headers(void)
+{
+    static const char said[] = "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 3)}";
+    vg_bytes x = numbers(3, 8, false);
+    for (size_t n = 65535; n <= 65537; n++) {
+        char *header = malloc(n + 1);
+        memset(header, ' ', n);
+        header[n] = 0;
+        memcpy(header, said, sizeof said - 1);
+        vg_bytes b = make(2, header, x.data, x.size);
+        played p = play(&vgi_sequence_npy, b.data, b.size);
+        CHECK(n <= 65536 ? p.result == 0 && p.frames == 1 && p.values[2] == 2.25 : p.result == VG_EINPUT);
+        played_clear(&p);
+        vg_bytes_clear(&b);
+        free(header);
+    }
+    vg_bytes_clear(&x);
+}
+
 static void reads_fortran_order(void)
 {
     vg_bytes x = numbers(18, 8, false);
@@ -248,7 +268,7 @@ static void npz_refuses_what_is_missing(void)
     vg_bytes_clear(&x);
 }
 
-TESTS({"reads all spellings", reads_all_spellings}, {"reads Fortran order", reads_fortran_order},
+TESTS({"reads all spellings", reads_all_spellings}, {"reads Fortran order", reads_fortran_order}, {"reads long headers", reads_long_headers},
       {"refuses other arrays", refuses_other_arrays}, {"an NPZ there and back", npz_there_and_back},
       {"refuses a damaged NPZ", npz_refuses_damage},
       {"refuses an NPZ without what it needs", npz_refuses_what_is_missing})

@@ -2,7 +2,7 @@
  * standard input, damage, and what is left on disk. Leaves out the mesh formats and the bytes of streams, which have
  * their own tests. The process stays in the C locale, where libarchive alone would lose every name that is not ASCII.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "io/io.h"
+#include "io/sink.h"
 #include "test.h"
 
 #include <dirent.h>
@@ -614,6 +614,24 @@ static void limits_count_what_is_passed_over(void)
     leave_place();
 }
 
+/* When one of several files cannot take its name, none of them keeps its. */
+static void files_take_their_names_together(void)
+{
+    vgi_targets t = {0};
+    vg_err e = {0};
+    enter_place();
+    CHECK(mkdir("d", 0777) == 0);
+    int one = vgi_targets_open(&t, "one", &e), two = vgi_targets_open(&t, "d/two", &e);
+    CHECK(one >= 0 && two >= 0 && access("one", F_OK) < 0 && access("d/two", F_OK) < 0);
+    CHECK(vgi_target_close(one, "one", &e) == VG_OK && vgi_target_close(two, "two", &e) == VG_OK);
+    CHECK(rename("d", "gone") == 0);
+    CHECK(vgi_targets_rename(&t, &e) == VG_ESYS && access("one", F_OK) == 0);
+    vgi_targets_remove(&t);
+    CHECK(access("one", F_OK) < 0);
+    vgi_targets_clear(&t);
+    leave_place();
+}
+
 /* ---- tests: standard input ---- */
 
 /* What is read when these bytes come through a pipe. Small enough to wait in the pipe. */
@@ -813,7 +831,9 @@ TESTS({"natural order of names", natural_order}, {"names of poses", pose_names},
       {"names that are not ASCII", names_of_all_scripts}, {"archives out of order", unordered_archives},
       {"odd members of archives", odd_members}, {"encrypted members", encrypted_zip},
       {"every 97th prefix of an archive", every_97th_prefix}, {"cut behind the end mark", cut_behind_the_end_mark},
-      {"changed bytes of archives", changed_bytes}, {"limits of archives", limits}, {"limits count what is passed over", limits_count_what_is_passed_over},
+      {"changed bytes of archives", changed_bytes}, {"limits of archives", limits}, 
+      {"limits count what is passed over", limits_count_what_is_passed_over},
+      {"files take their names together", files_take_their_names_together},
       {"standard input", standard_input}, {"series and directories", series_and_directories},
       {"names of outputs that are refused", refused_names}, {"frames that are refused", refused_frames},
       {"only vertices are written", other_kinds_are_refused}, {"a full disk", full_disk},
