@@ -100,6 +100,8 @@ int vgi_model_write(vg_bytes *out, const char *format, const vgi_writing *w, vg_
     if (result == VG_OK && a)
         result = check_range(a->tex, a->ntex * a->tex_dim, a->tex_dim, "texture coordinate", w->full_precision, e);
     if (result == VG_OK) result = known->write(out, w, e);
+    if (result == VG_OK && w->rest) result = vgi_bytes_append(out, w->rest->data, w->rest->size, e);
+    else if (result == VG_OK && known->rest) result = known->rest(out, w, e);
     if (result < 0) out->size = size; /* nothing was appended */
     return result;
 }
@@ -107,6 +109,6 @@ int vgi_model_write(vg_bytes *out, const char *format, const vgi_writing *w, vg_
 int vg_model_write(vg_bytes *out, const char *format, const vg_mesh *mesh, const double *vertices,
                    const vg_attributes *attributes, bool full_precision, vg_err *e)
 {
-    const vgi_writing w = {mesh, vertices, vertices, attributes, full_precision, NULL};
+    const vgi_writing w = {mesh, vertices, vertices, attributes, full_precision, NULL, NULL};
     return vgi_model_write(out, format, &w, e);
 }

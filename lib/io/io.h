@@ -126,6 +126,7 @@ typedef struct vgi_writing {
     const vg_attributes *attributes; /* may be NULL */
     bool full_precision;
     const vg_patches *patches; /* may be NULL: a colour for each face, where the format has them */
+    const vg_bytes *rest;      /* what the format's `rest` gives for this sequence, made before; NULL: it is made */
 } vgi_writing;
 
 typedef struct vgi_format {
@@ -136,7 +137,9 @@ typedef struct vgi_format {
      * call the file, quotes included: "'a.obj'" or "'b.obj' in 'a.zip'"; they add the line. The model is checked by
      * the caller with vg_mesh_check; NaN and Inf are refused here. */
     int (*read)(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e);
+    /* write: append a file, up to what is the same for all poses of a sequence; rest: append that. NULL: nothing is. */
     int (*write)(vg_bytes *out, const vgi_writing *w, vg_err *e);
+    int (*rest)(vg_bytes *out, const vgi_writing *w, vg_err *e);
     unsigned keeps; /* VGI_KEEPS_... */
 } vgi_format;
 
@@ -144,9 +147,13 @@ extern const vgi_format vgi_format_obj, vgi_format_ply, vgi_format_ply_ascii, vg
     vgi_format_stl, vgi_format_stl_ascii;
 /* obj_write.c, ply_write.c: for the tables in obj.c and ply.c */
 int vgi_obj_write(vg_bytes *out, const vgi_writing *w, vg_err *e);
+int vgi_obj_rest(vg_bytes *out, const vgi_writing *w, vg_err *e);
 int vgi_ply_write_little(vg_bytes *out, const vgi_writing *w, vg_err *e);
 int vgi_ply_write_text(vg_bytes *out, const vgi_writing *w, vg_err *e);
 int vgi_ply_write_big(vg_bytes *out, const vgi_writing *w, vg_err *e);
+int vgi_ply_rest_little(vg_bytes *out, const vgi_writing *w, vg_err *e);
+int vgi_ply_rest_text(vg_bytes *out, const vgi_writing *w, vg_err *e);
+int vgi_ply_rest_big(vg_bytes *out, const vgi_writing *w, vg_err *e);
 const vgi_format *vgi_format_by_name(const char *name, size_t n);     /* NULL: none */
 const vgi_format *vgi_format_by_suffix(const char *file_name);        /* case does not matter; NULL: none */
 const vgi_format *vgi_format_by_content(const unsigned char *data, size_t n);

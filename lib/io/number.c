@@ -264,6 +264,21 @@ struct decimal {
     int power; /* digits * 10^power */
 };
 
+/* A few bytes, at most 20: a call of memcpy takes longer than they do. */
+static inline void copy_few(char *to, const char *from, size_t n)
+{
+    if (n >= 8) {
+        memcpy(to, from, 8);
+        if (n > 16) memcpy(to + 8, from + 8, 8);
+        memcpy(to + n - 8, from + n - 8, 8);
+    } else if (n >= 4) {
+        memcpy(to, from, 4);
+        memcpy(to + n - 4, from + n - 4, 4);
+    } else if (n > 0) {
+        to[0] = from[0], to[n / 2] = from[n / 2], to[n - 1] = from[n - 1];
+    }
+}
+
 size_t vgi_print_uint(char *to, uint64_t x)
 {
     static const char pair[] = "0001020304050607080910111213141516171819202122232425262728293031323334353637383940"
@@ -278,7 +293,7 @@ size_t vgi_print_uint(char *to, uint64_t x)
     if (x >= 10) p -= 2, memcpy(p, pair + 2 * x, 2);
     else *--p = (char)('0' + x);
     size_t n = (size_t)(text + sizeof text - p);
-    memcpy(to, p, n);
+    copy_few(to, p, n);
     return n;
 }
 
@@ -374,15 +389,14 @@ out:
 static size_t print_decimal(char *to, const struct decimal *d, int most_plain)
 {
     char digits[20];
-    int n = (int)vgi_print_uint(digits, d->digits);
+    int n = (int)vgi_print_uint(digits, d->digits), point = d->power + n; /* digits before the point */
     while (n > 1 && digits[n - 1] == '0') n--;
-    int point = d->power + (int)vgi_print_uint(to, d->digits); /* digits before the point */
     char *p = to;
     if (point > most_plain || point < -4) {
         *p++ = digits[0];
         if (n > 1) {
             *p++ = '.';
-            memcpy(p, digits + 1, (size_t)n - 1);
+            copy_few(p, digits + 1, (size_t)n - 1);
             p += n - 1;
         }
         *p++ = 'e';
@@ -393,17 +407,17 @@ static size_t print_decimal(char *to, const struct decimal *d, int most_plain)
     if (point <= 0) {
         memcpy(p, "0.0000", 6);
         p += 2 - point;
-        memcpy(p, digits, (size_t)n);
+        copy_few(p, digits, (size_t)n);
         return (size_t)(p + n - to);
     }
     if (n <= point) {
-        memcpy(p, digits, (size_t)n);
+        copy_few(p, digits, (size_t)n);
         memset(p + n, '0', (size_t)(point - n));
         return (size_t)point;
     }
-    memcpy(p, digits, (size_t)point);
+    copy_few(p, digits, (size_t)point);
     p[point] = '.';
-    memcpy(p + point + 1, digits + point, (size_t)(n - point));
+    copy_few(p + point + 1, digits + point, (size_t)(n - point));
     return (size_t)n + 1;
 }
 

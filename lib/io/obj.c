@@ -551,6 +551,6 @@ static bool sniff_obj(const unsigned char *data, size_t n)
     return false;
 }
 
-const vgi_format vgi_format_obj = {"obj", ".obj", sniff_obj, read_obj, vgi_obj_write,
+const vgi_format vgi_format_obj = {"obj", ".obj", sniff_obj, read_obj, vgi_obj_write, vgi_obj_rest,
                                      VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE |
                                          VGI_KEEPS_LABELS | VGI_KEEPS_DOUBLES};

@@ -90,15 +90,24 @@ static int write_libraries(vg_bytes *out, const vg_attributes *a, vg_err *e)
     return VG_OK;
 }
 
-int vgi_obj_write(vg_bytes *out, const vgi_writing *w, vg_err *e)
+static const vg_attributes *attributes_of(const vgi_writing *w)
 {
     static const vg_attributes none;
-    const vg_attributes *a = w->attributes ? w->attributes : &none;
+    return w->attributes ? w->attributes : &none;
+}
+
+int vgi_obj_write(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    int result = write_libraries(out, attributes_of(w), e);
+    return result < 0 ? result : write_numbers(out, "v", w->vertices, w->mesh->nv, 3, w->full_precision, e);
+}
+
+int vgi_obj_rest(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    const vg_attributes *a = attributes_of(w);
     const vg_mesh *m = w->mesh;
     const uint32_t *tex = a->ntex ? a->corner_tex : NULL;
-    int result = write_libraries(out, a, e);
-    if (result == VG_OK) result = write_numbers(out, "v", w->vertices, m->nv, 3, w->full_precision, e);
-    if (result == VG_OK) result = write_numbers(out, "vt", a->tex, a->ntex, a->tex_dim, w->full_precision, e);
+    int result = write_numbers(out, "vt", a->tex, a->ntex, a->tex_dim, w->full_precision, e);
     size_t next_label = 0;
     for (size_t f = 0; f < m->nf && result == VG_OK; f++) {
         uint32_t first = m->start[f];

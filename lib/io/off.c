@@ -279,6 +279,12 @@ static int write_off(vg_bytes *out, const vgi_writing *w, vg_err *e)
         }
         out->size = (size_t)(to - (char *)out->data);
     }
+    return VG_OK;
+}
+
+static int write_off_faces(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    const vg_mesh *m = w->mesh;
     for (size_t f = 0; f < m->nf; f++) {
         size_t size = m->start[f + 1] - m->start[f];
         if (vgi_bytes_reserve(out, out->size + (size + 1) * MOST_INDEX + 1, e) < 0) return VG_ENOMEM;
@@ -294,5 +300,5 @@ static int write_off(vg_bytes *out, const vgi_writing *w, vg_err *e)
     return VG_OK;
 }
 
-const vgi_format vgi_format_off = {"off", ".off", sniff_off, read_off, write_off,
+const vgi_format vgi_format_off = {"off", ".off", sniff_off, read_off, write_off, write_off_faces,
                                      VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_DOUBLES};

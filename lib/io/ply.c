@@ -527,6 +527,9 @@ static bool sniff_ply(const unsigned char *data, size_t n)
 
 enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_DOUBLES };
 
-const vgi_format vgi_format_ply = {"ply", ".ply", sniff_ply, read_ply, vgi_ply_write_little, KEEPS};
-const vgi_format vgi_format_ply_ascii = {"ply-ascii", ".ply", sniff_ply, read_ply, vgi_ply_write_text, KEEPS};
-const vgi_format vgi_format_ply_be = {"ply-be", ".ply", sniff_ply, read_ply, vgi_ply_write_big, KEEPS};
+const vgi_format vgi_format_ply = {"ply", ".ply", sniff_ply, read_ply, vgi_ply_write_little, vgi_ply_rest_little,
+                                   KEEPS};
+const vgi_format vgi_format_ply_ascii = {"ply-ascii", ".ply", sniff_ply, read_ply, vgi_ply_write_text,
+                                         vgi_ply_rest_text, KEEPS};
+const vgi_format vgi_format_ply_be = {"ply-be", ".ply", sniff_ply, read_ply, vgi_ply_write_big, vgi_ply_rest_big,
+                                      KEEPS};

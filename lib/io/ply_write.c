@@ -98,7 +98,7 @@ static void wrote(struct writing *x, const char *to)
     x->out->size = (size_t)(to - (char *)x->out->data);
 }
 
-static int write_body(struct writing *x)
+static int write_vertices(struct writing *x)
 {
     const vg_mesh *m = x->w->mesh;
     for (size_t v = 0; v < m->nv; v++) {
@@ -108,6 +108,12 @@ static int write_body(struct writing *x)
             put_number(&to, x->w->vertices[3 * v + k], x->w->full_precision, x->encoding, k < 2 ? ' ' : '\n');
         wrote(x, to);
     }
+    return VG_OK;
+}
+
+static int write_faces(struct writing *x)
+{
+    const vg_mesh *m = x->w->mesh;
     for (size_t f = 0; f < m->nf; f++) {
         uint32_t first = m->start[f], end = m->start[f + 1];
         bool coloured = f < x->nfaces && has_colours(x);
@@ -131,7 +137,14 @@ static int write_ply(vg_bytes *out, const vgi_writing *w, enum encoding encoding
     struct writing x = {.out = out, .w = w, .encoding = encoding, .e = e};
     divide_faces(&x);
     int result = write_header(&x);
-    return result == VG_OK ? write_body(&x) : result;
+    return result == VG_OK ? write_vertices(&x) : result;
+}
+
+static int write_rest(vg_bytes *out, const vgi_writing *w, enum encoding encoding, vg_err *e)
+{
+    struct writing x = {.out = out, .w = w, .encoding = encoding, .e = e};
+    divide_faces(&x);
+    return write_faces(&x);
 }
 
 int vgi_ply_write_little(vg_bytes *out, const vgi_writing *w, vg_err *e)
@@ -147,4 +160,19 @@ int vgi_ply_write_text(vg_bytes *out, const vgi_writing *w, vg_err *e)
 int vgi_ply_write_big(vg_bytes *out, const vgi_writing *w, vg_err *e)
 {
     return write_ply(out, w, BIG, e);
+}
+
+int vgi_ply_rest_little(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    return write_rest(out, w, LITTLE, e);
+}
+
+int vgi_ply_rest_text(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    return write_rest(out, w, TEXT, e);
+}
+
+int vgi_ply_rest_big(vg_bytes *out, const vgi_writing *w, vg_err *e)
+{
+    return write_rest(out, w, BIG, e);
 }

@@ -43,6 +43,7 @@ struct vg_sink {
     vgi_belt *belt;      /* of pieces; NULL: no frame has come yet */
     piece *pieces;
     size_t npieces;
+    vg_bytes rest;       /* of every file, the same for all */
     /* a sequence: */
     vg_sink_options options;
     void *state;
@@ -358,18 +359,29 @@ static int put_into_sequence(vg_sink *s, const vg_frame *f, vg_err *e)
 
 /* ---- frames that become mesh files ---- */
 
+static vgi_writing writing_of(const vg_sink *s, const double *values)
+{
+    const vg_head *h = s->head;
+    return (vgi_writing){&h->mesh, values, h->reference, &h->attributes, s->full_precision, &h->patches,
+                         s->rest.size ? &s->rest : NULL};
+}
+
+static int unwritable(const vg_sink *s, const char *name, int code, const vg_err *cause, vg_err *e)
+{
+    return vg_fail(e, code, "cannot write frame '%s' to '%s': %s", name, s->output, cause->message);
+}
+
 /* The work on a piece. */
 static void make_piece(void *context, size_t place)
 {
     const vg_sink *s = context;
-    const vg_head *h = s->head;
     piece *p = &s->pieces[place];
-    const vgi_writing w = {&h->mesh, p->values, h->reference, &h->attributes, s->full_precision, &h->patches};
+    const vgi_writing w = writing_of(s, p->values);
     vg_err cause;
     p->text.size = 0;
     p->result = vgi_model_write(&p->text, s->plan.format->name, &w, &cause);
     if (p->result < 0) {
-        vg_fail(&p->error, p->result, "cannot write frame '%s' to '%s': %s", p->name, s->output, cause.message);
+        unwritable(s, p->name, p->result, &cause, &p->error);
         if (p->fd >= 0) close(p->fd);
     } else if (p->fd >= 0) {
         p->result = write_and_close(p->fd, &p->text, (char *)p->path.data, &p->error);
@@ -377,12 +389,22 @@ static void make_piece(void *context, size_t place)
     p->fd = -1;
 }
 
-/* Pieces wait for other threads only: a single one makes each before the next comes. */
-static int start_belt(vg_sink *s, vg_err *e)
+static int make_rest(vg_sink *s, const vg_frame *first, vg_err *e)
 {
-    size_t nv = s->head->mesh.nv, room = MOST_WAITING / (3 * sizeof(double) + TEXT_OF_VERTEX) / (nv + 1);
-    int threads = s->options.threads;
-    size_t n = threads > 1 ? (size_t)threads + 1 : 1;
+    const vgi_writing w = writing_of(s, first->values);
+    vg_err cause;
+    if (!s->plan.format->rest || s->plan.kind == VGI_PLAN_FILE) return VG_OK;
+    int r = s->plan.format->rest(&s->rest, &w, &cause);
+    return r < 0 ? unwritable(s, first->name ? first->name : "", r, &cause, e) : r;
+}
+
+/* Pieces wait for other threads only: a single one makes each before the next comes. */
+static int start_belt(vg_sink *s, const vg_frame *first, vg_err *e)
+{
+    int r = make_rest(s, first, e), threads = s->options.threads;
+    if (r < 0) return r;
+    size_t nv = s->head->mesh.nv, n = threads > 1 ? (size_t)threads + 1 : 1;
+    size_t room = MOST_WAITING / ((3 * sizeof(double) + TEXT_OF_VERTEX) * (nv + 1) + s->rest.size);
     if (n > 2 && n > room) n = room < 2 ? 2 : room;
     if (!(s->pieces = vgi_array(n, sizeof *s->pieces, e))) return VG_ENOMEM;
     s->npieces = n;
@@ -416,7 +438,7 @@ static int place_piece(vg_sink *s, piece *p, vg_err *e)
 
 static int put_piece(vg_sink *s, const vg_frame *f, const char *name, vg_err *e)
 {
-    int r = s->belt ? VG_OK : start_belt(s, e);
+    int r = s->belt ? VG_OK : start_belt(s, f, e);
     if (r < 0) return r;
     piece *p = &s->pieces[vgi_belt_place(s->belt)];
     free(p->name);
@@ -523,6 +545,7 @@ static void clear_pieces(vg_sink *s)
         if (p->fd >= 0) close(p->fd); /* nobody came to make it */
     }
     free(s->pieces);
+    vg_bytes_clear(&s->rest);
 }
 
 void vg_sink_close(vg_sink **sink)

@@ -473,6 +473,6 @@ static int write_ascii(vg_bytes *out, const vgi_writing *w, vg_err *e)
     return write_stl(out, w, true, e);
 }
 
-const vgi_format vgi_format_stl = {"stl", ".stl", sniff_stl, read_stl, write_binary, VGI_KEEPS_FACES};
-const vgi_format vgi_format_stl_ascii = {"stl-ascii", ".stl", sniff_stl, read_stl, write_ascii,
+const vgi_format vgi_format_stl = {"stl", ".stl", sniff_stl, read_stl, write_binary, NULL, VGI_KEEPS_FACES};
+const vgi_format vgi_format_stl_ascii = {"stl-ascii", ".stl", sniff_stl, read_stl, write_ascii, NULL,
                                          VGI_KEEPS_FACES | VGI_KEEPS_DOUBLES};
