@@ -355,10 +355,14 @@ static void test_degenerate(void)
     problem q = make_problem(&h, g, NULL, 0, 0.02);
     memset(q.w[2], 0, 3 * vg_graph_corners(g) * sizeof(double)); /* every face a point */
     for (size_t c = 0; c < vg_graph_corners(g); c++) q.w[3][3 * c + 1] = q.w[3][3 * c + 2] = 0; /* on a line */
+    for (size_t c = 0; c < vg_graph_corners(g); c++) { /* on a line that rounding does not quite meet */
+        double t = noise();
+        for (size_t k = 0; k < 3; k++) q.w[4][3 * c + k] = t * (const double[]){1, M_SQRT2, M_PI}[k];
+    }
     answer a = solve(&q, 1, POSES);
     CHECK(a.good == POSES);
     for (size_t k = 0; k < POSES; k++) CHECK(vgi_finite(a.x[k], 3 * g->nv));
-    for (size_t k = 2; k < 4; k++) CHECK(!memcmp(a.x[k], a.plain[k], 3 * g->nv * sizeof(double)));
+    for (size_t k = 2; k < 5; k++) CHECK(!memcmp(a.x[k], a.plain[k], 3 * g->nv * sizeof(double)));
     clear(&a, POSES);
     clear_problem(&q);
     vg_graph_free(&g);
