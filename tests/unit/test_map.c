@@ -406,6 +406,43 @@ static void what_hangs_loose(void)
     vg_head_clear(&h);
 }
 
+/* Powers of two, so that nothing is rounded: fits, measures and plays the same in any unit. */
+static void units_do_not_matter(void)
+{
+    static const int powers[] = {0, -66, 66}; /* 1, 1e-20, 1e20 */
+    double *first = NULL;
+    for (int u = 0; u < 3; u++) {
+        double unit = ldexp(1, powers[u]);
+        vg_head h = make_body(5);
+        vg_err e;
+        vg_map_fitter *f;
+        size_t n = 3 * h.mesh.nv;
+        double *pose = room(n, sizeof *pose);
+        for (size_t i = 0; i < n; i++) h.reference[i] *= unit;
+        CHECK(vg_map_fitter_new(&f, &h, 0.03, 2, &e) == VG_OK);
+        for (int k = 0; k < POSES; k++) {
+            const double *poses[1] = {pose};
+            for (size_t i = 0; i < n; i++) h.reference[i] /= unit;
+            bend(&h, 0.2 * (k + 1), pose);
+            for (size_t i = 0; i < n; i++) h.reference[i] *= unit, pose[i] *= unit;
+            CHECK(vg_map_fitter_add(f, 1, poses, &e) == VG_OK);
+        }
+        CHECK(vg_map_fitter_finish(f, &e) == VG_OK);
+        vg_map_fitter_free(&f);
+        played x = open_player(&h, false, 1);
+        measure(&x, pose);
+        vg_player_place(x.p, x.transforms);
+        play(&x);
+        for (size_t i = 0; i < n; i++) x.vertices[i] /= unit;
+        if (u == 0) first = vgi_copy_array(x.vertices, n, sizeof *first, &e);
+        else CHECK_NEAR(apart(x.vertices, first, n), 0, 1e-10);
+        free(pose);
+        close_player(&x);
+        vg_head_clear(&h);
+    }
+    free(first);
+}
+
 static void refusals(void)
 {
     vg_head h = make_rod(5, 4, true);
@@ -426,4 +463,4 @@ static void refusals(void)
 TESTS({"rigid bodies", rigid_bodies}, {"collapsed is uncollapsed", collapsed_is_uncollapsed}, {"paths", paths},
       {"half turns", half_turns}, {"other bodies", other_bodies},
       {"dense systems", dense_systems}, {"patches are measured", patches_are_measured},
-      {"what hangs loose", what_hangs_loose}, {"refusals", refusals})
+      {"what hangs loose", what_hangs_loose}, {"units do not matter", units_do_not_matter}, {"refusals", refusals})
