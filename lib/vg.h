@@ -4,12 +4,14 @@
  * frame of a sequence, vector graph, rotations, measures), method (selection, deformation, reconstruction),
  * io (stream, mesh files, archives; the two doors `vg_source` and `vg_sink`), view (pictures).
  *
- * Conventions. Arrays of points and vectors are interleaved: xyzxyz... Index base is 0. Lengths are in the
- * unit of the mesh. D is the diagonal of the bounding box of the reference pose. Functions that can fail return
- * an int: VG_OK or more on success, a negative vg_code on failure, with the details in *e (e may be NULL).
- * Whoever calls _new or _open calls _free or _close, which take the address of the pointer and leave NULL there.
- * Structs are prepared by = {0} and released by _clear, which leaves them zero. The library never prints and
- * never exits. The mathematics is cited as (T n) from the thesis on vector graphs that the man page vg(7) names.
+ * Conventions. Arrays of points and vectors are interleaved: xyzxyz... Index base is 0. Lengths are in the unit of
+ * the mesh. D is the diagonal of the bounding box of the reference pose. Functions that can fail return an int:
+ * VG_OK or more on success, a negative vg_code on failure, with the details in *e (e may be NULL). Whoever calls
+ * _new or _open calls _free or _close, which take the address of the pointer and leave NULL there. Structs are
+ * prepared by = {0} and released by _clear, which leaves them zero; _copy writes over what was there, and leaves
+ * zero when it fails. Where a thing takes threads, these must be >= 1, and calls on it go one after another; the
+ * results do not depend on their number. The library never prints and never exits. The mathematics is cited as (T n)
+ * from the thesis on vector graphs that the man page vg(7) names.
  *
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_H
@@ -83,7 +85,8 @@ void vg_mesh_clear(vg_mesh *m);
 int vg_mesh_copy(vg_mesh *to, const vg_mesh *from, vg_err *e) VG_MUST_CHECK;
 
 /* vg_mesh_check: VG_OK, or VG_EINPUT naming the first face that is too small, has an index out of range, or names a
- * vertex twice, or when there are too many of anything. `subject` is what the message calls the mesh ("file 'a.obj'"). O(corners). */
+ * vertex twice, or when there are too many of anything. `subject` is what the message calls the mesh ("file
+ * 'a.obj'"). O(corners). */
 int vg_mesh_check(const vg_mesh *m, const char *subject, vg_err *e) VG_MUST_CHECK;
 
 /* vg_mesh_same: VG_OK when both have the same vertex count and the same faces in the same order; else VG_EINPUT, and
@@ -389,6 +392,7 @@ typedef struct vg_frame {
 void vg_frame_clear(vg_frame *f);
 /* vg_frame_shape: make room for the values and anchors of a frame of h; contents undefined, no scalars. */
 int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+/* vg_frame_pin, _turn, _rename: the frame has these from now on (copied; n or njoints 0: none). */
 int vg_frame_pin(vg_frame *f, const uint32_t *vertices, size_t n, vg_err *e) VG_MUST_CHECK;
 int vg_frame_turn(vg_frame *f, const double *turns, size_t njoints, vg_err *e) VG_MUST_CHECK;
 int vg_frame_rename(vg_frame *f, const char *name, vg_err *e) VG_MUST_CHECK;
@@ -438,8 +442,8 @@ void vg_quat_between(const double r[3], const double d[3], double q[4]);
 /* ---------------------------------------------------------------------------------------------- method -- */
 
 /* vg_threads_with_room: how many threads, `most` at most, may multiply matrices in the address space that is left to
- * the process; 0: not even one. OpenBLAS does not return, ever, when it is refused the memory it works in, so ask this
- * before. */
+ * the process; 0: not even one. OpenBLAS does not return, ever, when it is refused the memory it works in, so ask
+ * this before. */
 int vg_threads_with_room(int most);
 
 /* vg_select_faces: fewer faces that still determine the mesh (T 3.2, Algorithm 1), completed so that every vertex
@@ -449,8 +453,8 @@ int vg_select_faces(const vg_mesh *m, uint32_t **faces, size_t *n, vg_err *e) VG
 
 /* vg_link_components: the fewest virtual line segments that join all components of m, between nearby vertices of
  * `vertices` (nv points): a minimum spanning tree of the components, where a link that would be shorter than the
- * edges beside it is moved on to the next vertex of the face. *pairs (2 per link, caller frees) and *n. VG_EARG when a
- * vertex is not finite. */
+ * edges beside it is moved on to the next vertex of the face. *pairs (2 per link, caller frees) and *n. VG_EARG when
+ * a vertex is not finite. */
 int vg_link_components(const vg_mesh *m, const double *vertices, uint32_t **pairs, size_t *n,
                        vg_err *e) VG_MUST_CHECK;
 
@@ -512,9 +516,9 @@ typedef struct vg_path_facts {
 int vg_path_new(vg_path **p, const vg_graph *g, const double *reference, const vg_key *keys, size_t nkeys,
                 const vg_path_options *o, vg_err *e) VG_MUST_CHECK;
 void vg_path_free(vg_path **p);
-/* vg_path_at: the pose at t: vectors (one per corner), root and anchors (NULL if there are none) out. Key i is at t = i. What is between two
- * keys is prepared when it is first asked for and kept until something else is (three stretches if smooth): ask in
- * order. */
+/* vg_path_at: the pose at t: vectors (one per corner), root and anchors (NULL if there are none) out. Key i is at t
+ * = i. What is between two keys is prepared when it is first asked for and kept until something else is (three
+ * stretches if smooth): ask in order. */
 int vg_path_at(vg_path *p, double t, double *vectors, double root[3], double *anchors, vg_err *e) VG_MUST_CHECK;
 vg_path_facts vg_path_get_facts(const vg_path *p);
 
@@ -655,9 +659,10 @@ int vg_segmenter_new(vg_segmenter **s, const vg_mesh *m, const double *reference
 void vg_segmenter_free(vg_segmenter **s);
 /* vg_segmenter_add: n poses, nv points each. */
 int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_err *e) VG_MUST_CHECK;
-/* vg_segmenter_cut: the patches of the poses so far; may be called again, for others. patches 0: as few of 4 6 8 12 16 24 ... 256 as bring the angle to 10 degrees. connected: every
- * patch is in one piece: pieces are joined with neighbours that turn alike until `patches` are left, or no
- * neighbours. Fewer patches than asked for when fewer faces turn differently. VG_EINPUT when there is no face. */
+/* vg_segmenter_cut: the patches of the poses so far; may be called again, for others. patches 0: as few of 4 6 8 12
+ * 16 24 ... 256 as bring the angle to 10 degrees. connected: every patch is in one piece: pieces are joined with
+ * neighbours that turn alike until `patches` are left, or no neighbours. Fewer patches than asked for when fewer
+ * faces turn differently. VG_EINPUT when there is no face. */
 int vg_segmenter_cut(vg_segmenter *s, size_t patches, uint64_t seed, bool connected, vg_patches *out,
                      vg_segment_report *report, vg_err *e) VG_MUST_CHECK;
 
@@ -681,12 +686,14 @@ int vg_map_retarget(vg_head *h, const double *target, double morph, int threads,
 
 /* A map at work. Transforms are 7 numbers each, as in VG_TRANSFORMS. */
 typedef struct vg_player vg_player;
-/* vg_player_new: h has a map and its patches; borrowed until free. single: the product is formed in binary32. */
+/* vg_player_new: h has a map and its patches, or the weights of its rig; borrowed until free. single: the product is
+ * formed in binary32. VG_EINPUT when h has not. */
 int vg_player_new(vg_player **p, const vg_head *h, bool single, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_player_free(vg_player **p);
 /* vg_player_measure: n poses (nv points each) to the best similarity of each patch. */
 void vg_player_measure(vg_player *p, size_t n, const double *const *poses, double *const *transforms);
-/* vg_player_place: keep rotations, scales and root, and put the patches where their joints want them, in place. */
+/* vg_player_place: keep rotations, scales and root, and put the patches where their joints want them, in place. A map
+ * of another body than its home does so whenever it is posed: there nothing is done. */
 void vg_player_place(vg_player *p, double *transforms);
 /* vg_player_between: from a (t = 0) to b (t = 1) and beyond: rotations and scales go along geodesics, the root in a
  * line, joints hold. transforms: neither a nor b. */
@@ -700,7 +707,7 @@ void vg_player_pose(vg_player *p, size_t n, const double *const *transforms, dou
  * linear blend skinning comes as near to the vertices as it can (damped Gauss-Newton over all bones at once). Bones
  * that no vertex tells about go with their parents. */
 typedef struct vg_bender vg_bender;
-/* vg_bender_new: r has weights; it and reference (nv points) are not kept. */
+/* vg_bender_new: r has weights (else VG_EINPUT); it and reference (nv points) are not kept. */
 int vg_bender_new(vg_bender **b, const vg_rig *r, size_t nv, const double *reference, int threads,
                   vg_err *e) VG_MUST_CHECK;
 void vg_bender_free(vg_bender **b);
@@ -782,9 +789,9 @@ void vg_measures_get(const vg_measures *x, vg_measure_report *r);
 double vg_error_p95(double *numbers, size_t n);
 
 /* A fingerprint of what a sequence says, whoever made it: XXH64 over kind, faces, selection, links, anchors,
- * reference positions, and of every frame name, time, root, anchors, turns of joints and values, all numbers as binary64
- * (-0 as 0). Provenance, attributes, scalars, pins, unknown records and the precision they are written in do not count,
- * nor does what is no sequence: skeletons, pairs of faces, patches, rigs and maps. */
+ * reference positions, and of every frame name, time, root, anchors, turns of joints and values, all numbers as
+ * binary64 (-0 as 0). Provenance, attributes, scalars, pins, unknown records and the precision they are written in
+ * do not count, nor does what is no sequence: skeletons, pairs of faces, patches, rigs and maps. */
 typedef struct vg_digest vg_digest;
 int vg_digest_new(vg_digest **d, const vg_head *h, vg_err *e) VG_MUST_CHECK; /* h is borrowed until free */
 void vg_digest_free(vg_digest **d);
