@@ -83,8 +83,9 @@ int vgi_mesh_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     return vg_mesh_check(m, p->where, e);
 }
 
-int vgi_mesh_encode(vg_bytes *b, const vg_mesh *m, vg_err *e)
+int vgi_mesh_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
+    const vg_mesh *m = &h->mesh;
     int r = put64(b, m->nv, e);
     if (r == VG_OK) r = put64(b, m->nf, e);
     if (r == VG_OK) r = vgi_bytes_reserve(b, b->size + 4 * (m->nf + vg_mesh_corners(m)), e);
@@ -151,8 +152,9 @@ int vgi_labl_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     return r;
 }
 
-int vgi_labl_encode(vg_bytes *b, const vg_attributes *a, vg_err *e)
+int vgi_labl_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
+    const vg_attributes *a = &h->attributes;
     int r = VG_OK;
     for (size_t i = 0; r == VG_OK && i < a->nlabels; i++) {
         r = put64(b, a->labels[i].face, e);
@@ -207,6 +209,21 @@ int vgi_indices_encode(vg_bytes *b, const uint32_t *x, size_t n, vg_err *e)
     for (size_t i = 0; i < n; i++) vgi_put32(b->data + b->size + 4 * i, x[i]);
     b->size += 4 * n;
     return VG_OK;
+}
+
+int vgi_sele_encode(vg_bytes *b, const vg_head *h, vg_err *e)
+{
+    return vgi_indices_encode(b, h->selected, h->nselected, e);
+}
+
+int vgi_link_encode(vg_bytes *b, const vg_head *h, vg_err *e)
+{
+    return vgi_indices_encode(b, h->links, 2 * h->nlinks, e);
+}
+
+int vgi_anch_encode(vg_bytes *b, const vg_head *h, vg_err *e)
+{
+    return vgi_indices_encode(b, h->anchors, h->nanchors, e);
 }
 
 /* ---- REFP, FORM ---- */
@@ -335,8 +352,9 @@ int vgi_corr_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     return check_pairs(p, k, e);
 }
 
-int vgi_corr_encode(vg_bytes *b, const vg_correspondence *c, vg_err *e)
+int vgi_corr_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
+    const vg_correspondence *c = &h->correspondence;
     size_t pairs = c->first[c->target_nf];
     const uint64_t head[7] = {c->source_nv,     c->source_nf, c->source_digest, c->target_nv, c->target_nf,
                               c->target_digest, pairs};

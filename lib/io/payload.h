@@ -18,18 +18,12 @@ vgi_decoder vgi_prov_decode, vgi_mesh_decode, vgi_texc_decode, vgi_labl_decode, 
     vgi_rig_decode, vgi_map_decode;
 
 int vgi_prov_encode(vg_bytes *b, const vg_provenance *p, vg_err *e) VG_MUST_CHECK;
-int vgi_mesh_encode(vg_bytes *b, const vg_mesh *m, vg_err *e) VG_MUST_CHECK;
-int vgi_texc_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
-int vgi_labl_encode(vg_bytes *b, const vg_attributes *a, vg_err *e) VG_MUST_CHECK;
+/* The others append what the head says of their kind. */
+typedef int vgi_encoder(vg_bytes *b, const vg_head *h, vg_err *e);
+vgi_encoder vgi_mesh_encode, vgi_texc_encode, vgi_labl_encode, vgi_sele_encode, vgi_link_encode, vgi_anch_encode,
+    vgi_refp_encode, vgi_form_encode, vgi_skel_encode, vgi_corr_encode, vgi_ptch_encode, vgi_rig_encode,
+    vgi_map_encode;
 int vgi_indices_encode(vg_bytes *b, const uint32_t *x, size_t n, vg_err *e) VG_MUST_CHECK;
-int vgi_refp_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
-int vgi_form_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
-
-int vgi_skel_encode(vg_bytes *b, const vg_skeleton *s, vg_err *e) VG_MUST_CHECK;
-int vgi_corr_encode(vg_bytes *b, const vg_correspondence *c, vg_err *e) VG_MUST_CHECK;
-int vgi_ptch_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
-int vgi_rig_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
-int vgi_map_encode(vg_bytes *b, const vg_map *m, vg_err *e) VG_MUST_CHECK;
 
 /* vgi_fram_decode: f->raw holds the payload. On a little-endian machine binary64 values are used where they lie. */
 int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e) VG_MUST_CHECK;

@@ -50,7 +50,7 @@ int vgi_skel_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     return h->skeleton.njoints == h->mesh.nv ? VG_OK : wrong(p, "it does not have one joint for each vertex", e);
 }
 
-int vgi_skel_encode(vg_bytes *b, const vg_skeleton *s, vg_err *e)
+static int encode_joints(vg_bytes *b, const vg_skeleton *s, vg_err *e)
 {
     int r = VG_OK;
     for (size_t i = 0; r == VG_OK && i < s->njoints; i++) {
@@ -65,6 +65,11 @@ int vgi_skel_encode(vg_bytes *b, const vg_skeleton *s, vg_err *e)
         if (r == VG_OK) r = put_padding(b, 0, e);
     }
     return r;
+}
+
+int vgi_skel_encode(vg_bytes *b, const vg_head *h, vg_err *e)
+{
+    return encode_joints(b, &h->skeleton, e);
 }
 
 /* ---- RIG ---- */
@@ -136,7 +141,7 @@ int vgi_rig_encode(vg_bytes *b, const vg_head *h, vg_err *e)
     const vg_rig *g = &h->rig;
     size_t n = g->skeleton.njoints, nv = h->mesh.nv;
     int r = put64(b, n, e);
-    if (r == VG_OK) r = vgi_skel_encode(b, &g->skeleton, e);
+    if (r == VG_OK) r = encode_joints(b, &g->skeleton, e);
     if (r == VG_OK) r = put_doubles(b, g->at, 3 * n, e);
     if (r == VG_OK) r = put_doubles(b, g->turn, 4 * n, e);
     if (r == VG_OK) r = put32(b, g->skin_bone != NULL, e);
@@ -287,8 +292,9 @@ int vgi_map_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     return r < 0 ? r : left(&c) ? wrong(p, "bytes are left over", e) : VG_OK;
 }
 
-int vgi_map_encode(vg_bytes *b, const vg_map *m, vg_err *e)
+int vgi_map_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
+    const vg_map *m = &h->map;
     const uint64_t counts[5] = {m->n, m->nv, m->njoints, m->ncorners, m->nheld};
     const uint32_t words[4] = {m->kind, m->has_home ? HAS_HOME : 0, (uint32_t)m->nnames, (uint32_t)m->per_corner};
     vg_map copy = *m; /* the list of arrays does not promise not to change them */

@@ -7,29 +7,29 @@
 #include <stdlib.h>
 
 /* The header records, in the order they are written. */
-enum { FORM = 13, KNOWN = 14 };
+enum { PROV, MESH, TEXC, LABL, SELE, LINK, ANCH, REFP, SKEL, CORR, PTCH, RIG, MAP, FORM, KNOWN };
 static const struct {
     const char *tag;
     uint32_t flags;
     vgi_decoder *decode;
+    vgi_encoder *encode; /* NULL: one record for each of several */
     bool repeats, needs_mesh;
 } known[KNOWN] = {
-    {"PROV", VGI_COPY_SAFE, vgi_prov_decode, true, false},
-    {"MESH", VGI_CRITICAL, vgi_mesh_decode, false, false},
-    {"TEXC", 0, vgi_texc_decode, false, true},
-    {"LABL", 0, vgi_labl_decode, false, true},
-    {"SELE", VGI_CRITICAL, vgi_sele_decode, false, true},
-    {"LINK", VGI_CRITICAL, vgi_link_decode, false, true},
-    {"ANCH", VGI_CRITICAL, vgi_anch_decode, false, true},
-    {"REFP", VGI_CRITICAL, vgi_refp_decode, false, true},
-    {"SKEL", 0, vgi_skel_decode, false, true},
-    {"CORR", VGI_CRITICAL, vgi_corr_decode, false, false},
-    {"PTCH", 0, vgi_ptch_decode, false, true},
-    {"RIG ", 0, vgi_rig_decode, false, true},
-    {"MAP ", VGI_CRITICAL, vgi_map_decode, false, true},
-    {"FORM", VGI_CRITICAL, vgi_form_decode, false, false},
+    [PROV] = {"PROV", VGI_COPY_SAFE, vgi_prov_decode, NULL, true, false},
+    [MESH] = {"MESH", VGI_CRITICAL, vgi_mesh_decode, vgi_mesh_encode, false, false},
+    [TEXC] = {"TEXC", 0, vgi_texc_decode, vgi_texc_encode, false, true},
+    [LABL] = {"LABL", 0, vgi_labl_decode, vgi_labl_encode, false, true},
+    [SELE] = {"SELE", VGI_CRITICAL, vgi_sele_decode, vgi_sele_encode, false, true},
+    [LINK] = {"LINK", VGI_CRITICAL, vgi_link_decode, vgi_link_encode, false, true},
+    [ANCH] = {"ANCH", VGI_CRITICAL, vgi_anch_decode, vgi_anch_encode, false, true},
+    [REFP] = {"REFP", VGI_CRITICAL, vgi_refp_decode, vgi_refp_encode, false, true},
+    [SKEL] = {"SKEL", 0, vgi_skel_decode, vgi_skel_encode, false, true},
+    [CORR] = {"CORR", VGI_CRITICAL, vgi_corr_decode, vgi_corr_encode, false, false},
+    [PTCH] = {"PTCH", 0, vgi_ptch_decode, vgi_ptch_encode, false, true},
+    [RIG] = {"RIG ", 0, vgi_rig_decode, vgi_rig_encode, false, true},
+    [MAP] = {"MAP ", VGI_CRITICAL, vgi_map_decode, vgi_map_encode, false, true},
+    [FORM] = {"FORM", VGI_CRITICAL, vgi_form_decode, vgi_form_encode, false, false},
 };
-enum { MESH = 1 };
 
 /* ---- reader ---- */
 
@@ -243,45 +243,41 @@ static int write_extra(vg_writer *w, const vg_records *list, vg_err *e)
     return r;
 }
 
-static int encode_known(vg_bytes *b, const vg_head *h, int i, vg_err *e)
+static int write_provenance(vg_writer *w, vg_err *e)
 {
-    switch (i) {
-    case 1: return vgi_mesh_encode(b, &h->mesh, e);
-    case 2: return vgi_texc_encode(b, h, e);
-    case 3: return vgi_labl_encode(b, &h->attributes, e);
-    case 4: return vgi_indices_encode(b, h->selected, h->nselected, e);
-    case 5: return vgi_indices_encode(b, h->links, 2 * h->nlinks, e);
-    case 6: return vgi_indices_encode(b, h->anchors, h->nanchors, e);
-    case 7: return vgi_refp_encode(b, h, e);
-    case 8: return vgi_skel_encode(b, &h->skeleton, e);
-    case 9: return vgi_corr_encode(b, &h->correspondence, e);
-    case 10: return vgi_ptch_encode(b, h, e);
-    case 11: return vgi_rig_encode(b, h, e);
-    case 12: return vgi_map_encode(b, &h->map, e);
-    default: return vgi_form_encode(b, h, e);
+    int r = VG_OK;
+    for (size_t i = 0; r == VG_OK && i < w->head->nprovenance; i++) {
+        w->front.size = 0;
+        r = vgi_prov_encode(&w->front, &w->head->provenance[i], e);
+        if (r == VG_OK) r = write_record(w, known[PROV].tag, known[PROV].flags, &w->front, e);
     }
+    return r;
 }
 
 static int write_head(vg_writer *w, vg_err *e)
 {
     const vg_head *h = w->head;
-    bool mesh = h->reference != NULL;
-    const bool present[KNOWN] = {false, mesh, mesh && h->attributes.ntex > 0, mesh && h->attributes.nlabels > 0,
-                                 mesh && h->has_selection, mesh && h->has_links, mesh && h->nanchors > 0, mesh,
-                                 mesh && h->skeleton.njoints > 0, h->correspondence.first != NULL,
-                                 mesh && h->patches.n > 0, mesh && h->rig.skeleton.njoints > 0, mesh && h->map.n > 0,
-                                 true};
+    const bool mesh = h->reference != NULL;
+    const bool present[KNOWN] = {[MESH] = mesh,
+                                 [TEXC] = mesh && h->attributes.ntex > 0,
+                                 [LABL] = mesh && h->attributes.nlabels > 0,
+                                 [SELE] = mesh && h->has_selection,
+                                 [LINK] = mesh && h->has_links,
+                                 [ANCH] = mesh && h->nanchors > 0,
+                                 [REFP] = mesh,
+                                 [SKEL] = mesh && h->skeleton.njoints > 0,
+                                 [CORR] = h->correspondence.first != NULL,
+                                 [PTCH] = mesh && h->patches.n > 0,
+                                 [RIG] = mesh && h->rig.skeleton.njoints > 0,
+                                 [MAP] = mesh && h->map.n > 0,
+                                 [FORM] = true};
     int r = vgi_record_begin_write(w->fd, w->name, e);
-    for (size_t i = 0; r == VG_OK && i < h->nprovenance; i++) {
-        w->front.size = 0;
-        r = vgi_prov_encode(&w->front, &h->provenance[i], e);
-        if (r == VG_OK) r = write_record(w, known[0].tag, known[0].flags, &w->front, e);
-    }
-    for (int i = 1; r == VG_OK && i < KNOWN; i++) {
+    if (r == VG_OK) r = write_provenance(w, e);
+    for (int i = 0; r == VG_OK && i < KNOWN; i++) {
         if (!present[i]) continue;
         if (i == FORM) r = write_extra(w, &h->extra, e);
         w->front.size = 0;
-        if (r == VG_OK) r = encode_known(&w->front, h, i, e);
+        if (r == VG_OK) r = known[i].encode(&w->front, h, e);
         if (r == VG_OK) r = write_record(w, known[i].tag, known[i].flags, &w->front, e);
     }
     return r;
