@@ -538,6 +538,9 @@ void vg_carrier_free(vg_carrier **c);
 void vg_carrier_transfer(vg_carrier *c, size_t n, const double *const *poses, double *const *vectors);
 /* corners: source faces without a direction, over all poses */
 vg_deform_counts vg_carrier_counts(const vg_carrier *c);
+/* vg_carrier_turned: by how many degrees the matched faces of the target are turned against the source faces that drive
+ * them, in the two references: the angle of the mean cosine between normals. A mesh that is inside out is not turned. */
+double vg_carrier_turned(const vg_carrier *c);
 
 /* Shape deformation (T 4.1 to 4.6): what takes each source vector to the target's in the reference poses, applied to
  * the vectors of each pose and put at the source face's centroid; corners that share a vertex are averaged. No linear

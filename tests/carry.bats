@@ -47,6 +47,20 @@ for f in out.frames:
 END
 }
 
+@test "a target that is turned against the source is warned of, one that is inside out is not" {
+    awk '$1 == "v" {y = $3; $3 = -$4; $4 = y} {print}' "$DATA/trex.rest.obj" >z-up.obj
+    awk '$1 == "f" {for (i = NF; i > 1; i--) printf "%s ", (i == NF ? "f " : "") $i; print ""; next} {print}' \
+        "$DATA/trex.rest.obj" >inside-out.obj
+    must vg-encode --reference "$DATA/velociraptor.rest.obj" "$DATA/velociraptor-run.tar.xz" -o run.vgs
+    for target in z-up inside-out; do
+        must vg-register -q --markers "$DATA/velociraptor-trex.markers.txt" "$DATA/velociraptor.rest.obj" $target.obj \
+            -o $target.vgs
+    done
+    must_fail 0 vg-deform --onto z-up.obj --correspondence z-up.vgs run.vgs -o out.vgs
+    says "does not stand as the reference pose 'velociraptor.rest' does: they differ by 6"
+    must vg-deform --onto inside-out.obj --correspondence inside-out.vgs run.vgs -o out.vgs
+}
+
 @test "through a correspondence with itself every pose comes back within 1e-10 D, by every method" {
     for set in trex-walk:trex horse-run:horse woman-tanktop-jump:woman-tanktop; do
         poses=$DATA/${set%:*}.tar.xz rest=$DATA/${set#*:}.rest.obj

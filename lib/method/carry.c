@@ -245,6 +245,23 @@ int vg_carrier_new(vg_carrier **out, const vg_mesh *source, const double *source
     return r;
 }
 
+double vg_carrier_turned(const vg_carrier *c)
+{
+    const vg_graph *t = c->target;
+    const vg_correspondence *pairs = c->pairs;
+    double sum = 0, n[3];
+    size_t count = 0;
+    for (size_t f = 0; f < t->nf - t->nlinks; f++) {
+        size_t s = pairs->source[pairs->first[f]];
+        const double *q = c->q + 3 * s; /* along the normal */
+        if (!pairs->matched[f] || c->slow[s]) continue;
+        if (!vgi_unit_normal(c->vectors + 3 * (size_t)t->start[f], t->start[f + 1] - t->start[f], n)) continue;
+        sum += (q[0] * n[0] + q[1] * n[1] + q[2] * n[2]) / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
+        count++;
+    }
+    return count ? 180 / M_PI * acos(fmin(fabs(sum) / (double)count, 1)) : 0;
+}
+
 void vg_carrier_free(vg_carrier **out)
 {
     vg_carrier *c = *out;
