@@ -240,7 +240,8 @@ static void refuse_option(int problem, char **argv)
     int length = (int)strcspn(text, "=");
     const cli_option *first = NULL, *second = NULL;
     for (size_t i = 0; i < known.n; i++)
-        if (length > 2 && !strncmp(known.at[i]->name, text + 2, (size_t)length - 2)) *(first ? &second : &first) = known.at[i];
+        if (length > 2 && !strncmp(known.at[i]->name, text + 2, (size_t)length - 2))
+            *(first ? &second : &first) = known.at[i];
     if (second)
         cli_usage("ambiguous option '%.*s': it could be '--%s' or '--%s'", length, text, first->name, second->name);
     if (length > 2 && (o = likely_option(text + 2, (size_t)length - 2)))

@@ -1,6 +1,6 @@
-/* output.c: where the stream or text of a program goes: standard output, a special file opened as it is, or a temporary
- * file that takes its final name at the end. Leaves out mesh files: their names and temporary files are vg_sink's, in
- * the library. SPDX-License-Identifier: GPL-3.0-or-later */
+/* output.c: where the stream or text of a program goes: standard output, a special file opened as it is, or a
+ * temporary file that takes its final name at the end. Leaves out mesh files: their names and temporary files are
+ * vg_sink's, in the library. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "output.h"
 #include "cli.h"
 

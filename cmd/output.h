@@ -9,7 +9,8 @@
 void output_check(bool stream);
 /* output_remove: the temporary file, if there is one. */
 void output_remove(void);
-/* output_abandon: leave nothing half-written: no temporary file, and no stream that only stops: it says who failed. */
+/* output_abandon: leave nothing half-written: no temporary file, and no stream that only stops: that says who
+ * failed. */
 void output_abandon(const char *program, int status, const char *message);
 /* output_discard: before the process ends in a way that is not ours. Safe in the handler of a signal. */
 void output_discard(void);

@@ -151,7 +151,8 @@ static void choose_kind(void)
         cli_usage("option '--%s' is about a sheet: the output is a page",
                   opts.frames ? "frames" : opts.columns ? "columns" : opts.size ? "size" : "silhouettes");
     if (!opts.page && opts.patches && (opts.against || opts.scales))
-        cli_usage("a sheet has one kind of colours: leave out --patches or --%s", opts.against ? "against" : "scales");
+        cli_usage("a sheet has one kind of colours: leave out --patches or --%s",
+                  opts.against ? "against" : "scales");
     if (!opts.page && opts.title) cli_usage("option '--title' is about a page: use -o FILE.html");
     if (!cli.output && isatty(STDOUT_FILENO))
         cli_usage("a %s is not written to a terminal: use -o FILE.html or -o FILE.png",

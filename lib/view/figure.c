@@ -11,16 +11,30 @@
 /* Around a vertex of more faces than this all are smoothed: comparing each with each would take too long. */
 enum { MOST_COMPARED = 64 };
 
+bool *vgi_drawn_vertices(const vg_mesh *m, vg_err *e)
+{
+    bool *drawn = vgi_array(m->nv, sizeof *drawn, e);
+    if (!drawn) return NULL;
+    for (size_t c = 0; c < vg_mesh_corners(m); c++) drawn[m->vert[c]] = true;
+    if (m->nf == 0) memset(drawn, 1, m->nv);
+    return drawn;
+}
+
+double vgi_ground_height(const bool *drawn, size_t nv, const double *points, bool z_up)
+{
+    double least = INFINITY;
+    for (size_t v = 0; v < nv; v++)
+        if (drawn[v]) least = fmin(least, points[3 * v + (z_up ? 2 : 1)]);
+    return isfinite(least) ? least : 0;
+}
+
 static void count_ring(vgi_figure *g)
 {
     const vg_mesh *m = g->mesh;
     for (size_t f = 0; f < m->nf; f++) {
         size_t n = m->start[f + 1] - m->start[f];
         if (n > g->max_corners) g->max_corners = n;
-        for (size_t c = m->start[f]; c < m->start[f + 1]; c++) {
-            g->drawn[m->vert[c]] = true;
-            if (n > 2) g->ring_start[m->vert[c] + 1]++;
-        }
+        for (size_t c = m->start[f]; n > 2 && c < m->start[f + 1]; c++) g->ring_start[m->vert[c] + 1]++;
     }
     for (size_t v = 0; v < m->nv; v++) g->ring_start[v + 1] += g->ring_start[v];
 }
@@ -41,14 +55,13 @@ int vgi_figure_init(vgi_figure *g, const vg_mesh *m, vg_err *e)
     *g = (vgi_figure){.mesh = m};
     g->ring_start = vgi_array(m->nv + 1, sizeof *g->ring_start, e);
     g->ring = vgi_array(vg_mesh_corners(m), sizeof *g->ring, e);
-    g->drawn = vgi_array(m->nv, sizeof *g->drawn, e);
+    g->drawn = vgi_drawn_vertices(m, e);
     if (!g->ring_start || !g->ring || !g->drawn) {
         vgi_figure_clear(g);
         return VG_ENOMEM;
     }
     count_ring(g);
     fill_ring(g);
-    if (m->nf == 0) memset(g->drawn, 1, m->nv);
     return VG_OK;
 }
 

@@ -20,7 +20,7 @@ enum {
 typedef struct sequence {
     const char *label;
     const vg_head *head;
-    bool *drawn;               /* nv: in a face, or all when there is no face */
+    bool *drawn;               /* nv: vertices that are seen */
     double centre[3], diagonal, unit, ground;
     vgi_track places, numbers;
     vgi_meter meter;
@@ -78,103 +78,13 @@ static int put_template(vg_page *p, const char *mark, vg_err *e)
     return r;
 }
 
-/* What is not ASCII in a text that is no UTF-8, such as the name of a file, becomes '?'. */
-static bool is_strange(const char *c, bool utf8)
-{
-    return (unsigned char)*c >= 0x80 && !utf8;
-}
-
 static int put_escaped(vg_page *p, const char *text, vg_err *e)
 {
-    int r = VG_OK;
-    bool utf8 = vgi_is_utf8(text, strlen(text));
-    for (const char *c = text; *c && r == VG_OK; c++) {
-        switch (is_strange(c, utf8) ? '?' : *c) {
-        case '<': r = put_text(p, "&lt;", e); break;
-        case '>': r = put_text(p, "&gt;", e); break;
-        case '&': r = put_text(p, "&amp;", e); break;
-        case '"': r = put_text(p, "&quot;", e); break;
-        case '?': r = put_text(p, "?", e); break;
-        default: r = put(p, c, 1, e);
-        }
-    }
+    vg_bytes b = {0};
+    int r = vgi_page_escape(&b, text, e);
+    if (r == VG_OK) r = put(p, b.data, b.size, e);
+    vg_bytes_clear(&b);
     return r;
-}
-
-/* JSON that may stand inside of a script element: no '<', so that nothing ends it. */
-static int json_string(vg_bytes *b, const char *text, vg_err *e)
-{
-    int r = vgi_bytes_append(b, "\"", 1, e);
-    bool utf8 = vgi_is_utf8(text, strlen(text));
-    for (const char *c = text; *c && r == VG_OK; c++) {
-        char code[8];
-        unsigned char u = (unsigned char)*c;
-        if (u < 0x20 || u == '"' || u == '\\' || u == '<' || u == 0x7f) {
-            snprintf(code, sizeof code, "\\u%04x", u);
-            r = vgi_bytes_append(b, code, 6, e);
-        } else {
-            r = vgi_bytes_append(b, is_strange(c, utf8) ? "?" : c, 1, e);
-        }
-    }
-    return r == VG_OK ? vgi_bytes_append(b, "\"", 1, e) : r;
-}
-
-static int json_text(vg_bytes *b, const char *text, vg_err *e)
-{
-    return vgi_bytes_append(b, text, strlen(text), e);
-}
-
-static int json_number(vg_bytes *b, double x, vg_err *e)
-{
-    char text[32];
-    return isfinite(x) ? vgi_bytes_append(b, text, vgi_print_double(text, x), e) : json_text(b, "null", e);
-}
-
-static int json_short(vg_bytes *b, double x, vg_err *e) /* to be shown */
-{
-    char text[32];
-    if (!isfinite((float)x)) return json_number(b, x, e);
-    return vgi_bytes_append(b, text, vgi_print_float(text, x), e);
-}
-
-/* Fields: the name, and what it is. */
-static int field(vg_bytes *b, const char *name, vg_err *e)
-{
-    bool first = b->size == 0 || b->data[b->size - 1] == '{';
-    int r = first ? VG_OK : vgi_bytes_append(b, ",", 1, e);
-    if (r == VG_OK) r = json_string(b, name, e);
-    return r == VG_OK ? vgi_bytes_append(b, ":", 1, e) : r;
-}
-
-static int field_text(vg_bytes *b, const char *name, const char *text, vg_err *e)
-{
-    int r = field(b, name, e);
-    return r == VG_OK ? json_string(b, text, e) : r;
-}
-
-static int field_number(vg_bytes *b, const char *name, double x, vg_err *e)
-{
-    int r = field(b, name, e);
-    return r == VG_OK ? json_number(b, x, e) : r;
-}
-
-static int field_flag(vg_bytes *b, const char *name, bool x, vg_err *e)
-{
-    int r = field(b, name, e);
-    return r == VG_OK ? json_text(b, x ? "true" : "false", e) : r;
-}
-
-static int field_list(vg_bytes *b, const char *name, const vg_bytes *open_list, vg_err *e)
-{
-    int r = field(b, name, e);
-    if (r == VG_OK) r = json_text(b, open_list->size ? "" : "[", e);
-    if (r == VG_OK) r = vgi_bytes_append(b, open_list->data, open_list->size, e);
-    return r == VG_OK ? json_text(b, "]", e) : r;
-}
-
-static int list_next(vg_bytes *list, vg_err *e)
-{
-    return json_text(list, list->size ? "," : "[", e);
 }
 
 /* A block of packed data. */
@@ -287,17 +197,12 @@ static int put_mesh(vg_page *p, size_t i, const vg_head *h, vg_err *e)
 static int measure(sequence *s, bool z_up, vg_err *e)
 {
     const vg_mesh *m = &s->head->mesh;
-    s->drawn = vgi_array(m->nv, sizeof *s->drawn, e);
+    s->drawn = vgi_drawn_vertices(m, e);
     if (!s->drawn) return VG_ENOMEM;
-    for (size_t c = 0; c < vg_mesh_corners(m); c++) s->drawn[m->vert[c]] = true;
-    for (size_t v = 0; m->nf == 0 && v < m->nv; v++) s->drawn[v] = true;
     vg_centroid(s->head->reference, m->nv, s->centre);
     s->diagonal = vg_diagonal(s->head->reference, m->nv);
     s->unit = s->diagonal > 0 ? s->diagonal : 1;
-    s->ground = INFINITY;
-    for (size_t v = 0; v < m->nv; v++)
-        if (s->drawn[v]) s->ground = fmin(s->ground, s->head->reference[3 * v + (z_up ? 2 : 1)]);
-    if (!isfinite(s->ground)) s->ground = 0;
+    s->ground = vgi_ground_height(s->drawn, m->nv, s->head->reference, z_up);
     return VG_OK;
 }
 
@@ -325,17 +230,17 @@ static int put_chunk(vg_page *p, size_t i, const char *what, vgi_track *t, vg_er
     snprintf(text, sizeof text,
              "<script type=\"text/plain\" data-sequence=\"%zu\" data-frames=\"%s\" data-count=\"%zu\" "
              "data-origin=\"", i, what, c->n);
-    r = json_text(&head, text, e);
+    r = vgi_page_raw(&head, text, e);
     for (size_t k = 0; k < t->width && r == VG_OK; k++) {
-        if (k) r = json_text(&head, " ", e);
-        if (r == VG_OK) r = json_number(&head, c->origin[k], e);
+        if (k) r = vgi_page_raw(&head, " ", e);
+        if (r == VG_OK) r = vgi_page_number(&head, c->origin[k], e);
     }
-    if (r == VG_OK) r = json_text(&head, "\" data-step=\"", e);
+    if (r == VG_OK) r = vgi_page_raw(&head, "\" data-step=\"", e);
     for (size_t k = 0; k < t->width && r == VG_OK; k++) {
-        if (k) r = json_text(&head, " ", e);
-        if (r == VG_OK) r = json_number(&head, c->step[k], e);
+        if (k) r = vgi_page_raw(&head, " ", e);
+        if (r == VG_OK) r = vgi_page_number(&head, c->step[k], e);
     }
-    if (r == VG_OK) r = json_text(&head, "\">", e);
+    if (r == VG_OK) r = vgi_page_raw(&head, "\">", e);
     if (r == VG_OK) r = put(p, head.data, head.size, e);
     if (r == VG_OK) r = put_packed(p, &c->packed, e);
     vg_bytes_clear(&head);
@@ -356,8 +261,8 @@ static int list_spread(sequence *s, const vgi_tint *t, const vgi_spread *x, vg_e
     const double numbers[3] = {x->mean, x->least, x->most};
     int r = VG_OK;
     for (int i = 0; i < 3 && r == VG_OK; i++) {
-        r = list_next(lists[i], e);
-        if (r == VG_OK) r = json_short(lists[i], vgi_tint_shown(t, numbers[i]), e);
+        r = vgi_page_next(lists[i], e);
+        if (r == VG_OK) r = vgi_page_short(lists[i], vgi_tint_shown(t, numbers[i]), e);
     }
     return r;
 }
@@ -396,14 +301,14 @@ static int add_numbers(vg_page *p, sequence *s, const vg_frame *f, const double 
 
 static int add_label(sequence *s, const vg_frame *f, vg_err *e)
 {
-    int r = list_next(&s->names, e);
-    if (r == VG_OK) r = json_string(&s->names, f->name, e);
+    int r = vgi_page_next(&s->names, e);
+    if (r == VG_OK) r = vgi_page_string(&s->names, f->name, e);
     /* times that do not grow are no times to play by */
     s->timed = s->timed && f->has_time && isfinite(f->time) && f->time > s->last_time;
     s->last_time = f->time;
     if (r < 0 || !s->timed) return r;
-    r = list_next(&s->times, e);
-    return r == VG_OK ? json_number(&s->times, f->time, e) : r;
+    r = vgi_page_next(&s->times, e);
+    return r == VG_OK ? vgi_page_number(&s->times, f->time, e) : r;
 }
 
 int vg_page_add(vg_page *p, size_t i, const vg_frame *f, const double *truth, vg_err *e)
@@ -502,22 +407,22 @@ static void end_tint(vg_page *p, vg_page_facts *facts)
 /* Who made the sequence: the command lines, in order. */
 static int json_provenance(vg_bytes *b, const vg_head *h, vg_err *e)
 {
-    int r = field(b, "provenance", e);
+    int r = vgi_page_field(b, "provenance", e);
     vg_bytes list = {0};
     for (size_t i = 0; i < h->nprovenance && r == VG_OK; i++) {
         const vg_provenance *p = h->provenance + i;
         vg_bytes line = {0};
         for (size_t j = 0; j < p->nargs && r == VG_OK; j++) {
-            if (j) r = json_text(&line, " ", e);
-            if (r == VG_OK) r = json_text(&line, p->args[j], e);
+            if (j) r = vgi_page_raw(&line, " ", e);
+            if (r == VG_OK) r = vgi_page_raw(&line, p->args[j], e);
         }
         if (r == VG_OK) r = vgi_bytes_append(&line, "", 1, e);
-        if (r == VG_OK) r = list_next(&list, e);
-        if (r == VG_OK) r = json_string(&list, (char *)line.data, e);
+        if (r == VG_OK) r = vgi_page_next(&list, e);
+        if (r == VG_OK) r = vgi_page_string(&list, (char *)line.data, e);
         vg_bytes_clear(&line);
     }
-    if (r == VG_OK && !list.size) r = json_text(&list, "[", e);
-    if (r == VG_OK) r = json_text(&list, "]", e);
+    if (r == VG_OK && !list.size) r = vgi_page_raw(&list, "[", e);
+    if (r == VG_OK) r = vgi_page_raw(&list, "]", e);
     if (r == VG_OK) r = vgi_bytes_append(b, list.data, list.size, e);
     vg_bytes_clear(&list);
     return r;
@@ -535,26 +440,26 @@ static int json_sequence(vg_bytes *b, const vg_page *p, size_t i, vg_err *e)
     const sequence *frame = frame_of(p, s);
     const vg_mesh *m = &s->head->mesh;
     vg_bytes centre = {0};
-    int r = json_text(b, i ? ",{" : "{", e);
-    if (r == VG_OK) r = field_text(b, "label", s->label, e);
-    if (r == VG_OK) r = field_number(b, "vertices", (double)m->nv, e);
-    if (r == VG_OK) r = field_number(b, "faces", (double)m->nf, e);
-    if (r == VG_OK) r = field_number(b, "patches", (double)s->head->patches.n, e);
-    if (r == VG_OK) r = field_number(b, "diagonal", frame->diagonal, e);
+    int r = vgi_page_raw(b, i ? ",{" : "{", e);
+    if (r == VG_OK) r = vgi_page_field_text(b, "label", s->label, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "vertices", (double)m->nv, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "faces", (double)m->nf, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "patches", (double)s->head->patches.n, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "diagonal", frame->diagonal, e);
     for (int k = 0; k < 3 && r == VG_OK; k++) {
-        r = list_next(&centre, e);
-        if (r == VG_OK) r = json_number(&centre, frame->centre[k], e);
+        r = vgi_page_next(&centre, e);
+        if (r == VG_OK) r = vgi_page_number(&centre, frame->centre[k], e);
     }
-    if (r == VG_OK) r = field_list(b, "centre", &centre, e);
-    if (r == VG_OK) r = field_number(b, "ground", frame->ground, e);
-    if (r == VG_OK) r = field_number(b, "loss", s->loss / frame->unit, e);
+    if (r == VG_OK) r = vgi_page_field_list(b, "centre", &centre, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "ground", frame->ground, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "loss", s->loss / frame->unit, e);
     if (r == VG_OK) r = json_provenance(b, s->head, e);
-    if (r == VG_OK) r = field_list(b, "names", &s->names, e);
-    if (r == VG_OK && s->timed) r = field_list(b, "times", &s->times, e);
-    if (r == VG_OK && s->tinted) r = field_list(b, "means", &s->means, e);
-    if (r == VG_OK && s->tinted) r = field_list(b, "minima", &s->minima, e);
-    if (r == VG_OK && s->tinted) r = field_list(b, "maxima", &s->maxima, e);
-    if (r == VG_OK) r = json_text(b, "}", e);
+    if (r == VG_OK) r = vgi_page_field_list(b, "names", &s->names, e);
+    if (r == VG_OK && s->timed) r = vgi_page_field_list(b, "times", &s->times, e);
+    if (r == VG_OK && s->tinted) r = vgi_page_field_list(b, "means", &s->means, e);
+    if (r == VG_OK && s->tinted) r = vgi_page_field_list(b, "minima", &s->minima, e);
+    if (r == VG_OK && s->tinted) r = vgi_page_field_list(b, "maxima", &s->maxima, e);
+    if (r == VG_OK) r = vgi_page_raw(b, "}", e);
     vg_bytes_clear(&centre);
     return r;
 }
@@ -572,7 +477,7 @@ static int json_map(vg_bytes *b, bool diverging, vg_err *e)
                  vgi_encode(palette, c[2]));
     }
     free(palette);
-    return field_text(b, "map", text, e);
+    return vgi_page_field_text(b, "map", text, e);
 }
 
 /* What the colours of the page say, and where they end; numbers of scales are logarithms to base 2. */
@@ -582,41 +487,41 @@ static int json_tint(vg_bytes *b, const vg_page *p, vg_err *e)
     char title[256];
     const vgi_tint *t = &p->tint;
     vgi_tint_title(t, 0, title, sizeof title);
-    int r = field(b, "tint", e);
-    if (r == VG_OK) r = json_text(b, "{", e);
-    if (r == VG_OK) r = field_text(b, "kind", kinds[t->what], e);
-    if (r == VG_OK) r = field_text(b, "title", title, e);
-    if (r == VG_OK) r = field_text(b, "unit", t->what == VG_TINT_ERRORS ? "D" : t->unit ? t->unit : "", e);
-    if (r == VG_OK) r = field_number(b, "low", t->low, e);
-    if (r == VG_OK) r = field_number(b, "high", t->high, e);
-    if (r == VG_OK) r = field_flag(b, "diverging", t->diverging, e);
-    return r == VG_OK ? json_text(b, "}", e) : r;
+    int r = vgi_page_field(b, "tint", e);
+    if (r == VG_OK) r = vgi_page_raw(b, "{", e);
+    if (r == VG_OK) r = vgi_page_field_text(b, "kind", kinds[t->what], e);
+    if (r == VG_OK) r = vgi_page_field_text(b, "title", title, e);
+    if (r == VG_OK) r = vgi_page_field_text(b, "unit", t->what == VG_TINT_ERRORS ? "D" : t->unit ? t->unit : "", e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "low", t->low, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "high", t->high, e);
+    if (r == VG_OK) r = vgi_page_field_flag(b, "diverging", t->diverging, e);
+    return r == VG_OK ? vgi_page_raw(b, "}", e) : r;
 }
 
 static int json_page(vg_bytes *b, const vg_page *p, const vg_page_facts *facts, vg_err *e)
 {
-    int r = json_text(b, "{", e);
-    if (r == VG_OK) r = field_text(b, "version", VG_VERSION, e);
-    if (r == VG_OK) r = field_text(b, "title", p->o.title, e);
-    if (r == VG_OK) r = field_number(b, "azimuth", p->o.azimuth, e);
-    if (r == VG_OK) r = field_number(b, "elevation", p->o.elevation, e);
-    if (r == VG_OK) r = field_flag(b, "zUp", p->o.z_up, e);
-    if (r == VG_OK) r = field_flag(b, "follow", p->o.follow, e);
-    if (r == VG_OK) r = field_flag(b, "edges", p->o.edges, e);
-    if (r == VG_OK) r = field_flag(b, "ground", p->o.ground, e);
-    if (r == VG_OK) r = field_number(b, "zoom", p->o.zoom > 0 ? p->o.zoom : 1, e);
-    if (r == VG_OK) r = field_flag(b, "patches", p->o.tint != VG_TINT_PLAIN, e);
+    int r = vgi_page_raw(b, "{", e);
+    if (r == VG_OK) r = vgi_page_field_text(b, "version", VG_VERSION, e);
+    if (r == VG_OK) r = vgi_page_field_text(b, "title", p->o.title, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "azimuth", p->o.azimuth, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "elevation", p->o.elevation, e);
+    if (r == VG_OK) r = vgi_page_field_flag(b, "zUp", p->o.z_up, e);
+    if (r == VG_OK) r = vgi_page_field_flag(b, "follow", p->o.follow, e);
+    if (r == VG_OK) r = vgi_page_field_flag(b, "edges", p->o.edges, e);
+    if (r == VG_OK) r = vgi_page_field_flag(b, "ground", p->o.ground, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "zoom", p->o.zoom > 0 ? p->o.zoom : 1, e);
+    if (r == VG_OK) r = vgi_page_field_flag(b, "patches", p->o.tint != VG_TINT_PLAIN, e);
     if (r == VG_OK && facts->tinted) r = json_tint(b, p, e);
-    if (r == VG_OK) r = field_flag(b, "centred", p->o.centred, e);
-    if (r == VG_OK) r = field_number(b, "scale", facts->scale, e);
-    if (r == VG_OK) r = field_number(b, "mean", facts->mean, e);
-    if (r == VG_OK) r = field_number(b, "least", facts->least, e);
-    if (r == VG_OK) r = field_number(b, "max", facts->max, e);
+    if (r == VG_OK) r = vgi_page_field_flag(b, "centred", p->o.centred, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "scale", facts->scale, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "mean", facts->mean, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "least", facts->least, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "max", facts->max, e);
     if (r == VG_OK) r = json_map(b, p->tint.diverging, e);
-    if (r == VG_OK) r = field(b, "sequences", e);
-    if (r == VG_OK) r = json_text(b, "[", e);
+    if (r == VG_OK) r = vgi_page_field(b, "sequences", e);
+    if (r == VG_OK) r = vgi_page_raw(b, "[", e);
     for (size_t i = 0; i < p->n && r == VG_OK; i++) r = json_sequence(b, p, i, e);
-    return r == VG_OK ? json_text(b, "]}", e) : r;
+    return r == VG_OK ? vgi_page_raw(b, "]}", e) : r;
 }
 
 static int put_remaining(vg_page *p, vg_page_facts *facts, vg_err *e)

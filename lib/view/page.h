@@ -1,4 +1,4 @@
-/* page.h: what the files of the page share: numbers packed into text, and the page's own texts.
+/* page.h: what the files of the page share: numbers packed into text, JSON, and the page's own texts.
  * Internal; the page a C program may ask for is vg_page in vg.h.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_PAGE_H
@@ -43,6 +43,23 @@ int vgi_track_pack(vgi_track *t, vgi_chunk *c, vg_err *e) VG_MUST_CHECK;
 int vgi_pack_list(vg_bytes *packed, const uint32_t *list, size_t n, bool differences, vg_err *e) VG_MUST_CHECK;
 /* vgi_base64: append n bytes as text; n is a multiple of 3 unless they are the last. */
 int vgi_base64(vg_bytes *text, const unsigned char *data, size_t n, vg_err *e) VG_MUST_CHECK;
+
+/* ---- page_json.c: text appended to b. What is no UTF-8 loses all that is not ASCII. ---- */
+
+int vgi_page_escape(vg_bytes *b, const char *text, vg_err *e) VG_MUST_CHECK; /* for HTML, also between quotes */
+/* JSON that may stand inside of a script element: no '<', so that nothing ends it. */
+int vgi_page_raw(vg_bytes *b, const char *text, vg_err *e) VG_MUST_CHECK; /* as it is */
+int vgi_page_string(vg_bytes *b, const char *text, vg_err *e) VG_MUST_CHECK;
+int vgi_page_number(vg_bytes *b, double x, vg_err *e) VG_MUST_CHECK; /* all digits; null when it is not finite */
+int vgi_page_short(vg_bytes *b, double x, vg_err *e) VG_MUST_CHECK;  /* as many digits as are worth being shown */
+/* The next field of an object: its name alone, or with its value. */
+int vgi_page_field(vg_bytes *b, const char *name, vg_err *e) VG_MUST_CHECK;
+int vgi_page_field_text(vg_bytes *b, const char *name, const char *text, vg_err *e) VG_MUST_CHECK;
+int vgi_page_field_number(vg_bytes *b, const char *name, double x, vg_err *e) VG_MUST_CHECK;
+int vgi_page_field_flag(vg_bytes *b, const char *name, bool x, vg_err *e) VG_MUST_CHECK;
+/* open_list: what vgi_page_next has begun, an element behind each; without elements it is empty. */
+int vgi_page_field_list(vg_bytes *b, const char *name, const vg_bytes *open_list, vg_err *e) VG_MUST_CHECK;
+int vgi_page_next(vg_bytes *list, vg_err *e) VG_MUST_CHECK;
 
 /* ---- page_text.c, which the Makefile makes of page.html, page.css and page.js; each ends with a 0 ---- */
 

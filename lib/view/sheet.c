@@ -101,10 +101,7 @@ static void measure_reference(sequence *q, const double *reference, bool z_up)
     q->diagonal = vg_diagonal(reference, nv);
     q->unit = q->diagonal > 0 ? q->diagonal : 1;
     vg_centroid(reference, nv, q->origin);
-    double least = INFINITY;
-    for (size_t v = 0; v < nv; v++)
-        if (q->figure.drawn[v]) least = fmin(least, reference[3 * v + vertical]);
-    q->ground_height = isfinite(least) ? (least - q->origin[vertical]) / q->unit : 0;
+    q->ground_height = (vgi_ground_height(q->figure.drawn, nv, reference, z_up) - q->origin[vertical]) / q->unit;
 }
 
 int vg_sheet_sequence(vg_sheet *s, const char *label, const vg_head *h, const vg_head *truth, vg_err *e)

@@ -16,7 +16,7 @@ typedef struct vgi_figure {
     const vg_mesh *mesh;    /* borrowed */
     uint32_t *ring_start;   /* nv + 1: the faces of 3 or more around a vertex are */
     uint32_t *ring;         /* ring[ring_start[v]] .. ring[ring_start[v + 1] - 1] */
-    bool *drawn;            /* nv: vertices that are seen: those in a face, or all when there is no face */
+    bool *drawn;            /* nv: vertices that are seen */
     size_t max_corners;
     size_t nsides;          /* made by vgi_figure_sides */
     struct vgi_side *side;  /* by their vertices */
@@ -33,6 +33,11 @@ typedef struct vgi_side { /* of a face of 3 or more */
 int vgi_figure_sides(vgi_figure *g, vg_err *e) VG_MUST_CHECK;
 int vgi_figure_init(vgi_figure *g, const vg_mesh *m, vg_err *e) VG_MUST_CHECK;
 void vgi_figure_clear(vgi_figure *g);
+
+/* vgi_drawn_vertices: which of nv are seen: those in a face, or all when there is no face; free(). */
+bool *vgi_drawn_vertices(const vg_mesh *m, vg_err *e);
+/* vgi_ground_height: of the lowest of them, along the vertical; 0: there are none. */
+double vgi_ground_height(const bool *drawn, size_t nv, const double *points, bool z_up);
 
 /* vgi_figure_normals: a unit normal per corner: the mean of the faces around the vertex, by area, that turn less
  * than the crease angle from the corner's own face. points: nv, any unit. face: 3 * nf work; normals: 3 * corners
