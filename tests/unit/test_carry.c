@@ -207,6 +207,111 @@ static void degenerate_sources_are_counted(void)
     vg_head_clear(&target);
 }
 
+/* Cycles of the target that begin elsewhere: corners find one another by where they are. */
+static void cycles_find_their_beginning(void)
+{
+    vg_head source = make_rod(9, 7, false), target = make_rod(9, 7, false);
+    for (size_t f = 0; f < target.mesh.nf; f++) {
+        uint32_t begin = target.mesh.start[f], r = target.mesh.start[f + 1] - begin;
+        for (uint32_t i = 0; i < r; i++) target.mesh.vert[begin + i] = source.mesh.vert[begin + (i + f) % r];
+    }
+    vg_correspondence k = identity_pairs(&source.mesh);
+    k.target_digest = vg_mesh_digest(&target.mesh);
+    double *pose = warp(source.reference, source.mesh.nv, 0.3);
+    for (int i = 0; i < 3; i++) {
+        carried r = carry(&source, &target, &k, pose, methods[i], 1);
+        double *truth = vectors_of(r.g, pose);
+        CHECK_NEAR(farthest(truth, r.vectors, vg_graph_corners(r.g)), 0, 1e-12 * vg_diagonal(pose, source.mesh.nv));
+        free(truth);
+        carried_clear(&r);
+    }
+    free(pose);
+    vg_correspondence_clear(&k);
+    vg_head_clear(&source);
+    vg_head_clear(&target);
+}
+
+/* Two rings that turn against one another and part; the target is twice as large. Its link takes the mean of both
+ * turns, and what the rings do beyond that: w0 - w1 = D (r0 - r1) + 2 ((c0' - c1') - D (c0 - c1)), c the middle of
+ * the source's faces around an end. */
+static void links_follow_both_ends(void)
+{
+    vg_head source = new_shape(), target = new_shape();
+    for (vg_head *h = &source; h; h = h == &source ? &target : NULL) {
+        add_torus(h, 9, 6, (double[3]){0, 0, 0});
+        add_torus(h, 9, 6, (double[3]){3, 1, 0.5});
+    }
+    size_t nv = source.mesh.nv, ring = nv / 2;
+    for (size_t i = 0; i < 3 * nv; i++) target.reference[i] *= 2;
+    motion t[2] = {turn(0.7, 1, 0.2), turn(-0.4, 1, -0.6)};
+    double *pose = room(3 * nv, sizeof *pose);
+    for (size_t v = 0; v < nv; v++) {
+        move_vector(&t[v >= ring], source.reference + 3 * v, pose + 3 * v);
+        for (size_t i = 0; i < 3; i++) pose[3 * v + i] += t[v >= ring].shift[i];
+    }
+    vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 2, true); /* two: no corners are paired */
+    for (uint32_t f = 0; f < source.mesh.nf; f++) k.source[2 * f] = k.source[2 * f + 1] = f;
+    carried r = carry(&source, &target, &k, pose, VG_BY_GRADIENT, 1);
+    CHECK(r.g->nlinks == 1);
+    const uint32_t *end = r.g->vert + r.g->start[r.g->nf - 1];
+    const double *w = r.vectors + 3 * (size_t)r.g->start[r.g->nf - 1];
+    double c[2][2][3] = {{{0}}}; /* of both ends: before, now */
+    for (int n = 0; n < 2; n++)
+        for (size_t f = 0, faces = 4; f < source.mesh.nf; f++) {
+            const uint32_t *vert = source.mesh.vert + 4 * f;
+            if (vert[0] != end[n] && vert[1] != end[n] && vert[2] != end[n] && vert[3] != end[n]) continue;
+            for (size_t i = 0; i < 12; i++) {
+                c[n][0][i % 3] += source.reference[3 * (size_t)vert[i / 3] + i % 3] / (4.0 * (double)faces);
+                c[n][1][i % 3] += pose[3 * (size_t)vert[i / 3] + i % 3] / (4.0 * (double)faces);
+            }
+        }
+    for (size_t i = 0; i < 3; i++) {
+        double wanted = 2 * (c[0][1][i] - c[1][1][i]);
+        for (size_t j = 0; j < 3; j++) {
+            double D = (t[0].m[3 * i + j] + t[1].m[3 * i + j]) / 2, apart = c[0][0][j] - c[1][0][j];
+            wanted += D * (target.reference[3 * end[0] + j] - target.reference[3 * end[1] + j] - 2 * apart);
+        }
+        CHECK_NEAR(w[i] - w[3 + i], wanted, 1e-12);
+        CHECK_NEAR(w[i] + w[3 + i], 0, 1e-12);
+    }
+    free(pose);
+    vg_correspondence_clear(&k);
+    carried_clear(&r);
+    vg_head_clear(&source);
+    vg_head_clear(&target);
+}
+
+/* A source face that is a point in a pose drives nothing there: the other one does. */
+static void points_drive_nothing(void)
+{
+    vg_head source = new_shape(), target = new_shape();
+    for (uint32_t i = 0; i < 2; i++) {
+        add_vertex(&source, 0, 3 * i, 0), add_vertex(&source, 1, 3 * i, 0), add_vertex(&source, 0, 3 * i + 1, 0.2);
+        FACE(&source, 3 * i, 3 * i + 1, 3 * i + 2);
+    }
+    add_vertex(&target, 0, 0, 0), add_vertex(&target, 1, 0, 1), add_vertex(&target, 0, 1, 0);
+    FACE(&target, 0, 1, 2);
+    motion t = turn(0.9, 1, 0);
+    double *pose = move_points(&t, source.reference, 6);
+    memcpy(pose + 12, pose + 9, 3 * sizeof *pose);
+    memcpy(pose + 15, pose + 9, 3 * sizeof *pose);
+    vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 2, true);
+    k.source[0] = 0, k.source[1] = 1;
+    for (int i = 0; i < 3; i++) {
+        carried r = carry(&source, &target, &k, pose, methods[i], 1);
+        for (size_t c = 0; c < 3; c++) {
+            double w[3];
+            move_vector(&t, r.expected + 3 * c, w);
+            for (size_t a = 0; a < 3; a++) CHECK_NEAR(r.vectors[3 * c + a], w[a], 1e-12);
+        }
+        carried_clear(&r);
+    }
+    free(pose);
+    vg_correspondence_clear(&k);
+    vg_head_clear(&source);
+    vg_head_clear(&target);
+}
+
 static void other_meshes_are_refused(void)
 {
     vg_head a = make_torus(6, 5), b = make_torus(5, 6);
@@ -253,14 +358,15 @@ static void polar_finds_the_rotation(void)
 
 static double determinant(const double m[9])
 {
-    return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+    return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+           m[2] * (m[3] * m[7] - m[4] * m[6]);
 }
 
 /* What opposite turns leave of one another when they are averaged: flat, thin, inside out, nothing. It is a rotation
  * all the same, and of all rotations none is nearer; a sound matrix in the next lane is not disturbed. */
 static void polar_of_what_cancels(void)
 {
-    static const double left[VGI_LANES][3] = {{1, 0, 0},   {1, 1, 0},       {0, 0, 0},       {-1. / 3, -1. / 3, -1. / 3},
+    static const double left[VGI_LANES][3] = {{1, 0, 0}, {1, 1, 0}, {0, 0, 0}, {-1. / 3, -1. / 3, -1. / 3},
                                               {1, 1, -.5}, {.2, 1e-9, -.1}, {1, -1e-14, .5}, {2, 1, .5}};
     vgi_map a, r;
     double m[VGI_LANES][9];
@@ -319,7 +425,7 @@ static void a_fold_is_finite(void)
                     d2 += r.vectors[x] * r.vectors[x], w2 += r.expected[x] * r.expected[x];
                 if (matched) CHECK(d2 <= w2 * (1 + 1e-12)); /* a mean of turns stretches nothing */
                 else CHECK_NEAR(d2, w2, 1e-12);
-                CHECK_NEAR(r.vectors[3 * c], r.expected[3 * c], matched ? 1 : 1e-12); /* the crease is on the x axis */
+                CHECK_NEAR(r.vectors[3 * c], r.expected[3 * c], matched ? 1 : 1e-12); /* along the crease */
             }
             carried_clear(&r);
         }
@@ -424,6 +530,8 @@ TESTS({"a turning source turns every target", rotation_passes},
       {"unmatched faces are rigid", unmatched_is_rigid},
       {"the thread count changes no bit", threads_do_not_matter},
       {"degenerate source faces are counted and drive nothing", degenerate_sources_are_counted},
+      {"cycles find their beginning", cycles_find_their_beginning},
+      {"links follow both ends", links_follow_both_ends}, {"points drive nothing", points_drive_nothing},
       {"a correspondence of other meshes is refused", other_meshes_are_refused},
       {"the polar rotation of R S is R", polar_finds_the_rotation},
       {"the polar rotation of what is no rotation is one", polar_of_what_cancels},

@@ -305,7 +305,8 @@ static void other_bodies(void)
     }
 }
 
-/* Larger and smaller than the blocks of the factorisation, against elimination; what is not definite is said to be so. */
+/* Larger and smaller than the blocks of the factorisation, against elimination; what is not definite is said to be
+ * so. */
 static void dense_systems(void)
 {
     static const size_t sizes[] = {1, 3, 64, 65, 150};
@@ -369,16 +370,16 @@ static void patches_are_measured(void)
     vg_head_clear(&h);
 }
 
-/* A vertex in no face goes with the patch whose centre is nearest; a second component with the patch at the end of its
- * link. */
+/* A vertex in no face goes with the patch whose centre is nearest; a second component with the patch at the end of
+ * its link. */
 static void what_hangs_loose(void)
 {
     vg_head h = make_body(5);
     vg_err e;
     double end = h.reference[3 * h.mesh.nv - 1];
     add_vertex(&h, 0, 1.7, end - 2);
-    uint32_t loose = (uint32_t)h.mesh.nv - 1, a = add_vertex(&h, 0, 0, end + 0.4), b = add_vertex(&h, 0.3, 0, end + 0.4),
-             c = add_vertex(&h, 0, 0.3, end + 0.5);
+    uint32_t loose = (uint32_t)h.mesh.nv - 1, a = add_vertex(&h, 0, 0, end + 0.4),
+             b = add_vertex(&h, 0.3, 0, end + 0.4), c = add_vertex(&h, 0, 0.3, end + 0.5);
     uint32_t *of_face = room(h.mesh.nf + 1, sizeof *of_face);
     memcpy(of_face, h.patches.of_face, h.mesh.nf * sizeof *of_face);
     FACE(&h, a, b, c);

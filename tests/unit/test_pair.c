@@ -1,7 +1,6 @@
-/* test_pair.c: which source faces drive which target faces, of surfaces that lie on one another: averages, leftovers,
- * borders, holes, folds, strangers, and bones, each against what the layout says. Lengths are those of vgi_pair: 1 is the
- * target's D.
- * SPDX-License-Identifier: GPL-3.0-or-later */
+/* test_pair.c: which source faces drive which target faces, of surfaces that lie on one another: averages,
+ * leftovers, borders, holes, folds, strangers, and bones, each against what the layout says. Lengths are those of
+ * vgi_pair: 1 is the target's D. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
 #include "method/register.h"
 
@@ -171,8 +170,8 @@ static void holes_ride_with_their_rim(void)
     close_all(&c, &source, &target);
 }
 
-/* A component of which a few faces happen to lie on the source is a stranger all the same: all of it is driven alike, by
- * what drives the four matched faces that are nearest to it. */
+/* A component of which a few faces happen to lie on the source is a stranger all the same: all of it is driven
+ * alike, by what drives the four matched faces that are nearest to it. */
 static void strangers_are_rigid(void)
 {
     enum { N = 10, STRIP = 9 };

@@ -647,7 +647,8 @@ static void joints_go_with_their_own(void)
     vg_rig_fitter *f = fit(&x, VG_RIG_LBS, 1, 0, 1);
     vg_rig_fitter_free(&f);
     double *target = room(3 * nv, sizeof *target), positions[3 * JOINTS], turned_to[4 * JOINTS];
-    for (size_t i = 0; i < 3 * nv; i++) target[i] = (i < 3 * limb ? 2 : 1) * x.h.reference[i] + (i >= 3 * limb ? 9 : 0);
+    for (size_t i = 0; i < 3 * nv; i++)
+        target[i] = i < 3 * limb ? 2 * x.h.reference[i] : x.h.reference[i] + 9;
     CHECK(vg_map_retarget(&x.h, target, 1, 1, &e) == VG_OK);
     for (size_t i = 3; i < 9; i++) /* knee and foot are in the limb */
         CHECK_NEAR(x.h.rig.at[i], 2 * x.positions[0][i], 0.05);
@@ -750,7 +751,8 @@ TESTS({"rigid bodies are met", rigid_bodies_are_met}, {"weights are found again"
       {"a rig is learned from poses alone", a_rig_is_learned_from_poses_alone},
       {"the map is its chain", the_map_is_its_chain}, {"refinement brings nearer", refinement_brings_nearer},
       {"the root is found", the_root_is_found},
-      {"the root is found among others", the_root_is_found_among_others}, {"other skeletons drive", other_skeletons_drive},
+      {"the root is found among others", the_root_is_found_among_others},
+      {"other skeletons drive", other_skeletons_drive},
       {"a line leaves nothing to chance", a_line_leaves_nothing_to_chance},
       {"edits turn what hangs on a bone", edits_turn_what_hangs_on_a_bone},
       {"rotations alone say where bones are", rotations_alone_say_where_bones_are},

@@ -144,8 +144,8 @@ static void pieces(void)
     free(shared);
 }
 
-/* A fan of a hundred and thirty triangles around a hub, in three sectors: a pair shares the hub and the vertex on the rim
- * between them; those whose faces come last are no worse off. */
+/* A fan of a hundred and thirty triangles around a hub, in three sectors: a pair shares the hub and the vertex on
+ * the rim between them; those whose faces come last are no worse off. */
 static void sectors_meet(void)
 {
     enum { RIM = 130 };
@@ -293,8 +293,8 @@ static void groups_are_found(void)
     }
 }
 
-/* Half of the faces turned by a few degrees one way, half the other way: one patch has this angle, whether features are
- * kept as they are or folded; and so it is where folding without signs would add up. */
+/* Half of the faces turned by a few degrees one way, half the other way: one patch has this angle, whether features
+ * are kept as they are or folded; and so it is where folding without signs would add up. */
 static void angles_are_kept(void)
 {
     enum { N = 600 };
@@ -363,7 +363,8 @@ static void patches_are_around_their_means(void)
             size_t best = 0;
             for (size_t k = 0; k < K; k++) {
                 double d = 0;
-                for (size_t i = 0; i < 9 * POSES; i++) d += pow(feature[9 * POSES * f + i] - mean[k][i] / count[k], 2);
+                for (size_t i = 0; i < 9 * POSES; i++)
+                    d += pow(feature[9 * POSES * f + i] - mean[k][i] / count[k], 2);
                 if (d < least) least = d, best = k;
             }
             astray += best != p.of_face[f];
@@ -375,7 +376,8 @@ static void patches_are_around_their_means(void)
     }
 }
 
-/* What the sum of squared distances of members from their means grows by when two sets are joined: from the members. */
+/* What the sum of squared distances of members from their means grows by when two sets are joined: from the members.
+ * */
 static double growth(const double *x, const double *count, const uint32_t *set, size_t n, uint32_t a, uint32_t b)
 {
     double square[3] = {0, 0, 0};
