@@ -435,7 +435,7 @@ static void joints_are_found(void)
         CHECK(vg_map_fitter_add(f, 1, poses, &e) == VG_OK);
     }
     CHECK(vg_map_fitter_finish(f, &e) == VG_OK && h.map.njoints == 1);
-    /* nearly: the halves share a ring of vertices, so the lower one is not quite rigid; the ring's middle is 3.1 away */
+    /* nearly: the halves share a ring, so the lower one is not quite rigid; the middle of the ring is 3.1 away */
     CHECK(farthest(h.map.joint_at, hinge, 1) < 1);
     played x = open_player(&h, false, 1);
     measure(&x, pose);

@@ -2,6 +2,7 @@
  * its uncollapsed chain, other skeletons drive it, and edits, joints of vertices and other bodies.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
+#include "method/skin.h"
 
 enum { JOINTS = 5, BONES = 4, POSES = 9 };
 static const double LENGTH = 3;
@@ -385,6 +386,60 @@ static void the_map_is_its_chain(void)
     }
 }
 
+/* Without poses a vertex goes with the bone that it is beside. */
+static void near_bones(void)
+{
+    stage x;
+    vg_err e;
+    set_stage(&x, make_limb(), 40);
+    CHECK(vgi_skin_near(&x.h.rig, x.h.mesh.nv, x.h.reference, &e) == VG_OK);
+    for (size_t v = 0; v < x.h.mesh.nv; v++) {
+        double at = x.h.reference[3 * v + 2] / LENGTH;
+        CHECK(x.h.rig.skin_weight[VG_SKIN * v] == 1 && x.h.rig.skin_weight[VG_SKIN * v + 1] == 0);
+        if (fabs(at - round(at)) > 1e-6)
+            CHECK(x.h.rig.skin_bone[VG_SKIN * v] == (uint32_t)fmin(BONES - 1, floor(at)));
+    }
+    strike(&x);
+}
+
+/* However few vertices are to be held: some of each component are. */
+static void every_component_is_held(void)
+{
+    stage x;
+    vg_err e;
+    vg_rig_fitter *f;
+    const vg_rig_options o = {1, 0, 0, 1};
+    set_stage(&x, make_beads(), 40);
+    size_t each = x.h.mesh.nv / BONES, held[BONES] = {0};
+    paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0);
+    skin_poses(&x);
+    CHECK(vg_rig_fitter_new(&f, &x.h, &o, &e) == VG_OK);
+    vg_rig_fitter_add(f, POSES, (const double *const *)x.poses, (const double *const *)x.transforms);
+    CHECK(vg_rig_fitter_finish(f, VG_RIG_ENVELOPE, &e) == VG_OK);
+    for (size_t i = 0; i < x.h.map.nheld; i++) held[x.h.map.held[i] / each]++;
+    for (size_t b = 0; b < BONES; b++) CHECK(held[b] > 0);
+    vg_rig_fitter_free(&f);
+    strike(&x);
+}
+
+/* Where skin is blended two bones for a corner come nearer than one. */
+static void two_bones_come_nearer(void)
+{
+    double miss[3];
+    for (size_t per = 1; per <= 2; per++) {
+        stage x;
+        meshes_state = 11;
+        set_stage(&x, make_limb(), 40);
+        paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.4);
+        skin_poses(&x);
+        vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, per, 0, 1);
+        miss[per] = misses(&x);
+        vg_rig_fitter_free(&f);
+        strike(&x);
+    }
+    CHECK(miss[2] < 0.5 * miss[1]);
+}
+
 static void refinement_brings_nearer(void)
 {
     double miss[2];
@@ -749,7 +804,9 @@ TESTS({"rigid bodies are met", rigid_bodies_are_met}, {"weights are found again"
       {"a bone without vertices goes with its parent", a_bone_without_vertices_goes_with_its_parent},
       {"units do not matter", units_do_not_matter},
       {"a rig is learned from poses alone", a_rig_is_learned_from_poses_alone},
-      {"the map is its chain", the_map_is_its_chain}, {"refinement brings nearer", refinement_brings_nearer},
+      {"the map is its chain", the_map_is_its_chain}, {"near bones", near_bones},
+      {"every component is held", every_component_is_held}, {"two bones come nearer", two_bones_come_nearer},
+      {"refinement brings nearer", refinement_brings_nearer},
       {"the root is found", the_root_is_found},
       {"the root is found among others", the_root_is_found_among_others},
       {"other skeletons drive", other_skeletons_drive},
