@@ -1,6 +1,6 @@
 /* memory.c: allocation with checked sizes, growing bytes, and the two scans of raw memory that input needs.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "core/core.h"
+#include "core/lanes.h"
 
 #include <stdlib.h>
 
@@ -103,15 +103,40 @@ bool vgi_is_utf8(const char *s, size_t n)
     return true;
 }
 
+/* x - x is 0 for finite x and NaN for others; bits are or-ed so that the loop needs no branch. */
+static inline __attribute__((always_inline)) bool all_finite(const double *x, size_t n)
+{
+    vgi_mask bad = {0};
+    for (; n >= VGI_LANES; n -= VGI_LANES, x += VGI_LANES) {
+        vgi_lanes a;
+        memcpy(&a, x, sizeof a);
+        bad |= (vgi_mask)(a - a);
+    }
+    vgi_lanes rest = {0};
+    if (n) memcpy(&rest, x, n * sizeof *x);
+    bad |= (vgi_mask)(rest - rest);
+    int64_t bits = 0;
+    for (int i = 0; i < VGI_LANES; i++) bits |= bad[i];
+    return bits == 0;
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx512f"))) static bool finite_avx512(const double *x, size_t n)
+{
+    return all_finite(x, n);
+}
+
+__attribute__((target("avx2"))) static bool finite_avx2(const double *x, size_t n)
+{
+    return all_finite(x, n);
+}
+#endif
+
 bool vgi_finite(const double *x, size_t n)
 {
-    /* x - x is 0 for finite x and NaN for others; bits are or-ed so that the loop needs no branch and vectorises */
-    uint64_t bad = 0;
-    for (size_t i = 0; i < n; i++) {
-        double zero = x[i] - x[i];
-        uint64_t bits;
-        memcpy(&bits, &zero, sizeof bits);
-        bad |= bits;
-    }
-    return bad == 0;
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx512f")) return finite_avx512(x, n);
+    if (__builtin_cpu_supports("avx2")) return finite_avx2(x, n);
+#endif
+    return all_finite(x, n);
 }
