@@ -3,44 +3,13 @@
  * Leaves out vertices, and where the indices go in a file (gltf_write.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
-
-enum { MOST_CLIPPED = 512 };
+#include "io/polygon.h"
 
 typedef struct shaping {
     const vg_mesh *mesh;
     const double *reference;
     vgi_gltf_shape *to;
 } shaping;
-
-static void area(const double *p, const double *q, const double *r, double n[3])
-{
-    double a[3], b[3];
-    for (int k = 0; k < 3; k++) a[k] = q[k] - p[k], b[k] = r[k] - p[k];
-    n[0] = a[1] * b[2] - a[2] * b[1], n[1] = a[2] * b[0] - a[0] * b[2], n[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static const double *place(const shaping *x, uint32_t v)
-{
-    return x->reference + 3 * (size_t)v;
-}
-
-/* Does the triangle look where the face does, or nowhere? */
-static double facing(const shaping *x, uint32_t a, uint32_t b, uint32_t c, const double normal[3])
-{
-    double n[3];
-    area(place(x, a), place(x, b), place(x, c), n);
-    return n[0] * normal[0] + n[1] * normal[1] + n[2] * normal[2];
-}
-
-static void face_normal(const shaping *x, const uint32_t *v, size_t n, double normal[3])
-{
-    normal[0] = normal[1] = normal[2] = 0;
-    for (size_t i = 1; i + 1 < n; i++) {
-        double t[3];
-        area(place(x, v[0]), place(x, v[i]), place(x, v[i + 1]), t);
-        for (int k = 0; k < 3; k++) normal[k] += t[k];
-    }
-}
 
 static int put_index(vg_bytes *to, uint32_t v, vg_err *e)
 {
@@ -56,26 +25,6 @@ static int put_triangle(const shaping *x, uint32_t a, uint32_t b, uint32_t c, vg
     return r < 0 ? r : put_index(&x->to->triangles, c, e);
 }
 
-static bool is_ear(const shaping *x, const uint32_t *ring, size_t n, size_t b, const double normal[3])
-{
-    uint32_t p = ring[(b + n - 1) % n], q = ring[b], s = ring[(b + 1) % n];
-    if (!(facing(x, p, q, s, normal) > 0)) return false;
-    for (size_t i = 0; i < n; i++) {
-        uint32_t v = ring[i];
-        if (v != p && v != q && v != s && facing(x, p, q, v, normal) >= 0 && facing(x, q, s, v, normal) >= 0 &&
-            facing(x, s, p, v, normal) >= 0)
-            return false;
-    }
-    return true;
-}
-
-static bool is_fan(const shaping *x, const uint32_t *v, size_t n, const double normal[3])
-{
-    for (size_t i = 1; i + 1 < n; i++)
-        if (!(facing(x, v[0], v[i], v[i + 1], normal) >= 0)) return false;
-    return true;
-}
-
 static int put_fan(const shaping *x, const uint32_t *v, size_t n, vg_err *e)
 {
     int r = VG_OK;
@@ -86,8 +35,8 @@ static int put_fan(const shaping *x, const uint32_t *v, size_t n, vg_err *e)
 static size_t find_ear(const shaping *x, const uint32_t *ring, size_t n, const double normal[3])
 {
     for (size_t b = 1; b < n; b++)
-        if (is_ear(x, ring, n, b, normal)) return b;
-    return is_ear(x, ring, n, 0, normal) ? 0 : 1; /* it touches or crosses itself: any will do */
+        if (vgi_is_ear(x->reference, ring, n, b, normal)) return b;
+    return vgi_is_ear(x->reference, ring, n, 0, normal) ? 0 : 1; /* it touches or crosses itself: any will do */
 }
 
 /* The triangle with the face's first corner goes first and begins with it,
@@ -107,7 +56,7 @@ static void begin_with(unsigned char *triangles, size_t n, uint32_t v)
 
 static int put_ears(const shaping *x, const uint32_t *v, size_t n, const double normal[3], vg_err *e)
 {
-    uint32_t ring[MOST_CLIPPED];
+    uint32_t ring[VGI_MOST_CLIPPED];
     const size_t start = x->to->triangles.size;
     int r = VG_OK;
     memcpy(ring, v, n * sizeof *v);
@@ -127,8 +76,8 @@ static int put_face(const shaping *x, const uint32_t *v, size_t n, vg_err *e)
         int r = put_index(&x->to->lines, v[0], e);
         return r < 0 ? r : put_index(&x->to->lines, v[1], e);
     }
-    face_normal(x, v, n, normal);
-    if (n == 3 || n > MOST_CLIPPED || is_fan(x, v, n, normal)) return put_fan(x, v, n, e);
+    vgi_face_normal(x->reference, v, n, normal);
+    if (n == 3 || n > VGI_MOST_CLIPPED || vgi_is_fan(x->reference, v, n, normal)) return put_fan(x, v, n, e);
     return put_ears(x, v, n, normal, e);
 }
 

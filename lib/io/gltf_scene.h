@@ -7,7 +7,7 @@
 
 #include "io/gltf.h"
 
-enum { VGI_GLTF_SETS = 8, VGI_GLTF_CLIPPED = 512, VGI_GLTF_NONE = -1 };
+enum { VGI_GLTF_SETS = 8, VGI_GLTF_NONE = -1 };
 
 /* Many nodes may show one mesh and many channels have the times of one accessor, so that a small file could ask for
  * more than any memory. */

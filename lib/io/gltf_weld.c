@@ -3,6 +3,7 @@
  * Leaves out where vertices and faces come from (gltf_scene.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_scene.h"
+#include "io/polygon.h"
 
 #include <stdlib.h>
 
@@ -13,7 +14,7 @@ typedef struct restoring {
     size_t triangle, line; /* the faces of three and two that come next */
     vg_mesh to;
     size_t start_cap, vert_cap;
-    uint32_t edge[3 * VGI_GLTF_CLIPPED][2];
+    uint32_t edge[3 * VGI_MOST_CLIPPED][2];
 } restoring;
 
 static const uint32_t *next_of_size(const vg_mesh *m, size_t *at, size_t size)
@@ -53,10 +54,10 @@ static bool take_polygon(restoring *k, size_t n, uint32_t *face)
         const uint32_t *v = next_of_size(k->from, &k->triangle, 3);
         if (!v) return false;
         fan &= t == 0 || (v[0] == face[0] && v[1] == face[t + 1]);
-        if (!fan && n > VGI_GLTF_CLIPPED) return false;
+        if (!fan && n > VGI_MOST_CLIPPED) return false;
         if (fan && t == 0) face[0] = v[0], face[1] = v[1];
         if (fan) face[t + 2] = v[2];
-        for (size_t s = 0; s < 3 && n <= VGI_GLTF_CLIPPED; s++)
+        for (size_t s = 0; s < 3 && n <= VGI_MOST_CLIPPED; s++)
             k->edge[3 * t + s][0] = v[s], k->edge[3 * t + s][1] = v[(s + 1) % 3];
     }
     return fan || walk_around(k, n, face);

@@ -6,6 +6,7 @@
  * it is left out and counted.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
+#include "io/polygon.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -279,9 +280,6 @@ static int read_stl(vg_model *m, const char *data, size_t n, const char *subject
 
 /* ------------------------------------------------------------------------------------------- writing -- */
 
-/* Beyond this, a face is split as a fan whatever its shape: clipping takes quadratic time and more. */
-enum { MOST_CLIPPED = 512 };
-
 struct writing {
     vg_bytes *out;
     const vgi_writing *w;
@@ -292,35 +290,9 @@ struct writing {
     vg_err *e;
 };
 
-static void cross(const double a[3], const double b[3], double c[3])
-{
-    c[0] = a[1] * b[2] - a[2] * b[1];
-    c[1] = a[2] * b[0] - a[0] * b[2];
-    c[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-/* (q - p) x (r - p) */
-static void turn(const double *p, const double *q, const double *r, double n[3])
-{
-    double a[3], b[3];
-    for (int k = 0; k < 3; k++) a[k] = q[k] - p[k], b[k] = r[k] - p[k];
-    cross(a, b, n);
-}
-
 static const double *point(const struct writing *x, uint32_t v)
 {
     return x->w->vertices + 3 * (size_t)v;
-}
-
-/* Where it is in the pose that decides how polygons are split. */
-static const double *place(const struct writing *x, uint32_t v)
-{
-    return x->w->shape + 3 * (size_t)v;
 }
 
 /* Words, and behind them the three numbers of p, unless NULL, and the end of the line. */
@@ -349,8 +321,8 @@ static int put_triangle(struct writing *x, uint32_t a, uint32_t b, uint32_t c)
 {
     const uint32_t v[3] = {a, b, c};
     double n[3];
-    turn(point(x, a), point(x, b), point(x, c), n);
-    double length = sqrt(dot(n, n));
+    vgi_triangle_normal(x->w->vertices, a, b, c, n);
+    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     for (int k = 0; k < 3; k++) n[k] = length > 0 && isfinite(length) ? n[k] / length : 0;
     x->triangles++;
     if (x->text) return put_text(x, n, v);
@@ -361,53 +333,11 @@ static int put_triangle(struct writing *x, uint32_t a, uint32_t b, uint32_t c)
     return vgi_bytes_append(x->out, facet, sizeof facet, x->e);
 }
 
-/* Twice the vector area (Newell): where the face looks. */
-static void face_normal(const struct writing *x, const uint32_t *v, size_t n, double normal[3])
-{
-    normal[0] = normal[1] = normal[2] = 0;
-    for (size_t i = 1; i + 1 < n; i++) {
-        double t[3];
-        turn(place(x, v[0]), place(x, v[i]), place(x, v[i + 1]), t);
-        for (int k = 0; k < 3; k++) normal[k] += t[k];
-    }
-}
-
-static bool looks_along(const struct writing *x, uint32_t a, uint32_t b, uint32_t c, const double normal[3])
-{
-    double t[3];
-    turn(place(x, a), place(x, b), place(x, c), t);
-    return dot(t, normal) >= 0;
-}
-
-static bool is_fan(const struct writing *x, const uint32_t *v, size_t n, const double normal[3])
-{
-    for (size_t i = 1; i + 1 < n; i++)
-        if (!looks_along(x, v[0], v[i], v[i + 1], normal)) return false;
-    return true;
-}
-
 static int put_fan(struct writing *x, const uint32_t *v, size_t n)
 {
     int r = VG_OK;
     for (size_t i = 1; i + 1 < n && r == VG_OK; i++) r = put_triangle(x, v[0], v[i], v[i + 1]);
     return r;
-}
-
-/* Is corner i of the ring an ear: convex, and no other corner inside its triangle? */
-static bool is_ear(const struct writing *x, size_t n, size_t i, const double normal[3])
-{
-    const uint32_t *v = x->ring;
-    uint32_t a = v[(i + n - 1) % n], b = v[i], c = v[(i + 1) % n];
-    double t[3];
-    turn(place(x, a), place(x, b), place(x, c), t);
-    if (!(dot(t, normal) > 0)) return false;
-    for (size_t k = 0; k < n; k++) {
-        uint32_t p = v[k];
-        if (p == a || p == b || p == c) continue;
-        if (looks_along(x, a, b, p, normal) && looks_along(x, b, c, p, normal) && looks_along(x, c, a, p, normal))
-            return false;
-    }
-    return true;
 }
 
 /* Ear by ear; what has none any more (it crosses itself) goes as a fan. */
@@ -418,7 +348,7 @@ static int clip_ears(struct writing *x, const uint32_t *v, size_t n, const doubl
     memcpy(x->ring, v, n * sizeof *v);
     while (n > 3 && r == VG_OK) {
         size_t i = 0;
-        while (i < n && !is_ear(x, n, i, normal)) i++;
+        while (i < n && !vgi_is_ear(x->w->shape, x->ring, n, i, normal)) i++;
         if (i == n) break;
         r = put_triangle(x, x->ring[(i + n - 1) % n], x->ring[i], x->ring[(i + 1) % n]);
         memmove(x->ring + i, x->ring + i + 1, (n - i - 1) * sizeof *x->ring);
@@ -431,9 +361,9 @@ static int clip_ears(struct writing *x, const uint32_t *v, size_t n, const doubl
 static int put_face(struct writing *x, const uint32_t *v, size_t n)
 {
     double normal[3];
-    if (n <= 3 || n > MOST_CLIPPED) return put_fan(x, v, n);
-    face_normal(x, v, n, normal);
-    return is_fan(x, v, n, normal) ? put_fan(x, v, n) : clip_ears(x, v, n, normal);
+    if (n <= 3 || n > VGI_MOST_CLIPPED) return put_fan(x, v, n);
+    vgi_face_normal(x->w->shape, v, n, normal);
+    return vgi_is_fan(x->w->shape, v, n, normal) ? put_fan(x, v, n) : clip_ears(x, v, n, normal);
 }
 
 static int check_singles(const vgi_writing *w, vg_err *e)

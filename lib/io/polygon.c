@@ -1,0 +1,52 @@
+/* polygon.c: where a face of more than three corners can be cut into triangles.
+ * Leaves out the cutting: each format has its order (stl.c, gltf_faces.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/polygon.h"
+
+void vgi_triangle_normal(const double *points, uint32_t a, uint32_t b, uint32_t c, double normal[3])
+{
+    const double *p = points + 3 * (size_t)a, *q = points + 3 * (size_t)b, *r = points + 3 * (size_t)c;
+    double u[3], v[3];
+    for (int k = 0; k < 3; k++) u[k] = q[k] - p[k], v[k] = r[k] - p[k];
+    normal[0] = u[1] * v[2] - u[2] * v[1];
+    normal[1] = u[2] * v[0] - u[0] * v[2];
+    normal[2] = u[0] * v[1] - u[1] * v[0];
+}
+
+/* Positive when the triangle looks where the face does; 0: it looks nowhere. */
+static double facing(const double *points, uint32_t a, uint32_t b, uint32_t c, const double normal[3])
+{
+    double n[3];
+    vgi_triangle_normal(points, a, b, c, n);
+    return n[0] * normal[0] + n[1] * normal[1] + n[2] * normal[2];
+}
+
+void vgi_face_normal(const double *points, const uint32_t *v, size_t n, double normal[3])
+{
+    normal[0] = normal[1] = normal[2] = 0;
+    for (size_t i = 1; i + 1 < n; i++) {
+        double t[3];
+        vgi_triangle_normal(points, v[0], v[i], v[i + 1], t);
+        for (int k = 0; k < 3; k++) normal[k] += t[k];
+    }
+}
+
+bool vgi_is_fan(const double *points, const uint32_t *v, size_t n, const double normal[3])
+{
+    for (size_t i = 1; i + 1 < n; i++)
+        if (!(facing(points, v[0], v[i], v[i + 1], normal) >= 0)) return false;
+    return true;
+}
+
+bool vgi_is_ear(const double *points, const uint32_t *v, size_t n, size_t i, const double normal[3])
+{
+    uint32_t a = v[(i + n - 1) % n], b = v[i], c = v[(i + 1) % n];
+    if (!(facing(points, a, b, c, normal) > 0)) return false;
+    for (size_t k = 0; k < n; k++) {
+        uint32_t p = v[k];
+        if (p != a && p != b && p != c && facing(points, a, b, p, normal) >= 0 &&
+            facing(points, b, c, p, normal) >= 0 && facing(points, c, a, p, normal) >= 0)
+            return false;
+    }
+    return true;
+}

@@ -1,0 +1,21 @@
+/* polygon.h: what the writers of triangles share: where a face of more corners can be cut.
+ * A face is n vertices v, a ring; points are those of the mesh.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_POLYGON_H
+#define VG_POLYGON_H
+
+#include "core/core.h"
+
+/* Beyond this, a face is split as a fan whatever its shape: clipping takes quadratic time and more. */
+enum { VGI_MOST_CLIPPED = 512 };
+
+/* vgi_triangle_normal: (b - a) x (c - a). */
+void vgi_triangle_normal(const double *points, uint32_t a, uint32_t b, uint32_t c, double normal[3]);
+/* vgi_face_normal: twice the vector area (Newell): where the face looks. */
+void vgi_face_normal(const double *points, const uint32_t *v, size_t n, double normal[3]);
+/* vgi_is_fan: does the fan of triangles around the first vertex cover the face? */
+bool vgi_is_fan(const double *points, const uint32_t *v, size_t n, const double normal[3]);
+/* vgi_is_ear: is corner i convex, and no other corner inside its triangle? */
+bool vgi_is_ear(const double *points, const uint32_t *v, size_t n, size_t i, const double normal[3]);
+
+#endif
