@@ -88,4 +88,7 @@ mistake() {
     must vg-encode "$GOLDEN/empty-sequence.vgs" -o empty.vgs
     must_warn vg-decode empty.vgs -o out.zip
     says "vg-decode: warning: the input has no poses: 'out.zip' holds none"
+    [[ $stderr != *--map* ]]
+    must_warn vg-decode "$GOLDEN/map.vgs" -o out/
+    says "'out/' holds none; vg-deform --map plays a map"
 }

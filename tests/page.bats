@@ -406,3 +406,18 @@ assert [s["label"] for s in facts["sequences"]] == ["n?.obj", "é" * 60], facts[
 assert facts["title"] == "t?<??" and "<title>t?&lt;??</title>" in page
 END
 }
+
+@test "times that do not grow are no times to play by" {
+    py <<'END'
+import make_corpus as m
+for name, times in ("grow", (0, 0.5)), ("same", (1, 1)):
+    m.write(name + ".vgs", m.whole(m.content(frames=[m.pose("p%d" % i, m.POINTS[:4], time=t) for i, t in enumerate(times)])))
+END
+    for name in grow same; do must vg-view $name.vgs -o $name.html; done
+    py <<'END'
+import json, re
+facts = [json.loads(re.search(r'id="facts">(.*?)</script>', open(p + ".html").read()).group(1)) for p in ("grow", "same")]
+grow, same = (f["sequences"][0] for f in facts)
+assert grow["times"] == [0, 0.5] and "times" not in same
+END
+}

@@ -47,3 +47,9 @@ END
     run -3 vg-segment auto.vgs -o out.vgs
     [ ! -e out.vgs ]
 }
+
+@test "more components than patches is said" {
+    poses two 2
+    must_warn vg-segment -k 1 --connected pose1.obj pose2.obj -o out.vgs
+    says '2 patches instead of 1: the mesh has more components'
+}

@@ -145,3 +145,12 @@ END
     says "346 unknowns"
     must vg-solve -q in.vgs -o out.vgs
 }
+
+@test "anchors among vertices that are held: each is where it belongs" {
+    mesh two >rest.obj
+    # the cube stands still, the tetrahedron beside it moves
+    LC_ALL=C awk '$1 == "v" && ++n > 8 { $3 += 0.25; $4 -= 0.5 } { print }' rest.obj >moved.obj
+    must vg-encode --anchor 2,9,11 rest.obj moved.obj -o in.vgs
+    pipe 'vg-deform --onto rest.obj --pin always in.vgs | vg-solve >out.vgs'
+    must vg-diff -t 1e-12 in.vgs out.vgs
+}

@@ -387,3 +387,48 @@ assert len(dark(iso)) > 120  # six sides, most of them slanted
 assert abs(figure(plain) / figure(small) - 4) < 0.2, (figure(plain), figure(small))
 END
 }
+
+# strip_of_numbers FILE NUMBER COUNT ...: a strip of 200 vertices, so many of which have each number
+strip_of_numbers() {
+    py "$@" <<'END'
+import sys, make_corpus as m
+numbers = [float(x) for x, n in zip(sys.argv[2::2], sys.argv[3::2]) for _ in range(int(n))]
+points = [[i // 2 / 8, i % 2, 0] for i in range(200)]
+faces = [[i, i + 2, i + 3, i + 1] for i in range(0, 198, 2)]
+frame = dict(m.pose("p", points), scalars={"name": "load", "unit": "N", "numbers": numbers})
+m.write(sys.argv[1], m.whole(m.content(mesh={"vertices": 200, "faces": faces}, count=200, frames=[frame],
+                                       reference={"name": "rest", "positions": points})))
+END
+}
+
+# same_pictures A B: above the legend
+same_pictures() {
+    py "$@" <<'END'
+import struct, sys, zlib
+def rows(name):
+    data = open(name, "rb").read()
+    at, packed = 8, b""
+    while at < len(data):
+        size, kind = struct.unpack(">I4s", data[at:at + 8])
+        packed += data[at + 8:at + 8 + size] if kind == b"IDAT" else b""
+        width = struct.unpack(">I", data[16:20])[0]
+        at += 12 + size
+    return zlib.decompress(packed)[:(16 + 128) * (1 + 3 * width)]
+assert rows(sys.argv[1]) == rows(sys.argv[2])
+END
+}
+
+@test "colours end where 99 % are below, and of what is nearly all exact at the largest" {
+    strip_of_numbers spread.vgs 0.01 185 0.09 14 0.7 1
+    strip_of_numbers exact.vgs 0 199 0.7 1
+    for name in spread exact; do
+        must vg-view --size 128x128 $name.vgs -o $name.png
+        must vg-view --size 128x128 --scale 0.1 $name.vgs -o $name-0.1.png
+        must vg-view --size 128x128 --scale 0.8 $name.vgs -o $name-0.8.png
+    done
+    same_pictures spread.png spread-0.1.png
+    same_pictures exact.png exact-0.8.png
+    if same_pictures spread.png spread-0.8.png 2>/dev/null; then fail "the end of the colours makes no difference"; fi
+    must vg-view spread.vgs -o spread.html
+    grep -q '"scale":0.1,' spread.html
+}
