@@ -131,6 +131,11 @@ END
     capture vg-decode empty.vgs -o out/
     [ "$status" = 0 ] || [ "$status" = 3 ] || fail "status $status"
     must_fail 3 vg-decode empty.vgs -o out.obj
+    for archive in out.zip out.tar.gz; do # whole, with nothing in it
+        must vg-decode -q empty.vgs -o $archive
+        must_fail 3 vg-info $archive
+        says "archive '$archive' holds no mesh file"
+    done
 }
 
 @test "names that would leave the directory, or are none, do not make files" {

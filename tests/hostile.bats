@@ -335,3 +335,14 @@ END
     says "too far apart"
     no_output 2 vg-deform --at -1 keys.vgs -o out.vgs
 }
+
+@test "one vertex in 60,000 faces: drawn in time that does not grow with its square" {
+    [ "${CONFIG:-release}" = release ] || skip "a sanitizer takes too long"
+    awk 'BEGIN {
+        n = 60000
+        print "v 0 0 1"
+        for (i = 0; i < n; i++) printf "v %.9f %.9f 0\n", cos(6.2831853 * i / n), sin(6.2831853 * i / n)
+        for (i = 0; i < n; i++) print "f", 1, 2 + i, 2 + (i + 1) % n
+    }' >fan.obj
+    must bash -c 'ulimit -t 5; exec vg-view -j 1 --size 100x100 fan.obj -o fan.png'
+}

@@ -314,11 +314,19 @@ int vgi_unknown_kind(const char *name, vg_err *e)
                    name, vgi_kinds_read());
 }
 
+static int holds_no_mesh(const vgi_archive *a, vg_err *e)
+{
+    return vg_fail(e, VG_EINPUT, "archive '%s' holds no mesh file (%s)", a->name, vgi_kinds_read());
+}
+
+/* Nor is a zip without a member one for libarchive. */
 static int not_an_archive(const vgi_archive *a, vg_err *e)
 {
     unsigned char start[512];
     size_t got = 0;
-    if (vgi_read_at(a->file.fd, start, sizeof start, a->file.base, &got) == 0 && vgi_is_archive(start, got))
+    bool read = vgi_read_at(a->file.fd, start, sizeof start, a->file.base, &got) == 0;
+    if (read && a->file.size == 22 && starts(start, got, "PK\5\6", 4)) return holds_no_mesh(a, e);
+    if (read && vgi_is_archive(start, got))
         return vg_fail(e, VG_ETRUNC, "archive '%s' is damaged or cut short", a->name);
     return vgi_unknown_kind(a->name, e);
 }
@@ -349,7 +357,7 @@ static int list_members(vgi_archive *a, vg_err *e)
     if (r == VG_OK && a->n == 0 && a->wanted != is_mesh_name)
         r = vg_fail(e, VG_EINPUT, "archive '%s' holds none of the files it should", a->name);
     else if (r == VG_OK && a->n == 0)
-        r = vg_fail(e, VG_EINPUT, "archive '%s' holds no mesh file (%s)", a->name, vgi_kinds_read());
+        r = holds_no_mesh(a, e);
     if (r == VG_OK) prefer_poses(a);
     return r;
 }

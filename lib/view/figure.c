@@ -45,6 +45,9 @@ static void fill_ring(vgi_figure *g)
     for (size_t f = 0; f < m->nf; f++)
         if (m->start[f + 1] - m->start[f] > 2)
             for (size_t c = m->start[f]; c < m->start[f + 1]; c++) g->ring[g->ring_start[m->vert[c]]++] = (uint32_t)f;
+    for (size_t f = m->nf; f-- > 0;)
+        if (m->start[f + 1] - m->start[f] > 2)
+            for (size_t c = m->start[f]; c < m->start[f + 1]; c++) g->first[m->vert[c]] = (uint32_t)c;
     /* filling has moved every start to its end, which is the start of the next */
     for (size_t v = m->nv; v > 0; v--) g->ring_start[v] = g->ring_start[v - 1];
     g->ring_start[0] = 0;
@@ -55,8 +58,9 @@ int vgi_figure_init(vgi_figure *g, const vg_mesh *m, vg_err *e)
     *g = (vgi_figure){.mesh = m};
     g->ring_start = vgi_array(m->nv + 1, sizeof *g->ring_start, e);
     g->ring = vgi_array(vg_mesh_corners(m), sizeof *g->ring, e);
+    g->first = vgi_array(m->nv, sizeof *g->first, e);
     g->drawn = vgi_drawn_vertices(m, e);
-    if (!g->ring_start || !g->ring || !g->drawn) {
+    if (!g->ring_start || !g->ring || !g->first || !g->drawn) {
         vgi_figure_clear(g);
         return VG_ENOMEM;
     }
@@ -69,6 +73,7 @@ void vgi_figure_clear(vgi_figure *g)
 {
     free(g->ring_start);
     free(g->ring);
+    free(g->first);
     free(g->drawn);
     free(g->side);
     *g = (vgi_figure){0};
@@ -123,12 +128,19 @@ static void area_vector(const vg_mesh *m, size_t f, const float *points, float a
     }
 }
 
-static void corner_normal(const vgi_figure *g, size_t f, uint32_t v, const float *face, float normal[3])
+/* Of corner c. Where all faces around are smoothed it is that of the vertex's first corner, which has gone before. */
+static void corner_normal(const vgi_figure *g, size_t f, size_t c, const float *face, float *normals)
 {
+    uint32_t v = g->mesh->vert[c];
+    float *normal = normals + 3 * c;
     const float *own = face + 3 * f;
     float length = sqrtf(dot(own, own)), sum[3] = {0, 0, 0};
     uint32_t first = g->ring_start[v], end = g->ring_start[v + 1];
     bool all = end - first > MOST_COMPARED;
+    if (all && c != g->first[v]) {
+        memcpy(normal, normals + 3 * (size_t)g->first[v], 3 * sizeof *normal);
+        return;
+    }
     for (uint32_t i = first; i < end; i++) {
         const float *other = face + 3 * (size_t)g->ring[i];
         if (all || dot(own, other) >= CREASE_COSINE * length * sqrtf(dot(other, other)))
@@ -144,7 +156,7 @@ void vgi_figure_normals(const vgi_figure *g, const float *points, float *face, f
     for (size_t f = 0; f < m->nf; f++) area_vector(m, f, points, face + 3 * f);
     for (size_t f = 0; f < m->nf; f++)
         for (size_t c = m->start[f]; c < m->start[f + 1]; c++) {
-            if (m->start[f + 1] - m->start[f] > 2) corner_normal(g, f, m->vert[c], face, normals + 3 * c);
+            if (m->start[f + 1] - m->start[f] > 2) corner_normal(g, f, c, face, normals);
             else normals[3 * c] = normals[3 * c + 1] = normals[3 * c + 2] = 0;
         }
 }

@@ -16,6 +16,7 @@ typedef struct vgi_figure {
     const vg_mesh *mesh;    /* borrowed */
     uint32_t *ring_start;   /* nv + 1: the faces of 3 or more around a vertex are */
     uint32_t *ring;         /* ring[ring_start[v]] .. ring[ring_start[v + 1] - 1] */
+    uint32_t *first;        /* nv: the first corner at a vertex, of a face of 3 or more */
     bool *drawn;            /* nv: vertices that are seen */
     size_t max_corners;
     size_t nsides;          /* made by vgi_figure_sides */
