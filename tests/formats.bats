@@ -142,8 +142,10 @@ npz('indices', positions=points, faces=('|i1', (1, 3), struct.pack('3b', 0, 1, -
 npz('letters', positions=points, names=('<U2', (1,), struct.pack('<2I', 0xd800, 65)))
 npz('horse', positions=points, names=('>U2', (1,), struct.pack('>2I', 0x1f40e, 0xfc)))
 corners = ('<f8', (1, 3, 4), struct.pack('<12d', 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0))
-npz('quaternion', deformations=corners, reference=('<f8', (3, 3), struct.pack('<9d', 0, 0, 0, 1, 0, 0, 0, 1, 0)),
-    faces=('<i4', (1, 3), struct.pack('<3i', 0, 1, 2)), links=('<u4', (0, 2), b''), roots=('<f8', (1, 3), bytes(24)))
+graph = dict(deformations=corners, reference=('<f8', (3, 3), struct.pack('<9d', 0, 0, 0, 1, 0, 0, 0, 1, 0)),
+    faces=('<i4', (1, 3), struct.pack('<3i', 0, 1, 2)), roots=('<f8', (1, 3), bytes(24)))
+npz('quaternion', links=('<u4', (0, 2), b''), **graph)
+npz('unlinked', **graph)
 END
     py <bad.py
     must_fail 3 vg-encode indices.npz -o no.vgs
@@ -152,6 +154,8 @@ END
     says "array 'names' in 'letters.npz' holds a letter that does not exist"
     must_fail 3 vg-encode quaternion.npz -o no.vgs
     says "array 'deformations' in 'quaternion.npz' holds a quaternion that is zero"
+    must_fail 3 vg-encode unlinked.npz -o no.vgs
+    says "an array 'deformations', but none called 'links'"
     pipe "vg-encode horse.npz | vg-info --frames"
     shows 🐎ü
     [ ! -e no.vgs ]

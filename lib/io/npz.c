@@ -311,9 +311,9 @@ static int take_faces(reading *x, vg_head *h, vg_err *e)
 static int take_links(reading *x, vg_head *h, vg_err *e)
 {
     static const uint64_t pairs[2] = {UINT64_MAX, 2};
-    h->has_links = x->held[LINKS].there;
-    if (h->has_links && !has_shape(&x->held[LINKS], 2, pairs))
-        return wrong(x, LINKS, "is not of shape (links, 2)", e);
+    if (!x->held[LINKS].there) return missing(x, LINKS, x->values, e);
+    if (!has_shape(&x->held[LINKS], 2, pairs)) return wrong(x, LINKS, "is not of shape (links, 2)", e);
+    h->has_links = true;
     size_t n;
     int r = copy_indices(x, LINKS, h->mesh.nv, &h->links, &n, e);
     h->nlinks = n / 2;
