@@ -141,6 +141,7 @@ points = ('<f4', (300, 3), struct.pack('<900f', *range(900)))
 npz('indices', positions=points, faces=('|i1', (1, 3), struct.pack('3b', 0, 1, -1)))
 npz('letters', positions=points, names=('<U2', (1,), struct.pack('<2I', 0xd800, 65)))
 npz('horse', positions=points, names=('>U2', (1,), struct.pack('>2I', 0x1f40e, 0xfc)))
+npz('few', positions=points, names=('<U1', (2,), struct.pack('<2I', 65, 66)))
 corners = ('<f8', (1, 3, 4), struct.pack('<12d', 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0))
 graph = dict(deformations=corners, reference=('<f8', (3, 3), struct.pack('<9d', 0, 0, 0, 1, 0, 0, 0, 1, 0)),
     faces=('<i4', (1, 3), struct.pack('<3i', 0, 1, 2)), roots=('<f8', (1, 3), bytes(24)))
@@ -156,6 +157,8 @@ END
     says "array 'deformations' in 'quaternion.npz' holds a quaternion that is zero"
     must_fail 3 vg-encode unlinked.npz -o no.vgs
     says "an array 'deformations', but none called 'links'"
+    must_fail 3 vg-encode few.npz -o no.vgs
+    says "array 'names' in 'few.npz' is not a list of texts, one for each frame"
     pipe "vg-encode horse.npz | vg-info --frames"
     shows 🐎ü
     [ ! -e no.vgs ]
@@ -206,6 +209,12 @@ for i in range(n):
     volume += sum(x * y for x, y in zip(a, cross)) / 6
     assert abs(sum(x * x for x in normal) - 1) < 1e-6
 assert abs(volume - 1) < 1e-6, volume
+END
+    printf 'v 0 0 0\nv 3 0 0\nv 0 5 0\nf 1 2 3\n' >large.obj
+    must vg-decode -q -o large.stl large.obj
+    py <<'END'
+import struct
+assert struct.unpack('<3f', open('large.stl', 'rb').read()[84:96]) == (0, 0, 1) # of length 1 whatever the triangle's size
 END
     must vg-decode -q --format stl-ascii -o text.stl cube.obj
     local file

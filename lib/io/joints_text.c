@@ -140,11 +140,9 @@ static uint32_t find_aim(const reading *b, const given *g, size_t j, size_t abov
 {
     const double near = 0.05, *at = b->reference + 3 * j; /* of the bone's length: people join by eye */
     const double most = near * near * square_distance(at, b->reference + 3 * (size_t)above);
-    vgi_near found[2]; /* the bone itself may be one */
-    size_t n = vgi_kdtree_nearest(g->tree, at, most, 2, found);
-    for (size_t i = 0; i < n; i++)
-        if (g->joint[found[i].index] != above && found[i].square < most) return g->joint[found[i].index];
-    return NONE;
+    vgi_near found; /* never the bone itself, whose joint is all its length away */
+    size_t n = vgi_kdtree_nearest(g->tree, at, most, 1, &found);
+    return n && found.square < most ? g->joint[found.index] : NONE;
 }
 
 static int find_aims(reading *b, vg_err *e)

@@ -179,7 +179,7 @@ static void large_face(uint32_t n)
         vert[n / 2] = vert[3];
         CHECK(vg_model_write(&out, format_names[i], &mesh, x, NULL, true, &e) == VG_OK);
         CHECK(read_bytes(&m, out.data, out.size, NULL, &e) == VG_EINPUT);
-        CHECK(strstr(e.message, "twice"));
+        CHECK(strstr(e.message, "twice") && (strcmp(format_names[i], "obj") || strstr(e.message, " line ")));
         vert[n / 2] = n - 1 - n / 2;
         vg_bytes_clear(&out);
     }

@@ -327,6 +327,35 @@ static void nodes_move(void)
     played_clear(&p);
 }
 
+/* Half way to a turn of 90 degrees that is written as the other one of its quaternions. */
+static void turns_go_the_short_way(void)
+{
+    const float h = 0.70710678f;
+    struct { float base[3], ends[2], three[3], turn[8], still[9]; } bin = {
+        {1, 0, 0}, {0, 2}, {0, 1, 2}, {0, 0, 0, 1, 0, 0, -h, -h}, {0}};
+    played p = play_json("'nodes':[{'mesh':0}],'meshes':[{'primitives':[{'mode':0,'attributes':{'POSITION':0}}]}],'animations':[{'channels':["
+                         "{'sampler':0,'target':{'node':0,'path':'rotation'}},{'sampler':1,'target':{'node':0,'path':'translation'}}],"
+                         "'samplers':[{'input':1,'output':3},{'input':2,'output':4}]}],'accessors':[" FLOATS(0, 1, "VEC3") ","
+                         FLOATS(12, 2, "SCALAR") "," FLOATS(20, 3, "SCALAR") "," FLOATS(32, 2, "VEC4") "," FLOATS(64, 3, "VEC3") "]",
+                         &bin, sizeof bin);
+    CHECK(p.result == 0 && p.frames == 3);
+    check_point(&p, 1, 0, 0.70710678, 0.70710678, 0);
+    check_point(&p, 2, 0, 0, 1, 0);
+    played_clear(&p);
+}
+
+static void weights_are_shares(void)
+{
+    struct { float base[3], weights[4]; unsigned char joints[4]; } bin = {{0, 0, 0}, {0.25f, 0.25f, 0, 0}, {0, 1, 0, 0}};
+    played p = play_json("'nodes':[{'mesh':0,'skin':0},{'translation':[2,0,0]},{'translation':[0,6,0]}],'skins':[{'joints':[1,2]}],"
+                         "'meshes':[{'primitives':[{'mode':0,'attributes':{'POSITION':0,'JOINTS_0':1,'WEIGHTS_0':2}}]}],"
+                         "'accessors':[" FLOATS(0, 1, "VEC3") ",{'bufferView':0,'byteOffset':28,'componentType':5121,'count':1,'type':'VEC4'},"
+                         FLOATS(12, 1, "VEC4") "]", &bin, sizeof bin);
+    CHECK(p.result == 0 && p.frames == 1);
+    check_point(&p, 0, 0, 1, 3, 0);
+    played_clear(&p);
+}
+
 /* Two joints along y; the upper one bends by 90 degrees about z. Weights are bytes, joints too. */
 static void skins_bend(void)
 {
@@ -458,6 +487,9 @@ static void malformed_is_refused(void)
         {NODE MESH "'animations':[{'channels':[{'sampler':0,'target':{'node':0,'path':'scale'}}],'samplers':[{'input':1,'output':0}]}],"
          "'accessors':[" FLOATS(0, 3, "VEC3") "," FLOATS(48, 3, "SCALAR") "]", "times of an animation do not ascend"},
         {NODE MESH "'animations':[{'channels':[{'sampler':1,'target':{'node':0,'path':'scale'}}],'samplers':[]}]," GOOD, "sampler that is not there"},
+        {"'nodes':[{'mesh':0,'matrix':[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}]," MESH "'animations':[{'channels':[{'sampler':0,"
+         "'target':{'node':0,'path':'scale'}}],'samplers':[{'input':1,'output':0}]}],'accessors':[" FLOATS(0, 3, "VEC3") ","
+         FLOATS(0, 1, "SCALAR") "]", "is animated and has a matrix"},
         {"'nodes':[{'mesh':0,'skin':0}],'skins':[{'joints':[5]}]," MESH GOOD, "'nodes' that is not there"},
         {NODE MESH "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3','sparse':{'count':2,"
          "'indices':{'bufferView':0,'componentType':5121},'values':{'bufferView':0}}}]", "do not ascend"}};
@@ -468,6 +500,10 @@ static void malformed_is_refused(void)
         CHECK(strstr(message, cases[i].says));
         vg_bytes_clear(&b);
     }
+    vg_bytes b = make(NODE MESH GOOD, bin, 36); /* an empty chunk behind the end that the file says it has */
+    CHECK(vgi_bytes_append(&b, "\0\0\0\0XXXX", 8, NULL) == VG_OK);
+    CHECK(refused(&vgi_sequence_glb, b.data, b.size) == VG_EINPUT && strstr(message, "bytes behind the end of the GLB"));
+    vg_bytes_clear(&b);
 }
 
 static void wrong_texts_are_refused(void)
@@ -487,6 +523,7 @@ TESTS({"a GLB of ours comes back whole", binary_comes_back}, {"a glTF of ours co
        {"a rig that moves comes back as its vertices", skins_come_back},
       {"points without faces come back", points_come_back}, {"morph targets are frames", targets_are_frames},
       {"only equal vertices are welded", only_equal_vertices_are_welded}, {"weights are played", weights_are_played}, {"weights stay", weights_stay},
+      {"turns go the short way", turns_go_the_short_way}, {"weights are shares", weights_are_shares},
       {"normalized numbers end at minus one", normalized_numbers_end_at_minus_one},
       {"nodes move", nodes_move}, {"skins bend", skins_bend}, {"all kinds of primitives", all_kinds_of_primitives},
       {"stale polygons are passed over", stale_polygons_are_passed_over},

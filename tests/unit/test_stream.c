@@ -659,6 +659,13 @@ static void test_end_mark(void)
     put_file_header(&n);
     for (size_t i = 0; i < p.n; i++) put_record(&n, p.at[i].tag, p.at[i].flags, &p.at[i].payload);
     CHECK(n.size == b.size && !memcmp(n.data, b.data, n.size)); /* that was the same stream, made here */
+    for (int more = -1; more <= 1; more += 2) { /* all sums are right, the count is not */
+        n.size = 0;
+        put_file_header(&n);
+        vgi_put64(p.at[last].payload.data, (uint64_t)((int64_t)last + more));
+        for (size_t i = 0; i < p.n; i++) put_record(&n, p.at[i].tag, p.at[i].flags, &p.at[i].payload);
+        refuse(n.data, n.size, VG_EINPUT, "a false count in the END mark");
+    }
     drop(&p);
     vg_bytes_clear(&b);
     vg_bytes_clear(&n);
