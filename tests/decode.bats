@@ -86,7 +86,7 @@ END
 }
 
 @test "the name of the output is checked before any work" {
-    for to in a.xyz noname a.obj.gz 'a-%s.obj' 'a-%d-%d.obj' 'a-%.obj' ''; do
+    for to in a.xyz noname a.obj.gz 'a-%s.obj' 'a-%d-%d.obj' 'a-%.obj' 'a-%021d.obj' 'a-%4d.obj' ''; do
         must_fail 2 vg-decode -o "$to" none.vgs # which is not there: it was not looked at
         says vg-decode:
     done

@@ -658,6 +658,20 @@ static void writes_no_minus_zero(void)
     free(text);
 }
 
+/* Times that were rounded say the frame time together, not the first two of them. */
+static void frame_time_is_of_the_whole(void)
+{
+    vg_joint joints[] = {{.name = (char *)"a", .parent = UINT32_MAX, .nchannels = 3, .channels = {1, 2, 3}}};
+    double pose[] = {1, 2, 3};
+    sequence s = {.n = 4, .at = {pose, pose, pose, pose}, .time = {0, 0.0333, 0.0667, 0.1}, .timed = {true, true, true, true}};
+    vg_err e = {0};
+    s.head.skeleton = (vg_skeleton){1, joints};
+    s.head.reference = pose, s.head.count = s.head.mesh.nv = 1;
+    char *text = write_text(&s, false, NULL, &e);
+    CHECK(text && strstr(text, " 0.0333333333\n"));
+    free(text);
+}
+
 static void tells_its_files(void)
 {
     const vgi_sequence_format *f = &vgi_sequence_bvh;
@@ -674,4 +688,5 @@ TESTS({"reads_and_poses", reads_and_poses}, {"reads_what_people_have", reads_wha
       {"fits_what_it_can", fits_what_it_can}, {"goes_on_turning", goes_on_turning},
       {"says_what_is_lost", says_what_is_lost}, {"keeps_places_of_joints", keeps_places_of_joints},
       {"writes_any_skeleton", writes_any_skeleton}, {"writes_no_minus_zero", writes_no_minus_zero},
+      {"frame_time_is_of_the_whole", frame_time_is_of_the_whole},
       {"tells_its_files", tells_its_files})
