@@ -311,6 +311,7 @@ END
     ln -s nowhere d/a.obj
     for link in dangling loop; do
         for command in "vg-info a.obj" "vg-encode a.obj" "vg-view a.obj --format png" "vg-decode a.obj --format ply"; do
+            # shellcheck disable=SC2086 # words
             must_fail 4 $command -o $link
             says "'$link'"
             one_line
