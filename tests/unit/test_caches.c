@@ -213,6 +213,17 @@ static void refuses_times_too_close(void)
     }
 }
 
+static void usda_names_are_quoted(void)
+{
+    vg_frame f = {.name = (char *)"a\"b\\c\n", .values = points[0]};
+    int r;
+    vg_bytes b = record(&vgi_sequence_usda, &head, &f, 1, false, &r, NULL);
+    CHECK(r == VG_OK && vgi_bytes_append(&b, "", 1, NULL) == VG_OK);
+    CHECK(strstr((char *)b.data, "vg:frameNames = [\"a\\\"b\\\\c\\x0a\"]\n"));
+    vg_bytes_clear(&b);
+}
+
 TESTS({"reads PC2", reads_pc2}, {"takes counting for no time", takes_counting_for_no_time}, {"reads MDD", reads_mdd},
       {"refuses false numbers", refuses_false_numbers}, {"writes PC2", writes_pc2}, {"writes MDD", writes_mdd},
-      {"refuses what does not fit", refuses_what_does_not_fit}, {"refuses times too close", refuses_times_too_close})
+      {"refuses what does not fit", refuses_what_does_not_fit}, {"refuses times too close", refuses_times_too_close},
+      {"USDA names are quoted", usda_names_are_quoted})
