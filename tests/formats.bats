@@ -323,6 +323,9 @@ END
     must vg-decode --drop-loose -o slim2.obj loose.obj
     must vg-decode -o cube2.obj cube.obj
     same_file slim2.obj cube2.obj
+    printf 'v 9 9 9\nv 0 0 0\nv 1 0 0\nv 8 8 8\nv 0 1 0\nf 2 3 5\n' >among.obj # those that stay close up
+    must vg-decode --drop-loose -o closed.obj among.obj
+    [ "$(cat closed.obj)" = "$(printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3')" ]
 }
 
 @test "a warning names what a format does not keep, and -q none" {
