@@ -1,5 +1,5 @@
-/* processors.c: how many processors this process may use: its affinity mask, and what its control groups allow.
- * Leaves out what is done with them (lib/core/threads.c).
+/* processors.c: how many processors this process may use: its affinity mask, and what its control groups allow; and
+ * that libraries, while they are loaded, see but one. Leaves out what is done with them (lib/core/threads.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "processors.h"
 
@@ -10,7 +10,33 @@
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/syscall.h>
 #include <unistd.h>
+
+/* OpenBLAS, when it is loaded, starts a thread for each processor: they spin, take 128 MB of address space each, and try
+ * for ever where that is not to be had. The programs' own threads call it, one product each, so that none of them is
+ * ever of use. What runs before the libraries' constructors is system calls only. */
+static struct {
+    unsigned long all[1024 / sizeof(long)];
+    long bytes; /* of the mask; not positive: nothing was hidden */
+} processors;
+
+static void hide_processors(void)
+{
+    enum { BITS = 8 * sizeof(long) };
+    unsigned long one[sizeof processors.all / sizeof(long)] = {0};
+    unsigned here;
+    long bytes = syscall(SYS_sched_getaffinity, 0, sizeof processors.all, processors.all);
+    if (bytes <= 0 || syscall(SYS_getcpu, &here, NULL, NULL) || here >= 8 * (unsigned long)bytes) return;
+    one[here / BITS] = 1ul << here % BITS;
+    if (!syscall(SYS_sched_setaffinity, 0, (size_t)bytes, one)) processors.bytes = bytes;
+}
+__attribute__((section(".preinit_array"), used)) static void (*const before_libraries)(void) = hide_processors;
+
+__attribute__((constructor)) static void show_processors(void)
+{
+    if (processors.bytes > 0) syscall(SYS_sched_setaffinity, 0, (size_t)processors.bytes, processors.all);
+}
 
 static bool read_line(const char *path, char *line, size_t n)
 {

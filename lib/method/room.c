@@ -20,6 +20,6 @@ static bool has_room(size_t n)
 int vg_threads_with_room(int most)
 {
     if (!openblas_get_num_threads) return most;
-    while (most > 1 && !has_room(2 * (size_t)most * BLAS_ROOM)) most--;
-    return most > 0 && has_room(BLAS_ROOM) ? most : 0;
+    while (most > 0 && !has_room(2 * (size_t)most * BLAS_ROOM)) most--;
+    return most;
 }
