@@ -279,23 +279,36 @@ typedef struct coverage {
     double sum, largest; /* distances of matched faces */
 } coverage;
 
+static int ascending(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* How many faces of the source drive anything: counted among the pairs, for how many it has is the stream's word only. */
+static uint64_t count_sources(const vg_correspondence *c)
+{
+    size_t n = c->first[c->target_nf];
+    uint32_t *faces = cli_allocate(n, sizeof *faces, "the pairs of a correspondence");
+    uint64_t used = n > 0;
+    if (n) memcpy(faces, c->source, n * sizeof *faces);
+    qsort(faces, n, sizeof *faces, ascending);
+    for (size_t i = 1; i < n; i++) used += faces[i] != faces[i - 1];
+    free(faces);
+    return used;
+}
+
 static coverage cover(const vg_correspondence *c)
 {
-    coverage x = {0};
-    bool *used = cli_allocate(c->source_nf, sizeof *used, "the faces of the source");
+    coverage x = {.used = count_sources(c)};
     for (size_t f = 0; f < c->target_nf; f++) {
         uint64_t pairs = c->first[f + 1] - c->first[f];
         if (pairs > x.most_pairs) x.most_pairs = pairs;
-        for (uint32_t i = c->first[f]; i < c->first[f + 1]; i++) {
-            x.used += !used[c->source[i]];
-            used[c->source[i]] = true;
-        }
         if (!c->matched[f]) continue;
         x.matched++;
         x.sum += c->distance[f];
         x.largest = fmax(x.largest, c->distance[f]);
     }
-    free(used);
     return x;
 }
 

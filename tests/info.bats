@@ -363,6 +363,16 @@ assert got["tree"] == [dict(j, channels=[names[c] for c in j["channels"]]) for j
 END
 }
 
+@test "a correspondence's source may claim any number of faces" {
+    py <<'END'
+import make_corpus as m
+open("many.vgs", "wb").write(m.patched(m.register_content(), "CORR", 8, m.u64(1 << 61)))
+END
+    must vg-info --json many.vgs -o many.json
+    is many.json correspondence.source_faces 2305843009213693952
+    is many.json correspondence.source_faces_used 2
+}
+
 @test "numbers of no vertices have no range" {
     must vg-info "$CORPUS/accept/scalars-of-nothing.vgs"
     shows "'x' of each vertex in 1 of the frames"
