@@ -75,7 +75,7 @@ static void show_where(void)
     armed_here = true;
 }
 
-/* ---- the library that is spared ---- */
+/* ---- who is spared ---- */
 
 static struct range {
     uintptr_t from, to;
@@ -101,6 +101,17 @@ static void find_all_spared(const char *names)
     snprintf(copy, sizeof copy, "%s", names);
     for (char *save, *name = strtok_r(copy, ",", &save); name; name = strtok_r(NULL, ",", &save))
         dl_iterate_phdr(find_spared, name);
+}
+
+/* Under AddressSanitizer this is what a new thread begins with, and it stops the program when that fails. */
+static void spare_function(const char *name)
+{
+    Dl_info info;
+    const ElfW(Sym) *symbol = NULL;
+    void *at = dlsym(RTLD_DEFAULT, name);
+    if (!at || !dladdr1(at, &info, (void **)&symbol, RTLD_DL_SYMENT) || !symbol) return;
+    if (nspared == sizeof spared / sizeof *spared) return;
+    spared[nspared++] = (struct range){(uintptr_t)at, (uintptr_t)at + symbol->st_size};
 }
 
 static bool is_spared(void)
@@ -196,6 +207,7 @@ static int armed_main(int argc, char **argv, char **environment)
     if (text) failing = strtoul(text, NULL, 10), all_after = strchr(text, '+') != NULL;
     tell_where = getenv("FAIL_WHERE") != NULL;
     if (getenv("FAIL_SPARE")) find_all_spared(getenv("FAIL_SPARE"));
+    spare_function("pthread_getattr_np");
     unsetenv("LD_PRELOAD");
     armed = true;
     return true_main(argc, argv, environment);
