@@ -264,7 +264,7 @@ END
     printf 'v 0 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n' >late.obj
     pipe "vg-encode late.mdd | vg-decode -o late.usda"
     must grep -Eo '^ +[0-9.]+ *:' late.usda
-    [ "$(echo $output)" = "1 : 2: 3: 1: 2: 3:" ]
+    [ "$(tr -d ' \n' <<<"$output")" = "1:2:3:1:2:3:" ]
     must_fail 2 vg-decode --f64 -o wide.usda walk.vgs
     says "cannot write 'wide.usda' in full precision"
     must_fail 3 vg-encode walk.usda -o out.vgs

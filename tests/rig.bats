@@ -5,7 +5,7 @@
 load lib.bash
 
 setup_file() {
-    cd "$BATS_FILE_TMPDIR"
+    cd "$BATS_FILE_TMPDIR" || return 1
     write_chain >chain.py
     xz -dc "$DATA/human-man-poses.bvh.xz" >man.bvh
     vg-fitmap --holdout 5 --skeleton man.bvh "$DATA/human-man-poses.tar.xz" -o man.rig 2>man.report

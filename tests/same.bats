@@ -76,15 +76,15 @@ alike() {
     cp a.obj e.obj
     for wrong in 'v 1 2 x' 'f 1 1 2' 'v 0 0 0' 'f 1 2 999999'; do
         { cat a.obj; echo "$wrong"; } >d.obj
-        alike 3 vg-encode --no-provenance ?.obj
+        alike 3 vg-encode --no-provenance [a-e].obj
         says "'d.obj'"
-        tar -cf poses.tar ?.obj
+        tar -cf poses.tar [a-e].obj
         alike 3 vg-encode --no-provenance poses.tar
         says "'d.obj'"
     done
     : >d.obj # two are wrong: the first is told
     echo 'v 1' >e.obj
-    alike 3 vg-encode --no-provenance ?.obj
+    alike 3 vg-encode --no-provenance [a-e].obj
     says "'d.obj' is empty"
     # frames that single precision cannot hold
     sed 's/^v /v 1e39 /; s/^\(v [^ ]* [^ ]* [^ ]*\).*/\1/' a.obj >d.obj

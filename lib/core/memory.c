@@ -110,11 +110,11 @@ static inline __attribute__((always_inline)) bool all_finite(const double *x, si
     for (; n >= VGI_LANES; n -= VGI_LANES, x += VGI_LANES) {
         vgi_lanes a;
         memcpy(&a, x, sizeof a);
-        bad |= (vgi_mask)(a - a);
+        bad |= (vgi_mask)(a - a); /* NOLINT(misc-redundant-expression) */
     }
     vgi_lanes rest = {0};
     if (n) memcpy(&rest, x, n * sizeof *x);
-    bad |= (vgi_mask)(rest - rest);
+    bad |= (vgi_mask)(rest - rest); /* NOLINT(misc-redundant-expression) */
     int64_t bits = 0;
     for (int i = 0; i < VGI_LANES; i++) bits |= bad[i];
     return bits == 0;

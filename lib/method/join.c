@@ -32,7 +32,8 @@ static double cost_of(const vgi_joining *j, uint32_t a, uint32_t b)
 
 static bool before(const state *s, uint32_t p, uint32_t q)
 {
-    return s->cost[p] < s->cost[q] || (s->cost[p] == s->cost[q] && p < q);
+    double a = s->cost[p], b = s->cost[q];
+    return a < b || (a == b && p < q);
 }
 
 static void put(state *s, size_t at, uint32_t p)
