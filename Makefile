@@ -58,12 +58,13 @@ ALL_LDFLAGS := -fsanitize=address,undefined
 endif
 ALL_CFLAGS += $(CFLAGS)
 # numeric kernels: the compiler may unroll and vectorise them; nothing here reorders sums
-KERNELS := $(addprefix lib/method/,deform_kernel solve_kernel carry carry_kernel planar_kernel guess_kernel reconstruct segment) lib/model/graph lib/model/measures lib/model/measures_kernel lib/core/memory
+KERNELS := $(addprefix lib/method/vectors/,deform_kernel planar_kernel guess_kernel reconstruct) $(addprefix lib/method/pairs/,transfer transfer_kernel) \
+    lib/method/patches/segment lib/numeric/solve_kernel lib/model/graph lib/model/measures lib/model/measures_kernel lib/core/memory
 # what a program does not call is not loaded: OpenBLAS starts threads that spin for a while as soon as it is there
 ALL_LDFLAGS += -Wl,--as-needed $(LDFLAGS)
 ALL_LIBS := $(CHOLMOD_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) -lpthread -lm $(LDLIBS)
 
-LIB_SRC := $(sort $(wildcard lib/*/*.c))
+LIB_SRC := $(sort $(wildcard lib/*/*.c lib/*/*/*.c))
 LIB_OBJ := $(LIB_SRC:%.c=$(B)/%.o) $(B)/page_text.o
 PROGRAMS := $(patsubst cmd/%.c,%,$(sort $(wildcard cmd/vg-*.c)))
 CMD_SHARED := $(filter-out cmd/vg-%.c,$(sort $(wildcard cmd/*.c)))

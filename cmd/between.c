@@ -1,6 +1,6 @@
 /* between.c: --interpolate, --at and --smooth of vg-deform: collect the key poses, write the poses between them as
  * vectors.
- * Leaves out the mathematics (lib/method/interpolate.c), and paths of transforms, which need a map.
+ * Leaves out the mathematics (lib/method/vectors/interpolate.c), and paths of transforms, which need a map.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "between.h"
 

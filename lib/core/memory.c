@@ -1,6 +1,6 @@
 /* memory.c: allocation with checked sizes, growing bytes, and the two scans of raw memory that input needs.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "core/lanes.h"
+#include "numeric/lanes.h"
 
 #include <stdlib.h>
 

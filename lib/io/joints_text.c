@@ -5,7 +5,7 @@
  * out how turns are found (model/skeleton.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
-#include "model/kdtree.h"
+#include "numeric/kdtree.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* source.c: the door in: whatever the operands are, the caller gets one head and frame after frame.
  * Leaves out which files an operand names (operands.c) and how a stream, an archive, a mesh file or a sequence
- * (play.c) is read; it only tells them apart and joins them.
+ * (sequence_reader.c) is read; it only tells them apart and joins them.
  *
  * Mesh files become poses by several threads, some before they are asked for. What comes through a pipe is not waited
  * for before its turn, and what goes wrong is told when it is its turn.
@@ -9,7 +9,7 @@
  * opened again one after another when it is their turn. What can be read only once (standard input, a pipe named by
  * the shell) stays open in between.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "io/play.h"
+#include "io/sequence_reader.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -2,7 +2,7 @@
  * Leaves out the text that names the vertices (io).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
-#include "model/turn.h"
+#include "numeric/turn.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,7 +3,7 @@
 #ifndef VG_MEASURES_KERNEL_H
 #define VG_MEASURES_KERNEL_H
 
-#include "core/lanes.h"
+#include "numeric/lanes.h"
 
 /* All faces of r corners: `faces` of them. corners: for each eight faces r times eight vertices, the first corner of
  * each, the second of each; in the last eight, the last face again in the place of those that are not there. */

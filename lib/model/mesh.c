@@ -2,7 +2,7 @@
  * Leaves out attributes and poses (head.c) and vectors (graph.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
-#include "model/sets.h"
+#include "numeric/sets.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* rig.c: a skeleton in the reference pose of a mesh, its motions as transforms, editing them, and linear blend
  * skinning.
- * Leaves out how weights and transforms are fitted (method/skin.c, method/bend.c) and other skeletons (drive.c).
+ * Leaves out how weights and transforms are fitted (method/rig/skin.c, method/rig/inverse_skin.c) and other skeletons (drive.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/rig.h"
 

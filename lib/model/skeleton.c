@@ -2,8 +2,8 @@
  * Leaves out the file that holds a skeleton (bvh.c) and how bones deform (deform.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
-#include "core/vector.h"
-#include "model/turn.h"
+#include "numeric/vec3.h"
+#include "numeric/turn.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,8 +1,8 @@
 /* test_carry: transfer along a correspondence, by shape, by gradients, and the area metric, against what they must
  * be.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "method/carry_kernel.h"
-#include "method/metric.h"
+#include "method/pairs/transfer_kernel.h"
+#include "method/vectors/metric.h"
 #include "test.h"
 #include "meshes.h"
 

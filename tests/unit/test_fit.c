@@ -2,7 +2,7 @@
  * borders, limbs that turn far, and what a wrong pair does to the others. SPDX-License-Identifier: GPL-3.0-or-later
  * */
 #include "meshes.h"
-#include "method/register.h"
+#include "method/pairs/register.h"
 
 static vg_markers tie(size_t n, const uint32_t *of)
 {

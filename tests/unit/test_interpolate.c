@@ -2,7 +2,7 @@
  * a whole turn, smooth paths without jumps of velocity.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
-#include "method/branch.h"
+#include "method/vectors/unwrap.h"
 
 #define DEGREES (M_PI / 180)
 

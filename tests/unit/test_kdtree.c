@@ -1,6 +1,6 @@
 /* test_kdtree.c: the k-d tree answers what looking at every point answers, to the last bit and in every tie.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "model/kdtree.h"
+#include "numeric/kdtree.h"
 #include "test.h"
 
 static uint64_t state = 1;

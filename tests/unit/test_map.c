@@ -2,8 +2,8 @@
  * bodies.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "dense.h"
-#include "method/dense.h"
-#include "method/map_parts.h"
+#include "numeric/dense.h"
+#include "method/rig/map_parts.h"
 
 enum { POSES = 7 };
 

@@ -2,7 +2,7 @@
  * leftovers, borders, holes, folds, strangers, and bones, each against what the layout says. Lengths are those of
  * vgi_pair: 1 is the target's D. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
-#include "method/register.h"
+#include "method/pairs/register.h"
 
 /* A sheet of nx x ny quads of size d; over: facing down. */
 static void add_sheet(vg_head *h, uint32_t nx, uint32_t ny, double x, double y, double z, double d, bool over)

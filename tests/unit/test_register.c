@@ -3,8 +3,8 @@
  * coordinates.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
-#include "method/sparse.h"
-#include "method/surface.h"
+#include "numeric/sparse.h"
+#include "method/pairs/surface.h"
 
 static vg_head load(const char *name)
 {

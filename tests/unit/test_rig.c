@@ -2,7 +2,7 @@
  * its uncollapsed chain, other skeletons drive it, and edits, joints of vertices and other bodies.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
-#include "method/skin.h"
+#include "method/rig/skin.h"
 
 enum { JOINTS = 5, BONES = 4, POSES = 9 };
 static const double LENGTH = 3;

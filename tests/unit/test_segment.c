@@ -1,9 +1,9 @@
 /* test_segment.c: rotations nearest to matrices; patches of bars that turn in known pieces; pieces; threads.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
-#include "method/join.h"
-#include "method/pieces.h"
-#include "method/rotation_fit.h"
+#include "method/patches/join.h"
+#include "method/patches/pieces.h"
+#include "numeric/polar.h"
 
 static void turn_about(const double axis[3], double angle, double m[9])
 {

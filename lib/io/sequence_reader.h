@@ -1,0 +1,33 @@
+/* sequence_reader.h: what source.c needs of sequence_reader.c: a file that holds a whole sequence, being read.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_SEQUENCE_READER_H
+#define VG_SEQUENCE_READER_H
+
+#include "io/io.h"
+
+typedef struct vgi_playing {
+    const vgi_sequence_format *format; /* NULL: there is none */
+    void *state;
+    vgi_input *in;
+    char *subject, *stem; /* what messages call it; what frames without names are called after */
+    uint64_t frames;      /* read so far */
+    vg_frame first;       /* the first one, when it was asked for before its turn */
+    bool waiting;         /* and has not been handed out */
+} vgi_playing;
+
+/* vgi_play_open: p is empty, and h too, which is filled. in, subject and stem are taken over, also on failure; NULL
+ * for one of these texts is VG_ENOMEM. */
+int vgi_play_open(vgi_playing *p, const vgi_sequence_format *format, vgi_input *in, char *subject, char *stem,
+                  vg_head *h, vg_err *e) VG_MUST_CHECK;
+/* vgi_play_borrow_faces: h, which has no faces, takes them, and a reference pose if it has none, from the mesh file
+ * beside `path` (NULL: there is no place beside it); VG_EINPUT when there is none and the format needs it. */
+int vgi_play_borrow_faces(const vgi_playing *p, const char *path, vg_head *h, vg_err *e) VG_MUST_CHECK;
+/* vgi_play_first: the first frame, which is handed out all the same; own: what frames are measured by. */
+int vgi_play_first(vgi_playing *p, const vg_head *own, const vg_frame **first, vg_err *e) VG_MUST_CHECK;
+/* vgi_play_next: 1 and a frame; 0 behind the last one, and then p is empty again. */
+int vgi_play_next(vgi_playing *p, const vg_head *own, vg_frame *f, vg_err *e) VG_MUST_CHECK;
+void vgi_play_stop(vgi_playing *p);
+/* vgi_different_count: VG_EINPUT: h has another number of points than the mesh. */
+int vgi_different_count(const vg_head *h, const char *subject, size_t nv, const char *mesh, vg_err *e);
+
+#endif

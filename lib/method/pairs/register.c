@@ -1,0 +1,493 @@
+/* register.c: from a few pairs of points to the faces of one mesh that drive those of another: one frame for both,
+ * contradictions among the pairs, the fit, the pairing. Leaves out the fit itself (fit.c), the choice of pairs
+ * (pair.c), and files.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/pairs/register.h"
+#include "numeric/kdtree.h"
+#include "numeric/turn.h"
+
+#include <stdlib.h>
+
+enum { NEIGHBOURS = 4, ROBUST_ROUNDS = 20 };
+
+/* A wrong pair is one that is this many times the typical distance from where its neighbours expect it,
+ * and this far, in D. */
+static const double WRONG_TIMES = 5, WRONG_FAR = 0.08;
+
+struct similarity {
+    double scale, rotation[9], shift[3]; /* x -> scale R x + shift */
+};
+
+struct registration {
+    const vg_register_input *in;
+    vg_register_result *out;
+    double unit, centre[3];     /* of the target: lengths are divided by D, its centroid is at 0 */
+    double *source, *target;    /* points, normalised */
+    double *rest;               /* source on target as a whole */
+    vgi_tie *tie;
+    size_t nties, nmarkers;     /* the first ones are the markers */
+    struct similarity s;
+    vgi_surface *source_surface, *target_surface, *fitted_surface;
+    uint32_t *links;
+    size_t nlinks;
+    bool flipped;
+    double *x;
+};
+
+/* ---- the similarity ---- */
+
+/* Least squares (Horn 1987): n weighted pairs of points; the scale treats both sides alike. */
+static void fit_similarity(struct similarity *s, const double *from, const double *to, const double *weight, size_t n)
+{
+    double sum = 0, a[3] = {0}, b[3] = {0}, S[9] = {0}, aa = 0, bb = 0;
+    for (size_t i = 0; i < n; i++) {
+        sum += weight[i];
+        for (size_t k = 0; k < 3; k++) a[k] += weight[i] * from[3 * i + k], b[k] += weight[i] * to[3 * i + k];
+    }
+    for (int k = 0; k < 3; k++) a[k] /= sum, b[k] /= sum;
+    for (size_t i = 0; i < n; i++) {
+        double x[3], y[3];
+        for (size_t k = 0; k < 3; k++) {
+            x[k] = from[3 * i + k] - a[k], y[k] = to[3 * i + k] - b[k];
+            aa += weight[i] * x[k] * x[k], bb += weight[i] * y[k] * y[k];
+        }
+        vgi_add_outer(S, weight[i], y, x);
+    }
+    double q[4], turned[3];
+    vgi_best_turn(S, q);
+    vg_quat_matrix(q, s->rotation);
+    s->scale = sqrt(bb / aa);
+    vgi_multiply_vector(s->rotation, a, turned);
+    for (int k = 0; k < 3; k++) s->shift[k] = b[k] - s->scale * turned[k];
+}
+
+static void apply_similarity(const struct similarity *s, const double x[3], double y[3])
+{
+    double t[3];
+    vgi_multiply_vector(s->rotation, x, t);
+    for (int k = 0; k < 3; k++) y[k] = s->scale * t[k] + s->shift[k];
+}
+
+/* Are they neither in one point nor on one line? Then the sum of squares has a second direction. */
+static bool spread_out(const double *x, size_t n)
+{
+    double centre[3], S[9] = {0};
+    vg_centroid(x, n, centre);
+    for (size_t i = 0; i < n; i++) {
+        double d[3] = {x[3 * i] - centre[0], x[3 * i + 1] - centre[1], x[3 * i + 2] - centre[2]};
+        vgi_add_outer(S, 1, d, d);
+    }
+    double trace = S[0] + S[4] + S[8];
+    double minors = S[0] * S[4] - S[1] * S[3] + S[0] * S[8] - S[2] * S[6] + S[4] * S[8] - S[5] * S[7];
+    return minors > 1e-8 * trace * trace;
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+static double median(const double *x, size_t n, double *room)
+{
+    memcpy(room, x, n * sizeof *x);
+    qsort(room, n, sizeof *room, compare_doubles);
+    return n ? room[n / 2] : 0;
+}
+
+/* Pairs that miss by much more than most count less and less (Geman and McClure). */
+static int robust_similarity(struct similarity *s, const double *from, const double *to, size_t n, vg_err *e)
+{
+    double *weight = vgi_array(n, sizeof *weight, e), *miss = vgi_array(n, sizeof *miss, e),
+           *room = vgi_array(n, sizeof *room, e);
+    if (!weight || !miss || !room) return free(weight), free(miss), free(room), VG_ENOMEM;
+    for (size_t i = 0; i < n; i++) weight[i] = 1;
+    for (int round = 0; round < ROBUST_ROUNDS; round++) {
+        fit_similarity(s, from, to, weight, n);
+        for (size_t i = 0; i < n; i++) {
+            double y[3];
+            apply_similarity(s, from + 3 * i, y);
+            miss[i] = sqrt(vgi_square(y, to + 3 * i));
+        }
+        double c = 3 * median(miss, n, room) + 1e-12;
+        for (size_t i = 0; i < n; i++) {
+            double x = miss[i] / c;
+            weight[i] = 1 / ((1 + x * x) * (1 + x * x));
+        }
+    }
+    free(weight);
+    free(miss);
+    free(room);
+    return VG_OK;
+}
+
+/* ---- ties ---- */
+
+static void add_marker_ties(struct registration *r)
+{
+    const vg_markers *m = r->in->markers;
+    for (size_t i = 0; m && i < m->n; i++) {
+        vgi_tie *t = &r->tie[r->nties++];
+        *t = (vgi_tie){{m->at[i].source, m->at[i].source, m->at[i].source}, {1, 0, 0}, {0}, 1};
+        memcpy(t->point, r->target + 3 * (size_t)m->at[i].target, sizeof t->point);
+    }
+    r->nmarkers = r->nties;
+}
+
+static void add_seed_ties(struct registration *r)
+{
+    const vg_register_input *in = r->in;
+    for (size_t i = 0; i < in->nseeds; i++) {
+        const vg_seed *s = &in->seeds[i];
+        vgi_tie *t = &r->tie[r->nties++];
+        *t = (vgi_tie){{s->vertex, s->vertex, s->vertex}, {1, 0, 0}, {0}, 1};
+        if (in->seeds_of_source) {
+            for (int a = 0; a < 3; a++)
+                for (size_t k = 0; k < 3; k++) t->point[k] += s->weight[a] * r->target[3 * (size_t)s->on[a] + k];
+        } else {
+            memcpy(t->vertex, s->on, sizeof t->vertex);
+            memcpy(t->share, s->weight, sizeof t->share);
+            memcpy(t->point, r->target + 3 * (size_t)s->vertex, sizeof t->point);
+        }
+    }
+}
+
+/* The texture of a mesh as a surface in the plane: each corner is a vertex of its own. */
+static int texture_surface(vgi_surface **s, vg_mesh *flat, double **points, const vg_mesh *m, const vg_attributes *a,
+                           vg_err *e)
+{
+    size_t corners = vg_mesh_corners(m);
+    if (vg_mesh_copy(flat, m, e) < 0) return VG_ENOMEM;
+    *points = vgi_array(corners, 3 * sizeof **points, e);
+    if (!*points) return VG_ENOMEM;
+    flat->nv = corners;
+    for (size_t c = 0; c < corners; c++) {
+        uint32_t t = a->corner_tex[c];
+        flat->vert[c] = (uint32_t)c;
+        for (size_t k = 0; k < 2; k++)
+            (*points)[3 * c + k] = t == UINT32_MAX || k >= a->tex_dim ? 1e6 : a->tex[(size_t)t * a->tex_dim + k];
+    }
+    return vgi_surface_new(s, flat, *points, e);
+}
+
+/* The point of a target face at the same place as a point of its texture: mean value coordinates would be exact for
+ * polygons; least squares of an affine map of the corners is, for what a face spans. */
+static bool lift(const vg_mesh *m, uint32_t face, const double *uv, const double *points, const double at[3],
+                 double out[3])
+{
+    size_t begin = m->start[face], r = m->start[face + 1] - begin;
+    double C[3] = {0}, P[3] = {0}, S[3] = {0}, T[6] = {0};
+    for (size_t c = begin; c < begin + r; c++)
+        for (size_t k = 0; k < 3; k++) {
+            C[k] += uv[3 * c + k] / (double)r;
+            P[k] += points[3 * (size_t)m->vert[c] + k] / (double)r;
+        }
+    for (size_t c = begin; c < begin + r; c++) {
+        double u = uv[3 * c] - C[0], v = uv[3 * c + 1] - C[1];
+        S[0] += u * u, S[1] += u * v, S[2] += v * v;
+        for (size_t k = 0; k < 3; k++) {
+            double x = points[3 * (size_t)m->vert[c] + k] - P[k];
+            T[k] += u * x, T[3 + k] += v * x;
+        }
+    }
+    double det = S[0] * S[2] - S[1] * S[1], u = at[0] - C[0], v = at[1] - C[1];
+    if (!(det > 1e-9 * (S[0] + S[2]) * (S[0] + S[2]))) return false;
+    double a = (S[2] * u - S[1] * v) / det, b = (S[0] * v - S[1] * u) / det;
+    for (size_t k = 0; k < 3; k++) out[k] = P[k] + a * T[k] + b * T[3 + k];
+    return true;
+}
+
+static void find_texture_ties(struct registration *r, const vgi_surface *texture, const double *uv, bool *done)
+{
+    const vg_mesh *m = r->in->source;
+    const vg_attributes *a = r->in->source_uv;
+    for (size_t c = 0; c < vg_mesh_corners(m); c++) {
+        uint32_t v = m->vert[c], t = a->corner_tex[c];
+        if (done[v] || t == UINT32_MAX) continue;
+        double at[3] = {a->tex[(size_t)t * a->tex_dim], a->tex_dim > 1 ? a->tex[(size_t)t * a->tex_dim + 1] : 0, 0},
+               point[3];
+        vgi_hit hit;
+        done[v] = true;
+        if (!vgi_surface_nearest(texture, at, NULL, 0, 1e-3 * 1e-3, &hit)) continue;
+        if (!lift(r->in->target, hit.face, uv, r->target, at, point)) continue;
+        vgi_tie *tie = &r->tie[r->nties++];
+        *tie = (vgi_tie){{v, v, v}, {1, 0, 0}, {point[0], point[1], point[2]}, 1};
+        r->out->uv_pairs++;
+    }
+}
+
+static int add_texture_ties(struct registration *r, vg_err *e)
+{
+    if (!r->in->source_uv) return VG_OK;
+    vg_mesh flat = {0};
+    double *uv = NULL;
+    vgi_surface *texture = NULL;
+    bool *done = vgi_array(r->in->source->nv, sizeof *done, e);
+    int ok = done ? texture_surface(&texture, &flat, &uv, r->in->target, r->in->target_uv, e) : VG_ENOMEM;
+    if (ok == VG_OK) find_texture_ties(r, texture, uv, done);
+    vgi_surface_free(&texture);
+    vg_mesh_clear(&flat);
+    free(uv);
+    free(done);
+    return ok;
+}
+
+static int make_ties(struct registration *r, vg_err *e)
+{
+    size_t most =
+        (r->in->markers ? r->in->markers->n : 0) + r->in->nseeds + (r->in->source_uv ? r->in->source->nv : 0);
+    r->tie = vgi_array(most, sizeof *r->tie, e);
+    if (!r->tie) return VG_ENOMEM;
+    add_marker_ties(r);
+    add_seed_ties(r);
+    return add_texture_ties(r, e);
+}
+
+static void tied_point(const vgi_tie *t, const double *x, double p[3])
+{
+    p[0] = p[1] = p[2] = 0;
+    for (int a = 0; a < 3; a++)
+        for (size_t k = 0; k < 3; k++) p[k] += t->share[a] * x[3 * (size_t)t->vertex[a] + k];
+}
+
+/* ---- pairs that contradict the others ---- */
+
+/* residual[i]: how far the way of tie i to its place differs from what the nearest ones kept say. */
+static void neighbour_residuals(const double *from, const double *way, const bool *out, size_t n, double *residual)
+{
+    for (size_t i = 0; i < n; i++) {
+        size_t near[NEIGHBOURS], found = 0;
+        double square[NEIGHBOURS];
+        for (size_t j = 0; j < n; j++) {
+            if (j == i || out[j]) continue;
+            double d = vgi_square(from + 3 * i, from + 3 * j);
+            size_t k = found < NEIGHBOURS ? found++ : d < square[NEIGHBOURS - 1] ? NEIGHBOURS - 1 : NEIGHBOURS;
+            if (k == NEIGHBOURS) continue;
+            for (; k > 0 && square[k - 1] > d; k--) square[k] = square[k - 1], near[k] = near[k - 1];
+            square[k] = d, near[k] = j;
+        }
+        double sum = 0, mean[3] = {0};
+        for (size_t k = 0; k < found; k++) {
+            double w = 1 / (square[k] + 1e-6);
+            sum += w;
+            for (size_t l = 0; l < 3; l++) mean[l] += w * way[3 * near[k] + l];
+        }
+        for (int l = 0; l < 3; l++) mean[l] = found ? mean[l] / sum : 0;
+        residual[i] = sqrt(vgi_square(mean, way + 3 * i));
+    }
+}
+
+/* The worst goes first, for it makes its neighbours look bad; and so on. */
+static int judge_markers(struct registration *r, vg_err *e)
+{
+    size_t n = r->nmarkers;
+    vg_register_result *out = r->out;
+    out->residual = vgi_array(n, sizeof *out->residual, e);
+    out->left_out = vgi_array(n, sizeof *out->left_out, e);
+    double *from = vgi_array(n, 3 * sizeof *from, e), *way = vgi_array(n, 3 * sizeof *way, e),
+           *room = vgi_array(n, sizeof *room, e);
+    int ok = out->residual && out->left_out && from && way && room ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; i < n && ok == VG_OK; i++) {
+        memcpy(from + 3 * i, r->rest + 3 * (size_t)r->tie[i].vertex[0], 3 * sizeof *from);
+        for (size_t k = 0; k < 3; k++) way[3 * i + k] = r->tie[i].point[k] - from[3 * i + k];
+    }
+    for (size_t left = 0; ok == VG_OK && n > 0 && left <= n / 4; left++) {
+        neighbour_residuals(from, way, out->left_out, n, out->residual);
+        out->typical_residual = median(out->residual, n, room);
+        size_t worst = n;
+        for (size_t i = 0; i < n; i++)
+            if (!out->left_out[i] && (worst == n || out->residual[i] > out->residual[worst])) worst = i;
+        if (!(out->residual[worst] > WRONG_FAR && out->residual[worst] > WRONG_TIMES * out->typical_residual)) break;
+        out->left_out[worst] = true;
+    }
+    for (size_t i = 0; i < n && ok == VG_OK && !r->in->keep_all; i++)
+        if (out->left_out[i]) r->tie[i].weight = 0;
+    free(from);
+    free(way);
+    free(room);
+    return ok;
+}
+
+/* ---- one after the other ---- */
+
+static int normalise(struct registration *r, vg_err *e)
+{
+    const vg_register_input *in = r->in;
+    size_t ns = in->source->nv, nt = in->target->nv;
+    r->source = vgi_array_raw(ns, 3 * sizeof *r->source, e);
+    r->target = vgi_array_raw(nt, 3 * sizeof *r->target, e);
+    r->rest = vgi_array_raw(ns, 3 * sizeof *r->rest, e);
+    r->x = vgi_array_raw(ns, 3 * sizeof *r->x, e);
+    if (!r->source || !r->target || !r->rest || !r->x) return VG_ENOMEM;
+    r->unit = vg_diagonal(in->target_points, nt);
+    if (!(r->unit > 0) || !(vg_diagonal(in->source_points, ns) > 0))
+        return vg_fail(e, VG_EINPUT, "a mesh without extent cannot be registered");
+    vg_centroid(in->target_points, nt, r->centre);
+    for (size_t i = 0; i < nt; i++)
+        for (size_t k = 0; k < 3; k++) r->target[3 * i + k] = (in->target_points[3 * i + k] - r->centre[k]) / r->unit;
+    for (size_t i = 0; i < ns; i++)
+        for (size_t k = 0; k < 3; k++) r->source[3 * i + k] = (in->source_points[3 * i + k] - r->centre[k]) / r->unit;
+    return VG_OK;
+}
+
+static int align(struct registration *r, vg_err *e)
+{
+    r->s = (struct similarity){1, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
+    int ok = VG_OK;
+    if (!r->in->aligned) {
+        double *from = vgi_array(r->nties, 3 * sizeof *from, e), *to = vgi_array(r->nties, 3 * sizeof *to, e);
+        ok = from && to ? VG_OK : VG_ENOMEM;
+        for (size_t i = 0; i < r->nties && ok == VG_OK; i++) {
+            tied_point(&r->tie[i], r->source, from + 3 * i);
+            memcpy(to + 3 * i, r->tie[i].point, 3 * sizeof *to);
+        }
+        if (ok == VG_OK && (r->nties < 3 || !spread_out(from, r->nties) || !spread_out(to, r->nties)))
+            ok = vg_fail(e, VG_EINPUT,
+                         "%zu pairs do not say how the meshes lie: give at least three that are not in line",
+                         r->nties);
+        if (ok == VG_OK) ok = robust_similarity(&r->s, from, to, r->nties, e);
+        free(from);
+        free(to);
+    }
+    for (size_t v = 0; v < r->in->source->nv && ok == VG_OK; v++)
+        apply_similarity(&r->s, r->source + 3 * v, r->rest + 3 * v);
+    return ok;
+}
+
+/* Do the faces of one mesh turn the other way round? Asked at the ties, or everywhere if there are none. */
+static void find_sides(struct registration *r)
+{
+    double votes = 0;
+    const double *n = vgi_surface_normals(r->source_surface), *c = vgi_surface_centroids(r->source_surface);
+    const vg_mesh *m = r->in->source;
+    /* without room for it all faces vote: as good, but slower */
+    bool *tied = r->nties ? calloc(m->nv + 1, sizeof *tied) : NULL;
+    for (size_t i = 0; i < r->nties && tied; i++) tied[r->tie[i].vertex[0]] = r->tie[i].weight > 0;
+    for (size_t f = 0; f < m->nf; f++) {
+        bool asked = !tied;
+        for (uint32_t k = m->start[f]; k < m->start[f + 1] && !asked; k++) asked = tied[m->vert[k]];
+        vgi_hit hit;
+        if (!asked || !vgi_surface_nearest(r->target_surface, c + 3 * f, NULL, 0, INFINITY, &hit)) continue;
+        const double *o = vgi_surface_normals(r->target_surface) + 3 * (size_t)hit.face;
+        votes += n[3 * f] * o[0] + n[3 * f + 1] * o[1] + n[3 * f + 2] * o[2];
+    }
+    r->flipped = votes < 0;
+    free(tied);
+}
+
+static int bend(struct registration *r, void (*step)(void *, const vg_register_step *), void *context, vg_err *e)
+{
+    const vgi_fitting f = {.source = r->in->source,
+                           .rest = r->rest,
+                           .source_surface = r->source_surface,
+                           .target_mesh = r->in->target,
+                           .target_points = r->target,
+                           .target = r->target_surface,
+                           .flipped = r->flipped,
+                           .links = r->links,
+                           .nlinks = r->nlinks,
+                           .tie = r->tie,
+                           .nties = r->nties,
+                           .threads = r->in->threads,
+                           .step = step,
+                           .context = context};
+    return vgi_fit(&f, r->x, e);
+}
+
+static int pair_faces(struct registration *r, vg_err *e)
+{
+    const vgi_pairing p = {.source = r->in->source, .target = r->in->target, .source_surface = r->fitted_surface,
+                           .target_surface = r->target_surface, .flipped = r->flipped, .threads = r->in->threads};
+    return vgi_pair(&p, &r->out->pairs, e);
+}
+
+/* Back to the target's units. x -> S((x - c) / D) D + c */
+static int hand_over(struct registration *r, vg_err *e)
+{
+    vg_register_result *out = r->out;
+    size_t n = r->in->source->nv;
+    out->fitted = vgi_array_raw(n, 3 * sizeof *out->fitted, e);
+    if (!out->fitted) return VG_ENOMEM;
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < 3; k++) out->fitted[3 * i + k] = r->x[3 * i + k] * r->unit + r->centre[k];
+    for (size_t f = 0; f < out->pairs.target_nf; f++) out->pairs.distance[f] *= r->unit;
+    out->flipped = r->flipped;
+    out->scale = r->s.scale;
+    memcpy(out->rotation, r->s.rotation, sizeof out->rotation);
+    double turned[3];
+    vgi_multiply_vector(r->s.rotation, r->centre, turned);
+    for (int k = 0; k < 3; k++) out->shift[k] = r->s.shift[k] * r->unit - r->s.scale * turned[k] + r->centre[k];
+    return VG_OK;
+}
+
+static void clear(struct registration *r)
+{
+    free(r->source);
+    free(r->target);
+    free(r->rest);
+    free(r->tie);
+    free(r->links);
+    free(r->x);
+    vgi_surface_free(&r->source_surface);
+    vgi_surface_free(&r->target_surface);
+    vgi_surface_free(&r->fitted_surface);
+}
+
+void vg_register_result_clear(vg_register_result *r)
+{
+    vg_correspondence_clear(&r->pairs);
+    free(r->fitted);
+    free(r->residual);
+    free(r->left_out);
+    *r = (vg_register_result){0};
+}
+
+static int check_input(const vg_register_input *in, vg_err *e)
+{
+    for (size_t i = 0; in->markers && i < in->markers->n; i++) {
+        const vg_marker *m = &in->markers->at[i];
+        bool source = m->source >= in->source->nv;
+        char which[80] = "";
+        if (!source && m->target < in->target->nv) continue;
+        if (m->name) snprintf(which, sizeof which, "marker '%.60s'", m->name);
+        else snprintf(which, sizeof which, "the marker of line %zu", m->line);
+        return vg_fail(e, VG_EINPUT, "%s names vertex %u, but the %s has %zu vertices", which,
+                       source ? m->source : m->target, source ? "source" : "target",
+                       source ? in->source->nv : in->target->nv);
+    }
+    for (size_t i = 0; i < in->nseeds; i++) {
+        const vg_seed *s = &in->seeds[i];
+        size_t own = in->seeds_of_source ? in->source->nv : in->target->nv;
+        size_t other = in->seeds_of_source ? in->target->nv : in->source->nv;
+        if (s->vertex >= own || s->on[0] >= other || s->on[1] >= other || s->on[2] >= other)
+            return vg_fail(e, VG_EINPUT,
+                           "the dense correspondence of vertex %u does not fit the meshes: are the two interchanged?",
+                           s->vertex);
+    }
+    if (in->source->nf == 0 || in->target->nf == 0)
+        return vg_fail(e, VG_EINPUT, "a mesh without faces cannot be registered");
+    return VG_OK;
+}
+
+int vg_register(vg_register_result *out, const vg_register_input *in,
+                void (*step)(void *context, const vg_register_step *step), void *context, vg_err *e)
+{
+    struct registration r = {.in = in, .out = out};
+    *out = (vg_register_result){0};
+    int ok = check_input(in, e);
+    if (ok == VG_OK) ok = normalise(&r, e);
+    if (ok == VG_OK) ok = make_ties(&r, e);
+    if (ok == VG_OK) ok = align(&r, e);
+    if (ok == VG_OK) ok = judge_markers(&r, e);
+    if (ok == VG_OK) ok = vg_link_components(in->source, r.rest, &r.links, &r.nlinks, e);
+    if (ok == VG_OK) ok = vgi_surface_new(&r.target_surface, in->target, r.target, e);
+    if (ok == VG_OK) ok = vgi_surface_new(&r.source_surface, in->source, r.rest, e);
+    if (ok == VG_OK) find_sides(&r);
+    if (ok == VG_OK) ok = bend(&r, step, context, e);
+    if (ok == VG_OK) ok = vgi_surface_new(&r.fitted_surface, in->source, r.x, e);
+    if (ok == VG_OK) ok = pair_faces(&r, e);
+    if (ok == VG_OK) ok = hand_over(&r, e);
+    clear(&r);
+    if (ok < 0) vg_register_result_clear(out);
+    return ok;
+}

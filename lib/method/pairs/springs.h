@@ -1,0 +1,39 @@
+/* springs.h: what holds a surface of polygons together while it is fitted: its graph Laplacian L, and the two
+ * smoothness terms |(L x)_v|^2 / L_vv and sum over edges of |x_u - x_v|^2 as sparse matrices of one pattern (fit.c).
+ * Internal.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_SPRINGS_H
+#define VG_SPRINGS_H
+
+#include "method/pairs/register.h"
+#include "numeric/sparse.h"
+
+/* All corners of a face of so many or fewer are joined with one another; larger ones have fewer springs. */
+enum { VGI_SMALL_FACE = 8 };
+
+/* Those of vertex v are first[v] .. first[v + 1] - 1, by ascending neighbour. */
+typedef struct vgi_springs {
+    size_t nv;
+    uint32_t *first, *to;
+    double *weight, *sum; /* per spring; per vertex: L_vv, 0 for a vertex in no face */
+} vgi_springs;
+
+/* vgi_springs_make: of the source's faces and links; vertices that a tie joins have springs without weight.
+ * Failed: *L is 0. */
+int vgi_springs_make(vgi_springs *L, const vgi_fitting *in, vg_err *e) VG_MUST_CHECK;
+void vgi_springs_clear(vgi_springs *L);
+/* vgi_springs_apply: y = L x, nv points */
+void vgi_springs_apply(const vgi_springs *L, const double *x, double *y);
+/* vgi_is_hub: does it have so many neighbours that it does not count bending? All of them would be joined. */
+bool vgi_is_hub(const vgi_springs *L, size_t v);
+
+typedef struct vgi_smoothness {
+    vgi_sparse matrix;            /* the pattern; its numbers are the caller's to set */
+    double *bending, *stretching; /* per entry */
+} vgi_smoothness;
+
+/* vgi_smoothness_make: failed: *s is 0. */
+int vgi_smoothness_make(vgi_smoothness *s, const vgi_springs *L, vg_err *e) VG_MUST_CHECK;
+void vgi_smoothness_clear(vgi_smoothness *s);
+
+#endif

@@ -1,0 +1,460 @@
+/* surface.c: a tree of boxes over the triangles of polygons, searched nearest box first.
+ * Leaves out what a nearest point is good for (fit.c, pair.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/pairs/surface.h"
+#include "numeric/vec3.h"
+#include "model/incidence.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { LEAF = 4, DEEPEST = 34 };
+
+struct triangle {
+    double a[3], ab[3], ac[3];
+    uint32_t face, corner;
+    uint8_t borders; /* bit 0: edge ab, 1: bc, 2: ca */
+    bool flat;       /* no area: only its edges count */
+};
+
+/* Node i has the children 2i and 2i + 1; the node at place k of depth d holds the triangles n k / 2^d to
+ * n (k + 1) / 2^d. */
+struct box {
+    double least[3], most[3];
+};
+
+struct vgi_surface {
+    const vg_mesh *m;
+    double *normal, *centroid; /* nf x 3 */
+    double *size;              /* nf */
+    double *vertex_normal;     /* nv x 3 */
+    uint8_t *border;           /* per corner */
+    size_t n;
+    int depth;
+    struct triangle *triangle;
+    struct box *box;
+};
+
+void vgi_newell(const double *points, const uint32_t *vert, size_t r, double area[3])
+{
+    /* relative to a corner, so that far from the origin no digits are lost */
+    const double *o = points + 3 * (size_t)vert[0];
+    area[0] = area[1] = area[2] = 0;
+    for (size_t i = 1; i + 1 < r; i++) {
+        const double *p = points + 3 * (size_t)vert[i], *q = points + 3 * (size_t)vert[i + 1];
+        double u[3] = {p[0] - o[0], p[1] - o[1], p[2] - o[2]}, v[3] = {q[0] - o[0], q[1] - o[1], q[2] - o[2]};
+        area[0] += 0.5 * (u[1] * v[2] - u[2] * v[1]);
+        area[1] += 0.5 * (u[2] * v[0] - u[0] * v[2]);
+        area[2] += 0.5 * (u[0] * v[1] - u[1] * v[0]);
+    }
+}
+
+/* ---- building ---- */
+
+static bool find_borders(vgi_surface *s, vg_err *e)
+{
+    const vg_mesh *m = s->m;
+    vgi_incidence around;
+    if (vgi_incidence_make(&around, m->nv, m->nf, m->start, m->vert, e) < 0) return false;
+    for (size_t f = 0; f < m->nf; f++)
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
+            uint32_t next = c + 1 < m->start[f + 1] ? c + 1 : m->start[f], v = m->vert[c], w = m->vert[next], ends[2];
+            bool shared = false;
+            if (around.first[v + 1] - around.first[v] > around.first[w + 1] - around.first[w]) {
+                uint32_t swap = v; /* look around the end with fewer faces: the other may be the hub of a large fan */
+                v = w, w = swap;
+            }
+            for (uint32_t i = around.first[v]; i < around.first[v + 1] && !shared; i++) {
+                if (around.face[i] == f) continue;
+                vgi_corner_edges(m->start, m->vert, around.face[i], around.corner[i], ends);
+                shared = ends[0] == w || ends[1] == w;
+            }
+            s->border[c] = !shared;
+        }
+    vgi_incidence_clear(&around);
+    return true;
+}
+
+static void set_triangle(struct triangle *t, const double *a, const double *b, const double *c, size_t face,
+                         size_t corner, uint8_t borders)
+{
+    double area[3];
+    for (int k = 0; k < 3; k++) t->a[k] = a[k], t->ab[k] = b[k] - a[k], t->ac[k] = c[k] - a[k];
+    area[0] = t->ab[1] * t->ac[2] - t->ab[2] * t->ac[1];
+    area[1] = t->ab[2] * t->ac[0] - t->ab[0] * t->ac[2];
+    area[2] = t->ab[0] * t->ac[1] - t->ab[1] * t->ac[0];
+    t->face = (uint32_t)face, t->corner = (uint32_t)corner, t->borders = borders;
+    t->flat = !(vgi_dot(area, area) > 1e-24 * vgi_dot(t->ab, t->ab) * vgi_dot(t->ac, t->ac));
+}
+
+static size_t fan_size(size_t r)
+{
+    return r <= 3 ? 1 : r;
+}
+
+static void make_triangles(vgi_surface *s, const double *points)
+{
+    const vg_mesh *m = s->m;
+    struct triangle *t = s->triangle;
+    for (size_t f = 0; f < m->nf; f++) {
+        size_t begin = m->start[f], r = m->start[f + 1] - begin;
+        const uint32_t *vert = m->vert + begin;
+        const uint8_t *border = s->border + begin;
+        double *C = s->centroid + 3 * f, *n = s->normal + 3 * f, length;
+        for (size_t i = 0; i < r; i++)
+            for (int k = 0; k < 3; k++) C[k] += points[3 * (size_t)vert[i] + (size_t)k] / (double)r;
+        vgi_newell(points, vert, r, n);
+        length = sqrt(vgi_dot(n, n));
+        s->size[f] = sqrt(length);
+        for (int k = 0; k < 3; k++) n[k] = length > 0 ? n[k] / length : 0;
+        const double *p = points + 3 * (size_t)vert[0], *q = points + 3 * (size_t)vert[1];
+        if (r == 2) {
+            set_triangle(t++, p, q, q, f, begin, 0);
+            s->size[f] = sqrt(vgi_dot(t[-1].ab, t[-1].ab));
+        } else if (r == 3) {
+            uint8_t edges = (uint8_t)(border[0] | border[1] << 1 | border[2] << 2);
+            set_triangle(t++, p, q, points + 3 * (size_t)vert[2], f, begin, edges);
+        } else {
+            for (size_t i = 0; i < r; i++)
+                set_triangle(t++, points + 3 * (size_t)vert[i], points + 3 * (size_t)vert[i + 1 < r ? i + 1 : 0], C,
+                             f, begin + i, border[i]);
+        }
+    }
+}
+
+static void make_vertex_normals(vgi_surface *s)
+{
+    const vg_mesh *m = s->m;
+    for (size_t f = 0; f < m->nf; f++) {
+        if (m->start[f + 1] - m->start[f] == 2) continue;
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
+            for (size_t k = 0; k < 3; k++)
+                s->vertex_normal[3 * (size_t)m->vert[c] + k] += s->size[f] * s->size[f] * s->normal[3 * f + k];
+    }
+    for (size_t v = 0; v < m->nv; v++) {
+        double *n = s->vertex_normal + 3 * v, length = sqrt(vgi_dot(n, n));
+        for (int k = 0; k < 3; k++) n[k] = length > 0 ? n[k] / length : 0;
+    }
+}
+
+/* An order along an axis, by the middle of the triangles; a total one, so that the tree is always the same. */
+struct key {
+    double middle[3];
+    uint32_t index;
+};
+
+static inline bool before(const struct key *a, const struct key *b, int axis)
+{
+    return a->middle[axis] < b->middle[axis] || (a->middle[axis] == b->middle[axis] && a->index < b->index);
+}
+
+/* Hoare's selection: bring the key of rank `middle` to its place, lesser ones before it. */
+static void select_rank(struct key *p, size_t n, size_t middle, int axis)
+{
+    size_t begin = 0, end = n;
+    uint64_t seed = n;
+    while (end - begin > 1) {
+        seed = seed * 6364136223846793005u + 1442695040888963407u;
+        struct key pivot = p[begin + (size_t)((seed >> 32) * (end - begin) >> 32)];
+        size_t i = begin, j = end - 1;
+        for (;;) {
+            while (before(&p[i], &pivot, axis)) i++;
+            while (before(&pivot, &p[j], axis)) j--;
+            if (i >= j) break;
+            struct key swap = p[i];
+            p[i++] = p[j], p[j--] = swap;
+        }
+        if (middle < i) end = i;
+        else if (middle > j) begin = j + 1;
+        else return;
+    }
+}
+
+static int widest_axis(const struct key *key, size_t n)
+{
+    double least[3], most[3];
+    for (int k = 0; k < 3; k++) least[k] = most[k] = key[0].middle[k];
+    for (size_t i = 1; i < n; i++)
+        for (int k = 0; k < 3; k++) {
+            if (key[i].middle[k] < least[k]) least[k] = key[i].middle[k];
+            if (key[i].middle[k] > most[k]) most[k] = key[i].middle[k];
+        }
+    int axis = 0;
+    for (int k = 1; k < 3; k++)
+        if (most[k] - least[k] > most[axis] - least[axis]) axis = k;
+    return axis;
+}
+
+static void node_range(size_t n, uint64_t node, int depth, size_t *begin, size_t *end)
+{
+    uint64_t k = node - ((uint64_t)1 << depth); /* n and k are below 2^35 */
+    *begin = (size_t)((__uint128_t)n * k >> depth);
+    *end = (size_t)((__uint128_t)n * (k + 1) >> depth);
+}
+
+static void sort_keys(struct key *key, size_t n, int deepest)
+{
+    for (int depth = 0; depth < deepest; depth++)
+        for (uint64_t node = (uint64_t)1 << depth; node < (uint64_t)2 << depth; node++) {
+            size_t begin, end, middle, unused;
+            node_range(n, node, depth, &begin, &end);
+            node_range(n, 2 * node, depth + 1, &unused, &middle);
+            select_rank(key + begin, end - begin, middle - begin, widest_axis(key + begin, end - begin));
+        }
+}
+
+static void widen(struct box *box, const double least[3], const double most[3])
+{
+    for (int k = 0; k < 3; k++) {
+        if (least[k] < box->least[k]) box->least[k] = least[k];
+        if (most[k] > box->most[k]) box->most[k] = most[k];
+    }
+}
+
+static void make_boxes(vgi_surface *s)
+{
+    uint64_t leaves = (uint64_t)1 << s->depth;
+    for (uint64_t i = 2 * leaves - 1; i > 0; i--) {
+        struct box *box = &s->box[i];
+        for (int k = 0; k < 3; k++) box->least[k] = INFINITY, box->most[k] = -INFINITY;
+        if (i < leaves) {
+            widen(box, s->box[2 * i].least, s->box[2 * i].most);
+            widen(box, s->box[2 * i + 1].least, s->box[2 * i + 1].most);
+            continue;
+        }
+        size_t begin, end;
+        node_range(s->n, i, s->depth, &begin, &end);
+        for (size_t j = begin; j < end; j++) {
+            const struct triangle *t = &s->triangle[j];
+            double b[3], c[3];
+            for (int k = 0; k < 3; k++) b[k] = t->a[k] + t->ab[k], c[k] = t->a[k] + t->ac[k];
+            widen(box, t->a, t->a);
+            widen(box, b, b);
+            widen(box, c, c);
+        }
+    }
+}
+
+static int grow_tree(vgi_surface *s, vg_err *e)
+{
+    while (s->n >> s->depth > LEAF) s->depth++;
+    struct key *key = vgi_array_raw(s->n, sizeof *key, e);
+    struct triangle *sorted = vgi_array_raw(s->n, sizeof *sorted, e);
+    s->box = vgi_array_raw((size_t)2 << s->depth, sizeof *s->box, e);
+    if (!key || !sorted || !s->box) return free(key), free(sorted), VG_ENOMEM;
+    for (size_t i = 0; i < s->n; i++) {
+        const struct triangle *t = &s->triangle[i];
+        for (int k = 0; k < 3; k++) key[i].middle[k] = t->a[k] + (t->ab[k] + t->ac[k]) / 3;
+        key[i].index = (uint32_t)i;
+    }
+    if (s->n) sort_keys(key, s->n, s->depth);
+    for (size_t i = 0; i < s->n; i++) sorted[i] = s->triangle[key[i].index];
+    free(s->triangle);
+    free(key);
+    s->triangle = sorted;
+    make_boxes(s);
+    return VG_OK;
+}
+
+int vgi_surface_new(vgi_surface **out, const vg_mesh *m, const double *points, vg_err *e)
+{
+    vgi_surface *s = *out = vgi_array(1, sizeof *s, e);
+    if (!s) return VG_ENOMEM;
+    s->m = m;
+    for (size_t f = 0; f < m->nf; f++) s->n += fan_size(m->start[f + 1] - m->start[f]);
+    s->normal = vgi_array(m->nf, 3 * sizeof *s->normal, e);
+    s->centroid = vgi_array(m->nf, 3 * sizeof *s->centroid, e);
+    s->size = vgi_array(m->nf, sizeof *s->size, e);
+    s->vertex_normal = vgi_array(m->nv, 3 * sizeof *s->vertex_normal, e);
+    s->border = vgi_array(vg_mesh_corners(m), 1, e);
+    s->triangle = vgi_array_raw(s->n, sizeof *s->triangle, e);
+    bool ok =
+        s->normal && s->centroid && s->size && s->vertex_normal && s->border && s->triangle && find_borders(s, e);
+    if (ok) {
+        make_triangles(s, points);
+        make_vertex_normals(s);
+    }
+    if (ok && grow_tree(s, e) == VG_OK) return VG_OK;
+    vgi_surface_free(out);
+    return VG_ENOMEM;
+}
+
+void vgi_surface_free(vgi_surface **out)
+{
+    vgi_surface *s = *out;
+    if (!s) return;
+    free(s->normal);
+    free(s->centroid);
+    free(s->size);
+    free(s->vertex_normal);
+    free(s->border);
+    free(s->triangle);
+    free(s->box);
+    free(s);
+    *out = NULL;
+}
+
+const double *vgi_surface_normals(const vgi_surface *s)
+{
+    return s->normal;
+}
+
+const double *vgi_surface_centroids(const vgi_surface *s)
+{
+    return s->centroid;
+}
+
+const double *vgi_surface_sizes(const vgi_surface *s)
+{
+    return s->size;
+}
+
+const double *vgi_surface_vertex_normals(const vgi_surface *s)
+{
+    return s->vertex_normal;
+}
+
+bool vgi_surface_border(const vgi_surface *s, uint32_t corner)
+{
+    return s->border[corner];
+}
+
+/* ---- searching ---- */
+
+static double box_distance(const struct box *b, const double p[3])
+{
+    double square = 0;
+    for (int k = 0; k < 3; k++) {
+        double d = p[k] < b->least[k] ? b->least[k] - p[k] : p[k] > b->most[k] ? p[k] - b->most[k] : 0;
+        square += d * d;
+    }
+    return square;
+}
+
+static double clamp01(double x)
+{
+    return x > 0 ? x < 1 ? x : 1 : 0;
+}
+
+/* Nearest point of the segment from o along d to p, as a share of d. */
+static double on_segment(const double o[3], const double d[3], const double p[3])
+{
+    double dd = vgi_dot(d, d), op[3] = {p[0] - o[0], p[1] - o[1], p[2] - o[2]};
+    return dd > 0 ? clamp01(vgi_dot(op, d) / dd) : 0;
+}
+
+static void try_edge(const struct triangle *t, const double p[3], int edge, double *best, double u[2],
+                     uint8_t *touched)
+{
+    double bc[3], b[3], share, x[2], square = 0;
+    for (int k = 0; k < 3; k++) b[k] = t->a[k] + t->ab[k], bc[k] = t->ac[k] - t->ab[k];
+    if (edge == 0) share = on_segment(t->a, t->ab, p), x[0] = share, x[1] = 0;
+    else if (edge == 1) share = on_segment(b, bc, p), x[0] = 1 - share, x[1] = share;
+    else share = on_segment(t->a, t->ac, p), x[0] = 0, x[1] = share;
+    for (int k = 0; k < 3; k++) {
+        double d = t->a[k] + x[0] * t->ab[k] + x[1] * t->ac[k] - p[k];
+        square += d * d;
+    }
+    if (square < *best) *best = square, u[0] = x[0], u[1] = x[1], *touched = (uint8_t)(1 << edge);
+    else if (!(square > *best)) *touched |= (uint8_t)(1 << edge); /* a corner: both edges */
+}
+
+/* Squared distance of p from a triangle; u: the nearest point as a + u0 ab + u1 ac; touched: the edges that it is
+ * on. */
+static double triangle_distance(const struct triangle *t, const double p[3], double u[2], uint8_t *touched)
+{
+    double best = INFINITY;
+    *touched = 0;
+    if (!t->flat) {
+        double ap[3] = {p[0] - t->a[0], p[1] - t->a[1], p[2] - t->a[2]};
+        double d11 = vgi_dot(t->ab, t->ab), d12 = vgi_dot(t->ab, t->ac), d22 = vgi_dot(t->ac, t->ac);
+        double r1 = vgi_dot(t->ab, ap), r2 = vgi_dot(t->ac, ap), det = d11 * d22 - d12 * d12;
+        double v = (d22 * r1 - d12 * r2) / det, w = (d11 * r2 - d12 * r1) / det;
+        if (v >= 0 && w >= 0 && v + w <= 1) {
+            double square = 0;
+            for (int k = 0; k < 3; k++) {
+                double d = ap[k] - v * t->ab[k] - w * t->ac[k];
+                square += d * d;
+            }
+            u[0] = v, u[1] = w;
+            if (v <= 0) *touched |= 4;
+            if (w <= 0) *touched |= 1;
+            if (v + w >= 1) *touched |= 2;
+            return square;
+        }
+    }
+    for (int edge = 0; edge < 3; edge++) try_edge(t, p, edge, &best, u, touched);
+    return best;
+}
+
+static const double *corner_normal(const vgi_surface *s, uint32_t corner)
+{
+    return s->vertex_normal + 3 * (size_t)s->m->vert[corner];
+}
+
+/* On sharp edges and tips the vertex normals are those of the surface, not those of the faces that meet there. */
+static bool fits(const vgi_surface *s, const struct triangle *t, const double u[2], const double *normal,
+                 double cosine)
+{
+    const double *n = s->normal + 3 * (size_t)t->face;
+    if (!normal || !(vgi_dot(n, n) > 0) || vgi_dot(n, normal) >= cosine) return true;
+    uint32_t begin = s->m->start[t->face], r = s->m->start[t->face + 1] - begin,
+             next = begin + (t->corner - begin + 1) % r;
+    const double *a = corner_normal(s, t->corner), *b = corner_normal(s, next),
+                 *c = r == 3 ? corner_normal(s, begin + 2) : n;
+    double smooth[3];
+    for (int k = 0; k < 3; k++) smooth[k] = (1 - u[0] - u[1]) * a[k] + u[0] * b[k] + u[1] * c[k];
+    double length = sqrt(vgi_dot(smooth, smooth));
+    return length > 0 && vgi_dot(smooth, normal) >= cosine * length;
+}
+
+static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const double p[3], const double *normal,
+                     double cosine, double *best, vgi_hit *hit)
+{
+    for (size_t i = begin; i < end; i++) {
+        const struct triangle *t = &s->triangle[i];
+        double u[2] = {0, 0};
+        uint8_t touched;
+        double square = triangle_distance(t, p, u, &touched);
+        if (!(square <= *best) || (!(square < *best) && t->face >= hit->face) || !fits(s, t, u, normal, cosine))
+            continue;
+        *best = square;
+        *hit = (vgi_hit){.face = t->face, .square = square, .border = touched & t->borders,
+                         .corner = t->corner, .u = {u[0], u[1]}};
+        for (int k = 0; k < 3; k++) hit->point[k] = t->a[k] + u[0] * t->ab[k] + u[1] * t->ac[k];
+    }
+}
+
+bool vgi_surface_nearest(const vgi_surface *s, const double p[3], const double *normal, double cosine, double limit,
+                         vgi_hit *hit)
+{
+    struct place {
+        uint64_t node;
+        int depth;
+        double square;
+    } stack[DEEPEST + 2];
+    double best = limit;
+    int top = 0;
+    if (normal && !(vgi_dot(normal, normal) > 0)) normal = NULL;
+    hit->face = UINT32_MAX;
+    if (s->n) stack[top++] = (struct place){1, 0, box_distance(&s->box[1], p)};
+    while (top > 0) {
+        struct place at = stack[--top];
+        if (at.square > best) continue;
+        if (at.depth == s->depth) {
+            size_t begin, end;
+            node_range(s->n, at.node, at.depth, &begin, &end);
+            try_leaf(s, begin, end, p, normal, cosine, &best, hit);
+            continue;
+        }
+        struct place near = {2 * at.node, at.depth + 1, box_distance(&s->box[2 * at.node], p)};
+        struct place far = {2 * at.node + 1, at.depth + 1, box_distance(&s->box[2 * at.node + 1], p)};
+        if (far.square < near.square) {
+            struct place swap = near;
+            near = far, far = swap;
+        }
+        if (far.square <= best) stack[top++] = far;
+        if (near.square <= best) stack[top++] = near;
+    }
+    return hit->face != UINT32_MAX;
+}

@@ -1,0 +1,467 @@
+/* transfer.c: deformation transfer between meshes of different connectivity, face by face along a correspondence (MATH
+ * 9). Where a face is driven by one face of as many corners, corner follows corner, as between meshes of one
+ * connectivity (deform.c): so a mesh paired with itself comes back exactly, bent polygons too. Elsewhere one map of
+ * the source faces drives all corners.
+ * Leaves out how the correspondence is found (register.c) and the loops over corners (transfer_kernel.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/pairs/transfer_kernel.h"
+#include "method/vectors/moments.h"
+#include "model/incidence.h"
+
+#include <math.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+
+enum { CHUNK = 512, ENOUGH = 64 };
+
+struct vg_carrier {
+    const vg_mesh *source;
+    const vg_correspondence *pairs;
+    const vg_graph *target;
+    vg_method method;
+    int threads;
+    const double *source_reference;
+    double ratio;          /* size of the target over that of the source */
+    double *p, *q;         /* see vgi_source */
+    unsigned char *slow;   /* per source face: 1: a line segment, 2: no gradient in the reference pose, never
+                              drives */
+    double *segment;       /* reference vector of each source face's first corner */
+    double *vectors;       /* the target's reference vectors, per corner of its graph */
+    vgi_incidence around;  /* of the target, only if there are links */
+    /* target faces that go corner by corner: a graph of them over the source's vertices,
+     * and what it gives for eight poses */
+    size_t ntwins;
+    uint32_t *twin;        /* the target faces, ascending; then links between vertices of such faces */
+    unsigned char *is_twin; /* per target face */
+    vg_graph *twins;
+    vg_deformer *deformer;
+    double *twin_vectors[VGI_LANES];
+    vgi_map *maps;         /* per source face */
+    unsigned char *bad;    /* per source face: lanes in which it drives nothing */
+    atomic_uint_fast64_t degenerate, first_face;
+};
+
+static size_t source_size(const vg_carrier *c, size_t f)
+{
+    return c->source->start[f + 1] - c->source->start[f];
+}
+
+static void note_degenerate(vg_carrier *c, size_t f, unsigned lanes)
+{
+    if (!lanes) return;
+    atomic_fetch_add(&c->degenerate, (unsigned)__builtin_popcount(lanes));
+    uint_fast64_t least = atomic_load(&c->first_face);
+    while (f < least && !atomic_compare_exchange_weak(&c->first_face, &least, f)) continue;
+}
+
+/* ---- making ---- */
+
+static int check_fit(const vg_mesh *source, const vg_correspondence *k, const vg_graph *target, vg_err *e)
+{
+    vg_mesh t = {target->nv, target->nf - target->nlinks, target->start, target->vert};
+    if (k->source_nv != source->nv || k->source_nf != source->nf || k->source_digest != vg_mesh_digest(source))
+        return vg_fail(e, VG_EINPUT,
+                       "the correspondence was made for another source: %zu vertices and %zu faces, the sequence "
+                       "has %zu and %zu",
+                       k->source_nv, k->source_nf, source->nv, source->nf);
+    if (k->target_nv != t.nv || k->target_nf != t.nf || k->target_digest != vg_mesh_digest(&t))
+        return vg_fail(e, VG_EINPUT,
+                       "the correspondence was made for another target: %zu vertices and %zu faces, this one has "
+                       "%zu and %zu",
+                       k->target_nv, k->target_nf, t.nv, t.nf);
+    return VG_OK;
+}
+
+static int measure_source(vg_carrier *c, const double *reference, vg_err *e)
+{
+    const vg_mesh *m = c->source;
+    size_t most = 0;
+    for (size_t f = 0; f < m->nf; f++) most = source_size(c, f) > most ? source_size(c, f) : most;
+    double *w = vgi_array(3 * most, sizeof *w, e); /* the vectors of a face */
+    if (!w) return VG_ENOMEM;
+    for (size_t f = 0; f < m->nf; f++) {
+        size_t begin = m->start[f], r = source_size(c, f);
+        double centre[3] = {0, 0, 0}, P[6], size;
+        for (size_t i = 0; i < r; i++)
+            for (size_t k = 0; k < 3; k++) centre[k] += reference[3 * (size_t)m->vert[begin + i] + k] / (double)r;
+        for (size_t i = 0; i < r; i++)
+            for (size_t k = 0; k < 3; k++) w[3 * i + k] = reference[3 * (size_t)m->vert[begin + i] + k] - centre[k];
+        memcpy(c->segment + 3 * f, w, 3 * sizeof *w);
+        if (r == 2) {
+            c->slow[f] = w[0] != 0 || w[1] != 0 || w[2] != 0 ? 1 : 2;
+        } else if (vgi_gradient_moments(w, r, P, c->q + 3 * f, &size)) {
+            for (size_t k = 0; k < 3; k++) c->q[3 * f + k] /= sqrt(size);
+            for (size_t i = 0; i < r; i++) vgi_symmetric_times(P, w + 3 * i, c->p + 3 * (begin + i));
+        } else {
+            c->slow[f] = 2;
+        }
+    }
+    free(w);
+    return VG_OK;
+}
+
+/* Which corner of source face s goes with the first of target face f:
+ * the turn of the cycle in which their vectors agree best. */
+static size_t best_turn(const vg_carrier *c, const double *source_reference, size_t s, size_t f)
+{
+    const uint32_t *vert = c->source->vert + c->source->start[s];
+    const double *t = c->vectors + 3 * (size_t)c->target->start[f];
+    size_t r = source_size(c, s), best = 0;
+    double most = -INFINITY;
+    for (size_t turn = 0; turn < r; turn++) {
+        double sum = 0; /* the target's vectors sum to 0, so positions do as well as vectors */
+        for (size_t i = 0; i < r; i++)
+            for (size_t k = 0; k < 3; k++)
+                sum += t[3 * i + k] * source_reference[3 * (size_t)vert[(i + turn) % r] + k];
+        if (sum > most) most = sum, best = turn;
+    }
+    return best;
+}
+
+/* Choose the twins; the number of their corners. */
+static size_t choose_twins(vg_carrier *c)
+{
+    enum { LARGEST = 64 }; /* trying all turns of a face costs the square of its corners */
+    const vg_graph *g = c->target;
+    const vg_correspondence *k = c->pairs;
+    size_t corners = 0;
+    for (size_t f = 0; f < g->nf - g->nlinks; f++) {
+        size_t r = g->start[f + 1] - g->start[f], s = k->source[k->first[f]];
+        if (!k->matched[f] || k->first[f + 1] - k->first[f] != 1 || source_size(c, s) != r || r > LARGEST) continue;
+        c->is_twin[f] = 1;
+        c->twin[c->ntwins++] = (uint32_t)f;
+        corners += r;
+    }
+    return corners;
+}
+
+/* Fill the twins' mesh over the source's vertices; twin_of[v]: the source's vertex for target vertex v,
+ * UINT32_MAX: none. */
+static void fill_twins(const vg_carrier *c, const double *source_reference, vg_mesh *m, uint32_t *twin_of)
+{
+    const vg_graph *g = c->target;
+    size_t at = 0;
+    for (size_t v = 0; v < g->nv; v++) twin_of[v] = UINT32_MAX;
+    for (size_t i = 0; i < m->nf; i++) {
+        size_t f = c->twin[i], s = c->pairs->source[c->pairs->first[f]], r = source_size(c, s);
+        size_t turn = best_turn(c, source_reference, s, f);
+        for (size_t j = 0; j < r; j++) {
+            uint32_t v = c->source->vert[c->source->start[s] + (j + turn) % r];
+            m->vert[at++] = v;
+            twin_of[g->vert[g->start[f] + j]] = v;
+        }
+        m->start[i + 1] = (uint32_t)at;
+    }
+}
+
+/* Links between vertices that have twins have one themselves. */
+static void link_twins(vg_carrier *c, const uint32_t *twin_of, vg_head *h)
+{
+    const vg_graph *g = c->target;
+    for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
+        uint32_t a = twin_of[g->vert[g->start[f]]], b = twin_of[g->vert[g->start[f] + 1]];
+        if (a == UINT32_MAX || b == UINT32_MAX || a == b) continue;
+        h->links[2 * h->nlinks] = a, h->links[2 * h->nlinks + 1] = b;
+        h->nlinks++;
+        c->is_twin[f] = 1;
+        c->twin[c->ntwins++] = (uint32_t)f;
+    }
+}
+
+/* The faces that go corner by corner, as a graph over the source's vertices in the order of the target's corners. */
+static int find_twins(vg_carrier *c, const double *source_reference, vg_err *e)
+{
+    const vg_graph *g = c->target;
+    c->twin = vgi_array(g->nf, sizeof *c->twin, e);
+    c->is_twin = vgi_array(g->nf, 1, e);
+    if (!c->twin || !c->is_twin) return VG_ENOMEM;
+    size_t corners = choose_twins(c);
+    if (!c->ntwins) return VG_OK;
+    vg_head h = {.mesh = {c->source->nv, c->ntwins, NULL, NULL}};
+    h.mesh.start = vgi_array(c->ntwins + 1, sizeof *h.mesh.start, e);
+    h.mesh.vert = vgi_array(corners, sizeof *h.mesh.vert, e);
+    h.links = vgi_array(2 * g->nlinks, sizeof *h.links, e);
+    uint32_t *twin_of = vgi_array(g->nv, sizeof *twin_of, e);
+    corners += 2 * g->nlinks;
+    double *target = vgi_array(3 * corners, sizeof *target, e);
+    int result = h.mesh.start && h.mesh.vert && h.links && twin_of && target ? VG_OK : VG_ENOMEM;
+    if (result == VG_OK) {
+        fill_twins(c, source_reference, &h.mesh, twin_of);
+        link_twins(c, twin_of, &h);
+        result = vg_graph_new(&c->twins, &h, e);
+    }
+    for (size_t i = 0; result == VG_OK && i < c->ntwins; i++) {
+        size_t at = c->twins->start[i], n = c->twins->start[i + 1] - at;
+        memcpy(target + 3 * at, c->vectors + 3 * (size_t)g->start[c->twin[i]], 3 * n * sizeof *target);
+    }
+    if (result == VG_OK) result = vg_deformer_new(&c->deformer, c->twins, source_reference, c->threads, e);
+    if (result == VG_OK) result = vg_deformer_target(c->deformer, target, c->method, e);
+    for (size_t i = 0; result == VG_OK && i < VGI_LANES; i++)
+        if (!(c->twin_vectors[i] = vgi_array(3 * corners, sizeof *target, e))) result = VG_ENOMEM;
+    vg_mesh_clear(&h.mesh);
+    free(h.links);
+    free(twin_of);
+    free(target);
+    return result;
+}
+
+static int make_arrays(vg_carrier *c, vg_err *e)
+{
+    size_t nf = c->source->nf;
+    c->p = vgi_array(3 * vg_mesh_corners(c->source), sizeof *c->p, e);
+    c->q = vgi_array(3 * nf, sizeof *c->q, e);
+    c->slow = vgi_array(nf, 1, e);
+    c->bad = vgi_array(nf, 1, e);
+    c->segment = vgi_array(3 * nf, sizeof *c->segment, e);
+    c->vectors = vgi_array(3 * vg_graph_corners(c->target), sizeof *c->vectors, e);
+    c->maps = aligned_alloc(sizeof(vgi_lanes), (nf ? nf : 1) * sizeof *c->maps);
+    if (c->p && c->q && c->slow && c->bad && c->segment && c->vectors && c->maps) return VG_OK;
+    return vg_fail(e, VG_ENOMEM, "not enough memory for a transfer of %zu faces", nf);
+}
+
+int vg_carrier_new(vg_carrier **out, const vg_mesh *source, const double *source_reference,
+                   const vg_correspondence *pairs, const vg_graph *target, const double *target_reference,
+                   vg_method method, int threads, vg_err *e)
+{
+    *out = NULL;
+    int r = check_fit(source, pairs, target, e);
+    if (r < 0) return r;
+    vg_carrier *c = *out = vgi_array(1, sizeof *c, e);
+    if (!c) return VG_ENOMEM;
+    c->source = source, c->pairs = pairs, c->target = target, c->method = method, c->threads = threads;
+    atomic_init(&c->first_face, UINT64_MAX);
+    double before = vg_diagonal(source_reference, source->nv);
+    c->source_reference = source_reference;
+    c->ratio = before > 0 ? vg_diagonal(target_reference, target->nv) / before : 1;
+    r = make_arrays(c, e);
+    if (r == VG_OK && target->nlinks)
+        r = vgi_incidence_make(&c->around, target->nv, target->nf, target->start, target->vert, e);
+    if (r == VG_OK) r = measure_source(c, source_reference, e);
+    if (r == VG_OK) {
+        vg_graph_vectors(target, target_reference, c->vectors);
+        r = find_twins(c, source_reference, e);
+    }
+    if (r < 0) vg_carrier_free(out);
+    return r;
+}
+
+double vg_carrier_turned(const vg_carrier *c)
+{
+    const vg_graph *t = c->target;
+    const vg_correspondence *pairs = c->pairs;
+    double sum = 0, n[3];
+    size_t count = 0;
+    for (size_t f = 0; f < t->nf - t->nlinks; f++) {
+        size_t s = pairs->source[pairs->first[f]];
+        const double *q = c->q + 3 * s; /* along the normal */
+        if (!pairs->matched[f] || c->slow[s]) continue;
+        if (!vgi_unit_normal(c->vectors + 3 * (size_t)t->start[f], t->start[f + 1] - t->start[f], n)) continue;
+        sum += (q[0] * n[0] + q[1] * n[1] + q[2] * n[2]) / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
+        count++;
+    }
+    return count ? 180 / M_PI * acos(fmin(fabs(sum) / (double)count, 1)) : 0;
+}
+
+void vg_carrier_free(vg_carrier **out)
+{
+    vg_carrier *c = *out;
+    if (!c) return;
+    free(c->p);
+    free(c->q);
+    free(c->slow);
+    free(c->bad);
+    free(c->segment);
+    free(c->vectors);
+    free(c->maps);
+    vgi_incidence_clear(&c->around);
+    free(c->twin);
+    free(c->is_twin);
+    vg_deformer_free(&c->deformer);
+    vg_graph_free(&c->twins);
+    for (int i = 0; i < VGI_LANES; i++) free(c->twin_vectors[i]);
+    free(c);
+    *out = NULL;
+}
+
+vg_deform_counts vg_carrier_counts(const vg_carrier *c)
+{
+    return (vg_deform_counts){atomic_load(&c->degenerate), atomic_load(&c->first_face)};
+}
+
+/* ---- eight poses ---- */
+
+typedef struct carry_job {
+    vg_carrier *c;
+    const double *poses[VGI_LANES];
+    double *const *out;
+    size_t lanes;
+} carry_job;
+
+/* A line segment's map: its smallest rotation and its stretch, lane by lane. */
+static void measure_segment(const carry_job *j, size_t f)
+{
+    const vg_carrier *c = j->c;
+    const uint32_t *vert = c->source->vert + c->source->start[f];
+    const double *r = c->segment + 3 * f;
+    vgi_map *map = &c->maps[f];
+    unsigned bad = 0;
+    for (size_t k = 0; k < VGI_LANES; k++) {
+        const double *a = j->poses[k] + 3 * (size_t)vert[0], *b = j->poses[k] + 3 * (size_t)vert[1];
+        double d[3] = {(a[0] - b[0]) / 2, (a[1] - b[1]) / 2, (a[2] - b[2]) / 2}, q[4] = {1, 0, 0, 0}, m[9];
+        if (d[0] == 0 && d[1] == 0 && d[2] == 0) bad |= 1u << k;
+        else vg_quat_between(r, d, q);
+        double scale = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], root = sqrt(scale);
+        for (int i = 0; i < 4; i++) q[i] /= root;
+        vg_quat_matrix(q, m);
+        for (int i = 0; i < 9; i++) map->m[i][k] = scale * m[i];
+    }
+    c->bad[f] = (unsigned char)bad;
+}
+
+static void measure_chunk(void *context, size_t i)
+{
+    carry_job *j = context;
+    vg_carrier *c = j->c;
+    size_t nf = c->source->nf, first = i * CHUNK, last = first + CHUNK < nf ? first + CHUNK : nf;
+    const vgi_source s = {c->source->start, c->source->vert, c->p, c->q, c->slow, j->poses};
+    vgi_measure_maps(&s, first, last, c->maps, c->bad);
+    for (size_t f = first; f < last; f++) {
+        if (c->slow[f] == 1) measure_segment(j, f);
+        if (c->slow[f] == 2) c->bad[f] = 0xff;
+        note_degenerate(c, f, c->bad[f] & (0xffu >> (VGI_LANES - j->lanes)));
+    }
+}
+
+/* Add the mean map of a target face's sources to a sum; sources without a direction are left out. */
+static void add_sources(const vg_carrier *c, size_t f, vgi_map *sum, vgi_lanes *weight)
+{
+    const vg_correspondence *k = c->pairs;
+    for (uint32_t i = k->first[f]; i < k->first[f + 1]; i++) {
+        const vgi_map *map = &c->maps[k->source[i]];
+        unsigned bad = c->bad[k->source[i]];
+        if (!bad) {
+            for (int e = 0; e < 9; e++) sum->m[e] += k->weight[i] * map->m[e];
+            *weight += k->weight[i];
+            continue;
+        }
+        for (int lane = 0; lane < VGI_LANES; lane++) {
+            if (bad >> lane & 1) continue;
+            for (int e = 0; e < 9; e++) sum->m[e][lane] += k->weight[i] * map->m[e][lane];
+            (*weight)[lane] += k->weight[i];
+        }
+    }
+}
+
+/* Nothing to follow: stay as it is. */
+static void finish_mean(vgi_map *sum, vgi_lanes weight)
+{
+    vgi_lanes share = 1 / weight;
+    for (int e = 0; e < 9; e++) sum->m[e] *= share;
+    for (int lane = 0; lane < VGI_LANES; lane++)
+        for (int e = 0; e < 9 && !(weight[lane] > 0); e++) sum->m[e][lane] = e % 4 == 0;
+}
+
+/* The centre of the source faces that drive the target faces around a vertex, in eight poses. */
+static void centre_beside(const vg_carrier *c, uint32_t v, const double *const *poses, vgi_lanes centre[3])
+{
+    const vg_correspondence *k = c->pairs;
+    size_t faces = c->target->nf - c->target->nlinks;
+    uint32_t first = c->around.first[v], last = c->around.first[v + 1];
+    double total = 0;
+    if (last - first > ENOUGH) last = first + ENOUGH;
+    for (int a = 0; a < 3; a++) centre[a] = (vgi_lanes){0};
+    for (uint32_t i = first; i < last; i++) {
+        size_t f = c->around.face[i];
+        for (uint32_t p = f < faces ? k->first[f] : 0; f < faces && p < k->first[f + 1]; p++) {
+            size_t s = k->source[p], r = source_size(c, s);
+            total += k->weight[p];
+            for (uint32_t n = c->source->start[s]; n < c->source->start[s + 1]; n++)
+                for (size_t a = 0; a < 3; a++)
+                    centre[a] += k->weight[p] / (double)r * vgi_gather(poses, 3 * (size_t)c->source->vert[n] + a);
+        }
+    }
+    for (int a = 0; a < 3 && total > 0; a++) centre[a] /= total;
+}
+
+/* A link also takes part in how the source's faces at its ends have moved against each other, beyond the map that
+ * they share: eyes move in their sockets. In the target's size. */
+static void add_drift(const carry_job *j, size_t f, const vgi_map *map)
+{
+    const vg_carrier *c = j->c;
+    size_t begin = c->target->start[f];
+    const double *reference[VGI_LANES];
+    for (int k = 0; k < VGI_LANES; k++) reference[k] = c->source_reference;
+    vgi_lanes now[2][3], before[2][3];
+    for (size_t end = 0; end < 2; end++) {
+        centre_beside(c, c->target->vert[begin + end], j->poses, now[end]);
+        centre_beside(c, c->target->vert[begin + end], reference, before[end]);
+    }
+    for (size_t a = 0; a < 3; a++) {
+        vgi_lanes drift = now[0][a] - now[1][a];
+        for (size_t b = 0; b < 3; b++) drift -= map->m[3 * a + b] * (before[0][b] - before[1][b]);
+        for (size_t k = 0; k < j->lanes; k++) {
+            j->out[k][3 * begin + a] += 0.5 * c->ratio * drift[k];
+            j->out[k][3 * begin + 3 + a] -= 0.5 * c->ratio * drift[k];
+        }
+    }
+}
+
+static void follow(const carry_job *j, size_t f)
+{
+    static const vgi_follow how[] = {[VG_BY_POSE] = VGI_FOLLOW_POSE, [VG_BY_GRADIENT] = VGI_FOLLOW_GRADIENT,
+                                     [VG_BY_BLEND] = VGI_FOLLOW_BLEND};
+    const vg_carrier *c = j->c;
+    const vg_graph *g = c->target;
+    size_t faces = g->nf - g->nlinks, begin = g->start[f];
+    vgi_map sum;
+    vgi_lanes weight = {0};
+    memset(&sum, 0, sizeof sum);
+    bool rigid = f < faces && !c->pairs->matched[f];
+    if (f < faces) {
+        add_sources(c, f, &sum, &weight);
+    } else { /* a link: the faces at both ends */
+        for (size_t end = 0; end < 2; end++) {
+            uint32_t v = g->vert[begin + end], first = c->around.first[v], last = c->around.first[v + 1];
+            if (last - first > ENOUGH) last = first + ENOUGH;
+            for (uint32_t i = first; i < last; i++)
+                if (c->around.face[i] < faces) add_sources(c, c->around.face[i], &sum, &weight);
+        }
+    }
+    finish_mean(&sum, weight);
+    vgi_follow_face(&sum, rigid ? VGI_FOLLOW_RIGID : how[c->method], c->vectors + 3 * begin, g->start[f + 1] - begin,
+                    j->out, 3 * begin, j->lanes);
+    if (f >= faces) add_drift(j, f, &sum);
+}
+
+static void follow_chunk(void *context, size_t i)
+{
+    const carry_job *j = context;
+    size_t nf = j->c->target->nf, first = i * CHUNK, last = first + CHUNK < nf ? first + CHUNK : nf;
+    for (size_t f = first; f < last; f++)
+        if (!j->c->is_twin[f]) follow(j, f);
+}
+
+/* Corner by corner, and from the order of the twins to that of the target. */
+static void transfer_twins(const carry_job *j)
+{
+    const vg_carrier *c = j->c;
+    if (!c->ntwins) return;
+    vg_deformer_transfer(c->deformer, j->lanes, VG_VERTICES, j->poses, c->twin_vectors);
+    for (size_t k = 0; k < j->lanes; k++)
+        for (size_t i = 0; i < c->ntwins; i++) {
+            size_t from = c->twins->start[i], n = c->twins->start[i + 1] - from;
+            memcpy(j->out[k] + 3 * (size_t)c->target->start[c->twin[i]], c->twin_vectors[k] + 3 * from,
+                   3 * n * sizeof(double));
+        }
+}
+
+void vg_carrier_transfer(vg_carrier *c, size_t n, const double *const *poses, double *const *vectors)
+{
+    for (size_t p = 0; p < n; p += VGI_LANES) {
+        carry_job j = {.c = c, .out = vectors + p, .lanes = n - p < VGI_LANES ? n - p : VGI_LANES};
+        for (size_t k = 0; k < VGI_LANES; k++) j.poses[k] = poses[p + (k < j.lanes ? k : j.lanes - 1)];
+        vgi_parallel(c->threads, (c->source->nf + CHUNK - 1) / CHUNK, measure_chunk, &j);
+        transfer_twins(&j);
+        vgi_parallel(c->threads, (c->target->nf + CHUNK - 1) / CHUNK, follow_chunk, &j);
+    }
+}

@@ -1,0 +1,480 @@
+/* envelope.c: the fit of a map of bones to poses (MATH 6; T 5): which bone each corner goes with and how it lies in
+ * it, the vertices that are held, and the operator that all of it collapses into.
+ * Leaves out the sums over the poses (rig_sums.c), weights (skin.c), and motions that are not known (inverse_skin.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "numeric/vec3.h"
+#include "numeric/dense.h"
+#include "method/rig/map_parts.h"
+#include "method/rig/skin.h"
+#include "model/rig.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { CHUNK = 64, MOST_HELD = 2048, NEAR = 32, AROUND = 8 };
+
+struct vg_rig_fitter {
+    vg_head *h;
+    vg_rig_options o;
+    vg_graph *g;
+    vgi_turns turns;
+    vgi_rig_sums sums;
+    double *miss; /* nv: what linear blend skinning leaves */
+};
+
+int vg_rig_fitter_new(vg_rig_fitter **out, vg_head *h, const vg_rig_options *o, vg_err *e)
+{
+    *out = NULL;
+    if (!h->rig.nbones) return vg_fail(e, VG_EINPUT, "there is no skeleton to fit");
+    if (o->bones_per_corner < 1 || o->bones_per_corner > 2)
+        return vg_fail(e, VG_EARG, "a corner has 1 or 2 bones, not %zu", o->bones_per_corner);
+    vg_rig_fitter *f = *out = vgi_array(1, sizeof *f, e);
+    if (!f) return VG_ENOMEM;
+    f->h = h, f->o = *o;
+    double *at = vgi_array(3 * h->rig.nbones, sizeof *at, e);
+    int r = at ? vg_head_prepare_vectors(h, e) : VG_ENOMEM;
+    for (size_t b = 0; r == VG_OK && b < h->rig.nbones; b++)
+        memcpy(at + 3 * b, h->rig.at + 3 * (size_t)h->rig.bone[b], 3 * sizeof *at);
+    if (r == VG_OK) r = vg_graph_new(&f->g, h, e);
+    if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->nf, f->g->start, f->g->vert, h->reference, e);
+    if (r == VG_OK) r = vgi_rig_sums_make(&f->sums, h->mesh.nv, h->rig.nbones, at, &f->turns, e);
+    if (r == VG_OK && !(f->miss = vgi_array(h->mesh.nv, sizeof *f->miss, e))) r = VG_ENOMEM;
+    free(at);
+    if (r < 0) vg_rig_fitter_free(out);
+    return r;
+}
+
+void vg_rig_fitter_free(vg_rig_fitter **out)
+{
+    vg_rig_fitter *f = *out;
+    if (!f) return;
+    vg_graph_free(&f->g);
+    vgi_turns_clear(&f->turns);
+    vgi_rig_sums_clear(&f->sums);
+    free(f->miss);
+    free(f);
+    *out = NULL;
+}
+
+void vg_rig_fitter_add(vg_rig_fitter *f, size_t n, const double *const *poses, const double *const *transforms)
+{
+    enum { SOME = 32 };
+    const double *p[SOME], *t[SOME];
+    size_t count = 0;
+    for (size_t k = 0; k < n; k++) {
+        if (!memcmp(poses[k], f->h->reference, 3 * f->h->mesh.nv * sizeof(double))) continue; /* it says nothing */
+        p[count] = poses[k], t[count++] = transforms[k];
+        if (count == SOME) {
+            vgi_rig_sums_add(&f->sums, count, p, t, f->o.threads);
+            count = 0;
+        }
+    }
+    vgi_rig_sums_add(&f->sums, count, p, t, f->o.threads);
+}
+
+/* ---- corners ---- */
+
+typedef struct cornering {
+    const vg_rig_fitter *f;
+    vg_map *m;
+    size_t chunks;
+    double *space; /* per chunk: 4 n */
+} cornering;
+
+/* The sum of squared scales of a bone. */
+static double weight_of(const vgi_rig_sums *s, size_t j)
+{
+    return s->cross[4 * j * 4 * s->n + 4 * j];
+}
+
+/* The rotation of a face beside bone j. */
+static void face_turn(const vgi_rig_sums *s, size_t face, size_t j, double q[4])
+{
+    double m[9], h[9];
+    for (size_t i = 0; i < 3; i++)
+        for (size_t k = 0; k < 3; k++) m[3 * i + k] = s->turn[(3 * face + k) * 3 * s->n + 3 * j + i];
+    vgi_fit_rotation(m, h);
+    vg_quat_from_matrix(h, q);
+}
+
+/* The quaternion that takes reference vector r to u: as its face turns, then by the smallest rotation. */
+static void corner_quaternion(const vgi_rig_sums *s, size_t face, size_t j, const double r[3], const double u[3],
+                              double q[4])
+{
+    double turn[4], turned[3], rest[4] = {1, 0, 0, 0};
+    face_turn(s, face, j, turn);
+    vg_quat_apply(turn, r, turned);
+    if (vgi_dot(r, r) > 0 && vgi_dot(u, u) > 1e-18 * vgi_dot(r, r)) vg_quat_between(turned, u, rest);
+    else if (vgi_dot(r, r) > 0) rest[0] = 1e-9; /* it vanishes */
+    vg_quat_multiply(rest, turn, q);
+}
+
+/* The bones that a face may go with: those that move its vertices, by their skin. */
+static size_t face_bones(const vg_rig_fitter *f, size_t face, uint32_t *list)
+{
+    const vg_rig *r = &f->h->rig;
+    size_t n = 0;
+    for (uint32_t c = f->g->start[face]; c < f->g->start[face + 1]; c++)
+        for (size_t s = VG_SKIN * f->g->vert[c]; s < VG_SKIN * (f->g->vert[c] + 1); s++) {
+            size_t i = 0;
+            while (i < n && list[i] != r->skin_bone[s]) i++;
+            if (i == n && n < NEAR && r->skin_weight[s] > 0) list[n++] = r->skin_bone[s];
+        }
+    return n;
+}
+
+/* Least squares for d = A_a x + A_b y over the poses: x and y; returns how much of sum |d|^2 they explain. The
+ * unknowns are x + y and y, the latter with a ridge: where both bones move alike the first has it all. */
+static double pair_vectors(const vgi_rig_sums *s, size_t a, size_t b, const double *raw, double x[3], double y[3])
+{
+    static const double ridge = 1e-4;
+    size_t width = 4 * s->n;
+    double m[36] = {0}, z[6], explained = 0, wa = weight_of(s, a), wb = weight_of(s, b);
+    for (size_t i = 0; i < 3; i++)
+        for (size_t k = 0; k < 3; k++) {
+            double ab = s->cross[(4 * a + i) * width + 4 * b + k], ba = s->cross[(4 * b + i) * width + 4 * a + k];
+            m[6 * i + k] = i == k ? wa : 0;
+            m[6 * (3 + i) + k] = ba - (i == k ? wa : 0);
+            m[6 * (3 + i) + 3 + k] = (i == k ? (1 + ridge) * wa + wb : 0) - ab - ba;
+        }
+    for (size_t k = 0; k < 3; k++) z[k] = raw[4 * a + k], z[3 + k] = raw[4 * b + k] - raw[4 * a + k];
+    if (!vgi_cholesky_dense(m, 6)) return -INFINITY;
+    vgi_cholesky_dense_solve(m, 6, z, 1);
+    for (size_t k = 0; k < 3; k++) {
+        y[k] = z[3 + k], x[k] = z[k] - z[3 + k];
+        explained += x[k] * raw[4 * a + k] + y[k] * raw[4 * b + k];
+    }
+    return explained;
+}
+
+/* One corner: raw: for each bone the sum of A' d, in steps of 4. */
+static void fit_corner(const cornering *x, size_t face, size_t c, const double *raw, const uint32_t *list, size_t n)
+{
+    const vgi_rig_sums *s = &x->f->sums;
+    const double *r = x->f->turns.vector + 3 * c;
+    size_t per = x->m->per_corner, best = list[0];
+    double most = -1, u[3], w[3];
+    for (size_t i = 0; i < n; i++) {
+        const double *own = raw + 4 * (size_t)list[i];
+        double explained = vgi_dot(own, own) / weight_of(s, list[i]);
+        if (explained > most) most = explained, best = list[i];
+    }
+    for (size_t k = 0; k < 3; k++) u[k] = raw[4 * best + k] / weight_of(s, best);
+    if (per == 2) {
+        size_t second = best;
+        double more = -INFINITY, p[3], q[3];
+        for (size_t i = 0; i < n; i++) {
+            if (list[i] == best) continue;
+            double explained = pair_vectors(s, best, list[i], raw, p, q);
+            if (explained > more) more = explained, second = list[i];
+        }
+        if (second != best && more > most) pair_vectors(s, best, second, raw, u, w);
+        else
+            for (size_t k = 0; k < 3; k++) second = best, u[k] *= 0.5, w[k] = u[k];
+        x->m->corner_bone[2 * c + 1] = (uint32_t)second;
+        corner_quaternion(s, face, second, r, w, x->m->corner + 4 * (2 * c + 1));
+    }
+    x->m->corner_bone[per * c] = (uint32_t)best;
+    corner_quaternion(s, face, best, r, u, x->m->corner + 4 * per * c);
+}
+
+static void fit_faces(void *context, size_t task)
+{
+    const cornering *x = context;
+    const vg_graph *g = x->f->g;
+    const vgi_rig_sums *s = &x->f->sums;
+    size_t faces = g->nf - g->nlinks, first = task * faces / x->chunks, last = (task + 1) * faces / x->chunks,
+           width = 4 * s->n;
+    double *raw = x->space + task * 2 * width, *mean = raw + width;
+    for (size_t face = first; face < last; face++) {
+        uint32_t list[NEAR];
+        size_t n = face_bones(x->f, face, list), begin = g->start[face], r = g->start[face + 1] - begin;
+        for (size_t b = 0; b < n; b++)
+            for (size_t i = 4 * list[b]; i < 4 * (size_t)list[b] + 3; i++) {
+                mean[i] = 0;
+                for (size_t c = begin; c < begin + r; c++) mean[i] += s->pull[g->vert[c] * width + i] / (double)r;
+            }
+        for (size_t c = begin; c < begin + r; c++) {
+            for (size_t b = 0; b < n; b++)
+                for (size_t i = 4 * list[b]; i < 4 * (size_t)list[b] + 3; i++)
+                    raw[i] = s->pull[g->vert[c] * width + i] - mean[i];
+            fit_corner(x, face, c, raw, list, n);
+        }
+    }
+}
+
+static int fit_corners(const vg_rig_fitter *f, vg_map *m, vg_err *e)
+{
+    cornering x = {f, m, f->g->nf < CHUNK ? 1 : CHUNK, NULL};
+    if (!(x.space = vgi_array(x.chunks, 8 * m->n * sizeof *x.space, e))) return VG_ENOMEM;
+    vgi_parallel(f->o.threads, x.chunks, fit_faces, &x);
+    for (size_t i = m->per_corner * (size_t)f->g->start[f->g->nf - f->g->nlinks]; i < m->per_corner * m->ncorners;
+         i++)
+        m->corner[4 * i] = 1; /* links follow the skin of their ends */
+    free(x.space);
+    return VG_OK;
+}
+
+/* ---- vertices that are held ---- */
+
+/* How far from rigid vertex v moves with the bone that suits it best, in mesh units. */
+static double rigidity(const vgi_rig_sums *s, size_t v)
+{
+    size_t width = 4 * s->n;
+    double least = INFINITY;
+    for (size_t j = 0; j < s->n; j++) {
+        const double *c = s->cross + 4 * j * width + 4 * j, *y = s->pull + v * width + 4 * j;
+        const double d[3] = {y[0] - c[3], y[1] - c[width + 3], y[2] - c[2 * width + 3]};
+        double left = s->square[v] - 2 * y[3] + c[3 * width + 3] - vgi_dot(d, d) / c[0];
+        if (left < least) least = left;
+    }
+    return least > 0 ? sqrt(least / (double)s->poses) : 0;
+}
+
+typedef struct choosing {
+    const vg_rig_fitter *f;
+    double *doubt;    /* per vertex: how little it moves rigidly and as its skin does */
+    double *distance; /* squared, from the nearest one chosen; -1: not to be chosen */
+    uint32_t *list;
+    size_t n;
+} choosing;
+
+static void hold(choosing *x, size_t v)
+{
+    const double *p = x->f->h->reference, *at = p + 3 * v;
+    x->list[x->n++] = (uint32_t)v;
+    for (size_t i = 0; i < x->f->g->nv; i++, p += 3) {
+        double d =
+            (p[0] - at[0]) * (p[0] - at[0]) + (p[1] - at[1]) * (p[1] - at[1]) + (p[2] - at[2]) * (p[2] - at[2]);
+        if (d < x->distance[i]) x->distance[i] = d;
+    }
+    x->distance[v] = -1;
+}
+
+/* One vertex for each bone of each component: the least doubtful. */
+static int hold_groups(choosing *x, vg_err *e)
+{
+    const vg_head *h = x->f->h;
+    size_t nv = h->mesh.nv, bones = h->rig.nbones, components, slots;
+    uint32_t *label = vgi_array(nv, sizeof *label, e), *best = NULL;
+    int r = label ? vg_mesh_components(&h->mesh, label, &components, e) : VG_ENOMEM;
+    if (r == VG_OK && !vgi_mul(components, bones, &slots))
+        r = vg_fail(e, VG_ENOMEM, "not enough memory for %zu bones of %zu components", bones, components);
+    if (r == VG_OK && !(best = vgi_array(slots, sizeof *best, e))) r = VG_ENOMEM;
+    for (size_t v = 0; r == VG_OK && v < nv; v++) {
+        if (x->distance[v] < 0) continue;
+        uint32_t *to = &best[label[v] * bones + h->rig.skin_bone[VG_SKIN * v]];
+        if (!*to || x->doubt[v] < x->doubt[*to - 1]) *to = (uint32_t)v + 1;
+    }
+    for (size_t i = 0; r == VG_OK && i < slots && x->n < MOST_HELD; i++)
+        if (best[i]) hold(x, best[i] - 1);
+    free(label);
+    free(best);
+    return r;
+}
+
+static int by_number(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* Then those far from all chosen ones and little doubtful, until the share is reached. */
+static int choose_held(const vg_rig_fitter *f, vg_map *m, vg_err *e)
+{
+    static const double tolerance = 1e-3; /* of D: doubts below it do not count */
+    size_t nv = f->g->nv, want = (size_t)(f->o.hold * (double)f->g->attached + 0.5);
+    double d = vg_diagonal(f->h->reference, nv);
+    choosing x = {.f = f,
+                  .doubt = vgi_array(nv, sizeof *x.doubt, e),
+                  .distance = vgi_array(nv, sizeof *x.distance, e),
+                  .list = vgi_array(nv, sizeof *x.list, e)};
+    int r = x.doubt && x.distance && x.list ? VG_OK : VG_ENOMEM;
+    for (size_t v = 0; r == VG_OK && v < nv; v++) {
+        x.distance[v] = f->g->in_face[v] ? 4 * d * d : -1;
+        x.doubt[v] = (rigidity(&f->sums, v) + f->miss[v]) / (d > 0 ? tolerance * d : 1);
+    }
+    if (r == VG_OK) r = hold_groups(&x, e);
+    while (r == VG_OK && x.n < want && x.n < MOST_HELD) {
+        size_t best = nv;
+        double most = 0;
+        for (size_t v = 0; v < nv; v++) {
+            double value = x.distance[v] / (1 + x.doubt[v] * x.doubt[v]);
+            if (value > most) most = value, best = v;
+        }
+        if (best == nv) break;
+        hold(&x, best);
+    }
+    if (r == VG_OK) {
+        qsort(x.list, x.n, sizeof *x.list, by_number);
+        m->held = x.list, m->nheld = x.n, x.list = NULL;
+    }
+    free(x.doubt);
+    free(x.distance);
+    free(x.list);
+    return r;
+}
+
+/* ---- what is left ---- */
+
+typedef struct refining {
+    const vg_rig_fitter *f;
+    vg_map *m;
+    double origin[3]; /* of the reference pose */
+    uint32_t *parent; /* of each bone */
+    size_t chunks;
+    double *space; /* per chunk: 4 n */
+} refining;
+
+/* Element (i, k) x (j, l) of the sums of T_i' T_j, the reference pose among the poses. */
+static double cross_with_reference(const refining *x, size_t i, size_t k, size_t j, size_t l)
+{
+    const vgi_rig_sums *s = &x->f->sums;
+    const double *a = s->at + 3 * i, *b = s->at + 3 * j, *o = x->origin;
+    double sum = s->cross[(4 * i + k) * 4 * s->n + 4 * j + l];
+    if (k < 3 && l < 3) return sum + (k == l);
+    if (k < 3) return sum + b[k] - o[k];
+    if (l < 3) return sum + a[l] - o[l];
+    return sum + (a[0] - o[0]) * (b[0] - o[0]) + (a[1] - o[1]) * (b[1] - o[1]) + (a[2] - o[2]) * (b[2] - o[2]);
+}
+
+/* What the poses have of vertex v beyond what row z (seen from the joints) makes, along number k of bone i. */
+static double missing(const refining *x, size_t v, const double *z, size_t i, size_t k)
+{
+    const vgi_rig_sums *s = &x->f->sums;
+    const double *p = x->f->h->reference + 3 * v, *a = s->at + 3 * i, *o = x->origin;
+    double sum = s->pull[v * 4 * s->n + 4 * i + k];
+    if (k < 3) sum += p[k] - o[k];
+    else sum += (p[0] - o[0]) * (a[0] - o[0]) + (p[1] - o[1]) * (a[1] - o[1]) + (p[2] - o[2]) * (a[2] - o[2]);
+    for (size_t j = 0; j < s->n; j++)
+        for (size_t l = 0; l < 4; l++)
+            if (z[4 * j + l] != 0) sum -= cross_with_reference(x, i, k, j, l) * z[4 * j + l];
+    return sum;
+}
+
+/* The vertex's own bones, then those above and below the first two. */
+static size_t bones_around(const refining *x, size_t v, uint32_t *list)
+{
+    const vg_rig *r = &x->f->h->rig;
+    size_t n = 0, own;
+    while (n < VG_SKIN && r->skin_weight[VG_SKIN * v + n] > 0) list[n] = r->skin_bone[VG_SKIN * v + n], n++;
+    own = n < 2 ? n : 2;
+    for (size_t i = 0; i < own; i++)
+        for (size_t b = 0; b < r->nbones && n < AROUND; b++) {
+            if (x->parent[b] != list[i] && x->parent[list[i]] != b) continue;
+            bool there = false;
+            for (size_t k = 0; k < n; k++) there |= list[k] == b;
+            if (!there) list[n++] = (uint32_t)b;
+        }
+    return n;
+}
+
+/* Ridge regression on the motions of the vertex's own bones; of their places only differences count, so that what
+ * moves as a whole does so still. */
+static void refine_vertex(const refining *x, size_t v, double *z)
+{
+    enum { MOST = 4 * AROUND };
+    size_t n = x->m->n, bones = 0, unknowns = 0, bone[MOST], number[MOST];
+    double *row = x->m->weights + v * 4 * n, s[MOST * MOST], y[MOST], d[AROUND][4] = {{0}};
+    uint32_t own[AROUND];
+    for (size_t j = 0; j < n; j++) {
+        for (size_t k = 0; k < 3; k++) z[4 * j + k] = row[4 * j + k] - row[4 * j + 3] * x->f->sums.at[3 * j + k];
+        z[4 * j + 3] = row[4 * j + 3];
+    }
+    bones = bones_around(x, v, own);
+    for (size_t b = 0; b < bones; b++)
+        for (size_t k = 0; k < 4; k++)
+            if (b || k < 3) bone[unknowns] = b, number[unknowns++] = k;
+    double base = missing(x, v, z, own[0], 3);
+    for (size_t i = 0; i < unknowns; i++) {
+        size_t a = own[bone[i]], k = number[i];
+        y[i] = missing(x, v, z, a, k) - (k == 3 ? base : 0);
+        for (size_t j = 0; j <= i; j++) {
+            size_t c = own[bone[j]], l = number[j];
+            double sum = cross_with_reference(x, a, k, c, l);
+            if (k == 3) sum -= cross_with_reference(x, own[0], 3, c, l);
+            if (l == 3) sum -= cross_with_reference(x, a, k, own[0], 3);
+            if (k == 3 && l == 3) sum += cross_with_reference(x, own[0], 3, own[0], 3);
+            s[i * unknowns + j] = sum;
+        }
+    }
+    for (size_t i = 0; i < unknowns; i++) s[i * unknowns + i] *= 1 + x->f->o.refine;
+    if (!vgi_cholesky_dense(s, unknowns)) return;
+    vgi_cholesky_dense_solve(s, unknowns, y, 1);
+    for (size_t i = 0; i < unknowns; i++) {
+        d[bone[i]][number[i]] += y[i];
+        if (number[i] == 3) d[0][3] -= y[i];
+    }
+    for (size_t b = 0; b < bones; b++) {
+        double *to = row + 4 * (size_t)own[b];
+        for (size_t k = 0; k < 3; k++) to[k] += d[b][k] + d[b][3] * x->f->sums.at[3 * (size_t)own[b] + k];
+        to[3] += d[b][3];
+    }
+}
+
+static void refine_chunk(void *context, size_t task)
+{
+    const refining *x = context;
+    size_t nv = x->m->nv, first = task * nv / x->chunks, last = (task + 1) * nv / x->chunks;
+    for (size_t v = first; v < last; v++)
+        if (x->f->g->in_face[v]) refine_vertex(x, v, x->space + task * 4 * x->m->n);
+}
+
+static int refine(const vg_rig_fitter *f, vg_map *m, vg_err *e)
+{
+    refining x = {.f = f, .m = m, .chunks = m->nv < CHUNK ? 1 : CHUNK};
+    if (!(f->o.refine > 0)) return VG_OK;
+    x.space = vgi_array(x.chunks, 4 * m->n * sizeof *x.space, e);
+    x.parent = vgi_array(m->n, sizeof *x.parent, e);
+    int r = x.space && x.parent ? vgi_rig_parents(&f->h->rig, x.parent, e) : VG_ENOMEM;
+    vg_centroid(f->h->reference, m->nv, x.origin);
+    if (r == VG_OK) vgi_parallel(f->o.threads, x.chunks, refine_chunk, &x);
+    free(x.space);
+    free(x.parent);
+    return r;
+}
+
+/* ---- the map ---- */
+
+static int make_arrays(const vg_rig_fitter *f, vg_map *m, bool corners, vg_err *e)
+{
+    const vg_rig *r = &f->h->rig;
+    size_t n = r->nbones, nv = f->g->nv;
+    *m = (vg_map){.n = n,
+                  .nv = nv,
+                  .kind = VG_MAP_BONES,
+                  .size = 1,
+                  .per_corner = corners ? f->o.bones_per_corner : 1,
+                  .ncorners = corners ? vg_graph_corners(f->g) : 0};
+    m->place = vgi_array(n, 3 * n * sizeof *m->place, e);
+    m->centre = vgi_copy_array(f->sums.at, 3 * n, sizeof *m->centre, e);
+    m->home_centre = vgi_copy_array(f->sums.at, 3 * n, sizeof *m->centre, e);
+    m->share = vgi_array(n, sizeof *m->share, e);
+    m->weights = vgi_array(nv, 4 * n * sizeof *m->weights, e);
+    m->corner = vgi_array(m->ncorners * m->per_corner, 4 * sizeof *m->corner, e);
+    m->corner_bone = vgi_array(m->ncorners, m->per_corner * sizeof *m->corner_bone, e);
+    if (!m->place || !m->centre || !m->home_centre || !m->share || !m->weights || !m->corner || !m->corner_bone)
+        return VG_ENOMEM;
+    for (size_t s = 0; s < VG_SKIN * nv; s++) m->share[r->skin_bone[s]] += r->skin_weight[s] / (double)nv;
+    return vgi_place_by_bones(r, m, m->place, e);
+}
+
+int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_err *e)
+{
+    vg_head *h = f->h;
+    vg_map *m = &h->map;
+    if (!f->sums.poses) return vg_fail(e, VG_EINPUT, "there are no poses but the reference to fit a rig to");
+    vg_map_clear(m);
+    int r = vgi_skin_fit(&h->rig, &f->sums, h->reference, f->o.threads, f->miss, e);
+    if (r == VG_OK) r = make_arrays(f, m, method == VG_RIG_ENVELOPE, e);
+    if (r == VG_OK && method == VG_RIG_LBS) {
+        for (size_t v = 0; v < m->nv; v++) vgi_map_skin_row(h, v);
+        return VG_OK;
+    }
+    if (r == VG_OK) r = fit_corners(f, m, e);
+    if (r == VG_OK) r = choose_held(f, m, e);
+    if (r == VG_OK) r = vgi_map_collapse(h, f->g, NULL, f->turns.vector, f->o.threads, e);
+    if (r == VG_OK) r = refine(f, m, e);
+    if (r < 0) vg_map_clear(m);
+    return r;
+}

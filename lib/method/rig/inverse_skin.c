@@ -1,0 +1,493 @@
+/* inverse_skin.c: the motions of the bones of a rig in poses that are known by their vertices only, and weights for such a
+ * rig.
+ *
+ * With the joints together, linear blend skinning is linear in the rotations R_j of the bones: vertex v is at p + sum
+ * of R_j q_vj, p the place of the first joint, q_vj made of the weights and the reference pose. So over all vertices
+ * the squared distance is a quadratic tr(R G R') - 2 tr(R B') in R = [R_1 R_2 ...], whose G belongs to the rig and
+ * whose B is one pass over the pose. It is minimised over rotations: each bone in turn at first, then all at once by
+ * damped Gauss-Newton steps.
+ * Leaves out how weights are fitted to known motions (skin.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "numeric/vec3.h"
+#include "numeric/dense.h"
+#include "numeric/blas.h"
+#include "numeric/polar.h"
+#include "method/rig/skin.h"
+#include "model/rig.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { BLOCK = 8, SHARES = 8, SWEEPS = 8, STEPS = 30, ROUNDS = 30 };
+static const double FIRST_PRIOR = 1e-3,
+                    LAST_PRIOR = 1e-10; /* pull of a bone towards its parent, beside that of the vertices */
+
+struct vg_bender {
+    size_t nv, n; /* vertices, bones */
+    int threads;
+    double least;     /* turns smaller than this, in radians, are none */
+    uint32_t *parent; /* of each bone; each before its children */
+    double *at;       /* 3 n: the joints */
+    double *offset;   /* 3 n: from the parent's joint */
+    uint32_t *bone;   /* VG_SKIN per vertex */
+    double *weight,
+        *local;    /* per bone of a vertex: its weight, and weight times the vertex, seen from the joint: 3 numbers */
+    double *g;     /* 3 n x 3 n */
+    double *mean;  /* 3 n: mean of q */
+    double *size;  /* n: trace of the diagonal blocks of g */
+    double *own;   /* 4 n: sums over a bone's own vertices of local and of the weight */
+    bool *carries; /* n: whether a bone, or one below it, has vertices */
+    double *space; /* BLOCK times working space */
+};
+
+/* Working space of one pose. */
+typedef struct bending {
+    double *r, *trial, *b, *sum, *h, *step; /* 9 n, 9 n, 9 n, 3 n, (3 n)^2, 3 n */
+} bending;
+
+static size_t space_of(size_t n)
+{
+    return 27 * n + 6 * n + 9 * n * n;
+}
+
+static bending bending_at(const vg_bender *x, size_t i)
+{
+    double *p = x->space + i * space_of(x->n);
+    size_t n = x->n;
+    return (bending){p, p + 9 * n, p + 18 * n, p + 27 * n, p + 33 * n, p + 30 * n};
+}
+
+/* The q of vertex v, for the bones listed in `list`: 3 numbers each in q. */
+static size_t vertex_row(const vg_bender *x, size_t v, uint32_t *list, double *q, bool *seen)
+{
+    size_t count = 0;
+    for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++) {
+        if (!(x->weight[s] > 0)) continue;
+        const double *add = x->local + 3 * s;
+        double w = 1;
+        for (uint32_t j = x->bone[s], from = VGI_NO_BONE; j != VGI_NO_BONE; from = j, j = x->parent[j]) {
+            if (from != VGI_NO_BONE) add = x->offset + 3 * (size_t)from, w = x->weight[s];
+            if (!seen[j]) {
+                seen[j] = true, list[count++] = j;
+                q[3 * j] = q[3 * j + 1] = q[3 * j + 2] = 0;
+            }
+            for (size_t k = 0; k < 3; k++) q[3 * j + k] += w * add[k];
+        }
+    }
+    for (size_t i = 0; i < count; i++) seen[list[i]] = false;
+    return count;
+}
+
+/* The sums over one share of the vertices; shares are fixed, so that the threads do not change the result. */
+typedef struct summing {
+    const vg_bender *x;
+    uint32_t *list; /* n for each share, as all else */
+    bool *seen;
+    double *q, *mean, *g; /* 3 n, 3 n, 3 n x 3 n: blocks with row >= column */
+} summing;
+
+static void sum_share(void *context, size_t share)
+{
+    const summing *s = context;
+    const vg_bender *x = s->x;
+    size_t n = x->n, width = 3 * n, last = (share + 1) * x->nv / SHARES;
+    uint32_t *list = s->list + share * n;
+    double *q = s->q + share * width, *mean = s->mean + share * width, *g = s->g + share * width * width;
+    for (size_t v = share * x->nv / SHARES; v < last; v++) {
+        size_t count = vertex_row(x, v, list, q, s->seen + share * n);
+        for (size_t a = 0; a < count; a++) {
+            const double *p = q + 3 * (size_t)list[a];
+            for (size_t k = 0; k < 3; k++) mean[3 * list[a] + k] += p[k];
+            for (size_t b = 0; b < count; b++) {
+                if (list[b] > list[a]) continue;
+                const double *r = q + 3 * (size_t)list[b];
+                double *to = g + 3 * list[a] * width + 3 * list[b];
+                for (size_t k = 0; k < 3; k++, to += width)
+                    to[0] += p[k] * r[0], to[1] += p[k] * r[1], to[2] += p[k] * r[2];
+            }
+        }
+    }
+}
+
+static void finish_quadratic(vg_bender *x, const summing *s)
+{
+    size_t n = x->n, width = 3 * n;
+    double count = (double)x->nv, largest = 0;
+    for (size_t k = 0; k < SHARES; k++)
+        for (size_t i = 0; i < width; i++) x->mean[i] += s->mean[k * width + i] / count;
+    for (size_t i = 0; i < width; i++)
+        for (size_t j = 0; j < 3 * (i / 3 + 1); j++) {
+            double sum = 0;
+            for (size_t k = 0; k < SHARES; k++) sum += s->g[(k * width + i) * width + j];
+            x->g[i * width + j] = x->g[j * width + i] = sum / count - x->mean[i] * x->mean[j];
+        }
+    for (size_t j = 0; j < n; j++) {
+        for (size_t k = 0; k < 3; k++) x->size[j] += x->g[(3 * j + k) * (width + 1)];
+        if (x->size[j] > largest) largest = x->size[j];
+    }
+    for (size_t j = 0; j < n; j++) /* bones that move nothing */
+        if (!(x->size[j] > 1e-6 * largest)) x->size[j] = largest > 0 ? 1e-6 * largest : 1;
+}
+
+static int make_quadratic(vg_bender *x, vg_err *e)
+{
+    size_t n = x->n, width = 3 * n;
+    summing s = {.x = x};
+    s.list = vgi_array(SHARES * n, sizeof *s.list, e), s.seen = vgi_array(SHARES * n, sizeof *s.seen, e);
+    s.q = vgi_array(SHARES * width, sizeof *s.q, e), s.mean = vgi_array(SHARES * width, sizeof *s.mean, e);
+    s.g = vgi_array(SHARES * width, width * sizeof *s.g, e);
+    bool ok = s.list && s.seen && s.q && s.mean && s.g;
+    if (ok) {
+        vgi_parallel(x->threads, SHARES, sum_share, &s);
+        finish_quadratic(x, &s);
+    }
+    free(s.list);
+    free(s.seen);
+    free(s.q);
+    free(s.mean);
+    free(s.g);
+    return ok ? VG_OK : VG_ENOMEM;
+}
+
+static int make_arrays(vg_bender *x, const vg_rig *r, vg_err *e)
+{
+    size_t n = x->n, nv = x->nv;
+    x->parent = vgi_array(n, sizeof *x->parent, e);
+    x->at = vgi_array(3 * n, sizeof *x->at, e), x->offset = vgi_array(3 * n, sizeof *x->offset, e);
+    x->bone = vgi_copy_array(r->skin_bone, VG_SKIN * nv, sizeof *x->bone, e);
+    x->weight = vgi_copy_array(r->skin_weight, VG_SKIN * nv, sizeof *x->weight, e);
+    x->local = vgi_array(VG_SKIN * nv, 3 * sizeof *x->local, e);
+    x->g = vgi_array(3 * n, 3 * n * sizeof *x->g, e), x->mean = vgi_array(3 * n, sizeof *x->mean, e);
+    x->size = vgi_array(n, sizeof *x->size, e), x->own = vgi_array(4 * n, sizeof *x->own, e);
+    x->carries = vgi_array(n, sizeof *x->carries, e);
+    x->space = vgi_array(BLOCK, space_of(n) * sizeof *x->space, e);
+    bool ok = x->parent && x->at && x->offset && x->bone && x->weight && x->local && x->g && x->mean && x->size &&
+              x->own && x->carries && x->space;
+    return ok ? VG_OK : VG_ENOMEM;
+}
+
+/* The rest of the bones and of the vertices, seen from them. */
+static void read_rest(vg_bender *x, const vg_rig *r, const double *reference)
+{
+    for (size_t b = 0; b < x->n; b++)
+        for (size_t k = 0; k < 3; k++) {
+            x->at[3 * b + k] = r->at[3 * (size_t)r->bone[b] + k];
+            if (b) x->offset[3 * b + k] = x->at[3 * b + k] - x->at[3 * (size_t)x->parent[b] + k];
+        }
+    for (size_t s = 0; s < VG_SKIN * x->nv; s++) {
+        double *own = x->own + 4 * (size_t)x->bone[s];
+        for (size_t k = 0; k < 3; k++) {
+            double away = reference[3 * (s / VG_SKIN) + k] - x->at[3 * (size_t)x->bone[s] + k];
+            own[k] += x->local[3 * s + k] = x->weight[s] * away;
+        }
+        own[3] += x->weight[s];
+    }
+    for (size_t b = x->n; b-- > 0;) {
+        x->carries[b] = x->carries[b] || x->own[4 * b + 3] > 0;
+        if (b && x->carries[b]) x->carries[x->parent[b]] = true;
+    }
+}
+
+int vg_bender_new(vg_bender **out, const vg_rig *r, size_t nv, const double *reference, int threads, vg_err *e)
+{
+    *out = NULL;
+    if (!r->nbones || !r->skin_bone) return vg_fail(e, VG_EINPUT, "there is no rig with weights");
+    vg_bender *x = *out = vgi_array(1, sizeof *x, e);
+    if (!x) return VG_ENOMEM;
+    x->n = r->nbones, x->nv = nv, x->threads = threads, x->least = 1e-7;
+    int code = make_arrays(x, r, e);
+    if (code == VG_OK) code = vgi_rig_parents(r, x->parent, e);
+    if (code == VG_OK) {
+        read_rest(x, r, reference);
+        code = make_quadratic(x, e);
+    }
+    if (code < 0) vg_bender_free(out);
+    return code;
+}
+
+void vg_bender_free(vg_bender **out)
+{
+    vg_bender *x = *out;
+    if (!x) return;
+    free(x->parent);
+    free(x->at);
+    free(x->offset);
+    free(x->bone);
+    free(x->weight);
+    free(x->local);
+    free(x->g);
+    free(x->mean);
+    free(x->size);
+    free(x->own);
+    free(x->carries);
+    free(x->space);
+    free(x);
+    *out = NULL;
+}
+
+/* B of a pose whose centroid is taken for the origin: 3 x 3 for each bone, first what its own vertices say,
+ * then what it carries. */
+static void load(const vg_bender *x, const double *pose, const double centre[3], bending *w)
+{
+    size_t n = x->n;
+    memset(w->b, 0, 9 * n * sizeof *w->b);
+    memset(w->sum, 0, 3 * n * sizeof *w->sum);
+    for (size_t s = 0; s < VG_SKIN * x->nv; s++) {
+        if (!(x->weight[s] > 0)) continue;
+        const double *y = pose + 3 * (s / VG_SKIN), *q = x->local + 3 * s;
+        double *b = w->b + 9 * (size_t)x->bone[s], *sum = w->sum + 3 * (size_t)x->bone[s];
+        for (int c = 0; c < 3; c++) {
+            double d = (y[c] - centre[c]) / (double)x->nv;
+            sum[c] += x->weight[s] * d;
+            for (int k = 0; k < 3; k++) b[3 * c + k] += d * q[k];
+        }
+    }
+}
+
+static void carry(const vg_bender *x, bending *w)
+{
+    for (size_t j = x->n; j-- > 1;) {
+        size_t up = x->parent[j];
+        for (size_t c = 0; c < 3; c++) {
+            w->sum[3 * up + c] += w->sum[3 * j + c];
+            for (size_t k = 0; k < 3; k++) w->b[9 * up + 3 * c + k] += w->sum[3 * j + c] * x->offset[3 * j + k];
+        }
+    }
+}
+
+/* m = B_j - sum over i of R_i G_ij, the bone itself left out or not */
+static void left_for(const vg_bender *x, const bending *w, const double *r, size_t j, bool own, double m[9])
+{
+    size_t width = 3 * x->n;
+    memcpy(m, w->b + 9 * j, 9 * sizeof *m);
+    for (size_t i = 0; i < x->n; i++) {
+        if (i == j && !own) continue;
+        const double *a = r + 9 * i, *g = x->g + 3 * i * width + 3 * j;
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < 3; k++)
+                m[3 * c + k] -=
+                    a[3 * c] * g[k] + a[3 * c + 1] * g[width + (size_t)k] + a[3 * c + 2] * g[2 * width + (size_t)k];
+    }
+}
+
+static double objective(const vg_bender *x, const bending *w, const double *r, double prior)
+{
+    double f = 0;
+    for (size_t j = 0; j < x->n; j++) {
+        double m[9];
+        left_for(x, w, r, j, true, m); /* B - R G */
+        for (int i = 0; i < 9; i++) f -= 0.5 * r[9 * j + (size_t)i] * (m[i] + w->b[9 * j + (size_t)i]);
+        for (int i = 0; j && i < 9; i++) {
+            double d = r[9 * j + (size_t)i] - r[9 * (size_t)x->parent[j] + (size_t)i];
+            f += 0.5 * prior * x->size[j] * d * d;
+        }
+    }
+    return f;
+}
+
+/* m += prior * (what the parent and the children are) */
+static void add_prior(const vg_bender *x, const double *r, size_t j, double prior, double m[9])
+{
+    for (size_t i = 0; i < 9; i++) {
+        if (j) m[i] += prior * x->size[j] * r[9 * (size_t)x->parent[j] + i];
+        for (size_t c = j + 1; c < x->n; c++)
+            if (x->parent[c] == j) m[i] += prior * x->size[c] * r[9 * c + i];
+    }
+}
+
+static void sweep(const vg_bender *x, bending *w, double prior)
+{
+    for (size_t j = 0; j < x->n; j++) {
+        double m[9];
+        left_for(x, w, w->r, j, false, m);
+        add_prior(x, w->r, j, prior, m);
+        vgi_fit_rotation(m, w->r + 9 * j);
+    }
+}
+
+static void multiply_back(const double a[9], const double b[9], double ab[9]) /* a b' */
+{
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            ab[3 * i + k] = a[3 * i] * b[3 * k] + a[3 * i + 1] * b[3 * k + 1] + a[3 * i + 2] * b[3 * k + 2];
+}
+
+/* The Gauss-Newton system in small turns of all bones: the lower triangle of h, and the right-hand side. */
+static void make_system(const vg_bender *x, bending *w, double prior, double damping)
+{
+    size_t n = x->n, width = 3 * n;
+    for (size_t i = 0; i < n; i++) {
+        double m[9], t[9];
+        for (size_t j = 0; j <= i; j++) {
+            double g[9], s[9], trace;
+            for (size_t k = 0; k < 3; k++)
+                for (size_t l = 0; l < 3; l++) g[3 * k + l] = x->g[(3 * i + k) * width + 3 * j + l];
+            vgi_multiply(w->r + 9 * i, g, t);
+            multiply_back(t, w->r + 9 * j, s);
+            trace = s[0] + s[4] + s[8];
+            for (size_t k = 0; k < 3; k++)
+                for (size_t l = 0; l < 3; l++)
+                    w->h[(3 * i + k) * width + 3 * j + l] = (k == l ? trace : 0) - s[3 * l + k];
+        }
+        left_for(x, w, w->r, i, true, m);
+        add_prior(x, w->r, i, prior, m);
+        multiply_back(w->r + 9 * i, m, t);
+        w->step[3 * i] = t[5] - t[7], w->step[3 * i + 1] = t[6] - t[2], w->step[3 * i + 2] = t[1] - t[3];
+    }
+    for (size_t i = 0; i < n; i++) {
+        double pull = i ? 2 * prior * x->size[i] : 0;
+        for (size_t k = 0; k < 3; k++) {
+            w->h[(3 * i + k) * (width + 1)] += pull + (damping + 1e-15) * x->size[i];
+            if (!i) continue;
+            size_t up = 3 * (size_t)x->parent[i] + k;
+            w->h[up * (width + 1)] += pull;
+            w->h[(3 * i + k) * width + up] -= pull;
+        }
+    }
+}
+
+/* trial = exp(step) r; the largest turn */
+static double turn_bones(const vg_bender *x, bending *w)
+{
+    double most = 0;
+    for (size_t j = 0; j < x->n; j++) {
+        const double *s = w->step + 3 * j, half[4] = {0, 0.5 * s[0], 0.5 * s[1], 0.5 * s[2]};
+        double q[4], m[9];
+        vg_quat_exp(half, q);
+        vg_quat_matrix(q, m);
+        vgi_multiply(m, w->r + 9 * j, w->trial + 9 * j);
+        most = fmax(most, sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]));
+    }
+    return most;
+}
+
+static void descend(const vg_bender *x, bending *w, double prior)
+{
+    static const double noise = 1e-16; /* of the objective */
+    double damping = 1e-6, f = objective(x, w, w->r, prior), turn = 1;
+    for (int step = 0; step < STEPS && turn > x->least && damping < 1e6; step++) {
+        make_system(x, w, prior, damping);
+        if (!vgi_cholesky_dense(w->h, 3 * x->n)) {
+            damping = 10 * damping + 1e-9;
+            continue;
+        }
+        vgi_cholesky_dense_solve(w->h, 3 * x->n, w->step, 1);
+        turn = turn_bones(x, w);
+        double now = objective(x, w, w->trial, prior), gain = f - now;
+        if (gain < -noise * fabs(f)) {
+            damping = 10 * damping + 1e-9;
+            continue;
+        }
+        memcpy(w->r, w->trial, 9 * x->n * sizeof *w->r);
+        f = now, damping *= 0.1;
+        if (gain < noise * fabs(f))
+            break; /* the step that was just taken is the last that can be told from rounding */
+    }
+    for (size_t j = 0; j < x->n; j++) { /* what rounding has done to the products */
+        double m[9];
+        memcpy(m, w->r + 9 * j, sizeof m);
+        vgi_fit_rotation(m, w->r + 9 * j);
+    }
+}
+
+typedef struct fitting {
+    const vg_bender *x;
+    const double *const *poses;
+    double *const *transforms;
+} fitting;
+
+/* Each bone by itself at first, about the centroid of its own vertices; one without vertices as its parent. */
+static void start(const vg_bender *x, bending *w, size_t j)
+{
+    const double *own = x->own + 4 * j, *sum = w->sum + 3 * j;
+    double m[9];
+    if (!(own[3] > 0) && j) {
+        memcpy(w->r + 9 * j, w->r + 9 * (size_t)x->parent[j], 9 * sizeof *w->r);
+        return;
+    }
+    for (size_t c = 0; c < 3; c++)
+        for (size_t k = 0; k < 3; k++)
+            m[3 * c + k] = w->b[9 * j + 3 * c + k] - (own[3] > 0 ? sum[c] * own[k] / own[3] : 0);
+    vgi_fit_rotation(m, w->r + 9 * j);
+}
+
+static void fit_pose(void *context, size_t k)
+{
+    const fitting *f = context;
+    const vg_bender *x = f->x;
+    bending w = bending_at(x, k);
+    double centre[3], root[3];
+    vg_centroid(f->poses[k], x->nv, centre);
+    load(x, f->poses[k], centre, &w);
+    for (size_t j = 0; j < x->n; j++) start(x, &w, j);
+    carry(x, &w);
+    for (int i = 0; i < SWEEPS; i++) sweep(x, &w, FIRST_PRIOR);
+    descend(x, &w, FIRST_PRIOR);
+    descend(x, &w, LAST_PRIOR);
+    for (size_t j = 1; j < x->n; j++)
+        if (!x->carries[j]) memcpy(w.r + 9 * j, w.r + 9 * (size_t)x->parent[j], 9 * sizeof *w.r);
+    memcpy(root, centre, sizeof root);
+    for (size_t j = 0; j < x->n; j++)
+        for (size_t c = 0; c < 3; c++)
+            for (size_t i = 0; i < 3; i++) root[c] -= w.r[9 * j + 3 * c + i] * x->mean[3 * j + i];
+    for (size_t j = 0; j < x->n; j++) {
+        double *p = w.sum + 3 * j, *to = f->transforms[k] + 7 * j;
+        const double *o = x->offset + 3 * j, *above = w.r + 9 * (size_t)(j ? x->parent[j] : 0), *r = w.r + 9 * j;
+        const double *from = j ? w.sum + 3 * (size_t)x->parent[j] : root;
+        vg_quat_from_matrix(r, to);
+        for (size_t c = 0; c < 3; c++) {
+            p[c] = from[c] + above[3 * c] * o[0] + above[3 * c + 1] * o[1] + above[3 * c + 2] * o[2];
+            to[4 + c] =
+                p[c] - (r[3 * c] * x->at[3 * j] + r[3 * c + 1] * x->at[3 * j + 1] + r[3 * c + 2] * x->at[3 * j + 2]);
+        }
+    }
+}
+
+void vg_bender_fit(vg_bender *x, size_t n, const double *const *poses, double *const *transforms)
+{
+    int blas = vgi_product_begin();
+    for (size_t first = 0; first < n; first += BLOCK) {
+        fitting f = {x, poses + first, transforms + first};
+        vgi_parallel(x->threads, n - first < BLOCK ? n - first : BLOCK, fit_pose, &f);
+    }
+    vgi_product_end(blas);
+}
+
+/* ---- weights without motions ---- */
+
+int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, double *miss, vg_err *e)
+{
+    vg_rig *r = &h->rig;
+    size_t nv = h->mesh.nv, bones = r->nbones;
+    double before = INFINITY, **transforms = vgi_array(n, sizeof *transforms, e),
+           *space = vgi_array(n, 7 * bones * sizeof *space, e);
+    double *at = vgi_array(3 * bones, sizeof *at, e), *left = vgi_array(nv, sizeof *left, e);
+    int code = transforms && space && at && left ? VG_OK : VG_ENOMEM;
+    if (code == VG_OK) code = vgi_skin_near(r, nv, h->reference, e);
+    for (size_t i = 0; code == VG_OK && i < n; i++) transforms[i] = space + 7 * bones * i;
+    for (size_t b = 0; code == VG_OK && b < bones; b++)
+        memcpy(at + 3 * b, r->at + 3 * (size_t)r->bone[b], 3 * sizeof *at);
+    *miss = 0;
+    bool fine = false;
+    for (int round = 0; code == VG_OK && round < ROUNDS; round++) {
+        vg_bender *x = NULL;
+        vgi_rig_sums s = {0};
+        code = vg_bender_new(&x, r, nv, h->reference, threads, e);
+        if (code == VG_OK) x->least = fine ? x->least : 1e-4, vg_bender_fit(x, n, poses, transforms);
+        if (code == VG_OK) code = vgi_rig_sums_make(&s, nv, bones, at, NULL, e);
+        if (code == VG_OK) vgi_rig_sums_add(&s, n, poses, (const double *const *)transforms, threads);
+        if (code == VG_OK) code = vgi_skin_fit(r, &s, h->reference, threads, left, e);
+        vgi_rig_sums_clear(&s);
+        vg_bender_free(&x);
+        *miss = 0;
+        for (size_t v = 0; code == VG_OK && v < nv; v++) *miss += left[v] / (double)nv;
+        if (!(*miss < 0.995 * before) && fine) break;
+        fine = fine || !(*miss < 0.995 * before); /* roughly at first, then exactly */
+        before = *miss;
+    }
+    free(transforms);
+    free(space);
+    free(at);
+    free(left);
+    return code;
+}

@@ -1,0 +1,343 @@
+/* map_eval.c: a map at work: transforms of patches or bones measured, placed by joints, interpolated, and turned into
+ * vertices by one product.
+ * Leaves out fitting (map.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "numeric/vec3.h"
+#include "method/rig/map_parts.h"
+#include "numeric/blas.h"
+#include "model/rig.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { BLOCK = 32, ROWS = 256, SOME = 8 };
+static const double half_turn = 3.14159265358979323846;
+
+struct vg_player {
+    const vg_map *m;
+    size_t nv;
+    int threads;
+    bool single;
+    vgi_shape shape;    /* patches: of the body that poses are measured on */
+    vg_bender *bender;  /* bones */
+    float *weights_single;
+    void *columns;      /* 4n x 3 BLOCK: what the product multiplies, float or double */
+    void *product;      /* nv x 3 BLOCK */
+    double *motion;     /* 12 n: A row by row, then t */
+    double *ends;       /* 6 n: what joints miss at both ends, in each patch's own frame */
+    uint32_t *order, *parent; /* patches along a tree of joints, parents first; a root is its own parent */
+};
+
+/* Of bones: as their skeleton says. */
+static int plan_bones(vg_player *p, const vg_rig *r, vg_err *e)
+{
+    int code = vgi_rig_parents(r, p->parent, e);
+    for (size_t b = 0; code == VG_OK && b < r->nbones; b++) {
+        p->order[b] = (uint32_t)b;
+        if (p->parent[b] == VGI_NO_BONE) p->parent[b] = (uint32_t)b;
+    }
+    return code;
+}
+
+/* Of patches: breadth first from the largest; what it does not reach starts anew. */
+static int plan_patches(vg_player *p, vg_err *e)
+{
+    const vg_map *m = p->m;
+    size_t n = m->n, tail = 0, head = 0;
+    bool *seen = vgi_array(n, sizeof *seen, e);
+    if (!seen) return VG_ENOMEM;
+    while (tail < n) {
+        size_t first = n;
+        for (size_t i = 0; i < n; i++)
+            if (!seen[i] && (first == n || m->share[i] > m->share[first])) first = i;
+        seen[first] = true, p->parent[first] = (uint32_t)first, p->order[tail++] = (uint32_t)first;
+        for (; head < tail; head++)
+            for (size_t j = 0; j < m->njoints; j++)
+                for (int k = 0; k < 2; k++) {
+                    uint32_t a = m->joint[2 * j + (size_t)k], b = m->joint[2 * j + 1 - (size_t)k];
+                    if (a != p->order[head] || seen[b]) continue;
+                    seen[b] = true, p->parent[b] = a, p->order[tail++] = b;
+                }
+    }
+    free(seen);
+    return VG_OK;
+}
+
+int vg_player_new(vg_player **out, const vg_head *h, bool single, int threads, vg_err *e)
+{
+    const vg_map *m = &h->map;
+    *out = NULL;
+    if (!m->n) return vg_fail(e, VG_EINPUT, "there is no map: make one with vg-fitmap");
+    bool bones = m->kind == VG_MAP_BONES;
+    if (!bones && h->patches.n != m->n)
+        return vg_fail(e, VG_EINPUT, "the map has %zu transforms, the mesh %zu patches", m->n, h->patches.n);
+    if (bones && (h->rig.nbones != m->n || !h->rig.skin_bone))
+        return vg_fail(e, VG_EINPUT, "the map has %zu transforms, its skeleton %zu bones", m->n, h->rig.nbones);
+    if (m->n > INT32_MAX / 4 || h->mesh.nv > INT32_MAX / (3 * BLOCK))
+        return vg_fail(e, VG_EINPUT, "a map of %zu transforms and %zu vertices is too large", m->n, h->mesh.nv);
+    vg_player *p = *out = vgi_array(1, sizeof *p, e);
+    if (!p) return VG_ENOMEM;
+    p->m = m, p->nv = h->mesh.nv, p->threads = threads, p->single = single;
+    size_t size = single ? sizeof(float) : sizeof(double);
+    const double *measured = m->home ? m->home : h->reference;
+    p->order = vgi_array(m->n, sizeof *p->order, e), p->parent = vgi_array(m->n, sizeof *p->parent, e);
+    int r = p->order && p->parent ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) r = bones ? plan_bones(p, &h->rig, e) : plan_patches(p, e);
+    if (r == VG_OK && bones) r = vg_bender_new(&p->bender, &h->rig, p->nv, measured, threads, e);
+    else if (r == VG_OK) r = vgi_shape_make(&p->shape, &h->mesh, &h->patches, measured, e);
+    if (r == VG_OK) {
+        p->columns = vgi_array(4 * m->n, 3 * BLOCK * size, e);
+        p->product = vgi_array(p->nv, 3 * BLOCK * size, e);
+        p->motion = vgi_array(12 * m->n, sizeof *p->motion, e);
+        p->ends = vgi_array(6 * m->n, sizeof *p->ends, e);
+        if (single) p->weights_single = vgi_array(p->nv, 4 * m->n * sizeof(float), e);
+        if (!p->columns || !p->product || !p->motion || !p->ends || (single && !p->weights_single)) r = VG_ENOMEM;
+    }
+    for (size_t i = 0; r == VG_OK && single && i < 4 * m->n * p->nv; i++) p->weights_single[i] = (float)m->weights[i];
+    if (r < 0) vg_player_free(out);
+    return r;
+}
+
+void vg_player_free(vg_player **out)
+{
+    vg_player *p = *out;
+    if (!p) return;
+    vgi_shape_clear(&p->shape);
+    vg_bender_free(&p->bender);
+    free(p->weights_single);
+    free(p->columns);
+    free(p->product);
+    free(p->motion);
+    free(p->ends);
+    free(p->order);
+    free(p->parent);
+    free(p);
+    *out = NULL;
+}
+
+/* ---- measuring ---- */
+
+typedef struct measuring {
+    const vg_player *p;
+    const double *const *poses;
+    double *const *transforms;
+    size_t groups;
+} measuring;
+
+static void measure_some(void *context, size_t task)
+{
+    const measuring *x = context;
+    size_t k = task / x->groups, first = task % x->groups * SOME,
+           last = first + SOME < x->p->m->n ? first + SOME : x->p->m->n;
+    for (size_t i = first; i < last; i++) {
+        vgi_motion m;
+        double r[9], *to = x->transforms[k] + 7 * i;
+        vgi_shape_measure(&x->p->shape, i, x->poses[k], &m);
+        double b = sqrt(m.b2), root = sqrt(b);
+        for (int q = 0; q < 9; q++) r[q] = m.a[q] / b;
+        vg_quat_from_matrix(r, to);
+        for (int q = 0; q < 4; q++) to[q] *= root;
+        memcpy(to + 4, m.t, sizeof m.t);
+    }
+}
+
+void vg_player_measure(vg_player *p, size_t n, const double *const *poses, double *const *transforms)
+{
+    if (p->bender) {
+        vg_bender_fit(p->bender, n, poses, transforms);
+        return;
+    }
+    measuring x = {p, poses, transforms, (p->m->n + SOME - 1) / SOME};
+    vgi_parallel(n * x.groups < 4 ? 1 : p->threads, n * x.groups, measure_some, &x);
+}
+
+/* ---- placing ---- */
+
+static void matrix_of(const double q[4], double a[9])
+{
+    double s = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], root = sqrt(s);
+    const double unit[4] = {q[0] / root, q[1] / root, q[2] / root, q[3] / root};
+    vg_quat_matrix(unit, a);
+    for (int i = 0; i < 9; i++) a[i] *= s;
+}
+
+static void read_motion(vg_player *p, const double *transforms)
+{
+    for (size_t i = 0; i < p->m->n; i++) {
+        matrix_of(transforms + 7 * i, p->motion + 12 * i);
+        memcpy(p->motion + 12 * i + 9, transforms + 7 * i + 4, 3 * sizeof(double));
+    }
+}
+
+static void root_of(const vg_player *p, const double *centre, double root[3])
+{
+    root[0] = root[1] = root[2] = 0;
+    for (size_t i = 0; i < p->m->n; i++) {
+        double at[3];
+        vgi_multiply_vector(p->motion + 12 * i, centre + 3 * i, at);
+        for (int k = 0; k < 3; k++) root[k] += p->m->share[i] * (at[k] + p->motion[12 * i + 9 + (size_t)k]);
+    }
+}
+
+/* Where joints want patch i, from the root. */
+static void placed(const vg_player *p, size_t i, double t[3])
+{
+    size_t n = p->m->n;
+    const double *g = p->m->place + 3 * n * i;
+    t[0] = t[1] = t[2] = 0;
+    for (size_t j = 0; j < n; j++) {
+        const double *a = p->motion + 12 * j;
+        for (int k = 0; k < 3; k++)
+            t[k] += a[3 * k] * g[3 * j] + a[3 * k + 1] * g[3 * j + 1] + a[3 * k + 2] * g[3 * j + 2];
+    }
+}
+
+void vg_player_place(vg_player *p, double *transforms)
+{
+    double root[3], t[3];
+    if (p->m->has_home) return; /* it is what vg_player_pose does in any case */
+    read_motion(p, transforms);
+    root_of(p, p->m->centre, root);
+    for (size_t i = 0; i < p->m->n; i++) {
+        placed(p, i, t);
+        for (size_t k = 0; k < 3; k++) transforms[7 * i + 4 + k] = t[k] + root[k];
+    }
+}
+
+/* ---- interpolation ---- */
+
+/* What joints miss in a pose, seen by each patch, and the root. */
+static void remember_end(vg_player *p, const double *transforms, double *miss, double root[3])
+{
+    read_motion(p, transforms);
+    root_of(p, p->m->home_centre, root);
+    for (size_t i = 0; i < p->m->n; i++) {
+        const double *a = p->motion + 12 * i;
+        double t[3] = {0, 0, 0}, d[3], b2 = (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+        if (!p->m->has_home) placed(p, i, t);
+        for (int k = 0; k < 3; k++) d[k] = a[9 + k] - root[k] - t[k];
+        for (int k = 0; k < 3; k++) miss[3 * i + (size_t)k] = (a[k] * d[0] + a[3 + k] * d[1] + a[6 + k] * d[2]) / b2;
+    }
+}
+
+/* The logarithm of b a^-1, that branch of it which is nearest to that of a neighbour: l[1..3] is half the angle, so
+ * branches are half turns apart. */
+static void difference(const double *a, const double *b, const double *neighbour, double l[4])
+{
+    double s = a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + a[3] * a[3], q[4];
+    const double back[4] = {a[0] / s, -a[1] / s, -a[2] / s, -a[3] / s};
+    vg_quat_multiply(b, back, q);
+    if (q[0] < 0)
+        for (int k = 0; k < 4; k++) q[k] = -q[k];
+    vg_quat_log(q, l);
+    if (!neighbour) return;
+    double angle = sqrt(l[1] * l[1] + l[2] * l[2] + l[3] * l[3]), axis[3], along = 0;
+    double far = sqrt(neighbour[1] * neighbour[1] + neighbour[2] * neighbour[2] + neighbour[3] * neighbour[3]);
+    for (int k = 0; k < 3; k++) axis[k] = angle > 1e-9 ? l[k + 1] / angle : far > 0 ? neighbour[k + 1] / far : 0;
+    for (int k = 0; k < 3; k++) along += axis[k] * neighbour[k + 1];
+    double turns = round((along - angle) / half_turn);
+    for (int k = 0; k < 3; k++) l[k + 1] += turns * half_turn * axis[k];
+}
+
+void vg_player_between(vg_player *p, const double *a, const double *b, double t, double *out)
+{
+    size_t n = p->m->n;
+    double root_a[3], root_b[3], *logs = p->motion; /* not in use before read_motion below; 4 numbers of 12 */
+    remember_end(p, a, p->ends, root_a);
+    remember_end(p, b, p->ends + 3 * n, root_b);
+    for (size_t k = 0; k < n; k++) {
+        size_t i = p->order[k], up = p->parent[i];
+        double l[4], q[4];
+        difference(a + 7 * i, b + 7 * i, up == i ? NULL : logs + 12 * up, logs + 12 * i);
+        for (int j = 0; j < 4; j++) l[j] = t * logs[12 * i + (size_t)j];
+        vg_quat_exp(l, q);
+        vg_quat_multiply(q, a + 7 * i, out + 7 * i);
+    }
+    read_motion(p, out);
+    for (size_t i = 0; i < n; i++) {
+        double at[3] = {0, 0, 0}, miss[3], turned[3];
+        if (!p->m->has_home) placed(p, i, at);
+        for (size_t k = 0; k < 3; k++)
+            miss[k] = p->ends[3 * i + k] + t * (p->ends[3 * n + 3 * i + k] - p->ends[3 * i + k]);
+        vgi_multiply_vector(p->motion + 12 * i, miss, turned);
+        for (size_t k = 0; k < 3; k++)
+            out[7 * i + 4 + k] = at[k] + root_a[k] + t * (root_b[k] - root_a[k]) + turned[k];
+    }
+}
+
+/* ---- the product ---- */
+
+typedef struct playing {
+    const vg_player *p;
+    size_t n;
+    double roots[BLOCK][3];
+    double *const *vertices;
+} playing;
+
+static void fill_columns(vg_player *p, playing *x, size_t k, const double *transforms)
+{
+    const vg_map *m = p->m;
+    size_t n = m->n, stride = 3 * x->n;
+    double root[3], *to = x->roots[k];
+    read_motion(p, transforms);
+    root_of(p, m->home_centre, root);
+    for (int c = 0; c < 3; c++) {
+        double home = 0, here = 0;
+        for (size_t i = 0; i < n; i++) {
+            home += m->share[i] * m->home_centre[3 * i + (size_t)c];
+            here += m->share[i] * m->centre[3 * i + (size_t)c];
+        }
+        to[c] = m->has_home ? here + m->size * (root[c] - home) : root[c];
+    }
+    for (size_t i = 0; i < n; i++) {
+        const double *a = p->motion + 12 * i;
+        double t[3] = {a[9] - root[0], a[10] - root[1], a[11] - root[2]};
+        if (m->has_home) placed(p, i, t);
+        for (size_t c = 0; c < 3; c++)
+            for (size_t j = 0; j < 4; j++) {
+                double value = j < 3 ? a[3 * c + j] : t[c];
+                size_t at = (4 * i + j) * stride + 3 * k + c;
+                if (p->single) ((float *)p->columns)[at] = (float)value;
+                else ((double *)p->columns)[at] = value;
+            }
+    }
+}
+
+static void play_rows(void *context, size_t task)
+{
+    const playing *x = context;
+    const vg_player *p = x->p;
+    size_t first = task * ROWS, rows = p->nv - first < ROWS ? p->nv - first : ROWS, width = 4 * p->m->n,
+           stride = 3 * x->n;
+    if (p->single) {
+        float *c = (float *)p->product + first * stride;
+        vgi_product_single(rows, stride, width, p->weights_single + first * width, width, p->columns, stride, c,
+                           stride);
+        for (size_t k = 0; k < x->n; k++) {
+            double *to = x->vertices[k] + 3 * first;
+            const double *root = x->roots[k];
+            for (size_t v = 0; v < rows; v++)
+                for (size_t a = 0; a < 3; a++) to[3 * v + a] = (double)c[v * stride + 3 * k + a] + root[a];
+        }
+    } else {
+        double *c = (double *)p->product + first * stride;
+        vgi_product_double(rows, stride, width, p->m->weights + first * width, width, p->columns, stride, c, stride);
+        for (size_t k = 0; k < x->n; k++) {
+            double *to = x->vertices[k] + 3 * first;
+            const double *root = x->roots[k];
+            for (size_t v = 0; v < rows; v++)
+                for (size_t a = 0; a < 3; a++) to[3 * v + a] = c[v * stride + 3 * k + a] + root[a];
+        }
+    }
+}
+
+void vg_player_pose(vg_player *p, size_t n, const double *const *transforms, double *const *vertices)
+{
+    int blas = vgi_product_begin();
+    for (size_t first = 0; first < n; first += BLOCK) {
+        playing x = {.p = p, .n = n - first < BLOCK ? n - first : BLOCK, .vertices = vertices + first};
+        for (size_t k = 0; k < x.n; k++) fill_columns(p, &x, k, transforms[first + k]);
+        vgi_parallel(p->threads, (p->nv + ROWS - 1) / ROWS, play_rows, &x);
+    }
+    vgi_product_end(blas);
+}

@@ -1,0 +1,342 @@
+/* map_parts.c: the geometry of patches, their joints, and the collapse of a map into one matrix (T 6.3; MATH 7).
+ * Leaves out what is fitted to poses (map.c) and how a map is played (map_eval.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/rig/map_parts.h"
+#include "numeric/dense.h"
+#include "numeric/polar.h"
+#include "model/rig.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* ---- shapes ---- */
+
+static int by_number(const void *a, const void *b)
+{
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return x < y ? -1 : x > y;
+}
+
+int vgi_shape_make(vgi_shape *s, const vg_mesh *m, const vg_patches *patches, const double *points, vg_err *e)
+{
+    size_t corners = vg_mesh_corners(m), n = 0;
+    *s = (vgi_shape){.n = patches->n};
+    uint64_t *all = vgi_array_raw(corners, sizeof *all, e);
+    s->first = vgi_array(s->n + 1, sizeof *s->first, e);
+    s->centre = vgi_array(3 * s->n, sizeof *s->centre, e);
+    s->spread = vgi_array(s->n, sizeof *s->spread, e);
+    if (!all || !s->first || !s->centre || !s->spread) goto failed;
+    for (size_t f = 0; f < m->nf; f++)
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
+            all[c] = (uint64_t)patches->of_face[f] << 32 | m->vert[c];
+    if (corners) qsort(all, corners, sizeof *all, by_number);
+    for (size_t i = 0; i < corners; i++)
+        if (i == 0 || all[i] != all[i - 1]) all[n++] = all[i];
+    s->member = vgi_array_raw(n, sizeof *s->member, e);
+    s->local = vgi_array_raw(3 * n, sizeof *s->local, e);
+    if (!s->member || !s->local) goto failed;
+    for (size_t i = 0; i < n; i++) {
+        size_t p = (size_t)(all[i] >> 32);
+        s->member[i] = (uint32_t)all[i];
+        s->first[p + 1] = (uint32_t)i + 1;
+        for (size_t k = 0; k < 3; k++) s->centre[3 * p + k] += points[3 * (size_t)s->member[i] + k];
+    }
+    for (size_t p = 0; p < s->n; p++) {
+        if (s->first[p + 1] < s->first[p]) s->first[p + 1] = s->first[p];
+        for (size_t k = 0; k < 3 && s->first[p + 1] > s->first[p]; k++)
+            s->centre[3 * p + k] /= s->first[p + 1] - s->first[p];
+        for (size_t i = s->first[p]; i < s->first[p + 1]; i++)
+            for (size_t k = 0; k < 3; k++) {
+                double x = points[3 * (size_t)s->member[i] + k] - s->centre[3 * p + k];
+                s->local[3 * i + k] = x;
+                s->spread[p] += x * x;
+            }
+    }
+    free(all);
+    return VG_OK;
+failed:
+    free(all);
+    vgi_shape_clear(s);
+    return VG_ENOMEM;
+}
+
+void vgi_shape_clear(vgi_shape *s)
+{
+    free(s->first);
+    free(s->member);
+    free(s->local);
+    free(s->centre);
+    free(s->spread);
+    *s = (vgi_shape){0};
+}
+
+void vgi_shape_measure(const vgi_shape *s, size_t p, const double *pose, vgi_motion *to)
+{
+    static const double least = 1e-6; /* a patch that shrinks to a point keeps a scale */
+    size_t first = s->first[p], last = s->first[p + 1];
+    double m[9] = {0}, mean[3] = {0, 0, 0}, r[9], b = 0;
+    const double *o = first < last ? pose + 3 * (size_t)s->member[first] : mean;
+    for (size_t i = first; i < last; i++) {
+        const double *x = pose + 3 * (size_t)s->member[i], *l = s->local + 3 * i;
+        for (int k = 0; k < 3; k++) {
+            double d = x[k] - o[k]; /* the local vectors sum to 0: any point will do for a centre */
+            mean[k] += d;
+            m[3 * k] += d * l[0], m[3 * k + 1] += d * l[1], m[3 * k + 2] += d * l[2];
+        }
+    }
+    vgi_fit_rotation(m, r);
+    for (int i = 0; i < 9; i++) b += r[i] * m[i];
+    b = s->spread[p] > 0 ? b / s->spread[p] : 1;
+    if (!(b > least)) b = least;
+    for (int i = 0; i < 9; i++) to->a[i] = b * r[i];
+    to->b2 = b * b;
+    const double *c = s->centre + 3 * p;
+    for (int k = 0; k < 3; k++) {
+        double at = first < last ? o[k] + mean[k] / (double)(last - first) : c[k];
+        to->t[k] = at - (to->a[3 * k] * c[0] + to->a[3 * k + 1] * c[1] + to->a[3 * k + 2] * c[2]);
+    }
+}
+
+/* ---- joints ---- */
+
+/* Least squares over the joints: t_i - t_j = A_j c - A_i c, all of them; and sum of share (A centre + t) = 0. Linear
+ * in the A. */
+int vgi_place_by_joints(const vg_map *m, const double *centre, double *place, vg_err *e)
+{
+    size_t n = m->n;
+    double *l = vgi_array(n, n * sizeof *l, e), trace = 1;
+    if (!l) return VG_ENOMEM;
+    memset(place, 0, 3 * n * n * sizeof *place);
+    for (size_t q = 0; q < m->njoints; q++) {
+        size_t i = m->joint[2 * q], j = m->joint[2 * q + 1];
+        double w = m->joint_weight[q];
+        l[i * n + i] += w, l[j * n + j] += w, l[i * n + j] -= w, l[j * n + i] -= w;
+        trace += 2 * w;
+        for (size_t k = 0; k < 3; k++) {
+            double c = w * m->joint_at[3 * q + k];
+            place[i * 3 * n + 3 * i + k] -= c, place[i * 3 * n + 3 * j + k] += c;
+            place[j * 3 * n + 3 * i + k] += c, place[j * 3 * n + 3 * j + k] -= c;
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        for (size_t j = 0; j < n; j++) {
+            l[i * n + j] += trace * m->share[i] * m->share[j];
+            for (size_t k = 0; k < 3; k++)
+                place[i * 3 * n + 3 * j + k] -= trace * m->share[i] * m->share[j] * centre[3 * j + k];
+        }
+        l[i * n + i] += 1e-13 * trace;
+    }
+    bool ok = vgi_cholesky_dense(l, n);
+    if (ok) vgi_cholesky_dense_solve(l, n, place, 3 * n);
+    free(l);
+    return ok ? VG_OK : vg_fail(e, VG_EINPUT, "the patches do not hang together");
+}
+
+uint32_t *vgi_graph_patches(const vg_head *h, const vg_graph *g, vg_err *e)
+{
+    size_t faces = g->nf - g->nlinks;
+    uint32_t *of_face = vgi_array(g->nf, sizeof *of_face, e), *of_vertex = vgi_array(g->nv, sizeof *of_vertex, e);
+    if (of_face && of_vertex) {
+        for (size_t f = faces; f-- > 0;) {
+            of_face[f] = h->patches.of_face[h->has_selection ? h->selected[f] : f];
+            for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) of_vertex[g->vert[c]] = of_face[f];
+        }
+        for (size_t f = faces; f < g->nf; f++) of_face[f] = of_vertex[g->vert[g->start[f]]];
+    } else {
+        free(of_face);
+        of_face = NULL;
+    }
+    free(of_vertex);
+    return of_face;
+}
+
+int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *e)
+{
+    size_t n = r->nbones, width = 3 * n;
+    uint32_t *parent = vgi_array(n, sizeof *parent, e);
+    double *mean = vgi_array(width, sizeof *mean, e);
+    int code = parent && mean ? vgi_rig_parents(r, parent, e) : VG_ENOMEM;
+    for (size_t b = 0; code == VG_OK && b < n; b++) { /* where the joint is, from the first one */
+        double *row = place + b * width;
+        if (b) memcpy(row, place + parent[b] * width, width * sizeof *row);
+        else memset(row, 0, width * sizeof *row);
+        for (size_t k = 0; b && k < 3; k++)
+            row[3 * parent[b] + k] += m->centre[3 * b + k] - m->centre[3 * (size_t)parent[b] + k];
+        for (size_t i = 0; i < width; i++) mean[i] += m->share[b] * row[i];
+    }
+    for (size_t b = 0; code == VG_OK && b < n; b++) {
+        for (size_t i = 0; i < width; i++) place[b * width + i] -= mean[i];
+        for (size_t k = 0; k < 3; k++) place[b * width + 3 * b + k] -= m->centre[3 * b + k];
+    }
+    free(parent);
+    free(mean);
+    return code;
+}
+
+/* ---- collapse ---- */
+
+/* How much of vertex v goes with bone p, by its skin. */
+static double skin_share(const vg_rig *r, size_t v, size_t p)
+{
+    double w = 0;
+    for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++)
+        if (r->skin_bone[s] == p) w += r->skin_weight[s];
+    return w;
+}
+
+/* The vectors that transform p alone makes, when it is the identity. */
+static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *of_face, const double *vectors,
+                           size_t p, double *wanted)
+{
+    memset(wanted, 0, 3 * vg_graph_corners(g) * sizeof *wanted);
+    if (m->kind == VG_MAP_PATCHES) {
+        for (size_t f = 0; f < g->nf; f++)
+            for (size_t c = g->start[f]; of_face[f] == p && c < g->start[f + 1]; c++)
+                vg_quat_apply(m->corner + 4 * c, vectors + 3 * c, wanted + 3 * c);
+        return;
+    }
+    for (size_t i = 0; i < m->per_corner * (size_t)g->start[g->nf - g->nlinks]; i++) {
+        if (m->corner_bone[i] != p) continue;
+        double *to = wanted + 3 * (i / m->per_corner), d[3];
+        vg_quat_apply(m->corner + 4 * i, vectors + 3 * (i / m->per_corner), d);
+        for (int k = 0; k < 3; k++) to[k] += d[k];
+    }
+}
+
+/* The links of a map of bones go from where the skin takes one end to where it takes the other. at: of the ends, nv
+ * points, or NULL: 1, into number k. */
+static void link_vectors(const vg_head *h, const vg_graph *g, size_t p, const double *at, size_t k, double *wanted)
+{
+    for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
+        const uint32_t *end = g->vert + g->start[f];
+        double w[2] = {0.5 * skin_share(&h->rig, end[0], p), 0.5 * skin_share(&h->rig, end[1], p)};
+        for (size_t i = at ? 0 : k; i < (at ? 3 : k + 1); i++) {
+            double d = at ? w[0] * at[3 * (size_t)end[0] + i] - w[1] * at[3 * (size_t)end[1] + i] : w[0] - w[1];
+            wanted[3 * (size_t)g->start[f] + i] = d, wanted[3 * (size_t)g->start[f] + 3 + i] = -d;
+        }
+    }
+}
+
+/* How much transform p counts for held vertex i; the point that it takes along. */
+static double hold_of(const vg_head *h, size_t i, size_t p, const double **at)
+{
+    const vg_map *m = &h->map;
+    bool bones = m->kind == VG_MAP_BONES;
+    *at = bones ? h->reference + 3 * (size_t)m->held[i] : m->held_at + 3 * i;
+    return bones ? skin_share(&h->rig, m->held[i], p) : m->held_patch[i] == p;
+}
+
+/* Wanted vectors and held vertices when only the j-th number of A_p is at work, j = 0 1 2 at once as x y z; or t of
+ * three transforms. */
+static void column_input(const vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors,
+                         size_t column, double *wanted, double *anchors)
+{
+    const vg_map *m = &h->map;
+    const double *at;
+    bool bones = m->kind == VG_MAP_BONES;
+    if (column < m->n) {
+        driven_vectors(m, g, of_face, vectors, column, wanted);
+        if (bones) link_vectors(h, g, column, h->reference, 0, wanted);
+        for (size_t i = 0; i < m->nheld; i++) {
+            double w = hold_of(h, i, column, &at);
+            for (size_t k = 0; k < 3; k++) anchors[3 * i + k] = w * at[k];
+        }
+        return;
+    }
+    memset(wanted, 0, 3 * vg_graph_corners(g) * sizeof *wanted);
+    for (size_t k = 0; k < 3; k++) {
+        size_t p = 3 * (column - m->n) + k;
+        if (bones && p < m->n) link_vectors(h, g, p, NULL, k, wanted);
+        for (size_t i = 0; i < m->nheld; i++) anchors[3 * i + k] = p < m->n ? hold_of(h, i, p, &at) : 0;
+    }
+}
+
+static void store_column(vg_map *m, const vg_graph *g, size_t column, const double *x)
+{
+    size_t n = m->n;
+    for (size_t v = 0; v < g->nv; v++) {
+        double *row = m->weights + v * 4 * n;
+        if (!g->in_face[v]) continue;
+        for (size_t k = 0; k < 3; k++) {
+            size_t p = 3 * (column - n) + k;
+            if (column < n) row[4 * column + k] = x[3 * v + k];
+            else if (p < n) row[4 * p + 3] = x[3 * v + k];
+        }
+    }
+}
+
+void vgi_map_skin_row(vg_head *h, size_t v)
+{
+    double *row = h->map.weights + v * 4 * h->map.n;
+    memset(row, 0, 4 * h->map.n * sizeof *row);
+    for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++) {
+        double w = h->rig.skin_weight[s], *to = row + 4 * (size_t)h->rig.skin_bone[s];
+        for (size_t k = 0; k < 3; k++) to[k] += w * h->reference[3 * v + k];
+        to[3] += w;
+    }
+}
+
+/* Vertices in no face go with the patch whose centre is nearest, or as their skin does. */
+static void carry_loose(vg_head *h, const vg_graph *g)
+{
+    vg_map *m = &h->map;
+    for (size_t v = 0; v < g->nv; v++) {
+        if (g->in_face[v]) continue;
+        if (m->kind == VG_MAP_BONES) {
+            vgi_map_skin_row(h, v);
+            continue;
+        }
+        const double *x = h->reference + 3 * v;
+        size_t best = 0;
+        double least = INFINITY;
+        for (size_t p = 0; p < m->n; p++) {
+            const double *c = m->centre + 3 * p;
+            double d = (x[0] - c[0]) * (x[0] - c[0]) + (x[1] - c[1]) * (x[1] - c[1]) + (x[2] - c[2]) * (x[2] - c[2]);
+            if (d < least) least = d, best = p;
+        }
+        double *row = m->weights + v * 4 * m->n + 4 * best;
+        row[0] = x[0], row[1] = x[1], row[2] = x[2], row[3] = 1;
+    }
+}
+
+int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors, int threads,
+                     vg_err *e)
+{
+    vg_map *m = &h->map;
+    vg_solver *s;
+    int r = vg_solver_new(&s, g, m->held, m->nheld, h->reference, VG_WEIGHTS_UNIFORM, threads, e);
+    if (r < 0) return r;
+    size_t batch = vg_solver_batch(s), columns = m->n + (m->n + 2) / 3, nv = g->nv;
+    double *wanted = vgi_array(3 * vg_graph_corners(g), sizeof *wanted, e);
+    double *space = vgi_array(batch, (6 * nv + 3 * m->nheld) * sizeof *space, e);
+    double **x = vgi_array(4 * batch, sizeof *x, e), **rhs = x ? x + batch : NULL,
+           **anchors = x ? x + 2 * batch : NULL;
+    free(m->weights);
+    m->weights = vgi_array(nv, 4 * m->n * sizeof *m->weights, e);
+    if (wanted && space && x && m->weights) {
+        static const double nowhere[3] = {0, 0, 0};
+        for (size_t i = 0; i < batch; i++) {
+            x[i] = space + i * (6 * nv + 3 * m->nheld), rhs[i] = x[i] + 3 * nv, anchors[i] = rhs[i] + 3 * nv;
+            x[3 * batch + i] = (double *)(uintptr_t)nowhere;
+        }
+        for (size_t first = 0; first < columns; first += batch) {
+            size_t n = columns - first < batch ? columns - first : batch;
+            for (size_t i = 0; i < n; i++) {
+                column_input(h, g, of_face, vectors, first + i, wanted, anchors[i]);
+                vg_solver_load(s, 1, (const double *const *)&wanted, (const double *const *)anchors + i, x + i,
+                               rhs + i);
+            }
+            vg_solver_solve(s, n, (const double *const *)rhs, x, (const double *const *)anchors,
+                            (const double *const *)(x + 3 * batch));
+            for (size_t i = 0; i < n; i++) store_column(m, g, first + i, x[i]);
+        }
+        carry_loose(h, g);
+    } else {
+        r = VG_ENOMEM;
+    }
+    vg_solver_free(&s);
+    free(wanted);
+    free(space);
+    free(x);
+    return r;
+}

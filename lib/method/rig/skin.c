@@ -1,0 +1,363 @@
+/* skin.c: linear blend skinning fitted to poses: at most four bones per vertex, weights >= 0 that sum to 1, least
+ * squares.
+ *
+ * For one vertex the squared distance over all poses is the quadratic w' G w - 2 b' w + c, whose numbers are products
+ * of the sums with the vertex's place. Bones are taken up one by one, each time the one that helps most, then
+ * exchanged as long as that helps.
+ * Leaves out where the motions of bones come from (inverse_skin.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/rig/skin.h"
+#include "model/rig.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { CHUNK = 64, MOST = 20, BEST = 14 }; /* bones that a vertex considers; of these by how well each does alone */
+
+/* What a bone is in the reference pose: line segments from its joint to the joints below. */
+typedef struct bones {
+    const vg_rig *r;
+    size_t nsegments;
+    uint32_t *of; /* bone of each segment */
+    double *from, *to;
+} bones;
+
+static void clear_bones(bones *b)
+{
+    free(b->of);
+    free(b->from);
+    free(b->to);
+}
+
+static int make_bones(bones *b, const vg_rig *r, vg_err *e)
+{
+    size_t joints = r->skeleton.njoints;
+    uint32_t *mover = vgi_array(joints, sizeof *mover, e);
+    *b = (bones){.r = r};
+    b->of = vgi_array(2 * joints, sizeof *b->of, e);
+    b->from = vgi_array(2 * joints, 3 * sizeof *b->from, e), b->to = vgi_array(2 * joints, 3 * sizeof *b->to, e);
+    if (!mover || !b->of || !b->from || !b->to) {
+        free(mover);
+        clear_bones(b);
+        return VG_ENOMEM;
+    }
+    vgi_rig_movers(r, mover);
+    for (size_t j = 0; j < joints; j++) { /* a segment from the parent, and a point that is the joint's own */
+        uint32_t parent = r->skeleton.joints[j].parent;
+        for (int own = 0; own < 2; own++) {
+            uint32_t from = own ? (uint32_t)j : parent, bone = from == UINT32_MAX ? UINT32_MAX : mover[from];
+            if (bone == UINT32_MAX) continue;
+            size_t i = b->nsegments++;
+            b->of[i] = bone;
+            memcpy(b->from + 3 * i, r->at + 3 * (size_t)from, 3 * sizeof(double));
+            memcpy(b->to + 3 * i, r->at + 3 * j, 3 * sizeof(double));
+        }
+    }
+    free(mover);
+    return VG_OK;
+}
+
+static double squared_distance(const double a[3], const double b[3], const double x[3])
+{
+    double d[3], y[3], along = 0, length = 0, sum = 0;
+    for (int k = 0; k < 3; k++) {
+        d[k] = b[k] - a[k], y[k] = x[k] - a[k];
+        along += d[k] * y[k], length += d[k] * d[k];
+    }
+    double t = length > 0 ? along / length : 0;
+    t = t < 0 ? 0 : t > 1 ? 1 : t;
+    for (int k = 0; k < 3; k++) sum += (y[k] - t * d[k]) * (y[k] - t * d[k]);
+    return sum;
+}
+
+/* far (n): squared distance of a point from each bone */
+static void distances(const bones *b, const double x[3], double *far)
+{
+    for (size_t j = 0; j < b->r->nbones; j++) far[j] = INFINITY;
+    for (size_t i = 0; i < b->nsegments; i++) {
+        double d = squared_distance(b->from + 3 * i, b->to + 3 * i, x), *to = &far[b->of[i]];
+        if (d < *to) *to = d;
+    }
+}
+
+static int make_skin(vg_rig *r, size_t nv, vg_err *e)
+{
+    free(r->skin_bone);
+    free(r->skin_weight);
+    r->skin_bone = vgi_array(nv, VG_SKIN * sizeof *r->skin_bone, e);
+    r->skin_weight = vgi_array(nv, VG_SKIN * sizeof *r->skin_weight, e);
+    return r->skin_bone && r->skin_weight ? VG_OK : VG_ENOMEM;
+}
+
+int vgi_skin_near(vg_rig *r, size_t nv, const double *reference, vg_err *e)
+{
+    bones b;
+    int code = make_skin(r, nv, e);
+    if (code < 0 || (code = make_bones(&b, r, e)) < 0) return code;
+    double *far = vgi_array(r->nbones, sizeof *far, e);
+    if (!far) code = VG_ENOMEM;
+    for (size_t v = 0; v < nv && far; v++) {
+        size_t best = 0;
+        distances(&b, reference + 3 * v, far);
+        for (size_t j = 1; j < r->nbones; j++)
+            if (far[j] < far[best]) best = j;
+        r->skin_bone[VG_SKIN * v] = (uint32_t)best, r->skin_weight[VG_SKIN * v] = 1;
+    }
+    free(far);
+    clear_bones(&b);
+    return code;
+}
+
+/* ---- the quadratic of one vertex ---- */
+
+typedef struct quadratic {
+    size_t n;
+    uint32_t bone[MOST];
+    double g[MOST][MOST], b[MOST];
+    double ridge; /* on all weights but that of the last bone chosen */
+} quadratic;
+
+/* Up to four of a quadratic's bones. */
+typedef struct choice {
+    size_t n;
+    size_t at[VG_SKIN];
+    double w[VG_SKIN], value;
+} choice;
+
+/* a x = b for n <= 3, by elimination with the largest pivot; what has no pivot stays 0. */
+static void solve_small(double a[3][3], double *b, size_t n)
+{
+    bool used[3] = {false, false, false};
+    size_t row_of[3];
+    double scale = 0;
+    for (size_t i = 0; i < n; i++) scale = fmax(scale, fabs(a[i][i]));
+    for (size_t c = 0; c < n; c++) {
+        size_t p = n;
+        for (size_t i = 0; i < n; i++)
+            if (!used[i] && (p == n || fabs(a[i][c]) > fabs(a[p][c]))) p = i;
+        row_of[c] = p;
+        if (!(fabs(a[p][c]) > 1e-14 * scale)) {
+            row_of[c] = n;
+            continue;
+        }
+        used[p] = true;
+        for (size_t i = 0; i < n; i++) {
+            if (i == p) continue;
+            double f = a[i][c] / a[p][c];
+            for (size_t j = c; j < n; j++) a[i][j] -= f * a[p][j];
+            b[i] -= f * b[p];
+        }
+    }
+    double x[3] = {0, 0, 0};
+    for (size_t c = 0; c < n; c++)
+        if (row_of[c] < n) x[c] = b[row_of[c]] / a[row_of[c]][c];
+    memcpy(b, x, n * sizeof *b);
+}
+
+/* Weights of the bones chosen, those that would be negative left out one by one, and the value of the quadratic. */
+static void weigh(const quadratic *q, choice *c)
+{
+    for (;;) {
+        size_t n = c->n - 1, base = c->at[n];
+        double a[3][3], w[VG_SKIN], sum = 0;
+        for (size_t i = 0; i < n; i++) {
+            size_t k = c->at[i];
+            w[i] = q->b[k] - q->b[base] - q->g[k][base] + q->g[base][base];
+            for (size_t j = 0; j < n; j++) {
+                size_t l = c->at[j];
+                a[i][j] = q->g[k][l] - q->g[k][base] - q->g[base][l] + q->g[base][base] + (i == j ? q->ridge : 0);
+            }
+        }
+        solve_small(a, w, n);
+        for (size_t i = 0; i < n; i++) sum += w[i];
+        w[n] = 1 - sum;
+        size_t worst = 0;
+        for (size_t i = 1; i <= n; i++)
+            if (w[i] < w[worst]) worst = i;
+        if (w[worst] >= 0 || n == 0) {
+            memcpy(c->w, w, (n + 1) * sizeof *w);
+            break;
+        }
+        memmove(c->at + worst, c->at + worst + 1, (n - worst) * sizeof *c->at);
+        c->n--;
+    }
+    c->value = 0;
+    for (size_t i = 0; i < c->n; i++) {
+        c->value -= 2 * c->w[i] * q->b[c->at[i]];
+        for (size_t j = 0; j < c->n; j++) c->value += c->w[i] * c->w[j] * q->g[c->at[i]][c->at[j]];
+    }
+}
+
+static bool has(const choice *c, size_t k)
+{
+    for (size_t i = 0; i < c->n; i++)
+        if (c->at[i] == k) return true;
+    return false;
+}
+
+static void choose(const quadratic *q, double least_gain, choice *best)
+{
+    *best = (choice){.n = 1, .w = {1}};
+    for (size_t k = 0; k < q->n; k++)
+        if (q->g[k][k] - 2 * q->b[k] < q->g[best->at[0]][best->at[0]] - 2 * q->b[best->at[0]]) best->at[0] = k;
+    weigh(q, best);
+    for (int round = 0; round < 2 * VG_SKIN; round++) { /* add one, or put one in another's place */
+        choice next = *best;
+        for (size_t k = 0; k < q->n; k++) {
+            if (has(best, k)) continue;
+            for (size_t out = best->n < VG_SKIN ? VG_SKIN : 0; out < (best->n < VG_SKIN ? VG_SKIN + 1 : best->n);
+                 out++) {
+                choice c = *best;
+                c.at[out < VG_SKIN ? out : c.n++] = k;
+                weigh(q, &c);
+                if (c.value < next.value) next = c;
+            }
+        }
+        if (!(next.value < best->value - least_gain)) break;
+        *best = next;
+    }
+}
+
+/* The bone of the largest weight becomes the last. */
+static void first_last(choice *c)
+{
+    size_t best = 0, last = c->n - 1;
+    for (size_t i = 1; i < c->n; i++)
+        if (c->w[i] > c->w[best]) best = i;
+    size_t at = c->at[best];
+    c->at[best] = c->at[last], c->at[last] = at;
+}
+
+typedef struct skinning {
+    vg_rig *r;
+    const vgi_rig_sums *s;
+    const double *reference;
+    const bones *b;
+    uint32_t *mover; /* per joint */
+    double *space;   /* per chunk at work: 3 n */
+    double diagonal, *miss;
+    size_t chunks;
+} skinning;
+
+/* One entry of G: the product of what bones i and j make of the point. */
+static double product(const skinning *x, size_t i, size_t j, const double *v)
+{
+    size_t width = 4 * x->s->n;
+    const double *a = x->s->at + 3 * i, *b = x->s->at + 3 * j, *c = x->s->cross + 4 * i * width + 4 * j;
+    const double p[4] = {v[0] - a[0], v[1] - a[1], v[2] - a[2], 1}, q[4] = {v[0] - b[0], v[1] - b[1], v[2] - b[2], 1};
+    double sum = 0;
+    for (size_t k = 0; k < 4; k++)
+        sum += p[k] *
+               (c[k * width] * q[0] + c[k * width + 1] * q[1] + c[k * width + 2] * q[2] + c[k * width + 3] * q[3]);
+    return sum;
+}
+
+static double along(const skinning *x, size_t j, size_t v)
+{
+    const double *at = x->s->at + 3 * j, *p = x->reference + 3 * v, *y = x->s->pull + v * 4 * x->s->n + 4 * j;
+    return (p[0] - at[0]) * y[0] + (p[1] - at[1]) * y[1] + (p[2] - at[2]) * y[2] + y[3];
+}
+
+static void take_up(quadratic *q, size_t bone)
+{
+    for (size_t i = 0; i < q->n; i++)
+        if (q->bone[i] == bone) return;
+    if (q->n < MOST) q->bone[q->n++] = (uint32_t)bone;
+}
+
+/* The bones that do best alone, then those above and below the first two of them. */
+static void find_candidates(const skinning *x, const double *alone, quadratic *q)
+{
+    const vg_rig *r = x->r;
+    q->n = 0;
+    while (q->n < BEST && q->n < r->nbones) {
+        size_t best = r->nbones;
+        for (size_t j = 0; j < r->nbones; j++) {
+            bool taken = false;
+            for (size_t i = 0; i < q->n; i++) taken |= q->bone[i] == j;
+            if (!taken && (best == r->nbones || alone[j] < alone[best])) best = j;
+        }
+        take_up(q, best);
+    }
+    for (size_t i = 0; i < 2 && i < q->n; i++) {
+        uint32_t parent = r->skeleton.joints[r->bone[q->bone[i]]].parent;
+        if (parent != UINT32_MAX && x->mover[parent] != UINT32_MAX) take_up(q, x->mover[parent]);
+        for (size_t j = 0; j < r->nbones; j++)
+            if (r->skeleton.joints[r->bone[j]].parent == r->bone[q->bone[i]]) take_up(q, j);
+    }
+}
+
+static void skin_vertex(const skinning *x, size_t v, double *far, double *alone)
+{
+    /* Per pose, what a bone has to gain for each squared distance from the vertex, and at least (of D^2); and the
+     * way, in D, that a bone has to go apart from the vertex's first one to count beside it. */
+    static const double nearness = 1e-8, least_gain = 1e-13, apart = 1e-5;
+    const vgi_rig_sums *s = x->s;
+    const double *p = x->reference + 3 * v;
+    double poses = (double)s->poses;
+    quadratic q = {.ridge = 0};
+    choice c;
+    distances(x->b, p, far);
+    for (size_t j = 0; j < s->n; j++) alone[j] = product(x, j, j, p) - 2 * along(x, j, v) + nearness * poses * far[j];
+    find_candidates(x, alone, &q);
+    for (size_t i = 0; i < q.n; i++) {
+        q.b[i] = along(x, q.bone[i], v) - 0.5 * nearness * poses * far[q.bone[i]];
+        for (size_t j = 0; j <= i; j++) q.g[i][j] = q.g[j][i] = product(x, q.bone[i], q.bone[j], p);
+    }
+    choose(&q, least_gain * poses * x->diagonal * x->diagonal, &c);
+    first_last(&c);
+    for (size_t i = 0; i < q.n; i++) q.b[i] = along(x, q.bone[i], v);
+    q.ridge = poses * apart * apart * x->diagonal * x->diagonal;
+    weigh(&q, &c);
+    uint32_t *bone = x->r->skin_bone + VG_SKIN * v;
+    double *weight = x->r->skin_weight + VG_SKIN * v, left = s->square[v];
+    for (size_t i = 0; i < VG_SKIN; i++) {
+        size_t best = 0;
+        bone[i] = 0, weight[i] = 0;
+        for (size_t k = 1; k < c.n; k++)
+            if (c.w[k] > c.w[best]) best = k;
+        if (i >= c.n || !(c.w[best] > 0)) continue;
+        bone[i] = q.bone[c.at[best]], weight[i] = c.w[best];
+        c.w[best] = 0;
+    }
+    for (size_t i = 0; i < VG_SKIN; i++) {
+        left -= 2 * weight[i] * along(x, bone[i], v);
+        for (size_t k = 0; k < VG_SKIN; k++)
+            if (weight[i] > 0 && weight[k] > 0) left += weight[i] * weight[k] * product(x, bone[i], bone[k], p);
+    }
+    if (x->miss) x->miss[v] = left > 0 ? sqrt(left / poses) : 0;
+}
+
+static void skin_chunk(void *context, size_t task)
+{
+    const skinning *x = context;
+    double *far = x->space + task * 2 * x->s->n;
+    size_t first = task * x->s->nv / x->chunks, last = (task + 1) * x->s->nv / x->chunks;
+    for (size_t v = first; v < last; v++) skin_vertex(x, v, far, far + x->s->n);
+}
+
+int vgi_skin_fit(vg_rig *r, const vgi_rig_sums *s, const double *reference, int threads, double *miss, vg_err *e)
+{
+    bones b;
+    int code = make_skin(r, s->nv, e);
+    if (code < 0 || (code = make_bones(&b, r, e)) < 0) return code;
+    skinning x = {.r = r,
+                  .s = s,
+                  .reference = reference,
+                  .b = &b,
+                  .diagonal = vg_diagonal(reference, s->nv),
+                  .miss = miss,
+                  .chunks = s->nv < CHUNK ? 1 : CHUNK};
+    x.mover = vgi_array(r->skeleton.njoints, sizeof *x.mover, e);
+    x.space = vgi_array(x.chunks, 2 * s->n * sizeof *x.space, e);
+    if (x.mover && x.space) {
+        vgi_rig_movers(r, x.mover);
+        vgi_parallel(threads, x.chunks, skin_chunk, &x);
+    } else {
+        code = VG_ENOMEM;
+    }
+    free(x.mover);
+    free(x.space);
+    clear_bones(&b);
+    return code;
+}

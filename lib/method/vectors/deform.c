@@ -1,0 +1,484 @@
+/* deform.c: how each vector of a pose has turned and stretched against the reference pose, and the same done to
+ * another mesh's vectors (MATH 4 and 5, pose deformation; T 3.3, T 4.2).
+ *
+ * Two ways lead to the same numbers. The kernel (deform_kernel.c) does whole faces in eight poses at once and never
+ * forms a quaternion. The scalar way below forms them: for faces with degenerate corners, for line segments, for
+ * links, and when quaternions are what is asked for.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/vectors/deform.h"
+#include "numeric/vec3.h"
+#include "method/vectors/deform_kernel.h"
+#include "method/vectors/moments.h"
+#include "model/incidence.h"
+
+#include <math.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+
+enum { CHUNK = 1024, /* faces of one task */
+       ENOUGH = 64 };
+static const double shortest = 1e-9;      /* of D: a vector below has no direction */
+static const double flat = 1e-12;         /* see deform_kernel.c */
+
+struct vg_deformer {
+    const vg_graph *g;
+    int threads;
+    double shortest2; /* mesh units, squared */
+    size_t faces;     /* without links */
+    double *vector;   /* per corner of the reference: the vector */
+    double *length;   /* its length, 0 if degenerate */
+    double *frame;    /* per corner: unit quaternion of its frame; of a 2-vertex face unused */
+    unsigned char *slow; /* per face: the kernel cannot do it */
+    vgi_incidence around; /* faces at each vertex, only if there are links */
+    double *target;   /* per corner: the target's vector */
+    vgi_method method;
+    double *coordinates; /* see vgi_transfer */
+    vgi_gradient *gradient;
+    vgi_gradient_face *gradient_face;
+    atomic_uint_fast64_t degenerate, first_face;
+    /* one piece per thread: vectors and quaternions of the largest face (work_scalars numbers),
+     * then the kernel's lanes */
+    double *work;
+    size_t work_size, work_scalars;
+};
+
+static size_t face_size(const vg_graph *g, size_t f)
+{
+    return g->start[f + 1] - g->start[f];
+}
+
+/* ---- one face in one pose ---- */
+
+/* The unit quaternion of the frame [u b n] of a corner; false when the corner is degenerate. */
+static bool corner_frame(const vg_deformer *d, const double w[3], const double n[3], double *length, double q[4])
+{
+    *length = vgi_length(w);
+    if (!(*length * *length > d->shortest2)) return false;
+    double u[3], m[3], b[3], along = 0;
+    for (int k = 0; k < 3; k++) u[k] = w[k] / *length, along += u[k] * n[k];
+    for (int k = 0; k < 3; k++) m[k] = n[k] - along * u[k];
+    double sine = vgi_length(m);
+    if (!(sine > flat)) return false;
+    for (int k = 0; k < 3; k++) m[k] /= sine;
+    vgi_cross(m, u, b);
+    const double matrix[9] = {u[0], b[0], m[0], u[1], b[1], m[1], u[2], b[2], m[2]};
+    vg_quat_from_matrix(matrix, q);
+    return true;
+}
+
+/* Add unit quaternion q to a sum, in the sign that agrees with the sum so far. */
+static void add_turn(double sum[4], const double q[4])
+{
+    double sign = sum[0] * q[0] + sum[1] * q[1] + sum[2] * q[2] + sum[3] * q[3] < 0 ? -1 : 1;
+    for (int k = 0; k < 4; k++) sum[k] += sign * q[k];
+}
+
+static void make_unit(double q[4])
+{
+    double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    if (length > 0) {
+        for (int k = 0; k < 4; k++) q[k] /= length;
+    } else {
+        q[0] = 1, q[1] = q[2] = q[3] = 0;
+    }
+}
+
+/* Deformation of every corner of a face of 3 or more; returns how many were degenerate. w: its vectors in the
+ * pose. */
+static size_t measure_polygon(const vg_deformer *d, size_t f, const double *w, double *quaternions)
+{
+    uint32_t begin = d->g->start[f];
+    size_t r = face_size(d->g, f), bad = 0;
+    double n[3], mean[4] = {0, 0, 0, 0};
+    bool has_normal = vgi_unit_normal(w, r, n);
+    for (size_t i = 0; i < r; i++) {
+        double *q = quaternions + 4 * i, now[4], length, before = d->length[begin + i];
+        if (!has_normal || before == 0 || !corner_frame(d, w + 3 * i, n, &length, now)) {
+            /* to be filled in below; a good corner's Q is never all zero, but its w may be: mark all four */
+            q[0] = 0;
+            q[1] = q[2] = q[3] = 0;
+            bad++;
+            continue;
+        }
+        const double *ref = d->frame + 4 * (size_t)(begin + i), back[4] = {ref[0], -ref[1], -ref[2], -ref[3]};
+        vg_quat_multiply(now, back, q);
+        add_turn(mean, q);
+        double root = sqrt(length / before);
+        for (int k = 0; k < 4; k++) q[k] *= root;
+    }
+    if (bad) {
+        make_unit(mean);
+        for (size_t i = 0; i < r; i++) {
+            double *q = quaternions + 4 * i;
+            if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) memcpy(q, mean, sizeof mean);
+        }
+    }
+    return bad;
+}
+
+/* A 2-vertex face: both corners get the smallest rotation that does it, on top of the turn `base` (a unit quaternion;
+ * identity for bones). */
+static size_t measure_segment(const vg_deformer *d, size_t f, const double *w, const double base[4],
+                              double *quaternions)
+{
+    uint32_t begin = d->g->start[f];
+    double length = vgi_length(w), before = d->length[begin];
+    size_t bad = 0;
+    if (before == 0 || !(length * length > d->shortest2)) {
+        memcpy(quaternions, base, 4 * sizeof *base);
+        bad = 2;
+    } else {
+        double turned[3], rest[4];
+        vg_quat_apply(base, d->vector + 3 * (size_t)begin, turned);
+        vg_quat_between(turned, w, rest);
+        vg_quat_multiply(rest, base, quaternions);
+    }
+    memcpy(quaternions + 4, quaternions, 4 * sizeof *quaternions);
+    return bad;
+}
+
+/* ---- reading a face's vectors out of a pose ---- */
+
+static void face_vectors(const vg_graph *g, size_t f, vg_kind kind, const double *pose, double *w)
+{
+    uint32_t begin = g->start[f];
+    size_t r = face_size(g, f);
+    if (kind == VG_VECTORS) {
+        memcpy(w, pose + 3 * (size_t)begin, 3 * r * sizeof *w);
+        return;
+    }
+    double centre[3] = {0, 0, 0};
+    for (size_t i = 0; i < r; i++)
+        for (int k = 0; k < 3; k++) centre[k] += w[3 * i + k] = pose[3 * (size_t)g->vert[begin + i] + k];
+    for (int k = 0; k < 3; k++) centre[k] /= (double)r;
+    for (size_t i = 0; i < r; i++)
+        for (int k = 0; k < 3; k++) w[3 * i + k] -= centre[k];
+}
+
+static const double identity[4] = {1, 0, 0, 0};
+
+/* The deformation of face f (no link) in one pose, scalar way. `w` is workspace of its vectors. */
+static size_t measure_face(const vg_deformer *d, size_t f, vg_kind kind, const double *pose, double *w,
+                           double *quaternions)
+{
+    face_vectors(d->g, f, kind, pose, w);
+    if (face_size(d->g, f) == 2) return measure_segment(d, f, w, identity, quaternions);
+    return measure_polygon(d, f, w, quaternions);
+}
+
+/* The mean turn of the faces around both ends of a link, links left out, of at most ENOUGH corners each. w, q:
+ * workspace. */
+static void turn_beside(const vg_deformer *d, size_t link, vg_kind kind, const double *pose, double *w, double *q,
+                        double mean[4])
+{
+    const vg_graph *g = d->g;
+    memset(mean, 0, 4 * sizeof *mean);
+    for (int end = 0; end < 2; end++) {
+        uint32_t v = g->vert[g->start[link] + (uint32_t)end];
+        uint32_t first = d->around.first[v], last = d->around.first[v + 1];
+        if (last - first > ENOUGH) last = first + ENOUGH;
+        for (uint32_t i = first; i < last; i++) {
+            size_t f = d->around.face[i];
+            if (f >= d->faces) continue;
+            measure_face(d, f, kind, pose, w, q);
+            for (size_t c = 0; c < face_size(g, f); c++) {
+                make_unit(q + 4 * c);
+                add_turn(mean, q + 4 * c);
+            }
+        }
+    }
+    make_unit(mean);
+}
+
+static size_t measure_link(const vg_deformer *d, size_t link, vg_kind kind, const double *pose, double *w, double *q)
+{
+    double mean[4];
+    turn_beside(d, link, kind, pose, w, w + 3 * d->g->max_corners, mean);
+    face_vectors(d->g, link, kind, pose, w);
+    measure_segment(d, link, w, mean, q);
+    return 0; /* a link between coincident vertices has no direction, and needs none */
+}
+
+static size_t measure_any(const vg_deformer *d, size_t f, vg_kind kind, const double *pose, double *w, double *q)
+{
+    return f < d->faces ? measure_face(d, f, kind, pose, w, q) : measure_link(d, f, kind, pose, w, q);
+}
+
+static void apply_face(const vg_deformer *d, size_t f, const double *quaternions, double *vectors)
+{
+    uint32_t begin = d->g->start[f];
+    for (size_t i = 0; i < face_size(d->g, f); i++)
+        vg_quat_apply(quaternions + 4 * i, d->target + 3 * (size_t)(begin + i), vectors + 3 * (size_t)(begin + i));
+}
+
+static void count_degenerate(vg_deformer *d, size_t f, size_t bad)
+{
+    if (!bad) return;
+    atomic_fetch_add(&d->degenerate, bad);
+    uint_fast64_t least = atomic_load(&d->first_face);
+    while (f < least && !atomic_compare_exchange_weak(&d->first_face, &least, f)) continue;
+}
+
+/* ---- making ---- */
+
+static void measure_reference(vg_deformer *d)
+{
+    const vg_graph *g = d->g;
+    for (size_t f = 0; f < g->nf; f++) {
+        size_t r = face_size(g, f);
+        const double *w = d->vector + 3 * (size_t)g->start[f];
+        double n[3];
+        bool good = r == 2 || vgi_unit_normal(w, r, n);
+        d->slow[f] = r == 2 || !good;
+        for (size_t i = 0; i < r; i++) {
+            size_t c = g->start[f] + i;
+            double *length = &d->length[c];
+            *length = vgi_length(d->vector + 3 * c);
+            bool usable = good && *length * *length > d->shortest2;
+            if (usable && r > 2) usable = corner_frame(d, d->vector + 3 * c, n, length, d->frame + 4 * c);
+            if (!usable) *length = 0, d->slow[f] = 1;
+        }
+    }
+}
+
+static int make_workspace(vg_deformer *d, vg_err *e)
+{
+    size_t r = d->g->max_corners + 1, per_lane = sizeof(vgi_lanes) / sizeof(double);
+    d->work_scalars = (7 * r + per_lane - 1) / per_lane * per_lane;
+    d->work_size = d->work_scalars + 2 * r * (sizeof(vgi_vec) / sizeof(double));
+    d->work = aligned_alloc(sizeof(vgi_lanes), (size_t)d->threads * d->work_size * sizeof *d->work);
+    return d->work ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory for faces of %zu corners", r - 1);
+}
+
+/* All but what the reference says, whose D is `diagonal`. */
+static int make_deformer(vg_deformer **out, const vg_graph *g, double diagonal, int threads, vg_err *e)
+{
+    size_t corners = vg_graph_corners(g);
+    vg_deformer *d = *out = vgi_array(1, sizeof *d, e);
+    if (!d) return VG_ENOMEM;
+    d->g = g, d->threads = threads, d->faces = g->nf - g->nlinks;
+    atomic_init(&d->first_face, UINT64_MAX);
+    double least = shortest * diagonal;
+    d->shortest2 = least * least;
+    d->vector = vgi_array_raw(3 * corners, sizeof *d->vector, e);
+    d->length = vgi_array_raw(corners, sizeof *d->length, e);
+    d->frame = vgi_array(4 * corners, sizeof *d->frame, e);
+    d->slow = vgi_array(g->nf, sizeof *d->slow, e);
+    bool ok = d->vector && d->length && d->frame && d->slow && make_workspace(d, e) == VG_OK;
+    if (ok && g->nlinks) {
+        ok = vgi_incidence_make(&d->around, g->nv, g->nf, g->start, g->vert, e) == VG_OK;
+    }
+    if (!ok) return vg_deformer_free(out), VG_ENOMEM;
+    return VG_OK;
+}
+
+int vg_deformer_new(vg_deformer **d, const vg_graph *g, const double *reference, int threads, vg_err *e)
+{
+    if (make_deformer(d, g, vg_diagonal(reference, g->nv), threads, e) < 0) return VG_ENOMEM;
+    vg_graph_vectors(g, reference, (*d)->vector);
+    measure_reference(*d);
+    return VG_OK;
+}
+
+int vgi_deformer_of_vectors(vg_deformer **d, const vg_graph *g, const double *vectors, double diagonal, int threads,
+                            vg_err *e)
+{
+    if (make_deformer(d, g, diagonal, threads, e) < 0) return VG_ENOMEM;
+    memcpy((*d)->vector, vectors, 3 * vg_graph_corners(g) * sizeof *vectors);
+    measure_reference(*d);
+    return VG_OK;
+}
+
+void vg_deformer_free(vg_deformer **out)
+{
+    vg_deformer *d = *out;
+    if (!d) return;
+    free(d->vector);
+    free(d->length);
+    free(d->frame);
+    free(d->slow);
+    vgi_incidence_clear(&d->around);
+    free(d->target);
+    free(d->coordinates);
+    free(d->gradient);
+    free(d->gradient_face);
+    free(d->work);
+    free(d);
+    *out = NULL;
+}
+
+/* k = F_r' r_t / |r| */
+static void make_coordinates(vg_deformer *d)
+{
+    size_t corners = vg_graph_corners(d->g);
+    for (size_t c = 0; c < corners; c++) {
+        const double *q = d->frame + 4 * c, back[4] = {q[0], -q[1], -q[2], -q[3]};
+        vg_quat_apply(back, d->target + 3 * c, d->coordinates + 3 * c);
+        for (int k = 0; k < 3 && d->length[c] > 0; k++) d->coordinates[3 * c + k] /= d->length[c];
+    }
+}
+
+/* A face whose gradient cannot be had (nearly a line) is done the slow way, by its corners. */
+static void make_gradient(vg_deformer *d, size_t f)
+{
+    const vg_graph *g = d->g;
+    size_t begin = g->start[f], r = face_size(g, f);
+    double P[6], size, source2 = 0, target2 = 0;
+    vgi_gradient_face *face = &d->gradient_face[f];
+    if (!vgi_gradient_moments(d->vector + 3 * begin, r, P, face->q, &size)) {
+        d->slow[f] = 1;
+        return;
+    }
+    for (size_t i = 3 * begin; i < 3 * (begin + r); i++) {
+        source2 += d->vector[i] * d->vector[i];
+        target2 += d->target[i] * d->target[i];
+    }
+    face->rho = sqrt(target2 / source2);
+    for (size_t c = begin; c < begin + r; c++) {
+        vgi_symmetric_times(P, d->vector + 3 * c, d->gradient[c].p);
+        for (size_t k = 0; k < 3; k++) d->gradient[c].b[k] = d->target[3 * c + k] - face->rho * d->vector[3 * c + k];
+    }
+}
+
+static int make_gradients(vg_deformer *d, vg_err *e)
+{
+    if (!d->gradient) d->gradient = vgi_array(vg_graph_corners(d->g), sizeof *d->gradient, e);
+    if (!d->gradient_face) d->gradient_face = vgi_array(d->g->nf, sizeof *d->gradient_face, e);
+    if (!d->gradient || !d->gradient_face) return VG_ENOMEM;
+    for (size_t f = 0; f < d->faces; f++)
+        if (!d->slow[f]) make_gradient(d, f);
+    return VG_OK;
+}
+
+int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_method method, vg_err *e)
+{
+    size_t corners = vg_graph_corners(d->g);
+    free(d->target);
+    d->target = vgi_copy_array(target_vectors, 3 * corners, sizeof *d->target, e);
+    if (!d->coordinates) d->coordinates = vgi_array_raw(3 * corners, sizeof *d->coordinates, e);
+    if (!d->target || !d->coordinates) return VG_ENOMEM;
+    make_coordinates(d);
+    d->method = method == VG_BY_GRADIENT ? VGI_GRADIENT : method == VG_BY_BLEND ? VGI_BLEND : VGI_POSE;
+    return d->method == VGI_POSE ? VG_OK : make_gradients(d, e);
+}
+
+vg_deform_counts vg_deformer_counts(const vg_deformer *d)
+{
+    return (vg_deform_counts){atomic_load(&d->degenerate), atomic_load(&d->first_face)};
+}
+
+/* ---- many faces, many poses ---- */
+
+typedef struct deform_job deform_job;
+typedef void deform_step(deform_job *job, double *work, size_t first, size_t last);
+struct deform_job {
+    vg_deformer *d;
+    size_t n;
+    vg_kind kind;
+    const double *const *in;
+    double *const *out;
+    deform_step *step;
+    atomic_size_t next; /* first face nobody has taken */
+};
+
+static void run_worker(void *context, size_t worker)
+{
+    deform_job *j = context;
+    size_t nf = j->d->g->nf;
+    double *work = j->d->work + worker * j->d->work_size;
+    for (size_t first; (first = atomic_fetch_add(&j->next, CHUNK)) < nf;)
+        j->step(j, work, first, first + CHUNK < nf ? first + CHUNK : nf);
+}
+
+static void run(deform_job *j)
+{
+    atomic_init(&j->next, 0);
+    vgi_parallel(j->d->threads, (size_t)j->d->threads, run_worker, j);
+}
+
+static void measure_step(deform_job *j, double *work, size_t first, size_t last)
+{
+    vg_deformer *d = j->d;
+    for (size_t f = first; f < last; f++)
+        for (size_t p = 0; p < j->n; p++)
+            count_degenerate(d, f,
+                             measure_any(d, f, j->kind, j->in[p], work, j->out[p] + 4 * (size_t)d->g->start[f]));
+}
+
+void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses,
+                         double *const *quaternions)
+{
+    deform_job j = {.d = d, .n = n, .kind = kind, .in = poses, .out = quaternions, .step = measure_step};
+    run(&j);
+}
+
+static void apply_step(deform_job *j, double *work, size_t first, size_t last)
+{
+    (void)work;
+    const vg_graph *g = j->d->g;
+    for (size_t f = first; f < last; f++)
+        for (size_t p = 0; p < j->n; p++) apply_face(j->d, f, j->in[p] + 4 * (size_t)g->start[f], j->out[p]);
+}
+
+void vg_deformer_apply(vg_deformer *d, size_t n, const double *const *quaternions, double *const *vectors)
+{
+    deform_job j = {.d = d, .n = n, .in = quaternions, .out = vectors, .step = apply_step};
+    run(&j);
+}
+
+static void transfer_slowly(deform_job *j, double *work, size_t f, size_t p)
+{
+    const vg_deformer *d = j->d;
+    double *quaternions = work + 3 * d->g->max_corners;
+    count_degenerate(j->d, f, measure_any(d, f, j->kind, j->in[p], work, quaternions));
+    apply_face(d, f, quaternions, j->out[p]);
+}
+
+/* What the kernel calls back with: faces that it found degenerate in some poses. */
+typedef struct redo {
+    deform_job *job;
+    double *work;
+    size_t first_pose;
+} redo;
+
+static void redo_slowly(void *context, size_t face, unsigned lanes)
+{
+    redo *r = context;
+    for (size_t k = 0; k < VGI_LANES; k++)
+        if (lanes >> k & 1) transfer_slowly(r->job, r->work, face, r->first_pose + k);
+}
+
+static void transfer_step(deform_job *j, double *work, size_t first, size_t last)
+{
+    vg_deformer *d = j->d;
+    vgi_vec *lanes = (vgi_vec *)(work + d->work_scalars);
+    for (size_t p = 0; p < j->n; p += VGI_LANES) {
+        size_t n = j->n - p < VGI_LANES ? j->n - p : VGI_LANES;
+        const double *poses[VGI_LANES];
+        for (size_t k = 0; k < VGI_LANES; k++) poses[k] = j->in[p + (k < n ? k : n - 1)];
+        redo again = {j, work, p};
+        const vgi_transfer t = {.start = d->g->start,
+                                .vert = d->g->vert,
+                                .poses = poses,
+                                .vertices = j->kind == VG_VERTICES,
+                                .method = d->method,
+                                .coordinates = d->coordinates,
+                                .gradient = d->gradient,
+                                .gradient_face = d->gradient_face,
+                                .shortest2 = d->shortest2,
+                                .skip = d->slow,
+                                .out = j->out + p,
+                                .lanes = n,
+                                .bad = redo_slowly,
+                                .context = &again};
+        vgi_transfer_faces(&t, first, last, lanes, d->g->max_corners);
+        for (size_t f = first; f < last; f++)
+            for (size_t k = 0; k < n && d->slow[f]; k++) transfer_slowly(j, work, f, p + k);
+    }
+}
+
+void vg_deformer_transfer(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses, double *const *vectors)
+{
+    deform_job j = {.d = d, .n = n, .kind = kind, .in = poses, .out = vectors, .step = transfer_step};
+    run(&j);
+}

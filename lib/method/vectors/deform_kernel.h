@@ -1,0 +1,56 @@
+/* deform_kernel.h: deformed target vectors of one face in eight poses at once (Frames, MATH 4).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_DEFORM_KERNEL_H
+#define VG_DEFORM_KERNEL_H
+
+#include "numeric/lanes.h"
+
+typedef struct vgi_vec {
+    vgi_lanes x, y, z;
+} vgi_vec;
+
+/* What is carried over: MATH 5. */
+typedef enum vgi_method { VGI_POSE, VGI_GRADIENT, VGI_BLEND } vgi_method;
+
+/* The deformation gradient of a face is D = (sum d_c r_c' + h n_d n_r') P with P = (sum r_c r_c' + h n_r n_r')^-1.
+ * For the target's vector t the wanted vector is D t, plus what a linear map of the face leaves of the source's own
+ * vector, at the target's size: rho (d - D r). (Corners of a face that is not flat are no linear image of one
+ * another.) With b = t - rho r that is sum d_k (p_k . b) + n_d (q . b) + rho d, p_k = P r_k, q = h P n_r. */
+typedef struct vgi_gradient {
+    double p[3], b[3];
+} vgi_gradient; /* per corner */
+typedef struct vgi_gradient_face {
+    double q[3], rho;
+} vgi_gradient_face;
+
+/* vgi_transfer_faces: faces first .. last-1, each of 3 or more corners.
+ *   start, vert   the graph (vg_graph)
+ *   poses         8 poses: positions if `vertices`, else vectors
+ *   gradient, gradient_face   for VGI_GRADIENT and VGI_BLEND, see above
+ *   coordinates   for VGI_POSE and VGI_BLEND, 3 per corner: the target's vector in the frame of the source's
+ *                 reference corner, over the length of the source's reference vector
+ *   shortest2     squared length below which a vector is degenerate
+ *   skip          1 per face: do nothing
+ *   w             workspace of 2 (max corners + 1)
+ *   out           lanes of them, vectors of the target
+ *   bad           called for each face with a degenerate corner in one of the first `lanes` poses, after its vectors
+ *                 have been written */
+typedef struct vgi_transfer {
+    const uint32_t *start, *vert;
+    const double *const *poses;
+    bool vertices;
+    vgi_method method;
+    const double *coordinates;
+    const vgi_gradient *gradient;
+    const vgi_gradient_face *gradient_face;
+    double shortest2;
+    const unsigned char *skip;
+    double *const *out;
+    size_t lanes;
+    void (*bad)(void *context, size_t face, unsigned lanes);
+    void *context;
+} vgi_transfer;
+
+void vgi_transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w, size_t max_corners);
+
+#endif

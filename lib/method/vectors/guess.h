@@ -1,0 +1,33 @@
+/* guess.h: the first guess of a pose from its vectors, and what it misses.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_GUESS_H
+#define VG_GUESS_H
+
+#include "method/vectors/metric.h"
+
+/* One step of the walk: x(vertex of `corner`) = x(vertex of `from`) + w(corner) - w(from),
+ * both corners of one face. */
+typedef struct vgi_step {
+    uint32_t corner, from;
+} vgi_step;
+
+/* x, y, z and a number that does not matter: what one register holds. */
+typedef double vgi_point __attribute__((vector_size(32)));
+
+typedef struct vgi_guesser { /* all borrowed */
+    const vg_graph *g;
+    const vgi_metric *metric;
+    const vgi_step *walk;    /* from the held vertices to all others */
+    size_t nsteps;
+    uint32_t pinned;         /* without anchors: the vertex that is held at 0 */
+    const uint32_t *anchors; /* the held vertices, or */
+    size_t nanchors;         /* 0: one vertex is pinned */
+} vgi_guesser;
+
+/* vgi_guess: x (nv points): the pose that the walk gives, relative to the first anchor or the pinned vertex, so that
+ * a pose far from the origin loses no digits. rhs (nv x 3): A G (W* - A' x), what it misses. anchors: nanchors
+ * points. space: nv + max_corners. */
+void vgi_guess(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs,
+               vgi_point *space);
+
+#endif

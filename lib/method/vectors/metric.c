@@ -1,0 +1,80 @@
+/* metric.c: the area metric of polygons: from the moments of a face's reference vectors in its plane.
+ * Leaves out its use: reconstruct.c.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/vectors/metric.h"
+#include "numeric/vec3.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* A thin face: its lesser moment counts as at least THIN of the greater, its area as at least SMALL of it. */
+static const double thin = 1e-4, small = 1e-3;
+
+static void make_face(vgi_face_metric *m, double *plane, const double *w, size_t r)
+{
+    double n[3];
+    *m = (vgi_face_metric){.weight = 1};
+    memset(plane, 0, 3 * r * sizeof *plane);
+    vgi_area_vector(w, r, n);
+    double length = sqrt(vgi_dot(n, n));
+    if (r < 3 || !(length > 0)) return;
+    /* axes of the plane: the first vector that is not along the normal, and across */
+    double a[3] = {0, 0, 0}, b[3], most = 0;
+    for (int k = 0; k < 3; k++) n[k] /= length;
+    for (size_t i = 0; i < r; i++) {
+        double t[3], along = vgi_dot(n, w + 3 * i);
+        for (size_t k = 0; k < 3; k++) plane[3 * i + k] = t[k] = w[3 * i + k] - along * n[k];
+        if (vgi_dot(t, t) > most) most = vgi_dot(t, t), memcpy(a, t, sizeof a);
+    }
+    if (!(most > 0)) return;
+    for (int k = 0; k < 3; k++) a[k] /= sqrt(most);
+    vgi_cross(n, a, b);
+    double aa = 0, ab = 0, bb = 0;
+    for (size_t i = 0; i < r; i++) {
+        double x = vgi_dot(a, plane + 3 * i), y = vgi_dot(b, plane + 3 * i);
+        aa += x * x, ab += x * y, bb += y * y;
+    }
+    /* eigenvalues and the first eigenvector of [aa ab; ab bb] */
+    double half = (aa + bb) / 2, spread = hypot((aa - bb) / 2, ab), angle = 0.5 * atan2(2 * ab, aa - bb);
+    double l1 = half + spread, l2 = fmax(half - spread, thin * l1), w_area = fmax(length / 2, small * l1);
+    double trace = 1 / l1 + 1 / l2;
+    m->weight = w_area * trace;
+    for (int which = 0; which < 2; which++) {
+        double c = which ? -sin(angle) : cos(angle), s = which ? cos(angle) : sin(angle), l = which ? l2 : l1, e[3];
+        double scale = w_area * (1 / (l * l) - trace / l);
+        for (int k = 0; k < 3; k++) e[k] = c * a[k] + s * b[k];
+        m->s[0] += scale * e[0] * e[0], m->s[1] += scale * e[0] * e[1], m->s[2] += scale * e[0] * e[2];
+        m->s[3] += scale * e[1] * e[1], m->s[4] += scale * e[1] * e[2], m->s[5] += scale * e[2] * e[2];
+    }
+}
+
+int vgi_metric_make(vgi_metric *m, const vg_graph *g, const double *reference, vg_err *e)
+{
+    size_t corners = vg_graph_corners(g);
+    double *w = vgi_array_raw(3 * corners, sizeof *w, e);
+    m->face = vgi_array(g->nf, sizeof *m->face, e);
+    m->plane = vgi_array(3 * corners, sizeof *m->plane, e);
+    if (!w || !m->face || !m->plane) {
+        free(w);
+        vgi_metric_clear(m);
+        return VG_ENOMEM;
+    }
+    vg_graph_vectors(g, reference, w);
+    /* in units of the mean length, so that moments neither overflow nor vanish */
+    double sum = 0;
+    for (size_t i = 0; i < 3 * corners; i++) sum += fabs(w[i]);
+    for (size_t i = 0; i < 3 * corners && sum > 0; i++) w[i] *= (double)corners / sum;
+    for (size_t f = 0; f < g->nf; f++) {
+        size_t begin = 3 * (size_t)g->start[f];
+        make_face(&m->face[f], m->plane + begin, w + begin, g->start[f + 1] - g->start[f]);
+    }
+    free(w);
+    return VG_OK;
+}
+
+void vgi_metric_clear(vgi_metric *m)
+{
+    free(m->face);
+    free(m->plane);
+    *m = (vgi_metric){0};
+}

@@ -1,0 +1,64 @@
+/* move.c: where the whole body goes when a motion is carried over to another mesh (MATH 5).
+ * Leaves out how its vectors turn and stretch (deform.c, transfer.c, shape.c), and what does not move at all (pin.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/core.h"
+
+#include <stdlib.h>
+
+struct vg_mover {
+    const vg_graph *to;
+    double ratio; /* of the target's size to the source's; 0: it stays */
+    size_t nanchors;
+    double source[3], target[3];             /* roots of the references */
+    double *source_anchors, *target_anchors; /* positions in the references */
+};
+
+int vg_mover_new(vg_mover **out, const vg_graph *from, const double *source, const vg_graph *to, const double *target,
+                 const uint32_t *anchors, size_t nanchors, bool stay, vg_err *e)
+{
+    double before = vg_diagonal(source, from->nv), after = vg_diagonal(target, to->nv);
+    vg_mover *m = *out = vgi_array(1, sizeof *m, e);
+    if (!m) return VG_ENOMEM;
+    m->to = to, m->nanchors = nanchors;
+    m->ratio = stay ? 0 : before > 0 ? after / before : 1;
+    vg_graph_root(from, source, m->source);
+    vg_graph_root(to, target, m->target);
+    m->source_anchors = vgi_array(nanchors, 3 * sizeof *m->source_anchors, e);
+    m->target_anchors = vgi_array(nanchors, 3 * sizeof *m->target_anchors, e);
+    if (!m->source_anchors || !m->target_anchors) {
+        vg_mover_free(out);
+        return VG_ENOMEM;
+    }
+    vg_graph_anchors(source, anchors, nanchors, m->source_anchors);
+    vg_graph_anchors(target, anchors, nanchors, m->target_anchors);
+    return VG_OK;
+}
+
+void vg_mover_free(vg_mover **m)
+{
+    if (!*m) return;
+    free((*m)->source_anchors);
+    free((*m)->target_anchors);
+    free(*m);
+    *m = NULL;
+}
+
+static void go(const vg_mover *m, const double *source, const double *target, const double *now, double *to)
+{
+    for (int k = 0; k < 3; k++) to[k] = target[k] + (m->ratio > 0 ? m->ratio * (now[k] - source[k]) : 0);
+}
+
+void vg_mover_move(const vg_mover *m, const vg_frame *in, vg_frame *out)
+{
+    go(m, m->source, m->target, in->root, out->root);
+    for (size_t i = 0; i < 3 * m->nanchors; i += 3)
+        go(m, m->source_anchors + i, m->target_anchors + i, in->anchors + i, out->anchors + i);
+}
+
+void vg_mover_place(const vg_mover *m, const double root[3], double *vertices)
+{
+    double now[3];
+    vg_graph_root(m->to, vertices, now);
+    for (size_t v = 0; v < m->to->nv; v++)
+        for (size_t k = 0; k < 3 && m->to->in_face[v]; k++) vertices[3 * v + k] += root[k] - now[k];
+}

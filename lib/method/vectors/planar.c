@@ -1,0 +1,354 @@
+/* planar.c: poses whose faces of four and more corners are more nearly plane: w1 times the energy of the
+ * reconstruction plus w2 times the sum over corners of such faces of (m_f . t_c)^2, m_f the normal of the wanted
+ * vectors (MATH 5; T 4.2.3).
+ *
+ * x, y and z couple, and the matrix M = w1 N + w2 P differs from pose to pose. It is not factorized: P lies between
+ * 0 and N (of uniform weights), so that conjugate gradients preconditioned by the one factor of N see eigenvalues
+ * between w1 and w1 + w2 only, whatever the mesh. They start from the plain solution V, where the residual is -w2 P
+ * V, and look for the difference to it. N itself is never multiplied with: as p := z + beta p with z = N^-1 r, N p
+ * := r + beta N p.
+ *
+ * Eight poses go side by side, each with coefficients and an end of its own, so that a pose does not depend on its
+ * neighbours. Leaves out the loops over rows: planar_kernel.c.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/vectors/planar.h"
+#include "method/vectors/planar_kernel.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+
+enum {
+    CORNERS = 4, /* of the least face that may be bent */
+    LIMIT = 1000 /* steps; 40 are usual for weights of 0.05 and 1 */
+};
+static const double enough = 1e-10; /* of the residual at the start, in the norm of N^-1 */
+static const double thin = 1e-12;   /* a face of less area than this part of its vectors' squares has no normal */
+
+/* What one block of eight poses needs. */
+typedef struct room {
+    vgi_row *x, *r, *z, *p, *s, *y; /* rows of unknowns; p and y also of the held vertices behind them */
+    vgi_row *normals;               /* one per planar face */
+    vgi_lanes *h;
+} room;
+
+struct vg_planar {
+    vgi_solver_view solver;
+    double ratio;        /* w2 / w1: the search is for N + ratio P */
+    size_t nheld;        /* attached vertices without a row: they get the rows behind */
+    uint32_t *held;
+    size_t nf, corners;  /* faces of four and more */
+    uint32_t *face;      /* in the order of the graph */
+    uint32_t *order;     /* place of that face among `start`, which follows the rows, for the sake of the cache */
+    uint32_t *start, *row;
+    vgi_row *memory;
+    room *rooms;         /* one per thread */
+    vg_planar_facts *found; /* per thread */
+    vg_planar_facts facts;
+};
+
+/* ---- faces ---- */
+
+typedef struct place {
+    uint32_t row, face;
+} place;
+
+static int compare_places(const void *a, const void *b)
+{
+    const place *x = a, *y = b;
+    return x->row != y->row ? (x->row > y->row) - (x->row < y->row) : (x->face > y->face) - (x->face < y->face);
+}
+
+static size_t face_size(const vg_graph *g, size_t f)
+{
+    return g->start[f + 1] - g->start[f];
+}
+
+static uint32_t least_row(const vg_graph *g, const uint32_t *row, size_t f)
+{
+    uint32_t least = UINT32_MAX;
+    for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++)
+        if (row[g->vert[c]] < least) least = row[g->vert[c]];
+    return least;
+}
+
+static void count_faces(vg_planar *p)
+{
+    const vg_graph *g = p->solver.g;
+    for (size_t f = 0; f < g->nf; f++) {
+        if (face_size(g, f) < CORNERS) continue;
+        p->nf++;
+        p->corners += face_size(g, f);
+    }
+    for (size_t v = 0; v < g->nv; v++) p->nheld += g->in_face[v] && p->solver.row[v] >= p->solver.rows;
+}
+
+/* rows: of all vertices, those held behind the others */
+static void list_faces(vg_planar *p, const uint32_t *rows, place *places)
+{
+    const vg_graph *g = p->solver.g;
+    size_t n = 0;
+    for (size_t f = 0; f < g->nf; f++) {
+        if (face_size(g, f) < CORNERS) continue;
+        p->face[n] = (uint32_t)f;
+        places[n] = (place){least_row(g, rows, f), (uint32_t)n};
+        n++;
+    }
+    qsort(places, n, sizeof *places, compare_places);
+    for (size_t i = 0; i < n; i++) {
+        size_t f = p->face[places[i].face];
+        p->order[places[i].face] = (uint32_t)i;
+        p->start[i + 1] = p->start[i];
+        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) p->row[p->start[i + 1]++] = rows[g->vert[c]];
+    }
+}
+
+static int prepare_faces(vg_planar *p, vg_err *e)
+{
+    const vg_graph *g = p->solver.g;
+    uint32_t *rows = vgi_copy_array(p->solver.row, g->nv, sizeof *rows, e);
+    place *places = vgi_array_raw(p->nf, sizeof *places, e);
+    p->held = vgi_array_raw(p->nheld, sizeof *p->held, e);
+    p->face = vgi_array_raw(p->nf, sizeof *p->face, e);
+    p->order = vgi_array_raw(p->nf, sizeof *p->order, e);
+    p->start = vgi_array(p->nf + 1, sizeof *p->start, e);
+    p->row = vgi_array_raw(p->corners, sizeof *p->row, e);
+    bool ok = rows && places && p->held && p->face && p->order && p->start && p->row;
+    if (ok) {
+        size_t n = 0;
+        for (size_t v = 0; v < g->nv; v++) {
+            if (!g->in_face[v] || rows[v] < p->solver.rows) continue;
+            rows[v] = (uint32_t)(p->solver.rows + n);
+            p->held[n++] = (uint32_t)v;
+        }
+        list_faces(p, rows, places);
+    }
+    free(rows);
+    free(places);
+    return ok ? VG_OK : VG_ENOMEM;
+}
+
+static int make_rooms(vg_planar *p, vg_err *e)
+{
+    size_t n = p->solver.rows, all = n + p->nheld, largest = (p->solver.g->max_corners + 2) / 3, each, total;
+    size_t threads = (size_t)p->solver.threads;
+    each = 4 * n + 2 * all + p->nf + largest + 1; /* of the largest mesh there can be, all are below 2^33 */
+    p->rooms = vgi_array(threads, sizeof *p->rooms, e);
+    p->found = vgi_array(threads, sizeof *p->found, e);
+    if (!p->rooms || !p->found) return VG_ENOMEM;
+    if (vgi_mul(each, threads, &total) && vgi_mul(total, sizeof *p->memory, &total))
+        p->memory = aligned_alloc(sizeof(vgi_lanes), total);
+    if (!p->memory) return vg_fail(e, VG_ENOMEM, "not enough memory to make %zu faces planar", p->nf);
+    for (size_t i = 0; i < threads; i++) {
+        room *m = &p->rooms[i];
+        vgi_row *at = p->memory + i * each;
+        m->x = at, m->r = m->x + n, m->z = m->r + n, m->s = m->z + n, m->p = m->s + n, m->y = m->p + all;
+        m->normals = m->y + all, m->h = (m->normals + p->nf)->xyz;
+    }
+    return VG_OK;
+}
+
+int vg_planar_new(vg_planar **out, const vg_solver *s, double fidelity, double planarity, vg_err *e)
+{
+    *out = NULL;
+    if (!(fidelity > 0) || !(planarity >= 0) || !isfinite(planarity / fidelity))
+        return vg_fail(e, VG_EARG, "the weights of planarity are one above 0 and one of at least 0, not %g and %g",
+                       fidelity, planarity);
+    vg_planar *p = *out = vgi_array(1, sizeof *p, e);
+    if (!p) return VG_ENOMEM;
+    p->solver = vgi_solver_look(s);
+    p->ratio = planarity / fidelity;
+    count_faces(p);
+    p->facts.faces = p->nf;
+    int r = prepare_faces(p, e);
+    if (r == VG_OK) r = make_rooms(p, e);
+    if (r < 0) vg_planar_free(out);
+    return r;
+}
+
+void vg_planar_free(vg_planar **out)
+{
+    vg_planar *p = *out;
+    if (!p) return;
+    free(p->held);
+    free(p->face);
+    free(p->order);
+    free(p->start);
+    free(p->row);
+    free(p->memory);
+    free(p->rooms);
+    free(p->found);
+    free(p);
+    *out = NULL;
+}
+
+size_t vg_planar_faces(const vg_planar *p)
+{
+    return p->nf;
+}
+
+vg_planar_facts vg_planar_get_facts(const vg_planar *p)
+{
+    return p->facts;
+}
+
+/* The mean of the cross products of successive vectors, made a unit; 0 if there is none. Moving all vectors of a
+ * face by the same changes nothing (they need not sum to 0), so they are taken from the first,
+ * and in units of the largest. */
+static void face_normal(const double *w, size_t r, double m[3])
+{
+    double n[3] = {0, 0, 0}, size = 0, largest = 0;
+    for (size_t i = 3; i < 3 * r; i++) largest = fmax(largest, fabs(w[i] - w[i % 3]));
+    double scale = largest >= DBL_MIN && largest < INFINITY ? 1 / largest : 0;
+    for (size_t i = 1; i + 1 < r; i++) {
+        double a[3], b[3];
+        for (size_t k = 0; k < 3; k++) a[k] = scale * (w[3 * i + k] - w[k]), b[k] = scale * (w[3 * i + 3 + k] - w[k]);
+        n[0] += a[1] * b[2] - a[2] * b[1];
+        n[1] += a[2] * b[0] - a[0] * b[2];
+        n[2] += a[0] * b[1] - a[1] * b[0];
+        size += a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
+    }
+    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (int k = 0; k < 3; k++) m[k] = length > thin * size ? n[k] / length : 0;
+}
+
+void vg_planar_load(const vg_planar *p, const double *vectors, double *normals)
+{
+    const vg_graph *g = p->solver.g;
+    for (size_t i = 0; i < p->nf; i++) {
+        size_t f = p->face[i];
+        face_normal(vectors + 3 * (size_t)g->start[f], face_size(g, f), normals + 3 * i);
+    }
+}
+
+/* ---- the search ---- */
+
+typedef struct plane_job {
+    vg_planar *p;
+    size_t n;
+    const double *const *normals;
+    double *const *x;
+    bool *converged; /* n */
+} plane_job;
+
+/* The residual of the plain solution, -ratio P V, each pose in units of its largest entry,
+ * which is returned in `unit`. */
+static void load_residual(const vg_planar *p, const room *m, const vgi_planar_faces *f, const double *const *pose,
+                          vgi_lanes *unit)
+{
+    size_t n = p->solver.rows;
+    vgi_lanes none, most = {0};
+    memset(m->y, 0, (n + p->nheld) * sizeof *m->y);
+    memset(m->p, 0, (n + p->nheld) * sizeof *m->p); /* rows of centroids stay 0 */
+    vgi_load_rows(m->p, p->solver.row, p->solver.g->nv, n, pose);
+    for (size_t i = 0; i < p->nheld; i++)
+        for (size_t c = 0; c < 3; c++)
+            for (int k = 0; k < VGI_LANES; k++) m->p[n + i].xyz[c][k] = pose[k][3 * (size_t)p->held[i] + c];
+    vgi_planar_product(f, m->normals, m->p, m->y, m->h, &none);
+    for (size_t i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < VGI_LANES; k++) most[k] = fmax(most[k], fabs(m->y[i].xyz[c][k]));
+    vgi_lanes factor;
+    for (int k = 0; k < VGI_LANES; k++) unit[0][k] = p->ratio * most[k], factor[k] = most[k] > 0 ? -1 / most[k] : 0;
+    for (size_t i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++) m->z[i].xyz[c] = m->r[i].xyz[c] = factor * m->y[i].xyz[c];
+    memset(m->x, 0, n * sizeof *m->x);
+    memset(m->s, 0, n * sizeof *m->s);
+    memset(m->y, 0, (n + p->nheld) * sizeof *m->y);
+    memset(m->p, 0, (n + p->nheld) * sizeof *m->p);
+}
+
+/* Conjugate gradients on (N + ratio P) x = r. left[k]: what is left of the residual, relative, where pose k ended. */
+static size_t descend(const vg_planar *p, const room *m, const vgi_planar_faces *f, double *left)
+{
+    size_t n = p->solver.rows, steps = 0;
+    vgi_lanes rz, start, next, ps, pPp, alpha, beta = {0}, gamma;
+    vgi_factor_solve(p->solver.factor, m->z);
+    vgi_planar_dot(n, m->r, m->z, &rz);
+    start = rz;
+    for (;; steps++) {
+        bool all = true;
+        vgi_mask active;
+        for (int k = 0; k < VGI_LANES; k++) {
+            left[k] = start[k] > 0 ? sqrt(fmax(rz[k], 0) / start[k]) : start[k] == 0 ? 0 : NAN;
+            active[k] = left[k] > enough;
+            all = all && !active[k];
+        }
+        if (all || steps == LIMIT) return steps;
+        vgi_planar_turn(n, m->z, m->r, &beta, m->p, m->s, &ps);
+        vgi_planar_product(f, m->normals, m->p, m->y, m->h, &pPp);
+        for (int k = 0; k < VGI_LANES; k++) {
+            alpha[k] = active[k] ? rz[k] / (ps[k] + p->ratio * pPp[k]) : 0;
+            gamma[k] = alpha[k] * p->ratio;
+        }
+        vgi_planar_advance(n, &alpha, &gamma, m->p, m->s, m->y, m->x, m->r, m->z);
+        vgi_factor_solve(p->solver.factor, m->z);
+        vgi_planar_dot(n, m->r, m->z, &next);
+        for (int k = 0; k < VGI_LANES; k++) {
+            beta[k] = active[k] ? next[k] / rz[k] : 0;
+            if (active[k]) rz[k] = next[k];
+        }
+    }
+}
+
+/* The difference is 0 at the held vertex; without anchors the mean is what stays. */
+static void put_back(const vg_planar *p, double *x, const double before[3])
+{
+    const vg_graph *g = p->solver.g;
+    double now[3];
+    vg_graph_root(g, x, now);
+    for (size_t v = 0; v < g->nv; v++)
+        for (size_t k = 0; g->in_face[v] && k < 3; k++) x[3 * v + k] += before[k] - now[k];
+}
+
+static void note(vg_planar_facts *found, size_t steps, double left)
+{
+    if (steps > found->most_steps) found->most_steps = steps;
+    if (!isnan(found->worst_residual) && !(left <= found->worst_residual)) found->worst_residual = left;
+}
+
+static void plane_block(void *context, size_t i)
+{
+    const plane_job *j = context;
+    vg_planar *p = j->p;
+    const room *m = &p->rooms[i];
+    size_t first = i * VGI_LANES, lanes = j->n - first < VGI_LANES ? j->n - first : VGI_LANES;
+    const vgi_planar_faces f = {p->nf, p->start, p->row};
+    const double *normals[VGI_LANES], *pose[VGI_LANES];
+    double left[VGI_LANES], root[VGI_LANES][3];
+    for (size_t k = 0; k < VGI_LANES; k++) {
+        size_t from = first + (k < lanes ? k : lanes - 1);
+        normals[k] = j->normals[from], pose[k] = j->x[from];
+        vg_graph_root(p->solver.g, pose[k], root[k]);
+    }
+    vgi_load_rows(m->normals, p->order, p->nf, p->nf, normals);
+    vgi_lanes unit;
+    load_residual(p, m, &f, pose, &unit);
+    size_t steps = descend(p, m, &f, left);
+    for (size_t r = 0; r < p->solver.rows; r++)
+        for (int c = 0; c < 3; c++) m->x[r].xyz[c] *= unit;
+    vgi_add_rows(m->x, p->solver.row, p->solver.g->nv, p->solver.rows, j->x + first, lanes);
+    for (size_t k = 0; k < lanes; k++) {
+        if (!p->solver.anchored) put_back(p, j->x[first + k], root[k]);
+        j->converged[first + k] = left[k] <= enough;
+        note(&p->found[i], steps, left[k]);
+    }
+}
+
+size_t vg_planar_solve(vg_planar *p, size_t n, const double *const *normals, double *const *x)
+{
+    enum { ROUND = 256 }; /* poses whose outcome is noted at once */
+    bool converged[ROUND];
+    size_t threads = (size_t)p->solver.threads, good = n;
+    if (p->nf == 0 || p->solver.rows == 0 || p->ratio == 0) return n; /* the plain solution, to the bit */
+    size_t most = ROUND / VGI_LANES < threads ? ROUND / VGI_LANES : threads;
+    for (size_t done = 0; done < n; done += most * VGI_LANES) {
+        size_t some = n - done < most * VGI_LANES ? n - done : most * VGI_LANES;
+        plane_job j = {.p = p, .n = some, .normals = normals + done, .x = x + done, .converged = converged};
+        vgi_parallel(p->solver.threads, (some + VGI_LANES - 1) / VGI_LANES, plane_block, &j);
+        for (size_t k = 0; k < some && good == n; k++)
+            if (!converged[k]) good = done + k;
+    }
+    for (size_t i = 0; i < threads; i++) note(&p->facts, p->found[i].most_steps, p->found[i].worst_residual);
+    return good;
+}

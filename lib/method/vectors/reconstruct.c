@@ -1,0 +1,407 @@
+/* reconstruct.c: a mesh from its vectors: min over V of sum |v(c) - C_f - w*_c|^2 (T 3.7), one factorisation for all
+ * poses.
+ *
+ * The normal matrix is the sum over faces of I - 11'/r on the face's own vertices (MATH 2): a graph Laplacian with
+ * weight 1/r on every pair. A face of many corners would fill r^2/2 entries; there the centroid is an unknown of its
+ * own, joined to each corner with weight 1, which has the same minimum (eliminating it gives I - 11'/r back) and r
+ * entries.
+ *
+ * What is solved for is not V but its difference from a first guess: the pose that one gets by walking from corner to
+ * corner along a spanning tree, adding up vectors. Where the vectors are consistent the guess is right to the last
+ * digits and the solve has nothing to do; where they are not, it spreads what does not fit. A solve for V itself
+ * would lose two to four digits on long meshes, for its rounding errors are those of positions, not of vectors.
+ *
+ * Without anchors one vertex is held at 0 and the pose is moved to its root in the end. Leaves out the triangular
+ * solves (solve_kernel.c), that guess (guess_kernel.c) and the factorisation (sparse.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/vectors/guess.h"
+#include "method/vectors/planar.h"
+#include "numeric/sparse.h"
+#include "model/incidence.h"
+
+#include <stdlib.h>
+#include <time.h>
+
+enum {
+    STAR = 12,         /* from this many corners on a face gets its centroid as an unknown ... */
+    STAR_METRIC = 200  /* ... or from this many, if it has a metric of its own; then its metric is the weight alone */
+};
+#define NO_ROW UINT32_MAX
+
+struct vg_solver {
+    const vg_graph *g;
+    int threads;
+    size_t unknowns;  /* attached vertices that are no anchors, then centroids */
+    size_t vertices_unknown;
+    uint32_t pinned;  /* without anchors: the vertex that is held at 0 */
+    uint32_t *row;    /* nv: row in the factor's order; NO_ROW if held or isolated */
+    vgi_metric metric;
+    size_t nsteps;
+    vgi_step *walk;       /* from the held vertices to all others */
+    uint32_t *anchors;
+    size_t nanchors;  /* those the caller gave; 0: one vertex is pinned */
+    size_t nisolated;
+    uint32_t *isolated;
+    double *isolated_at;
+    vgi_cholesky *cholesky;
+    vgi_factor factor;
+    vgi_row *x;       /* threads * unknowns */
+    vgi_point *spare; /* of vg_solver_load: nv + max_corners for each thread */
+    vg_solver_facts facts;
+};
+
+static double seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static size_t face_size(const vg_graph *g, size_t f)
+{
+    return g->start[f + 1] - g->start[f];
+}
+
+static bool is_star(const vg_solver *s, size_t f)
+{
+    return face_size(s->g, f) >= (s->metric.face ? STAR_METRIC : STAR);
+}
+
+/* Number the unknowns: row[v] counts up over attached vertices that are not held. */
+static int number_unknowns(vg_solver *s, const uint32_t *anchors, size_t n, const double *reference, vg_err *e)
+{
+    const vg_graph *g = s->g;
+    s->row = vgi_array_raw(g->nv, sizeof *s->row, e);
+    s->anchors = vgi_copy_array(anchors, n, sizeof *anchors, e);
+    s->isolated = vgi_array_raw(g->nv - g->attached, sizeof *s->isolated, e);
+    s->isolated_at = vgi_array_raw(3 * (g->nv - g->attached), sizeof *s->isolated_at, e);
+    if (!s->row || !s->anchors || !s->isolated || !s->isolated_at) return VG_ENOMEM;
+    s->nanchors = n;
+    for (size_t v = 0; v < g->nv; v++) s->row[v] = 0;
+    for (size_t i = 0; i < n; i++) {
+        if (!g->in_face[anchors[i]]) return vg_fail(e, VG_EINPUT, "anchor %u is in no face", anchors[i]);
+        s->row[anchors[i]] = NO_ROW;
+    }
+    size_t pinned = g->nv;
+    for (size_t v = 0; v < g->nv; v++) {
+        if (!g->in_face[v]) {
+            s->row[v] = NO_ROW;
+            for (int k = 0; k < 3; k++) s->isolated_at[3 * s->nisolated + (size_t)k] = reference[3 * v + (size_t)k];
+            s->isolated[s->nisolated++] = (uint32_t)v;
+        } else if (n == 0 && pinned == g->nv) {
+            pinned = v;
+        } else if (s->row[v] != NO_ROW) {
+            s->row[v] = (uint32_t)s->unknowns++;
+        }
+    }
+    s->vertices_unknown = s->unknowns;
+    for (size_t f = 0; f < g->nf; f++) s->unknowns += is_star(s, f);
+    if (s->unknowns > INT32_MAX / 2) return vg_fail(e, VG_EINPUT, "a mesh of %zu unknowns is too large", s->unknowns);
+    if (pinned < g->nv) s->row[pinned] = NO_ROW;
+    s->pinned = (uint32_t)pinned;
+    return VG_OK;
+}
+
+/* Breadth first from the held vertices, so that paths are short and few roundings add up. */
+static int plan_walk(vg_solver *s, vg_err *e)
+{
+    const vg_graph *g = s->g;
+    vgi_incidence around;
+    if (vgi_incidence_make(&around, g->nv, g->nf, g->start, g->vert, e) < 0) return VG_ENOMEM;
+    bool *reached = vgi_array(g->nv, sizeof *reached, e), *used = vgi_array(g->nf, sizeof *used, e);
+    uint32_t *queue = vgi_array_raw(g->nv, sizeof *queue, e);
+    s->walk = vgi_array_raw(g->attached, sizeof *s->walk, e);
+    size_t head = 0, tail = 0;
+    int r = reached && used && queue && s->walk ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; r == VG_OK && i < s->nanchors; i++)
+        queue[tail++] = s->anchors[i], reached[s->anchors[i]] = true;
+    if (r == VG_OK && s->pinned < g->nv) queue[tail++] = s->pinned, reached[s->pinned] = true;
+    while (r == VG_OK && head < tail) {
+        uint32_t v = queue[head++];
+        for (uint32_t i = around.first[v]; i < around.first[v + 1]; i++) {
+            uint32_t f = around.face[i];
+            if (used[f]) continue;
+            used[f] = true;
+            for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
+                if (reached[g->vert[c]]) continue;
+                reached[g->vert[c]] = true;
+                queue[tail++] = g->vert[c];
+                s->walk[s->nsteps++] = (vgi_step){c, around.corner[i]};
+            }
+        }
+    }
+    if (r == VG_OK && tail < g->attached)
+        r = vg_fail(e, VG_EINPUT,
+                    "the vectors leave %zu vertices in pieces that nothing joins to the rest: a link is missing",
+                    g->attached - tail);
+    vgi_incidence_clear(&around);
+    free(reached);
+    free(used);
+    free(queue);
+    return r;
+}
+
+/* Upper bound of the entries of the lower triangle, duplicates counted. */
+static size_t count_entries(const vg_solver *s)
+{
+    size_t n = 0;
+    for (size_t f = 0; f < s->g->nf; f++) {
+        size_t r = face_size(s->g, f);
+        n += is_star(s, f) ? 2 * r + 1 : r * (r + 1) / 2;
+    }
+    return n;
+}
+
+static double quadratic(const double s[6], const double *a, const double *b)
+{
+    return a[0] * (s[0] * b[0] + s[1] * b[1] + s[2] * b[2]) + a[1] * (s[1] * b[0] + s[3] * b[1] + s[4] * b[2]) +
+           a[2] * (s[2] * b[0] + s[4] * b[1] + s[5] * b[2]);
+}
+
+static void assemble_pairs(vgi_triplets *t, const vg_solver *s, size_t f)
+{
+    size_t begin = s->g->start[f], r = face_size(s->g, f);
+    const uint32_t *vert = s->g->vert + begin;
+    const vgi_face_metric *m = s->metric.face ? &s->metric.face[f] : NULL;
+    const double *plane = m ? s->metric.plane + 3 * begin : NULL;
+    double weight = m ? m->weight : 1, share = weight / (double)r;
+    for (size_t p = 0; p < r; p++) {
+        size_t i = s->row[vert[p]];
+        if (i >= s->unknowns) continue;
+        for (size_t q = 0; q <= p; q++) {
+            if (s->row[vert[q]] >= s->unknowns) continue;
+            double x = (p == q ? weight : 0) - share;
+            vgi_triplets_put(t, i, s->row[vert[q]], m ? x + quadratic(m->s, plane + 3 * p, plane + 3 * q) : x);
+        }
+    }
+}
+
+static void assemble_star(vgi_triplets *t, const vg_solver *s, size_t f, size_t centre)
+{
+    size_t r = face_size(s->g, f);
+    const uint32_t *vert = s->g->vert + s->g->start[f];
+    double weight = s->metric.face ? s->metric.face[f].weight : 1;
+    vgi_triplets_put(t, centre, centre, weight * (double)r);
+    for (size_t p = 0; p < r; p++) {
+        size_t i = s->row[vert[p]];
+        if (i >= s->unknowns) continue;
+        vgi_triplets_put(t, i, i, weight);
+        vgi_triplets_put(t, i, centre, -weight);
+    }
+}
+
+static int assemble(const vg_solver *s, vgi_sparse *N, vg_err *e)
+{
+    const vg_graph *g = s->g;
+    vgi_triplets t;
+    int r = vgi_triplets_make(&t, count_entries(s), e);
+    if (r < 0) return r;
+    size_t centre = s->vertices_unknown;
+    for (size_t f = 0; f < g->nf; f++) {
+        if (is_star(s, f)) assemble_star(&t, s, f, centre++);
+        else assemble_pairs(&t, s, f);
+    }
+    r = vgi_triplets_sum(&t, s->unknowns, N, e);
+    vgi_triplets_clear(&t);
+    return r;
+}
+
+static int factorize(vg_solver *s, vg_err *e)
+{
+    vgi_sparse N;
+    int r = assemble(s, &N, e);
+    if (r < 0) return r;
+    double t0 = seconds(), t1 = t0;
+    r = vgi_cholesky_new(&s->cholesky, &N, e);
+    if (r == VG_OK) {
+        t1 = seconds();
+        r = vgi_cholesky_factorize(s->cholesky, &N, e);
+    }
+    if (r == VG_OK) {
+        s->facts = (vg_solver_facts){s->unknowns, vgi_cholesky_entries(s->cholesky), t1 - t0, seconds() - t1};
+        s->factor = vgi_cholesky_factor(s->cholesky);
+    }
+    vgi_sparse_clear(&N);
+    return r;
+}
+
+/* From now on row[v] is the row in the factor's order. */
+static int permute_rows(vg_solver *s, vg_err *e)
+{
+    uint32_t *inverse = vgi_array_raw(s->unknowns, sizeof *inverse, e);
+    if (!inverse) return VG_ENOMEM;
+    const int *perm = vgi_cholesky_order(s->cholesky);
+    for (size_t i = 0; i < s->unknowns; i++) inverse[perm[i]] = (uint32_t)i;
+    for (size_t v = 0; v < s->g->nv; v++)
+        if (s->row[v] != NO_ROW) s->row[v] = inverse[s->row[v]];
+    free(inverse);
+    return VG_OK;
+}
+
+/* n elements for each thread, aligned for vectors; sizes of elements are multiples of 32 */
+static void *for_threads(const vg_solver *s, size_t n, size_t size, vg_err *e)
+{
+    size_t all;
+    void *p = NULL;
+    if (vgi_mul(n, (size_t)s->threads, &all) && vgi_mul(all, size, &all) && all <= SIZE_MAX - sizeof(vgi_lanes))
+        p = aligned_alloc(sizeof(vgi_lanes), (all + sizeof(vgi_lanes)) / sizeof(vgi_lanes) * sizeof(vgi_lanes));
+    if (!p) vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", s->unknowns);
+    return p;
+}
+
+static int make_spare(vg_solver *s, vg_err *e)
+{
+    s->spare = for_threads(s, s->g->nv + s->g->max_corners, sizeof *s->spare, e);
+    return s->spare ? VG_OK : VG_ENOMEM;
+}
+
+static int make_workspace(vg_solver *s, vg_err *e)
+{
+    s->x = for_threads(s, s->unknowns, sizeof *s->x, e);
+    return s->x ? VG_OK : VG_ENOMEM;
+}
+
+static int make_metric(vg_solver *s, const double *reference, vg_err *e)
+{
+    int r = vgi_metric_make(&s->metric, s->g, reference, e);
+    for (size_t f = 0; r == VG_OK && f < s->g->nf; f++)
+        if (is_star(s, f)) memset(s->metric.face[f].s, 0, sizeof s->metric.face[f].s);
+    return r;
+}
+
+int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, size_t nanchors,
+                  const double *reference, vg_weights weights, int threads, vg_err *e)
+{
+    vg_solver *s = *out = vgi_array(1, sizeof *s, e);
+    if (!s) return VG_ENOMEM;
+    s->g = g, s->threads = threads;
+    int r = weights == VG_WEIGHTS_AREA ? make_metric(s, reference, e) : VG_OK;
+    if (r == VG_OK) r = number_unknowns(s, anchors, nanchors, reference, e);
+    if (r == VG_OK) r = plan_walk(s, e);
+    if (r == VG_OK) r = make_spare(s, e);
+    if (r == VG_OK && s->unknowns) {
+        r = factorize(s, e);
+        if (r == VG_OK) r = permute_rows(s, e);
+        if (r == VG_OK) r = make_workspace(s, e);
+    }
+    if (r < 0) vg_solver_free(out);
+    return r;
+}
+
+void vg_solver_free(vg_solver **out)
+{
+    vg_solver *s = *out;
+    if (!s) return;
+    vgi_cholesky_free(&s->cholesky);
+    free(s->row);
+    free(s->anchors);
+    free(s->walk);
+    free(s->spare);
+    vgi_metric_clear(&s->metric);
+    free(s->isolated);
+    free(s->isolated_at);
+    free(s->x);
+    free(s);
+    *out = NULL;
+}
+
+vgi_solver_view vgi_solver_look(const vg_solver *s)
+{
+    return (vgi_solver_view){.g = s->g,
+                             .factor = &s->factor,
+                             .row = s->row,
+                             .rows = s->unknowns,
+                             .anchored = s->nanchors > 0,
+                             .threads = s->threads};
+}
+
+/* ---- solving ---- */
+
+size_t vg_solver_batch(const vg_solver *s)
+{
+    return VGI_LANES * (size_t)s->threads;
+}
+
+vg_solver_facts vg_solver_get_facts(const vg_solver *s)
+{
+    return s->facts;
+}
+
+typedef struct load_job {
+    const vg_solver *s;
+    size_t n, share; /* poses, and how many of them are one task */
+    const double *const *vectors, *const *anchors;
+    double *const *x, *const *rhs;
+} load_job;
+
+static void load_share(void *context, size_t task)
+{
+    const load_job *j = context;
+    const vg_solver *s = j->s;
+    vgi_guesser g = {.g = s->g, .metric = &s->metric, .walk = s->walk, .nsteps = s->nsteps, .pinned = s->pinned,
+                     .anchors = s->anchors, .nanchors = s->nanchors};
+    for (size_t i = task * j->share; i < j->n && i < (task + 1) * j->share; i++)
+        vgi_guess(&g, j->vectors[i], s->nanchors ? j->anchors[i] : NULL, j->x[i], j->rhs[i],
+                  s->spare + task * (s->g->nv + s->g->max_corners));
+}
+
+void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const double *const *anchors,
+                    double *const *x, double *const *rhs)
+{
+    size_t tasks = (size_t)s->threads < n ? (size_t)s->threads : n;
+    load_job j = {s, n, tasks ? (n + tasks - 1) / tasks : 0, vectors, anchors, x, rhs};
+    vgi_parallel(s->threads, tasks, load_share, &j);
+}
+
+typedef struct solve_job {
+    vg_solver *s;
+    size_t n;
+    const double *const *rhs;
+    double *const *x;
+    const double *const *anchors, *const *roots;
+    size_t first; /* first block of this round */
+} solve_job;
+
+/* Move a pose whose held vertex is at 0 to its place: to the first anchor, or so that its mean becomes the root. */
+static void place(const vg_solver *s, double *x, const double *anchor, const double *root)
+{
+    const vg_graph *g = s->g;
+    double mean[3] = {0, 0, 0};
+    if (!s->nanchors) vg_graph_root(g, x, mean);
+    double shift[3];
+    for (int k = 0; k < 3; k++) shift[k] = s->nanchors ? anchor[k] : root[k] - mean[k];
+    for (size_t v = 0; v < g->nv; v++)
+        for (size_t k = 0; k < 3; k++) x[3 * v + k] += shift[k];
+    for (size_t i = 0; i < s->nanchors; i++) memcpy(x + 3 * (size_t)s->anchors[i], anchor + 3 * i, 3 * sizeof *x);
+    for (size_t i = 0; i < s->nisolated; i++)
+        memcpy(x + 3 * (size_t)s->isolated[i], s->isolated_at + 3 * i, 3 * sizeof *x);
+}
+
+static void solve_block(void *context, size_t i)
+{
+    const solve_job *j = context;
+    const vg_solver *s = j->s;
+    size_t first = (j->first + i) * VGI_LANES, lanes = j->n - first < VGI_LANES ? j->n - first : VGI_LANES;
+    if (s->unknowns) {
+        vgi_row *x = s->x + i * s->unknowns;
+        const double *rhs[VGI_LANES];
+        for (size_t k = 0; k < VGI_LANES; k++) rhs[k] = j->rhs[first + (k < lanes ? k : lanes - 1)];
+        if (s->unknowns > s->vertices_unknown) memset(x, 0, s->unknowns * sizeof *x); /* the centroids' are 0 */
+        vgi_load_rows(x, s->row, s->g->nv, s->unknowns, rhs);
+        vgi_factor_solve(&s->factor, x);
+        vgi_add_rows(x, s->row, s->g->nv, s->unknowns, j->x + first, lanes);
+    }
+    for (size_t k = first; k < first + lanes; k++)
+        place(s, j->x[k], s->nanchors ? j->anchors[k] : NULL, s->nanchors ? NULL : j->roots[k]);
+}
+
+void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *const *x, const double *const *anchors,
+                     const double *const *roots)
+{
+    solve_job j = {.s = s, .n = n, .rhs = rhs, .x = x, .anchors = anchors, .roots = roots};
+    size_t blocks = (n + VGI_LANES - 1) / VGI_LANES;
+    for (; j.first < blocks; j.first += (size_t)s->threads) {
+        size_t round = blocks - j.first < (size_t)s->threads ? blocks - j.first : (size_t)s->threads;
+        vgi_parallel(s->threads, round, solve_block, &j);
+    }
+}

@@ -1,0 +1,27 @@
+/* polar.h: the rotation nearest to a 3 x 3 matrix, whatever the matrix is; rotations of faces in eight poses
+ * at once.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_POLAR_H
+#define VG_POLAR_H
+
+#include "numeric/lanes.h"
+
+/* vgi_fit_rotation: the rotation R that maximises tr(R'm): for m = sum of d r' that which takes the r nearest to the
+ * d. Row-major. Where several do, one that turns least; the identity for 0. */
+void vgi_fit_rotation(const double m[9], double r[9]);
+
+/* What the rotations of faces are measured against. Faces and corners as in a vg_graph. */
+typedef struct vgi_turns {
+    const uint32_t *start, *vert;
+    size_t nf;
+    double *vector; /* 3 per corner: in the reference pose */
+    double *normal; /* 3 per face: unit normal of it times half the sum of squared vectors; 0: it has none */
+} vgi_turns;
+
+int vgi_turns_make(vgi_turns *t, size_t nf, const uint32_t *start, const uint32_t *vert, const double *reference,
+                   vg_err *e) VG_MUST_CHECK;
+void vgi_turns_clear(vgi_turns *t);
+/* vgi_turns_measure: the rotation of face f in eight poses (vertices). */
+void vgi_turns_measure(const vgi_turns *t, size_t f, const double *const *poses, vgi_lanes rotation[9]);
+
+#endif

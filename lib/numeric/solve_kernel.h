@@ -1,0 +1,30 @@
+/* solve_kernel.h: triangular solves with a supernodal Cholesky factor for eight poses at once.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_SOLVE_KERNEL_H
+#define VG_SOLVE_KERNEL_H
+
+#include "numeric/lanes.h"
+
+/* A supernodal factor as CHOLMOD lays it out, borrowed. Supernode s holds columns super[s] .. super[s+1]-1; its rows
+ * are rows[pi[s]] .. rows[pi[s+1]-1], the first of which are its own columns; its entries are a column-major block of
+ * that many rows at values + px[s]. Only the lower triangle of the block's head is defined. */
+typedef struct vgi_factor {
+    size_t n, supernodes;
+    const int *super, *pi, *px, *rows;
+    const double *values;
+} vgi_factor;
+
+/* The unknowns of a block of poses: x, y and z of eight poses side by side for each row of the factor. */
+typedef struct vgi_row {
+    vgi_lanes xyz[3];
+} vgi_row;
+
+/* vgi_factor_solve: x := (L L')^-1 x, n rows in the factor's order. */
+void vgi_factor_solve(const vgi_factor *f, vgi_row *x);
+
+/* vgi_load_rows: x[row[v]] := rhs of vertex v in 8 poses (nv x 3 each), for every v with row[v] < rows. */
+void vgi_load_rows(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs);
+/* vgi_add_rows: the way back, for the first `lanes` poses: pose[k] of v += x[row[v]]. */
+void vgi_add_rows(const vgi_row *x, const uint32_t *row, size_t nv, size_t rows, double *const *pose, size_t lanes);
+
+#endif
