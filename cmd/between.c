@@ -180,7 +180,7 @@ void between_run(vg_source *s)
     collect(&p, s);
     const vg_path_options o = {.kind = p.kind, .nanchors = p.h->nanchors, .smooth = between.smooth,
                                .threads = cli.threads};
-    if (vg_path_new(&path, p.g, p.h->reference, p.keys, p.n, &o, &e) < 0) cli_die(&e);
+    if (vg_path_new(&path, p.g, p.h->body.reference, p.keys, p.n, &o, &e) < 0) cli_die(&e);
     write_poses(&p, path);
     report(path);
     vg_path_free(&path);

@@ -70,7 +70,7 @@ static void load_map(playback *p)
 /* Edits speak of bones by name and of their axes in the skeleton's pose without rotations. */
 static void find_bones(playback *p)
 {
-    const vg_rig *r = &p->map.rig;
+    const vg_rig *r = &p->map.body.rig;
     if (!mapped.nedits) return;
     if (p->map.map.kind != VG_MAP_BONES)
         cli_stop(VG_EINPUT, "'%s' is a map of patches, --edit needs one of bones: make it with vg-fitmap --skeleton",
@@ -92,7 +92,8 @@ static void find_bones(playback *p)
 static void apply_edits(const playback *p, double *transforms)
 {
     for (size_t i = 0; i < mapped.nedits; i++)
-        vg_rig_edit(&p->map.rig, mapped.edits[i].number, mapped.edits[i].around, mapped.edits[i].degrees, transforms);
+        vg_rig_edit(&p->map.body.rig, mapped.edits[i].number, mapped.edits[i].around, mapped.edits[i].degrees,
+                    transforms);
 }
 
 static void take_skeleton(playback *p)
@@ -102,9 +103,9 @@ static void take_skeleton(playback *p)
         cli_stop(VG_EINPUT,
                  "the input is a skeleton, and '%s' is a map of patches: make one of bones with vg-fitmap --skeleton",
                  mapped.map);
-    if (vg_skeleton_copy(&p->skeleton, &p->h->skeleton, &e) < 0 ||
+    if (vg_skeleton_copy(&p->skeleton, &p->h->body.skeleton, &e) < 0 ||
         vg_joint_fitter_new(&p->fitter, &p->skeleton, &e) < 0 ||
-        vg_driver_new(&p->driver, &p->map.rig, &p->skeleton, mapped.align, &e) < 0)
+        vg_driver_new(&p->driver, &p->map.body.rig, &p->skeleton, mapped.align, &e) < 0)
         cli_die(&e);
     size_t missing = vg_driver_missing(p->driver);
     if (missing)
@@ -120,12 +121,12 @@ static void check_input(playback *p)
     snprintf(name, sizeof name, "'%.190s'", mapped.map);
     p->kind = h->kind, p->count = p->map.map.n;
     int r = VG_OK;
-    if (p->kind == VG_VERTICES && h->skeleton.njoints) {
+    if (p->kind == VG_VERTICES && h->body.skeleton.njoints) {
         take_skeleton(p);
     } else if (mapped.align) {
         cli_usage("--align is for a skeleton that comes in, this input holds %s", vg_kind_name(p->kind));
     } else if (p->kind == VG_VERTICES) {
-        r = vg_mesh_same(&h->mesh, "the sequence", &p->map.mesh, name, &e);
+        r = vg_mesh_same(&h->body.mesh, "the sequence", &p->map.body.mesh, name, &e);
     } else if (p->kind != VG_TRANSFORMS) {
         r = vg_fail(&e, VG_EINPUT, "the input holds %s: --map takes vertices or transforms", vg_kind_name(p->kind));
     } else if (h->count != p->count) {
@@ -142,16 +143,16 @@ static void make_head(playback *p)
     vg_head old = *p->h, *h = p->h;
     if (vg_head_merge_trace(&old, &p->map, &e) < 0) cli_die(&e);
     vg_rig rig = {0}; /* of transforms it says what they move; the player has the other one */
-    if (mapped.transforms && vg_rig_copy(&rig, &p->map.rig, p->map.mesh.nv, &e) < 0) cli_die(&e);
+    if (mapped.transforms && vg_rig_copy(&rig, &p->map.body.rig, p->map.body.mesh.nv, &e) < 0) cli_die(&e);
     *h = p->map;
-    h->rig = rig;
+    h->body.rig = rig;
     h->nprovenance = old.nprovenance, h->provenance = old.provenance;
     h->extra = old.extra, h->precision = old.precision;
     h->map = (vg_map){0}; /* stays with p->map, where the player has it */
     old.provenance = NULL, old.nprovenance = 0, old.extra = (vg_records){0};
     vg_head_clear(&old);
     h->kind = mapped.transforms ? VG_TRANSFORMS : VG_VERTICES;
-    h->count = mapped.transforms ? p->count : h->mesh.nv;
+    h->count = mapped.transforms ? p->count : h->body.mesh.nv;
 }
 
 static void put_batch(playback *p)
@@ -255,7 +256,7 @@ static void play_reference(playback *p)
 {
     vg_err e;
     for (size_t i = 0; i < p->count; i++) p->transforms[0][7 * i] = 1;
-    if (vg_frame_rename(&p->out[0], p->h->reference_name, &e) < 0) cli_die(&e);
+    if (vg_frame_rename(&p->out[0], p->h->body.reference_name, &e) < 0) cli_die(&e);
     p->n = 1;
     put_batch(p);
 }

@@ -75,7 +75,7 @@ static void *room(size_t n, size_t size)
 /* Keeps every stride-th of the fitted poses; when there is no room, every second of these. */
 static void sample_pose(work *w, uint64_t i, const double *pose)
 {
-    size_t bytes = 3 * w->h->mesh.nv * sizeof *pose;
+    size_t bytes = 3 * w->h->body.mesh.nv * sizeof *pose;
     if (is_left_out(w, i) || i % w->stride) return;
     if (w->nsample == 2 * SAMPLE) {
         size_t n = 0;
@@ -91,7 +91,7 @@ static void sample_pose(work *w, uint64_t i, const double *pose)
         if (i % w->stride) return;
     }
     double **to = &w->sample[w->nsample];
-    if (!*to) *to = room(3 * w->h->mesh.nv, sizeof **to);
+    if (!*to) *to = room(3 * w->h->body.mesh.nv, sizeof **to);
     w->sample_at[w->nsample++] = i;
     memcpy(*to, pose, bytes);
 }
@@ -104,7 +104,7 @@ static void read_poses(work *w, vg_source *s)
     if (vg_spool_new(&w->spool, w->h, in_memory, &e) < 0) cli_die(&e);
     for (w->stride = 1; cli_next(s, &f); w->total++) {
         if (vg_spool_put(w->spool, &f, &e) < 0) cli_die(&e);
-        if (!found && !memcmp(f.values, w->h->reference, 3 * w->h->mesh.nv * sizeof *f.values))
+        if (!found && !memcmp(f.values, w->h->body.reference, 3 * w->h->body.mesh.nv * sizeof *f.values))
             found = true, w->reference = w->total;
         sample_pose(w, w->total, f.values);
         cli_progress("poses", w->total + 1);
@@ -157,10 +157,10 @@ static void read_skeleton(work *w)
     vg_joint_fitter *fitter;
     if (vg_source_open(&s, &rigging.skeleton, 1, &e) < 0) cli_die(&e);
     vg_head *h = vg_source_head(s);
-    if (!h->skeleton.njoints || h->kind != VG_VERTICES)
+    if (!h->body.skeleton.njoints || h->kind != VG_VERTICES)
         cli_stop(VG_EINPUT, "'%s' holds no skeleton: give a BVH file, or lines of 'bone parent head tail'",
                  rigging.skeleton);
-    if (vg_skeleton_copy(&w->given.skeleton, &h->skeleton, &e) < 0 ||
+    if (vg_skeleton_copy(&w->given.skeleton, &h->body.skeleton, &e) < 0 ||
         vg_joint_fitter_new(&fitter, &w->given.skeleton, &e) < 0)
         cli_die(&e);
     while (cli_next(s, &f)) keep_motion(&w->given, &f, fitter);
@@ -184,14 +184,14 @@ static void locate_root(work *w, double *positions)
     vg_err e;
     const motion *m = &w->given;
     const double *poses[2 * SAMPLE], *at[2 * SAMPLE], *turns[2 * SAMPLE];
-    double shift[3], spread, d = vg_diagonal(w->h->reference, w->h->mesh.nv);
+    double shift[3], spread, d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
     size_t joints = m->skeleton.njoints;
     for (size_t i = 0; i < w->nsample; i++) {
         poses[i] = w->sample[i];
         at[i] = m->positions + 3 * joints * w->sample_at[i], turns[i] = m->turns + 4 * joints * w->sample_at[i];
     }
-    if (vg_rig_locate(&m->skeleton, w->h->mesh.nv, w->h->reference, w->nsample, poses, at, turns, cli.threads, shift,
-                      &spread, &e) < 0)
+    if (vg_rig_locate(&m->skeleton, w->h->body.mesh.nv, w->h->body.reference, w->nsample, poses, at, turns,
+                      cli.threads, shift, &spread, &e) < 0)
         cli_die(&e);
     for (size_t j = 0; j < joints; j++)
         for (size_t k = 0; k < 3; k++) positions[3 * j + k] += shift[k];
@@ -206,12 +206,12 @@ static void locate_root(work *w, double *positions)
 
 static void warn_outside(const work *w)
 {
-    const vg_rig *r = &w->h->rig;
-    double low[3], high[3], d = vg_diagonal(w->h->reference, w->h->mesh.nv);
+    const vg_rig *r = &w->h->body.rig;
+    double low[3], high[3], d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
     size_t outside = 0;
-    for (size_t v = 0; v < w->h->mesh.nv; v++)
+    for (size_t v = 0; v < w->h->body.mesh.nv; v++)
         for (size_t k = 0; k < 3; k++) {
-            double x = w->h->reference[3 * v + k];
+            double x = w->h->body.reference[3 * v + k];
             low[k] = v == 0 || x < low[k] ? x : low[k], high[k] = v == 0 || x > high[k] ? x : high[k];
         }
     for (size_t b = 0; b < r->nbones; b++) {
@@ -254,14 +254,14 @@ static void place_skeleton(work *w)
                  "says otherwise",
                  positions[0], positions[1], positions[2]);
     }
-    if (vg_rig_make(&w->h->rig, &m->skeleton, positions, turns, &e) < 0) cli_die(&e);
+    if (vg_rig_make(&w->h->body.rig, &m->skeleton, positions, turns, &e) < 0) cli_die(&e);
     free(positions);
     free(turns);
     warn_outside(w);
     if (known) return;
-    double miss, d = vg_diagonal(w->h->reference, w->h->mesh.nv);
+    double miss, d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
     if (vg_rig_learn(w->h, w->nsample, (const double *const *)w->sample, cli.threads, &miss, &e) < 0 ||
-        vg_bender_new(&w->bender, &w->h->rig, w->h->mesh.nv, w->h->reference, cli.threads, &e) < 0)
+        vg_bender_new(&w->bender, &w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, cli.threads, &e) < 0)
         cli_die(&e);
     cli_note("the motion of the bones is learned from %zu poses: what skinning leaves is %.3g D", w->nsample,
              d > 0 ? miss / d : 0);
@@ -275,11 +275,11 @@ static void read_groups(work *w)
     char *text = cli_read_file(rigging.groups, &n), name[200];
     snprintf(name, sizeof name, "'%.190s'", rigging.groups);
     if (vg_joint_groups_read(&w->groups, text, n, 0, name, &e) < 0 ||
-        vg_joint_groups_skeleton(&w->groups, w->h->mesh.nv, w->h->reference, &s, &e) < 0)
+        vg_joint_groups_skeleton(&w->groups, w->h->body.mesh.nv, w->h->body.reference, &s, &e) < 0)
         cli_die(&e);
     double *positions = room(3 * s.njoints, sizeof *positions), *turns = room(4 * s.njoints, sizeof *turns);
     vg_skeleton_pose(&s, NULL, positions, turns);
-    if (vg_rig_make(&w->h->rig, &s, positions, turns, &e) < 0) cli_die(&e);
+    if (vg_rig_make(&w->h->body.rig, &s, positions, turns, &e) < 0) cli_die(&e);
     vg_skeleton_clear(&s);
     free(positions);
     free(turns);
@@ -292,7 +292,7 @@ static vg_rig_fitter *fitter;
 
 static void measure_transforms(work *w, uint64_t first, size_t n, const vg_frame *frames)
 {
-    const vg_rig *r = &w->h->rig;
+    const vg_rig *r = &w->h->body.rig;
     size_t joints = r->skeleton.njoints;
     const double *poses[BATCH];
     for (size_t i = 0; i < n; i++) poses[i] = frames[i].values;
@@ -305,7 +305,7 @@ static void measure_transforms(work *w, uint64_t first, size_t n, const vg_frame
     for (size_t i = 0; i < n; i++) {
         size_t k = (size_t)first + i;
         if (rigging.groups) {
-            vg_joint_groups_pose(&w->groups, w->h->reference, poses[i], positions, turns);
+            vg_joint_groups_pose(&w->groups, w->h->body.reference, poses[i], positions, turns);
             vg_rig_transforms(r, positions, turns, w->transforms[k]);
         } else {
             vg_rig_transforms(r, w->given.positions + 3 * joints * k, w->given.turns + 4 * joints * k,
@@ -320,7 +320,7 @@ static void fit_batch(work *w, uint64_t first, size_t n, const vg_frame *frames)
 {
     const double *poses[BATCH], *transforms[BATCH];
     size_t count = 0;
-    for (size_t i = 0; i < n; i++) w->transforms[first + i] = room(7 * w->h->rig.nbones, sizeof(double));
+    for (size_t i = 0; i < n; i++) w->transforms[first + i] = room(7 * w->h->body.rig.nbones, sizeof(double));
     measure_transforms(w, first, n, frames);
     for (size_t i = 0; i < n; i++) {
         if (is_left_out(w, first + i)) continue;
@@ -350,7 +350,7 @@ static void compare(errors *x, const double *truth, const double *result, size_t
 static void judge_batch(work *w, uint64_t first, size_t n, const vg_frame *frames)
 {
     static double *vertices[BATCH];
-    size_t nv = w->h->mesh.nv;
+    size_t nv = w->h->body.mesh.nv;
     for (size_t i = 0; i < n; i++)
         if (!vertices[i]) vertices[i] = room(3 * nv, sizeof(double));
     for (int method = 0; method < 2; method++) {
@@ -378,8 +378,8 @@ static void report(work *w)
     static vg_head skinning; /* h with another map */
     static const char *const names[2][2] = {{"envelope, fitted", "envelope, left out"},
                                             {"skinning, fitted", "skinning, left out"}};
-    size_t nv = w->h->mesh.nv;
-    double d = vg_diagonal(w->h->reference, nv);
+    size_t nv = w->h->body.mesh.nv;
+    double d = vg_diagonal(w->h->body.reference, nv);
     if (cli.quiet || !(d > 0)) return;
     skinning = *w->h;
     if (!by_skinning()) skinning.map = w->skinning;
@@ -391,7 +391,7 @@ static void report(work *w)
         x->first = room(nv, sizeof *x->first), x->second = room(nv, sizeof *x->second);
     }
     pass(w, judge_batch);
-    cli_say("%zu bones, %zu vertices, %llu poses; errors in 1e-3 D:  mean  sigma largest", w->h->rig.nbones, nv,
+    cli_say("%zu bones, %zu vertices, %llu poses; errors in 1e-3 D:  mean  sigma largest", w->h->body.rig.nbones, nv,
             (unsigned long long)w->total);
     for (int i = 0; i < 4; i++) {
         const errors *x = &w->errors[i / 2][i % 2];
@@ -426,9 +426,9 @@ void rigging_run(vg_source *s, double hold, long holdout)
 {
     static work w; /* lives until the end: what it holds goes with the process */
     w.h = vg_source_head(s), w.holdout = holdout;
-    if (w.h->skeleton.njoints) cli_stop(VG_EINPUT, "the input is a skeleton: vg-fitmap takes poses of a mesh");
-    if (!w.h->mesh.nf) cli_stop(VG_EINPUT, "the input has no faces");
-    vg_rig_clear(&w.h->rig);
+    if (w.h->body.skeleton.njoints) cli_stop(VG_EINPUT, "the input is a skeleton: vg-fitmap takes poses of a mesh");
+    if (!w.h->body.mesh.nf) cli_stop(VG_EINPUT, "the input has no faces");
+    vg_rig_clear(&w.h->body.rig);
     vg_map_clear(&w.h->map);
     if (rigging.skeleton) read_skeleton(&w);
     read_poses(&w, s);

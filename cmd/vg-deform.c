@@ -111,8 +111,8 @@ static void set_root(work *w)
     if (!opts.root || !strcmp(opts.root, "centroid") || root_stays()) return;
     if (opts.root[strspn(opts.root, "0123456789")] || cli_parse_vertices("--root", opts.root, &vertex) != 1)
         cli_usage("--root is 'centroid', 'stay' or the number of a vertex, not '%s'", opts.root);
-    if (vertex[0] >= w->h->mesh.nv)
-        cli_usage("--root names vertex %u, but there are %zu, counted from 0", vertex[0], w->h->mesh.nv);
+    if (vertex[0] >= w->h->body.mesh.nv)
+        cli_usage("--root names vertex %u, but there are %zu, counted from 0", vertex[0], w->h->body.mesh.nv);
     if (opts.correspondence)
         cli_usage("--root V needs one connectivity: with --correspondence it is 'centroid' or 'stay'");
     if (w->kind != VG_VERTICES)
@@ -235,7 +235,7 @@ static void make_graphs(work *w)
     } else if (opts.onto) {
         char name[200];
         snprintf(name, sizeof name, "'%.190s'", opts.onto);
-        if (vg_mesh_same(&w->h->mesh, "the sequence", &w->target.mesh, name, &e) < 0) {
+        if (vg_mesh_same(&w->h->body.mesh, "the sequence", &w->target.body.mesh, name, &e) < 0) {
             size_t n = strlen(e.message);
             snprintf(e.message + n, sizeof e.message - n, ": pair them with vg-register and --correspondence");
             cli_die(&e);
@@ -253,10 +253,10 @@ static vg_graph *sample_graph(const vg_head *h)
     vg_err e;
     vg_graph *g;
     vg_head some = *h; /* lent */
-    size_t step = h->mesh.nf / SAMPLE + 1;
+    size_t step = h->body.mesh.nf / SAMPLE + 1;
     some.has_selection = true, some.nselected = 0, some.nlinks = 0;
-    some.selected = cli_allocate(h->mesh.nf / step, sizeof *some.selected, "a sample of the faces");
-    for (size_t f = 0; f < h->mesh.nf; f += step) some.selected[some.nselected++] = (uint32_t)f;
+    some.selected = cli_allocate(h->body.mesh.nf / step, sizeof *some.selected, "a sample of the faces");
+    for (size_t f = 0; f < h->body.mesh.nf; f += step) some.selected[some.nselected++] = (uint32_t)f;
     if (vg_graph_new(&g, &some, &e) < 0) cli_die(&e);
     free(some.selected);
     return g;
@@ -270,9 +270,9 @@ static double degrees_apart(const work *w)
     vg_deformer *d;
     vg_graph *g = sample_graph(w->h);
     size_t corners = vg_graph_corners(g);
-    const double *pose = w->target.reference;
+    const double *pose = w->target.body.reference;
     double *q = cli_allocate(4 * corners, sizeof *q, "a sample of the faces"), sum = 0;
-    if (vg_deformer_new(&d, g, w->h->reference, 1, &e) < 0) cli_die(&e);
+    if (vg_deformer_new(&d, g, w->h->body.reference, 1, &e) < 0) cli_die(&e);
     vg_deformer_measure(d, 1, VG_VERTICES, &pose, &q);
     for (size_t i = 0; i < 4 * corners; i += 4) {
         double u2 = q[i + 1] * q[i + 1] + q[i + 2] * q[i + 2] + q[i + 3] * q[i + 3];
@@ -291,9 +291,10 @@ static void warn_of_other_pose(const work *w)
     if (!opts.onto || cli.quiet) return;
     double degrees = w->carrier ? vg_carrier_turned(w->carrier) : degrees_apart(w), most = w->carrier ? 45 : 30;
     if (degrees > most)
-        cli_warn("the target does not stand as the reference pose '%s' does: they differ by %.0f degrees on average; name "
-                 "a pose that stands as the target does with 'vg-encode --reference', or turn the target",
-                 w->h->reference_name, degrees);
+        cli_warn(
+            "the target does not stand as the reference pose '%s' does: they differ by %.0f degrees on average; name "
+            "a pose that stands as the target does with 'vg-encode --reference', or turn the target",
+            w->h->body.reference_name, degrees);
 }
 
 /* What follows the source as a whole: the body, and what does not move. */
@@ -307,10 +308,10 @@ static void make_followers(work *w)
     bool pins = w->kind == VG_VERTICES && (w->way == TRANSFER || w->way == CARRY) && opts.pin_choice != PIN_NONE;
     int r = VG_OK;
     if (opts.onto)
-        r = vg_mover_new(&w->mover, w->from, h->reference, w->to, w->target.reference, h->anchors, h->nanchors,
-                         root_stays(), &e);
+        r = vg_mover_new(&w->mover, w->from, h->body.reference, w->to, w->target.body.reference, h->anchors,
+                         h->nanchors, root_stays(), &e);
     if (r == VG_OK && pins)
-        r = vg_pinner_new(&w->pinner, w->from, h->reference, w->to, pairs, opts.pin_choice == PIN_ALWAYS, &e);
+        r = vg_pinner_new(&w->pinner, w->from, h->body.reference, w->to, pairs, opts.pin_choice == PIN_ALWAYS, &e);
     if (r < 0) cli_die(&e);
 }
 
@@ -322,19 +323,19 @@ static void make_step(work *w)
     const vg_head *h = w->h, *t = &w->target;
     vg_method method = methods[w->by];
     int r = VG_OK;
-    w->source_mesh = h->mesh;
+    w->source_mesh = h->body.mesh;
     w->way = !opts.onto ? MEASURE : opts.correspondence ? CARRY : w->by == BY_SHAPE ? SHAPE
              : w->kind == VG_DEFORMATIONS ? APPLY : TRANSFER;
     if (w->way == CARRY) {
-        r = vg_carrier_new(&w->carrier, &w->source_mesh, h->reference, &w->pairs.correspondence, w->to, t->reference,
-                           method, cli.threads, &e);
+        r = vg_carrier_new(&w->carrier, &w->source_mesh, h->body.reference, &w->pairs.correspondence, w->to,
+                           t->body.reference, method, cli.threads, &e);
     } else if (w->way == SHAPE) {
-        r = vg_shaper_new(&w->shaper, w->to, h->reference, t->reference, cli.threads, &e);
+        r = vg_shaper_new(&w->shaper, w->to, h->body.reference, t->body.reference, cli.threads, &e);
     } else {
-        r = vg_deformer_new(&w->deformer, w->from, h->reference, cli.threads, &e);
+        r = vg_deformer_new(&w->deformer, w->from, h->body.reference, cli.threads, &e);
         double *vectors = cli_allocate(3 * vg_graph_corners(w->from), sizeof *vectors, "the mesh of the sequence");
         if (r == VG_OK && opts.onto) {
-            vg_graph_vectors(w->from, t->reference, vectors);
+            vg_graph_vectors(w->from, t->body.reference, vectors);
             r = vg_deformer_target(w->deformer, vectors, method, &e);
         }
         free(vectors);
@@ -348,27 +349,27 @@ static void make_head(work *w)
 {
     vg_err e;
     vg_head *h = w->h, *t = &w->target;
-    w->source_reference = h->reference;
+    w->source_reference = h->body.reference;
     if (opts.onto) {
         if (vg_head_merge_trace(h, t, &e) < 0 || vg_head_merge_trace(h, &w->pairs, &e) < 0) cli_die(&e);
-        free(h->reference_name);
-        vg_attributes_clear(&h->attributes);
-        vg_skeleton_clear(&h->skeleton);
-        h->reference = t->reference, h->reference_name = t->reference_name;
-        h->attributes = t->attributes, h->skeleton = t->skeleton;
-        t->reference = NULL, t->reference_name = NULL;
-        t->attributes = (vg_attributes){0}, t->skeleton = (vg_skeleton){0};
+        free(h->body.reference_name);
+        vg_attributes_clear(&h->body.attributes);
+        vg_skeleton_clear(&h->body.skeleton);
+        h->body.reference = t->body.reference, h->body.reference_name = t->body.reference_name;
+        h->body.attributes = t->body.attributes, h->body.skeleton = t->body.skeleton;
+        t->body.reference = NULL, t->body.reference_name = NULL;
+        t->body.attributes = (vg_attributes){0}, t->body.skeleton = (vg_skeleton){0};
     }
     vg_map_clear(&h->map); /* it is no property of the mesh */
     if (w->way == CARRY) {
-        vg_patches_clear(&h->patches);
-        h->mesh = t->mesh;
+        vg_patches_clear(&h->body.patches);
+        h->body.mesh = t->body.mesh;
         free(h->links);
         h->has_links = t->has_links, h->links = t->links, h->nlinks = t->nlinks;
-        t->mesh = (vg_mesh){0}, t->links = NULL;
+        t->body.mesh = (vg_mesh){0}, t->links = NULL;
     }
     h->kind = w->way == MEASURE ? VG_DEFORMATIONS : w->way == SHAPE ? VG_VERTICES : VG_VECTORS;
-    h->count = h->kind == VG_VERTICES ? h->mesh.nv : vg_graph_corners(w->to);
+    h->count = h->kind == VG_VERTICES ? h->body.mesh.nv : vg_graph_corners(w->to);
 }
 
 static void prepare(work *w)

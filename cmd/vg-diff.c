@@ -126,7 +126,8 @@ static void check_same_mesh(const side *truth, const side *result)
     vg_err e;
     snprintf(names[0], sizeof names[0], "'%.190s'", truth->name);
     snprintf(names[1], sizeof names[1], "'%.190s'", result->name);
-    if (vg_mesh_same(&truth->head->mesh, names[0], &result->head->mesh, names[1], &e) < 0) cannot_compare(e.message);
+    if (vg_mesh_same(&truth->head->body.mesh, names[0], &result->head->body.mesh, names[1], &e) < 0)
+        cannot_compare(e.message);
 }
 
 static double in_diagonals(double x, double diagonal)
@@ -231,7 +232,7 @@ static void note_worst(findings *found, const vg_pose_error *error, const char *
 static void measure_batch(vg_measures *x, batch *b, const side *result, double diagonal, findings *found, report *r)
 {
     vg_err e;
-    size_t nv = result->head->mesh.nv;
+    size_t nv = result->head->body.mesh.nv;
     if (vg_measures_add(x, b->n, b->poses[0], b->poses[1], b->errors, b->found, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < b->n; i++, found->frames++) {
         const char *name = b->truth[i].name;
@@ -249,11 +250,11 @@ static void compare(side *truth, side *result, findings *found, report *r)
     vg_measures *x = NULL;
     vg_err e;
     batch b = {0};
-    size_t nv = truth->head->mesh.nv;
-    const double *reference = truth->head->reference;
+    size_t nv = truth->head->body.mesh.nv;
+    const double *reference = truth->head->body.reference;
     double diagonal = vg_diagonal(reference, nv);
     make_batch(&b, nv);
-    if (vg_measures_new(&x, &truth->head->mesh, reference, opts.centred, cli.threads, &e) < 0) cli_die(&e);
+    if (vg_measures_new(&x, &truth->head->body.mesh, reference, opts.centred, cli.threads, &e) < 0) cli_die(&e);
     if (opts.frames) report_table(r, "frame_errors", "", false, frame_columns, COLUMNS_FRAME);
     open_heat(result, truth);
     for (bool more = true; more;) {

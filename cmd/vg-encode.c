@@ -46,29 +46,29 @@ static void set_reference(vg_head *h, const char *operand)
     vg_err e;
     vg_head r = {0};
     if (vg_load_mesh(&r, operand, &e) < 0 ||
-        vg_mesh_same(&r.mesh, "the reference", &h->mesh, "the sequence", &e) < 0 ||
+        vg_mesh_same(&r.body.mesh, "the reference", &h->body.mesh, "the sequence", &e) < 0 ||
         vg_head_merge_trace(h, &r, &e) < 0)
         cli_die(&e);
-    free(h->reference);
-    free(h->reference_name);
-    h->reference = r.reference, h->reference_name = r.reference_name;
-    r.reference = NULL, r.reference_name = NULL;
-    if (r.attributes.ntex || r.attributes.nlabels) {
-        vg_attributes_clear(&h->attributes);
-        h->attributes = r.attributes;
-        r.attributes = (vg_attributes){0};
+    free(h->body.reference);
+    free(h->body.reference_name);
+    h->body.reference = r.body.reference, h->body.reference_name = r.body.reference_name;
+    r.body.reference = NULL, r.body.reference_name = NULL;
+    if (r.body.attributes.ntex || r.body.attributes.nlabels) {
+        vg_attributes_clear(&h->body.attributes);
+        h->body.attributes = r.body.attributes;
+        r.body.attributes = (vg_attributes){0};
     }
     free(h->links);
     h->links = NULL, h->nlinks = 0, h->has_links = false;
-    vg_rig_clear(&h->rig);
+    vg_rig_clear(&h->body.rig);
     vg_map_clear(&h->map);
     vg_head_clear(&r);
 }
 
 static void set_anchors(vg_head *h, uint32_t *anchors, size_t n)
 {
-    if (n && anchors[n - 1] >= h->mesh.nv)
-        cli_usage("--anchor names vertex %u, but there are %zu, counted from 0", anchors[n - 1], h->mesh.nv);
+    if (n && anchors[n - 1] >= h->body.mesh.nv)
+        cli_usage("--anchor names vertex %u, but there are %zu, counted from 0", anchors[n - 1], h->body.mesh.nv);
     free(h->anchors);
     h->anchors = anchors, h->nanchors = n;
 }
@@ -85,10 +85,10 @@ static void select_faces(vg_head *h)
 {
     vg_err e;
     if (h->has_selection) return;
-    if (vg_select_faces(&h->mesh, &h->selected, &h->nselected, &e) < 0) cli_die(&e);
+    if (vg_select_faces(&h->body.mesh, &h->selected, &h->nselected, &e) < 0) cli_die(&e);
     h->has_selection = true;
     vg_map_clear(&h->map);
-    cli_note("%zu of %zu faces carry vectors", h->nselected, h->mesh.nf);
+    cli_note("%zu of %zu faces carry vectors", h->nselected, h->body.mesh.nf);
 }
 
 /* What the options change about a sequence is about vertices: a stream of anything else is passed on as it is. */

@@ -61,17 +61,18 @@ static void take_patches(vg_head *h)
     vg_head from = {0};
     char name[200];
     if (!opts.patches) {
-        if (!h->patches.n) cli_usage("the input has no patches: name them with --patches, made by vg-segment");
+        if (!h->body.patches.n) cli_usage("the input has no patches: name them with --patches, made by vg-segment");
         return;
     }
     snprintf(name, sizeof name, "'%.190s'", opts.patches);
     if (vg_load_mesh(&from, opts.patches, &e) < 0) cli_die(&e);
-    if (!from.patches.n) cli_stop(VG_EINPUT, "%s holds no patches: make them with vg-segment", name);
-    if (vg_mesh_same(&h->mesh, "the sequence", &from.mesh, name, &e) < 0 || vg_head_merge_trace(h, &from, &e) < 0)
+    if (!from.body.patches.n) cli_stop(VG_EINPUT, "%s holds no patches: make them with vg-segment", name);
+    if (vg_mesh_same(&h->body.mesh, "the sequence", &from.body.mesh, name, &e) < 0 ||
+        vg_head_merge_trace(h, &from, &e) < 0)
         cli_die(&e);
-    vg_patches_clear(&h->patches);
-    h->patches = from.patches;
-    from.patches = (vg_patches){0};
+    vg_patches_clear(&h->body.patches);
+    h->body.patches = from.body.patches;
+    from.body.patches = (vg_patches){0};
     vg_head_clear(&from);
 }
 
@@ -145,7 +146,7 @@ static void judge_batch(judging *j, size_t n, uint64_t first)
         for (size_t i = 0; i < n && way == 1; i++) vg_player_place(j->player, j->transforms[i]);
         vg_player_pose(j->player, n, (const double *const *)j->transforms, j->vertices);
         for (size_t i = 0; i < n; i++)
-            compare(&j->x[way][is_left_out(first + i)], truth[i], j->vertices[i], j->h->mesh.nv);
+            compare(&j->x[way][is_left_out(first + i)], truth[i], j->vertices[i], j->h->body.mesh.nv);
     }
 }
 
@@ -160,13 +161,13 @@ static void report(const vg_head *h, vg_spool *spool)
 {
     static judging j;
     vg_err e;
-    double d = vg_diagonal(h->reference, h->mesh.nv);
+    double d = vg_diagonal(h->body.reference, h->body.mesh.nv);
     if (cli.quiet || !(d > 0)) return;
     j.h = h;
     if (vg_player_new(&j.player, h, false, cli.threads, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < BATCH; i++) {
         j.transforms[i] = cli_allocate(7 * h->map.n, sizeof(double), "the report");
-        j.vertices[i] = cli_allocate(3 * h->mesh.nv, sizeof(double), "the report");
+        j.vertices[i] = cli_allocate(3 * h->body.mesh.nv, sizeof(double), "the report");
     }
     uint64_t first = 0;
     int r;
@@ -200,13 +201,13 @@ static void fit(vg_source *s)
         return;
     }
     take_patches(h);
-    size_t before = h->patches.n;
+    size_t before = h->body.patches.n;
     vg_map_fitter *f;
     vg_spool *spool;
     if (vg_map_fitter_new(&f, h, opts.hold, cli.threads, &e) < 0 || vg_spool_new(&spool, h, in_memory, &e) < 0)
         cli_die(&e);
-    if (h->patches.n != before)
-        cli_note("%zu patches are in %zu pieces, each of which is a patch of the map", before, h->patches.n);
+    if (h->body.patches.n != before)
+        cli_note("%zu patches are in %zu pieces, each of which is a patch of the map", before, h->body.patches.n);
     if (!read_poses(s, f, spool)) cli_stop(VG_EINPUT, "the input has no poses to fit a map to");
     if (vg_map_fitter_finish(f, &e) < 0) cli_die(&e);
     vg_map_fitter_free(&f);
@@ -224,14 +225,14 @@ static void retarget(vg_source *s)
     snprintf(name, sizeof name, "'%.190s'", opts.retarget);
     if (!h->map.n) cli_stop(VG_EINPUT, "the input holds no map: make one with vg-fitmap");
     if (vg_load_mesh(&target, opts.retarget, &e) < 0 ||
-        vg_mesh_same(&h->mesh, "the map", &target.mesh, name, &e) < 0 ||
-        vg_map_retarget(h, target.reference, opts.morph, cli.threads, &e) < 0 ||
+        vg_mesh_same(&h->body.mesh, "the map", &target.body.mesh, name, &e) < 0 ||
+        vg_map_retarget(h, target.body.reference, opts.morph, cli.threads, &e) < 0 ||
         vg_head_merge_trace(h, &target, &e) < 0)
         cli_die(&e);
-    free(h->reference_name);
-    h->reference_name = target.reference_name, target.reference_name = NULL;
-    vg_attributes_clear(&h->attributes);
-    h->attributes = target.attributes, target.attributes = (vg_attributes){0};
+    free(h->body.reference_name);
+    h->body.reference_name = target.body.reference_name, target.body.reference_name = NULL;
+    vg_attributes_clear(&h->body.attributes);
+    h->body.attributes = target.body.attributes, target.body.attributes = (vg_attributes){0};
     vg_head_clear(&target);
     vg_frame frame = {0};
     while (cli_next(s, &frame)) continue; /* to the end, so that damage is seen; a map has no frames */

@@ -136,7 +136,7 @@ static void read_all(vg_source *s, contents *c, report *list)
         if (list) list_frame(list, h, &f, c->frames);
         if (c->frames == 0 && poses) c->D = vg_diagonal(f.values, h->count);
         note_frame(c, &f);
-        note_scalars(c, &f, h->mesh.nv);
+        note_scalars(c, &f, h->body.mesh.nv);
         cli_progress("frame", c->frames);
     }
     cli_note("%" PRIu64 " frames read, and the end mark where there has to be one", c->frames);
@@ -253,15 +253,15 @@ static void report_components(report *r, const vg_mesh *m)
 
 static void report_mesh(report *r, const vg_head *h)
 {
-    const vg_attributes *a = &h->attributes;
-    if (!h->reference) return;
+    const vg_attributes *a = &h->body.attributes;
+    if (!h->body.reference) return;
     report_gap(r);
     report_group(r, "mesh");
-    report_put(r, "vertices", "vertices", report_count(h->mesh.nv));
-    report_faces(r, &h->mesh);
-    report_components(r, &h->mesh);
-    report_put(r, "D", "D", report_number(vg_diagonal(h->reference, h->mesh.nv)));
-    report_put(r, "reference", "reference", report_text(h->reference_name ? h->reference_name : ""));
+    report_put(r, "vertices", "vertices", report_count(h->body.mesh.nv));
+    report_faces(r, &h->body.mesh);
+    report_components(r, &h->body.mesh);
+    report_put(r, "D", "D", report_number(vg_diagonal(h->body.reference, h->body.mesh.nv)));
+    report_put(r, "reference", "reference", report_text(h->body.reference_name ? h->body.reference_name : ""));
     report_put(r, "texture_coordinates", a->ntex ? "texture coordinates" : NULL, report_count(a->ntex));
     report_put(r, "labels", a->nlabels ? "labels" : NULL, report_count(a->nlabels));
     report_put(r, "selected_faces", h->has_selection ? "selected faces" : NULL,
@@ -319,12 +319,12 @@ static double percent(uint64_t part, uint64_t all)
 
 static void report_skeletons(report *r, const vg_head *h, const contents *c)
 {
-    const vg_rig *g = &h->rig;
+    const vg_rig *g = &h->body.rig;
     char line[80];
-    if (h->skeleton.njoints) {
+    if (h->body.skeleton.njoints) {
         report_gap(r);
         report_group(r, "skeleton");
-        report_skeleton(r, "skeleton", &h->skeleton);
+        report_skeleton(r, "skeleton", &h->body.skeleton);
         report_put(r, "turned_frames", NULL, report_count(c->turned));
         snprintf(line, sizeof line, "known in %" PRIu64 " of %" PRIu64 " frames", c->turned, c->frames);
         report_put(r, NULL, "turns", report_text(line));
@@ -363,10 +363,10 @@ static void report_map(report *r, const vg_map *m)
 
 static void report_patches(report *r, const vg_head *h)
 {
-    if (!h->patches.n) return;
+    if (!h->body.patches.n) return;
     report_gap(r);
     report_group(r, "patches");
-    report_put(r, "count", "patches", report_count(h->patches.n));
+    report_put(r, "count", "patches", report_count(h->body.patches.n));
     report_end(r);
 }
 
@@ -548,10 +548,10 @@ static void report_digest(report *r, const contents *c)
 
 static void print_weights(const vg_head *h, const char *operand)
 {
-    if (!h->rig.skin_weight)
+    if (!h->body.rig.skin_weight)
         cli_stop(VG_EINPUT, "'%s' holds no skinning weights: vg-fitmap --skeleton makes them",
                  operand ? operand : "standard input");
-    write_weights(cli_text_open(), &h->rig, h->mesh.nv);
+    write_weights(cli_text_open(), &h->body.rig, h->body.mesh.nv);
 }
 
 int main(int argc, char **argv)

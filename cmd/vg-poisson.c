@@ -115,11 +115,11 @@ static void load_key(key *k, vg_head *h)
     if (vg_source_open(&s, &k->mesh, 1, &e) < 0) cli_die(&e);
     const vg_head *from = vg_source_head(s);
     cli_need_vertices(from, subject);
-    if (vg_mesh_same(&h->mesh, "the sequence", &from->mesh, subject, &e) < 0) cli_die(&e);
+    if (vg_mesh_same(&h->body.mesh, "the sequence", &from->body.mesh, subject, &e) < 0) cli_die(&e);
     if (!cli_next(s, &f)) cli_stop(VG_EINPUT, "%s holds no pose", subject);
     if (vg_head_merge_trace(h, from, &e) < 0) cli_die(&e);
-    k->pose = cli_allocate(3 * h->mesh.nv, sizeof *k->pose, "the given poses");
-    memcpy(k->pose, f.values, 3 * h->mesh.nv * sizeof *k->pose);
+    k->pose = cli_allocate(3 * h->body.mesh.nv, sizeof *k->pose, "the given poses");
+    memcpy(k->pose, f.values, 3 * h->body.mesh.nv * sizeof *k->pose);
     vg_frame_clear(&f);
     vg_source_close(&s);
 }
@@ -168,7 +168,7 @@ static const double *find_given(work *w, uint64_t n, const char *name, bool last
         k->met = true, k->at = n;
         k->named = k->by == NAMED && !strcmp(k->frame, name);
         w->ahead--;
-        if (found && memcmp(found->pose, k->pose, 3 * w->h->mesh.nv * sizeof *k->pose)) {
+        if (found && memcmp(found->pose, k->pose, 3 * w->h->body.mesh.nv * sizeof *k->pose)) {
             cli_stop(VG_EINPUT, "'%s' and '%s' give two poses to one frame, number %llu, '%s'", found->option,
                      k->option, (unsigned long long)n, name);
         }
@@ -242,7 +242,8 @@ static void open_work(work *w)
     size_t limit = opts.memory < SIZE_MAX ? (size_t)opts.memory : SIZE_MAX;
     for (size_t i = 0; i < opts.nkeys; i++) load_key(&opts.keys[i], w->h);
     w->ahead = opts.nkeys;
-    if (vg_guide_new(&w->guide, w->h->mesh.nv, &e) < 0 || vg_spool_new(&w->spool, w->h, limit, &e) < 0) cli_die(&e);
+    if (vg_guide_new(&w->guide, w->h->body.mesh.nv, &e) < 0 || vg_spool_new(&w->spool, w->h, limit, &e) < 0)
+        cli_die(&e);
 }
 
 static void close_work(work *w)

@@ -157,7 +157,7 @@ static void load(vg_head *h, const char *operand)
 {
     vg_err e;
     if (vg_load_mesh(h, operand, &e) < 0) cli_die(&e);
-    if (opts.uv && h->attributes.ntex == 0)
+    if (opts.uv && h->body.attributes.ntex == 0)
         cli_stop(VG_EINPUT, "'%s' has no texture coordinates: --uv needs them in both meshes", operand);
 }
 
@@ -168,13 +168,13 @@ static void write_stream(vg_head *h, const vg_head *target, vg_register_result *
     vg_frame f = {0};
     h->correspondence = r->pairs;
     r->pairs = (vg_correspondence){0};
-    h->kind = VG_VERTICES, h->count = h->mesh.nv;
+    h->kind = VG_VERTICES, h->count = h->body.mesh.nv;
     if (vg_head_merge_trace(h, target, &e) < 0) cli_die(&e);
     cli_stream_open(h);
     if (vg_frame_shape(&f, h, &e) < 0 ||
-        vg_frame_rename(&f, target->reference_name ? target->reference_name : "", &e) < 0)
+        vg_frame_rename(&f, target->body.reference_name ? target->body.reference_name : "", &e) < 0)
         cli_die(&e);
-    if (h->mesh.nv) memcpy(f.values, r->fitted, 3 * h->mesh.nv * sizeof *f.values);
+    if (h->body.mesh.nv) memcpy(f.values, r->fitted, 3 * h->body.mesh.nv * sizeof *f.values);
     cli_stream_put(&f);
     cli_stream_end(NULL);
     vg_frame_clear(&f);
@@ -191,20 +191,20 @@ int main(int argc, char **argv)
     check_options(cli_start(&program, argc, argv, &operands));
     load(&source, operands[0]);
     load(&target, operands[1]);
-    vg_register_input in = {.source = &source.mesh,
-                            .target = &target.mesh,
-                            .source_points = source.reference,
-                            .target_points = target.reference,
+    vg_register_input in = {.source = &source.body.mesh,
+                            .target = &target.body.mesh,
+                            .source_points = source.body.reference,
+                            .target_points = target.body.reference,
                             .aligned = opts.aligned,
                             .keep_all = opts.keep_all,
-                            .source_uv = opts.uv ? &source.attributes : NULL,
-                            .target_uv = opts.uv ? &target.attributes : NULL,
+                            .source_uv = opts.uv ? &source.body.attributes : NULL,
+                            .target_uv = opts.uv ? &target.body.attributes : NULL,
                             .threads = cli.threads};
     read_pairs(&in, &markers, &seeds);
     if (vg_register(&r, &in, note_step, NULL, &e) < 0) cli_die(&e);
     note_alignment(&r);
     report_markers(&markers, &r);
-    report_unmatched(&target.mesh, &r.pairs);
+    report_unmatched(&target.body.mesh, &r.pairs);
     write_stream(&source, &target, &r);
     vg_register_result_clear(&r);
     vg_markers_clear(&markers);

@@ -69,19 +69,19 @@ int main(int argc, char **argv)
     vg_err e;
     vg_segmenter *s;
     vg_segment_report report;
-    if (vg_segmenter_new(&s, &h->mesh, h->reference, cli.threads, &e) < 0) cli_die(&e);
+    if (vg_segmenter_new(&s, &h->body.mesh, h->body.reference, cli.threads, &e) < 0) cli_die(&e);
     uint64_t poses = add_all(s, source);
     if (!poses) cli_stop(VG_EINPUT, "the input has no poses: what turns alike cannot be told");
-    vg_patches_clear(&h->patches);
+    vg_patches_clear(&h->body.patches);
     vg_map_clear(&h->map);
-    if (vg_segmenter_cut(s, k, (uint64_t)opts.seed, opts.connected, &h->patches, &report, &e) < 0) cli_die(&e);
+    if (vg_segmenter_cut(s, k, (uint64_t)opts.seed, opts.connected, &h->body.patches, &report, &e) < 0) cli_die(&e);
     vg_segmenter_free(&s);
     if (k && report.patches < k)
         cli_warn("%zu patches instead of %zu: no more faces turn differently", report.patches, k);
     if (k && report.patches > k)
         cli_warn("%zu patches instead of %zu: the mesh has more components", report.patches, k);
-    cli_note("%zu patches of %zu faces, %.2f degrees from their faces (rms), %zu rounds", report.patches, h->mesh.nf,
-             report.angle, report.rounds);
+    cli_note("%zu patches of %zu faces, %.2f degrees from their faces (rms), %zu rounds", report.patches,
+             h->body.mesh.nf, report.angle, report.rounds);
     cli_stream_open(h);
     cli_stream_end(vg_source_tail(source));
     vg_source_close(&source);

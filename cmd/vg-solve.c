@@ -95,7 +95,7 @@ static void make_machine(work *w, machine *m, uint32_t *held, size_t nheld)
 {
     vg_err e;
     *m = (machine){.held = held, .nheld = nheld};
-    if (vg_solver_new(&m->solver, w->g, held, nheld, w->h->reference, w->weights, cli.threads, &e) < 0 ||
+    if (vg_solver_new(&m->solver, w->g, held, nheld, w->h->body.reference, w->weights, cli.threads, &e) < 0 ||
         (opts.planar && vg_planar_new(&m->planar, m->solver, opts.planar_weights[0], opts.planar_weights[1], &e) < 0))
         cli_die(&e);
     vg_solver_facts facts = vg_solver_get_facts(m->solver);
@@ -220,7 +220,7 @@ static void place_held(const work *w, const machine *m, const vg_frame *f, waiti
     size_t a = 0;
     for (size_t i = 0; i < m->nheld; i++) {
         bool anchor = a < w->h->nanchors && w->h->anchors[a] == m->held[i];
-        const double *at = anchor ? f->anchors + 3 * a : w->h->reference + 3 * (size_t)m->held[i];
+        const double *at = anchor ? f->anchors + 3 * a : w->h->body.reference + 3 * (size_t)m->held[i];
         memcpy(p->held + 3 * i, at, 3 * sizeof *at);
         a += anchor;
     }
@@ -259,7 +259,7 @@ static void make_waiting(work *w)
     w->waiting = cli_allocate(w->most, sizeof *w->waiting, "a batch of poses");
     for (size_t i = 0; i < w->most; i++) {
         waiting *p = &w->waiting[i];
-        p->rhs = cli_allocate(3 * w->h->mesh.nv, sizeof *p->rhs, "a batch of poses");
+        p->rhs = cli_allocate(3 * w->h->body.mesh.nv, sizeof *p->rhs, "a batch of poses");
         p->normals = cli_allocate(w->plain.planar ? 3 * vg_planar_faces(w->plain.planar) : 0, sizeof *p->normals,
                                   "a batch of poses");
         if (vg_frame_shape(&p->frame, w->h, &e) < 0) cli_die(&e);
@@ -334,7 +334,7 @@ int main(int argc, char **argv)
     work w = {.weights = opts.weights == 1 ? VG_WEIGHTS_AREA : VG_WEIGHTS_UNIFORM};
     vg_source *s = cli_source(operands, n);
     prepare(&w, vg_source_head(s));
-    w.h->kind = VG_VERTICES, w.h->count = w.h->mesh.nv;
+    w.h->kind = VG_VERTICES, w.h->count = w.h->body.mesh.nv;
     make_waiting(&w);
     cli_stream_open(w.h);
     solve_all(&w, s);

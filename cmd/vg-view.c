@@ -237,7 +237,8 @@ static void open_truth(side *truth, const side *result)
 {
     vg_err e;
     open_operand(truth, opts.against);
-    if (vg_mesh_same(&truth->head->mesh, truth->name, &result->head->mesh, result->name, &e) < 0) cli_die(&e);
+    if (vg_mesh_same(&truth->head->body.mesh, truth->name, &result->head->body.mesh, result->name, &e) < 0)
+        cli_die(&e);
 }
 
 /* All that is shown: the result, the truth it is compared with, if any, and what stands beside. */
@@ -253,7 +254,8 @@ static void open_cast(cast *c, char **operands, size_t n)
     for (size_t i = 0; i < opts.nbeside; i++) {
         side *s = &c->beside[i];
         open_operand(s, opts.beside[i]);
-        c->compared[i] = opts.against && vg_mesh_same(&c->truth.head->mesh, "", &s->head->mesh, "", NULL) == VG_OK;
+        c->compared[i] =
+            opts.against && vg_mesh_same(&c->truth.head->body.mesh, "", &s->head->body.mesh, "", NULL) == VG_OK;
     }
 }
 
@@ -318,13 +320,13 @@ static void warn_scale(const cast *c)
 /* A stream of patches has no frames: they are shown on the reference pose. */
 static bool shows_reference(const cast *c)
 {
-    return !c->result.frames && !opts.against && c->result.head->patches.n;
+    return !c->result.frames && !opts.against && c->result.head->body.patches.n;
 }
 
 static void put_reference(side *s, take_frame *put, void *context)
 {
     vg_frame frame = s->frame;
-    s->frame = (vg_frame){.name = s->head->reference_name, .values = s->head->reference};
+    s->frame = (vg_frame){.name = s->head->body.reference_name, .values = s->head->body.reference};
     put(context, 0, s, NULL);
     s->frame = frame;
     s->frames++;
@@ -340,12 +342,12 @@ static void take_patches(side *s)
     char name[420];
     snprintf(name, sizeof name, "'%.400s'", opts.patches);
     if (vg_load_mesh(&h, opts.patches, &e) < 0 ||
-        vg_mesh_same(&h.mesh, name, &s->head->mesh, s->name, &e) < 0)
+        vg_mesh_same(&h.body.mesh, name, &s->head->body.mesh, s->name, &e) < 0)
         cli_die(&e);
-    if (!h.patches.n) cli_stop(VG_EINPUT, "%s holds no patches: make them with 'vg-segment'", name);
-    vg_patches_clear(&s->head->patches);
-    s->head->patches = h.patches;
-    h.patches = (vg_patches){0};
+    if (!h.body.patches.n) cli_stop(VG_EINPUT, "%s holds no patches: make them with 'vg-segment'", name);
+    vg_patches_clear(&s->head->body.patches);
+    s->head->body.patches = h.body.patches;
+    h.body.patches = (vg_patches){0};
     vg_head_clear(&h);
 }
 

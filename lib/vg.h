@@ -322,18 +322,29 @@ const char *vg_kind_name(vg_kind k);     /* "vertices", ... ; "unknown" */
 
 typedef enum vg_precision { VG_F32 = 4, VG_F64 = 8 } vg_precision;
 
-/* All that is known of a sequence before its frames. Frames carry vertices of `mesh`, or values on its vector graph
- * (see vg_graph), or transforms. */
-typedef struct vg_head {
+/* A body: what goes together whatever happens to the frames of a sequence. Arrays are owned. */
+typedef struct vg_body {
     vg_mesh mesh;
     double *reference;    /* nv points: the undeformed pose. Always there when the mesh has vertices */
-    char *reference_name; /* never NULL in a head that was read */
+    char *reference_name; /* never NULL in a body that was read */
     vg_attributes attributes;
     vg_skeleton skeleton;
-    vg_correspondence correspondence; /* a stream of vg-register: mesh and reference are the source's, its frame is
-                                         fitted to the target */
     vg_patches patches;   /* a stream of vg-segment, and those that come of it */
     vg_rig rig;           /* of a map of bones; also in streams of transforms of bones */
+} vg_body;
+
+void vg_body_clear(vg_body *b);
+/* vg_body_copy: all of it. */
+int vg_body_copy(vg_body *to, const vg_body *from, vg_err *e) VG_MUST_CHECK;
+/* vg_body_take: *to becomes *from, what it held is cleared, and *from is left empty. */
+void vg_body_take(vg_body *to, vg_body *from);
+
+/* All that is known of a sequence before its frames. Frames carry vertices of the body's mesh, or values on its
+ * vector graph (see vg_graph), or transforms. */
+typedef struct vg_head {
+    vg_body body;
+    vg_correspondence correspondence; /* a stream of vg-register: mesh and reference are the source's, its frame is
+                                         fitted to the target */
     vg_map map;           /* a stream of vg-fitmap */
     bool has_selection;   /* only the faces `selected` (ascending) carry vectors; else all do */
     size_t nselected;

@@ -317,13 +317,13 @@ static int open_text(reading *b, vgi_input *in, vg_err *e)
 static int fill_head(reading *b, vg_head *h, vg_err *e)
 {
     const vg_skeleton *s = &b->skeleton;
-    int r = vg_skeleton_mesh(s, &h->mesh, e);
-    if (r == VG_OK) r = vg_skeleton_copy(&h->skeleton, s, e);
-    if (r == VG_OK && !(h->reference = vgi_array(s->njoints, 3 * sizeof *h->reference, e))) r = VG_ENOMEM;
+    int r = vg_skeleton_mesh(s, &h->body.mesh, e);
+    if (r == VG_OK) r = vg_skeleton_copy(&h->body.skeleton, s, e);
+    if (r == VG_OK && !(h->body.reference = vgi_array(s->njoints, 3 * sizeof *h->body.reference, e))) r = VG_ENOMEM;
     if (r < 0) return r;
     h->kind = VG_VERTICES, h->precision = VG_F64, h->count = s->njoints;
-    vg_skeleton_pose(s, NULL, h->reference, b->turns);
-    return check_places(b, h->reference, "in the reference pose", e);
+    vg_skeleton_pose(s, NULL, h->body.reference, b->turns);
+    return check_places(b, h->body.reference, "in the reference pose", e);
 }
 
 static int open_bvh(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)

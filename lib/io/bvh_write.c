@@ -124,7 +124,7 @@ static void take_offsets(vg_skeleton *s, const double *reference)
 
 int vgi_bvh_check(const vg_head *h, const char *output, vg_err *e)
 {
-    if (h->mesh.nv && h->skeleton.njoints == h->mesh.nv) return VG_OK;
+    if (h->body.mesh.nv && h->body.skeleton.njoints == h->body.mesh.nv) return VG_OK;
     return vg_fail(e, VG_EINPUT, "cannot write '%s': the input holds no skeleton, as a sequence read from BVH does",
                    output);
 }
@@ -294,10 +294,10 @@ int vgi_bvh_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi_
     writing *w = *state = vgi_array(1, sizeof *w, e);
     if (!w) return VG_ENOMEM;
     w->out = out;
-    int r = vg_skeleton_copy(&w->skeleton, &h->skeleton, e);
+    int r = vg_skeleton_copy(&w->skeleton, &h->body.skeleton, e);
     if (r < 0) return r;
-    take_offsets(&w->skeleton, h->reference);
-    w->size = vg_diagonal(h->reference, h->mesh.nv);
+    take_offsets(&w->skeleton, h->body.reference);
+    w->size = vg_diagonal(h->body.reference, h->body.mesh.nv);
     w->place_decimals = decimals_for(w->size, o->full_precision), w->angle_decimals = o->full_precision ? 12 : 6;
     if (!(w->values = vgi_array(vg_skeleton_channels(&w->skeleton), sizeof *w->values, e))) return VG_ENOMEM;
     r = link_kin(w, e);

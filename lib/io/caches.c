@@ -106,7 +106,7 @@ static int finish_head(reading *x, vg_head *h, vg_err *e)
     int r = take_sample(x, e);
     if (r < 0) return r;
     h->kind = VG_VERTICES, h->precision = VG_F32;
-    h->count = h->mesh.nv = x->points;
+    h->count = h->body.mesh.nv = x->points;
     return VG_OK;
 }
 

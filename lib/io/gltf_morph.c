@@ -33,7 +33,7 @@ typedef struct morphs {
 
 static int begin(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
 {
-    const size_t nv = w->h->mesh.nv;
+    const size_t nv = w->h->body.mesh.nv;
     morphs *x = w->own = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
     x->most = o->most_targets ? o->most_targets : USUAL_TARGETS;
@@ -45,7 +45,7 @@ static int begin(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
 static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
 {
     morphs *x = w->own;
-    const size_t n = 3 * w->h->mesh.nv;
+    const size_t n = 3 * w->h->body.mesh.nv;
     for (size_t i = 0; i < n; i++) {
         float d = (float)(f->values[i] - w->base[i]);
         if (!isfinite(d)) return vg_fail(e, VG_EINPUT, "a position is too large for binary32");
@@ -59,7 +59,7 @@ static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
 static int load(const vgi_gltf_writing *w, size_t frame, float *to, vg_err *e)
 {
     const morphs *x = w->own;
-    const size_t n = 3 * w->h->mesh.nv, bytes = VGI_GLTF_ITEM * n;
+    const size_t n = 3 * w->h->body.mesh.nv, bytes = VGI_GLTF_ITEM * n;
     int r = vgi_gltf_load(w, (uint64_t)frame * bytes, x->packed, bytes, e);
     for (size_t i = 0; i < n && r == VG_OK; i++) to[i] = vgi_gltf_get_single(x->packed + VGI_GLTF_ITEM * i);
     return r;
@@ -94,7 +94,7 @@ static double mix_error(const float *a, const float *b, const float *c, size_t n
 static int measure_span(vgi_gltf_writing *w, span *s, vg_err *e)
 {
     morphs *x = w->own;
-    const size_t n = 3 * w->h->mesh.nv;
+    const size_t n = 3 * w->h->body.mesh.nv;
     int r = s->to > s->from + 1 ? load(w, s->from, x->first, e) : VG_OK;
     if (r == VG_OK && s->to > s->from + 1) r = load(w, s->to, x->second, e);
     s->error = 0, s->worst = s->from;
@@ -158,7 +158,7 @@ static int choose_targets(vgi_gltf_writing *w, vg_err *e)
 static int describe_points(vgi_gltf_writing *w, vg_err *e)
 {
     morphs *x = w->own;
-    const size_t nv = w->h->mesh.nv, bytes = VGI_GLTF_POINT * nv;
+    const size_t nv = w->h->body.mesh.nv, bytes = VGI_GLTF_POINT * nv;
     double bounds[6];
     x->points = w->naccessors;
     int r = vgi_gltf_view(w, bytes * (x->targets + 1), ",\"target\":34962,\"byteStride\":12", e);
@@ -248,7 +248,7 @@ static int emit_weights(vgi_gltf_writing *w, vg_err *e)
 static int emit(vgi_gltf_writing *w, vg_err *e)
 {
     const morphs *x = w->own;
-    const size_t n = 3 * w->h->mesh.nv;
+    const size_t n = 3 * w->h->body.mesh.nv;
     int r = emit_weights(w, e);
     if (r == VG_OK) r = vgi_gltf_emit_singles(w, w->base, n, e);
     for (size_t t = 0; t < x->targets && r == VG_OK; t++) {
@@ -261,7 +261,7 @@ static int emit(vgi_gltf_writing *w, vg_err *e)
 static void warning(const vgi_gltf_writing *w, char *to, size_t room)
 {
     const morphs *x = w->own;
-    const double d = vg_diagonal(w->h->reference, w->h->mesh.nv);
+    const double d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
     if (x->targets < w->frames && x->error > 0)
         snprintf(to, room,
                  "every frame: %zu are mixed from %zu morph targets, with vertices off by at "

@@ -401,10 +401,10 @@ static int take_reference(vgi_gltf_scene *x, vg_head *h, vg_err *e)
     int r = vgi_gltf_item(&x->g, vgi_json_get(x->nodes[x->parts[0].node].json, "mesh"), "meshes", &mesh, NULL, e);
     if (r < 0) return r;
     const char *name = vgi_json_text(vgi_json_get(mesh, "name"));
-    if (name && *name && !(h->reference_name = vgi_copy_string(name, strlen(name), e))) return VG_ENOMEM;
-    if (!(h->reference = vgi_array(h->mesh.nv, 3 * sizeof *h->reference, e))) return VG_ENOMEM;
+    if (name && *name && !(h->body.reference_name = vgi_copy_string(name, strlen(name), e))) return VG_ENOMEM;
+    if (!(h->body.reference = vgi_array(h->body.mesh.nv, 3 * sizeof *h->body.reference, e))) return VG_ENOMEM;
     rest(x, false);
-    return pose(x, h->reference, e);
+    return pose(x, h->body.reference, e);
 }
 
 int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)
@@ -415,8 +415,8 @@ int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const char *subject, 
     int r = vgi_gltf_open(&x->g, in, subject, e);
     if (r == VG_OK) r = vgi_gltf_scene_read(x, &f, e);
     if (r == VG_OK) r = vgi_gltf_mend(x, &f, e);
-    h->mesh = f.mesh;
-    h->kind = VG_VERTICES, h->precision = VG_F32, h->count = h->mesh.nv;
+    h->body.mesh = f.mesh;
+    h->kind = VG_VERTICES, h->precision = VG_F32, h->count = h->body.mesh.nv;
     if (r == VG_OK) r = read_animations(x, e);
     return r < 0 ? r : take_reference(x, h, e);
 }

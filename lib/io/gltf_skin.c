@@ -48,12 +48,12 @@ typedef struct skinning {
 
 static size_t joints_of(const vgi_gltf_writing *w)
 {
-    return w->h->rig.skeleton.njoints;
+    return w->h->body.rig.skeleton.njoints;
 }
 
 static uint32_t parent_of(const vgi_gltf_writing *w, size_t j)
 {
-    return w->h->rig.skeleton.joints[j].parent;
+    return w->h->body.rig.skeleton.joints[j].parent;
 }
 
 /* ---- the rig at rest ---- */
@@ -61,7 +61,7 @@ static uint32_t parent_of(const vgi_gltf_writing *w, size_t j)
 /* A joint without channels moves with its parent. */
 static void find_bones(const vgi_gltf_writing *w, uint32_t *bone)
 {
-    const vg_rig *r = &w->h->rig;
+    const vg_rig *r = &w->h->body.rig;
     for (size_t j = 0; j < r->skeleton.njoints; j++) bone[j] = NOTHING;
     for (size_t b = 0; b < r->nbones; b++) bone[r->bone[b]] = (uint32_t)b;
     for (size_t j = 0; j < r->skeleton.njoints; j++)
@@ -83,21 +83,22 @@ static int place_rest(const vgi_gltf_writing *w, skinning *x, vg_err *e)
 {
     const size_t n = joints_of(w);
     for (size_t i = 0; i < 3 * n; i++) {
-        x->at[i] = (float)w->h->rig.at[i];
+        x->at[i] = (float)w->h->body.rig.at[i];
         if (!isfinite(x->at[i])) return vg_fail(e, VG_EINPUT, "the place of a joint is too large for binary32");
     }
     for (size_t i = 0; i < 3 * n; i++) {
         uint32_t parent = parent_of(w, i / 3);
         x->rest[i] = x->at[i] - (parent == NOTHING ? 0 : x->at[3 * (size_t)parent + i % 3]);
     }
-    x->size = fmax(vg_diagonal(x->at, n), vg_diagonal(w->h->reference, w->h->mesh.nv));
+    x->size = fmax(vg_diagonal(x->at, n), vg_diagonal(w->h->body.reference, w->h->body.mesh.nv));
     return VG_OK;
 }
 
 static int check_weights(const vgi_gltf_writing *w, vg_err *e)
 {
-    for (size_t v = 0; v < w->h->mesh.nv; v++)
-        if (!(w->h->rig.skin_weight[VG_SKIN * v] > 0)) return vg_fail(e, VG_EINPUT, "vertex %zu hangs on no bone", v);
+    for (size_t v = 0; v < w->h->body.mesh.nv; v++)
+        if (!(w->h->body.rig.skin_weight[VG_SKIN * v] > 0))
+            return vg_fail(e, VG_EINPUT, "vertex %zu hangs on no bone", v);
     return VG_OK;
 }
 
@@ -118,8 +119,8 @@ static int begin(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
     if (!x->bone || !x->channels || !x->child || !x->next || !x->rest || !x->at || !x->now || !x->local ||
         !x->before || !x->moves || !x->grows || !x->packed)
         return VG_ENOMEM;
-    x->joint_bytes = w->h->rig.nbones <= 256 ? 1 : 2;
-    if (w->h->rig.nbones > 65536) return vg_fail(e, VG_EINPUT, "a skin of glTF has at most 65536 bones");
+    x->joint_bytes = w->h->body.rig.nbones <= 256 ? 1 : 2;
+    if (w->h->body.rig.nbones > 65536) return vg_fail(e, VG_EINPUT, "a skin of glTF has at most 65536 bones");
     find_bones(w, x->bone);
     find_children(w, x);
     int r = place_rest(w, x, e);
@@ -199,7 +200,7 @@ static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
 static int describe_points(vgi_gltf_writing *w, vg_err *e)
 {
     skinning *x = w->own;
-    const size_t nv = w->h->mesh.nv;
+    const size_t nv = w->h->body.mesh.nv;
     double bounds[6];
     char stride[48];
     snprintf(stride, sizeof stride, ",\"target\":34962,\"byteStride\":%zu", VG_SKIN * x->joint_bytes);
@@ -222,14 +223,14 @@ static int describe_inverse(vgi_gltf_writing *w, vg_err *e)
 {
     skinning *x = w->own;
     x->inverse = w->naccessors;
-    int r = vgi_gltf_view(w, 16 * VGI_GLTF_ITEM * w->h->rig.nbones, "", e);
-    return r < 0 ? r : vgi_gltf_say_accessor(w, 0, VGI_GLTF_FLOAT, w->h->rig.nbones, "MAT4", NULL, 0, e);
+    int r = vgi_gltf_view(w, 16 * VGI_GLTF_ITEM * w->h->body.rig.nbones, "", e);
+    return r < 0 ? r : vgi_gltf_say_accessor(w, 0, VGI_GLTF_FLOAT, w->h->body.rig.nbones, "MAT4", NULL, 0, e);
 }
 
 static void choose_channels(const vgi_gltf_writing *w, skinning *x)
 {
     for (size_t j = 0; j < joints_of(w); j++) {
-        if (w->h->rig.skeleton.joints[j].nchannels > 0)
+        if (w->h->body.rig.skeleton.joints[j].nchannels > 0)
             x->channels[x->nchannels++] = (channel){j, TURN, 4, "rotation"};
         if (x->moves[j]) x->channels[x->nchannels++] = (channel){j, PLACE, 3, "translation"};
         if (x->grows[j]) x->channels[x->nchannels++] = (channel){j, SIZE, 3, "scale"};
@@ -265,7 +266,7 @@ static int say_joint(vgi_gltf_writing *w, size_t j, vg_err *e)
 {
     const skinning *x = w->own;
     int r = vgi_gltf_say(&w->json, e, ",\n{\"name\":");
-    if (r == VG_OK) r = vgi_gltf_say_text(&w->json, w->h->rig.skeleton.joints[j].name, e);
+    if (r == VG_OK) r = vgi_gltf_say_text(&w->json, w->h->body.rig.skeleton.joints[j].name, e);
     if (r == VG_OK) r = vgi_gltf_say_numbers(&w->json, ",\"translation\":[", x->rest + 3 * j, 3, "]", e);
     if (r == VG_OK) r = say_children(w, x->child[j], e);
     return r < 0 ? r : vgi_gltf_say(&w->json, e, "}");
@@ -294,7 +295,7 @@ static int say_nodes(vgi_gltf_writing *w, vg_err *e)
 static int say_skin(vgi_gltf_writing *w, vg_err *e)
 {
     const skinning *x = w->own;
-    const vg_rig *rig = &w->h->rig;
+    const vg_rig *rig = &w->h->body.rig;
     int r = vgi_gltf_say(&w->json, e, "\"skins\":[{\"inverseBindMatrices\":%zu,\"joints\":[", x->inverse);
     for (size_t b = 0; b < rig->nbones && r == VG_OK; b++)
         r = vgi_gltf_say(&w->json, e, "%s%zu", b ? "," : "", (size_t)rig->bone[b] + 1);
@@ -370,17 +371,17 @@ static int emit_joints(vgi_gltf_writing *w, vg_err *e)
     uint32_t bone[VG_SKIN];
     float weight[VG_SKIN];
     int r = VG_OK;
-    for (size_t v = 0; v < w->h->mesh.nv && r == VG_OK; v++) {
+    for (size_t v = 0; v < w->h->body.mesh.nv && r == VG_OK; v++) {
         unsigned char p[2 * VG_SKIN];
-        influences(&w->h->rig, v, bone, weight);
+        influences(&w->h->body.rig, v, bone, weight);
         for (size_t i = 0; i < VG_SKIN; i++) {
             p[x->joint_bytes * i] = (unsigned char)bone[i];
             if (x->joint_bytes == 2) p[2 * i + 1] = (unsigned char)(bone[i] >> 8);
         }
         r = vgi_gltf_emit(w, p, x->joint_bytes * VG_SKIN, e);
     }
-    for (size_t v = 0; v < w->h->mesh.nv && r == VG_OK; v++) {
-        influences(&w->h->rig, v, bone, weight);
+    for (size_t v = 0; v < w->h->body.mesh.nv && r == VG_OK; v++) {
+        influences(&w->h->body.rig, v, bone, weight);
         r = vgi_gltf_emit_singles(w, weight, VG_SKIN, e);
     }
     return r;
@@ -390,9 +391,9 @@ static int emit_inverse(vgi_gltf_writing *w, vg_err *e)
 {
     const skinning *x = w->own;
     int r = VG_OK;
-    for (size_t b = 0; b < w->h->rig.nbones && r == VG_OK; b++) {
+    for (size_t b = 0; b < w->h->body.rig.nbones && r == VG_OK; b++) {
         float m[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-        for (size_t k = 0; k < 3; k++) m[12 + k] = (float)-x->at[3 * (size_t)w->h->rig.bone[b] + k];
+        for (size_t k = 0; k < 3; k++) m[12 + k] = (float)-x->at[3 * (size_t)w->h->body.rig.bone[b] + k];
         r = vgi_gltf_emit_singles(w, m, 16, e);
     }
     return r;
@@ -436,7 +437,7 @@ static int emit_channels(vgi_gltf_writing *w, vg_err *e)
 
 static int emit(vgi_gltf_writing *w, vg_err *e)
 {
-    int r = vgi_gltf_emit_singles(w, w->base, 3 * w->h->mesh.nv, e);
+    int r = vgi_gltf_emit_singles(w, w->base, 3 * w->h->body.mesh.nv, e);
     if (r == VG_OK) r = emit_joints(w, e);
     if (r == VG_OK) r = emit_inverse(w, e);
     return r < 0 ? r : emit_channels(w, e);

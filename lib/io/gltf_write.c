@@ -19,18 +19,18 @@ static const double usual_rate = 30;
 static int check_skin(const vg_head *h, const char *output, vg_err *e)
 {
     const char *lacks = NULL;
-    if (!h->rig.skeleton.njoints)
+    if (!h->body.rig.skeleton.njoints)
         lacks = "the input holds transforms of no skeleton: make vertices of them with 'vg-deform --map MAP' first";
-    else if (!h->rig.skin_bone)
+    else if (!h->body.rig.skin_bone)
         lacks = "the rig of the input has no weights: make vertices of it with 'vg-deform --map MAP' first";
-    else if (h->count != h->rig.nbones) lacks = "the input has not as many transforms as its rig has bones";
+    else if (h->count != h->body.rig.nbones) lacks = "the input has not as many transforms as its rig has bones";
     return lacks ? vg_fail(e, VG_EINPUT, "cannot write '%s': %s", output, lacks) : VG_OK;
 }
 
 int vgi_gltf_check(const vg_head *h, const char *output, vg_err *e)
 {
     int r = h->kind == VG_TRANSFORMS ? check_skin(h, output, e) : VG_OK;
-    if (r < 0 || h->mesh.nv) return r;
+    if (r < 0 || h->body.mesh.nv) return r;
     return vg_fail(e, VG_EINPUT, "cannot write '%s': a mesh of glTF must have vertices", output);
 }
 
@@ -48,9 +48,9 @@ float vgi_gltf_get_single(const unsigned char *p)
 
 static int round_base(vgi_gltf_writing *w, vg_err *e)
 {
-    if (!(w->base = vgi_array_raw(w->h->mesh.nv, VGI_GLTF_POINT, e))) return VG_ENOMEM;
-    for (size_t i = 0; i < 3 * w->h->mesh.nv; i++) {
-        w->base[i] = (float)w->h->reference[i];
+    if (!(w->base = vgi_array_raw(w->h->body.mesh.nv, VGI_GLTF_POINT, e))) return VG_ENOMEM;
+    for (size_t i = 0; i < 3 * w->h->body.mesh.nv; i++) {
+        w->base[i] = (float)w->h->body.reference[i];
         if (!isfinite(w->base[i])) return vg_fail(e, VG_EINPUT, "a position is too large for binary32");
     }
     return VG_OK;
@@ -147,7 +147,7 @@ int vgi_gltf_say_names(vgi_gltf_writing *w, const char *key, const size_t *which
 
 int vgi_gltf_say_mesh_name(vgi_gltf_writing *w, vg_err *e)
 {
-    const char *name = w->h->reference_name ? w->h->reference_name : "";
+    const char *name = w->h->body.reference_name ? w->h->body.reference_name : "";
     int r = vgi_gltf_say(&w->json, e, "\"name\":");
     return r < 0 ? r : vgi_gltf_say_text(&w->json, *name ? name : "mesh", e);
 }
@@ -335,7 +335,7 @@ int vgi_gltf_end(void *state, vg_err *e)
     vgi_gltf_writing *w = state;
     w->timed = times_fit(w);
     int r = vgi_output_flush(&w->spool, e);
-    if (r == VG_OK) r = vgi_gltf_shape_make(&w->shape, &w->h->mesh, w->h->reference, e);
+    if (r == VG_OK) r = vgi_gltf_shape_make(&w->shape, &w->h->body.mesh, w->h->body.reference, e);
     if (r == VG_OK) r = say_all(w, e);
     if (r == VG_OK) r = w->binary ? put_binary(w, e) : put_text(w, e);
     note_losses(w);

@@ -69,10 +69,10 @@ static int compare_names(const void *a, const void *b)
 static int join_skeleton(void *state, const vg_head *with, vg_err *e)
 {
     reading *b = state;
-    size_t n = with->skeleton.njoints;
-    int r = vg_skeleton_copy(&b->skeleton, &with->skeleton, e);
+    size_t n = with->body.skeleton.njoints;
+    int r = vg_skeleton_copy(&b->skeleton, &with->body.skeleton, e);
     if (r < 0) return r;
-    b->reference = vgi_copy_array(with->reference, n, 3 * sizeof *b->reference, e);
+    b->reference = vgi_copy_array(with->body.reference, n, 3 * sizeof *b->reference, e);
     b->by_name = vgi_array(n, sizeof *b->by_name, e);
     b->met = vgi_array(n, sizeof *b->met, e);
     b->guide = vgi_array_raw(n, sizeof *b->guide, e);

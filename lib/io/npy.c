@@ -261,7 +261,7 @@ static int open_npy(void **state, vg_head *h, vgi_input *in, const char *subject
     if (r == VG_OK) r = judge_shape(x, e);
     if (r == VG_OK) r = take_data(x, e);
     h->kind = VG_VERTICES, h->precision = x->a.item == 4 ? VG_F32 : VG_F64;
-    h->count = h->mesh.nv = x->points;
+    h->count = h->body.mesh.nv = x->points;
     return r;
 }
 

@@ -251,25 +251,26 @@ static int take_reference(reading *x, vg_head *h, vg_err *e)
     const struct held *r = &x->held[REFERENCE];
     bool vertices = h->kind == VG_VERTICES;
     const uint64_t shape[2] = {vertices ? x->count : UINT64_MAX, 3};
-    h->mesh.nv = x->count;
+    h->body.mesh.nv = x->count;
     if (!r->there) return vertices ? VG_OK : missing(x, REFERENCE, x->values, e);
     if (!is_float(r) || !has_shape(r, 2, shape) || r->a.shape[0] == 0 || r->a.shape[0] >= UINT32_MAX - 1)
         return wrong(x, REFERENCE, "is not of shape (vertices, 3) with float32 or float64", e);
-    h->mesh.nv = (size_t)r->a.shape[0];
-    h->reference = vgi_array_raw(h->mesh.nv, 3 * sizeof *h->reference, e);
-    int result = h->reference ? copy_floats(x, REFERENCE, 0, 3 * h->mesh.nv, h->reference, e) : VG_ENOMEM;
+    h->body.mesh.nv = (size_t)r->a.shape[0];
+    h->body.reference = vgi_array_raw(h->body.mesh.nv, 3 * sizeof *h->body.reference, e);
+    int result =
+        h->body.reference ? copy_floats(x, REFERENCE, 0, 3 * h->body.mesh.nv, h->body.reference, e) : VG_ENOMEM;
     const struct held *name = &x->held[REFERENCE_NAME];
     if (result < 0 || !name->there) return result;
     if ((name->a.kind != 'U' && name->a.kind != 'S') || elements(name) != 1)
         return wrong(x, REFERENCE_NAME, "is not one text", e);
-    return text_at(x, REFERENCE_NAME, 0, &h->reference_name, e);
+    return text_at(x, REFERENCE_NAME, 0, &h->body.reference_name, e);
 }
 
 /* face_offsets and face_vertices; checked so far that the source can check the rest. */
 static int take_polygons(reading *x, vg_head *h, vg_err *e)
 {
     size_t n, corners;
-    vg_mesh *m = &h->mesh;
+    vg_mesh *m = &h->body.mesh;
     if (!x->held[FACE_VERTICES].there) return missing(x, FACE_VERTICES, FACE_OFFSETS, e);
     if (!x->held[FACE_OFFSETS].there) return missing(x, FACE_OFFSETS, FACE_VERTICES, e);
     int r = copy_indices(x, FACE_OFFSETS, UINT32_MAX, &m->start, &n, e);
@@ -287,7 +288,7 @@ static int take_equal_faces(reading *x, vg_head *h, vg_err *e)
 {
     const struct held *f = &x->held[FACES];
     size_t corners;
-    vg_mesh *m = &h->mesh;
+    vg_mesh *m = &h->body.mesh;
     if (x->held[FACE_OFFSETS].there)
         return wrong(x, FACES, "is there beside 'face_offsets': faces are told by one of them", e);
     if (f->a.ndim != 2 || f->a.shape[1] < 2) return wrong(x, FACES, "is not of shape (faces, corners of a face)", e);
@@ -315,7 +316,7 @@ static int take_links(reading *x, vg_head *h, vg_err *e)
     if (!has_shape(&x->held[LINKS], 2, pairs)) return wrong(x, LINKS, "is not of shape (links, 2)", e);
     h->has_links = true;
     size_t n;
-    int r = copy_indices(x, LINKS, h->mesh.nv, &h->links, &n, e);
+    int r = copy_indices(x, LINKS, h->body.mesh.nv, &h->links, &n, e);
     h->nlinks = n / 2;
     for (size_t i = 0; r == VG_OK && i < h->nlinks; i++)
         if (h->links[2 * i] == h->links[2 * i + 1]) return wrong(x, LINKS, "joins a vertex to itself", e);
@@ -328,12 +329,12 @@ static int take_graph(reading *x, vg_head *h, vg_err *e)
 {
     const uint64_t roots[2] = {x->frames, 3};
     if (h->kind == VG_VERTICES) return VG_OK;
-    int r = vg_mesh_check(&h->mesh, x->subject, e);
-    if (r == VG_OK) r = copy_indices(x, SELECTED, h->mesh.nf, &h->selected, &h->nselected, e);
+    int r = vg_mesh_check(&h->body.mesh, x->subject, e);
+    if (r == VG_OK) r = copy_indices(x, SELECTED, h->body.mesh.nf, &h->selected, &h->nselected, e);
     h->has_selection = x->held[SELECTED].there;
     if (r == VG_OK) r = check_ascending(x, SELECTED, h->selected, h->nselected, e);
     if (r == VG_OK) r = take_links(x, h, e);
-    if (r == VG_OK) r = copy_indices(x, ANCHORS, h->mesh.nv, &h->anchors, &h->nanchors, e);
+    if (r == VG_OK) r = copy_indices(x, ANCHORS, h->body.mesh.nv, &h->anchors, &h->nanchors, e);
     if (r == VG_OK) r = check_ascending(x, ANCHORS, h->anchors, h->nanchors, e);
     if (r < 0) return r;
     x->nanchors = h->nanchors;

@@ -174,9 +174,9 @@ static int add_values(writing *x, enum array i, vg_err *e)
 
 static int add_reference(writing *x, vg_err *e)
 {
-    const uint64_t shape[2] = {x->h->mesh.nv, 3};
+    const uint64_t shape[2] = {x->h->body.mesh.nv, 3};
     vg_bytes b = {0};
-    int r = vgi_npy_store(&b, x->h->reference, 3 * x->h->mesh.nv, true, e);
+    int r = vgi_npy_store(&b, x->h->body.reference, 3 * x->h->body.mesh.nv, true, e);
     if (r == VG_OK) r = add_doubles(x, REFERENCE, 2, shape, &b, e);
     vg_bytes_clear(&b);
     return r;
@@ -193,9 +193,9 @@ static bool belongs(const writing *x, enum array i)
     case LINKS: return is_rooted(h) && h->has_links;
     case SELECTED: return is_rooted(h) && h->has_selection;
     case ROOTS: return is_rooted(h);
-    case FACE_OFFSETS: return h->mesh.nv > 0; /* with face_vertices */
-    case REFERENCE: return h->mesh.nv > 0 && h->reference;
-    case REFERENCE_NAME: return h->mesh.nv > 0 && h->reference_name;
+    case FACE_OFFSETS: return h->body.mesh.nv > 0; /* with face_vertices */
+    case REFERENCE: return h->body.mesh.nv > 0 && h->body.reference;
+    case REFERENCE_NAME: return h->body.mesh.nv > 0 && h->body.reference_name;
     case TIMES: return x->timed;
     case NAMES: return true;
     case POSITIONS: return h->kind == VG_VERTICES;
@@ -215,12 +215,13 @@ static int add(writing *x, enum array i, vg_err *e)
     switch (i) {
     case ANCHOR_POSITIONS: return add_doubles(x, i, 3, places, &x->anchors, e);
     case ANCHORS: return add_indices(x, i, 1, &anchors, h->anchors, h->nanchors, e);
-    case FACE_OFFSETS: return add_mesh(x, i, FACE_VERTICES, h->mesh.start, h->mesh.vert, h->mesh.nf, e);
+    case FACE_OFFSETS:
+        return add_mesh(x, i, FACE_VERTICES, h->body.mesh.start, h->body.mesh.vert, h->body.mesh.nf, e);
     case GRAPH_OFFSETS: return add_graph(x, e);
     case LINKS: return add_indices(x, i, 2, links, h->links, 2 * h->nlinks, e);
     case NAMES: return add_texts(x, i, 1, x->names.at, x->names.n, e);
     case REFERENCE: return add_reference(x, e);
-    case REFERENCE_NAME: return add_texts(x, i, 0, &h->reference_name, 1, e);
+    case REFERENCE_NAME: return add_texts(x, i, 0, &h->body.reference_name, 1, e);
     case ROOTS: return add_doubles(x, i, 2, roots, &x->roots, e);
     case SELECTED: return add_indices(x, i, 1, &selected, h->selected, h->nselected, e);
     case TIMES: return add_doubles(x, i, 1, &frames, &x->times, e);

@@ -65,7 +65,7 @@ int vgi_mesh_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     const unsigned char *sizes = take_array(&c, nf, 4);
     if (c.bad) return wrong(p, "it is shorter than its counts say", e);
     if (nv >= UINT32_MAX || nf >= UINT32_MAX) return wrong(p, "more than 2^32 - 2 vertices or faces", e);
-    vg_mesh *m = &h->mesh;
+    vg_mesh *m = &h->body.mesh;
     m->start = vgi_array_raw((size_t)nf + 1, sizeof *m->start, e);
     if (!m->start) return VG_ENOMEM;
     m->start[0] = 0;
@@ -85,7 +85,7 @@ int vgi_mesh_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 
 int vgi_mesh_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
-    const vg_mesh *m = &h->mesh;
+    const vg_mesh *m = &h->body.mesh;
     int r = put64(b, m->nv, e);
     if (r == VG_OK) r = put64(b, m->nf, e);
     if (r == VG_OK) r = vgi_bytes_reserve(b, b->size + 4 * (m->nf + vg_mesh_corners(m)), e);
@@ -98,8 +98,8 @@ int vgi_mesh_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 int vgi_texc_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 {
     cursor c = start(p);
-    vg_attributes *a = &h->attributes;
-    size_t corners = vg_mesh_corners(&h->mesh);
+    vg_attributes *a = &h->body.attributes;
+    size_t corners = vg_mesh_corners(&h->body.mesh);
     uint32_t dim = take32(&c), zero = take32(&c);
     uint64_t nt = take64(&c);
     if (c.bad || dim < 1 || dim > 3 || zero) return wrong(p, "a texture coordinate must have 1 to 3 numbers", e);
@@ -121,25 +121,25 @@ int vgi_texc_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 
 int vgi_texc_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
-    const vg_attributes *a = &h->attributes;
+    const vg_attributes *a = &h->body.attributes;
     int r = put32(b, a->tex_dim, e);
     if (r == VG_OK) r = put32(b, 0, e);
     if (r == VG_OK) r = put64(b, a->ntex, e);
     if (r == VG_OK) r = put_doubles(b, a->tex, a->ntex * a->tex_dim, e);
-    return r < 0 ? r : vgi_indices_encode(b, a->corner_tex, vg_mesh_corners(&h->mesh), e);
+    return r < 0 ? r : vgi_indices_encode(b, a->corner_tex, vg_mesh_corners(&h->body.mesh), e);
 }
 
 int vgi_labl_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 {
     cursor c = start(p);
-    vg_attributes *a = &h->attributes;
+    vg_attributes *a = &h->body.attributes;
     size_t cap = 0;
     int r = VG_OK;
     while (r == VG_OK && left(&c)) {
         uint64_t face = take64(&c);
         uint32_t kind = take32(&c), n = take32(&c);
         if (c.bad) return wrong(p, "it ends inside a label", e);
-        if (face > h->mesh.nf || (a->nlabels && face < a->labels[a->nlabels - 1].face))
+        if (face > h->body.mesh.nf || (a->nlabels && face < a->labels[a->nlabels - 1].face))
             return wrong(p, "labels are not in the order of their faces", e);
         if (kind < VG_LABEL_OBJECT || kind > VG_LABEL_LIBRARY) return wrong(p, "a label is of unknown kind", e);
         char *text = take_text(&c, n, p, &r, e);
@@ -154,7 +154,7 @@ int vgi_labl_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 
 int vgi_labl_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
-    const vg_attributes *a = &h->attributes;
+    const vg_attributes *a = &h->body.attributes;
     int r = VG_OK;
     for (size_t i = 0; r == VG_OK && i < a->nlabels; i++) {
         r = put64(b, a->labels[i].face, e);
@@ -181,13 +181,13 @@ int vgi_sele_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 {
     h->has_selection = true;
     int r = decode_indices(p, 1, &h->selected, &h->nselected, e);
-    return r < 0 ? r : check_ascending(p, h->selected, h->nselected, h->mesh.nf, e);
+    return r < 0 ? r : check_ascending(p, h->selected, h->nselected, h->body.mesh.nf, e);
 }
 
 int vgi_anch_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 {
     int r = decode_indices(p, 1, &h->anchors, &h->nanchors, e);
-    return r < 0 ? r : check_ascending(p, h->anchors, h->nanchors, h->mesh.nv, e);
+    return r < 0 ? r : check_ascending(p, h->anchors, h->nanchors, h->body.mesh.nv, e);
 }
 
 int vgi_link_decode(const vgi_payload *p, vg_head *h, vg_err *e)
@@ -196,7 +196,7 @@ int vgi_link_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     int r = decode_indices(p, 2, &h->links, &h->nlinks, e);
     for (size_t i = 0; r == VG_OK && i < h->nlinks; i++) {
         uint32_t a = h->links[2 * i], b = h->links[2 * i + 1];
-        if (a >= h->mesh.nv || b >= h->mesh.nv) return wrong(p, "an index is out of range", e);
+        if (a >= h->body.mesh.nv || b >= h->body.mesh.nv) return wrong(p, "an index is out of range", e);
         if (a == b) return wrong(p, "a link joins a vertex to itself", e);
     }
     return r;
@@ -234,32 +234,32 @@ int vgi_refp_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     int r = VG_OK;
     uint32_t n = take32(&c), zero = take32(&c);
     if (c.bad || zero) return wrong(p, "it is too short, or reserved bytes are not zero", e);
-    if (!(h->reference_name = take_text(&c, n, p, &r, e))) return r;
+    if (!(h->body.reference_name = take_text(&c, n, p, &r, e))) return r;
     if (!take_padding(&c, -n & 7)) return wrong(p, "padding is missing or not zero", e);
-    const unsigned char *xyz = take_array(&c, 3 * (uint64_t)h->mesh.nv, 8);
+    const unsigned char *xyz = take_array(&c, 3 * (uint64_t)h->body.mesh.nv, 8);
     if (c.bad || left(&c)) return wrong(p, "its length does not fit the number of vertices", e);
-    h->reference = vgi_array_raw(3 * h->mesh.nv, sizeof *h->reference, e);
-    if (!h->reference) return VG_ENOMEM;
-    copy_doubles(h->reference, xyz, 3 * h->mesh.nv);
-    return vgi_finite(h->reference, 3 * h->mesh.nv) ? VG_OK : wrong(p, "a position is not finite", e);
+    h->body.reference = vgi_array_raw(3 * h->body.mesh.nv, sizeof *h->body.reference, e);
+    if (!h->body.reference) return VG_ENOMEM;
+    copy_doubles(h->body.reference, xyz, 3 * h->body.mesh.nv);
+    return vgi_finite(h->body.reference, 3 * h->body.mesh.nv) ? VG_OK : wrong(p, "a position is not finite", e);
 }
 
 int vgi_refp_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
-    const char *name = h->reference_name ? h->reference_name : "";
-    if (!vgi_finite(h->reference, 3 * h->mesh.nv))
+    const char *name = h->body.reference_name ? h->body.reference_name : "";
+    if (!vgi_finite(h->body.reference, 3 * h->body.mesh.nv))
         return vg_fail(e, VG_EINPUT, "the reference pose holds a number that is not finite");
     int r = put32(b, (uint32_t)strlen(name), e);
     if (r == VG_OK) r = put32(b, 0, e);
     if (r == VG_OK) r = vgi_bytes_append(b, name, strlen(name), e);
     if (r == VG_OK) r = put_padding(b, 0, e);
-    return r < 0 ? r : put_doubles(b, h->reference, 3 * h->mesh.nv, e);
+    return r < 0 ? r : put_doubles(b, h->body.reference, 3 * h->body.mesh.nv, e);
 }
 
 /* Elements that a frame of this kind must have on h's mesh, selection and links. */
 static size_t graph_count(const vg_head *h, vg_kind kind)
 {
-    const vg_mesh *m = &h->mesh;
+    const vg_mesh *m = &h->body.mesh;
     if (kind == VG_VERTICES) return m->nv;
     if (!h->has_selection) return vg_mesh_corners(m) + 2 * h->nlinks;
     size_t corners = 2 * h->nlinks;
@@ -272,10 +272,10 @@ static const char *refuse_form(const vg_head *h)
 {
     if (h->map.ncorners && h->map.ncorners != graph_count(h, VG_VECTORS))
         return "the corners of record MAP do not fit the mesh";
-    if (h->map.n && h->map.kind == VG_MAP_PATCHES && h->map.n != h->patches.n)
+    if (h->map.n && h->map.kind == VG_MAP_PATCHES && h->map.n != h->body.patches.n)
         return "record MAP has not as many patches as record PTCH";
     if (h->kind == VG_TRANSFORMS) return NULL;
-    if (!h->reference) return "a MESH and a REFP record must come before it";
+    if (!h->body.reference) return "a MESH and a REFP record must come before it";
     if (h->kind != VG_VERTICES && !h->has_links) return "a LINK record must come before it";
     return h->count != graph_count(h, h->kind) ? "its count does not fit the mesh" : NULL;
 }
@@ -388,13 +388,13 @@ static int take_pins(cursor *c, vg_frame *f, const vg_head *h, const vgi_payload
     if (r < 0) return r;
     copy32(f->pins, pins, n);
     f->npins = n;
-    return check_ascending(p, f->pins, n, h->mesh.nv, e);
+    return check_ascending(p, f->pins, n, h->body.mesh.nv, e);
 }
 
 /* Are these the vertices of a skeleton, whose joints can say how they have turned? */
 static bool may_turn(const vg_head *h)
 {
-    return h->kind == VG_VERTICES && h->skeleton.njoints > 0;
+    return h->kind == VG_VERTICES && h->body.skeleton.njoints > 0;
 }
 
 static int take_turns(cursor *c, vg_frame *f, size_t njoints, const vgi_payload *p, vg_err *e)
@@ -469,7 +469,7 @@ int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e)
             return wrong(&p, "its root or an anchor is not finite", e);
     }
     if (flags & HAS_PINS && (r = take_pins(&c, f, h, &p, e)) < 0) return r;
-    if (flags & HAS_TURNS && (r = take_turns(&c, f, h->skeleton.njoints, &p, e)) < 0) return r;
+    if (flags & HAS_TURNS && (r = take_turns(&c, f, h->body.skeleton.njoints, &p, e)) < 0) return r;
     if ((r = take_values(&c, f, h, &p, e)) < 0) return r;
     if (!vgi_finite(f->values, h->count * vg_kind_width(h->kind))) return wrong(&p, "a value is not finite", e);
     return has_zero_quaternion(h, f->values) ? wrong(&p, "a quaternion is zero", e) : VG_OK;
@@ -478,7 +478,7 @@ int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e)
 /* Turns of other joints than the head's are those of a skeleton that was replaced: they are left out. */
 static bool has_turns(const vg_head *h, const vg_frame *f)
 {
-    return may_turn(h) && f->nturns == h->skeleton.njoints;
+    return may_turn(h) && f->nturns == h->body.skeleton.njoints;
 }
 
 /* What a reader would refuse is not written. The values' own finiteness is vg_writer_put's to check. */

@@ -45,9 +45,10 @@ static int take_joints(cursor *c, const vgi_payload *p, vg_skeleton *s, uint64_t
 int vgi_skel_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 {
     cursor c = start(p);
-    int r = take_joints(&c, p, &h->skeleton, UINT64_MAX, e);
+    int r = take_joints(&c, p, &h->body.skeleton, UINT64_MAX, e);
     if (r < 0) return r;
-    return h->skeleton.njoints == h->mesh.nv ? VG_OK : wrong(p, "it does not have one joint for each vertex", e);
+    return h->body.skeleton.njoints == h->body.mesh.nv ? VG_OK
+                                                       : wrong(p, "it does not have one joint for each vertex", e);
 }
 
 static int encode_joints(vg_bytes *b, const vg_skeleton *s, vg_err *e)
@@ -69,7 +70,7 @@ static int encode_joints(vg_bytes *b, const vg_skeleton *s, vg_err *e)
 
 int vgi_skel_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
-    return encode_joints(b, &h->skeleton, e);
+    return encode_joints(b, &h->body.skeleton, e);
 }
 
 /* ---- RIG ---- */
@@ -127,19 +128,19 @@ int vgi_rig_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 {
     cursor c = start(p);
     vg_skeleton s = {0};
-    int r = take_posed(&c, p, &s, &h->rig, e);
+    int r = take_posed(&c, p, &s, &h->body.rig, e);
     vg_skeleton_clear(&s);
     if (r < 0) return r;
     uint32_t skin = take32(&c), zero = take32(&c);
     if (c.bad || skin > 1 || zero) return wrong(p, "it is too short, or reserved bytes are not zero", e);
-    if (skin && (r = take_skin(&c, p, &h->rig, h->mesh.nv, e)) < 0) return r;
+    if (skin && (r = take_skin(&c, p, &h->body.rig, h->body.mesh.nv, e)) < 0) return r;
     return left(&c) ? wrong(p, "bytes are left over", e) : VG_OK;
 }
 
 int vgi_rig_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
-    const vg_rig *g = &h->rig;
-    size_t n = g->skeleton.njoints, nv = h->mesh.nv;
+    const vg_rig *g = &h->body.rig;
+    size_t n = g->skeleton.njoints, nv = h->body.mesh.nv;
     int r = put64(b, n, e);
     if (r == VG_OK) r = encode_joints(b, &g->skeleton, e);
     if (r == VG_OK) r = put_doubles(b, g->at, 3 * n, e);
@@ -157,24 +158,24 @@ int vgi_ptch_decode(const vgi_payload *p, vg_head *h, vg_err *e)
 {
     cursor c = start(p);
     uint64_t n = take64(&c);
-    size_t nf = h->mesh.nf;
+    size_t nf = h->body.mesh.nf;
     const unsigned char *of_face = take_array(&c, nf, 4);
     if (c.bad || !take_padding(&c, nf % 2 * 4) || left(&c))
         return wrong(p, "its length does not fit the number of faces", e);
     if (n == 0 || n > UINT32_MAX) return wrong(p, "its count is out of range", e);
-    h->patches.of_face = vgi_array_raw(nf, sizeof *h->patches.of_face, e);
-    if (!h->patches.of_face) return VG_ENOMEM;
-    h->patches.n = (size_t)n;
-    copy32(h->patches.of_face, of_face, nf);
+    h->body.patches.of_face = vgi_array_raw(nf, sizeof *h->body.patches.of_face, e);
+    if (!h->body.patches.of_face) return VG_ENOMEM;
+    h->body.patches.n = (size_t)n;
+    copy32(h->body.patches.of_face, of_face, nf);
     for (size_t f = 0; f < nf; f++)
-        if (h->patches.of_face[f] >= n) return wrong(p, "a face is in a patch that is not there", e);
+        if (h->body.patches.of_face[f] >= n) return wrong(p, "a face is in a patch that is not there", e);
     return VG_OK;
 }
 
 int vgi_ptch_encode(vg_bytes *b, const vg_head *h, vg_err *e)
 {
-    int r = put64(b, h->patches.n, e);
-    if (r == VG_OK) r = vgi_indices_encode(b, h->patches.of_face, h->mesh.nf, e);
+    int r = put64(b, h->body.patches.n, e);
+    if (r == VG_OK) r = vgi_indices_encode(b, h->body.patches.of_face, h->body.mesh.nf, e);
     return r < 0 ? r : put_padding(b, 0, e);
 }
 
@@ -270,7 +271,7 @@ int vgi_map_decode(const vgi_payload *p, vg_head *h, vg_err *e)
     double size = take_double(&c);
     if (c.bad || n == 0 || n >= UINT32_MAX || joints >= UINT32_MAX || corners >= UINT32_MAX || held > nv)
         return wrong(p, "its counts are out of range", e);
-    if (nv != h->mesh.nv) return wrong(p, "its count does not fit the mesh", e);
+    if (nv != h->body.mesh.nv) return wrong(p, "its count does not fit the mesh", e);
     if (kind != VG_MAP_PATCHES && kind != VG_MAP_BONES) return wrong(p, "it is driven by something unknown", e);
     if ((flags & ~HAS_HOME) || (names && names != n))
         return wrong(p, "unknown flags are set, or names are missing", e);
@@ -285,7 +286,7 @@ int vgi_map_decode(const vgi_payload *p, vg_head *h, vg_err *e)
                   .ncorners = (size_t)corners,
                   .per_corner = per_corner,
                   .nheld = (size_t)held};
-    int r = check_bones(p, m, &h->rig, e);
+    int r = check_bones(p, m, &h->body.rig, e);
     if (r == VG_OK) r = take_map_arrays(&c, m, p, e);
     if (r == VG_OK) r = check_map(p, m, e);
     if (r == VG_OK) r = take_map_names(&c, m, names, p, e);

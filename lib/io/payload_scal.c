@@ -14,7 +14,7 @@ static const char *peek_text(cursor *c, size_t n)
 /* Nothing is made that the bytes do not back: the numbers are there before the frame gets room for them. */
 int vgi_scal_decode(const vgi_payload *p, const vg_head *h, vg_frame *f, vg_err *e)
 {
-    size_t nv = h->mesh.nv;
+    size_t nv = h->body.mesh.nv;
     cursor c = start(p);
     if (h->kind != VG_VERTICES) return wrong(p, "frames are no vertices", e);
     if (f->has_scalars) return wrong(p, "the frame has another one", e);

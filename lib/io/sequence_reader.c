@@ -24,7 +24,7 @@ int vgi_play_open(vgi_playing *p, const vgi_sequence_format *format, vgi_input *
     if (!subject || !stem) return VG_ENOMEM;
     p->format = format;
     int r = format->open(&p->state, h, in, subject, e);
-    return r == VG_OK && h->mesh.nf ? vg_mesh_check(&h->mesh, subject, e) : r;
+    return r == VG_OK && h->body.mesh.nf ? vg_mesh_check(&h->body.mesh, subject, e) : r;
 }
 
 /* ---- faces ---- */
@@ -49,7 +49,7 @@ static int find_beside(const char *file, const char *suffix, char **path, vg_err
 
 int vgi_different_count(const vg_head *h, const char *subject, size_t nv, const char *mesh, vg_err *e)
 {
-    return vg_fail(e, VG_EINPUT, "%s has %zu points where %s has %zu vertices", subject, h->mesh.nv, mesh, nv);
+    return vg_fail(e, VG_EINPUT, "%s has %zu points where %s has %zu vertices", subject, h->body.mesh.nv, mesh, nv);
 }
 
 static int borrow_mesh(const vgi_playing *p, vg_head *h, const char *path, vg_err *e)
@@ -57,17 +57,17 @@ static int borrow_mesh(const vgi_playing *p, vg_head *h, const char *path, vg_er
     vg_head from = {0};
     char subject[VGI_SUBJECT];
     int r = vg_load_mesh(&from, path, e);
-    if (r == VG_OK && from.mesh.nv != h->mesh.nv)
-        r = vgi_different_count(h, p->subject, from.mesh.nv, vgi_quote(path, subject), e);
+    if (r == VG_OK && from.body.mesh.nv != h->body.mesh.nv)
+        r = vgi_different_count(h, p->subject, from.body.mesh.nv, vgi_quote(path, subject), e);
     if (r == VG_OK) {
-        vg_mesh_clear(&h->mesh);
-        vg_attributes_clear(&h->attributes);
-        h->mesh = from.mesh, h->attributes = from.attributes;
-        from.mesh = (vg_mesh){0}, from.attributes = (vg_attributes){0};
-        if (!h->reference) {
-            free(h->reference_name);
-            h->reference = from.reference, h->reference_name = from.reference_name;
-            from.reference = NULL, from.reference_name = NULL;
+        vg_mesh_clear(&h->body.mesh);
+        vg_attributes_clear(&h->body.attributes);
+        h->body.mesh = from.body.mesh, h->body.attributes = from.body.attributes;
+        from.body.mesh = (vg_mesh){0}, from.body.attributes = (vg_attributes){0};
+        if (!h->body.reference) {
+            free(h->body.reference_name);
+            h->body.reference = from.body.reference, h->body.reference_name = from.body.reference_name;
+            from.body.reference = NULL, from.body.reference_name = NULL;
         }
     }
     vg_head_clear(&from);

@@ -168,8 +168,8 @@ static int keep_mesh(const vg_sink *s, vg_err *e)
 {
     vg_head there = {0};
     int r = vg_load_mesh(&there, s->mesh, NULL);
-    bool same = r == VG_OK && vg_mesh_same(&there.mesh, "", &s->head->mesh, "", NULL) == VG_OK &&
-                same_singles(there.reference, s->head->reference, 3 * there.mesh.nv);
+    bool same = r == VG_OK && vg_mesh_same(&there.body.mesh, "", &s->head->body.mesh, "", NULL) == VG_OK &&
+                same_singles(there.body.reference, s->head->body.reference, 3 * there.body.mesh.nv);
     vg_head_clear(&there);
     if (same) return VG_OK;
     return vg_fail(e, VG_EARG,
@@ -199,8 +199,8 @@ static int put_mesh(vg_sink *s, const vg_sink_options *o, vg_err *e)
     if (!o->mesh && stat(s->mesh, &st) == 0) return keep_mesh(s, e);
     vg_bytes text = {0};
     int fd = -1;
-    r = vg_model_write(&text, s->mesh_format->name, &s->head->mesh, s->head->reference, &s->head->attributes,
-                       s->full_precision, e);
+    r = vg_model_write(&text, s->mesh_format->name, &s->head->body.mesh, s->head->body.reference,
+                       &s->head->body.attributes, s->full_precision, e);
     if (r == VG_OK) r = fd = vgi_targets_open(&s->targets, s->mesh, e);
     if (r >= 0) r = write_and_close(fd, &text, s->mesh, e);
     vg_bytes_clear(&text);
@@ -215,7 +215,7 @@ static int drop_loose(vg_sink *s, bool drop, vg_err *e)
         return drop ? vg_fail(e, VG_EARG, "--drop-loose is for vertices: the input holds %s",
                               vg_kind_name(s->head->kind))
                     : VG_OK;
-    if (!drop) return vgi_count_loose(&s->head->mesh, &s->loose, e);
+    if (!drop) return vgi_count_loose(&s->head->body.mesh, &s->loose, e);
     int r = vgi_slim_make(&s->slim, s->head, e);
     if (r == VG_OK && s->slim.kept) s->head = &s->slim.head;
     return r;
@@ -253,13 +253,13 @@ static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
     const struct {
         bool lost;
         const char *what;
-    } all[] = {{!faces && h->mesh.nf, "the faces"},
-               {triangles && has_faces_of(&h->mesh, 4, SIZE_MAX), "polygons, which became triangles"},
-               {triangles && has_faces_of(&h->mesh, 2, 2), "line segments"},
+    } all[] = {{!faces && h->body.mesh.nf, "the faces"},
+               {triangles && has_faces_of(&h->body.mesh, 4, SIZE_MAX), "polygons, which became triangles"},
+               {triangles && has_faces_of(&h->body.mesh, 2, 2), "line segments"},
                {!(keeps & VGI_KEEPS_ORDER), "the numbers of the vertices, and those in no face"},
-               {!(keeps & VGI_KEEPS_TEXTURE) && h->attributes.ntex, "texture coordinates"},
-               {!(keeps & VGI_KEEPS_LABELS) && h->attributes.nlabels, "groups and materials"},
-               {!(keeps & VGI_KEEPS_SKELETON) && h->skeleton.njoints, "the skeleton"},
+               {!(keeps & VGI_KEEPS_TEXTURE) && h->body.attributes.ntex, "texture coordinates"},
+               {!(keeps & VGI_KEEPS_LABELS) && h->body.attributes.nlabels, "groups and materials"},
+               {!(keeps & VGI_KEEPS_SKELETON) && h->body.skeleton.njoints, "the skeleton"},
                {f && !(keeps & VGI_KEEPS_NAMES) && s->names_lost && s->frames > 1, "the names of the frames"},
                {f && !(keeps & VGI_KEEPS_TIMES) && s->times_lost, "the times of the frames"},
                {*s->scalars_lost, scalars}};
@@ -289,7 +289,8 @@ static int warn_of_losses(vg_sink *s, vg_err *e)
 static int warn_of_loose(vg_sink *s, vg_err *e)
 {
     char text[160];
-    if (!vgi_plan_lacks_faces(&s->plan) || s->plan.sequence->bare || !s->loose || s->head->mesh.nf == 0) return VG_OK;
+    if (!vgi_plan_lacks_faces(&s->plan) || s->plan.sequence->bare || !s->loose || s->head->body.mesh.nf == 0)
+        return VG_OK;
     int n = snprintf(text, sizeof text,
                      "%zu vertices are in no face: programs that drop them from the mesh, as Blender "
                      "does, then refuse the cache (--drop-loose)",
@@ -362,7 +363,12 @@ static int put_into_sequence(vg_sink *s, const vg_frame *f, vg_err *e)
 static vgi_writing writing_of(const vg_sink *s, const double *values)
 {
     const vg_head *h = s->head;
-    return (vgi_writing){&h->mesh, values, h->reference, &h->attributes, s->full_precision, &h->patches,
+    return (vgi_writing){&h->body.mesh,
+                         values,
+                         h->body.reference,
+                         &h->body.attributes,
+                         s->full_precision,
+                         &h->body.patches,
                          s->rest.size ? &s->rest : NULL};
 }
 
@@ -403,7 +409,7 @@ static int start_belt(vg_sink *s, const vg_frame *first, vg_err *e)
 {
     int r = make_rest(s, first, e), threads = s->options.threads;
     if (r < 0) return r;
-    size_t nv = s->head->mesh.nv, n = threads > 1 ? (size_t)threads + 1 : 1;
+    size_t nv = s->head->body.mesh.nv, n = threads > 1 ? (size_t)threads + 1 : 1;
     size_t room = MOST_WAITING / ((3 * sizeof(double) + TEXT_OF_VERTEX) * (nv + 1) + s->rest.size);
     if (n > 2 && n > room) n = room < 2 ? 2 : room;
     if (!(s->pieces = vgi_array(n, sizeof *s->pieces, e))) return VG_ENOMEM;
@@ -443,7 +449,7 @@ static int put_piece(vg_sink *s, const vg_frame *f, const char *name, vg_err *e)
     piece *p = &s->pieces[vgi_belt_place(s->belt)];
     free(p->name);
     if (!(p->name = vgi_copy_string(name, strlen(name), e))) return VG_ENOMEM;
-    memcpy(p->values, f->values, 3 * s->head->mesh.nv * sizeof *p->values);
+    memcpy(p->values, f->values, 3 * s->head->body.mesh.nv * sizeof *p->values);
     if ((r = place_piece(s, p, e)) < 0) return r;
     vgi_belt_put(s->belt);
     return vgi_belt_full(s->belt) ? finish_oldest(s, e) : VG_OK;

@@ -279,9 +279,9 @@ static int open_skeleton(void **state, vg_head *h, vgi_input *in, const char *su
     vgi_lines t = vgi_lines_of(b->text.data, b->text.size, subject);
     if ((r = take_entries(&b->bones, &t, -1, e)) < 0 || (r = make_skeleton(b, e)) < 0) return r;
     size_t n = b->skeleton.njoints;
-    r = vg_skeleton_mesh(&b->skeleton, &h->mesh, e);
-    if (r == VG_OK) r = vg_skeleton_copy(&h->skeleton, &b->skeleton, e);
-    if (r == VG_OK && !(h->reference = vgi_copy_array(b->places, n, 3 * sizeof *b->places, e))) r = VG_ENOMEM;
+    r = vg_skeleton_mesh(&b->skeleton, &h->body.mesh, e);
+    if (r == VG_OK) r = vg_skeleton_copy(&h->body.skeleton, &b->skeleton, e);
+    if (r == VG_OK && !(h->body.reference = vgi_copy_array(b->places, n, 3 * sizeof *b->places, e))) r = VG_ENOMEM;
     h->kind = VG_VERTICES, h->precision = VG_F64, h->count = n;
     return r;
 }

@@ -34,21 +34,21 @@ static void close_up(vgi_slim *s, const vg_head *h, const bool *attached, uint32
 {
     vg_head *to = &s->head;
     size_t n = 0;
-    for (size_t v = 0; v < h->mesh.nv; v++) {
+    for (size_t v = 0; v < h->body.mesh.nv; v++) {
         if (!attached[v]) continue;
-        memcpy(to->reference + 3 * n, h->reference + 3 * v, 3 * sizeof *to->reference);
+        memcpy(to->body.reference + 3 * n, h->body.reference + 3 * v, 3 * sizeof *to->body.reference);
         s->kept[n] = (uint32_t)v;
         number[v] = (uint32_t)n++;
     }
-    for (size_t c = 0; c < vg_mesh_corners(&h->mesh); c++) to->mesh.vert[c] = number[h->mesh.vert[c]];
-    to->mesh.nv = to->count = n;
-    vg_skeleton_clear(&to->skeleton); /* its joints are vertices */
+    for (size_t c = 0; c < vg_mesh_corners(&h->body.mesh); c++) to->body.mesh.vert[c] = number[h->body.mesh.vert[c]];
+    to->body.mesh.nv = to->count = n;
+    vg_skeleton_clear(&to->body.skeleton); /* its joints are vertices */
 }
 
 int vgi_slim_make(vgi_slim *s, const vg_head *h, vg_err *e)
 {
-    size_t nv = h->mesh.nv;
-    bool *attached = find_attached(&h->mesh, e);
+    size_t nv = h->body.mesh.nv;
+    bool *attached = find_attached(&h->body.mesh, e);
     size_t kept = attached ? count(attached, nv) : 0;
     uint32_t *number = NULL;
     int r = attached ? VG_OK : VG_ENOMEM;

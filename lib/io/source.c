@@ -186,7 +186,7 @@ static char *pose_of(const char *path, vg_err *e)
 /* The mesh that every further pose must have. */
 static int settle_mesh(vg_source *s, const vg_mesh *mesh, const char *archive, const char *path, vg_err *e)
 {
-    int r = vg_mesh_copy(&s->own.mesh, mesh, e);
+    int r = vg_mesh_copy(&s->own.body.mesh, mesh, e);
     if (r < 0) return r;
     free(s->own_name);
     s->own.kind = s->head.kind = VG_VERTICES;
@@ -198,9 +198,10 @@ static int settle_mesh(vg_source *s, const vg_mesh *mesh, const char *archive, c
 /* The skeleton that files of joints by name are about, when the mesh is one. */
 static int keep_skeleton(vg_source *s, const vg_head *h, vg_err *e)
 {
-    if (!h->skeleton.njoints) return VG_OK;
-    int r = vg_skeleton_copy(&s->own.skeleton, &h->skeleton, e);
-    if (r == VG_OK && !(s->own.reference = vgi_copy_array(h->reference, 3 * h->mesh.nv, sizeof *h->reference, e)))
+    if (!h->body.skeleton.njoints) return VG_OK;
+    int r = vg_skeleton_copy(&s->own.body.skeleton, &h->body.skeleton, e);
+    if (r == VG_OK && !(s->own.body.reference =
+                            vgi_copy_array(h->body.reference, 3 * h->body.mesh.nv, sizeof *h->body.reference, e)))
         r = VG_ENOMEM;
     return r;
 }
@@ -213,7 +214,7 @@ static int join_head(vg_source *s, const item *it, const vg_head *h, vg_err *e)
                        item_name(it), vg_kind_name(h->kind));
     if (s->own_name || it != s->items) return vg_head_merge_trace(&s->head, h, e);
     int r = vg_head_copy(&s->head, h, e);
-    if (r == VG_OK) r = settle_mesh(s, &h->mesh, NULL, item_name(it), e);
+    if (r == VG_OK) r = settle_mesh(s, &h->body.mesh, NULL, item_name(it), e);
     return r < 0 ? r : keep_skeleton(s, h, e);
 }
 
@@ -275,19 +276,19 @@ static int take_over_model(vg_source *s, pose *p, vg_err *e)
     if (m->degenerate)
         snprintf(s->warning, sizeof s->warning, "%s: left out %zu triangles of which two corners are at one place",
                  s->own_name, m->degenerate);
-    s->head.mesh = m->mesh;
-    s->head.attributes = m->attributes;
+    s->head.body.mesh = m->mesh;
+    s->head.body.attributes = m->attributes;
     m->mesh = (vg_mesh){0};
     m->attributes = (vg_attributes){0};
-    s->head.reference = vgi_copy_array(m->vertices, 3 * s->own.count, sizeof(double), e);
-    s->head.reference_name = vgi_copy_string(p->name, strlen(p->name), e);
-    return s->head.reference && s->head.reference_name ? VG_OK : VG_ENOMEM;
+    s->head.body.reference = vgi_copy_array(m->vertices, 3 * s->own.count, sizeof(double), e);
+    s->head.body.reference_name = vgi_copy_string(p->name, strlen(p->name), e);
+    return s->head.body.reference && s->head.body.reference_name ? VG_OK : VG_ENOMEM;
 }
 
 /* Does what comes next have the faces of what came before? */
 static int check_joins(const vg_source *s, const vg_mesh *next, const char *subject, vg_err *e)
 {
-    int r = vg_mesh_same(&s->own.mesh, s->own_name, next, subject, e);
+    int r = vg_mesh_same(&s->own.body.mesh, s->own_name, next, subject, e);
     size_t n = r < 0 && e ? strlen(e->message) : 0;
     if (n)
         snprintf(e->message + n, sizeof e->message - n, ": all poses of a sequence have the same vertices and faces");
@@ -401,7 +402,7 @@ static int open_stream(vg_source *s, item *it, vg_err *e)
     const vg_head *h = vg_reader_head(s->reader);
     char *subject = subject_of(NULL, item_name(it), e);
     if (!subject) return VG_ENOMEM;
-    r = s->own_name ? check_joins(s, &h->mesh, subject, e) : VG_OK;
+    r = s->own_name ? check_joins(s, &h->body.mesh, subject, e) : VG_OK;
     free(subject);
     return r;
 }
@@ -415,9 +416,9 @@ static int reference_from_first(vg_source *s, vg_err *e)
     const vg_frame *first = NULL;
     int r = vgi_play_first(&s->playing, &s->own, &first, e);
     if (r < 0) return r;
-    h->reference = vgi_copy_array(first->values, 3 * h->mesh.nv, sizeof(double), e);
-    h->reference_name = vgi_copy_string(first->name, strlen(first->name), e);
-    return h->reference && h->reference_name ? VG_OK : VG_ENOMEM;
+    h->body.reference = vgi_copy_array(first->values, 3 * h->body.mesh.nv, sizeof(double), e);
+    h->body.reference_name = vgi_copy_string(first->name, strlen(first->name), e);
+    return h->body.reference && h->body.reference_name ? VG_OK : VG_ENOMEM;
 }
 
 /* The sequence brings the mesh: its head becomes that of the source. */
@@ -433,7 +434,7 @@ static int take_over_head(vg_source *s, const char *archive, const char *path, v
     int r = p->format->keeps & VGI_KEEPS_FACES
                 ? VG_OK
                 : vgi_play_borrow_faces(p, path == standard_input ? NULL : path, h, e);
-    if (r == VG_OK) r = settle_mesh(s, &h->mesh, archive, path, e);
+    if (r == VG_OK) r = settle_mesh(s, &h->body.mesh, archive, path, e);
     if (r < 0) return r;
     vg_head_clear(&s->head);
     s->head = *h;
@@ -443,10 +444,10 @@ static int take_over_head(vg_source *s, const char *archive, const char *path, v
         !(s->own.anchors = vgi_copy_array(s->head.anchors, s->head.nanchors, sizeof *s->head.anchors, e)))
         return VG_ENOMEM;
     s->own.nanchors = s->head.nanchors;
-    if (s->head.reference && (r = keep_skeleton(s, &s->head, e)) < 0) return r;
-    if (!s->head.reference) return reference_from_first(s, e);
-    if (!s->head.reference_name) s->head.reference_name = vgi_copy_string(p->stem, strlen(p->stem), e);
-    return s->head.reference_name ? VG_OK : VG_ENOMEM;
+    if (s->head.body.reference && (r = keep_skeleton(s, &s->head, e)) < 0) return r;
+    if (!s->head.body.reference) return reference_from_first(s, e);
+    if (!s->head.body.reference_name) s->head.body.reference_name = vgi_copy_string(p->stem, strlen(p->stem), e);
+    return s->head.body.reference_name ? VG_OK : VG_ENOMEM;
 }
 
 static int join_sequence(const vg_source *s, const vg_head *h, vg_err *e)
@@ -456,8 +457,10 @@ static int join_sequence(const vg_source *s, const vg_head *h, vg_err *e)
     if (h->kind != VG_VERTICES)
         return vg_fail(e, VG_EINPUT, "%s holds %s: only vertices can be joined with a mesh or other inputs", subject,
                        vg_kind_name(h->kind));
-    if (h->mesh.nf) return check_joins(s, &h->mesh, subject, e);
-    return h->mesh.nv == s->own.mesh.nv ? VG_OK : vgi_different_count(h, subject, s->own.mesh.nv, s->own_name, e);
+    if (h->body.mesh.nf) return check_joins(s, &h->body.mesh, subject, e);
+    return h->body.mesh.nv == s->own.body.mesh.nv
+               ? VG_OK
+               : vgi_different_count(h, subject, s->own.body.mesh.nv, s->own_name, e);
 }
 
 /* Start on a sequence whose bytes are `in`, which is taken over: a file, or a member of an archive. */
@@ -467,7 +470,7 @@ static int play(vg_source *s, const vgi_sequence_format *format, vgi_input *in, 
     vgi_playing *p = &s->playing;
     vg_head h = {0};
     int r = vgi_play_open(p, format, in, subject_of(archive, path, e), pose_of(path, e), &h, e);
-    if (r == VG_OK && format->join && !s->own.skeleton.njoints)
+    if (r == VG_OK && format->join && !s->own.body.skeleton.njoints)
         r = vg_fail(e, VG_EINPUT, "%s holds joints by name: name the file of their skeleton with --mesh", p->subject);
     if (r == VG_OK) r = s->own_name ? join_sequence(s, &h, e) : take_over_head(s, archive, path, &h, e);
     vg_head_clear(&h);
@@ -525,15 +528,16 @@ static int settle_named_mesh(vg_source *s, const char *mesh, vg_err *e)
 {
     vg_head from;
     int r = vg_load_mesh(&from, mesh, e);
-    if (r == VG_OK) r = settle_mesh(s, &from.mesh, NULL, mesh, e);
+    if (r == VG_OK) r = settle_mesh(s, &from.body.mesh, NULL, mesh, e);
     if (r == VG_OK) r = keep_skeleton(s, &from, e);
     if (r == VG_OK) r = vg_head_merge_trace(&s->head, &from, e);
     if (r == VG_OK) {
-        s->head.mesh = from.mesh, s->head.attributes = from.attributes, s->head.skeleton = from.skeleton;
-        from.skeleton = (vg_skeleton){0};
-        s->head.reference = from.reference, s->head.reference_name = from.reference_name;
-        from.mesh = (vg_mesh){0}, from.attributes = (vg_attributes){0};
-        from.reference = NULL, from.reference_name = NULL;
+        s->head.body.mesh = from.body.mesh, s->head.body.attributes = from.body.attributes,
+        s->head.body.skeleton = from.body.skeleton;
+        from.body.skeleton = (vg_skeleton){0};
+        s->head.body.reference = from.body.reference, s->head.body.reference_name = from.body.reference_name;
+        from.body.mesh = (vg_mesh){0}, from.body.attributes = (vg_attributes){0};
+        from.body.reference = NULL, from.body.reference_name = NULL;
     }
     vg_head_clear(&from);
     return r;
@@ -681,7 +685,7 @@ int vg_load_mesh(vg_head *h, const char *operand, vg_err *e)
     int r = open_source(&s, &operand, 1, NULL, true, e);
     if (r < 0) return r;
     vg_head *from = vg_source_head(s);
-    if (from->mesh.nv == 0 || !from->reference) r = vg_fail(e, VG_EINPUT, "'%s' holds no mesh", operand);
+    if (from->body.mesh.nv == 0 || !from->body.reference) r = vg_fail(e, VG_EINPUT, "'%s' holds no mesh", operand);
     else if (s->through) r = vg_head_copy(h, from, e);
     else *h = *from, *from = (vg_head){0};
     vg_source_close(&s);

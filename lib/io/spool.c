@@ -93,7 +93,7 @@ static int measure(const vg_spool *s, const vg_frame *f, front *to, vg_err *e)
               add(&to->bytes, to->turns, 4 * sizeof *f->turns) && add(&to->bytes, s->anchors, sizeof(double)) &&
               add(&to->bytes, s->values, sizeof(double));
     if (f->has_scalars) {
-        to->scalars = s->h->mesh.nv;
+        to->scalars = s->h->body.mesh.nv;
         to->scalars_name = strlen(f->scalars_name) + 1, to->scalars_unit = strlen(f->scalars_unit) + 1;
         ok = ok && add(&to->bytes, to->scalars_name, 1) && add(&to->bytes, to->scalars_unit, 1) &&
              add(&to->bytes, to->scalars, sizeof(double));

@@ -47,9 +47,12 @@ struct vg_reader {
 
 static void remember_form(vg_reader *r)
 {
-    r->form = (vg_head){.kind = r->head.kind, .precision = r->head.precision, .count = r->head.count,
-                            .nanchors = r->head.nanchors, .mesh.nv = r->head.mesh.nv,
-                            .skeleton.njoints = r->head.skeleton.njoints};
+    r->form = (vg_head){.kind = r->head.kind,
+                        .precision = r->head.precision,
+                        .count = r->head.count,
+                        .nanchors = r->head.nanchors,
+                        .body.mesh.nv = r->head.body.mesh.nv,
+                        .body.skeleton.njoints = r->head.body.skeleton.njoints};
 }
 
 static int keep_unknown(vg_reader *r, vg_record *record, vg_records *list, vg_err *e)
@@ -113,9 +116,9 @@ static int read_head(vg_reader *r, vg_err *e)
     }
     vg_bytes_clear(&record.payload);
     if (ok < 0) return ok;
-    if (r->seen[MESH] && !r->head.reference)
+    if (r->seen[MESH] && !r->head.body.reference)
         return vg_fail(e, VG_EINPUT, "'%s' has a MESH but no REFP record before FORM", vgi_input_name(r->in));
-    if (!r->head.reference_name && !(r->head.reference_name = vgi_copy_string("", 0, e))) return VG_ENOMEM;
+    if (!r->head.body.reference_name && !(r->head.body.reference_name = vgi_copy_string("", 0, e))) return VG_ENOMEM;
     remember_form(r);
     return VG_OK;
 }
@@ -257,18 +260,18 @@ static int write_provenance(vg_writer *w, vg_err *e)
 static int write_head(vg_writer *w, vg_err *e)
 {
     const vg_head *h = w->head;
-    const bool mesh = h->reference != NULL;
+    const bool mesh = h->body.reference != NULL;
     const bool present[KNOWN] = {[MESH] = mesh,
-                                 [TEXC] = mesh && h->attributes.ntex > 0,
-                                 [LABL] = mesh && h->attributes.nlabels > 0,
+                                 [TEXC] = mesh && h->body.attributes.ntex > 0,
+                                 [LABL] = mesh && h->body.attributes.nlabels > 0,
                                  [SELE] = mesh && h->has_selection,
                                  [LINK] = mesh && h->has_links,
                                  [ANCH] = mesh && h->nanchors > 0,
                                  [REFP] = mesh,
-                                 [SKEL] = mesh && h->skeleton.njoints > 0,
+                                 [SKEL] = mesh && h->body.skeleton.njoints > 0,
                                  [CORR] = h->correspondence.first != NULL,
-                                 [PTCH] = mesh && h->patches.n > 0,
-                                 [RIG] = mesh && h->rig.skeleton.njoints > 0,
+                                 [PTCH] = mesh && h->body.patches.n > 0,
+                                 [RIG] = mesh && h->body.rig.skeleton.njoints > 0,
                                  [MAP] = mesh && h->map.n > 0,
                                  [FORM] = true};
     int r = vgi_record_begin_write(w->fd, w->name, e);
@@ -301,10 +304,11 @@ static int write_scalars(vg_writer *w, const vg_frame *f, vg_err *e)
     if (h->kind != VG_VERTICES || !f->has_scalars) return VG_OK;
     w->front.size = 0;
     int r = vgi_scal_encode(&w->front, f, e);
-    if (r == VG_OK && !vgi_finite(f->scalars, h->mesh.nv))
+    if (r == VG_OK && !vgi_finite(f->scalars, h->body.mesh.nv))
         r = vg_fail(e, VG_EINPUT, "a '%s' of frame '%s' is not finite", f->scalars_name, f->name ? f->name : "");
     if (r == VG_OK)
-        r = vgi_values_encode(&w->values, f->scalars, h->mesh.nv, h->precision, &parts[1].data, &parts[1].size, e);
+        r = vgi_values_encode(&w->values, f->scalars, h->body.mesh.nv, h->precision, &parts[1].data, &parts[1].size,
+                              e);
     if (r < 0) return r;
     parts[0] = (vgi_part){w->front.data, w->front.size};
     return vgi_record_write(w->fd, w->name, &w->tally, "SCAL", 0, parts, 2, e);

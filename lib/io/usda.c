@@ -75,7 +75,7 @@ static int put_integer(writing *x, uint64_t number, bool first, vg_err *e)
 /* A mesh of USD has faces of three and more. */
 static int put_faces(writing *x, vg_err *e)
 {
-    const vg_mesh *m = &x->h->mesh;
+    const vg_mesh *m = &x->h->body.mesh;
     bool first = true;
     int r = put_text(x, "    int[] faceVertexCounts = [", e);
     for (size_t f = 0; f < m->nf && r == VG_OK; f++) {

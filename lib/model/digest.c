@@ -67,15 +67,15 @@ int vg_digest_new(vg_digest **out, const vg_head *h, vg_err *e)
     XXH64_reset(&d->state, 0);
     mix_count(d, h->kind);
     mix_count(d, h->count);
-    mix_count(d, h->mesh.nv);
-    mix_count(d, h->mesh.nf);
-    for (size_t f = 0; f < h->mesh.nf; f++)
-        mix_indices(d, h->mesh.vert + h->mesh.start[f], h->mesh.start[f + 1] - h->mesh.start[f]);
+    mix_count(d, h->body.mesh.nv);
+    mix_count(d, h->body.mesh.nf);
+    for (size_t f = 0; f < h->body.mesh.nf; f++)
+        mix_indices(d, h->body.mesh.vert + h->body.mesh.start[f], h->body.mesh.start[f + 1] - h->body.mesh.start[f]);
     mix_count(d, h->has_selection);
     mix_indices(d, h->selected, h->has_selection ? h->nselected : 0);
     mix_indices(d, h->links, 2 * h->nlinks);
     mix_indices(d, h->anchors, h->nanchors);
-    if (h->reference) mix_doubles(d, h->reference, 3 * h->mesh.nv);
+    if (h->body.reference) mix_doubles(d, h->body.reference, 3 * h->body.mesh.nv);
     return VG_OK;
 }
 
@@ -95,7 +95,7 @@ void vg_digest_add(vg_digest *d, const vg_frame *f)
         mix_doubles(d, f->root, 3);
         mix_doubles(d, f->anchors, 3 * h->nanchors);
     }
-    if (h->kind == VG_VERTICES && h->skeleton.njoints) {
+    if (h->kind == VG_VERTICES && h->body.skeleton.njoints) {
         mix_count(d, f->nturns);
         mix_doubles(d, f->turns, 4 * f->nturns);
     }

@@ -21,7 +21,7 @@ static void mark_attached(vg_graph *g)
 
 int vg_graph_new(vg_graph **out, const vg_head *h, vg_err *e)
 {
-    const vg_mesh *m = &h->mesh;
+    const vg_mesh *m = &h->body.mesh;
     size_t faces = h->has_selection ? h->nselected : m->nf, corners = 0;
     for (size_t i = 0; i < faces; i++) {
         size_t f = h->has_selection ? h->selected[i] : i;

@@ -299,18 +299,50 @@ int vg_head_merge_trace(vg_head *h, const vg_head *other, vg_err *e)
     return VG_OK;
 }
 
+/* ---- body ---- */
+
+void vg_body_clear(vg_body *b)
+{
+    vg_mesh_clear(&b->mesh);
+    free(b->reference);
+    free(b->reference_name);
+    vg_attributes_clear(&b->attributes);
+    vg_skeleton_clear(&b->skeleton);
+    vg_patches_clear(&b->patches);
+    vg_rig_clear(&b->rig);
+    *b = (vg_body){0};
+}
+
+int vg_body_copy(vg_body *to, const vg_body *from, vg_err *e)
+{
+    *to = (vg_body){0};
+    const char *name = from->reference_name ? from->reference_name : "";
+    bool ok = vg_mesh_copy(&to->mesh, &from->mesh, e) == VG_OK &&
+              vg_attributes_copy(&to->attributes, &from->attributes, &from->mesh, e) == VG_OK &&
+              vg_skeleton_copy(&to->skeleton, &from->skeleton, e) == VG_OK &&
+              copy_patches(&to->patches, &from->patches, from->mesh.nf, e) == VG_OK &&
+              vg_rig_copy(&to->rig, &from->rig, from->mesh.nv, e) == VG_OK &&
+              (to->reference_name = vgi_copy_string(name, strlen(name), e));
+    if (ok && from->reference)
+        ok = (to->reference = vgi_copy_array(from->reference, 3 * from->mesh.nv, sizeof *to->reference, e));
+    if (ok) return VG_OK;
+    vg_body_clear(to);
+    return VG_ENOMEM;
+}
+
+void vg_body_take(vg_body *to, vg_body *from)
+{
+    vg_body_clear(to);
+    *to = *from;
+    *from = (vg_body){0};
+}
+
 /* ---- head ---- */
 
 void vg_head_clear(vg_head *h)
 {
-    vg_mesh_clear(&h->mesh);
-    free(h->reference);
-    free(h->reference_name);
-    vg_attributes_clear(&h->attributes);
-    vg_skeleton_clear(&h->skeleton);
+    vg_body_clear(&h->body);
     vg_correspondence_clear(&h->correspondence);
-    vg_patches_clear(&h->patches);
-    vg_rig_clear(&h->rig);
     vg_map_clear(&h->map);
     free(h->selected);
     free(h->links);
@@ -325,17 +357,9 @@ int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e)
 {
     *to = (vg_head){.has_selection = from->has_selection, .has_links = from->has_links, .kind = from->kind,
                     .precision = from->precision, .count = from->count};
-    const char *name = from->reference_name ? from->reference_name : "";
-    bool ok = vg_mesh_copy(&to->mesh, &from->mesh, e) == VG_OK &&
-              vg_attributes_copy(&to->attributes, &from->attributes, &from->mesh, e) == VG_OK &&
-              vg_skeleton_copy(&to->skeleton, &from->skeleton, e) == VG_OK &&
+    bool ok = vg_body_copy(&to->body, &from->body, e) == VG_OK &&
               vg_correspondence_copy(&to->correspondence, &from->correspondence, e) == VG_OK &&
-              copy_patches(&to->patches, &from->patches, from->mesh.nf, e) == VG_OK &&
-              copy_map(&to->map, &from->map, e) == VG_OK &&
-              vg_rig_copy(&to->rig, &from->rig, from->mesh.nv, e) == VG_OK &&
-              (to->reference_name = vgi_copy_string(name, strlen(name), e));
-    if (ok && from->reference)
-        ok = (to->reference = vgi_copy_array(from->reference, 3 * from->mesh.nv, sizeof *to->reference, e));
+              copy_map(&to->map, &from->map, e) == VG_OK;
     if (ok && (ok = (to->selected = vgi_copy_array(from->selected, from->nselected, sizeof *to->selected, e))))
         to->nselected = from->nselected;
     if (ok && (ok = (to->links = vgi_copy_array(from->links, 2 * from->nlinks, sizeof *to->links, e))))

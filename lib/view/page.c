@@ -180,15 +180,15 @@ static int put_triangles(vg_page *p, size_t i, const vg_mesh *m, const double *p
 
 static int put_mesh(vg_page *p, size_t i, const vg_head *h, vg_err *e)
 {
-    const vg_mesh *m = &h->mesh;
+    const vg_mesh *m = &h->body.mesh;
     uint32_t *sizes = vgi_array_raw(m->nf, sizeof *sizes, e);
     if (!sizes) return VG_ENOMEM;
     for (size_t f = 0; f < m->nf; f++) sizes[f] = m->start[f + 1] - m->start[f];
     int r = put_list(p, i, "sizes", sizes, m->nf, false, e);
     free(sizes);
     if (r == VG_OK) r = put_list(p, i, "corners", m->vert, vg_mesh_corners(m), true, e);
-    if (r == VG_OK) r = put_triangles(p, i, m, h->reference, e);
-    if (r == VG_OK && h->patches.n) r = put_list(p, i, "patches", h->patches.of_face, m->nf, false, e);
+    if (r == VG_OK) r = put_triangles(p, i, m, h->body.reference, e);
+    if (r == VG_OK && h->body.patches.n) r = put_list(p, i, "patches", h->body.patches.of_face, m->nf, false, e);
     return r;
 }
 
@@ -196,13 +196,13 @@ static int put_mesh(vg_page *p, size_t i, const vg_head *h, vg_err *e)
 
 static int measure(sequence *s, bool z_up, vg_err *e)
 {
-    const vg_mesh *m = &s->head->mesh;
+    const vg_mesh *m = &s->head->body.mesh;
     s->drawn = vgi_drawn_vertices(m, e);
     if (!s->drawn) return VG_ENOMEM;
-    vg_centroid(s->head->reference, m->nv, s->centre);
-    s->diagonal = vg_diagonal(s->head->reference, m->nv);
+    vg_centroid(s->head->body.reference, m->nv, s->centre);
+    s->diagonal = vg_diagonal(s->head->body.reference, m->nv);
     s->unit = s->diagonal > 0 ? s->diagonal : 1;
-    s->ground = vgi_ground_height(s->drawn, m->nv, s->head->reference, z_up);
+    s->ground = vgi_ground_height(s->drawn, m->nv, s->head->body.reference, z_up);
     return VG_OK;
 }
 
@@ -214,7 +214,7 @@ int vg_page_sequence(vg_page *p, const char *label, const vg_head *h, vg_err *e)
     *s = (sequence){.label = label, .head = h, .timed = true, .last_time = -INFINITY};
     size_t i = p->n++;
     int r = measure(s, p->o.z_up, e);
-    if (r == VG_OK) r = vgi_track_init(&s->places, h->mesh.nv, 3, e);
+    if (r == VG_OK) r = vgi_track_init(&s->places, h->body.mesh.nv, 3, e);
     return r == VG_OK ? put_mesh(p, i, h, e) : r;
 }
 
@@ -274,14 +274,15 @@ static int begin_numbers(vg_page *p, sequence *s, const vg_frame *f, const doubl
     s->compared = s->tinted && p->tint.what == VG_TINT_ERRORS;
     if (!s->tinted) return VG_OK;
     double unit = s->compared ? p->at[1].unit : s->unit;
-    int r = vgi_track_init(&s->numbers, s->head->mesh.nv, 1, e);
-    return r == VG_OK ? vgi_meter_init(&s->meter, &p->tint, &s->head->mesh, s->head->reference, unit, e) : r;
+    int r = vgi_track_init(&s->numbers, s->head->body.mesh.nv, 1, e);
+    return r == VG_OK ? vgi_meter_init(&s->meter, &p->tint, &s->head->body.mesh, s->head->body.reference, unit, e)
+                      : r;
 }
 
 static int add_numbers(vg_page *p, sequence *s, const vg_frame *f, const double *truth, vg_err *e)
 {
     vgi_spread x;
-    size_t nv = s->head->mesh.nv;
+    size_t nv = s->head->body.mesh.nv;
     if (!s->tinted) return VG_OK;
     if (!vgi_tint_has(&p->tint, f, truth))
         return vg_fail(e, VG_EINPUT, "frame '%s' brings no '%s' to be coloured, as those before it do", f->name,
@@ -313,14 +314,14 @@ static int add_label(sequence *s, const vg_frame *f, vg_err *e)
 
 int vg_page_add(vg_page *p, size_t i, const vg_frame *f, const double *truth, vg_err *e)
 {
-    if (i >= p->n || (truth && (p->n < 2 || p->at[i].head->mesh.nv != p->at[1].head->mesh.nv)))
+    if (i >= p->n || (truth && (p->n < 2 || p->at[i].head->body.mesh.nv != p->at[1].head->body.mesh.nv)))
         return vg_fail(e, VG_EARG, "a frame is for a sequence that the page does not have");
     sequence *s = p->at + i;
     if (s->compared && !truth) return vg_fail(e, VG_EARG, "a frame that is compared needs a truth");
     int r = add_label(s, f, e);
     if (r == VG_OK && s->frames == 0) r = begin_numbers(p, s, f, truth, e);
     if (r < 0) return r;
-    memcpy(vgi_track_next(&s->places), f->values, 3 * s->head->mesh.nv * sizeof *f->values);
+    memcpy(vgi_track_next(&s->places), f->values, 3 * s->head->body.mesh.nv * sizeof *f->values);
     s->frames++;
     r = add_numbers(p, s, f, truth, e);
     if (r == VG_OK && s->places.n == s->places.cap) r = put_chunk(p, i, "places", &s->places, e);
@@ -438,13 +439,13 @@ static int json_sequence(vg_bytes *b, const vg_page *p, size_t i, vg_err *e)
 {
     const sequence *s = p->at + i;
     const sequence *frame = frame_of(p, s);
-    const vg_mesh *m = &s->head->mesh;
+    const vg_mesh *m = &s->head->body.mesh;
     vg_bytes centre = {0};
     int r = vgi_page_raw(b, i ? ",{" : "{", e);
     if (r == VG_OK) r = vgi_page_field_text(b, "label", s->label, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "vertices", (double)m->nv, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "faces", (double)m->nf, e);
-    if (r == VG_OK) r = vgi_page_field_number(b, "patches", (double)s->head->patches.n, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "patches", (double)s->head->body.patches.n, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "diagonal", frame->diagonal, e);
     for (int k = 0; k < 3 && r == VG_OK; k++) {
         r = vgi_page_next(&centre, e);

@@ -97,7 +97,7 @@ void vg_sheet_free(vg_sheet **address)
 
 static void measure_reference(sequence *q, const double *reference, bool z_up)
 {
-    size_t nv = q->head->mesh.nv, vertical = z_up ? 2 : 1;
+    size_t nv = q->head->body.mesh.nv, vertical = z_up ? 2 : 1;
     q->diagonal = vg_diagonal(reference, nv);
     q->unit = q->diagonal > 0 ? q->diagonal : 1;
     vg_centroid(reference, nv, q->origin);
@@ -109,16 +109,16 @@ int vg_sheet_sequence(vg_sheet *s, const char *label, const vg_head *h, const vg
     if (s->nsequences == VG_SHEET_SEQUENCES)
         return vg_fail(e, VG_EARG, "a sheet has at most %d sequences", VG_SHEET_SEQUENCES);
     if (h->kind != VG_VERTICES) return vg_fail(e, VG_EARG, "a sheet shows vertices, not %s", vg_kind_name(h->kind));
-    if (truth && truth->mesh.nv != h->mesh.nv)
+    if (truth && truth->body.mesh.nv != h->body.mesh.nv)
         return vg_fail(e, VG_EARG, "a sequence and its truth have another number of vertices");
     sequence *q = s->at + s->nsequences++;
     *q = (sequence){.label = label, .head = h};
-    int r = vgi_figure_init(&q->figure, &h->mesh, e);
+    int r = vgi_figure_init(&q->figure, &h->body.mesh, e);
     if (r == VG_OK && s->o.silhouettes) r = vgi_figure_sides(&q->figure, e);
-    if (r == VG_OK) r = vgi_album_init(&q->album, h->mesh.nv, s->o.frames, e);
+    if (r == VG_OK) r = vgi_album_init(&q->album, h->body.mesh.nv, s->o.frames, e);
     if (r < 0) return r;
-    measure_reference(q, truth ? truth->reference : h->reference, s->o.z_up);
-    return vgi_meter_init(&q->meter, &s->tint, &h->mesh, h->reference, q->unit, e);
+    measure_reference(q, truth ? truth->body.reference : h->body.reference, s->o.z_up);
+    return vgi_meter_init(&q->meter, &s->tint, &h->body.mesh, h->body.reference, q->unit, e);
 }
 
 static int keep_points(const sequence *q, vgi_shot *shot, const double *vertices, vg_err *e)
@@ -365,9 +365,13 @@ static int draw_shot(const vg_sheet *s, const sequence *q, size_t i, unsigned ch
         if (!values) return VG_ENOMEM;
         for (size_t v = 0; v < nv; v++) values[v] = (float)vgi_tint_place(&s->tint, shot->numbers[v]);
     }
-    bool patches = !q->tinted && s->o.tint != VG_TINT_PLAIN && q->head->patches.n;
-    vgi_drawing drawing = {.figure = &q->figure, .camera = &camera, .points = shot->points, .values = values,
-                           .patches = patches ? q->head->patches.of_face : NULL, .wire = (float)(0.9 * pixel),
+    bool patches = !q->tinted && s->o.tint != VG_TINT_PLAIN && q->head->body.patches.n;
+    vgi_drawing drawing = {.figure = &q->figure,
+                           .camera = &camera,
+                           .points = shot->points,
+                           .values = values,
+                           .patches = patches ? q->head->body.patches.of_face : NULL,
+                           .wire = (float)(0.9 * pixel),
                            .edge = s->o.edges ? (float)(0.45 * pixel) : 0,
                            .contour = s->o.silhouettes ? (float)(0.8 * pixel) : 0};
     vgi_look look = {.palette = &s->palette, .numbers = q->tinted, .patches = patches,

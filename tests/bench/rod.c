@@ -124,11 +124,11 @@ int main(int argc, char **argv)
     vg_head h = {.kind = VG_VERTICES, .precision = VG_F64};
     vg_frame f = {0};
     vg_writer *w;
-    make_mesh(&h.mesh, !strcmp(argv[2], "quad"), rings, segments);
-    h.count = h.mesh.nv;
-    h.reference = calloc(3 * h.mesh.nv, sizeof *h.reference);
-    if (!h.reference) return 4;
-    pose(h.reference, body, rings, segments, 0);
+    make_mesh(&h.body.mesh, !strcmp(argv[2], "quad"), rings, segments);
+    h.count = h.body.mesh.nv;
+    h.body.reference = calloc(3 * h.body.mesh.nv, sizeof *h.body.reference);
+    if (!h.body.reference) return 4;
+    pose(h.body.reference, body, rings, segments, 0);
     check(vg_frame_shape(&f, &h, &e), &e);
     check(vg_writer_open(&w, STDOUT_FILENO, "standard output", &h, &e), &e);
     for (size_t i = 0; i < poses; i++) {

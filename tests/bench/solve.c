@@ -67,7 +67,8 @@ static void read_poses(problem *p, vg_source *s, const vg_head *h)
         p->w[i] = p->w[i - n];
         memcpy(p->root[i], p->root[i - n], sizeof p->root[i]);
     }
-    for (size_t i = 0; i < POSES; i++) p->x[i] = numbers(3 * h->mesh.nv), p->rhs[i] = numbers(3 * h->mesh.nv);
+    for (size_t i = 0; i < POSES; i++)
+        p->x[i] = numbers(3 * h->body.mesh.nv), p->rhs[i] = numbers(3 * h->body.mesh.nv);
     vg_frame_clear(&f);
 }
 
@@ -267,10 +268,10 @@ int main(int argc, char **argv)
     check(vg_source_open(&s, (const char *const *)(argv + 1), 1, &e), &e);
     const vg_head *h = vg_source_head(s);
     if (h->kind != VG_VECTORS || h->nanchors) die("the stream must hold vectors without anchors");
-    problem p = {.reference = h->reference};
+    problem p = {.reference = h->body.reference};
     check(vg_graph_new(&p.g, h, &e), &e);
     read_poses(&p, s, h);
-    compare(&p, vg_diagonal(h->reference, h->mesh.nv));
+    compare(&p, vg_diagonal(h->body.reference, h->body.mesh.nv));
     for (size_t i = 0; i < POSES; i++) {
         free(p.x[i]);
         free(p.rhs[i]);

@@ -46,10 +46,11 @@ static void close_run(run *x)
 static void check_head(const vg_head *h)
 {
     vg_err e;
-    demand(h->kind == VG_VERTICES && h->count > 0 && h->mesh.nv == h->count && h->skeleton.njoints == h->count);
-    demand(vg_mesh_check(&h->mesh, "it", &e) == VG_OK && vgi_finite(h->reference, 3 * h->count));
+    demand(h->kind == VG_VERTICES && h->count > 0 && h->body.mesh.nv == h->count &&
+           h->body.skeleton.njoints == h->count);
+    demand(vg_mesh_check(&h->body.mesh, "it", &e) == VG_OK && vgi_finite(h->body.reference, 3 * h->count));
     for (size_t j = 0; j < h->count; j++) {
-        const vg_joint *joint = &h->skeleton.joints[j];
+        const vg_joint *joint = &h->body.skeleton.joints[j];
         demand((joint->parent == UINT32_MAX || joint->parent < j) && joint->nchannels <= 6);
         demand(vgi_is_utf8(joint->name, strlen(joint->name)));
     }
@@ -64,7 +65,7 @@ static void read_again(const run *x, uint64_t frames)
     demand(text && pread(x->out.fd, text, (size_t)x->out.size, 0) == (ssize_t)x->out.size);
     int r = open_run(&y, text, (size_t)x->out.size, &e);
     demand(r == VG_OK);
-    demand(y.head.count == x->head.count && y.head.mesh.nf == x->head.mesh.nf);
+    demand(y.head.count == x->head.count && y.head.body.mesh.nf == x->head.body.mesh.nf);
     uint64_t n = 0;
     while ((r = vgi_sequence_bvh.next(y.state, &y.frame, &e)) > 0) n++;
     demand((r == 0 && n == frames) || r == VG_EINPUT); /* rounded up, a place can leave the range of numbers */

@@ -30,7 +30,7 @@ static int open_run(run *x, const vgi_sequence_format *format, const void *data,
     *x = (run){.format = format, .out = {.fd = -1, .name = "fuzz"}};
     int r = vgi_input_memory(&x->in, data, size, "fuzz", e);
     if (r == VG_OK) r = format->open(&x->state, &x->head, x->in, "'fuzz'", e);
-    if (r == VG_OK) r = vg_mesh_check(&x->head.mesh, "'fuzz'", e);
+    if (r == VG_OK) r = vg_mesh_check(&x->head.body.mesh, "'fuzz'", e);
     return r < 0 ? r : vg_frame_shape(&x->frame, &x->head, e);
 }
 
@@ -62,7 +62,7 @@ static void read_again(const run *x, uint64_t frames)
     char *text = malloc((size_t)x->out.size + 1);
     demand(text && pread(x->out.fd, text, (size_t)x->out.size, 0) == (ssize_t)x->out.size);
     demand(open_run(&y, x->format, text, (size_t)x->out.size, &e) == VG_OK);
-    demand(vg_mesh_same(&x->head.mesh, "a", &y.head.mesh, "b", &e) == VG_OK);
+    demand(vg_mesh_same(&x->head.body.mesh, "a", &y.head.body.mesh, "b", &e) == VG_OK);
     uint64_t n = 0;
     while (next(&y, &e) > 0) n++;
     demand(n == frames);
@@ -97,7 +97,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     int r = open_run(&x, f, data, size, &e);
     demand(r == VG_OK || (r == e.code && e.message[0]));
     if (r == VG_OK) {
-        demand(x.head.count > 0 && x.head.count == x.head.mesh.nv && vgi_finite(x.head.reference, 3 * x.head.count));
+        demand(x.head.count > 0 && x.head.count == x.head.body.mesh.nv &&
+               vgi_finite(x.head.body.reference, 3 * x.head.count));
         if (x.head.count < MOST_VALUES) write_run(&x, 2 + size % 5);
     }
     close_run(&x);

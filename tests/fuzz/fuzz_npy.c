@@ -27,8 +27,9 @@ static void write_frame(vg_writer *w, const vg_head *h, const vg_frame *f)
 /* A source adds the reference that an array without one lacks: here it is zeros. */
 static void complete(vg_head *h)
 {
-    if (!h->reference) demand((h->reference = vgi_array(h->mesh.nv, 3 * sizeof *h->reference, NULL)) != NULL);
-    if (!h->reference_name) demand((h->reference_name = vgi_copy_string("r", 1, NULL)) != NULL);
+    if (!h->body.reference)
+        demand((h->body.reference = vgi_array(h->body.mesh.nv, 3 * sizeof *h->body.reference, NULL)) != NULL);
+    if (!h->body.reference_name) demand((h->body.reference_name = vgi_copy_string("r", 1, NULL)) != NULL);
 }
 
 static void read_all(const vgi_sequence_format *format, const void *data, size_t n)
@@ -43,7 +44,7 @@ static void read_all(const vgi_sequence_format *format, const void *data, size_t
     if (nowhere < 0) nowhere = open("/dev/null", O_WRONLY);
     demand(vgi_input_memory(&in, data, n, "fuzz", &e) == VG_OK);
     int r = format->open(&state, &h, in, "'fuzz'", &e);
-    if (r == VG_OK && h.mesh.nf) r = vg_mesh_check(&h.mesh, "'fuzz'", &e);
+    if (r == VG_OK && h.body.mesh.nf) r = vg_mesh_check(&h.body.mesh, "'fuzz'", &e);
     if (r == VG_OK) {
         complete(&h);
         demand(vg_writer_open(&w, nowhere, "nowhere", &h, &e) == VG_OK);

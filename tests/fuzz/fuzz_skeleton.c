@@ -23,12 +23,13 @@ static void read_skeleton(const uint8_t *data, size_t size)
     int r = vgi_input_memory(&in, data, size, "fuzz", &e);
     if (r == VG_OK) r = format->open(&state, &h, in, "'fuzz'", &e);
     if (r == VG_OK) {
-        demand(h.count > 0 && h.count % 2 == 0 && h.skeleton.njoints == h.count && h.mesh.nv == h.count);
-        demand(vg_mesh_check(&h.mesh, "it", &e) == VG_OK && vgi_finite(h.reference, 3 * h.count));
+        demand(h.count > 0 && h.count % 2 == 0 && h.body.skeleton.njoints == h.count && h.body.mesh.nv == h.count);
+        demand(vg_mesh_check(&h.body.mesh, "it", &e) == VG_OK && vgi_finite(h.body.reference, 3 * h.count));
         for (size_t j = 0; j < h.count; j++)
-            demand(h.skeleton.joints[j].parent == UINT32_MAX || h.skeleton.joints[j].parent < j);
+            demand(h.body.skeleton.joints[j].parent == UINT32_MAX || h.body.skeleton.joints[j].parent < j);
         demand(vg_frame_shape(&f, &h, &e) == VG_OK && format->next(state, &f, &e) == 1 && f.nturns == h.count);
-        demand(!memcmp(f.values, h.reference, 3 * h.count * sizeof *f.values) && format->next(state, &f, &e) == 0);
+        demand(!memcmp(f.values, h.body.reference, 3 * h.count * sizeof *f.values) &&
+               format->next(state, &f, &e) == 0);
     }
     format->close(state);
     vg_frame_clear(&f);

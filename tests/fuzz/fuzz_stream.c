@@ -62,9 +62,9 @@ static void use_head(const vg_head *h)
     vg_head copy = {0};
     vg_graph *g = NULL;
     demand(vg_head_copy(&copy, h, &e) == VG_OK);
-    if (h->reference) {
-        demand(vg_mesh_check(&h->mesh, "it", &e) == VG_OK);
-        demand(vg_mesh_same(&h->mesh, "first", &copy.mesh, "second", &e) == VG_OK);
+    if (h->body.reference) {
+        demand(vg_mesh_check(&h->body.mesh, "it", &e) == VG_OK);
+        demand(vg_mesh_same(&h->body.mesh, "first", &copy.body.mesh, "second", &e) == VG_OK);
     }
     if (h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS) {
         demand(vg_graph_new(&g, h, &e) == VG_OK && vg_graph_corners(g) == h->count);
@@ -79,7 +79,7 @@ static void use_frame(const vg_frame *f, const vg_head *h)
     demand(vgi_finite(f->values, h->count * vg_kind_width(h->kind)));
     if (f->has_scalars)
         demand(*f->scalars_name && vgi_is_utf8(f->scalars_unit, strlen(f->scalars_unit)) &&
-               vgi_finite(f->scalars, h->mesh.nv));
+               vgi_finite(f->scalars, h->body.mesh.nv));
     if (h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS) demand(vgi_finite(f->anchors, 3 * h->nanchors));
 }
 

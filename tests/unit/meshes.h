@@ -27,16 +27,17 @@ static inline void *room(size_t n, size_t size)
 
 static inline uint32_t add_vertex(vg_head *h, double x, double y, double z)
 {
-    size_t n = h->mesh.nv;
-    if ((n & (n - 1)) == 0 && !(h->reference = realloc(h->reference, (n ? 2 * n : 1) * 3 * sizeof(double)))) abort();
-    memcpy(h->reference + 3 * n, (double[]){x, y, z}, 3 * sizeof(double));
-    h->count = ++h->mesh.nv;
+    size_t n = h->body.mesh.nv;
+    if ((n & (n - 1)) == 0 && !(h->body.reference = realloc(h->body.reference, (n ? 2 * n : 1) * 3 * sizeof(double))))
+        abort();
+    memcpy(h->body.reference + 3 * n, (double[]){x, y, z}, 3 * sizeof(double));
+    h->count = ++h->body.mesh.nv;
     return (uint32_t)n;
 }
 
 static inline void add_face(vg_head *h, size_t r, const uint32_t *vert)
 {
-    vg_mesh *m = &h->mesh;
+    vg_mesh *m = &h->body.mesh;
     size_t nf = m->nf, corners = vg_mesh_corners(m), cap = 1;
     while (cap < corners) cap *= 2;
     if (corners == 0) cap = 0;
@@ -58,9 +59,9 @@ static inline void add_face(vg_head *h, size_t r, const uint32_t *vert)
 static inline vg_head new_shape(void)
 {
     vg_head h = {.kind = VG_VERTICES, .precision = VG_F64};
-    h.reference_name = strdup("rest");
-    h.reference = room(3, sizeof(double));
-    h.mesh.start = room(1, sizeof *h.mesh.start);
+    h.body.reference_name = strdup("rest");
+    h.body.reference = room(3, sizeof(double));
+    h.body.mesh.start = room(1, sizeof *h.body.mesh.start);
     return h;
 }
 
@@ -90,7 +91,7 @@ static inline vg_head make_rod(size_t rings, size_t sides, bool split)
 
 static inline void add_torus(vg_head *h, uint32_t u, uint32_t v, const double at[3])
 {
-    uint32_t first = (uint32_t)h->mesh.nv;
+    uint32_t first = (uint32_t)h->body.mesh.nv;
     for (uint32_t i = 0; i < u; i++)
         for (uint32_t k = 0; k < v; k++) {
             double a = 2 * M_PI * i / u, b = 2 * M_PI * k / v, r = 1 + 0.35 * cos(b);
@@ -154,7 +155,7 @@ static inline vg_head make_tree(uint32_t n)
     add_vertex(&h, 0, 0, 0);
     for (uint32_t i = 1; i <= n; i++) {
         uint32_t p = (uint32_t)((noise() + 1) / 2 * i);
-        const double *at = h.reference + 3 * (size_t)p;
+        const double *at = h.body.reference + 3 * (size_t)p;
         add_vertex(&h, at[0] + noise(), at[1] + noise(), at[2] + noise());
         FACE(&h, p, i);
     }
@@ -269,8 +270,8 @@ static inline film load_film(const char *name, const char *rest_name, size_t mos
     }
     x.pose = room(most, sizeof *x.pose);
     while (x.n < most && vg_source_next(s, &f, &e) > 0) {
-        x.pose[x.n] = room(3 * x.h.mesh.nv, sizeof(double));
-        memcpy(x.pose[x.n++], f.values, 3 * x.h.mesh.nv * sizeof(double));
+        x.pose[x.n] = room(3 * x.h.body.mesh.nv, sizeof(double));
+        memcpy(x.pose[x.n++], f.values, 3 * x.h.body.mesh.nv * sizeof(double));
     }
     vg_frame_clear(&f);
     vg_source_close(&s);
@@ -278,7 +279,7 @@ static inline film load_film(const char *name, const char *rest_name, size_t mos
         vg_head rest = {0};
         snprintf(path, sizeof path, "tests/data/%s", rest_name);
         if (vg_load_mesh(&rest, path, &e) < 0) printf("%s\n", e.message), exit(1);
-        memcpy(x.h.reference, rest.reference, 3 * x.h.mesh.nv * sizeof(double));
+        memcpy(x.h.body.reference, rest.body.reference, 3 * x.h.body.mesh.nv * sizeof(double));
         vg_head_clear(&rest);
     }
     CHECK(x.n > 0);

@@ -127,18 +127,19 @@ static void reads_and_poses(void)
     /* the knee is bent by 90 degrees about x, the whole turned by 90 about z and moved */
     CHECK(read_text(&s, ARM("3 Zrotation Xrotation Yrotation", "Frames: 2\nFrame Time: 0.5\n"
                             "0 1 0 0 0 0 0 0 0\n7 8 9 90 0 0  0 90 0\n"), &e) == VG_OK);
-    CHECK(s.head.kind == VG_VERTICES && s.head.count == 3 && s.head.mesh.nv == 3 && s.head.mesh.nf == 2 && s.n == 2);
+    CHECK(s.head.kind == VG_VERTICES && s.head.count == 3 && s.head.body.mesh.nv == 3 && s.head.body.mesh.nf == 2 &&
+          s.n == 2);
     static const uint32_t bones[] = {0, 1, 1, 2};
-    CHECK(!memcmp(s.head.mesh.vert, bones, sizeof bones) && s.head.mesh.start[2] == 4);
-    CHECK(vg_mesh_check(&s.head.mesh, "it", &e) == VG_OK);
+    CHECK(!memcmp(s.head.body.mesh.vert, bones, sizeof bones) && s.head.body.mesh.start[2] == 4);
+    CHECK(vg_mesh_check(&s.head.body.mesh, "it", &e) == VG_OK);
     static const double rest[] = {0, 1, 0, 0, 0, 0, 0, -2, 0}, turned[] = {7, 8, 9, 8, 8, 9, 8, 8, 7};
     for (int i = 0; i < 9; i++) {
-        CHECK_NEAR(s.head.reference[i], rest[i], 0);
+        CHECK_NEAR(s.head.body.reference[i], rest[i], 0);
         CHECK_NEAR(s.at[0][i], rest[i], 0);
         CHECK_NEAR(s.at[1][i], turned[i], 1e-14);
     }
     CHECK(s.timed[1] && s.time[0] == 0 && s.time[1] == 0.5);
-    const vg_skeleton *k = &s.head.skeleton;
+    const vg_skeleton *k = &s.head.body.skeleton;
     CHECK(k->njoints == 3 && k->joints[0].parent == UINT32_MAX && k->joints[2].parent == 1 &&
           k->joints[2].nchannels == 0);
     CHECK_TEXT(k->joints[0].name, "Hip");
@@ -160,9 +161,9 @@ static void reads_what_people_have(void)
     vg_err e = {0};
     CHECK(read_text(&s, text, &e) == VG_OK);
     CHECK_TEXT(e.message, "");
-    CHECK(s.n == 2 && s.head.count == 5 && s.head.mesh.nf == 3);
+    CHECK(s.n == 2 && s.head.count == 5 && s.head.body.mesh.nf == 3);
     if (s.n != 2 || s.head.count != 5) return;
-    const vg_joint *j = s.head.skeleton.joints;
+    const vg_joint *j = s.head.body.skeleton.joints;
     CHECK_TEXT(j[0].name, "Left Hip");
     CHECK_TEXT(j[1].name, "a b");
     CHECK_TEXT(j[2].name, "a b.end");
@@ -175,8 +176,8 @@ static void reads_what_people_have(void)
     char *again = write_text(&s, true, NULL, &e);
     sequence t = {0};
     CHECK(again && read_text(&t, again, &e) == VG_OK);
-    CHECK(distance(&s, &t) < 1e-12 && t.head.skeleton.joints[1].nchannels == 0 &&
-          t.head.skeleton.joints[3].nchannels == 2);
+    CHECK(distance(&s, &t) < 1e-12 && t.head.body.skeleton.joints[1].nchannels == 0 &&
+          t.head.body.skeleton.joints[3].nchannels == 2);
     free(again);
     clear(&t);
     clear(&s);
@@ -271,8 +272,8 @@ static void limits_names(void)
         char *again = write_text(&s, false, NULL, &e);
         CHECK(again && read_text(&t, again, &e) == VG_OK && distance(&s, &t) == 0);
         free(again);
-        free(s.head.skeleton.joints[0].name);
-        s.head.skeleton.joints[0].name = strdup(text); /* as a stream might hold it */
+        free(s.head.body.skeleton.joints[0].name);
+        s.head.body.skeleton.joints[0].name = strdup(text); /* as a stream might hold it */
         if (strlen(text) > 1024)
             CHECK(!write_text(&s, false, NULL, &e) && strstr(e.message, "the name of joint 0 is longer"));
         clear(&s);
@@ -399,11 +400,12 @@ static void there_and_back(void)
                 CHECK(text && read_text(&t, text, &e) == VG_OK);
                 CHECK_TEXT(e.message, "");
                 CHECK_TEXT(warning, "");
-                CHECK_NEAR(distance(&s, &t) / vg_diagonal(s.head.reference, s.head.count), 0, full ? 2e-12 : 2e-7);
+                CHECK_NEAR(distance(&s, &t) / vg_diagonal(s.head.body.reference, s.head.count), 0,
+                           full ? 2e-12 : 2e-7);
                 CHECK_NEAR(t.time[39], 39 * 0.0333, 1e-8);
-                for (size_t j = 0; j < s.head.skeleton.njoints; j++) {
-                    CHECK(s.head.skeleton.joints[j].parent == t.head.skeleton.joints[j].parent);
-                    CHECK_TEXT(s.head.skeleton.joints[j].name, t.head.skeleton.joints[j].name);
+                for (size_t j = 0; j < s.head.body.skeleton.njoints; j++) {
+                    CHECK(s.head.body.skeleton.joints[j].parent == t.head.body.skeleton.joints[j].parent);
+                    CHECK_TEXT(s.head.body.skeleton.joints[j].name, t.head.body.skeleton.joints[j].name);
                 }
                 if (text && i < 6) CHECK(largest_step(text) < 60); /* smooth motion: no jump by half a turn */
                 char *again = text ? write_text(&t, full, warning, &e) : NULL;
@@ -482,8 +484,8 @@ static void finds_turns(void)
     double values[12];
     size_t joint;
     CHECK(read_text(&s, text, &e) == VG_OK);
-    CHECK(vg_skeleton_channels(&s.head.skeleton) == 12);
-    CHECK(vg_joint_fitter_new(&f, &s.head.skeleton, &e) == VG_OK);
+    CHECK(vg_skeleton_channels(&s.head.body.skeleton) == 12);
+    CHECK(vg_joint_fitter_new(&f, &s.head.body.skeleton, &e) == VG_OK);
     /* b lies on a: that it turns with a is seen from its end */
     CHECK_NEAR(vg_joint_fitter_fit(f, s.at[0], NULL, values, &joint), 0, 1e-8);
     static const double first[] = {1, 2, 3, 30, 40, 50, 0, 0, 0, 0, 70, 0};
@@ -497,10 +499,10 @@ static void finds_turns(void)
     vg_quat_multiply(q, x, q);
     vg_quat_apply(q, down, now);
     vg_quat_between(down, now, x);
-    vg_skeleton_pose(&s.head.skeleton, values, s.at[0], (double[20]){0});
+    vg_skeleton_pose(&s.head.body.skeleton, values, s.at[0], (double[20]){0});
     CHECK(distance(&s, &s) == 0);
     double turns[20], back[4], local[4];
-    vg_skeleton_pose(&s.head.skeleton, values, s.at[0], turns);
+    vg_skeleton_pose(&s.head.body.skeleton, values, s.at[0], turns);
     back[0] = turns[0];
     for (int i = 1; i < 4; i++) back[i] = -turns[i];
     vg_quat_multiply(back, turns + 12, local);
@@ -537,10 +539,10 @@ static void fits_what_it_can(void)
         double pose[9] = {0, 1, 0, 0, 0, 0, l * cases[i].x, l * cases[i].y, l * cases[i].z};
         vg_joint_fitter *f;
         size_t joint;
-        CHECK(vg_joint_fitter_new(&f, &s.head.skeleton, &e) == VG_OK);
+        CHECK(vg_joint_fitter_new(&f, &s.head.body.skeleton, &e) == VG_OK);
         for (int k = 0; k < 3; k++) {
             double d = vg_joint_fitter_fit(f, pose, NULL, values, &joint);
-            CHECK(vgi_finite(values, vg_skeleton_channels(&s.head.skeleton)));
+            CHECK(vgi_finite(values, vg_skeleton_channels(&s.head.body.skeleton)));
             if (cases[i].reached == 0) CHECK_NEAR(d, 0, 1e-5);
             else CHECK(d > 0.5 && d <= cases[i].reached + 1 && joint == 2);
         }
@@ -593,7 +595,7 @@ static void says_what_is_lost(void)
     text = write_text(&s, false, warning, &e);
     CHECK(text && !strstr(warning, "times") && strstr(text, " 0.0333333333\n"));
     free(text);
-    vg_skeleton_clear(&s.head.skeleton);
+    vg_skeleton_clear(&s.head.body.skeleton);
     CHECK(!write_text(&s, false, warning, &e) &&
           strstr(e.message, "cannot write 't.bvh': the input holds no skeleton"));
     clear(&s);
@@ -627,8 +629,8 @@ static void writes_any_skeleton(void)
     double pose[] = {0, 0, 0, 5, 6, 7, 1, 0, 0, 5, 7, 7, 0, 0, 1};
     sequence s = {.n = 1, .at = {pose}}, t;
     vg_err e = {0};
-    s.head.skeleton = (vg_skeleton){5, joints};
-    s.head.reference = pose, s.head.count = s.head.mesh.nv = 5;
+    s.head.body.skeleton = (vg_skeleton){5, joints};
+    s.head.body.reference = pose, s.head.count = s.head.body.mesh.nv = 5;
     char *text = write_text(&s, false, NULL, &e);
     CHECK(text && read_text(&t, text, &e) == VG_OK && t.head.count == 5);
     CHECK_TEXT(e.message, "");
@@ -636,9 +638,9 @@ static void writes_any_skeleton(void)
     static const int order[] = {0, 2, 4, 1, 3};
     for (int j = 0; j < 5; j++)
         for (int k = 0; k < 3; k++) CHECK_NEAR(t.at[0][3 * j + k], pose[3 * order[j] + k], 1e-6);
-    CHECK_TEXT(t.head.skeleton.joints[0].name, "a_b");
-    CHECK_TEXT(t.head.skeleton.joints[1].name, "_d_");
-    CHECK_TEXT(t.head.skeleton.joints[2].name, "a_b.end");
+    CHECK_TEXT(t.head.body.skeleton.joints[0].name, "a_b");
+    CHECK_TEXT(t.head.body.skeleton.joints[1].name, "_d_");
+    CHECK_TEXT(t.head.body.skeleton.joints[2].name, "a_b.end");
     free(text);
     clear(&t);
 }
@@ -651,8 +653,8 @@ static void writes_no_minus_zero(void)
     double pose[] = {-1e-12, -0.0, 3, 10, -1e-12, 3};
     sequence s = {.n = 1, .at = {pose}};
     vg_err e = {0};
-    s.head.skeleton = (vg_skeleton){2, joints};
-    s.head.reference = pose, s.head.count = s.head.mesh.nv = 2;
+    s.head.body.skeleton = (vg_skeleton){2, joints};
+    s.head.body.reference = pose, s.head.count = s.head.body.mesh.nv = 2;
     char *text = write_text(&s, false, NULL, &e);
     CHECK(text && !strstr(text, "-0"));
     free(text);
@@ -665,8 +667,8 @@ static void frame_time_is_of_the_whole(void)
     double pose[] = {1, 2, 3};
     sequence s = {.n = 4, .at = {pose, pose, pose, pose}, .time = {0, 0.0333, 0.0667, 0.1}, .timed = {true, true, true, true}};
     vg_err e = {0};
-    s.head.skeleton = (vg_skeleton){1, joints};
-    s.head.reference = pose, s.head.count = s.head.mesh.nv = 1;
+    s.head.body.skeleton = (vg_skeleton){1, joints};
+    s.head.body.reference = pose, s.head.count = s.head.body.mesh.nv = 1;
     char *text = write_text(&s, false, NULL, &e);
     CHECK(text && strstr(text, " 0.0333333333\n"));
     free(text);

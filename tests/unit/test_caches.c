@@ -51,7 +51,7 @@ static vg_bytes make_mdd(void)
 
 static void check_values(const played *p)
 {
-    CHECK(p->result == 0 && p->frames == 3 && p->n == 18 && p->h.mesh.nv == 2 && p->h.mesh.nf == 0);
+    CHECK(p->result == 0 && p->frames == 3 && p->n == 18 && p->h.body.mesh.nv == 2 && p->h.body.mesh.nf == 0);
     CHECK(p->h.precision == VG_F32 && p->h.kind == VG_VERTICES);
     for (int i = 0; i < 18; i++) CHECK(p->values[i] == i + 0.5);
 }
@@ -144,7 +144,7 @@ static void make_frames(vg_frame frames[3], double first, double step)
             (vg_frame){.name = (char *)"f", .has_time = step != 0, .time = first + i * step, .values = points[i]};
 }
 
-static const vg_head head = {.mesh.nv = 2, .kind = VG_VERTICES, .precision = VG_F64, .count = 2};
+static const vg_head head = {.body.mesh.nv = 2, .kind = VG_VERTICES, .precision = VG_F64, .count = 2};
 
 static void writes_pc2(void)
 {

@@ -47,9 +47,10 @@ static carried carry(const vg_head *source, vg_head *target, const vg_correspond
     vg_err e;
     vg_carrier *c;
     carried r = {.g = graph_of(target)};
-    r.expected = vectors_of(r.g, target->reference);
+    r.expected = vectors_of(r.g, target->body.reference);
     r.vectors = room(3 * vg_graph_corners(r.g), sizeof *r.vectors);
-    int code = vg_carrier_new(&c, &source->mesh, source->reference, k, r.g, target->reference, by, threads, &e);
+    int code = vg_carrier_new(&c, &source->body.mesh, source->body.reference, k, r.g, target->body.reference, by,
+                              threads, &e);
     CHECK(code == VG_OK);
     if (code < 0) abort();
     const double *in[3] = {pose, pose, pose};
@@ -74,9 +75,9 @@ static void rotation_passes(void)
 {
     /* a line segment of the source would not tell its turn */
     vg_head source = make_torus(7, 6), target = make_mixed(6);
-    vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 3, true);
+    vg_correspondence k = chance_pairs(&source.body.mesh, &target.body.mesh, 3, true);
     motion t = turn(2.5, 1, 3);
-    double *pose = move_points(&t, source.reference, source.mesh.nv);
+    double *pose = move_points(&t, source.body.reference, source.body.mesh.nv);
     for (int i = 0; i < 3; i++) {
         carried r = carry(&source, &target, &k, pose, methods[i], 1);
         double worst = 0;
@@ -85,7 +86,7 @@ static void rotation_passes(void)
             move_vector(&t, r.expected + 3 * c, w);
             for (size_t a = 0; a < 3; a++) worst = fmax(worst, fabs(w[a] - r.vectors[3 * c + a]));
         }
-        CHECK_NEAR(worst, 0, 1e-12 * vg_diagonal(target.reference, target.mesh.nv));
+        CHECK_NEAR(worst, 0, 1e-12 * vg_diagonal(target.body.reference, target.body.mesh.nv));
         carried_clear(&r);
     }
     free(pose);
@@ -100,12 +101,13 @@ static void identity_is_exact(void)
     vg_head all[] = {make_pieces(), make_rod(9, 7, false), make_flower(9)};
     for (int n = 0; n < 3; n++) {
         vg_head *h = &all[n];
-        vg_correspondence k = identity_pairs(&h->mesh);
-        double *pose = warp(h->reference, h->mesh.nv, 0.3);
+        vg_correspondence k = identity_pairs(&h->body.mesh);
+        double *pose = warp(h->body.reference, h->body.mesh.nv, 0.3);
         for (int i = 0; i < 3; i++) {
             carried r = carry(h, h, &k, pose, methods[i], 2);
             double *truth = vectors_of(r.g, pose);
-            CHECK_NEAR(farthest(truth, r.vectors, vg_graph_corners(r.g)), 0, 1e-12 * vg_diagonal(pose, h->mesh.nv));
+            CHECK_NEAR(farthest(truth, r.vectors, vg_graph_corners(r.g)), 0,
+                       1e-12 * vg_diagonal(pose, h->body.mesh.nv));
             free(truth);
             carried_clear(&r);
         }
@@ -120,15 +122,15 @@ static void identity_is_exact(void)
 static void triangles_onto_themselves(void)
 {
     vg_head h = make_rod(9, 7, true);
-    vg_correspondence k = chance_pairs(&h.mesh, &h.mesh, 2, true);
-    for (size_t f = 0; f < h.mesh.nf; f++) k.source[2 * f] = k.source[2 * f + 1] = (uint32_t)f;
-    double *pose = warp(h.reference, h.mesh.nv, 0.3);
+    vg_correspondence k = chance_pairs(&h.body.mesh, &h.body.mesh, 2, true);
+    for (size_t f = 0; f < h.body.mesh.nf; f++) k.source[2 * f] = k.source[2 * f + 1] = (uint32_t)f;
+    double *pose = warp(h.body.reference, h.body.mesh.nv, 0.3);
     for (int i = 0; i < 3; i++) {
         carried r = carry(&h, &h, &k, pose, methods[i], 2);
         double *truth = vectors_of(r.g, pose), worst = 0, length = 0;
-        for (size_t f = 0; f < h.mesh.nf; f++) {
-            if (h.mesh.start[f + 1] - h.mesh.start[f] != 3) continue;
-            for (size_t c = 3 * (size_t)h.mesh.start[f]; c < 3 * (size_t)h.mesh.start[f + 1]; c++)
+        for (size_t f = 0; f < h.body.mesh.nf; f++) {
+            if (h.body.mesh.start[f + 1] - h.body.mesh.start[f] != 3) continue;
+            for (size_t c = 3 * (size_t)h.body.mesh.start[f]; c < 3 * (size_t)h.body.mesh.start[f + 1]; c++)
                 worst = fmax(worst, fabs(truth[c] - r.vectors[c])), length = fmax(length, fabs(truth[c]));
         }
         if (methods[i] == VG_BY_GRADIENT) CHECK_NEAR(worst, 0, 1e-12);
@@ -146,9 +148,9 @@ static void unmatched_is_rigid(void)
 {
     vg_head source = make_torus(8, 6), target = make_torus(5, 5);
     motion t = turn(1, 2, 0), plain = turn(1, 1, 0);
-    double *pose = move_points(&t, source.reference, source.mesh.nv);
+    double *pose = move_points(&t, source.body.reference, source.body.mesh.nv);
     for (int matched = 0; matched < 2; matched++) {
-        vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 2, matched);
+        vg_correspondence k = chance_pairs(&source.body.mesh, &target.body.mesh, 2, matched);
         carried r = carry(&source, &target, &k, pose, VG_BY_POSE, 1);
         double worst = 0;
         for (size_t c = 0; c < vg_graph_corners(r.g); c++) {
@@ -173,8 +175,8 @@ static void unmatched_is_rigid(void)
 static void threads_do_not_matter(void)
 {
     vg_head source = make_torus(40, 30), target = make_mixed(24);
-    vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 3, true);
-    double *pose = warp(source.reference, source.mesh.nv, 0.4);
+    vg_correspondence k = chance_pairs(&source.body.mesh, &target.body.mesh, 3, true);
+    double *pose = warp(source.body.reference, source.body.mesh.nv, 0.4);
     carried a = carry(&source, &target, &k, pose, VG_BY_BLEND, 1),
             b = carry(&source, &target, &k, pose, VG_BY_BLEND, 3);
     CHECK(!memcmp(a.vectors, b.vectors, 3 * vg_graph_corners(a.g) * sizeof *a.vectors));
@@ -189,15 +191,16 @@ static void threads_do_not_matter(void)
 static void degenerate_sources_are_counted(void)
 {
     vg_head source = make_degenerate(), target = make_torus(6, 5);
-    vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 1, true);
+    vg_correspondence k = chance_pairs(&source.body.mesh, &target.body.mesh, 1, true);
     vg_graph *g = graph_of(&target);
     vg_carrier *c;
     vg_err e;
     double *out = room(3 * vg_graph_corners(g), sizeof *out);
-    CHECK(vg_carrier_new(&c, &source.mesh, source.reference, &k, g, target.reference, VG_BY_POSE, 1, &e) == VG_OK);
-    const double *in = source.reference;
+    CHECK(vg_carrier_new(&c, &source.body.mesh, source.body.reference, &k, g, target.body.reference, VG_BY_POSE, 1,
+                         &e) == VG_OK);
+    const double *in = source.body.reference;
     vg_carrier_transfer(c, 1, &in, &out);
-    CHECK(vg_carrier_counts(c).corners > 0 && vg_carrier_counts(c).first_face < source.mesh.nf);
+    CHECK(vg_carrier_counts(c).corners > 0 && vg_carrier_counts(c).first_face < source.body.mesh.nf);
     for (size_t i = 0; i < 3 * vg_graph_corners(g); i++) CHECK(isfinite(out[i]));
     free(out);
     vg_carrier_free(&c);
@@ -211,17 +214,19 @@ static void degenerate_sources_are_counted(void)
 static void cycles_find_their_beginning(void)
 {
     vg_head source = make_rod(9, 7, false), target = make_rod(9, 7, false);
-    for (size_t f = 0; f < target.mesh.nf; f++) {
-        uint32_t begin = target.mesh.start[f], r = target.mesh.start[f + 1] - begin;
-        for (uint32_t i = 0; i < r; i++) target.mesh.vert[begin + i] = source.mesh.vert[begin + (i + f) % r];
+    for (size_t f = 0; f < target.body.mesh.nf; f++) {
+        uint32_t begin = target.body.mesh.start[f], r = target.body.mesh.start[f + 1] - begin;
+        for (uint32_t i = 0; i < r; i++)
+            target.body.mesh.vert[begin + i] = source.body.mesh.vert[begin + (i + f) % r];
     }
-    vg_correspondence k = identity_pairs(&source.mesh);
-    k.target_digest = vg_mesh_digest(&target.mesh);
-    double *pose = warp(source.reference, source.mesh.nv, 0.3);
+    vg_correspondence k = identity_pairs(&source.body.mesh);
+    k.target_digest = vg_mesh_digest(&target.body.mesh);
+    double *pose = warp(source.body.reference, source.body.mesh.nv, 0.3);
     for (int i = 0; i < 3; i++) {
         carried r = carry(&source, &target, &k, pose, methods[i], 1);
         double *truth = vectors_of(r.g, pose);
-        CHECK_NEAR(farthest(truth, r.vectors, vg_graph_corners(r.g)), 0, 1e-12 * vg_diagonal(pose, source.mesh.nv));
+        CHECK_NEAR(farthest(truth, r.vectors, vg_graph_corners(r.g)), 0,
+                   1e-12 * vg_diagonal(pose, source.body.mesh.nv));
         free(truth);
         carried_clear(&r);
     }
@@ -241,27 +246,28 @@ static void links_follow_both_ends(void)
         add_torus(h, 9, 6, (double[3]){0, 0, 0});
         add_torus(h, 9, 6, (double[3]){3, 1, 0.5});
     }
-    size_t nv = source.mesh.nv, ring = nv / 2;
-    for (size_t i = 0; i < 3 * nv; i++) target.reference[i] *= 2;
+    size_t nv = source.body.mesh.nv, ring = nv / 2;
+    for (size_t i = 0; i < 3 * nv; i++) target.body.reference[i] *= 2;
     motion t[2] = {turn(0.7, 1, 0.2), turn(-0.4, 1, -0.6)};
     double *pose = room(3 * nv, sizeof *pose);
     for (size_t v = 0; v < nv; v++) {
-        move_vector(&t[v >= ring], source.reference + 3 * v, pose + 3 * v);
+        move_vector(&t[v >= ring], source.body.reference + 3 * v, pose + 3 * v);
         for (size_t i = 0; i < 3; i++) pose[3 * v + i] += t[v >= ring].shift[i];
     }
-    vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 2, true); /* two: no corners are paired */
-    for (uint32_t f = 0; f < source.mesh.nf; f++) k.source[2 * f] = k.source[2 * f + 1] = f;
+    vg_correspondence k =
+        chance_pairs(&source.body.mesh, &target.body.mesh, 2, true); /* two: no corners are paired */
+    for (uint32_t f = 0; f < source.body.mesh.nf; f++) k.source[2 * f] = k.source[2 * f + 1] = f;
     carried r = carry(&source, &target, &k, pose, VG_BY_GRADIENT, 1);
     CHECK(r.g->nlinks == 1);
     const uint32_t *end = r.g->vert + r.g->start[r.g->nf - 1];
     const double *w = r.vectors + 3 * (size_t)r.g->start[r.g->nf - 1];
     double c[2][2][3] = {{{0}}}; /* of both ends: before, now */
     for (int n = 0; n < 2; n++)
-        for (size_t f = 0, faces = 4; f < source.mesh.nf; f++) {
-            const uint32_t *vert = source.mesh.vert + 4 * f;
+        for (size_t f = 0, faces = 4; f < source.body.mesh.nf; f++) {
+            const uint32_t *vert = source.body.mesh.vert + 4 * f;
             if (vert[0] != end[n] && vert[1] != end[n] && vert[2] != end[n] && vert[3] != end[n]) continue;
             for (size_t i = 0; i < 12; i++) {
-                c[n][0][i % 3] += source.reference[3 * (size_t)vert[i / 3] + i % 3] / (4.0 * (double)faces);
+                c[n][0][i % 3] += source.body.reference[3 * (size_t)vert[i / 3] + i % 3] / (4.0 * (double)faces);
                 c[n][1][i % 3] += pose[3 * (size_t)vert[i / 3] + i % 3] / (4.0 * (double)faces);
             }
         }
@@ -269,7 +275,7 @@ static void links_follow_both_ends(void)
         double wanted = 2 * (c[0][1][i] - c[1][1][i]);
         for (size_t j = 0; j < 3; j++) {
             double D = (t[0].m[3 * i + j] + t[1].m[3 * i + j]) / 2, apart = c[0][0][j] - c[1][0][j];
-            wanted += D * (target.reference[3 * end[0] + j] - target.reference[3 * end[1] + j] - 2 * apart);
+            wanted += D * (target.body.reference[3 * end[0] + j] - target.body.reference[3 * end[1] + j] - 2 * apart);
         }
         CHECK_NEAR(w[i] - w[3 + i], wanted, 1e-12);
         CHECK_NEAR(w[i] + w[3 + i], 0, 1e-12);
@@ -292,10 +298,10 @@ static void points_drive_nothing(void)
     add_vertex(&target, 0, 0, 0), add_vertex(&target, 1, 0, 1), add_vertex(&target, 0, 1, 0);
     FACE(&target, 0, 1, 2);
     motion t = turn(0.9, 1, 0);
-    double *pose = move_points(&t, source.reference, 6);
+    double *pose = move_points(&t, source.body.reference, 6);
     memcpy(pose + 12, pose + 9, 3 * sizeof *pose);
     memcpy(pose + 15, pose + 9, 3 * sizeof *pose);
-    vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 2, true);
+    vg_correspondence k = chance_pairs(&source.body.mesh, &target.body.mesh, 2, true);
     k.source[0] = 0, k.source[1] = 1;
     for (int i = 0; i < 3; i++) {
         carried r = carry(&source, &target, &k, pose, methods[i], 1);
@@ -315,13 +321,17 @@ static void points_drive_nothing(void)
 static void other_meshes_are_refused(void)
 {
     vg_head a = make_torus(6, 5), b = make_torus(5, 6);
-    vg_correspondence k = identity_pairs(&a.mesh);
+    vg_correspondence k = identity_pairs(&a.body.mesh);
     vg_graph *ga = graph_of(&a), *gb = graph_of(&b);
     vg_carrier *c;
     vg_err e;
-    CHECK(vg_carrier_new(&c, &b.mesh, b.reference, &k, ga, a.reference, VG_BY_POSE, 1, &e) == VG_EINPUT && !c);
+    CHECK(vg_carrier_new(&c, &b.body.mesh, b.body.reference, &k, ga, a.body.reference, VG_BY_POSE, 1, &e) ==
+              VG_EINPUT &&
+          !c);
     CHECK(strstr(e.message, "another source") != NULL);
-    CHECK(vg_carrier_new(&c, &a.mesh, a.reference, &k, gb, b.reference, VG_BY_POSE, 1, &e) == VG_EINPUT && !c);
+    CHECK(vg_carrier_new(&c, &a.body.mesh, a.body.reference, &k, gb, b.body.reference, VG_BY_POSE, 1, &e) ==
+              VG_EINPUT &&
+          !c);
     CHECK(strstr(e.message, "another target") != NULL);
     vg_graph_free(&ga);
     vg_graph_free(&gb);
@@ -412,10 +422,10 @@ static void a_fold_is_finite(void)
         else FACE(h, 0, 1, 2);
     }
     double fold[12];
-    memcpy(fold, source.reference, sizeof fold);
+    memcpy(fold, source.body.reference, sizeof fold);
     fold[10] = 1;
     for (int matched = 0; matched < 2; matched++) {
-        vg_correspondence k = chance_pairs(&source.mesh, &target.mesh, 2, matched);
+        vg_correspondence k = chance_pairs(&source.body.mesh, &target.body.mesh, 2, matched);
         k.source[0] = 0, k.source[1] = 1;
         for (int i = 0; i < 3; i++) {
             carried r = carry(&source, &target, &k, fold, methods[i], 1);
@@ -451,7 +461,7 @@ static void area_metric_is_cotangents(void)
         vg_graph *g = graph_of(&h);
         vgi_metric m;
         vg_err e;
-        CHECK(vgi_metric_make(&m, g, h.reference, &e) == VG_OK);
+        CHECK(vgi_metric_make(&m, g, h.body.reference, &e) == VG_OK);
         for (int o = 0; o < 3; o++) { /* o: the corner opposite the pair i, j */
             int i = (o + 1) % 3, j = (o + 2) % 3;
             double a[3], b[3], dot = 0, cross[3], area, x = -m.face[0].weight / 3;
@@ -479,11 +489,11 @@ static void shape_onto_itself(void)
     vg_graph *g = graph_of(&h);
     vg_shaper *s;
     vg_err e;
-    CHECK(vg_shaper_new(&s, g, h.reference, h.reference, 2, &e) == VG_OK);
-    double *pose = warp(h.reference, h.mesh.nv, 0.5), *out = room(3 * h.mesh.nv, sizeof *out);
+    CHECK(vg_shaper_new(&s, g, h.body.reference, h.body.reference, 2, &e) == VG_OK);
+    double *pose = warp(h.body.reference, h.body.mesh.nv, 0.5), *out = room(3 * h.body.mesh.nv, sizeof *out);
     const double *in = pose;
     vg_shaper_transfer(s, 1, &in, &out);
-    CHECK_NEAR(farthest(pose, out, h.mesh.nv), 0, 1e-12 * vg_diagonal(pose, h.mesh.nv));
+    CHECK_NEAR(farthest(pose, out, h.body.mesh.nv), 0, 1e-12 * vg_diagonal(pose, h.body.mesh.nv));
     vg_shaper_free(&s);
     free(pose);
     free(out);
@@ -496,24 +506,24 @@ static void shape_of_the_reference(void)
 {
     vg_head h = make_torus(12, 9);
     motion t = turn(0, 1.5, 0);
-    double *target = move_points(&t, h.reference, h.mesh.nv), *out = room(3 * h.mesh.nv, sizeof *out);
+    double *target = move_points(&t, h.body.reference, h.body.mesh.nv), *out = room(3 * h.body.mesh.nv, sizeof *out);
     vg_graph *g = graph_of(&h);
     vg_shaper *s;
     vg_err e;
-    CHECK(vg_shaper_new(&s, g, h.reference, target, 1, &e) == VG_OK);
-    const double *in = h.reference;
+    CHECK(vg_shaper_new(&s, g, h.body.reference, target, 1, &e) == VG_OK);
+    const double *in = h.body.reference;
     vg_shaper_transfer(s, 1, &in, &out);
     /* vectors are the target's, centroids the source's: each vertex is the mean of C_f + 1.5 w_c over its corners */
-    double *truth = room(3 * h.mesh.nv, sizeof *truth), *count = room(h.mesh.nv, sizeof *count);
-    double *w = vectors_of(g, h.reference);
+    double *truth = room(3 * h.body.mesh.nv, sizeof *truth), *count = room(h.body.mesh.nv, sizeof *count);
+    double *w = vectors_of(g, h.body.reference);
     for (size_t c = 0; c < vg_graph_corners(g); c++) {
         size_t v = g->vert[c];
         count[v]++;
-        for (size_t k = 0; k < 3; k++) truth[3 * v + k] += h.reference[3 * v + k] + 0.5 * w[3 * c + k];
+        for (size_t k = 0; k < 3; k++) truth[3 * v + k] += h.body.reference[3 * v + k] + 0.5 * w[3 * c + k];
     }
-    for (size_t v = 0; v < h.mesh.nv; v++)
+    for (size_t v = 0; v < h.body.mesh.nv; v++)
         for (size_t k = 0; k < 3; k++) truth[3 * v + k] /= count[v];
-    CHECK_NEAR(farthest(truth, out, h.mesh.nv), 0, 1e-12);
+    CHECK_NEAR(farthest(truth, out, h.body.mesh.nv), 0, 1e-12);
     vg_shaper_free(&s);
     vg_graph_free(&g);
     free(target);

@@ -45,7 +45,7 @@ static void aim(vg_deformer *d, const vg_graph *g, const double *target)
 static double *measure(vg_head *h, const vg_graph *g, const double *pose)
 {
     double *q = room(4 * vg_graph_corners(g), sizeof *q);
-    vg_deformer *d = deformer(g, h->reference, 1);
+    vg_deformer *d = deformer(g, h->body.reference, 1);
     const double *in = pose;
     vg_deformer_measure(d, 1, VG_VERTICES, &in, &q);
     vg_deformer_free(&d);
@@ -109,7 +109,7 @@ static void rodrigues(const double r[3], const double d[3], double J[9])
 static double against_formulas(vg_head *h, const double *pose)
 {
     vg_graph *g = graph_of(h);
-    double *q = measure(h, g, pose), *r = vectors_of(g, h->reference), *d = vectors_of(g, pose), worst = 0;
+    double *q = measure(h, g, pose), *r = vectors_of(g, h->body.reference), *d = vectors_of(g, pose), worst = 0;
     for (size_t f = 0; f < g->nf - g->nlinks; f++)
         for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
             double J[9] = {0}, F[9], R[9], M[9], unit[4], scale = dot(q + 4 * c, q + 4 * c, 4);
@@ -117,7 +117,7 @@ static double against_formulas(vg_head *h, const double *pose)
                 rodrigues(r + 3 * c, d + 3 * c, J);
             } else {
                 frame_of(g, f, c, pose, F);
-                frame_of(g, f, c, h->reference, R);
+                frame_of(g, f, c, h->body.reference, R);
                 for (int k = 0; k < 27; k++) J[k / 3] += F[k / 9 * 3 + k % 3] * R[k / 3 % 3 * 3 + k % 3];
             }
             for (int k = 0; k < 4; k++) unit[k] = q[4 * c + (size_t)k] / sqrt(scale);
@@ -140,7 +140,7 @@ static void test_formulas(void)
     const char *name;
     for (size_t i = 0; make_any(i, &h, &name); i++) {
         for (double amount = 0; amount < 1; amount += 0.4) {
-            double *pose = warp(h.reference, h.mesh.nv, amount), worst = against_formulas(&h, pose);
+            double *pose = warp(h.body.reference, h.body.mesh.nv, amount), worst = against_formulas(&h, pose);
             if (!(worst <= 1e-11)) printf("%s, warped by %g:\n", name, amount);
             CHECK_NEAR(worst, 0, 1e-11);
             free(pose);
@@ -153,9 +153,9 @@ static void test_formulas(void)
 static double misses(vg_head *h, const double *pose)
 {
     vg_graph *g = graph_of(h);
-    double *q = measure(h, g, pose), *r = vectors_of(g, h->reference), *d = vectors_of(g, pose);
+    double *q = measure(h, g, pose), *r = vectors_of(g, h->body.reference), *d = vectors_of(g, pose);
     size_t n = vg_graph_corners(g);
-    double D = fmax(vg_diagonal(h->reference, g->nv), vg_diagonal(pose, g->nv)), worst = 0;
+    double D = fmax(vg_diagonal(h->body.reference, g->nv), vg_diagonal(pose, g->nv)), worst = 0;
     for (size_t c = 0; c < n; c++) {
         double got[3];
         vg_quat_apply(q + 4 * c, r + 3 * c, got);
@@ -175,14 +175,15 @@ static void test_turned_and_scaled(void)
     const char *name;
     for (size_t i = 0; make_any(i, &h, &name); i++) {
         for (size_t u = 0; u < 3; u++) {
-            for (size_t k = 0; k < 3 * h.mesh.nv; k++) h.reference[k] *= units[u];
-            double *bent = warp(h.reference, h.mesh.nv, 2);
-            CHECK_NEAR(misses(&h, h.reference), 0, 1e-12);
+            for (size_t k = 0; k < 3 * h.body.mesh.nv; k++) h.body.reference[k] *= units[u];
+            double *bent = warp(h.body.reference, h.body.mesh.nv, 2);
+            CHECK_NEAR(misses(&h, h.body.reference), 0, 1e-12);
             CHECK_NEAR(misses(&h, bent), 0, 1e-12);
-            for (size_t k = 0; k < 3 * h.mesh.nv; k++) bent[k] = -h.reference[k]; /* turned inside out: half turns */
+            for (size_t k = 0; k < 3 * h.body.mesh.nv; k++)
+                bent[k] = -h.body.reference[k]; /* turned inside out: half turns */
             CHECK_NEAR(misses(&h, bent), 0, 1e-12);
             free(bent);
-            for (size_t k = 0; k < 3 * h.mesh.nv; k++) h.reference[k] /= units[u];
+            for (size_t k = 0; k < 3 * h.body.mesh.nv; k++) h.body.reference[k] /= units[u];
         }
         if (test_bad) printf("%s\n", name);
         vg_head_clear(&h);
@@ -202,8 +203,8 @@ static double away(const double q[4], const double s[4])
 static void rotates_all(vg_head *h, const char *name, double angle, double scale)
 {
     vg_graph *g = graph_of(h);
-    motion t = turn(angle, scale, 3 * vg_diagonal(h->reference, g->nv)), only = turn(angle, 1, 0);
-    double *pose = move_points(&t, h->reference, g->nv), *q = measure(h, g, pose), want[4], worst = 0;
+    motion t = turn(angle, scale, 3 * vg_diagonal(h->body.reference, g->nv)), only = turn(angle, 1, 0);
+    double *pose = move_points(&t, h->body.reference, g->nv), *q = measure(h, g, pose), want[4], worst = 0;
     vg_quat_from_matrix(only.m, want);
     for (int k = 0; k < 4; k++) want[k] *= sqrt(scale);
     for (size_t f = 0; f < g->nf; f++) {
@@ -211,8 +212,8 @@ static void rotates_all(vg_head *h, const char *name, double angle, double scale
         for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
             const uint32_t *v = g->vert + g->start[f];
             /* a link between coincident vertices has no length to scale */
-            bool no_length = f >= g->nf - g->nlinks &&
-                             farthest(h->reference + 3 * (size_t)v[0], h->reference + 3 * (size_t)v[1], 1) < 1e-9;
+            bool no_length = f >= g->nf - g->nlinks && farthest(h->body.reference + 3 * (size_t)v[0],
+                                                                h->body.reference + 3 * (size_t)v[1], 1) < 1e-9;
             if (!no_length) worst = fmax(worst, away(q + 4 * c, want) / sqrt(scale));
         }
     }
@@ -253,7 +254,7 @@ static void test_rigid_transfer(void)
         double *target = pairs[i].target ? t.pose[0] : warp(t.pose[0], g->nv, 0.3),
                *pose = move_points(&by, s.pose[0], g->nv);
         double *w = vectors_of(g, target), *got = room(n, sizeof *got);
-        vg_deformer *d = deformer(g, s.h.reference, 2);
+        vg_deformer *d = deformer(g, s.h.body.reference, 2);
         aim(d, g, target);
         for (size_t c = 0; c < n / 3; c++) move_vector(&by, w + 3 * c, w + 3 * c);
         vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &got);
@@ -278,14 +279,14 @@ static void test_unit_of_source(void)
     for (size_t i = 0; make_any(i, &h, &name); i++) {
         vg_graph *g = graph_of(&h);
         size_t n = 4 * vg_graph_corners(g), nv = g->nv;
-        double *pose = warp(h.reference, nv, 0.8), *before = measure(&h, g, pose), worst = 0;
+        double *pose = warp(h.body.reference, nv, 0.8), *before = measure(&h, g, pose), worst = 0;
         static const double units[] = {2, 0x1p-70, 0x1p70, 1e-3};
         for (size_t u = 0; u < sizeof units / sizeof *units; u++) {
-            for (size_t k = 0; k < 3 * nv; k++) h.reference[k] *= units[u], pose[k] *= units[u];
+            for (size_t k = 0; k < 3 * nv; k++) h.body.reference[k] *= units[u], pose[k] *= units[u];
             double *after = measure(&h, g, pose);
             for (size_t k = 0; k < n; k += 4) worst = fmax(worst, away(before + k, after + k));
             free(after);
-            for (size_t k = 0; k < 3 * nv; k++) h.reference[k] /= units[u], pose[k] /= units[u];
+            for (size_t k = 0; k < 3 * nv; k++) h.body.reference[k] /= units[u], pose[k] /= units[u];
         }
         if (!(worst <= 1e-12)) printf("%s:\n", name);
         CHECK_NEAR(worst, 0, 1e-12);
@@ -306,7 +307,7 @@ static double ways_differ(vg_head *h, size_t n, const double *const *poses, cons
     double **q = lists(n, 4 * corners), **a = lists(n, 3 * corners), **b = lists(n, 3 * corners),
            **w = lists(n, 3 * corners);
     double D = vg_diagonal(target, g->nv), worst = 0;
-    vg_deformer *d = deformer(g, h->reference, 1);
+    vg_deformer *d = deformer(g, h->body.reference, 1);
     aim(d, g, target);
     vg_deformer_measure(d, n, VG_VERTICES, poses, q);
     vg_deformer_apply(d, n, CONST(q), a);
@@ -335,8 +336,8 @@ static void test_two_ways(void)
     vg_head h;
     const char *name;
     for (size_t i = 0; make_any(i, &h, &name); i++) {
-        double *poses[POSES], *target = warp(h.reference, h.mesh.nv, 0.3);
-        for (size_t k = 0; k < POSES; k++) poses[k] = warp(h.reference, h.mesh.nv, 0.15 * (double)k);
+        double *poses[POSES], *target = warp(h.body.reference, h.body.mesh.nv, 0.3);
+        for (size_t k = 0; k < POSES; k++) poses[k] = warp(h.body.reference, h.body.mesh.nv, 0.15 * (double)k);
         double differ = ways_differ(&h, POSES, CONST(poses), target);
         if (!(differ <= 1e-12)) printf("%s:\n", name);
         CHECK_NEAR(differ, 0, 1e-12);
@@ -345,7 +346,7 @@ static void test_two_ways(void)
         vg_head_clear(&h);
     }
     film f = load_film("trex-walk.tar.xz", "trex.rest.obj", 12);
-    double *target = warp(f.h.reference, f.h.mesh.nv, 0.2);
+    double *target = warp(f.h.body.reference, f.h.body.mesh.nv, 0.2);
     CHECK_NEAR(ways_differ(&f.h, f.n, CONST(f.pose), target), 0, 1e-12);
     free(target);
     film_clear(&f);
@@ -360,8 +361,8 @@ static void test_threads_and_batches(void)
         size_t corners = vg_graph_corners(g);
         double *poses[POSES], **q = lists(POSES, 4 * corners), **w = lists(POSES, 3 * corners);
         double **q1 = lists(POSES, 4 * corners), **w1 = lists(POSES, 3 * corners);
-        for (size_t k = 0; k < POSES; k++) poses[k] = warp(shapes[i].reference, g->nv, 0.1 * (double)k);
-        vg_deformer *d = deformer(g, shapes[i].reference, 1);
+        for (size_t k = 0; k < POSES; k++) poses[k] = warp(shapes[i].body.reference, g->nv, 0.1 * (double)k);
+        vg_deformer *d = deformer(g, shapes[i].body.reference, 1);
         aim_by(d, g, poses[2], methods[i % 3]);
         for (size_t k = 0; k < POSES; k++) {
             vg_deformer_measure(d, 1, VG_VERTICES, CONST(poses + k), q1 + k);
@@ -371,7 +372,7 @@ static void test_threads_and_batches(void)
         vg_deformer_free(&d);
         for (int threads = 1; threads <= 3; threads++) {
             for (size_t batch = 1; batch <= POSES; batch++) {
-                d = deformer(g, shapes[i].reference, threads);
+                d = deformer(g, shapes[i].body.reference, threads);
                 aim_by(d, g, poses[2], methods[i % 3]);
                 for (size_t k = 0; k < POSES; k += batch) {
                     size_t n = POSES - k < batch ? POSES - k : batch;
@@ -405,10 +406,10 @@ static void test_degenerate(void)
     size_t corners = vg_graph_corners(g), nv = g->nv;
     CHECK(g->nlinks == 0);
     motion t = turn(1.1, 1, 2);
-    double *pose = move_points(&t, h.reference, nv), *q = room(4 * corners, sizeof *q), want[4];
+    double *pose = move_points(&t, h.body.reference, nv), *q = room(4 * corners, sizeof *q), want[4];
     static const double identity[4] = {1, 0, 0, 0};
     vg_quat_from_matrix(t.m, want);
-    vg_deformer *d = deformer(g, h.reference, 1);
+    vg_deformer *d = deformer(g, h.body.reference, 1);
     CHECK(vg_deformer_counts(d).corners == 0 && vg_deformer_counts(d).first_face == UINT64_MAX);
     vg_deformer_measure(d, 1, VG_VERTICES, CONST(&pose), &q);
     /* three on the face without area, three on the point, two on the segment without length,
@@ -419,7 +420,7 @@ static void test_degenerate(void)
             bool alone = f >= 1 && f <= 3, bone = f == 4;
             if (!bone) CHECK_NEAR(away(q + 4 * c, alone ? identity : want), 0, 1e-12);
         }
-    aim(d, g, h.reference);
+    aim(d, g, h.body.reference);
     double *w = vectors_of(g, pose), *got = room(3 * corners, sizeof *got);
     vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &got);
     CHECK(vg_deformer_counts(d).corners == 18);
@@ -444,8 +445,8 @@ static void test_collapsed_in_one_pose(void)
     vg_graph *g = graph_of(&h);
     size_t corners = vg_graph_corners(g);
     double *poses[POSES], **good = lists(POSES, 3 * corners), **bad = lists(POSES, 3 * corners);
-    for (size_t k = 0; k < POSES; k++) poses[k] = warp(h.reference, g->nv, 0.1 * (double)k);
-    vg_deformer *d = deformer(g, h.reference, 1);
+    for (size_t k = 0; k < POSES; k++) poses[k] = warp(h.body.reference, g->nv, 0.1 * (double)k);
+    vg_deformer *d = deformer(g, h.body.reference, 1);
     aim(d, g, poses[1]);
     vg_deformer_transfer(d, POSES, VG_VERTICES, CONST(poses), good);
     CHECK(vg_deformer_counts(d).corners == 0);
@@ -479,8 +480,8 @@ static void test_where_degenerate_begins(void)
         FACE(&h, 0, 3);
         vg_graph *g = graph_of(&h);
         double *q = room(4 * vg_graph_corners(g), sizeof *q);
-        vg_deformer *d = deformer(g, h.reference, 1);
-        vg_deformer_measure(d, 1, VG_VERTICES, CONST(&h.reference), &q);
+        vg_deformer *d = deformer(g, h.body.reference, 1);
+        vg_deformer_measure(d, 1, VG_VERTICES, CONST(&h.body.reference), &q);
         CHECK(vg_deformer_counts(d).corners == (factor ? 0 : 2));
         CHECK(vg_deformer_counts(d).first_face == (factor ? UINT64_MAX : 1));
         vg_deformer_free(&d);
@@ -499,11 +500,11 @@ static void test_nothing_but_finite(void)
     size_t corners = vg_graph_corners(g);
     double *pose = room(3 * g->nv, sizeof *pose), *q = room(4 * corners, sizeof *q),
            *w = room(3 * corners, sizeof *w);
-    vg_deformer *d = deformer(g, h.reference, 1);
+    vg_deformer *d = deformer(g, h.body.reference, 1);
     for (int trial = 0; trial < 3000; trial++) {
         for (size_t i = 0; i < 3 * g->nv; i++) pose[i] = values[(size_t)((noise() + 1) * 3.4999)];
         vg_deformer_measure(d, 1, VG_VERTICES, CONST(&pose), &q);
-        if (trial % 1000 == 0) aim_by(d, g, h.reference, methods[trial / 1000]);
+        if (trial % 1000 == 0) aim_by(d, g, h.body.reference, methods[trial / 1000]);
         vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &w);
         CHECK(vgi_finite(q, 4 * corners) && vgi_finite(w, 3 * corners));
         for (size_t c = 0; c < corners; c++) CHECK(dot(q + 4 * c, q + 4 * c, 4) > 0);
@@ -568,10 +569,10 @@ static void test_gradient(void)
     for (size_t i = 0; make_any(i, &h, &name); i++) {
         vg_graph *g = graph_of(&h);
         size_t corners = vg_graph_corners(g);
-        double *pose = warp(h.reference, g->nv, 0.6), *target = warp(h.reference, g->nv, -0.3), *w[3];
-        double *r = vectors_of(g, h.reference), *p = vectors_of(g, pose), *t = vectors_of(g, target);
+        double *pose = warp(h.body.reference, g->nv, 0.6), *target = warp(h.body.reference, g->nv, -0.3), *w[3];
+        double *r = vectors_of(g, h.body.reference), *p = vectors_of(g, pose), *t = vectors_of(g, target);
         double *want = room(3 * g->max_corners, sizeof *want), D = vg_diagonal(target, g->nv), worst = 0, apart = 0;
-        vg_deformer *d = deformer(g, h.reference, 1);
+        vg_deformer *d = deformer(g, h.body.reference, 1);
         for (int k = 0; k < 3; k++) {
             w[k] = room(3 * corners, sizeof(double));
             aim_by(d, g, target, methods[k]);
@@ -606,10 +607,10 @@ static double self_transfer(vg_head *h, size_t n, const double *const *poses, vg
            worst = 0;
     vg_err e;
     vg_solver *s;
-    vg_deformer *d = deformer(g, h->reference, threads);
-    aim_by(d, g, h->reference, method);
+    vg_deformer *d = deformer(g, h->body.reference, threads);
+    aim_by(d, g, h->body.reference, method);
     vg_deformer_transfer(d, n, VG_VERTICES, poses, w);
-    if (vg_solver_new(&s, g, NULL, 0, h->reference, VG_WEIGHTS_UNIFORM, threads, &e) < 0) abort();
+    if (vg_solver_new(&s, g, NULL, 0, h->body.reference, VG_WEIGHTS_UNIFORM, threads, &e) < 0) abort();
     for (size_t i = 0; i < n; i++) vg_graph_root(g, poses[i], root[i]);
     vg_solver_load(s, n, CONST(w), NULL, x, rhs);
     vg_solver_solve(s, n, CONST(rhs), x, NULL, CONST(root));
@@ -630,7 +631,7 @@ static void test_onto_itself(void)
     vg_head h;
     const char *name;
     for (size_t i = 0; make_any(i, &h, &name); i++) {
-        double *pose = warp(h.reference, h.mesh.nv, 1);
+        double *pose = warp(h.body.reference, h.body.mesh.nv, 1);
         for (size_t k = 0; k < 3; k++) {
             double worst = self_transfer(&h, 1, CONST(&pose), methods[k], 1);
             if (!(worst <= 1e-10)) printf("%s, method %zu:\n", name, k);

@@ -58,7 +58,11 @@ static double rest_pose[] = {0, 0, 0, 1,   0,   0, 1, 1, 0, 0, 1, 0, 2, 0, 0, 4,
 static void fill(vg_head *h, vg_frame frames[3], double values[3][36])
 {
     static char name[3][8] = {"a\"b", "\xc3\xa4\\", "c"}, reference[] = "rest";
-    *h = (vg_head){.mesh = {12, 4, starts, corners}, .reference = rest_pose, .reference_name = reference, .kind = VG_VERTICES, .count = 12};
+    *h = (vg_head){.body.mesh = {12, 4, starts, corners},
+                   .body.reference = rest_pose,
+                   .body.reference_name = reference,
+                   .kind = VG_VERTICES,
+                   .count = 12};
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 36; k++) values[i][k] = rest_pose[k] + 0.1 * i * (k % 5) - 0.25 * i;
         frames[i] = (vg_frame){.name = name[i], .has_time = true, .time = 0.5 * i, .values = values[i]};
@@ -80,10 +84,10 @@ static void comes_back(const vgi_sequence_format *format)
     if (format == &vgi_sequence_gltf) b.size--; /* the last line's end is not needed */
     played p = play(format, b.data, b.size);
     CHECK(p.result == 0 && p.frames == 3 && p.timed && p.times[2] == 1);
-    CHECK(vg_mesh_same(&h.mesh, "a", &p.h.mesh, "b", NULL) == VG_OK);
+    CHECK(vg_mesh_same(&h.body.mesh, "a", &p.h.body.mesh, "b", NULL) == VG_OK);
     CHECK_TEXT(p.names, "a\"b \xc3\xa4\\ c ");
-    CHECK_TEXT(p.h.reference_name, "rest");
-    for (int k = 0; k < 36; k++) CHECK_NEAR(p.h.reference[k], rest_pose[k], 1e-6);
+    CHECK_TEXT(p.h.body.reference_name, "rest");
+    for (int k = 0; k < 36; k++) CHECK_NEAR(p.h.body.reference[k], rest_pose[k], 1e-6);
     for (int i = 0; i < 108; i++) CHECK_NEAR(p.values[i], values[i / 36][i % 36], 1e-6);
     played_clear(&p);
     check_prefixes(format, &b);
@@ -156,12 +160,12 @@ static void skin_comes_back(const vgi_sequence_format *format, double scale)
     int r;
     const vg_skeleton skeleton = {5, rig_joints};
     fill(&h, frames, values);
-    CHECK(vg_rig_make(&h.rig, &skeleton, rig_at, rig_turns, NULL) == VG_OK && h.rig.nbones == 3);
-    hang(&h.rig, bones, weights);
+    CHECK(vg_rig_make(&h.body.rig, &skeleton, rig_at, rig_turns, NULL) == VG_OK && h.body.rig.nbones == 3);
+    hang(&h.body.rig, bones, weights);
     h.kind = VG_TRANSFORMS, h.count = 3;
     CHECK(format->check(&h, "out", NULL) == VG_OK);
     for (int i = 0; i < 3; i++) {
-        move_bones(&h.rig, i, scale, transforms[i]);
+        move_bones(&h.body.rig, i, scale, transforms[i]);
         frames[i].values = transforms[i];
     }
     vg_bytes b = record(format, &h, frames, 3, false, &r, NULL);
@@ -170,16 +174,16 @@ static void skin_comes_back(const vgi_sequence_format *format, double scale)
     if (format == &vgi_sequence_gltf) b.size--;
     played p = play(format, b.data, b.size);
     CHECK(p.result == 0 && p.frames == 3 && p.timed && p.times[1] == 0.5 && p.h.kind == VG_VERTICES);
-    CHECK(vg_mesh_same(&h.mesh, "a", &p.h.mesh, "b", NULL) == VG_OK);
+    CHECK(vg_mesh_same(&h.body.mesh, "a", &p.h.body.mesh, "b", NULL) == VG_OK);
     CHECK_TEXT(p.names, "a\"b \xc3\xa4\\ c ");
     for (int i = 0; i < 3; i++) {
-        vg_rig_skin(&h.rig, 12, h.reference, transforms[i], truth);
+        vg_rig_skin(&h.body.rig, 12, h.body.reference, transforms[i], truth);
         /* the mesh is 15 across */
         for (int k = 0; k < 36; k++) CHECK_NEAR(p.values[36 * i + k], truth[k], 2e-6 * 15);
     }
-    h.rig.skin_bone = NULL, h.rig.skin_weight = NULL;
+    h.body.rig.skin_bone = NULL, h.body.rig.skin_weight = NULL;
     CHECK(format->check(&h, "out", NULL) == VG_EINPUT);
-    vg_rig_clear(&h.rig);
+    vg_rig_clear(&h.body.rig);
     CHECK(format->check(&h, "out", NULL) == VG_EINPUT);
     played_clear(&p);
     vg_bytes_clear(&b);
@@ -200,13 +204,13 @@ static void points_come_back(void)
     int r;
     char warning[200];
     fill(&h, frames, values);
-    h.mesh.nf = 0;
+    h.body.mesh.nf = 0;
     frames[1].time = -1; /* does not ascend */
     memcpy(values[0] + 3, values[0], 3 * sizeof(double)); /* two points that coincide stay two */
     vg_bytes b = record(&vgi_sequence_glb, &h, frames, 3, false, &r, warning);
     CHECK(r == VG_OK && strstr(warning, "the times of the frames"));
     played p = play(&vgi_sequence_glb, b.data, b.size);
-    CHECK(p.result == 0 && p.frames == 3 && p.h.count == 12 && p.h.mesh.nf == 0);
+    CHECK(p.result == 0 && p.frames == 3 && p.h.count == 12 && p.h.body.mesh.nf == 0);
     CHECK_NEAR(p.times[2], 2 / 30.0, 1e-6);
     played_clear(&p);
     vg_bytes_clear(&b);
@@ -227,9 +231,9 @@ static void targets_are_frames(void)
                          "'accessors':[" FLOATS(0, 3, "VEC3") "," FLOATS(36, 3, "VEC3") ",{'componentType':5126,'count':3,'type':'VEC3',"
                          "'sparse':{'count':1,'indices':{'bufferView':0,'byteOffset':84,'componentType':5121},"
                          "'values':{'bufferView':0,'byteOffset':72}}}]", &bin, sizeof bin);
-    CHECK(p.result == 0 && p.frames == 4 && p.h.count == 3 && p.h.mesh.nf == 1 && !p.timed);
+    CHECK(p.result == 0 && p.frames == 4 && p.h.count == 3 && p.h.body.mesh.nf == 1 && !p.timed);
     CHECK_TEXT(p.names, "base smile frown  ");
-    CHECK_TEXT(p.h.reference_name, "face");
+    CHECK_TEXT(p.h.body.reference_name, "face");
     check_point(&p, 0, 1, 11, 0, 0);
     check_point(&p, 1, 1, 11, 0, 2);
     check_point(&p, 1, 2, 10, 1, 3);
@@ -250,14 +254,14 @@ static void only_equal_vertices_are_welded(void)
     snprintf(json, sizeof json, targets, "");
     played p = play_json(json, &bin, sizeof bin);
     const uint32_t whole[] = {0, 1, 2, 0, 2, 3}, torn[] = {0, 1, 2, 0, 3, 4};
-    CHECK(p.result == 0 && p.frames == 1 && p.h.count == 4 && p.h.mesh.nf == 2 &&
-          !memcmp(p.h.mesh.vert, whole, sizeof whole));
+    CHECK(p.result == 0 && p.frames == 1 && p.h.count == 4 && p.h.body.mesh.nf == 2 &&
+          !memcmp(p.h.body.mesh.vert, whole, sizeof whole));
     check_point(&p, 0, 3, 0, 1, 0);
     played_clear(&p);
     snprintf(json, sizeof json, targets, ",'targets':[{'POSITION':1}]");
     p = play_json(json, &bin, sizeof bin);
-    CHECK(p.result == 0 && p.frames == 2 && p.h.count == 5 && p.h.mesh.nf == 2 &&
-          !memcmp(p.h.mesh.vert, torn, sizeof torn));
+    CHECK(p.result == 0 && p.frames == 2 && p.h.count == 5 && p.h.body.mesh.nf == 2 &&
+          !memcmp(p.h.body.mesh.vert, torn, sizeof torn));
     check_point(&p, 1, 2, 1, 1, 5);
     check_point(&p, 1, 3, 1, 1, 6);
     played_clear(&p);
@@ -295,7 +299,7 @@ static void weights_stay(void)
         CHECK(p.result == 0 && p.frames == 2);
         check_point(&p, 0, 0, 1, i ? 0 : 0.5, i ? 3 : 2);
         check_point(&p, 1, 0, 6, i ? 0 : 0.5, i ? 3 : 2);
-        CHECK(p.h.reference[0] == 1 && p.h.reference[1] == 0 && p.h.reference[2] == 0);
+        CHECK(p.h.body.reference[0] == 1 && p.h.body.reference[1] == 0 && p.h.body.reference[2] == 0);
         played_clear(&p);
     }
 }
@@ -406,10 +410,11 @@ static void all_kinds_of_primitives(void)
         snprintf(json, sizeof json, "'nodes':[{'mesh':0}],'meshes':[{'primitives':[{'mode':%d,'attributes':{'POSITION':0}}]}],"
                  "'accessors':[" FLOATS(0, 5, "VEC3") "]", cases[i].mode);
         played p = play_json(json, bin, sizeof bin);
-        const size_t n = vg_mesh_corners(&p.h.mesh);
-        CHECK(p.result == 0 && p.h.count == 5 && p.h.mesh.nf == cases[i].faces &&
+        const size_t n = vg_mesh_corners(&p.h.body.mesh);
+        CHECK(p.result == 0 && p.h.count == 5 && p.h.body.mesh.nf == cases[i].faces &&
               n == cases[i].faces * cases[i].size);
-        if (n) CHECK(!memcmp(p.h.mesh.vert + n - cases[i].size, cases[i].last, cases[i].size * sizeof(uint32_t)));
+        if (n)
+            CHECK(!memcmp(p.h.body.mesh.vert + n - cases[i].size, cases[i].last, cases[i].size * sizeof(uint32_t)));
         played_clear(&p);
     }
 }
@@ -425,7 +430,7 @@ static void stale_polygons_are_passed_over(void)
         snprintf(json, sizeof json, "'nodes':[{'mesh':0}],'meshes':[{'primitives':[{'attributes':{'POSITION':0}}],"
                  "'extras':{'vg_faces':[%s]}}],'accessors':[" FLOATS(0, 6, "VEC3") "]", runs[i]);
         played p = play_json(json, bin, sizeof bin);
-        CHECK(p.result == 0 && p.h.count == 4 && p.h.mesh.nf == 2 && vg_mesh_corners(&p.h.mesh) == 6);
+        CHECK(p.result == 0 && p.h.count == 4 && p.h.body.mesh.nf == 2 && vg_mesh_corners(&p.h.body.mesh) == 6);
         played_clear(&p);
     }
 }

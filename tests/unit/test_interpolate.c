@@ -25,9 +25,9 @@ static void trial_begin(trial *t, vg_head *h)
     *t = (trial){.h = *h};
     t->g = graph_of(&t->h);
     t->corners = vg_graph_corners(t->g);
-    t->D = vg_diagonal(h->reference, h->mesh.nv);
+    t->D = vg_diagonal(h->body.reference, h->body.mesh.nv);
     t->w = room(3 * t->corners, sizeof(double));
-    t->rhs = room(3 * h->mesh.nv, sizeof(double));
+    t->rhs = room(3 * h->body.mesh.nv, sizeof(double));
 }
 
 /* takes the pose over */
@@ -45,15 +45,16 @@ static void trial_open(trial *t, bool smooth, int threads)
 {
     vg_err e = {0, ""};
     const vg_path_options o = {.kind = VG_VERTICES, .nanchors = t->h.nanchors, .smooth = smooth, .threads = threads};
-    if (vg_path_new(&t->path, t->g, t->h.reference, t->keys, t->n, &o, &e) < 0 ||
-        vg_solver_new(&t->solver, t->g, t->h.anchors, t->h.nanchors, t->h.reference, VG_WEIGHTS_UNIFORM, 1, &e) < 0)
+    if (vg_path_new(&t->path, t->g, t->h.body.reference, t->keys, t->n, &o, &e) < 0 ||
+        vg_solver_new(&t->solver, t->g, t->h.anchors, t->h.nanchors, t->h.body.reference, VG_WEIGHTS_UNIFORM, 1, &e) <
+            0)
         printf("%s\n", e.message), exit(1);
 }
 
 /* the vertices of vectors */
 static double *solve(trial *t, const double *w, const double *root, const double *anchors)
 {
-    double *x = room(3 * t->h.mesh.nv, sizeof *x);
+    double *x = room(3 * t->h.body.mesh.nv, sizeof *x);
     const double *rhs = t->rhs;
     vg_solver_load(t->solver, 1, &w, &anchors, &x, &t->rhs);
     vg_solver_solve(t->solver, 1, &rhs, &x, &anchors, &root);
@@ -109,8 +110,9 @@ static double *plain_at(trial *t, double u)
 
 static double *linear_at(const trial *t, double u)
 {
-    double *x = room(3 * t->h.mesh.nv, sizeof *x);
-    for (size_t i = 0; i < 3 * t->h.mesh.nv; i++) x[i] = (1 - u) * t->keys[0].values[i] + u * t->keys[1].values[i];
+    double *x = room(3 * t->h.body.mesh.nv, sizeof *x);
+    for (size_t i = 0; i < 3 * t->h.body.mesh.nv; i++)
+        x[i] = (1 - u) * t->keys[0].values[i] + u * t->keys[1].values[i];
     return x;
 }
 
@@ -126,15 +128,15 @@ static double *copy_points(const double *x, size_t n)
 static double top_of(const vg_head *h)
 {
     double top = 0;
-    for (size_t v = 0; v < h->mesh.nv; v++) top = fmax(top, h->reference[3 * v + 2]);
+    for (size_t v = 0; v < h->body.mesh.nv; v++) top = fmax(top, h->body.reference[3 * v + 2]);
     return top;
 }
 
 static double *twisted(const vg_head *h, double angle)
 {
-    double *y = room(3 * h->mesh.nv, sizeof *y), top = top_of(h);
-    for (size_t v = 0; v < h->mesh.nv; v++) {
-        const double *x = h->reference + 3 * v;
+    double *y = room(3 * h->body.mesh.nv, sizeof *y), top = top_of(h);
+    for (size_t v = 0; v < h->body.mesh.nv; v++) {
+        const double *x = h->body.reference + 3 * v;
         double a = angle * x[2] / top, c = cos(a), s = sin(a);
         y[3 * v] = c * x[0] - s * x[1], y[3 * v + 1] = s * x[0] + c * x[1], y[3 * v + 2] = x[2];
     }
@@ -144,9 +146,9 @@ static double *twisted(const vg_head *h, double angle)
 /* The middle third bends about y, the rest stays straight. */
 static double *bent(const vg_head *h, double angle)
 {
-    double *y = room(3 * h->mesh.nv, sizeof *y), top = top_of(h), arc = top / 3;
-    for (size_t v = 0; v < h->mesh.nv; v++) {
-        const double *x = h->reference + 3 * v;
+    double *y = room(3 * h->body.mesh.nv, sizeof *y), top = top_of(h), arc = top / 3;
+    for (size_t v = 0; v < h->body.mesh.nv; v++) {
+        const double *x = h->body.reference + 3 * v;
         double s = x[2] - arc, along = s < 0 ? 0 : s > arc ? arc : s, a = angle * along / arc, R = arc / angle;
         double ahead = s < 0 ? s : s > arc ? s - arc : 0;
         y[3 * v] = R * (1 - cos(a)) + x[0] * cos(a) + ahead * sin(a);
@@ -173,7 +175,7 @@ static double volume(const vg_mesh *m, const double *x)
 static double twist_of_ring(const vg_head *h, const double *x, size_t ring, size_t sides, double expected)
 {
     double centre[3], was[3], c = 0, s = 0;
-    const double *a = h->reference + 3 * ring * sides, *b = x + 3 * ring * sides;
+    const double *a = h->body.reference + 3 * ring * sides, *b = x + 3 * ring * sides;
     vg_centroid(a, sides, was);
     vg_centroid(b, sides, centre);
     for (size_t i = 0; i < sides; i++) {
@@ -193,14 +195,14 @@ static double uneven(trial *t, const double *x, double angle, double u, double *
 {
     double most = 0, root[3], mine[3];
     for (size_t ring = 0; ring < RINGS; ring++) {
-        double want = u * angle * t->h.reference[3 * ring * SIDES + 2] / top_of(&t->h);
+        double want = u * angle * t->h.body.reference[3 * ring * SIDES + 2] / top_of(&t->h);
         most = fmax(most, fabs(twist_of_ring(&t->h, x, ring, SIDES, want) - want));
     }
     double *even = twisted(&t->h, u * angle);
     vg_graph_root(t->g, even, root);
     vg_graph_root(t->g, x, mine);
-    for (size_t i = 0; i < 3 * t->h.mesh.nv; i++) even[i] += mine[i % 3] - root[i % 3];
-    *off = farthest(even, x, t->h.mesh.nv) / t->D;
+    for (size_t i = 0; i < 3 * t->h.body.mesh.nv; i++) even[i] += mine[i % 3] - root[i % 3];
+    *off = farthest(even, x, t->h.body.mesh.nv) / t->D;
     free(even);
     return most / DEGREES;
 }
@@ -218,14 +220,14 @@ static void ends_are_exact(void)
             if (vg_head_copy(&again, &h, &e) < 0) exit(1);
             trial t;
             trial_begin(&t, &again);
-            trial_key(&t, warp(h.reference, h.mesh.nv, 0.3));
-            trial_key(&t, warp(h.reference, h.mesh.nv, 1));
-            trial_key(&t, warp(h.reference, h.mesh.nv, -0.8));
+            trial_key(&t, warp(h.body.reference, h.body.mesh.nv, 0.3));
+            trial_key(&t, warp(h.body.reference, h.body.mesh.nv, 1));
+            trial_key(&t, warp(h.body.reference, h.body.mesh.nv, -0.8));
             trial_open(&t, smooth, 1);
             for (size_t k = 0; k < 3; k++) {
                 double *x = at(&t, (double)k), *y = at(&t, (double)k + (k == 2 ? -1e-12 : 1e-12));
                 /* vertices in no face are placed by the solver, at the reference */
-                for (size_t v = 0; v < h.mesh.nv; v++) {
+                for (size_t v = 0; v < h.body.mesh.nv; v++) {
                     if (!t.g->in_face[v]) continue;
                     const double *key = t.keys[k].values + 3 * v;
                     double off = farthest(x + 3 * v, key, 1), near = farthest(y + 3 * v, key, 1);
@@ -246,19 +248,19 @@ static void degenerate_ends_are_exact(void)
     vg_head h = make_degenerate();
     trial t;
     trial_begin(&t, &h);
-    trial_key(&t, copy_points(h.reference, h.mesh.nv));
-    trial_key(&t, warp(h.reference, h.mesh.nv, 1));
-    double *apart = warp(h.reference, h.mesh.nv, -0.5); /* points that coincided come apart */
-    for (size_t i = 0; i < 3 * h.mesh.nv; i++) apart[i] += 0.3 * noise();
+    trial_key(&t, copy_points(h.body.reference, h.body.mesh.nv));
+    trial_key(&t, warp(h.body.reference, h.body.mesh.nv, 1));
+    double *apart = warp(h.body.reference, h.body.mesh.nv, -0.5); /* points that coincided come apart */
+    for (size_t i = 0; i < 3 * h.body.mesh.nv; i++) apart[i] += 0.3 * noise();
     trial_key(&t, apart);
     trial_open(&t, false, 1);
     for (size_t k = 0; k < 3; k++) {
         double *x = at(&t, (double)k);
-        CHECK_NEAR(farthest(x, t.keys[k].values, h.mesh.nv), 0, 1e-10 * t.D);
+        CHECK_NEAR(farthest(x, t.keys[k].values, h.body.mesh.nv), 0, 1e-10 * t.D);
         free(x);
     }
     double *x = at(&t, 1.5);
-    CHECK(farthest(x, apart, h.mesh.nv) < INFINITY);
+    CHECK(farthest(x, apart, h.body.mesh.nv) < INFINITY);
     CHECK(vg_path_get_facts(t.path).degenerate.corners > 0);
     free(x);
     trial_end(&t);
@@ -290,11 +292,11 @@ static void rigid_turns_stay_rigid(void)
             trial t;
             trial_begin(&t, &again);
             motion m = turn(angles[k / 2] * DEGREES, 1, 0.7 * t.D);
-            trial_key(&t, copy_points(h.reference, h.mesh.nv));
-            trial_key(&t, move_points(&m, h.reference, h.mesh.nv));
+            trial_key(&t, copy_points(h.body.reference, h.body.mesh.nv));
+            trial_key(&t, move_points(&m, h.body.reference, h.body.mesh.nv));
             trial_open(&t, k % 2, 1);
             for (double u = -0.5; u < 1.6; u += 0.25) {
-                double *x = at(&t, u), change = shape_change(h.reference, x, h.mesh.nv) / t.D;
+                double *x = at(&t, u), change = shape_change(h.body.reference, x, h.body.mesh.nv) / t.D;
                 if (!(change <= 1e-9))
                     printf("%s, %g degrees at %g: %g D\n", name, angles[k / 2], u, change), test_bad++;
                 free(x);
@@ -317,12 +319,12 @@ static void anchors_turn_with_the_body(void)
         trial_begin(&t, &h);
         for (int k = 0; k < 3; k++) {
             motion m = turn(100 * k * DEGREES, 1, 0.3 * k * k);
-            trial_key(&t, move_points(&m, h.reference, h.mesh.nv));
+            trial_key(&t, move_points(&m, h.body.reference, h.body.mesh.nv));
         }
         trial_open(&t, smooth, 2);
         for (double u = 0; u <= 2; u += 0.125) {
             double *x = at(&t, u);
-            CHECK_NEAR(shape_change(h.reference, x, h.mesh.nv), 0, 1e-9 * t.D);
+            CHECK_NEAR(shape_change(h.body.reference, x, h.body.mesh.nv), 0, 1e-9 * t.D);
             free(x);
         }
         trial_end(&t);
@@ -334,12 +336,12 @@ static void limb_keeps_its_volume(void)
     vg_head h = make_rod(RINGS, SIDES, false);
     trial t;
     trial_begin(&t, &h);
-    trial_key(&t, copy_points(h.reference, h.mesh.nv));
+    trial_key(&t, copy_points(h.body.reference, h.body.mesh.nv));
     trial_key(&t, bent(&h, 120 * DEGREES));
     trial_open(&t, false, 1);
     double *x = at(&t, 0.5), *y = linear_at(&t, 0.5);
-    double mean = (volume(&h.mesh, t.keys[0].values) + volume(&h.mesh, t.keys[1].values)) / 2;
-    double ours = volume(&h.mesh, x) / mean, linear = volume(&h.mesh, y) / mean;
+    double mean = (volume(&h.body.mesh, t.keys[0].values) + volume(&h.body.mesh, t.keys[1].values)) / 2;
+    double ours = volume(&h.body.mesh, x) / mean, linear = volume(&h.body.mesh, y) / mean;
     printf("volume half way, of the ends' mean: %.4f, linear %.4f\n", ours, linear);
     CHECK_NEAR(ours, 1, 0.05);
     CHECK(linear < 0.95);
@@ -357,7 +359,7 @@ static void bar_unwinds_evenly(void)
             trial t;
             trial_begin(&t, &h);
             double angle = angles[i] * DEGREES, most = 0, worst = 0, plain = 0, astray = 0, off;
-            trial_key(&t, copy_points(h.reference, h.mesh.nv));
+            trial_key(&t, copy_points(h.body.reference, h.body.mesh.nv));
             trial_key(&t, twisted(&h, angle));
             trial_open(&t, false, 1);
             for (double u = 0.125; u < 1; u += 0.125) {
@@ -386,10 +388,10 @@ static void smooth_paths_have_no_jumps(void)
         trial t;
         trial_begin(&t, &h);
         motion m = turn(k ? 2.2 : 0.7, 1.3, 2);
-        trial_key(&t, copy_points(h.reference, h.mesh.nv));
-        trial_key(&t, warp(h.reference, h.mesh.nv, 0.5));
+        trial_key(&t, copy_points(h.body.reference, h.body.mesh.nv));
+        trial_key(&t, warp(h.body.reference, h.body.mesh.nv, 0.5));
         double *turned = twisted(&h, (k ? 400 : 100) * DEGREES);
-        trial_key(&t, move_points(&m, turned, h.mesh.nv));
+        trial_key(&t, move_points(&m, turned, h.body.mesh.nv));
         free(turned);
         trial_key(&t, bent(&h, 1));
         t.keys[2].place = 2.5;
@@ -401,7 +403,7 @@ static void smooth_paths_have_no_jumps(void)
                 double *a = at(&t, (double)key - step), *b = at(&t, (double)key), *c = at(&t, (double)key + step);
                 double before = t.keys[key ? key : 1].place - t.keys[key ? key - 1 : 0].place;
                 double after = key < 3 ? t.keys[key + 1].place - t.keys[key].place : before;
-                for (size_t i = 0; i < 3 * h.mesh.nv; i++) {
+                for (size_t i = 0; i < 3 * h.body.mesh.nv; i++) {
                     double v0 = (b[i] - a[i]) / step / before, v1 = (c[i] - b[i]) / step / after;
                     jump = fmax(jump, fabs(v1 - v0) / t.D), first = fmax(first, fabs(v0) / t.D);
                 }
@@ -431,7 +433,7 @@ static void threads_change_nothing(void)
     for (int threads = 1; threads < 4; threads++) {
         const vg_path_options o = {.kind = VG_VERTICES, .smooth = true, .threads = threads};
         vg_path *p;
-        CHECK(vg_path_new(&p, t.g, h.reference, t.keys, t.n, &o, &e) == VG_OK);
+        CHECK(vg_path_new(&p, t.g, h.body.reference, t.keys, t.n, &o, &e) == VG_OK);
         for (size_t i = 0; i < 9; i++) {
             size_t k = threads == 3 ? 8 - i : i;
             double *to = threads == 1 ? want + 3 * t.corners * k : t.w;
@@ -451,14 +453,14 @@ static void kinds_agree(void)
     vg_head h = make_mixed(8);
     trial t;
     trial_begin(&t, &h);
-    trial_key(&t, warp(h.reference, h.mesh.nv, 0.4));
-    trial_key(&t, warp(h.reference, h.mesh.nv, 1));
+    trial_key(&t, warp(h.body.reference, h.body.mesh.nv, 0.4));
+    trial_key(&t, warp(h.body.reference, h.body.mesh.nv, 1));
     trial_open(&t, false, 1);
     double root[3], *no_anchors = room(0, 1), *vectors[2], *q[2];
     vg_key keys[2] = {t.keys[0], t.keys[1]};
     vg_deformer *d;
     vg_err e;
-    CHECK(vg_deformer_new(&d, t.g, h.reference, 1, &e) == VG_OK);
+    CHECK(vg_deformer_new(&d, t.g, h.body.reference, 1, &e) == VG_OK);
     for (int k = 0; k < 2; k++) {
         vectors[k] = vectors_of(t.g, t.keys[k].values);
         q[k] = room(4 * t.corners, sizeof(double));
@@ -470,7 +472,7 @@ static void kinds_agree(void)
         const vg_path_options o = {.kind = (vg_kind)kind, .threads = 1};
         vg_path *p;
         for (int k = 0; k < 2; k++) keys[k].values = kind == VG_VECTORS ? vectors[k] : q[k];
-        CHECK(vg_path_new(&p, t.g, h.reference, keys, 2, &o, &e) == VG_OK);
+        CHECK(vg_path_new(&p, t.g, h.body.reference, keys, 2, &o, &e) == VG_OK);
         CHECK(vg_path_at(p, 0.3, t.w, root, no_anchors, &e) == VG_OK);
         CHECK_NEAR(farthest(t.w, want, t.corners), 0, 1e-10 * t.D);
         vg_path_free(&p);
@@ -487,14 +489,14 @@ static void wrong_keys_are_refused(void)
     vg_head h = make_torus(5, 4);
     trial t;
     trial_begin(&t, &h);
-    trial_key(&t, copy_points(h.reference, h.mesh.nv));
-    trial_key(&t, copy_points(h.reference, h.mesh.nv));
+    trial_key(&t, copy_points(h.body.reference, h.body.mesh.nv));
+    trial_key(&t, copy_points(h.body.reference, h.body.mesh.nv));
     const vg_path_options o = {.kind = VG_VERTICES, .threads = 1};
     vg_path *p;
     vg_err e;
-    CHECK(vg_path_new(&p, t.g, h.reference, t.keys, 1, &o, &e) == VG_EARG && !p);
+    CHECK(vg_path_new(&p, t.g, h.body.reference, t.keys, 1, &o, &e) == VG_EARG && !p);
     t.keys[1].place = t.keys[0].place;
-    CHECK(vg_path_new(&p, t.g, h.reference, t.keys, 2, &o, &e) == VG_EARG && !p);
+    CHECK(vg_path_new(&p, t.g, h.body.reference, t.keys, 2, &o, &e) == VG_EARG && !p);
     trial_end(&t);
 }
 

@@ -304,14 +304,14 @@ static void a_head_is_prepared_once(void)
     struct built b = new_built(16, 12);
     add_box(&b, 0, 0, 0, 1);
     vg_head h = {0};
-    CHECK(vg_mesh_copy(&h.mesh, &b.m, NULL) == VG_OK);
-    h.reference = calloc(3 * 16, sizeof(double));
-    memcpy(h.reference, b.v, 3 * 8 * sizeof(double));
+    CHECK(vg_mesh_copy(&h.body.mesh, &b.m, NULL) == VG_OK);
+    h.body.reference = calloc(3 * 16, sizeof(double));
+    memcpy(h.body.reference, b.v, 3 * 8 * sizeof(double));
     CHECK(vg_head_prepare_vectors(&h, NULL) == VG_OK && h.has_links && h.nlinks == 0);
     add_box(&b, 3, 0, 0, 1);
-    vg_mesh_clear(&h.mesh);
-    CHECK(vg_mesh_copy(&h.mesh, &b.m, NULL) == VG_OK);
-    memcpy(h.reference, b.v, 3 * 16 * sizeof(double));
+    vg_mesh_clear(&h.body.mesh);
+    CHECK(vg_mesh_copy(&h.body.mesh, &b.m, NULL) == VG_OK);
+    memcpy(h.body.reference, b.v, 3 * 16 * sizeof(double));
     CHECK(vg_head_prepare_vectors(&h, NULL) == VG_OK && h.nlinks == 0); /* what was chosen stays */
     h.has_links = false;
     CHECK(vg_head_prepare_vectors(&h, NULL) == VG_OK && h.has_links && h.nlinks == 1);

@@ -12,13 +12,14 @@ static vg_head make_body(size_t n)
 {
     vg_head h = make_rod(24, 8, false);
     vg_err e;
-    h.patches.n = n;
-    h.patches.of_face = room(h.mesh.nf, sizeof *h.patches.of_face);
-    for (size_t f = 0; f < h.mesh.nf; f++) {
+    h.body.patches.n = n;
+    h.body.patches.of_face = room(h.body.mesh.nf, sizeof *h.body.patches.of_face);
+    for (size_t f = 0; f < h.body.mesh.nf; f++) {
         double z = 0, most = 2 * M_PI * 24 / 8;
-        for (uint32_t c = h.mesh.start[f]; c < h.mesh.start[f + 1]; c++)
-            z += h.reference[3 * (size_t)h.mesh.vert[c] + 2] / (h.mesh.start[f + 1] - h.mesh.start[f]);
-        h.patches.of_face[f] = (uint32_t)fmin((double)n - 1, floor(z / most * (double)n));
+        for (uint32_t c = h.body.mesh.start[f]; c < h.body.mesh.start[f + 1]; c++)
+            z += h.body.reference[3 * (size_t)h.body.mesh.vert[c] + 2] /
+                 (h.body.mesh.start[f + 1] - h.body.mesh.start[f]);
+        h.body.patches.of_face[f] = (uint32_t)fmin((double)n - 1, floor(z / most * (double)n));
     }
     CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK);
     return h;
@@ -28,8 +29,8 @@ static vg_head make_body(size_t n)
 static void bend(const vg_head *h, double angle, double *pose)
 {
     double most = 2 * M_PI * 24 / 8, r = most / angle;
-    for (size_t v = 0; v < h->mesh.nv; v++) {
-        const double *x = h->reference + 3 * v;
+    for (size_t v = 0; v < h->body.mesh.nv; v++) {
+        const double *x = h->body.reference + 3 * v;
         double a = angle * x[2] / most;
         pose[3 * v] = x[0] + angle;
         pose[3 * v + 1] = r * (1 - cos(a)) + x[1] * cos(a) - 3 * angle;
@@ -39,8 +40,8 @@ static void bend(const vg_head *h, double angle, double *pose)
 
 static void turn_all(const vg_head *h, double angle, double *pose)
 {
-    for (size_t v = 0; v < h->mesh.nv; v++) {
-        const double *x = h->reference + 3 * v;
+    for (size_t v = 0; v < h->body.mesh.nv; v++) {
+        const double *x = h->body.reference + 3 * v;
         pose[3 * v] = x[0] * cos(angle) - x[1] * sin(angle) + 5;
         pose[3 * v + 1] = x[0] * sin(angle) + x[1] * cos(angle) - 1;
         pose[3 * v + 2] = x[2] + 2;
@@ -51,7 +52,7 @@ static void fit(vg_head *h, void (*make)(const vg_head *, double, double *))
 {
     vg_map_fitter *f;
     vg_err e;
-    double *pose = room(3 * h->mesh.nv, sizeof *pose);
+    double *pose = room(3 * h->body.mesh.nv, sizeof *pose);
     CHECK(vg_map_fitter_new(&f, h, 0.03, 2, &e) == VG_OK);
     for (int i = 0; i < POSES; i++) {
         const double *poses[1] = {pose};
@@ -78,7 +79,7 @@ typedef struct played {
 static played open_player(const vg_head *h, bool single, int threads)
 {
     vg_err e;
-    played x = {NULL, room(7 * h->map.n, sizeof(double)), room(3 * h->mesh.nv, sizeof(double))};
+    played x = {NULL, room(7 * h->map.n, sizeof(double)), room(3 * h->body.mesh.nv, sizeof(double))};
     CHECK(vg_player_new(&x.p, h, single, threads, &e) == VG_OK);
     return x;
 }
@@ -106,16 +107,16 @@ static void rigid_bodies(void)
 {
     vg_head h = make_body(5);
     fit(&h, turn_all);
-    double D = vg_diagonal(h.reference, h.mesh.nv), *pose = room(3 * h.mesh.nv, sizeof *pose);
+    double D = vg_diagonal(h.body.reference, h.body.mesh.nv), *pose = room(3 * h.body.mesh.nv, sizeof *pose);
     played x = open_player(&h, false, 1);
     for (int i = 0; i < 10; i++) {
         turn_all(&h, 0.7 * i - 2, pose);
         measure(&x, pose);
         play(&x);
-        CHECK_NEAR(apart(x.vertices, pose, 3 * h.mesh.nv), 0, 1e-9 * D);
+        CHECK_NEAR(apart(x.vertices, pose, 3 * h.body.mesh.nv), 0, 1e-9 * D);
         vg_player_place(x.p, x.transforms);
         play(&x);
-        CHECK_NEAR(apart(x.vertices, pose, 3 * h.mesh.nv), 0, 1e-9 * D);
+        CHECK_NEAR(apart(x.vertices, pose, 3 * h.body.mesh.nv), 0, 1e-9 * D);
     }
     free(pose);
     close_player(&x);
@@ -132,12 +133,12 @@ static void collapsed_is_uncollapsed(void)
     fit(&h, bend);
     CHECK(vg_graph_new(&g, &h, &e) == VG_OK);
     uint32_t *of_face = vgi_graph_patches(&h, g, &e);
-    size_t corners = vg_graph_corners(g), nv = h.mesh.nv;
+    size_t corners = vg_graph_corners(g), nv = h.body.mesh.nv;
     double *vectors = room(3 * corners, sizeof *vectors), *wanted = room(3 * corners, sizeof *wanted);
     double *anchors = room(3 * h.map.nheld, sizeof *anchors), *x = room(3 * nv, sizeof *x),
            *rhs = room(3 * nv, sizeof *rhs);
     double *pose = room(3 * nv, sizeof *pose);
-    vg_graph_vectors(g, h.reference, vectors);
+    vg_graph_vectors(g, h.body.reference, vectors);
     CHECK(vgi_map_collapse(&h, g, of_face, vectors, 2, &e) == VG_OK);
     played p = open_player(&h, false, 2);
     bend(&h, 1.3, pose);
@@ -154,11 +155,11 @@ static void collapsed_is_uncollapsed(void)
         vg_quat_apply(t, h.map.held_at + 3 * i, anchors + 3 * i);
         for (size_t k = 0; k < 3; k++) anchors[3 * i + k] += t[4 + k];
     }
-    CHECK(vg_solver_new(&s, g, h.map.held, h.map.nheld, h.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_OK);
+    CHECK(vg_solver_new(&s, g, h.map.held, h.map.nheld, h.body.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_OK);
     vg_solver_load(s, 1, (const double *const *)&wanted, (const double *const *)&anchors, &x, &rhs);
     vg_solver_solve(s, 1, (const double *const *)&rhs, &x, (const double *const *)&anchors,
                     (const double *const *)&anchors);
-    CHECK_NEAR(apart(x, p.vertices, 3 * nv), 0, 1e-9 * vg_diagonal(h.reference, nv));
+    CHECK_NEAR(apart(x, p.vertices, 3 * nv), 0, 1e-9 * vg_diagonal(h.body.reference, nv));
     vg_solver_free(&s);
     close_player(&p);
     free(of_face);
@@ -176,8 +177,8 @@ static void paths(void)
 {
     vg_head h = make_body(6);
     fit(&h, bend);
-    size_t n = h.map.n, nv = h.mesh.nv;
-    double D = vg_diagonal(h.reference, nv), *a = room(7 * n, sizeof *a), *b = room(7 * n, sizeof *b),
+    size_t n = h.map.n, nv = h.body.mesh.nv;
+    double D = vg_diagonal(h.body.reference, nv), *a = room(7 * n, sizeof *a), *b = room(7 * n, sizeof *b),
            *pose = room(3 * nv, sizeof *pose);
     played x = open_player(&h, false, 1), single = open_player(&h, true, 2);
     bend(&h, 0.4, pose);
@@ -226,11 +227,11 @@ static void half_turns(void)
 {
     vg_head h = make_body(5);
     fit(&h, bend);
-    size_t n = h.map.n, nv = h.mesh.nv;
+    size_t n = h.map.n, nv = h.body.mesh.nv;
     double *a = room(7 * n, sizeof *a), *b = room(7 * n, sizeof *b), *pose = room(3 * nv, sizeof *pose),
            *start = room(3 * nv, sizeof *start);
     played x = open_player(&h, false, 1);
-    measure(&x, h.reference);
+    measure(&x, h.body.reference);
     memcpy(a, x.transforms, 7 * n * sizeof *a);
     play(&x);
     memcpy(start, x.vertices, 3 * nv * sizeof *start);
@@ -246,7 +247,7 @@ static void half_turns(void)
                 before += pow(start[3 * v + k] - start[k], 2);
                 after += pow(x.vertices[3 * v + k] - x.vertices[k], 2);
             }
-            CHECK_NEAR(sqrt(after), sqrt(before), 1e-9 * vg_diagonal(h.reference, nv));
+            CHECK_NEAR(sqrt(after), sqrt(before), 1e-9 * vg_diagonal(h.body.reference, nv));
         }
     }
     free(a);
@@ -264,8 +265,8 @@ static void other_bodies(void)
         vg_head h = make_body(5);
         vg_err e;
         fit(&h, bend);
-        size_t nv = h.mesh.nv;
-        double D = vg_diagonal(h.reference, nv), c0[3], c1[3], scale = half ? sqrt(2) : 2;
+        size_t nv = h.body.mesh.nv;
+        double D = vg_diagonal(h.body.reference, nv), c0[3], c1[3], scale = half ? sqrt(2) : 2;
         double *pose = room(3 * nv, sizeof *pose), *target = room(3 * nv, sizeof *target),
                *own = room(3 * nv, sizeof *own);
         bend(&h, 0.9, pose);
@@ -275,7 +276,7 @@ static void other_bodies(void)
         play(&x);
         memcpy(own, x.vertices, 3 * nv * sizeof *own);
         close_player(&x);
-        for (size_t i = 0; i < 3 * nv; i++) target[i] = 2 * h.reference[i] + 1;
+        for (size_t i = 0; i < 3 * nv; i++) target[i] = 2 * h.body.reference[i] + 1;
         CHECK(vg_map_retarget(&h, target, half ? 0.5 : 1, 2, &e) == VG_OK);
         x = open_player(&h, false, 1);
         measure(&x, pose);
@@ -287,7 +288,7 @@ static void other_bodies(void)
             worst = fmax(worst, fabs(scale * (own[i] - c0[i % 3]) - (x.vertices[i] - c1[i % 3])));
         CHECK_NEAR(worst, 0, 1e-8 * D);
         /* the body is between both as a whole, and goes as far as its size says */
-        vg_centroid(h.reference, nv, c0);
+        vg_centroid(h.body.reference, nv, c0);
         vg_centroid(target, nv, c1);
         for (int k = 0; k < 3; k++) /* target = 2 reference + 1 */
             CHECK_NEAR(c0[k], half ? (c1[k] + (c1[k] - 1) / 2) / 2 : c1[k], 1e-9);
@@ -344,16 +345,17 @@ static void patches_are_measured(void)
     vgi_shape s;
     vg_err e;
     motion truth[5];
-    double *pose = room(3 * h.mesh.nv, sizeof *pose);
-    CHECK(vgi_shape_make(&s, &h.mesh, &h.patches, h.reference, &e) == VG_OK);
+    double *pose = room(3 * h.body.mesh.nv, sizeof *pose);
+    CHECK(vgi_shape_make(&s, &h.body.mesh, &h.body.patches, h.body.reference, &e) == VG_OK);
     for (uint32_t p = 0; p < 5; p++) {
         vgi_motion m;
         double b = p == 4 ? 1e-9 : 0.3 + p;
         truth[p] = turn(0.5 * p - 1, b, p);
-        for (size_t f = 0; f < h.mesh.nf; f++)
-            for (uint32_t c = h.mesh.start[f]; h.patches.of_face[f] == p && c < h.mesh.start[f + 1]; c++) {
-                double *to = pose + 3 * (size_t)h.mesh.vert[c];
-                move_vector(&truth[p], h.reference + 3 * (size_t)h.mesh.vert[c], to);
+        for (size_t f = 0; f < h.body.mesh.nf; f++)
+            for (uint32_t c = h.body.mesh.start[f]; h.body.patches.of_face[f] == p && c < h.body.mesh.start[f + 1];
+                 c++) {
+                double *to = pose + 3 * (size_t)h.body.mesh.vert[c];
+                move_vector(&truth[p], h.body.reference + 3 * (size_t)h.body.mesh.vert[c], to);
                 for (int k = 0; k < 3; k++) to[k] += truth[p].shift[k];
             }
         vgi_shape_measure(&s, p, pose, &m);
@@ -376,29 +378,29 @@ static void what_hangs_loose(void)
 {
     vg_head h = make_body(5);
     vg_err e;
-    double end = h.reference[3 * h.mesh.nv - 1];
+    double end = h.body.reference[3 * h.body.mesh.nv - 1];
     add_vertex(&h, 0, 1.7, end - 2);
-    uint32_t loose = (uint32_t)h.mesh.nv - 1, a = add_vertex(&h, 0, 0, end + 0.4),
+    uint32_t loose = (uint32_t)h.body.mesh.nv - 1, a = add_vertex(&h, 0, 0, end + 0.4),
              b = add_vertex(&h, 0.3, 0, end + 0.4), c = add_vertex(&h, 0, 0.3, end + 0.5);
-    uint32_t *of_face = room(h.mesh.nf + 1, sizeof *of_face);
-    memcpy(of_face, h.patches.of_face, h.mesh.nf * sizeof *of_face);
+    uint32_t *of_face = room(h.body.mesh.nf + 1, sizeof *of_face);
+    memcpy(of_face, h.body.patches.of_face, h.body.mesh.nf * sizeof *of_face);
     FACE(&h, a, b, c);
-    of_face[h.mesh.nf - 1] = 5, h.patches.n = 6;
-    free(h.patches.of_face);
-    h.patches.of_face = of_face;
+    of_face[h.body.mesh.nf - 1] = 5, h.body.patches.n = 6;
+    free(h.body.patches.of_face);
+    h.body.patches.of_face = of_face;
     h.has_links = false;
     CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK && h.nlinks == 1);
     fit(&h, bend);
     vg_graph *g = graph_of(&h);
     uint32_t *all = vgi_graph_patches(&h, g, &e);
     CHECK(g->nlinks == 1 && all[g->nf - 1] == 4); /* the rod's vertices come first */
-    double *pose = room(3 * h.mesh.nv, sizeof *pose);
+    double *pose = room(3 * h.body.mesh.nv, sizeof *pose);
     played x = open_player(&h, false, 1);
     bend(&h, 0.8, pose);
     measure(&x, pose);
     play(&x);
     double at[3];
-    vg_quat_apply(x.transforms + 7 * 4, h.reference + 3 * (size_t)loose, at);
+    vg_quat_apply(x.transforms + 7 * 4, h.body.reference + 3 * (size_t)loose, at);
     for (size_t k = 0; k < 3; k++) CHECK_NEAR(x.vertices[3 * loose + k], at[k] + x.transforms[7 * 4 + 4 + k], 1e-9);
     free(all);
     free(pose);
@@ -414,10 +416,10 @@ static void joints_are_found(void)
     vg_head h = make_body(2);
     vg_err e;
     vg_map_fitter *f;
-    size_t nv = h.mesh.nv;
-    double D = vg_diagonal(h.reference, nv), *pose = room(3 * nv, sizeof *pose), rotation[9];
+    size_t nv = h.body.mesh.nv;
+    double D = vg_diagonal(h.body.reference, nv), *pose = room(3 * nv, sizeof *pose), rotation[9];
     vgi_shape shape;
-    CHECK(vgi_shape_make(&shape, &h.mesh, &h.patches, h.reference, &e) == VG_OK);
+    CHECK(vgi_shape_make(&shape, &h.body.mesh, &h.body.patches, h.body.reference, &e) == VG_OK);
     bool *upper = room(nv, sizeof *upper);
     for (size_t i = shape.first[1]; i < shape.first[2]; i++) upper[shape.member[i]] = true;
     CHECK(vg_map_fitter_new(&f, &h, 0.03, 1, &e) == VG_OK);
@@ -428,7 +430,7 @@ static void joints_are_found(void)
         vg_quat_matrix(q, rotation);
         for (size_t v = 0; v < nv; v++)
             for (size_t i = 0; i < 3; i++) {
-                const double *x = h.reference + 3 * v, *m = rotation + 3 * i;
+                const double *x = h.body.reference + 3 * v, *m = rotation + 3 * i;
                 double turned = m[0] * (x[0] - hinge[0]) + m[1] * (x[1] - hinge[1]) + m[2] * (x[2] - hinge[2]);
                 pose[3 * v + i] = upper[v] ? turned + hinge[i] : x[i];
             }
@@ -459,8 +461,8 @@ static void joints_are_found(void)
 static void bends_are_learned(void)
 {
     vg_head h = make_body(5);
-    size_t nv = h.mesh.nv;
-    double D = vg_diagonal(h.reference, nv), *pose = room(3 * nv, sizeof *pose), mean[2] = {0, 0};
+    size_t nv = h.body.mesh.nv;
+    double D = vg_diagonal(h.body.reference, nv), *pose = room(3 * nv, sizeof *pose), mean[2] = {0, 0};
     fit(&h, bend);
     played x = open_player(&h, false, 1);
     for (int k = 0; k < POSES; k++) {
@@ -490,15 +492,15 @@ static void units_do_not_matter(void)
         vg_head h = make_body(5);
         vg_err e;
         vg_map_fitter *f;
-        size_t n = 3 * h.mesh.nv;
+        size_t n = 3 * h.body.mesh.nv;
         double *pose = room(n, sizeof *pose);
-        for (size_t i = 0; i < n; i++) h.reference[i] *= unit;
+        for (size_t i = 0; i < n; i++) h.body.reference[i] *= unit;
         CHECK(vg_map_fitter_new(&f, &h, 0.03, 2, &e) == VG_OK);
         for (int k = 0; k < POSES; k++) {
             const double *poses[1] = {pose};
-            for (size_t i = 0; i < n; i++) h.reference[i] /= unit;
+            for (size_t i = 0; i < n; i++) h.body.reference[i] /= unit;
             bend(&h, 0.2 * (k + 1), pose);
-            for (size_t i = 0; i < n; i++) h.reference[i] *= unit, pose[i] *= unit;
+            for (size_t i = 0; i < n; i++) h.body.reference[i] *= unit, pose[i] *= unit;
             CHECK(vg_map_fitter_add(f, 1, poses, &e) == VG_OK);
         }
         CHECK(vg_map_fitter_finish(f, &e) == VG_OK);
@@ -525,7 +527,7 @@ static void refusals(void)
     vg_err e;
     CHECK(vg_map_fitter_new(&f, &h, 0.03, 1, &e) == VG_EINPUT && !f);
     CHECK(vg_player_new(&p, &h, false, 1, &e) == VG_EINPUT && !p);
-    CHECK(vg_map_retarget(&h, h.reference, 1, 1, &e) == VG_EINPUT);
+    CHECK(vg_map_retarget(&h, h.body.reference, 1, 1, &e) == VG_EINPUT);
     vg_head body = make_body(3);
     CHECK(vg_map_fitter_new(&f, &body, 0.03, 1, &e) == VG_OK);
     CHECK(vg_map_fitter_finish(f, &e) == VG_EINPUT && !body.map.n);

@@ -19,7 +19,7 @@ enum { SANITIZED = 0 };
 static void refused(vg_head *h, const char *what)
 {
     vg_err e = {0, ""};
-    CHECK(vg_mesh_check(&h->mesh, "file 'a.obj'", &e) == VG_EINPUT && e.code == VG_EINPUT);
+    CHECK(vg_mesh_check(&h->body.mesh, "file 'a.obj'", &e) == VG_EINPUT && e.code == VG_EINPUT);
     CHECK(strstr(e.message, "file 'a.obj'") == e.message);
     if (!strstr(e.message, what)) printf("\"%s\" does not say \"%s\"\n", e.message, what);
     CHECK(strstr(e.message, what) != NULL);
@@ -31,23 +31,23 @@ static void test_check(void)
     vg_head h;
     const char *name;
     for (size_t i = 0; make_any(i, &h, &name); i++) {
-        CHECK(vg_mesh_check(&h.mesh, name, &e) == VG_OK);
+        CHECK(vg_mesh_check(&h.body.mesh, name, &e) == VG_OK);
         vg_head_clear(&h);
     }
     h = make_torus(5, 4);
-    h.mesh.vert[4 * 7 + 2] = 20;
+    h.body.mesh.vert[4 * 7 + 2] = 20;
     refused(&h, "face 7 names vertex 20 of 20");
-    h.mesh.vert[4 * 7 + 2] = UINT32_MAX;
+    h.body.mesh.vert[4 * 7 + 2] = UINT32_MAX;
     refused(&h, "face 7 names vertex 4294967295 of 20");
-    h.mesh.vert[4 * 7 + 2] = h.mesh.vert[4 * 7];
+    h.body.mesh.vert[4 * 7 + 2] = h.body.mesh.vert[4 * 7];
     refused(&h, "face 7 names a vertex twice");
     vg_head_clear(&h);
     h = make_torus(5, 4);
-    h.mesh.start[4] = 13; /* face 3 has 1 corner, face 4 has 7 */
+    h.body.mesh.start[4] = 13; /* face 3 has 1 corner, face 4 has 7 */
     refused(&h, "face 3 has fewer than 2 vertices");
-    h.mesh.start[4] = h.mesh.start[3];
+    h.body.mesh.start[4] = h.body.mesh.start[3];
     refused(&h, "face 3 has fewer than 2 vertices");
-    h.mesh.start[4] = h.mesh.start[3] - 1;
+    h.body.mesh.start[4] = h.body.mesh.start[3] - 1;
     refused(&h, "has fewer than 2 vertices");
     vg_head_clear(&h);
     for (size_t r = 3; r < 70; r++) { /* small and large faces, repeats near and far */
@@ -55,14 +55,14 @@ static void test_check(void)
         for (size_t k = 0; k < 3; k++) {
             h = make_flower(r);
             size_t from = k < 2 ? far[k] : r - 1;
-            CHECK(vg_mesh_check(&h.mesh, "m", &e) == VG_OK);
-            h.mesh.vert[0] = h.mesh.vert[from];
+            CHECK(vg_mesh_check(&h.body.mesh, "m", &e) == VG_OK);
+            h.body.mesh.vert[0] = h.body.mesh.vert[from];
             refused(&h, "face 0 names a vertex twice");
             vg_head_clear(&h);
         }
     }
     h = make_ngon(10000, 0, 0);
-    h.mesh.vert[9999] = h.mesh.vert[1];
+    h.body.mesh.vert[9999] = h.body.mesh.vert[1];
     refused(&h, "face 0 names a vertex twice");
     vg_head_clear(&h);
 }
@@ -76,9 +76,9 @@ static void test_check_needs_no_memory(void)
         vg_head h = make_ngon(40, 0, 0);
         struct rlimit limit = {1u << 30, 1u << 30};
         vg_err e = {0, ""};
-        h.mesh.nv = UINT32_MAX - 1;
+        h.body.mesh.nv = UINT32_MAX - 1;
         setrlimit(RLIMIT_AS, &limit);
-        _exit(vg_mesh_check(&h.mesh, "m", &e) == VG_OK ? 0 : 1);
+        _exit(vg_mesh_check(&h.body.mesh, "m", &e) == VG_OK ? 0 : 1);
     }
     int status = -1;
     CHECK(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0);
@@ -87,7 +87,7 @@ static void test_check_needs_no_memory(void)
 static void differ(const vg_head *a, const vg_head *b, const char *message)
 {
     vg_err e = {0, ""};
-    CHECK(vg_mesh_same(&a->mesh, "'a.obj'", &b->mesh, "'b.obj'", &e) == VG_EINPUT);
+    CHECK(vg_mesh_same(&a->body.mesh, "'a.obj'", &b->body.mesh, "'b.obj'", &e) == VG_EINPUT);
     CHECK_TEXT(e.message, message);
 }
 
@@ -97,10 +97,10 @@ static void test_same(void)
     vg_head a, b;
     const char *name;
     for (size_t i = 0; make_any(i, &a, &name); i++) {
-        CHECK(vg_mesh_copy(&b.mesh, &a.mesh, &e) == VG_OK);
-        CHECK(vg_mesh_same(&a.mesh, "a", &b.mesh, "b", &e) == VG_OK &&
-              vg_mesh_digest(&a.mesh) == vg_mesh_digest(&b.mesh));
-        vg_mesh_clear(&b.mesh);
+        CHECK(vg_mesh_copy(&b.body.mesh, &a.body.mesh, &e) == VG_OK);
+        CHECK(vg_mesh_same(&a.body.mesh, "a", &b.body.mesh, "b", &e) == VG_OK &&
+              vg_mesh_digest(&a.body.mesh) == vg_mesh_digest(&b.body.mesh));
+        vg_mesh_clear(&b.body.mesh);
         vg_head_clear(&a);
     }
     a = make_torus(5, 4), b = make_torus(5, 4);
@@ -116,7 +116,7 @@ static void test_same(void)
     add_isolated(&b);
     FACE(&b, 0, 7, 2);
     differ(&a, &b, "face 20 of 'b.obj' names vertex 7 where that of 'a.obj' names 2");
-    CHECK(vg_mesh_digest(&a.mesh) != vg_mesh_digest(&b.mesh));
+    CHECK(vg_mesh_digest(&a.body.mesh) != vg_mesh_digest(&b.body.mesh));
     vg_head_clear(&a);
     vg_head_clear(&b);
 }
@@ -144,12 +144,12 @@ static void test_components(void)
 {
     vg_head h = make_pieces();
     add_isolated(&h);
-    uint32_t *label = room(h.mesh.nv, sizeof *label);
+    uint32_t *label = room(h.body.mesh.nv, sizeof *label);
     size_t count;
     vg_err e;
-    CHECK(vg_mesh_components(&h.mesh, label, &count, &e) == VG_OK && count == 5);
+    CHECK(vg_mesh_components(&h.body.mesh, label, &count, &e) == VG_OK && count == 5);
     static const size_t ends[] = {54, 89, 137, 185, 188};
-    for (size_t v = 0, piece = 0; v < h.mesh.nv; v++) {
+    for (size_t v = 0, piece = 0; v < h.body.mesh.nv; v++) {
         while (piece < 5 && v >= ends[piece]) piece++;
         CHECK(label[v] == (piece < 5 ? (uint32_t)piece : UINT32_MAX));
     }
@@ -160,10 +160,10 @@ static void test_components(void)
     for (int i = 0; i < 9; i++) add_vertex(&h, i, 0, 0);
     FACE(&h, 8, 7), FACE(&h, 6, 5, 4), FACE(&h, 1, 2), FACE(&h, 7, 4), FACE(&h, 2, 8);
     uint32_t few[9], want[9] = {UINT32_MAX, 0, 0, UINT32_MAX, 0, 0, 0, 0, 0};
-    CHECK(vg_mesh_components(&h.mesh, few, &count, &e) == VG_OK && count == 1 && !memcmp(few, want, sizeof few));
-    h.mesh.nf = 4;
+    CHECK(vg_mesh_components(&h.body.mesh, few, &count, &e) == VG_OK && count == 1 && !memcmp(few, want, sizeof few));
+    h.body.mesh.nf = 4;
     static const uint32_t two[9] = {UINT32_MAX, 0, 0, UINT32_MAX, 1, 1, 1, 1, 1};
-    CHECK(vg_mesh_components(&h.mesh, few, &count, &e) == VG_OK && count == 2 && !memcmp(few, two, sizeof few));
+    CHECK(vg_mesh_components(&h.body.mesh, few, &count, &e) == VG_OK && count == 2 && !memcmp(few, two, sizeof few));
     vg_head_clear(&h);
 }
 
@@ -184,8 +184,8 @@ static void vectors_hold(vg_head *h, const char *name)
 {
     vg_graph *g = graph_of(h);
     size_t n = vg_graph_corners(g), nv = g->nv;
-    double D = vg_diagonal(h->reference, nv), *w = vectors_of(g, h->reference), *again, *moved, root[3], turned[3],
-           most = 0;
+    double D = vg_diagonal(h->body.reference, nv), *w = vectors_of(g, h->body.reference), *again, *moved, root[3],
+           turned[3], most = 0;
     for (size_t f = 0; f < g->nf; f++) {
         double sum[3] = {0, 0, 0};
         for (size_t c = g->start[f]; c < g->start[f + 1]; c++)
@@ -196,17 +196,18 @@ static void vectors_hold(vg_head *h, const char *name)
     for (size_t f = 0; f < g->nf; f++) /* what a vector is: differences within a face are those of its vertices */
         for (size_t c = g->start[f] + 1; c < g->start[f + 1]; c++)
             for (size_t k = 0; k < 3; k++) {
-                double want = h->reference[3 * (size_t)g->vert[c] + k] - h->reference[3 * (size_t)g->vert[c - 1] + k];
+                double want =
+                    h->body.reference[3 * (size_t)g->vert[c] + k] - h->body.reference[3 * (size_t)g->vert[c - 1] + k];
                 CHECK_NEAR(w[3 * c + k] - w[3 * (c - 1) + k], want, 1e-14 * D);
             }
     motion by = turn(1.3, 2.5, 3 * D), shift = turn(0, 1, 3 * D);
-    moved = move_points(&shift, h->reference, nv), again = vectors_of(g, moved);
+    moved = move_points(&shift, h->body.reference, nv), again = vectors_of(g, moved);
     CHECK_NEAR(farthest(w, again, n) / D, 0, 1e-14);
     free(moved), free(again);
-    moved = move_points(&by, h->reference, nv), again = vectors_of(g, moved);
+    moved = move_points(&by, h->body.reference, nv), again = vectors_of(g, moved);
     for (size_t c = 0; c < n; c++) move_vector(&by, w + 3 * c, w + 3 * c);
     CHECK_NEAR(farthest(w, again, n) / D, 0, 1e-13);
-    vg_graph_root(g, h->reference, root);
+    vg_graph_root(g, h->body.reference, root);
     move_vector(&by, root, turned);
     for (int k = 0; k < 3; k++) turned[k] += by.shift[k];
     vg_graph_root(g, moved, root);
@@ -238,21 +239,22 @@ static void test_graph(void)
     add_isolated(&h);
     vg_err e;
     vg_graph *g = graph_of(&h);
-    CHECK(g->nlinks == 4 && g->nf == h.mesh.nf + 4 && g->attached == h.mesh.nv - 2 && g->max_corners == 4);
-    CHECK(vg_graph_corners(g) == vg_mesh_corners(&h.mesh) + 8 && !g->in_face[h.mesh.nv - 1] && g->in_face[0]);
-    CHECK(!memcmp(g->vert + vg_mesh_corners(&h.mesh), h.links, 8 * sizeof *h.links));
+    CHECK(g->nlinks == 4 && g->nf == h.body.mesh.nf + 4 && g->attached == h.body.mesh.nv - 2 && g->max_corners == 4);
+    CHECK(vg_graph_corners(g) == vg_mesh_corners(&h.body.mesh) + 8 && !g->in_face[h.body.mesh.nv - 1] &&
+          g->in_face[0]);
+    CHECK(!memcmp(g->vert + vg_mesh_corners(&h.body.mesh), h.links, 8 * sizeof *h.links));
     vg_graph_free(&g);
     CHECK(g == NULL);
     h.has_selection = true, h.nselected = 2, h.selected = room(2, sizeof *h.selected);
-    h.selected[0] = 3, h.selected[1] = (uint32_t)h.mesh.nf - 1;
+    h.selected[0] = 3, h.selected[1] = (uint32_t)h.body.mesh.nf - 1;
     CHECK(vg_graph_new(&g, &h, &e) == VG_OK);
     CHECK(g->nf == 6 && vg_graph_corners(g) == 4 + 3 + 8 && g->start[1] == 4 && g->start[2] == 7 && g->start[3] == 9);
-    CHECK(!memcmp(g->vert, h.mesh.vert + h.mesh.start[3], 4 * sizeof *g->vert));
+    CHECK(!memcmp(g->vert, h.body.mesh.vert + h.body.mesh.start[3], 4 * sizeof *g->vert));
     double root[3], sum[3] = {0, 0, 0};
     size_t n = 0;
-    for (size_t v = 0; v < h.mesh.nv; v++)
-        for (size_t k = 0; k < 3 && g->in_face[v]; k++) sum[k] += h.reference[3 * v + k], n += k == 0;
-    vg_graph_root(g, h.reference, root);
+    for (size_t v = 0; v < h.body.mesh.nv; v++)
+        for (size_t k = 0; k < 3 && g->in_face[v]; k++) sum[k] += h.body.reference[3 * v + k], n += k == 0;
+    vg_graph_root(g, h.body.reference, root);
     CHECK(n == g->attached && n < 20);
     for (int k = 0; k < 3; k++) CHECK_NEAR(root[k], sum[k] / (double)n, 1e-14);
     vg_graph_free(&g);
@@ -280,16 +282,16 @@ static void trace(vg_head *h, const char *program, const char *a, const char *b)
 static vg_head full_head(void)
 {
     vg_head h = make_mixed(3);
-    size_t corners = vg_mesh_corners(&h.mesh);
-    h.attributes = (vg_attributes){.ntex = 2,
-                                   .tex_dim = 2,
-                                   .tex = room(4, sizeof(double)),
-                                   .nlabels = 2,
-                                   .corner_tex = room(corners, sizeof(uint32_t)),
-                                   .labels = room(2, sizeof(vg_label))};
-    h.attributes.tex[3] = 0.5, h.attributes.corner_tex[corners - 1] = UINT32_MAX;
-    h.attributes.labels[0] = (vg_label){0, VG_LABEL_GROUP, strdup("body")};
-    h.attributes.labels[1] = (vg_label){2, VG_LABEL_MATERIAL, strdup("skin")};
+    size_t corners = vg_mesh_corners(&h.body.mesh);
+    h.body.attributes = (vg_attributes){.ntex = 2,
+                                        .tex_dim = 2,
+                                        .tex = room(4, sizeof(double)),
+                                        .nlabels = 2,
+                                        .corner_tex = room(corners, sizeof(uint32_t)),
+                                        .labels = room(2, sizeof(vg_label))};
+    h.body.attributes.tex[3] = 0.5, h.body.attributes.corner_tex[corners - 1] = UINT32_MAX;
+    h.body.attributes.labels[0] = (vg_label){0, VG_LABEL_GROUP, strdup("body")};
+    h.body.attributes.labels[1] = (vg_label){2, VG_LABEL_MATERIAL, strdup("skin")};
     h.has_selection = h.has_links = true;
     h.nselected = 2, h.selected = room(2, 4), h.selected[1] = 3;
     h.nlinks = 1, h.links = room(2, 4), h.links[1] = 5;
@@ -305,13 +307,15 @@ static void test_copy(void)
     vg_head a = full_head(), b;
     vg_err e;
     CHECK(vg_head_copy(&b, &a, &e) == VG_OK);
-    CHECK(vg_mesh_same(&a.mesh, "a", &b.mesh, "b", &e) == VG_OK);
-    CHECK(!memcmp(a.reference, b.reference, 3 * a.mesh.nv * sizeof(double)) && a.reference != b.reference);
-    CHECK_TEXT(b.reference_name, "rest");
-    CHECK(b.attributes.ntex == 2 && b.attributes.tex_dim == 2 && b.attributes.tex[3] == 0.5);
-    CHECK(b.attributes.corner_tex[vg_mesh_corners(&a.mesh) - 1] == UINT32_MAX && b.attributes.nlabels == 2);
-    CHECK(b.attributes.labels[1].face == 2 && b.attributes.labels[1].kind == VG_LABEL_MATERIAL);
-    CHECK_TEXT(b.attributes.labels[1].text, "skin");
+    CHECK(vg_mesh_same(&a.body.mesh, "a", &b.body.mesh, "b", &e) == VG_OK);
+    CHECK(!memcmp(a.body.reference, b.body.reference, 3 * a.body.mesh.nv * sizeof(double)) &&
+          a.body.reference != b.body.reference);
+    CHECK_TEXT(b.body.reference_name, "rest");
+    CHECK(b.body.attributes.ntex == 2 && b.body.attributes.tex_dim == 2 && b.body.attributes.tex[3] == 0.5);
+    CHECK(b.body.attributes.corner_tex[vg_mesh_corners(&a.body.mesh) - 1] == UINT32_MAX &&
+          b.body.attributes.nlabels == 2);
+    CHECK(b.body.attributes.labels[1].face == 2 && b.body.attributes.labels[1].kind == VG_LABEL_MATERIAL);
+    CHECK_TEXT(b.body.attributes.labels[1].text, "skin");
     CHECK(b.has_selection && b.nselected == 2 && b.selected[1] == 3 && b.has_links && b.nlinks == 1 &&
           b.links[1] == 5);
     CHECK(b.nanchors == 1 && b.anchors[0] == 4 && b.kind == VG_VERTICES && b.precision == VG_F64 &&
@@ -322,8 +326,8 @@ static void test_copy(void)
     CHECK_TEXT(b.extra.at[0].tag, "NOTE");
     CHECK(!memcmp(b.extra.at[0].payload.data, "hello", 5));
     vg_head_clear(&a); /* what was copied is the copy's own */
-    CHECK(b.provenance[0].program[0] == 'f' && b.extra.at[0].payload.data[4] == 'o' && b.mesh.vert[0] > 0);
-    CHECK(a.mesh.vert == NULL && a.nprovenance == 0 && a.extra.at == NULL);
+    CHECK(b.provenance[0].program[0] == 'f' && b.extra.at[0].payload.data[4] == 'o' && b.body.mesh.vert[0] > 0);
+    CHECK(a.body.mesh.vert == NULL && a.nprovenance == 0 && a.extra.at == NULL);
     vg_head_clear(&b);
 }
 
@@ -355,7 +359,7 @@ static void test_frame(void)
     vg_frame a = {0}, b = {0};
     vg_err e;
     CHECK(vg_frame_shape(&a, &h, &e) == VG_OK && a.values && a.anchors);
-    a.values[3 * h.mesh.nv - 1] = 1, a.anchors[2] = 1;
+    a.values[3 * h.body.mesh.nv - 1] = 1, a.anchors[2] = 1;
     CHECK(vg_frame_rename(&a, "pose", &e) == VG_OK && vg_frame_rename(&a, "a longer name", &e) == VG_OK);
     a.has_time = true, a.time = 2.5;
     a.extra = (vg_records){1, room(1, sizeof(vg_record))};

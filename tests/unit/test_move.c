@@ -13,13 +13,14 @@ static void moved(bool stay, double times)
     add_isolated(&h);
     vg_graph *g = graph_of(&h);
     motion far = turn(0, 2, 3), step = turn(0.4, 1, 5);
-    double *target = move_points(&far, h.reference, g->nv), *pose = move_points(&step, h.reference, g->nv);
+    double *target = move_points(&far, h.body.reference, g->nv), *pose = move_points(&step, h.body.reference, g->nv);
     double roots[3][3], at[2][3], to[2][3];
     vg_frame in = {.anchors = at[0]}, out = {.anchors = to[0]};
     vg_mover *m;
     vg_err e;
-    CHECK(vg_mover_new(&m, g, h.reference, g, target, anchors, 2, stay, &e) == VG_OK);
-    vg_graph_root(g, h.reference, roots[0]), vg_graph_root(g, target, roots[1]), vg_graph_root(g, pose, roots[2]);
+    CHECK(vg_mover_new(&m, g, h.body.reference, g, target, anchors, 2, stay, &e) == VG_OK);
+    vg_graph_root(g, h.body.reference, roots[0]), vg_graph_root(g, target, roots[1]),
+        vg_graph_root(g, pose, roots[2]);
     memcpy(in.root, roots[2], sizeof in.root);
     vg_graph_anchors(pose, anchors, 2, in.anchors);
     vg_mover_move(m, &in, &out);
@@ -27,7 +28,7 @@ static void moved(bool stay, double times)
         CHECK_NEAR(out.root[k], roots[1][k] + times * (roots[2][k] - roots[0][k]), 1e-12);
         for (size_t i = 0; i < 2; i++) {
             size_t x = 3 * anchors[i] + k;
-            CHECK_NEAR(to[i][k], target[x] + times * (pose[x] - h.reference[x]), 1e-12);
+            CHECK_NEAR(to[i][k], target[x] + times * (pose[x] - h.body.reference[x]), 1e-12);
         }
     }
     double *placed = move_points(&step, target, g->nv),
@@ -66,7 +67,7 @@ static void test_without_size(void)
     vg_frame in = {.root = {2, 1, 1}}, out = {0};
     vg_mover *m;
     vg_err e;
-    CHECK(vg_mover_new(&m, g, h.reference, g, target, NULL, 0, false, &e) == VG_OK);
+    CHECK(vg_mover_new(&m, g, h.body.reference, g, target, NULL, 0, false, &e) == VG_OK);
     vg_mover_move(m, &in, &out);
     CHECK(out.root[0] == 3 && out.root[1] == 2 && out.root[2] == 2);
     vg_mover_free(&m);
@@ -126,7 +127,7 @@ static void test_same_faces(void)
     vg_graph *g = graph_of(&h);
     bool *moves = room(g->nv, sizeof *moves);
     for (size_t v = 0; v < g->nv; v += 31) moves[v] = true;
-    against_counting(g, h.reference, g, NULL, moves);
+    against_counting(g, h.body.reference, g, NULL, moves);
     free(moves);
     vg_graph_free(&g);
     vg_head_clear(&h);
@@ -145,7 +146,7 @@ static void test_correspondence(void)
         pairs.source[2 * f] = f % (uint32_t)from->nf, pairs.source[2 * f + 1] = 7 * f % (uint32_t)from->nf;
     }
     moves[5] = moves[40] = true;
-    against_counting(from, torus.reference, to, &pairs, moves);
+    against_counting(from, torus.body.reference, to, &pairs, moves);
     free(moves), free(pairs.first), free(pairs.source);
     vg_graph_free(&from), vg_graph_free(&to);
     vg_head_clear(&torus), vg_head_clear(&rod);
@@ -164,8 +165,8 @@ static void test_few(void)
             const uint32_t *list;
             vg_pinner *p;
             vg_err e;
-            for (size_t x = 0; x < 3 * g->nv; x++) pose[x] = h.reference[x] + (x / 9 >= rings);
-            CHECK(vg_pinner_new(&p, g, h.reference, g, NULL, always, &e) == VG_OK);
+            for (size_t x = 0; x < 3 * g->nv; x++) pose[x] = h.body.reference[x] + (x / 9 >= rings);
+            CHECK(vg_pinner_new(&p, g, h.body.reference, g, NULL, always, &e) == VG_OK);
             size_t want = rings == RINGS ? 3 * RINGS : rings > 2 ? 3 * (rings - 2) : 0;
             if (!always && 10 * rings < RINGS) want = 0;
             CHECK(vg_pinner_find(p, pose, &list) == want);

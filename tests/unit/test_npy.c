@@ -156,8 +156,12 @@ static double reference[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
 
 static vg_head make_head(vg_kind kind)
 {
-    vg_head h = {.mesh = {4, 2, start, vert}, .reference = reference, .reference_name = (char *)"Ruhe \xc3\xa4",
-                 .kind = kind, .precision = VG_F64, .count = 4};
+    vg_head h = {.body.mesh = {4, 2, start, vert},
+                 .body.reference = reference,
+                 .body.reference_name = (char *)"Ruhe \xc3\xa4",
+                 .kind = kind,
+                 .precision = VG_F64,
+                 .count = 4};
     if (kind == VG_VERTICES) return h;
     h.has_selection = true, h.nselected = 1, h.selected = selected;
     h.has_links = true, h.nlinks = 1, h.links = links;
@@ -198,9 +202,9 @@ static void npz_there_and_back(void)
         if (p.result < 0) printf("# %s\n", p.e.message);
         CHECK(p.frames == 2 && p.h.kind == kinds[i] && p.h.count == h.count && p.times[1] == 1.5 && p.timed);
         CHECK_TEXT(p.names, "sm\xc3\xaele \xf0\x9f\x90\x8e b ");
-        CHECK(p.h.reference_name && !strcmp(p.h.reference_name, h.reference_name));
-        CHECK(vg_mesh_same(&h.mesh, "", &p.h.mesh, "", NULL) == VG_OK);
-        CHECK(p.h.reference && !memcmp(p.h.reference, reference, sizeof reference));
+        CHECK(p.h.body.reference_name && !strcmp(p.h.body.reference_name, h.body.reference_name));
+        CHECK(vg_mesh_same(&h.body.mesh, "", &p.h.body.mesh, "", NULL) == VG_OK);
+        CHECK(p.h.body.reference && !memcmp(p.h.body.reference, reference, sizeof reference));
         size_t n = h.count * vg_kind_width(h.kind);
         CHECK(p.n == 2 * n && !memcmp(p.values, values[0], n * 8) && !memcmp(p.values + n, values[1], n * 8));
         CHECK(p.h.nselected == h.nselected && p.h.nlinks == h.nlinks && p.h.nanchors == h.nanchors);

@@ -163,7 +163,7 @@ static double places[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 2, 0};
 
 static vg_head make_head(void)
 {
-    return (vg_head){.mesh = {5, 2, starts, corners}, .reference = places, .kind = VG_VERTICES, .count = 5};
+    return (vg_head){.body.mesh = {5, 2, starts, corners}, .body.reference = places, .kind = VG_VERTICES, .count = 5};
 }
 
 static char *page_text(int fd)

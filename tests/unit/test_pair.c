@@ -7,7 +7,7 @@
 /* A sheet of nx x ny quads of size d; over: facing down. */
 static void add_sheet(vg_head *h, uint32_t nx, uint32_t ny, double x, double y, double z, double d, bool over)
 {
-    uint32_t first = (uint32_t)h->mesh.nv;
+    uint32_t first = (uint32_t)h->body.mesh.nv;
     for (uint32_t k = 0; k <= ny; k++)
         for (uint32_t i = 0; i <= nx; i++) add_vertex(h, x + i * d, y + k * d, z);
     for (uint32_t k = 0; k < ny; k++)
@@ -29,10 +29,10 @@ static vg_correspondence paired(const vg_head *source, const vg_head *target, bo
 {
     vg_err e = {0, ""};
     vg_correspondence c;
-    vgi_pairing in = {.source = &source->mesh, .target = &target->mesh, .flipped = flipped, .threads = 2};
+    vgi_pairing in = {.source = &source->body.mesh, .target = &target->body.mesh, .flipped = flipped, .threads = 2};
     vgi_surface *s, *t;
-    CHECK(vgi_surface_new(&s, in.source, source->reference, &e) == VG_OK);
-    CHECK(vgi_surface_new(&t, in.target, target->reference, &e) == VG_OK);
+    CHECK(vgi_surface_new(&s, in.source, source->body.reference, &e) == VG_OK);
+    CHECK(vgi_surface_new(&t, in.target, target->body.reference, &e) == VG_OK);
     in.source_surface = s, in.target_surface = t;
     if (vgi_pair(&in, &c, &e) < 0) printf("%s\n", e.message), exit(1);
     for (size_t f = 0; f < c.target_nf; f++) {
@@ -154,7 +154,7 @@ static void holes_ride_with_their_rim(void)
     enum { N = 12 };
     vg_head source = make_sheet(N, N, 0.03, false), target = make_sheet(N, N, 0.03, false);
     for (uint32_t k = 4; k <= 8; k++)
-        for (uint32_t i = 4; i <= 8; i++) target.reference[3 * (k * (N + 1) + i) + 2] = 0.5;
+        for (uint32_t i = 4; i <= 8; i++) target.body.reference[3 * (k * (N + 1) + i) + 2] = 0.5;
     vg_correspondence c = paired(&source, &target, false);
     for (uint32_t k = 0; k < N; k++)
         for (uint32_t i = 0; i < N; i++) {
@@ -183,7 +183,7 @@ static void strangers_are_rigid(void)
         CHECK(c.matched[f] && drivers(&c, f) == 1 && c.source[c.first[f]] == f);
         far[f] = hypot(0.04 * (f % N) + 0.02 - middle[0], 0.04 * (f / N) + 0.02 - middle[1]);
     }
-    for (size_t f = N * N; f < target.mesh.nf; f++) {
+    for (size_t f = N * N; f < target.body.mesh.nf; f++) {
         CHECK(!c.matched[f] && drivers(&c, f) == 4 && same_drivers(&c, f, N * N));
         for (uint32_t i = c.first[f]; i < c.first[f + 1]; i++) {
             size_t nearer = 0;

@@ -69,16 +69,16 @@ static problem make_problem(const vg_head *h, const vg_graph *g, const uint32_t 
                             double disturb)
 {
     problem q = {.g = g,
-                 .reference = h->reference,
+                 .reference = h->body.reference,
                  .anchors = anchors,
                  .nanchors = nanchors,
                  .n = POSES,
                  .fidelity = 0.05,
                  .planarity = 1,
                  .weights = VG_WEIGHTS_UNIFORM};
-    double D = vg_diagonal(h->reference, g->nv);
+    double D = vg_diagonal(h->body.reference, g->nv);
     for (size_t k = 0; k < POSES; k++) {
-        double *pose = warp(h->reference, g->nv, 0.15 * (double)k);
+        double *pose = warp(h->body.reference, g->nv, 0.15 * (double)k);
         q.w[k] = vectors_of(g, pose);
         q.at[k] = room(3 * (nanchors + 1), sizeof(double));
         vg_graph_anchors(pose, anchors, nanchors, q.at[k]);
@@ -178,7 +178,7 @@ static void against_dense(vg_head *h, const char *name, vg_weights weights, size
     q.weights = weights;
     answer a = solve(&q, 2, POSES);
     CHECK(a.good == POSES && a.facts.worst_residual <= 1e-10);
-    double D = vg_diagonal(h->reference, g->nv), worst = 0, moved = 0;
+    double D = vg_diagonal(h->body.reference, g->nv), worst = 0, moved = 0;
     for (size_t k = 0; k < POSES; k += 5) {
         double *want = dense(&q, k);
         worst = fmax(worst, farthest(a.x[k], want, g->nv) / D);
@@ -198,7 +198,7 @@ static void test_dense(void)
     vg_head h;
     const char *name;
     for (size_t i = 0; make_any(i, &h, &name); i++) {
-        if (h.mesh.nv <= 90 && h.mesh.nv > 5 && strcmp(name, "mixed")) {
+        if (h.body.mesh.nv <= 90 && h.body.mesh.nv > 5 && strcmp(name, "mixed")) {
             against_dense(&h, name, VG_WEIGHTS_UNIFORM, 0);
             against_dense(&h, name, VG_WEIGHTS_UNIFORM, 3);
         }
@@ -239,7 +239,7 @@ static void test_planar_stays(void)
     vg_head shapes[] = {make_torus(12, 8), make_rod(10, 5, false), make_ngon(9, 0.5, 0)};
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
         vg_graph *g = graph_of(&shapes[i]);
-        problem q = {.g = g, .reference = shapes[i].reference, .n = 1, .fidelity = 0.05, .planarity = 1};
+        problem q = {.g = g, .reference = shapes[i].body.reference, .n = 1, .fidelity = 0.05, .planarity = 1};
         double root[3], D = vg_diagonal(q.reference, g->nv);
         vg_graph_root(g, q.reference, root);
         q.w[0] = vectors_of(g, q.reference), q.at[0] = root;
@@ -267,9 +267,9 @@ static void test_anchors_roots_isolated(void)
                 CHECK(!memcmp(a.x[k] + 3 * (size_t)anchors[i], q.at[k] + 3 * i, 3 * sizeof(double)));
             vg_graph_root(g, a.x[k], root);
             for (int i = 0; !nanchors && i < 3; i++)
-                CHECK_NEAR(root[i], q.at[k][i], 1e-12 * vg_diagonal(h.reference, g->nv));
+                CHECK_NEAR(root[i], q.at[k][i], 1e-12 * vg_diagonal(h.body.reference, g->nv));
             for (size_t v = 0; v < g->nv; v++)
-                CHECK(g->in_face[v] || !memcmp(a.x[k] + 3 * v, h.reference + 3 * v, 3 * sizeof(double)));
+                CHECK(g->in_face[v] || !memcmp(a.x[k] + 3 * v, h.body.reference + 3 * v, 3 * sizeof(double)));
         }
         clear(&a, POSES);
         clear_problem(&q);
@@ -324,7 +324,7 @@ static void test_units(void)
     vg_graph *g = graph_of(&h);
     problem q = make_problem(&h, g, NULL, 0, 0.02);
     answer one = solve(&q, 1, POSES);
-    double D = vg_diagonal(h.reference, g->nv), before = 1;
+    double D = vg_diagonal(h.body.reference, g->nv), before = 1;
     static const double units[] = {0x1p-300, 0x1p-60, 0x1p60, 0x1p300};
     for (size_t u = 0; u < sizeof units / sizeof *units; u++) {
         for (size_t k = 0; k < POSES; k++) {
@@ -394,7 +394,7 @@ static void test_weights_refused(void)
     vg_planar *p;
     vg_err e;
     static const double bad[][2] = {{0, 1}, {-1, 1}, {1, -1}, {NAN, 1}, {1, NAN}, {1, INFINITY}, {1e-300, 1e300}};
-    CHECK(vg_solver_new(&s, g, NULL, 0, h.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_OK);
+    CHECK(vg_solver_new(&s, g, NULL, 0, h.body.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_OK);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         CHECK(vg_planar_new(&p, s, bad[i][0], bad[i][1], &e) == VG_EARG && !p);
     vg_solver_free(&s);

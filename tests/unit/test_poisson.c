@@ -112,8 +112,12 @@ static void test_same_offset(void)
 static vg_head graph_head(vg_kind kind)
 {
     static uint32_t anchors[2] = {0, 3};
-    return (vg_head){.kind = kind, .precision = VG_F64, .count = POINTS, .nanchors = 2, .anchors = anchors,
-                     .mesh.nv = POINTS};
+    return (vg_head){.kind = kind,
+                     .precision = VG_F64,
+                     .count = POINTS,
+                     .nanchors = 2,
+                     .anchors = anchors,
+                     .body.mesh.nv = POINTS};
 }
 
 static void fill(vg_frame *f, const vg_head *h, size_t k)

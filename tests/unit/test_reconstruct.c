@@ -52,8 +52,8 @@ static double there_and_back(vg_head *h, const double *pose, vg_weights weights)
     const double *at = root;
     vg_graph_root(g, pose, root);
     for (size_t v = 0; v < g->nv; v++)
-        memcpy(want + 3 * v, (g->in_face[v] ? pose : h->reference) + 3 * v, 3 * sizeof *want);
-    answer a = solve(g, h->reference, NULL, 0, 1, (const double *const *)&w, &at, weights, 1, 1);
+        memcpy(want + 3 * v, (g->in_face[v] ? pose : h->body.reference) + 3 * v, 3 * sizeof *want);
+    answer a = solve(g, h->body.reference, NULL, 0, 1, (const double *const *)&w, &at, weights, 1, 1);
     if (a.code < 0) printf("%s\n", a.e.message);
     double error = a.code < 0 ? INFINITY : farthest(a.x[0], want, g->nv) / vg_diagonal(want, g->nv);
     clear(&a);
@@ -67,18 +67,18 @@ static void select_faces(vg_head *h)
 {
     vg_err e;
     free(h->selected);
-    CHECK(vg_select_faces(&h->mesh, &h->selected, &h->nselected, &e) == VG_OK);
+    CHECK(vg_select_faces(&h->body.mesh, &h->selected, &h->nselected, &e) == VG_OK);
     h->has_selection = true;
 }
 
 /* the reference and a strongly bent pose, through all faces and through the selected ones, with both weights */
 static void gives_back(vg_head *h, const char *name)
 {
-    double *bent = warp(h->reference, h->mesh.nv, 1.5);
+    double *bent = warp(h->body.reference, h->body.mesh.nv, 1.5);
     for (int pass = 0; pass < 4; pass++) {
         vg_weights weights = all_weights[pass % 2];
         if (pass == 2) select_faces(h);
-        double at_rest = there_and_back(h, h->reference, weights), moved = there_and_back(h, bent, weights);
+        double at_rest = there_and_back(h, h->body.reference, weights), moved = there_and_back(h, bent, weights);
         if (!(at_rest <= tight) || !(moved <= tight)) printf("%s, pass %d:\n", name, pass);
         CHECK_NEAR(at_rest, 0, tight);
         CHECK_NEAR(moved, 0, tight);
@@ -116,7 +116,7 @@ static void test_units(void)
     for (size_t u = 0; u < sizeof units / sizeof *units; u++) {
         vg_head shapes[] = {make_flower(15), make_mixed(6), make_pieces(), make_chain(50)};
         for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
-            for (size_t k = 0; k < 3 * shapes[i].mesh.nv; k++) shapes[i].reference[k] *= units[u];
+            for (size_t k = 0; k < 3 * shapes[i].body.mesh.nv; k++) shapes[i].body.reference[k] *= units[u];
             gives_back(&shapes[i], "in another unit");
             vg_head_clear(&shapes[i]);
         }
@@ -141,7 +141,7 @@ static void test_data(void)
             if (!(worst <= tight)) printf("%s, pass %d:\n", all[i].poses, pass);
             CHECK_NEAR(worst, 0, tight);
         }
-        CHECK(f.h.nselected < f.h.mesh.nf && 2 * f.h.nselected > f.h.mesh.nf);
+        CHECK(f.h.nselected < f.h.body.mesh.nf && 2 * f.h.nselected > f.h.body.mesh.nf);
         film_clear(&f);
     }
 }
@@ -198,14 +198,14 @@ static double *least_squares(const vg_graph *g, const double *reference, const d
 static void against_dense(vg_head *h, const char *name, const uint32_t *anchors, size_t nanchors, vg_weights weights)
 {
     vg_graph *g = graph_of(h);
-    double D = vg_diagonal(h->reference, g->nv), *w = vectors_of(g, h->reference);
+    double D = vg_diagonal(h->body.reference, g->nv), *w = vectors_of(g, h->body.reference);
     double at[64] = {0.3 * D, -0.2 * D, D};
     const double *where = at;
     for (size_t i = 0; i < 3 * nanchors; i++) at[i] = 0.4 * D * noise();
     /* no longer a mesh's, nor centred */
     for (size_t i = 0; i < 3 * vg_graph_corners(g); i++) w[i] += 0.2 * D * noise();
-    double *want = least_squares(g, h->reference, w, anchors, nanchors, at, weights);
-    answer a = solve(g, h->reference, anchors, nanchors, 1, (const double *const *)&w, &where, weights, 1, 1);
+    double *want = least_squares(g, h->body.reference, w, anchors, nanchors, at, weights);
+    answer a = solve(g, h->body.reference, anchors, nanchors, 1, (const double *const *)&w, &where, weights, 1, 1);
     CHECK(a.code == VG_OK);
     double error = farthest(a.x[0], want, g->nv) / D;
     if (!(error <= 1e-10)) printf("%s with %zu anchors, weights %d:\n", name, nanchors, (int)weights);
@@ -222,12 +222,12 @@ static void test_least_squares(void)
     const char *name;
     static const uint32_t one[] = {1}, several[] = {0, 1, 2};
     for (size_t i = 0; make_any(i, &h, &name); i++) {
-        if (h.mesh.nv <= 200) {
+        if (h.body.mesh.nv <= 200) {
             bool isolated = !strcmp(name, "mixed");
             for (int k = 0; k < 2; k++) {
                 against_dense(&h, name, NULL, 0, all_weights[k]);
                 against_dense(&h, name, one, 1, all_weights[k]);
-                if (h.mesh.nv > 3 && !isolated) against_dense(&h, name, several, 3, all_weights[k]);
+                if (h.body.mesh.nv > 3 && !isolated) against_dense(&h, name, several, 3, all_weights[k]);
             }
             select_faces(&h);
             for (int k = 0; k < 2; k++) against_dense(&h, name, NULL, 0, all_weights[k]);
@@ -247,12 +247,12 @@ static void test_normal_equations(void)
     for (size_t i = 0; i < 2; i++) {
         if (i == 0) select_faces(shapes[i]);
         vg_graph *g = graph_of(shapes[i]);
-        double D = vg_diagonal(shapes[i]->reference, g->nv), *w = vectors_of(g, shapes[i]->reference);
+        double D = vg_diagonal(shapes[i]->body.reference, g->nv), *w = vectors_of(g, shapes[i]->body.reference);
         double root[3] = {D, 2 * D, -D}, mean[3], *left = room(3 * g->nv, sizeof *left);
         const double *at = root;
         for (size_t c = 0; c < 3 * vg_graph_corners(g); c++) w[c] *= 1 + 0.3 * noise();
         answer a =
-            solve(g, shapes[i]->reference, NULL, 0, 1, (const double *const *)&w, &at, VG_WEIGHTS_UNIFORM, 2, 1);
+            solve(g, shapes[i]->body.reference, NULL, 0, 1, (const double *const *)&w, &at, VG_WEIGHTS_UNIFORM, 2, 1);
         CHECK(a.code == VG_OK);
         double *x = vectors_of(g, a.x[0]), most = 0;
         for (size_t face = 0; face < g->nf; face++) {
@@ -299,13 +299,13 @@ static void test_anchors(void)
             double *pose[POSES], *w[POSES], *at[POSES], worst = 0;
             CHECK(spread_anchors(g, count, anchors) == count);
             for (size_t k = 0; k < POSES; k++) {
-                pose[k] = warp(h.reference, g->nv, 0.2 * (double)k);
+                pose[k] = warp(h.body.reference, g->nv, 0.2 * (double)k);
                 /* each pose has its anchors elsewhere */
                 for (size_t v = 0; v < 3 * g->nv; v++) pose[k][v] += (double)k;
                 w[k] = vectors_of(g, pose[k]), at[k] = room(3 * count, sizeof(double));
                 vg_graph_anchors(pose[k], anchors, count, at[k]);
             }
-            answer a = solve(g, h.reference, anchors, count, POSES, (const double *const *)w,
+            answer a = solve(g, h.body.reference, anchors, count, POSES, (const double *const *)w,
                              (const double *const *)at, all_weights[count % 2], 2, POSES);
             CHECK(a.code == VG_OK);
             for (size_t k = 0; k < POSES; k++) {
@@ -314,7 +314,7 @@ static void test_anchors(void)
                     met &= !memcmp(a.x[k] + 3 * (size_t)anchors[j], at[k] + 3 * j, 3 * sizeof(double));
                 for (size_t v = 0; v < g->nv; v++) {
                     if (g->in_face[v]) continue;
-                    kept &= !memcmp(a.x[k] + 3 * v, h.reference + 3 * v, 3 * sizeof(double));
+                    kept &= !memcmp(a.x[k] + 3 * v, h.body.reference + 3 * v, 3 * sizeof(double));
                     memcpy(a.x[k] + 3 * v, pose[k] + 3 * v, 3 * sizeof(double));
                 }
                 CHECK(met);
@@ -323,7 +323,7 @@ static void test_anchors(void)
                 free(pose[k]), free(w[k]), free(at[k]);
             }
             /* positions of the size of 10 + D are given in 53 bits: that much of D cannot be had back */
-            double D = vg_diagonal(h.reference, g->nv), lost = 2e-15 * (10 + D) / D;
+            double D = vg_diagonal(h.body.reference, g->nv), lost = 2e-15 * (10 + D) / D;
             if (!(worst <= tight + lost)) printf("%s, %zu anchors:\n", name, count);
             CHECK_NEAR(worst, 0, tight + lost);
             clear(&a);
@@ -338,13 +338,13 @@ static void test_contradicting_anchors(void)
 {
     vg_head h = make_flower(14);
     vg_graph *g = graph_of(&h);
-    double *w = vectors_of(g, h.reference), *at = room(3 * g->nv, sizeof *at);
+    double *w = vectors_of(g, h.body.reference), *at = room(3 * g->nv, sizeof *at);
     uint32_t *all = room(g->nv, sizeof *all);
     const double *where = at;
     for (size_t v = 0; v < g->nv; v++) all[v] = (uint32_t)v;
     for (size_t i = 0; i < 3 * g->nv; i++) at[i] = 1e3 * noise() / 3;
     for (size_t n = 1; n <= g->nv; n += 9) {
-        answer a = solve(g, h.reference, all, n, 1, (const double *const *)&w, &where, all_weights[n % 2], 1, 1);
+        answer a = solve(g, h.body.reference, all, n, 1, (const double *const *)&w, &where, all_weights[n % 2], 1, 1);
         CHECK(a.code == VG_OK && !memcmp(a.x[0], at, 3 * n * sizeof *at));
         clear(&a);
     }
@@ -369,16 +369,16 @@ static void test_threads_and_batches(void)
         double *w[POSES], roots[POSES][3];
         const double *at[POSES];
         for (size_t k = 0; k < POSES; k++) {
-            w[k] = vectors_of(g, i == 0 ? f.pose[k] : flower.reference);
+            w[k] = vectors_of(g, i == 0 ? f.pose[k] : flower.body.reference);
             for (size_t c = 0; c < 3 * vg_graph_corners(g); c++) w[k][c] *= 1 + 0.2 * noise();
             for (int j = 0; j < 3; j++) roots[k][j] = noise();
             at[k] = roots[k];
         }
-        answer one = solve(g, shapes[i]->reference, NULL, 0, POSES, (const double *const *)w, at, weights, 1, 1);
+        answer one = solve(g, shapes[i]->body.reference, NULL, 0, POSES, (const double *const *)w, at, weights, 1, 1);
         CHECK(one.code == VG_OK);
         for (int threads = 1; threads <= 3; threads++)
             for (size_t batch = 1; batch <= POSES; batch += batch < 9 || i == 1 ? 1 : 4) {
-                answer a = solve(g, shapes[i]->reference, NULL, 0, POSES, (const double *const *)w, at, weights,
+                answer a = solve(g, shapes[i]->body.reference, NULL, 0, POSES, (const double *const *)w, at, weights,
                                  threads, batch);
                 bool same = a.code == VG_OK;
                 for (size_t k = 0; same && k < POSES; k++)
@@ -402,7 +402,7 @@ static void test_batch_size_and_facts(void)
     vg_solver *s;
     vg_err e;
     for (int threads = 1; threads <= 3; threads++) {
-        if (vg_solver_new(&s, g, NULL, 0, h.reference, VG_WEIGHTS_UNIFORM, threads, &e) < 0) abort();
+        if (vg_solver_new(&s, g, NULL, 0, h.body.reference, VG_WEIGHTS_UNIFORM, threads, &e) < 0) abort();
         CHECK(vg_solver_batch(s) >= 8 && vg_solver_batch(s) % (size_t)threads == 0);
         vg_solver_facts facts = vg_solver_get_facts(s);
         CHECK(facts.unknowns == 299); /* one vertex is held */
@@ -425,8 +425,8 @@ static void test_without_faces(void)
         CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK && vg_graph_new(&g, &h, &e) == VG_OK);
         double none = 0, root[3] = {1, 2, 3};
         const double *w = &none, *at = root;
-        answer a = solve(g, h.reference, NULL, 0, 1, &w, &at, all_weights[points], 1, 1);
-        CHECK(a.code == VG_OK && !memcmp(a.x[0], h.reference, 3 * h.mesh.nv * sizeof(double)));
+        answer a = solve(g, h.body.reference, NULL, 0, 1, &w, &at, all_weights[points], 1, 1);
+        CHECK(a.code == VG_OK && !memcmp(a.x[0], h.body.reference, 3 * h.body.mesh.nv * sizeof(double)));
         clear(&a);
         vg_graph_free(&g);
     }
@@ -442,14 +442,14 @@ static void test_refused(void)
     vg_err e;
     h.has_links = true; /* and none are there */
     CHECK(vg_graph_new(&g, &h, &e) == VG_OK);
-    CHECK(vg_solver_new(&s, g, NULL, 0, h.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_EINPUT && !s);
+    CHECK(vg_solver_new(&s, g, NULL, 0, h.body.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_EINPUT && !s);
     CHECK(strstr(e.message, "link is missing") != NULL);
     uint32_t anchors[] = {0, 1};
-    CHECK(vg_solver_new(&s, g, anchors, 2, h.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_EINPUT && !s);
+    CHECK(vg_solver_new(&s, g, anchors, 2, h.body.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_EINPUT && !s);
     vg_graph_free(&g);
     h.has_links = false;
     g = graph_of(&h);
-    CHECK(vg_solver_new(&s, g, &lone, 1, h.reference, VG_WEIGHTS_AREA, 1, &e) == VG_EINPUT && !s);
+    CHECK(vg_solver_new(&s, g, &lone, 1, h.body.reference, VG_WEIGHTS_AREA, 1, &e) == VG_EINPUT && !s);
     CHECK(strstr(e.message, "in no face") != NULL);
     vg_graph_free(&g);
     vg_head_clear(&h);

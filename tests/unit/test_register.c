@@ -48,8 +48,12 @@ static vg_markers spread_markers(const vg_mesh *m, size_t n, const uint32_t *to)
 
 static vg_register_input between(const vg_head *a, const vg_head *b, const vg_markers *m)
 {
-    return (vg_register_input){.source = &a->mesh, .target = &b->mesh, .source_points = a->reference,
-                               .target_points = b->reference, .markers = m, .threads = 1};
+    return (vg_register_input){.source = &a->body.mesh,
+                               .target = &b->body.mesh,
+                               .source_points = a->body.reference,
+                               .target_points = b->body.reference,
+                               .markers = m,
+                               .threads = 1};
 }
 
 static vg_register_result registered(const vg_register_input *in)
@@ -63,9 +67,9 @@ static vg_register_result registered(const vg_register_input *in)
 /* What every correspondence keeps. */
 static void check_whole(const vg_correspondence *c, const vg_head *a, const vg_head *b)
 {
-    CHECK(c->source_nf == a->mesh.nf && c->target_nf == b->mesh.nf && c->source_nv == a->mesh.nv &&
-          c->target_nv == b->mesh.nv);
-    CHECK(c->source_digest == vg_mesh_digest(&a->mesh) && c->target_digest == vg_mesh_digest(&b->mesh));
+    CHECK(c->source_nf == a->body.mesh.nf && c->target_nf == b->body.mesh.nf && c->source_nv == a->body.mesh.nv &&
+          c->target_nv == b->body.mesh.nv);
+    CHECK(c->source_digest == vg_mesh_digest(&a->body.mesh) && c->target_digest == vg_mesh_digest(&b->body.mesh));
     bool driven = true, fair = true, known = true;
     for (size_t f = 0; f < c->target_nf; f++) {
         double sum = 0;
@@ -101,17 +105,18 @@ static size_t count_matched(const vg_correspondence *c)
 
 static double brute_distance(const vg_head *h, const double p[3])
 {
-    const vg_mesh *m = &h->mesh;
+    const vg_mesh *m = &h->body.mesh;
     double best = INFINITY;
     for (size_t f = 0; f < m->nf; f++) {
         size_t r = m->start[f + 1] - m->start[f];
         double C[3] = {0};
         for (size_t i = 0; i < r; i++)
-            for (size_t k = 0; k < 3; k++) C[k] += h->reference[3 * (size_t)m->vert[m->start[f] + i] + k] / (double)r;
+            for (size_t k = 0; k < 3; k++)
+                C[k] += h->body.reference[3 * (size_t)m->vert[m->start[f] + i] + k] / (double)r;
         for (size_t i = 0; i < (r <= 3 ? 1 : r); i++) {
-            const double *a = h->reference + 3 * (size_t)m->vert[m->start[f] + i];
-            const double *b = h->reference + 3 * (size_t)m->vert[m->start[f] + (i + 1) % r];
-            const double *c = r == 2 ? b : r == 3 ? h->reference + 3 * (size_t)m->vert[m->start[f] + 2] : C;
+            const double *a = h->body.reference + 3 * (size_t)m->vert[m->start[f] + i];
+            const double *b = h->body.reference + 3 * (size_t)m->vert[m->start[f] + (i + 1) % r];
+            const double *c = r == 2 ? b : r == 3 ? h->body.reference + 3 * (size_t)m->vert[m->start[f] + 2] : C;
             enum { STEPS = 60 };
             for (int s = 0; s <= STEPS; s++)
                 for (int t = 0; s + t <= STEPS; t++) {
@@ -132,7 +137,7 @@ static void nearest_points(void)
 {
     vg_head h = make_mixed(5);
     vgi_surface *s;
-    CHECK(vgi_surface_new(&s, &h.mesh, h.reference, NULL) == VG_OK);
+    CHECK(vgi_surface_new(&s, &h.body.mesh, h.body.reference, NULL) == VG_OK);
     for (int i = 0; i < 60; i++) {
         double p[3] = {2.5 + 4 * noise(), 2.5 + 4 * noise(), 2 * noise()}, brute = brute_distance(&h, p);
         vgi_hit hit;
@@ -157,7 +162,7 @@ static void nearest_points_by_normal(void)
     vgi_surface *s;
     vgi_hit hit;
     const double at[3] = {0.4, 0.4, 0.06}, up[3] = {0, 0, 1}, down[3] = {0, 0, -1}, beside[3] = {-1, 0.5, 0.1};
-    CHECK(vgi_surface_new(&s, &h.mesh, h.reference, NULL) == VG_OK);
+    CHECK(vgi_surface_new(&s, &h.body.mesh, h.body.reference, NULL) == VG_OK);
     CHECK(vgi_surface_nearest(s, at, NULL, 0, INFINITY, &hit) && hit.face == 1 && !hit.border);
     CHECK(vgi_surface_nearest(s, at, up, 0.5, INFINITY, &hit) && hit.face == 1);
     CHECK_NEAR(hit.square, 0.0016, 1e-15);
@@ -259,13 +264,14 @@ static void seeds_as_text(void)
 
 static void check_identity(const vg_head *h)
 {
-    vg_markers m = spread_markers(&h->mesh, 4, NULL);
+    vg_markers m = spread_markers(&h->body.mesh, 4, NULL);
     vg_register_input in = between(h, h, &m);
     vg_register_result r = registered(&in);
     check_whole(&r.pairs, h, h);
     CHECK(share_of_identity(&r.pairs) >= 0.99);
-    CHECK(count_matched(&r.pairs) == h->mesh.nf);
-    CHECK_NEAR(farthest(r.fitted, h->reference, h->mesh.nv), 0, 1e-6 * vg_diagonal(h->reference, h->mesh.nv));
+    CHECK(count_matched(&r.pairs) == h->body.mesh.nf);
+    CHECK_NEAR(farthest(r.fitted, h->body.reference, h->body.mesh.nv), 0,
+               1e-6 * vg_diagonal(h->body.reference, h->body.mesh.nv));
     vg_register_result_clear(&r);
     vg_markers_clear(&m);
 }
@@ -286,7 +292,7 @@ static void identity_on_generated_meshes(void)
     const char *name;
     vg_head h;
     for (size_t i = 0; make_any(i, &h, &name); i++) {
-        bool flat = h.mesh.nf < 12; /* too few vertices for four markers that are not in line */
+        bool flat = h.body.mesh.nf < 12; /* too few vertices for four markers that are not in line */
         if (!flat) check_identity(&h);
         if (test_bad) printf("%s\n", name);
         vg_head_clear(&h);
@@ -309,9 +315,9 @@ static void fans(void)
  * vertices and faces in another order. */
 static vg_head disguise(const vg_head *h, const motion *t, uint32_t *to, bool turn_over)
 {
-    const vg_mesh *m = &h->mesh;
+    const vg_mesh *m = &h->body.mesh;
     vg_head x = new_shape();
-    double *moved = move_points(t, h->reference, m->nv);
+    double *moved = move_points(t, h->body.reference, m->nv);
     uint32_t *from = room(m->nv, sizeof *from);
     for (uint32_t v = 0; v < m->nv; v++) from[v] = v;
     for (size_t v = m->nv; v > 1; v--) {
@@ -357,13 +363,13 @@ static double median_distance(const vg_correspondence *c)
 static double mean_edge(const vg_head *h)
 {
     double sum = 0;
-    for (size_t f = 0; f < h->mesh.nf; f++)
-        for (uint32_t c = h->mesh.start[f]; c < h->mesh.start[f + 1]; c++) {
-            uint32_t next = c + 1 < h->mesh.start[f + 1] ? c + 1 : h->mesh.start[f];
-            sum += farthest(h->reference + 3 * (size_t)h->mesh.vert[c], h->reference + 3 * (size_t)h->mesh.vert[next],
-                            1);
+    for (size_t f = 0; f < h->body.mesh.nf; f++)
+        for (uint32_t c = h->body.mesh.start[f]; c < h->body.mesh.start[f + 1]; c++) {
+            uint32_t next = c + 1 < h->body.mesh.start[f + 1] ? c + 1 : h->body.mesh.start[f];
+            sum += farthest(h->body.reference + 3 * (size_t)h->body.mesh.vert[c],
+                            h->body.reference + 3 * (size_t)h->body.mesh.vert[next], 1);
         }
-    return sum / (double)vg_mesh_corners(&h->mesh);
+    return sum / (double)vg_mesh_corners(&h->body.mesh);
 }
 
 static void disguised_copies(void)
@@ -372,10 +378,10 @@ static void disguised_copies(void)
                                         "walk-man.rest.obj.xz"};
     for (size_t i = 0; i < 2 * sizeof names / sizeof *names; i++) {
         vg_head h = load(names[i / 2]);
-        uint32_t *to = room(h.mesh.nv, sizeof *to);
+        uint32_t *to = room(h.body.mesh.nv, sizeof *to);
         motion t = turn(2.2, 3.7, 10);
         vg_head x = disguise(&h, &t, to, i % 2);
-        vg_markers m = spread_markers(&h.mesh, 6, to);
+        vg_markers m = spread_markers(&h.body.mesh, 6, to);
         vg_register_input in = between(&h, &x, &m);
         vg_register_result r = registered(&in);
         check_whole(&r.pairs, &h, &x);
@@ -386,7 +392,7 @@ static void disguised_copies(void)
         for (int k = 0; k < 3; k++) worst = fmax(worst, fabs(r.shift[k] - t.shift[k]));
         CHECK_NEAR(worst, 0, 1e-7);
         CHECK(median_distance(&r.pairs) < 0.5 * mean_edge(&x));
-        CHECK((double)count_matched(&r.pairs) > 0.99 * (double)x.mesh.nf);
+        CHECK((double)count_matched(&r.pairs) > 0.99 * (double)x.body.mesh.nf);
         vg_register_result_clear(&r);
         vg_markers_clear(&m);
         vg_head_clear(&x);
@@ -402,22 +408,22 @@ static void another_body(void)
     vg_register_input in = between(&man, &woman, &m);
     vg_register_result r = registered(&in);
     check_whole(&r.pairs, &man, &woman);
-    CHECK(count_matched(&r.pairs) == woman.mesh.nf);
-    double D = vg_diagonal(woman.reference, woman.mesh.nv), worst = 0;
+    CHECK(count_matched(&r.pairs) == woman.body.mesh.nf);
+    double D = vg_diagonal(woman.body.reference, woman.body.mesh.nv), worst = 0;
     for (size_t i = 0; i < m.n; i++) {
         CHECK(!r.left_out[i]);
-        worst = fmax(
-            worst, farthest(r.fitted + 3 * (size_t)m.at[i].source, woman.reference + 3 * (size_t)m.at[i].target, 1));
+        worst = fmax(worst, farthest(r.fitted + 3 * (size_t)m.at[i].source,
+                                     woman.body.reference + 3 * (size_t)m.at[i].target, 1));
     }
     CHECK(worst < 0.01 * D);
     CHECK(median_distance(&r.pairs) < 0.25 * mean_edge(&woman));
     vg_register_result again;
     in.threads = 3;
     again = registered(&in);
-    CHECK(!memcmp(r.fitted, again.fitted, 3 * man.mesh.nv * sizeof *r.fitted));
-    CHECK(r.pairs.first[woman.mesh.nf] == again.pairs.first[woman.mesh.nf]);
-    CHECK(!memcmp(r.pairs.source, again.pairs.source, r.pairs.first[woman.mesh.nf] * sizeof *r.pairs.source));
-    CHECK(!memcmp(r.pairs.weight, again.pairs.weight, r.pairs.first[woman.mesh.nf] * sizeof *r.pairs.weight));
+    CHECK(!memcmp(r.fitted, again.fitted, 3 * man.body.mesh.nv * sizeof *r.fitted));
+    CHECK(r.pairs.first[woman.body.mesh.nf] == again.pairs.first[woman.body.mesh.nf]);
+    CHECK(!memcmp(r.pairs.source, again.pairs.source, r.pairs.first[woman.body.mesh.nf] * sizeof *r.pairs.source));
+    CHECK(!memcmp(r.pairs.weight, again.pairs.weight, r.pairs.first[woman.body.mesh.nf] * sizeof *r.pairs.weight));
     vg_register_result_clear(&again);
     vg_register_result_clear(&r);
     vg_markers_clear(&m);
@@ -437,13 +443,14 @@ static void wrong_markers(void)
     vg_register_result r = registered(&in);
     for (size_t i = 0; i < m.n; i++) CHECK(r.left_out[i] == (i == 7 || i == 30));
     CHECK(r.residual[7] > 5 * r.typical_residual);
-    double D = vg_diagonal(woman.reference, woman.mesh.nv);
-    CHECK(farthest(r.fitted + 3 * (size_t)m.at[7].source, woman.reference + 3 * (size_t)swap, 1) < 0.03 * D);
+    double D = vg_diagonal(woman.body.reference, woman.body.mesh.nv);
+    CHECK(farthest(r.fitted + 3 * (size_t)m.at[7].source, woman.body.reference + 3 * (size_t)swap, 1) < 0.03 * D);
     vg_register_result_clear(&r);
     in.keep_all = true;
     r = registered(&in);
     CHECK(r.left_out[7]); /* said all the same */
-    CHECK(farthest(r.fitted + 3 * (size_t)m.at[7].source, woman.reference + 3 * (size_t)m.at[7].target, 1) < 0.1 * D);
+    CHECK(farthest(r.fitted + 3 * (size_t)m.at[7].source, woman.body.reference + 3 * (size_t)m.at[7].target, 1) <
+          0.1 * D);
     vg_register_result_clear(&r);
     vg_markers_clear(&m);
     vg_head_clear(&man);
@@ -476,8 +483,8 @@ static void refusals(void)
     in = between(&h, &none, &two);
     in.markers = NULL, in.aligned = true;
     CHECK(refused(&in, "a mesh without faces cannot be registered") == VG_EINPUT);
-    memset(point.reference, 0, 3 * point.mesh.nv * sizeof(double));
-    in.target = &point.mesh, in.target_points = point.reference;
+    memset(point.body.reference, 0, 3 * point.body.mesh.nv * sizeof(double));
+    in.target = &point.body.mesh, in.target_points = point.body.reference;
     CHECK(refused(&in, "a mesh without extent cannot be registered") == VG_EINPUT);
     vg_seed seed = {0, {1, 2, 63}, {1, 0, 0}};
     in = between(&h, &h, NULL);
@@ -485,7 +492,7 @@ static void refusals(void)
     CHECK(refused(&in, "the dense correspondence of vertex 0 does not fit the meshes: are the two interchanged?") ==
           VG_EINPUT);
     vg_head away = make_torus(9, 7);
-    for (size_t i = 0; i < away.mesh.nv; i++) away.reference[3 * i] += 100;
+    for (size_t i = 0; i < away.body.mesh.nv; i++) away.body.reference[3 * i] += 100;
     in = between(&h, &away, NULL);
     in.aligned = true;
     CHECK(refused(&in, "no face of the target comes near a face of the source that looks the same way") == VG_EINPUT);
@@ -505,7 +512,7 @@ static void degenerate_faces(void)
     vg_register_input in = between(&h, &h, &m);
     vg_register_result r = registered(&in);
     check_whole(&r.pairs, &h, &h);
-    CHECK(farthest(r.fitted, h.reference, h.mesh.nv) < 1e-6);
+    CHECK(farthest(r.fitted, h.body.reference, h.body.mesh.nv) < 1e-6);
     vg_register_result_clear(&r);
     vg_markers_clear(&m);
     vg_head_clear(&h);
@@ -515,15 +522,15 @@ static void degenerate_faces(void)
 static void parts_without_counterpart(void)
 {
     vg_head source = make_torus(24, 16), target = make_torus(24, 16);
-    size_t shared = target.mesh.nf;
+    size_t shared = target.body.mesh.nf;
     add_torus(&target, 8, 6, (double[3]){6, 0, 0});
-    vg_markers m = spread_markers(&source.mesh, 6, NULL);
+    vg_markers m = spread_markers(&source.body.mesh, 6, NULL);
     vg_register_input in = between(&source, &target, &m);
     vg_register_result r = registered(&in);
     const vg_correspondence *c = &r.pairs;
     check_whole(c, &source, &target);
-    for (size_t f = 0; f < target.mesh.nf; f++) CHECK(c->matched[f] == (f < shared));
-    for (size_t f = shared; f < target.mesh.nf; f++) {
+    for (size_t f = 0; f < target.body.mesh.nf; f++) CHECK(c->matched[f] == (f < shared));
+    for (size_t f = shared; f < target.body.mesh.nf; f++) {
         uint32_t n = c->first[f + 1] - c->first[f];
         CHECK(n == c->first[shared + 1] - c->first[shared]);
         CHECK(!memcmp(c->source + c->first[f], c->source + c->first[shared], n * sizeof *c->source));
@@ -550,13 +557,13 @@ static void holes(void)
             if (i < N / 2) FACE(&source, a, a + N + 1, a + N + 2, a + 1);
             FACE(&target, a, a + N + 1, a + N + 2, a + 1);
         }
-    vg_markers m = spread_markers(&source.mesh, 8, NULL);
+    vg_markers m = spread_markers(&source.body.mesh, 8, NULL);
     vg_register_input in = between(&source, &target, &m);
     vg_register_result r = registered(&in);
     check_whole(&r.pairs, &source, &target);
     size_t matched = count_matched(&r.pairs);
     CHECK(matched >= N * N / 2 && matched <= N * (N / 2 + 1));
-    for (size_t f = 0; f < source.mesh.nf; f++) CHECK(r.pairs.source[r.pairs.first[f]] == f);
+    for (size_t f = 0; f < source.body.mesh.nf; f++) CHECK(r.pairs.source[r.pairs.first[f]] == f);
     CHECK(r.pairs.source[r.pairs.first[N * N - 1]] >= N * (N / 2 - 1)); /* the far corner rides with the last row */
     vg_register_result_clear(&r);
     vg_markers_clear(&m);
@@ -568,15 +575,16 @@ static void bones(void)
 {
     vg_head a = make_tree(40), b = new_shape();
     motion t = turn(1, 2, 3);
-    double *moved = move_points(&t, a.reference, a.mesh.nv);
-    for (size_t v = 0; v < a.mesh.nv; v++) add_vertex(&b, moved[3 * v], moved[3 * v + 1], moved[3 * v + 2]);
-    for (size_t f = a.mesh.nf; f-- > 0;) FACE(&b, a.mesh.vert[2 * f], a.mesh.vert[2 * f + 1]);
-    vg_markers m = spread_markers(&a.mesh, 8, NULL);
+    double *moved = move_points(&t, a.body.reference, a.body.mesh.nv);
+    for (size_t v = 0; v < a.body.mesh.nv; v++) add_vertex(&b, moved[3 * v], moved[3 * v + 1], moved[3 * v + 2]);
+    for (size_t f = a.body.mesh.nf; f-- > 0;) FACE(&b, a.body.mesh.vert[2 * f], a.body.mesh.vert[2 * f + 1]);
+    vg_markers m = spread_markers(&a.body.mesh, 8, NULL);
     vg_register_input in = between(&a, &b, &m);
     vg_register_result r = registered(&in);
     check_whole(&r.pairs, &a, &b);
-    for (size_t f = 0; f < b.mesh.nf; f++)
-        CHECK(r.pairs.first[f + 1] - r.pairs.first[f] == 1 && r.pairs.source[r.pairs.first[f]] == b.mesh.nf - 1 - f);
+    for (size_t f = 0; f < b.body.mesh.nf; f++)
+        CHECK(r.pairs.first[f + 1] - r.pairs.first[f] == 1 &&
+              r.pairs.source[r.pairs.first[f]] == b.body.mesh.nf - 1 - f);
     vg_register_result_clear(&r);
     vg_markers_clear(&m);
     vg_head_clear(&a);
@@ -587,7 +595,7 @@ static void bones(void)
 /* Tori of different resolution with the two angles as texture coordinates: no marker is needed, and angles agree. */
 static vg_attributes torus_texture(const vg_head *h, uint32_t u, uint32_t v)
 {
-    size_t corners = vg_mesh_corners(&h->mesh);
+    size_t corners = vg_mesh_corners(&h->body.mesh);
     vg_attributes a = {.ntex = corners, .tex_dim = 2, .tex = room(2 * corners, sizeof(double)),
                        .corner_tex = room(corners, sizeof(uint32_t))};
     for (uint32_t i = 0, c = 0; i < u; i++)
@@ -606,10 +614,10 @@ static void texture_coordinates(void)
     vg_head a = make_torus(U, V), b = make_torus(U2, V2);
     vg_attributes ta = torus_texture(&a, U, V), tb = torus_texture(&b, U2, V2);
     motion t = turn(2, 5, -1);
-    double *moved = move_points(&t, b.reference, b.mesh.nv);
-    vg_register_input in = {.source = &a.mesh,
-                            .target = &b.mesh,
-                            .source_points = a.reference,
+    double *moved = move_points(&t, b.body.reference, b.body.mesh.nv);
+    vg_register_input in = {.source = &a.body.mesh,
+                            .target = &b.body.mesh,
+                            .source_points = a.body.reference,
                             .target_points = moved,
                             .source_uv = &ta,
                             .target_uv = &tb,
@@ -617,7 +625,7 @@ static void texture_coordinates(void)
     vg_register_result r = registered(&in);
     check_whole(&r.pairs, &a, &b);
     CHECK(r.uv_pairs == U * V);
-    for (uint32_t f = 0; f < b.mesh.nf; f++) {
+    for (uint32_t f = 0; f < b.body.mesh.nf; f++) {
         uint32_t s = r.pairs.source[r.pairs.first[f]];
         double du = (s / V + 0.5) / U - (f / V2 + 0.5) / U2, dv = (s % V + 0.5) / V - (f % V2 + 0.5) / V2;
         CHECK(fabs(du) < 1.0 / U2 && fabs(dv) < 1.0 / V2);
@@ -634,26 +642,28 @@ static void texture_coordinates(void)
 static void dense_seeds(void)
 {
     vg_head a = make_torus(20, 12), b = make_torus(20, 12);
-    vg_seed *seed = room(b.mesh.nv, sizeof *seed);
+    vg_seed *seed = room(b.body.mesh.nv, sizeof *seed);
     motion t = turn(1.3, 0.5, 2);
-    for (uint32_t i = 0; i < b.mesh.nv; i++) {
-        const uint32_t *v = a.mesh.vert + 4 * i; /* target vertex i: half way along the diagonal of source face i */
+    for (uint32_t i = 0; i < b.body.mesh.nv; i++) {
+        const uint32_t *v =
+            a.body.mesh.vert + 4 * i; /* target vertex i: half way along the diagonal of source face i */
         seed[i] = (vg_seed){i, {v[0], v[2], v[0]}, {0.5, 0.5, 0}};
         for (size_t k = 0; k < 3; k++)
-            b.reference[3 * i + k] = 0.5 * (a.reference[3 * (size_t)v[0] + k] + a.reference[3 * (size_t)v[2] + k]);
+            b.body.reference[3 * i + k] =
+                0.5 * (a.body.reference[3 * (size_t)v[0] + k] + a.body.reference[3 * (size_t)v[2] + k]);
     }
-    double *moved = move_points(&t, b.reference, b.mesh.nv);
+    double *moved = move_points(&t, b.body.reference, b.body.mesh.nv);
     for (int reverse = 0; reverse < 2; reverse++) {
         vg_register_input in = between(&a, &b, NULL);
-        in.target_points = moved, in.seeds = seed, in.nseeds = b.mesh.nv;
+        in.target_points = moved, in.seeds = seed, in.nseeds = b.body.mesh.nv;
         if (reverse) {
             in = between(&b, &a, NULL);
-            in.source_points = moved, in.seeds = seed, in.nseeds = b.mesh.nv, in.seeds_of_source = true;
+            in.source_points = moved, in.seeds = seed, in.nseeds = b.body.mesh.nv, in.seeds_of_source = true;
         }
         vg_register_result r = registered(&in);
-        CHECK(r.pairs.target_nf == a.mesh.nf && count_matched(&r.pairs) == a.mesh.nf);
+        CHECK(r.pairs.target_nf == a.body.mesh.nf && count_matched(&r.pairs) == a.body.mesh.nf);
         CHECK_NEAR(r.scale, reverse ? 2 : 0.5, 1e-6);
-        double D = reverse ? vg_diagonal(a.reference, a.mesh.nv) : vg_diagonal(moved, b.mesh.nv);
+        double D = reverse ? vg_diagonal(a.body.reference, a.body.mesh.nv) : vg_diagonal(moved, b.body.mesh.nv);
         CHECK(median_distance(&r.pairs) < 0.06 * D); /* half a cell is 0.046 D */
         vg_register_result_clear(&r);
     }

@@ -44,14 +44,14 @@ static void set_stage(stage *x, vg_head h, double degrees)
     double positions[3 * JOINTS], turns[4 * JOINTS];
     *x = (stage){.h = h, .s = make_skeleton(LENGTH)};
     vg_skeleton_pose(&x->s, NULL, positions, turns);
-    CHECK(vg_rig_make(&x->h.rig, &x->s, positions, turns, &e) == VG_OK);
-    CHECK(x->h.rig.nbones == BONES);
+    CHECK(vg_rig_make(&x->h.body.rig, &x->s, positions, turns, &e) == VG_OK);
+    CHECK(x->h.body.rig.nbones == BONES);
     for (size_t k = 0; k < POSES; k++) {
         x->positions[k] = room(3 * JOINTS, sizeof(double)), x->turns[k] = room(4 * JOINTS, sizeof(double));
-        x->transforms[k] = room(7 * BONES, sizeof(double)), x->poses[k] = room(3 * h.mesh.nv, sizeof(double));
+        x->transforms[k] = room(7 * BONES, sizeof(double)), x->poses[k] = room(3 * h.body.mesh.nv, sizeof(double));
         draw_values(x->values[k], degrees);
         vg_skeleton_pose(&x->s, x->values[k], x->positions[k], x->turns[k]);
-        vg_rig_transforms(&x->h.rig, x->positions[k], x->turns[k], x->transforms[k]);
+        vg_rig_transforms(&x->h.body.rig, x->positions[k], x->turns[k], x->transforms[k]);
     }
 }
 
@@ -89,7 +89,7 @@ static void paint(vg_rig *r, size_t nv, const double *reference, double blend)
 static void skin_poses(stage *x)
 {
     for (size_t k = 0; k < POSES; k++)
-        vg_rig_skin(&x->h.rig, x->h.mesh.nv, x->h.reference, x->transforms[k], x->poses[k]);
+        vg_rig_skin(&x->h.body.rig, x->h.body.mesh.nv, x->h.body.reference, x->transforms[k], x->poses[k]);
 }
 
 static vg_rig_fitter *fit(stage *x, vg_rig_method method, size_t bones, double refine, int threads)
@@ -108,12 +108,12 @@ static double misses(const stage *x)
 {
     vg_err e;
     vg_player *p;
-    double most = 0, *out = room(3 * x->h.mesh.nv, sizeof *out), *outs[1] = {out};
+    double most = 0, *out = room(3 * x->h.body.mesh.nv, sizeof *out), *outs[1] = {out};
     CHECK(vg_player_new(&p, &x->h, false, 2, &e) == VG_OK);
     for (size_t k = 0; k < POSES; k++) {
         const double *t[1] = {x->transforms[k]};
         vg_player_pose(p, 1, t, outs);
-        most = fmax(most, farthest(out, x->poses[k], x->h.mesh.nv));
+        most = fmax(most, farthest(out, x->poses[k], x->h.body.mesh.nv));
     }
     vg_player_free(&p);
     free(out);
@@ -140,18 +140,18 @@ static void rigid_bodies_are_met(void)
             stage x;
             set_stage(&x, make_beads(), 50);
             for (size_t k = 0; k < POSES; k++)
-                for (size_t v = 0; v < x.h.mesh.nv;
+                for (size_t v = 0; v < x.h.body.mesh.nv;
                      v++) { /* by another road than the library's: two columns of a rotation matrix at a time */
                     double m[9], d[3];
-                    size_t b = v / (x.h.mesh.nv / BONES);
+                    size_t b = v / (x.h.body.mesh.nv / BONES);
                     vg_quat_matrix(x.turns[k] + 4 * b, m);
-                    for (size_t i = 0; i < 3; i++) d[i] = x.h.reference[3 * v + i] - x.h.rig.at[3 * b + i];
+                    for (size_t i = 0; i < 3; i++) d[i] = x.h.body.reference[3 * v + i] - x.h.body.rig.at[3 * b + i];
                     for (size_t i = 0; i < 3; i++)
                         x.poses[k][3 * v + i] =
                             x.positions[k][3 * b + i] + m[3 * i] * d[0] + m[3 * i + 1] * d[1] + m[3 * i + 2] * d[2];
                 }
             vg_rig_fitter *f = fit(&x, method ? VG_RIG_LBS : VG_RIG_ENVELOPE, bones, 0.003, 2);
-            CHECK_NEAR(misses(&x), 0, 1e-9 * vg_diagonal(x.h.reference, x.h.mesh.nv));
+            CHECK_NEAR(misses(&x), 0, 1e-9 * vg_diagonal(x.h.body.reference, x.h.body.mesh.nv));
             vg_rig_fitter_free(&f);
             strike(&x);
         }
@@ -161,19 +161,19 @@ static void weights_are_found_again(void)
 {
     stage x;
     set_stage(&x, make_limb(), 40);
-    size_t nv = x.h.mesh.nv;
-    paint(&x.h.rig, nv, x.h.reference, 0.3);
+    size_t nv = x.h.body.mesh.nv;
+    paint(&x.h.body.rig, nv, x.h.body.reference, 0.3);
     skin_poses(&x);
     double *truth = room(nv * BONES, sizeof *truth), most = 0;
     for (size_t s = 0; s < VG_SKIN * nv; s++)
-        truth[s / VG_SKIN * BONES + x.h.rig.skin_bone[s]] += x.h.rig.skin_weight[s];
+        truth[s / VG_SKIN * BONES + x.h.body.rig.skin_bone[s]] += x.h.body.rig.skin_weight[s];
     vg_rig_fitter *f = fit(&x, VG_RIG_LBS, 1, 0, 2);
     for (size_t v = 0; v < nv; v++) {
         double sum = 0;
         for (size_t s = VG_SKIN * v; s < VG_SKIN * (v + 1); s++) {
-            double w = x.h.rig.skin_weight[s];
-            CHECK(w >= 0 && (s % VG_SKIN == 0 || w <= x.h.rig.skin_weight[s - 1]));
-            truth[v * BONES + x.h.rig.skin_bone[s]] -= w, sum += w;
+            double w = x.h.body.rig.skin_weight[s];
+            CHECK(w >= 0 && (s % VG_SKIN == 0 || w <= x.h.body.rig.skin_weight[s - 1]));
+            truth[v * BONES + x.h.body.rig.skin_bone[s]] -= w, sum += w;
         }
         CHECK_NEAR(sum, 1, 1e-12);
     }
@@ -191,11 +191,11 @@ static void motions_are_found_again(void)
     vg_err e;
     vg_bender *b;
     set_stage(&x, make_limb(), 60);
-    paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.2);
+    paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.2);
     skin_poses(&x);
     double *found[POSES];
     for (size_t k = 0; k < POSES; k++) found[k] = room(7 * BONES, sizeof(double));
-    CHECK(vg_bender_new(&b, &x.h.rig, x.h.mesh.nv, x.h.reference, 2, &e) == VG_OK);
+    CHECK(vg_bender_new(&b, &x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 2, &e) == VG_OK);
     vg_bender_fit(b, POSES, (const double *const *)x.poses, found);
     for (size_t k = 0; k < POSES; k++)
         for (size_t j = 0; j < BONES; j++) {
@@ -217,15 +217,15 @@ static void far_motions_are_found_again(void)
         vg_err e;
         vg_bender *b;
         set_stage(&x, make_limb(), 150);
-        paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.1);
+        paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.1);
         skin_poses(&x);
-        double *found[POSES], *again = room(3 * x.h.mesh.nv, sizeof *again);
+        double *found[POSES], *again = room(3 * x.h.body.mesh.nv, sizeof *again);
         for (size_t k = 0; k < POSES; k++) found[k] = room(7 * BONES, sizeof(double));
-        CHECK(vg_bender_new(&b, &x.h.rig, x.h.mesh.nv, x.h.reference, 2, &e) == VG_OK);
+        CHECK(vg_bender_new(&b, &x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 2, &e) == VG_OK);
         vg_bender_fit(b, POSES, (const double *const *)x.poses, found);
         for (size_t k = 0; k < POSES; k++) {
-            vg_rig_skin(&x.h.rig, x.h.mesh.nv, x.h.reference, found[k], again);
-            CHECK_NEAR(farthest(again, x.poses[k], x.h.mesh.nv), 0, 1e-5);
+            vg_rig_skin(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, found[k], again);
+            CHECK_NEAR(farthest(again, x.poses[k], x.h.body.mesh.nv), 0, 1e-5);
         }
         vg_bender_free(&b);
         for (size_t k = 0; k < POSES; k++) free(found[k]);
@@ -243,12 +243,12 @@ static void a_bone_without_vertices_goes_with_its_parent(void)
     vg_bender *b;
     double found[7 * BONES], *founds[1] = {found};
     set_stage(&x, make_limb(), 60);
-    size_t nv = x.h.mesh.nv;
-    paint(&x.h.rig, nv, x.h.reference, 0);
+    size_t nv = x.h.body.mesh.nv;
+    paint(&x.h.body.rig, nv, x.h.body.reference, 0);
     for (size_t v = 0; v < nv; v++)
-        if (x.h.rig.skin_bone[VG_SKIN * v] == BARE) x.h.rig.skin_bone[VG_SKIN * v] = BARE - 1;
+        if (x.h.body.rig.skin_bone[VG_SKIN * v] == BARE) x.h.body.rig.skin_bone[VG_SKIN * v] = BARE - 1;
     skin_poses(&x);
-    CHECK(vg_bender_new(&b, &x.h.rig, nv, x.h.reference, 1, &e) == VG_OK);
+    CHECK(vg_bender_new(&b, &x.h.body.rig, nv, x.h.body.reference, 1, &e) == VG_OK);
     for (size_t k = 0; k < POSES; k++) {
         vg_bender_fit(b, 1, (const double *const *)x.poses + k, founds);
         const double *p = found + 7 * BARE, *up = found + 7 * (BARE - 1), *truth = x.transforms[k] + 7 * (BARE - 1);
@@ -262,14 +262,14 @@ static void a_bone_without_vertices_goes_with_its_parent(void)
 /* All of a stage in other units of length. */
 static void change_units(stage *x, double unit)
 {
-    for (size_t i = 0; i < 3 * x->h.mesh.nv; i++) x->h.reference[i] *= unit;
+    for (size_t i = 0; i < 3 * x->h.body.mesh.nv; i++) x->h.body.reference[i] *= unit;
     for (size_t j = 0; j < JOINTS; j++)
         for (size_t k = 0; k < 3; k++) {
-            x->s.joints[j].offset[k] *= unit, x->h.rig.skeleton.joints[j].offset[k] *= unit;
-            x->h.rig.at[3 * j + k] *= unit;
+            x->s.joints[j].offset[k] *= unit, x->h.body.rig.skeleton.joints[j].offset[k] *= unit;
+            x->h.body.rig.at[3 * j + k] *= unit;
         }
     for (size_t n = 0; n < POSES; n++) {
-        for (size_t i = 0; i < 3 * x->h.mesh.nv; i++) x->poses[n][i] *= unit;
+        for (size_t i = 0; i < 3 * x->h.body.mesh.nv; i++) x->poses[n][i] *= unit;
         for (size_t i = 0; i < 3 * JOINTS; i++) x->positions[n][i] *= unit;
         for (size_t i = 0; i < 7 * BONES; i++)
             if (i % 7 > 3) x->transforms[n][i] *= unit;
@@ -287,15 +287,15 @@ static void units_do_not_matter(void)
         double unit = ldexp(1, i == 0 ? 0 : i == 1 ? -66 : 66), *found[1] = {turned[i]}; /* 1, 1e-20, 1e20 */
         meshes_state = 9;
         set_stage(&x, make_limb(), 60);
-        paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.2);
+        paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.2);
         skin_poses(&x);
         for (size_t k = 0; k < POSES; k++)
-            for (size_t v = 0; v < 3 * x.h.mesh.nv; v++) x.poses[k][v] += 0.05 * sin(x.poses[k][v] * 3);
+            for (size_t v = 0; v < 3 * x.h.body.mesh.nv; v++) x.poses[k][v] += 0.05 * sin(x.poses[k][v] * 3);
         change_units(&x, unit);
-        CHECK(vg_bender_new(&b, &x.h.rig, x.h.mesh.nv, x.h.reference, 1, &e) == VG_OK);
+        CHECK(vg_bender_new(&b, &x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 1, &e) == VG_OK);
         vg_bender_fit(b, 1, (const double *const *)x.poses, found);
         vg_bender_free(&b);
-        CHECK(vg_rig_locate(&x.s, x.h.mesh.nv, x.h.reference, POSES, (const double *const *)x.poses,
+        CHECK(vg_rig_locate(&x.s, x.h.body.mesh.nv, x.h.body.reference, POSES, (const double *const *)x.poses,
                             (const double *const *)x.positions, (const double *const *)x.turns, 1, shift[i], &spread,
                             &e) == VG_OK);
         vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, 2, 0.003, 1);
@@ -321,10 +321,10 @@ static void a_rig_is_learned_from_poses_alone(void)
     vg_err e;
     double miss;
     set_stage(&x, make_limb(), 40);
-    paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.2);
+    paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.2);
     skin_poses(&x);
     CHECK(vg_rig_learn(&x.h, POSES, (const double *const *)x.poses, 2, &miss, &e) == VG_OK);
-    CHECK_NEAR(miss, 0, 1e-3 * vg_diagonal(x.h.reference, x.h.mesh.nv));
+    CHECK_NEAR(miss, 0, 1e-3 * vg_diagonal(x.h.body.reference, x.h.body.mesh.nv));
     strike(&x);
 }
 
@@ -336,20 +336,20 @@ static void the_map_is_its_chain(void)
         stage x;
         vg_err e;
         set_stage(&x, make_limb(), 40);
-        paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.2);
+        paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.2);
         skin_poses(&x);
         for (size_t k = 0; k < POSES; k++) /* skin that skinning does not know */
-            for (size_t i = 0; i < 3 * x.h.mesh.nv; i++) x.poses[k][i] += 0.05 * sin(x.poses[k][i] * 3);
+            for (size_t i = 0; i < 3 * x.h.body.mesh.nv; i++) x.poses[k][i] += 0.05 * sin(x.poses[k][i] * 3);
         vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, per, 0, 2);
         const vg_map *m = &x.h.map;
-        size_t nv = x.h.mesh.nv;
+        size_t nv = x.h.body.mesh.nv;
         vg_graph *g = graph_of(&x.h);
         vg_solver *s;
         vg_player *p;
         CHECK(m->nheld >= BONES && m->per_corner == per && m->ncorners == vg_graph_corners(g));
-        CHECK(vg_solver_new(&s, g, m->held, m->nheld, x.h.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_OK);
+        CHECK(vg_solver_new(&s, g, m->held, m->nheld, x.h.body.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_OK);
         CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
-        double *vectors = vectors_of(g, x.h.reference), *wanted = room(3 * m->ncorners, sizeof *wanted);
+        double *vectors = vectors_of(g, x.h.body.reference), *wanted = room(3 * m->ncorners, sizeof *wanted);
         double *held = room(3 * m->nheld, sizeof *held), *skin = room(3 * nv, sizeof *skin);
         double *chain = room(3 * nv, sizeof *chain), *rhs = room(3 * nv, sizeof *rhs),
                *out = room(3 * nv, sizeof *out), *outs[1] = {out};
@@ -364,12 +364,12 @@ static void the_map_is_its_chain(void)
                 vg_quat_apply(x.transforms[k] + 7 * m->corner_bone[i], d, d);
                 for (size_t q = 0; q < 3; q++) wanted[3 * (i / per) + q] += d[q];
             }
-            vg_rig_skin(&x.h.rig, nv, x.h.reference, x.transforms[k], skin);
+            vg_rig_skin(&x.h.body.rig, nv, x.h.body.reference, x.transforms[k], skin);
             vg_graph_anchors(skin, m->held, m->nheld, held);
             vg_solver_load(s, 1, w, a, c, load);
             vg_solver_solve(s, 1, r, c, a, NULL);
             vg_player_pose(p, 1, t, outs);
-            CHECK_NEAR(farthest(out, chain, nv), 0, 1e-9 * vg_diagonal(x.h.reference, nv));
+            CHECK_NEAR(farthest(out, chain, nv), 0, 1e-9 * vg_diagonal(x.h.body.reference, nv));
         }
         free(vectors);
         free(wanted);
@@ -392,12 +392,12 @@ static void near_bones(void)
     stage x;
     vg_err e;
     set_stage(&x, make_limb(), 40);
-    CHECK(vgi_skin_near(&x.h.rig, x.h.mesh.nv, x.h.reference, &e) == VG_OK);
-    for (size_t v = 0; v < x.h.mesh.nv; v++) {
-        double at = x.h.reference[3 * v + 2] / LENGTH;
-        CHECK(x.h.rig.skin_weight[VG_SKIN * v] == 1 && x.h.rig.skin_weight[VG_SKIN * v + 1] == 0);
+    CHECK(vgi_skin_near(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, &e) == VG_OK);
+    for (size_t v = 0; v < x.h.body.mesh.nv; v++) {
+        double at = x.h.body.reference[3 * v + 2] / LENGTH;
+        CHECK(x.h.body.rig.skin_weight[VG_SKIN * v] == 1 && x.h.body.rig.skin_weight[VG_SKIN * v + 1] == 0);
         if (fabs(at - round(at)) > 1e-6)
-            CHECK(x.h.rig.skin_bone[VG_SKIN * v] == (uint32_t)fmin(BONES - 1, floor(at)));
+            CHECK(x.h.body.rig.skin_bone[VG_SKIN * v] == (uint32_t)fmin(BONES - 1, floor(at)));
     }
     strike(&x);
 }
@@ -410,8 +410,8 @@ static void every_component_is_held(void)
     vg_rig_fitter *f;
     const vg_rig_options o = {1, 0, 0, 1};
     set_stage(&x, make_beads(), 40);
-    size_t each = x.h.mesh.nv / BONES, held[BONES] = {0};
-    paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0);
+    size_t each = x.h.body.mesh.nv / BONES, held[BONES] = {0};
+    paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0);
     skin_poses(&x);
     CHECK(vg_rig_fitter_new(&f, &x.h, &o, &e) == VG_OK);
     vg_rig_fitter_add(f, POSES, (const double *const *)x.poses, (const double *const *)x.transforms);
@@ -430,7 +430,7 @@ static void two_bones_come_nearer(void)
         stage x;
         meshes_state = 11;
         set_stage(&x, make_limb(), 40);
-        paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.4);
+        paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.4);
         skin_poses(&x);
         vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, per, 0, 1);
         miss[per] = misses(&x);
@@ -447,7 +447,7 @@ static void refinement_brings_nearer(void)
         stage x;
         meshes_state = 7;
         set_stage(&x, make_limb(), 40);
-        paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.4);
+        paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.4);
         skin_poses(&x);
         vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, 1, i ? 0.003 : 0, 2);
         miss[i] = misses(&x);
@@ -465,11 +465,11 @@ static void the_root_is_found(void)
     double shift[3], spread;
     static const double away[3] = {0.7, -2, 0.4};
     set_stage(&x, make_limb(), 40);
-    size_t nv = x.h.mesh.nv;
-    paint(&x.h.rig, nv, x.h.reference, 0.2);
+    size_t nv = x.h.body.mesh.nv;
+    paint(&x.h.body.rig, nv, x.h.body.reference, 0.2);
     skin_poses(&x);
-    for (size_t i = 0; i < 3 * nv; i++) x.h.reference[i] += away[i % 3]; /* the skeleton does not know */
-    CHECK(vg_rig_locate(&x.s, nv, x.h.reference, POSES, (const double *const *)x.poses,
+    for (size_t i = 0; i < 3 * nv; i++) x.h.body.reference[i] += away[i % 3]; /* the skeleton does not know */
+    CHECK(vg_rig_locate(&x.s, nv, x.h.body.reference, POSES, (const double *const *)x.poses,
                         (const double *const *)x.positions, (const double *const *)x.turns, 2, shift, &spread,
                         &e) == VG_OK);
     for (int k = 0; k < 3; k++) CHECK_NEAR(shift[k], away[k], 1e-9);
@@ -485,22 +485,22 @@ static void the_root_is_found_among_others(void)
     vg_err e;
     double shift[3], spread;
     set_stage(&x, make_beads(), 40);
-    size_t nv = x.h.mesh.nv, each = nv / BONES;
-    paint(&x.h.rig, nv, x.h.reference, 0);
-    for (size_t v = 0; v < nv; v++) x.h.rig.skin_bone[VG_SKIN * v] = (uint32_t)(v / each);
+    size_t nv = x.h.body.mesh.nv, each = nv / BONES;
+    paint(&x.h.body.rig, nv, x.h.body.reference, 0);
+    for (size_t v = 0; v < nv; v++) x.h.body.rig.skin_bone[VG_SKIN * v] = (uint32_t)(v / each);
     skin_poses(&x);
     for (size_t k = 0; k < POSES; k++)
         for (size_t v = 0; v < nv; v++)
             if (v % 5 < 3) x.poses[k][3 * v] += 1 + noise(); /* all the same way */
-    CHECK(vg_rig_locate(&x.s, nv, x.h.reference, POSES, (const double *const *)x.poses,
+    CHECK(vg_rig_locate(&x.s, nv, x.h.body.reference, POSES, (const double *const *)x.poses,
                         (const double *const *)x.positions, (const double *const *)x.turns, 2, shift, &spread,
                         &e) == VG_OK);
     for (int k = 0; k < 3; k++) CHECK_NEAR(shift[k], 0, 1e-9);
     CHECK_NEAR(spread, 0, 1e-9);
     /* every vertex is rigid, but a reference that was stretched evenly: opinions from 0 to 1 in x */
     skin_poses(&x);
-    for (size_t v = 0; v < nv; v++) x.h.reference[3 * v] += (double)v / (double)nv;
-    CHECK(vg_rig_locate(&x.s, nv, x.h.reference, POSES, (const double *const *)x.poses,
+    for (size_t v = 0; v < nv; v++) x.h.body.reference[3 * v] += (double)v / (double)nv;
+    CHECK(vg_rig_locate(&x.s, nv, x.h.body.reference, POSES, (const double *const *)x.poses,
                         (const double *const *)x.positions, (const double *const *)x.turns, 2, shift, &spread,
                         &e) == VG_OK);
     CHECK_NEAR(shift[0], 0.5, 0.1);
@@ -517,7 +517,7 @@ static void other_skeletons_drive(void)
     vg_driver *d;
     double t[7 * BONES];
     set_stage(&x, make_limb(), 40);
-    CHECK(vg_driver_new(&d, &x.h.rig, &x.s, false, &e) == VG_OK);
+    CHECK(vg_driver_new(&d, &x.h.body.rig, &x.s, false, &e) == VG_OK);
     CHECK(vg_driver_missing(d) == 0);
     for (size_t k = 0; k < POSES; k++) {
         vg_driver_pose(d, x.positions[k], x.turns[k], t);
@@ -526,7 +526,7 @@ static void other_skeletons_drive(void)
     vg_driver_free(&d);
     vg_skeleton large = make_skeleton(10 * LENGTH), bent = make_skeleton(LENGTH);
     double positions[3 * JOINTS], turns[4 * JOINTS], values[6 + 3 * (BONES - 1)];
-    CHECK(vg_driver_new(&d, &x.h.rig, &large, false, &e) == VG_OK);
+    CHECK(vg_driver_new(&d, &x.h.body.rig, &large, false, &e) == VG_OK);
     memcpy(values, x.values[0], sizeof values);
     for (int k = 0; k < 3; k++) values[k] *= 10;
     vg_skeleton_pose(&large, values, positions, turns);
@@ -535,22 +535,22 @@ static void other_skeletons_drive(void)
     vg_driver_free(&d);
     for (size_t j = 1; j < JOINTS; j++)
         memcpy(bent.joints[j].offset, (const double[3]){LENGTH, 0, 0}, sizeof bent.joints[j].offset);
-    CHECK(vg_driver_new(&d, &x.h.rig, &bent, true, &e) == VG_OK);
+    CHECK(vg_driver_new(&d, &x.h.body.rig, &bent, true, &e) == VG_OK);
     vg_skeleton_pose(&bent, NULL, positions, turns);
     vg_driver_pose(d, positions, turns, t);
     for (size_t b = 0; b < BONES; b++) { /* every joint of the rig is where the other's is */
         double at[3];
-        vg_quat_apply(t + 7 * b, x.h.rig.at + 3 * b, at);
+        vg_quat_apply(t + 7 * b, x.h.body.rig.at + 3 * b, at);
         for (size_t k = 0; k < 3; k++) CHECK_NEAR(at[k] + t[7 * b + 4 + k], positions[3 * b + k], 1e-12);
     }
     vg_driver_free(&d);
     free(large.joints[1].name);
     large.joints[1].name = strdup("nothing alike");
-    CHECK(vg_driver_new(&d, &x.h.rig, &large, false, &e) == VG_OK);
+    CHECK(vg_driver_new(&d, &x.h.body.rig, &large, false, &e) == VG_OK);
     CHECK(vg_driver_missing(d) == 1);
     vg_driver_free(&d);
     for (size_t j = 0; j < JOINTS; j++) large.joints[j].name[0] = '?';
-    CHECK(vg_driver_new(&d, &x.h.rig, &large, false, &e) == VG_EINPUT && strstr(e.message, "'hip'"));
+    CHECK(vg_driver_new(&d, &x.h.body.rig, &large, false, &e) == VG_EINPUT && strstr(e.message, "'hip'"));
     vg_skeleton_clear(&large);
     vg_skeleton_clear(&bent);
     strike(&x);
@@ -587,17 +587,17 @@ static void edits_turn_what_hangs_on_a_bone(void)
     double t[7 * BONES] = {0}, axis[3], at[3];
     set_stage(&x, make_limb(), 40);
     for (size_t b = 0; b < BONES; b++) t[7 * b] = 1;
-    CHECK(vg_rig_find(&x.h.rig, "knee") == 1 && vg_rig_find(&x.h.rig, "toe.end") == BONES);
-    CHECK(vg_rig_axis(&x.h.rig, 3, axis));
+    CHECK(vg_rig_find(&x.h.body.rig, "knee") == 1 && vg_rig_find(&x.h.body.rig, "toe.end") == BONES);
+    CHECK(vg_rig_axis(&x.h.body.rig, 3, axis));
     CHECK_NEAR(axis[2], 1, 1e-15);
-    vg_rig_edit(&x.h.rig, 1, (const double[3]){1, 0, 0}, 90, t);
+    vg_rig_edit(&x.h.body.rig, 1, (const double[3]){1, 0, 0}, 90, t);
     CHECK_NEAR(t[0], 1, 0); /* the hip stays */
     vg_quat_apply(t + 7 * 3, (const double[3]){0, 0, 3 * LENGTH},
                   at); /* the toe, 2 bones beyond the knee, goes from z to -y */
     CHECK_NEAR(at[0] + t[25], 0, 1e-12);
     CHECK_NEAR(at[1] + t[26], -2 * LENGTH, 1e-12);
     CHECK_NEAR(at[2] + t[27], LENGTH, 1e-12);
-    vg_rig_edit(&x.h.rig, 2, axis, 30, t); /* a twist leaves the bone where it is */
+    vg_rig_edit(&x.h.body.rig, 2, axis, 30, t); /* a twist leaves the bone where it is */
     vg_quat_apply(t + 7 * 3, (const double[3]){0, 0, 3 * LENGTH}, at);
     CHECK_NEAR(at[1] + t[26], -2 * LENGTH, 1e-12);
     vg_quat_apply(t + 7 * 2, (const double[3]){1, 0, 2 * LENGTH},
@@ -613,7 +613,7 @@ static void rotations_alone_say_where_bones_are(void)
     vg_err e;
     vg_player *p;
     set_stage(&x, make_limb(), 40);
-    paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.2);
+    paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.2);
     skin_poses(&x);
     vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, 2, 0.003, 1);
     CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
@@ -639,8 +639,8 @@ static void a_rig_serves_another_body(void)
         stage x;
         vg_err e;
         set_stage(&x, make_limb(), 40);
-        size_t nv = x.h.mesh.nv;
-        paint(&x.h.rig, nv, x.h.reference, 0.2);
+        size_t nv = x.h.body.mesh.nv;
+        paint(&x.h.body.rig, nv, x.h.body.reference, 0.2);
         skin_poses(&x);
         vg_rig_fitter *f = fit(&x, method ? VG_RIG_LBS : VG_RIG_ENVELOPE, 2, 0.003, 1);
         vg_rig_fitter_free(&f);
@@ -648,7 +648,7 @@ static void a_rig_serves_another_body(void)
                *after = room(3 * nv, sizeof *after);
         double *list[1] = {before}, t[7 * BONES];
         vg_player *p;
-        for (size_t i = 0; i < 3 * nv; i++) target[i] = 2 * x.h.reference[i] + (double)(i % 3);
+        for (size_t i = 0; i < 3 * nv; i++) target[i] = 2 * x.h.body.reference[i] + (double)(i % 3);
         const double *from[1] = {x.transforms[0]};
         CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
         vg_player_pose(p, 1, from, list);
@@ -656,10 +656,10 @@ static void a_rig_serves_another_body(void)
         CHECK(vg_map_retarget(&x.h, target, 1, 1, &e) == VG_OK);
         for (size_t j = 0; j < JOINTS; j++)
             for (size_t k = 0; k < 3; k++)
-                CHECK_NEAR(x.h.rig.at[3 * j + k], (k == 2 ? 2 * LENGTH * (double)j : 0) + (double)k, 1e-6);
+                CHECK_NEAR(x.h.body.rig.at[3 * j + k], (k == 2 ? 2 * LENGTH * (double)j : 0) + (double)k, 1e-6);
         for (size_t j = 0; j < JOINTS; j++)
             for (size_t k = 0; k < 3; k++) x.positions[0][3 * j + k] = 2 * x.positions[0][3 * j + k] + (double)k;
-        vg_rig_transforms(&x.h.rig, x.positions[0], x.turns[0], t);
+        vg_rig_transforms(&x.h.body.rig, x.positions[0], x.turns[0], t);
         from[0] = t, list[0] = after;
         CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
         vg_player_pose(p, 1, from, list);
@@ -680,37 +680,37 @@ static void joints_go_with_their_own(void)
     stage x;
     vg_err e;
     vg_head h = make_limb();
-    size_t limb = h.mesh.nv;
+    size_t limb = h.body.mesh.nv;
     add_torus(&h, 9, 7, (const double[3]){0, 0, LENGTH}); /* around the knee, a little wider than the limb */
-    for (size_t i = 3 * limb; i < 3 * h.mesh.nv; i++) h.reference[i] *= i % 3 == 2 ? 1 : 1.2;
+    for (size_t i = 3 * limb; i < 3 * h.body.mesh.nv; i++) h.body.reference[i] *= i % 3 == 2 ? 1 : 1.2;
     set_stage(&x, h, 40);
-    size_t nv = x.h.mesh.nv;
-    paint(&x.h.rig, nv, x.h.reference, 0.3);
+    size_t nv = x.h.body.mesh.nv;
+    paint(&x.h.body.rig, nv, x.h.body.reference, 0.3);
     for (size_t v = limb; v < nv; v++) {
-        memset(x.h.rig.skin_weight + VG_SKIN * v, 0, VG_SKIN * sizeof(double));
-        x.h.rig.skin_bone[VG_SKIN * v] = BONES - 1, x.h.rig.skin_weight[VG_SKIN * v] = 1;
+        memset(x.h.body.rig.skin_weight + VG_SKIN * v, 0, VG_SKIN * sizeof(double));
+        x.h.body.rig.skin_bone[VG_SKIN * v] = BONES - 1, x.h.body.rig.skin_weight[VG_SKIN * v] = 1;
     }
     skin_poses(&x);
     vg_rig turned; /* it rests in the first pose */
     CHECK(vg_rig_make(&turned, &x.s, x.positions[0], x.turns[0], &e) == VG_OK);
-    turned.skin_bone = x.h.rig.skin_bone, turned.skin_weight = x.h.rig.skin_weight;
-    x.h.rig.skin_bone = NULL, x.h.rig.skin_weight = NULL;
-    vg_rig_clear(&x.h.rig);
-    x.h.rig = turned;
-    memcpy(x.h.reference, x.poses[0], 3 * nv * sizeof(double));
-    for (size_t k = 0; k < POSES; k++) vg_rig_transforms(&x.h.rig, x.positions[k], x.turns[k], x.transforms[k]);
+    turned.skin_bone = x.h.body.rig.skin_bone, turned.skin_weight = x.h.body.rig.skin_weight;
+    x.h.body.rig.skin_bone = NULL, x.h.body.rig.skin_weight = NULL;
+    vg_rig_clear(&x.h.body.rig);
+    x.h.body.rig = turned;
+    memcpy(x.h.body.reference, x.poses[0], 3 * nv * sizeof(double));
+    for (size_t k = 0; k < POSES; k++) vg_rig_transforms(&x.h.body.rig, x.positions[k], x.turns[k], x.transforms[k]);
     vg_rig_fitter *f = fit(&x, VG_RIG_LBS, 1, 0, 1);
     vg_rig_fitter_free(&f);
     double *target = room(3 * nv, sizeof *target), positions[3 * JOINTS], turned_to[4 * JOINTS];
     for (size_t i = 0; i < 3 * nv; i++)
-        target[i] = i < 3 * limb ? 2 * x.h.reference[i] : x.h.reference[i] + 9;
+        target[i] = i < 3 * limb ? 2 * x.h.body.reference[i] : x.h.body.reference[i] + 9;
     CHECK(vg_map_retarget(&x.h, target, 1, 1, &e) == VG_OK);
     for (size_t i = 3; i < 9; i++) /* knee and foot are in the limb */
-        CHECK_NEAR(x.h.rig.at[i], 2 * x.positions[0][i], 0.05);
-    vg_skeleton_pose(&x.h.rig.skeleton, x.values[0], positions, turned_to);
+        CHECK_NEAR(x.h.body.rig.at[i], 2 * x.positions[0][i], 0.05);
+    vg_skeleton_pose(&x.h.body.rig.skeleton, x.values[0], positions, turned_to);
     for (size_t j = 1; j < JOINTS; j++)
         for (size_t k = 0; k < 3; k++)
-            CHECK_NEAR(positions[3 * j + k] - positions[k], x.h.rig.at[3 * j + k] - x.h.rig.at[k], 1e-12);
+            CHECK_NEAR(positions[3 * j + k] - positions[k], x.h.body.rig.at[3 * j + k] - x.h.body.rig.at[k], 1e-12);
     free(target);
     strike(&x);
 }
@@ -721,7 +721,7 @@ static void joints_of_vertices_find_themselves(void)
     stage x;
     vg_err e;
     set_stage(&x, make_beads(), 50);
-    size_t each = x.h.mesh.nv / BONES;
+    size_t each = x.h.body.mesh.nv / BONES;
     uint32_t list[BONES][4];
     vg_joint_group groups[BONES];
     for (uint32_t b = 0; b < BONES; b++) {
@@ -731,15 +731,15 @@ static void joints_of_vertices_find_themselves(void)
     }
     vg_joint_groups g = {BONES, groups};
     vg_skeleton s;
-    double positions[3 * BONES], turns[4 * BONES], *pose = room(3 * x.h.mesh.nv, sizeof *pose),
+    double positions[3 * BONES], turns[4 * BONES], *pose = room(3 * x.h.body.mesh.nv, sizeof *pose),
                                                    q[4] = {0.8, 0.36, 0, 0.48};
-    CHECK(vg_joint_groups_skeleton(&g, x.h.mesh.nv, x.h.reference, &s, &e) == VG_OK);
+    CHECK(vg_joint_groups_skeleton(&g, x.h.body.mesh.nv, x.h.body.reference, &s, &e) == VG_OK);
     CHECK(s.njoints == BONES && s.joints[2].parent == 1 && s.joints[2].nchannels == 3 && s.joints[0].nchannels == 6);
-    for (size_t v = 0; v < x.h.mesh.nv; v++) { /* all of it turned and moved */
-        vg_quat_apply(q, x.h.reference + 3 * v, pose + 3 * v);
+    for (size_t v = 0; v < x.h.body.mesh.nv; v++) { /* all of it turned and moved */
+        vg_quat_apply(q, x.h.body.reference + 3 * v, pose + 3 * v);
         pose[3 * v] += 4;
     }
-    vg_joint_groups_pose(&g, x.h.reference, pose, positions, turns);
+    vg_joint_groups_pose(&g, x.h.body.reference, pose, positions, turns);
     for (size_t b = 0; b < BONES; b++) {
         double dot = 0, at[3] = {0, 0, 0};
         for (int i = 0; i < 4; i++) dot += q[i] * turns[4 * b + (size_t)i];
@@ -748,9 +748,9 @@ static void joints_of_vertices_find_themselves(void)
             for (size_t k = 0; k < 3; k++) at[k] += pose[3 * (size_t)list[b][i] + k] / 4;
         for (size_t k = 0; k < 3; k++) CHECK_NEAR(positions[3 * b + k], at[k], 1e-12);
     }
-    list[3][0] = (uint32_t)x.h.mesh.nv;
+    list[3][0] = (uint32_t)x.h.body.mesh.nv;
     vg_skeleton_clear(&s);
-    CHECK(vg_joint_groups_skeleton(&g, x.h.mesh.nv, x.h.reference, &s, &e) == VG_EINPUT &&
+    CHECK(vg_joint_groups_skeleton(&g, x.h.body.mesh.nv, x.h.body.reference, &s, &e) == VG_EINPUT &&
           strstr(e.message, "'toe'"));
     free(pose);
     strike(&x);
@@ -763,10 +763,10 @@ static void threads_do_not_matter(void)
         stage x;
         meshes_state = 3;
         set_stage(&x, make_limb(), 40);
-        paint(&x.h.rig, x.h.mesh.nv, x.h.reference, 0.3);
+        paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.3);
         skin_poses(&x);
         vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, 2, 0.003, threads);
-        size_t n = x.h.mesh.nv * 4 * BONES;
+        size_t n = x.h.body.mesh.nv * 4 * BONES;
         if (!first) {
             first = room(n, sizeof *first);
             memcpy(first, x.h.map.weights, n * sizeof *first);
@@ -787,14 +787,14 @@ static void what_cannot_be_fitted_is_refused(void)
     const vg_rig_options three = {3, 0.03, 0, 1}, one = {1, 0.03, 0, 1};
     CHECK(vg_rig_fitter_new(&f, &x.h, &three, &e) == VG_EARG);
     CHECK(vg_rig_fitter_new(&f, &x.h, &one, &e) == VG_OK);
-    const double *poses[1] = {x.h.reference}, *transforms[1] = {x.transforms[0]};
+    const double *poses[1] = {x.h.body.reference}, *transforms[1] = {x.transforms[0]};
     vg_rig_fitter_add(f, 1, poses, transforms); /* the reference says nothing */
     CHECK(vg_rig_fitter_finish(f, VG_RIG_ENVELOPE, &e) == VG_EINPUT && strstr(e.message, "no poses"));
     vg_rig_fitter_free(&f);
-    vg_rig_clear(&x.h.rig);
+    vg_rig_clear(&x.h.body.rig);
     CHECK(vg_rig_fitter_new(&f, &x.h, &one, &e) == VG_EINPUT);
     for (size_t j = 0; j < JOINTS; j++) x.s.joints[j].nchannels = 0;
-    CHECK(vg_rig_make(&x.h.rig, &x.s, x.positions[0], x.turns[0], &e) == VG_EINPUT);
+    CHECK(vg_rig_make(&x.h.body.rig, &x.s, x.positions[0], x.turns[0], &e) == VG_EINPUT);
     strike(&x);
 }
 

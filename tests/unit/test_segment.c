@@ -75,8 +75,8 @@ static void fold(const vg_head *h, double angle, double *pose)
 {
     double r[9], z[3] = {0, 0, 1};
     turn_about(z, angle, r);
-    for (size_t v = 0; v < h->mesh.nv; v++) {
-        const double *x = h->reference + 3 * v;
+    for (size_t v = 0; v < h->body.mesh.nv; v++) {
+        const double *x = h->body.reference + 3 * v;
         double d[3] = {x[0] - LONG / 3, x[1], x[2]};
         bool middle = x[0] > LONG / 3 && x[0] <= 2 * LONG / 3, far = x[0] > 2 * LONG / 3;
         for (size_t i = 0; i < 3; i++)
@@ -96,8 +96,8 @@ static vg_patches cut(const vg_head *h, size_t k, bool connected, int threads)
     vg_err e;
     vg_patches p = {0};
     vg_segment_report report;
-    double *pose = room(3 * h->mesh.nv, sizeof *pose);
-    CHECK(vg_segmenter_new(&s, &h->mesh, h->reference, threads, &e) == VG_OK);
+    double *pose = room(3 * h->body.mesh.nv, sizeof *pose);
+    CHECK(vg_segmenter_new(&s, &h->body.mesh, h->body.reference, threads, &e) == VG_OK);
     for (int i = 1; i < 6; i++) {
         const double *poses[1] = {pose};
         fold(h, 0.3 * i, pose);
@@ -121,7 +121,7 @@ static void thirds(void)
     CHECK(two.of_face[0] == two.of_face[LONG - 1] && two.of_face[0] != two.of_face[LONG / 2]);
     CHECK(three.n == 3 && three.of_face[0] != three.of_face[LONG - 1]);
     for (int f = 1; f < LONG; f++) CHECK(three.of_face[f] >= three.of_face[f - 1]);
-    CHECK(many.n == same.n && !memcmp(many.of_face, same.of_face, h.mesh.nf * sizeof *many.of_face));
+    CHECK(many.n == same.n && !memcmp(many.of_face, same.of_face, h.body.mesh.nf * sizeof *many.of_face));
     vg_patches_clear(&two);
     vg_patches_clear(&three);
     vg_patches_clear(&many);
@@ -161,14 +161,14 @@ static void sectors_meet(void)
     }
     const uint32_t rim[3] = {0, 100, 70};
     double mean[9];
-    const vg_mesh *m = &h.mesh;
+    const vg_mesh *m = &h.body.mesh;
     CHECK(vgi_neighbours(m->nv, m->nf, m->start, m->vert, label, &pair, &shared, &n, &e) == VG_OK);
     CHECK(n == 3 && pair[0][0] == 0 && pair[0][1] == 1 && pair[1][1] == 2 && pair[2][0] == 1 && pair[2][1] == 2);
-    CHECK(vgi_shared_points(m->nv, m->nf, m->start, m->vert, label, pair[0], n, h.reference, mean, &e) == VG_OK);
+    CHECK(vgi_shared_points(m->nv, m->nf, m->start, m->vert, label, pair[0], n, h.body.reference, mean, &e) == VG_OK);
     for (size_t i = 0; i < 3; i++) {
         CHECK(shared[i] == 2);
         for (size_t k = 0; k < 3; k++)
-            CHECK_NEAR(mean[3 * i + k], (h.reference[k] + h.reference[3 + 3 * rim[i] + k]) / 2, 1e-15 * 8);
+            CHECK_NEAR(mean[3 * i + k], (h.body.reference[k] + h.body.reference[3 + 3 * rim[i] + k]) / 2, 1e-15 * 8);
     }
     free(pair);
     free(shared);
@@ -199,8 +199,9 @@ static vg_head make_crowd(size_t n)
 /* Face f turned about its first corner by rotation[f] (9 numbers). */
 static void turn_crowd(const vg_head *h, const double *rotation, double *pose)
 {
-    for (size_t v = 0; v < h->mesh.nv; v++) {
-        const double *m = rotation + 9 * (v / 3), *o = h->reference + 3 * (v - v % 3), *x = h->reference + 3 * v;
+    for (size_t v = 0; v < h->body.mesh.nv; v++) {
+        const double *m = rotation + 9 * (v / 3), *o = h->body.reference + 3 * (v - v % 3),
+                     *x = h->body.reference + 3 * v;
         for (size_t i = 0; i < 3; i++) {
             pose[3 * v + i] = o[i];
             for (size_t k = 0; k < 3; k++) pose[3 * v + i] += m[3 * i + k] * (x[k] - o[k]);
@@ -226,7 +227,7 @@ static crowd open_crowd(size_t n)
 {
     vg_err e;
     crowd x = {.h = make_crowd(n), .rotation = room(9 * n, sizeof(double)), .pose = room(9 * n, sizeof(double))};
-    CHECK(vg_segmenter_new(&x.s, &x.h.mesh, x.h.reference, 2, &e) == VG_OK);
+    CHECK(vg_segmenter_new(&x.s, &x.h.body.mesh, x.h.body.reference, 2, &e) == VG_OK);
     return x;
 }
 
@@ -244,7 +245,7 @@ static vg_segment_report cut_crowd(crowd *x, size_t k, uint64_t seed, vg_patches
     CHECK(vg_segmenter_cut(x->s, k, seed, false, p, &report, &e) == VG_OK);
     CHECK(report.patches == p->n);
     uint32_t next = 0; /* every patch has faces, and they are in the order of the first ones */
-    for (size_t f = 0; f < x->h.mesh.nf; f++) {
+    for (size_t f = 0; f < x->h.body.mesh.nf; f++) {
         CHECK(p->of_face[f] <= next);
         next += p->of_face[f] == next;
     }

@@ -134,7 +134,7 @@ static int write_frames(const char *output, const vg_sink_options *o, const char
     int r = vg_sink_open(&s, output, &h, o, e);
     for (size_t i = 0; r == VG_OK && i < n; i++) {
         CHECK(vg_frame_shape(&f, &h, NULL) == VG_OK && vg_frame_rename(&f, names[i], NULL) == VG_OK);
-        memcpy(f.values, h.reference, 12 * sizeof *f.values);
+        memcpy(f.values, h.body.reference, 12 * sizeof *f.values);
         f.values[11] = (double)i + 1;
         r = vg_sink_put(s, &f, e);
     }
@@ -237,8 +237,9 @@ static void order_of_operands(void)
     CHECK_TEXT(s.names, "b pose1 pose2 pose10 a ");
     vg_head h;
     CHECK(vg_load_mesh(&h, "c.zip", NULL) == VG_OK);
-    CHECK(h.mesh.nv == 4 && h.mesh.nf == 4 && h.reference[11] == 1 && h.kind == VG_VERTICES && h.count == 4);
-    CHECK_TEXT(h.reference_name, "pose1");
+    CHECK(h.body.mesh.nv == 4 && h.body.mesh.nf == 4 && h.body.reference[11] == 1 && h.kind == VG_VERTICES &&
+          h.count == 4);
+    CHECK_TEXT(h.body.reference_name, "pose1");
     vg_head_clear(&h);
     leave_place();
 }
@@ -268,8 +269,8 @@ static void compressed_files(void)
     write_bytes("p1.obj.gz", joined, sizeof joined);
     vg_head h;
     CHECK(vg_load_mesh(&h, "p1.obj.gz", NULL) == VG_OK);
-    CHECK(h.mesh.nv == 3 && h.mesh.nf == 1);
-    CHECK_TEXT(h.reference_name, "p1");
+    CHECK(h.body.mesh.nv == 3 && h.body.mesh.nf == 1);
+    CHECK_TEXT(h.body.reference_name, "p1");
     vg_head_clear(&h);
     for (size_t n = 0; n < sizeof joined; n++) {
         vg_err e = {0};
@@ -302,7 +303,7 @@ static void write_stream(const char *path, const char *from, const char *program
     CHECK(vg_source_open(&s, &from, 1, NULL) == VG_OK);
     vg_head *h = vg_source_head(s);
     CHECK(vg_head_trace(h, program, 1, argv, NULL) == VG_OK);
-    if (kind == VG_VECTORS) h->kind = kind, h->has_links = true, h->count = vg_mesh_corners(&h->mesh);
+    if (kind == VG_VECTORS) h->kind = kind, h->has_links = true, h->count = vg_mesh_corners(&h->body.mesh);
     int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0666);
     CHECK(fd >= 0 && vg_writer_open(&w, fd, path, h, NULL) == VG_OK);
     while (kind == VG_VERTICES && vg_source_next(s, &f, NULL) > 0) CHECK(vg_writer_put(w, &f, NULL) == VG_OK);
@@ -812,7 +813,7 @@ static void abandoned(void)
         make_head(&h);
         CHECK(vg_sink_open(&s, outputs[i], &h, &plain, NULL) == VG_OK);
         CHECK(vg_frame_shape(&f, &h, NULL) == VG_OK && vg_frame_rename(&f, "a", NULL) == VG_OK);
-        memcpy(f.values, h.reference, 12 * sizeof *f.values);
+        memcpy(f.values, h.body.reference, 12 * sizeof *f.values);
         CHECK(vg_sink_put(s, &f, NULL) == VG_OK);
         CHECK(access("a.obj", F_OK) < 0 && access("p-0.obj", F_OK) < 0 && access("new/a.obj", F_OK) < 0 &&
               access("a.zip", F_OK) < 0);

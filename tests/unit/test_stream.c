@@ -201,7 +201,7 @@ static int read_rest(vg_reader *reader, content *c, vg_err *e)
         memcpy(to->values, f.values, h->count * vg_kind_width(h->kind) * sizeof(double));
         memcpy(to->root, f.root, sizeof f.root);
         if (vg_frame_pin(to, f.pins, f.npins, e) < 0 || vg_frame_turn(to, f.turns, f.nturns, e) < 0) abort();
-        if (f.has_scalars && vg_frame_scalars(to, f.scalars_name, f.scalars_unit, f.scalars, h->mesh.nv, e) < 0)
+        if (f.has_scalars && vg_frame_scalars(to, f.scalars_name, f.scalars_unit, f.scalars, h->body.mesh.nv, e) < 0)
             abort();
         if (h->nanchors && f.anchors) memcpy(to->anchors, f.anchors, 3 * h->nanchors * sizeof(double));
     }
@@ -255,18 +255,18 @@ static bool same_memory(const void *a, const void *b, size_t n)
 static bool same_head(const vg_head *a, const vg_head *b)
 {
     vg_err e;
-    size_t corners = vg_mesh_corners(&a->mesh);
-    bool same = vg_mesh_same(&a->mesh, "a", &b->mesh, "b", &e) == VG_OK && !a->reference == !b->reference &&
-                same_text(a->reference_name, b->reference_name) && a->kind == b->kind &&
-                a->precision == b->precision && a->count == b->count && a->nselected == b->nselected &&
-                a->nlinks == b->nlinks && a->nanchors == b->nanchors && a->has_selection == b->has_selection &&
-                a->has_links == b->has_links && a->nprovenance == b->nprovenance &&
-                same_records(&a->extra, &b->extra);
+    size_t corners = vg_mesh_corners(&a->body.mesh);
+    bool same =
+        vg_mesh_same(&a->body.mesh, "a", &b->body.mesh, "b", &e) == VG_OK &&
+        !a->body.reference == !b->body.reference && same_text(a->body.reference_name, b->body.reference_name) &&
+        a->kind == b->kind && a->precision == b->precision && a->count == b->count && a->nselected == b->nselected &&
+        a->nlinks == b->nlinks && a->nanchors == b->nanchors && a->has_selection == b->has_selection &&
+        a->has_links == b->has_links && a->nprovenance == b->nprovenance && same_records(&a->extra, &b->extra);
     if (!same) return false;
-    same &= same_memory(a->reference, b->reference, a->reference ? 24 * a->mesh.nv : 0);
+    same &= same_memory(a->body.reference, b->body.reference, a->body.reference ? 24 * a->body.mesh.nv : 0);
     same &= same_memory(a->selected, b->selected, 4 * a->nselected) && same_memory(a->links, b->links, 8 * a->nlinks);
     same &= same_memory(a->anchors, b->anchors, 4 * a->nanchors);
-    const vg_attributes *p = &a->attributes, *q = &b->attributes;
+    const vg_attributes *p = &a->body.attributes, *q = &b->body.attributes;
     same &= p->ntex == q->ntex && p->nlabels == q->nlabels && (!p->ntex || p->tex_dim == q->tex_dim);
     same = same && same_memory(p->tex, q->tex, 8 * p->ntex * p->tex_dim) &&
            same_memory(p->corner_tex, q->corner_tex, p->ntex ? 4 * corners : 0);
@@ -279,14 +279,14 @@ static bool same_head(const vg_head *a, const vg_head *b)
                u->nparents == v->nparents && same_memory(u->parents, v->parents, 4 * u->nparents);
         for (size_t k = 0; same && k < u->nargs; k++) same = !strcmp(u->args[k], v->args[k]);
     }
-    same = same && a->skeleton.njoints == b->skeleton.njoints;
-    for (size_t i = 0; same && i < a->skeleton.njoints; i++) {
-        const vg_joint *u = &a->skeleton.joints[i], *v = &b->skeleton.joints[i];
+    same = same && a->body.skeleton.njoints == b->body.skeleton.njoints;
+    for (size_t i = 0; same && i < a->body.skeleton.njoints; i++) {
+        const vg_joint *u = &a->body.skeleton.joints[i], *v = &b->body.skeleton.joints[i];
         same = !strcmp(u->name, v->name) && u->parent == v->parent && u->nchannels == v->nchannels &&
                !memcmp(u->offset, v->offset, sizeof u->offset) && !memcmp(u->channels, v->channels, u->nchannels);
     }
-    const vg_rig *g = &a->rig, *k = &b->rig;
-    size_t n = g->skeleton.njoints, skin = g->skin_bone ? VG_SKIN * a->mesh.nv : 0;
+    const vg_rig *g = &a->body.rig, *k = &b->body.rig;
+    size_t n = g->skeleton.njoints, skin = g->skin_bone ? VG_SKIN * a->body.mesh.nv : 0;
     same = same && n == k->skeleton.njoints && g->nbones == k->nbones && !g->skin_bone == !k->skin_bone &&
            same_memory(g->at, k->at, 24 * n) && same_memory(g->turn, k->turn, 32 * n) &&
            same_memory(g->bone, k->bone, 4 * g->nbones) && same_memory(g->skin_bone, k->skin_bone, 4 * skin) &&
@@ -313,7 +313,7 @@ static bool same_frame(const vg_frame *a, const vg_frame *b, const vg_head *h)
     same &= a->has_scalars == b->has_scalars;
     if (same && a->has_scalars)
         same = same_text(a->scalars_name, b->scalars_name) && same_text(a->scalars_unit, b->scalars_unit) &&
-               same_memory(a->scalars, b->scalars, h->mesh.nv * sizeof(double));
+               same_memory(a->scalars, b->scalars, h->body.mesh.nv * sizeof(double));
     if (graph) same &= !memcmp(a->root, b->root, 24) && same_memory(a->anchors, b->anchors, 24 * h->nanchors);
     return same;
 }
@@ -350,8 +350,8 @@ static void add_provenance(vg_head *h, const char *a, const char *b, const char 
 
 static void add_attributes(vg_head *h, uint32_t dim)
 {
-    size_t corners = vg_mesh_corners(&h->mesh);
-    vg_attributes *a = &h->attributes;
+    size_t corners = vg_mesh_corners(&h->body.mesh);
+    vg_attributes *a = &h->body.attributes;
     a->ntex = 3, a->tex_dim = dim, a->tex = room(3 * dim, 8), a->corner_tex = room(corners, 4);
     for (size_t i = 0; i < 3 * dim; i++) a->tex[i] = 0.1 * (double)i - 0.3;
     for (size_t i = 0; i < corners; i++) a->corner_tex[i] = i % 4 == 3 ? UINT32_MAX : (uint32_t)(i % 4);
@@ -367,8 +367,8 @@ static void add_attributes(vg_head *h, uint32_t dim)
 
 static void add_skeleton(vg_head *h)
 {
-    vg_skeleton *s = &h->skeleton;
-    s->njoints = h->mesh.nv, s->joints = room(s->njoints, sizeof *s->joints);
+    vg_skeleton *s = &h->body.skeleton;
+    s->njoints = h->body.mesh.nv, s->joints = room(s->njoints, sizeof *s->joints);
     for (size_t i = 0; i < s->njoints; i++) {
         vg_joint *j = &s->joints[i];
         char name[] = "joint.";
@@ -383,16 +383,18 @@ static void add_skeleton(vg_head *h)
 /* The same skeleton moves the mesh; the weights are those of one bone, or of two. */
 static void add_rig(vg_head *h)
 {
-    size_t n = h->skeleton.njoints;
+    size_t n = h->body.skeleton.njoints;
     double *at = room(3 * n, 8), *turns = room(4 * n, 8);
     vg_err e;
     for (size_t k = 0; k < 3 * n; k++) at[k] = noise();
     for (size_t j = 0; j < n; j++) turns[4 * j] = 0.6, turns[4 * j + 1 + j % 3] = -0.8;
-    if (vg_rig_make(&h->rig, &h->skeleton, at, turns, &e) < 0) abort();
-    h->rig.skin_bone = room(VG_SKIN * h->mesh.nv, 4), h->rig.skin_weight = room(VG_SKIN * h->mesh.nv, 8);
-    for (size_t v = 0; v < h->mesh.nv; v++) {
-        h->rig.skin_bone[VG_SKIN * v] = (uint32_t)(v % n), h->rig.skin_weight[VG_SKIN * v] = v % 2 ? 1 : 0.75;
-        h->rig.skin_weight[VG_SKIN * v + 1] = v % 2 ? 0 : 0.25;
+    if (vg_rig_make(&h->body.rig, &h->body.skeleton, at, turns, &e) < 0) abort();
+    h->body.rig.skin_bone = room(VG_SKIN * h->body.mesh.nv, 4),
+    h->body.rig.skin_weight = room(VG_SKIN * h->body.mesh.nv, 8);
+    for (size_t v = 0; v < h->body.mesh.nv; v++) {
+        h->body.rig.skin_bone[VG_SKIN * v] = (uint32_t)(v % n),
+                                        h->body.rig.skin_weight[VG_SKIN * v] = v % 2 ? 1 : 0.75;
+        h->body.rig.skin_weight[VG_SKIN * v + 1] = v % 2 ? 0 : 0.25;
     }
     free(at);
     free(turns);
@@ -449,7 +451,7 @@ static content make(vg_kind kind, vg_precision precision, int how)
         h->has_links = true, h->nlinks = 1, h->links = room(2, 4), h->links[0] = 3, h->links[1] = 5;
     }
     size_t on_graph = (how == FULL ? 7 : 9) + 2;
-    h->count = kind == VG_VERTICES ? h->mesh.nv : kind == VG_TRANSFORMS ? 3 : on_graph;
+    h->count = kind == VG_VERTICES ? h->body.mesh.nv : kind == VG_TRANSFORMS ? 3 : on_graph;
     for (size_t i = 0; i < c.n; i++) {
         vg_frame *f = &c.frame[i];
         vg_err e;
@@ -462,9 +464,9 @@ static content make(vg_kind kind, vg_precision precision, int how)
         if (how == FULL && kind == VG_VECTORS) /* an even and an odd number of pins */
             CHECK(vg_frame_pin(f, (uint32_t[]){0, 2, 6}, 2 + i, &e) == VG_OK);
         if (how == FULL && kind == VG_VERTICES && i)
-            CHECK(vg_frame_turn(f, h->rig.turn, h->rig.skeleton.njoints, &e) == VG_OK);
+            CHECK(vg_frame_turn(f, h->body.rig.turn, h->body.rig.skeleton.njoints, &e) == VG_OK);
         if (how == FULL && kind == VG_VERTICES && i) /* any numbers will do: the first of the frame */
-            CHECK(vg_frame_scalars(f, "error", i == 1 ? "D" : "", f->values, h->mesh.nv, &e) == VG_OK);
+            CHECK(vg_frame_scalars(f, "error", i == 1 ? "D" : "", f->values, h->body.mesh.nv, &e) == VG_OK);
         if (how == FULL && i) add_unknown(&f->extra, "MID ", COPY_SAFE, "before a frame");
         if (how == FULL && i) add_unknown(&f->extra, "MID ", COPY_SAFE, "");
     }
@@ -494,7 +496,7 @@ static void there_and_back(const content *c, const char *what)
     if (r == 0) {
         if (!same_content(c, &back)) printf("%s:\n", what);
         CHECK(same_content(c, &back));
-        CHECK(back.head.reference_name != NULL);
+        CHECK(back.head.body.reference_name != NULL);
         CHECK(write_stream(&back, &twice, &e) == VG_OK);
         CHECK(once.size == twice.size && !memcmp(once.data, twice.data, once.size));
         CHECK(once.size % 8 == 0 && vgi_is_stream(once.data, once.size));
@@ -533,7 +535,7 @@ static void test_numbers(void)
                                   0.1, 1e-310, 1 + 0x1p-52};
     content c = make(VG_VERTICES, VG_F64, PLAIN);
     memcpy(c.frame[0].values, wild, sizeof wild);
-    memcpy(c.head.reference, wild, sizeof wild);
+    memcpy(c.head.body.reference, wild, sizeof wild);
     there_and_back(&c, "extreme numbers");
     c.frame[0].has_time = true, c.frame[0].time = -1e300;
     there_and_back(&c, "an extreme time");
@@ -543,7 +545,7 @@ static void test_numbers(void)
     static const float want[] = {0.1f, 3.4028234663852886e38f, 1e-40f, 0, -0.0f, 16777216};
     c = make(VG_VERTICES, VG_F32, PLAIN);
     memcpy(c.frame[0].values, rounded, sizeof rounded);
-    memcpy(c.head.reference, rounded, sizeof rounded);
+    memcpy(c.head.body.reference, rounded, sizeof rounded);
     vg_bytes b = written(&c);
     content back = {0};
     vg_err e = {0, ""};
@@ -552,7 +554,8 @@ static void test_numbers(void)
         double got = back.frame[0].values[i];
         CHECK(got == (double)want[i] && !signbit(got) == !signbit(want[i]));
     }
-    CHECK(!memcmp(back.head.reference, c.head.reference, sizeof rounded)); /* the reference stays binary64 */
+    CHECK(
+        !memcmp(back.head.body.reference, c.head.body.reference, sizeof rounded)); /* the reference stays binary64 */
     content_clear(&back);
     vg_bytes_clear(&b);
     content_clear(&c);
@@ -868,8 +871,8 @@ static void test_not_finite_out(void)
             content c = make((vg_kind)kind, (vg_precision)precision, FULL);
             bool graph = kind == VG_VECTORS || kind == VG_DEFORMATIONS;
             size_t last = c.head.count * vg_kind_width(c.head.kind) - 1;
-            double *places[] = {&c.frame[1].values[0], &c.frame[1].values[last], &c.frame[1].time,
-                                &c.head.reference[2],  &c.frame[0].root[1],      &c.frame[0].anchors[5]};
+            double *places[] = {&c.frame[1].values[0],     &c.frame[1].values[last], &c.frame[1].time,
+                                &c.head.body.reference[2], &c.frame[0].root[1],      &c.frame[0].anchors[5]};
             for (size_t i = 0; i < (graph ? 6 : 4); i++)
                 for (size_t k = 0; k < 3; k++) {
                     double was = *places[i];

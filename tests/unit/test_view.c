@@ -343,8 +343,10 @@ typedef struct picture {
 
 static vg_head head_of(const shape *f)
 {
-    return (vg_head){
-        .mesh = f->mesh, .reference = (double *)(uintptr_t)f->points, .kind = VG_VERTICES, .count = f->mesh.nv};
+    return (vg_head){.body.mesh = f->mesh,
+                     .body.reference = (double *)(uintptr_t)f->points,
+                     .kind = VG_VERTICES,
+                     .count = f->mesh.nv};
 }
 
 static vg_sheet_options options(void)

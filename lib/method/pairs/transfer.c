@@ -177,16 +177,16 @@ static int find_twins(vg_carrier *c, const double *source_reference, vg_err *e)
     if (!c->twin || !c->is_twin) return VG_ENOMEM;
     size_t corners = choose_twins(c);
     if (!c->ntwins) return VG_OK;
-    vg_head h = {.mesh = {c->source->nv, c->ntwins, NULL, NULL}};
-    h.mesh.start = vgi_array(c->ntwins + 1, sizeof *h.mesh.start, e);
-    h.mesh.vert = vgi_array(corners, sizeof *h.mesh.vert, e);
+    vg_head h = {.body.mesh = {c->source->nv, c->ntwins, NULL, NULL}};
+    h.body.mesh.start = vgi_array(c->ntwins + 1, sizeof *h.body.mesh.start, e);
+    h.body.mesh.vert = vgi_array(corners, sizeof *h.body.mesh.vert, e);
     h.links = vgi_array(2 * g->nlinks, sizeof *h.links, e);
     uint32_t *twin_of = vgi_array(g->nv, sizeof *twin_of, e);
     corners += 2 * g->nlinks;
     double *target = vgi_array(3 * corners, sizeof *target, e);
-    int result = h.mesh.start && h.mesh.vert && h.links && twin_of && target ? VG_OK : VG_ENOMEM;
+    int result = h.body.mesh.start && h.body.mesh.vert && h.links && twin_of && target ? VG_OK : VG_ENOMEM;
     if (result == VG_OK) {
-        fill_twins(c, source_reference, &h.mesh, twin_of);
+        fill_twins(c, source_reference, &h.body.mesh, twin_of);
         link_twins(c, twin_of, &h);
         result = vg_graph_new(&c->twins, &h, e);
     }
@@ -198,7 +198,7 @@ static int find_twins(vg_carrier *c, const double *source_reference, vg_err *e)
     if (result == VG_OK) result = vg_deformer_target(c->deformer, target, c->method, e);
     for (size_t i = 0; result == VG_OK && i < VGI_LANES; i++)
         if (!(c->twin_vectors[i] = vgi_array(3 * corners, sizeof *target, e))) result = VG_ENOMEM;
-    vg_mesh_clear(&h.mesh);
+    vg_mesh_clear(&h.body.mesh);
     free(h.links);
     free(twin_of);
     free(target);

@@ -25,20 +25,20 @@ struct vg_rig_fitter {
 int vg_rig_fitter_new(vg_rig_fitter **out, vg_head *h, const vg_rig_options *o, vg_err *e)
 {
     *out = NULL;
-    if (!h->rig.nbones) return vg_fail(e, VG_EINPUT, "there is no skeleton to fit");
+    if (!h->body.rig.nbones) return vg_fail(e, VG_EINPUT, "there is no skeleton to fit");
     if (o->bones_per_corner < 1 || o->bones_per_corner > 2)
         return vg_fail(e, VG_EARG, "a corner has 1 or 2 bones, not %zu", o->bones_per_corner);
     vg_rig_fitter *f = *out = vgi_array(1, sizeof *f, e);
     if (!f) return VG_ENOMEM;
     f->h = h, f->o = *o;
-    double *at = vgi_array(3 * h->rig.nbones, sizeof *at, e);
+    double *at = vgi_array(3 * h->body.rig.nbones, sizeof *at, e);
     int r = at ? vg_head_prepare_vectors(h, e) : VG_ENOMEM;
-    for (size_t b = 0; r == VG_OK && b < h->rig.nbones; b++)
-        memcpy(at + 3 * b, h->rig.at + 3 * (size_t)h->rig.bone[b], 3 * sizeof *at);
+    for (size_t b = 0; r == VG_OK && b < h->body.rig.nbones; b++)
+        memcpy(at + 3 * b, h->body.rig.at + 3 * (size_t)h->body.rig.bone[b], 3 * sizeof *at);
     if (r == VG_OK) r = vg_graph_new(&f->g, h, e);
-    if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->nf, f->g->start, f->g->vert, h->reference, e);
-    if (r == VG_OK) r = vgi_rig_sums_make(&f->sums, h->mesh.nv, h->rig.nbones, at, &f->turns, e);
-    if (r == VG_OK && !(f->miss = vgi_array(h->mesh.nv, sizeof *f->miss, e))) r = VG_ENOMEM;
+    if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->nf, f->g->start, f->g->vert, h->body.reference, e);
+    if (r == VG_OK) r = vgi_rig_sums_make(&f->sums, h->body.mesh.nv, h->body.rig.nbones, at, &f->turns, e);
+    if (r == VG_OK && !(f->miss = vgi_array(h->body.mesh.nv, sizeof *f->miss, e))) r = VG_ENOMEM;
     free(at);
     if (r < 0) vg_rig_fitter_free(out);
     return r;
@@ -62,7 +62,8 @@ void vg_rig_fitter_add(vg_rig_fitter *f, size_t n, const double *const *poses, c
     const double *p[SOME], *t[SOME];
     size_t count = 0;
     for (size_t k = 0; k < n; k++) {
-        if (!memcmp(poses[k], f->h->reference, 3 * f->h->mesh.nv * sizeof(double))) continue; /* it says nothing */
+        if (!memcmp(poses[k], f->h->body.reference, 3 * f->h->body.mesh.nv * sizeof(double)))
+            continue; /* it says nothing */
         p[count] = poses[k], t[count++] = transforms[k];
         if (count == SOME) {
             vgi_rig_sums_add(&f->sums, count, p, t, f->o.threads);
@@ -112,7 +113,7 @@ static void corner_quaternion(const vgi_rig_sums *s, size_t face, size_t j, cons
 /* The bones that a face may go with: those that move its vertices, by their skin. */
 static size_t face_bones(const vg_rig_fitter *f, size_t face, uint32_t *list)
 {
-    const vg_rig *r = &f->h->rig;
+    const vg_rig *r = &f->h->body.rig;
     size_t n = 0;
     for (uint32_t c = f->g->start[face]; c < f->g->start[face + 1]; c++)
         for (size_t s = VG_SKIN * f->g->vert[c]; s < VG_SKIN * (f->g->vert[c] + 1); s++) {
@@ -241,7 +242,7 @@ typedef struct choosing {
 
 static void hold(choosing *x, size_t v)
 {
-    const double *p = x->f->h->reference, *at = p + 3 * v;
+    const double *p = x->f->h->body.reference, *at = p + 3 * v;
     x->list[x->n++] = (uint32_t)v;
     for (size_t i = 0; i < x->f->g->nv; i++, p += 3) {
         double d =
@@ -255,15 +256,15 @@ static void hold(choosing *x, size_t v)
 static int hold_groups(choosing *x, vg_err *e)
 {
     const vg_head *h = x->f->h;
-    size_t nv = h->mesh.nv, bones = h->rig.nbones, components, slots;
+    size_t nv = h->body.mesh.nv, bones = h->body.rig.nbones, components, slots;
     uint32_t *label = vgi_array(nv, sizeof *label, e), *best = NULL;
-    int r = label ? vg_mesh_components(&h->mesh, label, &components, e) : VG_ENOMEM;
+    int r = label ? vg_mesh_components(&h->body.mesh, label, &components, e) : VG_ENOMEM;
     if (r == VG_OK && !vgi_mul(components, bones, &slots))
         r = vg_fail(e, VG_ENOMEM, "not enough memory for %zu bones of %zu components", bones, components);
     if (r == VG_OK && !(best = vgi_array(slots, sizeof *best, e))) r = VG_ENOMEM;
     for (size_t v = 0; r == VG_OK && v < nv; v++) {
         if (x->distance[v] < 0) continue;
-        uint32_t *to = &best[label[v] * bones + h->rig.skin_bone[VG_SKIN * v]];
+        uint32_t *to = &best[label[v] * bones + h->body.rig.skin_bone[VG_SKIN * v]];
         if (!*to || x->doubt[v] < x->doubt[*to - 1]) *to = (uint32_t)v + 1;
     }
     for (size_t i = 0; r == VG_OK && i < slots && x->n < MOST_HELD; i++)
@@ -284,7 +285,7 @@ static int choose_held(const vg_rig_fitter *f, vg_map *m, vg_err *e)
 {
     static const double tolerance = 1e-3; /* of D: doubts below it do not count */
     size_t nv = f->g->nv, want = (size_t)(f->o.hold * (double)f->g->attached + 0.5);
-    double d = vg_diagonal(f->h->reference, nv);
+    double d = vg_diagonal(f->h->body.reference, nv);
     choosing x = {.f = f,
                   .doubt = vgi_array(nv, sizeof *x.doubt, e),
                   .distance = vgi_array(nv, sizeof *x.distance, e),
@@ -342,7 +343,7 @@ static double cross_with_reference(const refining *x, size_t i, size_t k, size_t
 static double missing(const refining *x, size_t v, const double *z, size_t i, size_t k)
 {
     const vgi_rig_sums *s = &x->f->sums;
-    const double *p = x->f->h->reference + 3 * v, *a = s->at + 3 * i, *o = x->origin;
+    const double *p = x->f->h->body.reference + 3 * v, *a = s->at + 3 * i, *o = x->origin;
     double sum = s->pull[v * 4 * s->n + 4 * i + k];
     if (k < 3) sum += p[k] - o[k];
     else sum += (p[0] - o[0]) * (a[0] - o[0]) + (p[1] - o[1]) * (a[1] - o[1]) + (p[2] - o[2]) * (a[2] - o[2]);
@@ -355,7 +356,7 @@ static double missing(const refining *x, size_t v, const double *z, size_t i, si
 /* The vertex's own bones, then those above and below the first two. */
 static size_t bones_around(const refining *x, size_t v, uint32_t *list)
 {
-    const vg_rig *r = &x->f->h->rig;
+    const vg_rig *r = &x->f->h->body.rig;
     size_t n = 0, own;
     while (n < VG_SKIN && r->skin_weight[VG_SKIN * v + n] > 0) list[n] = r->skin_bone[VG_SKIN * v + n], n++;
     own = n < 2 ? n : 2;
@@ -426,8 +427,8 @@ static int refine(const vg_rig_fitter *f, vg_map *m, vg_err *e)
     if (!(f->o.refine > 0)) return VG_OK;
     x.space = vgi_array(x.chunks, 4 * m->n * sizeof *x.space, e);
     x.parent = vgi_array(m->n, sizeof *x.parent, e);
-    int r = x.space && x.parent ? vgi_rig_parents(&f->h->rig, x.parent, e) : VG_ENOMEM;
-    vg_centroid(f->h->reference, m->nv, x.origin);
+    int r = x.space && x.parent ? vgi_rig_parents(&f->h->body.rig, x.parent, e) : VG_ENOMEM;
+    vg_centroid(f->h->body.reference, m->nv, x.origin);
     if (r == VG_OK) vgi_parallel(f->o.threads, x.chunks, refine_chunk, &x);
     free(x.space);
     free(x.parent);
@@ -438,7 +439,7 @@ static int refine(const vg_rig_fitter *f, vg_map *m, vg_err *e)
 
 static int make_arrays(const vg_rig_fitter *f, vg_map *m, bool corners, vg_err *e)
 {
-    const vg_rig *r = &f->h->rig;
+    const vg_rig *r = &f->h->body.rig;
     size_t n = r->nbones, nv = f->g->nv;
     *m = (vg_map){.n = n,
                   .nv = nv,
@@ -465,7 +466,7 @@ int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_err *e)
     vg_map *m = &h->map;
     if (!f->sums.poses) return vg_fail(e, VG_EINPUT, "there are no poses but the reference to fit a rig to");
     vg_map_clear(m);
-    int r = vgi_skin_fit(&h->rig, &f->sums, h->reference, f->o.threads, f->miss, e);
+    int r = vgi_skin_fit(&h->body.rig, &f->sums, h->body.reference, f->o.threads, f->miss, e);
     if (r == VG_OK) r = make_arrays(f, m, method == VG_RIG_ENVELOPE, e);
     if (r == VG_OK && method == VG_RIG_LBS) {
         for (size_t v = 0; v < m->nv; v++) vgi_map_skin_row(h, v);

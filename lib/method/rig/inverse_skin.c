@@ -457,13 +457,13 @@ void vg_bender_fit(vg_bender *x, size_t n, const double *const *poses, double *c
 
 int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, double *miss, vg_err *e)
 {
-    vg_rig *r = &h->rig;
-    size_t nv = h->mesh.nv, bones = r->nbones;
+    vg_rig *r = &h->body.rig;
+    size_t nv = h->body.mesh.nv, bones = r->nbones;
     double before = INFINITY, **transforms = vgi_array(n, sizeof *transforms, e),
            *space = vgi_array(n, 7 * bones * sizeof *space, e);
     double *at = vgi_array(3 * bones, sizeof *at, e), *left = vgi_array(nv, sizeof *left, e);
     int code = transforms && space && at && left ? VG_OK : VG_ENOMEM;
-    if (code == VG_OK) code = vgi_skin_near(r, nv, h->reference, e);
+    if (code == VG_OK) code = vgi_skin_near(r, nv, h->body.reference, e);
     for (size_t i = 0; code == VG_OK && i < n; i++) transforms[i] = space + 7 * bones * i;
     for (size_t b = 0; code == VG_OK && b < bones; b++)
         memcpy(at + 3 * b, r->at + 3 * (size_t)r->bone[b], 3 * sizeof *at);
@@ -472,11 +472,11 @@ int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, 
     for (int round = 0; code == VG_OK && round < ROUNDS; round++) {
         vg_bender *x = NULL;
         vgi_rig_sums s = {0};
-        code = vg_bender_new(&x, r, nv, h->reference, threads, e);
+        code = vg_bender_new(&x, r, nv, h->body.reference, threads, e);
         if (code == VG_OK) x->least = fine ? x->least : 1e-4, vg_bender_fit(x, n, poses, transforms);
         if (code == VG_OK) code = vgi_rig_sums_make(&s, nv, bones, at, NULL, e);
         if (code == VG_OK) vgi_rig_sums_add(&s, n, poses, (const double *const *)transforms, threads);
-        if (code == VG_OK) code = vgi_skin_fit(r, &s, h->reference, threads, left, e);
+        if (code == VG_OK) code = vgi_skin_fit(r, &s, h->body.reference, threads, left, e);
         vgi_rig_sums_clear(&s);
         vg_bender_free(&x);
         *miss = 0;

@@ -62,17 +62,18 @@ struct vg_map_fitter {
  * with. */
 static int split_patches(vg_head *h, vg_err *e)
 {
-    const vg_mesh *m = &h->mesh;
-    uint32_t *label = h->patches.of_face, *piece = vgi_array(m->nf, sizeof *piece, e), *shared = NULL,
+    const vg_mesh *m = &h->body.mesh;
+    uint32_t *label = h->body.patches.of_face, *piece = vgi_array(m->nf, sizeof *piece, e), *shared = NULL,
              (*pair)[2] = NULL;
     size_t n = 0, npairs = 0;
     if (!piece) return VG_ENOMEM;
-    int r = vgi_connected_pieces(m->nv, m->nf, m->start, m->vert, label, h->patches.n, piece, &n, e);
+    int r = vgi_connected_pieces(m->nv, m->nf, m->start, m->vert, label, h->body.patches.n, piece, &n, e);
     if (r == VG_OK) r = vgi_neighbours(m->nv, m->nf, m->start, m->vert, piece, &pair, &shared, &npairs, e);
     uint32_t *size = vgi_array(n, sizeof *size, e), *set = vgi_array(n, sizeof *set, e),
              *best = vgi_array(n, sizeof *best, e);
     if (!size || !set || !best) r = VG_ENOMEM;
-    if (r == VG_OK && n > h->patches.n) { /* patches that came in one piece each stay as they are, however small */
+    if (r == VG_OK &&
+        n > h->body.patches.n) { /* patches that came in one piece each stay as they are, however small */
         for (size_t f = 0; f < m->nf; f++) size[piece[f]]++;
         vgi_sets_init(set, n);
         for (size_t i = 0; i < npairs; i++)
@@ -87,7 +88,7 @@ static int split_patches(vg_head *h, vg_err *e)
     }
     if (r == VG_OK) {
         memcpy(label, piece, m->nf * sizeof *label);
-        h->patches.n = n;
+        h->body.patches.n = n;
     }
     free(piece);
     free(shared);
@@ -120,7 +121,7 @@ static int choose_held(vg_map_fitter *f, vg_err *e)
 {
     const vgi_shape *s = &f->shape;
     const vg_graph *g = f->g;
-    double d = vg_diagonal(f->h->reference, g->nv);
+    double d = vg_diagonal(f->h->body.reference, g->nv);
     unsigned char *used = vgi_array(g->nv, sizeof *used, e), *count = vgi_array(g->nv, sizeof *count, e);
     candidate *list = vgi_array(g->nv, sizeof *list, e), *chosen = vgi_array(g->nv, sizeof *chosen, e);
     bool ok = used && count && list && chosen;
@@ -188,7 +189,8 @@ static int find_near(vg_map_fitter *f, vg_err *e)
 int vg_map_fitter_new(vg_map_fitter **out, vg_head *h, double hold, int threads, vg_err *e)
 {
     *out = NULL;
-    if (!h->patches.n || !h->mesh.nf) return vg_fail(e, VG_EINPUT, "there are no patches: make them with vg-segment");
+    if (!h->body.patches.n || !h->body.mesh.nf)
+        return vg_fail(e, VG_EINPUT, "there are no patches: make them with vg-segment");
     vg_map_fitter *f = *out = vgi_array(1, sizeof *f, e);
     if (!f) return VG_ENOMEM;
     f->h = h, f->threads = threads, f->hold = hold;
@@ -196,14 +198,14 @@ int vg_map_fitter_new(vg_map_fitter **out, vg_head *h, double hold, int threads,
     if (r == VG_OK) r = vg_head_prepare_vectors(h, e);
     if (r == VG_OK) r = vg_graph_new(&f->g, h, e);
     if (r == VG_OK && !(f->of_face = vgi_graph_patches(h, f->g, e))) r = VG_ENOMEM;
-    if (r == VG_OK) r = vgi_shape_make(&f->shape, &h->mesh, &h->patches, h->reference, e);
-    if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->nf, f->g->start, f->g->vert, h->reference, e);
+    if (r == VG_OK) r = vgi_shape_make(&f->shape, &h->body.mesh, &h->body.patches, h->body.reference, e);
+    if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->nf, f->g->start, f->g->vert, h->body.reference, e);
     if (r == VG_OK) r = choose_held(f, e);
     if (r == VG_OK) r = find_near(f, e);
     if (r == VG_OK) {
         f->pull = vgi_array(3 * vg_graph_corners(f->g), sizeof *f->pull, e);
         f->turn = vgi_array(9 * f->g->nf, sizeof *f->turn, e);
-        f->b2 = vgi_array(h->patches.n, sizeof *f->b2, e);
+        f->b2 = vgi_array(h->body.patches.n, sizeof *f->b2, e);
         if (!f->pull || !f->turn || !f->b2) r = VG_ENOMEM;
     }
     if (r < 0) vg_map_fitter_free(out);
@@ -397,7 +399,7 @@ static int fit_joints(const vg_map_fitter *f, vg_map *m, vg_err *e)
     static const double nothing = 1e-12; /* weight of a joint that is missed by thousands of D, or by no number at all */
     const vg_graph *g = f->g;
     uint32_t (*pair)[2], *shared;
-    double d = vg_diagonal(f->h->reference, g->nv);
+    double d = vg_diagonal(f->h->body.reference, g->nv);
     int r = vgi_neighbours(g->nv, g->nf, g->start, g->vert, f->of_face, &pair, &shared, &m->njoints, e);
     if (r < 0) return r;
     m->joint = (uint32_t *)pair;
@@ -406,7 +408,7 @@ static int fit_joints(const vg_map_fitter *f, vg_map *m, vg_err *e)
     double *middle = vgi_array(3 * m->njoints, sizeof *middle, e);
     if (!m->joint_at || !m->joint_weight || !middle) r = VG_ENOMEM;
     if (r == VG_OK)
-        r = vgi_shared_points(g->nv, g->nf, g->start, g->vert, f->of_face, m->joint, m->njoints, f->h->reference,
+        r = vgi_shared_points(g->nv, g->nf, g->start, g->vert, f->of_face, m->joint, m->njoints, f->h->body.reference,
                               middle, e);
     for (size_t i = 0; r == VG_OK && i < m->njoints; i++) {
         double miss;
@@ -605,7 +607,7 @@ static void skin_patch(void *context, size_t p)
         if (f->owner[v] != p || !f->g->in_face[v]) continue;
         double *row = x->m->weights + v * width;
         for (size_t i = 0; i < w; i++) {
-            z[i] = f->want[3 * NEAR * v + i] + f->h->reference[3 * v + i % 3];
+            z[i] = f->want[3 * NEAR * v + i] + f->h->body.reference[3 * v + i % 3];
             for (size_t j = 0; j < width; j++) z[i] -= cross[i * width + j] * row[j];
         }
         vgi_cholesky_dense_solve(s, w, z, 1);

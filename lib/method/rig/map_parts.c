@@ -138,7 +138,7 @@ uint32_t *vgi_graph_patches(const vg_head *h, const vg_graph *g, vg_err *e)
     uint32_t *of_face = vgi_array(g->nf, sizeof *of_face, e), *of_vertex = vgi_array(g->nv, sizeof *of_vertex, e);
     if (of_face && of_vertex) {
         for (size_t f = faces; f-- > 0;) {
-            of_face[f] = h->patches.of_face[h->has_selection ? h->selected[f] : f];
+            of_face[f] = h->body.patches.of_face[h->has_selection ? h->selected[f] : f];
             for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) of_vertex[g->vert[c]] = of_face[f];
         }
         for (size_t f = faces; f < g->nf; f++) of_face[f] = of_vertex[g->vert[g->start[f]]];
@@ -209,7 +209,7 @@ static void link_vectors(const vg_head *h, const vg_graph *g, size_t p, const do
 {
     for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
         const uint32_t *end = g->vert + g->start[f];
-        double w[2] = {0.5 * skin_share(&h->rig, end[0], p), 0.5 * skin_share(&h->rig, end[1], p)};
+        double w[2] = {0.5 * skin_share(&h->body.rig, end[0], p), 0.5 * skin_share(&h->body.rig, end[1], p)};
         for (size_t i = at ? 0 : k; i < (at ? 3 : k + 1); i++) {
             double d = at ? w[0] * at[3 * (size_t)end[0] + i] - w[1] * at[3 * (size_t)end[1] + i] : w[0] - w[1];
             wanted[3 * (size_t)g->start[f] + i] = d, wanted[3 * (size_t)g->start[f] + 3 + i] = -d;
@@ -222,8 +222,8 @@ static double hold_of(const vg_head *h, size_t i, size_t p, const double **at)
 {
     const vg_map *m = &h->map;
     bool bones = m->kind == VG_MAP_BONES;
-    *at = bones ? h->reference + 3 * (size_t)m->held[i] : m->held_at + 3 * i;
-    return bones ? skin_share(&h->rig, m->held[i], p) : m->held_patch[i] == p;
+    *at = bones ? h->body.reference + 3 * (size_t)m->held[i] : m->held_at + 3 * i;
+    return bones ? skin_share(&h->body.rig, m->held[i], p) : m->held_patch[i] == p;
 }
 
 /* Wanted vectors and held vertices when only the j-th number of A_p is at work, j = 0 1 2 at once as x y z; or t of
@@ -236,7 +236,7 @@ static void column_input(const vg_head *h, const vg_graph *g, const uint32_t *of
     bool bones = m->kind == VG_MAP_BONES;
     if (column < m->n) {
         driven_vectors(m, g, of_face, vectors, column, wanted);
-        if (bones) link_vectors(h, g, column, h->reference, 0, wanted);
+        if (bones) link_vectors(h, g, column, h->body.reference, 0, wanted);
         for (size_t i = 0; i < m->nheld; i++) {
             double w = hold_of(h, i, column, &at);
             for (size_t k = 0; k < 3; k++) anchors[3 * i + k] = w * at[k];
@@ -270,8 +270,8 @@ void vgi_map_skin_row(vg_head *h, size_t v)
     double *row = h->map.weights + v * 4 * h->map.n;
     memset(row, 0, 4 * h->map.n * sizeof *row);
     for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++) {
-        double w = h->rig.skin_weight[s], *to = row + 4 * (size_t)h->rig.skin_bone[s];
-        for (size_t k = 0; k < 3; k++) to[k] += w * h->reference[3 * v + k];
+        double w = h->body.rig.skin_weight[s], *to = row + 4 * (size_t)h->body.rig.skin_bone[s];
+        for (size_t k = 0; k < 3; k++) to[k] += w * h->body.reference[3 * v + k];
         to[3] += w;
     }
 }
@@ -286,7 +286,7 @@ static void carry_loose(vg_head *h, const vg_graph *g)
             vgi_map_skin_row(h, v);
             continue;
         }
-        const double *x = h->reference + 3 * v;
+        const double *x = h->body.reference + 3 * v;
         size_t best = 0;
         double least = INFINITY;
         for (size_t p = 0; p < m->n; p++) {
@@ -304,7 +304,7 @@ int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, con
 {
     vg_map *m = &h->map;
     vg_solver *s;
-    int r = vg_solver_new(&s, g, m->held, m->nheld, h->reference, VG_WEIGHTS_UNIFORM, threads, e);
+    int r = vg_solver_new(&s, g, m->held, m->nheld, h->body.reference, VG_WEIGHTS_UNIFORM, threads, e);
     if (r < 0) return r;
     size_t batch = vg_solver_batch(s), columns = m->n + (m->n + 2) / 3, nv = g->nv;
     double *wanted = vgi_array(3 * vg_graph_corners(g), sizeof *wanted, e);

@@ -21,10 +21,10 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
     double *rhs = vgi_array(3 * nv, sizeof *rhs, e), roots[2][3], root[3];
     int r = a && b && rhs ? VG_OK : VG_ENOMEM;
     for (size_t i = 0; r == VG_OK && i < 3 * nv; i++)
-        body[i] = h->reference[i] + morph * (target[i] - h->reference[i]);
+        body[i] = h->body.reference[i] + morph * (target[i] - h->body.reference[i]);
     if (r == VG_OK) r = vg_solver_new(&s, g, NULL, 0, body, VG_WEIGHTS_UNIFORM, threads, e);
     if (r == VG_OK) {
-        vg_graph_vectors(g, h->reference, a);
+        vg_graph_vectors(g, h->body.reference, a);
         vg_graph_vectors(g, target, b);
         for (size_t c = 0; c < corners; c++) {
             double *x = a + 3 * c, *y = b + 3 * c, q[4], l[4];
@@ -38,7 +38,7 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
             vg_quat_exp(l, q);
             vg_quat_apply(q, x, x);
         }
-        vg_graph_root(g, h->reference, roots[0]);
+        vg_graph_root(g, h->body.reference, roots[0]);
         vg_graph_root(g, target, roots[1]);
         for (int k = 0; k < 3; k++) root[k] = roots[0][k] + morph * (roots[1][k] - roots[0][k]);
         const double *rhs_list[1] = {rhs}, *root_list[1] = {root};
@@ -71,15 +71,15 @@ static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, c
     double *old = vgi_array(3 * m->njoints, sizeof *old, e), *now = vgi_array(3 * m->njoints, sizeof *now, e);
     int blas = vgi_product_begin();
     int r = before && after && old && now ? vgi_place_by_joints(m, m->centre, before, e) : VG_ENOMEM;
-    if (r == VG_OK) r = meeting_points(m, g, of_face, h->reference, old, e);
+    if (r == VG_OK) r = meeting_points(m, g, of_face, h->body.reference, old, e);
     if (r == VG_OK) r = meeting_points(m, g, of_face, body, now, e);
-    if (r == VG_OK) r = vgi_shape_make(&shape, &h->mesh, &h->patches, body, e);
+    if (r == VG_OK) r = vgi_shape_make(&shape, &h->body.mesh, &h->body.patches, body, e);
     if (r == VG_OK) {
         for (size_t i = 0; i < 3 * m->njoints; i++) m->joint_at[i] = now[i] + ratio * (m->joint_at[i] - old[i]);
         for (size_t i = 0; i < m->nheld; i++)
             for (size_t k = 0; k < 3; k++) {
                 size_t x = 3 * (size_t)m->held[i] + k;
-                m->held_at[3 * i + k] = body[x] + ratio * (m->held_at[3 * i + k] - h->reference[x]);
+                m->held_at[3 * i + k] = body[x] + ratio * (m->held_at[3 * i + k] - h->body.reference[x]);
             }
         r = vgi_place_by_joints(m, shape.centre, after, e);
     }
@@ -164,12 +164,12 @@ static int move_joints(vg_rig *r, size_t nv, const double *from, const double *t
 static int move_bones(vg_head *h, const double *body, vg_err *e)
 {
     vg_map *m = &h->map;
-    int r = move_joints(&h->rig, m->nv, h->reference, body, e);
+    int r = move_joints(&h->body.rig, m->nv, h->body.reference, body, e);
     if (r < 0) return r;
     for (size_t b = 0; b < m->n; b++)
         for (size_t k = 0; k < 3; k++)
-            m->centre[3 * b + k] = m->home_centre[3 * b + k] = h->rig.at[3 * (size_t)h->rig.bone[b] + k];
-    return vgi_place_by_bones(&h->rig, m, m->place, e);
+            m->centre[3 * b + k] = m->home_centre[3 * b + k] = h->body.rig.at[3 * (size_t)h->body.rig.bone[b] + k];
+    return vgi_place_by_bones(&h->body.rig, m, m->place, e);
 }
 
 /* What regression has added grows with the body; of a bone it is about its joint, so that what it adds to the share
@@ -201,9 +201,9 @@ int vg_map_retarget(vg_head *h, const double *target, double morph, int threads,
     vg_map *m = &h->map;
     vg_graph *g = NULL;
     uint32_t *of_face = NULL;
-    size_t nv = h->mesh.nv, size = nv * 4 * m->n;
+    size_t nv = h->body.mesh.nv, size = nv * 4 * m->n;
     bool bones = m->kind == VG_MAP_BONES, corners = m->ncorners > 0;
-    if (!m->n || (bones ? h->rig.nbones : h->patches.n) != m->n)
+    if (!m->n || (bones ? h->body.rig.nbones : h->body.patches.n) != m->n)
         return vg_fail(e, VG_EINPUT, "there is no map to retarget");
     double *body = vgi_copy_array(target, 3 * nv, sizeof *body, e), *vectors = NULL, *home = NULL, *skin = NULL,
            ratio = 1;
@@ -215,15 +215,15 @@ int vg_map_retarget(vg_head *h, const double *target, double morph, int threads,
     if (r == VG_OK && !(vectors = vgi_array(3 * vg_graph_corners(g), sizeof *vectors, e))) r = VG_ENOMEM;
     if (r == VG_OK && corners && !(skin = vgi_copy_array(m->weights, size, sizeof *skin, e))) r = VG_ENOMEM;
     if (r == VG_OK && corners) { /* what regression has added to the reconstruction */
-        vg_graph_vectors(g, h->reference, vectors);
+        vg_graph_vectors(g, h->body.reference, vectors);
         r = vgi_map_collapse(h, g, of_face, vectors, threads, e);
         for (size_t i = 0; r == VG_OK && i < size; i++) skin[i] -= m->weights[i];
     }
-    if (r == VG_OK && !bones && !m->has_home && !(home = vgi_copy_array(h->reference, 3 * nv, sizeof *home, e)))
+    if (r == VG_OK && !bones && !m->has_home && !(home = vgi_copy_array(h->body.reference, 3 * nv, sizeof *home, e)))
         r = VG_ENOMEM;
     if (r == VG_OK && morph != 1) r = morph_body(h, g, target, morph, body, threads, e);
     if (r == VG_OK) {
-        double before = vg_diagonal(h->reference, nv), after = vg_diagonal(body, nv);
+        double before = vg_diagonal(h->body.reference, nv), after = vg_diagonal(body, nv);
         ratio = after / before;
         if (!(before > 0 && after > 0)) r = vg_fail(e, VG_EINPUT, "a body without extent cannot be retargeted");
         else if (!(isfinite(ratio * m->size) && ratio * m->size > 0))
@@ -232,7 +232,7 @@ int vg_map_retarget(vg_head *h, const double *target, double morph, int threads,
     }
     if (r == VG_OK) {
         if (home) m->home = home, m->has_home = true, home = NULL;
-        memcpy(h->reference, body, 3 * nv * sizeof *body);
+        memcpy(h->body.reference, body, 3 * nv * sizeof *body);
         vg_graph_vectors(g, body, vectors);
         if (corners) r = vgi_map_collapse(h, g, of_face, vectors, threads, e);
         else skin_rows(h);

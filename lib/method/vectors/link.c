@@ -249,7 +249,7 @@ int vg_head_prepare_vectors(vg_head *h, vg_err *e)
     if (h->has_links) return VG_OK;
     uint32_t *links;
     size_t n;
-    int r = vg_link_components(&h->mesh, h->reference, &links, &n, e);
+    int r = vg_link_components(&h->body.mesh, h->body.reference, &links, &n, e);
     if (r < 0) return r;
     free(h->links);
     h->links = links;
