@@ -187,10 +187,11 @@ COMPLETION_TO := $(DESTDIR)$(PREFIX)/share/bash-completion/completions
 
 .PHONY: install
 install: all
-	install -d $(BIN_TO) $(LIB_TO)/pkgconfig $(INCLUDE_TO) $(MAN_TO)/man1 $(MAN_TO)/man5 $(MAN_TO)/man7 $(COMPLETION_TO)
+	install -d $(BIN_TO) $(LIB_TO)/pkgconfig $(INCLUDE_TO)/vg $(MAN_TO)/man1 $(MAN_TO)/man5 $(MAN_TO)/man7 $(COMPLETION_TO)
 	install -m 755 $(PROGRAMS:%=$(B)/bin/%) $(BIN_TO)
 	install -m 644 $(B)/libvg.a $(LIB_TO)
 	install -m 644 lib/vg.h $(INCLUDE_TO)
+	install -m 644 $(sort $(wildcard lib/vg/*.h)) $(INCLUDE_TO)/vg
 	sed -e 's|@PREFIX@|$(PREFIX)|' -e 's|@LIBDIR@|$(LIBDIR)|' -e 's|@VERSION@|$(VERSION)|' \
 	    -e 's|@LIBS@|$(strip $(ALL_LIBS))|' lib/libvg.pc.in > $(LIB_TO)/pkgconfig/libvg.pc
 	for page in man/*.[1-9]; do install -m 644 $$page $(MAN_TO)/man$${page##*.} || exit 1; done
@@ -199,9 +200,10 @@ install: all
 
 .PHONY: uninstall
 uninstall:
-	rm -f $(PROGRAMS:%=$(BIN_TO)/%) $(LIB_TO)/libvg.a $(INCLUDE_TO)/vg.h $(LIB_TO)/pkgconfig/libvg.pc \
+	rm -f $(PROGRAMS:%=$(BIN_TO)/%) $(LIB_TO)/libvg.a $(INCLUDE_TO)/vg.h $(patsubst lib/%,$(INCLUDE_TO)/%,$(wildcard lib/vg/*.h)) $(LIB_TO)/pkgconfig/libvg.pc \
 	    $(foreach page,$(notdir $(wildcard man/*.[1-9])),$(MAN_TO)/man$(subst .,,$(suffix $(page)))/$(page)) \
 	    $(COMPLETION_TO)/vg $(PROGRAMS:%=$(COMPLETION_TO)/%)
+	rmdir $(INCLUDE_TO)/vg 2>/dev/null || :
 
 # The same tree gives the same bytes: names sorted, nobody's user and mask, one time for all files. DIST tells where it is.
 DIST := build/vg-$(VERSION).tar.xz

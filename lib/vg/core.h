@@ -1,0 +1,58 @@
+/* vg/core.h: errors and bytes.
+ * A part of vg.h, which says what holds for all parts.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_PART_CORE_H
+#define VG_PART_CORE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(__GNUC__)
+#define VG_MUST_CHECK __attribute__((warn_unused_result))
+#define VG_PRINTF(a, b) __attribute__((format(printf, a, b)))
+#else
+#define VG_MUST_CHECK
+#define VG_PRINTF(a, b)
+#endif
+
+/* The exit status of a program that stops on an error follows from the code: VG_EARG 2, VG_EINPUT and VG_ETRUNC 3,
+ * VG_ESYS and VG_ENOMEM 4. */
+typedef enum vg_code {
+    VG_OK = 0,
+    VG_EARG = -1,   /* the caller asked for something that does not exist or does not fit */
+    VG_EINPUT = -2, /* malformed input, or inputs that do not fit one another */
+    VG_ETRUNC = -3, /* input that ends too early */
+    VG_ESYS = -4,   /* the system refused: open, read, write, ... */
+    VG_ENOMEM = -5
+} vg_code;
+
+/* What went wrong: one line without a final full stop, with the file or frame it is about. Control characters of
+ * the input are replaced by '?'. */
+typedef struct vg_err {
+    int code;
+    char message[480];
+} vg_err;
+
+/* vg_fail: fill *e (unless NULL) and return `code`. Control characters are stripped from the result. */
+int vg_fail(vg_err *e, int code, const char *format, ...) VG_PRINTF(3, 4);
+
+/* vg_exit_status: the exit status that STYLE gives to a code (see vg_code). */
+int vg_exit_status(int code);
+
+/* Bytes that grow. data is NULL while cap is 0. */
+typedef struct vg_bytes {
+    unsigned char *data;
+    size_t size, cap;
+} vg_bytes;
+
+void vg_bytes_clear(vg_bytes *b);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

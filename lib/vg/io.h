@@ -1,0 +1,146 @@
+/* vg/io.h: files: streams, mesh files, archives.
+ * A part of vg.h, which says what holds for all parts.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_PART_IO_H
+#define VG_PART_IO_H
+
+#include "vg/frames.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The stream (fmt/STREAM.md). A reader takes it from a descriptor or from memory and checks every byte. */
+typedef struct vg_reader vg_reader;
+/* vg_reader_open: read up to the FORM record. fd is borrowed and read to the END mark by vg_reader_next. `name` is
+ * what messages call it. */
+int vg_reader_open(vg_reader **r, int fd, const char *name, vg_err *e) VG_MUST_CHECK;
+int vg_reader_open_memory(vg_reader **r, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
+/* vg_reader_head: what was read; the caller may change it (it is what a filter hands to its writer). */
+vg_head *vg_reader_head(vg_reader *r);
+/* What a stream says that its writer gave up on: the record FAIL. */
+typedef struct vg_failure {
+    char *program; /* NULL: there is no such record */
+    uint32_t status; /* exit status */
+    char *message; /* one line */
+} vg_failure;
+
+/* vg_reader_next: 1 and the next frame; 0 at the END mark, nothing left behind it; negative on damage. */
+int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e) VG_MUST_CHECK;
+vg_records *vg_reader_tail(vg_reader *r); /* unknown records after the last frame, valid when next has given 0 */
+/* vg_reader_failure: why vg_reader_next gave VG_ETRUNC, if the stream says it; else NULL. Borrowed until close. */
+const vg_failure *vg_reader_failure(const vg_reader *r);
+void vg_reader_close(vg_reader **r);
+
+typedef struct vg_writer vg_writer;
+/* vg_writer_open: write everything up to FORM. fd is borrowed. h is borrowed until close and must not change. */
+int vg_writer_open(vg_writer **w, int fd, const char *name, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+int vg_writer_put(vg_writer *w, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
+/* vg_writer_end: unknown records left over (may be NULL), END, flush. Without it the stream is not whole. */
+int vg_writer_end(vg_writer *w, const vg_records *tail, vg_err *e) VG_MUST_CHECK;
+/* vg_writer_abandon: say in a FAIL record who failed and why; best effort; no END will follow. */
+void vg_writer_abandon(vg_writer *w, const char *program, int exit_status, const char *message);
+void vg_writer_close(vg_writer **w);
+
+/* The door in. Operands are streams, mesh files, files that hold a whole sequence (point caches, arrays, ...),
+ * archives of mesh files, directories, or "-" (standard input: any of them); what each one is, is told by its
+ * content, for OBJ by its name or content. Directories and archives give their mesh files in natural order ("pose2"
+ * before "pose10"); other files in them are passed over. One operand that is a stream gives that stream as it is.
+ * More operands are joined into one sequence of vertices of one mesh. The first pose is the reference unless a stream
+ * or a sequence brings its own. */
+typedef struct vg_source vg_source;
+int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err *e) VG_MUST_CHECK;
+typedef struct vg_source_options {
+    const char *mesh;    /* an operand whose faces and reference pose are those of operands that hold none of their
+                            own (point caches, arrays); NULL: those of the operand before, or of the file of the same
+                            name that ends in .obj or .ply */
+    uint64_t most_bytes; /* what an archive, a compressed file, or a file from a pipe that is no stream may hold,
+                            unpacked; 0: 1 GiB in one file, 64 GiB in all */
+    int threads;         /* parse as many mesh files at a time; one more waits, if their bytes are less than 256 MiB.
+                            What comes through a pipe is not read before it is asked for. 0 or 1: one after another */
+} vg_source_options;
+/* vg_source_open_with: o may be NULL. */
+int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const vg_source_options *o,
+                        vg_err *e) VG_MUST_CHECK;
+/* vg_source_warning: what was left out of the mesh, one line; NULL: nothing. Borrowed until close. */
+const char *vg_source_warning(const vg_source *s);
+vg_head *vg_source_head(vg_source *s);
+int vg_source_next(vg_source *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
+vg_records *vg_source_tail(vg_source *s);
+const vg_failure *vg_source_failure(const vg_source *s); /* as vg_reader_failure */
+void vg_source_close(vg_source **s);
+
+/* vg_load_mesh: the mesh behind one operand, as a head whose reference is the operand's reference pose (for a mesh
+ * file its only pose, for BVH the one without rotations; for a stream its reference; for an archive or directory the
+ * first pose). The rest is not read. */
+int vg_load_mesh(vg_head *h, const char *operand, vg_err *e) VG_MUST_CHECK;
+
+/* Frames that wait, first in, first out: in memory up to a limit,
+ * then in a file without a name in $TMPDIR (or /tmp). */
+typedef struct vg_spool vg_spool;
+typedef struct vg_spool_facts {
+    uint64_t most_frames; /* that have waited at once */
+    uint64_t file_bytes;  /* the largest size of the file; 0: there was none */
+} vg_spool_facts;
+
+/* vg_spool_new: h says what a frame holds; borrowed until free. limit: bytes of frames in memory. */
+int vg_spool_new(vg_spool **s, const vg_head *h, size_t limit, vg_err *e) VG_MUST_CHECK;
+void vg_spool_free(vg_spool **s);
+/* vg_spool_put: keep a copy of f, all of it. vg_spool_next: 1 and the frame that has waited longest;
+ * 0 when none waits. */
+int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
+int vg_spool_next(vg_spool *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
+vg_spool_facts vg_spool_get_facts(const vg_spool *s);
+
+/* The door out: one mesh file, a '%04d' pattern, a directory ("out/"), an archive, or one file that holds the whole
+ * sequence, told by the name and checked at once; "NAME:ply" chooses what is inside an archive or directory, `format`
+ * (may be NULL) overrides. Everything is written under temporary names and takes its final name in vg_sink_end. */
+typedef struct vg_sink vg_sink;
+typedef struct vg_sink_options {
+    const char *format;  /* "obj", "pc2", ...; NULL: told by the name */
+    bool full_precision; /* numbers read back to the same binary64, not binary32 */
+    long first_number;   /* what %d starts at; 0 */
+    const char *mesh;    /* where the mesh of a file without faces goes; NULL: beside it, NAME.obj, which must not be
+                            another mesh */
+    bool no_mesh;        /* nowhere */
+    bool drop_loose;     /* leave out the vertices that are in no face */
+    size_t most_targets; /* GLB, glTF: morph targets; more frames are mixed from so many. 0: 100 */
+    int threads;         /* of mesh files so many are made at a time, and one more waits: no more than 256 MiB, but two
+                            in any case, and what went wrong with one is told by a later call. 0 or 1: each at once */
+} vg_sink_options;
+/* vg_sink_check: is this a name and format that can be written? To be called before any work. */
+int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;
+int vg_sink_open(vg_sink **s, const char *output, const vg_head *h, const vg_sink_options *o,
+                 vg_err *e) VG_MUST_CHECK;
+/* a frame of vertices; arrays take any kind */
+int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
+int vg_sink_end(vg_sink *s, vg_err *e) VG_MUST_CHECK;
+/* vg_sink_discard: remove what was written, unless vg_sink_end has given it its names. For the handler of a signal
+ * that ends the program: it calls nothing but unlink and rmdir, and leaves the sink as it is. */
+void vg_sink_discard(const vg_sink *s);
+/* vg_sink_warning: line number i of what the output does not keep, after vg_sink_end; NULL: no more.
+ * Borrowed until close. */
+const char *vg_sink_warning(const vg_sink *s, size_t i);
+void vg_sink_close(vg_sink **s); /* without _end: nothing is left behind */
+
+/* A mesh file in memory, read or written as a whole. */
+typedef struct vg_model {
+    vg_mesh mesh;
+    double *vertices;
+    vg_attributes attributes;
+    size_t degenerate; /* triangles left out on reading: two corners were at one place (STL, whose corners have no
+                          numbers) */
+} vg_model;
+
+void vg_model_clear(vg_model *m);
+/* vg_model_read: format NULL: told by content, then by the name. name is what messages call it. */
+int vg_model_read(vg_model *m, const void *data, size_t n, const char *format, const char *name,
+                  vg_err *e) VG_MUST_CHECK;
+/* vg_model_write: append to out. attributes may be NULL. */
+int vg_model_write(vg_bytes *out, const char *format, const vg_mesh *mesh, const double *vertices,
+                   const vg_attributes *attributes, bool full_precision, vg_err *e) VG_MUST_CHECK;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

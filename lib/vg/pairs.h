@@ -1,0 +1,80 @@
+/* vg/pairs.h: meshes of different connectivity: registration and transfer.
+ * A part of vg.h, which says what holds for all parts.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_PART_PAIRS_H
+#define VG_PART_PAIRS_H
+
+#include "vg/markers.h"
+#include "vg/vectors.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What is known about which point belongs to which. */
+typedef struct vg_register_input {
+    const vg_mesh *source, *target;
+    const double *source_points, *target_points;
+    const vg_markers *markers;  /* may be NULL */
+    const vg_seed *seeds;       /* may be NULL */
+    size_t nseeds;
+    bool seeds_of_source;       /* seeds are vertices of the source on the target; else vertices of the target on the
+                                   source */
+    const vg_attributes *source_uv, *target_uv; /* both, or NULL: points of the same texture coordinates belong
+                                                   together */
+    bool aligned;               /* the two lie on one another as they are */
+    bool keep_all;              /* markers that contradict the others are not left out */
+    int threads;
+} vg_register_input;
+
+/* One round of the fit. */
+typedef struct vg_register_step {
+    size_t round, rounds;
+    size_t near;      /* source vertices that the target pulls */
+    double stiffness; /* weight of smoothness, that of the target being 1 */
+    double mean, largest; /* distance of these vertices from the target, in D */
+} vg_register_step;
+
+typedef struct vg_register_result {
+    vg_correspondence pairs;
+    double *fitted;          /* source nv points: the source on the target, in the target's place and size */
+    double scale, rotation[9], shift[3]; /* the similarity that brings the source onto the target as a whole */
+    bool flipped;            /* the faces of one mesh turn the other way round */
+    double *residual;        /* per marker: how far it is from where its neighbours expect it, in D of the target */
+    bool *left_out;          /* per marker */
+    double typical_residual; /* the median */
+    size_t uv_pairs;         /* points paired by texture coordinates */
+} vg_register_result;
+
+void vg_register_result_clear(vg_register_result *r);
+
+/* vg_register: pair the faces of two meshes (MATH 9; after Sumner and Popovic 2004, section 5). step (may be NULL) is
+ * told of each round of the fit. VG_EINPUT when the pairs given do not say how the meshes lie (three that are not in
+ * line are needed). */
+int vg_register(vg_register_result *r, const vg_register_input *in,
+                void (*step)(void *context, const vg_register_step *step), void *context, vg_err *e) VG_MUST_CHECK;
+
+/* Transfer between meshes of different connectivity (MATH 9). A face that one face of as many corners drives goes
+ * corner by corner, as by vg_deformer. Each other face of the target takes the deformation gradient of the source
+ * faces that drive it, and by pose its rotation (polar) with the stretch that the gradient gives the direction of
+ * each vector. Here the normal stretches by the root of the area's ratio, for the target's vectors lie across the
+ * source's planes. Faces without a match of their own turn rigidly. Links follow the faces at their ends. */
+typedef struct vg_carrier vg_carrier;
+/* vg_carrier_new: source: the whole source mesh and its reference pose; c: fits both meshes (checked: VG_EINPUT);
+ * target: the graph of the target (all faces, then links) and its reference. All are borrowed until free. */
+int vg_carrier_new(vg_carrier **c, const vg_mesh *source, const double *source_reference,
+                   const vg_correspondence *pairs, const vg_graph *target, const double *target_reference,
+                   vg_method method, int threads, vg_err *e) VG_MUST_CHECK;
+void vg_carrier_free(vg_carrier **c);
+/* vg_carrier_transfer: n poses of the source (vertices) in, n times the target's wanted vectors out. */
+void vg_carrier_transfer(vg_carrier *c, size_t n, const double *const *poses, double *const *vectors);
+/* corners: source faces without a direction, over all poses */
+vg_deform_counts vg_carrier_counts(const vg_carrier *c);
+/* vg_carrier_turned: by how many degrees the matched faces of the target are turned against the source faces that drive
+ * them, in the two references: the angle of the mean cosine between normals. A mesh that is inside out is not turned. */
+double vg_carrier_turned(const vg_carrier *c);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,77 @@
+/* vg/rig.h: skeletons that drive a mesh: skinning, envelopes, other skeletons.
+ * A part of vg.h, which says what holds for all parts.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_PART_RIG_H
+#define VG_PART_RIG_H
+
+#include "vg/frames.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A rig driven by a skeleton of its own or another one; joints belong together by name. Joints of the rig that the
+ * other does not have follow those above them. The rig keeps the lengths of its bones and goes as far as its size,
+ * beside the other's, wants. */
+typedef struct vg_driver vg_driver;
+/* vg_driver_new: both are borrowed until free. align: the skeletons do not rest alike: bones of the rig point where
+ * those of the other one do. VG_EINPUT when no names fit. */
+int vg_driver_new(vg_driver **d, const vg_rig *r, const vg_skeleton *by, bool align, vg_err *e) VG_MUST_CHECK;
+void vg_driver_free(vg_driver **d);
+size_t vg_driver_missing(const vg_driver *d); /* bones of the rig that follow others */
+/* vg_driver_pose: positions and turns of the other skeleton's joints to nbones transforms. */
+void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, double *transforms);
+
+/* Enveloping (MATH 6; T 5): a skeleton drives the mesh, learned from example poses.
+ *
+ * vg_bender: the other way round: the motions of the bones in a pose of vertices, joints staying together, so that
+ * linear blend skinning comes as near to the vertices as it can (damped Gauss-Newton over all bones at once). Bones
+ * that no vertex tells about go with their parents. */
+typedef struct vg_bender vg_bender;
+/* vg_bender_new: r has weights (else VG_EINPUT); it and reference (nv points) are not kept. */
+int vg_bender_new(vg_bender **b, const vg_rig *r, size_t nv, const double *reference, int threads,
+                  vg_err *e) VG_MUST_CHECK;
+void vg_bender_free(vg_bender **b);
+/* vg_bender_fit: n poses (nv points each) to n times nbones transforms of 7 numbers. */
+void vg_bender_fit(vg_bender *b, size_t n, const double *const *poses, double *const *transforms);
+
+/* vg_rig_learn: give h's rig weights when the motions of its bones are not known: weights and motions are fitted in
+ * turn to n poses. miss: the mean distance that linear blend skinning leaves, in mesh units. */
+int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, double *miss,
+                 vg_err *e) VG_MUST_CHECK;
+/* vg_rig_locate: a skeleton whose root is not known to the mesh (in BVH it has no place of its own): shift is what
+ * has to be added to the positions of its reference pose. n poses of the mesh with the positions and turns of all
+ * joints in the same poses. spread: how far the vertices disagree about it (median), in mesh units. */
+int vg_rig_locate(const vg_skeleton *s, size_t nv, const double *reference, size_t n, const double *const *poses,
+                  const double *const *positions, const double *const *turns, int threads, double shift[3],
+                  double *spread, vg_err *e) VG_MUST_CHECK;
+
+/* The fit of a map of bones. Corner i has the vector A u_i, A that of the bone with which it moves most nearly
+ * rigidly, and u_i what fits best over the poses; kept as the turn of its face beside the bone (T 5.12, without
+ * reflections), the rest by the smallest rotation, and a stretch. Some vertices go where linear blend skinning,
+ * fitted to the same poses, takes them: those that move most nearly rigidly with one bone, spread over the mesh, on
+ * every component and bone. Both together are reconstructed once for each number of each transform. */
+typedef struct vg_rig_fitter vg_rig_fitter;
+typedef enum vg_rig_method { VG_RIG_ENVELOPE = 0, VG_RIG_LBS = 1 } vg_rig_method;
+typedef struct vg_rig_options {
+    size_t bones_per_corner; /* 1, or 2 */
+    double hold;             /* share of the vertices that are held; at least one for each bone and component */
+    double refine;           /* ridge of the regression by which the bones near a vertex take up what that leaves of the
+                                poses: the larger, the less of it; 0: they take up nothing */
+    int threads;
+} vg_rig_options;
+
+/* vg_rig_fitter_new: h: mesh, reference and a rig (its weights, if any, are replaced); borrowed until free. */
+int vg_rig_fitter_new(vg_rig_fitter **f, vg_head *h, const vg_rig_options *o, vg_err *e) VG_MUST_CHECK;
+void vg_rig_fitter_free(vg_rig_fitter **f);
+/* vg_rig_fitter_add: n poses (nv points) and the transforms of the bones in them.
+ * Poses that are the reference are passed over. */
+void vg_rig_fitter_add(vg_rig_fitter *f, size_t n, const double *const *poses, const double *const *transforms);
+/* vg_rig_fitter_finish: fill h->map and the weights of h->rig. May be called again for another method.
+ * VG_EINPUT without poses. */
+int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_err *e) VG_MUST_CHECK;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,225 @@
+/* vg/vectors.h: the vector graph: deformation, transfer, interpolation, reconstruction.
+ * A part of vg.h, which says what holds for all parts.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_PART_VECTORS_H
+#define VG_PART_VECTORS_H
+
+#include "vg/frames.h"
+#include "vg/rotation.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The vector graph of a sequence: the faces that carry vectors, in order (all, or the selected ones), then the links.
+ * Layout as in vg_mesh; corner c of the graph is a position in vert.
+ * `attached` counts the vertices that are in a face. */
+typedef struct vg_graph {
+    size_t nv, nf, nlinks; /* nf includes the links, which are the last */
+    uint32_t *start, *vert;
+    size_t attached, max_corners;
+    bool *in_face; /* nv */
+} vg_graph;
+
+/* vg_graph_new: the graph of h's mesh, selection and links. h must hold links (vg_link_components) when it has more
+ * than one component; this is not checked here. O(corners). */
+int vg_graph_new(vg_graph **g, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+void vg_graph_free(vg_graph **g);
+size_t vg_graph_corners(const vg_graph *g);
+
+/* vg_graph_vectors: w_c = v(c) - C_f (T 3.1). vertices: nv points in; vectors: one per corner out. */
+void vg_graph_vectors(const vg_graph *g, const double *vertices, double *vectors);
+/* vg_graph_root: the mean of the attached vertices (zeros when there are none). */
+void vg_graph_root(const vg_graph *g, const double *vertices, double root[3]);
+/* vg_graph_anchors: positions of the n anchors out of nv points. */
+void vg_graph_anchors(const double *vertices, const uint32_t *anchors, size_t n, double *positions);
+
+/* vg_threads_with_room: how many threads, `most` at most, may multiply matrices in the address space that is left to
+ * the process; 0: not even one. OpenBLAS does not return, ever, when it is refused the memory it works in, so ask
+ * this before. */
+int vg_threads_with_room(int most);
+
+/* vg_select_faces: fewer faces that still determine the mesh (T 3.2, Algorithm 1), completed so that every vertex
+ * that is in a face stays in one and every component stays connected. *faces (ascending, caller frees with free())
+ * and *n. */
+int vg_select_faces(const vg_mesh *m, uint32_t **faces, size_t *n, vg_err *e) VG_MUST_CHECK;
+
+/* vg_link_components: the fewest virtual line segments that join all components of m, between nearby vertices of
+ * `vertices` (nv points): a minimum spanning tree of the components, where a link that would be shorter than the
+ * edges beside it is moved on to the next vertex of the face. *pairs (2 per link, caller frees) and *n. VG_EARG when
+ * a vertex is not finite. */
+int vg_link_components(const vg_mesh *m, const double *vertices, uint32_t **pairs, size_t *n,
+                       vg_err *e) VG_MUST_CHECK;
+
+/* vg_head_prepare_vectors: choose h's links from its reference pose unless it has them. Every program that derives
+ * vectors from vertices calls this before vg_graph_new. A map whose corners the links are not among is left out. */
+int vg_head_prepare_vectors(vg_head *h, vg_err *e) VG_MUST_CHECK;
+
+/* Deformation of vectors, reference pose to deformed pose (MATH 4): Frames (T 3.12 ff.) on faces of 3 or more,
+ * Rodrigues on line segments, and on links the mean turn of the faces at their ends followed by Rodrigues. Degenerate
+ * corners take the rotation of their face's other corners and scale 1. */
+typedef struct vg_deformer vg_deformer;
+typedef struct vg_deform_counts {
+    uint64_t corners;    /* degenerate corners met, over all poses */
+    uint64_t first_face; /* the first face of the graph that has one; UINT64_MAX: none */
+} vg_deform_counts;
+
+/* vg_deformer_new: g borrowed until free; reference: nv points, copied in part. threads >= 1. */
+int vg_deformer_new(vg_deformer **d, const vg_graph *g, const double *reference, int threads,
+                    vg_err *e) VG_MUST_CHECK;
+void vg_deformer_free(vg_deformer **d);
+/* What is carried over to the target (MATH 5): the corner's turn and stretch (T 4.2); the face's deformation gradient
+ * (Sumner and Popovic 2004), by polygons; the mean of both. Line segments and links always go by pose. */
+typedef enum vg_method { VG_BY_POSE = 0, VG_BY_GRADIENT = 1, VG_BY_BLEND = 2 } vg_method;
+/* vg_deformer_target: apply to these reference vectors (one per corner of the graph, copied) from now on. */
+int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_method method, vg_err *e) VG_MUST_CHECK;
+/* vg_deformer_measure: n poses in (kind VG_VERTICES: nv points each, or VG_VECTORS: one vector per corner), n arrays
+ * of a quaternion per corner out. With a target: vg_deformer_apply: quaternions in, deformed target vectors out;
+ * vg_deformer_transfer: poses in, deformed target vectors out: by pose what measuring and applying gives, but for
+ * rounding. One call at a time on one deformer. */
+void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses,
+                         double *const *quaternions);
+void vg_deformer_transfer(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses, double *const *vectors);
+void vg_deformer_apply(vg_deformer *d, size_t n, const double *const *quaternions, double *const *vectors);
+vg_deform_counts vg_deformer_counts(const vg_deformer *d);
+
+/* A path through key poses (MATH 7; T 6.1): each vector turns and stretches along the geodesic from one key to the
+ * next, neighbours the same way round also beyond half a turn; the root moves straight. Outside of the keys it goes
+ * on as beside the first or last. */
+typedef struct vg_path vg_path;
+typedef struct vg_key {
+    const double *values;  /* a frame's: of vertices, vectors or deformations; borrowed as long as the path lives */
+    double root[3];
+    const double *anchors; /* nanchors points; borrowed */
+    double place;          /* grows from key to key: number, or time; says only how fast a smooth path goes by */
+} vg_key;
+typedef struct vg_path_options {
+    vg_kind kind;    /* of the keys' values */
+    size_t nanchors;
+    bool smooth;     /* velocities do not jump at keys */
+    int threads;     /* >= 1 */
+} vg_path_options;
+typedef struct vg_path_facts {
+    size_t segments; /* between keys, looked at so far, again if come back to */
+    size_t beyond;   /* of these, where something turns by more than half a turn */
+    vg_deform_counts degenerate;
+} vg_path_facts;
+
+/* vg_path_new: g and keys are borrowed until free; reference: nv points. VG_EARG with fewer than two keys. */
+int vg_path_new(vg_path **p, const vg_graph *g, const double *reference, const vg_key *keys, size_t nkeys,
+                const vg_path_options *o, vg_err *e) VG_MUST_CHECK;
+void vg_path_free(vg_path **p);
+/* vg_path_at: the pose at t: vectors (one per corner), root and anchors (NULL if there are none) out. Key i is at t
+ * = i. What is between two keys is prepared when it is first asked for and kept until something else is (three
+ * stretches if smooth): ask in order. */
+int vg_path_at(vg_path *p, double t, double *vectors, double root[3], double *anchors, vg_err *e) VG_MUST_CHECK;
+vg_path_facts vg_path_get_facts(const vg_path *p);
+
+/* Shape deformation (T 4.1 to 4.6): what takes each source vector to the target's in the reference poses, applied to
+ * the vectors of each pose and put at the source face's centroid; corners that share a vertex are averaged. No linear
+ * system; fails for large deformations. Gives vertices: the mean of the attached ones is the source's. */
+typedef struct vg_shaper vg_shaper;
+/* vg_shaper_new: g, the graph of both, is borrowed until free; references: nv points each, not kept. */
+int vg_shaper_new(vg_shaper **s, const vg_graph *g, const double *source_reference, const double *target_reference,
+                  int threads, vg_err *e) VG_MUST_CHECK;
+void vg_shaper_free(vg_shaper **s);
+/* vg_shaper_transfer: n poses of the source in, n of the target out (nv points each); what is in no face is as in the
+ * target's reference. */
+void vg_shaper_transfer(vg_shaper *s, size_t n, const double *const *poses, double *const *vertices);
+
+/* Where the whole body goes when a motion is carried over (MATH 5): each root or anchor is as far from its place in
+ * the target's reference as the source's is from its own, by the ratio of the diagonals of the references; or it
+ * stays. */
+typedef struct vg_mover vg_mover;
+/* vg_mover_new: to is borrowed until free. anchors: of both, when they have the same vertices. */
+int vg_mover_new(vg_mover **m, const vg_graph *from, const double *source_reference, const vg_graph *to,
+                 const double *target_reference, const uint32_t *anchors, size_t nanchors, bool stay,
+                 vg_err *e) VG_MUST_CHECK;
+void vg_mover_free(vg_mover **m);
+/* vg_mover_move: root and anchors of `in` become those of `out`. */
+void vg_mover_move(const vg_mover *m, const vg_frame *in, vg_frame *out);
+/* vg_mover_place: move a pose of the target as a whole until its root is there; vertices in no face stay. */
+void vg_mover_place(const vg_mover *m, const double root[3], double *vertices);
+
+/* Which vertices of the target stay in a pose: those all of whose faces are driven only by faces of the source none
+ * of whose vertices is further than 1e-6 D from its place in the reference. */
+typedef struct vg_pinner vg_pinner;
+/* vg_pinner_new: all is borrowed until free. pairs NULL: one connectivity. always: even when less than a tenth of the
+ * source's vertices stay. */
+int vg_pinner_new(vg_pinner **p, const vg_graph *from, const double *source_reference, const vg_graph *to,
+                  const vg_correspondence *pairs, bool always, vg_err *e) VG_MUST_CHECK;
+void vg_pinner_free(vg_pinner **p);
+/* vg_pinner_find: for a pose of the source, how many they are and which, ascending; borrowed until the next call. */
+size_t vg_pinner_find(vg_pinner *p, const double *pose, const uint32_t **vertices);
+
+/* Reconstruction: min over V of the squared difference between the vectors of V and the given ones (MATH 2; T
+ * 3.7-3.9), by one sparse Cholesky factorisation, many poses per solve. */
+typedef struct vg_solver vg_solver;
+/* What a difference counts: every corner alike (T 3.7), or in the reference surface's own metric, which does not
+ * depend on how the surface is cut into faces (on triangles the cotangent weights). Consistent vectors are met
+ * exactly by both. */
+typedef enum vg_weights { VG_WEIGHTS_UNIFORM = 0, VG_WEIGHTS_AREA = 1 } vg_weights;
+typedef struct vg_solver_facts {
+    size_t unknowns, factor_entries; /* entries of the factor, explicit zeros included */
+    double analyse_seconds, factor_seconds;
+} vg_solver_facts;
+
+/* vg_solver_new: g borrowed until free; anchors (n ascending vertices, each attached) are met exactly; without any,
+ * the mean of the attached vertices is. reference (nv points, copied in part) places the vertices that are in no
+ * face. VG_EINPUT when the graph is not connected, an anchor is in no face, or all of it is too large. */
+int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
+                  vg_weights weights, int threads, vg_err *e) VG_MUST_CHECK;
+void vg_solver_free(vg_solver **s);
+/* vg_solver_load: the vectors of n poses (and their anchors, nanchors points each; NULL when there are none) become
+ * first guesses x and right-hand sides, nv x 3 each: what the guesses miss. One call at a time on one solver; the
+ * threads share the poses. */
+void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const double *const *anchors,
+                    double *const *x, double *const *rhs);
+/* vg_solver_solve: n guesses x, with their right-hand sides, become n poses in place. anchors[i]: nanchors points of
+ * pose i, or roots[i]: its root; the other is not looked at. Best when n is a multiple of vg_solver_batch. */
+void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *const *x, const double *const *anchors,
+                     const double *const *roots);
+size_t vg_solver_batch(const vg_solver *s);
+vg_solver_facts vg_solver_get_facts(const vg_solver *s);
+
+/* Planarity (MATH 5; T 4.2.3): poses that minimise `fidelity` times the energy of the reconstruction plus `planarity`
+ * times the sum over corners of faces of four and more of (m_f . t_c)^2, t_c the corner's vector, m_f the unit mean
+ * of the cross products of successive given vectors of the face (no such term where that is 0). By conjugate
+ * gradients from the plain solution. */
+typedef struct vg_planar vg_planar;
+typedef struct vg_planar_facts {
+    size_t faces;          /* of four and more corners */
+    size_t most_steps;     /* of one pose so far */
+    double worst_residual; /* left at the end, relative to that of the plain solution; NaN if numbers overflowed */
+} vg_planar_facts;
+
+/* vg_planar_new: s borrowed until free. VG_EARG unless fidelity > 0 and planarity >= 0. */
+int vg_planar_new(vg_planar **p, const vg_solver *s, double fidelity, double planarity, vg_err *e) VG_MUST_CHECK;
+void vg_planar_free(vg_planar **p);
+size_t vg_planar_faces(const vg_planar *p);
+/* vg_planar_load: of one pose's given vectors what is needed later: the m_f, 3 numbers for each of
+ * vg_planar_faces. */
+void vg_planar_load(const vg_planar *p, const double *vectors, double *normals);
+/* vg_planar_solve: n poses x from vg_solver_solve, with their normals, become more nearly planar in place; anchors
+ * stay, or the root does, and vertices in no face. Returns the number of the first pose that did not converge; n when
+ * all did. */
+size_t vg_planar_solve(vg_planar *p, size_t n, const double *const *normals, double *const *x);
+vg_planar_facts vg_planar_get_facts(const vg_planar *p);
+
+/* Guidance in time (MATH 5; T 4.10, 4.16): a sequence keeps its second differences in time and meets given poses at
+ * keys. Between two keys a < b the pose U_k becomes U_k + ((b - k) e_a + (k - a) e_b) / (b - a), e = given - U;
+ * before the first key and after the last that key's own e is added. */
+typedef struct vg_guide vg_guide;
+int vg_guide_new(vg_guide **g, size_t nv, vg_err *e) VG_MUST_CHECK;
+void vg_guide_free(vg_guide **g);
+/* vg_guide_key: frame number `frame`, later than the key before, has this pose (nv points), which becomes the given
+ * one to the bit. Poses between both keys are to be applied before the next key is named. */
+void vg_guide_key(vg_guide *g, uint64_t frame, double *pose, const double *given);
+/* vg_guide_apply: the pose of frame number `frame` in place: one between the last two keys, or behind the last, or,
+ * when only one key was named, any. Without keys it stays. */
+void vg_guide_apply(const vg_guide *g, uint64_t frame, double *pose);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
