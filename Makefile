@@ -29,6 +29,7 @@ B := build/$(CONFIG)
 CHOLMOD_CFLAGS ?= -I/usr/include/suitesparse
 CHOLMOD_LIBS ?= -lcholmod
 BLAS_LIBS ?= -lopenblas
+LAPACKE_LIBS ?= -llapacke
 ARCHIVE_CFLAGS ?= $(shell $(PKG_CONFIG) --cflags libarchive 2>/dev/null)
 ARCHIVE_LIBS ?= $(shell $(PKG_CONFIG) --libs libarchive 2>/dev/null || echo -larchive)
 XXHASH_LIBS ?= -lxxhash
@@ -62,7 +63,7 @@ KERNELS := $(addprefix lib/method/vectors/,deform_kernel planar_kernel guess_ker
     lib/method/patches/segment lib/numeric/solve_kernel lib/model/graph lib/model/measures lib/model/measures_kernel lib/core/memory
 # what a program does not call is not loaded: OpenBLAS starts threads that spin for a while as soon as it is there
 ALL_LDFLAGS += -Wl,--as-needed $(LDFLAGS)
-ALL_LIBS := $(CHOLMOD_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) -lpthread -lm $(LDLIBS)
+ALL_LIBS := $(CHOLMOD_LIBS) $(LAPACKE_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) -lpthread -lm $(LDLIBS)
 
 LIB_SRC := $(sort $(wildcard lib/*/*.c lib/*/*/*.c))
 LIB_OBJ := $(LIB_SRC:%.c=$(B)/%.o) $(B)/page_text.o

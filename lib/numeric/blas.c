@@ -1,25 +1,35 @@
-/* blas.c: dense products through BLAS. The only file that knows its header.
+/* blas.c: dense products and triangular solves through BLAS. The only file that knows its header.
  * Leaves out what is multiplied, and how the work is shared out among threads.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 
 #include <cblas.h>
+#include <pthread.h>
 
 /* OpenBLAS's own; with another BLAS they are not there. */
 void openblas_set_num_threads(int n) __attribute__((weak));
 int openblas_get_num_threads(void) __attribute__((weak));
 
-int vgi_product_begin(void)
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+static int alone, threads_before;
+
+void vgi_blas_alone(void)
 {
-    if (!openblas_set_num_threads || !openblas_get_num_threads) return 0;
-    int before = openblas_get_num_threads();
-    if (before != 1) openblas_set_num_threads(1);
-    return before;
+    if (!openblas_set_num_threads || !openblas_get_num_threads) return;
+    pthread_mutex_lock(&lock);
+    if (!alone++) {
+        threads_before = openblas_get_num_threads();
+        if (threads_before != 1) openblas_set_num_threads(1);
+    }
+    pthread_mutex_unlock(&lock);
 }
 
-void vgi_product_end(int before)
+void vgi_blas_shared(void)
 {
-    if (before > 1) openblas_set_num_threads(before);
+    if (!openblas_set_num_threads || !openblas_get_num_threads) return;
+    pthread_mutex_lock(&lock);
+    if (!--alone && threads_before > 1) openblas_set_num_threads(threads_before);
+    pthread_mutex_unlock(&lock);
 }
 
 void vgi_product_single(size_t m, size_t n, size_t k, const float *a, size_t lda, const float *b, size_t ldb,
@@ -50,13 +60,19 @@ void vgi_product_single_transposed(size_t m, size_t n, size_t k, const float *a,
                 (int)ldc);
 }
 
-void vgi_product_downdate(size_t m, size_t k, const double *p, size_t ldp, double *a, size_t lda)
+static void solve_triangle(CBLAS_TRANSPOSE side, size_t n, const double *l, size_t m, double *x)
 {
-    cblas_dsyrk(CblasRowMajor, CblasLower, CblasNoTrans, (int)m, (int)k, -1, p, (int)ldp, 1, a, (int)lda);
+    if (m == 1) cblas_dtrsv(CblasRowMajor, CblasLower, side, CblasNonUnit, (int)n, l, (int)n, x, 1);
+    else
+        cblas_dtrsm(CblasRowMajor, CblasLeft, CblasLower, side, CblasNonUnit, (int)n, (int)m, 1, l, (int)n, x, (int)m);
 }
 
-void vgi_product_divide(size_t m, size_t k, const double *l, size_t ldl, double *x, size_t ldx)
+void vgi_solve_lower(size_t n, const double *l, size_t m, double *x)
 {
-    cblas_dtrsm(CblasRowMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, (int)m, (int)k, 1, l, (int)ldl, x,
-                (int)ldx);
+    if (n && m) solve_triangle(CblasNoTrans, n, l, m, x);
+}
+
+void vgi_solve_lower_transposed(size_t n, const double *l, size_t m, double *x)
+{
+    if (n && m) solve_triangle(CblasTrans, n, l, m, x);
 }

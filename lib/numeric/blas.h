@@ -1,14 +1,15 @@
-/* blas.h: dense products through BLAS, which runs alone here: the threads are ours, and the last digits must not
- * depend on them.
+/* blas.h: dense products and triangular solves through BLAS. BLAS runs on one thread here: the threads are ours, and the
+ * last digits must not depend on their number.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_BLAS_H
 #define VG_BLAS_H
 
 #include <stddef.h>
 
-/* vgi_product_begin, _end: around products that are called from several threads at once. */
-int vgi_product_begin(void); /* gives what _end takes */
-void vgi_product_end(int before);
+/* vgi_blas_alone, vgi_blas_shared: around calls of BLAS or LAPACK from several threads at once: from the first _alone to
+ * the last _shared BLAS starts no threads of its own. Calls may nest, also across threads. */
+void vgi_blas_alone(void);
+void vgi_blas_shared(void);
 
 /* c (m x n, row stride ldc) := a (m x k) b (k x n), all row-major */
 void vgi_product_single(size_t m, size_t n, size_t k, const float *a, size_t lda, const float *b, size_t ldb,
@@ -22,9 +23,8 @@ void vgi_product_add(size_t m, size_t n, size_t k, const double *a, size_t lda, 
 void vgi_product_single_transposed(size_t m, size_t n, size_t k, const float *a, size_t lda, const float *b,
                                    size_t ldb, float *c, size_t ldc);
 
-/* a (lower triangle of m x m, row stride lda) -= p p', p m x k */
-void vgi_product_downdate(size_t m, size_t k, const double *p, size_t ldp, double *a, size_t lda);
-/* x (m x k) := x l'^-1, l a lower triangle of k x k */
-void vgi_product_divide(size_t m, size_t k, const double *l, size_t ldl, double *x, size_t ldx);
+/* x (n x m, row-major) := l^-1 x and l'^-1 x, l a lower triangle of n x n */
+void vgi_solve_lower(size_t n, const double *l, size_t m, double *x);
+void vgi_solve_lower_transposed(size_t n, const double *l, size_t m, double *x);
 
 #endif

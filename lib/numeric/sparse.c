@@ -23,23 +23,20 @@ struct vgi_cholesky {
 void omp_set_max_active_levels(int n) __attribute__((weak));
 int omp_get_max_active_levels(void) __attribute__((weak));
 
-typedef struct alone {
-    int blas, levels; /* what was set before */
-} alone;
-
-static alone begin_alone(void)
+/* Returns what end_alone takes: the levels that were set before. */
+static int begin_alone(void)
 {
-    alone before = {.blas = vgi_product_begin()};
-    if (!omp_set_max_active_levels || !omp_get_max_active_levels) return before;
-    before.levels = omp_get_max_active_levels();
+    vgi_blas_alone();
+    if (!omp_set_max_active_levels || !omp_get_max_active_levels) return 0;
+    int before = omp_get_max_active_levels();
     omp_set_max_active_levels(0);
     return before;
 }
 
-static void end_alone(alone before)
+static void end_alone(int before)
 {
-    if (omp_set_max_active_levels && omp_get_max_active_levels) omp_set_max_active_levels(before.levels);
-    vgi_product_end(before.blas);
+    if (omp_set_max_active_levels && omp_get_max_active_levels) omp_set_max_active_levels(before);
+    vgi_blas_shared();
 }
 
 void vgi_sparse_clear(vgi_sparse *a)
@@ -158,7 +155,7 @@ int vgi_cholesky_new(vgi_cholesky **out, const vgi_sparse *a, vg_err *e)
     c->common.postorder = 1;
     c->common.supernodal = CHOLMOD_SUPERNODAL;
     cholmod_sparse A = view(a);
-    alone before = begin_alone();
+    int before = begin_alone();
     c->L = cholmod_analyze(&A, &c->common);
     end_alone(before);
     if (c->L) return VG_OK;
@@ -183,7 +180,7 @@ void vgi_cholesky_free(vgi_cholesky **out)
 int vgi_cholesky_factorize(vgi_cholesky *c, const vgi_sparse *a, vg_err *e)
 {
     cholmod_sparse A = view(a);
-    alone before = begin_alone();
+    int before = begin_alone();
     cholmod_factorize(&A, c->L, &c->common);
     end_alone(before);
     if (c->common.status == CHOLMOD_OUT_OF_MEMORY)
@@ -201,7 +198,7 @@ int vgi_cholesky_solve(vgi_cholesky *c, double *x, vg_err *e)
         for (size_t k = 0; k < 3; k++) c->b[k * n + i] = x[3 * i + k];
     cholmod_dense B = {
         .nrow = n, .ncol = 3, .nzmax = 3 * n, .d = n, .x = c->b, .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
-    alone before = begin_alone();
+    int before = begin_alone();
     int done = cholmod_solve2(CHOLMOD_A, c->L, &B, NULL, &c->x, NULL, &c->y, &c->e, &c->common);
     end_alone(before);
     if (!done) return vg_fail(e, VG_ENOMEM, "not enough memory to solve for %zu unknowns", n);

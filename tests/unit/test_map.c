@@ -1,8 +1,7 @@
 /* test_map.c: a map is its uncollapsed chain; bodies that move rigidly by patches are met; joints, paths, and other
  * bodies.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "dense.h"
-#include "numeric/dense.h"
+#include "meshes.h"
 #include "method/rig/map_parts.h"
 
 enum { POSES = 7 };
@@ -306,38 +305,6 @@ static void other_bodies(void)
     }
 }
 
-/* Larger and smaller than the blocks of the factorisation, against elimination; what is not definite is said to be
- * so. */
-static void dense_systems(void)
-{
-    static const size_t sizes[] = {1, 3, 64, 65, 150};
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
-        size_t n = sizes[i], m = 2;
-        double *b = room(n * n, sizeof *b), *a = room(n * n, sizeof *a), *l = room(n * n, sizeof *l);
-        double *x = room(n * m, sizeof *x), *truth = room(n * m, sizeof *truth);
-        for (size_t k = 0; k < n * n; k++) b[k] = noise();
-        for (size_t p = 0; p < n; p++)
-            for (size_t q = 0; q < n; q++) {
-                a[p * n + q] = p == q;
-                for (size_t k = 0; k < n; k++) a[p * n + q] += b[p * n + k] * b[q * n + k];
-                l[p * n + q] = q <= p ? a[p * n + q] : NAN; /* the lower triangle is all that is looked at */
-            }
-        for (size_t k = 0; k < n * m; k++) x[k] = truth[k] = noise();
-        CHECK(vgi_cholesky_dense(l, n));
-        vgi_cholesky_dense_solve(l, n, x, m);
-        memcpy(l, a, n * n * sizeof *l);
-        l[n * n - 1] -= 1e3 * (double)n;
-        CHECK(!vgi_cholesky_dense(l, n));
-        eliminate(a, truth, n, m);
-        for (size_t k = 0; k < n * m; k++) CHECK_NEAR(x[k], truth[k], 1e-10);
-        free(b);
-        free(a);
-        free(l);
-        free(x);
-        free(truth);
-    }
-}
-
 /* Patches that turn, grow and move each by themselves are measured as they do so. */
 static void patches_are_measured(void)
 {
@@ -538,6 +505,6 @@ static void refusals(void)
 
 TESTS({"rigid bodies", rigid_bodies}, {"collapsed is uncollapsed", collapsed_is_uncollapsed}, {"paths", paths},
       {"half turns", half_turns}, {"other bodies", other_bodies},
-      {"dense systems", dense_systems}, {"patches are measured", patches_are_measured},
+      {"patches are measured", patches_are_measured},
       {"what hangs loose", what_hangs_loose}, {"units do not matter", units_do_not_matter},
       {"joints are found", joints_are_found}, {"bends are learned", bends_are_learned}, {"refusals", refusals})

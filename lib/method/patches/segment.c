@@ -334,10 +334,10 @@ static size_t iterate(clustering *c, double *objective)
         find_means(c);
         for (size_t k = 0; k < c->k; k++)
             c->centre_norm[k] = inner(c->centre + k * c->s->width, c->centre + k * c->s->width, c->s->width);
-        int blas = vgi_product_begin();
+        vgi_blas_alone();
         atomic_store(&c->next, 0);
         vgi_parallel(c->s->threads, c->workers, assign_chunks, c);
-        vgi_product_end(blas);
+        vgi_blas_shared();
         *objective = add_up(c);
         c->changed = 0;
         for (size_t i = 0; i < chunks(c); i++) c->changed += c->chunk_changed[i];

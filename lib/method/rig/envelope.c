@@ -3,7 +3,7 @@
  * Leaves out the sums over the poses (rig_sums.c), weights (skin.c), and motions that are not known (inverse_skin.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
-#include "numeric/dense.h"
+#include "numeric/lapack.h"
 #include "method/rig/map_parts.h"
 #include "method/rig/skin.h"
 #include "model/rig.h"
@@ -139,8 +139,8 @@ static double pair_vectors(const vgi_rig_sums *s, size_t a, size_t b, const doub
             m[6 * (3 + i) + 3 + k] = (i == k ? (1 + ridge) * wa + wb : 0) - ab - ba;
         }
     for (size_t k = 0; k < 3; k++) z[k] = raw[4 * a + k], z[3 + k] = raw[4 * b + k] - raw[4 * a + k];
-    if (!vgi_cholesky_dense(m, 6)) return -INFINITY;
-    vgi_cholesky_dense_solve(m, 6, z, 1);
+    if (!vgi_spd_factor(6, m)) return -INFINITY;
+    vgi_spd_solve(6, m, 1, z);
     for (size_t k = 0; k < 3; k++) {
         y[k] = z[3 + k], x[k] = z[k] - z[3 + k];
         explained += x[k] * raw[4 * a + k] + y[k] * raw[4 * b + k];
@@ -400,8 +400,8 @@ static void refine_vertex(const refining *x, size_t v, double *z)
         }
     }
     for (size_t i = 0; i < unknowns; i++) s[i * unknowns + i] *= 1 + x->f->o.refine;
-    if (!vgi_cholesky_dense(s, unknowns)) return;
-    vgi_cholesky_dense_solve(s, unknowns, y, 1);
+    if (!vgi_spd_factor(unknowns, s)) return;
+    vgi_spd_solve(unknowns, s, 1, y);
     for (size_t i = 0; i < unknowns; i++) {
         d[bone[i]][number[i]] += y[i];
         if (number[i] == 3) d[0][3] -= y[i];

@@ -9,7 +9,7 @@
  * Leaves out how weights are fitted to known motions (skin.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
-#include "numeric/dense.h"
+#include "numeric/lapack.h"
 #include "numeric/blas.h"
 #include "numeric/polar.h"
 #include "method/rig/skin.h"
@@ -367,11 +367,11 @@ static void descend(const vg_bender *x, bending *w, double prior)
     double damping = 1e-6, f = objective(x, w, w->r, prior), turn = 1;
     for (int step = 0; step < STEPS && turn > x->least && damping < 1e6; step++) {
         make_system(x, w, prior, damping);
-        if (!vgi_cholesky_dense(w->h, 3 * x->n)) {
+        if (!vgi_spd_factor(3 * x->n, w->h)) {
             damping = 10 * damping + 1e-9;
             continue;
         }
-        vgi_cholesky_dense_solve(w->h, 3 * x->n, w->step, 1);
+        vgi_spd_solve(3 * x->n, w->h, 1, w->step);
         turn = turn_bones(x, w);
         double now = objective(x, w, w->trial, prior), gain = f - now;
         if (gain < -noise * fabs(f)) {
@@ -445,12 +445,12 @@ static void fit_pose(void *context, size_t k)
 
 void vg_bender_fit(vg_bender *x, size_t n, const double *const *poses, double *const *transforms)
 {
-    int blas = vgi_product_begin();
+    vgi_blas_alone();
     for (size_t first = 0; first < n; first += BLOCK) {
         fitting f = {x, poses + first, transforms + first};
         vgi_parallel(x->threads, n - first < BLOCK ? n - first : BLOCK, fit_pose, &f);
     }
-    vgi_product_end(blas);
+    vgi_blas_shared();
 }
 
 /* ---- weights without motions ---- */

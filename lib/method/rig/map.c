@@ -15,7 +15,7 @@
  * predict left-out poses best.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
-#include "numeric/dense.h"
+#include "numeric/lapack.h"
 #include "method/rig/map_parts.h"
 #include "method/patches/pieces.h"
 #include "numeric/blas.h"
@@ -381,7 +381,7 @@ static void fit_joint(const vg_map_fitter *f, size_t i, size_t j, const double m
                 for (int t = 0; t < 3; t++) s[3 * p + q] += d[3 * t + p] * d[3 * t + q];
     }
     for (int q = 0; q < 3; q++) s[4 * q] += firmness * (double)f->poses;
-    if (vgi_cholesky_dense(s, 3)) vgi_cholesky_dense_solve(s, 3, y, 1);
+    if (vgi_spd_factor(3, s)) vgi_spd_solve(3, s, 1, y);
     else y[0] = y[1] = y[2] = 0;
     for (int q = 0; q < 3; q++) c[q] = middle[q] + y[q];
     *miss = 0;
@@ -482,8 +482,8 @@ static bool solve_ridge(ridge *x, double strength)
     memcpy(x->l, x->s, w * w * sizeof *x->l);
     memcpy(x->g, x->y, w * x->n * sizeof *x->g);
     for (size_t i = 0; i < w; i++) x->l[i * w + i] += strength;
-    if (!vgi_cholesky_dense(x->l, w)) return false;
-    vgi_cholesky_dense_solve(x->l, w, x->g, x->n);
+    if (!vgi_spd_factor(w, x->l)) return false;
+    vgi_spd_solve(w, x->l, x->n, x->g);
     return true;
 }
 
@@ -497,21 +497,21 @@ static double left_out(ridge *x, size_t k)
     for (size_t i = 0; i < 3; i++) row_of(x->f, k, i, rows + i * w);
     for (size_t i = 0; i < w; i++)
         for (size_t q = 0; q < 3; q++) solved[3 * i + q] = rows[q * w + i];
-    vgi_cholesky_dense_solve(x->l, w, solved, 3);
+    vgi_spd_solve(w, x->l, 3, solved);
     for (size_t i = 0; i < 3; i++)
         for (size_t q = 0; q < 3; q++) {
             h[3 * i + q] = i == q;
             for (size_t j = 0; j < w; j++) h[3 * i + q] -= rows[i * w + j] * solved[3 * j + q];
         }
     memcpy(c, h, sizeof c);
-    if (!vgi_cholesky_dense(c, 3)) return INFINITY;
+    if (!vgi_spd_factor(3, c)) return INFINITY;
     for (size_t p = 0; p < n; p++) {
         double r[3];
         for (size_t i = 0; i < 3; i++) {
             r[i] = x->delta[i * n + p];
             for (size_t j = 0; j < w; j++) r[i] -= rows[i * w + j] * x->g[j * n + p];
         }
-        vgi_cholesky_dense_solve(c, 3, r, 1);
+        vgi_spd_solve(3, c, 1, r);
         sum += x->m->share[p] * vgi_dot(r, r);
     }
     return sum;
@@ -602,7 +602,7 @@ static void skin_patch(void *context, size_t p)
         for (size_t q = 0; q < n; q++) cross[i * width + 4 * q + i % 3] += 1;
         s[i * w + i] += x->strength * (double)(f->poses + 1);
     }
-    bool ok = vgi_cholesky_dense(s, w);
+    bool ok = vgi_spd_factor(w, s);
     for (size_t v = 0; ok && v < f->g->nv; v++) {
         if (f->owner[v] != p || !f->g->in_face[v]) continue;
         double *row = x->m->weights + v * width;
@@ -610,7 +610,7 @@ static void skin_patch(void *context, size_t p)
             z[i] = f->want[3 * NEAR * v + i] + f->h->body.reference[3 * v + i % 3];
             for (size_t j = 0; j < width; j++) z[i] -= cross[i * width + j] * row[j];
         }
-        vgi_cholesky_dense_solve(s, w, z, 1);
+        vgi_spd_solve(w, s, 1, z);
         for (size_t i = 0; i < w; i++) row[4 * near->patch[i / 3] + i % 3] += z[i];
     }
     free(cross);
@@ -656,14 +656,15 @@ int vg_map_fitter_finish(vg_map_fitter *f, vg_err *e)
     vg_map *m = &f->h->map;
     if (!f->poses) return vg_fail(e, VG_EINPUT, "there are no poses to fit a map to");
     vg_map_clear(m);
-    int blas = vgi_product_begin(), r = make_arrays(m, f, e);
+    vgi_blas_alone();
+    int r = make_arrays(m, f, e);
     if (r == VG_OK) fit_corners(f, m);
     if (r == VG_OK) r = vgi_map_collapse(f->h, f->g, f->of_face, f->turns.vector, f->threads, e);
     if (r == VG_OK) r = fit_skin(f, m, e);
     if (r == VG_OK) r = fit_joints(f, m, e);
     if (r == VG_OK) r = vgi_place_by_joints(m, m->centre, m->place, e);
     if (r == VG_OK) r = correct_place(f, m, e);
-    vgi_product_end(blas);
+    vgi_blas_shared();
     if (r < 0) vg_map_clear(m);
     return r;
 }

@@ -333,11 +333,11 @@ static void play_rows(void *context, size_t task)
 
 void vg_player_pose(vg_player *p, size_t n, const double *const *transforms, double *const *vertices)
 {
-    int blas = vgi_product_begin();
+    vgi_blas_alone();
     for (size_t first = 0; first < n; first += BLOCK) {
         playing x = {.p = p, .n = n - first < BLOCK ? n - first : BLOCK, .vertices = vertices + first};
         for (size_t k = 0; k < x.n; k++) fill_columns(p, &x, k, transforms[first + k]);
         vgi_parallel(p->threads, (p->nv + ROWS - 1) / ROWS, play_rows, &x);
     }
-    vgi_product_end(blas);
+    vgi_blas_shared();
 }

@@ -2,7 +2,7 @@
  * Leaves out what is fitted to poses (map.c) and how a map is played (map_eval.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/map_parts.h"
-#include "numeric/dense.h"
+#include "numeric/lapack.h"
 #include "numeric/polar.h"
 #include "model/rig.h"
 
@@ -126,8 +126,8 @@ int vgi_place_by_joints(const vg_map *m, const double *centre, double *place, vg
         }
         l[i * n + i] += 1e-13 * trace;
     }
-    bool ok = vgi_cholesky_dense(l, n);
-    if (ok) vgi_cholesky_dense_solve(l, n, place, 3 * n);
+    bool ok = vgi_spd_factor(n, l);
+    if (ok) vgi_spd_solve(n, l, 3 * n, place);
     free(l);
     return ok ? VG_OK : vg_fail(e, VG_EINPUT, "the patches do not hang together");
 }

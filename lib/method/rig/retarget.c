@@ -69,7 +69,7 @@ static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, c
     vgi_shape shape = {0};
     double *before = vgi_array(n, 3 * n * sizeof *before, e), *after = vgi_array(n, 3 * n * sizeof *after, e);
     double *old = vgi_array(3 * m->njoints, sizeof *old, e), *now = vgi_array(3 * m->njoints, sizeof *now, e);
-    int blas = vgi_product_begin();
+    vgi_blas_alone();
     int r = before && after && old && now ? vgi_place_by_joints(m, m->centre, before, e) : VG_ENOMEM;
     if (r == VG_OK) r = meeting_points(m, g, of_face, h->body.reference, old, e);
     if (r == VG_OK) r = meeting_points(m, g, of_face, body, now, e);
@@ -83,7 +83,7 @@ static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, c
             }
         r = vgi_place_by_joints(m, shape.centre, after, e);
     }
-    vgi_product_end(blas);
+    vgi_blas_shared();
     if (r == VG_OK) {
         memcpy(m->centre, shape.centre, 3 * n * sizeof *m->centre);
         for (size_t i = 0; i < 3 * n * n; i++) m->place[i] = after[i] + ratio * (m->place[i] - before[i]);

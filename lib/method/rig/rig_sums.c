@@ -141,7 +141,7 @@ static void add_cross(void *context, size_t task)
 void vgi_rig_sums_add(vgi_rig_sums *s, size_t count, const double *const *poses, const double *const *transforms,
                       int threads)
 {
-    int blas = vgi_product_begin();
+    vgi_blas_alone();
     for (size_t first = 0; first < count; first += BLOCK) {
         adding a = {s, count - first < BLOCK ? count - first : BLOCK, poses + first};
         for (size_t k = 0; k < a.count; k++) {
@@ -156,5 +156,5 @@ void vgi_rig_sums_add(vgi_rig_sums *s, size_t count, const double *const *poses,
         if (s->turns) vgi_parallel(threads, (s->turns->nf + FACES - 1) / FACES, add_faces, &a);
         s->poses += a.count;
     }
-    vgi_product_end(blas);
+    vgi_blas_shared();
 }
