@@ -196,22 +196,7 @@ static size_t edge_below(const vg_measures *x, double error)
 
 double vg_error_p95(double *x, size_t n)
 {
-    if (n == 0) return 0;
-    size_t low = 0, high = n - 1, rank = n - n / 20 - 1;
-    while (low < high) { /* Hoare: only the part that holds the rank is looked at again */
-        double pivot = x[low + (high - low) / 2];
-        size_t i = low, j = high;
-        for (;;) {
-            while (x[i] < pivot) i++;
-            while (x[j] > pivot) j--;
-            if (i >= j) break;
-            double t = x[i];
-            x[i++] = x[j], x[j--] = t;
-        }
-        if (rank <= j) high = j;
-        else low = j + 1;
-    }
-    return x[rank];
+    return vgi_percentile(x, n, 95);
 }
 
 /* ---- poses ---- */
@@ -332,11 +317,6 @@ int vg_measures_add(vg_measures *x, size_t n, const double *const *truth, const 
 
 /* ---- the report ---- */
 
-static double running_sd(const vgi_running *r)
-{
-    return r->n > 0 ? sqrt(r->squares / r->n) : 0;
-}
-
 /* The smallest error that 95 of 100 do not exceed. */
 static double percentile_95(const vg_measures *x)
 {
@@ -365,8 +345,8 @@ void vg_measures_get(const vg_measures *x, vg_measure_report *r)
     r->sigma = x->frames ? sqrt(worst / (double)x->frames) : 0;
     const vgi_face_sums *f = &x->faces;
     r->orientation_mean = f->orientation.mean, r->orientation_max = f->orientation.max;
-    r->orientation_sd = running_sd(&f->orientation);
-    r->area_mean = f->area.mean, r->area_max = f->area.max, r->area_sd = running_sd(&f->area);
+    r->orientation_sd = vgi_running_deviation(&f->orientation);
+    r->area_mean = f->area.mean, r->area_max = f->area.max, r->area_sd = vgi_running_deviation(&f->area);
     r->faces_measured = (size_t)f->orientation.n;
     for (int i = 0; i < 2; i++) {
         r->planarity_mean[i] = f->planarity[i].mean;

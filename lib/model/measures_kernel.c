@@ -73,16 +73,6 @@ INLINE vgi_lanes next_share(const lane_running *l)
     return 1.0 / (l->n + 1.0);
 }
 
-void vgi_running_merge(vgi_running *r, const vgi_running *more)
-{
-    double n = r->n + more->n, d = more->mean - r->mean;
-    if (more->n == 0) return;
-    r->mean += d * (more->n / n);
-    r->squares += more->squares + d * d * (r->n * more->n / n);
-    r->n = n;
-    if (more->max > r->max) r->max = more->max;
-}
-
 static void merge_lanes(vgi_running *r, const lane_running *l)
 {
     for (int i = 0; i < VGI_LANES; i++) {

@@ -4,6 +4,7 @@
 #define VG_MEASURES_KERNEL_H
 
 #include "numeric/lanes.h"
+#include "numeric/stats.h"
 
 /* All faces of r corners: `faces` of them. corners: for each eight faces r times eight vertices, the first corner of
  * each, the second of each; in the last eight, the last face again in the place of those that are not there. */
@@ -12,18 +13,12 @@ typedef struct vgi_face_class {
     uint32_t *corners;
 } vgi_face_class;
 
-typedef struct vgi_running { /* mean and sum of squared deviations without cancellation (Welford) */
-    double n, mean, squares, max;
-} vgi_running;
-
 /* Over faces that have a normal: in the truth; planarity: each by itself, of four corners and more. */
 typedef struct vgi_face_sums {
     vgi_running orientation, area, planarity[2];
     uint64_t planarity_histogram[2][10];
 } vgi_face_sums;
 
-/* vgi_running_merge: as if what went into `more` had gone into *r, behind what is there (Chan et al.). */
-void vgi_running_merge(vgi_running *r, const vgi_running *more);
 /* vgi_measure_faces: add all of a class to *s. poses: truth, result. */
 void vgi_measure_faces(const vgi_face_class *c, double diagonal, const double *const poses[2], vgi_face_sums *s);
 

@@ -2,6 +2,7 @@
  * and the node at place k of depth d holds the points n k / 2^d to n (k + 1) / 2^d, so neither is written down.
  * Leaves out insertion and removal: points are given once.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/random.h"
 #include "numeric/kdtree.h"
 
 #include <math.h>
@@ -61,13 +62,10 @@ static inline void swap(struct point *a, struct point *b)
 }
 
 /* The middle one of three points taken from pseudo-random places: no order of the input makes the selection slow. */
-static struct point choose_pivot(const struct point *p, size_t n, int axis, uint64_t *seed)
+static struct point choose_pivot(const struct point *p, size_t n, int axis, vgi_random *random)
 {
     const struct point *three[3];
-    for (int k = 0; k < 3; k++) {
-        *seed = *seed * 6364136223846793005u + 1442695040888963407u;
-        three[k] = p + (size_t)((*seed >> 32) * n >> 32);
-    }
+    for (int k = 0; k < 3; k++) three[k] = p + vgi_random_below(random, n);
     int low = before(three[1], three[0], axis), high = !low;
     if (before(three[2], three[low], axis)) return *three[low];
     return before(three[2], three[high], axis) ? *three[2] : *three[high];
@@ -76,10 +74,10 @@ static struct point choose_pivot(const struct point *p, size_t n, int axis, uint
 /* Hoare's selection: bring the point of rank `middle` to its place, lesser ones before it. */
 static void select_rank(struct point *p, size_t n, size_t middle, int axis)
 {
-    uint64_t seed = n;
+    vgi_random random = {.key = n};
     size_t begin = 0, end = n;
     while (end - begin > 1) {
-        struct point pivot = choose_pivot(p + begin, end - begin, axis, &seed);
+        struct point pivot = choose_pivot(p + begin, end - begin, axis, &random);
         size_t i = begin, j = end - 1;
         for (;;) {
             while (before(&p[i], &pivot, axis)) i++;

@@ -4,6 +4,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/register.h"
 #include "numeric/kdtree.h"
+#include "numeric/stats.h"
 #include "numeric/turn.h"
 
 #include <stdlib.h>
@@ -82,19 +83,6 @@ static bool spread_out(const double *x, size_t n)
     return minors > 1e-8 * trace * trace;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
-static double median(const double *x, size_t n, double *room)
-{
-    memcpy(room, x, n * sizeof *x);
-    qsort(room, n, sizeof *room, compare_doubles);
-    return n ? room[n / 2] : 0;
-}
-
 /* Pairs that miss by much more than most count less and less (Geman and McClure). */
 static int robust_similarity(struct similarity *s, const double *from, const double *to, size_t n, vg_err *e)
 {
@@ -109,7 +97,7 @@ static int robust_similarity(struct similarity *s, const double *from, const dou
             apply_similarity(s, from + 3 * i, y);
             miss[i] = sqrt(vgi_square(y, to + 3 * i));
         }
-        double c = 3 * median(miss, n, room) + 1e-12;
+        double c = 3 * vgi_median(memcpy(room, miss, n * sizeof *room), n) + 1e-12;
         for (size_t i = 0; i < n; i++) {
             double x = miss[i] / c;
             weight[i] = 1 / ((1 + x * x) * (1 + x * x));
@@ -293,7 +281,7 @@ static int judge_markers(struct registration *r, vg_err *e)
     }
     for (size_t left = 0; ok == VG_OK && n > 0 && left <= n / 4; left++) {
         neighbour_residuals(from, way, out->left_out, n, out->residual);
-        out->typical_residual = median(out->residual, n, room);
+        out->typical_residual = vgi_median(memcpy(room, out->residual, n * sizeof *room), n);
         size_t worst = n;
         for (size_t i = 0; i < n; i++)
             if (!out->left_out[i] && (worst == n || out->residual[i] > out->residual[worst])) worst = i;

@@ -1,6 +1,7 @@
 /* surface.c: a tree of boxes over the triangles of polygons, searched nearest box first.
  * Leaves out what a nearest point is good for (fit.c, pair.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/random.h"
 #include "method/pairs/surface.h"
 #include "numeric/vec3.h"
 #include "model/incidence.h"
@@ -152,10 +153,9 @@ static inline bool before(const struct key *a, const struct key *b, int axis)
 static void select_rank(struct key *p, size_t n, size_t middle, int axis)
 {
     size_t begin = 0, end = n;
-    uint64_t seed = n;
+    vgi_random random = {.key = n};
     while (end - begin > 1) {
-        seed = seed * 6364136223846793005u + 1442695040888963407u;
-        struct key pivot = p[begin + (size_t)((seed >> 32) * (end - begin) >> 32)];
+        struct key pivot = p[begin + vgi_random_below(&random, end - begin)];
         size_t i = begin, j = end - 1;
         for (;;) {
             while (before(&p[i], &pivot, axis)) i++;

@@ -2,6 +2,7 @@
  * Leaves out how the rotation of a face is measured (polar.c), what hangs together (pieces.c), and which
  * pieces are joined (join.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/random.h"
 #include "method/patches/join.h"
 #include "method/patches/pieces.h"
 #include "numeric/blas.h"
@@ -32,14 +33,6 @@ struct vg_segmenter {
     float *feature; /* nf x width */
     size_t width;   /* grows with the poses; in the end it is cut down to what is used */
 };
-
-static uint64_t mix(uint64_t x) /* splitmix64 (Vigna, public domain) */
-{
-    x += 0x9e3779b97f4a7c15u;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return x ^ (x >> 31);
-}
 
 int vg_segmenter_new(vg_segmenter **out, const vg_mesh *m, const double *reference, int threads, vg_err *e)
 {
@@ -117,7 +110,7 @@ int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_e
         adding a = {.s = s, .lanes = n - p < VGI_LANES ? n - p : VGI_LANES};
         for (size_t k = 0; k < VGI_LANES; k++) a.poses[k] = poses[p + (k < a.lanes ? k : a.lanes - 1)];
         for (size_t k = 0; k < 9 * a.lanes; k++) {
-            uint64_t index = 9 * (uint64_t)s->poses + k, chance = mix(index);
+            uint64_t index = 9 * (uint64_t)s->poses + k, chance = vgi_random_mix(index);
             a.at[k] = (uint32_t)(index < WIDTH ? index : chance % WIDTH);
             a.sign[k] = index < WIDTH || chance >> 63 ? 1 : -1;
         }
@@ -233,9 +226,9 @@ static void add_centre(clustering *c, size_t face)
 /* k-means++ (Arthur and Vassilvitskii 2007). */
 static void seed_centres(clustering *c, size_t k, uint64_t seed)
 {
-    add_centre(c, (size_t)(mix(seed) % c->n));
+    add_centre(c, (size_t)(vgi_random_mix(seed) % c->n));
     while (c->k < k) {
-        double sum = add_up(c), share = (double)(mix(seed ^ mix(c->k)) >> 11) * 0x1p-53;
+        double sum = add_up(c), share = (double)(vgi_random_mix(seed ^ vgi_random_mix(c->k)) >> 11) * 0x1p-53;
         if (!(sum > 0)) break; /* every face turns like one of the centres */
         size_t face = draw(c, share * sum);
         if (!(c->nearest[face] > 0)) break;

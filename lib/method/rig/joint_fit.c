@@ -6,6 +6,7 @@
  * Leaves out everything else about rigs (envelope.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
+#include "numeric/stats.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -59,29 +60,17 @@ static void ask_vertices(void *context, size_t task)
     }
 }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
-static double median(double *x, size_t n)
-{
-    qsort(x, n, sizeof *x, by_value);
-    return x[n / 2];
-}
-
 /* The median, coordinate by coordinate, of the better half of the vertices. */
 static void agree(const locating *x, double *list, double shift[3], double *spread)
 {
     size_t n = 0;
     memcpy(list, x->spread, x->nv * sizeof *list);
-    double limit = median(list, x->nv);
+    double limit = vgi_median(list, x->nv);
     for (size_t i = 0; i < 3; i++) {
         n = 0;
         for (size_t v = 0; v < x->nv; v++)
             if (x->spread[v] <= limit) list[n++] = x->opinion[3 * v + i];
-        shift[i] = median(list, n);
+        shift[i] = vgi_median(list, n);
     }
     n = 0;
     for (size_t v = 0; v < x->nv; v++) {
@@ -90,7 +79,7 @@ static void agree(const locating *x, double *list, double shift[3], double *spre
             list[n++] = sqrt((o[0] - shift[0]) * (o[0] - shift[0]) + (o[1] - shift[1]) * (o[1] - shift[1]) +
                              (o[2] - shift[2]) * (o[2] - shift[2]));
     }
-    *spread = median(list, n);
+    *spread = vgi_median(list, n);
 }
 
 int vg_rig_locate(const vg_skeleton *s, size_t nv, const double *reference, size_t n, const double *const *poses,
