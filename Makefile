@@ -60,7 +60,7 @@ endif
 ALL_CFLAGS += $(CFLAGS)
 # numeric kernels: the compiler may unroll and vectorise them; nothing here reorders sums
 KERNELS := $(addprefix lib/method/vectors/,deform_kernel planar_kernel guess_kernel reconstruct) $(addprefix lib/method/pairs/,transfer transfer_kernel) \
-    lib/method/patches/segment lib/numeric/solve_kernel lib/model/graph lib/model/measures lib/model/measures_kernel lib/core/memory
+    lib/signal/plane lib/signal/spline_pose lib/method/patches/segment lib/numeric/solve_kernel lib/model/graph lib/model/measures lib/model/measures_kernel lib/core/memory
 # what a program does not call is not loaded: OpenBLAS starts threads that spin for a while as soon as it is there
 ALL_LDFLAGS += -Wl,--as-needed $(LDFLAGS)
 ALL_LIBS := $(CHOLMOD_LIBS) $(LAPACKE_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) -lpthread -lm $(LDLIBS)

@@ -67,6 +67,31 @@ static void solve_triangle(CBLAS_TRANSPOSE side, size_t n, const double *l, size
         cblas_dtrsm(CblasRowMajor, CblasLeft, CblasLower, side, CblasNonUnit, (int)n, (int)m, 1, l, (int)n, x, (int)m);
 }
 
+void vgi_product_double_transposed(size_t m, size_t n, size_t k, const double *a, size_t lda, const double *b,
+                                   size_t ldb, double *c, size_t ldc)
+{
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, (int)m, (int)n, (int)k, 1, a, (int)lda, b, (int)ldb, 0, c,
+                (int)ldc);
+}
+
+void vgi_product_transposed_double(size_t m, size_t n, size_t k, const double *a, size_t lda, const double *b,
+                                   size_t ldb, double *c, size_t ldc)
+{
+    cblas_dgemm(CblasRowMajor, CblasTrans, CblasNoTrans, (int)m, (int)n, (int)k, 1, a, (int)lda, b, (int)ldb, 0, c,
+                (int)ldc);
+}
+
+void vgi_product_gram(size_t n, size_t k, const double *a, size_t lda, double *c, size_t ldc)
+{
+    cblas_dsyrk(CblasRowMajor, CblasLower, CblasNoTrans, (int)n, (int)k, 1, a, (int)lda, 0, c, (int)ldc);
+}
+
+void vgi_solve_lower_stripe(size_t n, const double *l, size_t m, double *x, size_t ldx)
+{
+    cblas_dtrsm(CblasRowMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, (int)n, (int)m, 1, l, (int)n, x,
+                (int)ldx);
+}
+
 void vgi_solve_lower(size_t n, const double *l, size_t m, double *x)
 {
     if (n && m) solve_triangle(CblasNoTrans, n, l, m, x);

@@ -23,6 +23,16 @@ void vgi_product_add(size_t m, size_t n, size_t k, const double *a, size_t lda, 
 void vgi_product_single_transposed(size_t m, size_t n, size_t k, const float *a, size_t lda, const float *b,
                                    size_t ldb, float *c, size_t ldc);
 
+void vgi_product_double_transposed(size_t m, size_t n, size_t k, const double *a, size_t lda, const double *b,
+                                   size_t ldb, double *c, size_t ldc);
+/* c (m x n) := a' b, a k x m, b k x n */
+void vgi_product_transposed_double(size_t m, size_t n, size_t k, const double *a, size_t lda, const double *b,
+                                   size_t ldb, double *c, size_t ldc);
+/* c (n x n, its lower triangle) := a a', a n x k */
+void vgi_product_gram(size_t n, size_t k, const double *a, size_t lda, double *c, size_t ldc);
+
+/* x (n x m, row stride ldx) := l^-1 x, l a lower triangle of n x n */
+void vgi_solve_lower_stripe(size_t n, const double *l, size_t m, double *x, size_t ldx);
 /* x (n x m, row-major) := l^-1 x and l'^-1 x, l a lower triangle of n x n */
 void vgi_solve_lower(size_t n, const double *l, size_t m, double *x);
 void vgi_solve_lower_transposed(size_t n, const double *l, size_t m, double *x);

@@ -1,0 +1,227 @@
+/* basis.c: principal components of few poses of many numbers: the eigenvectors of the n x n Gram matrix give them at
+ * the cost of two products.
+ *
+ * Rounding of the Gram matrix leaves basis vectors of small variance slanted by up to its square root; one pass of
+ * Cholesky QR sets them upright (1e-4 becomes 1e-15). Coordinates then follow from the Gram matrix, too, but for those
+ * of small variance, which are products of vectors again.
+ * Leaves out what the numbers of a pose are.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "numeric/blas.h"
+#include "numeric/lapack.h"
+#include "signal/signal.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum {
+    TILE = 128,    /* rows of a tile of a Gram matrix */
+    STRIPE = 3072  /* numbers of a pose that are worked on at a time: a multiple of 3 */
+};
+
+void vgi_basis_clear(vgi_basis *b)
+{
+    free(b->mean);
+    free(b->centred);
+    free(b->vectors);
+    free(b->x);
+    free(b->value);
+    *b = (vgi_basis){0};
+}
+
+typedef struct job {
+    vgi_basis *b;
+    const double *rows; /* of a Gram matrix */
+    size_t nrows;
+    double *gram;
+    const double *weight; /* rank x n: vectors = weight * centred */
+    const double *factor; /* rank x rank, lower */
+    const double *x;      /* of an error */
+    size_t stride, m;
+    size_t first;         /* of the stripes that are measured at a time */
+    double *room, *square, *sums;
+} job;
+
+static size_t stripes(size_t d)
+{
+    return (d + STRIPE - 1) / STRIPE;
+}
+
+static size_t width_of(size_t d, size_t stripe)
+{
+    return d - stripe * STRIPE < STRIPE ? d - stripe * STRIPE : STRIPE;
+}
+
+/* ---- Gram matrices, tile by tile ---- */
+
+static void gram_tile(void *context, size_t index)
+{
+    job *j = context;
+    size_t row = 0, n = j->nrows, d = j->b->d;
+    while ((row + 1) * (row + 2) / 2 <= index) row++;
+    size_t column = index - row * (row + 1) / 2, i = row * TILE, k = column * TILE;
+    size_t height = n - i < TILE ? n - i : TILE, width = n - k < TILE ? n - k : TILE;
+    if (row == column) vgi_product_gram(height, d, j->rows + i * d, d, j->gram + i * n + k, n);
+    else vgi_product_double_transposed(height, width, d, j->rows + i * d, d, j->rows + k * d, d, j->gram + i * n + k, n);
+}
+
+/* the lower triangle, then all of it */
+static void gram(vgi_basis *b, const double *rows, size_t n, double *g, int threads)
+{
+    size_t tiles = (n + TILE - 1) / TILE;
+    vgi_parallel(threads, tiles * (tiles + 1) / 2, gram_tile, &(job){.b = b, .rows = rows, .nrows = n, .gram = g});
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = i + 1; k < n; k++) g[i * n + k] = g[k * n + i];
+}
+
+/* ---- eigenvectors, as rows divided by the root of the eigenvalue ---- */
+
+static int find_weights(vgi_basis *b, const double *g, double *weight, vg_err *e)
+{
+    size_t n = b->n;
+    double *copy = vgi_copy_array(g, n * n, sizeof *g, e);
+    int r = copy ? vgi_eigen(n, copy, VGI_LARGEST, n, b->value, weight, e) : VG_ENOMEM;
+    free(copy);
+    if (r < 0) return r;
+    while (b->rank + 1 < n && b->value[b->rank] > 1e-14 * b->value[0]) b->rank++;
+    for (size_t j = 0; j < b->rank; j++)
+        for (size_t i = 0; i < n; i++) weight[j * n + i] /= sqrt(b->value[j]);
+    return VG_OK;
+}
+
+/* ---- vectors ---- */
+
+static void multiply_stripe(void *context, size_t s)
+{
+    job *j = context;
+    vgi_basis *b = j->b;
+    vgi_product_double(b->rank, width_of(b->d, s), b->n, j->weight, b->n, b->centred + s * STRIPE, b->d,
+                       b->vectors + s * STRIPE, b->d);
+}
+
+static void straighten_stripe(void *context, size_t s)
+{
+    job *j = context;
+    vgi_basis *b = j->b;
+    vgi_solve_lower_stripe(b->rank, j->factor, width_of(b->d, s), b->vectors + s * STRIPE, b->d);
+}
+
+/* weight := factor^-1 weight, so that vectors = weight * centred still */
+static int make_vectors(vgi_basis *b, double *weight, int threads, vg_err *e)
+{
+    size_t rank = b->rank;
+    double *g = vgi_array(rank * rank, sizeof *g, e);
+    if (!g) return VG_ENOMEM;
+    vgi_parallel(threads, stripes(b->d), multiply_stripe, &(job){.b = b, .weight = weight});
+    gram(b, b->vectors, rank, g, threads);
+    bool definite = vgi_spd_factor(rank, g);
+    if (definite) {
+        vgi_parallel(threads, stripes(b->d), straighten_stripe, &(job){.b = b, .factor = g});
+        vgi_solve_lower(rank, g, b->n, weight);
+    }
+    free(g);
+    return definite ? VG_OK : vg_fail(e, VG_EINPUT, "the poses cannot be told apart from their rounding errors");
+}
+
+static void make_coordinates(vgi_basis *b, const double *g, const double *weight)
+{
+    size_t large = 0;
+    while (large < b->rank && b->value[large] > 1e-6 * b->value[0]) large++;
+    vgi_product_double_transposed(b->n, large, b->n, g, b->n, weight, b->n, b->x, b->rank);
+    if (large < b->rank)
+        vgi_product_double_transposed(b->n, b->rank - large, b->d, b->centred, b->d, b->vectors + large * b->d, b->d,
+                                      b->x + large, b->rank);
+}
+
+static int centre(vgi_basis *b, vg_err *e)
+{
+    if (!(b->mean = vgi_array(b->d, sizeof *b->mean, e))) return VG_ENOMEM;
+    for (size_t i = 0; i < b->n; i++)
+        for (size_t c = 0; c < b->d; c++) b->mean[c] += b->centred[i * b->d + c];
+    for (size_t c = 0; c < b->d; c++) b->mean[c] /= (double)b->n;
+    for (size_t i = 0; i < b->n; i++)
+        for (size_t c = 0; c < b->d; c++) b->centred[i * b->d + c] -= b->mean[c];
+    return VG_OK;
+}
+
+int vgi_basis_make(vgi_basis *b, double *poses, size_t n, size_t d, int threads, vg_err *e)
+{
+    int r = VG_ENOMEM;
+    vgi_blas_alone();
+    double *g = NULL, *weight = NULL;
+    *b = (vgi_basis){.n = n, .d = d, .centred = poses};
+    if (centre(b, e) < 0 || !(g = vgi_array(n * n, sizeof *g, e)) || !(weight = vgi_array(n * n, sizeof *weight, e)) ||
+        !(b->value = vgi_array(n, sizeof *b->value, e)))
+        goto out;
+    gram(b, poses, n, g, threads);
+    if ((r = find_weights(b, g, weight, e)) < 0) goto out;
+    r = VG_ENOMEM;
+    size_t size;
+    if (!vgi_mul(b->rank, d, &size) || !(b->vectors = vgi_array_raw(size, sizeof *b->vectors, e)) ||
+        !(b->x = vgi_array(n * b->rank, sizeof *b->x, e)))
+        goto out;
+    r = VG_OK;
+    if (b->rank && (r = make_vectors(b, weight, threads, e)) == VG_OK) make_coordinates(b, g, weight);
+out:
+    vgi_blas_shared();
+    free(g);
+    free(weight);
+    if (r < 0) vgi_basis_clear(b);
+    return r;
+}
+
+/* ---- errors ---- */
+
+static void measure_stripe(void *context, size_t index)
+{
+    job *j = context;
+    const vgi_basis *b = j->b;
+    size_t s = j->first + index, width = width_of(b->d, s), n = b->n;
+    double *fitted = j->room + index * STRIPE * n, *most = j->square + s * n;
+    if (j->m)
+        vgi_product_double(n, width, j->m, j->x, j->stride, b->vectors + s * STRIPE, b->d, fitted, width);
+    else memset(fitted, 0, n * width * sizeof *fitted);
+    for (size_t i = 0; i < n; i++) {
+        const double *a = b->centred + i * b->d + s * STRIPE, *f = fitted + i * width;
+        double sum = 0, largest = 0;
+        for (size_t c = 0; c + 2 < width; c += 3) {
+            double x = a[c] - f[c], y = a[c + 1] - f[c + 1], z = a[c + 2] - f[c + 2], square = x * x + y * y + z * z;
+            sum += square;
+            largest = square > largest ? square : largest;
+        }
+        most[i] = largest;
+        j->sums[s * n + i] = sum;
+    }
+}
+
+int vgi_basis_error(const vgi_basis *b, const double *x, size_t stride, size_t m, int threads, vgi_error *error,
+                    vg_err *e)
+{
+    size_t n = b->n, count = stripes(b->d);
+    size_t group = (size_t)threads < count ? (size_t)threads : count;
+    int r = VG_ENOMEM;
+    double *room = vgi_array_raw(group * n, STRIPE * sizeof *room, e), *square = vgi_array(n * count, sizeof *square, e);
+    double *sums = vgi_array(n * count, sizeof *sums, e), total = 0;
+    vgi_blas_alone();
+    if (!room || !square || !sums) goto out;
+    job j = {.b = (vgi_basis *)b, .x = x, .stride = stride, .m = m, .room = room, .square = square, .sums = sums};
+    for (; j.first < count; j.first += group)
+        vgi_parallel(threads, count - j.first < group ? count - j.first : group, measure_stripe, &j);
+    error->most = 0;
+    for (size_t i = 0; i < n; i++) {
+        double largest = 0;
+        for (size_t s = 0; s < count; s++) {
+            largest = fmax(largest, square[s * n + i]);
+            total += sums[s * n + i];
+        }
+        if (error->of_frame) error->of_frame[i] = sqrt(largest);
+        error->most = fmax(error->most, sqrt(largest));
+    }
+    error->rms = b->d ? sqrt(total / (double)n / (double)(b->d / 3)) : 0;
+    r = VG_OK;
+out:
+    vgi_blas_shared();
+    free(room);
+    free(square);
+    free(sums);
+    return r;
+}

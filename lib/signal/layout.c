@@ -1,0 +1,395 @@
+/* layout.c: which distances the positions in the plane shall have, and how good the motion between frames is then.
+ *
+ * Distances of the shapes alone put similar shapes of different moments next to one another, and the surface through
+ * them then cannot say how either goes on. A further coordinate pulls them apart: time, or the phase of a cycle.
+ * Leaves out how positions follow from distances (plane.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "numeric/blas.h"
+#include "numeric/lapack.h"
+#include "signal/signal.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { AXES = 30, MORE = 2 }; /* principal coordinates that a start is taken from, and further ones */
+static const double good = 0.6; /* a candidate of this ratio is taken */
+
+/* ---- the length of a cycle ---- */
+
+static int by_size(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+static double median(double *x, size_t n)
+{
+    qsort(x, n, sizeof *x, by_size);
+    return n % 2 ? x[n / 2] : (x[n / 2 - 1] + x[n / 2]) / 2;
+}
+
+/* middle[T]: the median distance of frames T apart, beside that of all pairs */
+static void lag_medians(size_t n, const double *square, double *middle, double *room)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = i + 1; j < n; j++) room[count++] = sqrt(square[i * n + j]);
+    double all = median(room, count);
+    for (size_t lag = 4; lag < n; lag++) {
+        for (size_t i = 0; i + lag < n; i++) room[i] = sqrt(square[i * n + i + lag]);
+        middle[lag] = all > 0 ? median(room, n - lag) / all : INFINITY;
+    }
+}
+
+static double refine(double a, double b, double c)
+{
+    double bend = a - 2 * b + c, off = bend > 0 ? fmin(fmax(0.5 * (a - c) / bend, -0.5), 0.5) : 0;
+    return fabs(off) > 0.05 ? off : 0;
+}
+
+int vgi_period(size_t n, size_t m, const double *x, double *period, vg_err *e)
+{
+    *period = 0;
+    if (n < 5) return VG_OK;
+    double *square = vgi_array_raw(n * n, sizeof *square, e), *room = vgi_array_raw(n * n, sizeof *room, e);
+    double *middle = vgi_array(n + 1, sizeof *middle, e);
+    if (square && room && middle) {
+        vgi_distances(n, m, x, m, square);
+        for (size_t i = 0; i <= n; i++) middle[i] = INFINITY;
+        lag_medians(n, square, middle, room);
+        for (size_t lag = 4; lag < n && !*period; lag++)
+            if (middle[lag] < 0.05 && middle[lag] <= middle[lag - 1] && middle[lag] <= middle[lag + 1])
+                *period = (double)lag + (lag + 1 < n && isfinite(middle[lag - 1])
+                                             ? refine(middle[lag - 1], middle[lag], middle[lag + 1]) : 0);
+    }
+    int r = square && room && middle ? VG_OK : VG_ENOMEM;
+    free(square);
+    free(room);
+    free(middle);
+    return r;
+}
+
+/* ---- positions ---- */
+
+/* Coordinates beside the shapes', n x MORE; how many. */
+static size_t further_coordinates(const vgi_layout *w, double period, size_t n, size_t m, const double *x, double *more)
+{
+    double size = 0, length = 0, weight = w->weight;
+    for (size_t i = 0; i < n * m; i++) size += x[i] * x[i] / (double)n;
+    size = sqrt(size);
+    for (size_t i = 0; i < n; i++) {
+        double phase = period > 0 ? 2 * M_PI * (double)i / period : 0, square = 0;
+        if (w->kind == VGI_RING) {
+            more[MORE * i] = weight * size * cos(phase) / M_SQRT2;
+            more[MORE * i + 1] = weight * size * sin(phase) / M_SQRT2;
+            continue;
+        }
+        for (size_t c = 0; c < m && i; c++) square += pow(x[i * m + c] - x[(i - 1) * m + c], 2);
+        length += sqrt(square);
+        more[MORE * i] = length;
+        more[MORE * i + 1] = 0;
+    }
+    if (w->kind == VGI_TIME)
+        for (size_t i = 0; i < n; i++) more[MORE * i] = length > 0 ? weight * size * (more[MORE * i] / length - 0.5) : 0;
+    for (size_t c = 0; c < MORE; c++) {
+        double mean = 0;
+        for (size_t i = 0; i < n; i++) mean += more[MORE * i + c] / (double)n;
+        for (size_t i = 0; i < n; i++) more[MORE * i + c] -= mean;
+    }
+    return w->kind == VGI_RING ? 2 : w->kind == VGI_TIME ? 1 : 0;
+}
+
+/* The first three principal coordinates (n x 3) of shapes and further coordinates together. */
+static int principal(size_t n, size_t m, const double *x, size_t nmore, const double *more, double *axes, vg_err *e)
+{
+    size_t few = m < AXES ? m : AXES, w = few + nmore, count = w < 3 ? w : 3;
+    double *all = vgi_array(n * w, sizeof *all, e), *c = vgi_array(w * w, sizeof *c, e);
+    double value[3], *vector = vgi_array(3 * w, sizeof *vector, e);
+    int r = all && c && vector ? VG_OK : VG_ENOMEM;
+    memset(axes, 0, 3 * n * sizeof *axes);
+    if (r == VG_OK && w) {
+        for (size_t i = 0; i < n; i++)
+            for (size_t k = 0; k < w; k++) all[i * w + k] = k < few ? x[i * m + k] : more[MORE * i + k - few];
+        vgi_product_transposed_double(w, w, n, all, w, all, w, c, w);
+        if ((r = vgi_eigen(w, c, VGI_LARGEST, count, value, vector, e)) == VG_OK)
+            vgi_product_double_transposed(n, count, w, all, w, vector, w, axes, 3);
+    }
+    free(all);
+    free(c);
+    free(vector);
+    return r;
+}
+
+/* From the best of three starts. */
+static int settle_freely(size_t n, const double *distance, const double *axes, double *p, double *best, vg_err *e)
+{
+    static const size_t pairs[3][2] = {{0, 1}, {0, 2}, {1, 2}};
+    double least = INFINITY;
+    for (int start = 0; start < 3; start++) {
+        vgi_stress_facts f;
+        for (size_t i = 0; i < n; i++)
+            for (int k = 0; k < 2; k++) p[2 * i + (size_t)k] = axes[3 * i + pairs[start][k]];
+        if (start && !(vgi_plane_radius(n, p, NULL) > 0)) break;
+        if (vgi_plane_settle(n, distance, NULL, p, &f, e) < 0) return VG_ENOMEM;
+        if (f.stress < least) least = f.stress, memcpy(best, p, 2 * n * sizeof *p);
+    }
+    return VG_OK;
+}
+
+/* Move p as a whole, mirrored or not, to where its pinned frames are nearest to their pins. */
+static void move_to_pins(size_t n, double *p, const vgi_pin *pins, size_t npins)
+{
+    double a[2] = {0, 0}, b[2] = {0, 0}, plain[2] = {0, 0}, mirrored[2] = {0, 0};
+    for (size_t i = 0; i < npins; i++)
+        for (int k = 0; k < 2; k++) a[k] += p[2 * pins[i].frame + (size_t)k] / (double)npins, b[k] += pins[i].at[k] / (double)npins;
+    for (size_t i = 0; i < npins; i++) {
+        double u = p[2 * pins[i].frame] - a[0], v = p[2 * pins[i].frame + 1] - a[1];
+        double x = pins[i].at[0] - b[0], y = pins[i].at[1] - b[1];
+        plain[0] += u * x + v * y, plain[1] += u * y - v * x;
+        mirrored[0] += u * x - v * y, mirrored[1] += u * y + v * x;
+    }
+    bool mirror = hypot(mirrored[0], mirrored[1]) > hypot(plain[0], plain[1]);
+    const double *turn = mirror ? mirrored : plain;
+    double size = hypot(turn[0], turn[1]), c = size > 0 ? turn[0] / size : 1, s = size > 0 ? turn[1] / size : 0;
+    for (size_t i = 0; i < n; i++) {
+        double u = p[2 * i] - a[0], v = (mirror ? -1 : 1) * (p[2 * i + 1] - a[1]);
+        p[2 * i] = b[0] + c * u - s * v;
+        p[2 * i + 1] = b[1] + s * u + c * v;
+    }
+}
+
+static int settle_pinned(size_t n, const double *distance, const vgi_pin *pins, size_t npins, double *p, vg_err *e)
+{
+    bool *held = vgi_array(n, sizeof *held, e);
+    if (!held) return VG_ENOMEM;
+    move_to_pins(n, p, pins, npins);
+    for (size_t i = 0; i < npins; i++) {
+        held[pins[i].frame] = true;
+        memcpy(p + 2 * pins[i].frame, pins[i].at, sizeof pins[i].at);
+    }
+    int r = vgi_plane_settle(n, distance, held, p, NULL, e);
+    free(held);
+    return r;
+}
+
+int vgi_layout_make(const vgi_layout *layout, double period, size_t n, size_t m, const double *x, const vgi_pin *pins,
+                    size_t npins, double *p, vg_err *e)
+{
+    int r = VG_ENOMEM;
+    double *distance = vgi_array_raw(n * n, sizeof *distance, e), *more = vgi_array(n, MORE * sizeof *more, e);
+    double *axes = vgi_array(n, 3 * sizeof *axes, e), *best = vgi_array(n, 2 * sizeof *best, e), add[MORE];
+    if (!distance || !more || !axes || !best) goto out;
+    vgi_distances(n, m, x, m, distance);
+    size_t nmore = layout->kind == VGI_PLAIN ? 0 : further_coordinates(layout, period, n, m, x, more);
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++) {
+            for (size_t k = 0; k < MORE; k++) add[k] = more[MORE * i + k] - more[MORE * j + k];
+            distance[i * n + j] = sqrt(distance[i * n + j] + add[0] * add[0] + add[1] * add[1]);
+        }
+    if ((r = principal(n, m, x, nmore, more, axes, e)) < 0 || (r = settle_freely(n, distance, axes, p, best, e)) < 0)
+        goto out;
+    double centre[2], radius = vgi_plane_radius(n, best, centre);
+    if (!(radius > 0)) radius = 1;
+    for (size_t i = 0; i < 2 * n; i++) p[i] = (best[i] - centre[i & 1]) / radius;
+    for (size_t i = 0; i < n * n; i++) distance[i] /= radius;
+    if (npins) r = settle_pinned(n, distance, pins, npins, p, e);
+out:
+    free(distance);
+    free(more);
+    free(axes);
+    free(best);
+    return r;
+}
+
+/* ---- how good a layout is ---- */
+
+typedef struct judge {
+    size_t n, m;
+    const double *x, *p;
+    double *second, *fitted, *functions, *coefficients, *row;
+    vgi_plate plate;
+    vgi_curve curve;
+} judge;
+
+static int prepare(judge *j, vg_err *e)
+{
+    size_t n = j->n, m = j->m;
+    double *t = vgi_array(n, sizeof *t, e);
+    uint32_t *all = vgi_array(n, sizeof *all, e);
+    int r = VG_ENOMEM;
+    if (!t || !all || !(j->second = vgi_array(n * m, sizeof *j->second, e)) || !(j->row = vgi_array(m + n, sizeof(double), e)) ||
+        !(j->fitted = vgi_array(3 * n * m, sizeof *j->fitted, e)) ||
+        !(j->functions = vgi_array(3 * n * n, sizeof *j->functions, e)) ||
+        !(j->coefficients = vgi_array(n * m, sizeof *j->coefficients, e)) ||
+        vgi_plate_order(&j->plate, n, m, j->p, j->x, m, VGI_FARTHEST, e) < 0)
+        goto out;
+    vgi_natural_make(n, m, j->x, j->second, j->row);
+    vgi_plate_solve(&j->plate, j->plate.l, m, j->x, m, j->coefficients);
+    for (size_t i = 0; i < n; i++) all[i] = (uint32_t)i;
+    vgi_parameters(n, j->p, t);
+    r = vgi_curve_fit(&j->curve, n, j->p, t, all, n, e);
+out:
+    free(t);
+    free(all);
+    return r;
+}
+
+static double between(size_t index) /* times i + 1/4, 1/2, 3/4 */
+{
+    return 1 + (double)(index / 3) + 0.25 * (double)(1 + index % 3);
+}
+
+/* Squares of the deviation at each time in between; returns the mean square of straight lines. */
+static double measure(judge *j, double *square)
+{
+    size_t n = j->n, m = j->m, l = j->plate.l, times = 3 * (n - 1);
+    double straight = 0;
+    for (size_t i = 0; i < times; i++) {
+        double p[2];
+        vgi_curve_at(&j->curve, between(i), p);
+        vgi_plate_functions(&j->plate, l, p, j->functions + i * l);
+    }
+    vgi_product_double(times, m, l, j->functions, l, j->coefficients, m, j->fitted, m);
+    for (size_t i = 0; i < times; i++) {
+        const double *a = j->x + i / 3 * m, *b = a + m;
+        double share = 0.25 * (double)(1 + i % 3);
+        vgi_natural_at(n, m, j->x, j->second, between(i), j->row);
+        square[i] = 0;
+        for (size_t c = 0; c < m; c++) {
+            double line = a[c] * (1 - share) + b[c] * share - j->row[c], off = j->fitted[i * m + c] - j->row[c];
+            square[i] += off * off;
+            straight += line * line / (double)times;
+        }
+    }
+    return straight;
+}
+
+int vgi_layout_judge(size_t n, size_t m, const double *x, const double *p, double *ratio, double *deviation, vg_err *e)
+{
+    judge j = {.n = n, .m = m, .x = x, .p = p};
+    size_t times = 3 * (n - 1);
+    double *square = vgi_array(times, sizeof *square, e), sum = 0, straight = 0;
+    *ratio = 0;
+    int r = square ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK && m && n > 2 && (r = prepare(&j, e)) == VG_OK) {
+        straight = measure(&j, square);
+        for (size_t i = 0; i < times; i++) sum += square[i] / (double)times;
+        if (straight > 0) *ratio = sqrt(sum / straight);
+    }
+    for (size_t i = 0; r == VG_OK && deviation && i < times; i++) deviation[i] = straight > 0 ? square[i] / straight : 0;
+    free(square);
+    free(j.second);
+    free(j.fitted);
+    free(j.functions);
+    free(j.coefficients);
+    free(j.row);
+    vgi_plate_clear(&j.plate);
+    vgi_curve_clear(&j.curve);
+    return r;
+}
+
+/* ---- the choice ---- */
+
+typedef struct choice {
+    size_t n, m;
+    const double *x;
+    const vgi_pin *pins;
+    size_t npins;
+    double period;
+    vgi_layout *tried;
+    double *p; /* 2 n for each of those tried */
+    size_t first;
+    int status[VGI_LAYOUTS];
+} choice;
+
+static void try_one(void *context, size_t index)
+{
+    choice *c = context;
+    size_t i = c->first + index;
+    double *p = c->p + 2 * c->n * i;
+    c->status[i] = vgi_layout_make(&c->tried[i], c->period, c->n, c->m, c->x, c->pins, c->npins, p, NULL);
+    if (c->status[i] == VG_OK)
+        c->status[i] = vgi_layout_judge(c->n, c->m, c->x, p, &c->tried[i].ratio, NULL, NULL);
+}
+
+static size_t list_candidates(vgi_layout *list, double period)
+{
+    static const double times[] = {1, 1.5, 2, 3, 4, 6, 8, 12, 16, 24};
+    size_t count = 0;
+    list[count++] = (vgi_layout){.kind = VGI_PLAIN};
+    for (int c = 1; c <= 4 && period > 0; c++) list[count++] = (vgi_layout){.kind = VGI_RING, .weight = c};
+    for (size_t i = 0; i < sizeof times / sizeof *times; i++)
+        list[count++] = (vgi_layout){.kind = VGI_TIME, .weight = times[i]};
+    return count;
+}
+
+/* The first good one, or after the last one the best; SIZE_MAX: go on. */
+static size_t decide(const choice *c, size_t done, size_t count)
+{
+    size_t best = 0;
+    for (size_t i = 0; i < done; i++) {
+        if (c->tried[i].ratio <= good) return i;
+        if (c->tried[i].ratio < c->tried[best].ratio) best = i;
+    }
+    return done == count ? best : SIZE_MAX;
+}
+
+int vgi_layout_choose(size_t n, size_t m, const double *x, const vgi_pin *pins, size_t npins, int threads, double *p,
+                      vgi_layout *chosen, double *period, vgi_layout *tried, size_t *ntried, vg_err *e)
+{
+    choice c = {.n = n, .m = m, .x = x, .pins = pins, .npins = npins, .tried = tried};
+    int r = vgi_period(n, m, x, &c.period, e);
+    size_t count = list_candidates(tried, c.period), found = SIZE_MAX, done = 0, wave = (size_t)threads;
+    if (r < 0 || !(c.p = vgi_array(2 * n * count, sizeof *c.p, e))) return VG_ENOMEM;
+    vgi_blas_alone();
+    while (found == SIZE_MAX && r == VG_OK) {
+        c.first = done;
+        size_t now = count - done < wave ? count - done : wave;
+        if (!done) now = 1; /* most need no other */
+        vgi_parallel(threads, now, try_one, &c);
+        for (size_t i = done; i < done + now; i++)
+            if (c.status[i] < 0) r = vg_fail(e, c.status[i], "not enough memory for the layout of %zu frames", n);
+        done += now;
+        found = decide(&c, done, count);
+    }
+    vgi_blas_shared();
+    if (r == VG_OK) {
+        memcpy(p, c.p + 2 * n * found, 2 * n * sizeof *p);
+        *chosen = tried[found];
+        *period = c.period;
+        *ntried = tried[found].ratio <= good ? found + 1 : count;
+    }
+    free(c.p);
+    return r;
+}
+
+/* ---- crossings ---- */
+
+static bool cross(const double *a, const double *b, double *s, double *t)
+{
+    double u[2] = {a[2] - a[0], a[3] - a[1]}, v[2] = {b[2] - b[0], b[3] - b[1]}, w[2] = {b[0] - a[0], b[1] - a[1]};
+    double det = u[0] * v[1] - u[1] * v[0];
+    if (!(fabs(det) > 1e-300)) return false;
+    *s = (w[0] * v[1] - w[1] * v[0]) / det;
+    *t = (w[0] * u[1] - w[1] * u[0]) / det;
+    return *s >= 0 && *s < 1 && *t >= 0 && *t < 1;
+}
+
+int vgi_crossings(size_t n, const double *p, vgi_crossing **list, size_t *count, vg_err *e)
+{
+    size_t cap = 0;
+    double s, t;
+    *list = NULL;
+    *count = 0;
+    for (size_t i = 0; i + 3 < n; i++)
+        for (size_t j = i + 2; j + 1 < n; j++) {
+            if (!cross(p + 2 * i, p + 2 * j, &s, &t)) continue;
+            if (vgi_grow(list, &cap, *count + 1, sizeof **list, e) < 0) {
+                free(*list);
+                *list = NULL;
+                return VG_ENOMEM;
+            }
+            (*list)[(*count)++] = (vgi_crossing){1 + (double)i + s, 1 + (double)j + t};
+        }
+    return VG_OK;
+}

@@ -1,0 +1,142 @@
+/* plane.c: positions in the plane whose distances are as near as can be to given ones: stress majorisation.
+ *
+ * A step replaces p_i by the mean over j of p_j + distance_ij (p_i - p_j) / |p_i - p_j| (Guttman). It is done twice as far
+ * as long as that lowers the stress, which halves the number of steps.
+ * Leaves out which distances (layout.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "signal/signal.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+void vgi_distances(size_t n, size_t m, const double *x, size_t stride, double *square)
+{
+    for (size_t i = 0; i < n; i++) {
+        square[i * n + i] = 0;
+        for (size_t j = 0; j < i; j++) {
+            const double *a = x + i * stride, *b = x + j * stride;
+            double sum = 0;
+            for (size_t c = 0; c < m; c++) sum += (a[c] - b[c]) * (a[c] - b[c]);
+            square[i * n + j] = square[j * n + i] = sum;
+        }
+    }
+}
+
+double vgi_plane_radius(size_t n, const double *p, double centre[2])
+{
+    double c[2] = {0, 0}, sum = 0;
+    for (size_t i = 0; i < 2 * n; i++) c[i & 1] += p[i] / (double)n;
+    for (size_t i = 0; i < 2 * n; i++) sum += (p[i] - c[i & 1]) * (p[i] - c[i & 1]);
+    if (centre) centre[0] = c[0], centre[1] = c[1];
+    return sqrt(sum / (double)n);
+}
+
+/* What a step looks at: coordinates apart, so that frames lie side by side in registers. */
+typedef struct plane {
+    size_t n;
+    const double *distance;
+    double least; /* below it a distance in the plane counts as this */
+    const bool *held;
+    size_t nheld;
+} plane;
+
+enum { WIDE = 8 };
+
+/* Stress of frame i against all, twice for each pair in the end, and what pulls at it: the row of B P. */
+__attribute__((target_clones("avx2,fma", "default")))
+static double pull(const plane *s, size_t i, const double *x, const double *y, double bx[1], double by[1])
+{
+    const double *want = s->distance + i * s->n;
+    double xi = x[i], yi = y[i], least = s->least;
+    double sum[WIDE] = {0}, px[WIDE] = {0}, py[WIDE] = {0};
+    size_t j = 0;
+    for (; j + WIDE <= s->n; j += WIDE)
+        for (size_t q = 0; q < WIDE; q++) {
+            double dx = xi - x[j + q], dy = yi - y[j + q], d = sqrt(dx * dx + dy * dy), w = want[j + q];
+            double over = d - w, pulls = w / (d > least ? d : least);
+            sum[q] += over * over;
+            px[q] += pulls * dx;
+            py[q] += pulls * dy;
+        }
+    for (; j < s->n; j++) {
+        double dx = xi - x[j], dy = yi - y[j], d = sqrt(dx * dx + dy * dy), w = want[j];
+        double over = d - w, pulls = w / (d > least ? d : least);
+        sum[0] += over * over;
+        px[0] += pulls * dx;
+        py[0] += pulls * dy;
+    }
+    double total = 0, tx = 0, ty = 0;
+    for (size_t q = 0; q < WIDE; q++) total += sum[q], tx += px[q], ty += py[q];
+    *bx = tx, *by = ty;
+    return total;
+}
+
+/* The stress at p (x then y), and where a step leads. */
+static double step(const plane *s, const double *p, double *to)
+{
+    size_t n = s->n;
+    double stress = 0, sum[2] = {0, 0};
+    for (size_t i = 0; i < n; i++) stress += pull(s, i, p, p + n, to + i, to + n + i);
+    if (!s->nheld) {
+        for (size_t i = 0; i < 2 * n; i++) to[i] /= (double)n;
+        return stress / 2;
+    }
+    /* the others' part of the matrix n I - 1 1' has the inverse (I + 1 1' / nheld) / n */
+    double fixed[2] = {0, 0};
+    for (size_t i = 0; i < 2 * n; i++)
+        if (s->held[i % n]) fixed[i / n] += p[i];
+    for (size_t i = 0; i < 2 * n; i++)
+        if (!s->held[i % n]) sum[i / n] += to[i] += fixed[i / n];
+    for (size_t i = 0; i < 2 * n; i++)
+        to[i] = s->held[i % n] ? p[i] : (to[i] + sum[i / n] / (double)s->nheld) / (double)n;
+    return stress / 2;
+}
+
+static void swap(double **a, double **b)
+{
+    double *t = *a;
+    *a = *b, *b = t;
+}
+
+/* now: where it is; leads: where a step from there leads. After it, now is the end. */
+static vgi_stress_facts settle(const plane *s, double *room[4])
+{
+    enum { MOST_STEPS = 2000 };
+    double **now = &room[0], **leads = &room[1], **far = &room[2], **beyond = &room[3];
+    double stress = step(s, *now, *leads);
+    size_t steps = 1;
+    for (; steps < MOST_STEPS; steps++) {
+        for (size_t i = 0; i < 2 * s->n; i++) (*far)[i] = 2 * (*leads)[i] - (*now)[i];
+        double next = step(s, *far, *beyond);
+        if (next < stress) {
+            swap(now, far);
+            swap(leads, beyond);
+        } else {
+            swap(now, leads);
+            next = step(s, *now, *leads);
+        }
+        double less = stress - next;
+        stress = next;
+        if (!(less > 1e-7 * stress)) break;
+    }
+    swap(now, leads); /* the last one as it is */
+    return (vgi_stress_facts){.stress = step(s, *now, *leads), .steps = steps};
+}
+
+int vgi_plane_settle(size_t n, const double *distance, const bool *held, double *p, vgi_stress_facts *facts, vg_err *e)
+{
+    plane s = {.n = n, .distance = distance, .held = held};
+    double most = 0, *all = vgi_array(n, 8 * sizeof *all, e);
+    if (!all) return VG_ENOMEM;
+    for (size_t i = 0; i < n * n; i++) most = fmax(most, distance[i]);
+    for (size_t i = 0; held && i < n; i++) s.nheld += held[i];
+    s.least = most > 0 ? 1e-12 * most : 1;
+    double *room[4] = {all, all + 2 * n, all + 4 * n, all + 6 * n};
+    for (size_t i = 0; i < n; i++) room[0][i] = p[2 * i], room[0][n + i] = p[2 * i + 1];
+    vgi_stress_facts f = {0};
+    if (s.nheld < n) f = settle(&s, room);
+    for (size_t i = 0; i < n; i++) p[2 * i] = room[0][i], p[2 * i + 1] = room[0][n + i];
+    if (facts) *facts = f;
+    free(all);
+    return VG_OK;
+}

@@ -1,0 +1,162 @@
+/* signal.h: the numeric parts of continuous signals (MATH 11; after Cashman and Hormann 2012): arrays in, arrays out.
+ * Internal. Leaves out meshes and files. Frames are rows: an n x m array holds the m numbers of frame 0 first. Points
+ * of the pose plane are pairs. Times count frames from 1, as in the source: frame i (from 0) is at time i + 1.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_SIGNAL_PARTS_H
+#define VG_SIGNAL_PARTS_H
+
+#include "core/core.h"
+
+/* ---- basis.c: the shape signal h(x) = mean + sum x_j h_j ---- */
+
+typedef struct vgi_basis {
+    size_t n, d;
+    size_t rank;     /* basis vectors */
+    double *mean;    /* d */
+    double *centred; /* n x d: the poses less their mean */
+    double *vectors; /* rank x d: orthonormal rows h_j, by falling variance */
+    double *x;       /* n x rank: coordinates of the frames */
+    double *value;   /* rank: eigenvalues of the Gram matrix of the centred poses, falling */
+} vgi_basis;
+
+/* vgi_basis_make: principal components of n poses of d numbers by their Gram matrix. poses (n x d, from malloc) is
+ * taken over, also on failure. Eigenvalues up to 1e-14 of the largest are dropped. VG_ENOMEM. */
+int vgi_basis_make(vgi_basis *b, double *poses, size_t n, size_t d, int threads, vg_err *e) VG_MUST_CHECK;
+void vgi_basis_clear(vgi_basis *b);
+
+/* The distance between points of the poses and of what stands for them. */
+typedef struct vgi_error {
+    double most;  /* the largest distance of a point */
+    double rms;   /* over all points and frames */
+    double *of_frame; /* n: the largest of each frame; the caller's, may be NULL */
+} vgi_error;
+/* vgi_basis_error: poses of three numbers a point against h with the first m vectors at x (n x stride, stride >= m). */
+int vgi_basis_error(const vgi_basis *b, const double *x, size_t stride, size_t m, int threads, vgi_error *error,
+                    vg_err *e) VG_MUST_CHECK;
+
+/* ---- natural.c: natural cubic splines through values at 1, 2, ..., n ---- */
+
+/* vgi_natural_make: second derivatives (n x w) of the spline through x (n x w). room: n numbers. */
+void vgi_natural_make(size_t n, size_t w, const double *x, double *second, double *room);
+/* vgi_natural_at: w numbers at time t, clamped to 1 .. n. At t = i they are row i - 1 of x to the last bit. */
+void vgi_natural_at(size_t n, size_t w, const double *x, const double *second, double t, double *out);
+
+/* ---- plane.c: positions whose distances are those of the shapes ---- */
+
+/* vgi_distances: squares of the distances between n rows of m numbers (n x n), 0 on the diagonal. */
+void vgi_distances(size_t n, size_t m, const double *x, size_t stride, double *square);
+
+typedef struct vgi_stress_facts {
+    double stress; /* sum over pairs of (|p_i - p_j| - distance)^2 */
+    size_t steps;
+} vgi_stress_facts;
+/* vgi_plane_settle: Guttman's steps from p (n points) to a minimum of the stress; the stress never rises. distance: n
+ * x n. held (n, may be NULL): frames that stay where p has them. */
+int vgi_plane_settle(size_t n, const double *distance, const bool *held, double *p, vgi_stress_facts *facts,
+                     vg_err *e) VG_MUST_CHECK;
+/* vgi_plane_radius: root of the mean squared distance from the centroid; centre (2 numbers) may be NULL. */
+double vgi_plane_radius(size_t n, const double *p, double centre[2]);
+
+/* ---- layout.c: which distances ---- */
+
+typedef enum vgi_layout_kind { VGI_PLAIN, VGI_RING, VGI_TIME } vgi_layout_kind;
+typedef struct vgi_layout {
+    vgi_layout_kind kind;
+    double weight; /* of the ring or the time beside the shapes */
+    double ratio;  /* vgi_layout_judge's measure; NaN: not taken */
+} vgi_layout;
+typedef struct vgi_pin { /* a frame that the user has placed */
+    size_t frame;
+    double at[2];
+} vgi_pin;
+
+/* vgi_period: the length of a cycle in frames, 0: there is none. x: n x m. */
+int vgi_period(size_t n, size_t m, const double *x, double *period, vg_err *e) VG_MUST_CHECK;
+/* vgi_layout_make: positions p of rms radius 1, or with pins of about that, and the pins are met exactly. x: n x m
+ * principal coordinates. period: for VGI_RING. */
+int vgi_layout_make(const vgi_layout *layout, double period, size_t n, size_t m, const double *x, const vgi_pin *pins,
+                    size_t npins, double *p, vg_err *e) VG_MUST_CHECK;
+/* vgi_layout_judge: rms distance of the chain of full fidelity at these positions from a cubic spline through the x, a
+ * quarter, a half and three quarters between frames, beside that of straight lines. deviation (3 (n - 1) squares, may be
+ * NULL): beside the mean square of straight lines. */
+int vgi_layout_judge(size_t n, size_t m, const double *x, const double *p, double *ratio, double *deviation,
+                     vg_err *e) VG_MUST_CHECK;
+enum { VGI_LAYOUTS = 16 };
+/* vgi_layout_choose: the first candidate whose ratio is at most 0.6, or the best. tried: those that were judged, in
+ * order; *ntried at most VGI_LAYOUTS. */
+int vgi_layout_choose(size_t n, size_t m, const double *x, const vgi_pin *pins, size_t npins, int threads, double *p,
+                      vgi_layout *chosen, double *period, vgi_layout *tried, size_t *ntried, vg_err *e) VG_MUST_CHECK;
+
+typedef struct vgi_crossing {
+    double a, b; /* times at which the curve is at the same place, a < b */
+} vgi_crossing;
+/* vgi_crossings: of a polyline of n points; times count its points from 1. *list is the caller's to free. */
+int vgi_crossings(size_t n, const double *p, vgi_crossing **list, size_t *count, vg_err *e) VG_MUST_CHECK;
+
+/* ---- spline_pose.c: the pose signal g, a thin-plate spline ---- */
+
+typedef struct vgi_plate {
+    size_t n;        /* frames */
+    size_t anchors;  /* the first sites, whose functions are the linear ones: 3; 2 when all is on a line, 1 at a
+                        point */
+    size_t l;        /* sites */
+    size_t most;     /* sites that there is room for */
+    double centre[2], scale; /* of the plane: what is computed with is (p - centre) / scale */
+    double bary[9];  /* barycentric coordinates in the anchors are bary (3 x 3, row-major) times (1, x, y) */
+    double *p;       /* n points, scaled */
+    uint32_t *site;  /* l frames; the first `anchors` are the anchors */
+    double *weight;  /* l x 3: barycentric coordinates of the sites */
+    double *anchor;  /* 3 x n: radial functions of the anchors on the frames */
+    double *q;       /* l x n: orthonormal functions on the frames; the first r span what r sites can say */
+    double *r;       /* most x most, row-major, upper triangle: function j itself is sum_i q_i r_ij */
+} vgi_plate;
+
+typedef enum vgi_site_rule { VGI_FARTHEST, VGI_GAIN } vgi_site_rule;
+/* vgi_plate_order: all sites that are of use, in the order in which they help most: n positions p, n x m coordinates
+ * x. */
+int vgi_plate_order(vgi_plate *s, size_t n, size_t m, const double *p, const double *x, size_t stride,
+                    vgi_site_rule rule, vg_err *e) VG_MUST_CHECK;
+/* vgi_plate_make: these sites, the anchors among them first; those that say nothing that others do not are left out. */
+int vgi_plate_make(vgi_plate *s, size_t n, const double *p, const uint32_t *sites, size_t l, vg_err *e) VG_MUST_CHECK;
+void vgi_plate_clear(vgi_plate *s);
+/* vgi_plate_fitted: g at the frames with the first l sites: fitted (n x m) from x (n x stride). room: l * m. */
+void vgi_plate_fitted(const vgi_plate *s, size_t l, size_t m, const double *x, size_t stride, double *fitted,
+                      double *room);
+/* vgi_plate_solve: coefficients (l x m) of the first l sites: of barycentric coordinates, then of functions of
+ * sites. */
+void vgi_plate_solve(const vgi_plate *s, size_t l, size_t m, const double *x, size_t stride, double *coefficients);
+/* vgi_plate_functions: the l functions at a point of the plane: g(p) = their sum times coefficients. */
+void vgi_plate_functions(const vgi_plate *s, size_t l, const double p[2], double *functions);
+
+/* ---- spline_time.c: the time signal f, a cubic spline with natural ends ---- */
+
+typedef struct vgi_curve {
+    size_t n, k;
+    double *t;       /* n: parameters of the frames, rising */
+    double *slope;   /* n: of the monotone interpolant from time to parameter */
+    double *knot;    /* k + 4, the first and last four alike */
+    double *control; /* k points */
+} vgi_curve;
+
+/* vgi_parameters: centripetal parameters t of n points. */
+void vgi_parameters(size_t n, const double *p, double *t);
+/* vgi_monotone_slopes: Fritsch and Carlson's slopes of the monotone interpolant of y at 1, 2, ..., n. */
+void vgi_monotone_slopes(size_t n, const double *y, double *slope);
+double vgi_monotone_at(size_t n, const double *y, const double *slope, double x); /* x clamped to 1 .. n */
+/* vgi_curve_fit: least squares with natural ends; knots at the parameters of the frames `at` (count >= 2, ascending,
+ * from 0 to n - 1): k = count + 2. n >= 2. */
+int vgi_curve_fit(vgi_curve *c, size_t n, const double *p, const double *t, const uint32_t *at, size_t count,
+                  vg_err *e) VG_MUST_CHECK;
+void vgi_curve_clear(vgi_curve *c);
+int vgi_curve_copy(vgi_curve *to, const vgi_curve *from, vg_err *e) VG_MUST_CHECK;
+double vgi_curve_parameter(const vgi_curve *c, double time);
+void vgi_curve_point(const vgi_curve *c, double parameter, double p[2]);
+void vgi_curve_at(const vgi_curve *c, double time, double p[2]);
+/* vgi_curve_order: frames in the order in which their parameters help most as knots, first the two ends. order: n. */
+int vgi_curve_order(size_t n, const double *p, const double *t, uint32_t *order, vg_err *e) VG_MUST_CHECK;
+/* vgi_curve_insert: one more knot and control point; the curve stays as it is. VG_EARG outside of the ends. */
+int vgi_curve_insert(vgi_curve *c, double parameter, vg_err *e) VG_MUST_CHECK;
+/* vgi_curve_remove: a control point and a knot less; VG_EARG for the first and last two, and when four are left. */
+int vgi_curve_remove(vgi_curve *c, size_t control, vg_err *e) VG_MUST_CHECK;
+
+#endif

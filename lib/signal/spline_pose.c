@@ -1,0 +1,400 @@
+/* spline_pose.c: the pose signal: a thin-plate spline from the plane to shape coordinates, least squares over all frames.
+ *
+ * The sites are frames. Coefficients of the radial functions shall be orthogonal to linear functions at the sites (else
+ * the fit depends on the scale of the plane), so the function of a site beyond the anchors is
+ * phi(|s_j - p|) - sum_a lambda_a(s_j) phi(|s_a - p|), lambda the barycentric coordinates in the anchors. Together with
+ * the lambda these span all that the sites can say; they are orthogonalised one by one on the frames, so that a fit with
+ * fewer sites is the beginning of one with more.
+ * Leaves out how positions are found (layout.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "numeric/blas.h"
+#include "signal/signal.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static const double nearest = 1e-3;  /* sites keep this from one another: near duplicates ruin the surface */
+static const double dependent = 1e-9; /* what is left of a function, beside it, that says nothing new */
+
+static double phi(double square)
+{
+    return square > 0 ? 0.5 * square * log(square) : 0;
+}
+
+static double square_between(const double a[2], const double b[2])
+{
+    return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]);
+}
+
+void vgi_plate_clear(vgi_plate *s)
+{
+    free(s->p);
+    free(s->site);
+    free(s->weight);
+    free(s->anchor);
+    free(s->q);
+    free(s->r);
+    *s = (vgi_plate){0};
+}
+
+static int start(vgi_plate *s, size_t n, size_t most, const double *p, vg_err *e)
+{
+    *s = (vgi_plate){.n = n, .most = most};
+    if (!(s->p = vgi_array(n, 2 * sizeof *s->p, e)) || !(s->site = vgi_array(most, sizeof *s->site, e)) ||
+        !(s->weight = vgi_array(most, 3 * sizeof *s->weight, e)) || !(s->anchor = vgi_array(n, 3 * sizeof(double), e)) ||
+        !(s->q = vgi_array(most * n, sizeof *s->q, e)) || !(s->r = vgi_array(most * most, sizeof *s->r, e)))
+        return VG_ENOMEM;
+    s->scale = vgi_plane_radius(n, p, s->centre);
+    if (!(s->scale > 0)) s->scale = 1;
+    for (size_t i = 0; i < 2 * n; i++) s->p[i] = (p[i] - s->centre[i & 1]) / s->scale;
+    return VG_OK;
+}
+
+/* ---- anchors: the first sites, far apart ---- */
+
+static void barycentric(const vgi_plate *s, const double p[2], double lambda[3])
+{
+    for (int a = 0; a < 3; a++) lambda[a] = s->bary[3 * a] + s->bary[3 * a + 1] * p[0] + s->bary[3 * a + 2] * p[1];
+}
+
+/* Coordinate a is 1 at anchor a and 0 at the others. */
+static void set_barycentric(vgi_plate *s)
+{
+    const double *a = s->p + 2 * s->site[0], *b = a, *c = a;
+    double *m = s->bary;
+    memset(m, 0, sizeof s->bary);
+    if (s->anchors > 1) b = s->p + 2 * s->site[1];
+    if (s->anchors > 2) c = s->p + 2 * s->site[2];
+    double u[2] = {b[0] - a[0], b[1] - a[1]}, v[2] = {c[0] - a[0], c[1] - a[1]};
+    if (s->anchors == 3) {
+        double det = u[0] * v[1] - u[1] * v[0];
+        m[4] = v[1] / det, m[5] = -v[0] / det;
+        m[7] = -u[1] / det, m[8] = u[0] / det;
+    } else if (s->anchors == 2) {
+        double square = u[0] * u[0] + u[1] * u[1];
+        m[4] = u[0] / square, m[5] = u[1] / square;
+    }
+    for (int k = 3; k < 9; k += 3) m[k] = -(m[k + 1] * a[0] + m[k + 2] * a[1]);
+    m[0] = 1 - m[3] - m[6], m[1] = -m[4] - m[7], m[2] = -m[5] - m[8];
+}
+
+/* Of `among` (count frames) the one farthest from the origin, the one farthest from that, the one that makes the largest
+ * triangle. */
+static void choose_anchors(vgi_plate *s, const uint32_t *among, size_t count)
+{
+    static const double origin[2] = {0, 0};
+    const double *a = origin, *b = NULL;
+    double most = -1;
+    for (size_t i = 0; i < count; i++) {
+        double far = square_between(s->p + 2 * among[i], origin);
+        if (far > most) most = far, s->site[0] = among[i];
+    }
+    a = s->p + 2 * s->site[0];
+    most = 0;
+    for (size_t i = 0; i < count; i++) {
+        double far = square_between(s->p + 2 * among[i], a);
+        if (far > most) most = far, s->site[1] = among[i];
+    }
+    s->anchors = most > nearest * nearest ? 2 : 1;
+    if (s->anchors < 2) return;
+    b = s->p + 2 * s->site[1];
+    double large = 1e-9 * most;
+    for (size_t i = 0; i < count; i++) {
+        const double *c = s->p + 2 * among[i];
+        double area = fabs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+        if (area > large) large = area, s->site[2] = among[i], s->anchors = 3;
+    }
+}
+
+/* ---- functions, orthogonalised on the frames ---- */
+
+/* v -= sum of the rows of q times their products with v, which are added to c; four rows at a time */
+__attribute__((target_clones("avx2,fma", "default")))
+static void project(const double *q, size_t rows, size_t n, double *v, double *c, size_t stride)
+{
+    size_t j = 0;
+    for (; j + 4 <= rows; j += 4) {
+        const double *a = q + j * n, *b = a + n, *d = b + n, *f = d + n;
+        double s[4][4] = {{0}};
+        size_t i = 0;
+        for (; i + 4 <= n; i += 4)
+            for (size_t k = 0; k < 4; k++) {
+                double x = v[i + k];
+                s[0][k] += a[i + k] * x, s[1][k] += b[i + k] * x, s[2][k] += d[i + k] * x, s[3][k] += f[i + k] * x;
+            }
+        for (; i < n; i++) s[0][0] += a[i] * v[i], s[1][0] += b[i] * v[i], s[2][0] += d[i] * v[i], s[3][0] += f[i] * v[i];
+        double t[4];
+        for (size_t k = 0; k < 4; k++) {
+            t[k] = (s[k][0] + s[k][1]) + (s[k][2] + s[k][3]);
+            c[(j + k) * stride] += t[k];
+        }
+        for (i = 0; i < n; i++) v[i] -= (t[0] * a[i] + t[1] * b[i]) + (t[2] * d[i] + t[3] * f[i]);
+    }
+    for (; j < rows; j++) {
+        const double *a = q + j * n;
+        double t = 0;
+        for (size_t i = 0; i < n; i++) t += a[i] * v[i];
+        c[j * stride] += t;
+        for (size_t i = 0; i < n; i++) v[i] -= t * a[i];
+    }
+}
+
+static double norm(const double *v, size_t n)
+{
+    double sum = 0;
+    for (size_t i = 0; i < n; i++) sum += v[i] * v[i];
+    return sqrt(sum);
+}
+
+/* The function in the next row of q becomes orthogonal to the others, of norm 1, and counts. false: nothing is left of
+ * it beside `size`. */
+static bool orthogonalise(vgi_plate *s, double size)
+{
+    size_t j = s->l;
+    double *v = s->q + j * s->n, *column = s->r + j;
+    for (size_t i = 0; i < j; i++) column[i * s->most] = 0;
+    for (int pass = 0; pass < 2; pass++) project(s->q, j, s->n, v, column, s->most);
+    double left = norm(v, s->n);
+    if (!(left > dependent * size)) return false;
+    column[j * s->most] = left;
+    for (size_t i = 0; i < s->n; i++) v[i] /= left;
+    s->l = j + 1;
+    return true;
+}
+
+static void add_anchors(vgi_plate *s)
+{
+    set_barycentric(s);
+    for (size_t a = 0; a < s->anchors; a++) {
+        double *v = s->q + a * s->n, lambda[3];
+        const double *at = s->p + 2 * s->site[a];
+        for (size_t i = 0; i < s->n; i++) {
+            barycentric(s, s->p + 2 * i, lambda);
+            v[i] = lambda[a];
+            s->anchor[a * s->n + i] = phi(square_between(s->p + 2 * i, at));
+        }
+        if (!orthogonalise(s, norm(v, s->n))) {
+            s->anchors = a; /* cannot be: they are 0 and 1 at the anchors themselves */
+            return;
+        }
+    }
+}
+
+/* The function of a site, on all frames. Returns the norm of its radial part. */
+static double write_function(const vgi_plate *s, size_t site, double *v, double lambda[3])
+{
+    double sum = 0;
+    barycentric(s, s->p + 2 * site, lambda);
+    for (size_t i = 0; i < s->n; i++) {
+        double f = phi(square_between(s->p + 2 * i, s->p + 2 * site));
+        sum += f * f;
+        for (size_t a = 0; a < s->anchors; a++) f -= lambda[a] * s->anchor[a * s->n + i];
+        v[i] = f;
+    }
+    return sqrt(sum);
+}
+
+static bool near_others(const vgi_plate *s, size_t site)
+{
+    for (size_t j = 0; j < s->l; j++)
+        if (square_between(s->p + 2 * site, s->p + 2 * s->site[j]) < nearest * nearest) return true;
+    return false;
+}
+
+static bool add_site(vgi_plate *s, size_t site)
+{
+    if (s->l == s->most || near_others(s, site)) return false;
+    double *lambda = s->weight + 3 * s->l, size = write_function(s, site, s->q + s->l * s->n, lambda);
+    s->site[s->l] = (uint32_t)site;
+    return orthogonalise(s, size);
+}
+
+int vgi_plate_make(vgi_plate *s, size_t n, const double *p, const uint32_t *sites, size_t l, vg_err *e)
+{
+    if (start(s, n, l < 3 ? 3 : l, p, e) < 0) {
+        vgi_plate_clear(s);
+        return VG_ENOMEM;
+    }
+    choose_anchors(s, sites, l);
+    add_anchors(s);
+    for (size_t j = 0; j < l; j++) add_site(s, sites[j]); /* the anchors are near themselves */
+    return VG_OK;
+}
+
+/* ---- the order of all sites ---- */
+
+typedef struct greedy {
+    vgi_plate *s;
+    size_t m;
+    double *rest;   /* n x m: what is not said yet */
+    double *square; /* n: of its rows */
+    double *sums;   /* m */
+    bool *used;     /* n */
+    double *left;   /* VGI_GAIN: n x n: the functions of all frames, less what is said; their products with rest */
+    double *match;  /* n x m */
+    double *along;  /* n */
+} greedy;
+
+/* rest -= v v' rest */
+__attribute__((target_clones("avx2,fma", "default")))
+static void take_out(greedy *g, const double *v)
+{
+    size_t n = g->s->n, m = g->m;
+    double *restrict w = g->sums;
+    memset(w, 0, m * sizeof *w);
+    for (size_t i = 0; i < n; i++) {
+        const double *row = g->rest + i * m;
+        double f = v[i];
+        for (size_t c = 0; c < m; c++) w[c] += f * row[c];
+    }
+    for (size_t i = 0; i < n; i++) {
+        double *row = g->rest + i * m, f = v[i], sum[4] = {0};
+        size_t c = 0;
+        for (; c + 4 <= m; c += 4)
+            for (size_t k = 0; k < 4; k++) {
+                double x = row[c + k] - f * w[c + k];
+                row[c + k] = x;
+                sum[k] += x * x;
+            }
+        for (; c < m; c++) row[c] -= f * w[c], sum[0] += row[c] * row[c];
+        g->square[i] = (sum[0] + sum[1]) + (sum[2] + sum[3]);
+    }
+}
+
+static size_t farthest(const greedy *g)
+{
+    size_t best = SIZE_MAX;
+    for (size_t i = 0; i < g->s->n; i++)
+        if (!g->used[i] && (best == SIZE_MAX || g->square[i] > g->square[best])) best = i;
+    return best;
+}
+
+static size_t most_gain(const greedy *g)
+{
+    size_t n = g->s->n, m = g->m, best = SIZE_MAX;
+    double most = -1;
+    for (size_t i = 0; i < n; i++) {
+        double match = 0, size = 0;
+        if (g->used[i]) continue;
+        for (size_t c = 0; c < m; c++) match += g->match[i * m + c] * g->match[i * m + c];
+        for (size_t c = 0; c < n; c++) size += g->left[i * n + c] * g->left[i * n + c];
+        double gain = size > 0 ? match / size : 0;
+        if (gain > most) most = gain, best = i;
+    }
+    return best;
+}
+
+/* What v says is said: of the functions that are left, and of their products with what is not said. */
+static void take_out_gain(greedy *g, const double *v)
+{
+    size_t n = g->s->n, m = g->m;
+    for (size_t i = 0; i < n; i++) {
+        double along = 0;
+        for (size_t c = 0; c < n; c++) along += g->left[i * n + c] * v[c];
+        for (size_t c = 0; c < n; c++) g->left[i * n + c] -= along * v[c];
+        for (size_t c = 0; c < m; c++) g->match[i * m + c] -= along * g->sums[c];
+    }
+}
+
+static int start_gain(greedy *g, vg_err *e)
+{
+    size_t n = g->s->n, m = g->m;
+    double lambda[3];
+    if (!(g->left = vgi_array(n * n, sizeof *g->left, e)) || !(g->match = vgi_array(n * m, sizeof *g->match, e)) ||
+        !(g->along = vgi_array(n, sizeof *g->along, e)))
+        return VG_ENOMEM;
+    for (size_t i = 0; i < n; i++) write_function(g->s, i, g->left + i * n, lambda);
+    for (size_t i = 0; i < n; i++) {
+        memset(g->along, 0, n * sizeof *g->along);
+        project(g->s->q, g->s->l, n, g->left + i * n, g->along, 1);
+    }
+    vgi_product_double(n, m, n, g->left, n, g->rest, m, g->match, m);
+    return VG_OK;
+}
+
+static int run(greedy *g, vgi_site_rule rule, vg_err *e)
+{
+    vgi_plate *s = g->s;
+    for (size_t j = 0; j < s->l; j++) {
+        take_out(g, s->q + j * s->n);
+        g->used[s->site[j]] = true;
+    }
+    if (rule == VGI_GAIN && start_gain(g, e) < 0) return VG_ENOMEM;
+    for (size_t next; (next = rule == VGI_GAIN ? most_gain(g) : farthest(g)) != SIZE_MAX;) {
+        g->used[next] = true;
+        if (!add_site(s, next)) continue;
+        const double *v = s->q + (s->l - 1) * s->n;
+        take_out(g, v);
+        if (rule == VGI_GAIN) take_out_gain(g, v);
+    }
+    return VG_OK;
+}
+
+int vgi_plate_order(vgi_plate *s, size_t n, size_t m, const double *p, const double *x, size_t stride,
+                    vgi_site_rule rule, vg_err *e)
+{
+    greedy g = {.s = s, .m = m};
+    int r = start(s, n, n < 3 ? 3 : n, p, e);
+    uint32_t *all = vgi_array(n, sizeof *all, e);
+    if (r < 0 || !all || !(g.rest = vgi_array(n * m, sizeof *g.rest, e)) ||
+        !(g.square = vgi_array(n, sizeof *g.square, e)) || !(g.sums = vgi_array(m, sizeof *g.sums, e)) ||
+        !(g.used = vgi_array(n, sizeof *g.used, e))) {
+        r = VG_ENOMEM;
+        goto out;
+    }
+    for (size_t i = 0; i < n; i++) {
+        all[i] = (uint32_t)i;
+        memcpy(g.rest + i * m, x + i * stride, m * sizeof *x);
+    }
+    choose_anchors(s, all, n);
+    add_anchors(s);
+    r = run(&g, rule, e);
+out:
+    free(all);
+    free(g.rest);
+    free(g.square);
+    free(g.sums);
+    free(g.used);
+    free(g.left);
+    free(g.match);
+    free(g.along);
+    if (r < 0) vgi_plate_clear(s);
+    return r;
+}
+
+/* ---- the surface ---- */
+
+void vgi_plate_fitted(const vgi_plate *s, size_t l, size_t m, const double *x, size_t stride, double *fitted,
+                      double *room)
+{
+    vgi_product_double(l, m, s->n, s->q, s->n, x, stride, room, m);
+    vgi_product_transposed_double(s->n, m, l, s->q, s->n, room, m, fitted, m);
+}
+
+void vgi_plate_solve(const vgi_plate *s, size_t l, size_t m, const double *x, size_t stride, double *coefficients)
+{
+    if (m) vgi_product_double(l, m, s->n, s->q, s->n, x, stride, coefficients, m);
+    for (size_t i = l; i-- > 0;) {
+        double *row = coefficients + i * m;
+        for (size_t k = i + 1; k < l; k++) {
+            double f = s->r[i * s->most + k];
+            for (size_t c = 0; c < m; c++) row[c] -= f * coefficients[k * m + c];
+        }
+        for (size_t c = 0; c < m; c++) row[c] /= s->r[i * s->most + i];
+    }
+}
+
+void vgi_plate_functions(const vgi_plate *s, size_t l, const double p[2], double *functions)
+{
+    double at[2] = {(p[0] - s->centre[0]) / s->scale, (p[1] - s->centre[1]) / s->scale}, lambda[3], base[3];
+    barycentric(s, at, lambda);
+    for (size_t a = 0; a < s->anchors; a++) {
+        functions[a] = lambda[a];
+        base[a] = phi(square_between(at, s->p + 2 * s->site[a]));
+    }
+    for (size_t j = s->anchors; j < l; j++) {
+        double f = phi(square_between(at, s->p + 2 * s->site[j]));
+        for (size_t a = 0; a < s->anchors; a++) f -= s->weight[3 * j + a] * base[a];
+        functions[j] = f;
+    }
+}

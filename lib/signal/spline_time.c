@@ -1,0 +1,343 @@
+/* spline_time.c: the time signal: a cubic B-spline with natural ends, from a parameter that rises with time.
+ *
+ * Control points f_0 .. f_(k-1) over knots U_0 .. U_(k+3), the first and last four alike. Natural ends: f_0 / a - f_1 (1/a
+ * + 1/b) + f_2 / b = 0 with a = U_4 - U_1, b = U_5 - U_2, and mirrored; they leave k - 2 unknowns. Inner knots are
+ * parameters of frames, so that the least-squares system has full rank for any choice of them.
+ * Leaves out splines at whole times (natural.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "signal/signal.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* ---- time to parameter ---- */
+
+void vgi_parameters(size_t n, const double *p, double *t)
+{
+    double mean = 0;
+    for (size_t i = 0; i + 1 < n; i++) {
+        t[i + 1] = sqrt(hypot(p[2 * i + 2] - p[2 * i], p[2 * i + 3] - p[2 * i + 1]));
+        mean += t[i + 1] / (double)(n - 1);
+    }
+    if (!(mean > 0)) mean = 1;
+    t[0] = 0;
+    for (size_t i = 1; i < n; i++) t[i] = t[i - 1] + fmax(t[i], 1e-3 * mean);
+}
+
+void vgi_monotone_slopes(size_t n, const double *y, double *slope)
+{
+    if (n < 2) {
+        if (n) slope[0] = 0;
+        return;
+    }
+    for (size_t i = 1; i + 1 < n; i++) slope[i] = (y[i + 1] - y[i - 1]) / 2;
+    double first = y[1] - y[0], last = y[n - 1] - y[n - 2];
+    slope[0] = n > 2 ? (3 * first - (y[2] - y[1])) / 2 : first;
+    slope[n - 1] = n > 2 ? (3 * last - (y[n - 2] - y[n - 3])) / 2 : last;
+    for (size_t i = 0; i < n; i++) slope[i] = fmax(slope[i], 0);
+    for (size_t i = 0; i + 1 < n; i++)
+        if (!(y[i + 1] > y[i])) slope[i] = slope[i + 1] = 0;
+    for (size_t i = 0; i + 1 < n; i++) {
+        double rise = y[i + 1] - y[i];
+        if (!(rise > 0)) continue;
+        double a = slope[i] / rise, b = slope[i + 1] / rise, square = a * a + b * b;
+        if (square > 9) slope[i] = 3 / sqrt(square) * a * rise, slope[i + 1] = 3 / sqrt(square) * b * rise;
+    }
+}
+
+double vgi_monotone_at(size_t n, const double *y, const double *slope, double x)
+{
+    double s = fmin(fmax(x - 1, 0), (double)(n - 1));
+    size_t i = (size_t)s;
+    if (i + 1 >= n) return y[n - 1];
+    double h = s - (double)i, g = 1 - h;
+    if (h == 0) return y[i];
+    return y[i] * (1 + 2 * h) * g * g + slope[i] * h * g * g + y[i + 1] * h * h * (3 - 2 * h) - slope[i + 1] * h * h * g;
+}
+
+/* ---- the spline ---- */
+
+void vgi_curve_clear(vgi_curve *c)
+{
+    free(c->t);
+    free(c->slope);
+    free(c->knot);
+    free(c->control);
+    *c = (vgi_curve){0};
+}
+
+int vgi_curve_copy(vgi_curve *to, const vgi_curve *from, vg_err *e)
+{
+    *to = (vgi_curve){.n = from->n, .k = from->k};
+    if (!(to->t = vgi_copy_array(from->t, from->n, sizeof *to->t, e)) ||
+        !(to->slope = vgi_copy_array(from->slope, from->n, sizeof *to->slope, e)) ||
+        !(to->knot = vgi_copy_array(from->knot, from->k + 4, sizeof *to->knot, e)) ||
+        !(to->control = vgi_copy_array(from->control, from->k, 2 * sizeof *to->control, e))) {
+        vgi_curve_clear(to);
+        return VG_ENOMEM;
+    }
+    return VG_OK;
+}
+
+/* The four functions that are not 0 at u; the first is number s - 3, which is returned. */
+static size_t basis_at(const double *knot, size_t k, double u, double b[4])
+{
+    size_t low = 3, high = k; /* knot[low] <= u < knot[high], but at the end */
+    while (high - low > 1) {
+        size_t middle = (low + high) / 2;
+        if (u < knot[middle]) high = middle;
+        else low = middle;
+    }
+    while (low > 3 && knot[low] == knot[low + 1]) low--;
+    b[0] = 1;
+    for (size_t d = 1; d < 4; d++) {
+        double kept = 0;
+        for (size_t a = 0; a < d; a++) {
+            double right = knot[low + a + 1], left = knot[low + 1 + a - d], w = right > left ? b[a] / (right - left) : 0;
+            b[a] = kept + (right - u) * w;
+            kept = (u - left) * w;
+        }
+        b[d] = kept;
+    }
+    return low - 3;
+}
+
+double vgi_curve_parameter(const vgi_curve *c, double time)
+{
+    return vgi_monotone_at(c->n, c->t, c->slope, time);
+}
+
+void vgi_curve_point(const vgi_curve *c, double parameter, double p[2])
+{
+    double b[4], u = fmin(fmax(parameter, c->knot[3]), c->knot[c->k]);
+    size_t first = basis_at(c->knot, c->k, u, b);
+    const double *f = c->control + 2 * first;
+    for (int q = 0; q < 2; q++) p[q] = (b[0] * f[q] + b[1] * f[2 + q]) + (b[2] * f[4 + q] + b[3] * f[6 + q]);
+}
+
+void vgi_curve_at(const vgi_curve *c, double time, double p[2])
+{
+    vgi_curve_point(c, vgi_curve_parameter(c, time), p);
+}
+
+/* ---- least squares ---- */
+
+/* f_0 = one f_1 + two f_2, and the same from the other end. */
+typedef struct ends {
+    double one, two;
+} ends;
+
+static ends natural_end(double a, double b) /* f_0 / a - f_1 (1 / a + 1 / b) + f_2 / b = 0 */
+{
+    return (ends){1 + a / b, -a / b};
+}
+
+/* Rows of the system, turned into an upper triangle of width 4 by rotations as they come. */
+typedef struct band {
+    size_t unknowns;
+    double *r; /* unknowns x 4: row i holds columns i .. i + 3 */
+    double *y; /* unknowns x 2 */
+} band;
+
+static void add_row(band *s, size_t at, double row[4], double right[2])
+{
+    for (size_t step = 0; step < 4 && at < s->unknowns; step++, at++) {
+        double *r = s->r + 4 * at, *y = s->y + 2 * at, size = hypot(r[0], row[0]);
+        if (row[0] != 0) {
+            double c = r[0] / size, q = row[0] / size;
+            for (int k = 0; k < 4; k++) {
+                double a = r[k], b = row[k];
+                r[k] = c * a + q * b;
+                row[k] = c * b - q * a;
+            }
+            for (int k = 0; k < 2; k++) {
+                double a = y[k], b = right[k];
+                y[k] = c * a + q * b;
+                right[k] = c * b - q * a;
+            }
+        }
+        for (int k = 0; k < 3; k++) row[k] = row[k + 1];
+        row[3] = 0;
+    }
+}
+
+/* The row of the functions b from number `first` on, with the ends put in: from what unknown it starts. */
+static size_t reduce(size_t k, size_t first, const double b[4], ends front, ends back, double row[4])
+{
+    double all[6] = {0}; /* from function first - 1 on */
+    for (size_t q = 0; q < 4; q++) {
+        size_t j = first + q;
+        if (j == 0) all[q + 2] += front.one * b[q], all[q + 3] += front.two * b[q];
+        else if (j == k - 1) all[q] += back.one * b[q], all[q - 1] += back.two * b[q];
+        else all[q + 1] += b[q];
+    }
+    size_t at = first > 0 ? first - 1 : 0; /* unknown i is function i + 1 */
+    memcpy(row, all + (first > 0 ? 1 : 2), 4 * sizeof *row);
+    return at;
+}
+
+static void solve_band(const band *s)
+{
+    for (size_t i = s->unknowns; i-- > 0;)
+        for (int k = 0; k < 2; k++) {
+            double x = s->y[2 * i + k];
+            for (size_t q = 1; q < 4 && i + q < s->unknowns; q++) x -= s->r[4 * i + q] * s->y[2 * (i + q) + k];
+            s->y[2 * i + k] = s->r[4 * i] != 0 ? x / s->r[4 * i] : 0;
+        }
+}
+
+static void solve_control(vgi_curve *c, const double *p, band *s)
+{
+    size_t k = c->k;
+    const double *u = c->knot;
+    ends front = natural_end(u[4] - u[1], u[5] - u[2]), back = natural_end(u[k + 2] - u[k - 1], u[k + 1] - u[k - 2]);
+    s->unknowns = k - 2;
+    memset(s->r, 0, 4 * s->unknowns * sizeof *s->r);
+    memset(s->y, 0, 2 * s->unknowns * sizeof *s->y);
+    for (size_t i = 0; i < c->n; i++) {
+        double b[4], row[4], right[2] = {p[2 * i], p[2 * i + 1]};
+        size_t first = basis_at(u, k, c->t[i], b);
+        size_t at = reduce(k, first, b, front, back, row);
+        add_row(s, at, row, right);
+    }
+    solve_band(s);
+    double *f = c->control, *g = f + 2 * (k - 1);
+    memcpy(f + 2, s->y, 2 * s->unknowns * sizeof *f);
+    for (int q = 0; q < 2; q++) {
+        f[q] = front.one * f[2 + q] + front.two * f[4 + q];
+        g[q] = back.one * (g - 2)[q] + back.two * (g - 4)[q];
+    }
+}
+
+/* knots at the parameters of frames */
+static void set_knots(vgi_curve *c, const uint32_t *at, size_t count)
+{
+    c->k = count + 2;
+    for (size_t i = 0; i < 3; i++) c->knot[i] = c->t[0], c->knot[c->k + 1 + i] = c->t[c->n - 1];
+    for (size_t i = 0; i < count; i++) c->knot[3 + i] = c->t[at[i]];
+}
+
+static int make_room(vgi_curve *c, band *s, size_t n, const double *t, size_t most, vg_err *e)
+{
+    *c = (vgi_curve){.n = n};
+    *s = (band){0};
+    if (!(c->t = vgi_copy_array(t, n, sizeof *t, e)) || !(c->slope = vgi_array(n, sizeof *c->slope, e)) ||
+        !(c->knot = vgi_array(most + 4, sizeof *c->knot, e)) ||
+        !(c->control = vgi_array(most, 2 * sizeof *c->control, e)) ||
+        !(s->r = vgi_array(most, 4 * sizeof *s->r, e)) || !(s->y = vgi_array(most, 2 * sizeof *s->y, e)))
+        return VG_ENOMEM;
+    vgi_monotone_slopes(n, c->t, c->slope);
+    return VG_OK;
+}
+
+static void clear_band(band *s)
+{
+    free(s->r);
+    free(s->y);
+}
+
+int vgi_curve_fit(vgi_curve *c, size_t n, const double *p, const double *t, const uint32_t *at, size_t count, vg_err *e)
+{
+    band s;
+    int r = make_room(c, &s, n, t, count + 2, e);
+    if (r == VG_OK) {
+        set_knots(c, at, count);
+        solve_control(c, p, &s);
+    } else vgi_curve_clear(c);
+    clear_band(&s);
+    return r;
+}
+
+/* ---- which frames give knots ---- */
+
+static int by_number(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* The frame farthest from the curve, knots not counted; n: all are knots. */
+static size_t farthest_frame(const vgi_curve *c, const double *p, const bool *used)
+{
+    size_t best = c->n;
+    double most = -1;
+    for (size_t i = 0; i < c->n; i++) {
+        double at[2];
+        if (used[i]) continue;
+        vgi_curve_point(c, c->t[i], at);
+        double far = hypot(at[0] - p[2 * i], at[1] - p[2 * i + 1]);
+        if (far > most) most = far, best = i;
+    }
+    return best;
+}
+
+int vgi_curve_order(size_t n, const double *p, const double *t, uint32_t *order, vg_err *e)
+{
+    vgi_curve c;
+    band s;
+    bool *used = vgi_array(n, sizeof *used, e);
+    uint32_t *sorted = vgi_array(n, sizeof *sorted, e);
+    int r = make_room(&c, &s, n, t, n + 2, e);
+    if (r < 0 || !used || !sorted) {
+        r = VG_ENOMEM;
+        goto out;
+    }
+    order[0] = 0, order[1] = (uint32_t)n - 1;
+    used[0] = used[n - 1] = true;
+    for (size_t count = 2; count < n; count++) {
+        memcpy(sorted, order, count * sizeof *order);
+        qsort(sorted, count, sizeof *sorted, by_number);
+        set_knots(&c, sorted, count);
+        solve_control(&c, p, &s);
+        size_t next = farthest_frame(&c, p, used);
+        order[count] = (uint32_t)next;
+        used[next] = true;
+    }
+out:
+    free(used);
+    free(sorted);
+    clear_band(&s);
+    vgi_curve_clear(&c);
+    return r;
+}
+
+/* ---- more and fewer control points ---- */
+
+int vgi_curve_insert(vgi_curve *c, double parameter, vg_err *e)
+{
+    size_t k = c->k, at = 3;
+    if (!(parameter > c->knot[3] && parameter < c->knot[k]))
+        return vg_fail(e, VG_EARG, "a control point can only be added between the first and the last frame");
+    while (at + 1 < k && c->knot[at + 1] <= parameter) at++;
+    double *knot = vgi_array(k + 5, sizeof *knot, e), *control = vgi_array(k + 1, 2 * sizeof *control, e);
+    if (!knot || !control) {
+        free(knot);
+        free(control);
+        return VG_ENOMEM;
+    }
+    for (size_t i = 0; i <= k; i++) { /* Boehm */
+        double w = i + 3 <= at ? 1 : i > at ? 0 : (parameter - c->knot[i]) / (c->knot[i + 3] - c->knot[i]);
+        for (size_t q = 0; q < 2; q++)
+            control[2 * i + q] = (i < k && w > 0 ? w * c->control[2 * i + q] : 0) +
+                                 (i > 0 && w < 1 ? (1 - w) * c->control[2 * (i - 1) + q] : 0);
+    }
+    memcpy(knot, c->knot, (at + 1) * sizeof *knot);
+    knot[at + 1] = parameter;
+    memcpy(knot + at + 2, c->knot + at + 1, (k + 3 - at) * sizeof *knot);
+    free(c->knot);
+    free(c->control);
+    c->knot = knot, c->control = control, c->k = k + 1;
+    return VG_OK;
+}
+
+int vgi_curve_remove(vgi_curve *c, size_t control, vg_err *e)
+{
+    size_t k = c->k;
+    if (k <= 4) return vg_fail(e, VG_EARG, "a curve has at least 4 control points");
+    if (control < 2 || control + 2 >= k)
+        return vg_fail(e, VG_EARG, "the first and last two control points cannot be removed");
+    memmove(c->control + 2 * control, c->control + 2 * control + 2, 2 * (k - control - 1) * sizeof *c->control);
+    memmove(c->knot + control + 2, c->knot + control + 3, (k + 1 - control) * sizeof *c->knot);
+    c->k = k - 1;
+    return VG_OK;
+}
