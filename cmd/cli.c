@@ -277,7 +277,7 @@ void cli_claim_input(const char *option, const char *operand)
     char what[sizeof input_is_for];
     if (strcmp(operand, "-")) return;
     snprintf(what, sizeof what, "%s%s", option ? "--" : "", option ? option : "the input");
-    if (!strcmp(input_is_for, what)) cli_usage("standard input can be read only once: two operands are '-'");
+    if (!strcmp(input_is_for, what)) cli_usage("standard input can be read only once, not for two operands");
     if (*input_is_for) cli_usage("standard input can be read only once, not for %s and %s", input_is_for, what);
     memcpy(input_is_for, what, sizeof what);
 }
@@ -324,7 +324,7 @@ void cli_need_vertices(const vg_head *h, const char *subject)
     static const char *const advice[] = {
         [VG_VECTORS] = "pipe it through 'vg-solve' first",
         [VG_DEFORMATIONS] = "apply them with 'vg-deform --onto MESH' and pipe that through 'vg-solve' first",
-        [VG_TRANSFORMS] = "make vertices of them with 'vg-deform --map MAP' first"};
+        [VG_TRANSFORMS] = "make vertices of them with 'vg-play MAP' first"};
     if (h->kind == VG_VERTICES) return;
     cli_stop(VG_EINPUT, "%s holds %s: %s", subject, vg_kind_name(h->kind), advice[h->kind]);
 }

@@ -29,13 +29,21 @@ typedef struct cli_option {
     const char *excludes; /* "a|b": none of these may be; said of one option of a pair */
 } cli_option;
 
+/* An option that has gone to another program: what `--name` "is now ...", for the message. */
+typedef struct cli_moved {
+    const char *name, *now;
+} cli_moved;
+
 typedef struct cli_program {
     const char *name;     /* "vg-solve" */
     const char *synopsis; /* "[options] [FILE]": what follows the name */
     const char *summary;  /* one line: what it does */
     const cli_option *options; /* ends with a NULL name */
+    const cli_moved *moved;    /* ends with a NULL name; NULL: none have moved */
     size_t most_operands;
     bool writes_stream;   /* has -o --output and --no-provenance */
+    bool writes_vectors;  /* the stream is for vg-solve */
+    bool writes_map;      /* the stream holds a map and no frames: it is for vg-play */
     bool writes_text;     /* has -o --output and --json */
     bool writes_file;     /* has -o --output, whose bytes go through cli_text_open too */
     bool traces;          /* has --no-provenance also if its output is no stream: another one is */

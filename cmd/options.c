@@ -227,6 +227,13 @@ static const cli_option *likely_option(const char *text, size_t length)
     return likely;
 }
 
+static const cli_moved *moved_option(const char *text, size_t length)
+{
+    for (const cli_moved *m = cli.program->moved; m && m->name; m++)
+        if (strlen(m->name) == length && !memcmp(m->name, text, length)) return m;
+    return NULL;
+}
+
 /* What getopt did not like, in our words. */
 static void refuse_option(int problem, char **argv) __attribute__((noreturn));
 static void refuse_option(int problem, char **argv)
@@ -238,6 +245,8 @@ static void refuse_option(int problem, char **argv)
     if (optopt) cli_usage("unknown option '-%c': '%s --help' lists them", optopt, cli.program->name);
     const char *text = argv[optind - 1];
     int length = (int)strcspn(text, "=");
+    const cli_moved *moved = moved_option(text + 2, length > 2 ? (size_t)length - 2 : 0);
+    if (moved) cli_usage("--%s %s", moved->name, moved->now);
     const cli_option *first = NULL, *second = NULL;
     for (size_t i = 0; i < known.n; i++)
         if (length > 2 && !strncmp(known.at[i]->name, text + 2, (size_t)length - 2))

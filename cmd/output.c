@@ -109,15 +109,32 @@ static const char *split_path(const char *path, char directory[PATH_MAX])
     return path + n;
 }
 
+static void refuse_terminal(void) __attribute__((noreturn));
+static void refuse_terminal(void)
+{
+    cli_usage("a stream is not written to a terminal: use -o FILE or pipe it into %s",
+              cli.program->writes_vectors ? "'vg-solve | vg-decode -o NAME'"
+              : cli.program->writes_map   ? "a file for vg-play"
+                                          : "'vg-decode -o NAME'");
+}
+
+static void refuse_stream(const char *name) __attribute__((noreturn));
+static void refuse_stream(const char *name)
+{
+    const char *last = names_picture(name) ? "vg-view" : "vg-decode";
+    if (cli.program->writes_map)
+        cli_usage("the output is a map, not poses: write it with -o MAP, then 'vg-play MAP POSES | %s -o %s'", last,
+                  name);
+    cli_usage("the output is a stream: pipe it into '%s%s -o %s'", cli.program->writes_vectors ? "vg-solve | " : "",
+              last, name);
+}
+
 void output_check(bool stream)
 {
     const char *name = cli.output;
     struct stat st;
-    if (stream && name && (names_meshes(name) || names_picture(name)))
-        cli_usage("the output is a stream: pipe it into '%s -o %s'", names_picture(name) ? "vg-view" : "vg-decode",
-                  name);
-    if (stream && !name && isatty(STDOUT_FILENO))
-        cli_usage("a stream is not written to a terminal: use -o FILE or a pipe");
+    if (stream && name && (names_meshes(name) || names_picture(name))) refuse_stream(name);
+    if (stream && !name && isatty(STDOUT_FILENO)) refuse_terminal();
     if (!name) return;
     if (!*name) cli_usage("option '--output' needs the name of a file");
     if (strlen(name) > PATH_MAX - 64)
@@ -220,7 +237,7 @@ void cli_stream_open(vg_head *h)
 {
     vg_err e;
     open_output();
-    if (isatty(out.fd)) cli_usage("a stream is not written to a terminal: use -o FILE or a pipe");
+    if (isatty(out.fd)) refuse_terminal();
     if (!cli.no_provenance) {
         /* the program's own name instead of the path it was found by: same command, same bytes, on any machine */
         char *called = cli.argv[0];

@@ -1,5 +1,5 @@
 /* rigging.c: --skeleton and --groups of vg-fitmap: poses and what is known of a skeleton become a rig and its map.
- * Leaves out maps of patches (vg-fitmap.c) and driving a rig (mapped.c).
+ * Leaves out maps of patches (vg-fitmap.c) and driving a rig (playback.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "rigging.h"
 

@@ -64,7 +64,7 @@ int main(int argc, char **argv)
     if (r == 0) r = vg_sink_end(sink, &e);
     if (r == 0 && !frames)
         cli_warn("the input has no poses: '%s' holds none%s", output,
-                 vg_source_head(s)->map.n ? "; vg-deform --map plays a map" : "");
+                 vg_source_head(s)->map.n ? "; vg-play plays a map" : "");
     for (size_t i = 0; r == 0 && vg_sink_warning(sink, i); i++) cli_warn("%s", vg_sink_warning(sink, i));
     vg_sink_close(&sink);
     if (r < 0) cli_die(&e);

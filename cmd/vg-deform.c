@@ -1,7 +1,6 @@
 /* vg-deform: measure how each vector of a sequence deforms, and do the same to another mesh.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "between.h"
-#include "mapped.h"
+#include "cli.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -25,35 +24,28 @@ static const cli_option options[] = {
     {"pin", 0, "auto|always|none",
      "hold what does not move in the source: where it is much of the mesh (default), ...",
      .choice = &opts.pin_choice, .needs = "onto"},
-    {"interpolate", 0, "N", "write N poses, evenly from the first pose of the input to the last",
-     .integer = &between.frames, .least = 1, .most = 1e9, .excludes = "at"},
-    {"at", 0, "T,...", "write the poses at these moments: 0 is the first pose, 1 the second; outside is extrapolated",
-     .take = between_take_at},
-    {"smooth", 0, NULL, "let velocities not jump at the poses that are interpolated", .flag = &between.smooth,
-     .needs = "interpolate|at"},
-    {"map", 0, "MAP", "write the vertices that this map, made by vg-fitmap, gives to motions of patches or bones",
-     .text = &mapped.map, .reads = true, .excludes = "onto|smooth"},
-    {"edit", 0, "EDIT",
-     "with --map: turn a bone, 'BONE x|y|z|twist DEGREES'; may be repeated; without input, of the reference pose",
-     .take = mapped_take_edit, .needs = "map"},
-    {"align", 0, NULL,
-     "with --map: the skeleton that comes in rests in another pose than the rig: make its limbs point alike",
-     .flag = &mapped.align, .needs = "map"},
-    {"joints", 0, NULL, "with --map: only rotations and scales count; joints say where patches and bones are",
-     .flag = &mapped.joints, .needs = "map"},
-    {"transforms", 0, NULL, "with --map: write the motions of the patches or bones, not vertices",
-     .flag = &mapped.transforms, .needs = "map"},
-    {"live", 0, NULL, "with --map: write each frame at once, before the next is read", .flag = &mapped.live,
-     .needs = "map", .excludes = "interpolate|at"},
     {.name = NULL}};
+
+static const cli_moved moved[] = {{"interpolate", "is now the program vg-interpolate: vg-interpolate 30"},
+                                  {"at", "is now an option of vg-interpolate: vg-interpolate --at 0,0.5,1"},
+                                  {"smooth", "is now an option of vg-interpolate: vg-interpolate --smooth 30"},
+                                  {"map", "is now the program vg-play: vg-play MAP"},
+                                  {"edit", "is now an option of vg-play: vg-play MAP --edit 'BONE x 45'"},
+                                  {"align", "is now an option of vg-play: vg-play MAP --align"},
+                                  {"joints", "is now an option of vg-play: vg-play MAP --joints"},
+                                  {"transforms", "is now an option of vg-play: vg-play MAP --transforms"},
+                                  {"live", "is now an option of vg-play: vg-play MAP --live"},
+                                  {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-deform",
     .synopsis = "[options] [FILE]",
     .summary = "measure how each vector of a sequence deforms, and do the same to another mesh",
     .options = options,
+    .moved = moved,
     .most_operands = 1,
     .writes_stream = true,
+    .writes_vectors = true,
     .threaded = true};
 
 enum { BATCH = 8 }; /* poses of one call: the lanes of the kernels */
@@ -93,8 +85,6 @@ static void parse_options(work *w)
         cli_usage("--by shape needs one connectivity: it takes no --correspondence");
     if (w->by == BY_SHAPE && opts.pin_choice == PIN_ALWAYS)
         cli_usage("--pin holds vertices while vg-solve looks for the others: --by shape finds all of them itself");
-    if (opts.onto && between_wanted())
-        cli_usage("--onto takes poses as they are: pipe those of --interpolate and --at into it");
 }
 
 /* ---- where the body goes ---- */
@@ -203,7 +193,7 @@ static void warn_degenerate(const work *w)
 static void check_kind(const work *w)
 {
     const char *advice = NULL;
-    if (w->kind == VG_TRANSFORMS) advice = "name the map that turns them into vertices with --map";
+    if (w->kind == VG_TRANSFORMS) advice = "make vertices of them with 'vg-play MAP' first";
     else if (w->kind == VG_DEFORMATIONS && !opts.onto) advice = "name the mesh to apply them to with --onto";
     else if (w->kind == VG_DEFORMATIONS && w->by != BY_POSE) advice = "they go --by pose only";
     else if (w->kind != VG_VERTICES && (w->by == BY_SHAPE || opts.correspondence))
@@ -394,18 +384,9 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     static work w; /* lives until the end: what it holds goes with the process */
     parse_options(&w);
-    bool reads = mapped_needs_input(n);
-    if (reads) cli_expect_input(n);
+    cli_expect_input(n);
     load_target(&w);
-    if (reads) w.s = cli_source(operands, n);
-    if (mapped.map) {
-        mapped_run(w.s);
-        cli_finish(0);
-    }
-    if (between_wanted()) {
-        between_run(w.s);
-        cli_finish(0);
-    }
+    w.s = cli_source(operands, n);
     w.h = vg_source_head(w.s);
     prepare(&w);
     cli_stream_open(w.h);

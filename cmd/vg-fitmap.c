@@ -1,4 +1,4 @@
-/* vg-fitmap: fit a map from the motions of patches or bones to the vertices of a body, or bring one to another body.
+/* vg-fitmap: fit a map from the motions of patches or bones to the vertices of a body.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "rigging.h"
 
@@ -7,10 +7,10 @@
 #include <string.h>
 
 static struct {
-    const char *patches, *retarget;
+    const char *patches;
     long holdout;
-    double hold, morph;
-} opts = {.hold = 0.03, .morph = 1};
+    double hold;
+} opts = {.hold = 0.03};
 
 static const cli_option options[] = {
     {"patches", 0, "FILE", "the patches: what vg-segment wrote; default: those of the input", .text = &opts.patches,
@@ -35,19 +35,21 @@ static const cli_option options[] = {
      .least = 2, .most = 1000000000},
     {"hold", 0, "SHARE", "of the vertices, those that go where their patch or bones take them (default 0.03)",
      .number = &opts.hold, .least = 0, .most = 1},
-    {"retarget", 0, "MESH", "no fit: bring the map that is the input to this body of the same faces",
-     .text = &opts.retarget, .reads = true, .excludes = "patches|skeleton|groups|holdout|hold"},
-    {"morph", 0, "T", "with --retarget: how far on the way to that body (default 1)", .number = &opts.morph,
-     .needs = "retarget"},
     {.name = NULL}};
+
+static const cli_moved moved[] = {{"retarget", "is now the program vg-retarget: vg-retarget --onto MESH MAP"},
+                                  {"morph", "is now an option of vg-retarget: vg-retarget --onto MESH --morph 0.5 MAP"},
+                                  {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-fitmap",
     .synopsis = "[options] [FILE ...]",
     .summary = "fit a map from the motions of patches or bones to vertices",
     .options = options,
+    .moved = moved,
     .most_operands = SIZE_MAX,
     .writes_stream = true,
+    .writes_map = true,
     .threaded = true};
 
 enum { BATCH = 32 };
@@ -215,37 +217,12 @@ static void fit(vg_source *s)
     vg_spool_free(&spool);
 }
 
-/* ---- another body ---- */
-
-static void retarget(vg_source *s)
-{
-    vg_err e;
-    vg_head *h = vg_source_head(s), target = {0};
-    char name[200];
-    snprintf(name, sizeof name, "'%.190s'", opts.retarget);
-    if (!h->map.n) cli_stop(VG_EINPUT, "the input holds no map: make one with vg-fitmap");
-    if (vg_load_mesh(&target, opts.retarget, &e) < 0 ||
-        vg_mesh_same(&h->body.mesh, "the map", &target.body.mesh, name, &e) < 0 ||
-        vg_map_retarget(h, target.body.reference, opts.morph, cli.threads, &e) < 0 ||
-        vg_head_merge_trace(h, &target, &e) < 0)
-        cli_die(&e);
-    free(h->body.reference_name);
-    h->body.reference_name = target.body.reference_name, target.body.reference_name = NULL;
-    vg_attributes_clear(&h->body.attributes);
-    h->body.attributes = target.body.attributes, target.body.attributes = (vg_attributes){0};
-    vg_head_clear(&target);
-    vg_frame frame = {0};
-    while (cli_next(s, &frame)) continue; /* to the end, so that damage is seen; a map has no frames */
-    vg_frame_clear(&frame);
-}
-
 int main(int argc, char **argv)
 {
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_source *s = cli_source(operands, n);
-    if (opts.retarget) retarget(s);
-    else fit(s);
+    fit(s);
     cli_stream_open(vg_source_head(s));
     cli_stream_end(vg_source_tail(s));
     vg_source_close(&s);

@@ -62,6 +62,25 @@ _vg_complete_value() {
     esac
 }
 
+# _vg_operand PROGRAM WORD...: the place-holder of the operand that comes after these words ("MAP", "FILE")
+_vg_operand() {
+    local program=$1 operands=0 skip='' word
+    shift
+    for word; do
+        if [[ $word == '=' ]]; then
+            skip=1
+        elif [[ -n $skip ]]; then
+            skip=''
+        elif [[ $word == -?* ]]; then
+            skip=$(_vg_value "$program" "$word")
+        else
+            operands=$((operands + 1))
+        fi
+    done
+    "$program" --help 2>/dev/null | sed -n '1s/--[a-z]* [A-Z,.]*//g; 1s/^usage: [a-z-]* //p' | grep -o '[A-Z][A-Z]*' |
+        sed -n "$((operands + 1))p"
+}
+
 # bash cuts words at '=': --by=shape is three of them, and so is walk=a.obj behind --key
 _vg() {
     local program=$1 word=${COMP_WORDS[COMP_CWORD]} before='' at=$((COMP_CWORD - 1)) i value
@@ -85,10 +104,12 @@ _vg() {
     fi
     if [[ $word == -* ]]; then
         mapfile -t COMPREPLY < <(compgen -W "$(_vg_options "$program")" -- "$word")
+    elif [[ $(_vg_operand "$program" "${COMP_WORDS[@]:1:COMP_CWORD-1}") == MAP ]]; then
+        _vg_complete_value MAP '' "$word"
     else
         _vg_files "$word" "$_vg_sequences"
     fi
 }
 
-complete -o filenames -F _vg vg-decode vg-deform vg-diff vg-encode vg-fitmap vg-info vg-poisson vg-register vg-segment vg-solve \
-    vg-view
+complete -o filenames -F _vg vg-decode vg-deform vg-diff vg-encode vg-fitmap vg-info vg-interpolate vg-play vg-poisson vg-register \
+    vg-retarget vg-segment vg-solve vg-view

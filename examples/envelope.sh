@@ -41,32 +41,32 @@ run 'vg-fitmap -q --method lbs --skeleton fit.bvh poses/ -o skinning.rig'
 
 printf '\n# The poses that were set aside, by the skeleton alone:\n'
 run 'vg-encode --reference poses/human-man_000_rest.obj aside/ -o truth.vgs'
-run 'vg-deform --map man.rig dance.bvh -o envelope.vgs'
-run 'vg-deform --map skinning.rig dance.bvh -o skinning.vgs'
+run 'vg-play man.rig dance.bvh -o envelope.vgs'
+run 'vg-play skinning.rig dance.bvh -o skinning.vgs'
 run 'vg-diff truth.vgs envelope.vgs | grep -E "^(mean|max)"'
 run 'vg-diff truth.vgs skinning.vgs | grep -E "^(mean|max)"'
 run 'vg-view truth.vgs --beside envelope.vgs --beside skinning.vgs --against truth.vgs \
     --size 240x210 --view 25,10 -o envelope.png'
 
 printf '\n# By hand, and as a skin for engines:\n'
-run 'vg-deform --map man.rig --edit "lowerarm01.L y -80" --edit "upperleg01.R x -60" \
+run 'vg-play man.rig --edit "lowerarm01.L y -80" --edit "upperleg01.R x -60" \
     --edit "lowerleg01.R x 70" -o edited.vgs'
 run 'vg-view edited.vgs --size 400x400 -o edited.png'
-run 'vg-deform --map man.rig --transforms dance.bvh | vg-decode -o skin.glb'
+run 'vg-play man.rig --transforms dance.bvh | vg-decode -o skin.glb'
 
 printf '\n# A trex: how its bones move is learned from the poses. Then it attacks, by its joints:\n'
 run 'vg-encode --reference $data/trex.rest.obj $data/trex-walk.tar.xz -o walk.vgs'
 run 'vg-fitmap --skeleton $data/trex.skeleton.txt walk.vgs -o trex.rig'
 run 'vg-fitmap -q --method lbs --skeleton $data/trex.skeleton.txt walk.vgs -o trex-skinning.rig'
 run 'xz -dc $data/trex-attack.joints.txt.xz | grep -v "^000" >attack.joints.txt'
-run 'vg-encode --mesh $data/trex.skeleton.txt attack.joints.txt | vg-deform --map trex.rig -o attack.vgs'
+run 'vg-encode --mesh $data/trex.skeleton.txt attack.joints.txt | vg-play trex.rig -o attack.vgs'
 run 'vg-encode --reference $data/trex.rest.obj $data/trex-attack.tar.xz |
     vg-view - --beside attack.vgs --frames 5 --size 280x200 --view 60,10 -o attack.png'
 
 printf '\n# Its foot in the walk, close up: as it is, by the envelope, by skinning:\n'
 run 'vg-decode walk.vgs -o steps/'
-run 'vg-deform --map trex.rig walk.vgs | vg-decode -o steps-envelope/'
-run 'vg-deform --map trex-skinning.rig walk.vgs | vg-decode -o steps-skinning/'
+run 'vg-play trex.rig walk.vgs | vg-decode -o steps-envelope/'
+run 'vg-play trex-skinning.rig walk.vgs | vg-decode -o steps-skinning/'
 run 'for i in "" -envelope -skinning; do
     mkdir -p foot$i
     for n in 012 017 022; do leg steps$i/trex-walk_$n.obj >foot$i/$n.obj; done

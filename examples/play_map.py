@@ -3,7 +3,7 @@
 
     python3 play_map.py MAP TRANSFORMS > poses.txt
 
-MAP is what vg-fitmap wrote, TRANSFORMS a stream of transforms, one for each patch of the map (from 'vg-deform --map MAP --transforms', or
+MAP is what vg-fitmap wrote, TRANSFORMS a stream of transforms, one for each patch of the map (from 'vg-play MAP --transforms', or
 your own: a quaternion w x y z whose squared length is the scale, and a translation). Out comes a line "frame NAME" for each frame, then a line
 "x y z" for each vertex. fmt/STREAM.md, section 3.16, is all that it needs to know. It leaves out speed: there are products for that.
 

@@ -25,11 +25,11 @@ bar() {
 
 run 'bar 0 >bar0.obj'
 run 'bar 400 >bar400.obj'
-run 'vg-encode bar0.obj bar400.obj | vg-deform --interpolate 6 | vg-solve -o bar.vgs'
+run 'vg-encode bar0.obj bar400.obj | vg-interpolate 6 | vg-solve -o bar.vgs'
 run 'vg-view bar.vgs --frames 6 --columns 6 --size 160x300 --view 20,15 -o bar.png'
 
 run 'vg-decode $data/human-man-poses.tar.xz -o poses/'
-run 'vg-encode poses/*_000_*.obj poses/*_009_*.obj | vg-deform --interpolate 6 | vg-solve -o between.vgs'
+run 'vg-encode poses/*_000_*.obj poses/*_009_*.obj | vg-interpolate 6 | vg-solve -o between.vgs'
 run 'vg-view between.vgs --frames 6 --columns 6 --size 220x240 --view 25,10 -o interpolation.png'
 
 run 'vg-encode $data/human-man-poses.tar.xz -o man.vgs'

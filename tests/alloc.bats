@@ -49,7 +49,7 @@ each() {
 @test "memory runs out: vg-deform" {
     each 'vg-deform --onto target.obj poses.vgs -o out.vgs' 'vg-deform --onto target.obj --by shape poses.vgs -o out.vgs' \
         'vg-deform --onto target.obj --correspondence pairs.vgs poses.vgs -o out.vgs' \
-        'vg-deform --interpolate 5 poses.vgs -o out.vgs' 'vg-deform --map map.vgs poses.vgs -o out.vgs'
+        'vg-interpolate 5 poses.vgs -o out.vgs' 'vg-play map.vgs poses.vgs -o out.vgs'
 }
 
 @test "memory runs out: vg-solve" {
@@ -62,7 +62,7 @@ each() {
 
 @test "memory runs out: vg-segment, vg-fitmap" {
     each 'vg-segment -k 3 --connected poses.vgs -o out.vgs' 'vg-fitmap -q --patches patches.vgs poses.vgs -o out.vgs' \
-        'vg-fitmap --retarget target.obj map.vgs -o out.vgs'
+        'vg-retarget --onto target.obj map.vgs -o out.vgs'
 }
 
 @test "memory runs out: vg-register" {
@@ -84,7 +84,7 @@ each() {
     until bash -c "ulimit -v $kilobytes && exec vg-solve --version" >/dev/null 2>&1; do kilobytes=$((kilobytes + 10000)); done
     for ((; kilobytes < 1000000; kilobytes += kilobytes / 6)); do
         for command in 'vg-solve vectors.vgs -o out.vgs' 'vg-fitmap -q --patches patches.vgs poses.vgs -o out.vgs' \
-            'vg-deform --map map.vgs poses.vgs -o out.vgs' 'vg-segment -k 2 -j 8 poses.vgs -o out.vgs'; do
+            'vg-play map.vgs poses.vgs -o out.vgs' 'vg-segment -k 2 -j 8 poses.vgs -o out.vgs'; do
             capture timeout 20 bash -c "ulimit -v $kilobytes && exec $command"
             [ "$status" = 0 ] || { [ "$status" = 4 ] && one_line && [ ! -e out.vgs ]; } || fail "$kilobytes: '$command': status $status"
             [ "$status" = 4 ] || solved=$((solved + 1))

@@ -28,7 +28,7 @@ offers() {
         [ "$offered" = "$("$program" --help | grep -o '^  \(-., \|    \)--[a-z0-9-]*' | sed 's/.*--/--/' | LC_ALL=C sort)" ]
         [ "$(wc -l <<<"$offered")" -ge 5 ]
     done
-    complete_line vg-deform --in
+    complete_line vg-play --in
     offers --interpolate
     complete_line vg-solve walk.vgs --no
     offers --no-provenance
@@ -55,7 +55,7 @@ offers() {
     offers area uniform
     complete_line vg-decode --format g
     offers glb gltf
-    complete_line vg-deform --interpolate ''
+    complete_line vg-play man.map --interpolate ''
     offers ''
 }
 
@@ -66,7 +66,13 @@ offers() {
     offers man.map man.obj man.patches poses run.tar.xz 'two words.OBJ' walk.zip
     complete_line vg-encode --json m # a flag takes no value
     offers man.map man.obj man.patches
-    complete_line vg-deform --map ''
+    complete_line vg-play ''
+    offers man.map poses
+    complete_line vg-play --live ''
+    offers man.map poses
+    complete_line vg-play --at 0,1 man.map ''
+    offers man.map man.obj man.patches poses run.tar.xz 'two words.OBJ' walk.zip
+    complete_line vg-retarget --onto man.obj ''
     offers man.map poses
     complete_line vg-segment man.obj --onto '' # no option of this program
     offers man.map man.obj man.patches poses run.tar.xz 'two words.OBJ' walk.zip

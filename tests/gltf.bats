@@ -186,7 +186,7 @@ END
     must_fail 2 vg-decode --max-targets 12 -o bar2.glb bar.vgs
     says 'leave out --max-targets'
     must_fail 3 vg-decode -o bar-%d.obj bar.vgs
-    says "make vertices of them with 'vg-deform --map MAP' first, or of a rig's a skin in a .glb"
+    says "make vertices of them with 'vg-play MAP' first, or of a rig's a skin in a .glb"
     must_fail 3 vg-decode -o none.glb "$GOLDEN/transforms.vgs"
     says 'transforms of no skeleton'
 }

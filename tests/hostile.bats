@@ -175,13 +175,13 @@ every_program() {
         answers vg-deform --onto "$k-target.obj" --by $by "$k.vgs" -o d.vgs || return 1
         if [ "$status" = 0 ]; then answers vg-solve d.vgs -o s.vgs || return 1; fi
     done
-    answers vg-deform --at -1,0.5,2.5 --smooth "$k.vgs" -o i.vgs || return 1
+    answers vg-interpolate --at -1,0.5,2.5 --smooth "$k.vgs" -o i.vgs || return 1
     if [ "$status" = 0 ]; then answers vg-solve i.vgs -o s.vgs || return 1; fi
     answers vg-poisson --first "$k-target.obj" "$k.vgs" -o p.vgs || return 1
     answers vg-segment -k 2 "$k.vgs" -o seg.vgs || return 1
     if [ "$status" = 0 ] && [ "$2" != no-map ]; then
         answers vg-fitmap -q --patches seg.vgs "$k.vgs" -o map.vgs || return 1
-        if [ "$status" = 0 ]; then answers vg-deform --map map.vgs --interpolate 4 "$k.vgs" -o m.vgs || return 1; fi
+        if [ "$status" = 0 ]; then answers vg-play map.vgs --interpolate 4 "$k.vgs" -o m.vgs || return 1; fi
     fi
     printf '0 0\n1 1\n2 2\n' >markers.txt
     [ "$3" = no-pairs ] || answers vg-register -q "$k-1.obj" "$k-target.obj" --markers markers.txt -o c.vgs || return 1
@@ -280,16 +280,16 @@ no_output() {
     [ -z "$(find . -name '*out.*')" ] || fail "'${*:2}' left a file"
 }
 
-@test "a body whose size no number holds is refused by vg-fitmap --retarget" {
+@test "a body whose size no number holds is refused by vg-retarget" {
     poses cube 3
     must vg-encode pose*.obj -o cube.vgs
     must vg-segment -k 2 cube.vgs -o patches.vgs
     must vg-fitmap -q --patches patches.vgs cube.vgs -o cube.map
     for size in 1e300 1e155 1e-300 1e-310; do
         scale $size pose2.obj >body.obj
-        no_output 3 vg-fitmap --retarget body.obj cube.map -o out.map
+        no_output 3 vg-retarget --onto body.obj cube.map -o out.map
     done
-    no_output 3 vg-fitmap --retarget pose2.obj --morph 1e308 cube.map -o out.map
+    no_output 3 vg-retarget --onto pose2.obj --morph 1e308 cube.map -o out.map
 }
 
 @test "a map or a rig does not stay with a mesh that it is no longer true of" {
@@ -333,9 +333,9 @@ END
     poses cube 2
     scale 1.7e307 pose2.obj >huge.obj
     must vg-encode pose1.obj huge.obj -o keys.vgs
-    no_output 3 vg-deform --at 0.25 keys.vgs -o out.vgs
+    no_output 3 vg-interpolate --at 0.25 keys.vgs -o out.vgs
     says "too far apart"
-    no_output 2 vg-deform --at -1 keys.vgs -o out.vgs
+    no_output 2 vg-interpolate --at -1 keys.vgs -o out.vgs
 }
 
 @test "one vertex in 60,000 faces: drawn in time that does not grow with its square" {

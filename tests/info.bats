@@ -275,7 +275,7 @@ END
     status=0
     python3 term.py vg-encode a.obj >out </dev/null || status=$?
     [ $status = 2 ]
-    grep -q 'a stream is not written to a terminal: use -o FILE or a pipe' out
+    grep -q 'a stream is not written to a terminal: use -o FILE or pipe it into' out
     status=0
     timeout 20 python3 term.py vg-info >out </dev/null || status=$?
     [ $status = 2 ]

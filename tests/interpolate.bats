@@ -42,7 +42,7 @@ every_eighth() {
         must vg-encode "$DATA/$set.tar.xz" -o in.vgs
         n=$(vg-info --json in.vgs | python3 -c 'import json, sys; print(json.load(sys.stdin)["frames"])')
         for smooth in '' --smooth; do
-            pipe "vg-deform $smooth --interpolate $n in.vgs 2>/dev/null | vg-solve >out.vgs"
+            pipe "vg-interpolate $smooth $n in.vgs 2>/dev/null | vg-solve >out.vgs"
             must vg-diff -t 1e-10 in.vgs out.vgs
         done
     done
@@ -53,39 +53,39 @@ every_eighth() {
     turned 170 3 <"$mesh" >b.obj
     for t in 0.25 0.5 0.9 1.2 -0.5; do
         turned "$(python3 -c "print(170 * $t)")" 0 <"$mesh" >truth.obj
-        pipe "vg-encode '$mesh' b.obj | vg-deform --at $t | vg-solve >out.vgs"
+        pipe "vg-encode '$mesh' b.obj | vg-interpolate --at $t | vg-solve >out.vgs"
         must vg-diff -c -t 1e-9 truth.obj out.vgs
     done
 }
 
 @test "selected faces, vectors and deformations on the way in" {
     set=$DATA/woman-tanktop-jump.tar.xz
-    pipe "vg-encode '$set' | vg-deform --at 0.5,3.25 | vg-solve >want.vgs"
-    pipe "vg-encode --vectors '$set' | vg-deform --at 0.5,3.25 | vg-solve >out.vgs"
+    pipe "vg-encode '$set' | vg-interpolate --at 0.5,3.25 | vg-solve >want.vgs"
+    pipe "vg-encode --vectors '$set' | vg-interpolate --at 0.5,3.25 | vg-solve >out.vgs"
     must vg-diff -t 1e-10 want.vgs out.vgs
     must vg-encode --faces selected "$set" -o selected.vgs
-    pipe "vg-deform --interpolate 26 selected.vgs | vg-solve >out.vgs"
+    pipe "vg-interpolate 26 selected.vgs | vg-solve >out.vgs"
     must vg-diff -t 1e-10 "$set" out.vgs
-    pipe "vg-encode '$set' | vg-deform | vg-deform --at 0,7,25 2>/dev/null | vg-solve >out.vgs"
-    pipe "vg-encode '$set' | vg-deform --at 0,7,25 | vg-solve >want.vgs"
+    pipe "vg-encode '$set' | vg-deform | vg-interpolate --at 0,7,25 2>/dev/null | vg-solve >out.vgs"
+    pipe "vg-encode '$set' | vg-interpolate --at 0,7,25 | vg-solve >want.vgs"
     must vg-diff -t 1e-10 want.vgs out.vgs
 }
 
 @test "frames are named after keys and moment, in the order asked for" {
     poses two 3
-    pipe "vg-encode pose1.obj pose2.obj pose3.obj | vg-deform --at 1.5,0,-0.5,0.25,1,2,2.75 | vg-solve >out.vgs"
+    pipe "vg-encode pose1.obj pose2.obj pose3.obj | vg-interpolate --at 1.5,0,-0.5,0.25,1,2,2.75 | vg-solve >out.vgs"
     py <<'END'
 from read_stream import read_stream
 names = [f.name for f in read_stream("out.vgs").frames]
 assert names == ["pose2~pose3@0.5", "pose1", "pose1~pose2@-0.5", "pose1~pose2@0.25", "pose2", "pose3", "pose2~pose3@1.75"], names
 END
-    pipe "vg-encode pose1.obj pose2.obj pose3.obj | vg-deform --interpolate 5 | vg-solve >out.vgs"
+    pipe "vg-encode pose1.obj pose2.obj pose3.obj | vg-interpolate 5 | vg-solve >out.vgs"
     py <<'END'
 from read_stream import read_stream
 names = [f.name for f in read_stream("out.vgs").frames]
 assert names == ["pose1", "pose1~pose2@0.5", "pose2", "pose2~pose3@0.5", "pose3"], names
 END
-    pipe "vg-encode pose1.obj pose3.obj | vg-deform --interpolate 1 | vg-solve >out.vgs"
+    pipe "vg-encode pose1.obj pose3.obj | vg-interpolate 1 | vg-solve >out.vgs"
     must vg-diff -t 1e-10 pose1.obj out.vgs
 }
 
@@ -93,8 +93,8 @@ END
     poses cube 3
     must vg-encode pose1.obj pose2.obj pose3.obj -o plain.vgs
     must vg-decode --quiet plain.vgs -o in.mdd
-    pipe "vg-encode in.mdd | vg-deform --at 0.5,1,3 >timed.vgs"
-    pipe "vg-deform --at 0.5,1,3 plain.vgs >untimed.vgs"
+    pipe "vg-encode in.mdd | vg-interpolate --at 0.5,1,3 >timed.vgs"
+    pipe "vg-interpolate --at 0.5,1,3 plain.vgs >untimed.vgs"
     must vg-encode in.mdd -o keys.vgs
     py <<'END'
 from read_stream import read_stream
@@ -115,7 +115,7 @@ for name, times in ("plain", (None, None, None)), ("same", (0, 0, 1)), ("back", 
     m.write(name + ".vgs", m.whole(m.content(frames=[m.pose("p%d" % i, p, time=t) for i, (p, t) in enumerate(zip(points, times))])))
 END
     for name in plain same back grow; do
-        pipe "vg-deform --smooth --at 0.25,0.5,1.5 $name.vgs | vg-solve -o $name-between.vgs"
+        pipe "vg-interpolate --smooth --at 0.25,0.5,1.5 $name.vgs | vg-solve -o $name-between.vgs"
     done
     must vg-diff -t 0 plain-between.vgs same-between.vgs
     must vg-diff -t 0 plain-between.vgs back-between.vgs
@@ -124,23 +124,23 @@ END
 
 @test "an anchor is where its keys have it" {
     poses two 3
-    pipe "vg-encode --anchor 0,9 pose1.obj pose2.obj pose3.obj | vg-deform --smooth --interpolate 3 | vg-solve >out.vgs"
+    pipe "vg-encode --anchor 0,9 pose1.obj pose2.obj pose3.obj | vg-interpolate --smooth 3 | vg-solve >out.vgs"
     must vg-encode pose1.obj pose2.obj pose3.obj -o want.vgs
     must vg-diff -t 1e-10 want.vgs out.vgs
 }
 
 @test "every eighth frame of a walk: the frames between, by the known errors" {
     every_eighth "$DATA/trex-walk.tar.xz"
-    pipe "vg-encode keys | vg-deform --at $at | vg-solve >straight.vgs"
-    pipe "vg-encode keys | vg-deform --smooth --at $at | vg-solve >smooth.vgs"
+    pipe "vg-encode keys | vg-interpolate --at $at | vg-solve >straight.vgs"
+    pipe "vg-encode keys | vg-interpolate --smooth --at $at | vg-solve >smooth.vgs"
     at_most "$(vertex_error mean -c truth straight.vgs)" 7.8e-3
     at_most "$(vertex_error mean -c truth smooth.vgs)" 6.3e-3
 }
 
 @test "poses between go on into transfer, and give the same as when transferred first" {
     a=$DATA/human-man-poses.tar.xz
-    pipe "vg-encode '$a' | vg-deform --at 0,1,2 | vg-deform --onto '$DATA/human-heavy-poses.tar.xz' | vg-solve >after.vgs"
-    pipe "vg-encode '$a' | vg-deform --onto '$DATA/human-heavy-poses.tar.xz' | vg-deform --at 0,1,2 | vg-solve >before.vgs"
+    pipe "vg-encode '$a' | vg-interpolate --at 0,1,2 | vg-deform --onto '$DATA/human-heavy-poses.tar.xz' | vg-solve >after.vgs"
+    pipe "vg-encode '$a' | vg-deform --onto '$DATA/human-heavy-poses.tar.xz' | vg-interpolate --at 0,1,2 | vg-solve >before.vgs"
     must vg-diff -t 1e-9 before.vgs after.vgs
 }
 
@@ -154,9 +154,9 @@ print(*(f'{i} {i}' for i in range(0, n, n // 12)), sep='\n')
 END
     capture vg-register "$mesh" other.obj --markers markers.txt -o fitted.vgs
     [ "$status" = 0 ]
-    pipe "vg-encode '$mesh' fitted.vgs | vg-deform --at 0,0.5,1 | vg-solve >out.vgs"
+    pipe "vg-encode '$mesh' fitted.vgs | vg-interpolate --at 0,0.5,1 | vg-solve >out.vgs"
     must vg-encode "$mesh" fitted.vgs -o keys.vgs
-    pipe "vg-deform --at 0,1 keys.vgs | vg-solve >ends.vgs"
+    pipe "vg-interpolate --at 0,1 keys.vgs | vg-solve >ends.vgs"
     must vg-diff -t 1e-10 keys.vgs ends.vgs
     [ "$(vg-info --json out.vgs | python3 -c 'import json, sys; print(json.load(sys.stdin)["frames"])')" = 3 ]
 }
@@ -164,29 +164,29 @@ END
 @test "the same bytes whatever the number of threads" {
     must vg-encode "$DATA/human-man-poses.tar.xz" -o in.vgs
     for smooth in '' --smooth; do
-        must vg-deform --no-provenance -j 1 $smooth --at 0.3,2.5,4.1 in.vgs -o one.vgs
-        must vg-deform --no-provenance -j 3 $smooth --at 0.3,2.5,4.1 in.vgs -o three.vgs
+        must vg-interpolate --no-provenance -j 1 $smooth --at 0.3,2.5,4.1 in.vgs -o one.vgs
+        must vg-interpolate --no-provenance -j 3 $smooth --at 0.3,2.5,4.1 in.vgs -o three.vgs
         same_file one.vgs three.vgs
     done
 }
 
 @test "wrong usage" {
     poses cube 2
-    must_fail 2 vg-deform --interpolate 3 --at 0.5 pose1.obj
-    says "--interpolate does not go with --at"
-    must_fail 2 vg-deform --smooth pose1.obj
-    says "--smooth needs --interpolate or --at"
-    must_fail 2 vg-deform --interpolate 0 pose1.obj
-    for list in '' ',' '0,' ,1 x 0.5,nan 1e999; do must_fail 2 vg-deform --at "$list" pose1.obj; done
-    must_fail 2 vg-deform --interpolate 3 --onto pose2.obj pose1.obj
-    says "pipe"
+    must_fail 2 vg-interpolate 3 --at 0.5 pose1.obj
+    says "--at says which poses are written"
+    must_fail 2 vg-interpolate --smooth pose1.obj
+    says "the number of poses is from 1"
+    must_fail 2 vg-interpolate 0 pose1.obj
+    for list in '' ',' '0,' ,1 x 0.5,nan 1e999; do must_fail 2 vg-interpolate --at "$list" pose1.obj; done
+    must_fail 2 vg-interpolate 3 --onto pose2.obj pose1.obj
+    says "unknown option '--onto'"
 }
 
 @test "one pose is no path, and numbers that overflow are refused" {
     poses cube 2
-    pipe_fail 3 "vg-encode pose1.obj | vg-deform --interpolate 3 >out.vgs"
+    pipe_fail 3 "vg-encode pose1.obj | vg-interpolate 3 >out.vgs"
     says "there is one pose in the input, and a path needs two or more"
     LC_ALL=C awk '$1 == "v" {print "v", 9 * $2, 9 * $3, 9 * $4; next} {print}' pose1.obj >large.obj
-    pipe_fail 2 "vg-encode pose1.obj large.obj | vg-deform --at 1e6 >out.vgs"
+    pipe_fail 2 "vg-encode pose1.obj large.obj | vg-interpolate --at 1e6 >out.vgs"
     says "so far outside that numbers overflow"
 }

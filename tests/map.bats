@@ -1,5 +1,5 @@
 #!/usr/bin/env bats
-# vg-fitmap and vg-deform --map: errors on real sequences, another body, frame by frame, a player of its own.
+# vg-fitmap, vg-play and vg-retarget: errors on real sequences, another body, frame by frame, a player of its own.
 # SPDX-License-Identifier: GPL-3.0-or-later
 load lib.bash
 bats_require_minimum_version 1.5.0
@@ -20,9 +20,9 @@ made() {
 
 @test "50 patches of the trex: the error with motions given and with rotations alone" {
     made
-    must vg-deform --map trex.map trex.vgs -o given.vgs
+    must vg-play trex.map trex.vgs -o given.vgs
     at_most "$(vertex_error mean --centred trex.vgs given.vgs)" 0.0017
-    must vg-deform --map trex.map --joints trex.vgs -o joints.vgs
+    must vg-play trex.map --joints trex.vgs -o joints.vgs
     at_most "$(vertex_error mean --centred trex.vgs joints.vgs)" 0.00245
 }
 
@@ -30,10 +30,10 @@ made() {
     made
     must vg-encode "$DATA/human-man-poses.tar.xz" -o man.vgs
     pipe "vg-segment -k 50 --connected man.vgs | vg-fitmap -q --patches - man.vgs -o man.map"
-    must vg-deform --map man.map man.vgs -o given.vgs
+    must vg-play man.map man.vgs -o given.vgs
     at_most "$(vertex_error mean --centred man.vgs given.vgs)" 0.0015
-    must vg-fitmap --retarget "$DATA/human-heavy-poses.tar.xz" man.map -o heavy.map
-    must vg-deform --map heavy.map man.vgs -o heavy.vgs
+    must vg-retarget --onto "$DATA/human-heavy-poses.tar.xz" man.map -o heavy.map
+    must vg-play heavy.map man.vgs -o heavy.vgs
     at_most "$(vertex_error mean --centred "$DATA/human-heavy-poses.tar.xz" heavy.vgs)" 0.008
 }
 
@@ -47,9 +47,9 @@ made() {
 
 @test "motions written and played are the poses; and by the player that shares no code" {
     made
-    must vg-deform --map horse.map --transforms horse.vgs -o motions.vgs
-    must vg-deform --map horse.map motions.vgs -o a.vgs
-    must vg-deform --map horse.map horse.vgs -o b.vgs
+    must vg-play horse.map --transforms horse.vgs -o motions.vgs
+    must vg-play horse.map motions.vgs -o a.vgs
+    must vg-play horse.map horse.vgs -o b.vgs
     must vg-diff -t 1e-12 a.vgs b.vgs
     python3 "$ROOT/examples/play_map.py" horse.map motions.vgs >played.txt
     py <<'END'
@@ -62,8 +62,8 @@ END
 
 @test "keys of a path are met, and named" {
     made
-    must vg-deform --map trex.map --at 0,33 trex.vgs -o ends.vgs
-    must vg-deform --map trex.map trex.vgs -o all.vgs
+    must vg-play trex.map --at 0,33 trex.vgs -o ends.vgs
+    must vg-play trex.map trex.vgs -o all.vgs
     py <<'END'
 from read_stream import read_stream
 ends, every = read_stream("ends.vgs").frames, read_stream("all.vgs").frames
@@ -74,7 +74,7 @@ END
 
 @test "--live: each frame comes out before the next goes in" {
     made
-    must vg-deform --map horse.map --transforms horse.vgs -o motions.vgs
+    must vg-play horse.map --transforms horse.vgs -o motions.vgs
     py <<'END'
 import os, select, struct, subprocess
 data = open("motions.vgs", "rb").read()
@@ -83,7 +83,7 @@ while at < len(data):
     tag, length = data[at:at + 4], struct.unpack_from("<Q", data, at + 8)[0]
     at += 32 + (length + 7) // 8 * 8
     cuts.append((tag, at))
-p = subprocess.Popen(["vg-deform", "--map", "horse.map", "--live"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+p = subprocess.Popen(["vg-play", "horse.map", "--live"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 sent = frames = 0
 got = b""
 for tag, end in cuts:
@@ -104,21 +104,20 @@ END
 
 @test "what does not fit is refused" {
     made
-    run -3 vg-deform --map horse.map trex.vgs -o out.vgs
-    run -3 vg-deform --map trex.patches trex.vgs -o out.vgs
-    must vg-deform --map horse.map --transforms horse.vgs -o motions.vgs
-    run -3 vg-deform --map trex.map motions.vgs -o out.vgs
-    run -2 vg-deform --live horse.vgs -o out.vgs
-    run -2 vg-fitmap --morph 0.5 horse.vgs -o out.map
+    run -3 vg-play horse.map trex.vgs -o out.vgs
+    run -3 vg-play trex.patches trex.vgs -o out.vgs
+    must vg-play horse.map --transforms horse.vgs -o motions.vgs
+    run -3 vg-play trex.map motions.vgs -o out.vgs
+    run -2 vg-retarget --morph 0.5 horse.map -o out.map
     run -2 vg-fitmap horse.vgs -o out.map
     run -3 vg-fitmap --patches trex.patches horse.vgs -o out.map
-    run -3 vg-fitmap --retarget "$DATA/trex.rest.obj" horse.map -o out.map
+    run -3 vg-retarget --onto "$DATA/trex.rest.obj" horse.map -o out.map
     [ ! -e out.vgs ] && [ ! -e out.map ]
 }
 
 @test "poses with patches have a colour for each face in PLY" {
     made
-    must vg-deform --map horse.map --at 0 horse.vgs -o one.vgs
+    must vg-play horse.map --at 0 horse.vgs -o one.vgs
     must vg-decode one.vgs --format ply-ascii -o one.ply
     grep -qx "property uchar red" one.ply
     colours=$(awk 'NF == 7 || NF == 8 || NF == 9 || NF == 10 {print $(NF - 2), $(NF - 1), $NF}' one.ply | sort -u | wc -l)

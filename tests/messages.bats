@@ -39,7 +39,7 @@ mistake() {
     mistake 3 'vg-diff walk.vgs vectors.vgs' "pipe it through 'vg-solve' first"
     mistake 3 'vg-poisson --first pose1.obj vectors.vgs' "'vg-solve' first"
     mistake 3 'vg-solve deformations.vgs' "apply them with 'vg-deform --onto MESH'"
-    mistake 3 'vg-deform --map walk.vgs walk.vgs' "make one with vg-fitmap"
+    mistake 3 'vg-play walk.vgs walk.vgs' "make one with vg-fitmap"
     mistake 2 'vg-fitmap walk.vgs' "--patches, made by vg-segment"
     mistake 3 'true | vg-solve' "standard input is empty: look at the program before in the pipe"
 
@@ -90,5 +90,5 @@ mistake() {
     says "vg-decode: warning: the input has no poses: 'out.zip' holds none"
     [[ $stderr != *--map* ]]
     must_warn vg-decode "$GOLDEN/map.vgs" -o out/
-    says "'out/' holds none; vg-deform --map plays a map"
+    says "'out/' holds none; vg-play plays a map"
 }

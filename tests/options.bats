@@ -32,17 +32,13 @@ setup() {
     for option in '--by pose' '--root stay' '--pin always' '--correspondence x'; do
         refused "vg-deform $option walk.vgs -o out" "${option%% *} needs --onto"
     done
-    for option in '--edit "a x 1"' --align --joints --transforms --live; do
-        refused "vg-deform $option walk.vgs -o out" "${option%% *} needs --map"
-    done
-    refused 'vg-deform --smooth walk.vgs -o out' '--smooth needs --interpolate or --at'
     refused 'vg-solve --planar-weights 1,1 vectors.vgs -o out' '--planar-weights needs --planar'
     for option in '--method lbs' '--bones-per-corner 1' '--refine 1'; do
         refused "vg-fitmap $option --patches patches.vgs walk.vgs -o out" "${option%% *} needs --skeleton or --groups"
     done
     refused 'vg-fitmap --learn --groups g walk.vgs -o out' '--learn needs --skeleton'
     refused 'vg-fitmap --root-at 0,0,0 --groups g walk.vgs -o out' '--root-at needs --skeleton'
-    refused 'vg-fitmap --morph 1 map.vgs -o out' '--morph needs --retarget'
+    refused 'vg-retarget --morph 1 map.vgs -o out' 'name the body that the map is brought to: --onto MESH'
     refused 'vg-diff --of mean walk.vgs walk.vgs -o out' '--of needs --tolerance'
     refused 'vg-diff --no-provenance walk.vgs walk.vgs -o out' '--no-provenance' '--heat'
     refused 'vg-register --aligned --keep-all pose1.obj target.obj -o out' '--keep-all needs --markers'
@@ -51,18 +47,38 @@ setup() {
     refused 'vg-view --centred walk.vgs -o out.png' '--centred needs --against'
 }
 
+@test "an option that moved to another program" {
+    for option in --interpolate=30 '--at 0,1' --smooth; do
+        refused "vg-deform $option walk.vgs -o out" "${option%%[ =]*} is now " 'vg-interpolate'
+    done
+    refused 'vg-deform --interpolate 30 walk.vgs -o out' '--interpolate is now the program vg-interpolate: vg-interpolate 30'
+    for option in '--map map.vgs' '--edit "a x 1"' --align --joints --transforms --live; do
+        refused "vg-deform $option walk.vgs -o out" "${option%% *} is now " "vg-play MAP"
+    done
+    refused 'vg-fitmap --retarget target.obj map.vgs -o out' '--retarget is now the program vg-retarget: vg-retarget --onto MESH MAP'
+    refused 'vg-fitmap --morph 0.5 map.vgs -o out' '--morph is now an option of vg-retarget'
+}
+
+@test "operands that a program cannot do without" {
+    refused 'vg-interpolate <walk.vgs -o out' 'say how many poses to write: vg-interpolate 30'
+    refused 'vg-interpolate walk.vgs -o out' "the number of poses is from 1 to 1000000000, not 'walk.vgs'"
+    for n in 0 1e3 1000000001 2.5 ''; do
+        refused "vg-interpolate '$n' walk.vgs -o out" 'the number of poses' "not '$n'"
+    done
+    refused 'vg-interpolate --at 0 walk.vgs pose1.obj -o out' 'one operand too many'
+    refused 'vg-interpolate 3 walk.vgs pose1.obj -o out' "one operand too many: 'pose1.obj'"
+    refused 'vg-play -o out' 'name the map to play'
+    refused 'vg-play map.vgs walk.vgs pose1.obj -o out' "one operand too many: 'pose1.obj'"
+    refused 'vg-retarget map.vgs -o out' '--onto MESH'
+}
+
 @test "options that exclude each other" {
-    refused 'vg-deform --interpolate 3 --at 1 walk.vgs -o out' '--interpolate does not go with --at'
-    refused 'vg-deform --map map.vgs --onto target.obj walk.vgs -o out' '--map does not go with --onto'
-    refused 'vg-deform --map map.vgs --smooth --at 1 walk.vgs -o out' '--map does not go with --smooth'
-    refused 'vg-deform --map map.vgs --live --at 1 walk.vgs -o out' '--live does not go with --at'
-    refused 'vg-deform --onto target.obj --at 1 walk.vgs -o out' '--onto takes poses as they are' '--at'
+    refused 'vg-interpolate 3 --at 1 walk.vgs -o out' "--at says which poses are written" "'3'"
+    refused 'vg-play map.vgs --live --at 1 walk.vgs -o out' '--live does not go with --at'
+    refused 'vg-play map.vgs --interpolate 3 --at 1 walk.vgs -o out' '--interpolate does not go with --at'
     refused 'vg-deform --onto target.obj --by shape --correspondence c walk.vgs -o out' '--by shape' '--correspondence'
     refused 'vg-fitmap --skeleton s --groups g walk.vgs -o out' '--skeleton does not go with --groups'
     refused 'vg-fitmap --skeleton s --patches p walk.vgs -o out' '--patches does not go with --skeleton'
-    for option in '--patches p' '--skeleton s' '--groups g' '--holdout 2' '--hold 0.5'; do
-        refused "vg-fitmap --retarget target.obj $option map.vgs -o out" "--retarget does not go with ${option%% *}"
-    done
     refused 'vg-register --dense a --dense-source b pose1.obj target.obj -o out' '--dense does not go with --dense-source'
     refused 'vg-view --against walk.vgs --scales walk.vgs -o out.png' '--against does not go with --scales'
     refused 'vg-view --against walk.vgs --plain walk.vgs -o out.png' '--against does not go with --plain'
@@ -78,7 +94,7 @@ setup() {
     refused 'vg-deform --onto target.obj --by shape --pin always walk.vgs -o out' '--pin' '--by shape'
     refused 'vg-deform --onto target.obj --pin always vectors.vgs -o out' '--pin needs a sequence of vertices' 'holds vectors'
     must vg-deform --onto target.obj --pin none vectors.vgs -o pinned.vgs # that is what happens
-    refused 'vg-deform --map map.vgs --edit "a x 1" --align -o out' '--align' 'no input'
+    refused 'vg-play map.vgs --edit "a x 1" --align -o out' '--align' 'no input'
     refused 'vg-view --patches patches.vgs --against walk.vgs walk.vgs -o out.png' '--patches' '--against'
     refused 'vg-view --patches patches.vgs --scales walk.vgs -o out.png' '--patches' '--scales'
     must vg-view --patches patches.vgs --scales walk.vgs -o both.html # a page shows either
@@ -88,9 +104,9 @@ setup() {
 }
 
 @test "standard input is read once" {
-    for line in 'vg-deform --onto - <walk.vgs' 'vg-deform --map - <map.vgs' 'vg-deform --onto target.obj --correspondence - <walk.vgs' \
+    for line in 'vg-deform --onto - <walk.vgs' 'vg-play - <map.vgs' 'vg-deform --onto target.obj --correspondence - <walk.vgs' \
         'vg-encode --reference - <walk.vgs' 'vg-encode --mesh - <walk.vgs' 'vg-fitmap --patches - <walk.vgs' \
-        'vg-fitmap --skeleton - - <walk.vgs' 'vg-fitmap --retarget - <map.vgs' 'vg-register - - --aligned <pose1.obj' \
+        'vg-fitmap --skeleton - - <walk.vgs' 'vg-retarget --onto - <map.vgs' 'vg-register - - --aligned <pose1.obj' \
         'vg-register - target.obj --markers - <pose1.obj' 'vg-register pose1.obj target.obj --markers - --dense - <pose1.obj' \
         'vg-diff - - <walk.vgs' 'vg-view --against - <walk.vgs' 'vg-view --beside - --beside - walk.vgs <walk.vgs' \
         'vg-view --patches - - <walk.vgs' 'vg-poisson --first - <walk.vgs' 'vg-poisson --first - --key 1=- walk.vgs <pose1.obj' \
@@ -110,6 +126,11 @@ setup() {
     for name in out.png out.html out.htm; do
         refused "vg-solve vectors.vgs -o $name" "the output is a stream: pipe it into 'vg-view -o $name'"
     done
+    refused 'vg-deform --onto target.obj walk.vgs -o out.obj' "pipe it into 'vg-solve | vg-decode -o out.obj'"
+    refused 'vg-interpolate 3 walk.vgs -o out.png' "pipe it into 'vg-solve | vg-view -o out.png'"
+    refused 'vg-play map.vgs walk.vgs -o out.glb' "pipe it into 'vg-decode -o out.glb'"
+    refused 'vg-fitmap --patches patches.vgs walk.vgs -o out.glb' "a map, not poses" "'vg-play MAP POSES | vg-decode -o out.glb'"
+    refused 'vg-retarget --onto target.obj map.vgs -o out.html' "'vg-play MAP POSES | vg-view -o out.html'"
     must vg-solve vectors.vgs -o out.any
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bats
-# Rigs: vg-fitmap --skeleton and --groups, vg-deform --map driven by skeletons, transforms and by hand. Toys have forward kinematics of
+# Rigs: vg-fitmap --skeleton and --groups, vg-play driven by skeletons, transforms and by hand. Toys have forward kinematics of
 # their own, written here in Python; real sequences are compared with their poses by vg-diff.
 # SPDX-License-Identifier: GPL-3.0-or-later
 load lib.bash
@@ -105,9 +105,9 @@ of_report() {
     for how in '--bones-per-corner 1' '--bones-per-corner 1 --refine 0' '--bones-per-corner 2 --refine 0' '--refine 0.003' '--method lbs'; do
         # shellcheck disable=SC2086
         must vg-fitmap -q $how --skeleton fit.bvh fit/ -o one.rig
-        must vg-deform --map one.rig fit.bvh -o again.vgs
+        must vg-play one.rig fit.bvh -o again.vgs
         must vg-diff -t 1e-9 fit/ again.vgs
-        must vg-deform --map one.rig other.bvh -o driven.vgs
+        must vg-play one.rig other.bvh -o driven.vgs
         must vg-diff -t 1e-9 other/ driven.vgs
     done
     must_fail 1 vg-diff -t 1e-2 fit/ other/ # so that the bounds say something
@@ -124,7 +124,7 @@ of_report() {
     must vg-encode --reference fit/p00.obj moving/ -o moving.vgs
     must_warn vg-fitmap -v --skeleton moving.bvh moving.vgs -o moving.rig
     says 'the root of the skeleton is at 0.3 0.1 -0.2 in the reference pose'
-    must vg-deform --map moving.rig fit.bvh -o again.vgs
+    must vg-play moving.rig fit.bvh -o again.vgs
     must vg-diff -t 1e-9 fit/ again.vgs
     # the man without his rest pose, nor its row
     must vg-decode "$DATA/human-man-poses.tar.xz" -o man/
@@ -145,23 +145,23 @@ END
 @test "a motion that is not known is learned: the toy to 1e-6 D, also from its own poses and without any skeleton's motion" {
     made
     must vg-fitmap -q --learn --root-at 0.3,0.1,-0.2 --skeleton fit.bvh fit/ -o learned.rig
-    must vg-deform --map learned.rig fit/ -o again.vgs
+    must vg-play learned.rig fit/ -o again.vgs
     must vg-diff -t 1e-6 fit/ again.vgs
     chain other --frames 9 --seed 2
-    must vg-deform --map learned.rig other/ -o own.vgs
+    must vg-play learned.rig other/ -o own.vgs
     must vg-diff -t 1e-6 other/ own.vgs
-    must vg-deform --map learned.rig other.bvh -o driven.vgs
+    must vg-play learned.rig other.bvh -o driven.vgs
     must vg-diff -t 1e-6 other/ driven.vgs
     # the same from text, which has no motion
     printf '%s\n' 'hip - 0.3 0.1 -0.2 0.3 1.1 -0.2' 'knee hip 0.3 1.1 -0.2 0.3 2.1 -0.2' 'foot knee 0.3 2.1 -0.2 0.3 3.1 -0.2' \
         'toe foot 0.3 3.1 -0.2 0.3 4.1 -0.2' >chain.skeleton.txt
     must vg-fitmap -q --skeleton chain.skeleton.txt fit/ -o text.rig
-    must vg-deform --map text.rig other.bvh -o driven.vgs
+    must vg-play text.rig other.bvh -o driven.vgs
     must vg-diff -t 1e-6 other/ driven.vgs
     # from far away, moved there by --root-at
     sed 's/ 0\.3 / 5.3 /g' chain.skeleton.txt >far.skeleton.txt
     must vg-fitmap -q --root-at 0.3,0.1,-0.2 --skeleton far.skeleton.txt fit/ -o text.rig
-    must vg-deform --map text.rig other.bvh -o driven.vgs
+    must vg-play text.rig other.bvh -o driven.vgs
     must vg-diff -t 1e-6 other/ driven.vgs
 }
 
@@ -180,9 +180,9 @@ with open("groups.txt", "w") as f:
 END
     must vg-fitmap -q --groups groups.txt at-joints/ -o groups.rig
     chain other --frames 9 --seed 2
-    must vg-deform --map groups.rig at-joints.bvh -o again.vgs # the joints have the names of the skeleton
+    must vg-play groups.rig at-joints.bvh -o again.vgs # the joints have the names of the skeleton
     must vg-diff -t 1e-7 at-joints/ again.vgs # a joint with none below is drawn to the one above by 1e-9, beside 0.04 from its vertices
-    must vg-deform --map groups.rig other.bvh -o driven.vgs
+    must vg-play groups.rig other.bvh -o driven.vgs
     must vg-diff -t 1e-7 other/ driven.vgs
     echo 'hip - vertices 0 1 32' >bad.txt
     must_fail 3 vg-fitmap --groups bad.txt at-joints/ -o no.rig
@@ -191,7 +191,7 @@ END
 
 @test "a man in 15 large poses, driven by his skeleton: what vg-fitmap said it would be, poses left out included" {
     made
-    must vg-deform --map man.rig man.bvh -o driven.vgs
+    must vg-play man.rig man.bvh -o driven.vgs
     mean=$(vertex_error mean "$DATA/human-man-poses.tar.xz" driven.vgs)
     at_most "$mean" 2.5e-4
     at_most "$(vertex_error max "$DATA/human-man-poses.tar.xz" driven.vgs)" 0.012
@@ -222,23 +222,23 @@ END
     at_most "$(of_report trex.report envelope fitted sigma)" "$(of_report trex.report skinning fitted sigma)"
     xz -dc "$DATA/trex-attack.joints.txt.xz" | grep -v '^000 ' >attack.joints.txt
     must vg-encode --mesh "$DATA/trex.skeleton.txt" attack.joints.txt -o joints.vgs
-    must vg-deform --map trex.rig joints.vgs -o driven.vgs
+    must vg-play trex.rig joints.vgs -o driven.vgs
     # positions do not say how head, feet and the many-legged middle turn: far more than by the poses' own motion
     at_most "$(vertex_error mean "$DATA/trex-attack.tar.xz" driven.vgs)" 0.03
-    must vg-deform --map trex.rig "$DATA/trex-attack.tar.xz" -o own.vgs
+    must vg-play trex.rig "$DATA/trex-attack.tar.xz" -o own.vgs
     at_most "$(vertex_error mean "$DATA/trex-attack.tar.xz" own.vgs)" 0.0105
     # the walk is farther from the attack than that, so the bound says something
-    capture bash -c 'vg-deform --map trex.rig "$DATA/trex-walk.tar.xz" | vg-diff -q -t 0.03 --of mean "$DATA/trex-attack.tar.xz" -'
+    capture bash -c 'vg-play trex.rig "$DATA/trex-walk.tar.xz" | vg-diff -q -t 0.03 --of mean "$DATA/trex-attack.tar.xz" -'
     [ "$status" = 1 ]
 }
 
 @test "transforms there and back, through a second process, and with any number of threads the same bytes" {
     made
-    pipe 'vg-deform --map man.rig --transforms man.bvh | vg-deform --map man.rig >back.vgs'
-    must vg-deform --map man.rig man.bvh -o straight.vgs
+    pipe 'vg-play man.rig --transforms man.bvh | vg-play man.rig >back.vgs'
+    must vg-play man.rig man.bvh -o straight.vgs
     must vg-diff -t 1e-9 straight.vgs back.vgs
-    must vg-deform --no-provenance -j1 --map man.rig man.bvh -o one.vgs
-    must vg-deform --no-provenance -j2 --map man.rig man.bvh -o two.vgs
+    must vg-play --no-provenance -j1 man.rig man.bvh -o one.vgs
+    must vg-play --no-provenance -j2 man.rig man.bvh -o two.vgs
     same_file one.vgs two.vgs
     for j in 1 2; do must vg-fitmap -q -j$j --no-provenance --skeleton "$DATA/trex.skeleton.txt" trex.vgs -o trex$j.rig; done
     same_file trex1.rig trex2.rig
@@ -248,13 +248,13 @@ END
 
 @test "--live: each pose of a skeleton comes out before the next goes in" {
     made
-    must vg-deform --map chain.rig --transforms fit.bvh -o motions.vgs
+    must vg-play chain.rig --transforms fit.bvh -o motions.vgs
     must vg-encode fit.bvh -o skeleton.vgs
     py <<'END'
 import os, select, struct, subprocess
 for name in ("motions.vgs", "skeleton.vgs"):
     data, at, sent, frames, got = open(name, "rb").read(), 16, 0, 0, b""
-    p = subprocess.Popen(["vg-deform", "--map", "chain.rig", "--live"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    p = subprocess.Popen(["vg-play", "chain.rig", "--live"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     while at < len(data):
         tag, length = data[at:at + 4], struct.unpack_from("<Q", data, at + 8)[0]
         at += 32 + (length + 7) // 8 * 8
@@ -295,24 +295,24 @@ write("before", [(root, angles)])
 angles[1][0] += 40.0
 write("after", [(root, angles)])
 END
-    must vg-deform --map chain.rig --edit 'knee z 90' -o z.vgs
-    must vg-deform --map chain.rig --edit 'foot x -35' -o x.vgs
-    must vg-deform --map chain.rig --edit 'knee twist 50' -o twist.vgs # the bone lies along y
+    must vg-play chain.rig --edit 'knee z 90' -o z.vgs
+    must vg-play chain.rig --edit 'foot x -35' -o x.vgs
+    must vg-play chain.rig --edit 'knee twist 50' -o twist.vgs # the bone lies along y
     must vg-encode z.vgs x.vgs twist.vgs -o all.vgs
     must vg-diff -t 1e-9 truth/ all.vgs
-    must vg-deform --map chain.rig --edit 'hip z 20' --edit 'foot x 70' -o edits.vgs
+    must vg-play chain.rig --edit 'hip z 20' --edit 'foot x 70' -o edits.vgs
     must vg-diff -t 1e-9 both/ edits.vgs
-    must vg-deform --map chain.rig --edit 'knee z 40' before.bvh -o edits.vgs
+    must vg-play chain.rig --edit 'knee z 40' before.bvh -o edits.vgs
     must vg-diff -t 1e-9 after/ edits.vgs
     # nothing is read when there is no operand: standard input may be closed, or a stream that is none
-    must bash -c "vg-deform --map chain.rig --edit 'hip z 1' -o out.vgs <&-"
-    must bash -c "echo nonsense | vg-deform --map chain.rig --edit 'hip z 1' -o out.vgs"
+    must bash -c "vg-play chain.rig --edit 'hip z 1' -o out.vgs <&-"
+    must bash -c "echo nonsense | vg-play chain.rig --edit 'hip z 1' -o out.vgs"
 }
 
 @test "--edit of a man: his forearm goes round by 90 degrees as one, and the rest of him stays" {
     made
-    must vg-deform --map man.rig --edit 'lowerarm01.L y 90' -o bent.vgs
-    must vg-deform --map man.rig --edit 'lowerarm01.L y 0' -o still.vgs
+    must vg-play man.rig --edit 'lowerarm01.L y 90' -o bent.vgs
+    must vg-play man.rig --edit 'lowerarm01.L y 0' -o still.vgs
     py <<'END'
 import math
 from read_stream import read_stream
@@ -353,13 +353,13 @@ def pose(t): return ROOT, [[0.0, 0.0, 0.0], [90.0 * t, 0.0, 0.0], [-150.0 * t, 0
 write("keys", [pose(0), pose(1)])
 write("truth", [pose(0), pose(0.5), pose(1)])
 END
-    must vg-deform --map chain.rig --interpolate 3 keys.bvh -o between.vgs
-    must vg-deform --map chain.rig --transforms keys.bvh -o motions.vgs
-    must vg-deform --map chain.rig --interpolate 3 motions.vgs -o again.vgs
+    must vg-play chain.rig --interpolate 3 keys.bvh -o between.vgs
+    must vg-play chain.rig --transforms keys.bvh -o motions.vgs
+    must vg-play chain.rig --interpolate 3 motions.vgs -o again.vgs
     must vg-diff -t 1e-9 between.vgs again.vgs
     # the mean of the body goes straight, so shift is free; shape is that of the joints
     must vg-diff -c -t 1e-9 truth/ between.vgs
-    must vg-deform --map chain.rig --at 0,1 keys.bvh -o ends.vgs
+    must vg-play chain.rig --at 0,1 keys.bvh -o ends.vgs
     must vg-diff -t 1e-9 keys/ ends.vgs
 }
 
@@ -373,14 +373,14 @@ poses = [any_pose(500 + i) for i in range(5)]
 stiff = [(root, angles[:3] + [(0.0, 0.0, 0.0)]) for root, angles in poses]
 write("stiff", stiff, NAMES[:3])
 END
-    must_warn vg-deform --map chain.rig stiff.bvh -o out.vgs
+    must_warn vg-play chain.rig stiff.bvh -o out.vgs
     says '1 of 4 bones are not in the skeleton'
     one_line
     must vg-diff -t 1e-9 stiff/ out.vgs
     # twice as large: the rig keeps its size, and goes half as far
     awk '/OFFSET/{$2 *= 2; $3 *= 2; $4 *= 2} moving && NF > 6 {for (i = 1; i <= 3; i++) $i *= 2} /^Frame Time/{moving = 1} {print}' \
         fit.bvh >large.bvh
-    must vg-deform --map chain.rig large.bvh -o out.vgs
+    must vg-play chain.rig large.bvh -o out.vgs
     must vg-diff -t 1e-6 fit/ out.vgs # awk writes six digits
     # a skeleton that rests with its knee bent says so with --align
     sed '/^JOINT foot/,/CHANNELS/s/OFFSET 0 1 0/OFFSET -1 0 0/; /^JOINT toe/,/CHANNELS/s/OFFSET 0 1 0/OFFSET -1 0 0/
@@ -392,18 +392,18 @@ sys.path.insert(0, ".")
 from chain import *
 write("bent-truth", [(ROOT, [[0.0] * 3, [90.0, 0.0, 0.0], [0.0] * 3, [0.0] * 3])])
 END
-    must vg-deform --map chain.rig --align bent.bvh -o out.vgs
+    must vg-play chain.rig --align bent.bvh -o out.vgs
     must vg-diff -c -t 1e-6 bent-truth/ out.vgs # it is less spread, so the root goes less far
-    must vg-deform --map chain.rig bent.bvh -o out.vgs
+    must vg-play chain.rig bent.bvh -o out.vgs
     must vg-diff -c -t 1e-6 fit/p00.obj out.vgs
 }
 
 @test "another body takes the rig: the heavy man driven by a skeleton's motion" {
     made
-    must vg-fitmap -q --retarget "$DATA/human-heavy-poses.tar.xz" man.rig -o heavy.rig
-    must vg-deform --map heavy.rig man.bvh -o heavy.vgs
+    must vg-retarget --onto "$DATA/human-heavy-poses.tar.xz" man.rig -o heavy.rig
+    must vg-play heavy.rig man.bvh -o heavy.vgs
     must vg-diff -c --of mean -t 0.0095 "$DATA/human-heavy-poses.tar.xz" heavy.vgs # as a transfer does, 0.0073
-    must vg-deform --map man.rig man.bvh -o man.vgs
+    must vg-play man.rig man.bvh -o man.vgs
     capture vg-diff -c -q --of mean -t 0.0095 "$DATA/human-heavy-poses.tar.xz" man.vgs
     [ "$status" = 1 ]
 }
@@ -413,7 +413,7 @@ END
     capture vg-fitmap --skeleton face.skeleton.txt "$DATA/faceA.tar.xz" -o face.rig
     [ "$status" = 0 ] || fail "$stderr"
     printf '%s\n' "$stderr" >report
-    must vg-deform --map face.rig "$DATA/faceA.tar.xz" -o out.vgs
+    must vg-play face.rig "$DATA/faceA.tar.xz" -o out.vgs
     mean=$(vertex_error mean "$DATA/faceA.tar.xz" out.vgs)
     py "$mean" "$(of_report report envelope fitted mean)" "$(of_report report envelope fitted largest)" <<'END'
 import sys
@@ -437,25 +437,25 @@ END
     must_fail 2 vg-fitmap --skeleton fit.bvh --method linear fit/ -o no.rig
     must_fail 2 vg-fitmap --skeleton fit.bvh --bones-per-corner 3 fit/ -o no.rig
     must_fail 2 vg-fitmap --skeleton fit.bvh --root-at 1,2 fit/ -o no.rig
-    must_fail 2 vg-fitmap --retarget fit/p01.obj --skeleton fit.bvh chain.rig -o no.rig
+    must_fail 2 vg-retarget --onto fit/p01.obj --morph x chain.rig -o no.rig
     for edit in knee 'knee z' 'knee w 20' 'knee z x' 'z 20' ''; do
-        must_fail 2 vg-deform --map chain.rig --edit "$edit" -o no.vgs
+        must_fail 2 vg-play chain.rig --edit "$edit" -o no.vgs
     done
-    must_fail 2 vg-deform --map chain.rig --edit 'elbow z 20' -o no.vgs
+    must_fail 2 vg-play chain.rig --edit 'elbow z 20' -o no.vgs
     says "no bone 'elbow'"
-    must_fail 2 vg-deform --edit 'knee z 20' fit/ -o no.vgs
-    says 'needs --map'
-    must_fail 2 vg-deform --map chain.rig --align fit/ -o no.vgs
+    must_fail 3 vg-play fit/ --edit 'knee z 20' -o no.vgs
+    says "'fit/' holds no map: make one with vg-fitmap"
+    must_fail 2 vg-play chain.rig --align fit/ -o no.vgs
     sed 's/hip/a/; s/knee/b/; s/foot/c/; s/toe/d/' fit.bvh >names.bvh
-    must_fail 3 vg-deform --map chain.rig names.bvh -o no.vgs
-    must_fail 3 vg-deform --map chain.rig trex.vgs -o no.vgs
-    must vg-deform --map trex.rig --transforms trex.vgs -o motions.vgs
-    must_fail 3 vg-deform --map chain.rig motions.vgs -o no.vgs
+    must_fail 3 vg-play chain.rig names.bvh -o no.vgs
+    must_fail 3 vg-play chain.rig trex.vgs -o no.vgs
+    must vg-play trex.rig --transforms trex.vgs -o motions.vgs
+    must_fail 3 vg-play chain.rig motions.vgs -o no.vgs
     says '29 transforms'
     pipe "vg-segment -q -k 3 trex.vgs | vg-fitmap -q --patches - trex.vgs -o patches.map"
-    must_fail 3 vg-deform --map patches.map --edit 'Head z 20' -o no.vgs
+    must_fail 3 vg-play patches.map --edit 'Head z 20' -o no.vgs
     says 'map of patches'
-    must_fail 3 vg-deform --map patches.map fit.bvh -o no.vgs
+    must_fail 3 vg-play patches.map fit.bvh -o no.vgs
     says 'map of patches'
     [ ! -e no.rig ] && [ ! -e no.vgs ]
 }
@@ -491,10 +491,10 @@ END
     awk '/^Frames:/{print "Frames: 18"; next} moving && n++ % 5 {next} {print} /^Frame Time/{moving = 1}' "$bvh" >fifth.bvh
     must vg-encode --reference rest.obj fifth/ -o fifth.vgs
     must vg-fitmap -q --skeleton fifth.bvh fifth.vgs -o fifth.rig
-    must vg-deform --map fifth.rig "$bvh" -o driven.vgs
+    must vg-play fifth.rig "$bvh" -o driven.vgs
     at_most "$(vertex_error mean "$poses" driven.vgs)" 1.2e-3
     must vg-fitmap -q --method lbs --skeleton fifth.bvh fifth.vgs -o fifth.rig
-    must vg-deform --map fifth.rig "$bvh" -o driven.vgs
+    must vg-play fifth.rig "$bvh" -o driven.vgs
     at_most "$(vertex_error mean "$poses" driven.vgs)" 2e-4
 }
 

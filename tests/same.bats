@@ -24,13 +24,13 @@ same() {
     for by in pose shape blend; do
         same $by.vgs vg-deform --no-provenance --onto "$DATA/horse.rest.obj" --by $by --root stay first.poses.vgs
     done
-    same between.vgs vg-deform --no-provenance --interpolate 20 --smooth first.poses.vgs
+    same between.vgs vg-interpolate --no-provenance 20 --smooth first.poses.vgs
     same solved.vgs vg-solve --no-provenance first.pose.vgs
     same planar.vgs vg-solve --no-provenance --planar --weights area first.vectors.vgs
     same guided.vgs vg-poisson --no-provenance --first "$DATA/horse.rest.obj" first.poses.vgs
     same patches.vgs vg-segment --no-provenance -k 12 first.poses.vgs
     same map.vgs vg-fitmap -q --no-provenance --patches first.patches.vgs first.poses.vgs
-    same mapped.vgs vg-deform --no-provenance --map first.map.vgs --interpolate 9 first.poses.vgs
+    same mapped.vgs vg-play --no-provenance first.map.vgs --interpolate 9 first.poses.vgs
     must vg-decode -q first.poses.vgs -o poses.zip
     printf '0 0\n100 100\n200 200\n300 300\n' >markers.txt
     same pairs.vgs vg-register -q --no-provenance "$DATA/horse.rest.obj" "$DATA/horse.rest.obj" --markers markers.txt

@@ -20,9 +20,9 @@ static int check_skin(const vg_head *h, const char *output, vg_err *e)
 {
     const char *lacks = NULL;
     if (!h->body.rig.skeleton.njoints)
-        lacks = "the input holds transforms of no skeleton: make vertices of them with 'vg-deform --map MAP' first";
+        lacks = "the input holds transforms of no skeleton: make vertices of them with 'vg-play MAP' first";
     else if (!h->body.rig.skin_bone)
-        lacks = "the rig of the input has no weights: make vertices of it with 'vg-deform --map MAP' first";
+        lacks = "the rig of the input has no weights: make vertices of it with 'vg-play MAP' first";
     else if (h->count != h->body.rig.nbones) lacks = "the input has not as many transforms as its rig has bones";
     return lacks ? vg_fail(e, VG_EINPUT, "cannot write '%s': %s", output, lacks) : VG_OK;
 }

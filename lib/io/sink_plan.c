@@ -227,7 +227,7 @@ int vgi_plan_check_head(const vgi_plan *p, const vg_head *h, const char *output,
 {
     const vgi_sequence_format *f = p->sequence;
     if (f ? f->kinds >> h->kind & 1 : h->kind == VG_VERTICES) return f && f->check ? f->check(h, output, e) : VG_OK;
-    const char *advice = "make vertices of them with 'vg-deform --map MAP' first, or of a rig's a skin in a .glb";
+    const char *advice = "make vertices of them with 'vg-play MAP' first, or of a rig's a skin in a .glb";
     if (h->kind == VG_VECTORS) advice = "pipe it through 'vg-solve' first";
     if (h->kind == VG_DEFORMATIONS)
         advice = "apply them with 'vg-deform --onto MESH' and pipe that through 'vg-solve' first";

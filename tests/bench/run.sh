@@ -279,11 +279,11 @@ patches() {
     by_cholmod $(((4 * k + 2) / 3))
     row vg-fitmap "$poses" "$data"
     # shellcheck disable=SC2046
-    vg-encode --f32 $(repeat $((played / 11)) "$n-11.vgs") | vg-deform --map "$n.map" --transforms -o motions.vgs
+    vg-encode --f32 $(repeat $((played / 11)) "$n-11.vgs") | vg-play "$n.map" --transforms -o motions.vgs
     product=$(product "$k" "$7")
-    best "$runs" "vg-deform --map $n.map motions.vgs >/dev/null"
+    best "$runs" "vg-play $n.map motions.vgs >/dev/null"
     limit=sgemm least=$(calc "$played / ${product% *}")
-    row 'vg-deform --map, binary32' "$played" $((played * $7 * 12))
+    row 'vg-play, binary32' "$played" $((played * $7 * 12))
     rm -f motions.vgs "$n.map" "$n.patches"
 }
 
@@ -303,14 +303,14 @@ rigs() {
     by_sgemm "6 * $poses * $k * (4 * $7 + 9 * $6)"
     row 'vg-fitmap --skeleton, learned' "$poses" "$(bytes "$in")"
     # shellcheck disable=SC2046
-    vg-encode --f32 $(repeat $((played / 11)) "$n-11.vgs") | vg-deform --map "$n.rig" --transforms -o motions.vgs
+    vg-encode --f32 $(repeat $((played / 11)) "$n-11.vgs") | vg-play "$n.rig" --transforms -o motions.vgs
     product=$(product "$k" "$7")
-    best "$runs" "vg-deform --map $n.rig motions.vgs >/dev/null"
+    best "$runs" "vg-play $n.rig motions.vgs >/dev/null"
     limit=sgemm least=$(calc "$played / ${product% *}")
-    row 'vg-deform --map, rig, binary32' "$played" $((played * $7 * 12))
+    row 'vg-play, rig, binary32' "$played" $((played * $7 * 12))
     rig_rate=$rate
-    best "$runs" "vg-deform --live --map $n.rig motions.vgs >/dev/null"
-    row 'vg-deform --map --live, rig' "$played" $((played * $7 * 12))
+    best "$runs" "vg-play --live $n.rig motions.vgs >/dev/null"
+    row 'vg-play --live, rig' "$played" $((played * $7 * 12))
     live_seconds=$(calc "1000 * $seconds / $played")
     rm -f motions.vgs "$n.rig" bones.txt
 }

@@ -95,9 +95,9 @@ static const cli_option options[] = {
     {.name = NULL}};
 
 static const cli_program programs[] = {
-    {"vg-fuzz", "[options] [FILE]", "a filter", options, 1, .writes_stream = true, .threaded = true},
-    {"vg-fuzz", "[options] FILE FILE", "a report", options, 2, .writes_text = true, .traces = true},
-    {"vg-fuzz", "[options] FILE...", "a writer", options, SIZE_MAX, .writes_file = true, .threaded = true},
+    {"vg-fuzz", "[options] [FILE]", "a filter", options, .most_operands = 1, .writes_stream = true, .threaded = true},
+    {"vg-fuzz", "[options] FILE FILE", "a report", options, .most_operands = 2, .writes_text = true, .traces = true},
+    {"vg-fuzz", "[options] FILE...", "a writer", options, .most_operands = SIZE_MAX, .writes_file = true, .threaded = true},
     {.name = "vg-fuzz", .synopsis = "[options]", .summary = "a thing", .options = options}};
 
 /* The words of the input; words[0] is the program. */

@@ -1,61 +1,50 @@
-/* between.c: --interpolate, --at and --smooth of vg-deform: collect the key poses, write the poses between them as
- * vectors.
- * Leaves out the mathematics (lib/method/vectors/interpolate.c), and paths of transforms, which need a map.
+/* vg-interpolate: poses between key poses and beyond them, as vectors.
+ * Leaves out the mathematics (lib/method/vectors/interpolate.c), and paths of transforms, which need a map (vg-play).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "between.h"
+#include "pose_times.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-struct between_options between;
+static struct {
+    pose_times times;
+    bool smooth;
+} opts;
 
-/* ---- moments ---- */
+static const cli_option options[] = {
+    {"at", 0, "T,...", "write the poses at these moments: 0 is the first pose, 1 the second; outside is extrapolated",
+     .take = pose_times_take, .context = &opts.times},
+    {"smooth", 0, NULL, "keep the velocity continuous at the poses that are interpolated", .flag = &opts.smooth},
+    {.name = NULL}};
 
-void between_take_at(const char *list, void *context)
+static const cli_program program = {
+    .name = "vg-interpolate",
+    .synopsis = "[options] N | --at T,... [FILE]",
+    .summary = "write N poses, evenly spaced from the first pose of the input to the last, or poses at given moments",
+    .options = options,
+    .most_operands = 2,
+    .writes_stream = true,
+    .writes_vectors = true,
+    .threaded = true};
+
+/* Takes N from the operands unless --at was given; returns how many operands that used. */
+static size_t take_count(char **operands, size_t n)
 {
-    (void)context;
-    size_t most = strlen(list) / 2 + 1;
-    free(between.at);
-    between.at = cli_allocate(most, sizeof *between.at, "the list of --at");
-    between.count = cli_parse_numbers(list, between.at, most);
-    if (!between.count) cli_usage("option '--at' needs numbers with commas between, not '%s'", list);
+    if (opts.times.at) {
+        if (n > 1) cli_usage("--at says which poses are written, so '%s' is one operand too many", operands[0]);
+        return 0;
+    }
+    if (n == 0) cli_usage("say how many poses to write: vg-interpolate 30, or which: vg-interpolate --at 0,0.5,1");
+    double count;
+    bool digits = !operands[0][strspn(operands[0], "0123456789")];
+    if (!digits || cli_parse_numbers(operands[0], &count, 1) != 1 || !(count >= 1 && count <= 1e9))
+        cli_usage("the number of poses is from 1 to 1000000000, not '%s'", operands[0]);
+    opts.times.count = (long)count;
+    return 1;
 }
 
-bool between_wanted(void)
-{
-    return between.frames || between.at;
-}
-
-size_t between_count(void)
-{
-    return between.at ? between.count : (size_t)between.frames;
-}
-
-double between_moment(size_t i, size_t keys)
-{
-    if (between.at) return between.at[i];
-    size_t n = between_count();
-    return n < 2 ? 0 : (double)i * (double)(keys - 1) / (double)(n - 1);
-}
-
-void between_label(vg_frame *f, const between_key *keys, size_t nkeys, double t)
-{
-    vg_err e;
-    size_t last = nkeys > 1 ? nkeys - 2 : 0, number = t > 0 ? (t < (double)last ? (size_t)t : last) : 0;
-    const between_key *a = &keys[number], *b = &keys[nkeys > 1 ? number + 1 : number];
-    double u = t - (double)number;
-    size_t room = strlen(a->name) + strlen(b->name) + 40;
-    char *name = cli_allocate(room, 1, "the key poses");
-    if (u == 0 || u == 1) snprintf(name, room, "%s", u == 0 ? a->name : b->name);
-    else snprintf(name, room, "%s~%s@%.6g", a->name, b->name, u);
-    if (vg_frame_rename(f, name, &e) < 0) cli_die(&e);
-    free(name);
-    f->has_time = a->has_time && b->has_time;
-    f->time = f->has_time ? a->time + u * (b->time - a->time) : 0;
-}
-
-/* ---- a path of vectors ---- */
+/* ---- the key poses ---- */
 
 typedef struct poses {
     vg_head *h;
@@ -63,7 +52,7 @@ typedef struct poses {
     vg_kind kind;   /* what comes in */
     size_t numbers; /* of the values of a key */
     vg_key *keys;
-    between_key *labels;
+    pose_key *labels;
     size_t n, cap;
 } poses;
 
@@ -72,7 +61,8 @@ static void prepare(poses *p, vg_source *s)
     vg_err e;
     p->h = vg_source_head(s);
     p->kind = p->h->kind;
-    if (p->kind == VG_TRANSFORMS) cli_stop(VG_EINPUT, "the input holds transforms: name their map with --map");
+    if (p->kind == VG_TRANSFORMS)
+        cli_stop(VG_EINPUT, "the input holds transforms: interpolate them with 'vg-play MAP --interpolate N'");
     p->numbers = p->h->count * vg_kind_width(p->kind);
     if (vg_head_prepare_vectors(p->h, &e) < 0 || vg_graph_new(&p->g, p->h, &e) < 0) cli_die(&e);
     p->h->kind = VG_VECTORS;
@@ -99,10 +89,10 @@ static void keep(poses *p, const vg_frame *f)
         memcpy(k->root, f->root, sizeof k->root);
         if (h->nanchors) memcpy(anchors, f->anchors, 3 * h->nanchors * sizeof *anchors);
     }
-    p->labels[p->n++] = (between_key){cli_copy_text(f->name, "the key poses"), f->has_time, f->time};
+    p->labels[p->n++] = (pose_key){cli_copy_text(f->name, "the key poses"), f->has_time, f->time};
 }
 
-/* Speeds are by time where all keys have times, and these grow. */
+/* Velocities are per unit of time if all keys have times and these increase, else per key. */
 static void place_keys(poses *p)
 {
     bool timed = true;
@@ -121,6 +111,20 @@ static void collect(poses *p, vg_source *s)
     place_keys(p);
 }
 
+static void clear(poses *p)
+{
+    for (size_t i = 0; i < p->n; i++) {
+        free((double *)(uintptr_t)p->keys[i].values);
+        free((double *)(uintptr_t)p->keys[i].anchors);
+        free(p->labels[i].name);
+    }
+    free(p->keys);
+    free(p->labels);
+    vg_graph_free(&p->g);
+}
+
+/* ---- the poses between them ---- */
+
 static void check_finite(const poses *p, const vg_frame *f, double t)
 {
     bool finite = isfinite(f->root[0]) && isfinite(f->root[1]) && isfinite(f->root[2]);
@@ -136,11 +140,12 @@ static void write_poses(const poses *p, vg_path *path)
 {
     vg_err e;
     vg_frame f = {0};
+    size_t count = (size_t)opts.times.count;
     if (vg_frame_shape(&f, p->h, &e) < 0) cli_die(&e);
-    for (size_t i = 0; i < between_count(); i++) {
-        double t = between_moment(i, p->n);
+    for (size_t i = 0; i < count; i++) {
+        double t = pose_times_at(&opts.times, i, p->n);
         if (vg_path_at(path, t, f.values, f.root, f.anchors, &e) < 0) cli_die(&e);
-        between_label(&f, p->labels, p->n, t);
+        key_label(&f, p->labels, p->n, t);
         check_finite(p, &f, t);
         cli_stream_put(&f);
         cli_progress("poses", i + 1);
@@ -158,27 +163,18 @@ static void report(const vg_path *path)
                  (unsigned long long)c->corners, (unsigned long long)c->first_face);
 }
 
-static void clear(poses *p)
+int main(int argc, char **argv)
 {
-    for (size_t i = 0; i < p->n; i++) {
-        free((double *)(uintptr_t)p->keys[i].values);
-        free((double *)(uintptr_t)p->keys[i].anchors);
-        free((char *)(uintptr_t)p->labels[i].name);
-    }
-    free(p->keys);
-    free(p->labels);
-    vg_graph_free(&p->g);
-}
-
-void between_run(vg_source *s)
-{
+    char **operands;
+    size_t n = cli_start(&program, argc, argv, &operands), count = take_count(operands, n);
     poses p = {0};
     vg_path *path;
     vg_err e;
+    vg_source *s = cli_source(operands + count, n - count);
     prepare(&p, s);
     cli_stream_open(p.h);
     collect(&p, s);
-    const vg_path_options o = {.kind = p.kind, .nanchors = p.h->nanchors, .smooth = between.smooth,
+    const vg_path_options o = {.kind = p.kind, .nanchors = p.h->nanchors, .smooth = opts.smooth,
                                .threads = cli.threads};
     if (vg_path_new(&path, p.g, p.h->body.reference, p.keys, p.n, &o, &e) < 0) cli_die(&e);
     write_poses(&p, path);
@@ -186,4 +182,5 @@ void between_run(vg_source *s)
     vg_path_free(&path);
     cli_stream_end(vg_source_tail(s));
     clear(&p);
+    cli_finish(0);
 }

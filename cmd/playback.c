@@ -1,27 +1,17 @@
-/* mapped.c: --map of vg-deform: measures patches or bones, takes their transforms or what a skeleton says, edits or
- * interpolates them, and makes vertices of them by one product.
- * Leaves out fitting the map (vg-fitmap) and paths through vectors (between.c).
+/* playback.c: the job of vg-play: measures patches or bones, takes their transforms as they come or from a skeleton, edits
+ * or interpolates them, and makes vertices of them by one product.
+ * Leaves out fitting the map (vg-fitmap) and paths through vectors (vg-interpolate).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "mapped.h"
-#include "between.h"
+#include "playback.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-struct mapped_options mapped;
-
 enum { BATCH = 32 };
 
-struct mapped_edit {
-    char *bone;
-    char axis; /* 'x', 'y', 'z'; 't': about the bone itself */
-    double degrees;
-    size_t number; /* of the bone; found when the rig is there */
-    double around[3];
-};
-
 typedef struct playback {
+    const playback_options *o;
     vg_source *source;
     vg_head *h; /* the input's, then the output's */
     vg_head map;
@@ -36,64 +26,11 @@ typedef struct playback {
     double *transforms[BATCH];
 } playback;
 
-void mapped_take_edit(const char *text, void *context)
-{
-    (void)context;
-    char *copy = cli_copy_text(text, "the edits");
-    mapped.edits = cli_resize(mapped.edits, mapped.nedits + 1, sizeof *mapped.edits, "the edits");
-    char *angle = strrchr(copy, ' ');
-    if (angle) *angle++ = 0;
-    char *axis = angle ? strrchr(copy, ' ') : NULL;
-    if (axis) *axis++ = 0;
-    bool twist = axis && !strcmp(axis, "twist");
-    if (!axis || !*copy || !(twist || (strlen(axis) == 1 && strchr("xyz", *axis))))
-        cli_usage("--edit is 'BONE x|y|z|twist DEGREES', not '%s'", text);
-    mapped.edits[mapped.nedits++] =
-        (struct mapped_edit){.bone = copy, .axis = twist ? 't' : *axis, .degrees = cli_parse_number("--edit", angle)};
-}
-
-bool mapped_needs_input(size_t operands)
-{
-    if (operands > 0 || !mapped.nedits) return true;
-    if (between_wanted()) cli_usage("--interpolate and --at need the poses between which they are");
-    if (mapped.align) cli_usage("--align is for a skeleton that comes in, and there is no input");
-    return false;
-}
-
 static void load_map(playback *p)
 {
     vg_err e;
-    if (vg_load_mesh(&p->map, mapped.map, &e) < 0) cli_die(&e);
-    if (!p->map.map.n) cli_stop(VG_EINPUT, "'%s' holds no map: make one with vg-fitmap", mapped.map);
-}
-
-/* Edits speak of bones by name and of their axes in the skeleton's pose without rotations. */
-static void find_bones(playback *p)
-{
-    const vg_rig *r = &p->map.body.rig;
-    if (!mapped.nedits) return;
-    if (p->map.map.kind != VG_MAP_BONES)
-        cli_stop(VG_EINPUT, "'%s' is a map of patches, --edit needs one of bones: make it with vg-fitmap --skeleton",
-                 mapped.map);
-    for (size_t i = 0; i < mapped.nedits; i++) {
-        struct mapped_edit *edit = &mapped.edits[i];
-        edit->number = vg_rig_find(r, edit->bone);
-        if (edit->number == r->nbones)
-            cli_usage("the rig has no bone '%s': 'vg-info %s' lists them", edit->bone, mapped.map);
-        if (edit->axis != 't') {
-            double unit[3] = {edit->axis == 'x', edit->axis == 'y', edit->axis == 'z'};
-            vg_quat_apply(r->turn + 4 * (size_t)r->bone[edit->number], unit, edit->around);
-        } else if (!vg_rig_axis(r, edit->number, edit->around)) {
-            cli_usage("bone '%s' has no end to twist towards: turn it about x, y or z", edit->bone);
-        }
-    }
-}
-
-static void apply_edits(const playback *p, double *transforms)
-{
-    for (size_t i = 0; i < mapped.nedits; i++)
-        vg_rig_edit(&p->map.body.rig, mapped.edits[i].number, mapped.edits[i].around, mapped.edits[i].degrees,
-                    transforms);
+    if (vg_load_mesh(&p->map, p->o->map, &e) < 0) cli_die(&e);
+    if (!p->map.map.n) cli_stop(VG_EINPUT, "'%s' holds no map: make one with vg-fitmap", p->o->map);
 }
 
 static void take_skeleton(playback *p)
@@ -102,10 +39,10 @@ static void take_skeleton(playback *p)
     if (p->map.map.kind != VG_MAP_BONES)
         cli_stop(VG_EINPUT,
                  "the input is a skeleton, and '%s' is a map of patches: make one of bones with vg-fitmap --skeleton",
-                 mapped.map);
+                 p->o->map);
     if (vg_skeleton_copy(&p->skeleton, &p->h->body.skeleton, &e) < 0 ||
         vg_joint_fitter_new(&p->fitter, &p->skeleton, &e) < 0 ||
-        vg_driver_new(&p->driver, &p->map.body.rig, &p->skeleton, mapped.align, &e) < 0)
+        vg_driver_new(&p->driver, &p->map.body.rig, &p->skeleton, p->o->align, &e) < 0)
         cli_die(&e);
     size_t missing = vg_driver_missing(p->driver);
     if (missing)
@@ -118,17 +55,17 @@ static void check_input(playback *p)
     vg_err e;
     const vg_head *h = p->h;
     char name[200];
-    snprintf(name, sizeof name, "'%.190s'", mapped.map);
+    snprintf(name, sizeof name, "'%.190s'", p->o->map);
     p->kind = h->kind, p->count = p->map.map.n;
     int r = VG_OK;
     if (p->kind == VG_VERTICES && h->body.skeleton.njoints) {
         take_skeleton(p);
-    } else if (mapped.align) {
+    } else if (p->o->align) {
         cli_usage("--align is for a skeleton that comes in, this input holds %s", vg_kind_name(p->kind));
     } else if (p->kind == VG_VERTICES) {
         r = vg_mesh_same(&h->body.mesh, "the sequence", &p->map.body.mesh, name, &e);
     } else if (p->kind != VG_TRANSFORMS) {
-        r = vg_fail(&e, VG_EINPUT, "the input holds %s: --map takes vertices or transforms", vg_kind_name(p->kind));
+        r = vg_fail(&e, VG_EINPUT, "the input holds %s: vg-play takes vertices or transforms", vg_kind_name(p->kind));
     } else if (h->count != p->count) {
         r = vg_fail(&e, VG_EINPUT, "the input has %zu transforms a frame, the map %s takes %zu", h->count, name,
                     p->count);
@@ -143,7 +80,7 @@ static void make_head(playback *p)
     vg_head old = *p->h, *h = p->h;
     if (vg_head_merge_trace(&old, &p->map, &e) < 0) cli_die(&e);
     vg_rig rig = {0}; /* of transforms it says what they move; the player has the other one */
-    if (mapped.transforms && vg_rig_copy(&rig, &p->map.body.rig, p->map.body.mesh.nv, &e) < 0) cli_die(&e);
+    if (p->o->transforms && vg_rig_copy(&rig, &p->map.body.rig, p->map.body.mesh.nv, &e) < 0) cli_die(&e);
     *h = p->map;
     h->body.rig = rig;
     h->nprovenance = old.nprovenance, h->provenance = old.provenance;
@@ -151,8 +88,8 @@ static void make_head(playback *p)
     h->map = (vg_map){0}; /* stays with p->map, where the player has it */
     old.provenance = NULL, old.nprovenance = 0, old.extra = (vg_records){0};
     vg_head_clear(&old);
-    h->kind = mapped.transforms ? VG_TRANSFORMS : VG_VERTICES;
-    h->count = mapped.transforms ? p->count : h->body.mesh.nv;
+    h->kind = p->o->transforms ? VG_TRANSFORMS : VG_VERTICES;
+    h->count = p->o->transforms ? p->count : h->body.mesh.nv;
 }
 
 static void put_batch(playback *p)
@@ -161,11 +98,11 @@ static void put_batch(playback *p)
     double *to[BATCH];
     for (size_t i = 0; i < p->n; i++) {
         from[i] = p->transforms[i], to[i] = p->out[i].values;
-        apply_edits(p, p->transforms[i]);
-        if (mapped.joints) vg_player_place(p->player, p->transforms[i]);
-        if (mapped.transforms) memcpy(to[i], from[i], 7 * p->count * sizeof *to[i]);
+        bone_edits_apply(&p->o->edits, &p->map.body.rig, p->transforms[i]);
+        if (p->o->joints) vg_player_place(p->player, p->transforms[i]);
+        if (p->o->transforms) memcpy(to[i], from[i], 7 * p->count * sizeof *to[i]);
     }
-    if (!mapped.transforms) vg_player_pose(p->player, p->n, from, to);
+    if (!p->o->transforms) vg_player_pose(p->player, p->n, from, to);
     for (size_t i = 0; i < p->n; i++) cli_stream_put(&p->out[i]);
     p->n = 0;
 }
@@ -211,7 +148,7 @@ static void play_all(playback *p)
 /* ---- between keys ---- */
 
 typedef struct key_list {
-    between_key *label;
+    pose_key *label;
     double **transforms;
     size_t n, cap;
 } key_list;
@@ -224,7 +161,7 @@ static void add_key(playback *p, key_list *k)
         k->label = cli_resize(k->label, k->cap, sizeof *k->label, "the keys");
         k->transforms = cli_resize(k->transforms, k->cap, sizeof *k->transforms, "the keys");
     }
-    k->label[k->n] = (between_key){cli_copy_text(f->name, "the keys"), f->has_time, f->time};
+    k->label[k->n] = (pose_key){cli_copy_text(f->name, "the keys"), f->has_time, f->time};
     k->transforms[k->n] = cli_allocate(7 * p->count, sizeof(double), "the transforms");
     take_transforms(p, 1, &k->transforms[k->n++]);
 }
@@ -235,7 +172,7 @@ static void put_moment(playback *p, const key_list *k, double t)
     if (i == last && i > 0) i--;
     if (k->n == 1) memcpy(p->transforms[p->n], k->transforms[0], 7 * p->count * sizeof(double));
     else vg_player_between(p->player, k->transforms[i], k->transforms[i + 1], t - (double)i, p->transforms[p->n]);
-    between_label(&p->out[p->n], k->label, k->n, t);
+    key_label(&p->out[p->n], k->label, k->n, t);
     if (++p->n == p->most) put_batch(p);
 }
 
@@ -244,8 +181,8 @@ static void play_between(playback *p)
     key_list k = {0};
     while (cli_next(p->source, &p->in[0])) add_key(p, &k);
     if (k.n == 0) cli_stop(VG_EINPUT, "the input has no poses to interpolate");
-    for (size_t i = 0; i < between_count(); i++) {
-        put_moment(p, &k, between_moment(i, k.n));
+    for (size_t i = 0; i < (size_t)p->o->between.count; i++) {
+        put_moment(p, &k, pose_times_at(&p->o->between, i, k.n));
         cli_progress("poses", i + 1);
     }
     put_batch(p);
@@ -261,16 +198,16 @@ static void play_reference(playback *p)
     put_batch(p);
 }
 
-void mapped_run(vg_source *s)
+void playback_run(playback_options *o, vg_source *s)
 {
     static playback p; /* lives until the end: what it holds goes with the process */
     static vg_head alone;
     vg_err e;
-    p.source = s, p.h = s ? vg_source_head(s) : &alone, p.most = mapped.live ? 1 : BATCH;
+    p.o = o, p.source = s, p.h = s ? vg_source_head(s) : &alone, p.most = o->live ? 1 : BATCH;
     load_map(&p);
     if (s) check_input(&p);
     else p.count = p.map.map.n, alone.precision = p.map.precision;
-    find_bones(&p);
+    bone_edits_find(&o->edits, &p.map, o->map);
     if (vg_player_new(&p.player, &p.map, p.h->precision == VG_F32, cli.threads, &e) < 0) cli_die(&e);
     make_head(&p);
     for (size_t i = 0; i < p.most; i++) {
@@ -279,7 +216,7 @@ void mapped_run(vg_source *s)
     }
     cli_stream_open(p.h);
     if (!s) play_reference(&p);
-    else if (between_wanted()) play_between(&p);
+    else if (o->between.count) play_between(&p);
     else play_all(&p);
     cli_stream_end(s ? vg_source_tail(s) : NULL);
 }

@@ -1,0 +1,62 @@
+/* vg-retarget: bring a map to another body of the same faces, or to one on the way to it.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "cli.h"
+
+#include <stdlib.h>
+
+static struct {
+    const char *onto;
+    double morph;
+} opts = {.morph = 1};
+
+static const cli_option options[] = {
+    {"onto", 0, "MESH", "the body, which has the same faces as the map's and stands as its reference pose does",
+     .text = &opts.onto, .reads = true},
+    {"morph", 0, "T", "how far to go on the way to that body (default 1)", .number = &opts.morph},
+    {.name = NULL}};
+
+static const cli_program program = {
+    .name = "vg-retarget",
+    .synopsis = "[options] --onto MESH [MAP]",
+    .summary = "bring a map, made by vg-fitmap, to another body of the same faces",
+    .options = options,
+    .most_operands = 1,
+    .writes_stream = true,
+    .writes_map = true,
+    .threaded = true};
+
+/* The head of the map becomes that of the other body. */
+static void retarget(vg_head *h)
+{
+    vg_err e;
+    vg_head target = {0};
+    char name[200];
+    snprintf(name, sizeof name, "'%.190s'", opts.onto);
+    if (!h->map.n) cli_stop(VG_EINPUT, "the input holds no map: make one with vg-fitmap");
+    if (vg_load_mesh(&target, opts.onto, &e) < 0 ||
+        vg_mesh_same(&h->body.mesh, "the map", &target.body.mesh, name, &e) < 0 ||
+        vg_map_retarget(h, target.body.reference, opts.morph, cli.threads, &e) < 0 ||
+        vg_head_merge_trace(h, &target, &e) < 0)
+        cli_die(&e);
+    free(h->body.reference_name);
+    h->body.reference_name = target.body.reference_name, target.body.reference_name = NULL;
+    vg_attributes_clear(&h->body.attributes);
+    h->body.attributes = target.body.attributes, target.body.attributes = (vg_attributes){0};
+    vg_head_clear(&target);
+}
+
+int main(int argc, char **argv)
+{
+    char **operands;
+    size_t n = cli_start(&program, argc, argv, &operands);
+    if (!opts.onto) cli_usage("name the body that the map is brought to: --onto MESH");
+    vg_source *s = cli_source(operands, n);
+    retarget(vg_source_head(s));
+    vg_frame frame = {0};
+    while (cli_next(s, &frame)) continue; /* a map has no frames; reading to the end finds damage */
+    vg_frame_clear(&frame);
+    cli_stream_open(vg_source_head(s));
+    cli_stream_end(vg_source_tail(s));
+    vg_source_close(&s);
+    cli_finish(0);
+}
