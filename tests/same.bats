@@ -30,6 +30,7 @@ same() {
     same guided.vgs vg-poisson --no-provenance --first "$DATA/horse.rest.obj" first.poses.vgs
     same patches.vgs vg-segment --no-provenance -k 12 first.poses.vgs
     same map.vgs vg-fitmap -q --no-provenance --patches first.patches.vgs first.poses.vgs
+    same other.vgs vg-retarget --no-provenance --onto "$DATA/horse.rest.obj" --morph 0.5 first.map.vgs
     same mapped.vgs vg-play --no-provenance first.map.vgs --interpolate 9 first.poses.vgs
     must vg-decode -q first.poses.vgs -o poses.zip
     printf '0 0\n100 100\n200 200\n300 300\n' >markers.txt
