@@ -92,6 +92,27 @@ int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
 int vg_spool_next(vg_spool *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
 vg_spool_facts vg_spool_get_facts(const vg_spool *s);
 
+/* All frames of a sequence, any of them at any time: in memory up to a limit, beyond it in a file without a name in
+ * $TMPDIR (or /tmp). What is read of a frame may be read by several threads at once. */
+typedef struct vg_poses vg_poses;
+typedef struct vg_poses_stats {
+    uint64_t memory_bytes, file_bytes; /* what the frames take in each */
+} vg_poses_stats;
+
+/* vg_poses_new: h says what a frame holds; borrowed until free. limit: bytes of frames in memory. */
+int vg_poses_new(vg_poses **p, const vg_head *h, size_t limit, vg_err *e) VG_MUST_CHECK;
+void vg_poses_free(vg_poses **p);
+/* vg_poses_add: keep a copy of f, all of it, as the last frame. */
+int vg_poses_add(vg_poses *p, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
+size_t vg_poses_count(const vg_poses *p);
+/* vg_poses_values: the values of frame i < count (head.count * vg_kind_width(head.kind) numbers): *values is where they
+ * are. A frame that is in the file is read into `room`, which has place for them. Borrowed until the next _add, and until
+ * `room` is used again. */
+int vg_poses_values(const vg_poses *p, size_t i, double *room, const double **values, vg_err *e) VG_MUST_CHECK;
+/* vg_poses_frame: frame i with name, time, and all that came with it. */
+int vg_poses_frame(const vg_poses *p, size_t i, vg_frame *f, vg_err *e) VG_MUST_CHECK;
+vg_poses_stats vg_poses_get_stats(const vg_poses *p);
+
 /* The door out: one mesh file, a '%04d' pattern, a directory ("out/"), an archive, or one file that holds the whole
  * sequence, told by the name and checked at once; "NAME:ply" chooses what is inside an archive or directory, `format`
  * (may be NULL) overrides. Everything is written under temporary names and takes its final name in vg_sink_end. */

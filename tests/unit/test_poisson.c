@@ -1,6 +1,6 @@
 /* test_poisson.c: the closed form of guidance is the solution of the Poisson equation in time: second differences
  * stay, keys are met to the bit, and the relaxation of the thesis ends at the same sequence. Frames come out of the
- * spool as they went in.
+ * spool and of the store of poses as they went in.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "meshes.h"
 
@@ -232,5 +232,64 @@ static void test_spool_without_room(void)
     unsetenv("TMPDIR");
 }
 
+/* ---- frames at random ---- */
+
+typedef struct readers {
+    const vg_poses *poses;
+    const vg_head *h;
+    int wrong[240];
+} readers;
+
+/* Values alone, in an order of its own. */
+static void read_values(void *context, size_t task)
+{
+    readers *x = context;
+    size_t n = vg_poses_count(x->poses), k = task * 37 % n;
+    vg_frame want = {0};
+    double buffer[8 * POINTS];
+    const double *values;
+    vg_err e;
+    fill(&want, x->h, k);
+    int r = vg_poses_values(x->poses, k, buffer, &values, &e);
+    x->wrong[task] =
+        r < 0 || memcmp(values, want.values, POINTS * vg_kind_width(x->h->kind) * sizeof *values) != 0;
+    vg_frame_clear(&want);
+}
+
+/* Every frame is found again from any place, whole or its values alone, with room in memory for none, some and all. */
+static void test_poses(void)
+{
+    static const size_t limits[] = {0, 1, 700, 2000, 1 << 20};
+    static const vg_kind kinds[] = {VG_VERTICES, VG_VECTORS, VG_DEFORMATIONS, VG_TRANSFORMS};
+    enum { COUNT = 60 };
+    vg_frame in = {0}, out = {0}, want = {0};
+    vg_err e;
+    for (size_t c = 0; c < 4 * 5; c++) {
+        vg_head h = graph_head(kinds[c % 4]);
+        size_t limit = limits[c / 4];
+        vg_poses *p;
+        CHECK(vg_poses_new(&p, &h, limit, &e) == VG_OK && vg_poses_count(p) == 0);
+        for (size_t k = 0; k < COUNT; k++) {
+            fill(&in, &h, k);
+            CHECK(vg_poses_add(p, &in, &e) == VG_OK && vg_poses_count(p) == k + 1);
+            fill(&want, &h, k / 2);
+            CHECK(vg_poses_frame(p, k / 2, &out, &e) == VG_OK && same_frame(&out, &want, &h));
+        }
+        vg_poses_stats stats = vg_poses_get_stats(p);
+        CHECK(stats.memory_bytes <= limit);
+        CHECK(limit == 1 << 20 ? !stats.file_bytes : stats.file_bytes > 0);
+        CHECK(limit < 700 || stats.memory_bytes > 0);
+        readers x = {.poses = p, .h = &h};
+        vgi_parallel(4, 240, read_values, &x);
+        for (size_t i = 0; i < 240; i++) CHECK(!x.wrong[i]);
+        vg_poses_free(&p);
+        CHECK(p == NULL);
+    }
+    vg_frame_clear(&in);
+    vg_frame_clear(&out);
+    vg_frame_clear(&want);
+}
+
 TESTS({"keys, second differences, relaxation", test_keys}, {"one offset for all", test_same_offset},
-      {"frames come out as they went in", test_spool}, {"no room", test_spool_without_room})
+      {"frames come out as they went in", test_spool}, {"frames at random", test_poses},
+      {"no room", test_spool_without_room})
