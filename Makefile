@@ -92,15 +92,16 @@ $(B)/%.o: %.c $(B)/flags
 	$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
 
 # what the pages of vg-view are made of, as strings of C; all ASCII
+# The player is one script in several files: the first opens its scope, the last closes it and starts it.
+PAGE_html := lib/view/page.html
+PAGE_css := lib/view/page.css
+PAGE_js := $(addprefix lib/view/page_,read.js draw.js pick.js play.js)
 PAGE_PARTS := html css js
-$(B)/page_text.c: $(PAGE_PARTS:%=lib/view/page.%) Makefile
+$(B)/page_text.c: $(PAGE_html) $(PAGE_css) $(PAGE_js) Makefile
 	@mkdir -p $(@D)
 	@{ echo '#include "view/page.h"'; \
-	   for part in $(PAGE_PARTS); do \
-	       echo "const char vgi_page_$$part[] = {"; \
-	       od -An -v -tu1 lib/view/page.$$part | sed 's/[0-9][0-9]*/&,/g'; \
-	       echo '0};'; \
-	   done; } > $@
+	   $(foreach part,$(PAGE_PARTS),echo 'const char vgi_page_$(part)[] = {'; \
+	       cat $(PAGE_$(part)) | od -An -v -tu1 | sed 's/[0-9][0-9]*/&,/g'; echo '0};';) } > $@
 
 $(B)/page_text.o: $(B)/page_text.c $(B)/flags
 	$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
@@ -146,9 +147,13 @@ $(B)/tools/%.so: tests/tools/%.c $(B)/flags
 deps:
 	@sh tests/install-packages.sh debian-packages.txt
 
+# with TESTS only what these need is built
+TESTS ?= all
+CHECK_UNITS := $(if $(filter all unit,$(TESTS)),$(UNITS),$(filter $(TESTS),$(UNITS)))
+CHECK_FUZZERS := $(if $(filter all fuzz,$(TESTS)),$(FUZZERS),$(filter $(TESTS),$(FUZZERS)))
 .PHONY: check
-check: all $(UNITS:%=$(B)/unit/%) $(FUZZERS:%=$(B)/fuzz/%) $(B)/tools/fail_malloc.so
-	@BUILD=$(B) CONFIG=$(CONFIG) sh tests/run.sh
+check: all $(CHECK_UNITS:%=$(B)/unit/%) $(CHECK_FUZZERS:%=$(B)/fuzz/%) $(B)/tools/fail_malloc.so
+	@BUILD=$(B) CONFIG=$(CONFIG) TESTS='$(TESTS)' sh tests/run.sh
 
 .PHONY: coverage
 coverage:

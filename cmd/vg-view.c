@@ -15,8 +15,8 @@ static struct {
     const char *beside[VG_PAGE_SEQUENCES];
     size_t nbeside;
     double scale, zoom;
-    bool edges, ground, follow, centred, silhouettes, scales, plain;
-    size_t kind, up; /* 1: html, z */
+    bool edges, ground, centred, silhouettes, scales, plain;
+    size_t kind, up, fit; /* 1: html, z, figure */
     bool page; /* what is made, else a sheet */
 } opts = {.view = "30,15"};
 
@@ -44,7 +44,9 @@ static const cli_option options[] = {
     {.name = "zoom", .value = "X", .help = "how large: 1 (the default) is what fits", .number = &opts.zoom,
      .least = 1e-3, .most = 1e3},
     {.name = "up", .value = "y|z", .help = "the axis that points up (default: y)", .choice = &opts.up},
-    {.name = "follow", .help = "keep the figure in the middle of its picture", .flag = &opts.follow},
+    {.name = "fit", .value = "path|figure", .choice = &opts.fit,
+     .help = "show the whole path with a camera that stays, or keep the figure in the middle (default: path; page: "
+             "figure if it goes far)"},
     {.name = "ground", .help = "draw a grid where the reference pose stands, and a shadow", .flag = &opts.ground},
     {.name = "edges", .help = "draw the edges of the polygons", .flag = &opts.edges},
     {.name = "silhouettes", .help = "sheet: draw the contours of surfaces as lines", .flag = &opts.silhouettes},
@@ -63,7 +65,7 @@ static const cli_option options[] = {
     {.name = "plain", .help = "no colours, whatever the sequence brings", .flag = &opts.plain,
      .excludes = "scales|patches|scale"},
     {.name = "scale", .value = "X", .number = &opts.scale, .least = 1e-12, .most = 1e12,
-     .help = "where the colours end: an error in units of D, with --scales a factor (default: 2)"},
+     .help = "where the colours end: an error in units of D, with --scales a factor (default: by the data)"},
     {0},
 };
 
@@ -119,11 +121,16 @@ static vg_tint choose_tint(void)
     return opts.scales ? VG_TINT_SCALES : opts.plain ? VG_TINT_PLAIN : VG_TINT_SCALARS;
 }
 
+static vg_fit choose_fit(void)
+{
+    return !cli_given("fit") ? VG_FIT_AUTO : opts.fit == 1 ? VG_FIT_FIGURE : VG_FIT_PATH;
+}
+
 static vg_sheet_options sheet_options(void)
 {
     vg_sheet_options o = {.frames = opts.frames ? (size_t)opts.frames : 8, .columns = (size_t)opts.columns,
                           .edges = opts.edges,
-                          .ground = opts.ground, .follow = opts.follow, .silhouettes = opts.silhouettes,
+                          .ground = opts.ground, .fit = choose_fit(), .silhouettes = opts.silhouettes,
                           .zoom = opts.zoom, .tint = choose_tint(), .centred = opts.centred, .scale = opts.scale,
                           .threads = cli.threads};
     parse_size(opts.size ? opts.size : "360x360", &o);
@@ -390,7 +397,7 @@ static vg_page_options page_options(const side *result)
                              .azimuth = view.azimuth,
                              .elevation = view.elevation,
                              .z_up = view.z_up,
-                             .follow = opts.follow,
+                             .fit = view.fit,
                              .edges = opts.edges,
                              .ground = opts.ground,
                              .zoom = view.zoom,

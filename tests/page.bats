@@ -108,7 +108,7 @@ browse() {
 @test "a page loads nothing from outside" {
     poses cube 2
     must vg-view pose1.obj --against pose2.obj --beside pose2.obj -o page.html
-    if grep -E -i 'https?://|src=|@import|url\(|\bfetch\(|XMLHttpRequest|WebSocket' page.html; then fail 'the page looks outside'; fi
+    if grep -E -i 'https?://|src=|@import|[^a-z]url\(|\bfetch\(|XMLHttpRequest|WebSocket' page.html; then fail 'the page looks outside'; fi
     [ "$(grep -o 'href="[^"]*"' page.html)" = 'href="data:,"' ]
     grep -q "default-src 'none'" page.html
 }
@@ -203,11 +203,13 @@ END
     must vg-view pose*.obj -o page.html
     browse page.html <<'END'
 data = lambda name: page.value(f"document.documentElement.dataset.{name}")
-page.key(" ")
-assert data("playing") == "true"
+assert data("playing") == "true"  # a page opens playing
 page.wait("document.documentElement.dataset.drawn > '1'")
 page.key(" ")
 assert data("playing") == "false"
+page.key(" ")
+assert data("playing") == "true"
+page.key(" ")
 page.key("Home")
 assert data("frame") == "0"
 plain = page.picture()
@@ -234,6 +236,106 @@ page.key("End")
 assert data("frame") == "5"
 page.key("?")
 assert page.value("document.querySelector('#help').open")
+END
+}
+
+@test "browser: between two frames the figure is between them" {
+    poses cube 3
+    must vg-view pose*.obj -o page.html
+    browse page.html '#frame=0' <<'END'
+first = page.picture()
+page.key("ArrowRight")
+second = page.picture()
+page.key("Home")
+for _ in range(3):
+    page.key("<")
+for _ in range(30):  # until it stops between two frames
+    page.key(" ")
+    page.settle()
+    page.key(" ")
+    page.settle()
+    part = float(page.value("document.documentElement.dataset.part"))
+    if 0.02 < part < 0.98:
+        break
+between = page.picture()
+assert 0 < part < 1 and between[2] != first[2] and between[2] != second[2], part
+END
+}
+
+@test "browser: what is under the pointer is read out, and a click pins it with its path" {
+    poses cube 3
+    must vg-view pose*.obj -o page.html
+    browse page.html '#frame=0' <<'END'
+data = lambda name: page.value(f"document.documentElement.dataset.{name}")
+box = page.value("(r => [r.x, r.y, r.width, r.height])(document.querySelector('#canvas').getBoundingClientRect())")
+x, y = box[0] + box[2] / 2, box[1] + box[3] / 2
+before = page.picture()
+page.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+page.wait("document.documentElement.dataset.hovered")
+text = page.value("document.querySelector('#readout').innerText")
+assert text.startswith("vertex " + data("hovered")) and "face" in text and "at " in text, text
+page.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", buttons=1, clickCount=1)
+page.call("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, button="left", clickCount=1)
+page.wait("document.documentElement.dataset.pinned")
+page.call("Input.dispatchMouseEvent", type="mouseMoved", x=box[0] + 3, y=box[1] + 3)
+assert not data("hovered") and page.value("!document.querySelector('#readout').hidden")
+page.settle()
+assert page.picture()[2] != before[2]  # the path and the point
+page.key("Escape")
+page.wait("document.querySelector('#readout').hidden")
+END
+}
+
+@test "browser: two sequences one over another, and with a line to wipe" {
+    poses cube 2
+    mesh tetra >other.obj
+    must vg-view pose*.obj --beside other.obj -o page.html
+    browse page.html '#frame=0' <<'END'
+beside = page.picture()
+page.key("l")
+over = page.picture()
+assert over[2] != beside[2] and share_drawn(over) > 0.02
+page.key("l")
+page.wait("!document.querySelector('#wipe').hidden")
+wiped = page.picture()
+assert wiped[2] != over[2]
+page.value("document.querySelector('#wipe').focus()")
+for _ in range(10):
+    page.key("ArrowRight")
+assert page.value("document.querySelector('#wipe').getAttribute('aria-valuenow')") == "70"
+assert page.picture()[2] != wiped[2]
+page.wait("location.hash.includes('layout=wipe')")
+END
+}
+
+@test "browser: graphics that are lost come back" {
+    poses cube 2
+    must vg-view pose*.obj -o page.html
+    browse page.html '#frame=1' <<'END'
+before = page.picture()
+page.value("window.lose = document.querySelector('#canvas').getContext('webgl2').getExtension('WEBGL_lose_context'), window.lose.loseContext()")
+page.wait("document.querySelector('#message').innerText.includes('reset')")
+page.value("window.lose.restoreContext()")
+page.wait("document.querySelector('#message').hidden")
+page.settle()
+assert page.picture()[2] == before[2]
+page.trouble = [t for t in page.trouble if "CONTEXT_LOST" not in str(t)]
+END
+}
+
+@test "browser: on a phone nothing lies over the figure, and nothing is wider than the screen" {
+    poses cube 3
+    mkdir truth
+    cp pose*.obj truth
+    for i in 1 2 3; do mesh cube 0.4 0.1 >"pose$i.obj"; done
+    must vg-view pose*.obj --against truth -o page.html
+    browse page.html '#frame=1' <<'END'
+page.call("Emulation.setDeviceMetricsOverride", width=320, height=640, deviceScaleFactor=1, mobile=True)
+page.settle()
+assert page.value("document.documentElement.scrollWidth") <= 320
+over = page.value("(a => (b => a.bottom > b.top + 1 && a.top < b.bottom - 1)(document.querySelector('#legend').getBoundingClientRect()))(document.querySelector('#canvas').getBoundingClientRect())")
+assert over is False
+assert page.value("document.querySelector('#canvas').clientHeight") > 150
 END
 }
 
@@ -337,7 +439,9 @@ def lengths(points, faces):
         mean = [sum(points[v][k] for v in face) / len(face) for k in range(3)]
         out += [(v, math.dist(points[v], mean)) for v in face]
     return out
-assert scales["tint"]["kind"] == "scales" and (scales["tint"]["low"], scales["tint"]["high"]) == (-1, 1)
+assert scales["tint"]["kind"] == "scales" and scales["tint"]["low"] == -scales["tint"]["high"]
+beyond, far = scales["scale"] - 1, max(scales["max"], 1 / scales["least"]) - 1  # the 99th percentile, to two digits
+assert 0.5 * far < beyond < 1.11 * far, (beyond, far)
 for number, name in ((0, "pose%d.obj"), (1, "truth/t%d.obj")):
     about, (rest, faces) = scales["sequences"][number], load(name % 1)
     reference = lengths(rest, faces)
@@ -379,7 +483,9 @@ END
 text = lambda at: page.value(f"document.querySelector('{at}').textContent")
 assert text("#legend-text").startswith("length of vectors")
 numbers = page.value("[...document.querySelector('#legend-numbers').children].map((x) => x.textContent).join(' ')")
-assert numbers == "0.5\u00d7 0.707\u00d7 1\u00d7 1.41\u00d7 2\u00d7", numbers
+ends = page.value("(f => [f.least, f.max, f.scale])(JSON.parse(document.querySelector('#facts').textContent))")
+first, last = (float(numbers.split(" ")[i].strip("\u2264\u2265\u00d7")) for i in (0, -1)) if "\u2264" not in numbers and "\u2265" not in numbers else (None, None)
+assert first is None or abs(first / min(ends[0], 1) - 1) < 0.01 and abs(last / max(ends[1], 1) - 1) < 0.01, (numbers, ends)
 assert text("#captions").count(" to ") == 2
 coloured = page.picture()
 page.key("c")

@@ -187,11 +187,12 @@ def read_png(data):
 
 
 def share_drawn(picture, left=0.0, right=1.0):
-    """The share of the pixels between two shares of the width that are not the background (the top left corner's colour)."""
+    """The share of the pixels between two shares of the width that are not the background (of a row, that at its right end)."""
     width, height, rows = picture
-    ground = rows[height - 2][3 * (width - 2):3 * (width - 1)]
-    a, b = int(left * width), int(right * width)
-    other = sum(row[3 * x:3 * x + 3] != ground for row in rows for x in range(a, b))
+    a, b, other = int(left * width), int(right * width), 0
+    for row in rows:
+        ground = row[3 * (width - 2):3 * (width - 1)]
+        other += sum(max(abs(row[3 * x + k] - ground[k]) for k in range(3)) > 2 for x in range(a, b))
     return other / ((b - a) * height)
 
 

@@ -189,7 +189,7 @@ PY
         must vg-view "$name.obj" --size 48x48 --ground --edges -o "$name.png"
         must png "$name.png"
         [ "$output" = "80 126" ]
-        must vg-view "$name.obj" --against "$name.obj" --follow --size 48x48 -o "$name.png"
+        must vg-view "$name.obj" --against "$name.obj" --fit figure --size 48x48 -o "$name.png"
         must png "$name.png"
     done
 }

@@ -20,6 +20,13 @@ typedef enum vg_tint {
     VG_TINT_PLAIN        /* nothing, not even patches */
 } vg_tint;
 
+/* What a picture has to hold. */
+typedef enum vg_fit {
+    VG_FIT_AUTO = 0,
+    VG_FIT_PATH,  /* all that is shown: the camera stays where it is */
+    VG_FIT_FIGURE /* the figure: its centroid stays in the middle */
+} vg_fit;
+
 /* A contact sheet: evenly spaced frames of a sequence side by side, drawn without display or GPU, as PNG; of several
  * sequences the same frames below one another. */
 typedef struct vg_sheet vg_sheet;
@@ -30,13 +37,13 @@ typedef struct vg_sheet_options {
     double azimuth, elevation; /* of the viewer, in degrees: 0, 0 is before the front, 90, 0 at +x, 0, 90 above */
     double zoom;          /* 1 or 0: all that is shown fits */
     bool z_up;            /* z is up and the front at -y; else y is up and the front at +z */
-    bool follow;          /* the figure's centroid stays in the middle; else the camera stays where it is */
+    vg_fit fit;           /* VG_FIT_AUTO is VG_FIT_PATH */
     bool edges, ground;   /* draw edges of polygons; a grid where the reference stands, with the figure's shadow */
     bool silhouettes;     /* draw the contours of surfaces as lines */
     vg_tint tint;
     bool centred;         /* of errors the shift of the centroid is no part */
     double scale;         /* the end of the colours: in D, in the unit of the scalars, or a factor > 1; 0: the 99th
-                             percentile of what is shown, rounded up, or the factor 2 */
+                             percentile of what is shown, rounded up */
     int threads;
 } vg_sheet_options;
 enum { VG_SHEET_SEQUENCES = 8 };
@@ -65,7 +72,8 @@ typedef struct vg_page_options {
     const char *title;           /* UTF-8; borrowed until free, as are the labels */
     double azimuth, elevation;   /* of the viewer at first, as for a sheet; and so are: */
     double zoom;
-    bool z_up, follow, edges, ground;
+    bool z_up, edges, ground;
+    vg_fit fit;    /* VG_FIT_AUTO: VG_FIT_FIGURE where the figure goes so far that it would be small else */
     vg_tint tint;  /* VG_TINT_ERRORS: the second sequence is the truth */
     bool centred;
     double scale;  /* the end of the colours, as for a sheet, by all frames */

@@ -9,11 +9,17 @@ enum { BAR_WIDTH = 420, BAR_HEIGHT = 14 };
 static const double dot = 1.25;
 static const unsigned char ink[3] = {38, 42, 50}, soft_ink[3] = {112, 118, 128};
 
-static void put_bar(vgi_canvas *c, const vgi_palette *p, size_t x, size_t y, size_t w)
+static double number_at(const vgi_tint *t, double share)
+{
+    return t->shown_low + (t->shown_high - t->shown_low) * share;
+}
+
+static void put_bar(vgi_canvas *c, const vgi_tint *t, const vgi_palette *p, size_t x, size_t y, size_t w)
 {
     for (size_t j = 0; j < BAR_HEIGHT; j++)
         for (size_t i = 0; i < w; i++) {
-            const float *colour = p->map[w > 1 ? i * (VGI_MAP_STEPS - 1) / (w - 1) : 0];
+            double place = vgi_tint_place(t, number_at(t, w > 1 ? (double)i / (double)(w - 1) : 0));
+            const float *colour = p->map[(size_t)(place * (VGI_MAP_STEPS - 1) + 1e-6)];
             unsigned char *to = c->rgb + 3 * ((y + j) * c->w + x + i);
             for (int k = 0; k < 3; k++) to[k] = vgi_encode(p, colour[k]);
         }
@@ -26,8 +32,7 @@ static void put_ticks(vgi_canvas *c, const vgi_tint *t, size_t x, size_t y, size
     for (size_t i = 0; i <= parts; i++) {
         char text[VGI_NUMBER];
         double share = (double)i / (double)parts, at = (double)x + (double)(w - 1) * share;
-        double number = t->low + (t->high - t->low) * share;
-        vgi_tint_number(t, number, text);
+        vgi_tint_number(t, number_at(t, share), text);
         for (size_t j = 0; j < 4; j++) memcpy(c->rgb + 3 * ((y + j) * c->w + (size_t)at), soft_ink, 3);
         double left = fmax(at - vgi_text_width(dot, text) / 2, (double)x);
         left = fmin(left, (double)(x + w) - vgi_text_width(dot, text));
@@ -42,7 +47,7 @@ void vgi_legend(vgi_canvas *c, const vgi_tint *t, const vgi_palette *p, size_t m
     size_t room = c->w - 2 * margin, w = room < BAR_WIDTH ? room : BAR_WIDTH;
     vgi_text_fit(text, sizeof text, dot, (double)room, title);
     vgi_text(c, (double)margin, 4, dot, ink, text);
-    put_bar(c, p, margin, 20, w);
+    put_bar(c, t, p, margin, 20, w);
     put_ticks(c, t, margin, 20 + BAR_HEIGHT, w);
     vgi_text_fit(text, sizeof text, dot, (double)room, note);
     vgi_text(c, (double)margin, 20 + BAR_HEIGHT + 24, dot, soft_ink, text);

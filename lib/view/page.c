@@ -1,5 +1,5 @@
 /* page.c: the page that plays sequences in a browser: takes frames, packs them, says what was lost, and puts the
- * player to them. Leaves out how numbers are packed (page_data.c) and how they are drawn (page.js).
+ * player to them. Leaves out how numbers are packed (page_data.c) and how they are drawn (page_*.js).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/page.h"
 
@@ -21,7 +21,8 @@ typedef struct sequence {
     const char *label;
     const vg_head *head;
     bool *drawn;               /* nv: vertices that are seen */
-    double centre[3], diagonal, unit, ground;
+    double centre[3], diagonal, unit;
+    vgi_hull path, figure;     /* where it is in all frames, and that relative to the centroid of each */
     vgi_track places, numbers;
     vgi_meter meter;
     bool tinted, compared;     /* colours say something of it; they say errors */
@@ -194,7 +195,7 @@ static int put_mesh(vg_page *p, size_t i, const vg_head *h, vg_err *e)
 
 /* ---- sequences ---- */
 
-static int measure(sequence *s, bool z_up, vg_err *e)
+static int measure(sequence *s, vg_err *e)
 {
     const vg_mesh *m = &s->head->body.mesh;
     s->drawn = vgi_drawn_vertices(m, e);
@@ -202,7 +203,6 @@ static int measure(sequence *s, bool z_up, vg_err *e)
     vg_centroid(s->head->body.reference, m->nv, s->centre);
     s->diagonal = vg_diagonal(s->head->body.reference, m->nv);
     s->unit = s->diagonal > 0 ? s->diagonal : 1;
-    s->ground = vgi_ground_height(s->drawn, m->nv, s->head->body.reference, z_up);
     return VG_OK;
 }
 
@@ -213,7 +213,7 @@ int vg_page_sequence(vg_page *p, const char *label, const vg_head *h, vg_err *e)
     sequence *s = p->at + p->n;
     *s = (sequence){.label = label, .head = h, .timed = true, .last_time = -INFINITY};
     size_t i = p->n++;
-    int r = measure(s, p->o.z_up, e);
+    int r = measure(s, e);
     if (r == VG_OK) r = vgi_track_init(&s->places, h->body.mesh.nv, 3, e);
     return r == VG_OK ? put_mesh(p, i, h, e) : r;
 }
@@ -312,6 +312,16 @@ static int add_label(sequence *s, const vg_frame *f, vg_err *e)
     return r == VG_OK ? vgi_page_number(&s->times, f->time, e) : r;
 }
 
+static void add_extent(sequence *s, const double *points)
+{
+    static const double origin[3] = {0, 0, 0};
+    double centre[3];
+    size_t nv = s->head->body.mesh.nv;
+    vg_centroid(points, nv, centre);
+    vgi_hull_add(&s->path, points, s->drawn, nv, origin);
+    vgi_hull_add(&s->figure, points, s->drawn, nv, centre);
+}
+
 int vg_page_add(vg_page *p, size_t i, const vg_frame *f, const double *truth, vg_err *e)
 {
     if (i >= p->n || (truth && (p->n < 2 || p->at[i].head->body.mesh.nv != p->at[1].head->body.mesh.nv)))
@@ -322,6 +332,7 @@ int vg_page_add(vg_page *p, size_t i, const vg_frame *f, const double *truth, vg
     if (r == VG_OK && s->frames == 0) r = begin_numbers(p, s, f, truth, e);
     if (r < 0) return r;
     memcpy(vgi_track_next(&s->places), f->values, 3 * s->head->body.mesh.nv * sizeof *f->values);
+    add_extent(s, f->values);
     s->frames++;
     r = add_numbers(p, s, f, truth, e);
     if (r == VG_OK && s->places.n == s->places.cap) r = put_chunk(p, i, "places", &s->places, e);
@@ -395,7 +406,7 @@ static double find_percentile(const vg_page *p)
 
 static void end_tint(vg_page *p, vg_page_facts *facts)
 {
-    vgi_tint_end(&p->tint, p->o.scale, find_percentile(p), p->spread.least);
+    vgi_tint_end(&p->tint, p->o.scale, find_percentile(p), p->spread.least, p->spread.most);
     facts->tinted = p->counted_frames > 0;
     if (!facts->tinted) return;
     p->spread.mean /= (double)p->counted_frames;
@@ -405,27 +416,70 @@ static void end_tint(vg_page *p, vg_page_facts *facts)
     facts->max = vgi_tint_shown(&p->tint, p->spread.most);
 }
 
-/* Who made the sequence: the command lines, in order. */
+/* One process that took part: its command line, and the processes whose output it read. */
+static int json_process(vg_bytes *list, const vg_provenance *p, vg_err *e)
+{
+    vg_bytes line = {0}, parents = {0};
+    int r = vgi_page_next(list, e);
+    for (size_t j = 0; j < p->nargs && r == VG_OK; j++) {
+        if (j) r = vgi_page_raw(&line, " ", e);
+        if (r == VG_OK) r = vgi_page_raw(&line, p->args[j], e);
+    }
+    if (r == VG_OK) r = vgi_bytes_append(&line, "", 1, e);
+    for (size_t j = 0; j < p->nparents && r == VG_OK; j++) {
+        r = vgi_page_next(&parents, e);
+        if (r == VG_OK) r = vgi_page_number(&parents, p->parents[j], e);
+    }
+    if (r == VG_OK) r = vgi_page_raw(list, "{", e);
+    if (r == VG_OK) r = vgi_page_field_text(list, "line", (char *)line.data, e);
+    if (r == VG_OK) r = vgi_page_field_list(list, "parents", &parents, e);
+    if (r == VG_OK) r = vgi_page_raw(list, "}", e);
+    vg_bytes_clear(&line);
+    vg_bytes_clear(&parents);
+    return r;
+}
+
 static int json_provenance(vg_bytes *b, const vg_head *h, vg_err *e)
 {
-    int r = vgi_page_field(b, "provenance", e);
     vg_bytes list = {0};
-    for (size_t i = 0; i < h->nprovenance && r == VG_OK; i++) {
-        const vg_provenance *p = h->provenance + i;
-        vg_bytes line = {0};
-        for (size_t j = 0; j < p->nargs && r == VG_OK; j++) {
-            if (j) r = vgi_page_raw(&line, " ", e);
-            if (r == VG_OK) r = vgi_page_raw(&line, p->args[j], e);
-        }
-        if (r == VG_OK) r = vgi_bytes_append(&line, "", 1, e);
-        if (r == VG_OK) r = vgi_page_next(&list, e);
-        if (r == VG_OK) r = vgi_page_string(&list, (char *)line.data, e);
-        vg_bytes_clear(&line);
-    }
-    if (r == VG_OK && !list.size) r = vgi_page_raw(&list, "[", e);
-    if (r == VG_OK) r = vgi_page_raw(&list, "]", e);
-    if (r == VG_OK) r = vgi_bytes_append(b, list.data, list.size, e);
+    int r = VG_OK;
+    for (size_t i = 0; i < h->nprovenance && r == VG_OK; i++) r = json_process(&list, h->provenance + i, e);
+    if (r == VG_OK) r = vgi_page_field_list(b, "provenance", &list, e);
     vg_bytes_clear(&list);
+    return r;
+}
+
+static int json_numbers(vg_bytes *b, const char *name, const double *x, size_t n, vg_err *e)
+{
+    vg_bytes list = {0};
+    int r = VG_OK;
+    for (size_t i = 0; i < n && r == VG_OK; i++) {
+        r = vgi_page_next(&list, e);
+        if (r == VG_OK) r = vgi_page_number(&list, x[i], e);
+    }
+    if (r == VG_OK) r = vgi_page_field_list(b, name, &list, e);
+    vg_bytes_clear(&list);
+    return r;
+}
+
+/* The joints of a skeleton that is the sequence, or of a rig that drives its mesh: names, parents, places at rest. */
+static int json_joints(vg_bytes *b, const vg_body *body, vg_err *e)
+{
+    const vg_rig *rig = body->rig.skeleton.njoints ? &body->rig : NULL;
+    const vg_skeleton *s = rig ? &rig->skeleton : &body->skeleton;
+    vg_bytes names = {0}, parents = {0};
+    int r = VG_OK;
+    for (size_t j = 0; j < s->njoints && r == VG_OK; j++) {
+        r = vgi_page_next(&names, e);
+        if (r == VG_OK) r = vgi_page_string(&names, s->joints[j].name, e);
+        if (r == VG_OK) r = vgi_page_next(&parents, e);
+        if (r == VG_OK) r = vgi_page_number(&parents, s->joints[j].parent == UINT32_MAX ? -1.0 : (double)s->joints[j].parent, e);
+    }
+    if (r == VG_OK) r = vgi_page_field_list(b, "joints", &names, e);
+    if (r == VG_OK) r = vgi_page_field_list(b, "parents", &parents, e);
+    if (r == VG_OK && rig) r = json_numbers(b, "jointsAt", rig->at, 3 * s->njoints, e);
+    vg_bytes_clear(&names);
+    vg_bytes_clear(&parents);
     return r;
 }
 
@@ -440,29 +494,26 @@ static int json_sequence(vg_bytes *b, const vg_page *p, size_t i, vg_err *e)
     const sequence *s = p->at + i;
     const sequence *frame = frame_of(p, s);
     const vg_mesh *m = &s->head->body.mesh;
-    vg_bytes centre = {0};
+    size_t up = p->o.z_up ? 2 : 1;
     int r = vgi_page_raw(b, i ? ",{" : "{", e);
     if (r == VG_OK) r = vgi_page_field_text(b, "label", s->label, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "vertices", (double)m->nv, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "faces", (double)m->nf, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "patches", (double)s->head->body.patches.n, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "diagonal", frame->diagonal, e);
-    for (int k = 0; k < 3 && r == VG_OK; k++) {
-        r = vgi_page_next(&centre, e);
-        if (r == VG_OK) r = vgi_page_number(&centre, frame->centre[k], e);
-    }
-    if (r == VG_OK) r = vgi_page_field_list(b, "centre", &centre, e);
-    if (r == VG_OK) r = vgi_page_field_number(b, "ground", frame->ground, e);
+    if (r == VG_OK) r = json_numbers(b, "centre", frame->centre, 3, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "ground", frame->path.n ? -frame->path.reach[up + VGI_HULL / 2] : 0, e);
+    if (r == VG_OK) r = json_numbers(b, "path", s->path.at[0], 3 * s->path.n, e);
+    if (r == VG_OK) r = json_numbers(b, "figure", s->figure.at[0], 3 * s->figure.n, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "loss", s->loss / frame->unit, e);
     if (r == VG_OK) r = json_provenance(b, s->head, e);
+    if (r == VG_OK) r = json_joints(b, &s->head->body, e);
     if (r == VG_OK) r = vgi_page_field_list(b, "names", &s->names, e);
     if (r == VG_OK && s->timed) r = vgi_page_field_list(b, "times", &s->times, e);
     if (r == VG_OK && s->tinted) r = vgi_page_field_list(b, "means", &s->means, e);
     if (r == VG_OK && s->tinted) r = vgi_page_field_list(b, "minima", &s->minima, e);
     if (r == VG_OK && s->tinted) r = vgi_page_field_list(b, "maxima", &s->maxima, e);
-    if (r == VG_OK) r = vgi_page_raw(b, "}", e);
-    vg_bytes_clear(&centre);
-    return r;
+    return r == VG_OK ? vgi_page_raw(b, "}", e) : r;
 }
 
 static int json_map(vg_bytes *b, bool diverging, vg_err *e)
@@ -501,13 +552,14 @@ static int json_tint(vg_bytes *b, const vg_page *p, vg_err *e)
 
 static int json_page(vg_bytes *b, const vg_page *p, const vg_page_facts *facts, vg_err *e)
 {
+    static const char *const fits[] = {"", "path", "figure"};
     int r = vgi_page_raw(b, "{", e);
     if (r == VG_OK) r = vgi_page_field_text(b, "version", VG_VERSION, e);
     if (r == VG_OK) r = vgi_page_field_text(b, "title", p->o.title, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "azimuth", p->o.azimuth, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "elevation", p->o.elevation, e);
     if (r == VG_OK) r = vgi_page_field_flag(b, "zUp", p->o.z_up, e);
-    if (r == VG_OK) r = vgi_page_field_flag(b, "follow", p->o.follow, e);
+    if (r == VG_OK) r = vgi_page_field_text(b, "fit", fits[p->o.fit], e);
     if (r == VG_OK) r = vgi_page_field_flag(b, "edges", p->o.edges, e);
     if (r == VG_OK) r = vgi_page_field_flag(b, "ground", p->o.ground, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "zoom", p->o.zoom > 0 ? p->o.zoom : 1, e);

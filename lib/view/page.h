@@ -61,7 +61,17 @@ int vgi_page_field_flag(vg_bytes *b, const char *name, bool x, vg_err *e) VG_MUS
 int vgi_page_field_list(vg_bytes *b, const char *name, const vg_bytes *open_list, vg_err *e) VG_MUST_CHECK;
 int vgi_page_next(vg_bytes *list, vg_err *e) VG_MUST_CHECK;
 
-/* ---- page_text.c, which the Makefile makes of page.html, page.css and page.js; each ends with a 0 ---- */
+/* ---- hull.c: what a camera has to show of a sequence ---- */
+
+enum { VGI_HULL = 26 };
+typedef struct vgi_hull { /* the outermost points in 26 directions, of all frames so far */
+    size_t n;             /* VGI_HULL, or 0: there are none */
+    double reach[VGI_HULL], at[VGI_HULL][3];
+} vgi_hull;
+/* vgi_hull_add: the drawn ones of nv points of a frame, relative to `centre`. */
+void vgi_hull_add(vgi_hull *h, const double *points, const bool *drawn, size_t nv, const double centre[3]);
+
+/* ---- page_text.c, made by the Makefile from page.html, page.css and the files page_*.js; each ends with a 0 ---- */
 
 extern const char vgi_page_html[], vgi_page_css[], vgi_page_js[];
 

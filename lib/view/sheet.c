@@ -243,7 +243,8 @@ static int choose_colours(vg_sheet *s, vg_err *e)
             if (!s->least || shot->spread.least < s->least->spread.least) s->least = shot, s->least_of = s->at + k;
         }
     int r = s->tinted && !(s->o.scale > 0) ? find_percentile(s, &common, e) : VG_OK;
-    vgi_tint_end(&s->tint, s->o.scale, common, s->least ? s->least->spread.least : 0);
+    vgi_tint_end(&s->tint, s->o.scale, common, s->least ? s->least->spread.least : 0,
+                 s->largest ? s->largest->spread.most : 0);
     vgi_palette_init(&s->palette, s->tint.diverging);
     return r;
 }
@@ -307,7 +308,7 @@ static void place_camera(vg_sheet *s)
         for (size_t i = 0; i < s->n; i++) {
             double middle[2] = {0, 0};
             const vgi_shot *shot = shot_of(s->at + k, i);
-            if (s->o.follow) shot_middle(s, s->at + k, shot, middle);
+            if (s->o.fit == VG_FIT_FIGURE) shot_middle(s, s->at + k, shot, middle);
             vgi_camera_measure(&s->camera, &s->at[k].figure, shot->points, middle, &box);
         }
     vgi_camera_fit(&s->camera, &box, 0.06);
@@ -339,7 +340,7 @@ static void place_ground(const vg_sheet *s, const sequence *q, size_t shot, vgi_
     vgi_camera above = {0};
     for (int k = 0; k < 3; k++) above.right[k] = (float)g->across[k], above.up[k] = (float)g->along[k];
     vgi_box box = vgi_box_empty();
-    for (size_t i = s->o.follow ? shot : 0; i < (s->o.follow ? shot + 1 : s->n); i++)
+    for (size_t i = s->o.fit == VG_FIT_FIGURE ? shot : 0; i < (s->o.fit == VG_FIT_FIGURE ? shot + 1 : s->n); i++)
         vgi_camera_measure(&above, &q->figure, shot_of(q, i)->points, (double[2]){0, 0}, &box);
     for (int k = 0; k < 2; k++) g->middle[k] = (box.least[k] + box.most[k]) / 2;
     g->reach = 0.45 + 0.5 * hypot(box.most[0] - box.least[0], box.most[1] - box.least[1]);
@@ -355,7 +356,7 @@ static int draw_shot(const vg_sheet *s, const sequence *q, size_t i, unsigned ch
     vgi_ground ground = {0};
     float *values = NULL;
     int r = VG_OK;
-    if (s->o.follow) {
+    if (s->o.fit == VG_FIT_FIGURE) {
         double middle[2];
         shot_middle(s, q, shot, middle);
         camera.x += middle[0], camera.y += middle[1];

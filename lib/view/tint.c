@@ -8,6 +8,8 @@
 
 /* Errors below this, in D, are rounding; their colours never end before it. */
 #define LEAST_ERROR 1e-9
+/* Scales nearer to 1 than this are one colour. */
+#define LEAST_SCALE 0.01
 /* Vectors that have shrunk to nothing, or grown beyond all, are this many times halved or doubled. */
 #define MOST_DOUBLED 20
 
@@ -139,14 +141,24 @@ double vgi_round_up(double x)
     return 10 * power;
 }
 
-void vgi_tint_end(vgi_tint *t, double given, double common, double least)
+/* The factor at which the colours of scales end: by how much 99 % do not differ from 1, to two digits. */
+static double end_of_scales(double doubled)
+{
+    double beyond = exp2(doubled) - 1, step = beyond > LEAST_ERROR ? pow(10, floor(log10(beyond)) - 1) : 1;
+    return 1 + fmax(ceil(beyond / step - 1e-9) * step, LEAST_SCALE);
+}
+
+void vgi_tint_end(vgi_tint *t, double given, double common, double least, double most)
 {
     t->diverging = t->what == VG_TINT_SCALES || (t->what == VG_TINT_SCALARS && least < 0);
-    if (t->what == VG_TINT_SCALES) t->high = log2(given > 0 ? given : 2);
+    if (t->what == VG_TINT_SCALES) t->high = log2(given > 0 ? given : end_of_scales(common));
     else if (given > 0) t->high = given;
     else if (t->what == VG_TINT_ERRORS) t->high = common > LEAST_ERROR ? vgi_round_up(common) : LEAST_ERROR;
     else t->high = common > 0 ? vgi_round_up(common) : 1;
     t->low = t->diverging ? -t->high : 0;
+    t->shown_low = t->diverging ? fmin(fmax(least, t->low), 0) : t->low;
+    t->shown_high = t->diverging ? fmax(fmin(most, t->high), 0) : t->high;
+    if (!(t->shown_low < t->shown_high)) t->shown_low = t->low, t->shown_high = t->high;
 }
 
 double vgi_tint_place(const vgi_tint *t, double x)

@@ -133,6 +133,7 @@ typedef struct vgi_tint { /* of all that is on a sheet or page */
     char *name, *unit; /* of scalars; NULL: no frame has brought any */
     bool diverging;    /* the colours have a middle: 0, or for scales 1 */
     double low, high;  /* where they end; of scales the logarithms to base 2, as all their numbers */
+    double shown_low, shown_high; /* the part of that which occurs: a legend shows no more */
 } vgi_tint;
 
 typedef struct vgi_meter { /* of one sequence */
@@ -159,9 +160,9 @@ int vgi_tint_read(vgi_tint *t, vgi_meter *m, const vg_frame *f, const double *tr
 /* vgi_round_up: the next of 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8 times a power of ten: five parts of it have short
  * numbers. x > 0. */
 double vgi_round_up(double x);
-/* vgi_tint_end: where the colours end: given (> 0), or by what is common:
- * the absolute value that 99 % do not exceed. */
-void vgi_tint_end(vgi_tint *t, double given, double common, double least);
+/* vgi_tint_end: choose the ends of the colours: given (> 0), or from `common`, the absolute value that 99 % of the
+ * numbers do not exceed. least, most: of all numbers. */
+void vgi_tint_end(vgi_tint *t, double given, double common, double least, double most);
 double vgi_tint_place(const vgi_tint *t, double x); /* 0 to 1 */
 double vgi_tint_shown(const vgi_tint *t, double x); /* a number as people read it: of scales the factor */
 void vgi_tint_clear(vgi_tint *t);

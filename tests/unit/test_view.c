@@ -488,7 +488,7 @@ static void following_holds_the_figure(void)
     vg_sheet_options o = options();
     make_cube(&s);
     for (int follow = 0; follow < 2; follow++) {
-        o.follow = follow;
+        o.fit = follow ? VG_FIT_FIGURE : VG_FIT_PATH;
         o.columns = 2;
         picture p = make_sheet(&o, &s, 2, 3, 0);
         size_t differ = 0;
@@ -650,20 +650,24 @@ static void colours_end_at_short_numbers(void)
     for (size_t i = 0; i < sizeof given / sizeof *given; i++)
         CHECK_NEAR(vgi_round_up(given[i][0]), given[i][1], 1e-9 * given[i][1]);
     vgi_tint t = {.what = VG_TINT_ERRORS};
-    vgi_tint_end(&t, 0, 0.00447, 0);
+    vgi_tint_end(&t, 0, 0.00447, 0, 0.0046);
     CHECK(t.low == 0 && !t.diverging);
     CHECK_NEAR(vgi_tint_place(&t, 0.0025), 0.5, 1e-12);
-    vgi_tint_end(&t, 0, 1e-14, 0); /* rounding */
+    vgi_tint_end(&t, 0, 1e-14, 0, 1e-14); /* rounding */
     CHECK(t.high == 1e-9);
     t.what = VG_TINT_SCALARS;
-    vgi_tint_end(&t, 0, 3.2, -0.5);
+    vgi_tint_end(&t, 0, 3.2, -0.5, 3.3);
     CHECK(t.diverging && t.low == -4 && t.high == 4 && vgi_tint_place(&t, 0) == 0.5 && vgi_tint_place(&t, -9) == 0);
-    vgi_tint_end(&t, 0, 0, 0); /* all are 0: there is an end nevertheless */
+    vgi_tint_end(&t, 0, 0, 0, 0); /* all are 0: there is an end nevertheless */
     CHECK(t.high == 1 && vgi_tint_place(&t, 0) == 0);
     t.what = VG_TINT_SCALES;
-    vgi_tint_end(&t, 0, 123, -5);
+    vgi_tint_end(&t, 2, 123, -5, 5);
     CHECK(t.diverging && t.low == -1 && t.high == 1 && vgi_tint_shown(&t, t.low) == 0.5);
-    vgi_tint_end(&t, 4, 123, -5);
+    vgi_tint_end(&t, 0, -log2(0.553), log2(0.55), log2(1.11)); /* 1 / 0.553 = 1.808 */
+    CHECK_NEAR(vgi_tint_shown(&t, t.high), 1.81, 1e-12);
+    CHECK(t.low == -t.high && t.shown_low == t.low); /* the least lies beyond the end */
+    CHECK_NEAR(vgi_tint_shown(&t, t.shown_high), 1.11, 1e-12);
+    vgi_tint_end(&t, 4, 123, -5, 123);
     CHECK(t.low == -2 && t.high == 2);
 }
 
