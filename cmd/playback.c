@@ -29,8 +29,7 @@ typedef struct playback {
 static void load_map(playback *p)
 {
     vg_err e;
-    if (vg_load_mesh(&p->map, p->o->map, &e) < 0) cli_die(&e);
-    if (!p->map.map.n) cli_stop(VG_EINPUT, "'%s' holds no map: make one with vg-fitmap", p->o->map);
+    if (vg_load(&p->map, p->o->map, "map", &e) < 0) cli_die(&e);
 }
 
 static void take_skeleton(playback *p)

@@ -208,9 +208,7 @@ static void load_target(work *w)
     if (!opts.onto) return;
     if (vg_load_mesh(&w->target, opts.onto, &e) < 0) cli_die(&e);
     if (!opts.correspondence) return;
-    if (vg_load_mesh(&w->pairs, opts.correspondence, &e) < 0) cli_die(&e);
-    if (!w->pairs.correspondence.first)
-        cli_stop(VG_EINPUT, "'%s' holds no correspondence: make one with vg-register", opts.correspondence);
+    if (vg_load(&w->pairs, opts.correspondence, "correspondence", &e) < 0) cli_die(&e);
 }
 
 /* The graphs: of a pair with one connectivity, the source's serves both. */

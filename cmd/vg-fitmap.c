@@ -67,9 +67,8 @@ static void take_patches(vg_head *h)
         return;
     }
     snprintf(name, sizeof name, "'%.190s'", opts.patches);
-    if (vg_load_mesh(&from, opts.patches, &e) < 0) cli_die(&e);
-    if (!from.body.patches.n) cli_stop(VG_EINPUT, "%s holds no patches: make them with vg-segment", name);
-    if (vg_mesh_same(&h->body.mesh, "the sequence", &from.body.mesh, name, &e) < 0 ||
+    if (vg_load(&from, opts.patches, "patches", &e) < 0 ||
+        vg_mesh_same(&h->body.mesh, "the sequence", &from.body.mesh, name, &e) < 0 ||
         vg_head_merge_trace(h, &from, &e) < 0)
         cli_die(&e);
     vg_patches_clear(&h->body.patches);

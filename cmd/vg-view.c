@@ -348,10 +348,9 @@ static void take_patches(side *s)
     vg_err e;
     char name[420];
     snprintf(name, sizeof name, "'%.400s'", opts.patches);
-    if (vg_load_mesh(&h, opts.patches, &e) < 0 ||
+    if (vg_load(&h, opts.patches, "patches", &e) < 0 ||
         vg_mesh_same(&h.body.mesh, name, &s->head->body.mesh, s->name, &e) < 0)
         cli_die(&e);
-    if (!h.body.patches.n) cli_stop(VG_EINPUT, "%s holds no patches: make them with 'vg-segment'", name);
     vg_patches_clear(&s->head->body.patches);
     s->head->body.patches = h.body.patches;
     h.body.patches = (vg_patches){0};

@@ -32,6 +32,7 @@ KINDS = {1: "vertices", 2: "vectors", 3: "deformations", 4: "transforms"}
 WIDTH = {"vertices": 3, "vectors": 3, "deformations": 4, "transforms": 7}
 LABEL_KINDS = {1: "object", 2: "group", 3: "material", 4: "smoothing", 5: "library"}
 NO_PARENT = 0xFFFFFFFF
+NEEDS = {**dict.fromkeys(("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP "), "MESH"), "SKIN": "RIG "}
 TAG_BYTES = frozenset(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 ")
 
 
@@ -105,6 +106,9 @@ class Rig:
     turns: array      # how it is turned there
     skin_bone: object  # array: 4 bones for each vertex, or None
     skin_weight: object
+
+    def bones(self) -> int:
+        return sum(1 for j in self.joints if j.channels)
 
 
 @dataclass
@@ -308,12 +312,35 @@ class _Payload:
         return int.from_bytes(self.take(8), "little")
 
     def f64(self) -> float:
-        return struct.unpack("<d", self.take(8))[0]
+        return self.f64s(1, "a number")[0]
+
+    def word(self) -> int:
+        """A u64 below 2^32."""
+        x = self.u64()
+        if x >= 1 << 32:
+            self.fail("its counts are out of range")
+        return x
+
+    def flag(self) -> bool:
+        x = self.u64()
+        if x > 1:
+            self.fail("its counts are out of range")
+        return x == 1
+
+    def u64s(self, n: int) -> array:
+        return _numbers("Q", self.take(8 * n))
 
     def u32s(self, n: int) -> array:
-        return _numbers(_U32, self.take(4 * n))
+        a = _numbers(_U32, self.take(4 * n))
+        self.pad()
+        return a
 
-    def f64s(self, n: int, what: str, code: str = "d") -> array:
+    def u8s(self, n: int) -> list:
+        a = list(self.take(n))
+        self.pad()
+        return a
+
+    def f64s(self, n: int, what: str = "a number", code: str = "d") -> array:
         a = _numbers(code, self.take((8 if code == "d" else 4) * n))
         if not all(map(math.isfinite, a)):
             self.fail(f"{what} is not finite")
@@ -323,7 +350,7 @@ class _Payload:
         if any(self.take(n)):
             self.fail(f"{what} not zero")
 
-    def text(self, n: int, long: str = "a text is longer than its record", bad: str = "a text is no UTF-8") -> str:
+    def utf8(self, n: int, long: str = "a text is longer than its record", bad: str = "a text is no UTF-8") -> str:
         if n > self.left():
             self.fail(long)
         data = bytes(self.take(n))
@@ -335,13 +362,22 @@ class _Payload:
             self.fail(bad)
         return s
 
-    def string(self) -> str:
-        if self.left() < 4:
+    def text(self) -> str:
+        if self.left() < 8:
             self.fail("a text is longer than its record")
-        return self.text(self.u32())
+        s = self.utf8(self.u64())
+        self.pad()
+        return s
+
+    def texts(self, n: int) -> list:
+        if n > self.left() // 8:
+            self.fail(self.short)
+        return [self.text() for _ in range(n)]
 
     def pad(self):
-        self.zero(-self.at % 8, "padding is missing or")
+        n = -self.at % 8
+        if n > self.left() or any(self.take(n)):
+            self.fail("padding is missing or not zero")
 
     def end(self):
         if self.left():
@@ -468,37 +504,37 @@ class _Reader:
             raise StreamError(f"record {tag} must come before FORM" if tag != "FORM" else "it has two FORM records")
         if tag in self.seen and tag != "PROV":
             raise StreamError(f"it has two {tag} records")
-        if tag in ("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP ") and "MESH" not in self.seen:
-            raise StreamError(f"record {tag} must come after MESH")
+        needed = NEEDS.get(tag)
+        if needed and needed not in self.seen:
+            raise StreamError(f"record {tag} must come after {needed}")
+
+    # Header records: first the fields, as the tables of section 3 have them, then what these must hold.
 
     def prov(self, p: _Payload):
-        nparents, nargs = p.u32(), p.u32()
+        nparents, nargs = p.u64(), p.u64()
         parents = list(p.u32s(nparents))
+        program, version, args = p.text(), p.text(), p.texts(nargs)
+        p.end()
         if any(x >= len(self.stream.provenance) for x in parents):
             p.fail("it names a parent that does not come before it")
-        program, version = p.string(), p.string()
-        args = [p.string() for _ in range(nargs)]
-        p.end()
         self.stream.provenance.append(Provenance(program, version, parents, args))
 
     def mesh(self, p: _Payload):
         nv, nf = p.u64(), p.u64()
-        if nv >= INDEX_LIMIT:
-            p.fail("more than 2^32 - 2 vertices")
-        sizes = p.u32s(nf)
-        start = array("Q", [0])
-        for f, size in enumerate(sizes):
-            if size < 2:
-                p.fail(f"face {f} has fewer than 2 vertices")
-            start.append(start[-1] + size)
-        if start[-1] >= INDEX_LIMIT:
-            p.fail("more than 2^32 - 2 corners")
-        p.fits("its length and its counts do not agree")
+        start = p.u32s(nf + 1)
         vert = p.u32s(start[-1])
         p.end()
+        if nv >= INDEX_LIMIT:
+            p.fail("more than 2^32 - 2 vertices")
+        if start[0] != 0 or any(a > b for a, b in zip(start, start[1:])):
+            p.fail("its faces are not in order")
+        if nf >= INDEX_LIMIT or start[-1] >= INDEX_LIMIT:
+            p.fail("it has too many vertices, faces or corners")
         mesh = Mesh(nv, start, vert)
         for f in range(nf):
             face = mesh.face(f)
+            if len(face) < 2:
+                p.fail(f"face {f} has fewer than 2 vertices")
             if max(face) >= nv:
                 p.fail(f"face {f} names vertex {max(face)} of {nv}")
             if len(set(face)) < len(face):
@@ -506,108 +542,89 @@ class _Reader:
         self.stream.mesh = mesh
 
     def texc(self, p: _Payload):
-        dim = p.u32()
-        p.zero(4, "a texture coordinate must have 1 to 3 numbers, or reserved bytes are")
+        dim, nt = p.word(), p.u64()
+        coordinates, corners = p.f64s(nt * dim), p.u32s(len(self.stream.mesh.vert))
+        p.end()
         if not 1 <= dim <= 3:
             p.fail("a texture coordinate must have 1 to 3 numbers")
-        nt = p.u64()
-        p.fits("its length and its counts do not agree")
-        coordinates = p.f64s(nt * dim, "a number")
-        corners = p.u32s(len(self.stream.mesh.vert))
-        p.end()
         if any(c >= nt and c != NO_TEXTURE for c in corners):
             p.fail("a corner names a texture coordinate that is not there")
         self.stream.texture = Texture(dim, coordinates, corners)
 
     def labl(self, p: _Payload):
-        labels, last = [], 0
-        while p.left():
-            face, kind, length = p.u64(), p.u32(), p.u32()
-            if face > self.stream.mesh.nf or face < last:
-                p.fail("labels are not in the order of their faces, or of a face that is not there")
-            if kind not in LABEL_KINDS:
-                p.fail(f"a label is of unknown kind {kind}")
-            labels.append((face, LABEL_KINDS[kind], p.text(length)))
-            p.pad()
-            last = face
-        self.stream.labels = labels
+        n = p.u64()
+        faces, kinds, texts = p.u64s(n), p.u32s(n), p.texts(n)
+        p.end()
+        if any(f > self.stream.mesh.nf for f in faces) or any(a > b for a, b in zip(faces, faces[1:])):
+            p.fail("labels are not in the order of their faces, or of a face that is not there")
+        if any(k not in LABEL_KINDS for k in kinds):
+            p.fail("a label is of unknown kind")
+        self.stream.labels = [(f, LABEL_KINDS[k], x) for f, k, x in zip(faces, kinds, texts)]
 
-    def indices(self, p: _Payload, limit: int, size: int) -> array:
-        if p.left() % size:
-            p.fail("its length is no whole number of entries")
-        a = p.u32s(p.left() // 4)
-        if any(x >= limit for x in a):
-            p.fail("an index is out of range")
+    def indices(self, p: _Payload, width: int = 1) -> array:
+        a = p.u32s(p.u64() * width)
+        p.end()
         return a
 
-    def ascending(self, p: _Payload, limit: int) -> array:
-        a = self.indices(p, limit, 4)
+    def ascending(self, p: _Payload, a: array, limit: int) -> array:
+        if any(x >= limit for x in a):
+            p.fail("an index is out of range")
         if any(x >= y for x, y in zip(a, a[1:])):
             p.fail("indices are not ascending")
         return a
 
     def sele(self, p: _Payload):
-        self.stream.selection = self.ascending(p, self.stream.mesh.nf)
+        self.stream.selection = self.ascending(p, self.indices(p), self.stream.mesh.nf)
 
     def anch(self, p: _Payload):
-        self.stream.anchors = self.ascending(p, self.stream.mesh.nv)
+        self.stream.anchors = self.ascending(p, self.indices(p), self.stream.mesh.nv)
 
     def link(self, p: _Payload):
-        self.stream.links = a = self.indices(p, self.stream.mesh.nv, 8)
+        self.stream.links = a = self.indices(p, 2)
+        if any(x >= self.stream.mesh.nv for x in a):
+            p.fail("an index is out of range")
         if any(x == y for x, y in zip(a[::2], a[1::2])):
             p.fail("a link joins a vertex to itself")
 
     def refp(self, p: _Payload):
-        length = p.u32()
-        p.zero(4, "reserved bytes are")
-        self.stream.reference_name = p.text(length)
-        p.pad()
-        p.fits("its length does not fit the number of vertices")
-        self.stream.reference = p.f64s(3 * self.stream.mesh.nv, "a position")
+        self.stream.reference_name = p.text()
+        self.stream.reference = p.f64s(3 * self.stream.mesh.nv)
         p.end()
 
-    def joint(self, p: _Payload, index: int) -> Joint:
-        p.fits("it ends inside a joint")
-        parent, n = p.u32(), p.u32()
-        channels, offset = list(p.take(8)), p.take(24)
-        length = p.u32()
-        if parent != NO_PARENT and parent >= index:
-            p.fail("a joint's parent does not come before it")
-        if n > 6:
-            p.fail("a joint has more than 6 channels")
-        if any(not 1 <= c <= 6 for c in channels[:n]) or any(channels[n:]):
-            p.fail("a joint has an unknown channel")
-        offset = list(struct.unpack("<3d", offset))
-        if not all(map(math.isfinite, offset)):
-            p.fail("an offset is not finite")
-        name = p.text(length)
-        p.fits("padding is missing or not zero")
-        p.pad()
-        return Joint(name, None if parent == NO_PARENT else parent, offset, channels[:n])
+    def joints(self, p: _Payload) -> list:
+        n = p.u64()
+        parents, counts, channels = p.u32s(n), p.u32s(n), p.u8s(6 * n)
+        offsets, names = p.f64s(3 * n), p.texts(n)
+        return [(names[j], parents[j], list(offsets[3 * j:3 * j + 3]), counts[j], channels[6 * j:6 * j + 6])
+                for j in range(n)]
+
+    def checked(self, p: _Payload, rows: list) -> list:
+        joints = []
+        for j, (name, parent, offset, n, channels) in enumerate(rows):
+            if parent != NO_PARENT and parent >= j:
+                p.fail("a joint's parent does not come before it")
+            if n > 6:
+                p.fail("a joint has more than 6 channels")
+            if any(not 1 <= c <= 6 for c in channels[:n]) or any(channels[n:]):
+                p.fail("a joint has an unknown channel")
+            joints.append(Joint(name, None if parent == NO_PARENT else parent, offset, channels[:n]))
+        return joints
 
     def skel(self, p: _Payload):
-        joints = []
-        while p.left():
-            joints.append(self.joint(p, len(joints)))
-        if len(joints) != self.stream.mesh.nv:
+        rows = self.joints(p)
+        p.end()
+        if len(rows) != self.stream.mesh.nv:
             p.fail("it does not have one joint for each vertex")
-        self.stream.skeleton = joints
+        self.stream.skeleton = self.checked(p, rows)
 
     def corr(self, p: _Payload):
-        p.fits("its counts are out of range")
         source, target = (p.u64(), p.u64(), p.u64()), (p.u64(), p.u64(), p.u64())
-        pairs, nf = p.u64(), target[1]
-        if nf >= INDEX_LIMIT or pairs >= INDEX_LIMIT:
-            p.fail("its counts are out of range")
-        p.fits("its length and counts do not agree")
-        first, source_face = p.u32s(nf + 1), p.u32s(pairs)
-        p.pad()
-        weight = p.f64s(pairs, "a weight is not positive, or")
-        distance = p.f64s(nf, "a distance or mark is out of range, or")
-        matched = list(p.take(nf))
-        p.pad()
+        nf = target[1]
+        first = p.u32s(nf + 1)
+        source_face, weight = p.u32s(first[nf]), p.f64s(first[nf])
+        distance, matched = p.f64s(nf), p.u8s(nf)
         p.end()
-        if first[0] != 0 or first[nf] != pairs or any(a > b for a, b in zip(first, first[1:])):
+        if first[0] != 0 or any(a > b for a, b in zip(first, first[1:])):
             p.fail("its lists of pairs are not in order")
         for f in range(nf):
             mine = slice(first[f], first[f + 1])
@@ -623,60 +640,38 @@ class _Reader:
                 p.fail("a distance or mark is out of range")
         self.stream.correspondence = Correspondence(source, target, first, source_face, weight, distance, matched)
 
-    def unit_turns(self, p: _Payload, n: int, what: str = "a number") -> array:
-        turns = p.f64s(4 * n, what)
-        for i in range(0, 4 * n, 4):
+    def check_turns(self, p: _Payload, turns: array):
+        for i in range(0, len(turns), 4):
             if abs(sum(x * x for x in turns[i:i + 4]) - 1) > 2e-6:
                 p.fail("a turn is no unit quaternion")
-        return turns
 
     def rig(self, p: _Payload):
-        p.fits("it has no joints")
-        n, nv, joints = p.u64(), self.stream.mesh.nv, []
-        if n == 0:
-            p.fail("it has no joints")
-        while len(joints) < n and p.left():
-            joints.append(self.joint(p, len(joints)))
-        p.fits("it is shorter than its counts say")
-        at = p.f64s(3 * n, "a position")
-        turns = self.unit_turns(p, n, "a turn is no unit quaternion:")
-        bones = sum(1 for j in joints if j.channels)
-        if bones == 0:
-            p.fail("none of its joints turns")
-        p.fits("it is too short, or reserved bytes are not zero")
-        skin, zero = p.u32(), p.u32()
-        if skin > 1 or zero:
-            p.fail("it is too short, or reserved bytes are not zero")
-        bone = weight = None
-        if skin:
-            p.fits("its length does not fit the number of vertices")
-            bone, weight = p.u32s(4 * nv), p.f64s(4 * nv, "weights are negative, or do not descend, or a weight")
-            for v in range(0, 4 * nv, 4):
-                if any(b >= bones for b in bone[v:v + 4]):
-                    p.fail("a vertex is moved by a bone that is not there")
-                if weight[v + 3] < 0 or any(a < b for a, b in zip(weight[v:v + 3], weight[v + 1:v + 4])):
-                    p.fail("weights are negative, or do not descend")
-                if abs(sum(weight[v:v + 4]) - 1) >= 1e-9:
-                    p.fail("the weights of a vertex do not sum to 1")
-        p.long = "bytes are left over"
+        rows = self.joints(p)
+        at, turns = p.f64s(3 * len(rows)), p.f64s(4 * len(rows))
         p.end()
-        self.stream.rig = Rig(joints, at, turns, bone, weight)
+        if not rows:
+            p.fail("it has no joints")
+        joints = self.checked(p, rows)
+        self.check_turns(p, turns)
+        if not any(j.channels for j in joints):
+            p.fail("none of its joints turns")
+        self.stream.rig = Rig(joints, at, turns, None, None)
 
-    def map_of_bones(self, p: _Payload, n: int, nj: int, per_corner: int):
-        if self.stream.rig is None:
-            p.fail("a RIG record must come before it")
-        if n != sum(1 for j in self.stream.rig.joints if j.channels):
-            p.fail("it has not as many bones as the rig")
-        if not 1 <= per_corner <= 2:
-            p.fail("a corner must have 1 or 2 bones")
-        if nj:
-            p.fail("pairs of patches stand in a map of bones")
+    def skin(self, p: _Payload):
+        rig, nv = self.stream.rig, self.stream.mesh.nv
+        bone, weight = p.u32s(4 * nv), p.f64s(4 * nv)
+        p.end()
+        for v in range(0, 4 * nv, 4):
+            if any(b >= rig.bones() for b in bone[v:v + 4]):
+                p.fail("a vertex is moved by a bone that is not there")
+            if weight[v + 3] < 0 or any(a < b for a, b in zip(weight[v:v + 3], weight[v + 1:v + 4])):
+                p.fail("weights are negative, or do not descend")
+            if abs(sum(weight[v:v + 4]) - 1) >= 1e-9:
+                p.fail("the weights of a vertex do not sum to 1")
+        rig.skin_bone, rig.skin_weight = bone, weight
 
     def ptch(self, p: _Payload):
-        p.fits("its length does not fit the number of faces")
         count, patches = p.u64(), p.u32s(self.stream.mesh.nf)
-        if any(p.take(-p.at % 8)):
-            p.fail(p.short)
         p.end()
         if not 1 <= count <= INDEX_LIMIT:
             p.fail("its count is out of range")
@@ -684,35 +679,43 @@ class _Reader:
             p.fail("a face is in a patch that is not there")
         self.stream.patches = (count, patches)
 
+    def map_driver(self, p: _Payload, n: int, nj: int, bones: bool, per_corner: int):
+        if not bones:
+            if per_corner != 1:
+                p.fail("a corner must have one patch")
+            return
+        if self.stream.rig is None:
+            p.fail("a RIG record must come before it")
+        if n != self.stream.rig.bones():
+            p.fail("it has not as many bones as the rig")
+        if not 1 <= per_corner <= 2:
+            p.fail("a corner must have 1 or 2 bones")
+        if nj:
+            p.fail("pairs of patches stand in a map of bones")
+
     def map(self, p: _Payload):
-        p.fits("its counts are out of range")
         n, nv, nj, nc, nh = (p.u64() for _ in range(5))
-        kind, flags, names, per_corner = (p.u32() for _ in range(4))
-        size = p.f64()
+        kind, has_home, nnames, per_corner = p.word(), p.flag(), p.u64(), p.u64()
+        size, bones = p.f64(), kind == 2
+        lengths = (4 * nv * n, 3 * n * n, 3 * n, 3 * n, n, 3 * nv if has_home else 0, 3 * nj, nj,
+                   4 * per_corner * nc, 0 if bones else 3 * nh)
+        weights, place, centre, home_centre, share, home, joint_at, joint_weight, corners, held_at = (
+            p.f64s(length) for length in lengths)
+        joints, held, held_patch = p.u32s(2 * nj), p.u32s(nh), p.u32s(0 if bones else nh)
+        corner_bones = p.u32s(per_corner * nc if bones else 0)
+        names = p.texts(nnames)
+        p.end()
         if not 1 <= n < INDEX_LIMIT or nj >= INDEX_LIMIT or nc >= INDEX_LIMIT or nh > nv:
             p.fail("its counts are out of range")
         if nv != self.stream.mesh.nv:
             p.fail("its count does not fit the mesh")
         if kind not in (1, 2):
             p.fail("it is driven by something unknown")
-        if flags & ~1 or names not in (0, n):
-            p.fail("unknown flags are set, or names are missing")
-        if not (math.isfinite(size) and size > 0):
+        if nnames not in (0, n):
+            p.fail("names are missing")
+        if size <= 0:
             p.fail("its size is not positive")
-        bones = kind == 2
-        if bones:
-            self.map_of_bones(p, n, nj, per_corner)
-        elif per_corner > 1:
-            p.fail("a corner has more than one patch")
-        per_corner = per_corner or 1
-        p.fits("it is shorter than its counts say")
-        p.long = "bytes are left over"
-        lengths = (4 * nv * n, 3 * n * n, 3 * n, 3 * n, n, 3 * nv if flags & 1 else 0, 3 * nj, nj,
-                   4 * per_corner * nc, 0 if bones else 3 * nh)
-        weights, place, centre, home_centre, share, home, joint_at, joint_weight, corners, held_at = (
-            p.f64s(length, "a number") for length in lengths)
-        joints, held, held_patch = p.u32s(2 * nj), p.u32s(nh), p.u32s(0 if bones else nh)
-        corner_bones = p.u32s(per_corner * nc if bones else 0)
+        self.map_driver(p, n, nj, bones, per_corner)
         if min(share) < 0 or abs(sum(share) - 1) >= 1e-9:
             p.fail("a share is negative, or the shares do not sum to 1")
         pairs = list(zip(joints[::2], joints[1::2]))
@@ -724,14 +727,10 @@ class _Reader:
             p.fail("a corner is moved by a bone that is not there")
         if any(x >= n for x in held_patch):
             p.fail("a vertex is held by a transform that is not there")
-        if any(v >= nv for v in held):
-            p.fail("an index is out of range")
-        if any(a >= b for a, b in zip(held, held[1:])):
-            p.fail("indices are not ascending")
-        names = [p.string() for _ in range(names)]
-        p.end()
-        self.stream.map = Map("bones" if bones else "patches", n, size, names, weights, place, centre, home_centre, share, home if flags & 1 else None,
-                              joint_at, joint_weight, corners, held_at, joints, held, held_patch, per_corner, corner_bones)
+        self.ascending(p, held, nv)
+        self.stream.map = Map("bones" if bones else "patches", n, size, names, weights, place, centre, home_centre, share,
+                              home if has_home else None, joint_at, joint_weight, corners, held_at, joints, held,
+                              held_patch, per_corner, corner_bones)
 
     def form(self, p: _Payload):
         s = self.stream
@@ -763,7 +762,6 @@ class _Reader:
         if p.u32() or n == 0:
             p.fail("its list of pins is cut or malformed")
         pins = p.u32s(n)
-        p.zero(n % 2 * 4, "its list of pins is cut or malformed, or its padding is")
         for i, v in enumerate(pins):
             if v >= self.stream.mesh.nv:
                 p.fail("an index is out of range")
@@ -783,7 +781,7 @@ class _Reader:
         p.zero(8, "it is too short, or reserved bytes are")
         if name_length == 0:
             p.fail("it has no name")
-        name, unit = p.text(name_length), p.text(unit_length)
+        name, unit = p.utf8(name_length), p.utf8(unit_length)
         p.pad()
         p.fits("its length does not fit the number of vertices")
         self.scalars = (name, unit, p.f64s(s.mesh.nv, "a number", "d" if s.precision == 8 else "f"))
@@ -800,7 +798,7 @@ class _Reader:
         if not math.isfinite(time) or (not flags & 1 and time != 0):
             p.fail("its time is not finite, or set without its flag")
         wrong = "its name is longer than the record, or no UTF-8"
-        name = p.text(name_length, wrong, wrong)
+        name = p.utf8(name_length, wrong, wrong)
         p.pad()
         p.where += f" ('{name}')"
         root = anchors = pins = turns = None
@@ -812,7 +810,8 @@ class _Reader:
             pins = self.pins(p)
         if flags & 4:
             p.fits("it ends before its turns")
-            turns = self.unit_turns(p, len(s.skeleton), "a turn is no unit quaternion:")
+            turns = p.f64s(4 * len(s.skeleton), "a turn is no unit quaternion:")
+            self.check_turns(p, turns)
         width = WIDTH[s.kind]
         p.fits("its length does not fit the count of FORM")
         values = p.f64s(s.count * width, "a value", "d" if s.precision == 8 else "f")
@@ -825,7 +824,7 @@ class _Reader:
         self.pending, self.scalars = [], None
 
     def fail(self, p: _Payload):
-        status, program, message = p.u32(), p.string(), p.string()
+        status, program, message = p.u64(), p.text(), p.text()
         p.end()
         raise StreamError(f"it was cut short: {program} failed with status {status}: {message}")
 
@@ -841,7 +840,7 @@ class _Reader:
 
     HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "SELE": sele, "LINK": link, "ANCH": anch,
                 "REFP": refp, "SKEL": skel, "CORR": corr, "PTCH": ptch,
-                "RIG ": rig, "MAP ": map, "FORM": form, "SCAL": scal, "FRAM": fram, "FAIL": fail, "END ": end}
+                "RIG ": rig, "SKIN": skin, "MAP ": map, "FORM": form, "SCAL": scal, "FRAM": fram, "FAIL": fail, "END ": end}
 
 
 def read_stream(file) -> Stream:

@@ -87,6 +87,7 @@ types:
             '"CORR"': corr
             '"PTCH"': ptch
             '"RIG "': rig
+            '"SKIN"': skin
             '"MAP "': map
             '"FORM"': form
             '"SCAL"': scal
@@ -101,17 +102,41 @@ types:
       copy_safe:
         value: (flags & 2) != 0
       num_anchors:
-        value: 'tag == "ANCH" ? len_payload / 4 : (index == 0 ? 0 : _root.head[index - 1].num_anchors.as<u8>)'
+        value: 'tag == "ANCH" ? payload.as<indices>.num : (index == 0 ? 0 : _root.head[index - 1].num_anchors.as<u8>)'
         doc: of records in head, what ANCH up to here has said
-  string:
+  text:
     seq:
       - id: len
-        type: u4
+        type: u8
       - id: text
         type: str
         size: len
         encoding: UTF-8
+      - id: padding
+        size: (8 - len % 8) % 8
     -webide-representation: '{text}'
+  list_u4:
+    params:
+      - id: num
+        type: u8
+    seq:
+      - id: at
+        type: u4
+        repeat: expr
+        repeat-expr: num
+      - id: padding
+        size: (num % 2) * 4
+  list_u1:
+    params:
+      - id: num
+        type: u8
+    seq:
+      - id: at
+        type: u1
+        repeat: expr
+        repeat-expr: num
+      - id: padding
+        size: (8 - num % 8) % 8
   point:
     seq:
       - id: x
@@ -123,20 +148,18 @@ types:
   prov:
     seq:
       - id: num_parents
-        type: u4
+        type: u8
       - id: num_args
-        type: u4
+        type: u8
       - id: parents
-        type: u4
-        repeat: expr
-        repeat-expr: num_parents
+        type: list_u4(num_parents)
         doc: positions among the PROV records
       - id: program
-        type: string
+        type: text
       - id: version
-        type: string
+        type: text
       - id: args
-        type: string
+        type: text
         repeat: expr
         repeat-expr: num_args
   mesh:
@@ -145,125 +168,93 @@ types:
         type: u8
       - id: num_faces
         type: u8
-      - id: sizes
-        type: u4
-        repeat: expr
-        repeat-expr: num_faces
+      - id: starts
+        type: list_u4(num_faces + 1)
+        doc: where each face begins in vertices, and where the last one ends
       - id: vertices
-        type: u4
-        repeat: eos
+        type: list_u4(starts.at[num_faces].as<u8>)
         doc: the vertices of all faces, one face after the other
   texc:
     seq:
       - id: dimension
-        type: u4
-      - id: reserved
-        type: u4
+        type: u8
       - id: num_coordinates
         type: u8
       - id: coordinates
         type: f8
         repeat: expr
         repeat-expr: num_coordinates * dimension
-      - id: corners
+      - id: corners_and_padding
         type: u4
         repeat: eos
-        doc: one for each corner of the mesh; 0xffffffff is none
+        doc: one for each corner of the mesh, then a zero if their number is odd; 0xffffffff is none
   labl:
     seq:
-      - id: labels
-        type: label
-        repeat: eos
-  label:
-    seq:
-      - id: face
+      - id: num_labels
         type: u8
-        doc: holds from this face on
-      - id: kind
-        type: u4
-        enum: label_kind
-      - id: len_text
-        type: u4
-      - id: text
-        type: str
-        size: len_text
-        encoding: UTF-8
-      - id: padding
-        size: (8 - len_text % 8) % 8
+      - id: faces
+        type: u8
+        repeat: expr
+        repeat-expr: num_labels
+        doc: a label holds from this face on
+      - id: kinds
+        type: list_u4(num_labels)
+        doc: see label_kind
+      - id: texts
+        type: text
+        repeat: expr
+        repeat-expr: num_labels
   indices:
     seq:
-      - id: indices
-        type: u4
-        repeat: eos
+      - id: num
+        type: u8
+      - id: list
+        type: list_u4(num)
   link:
     seq:
-      - id: pairs
-        type: pair
-        repeat: eos
-    types:
-      pair:
-        seq:
-          - id: a
-            type: u4
-          - id: b
-            type: u4
+      - id: num
+        type: u8
+      - id: vertices
+        type: list_u4(2 * num)
+        doc: two of each link
   refp:
     seq:
-      - id: len_name
-        type: u4
-      - id: reserved
-        type: u4
       - id: name
-        type: str
-        size: len_name
-        encoding: UTF-8
-      - id: padding
-        size: (8 - len_name % 8) % 8
+        type: text
       - id: positions
         type: point
         repeat: eos
   skel:
+    doc: joint j is vertex j of the mesh
     seq:
-      - id: joints
-        type: joint
-        repeat: eos
-        doc: joint j is vertex j of the mesh
-  joint:
-    seq:
-      - id: parent
-        type: u4
+      - id: num_joints
+        type: u8
+      - id: parents
+        type: list_u4(num_joints)
         doc: 0xffffffff is a root
       - id: num_channels
-        type: u4
+        type: list_u4(num_joints)
       - id: channels
-        type: u1
-        repeat: expr
-        repeat-expr: 8
-        doc: 1 2 3 x y z position, 4 5 6 x y z rotation, 0 behind the last
-      - id: offset
+        type: list_u1(6 * num_joints)
+        doc: 6 of each joint; 1 2 3 x y z position, 4 5 6 x y z rotation, 0 behind the last
+      - id: offsets
         type: point
-      - id: name
-        type: string
-      - id: padding
-        size: (12 - name.len % 8) % 8
+        repeat: expr
+        repeat-expr: num_joints
+      - id: names
+        type: text
+        repeat: expr
+        repeat-expr: num_joints
   corr:
     seq:
       - id: source
         type: end
       - id: target
         type: end
-      - id: num_pairs
-        type: u8
       - id: first
-        type: u4
-        repeat: expr
-        repeat-expr: target.num_faces + 1
+        type: list_u4(target.num_faces + 1)
       - id: source_faces
-        type: u4
-        repeat: expr
-        repeat-expr: num_pairs
-      - id: padding
-        size: ((target.num_faces + 1 + num_pairs) % 2) * 4
+        type: list_u4(num_pairs)
       - id: weights
         type: f8
         repeat: expr
@@ -273,11 +264,10 @@ types:
         repeat: expr
         repeat-expr: target.num_faces
       - id: matched
-        type: u1
-        repeat: expr
-        repeat-expr: target.num_faces
-      - id: last_padding
-        size: (8 - target.num_faces % 8) % 8
+        type: list_u1(target.num_faces)
+    instances:
+      num_pairs:
+        value: first.at[target.num_faces].as<u8>
     types:
       end:
         seq:
@@ -291,8 +281,20 @@ types:
     seq:
       - id: num_joints
         type: u8
-      - id: joints
-        type: joint
+      - id: parents
+        type: list_u4(num_joints)
+        doc: 0xffffffff is a root
+      - id: num_channels
+        type: list_u4(num_joints)
+      - id: channels
+        type: list_u1(6 * num_joints)
+        doc: 6 of each joint; 1 2 3 x y z position, 4 5 6 x y z rotation, 0 behind the last
+      - id: offsets
+        type: point
+        repeat: expr
+        repeat-expr: num_joints
+      - id: names
+        type: text
         repeat: expr
         repeat-expr: num_joints
       - id: positions
@@ -303,14 +305,11 @@ types:
         type: f8
         repeat: expr
         repeat-expr: 4 * num_joints
-      - id: has_skin
-        type: u4
-      - id: reserved
-        type: u4
-      - id: skin
-        type: u1
-        repeat: eos
-        doc: of each vertex 4 bones (u4), then of each vertex 4 weights (f8), if has_skin
+  skin:
+    seq:
+      - id: bones_and_weights
+        size-eos: true
+        doc: of each vertex 4 bones (u4), then of each vertex 4 weights (f8)
   ptch:
     seq:
       - id: num_patches
@@ -332,14 +331,14 @@ types:
       - id: num_held
         type: u8
       - id: kind
-        type: u4
+        type: u8
         doc: 1 patches, 2 bones
-      - id: map_flags
-        type: u4
+      - id: has_home
+        type: u8
       - id: num_names
-        type: u4
-      - id: said_per_corner
-        type: u4
+        type: u8
+      - id: per_corner
+        type: u8
       - id: size
         type: f8
       - id: weights
@@ -365,7 +364,7 @@ types:
       - id: home
         type: point
         repeat: expr
-        repeat-expr: (map_flags & 1) * num_vertices
+        repeat-expr: has_home * num_vertices
       - id: joint_positions
         type: point
         repeat: expr
@@ -383,28 +382,17 @@ types:
         repeat: expr
         repeat-expr: 'kind == 1 ? num_held : 0'
       - id: joints
-        type: u4
-        repeat: expr
-        repeat-expr: 2 * num_joints
+        type: list_u4(2 * num_joints)
       - id: held_vertices
-        type: u4
-        repeat: expr
-        repeat-expr: num_held
+        type: list_u4(num_held)
       - id: held_patches
-        type: u4
-        repeat: expr
-        repeat-expr: 'kind == 1 ? num_held : 0'
+        type: 'list_u4(kind == 1 ? num_held : 0)'
       - id: corner_bones
-        type: u4
-        repeat: expr
-        repeat-expr: 'kind == 2 ? per_corner * num_corners : 0'
+        type: 'list_u4(kind == 2 ? per_corner * num_corners : 0)'
       - id: names
-        type: string
+        type: text
         repeat: expr
         repeat-expr: num_names
-    instances:
-      per_corner:
-        value: 'said_per_corner == 0 ? 1 : said_per_corner'
   form:
     seq:
       - id: kind
@@ -510,11 +498,11 @@ types:
   fail:
     seq:
       - id: exit_status
-        type: u4
+        type: u8
       - id: program
-        type: string
+        type: text
       - id: message
-        type: string
+        type: text
   end_mark:
     seq:
       - id: num_records

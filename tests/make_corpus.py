@@ -74,12 +74,18 @@ def f64(*x):
     return struct.pack(f"<{len(x)}d", *x)
 
 
-def string(s):
-    return u32(len(s.encode())) + s.encode()
-
-
 def pad(data):
     return data + bytes(-len(data) % 8)
+
+
+def text(s):
+    """A text field: length, bytes, padding."""
+    return pad(u64(len(s.encode())) + s.encode())
+
+
+def indices(*x):
+    """A field of u32."""
+    return pad(u32(*x))
 
 
 def flat(rows):
@@ -107,42 +113,50 @@ def unknown(records):
 
 
 def provenance(p):
-    head = u32(len(p["parents"]), len(p["args"]), *p["parents"])
-    texts = [p["program"], p["version"], *p["args"]]
-    return Record("PROV", head + b"".join(map(string, texts)), COPY_SAFE)
+    counts = u64(len(p["parents"]), len(p["args"])) + indices(*p["parents"])
+    return Record("PROV", counts + b"".join(map(text, [p["program"], p["version"], *p["args"]])), COPY_SAFE)
+
+
+def starts(lists):
+    """Where each of the lists begins in all of them together, and where the last one ends."""
+    out = [0]
+    for x in lists:
+        out.append(out[-1] + len(x))
+    return out
 
 
 def mesh(m):
-    sizes = [len(f) for f in m["faces"]]
-    return Record("MESH", u64(m["vertices"], len(sizes)) + u32(*sizes, *flat(m["faces"])), CRITICAL)
+    faces = m["faces"]
+    return Record("MESH", u64(m["vertices"], len(faces)) + indices(*starts(faces)) + indices(*flat(faces)), CRITICAL)
 
 
 def texture(t):
     corners = [0xFFFFFFFF if c is None else c for c in t["corners"]]
-    head = u32(t["dim"], 0) + u64(len(t["coordinates"]))
-    return Record("TEXC", head + f64(*flat(t["coordinates"])) + u32(*corners), 0)
+    counts = u64(t["dim"], len(t["coordinates"]))
+    return Record("TEXC", counts + f64(*flat(t["coordinates"])) + indices(*corners), 0)
 
 
 def labels(entries):
-    out = b""
-    for label in entries:
-        text = label["text"].encode()
-        out += pad(u64(label["face"]) + u32(LABELS[label["kind"]], len(text)) + text)
-    return Record("LABL", out, 0)
+    kinds = indices(*(LABELS[x["kind"]] for x in entries))
+    texts = b"".join(text(x["text"]) for x in entries)
+    return Record("LABL", u64(len(entries), *(x["face"] for x in entries)) + kinds + texts, 0)
+
+
+def index_list(tag, rows):
+    """SELE, ANCH: faces or vertices; LINK: pairs of vertices."""
+    return Record(tag, u64(len(rows)) + indices(*(flat(rows) if tag == "LINK" else rows)), CRITICAL)
 
 
 def reference(r):
-    name = r["name"].encode()
-    return Record("REFP", pad(u32(len(name), 0) + name) + f64(*flat(r["positions"])), CRITICAL)
+    return Record("REFP", text(r["name"]) + f64(*flat(r["positions"])), CRITICAL)
 
 
 def joint_list(joints):
-    out = b""
-    for j in joints:
-        parent = 0xFFFFFFFF if j["parent"] is None else j["parent"]
-        channels = bytes(j["channels"]) + bytes(8 - len(j["channels"]))
-        out += pad(u32(parent, len(j["channels"])) + channels + f64(*j["offset"]) + string(j["name"]))
-    return out
+    parents = indices(*(0xFFFFFFFF if j["parent"] is None else j["parent"] for j in joints))
+    counts = indices(*(len(j["channels"]) for j in joints))
+    channels = pad(b"".join((bytes(j["channels"]) + bytes(6))[:6] for j in joints))
+    names = b"".join(text(j["name"]) for j in joints)
+    return u64(len(joints)) + parents + counts + channels + f64(*flat(j["offset"] for j in joints)) + names
 
 
 def skeleton(joints):
@@ -150,11 +164,11 @@ def skeleton(joints):
 
 
 def rig(r):
-    out = u64(len(r["joints"])) + joint_list(r["joints"]) + f64(*flat(r["at"]), *flat(r["turns"]))
-    out += u32(r["skin"] is not None, 0)
-    if r["skin"] is not None:
-        out += u32(*flat(r["skin"]["bones"])) + f64(*flat(r["skin"]["weights"]))
-    return Record("RIG ", out, 0)
+    return Record("RIG ", joint_list(r["joints"]) + f64(*flat(r["at"]), *flat(r["turns"])), 0)
+
+
+def skin(s):
+    return Record("SKIN", indices(*flat(s["bones"])) + f64(*flat(s["weights"])), 0)
 
 
 def digest(m):
@@ -167,29 +181,28 @@ def digest(m):
 
 def correspondence(c):
     ends = [u64(m["vertices"], m["faces"], int(m["digest"], 16)) for m in (c["source"], c["target"])]
-    pairs = flat(f["driven_by"] for f in c["faces"])
-    first = [0]
-    for f in c["faces"]:
-        first.append(first[-1] + len(f["driven_by"]))
-    indices = pad(u32(*first, *(s for s, _ in pairs)))
+    lists = [f["driven_by"] for f in c["faces"]]
+    pairs = flat(lists)
     numbers = f64(*(w for _, w in pairs), *(f["distance"] for f in c["faces"]))
     matched = pad(bytes(f["matched"] for f in c["faces"]))
-    return Record("CORR", b"".join(ends) + u64(len(pairs)) + indices + numbers + matched, CRITICAL)
+    return Record("CORR", b"".join(ends) + indices(*starts(lists)) + indices(*(s for s, _ in pairs)) + numbers + matched,
+                  CRITICAL)
 
 
 def patches(p):
-    return Record("PTCH", pad(u64(p["count"]) + u32(*p["of_face"])), 0)
+    return Record("PTCH", u64(p["count"]) + indices(*p["of_face"]), 0)
 
 
 def fitted(m):
     n, corners, held = len(m["share"]), len(m["corners"]), len(m["held"])
     counts = u64(n, len(m["weights"]), len(m["joints"]), corners // m["per_corner"], held)
-    words = u32({"patches": 1, "bones": 2}[m["kind"]], m["home"] is not None, len(m["names"]), m["per_corner"])
+    counts += u64({"patches": 1, "bones": 2}[m["kind"]], m["home"] is not None, len(m["names"]), m["per_corner"])
     rows = ("weights", "place", "centre", "home_centre")
     numbers = [f64(m["size"])] + [f64(*flat(m[k])) for k in rows] + [f64(*m["share"]), f64(*flat(m["home"] or []))]
     numbers += [f64(*flat(m["joint_at"])), f64(*m["joint_weight"]), f64(*flat(m["corners"])), f64(*flat(m["held_at"]))]
-    indices = u32(*flat(m["joints"]), *m["held"], *m["held_patch"], *flat(m["corner_bones"]))
-    return Record("MAP ", counts + words + b"".join(numbers) + indices + b"".join(map(string, m["names"])), CRITICAL)
+    lists = [flat(m["joints"]), m["held"], m["held_patch"], flat(m["corner_bones"])]
+    return Record("MAP ", counts + b"".join(numbers) + b"".join(indices(*x) for x in lists) +
+                  b"".join(map(text, m["names"])), CRITICAL)
 
 
 def frame(c, f):
@@ -225,7 +238,7 @@ def records_of(c):
         out.append(labels(c["labels"]))
     for tag, value in (("SELE", c["selection"]), ("LINK", c["links"]), ("ANCH", c["anchors"])):
         if value is not None:
-            out.append(Record(tag, u32(*(flat(value) if tag == "LINK" else value)), CRITICAL))
+            out.append(index_list(tag, value))
     if c["reference"] is not None:
         out.append(reference(c["reference"]))
     if c["skeleton"] is not None:
@@ -236,6 +249,8 @@ def records_of(c):
         out.append(patches(c["patches"]))
     if c["rig"] is not None:
         out.append(rig(c["rig"]))
+        if c["rig"]["skin"] is not None:
+            out.append(skin(c["rig"]["skin"]))
     if c["map"] is not None:
         out.append(fitted(c["map"]))
     out += unknown(c["extra"])
@@ -389,7 +404,7 @@ def register_content(**changes):
     return dict(c, correspondence={"source": ends[0], "target": ends[1], "faces": faces}, **changes)
 
 
-def map_content(home=False, **changes):
+def map_content(home=False, corners=True, **changes):
     """Two triangles, a patch each: vertices 0 and 3 go with one patch, 1 and 2 half with each."""
     rest, half = POINTS[:4], [[0, 0, 0, 0], [0, 0, 0, 0]]
     half = [[x / 2 for x in p] + [0.5] for p in rest]
@@ -399,7 +414,7 @@ def map_content(home=False, **changes):
     m = {"kind": "patches", "per_corner": 1, "corner_bones": [], "size": 1.5 if home else 1.0, "names": ["left", "r\u00e9st"] if home else [], "weights": weights,
          "place": [[-0.5, -0.25, 0, -0.25, -0.25, 0], [-0.5, -0.25, 0, -0.25, -0.25, 0]], "centre": centre,
          "home_centre": centre, "share": [0.5, 0.5], "home": [[2, 0, 0], [3, 0, 0], [3, 1, 0], [2, 1, 0]] if home else None,
-         "joint_at": [[0.5, 0.5, 0]], "joint_weight": [2.0], "corners": [[1, 0, 0, 0]] * 6, "held_at": [[0, 0, 0], [0, 1, 0]],
+         "joint_at": [[0.5, 0.5, 0]], "joint_weight": [2.0], "corners": [[1, 0, 0, 0]] * 6 if corners else [], "held_at": [[0, 0, 0], [0, 1, 0]],
          "joints": [[0, 1]], "held": [0, 3], "held_patch": [0, 1]}
     return content(links=[], frames=[], patches={"count": 2, "of_face": [0, 1]}, map=m, **changes)
 
@@ -501,7 +516,6 @@ def accept():
                                                      correspondence=register_content()["correspondence"])),
         "correspondence-of-nothing": whole(content(correspondence={"source": nobody, "target": nobody, "faces": []})),
         "map-with-home-and-names": whole(map_content(home=True)),
-        "map-per-corner-0": patched(map_content(), "MAP ", 52, u32(0)),
         "map-of-bones-one-per-corner": whole(bone_map_content(per_corner=1)),
         "map-of-bones-without-corners": whole(bone_map_content(corners=False)),
         "rig-without-skin": whole(rig_content(skin=False)),
@@ -565,8 +579,8 @@ def bad_end(count=0, running=0, length=None, **fields):
     return assemble(records + [end])
 
 
-def failed(message=string("frame 'x' is not finite"), after=None):
-    fail = Record("FAIL", u32(3) + string("vg-solve") + message, CRITICAL)
+def failed(message=text("frame 'x' is not finite"), after=None):
+    fail = Record("FAIL", u64(3) + text("vg-solve") + message, CRITICAL)
     return assemble(records_of(content())[:after] + [fail])
 
 
@@ -622,7 +636,7 @@ def reject_container():
         "critical-before-end": inserted(c, None, Record("XEND", b"", CRITICAL)),
         "fail": failed(),
         "fail-before-form": failed(after=1),
-        "fail-cut": failed(u32(0xFFFFFFFF)),
+        "fail-cut": failed(u64(0xFFFFFFFF)),
     }
 
 
@@ -630,8 +644,8 @@ def reject_order():
     """Records that are missing, there twice, or in the wrong place."""
     c, v = content(), graph_content("vectors")
     of = {r.tag.decode(): r for r in records_of(c)}
-    first = [Record("SELE", u32(0), CRITICAL), Record("LINK", b"", CRITICAL), Record("ANCH", b"", CRITICAL),
-             Record("TEXC", u32(1, 0) + u64(0) + u32(0xFFFFFFFF) * 6, 0), Record("LABL", b"", 0), of["REFP"]]
+    first = [index_list("SELE", [0]), index_list("LINK", []), index_list("ANCH", []),
+             Record("TEXC", u64(1, 0) + u32(0xFFFFFFFF) * 6, 0), labels([]), of["REFP"]]
     joints = skeleton(skeleton_content()["skeleton"])
     b = bone_map_content()
     by = {r.tag.strip().decode(): r for r in records_of(b)}
@@ -639,13 +653,15 @@ def reject_order():
     out = {f"{r.tag.decode().lower()}-before-mesh": whole(c, [r, of["MESH"], of["FORM"]]) for r in first}
     for r in first[:-1]:
         out[f"{r.tag.decode().lower()}-twice"] = whole(c, [of["MESH"], r, r, of["REFP"], of["FORM"], of["FRAM"]])
-    orphan = Record("PROV", u32(1, 0, 0) + string("p") + string("1"), COPY_SAFE)
-    late = Record("PROV", u32(0, 0) + string("p") + string("1"), COPY_SAFE)
+    orphan = Record("PROV", u64(1, 0) + indices(0) + text("p") + text("1"), COPY_SAFE)
+    late = Record("PROV", u64(0, 0) + text("p") + text("1"), COPY_SAFE)
     out.update({
         "rig-before-mesh": whole(c, [rig(rig_content()["rig"]), of["MESH"], of["REFP"], of["FORM"]]),
         "rig-twice": inserted(rig_content(), "FORM", rig(rig_content()["rig"])),
-        "rig-after-map": whole(b, [by[t] for t in ("MESH", "LINK", "REFP", "MAP", "RIG", "FORM")]),
-        "rig-missing": without(b, "RIG "),
+        "rig-after-map": whole(b, [by[t] for t in ("MESH", "LINK", "REFP", "MAP", "RIG", "SKIN", "FORM")]),
+        "rig-missing": whole(b, [by[t] for t in ("MESH", "LINK", "REFP", "MAP", "FORM")]),
+        "skin-before-rig": whole(b, [by[t] for t in ("MESH", "REFP", "SKIN", "RIG", "FORM")]),
+        "skin-twice": inserted(rig_content(), "FORM", by["SKIN"]),
         "skel-before-mesh": whole(c, [joints, of["MESH"], of["REFP"], of["FORM"]]),
         "skel-twice": inserted(c, "FORM", joints, joints),
         "corr-twice": inserted(c, "FORM", drives, drives),
@@ -673,9 +689,18 @@ def reject_header():
     def with_record(tag, payload, flags=CRITICAL):
         return inserted(c, "REFP", Record(tag, payload, flags))
 
-    tex_head = u32(2, 0) + u64(1) + f64(0, 0)
-    label = u64(0) + u32(2, 3) + b"abc"
-    prov = u32(0, 1) + string("p") + string("1")
+    tex_head = u64(2, 1) + f64(0, 0)
+    label = {"face": 0, "kind": "group", "text": "abc"}
+    prov = u64(0, 1) + text("p") + text("1")
+
+    def with_list(tag, rows):
+        return inserted(c, "REFP", index_list(tag, rows))
+
+    def with_labels(*entries):
+        return whole(content(labels=list(entries)))
+
+    g = content(labels=[label])  # payload: count, face, kind from byte 16, length of the text from 24, text from 32
+
     return {
         "mesh-length-short": lie(c, "MESH", payload=lambda r: r.payload[:-4]),
         "mesh-length-long": lie(c, "MESH", payload=lambda r: r.payload + u32(0)),
@@ -685,43 +710,50 @@ def reject_header():
         "mesh-nf-2-31": patched(c, "MESH", 8, u64(1 << 31)),
         "mesh-nf-2-62": patched(c, "MESH", 8, u64(1 << 62)),
         "mesh-nf-2-64-less-1": patched(c, "MESH", 8, u64((1 << 64) - 1)),
-        "mesh-face-size-0": patched(c, "MESH", 16, u32(0, 6)),
-        "mesh-face-size-1": patched(c, "MESH", 16, u32(1, 5)),
-        "mesh-face-size-2-32-less-1": patched(c, "MESH", 20, u32(0xFFFFFFFF)),
+        "mesh-face-size-0": patched(c, "MESH", 16, u32(0, 0, 6)),
+        "mesh-face-size-1": patched(c, "MESH", 16, u32(0, 1, 6)),
+        "mesh-starts-descend": patched(c, "MESH", 16, u32(0, 7, 6)),
+        "mesh-start-not-zero": patched(c, "MESH", 16, u32(1, 3, 6)),
+        "mesh-corners-2-32-less-1": patched(c, "MESH", 24, u32(0xFFFFFFFF)),
+        "mesh-padding": patched(c, "MESH", 28, u32(1)),
         "mesh-index-out-of-range": patched(c, "MESH", -4, u32(4)),
         "mesh-index-2-32-less-1": patched(c, "MESH", -4, u32(0xFFFFFFFF)),
         "mesh-vertex-twice": patched(c, "MESH", -4, u32(0)),
-        "mesh-segment-twice": patched(m, "MESH", -4, u32(4)),
-        "texc-dim-0": with_record("TEXC", u32(0, 0) + u64(0) + u32(0xFFFFFFFF) * 6, 0),
-        "texc-dim-4": with_record("TEXC", u32(4, 0) + u64(0) + u32(0xFFFFFFFF) * 6, 0),
-        "texc-reserved": with_record("TEXC", u32(2, 1) + u64(1) + f64(0, 0) + u32(0) * 6, 0),
+        "mesh-segment-twice": patched(m, "MESH", -8, u32(4)),
+        "texc-dim-0": with_record("TEXC", u64(0, 0) + u32(0xFFFFFFFF) * 6, 0),
+        "texc-dim-4": with_record("TEXC", u64(4, 0) + u32(0xFFFFFFFF) * 6, 0),
+        "texc-dim-2-32": with_record("TEXC", u64(1 << 32, 0) + u32(0xFFFFFFFF) * 6, 0),
         "texc-corner-out-of-range": with_record("TEXC", tex_head + u32(0, 0, 0, 0, 0, 1), 0),
         "texc-corner-missing": with_record("TEXC", tex_head + u32(0) * 5, 0),
-        "texc-nan": with_record("TEXC", u32(1, 0) + u64(1) + f64(NAN) + u32(0) * 6, 0),
-        "texc-nt-2-61": with_record("TEXC", u32(1, 0) + u64(1 << 61) + u32(0) * 6, 0),
-        "labl-kind-0": with_record("LABL", pad(u64(0) + u32(0, 1) + b"a"), 0),
-        "labl-kind-6": with_record("LABL", pad(u64(0) + u32(6, 1) + b"a"), 0),
-        "labl-face-out-of-range": with_record("LABL", pad(u64(3) + u32(2, 1) + b"a"), 0),
-        "labl-order": with_record("LABL", pad(u64(2) + u32(2, 1) + b"a") + pad(label), 0),
-        "labl-length-2-31": with_record("LABL", u64(0) + u32(2, 1 << 31) + bytes(8), 0),
-        "labl-cut": with_record("LABL", pad(label)[:-8], 0),
-        "labl-padding": with_record("LABL", label + b"\1\0\0\0\0", 0),
-        "labl-utf8": with_record("LABL", pad(u64(0) + u32(2, 2) + b"\xc3\x28"), 0),
-        "sele-order": with_record("SELE", u32(1, 0)),
-        "sele-twice-the-same": with_record("SELE", u32(1, 1)),
-        "sele-out-of-range": with_record("SELE", u32(2)),
-        "sele-length": with_record("SELE", u32(0) + b"\1"),
-        "link-to-itself": with_record("LINK", u32(2, 2)),
-        "link-out-of-range": with_record("LINK", u32(0, 4)),
-        "link-length": with_record("LINK", u32(0)),
-        "anch-order": with_record("ANCH", u32(2, 1)),
-        "anch-out-of-range": with_record("ANCH", u32(4)),
-        "anch-length": with_record("ANCH", u32(0) + b"\0\0"),
+        "texc-nan": with_record("TEXC", u64(1, 1) + f64(NAN) + u32(0) * 6, 0),
+        "texc-nt-2-61": with_record("TEXC", u64(1, 1 << 61) + u32(0) * 6, 0),
+        "labl-kind-0": patched(g, "LABL", 16, u32(0)),
+        "labl-kind-6": patched(g, "LABL", 16, u32(6)),
+        "labl-face-out-of-range": with_labels(dict(label, face=3)),
+        "labl-order": with_labels(dict(label, face=2), label),
+        "labl-count-2-61": patched(g, "LABL", 0, u64(1 << 61)),
+        "labl-length-2-31": patched(g, "LABL", 24, u64(1 << 31)),
+        "labl-cut": lie(g, "LABL", payload=lambda r: r.payload[:-8]),
+        "labl-padding": patched(g, "LABL", -1, b"\1"),
+        "labl-utf8": patched(g, "LABL", 32, b"\xc3\x28"),
+        "sele-order": with_list("SELE", [1, 0]),
+        "sele-twice-the-same": with_list("SELE", [1, 1]),
+        "sele-out-of-range": with_list("SELE", [2]),
+        "sele-length": with_record("SELE", u64(3) + u32(0, 1)),
+        "sele-padding": with_record("SELE", u64(1) + u32(0, 1)),
+        "link-to-itself": with_list("LINK", [[2, 2]]),
+        "link-out-of-range": with_list("LINK", [[0, 4]]),
+        "link-length": with_record("LINK", u64(2) + u32(0, 1)),
+        "link-2-63": with_record("LINK", u64(1 << 63) + u32(0, 1)),
+        "anch-order": with_list("ANCH", [2, 1]),
+        "anch-out-of-range": with_list("ANCH", [4]),
+        "anch-length": with_record("ANCH", u64(1) + u32(0)),
+        "anch-long": with_record("ANCH", u64(1) + u32(0, 0, 0, 0)),
         "refp-short": lie(c, "REFP", payload=lambda r: r.payload[:-8]),
         "refp-long": lie(c, "REFP", payload=lambda r: r.payload + bytes(8)),
         "refp-nan": patched(c, "REFP", -8, f64(NAN)),
-        "refp-reserved": patched(c, "REFP", 4, u32(1)),
-        "refp-name-2-32-less-1": patched(c, "REFP", 0, u32(0xFFFFFFFF)),
+        "refp-name-2-32-less-1": patched(c, "REFP", 0, u64(0xFFFFFFFF)),
+        "refp-name-2-64-less-1": patched(c, "REFP", 0, u64((1 << 64) - 1)),
         "refp-name-padding": patched(c, "REFP", 12, b"\0\0\0\1"),
         "refp-name-utf8": patched(c, "REFP", 8, b"\xff"),
         "refp-name-nul": patched(c, "REFP", 9, b"\0"),
@@ -735,16 +767,12 @@ def reject_header():
         "form-transforms-2-63": patched(c, "FORM", 0, u32(4, 8) + u64(1 << 63)),
         "form-length": lie(c, "FORM", payload=lambda r: r.payload + bytes(8)),
         "prov-args-missing": inserted(c, "MESH", Record("PROV", prov, COPY_SAFE)),
-        "prov-args-2-32-less-1": inserted(c, "MESH", Record("PROV", patch32(prov, 4), COPY_SAFE)),
-        "prov-parents-2-32-less-1": inserted(c, "MESH", Record("PROV", patch32(prov, 0), COPY_SAFE)),
-        "prov-string-2-32-less-1": inserted(c, "MESH", Record("PROV", patch32(prov, 8), COPY_SAFE)),
-        "prov-too-long": inserted(c, "MESH", Record("PROV", prov + string("a") + b"x", COPY_SAFE)),
-        "prov-utf8": inserted(c, "MESH", Record("PROV", prov + u32(3) + b"\xed\xa0\x80", COPY_SAFE)),
+        "prov-args-2-32-less-1": inserted(c, "MESH", Record("PROV", prov[:8] + u64(0xFFFFFFFF) + prov[16:], COPY_SAFE)),
+        "prov-parents-2-32-less-1": inserted(c, "MESH", Record("PROV", u64(0xFFFFFFFF) + prov[8:], COPY_SAFE)),
+        "prov-string-2-32-less-1": inserted(c, "MESH", Record("PROV", prov[:16] + u64(0xFFFFFFFF) + prov[24:], COPY_SAFE)),
+        "prov-too-long": inserted(c, "MESH", Record("PROV", prov + text("a") + b"x", COPY_SAFE)),
+        "prov-utf8": inserted(c, "MESH", Record("PROV", prov + pad(u64(3) + b"\xed\xa0\x80"), COPY_SAFE)),
     }
-
-
-def patch32(data, at):
-    return data[:at] + u32(0xFFFFFFFF) + data[at + 4:]
 
 
 def joint(parent=None, channels=(), offset=(0, 0, 0), name="j"):
@@ -754,8 +782,10 @@ def joint(parent=None, channels=(), offset=(0, 0, 0), name="j"):
 def reject_attachments():
     """Skeletons and correspondences with content that does not hold."""
     s, r = skeleton_content(), register_content()
-    # payload of CORR: 7 numbers of 8 bytes, first[4] from byte 56, source[4] from 72, weight[4] from 88, distance[3]
-    # from 120, matched[3] from 144, padding[5]
+    # payload of CORR: 6 numbers of 8 bytes, first[4] from byte 48, source[4] from 64, weight[4] from 80, distance[3]
+    # from 112, matched[3] from 136, padding[5]
+    # payload of SKEL: their number, parent[4] from byte 8, channel count[4] from 24, channels[24] from 40, offset[12] from
+    # 64, the first name from 160
 
     def skeleton_of(*joints):
         return whole(dict(s, skeleton=list(joints)))
@@ -771,6 +801,9 @@ def reject_attachments():
     def skinned(**fields):
         return whole(dict(g, rig=dict(g["rig"], skin=dict(g["rig"]["skin"], **fields))))
 
+    def mapped(**fields):
+        return whole(dict(map_content(), map=dict(map_content()["map"], **fields)))
+
     joints_but_one = [dict(j, channels=[] if i == 3 else j["channels"]) for i, j in enumerate(JOINTS)]
     one = driven([[0, 1.0]])
     return {
@@ -780,13 +813,13 @@ def reject_attachments():
         "skel-parent-after": skeleton_of(joint(), joint(2), joint(0), joint(0)),
         "skel-channel-7": skeleton_of(joint(), joint(0, [7]), joint(0), joint(0)),
         "skel-channel-0": skeleton_of(joint(), joint(0, [4, 0, 5]), joint(0), joint(0)),
-        "skel-channels-7": patched(s, "SKEL", 4, u32(7)),
-        "skel-channel-unused": patched(s, "SKEL", 15, b"\1"),
+        "skel-channels-7": patched(s, "SKEL", 24, u32(7)),
+        "skel-channel-unused": patched(s, "SKEL", 49, b"\1"),
         "skel-offset-nan": skeleton_of(joint(), joint(0, offset=(0, NAN, 0)), joint(0), joint(0)),
-        "skel-name-2-32-less-1": patched(s, "SKEL", 40, u32(0xFFFFFFFF)),
-        "skel-name-utf8": patched(s, "SKEL", 44, b"\xff"),
+        "skel-name-2-32-less-1": patched(s, "SKEL", 160, u64(0xFFFFFFFF)),
+        "skel-name-utf8": patched(s, "SKEL", 168, b"\xff"),
         "skel-padding": patched(skeleton_content(), "SKEL", -1, b"\1"),
-        "skel-cut": lie(s, "SKEL", payload=lambda record: record.payload[:-20]),
+        "skel-cut": lie(s, "SKEL", payload=lambda record: record.payload[:-8]),
         "ptch-cut": lie(content(patches={"count": 2, "of_face": [0, 1]}), "PTCH", payload=lambda record: record.payload[:-4]),
         "ptch-long": lie(content(patches={"count": 2, "of_face": [0, 1]}), "PTCH", payload=lambda record: record.payload + bytes(8)),
         "ptch-none": whole(content(patches={"count": 0, "of_face": [0, 0]})),
@@ -795,19 +828,22 @@ def reject_attachments():
         "map-cut": lie(map_content(), "MAP ", payload=lambda record: record.payload[:-4]),
         "map-long": lie(map_content(), "MAP ", payload=lambda record: record.payload + bytes(4)),
         "map-empty": lie(map_content(), "MAP ", payload=b""),
-        "map-transforms-0": patched(map_content(), "MAP ", 0, u64(0)),
+        "map-transforms-0": mapped(share=[], weights=[[]] * 4, place=[], centre=[], home_centre=[], joints=[], joint_at=[],
+                                   joint_weight=[], held=[], held_at=[], held_patch=[], corners=[]),
         "map-transforms-2-31": patched(map_content(), "MAP ", 0, u64(1 << 31)),
-        "map-vertices": patched(map_content(), "MAP ", 8, u64(5)),
+        "map-vertices": mapped(weights=map_content()["map"]["weights"] + [[0, 0, 0, 1, 0, 0, 0, 0]]),
+        "map-vertices-2-63": patched(map_content(), "MAP ", 8, u64(1 << 63)),
         "map-joints-2-31": patched(map_content(), "MAP ", 16, u64(1 << 31)),
         "map-corners": patched(map_content(), "MAP ", 24, u64(7)),
         "map-held-2-63": patched(map_content(), "MAP ", 32, u64(1 << 63)),
-        "map-kind-3": patched(map_content(), "MAP ", 40, u32(3)),
-        "map-kind-2-without-rig": patched(map_content(), "MAP ", 40, u32(2)),
-        "map-flag": patched(map_content(), "MAP ", 44, u32(2)),
-        "map-name-missing": patched(map_content(home=True), "MAP ", 48, u32(1)),
-        "map-per-corner-2": patched(map_content(), "MAP ", 52, u32(2)),
-        "map-of-bones-per-corner-0": patched(b, "MAP ", 52, u32(0)),
-        "map-of-bones-per-corner-3": whole(bone_map_content(per_corner=3)),
+        "map-kind-3": patched(map_content(), "MAP ", 40, u64(3)),
+        "map-kind-2-32": patched(map_content(), "MAP ", 40, u64(1 << 32 | 1)),
+        "map-flag": patched(map_content(), "MAP ", 48, u64(2)),
+        "map-name-missing": mapped(names=["one"]),
+        "map-names-2-61": patched(map_content(), "MAP ", 56, u64(1 << 61)),
+        "map-per-corner-2": mapped(per_corner=2),
+        "map-per-corner-0": patched(map_content(corners=False), "MAP ", 64, u64(0)),
+        "map-of-bones-per-corner-3": whole(dict(b, map=dict(b["map"], per_corner=3, corners=[STRAIGHT] * 18, corner_bones=[[0, 1, 2]] * 6))),
         "map-of-bones-of-another-rig": whole(dict(b, rig=dict(b["rig"], joints=joints_but_one, skin=None))),
         "map-of-bones-with-joints": whole(dict(b, map=dict(b["map"], joints=[[0, 1]], joint_at=[[0, 0, 0]], joint_weight=[1.0]))),
         "map-of-bones-corner-bone": patched(b, "MAP ", -4, u32(3)),
@@ -824,16 +860,15 @@ def reject_attachments():
         "rig-position-inf": rigged(at=[[0, 0, 0], [0, INF, 0], [0, 0, 0], [0, 0, 0]]),
         "rig-turn-long": rigged(turns=[STRAIGHT, [1, 0.01, 0, 0], STRAIGHT, STRAIGHT]),
         "rig-turn-nan": rigged(turns=[STRAIGHT, [NAN, 0, 0, 0], STRAIGHT, STRAIGHT]),
-        "rig-skin-2": patched(rig_content(skin=False), "RIG ", -8, u32(2)),
-        "rig-reserved": patched(rig_content(skin=False), "RIG ", -4, u32(1)),
-        "rig-skin-missing": patched(rig_content(skin=False), "RIG ", -8, u32(1)),
-        "rig-bone-out-of-range": skinned(bones=[[0, 1, 2, 3]] * 4),
-        "rig-weights-ascend": skinned(weights=[[0.25, 0.5, 0.25, 0]] * 4),
-        "rig-weight-negative": skinned(weights=[[1, 0.5, -0.5, 0]] * 4),
-        "rig-weight-nan": skinned(weights=[[NAN, 0, 0, 0]] * 4),
-        "rig-weights-sum": skinned(weights=[[0.5, 0.25, 0.125, 0]] * 4),
-        "map-size-0": patched(map_content(), "MAP ", 56, f64(0)),
-        "map-weight-nan": patched(map_content(), "MAP ", 64, f64(NAN)),
+        "skin-cut": lie(g, "SKIN", payload=lambda record: record.payload[:-8]),
+        "skin-long": lie(g, "SKIN", payload=lambda record: record.payload + bytes(8)),
+        "skin-bone-out-of-range": skinned(bones=[[0, 1, 2, 3]] * 4),
+        "skin-weights-ascend": skinned(weights=[[0.25, 0.5, 0.25, 0]] * 4),
+        "skin-weight-negative": skinned(weights=[[1, 0.5, -0.5, 0]] * 4),
+        "skin-weight-nan": skinned(weights=[[NAN, 0, 0, 0]] * 4),
+        "skin-weights-sum": skinned(weights=[[0.5, 0.25, 0.125, 0]] * 4),
+        "map-size-0": patched(map_content(), "MAP ", 72, f64(0)),
+        "map-weight-nan": patched(map_content(), "MAP ", 80, f64(NAN)),
         "map-held-patch": patched(map_content(), "MAP ", -4, u32(2)),
         "map-held-vertex": patched(map_content(), "MAP ", -12, u32(4)),
         "map-joint-itself": patched(map_content(), "MAP ", -24, u32(1)),
@@ -846,11 +881,10 @@ def reject_attachments():
         "corr-empty": lie(r, "CORR", payload=b""),
         "corr-target-faces-2-32-less-1": patched(r, "CORR", 32, u64(0xFFFFFFFF)),
         "corr-target-faces-2-31": patched(r, "CORR", 32, u64(1 << 31)),
-        "corr-pairs-2-63": patched(r, "CORR", 48, u64(1 << 63)),
-        "corr-pairs-2-31": patched(r, "CORR", 48, u64(1 << 31)),
-        "corr-first-not-zero": patched(r, "CORR", 56, u32(1)),
-        "corr-first-descends": patched(r, "CORR", 60, u32(3, 1)),
-        "corr-first-last": patched(r, "CORR", 68, u32(3)),
+        "corr-first-not-zero": patched(r, "CORR", 48, u32(1)),
+        "corr-first-descends": patched(r, "CORR", 52, u32(3, 1)),
+        "corr-first-last": patched(r, "CORR", 60, u32(3)),
+        "corr-first-2-32-less-1": patched(r, "CORR", 60, u32(0xFFFFFFFF)),
         "corr-driven-by-none": driving(one, driven([]), one),
         "corr-source-out-of-range": driving(one, one, driven([[2, 1.0]])),
         "corr-padding": patched(r, "CORR", -1, b"\1"),
@@ -860,7 +894,7 @@ def reject_attachments():
         "corr-weights-sum": driving(one, one, driven([[0, 0.5], [1, 0.25]])),
         "corr-distance-negative": driving(one, one, driven([[0, 1.0]], -1.0)),
         "corr-distance-inf": driving(one, one, driven([[0, 1.0]], INF)),
-        "corr-matched-2": patched(r, "CORR", 144, b"\2"),
+        "corr-matched-2": patched(r, "CORR", 136, b"\2"),
     }
 
 

@@ -1,5 +1,5 @@
-/* cursor.h: what the files that know the contents of records share (payload.c, payload_rig.c, payload_scal.c): a
- * cursor that takes numbers, lists and texts from a payload, and the same for writing. No other file includes it.
+/* cursor.h: what the files that know the contents of records share (payload.c, payload_scal.c, artefact_io.c): a cursor
+ * that takes numbers, lists and texts from a payload, and the same for writing. No other file includes it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CURSOR_H
 #define VG_CURSOR_H
@@ -112,14 +112,6 @@ static inline int put_doubles(vg_bytes *b, const double *x, size_t n, vg_err *e)
     return r;
 }
 
-static inline int put_string(vg_bytes *b, const char *s, vg_err *e)
-{
-    size_t n = strlen(s);
-    if (n > UINT32_MAX) return vg_fail(e, VG_EARG, "a text of %zu bytes is too long for a stream", n);
-    int r = put32(b, (uint32_t)n, e);
-    return r < 0 ? r : vgi_bytes_append(b, s, n, e);
-}
-
 /* zero bytes up to the next multiple of 8, counted from `from` */
 static inline int put_padding(vg_bytes *b, size_t from, vg_err *e)
 {
@@ -127,26 +119,26 @@ static inline int put_padding(vg_bytes *b, size_t from, vg_err *e)
     return vgi_bytes_append(b, zeros, (from - b->size) & 7, e);
 }
 
+static inline int put_text(vg_bytes *b, const char *s, vg_err *e)
+{
+    size_t n = s ? strlen(s) : 0;
+    int r = put64(b, n, e);
+    if (r == VG_OK) r = vgi_bytes_append(b, s, n, e);
+    return r < 0 ? r : put_padding(b, 0, e);
+}
+
+static inline int put_indices(vg_bytes *b, const uint32_t *x, size_t n, vg_err *e)
+{
+    int r = vgi_bytes_reserve(b, b->size + 4 * n, e);
+    if (r < 0) return r;
+    for (size_t i = 0; i < n; i++) vgi_put32(b->data + b->size + 4 * i, x[i]);
+    b->size += 4 * n;
+    return VG_OK;
+}
+
 static inline int wrong(const vgi_payload *p, const char *what, vg_err *e)
 {
     return vg_fail(e, VG_EINPUT, "%s: %s", p->where, what);
-}
-
-/* A text of n bytes; NULL and *r set when it is not there, no UTF-8, or memory ran out. */
-static inline char *take_text(cursor *c, size_t n, const vgi_payload *p, int *r, vg_err *e)
-{
-    const char *s = (const char *)take(c, n);
-    if (!s) {
-        *r = wrong(p, "a text is longer than its record", e);
-        return NULL;
-    }
-    if (!vgi_is_utf8(s, n)) {
-        *r = wrong(p, "a text is no UTF-8", e);
-        return NULL;
-    }
-    char *copy = vgi_copy_string(s, n, e);
-    if (!copy) *r = VG_ENOMEM;
-    return copy;
 }
 
 static inline bool take_padding(cursor *c, size_t n)
@@ -157,24 +149,27 @@ static inline bool take_padding(cursor *c, size_t n)
     return p != NULL;
 }
 
-/* Indices below a limit, each greater than the one before. */
-static inline int check_ascending(const vgi_payload *p, const uint32_t *list, size_t n, size_t limit, vg_err *e)
+/* A text: its length, its bytes, padding. Where it lies in the payload, and *n; NULL and *r set when it is malformed. */
+static inline const char *peek_text(cursor *c, size_t *n, const vgi_payload *p, int *r, vg_err *e)
 {
-    for (size_t i = 0; i < n; i++) {
-        if (list[i] >= limit) return wrong(p, "an index is out of range", e);
-        if (i && list[i] <= list[i - 1]) return wrong(p, "indices are not ascending", e);
-    }
-    return VG_OK;
+    uint64_t length = take64(c);
+    const char *s = (const char *)take_array(c, length, 1);
+    *n = (size_t)length;
+    if (!s) *r = wrong(p, "a text is longer than its record", e);
+    else if (!vgi_is_utf8(s, *n)) *r = wrong(p, "a text is no UTF-8", e);
+    else if (!take_padding(c, -length & 7)) *r = wrong(p, "padding is missing or not zero", e);
+    else return s;
+    return NULL;
 }
 
-/* Unit quaternions, to 1e-6; false for NaN. */
-static inline bool are_turns(const double *q, size_t n)
+/* The same as a copy. */
+static inline char *take_text(cursor *c, const vgi_payload *p, int *r, vg_err *e)
 {
-    for (size_t i = 0; i < n; i++, q += 4) {
-        double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-        if (!(square >= 1 - 2e-6 && square <= 1 + 2e-6)) return false;
-    }
-    return true;
+    size_t n;
+    const char *s = peek_text(c, &n, p, r, e);
+    char *copy = s ? vgi_copy_string(s, n, e) : NULL;
+    if (s && !copy) *r = VG_ENOMEM;
+    return copy;
 }
 
 #endif

@@ -1,4 +1,4 @@
-/* payload.h: the typed contents of records (fmt/STREAM.md, section 3): each has a _decode into a head or frame, which
+/* payload.h: the contents of FORM, frames and FAIL (fmt/STREAM.md, section 3): each has a _decode into a head or frame, which
  * checks everything, and an _encode that appends to bytes. `where` is how messages call the record.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_PAYLOAD_H
@@ -12,18 +12,8 @@ typedef struct vgi_payload {
     const char *where;
 } vgi_payload;
 
-typedef int vgi_decoder(const vgi_payload *p, vg_head *h, vg_err *e);
-vgi_decoder vgi_prov_decode, vgi_mesh_decode, vgi_texc_decode, vgi_labl_decode, vgi_sele_decode, vgi_link_decode,
-    vgi_anch_decode, vgi_refp_decode, vgi_form_decode, vgi_skel_decode, vgi_corr_decode, vgi_ptch_decode,
-    vgi_rig_decode, vgi_map_decode;
-
-int vgi_prov_encode(vg_bytes *b, const vg_provenance *p, vg_err *e) VG_MUST_CHECK;
-/* The others append what the head says of their kind. */
-typedef int vgi_encoder(vg_bytes *b, const vg_head *h, vg_err *e);
-vgi_encoder vgi_mesh_encode, vgi_texc_encode, vgi_labl_encode, vgi_sele_encode, vgi_link_encode, vgi_anch_encode,
-    vgi_refp_encode, vgi_form_encode, vgi_skel_encode, vgi_corr_encode, vgi_ptch_encode, vgi_rig_encode,
-    vgi_map_encode;
-int vgi_indices_encode(vg_bytes *b, const uint32_t *x, size_t n, vg_err *e) VG_MUST_CHECK;
+int vgi_form_decode(const vgi_payload *p, vg_head *h, vg_err *e) VG_MUST_CHECK;
+int vgi_form_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 
 /* vgi_fram_decode: f->raw holds the payload. On a little-endian machine binary64 values are used where they lie. */
 int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e) VG_MUST_CHECK;

@@ -4,8 +4,7 @@
 #include "io/cursor.h"
 #include "model/frame.h"
 
-/* Text of n bytes that lies in the payload; NULL when it is not there or no UTF-8. */
-static const char *peek_text(cursor *c, size_t n)
+static const char *text_of(cursor *c, size_t n)
 {
     const char *s = (const char *)take(c, n);
     return s && vgi_is_utf8(s, n) ? s : NULL;
@@ -23,7 +22,7 @@ int vgi_scal_decode(const vgi_payload *p, const vg_head *h, vg_frame *f, vg_err 
     if (name_bytes == 0) return wrong(p, "it has no name", e);
     if (name_bytes > left(&c) || unit_bytes > left(&c) - name_bytes)
         return wrong(p, "a text is longer than its record", e);
-    const char *name = peek_text(&c, name_bytes), *unit = peek_text(&c, unit_bytes);
+    const char *name = text_of(&c, name_bytes), *unit = text_of(&c, unit_bytes);
     if (!name || !unit) return wrong(p, "a text is no UTF-8", e);
     if (!take_padding(&c, -(name_bytes + unit_bytes) & 7)) return wrong(p, "padding is missing or not zero", e);
     const unsigned char *numbers = take_array(&c, nv, h->precision);

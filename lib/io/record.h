@@ -4,8 +4,7 @@
 #define VG_RECORD_H
 
 #include "io/io.h"
-
-enum { VGI_CRITICAL = 1u, VGI_COPY_SAFE = 2u };
+#include "model/artefact.h"
 
 /* What both directions keep count of. */
 typedef struct vgi_tally {
@@ -19,8 +18,7 @@ void vgi_tally_clear(vgi_tally *t);
 /* vgi_record_begin_read: check the file header. */
 int vgi_record_begin_read(vgi_input *in, vg_err *e) VG_MUST_CHECK;
 /* vgi_record_read: the next record into *r (its payload buffer is reused). 1: a record; 0: the END mark, checked,
- * with nothing behind it. `subject` for messages. *expect: when not 0 and the tag is FRAM,
- * the only length that is right. */
+ * with nothing behind it. */
 int vgi_record_read(vgi_input *in, vgi_tally *t, vg_record *r, vg_err *e) VG_MUST_CHECK;
 
 int vgi_record_begin_write(int fd, const char *name, vg_err *e) VG_MUST_CHECK;

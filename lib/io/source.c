@@ -678,16 +678,23 @@ void vg_source_close(vg_source **source)
     *source = NULL;
 }
 
-int vg_load_mesh(vg_head *h, const char *operand, vg_err *e)
+int vg_load(vg_head *h, const char *operand, const char *what, vg_err *e)
 {
     vg_source *s;
+    char subject[420];
     *h = (vg_head){0};
     int r = open_source(&s, &operand, 1, NULL, true, e);
     if (r < 0) return r;
     vg_head *from = vg_source_head(s);
-    if (from->body.mesh.nv == 0 || !from->body.reference) r = vg_fail(e, VG_EINPUT, "'%s' holds no mesh", operand);
-    else if (s->through) r = vg_head_copy(h, from, e);
-    else *h = *from, *from = (vg_head){0};
+    snprintf(subject, sizeof subject, "'%.400s'", operand);
+    r = vg_head_need(from, what, subject, e);
+    if (r == VG_OK && s->through) r = vg_head_copy(h, from, e);
+    else if (r == VG_OK) *h = *from, *from = (vg_head){0};
     vg_source_close(&s);
     return r;
+}
+
+int vg_load_mesh(vg_head *h, const char *operand, vg_err *e)
+{
+    return vg_load(h, operand, "mesh", e);
 }

@@ -1,35 +1,11 @@
 /* stream.c: reader and writer of whole streams: which records may stand where, what is passed on, what stops.
  * Leaves out bytes of records (record.c) and of their contents (payload.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/artefact_io.h"
 #include "io/payload.h"
 #include "io/record.h"
 
 #include <stdlib.h>
-
-/* The header records, in the order they are written. */
-enum { PROV, MESH, TEXC, LABL, SELE, LINK, ANCH, REFP, SKEL, CORR, PTCH, RIG, MAP, FORM, KNOWN };
-static const struct {
-    const char *tag;
-    uint32_t flags;
-    vgi_decoder *decode;
-    vgi_encoder *encode; /* NULL: one record for each of several */
-    bool repeats, needs_mesh;
-} known[KNOWN] = {
-    [PROV] = {"PROV", VGI_COPY_SAFE, vgi_prov_decode, NULL, true, false},
-    [MESH] = {"MESH", VGI_CRITICAL, vgi_mesh_decode, vgi_mesh_encode, false, false},
-    [TEXC] = {"TEXC", 0, vgi_texc_decode, vgi_texc_encode, false, true},
-    [LABL] = {"LABL", 0, vgi_labl_decode, vgi_labl_encode, false, true},
-    [SELE] = {"SELE", VGI_CRITICAL, vgi_sele_decode, vgi_sele_encode, false, true},
-    [LINK] = {"LINK", VGI_CRITICAL, vgi_link_decode, vgi_link_encode, false, true},
-    [ANCH] = {"ANCH", VGI_CRITICAL, vgi_anch_decode, vgi_anch_encode, false, true},
-    [REFP] = {"REFP", VGI_CRITICAL, vgi_refp_decode, vgi_refp_encode, false, true},
-    [SKEL] = {"SKEL", 0, vgi_skel_decode, vgi_skel_encode, false, true},
-    [CORR] = {"CORR", VGI_CRITICAL, vgi_corr_decode, vgi_corr_encode, false, false},
-    [PTCH] = {"PTCH", 0, vgi_ptch_decode, vgi_ptch_encode, false, true},
-    [RIG] = {"RIG ", 0, vgi_rig_decode, vgi_rig_encode, false, true},
-    [MAP] = {"MAP ", VGI_CRITICAL, vgi_map_decode, vgi_map_encode, false, true},
-    [FORM] = {"FORM", VGI_CRITICAL, vgi_form_decode, vgi_form_encode, false, false},
-};
 
 /* ---- reader ---- */
 
@@ -37,7 +13,7 @@ struct vg_reader {
     vgi_input *in;
     vgi_tally tally;
     vg_head head;
-    bool seen[KNOWN];
+    bool seen[VGI_ARTEFACTS], formed; /* header records; FORM */
     vg_head form; /* kind, precision, counts of the frames as they come (no arrays): the caller may change `head` */
     vg_records tail;
     uint64_t frames;
@@ -70,13 +46,6 @@ static int keep_unknown(vg_reader *r, vg_record *record, vg_records *list, vg_er
     return VG_OK;
 }
 
-static int find_known(const char *tag)
-{
-    for (int i = 0; i < KNOWN; i++)
-        if (!strcmp(tag, known[i].tag)) return i;
-    return -1;
-}
-
 static int stopped_by_failure(vg_reader *r, const vg_record *record, vg_err *e)
 {
     char where[200];
@@ -86,22 +55,37 @@ static int stopped_by_failure(vg_reader *r, const vg_record *record, vg_err *e)
     return vgi_fail_decode(&r->failure, &p, vgi_input_name(r->in), e);
 }
 
+static bool seen(const vg_reader *r, const vgi_artefact *t)
+{
+    return r->seen[t - vgi_artefacts];
+}
+
+static int read_known(vg_reader *r, const vgi_artefact *t, const vgi_payload *p, vg_err *e)
+{
+    const char *name = vgi_input_name(r->in);
+    if (seen(r, t) && !t->each) return vg_fail(e, VG_EINPUT, "'%s' has two %s records", name, t->tag);
+    if (t->needs && !seen(r, vgi_artefact_by_tag(t->needs)))
+        return vg_fail(e, VG_EINPUT, "'%s': record %s must come after %s", name, t->tag, t->needs);
+    r->seen[t - vgi_artefacts] = true;
+    return vgi_artefact_decode(t, p, &r->head, e);
+}
+
 static int read_head_record(vg_reader *r, vg_record *record, vg_err *e)
 {
     const char *name = vgi_input_name(r->in);
-    int i = find_known(record->tag);
-    if (!strcmp(record->tag, "FAIL")) return stopped_by_failure(r, record, e);
-    if (!strcmp(record->tag, "FRAM")) return vg_fail(e, VG_EINPUT, "'%s' has a frame before its FORM record", name);
-    if (!strcmp(record->tag, "SCAL")) return vg_fail(e, VG_EINPUT, "'%s': record SCAL must come after FORM", name);
-    if (i < 0) return keep_unknown(r, record, &r->head.extra, e);
-    if (r->seen[i] && !known[i].repeats) return vg_fail(e, VG_EINPUT, "'%s' has two %s records", name, record->tag);
-    if (known[i].needs_mesh && !r->seen[MESH])
-        return vg_fail(e, VG_EINPUT, "'%s': record %s must come after MESH", name, record->tag);
-    r->seen[i] = true;
     char where[200];
     snprintf(where, sizeof where, "'%.150s': record %s", name, record->tag);
     vgi_payload p = {record->payload.data, record->payload.size, where};
-    return known[i].decode(&p, &r->head, e);
+    const vgi_artefact *t = vgi_artefact_by_tag(record->tag);
+    if (t) return read_known(r, t, &p, e);
+    if (!strcmp(record->tag, "FORM")) {
+        r->formed = true;
+        return vgi_form_decode(&p, &r->head, e);
+    }
+    if (!strcmp(record->tag, "FAIL")) return stopped_by_failure(r, record, e);
+    if (!strcmp(record->tag, "FRAM")) return vg_fail(e, VG_EINPUT, "'%s' has a frame before its FORM record", name);
+    if (!strcmp(record->tag, "SCAL")) return vg_fail(e, VG_EINPUT, "'%s': record SCAL must come after FORM", name);
+    return keep_unknown(r, record, &r->head.extra, e);
 }
 
 static int read_head(vg_reader *r, vg_err *e)
@@ -109,14 +93,14 @@ static int read_head(vg_reader *r, vg_err *e)
     int ok = vgi_tally_init(&r->tally, e);
     if (ok == VG_OK) ok = vgi_record_begin_read(r->in, e);
     vg_record record = {.payload = {0}};
-    while (ok == VG_OK && !r->seen[FORM]) {
+    while (ok == VG_OK && !r->formed) {
         ok = vgi_record_read(r->in, &r->tally, &record, e);
         if (ok == 0) ok = vg_fail(e, VG_EINPUT, "'%s' has no FORM record", vgi_input_name(r->in));
         else if (ok > 0) ok = read_head_record(r, &record, e);
     }
     vg_bytes_clear(&record.payload);
     if (ok < 0) return ok;
-    if (r->seen[MESH] && !r->head.body.reference)
+    if (r->seen[VGI_MESH] && !r->head.body.reference)
         return vg_fail(e, VG_EINPUT, "'%s' has a MESH but no REFP record before FORM", vgi_input_name(r->in));
     if (!r->head.body.reference_name && !(r->head.body.reference_name = vgi_copy_string("", 0, e))) return VG_ENOMEM;
     remember_form(r);
@@ -181,9 +165,9 @@ int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
         if (!strcmp(record.tag, "FRAM")) break;
         if (!strcmp(record.tag, "FAIL")) ok = stopped_by_failure(r, &record, e);
         else if (!strcmp(record.tag, "SCAL")) ok = read_scalars(r, &record, f, e);
-        else if (find_known(record.tag) == FORM)
+        else if (!strcmp(record.tag, "FORM"))
             ok = vg_fail(e, VG_EINPUT, "'%s' has two FORM records", vgi_input_name(r->in));
-        else if (find_known(record.tag) >= 0)
+        else if (vgi_artefact_by_tag(record.tag))
             ok = vg_fail(e, VG_EINPUT, "'%s': record %s must come before FORM", vgi_input_name(r->in), record.tag);
         else ok = keep_unknown(r, &record, &before, e);
         if (ok < 0) break;
@@ -246,44 +230,26 @@ static int write_extra(vg_writer *w, const vg_records *list, vg_err *e)
     return r;
 }
 
-static int write_provenance(vg_writer *w, vg_err *e)
+static int write_artefacts(vg_writer *w, const vgi_artefact *t, vg_err *e)
 {
+    size_t n = vgi_artefact_count(t, w->head);
     int r = VG_OK;
-    for (size_t i = 0; r == VG_OK && i < w->head->nprovenance; i++) {
+    for (size_t i = 0; r == VG_OK && i < n; i++) {
         w->front.size = 0;
-        r = vgi_prov_encode(&w->front, &w->head->provenance[i], e);
-        if (r == VG_OK) r = write_record(w, known[PROV].tag, known[PROV].flags, &w->front, e);
+        r = vgi_artefact_encode(t, &w->front, w->head, i, e);
+        if (r == VG_OK) r = write_record(w, t->tag, t->flags, &w->front, e);
     }
     return r;
 }
 
 static int write_head(vg_writer *w, vg_err *e)
 {
-    const vg_head *h = w->head;
-    const bool mesh = h->body.reference != NULL;
-    const bool present[KNOWN] = {[MESH] = mesh,
-                                 [TEXC] = mesh && h->body.attributes.ntex > 0,
-                                 [LABL] = mesh && h->body.attributes.nlabels > 0,
-                                 [SELE] = mesh && h->has_selection,
-                                 [LINK] = mesh && h->has_links,
-                                 [ANCH] = mesh && h->nanchors > 0,
-                                 [REFP] = mesh,
-                                 [SKEL] = mesh && h->body.skeleton.njoints > 0,
-                                 [CORR] = h->correspondence.first != NULL,
-                                 [PTCH] = mesh && h->body.patches.n > 0,
-                                 [RIG] = mesh && h->body.rig.skeleton.njoints > 0,
-                                 [MAP] = mesh && h->map.n > 0,
-                                 [FORM] = true};
     int r = vgi_record_begin_write(w->fd, w->name, e);
-    if (r == VG_OK) r = write_provenance(w, e);
-    for (int i = 0; r == VG_OK && i < KNOWN; i++) {
-        if (!present[i]) continue;
-        if (i == FORM) r = write_extra(w, &h->extra, e);
-        w->front.size = 0;
-        if (r == VG_OK) r = known[i].encode(&w->front, h, e);
-        if (r == VG_OK) r = write_record(w, known[i].tag, known[i].flags, &w->front, e);
-    }
-    return r;
+    for (int i = 0; r == VG_OK && i < VGI_ARTEFACTS; i++) r = write_artefacts(w, &vgi_artefacts[i], e);
+    if (r == VG_OK) r = write_extra(w, &w->head->extra, e);
+    w->front.size = 0;
+    if (r == VG_OK) r = vgi_form_encode(&w->front, w->head, e);
+    return r < 0 ? r : write_record(w, "FORM", VGI_CRITICAL, &w->front, e);
 }
 
 int vg_writer_open(vg_writer **out, int fd, const char *name, const vg_head *h, vg_err *e)

@@ -1,169 +1,80 @@
 /* head.c: what is known of a sequence before its frames, and the frame itself: making, copying, releasing.
  * Leaves out how either is written down (io) and what is computed from it (method).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "model/artefact.h"
 #include "model/frame.h"
-#include "model/map.h"
 
 #include <stdlib.h>
 
+/* ---- by the table of records ---- */
+
+static void clear_parts(void *of, const int *entries, size_t n)
+{
+    for (size_t i = 0; i < n; i++) vgi_fields_clear(&vgi_artefacts[entries[i]], of);
+}
+
+/* *to is zeroed first and left so on failure. */
+static int copy_parts(void *to, const void *from, size_t size, const int *entries, size_t n, const vg_mesh *mesh,
+                      vg_err *e)
+{
+    memset(to, 0, size);
+    int r = VG_OK;
+    for (size_t i = 0; r == VG_OK && i < n; i++) r = vgi_fields_copy(&vgi_artefacts[entries[i]], to, from, mesh, e);
+    if (r < 0) clear_parts(to, entries, n), memset(to, 0, size);
+    return r;
+}
+
+static const int attributes_parts[] = {VGI_TEXC, VGI_LABL}, rig_parts[] = {VGI_RIG, VGI_SKIN};
+
 void vg_attributes_clear(vg_attributes *a)
 {
-    free(a->tex);
-    free(a->corner_tex);
-    for (size_t i = 0; i < a->nlabels; i++) free(a->labels[i].text);
-    free(a->labels);
-    *a = (vg_attributes){0};
+    clear_parts(a, attributes_parts, 2);
 }
 
 int vg_attributes_copy(vg_attributes *to, const vg_attributes *from, const vg_mesh *mesh, vg_err *e)
 {
-    *to = (vg_attributes){.ntex = from->ntex, .tex_dim = from->tex_dim};
-    if (from->ntex) {
-        to->tex = vgi_copy_array(from->tex, from->ntex * from->tex_dim, sizeof *to->tex, e);
-        to->corner_tex = vgi_copy_array(from->corner_tex, vg_mesh_corners(mesh), sizeof *to->corner_tex, e);
-        if (!to->tex || !to->corner_tex) goto failed;
-    }
-    if (from->nlabels && !(to->labels = vgi_array(from->nlabels, sizeof *to->labels, e))) goto failed;
-    for (; to->nlabels < from->nlabels; to->nlabels++) {
-        const vg_label *l = &from->labels[to->nlabels];
-        char *text = vgi_copy_string(l->text, strlen(l->text), e);
-        if (!text) goto failed;
-        to->labels[to->nlabels] = (vg_label){.face = l->face, .kind = l->kind, .text = text};
-    }
-    return VG_OK;
-failed:
-    vg_attributes_clear(to);
-    return VG_ENOMEM;
+    return copy_parts(to, from, sizeof *to, attributes_parts, 2, mesh, e);
 }
 
 void vg_skeleton_clear(vg_skeleton *s)
 {
-    for (size_t i = 0; i < s->njoints; i++) free(s->joints[i].name);
-    free(s->joints);
-    *s = (vg_skeleton){0};
+    vgi_fields_clear(&vgi_artefacts[VGI_SKEL], s);
 }
 
 int vg_skeleton_copy(vg_skeleton *to, const vg_skeleton *from, vg_err *e)
 {
-    *to = (vg_skeleton){0};
-    if (!(to->joints = vgi_array(from->njoints, sizeof *to->joints, e))) return VG_ENOMEM;
-    for (; to->njoints < from->njoints; to->njoints++) {
-        const vg_joint *j = &from->joints[to->njoints];
-        char *name = vgi_copy_string(j->name, strlen(j->name), e);
-        if (!name) {
-            vg_skeleton_clear(to);
-            return VG_ENOMEM;
-        }
-        to->joints[to->njoints] = *j;
-        to->joints[to->njoints].name = name;
-    }
-    return VG_OK;
+    return vgi_fields_copy(&vgi_artefacts[VGI_SKEL], to, from, NULL, e);
 }
 
 void vg_correspondence_clear(vg_correspondence *c)
 {
-    free(c->first);
-    free(c->source);
-    free(c->weight);
-    free(c->distance);
-    free(c->matched);
-    *c = (vg_correspondence){0};
+    vgi_fields_clear(&vgi_artefacts[VGI_CORR], c);
 }
 
 int vg_correspondence_copy(vg_correspondence *to, const vg_correspondence *from, vg_err *e)
 {
-    *to = *from;
-    to->first = NULL, to->source = NULL, to->weight = NULL, to->distance = NULL, to->matched = NULL;
-    if (!from->first) return VG_OK;
-    size_t nf = from->target_nf, pairs = from->first[nf];
-    to->first = vgi_copy_array(from->first, nf + 1, sizeof *to->first, e);
-    to->source = vgi_copy_array(from->source, pairs, sizeof *to->source, e);
-    to->weight = vgi_copy_array(from->weight, pairs, sizeof *to->weight, e);
-    to->distance = vgi_copy_array(from->distance, nf, sizeof *to->distance, e);
-    to->matched = vgi_copy_array(from->matched, nf, sizeof *to->matched, e);
-    if (to->first && to->source && to->weight && to->distance && to->matched) return VG_OK;
-    vg_correspondence_clear(to);
-    return VG_ENOMEM;
+    return vgi_fields_copy(&vgi_artefacts[VGI_CORR], to, from, NULL, e);
 }
 
 void vg_patches_clear(vg_patches *p)
 {
-    free(p->of_face);
-    *p = (vg_patches){0};
+    vgi_fields_clear(&vgi_artefacts[VGI_PTCH], p);
 }
 
-static int copy_patches(vg_patches *to, const vg_patches *from, size_t nf, vg_err *e)
+void vg_rig_clear(vg_rig *r)
 {
-    *to = (vg_patches){0};
-    if (!from->n) return VG_OK;
-    if (!(to->of_face = vgi_copy_array(from->of_face, nf, sizeof *to->of_face, e))) return VG_ENOMEM;
-    to->n = from->n;
-    return VG_OK;
+    clear_parts(r, rig_parts, 2);
 }
 
-size_t vgi_map_arrays(vg_map *m, vgi_map_array list[VGI_MAP_ARRAYS])
+int vg_rig_copy(vg_rig *to, const vg_rig *from, size_t nv, vg_err *e)
 {
-    bool bones = m->kind == VG_MAP_BONES;
-    size_t placed = bones ? 0 : m->nheld;
-    const vgi_map_array all[VGI_MAP_ARRAYS] = {
-        {(void **)&m->weights, m->nv, 4, true, true},
-        {(void **)&m->place, m->n, 3, true, true},
-        {(void **)&m->centre, m->n, 3, false, true},
-        {(void **)&m->home_centre, m->n, 3, false, true},
-        {(void **)&m->share, m->n, 1, false, true},
-        {(void **)&m->home, m->has_home ? m->nv : 0, 3, false, true},
-        {(void **)&m->joint_at, m->njoints, 3, false, true},
-        {(void **)&m->joint_weight, m->njoints, 1, false, true},
-        {(void **)&m->corner, m->ncorners, 4 * m->per_corner, false, true},
-        {(void **)&m->held_at, placed, 3, false, true},
-        {(void **)&m->joint, m->njoints, 2, false, false},
-        {(void **)&m->held, m->nheld, 1, false, false},
-        {(void **)&m->held_patch, placed, 1, false, false},
-        {(void **)&m->corner_bone, bones ? m->ncorners : 0, m->per_corner, false, false}};
-    memcpy(list, all, sizeof all);
-    return VGI_MAP_ARRAYS;
-}
-
-size_t vgi_map_array_length(const vg_map *m, const vgi_map_array *a)
-{
-    size_t n;
-    if (!vgi_mul(a->count, a->width, &n) || (a->per_transform && !vgi_mul(n, m->n, &n))) return SIZE_MAX;
-    return n;
+    vg_mesh counts = {.nv = nv};
+    return copy_parts(to, from, sizeof *to, rig_parts, 2, &counts, e);
 }
 
 void vg_map_clear(vg_map *m)
 {
-    vgi_map_array list[VGI_MAP_ARRAYS];
-    size_t n = vgi_map_arrays(m, list);
-    for (size_t i = 0; i < n; i++) free(*list[i].at);
-    for (size_t i = 0; i < m->nnames; i++) free(m->names[i]);
-    free(m->names);
-    *m = (vg_map){0};
-}
-
-static int copy_map(vg_map *to, const vg_map *from, vg_err *e)
-{
-    vg_map source = *from;
-    vgi_map_array a[VGI_MAP_ARRAYS], b[VGI_MAP_ARRAYS];
-    *to = *from;
-    to->nnames = 0, to->names = NULL;
-    size_t n = vgi_map_arrays(&source, a);
-    vgi_map_arrays(to, b);
-    for (size_t i = 0; i < n; i++) *b[i].at = NULL;
-    if (!from->n) return VG_OK;
-    bool ok = true;
-    for (size_t i = 0; ok && i < n; i++) {
-        if (*a[i].at)
-            ok = (*b[i].at = vgi_copy_array(*a[i].at, vgi_map_array_length(from, &a[i]),
-                                            a[i].real ? sizeof(double) : sizeof(uint32_t), e));
-    }
-    if (ok && from->nnames) ok = (to->names = vgi_array(from->nnames, sizeof *to->names, e));
-    for (; ok && to->nnames < from->nnames; to->nnames++)
-        if (!(to->names[to->nnames] = vgi_copy_string(from->names[to->nnames], strlen(from->names[to->nnames]), e)))
-            ok = false;
-    if (ok) return VG_OK;
-    vg_map_clear(to);
-    return VG_ENOMEM;
+    vgi_fields_clear(&vgi_artefacts[VGI_MAP], m);
 }
 
 void vg_records_clear(vg_records *r)
@@ -213,12 +124,7 @@ const char *vg_kind_name(vg_kind k)
 
 static void clear_provenance(vg_provenance *p)
 {
-    free(p->program);
-    free(p->version);
-    for (size_t i = 0; i < p->nargs; i++) free(p->args[i]);
-    free(p->args);
-    free(p->parents);
-    *p = (vg_provenance){0};
+    vgi_fields_clear(&vgi_artefacts[VGI_PROV], p);
 }
 
 /* A copy of s in which bytes that are not part of valid UTF-8 stand as '?'. */
@@ -255,10 +161,10 @@ static int fill_provenance(vg_provenance *p, const char *program, const char *ve
 
 static int append_provenance(vg_head *h, vg_provenance *p, vg_err *e)
 {
-    size_t cap = h->nprovenance;
-    int r = vgi_grow(&h->provenance, &cap, h->nprovenance + 1, sizeof *p, e);
+    void *place;
+    int r = vgi_artefact_append(&vgi_artefacts[VGI_PROV], h, &place, e);
     if (r < 0) clear_provenance(p);
-    else h->provenance[h->nprovenance++] = *p;
+    else memcpy(place, p, sizeof *p);
     return r;
 }
 
@@ -289,11 +195,10 @@ int vg_head_merge_trace(vg_head *h, const vg_head *other, vg_err *e)
 {
     size_t base = h->nprovenance;
     for (size_t i = 0; i < other->nprovenance; i++) {
-        const vg_provenance *from = &other->provenance[i];
         vg_provenance p;
-        int r = fill_provenance(&p, from->program, from->version, from->nargs, from->args, from->nparents, e);
+        int r = vgi_fields_copy(&vgi_artefacts[VGI_PROV], &p, &other->provenance[i], NULL, e);
         if (r < 0) return r;
-        for (size_t k = 0; k < from->nparents; k++) p.parents[k] = from->parents[k] + (uint32_t)base;
+        for (size_t k = 0; k < p.nparents; k++) p.parents[k] += (uint32_t)base;
         if ((r = append_provenance(h, &p, e)) < 0) return r;
     }
     return VG_OK;
@@ -301,33 +206,29 @@ int vg_head_merge_trace(vg_head *h, const vg_head *other, vg_err *e)
 
 /* ---- body ---- */
 
+static void *in_body(const vgi_artefact *t, const vg_body *b)
+{
+    return (char *)(uintptr_t)b + t->at;
+}
+
 void vg_body_clear(vg_body *b)
 {
-    vg_mesh_clear(&b->mesh);
-    free(b->reference);
-    free(b->reference_name);
-    vg_attributes_clear(&b->attributes);
-    vg_skeleton_clear(&b->skeleton);
-    vg_patches_clear(&b->patches);
-    vg_rig_clear(&b->rig);
+    for (size_t i = 0; i < VGI_ARTEFACTS; i++)
+        if (vgi_artefacts[i].in_body) vgi_fields_clear(&vgi_artefacts[i], in_body(&vgi_artefacts[i], b));
     *b = (vg_body){0};
 }
 
 int vg_body_copy(vg_body *to, const vg_body *from, vg_err *e)
 {
     *to = (vg_body){0};
-    const char *name = from->reference_name ? from->reference_name : "";
-    bool ok = vg_mesh_copy(&to->mesh, &from->mesh, e) == VG_OK &&
-              vg_attributes_copy(&to->attributes, &from->attributes, &from->mesh, e) == VG_OK &&
-              vg_skeleton_copy(&to->skeleton, &from->skeleton, e) == VG_OK &&
-              copy_patches(&to->patches, &from->patches, from->mesh.nf, e) == VG_OK &&
-              vg_rig_copy(&to->rig, &from->rig, from->mesh.nv, e) == VG_OK &&
-              (to->reference_name = vgi_copy_string(name, strlen(name), e));
-    if (ok && from->reference)
-        ok = (to->reference = vgi_copy_array(from->reference, 3 * from->mesh.nv, sizeof *to->reference, e));
-    if (ok) return VG_OK;
-    vg_body_clear(to);
-    return VG_ENOMEM;
+    int r = VG_OK;
+    for (size_t i = 0; r == VG_OK && i < VGI_ARTEFACTS; i++) {
+        const vgi_artefact *t = &vgi_artefacts[i];
+        if (t->in_body) r = vgi_fields_copy(t, in_body(t, to), in_body(t, from), &from->mesh, e);
+    }
+    if (r == VG_OK && !to->reference_name && !(to->reference_name = vgi_copy_string("", 0, e))) r = VG_ENOMEM;
+    if (r < 0) vg_body_clear(to);
+    return r;
 }
 
 void vg_body_take(vg_body *to, vg_body *from)
@@ -342,12 +243,12 @@ void vg_body_take(vg_body *to, vg_body *from)
 void vg_head_clear(vg_head *h)
 {
     vg_body_clear(&h->body);
-    vg_correspondence_clear(&h->correspondence);
-    vg_map_clear(&h->map);
-    free(h->selected);
-    free(h->links);
-    free(h->anchors);
-    for (size_t i = 0; i < h->nprovenance; i++) clear_provenance(&h->provenance[i]);
+    for (size_t i = 0; i < VGI_ARTEFACTS; i++) {
+        const vgi_artefact *t = &vgi_artefacts[i];
+        if (t->in_body) continue;
+        size_t n = t->each ? vgi_artefact_count(t, h) : 1;
+        for (size_t k = 0; k < n; k++) vgi_fields_clear(t, vgi_artefact_in(t, h, k));
+    }
     free(h->provenance);
     vg_records_clear(&h->extra);
     *h = (vg_head){0};
@@ -357,19 +258,25 @@ int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e)
 {
     *to = (vg_head){.has_selection = from->has_selection, .has_links = from->has_links, .kind = from->kind,
                     .precision = from->precision, .count = from->count};
-    bool ok = vg_body_copy(&to->body, &from->body, e) == VG_OK &&
-              vg_correspondence_copy(&to->correspondence, &from->correspondence, e) == VG_OK &&
-              copy_map(&to->map, &from->map, e) == VG_OK;
-    if (ok && (ok = (to->selected = vgi_copy_array(from->selected, from->nselected, sizeof *to->selected, e))))
-        to->nselected = from->nselected;
-    if (ok && (ok = (to->links = vgi_copy_array(from->links, 2 * from->nlinks, sizeof *to->links, e))))
-        to->nlinks = from->nlinks;
-    if (ok && (ok = (to->anchors = vgi_copy_array(from->anchors, from->nanchors, sizeof *to->anchors, e))))
-        to->nanchors = from->nanchors;
-    ok = ok && vg_head_merge_trace(to, from, e) == VG_OK && copy_records(&to->extra, &from->extra, e) == VG_OK;
-    if (ok) return VG_OK;
-    vg_head_clear(to);
-    return VG_ENOMEM;
+    int r = vg_body_copy(&to->body, &from->body, e);
+    for (size_t i = 0; r == VG_OK && i < VGI_ARTEFACTS; i++) {
+        const vgi_artefact *t = &vgi_artefacts[i];
+        if (t->in_body || t->each) continue;
+        r = vgi_fields_copy(t, vgi_artefact_in(t, to, 0), vgi_artefact_in(t, from, 0), &from->body.mesh, e);
+    }
+    if (r == VG_OK) r = vg_head_merge_trace(to, from, e);
+    if (r == VG_OK) r = copy_records(&to->extra, &from->extra, e);
+    if (r < 0) vg_head_clear(to);
+    return r;
+}
+
+int vg_head_need(const vg_head *h, const char *what, const char *subject, vg_err *e)
+{
+    const vgi_artefact *t = vgi_artefact_by_name(what);
+    if (!t) return vg_fail(e, VG_EARG, "there is no such thing as a '%s' in a stream", what);
+    bool empty = t == &vgi_artefacts[VGI_MESH] && !h->body.mesh.nv;
+    if (vgi_artefact_count(t, h) && !empty) return VG_OK;
+    return vg_fail(e, VG_EINPUT, "%s holds no %s%s%s", subject, what, t->advice ? ": " : "", t->advice ? t->advice : "");
 }
 
 /* ---- frame ---- */

@@ -7,17 +7,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-void vg_rig_clear(vg_rig *r)
-{
-    vg_skeleton_clear(&r->skeleton);
-    free(r->at);
-    free(r->turn);
-    free(r->bone);
-    free(r->skin_bone);
-    free(r->skin_weight);
-    *r = (vg_rig){0};
-}
-
 int vg_rig_make(vg_rig *r, const vg_skeleton *s, const double *positions, const double *turns, vg_err *e)
 {
     *r = (vg_rig){0};
@@ -34,19 +23,6 @@ int vg_rig_make(vg_rig *r, const vg_skeleton *s, const double *positions, const 
     for (size_t j = 0; j < s->njoints; j++)
         if (s->joints[j].nchannels > 0) r->bone[r->nbones++] = (uint32_t)j;
     return VG_OK;
-}
-
-int vg_rig_copy(vg_rig *to, const vg_rig *from, size_t nv, vg_err *e)
-{
-    *to = (vg_rig){0};
-    if (!from->skeleton.njoints) return VG_OK;
-    int r = vg_rig_make(to, &from->skeleton, from->at, from->turn, e);
-    if (r < 0 || !from->skin_bone) return r;
-    to->skin_bone = vgi_copy_array(from->skin_bone, VG_SKIN * nv, sizeof *to->skin_bone, e);
-    to->skin_weight = vgi_copy_array(from->skin_weight, VG_SKIN * nv, sizeof *to->skin_weight, e);
-    if (to->skin_bone && to->skin_weight) return VG_OK;
-    vg_rig_clear(to);
-    return VG_ENOMEM;
 }
 
 void vgi_rig_movers(const vg_rig *r, uint32_t *mover)

@@ -125,6 +125,10 @@ typedef struct vg_head {
 void vg_head_clear(vg_head *h);
 int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e) VG_MUST_CHECK;
 
+/* vg_head_need: VG_OK when h holds `what`: "mesh", "skeleton", "correspondence", "patches", "rig", "map"; else
+ * VG_EINPUT: "<subject> holds no map: make one with vg-fitmap". */
+int vg_head_need(const vg_head *h, const char *what, const char *subject, vg_err *e) VG_MUST_CHECK;
+
 /* vg_head_trace: append the record of this process. Its parents are the records that no other names as a parent: the
  * last of the stream's own, and of every one that vg_head_merge_trace has put before it. argv is argc strings; bytes
  * that are no UTF-8 become '?'. */

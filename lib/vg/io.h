@@ -70,9 +70,11 @@ vg_records *vg_source_tail(vg_source *s);
 const vg_failure *vg_source_failure(const vg_source *s); /* as vg_reader_failure */
 void vg_source_close(vg_source **s);
 
-/* vg_load_mesh: the mesh behind one operand, as a head whose reference is the operand's reference pose (for a mesh
- * file its only pose, for BVH the one without rotations; for a stream its reference; for an archive or directory the
- * first pose). The rest is not read. */
+/* vg_load: the head behind one operand, which must hold `what` (vg_head_need); VG_EINPUT with the operand's name
+ * otherwise. The reference is the operand's reference pose (for a mesh file its only pose, for BVH the one without
+ * rotations; for a stream its reference; for an archive or directory the first pose). Frames are not read. */
+int vg_load(vg_head *h, const char *operand, const char *what, vg_err *e) VG_MUST_CHECK;
+/* vg_load_mesh: vg_load of a "mesh". */
 int vg_load_mesh(vg_head *h, const char *operand, vg_err *e) VG_MUST_CHECK;
 
 /* Frames that wait, first in, first out: in memory up to a limit,

@@ -683,6 +683,7 @@ static void test_order(void)
     vg_bytes b = written(&c);
     parts p = take_apart(&b);
     int n = (int)p.n - 1, order[MOST + 2], form = find(&p, "FORM"), mesh = find(&p, "MESH");
+    int rig = find(&p, "RIG ");
     char what[80];
     for (int i = 0; i < n; i++) {
         char tag[5];
@@ -705,7 +706,7 @@ static void test_order(void)
         vg_bytes_clear(&x);
         /* left out: SELE and LINK change how many corners there are, ANCH the size of a frame */
         bool may_miss = again || !strcmp(tag, "TEXC") || !strcmp(tag, "LABL") || !strcmp(tag, "SKEL") ||
-                        !strcmp(tag, "CORR") || !strcmp(tag, "RIG ");
+                        !strcmp(tag, "CORR") || !strcmp(tag, "SKIN"); /* RIG: SKIN needs it */
         if (!strcmp(tag, "PROV")) may_miss = i != 0; /* the second names the first as its parent */
         k = 0;
         for (int j = 0; j < n; j++)
@@ -717,7 +718,7 @@ static void test_order(void)
         else refuse(x.data, x.size, VG_EINPUT, what);
         vg_bytes_clear(&x);
         /* before MESH, and behind FORM */
-        bool needs_mesh = strstr("TEXC LABL SELE LINK ANCH REFP SKEL RIG  FORM FRAM", tag) && !unknown_tag;
+        bool needs_mesh = strstr("TEXC LABL SELE LINK ANCH REFP SKEL RIG  SKIN FORM FRAM", tag) && !unknown_tag;
         for (int place = 0; place < 2 && i != mesh; place++) {
             k = 0;
             for (int j = 0; j < n; j++) {
@@ -736,15 +737,16 @@ static void test_order(void)
             vg_bytes_clear(&x);
         }
     }
-    /* any order that keeps MESH first is the same stream */
+    /* any order that keeps MESH first, and RIG before SKIN, is the same stream */
     content back = {0};
     vg_err e = {0, ""};
     int k = 0;
     order[k++] = mesh;
+    order[k++] = rig;
     for (int j = form - 1; j >= 0; j--)
-        if (j != mesh && strcmp(p.at[j].tag, "PROV") && !(p.at[j].flags & COPY_SAFE)) order[k++] = j;
+        if (j != mesh && j != rig && strcmp(p.at[j].tag, "PROV") && !(p.at[j].flags & COPY_SAFE)) order[k++] = j;
     for (int j = 0; j < n; j++)
-        if (j >= form || (j != mesh && (!strcmp(p.at[j].tag, "PROV") || (p.at[j].flags & COPY_SAFE)))) order[k++] = j;
+        if (j >= form || (j != mesh && j != rig && (!strcmp(p.at[j].tag, "PROV") || (p.at[j].flags & COPY_SAFE)))) order[k++] = j;
     order[k] = -1;
     CHECK(k == n);
     vg_bytes x = put_together(&p, order);
@@ -962,23 +964,22 @@ static void test_lying_counts(void)
     static const uint64_t counts[] = {(uint64_t)1 << 31, UINT32_MAX - 1,    UINT32_MAX,        (uint64_t)1 << 32,
                                       (uint64_t)1 << 61, (uint64_t)1 << 62, (uint64_t)1 << 63, UINT64_MAX};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-        for (int what = 0; what < 8; what++) {
+        for (int what = 0; what < 13; what++) {
+            static const char *const tags[] = {"REFP", "REFP", "REFP", "REFP", "TEXC", "PROV", "CORR",
+                                               "LABL", "SELE", "LINK", "SKEL", "RIG ", "MAP "};
             vg_bytes b = {0}, mesh = {0}, x = {0};
             uint64_t n = counts[i];
             put_file_header(&b);
             append64(&mesh, what == 1 ? n : 20); /* vertices, of which a face of 17 is made */
             append64(&mesh, what == 2 ? n : 1);
-            append32(&mesh, what == 3 ? (uint32_t)(n >> (n > UINT32_MAX ? 32 : 0)) : 17);
-            for (uint32_t k = 0; k < 17; k++) append32(&mesh, k);
-            const char *tag = "REFP";
-            if (what == 4) tag = "TEXC", append32(&x, 3), append32(&x, 0), append64(&x, n), append_double(&x, 0);
-            if (what == 5)
-                tag = "PROV", append32(&x, (uint32_t)n), append32(&x, (uint32_t)n), append32(&x, 0), append32(&x, 0);
-            if (what == 6) tag = "CORR";
-            for (int k = 0; k < 7 && what == 6; k++) append64(&x, k == 4 || k == 6 ? n : 1);
-            if (what == 7)
-                tag = "LABL", append64(&x, 0), append32(&x, 1), append32(&x, (uint32_t)(n ? n : 1) | 1u << 31);
-            if (what < 4) append32(&x, what == 0 ? (uint32_t)n | 1u << 31 : 0), append32(&x, 0), append_double(&x, 0);
+            append32(&mesh, 0), append32(&mesh, what == 3 ? (uint32_t)(n >> (n > UINT32_MAX ? 32 : 0)) : 17);
+            for (uint32_t k = 0; k < 18; k++) append32(&mesh, k < 17 ? k : 0);
+            const char *tag = tags[what];
+            for (int k = 0; k < 6 && what == 6; k++) append64(&x, k == 4 ? n : 1);
+            if (what == 4) append64(&x, 3);
+            if (what == 6) append32(&x, 0), append32(&x, UINT32_MAX);
+            else append64(&x, what < 4 && what ? 0 : n);
+            for (int k = 0; k < 10 && what >= 5 && what != 6; k++) append64(&x, what == 12 || k == 0 ? n : 0);
             put_record(&b, "MESH", CRITICAL, &mesh);
             put_record(&b, tag, 0, &x);
             put_end(&b);

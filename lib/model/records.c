@@ -1,0 +1,225 @@
+/* records.c: the table of header records. artefact.h says how to add one.
+ * Leaves out what is done with the table (artefact.c, io/artefact_io.c) and what contents must hold (checks.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "model/artefact.h"
+
+#define SIZE_OF(type, member) sizeof(((type *)0)->member)
+#define NUMBER(struct_type, stream_type, member) \
+    {.type = VGI_##stream_type, .at = offsetof(struct_type, member), .size = SIZE_OF(struct_type, member)}
+#define ARRAY(struct_type, stream_type, member, entry_width, how_many)                                              \
+    {.type = VGI_##stream_type, .at = offsetof(struct_type, member), .size = sizeof(*((struct_type *)0)->member), \
+     .width = (entry_width), .length = (how_many)}
+#define OPTIONAL(struct_type, stream_type, member, entry_width, how_many)                                           \
+    {.type = VGI_##stream_type, .optional = true, .at = offsetof(struct_type, member),                               \
+     .size = sizeof(*((struct_type *)0)->member), .width = (entry_width), .length = (how_many)}
+#define DERIVED(struct_type, member, how_many)                                                                       \
+    {.type = VGI_U32, .derived = true, .at = offsetof(struct_type, member),                                          \
+     .size = sizeof(*((struct_type *)0)->member), .width = 1, .length = (how_many)}
+#define DERIVED_NUMBER(struct_type, member) \
+    {.type = VGI_U64, .derived = true, .at = offsetof(struct_type, member), .size = SIZE_OF(struct_type, member)}
+/* column `column` of an array of row_type */
+#define COLUMN(struct_type, stream_type, member, row_type, column, entry_width, how_many)                           \
+    {.type = VGI_##stream_type, .at = offsetof(struct_type, member), .size = sizeof(row_type),                       \
+     .row_at = offsetof(row_type, column), .rows = true, .width = (entry_width), .length = (how_many)}
+
+/* A function for vgi_member.length; `a` is the struct. */
+#define LENGTH(function, struct_type, expression)                                                                    \
+    static size_t function(const void *artefact, const vg_mesh *mesh)                                                \
+    {                                                                                                                \
+        const struct_type *a = artefact;                                                                             \
+        (void)a, (void)mesh;                                                                                         \
+        return expression;                                                                                           \
+    }
+
+static size_t times(size_t a, size_t b)
+{
+    size_t product;
+    return vgi_mul(a, b, &product) ? product : SIZE_MAX;
+}
+
+/* The last entry of a list of n + 1 starts: the length of what it divides. */
+static size_t last_of(const uint32_t *start, size_t n)
+{
+    return start ? start[n] : 0;
+}
+
+static size_t one_more(size_t n)
+{
+    return n < SIZE_MAX ? n + 1 : n;
+}
+
+/* ---- the body ---- */
+
+LENGTH(prov_parents, vg_provenance, a->nparents)
+LENGTH(prov_args, vg_provenance, a->nargs)
+static const vgi_member prov_fields[] = {
+    NUMBER(vg_provenance, U64, nparents),
+    NUMBER(vg_provenance, U64, nargs),
+    ARRAY(vg_provenance, U32, parents, 1, prov_parents),
+    NUMBER(vg_provenance, TEXT, program),
+    NUMBER(vg_provenance, TEXT, version),
+    ARRAY(vg_provenance, TEXT, args, 1, prov_args)};
+
+LENGTH(mesh_starts, vg_mesh, one_more(a->nf))
+LENGTH(mesh_corners, vg_mesh, last_of(a->start, a->nf))
+static const vgi_member mesh_fields[] = {
+    NUMBER(vg_mesh, U64, nv),
+    NUMBER(vg_mesh, U64, nf),
+    ARRAY(vg_mesh, U32, start, 1, mesh_starts),
+    ARRAY(vg_mesh, U32, vert, 1, mesh_corners)};
+
+LENGTH(texture_numbers, vg_attributes, times(a->ntex, a->tex_dim))
+LENGTH(texture_corners, vg_attributes, last_of(mesh->start, mesh->nf))
+static const vgi_member texc_fields[] = {
+    NUMBER(vg_attributes, U64, tex_dim),
+    NUMBER(vg_attributes, U64, ntex),
+    OPTIONAL(vg_attributes, F64, tex, 1, texture_numbers),
+    OPTIONAL(vg_attributes, U32, corner_tex, 1, texture_corners)};
+
+LENGTH(labels, vg_attributes, a->nlabels)
+static const vgi_member labl_fields[] = {
+    NUMBER(vg_attributes, U64, nlabels),
+    COLUMN(vg_attributes, U64, labels, vg_label, face, 1, labels),
+    COLUMN(vg_attributes, U32, labels, vg_label, kind, 1, labels),
+    COLUMN(vg_attributes, TEXT, labels, vg_label, text, 1, labels)};
+
+LENGTH(mesh_vertices, vg_body, mesh->nv)
+static const vgi_member refp_fields[] = {
+    NUMBER(vg_body, TEXT, reference_name),
+    ARRAY(vg_body, F64, reference, 3, mesh_vertices)};
+
+#define JOINTS(struct_type, count, rows, how_many)                            \
+    NUMBER(struct_type, U64, count),                                          \
+    COLUMN(struct_type, U32, rows, vg_joint, parent, 1, how_many),            \
+    COLUMN(struct_type, U32, rows, vg_joint, nchannels, 1, how_many),         \
+    COLUMN(struct_type, U8, rows, vg_joint, channels, 6, how_many),           \
+    COLUMN(struct_type, F64, rows, vg_joint, offset, 3, how_many),            \
+    COLUMN(struct_type, TEXT, rows, vg_joint, name, 1, how_many)
+
+LENGTH(skeleton_joints, vg_skeleton, a->njoints)
+static const vgi_member skel_fields[] = {JOINTS(vg_skeleton, njoints, joints, skeleton_joints)};
+
+LENGTH(patch_faces, vg_patches, mesh->nf)
+static const vgi_member ptch_fields[] = {
+    NUMBER(vg_patches, U64, n),
+    ARRAY(vg_patches, U32, of_face, 1, patch_faces)};
+
+LENGTH(rig_joints, vg_rig, a->skeleton.njoints)
+LENGTH(rig_bones, vg_rig, a->nbones)
+static const vgi_member rig_fields[] = {
+    JOINTS(vg_rig, skeleton.njoints, skeleton.joints, rig_joints),
+    ARRAY(vg_rig, F64, at, 3, rig_joints),
+    ARRAY(vg_rig, F64, turn, 4, rig_joints),
+    DERIVED_NUMBER(vg_rig, nbones),
+    DERIVED(vg_rig, bone, rig_bones)};
+
+static const vgi_member skin_fields[] = {
+    ARRAY(vg_rig, U32, skin_bone, VG_SKIN, mesh_vertices),
+    ARRAY(vg_rig, F64, skin_weight, VG_SKIN, mesh_vertices)};
+
+/* ---- beside the body ---- */
+
+LENGTH(selected_faces, vg_head, a->nselected)
+static const vgi_member sele_fields[] = {
+    NUMBER(vg_head, U64, nselected), ARRAY(vg_head, U32, selected, 1, selected_faces)};
+
+LENGTH(link_count, vg_head, a->nlinks)
+static const vgi_member link_fields[] = {NUMBER(vg_head, U64, nlinks), ARRAY(vg_head, U32, links, 2, link_count)};
+
+LENGTH(anchor_count, vg_head, a->nanchors)
+static const vgi_member anch_fields[] = {NUMBER(vg_head, U64, nanchors), ARRAY(vg_head, U32, anchors, 1, anchor_count)};
+
+LENGTH(driven_starts, vg_correspondence, one_more(a->target_nf))
+LENGTH(driven_faces, vg_correspondence, a->target_nf)
+LENGTH(pairs, vg_correspondence, last_of(a->first, a->target_nf))
+static const vgi_member corr_fields[] = {
+    NUMBER(vg_correspondence, U64, source_nv),
+    NUMBER(vg_correspondence, U64, source_nf),
+    NUMBER(vg_correspondence, U64, source_digest),
+    NUMBER(vg_correspondence, U64, target_nv),
+    NUMBER(vg_correspondence, U64, target_nf),
+    NUMBER(vg_correspondence, U64, target_digest),
+    ARRAY(vg_correspondence, U32, first, 1, driven_starts),
+    ARRAY(vg_correspondence, U32, source, 1, pairs),
+    ARRAY(vg_correspondence, F64, weight, 1, pairs),
+    ARRAY(vg_correspondence, F64, distance, 1, driven_faces),
+    ARRAY(vg_correspondence, U8, matched, 1, driven_faces)};
+
+LENGTH(map_weights, vg_map, times(a->nv, a->n))
+LENGTH(map_place, vg_map, times(a->n, a->n))
+LENGTH(map_transforms, vg_map, a->n)
+LENGTH(map_home, vg_map, a->has_home ? a->nv : 0)
+LENGTH(map_joints, vg_map, a->njoints)
+LENGTH(map_corners, vg_map, times(a->ncorners, a->per_corner))
+LENGTH(map_held, vg_map, a->nheld)
+LENGTH(map_placed, vg_map, a->kind == VG_MAP_BONES ? 0 : a->nheld)
+LENGTH(map_corner_bones, vg_map, a->kind == VG_MAP_BONES ? times(a->ncorners, a->per_corner) : 0)
+LENGTH(map_names, vg_map, a->nnames)
+static const vgi_member map_fields[] = {
+    NUMBER(vg_map, U64, n),
+    NUMBER(vg_map, U64, nv),
+    NUMBER(vg_map, U64, njoints),
+    NUMBER(vg_map, U64, ncorners),
+    NUMBER(vg_map, U64, nheld),
+    NUMBER(vg_map, U64, kind),
+    NUMBER(vg_map, U64, has_home),
+    NUMBER(vg_map, U64, nnames),
+    NUMBER(vg_map, U64, per_corner),
+    NUMBER(vg_map, F64, size),
+    OPTIONAL(vg_map, F64, weights, 4, map_weights),
+    OPTIONAL(vg_map, F64, place, 3, map_place),
+    OPTIONAL(vg_map, F64, centre, 3, map_transforms),
+    OPTIONAL(vg_map, F64, home_centre, 3, map_transforms),
+    OPTIONAL(vg_map, F64, share, 1, map_transforms),
+    OPTIONAL(vg_map, F64, home, 3, map_home),
+    OPTIONAL(vg_map, F64, joint_at, 3, map_joints),
+    OPTIONAL(vg_map, F64, joint_weight, 1, map_joints),
+    OPTIONAL(vg_map, F64, corner, 4, map_corners),
+    OPTIONAL(vg_map, F64, held_at, 3, map_placed),
+    OPTIONAL(vg_map, U32, joint, 2, map_joints),
+    OPTIONAL(vg_map, U32, held, 1, map_held),
+    OPTIONAL(vg_map, U32, held_patch, 1, map_placed),
+    OPTIONAL(vg_map, U32, corner_bone, 1, map_corner_bones),
+    OPTIONAL(vg_map, TEXT, names, 1, map_names)};
+
+/* ---- the table ---- */
+
+#define IN_BODY(member) .in_body = true, .at = offsetof(vg_body, member)
+#define IN_HEAD(member) .at = offsetof(vg_head, member)
+#define PRESENT(member) .present_at = offsetof(vg_head, member), .present_size = SIZE_OF(vg_head, member)
+#define MARKED(member) PRESENT(member), .marks = true, .mark_at = offsetof(vg_head, member)
+#define REPEATS(pointer, count) \
+    .at = offsetof(vg_head, pointer), .each = sizeof(*((vg_head *)0)->pointer), .count_at = offsetof(vg_head, count)
+#define FIELDS(list) .fields = (list), .nfields = sizeof(list) / sizeof *(list)
+
+const vgi_artefact vgi_artefacts[VGI_ARTEFACTS] = {
+    [VGI_PROV] = {.tag = "PROV", .flags = VGI_COPY_SAFE, REPEATS(provenance, nprovenance), FIELDS(prov_fields),
+                  .check = vgi_check_provenance},
+    [VGI_MESH] = {.tag = "MESH", .flags = VGI_CRITICAL, .name = "mesh", IN_BODY(mesh), PRESENT(body.reference),
+                  FIELDS(mesh_fields), .check = vgi_check_mesh},
+    [VGI_TEXC] = {.tag = "TEXC", .needs = "MESH", IN_BODY(attributes), PRESENT(body.attributes.ntex),
+                  FIELDS(texc_fields), .check = vgi_check_texture},
+    [VGI_LABL] = {.tag = "LABL", .needs = "MESH", IN_BODY(attributes), PRESENT(body.attributes.nlabels),
+                  FIELDS(labl_fields), .check = vgi_check_labels},
+    [VGI_SELE] = {.tag = "SELE", .flags = VGI_CRITICAL, .needs = "MESH", MARKED(has_selection), FIELDS(sele_fields),
+                  .check = vgi_check_selection},
+    [VGI_LINK] = {.tag = "LINK", .flags = VGI_CRITICAL, .needs = "MESH", MARKED(has_links), FIELDS(link_fields),
+                  .check = vgi_check_links},
+    [VGI_ANCH] = {.tag = "ANCH", .flags = VGI_CRITICAL, .needs = "MESH", PRESENT(nanchors), FIELDS(anch_fields),
+                  .check = vgi_check_anchors},
+    [VGI_REFP] = {.tag = "REFP", .flags = VGI_CRITICAL, .needs = "MESH", .in_body = true, PRESENT(body.reference),
+                  FIELDS(refp_fields)},
+    [VGI_SKEL] = {.tag = "SKEL", .name = "skeleton", .needs = "MESH", IN_BODY(skeleton),
+                  PRESENT(body.skeleton.njoints), FIELDS(skel_fields), .check = vgi_check_skeleton},
+    [VGI_CORR] = {.tag = "CORR", .flags = VGI_CRITICAL, .name = "correspondence", .advice = "make one with vg-register",
+                  IN_HEAD(correspondence), PRESENT(correspondence.first), FIELDS(corr_fields),
+                  .check = vgi_check_correspondence},
+    [VGI_PTCH] = {.tag = "PTCH", .name = "patches", .advice = "make them with vg-segment", .needs = "MESH",
+                  IN_BODY(patches), PRESENT(body.patches.n), FIELDS(ptch_fields), .check = vgi_check_patches},
+    [VGI_RIG] = {.tag = "RIG ", .name = "rig", .advice = "make one with vg-fitmap --skeleton", .needs = "MESH",
+                 IN_BODY(rig), PRESENT(body.rig.skeleton.njoints), FIELDS(rig_fields), .check = vgi_check_rig},
+    [VGI_SKIN] = {.tag = "SKIN", .needs = "RIG ", IN_BODY(rig), PRESENT(body.rig.skin_bone), FIELDS(skin_fields),
+                  .check = vgi_check_skin},
+    [VGI_MAP] = {.tag = "MAP ", .flags = VGI_CRITICAL, .name = "map", .advice = "make one with vg-fitmap",
+                 .needs = "MESH", IN_HEAD(map), PRESENT(map.n), FIELDS(map_fields), .check = vgi_check_map},
+};
