@@ -12,13 +12,14 @@
 #include "numeric/lapack.h"
 #include "numeric/blas.h"
 #include "numeric/polar.h"
+#include "numeric/stats.h"
 #include "method/rig/skin.h"
 #include "model/rig.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-enum { BLOCK = 8, SHARES = 8, SWEEPS = 8, STEPS = 30, ROUNDS = 30 };
+enum { BLOCK = 8, SHARES = 8, SWEEPS = 8, STEPS = 30, ROUNDS = 30, FIRST_STEPS = 8 };
 static const double FIRST_PRIOR = 1e-3,
                     LAST_PRIOR = 1e-10; /* pull of a bone towards its parent, beside that of the vertices */
 
@@ -26,6 +27,7 @@ struct vg_bender {
     size_t nv, n; /* vertices, bones */
     int threads;
     double least;     /* turns smaller than this, in radians, are none */
+    int steps;        /* at most, of each descent */
     uint32_t *parent; /* of each bone; each before its children */
     double *at;       /* 3 n: the joints */
     double *offset;   /* 3 n: from the parent's joint */
@@ -42,19 +44,23 @@ struct vg_bender {
 
 /* Working space of one pose. */
 typedef struct bending {
-    double *r, *trial, *b, *sum, *h, *step; /* 9 n, 9 n, 9 n, 3 n, (3 n)^2, 3 n */
+    double *r, *trial, *b; /* 9 n each: rotations, those that are tried, B */
+    double *left;          /* 9 n: B - R G, where the objective was asked for last */
+    double *rows;          /* 18 n: R, and R G, as 3 x 3 n */
+    double *sum, *step;    /* 3 n each */
+    double *h;             /* (3 n)^2 */
 } bending;
 
 static size_t space_of(size_t n)
 {
-    return 27 * n + 6 * n + 9 * n * n;
+    return 4 * 9 * n + 18 * n + 6 * n + 9 * n * n;
 }
 
 static bending bending_at(const vg_bender *x, size_t i)
 {
     double *p = x->space + i * space_of(x->n);
     size_t n = x->n;
-    return (bending){p, p + 9 * n, p + 18 * n, p + 27 * n, p + 33 * n, p + 30 * n};
+    return (bending){p, p + 9 * n, p + 18 * n, p + 27 * n, p + 36 * n, p + 54 * n, p + 57 * n, p + 60 * n};
 }
 
 /* The q of vertex v, for the bones listed in `list`: 3 numbers each in q. */
@@ -194,7 +200,7 @@ int vg_bender_new(vg_bender **out, const vg_rig *r, size_t nv, const double *ref
     if (!r->nbones || !r->skin_bone) return vg_fail(e, VG_EINPUT, "there is no rig with weights");
     vg_bender *x = *out = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
-    x->n = r->nbones, x->nv = nv, x->threads = threads, x->least = 1e-7;
+    x->n = r->nbones, x->nv = nv, x->threads = threads, x->least = 1e-7, x->steps = STEPS;
     int code = make_arrays(x, r, e);
     if (code == VG_OK) code = vgi_rig_parents(r, x->parent, e);
     if (code == VG_OK) {
@@ -255,14 +261,14 @@ static void carry(const vg_bender *x, bending *w)
     }
 }
 
-/* m = B_j - sum over i of R_i G_ij, the bone itself left out or not */
-static void left_for(const vg_bender *x, const bending *w, const double *r, size_t j, bool own, double m[9])
+/* m = B_j - sum over i of R_i G_ij, the bone itself left out */
+static void left_for(const vg_bender *x, const bending *w, size_t j, double m[9])
 {
     size_t width = 3 * x->n;
     memcpy(m, w->b + 9 * j, 9 * sizeof *m);
     for (size_t i = 0; i < x->n; i++) {
-        if (i == j && !own) continue;
-        const double *a = r + 9 * i, *g = x->g + 3 * i * width + 3 * j;
+        if (i == j) continue;
+        const double *a = w->r + 9 * i, *g = x->g + 3 * i * width + 3 * j;
         for (int c = 0; c < 3; c++)
             for (int k = 0; k < 3; k++)
                 m[3 * c + k] -=
@@ -270,15 +276,29 @@ static void left_for(const vg_bender *x, const bending *w, const double *r, size
     }
 }
 
-static double objective(const vg_bender *x, const bending *w, const double *r, double prior)
+/* left = B - R G of all bones, with one product. */
+static void find_left(const vg_bender *x, bending *w, const double *r)
+{
+    size_t width = 3 * x->n;
+    double *rg = w->rows + 3 * width;
+    for (size_t j = 0; j < x->n; j++)
+        for (size_t c = 0; c < 3; c++) memcpy(w->rows + c * width + 3 * j, r + 9 * j + 3 * c, 3 * sizeof *r);
+    vgi_product_double(3, width, width, w->rows, width, x->g, width, rg, width);
+    for (size_t j = 0; j < x->n; j++)
+        for (size_t c = 0; c < 3; c++)
+            for (size_t k = 0; k < 3; k++)
+                w->left[9 * j + 3 * c + k] = w->b[9 * j + 3 * c + k] - rg[c * width + 3 * j + k];
+}
+
+/* Leaves B - R G in w->left. */
+static double objective(const vg_bender *x, bending *w, const double *r, double prior)
 {
     double f = 0;
+    find_left(x, w, r);
     for (size_t j = 0; j < x->n; j++) {
-        double m[9];
-        left_for(x, w, r, j, true, m); /* B - R G */
-        for (int i = 0; i < 9; i++) f -= 0.5 * r[9 * j + (size_t)i] * (m[i] + w->b[9 * j + (size_t)i]);
-        for (int i = 0; j && i < 9; i++) {
-            double d = r[9 * j + (size_t)i] - r[9 * (size_t)x->parent[j] + (size_t)i];
+        for (size_t i = 9 * j; i < 9 * j + 9; i++) f -= 0.5 * r[i] * (w->left[i] + w->b[i]);
+        for (size_t i = 0; j && i < 9; i++) {
+            double d = r[9 * j + i] - r[9 * (size_t)x->parent[j] + i];
             f += 0.5 * prior * x->size[j] * d * d;
         }
     }
@@ -295,11 +315,23 @@ static void add_prior(const vg_bender *x, const double *r, size_t j, double prio
     }
 }
 
+/* The same for all bones: left += prior * (what parents and children are). */
+static void add_priors(const vg_bender *x, const double *r, double prior, double *left)
+{
+    for (size_t j = 1; j < x->n; j++) {
+        size_t up = 9 * (size_t)x->parent[j];
+        for (size_t i = 0; i < 9; i++) {
+            left[9 * j + i] += prior * x->size[j] * r[up + i];
+            left[up + i] += prior * x->size[j] * r[9 * j + i];
+        }
+    }
+}
+
 static void sweep(const vg_bender *x, bending *w, double prior)
 {
     for (size_t j = 0; j < x->n; j++) {
         double m[9];
-        left_for(x, w, w->r, j, false, m);
+        left_for(x, w, j, m);
         add_prior(x, w->r, j, prior, m);
         vgi_fit_rotation(m, w->r + 9 * j);
     }
@@ -312,26 +344,34 @@ static void multiply_back(const double a[9], const double b[9], double ab[9]) /*
             ab[3 * i + k] = a[3 * i] * b[3 * k] + a[3 * i + 1] * b[3 * k + 1] + a[3 * i + 2] * b[3 * k + 2];
 }
 
-/* The Gauss-Newton system in small turns of all bones: the lower triangle of h, and the right-hand side. */
+/* Rows of bone i of the Gauss-Newton matrix, up to the diagonal. */
+static void make_rows(const vg_bender *x, bending *w, size_t i)
+{
+    size_t width = 3 * x->n;
+    double *h = w->h + 3 * i * width;
+    for (size_t j = 0; j <= i; j++) {
+        const double *g = x->g + 3 * i * width + 3 * j;
+        const double block[9] = {g[0],     g[1],         g[2],         g[width],        g[width + 1],
+                                 g[width + 2], g[2 * width], g[2 * width + 1], g[2 * width + 2]};
+        double t[9], s[9], trace;
+        vgi_multiply(w->r + 9 * i, block, t);
+        multiply_back(t, w->r + 9 * j, s);
+        trace = s[0] + s[4] + s[8];
+        for (size_t k = 0; k < 3; k++)
+            for (size_t l = 0; l < 3; l++) h[k * width + 3 * j + l] = (k == l ? trace : 0) - s[3 * l + k];
+    }
+}
+
+/* The Gauss-Newton system in small turns of all bones: the lower triangle of h, and the right-hand side, from B - R G at
+ * r. */
 static void make_system(const vg_bender *x, bending *w, double prior, double damping)
 {
     size_t n = x->n, width = 3 * n;
+    add_priors(x, w->r, prior, w->left);
     for (size_t i = 0; i < n; i++) {
-        double m[9], t[9];
-        for (size_t j = 0; j <= i; j++) {
-            double g[9], s[9], trace;
-            for (size_t k = 0; k < 3; k++)
-                for (size_t l = 0; l < 3; l++) g[3 * k + l] = x->g[(3 * i + k) * width + 3 * j + l];
-            vgi_multiply(w->r + 9 * i, g, t);
-            multiply_back(t, w->r + 9 * j, s);
-            trace = s[0] + s[4] + s[8];
-            for (size_t k = 0; k < 3; k++)
-                for (size_t l = 0; l < 3; l++)
-                    w->h[(3 * i + k) * width + 3 * j + l] = (k == l ? trace : 0) - s[3 * l + k];
-        }
-        left_for(x, w, w->r, i, true, m);
-        add_prior(x, w->r, i, prior, m);
-        multiply_back(w->r + 9 * i, m, t);
+        double t[9];
+        make_rows(x, w, i);
+        multiply_back(w->r + 9 * i, w->left + 9 * i, t);
         w->step[3 * i] = t[5] - t[7], w->step[3 * i + 1] = t[6] - t[2], w->step[3 * i + 2] = t[1] - t[3];
     }
     for (size_t i = 0; i < n; i++) {
@@ -365,7 +405,10 @@ static void descend(const vg_bender *x, bending *w, double prior)
 {
     static const double noise = 1e-16; /* of the objective */
     double damping = 1e-6, f = objective(x, w, w->r, prior), turn = 1;
-    for (int step = 0; step < STEPS && turn > x->least && damping < 1e6; step++) {
+    bool moved = true; /* w->left is that of w->r */
+    for (int step = 0; step < x->steps && turn > x->least && damping < 1e6; step++) {
+        if (!moved) find_left(x, w, w->r);
+        moved = false;
         make_system(x, w, prior, damping);
         if (!vgi_spd_factor(3 * x->n, w->h)) {
             damping = 10 * damping + 1e-9;
@@ -379,7 +422,7 @@ static void descend(const vg_bender *x, bending *w, double prior)
             continue;
         }
         memcpy(w->r, w->trial, 9 * x->n * sizeof *w->r);
-        f = now, damping *= 0.1;
+        f = now, damping *= 0.1, moved = true;
         if (gain < noise * fabs(f))
             break; /* the step that was just taken is the last that can be told from rounding */
     }
@@ -394,6 +437,8 @@ typedef struct fitting {
     const vg_bender *x;
     const double *const *poses;
     double *const *transforms;
+    double *rotations; /* NULL, or 9 n for each pose: where to begin, and where it ends */
+    bool begun;        /* rotations are there to begin with */
 } fitting;
 
 /* Each bone by itself at first, about the centroid of its own vertices; one without vertices as its parent. */
@@ -419,11 +464,17 @@ static void fit_pose(void *context, size_t k)
     double centre[3], root[3];
     vg_centroid(f->poses[k], x->nv, centre);
     load(x, f->poses[k], centre, &w);
-    for (size_t j = 0; j < x->n; j++) start(x, &w, j);
-    carry(x, &w);
-    for (int i = 0; i < SWEEPS; i++) sweep(x, &w, FIRST_PRIOR);
-    descend(x, &w, FIRST_PRIOR);
+    if (f->begun) {
+        memcpy(w.r, f->rotations + 9 * x->n * k, 9 * x->n * sizeof *w.r);
+        carry(x, &w);
+    } else {
+        for (size_t j = 0; j < x->n; j++) start(x, &w, j);
+        carry(x, &w);
+        for (int i = 0; i < SWEEPS; i++) sweep(x, &w, FIRST_PRIOR);
+        descend(x, &w, FIRST_PRIOR);
+    }
     descend(x, &w, LAST_PRIOR);
+    if (f->rotations) memcpy(f->rotations + 9 * x->n * k, w.r, 9 * x->n * sizeof *w.r);
     for (size_t j = 1; j < x->n; j++)
         if (!x->carries[j]) memcpy(w.r + 9 * j, w.r + 9 * (size_t)x->parent[j], 9 * sizeof *w.r);
     memcpy(root, centre, sizeof root);
@@ -443,51 +494,134 @@ static void fit_pose(void *context, size_t k)
     }
 }
 
-void vg_bender_fit(vg_bender *x, size_t n, const double *const *poses, double *const *transforms)
+/* rotations, begun: see fitting. */
+static void fit_poses(const vg_bender *x, size_t n, const double *const *poses, double *const *transforms,
+                      double *rotations, bool begun)
 {
     vgi_blas_alone();
     for (size_t first = 0; first < n; first += BLOCK) {
-        fitting f = {x, poses + first, transforms + first};
+        fitting f = {x, poses + first, transforms + first, rotations ? rotations + 9 * x->n * first : NULL, begun};
         vgi_parallel(x->threads, n - first < BLOCK ? n - first : BLOCK, fit_pose, &f);
     }
     vgi_blas_shared();
 }
 
+void vg_bender_fit(vg_bender *x, size_t n, const double *const *poses, double *const *transforms)
+{
+    fit_poses(x, n, poses, transforms, NULL, false);
+}
+
 /* ---- weights without motions ---- */
 
+/* What is learned from: all vertices of the mesh, or some of them. */
+typedef struct learning {
+    vg_rig rig; /* its skin is ours, all else borrowed */
+    size_t nv, n, bones; /* vertices, poses */
+    double *reference, **poses;
+    double **transforms, *rotations, *at; /* of the poses; of the poses; of the bones */
+    double *left;                         /* nv: what skinning leaves */
+    int threads;
+} learning;
+
+static void clear_learning(learning *l)
+{
+    free(l->rig.skin_bone);
+    free(l->rig.skin_weight);
+    free(l->reference);
+    for (size_t i = 0; l->poses && i < l->n; i++) free(l->poses[i]);
+    free(l->poses);
+    free(l->left);
+    l->rig.skin_bone = NULL, l->rig.skin_weight = NULL, l->reference = NULL, l->poses = NULL, l->left = NULL;
+}
+
+static int gather_vertices(learning *l, const vg_head *h, size_t n, const double *const *poses, size_t most, vg_err *e)
+{
+    size_t nv = h->body.mesh.nv, step = (nv + most - 1) / most;
+    l->rig = h->body.rig, l->rig.skin_bone = NULL, l->rig.skin_weight = NULL;
+    l->n = n, l->nv = (nv + step - 1) / step;
+    l->reference = vgi_array_raw(3 * l->nv, sizeof *l->reference, e);
+    l->poses = vgi_array(n, sizeof *l->poses, e);
+    l->left = vgi_array(l->nv, sizeof *l->left, e);
+    bool ok = l->reference && l->poses && l->left;
+    for (size_t i = 0; ok && i < n; i++) ok = (l->poses[i] = vgi_array_raw(3 * l->nv, sizeof(double), e)) != NULL;
+    if (!ok) return VG_ENOMEM;
+    for (size_t v = 0; v < l->nv; v++) {
+        memcpy(l->reference + 3 * v, h->body.reference + 3 * step * v, 3 * sizeof(double));
+        for (size_t i = 0; i < n; i++) memcpy(l->poses[i] + 3 * v, poses[i] + 3 * step * v, 3 * sizeof(double));
+    }
+    return VG_OK;
+}
+
+/* Weights for the motions that are there; the mean distance that is left. */
+static int learn_weights(learning *l, double *miss, vg_err *e)
+{
+    vgi_rig_sums s = {0};
+    int r = vgi_rig_sums_make(&s, l->nv, l->bones, l->at, NULL, e);
+    if (r == VG_OK)
+        vgi_rig_sums_add(&s, l->n, (const double *const *)l->poses, (const double *const *)l->transforms, l->threads);
+    if (r == VG_OK) r = vgi_skin_fit(&l->rig, &s, l->reference, l->threads, l->left, e);
+    vgi_rig_sums_clear(&s);
+    if (r == VG_OK) *miss = vgi_mean(l->left, l->nv);
+    return r;
+}
+
+static int learn_motions(learning *l, bool begun, double least, int steps, vg_err *e)
+{
+    vg_bender *x = NULL;
+    int r = vg_bender_new(&x, &l->rig, l->nv, l->reference, l->threads, e);
+    if (r == VG_OK) {
+        x->least = least, x->steps = steps;
+        fit_poses(x, l->n, (const double *const *)l->poses, l->transforms, l->rotations, begun);
+    }
+    vg_bender_free(&x);
+    return r;
+}
+
+/* Weights and motions in turn until a round gains less than 0.4 %. */
+static int alternate(learning *l, bool begun, double least, int steps, double *miss, vg_err *e)
+{
+    int r = VG_OK;
+    double before = INFINITY;
+    for (int round = 0; r == VG_OK && round < ROUNDS; round++) {
+        r = learn_motions(l, begun, least, begun ? steps : FIRST_STEPS, e);
+        if (r == VG_OK) r = learn_weights(l, miss, e);
+        if (r == VG_OK && !(*miss < 0.996 * before)) break;
+        before = *miss, begun = true;
+    }
+    return r;
+}
+
+/* Roughly on some of the vertices first, then exactly on all of them. */
 int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, double *miss, vg_err *e)
 {
-    vg_rig *r = &h->body.rig;
-    size_t nv = h->body.mesh.nv, bones = r->nbones;
-    double before = INFINITY, **transforms = vgi_array(n, sizeof *transforms, e),
-           *space = vgi_array(n, 7 * bones * sizeof *space, e);
-    double *at = vgi_array(3 * bones, sizeof *at, e), *left = vgi_array(nv, sizeof *left, e);
-    int code = transforms && space && at && left ? VG_OK : VG_ENOMEM;
-    if (code == VG_OK) code = vgi_skin_near(r, nv, h->body.reference, e);
-    for (size_t i = 0; code == VG_OK && i < n; i++) transforms[i] = space + 7 * bones * i;
-    for (size_t b = 0; code == VG_OK && b < bones; b++)
-        memcpy(at + 3 * b, r->at + 3 * (size_t)r->bone[b], 3 * sizeof *at);
-    *miss = 0;
-    bool fine = false;
-    for (int round = 0; code == VG_OK && round < ROUNDS; round++) {
-        vg_bender *x = NULL;
-        vgi_rig_sums s = {0};
-        code = vg_bender_new(&x, r, nv, h->body.reference, threads, e);
-        if (code == VG_OK) x->least = fine ? x->least : 1e-4, vg_bender_fit(x, n, poses, transforms);
-        if (code == VG_OK) code = vgi_rig_sums_make(&s, nv, bones, at, NULL, e);
-        if (code == VG_OK) vgi_rig_sums_add(&s, n, poses, (const double *const *)transforms, threads);
-        if (code == VG_OK) code = vgi_skin_fit(r, &s, h->body.reference, threads, left, e);
-        vgi_rig_sums_clear(&s);
-        vg_bender_free(&x);
-        *miss = 0;
-        for (size_t v = 0; code == VG_OK && v < nv; v++) *miss += left[v] / (double)nv;
-        if (!(*miss < 0.995 * before) && fine) break;
-        fine = fine || !(*miss < 0.995 * before); /* roughly at first, then exactly */
-        before = *miss;
+    enum { SOME = 4096, ROUGH_STEPS = 2, FINE_STEPS = 8 };
+    vg_rig *rig = &h->body.rig;
+    size_t bones = rig->nbones, nv = h->body.mesh.nv;
+    learning l = {.bones = bones, .threads = threads};
+    double *space = vgi_array(n, 7 * bones * sizeof *space, e);
+    l.transforms = vgi_array(n, sizeof *l.transforms, e), l.rotations = vgi_array(n, 9 * bones * sizeof(double), e);
+    l.at = vgi_array(3 * bones, sizeof *l.at, e);
+    int r = space && l.transforms && l.rotations && l.at ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; r == VG_OK && i < n; i++) l.transforms[i] = space + 7 * bones * i;
+    for (size_t b = 0; r == VG_OK && b < bones; b++)
+        memcpy(l.at + 3 * b, rig->at + 3 * (size_t)rig->bone[b], 3 * sizeof *l.at);
+    if (r == VG_OK) r = gather_vertices(&l, h, n, poses, SOME, e);
+    if (r == VG_OK) r = vgi_skin_near(&l.rig, l.nv, l.reference, e);
+    if (r == VG_OK) r = alternate(&l, false, 1e-4, ROUGH_STEPS, miss, e);
+    clear_learning(&l);
+    if (r == VG_OK) r = gather_vertices(&l, h, n, poses, nv, e);
+    if (r == VG_OK) r = learn_weights(&l, miss, e);
+    if (r == VG_OK) r = alternate(&l, true, 1e-5, FINE_STEPS, miss, e);
+    if (r == VG_OK) {
+        free(rig->skin_bone);
+        free(rig->skin_weight);
+        rig->skin_bone = l.rig.skin_bone, rig->skin_weight = l.rig.skin_weight;
+        l.rig.skin_bone = NULL, l.rig.skin_weight = NULL;
     }
-    free(transforms);
+    clear_learning(&l);
     free(space);
-    free(at);
-    free(left);
-    return code;
+    free(l.transforms);
+    free(l.rotations);
+    free(l.at);
+    return r;
 }

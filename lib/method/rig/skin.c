@@ -270,14 +270,13 @@ static void find_candidates(const skinning *x, const double *alone, quadratic *q
 {
     const vg_rig *r = x->r;
     q->n = 0;
-    while (q->n < BEST && q->n < r->nbones) {
-        size_t best = r->nbones;
-        for (size_t j = 0; j < r->nbones; j++) {
-            bool taken = false;
-            for (size_t i = 0; i < q->n; i++) taken |= q->bone[i] == j;
-            if (!taken && (best == r->nbones || alone[j] < alone[best])) best = j;
-        }
-        take_up(q, best);
+    for (size_t j = 0; j < r->nbones; j++) { /* the best so far, in order; of equal ones the first stays before */
+        size_t i = q->n;
+        if (i == BEST && !(alone[j] < alone[q->bone[i - 1]])) continue;
+        if (i < BEST) q->n++;
+        else i--;
+        for (; i > 0 && alone[j] < alone[q->bone[i - 1]]; i--) q->bone[i] = q->bone[i - 1];
+        q->bone[i] = (uint32_t)j;
     }
     for (size_t i = 0; i < 2 && i < q->n; i++) {
         uint32_t parent = r->skeleton.joints[r->bone[q->bone[i]]].parent;
