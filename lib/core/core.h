@@ -1,5 +1,5 @@
-/* core.h: what every layer of libvg leans on: memory with checked sizes, growing bytes, threads, byte order.
- * Internal; nothing here knows a mesh or a file.
+/* core.h: what every layer of libvg uses: checked allocation, growing byte arrays, threads, byte order. Internal;
+ * nothing here knows a mesh or a file.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CORE_H
 #define VG_CORE_H
@@ -11,7 +11,7 @@
 /* vgi_array: n elements of `size` bytes, zeroed; VG_ENOMEM in *e and NULL when there is no room or n * size
  * overflows. n = 0 gives a valid pointer. Release with free(). */
 void *vgi_array(size_t n, size_t size, vg_err *e);
-/* vgi_array_raw: the same, contents undefined. */
+/* vgi_array_raw: like vgi_array, but the contents are undefined. */
 void *vgi_array_raw(size_t n, size_t size, vg_err *e);
 /* vgi_copy_array: a copy of n elements. */
 void *vgi_copy_array(const void *from, size_t n, size_t size, vg_err *e);
@@ -24,36 +24,34 @@ bool vgi_mul(size_t a, size_t b, size_t *product); /* false on overflow */
 int vgi_bytes_reserve(vg_bytes *b, size_t cap, vg_err *e) VG_MUST_CHECK;
 int vgi_bytes_append(vg_bytes *b, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
 
-/* vgi_is_utf8: is it valid UTF-8 without NUL? */
+/* vgi_is_utf8: whether n bytes are valid UTF-8 without NUL. */
 bool vgi_is_utf8(const char *s, size_t n);
 
-/* vgi_finite: are all n numbers finite? */
+/* vgi_finite: whether all n numbers are finite. */
 bool vgi_finite(const double *x, size_t n);
 
-/* vgi_parallel: call task(context, i) for i in 0..n-1 from up to `threads` threads, the caller's among them, and
- * wait. Tasks are handed out in order; they must not depend on one another. With one thread it is a loop. */
+/* vgi_parallel: call task(context, i) for i = 0 .. n-1 on up to `threads` threads, including the caller's, and
+ * wait. Tasks start in order and must not depend on one another. With one thread this is a plain loop. */
 void vgi_parallel(int threads, size_t n, void (*task)(void *context, size_t i), void *context);
 
-/* A belt: things are put on it one after another, threads work on them in any order, and they are taken off in the
- * order in which they were put. Places are numbered from 0; the things that lie there are the caller's. Memory is
- * bounded by the number of places. One thread at a time calls what is below.
+/* A belt: an ordered work queue. The caller puts items on it one after another, threads process them in any order,
+ * and the caller takes them off in the order in which it put them. Places are numbered from 0; the caller owns the
+ * items stored there. Memory is bounded by the number of places. Only one thread at a time may call the functions
+ * below.
  *
- *     if (vgi_belt_full(b)) use(thing[vgi_belt_take(b)]);
- *     fill(thing[vgi_belt_place(b)]);
- *     vgi_belt_put(b);
- */
+ *     if (vgi_belt_full(b)) use(thing[vgi_belt_take(b)]); fill(thing[vgi_belt_place(b)]); vgi_belt_put(b); */
 typedef struct vgi_belt vgi_belt;
-/* vgi_belt_new: work(context, place) is done by up to `threads` threads, the caller's among them, which works while
- * it waits in vgi_belt_take. With one thread it is done there and nowhere else. */
+/* vgi_belt_new: up to `threads` threads call work(context, place), including the caller's thread while it waits in
+ * vgi_belt_take. With one thread all work is done inside vgi_belt_take. */
 int vgi_belt_new(vgi_belt **b, int threads, size_t places, void (*work)(void *context, size_t place), void *context,
                  vg_err *e) VG_MUST_CHECK;
-/* vgi_belt_free: waits for what is being worked on; the rest is not. */
+/* vgi_belt_free: waits for items that are being processed and drops those that have not started. */
 void vgi_belt_free(vgi_belt **b);
-size_t vgi_belt_things(const vgi_belt *b); /* how many are on it */
+size_t vgi_belt_things(const vgi_belt *b); /* number of items on the belt */
 bool vgi_belt_full(const vgi_belt *b);
-size_t vgi_belt_place(const vgi_belt *b);  /* where the next one goes; not when it is full */
-void vgi_belt_put(vgi_belt *b);            /* the thing at vgi_belt_place is there */
-/* vgi_belt_take: the place of the oldest, when the work on it is done; there is one. */
+size_t vgi_belt_place(const vgi_belt *b);  /* where the next item goes; only when the belt is not full */
+void vgi_belt_put(vgi_belt *b);            /* the item at vgi_belt_place is filled */
+/* vgi_belt_take: wait for the oldest item and return its place. The belt must not be empty. */
 size_t vgi_belt_take(vgi_belt *b);
 
 /* Little-endian numbers. */
@@ -76,7 +74,7 @@ static inline void vgi_put64(unsigned char *p, uint64_t x)
     vgi_put32(p + 4, (uint32_t)(x >> 32));
 }
 
-/* The bits of a number, and the number that has them. */
+/* Reinterpret a number as its bits, and back. */
 static inline uint32_t vgi_float_bits(float x)
 {
     uint32_t bits;

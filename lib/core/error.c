@@ -1,4 +1,4 @@
-/* error.c: the one way a failure is written down. Leaves out printing: that is the command's.
+/* error.c: records a failure in a vg_err. Printing is left to the commands.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 

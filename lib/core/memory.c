@@ -1,4 +1,4 @@
-/* memory.c: allocation with checked sizes, growing bytes, and the two scans of raw memory that input needs.
+/* memory.c: checked allocation, growing byte arrays, and two scans of input: UTF-8 and finite numbers.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/lanes.h"
 
@@ -103,7 +103,7 @@ bool vgi_is_utf8(const char *s, size_t n)
     return true;
 }
 
-/* x - x is 0 for finite x and NaN for others; bits are or-ed so that the loop needs no branch. */
+/* x - x is 0 for finite x and NaN otherwise; the bits are or-ed so that the loop has no branch. */
 static inline __attribute__((always_inline)) bool all_finite(const double *x, size_t n)
 {
     vgi_mask bad = {0};

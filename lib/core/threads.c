@@ -1,6 +1,6 @@
-/* threads.c: a pool of threads that is made once and waits for work: parallel loops, and belts, on which one thing
- * after another is worked on while the caller goes on. Leaves out everything about what is computed. One loop runs at
- * a time; a loop inside a loop runs alone.
+/* threads.c: a pool of threads, made once, that waits for work: parallel loops, and belts, on which items are
+ * processed while the caller continues. One loop runs at a time; a loop inside a loop runs on its own thread
+ * alone.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 
@@ -11,12 +11,12 @@
 enum { MOST_THREADS = 256 };
 
 struct vgi_belt {
-    vgi_belt *next; /* of those that workers look at */
-    bool shared;    /* workers look at it */
+    vgi_belt *next; /* belts that have work for the pool */
+    bool shared;    /* in the list of those belts */
     void (*work)(void *, size_t);
     void *context;
-    size_t places, first, n; /* things are at first, first + 1, ... (mod places) */
-    size_t begun, working;   /* of the n: taken up so far; being worked on */
+    size_t places, first, n; /* items are at first, first + 1, ... (mod places) */
+    size_t begun, working;   /* of the n items: started so far; being processed */
     bool *done;              /* by place */
 };
 
@@ -24,12 +24,12 @@ static struct {
     pthread_mutex_t lock;
     pthread_cond_t start, done;
     int workers;     /* threads made so far */
-    vgi_belt *belts; /* where something may wait */
-    /* the present loop: */
-    int wanted;      /* of the workers, how many may join it */
-    int running;     /* how many are in it */
+    vgi_belt *belts; /* a thread may be waiting for it */
+    /* the loop that is running: */
+    int wanted;      /* how many threads may join it */
+    int running;     /* how many threads are in it */
     uint64_t loop;   /* its number */
-    bool busy, open; /* there is one; it may be joined */
+    bool busy, open; /* a loop is running and may be joined */
     atomic_size_t next;
     size_t n;
     void (*task)(void *, size_t);
@@ -50,7 +50,7 @@ static void join_loop(void)
     if (--pool.running == 0) pthread_cond_broadcast(&pool.done);
 }
 
-/* Work on the next thing of a belt that nobody has taken up. */
+/* Process the next item of a belt that has not started. */
 static void advance(vgi_belt *b)
 {
     size_t place = (b->first + b->begun++) % b->places;
@@ -89,7 +89,7 @@ static void *work(void *arg)
     return NULL;
 }
 
-/* Fewer will do when no more can be made. */
+/* If a thread cannot be created, go on with those that exist. */
 static void make_workers(int n)
 {
     pthread_t t;
@@ -116,7 +116,7 @@ static bool open_loop(int threads, size_t n, void (*task)(void *, size_t), void 
     return mine;
 }
 
-/* All tasks have been taken up: wait for those that others do. */
+/* All tasks have started: wait for those that other threads run. */
 static void close_loop(void)
 {
     pthread_mutex_lock(&pool.lock);
@@ -161,7 +161,7 @@ void vgi_belt_free(vgi_belt **belt)
     vgi_belt *b = *belt;
     if (!b) return;
     pthread_mutex_lock(&pool.lock);
-    b->begun = b->n; /* what nobody has taken up nobody will */
+    b->begun = b->n; /* drop items that have not started */
     for (vgi_belt **at = &pool.belts; b->shared && *at; at = &(*at)->next) {
         if (*at != b) continue;
         *at = b->next;

@@ -1,6 +1,7 @@
-/* album.c: evenly spaced frames of a sequence whose length is not known before its end, in bounded memory.
- * Of every `stride` frames one is kept; when there is no more room every second one is let go and the stride doubles.
- * The last frame is always kept. Leaves out what is in a shot. SPDX-License-Identifier: GPL-3.0-or-later */
+/* album.c: keeps evenly spaced frames of a sequence of unknown length in bounded memory. One frame in `stride` is
+ * kept; when the memory is full every second one is dropped and the stride doubles. The last frame is always kept.
+ * Leaves out what a shot holds.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 static void clear_shot(vgi_shot *s)
@@ -21,7 +22,7 @@ static int make_shot(const vgi_album *a, vgi_shot *s, vg_err *e)
 int vgi_album_init(vgi_album *a, size_t nv, size_t want, vg_err *e)
 {
     *a = (vgi_album){.nv = nv, .want = want, .stride = 1};
-    /* one more: the last frame may join those that were kept */
+    /* one more, for the last frame */
     a->at = vgi_array(4 * want + 1, sizeof *a->at, e);
     a->cap = 4 * want;
     return a->at ? VG_OK : VG_ENOMEM;
@@ -44,7 +45,7 @@ static void swap_shots(vgi_shot *a, vgi_shot *b)
 static void thin_out(vgi_album *a)
 {
     size_t kept = (a->n + 1) / 2;
-    for (size_t i = 1; i < kept; i++) swap_shots(a->at + i, a->at + 2 * i); /* their memory is used again */
+    for (size_t i = 1; i < kept; i++) swap_shots(a->at + i, a->at + 2 * i); /* reuse their memory */
     a->n = kept;
     a->stride *= 2;
 }
@@ -64,7 +65,7 @@ int vgi_album_next(vgi_album *a, vgi_shot **shot, vg_err *e)
     return VG_OK;
 }
 
-/* The last frame joins those that were kept; its number. */
+/* Append the last frame to those that were kept; returns its number. */
 static size_t add_last(vgi_album *a)
 {
     if (a->seen == 0) return 0;
@@ -90,8 +91,8 @@ size_t vgi_album_close(vgi_album *a)
     if (a->n == 0) return 0;
     if (a->n <= a->want) return a->n;
     for (size_t i = 0, from = 0; i < a->want; i++) {
-        /* the frame nearest to the i-th of `want` evenly spaced ones; wanted ones are more than a stride apart, so
-         * that none is taken twice */
+        /* The frame nearest to the i-th of `want` evenly spaced ones. Wanted frames are more than a stride apart,
+         * so none is taken twice. */
         double at = a->want > 1 ? (double)i * (double)last / (double)(a->want - 1) : 0;
         while (from + 1 < a->n && (double)a->at[from + 1].index - at < at - (double)a->at[from].index) from++;
         if (from < i) from = i;

@@ -1,11 +1,10 @@
-/* camera.c: a parallel projection, so that lengths compare all over the sheet.
- * Leaves out perspective.
+/* camera.c: a parallel projection, so that lengths can be compared across the sheet. Leaves out perspective.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
 
-/* From axes with y up, in which the viewer turns, to the axes of the mesh: z up is y up seen with its front at -y. */
+/* From y-up axes, in which the viewer turns, to the axes of the mesh (z up: its front is -y). */
 static void to_mesh(const double v[3], bool z_up, float out[3])
 {
     out[0] = (float)v[0];
@@ -56,7 +55,7 @@ void vgi_camera_fit(vgi_camera *c, const vgi_box *box, double margin)
     if (!(w >= 0 && h >= 0)) return; /* nothing to see */
     c->x = (box->least[0] + box->most[0]) / 2;
     c->y = (box->least[1] + box->most[1]) / 2;
-    /* a single point, or a figure as flat as rounding: show one D */
+    /* a single point, or flat within rounding: show one D */
     if (fmax(w, h) < 1e-6) w = h = 1;
     c->scale = fmin((c->width - space) / fmax(w, 1e-9), (c->height - space) / fmax(h, 1e-9));
 }

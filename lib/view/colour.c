@@ -1,7 +1,8 @@
-/* colour.c: the colours of numbers and the way from linear light to the bytes of a picture.
- * The colour map is of our own making: a path in OKLab (Ottosson 2020) whose lightness grows evenly from a deep
- * indigo over teal to a light yellow, so that it also reads in grey and with colour-deficient eyes; and one with a
- * middle: from blue over a light grey to orange. Leaves out lights. SPDX-License-Identifier: GPL-3.0-or-later */
+/* colour.c: colour maps, and the conversion of linear light to bytes. The sequential map is a path in OKLab
+ * (Ottosson 2020) whose lightness rises evenly from deep indigo over teal to light yellow, so that it also reads
+ * in grey and with colour-deficient eyes. The diverging map goes from blue over light grey to orange. Leaves out
+ * lights.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
@@ -10,14 +11,14 @@ typedef struct stop { /* lightness, chroma, hue in degrees */
     double l, c, h;
 } stop;
 
-/* The darkest is light enough to be shaded and still show its shape. Chroma stays inside sRGB. */
+/* The darkest colour is light enough for shading to show the shape. Chroma stays inside sRGB. */
 static const stop rising[] = {
     {0.380, 0.130, 284}, {0.490, 0.115, 258}, {0.590, 0.105, 220}, {0.690, 0.120, 178},
     {0.780, 0.150, 150}, {0.860, 0.170, 125}, {0.930, 0.175, 105},
 };
 
-/* Both ends are nearly of one lightness, so that neither counts more; in the middle the hue may jump,
- * for there is no chroma. */
+/* Both ends have nearly the same lightness, so that neither dominates; the hue may jump in the middle, where there
+ * is no chroma. */
 static const stop parting[] = {
     {0.450, 0.150, 262}, {0.600, 0.130, 255}, {0.765, 0.080, 245}, {0.930, 0.000, 240},
     {0.930, 0.000, 62},  {0.790, 0.095, 62},  {0.640, 0.150, 50},  {0.480, 0.160, 36},

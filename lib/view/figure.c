@@ -1,14 +1,15 @@
-/* figure.c: what of a mesh is seen: the faces around its vertices, smooth normals that respect creases, and
- * triangles. Leaves out where things are on the picture. SPDX-License-Identifier: GPL-3.0-or-later */
+/* figure.c: the drawable form of a mesh: faces around vertices, smooth normals with creases, triangles. Leaves out
+ * projection.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
 
-/* Faces that meet at less than this angle are smoothed into one another: the limbs of a coarse figure with eight
- * faces around stay round (45 degrees each), the sides of a box stay flat. */
+/* Faces that meet at less than this angle are shaded as one smooth surface: a limb with eight faces around it (45
+ * degrees) stays round, a box keeps its edges. */
 #define CREASE_COSINE 0.64f /* 50 degrees */
 
-/* Around a vertex of more faces than this all are smoothed: comparing each with each would take too long. */
+/* Around a vertex with more faces than this all faces are smoothed; comparing every pair would take too long. */
 enum { MOST_COMPARED = 64 };
 
 bool *vgi_drawn_vertices(const vg_mesh *m, vg_err *e)
@@ -48,7 +49,7 @@ static void fill_ring(vgi_figure *g)
     for (size_t f = m->nf; f-- > 0;)
         if (m->start[f + 1] - m->start[f] > 2)
             for (size_t c = m->start[f]; c < m->start[f + 1]; c++) g->first[m->vert[c]] = (uint32_t)c;
-    /* filling has moved every start to its end, which is the start of the next */
+    /* filling has moved each start to its end, which is the start of the next */
     for (size_t v = m->nv; v > 0; v--) g->ring_start[v] = g->ring_start[v - 1];
     g->ring_start[0] = 0;
 }
@@ -111,8 +112,8 @@ static float dot(const float a[3], const float b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Newell: the area vector of a polygon that need not be planar,
- * taken about its first corner so that far away figures lose nothing. */
+/* Newell: the area vector of a polygon that need not be planar, taken about its first corner so that no digits are
+ * lost far from the origin. */
 static void area_vector(const vg_mesh *m, size_t f, const float *points, float area[3])
 {
     const uint32_t *v = m->vert + m->start[f];
@@ -128,7 +129,8 @@ static void area_vector(const vg_mesh *m, size_t f, const float *points, float a
     }
 }
 
-/* Of corner c. Where all faces around are smoothed it is that of the vertex's first corner, which has gone before. */
+/* The normal of corner c. Where all faces around the vertex are smoothed, it is that of the vertex's first corner,
+ * already computed. */
 static void corner_normal(const vgi_figure *g, size_t f, size_t c, const float *face, float *normals)
 {
     uint32_t v = g->mesh->vert[c];
@@ -166,8 +168,8 @@ void vgi_figure_normals(const vgi_figure *g, const float *points, float *face, f
 typedef struct clipping {
     const double *xy;
     double sign;               /* +1: counter-clockwise */
-    size_t *before, *after;    /* the corners that are left, as a ring */
-    size_t *reflex, nreflex;   /* corners that may lie in an ear */
+    size_t *before, *after;    /* the remaining corners, as a ring */
+    size_t *reflex, nreflex;   /* corners that may lie inside an ear */
 } clipping;
 
 static double turn(const clipping *k, size_t a, size_t b, size_t c)
@@ -188,7 +190,7 @@ static bool is_ear(const clipping *k, size_t b)
     return true;
 }
 
-/* Clipping an ear can only make corners convex, never reflex: drop those that have become so. */
+/* Clipping an ear can make corners convex but never reflex: drop those that became convex. */
 static void drop_convex(clipping *k, size_t gone)
 {
     size_t n = 0;
@@ -212,7 +214,7 @@ void vgi_ear_clip(const double *xy, size_t n, size_t *work, size_t *triangles)
     for (size_t left = n, t = 0; left > 2; left--, t++) {
         size_t tried = 0;
         while (tried < left && !is_ear(&k, b)) b = k.after[b], tried++;
-        /* none is an ear: the polygon touches or crosses itself. Any corner will do, so that the loop ends */
+        /* no ear: the polygon touches or crosses itself. Take any corner, so that the loop ends */
         size_t a = k.before[b], c = k.after[b];
         triangles[3 * t] = a, triangles[3 * t + 1] = b, triangles[3 * t + 2] = c;
         k.after[a] = c, k.before[c] = a;

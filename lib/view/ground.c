@@ -1,5 +1,6 @@
-/* ground.c: a grid where the reference pose stands, and the shadow of the figure straight above it: they show whether
- * a figure walks, jumps or slides. Leaves out shadows of the lights. SPDX-License-Identifier: GPL-3.0-or-later */
+/* ground.c: a grid at the height of the reference pose, and a shadow straight below the figure: they show whether
+ * a figure walks, jumps or slides. Leaves out shadows cast by the lights.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
@@ -16,7 +17,7 @@ static double dot(const double a[3], const float b[3])
 
 /* ---- shadow ---- */
 
-/* A mean over 2 * SHADOW_BLUR + 1 entries, n of them `stride` apart. */
+/* Box blur over 2 * SHADOW_BLUR + 1 entries; n entries, `stride` apart. */
 static void blur_line(float *x, size_t n, size_t stride, float *line)
 {
     for (size_t i = 0; i < n; i++) line[i] = x[i * stride];
@@ -38,7 +39,7 @@ static void blur(float *x, size_t n)
 
 int vgi_ground_shadow(vgi_ground *g, const vgi_drawing *d, vg_err *e)
 {
-    /* seen from below, the nearest surface is the lowest */
+    /* seen from below, the nearest surface is the lowest one */
     vgi_camera below = {.width = SHADOW_SIZE, .height = SHADOW_SIZE};
     for (int k = 0; k < 3; k++) {
         below.right[k] = (float)g->across[k];
@@ -78,13 +79,13 @@ static float shadow_at(const vgi_ground *g, double across, double along)
     float u = (float)(x - (double)i), v = (float)(y - (double)j);
     const float *p = g->shadow + j * g->n + i, *q = p + g->n;
     float mean = (1 - v) * ((1 - u) * p[0] + u * p[1]) + v * ((1 - u) * q[0] + u * q[1]);
-    float raised = fminf(2 * mean, 1); /* small feet are lost in the blur */
+    float raised = fminf(2 * mean, 1); /* keep small feet visible after the blur */
     return raised * (1 - 0.25f * raised);
 }
 
 /* ---- grid ---- */
 
-/* How much of a line one pixel wide covers, at a distance in pixels. */
+/* Coverage of a line one pixel wide at a distance in pixels. */
 static double line_cover(double world, double spacing, double per_pixel)
 {
     double off = fabs(world - spacing * round(world / spacing)) / fmax(per_pixel, 1e-12);
@@ -100,7 +101,7 @@ static double smooth_step(double a, double b, double x)
 float vgi_ground_light(const vgi_ground *g, const vgi_camera *c, double x, double y, double pixel)
 {
     double rise = dot(g->vertical, c->toward), tilt = dot(g->vertical, c->up);
-    if (fabs(rise) < 0.02) /* seen from the side the ground is a line */
+    if (fabs(rise) < 0.02) /* seen from the side, the ground is a line */
         return fabs(y * tilt - g->height) < pixel / 2 ? 1 - 2 * LINE_DEPTH : 1;
     double z = (g->height - y * tilt) / rise; /* right has no rise */
     double at[2], change[2];

@@ -1,5 +1,4 @@
-/* legend.c: the bar of colours with its numbers, and the lines around it.
- * Leaves out where it stands on the sheet.
+/* legend.c: the colour bar with its numbers and the lines of text around it. Leaves out its position on the sheet.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
@@ -25,7 +24,7 @@ static void put_bar(vgi_canvas *c, const vgi_tint *t, const vgi_palette *p, size
         }
 }
 
-/* Under the bar as many numbers as there is room for; a map with a middle has a number there. */
+/* As many numbers under the bar as fit; a diverging map has a number in its middle. */
 static void put_ticks(vgi_canvas *c, const vgi_tint *t, size_t x, size_t y, size_t w)
 {
     size_t parts = w >= 330 ? (t->diverging ? 4 : 5) : w >= 170 ? 2 : 1;

@@ -1,5 +1,5 @@
-/* page.c: the page that plays sequences in a browser: takes frames, packs them, says what was lost, and puts the
- * player to them. Leaves out how numbers are packed (page_data.c) and how they are drawn (page_*.js).
+/* page.c: writes the page that plays sequences in a browser: takes frames, packs them, measures what the packing
+ * loses, and adds the player. Leaves out how numbers are packed (page_data.c) and how they are drawn (page_*.js).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/page.h"
 
@@ -10,24 +10,24 @@
 
 enum {
     FLUSH_BYTES = 1 << 18,
-    LINE_BYTES = 1 << 20,   /* of the data of a block that become text at once; a multiple of 3 */
-    MOST_CLIPPED = 4096,    /* corners of a face that is cut by ear clipping */
-    MAP_STEPS = 65,         /* colours of the map that the page gets: one is its middle */
-    DECADES = 60, PER_DECADE = 200, /* of the histogram of what is coloured */
+    LINE_BYTES = 1 << 20,   /* bytes of a block encoded as text at a time; a multiple of 3 */
+    MOST_CLIPPED = 4096,    /* largest face that is cut by ear clipping */
+    MAP_STEPS = 65,         /* samples of the colour map in the page; odd, so that one is its middle */
+    DECADES = 60, PER_DECADE = 200, /* of the histogram of the coloured numbers */
 };
 #define LEAST_COUNTED 1e-30
 
 typedef struct sequence {
     const char *label;
     const vg_head *head;
-    bool *drawn;               /* nv: vertices that are seen */
+    bool *drawn;               /* nv: vertices that are visible */
     double centre[3], diagonal, unit;
-    vgi_hull path, figure;     /* where it is in all frames, and that relative to the centroid of each */
+    vgi_hull path, figure;     /* extent over all frames, and relative to the centroid of each frame */
     vgi_track places, numbers;
     vgi_meter meter;
-    bool tinted, compared;     /* colours say something of it; they say errors */
+    bool tinted, compared;     /* frames have numbers to be coloured; these are errors */
     vgi_chunk chunk;
-    vg_bytes names, times, means, minima, maxima; /* of the frames, as JSON lists that are open at their end */
+    vg_bytes names, times, means, minima, maxima; /* per frame, as JSON lists without their closing bracket */
     bool timed;
     double last_time, loss;
     size_t frames;
@@ -37,7 +37,7 @@ struct vg_page {
     vg_page_options o;
     int fd;
     char *name;
-    const char *rest;          /* of the template, not yet written */
+    const char *rest;          /* the part of the template not yet written */
     vg_bytes out;
     uint64_t bytes;
     size_t n;
@@ -45,7 +45,7 @@ struct vg_page {
     uint64_t histogram[DECADES * PER_DECADE + 1], counted;
     uint64_t counted_frames;
     vgi_tint tint;
-    vgi_spread spread;         /* of what is coloured: mean is a sum until the end */
+    vgi_spread spread;         /* of the coloured numbers; mean is a sum until the end */
 };
 
 /* ---- writing ---- */
@@ -69,7 +69,7 @@ static int put_text(vg_page *p, const char *text, vg_err *e)
     return put(p, text, strlen(text), e);
 }
 
-/* The template up to a mark, which is left out; or to its end. */
+/* Copy the template up to a mark, which is left out, or to its end. */
 static int put_template(vg_page *p, const char *mark, vg_err *e)
 {
     const char *at = mark ? strstr(p->rest, mark) : p->rest + strlen(p->rest);
@@ -88,7 +88,7 @@ static int put_escaped(vg_page *p, const char *text, vg_err *e)
     return r;
 }
 
-/* A block of packed data. */
+/* A block of packed data as text. */
 static int put_packed(vg_page *p, const vg_bytes *packed, vg_err *e)
 {
     int r = VG_OK;
@@ -115,7 +115,7 @@ static int put_list(vg_page *p, size_t i, const char *what, const uint32_t *list
     return r;
 }
 
-/* A face in a plane: seen along the axis that its normal is nearest to. That distorts angles, which do not matter. */
+/* Project a face along the axis nearest to its normal. This distorts angles, which does not matter here. */
 static bool flatten_face(const uint32_t *v, size_t n, const double *points, double *xy)
 {
     double normal[3] = {0, 0, 0};
@@ -142,7 +142,7 @@ typedef struct cutter {
     size_t *work, *triangles;
 } cutter;
 
-/* The positions of the corners of n - 2 triangles. */
+/* The corner positions of n - 2 triangles. */
 static void cut_face(const cutter *k, const uint32_t *v, size_t n, const double *points, uint32_t *out)
 {
     bool fan = n == 3 || n > MOST_CLIPPED || !flatten_face(v, n, points, k->xy);
@@ -247,7 +247,7 @@ static int put_chunk(vg_page *p, size_t i, const char *what, vgi_track *t, vg_er
     return r;
 }
 
-/* Which numbers there are: the upper end of each step of the histogram is LEAST_COUNTED * 10^(step / PER_DECADE). */
+/* Count a number. The upper end of step i of the histogram is LEAST_COUNTED * 10^(i / PER_DECADE). */
 static void count_number(vg_page *p, double number)
 {
     double size = fabs(number), at = size > LEAST_COUNTED ? ceil(log10(size / LEAST_COUNTED) * PER_DECADE) : 0;
@@ -267,7 +267,7 @@ static int list_spread(sequence *s, const vgi_tint *t, const vgi_spread *x, vg_e
     return r;
 }
 
-/* Whether colours say something of a sequence is known by its first frame. */
+/* The first frame decides whether a sequence has numbers to be coloured. */
 static int begin_numbers(vg_page *p, sequence *s, const vg_frame *f, const double *truth, vg_err *e)
 {
     s->tinted = vgi_tint_has(&p->tint, f, truth);
@@ -304,7 +304,7 @@ static int add_label(sequence *s, const vg_frame *f, vg_err *e)
 {
     int r = vgi_page_next(&s->names, e);
     if (r == VG_OK) r = vgi_page_string(&s->names, f->name, e);
-    /* times that do not grow are no times to play by */
+    /* times that do not increase are not used for playing */
     s->timed = s->timed && f->has_time && isfinite(f->time) && f->time > s->last_time;
     s->last_time = f->time;
     if (r < 0 || !s->timed) return r;
@@ -483,7 +483,7 @@ static int json_joints(vg_bytes *b, const vg_body *body, vg_err *e)
     return r;
 }
 
-/* What is compared is shown in the place and unit of the truth. */
+/* A compared sequence is shown in the place and units of the truth. */
 static const sequence *frame_of(const vg_page *p, const sequence *s)
 {
     return s->compared ? p->at + 1 : s;
@@ -532,7 +532,7 @@ static int json_map(vg_bytes *b, bool diverging, vg_err *e)
     return vgi_page_field_text(b, "map", text, e);
 }
 
-/* What the colours of the page say, and where they end; numbers of scales are logarithms to base 2. */
+/* What the colours mean and where they end; scales are logarithms to base 2. */
 static int json_tint(vg_bytes *b, const vg_page *p, vg_err *e)
 {
     static const char *const kinds[] = {"scalars", "errors", "scales", "plain"};

@@ -1,5 +1,5 @@
-/* page.h: what the files of the page share: numbers packed into text, JSON, and the page's own texts.
- * Internal; the page a C program may ask for is vg_page in vg.h.
+/* page.h: shared by the files of the page: packing of numbers into text, JSON, and the texts of the page.
+ * Internal; the public interface is vg_page in vg.h.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_PAGE_H
 #define VG_PAGE_H
@@ -9,69 +9,70 @@
 /* ---- page_data.c ----
  *
  * A chunk holds n frames of nv x width numbers. Each axis of a chunk has an origin and a step: a number is origin +
- * step * q, q an integer of 16 bits. Frame by frame, axis by axis, vertex by vertex, q is predicted, and what is left
- * (modulo 2^16, then 0 -1 1 -2 2 ... as 0 1 2 3 4 ...) is kept. The prediction is chosen for each frame; its number
- * is a sum:
- *     0 nothing, 1 the frame before, 2 that and the step that led to it (all within the chunk),
- *     4: what is left is predicted by what was left of the vertex before (of the same axis; 0 for the first).
- * Bytes: n of predictions, then all upper bytes, then all lower bytes; deflated with a zlib head. Lists of 32 bit
+ * step * q, where q is a 16-bit integer. Frame by frame, axis by axis, vertex by vertex, q is predicted and the
+ * residual (modulo 2^16, then zigzag: 0 -1 1 -2 2 ... as 0 1 2 3 4 ...) is stored. The predictor is chosen per frame;
+ * its number is a sum of: 0 none; 1 the previous frame; 2 the previous frame plus the step that led to it (within the
+ * chunk); 4: the residual is itself predicted by that of the previous vertex (of the same axis; 0 for the first).
+ *
+ * Bytes: n predictor numbers, all upper bytes, all lower bytes; deflated with a zlib header. Lists of 32-bit
  * numbers are four such planes, the uppermost first. In the page both are base64. */
 
 enum { VGI_PREDICT_FRAME = 1, VGI_PREDICT_MOTION = 2, VGI_PREDICT_NEIGHBOUR = 4 };
 
-typedef struct vgi_track { /* frames on their way into a chunk */
+typedef struct vgi_track { /* frames waiting to become a chunk */
     size_t nv, width, n, cap;
-    double *values;      /* cap frames of nv * width, as they came */
-    uint16_t *q;         /* the same, axis by axis */
-    unsigned char *left; /* cap + 2 * cap * nv * width */
+    double *values;      /* cap frames of nv * width, as given */
+    uint16_t *q;         /* the same, quantised, axis by axis */
+    unsigned char *left; /* residuals: cap + 2 * cap * nv * width */
 } vgi_track;
 
 typedef struct vgi_chunk {
     size_t n;
     double origin[3], step[3];
-    double loss; /* the largest distance of an element from what is kept of it */
+    double loss; /* the largest distance of an element from its quantised position */
     vg_bytes packed;
 } vgi_chunk;
 
 int vgi_track_init(vgi_track *t, size_t nv, size_t width, vg_err *e) VG_MUST_CHECK;
 void vgi_track_clear(vgi_track *t);
-/* vgi_track_next: where the numbers of the next frame go. There must be room: n < cap. */
+/* vgi_track_next: where the caller puts the numbers of the next frame. n must be less than cap. */
 double *vgi_track_next(vgi_track *t);
-/* vgi_track_pack: all frames into c, and none left. c->packed is overwritten; the caller clears it in the end. */
+/* vgi_track_pack: pack all frames into c and empty the track. c->packed is overwritten; the caller clears it at
+ * the end. */
 int vgi_track_pack(vgi_track *t, vgi_chunk *c, vg_err *e) VG_MUST_CHECK;
-/* vgi_pack_list: n numbers of 32 bits, each less the one before it if `differences` (modulo 2^32). */
+/* vgi_pack_list: pack n 32-bit numbers; `differences`: each minus the one before it (modulo 2^32). */
 int vgi_pack_list(vg_bytes *packed, const uint32_t *list, size_t n, bool differences, vg_err *e) VG_MUST_CHECK;
-/* vgi_base64: append n bytes as text; n is a multiple of 3 unless they are the last. */
+/* vgi_base64: append n bytes as text; n must be a multiple of 3 except at the end. */
 int vgi_base64(vg_bytes *text, const unsigned char *data, size_t n, vg_err *e) VG_MUST_CHECK;
 
-/* ---- page_json.c: text appended to b. What is no UTF-8 loses all that is not ASCII. ---- */
+/* ---- page_json.c: text appended to b. In text that is not UTF-8, bytes beyond ASCII become '?'. ---- */
 
 int vgi_page_escape(vg_bytes *b, const char *text, vg_err *e) VG_MUST_CHECK; /* for HTML, also between quotes */
-/* JSON that may stand inside of a script element: no '<', so that nothing ends it. */
+/* JSON for a script element: contains no '<', so that nothing ends the element. */
 int vgi_page_raw(vg_bytes *b, const char *text, vg_err *e) VG_MUST_CHECK; /* as it is */
 int vgi_page_string(vg_bytes *b, const char *text, vg_err *e) VG_MUST_CHECK;
-int vgi_page_number(vg_bytes *b, double x, vg_err *e) VG_MUST_CHECK; /* all digits; null when it is not finite */
-int vgi_page_short(vg_bytes *b, double x, vg_err *e) VG_MUST_CHECK;  /* as many digits as are worth being shown */
-/* The next field of an object: its name alone, or with its value. */
+int vgi_page_number(vg_bytes *b, double x, vg_err *e) VG_MUST_CHECK; /* all digits; null when not finite */
+int vgi_page_short(vg_bytes *b, double x, vg_err *e) VG_MUST_CHECK;  /* rounded to binary32 */
+/* The next field of an object: its name alone, or name and value. */
 int vgi_page_field(vg_bytes *b, const char *name, vg_err *e) VG_MUST_CHECK;
 int vgi_page_field_text(vg_bytes *b, const char *name, const char *text, vg_err *e) VG_MUST_CHECK;
 int vgi_page_field_number(vg_bytes *b, const char *name, double x, vg_err *e) VG_MUST_CHECK;
 int vgi_page_field_flag(vg_bytes *b, const char *name, bool x, vg_err *e) VG_MUST_CHECK;
-/* open_list: what vgi_page_next has begun, an element behind each; without elements it is empty. */
+/* open_list: a list that vgi_page_next began, without its closing bracket; may be empty. */
 int vgi_page_field_list(vg_bytes *b, const char *name, const vg_bytes *open_list, vg_err *e) VG_MUST_CHECK;
 int vgi_page_next(vg_bytes *list, vg_err *e) VG_MUST_CHECK;
 
 /* ---- hull.c: what a camera has to show of a sequence ---- */
 
 enum { VGI_HULL = 26 };
-typedef struct vgi_hull { /* the outermost points in 26 directions, of all frames so far */
-    size_t n;             /* VGI_HULL, or 0: there are none */
+typedef struct vgi_hull { /* the outermost points in 26 directions over all frames so far */
+    size_t n;             /* VGI_HULL, or 0 when there are no points */
     double reach[VGI_HULL], at[VGI_HULL][3];
 } vgi_hull;
-/* vgi_hull_add: the drawn ones of nv points of a frame, relative to `centre`. */
+/* vgi_hull_add: add the drawn vertices of a frame (nv points), relative to `centre`. */
 void vgi_hull_add(vgi_hull *h, const double *points, const bool *drawn, size_t nv, const double centre[3]);
 
-/* ---- page_text.c, made by the Makefile from page.html, page.css and the files page_*.js; each ends with a 0 ---- */
+/* ---- page_text.c, made by the Makefile from page.html, page.css and page_*.js; each ends with a 0 ---- */
 
 extern const char vgi_page_html[], vgi_page_css[], vgi_page_js[];
 

@@ -1,5 +1,5 @@
-/* page_data.c: poses as few bytes: quantised, predicted, split into planes, deflated, as text.
- * Leaves out what the numbers mean. page.h has the format; page.js reads it.
+/* page_data.c: packs poses into few bytes: quantised, predicted, split into byte planes, deflated, base64. Leaves
+ * out what the numbers mean. page.h documents the format; page_read.js reads it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/page.h"
 
@@ -8,7 +8,7 @@
 
 enum {
     CHUNK_FRAMES = 32,
-    CHUNK_BYTES = 64 << 20,   /* of frames in binary64, unless a single one is larger */
+    CHUNK_BYTES = 64 << 20,   /* in binary64, unless one frame is larger */
     DEFLATE_STEP = 1 << 28,   /* zlib counts in 32 bits */
     LEVELS = 65535,
 };
@@ -24,7 +24,7 @@ static int deflate_all(vg_bytes *packed, const unsigned char *data, size_t n, vg
 {
     z_stream z = {0};
     packed->size = 0;
-    /* what is left of a prediction is noise in the lower bytes, where looking for repetitions only takes time */
+    /* the lower bytes of residuals are noise: searching them for repetitions only costs time */
     if (deflateInit2(&z, 4, Z_DEFLATED, 15, 9, Z_FILTERED) != Z_OK) return zlib_fails(&z, e);
     int r, status = VG_OK;
     size_t at = 0;
@@ -92,9 +92,9 @@ static void find_steps(const vgi_track *t, vgi_chunk *c)
             least = x < least ? x : least;
             most = x > most ? x : most;
         }
-        if (!(least <= most)) continue; /* nothing there */
+        if (!(least <= most)) continue; /* no vertices */
         c->origin[k] = least;
-        c->step[k] = most / LEVELS - least / LEVELS; /* most - least may be more than a double can hold */
+        c->step[k] = most / LEVELS - least / LEVELS; /* most - least may overflow */
     }
 }
 
@@ -121,7 +121,7 @@ static void quantise(vgi_track *t, vgi_chunk *c)
     c->loss = sqrt(worst);
 }
 
-/* What is left of a value that stands `frame` values behind that of the frame before; everything is modulo 2^16. */
+/* The residual of a value whose predecessor stands `frame` values before it; modulo 2^16. */
 static inline uint16_t remainder_of(const uint16_t *q, ptrdiff_t frame, unsigned how)
 {
     unsigned x = *q;
@@ -130,12 +130,12 @@ static inline uint16_t remainder_of(const uint16_t *q, ptrdiff_t frame, unsigned
     return (uint16_t)x;
 }
 
-static inline uint16_t fold(uint16_t x) /* 0 -1 1 -2 2 ... to 0 1 2 3 4 ... */
+static inline uint16_t fold(uint16_t x) /* zigzag: 0 -1 1 -2 2 ... to 0 1 2 3 4 ... */
 {
     return (uint16_t)(x & 0x8000 ? ~(x << 1) : x << 1);
 }
 
-/* Predict a frame: the bits that are left, or, unless upper is NULL, the two bytes of each value. */
+/* Predict a frame: returns the bits of its residuals, or, if upper is not NULL, stores the two bytes of each. */
 static inline __attribute__((always_inline)) uint64_t predict(const uint16_t *values, const vgi_track *t,
                                                               unsigned how, unsigned char *upper,
                                                               unsigned char *lower)
@@ -158,7 +158,7 @@ static inline __attribute__((always_inline)) uint64_t predict(const uint16_t *va
 
 static uint64_t count_bits(const uint16_t *q, const vgi_track *t, unsigned how)
 {
-    switch (how) { /* so that each loop is made for its prediction */
+    switch (how) { /* so that the compiler specialises each loop */
     case 0: return predict(q, t, 0, NULL, NULL);
     case 1: return predict(q, t, 1, NULL, NULL);
     case 2: return predict(q, t, 2, NULL, NULL);
@@ -175,7 +175,7 @@ static unsigned choose(const vgi_track *t, size_t i)
     unsigned best = 0;
     uint64_t least = UINT64_MAX;
     for (size_t j = 0; j < sizeof ways / sizeof *ways; j++) {
-        if ((ways[j] & 3) > i) continue; /* so many frames are not there */
+        if ((ways[j] & 3) > i) continue; /* needs more previous frames than there are */
         uint64_t bits = count_bits(q, t, ways[j]);
         if (bits < least) least = bits, best = ways[j];
     }

@@ -1,5 +1,4 @@
-/* page_json.c: text as it may stand inside of a page: in HTML, and as JSON in a script element.
- * Leaves out what it says.
+/* page_json.c: escapes text for HTML, and for JSON inside a script element. Leaves out its content.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/page.h"
 
@@ -8,7 +7,7 @@
 #include <math.h>
 #include <stdio.h>
 
-/* What is not ASCII in a text that is no UTF-8, such as the name of a file, becomes '?'. */
+/* In text that is not UTF-8, such as some file names, every byte beyond ASCII becomes '?'. */
 static char shown(char c, bool utf8)
 {
     return (unsigned char)c >= 0x80 && !utf8 ? '?' : c;

@@ -1,5 +1,5 @@
-/* png.c: a picture as PNG, row by row. The one file that knows libpng.
- * Leaves out times and texts: the same picture gives the same bytes.
+/* png.c: writes a PNG row by row. The only file that includes libpng. Writes no time or text chunks: the same
+ * picture gives the same bytes.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
@@ -29,7 +29,7 @@ static void on_error(png_structp png, png_const_charp message)
 
 static void on_warning(png_structp png, png_const_charp message)
 {
-    (void)png, (void)message; /* about colour profiles and the like, which are not written */
+    (void)png, (void)message; /* libpng warns about colour profiles and the like, which are not written */
 }
 
 static int flush(vgi_png *p)
@@ -49,7 +49,7 @@ static void on_write(png_structp png, png_bytep data, size_t n)
 
 static void on_flush(png_structp png)
 {
-    (void)png; /* vgi_png_end does it */
+    (void)png; /* vgi_png_end reports it */
 }
 
 static int give_error(const vgi_png *p, vg_err *e)
@@ -65,7 +65,7 @@ static int start(vgi_png *p, size_t w, size_t h)
     if (!p->info) return vg_fail(&p->err, VG_ENOMEM, "not enough memory for the picture '%s'", p->name);
     if (setjmp(png_jmpbuf(p->png))) return p->err.code;
     png_set_write_fn(p->png, p, on_write, on_flush);
-    /* fixed, so that the bytes do not depend on defaults. Rows of smooth shading compress best with these filters */
+    /* fixed, so that the bytes do not depend on defaults; these filters suit smooth shading best */
     png_set_compression_level(p->png, 6);
     png_set_compression_mem_level(p->png, 8);
     png_set_filter(p->png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB | PNG_FILTER_UP | PNG_FILTER_PAETH);

@@ -1,18 +1,17 @@
-/* raster.c: which surface is seen at which sample: triangles and round wires against a z-buffer.
- * Leaves out light and colour: a sample keeps depth, normal and value for shade.c.
+/* raster.c: visibility: triangles and round wires against a z-buffer. Leaves out light and colour: a sample keeps
+ * depth, normal and value for shade.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
 
-/* Positions are rounded to 1/256 of a sample, and the sides of triangles are evaluated in integers: two faces that
- * share a side then leave no gap between them. */
+/* Positions are rounded to 1/256 of a sample and the sides of triangles are evaluated in integers, so that faces
+ * sharing a side leave no gap. */
 enum { GRID = 256 };
-/* Pictures are at most 2^15 samples wide; what is farther out than this is not drawn, so that products fit 64 bits.
- */
+/* Pictures are at most 2^15 samples wide; anything further out is not drawn, so that products fit 64 bits. */
 #define FAR_OUT 1e6f
 
-/* A concave face of more corners than this is drawn as if it were convex. */
+/* A concave face with more corners than this is drawn as if it were convex. */
 enum { MOST_EARS = 4096 };
 
 int vgi_raster_init(vgi_raster *r, size_t w, size_t h, vg_err *e)
@@ -59,7 +58,7 @@ static side side_of(const int64_t p[2], const int64_t q[2], int64_t x, int64_t y
     return (side){ux * (y - p[1]) - uy * (x - p[0]), -uy * GRID, ux * GRID};
 }
 
-typedef struct span { /* the samples to look at, end excluded */
+typedef struct span { /* the range of samples to test, end excluded */
     size_t x0, x1, y0, y1;
 } span;
 
@@ -101,7 +100,7 @@ static void draw_triangle(vgi_raster *r, const vgi_corner *const corner[3], unsi
     double x0 = fmin(fmin(c[0]->x, c[1]->x), c[2]->x), x1 = fmax(fmax(c[0]->x, c[1]->x), c[2]->x);
     double y0 = fmin(fmin(c[0]->y, c[1]->y), c[2]->y), y1 = fmax(fmax(c[0]->y, c[1]->y), c[2]->y);
     if (area == 0 || !clip_span(r, x0 - 1, x1, y0 - 1, y1, &s)) return;
-    /* y goes down: a face that is counter-clockwise for the viewer has a negative area here */
+    /* y points down: a face that is counter-clockwise for the viewer has a negative area here */
     float facing = area < 0 ? 1 : -1;
     int64_t sign = area < 0 ? -1 : 1;
     float inverse = 1 / (float)(area * sign), height[3];
@@ -129,8 +128,8 @@ static void draw_triangle(vgi_raster *r, const vgi_corner *const corner[3], unsi
 
 /* ---- wires ---- */
 
-/* Where a row meets the strip of the given radius around the line through a and b; the caller has clipped to the box
- * of the rounded ends. */
+/* The part of a row inside the strip of the given radius around the line a-b; the caller has clipped to the box of
+ * the rounded ends. */
 static void strip(const vgi_corner *a, float dx, float dy, float reach, double y, size_t *x0, size_t *x1)
 {
     if (fabsf(dy) < 1e-3f) return;
@@ -169,8 +168,8 @@ typedef struct work { /* of one drawing */
     vgi_raster *raster;
     const vgi_drawing *drawing;
     float *seen, *face, *normals;
-    vgi_corner *corner; /* of the present face, and one more for its middle */
-    double *flat;       /* the face laid into the plane */
+    vgi_corner *corner; /* of the current face, plus one for its middle */
+    double *flat;       /* the face projected into a plane */
     size_t *clip, *triangles;
 } work;
 
@@ -189,7 +188,7 @@ static void load_corner(const work *k, uint32_t v, const float *normal, vgi_corn
     else to->normal[0] = to->normal[1] = 0, to->normal[2] = 1;
 }
 
-/* The mean of the corners: the middle of a fan, which treats all corners alike. */
+/* The mean of the corners: the centre of a fan that treats all corners alike. */
 static void load_middle(vgi_corner *corner, size_t n)
 {
     vgi_corner sum = {0};
@@ -204,7 +203,7 @@ static void load_middle(vgi_corner *corner, size_t n)
     corner[n] = sum;
 }
 
-/* Can the face be seen as a fan about its middle: does no triangle of the fan turn against the face's own normal? */
+/* Whether the face can be drawn as a fan about its centre: no triangle of the fan turns against the face's normal. */
 static bool is_fan(const vgi_corner *c, size_t n, const float area[3])
 {
     const vgi_corner *o = c + n;
@@ -219,7 +218,7 @@ static bool is_fan(const vgi_corner *c, size_t n, const float area[3])
     return true;
 }
 
-/* The area vector of the corners as they are seen. */
+/* The projected area vector of the corners. */
 static void seen_area(const vgi_corner *c, size_t n, float area[3])
 {
     area[0] = area[1] = area[2] = 0;
@@ -240,7 +239,7 @@ static void draw_fan(work *k, size_t n)
     }
 }
 
-/* Lay the face along the axis in which its area is largest, which keeps its shape as well as can be. */
+/* Project along the axis in which the area is largest, which distorts the shape least. */
 static void draw_ears(work *k, size_t n, const float area[3])
 {
     int drop = 0;
@@ -293,8 +292,8 @@ static bool is_empty(const vgi_raster *r)
     return true;
 }
 
-/* A flat figure seen from its side covers no sample, nor does one that has shrunk to a line or a point:
- * draw its edges. */
+/* A flat figure seen from the side, or one that has collapsed to a line or point, covers no sample: draw its
+ * edges. */
 static void draw_edges(work *k, float radius)
 {
     const vg_mesh *m = k->drawing->figure->mesh;
@@ -308,15 +307,15 @@ static void draw_edges(work *k, float radius)
     }
 }
 
-/* Does the face turn its front to the viewer? Seen along an edge of it, it does not. */
+/* Whether the face turns its front to the viewer; false when seen edge-on. */
 static bool faces_viewer(const work *k, const vgi_side *s)
 {
     const float *area = k->face + 3 * (size_t)s->face, *toward = k->drawing->camera->toward;
     return area[0] * toward[0] + area[1] * toward[1] + area[2] * toward[2] > 0;
 }
 
-/* An edge is on the contour when a front meets a back there, or a surface ends. Faces that go the same way along
- * their edge are of different orientation: what is front of one is back of the other. */
+/* An edge is on the contour when a front face meets a back face there, or at a border. Faces that run the same way
+ * along their edge have opposite orientation: the front of one is the back of the other. */
 static bool is_contour(const work *k, const vgi_side *s, size_t n)
 {
     if (n == 1) return true;
@@ -325,7 +324,7 @@ static bool is_contour(const work *k, const vgi_side *s, size_t n)
     return false;
 }
 
-/* Contours are wires around their edges: what lies before a surface hides them with it. */
+/* Contours are drawn as wires around edges: a surface in front hides them. */
 static void draw_contours(work *k, float radius)
 {
     const vgi_figure *g = k->drawing->figure;

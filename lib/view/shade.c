@@ -1,5 +1,5 @@
-/* shade.c: from samples to pixels: clay or error colours under fixed lights, shade in corners, outlines.
- * The lights stand around the viewer, not around the figure: every view is lit alike. Leaves out visibility.
+/* shade.c: from samples to pixels: clay or mapped colours under fixed lights, ambient occlusion, outlines. The
+ * lights move with the viewer, so that every view is lit alike. Leaves out visibility.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/colour.h"
 #include "view/view.h"
@@ -8,9 +8,9 @@
 
 enum { TAPS = 24, PATTERN = 4 };
 
-/* Directions in the eye's axes: x right, y up, z towards the viewer. All of unit length. */
+/* Unit directions in the eye's axes: x right, y up, z towards the viewer. */
 static const float key[3] = {-0.5194f, 0.5993f, 0.6092f};
-static const float half_way[3] = {-0.2895f, 0.3340f, 0.8970f}; /* between key and viewer */
+static const float half_way[3] = {-0.2895f, 0.3340f, 0.8970f}; /* half-way between key light and viewer */
 static const float fill[3] = {0.8421f, 0.1050f, 0.5290f};
 static const float rim[3] = {0.5902f, 0.5202f, -0.6173f};
 
@@ -29,7 +29,7 @@ static float clamp01(float x)
     return x < 0 ? 0 : x > 1 ? 1 : x;
 }
 
-/* ---- shade in corners (ambient occlusion in the plane of the picture) ---- */
+/* ---- ambient occlusion in the plane of the picture ---- */
 
 typedef struct pixels {
     const vgi_raster *r;
@@ -45,13 +45,13 @@ static const vgi_sample *middle_sample(const pixels *p, size_t x, size_t y)
 static void unit_normal(const vgi_sample *s, float n[3])
 {
     for (int k = 0; k < 3; k++) n[k] = s->normal[k];
-    if (n[2] < 0) n[2] = 0; /* a smooth normal may lean away at the outline */
+    if (n[2] < 0) n[2] = 0; /* a smooth normal may point away at the outline */
     float size = sqrtf(dot(n, n));
     if (!(size > 0)) n[0] = n[1] = 0, n[2] = size = 1;
     for (int k = 0; k < 3; k++) n[k] /= size;
 }
 
-/* One tap: how much of the sky of s its neighbour t hides. */
+/* One tap: how much of the sky of sample s its neighbour t hides. */
 static float hidden(const vgi_sample *s, const float n[3], const vgi_sample *t, float dx, float dy, float reach)
 {
     if (t->kind == VGI_EMPTY) return 0;
@@ -67,7 +67,7 @@ static float sky_seen(const pixels *p, size_t x, size_t y, const float taps[][2]
     if (s->kind == VGI_EMPTY || s->kind >= VGI_WIRE) return 1;
     float n[3], sum = 0;
     unit_normal(s, n);
-    /* as few taps would show as rings: their start turns from pixel to pixel, and the blur takes it out */
+    /* few taps would show as rings: rotate their start from pixel to pixel, and blur */
     float angle = (float)((x % PATTERN) * PATTERN + y % PATTERN) * (float)(2 * M_PI / (PATTERN * PATTERN));
     float cosine = cosf(angle), sine = sinf(angle);
     for (int i = 0; i < TAPS; i++) {
@@ -81,7 +81,7 @@ static float sky_seen(const pixels *p, size_t x, size_t y, const float taps[][2]
     return clamp01(1 - 2.1f * sum / TAPS);
 }
 
-/* Mean over the pattern, of the same surface only. */
+/* Mean over the pattern, within the same surface only. */
 static float smooth_sky(const pixels *p, const float *raw, size_t x, size_t y, float step_limit)
 {
     const vgi_sample *s = middle_sample(p, x, y);
@@ -100,14 +100,14 @@ static float smooth_sky(const pixels *p, const float *raw, size_t x, size_t y, f
 
 static int light_corners(pixels *p, float reach, vg_err *e)
 {
-    size_t n = p->w * p->h; /* less than the samples, which have been allocated */
+    size_t n = p->w * p->h; /* fewer than the samples, which are allocated already */
     float taps[TAPS][2], *raw = vgi_array_raw(n, sizeof *raw, e);
     p->light = vgi_array_raw(n, sizeof *p->light, e);
     if (!raw || !p->light) {
         free(raw);
         return VG_ENOMEM;
     }
-    for (int i = 0; i < TAPS; i++) { /* a sunflower: even in area, denser inside by the exponent */
+    for (int i = 0; i < TAPS; i++) { /* sunflower pattern: even in area, denser inside by the exponent */
         float radius = powf(((float)i + 0.5f) / TAPS, 0.75f), angle = 2.39996323f * (float)i;
         taps[i][0] = radius * cosf(angle), taps[i][1] = radius * sinf(angle);
     }
@@ -121,7 +121,7 @@ static int light_corners(pixels *p, float reach, vg_err *e)
     return VG_OK;
 }
 
-/* Samples of an outline whose pixel is empty in its middle take the light of a neighbour that is not. */
+/* Outline samples of a pixel whose middle is empty take the light of a neighbour. */
 static float corner_light(const pixels *p, size_t x, size_t y)
 {
     if (middle_sample(p, x, y)->kind != VGI_EMPTY) return p->light[y * p->w + x];
@@ -134,7 +134,7 @@ static float corner_light(const pixels *p, size_t x, size_t y)
 
 /* ---- outlines ---- */
 
-/* How much nearer a sample is than what its neighbours on both sides of it let expect, along one axis. */
+/* How much nearer a sample is than its two neighbours along one axis suggest. */
 static float depth_step(const vgi_raster *r, size_t at, size_t room_before, size_t room_after, size_t stride,
                         size_t reach, float limit)
 {
@@ -172,7 +172,7 @@ static void light_clay(const float n[3], const float albedo[3], float sky_seen_h
     }
 }
 
-/* A factor that is 1 on an open surface that faces the viewer, so that there the colours are those of the legend. */
+/* A factor that is 1 on an unoccluded surface facing the viewer, so that its colours match the legend. */
 static float light_error(const float n[3], float sky_seen_here)
 {
     float facing = (key[2] + 0.3f) / 1.3f, k = clamp01((dot(n, key) + 0.3f) / 1.3f) / facing;
@@ -249,7 +249,7 @@ static void shade_pixel(const vgi_look *l, const pixels *p, const background *b,
             for (int k = 0; k < 3; k++) sum[k] += fminf(c[k], 1);
         }
     if (empty) {
-        /* the grid has its own smooth lines: once a pixel is enough */
+        /* the grid is anti-aliased by itself: one evaluation per pixel is enough */
         light_background(b, (double)(x * s) + (double)s / 2, (double)(y * s) + (double)s / 2, page);
         for (int k = 0; k < 3; k++) sum[k] += (float)empty * page[k];
     }

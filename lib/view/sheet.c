@@ -1,24 +1,25 @@
-/* sheet.c: the contact sheet: takes frames of one sequence or several, chooses, draws them row by row and puts
- * captions and a legend to them. Leaves out how a pose becomes pixels (raster.c, shade.c), what its colours say
- * (tint.c), and how pixels become a file (png.c). SPDX-License-Identifier: GPL-3.0-or-later */
+/* sheet.c: the contact sheet: collects frames of one or more sequences, chooses which to show, draws them row by
+ * row and adds captions and a legend. Leaves out rasterisation (raster.c, shade.c), colours (tint.c), and the file
+ * format (png.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
 #include <stdio.h>
 
 enum {
-    MARGIN = 16,      /* around and between pictures, in pixels */
+    MARGIN = 16,      /* margin and gap between pictures, in pixels */
     CAPTION = 22,     /* below a picture */
-    NUMBERS = 18,     /* below the caption, when colours say something */
-    TITLE = 24,       /* above the row of a sequence, when there are several */
+    NUMBERS = 18,     /* below the caption, when frames have numbers */
+    TITLE = 24,       /* above each row, when there are several sequences */
     FOOTER = 24,      /* at the bottom, with a ground */
     TEXT_BYTES = 512,
     LEAST_SIDE = 16, MOST_SIDE = 4096,
-    WIDE_SIDE = 1536, /* a picture larger than this has 2 x 2 samples in a pixel instead of 3 x 3 */
-    MOST_COLUMNS = 8, /* of several sequences, unless asked for */
+    WIDE_SIDE = 1536, /* pictures larger than this have 2 x 2 samples per pixel instead of 3 x 3 */
+    MOST_COLUMNS = 8, /* default with several sequences */
 };
 
-/* What is farther away than this cannot be drawn together with the figure. In D. */
+/* Points further away than this, in D, cannot be drawn together with the figure. */
 #define MOST_DISTANCE 1e9
 
 static const double title_dot = 1.75, caption_dot = 1.5, small_dot = 1.25;
@@ -31,10 +32,10 @@ typedef struct sequence {
     vgi_album album;
     vgi_meter meter;
     double origin[3], unit;      /* points are kept as (p - origin) / unit */
-    double diagonal;             /* D; 0 for a figure that is a point, and then unit is 1 */
+    double diagonal;             /* D; 0 when all points coincide, and then unit is 1 */
     double ground_height;        /* in D, along the vertical */
     bool tinted;
-    size_t *shot;                /* which of the album is in column i */
+    size_t *shot;                /* index into the album for column i */
 } sequence;
 
 struct vg_sheet {
@@ -42,11 +43,11 @@ struct vg_sheet {
     size_t nsequences;
     sequence at[VG_SHEET_SEQUENCES];
     vgi_tint tint;
-    bool tinted;                 /* any of the sequences */
+    bool tinted;                 /* at least one sequence has numbers */
     vgi_palette palette;
-    size_t n, columns, oversampling; /* n: frames that are shown */
+    size_t n, columns, oversampling; /* number of frames that are shown */
     vgi_camera camera;
-    const sequence *largest_of, *least_of; /* where the largest and the least number is */
+    const sequence *largest_of, *least_of; /* the largest and the least number, and their sequences */
     const vgi_shot *largest, *least;
 };
 
@@ -161,7 +162,7 @@ int vg_sheet_add(vg_sheet *s, size_t i, const vg_frame *f, const double *truth, 
     return r == VG_OK ? keep_numbers(s, q, shot, f, truth, e) : r;
 }
 
-/* ---- which frames: those of the longest sequence; the others stay at their last ---- */
+/* ---- which frames: those of the longest sequence; shorter ones stay at their last frame ---- */
 
 static const vgi_shot *shot_of(const sequence *q, size_t i)
 {
@@ -205,7 +206,7 @@ static size_t count_drawn(const sequence *q)
     return n;
 }
 
-/* The absolute value that 99 % of the vertices seen do not exceed, over all that is shown. */
+/* The absolute value that 99 % of the visible vertices do not exceed, over all pictures. */
 static int find_percentile(const vg_sheet *s, double *number, vg_err *e)
 {
     size_t total = 0, n = 0;
@@ -227,7 +228,7 @@ static int find_percentile(const vg_sheet *s, double *number, vg_err *e)
     }
     qsort(all, n, sizeof *all, compare_floats);
     *number = all[(size_t)ceil(0.99 * (double)n) - 1];
-    if (!(*number > 0)) *number = all[n - 1]; /* nearly all are exact: show those that are not */
+    if (!(*number > 0)) *number = all[n - 1]; /* nearly all are exact: use the largest, so that the rest show */
     free(all);
     return VG_OK;
 }
@@ -261,7 +262,8 @@ static size_t title_height(const vg_sheet *s)
     return s->nsequences > 1 ? TITLE : 0;
 }
 
-/* Near to 16 : 9, and few holes in the last row; of several sequences as many as can be, in rows that are alike. */
+/* Near to 16 : 9 with few empty places in the last row; with several sequences as many columns as fit, in equal
+ * rows. */
 static size_t choose_columns(const vg_sheet *s)
 {
     size_t best = 1;
@@ -280,7 +282,7 @@ static size_t choose_columns(const vg_sheet *s)
     return best;
 }
 
-/* The middle of the picture of one shot, when the camera follows: its centroid. */
+/* The centroid of a shot: the middle of its picture when the camera follows. */
 static void shot_middle(const vg_sheet *s, const sequence *q, const vgi_shot *shot, double middle[2])
 {
     double sum[3] = {0, 0, 0};
@@ -297,7 +299,7 @@ static void shot_middle(const vg_sheet *s, const sequence *q, const vgi_shot *sh
     }
 }
 
-/* One scale for all, so that sizes compare; also the place, unless the camera follows. */
+/* One scale for all pictures, so that sizes compare; one place too, unless the camera follows. */
 static void place_camera(vg_sheet *s)
 {
     vgi_box box = vgi_box_empty();
@@ -317,7 +319,7 @@ static void place_camera(vg_sheet *s)
 
 /* ---- pictures ---- */
 
-typedef struct row { /* of pictures that are drawn at the same time */
+typedef struct row { /* how many pictures are drawn at the same time */
     const vg_sheet *s;
     const sequence *of;
     size_t first;
@@ -331,7 +333,7 @@ static double nice_spacing(const sequence *q)
     return (want / power < 1.5 ? 1 : want / power < 3.5 ? 2 : want / power < 7.5 ? 5 : 10) * power;
 }
 
-/* The grid lies round the feet of all shots, or of this one when the camera follows it. */
+/* The grid surrounds the feet in all shots, or in this one when the camera follows. */
 static void place_ground(const vg_sheet *s, const sequence *q, size_t shot, vgi_ground *g)
 {
     *g = (vgi_ground){.height = q->ground_height, .spacing = nice_spacing(q) / q->unit, .across = {1, 0, 0}};
@@ -416,7 +418,7 @@ static void paste(vgi_canvas *c, size_t x, size_t y, const unsigned char *rgb, s
     for (size_t j = 0; j < h; j++) memcpy(c->rgb + 3 * ((y + j) * c->w + x), rgb + 3 * j * w, 3 * w);
 }
 
-/* The name of a frame, or its number when it has none. */
+/* The name of a frame, or its number if it has no name. */
 static void print_label(char *to, size_t size, const vgi_shot *shot)
 {
     if (*shot->name)
@@ -438,7 +440,7 @@ static void put_caption(const vg_sheet *s, vgi_canvas *c, size_t x, const vgi_sh
     centre_text(c, middle, y + CAPTION - 4, small_dot, soft_ink, text);
 }
 
-/* Where a number is: "1.5 in 'pose3'", and of several sequences in which. */
+/* Where an extreme value occurs: "1.5 in 'pose3'", with several sequences also in which. */
 static void print_place(const vg_sheet *s, char *to, size_t size, double number, const sequence *q,
                         const vgi_shot *shot)
 {

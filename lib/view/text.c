@@ -1,5 +1,5 @@
-/* text.c: a small font for captions: dots on a 5 x 9 grid, joined to strokes, so that it can be drawn at any size.
- * Leaves out everything but ASCII: file and frame names are shown, not typeset.
+/* text.c: a small stroke font for captions: dots on a 5 x 9 grid joined to strokes, drawable at any size. ASCII
+ * only.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
@@ -7,8 +7,8 @@
 
 enum { COLUMNS = 5, ROWS = 9, FIRST = 32, LAST = 126 };
 
-/* One row of a glyph is five bits, the highest to the left. Capitals stand on row 6; rows 7 and 8 are below the line.
- */
+/* A row of a glyph is five bits, the highest on the left. Capitals stand on row 6; rows 7 and 8 are below the
+ * baseline. */
 static const unsigned char glyphs[LAST - FIRST + 1][ROWS] = {
     {0},                                    /* space */
     {4, 4, 4, 4, 4, 0, 4},                  /* ! */
@@ -108,7 +108,7 @@ static const unsigned char glyphs[LAST - FIRST + 1][ROWS] = {
 };
 static const unsigned char unknown[ROWS] = {31, 17, 17, 17, 17, 17, 31};
 
-/* The next code point's glyph; the position moves behind it. */
+/* The glyph of the next code point; advances the position. */
 static const unsigned char *next_glyph(const char **text)
 {
     unsigned char c = (unsigned char)*(*text)++;
@@ -135,8 +135,8 @@ static double to_stroke(double x, double y, int dx, int dy)
     return hypot(x - t * dx, y - t * dy);
 }
 
-/* Distance, in dots, from a point to the nearest stroke. Neighbouring dots are joined; diagonal ones only when no dot
- * beside them joins them already, which keeps corners sharp. */
+/* Distance, in dots, from a point to the nearest stroke. Neighbouring dots are joined; diagonal ones only if no
+ * dot beside them already joins them, which keeps corners sharp. */
 static double to_glyph(const unsigned char *glyph, double x, double y)
 {
     double least = 9;
@@ -157,7 +157,7 @@ static double to_glyph(const unsigned char *glyph, double x, double y)
 static void draw_glyph(vgi_canvas *c, double x, double y, double dot, const unsigned char colour[3],
                        const unsigned char *glyph)
 {
-    double thick = fmax(0.5 * dot, 0.55); /* half the stroke, in pixels */
+    double thick = fmax(0.5 * dot, 0.55); /* half the stroke width, in pixels */
     long x0 = (long)floor(x - 1), x1 = (long)ceil(x + COLUMNS * dot + 1);
     long y0 = (long)floor(y - 1), y1 = (long)ceil(y + ROWS * dot + 1);
     for (long py = y0 < 0 ? 0 : y0; py < y1 && py < (long)c->h; py++)
@@ -181,7 +181,7 @@ double vgi_text_width(double dot, const char *text)
     return n ? dot * (double)(n * VGI_TEXT_ADVANCE - 1) : 0;
 }
 
-/* Copy n glyphs after the first `skip`, as far as they fit; what is no ASCII is kept as it is. Returns the end. */
+/* Copy n glyphs after the first `skip`, as far as they fit. Returns the end. */
 static char *copy_glyphs(char *to, const char *end, const char *text, size_t skip, size_t n)
 {
     for (; skip > 0 && *text; skip--) next_glyph(&text);

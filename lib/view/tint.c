@@ -1,16 +1,17 @@
-/* tint.c: the number of each vertex that becomes its colour: the distance from a truth, what came with the frame, or
- * how much longer its vectors are than in the reference pose; and where the colours end. Sheets and pages share it.
- * Leaves out the colours: colour.c. SPDX-License-Identifier: GPL-3.0-or-later */
+/* tint.c: the number of each vertex that is mapped to a colour: its distance from a truth, a scalar of the frame,
+ * or how much its vectors have grown; and the ends of the colour map. Shared by sheets and pages. Leaves out the
+ * colours (colour.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
 #include <stdio.h>
 
-/* Errors below this, in D, are rounding; their colours never end before it. */
+/* Errors below this, in D, are rounding; the colour map never ends before it. */
 #define LEAST_ERROR 1e-9
-/* Scales nearer to 1 than this are one colour. */
+/* Scales closer to 1 than this have one colour. */
 #define LEAST_SCALE 0.01
-/* Vectors that have shrunk to nothing, or grown beyond all, are this many times halved or doubled. */
+/* Limit of doublings and halvings, for vectors that have collapsed or exploded. */
 #define MOST_DOUBLED 20
 
 /* ---- numbers ---- */
@@ -62,7 +63,8 @@ void vgi_meter_clear(vgi_meter *m)
     *m = (vgi_meter){0};
 }
 
-/* The mean over the vectors of a vertex of how often they have doubled: the geometric mean of their scales. */
+/* The mean over a vertex's vectors of log2(length / reference length): the logarithm of the geometric mean of
+ * their scales. */
 static void measure_scales(vgi_meter *m, const double *points)
 {
     const vg_mesh *mesh = m->mesh;
@@ -141,7 +143,7 @@ double vgi_round_up(double x)
     return 10 * power;
 }
 
-/* The factor at which the colours of scales end: by how much 99 % do not differ from 1, to two digits. */
+/* Where the colours of scales end: the factor that 99 % do not exceed, up or down, rounded up to two digits. */
 static double end_of_scales(double doubled)
 {
     double beyond = exp2(doubled) - 1, step = beyond > LEAST_ERROR ? pow(10, floor(log10(beyond)) - 1) : 1;
