@@ -129,8 +129,8 @@ void cli_stream_open(vg_head *h);
 void cli_stream_put(const vg_frame *f);
 void cli_stream_end(const vg_records *tail);
 
-/* cli_discard_by: what a program writes by other means than these: called when it is ended by a signal or by a
- * library that gives up, and may call only what a signal's handler may. */
+/* cli_discard_by: `discard` removes what the program writes by other means than these. Called when the program fails, or
+ * is ended by a signal or by a library that gives up: it may call only what a signal handler may. */
 void cli_discard_by(void (*discard)(void));
 
 /* The text output of a report: standard output or a temporary file beside --output, which cli_text_end renames. */

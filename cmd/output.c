@@ -1,6 +1,6 @@
-/* output.c: where the stream or text of a program goes: standard output, a special file opened as it is, or a
- * temporary file that takes its final name at the end. Leaves out mesh files: their names and temporary files are
- * vg_sink's, in the library. SPDX-License-Identifier: GPL-3.0-or-later */
+/* output.c: where the stream or text of a program goes: standard output, or a file that is replaced as a whole once it is
+ * complete (vg_targets). Leaves out mesh files, which are vg_sink's.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "output.h"
 #include "cli.h"
 
@@ -20,31 +20,33 @@ static struct {
     FILE *text;
     vg_writer *writer;
     char shown[PATH_MAX + 8]; /* what messages call it */
-    char final[PATH_MAX];     /* empty: nothing to rename */
-    char temporary[PATH_MAX];
-    volatile sig_atomic_t has_temporary;
+    vg_targets targets;       /* empty: standard output */
 } out = {.fd = -1};
 
 static void (*discard_other)(void); /* output that is not ours; NULL: none */
 
+static bool has_temporary(void)
+{
+    return out.targets.n && !vg_targets_in_place(&out.targets);
+}
+
 void output_remove(void)
 {
-    if (out.has_temporary) unlink(out.temporary);
-    out.has_temporary = 0;
+    vg_targets_remove(&out.targets);
+    vg_targets_clear(&out.targets);
 }
 
 void output_discard(void)
 {
-    if (out.has_temporary) unlink(out.temporary);
+    vg_targets_remove(&out.targets);
     if (discard_other) discard_other();
 }
 
 void output_abandon(const char *program, int status, const char *message)
 {
-    if (out.has_temporary)
-        output_remove();
-    else if (out.writer)
-        vg_writer_abandon(out.writer, program, status, message);
+    if (discard_other) discard_other();
+    if (has_temporary()) output_remove();
+    else if (out.writer) vg_writer_abandon(out.writer, program, status, message);
 }
 
 static void end_by_signal(int number)
@@ -99,16 +101,6 @@ static bool names_meshes(const char *name)
     return (!exists && vg_sink_check(name, &(vg_sink_options){0}, NULL) == VG_OK) || ends_with_one(name, foreign);
 }
 
-/* The directory that holds `path`, with a final slash or empty; returns where the last component starts. */
-static const char *split_path(const char *path, char directory[PATH_MAX])
-{
-    const char *slash = strrchr(path, '/');
-    size_t n = slash ? (size_t)(slash - path) + 1 : 0;
-    memcpy(directory, path, n);
-    directory[n] = 0;
-    return path + n;
-}
-
 static void refuse_terminal(void) __attribute__((noreturn));
 static void refuse_terminal(void)
 {
@@ -131,86 +123,56 @@ static void refuse_stream(const char *name)
 
 void output_check(bool stream)
 {
+    vg_err e;
     const char *name = cli.output;
-    struct stat st;
     if (stream && name && (names_meshes(name) || names_picture(name))) refuse_stream(name);
     if (stream && !name && isatty(STDOUT_FILENO)) refuse_terminal();
     if (!name) return;
     if (!*name) cli_usage("option '--output' needs the name of a file");
-    if (strlen(name) > PATH_MAX - 64)
-        cli_stop(VG_ESYS, "cannot write to '%.40s...': %s", name, strerror(ENAMETOOLONG));
     snprintf(out.shown, sizeof out.shown, "'%s'", name);
-    if (!stat(name, &st)) {
-        if (S_ISDIR(st.st_mode)) die_writing(EISDIR);
-        if (!S_ISREG(st.st_mode)) return; /* a pipe or device: opened and written as it is */
-    } else if (errno != ENOENT) {
-        die_writing(errno);
-    } else if (!lstat(name, &st)) { /* a file would come in its place */
-        cli_stop(VG_ESYS, "cannot write to %s: it is a link to a file that is not there", out.shown);
-    }
-    char directory[PATH_MAX];
-    if (!*split_path(name, directory)) die_writing(EISDIR);
-    if (access(*directory ? directory : ".", W_OK | X_OK)) die_writing(errno);
-}
-
-/* Open ".NAME.PID.tmp" beside out.final. */
-static int open_temporary(void)
-{
-    char directory[PATH_MAX];
-    const char *base = split_path(out.final, directory);
-    for (int i = 0; i < 100; i++) {
-        char number[16] = "";
-        if (i) snprintf(number, sizeof number, "-%d", i); /* a process of this number was killed here once */
-        int n = snprintf(out.temporary, sizeof out.temporary, "%s.%.200s.%ld%s.tmp", directory, base, (long)getpid(),
-                         number);
-        if (n < 0 || (size_t)n >= sizeof out.temporary) die_writing(ENAMETOOLONG);
-        int fd = open(out.temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        if (fd >= 0) return fd;
-        if (errno != EEXIST) die_writing(errno);
-    }
-    die_writing(EEXIST);
+    if (vg_target_check(name, &e) < 0) cli_die(&e);
 }
 
 static void open_output(void)
 {
-    struct stat st;
+    vg_err e;
     if (!cli.output) {
         out.fd = STDOUT_FILENO;
         snprintf(out.shown, sizeof out.shown, "standard output");
         return;
     }
-    bool exists = !stat(cli.output, &st);
-    if (exists && !S_ISREG(st.st_mode)) {
-        out.fd = open(cli.output, O_WRONLY | O_NOCTTY | O_CLOEXEC);
-        if (out.fd < 0) die_writing(errno);
-        return;
-    }
-    /* through a symbolic link to the file it means, or the link itself would be replaced */
-    if (!exists || !realpath(cli.output, out.final)) snprintf(out.final, sizeof out.final, "%s", cli.output);
     catch_signals();
-    sigset_t all, before; /* a signal between the two would leave a file that nobody knows of */
-    sigfillset(&all);
-    sigprocmask(SIG_BLOCK, &all, &before);
-    out.fd = open_temporary();
-    out.has_temporary = 1;
-    sigprocmask(SIG_SETMASK, &before, NULL);
-    if (exists && fchmod(out.fd, st.st_mode & 07777)) { /* keeps the mode where it can; not worth failing for */
-    }
+    out.fd = vg_targets_open(&out.targets, cli.output, &e);
+    if (out.fd < 0) cli_die(&e);
 }
 
 /* Close the output and give it its final name. Standard output stays for cli_finish. */
 static void close_output(void)
 {
+    vg_err e;
     if (out.fd != STDOUT_FILENO) {
         int failed = out.text ? fclose(out.text) : close(out.fd);
         if (failed) die_writing(errno);
     }
-    if (out.has_temporary) {
-        if (rename(out.temporary, out.final)) die_writing(errno);
-        out.has_temporary = 0;
-    }
+    if (vg_targets_rename(&out.targets, &e) < 0) cli_die(&e);
+    vg_targets_clear(&out.targets);
     out.fd = -1;
     out.text = NULL;
+}
+
+/* The directory that holds `path`, with a final slash, or empty. */
+static void directory_of(const char *path, char directory[PATH_MAX])
+{
+    const char *slash = strrchr(path, '/');
+    size_t n = slash ? (size_t)(slash - path) + 1 : 0;
+    memcpy(directory, path, n);
+    directory[n] = 0;
+}
+
+static const char *last_component(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash ? slash + 1 : path;
 }
 
 bool cli_same_output(const char *a, const char *b)
@@ -221,7 +183,8 @@ bool cli_same_output(const char *a, const char *b)
     if (there) return S_ISREG(s.st_mode) && s.st_dev == t.st_dev && s.st_ino == t.st_ino;
     char of_a[PATH_MAX], of_b[PATH_MAX];
     if (strlen(a) >= PATH_MAX || strlen(b) >= PATH_MAX) return false;
-    if (strcmp(split_path(a, of_a), split_path(b, of_b))) return false;
+    if (strcmp(last_component(a), last_component(b))) return false;
+    directory_of(a, of_a), directory_of(b, of_b);
     return !stat(*of_a ? of_a : ".", &s) && !stat(*of_b ? of_b : ".", &t) && s.st_dev == t.st_dev &&
            s.st_ino == t.st_ino;
 }
@@ -229,7 +192,6 @@ bool cli_same_output(const char *a, const char *b)
 void cli_redirect(const char *file, bool stream)
 {
     cli.output = file && strcmp(file, "-") ? file : NULL;
-    *out.final = 0;
     output_check(stream);
 }
 

@@ -3,6 +3,7 @@
  * Leaves out fitting the map (vg-fitmap) and paths through vectors (vg-interpolate).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "playback.h"
+#include "batch.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -10,9 +11,15 @@
 
 enum { BATCH = 32 };
 
+/* The poses that --interpolate and --at go between. */
+typedef struct key_list {
+    pose_key *label;
+    double **transforms;
+    size_t n, cap;
+} key_list;
+
 typedef struct playback {
-    const playback_options *o;
-    vg_source *source;
+    playback_options *o;
     vg_head *h; /* the input's, then the output's */
     vg_head map;
     vg_kind kind; /* what comes in */
@@ -21,9 +28,10 @@ typedef struct playback {
     vg_driver *driver;       /* a skeleton comes in */
     vg_joint_fitter *fitter; /* for frames that do not say how joints have turned */
     vg_skeleton skeleton;    /* the input's */
-    size_t n, most;          /* frames in hand */
-    vg_frame in[BATCH], out[BATCH];
+    size_t n, most;          /* poses in hand, at most BATCH */
+    vg_frame out[BATCH];
     double *transforms[BATCH];
+    key_list keys;
 } playback;
 
 static void load_map(playback *p)
@@ -106,15 +114,15 @@ static void put_batch(playback *p)
     p->n = 0;
 }
 
-/* The transforms of n frames in hand, measured or as they came. */
-static void take_transforms(playback *p, size_t n, double *const *to)
+/* The transforms of n frames, measured or as they came. */
+static void take_transforms(playback *p, size_t n, const vg_frame *in, double *const *to)
 {
     const double *poses[BATCH] = {NULL};
-    for (size_t i = 0; i < n; i++) poses[i] = p->in[i].values;
+    for (size_t i = 0; i < n; i++) poses[i] = in[i].values;
     for (size_t i = 0; i < n && p->driver; i++) {
-        const double *turns = p->in[i].turns;
+        const double *turns = in[i].turns;
         size_t joint;
-        if (!p->in[i].nturns) {
+        if (!in[i].nturns) {
             vg_joint_fitter_fit(p->fitter, poses[i], NULL, NULL, &joint);
             turns = vg_joint_fitter_turns(p->fitter);
         }
@@ -125,44 +133,33 @@ static void take_transforms(playback *p, size_t n, double *const *to)
     for (size_t i = 0; i < n && p->kind == VG_TRANSFORMS; i++) memcpy(to[i], poses[i], 7 * p->count * sizeof *to[i]);
 }
 
-static void play_batch(playback *p)
+static void play_batch(void *context, size_t n, vg_frame *in)
 {
+    playback *p = context;
     vg_err e;
-    take_transforms(p, p->n, p->transforms);
-    for (size_t i = 0; i < p->n; i++)
-        if (vg_frame_label(&p->out[i], &p->in[i], &e) < 0) cli_die(&e);
+    take_transforms(p, n, in, p->transforms);
+    for (size_t i = 0; i < n; i++)
+        if (vg_frame_label(&p->out[i], &in[i], &e) < 0) cli_die(&e);
+    p->n = n;
     put_batch(p);
-}
-
-static void play_all(playback *p)
-{
-    uint64_t n = 0;
-    while (cli_next(p->source, &p->in[p->n])) {
-        if (++p->n == p->most) play_batch(p);
-        cli_progress("poses", ++n);
-    }
-    play_batch(p);
 }
 
 /* ---- between keys ---- */
 
-typedef struct key_list {
-    pose_key *label;
-    double **transforms;
-    size_t n, cap;
-} key_list;
-
-static void add_key(playback *p, key_list *k)
+static void add_key(void *context, size_t n, vg_frame *in)
 {
-    const vg_frame *f = &p->in[0];
-    if (k->n == k->cap) {
-        k->cap = 2 * k->cap + 16;
-        k->label = cli_resize(k->label, k->cap, sizeof *k->label, "the keys");
-        k->transforms = cli_resize(k->transforms, k->cap, sizeof *k->transforms, "the keys");
+    playback *p = context;
+    key_list *k = &p->keys;
+    for (size_t i = 0; i < n; i++) {
+        if (k->n == k->cap) {
+            k->cap = 2 * k->cap + 16;
+            k->label = cli_resize(k->label, k->cap, sizeof *k->label, "the keys");
+            k->transforms = cli_resize(k->transforms, k->cap, sizeof *k->transforms, "the keys");
+        }
+        k->label[k->n] = (pose_key){cli_copy_text(in[i].name, "the keys"), in[i].has_time, in[i].time};
+        k->transforms[k->n] = cli_allocate(7 * p->count, sizeof(double), "the transforms");
+        take_transforms(p, 1, &in[i], &k->transforms[k->n++]);
     }
-    k->label[k->n] = (pose_key){cli_copy_text(f->name, "the keys"), f->has_time, f->time};
-    k->transforms[k->n] = cli_allocate(7 * p->count, sizeof(double), "the transforms");
-    take_transforms(p, 1, &k->transforms[k->n++]);
 }
 
 static void put_moment(playback *p, const key_list *k, double t)
@@ -175,13 +172,12 @@ static void put_moment(playback *p, const key_list *k, double t)
     if (++p->n == p->most) put_batch(p);
 }
 
-static void play_between(playback *p)
+static void play_between(void *context)
 {
-    key_list k = {0};
-    while (cli_next(p->source, &p->in[0])) add_key(p, &k);
-    if (k.n == 0) cli_stop(VG_EINPUT, "the input has no poses to interpolate");
+    playback *p = context;
+    if (p->keys.n == 0) cli_stop(VG_EINPUT, "the input has no poses to interpolate");
     for (size_t i = 0; i < (size_t)p->o->between.count; i++) {
-        put_moment(p, &k, pose_times_at(&p->o->between, i, k.n));
+        put_moment(p, &p->keys, pose_times_at(&p->o->between, i, p->keys.n));
         cli_progress("poses", i + 1);
     }
     put_batch(p);
@@ -197,25 +193,36 @@ static void play_reference(playback *p)
     put_batch(p);
 }
 
+static void prepare(void *context, vg_head *h, vg_frame *in)
+{
+    playback *p = context;
+    vg_err e;
+    p->h = h;
+    load_map(p);
+    if (in) check_input(p);
+    else p->count = p->map.map.n, h->precision = p->map.precision;
+    bone_edits_find(&p->o->edits, &p->map, p->o->map);
+    if (vg_player_new(&p->player, &p->map, h->precision == VG_F32, cli.threads, &e) < 0) cli_die(&e);
+    make_head(p);
+    for (size_t i = 0; i < p->most; i++) {
+        p->transforms[i] = cli_allocate(7 * p->count, sizeof(double), "the transforms");
+        if (vg_frame_shape(&p->out[i], h, &e) < 0) cli_die(&e);
+    }
+}
+
 void playback_run(playback_options *o, vg_source *s)
 {
     static playback p; /* lives until the end: what it holds goes with the process */
     static vg_head alone;
-    vg_err e;
-    p.o = o, p.source = s, p.h = s ? vg_source_head(s) : &alone, p.most = o->live ? 1 : BATCH;
-    load_map(&p);
-    if (s) check_input(&p);
-    else p.count = p.map.map.n, alone.precision = p.map.precision;
-    bone_edits_find(&o->edits, &p.map, o->map);
-    if (vg_player_new(&p.player, &p.map, p.h->precision == VG_F32, cli.threads, &e) < 0) cli_die(&e);
-    make_head(&p);
-    for (size_t i = 0; i < p.most; i++) {
-        p.transforms[i] = cli_allocate(7 * p.count, sizeof(double), "the transforms");
-        if (vg_frame_shape(&p.out[i], p.h, &e) < 0) cli_die(&e);
+    p.o = o, p.most = o->live ? 1 : BATCH;
+    step play = {.batch = p.most, .unit = "poses", .init = prepare, .process = play_batch};
+    if (o->between.count) play.process = add_key, play.finish = play_between;
+    if (s) {
+        step_run(&play, &p, s);
+        return;
     }
-    cli_stream_open(p.h);
-    if (!s) play_reference(&p);
-    else if (o->between.count) play_between(&p);
-    else play_all(&p);
-    cli_stream_end(s ? vg_source_tail(s) : NULL);
+    prepare(&p, &alone, NULL);
+    cli_stream_open(&alone);
+    play_reference(&p);
+    cli_stream_end(NULL);
 }

@@ -1,6 +1,6 @@
 /* vg-decode: write the poses of a stream as mesh files, a directory or an archive of them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "cli.h"
+#include "batch.h"
 
 #include <string.h>
 
@@ -39,6 +39,31 @@ static void discard(void)
     vg_sink_discard(sink);
 }
 
+static void put_frames(void *context, size_t n, vg_frame *in)
+{
+    vg_err e;
+    (void)context;
+    for (size_t i = 0; i < n; i++)
+        if (vg_sink_put(sink, &in[i], &e) < 0) cli_die(&e);
+}
+
+static void decode(vg_source *s)
+{
+    static const step writing = {.batch = 1, .unit = "poses", .process = put_frames};
+    vg_err e;
+    cli_discard_by(discard);
+    if (vg_sink_open(&sink, output, vg_source_head(s), &sink_options, &e) < 0) cli_die(&e);
+    vg_frame *in = batch_frames(&writing);
+    uint64_t frames = batch_read(&writing, NULL, s, in);
+    if (vg_sink_end(sink, &e) < 0) cli_die(&e);
+    if (!frames)
+        cli_warn("the input has no poses: '%s' holds none%s", output,
+                 vg_source_head(s)->map.n ? "; vg-play plays a map" : "");
+    for (size_t i = 0; vg_sink_warning(sink, i); i++) cli_warn("%s", vg_sink_warning(sink, i));
+    vg_sink_close(&sink);
+    batch_frames_free(&writing, in);
+}
+
 int main(int argc, char **argv)
 {
     char **operands;
@@ -50,25 +75,8 @@ int main(int argc, char **argv)
     if (vg_sink_check(output, &sink_options, &e) < 0) cli_die(&e);
     if (cli_given("first-number") && !strchr(output, '%'))
         cli_usage("--first-number is for files with numbers, such as 'pose-%%04d.obj': '%s' has none", output);
-
     vg_source *s = cli_source(operands, n);
-    cli_discard_by(discard);
-    if (vg_sink_open(&sink, output, vg_source_head(s), &sink_options, &e) < 0) cli_die(&e);
-    vg_frame f = {0};
-    uint64_t frames = 0;
-    int r;
-    while ((r = vg_source_next(s, &f, &e)) > 0) {
-        if ((r = vg_sink_put(sink, &f, &e)) < 0) break;
-        cli_progress("poses", ++frames);
-    }
-    if (r == 0) r = vg_sink_end(sink, &e);
-    if (r == 0 && !frames)
-        cli_warn("the input has no poses: '%s' holds none%s", output,
-                 vg_source_head(s)->map.n ? "; vg-play plays a map" : "");
-    for (size_t i = 0; r == 0 && vg_sink_warning(sink, i); i++) cli_warn("%s", vg_sink_warning(sink, i));
-    vg_sink_close(&sink);
-    if (r < 0) cli_die(&e);
-    vg_frame_clear(&f);
+    decode(s);
     vg_source_close(&s);
     cli_finish(0);
 }

@@ -1,6 +1,6 @@
 /* vg-deform: measure how each vector of a sequence deforms, and do the same to another mesh.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "cli.h"
+#include "batch.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -56,7 +56,6 @@ typedef enum by { BY_POSE, BY_SHAPE, BY_GRADIENT, BY_BLEND } by;
 typedef enum pin { PIN_AUTO, PIN_ALWAYS, PIN_NONE } pin;
 
 typedef struct work {
-    vg_source *s;
     vg_head *h;               /* the source's until the output's is made of it */
     vg_head target;
     vg_head pairs;            /* holds the correspondence */
@@ -72,8 +71,7 @@ typedef struct work {
     vg_shaper *shaper;
     vg_mover *mover;          /* NULL: poses are measured */
     vg_pinner *pinner;        /* NULL: nothing is held */
-    size_t n;                 /* poses in hand */
-    vg_frame in[BATCH], out[BATCH];
+    vg_frame out[BATCH];
 } work;
 
 /* ---- options ---- */
@@ -113,14 +111,14 @@ static void set_root(work *w)
 
 /* ---- frames ---- */
 
-static void run_batch(work *w, const double *const *in, double *const *out)
+static void run_batch(work *w, size_t n, const double *const *in, double *const *out)
 {
     switch (w->way) {
-    case MEASURE: vg_deformer_measure(w->deformer, w->n, w->kind, in, out); break;
-    case APPLY: vg_deformer_apply(w->deformer, w->n, in, out); break;
-    case TRANSFER: vg_deformer_transfer(w->deformer, w->n, w->kind, in, out); break;
-    case CARRY: vg_carrier_transfer(w->carrier, w->n, in, out); break;
-    case SHAPE: vg_shaper_transfer(w->shaper, w->n, in, out); break;
+    case MEASURE: vg_deformer_measure(w->deformer, n, w->kind, in, out); break;
+    case APPLY: vg_deformer_apply(w->deformer, n, in, out); break;
+    case TRANSFER: vg_deformer_transfer(w->deformer, n, w->kind, in, out); break;
+    case CARRY: vg_carrier_transfer(w->carrier, n, in, out); break;
+    case SHAPE: vg_shaper_transfer(w->shaper, n, in, out); break;
     }
 }
 
@@ -142,19 +140,6 @@ static void finish_frame(work *w, vg_frame *in, vg_frame *out)
     if (vg_frame_pin(out, still, n, &e) < 0) cli_die(&e);
 }
 
-static void deform_batch(work *w)
-{
-    const double *in[BATCH];
-    double *out[BATCH];
-    for (size_t i = 0; i < w->n; i++) in[i] = w->in[i].values, out[i] = w->out[i].values;
-    if (w->n) run_batch(w, in, out);
-    for (size_t i = 0; i < w->n; i++) {
-        finish_frame(w, &w->in[i], &w->out[i]);
-        cli_stream_put(&w->out[i]);
-    }
-    w->n = 0;
-}
-
 /* Frames of vertices carry neither root nor anchors: they are measured here, as vg-encode --vectors does. */
 static void fill_body(const work *w, vg_frame *f)
 {
@@ -163,19 +148,25 @@ static void fill_body(const work *w, vg_frame *f)
     vg_graph_anchors(f->values, w->h->anchors, w->h->nanchors, f->anchors);
 }
 
-static void deform_all(work *w)
+static void deform_batch(void *context, size_t n, vg_frame *in)
 {
-    uint64_t n = 0;
-    while (cli_next(w->s, &w->in[w->n])) {
-        fill_body(w, &w->in[w->n]);
-        if (++w->n == BATCH) deform_batch(w);
-        cli_progress("poses", ++n);
+    work *w = context;
+    const double *from[BATCH] = {NULL};
+    double *to[BATCH] = {NULL};
+    for (size_t i = 0; i < n; i++) {
+        fill_body(w, &in[i]);
+        from[i] = in[i].values, to[i] = w->out[i].values;
     }
-    deform_batch(w);
+    run_batch(w, n, from, to);
+    for (size_t i = 0; i < n; i++) {
+        finish_frame(w, &in[i], &w->out[i]);
+        cli_stream_put(&w->out[i]);
+    }
 }
 
-static void warn_degenerate(const work *w)
+static void warn_degenerate(void *context)
 {
+    const work *w = context;
     vg_deform_counts c = {0};
     if (w->deformer) c = vg_deformer_counts(w->deformer);
     if (c.corners)
@@ -241,10 +232,10 @@ static vg_graph *sample_graph(const vg_head *h)
     vg_err e;
     vg_graph *g;
     vg_head some = *h; /* lent */
-    size_t step = h->body.mesh.nf / SAMPLE + 1;
+    size_t stride = h->body.mesh.nf / SAMPLE + 1;
     some.has_selection = true, some.nselected = 0, some.nlinks = 0;
-    some.selected = cli_allocate(h->body.mesh.nf / step, sizeof *some.selected, "a sample of the faces");
-    for (size_t f = 0; f < h->body.mesh.nf; f += step) some.selected[some.nselected++] = (uint32_t)f;
+    some.selected = cli_allocate(h->body.mesh.nf / stride, sizeof *some.selected, "a sample of the faces");
+    for (size_t f = 0; f < h->body.mesh.nf; f += stride) some.selected[some.nselected++] = (uint32_t)f;
     if (vg_graph_new(&g, &some, &e) < 0) cli_die(&e);
     free(some.selected);
     return g;
@@ -360,36 +351,33 @@ static void make_head(work *w)
     h->count = h->kind == VG_VERTICES ? h->body.mesh.nv : vg_graph_corners(w->to);
 }
 
-static void prepare(work *w)
+static void prepare(void *context, vg_head *h, vg_frame *in)
 {
+    work *w = context;
     vg_err e;
-    w->kind = w->h->kind;
+    w->h = h, w->kind = h->kind;
     check_kind(w);
     set_root(w);
     make_graphs(w);
     for (size_t i = 0; i < BATCH && w->kind == VG_VERTICES; i++) /* room for the anchors that fill_body measures */
-        if (vg_frame_shape(&w->in[i], w->h, &e) < 0) cli_die(&e);
+        if (vg_frame_shape(&in[i], h, &e) < 0) cli_die(&e);
     make_step(w);
     warn_of_other_pose(w);
     make_head(w);
     for (size_t i = 0; i < BATCH; i++)
-        if (vg_frame_shape(&w->out[i], w->h, &e) < 0) cli_die(&e);
+        if (vg_frame_shape(&w->out[i], h, &e) < 0) cli_die(&e);
 }
 
 int main(int argc, char **argv)
 {
+    static const step deform = {
+        .batch = BATCH, .unit = "poses", .init = prepare, .process = deform_batch, .finish = warn_degenerate};
+    static work w; /* lives until the end: what it holds goes with the process */
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
-    static work w; /* lives until the end: what it holds goes with the process */
     parse_options(&w);
     cli_expect_input(n);
     load_target(&w);
-    w.s = cli_source(operands, n);
-    w.h = vg_source_head(w.s);
-    prepare(&w);
-    cli_stream_open(w.h);
-    deform_all(&w);
-    warn_degenerate(&w);
-    cli_stream_end(vg_source_tail(w.s));
+    step_run(&deform, &w, cli_source(operands, n));
     cli_finish(0);
 }

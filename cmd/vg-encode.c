@@ -1,6 +1,6 @@
 /* vg-encode: read poses from mesh files, archives, directories or streams into one stream.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "cli.h"
+#include "batch.h"
 #include "take.h"
 
 #include <stdlib.h>
@@ -91,8 +91,8 @@ static void select_faces(vg_head *h)
     cli_note("%zu of %zu faces carry vectors", h->nselected, h->body.mesh.nf);
 }
 
-/* What the options change about a sequence is about vertices: a stream of anything else is passed on as it is. */
-static void prepare(vg_head *h, bool selects, uint32_t *anchors, size_t nanchors)
+/* The options that change a sequence need vertices: a stream of anything else is passed on as it is. */
+static void apply_options(vg_head *h, bool selects, uint32_t *anchors, size_t nanchors)
 {
     if (h->kind != VG_VERTICES) {
         if (opts.vectors && h->kind == VG_VECTORS) opts.vectors = false;
@@ -108,69 +108,73 @@ static void prepare(vg_head *h, bool selects, uint32_t *anchors, size_t nanchors
     if (opts.f32) h->precision = VG_F32;
 }
 
-/* The next frame that is wanted: `read` of them are behind it. */
-static bool next_taken(vg_source *s, vg_frame *f, uint64_t *read)
+typedef struct work {
+    uint32_t *anchors; /* of --anchor */
+    size_t nanchors;
+    uint64_t read, written;
+    vg_head *h;
+    vg_graph *g; /* NULL: frames are written as they come */
+    vg_frame vectors;
+} work;
+
+static void prepare(void *context, vg_head *h, vg_frame *in)
 {
-    while (cli_next(s, f))
-        if (take_wants(&opts.take, (*read)++)) return true;
-    take_end(&opts.take, *read);
-    return false;
+    work *w = context;
+    vg_err e;
+    (void)in;
+    w->h = h;
+    apply_options(h, opts.faces == 1, w->anchors, w->nanchors);
+    if (!opts.vectors) return;
+    if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&w->g, h, &e) < 0) cli_die(&e);
+    h->kind = VG_VECTORS, h->count = vg_graph_corners(w->g);
+    if (vg_frame_shape(&w->vectors, h, &e) < 0) cli_die(&e);
 }
 
-static void write_as_is(vg_source *s, vg_head *h)
-{
-    vg_frame f = {0};
-    uint64_t read = 0;
-    cli_stream_open(h);
-    for (uint64_t n = 0; next_taken(s, &f, &read); n++) {
-        if (opts.fps > 0) f.has_time = true, f.time = (double)n / opts.fps;
-        cli_stream_put(&f);
-        cli_progress("poses", n + 1);
-    }
-    vg_frame_clear(&f);
-}
-
-static void write_vectors(vg_source *s, vg_head *h)
+/* The vectors of a pose as a frame. */
+static vg_frame *to_vectors(work *w, vg_frame *in)
 {
     vg_err e;
-    vg_graph *g;
-    vg_frame in = {0}, out = {0};
-    uint64_t read = 0;
-    if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&g, h, &e) < 0) cli_die(&e);
-    h->kind = VG_VECTORS, h->count = vg_graph_corners(g);
-    if (vg_frame_shape(&out, h, &e) < 0) cli_die(&e);
-    cli_stream_open(h);
-    for (uint64_t n = 0; next_taken(s, &in, &read); n++) {
-        if (vg_frame_label(&out, &in, &e) < 0) cli_die(&e);
-        if (opts.fps > 0) out.has_time = true, out.time = (double)n / opts.fps;
-        vg_graph_vectors(g, in.values, out.values);
-        vg_graph_root(g, in.values, out.root);
-        vg_graph_anchors(in.values, h->anchors, h->nanchors, out.anchors);
-        cli_stream_put(&out);
-        cli_progress("poses", n + 1);
+    vg_frame *out = &w->vectors;
+    if (vg_frame_label(out, in, &e) < 0) cli_die(&e);
+    vg_graph_vectors(w->g, in->values, out->values);
+    vg_graph_root(w->g, in->values, out->root);
+    vg_graph_anchors(in->values, w->h->anchors, w->h->nanchors, out->anchors);
+    return out;
+}
+
+static void encode(void *context, size_t n, vg_frame *in)
+{
+    work *w = context;
+    for (size_t i = 0; i < n; i++) {
+        if (!take_wants(&opts.take, w->read++)) continue;
+        vg_frame *f = w->g ? to_vectors(w, &in[i]) : &in[i];
+        if (opts.fps > 0) f->has_time = true, f->time = (double)w->written / opts.fps;
+        cli_stream_put(f);
+        w->written++;
     }
-    vg_frame_clear(&in);
-    vg_frame_clear(&out);
-    vg_graph_free(&g);
+}
+
+static void check_taken(void *context)
+{
+    const work *w = context;
+    take_end(&opts.take, w->read);
 }
 
 int main(int argc, char **argv)
 {
+    static const step encoding = {
+        .batch = 1, .unit = "poses", .init = prepare, .process = encode, .finish = check_taken};
     char **operands;
-    size_t n = cli_start(&program, argc, argv, &operands), nanchors = 0;
-    uint32_t *anchors = NULL;
-    bool selects = opts.faces == 1;
-    if (opts.anchors) nanchors = cli_parse_vertices("--anchor", opts.anchors, &anchors);
-
+    size_t n = cli_start(&program, argc, argv, &operands);
+    work w = {0};
+    if (opts.anchors) w.nanchors = cli_parse_vertices("--anchor", opts.anchors, &w.anchors);
     vg_source_options from = {.mesh = opts.mesh};
     if (opts.most_bytes && !(from.most_bytes = cli_parse_size("max-bytes", opts.most_bytes)))
         cli_usage("option '--max-bytes' needs a size of at least 1");
     vg_source *s = cli_source_with(operands, n, &from);
-    vg_head *h = vg_source_head(s);
-    prepare(h, selects, anchors, nanchors);
-    if (opts.vectors) write_vectors(s, h);
-    else write_as_is(s, h);
-    cli_stream_end(vg_source_tail(s));
+    step_run(&encoding, &w, s);
+    vg_frame_clear(&w.vectors);
+    vg_graph_free(&w.g);
     vg_source_close(&s);
     cli_finish(0);
 }

@@ -1,6 +1,7 @@
 /* vg-interpolate: poses between key poses and beyond them, as vectors.
  * Leaves out the mathematics (lib/method/vectors/interpolate.c), and paths of transforms, which need a map (vg-play).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "batch.h"
 #include "pose_times.h"
 
 #include <math.h>
@@ -56,11 +57,12 @@ typedef struct poses {
     size_t n, cap;
 } poses;
 
-static void prepare(poses *p, vg_source *s)
+static void prepare(void *context, vg_head *h, vg_frame *in)
 {
+    poses *p = context;
     vg_err e;
-    p->h = vg_source_head(s);
-    p->kind = p->h->kind;
+    (void)in;
+    p->h = h, p->kind = h->kind;
     if (p->kind == VG_TRANSFORMS)
         cli_stop(VG_EINPUT, "the input holds transforms: interpolate them with 'vg-play MAP --interpolate N'");
     p->numbers = p->h->count * vg_kind_width(p->kind);
@@ -101,14 +103,9 @@ static void place_keys(poses *p)
     for (size_t i = 0; i < p->n; i++) p->keys[i].place = timed ? p->labels[i].time : (double)i;
 }
 
-static void collect(poses *p, vg_source *s)
+static void keep_batch(void *context, size_t n, vg_frame *in)
 {
-    vg_frame f = {0};
-    while (cli_next(s, &f)) keep(p, &f);
-    if (p->n < 2)
-        cli_stop(VG_EINPUT, "there is %s in the input, and a path needs two or more", p->n ? "one pose" : "no pose");
-    vg_frame_clear(&f);
-    place_keys(p);
+    for (size_t i = 0; i < n; i++) keep(context, &in[i]);
 }
 
 static void clear(poses *p)
@@ -163,24 +160,30 @@ static void report(const vg_path *path)
                  (unsigned long long)c->corners, (unsigned long long)c->first_face);
 }
 
+static void interpolate(void *context)
+{
+    poses *p = context;
+    vg_path *path;
+    vg_err e;
+    if (p->n < 2)
+        cli_stop(VG_EINPUT, "there is %s in the input, and a path needs two or more", p->n ? "one pose" : "no pose");
+    place_keys(p);
+    const vg_path_options o = {.kind = p->kind, .nanchors = p->h->nanchors, .smooth = opts.smooth,
+                               .threads = cli.threads};
+    if (vg_path_new(&path, p->g, p->h->body.reference, p->keys, p->n, &o, &e) < 0) cli_die(&e);
+    write_poses(p, path);
+    report(path);
+    vg_path_free(&path);
+}
+
 int main(int argc, char **argv)
 {
+    static const step between = {
+        .batch = 1, .unit = "keys", .init = prepare, .process = keep_batch, .finish = interpolate};
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands), count = take_count(operands, n);
     poses p = {0};
-    vg_path *path;
-    vg_err e;
-    vg_source *s = cli_source(operands + count, n - count);
-    prepare(&p, s);
-    cli_stream_open(p.h);
-    collect(&p, s);
-    const vg_path_options o = {.kind = p.kind, .nanchors = p.h->nanchors, .smooth = opts.smooth,
-                               .threads = cli.threads};
-    if (vg_path_new(&path, p.g, p.h->body.reference, p.keys, p.n, &o, &e) < 0) cli_die(&e);
-    write_poses(&p, path);
-    report(path);
-    vg_path_free(&path);
-    cli_stream_end(vg_source_tail(s));
+    step_run(&between, &p, cli_source(operands + count, n - count));
     clear(&p);
     cli_finish(0);
 }

@@ -1,6 +1,6 @@
 /* vg-poisson: guide a sequence in time through given poses, keeping its second differences.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "cli.h"
+#include "batch.h"
 
 #include <limits.h>
 #include <stdlib.h>
@@ -127,11 +127,12 @@ static void load_key(key *k, vg_head *h)
 /* ---- the sequence ---- */
 
 typedef struct work {
-    vg_source *s;
     vg_head *h;
     vg_guide *guide;
     vg_spool *spool;
     vg_frame held;     /* a frame on its way out of the spool */
+    vg_frame late;     /* the latest frame: it may turn out to be the last */
+    uint64_t frames;   /* that have come */
     uint64_t released; /* number of the first frame that is still held */
     size_t ahead;      /* keys whose frames have not come */
     bool begun;        /* a key's frame has come */
@@ -188,7 +189,7 @@ static void release_held(work *w)
     if (r < 0) cli_die(&e);
 }
 
-static void step(work *w, vg_frame *f, uint64_t n, bool last)
+static void guide(work *w, vg_frame *f, uint64_t n, bool last)
 {
     const double *given = find_given(w, n, f->name, last);
     vg_err e;
@@ -208,18 +209,16 @@ static void step(work *w, vg_frame *f, uint64_t n, bool last)
     cli_stream_put(f);
 }
 
-/* One frame late, so that the last is known when it is its turn. */
-static uint64_t guide_all(work *w)
+/* Each frame waits until the next has come, so that the last is known as such. */
+static void guide_late(void *context, size_t n, vg_frame *in)
 {
-    vg_frame frames[2] = {{0}};
-    uint64_t n = 0;
-    for (; cli_next(w->s, &frames[n % 2]); n++) {
-        if (n > 0) step(w, &frames[(n - 1) % 2], n - 1, false);
-        cli_progress("frames", n + 1);
+    work *w = context;
+    for (size_t i = 0; i < n; i++) {
+        vg_frame late = w->late;
+        w->late = in[i], in[i] = late;
+        if (w->frames) guide(w, &in[i], w->frames - 1, false);
+        w->frames++;
     }
-    if (n > 0) step(w, &frames[(n - 1) % 2], n - 1, true);
-    for (int i = 0; i < 2; i++) vg_frame_clear(&frames[i]);
-    return n;
 }
 
 static void refuse_unmet(uint64_t frames)
@@ -236,22 +235,36 @@ static void refuse_unmet(uint64_t frames)
              (unsigned long long)frames, (unsigned long long)(frames - 1));
 }
 
-static void open_work(work *w)
+static void prepare(void *context, vg_head *h, vg_frame *in)
 {
+    work *w = context;
     vg_err e;
     size_t limit = opts.memory < SIZE_MAX ? (size_t)opts.memory : SIZE_MAX;
-    for (size_t i = 0; i < opts.nkeys; i++) load_key(&opts.keys[i], w->h);
+    (void)in;
+    w->h = h;
+    cli_need_vertices(h, "the input");
+    for (size_t i = 0; i < opts.nkeys; i++) load_key(&opts.keys[i], h);
     w->ahead = opts.nkeys;
-    if (vg_guide_new(&w->guide, w->h->body.mesh.nv, &e) < 0 || vg_spool_new(&w->spool, w->h, limit, &e) < 0)
-        cli_die(&e);
+    if (vg_guide_new(&w->guide, h->body.mesh.nv, &e) < 0 || vg_spool_new(&w->spool, h, limit, &e) < 0) cli_die(&e);
+}
+
+static void guide_last(void *context)
+{
+    work *w = context;
+    if (w->frames) guide(w, &w->late, w->frames - 1, true);
+    if (w->ahead) refuse_unmet(w->frames);
+    vg_spool_facts facts = vg_spool_get_facts(w->spool);
+    cli_note("%llu frames, at most %llu waited, %llu bytes of them in a temporary file",
+             (unsigned long long)w->frames, (unsigned long long)facts.most_frames,
+             (unsigned long long)facts.file_bytes);
 }
 
 static void close_work(work *w)
 {
     vg_frame_clear(&w->held);
+    vg_frame_clear(&w->late);
     vg_spool_free(&w->spool);
     vg_guide_free(&w->guide);
-    vg_source_close(&w->s);
     for (size_t i = 0; i < opts.nkeys; i++) {
         key *k = &opts.keys[i];
         if (k->frame) free((char *)(uintptr_t)k->option);
@@ -263,20 +276,15 @@ static void close_work(work *w)
 
 int main(int argc, char **argv)
 {
+    static const step guiding = {
+        .batch = 1, .unit = "frames", .init = prepare, .process = guide_late, .finish = guide_last};
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     if (opts.nkeys == 0) cli_usage("name at least one given pose: --first, --last or --key");
-    work w = {.s = cli_source(operands, n)};
-    w.h = vg_source_head(w.s);
-    cli_need_vertices(w.h, "the input");
-    open_work(&w);
-    cli_stream_open(w.h);
-    uint64_t frames = guide_all(&w);
-    if (w.ahead) refuse_unmet(frames);
-    vg_spool_facts facts = vg_spool_get_facts(w.spool);
-    cli_note("%llu frames, at most %llu waited, %llu bytes of them in a temporary file", (unsigned long long)frames,
-             (unsigned long long)facts.most_frames, (unsigned long long)facts.file_bytes);
-    cli_stream_end(vg_source_tail(w.s));
+    work w = {0};
+    vg_source *s = cli_source(operands, n);
+    step_run(&guiding, &w, s);
     close_work(&w);
+    vg_source_close(&s);
     cli_finish(0);
 }

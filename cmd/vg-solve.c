@@ -1,6 +1,6 @@
 /* vg-solve: reconstruct vertices from vectors, one factorisation for all poses.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "cli.h"
+#include "batch.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -64,9 +64,7 @@ typedef struct work {
     waiting *waiting;
     size_t n, most;
     size_t loaded;           /* of the n */
-    vg_frame *in;            /* one for each thread, so that so many are loaded at once */
-    double **vectors;        /* of those that come as vertices */
-    size_t slot;             /* the next of these to be used */
+    double **vectors;        /* of the frames of a batch, when they come as vertices */
     size_t most_steps, planar_faces;
     double worst_residual;
     vg_weights weights;
@@ -226,17 +224,16 @@ static void place_held(const work *w, const machine *m, const vg_frame *f, waiti
     }
 }
 
-/* The frame that has come into w->in[w->slot]. */
-static void take_frame(work *w)
+/* Frame i of a batch. Its vectors stay until load_taken. */
+static void take_frame(work *w, size_t i, vg_frame *in)
 {
     vg_err e;
-    vg_frame *in = &w->in[w->slot];
     const double *vectors = in->values;
     if (w->kind == VG_VERTICES) {
-        vg_graph_vectors(w->g, in->values, w->vectors[w->slot]);
+        vg_graph_vectors(w->g, in->values, w->vectors[i]);
         vg_graph_root(w->g, in->values, in->root);
         vg_graph_anchors(in->values, w->h->anchors, w->h->nanchors, in->anchors);
-        vectors = w->vectors[w->slot];
+        vectors = w->vectors[i];
     }
     const machine *m = machine_for(w, in);
     if (m != w->at) solve_waiting(w);
@@ -247,9 +244,14 @@ static void take_frame(work *w)
     place_held(w, m, in, p);
     p->vectors = vectors;
     if (m->planar) vg_planar_load(m->planar, vectors, p->normals);
-    w->slot = (w->slot + 1) % (size_t)cli.threads;
     if (++w->n == w->most) solve_waiting(w);
-    else if (w->n - w->loaded == (size_t)cli.threads) load_taken(w);
+}
+
+static void take_batch(void *context, size_t n, vg_frame *in)
+{
+    work *w = context;
+    for (size_t i = 0; i < n; i++) take_frame(w, i, &in[i]);
+    load_taken(w);
 }
 
 static void make_waiting(work *w)
@@ -266,22 +268,20 @@ static void make_waiting(work *w)
     }
 }
 
-/* before the head becomes that of the output */
-static void make_slots(work *w)
+/* Room for the vectors and anchors of the frames of a batch; to be called while the head is still that of the input. */
+static void make_room_for_vertices(work *w, vg_frame *in)
 {
     vg_err e;
-    size_t n = (size_t)cli.threads;
-    w->in = cli_allocate(n, sizeof *w->in, "a batch of poses");
-    w->vectors = cli_allocate(n, sizeof *w->vectors, "a batch of poses");
-    for (size_t i = 0; i < n; i++) {
-        if (w->kind != VG_VERTICES) continue;
+    w->vectors = cli_allocate((size_t)cli.threads, sizeof *w->vectors, "a batch of poses");
+    for (size_t i = 0; i < (size_t)cli.threads && w->kind == VG_VERTICES; i++) {
         w->vectors[i] = cli_allocate(3 * vg_graph_corners(w->g), sizeof **w->vectors, "a batch of poses");
-        if (vg_frame_shape(&w->in[i], w->h, &e) < 0) cli_die(&e); /* room for the anchors */
+        if (vg_frame_shape(&in[i], w->h, &e) < 0) cli_die(&e);
     }
 }
 
-static void prepare(work *w, vg_head *h)
+static void prepare(void *context, vg_head *h, vg_frame *in)
 {
+    work *w = context;
     vg_err e;
     w->h = h, w->kind = h->kind;
     if (w->kind != VG_VECTORS && w->kind != VG_VERTICES)
@@ -291,17 +291,14 @@ static void prepare(work *w, vg_head *h)
     uint32_t *anchors = cli_allocate(h->nanchors, sizeof *anchors, "a batch of poses");
     if (h->nanchors) memcpy(anchors, h->anchors, h->nanchors * sizeof *anchors);
     make_machine(w, &w->plain, anchors, h->nanchors);
-    make_slots(w);
+    make_room_for_vertices(w, in);
+    h->kind = VG_VERTICES, h->count = h->body.mesh.nv;
+    make_waiting(w);
 }
 
-static void solve_all(work *w, vg_source *s)
+static void solve_rest(void *context)
 {
-    uint64_t n = 0;
-    while (cli_next(s, &w->in[w->slot])) {
-        take_frame(w);
-        cli_progress("poses", ++n);
-    }
-    solve_waiting(w);
+    solve_waiting(context);
 }
 
 static void clear(work *w)
@@ -318,11 +315,7 @@ static void clear(work *w)
         free(w->waiting[i].normals);
     }
     free(w->waiting);
-    for (size_t i = 0; i < (size_t)cli.threads; i++) {
-        vg_frame_clear(&w->in[i]);
-        free(w->vectors[i]);
-    }
-    free(w->in);
+    for (size_t i = 0; i < (size_t)cli.threads; i++) free(w->vectors[i]);
     free(w->vectors);
     vg_graph_free(&w->g);
 }
@@ -333,13 +326,13 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     work w = {.weights = opts.weights == 1 ? VG_WEIGHTS_AREA : VG_WEIGHTS_UNIFORM};
     vg_source *s = cli_source(operands, n);
-    prepare(&w, vg_source_head(s));
-    w.h->kind = VG_VERTICES, w.h->count = w.h->body.mesh.nv;
-    make_waiting(&w);
-    cli_stream_open(w.h);
-    solve_all(&w, s);
+    const step solve = {.batch = (size_t)cli.threads, /* so many are loaded side by side */
+                        .unit = "poses",
+                        .init = prepare,
+                        .process = take_batch,
+                        .finish = solve_rest};
+    step_run(&solve, &w, s);
     clear(&w);
-    cli_stream_end(vg_source_tail(s));
     vg_source_close(&s);
     cli_finish(0);
 }

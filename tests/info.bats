@@ -303,6 +303,30 @@ END
     nothing_but a.obj copy.txt dir link.txt pipe real.txt
 }
 
+@test "a file that is replaced keeps its permissions, whatever writes it" {
+    poses cube 2
+    vg-encode pose1.obj pose2.obj -o walk.vgs
+    mkdir out
+    for name in out.vgs out.txt out.png out.obj out.ply out.zip out.pc2 out.glb p0.obj p1.obj out/pose1.obj; do
+        : >$name
+        chmod 640 $name
+    done
+    must vg-encode walk.vgs -o out.vgs
+    must vg-info walk.vgs -o out.txt
+    must vg-view walk.vgs -o out.png
+    must vg-decode pose1.obj -o out.obj
+    must vg-decode -q walk.vgs -o out.zip
+    must vg-decode -q walk.vgs -o out.glb
+    must vg-decode -q --mesh out.ply walk.vgs -o out.pc2
+    must vg-decode walk.vgs -o 'p%d.obj'
+    must vg-decode walk.vgs -o out/
+    for name in out.vgs out.txt out.png out.obj out.ply out.zip out.pc2 out.glb p0.obj p1.obj out/pose1.obj; do
+        [ -s $name ] && [ "$(stat -c %a $name)" = 640 ] || fail "$name has mode $(stat -c %a $name), not 640"
+    done
+    (umask 027 && vg-decode pose1.obj -o new.obj)
+    [ "$(stat -c %a new.obj)" = 640 ] # a new file follows the umask
+}
+
 @test "a link that leads nowhere, or to itself, is neither followed nor replaced" {
     mesh cube >a.obj
     mkdir d
@@ -333,10 +357,10 @@ END
         exec 7>in
         head -c 60000 one.vgs >&7
         for _ in $(seq 100); do
-            compgen -G '.late.vgs.*.tmp' >/dev/null && break
+            compgen -G '.vg-*.tmp' >/dev/null && break
             sleep 0.05
         done
-        compgen -G '.late.vgs.*.tmp'
+        compgen -G '.vg-*.tmp'
         kill -$signal $waiting
         status=0
         wait $waiting || status=$?

@@ -36,7 +36,7 @@ struct vg_sink {
     uint64_t frames;
     bool made_directory, ended;
     vgi_name_set names;  /* of frames in a directory or archive */
-    vgi_targets targets;
+    vg_targets targets;
     int fd; /* the one file or archive; -1 */
     vgi_packer *packer;
     /* mesh files: */
@@ -111,7 +111,7 @@ static int named_path(const vg_sink *s, const char *name, vg_bytes *path, vg_err
 
 static void remove_files(const vg_sink *s)
 {
-    vgi_targets_remove(&s->targets);
+    vg_targets_remove(&s->targets);
     if (s->made_directory) rmdir(s->output);
 }
 
@@ -119,7 +119,7 @@ static int write_and_close(int fd, const vg_bytes *text, const char *path, vg_er
 {
     int r = vgi_write_all(fd, text->data, text->size, path, e);
     if (r < 0) return close(fd), r;
-    return vgi_target_close(fd, path, e);
+    return vg_target_close(fd, path, e);
 }
 
 static int make_directory(vg_sink *s, vg_err *e)
@@ -132,9 +132,9 @@ static int make_directory(vg_sink *s, vg_err *e)
 /* A pipe cannot be patched: what goes there waits in a file without a name. */
 static int open_sequence(vg_sink *s, vg_err *e)
 {
-    s->fd = s->plan.to_stdout ? -1 : vgi_targets_open(&s->targets, s->output, e);
+    s->fd = s->plan.to_stdout ? -1 : vg_targets_open(&s->targets, s->output, e);
     if (s->fd < 0 && !s->plan.to_stdout) return s->fd;
-    bool patchable = s->fd >= 0 && !vgi_targets_in_place(&s->targets);
+    bool patchable = s->fd >= 0 && !vg_targets_in_place(&s->targets);
     s->out.name = s->output;
     s->out.fd = patchable ? s->fd : vgi_nameless_file(e);
     return s->out.fd < 0 ? s->out.fd : s->plan.sequence->begin(&s->state, s->head, &s->options, &s->out, e);
@@ -149,7 +149,7 @@ static int open_place(vg_sink *s, vg_err *e)
     default: break;
     }
     if (s->plan.to_stdout) return VG_OK;
-    if ((s->fd = vgi_targets_open(&s->targets, s->output, e)) < 0) return s->fd;
+    if ((s->fd = vg_targets_open(&s->targets, s->output, e)) < 0) return s->fd;
     if (s->plan.kind != VGI_PLAN_ARCHIVE) return VG_OK;
     return vgi_packer_open(&s->packer, s->fd, s->output, s->plan.length, e);
 }
@@ -201,7 +201,7 @@ static int put_mesh(vg_sink *s, const vg_sink_options *o, vg_err *e)
     int fd = -1;
     r = vg_model_write(&text, s->mesh_format->name, &s->head->body.mesh, s->head->body.reference,
                        &s->head->body.attributes, s->full_precision, e);
-    if (r == VG_OK) r = fd = vgi_targets_open(&s->targets, s->mesh, e);
+    if (r == VG_OK) r = fd = vg_targets_open(&s->targets, s->mesh, e);
     if (r >= 0) r = write_and_close(fd, &text, s->mesh, e);
     vg_bytes_clear(&text);
     return r;
@@ -438,7 +438,7 @@ static int place_piece(vg_sink *s, piece *p, vg_err *e)
     int r = series ? series_path(s, &p->path, e) : named_path(s, p->name, &p->path, e);
     s->number += series;
     if (r < 0 || s->plan.kind == VGI_PLAN_ARCHIVE) return r;
-    p->fd = vgi_targets_open(&s->targets, (char *)p->path.data, e);
+    p->fd = vg_targets_open(&s->targets, (char *)p->path.data, e);
     return p->fd < 0 ? p->fd : VG_OK;
 }
 
@@ -525,12 +525,12 @@ int vg_sink_end(vg_sink *s, vg_err *e)
     else if (s->plan.kind == VGI_PLAN_FILE) r = end_single(s, e);
     if (r == VG_OK && s->fd >= 0) {
         if (s->out.fd == s->fd) s->out.fd = -1;
-        r = vgi_target_close(s->fd, s->output, e);
+        r = vg_target_close(s->fd, s->output, e);
         s->fd = -1;
     }
     if (r == VG_OK && s->frames) r = warn_of_losses(s, e);
     if (r == VG_OK) r = warn_of_loose(s, e);
-    if (r == VG_OK) r = vgi_targets_rename(&s->targets, e);
+    if (r == VG_OK) r = vg_targets_rename(&s->targets, e);
     s->ended = r == VG_OK;
     return r;
 }
@@ -567,7 +567,7 @@ void vg_sink_close(vg_sink **sink)
     if (s->out.fd >= 0 && s->out.fd != s->fd) close(s->out.fd);
     vgi_output_clear(&s->out);
     if (s->fd >= 0) close(s->fd);
-    vgi_targets_clear(&s->targets);
+    vg_targets_clear(&s->targets);
     vgi_name_set_clear(&s->names);
     vgi_names_clear(&s->warnings);
     vgi_slim_clear(&s->slim);

@@ -1,5 +1,5 @@
-/* sink.h: what sink.c is made of: the plan of an output (sink_plan.c), files that take their final names in the end
- * (targets.c), and a sequence without the vertices that are in no face (slim.c).
+/* sink.h: what sink.c is made of: the plan of an output (sink_plan.c), and a sequence without the vertices that are in
+ * no face (slim.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_SINK_H
 #define VG_SINK_H
@@ -36,38 +36,10 @@ int vgi_plan_check_head(const vgi_plan *p, const vg_head *h, const char *output,
 /* vgi_plan_lacks_faces: does the file need a mesh beside it? */
 bool vgi_plan_lacks_faces(const vgi_plan *p);
 bool vgi_is_directory(const char *path);
-/* vgi_parent_directory: the one in which a file of this name (n bytes) would lie; free it. */
+/* vgi_parent_directory: the directory of the file `path` (n bytes); free it. Also in targets.c. */
 char *vgi_parent_directory(const char *path, size_t n, vg_err *e);
-
-/* ---- targets.c: files that are written beside their place and take their final names together ---- */
-
-typedef struct vgi_target {
-    char *final, *temporary; /* temporary NULL: written in place */
-    bool renamed;
-} vgi_target;
-
-typedef struct vgi_targets { /* whole at any moment: vgi_targets_remove may come from a signal's handler */
-    vgi_target *at;
-    size_t n, cap;
-    uint64_t temporaries; /* names tried */
-} vgi_targets;
-
-/* vgi_target_look: 1 and *st when there is something that can be written or replaced, 0 when there is nothing;
- * negative when there is a directory, or a link that leads nowhere, in whose place a file would come. */
-struct stat;
-int vgi_target_look(const char *path, struct stat *st, vg_err *e) VG_MUST_CHECK;
-/* vgi_targets_open: open what will be `path`: a descriptor, or negative. A link is followed: what it points to is
- * replaced, not the link. Pipes and devices, which cannot be replaced, are opened where they are. */
-int vgi_targets_open(vgi_targets *t, const char *path, vg_err *e) VG_MUST_CHECK;
-/* vgi_targets_in_place: is the file that was opened last a pipe or a device? */
-bool vgi_targets_in_place(const vgi_targets *t);
-/* vgi_target_close: close a descriptor; messages call the file `name`. */
-int vgi_target_close(int fd, const char *name, vg_err *e) VG_MUST_CHECK;
-int vgi_targets_rename(vgi_targets *t, vg_err *e) VG_MUST_CHECK;
-/* vgi_targets_remove: the files; under final names too, for half a series would look like a whole one. Nothing but
- * system calls. */
-void vgi_targets_remove(const vgi_targets *t);
-void vgi_targets_clear(vgi_targets *t); /* the list */
+/* vgi_check_directory: can files be made in `dir`? Messages say that `output` cannot be written. */
+int vgi_check_directory(const char *dir, const char *output, vg_err *e) VG_MUST_CHECK;
 
 /* ---- slim.c: a sequence without its loose vertices, those in no face ---- */
 

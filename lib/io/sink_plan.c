@@ -161,39 +161,6 @@ int vgi_plan_make(vgi_plan *p, const char *output, const vg_sink_options *o, vg_
 
 /* ---- what can be told without writing ---- */
 
-char *vgi_parent_directory(const char *path, size_t n, vg_err *e)
-{
-    while (n > 1 && path[n - 1] == '/') n--;
-    while (n > 0 && path[n - 1] != '/') n--;
-    while (n > 1 && path[n - 1] == '/') n--;
-    return n ? vgi_copy_string(path, n, e) : vgi_copy_string(".", 1, e);
-}
-
-static int check_directory(const char *dir, const char *output, vg_err *e)
-{
-    struct stat st;
-    if (stat(dir, &st) < 0 || access(dir, W_OK | X_OK) < 0)
-        return vg_fail(e, VG_ESYS, "cannot write '%s': directory '%s': %s", output, dir, strerror(errno));
-    if (!S_ISDIR(st.st_mode)) return vg_fail(e, VG_ESYS, "cannot write '%s': '%s' is no directory", output, dir);
-    return VG_OK;
-}
-
-/* May the file be replaced, or written in place if it is a pipe or device? */
-static int check_file(const char *path, vg_err *e)
-{
-    struct stat st;
-    int exists = vgi_target_look(path, &st, e);
-    if (exists < 0) return exists;
-    if (exists && !S_ISREG(st.st_mode))
-        return access(path, W_OK) == 0 ? VG_OK : vg_fail(e, VG_ESYS, "cannot write '%s': %s", path, strerror(errno));
-    char *real = realpath(path, NULL);
-    char *dir = vgi_parent_directory(real ? real : path, strlen(real ? real : path), e);
-    int r = dir ? check_directory(dir, path, e) : VG_ENOMEM;
-    free(real);
-    free(dir);
-    return r;
-}
-
 int vgi_plan_check_place(const vgi_plan *p, vg_err *e)
 {
     if (p->to_stdout) return VG_OK;
@@ -201,14 +168,14 @@ int vgi_plan_check_place(const vgi_plan *p, vg_err *e)
     if (!name) return VG_ENOMEM;
     int r;
     if (p->kind == VGI_PLAN_DIRECTORY && vgi_is_directory(name)) {
-        r = check_directory(name, name, e);
+        r = vgi_check_directory(name, name, e);
     } else if (p->kind == VGI_PLAN_DIRECTORY || p->kind == VGI_PLAN_SERIES) {
         if (!(dir = vgi_parent_directory(name, p->length, e))) r = VG_ENOMEM;
         else
             r = strchr(dir, '%') ? VG_OK
-                                 : check_directory(dir, name, e); /* numbered directories are met when written */
+                                 : vgi_check_directory(dir, name, e); /* numbered directories are met when written */
     } else {
-        r = check_file(name, e);
+        r = vg_target_check(name, e);
     }
     free(name);
     free(dir);
@@ -220,7 +187,7 @@ int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e)
     vgi_plan p;
     int r = vgi_plan_make(&p, output, o, e);
     if (r == VG_OK) r = vgi_plan_check_place(&p, e);
-    return r == VG_OK && o->mesh ? check_file(o->mesh, e) : r;
+    return r == VG_OK && o->mesh ? vg_target_check(o->mesh, e) : r;
 }
 
 int vgi_plan_check_head(const vgi_plan *p, const vg_head *h, const char *output, vg_err *e)

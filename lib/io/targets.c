@@ -1,6 +1,6 @@
-/* targets.c: files on their way to their final names: each is written beside its place under a temporary one, and all
- * are renamed together, or removed.
- * Leaves out what is written into them (sink.c).
+/* targets.c: files that are replaced as a whole: each is written beside its place under a temporary name, and all are
+ * renamed together, or removed. All output of the library and the programs goes through here.
+ * Leaves out what is written into them (sink.c, the writer of streams, the programs).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sink.h"
 
@@ -10,9 +10,54 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* A file beside its final place under a name that nobody has. mkstemp would do, but for the mode, which is the user's
- * choice (umask). The target knows the name before there is a file, so that vgi_targets_remove misses none. */
-static int create_beside(vgi_targets *t, vgi_target *target, vg_err *e)
+char *vgi_parent_directory(const char *path, size_t n, vg_err *e)
+{
+    while (n > 1 && path[n - 1] == '/') n--;
+    while (n > 0 && path[n - 1] != '/') n--;
+    while (n > 1 && path[n - 1] == '/') n--;
+    return n ? vgi_copy_string(path, n, e) : vgi_copy_string(".", 1, e);
+}
+
+int vgi_check_directory(const char *dir, const char *output, vg_err *e)
+{
+    struct stat st;
+    if (stat(dir, &st) < 0 || access(dir, W_OK | X_OK) < 0)
+        return vg_fail(e, VG_ESYS, "cannot write '%s': directory '%s': %s", output, dir, strerror(errno));
+    if (!S_ISDIR(st.st_mode)) return vg_fail(e, VG_ESYS, "cannot write '%s': '%s' is no directory", output, dir);
+    return VG_OK;
+}
+
+/* 1 and *st when there is something that can be written or replaced, 0 when there is nothing; negative when there is a
+ * directory, or a link that leads nowhere, which a file would replace. */
+static int look(const char *path, struct stat *st, vg_err *e)
+{
+    struct stat link;
+    bool exists = stat(path, st) == 0;
+    if (!exists && errno != ENOENT) return vg_fail(e, VG_ESYS, "cannot write '%s': %s", path, strerror(errno));
+    if (exists && S_ISDIR(st->st_mode)) return vg_fail(e, VG_ESYS, "cannot write '%s': it is a directory", path);
+    if (!exists && lstat(path, &link) == 0)
+        return vg_fail(e, VG_ESYS, "cannot write '%s': it is a link to a file that is not there", path);
+    return exists;
+}
+
+int vg_target_check(const char *path, vg_err *e)
+{
+    struct stat st;
+    int exists = look(path, &st, e);
+    if (exists < 0) return exists;
+    if (exists && !S_ISREG(st.st_mode))
+        return access(path, W_OK) == 0 ? VG_OK : vg_fail(e, VG_ESYS, "cannot write '%s': %s", path, strerror(errno));
+    char *real = realpath(path, NULL);
+    char *dir = vgi_parent_directory(real ? real : path, strlen(real ? real : path), e);
+    int r = dir ? vgi_check_directory(dir, path, e) : VG_ENOMEM;
+    free(real);
+    free(dir);
+    return r;
+}
+
+/* Create a file beside its final place under an unused name. mkstemp would ignore the umask. The target has the name
+ * before the file exists, so that vg_targets_remove misses no file. */
+static int create_beside(vg_targets *t, vg_target *target, vg_err *e)
 {
     const char *final = target->final;
     char *dir = vgi_parent_directory(final, strlen(final), e);
@@ -31,11 +76,11 @@ static int create_beside(vgi_targets *t, vgi_target *target, vg_err *e)
     return fd;
 }
 
-static int make_room(vgi_targets *t, vg_err *e)
+static int make_room(vg_targets *t, vg_err *e)
 {
     if (t->n < t->cap) return VG_OK;
     size_t cap = t->cap ? 2 * t->cap : 16;
-    vgi_target *grown = vgi_array(cap, sizeof *grown, e), *old = t->at;
+    vg_target *grown = vgi_array(cap, sizeof *grown, e), *old = t->at;
     if (!grown) return VG_ENOMEM;
     if (t->n) memcpy(grown, old, t->n * sizeof *grown);
     t->at = grown, t->cap = cap;
@@ -43,52 +88,43 @@ static int make_room(vgi_targets *t, vg_err *e)
     return VG_OK;
 }
 
-int vgi_target_look(const char *path, struct stat *st, vg_err *e)
-{
-    struct stat link;
-    bool exists = stat(path, st) == 0;
-    if (!exists && errno != ENOENT) return vg_fail(e, VG_ESYS, "cannot write '%s': %s", path, strerror(errno));
-    if (exists && S_ISDIR(st->st_mode)) return vg_fail(e, VG_ESYS, "cannot write '%s': it is a directory", path);
-    if (!exists && lstat(path, &link) == 0)
-        return vg_fail(e, VG_ESYS, "cannot write '%s': it is a link to a file that is not there", path);
-    return exists;
-}
-
-int vgi_targets_open(vgi_targets *t, const char *path, vg_err *e)
+int vg_targets_open(vg_targets *t, const char *path, vg_err *e)
 {
     struct stat st;
-    int fd, r = make_room(t, e), exists = r < 0 ? r : vgi_target_look(path, &st, e);
+    int fd, r = make_room(t, e), exists = r < 0 ? r : look(path, &st, e);
     if (exists < 0) return exists;
     char *real = exists ? realpath(path, NULL) : NULL;
-    vgi_target *target = &t->at[t->n];
-    *target = (vgi_target){.final = real ? real : vgi_copy_string(path, strlen(path), e)};
+    vg_target *target = &t->at[t->n];
+    *target = (vg_target){.final = real ? real : vgi_copy_string(path, strlen(path), e)};
     if (!target->final) return VG_ENOMEM;
     t->n++;
     if (exists && !S_ISREG(st.st_mode)) {
-        fd = open(path, O_WRONLY | O_CLOEXEC);
+        fd = open(path, O_WRONLY | O_NOCTTY | O_CLOEXEC);
         if (fd < 0) fd = vg_fail(e, VG_ESYS, "cannot open '%s': %s", path, strerror(errno));
     } else {
         fd = create_beside(t, target, e);
+        if (fd >= 0 && exists && fchmod(fd, st.st_mode & 07777) < 0) {
+            /* a file system without permissions: not worth failing for */
+        }
     }
     if (fd < 0) t->n--, free(target->final);
     return fd;
 }
 
-bool vgi_targets_in_place(const vgi_targets *t)
+bool vg_targets_in_place(const vg_targets *t)
 {
     return !t->at[t->n - 1].temporary;
 }
 
-/* close(2) is where some file systems say that the disk is full. */
-int vgi_target_close(int fd, const char *name, vg_err *e)
+int vg_target_close(int fd, const char *name, vg_err *e)
 {
     return close(fd) == 0 ? VG_OK : vg_fail(e, VG_ESYS, "cannot write to '%s': %s", name, strerror(errno));
 }
 
-int vgi_targets_rename(vgi_targets *t, vg_err *e)
+int vg_targets_rename(vg_targets *t, vg_err *e)
 {
     for (size_t i = 0; i < t->n; i++) {
-        vgi_target *target = &t->at[i];
+        vg_target *target = &t->at[i];
         if (target->temporary && rename(target->temporary, target->final) < 0)
             return vg_fail(e, VG_ESYS, "cannot write '%s': %s", target->final, strerror(errno));
         target->renamed = target->temporary != NULL;
@@ -96,21 +132,22 @@ int vgi_targets_rename(vgi_targets *t, vg_err *e)
     return VG_OK;
 }
 
-void vgi_targets_remove(const vgi_targets *t)
+void vg_targets_remove(const vg_targets *t)
 {
     for (size_t i = 0; i < t->n; i++) {
-        const vgi_target *target = &t->at[i];
+        const vg_target *target = &t->at[i];
         if (target->renamed) unlink(target->final);
         else if (target->temporary) unlink(target->temporary);
     }
 }
 
-void vgi_targets_clear(vgi_targets *t)
+void vg_targets_clear(vg_targets *t)
 {
-    for (size_t i = 0; i < t->n; i++) {
-        free(t->at[i].final);
-        free(t->at[i].temporary);
+    vg_targets old = *t;
+    *t = (vg_targets){0}; /* before anything is freed: vg_targets_remove may come at any moment */
+    for (size_t i = 0; i < old.n; i++) {
+        free(old.at[i].final);
+        free(old.at[i].temporary);
     }
-    free(t->at);
-    *t = (vgi_targets){0};
+    free(old.at);
 }

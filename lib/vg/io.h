@@ -115,6 +115,35 @@ int vg_poses_values(const vg_poses *p, size_t i, double *room, const double **va
 int vg_poses_frame(const vg_poses *p, size_t i, vg_frame *f, vg_err *e) VG_MUST_CHECK;
 vg_poses_stats vg_poses_get_stats(const vg_poses *p);
 
+/* Files that are replaced as a whole. Each is written beside its place under a temporary name; all are renamed together
+ * when they are complete, or removed. A file that is replaced keeps its permissions. A link is followed: the file it
+ * points to is replaced, not the link. Pipes and devices cannot be replaced and are written in place. */
+typedef struct vg_target {
+    char *final, *temporary; /* temporary NULL: written in place */
+    bool renamed;
+} vg_target;
+
+typedef struct vg_targets { /* consistent at any moment: vg_targets_remove may be called by a signal handler */
+    vg_target *at;
+    size_t n, cap;
+    uint64_t temporaries; /* temporary names tried so far */
+} vg_targets;
+
+/* vg_target_check: can `path` be written or replaced? A directory, a link that leads nowhere, or a directory without
+ * permission is VG_ESYS. */
+int vg_target_check(const char *path, vg_err *e) VG_MUST_CHECK;
+/* vg_targets_open: open what will be `path`: a descriptor, or negative. */
+int vg_targets_open(vg_targets *t, const char *path, vg_err *e) VG_MUST_CHECK;
+/* vg_targets_in_place: is the file that was opened last a pipe or a device? */
+bool vg_targets_in_place(const vg_targets *t);
+/* vg_target_close: close a descriptor; messages call the file `name`. Some file systems report a full disk only here. */
+int vg_target_close(int fd, const char *name, vg_err *e) VG_MUST_CHECK;
+int vg_targets_rename(vg_targets *t, vg_err *e) VG_MUST_CHECK;
+/* vg_targets_remove: unlink the files, also those that have been renamed, since half a series would look like a whole
+ * one. Calls nothing but unlink. */
+void vg_targets_remove(const vg_targets *t);
+void vg_targets_clear(vg_targets *t); /* forget the files, which stay */
+
 /* The door out: one mesh file, a '%04d' pattern, a directory ("out/"), an archive, or one file that holds the whole
  * sequence, told by the name and checked at once; "NAME:ply" chooses what is inside an archive or directory, `format`
  * (may be NULL) overrides. Everything is written under temporary names and takes its final name in vg_sink_end. */

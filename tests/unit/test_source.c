@@ -618,18 +618,18 @@ static void limits_count_what_is_passed_over(void)
 /* When one of several files cannot take its name, none of them keeps its. */
 static void files_take_their_names_together(void)
 {
-    vgi_targets t = {0};
+    vg_targets t = {0};
     vg_err e = {0};
     enter_place();
     CHECK(mkdir("d", 0777) == 0);
-    int one = vgi_targets_open(&t, "one", &e), two = vgi_targets_open(&t, "d/two", &e);
+    int one = vg_targets_open(&t, "one", &e), two = vg_targets_open(&t, "d/two", &e);
     CHECK(one >= 0 && two >= 0 && access("one", F_OK) < 0 && access("d/two", F_OK) < 0);
-    CHECK(vgi_target_close(one, "one", &e) == VG_OK && vgi_target_close(two, "two", &e) == VG_OK);
+    CHECK(vg_target_close(one, "one", &e) == VG_OK && vg_target_close(two, "two", &e) == VG_OK);
     CHECK(rename("d", "gone") == 0);
-    CHECK(vgi_targets_rename(&t, &e) == VG_ESYS && access("one", F_OK) == 0);
-    vgi_targets_remove(&t);
+    CHECK(vg_targets_rename(&t, &e) == VG_ESYS && access("one", F_OK) == 0);
+    vg_targets_remove(&t);
     CHECK(access("one", F_OK) < 0);
-    vgi_targets_clear(&t);
+    vg_targets_clear(&t);
     leave_place();
 }
 
