@@ -3,6 +3,7 @@
 # make demo        transfer an animation onto another body and draw it: says where to look
 # make check       all tests                    make CONFIG=asan check    the same under ASan and UBSan
 # make coverage    lines of lib that make check runs, file by file
+# make check-aarch64   the kernels' tests on an emulated ARM processor, where its tools are installed
 # make lint        the static analysers that are installed
 # make bench       throughput of every stage beside its limit; BENCH=full: up to 1,000,002 vertices; JSON=FILE: also as JSON
 # make fuzz        search for input that breaks the readers (clang; FUZZ_SECONDS=60 each)
@@ -58,15 +59,22 @@ ALL_CFLAGS += -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=
 ALL_LDFLAGS := -fsanitize=address,undefined
 endif
 ALL_CFLAGS += $(CFLAGS)
-# numeric kernels: the compiler may unroll and vectorise them; nothing here reorders sums
-KERNELS := $(addprefix lib/method/vectors/,deform_kernel planar_kernel guess_kernel reconstruct) $(addprefix lib/method/pairs/,transfer transfer_kernel) \
-    lib/signal/plane lib/signal/spline_pose lib/method/patches/segment lib/numeric/solve_kernel lib/model/graph lib/model/measures lib/model/measures_kernel lib/core/memory
+# Numeric kernels are compiled once for each instruction set of the target (lib/core/isa.h); the compiler may unroll and
+# vectorise them and what else is listed; nothing here reorders sums.
+TARGET := $(shell $(CC) -dumpmachine 2>/dev/null)
+SETS := $(if $(filter x86_64%,$(TARGET)),sse2 avx2 avx512,$(if $(filter aarch64%,$(TARGET)),neon,plain))
+SET_avx2 := -mavx2 -mfma
+SET_avx512 := -mavx512f -mavx512dq -mfma -mprefer-vector-width=512
+FAST := -O3 -fno-math-errno -fno-trapping-math
+FAST_SRC := $(addprefix lib/,method/vectors/reconstruct method/pairs/transfer method/patches/segment signal/plane signal/spline_pose model/graph model/measures)
 # what a program does not call is not loaded: OpenBLAS starts threads that spin for a while as soon as it is there
 ALL_LDFLAGS += -Wl,--as-needed $(LDFLAGS)
 ALL_LIBS := $(CHOLMOD_LIBS) $(LAPACKE_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) -lpthread -lm $(LDLIBS)
 
-LIB_SRC := $(sort $(wildcard lib/*/*.c lib/*/*/*.c))
-LIB_OBJ := $(LIB_SRC:%.c=$(B)/%.o) $(B)/page_text.o
+KERNEL_SRC := $(sort $(wildcard lib/*/*_kernel.c lib/*/*/*_kernel.c))
+LIB_SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard lib/*/*.c lib/*/*/*.c)))
+KERNEL_OBJ := $(foreach set,$(SETS),$(KERNEL_SRC:%.c=$(B)/%.$(set).o))
+LIB_OBJ := $(LIB_SRC:%.c=$(B)/%.o) $(KERNEL_OBJ) $(B)/page_text.o
 PROGRAMS := $(patsubst cmd/%.c,%,$(sort $(wildcard cmd/vg-*.c)))
 CMD_SHARED := $(filter-out cmd/vg-%.c,$(sort $(wildcard cmd/*.c)))
 CMD_OBJ := $(CMD_SHARED:%.c=$(B)/%.o)
@@ -78,18 +86,25 @@ BENCHES := $(patsubst tests/bench/%.c,%,$(sort $(wildcard tests/bench/*.c)))
 all: $(PROGRAMS:%=$(B)/bin/%) $(B)/libvg.a
 
 # objects depend on the flags they were made with
-FLAGS_NOW := $(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(ALL_LDFLAGS) $(ALL_LIBS)
+FLAGS_NOW := $(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(FAST) $(SET_avx2) $(SET_avx512) $(ALL_LDFLAGS) $(ALL_LIBS)
 $(B)/flags: FORCE
 	@mkdir -p $(B)
 	@echo '$(FLAGS_NOW)' | cmp -s - $@ || echo '$(FLAGS_NOW)' > $@
 .PHONY: FORCE
 FORCE:
 
-$(KERNELS:%=$(B)/%.o): ALL_CFLAGS += -O3 -fno-math-errno -fno-trapping-math
+$(FAST_SRC:%=$(B)/%.o) $(KERNEL_OBJ): ALL_CFLAGS += $(FAST)
 
 $(B)/%.o: %.c $(B)/flags
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
+
+define kernel_of_set
+$(B)/%_kernel.$(1).o: %_kernel.c $(B)/flags
+	@mkdir -p $$(@D)
+	$$(CC) $$(ALL_CPPFLAGS) $$(ALL_CFLAGS) $$(SET_$(1)) -DVGI_SET=$(1) -MMD -MP -c -o $$@ $$<
+endef
+$(foreach set,$(SETS),$(eval $(call kernel_of_set,$(set))))
 
 # what the pages of vg-view are made of, as strings of C; all ASCII
 # The player is one script in several files: the first opens its scope, the last closes it and starts it.
@@ -154,6 +169,21 @@ CHECK_FUZZERS := $(if $(filter all fuzz,$(TESTS)),$(FUZZERS),$(filter $(TESTS),$
 .PHONY: check
 check: all $(CHECK_UNITS:%=$(B)/unit/%) $(CHECK_FUZZERS:%=$(B)/fuzz/%) $(B)/tools/fail_malloc.so
 	@BUILD=$(B) CONFIG=$(CONFIG) TESTS='$(TESTS)' sh tests/run.sh
+
+# The kernels' tests, compiled for ARM of 64 bits and run by an emulator: what they link needs neither CHOLMOD nor BLAS.
+ARM_CC ?= aarch64-linux-gnu-gcc
+ARM_RUN ?= qemu-aarch64 -L /usr/aarch64-linux-gnu
+ARM_OBJ = $(patsubst %.c,$(B)/%.o,$(wildcard lib/core/*.c) $(addprefix lib/numeric/,polar.c rotation.c stats.c turn.c) tests/unit/test_isa.c)
+.PHONY: check-aarch64 check-kernels
+check-aarch64:
+	@if ! command -v $(firstword $(ARM_CC)) >/dev/null || ! command -v $(firstword $(ARM_RUN)) >/dev/null; then \
+	    echo 'skipped: this takes $(firstword $(ARM_CC)) and $(firstword $(ARM_RUN)), of gcc-aarch64-linux-gnu and qemu-user'; \
+	else $(MAKE) CC='$(ARM_CC)' CPPFLAGS= B=build/aarch64 RUN='$(ARM_RUN)' check-kernels; fi
+
+check-kernels: $(B)/check-kernels
+	$(RUN) $(B)/check-kernels
+$(B)/check-kernels: $(ARM_OBJ) $(KERNEL_OBJ)
+	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ -lpthread -lm
 
 .PHONY: coverage
 coverage:

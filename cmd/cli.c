@@ -251,6 +251,14 @@ static void widen_pipe(int fd)
     if (now >= 0 && now < PIPE_BYTES && fcntl(fd, F_SETPIPE_SZ, PIPE_BYTES) < 0) return; /* as it was: only slower */
 }
 
+/* VG_ISA: the instruction set of the kernels. */
+static void choose_kernels(void)
+{
+    vg_err e;
+    const char *name = getenv("VG_ISA");
+    if (name && *name && vg_isa_choose(name, &e) < 0) cli_stop(VG_EARG, "VG_ISA: %s", e.message);
+}
+
 size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands)
 {
     started = seconds();
@@ -259,6 +267,7 @@ size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands)
     if (atexit(library_gave_up)) cli_stop(VG_ENOMEM, "not enough memory to start");
     signal(SIGPIPE, SIG_DFL); /* a parent may have ignored it */
     signal(SIGXFSZ, SIG_IGN); /* a file size limit is a failed write, with a message */
+    choose_kernels();
     *operands = cli_allocate((size_t)argc, sizeof **operands, "the operands");
     size_t n = options_parse(argc, argv, *operands);
     for (size_t i = 0; i < n; i++) cli_claim_input(NULL, (*operands)[i]);

@@ -275,11 +275,11 @@ static size_t parse(int argc, char **argv, char **operands)
     for (int c; (c = getopt_long(argc, argv, letters, longs, NULL)) != -1;) {
         if (c == 1)
             operands[count++] = optarg;
-        else if (c == '?' || c == ':')
-            refuse_option(c, argv);
-        else
+        else if (c != '?' && c != ':')
             take_option(find_option(c), optarg);
-        if (want_help || want_version) return 0;
+        else if (!want_version)
+            refuse_option(c, argv);
+        if (want_help) return 0;
     }
     while (optind < argc) operands[count++] = argv[optind++];
     return count;
@@ -301,6 +301,17 @@ static void check_excludes(const cli_option *o)
             cli_usage("--%s does not go with --%.*s", o->name, (int)strcspn(p, "|"), p);
 }
 
+/* Not before the options are read: --verbose may follow --version. */
+static void print_version(const char *name)
+{
+    printf("%s (vg) %s\nstream 1.0\n", name, VG_VERSION);
+    if (!cli.verbose) return;
+    printf("kernels for %s; this machine has", vg_isa());
+    const char *set;
+    for (size_t i = 0; (set = vg_isa_at(i)); i++) printf("%s %s", i ? "," : "", set);
+    putchar('\n');
+}
+
 /* Do the options that were given stand together? */
 static void check_together(void)
 {
@@ -319,7 +330,7 @@ size_t options_parse(int argc, char **argv, char **operands)
     gather_options(p);
     size_t n = parse(argc, argv, operands);
     if (want_help) print_help(p);
-    if (want_version && !want_help) printf("%s (vg) %s\nstream 1.0\n", p->name, VG_VERSION);
+    if (want_version && !want_help) print_version(p->name);
     if (want_help || want_version) cli_finish(0);
     if (n > p->most_operands) {
         if (p->most_operands == 0) cli_usage("%s takes no operands, but got '%s'", p->name, operands[0]);

@@ -1,6 +1,6 @@
-/* memory.c: checked allocation, growing byte arrays, and two scans of input: UTF-8 and finite numbers.
+/* memory.c: checked allocation, growing byte arrays, and whether text is UTF-8; numbers_kernel.c looks whether numbers are finite.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "numeric/lanes.h"
+#include "core/numbers_kernel.h"
 
 #include <stdlib.h>
 
@@ -103,40 +103,7 @@ bool vgi_is_utf8(const char *s, size_t n)
     return true;
 }
 
-/* x - x is 0 for finite x and NaN otherwise; the bits are or-ed so that the loop has no branch. */
-static inline __attribute__((always_inline)) bool all_finite(const double *x, size_t n)
-{
-    vgi_mask bad = {0};
-    for (; n >= VGI_LANES; n -= VGI_LANES, x += VGI_LANES) {
-        vgi_lanes a;
-        memcpy(&a, x, sizeof a);
-        bad |= (vgi_mask)(a - a); /* NOLINT(misc-redundant-expression) */
-    }
-    vgi_lanes rest = {0};
-    if (n) memcpy(&rest, x, n * sizeof *x);
-    bad |= (vgi_mask)(rest - rest); /* NOLINT(misc-redundant-expression) */
-    int64_t bits = 0;
-    for (int i = 0; i < VGI_LANES; i++) bits |= bad[i];
-    return bits == 0;
-}
-
-#if defined(__x86_64__)
-__attribute__((target("avx512f"))) static bool finite_avx512(const double *x, size_t n)
-{
-    return all_finite(x, n);
-}
-
-__attribute__((target("avx2"))) static bool finite_avx2(const double *x, size_t n)
-{
-    return all_finite(x, n);
-}
-#endif
-
 bool vgi_finite(const double *x, size_t n)
 {
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f")) return finite_avx512(x, n);
-    if (__builtin_cpu_supports("avx2")) return finite_avx2(x, n);
-#endif
-    return all_finite(x, n);
+    return vgi_numbers_kernel_now()->finite(x, n);
 }

@@ -1,7 +1,7 @@
 /* digest.c: one number that tells whether two sequences say the same, whatever commands and precision made them.
  * Leaves out the checksums of records, which guard bytes and not meaning (io/record.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "core/core.h"
+#include "core/numbers_kernel.h"
 
 /* the state as a value, so that there is nothing to allocate; its layout is of the ABI */
 #define XXH_STATIC_LINKING_ONLY
@@ -30,14 +30,13 @@ static void mix_count(vg_digest *d, uint64_t n)
 
 static void mix_doubles(vg_digest *d, const double *x, size_t n)
 {
+    double plain[WORDS];
     uint64_t words[WORDS];
-    for (size_t i = 0; i < n;) {
-        size_t k = 0;
-        for (; k < WORDS && i < n; k++, i++) {
-            double value = x[i] + 0.0; /* -0 becomes 0 */
-            memcpy(&words[k], &value, sizeof value);
-        }
-        mix_words(d, words, k);
+    for (size_t i = 0; i < n; i += WORDS) {
+        size_t some = n - i < WORDS ? n - i : WORDS;
+        vgi_plain_zeros(plain, x + i, some);
+        memcpy(words, plain, some * sizeof *words);
+        mix_words(d, words, some);
     }
 }
 

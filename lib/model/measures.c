@@ -244,7 +244,7 @@ static void measure_pose(void *context, size_t i)
     const double *const poses[2] = {c->truth[i], c->result[i]};
     pose p = {0};
     measure_vertices(x, poses[0], poses[1], c->errors[i], &p);
-    for (size_t k = 0; k < x->nclasses; k++) vgi_measure_faces(&x->classes[k], x->diagonal, poses, &p.faces);
+    for (size_t k = 0; k < x->nclasses; k++) vgi_measures_kernel_now()->faces(&x->classes[k], x->diagonal, poses, &p.faces);
     x->poses[i] = p;
 }
 

@@ -1,111 +1,86 @@
 /* measures_kernel.c: the inner loop of measuring: how far the faces of two poses are apart.
- * Eight faces of one size stand side by side in the lanes of a vector, so nothing but gathering depends on where
- * their vertices are; a face that does not count is a lane of zeros. Leaves out vertices, and what becomes of the sums
- * (measures.c).
+ * Eight faces of one size stand side by side in lanes, so nothing but gathering depends on where their vertices are; a
+ * face that does not count is a lane of zeros. Each lane has sums of its own, which are merged in the end, so that they
+ * do not depend on the width of a vector. Leaves out vertices, and what becomes of the sums (measures.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/measures_kernel.h"
-
-#include <math.h>
-
-#define INLINE static inline __attribute__((always_inline))
+#include "core/wide.h"
 
 /* A face has a normal when its area exceeds this times D times its perimeter: below, it is rounding. */
 static const double FLAT = 1e-14;
 
-typedef struct lane_running {
-    vgi_lanes n, mean, squares, max;
-} lane_running;
+typedef struct wide_running {
+    vgi_wide n, mean, squares, max;
+} wide_running;
 
-/* What eight faces are in one pose. */
+/* What the faces of one part of eight are in one pose. */
 typedef struct shape {
-    vgi_lanes centroid[3], normal[3], area; /* normal and area are 0 without a normal */
-    vgi_mask ok;                            /* have one */
+    vgi_wide centroid[3], normal[3], area; /* normal and area are 0 without a normal */
+    vgi_mask ok;                           /* have one */
 } shape;
 
-INLINE vgi_lanes only(vgi_mask which, vgi_lanes x)
+VGI_INLINE vgi_wide at_most(vgi_wide x, double most)
 {
-    return (vgi_lanes)((vgi_mask)x & which);
+    return vgi_either(x < vgi_same(most), x, vgi_same(most));
 }
 
-INLINE vgi_lanes absolute(vgi_lanes x)
+/* vert: the vertices of one corner of the faces */
+VGI_INLINE void load(const double *points, const uint32_t *vert, vgi_wide to[3])
 {
-    return (vgi_lanes)((vgi_mask)x & INT64_MAX);
-}
-
-INLINE vgi_lanes at_most(vgi_lanes x, double most)
-{
-    vgi_mask less = x < most;
-    return only(less, x) + only(~less, (vgi_lanes){0} + most);
-}
-
-INLINE bool any(vgi_mask m)
-{
-    int64_t bits = 0;
-    for (int i = 0; i < VGI_LANES; i++) bits |= m[i];
-    return bits;
-}
-
-INLINE vgi_lanes dot(const vgi_lanes a[3], const vgi_lanes b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-INLINE void load(const double *points, const uint32_t *vert, vgi_lanes to[3])
-{
-    const double *p[VGI_LANES];
-    for (int i = 0; i < VGI_LANES; i++) p[i] = points + 3 * (size_t)vert[i];
-    for (size_t k = 0; k < 3; k++) to[k] = vgi_gather(p, k);
+    const double *p[VGI_WIDTH];
+#pragma GCC unroll 8
+    for (int i = 0; i < VGI_WIDTH; i++) p[i] = points + 3 * (size_t)vert[i];
+    vgi_gather_point(p, 0, to);
 }
 
 /* ones: 1 where the value counts, else 0; share: 1 / n, the value counted. */
-INLINE void lanes_add(lane_running *l, vgi_lanes value, vgi_mask which, vgi_lanes ones, vgi_lanes share)
+VGI_INLINE void add_values(wide_running *l, vgi_wide value, vgi_mask which, vgi_wide ones, vgi_wide share)
 {
-    vgi_lanes d = only(which, value - l->mean);
+    vgi_wide d = vgi_only(which, value - l->mean);
     l->n += ones;
     l->mean += d * share;
-    l->squares += d * only(which, value - l->mean);
-    vgi_mask more = which & (value > l->max);
-    l->max = only(more, value) + only(~more, l->max);
+    l->squares += d * vgi_only(which, value - l->mean);
+    l->max = vgi_either(which & (value > l->max), value, l->max);
 }
 
-INLINE vgi_lanes next_share(const lane_running *l)
+VGI_INLINE vgi_wide next_share(const wide_running *l)
 {
     return 1.0 / (l->n + 1.0);
 }
 
-static void merge_lanes(vgi_running *r, const lane_running *l)
+static void merge_lanes(vgi_running *r, const wide_running *l)
 {
-    for (int i = 0; i < VGI_LANES; i++) {
-        const vgi_running lane = {l->n[i], l->mean[i], l->squares[i], l->max[i]};
-        vgi_running_merge(r, &lane);
-    }
+    for (int part = 0; part < VGI_PARTS; part++)
+        for (int i = 0; i < VGI_WIDTH; i++) {
+            const vgi_running lane = {l[part].n[i], l[part].mean[i], l[part].squares[i], l[part].max[i]};
+            vgi_running_merge(r, &lane);
+        }
 }
 
 /* Perimeters; most faces do without. */
-INLINE vgi_lanes perimeters(const uint32_t *vert, size_t r, const double *points)
+VGI_INLINE vgi_wide perimeters(const uint32_t *vert, size_t r, const double *points)
 {
-    vgi_lanes sum = {0}, a[3], b[3];
+    vgi_wide sum = {0}, a[3], b[3];
     load(points, vert + (r - 1) * VGI_LANES, a);
     for (size_t i = 0; i < r; i++) {
         load(points, vert + i * VGI_LANES, b);
         for (int k = 0; k < 3; k++) a[k] -= b[k];
-        sum += vgi_lane_roots(dot(a, a));
+        sum += vgi_roots(vgi_dot(a, a));
         for (int k = 0; k < 3; k++) a[k] = b[k];
     }
     return sum;
 }
 
 /* Normals are Newell's: the sum of the cross products of successive corner vectors, here those from the centroid. */
-INLINE void shape_of(const uint32_t *vert, size_t r, double diagonal, const double *points, shape *s)
+VGI_INLINE void shape_of(const uint32_t *vert, size_t r, double diagonal, const double *points, shape *s)
 {
-    vgi_lanes n[3] = {{0}, {0}, {0}}, edges = {0}, a[3], b[3];
-    for (int k = 0; k < 3; k++) s->centroid[k] = (vgi_lanes){0};
+    vgi_wide n[3] = {{0}}, edges = {0}, a[3], b[3], sum[3] = {{0}};
     for (size_t i = 0; i < r; i++) {
         load(points, vert + i * VGI_LANES, b);
-        for (int k = 0; k < 3; k++) s->centroid[k] += b[k];
+        for (int k = 0; k < 3; k++) sum[k] += b[k];
     }
     load(points, vert + (r - 1) * VGI_LANES, a);
-    for (int k = 0; k < 3; k++) s->centroid[k] *= 1 / (double)r, a[k] -= s->centroid[k];
+    for (int k = 0; k < 3; k++) s->centroid[k] = sum[k] * (1 / (double)r), a[k] -= s->centroid[k];
     for (size_t i = 0; i < r; i++) {
         load(points, vert + i * VGI_LANES, b);
         for (int k = 0; k < 3; k++) b[k] -= s->centroid[k];
@@ -114,100 +89,101 @@ INLINE void shape_of(const uint32_t *vert, size_t r, double diagonal, const doub
         n[2] += a[0] * b[1] - a[1] * b[0];
         for (int k = 0; k < 3; k++) edges += (b[k] - a[k]) * (b[k] - a[k]), a[k] = b[k];
     }
-    vgi_lanes length = vgi_lane_roots(dot(n, n)), half = 0.5 * length;
+    vgi_wide length = vgi_roots(vgi_dot(n, n)), half = 0.5 * length;
     double least = FLAT * diagonal;
     /* the perimeter is no longer than the root of r times the squared edges */
     s->ok = half * half > 1.001 * least * least * (double)r * edges;
-    if (any(~s->ok)) s->ok |= half > least * perimeters(vert, r, points);
-    vgi_lanes scale = only(s->ok, 1.0 / length);
-    s->area = only(s->ok, half);
+    if (vgi_bits(~s->ok)) s->ok |= half > least * perimeters(vert, r, points);
+    vgi_wide scale = vgi_only(s->ok, 1.0 / length);
+    s->area = vgi_only(s->ok, half);
     for (int k = 0; k < 3; k++) s->normal[k] = scale * n[k];
 }
 
 /* Mean over the corners of |unit corner vector . normal|; a corner at the centroid has no direction: not counted. */
-INLINE vgi_lanes planarity_of(const uint32_t *vert, size_t r, const double *points, const shape *s)
+VGI_INLINE vgi_wide planarity_of(const uint32_t *vert, size_t r, const double *points, const shape *s)
 {
-    vgi_lanes sum = {0}, n = {0}, w[3];
+    vgi_wide sum = {0}, n = {0}, w[3];
     for (size_t i = 0; i < r; i++) {
         load(points, vert + i * VGI_LANES, w);
         for (int k = 0; k < 3; k++) w[k] -= s->centroid[k];
-        vgi_lanes length = vgi_lane_roots(dot(w, w));
-        vgi_mask directed = length > 0;
-        sum += only(directed, absolute(dot(w, s->normal)) / length);
-        n += only(directed, (vgi_lanes){0} + 1.0);
+        vgi_wide length = vgi_roots(vgi_dot(w, w));
+        vgi_mask directed = length > vgi_same(0);
+        sum += vgi_only(directed, vgi_absolute(vgi_dot(w, s->normal)) / length);
+        n += vgi_only(directed, vgi_same(1));
     }
-    return at_most(only(n > 0, sum / n), 1);
+    return at_most(vgi_only(n > vgi_same(0), sum / n), 1);
 }
 
 /* 1 - a.b of two unit vectors, as half the squared distance of their ends: exact near 0, and 0 for equal ones. */
-INLINE vgi_lanes normals_apart(const vgi_lanes a[3], const vgi_lanes b[3])
+VGI_INLINE vgi_wide normals_apart(const vgi_wide a[3], const vgi_wide b[3])
 {
-    vgi_lanes d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-    return at_most(0.5 * dot(d, d), 2);
+    vgi_wide d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+    return at_most(0.5 * vgi_dot(d, d), 2);
 }
 
-INLINE void count_planarity(uint64_t histogram[10], vgi_lanes p, vgi_mask which)
+VGI_INLINE void count_planarity(uint64_t histogram[10], vgi_wide p, vgi_mask which)
 {
-    for (int i = 0; i < VGI_LANES; i++) histogram[p[i] < 1 ? (int)(10 * p[i]) : 9] += (uint64_t)(which[i] & 1);
+    for (int i = 0; i < VGI_WIDTH; i++) histogram[p[i] < 1 ? (int)(10 * p[i]) : 9] += (uint64_t)(which[i] & 1);
+}
+
+typedef struct sums {
+    wide_running orientation, area, planarity[2];
+} sums;
+
+/* The faces of one part; `there`: those that exist. */
+VGI_INLINE void measure_part(const uint32_t *vert, size_t r, vgi_mask there, double diagonal,
+                             const double *const poses[2], sums *now, vgi_face_sums *all)
+{
+    shape s[2];
+#pragma GCC unroll 2
+    for (int i = 0; i < 2; i++) {
+        shape_of(vert, r, diagonal, poses[i], &s[i]);
+        s[i].ok &= there;
+        if (r < 4) continue;
+        vgi_wide p = planarity_of(vert, r, poses[i], &s[i]);
+        add_values(&now->planarity[i], p, s[i].ok, vgi_only(s[i].ok, vgi_same(1)), next_share(&now->planarity[i]));
+        count_planarity(all->planarity_histogram[i], p, s[i].ok);
+    }
+    /* a result that collapsed a face has no normal there: N.N~ is 0, and all of its area is wrong */
+    vgi_wide ones = vgi_only(s[0].ok, vgi_same(1)), share = next_share(&now->area);
+    vgi_wide change = vgi_absolute(1.0 - s[1].area / s[0].area);
+    vgi_wide apart = vgi_either(s[1].ok, normals_apart(s[0].normal, s[1].normal), vgi_same(1));
+    add_values(&now->orientation, apart, s[0].ok, ones, share);
+    add_values(&now->area, change, s[0].ok, ones, share);
+}
+
+/* The number of each lane, of those of one part. */
+VGI_INLINE vgi_wide lane_numbers(size_t part)
+{
+    static const double number[VGI_LANES] = {0, 1, 2, 3, 4, 5, 6, 7};
+    return vgi_load(number + part * VGI_WIDTH);
 }
 
 /* Called with a constant r for triangles and quads. */
-INLINE void measure_faces(const vgi_face_class *c, size_t r, double diagonal, const double *const poses[2],
-                          vgi_face_sums *sums)
+VGI_INLINE void measure_faces(const vgi_face_class *c, size_t r, double diagonal, const double *const poses[2],
+                              vgi_face_sums *all)
 {
-    lane_running orientation = {{0}, {0}, {0}, {0}}, area = orientation, planarity[2] = {orientation, orientation};
-    const vgi_lanes one = (vgi_lanes){0} + 1.0, number = {0, 1, 2, 3, 4, 5, 6, 7};
-    for (size_t f = 0; f < c->faces; f += VGI_LANES) {
-        const uint32_t *vert = c->corners + f * r;
-        vgi_mask there = number < (double)(c->faces - f);
-        shape s[2];
-        for (int i = 0; i < 2; i++) {
-            shape_of(vert, r, diagonal, poses[i], &s[i]);
-            s[i].ok &= there;
-            if (r < 4) continue;
-            vgi_lanes p = planarity_of(vert, r, poses[i], &s[i]);
-            lanes_add(&planarity[i], p, s[i].ok, only(s[i].ok, one), next_share(&planarity[i]));
-            count_planarity(sums->planarity_histogram[i], p, s[i].ok);
-        }
-        /* a result that collapsed a face has no normal there: N.N~ is 0, and all of its area is wrong */
-        vgi_lanes ones = only(s[0].ok, one), share = next_share(&area);
-        vgi_lanes change = absolute(1.0 - s[1].area / s[0].area);
-        vgi_lanes apart = only(s[1].ok, normals_apart(s[0].normal, s[1].normal)) + only(~s[1].ok, one);
-        lanes_add(&orientation, apart, s[0].ok, ones, share);
-        lanes_add(&area, change, s[0].ok, ones, share);
+    sums now[VGI_PARTS];
+    memset(now, 0, sizeof now);
+    for (size_t f = 0; f < c->faces; f += VGI_LANES)
+        for (size_t part = 0; part < VGI_PARTS && f + part * VGI_WIDTH < c->faces; part++)
+            measure_part(c->corners + f * r + part * VGI_WIDTH, r, lane_numbers(part) < vgi_same((double)(c->faces - f)),
+                         diagonal, poses, &now[part], all);
+    wide_running orientation[VGI_PARTS], area[VGI_PARTS], planarity[2][VGI_PARTS];
+    for (size_t part = 0; part < VGI_PARTS; part++) {
+        orientation[part] = now[part].orientation, area[part] = now[part].area;
+        for (int i = 0; i < 2; i++) planarity[i][part] = now[part].planarity[i];
     }
-    merge_lanes(&sums->orientation, &orientation);
-    merge_lanes(&sums->area, &area);
-    for (int i = 0; i < 2; i++) merge_lanes(&sums->planarity[i], &planarity[i]);
+    merge_lanes(&all->orientation, orientation);
+    merge_lanes(&all->area, area);
+    for (int i = 0; i < 2; i++) merge_lanes(&all->planarity[i], planarity[i]);
 }
 
-INLINE void measure_class(const vgi_face_class *c, double diagonal, const double *const poses[2], vgi_face_sums *s)
+static void faces(const vgi_face_class *c, double diagonal, const double *const poses[2], vgi_face_sums *s)
 {
     if (c->r == 3) measure_faces(c, 3, diagonal, poses, s);
     else if (c->r == 4) measure_faces(c, 4, diagonal, poses, s);
     else measure_faces(c, c->r, diagonal, poses, s);
 }
 
-#if defined(__x86_64__)
-__attribute__((target("avx512f,avx512dq,fma"))) static void
-measure_avx512(const vgi_face_class *c, double diagonal, const double *const poses[2], vgi_face_sums *s)
-{
-    measure_class(c, diagonal, poses, s);
-}
-
-__attribute__((target("avx2,fma"))) static void
-measure_avx2(const vgi_face_class *c, double diagonal, const double *const poses[2], vgi_face_sums *s)
-{
-    measure_class(c, diagonal, poses, s);
-}
-#endif
-
-void vgi_measure_faces(const vgi_face_class *c, double diagonal, const double *const poses[2], vgi_face_sums *s)
-{
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
-        return measure_avx512(c, diagonal, poses, s);
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return measure_avx2(c, diagonal, poses, s);
-#endif
-    measure_class(c, diagonal, poses, s);
-}
+const vgi_measures_kernel VGI_OF_SET(vgi_measures_kernel) = {faces};

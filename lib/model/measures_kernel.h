@@ -3,7 +3,8 @@
 #ifndef VG_MEASURES_KERNEL_H
 #define VG_MEASURES_KERNEL_H
 
-#include "numeric/lanes.h"
+#include "core/isa.h"
+#include "core/lanes.h"
 #include "numeric/stats.h"
 
 /* All faces of r corners: `faces` of them. corners: for each eight faces r times eight vertices, the first corner of
@@ -19,7 +20,10 @@ typedef struct vgi_face_sums {
     uint64_t planarity_histogram[2][10];
 } vgi_face_sums;
 
-/* vgi_measure_faces: add all of a class to *s. poses: truth, result. */
-void vgi_measure_faces(const vgi_face_class *c, double diagonal, const double *const poses[2], vgi_face_sums *s);
+typedef struct vgi_measures_kernel {
+    /* faces: add all of a class to *s. poses: truth, result. */
+    void (*faces)(const vgi_face_class *c, double diagonal, const double *const poses[2], vgi_face_sums *s);
+} vgi_measures_kernel;
+VGI_KERNEL(vgi_measures_kernel)
 
 #endif

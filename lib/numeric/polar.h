@@ -4,7 +4,8 @@
 #ifndef VG_POLAR_H
 #define VG_POLAR_H
 
-#include "numeric/lanes.h"
+#include "core/isa.h"
+#include "core/lanes.h"
 
 /* vgi_fit_rotation: the rotation R that maximises tr(R'm): for m = sum of d r' that which takes the r nearest to the
  * d. Row-major. Where several do, one that turns least; the identity for 0. */
@@ -21,7 +22,16 @@ typedef struct vgi_turns {
 int vgi_turns_make(vgi_turns *t, size_t nf, const uint32_t *start, const uint32_t *vert, const double *reference,
                    vg_err *e) VG_MUST_CHECK;
 void vgi_turns_clear(vgi_turns *t);
+
+typedef struct vgi_polar_kernel {
+    void (*measure)(const vgi_turns *t, size_t f, const double *const *poses, vgi_lanes *rotation);
+} vgi_polar_kernel;
+VGI_KERNEL(vgi_polar_kernel)
+
 /* vgi_turns_measure: the rotation of face f in eight poses (vertices). */
-void vgi_turns_measure(const vgi_turns *t, size_t f, const double *const *poses, vgi_lanes rotation[9]);
+static inline void vgi_turns_measure(const vgi_turns *t, size_t f, const double *const *poses, vgi_lanes rotation[9])
+{
+    vgi_polar_kernel_now()->measure(t, f, poses, rotation);
+}
 
 #endif

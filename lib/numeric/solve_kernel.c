@@ -3,104 +3,168 @@
  * A sparse triangular solve is bound by loading and storing x: with one column at a time every entry of the factor
  * costs a load and a store of its row of x. Here the columns of a supernode share their rows, so a row is loaded
  * once, takes all the columns of the supernode while it stays in registers, and is stored once; a few rows (forward)
- * or columns (backward) go together, so that what they share is loaded once too. Also the way of the numbers from the
- * poses into the rows and back. Leaves out assembly and factorisation: reconstruct.c.
+ * or columns (backward) go together, so that what they share is loaded once too. How many depends on the registers:
+ * their sums fill most of them. Also copies numbers from poses to rows and back. Leaves out assembly and
+ * factorisation: reconstruct.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/solve_kernel.h"
+#include "core/wide.h"
 
-#define INLINE static inline __attribute__((always_inline))
+/* A row is 24 numbers: SHARES times SPAN vectors. The sums of TOGETHER rows of one share are in registers at a time:
+ * 4 x 3 of 32 (AVX-512), 2 x 6 of 16 (AVX2), 2 x 12 of 32 (NEON), 2 x 6 of 16 twice (SSE2). */
+#if VGI_WIDTH == 8
+enum { SPAN = 3, TOGETHER = 4 };
+#elif VGI_WIDTH == 4 || !defined(__aarch64__)
+enum { SPAN = 6, TOGETHER = 2 };
+#else
+enum { SPAN = 12, TOGETHER = 2 };
+#endif
+enum { ROW = 3 * VGI_LANES, SHARE = SPAN * VGI_WIDTH, SHARES = ROW / SHARE };
 
-/* x[column k] for the head of the supernode; acc[i] -= L[i, k] x[k] for `n` rows starting at entry `l`, all
- * columns. */
-INLINE void eliminate_rows(const double *l, size_t stride, size_t columns, const vgi_row *x, vgi_row *const *target,
-                           int n)
+typedef struct sums {
+    vgi_wide at[SPAN];
+} sums;
+
+VGI_INLINE sums load_sums(const double *row)
 {
-    vgi_row acc[4];
+    sums s;
+#pragma GCC unroll 12
+    for (int c = 0; c < SPAN; c++) s.at[c] = vgi_load(row + c * VGI_WIDTH);
+    return s;
+}
+
+VGI_INLINE void store_sums(double *row, const sums *s)
+{
+#pragma GCC unroll 12
+    for (int c = 0; c < SPAN; c++) vgi_store(row + c * VGI_WIDTH, s->at[c]);
+}
+
+/* s[i] -= entry[i * apart] row, for n sums; a number of the row is loaded once for all of them. */
+VGI_INLINE void subtract(sums *s, int n, const double *entry, size_t apart, const double *row)
+{
+    vgi_wide factor[TOGETHER];
 #pragma GCC unroll 4
-    for (int i = 0; i < n; i++) acc[i] = *target[i];
-    for (size_t k = 0; k < columns; k++) {
-        vgi_row xk = x[k];
+    for (int i = 0; i < n; i++) factor[i] = vgi_same(entry[(size_t)i * apart]);
+#pragma GCC unroll 12
+    for (int c = 0; c < SPAN; c++) {
+        vgi_wide x = vgi_load(row + c * VGI_WIDTH);
 #pragma GCC unroll 4
-        for (int i = 0; i < n; i++) {
-            double entry = l[k * stride + (size_t)i];
-#pragma GCC unroll 3
-            for (int c = 0; c < 3; c++) acc[i].xyz[c] -= entry * xk.xyz[c];
-        }
+        for (int i = 0; i < n; i++) s[i].at[c] -= factor[i] * x;
     }
-#pragma GCC unroll 4
-    for (int i = 0; i < n; i++) *target[i] = acc[i];
 }
 
-/* The transposed: acc[k] -= sum over rows of L[row, k] x[row] for `n` columns starting at entry `l`. */
-INLINE void gather_columns(const double *l, size_t stride, size_t nrows, const int *rows, const vgi_row *x,
-                           vgi_row *target, int n)
+VGI_INLINE void scale(sums *s, double factor)
 {
-    vgi_row acc[4];
+    vgi_wide f = vgi_same(factor);
+#pragma GCC unroll 12
+    for (int c = 0; c < SPAN; c++) s->at[c] *= f;
+}
+
+/* Row i of the factor for n rows: target[i] -= sum over k < columns of l[k stride + i] x[k]. */
+VGI_INLINE void eliminate_rows(const double *l, size_t stride, size_t columns, const double *x, double *const *target,
+                               int n)
+{
+    sums s[TOGETHER];
 #pragma GCC unroll 4
-    for (int k = 0; k < n; k++) acc[k] = target[k];
-    for (size_t i = 0; i < nrows; i++) {
-        vgi_row xi = x[rows[i]];
+    for (int i = 0; i < n; i++) s[i] = load_sums(target[i]);
+    for (size_t k = 0; k < columns; k++) subtract(s, n, l + k * stride, 1, x + k * ROW);
 #pragma GCC unroll 4
-        for (int k = 0; k < n; k++) {
-            double entry = l[(size_t)k * stride + i];
-#pragma GCC unroll 3
-            for (int c = 0; c < 3; c++) acc[k].xyz[c] -= entry * xi.xyz[c];
-        }
+    for (int i = 0; i < n; i++) store_sums(target[i], &s[i]);
+}
+
+/* The first rows of a supernode, its own columns: two rows take the columns before them, then the second the first. */
+VGI_INLINE void eliminate_head(const double *l, size_t stride, size_t columns, double *head)
+{
+    size_t i = 0;
+    for (; i + 2 <= columns; i += 2) {
+        double *first = head + i * ROW, *second = first + ROW;
+        sums s[2] = {load_sums(first), load_sums(second)};
+        for (size_t k = 0; k < i; k++) subtract(s, 2, l + k * stride + i, 1, head + k * ROW);
+        scale(&s[0], 1 / l[i * stride + i]);
+        store_sums(first, &s[0]);
+        subtract(&s[1], 1, l + i * stride + i + 1, 1, first);
+        scale(&s[1], 1 / l[(i + 1) * stride + i + 1]);
+        store_sums(second, &s[1]);
     }
-#pragma GCC unroll 4
-    for (int k = 0; k < n; k++) target[k] = acc[k];
+    if (i == columns) return;
+    sums s = load_sums(head + i * ROW);
+    for (size_t k = 0; k < i; k++) subtract(&s, 1, l + k * stride + i, 1, head + k * ROW);
+    scale(&s, 1 / l[i * stride + i]);
+    store_sums(head + i * ROW, &s);
 }
 
-INLINE void scale(vgi_row *x, double factor)
-{
-    for (int c = 0; c < 3; c++) x->xyz[c] *= factor;
-}
-
-INLINE void forward(const vgi_factor *f, vgi_row *x, int width)
+VGI_INLINE void forward(const vgi_factor *f, double *x)
 {
     for (size_t s = 0; s < f->supernodes; s++) {
         size_t first = (size_t)f->super[s], columns = (size_t)f->super[s + 1] - first;
-        size_t nrows = (size_t)(f->pi[s + 1] - f->pi[s]), i = 0;
+        size_t nrows = (size_t)(f->pi[s + 1] - f->pi[s]), i = columns;
         const int *rows = f->rows + f->pi[s];
         const double *l = f->values + f->px[s];
-        vgi_row *head = x + first, *target[4];
-        for (; i < columns; i++) {
-            target[0] = head + i;
-            eliminate_rows(l + i, nrows, i, head, target, 1);
-            scale(head + i, 1 / l[i * nrows + i]);
-        }
-        for (; i + (size_t)width <= nrows; i += (size_t)width) {
-            for (int k = 0; k < width; k++) target[k] = x + rows[i + (size_t)k];
-            eliminate_rows(l + i, nrows, columns, head, target, width);
+        double *head = x + first * ROW, *target[TOGETHER];
+        eliminate_head(l, nrows, columns, head);
+        for (; i + TOGETHER <= nrows; i += TOGETHER) {
+            for (size_t k = 0; k < TOGETHER; k++) target[k] = x + (size_t)rows[i + k] * ROW;
+            eliminate_rows(l + i, nrows, columns, head, target, TOGETHER);
         }
         for (; i < nrows; i++) {
-            target[0] = x + rows[i];
+            target[0] = x + (size_t)rows[i] * ROW;
             eliminate_rows(l + i, nrows, columns, head, target, 1);
         }
     }
 }
 
-INLINE void backward(const vgi_factor *f, vgi_row *x, int width)
+/* s[k] -= sum over rows below the head of l[k stride + row] x[row], for n columns. */
+VGI_INLINE void gather_below(sums *s, int n, const double *l, size_t stride, size_t columns, const int *rows,
+                             const double *x)
+{
+    for (size_t i = columns; i < stride; i++) subtract(s, n, l + i, stride, x + (size_t)rows[i] * ROW);
+}
+
+/* Columns k .. k + n - 1 of a supernode, those behind them being done: each one is finished in turn. */
+VGI_INLINE void finish_columns(const double *l, size_t stride, size_t columns, const int *rows, const double *x,
+                               double *head, size_t k, int n)
+{
+    sums s[TOGETHER];
+    l += k * stride;
+#pragma GCC unroll 4
+    for (int i = 0; i < n; i++) s[i] = load_sums(head + (k + (size_t)i) * ROW);
+    gather_below(s, n, l, stride, columns, rows, x);
+    for (size_t j = k + (size_t)n; j < columns; j++) subtract(s, n, l + j, stride, head + j * ROW);
+#pragma GCC unroll 4
+    for (int i = n; i-- > 0;) {
+        double *at = head + (k + (size_t)i) * ROW;
+#pragma GCC unroll 4
+        for (int j = n; j-- > i + 1;)
+            subtract(&s[i], 1, l + (size_t)i * stride + k + (size_t)j, 0, head + (k + (size_t)j) * ROW);
+        scale(&s[i], 1 / l[(size_t)i * stride + k + (size_t)i]);
+        store_sums(at, &s[i]);
+    }
+}
+
+VGI_INLINE void backward(const vgi_factor *f, double *x)
 {
     for (size_t s = f->supernodes; s-- > 0;) {
-        size_t first = (size_t)f->super[s], columns = (size_t)f->super[s + 1] - first;
-        size_t nrows = (size_t)(f->pi[s + 1] - f->pi[s]), k = 0;
+        size_t first = (size_t)f->super[s], columns = (size_t)f->super[s + 1] - first, k = columns;
+        size_t nrows = (size_t)(f->pi[s + 1] - f->pi[s]);
         const int *rows = f->rows + f->pi[s];
         const double *l = f->values + f->px[s];
-        vgi_row *head = x + first;
-        for (; k + (size_t)width <= columns; k += (size_t)width)
-            gather_columns(l + k * nrows + columns, nrows, nrows - columns, rows + columns, x, head + k, width);
-        for (; k < columns; k++)
-            gather_columns(l + k * nrows + columns, nrows, nrows - columns, rows + columns, x, head + k, 1);
-        for (k = columns; k-- > 0;) {
-            gather_columns(l + k * nrows + k + 1, nrows, columns - k - 1, rows + k + 1, x, head + k, 1);
-            scale(head + k, 1 / l[k * nrows + k]);
-        }
+        double *head = x + first * ROW;
+        for (; k >= TOGETHER; k -= TOGETHER)
+            finish_columns(l, nrows, columns, rows, x, head, k - TOGETHER, TOGETHER);
+        for (; k > 0; k--) finish_columns(l, nrows, columns, rows, x, head, k - 1, 1);
+    }
+}
+
+static void solve(const vgi_factor *f, vgi_row *x)
+{
+    for (size_t share = 0; share < SHARES; share++) {
+        forward(f, (double *)x + share * SHARE);
+        backward(f, (double *)x + share * SHARE);
     }
 }
 
 /* Rows are met in the order of vertices, which is not theirs: ask for the lines of one ahead. */
-INLINE void ask(const vgi_row *x, const uint32_t *row, size_t v, size_t nv, size_t rows)
+VGI_INLINE void ask(const vgi_row *x, const uint32_t *row, size_t v, size_t nv, size_t rows)
 {
     enum { AHEAD = 8 };
     if (v + AHEAD >= nv || row[v + AHEAD] >= rows) return;
@@ -108,79 +172,39 @@ INLINE void ask(const vgi_row *x, const uint32_t *row, size_t v, size_t nv, size
     for (size_t i = 0; i < sizeof *x; i += 64) __builtin_prefetch(p + i, 1);
 }
 
-INLINE void load_rows(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs)
+static void load_rows(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs)
 {
     for (size_t v = 0; v < nv; v++) {
         ask(x, row, v, nv, rows);
         if (row[v] >= rows) continue;
-        vgi_row *to = &x[row[v]];
-        for (size_t c = 0; c < 3; c++) to->xyz[c] = vgi_gather(rhs, 3 * v + c);
+        double *to = (double *)&x[row[v]];
+#pragma GCC unroll 4
+        for (size_t part = 0; part < VGI_PARTS; part++) {
+            vgi_wide xyz[3];
+            vgi_gather_point(rhs + part * VGI_WIDTH, 3 * v, xyz);
+#pragma GCC unroll 3
+            for (size_t c = 0; c < 3; c++) vgi_store(to + c * VGI_LANES + part * VGI_WIDTH, xyz[c]);
+        }
     }
 }
 
-INLINE void add_rows(const vgi_row *x, const uint32_t *row, size_t nv, size_t rows, double *const *pose, size_t lanes)
+static void add_rows(const vgi_row *x, const uint32_t *row, size_t nv, size_t rows, double *const *pose, size_t lanes)
 {
     for (size_t v = 0; v < nv; v++) {
         ask(x, row, v, nv, rows);
         if (row[v] >= rows) continue;
         const double *from = (const double *)&x[row[v]];
-        for (size_t k = 0; k < lanes; k++)
-            for (size_t c = 0; c < 3; c++) pose[k][3 * v + c] += from[c * VGI_LANES + k];
+        for (size_t part = 0; part * VGI_WIDTH < lanes; part++) {
+            size_t first = part * VGI_WIDTH, n = vgi_part_lanes(lanes, part);
+            const double *now[VGI_WIDTH];
+            for (size_t k = 0; k < VGI_WIDTH; k++) now[k] = pose[first + (k < n ? k : 0)];
+            vgi_wide xyz[3];
+            vgi_gather_point(now, 3 * v, xyz);
+#pragma GCC unroll 3
+            for (size_t c = 0; c < 3; c++) xyz[c] += vgi_load(from + c * VGI_LANES + first);
+            vgi_scatter_point(pose + first, n, 3 * v, xyz);
+        }
     }
 }
 
-/* How many rows fit into the registers at once differs with their number and width. */
-#if defined(__x86_64__)
-#define AVX512 __attribute__((target("avx512f,avx512dq,fma")))
-#define AVX2 __attribute__((target("avx2,fma")))
-
-AVX512 static void solve_avx512(const vgi_factor *f, vgi_row *x)
-{
-    forward(f, x, 4);
-    backward(f, x, 4);
-}
-
-AVX512 static void load_avx512(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs)
-{
-    load_rows(x, row, nv, rows, rhs);
-}
-
-AVX2 static void solve_avx2(const vgi_factor *f, vgi_row *x)
-{
-    forward(f, x, 2);
-    backward(f, x, 2);
-}
-
-static bool has_avx512(void)
-{
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq");
-}
-
-static bool has_avx2(void)
-{
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-}
-#endif
-
-void vgi_factor_solve(const vgi_factor *f, vgi_row *x)
-{
-#if defined(__x86_64__)
-    if (has_avx512()) return solve_avx512(f, x);
-    if (has_avx2()) return solve_avx2(f, x);
-#endif
-    forward(f, x, 1);
-    backward(f, x, 1);
-}
-
-void vgi_load_rows(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs)
-{
-#if defined(__x86_64__)
-    if (has_avx512()) return load_avx512(x, row, nv, rows, rhs);
-#endif
-    load_rows(x, row, nv, rows, rhs);
-}
-
-void vgi_add_rows(const vgi_row *x, const uint32_t *row, size_t nv, size_t rows, double *const *pose, size_t lanes)
-{
-    add_rows(x, row, nv, rows, pose, lanes);
-}
+const vgi_solve_kernel VGI_OF_SET(vgi_solve_kernel) = {solve, load_rows, add_rows};

@@ -3,7 +3,8 @@
 #ifndef VG_SOLVE_KERNEL_H
 #define VG_SOLVE_KERNEL_H
 
-#include "numeric/lanes.h"
+#include "core/isa.h"
+#include "core/lanes.h"
 
 /* A supernodal factor as CHOLMOD lays it out, borrowed. Supernode s holds columns super[s] .. super[s+1]-1; its rows
  * are rows[pi[s]] .. rows[pi[s+1]-1], the first of which are its own columns; its entries are a column-major block of
@@ -19,12 +20,30 @@ typedef struct vgi_row {
     vgi_lanes xyz[3];
 } vgi_row;
 
+typedef struct vgi_solve_kernel {
+    void (*solve)(const vgi_factor *f, vgi_row *x);
+    void (*load)(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs);
+    void (*add)(const vgi_row *x, const uint32_t *row, size_t nv, size_t rows, double *const *pose, size_t lanes);
+} vgi_solve_kernel;
+VGI_KERNEL(vgi_solve_kernel)
+
 /* vgi_factor_solve: x := (L L')^-1 x, n rows in the factor's order. */
-void vgi_factor_solve(const vgi_factor *f, vgi_row *x);
+static inline void vgi_factor_solve(const vgi_factor *f, vgi_row *x)
+{
+    vgi_solve_kernel_now()->solve(f, x);
+}
 
 /* vgi_load_rows: x[row[v]] := rhs of vertex v in 8 poses (nv x 3 each), for every v with row[v] < rows. */
-void vgi_load_rows(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs);
+static inline void vgi_load_rows(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs)
+{
+    vgi_solve_kernel_now()->load(x, row, nv, rows, rhs);
+}
+
 /* vgi_add_rows: the way back, for the first `lanes` poses: pose[k] of v += x[row[v]]. */
-void vgi_add_rows(const vgi_row *x, const uint32_t *row, size_t nv, size_t rows, double *const *pose, size_t lanes);
+static inline void vgi_add_rows(const vgi_row *x, const uint32_t *row, size_t nv, size_t rows, double *const *pose,
+                                size_t lanes)
+{
+    vgi_solve_kernel_now()->add(x, row, nv, rows, pose, lanes);
+}
 
 #endif

@@ -52,6 +52,15 @@ typedef struct vg_bytes {
 
 void vg_bytes_clear(vg_bytes *b);
 
+/* The instruction set of the numeric kernels: avx512, avx2 or sse2 on x86-64, neon on ARM of 64 bits; elsewhere plain.
+ * vg_isa: the one in use, at first the widest that the machine has. */
+const char *vg_isa(void);
+/* vg_isa_at: those that the machine has, narrowest first; NULL from some i on. */
+const char *vg_isa_at(size_t i);
+/* vg_isa_choose: use this one from now on; NULL: the widest. Not while another thread computes. Results differ between
+ * sets in the last digits. VG_EARG when there is none of that name or the machine does not have it. */
+int vg_isa_choose(const char *name, vg_err *e) VG_MUST_CHECK;
+
 #ifdef __cplusplus
 }
 #endif

@@ -265,6 +265,7 @@ int main(int argc, char **argv)
     }
     vg_err e;
     vg_source *s;
+    check(vg_isa_choose(getenv("VG_ISA"), &e), &e);
     check(vg_source_open(&s, (const char *const *)(argv + 1), 1, &e), &e);
     const vg_head *h = vg_source_head(s);
     if (h->kind != VG_VECTORS || h->nanchors) die("the stream must hold vectors without anchors");

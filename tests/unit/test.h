@@ -1,8 +1,11 @@
 /* test.h: the whole unit-test framework: TEST(name) { CHECK(...); } and a main that runs what it is given. Each check
- * that fails prints its place and its values; every test counts once. The last line is "N passed, N failed".
+ * that fails prints its place and its values; every test counts once. VG_ISA chooses the kernels, as in the programs.
+ * The last line is "N passed, N failed".
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_TEST_H
 #define VG_TEST_H
+#include "vg.h"
+
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -30,6 +33,8 @@ struct test { const char *name; void (*run)(void); };
 static int test_main(const struct test *tests, size_t n)
 {
     int passed = 0, failed = 0;
+    vg_err e;
+    if (vg_isa_choose(getenv("VG_ISA"), &e) < 0) return printf("%s\n", e.message), 2;
     for (size_t i = 0; i < n; i++) {
         test_bad = 0;
         tests[i].run();

@@ -361,7 +361,7 @@ static void polar_finds_the_rotation(void)
                 a.m[3 * i + j][lane] = x;
             }
     }
-    vgi_polar(&a, &r);
+    vgi_transfer_kernel_now()->polar(&a, &r);
     for (int lane = 0; lane < VGI_LANES; lane++)
         for (int i = 0; i < 9; i++) CHECK_NEAR(r.m[i][lane], truth[lane][i], 1e-9);
 }
@@ -391,7 +391,7 @@ static void polar_of_what_cancels(void)
             a.m[i][lane] = m[lane][i];
         }
     }
-    vgi_polar(&a, &r);
+    vgi_transfer_kernel_now()->polar(&a, &r);
     for (int lane = 0; lane < VGI_LANES; lane++) {
         double one[9], trace = 0;
         for (int i = 0; i < 9; i++) one[i] = r.m[i][lane], trace += one[i] * m[lane][i];

@@ -324,7 +324,7 @@ static void measure_chunk(void *context, size_t i)
     vg_carrier *c = j->c;
     size_t nf = c->source->nf, first = i * CHUNK, last = first + CHUNK < nf ? first + CHUNK : nf;
     const vgi_source s = {c->source->start, c->source->vert, c->p, c->q, c->slow, j->poses};
-    vgi_measure_maps(&s, first, last, c->maps, c->bad);
+    vgi_transfer_kernel_now()->measure(&s, first, last, c->maps, c->bad);
     for (size_t f = first; f < last; f++) {
         if (c->slow[f] == 1) measure_segment(j, f);
         if (c->slow[f] == 2) c->bad[f] = 0xff;
@@ -333,32 +333,10 @@ static void measure_chunk(void *context, size_t i)
 }
 
 /* Add the mean map of a target face's sources to a sum; sources without a direction are left out. */
-static void add_sources(const vg_carrier *c, size_t f, vgi_map *sum, vgi_lanes *weight)
+static void add_sources(const vg_carrier *c, size_t f, vgi_map *sum, vgi_lanes weight)
 {
-    const vg_correspondence *k = c->pairs;
-    for (uint32_t i = k->first[f]; i < k->first[f + 1]; i++) {
-        const vgi_map *map = &c->maps[k->source[i]];
-        unsigned bad = c->bad[k->source[i]];
-        if (!bad) {
-            for (int e = 0; e < 9; e++) sum->m[e] += k->weight[i] * map->m[e];
-            *weight += k->weight[i];
-            continue;
-        }
-        for (int lane = 0; lane < VGI_LANES; lane++) {
-            if (bad >> lane & 1) continue;
-            for (int e = 0; e < 9; e++) sum->m[e][lane] += k->weight[i] * map->m[e][lane];
-            (*weight)[lane] += k->weight[i];
-        }
-    }
-}
-
-/* Nothing to follow: stay as it is. */
-static void finish_mean(vgi_map *sum, vgi_lanes weight)
-{
-    vgi_lanes share = 1 / weight;
-    for (int e = 0; e < 9; e++) sum->m[e] *= share;
-    for (int lane = 0; lane < VGI_LANES; lane++)
-        for (int e = 0; e < 9 && !(weight[lane] > 0); e++) sum->m[e][lane] = e % 4 == 0;
+    const vgi_drivers d = {c->maps, c->bad, c->pairs->source, c->pairs->weight};
+    vgi_transfer_kernel_now()->add(&d, c->pairs->first[f], c->pairs->first[f + 1], sum, weight);
 }
 
 /* The centre of the source faces that drive the target faces around a vertex, in eight poses. */
@@ -369,7 +347,7 @@ static void centre_beside(const vg_carrier *c, uint32_t v, const double *const *
     uint32_t first = c->around.first[v], last = c->around.first[v + 1];
     double total = 0;
     if (last - first > ENOUGH) last = first + ENOUGH;
-    for (int a = 0; a < 3; a++) centre[a] = (vgi_lanes){0};
+    memset(centre, 0, 3 * sizeof *centre);
     for (uint32_t i = first; i < last; i++) {
         size_t f = c->around.face[i];
         for (uint32_t p = f < faces ? k->first[f] : 0; f < faces && p < k->first[f + 1]; p++) {
@@ -377,10 +355,13 @@ static void centre_beside(const vg_carrier *c, uint32_t v, const double *const *
             total += k->weight[p];
             for (uint32_t n = c->source->start[s]; n < c->source->start[s + 1]; n++)
                 for (size_t a = 0; a < 3; a++)
-                    centre[a] += k->weight[p] / (double)r * vgi_gather(poses, 3 * (size_t)c->source->vert[n] + a);
+                    for (size_t lane = 0; lane < VGI_LANES; lane++)
+                        centre[a][lane] +=
+                            k->weight[p] / (double)r * poses[lane][3 * (size_t)c->source->vert[n] + a];
         }
     }
-    for (int a = 0; a < 3 && total > 0; a++) centre[a] /= total;
+    for (size_t a = 0; a < 3; a++)
+        for (size_t lane = 0; lane < VGI_LANES && total > 0; lane++) centre[a][lane] /= total;
 }
 
 /* A link also takes part in how the source's faces at its ends have moved against each other, beyond the map that
@@ -396,14 +377,13 @@ static void add_drift(const carry_job *j, size_t f, const vgi_map *map)
         centre_beside(c, c->target->vert[begin + end], j->poses, now[end]);
         centre_beside(c, c->target->vert[begin + end], reference, before[end]);
     }
-    for (size_t a = 0; a < 3; a++) {
-        vgi_lanes drift = now[0][a] - now[1][a];
-        for (size_t b = 0; b < 3; b++) drift -= map->m[3 * a + b] * (before[0][b] - before[1][b]);
+    for (size_t a = 0; a < 3; a++)
         for (size_t k = 0; k < j->lanes; k++) {
-            j->out[k][3 * begin + a] += 0.5 * c->ratio * drift[k];
-            j->out[k][3 * begin + 3 + a] -= 0.5 * c->ratio * drift[k];
+            double drift = now[0][a][k] - now[1][a][k];
+            for (size_t b = 0; b < 3; b++) drift -= map->m[3 * a + b][k] * (before[0][b][k] - before[1][b][k]);
+            j->out[k][3 * begin + a] += 0.5 * c->ratio * drift;
+            j->out[k][3 * begin + 3 + a] -= 0.5 * c->ratio * drift;
         }
-    }
 }
 
 static void follow(const carry_job *j, size_t f)
@@ -418,18 +398,18 @@ static void follow(const carry_job *j, size_t f)
     memset(&sum, 0, sizeof sum);
     bool rigid = f < faces && !c->pairs->matched[f];
     if (f < faces) {
-        add_sources(c, f, &sum, &weight);
+        add_sources(c, f, &sum, weight);
     } else { /* a link: the faces at both ends */
         for (size_t end = 0; end < 2; end++) {
             uint32_t v = g->vert[begin + end], first = c->around.first[v], last = c->around.first[v + 1];
             if (last - first > ENOUGH) last = first + ENOUGH;
             for (uint32_t i = first; i < last; i++)
-                if (c->around.face[i] < faces) add_sources(c, c->around.face[i], &sum, &weight);
+                if (c->around.face[i] < faces) add_sources(c, c->around.face[i], &sum, weight);
         }
     }
-    finish_mean(&sum, weight);
-    vgi_follow_face(&sum, rigid ? VGI_FOLLOW_RIGID : how[c->method], c->vectors + 3 * begin, g->start[f + 1] - begin,
-                    j->out, 3 * begin, j->lanes);
+    vgi_transfer_kernel_now()->finish(&sum, weight);
+    vgi_transfer_kernel_now()->follow(&sum, rigid ? VGI_FOLLOW_RIGID : how[c->method], c->vectors + 3 * begin,
+                                      g->start[f + 1] - begin, j->out, 3 * begin, j->lanes);
     if (f >= faces) add_drift(j, f, &sum);
 }
 

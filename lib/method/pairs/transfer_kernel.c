@@ -1,189 +1,151 @@
-/* transfer_kernel.c: deformation gradients of polygons, their rotations, and vectors that follow them, in lanes of
- * poses.
+/* transfer_kernel.c: deformation gradients of polygons, their means, their rotations, and vectors that follow them, in
+ * lanes of poses.
  * Leaves out which faces drive which (transfer.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/transfer_kernel.h"
-#include "numeric/polar.h"
+#include "numeric/wide_polar.h"
 
-#include <math.h>
+static const double enough = 1e-16; /* squared change: what is left of a rotation is rounding */
 
-#define INLINE static inline __attribute__((always_inline))
-#if defined(__x86_64__)
-#define AVX512 __attribute__((target("avx512f,avx512dq,fma")))
-#define AVX2 __attribute__((target("avx2,fma")))
-#endif
+VGI_INLINE void load_map(const vgi_map *map, size_t part, vgi_wide *m)
+{
+#pragma GCC unroll 9
+    for (int i = 0; i < 9; i++) m[i] = vgi_load(map->m[i] + part * VGI_WIDTH);
+}
 
-INLINE void measure_map(const vgi_source *s, size_t f, vgi_map *map, unsigned char *bad)
+VGI_INLINE void store_map(vgi_map *map, size_t part, const vgi_wide *m)
+{
+#pragma GCC unroll 9
+    for (int i = 0; i < 9; i++) vgi_store(map->m[i] + part * VGI_WIDTH, m[i]);
+}
+
+/* Returns the lanes in which the face has no normal. */
+VGI_INLINE unsigned measure_part(const vgi_source *s, size_t f, size_t part, vgi_map *map)
 {
     uint32_t begin = s->start[f], end = s->start[f + 1];
-    vgi_lanes first[3], before[3], n[3] = {{0}, {0}, {0}}, spread = {0};
-    vgi_map d = {{{0}, {0}, {0}, {0}, {0}, {0}, {0}, {0}, {0}}};
+    const double *const *poses = s->poses + part * VGI_WIDTH;
+    vgi_wide first[3], before[3] = {{0}}, n[3] = {{0}}, spread = {0}, d[9] = {{0}};
     /* p sums to 0 over the face, so any point will do for a centre; the first corner keeps numbers small */
-    for (size_t i = 0; i < 3; i++) {
-        first[i] = vgi_gather(s->poses, 3 * (size_t)s->vert[begin] + i);
-        before[i] = (vgi_lanes){0};
-    }
+    vgi_gather_point(poses, 3 * (size_t)s->vert[begin], first);
     for (uint32_t c = begin + 1; c < end; c++) {
-        vgi_lanes x[3];
+        vgi_wide x[3];
+        const double *p = s->p + 3 * (size_t)c;
+        vgi_gather_point(poses, 3 * (size_t)s->vert[c], x);
+#pragma GCC unroll 3
         for (int i = 0; i < 3; i++) {
-            x[i] = vgi_gather(s->poses, 3 * (size_t)s->vert[c] + (size_t)i) - first[i];
+            x[i] -= first[i];
             spread += x[i] * x[i];
-            for (int j = 0; j < 3; j++) d.m[3 * i + j] += x[i] * s->p[3 * (size_t)c + (size_t)j];
+#pragma GCC unroll 3
+            for (int j = 0; j < 3; j++) d[3 * i + j] += x[i] * vgi_same(p[j]);
         }
         n[0] += before[1] * x[2] - before[2] * x[1];
         n[1] += before[2] * x[0] - before[0] * x[2];
         n[2] += before[0] * x[1] - before[1] * x[0];
+#pragma GCC unroll 3
         for (int i = 0; i < 3; i++) before[i] = x[i];
     }
-    vgi_lanes n2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2], root = vgi_lane_roots(vgi_lane_roots(n2));
-    vgi_mask none = ~(n2 > 1e-24 * spread * spread);
+    vgi_wide n2 = vgi_dot(n, n), share = 1.0 / vgi_roots(vgi_roots(n2));
+#pragma GCC unroll 3
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) d.m[3 * i + j] += n[i] / root * s->q[3 * f + (size_t)j];
-    *map = d;
-    *bad = (unsigned char)vgi_lane_bits(none);
+#pragma GCC unroll 3
+        for (int j = 0; j < 3; j++) d[3 * i + j] += n[i] * share * vgi_same(s->q[3 * f + (size_t)j]);
+    store_map(map, part, d);
+    return vgi_bits(~(n2 > 1e-24 * spread * spread)) << part * VGI_WIDTH;
 }
 
-INLINE void measure_maps(const vgi_source *s, size_t first, size_t last, vgi_map *maps, unsigned char *bad)
+static void measure(const vgi_source *s, size_t first, size_t last, vgi_map *maps, unsigned char *bad)
 {
-    for (size_t f = first; f < last; f++)
-        if (!s->slow[f]) measure_map(s, f, &maps[f], &bad[f]);
-}
-
-/* x := (x / scale + scale x^-T) / 2 */
-INLINE vgi_lanes newton_step(vgi_lanes *x)
-{
-    vgi_lanes c[9], det = vgi_lane_cofactors(x, c); /* c: det x^-T */
-    vgi_lanes size = vgi_lane_squares(x), inverse_size = vgi_lane_squares(c), change = {0};
-    /* the scale that balances Frobenius norms of x and x^-T */
-    vgi_lanes abs_det = {0};
-    for (int k = 0; k < VGI_LANES; k++) abs_det[k] = fabs(det[k]);
-    vgi_lanes g = vgi_lane_roots(vgi_lane_roots(inverse_size / size) / abs_det), a = 0.5 * g, b = 0.5 / (g * det);
-    for (int i = 0; i < 9; i++) {
-        vgi_lanes y = a * x[i] + b * c[i];
-        change += (y - x[i]) * (y - x[i]);
-        x[i] = y;
-    }
-    return change;
-}
-
-/* Lanes in which a is flat, or inside out (what opposite turns leave of one another): no step of Newton's leads from
- * there to a rotation. */
-INLINE unsigned unsound(const vgi_lanes *x)
-{
-    static const double thin = 1e-12; /* determinant of a matrix of norm 1 */
-    vgi_lanes c[9], det = vgi_lane_cofactors(x, c), size = vgi_lane_squares(x);
-    return vgi_lane_bits(~(det > thin * size * vgi_lane_roots(size)));
-}
-
-INLINE void polar(const vgi_map *a, vgi_map *r)
-{
-    enum { MOST = 20 };
-    unsigned bad = unsound(a->m);
-    *r = *a;
-    for (int k = 0; bad >> k; k++) /* they wait at the identity */
-        for (int i = 0; (bad >> k & 1) && i < 9; i++) r->m[i][k] = i % 4 == 0;
-    for (int step = 0; step < MOST; step++) {
-        vgi_lanes change = newton_step(r->m);
-        double most = 0;
-        for (int k = 0; k < VGI_LANES; k++) most = change[k] > most ? change[k] : most;
-        if (most < 1e-20) break; /* quadratic: the next change would be below rounding */
-    }
-    for (int k = 0; bad >> k; k++) {
-        if (!(bad >> k & 1)) continue;
-        double one[9], turn[9];
-        for (int i = 0; i < 9; i++) one[i] = a->m[i][k];
-        vgi_fit_rotation(one, turn);
-        for (int i = 0; i < 9; i++) r->m[i][k] = turn[i];
+    for (size_t f = first; f < last; f++) {
+        if (s->slow[f]) continue;
+        unsigned none = 0;
+        for (size_t part = 0; part < VGI_PARTS; part++) none |= measure_part(s, f, part, &maps[f]);
+        bad[f] = (unsigned char)none;
     }
 }
 
-INLINE void apply(const vgi_map *a, const double *r, vgi_lanes d[3])
+static void add_but(const vgi_map *map, double w, unsigned bad, vgi_map *sum, vgi_lanes weight)
 {
-    for (int i = 0; i < 3; i++) d[i] = a->m[3 * i] * r[0] + a->m[3 * i + 1] * r[1] + a->m[3 * i + 2] * r[2];
+    for (int lane = 0; lane < VGI_LANES; lane++) {
+        if (bad >> lane & 1) continue;
+        for (int e = 0; e < 9; e++) sum->m[e][lane] += w * map->m[e][lane];
+        weight[lane] += w;
+    }
 }
 
-INLINE void follow_face(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out,
-                        size_t offset, size_t lanes)
+static void add(const vgi_drivers *d, size_t first, size_t last, vgi_map *sum, vgi_lanes weight)
 {
-    vgi_map turn = *d;
-    if (how != VGI_FOLLOW_GRADIENT) polar(d, &turn);
-    for (size_t c = 0; c < r; c++) {
-        const double *v = vectors + 3 * c;
-        double length2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-        vgi_lanes w[3], t[3];
-        if (how == VGI_FOLLOW_RIGID) {
-            apply(&turn, v, w);
-        } else {
-            apply(d, v, w);
-            if (how != VGI_FOLLOW_GRADIENT) {
-                apply(&turn, v, t);
-                vgi_lanes stretch =
-                    vgi_lane_roots((w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) / (length2 > 0 ? length2 : 1));
-                for (int i = 0; i < 3; i++) {
-                    t[i] *= stretch;
-                    w[i] = how == VGI_FOLLOW_BLEND ? 0.5 * (t[i] + w[i]) : t[i];
-                }
-            }
+    for (size_t i = first; i < last; i++) {
+        const vgi_map *map = &d->maps[d->source[i]];
+        unsigned bad = d->bad[d->source[i]];
+        if (bad) {
+            add_but(map, d->weight[i], bad, sum, weight);
+            continue;
         }
-        for (size_t k = 0; k < lanes; k++)
-            for (size_t i = 0; i < 3; i++) out[k][offset + 3 * c + i] = w[i][k];
+        vgi_wide w = vgi_same(d->weight[i]);
+        double *to = (double *)sum;
+        for (size_t at = 0; at < 9 * VGI_LANES; at += VGI_WIDTH)
+            vgi_store(to + at, vgi_load(to + at) + w * vgi_load((const double *)map + at));
+        for (size_t at = 0; at < VGI_LANES; at += VGI_WIDTH) vgi_store(weight + at, vgi_load(weight + at) + w);
     }
 }
 
-#if defined(__x86_64__)
-AVX512 static void measure_avx512(const vgi_source *s, size_t first, size_t last, vgi_map *maps, unsigned char *bad)
+static void finish(vgi_map *sum, const vgi_lanes weight)
 {
-    measure_maps(s, first, last, maps, bad);
+    for (size_t part = 0; part < VGI_PARTS; part++) {
+        vgi_wide m[9], w = vgi_load(weight + part * VGI_WIDTH), share = 1.0 / w;
+        vgi_mask some = w > vgi_same(0);
+        load_map(sum, part, m);
+#pragma GCC unroll 9
+        for (int i = 0; i < 9; i++) m[i] = vgi_either(some, m[i] * share, vgi_same(i % 4 == 0));
+        store_map(sum, part, m);
+    }
 }
 
-AVX2 static void measure_avx2(const vgi_source *s, size_t first, size_t last, vgi_map *maps, unsigned char *bad)
+static void polar(const vgi_map *a, vgi_map *rotation)
 {
-    measure_maps(s, first, last, maps, bad);
+    for (size_t part = 0; part < VGI_PARTS; part++) {
+        vgi_wide m[9], x[9];
+        load_map(a, part, m);
+        vgi_wide_polar(m, x, enough);
+        store_map(rotation, part, x);
+    }
 }
 
-AVX512 static void follow_avx512(const vgi_map *d, vgi_follow how, const double *vectors, size_t r,
-                                 double *const *out, size_t offset, size_t lanes)
+VGI_INLINE void apply(const vgi_wide *a, const double *r, vgi_wide d[3])
 {
-    follow_face(d, how, vectors, r, out, offset, lanes);
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; i++)
+        d[i] = a[3 * i] * vgi_same(r[0]) + a[3 * i + 1] * vgi_same(r[1]) + a[3 * i + 2] * vgi_same(r[2]);
 }
 
-AVX2 static void follow_avx2(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out,
-                             size_t offset, size_t lanes)
+/* One vector by the map d and its rotation. */
+VGI_INLINE void follow_vector(const vgi_wide *d, const vgi_wide *turn, vgi_follow how, const double *v, vgi_wide w[3])
 {
-    follow_face(d, how, vectors, r, out, offset, lanes);
+    if (how == VGI_FOLLOW_RIGID) return apply(turn, v, w);
+    apply(d, v, w);
+    if (how == VGI_FOLLOW_GRADIENT) return;
+    double length2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+    vgi_wide t[3], stretch = vgi_roots(vgi_dot(w, w) * vgi_same(1 / (length2 > 0 ? length2 : 1)));
+    apply(turn, v, t);
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; i++) {
+        t[i] *= stretch;
+        w[i] = how == VGI_FOLLOW_BLEND ? 0.5 * (t[i] + w[i]) : t[i];
+    }
 }
 
-static bool has_avx512(void)
+static void follow(const vgi_map *map, vgi_follow how, const double *vectors, size_t r, double *const *out,
+                   size_t offset, size_t lanes)
 {
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq");
+    for (size_t part = 0; part * VGI_WIDTH < lanes; part++) {
+        vgi_wide d[9], turn[9] = {{0}}, w[3];
+        load_map(map, part, d);
+        if (how != VGI_FOLLOW_GRADIENT) vgi_wide_polar(d, turn, enough);
+        for (size_t c = 0; c < r; c++) {
+            follow_vector(d, turn, how, vectors + 3 * c, w);
+            vgi_scatter_point(out + part * VGI_WIDTH, vgi_part_lanes(lanes, part), offset + 3 * c, w);
+        }
+    }
 }
 
-static bool has_avx2(void)
-{
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-}
-#endif
-
-void vgi_measure_maps(const vgi_source *s, size_t first, size_t last, vgi_map *maps, unsigned char *bad)
-{
-#if defined(__x86_64__)
-    if (has_avx512()) return measure_avx512(s, first, last, maps, bad);
-    if (has_avx2()) return measure_avx2(s, first, last, maps, bad);
-#endif
-    measure_maps(s, first, last, maps, bad);
-}
-
-void vgi_polar(const vgi_map *a, vgi_map *rotation)
-{
-    polar(a, rotation);
-}
-
-void vgi_follow_face(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out,
-                     size_t offset, size_t lanes)
-{
-#if defined(__x86_64__)
-    if (has_avx512()) return follow_avx512(d, how, vectors, r, out, offset, lanes);
-    if (has_avx2()) return follow_avx2(d, how, vectors, r, out, offset, lanes);
-#endif
-    follow_face(d, how, vectors, r, out, offset, lanes);
-}
+const vgi_transfer_kernel VGI_OF_SET(vgi_transfer_kernel) = {measure, add, finish, polar, follow};

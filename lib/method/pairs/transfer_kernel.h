@@ -1,9 +1,10 @@
-/* transfer_kernel.h: the two inner loops of transfer by a correspondence, eight poses at once.
+/* transfer_kernel.h: the inner loops of transfer by a correspondence, eight poses at once.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_TRANSFER_KERNEL_H
 #define VG_TRANSFER_KERNEL_H
 
-#include "numeric/lanes.h"
+#include "core/isa.h"
+#include "core/lanes.h"
 
 /* A linear map of space in eight poses, row-major. */
 typedef struct vgi_map {
@@ -19,21 +20,31 @@ typedef struct vgi_source {
     const double *const *poses;   /* 8, vertices */
 } vgi_source;
 
-/* vgi_measure_maps: D of faces first .. last-1. Where a face has no normal in a pose, bad[face] gets the lanes; else
- * 0. */
-void vgi_measure_maps(const vgi_source *s, size_t first, size_t last, vgi_map *maps, unsigned char *bad);
+/* Source faces that drive something, and how much each of them counts. */
+typedef struct vgi_drivers {
+    const vgi_map *maps;      /* of all source faces, */
+    const unsigned char *bad; /* and in which lanes each one has none */
+    const uint32_t *source;
+    const double *weight;
+} vgi_drivers;
 
 /* How a target face follows: its map D as it is; the rotation R of D with the stretch that D gives each vector; the
  * mean of both; or R alone (rigid). */
 typedef enum vgi_follow { VGI_FOLLOW_GRADIENT, VGI_FOLLOW_POSE, VGI_FOLLOW_BLEND, VGI_FOLLOW_RIGID } vgi_follow;
 
-/* vgi_polar: the rotation nearest to a, whatever a is: scaled Newton (Higham 1986), to rounding, or
- * vgi_fit_rotation. */
-void vgi_polar(const vgi_map *a, vgi_map *rotation);
-
-/* vgi_follow_face: wanted vectors of `r` reference vectors (xyz each), for the first `lanes` poses,
- * to out[k] + 3 i. */
-void vgi_follow_face(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out,
-                     size_t offset, size_t lanes);
+typedef struct vgi_transfer_kernel {
+    /* measure: D of faces first .. last-1. Where a face has no normal in a pose, bad[face] gets the lanes; else 0. */
+    void (*measure)(const vgi_source *s, size_t first, size_t last, vgi_map *maps, unsigned char *bad);
+    /* add: the weighted maps of drivers first .. last-1, and their weights, of the lanes in which they have one */
+    void (*add)(const vgi_drivers *d, size_t first, size_t last, vgi_map *sum, vgi_lanes weight);
+    /* finish: sum /= weight; the identity where there is none */
+    void (*finish)(vgi_map *sum, const vgi_lanes weight);
+    /* polar: the rotation nearest to a, whatever a is, to rounding */
+    void (*polar)(const vgi_map *a, vgi_map *rotation);
+    /* follow: wanted vectors of `r` reference vectors (xyz each), for the first `lanes` poses, to out[k] + offset */
+    void (*follow)(const vgi_map *d, vgi_follow how, const double *vectors, size_t r, double *const *out,
+                   size_t offset, size_t lanes);
+} vgi_transfer_kernel;
+VGI_KERNEL(vgi_transfer_kernel)
 
 #endif

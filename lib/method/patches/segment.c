@@ -5,6 +5,7 @@
 #include "core/random.h"
 #include "method/patches/join.h"
 #include "method/patches/pieces.h"
+#include "method/patches/segment_kernel.h"
 #include "numeric/blas.h"
 #include "numeric/polar.h"
 
@@ -22,8 +23,7 @@ enum {
 #define NONE UINT32_MAX
 static const double enough = 10; /* degrees, for the choice of the number of patches */
 
-typedef float floats __attribute__((vector_size(64)));
-enum { FLOATS = 16 };
+enum { FLOATS = 16 }; /* rows of features are multiples of this */
 
 struct vg_segmenter {
     const vg_mesh *mesh;
@@ -78,9 +78,7 @@ static void add_chunk(void *context, size_t i)
         vgi_lanes r[9];
         float *to = s->feature + f * s->width;
         vgi_turns_measure(&s->turns, f, a->poses, r);
-        for (size_t k = 0; k < a->lanes; k++)
-            for (size_t n = 0; n < 9; n++)
-                to[a->at[9 * k + n]] += a->sign[9 * k + n] * (float)(r[n][k] - (n % 4 == 0));
+        vgi_segment_kernel_now()->add(r, a->lanes, a->at, a->sign, to);
     }
 }
 
@@ -163,18 +161,7 @@ static size_t chunks(const clustering *c)
 
 static float inner(const float *a, const float *b, size_t n)
 {
-    floats sum[2] = {{0}, {0}};
-    size_t i = 0;
-    for (; i + FLOATS <= n; i += FLOATS) {
-        floats x, y;
-        memcpy(&x, a + i, sizeof x);
-        memcpy(&y, b + i, sizeof y);
-        sum[i / FLOATS % 2] += x * y;
-    }
-    sum[0] += sum[1];
-    float total = 0;
-    for (int k = 0; k < FLOATS; k++) total += sum[0][k];
-    return total;
+    return vgi_segment_kernel_now()->inner(a, b, n);
 }
 
 /* Distances to the centre that was added last; the sum of the nearest ones,
@@ -275,8 +262,7 @@ static void mean_stripe(void *context, size_t i)
         const float *x = c->s->feature + f * width + first;
         double *to = c->total + c->label[f] * width + first,
                *from = before == NONE ? NULL : c->total + before * width + first;
-        for (size_t j = 0; j < n; j++) to[j] += (double)x[j];
-        for (size_t j = 0; from && j < n; j++) from[j] -= (double)x[j];
+        vgi_segment_kernel_now()->move(x, n, to, from);
     }
     for (size_t k = 0; k < c->k; k++) {
         double share = c->sizes[k] ? 1 / (double)c->sizes[k] : 0;

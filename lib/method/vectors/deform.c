@@ -245,7 +245,7 @@ static int make_workspace(vg_deformer *d, vg_err *e)
 {
     size_t r = d->g->max_corners + 1, per_lane = sizeof(vgi_lanes) / sizeof(double);
     d->work_scalars = (7 * r + per_lane - 1) / per_lane * per_lane;
-    d->work_size = d->work_scalars + 2 * r * (sizeof(vgi_vec) / sizeof(double));
+    d->work_size = d->work_scalars + 2 * r * 3 * per_lane;
     d->work = aligned_alloc(sizeof(vgi_lanes), (size_t)d->threads * d->work_size * sizeof *d->work);
     return d->work ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory for faces of %zu corners", r - 1);
 }
@@ -451,7 +451,7 @@ static void redo_slowly(void *context, size_t face, unsigned lanes)
 static void transfer_step(deform_job *j, double *work, size_t first, size_t last)
 {
     vg_deformer *d = j->d;
-    vgi_vec *lanes = (vgi_vec *)(work + d->work_scalars);
+    vgi_lane_point *lanes = (vgi_lane_point *)(void *)(work + d->work_scalars);
     for (size_t p = 0; p < j->n; p += VGI_LANES) {
         size_t n = j->n - p < VGI_LANES ? j->n - p : VGI_LANES;
         const double *poses[VGI_LANES];

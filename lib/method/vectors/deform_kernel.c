@@ -7,166 +7,154 @@
  * only finds them (deform.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/deform_kernel.h"
-
-#include <math.h>
-
-#define INLINE static inline __attribute__((always_inline))
+#include "core/wide.h"
 
 /* the face has no normal when |n| <= 1e-12 sum |d|^2, a corner no frame when it stands on its face's normal to
  * 1e-12 */
 static const double flat2 = 1e-24;
 
-INLINE vgi_lanes dot(vgi_vec a, vgi_vec b)
+typedef struct vec {
+    vgi_wide at[3];
+} vec;
+
+VGI_INLINE vgi_wide dot(vec a, vec b)
 {
-    return a.x * b.x + a.y * b.y + a.z * b.z;
+    return vgi_dot(a.at, b.at);
 }
 
-INLINE vgi_vec cross(vgi_vec a, vgi_vec b)
+VGI_INLINE vec cross(vec a, vec b)
 {
-    return (vgi_vec){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+    return (vec){{a.at[1] * b.at[2] - a.at[2] * b.at[1], a.at[2] * b.at[0] - a.at[0] * b.at[2],
+                  a.at[0] * b.at[1] - a.at[1] * b.at[0]}};
 }
 
-INLINE vgi_vec times(vgi_vec a, vgi_lanes s)
+VGI_INLINE vec times(vec a, vgi_wide s)
 {
-    return (vgi_vec){a.x * s, a.y * s, a.z * s};
+    return (vec){{a.at[0] * s, a.at[1] * s, a.at[2] * s}};
 }
 
-INLINE vgi_vec add(vgi_vec a, vgi_vec b)
+VGI_INLINE vec add(vec a, vec b)
 {
-    return (vgi_vec){a.x + b.x, a.y + b.y, a.z + b.z};
+    return (vec){{a.at[0] + b.at[0], a.at[1] + b.at[1], a.at[2] + b.at[2]}};
 }
 
-INLINE vgi_vec load(const double *const *p, size_t i)
+VGI_INLINE vec load(const double *const *p, size_t i)
 {
-    return (vgi_vec){vgi_gather(p, 3 * i), vgi_gather(p, 3 * i + 1), vgi_gather(p, 3 * i + 2)};
+    vec v;
+    vgi_gather_point(p, 3 * i, v.at);
+    return v;
 }
 
 /* vectors of the face into w[0 .. r-1], and w[r] = w[0] */
-INLINE void load_face(const vgi_transfer *t, uint32_t begin, size_t r, vgi_vec *w)
+VGI_INLINE void load_face(const vgi_transfer *t, const double *const *poses, uint32_t begin, size_t r, vec *w)
 {
     if (t->vertices) {
-        vgi_vec centre = {{0}, {0}, {0}};
+        vec centre = {{{0}}};
         for (size_t i = 0; i < r; i++) {
-            w[i] = load(t->poses, t->vert[begin + i]);
+            w[i] = load(poses, t->vert[begin + i]);
             centre = add(centre, w[i]);
         }
-        vgi_vec back = times(centre, (vgi_lanes){0} - 1.0 / (double)r);
+        vec back = times(centre, vgi_same(-1.0 / (double)r));
         for (size_t i = 0; i < r; i++) w[i] = add(w[i], back);
     } else {
-        for (size_t i = 0; i < r; i++) w[i] = load(t->poses, begin + i);
+        for (size_t i = 0; i < r; i++) w[i] = load(poses, begin + i);
     }
     w[r] = w[0];
 }
 
-INLINE vgi_lanes same(double x)
-{
-    return (vgi_lanes){0} + x;
-}
-
 /* Wanted vectors by the corners' frames, w in place; returns which lanes have a corner without a frame. */
-INLINE vgi_mask by_pose(const vgi_transfer *t, uint32_t begin, size_t r, vgi_vec n, vgi_vec *w)
+VGI_INLINE vgi_mask by_pose(const vgi_transfer *t, uint32_t begin, size_t r, vec n, vec *w)
 {
     vgi_mask bad = {0};
     for (size_t i = 0; i < r; i++) {
         const double *k = t->coordinates + 3 * (size_t)(begin + i);
-        vgi_lanes d2 = dot(w[i], w[i]), length = vgi_lane_roots(d2), along = dot(n, w[i]);
+        vgi_wide d2 = dot(w[i], w[i]), along = dot(n, w[i]), inverse = 1.0 / d2;
         /* m = n - (n.u) u; |m|^2 = 1 - (n.u)^2 */
-        vgi_vec m = add(n, times(w[i], -along / d2));
-        vgi_lanes m2 = dot(m, m);
-        bad |= ~(d2 > t->shortest2) | ~(m2 > flat2);
-        m = times(m, length / vgi_lane_roots(m2));            /* |d| times the unit normal of the corner */
-        vgi_vec b = times(cross(m, w[i]), 1.0 / length); /* n x u, times |d| */
-        w[i] = add(times(w[i], same(k[0])), add(times(b, same(k[1])), times(m, same(k[2]))));
+        vec m = add(n, times(w[i], -along * inverse));
+        vgi_wide m2 = dot(m, m);
+        bad |= ~(d2 > vgi_same(t->shortest2)) | ~(m2 > vgi_same(flat2));
+        m = times(m, vgi_roots(d2 / m2));                         /* |d| times the unit normal of the corner */
+        vec b = times(cross(m, w[i]), vgi_roots(inverse));         /* n x u, times |d| */
+        w[i] = add(times(w[i], vgi_same(k[0])), add(times(b, vgi_same(k[1])), times(m, vgi_same(k[2]))));
     }
     return bad;
 }
 
 /* Wanted vectors by the face's deformation gradient, out of w into g. */
-INLINE void by_gradient(const vgi_transfer *t, size_t f, uint32_t begin, size_t r, vgi_vec n, const vgi_vec *w,
-                        vgi_vec *g)
+VGI_INLINE void by_gradient(const vgi_transfer *t, size_t f, uint32_t begin, size_t r, vec n, const vec *w, vec *g)
 {
-    vgi_vec y[3] = {{{0}, {0}, {0}}, {{0}, {0}, {0}}, {{0}, {0}, {0}}}; /* columns of sum d_k p_k' */
+    vec y[3] = {{{{0}}}}; /* columns of sum d_k p_k' */
     for (size_t i = 0; i < r; i++)
-        for (int k = 0; k < 3; k++) y[k] = add(y[k], times(w[i], same(t->gradient[begin + i].p[k])));
+#pragma GCC unroll 3
+        for (int k = 0; k < 3; k++) y[k] = add(y[k], times(w[i], vgi_same(t->gradient[begin + i].p[k])));
     const vgi_gradient_face *face = &t->gradient_face[f];
     for (size_t i = 0; i < r; i++) {
         const double *b = t->gradient[begin + i].b;
-        g[i] = times(n, same(face->q[0] * b[0] + face->q[1] * b[1] + face->q[2] * b[2]));
-        for (int k = 0; k < 3; k++) g[i] = add(g[i], times(y[k], same(b[k])));
-        g[i] = add(g[i], times(w[i], same(face->rho)));
+        g[i] = times(n, vgi_same(face->q[0] * b[0] + face->q[1] * b[1] + face->q[2] * b[2]));
+#pragma GCC unroll 3
+        for (int k = 0; k < 3; k++) g[i] = add(g[i], times(y[k], vgi_same(b[k])));
+        g[i] = add(g[i], times(w[i], vgi_same(face->rho)));
     }
 }
 
-INLINE void transfer_face(const vgi_transfer *t, size_t f, vgi_vec *w, vgi_vec *g, vgi_method method)
+/* Face f of r corners in the poses of one part; returns which of them have a degenerate corner. */
+VGI_INLINE unsigned transfer_part(const vgi_transfer *t, size_t f, size_t r, size_t part, vec *w, vec *g,
+                                  vgi_method method)
 {
     uint32_t begin = t->start[f];
-    size_t r = t->start[f + 1] - begin;
-    load_face(t, begin, r, w);
+    size_t first = part * VGI_WIDTH;
+    load_face(t, t->poses + first, begin, r, w);
 
-    vgi_vec n = {{0}, {0}, {0}};
-    vgi_lanes spread = {0};
+    vec n = {{{0}}};
+    vgi_wide spread = {0};
     for (size_t i = 0; i < r; i++) {
         n = add(n, cross(w[i], w[i + 1]));
         spread += dot(w[i], w[i]);
     }
-    vgi_lanes n2 = dot(n, n);
+    vgi_wide n2 = dot(n, n);
     vgi_mask bad = ~(n2 > flat2 * spread * spread);
-    n = times(n, 1.0 / vgi_lane_roots(n2));
+    n = times(n, 1.0 / vgi_roots(n2));
 
     if (method != VGI_POSE) by_gradient(t, f, begin, r, n, w, g);
     if (method != VGI_GRADIENT) bad |= by_pose(t, begin, r, n, w);
-    const vgi_vec *wanted = method == VGI_GRADIENT ? g : w;
+    const vec *wanted = method == VGI_GRADIENT ? g : w;
     if (method == VGI_BLEND)
-        for (size_t i = 0; i < r; i++) w[i] = times(add(w[i], g[i]), same(0.5));
+        for (size_t i = 0; i < r; i++) w[i] = times(add(w[i], g[i]), vgi_same(0.5));
 
-    for (size_t k = 0; k < t->lanes; k++) {
-        double *to = t->out[k] + 3 * (size_t)begin;
-        for (size_t i = 0; i < r; i++)
-            to[3 * i] = wanted[i].x[k], to[3 * i + 1] = wanted[i].y[k], to[3 * i + 2] = wanted[i].z[k];
-    }
-    unsigned which = vgi_lane_bits(bad) & (0xffu >> (VGI_LANES - t->lanes));
-    if (which) t->bad(t->context, f, which);
+    size_t lanes = vgi_part_lanes(t->lanes, part);
+    for (size_t i = 0; i < r; i++) vgi_scatter_point(t->out + first, lanes, 3 * (begin + i), wanted[i].at);
+    return (vgi_bits(bad) & ((1u << lanes) - 1)) << first;
 }
 
-INLINE void transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w, vgi_vec *g)
+/* Called with constant sizes, this becomes straight code for triangles and quads. */
+VGI_INLINE void transfer_face(const vgi_transfer *t, size_t f, size_t r, vec *w, vec *g, vgi_method method)
 {
+    unsigned bad = 0;
+    for (size_t part = 0; part * VGI_WIDTH < t->lanes; part++) bad |= transfer_part(t, f, r, part, w, g, method);
+    if (bad) t->bad(t->context, f, bad);
+}
+
+VGI_INLINE void transfer_by(const vgi_transfer *t, size_t first, size_t last, vec *w, size_t max_corners,
+                            vgi_method method)
+{
+    vec a[5], b[5], *g = w + max_corners + 1;
+    for (size_t f = first; f < last; f++) {
+        size_t r = t->start[f + 1] - t->start[f];
+        if (t->skip[f]) continue;
+        if (r == 3) transfer_face(t, f, 3, a, b, method);
+        else if (r == 4) transfer_face(t, f, 4, a, b, method);
+        else transfer_face(t, f, r, w, g, method);
+    }
+}
+
+static void transfer(const vgi_transfer *t, size_t first, size_t last, vgi_lane_point *room, size_t max_corners)
+{
+    vec *w = (vec *)(void *)room;
     switch (t->method) { /* once, so that each loop is compiled for its method */
-    case VGI_POSE:
-        for (size_t f = first; f < last; f++)
-            if (!t->skip[f]) transfer_face(t, f, w, g, VGI_POSE);
-        break;
-    case VGI_GRADIENT:
-        for (size_t f = first; f < last; f++)
-            if (!t->skip[f]) transfer_face(t, f, w, g, VGI_GRADIENT);
-        break;
-    case VGI_BLEND:
-        for (size_t f = first; f < last; f++)
-            if (!t->skip[f]) transfer_face(t, f, w, g, VGI_BLEND);
-        break;
+    case VGI_POSE: return transfer_by(t, first, last, w, max_corners, VGI_POSE);
+    case VGI_GRADIENT: return transfer_by(t, first, last, w, max_corners, VGI_GRADIENT);
+    case VGI_BLEND: return transfer_by(t, first, last, w, max_corners, VGI_BLEND);
     }
 }
 
-#if defined(__x86_64__)
-__attribute__((target("avx512f,avx512dq,fma"))) static void transfer_avx512(const vgi_transfer *t, size_t first,
-                                                                            size_t last, vgi_vec *w, vgi_vec *g)
-{
-    transfer_faces(t, first, last, w, g);
-}
-
-__attribute__((target("avx2,fma"))) static void transfer_avx2(const vgi_transfer *t, size_t first, size_t last,
-                                                              vgi_vec *w, vgi_vec *g)
-{
-    transfer_faces(t, first, last, w, g);
-}
-#endif
-
-void vgi_transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w, size_t max_corners)
-{
-    vgi_vec *g = w + max_corners + 1;
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
-        return transfer_avx512(t, first, last, w, g);
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return transfer_avx2(t, first, last, w, g);
-#endif
-    transfer_faces(t, first, last, w, g);
-}
+const vgi_deform_kernel VGI_OF_SET(vgi_deform_kernel) = {transfer};

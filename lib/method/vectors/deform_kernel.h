@@ -3,11 +3,8 @@
 #ifndef VG_DEFORM_KERNEL_H
 #define VG_DEFORM_KERNEL_H
 
-#include "numeric/lanes.h"
-
-typedef struct vgi_vec {
-    vgi_lanes x, y, z;
-} vgi_vec;
+#include "core/isa.h"
+#include "core/lanes.h"
 
 /* What is carried over: MATH 5. */
 typedef enum vgi_method { VGI_POSE, VGI_GRADIENT, VGI_BLEND } vgi_method;
@@ -31,7 +28,7 @@ typedef struct vgi_gradient_face {
  *                 reference corner, over the length of the source's reference vector
  *   shortest2     squared length below which a vector is degenerate
  *   skip          1 per face: do nothing
- *   w             workspace of 2 (max corners + 1)
+ *   w             workspace of 2 (max corners + 1) points of eight poses
  *   out           lanes of them, vectors of the target
  *   bad           called for each face with a degenerate corner in one of the first `lanes` poses, after its vectors
  *                 have been written */
@@ -51,6 +48,17 @@ typedef struct vgi_transfer {
     void *context;
 } vgi_transfer;
 
-void vgi_transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi_vec *w, size_t max_corners);
+typedef vgi_lanes vgi_lane_point[3];
+
+typedef struct vgi_deform_kernel {
+    void (*transfer)(const vgi_transfer *t, size_t first, size_t last, vgi_lane_point *w, size_t max_corners);
+} vgi_deform_kernel;
+VGI_KERNEL(vgi_deform_kernel)
+
+static inline void vgi_transfer_faces(const vgi_transfer *t, size_t first, size_t last, vgi_lane_point *w,
+                                      size_t max_corners)
+{
+    vgi_deform_kernel_now()->transfer(t, first, last, w, max_corners);
+}
 
 #endif

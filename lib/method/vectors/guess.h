@@ -3,6 +3,7 @@
 #ifndef VG_GUESS_H
 #define VG_GUESS_H
 
+#include "core/isa.h"
 #include "method/vectors/metric.h"
 
 /* One step of the walk: x(vertex of `corner`) = x(vertex of `from`) + w(corner) - w(from),
@@ -11,8 +12,8 @@ typedef struct vgi_step {
     uint32_t corner, from;
 } vgi_step;
 
-/* x, y, z and a number that does not matter: what one register holds. */
-typedef double vgi_point __attribute__((vector_size(32)));
+/* x, y, z and a number that does not matter: one register of four, or two of two. */
+typedef double vgi_point[4] __attribute__((aligned(32)));
 
 typedef struct vgi_guesser { /* all borrowed */
     const vg_graph *g;
@@ -24,10 +25,19 @@ typedef struct vgi_guesser { /* all borrowed */
     size_t nanchors;         /* 0: one vertex is pinned */
 } vgi_guesser;
 
+typedef struct vgi_guess_kernel {
+    void (*guess)(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs,
+                  vgi_point *space);
+} vgi_guess_kernel;
+VGI_KERNEL(vgi_guess_kernel)
+
 /* vgi_guess: x (nv points): the pose that the walk gives, relative to the first anchor or the pinned vertex, so that
  * a pose far from the origin loses no digits. rhs (nv x 3): A G (W* - A' x), what it misses. anchors: nanchors
  * points. space: nv + max_corners. */
-void vgi_guess(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs,
-               vgi_point *space);
+static inline void vgi_guess(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs,
+                             vgi_point *space)
+{
+    vgi_guess_kernel_now()->guess(s, w, anchors, x, rhs, space);
+}
 
 #endif

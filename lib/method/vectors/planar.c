@@ -234,61 +234,66 @@ typedef struct plane_job {
 /* The residual of the plain solution, -ratio P V, each pose in units of its largest entry,
  * which is returned in `unit`. */
 static void load_residual(const vg_planar *p, const room *m, const vgi_planar_faces *f, const double *const *pose,
-                          vgi_lanes *unit)
+                          vgi_lanes unit)
 {
+    const vgi_planar_kernel *kernel = vgi_planar_kernel_now();
     size_t n = p->solver.rows;
-    vgi_lanes none, most = {0};
+    vgi_lanes none, most, factor;
     memset(m->y, 0, (n + p->nheld) * sizeof *m->y);
     memset(m->p, 0, (n + p->nheld) * sizeof *m->p); /* rows of centroids stay 0 */
     vgi_load_rows(m->p, p->solver.row, p->solver.g->nv, n, pose);
     for (size_t i = 0; i < p->nheld; i++)
         for (size_t c = 0; c < 3; c++)
             for (int k = 0; k < VGI_LANES; k++) m->p[n + i].xyz[c][k] = pose[k][3 * (size_t)p->held[i] + c];
-    vgi_planar_product(f, m->normals, m->p, m->y, m->h, &none);
-    for (size_t i = 0; i < n; i++)
-        for (int c = 0; c < 3; c++)
-            for (int k = 0; k < VGI_LANES; k++) most[k] = fmax(most[k], fabs(m->y[i].xyz[c][k]));
-    vgi_lanes factor;
-    for (int k = 0; k < VGI_LANES; k++) unit[0][k] = p->ratio * most[k], factor[k] = most[k] > 0 ? -1 / most[k] : 0;
-    for (size_t i = 0; i < n; i++)
-        for (int c = 0; c < 3; c++) m->z[i].xyz[c] = m->r[i].xyz[c] = factor * m->y[i].xyz[c];
+    kernel->product(f, m->normals, m->p, m->y, m->h, none);
+    kernel->largest(n, m->y, most);
+    for (int k = 0; k < VGI_LANES; k++) unit[k] = p->ratio * most[k], factor[k] = most[k] > 0 ? -1 / most[k] : 0;
+    kernel->scale(n, factor, m->y, m->r);
+    memcpy(m->z, m->r, n * sizeof *m->z);
     memset(m->x, 0, n * sizeof *m->x);
     memset(m->s, 0, n * sizeof *m->s);
     memset(m->y, 0, (n + p->nheld) * sizeof *m->y);
     memset(m->p, 0, (n + p->nheld) * sizeof *m->p);
 }
 
+/* What is left of the residual of each pose, relative to the start; whether all of them are done. */
+static bool all_done(const vgi_lanes start, const vgi_lanes rz, double *left, bool *active)
+{
+    bool all = true;
+    for (int k = 0; k < VGI_LANES; k++) {
+        left[k] = start[k] > 0 ? sqrt(fmax(rz[k], 0) / start[k]) : start[k] == 0 ? 0 : NAN;
+        active[k] = left[k] > enough;
+        all = all && !active[k];
+    }
+    return all;
+}
+
 /* Conjugate gradients on (N + ratio P) x = r. left[k]: what is left of the residual, relative, where pose k ended. */
 static size_t descend(const vg_planar *p, const room *m, const vgi_planar_faces *f, double *left)
 {
+    const vgi_planar_kernel *kernel = vgi_planar_kernel_now();
     size_t n = p->solver.rows, steps = 0;
     vgi_lanes rz, start, next, ps, pPp, alpha, beta = {0}, gamma;
+    bool active[VGI_LANES];
     vgi_factor_solve(p->solver.factor, m->z);
-    vgi_planar_dot(n, m->r, m->z, &rz);
-    start = rz;
-    for (;; steps++) {
-        bool all = true;
-        vgi_mask active;
-        for (int k = 0; k < VGI_LANES; k++) {
-            left[k] = start[k] > 0 ? sqrt(fmax(rz[k], 0) / start[k]) : start[k] == 0 ? 0 : NAN;
-            active[k] = left[k] > enough;
-            all = all && !active[k];
-        }
-        if (all || steps == LIMIT) return steps;
-        vgi_planar_turn(n, m->z, m->r, &beta, m->p, m->s, &ps);
-        vgi_planar_product(f, m->normals, m->p, m->y, m->h, &pPp);
+    kernel->dot(n, m->r, m->z, rz);
+    memcpy(start, rz, sizeof start);
+    for (; !all_done(start, rz, left, active) && steps < LIMIT; steps++) {
+        kernel->turn(n, m->z, m->r, beta, m->p, m->s, ps);
+        kernel->product(f, m->normals, m->p, m->y, m->h, pPp);
         for (int k = 0; k < VGI_LANES; k++) {
             alpha[k] = active[k] ? rz[k] / (ps[k] + p->ratio * pPp[k]) : 0;
             gamma[k] = alpha[k] * p->ratio;
         }
-        vgi_planar_advance(n, &alpha, &gamma, m->p, m->s, m->y, m->x, m->r, m->z);
+        kernel->advance(n, alpha, gamma, m->p, m->s, m->y, m->x, m->r, m->z);
         vgi_factor_solve(p->solver.factor, m->z);
-        vgi_planar_dot(n, m->r, m->z, &next);
+        kernel->dot(n, m->r, m->z, next);
         for (int k = 0; k < VGI_LANES; k++) {
             beta[k] = active[k] ? next[k] / rz[k] : 0;
             if (active[k]) rz[k] = next[k];
         }
     }
+    return steps;
 }
 
 /* The difference is 0 at the held vertex; without anchors the mean is what stays. */
@@ -323,10 +328,9 @@ static void plane_block(void *context, size_t i)
     }
     vgi_load_rows(m->normals, p->order, p->nf, p->nf, normals);
     vgi_lanes unit;
-    load_residual(p, m, &f, pose, &unit);
+    load_residual(p, m, &f, pose, unit);
     size_t steps = descend(p, m, &f, left);
-    for (size_t r = 0; r < p->solver.rows; r++)
-        for (int c = 0; c < 3; c++) m->x[r].xyz[c] *= unit;
+    vgi_planar_kernel_now()->scale(p->solver.rows, unit, m->x, m->x);
     vgi_add_rows(m->x, p->solver.row, p->solver.g->nv, p->solver.rows, j->x + first, lanes);
     for (size_t k = 0; k < lanes; k++) {
         if (!p->solver.anchored) put_back(p, j->x[first + k], root[k]);

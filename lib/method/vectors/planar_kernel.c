@@ -1,137 +1,132 @@
-/* planar_kernel.c: the steps of conjugate gradients for eight poses at once (see planar.c), for the instructions at
- * hand. All of them are bound by memory: what can be done while a row is in registers is done in one go.
+/* planar_kernel.c: the steps of conjugate gradients for eight poses at once (see planar.c). All of them are bound by
+ * memory: what can be done while a row is in registers is done in one go.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/planar_kernel.h"
+#include "core/wide.h"
 
-#define INLINE static inline __attribute__((always_inline))
+/* A row is PIECES vectors; piece i holds part i % VGI_PARTS of the poses. */
+enum { PIECES = 3 * VGI_PARTS };
 
-INLINE vgi_lanes dot(const vgi_row *a, const vgi_row *b)
+VGI_INLINE vgi_wide piece(const vgi_row *a, size_t i)
 {
-    return a->xyz[0] * b->xyz[0] + a->xyz[1] * b->xyz[1] + a->xyz[2] * b->xyz[2];
+    return vgi_load((const double *)a + i * VGI_WIDTH);
+}
+
+VGI_INLINE void put(vgi_row *a, size_t i, vgi_wide x)
+{
+    vgi_store((double *)a + i * VGI_WIDTH, x);
+}
+
+VGI_INLINE vgi_wide dot_part(const vgi_row *a, const vgi_row *b, size_t part)
+{
+    vgi_wide sum = piece(a, part) * piece(b, part);
+    sum += piece(a, VGI_PARTS + part) * piece(b, VGI_PARTS + part);
+    return sum + piece(a, 2 * VGI_PARTS + part) * piece(b, 2 * VGI_PARTS + part);
 }
 
 /* One face: h_c = m.p_c less their mean is m.t_c; what it adds to y_c is (m.t_c) m,
  * for the matrix of t in v is a projector. */
-INLINE void face(const uint32_t *row, size_t corners, const vgi_row *m, const vgi_row *p, vgi_row *y, vgi_lanes *h,
-                 vgi_lanes *sum)
+VGI_INLINE void face_part(const uint32_t *row, size_t corners, const vgi_row *m, const vgi_row *p, vgi_row *y,
+                          vgi_wide *h, vgi_wide *sum, size_t part)
 {
-    vgi_lanes mean = {0};
+    vgi_wide mean = {0};
     for (size_t c = 0; c < corners; c++) {
-        h[c] = dot(m, &p[row[c]]);
+        h[c] = dot_part(m, &p[row[c]], part);
         mean += h[c];
     }
     mean *= 1 / (double)corners;
     for (size_t c = 0; c < corners; c++) {
-        vgi_lanes t = h[c] - mean;
+        vgi_wide t = h[c] - mean;
         vgi_row *to = &y[row[c]];
 #pragma GCC unroll 3
-        for (int k = 0; k < 3; k++) to->xyz[k] += t * m->xyz[k];
+        for (size_t k = part; k < PIECES; k += VGI_PARTS) put(to, k, piece(to, k) + t * piece(m, k));
         *sum += t * t;
     }
 }
 
-INLINE void product(const vgi_planar_faces *f, const vgi_row *normals, const vgi_row *p, vgi_row *y, vgi_lanes *h,
-                    vgi_lanes *pPp)
+static void product(const vgi_planar_faces *f, const vgi_row *normals, const vgi_row *p, vgi_row *y, vgi_lanes *room,
+                    vgi_lanes pPp)
 {
-    vgi_lanes sum = {0};
+    vgi_wide sum[VGI_PARTS] = {{0}}, *h = (vgi_wide *)(void *)room;
     for (size_t i = 0; i < f->n; i++) {
         size_t corners = f->start[i + 1] - f->start[i];
         const uint32_t *row = f->row + f->start[i];
-        vgi_lanes four[4];
-        if (corners == 4) face(row, 4, &normals[i], p, y, four, &sum); /* in registers */
-        else face(row, corners, &normals[i], p, y, h, &sum);
-    }
-    *pPp = sum;
-}
-
-INLINE void turn(size_t n, const vgi_row *z, const vgi_row *r, const vgi_lanes *beta, vgi_row *p, vgi_row *s,
-                 vgi_lanes *ps)
-{
-    vgi_lanes b = *beta, sum = {0};
-    for (size_t i = 0; i < n; i++)
-#pragma GCC unroll 3
-        for (int k = 0; k < 3; k++) {
-            p[i].xyz[k] = z[i].xyz[k] + b * p[i].xyz[k];
-            s[i].xyz[k] = r[i].xyz[k] + b * s[i].xyz[k];
-            sum += p[i].xyz[k] * s[i].xyz[k];
+#pragma GCC unroll 4
+        for (size_t part = 0; part < VGI_PARTS; part++) {
+            vgi_wide four[4];
+            if (corners == 4) face_part(row, 4, &normals[i], p, y, four, &sum[part], part); /* in registers */
+            else face_part(row, corners, &normals[i], p, y, h, &sum[part], part);
         }
-    *ps = sum;
+    }
+    for (size_t part = 0; part < VGI_PARTS; part++) vgi_store(pPp + part * VGI_WIDTH, sum[part]);
 }
 
-INLINE void advance(size_t n, const vgi_lanes *alpha, const vgi_lanes *gamma, const vgi_row *p, const vgi_row *s,
+VGI_INLINE void load_lanes(const vgi_lanes x, vgi_wide *to)
+{
+#pragma GCC unroll 4
+    for (size_t part = 0; part < VGI_PARTS; part++) to[part] = vgi_load(x + part * VGI_WIDTH);
+}
+
+static void turn(size_t n, const vgi_row *z, const vgi_row *r, const vgi_lanes beta, vgi_row *p, vgi_row *s,
+                 vgi_lanes ps)
+{
+    vgi_wide b[VGI_PARTS], sum[VGI_PARTS] = {{0}};
+    load_lanes(beta, b);
+    for (size_t i = 0; i < n; i++)
+#pragma GCC unroll 12
+        for (size_t k = 0; k < PIECES; k++) {
+            vgi_wide pk = piece(&z[i], k) + b[k % VGI_PARTS] * piece(&p[i], k);
+            vgi_wide sk = piece(&r[i], k) + b[k % VGI_PARTS] * piece(&s[i], k);
+            put(&p[i], k, pk), put(&s[i], k, sk);
+            sum[k % VGI_PARTS] += pk * sk;
+        }
+    for (size_t part = 0; part < VGI_PARTS; part++) vgi_store(ps + part * VGI_WIDTH, sum[part]);
+}
+
+static void advance(size_t n, const vgi_lanes alpha, const vgi_lanes gamma, const vgi_row *p, const vgi_row *s,
                     vgi_row *y, vgi_row *x, vgi_row *r, vgi_row *z)
 {
-    vgi_lanes a = *alpha, g = *gamma;
+    vgi_wide a[VGI_PARTS], g[VGI_PARTS];
+    load_lanes(alpha, a);
+    load_lanes(gamma, g);
     for (size_t i = 0; i < n; i++)
-#pragma GCC unroll 3
-        for (int k = 0; k < 3; k++) {
-            x[i].xyz[k] += a * p[i].xyz[k];
-            z[i].xyz[k] = r[i].xyz[k] -= a * s[i].xyz[k] + g * y[i].xyz[k];
-            y[i].xyz[k] = (vgi_lanes){0};
+#pragma GCC unroll 12
+        for (size_t k = 0; k < PIECES; k++) {
+            size_t part = k % VGI_PARTS;
+            vgi_wide left = piece(&r[i], k) - (a[part] * piece(&s[i], k) + g[part] * piece(&y[i], k));
+            put(&x[i], k, piece(&x[i], k) + a[part] * piece(&p[i], k));
+            put(&r[i], k, left), put(&z[i], k, left), put(&y[i], k, vgi_same(0));
         }
 }
 
-INLINE void dot_all(size_t n, const vgi_row *a, const vgi_row *b, vgi_lanes *ab)
+static void dot(size_t n, const vgi_row *a, const vgi_row *b, vgi_lanes ab)
 {
-    vgi_lanes sum = {0};
-    for (size_t i = 0; i < n; i++) sum += dot(&a[i], &b[i]);
-    *ab = sum;
+    vgi_wide sum[VGI_PARTS] = {{0}};
+    for (size_t i = 0; i < n; i++)
+#pragma GCC unroll 4
+        for (size_t part = 0; part < VGI_PARTS; part++) sum[part] += dot_part(&a[i], &b[i], part);
+    for (size_t part = 0; part < VGI_PARTS; part++) vgi_store(ab + part * VGI_WIDTH, sum[part]);
 }
 
-#if defined(__x86_64__)
-#define VARIANTS(suffix, instructions) \
-    __attribute__((target(instructions))) static void product_##suffix(const vgi_planar_faces *f, \
-        const vgi_row *normals, const vgi_row *p, vgi_row *y, vgi_lanes *h, vgi_lanes *pPp) \
-        { product(f, normals, p, y, h, pPp); } \
-    __attribute__((target(instructions))) static void turn_##suffix(size_t n, const vgi_row *z, const vgi_row *r, \
-        const vgi_lanes *beta, vgi_row *p, vgi_row *s, vgi_lanes *ps) { turn(n, z, r, beta, p, s, ps); } \
-    __attribute__((target(instructions))) static void advance_##suffix(size_t n, const vgi_lanes *alpha, \
-        const vgi_lanes *gamma, const vgi_row *p, const vgi_row *s, vgi_row *y, vgi_row *x, vgi_row *r, vgi_row *z) \
-        { advance(n, alpha, gamma, p, s, y, x, r, z); } \
-    __attribute__((target(instructions))) static void dot_##suffix(size_t n, const vgi_row *a, const vgi_row *b, \
-        vgi_lanes *ab) { dot_all(n, a, b, ab); }
-
-VARIANTS(avx512, "avx512f,avx512dq,fma")
-VARIANTS(avx2, "avx2,fma")
-
-#define CHOOSE(name, ...) \
-    do { \
-        if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) { \
-            name##_avx512(__VA_ARGS__); \
-            return; \
-        } \
-        if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) { \
-            name##_avx2(__VA_ARGS__); \
-            return; \
-        } \
-    } while (0)
-#else
-#define CHOOSE(name, ...) do { } while (0)
-#endif
-
-void vgi_planar_product(const vgi_planar_faces *f, const vgi_row *normals, const vgi_row *p, vgi_row *y, vgi_lanes *h,
-                        vgi_lanes *pPp)
+static void largest(size_t n, const vgi_row *a, vgi_lanes most)
 {
-    CHOOSE(product, f, normals, p, y, h, pPp);
-    product(f, normals, p, y, h, pPp);
+    vgi_wide now[VGI_PARTS] = {{0}};
+    for (size_t i = 0; i < n; i++)
+#pragma GCC unroll 12
+        for (size_t k = 0; k < PIECES; k++) {
+            vgi_wide x = vgi_absolute(piece(&a[i], k)), *to = &now[k % VGI_PARTS];
+            *to = vgi_either(x > *to, x, *to);
+        }
+    for (size_t part = 0; part < VGI_PARTS; part++) vgi_store(most + part * VGI_WIDTH, now[part]);
 }
 
-void vgi_planar_turn(size_t n, const vgi_row *z, const vgi_row *r, const vgi_lanes *beta, vgi_row *p, vgi_row *s,
-                     vgi_lanes *ps)
+static void scale(size_t n, const vgi_lanes factor, const vgi_row *a, vgi_row *to)
 {
-    CHOOSE(turn, n, z, r, beta, p, s, ps);
-    turn(n, z, r, beta, p, s, ps);
+    vgi_wide f[VGI_PARTS];
+    load_lanes(factor, f);
+    for (size_t i = 0; i < n; i++)
+#pragma GCC unroll 12
+        for (size_t k = 0; k < PIECES; k++) put(&to[i], k, f[k % VGI_PARTS] * piece(&a[i], k));
 }
 
-void vgi_planar_advance(size_t n, const vgi_lanes *alpha, const vgi_lanes *gamma, const vgi_row *p, const vgi_row *s,
-                        vgi_row *y, vgi_row *x, vgi_row *r, vgi_row *z)
-{
-    CHOOSE(advance, n, alpha, gamma, p, s, y, x, r, z);
-    advance(n, alpha, gamma, p, s, y, x, r, z);
-}
-
-void vgi_planar_dot(size_t n, const vgi_row *a, const vgi_row *b, vgi_lanes *ab)
-{
-    CHOOSE(dot, n, a, b, ab);
-    dot_all(n, a, b, ab);
-}
+const vgi_planar_kernel VGI_OF_SET(vgi_planar_kernel) = {product, turn, advance, dot, largest, scale};

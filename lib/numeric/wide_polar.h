@@ -1,0 +1,56 @@
+/* wide_polar.h: the rotation nearest to a 3 x 3 matrix in every lane. Included by *_kernel.c alone.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_WIDE_POLAR_H
+#define VG_WIDE_POLAR_H
+
+#include "core/wide.h"
+#include "numeric/polar.h"
+
+/* One step of Newton's, scaled to balance the norms of x and x^-T; the squared change. */
+VGI_INLINE vgi_wide vgi_polar_step(vgi_wide *x, bool scaled)
+{
+    vgi_wide c[9], det = vgi_wide_cofactors(x, c), a, b, change = {0}; /* c: det x^-T */
+    if (scaled) {
+        vgi_wide g = vgi_roots(vgi_roots(vgi_wide_squares(c) / vgi_wide_squares(x)) / det);
+        a = 0.5 * g, b = 0.5 / (g * det);
+    } else {
+        a = vgi_same(0.5), b = 0.5 / det;
+    }
+#pragma GCC unroll 9
+    for (int i = 0; i < 9; i++) {
+        vgi_wide y = a * x[i] + b * c[i], d = y - x[i];
+        change += d * d;
+        x[i] = y;
+    }
+    return change;
+}
+
+/* vgi_wide_polar: x := the rotation nearest to m, row-major: Newton's iteration (Higham 1986) where m is far enough from
+ * a flat one, vgi_fit_rotation in the other lanes. It ends when the squared change of every lane is below `enough`:
+ * convergence is quadratic, so that what is left is below it too. */
+VGI_INLINE void vgi_wide_polar(const vgi_wide *m, vgi_wide *x, double enough)
+{
+    enum { SCALED = 4, MOST = 16 };
+    static const double thin = 1e-3; /* determinant of a matrix of norm 1 below which Newton is not asked */
+    vgi_wide size2 = vgi_wide_squares(m), c[9];
+    vgi_wide shrink = vgi_roots(3.0 / size2);
+#pragma GCC unroll 9
+    for (int i = 0; i < 9; i++) x[i] = m[i] * shrink;
+    vgi_mask good = vgi_wide_cofactors(x, c) > vgi_same(5.2 * thin); /* false for NaN */
+    unsigned bad = vgi_bits(~good);
+    if (bad)
+        for (int i = 0; i < 9; i++) x[i] = vgi_either(good, x[i], vgi_same(i % 4 == 0)); /* they wait */
+    for (int step = 0; step < MOST; step++) {
+        vgi_wide change = vgi_polar_step(x, step < SCALED);
+        if (!vgi_bits(change >= vgi_same(enough))) break;
+    }
+    for (int k = 0; bad >> k; k++) {
+        if (!(bad >> k & 1)) continue;
+        double one[9], r[9];
+        for (int i = 0; i < 9; i++) one[i] = m[i][k];
+        vgi_fit_rotation(one, r);
+        for (int i = 0; i < 9; i++) x[i][k] = r[i];
+    }
+}
+
+#endif
