@@ -7,14 +7,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-struct rigging_options rigging = {.bones_per_corner = 2, .refine = 0.003};
+enum { METHOD_NOT_GIVEN = 2 };
+
+struct rigging_options rigging = {.method = METHOD_NOT_GIVEN, .bones_per_corner = 2, .refine = 0.003};
 
 enum { BATCH = 32, SAMPLE = 32 };
 static const size_t in_memory = (size_t)256 << 20; /* bytes of poses that wait for the next pass */
 
 bool rigging_wanted(void)
 {
-    return rigging.skeleton || rigging.groups;
+    return rigging.skeleton || rigging.groups || rigging.bones;
 }
 
 static bool by_skinning(void)
@@ -54,7 +56,8 @@ typedef struct work {
     double *sample[2 * SAMPLE];
     motion given;
     vg_joint_groups groups;
-    vg_bender *bender;   /* NULL: motions are known */
+    vg_inverse_skin *inverse; /* NULL: motions are known, or bones are free */
+    vg_free_bones *free;      /* NULL: bones have a skeleton */
     double **transforms; /* of each pose */
     vg_map skinning;     /* linear blend skinning as a map, beside the envelope */
     errors errors[2][2]; /* envelope, skinning; fitted, left out */
@@ -261,7 +264,7 @@ static void place_skeleton(work *w)
     if (known) return;
     double miss, d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
     if (vg_rig_learn(w->h, w->nsample, (const double *const *)w->sample, cli.threads, &miss, &e) < 0 ||
-        vg_bender_new(&w->bender, &w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, cli.threads, &e) < 0)
+        vg_inverse_skin_new(&w->inverse, &w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, cli.threads, &e) < 0)
         cli_die(&e);
     cli_note("the motion of the bones is learned from %zu poses: what skinning leaves is %.3g D", w->nsample,
              d > 0 ? miss / d : 0);
@@ -286,6 +289,21 @@ static void read_groups(work *w)
     free(text);
 }
 
+/* Bones without a skeleton. */
+static void find_bones(work *w)
+{
+    vg_err e;
+    double miss, d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
+    size_t nv = w->h->body.mesh.nv, wanted = (size_t)rigging.bones;
+    if (vg_rig_decompose(&w->h->body.rig, nv, w->h->body.reference, wanted, w->nsample,
+                         (const double *const *)w->sample, cli.threads, &miss, &e) < 0 ||
+        vg_free_bones_new(&w->free, &w->h->body.rig, nv, w->h->body.reference, cli.threads, &e) < 0)
+        cli_die(&e);
+    if (w->h->body.rig.nbones < wanted)
+        cli_note("%zu bones are all that the poses tell apart, %zu were asked for", w->h->body.rig.nbones, wanted);
+    cli_note("the bones are found in %zu poses: what skinning leaves is %.3g D", w->nsample, d > 0 ? miss / d : 0);
+}
+
 /* ---- the fit ---- */
 
 static vg_rig_fitter *fitter;
@@ -296,8 +314,12 @@ static void measure_transforms(work *w, uint64_t first, size_t n, const vg_frame
     size_t joints = r->skeleton.njoints;
     const double *poses[BATCH];
     for (size_t i = 0; i < n; i++) poses[i] = frames[i].values;
-    if (w->bender) {
-        vg_bender_fit(w->bender, n, poses, w->transforms + first);
+    if (w->inverse) {
+        vg_inverse_skin_fit(w->inverse, n, poses, w->transforms + first);
+        return;
+    }
+    if (w->free) {
+        vg_free_bones_fit(w->free, n, poses, w->transforms + first);
         return;
     }
     double *positions = NULL, *turns = NULL;
@@ -425,6 +447,7 @@ static void fit(work *w, double hold)
 void rigging_run(vg_source *s, double hold, long holdout)
 {
     static work w; /* lives until the end: what it holds goes with the process */
+    if (rigging.method == METHOD_NOT_GIVEN) rigging.method = rigging.bones ? VG_RIG_LBS : VG_RIG_ENVELOPE;
     w.h = vg_source_head(s), w.holdout = holdout;
     if (w.h->body.skeleton.njoints) cli_stop(VG_EINPUT, "the input is a skeleton: vg-fitmap takes poses of a mesh");
     if (!w.h->body.mesh.nf) cli_stop(VG_EINPUT, "the input has no faces");
@@ -434,6 +457,7 @@ void rigging_run(vg_source *s, double hold, long holdout)
     read_poses(&w, s);
     if (!w.nsample) cli_stop(VG_EINPUT, "all poses are left out of the fit: raise --holdout");
     if (rigging.groups) read_groups(&w);
+    else if (rigging.bones) find_bones(&w);
     else place_skeleton(&w);
     fit(&w, hold);
     report(&w);

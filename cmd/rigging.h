@@ -1,4 +1,4 @@
-/* rigging.h: --skeleton and --groups of vg-fitmap: a map of bones from poses and a skeleton.
+/* rigging.h: --skeleton, --groups and --bones of vg-fitmap: a map of bones from poses.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_RIGGING_H
 #define VG_RIGGING_H
@@ -10,11 +10,12 @@ extern struct rigging_options {
     double root_at[3];
     bool has_root, learn;
     size_t method; /* a vg_rig_method */
+    long bones;    /* without a skeleton; 0: not given */
     long bones_per_corner;
     double refine;
 } rigging;
 
-/* rigging_wanted: is --skeleton or --groups there? */
+/* rigging_wanted: is --skeleton, --groups or --bones there? */
 bool rigging_wanted(void);
 /* rigging_take_root: "X,Y,Z" into rigging.root_at; to be given to cli_option. */
 void rigging_take_root(const char *text, void *context);

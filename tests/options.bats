@@ -34,7 +34,7 @@ setup() {
     done
     refused 'vg-solve --planar-weights 1,1 vectors.vgs -o out' '--planar-weights needs --planar'
     for option in '--method lbs' '--bones-per-corner 1' '--refine 1'; do
-        refused "vg-fitmap $option --patches patches.vgs walk.vgs -o out" "${option%% *} needs --skeleton or --groups"
+        refused "vg-fitmap $option --patches patches.vgs walk.vgs -o out" "${option%% *} needs --skeleton, --groups or --bones"
     done
     refused 'vg-fitmap --learn --groups g walk.vgs -o out' '--learn needs --skeleton'
     refused 'vg-fitmap --root-at 0,0,0 --groups g walk.vgs -o out' '--root-at needs --skeleton'

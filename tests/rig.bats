@@ -165,6 +165,29 @@ END
     must vg-diff -t 1e-6 other/ driven.vgs
 }
 
+@test "--bones: free bones are found in the poses: the toy to 1e-6 D, poses left out too, and as a skin of glTF" {
+    chain fit --rest --frames 12 --seed 1
+    vg-encode fit/ -o fit.vgs
+    vg-fitmap --bones 4 --holdout 4 fit.vgs -o free.rig 2>report
+    grep -Eq '^vg-fitmap: skinning, left out +3 poses' report
+    vg-play free.rig fit.vgs -o back.vgs
+    vg-diff --tolerance 1e-6 fit.vgs back.vgs >/dev/null
+    vg-play --transforms free.rig fit.vgs | vg-decode -o free.glb
+    vg-encode free.glb -o skin.vgs
+    vg-diff --tolerance 1e-5 fit.vgs skin.vgs >/dev/null
+    vg-info free.rig | grep -q 'rig  4 joints, 4 of them turn'
+    vg-fitmap -v --bones 20 fit.vgs -o many.rig 2>many
+    must_fail 2 vg-fitmap --bones 3 --skeleton fit.bvh fit.vgs -o no.rig
+    must_fail 2 vg-fitmap --bones 0 fit.vgs -o no.rig
+}
+
+@test "--bones: 40 bones on a man in 15 poses: what is left is below what Dem Bones leaves, 0.57e-3 D fitted and 1.49e-3 left out" {
+    vg-fitmap --bones 40 --holdout 3 "$DATA/human-man-poses.tar.xz" -o man40.rig 2>report
+    read -r fitted left largest < <(awk '/skinning, fitted/ {f = $(NF-2)} /skinning, left out/ {l = $(NF-2); m = $NF}
+        END {print f, l, m}' report)
+    awk -v f="$fitted" -v l="$left" -v m="$largest" 'BEGIN {exit !(f < 0.5 && l < 1.4 && m < 25)}'
+}
+
 @test "joints that are means of vertices find themselves: the toy to 1e-7 D" {
     made
     export BOTTOM=0 # the middle of the lower four vertices of a box is the joint

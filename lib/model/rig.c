@@ -48,6 +48,13 @@ int vgi_rig_parents(const vg_rig *r, uint32_t *parent, vg_err *e)
     return VG_OK;
 }
 
+bool vgi_rig_is_free(const vg_rig *r)
+{
+    for (size_t b = 0; b < r->nbones; b++)
+        if (r->skeleton.joints[r->bone[b]].parent != UINT32_MAX) return false;
+    return r->nbones > 1;
+}
+
 void vg_rig_transforms(const vg_rig *r, const double *positions, const double *turns, double *transforms)
 {
     for (size_t b = 0; b < r->nbones; b++) {

@@ -24,21 +24,38 @@ void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, 
 
 /* Enveloping (MATH 6; T 5): a skeleton drives the mesh, learned from example poses.
  *
- * vg_bender: the other way round: the motions of the bones in a pose of vertices, joints staying together, so that
+ * vg_inverse_skin: the other way round: the motions of the bones in a pose of vertices, joints staying together, so that
  * linear blend skinning comes as near to the vertices as it can (damped Gauss-Newton over all bones at once). Bones
  * that no vertex tells about go with their parents. */
-typedef struct vg_bender vg_bender;
-/* vg_bender_new: r has weights (else VG_EINPUT); it and reference (nv points) are not kept. */
-int vg_bender_new(vg_bender **b, const vg_rig *r, size_t nv, const double *reference, int threads,
+typedef struct vg_inverse_skin vg_inverse_skin;
+/* vg_inverse_skin_new: r has weights (else VG_EINPUT); it and reference (nv points) are not kept. */
+int vg_inverse_skin_new(vg_inverse_skin **b, const vg_rig *r, size_t nv, const double *reference, int threads,
                   vg_err *e) VG_MUST_CHECK;
-void vg_bender_free(vg_bender **b);
-/* vg_bender_fit: n poses (nv points each) to n times nbones transforms of 7 numbers. */
-void vg_bender_fit(vg_bender *b, size_t n, const double *const *poses, double *const *transforms);
+void vg_inverse_skin_free(vg_inverse_skin **b);
+/* vg_inverse_skin_fit: n poses (nv points each) to n times nbones transforms of 7 numbers. */
+void vg_inverse_skin_fit(vg_inverse_skin *b, size_t n, const double *const *poses, double *const *transforms);
 
 /* vg_rig_learn: give h's rig weights when the motions of its bones are not known: weights and motions are fitted in
  * turn to n poses. miss: the mean distance that linear blend skinning leaves, in mesh units. */
 int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, double *miss,
                  vg_err *e) VG_MUST_CHECK;
+/* Bones without a skeleton (skinning decomposition; Le and Deng 2012).
+ *
+ * vg_rig_decompose: a rig of at most `bones` free bones, fewer where the poses do not tell more apart, with weights, from
+ * n poses (nv points each) of the reference (nv points). The joint of each bone is a root with six channels, named
+ * bone001 and so on, in the middle of the vertices it began with. miss: the mean distance that skinning leaves, in mesh
+ * units. VG_EARG when bones is 0 or more than nv. */
+int vg_rig_decompose(vg_rig *rig, size_t nv, const double *reference, size_t bones, size_t n,
+                     const double *const *poses, int threads, double *miss, vg_err *e) VG_MUST_CHECK;
+
+/* vg_free_bones: the motions of the bones of such a rig in other poses, as vg_inverse_skin finds those of bones that hang
+ * together. */
+typedef struct vg_free_bones vg_free_bones;
+int vg_free_bones_new(vg_free_bones **b, const vg_rig *r, size_t nv, const double *reference, int threads,
+                      vg_err *e) VG_MUST_CHECK;
+void vg_free_bones_free(vg_free_bones **b);
+void vg_free_bones_fit(vg_free_bones *b, size_t n, const double *const *poses, double *const *transforms);
+
 /* vg_rig_locate: a skeleton whose root is not known to the mesh (in BVH it has no place of its own): shift is what
  * has to be added to the positions of its reference pose. n poses of the mesh with the positions and turns of all
  * joints in the same poses. spread: how far the vertices disagree about it (median), in mesh units. */

@@ -189,14 +189,14 @@ static void motions_are_found_again(void)
 {
     stage x;
     vg_err e;
-    vg_bender *b;
+    vg_inverse_skin *b;
     set_stage(&x, make_limb(), 60);
     paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.2);
     skin_poses(&x);
     double *found[POSES];
     for (size_t k = 0; k < POSES; k++) found[k] = room(7 * BONES, sizeof(double));
-    CHECK(vg_bender_new(&b, &x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 2, &e) == VG_OK);
-    vg_bender_fit(b, POSES, (const double *const *)x.poses, found);
+    CHECK(vg_inverse_skin_new(&b, &x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 2, &e) == VG_OK);
+    vg_inverse_skin_fit(b, POSES, (const double *const *)x.poses, found);
     for (size_t k = 0; k < POSES; k++)
         for (size_t j = 0; j < BONES; j++) {
             double *p = found[k] + 7 * j, *q = x.transforms[k] + 7 * j, dot = 0;
@@ -204,7 +204,7 @@ static void motions_are_found_again(void)
             CHECK_NEAR(fabs(dot), 1, 1e-13);
             for (int i = 4; i < 7; i++) CHECK_NEAR(p[i], q[i], 1e-6);
         }
-    vg_bender_free(&b);
+    vg_inverse_skin_free(&b);
     for (size_t k = 0; k < POSES; k++) free(found[k]);
     strike(&x);
 }
@@ -215,19 +215,19 @@ static void far_motions_are_found_again(void)
     for (int trial = 0; trial < 5; trial++) {
         stage x;
         vg_err e;
-        vg_bender *b;
+        vg_inverse_skin *b;
         set_stage(&x, make_limb(), 150);
         paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.1);
         skin_poses(&x);
         double *found[POSES], *again = room(3 * x.h.body.mesh.nv, sizeof *again);
         for (size_t k = 0; k < POSES; k++) found[k] = room(7 * BONES, sizeof(double));
-        CHECK(vg_bender_new(&b, &x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 2, &e) == VG_OK);
-        vg_bender_fit(b, POSES, (const double *const *)x.poses, found);
+        CHECK(vg_inverse_skin_new(&b, &x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 2, &e) == VG_OK);
+        vg_inverse_skin_fit(b, POSES, (const double *const *)x.poses, found);
         for (size_t k = 0; k < POSES; k++) {
             vg_rig_skin(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, found[k], again);
             CHECK_NEAR(farthest(again, x.poses[k], x.h.body.mesh.nv), 0, 1e-5);
         }
-        vg_bender_free(&b);
+        vg_inverse_skin_free(&b);
         for (size_t k = 0; k < POSES; k++) free(found[k]);
         free(again);
         strike(&x);
@@ -240,7 +240,7 @@ static void a_bone_without_vertices_goes_with_its_parent(void)
     enum { BARE = BONES - 1 };
     stage x;
     vg_err e;
-    vg_bender *b;
+    vg_inverse_skin *b;
     double found[7 * BONES], *founds[1] = {found};
     set_stage(&x, make_limb(), 60);
     size_t nv = x.h.body.mesh.nv;
@@ -248,14 +248,14 @@ static void a_bone_without_vertices_goes_with_its_parent(void)
     for (size_t v = 0; v < nv; v++)
         if (x.h.body.rig.skin_bone[VG_SKIN * v] == BARE) x.h.body.rig.skin_bone[VG_SKIN * v] = BARE - 1;
     skin_poses(&x);
-    CHECK(vg_bender_new(&b, &x.h.body.rig, nv, x.h.body.reference, 1, &e) == VG_OK);
+    CHECK(vg_inverse_skin_new(&b, &x.h.body.rig, nv, x.h.body.reference, 1, &e) == VG_OK);
     for (size_t k = 0; k < POSES; k++) {
-        vg_bender_fit(b, 1, (const double *const *)x.poses + k, founds);
+        vg_inverse_skin_fit(b, 1, (const double *const *)x.poses + k, founds);
         const double *p = found + 7 * BARE, *up = found + 7 * (BARE - 1), *truth = x.transforms[k] + 7 * (BARE - 1);
         CHECK_NEAR(fabs(p[0] * up[0] + p[1] * up[1] + p[2] * up[2] + p[3] * up[3]), 1, 1e-13);
         CHECK_NEAR(fabs(truth[0] * up[0] + truth[1] * up[1] + truth[2] * up[2] + truth[3] * up[3]), 1, 1e-13);
     }
-    vg_bender_free(&b);
+    vg_inverse_skin_free(&b);
     strike(&x);
 }
 
@@ -283,7 +283,7 @@ static void units_do_not_matter(void)
     for (int i = 0; i < 3; i++) {
         stage x;
         vg_err e;
-        vg_bender *b;
+        vg_inverse_skin *b;
         double unit = ldexp(1, i == 0 ? 0 : i == 1 ? -66 : 66), *found[1] = {turned[i]}; /* 1, 1e-20, 1e20 */
         meshes_state = 9;
         set_stage(&x, make_limb(), 60);
@@ -292,9 +292,9 @@ static void units_do_not_matter(void)
         for (size_t k = 0; k < POSES; k++)
             for (size_t v = 0; v < 3 * x.h.body.mesh.nv; v++) x.poses[k][v] += 0.05 * sin(x.poses[k][v] * 3);
         change_units(&x, unit);
-        CHECK(vg_bender_new(&b, &x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 1, &e) == VG_OK);
-        vg_bender_fit(b, 1, (const double *const *)x.poses, found);
-        vg_bender_free(&b);
+        CHECK(vg_inverse_skin_new(&b, &x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 1, &e) == VG_OK);
+        vg_inverse_skin_fit(b, 1, (const double *const *)x.poses, found);
+        vg_inverse_skin_free(&b);
         CHECK(vg_rig_locate(&x.s, x.h.body.mesh.nv, x.h.body.reference, POSES, (const double *const *)x.poses,
                             (const double *const *)x.positions, (const double *const *)x.turns, 1, shift[i], &spread,
                             &e) == VG_OK);
@@ -325,6 +325,85 @@ static void a_rig_is_learned_from_poses_alone(void)
     skin_poses(&x);
     CHECK(vg_rig_learn(&x.h, POSES, (const double *const *)x.poses, 2, &miss, &e) == VG_OK);
     CHECK_NEAR(miss, 0, 1e-3 * vg_diagonal(x.h.body.reference, x.h.body.mesh.nv));
+    strike(&x);
+}
+
+/* ---- bones without a skeleton ---- */
+
+/* What a rig of free bones leaves of the poses, its motions found by themselves: the farthest. */
+static double free_misses(const stage *x, const vg_rig *r, int threads)
+{
+    vg_err e;
+    vg_free_bones *b;
+    size_t nv = x->h.body.mesh.nv;
+    double *out = room(3 * nv, sizeof *out), *found[POSES], most = 0;
+    for (size_t k = 0; k < POSES; k++) found[k] = room(7 * r->nbones, sizeof(double));
+    CHECK(vg_free_bones_new(&b, r, nv, x->h.body.reference, threads, &e) == VG_OK);
+    vg_free_bones_fit(b, POSES, (const double *const *)x->poses, found);
+    for (size_t k = 0; k < POSES; k++) {
+        vg_rig_skin(r, nv, x->h.body.reference, found[k], out);
+        most = fmax(most, farthest(out, x->poses[k], nv));
+        free(found[k]);
+    }
+    vg_free_bones_free(&b);
+    free(out);
+    return most;
+}
+
+/* Four bodies that move rigidly are four bones, however many are asked for, and are met. */
+static void rigid_bodies_are_bones(void)
+{
+    for (size_t wanted = BONES; wanted <= 7; wanted += 3) {
+        stage x;
+        vg_err e;
+        vg_rig r;
+        double miss;
+        set_stage(&x, make_beads(), 50);
+        paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0);
+        skin_poses(&x);
+        double d = vg_diagonal(x.h.body.reference, x.h.body.mesh.nv);
+        CHECK(vg_rig_decompose(&r, x.h.body.mesh.nv, x.h.body.reference, wanted, POSES,
+                               (const double *const *)x.poses, 2, &miss, &e) == VG_OK);
+        CHECK(r.nbones >= BONES && r.nbones <= wanted);
+        CHECK(wanted > BONES || r.nbones == BONES);
+        CHECK_NEAR(miss, 0, 1e-7 * d); /* the square root of rounding in sums of squares */
+        CHECK_NEAR(free_misses(&x, &r, 2), 0, 1e-9 * d);
+        CHECK_TEXT(r.skeleton.joints[0].name, "bone001");
+        vg_rig_clear(&r);
+        strike(&x);
+    }
+}
+
+/* A limb that was skinned by four bones needs no more than that many; one bone is the best rigid motion of all. */
+static void a_skinned_limb_is_decomposed(void)
+{
+    stage x;
+    vg_err e;
+    vg_rig r, one;
+    double miss, rigid, *first = NULL;
+    set_stage(&x, make_limb(), 40);
+    paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.2);
+    skin_poses(&x);
+    size_t nv = x.h.body.mesh.nv;
+    double d = vg_diagonal(x.h.body.reference, nv);
+    for (int threads = 1; threads <= 3; threads++) {
+        CHECK(vg_rig_decompose(&r, nv, x.h.body.reference, BONES, POSES, (const double *const *)x.poses, threads,
+                               &miss, &e) == VG_OK);
+        CHECK_NEAR(miss, 0, 2e-3 * d);
+        if (!first) first = room(VG_SKIN * nv, sizeof *first), memcpy(first, r.skin_weight, VG_SKIN * nv * sizeof *first);
+        CHECK(!memcmp(first, r.skin_weight, VG_SKIN * nv * sizeof *first));
+        vg_rig_clear(&r);
+    }
+    CHECK(vg_rig_decompose(&one, nv, x.h.body.reference, 1, POSES, (const double *const *)x.poses, 1, &rigid, &e) ==
+          VG_OK);
+    CHECK(one.nbones == 1 && rigid > 10 * miss);
+    CHECK(vg_rig_decompose(&r, nv, x.h.body.reference, 0, POSES, (const double *const *)x.poses, 1, &miss, &e) ==
+          VG_EARG);
+    CHECK(vg_rig_decompose(&r, nv, x.h.body.reference, nv + 1, POSES, (const double *const *)x.poses, 1, &miss, &e) ==
+          VG_EARG);
+    CHECK(vg_rig_decompose(&r, nv, x.h.body.reference, 1, 0, NULL, 1, &miss, &e) == VG_EINPUT && !r.nbones);
+    vg_rig_clear(&one);
+    free(first);
     strike(&x);
 }
 
@@ -804,6 +883,8 @@ TESTS({"rigid bodies are met", rigid_bodies_are_met}, {"weights are found again"
       {"a bone without vertices goes with its parent", a_bone_without_vertices_goes_with_its_parent},
       {"units do not matter", units_do_not_matter},
       {"a rig is learned from poses alone", a_rig_is_learned_from_poses_alone},
+      {"rigid bodies are bones", rigid_bodies_are_bones},
+      {"a skinned limb is decomposed", a_skinned_limb_is_decomposed},
       {"the map is its chain", the_map_is_its_chain}, {"near bones", near_bones},
       {"every component is held", every_component_is_held}, {"two bones come nearer", two_bones_come_nearer},
       {"refinement brings nearer", refinement_brings_nearer},

@@ -12,18 +12,18 @@
 #include "numeric/lapack.h"
 #include "numeric/blas.h"
 #include "numeric/polar.h"
-#include "numeric/stats.h"
+#include "method/rig/learn.h"
 #include "method/rig/skin.h"
 #include "model/rig.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-enum { BLOCK = 8, SHARES = 8, SWEEPS = 8, STEPS = 30, ROUNDS = 30, FIRST_STEPS = 8 };
+enum { BLOCK = 8, SHARES = 8, SWEEPS = 8, STEPS = 30, FIRST_STEPS = 8 };
 static const double FIRST_PRIOR = 1e-3,
                     LAST_PRIOR = 1e-10; /* pull of a bone towards its parent, beside that of the vertices */
 
-struct vg_bender {
+struct vg_inverse_skin {
     size_t nv, n; /* vertices, bones */
     int threads;
     double least;     /* turns smaller than this, in radians, are none */
@@ -43,28 +43,28 @@ struct vg_bender {
 };
 
 /* Working space of one pose. */
-typedef struct bending {
+typedef struct working {
     double *r, *trial, *b; /* 9 n each: rotations, those that are tried, B */
     double *left;          /* 9 n: B - R G, where the objective was asked for last */
     double *rows;          /* 18 n: R, and R G, as 3 x 3 n */
     double *sum, *step;    /* 3 n each */
     double *h;             /* (3 n)^2 */
-} bending;
+} working;
 
 static size_t space_of(size_t n)
 {
     return 4 * 9 * n + 18 * n + 6 * n + 9 * n * n;
 }
 
-static bending bending_at(const vg_bender *x, size_t i)
+static working working_at(const vg_inverse_skin *x, size_t i)
 {
     double *p = x->space + i * space_of(x->n);
     size_t n = x->n;
-    return (bending){p, p + 9 * n, p + 18 * n, p + 27 * n, p + 36 * n, p + 54 * n, p + 57 * n, p + 60 * n};
+    return (working){p, p + 9 * n, p + 18 * n, p + 27 * n, p + 36 * n, p + 54 * n, p + 57 * n, p + 60 * n};
 }
 
 /* The q of vertex v, for the bones listed in `list`: 3 numbers each in q. */
-static size_t vertex_row(const vg_bender *x, size_t v, uint32_t *list, double *q, bool *seen)
+static size_t vertex_row(const vg_inverse_skin *x, size_t v, uint32_t *list, double *q, bool *seen)
 {
     size_t count = 0;
     for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++) {
@@ -86,7 +86,7 @@ static size_t vertex_row(const vg_bender *x, size_t v, uint32_t *list, double *q
 
 /* The sums over one share of the vertices; shares are fixed, so that the threads do not change the result. */
 typedef struct summing {
-    const vg_bender *x;
+    const vg_inverse_skin *x;
     uint32_t *list; /* n for each share, as all else */
     bool *seen;
     double *q, *mean, *g; /* 3 n, 3 n, 3 n x 3 n: blocks with row >= column */
@@ -95,7 +95,7 @@ typedef struct summing {
 static void sum_share(void *context, size_t share)
 {
     const summing *s = context;
-    const vg_bender *x = s->x;
+    const vg_inverse_skin *x = s->x;
     size_t n = x->n, width = 3 * n, last = (share + 1) * x->nv / SHARES;
     uint32_t *list = s->list + share * n;
     double *q = s->q + share * width, *mean = s->mean + share * width, *g = s->g + share * width * width;
@@ -115,7 +115,7 @@ static void sum_share(void *context, size_t share)
     }
 }
 
-static void finish_quadratic(vg_bender *x, const summing *s)
+static void finish_quadratic(vg_inverse_skin *x, const summing *s)
 {
     size_t n = x->n, width = 3 * n;
     double count = (double)x->nv, largest = 0;
@@ -135,7 +135,7 @@ static void finish_quadratic(vg_bender *x, const summing *s)
         if (!(x->size[j] > 1e-6 * largest)) x->size[j] = largest > 0 ? 1e-6 * largest : 1;
 }
 
-static int make_quadratic(vg_bender *x, vg_err *e)
+static int make_quadratic(vg_inverse_skin *x, vg_err *e)
 {
     size_t n = x->n, width = 3 * n;
     summing s = {.x = x};
@@ -155,7 +155,7 @@ static int make_quadratic(vg_bender *x, vg_err *e)
     return ok ? VG_OK : VG_ENOMEM;
 }
 
-static int make_arrays(vg_bender *x, const vg_rig *r, vg_err *e)
+static int make_arrays(vg_inverse_skin *x, const vg_rig *r, vg_err *e)
 {
     size_t n = x->n, nv = x->nv;
     x->parent = vgi_array(n, sizeof *x->parent, e);
@@ -173,7 +173,7 @@ static int make_arrays(vg_bender *x, const vg_rig *r, vg_err *e)
 }
 
 /* The rest of the bones and of the vertices, seen from them. */
-static void read_rest(vg_bender *x, const vg_rig *r, const double *reference)
+static void read_rest(vg_inverse_skin *x, const vg_rig *r, const double *reference)
 {
     for (size_t b = 0; b < x->n; b++)
         for (size_t k = 0; k < 3; k++) {
@@ -194,11 +194,11 @@ static void read_rest(vg_bender *x, const vg_rig *r, const double *reference)
     }
 }
 
-int vg_bender_new(vg_bender **out, const vg_rig *r, size_t nv, const double *reference, int threads, vg_err *e)
+int vg_inverse_skin_new(vg_inverse_skin **out, const vg_rig *r, size_t nv, const double *reference, int threads, vg_err *e)
 {
     *out = NULL;
     if (!r->nbones || !r->skin_bone) return vg_fail(e, VG_EINPUT, "there is no rig with weights");
-    vg_bender *x = *out = vgi_array(1, sizeof *x, e);
+    vg_inverse_skin *x = *out = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
     x->n = r->nbones, x->nv = nv, x->threads = threads, x->least = 1e-7, x->steps = STEPS;
     int code = make_arrays(x, r, e);
@@ -207,13 +207,13 @@ int vg_bender_new(vg_bender **out, const vg_rig *r, size_t nv, const double *ref
         read_rest(x, r, reference);
         code = make_quadratic(x, e);
     }
-    if (code < 0) vg_bender_free(out);
+    if (code < 0) vg_inverse_skin_free(out);
     return code;
 }
 
-void vg_bender_free(vg_bender **out)
+void vg_inverse_skin_free(vg_inverse_skin **out)
 {
-    vg_bender *x = *out;
+    vg_inverse_skin *x = *out;
     if (!x) return;
     free(x->parent);
     free(x->at);
@@ -233,7 +233,7 @@ void vg_bender_free(vg_bender **out)
 
 /* B of a pose whose centroid is taken for the origin: 3 x 3 for each bone, first what its own vertices say,
  * then what it carries. */
-static void load(const vg_bender *x, const double *pose, const double centre[3], bending *w)
+static void load(const vg_inverse_skin *x, const double *pose, const double centre[3], working *w)
 {
     size_t n = x->n;
     memset(w->b, 0, 9 * n * sizeof *w->b);
@@ -250,7 +250,7 @@ static void load(const vg_bender *x, const double *pose, const double centre[3],
     }
 }
 
-static void carry(const vg_bender *x, bending *w)
+static void carry(const vg_inverse_skin *x, working *w)
 {
     for (size_t j = x->n; j-- > 1;) {
         size_t up = x->parent[j];
@@ -262,7 +262,7 @@ static void carry(const vg_bender *x, bending *w)
 }
 
 /* m = B_j - sum over i of R_i G_ij, the bone itself left out */
-static void left_for(const vg_bender *x, const bending *w, size_t j, double m[9])
+static void left_for(const vg_inverse_skin *x, const working *w, size_t j, double m[9])
 {
     size_t width = 3 * x->n;
     memcpy(m, w->b + 9 * j, 9 * sizeof *m);
@@ -277,7 +277,7 @@ static void left_for(const vg_bender *x, const bending *w, size_t j, double m[9]
 }
 
 /* left = B - R G of all bones, with one product. */
-static void find_left(const vg_bender *x, bending *w, const double *r)
+static void find_left(const vg_inverse_skin *x, working *w, const double *r)
 {
     size_t width = 3 * x->n;
     double *rg = w->rows + 3 * width;
@@ -291,7 +291,7 @@ static void find_left(const vg_bender *x, bending *w, const double *r)
 }
 
 /* Leaves B - R G in w->left. */
-static double objective(const vg_bender *x, bending *w, const double *r, double prior)
+static double objective(const vg_inverse_skin *x, working *w, const double *r, double prior)
 {
     double f = 0;
     find_left(x, w, r);
@@ -306,7 +306,7 @@ static double objective(const vg_bender *x, bending *w, const double *r, double 
 }
 
 /* m += prior * (what the parent and the children are) */
-static void add_prior(const vg_bender *x, const double *r, size_t j, double prior, double m[9])
+static void add_prior(const vg_inverse_skin *x, const double *r, size_t j, double prior, double m[9])
 {
     for (size_t i = 0; i < 9; i++) {
         if (j) m[i] += prior * x->size[j] * r[9 * (size_t)x->parent[j] + i];
@@ -316,7 +316,7 @@ static void add_prior(const vg_bender *x, const double *r, size_t j, double prio
 }
 
 /* The same for all bones: left += prior * (what parents and children are). */
-static void add_priors(const vg_bender *x, const double *r, double prior, double *left)
+static void add_priors(const vg_inverse_skin *x, const double *r, double prior, double *left)
 {
     for (size_t j = 1; j < x->n; j++) {
         size_t up = 9 * (size_t)x->parent[j];
@@ -327,7 +327,7 @@ static void add_priors(const vg_bender *x, const double *r, double prior, double
     }
 }
 
-static void sweep(const vg_bender *x, bending *w, double prior)
+static void sweep(const vg_inverse_skin *x, working *w, double prior)
 {
     for (size_t j = 0; j < x->n; j++) {
         double m[9];
@@ -345,7 +345,7 @@ static void multiply_back(const double a[9], const double b[9], double ab[9]) /*
 }
 
 /* Rows of bone i of the Gauss-Newton matrix, up to the diagonal. */
-static void make_rows(const vg_bender *x, bending *w, size_t i)
+static void make_rows(const vg_inverse_skin *x, working *w, size_t i)
 {
     size_t width = 3 * x->n;
     double *h = w->h + 3 * i * width;
@@ -364,7 +364,7 @@ static void make_rows(const vg_bender *x, bending *w, size_t i)
 
 /* The Gauss-Newton system in small turns of all bones: the lower triangle of h, and the right-hand side, from B - R G at
  * r. */
-static void make_system(const vg_bender *x, bending *w, double prior, double damping)
+static void make_system(const vg_inverse_skin *x, working *w, double prior, double damping)
 {
     size_t n = x->n, width = 3 * n;
     add_priors(x, w->r, prior, w->left);
@@ -387,7 +387,7 @@ static void make_system(const vg_bender *x, bending *w, double prior, double dam
 }
 
 /* trial = exp(step) r; the largest turn */
-static double turn_bones(const vg_bender *x, bending *w)
+static double turn_bones(const vg_inverse_skin *x, working *w)
 {
     double most = 0;
     for (size_t j = 0; j < x->n; j++) {
@@ -401,7 +401,7 @@ static double turn_bones(const vg_bender *x, bending *w)
     return most;
 }
 
-static void descend(const vg_bender *x, bending *w, double prior)
+static void descend(const vg_inverse_skin *x, working *w, double prior)
 {
     static const double noise = 1e-16; /* of the objective */
     double damping = 1e-6, f = objective(x, w, w->r, prior), turn = 1;
@@ -434,7 +434,7 @@ static void descend(const vg_bender *x, bending *w, double prior)
 }
 
 typedef struct fitting {
-    const vg_bender *x;
+    const vg_inverse_skin *x;
     const double *const *poses;
     double *const *transforms;
     double *rotations; /* NULL, or 9 n for each pose: where to begin, and where it ends */
@@ -442,7 +442,7 @@ typedef struct fitting {
 } fitting;
 
 /* Each bone by itself at first, about the centroid of its own vertices; one without vertices as its parent. */
-static void start(const vg_bender *x, bending *w, size_t j)
+static void start(const vg_inverse_skin *x, working *w, size_t j)
 {
     const double *own = x->own + 4 * j, *sum = w->sum + 3 * j;
     double m[9];
@@ -459,8 +459,8 @@ static void start(const vg_bender *x, bending *w, size_t j)
 static void fit_pose(void *context, size_t k)
 {
     const fitting *f = context;
-    const vg_bender *x = f->x;
-    bending w = bending_at(x, k);
+    const vg_inverse_skin *x = f->x;
+    working w = working_at(x, k);
     double centre[3], root[3];
     vg_centroid(f->poses[k], x->nv, centre);
     load(x, f->poses[k], centre, &w);
@@ -495,7 +495,7 @@ static void fit_pose(void *context, size_t k)
 }
 
 /* rotations, begun: see fitting. */
-static void fit_poses(const vg_bender *x, size_t n, const double *const *poses, double *const *transforms,
+static void fit_poses(const vg_inverse_skin *x, size_t n, const double *const *poses, double *const *transforms,
                       double *rotations, bool begun)
 {
     vgi_blas_alone();
@@ -506,122 +506,68 @@ static void fit_poses(const vg_bender *x, size_t n, const double *const *poses, 
     vgi_blas_shared();
 }
 
-void vg_bender_fit(vg_bender *x, size_t n, const double *const *poses, double *const *transforms)
+void vg_inverse_skin_fit(vg_inverse_skin *x, size_t n, const double *const *poses, double *const *transforms)
 {
     fit_poses(x, n, poses, transforms, NULL, false);
 }
 
 /* ---- weights without motions ---- */
 
-/* What is learned from: all vertices of the mesh, or some of them. */
-typedef struct learning {
-    vg_rig rig; /* its skin is ours, all else borrowed */
-    size_t nv, n, bones; /* vertices, poses */
-    double *reference, **poses;
-    double **transforms, *rotations, *at; /* of the poses; of the poses; of the bones */
-    double *left;                         /* nv: what skinning leaves */
-    int threads;
-} learning;
+typedef struct turning {
+    double *rotations; /* of all poses */
+    double least;
+    int steps;
+} turning;
 
-static void clear_learning(learning *l)
+static int find_motions(vgi_learning *l, void *context, bool begun, vg_err *e)
 {
-    free(l->rig.skin_bone);
-    free(l->rig.skin_weight);
-    free(l->reference);
-    for (size_t i = 0; l->poses && i < l->n; i++) free(l->poses[i]);
-    free(l->poses);
-    free(l->left);
-    l->rig.skin_bone = NULL, l->rig.skin_weight = NULL, l->reference = NULL, l->poses = NULL, l->left = NULL;
-}
-
-static int gather_vertices(learning *l, const vg_head *h, size_t n, const double *const *poses, size_t most, vg_err *e)
-{
-    size_t nv = h->body.mesh.nv, step = (nv + most - 1) / most;
-    l->rig = h->body.rig, l->rig.skin_bone = NULL, l->rig.skin_weight = NULL;
-    l->n = n, l->nv = (nv + step - 1) / step;
-    l->reference = vgi_array_raw(3 * l->nv, sizeof *l->reference, e);
-    l->poses = vgi_array(n, sizeof *l->poses, e);
-    l->left = vgi_array(l->nv, sizeof *l->left, e);
-    bool ok = l->reference && l->poses && l->left;
-    for (size_t i = 0; ok && i < n; i++) ok = (l->poses[i] = vgi_array_raw(3 * l->nv, sizeof(double), e)) != NULL;
-    if (!ok) return VG_ENOMEM;
-    for (size_t v = 0; v < l->nv; v++) {
-        memcpy(l->reference + 3 * v, h->body.reference + 3 * step * v, 3 * sizeof(double));
-        for (size_t i = 0; i < n; i++) memcpy(l->poses[i] + 3 * v, poses[i] + 3 * step * v, 3 * sizeof(double));
-    }
-    return VG_OK;
-}
-
-/* Weights for the motions that are there; the mean distance that is left. */
-static int learn_weights(learning *l, double *miss, vg_err *e)
-{
-    vgi_rig_sums s = {0};
-    int r = vgi_rig_sums_make(&s, l->nv, l->bones, l->at, NULL, e);
-    if (r == VG_OK)
-        vgi_rig_sums_add(&s, l->n, (const double *const *)l->poses, (const double *const *)l->transforms, l->threads);
-    if (r == VG_OK) r = vgi_skin_fit(&l->rig, &s, l->reference, l->threads, l->left, e);
-    vgi_rig_sums_clear(&s);
-    if (r == VG_OK) *miss = vgi_mean(l->left, l->nv);
-    return r;
-}
-
-static int learn_motions(learning *l, bool begun, double least, int steps, vg_err *e)
-{
-    vg_bender *x = NULL;
-    int r = vg_bender_new(&x, &l->rig, l->nv, l->reference, l->threads, e);
+    turning *t = context;
+    vg_inverse_skin *x = NULL;
+    int r = vg_inverse_skin_new(&x, &l->rig, l->nv, l->reference, l->threads, e);
     if (r == VG_OK) {
-        x->least = least, x->steps = steps;
-        fit_poses(x, l->n, (const double *const *)l->poses, l->transforms, l->rotations, begun);
+        x->least = t->least, x->steps = begun ? t->steps : FIRST_STEPS;
+        fit_poses(x, l->n, (const double *const *)l->poses, l->transforms, t->rotations, begun);
     }
-    vg_bender_free(&x);
-    return r;
-}
-
-/* Weights and motions in turn until a round gains less than 0.4 %. */
-static int alternate(learning *l, bool begun, double least, int steps, double *miss, vg_err *e)
-{
-    int r = VG_OK;
-    double before = INFINITY;
-    for (int round = 0; r == VG_OK && round < ROUNDS; round++) {
-        r = learn_motions(l, begun, least, begun ? steps : FIRST_STEPS, e);
-        if (r == VG_OK) r = learn_weights(l, miss, e);
-        if (r == VG_OK && !(*miss < 0.996 * before)) break;
-        before = *miss, begun = true;
-    }
+    vg_inverse_skin_free(&x);
     return r;
 }
 
 /* Roughly on some of the vertices first, then exactly on all of them. */
+static int learn(vgi_learning *l, vg_head *h, size_t n, const double *const *poses, double *rotations, double *miss,
+                 vg_err *e)
+{
+    enum { SOME = 4096 };
+    turning rough = {rotations, 1e-4, 2}, fine = {rotations, 1e-5, 8};
+    size_t nv = h->body.mesh.nv;
+    l->rig = h->body.rig, l->rig.skin_bone = NULL, l->rig.skin_weight = NULL;
+    int r = vgi_learning_gather(l, nv, h->body.reference, n, poses, SOME, e);
+    if (r == VG_OK) r = vgi_skin_near(&l->rig, l->nv, l->reference, e);
+    if (r == VG_OK) r = vgi_learning_alternate(l, find_motions, &rough, false, miss, e);
+    vgi_learning_clear(l);
+    if (r == VG_OK) r = vgi_learning_gather(l, nv, h->body.reference, n, poses, nv, e);
+    if (r == VG_OK) r = vgi_learning_weights(l, miss, e);
+    if (r == VG_OK) r = vgi_learning_alternate(l, find_motions, &fine, true, miss, e);
+    return r;
+}
+
 int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, double *miss, vg_err *e)
 {
-    enum { SOME = 4096, ROUGH_STEPS = 2, FINE_STEPS = 8 };
     vg_rig *rig = &h->body.rig;
-    size_t bones = rig->nbones, nv = h->body.mesh.nv;
-    learning l = {.bones = bones, .threads = threads};
-    double *space = vgi_array(n, 7 * bones * sizeof *space, e);
-    l.transforms = vgi_array(n, sizeof *l.transforms, e), l.rotations = vgi_array(n, 9 * bones * sizeof(double), e);
+    size_t bones = rig->nbones;
+    vgi_learning l = {.threads = threads};
+    double *space = vgi_array(n, 7 * bones * sizeof *space, e), *rotations = vgi_array(n, 9 * bones * sizeof *space, e);
+    l.transforms = vgi_array(n, sizeof *l.transforms, e);
     l.at = vgi_array(3 * bones, sizeof *l.at, e);
-    int r = space && l.transforms && l.rotations && l.at ? VG_OK : VG_ENOMEM;
+    int r = space && rotations && l.transforms && l.at ? VG_OK : VG_ENOMEM;
     for (size_t i = 0; r == VG_OK && i < n; i++) l.transforms[i] = space + 7 * bones * i;
     for (size_t b = 0; r == VG_OK && b < bones; b++)
         memcpy(l.at + 3 * b, rig->at + 3 * (size_t)rig->bone[b], 3 * sizeof *l.at);
-    if (r == VG_OK) r = gather_vertices(&l, h, n, poses, SOME, e);
-    if (r == VG_OK) r = vgi_skin_near(&l.rig, l.nv, l.reference, e);
-    if (r == VG_OK) r = alternate(&l, false, 1e-4, ROUGH_STEPS, miss, e);
-    clear_learning(&l);
-    if (r == VG_OK) r = gather_vertices(&l, h, n, poses, nv, e);
-    if (r == VG_OK) r = learn_weights(&l, miss, e);
-    if (r == VG_OK) r = alternate(&l, true, 1e-5, FINE_STEPS, miss, e);
-    if (r == VG_OK) {
-        free(rig->skin_bone);
-        free(rig->skin_weight);
-        rig->skin_bone = l.rig.skin_bone, rig->skin_weight = l.rig.skin_weight;
-        l.rig.skin_bone = NULL, l.rig.skin_weight = NULL;
-    }
-    clear_learning(&l);
+    if (r == VG_OK) r = learn(&l, h, n, poses, rotations, miss, e);
+    if (r == VG_OK) vgi_learning_keep(&l, rig);
+    vgi_learning_clear(&l);
     free(space);
+    free(rotations);
     free(l.transforms);
-    free(l.rotations);
     free(l.at);
     return r;
 }

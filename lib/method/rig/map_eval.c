@@ -19,7 +19,8 @@ struct vg_player {
     int threads;
     bool single;
     vgi_shape shape;    /* patches: of the body that poses are measured on */
-    vg_bender *bender;  /* bones */
+    vg_inverse_skin *inverse; /* bones of a skeleton */
+    vg_free_bones *free;      /* bones without one */
     float *weights_single;
     void *columns;      /* 4n x 3 BLOCK: what the product multiplies, float or double */
     void *product;      /* nv x 3 BLOCK */
@@ -83,8 +84,12 @@ int vg_player_new(vg_player **out, const vg_head *h, bool single, int threads, v
     p->order = vgi_array(m->n, sizeof *p->order, e), p->parent = vgi_array(m->n, sizeof *p->parent, e);
     int r = p->order && p->parent ? VG_OK : VG_ENOMEM;
     if (r == VG_OK) r = bones ? plan_bones(p, &h->body.rig, e) : plan_patches(p, e);
-    if (r == VG_OK && bones) r = vg_bender_new(&p->bender, &h->body.rig, p->nv, measured, threads, e);
-    else if (r == VG_OK) r = vgi_shape_make(&p->shape, &h->body.mesh, &h->body.patches, measured, e);
+    if (r == VG_OK && bones && vgi_rig_is_free(&h->body.rig))
+        r = vg_free_bones_new(&p->free, &h->body.rig, p->nv, measured, threads, e);
+    else if (r == VG_OK && bones)
+        r = vg_inverse_skin_new(&p->inverse, &h->body.rig, p->nv, measured, threads, e);
+    else if (r == VG_OK)
+        r = vgi_shape_make(&p->shape, &h->body.mesh, &h->body.patches, measured, e);
     if (r == VG_OK) {
         p->columns = vgi_array(4 * m->n, 3 * BLOCK * size, e);
         p->product = vgi_array(p->nv, 3 * BLOCK * size, e);
@@ -103,7 +108,8 @@ void vg_player_free(vg_player **out)
     vg_player *p = *out;
     if (!p) return;
     vgi_shape_clear(&p->shape);
-    vg_bender_free(&p->bender);
+    vg_inverse_skin_free(&p->inverse);
+    vg_free_bones_free(&p->free);
     free(p->weights_single);
     free(p->columns);
     free(p->product);
@@ -143,8 +149,9 @@ static void measure_some(void *context, size_t task)
 
 void vg_player_measure(vg_player *p, size_t n, const double *const *poses, double *const *transforms)
 {
-    if (p->bender) {
-        vg_bender_fit(p->bender, n, poses, transforms);
+    if (p->inverse || p->free) {
+        if (p->free) vg_free_bones_fit(p->free, n, poses, transforms);
+        else vg_inverse_skin_fit(p->inverse, n, poses, transforms);
         return;
     }
     measuring x = {p, poses, transforms, (p->m->n + SOME - 1) / SOME};

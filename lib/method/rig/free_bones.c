@@ -1,0 +1,241 @@
+/* free_bones.c: the motions of bones without a skeleton in poses that are known by their vertices.
+ *
+ * Linear blend skinning is linear in the 3 x 4 matrices T_j = [R_j t_j] of the bones, which take (p - at_j, 1) to the
+ * pose. Over all vertices the squared distance is the quadratic tr(T G T') - 2 tr(T B') in T = [T_1 T_2 ...], whose G
+ * belongs to the weights and whose B is one pass over the pose. It is minimised bone by bone, each the rotation and
+ * translation that are best beside the others (Le and Deng 2012), until no bone turns any more.
+ * Leaves out bones that hang together (inverse_skin.c) and where the weights come from (decompose.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/rig/free_bones.h"
+#include "numeric/polar.h"
+#include "numeric/vec3.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { BLOCK = 8, SWEEPS = 100 };
+
+struct vg_free_bones {
+    size_t nv, n;
+    int threads;
+    double *at;       /* 3 n */
+    uint32_t *bone;   /* VG_SKIN per vertex */
+    double *local;    /* 4 per bone of a vertex: its weight times (p - at, 1) */
+    double *g;        /* 4 n x 4 n */
+    double *own;      /* 16 n: per bone the sum of weight (p - at, 1) (p - at, 1)' */
+    double *space;    /* BLOCK times working space */
+};
+
+/* Working space of one pose. */
+typedef struct working {
+    double *t, *b, *left; /* 12 n each, as 3 x 4 n: T, B, B - T G */
+} working;
+
+static working working_at(const vg_free_bones *x, size_t i)
+{
+    double *p = x->space + i * 36 * x->n;
+    return (working){p, p + 12 * x->n, p + 24 * x->n};
+}
+
+static void make_quadratic(vg_free_bones *x, const double *weight)
+{
+    size_t width = 4 * x->n;
+    for (size_t v = 0; v < x->nv; v++)
+        for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++) {
+            if (!(weight[s] > 0)) continue;
+            const double *a = x->local + 4 * s;
+            double *own = x->own + 16 * (size_t)x->bone[s];
+            for (size_t i = 0; i < 4; i++)
+                for (size_t k = 0; k < 4; k++) own[4 * i + k] += a[i] * a[k] / weight[s];
+            for (size_t u = VG_SKIN * v; u < VG_SKIN * v + VG_SKIN; u++) {
+                if (!(weight[u] > 0)) continue;
+                const double *b = x->local + 4 * u;
+                double *g = x->g + 4 * x->bone[s] * width + 4 * (size_t)x->bone[u];
+                for (size_t i = 0; i < 4; i++)
+                    for (size_t k = 0; k < 4; k++) g[i * width + k] += a[i] * b[k];
+            }
+        }
+}
+
+int vg_free_bones_new(vg_free_bones **out, const vg_rig *r, size_t nv, const double *reference, int threads, vg_err *e)
+{
+    *out = NULL;
+    if (!r->nbones || !r->skin_bone) return vg_fail(e, VG_EINPUT, "there is no rig with weights");
+    size_t n = r->nbones;
+    vg_free_bones *x = *out = vgi_array(1, sizeof *x, e);
+    if (!x) return VG_ENOMEM;
+    x->nv = nv, x->n = n, x->threads = threads;
+    x->at = vgi_array(3 * n, sizeof *x->at, e);
+    x->bone = vgi_copy_array(r->skin_bone, VG_SKIN * nv, sizeof *x->bone, e);
+    x->local = vgi_array(VG_SKIN * nv, 4 * sizeof *x->local, e);
+    x->g = vgi_array(4 * n, 4 * n * sizeof *x->g, e), x->own = vgi_array(16 * n, sizeof *x->own, e);
+    x->space = vgi_array(BLOCK, 36 * n * sizeof *x->space, e);
+    if (!x->at || !x->bone || !x->local || !x->g || !x->own || !x->space) {
+        vg_free_bones_free(out);
+        return VG_ENOMEM;
+    }
+    for (size_t b = 0; b < n; b++) memcpy(x->at + 3 * b, r->at + 3 * (size_t)r->bone[b], 3 * sizeof *x->at);
+    for (size_t s = 0; s < VG_SKIN * nv; s++) {
+        const double *p = reference + 3 * (s / VG_SKIN), *at = x->at + 3 * (size_t)x->bone[s], w = r->skin_weight[s];
+        for (size_t k = 0; k < 3; k++) x->local[4 * s + k] = w * (p[k] - at[k]);
+        x->local[4 * s + 3] = w;
+    }
+    make_quadratic(x, r->skin_weight);
+    return VG_OK;
+}
+
+void vg_free_bones_free(vg_free_bones **out)
+{
+    vg_free_bones *x = *out;
+    if (!x) return;
+    free(x->at);
+    free(x->bone);
+    free(x->local);
+    free(x->g);
+    free(x->own);
+    free(x->space);
+    free(x);
+    *out = NULL;
+}
+
+/* ---- one pose ---- */
+
+/* B of a pose whose centroid is taken for the origin. */
+static void load(const vg_free_bones *x, const double *pose, const double centre[3], working *w)
+{
+    size_t width = 4 * x->n;
+    memset(w->b, 0, 3 * width * sizeof *w->b);
+    for (size_t s = 0; s < VG_SKIN * x->nv; s++) {
+        const double *y = pose + 3 * (s / VG_SKIN), *q = x->local + 4 * s;
+        if (!(q[3] > 0)) continue;
+        for (size_t c = 0; c < 3; c++) {
+            double *b = w->b + c * width + 4 * (size_t)x->bone[s], d = y[c] - centre[c];
+            for (size_t k = 0; k < 4; k++) b[k] += d * q[k];
+        }
+    }
+}
+
+/* The rotation and translation t (3 x 4, row stride `to`) that minimise tr(t g t') - 2 tr(t m'), g 4 x 4. */
+static void place_bone(const double *g, size_t stride, const double m[12], double *t, size_t to)
+{
+    double centred[9], r[9], w = g[3 * stride + 3];
+    for (size_t c = 0; c < 3; c++)
+        for (size_t k = 0; k < 3; k++) centred[3 * c + k] = m[4 * c + k] - m[4 * c + 3] * g[3 * stride + k] / w;
+    vgi_fit_rotation(centred, r);
+    for (size_t c = 0; c < 3; c++) {
+        for (size_t k = 0; k < 3; k++) t[c * to + k] = r[3 * c + k];
+        t[c * to + 3] = (m[4 * c + 3] - vgi_dot(r + 3 * c, g + 3 * stride)) / w;
+    }
+}
+
+/* Each bone by itself, as if it alone moved its vertices. One without vertices moves with the whole. */
+static void start(const vg_free_bones *x, working *w)
+{
+    size_t width = 4 * x->n;
+    for (size_t j = 0; j < x->n; j++) {
+        double m[12], *t = w->t + 4 * j;
+        for (size_t i = 0; i < 12; i++) m[i] = w->b[i / 4 * width + 4 * j + i % 4];
+        if (x->own[16 * j + 15] > 0) place_bone(x->own + 16 * j, 4, m, t, width);
+        else
+            for (size_t i = 0; i < 12; i++) t[i / 4 * width + i % 4] = i % 5 == 0;
+    }
+}
+
+static void find_left(const vg_free_bones *x, working *w)
+{
+    size_t width = 4 * x->n;
+    memcpy(w->left, w->b, 3 * width * sizeof *w->left);
+    for (size_t c = 0; c < 3; c++)
+        for (size_t i = 0; i < width; i++) {
+            double t = w->t[c * width + i];
+            for (size_t k = 0; k < width; k++) w->left[c * width + k] -= t * x->g[i * width + k];
+        }
+}
+
+/* Bone j beside the others; the largest change of its rotation. */
+static double improve_bone(const vg_free_bones *x, working *w, size_t j)
+{
+    size_t width = 4 * x->n;
+    const double *g = x->g + 4 * j * width + 4 * j;
+    double m[12], old[12], *t = w->t + 4 * j, most = 0;
+    for (size_t i = 0; i < 12; i++) old[i] = t[i / 4 * width + i % 4];
+    for (size_t c = 0; c < 3; c++)
+        for (size_t k = 0; k < 4; k++) {
+            m[4 * c + k] = w->left[c * width + 4 * j + k];
+            for (size_t i = 0; i < 4; i++) m[4 * c + k] += old[4 * c + i] * g[i * width + k];
+        }
+    place_bone(g, width, m, t, width);
+    for (size_t c = 0; c < 3; c++)
+        for (size_t i = 0; i < 4; i++) {
+            double d = t[c * width + i] - old[4 * c + i];
+            if (i < 3 && fabs(d) > most) most = fabs(d);
+            if (d == 0) continue;
+            const double *row = x->g + (4 * j + i) * width;
+            for (size_t k = 0; k < width; k++) w->left[c * width + k] -= d * row[k];
+        }
+    return most;
+}
+
+typedef struct fitting {
+    const vg_free_bones *x;
+    const double *const *poses;
+    double *const *transforms;
+    bool begun;
+} fitting;
+
+/* T from the transforms that are there. */
+static void continue_from(const vg_free_bones *x, const double *transforms, const double centre[3], working *w)
+{
+    size_t width = 4 * x->n;
+    for (size_t j = 0; j < x->n; j++) {
+        const double *q = transforms + 7 * j;
+        double a[9];
+        vg_quat_matrix(q, a);
+        for (size_t c = 0; c < 3; c++) {
+            double *t = w->t + c * width + 4 * j;
+            memcpy(t, a + 3 * c, 3 * sizeof *t);
+            t[3] = vgi_dot(a + 3 * c, x->at + 3 * j) + q[4 + c] - centre[c];
+        }
+    }
+}
+
+static void fit_pose(void *context, size_t k)
+{
+    static const double still = 1e-6; /* radians, about: a bone that turns less does not count */
+    const fitting *f = context;
+    const vg_free_bones *x = f->x;
+    size_t width = 4 * x->n;
+    working w = working_at(x, k);
+    double centre[3], most = 1;
+    vg_centroid(f->poses[k], x->nv, centre);
+    load(x, f->poses[k], centre, &w);
+    if (f->begun) continue_from(x, f->transforms[k], centre, &w);
+    else start(x, &w);
+    find_left(x, &w);
+    for (int sweep = 0; sweep < SWEEPS && most > still; sweep++) {
+        most = 0;
+        for (size_t j = 0; j < x->n; j++)
+            if (x->own[16 * j + 15] > 0) most = fmax(most, improve_bone(x, &w, j));
+    }
+    for (size_t j = 0; j < x->n; j++) {
+        double r[9], *to = f->transforms[k] + 7 * j;
+        for (size_t c = 0; c < 3; c++) memcpy(r + 3 * c, w.t + c * width + 4 * j, 3 * sizeof *r);
+        vg_quat_from_matrix(r, to);
+        for (size_t c = 0; c < 3; c++)
+            to[4 + c] = w.t[c * width + 4 * j + 3] + centre[c] - vgi_dot(r + 3 * c, x->at + 3 * j);
+    }
+}
+
+void vgi_free_bones_continue(vg_free_bones *x, size_t n, const double *const *poses, double *const *transforms,
+                             bool begun)
+{
+    for (size_t first = 0; first < n; first += BLOCK) {
+        fitting f = {x, poses + first, transforms + first, begun};
+        vgi_parallel(x->threads, n - first < BLOCK ? n - first : BLOCK, fit_pose, &f);
+    }
+}
+
+void vg_free_bones_fit(vg_free_bones *x, size_t n, const double *const *poses, double *const *transforms)
+{
+    vgi_free_bones_continue(x, n, poses, transforms, false);
+}

@@ -1,0 +1,13 @@
+/* free_bones.h: the motions of bones without a skeleton, from where they are.
+ * Internal.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_FREE_BONES_H
+#define VG_FREE_BONES_H
+
+#include "core/core.h"
+
+/* vgi_free_bones_continue: vg_free_bones_fit; begun: the search begins with the transforms that are there. */
+void vgi_free_bones_continue(vg_free_bones *x, size_t n, const double *const *poses, double *const *transforms,
+                             bool begun);
+
+#endif
