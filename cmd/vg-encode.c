@@ -8,7 +8,7 @@
 
 static struct {
     bool vectors, f32;
-    const char *reference, *anchors, *mesh, *most_bytes;
+    const char *reference, *anchors, *mesh, *most_bytes, *array_axes;
     double fps;
     size_t faces; /* 1: selected */
     take_list take;
@@ -22,6 +22,8 @@ static const cli_option options[] = {
      .reads = true},
     {"mesh", 0, "MESH", "the faces and reference pose of point caches and arrays, which hold none",
      .text = &opts.mesh, .reads = true},
+    {"array-axes", 0, "ORDER", "what the axes of positions in an NPZ count: fvx, vxf, ... (frames, vertices, x y z)",
+     .text = &opts.array_axes},
     {"max-bytes", 0, "SIZE", "what an archive or compressed file may unpack to (default: 1G in one file, 64G in all)",
      .text = &opts.most_bytes},
     {"anchor", 0, "V,V,...", "vertices that vg-solve must meet exactly", .text = &opts.anchors},
@@ -168,7 +170,7 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     work w = {0};
     if (opts.anchors) w.nanchors = cli_parse_vertices("--anchor", opts.anchors, &w.anchors);
-    vg_source_options from = {.mesh = opts.mesh};
+    vg_source_options from = {.mesh = opts.mesh, .reading.array_axes = opts.array_axes};
     if (opts.most_bytes && !(from.most_bytes = cli_parse_size("max-bytes", opts.most_bytes)))
         cli_usage("option '--max-bytes' needs a size of at least 1");
     vg_source *s = cli_source_with(operands, n, &from);

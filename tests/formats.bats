@@ -235,7 +235,7 @@ END
         echo 'facet normal 0 0 0 outer loop vertex 7 7 7 vertex 7 7 7 vertex 1 2 3 endloop endfacet endsolid'
     } >odd.stl
     must_warn vg-encode odd.stl -o odd.vgs
-    says "'odd.stl': left out 1 triangles of which two corners are at one place"
+    says "'odd.stl': left out 1 face that names a vertex twice or has fewer than 2 corners"
     one_line
 }
 

@@ -439,6 +439,60 @@ int vgi_archive_open_for(vgi_archive **out, int fd, int64_t base, const char *na
     return r;
 }
 
+/* ---- a compressed stream ---- */
+
+/* Is it compressed, and does what is in there begin like a stream? */
+static bool begins_like_stream(const vgi_archive *a)
+{
+    unsigned char start[8];
+    const void *data;
+    size_t got = 0;
+    vgi_tap file = a->file;
+    vgi_unpacker u = {0};
+    if (a->packed && vgi_unpacker_open(&u, &file, NULL) == VG_OK)
+        for (la_ssize_t n; got < sizeof start && (n = vgi_unpack_some(&u, &data)) > 0;) {
+            size_t some = (size_t)n < sizeof start - got ? (size_t)n : sizeof start - got;
+            memcpy(start + got, data, some);
+            got += some;
+        }
+    vgi_unpacker_close(&u);
+    free(u.sum);
+    return vgi_is_stream(start, got);
+}
+
+static int copy_unpacked(vgi_archive *a, int to, vg_err *e)
+{
+    const void *data;
+    la_ssize_t n;
+    int r = vgi_unpacker_open(&a->unpacker, &a->file, e);
+    if (r == VG_EINPUT) return damaged(a, a->unpacker.la, NULL, e);
+    while (r == VG_OK && (n = vgi_unpack_some(&a->unpacker, &data)) != 0) {
+        if (n < 0) return damaged(a, a->unpacker.la, NULL, e);
+        r = check_total(a, e);
+        if (r == VG_OK) r = vgi_write_all(to, data, (size_t)n, "temporary file", e);
+    }
+    return r == VG_OK ? check_packed_end(a, e) : r;
+}
+
+int vgi_unpack_stream(int fd, int64_t base, const char *name, const vgi_limits *limits, int *stream, vg_err *e)
+{
+    vgi_archive *a = vgi_array(1, sizeof *a, e);
+    *stream = -1;
+    if (!a) return VG_ENOMEM;
+    a->limits = *limits, a->file.base = base, a->spool = -1;
+    int r = a->file.fd = fcntl(fd, F_DUPFD_CLOEXEC, 3);
+    if (r < 0) r = vg_fail(e, VG_ESYS, "cannot read '%s': %s", name, strerror(errno));
+    if (r >= 0) r = prepare(a, name, e);
+    if (r == VG_OK && begins_like_stream(a)) {
+        r = *stream = vgi_nameless_file(e);
+        if (r >= 0) r = copy_unpacked(a, *stream, e);
+        if (r == VG_OK) r = lseek(*stream, 0, SEEK_SET) == 0 ? 1 : VG_ESYS;
+        if (r < 0 && *stream >= 0) close(*stream), *stream = -1;
+    }
+    vgi_archive_close(&a);
+    return r;
+}
+
 static int read_spooled(vgi_archive *a, const member *m, vg_bytes *data, vg_err *e)
 {
     int r = vgi_bytes_reserve(data, m->bytes, e);
@@ -469,7 +523,7 @@ void vgi_archive_close(vgi_archive **archive)
     vg_bytes_clear(&a->path);
     if (a->spool >= 0) close(a->spool);
     if (a->utf8) freelocale(a->utf8);
-    close(a->file.fd);
+    if (a->file.fd >= 0) close(a->file.fd);
     free(a->file.block);
     free(a->name);
     free(a);

@@ -10,13 +10,14 @@
 enum {
     SHOWN = 40,        /* bytes of the input that a message shows */
     MOST_DEPTH = 4096, /* joints from a root to an end */
-    MOST_CHANNELS = 6
+    MOST_CHANNELS = 6, /* of a joint, without scales */
+    SCALES = 3
 };
 
 static const uint32_t NONE = UINT32_MAX;
-static const char byte_order_mark[] = "\xef\xbb\xbf";
 const char vgi_bvh_end[] = ".end";
 const char *const vgi_bvh_channels[] = {"Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation"};
+static const char *const scale_channels[SCALES] = {"Xscale", "Yscale", "Zscale"};
 
 /* What was said of a joint. */
 enum { HAS_OFFSET = 1, HAS_CHANNELS = 2, IS_END = 4 };
@@ -31,10 +32,14 @@ typedef struct reading {
     size_t said_cap;
     uint32_t current;    /* whose braces are open; NONE: between roots */
     size_t depth;
-    size_t channels;     /* of all joints */
+    vg_bytes kept;       /* of each value of a row: 1, or 0 when it is a scale, which is passed over */
+    size_t scaled;       /* joints that have scales */
+    size_t channels;     /* values of a row that are kept */
+    bool still;          /* there is no motion: one frame at rest */
     uint64_t frames, next;
     double frame_time;
     double *values, *turns;
+    vg_note note;
 } reading;
 
 static bool is_blank(char c)
@@ -221,13 +226,17 @@ static int read_offset(reading *b, vg_err *e)
 
 static int read_channel(reading *b, vg_joint *j, vg_err *e)
 {
+    static const unsigned char keep = 1, pass = 0;
+    for (int c = 0; c < SCALES; c++)
+        if (take_word(b, scale_channels[c])) return vgi_bytes_append(&b->kept, &pass, 1, e);
     for (int c = 0; c < MOST_CHANNELS; c++) {
         if (!take_word(b, vgi_bvh_channels[c])) continue;
         uint8_t channel = (uint8_t)(c + 1);
         if (channel <= 3 && memchr(j->channels, channel, j->nchannels))
             return wrong_joint(b, "two channels for one coordinate of its position", e);
+        if (j->nchannels == MOST_CHANNELS) return wrong_joint(b, "more than 6 positions and rotations", e);
         j->channels[j->nchannels++] = channel;
-        return VG_OK;
+        return vgi_bytes_append(&b->kept, &keep, 1, e);
     }
     return fail_here(b, "a channel (Xposition ... Zrotation)", e);
 }
@@ -240,9 +249,10 @@ static int read_channels(reading *b, vg_err *e)
     if (b->said[b->current] & HAS_CHANNELS) return wrong_joint(b, "CHANNELS twice", e);
     b->said[b->current] |= HAS_CHANNELS;
     int r = take_count(b, "the number of channels", &n, e);
-    if (r == VG_OK && n > MOST_CHANNELS) r = wrong_joint(b, "more than 6 channels", e);
+    if (r == VG_OK && n > MOST_CHANNELS + SCALES) r = wrong_joint(b, "more than 9 channels", e);
     for (int64_t i = 0; r == VG_OK && i < n; i++) r = read_channel(b, j, e);
     b->channels += j->nchannels;
+    b->scaled += n > j->nchannels;
     return r;
 }
 
@@ -254,6 +264,7 @@ static int read_statement(reading *b, vg_err *e)
     if (take_word(b, "CHANNELS")) return read_channels(b, e);
     if (b->said[b->current] & IS_END) return fail_here(b, "OFFSET or '}'", e);
     if (take_word(b, "JOINT")) return open_joint(b, false, e);
+    if (take_word(b, "EndSite")) return open_joint(b, true, e);
     if (!take_word(b, "End")) return fail_here(b, "OFFSET, CHANNELS, JOINT, End Site or '}'", e);
     int r = expect_word(b, "Site", e);
     return r < 0 ? r : open_joint(b, true, e);
@@ -269,7 +280,9 @@ static int read_hierarchy(reading *b, vg_err *e)
         else break;
     }
     if (r == VG_OK && b->skeleton.njoints == 0) return fail_here(b, "ROOT", e);
-    return r < 0 ? r : take_word(b, "MOTION") ? VG_OK : fail_here(b, "ROOT or MOTION", e);
+    if (r < 0 || take_word(b, "MOTION")) return r;
+    b->still = b->at == b->end;
+    return b->still ? VG_OK : fail_here(b, "ROOT or MOTION", e);
 }
 
 /* ---- motion ---- */
@@ -293,6 +306,60 @@ static int read_motion_head(reading *b, vg_err *e)
     return VG_OK;
 }
 
+/* ---- rows ---- */
+
+/* How the numbers behind the head lie in lines. */
+typedef struct rows {
+    uint64_t values, lines;
+    const char *wrong; /* the first line that does not hold one row; NULL: all do */
+    size_t has;        /* the values in it */
+    bool aligned;      /* no row ends within a line and goes on: one row takes whole lines, or one line whole rows */
+} rows;
+
+static size_t count_words(const char *p, const char *end)
+{
+    size_t n = 0;
+    while (p < end) {
+        while (p < end && is_blank(*p)) p++;
+        n += p < end;
+        while (p < end && !is_blank(*p)) p++;
+    }
+    return n;
+}
+
+static rows look_at_rows(const reading *b)
+{
+    const size_t width = b->kept.size;
+    rows k = {.aligned = true};
+    for (const char *p = b->at, *stop; p < b->end; p = stop + 1) {
+        for (stop = p; stop < b->end && !is_line_end(*stop);) stop++;
+        const size_t n = count_words(p, stop), before = (size_t)(k.values % width);
+        if (n != width && n && !k.wrong) k.wrong = p, k.has = n;
+        if (before ? n > width - before : n > width && n % width) k.aligned = false;
+        k.values += n, k.lines += n > 0;
+    }
+    return k;
+}
+
+/* Rows may be wrapped anyhow, as long as their values are as many as the frames ask for. But where lines are rows, one
+ * that lacks a value would shift all that follow. An end that is missing is told when it is its turn. */
+static int check_rows(reading *b, vg_err *e)
+{
+    const size_t width = b->kept.size;
+    if (width == 0) return VG_OK;
+    const rows k = look_at_rows(b);
+    const uint64_t whole = k.values / width;
+    const bool free_lines = k.values % width == 0 && whole == b->frames && k.lines != b->frames;
+    if (k.wrong && !free_lines && !(k.aligned && (whole < b->frames || k.values % width == 0)))
+        return vg_fail(e, VG_EINPUT, "%s line %zu: a row of %zu values, and the channels are %zu", b->subject,
+                       line_of(b, k.wrong), k.has, width);
+    if (whole <= b->frames) return VG_OK;
+    vgi_note(&b->note, "it announces %llu frames and holds %llu, which are read", (unsigned long long)b->frames,
+             (unsigned long long)whole);
+    b->frames = whole;
+    return VG_OK;
+}
+
 static int check_places(reading *b, const double *positions, const char *what, vg_err *e)
 {
     for (size_t j = 0; j < b->skeleton.njoints; j++)
@@ -304,13 +371,16 @@ static int check_places(reading *b, const double *positions, const char *what, v
 
 static int open_text(reading *b, vgi_input *in, vg_err *e)
 {
-    int r = vgi_input_slurp(in, &b->text, e);
+    int r = vgi_input_slurp_text(in, &b->text, e);
     if (r < 0) return r;
     if (b->text.size == 0) return vg_fail(e, VG_ETRUNC, "%s is empty", b->subject);
     b->data = b->at = (char *)b->text.data, b->end = b->data + b->text.size;
-    if (b->text.size >= 3 && !memcmp(b->data, byte_order_mark, 3)) b->at += 3;
     r = read_hierarchy(b, e);
-    return r < 0 ? r : read_motion_head(b, e);
+    if (b->scaled) vgi_note(&b->note, "left out the scales of %zu joints", b->scaled);
+    if (b->still) b->frames = 1;
+    if (r < 0 || b->still) return r;
+    r = read_motion_head(b, e);
+    return r < 0 ? r : check_rows(b, e);
 }
 
 /* The bones, in the pose without rotations. */
@@ -326,8 +396,10 @@ static int fill_head(reading *b, vg_head *h, vg_err *e)
     return check_places(b, h->body.reference, "in the reference pose", e);
 }
 
-static int open_bvh(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)
+static int open_bvh(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject,
+                    vg_err *e)
 {
+    (void)how;
     reading *b = *state = vgi_array(1, sizeof *b, e);
     if (!b) return VG_ENOMEM;
     b->subject = subject;
@@ -348,22 +420,30 @@ static int end_motion(reading *b, vg_err *e)
     return fail_here(b, expected, e);
 }
 
+static int read_row(reading *b, vg_err *e)
+{
+    double *to = b->values, scale;
+    for (size_t i = 0; i < b->kept.size; i++) {
+        skip_blanks(b);
+        if (b->at == b->end)
+            return vg_fail(e, VG_ETRUNC, "%s ends in frame %llu of %llu, behind %zu of %zu values", b->subject,
+                           (unsigned long long)b->next, (unsigned long long)b->frames, i, b->kept.size);
+        int r = take_number(b, "a number", b->kept.data[i] ? to++ : &scale, e);
+        if (r < 0) return r;
+    }
+    return VG_OK;
+}
+
 static int next_frame(void *state, vg_frame *f, vg_err *e)
 {
     reading *b = state;
     char what[96];
     if (b->next == b->frames) return end_motion(b, e);
-    for (size_t i = 0; i < b->channels; i++) {
-        skip_blanks(b);
-        if (b->at == b->end)
-            return vg_fail(e, VG_ETRUNC, "%s ends in frame %llu of %llu, behind %zu of %zu values", b->subject,
-                           (unsigned long long)b->next, (unsigned long long)b->frames, i, b->channels);
-        int r = take_number(b, "a number", &b->values[i], e);
-        if (r < 0) return r;
-    }
-    vg_skeleton_pose(&b->skeleton, b->values, f->values, b->turns);
+    int r = b->still ? VG_OK : read_row(b, e);
+    if (r < 0) return r;
+    vg_skeleton_pose(&b->skeleton, b->still ? NULL : b->values, f->values, b->turns);
     snprintf(what, sizeof what, "in frame %llu", (unsigned long long)b->next);
-    int r = check_places(b, f->values, what, e);
+    r = check_places(b, f->values, what, e);
     if (r == VG_OK) r = vg_frame_turn(f, b->turns, b->skeleton.njoints, e);
     if (r < 0) return r;
     f->has_time = b->frames > 1; /* a single frame is a pose */
@@ -383,16 +463,22 @@ static void close_bvh(void *state)
     if (!b) return;
     vg_bytes_clear(&b->text);
     vg_skeleton_clear(&b->skeleton);
+    vg_bytes_clear(&b->kept);
     free(b->said);
     free(b->values);
     free(b->turns);
     free(b);
 }
 
+static const char *note_of(const void *state)
+{
+    return ((const reading *)state)->note.text;
+}
+
 static bool sniff_bvh(const unsigned char *data, size_t n)
 {
     static const char first[] = "HIERARCHY";
-    size_t i = n >= 3 && !memcmp(data, byte_order_mark, 3) ? 3 : 0, length = sizeof first - 1;
+    size_t i = 0, length = sizeof first - 1;
     while (i < n && is_blank((char)data[i])) i++;
     return n - i >= length && !strncasecmp((const char *)data + i, first, length) &&
            (n - i == length || is_blank((char)data[i + length]));
@@ -402,6 +488,7 @@ const vgi_sequence_format vgi_sequence_bvh = {
     .name = "bvh", .suffix = ".bvh",
     .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TIMES | VGI_KEEPS_SKELETON |
              VGI_KEEPS_DOUBLES,
-    .sniff = sniff_bvh, .open = open_bvh, .next = next_frame, .frames = count_frames, .close = close_bvh,
+    .sniff = sniff_bvh, .open = open_bvh, .next = next_frame, .frames = count_frames, .note = note_of,
+    .close = close_bvh,
     .kinds = 1 << VG_VERTICES, .check = vgi_bvh_check, .begin = vgi_bvh_begin, .put = vgi_bvh_put,
     .end = vgi_bvh_finish, .warning = vgi_bvh_warning, .release = vgi_bvh_release};

@@ -117,8 +117,10 @@ static void judge_times(reading *x)
     x->timed = !(x->rate == 1 && x->start == floorf(x->start));
 }
 
-static int open_pc2(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)
+static int open_pc2(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject,
+                    vg_err *e)
 {
+    (void)how;
     unsigned char head[PC2_HEADER];
     reading *x;
     int r = begin_reading(&x, state, in, subject, false, e);
@@ -138,8 +140,10 @@ static int open_pc2(void **state, vg_head *h, vgi_input *in, const char *subject
     return r < 0 ? r : finish_head(x, h, e);
 }
 
-static int open_mdd(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)
+static int open_mdd(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject,
+                    vg_err *e)
 {
+    (void)how;
     unsigned char head[MDD_HEADER];
     reading *x;
     int r = begin_reading(&x, state, in, subject, true, e);

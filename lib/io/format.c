@@ -53,18 +53,29 @@ void vg_model_clear(vg_model *m)
     *m = (vg_model){0};
 }
 
-int vgi_model_read(vg_model *m, const void *data, size_t n, const vgi_format *format, const char *file_name,
-                   const char *subject, vg_err *e)
+static int read_plain(vg_model *m, const void *data, size_t n, const vgi_format *format, const char *file_name,
+                      const char *subject, vg_err *e)
 {
-    *m = (vg_model){0};
     if (n == 0) return vg_fail(e, VG_ETRUNC, "%s is empty", subject);
     if (!format) format = vgi_format_by_content(data, n);
     if (!format) format = vgi_format_by_suffix(file_name);
     if (!format) return vg_fail(e, VG_EINPUT, "%s is no mesh file (read: OBJ, PLY, OFF, STL)", subject);
     int result = format->read(m, data, n, subject, e);
-    if (result == VG_OK) result = vg_mesh_check(&m->mesh, subject, e);
+    if (result == VG_OK) result = vgi_mend_faces(&m->mesh, m->vertices, &m->attributes, &m->note, subject, e);
     if (result < 0) vg_model_clear(m);
     return result;
+}
+
+int vgi_model_read(vg_model *m, const void *data, size_t n, const vgi_format *format, const char *file_name,
+                   const char *subject, vg_err *e)
+{
+    vg_bytes own = {0};
+    const unsigned char *plain = data;
+    *m = (vg_model){0};
+    int r = n ? vgi_plain_text(&own, &plain, &n, e) : VG_OK;
+    if (r == VG_OK) r = read_plain(m, plain, n, format, file_name, subject, e);
+    vg_bytes_clear(&own);
+    return r;
 }
 
 int vg_model_read(vg_model *m, const void *data, size_t n, const char *format, const char *name, vg_err *e)

@@ -198,7 +198,7 @@ int vgi_gltf_open(vgi_gltf *g, vgi_input *in, const char *subject, vg_err *e)
     const unsigned char *bin = NULL;
     size_t nbin = 0;
     *g = (vgi_gltf){.subject = subject};
-    int r = vgi_input_slurp(in, &g->file, e);
+    int r = vgi_input_slurp_text(in, &g->file, e);
     if (r < 0) return r;
     if (g->file.size >= 4 && !memcmp(g->file.data, "glTF", 4)) r = read_binary(g, &bin, &nbin, e);
     else r = vgi_json_parse(&g->json, g->file.data, g->file.size, subject, e);

@@ -71,7 +71,7 @@ int vgi_gltf_item(const vgi_gltf *g, const vgi_json *ref, const char *list, cons
                   vg_err *e) VG_MUST_CHECK;
 
 /* ---- gltf_play.c, gltf_write.c: for the tables in gltf.c ---- */
-int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e);
+int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject, vg_err *e);
 int vgi_gltf_next(void *state, vg_frame *f, vg_err *e);
 uint64_t vgi_gltf_frames(const void *state);
 void vgi_gltf_close(void *state);

@@ -407,8 +407,10 @@ static int take_reference(vgi_gltf_scene *x, vg_head *h, vg_err *e)
     return pose(x, h->body.reference, e);
 }
 
-int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)
+int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject,
+                  vg_err *e)
 {
+    (void)how;
     vgi_gltf_scene *x = *state = vgi_array(1, sizeof *x, e);
     vgi_gltf_faces f = {0};
     if (!x) return VG_ENOMEM;

@@ -65,7 +65,26 @@ size_t vgi_print_float(char *to, double x);
 size_t vgi_print_double(char *to, double x);
 size_t vgi_print_uint(char *to, uint64_t x); /* at most 20 bytes */
 
-/* ---- lines.c: text of fields between blanks, a thing per line; '#' begins a comment ---- */
+/* ---- plain.c: text files as plain UTF-8 ---- */
+
+/* vgi_plain_text: step over the mark of UTF-8; text in UTF-16 is converted into `own`, which is empty, and *data points
+ * there. Anything else stays as it is. A part of a file is treated as the whole would be. */
+int vgi_plain_text(vg_bytes *own, const unsigned char **data, size_t *n, vg_err *e) VG_MUST_CHECK;
+/* vgi_input_slurp_text: all that is left, of a text, as plain UTF-8. */
+int vgi_input_slurp_text(vgi_input *in, vg_bytes *b, vg_err *e) VG_MUST_CHECK;
+size_t vgi_mark_bytes(const void *data, size_t n); /* of the mark of UTF-8 in front; 0: there is none */
+int vgi_append_letter(vg_bytes *to, uint32_t letter, vg_err *e) VG_MUST_CHECK; /* as UTF-8 */
+
+/* ---- mend.c: what a reader left out or put right ---- */
+
+void vgi_note(vg_note *to, const char *format, ...) VG_PRINTF(2, 3); /* add to the line */
+void vgi_note_dropped(vg_note *to, size_t faces);                    /* as vgi_mend_faces says it */
+/* vgi_mend_faces: vg_mesh_check, but faces that name a vertex twice or have fewer than 2 corners are left out, shortened
+ * or cut until the mesh is valid. points: of its vertices; a (may be NULL): its labels and corner_tex move along. */
+int vgi_mend_faces(vg_mesh *m, const double *points, vg_attributes *a, vg_note *notes, const char *subject,
+                   vg_err *e) VG_MUST_CHECK;
+
+/* ---- lines.c: text of fields between blanks, a thing per line; '#' in front of a field begins a comment ---- */
 
 enum { VGI_FIELDS = 8, VGI_SUBJECT = 300 };
 
@@ -134,8 +153,9 @@ typedef struct vgi_format {
     const char *suffix; /* ".obj" */
     bool (*sniff)(const unsigned char *data, size_t n); /* does it start like one? (first 4096 bytes or all) */
     /* read: fill *m, which is empty, from the whole file; on failure the caller clears it. `subject` is how messages
-     * call the file, quotes included: "'a.obj'" or "'b.obj' in 'a.zip'"; they add the line. The model is checked by
-     * the caller with vg_mesh_check; NaN and Inf are refused here. */
+     * call the file, quotes included: "'a.obj'" or "'b.obj' in 'a.zip'"; they add the line. The faces
+     * are checked by the caller with vgi_mend_faces; NaN and Inf are refused here. What is not used cannot stop it: it
+     * goes into m->note. */
     int (*read)(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e);
     /* write: append a file, up to what is the same for all poses of a sequence; rest: append that. NULL: nothing is. */
     int (*write)(vg_bytes *out, const vgi_writing *w, vg_err *e);
@@ -191,11 +211,12 @@ typedef struct vgi_sequence_format {
     /* Reading. Whatever the file says, memory grows only as bytes arrive: open has the first frame at hand before it
      * gives a count. open: fill h, which is empty: kind, count, mesh.nv; what the file knows of faces, attributes,
      * skeleton, reference, reference_name. No faces: they come from beside. No reference: it is the one from there,
-     * or the first pose. The caller checks the mesh. in is borrowed until close; subject is how messages call the
-     * file, quotes included, borrowed too. next: 1 and values of a frame that has been shaped, its time, and its name
+     * or the first pose. The caller checks the mesh. in is borrowed until close, how for the call; subject is how
+     * messages call the file, quotes included, borrowed too. next: 1 and values of a frame that has been shaped, its time, and its name
      * (left empty, it is called after the file); 0 when the file is read to its end, nothing behind it. close takes
      * what open made, also when open failed, and NULL. */
-    int (*open)(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e); /* NULL: only written */
+    int (*open)(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject,
+                vg_err *e); /* NULL: only written */
     int (*next)(void *state, vg_frame *f, vg_err *e);
     /* join (else NULL): for a file that says by name which joint is meant. Called once before next with the skeleton
      * (there is one) and reference that the frames are of; open then says nothing of the mesh.
@@ -203,6 +224,8 @@ typedef struct vgi_sequence_format {
     int (*join)(void *state, const vg_head *with, vg_err *e);
     /* how many the file announces; a single one is called like the file. NULL: unknown */
     uint64_t (*frames)(const void *state);
+    /* note (may be NULL): what open left out or put right, one line, empty when it was nothing. */
+    const char *(*note)(const void *state);
     void (*close)(void *state);
 
     /* Writing. kinds: which kinds of frames, 1 << VG_VERTICES and so on. h, o and out are borrowed until release.
@@ -290,6 +313,10 @@ int vgi_archive_open_for(vgi_archive **a, int fd, int64_t base, const char *name
 /* vgi_archive_next: 1, path (borrowed until the next call) and contents of the next file; 0 behind the last one. */
 int vgi_archive_next(vgi_archive *a, const char **path, vg_bytes *data, vg_err *e) VG_MUST_CHECK;
 void vgi_archive_close(vgi_archive **a);
+/* vgi_unpack_stream: 1 when the file, read from byte `base` on, is a stream that was compressed without an archive:
+ * unpacked whole into a file without a name, *stream, at its start; 0 when it is something else. fd is borrowed. */
+int vgi_unpack_stream(int fd, int64_t base, const char *name, const vgi_limits *limits, int *stream,
+                      vg_err *e) VG_MUST_CHECK;
 /* Writing. The bytes depend on names and contents only. */
 typedef struct vgi_packer vgi_packer;
 bool vgi_packer_knows(const char *name, size_t n); /* do the first n bytes of name end like an archive we write? */

@@ -43,12 +43,14 @@ typedef struct reading {
     double *values, *part_places, *part_turns;
 } reading;
 
-static int open_joints(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)
+static int open_joints(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject,
+                       vg_err *e)
 {
+    (void)how;
     reading *b = *state = vgi_array(1, sizeof *b, e);
     if (!b) return VG_ENOMEM;
     b->number = -1;
-    int r = vgi_input_slurp(in, &b->text, e);
+    int r = vgi_input_slurp_text(in, &b->text, e);
     if (r < 0) return r;
     b->lines = vgi_lines_of(b->text.data, b->text.size, subject);
     b->waiting = vgi_lines_next(&b->lines, &b->line);

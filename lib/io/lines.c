@@ -7,7 +7,9 @@ enum { SHOWN = 40 }; /* bytes of a field that a message shows */
 
 vgi_lines vgi_lines_of(const void *data, size_t n, const char *subject)
 {
-    return (vgi_lines){.at = data, .end = n ? (const char *)data + n : data, .subject = subject};
+    size_t mark = n ? vgi_mark_bytes(data, n) : 0;
+    return (vgi_lines){.at = n ? (const char *)data + mark : data, .end = n ? (const char *)data + n : data,
+                       .subject = subject};
 }
 
 const char *vgi_quote(const char *name, char subject[VGI_SUBJECT])
@@ -26,7 +28,8 @@ bool vgi_line_more(const vgi_line *l, const char **at, vgi_field *f)
     const char *p = *at;
     while (p < l->end && is_blank(*p)) p++;
     const char *begin = p;
-    while (p < l->end && !is_blank(*p) && *p != '#') p++;
+    if (p < l->end && *p != '#') /* within a word it is none: Windows writes NaN as "-1.#IND" */
+        while (p < l->end && !is_blank(*p)) p++;
     *f = (vgi_field){begin, p};
     *at = p;
     return p > begin;

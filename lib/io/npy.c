@@ -251,8 +251,10 @@ static int take_data(reading *x, vg_err *e)
                : r;
 }
 
-static int open_npy(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)
+static int open_npy(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject,
+                    vg_err *e)
 {
+    (void)how;
     size_t bytes;
     reading *x = *state = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;

@@ -15,14 +15,29 @@ const char *const vgi_npz_names[ARRAYS] = {
     "graph_vertices", "links", "names", "positions", "reference", "reference_name", "roots", "selected", "times",
     "transforms", "vectors"};
 
+/* What others call positions and faces; our own names go before these, and earlier ones before later ones. */
+static const struct {
+    const char *name;
+    enum array array;
+} other_names[] = {{"vertices", POSITIONS}, {"verts", POSITIONS}, {"v", POSITIONS}, {"points", POSITIONS},
+                   {"f", FACES},            {"triangles", FACES}};
+enum { OTHER_NAMES = sizeof other_names / sizeof *other_names, OWN_NAME = 0 };
+
 struct held {
     bool there;
+    const char *name; /* in the file */
+    size_t rank;      /* OWN_NAME, or that of other_names + 1 */
     vgi_npy a;
+    bool strided;     /* the axes have been put in another order: */
+    size_t stride[VGI_NPY_DIMENSIONS];
     vg_bytes data;
 };
 
 typedef struct reading {
     const char *subject;
+    char inventory[240]; /* all arrays of the file with their shapes, as far as there is room, for messages */
+    bool has_poses, has_betas;
+    vg_note note;
     struct held held[ARRAYS];
     enum array values; /* which of them holds the frames */
     size_t frames, count, width, nanchors, next;
@@ -33,12 +48,39 @@ static bool is_array_name(const char *path)
     return vgi_has_suffix(path, strlen(path), ".npy");
 }
 
-static enum array find_array(const char *path)
+static bool is_called(const char *path, const char *name)
 {
     size_t n = strlen(path) - 4;
+    return strlen(name) == n && !memcmp(name, path, n);
+}
+
+static enum array find_array(const char *path, const char **name, size_t *rank)
+{
     for (int i = 0; i < ARRAYS; i++)
-        if (strlen(vgi_npz_names[i]) == n && !memcmp(vgi_npz_names[i], path, n)) return (enum array)i;
+        if (is_called(path, *name = vgi_npz_names[i])) return *rank = OWN_NAME, (enum array)i;
+    for (size_t i = 0; i < OTHER_NAMES; i++)
+        if (is_called(path, *name = other_names[i].name)) return *rank = i + 1, other_names[i].array;
     return ARRAYS;
+}
+
+/* "positions (120, 6890, 3)" */
+static void list_array(reading *x, const char *path, const vg_bytes *data)
+{
+    vgi_npy a = {0};
+    size_t bytes, n = strlen(x->inventory);
+    vgi_input *in;
+    int known = vgi_input_memory(&in, data->data, data->size, path, NULL);
+    if (known == VG_OK) known = vgi_npy_read(&a, &bytes, in, "it", NULL);
+    vgi_input_free(&in);
+    x->has_poses |= is_called(path, "poses") || is_called(path, "pose");
+    x->has_betas |= is_called(path, "betas") || is_called(path, "trans");
+    if (n + 80 > sizeof x->inventory) return;
+    n += (size_t)snprintf(x->inventory + n, sizeof x->inventory - n, "%s%.*s (", n ? ", " : "",
+                          (int)(strlen(path) - 4 > 30 ? 30 : strlen(path) - 4), path);
+    for (size_t d = 0; known == VG_OK && d < a.ndim && n + 24 < sizeof x->inventory; d++)
+        n += (size_t)snprintf(x->inventory + n, sizeof x->inventory - n, "%s%llu", d ? ", " : "",
+                              (unsigned long long)a.shape[d]);
+    snprintf(x->inventory + n, sizeof x->inventory - n, known == VG_OK ? ")" : "?)");
 }
 
 /* `in` starts at an array that fills it to its end. */
@@ -46,10 +88,10 @@ static int hold(reading *x, enum array i, vgi_input *in, const char *subject, vg
 {
     struct held *h = &x->held[i];
     size_t bytes;
-    if (h->there) return vg_fail(e, VG_EINPUT, "%s is there twice", subject);
     int r = vgi_npy_read(&h->a, &bytes, in, subject, e);
     if (r < 0) return r;
     h->there = true;
+    h->data.size = 0;
     r = vgi_input_take(in, &h->data, bytes, NULL, e);
     if (r == VG_ETRUNC) return vg_fail(e, r, "%s ends too early", subject);
     if (r == VG_OK) r = vgi_input_ended(in, e);
@@ -59,11 +101,17 @@ static int hold(reading *x, enum array i, vgi_input *in, const char *subject, vg
 
 static int hold_member(reading *x, const char *path, const vg_bytes *data, vg_err *e)
 {
-    enum array i = find_array(path);
+    const char *name;
+    size_t rank = 0;
+    enum array i = find_array(path, &name, &rank);
     char subject[200];
     vgi_input *in;
+    list_array(x, path, data);
     if (i == ARRAYS) return VG_OK; /* a feature of somebody else's */
-    snprintf(subject, sizeof subject, "array '%s' in %.150s", vgi_npz_names[i], x->subject);
+    snprintf(subject, sizeof subject, "array '%s' in %.150s", name, x->subject);
+    if (x->held[i].there && x->held[i].rank == rank) return vg_fail(e, VG_EINPUT, "%s is there twice", subject);
+    if (x->held[i].there && x->held[i].rank < rank) return VG_OK;
+    x->held[i].name = name, x->held[i].rank = rank;
     int r = vgi_input_memory(&in, data->data, data->size, path, e);
     if (r == VG_OK) r = hold(x, i, in, subject, e);
     vgi_input_free(&in);
@@ -93,12 +141,12 @@ static int hold_all(reading *x, vgi_input *in, vg_err *e)
 
 static int wrong(const reading *x, enum array i, const char *what, vg_err *e)
 {
-    return vg_fail(e, VG_EINPUT, "array '%s' in %s %s", vgi_npz_names[i], x->subject, what);
+    return vg_fail(e, VG_EINPUT, "array '%s' in %s %s", x->held[i].name, x->subject, what);
 }
 
 static int missing(const reading *x, enum array i, enum array because, vg_err *e)
 {
-    return vg_fail(e, VG_EINPUT, "%s has an array '%s', but none called '%s'", x->subject, vgi_npz_names[because],
+    return vg_fail(e, VG_EINPUT, "%s has an array '%s', but none called '%s'", x->subject, x->held[because].name,
                    vgi_npz_names[i]);
 }
 
@@ -127,9 +175,9 @@ static size_t elements(const struct held *h)
 static const unsigned char *element(const struct held *h, size_t i)
 {
     size_t at = 0;
-    if (!h->a.fortran) return h->data.data + i * h->a.item;
+    if (!h->a.fortran && !h->strided) return h->data.data + i * h->a.item;
     for (size_t d = h->a.ndim; d-- > 0; i /= (size_t)h->a.shape[d])
-        at += i % (size_t)h->a.shape[d] * vgi_npy_stride(&h->a, d);
+        at += i % (size_t)h->a.shape[d] * (h->strided ? h->stride[d] : vgi_npy_stride(&h->a, d));
     return h->data.data + at * h->a.item;
 }
 
@@ -177,16 +225,6 @@ static int check_ascending(const reading *x, enum array i, const uint32_t *list,
     return VG_OK;
 }
 
-static int append_letter(vg_bytes *b, uint32_t c, vg_err *e)
-{
-    unsigned char s[4];
-    size_t n = c < 0x80 ? 1 : c < 0x800 ? 2 : c < 0x10000 ? 3 : 4;
-    static const unsigned char lead[5] = {0, 0, 0xc0, 0xe0, 0xf0};
-    for (size_t k = n; k-- > 1; c >>= 6) s[k] = (unsigned char)(0x80 | (c & 0x3f));
-    s[0] = (unsigned char)(lead[n] | c);
-    return vgi_bytes_append(b, s, n, e);
-}
-
 /* Text of 'U' or 'S', without the NULs that fill it up. */
 static int text_at(const reading *x, enum array i, size_t k, char **text, vg_err *e)
 {
@@ -201,7 +239,7 @@ static int text_at(const reading *x, enum array i, size_t k, char **text, vg_err
         if (step == 1) r = vgi_bytes_append(&b, p + at, 1, e);
         else if (c > 0x10ffff || (c >= 0xd800 && c < 0xe000))
             r = wrong(x, i, "holds a letter that does not exist", e);
-        else r = append_letter(&b, c, e);
+        else r = vgi_append_letter(&b, c, e);
     }
     if (r == VG_OK && !vgi_is_utf8((char *)b.data, b.size)) r = wrong(x, i, "holds text that is no UTF-8", e);
     if (r == VG_OK && !(*text = vgi_copy_string((char *)b.data, b.size, e))) r = VG_ENOMEM;
@@ -211,7 +249,96 @@ static int text_at(const reading *x, enum array i, size_t k, char **text, vg_err
 
 /* ---- the head ---- */
 
-static int choose_values(reading *x, vg_head *h, vg_err *e)
+static int holds_no_frames(const reading *x, vg_err *e)
+{
+    if (x->has_poses && x->has_betas)
+        return vg_fail(e, VG_EINPUT,
+                       "%s holds angles of a body model (SMPL: poses, betas) and no vertices: let the model make the "
+                       "vertices first; it has: %s",
+                       x->subject, x->inventory);
+    return vg_fail(e, VG_EINPUT,
+                   "%s has no array of positions (called positions, vertices, verts, v or points), vectors or "
+                   "deformations; it has: %s",
+                   x->subject, *x->inventory ? x->inventory : "nothing");
+}
+
+/* ---- axes: frames, vertices and x y z in any order ---- */
+
+/* The vertices that the faces or the reference ask for; exact: there are no more. 0: nothing tells. */
+static size_t vertices_wanted(const reading *x, bool *exact)
+{
+    const struct held *r = &x->held[REFERENCE];
+    size_t most = 0;
+    *exact = false;
+    if (r->there && r->a.ndim == 2) return *exact = true, (size_t)r->a.shape[0];
+    static const enum array lists[] = {FACES, FACE_VERTICES};
+    for (int i = 0; i < 2; i++) {
+        const struct held *h = &x->held[lists[i]];
+        if (!h->there || (h->a.kind != 'i' && h->a.kind != 'u') || h->a.item > 8) continue;
+        for (size_t k = 0, n = elements(h); k < n; k++) {
+            int64_t v = integer_at(h, k);
+            if (v >= 0 && (size_t)v + 1 > most) most = (size_t)v + 1;
+        }
+    }
+    return most;
+}
+
+/* frames, vertices, x y z: which axis counts each */
+static void order_axes(struct held *h, const int axis[3])
+{
+    uint64_t shape[3];
+    for (int d = 0; d < 3; d++) shape[d] = h->a.shape[axis[d]], h->stride[d] = vgi_npy_stride(&h->a, (size_t)axis[d]);
+    memcpy(h->a.shape, shape, sizeof shape);
+    h->strided = true;
+}
+
+static int named_axes(reading *x, struct held *h, const char *axes, vg_err *e)
+{
+    static const char letters[] = "fvx";
+    int axis[3];
+    for (int k = 0; k < 3; k++) {
+        const char *at = strchr(axes, letters[k]);
+        if (!at || strlen(axes) != 3)
+            return vg_fail(e, VG_EARG, "'%.20s' are no axes: an order of f (frames), v (vertices) and x (x y z)", axes);
+        axis[k] = (int)(at - axes);
+    }
+    if (h->a.ndim != 3) return wrong(x, POSITIONS, "has not the three axes that were named", e);
+    order_axes(h, axis);
+    return VG_OK;
+}
+
+/* 0: these axes cannot be frames, vertices, x y z; 1: they can; 2: the vertices are as many as are wanted. */
+static int suits(const uint64_t *shape, const int axis[3], size_t wanted, bool exact)
+{
+    const uint64_t nv = shape[axis[1]];
+    if (shape[axis[2]] != 3 || nv < wanted || (exact && nv != wanted)) return 0;
+    return wanted && nv == wanted ? 2 : 1;
+}
+
+/* As (frames, vertices, 3) where that can be, else in the only other order that can be. */
+static int find_axes(reading *x, struct held *h, vg_err *e)
+{
+    static const int orders[6][3] = {{0, 1, 2}, {1, 0, 2}, {2, 0, 1}, {0, 2, 1}, {1, 2, 0}, {2, 1, 0}};
+    bool exact;
+    size_t wanted;
+    int best = 0, score = 0, equals = 0;
+    if (h->a.ndim != 3) return VG_OK;
+    wanted = vertices_wanted(x, &exact);
+    if (suits(h->a.shape, orders[0], wanted, exact)) return VG_OK;
+    for (int i = 1; i < 6; i++) {
+        int s = suits(h->a.shape, orders[i], wanted, exact);
+        equals = s == score ? equals + 1 : s > score ? 1 : equals;
+        if (s > score) best = i, score = s;
+    }
+    if (score == 0) return VG_OK;
+    if (equals > 1)
+        return wrong(x, POSITIONS, "has axes that cannot be told apart: name them with --array-axes (vxf: vertices, "
+                     "x y z, frames)", e);
+    order_axes(h, orders[best]);
+    return VG_OK;
+}
+
+static int choose_values(reading *x, vg_head *h, const vg_reading *how, vg_err *e)
 {
     static const enum array all[] = {POSITIONS, VECTORS, DEFORMATIONS};
     static const vg_kind kinds[] = {VG_VERTICES, VG_VECTORS, VG_DEFORMATIONS};
@@ -223,14 +350,16 @@ static int choose_values(reading *x, vg_head *h, vg_err *e)
                            vgi_npz_names[all[found]], vgi_npz_names[all[i]]);
         found = i;
     }
-    if (found < 0)
-        return vg_fail(e, VG_EINPUT, "%s has none of the arrays 'positions', 'vectors' and 'deformations'",
-                       x->subject);
+    if (found < 0) return holds_no_frames(x, e);
     struct held *v = &x->held[x->values = all[found]];
     vgi_npy *a = &v->a;
     x->width = vg_kind_width(kinds[found]);
     if (!is_float(v))
         return wrong(x, x->values, "holds no binary32 or binary64 numbers: store it as float32 or float64", e);
+    if (x->values == POSITIONS) {
+        int r = how->array_axes ? named_axes(x, v, how->array_axes, e) : find_axes(x, v, e);
+        if (r < 0) return r;
+    }
     if (a->ndim == 2) { /* one frame */
         a->shape[2] = a->shape[1], a->shape[1] = a->shape[0], a->shape[0] = 1;
         a->ndim = 3;
@@ -365,15 +494,32 @@ static int check_labels(const reading *x, vg_err *e)
     return VG_OK;
 }
 
-static int open_npz(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)
+/* Faces that no mesh may have go, unless the frames are counted by their corners. */
+static int mend(reading *x, vg_head *h, vg_err *e)
+{
+    if (h->kind != VG_VERTICES || !h->body.mesh.nf) return VG_OK;
+    double *first = vgi_array_raw(x->count, 3 * sizeof *first, e);
+    int r = first ? copy_floats(x, x->values, 0, 3 * x->count, first, e) : VG_ENOMEM;
+    if (r == VG_OK) r = vgi_mend_faces(&h->body.mesh, first, NULL, &x->note, x->subject, e);
+    free(first);
+    return r;
+}
+
+static const char *note_of(const void *state)
+{
+    return ((const reading *)state)->note.text;
+}
+
+static int open_npz(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject, vg_err *e)
 {
     reading *x = *state = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
     x->subject = subject;
     int r = hold_all(x, in, e);
-    if (r == VG_OK) r = choose_values(x, h, e);
+    if (r == VG_OK) r = choose_values(x, h, how, e);
     if (r == VG_OK) r = take_reference(x, h, e);
     if (r == VG_OK) r = take_faces(x, h, e);
+    if (r == VG_OK) r = mend(x, h, e);
     if (r == VG_OK) r = take_graph(x, h, e);
     return r < 0 ? r : check_labels(x, e);
 }
@@ -439,7 +585,8 @@ const vgi_sequence_format vgi_sequence_npz = {
     .name = "npz", .suffix = ".npz",
     .keeps = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_NAMES | VGI_KEEPS_TIMES |
              VGI_KEEPS_DOUBLES,
-    .sniff = sniff_npz, .open = open_npz, .next = next_npz, .frames = count_frames, .close = close_npz,
+    .sniff = sniff_npz, .open = open_npz, .next = next_npz, .frames = count_frames, .note = note_of,
+    .close = close_npz,
     .kinds = 1 << VG_VERTICES | 1 << VG_VECTORS | 1 << VG_DEFORMATIONS | 1 << VG_TRANSFORMS,
     .begin = vgi_npz_begin, .put = vgi_npz_put, .end = vgi_npz_end, .warning = vgi_npz_warning,
     .release = vgi_npz_release};

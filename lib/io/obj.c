@@ -7,10 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum {
-    SMALL_FACE = 16, /* up to here pairs of vertices are compared directly */
-    SHOWN = 40       /* bytes of the input that a message shows */
-};
+enum { SHOWN = 40 }; /* bytes of the input that a message shows */
 
 /* A file being read. Arrays are those of the model; these are their capacities. */
 struct reading {
@@ -24,8 +21,7 @@ struct reading {
     bool textured;      /* corner_tex is there, vert_cap long */
     size_t sought_face; /* find_face: stop behind this face ... */
     const char *found;  /* ... and say where its statement is */
-    uint32_t *scratch;  /* a large face, sorted */
-    size_t scratch_cap;
+    size_t bad_tex;     /* texture coordinates that are none */
 };
 
 static size_t line_of(const struct reading *r, const char *p)
@@ -49,12 +45,26 @@ static const char *continuation(const struct reading *r, const char *p)
     return *p == r->line_end ? p + 1 : NULL;
 }
 
+static bool is_odd_blank(const struct reading *r, char c)
+{
+    return c == ' ' || c == '\t' || (c == '\r' && r->line_end != '\r');
+}
+
+/* Between numbers lines are joined by a backslash with blanks behind it, too, which editors leave there. A name may end
+ * like that. */
+static const char *loose_continuation(const struct reading *r, const char *p)
+{
+    if (*p++ != '\\') return NULL;
+    while (p < r->end && is_odd_blank(r, *p)) p++;
+    return p == r->end ? p : *p == r->line_end ? p + 1 : NULL;
+}
+
 static const char *skip_odd_blanks(const struct reading *r, const char *p)
 {
     while (p < r->end) {
         const char *next;
-        if (*p == ' ' || *p == '\t' || (*p == '\r' && r->line_end != '\r')) p++;
-        else if (*p == '\\' && (next = continuation(r, p))) p = next;
+        if (is_odd_blank(r, *p)) p++;
+        else if (*p == '\\' && (next = loose_continuation(r, p))) p = next;
         else break;
     }
     return p;
@@ -99,6 +109,15 @@ static inline bool ends_word(const struct reading *r, const char *p)
     return is_line_end(r, p) || *p == ' ' || *p == '\t' || *p == '\r' || *p == '\\';
 }
 
+/* Words that nobody wants, up to the end of the statement or a comment. */
+static const char *skip_words(const struct reading *r, const char *p)
+{
+    for (p = skip_blanks(r, p); !at_end(r, p); p = skip_blanks(r, p))
+        do p++;
+        while (!ends_word(r, p));
+    return p;
+}
+
 /* Does the word at p equal `word`? */
 static bool is_word(const struct reading *r, const char *p, const char *word)
 {
@@ -116,30 +135,23 @@ static int fail_at(const struct reading *r, const char *p, const char *expected)
                    (int)n, p);
 }
 
-/* Up to `most` numbers into x, and how many there were into *n; all that follow must be numbers too, if `extra`. */
-static const char *read_numbers(struct reading *r, const char *p, double *x, size_t most, bool extra, size_t *n)
+/* VG_EINPUT: the word at p, which begins like a number, is none or not finite; Windows writes NaN as "-1.#IND". */
+static int fail_number(const struct reading *r, const char *p)
 {
-    *n = 0;
-    for (;;) {
-        const char *word = skip_blanks(r, p);
-        if (at_end(r, word)) return word;
-        double value;
-        const char *next = word > p && (*n < most || extra) ? vgi_parse_double(word, r->end, &value) : NULL;
-        if (!next) {
-            fail_at(r, word, *n < most || extra ? "a number" : "end of line");
-            return NULL;
-        }
-        if (*n < most) {
-            if (!isfinite(value)) {
-                vg_fail(r->e, VG_EINPUT, "%s line %zu: '%.*s' is not a finite number", r->subject, line_of(r, word),
-                        next - word > SHOWN ? SHOWN : (int)(next - word), word);
-                return NULL;
-            }
-            x[*n] = value;
-        }
-        ++*n;
-        p = next;
-    }
+    size_t n = 0;
+    while (n < SHOWN && !ends_word(r, p + n)) n++;
+    return vg_fail(r->e, VG_EINPUT, "%s line %zu: '%.*s' is not a finite number", r->subject, line_of(r, p), (int)n, p);
+}
+
+/* One of the numbers of a vertex at p, which blanks stand before; what follows it, or NULL. */
+static inline const char *read_coordinate(struct reading *r, const char *p, double *x)
+{
+    const char *word = skip_blanks(r, p);
+    const char *next = word > p && !is_line_end(r, word) ? vgi_parse_double(word, r->end, x) : NULL;
+    if (next && isfinite(*x) && ends_word(r, next)) return next;
+    if (next) fail_number(r, word);
+    else fail_at(r, word, "a number");
+    return NULL;
 }
 
 static const char *read_vertex(struct reading *r, const char *p)
@@ -152,19 +164,34 @@ static const char *read_vertex(struct reading *r, const char *p)
     if (m->mesh.nv >= r->vertices_cap &&
         vgi_grow(&m->vertices, &r->vertices_cap, m->mesh.nv + 1, 3 * sizeof *m->vertices, r->e) < 0)
         return NULL;
-    size_t n;
-    const char *next = read_numbers(r, p, m->vertices + 3 * m->mesh.nv, 3, true, &n);
-    if (!next) return NULL;
-    if (n < 3) {
-        vg_fail(r->e, VG_EINPUT, "%s line %zu: vertex with %zu numbers (expected x y z)", r->subject, line_of(r, p),
-                n);
-        return NULL;
+    const char *statement = p;
+    double *to = m->vertices + 3 * m->mesh.nv++;
+    for (int k = 0; k < 3 && p; k++) {
+        if (at_end(r, skip_blanks(r, p))) {
+            vg_fail(r->e, VG_EINPUT, "%s line %zu: vertex with %d numbers (expected x y z)", r->subject,
+                    line_of(r, statement), k);
+            return NULL;
+        }
+        p = read_coordinate(r, p, to + k);
     }
-    m->mesh.nv++;
-    return next;
+    if (!p) return NULL;
+    return skip_words(r, p);
 }
 
-/* Three numbers are kept of each; finish_tex packs them to what the file has. */
+/* One to three finite numbers and nothing else: how many; 0: it is something else. */
+static uint32_t take_tex(const struct reading *r, const char *p, double x[3])
+{
+    for (uint32_t n = 0;; n++) {
+        const char *word = skip_blanks(r, p);
+        if (at_end(r, word)) return n;
+        const char *next = word > p && n < 3 ? vgi_parse_double(word, r->end, &x[n]) : NULL;
+        if (!next || !ends_word(r, next) || !isfinite(x[n])) return 0;
+        p = next;
+    }
+}
+
+/* Three numbers are kept of each; finish_tex packs them to what the file has. One that is no number is marked by a
+ * NaN. */
 static const char *read_tex(struct reading *r, const char *p)
 {
     vg_attributes *a = &r->m->attributes;
@@ -174,23 +201,17 @@ static const char *read_tex(struct reading *r, const char *p)
     }
     if (a->ntex >= r->tex_cap && vgi_grow(&a->tex, &r->tex_cap, a->ntex + 1, 3 * sizeof *a->tex, r->e) < 0)
         return NULL;
-    double *x = a->tex + 3 * a->ntex;
+    double *x = a->tex + 3 * a->ntex++;
     x[0] = x[1] = x[2] = 0;
-    size_t n;
-    const char *next = read_numbers(r, p, x, 3, false, &n);
-    if (!next) return NULL;
-    if (n == 0) {
-        fail_at(r, skip_blanks(r, p), "a number");
-        return NULL;
-    }
-    if (n > a->tex_dim) a->tex_dim = (uint32_t)n;
-    a->ntex++;
-    return next;
+    uint32_t n = take_tex(r, p, x);
+    if (n == 0) r->bad_tex++, x[0] = NAN;
+    if (n > a->tex_dim) a->tex_dim = n;
+    return skip_words(r, p);
 }
 
 /* An index at p, counted from 1, or from the end when negative, into *index, counted from 0. Whether it is below the
  * final count is seen at the end of the file: it may come before what it names. */
-static inline const char *read_index(struct reading *r, const char *p, size_t count, uint32_t *index)
+static inline const char *read_index(const struct reading *r, const char *p, size_t count, uint32_t *index)
 {
     const char *s = p, *end = r->end;
     bool negative = s < end && *s == '-';
@@ -218,6 +239,20 @@ static inline const char *read_index(struct reading *r, const char *p, size_t co
         vg_fail(r->e, VG_EINPUT, "%s line %zu: index %.*s is out of range", r->subject, line_of(r, p),
                 s - p > SHOWN ? SHOWN : (int)(s - p), p);
     return NULL;
+}
+
+/* The same for a texture coordinate. One that cannot be there costs the corner nothing else: it is UINT32_MAX - 1. */
+static const char *read_tex_index(const struct reading *r, const char *p, uint32_t *index)
+{
+    int64_t x;
+    const char *s = *p == '+' ? NULL : vgi_parse_int(p, r->end, &x);
+    if (!s) {
+        fail_at(r, p, "an index");
+        return NULL;
+    }
+    if (x < 0) x += (int64_t)r->m->attributes.ntex + 1;
+    *index = x > 0 && x < UINT32_MAX ? (uint32_t)(x - 1) : UINT32_MAX - 1;
+    return s;
 }
 
 static int grow_corners(struct reading *r, size_t need)
@@ -255,7 +290,7 @@ static inline const char *read_corner(struct reading *r, const char *p)
     if (p < r->end && *p == '/') {
         p++;
         if (p < r->end && (unsigned char)*p > ' ' && *p != '/' && *p != '\\') {
-            p = read_index(r, p, m->attributes.ntex, &tex);
+            p = read_tex_index(r, p, &tex);
             if (!p || (!r->textured && start_texture(r) < 0)) return NULL;
         }
         if (p < r->end && *p == '/') {
@@ -269,39 +304,10 @@ static inline const char *read_corner(struct reading *r, const char *p)
     return p;
 }
 
-static int compare_indices(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return (x > y) - (x < y);
-}
-
-/* Is a vertex twice among these? *which says which. Negative: no memory. */
-static int has_repeated(struct reading *r, const uint32_t *vert, size_t n, uint32_t *which)
-{
-    if (n <= SMALL_FACE) {
-        for (size_t i = 1; i < n; i++)
-            for (size_t j = 0; j < i; j++)
-                if (vert[i] == vert[j]) return *which = vert[i], 1;
-        return 0;
-    }
-    if (vgi_grow(&r->scratch, &r->scratch_cap, n, sizeof *vert, r->e) < 0) return VG_ENOMEM;
-    memcpy(r->scratch, vert, n * sizeof *vert);
-    qsort(r->scratch, n, sizeof *vert, compare_indices);
-    for (size_t i = 1; i < n; i++)
-        if (r->scratch[i] == r->scratch[i - 1]) return *which = r->scratch[i], 1;
-    return 0;
-}
-
 /* The corners from `first` on are a new face. */
-static inline int end_face(struct reading *r, const char *p, size_t first, size_t size)
+static inline int end_face(struct reading *r, size_t first, size_t size)
 {
     vg_mesh *mesh = &r->m->mesh;
-    uint32_t which = 0;
-    int repeated = has_repeated(r, mesh->vert + first, size, &which);
-    if (repeated < 0) return repeated;
-    if (repeated)
-        return vg_fail(r->e, VG_EINPUT, "%s line %zu: vertex %zu is twice in one face", r->subject, line_of(r, p),
-                       (size_t)which + 1);
     if (mesh->nf + 2 > r->start_cap &&
         vgi_grow(&mesh->start, &r->start_cap, mesh->nf + 2, sizeof *mesh->start, r->e) < 0)
         return VG_ENOMEM;
@@ -309,8 +315,8 @@ static inline int end_face(struct reading *r, const char *p, size_t first, size_
     return VG_OK;
 }
 
-/* The n corners from `first` on are a polyline: every two of them are a face. */
-static int end_line(struct reading *r, const char *p, size_t first, size_t n)
+/* The n >= 2 corners from `first` on are a polyline: every two of them are a face. */
+static int end_line(struct reading *r, size_t first, size_t n)
 {
     size_t segments = n - 1;
     if (first + 2 * segments > r->vert_cap && grow_corners(r, first + 2 * segments) < 0) return VG_ENOMEM;
@@ -324,7 +330,7 @@ static int end_line(struct reading *r, const char *p, size_t first, size_t n)
     }
     r->corners = first + 2 * segments;
     for (size_t i = 0; i < segments; i++) {
-        int result = end_face(r, p, first + 2 * i, 2);
+        int result = end_face(r, first + 2 * i, 2);
         if (result < 0) return result;
     }
     return VG_OK;
@@ -348,12 +354,7 @@ static const char *read_face(struct reading *r, const char *p, bool line)
         if (!p) return NULL;
     }
     size_t n = r->corners - first;
-    if (n < 2) {
-        vg_fail(r->e, VG_EINPUT, "%s line %zu: %s with %zu vertices", r->subject, line_of(r, statement),
-                line ? "line" : "face", n);
-        return NULL;
-    }
-    if ((line ? end_line(r, statement, first, n) : end_face(r, statement, first, n)) < 0) return NULL;
+    if ((line && n > 2 ? end_line(r, first, n) : end_face(r, first, n)) < 0) return NULL;
     if (r->m->mesh.nf > r->sought_face) {
         r->found = statement;
         return r->end;
@@ -431,7 +432,6 @@ static const char *read_statement(struct reading *r, const char *p)
 static int read_statements(struct reading *r)
 {
     const char *p = r->data;
-    if (r->end - p >= 3 && !memcmp(p, "\xef\xbb\xbf", 3)) p += 3;
     if (vgi_grow(&r->m->mesh.start, &r->start_cap, 1, sizeof *r->m->mesh.start, r->e) < 0) return VG_ENOMEM;
     r->m->mesh.start[0] = 0;
     while (p < r->end) {
@@ -467,7 +467,6 @@ static size_t line_of_face(const struct reading *r, size_t face)
     s.sought_face = face;
     size_t line = read_statements(&s) == VG_OK && s.found ? line_of(r, s.found) : 0;
     vg_model_clear(&again);
-    free(s.scratch);
     return line;
 }
 
@@ -482,33 +481,65 @@ static size_t face_of_corner(const vg_mesh *m, size_t corner)
     return low;
 }
 
-/* Every index below `count`, or (for texture coordinates) UINT32_MAX. */
-static int check_indices(const struct reading *r, const uint32_t *index, size_t count, bool may_miss,
-                         const char *what)
+/* Every vertex is there. */
+static int check_vertices(const struct reading *r)
 {
-    for (size_t c = 0; c < r->corners; c++) {
-        if (index[c] < count || (may_miss && index[c] == UINT32_MAX)) continue;
-        return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s %zu is out of range, there are %zu", r->subject,
-                       line_of_face(r, face_of_corner(&r->m->mesh, c)), what, (size_t)index[c] + 1, count);
-    }
+    const vg_mesh *m = &r->m->mesh;
+    for (size_t c = 0; c < r->corners; c++)
+        if (m->vert[c] >= m->nv)
+            return vg_fail(r->e, VG_EINPUT, "%s line %zu: vertex %zu is out of range, there are %zu", r->subject,
+                           line_of_face(r, face_of_corner(m, c)), (size_t)m->vert[c] + 1, m->nv);
     return VG_OK;
 }
 
-/* Texture coordinates to as many numbers as the longest has, and an entry for each corner. */
+/* Texture coordinates that are numbers move up; number_of says where to. */
+static void pack_tex(vg_attributes *a, uint32_t *number_of)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < a->ntex; i++) {
+        const double x[3] = {a->tex[3 * i], a->tex[3 * i + 1], a->tex[3 * i + 2]};
+        number_of[i] = isnan(x[0]) ? UINT32_MAX : (uint32_t)kept;
+        if (isnan(x[0])) continue;
+        for (size_t k = 0; k < a->tex_dim; k++) a->tex[kept * a->tex_dim + k] = x[k];
+        kept++;
+    }
+    a->ntex = kept;
+}
+
+/* How many corners ask for a texture coordinate that is not there: they have none now. */
+static size_t renumber_tex(const struct reading *r, const uint32_t *number_of, size_t n)
+{
+    uint32_t *tex = r->m->attributes.corner_tex;
+    size_t missing = 0;
+    for (size_t c = 0; c < r->corners; c++) {
+        missing += tex[c] != UINT32_MAX && tex[c] >= n;
+        tex[c] = tex[c] < n ? number_of[tex[c]] : UINT32_MAX;
+    }
+    return missing;
+}
+
+/* Texture coordinates to as many numbers as the longest has, and an entry for each corner; a bad one costs nothing but
+ * itself. */
 static int finish_tex(struct reading *r)
 {
     vg_attributes *a = &r->m->attributes;
-    if (!a->ntex) return VG_OK;
-    if (!r->textured) {
+    const size_t n = a->ntex;
+    if (!r->textured && n) {
         a->corner_tex = vgi_array_raw(r->corners, sizeof *a->corner_tex, r->e);
         if (!a->corner_tex) return VG_ENOMEM;
         memset(a->corner_tex, 0xff, r->corners * sizeof *a->corner_tex);
     }
-    if (a->tex_dim == 3) return VG_OK;
-    for (size_t i = 0; i < a->ntex; i++)
-        for (size_t k = 0; k < a->tex_dim; k++) a->tex[i * a->tex_dim + k] = a->tex[3 * i + k];
-    double *fitting = realloc(a->tex, a->ntex * a->tex_dim * sizeof *a->tex);
-    if (fitting) a->tex = fitting;
+    uint32_t *number_of = vgi_array_raw(n, sizeof *number_of, r->e);
+    if (!number_of) return VG_ENOMEM;
+    pack_tex(a, number_of);
+    size_t missing = a->corner_tex ? renumber_tex(r, number_of, n) : 0;
+    free(number_of);
+    if (r->bad_tex) vgi_note(&r->m->note, "left out %zu texture coordinates that are no finite numbers", r->bad_tex);
+    if (missing) vgi_note(&r->m->note, "%zu corners name texture coordinates that are not there", missing);
+    if (a->ntex) return VG_OK;
+    free(a->tex);
+    free(a->corner_tex);
+    a->tex = NULL, a->corner_tex = NULL, a->tex_dim = 0;
     return VG_OK;
 }
 
@@ -517,12 +548,9 @@ static int read_obj(vg_model *m, const char *data, size_t n, const char *subject
     vg_err own;
     struct reading r = start_reading(m, data, n, subject, e ? e : &own);
     int result = read_statements(&r);
-    free(r.scratch);
     if (result < 0) return result;
     if (m->mesh.nv == 0) return vg_fail(e, VG_EINPUT, "%s has no vertices (no line 'v x y z')", subject);
-    result = check_indices(&r, m->mesh.vert, m->mesh.nv, false, "vertex");
-    if (result == VG_OK && r.textured)
-        result = check_indices(&r, m->attributes.corner_tex, m->attributes.ntex, true, "texture coordinate");
+    result = check_vertices(&r);
     return result == VG_OK ? finish_tex(&r) : result;
 }
 
@@ -533,7 +561,6 @@ static bool sniff_obj(const unsigned char *data, size_t n)
     static const char *const named[] = {"o", "g", "s", "usemtl", "mtllib", "cstype", "deg"};
     struct reading r = start_reading(NULL, (const char *)data, n, NULL, NULL);
     const char *p = r.data;
-    if (n >= 3 && !memcmp(p, "\xef\xbb\xbf", 3)) p += 3;
     for (;;) {
         while ((p = skip_blanks(&r, p)) < r.end && *p == r.line_end) p++;
         if (p == r.end) return false;

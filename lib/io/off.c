@@ -1,5 +1,9 @@
 /* off.c: OFF, the object file format of Geomview, as text: vertices and faces.
  * Leaves out normals, colours and texture coordinates (skipped), binary files and other dimensions than 3 (refused).
+ *
+ * OFF is a sequence of words, whatever the lines; only colours, normals and the like, which may or may not be there, are
+ * told by the end of the line. So a file is read so that what stands behind an element on its line is passed over, and
+ * when that fails, as words alone.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -11,88 +15,84 @@ enum { MOST_NUMBER = 26, MOST_INDEX = 11, SHOWN = 40 };
 /* ------------------------------------------------------------------------------------------- reading -- */
 
 struct reading {
-    const char *data, *end;
-    char line_end;                /* '\n', or '\r' in a file that has no '\n' */
-    const char *line, *line_stop; /* the present line without its comment; */
-    const char *p;                /* what is not read of it yet */
-    const char *next;             /* and the line behind it */
+    const char *data, *end, *p;
+    bool bare; /* words alone: three to a vertex, no colours */
     const char *subject;
     vg_err *e;
     vg_model *m;
     size_t start_cap, vert_cap, corners;
 };
 
-static size_t line_number(const struct reading *r)
+static bool is_blank(char c)
+{
+    return c == ' ' || c == '\t';
+}
+
+static bool is_line_end(char c)
+{
+    return c == '\n' || c == '\r';
+}
+
+/* LF, CR LF and CR end lines. */
+static size_t line_of(const struct reading *r, const char *p)
 {
     size_t n = 1;
-    for (const char *q = r->data; q < r->line && (q = memchr(q, r->line_end, (size_t)(r->line - q))); q++) n++;
+    for (const char *q = r->data; q < p; q++) n += *q == '\n' || (*q == '\r' && (q + 1 == r->end || q[1] != '\n'));
     return n;
 }
 
-static bool is_blank(char c)
+static void skip_line(struct reading *r)
 {
-    return c == ' ' || c == '\t' || c == '\r';
+    while (r->p < r->end && !is_line_end(*r->p)) r->p++;
 }
 
-static void skip_blanks(struct reading *r)
+/* To the next word; false at the end of the file. */
+static bool find_word(struct reading *r)
 {
-    while (r->p < r->line_stop && is_blank(*r->p)) r->p++;
-}
-
-/* The next line that holds more than blanks and a comment; false at the end of the file. */
-static bool next_line(struct reading *r)
-{
-    while (r->next < r->end) {
-        r->line = r->p = r->next;
-        const char *stop = memchr(r->line, r->line_end, (size_t)(r->end - r->line));
-        r->next = stop ? stop + 1 : r->end;
-        if (!stop) stop = r->end;
-        const char *comment = memchr(r->line, '#', (size_t)(stop - r->line));
-        r->line_stop = comment ? comment : stop;
-        skip_blanks(r);
-        if (r->p < r->line_stop) return true;
+    for (;;) {
+        while (r->p < r->end && (is_blank(*r->p) || is_line_end(*r->p))) r->p++;
+        if (r->p == r->end || *r->p != '#') return r->p < r->end;
+        skip_line(r);
     }
-    r->p = r->line_stop = r->end;
-    return false;
 }
 
-static int fail_here(struct reading *r, const char *expected)
+/* Is there another word in this line? */
+static bool line_goes_on(struct reading *r)
+{
+    while (r->p < r->end && is_blank(*r->p)) r->p++;
+    return r->p < r->end && !is_line_end(*r->p) && *r->p != '#';
+}
+
+static bool ends_word(const struct reading *r, const char *p)
+{
+    return p == r->end || is_blank(*p) || is_line_end(*p);
+}
+
+static int fail_here(const struct reading *r, const char *expected)
 {
     int n = 0;
-    while (n < SHOWN && r->p + n < r->line_stop && !is_blank(r->p[n])) n++;
-    if (n == 0) return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s expected", r->subject, line_number(r), expected);
-    return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s expected, not '%.*s'", r->subject, line_number(r), expected, n,
+    while (n < SHOWN && !ends_word(r, r->p + n)) n++;
+    if (n == 0) return vg_fail(r->e, VG_ETRUNC, "%s ends where %s is expected", r->subject, expected);
+    return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s expected, not '%.*s'", r->subject, line_of(r, r->p), expected, n,
                    r->p);
-}
-
-/* Is the present line read up to a blank or its end? */
-static bool at_word_end(const struct reading *r)
-{
-    return r->p == r->line_stop || is_blank(*r->p);
 }
 
 static int read_count(struct reading *r, size_t *n)
 {
-    int64_t x;
-    skip_blanks(r);
-    const char *before = r->p, *after = vgi_parse_int(r->p, r->line_stop, &x);
-    if (after) r->p = after;
-    if (after && at_word_end(r) && x >= 0) {
-        *n = (size_t)x;
-        return VG_OK;
-    }
-    r->p = before;
-    return fail_here(r, "a count");
+    int64_t x = 0;
+    const char *after = find_word(r) ? vgi_parse_int(r->p, r->end, &x) : NULL;
+    if (!after || !ends_word(r, after) || x < 0) return fail_here(r, "a count");
+    r->p = after;
+    *n = (size_t)x;
+    return VG_OK;
 }
 
-static int read_number(struct reading *r, double *x)
+static int read_coordinate(struct reading *r, double *x)
 {
-    skip_blanks(r);
-    const char *before = r->p, *after = vgi_parse_double(r->p, r->line_stop, x);
-    if (after) r->p = after;
-    if (after && at_word_end(r)) return VG_OK;
-    r->p = before;
-    return fail_here(r, "a number");
+    const char *after = find_word(r) ? vgi_parse_double(r->p, r->end, x) : NULL;
+    if (!after || !ends_word(r, after) || !isfinite(*x)) return fail_here(r, "a finite number");
+    r->p = after;
+    return VG_OK;
 }
 
 /* The keyword at s, [ST][C][N][4][n]OFF: its length, or 0. */
@@ -107,39 +107,33 @@ static size_t keyword(const char *s, const char *end)
     if (end - p < 3 || memcmp(p, "OFF", 3)) return 0;
     p += 3;
     /* some writers forget the line end before the counts */
-    bool ends = p == end || is_blank(*p) || *p == '\n' || *p == '#' || (*p >= '0' && *p <= '9');
+    bool ends = p == end || is_blank(*p) || is_line_end(*p) || *p == '#' || (*p >= '0' && *p <= '9');
     return ends ? (size_t)(p - s) : 0;
 }
 
+/* The keyword and the counts: of vertices, of faces, and of edges, which some writers leave out. */
 static int read_header(struct reading *r, size_t *nv, size_t *nf)
 {
-    if (!next_line(r)) return vg_fail(r->e, VG_EINPUT, "%s does not start like OFF", r->subject);
-    size_t n = keyword(r->p, r->line_stop);
+    size_t n = find_word(r) ? keyword(r->p, r->end) : 0, edges;
     if (n == 0) return fail_here(r, "OFF");
     if (memchr(r->p, 'n', n) || memchr(r->p, '4', n))
         return vg_fail(r->e, VG_EINPUT, "%s is %.*s, with vertices of other than 3 coordinates, which is not read",
                        r->subject, (int)n, r->p);
     r->p += n;
-    skip_blanks(r);
-    if (r->line_stop - r->p >= 6 && !memcmp(r->p, "BINARY", 6))
+    if (line_goes_on(r) && r->end - r->p >= 6 && !memcmp(r->p, "BINARY", 6))
         return vg_fail(r->e, VG_EINPUT, "%s is binary OFF, which is not read: write it as text", r->subject);
-    if (r->p == r->line_stop && !next_line(r))
-        return vg_fail(r->e, VG_ETRUNC, "%s ends before the counts of vertices and faces", r->subject);
     int result = read_count(r, nv);
     if (result == VG_OK) result = read_count(r, nf);
-    skip_blanks(r);
-    size_t edges; /* counted by some, 0 or missing with others: of no use */
-    if (result == VG_OK && r->p < r->line_stop) result = read_count(r, &edges);
-    skip_blanks(r);
-    return result == VG_OK && r->p < r->line_stop ? fail_here(r, "end of line") : result;
+    if (result == VG_OK && (r->bare || line_goes_on(r))) result = read_count(r, &edges);
+    return result == VG_OK && !r->bare && line_goes_on(r) ? fail_here(r, "end of line") : result;
 }
 
-/* The shortest lines are "0 0 0" and "2 0 1", with a line end that the last may lack. Counts beyond what is left are
- * refused before there is memory for them. */
-static int check_counts(struct reading *r, size_t nv, size_t nf)
+/* The shortest vertex is "0 0 0", the shortest face "0", with a blank that the last may lack. Counts beyond what is left
+ * are refused before there is memory for them. */
+static int check_counts(const struct reading *r, size_t nv, size_t nf)
 {
-    size_t left = (size_t)(r->end - r->next) / 6 + 1;
-    if (nv > left || nf > left - nv)
+    size_t left = (size_t)(r->end - r->p) + 1;
+    if (nv > left / 6 || nf > (left - 6 * nv) / 2)
         return vg_fail(r->e, VG_ETRUNC, "%s announces %zu vertices and %zu faces, but ends before", r->subject, nv,
                        nf);
     if (nv >= UINT32_MAX || nf >= UINT32_MAX)
@@ -148,49 +142,27 @@ static int check_counts(struct reading *r, size_t nv, size_t nf)
     return VG_OK;
 }
 
-/* x y z, and perhaps more numbers: normal, colour, texture. */
-static int read_vertex(struct reading *r, double *to)
-{
-    int result = VG_OK;
-    for (int k = 0; k < 3 && result == VG_OK; k++) {
-        skip_blanks(r);
-        const char *word = r->p;
-        result = read_number(r, to + k);
-        if (result == VG_OK && !isfinite(to[k])) {
-            r->p = word;
-            return fail_here(r, "a finite number");
-        }
-    }
-    double extra;
-    for (skip_blanks(r); result == VG_OK && r->p < r->line_stop; skip_blanks(r)) result = read_number(r, &extra);
-    return result;
-}
-
 static int read_corner(struct reading *r, uint32_t *to)
 {
-    int64_t v;
-    skip_blanks(r);
-    const char *before = r->p, *after = vgi_parse_int(r->p, r->line_stop, &v);
-    if (after) r->p = after;
-    if (after && at_word_end(r) && v >= 0 && (uint64_t)v < r->m->mesh.nv) {
-        *to = (uint32_t)v;
-        return VG_OK;
-    }
-    r->p = before;
-    return fail_here(r, after ? "the index of a vertex below their count" : "the index of a vertex");
+    int64_t v = -1;
+    const char *after = find_word(r) ? vgi_parse_int(r->p, r->end, &v) : NULL;
+    if (!after || !ends_word(r, after) || v < 0) return fail_here(r, "the index of a vertex");
+    if ((uint64_t)v >= r->m->mesh.nv) return fail_here(r, "the index of a vertex below their count");
+    r->p = after;
+    *to = (uint32_t)v;
+    return VG_OK;
 }
 
-/* A count and so many indices; what follows on the line is a colour. */
+/* A count and so many indices. */
 static int read_face(struct reading *r)
 {
     vg_mesh *m = &r->m->mesh;
     size_t n;
     int result = read_count(r, &n);
     if (result < 0) return result;
-    if (n < 2) return vg_fail(r->e, VG_EINPUT, "%s line %zu: face with %zu vertices", r->subject, line_number(r), n);
-    if (n > (size_t)(r->line_stop - r->p) / 2)
+    if (n > (size_t)(r->end - r->p) / 2)
         return vg_fail(r->e, VG_EINPUT, "%s line %zu: face with less than the %zu vertices announced", r->subject,
-                       line_number(r), n);
+                       line_of(r, r->p), n);
     if (n >= UINT32_MAX - r->corners)
         return vg_fail(r->e, VG_EINPUT, "%s has too many corners of faces (the limit is 2^32 - 2)", r->subject);
     if (vgi_grow(&m->vert, &r->vert_cap, r->corners + n, sizeof *m->vert, r->e) < 0) return VG_ENOMEM;
@@ -206,55 +178,64 @@ static int fail_short(struct reading *r, const char *what, size_t i, size_t n)
     return vg_fail(r->e, VG_ETRUNC, "%s ends before %s %zu of %zu", r->subject, what, i, n);
 }
 
-static int read_body(struct reading *r, size_t nv, size_t nf)
+static int read_elements(struct reading *r, size_t nv, size_t nf)
 {
     vg_model *m = r->m;
-    m->vertices = vgi_array_raw(nv, 3 * sizeof *m->vertices, r->e);
-    if (!m->vertices || vgi_grow(&m->mesh.start, &r->start_cap, 1, sizeof *m->mesh.start, r->e) < 0) return VG_ENOMEM;
-    m->mesh.start[0] = 0;
-    m->mesh.nv = nv;
-    for (size_t v = 0; v < nv; v++) {
-        if (!next_line(r)) return fail_short(r, "vertex", v, nv);
-        int result = read_vertex(r, m->vertices + 3 * v);
-        if (result < 0) return result;
+    int result = VG_OK;
+    for (size_t v = 0; v < nv && result == VG_OK; v++) {
+        if (!find_word(r)) return fail_short(r, "vertex", v, nv);
+        for (int k = 0; k < 3 && result == VG_OK; k++) result = read_coordinate(r, m->vertices + 3 * v + k);
+        if (!r->bare) skip_line(r);
     }
-    for (size_t f = 0; f < nf; f++) {
-        if (!next_line(r)) return fail_short(r, "face", f, nf);
-        int result = read_face(r);
-        if (result < 0) return result;
+    for (size_t f = 0; f < nf && result == VG_OK; f++) {
+        if (!find_word(r)) return fail_short(r, "face", f, nf);
+        result = read_face(r);
+        if (!r->bare) skip_line(r);
     }
-    if (next_line(r))
-        return vg_fail(r->e, VG_EINPUT, "%s line %zu: more lines than announced", r->subject, line_number(r));
+    return result;
+}
+
+/* What nothing was announced of. */
+static int finish(struct reading *r)
+{
+    if (!find_word(r)) return VG_OK;
+    if (r->bare) return fail_here(r, "the end of the file");
+    vgi_note(&r->m->note, "left out what stands behind the last face, from line %zu on", line_of(r, r->p));
     return VG_OK;
 }
 
-static const char *behind_mark(const char *data, size_t n)
+static int read_as(vg_model *m, bool bare, const char *data, size_t n, const char *subject, vg_err *e)
 {
-    return n >= 3 && !memcmp(data, "\xef\xbb\xbf", 3) ? data + 3 : data;
+    struct reading r = {.data = data, .end = data + n, .p = data, .bare = bare, .subject = subject, .e = e, .m = m};
+    size_t nv = 0, nf = 0;
+    int result = read_header(&r, &nv, &nf);
+    if (result == VG_OK) result = check_counts(&r, nv, nf);
+    if (result < 0) return result;
+    m->vertices = vgi_array_raw(nv, 3 * sizeof *m->vertices, e);
+    if (!m->vertices || vgi_grow(&m->mesh.start, &r.start_cap, 1, sizeof *m->mesh.start, e) < 0) return VG_ENOMEM;
+    m->mesh.start[0] = 0;
+    m->mesh.nv = nv;
+    result = read_elements(&r, nv, nf);
+    return result == VG_OK ? finish(&r) : result;
 }
 
 static int read_off(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
 {
-    bool unix_lines = memchr(data, '\n', n) || !memchr(data, '\r', n);
-    struct reading r = {.data = data,
-                        .end = data + n,
-                        .line_end = unix_lines ? '\n' : '\r',
-                        .subject = subject,
-                        .e = e,
-                        .m = m,
-                        .line = data,
-                        .next = behind_mark(data, n)};
-    size_t nv = 0, nf = 0;
-    int result = read_header(&r, &nv, &nf);
-    if (result == VG_OK) result = check_counts(&r, nv, nf);
-    return result == VG_OK ? read_body(&r, nv, nf) : result;
+    int result = read_as(m, false, data, n, subject, e);
+    if (result != VG_EINPUT && result != VG_ETRUNC) return result;
+    vg_model words = {0};
+    int again = read_as(&words, true, data, n, subject, NULL);
+    if (again < 0) return vg_model_clear(&words), again == VG_ENOMEM ? vg_fail(e, again, "not enough memory") : result;
+    vg_model_clear(m);
+    *m = words;
+    return VG_OK;
 }
 
 static bool sniff_off(const unsigned char *data, size_t n)
 {
-    const char *p = behind_mark((const char *)data, n), *end = (const char *)data + n;
+    const char *p = (const char *)data, *end = (const char *)data + n;
     for (;;) {
-        while (p < end && (is_blank(*p) || *p == '\n')) p++;
+        while (p < end && (is_blank(*p) || is_line_end(*p))) p++;
         if (p == end || *p != '#') break;
         while (p < end && *p != '\n' && *p != '\r') p++;
     }

@@ -1,6 +1,5 @@
-/* ply.c: PLY polygon files, text and binary in both byte orders, read: vertices, faces, edges.
- * Leaves out every other element and property (colours, normals, user data: skipped), triangle strips (refused), and
- * writing (ply_write.c).
+/* ply.c: PLY polygon files, text and binary in both byte orders, read: vertices, faces, triangle strips, edges.
+ * Leaves out every other element and property (colours, normals, user data: skipped) and writing (ply_write.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -72,11 +71,6 @@ static enum type type_named(struct word w)
     return NO_TYPE;
 }
 
-static bool is_integer(enum type t)
-{
-    return t >= I8 && t <= U32;
-}
-
 /* One line of the header, cut into words; lines end as the first one does. False at the end of the file. */
 static bool next_line(struct reading *r, char line_end, struct word words[MOST_WORDS], size_t *n)
 {
@@ -140,6 +134,8 @@ static enum role role_named(enum kind kind, struct word name, bool list)
                  {VERTEX, false, "z", Z},
                  {FACE, true, "vertex_indices", INDICES},
                  {FACE, true, "vertex_index", INDICES},
+                 {STRIPS, true, "vertex_indices", INDICES},
+                 {STRIPS, true, "vertex_index", INDICES},
                  {EDGE, false, "vertex1", FROM},
                  {EDGE, false, "vertex2", TO}};
     for (size_t i = 0; i < sizeof roles / sizeof *roles; i++)
@@ -163,11 +159,8 @@ static int read_property_line(struct reading *r, const struct word *words, size_
     struct word type = words[list ? 3 : 1], name = words[list ? 4 : 2];
     struct element *el = &r->elements[r->nelements - 1];
     struct property p = {list ? type_named(words[2]) : NO_TYPE, type_named(type), role_named(el->kind, name, list)};
-    if (p.item == NO_TYPE || (list && !is_integer(p.count)))
+    if (p.item == NO_TYPE || (list && p.count == NO_TYPE))
         return vg_fail(r->e, VG_EINPUT, "%s: PLY property '%.*s' has an unknown type", r->subject, shown(name),
-                       name.at);
-    if (p.role >= INDICES && !is_integer(p.item))
-        return vg_fail(r->e, VG_EINPUT, "%s: PLY property '%.*s' is not of an integer type", r->subject, shown(name),
                        name.at);
     if (p.role && has_role(r, el, p.role))
         return vg_fail(r->e, VG_EINPUT, "%s: PLY element '%s' has '%.*s' twice", r->subject, el->name, shown(name),
@@ -188,15 +181,13 @@ static int finish_element(struct reading *r, struct element *el)
         el->least += r->text ? 2 : type_bytes[p->count ? p->count : p->item]; /* text: a digit and a blank */
         if (p->count) el->fixed = false;
     }
-    if (el->kind == STRIPS && el->count)
-        return vg_fail(r->e, VG_EINPUT, "%s holds triangle strips, which are not read: write it with a list of faces",
-                       r->subject);
     if (el->kind == VERTEX && !(has_role(r, el, X) && has_role(r, el, Y) && has_role(r, el, Z)))
         return vg_fail(r->e, VG_EINPUT, "%s: its vertices have no x, y and z", r->subject);
     if (el->kind == VERTEX && el->count >= UINT32_MAX)
         return vg_fail(r->e, VG_EINPUT, "%s has too many vertices (the limit is 2^32 - 2)", r->subject);
-    if (el->kind == FACE && el->count && !has_role(r, el, INDICES))
-        return vg_fail(r->e, VG_EINPUT, "%s: its faces have no list vertex_indices", r->subject);
+    if ((el->kind == FACE || el->kind == STRIPS) && el->count && !has_role(r, el, INDICES))
+        return vg_fail(r->e, VG_EINPUT, "%s: its %s have no list vertex_indices", r->subject,
+                       el->kind == FACE ? "faces" : "triangle strips");
     if (el->kind == EDGE && !(has_role(r, el, FROM) && has_role(r, el, TO))) el->kind = OTHER;
     return VG_OK;
 }
@@ -204,7 +195,7 @@ static int finish_element(struct reading *r, struct element *el)
 static int read_header(struct reading *r)
 {
     struct word words[MOST_WORDS];
-    size_t n = 0;
+    size_t n = 0, strange = 0;
     bool formatted = false;
     const char *first = r->p;
     char line_end = r->end - first > 3 && first[3] == '\r' && !(r->end - first > 4 && first[4] == '\n') ? '\r' : '\n';
@@ -219,11 +210,10 @@ static int read_header(struct reading *r)
         if (word_is(words[0], "format")) result = read_encoding(r, words, n), formatted = true;
         else if (word_is(words[0], "element")) result = read_element_line(r, words, n);
         else if (word_is(words[0], "property")) result = read_property_line(r, words, n);
-        else
-            result = vg_fail(r->e, VG_EINPUT, "%s: unknown word '%.*s' in the PLY header", r->subject,
-                             shown(words[0]), words[0].at);
+        else strange++; /* a comment that was broken in two, as old Blenders wrote the name of their file */
         if (result < 0) return result;
     }
+    if (strange) vgi_note(&r->m->note, "left out %zu lines of the PLY header that mean nothing", strange);
     if (!formatted) return vg_fail(r->e, VG_EINPUT, "%s: the PLY header has no format line", r->subject);
     for (size_t i = 0; i < r->nelements; i++) {
         int result = finish_element(r, &r->elements[i]);
@@ -287,12 +277,34 @@ static inline double number_at(const char *p, enum type t, bool swap)
     return (double)integer_at(p, t, swap);
 }
 
+/* A whole number that is written as any other, "3.0" or in a type of floating point. */
+static int read_whole(struct reading *r, enum type t, const struct element *el, uint64_t i, int64_t *x)
+{
+    double value = NAN;
+    struct word w = {0};
+    if (!r->text && (size_t)(r->end - r->p) < type_bytes[t]) return fail_word(r, el, i, w);
+    if (!r->text) {
+        value = number_at(r->p, t, r->swap);
+        r->p += type_bytes[t];
+    } else if (!next_word(r, &w) || vgi_parse_double(w.at, w.at + w.n, &value) != w.at + w.n) {
+        return fail_word(r, el, i, w);
+    }
+    if (!(fabs(value) <= 9e15) || value != floor(value))
+        return vg_fail(r->e, VG_EINPUT, "%s: a number in %s %llu should be whole and is %g", r->subject, el->name,
+                       (unsigned long long)i, value);
+    *x = (int64_t)value;
+    return VG_OK;
+}
+
 static inline int read_integer(struct reading *r, enum type t, const struct element *el, uint64_t i, int64_t *x)
 {
+    if (t >= F32) return read_whole(r, t, el, i, x);
     if (r->text) {
+        const char *before = r->p;
         struct word w;
-        if (!next_word(r, &w) || vgi_parse_int(w.at, w.at + w.n, x) != w.at + w.n) return fail_word(r, el, i, w);
-        return VG_OK;
+        if (next_word(r, &w) && vgi_parse_int(w.at, w.at + w.n, x) == w.at + w.n) return VG_OK;
+        r->p = before;
+        return read_whole(r, t, el, i, x);
     }
     if ((size_t)(r->end - r->p) < type_bytes[t]) return fail_word(r, el, i, (struct word){0});
     *x = integer_at(r->p, t, r->swap);
@@ -380,19 +392,59 @@ static int read_indices(struct reading *r, const struct property *p, const struc
     if (result < 0) return result;
     size_t left = (size_t)(r->end - r->p), bytes = r->text ? 2 : type_bytes[p->item];
     if (n > left / bytes + 1) return fail_word(r, el, i, (struct word){0});
-    if (n < 2)
-        return vg_fail(r->e, VG_EINPUT, "%s: face %llu has %llu vertices", r->subject, (unsigned long long)i,
-                       (unsigned long long)n);
     result = grow_corners(r, n);
     for (uint64_t k = 0; k < n && result == VG_OK; k++) result = add_corner(r, p->item, el, i);
     return result == VG_OK ? end_face(r) : result;
+}
+
+static int put_triangle(struct reading *r, uint32_t a, uint32_t b, uint32_t c)
+{
+    int result = grow_corners(r, 3);
+    if (result < 0) return result;
+    uint32_t *v = r->m->mesh.vert + r->corners;
+    v[0] = a, v[1] = b, v[2] = c;
+    r->corners += 3;
+    return end_face(r);
+}
+
+static int strip_index(struct reading *r, const struct property *p, const struct element *el, uint64_t i, int64_t *v)
+{
+    int result = read_integer(r, p->item, el, i, v);
+    if (result == VG_OK && (*v < -1 || *v >= UINT32_MAX - 1))
+        result = vg_fail(r->e, VG_EINPUT, "%s: %s %llu names vertex %lld", r->subject, el->name, (unsigned long long)i,
+                         (long long)*v);
+    return result;
+}
+
+/* Each vertex behind the first two makes a triangle with the two before it, every other one the other way round; -1
+ * ends a strip. A triangle that names a vertex twice only carries the strip on. */
+static int read_strips(struct reading *r, const struct property *p, const struct element *el, uint64_t i)
+{
+    uint64_t n = 0, length = 0;
+    uint32_t a = 0, b = 0;
+    int result = list_length(r, p, el, i, &n);
+    for (uint64_t k = 0; k < n && result == VG_OK; k++, length++) {
+        int64_t v = 0;
+        if ((result = strip_index(r, p, el, i, &v)) < 0) break;
+        if (v < 0) {
+            length = UINT64_MAX;
+            continue;
+        }
+        const uint32_t c = (uint32_t)v;
+        if (length >= 2 && a != b && b != c && a != c)
+            result = length % 2 ? put_triangle(r, b, a, c) : put_triangle(r, a, b, c);
+        a = b, b = c;
+    }
+    return result;
 }
 
 static int read_face(struct reading *r, const struct element *el, uint64_t i)
 {
     for (size_t k = 0; k < el->n; k++) {
         const struct property *p = &r->properties[el->first + k];
-        int result = p->role == INDICES ? read_indices(r, p, el, i) : skip_property(r, p, el, i);
+        int result = p->role != INDICES     ? skip_property(r, p, el, i)
+                     : el->kind == STRIPS ? read_strips(r, p, el, i)
+                                          : read_indices(r, p, el, i);
         if (result < 0) return result;
     }
     return VG_OK;
@@ -487,7 +539,7 @@ static int read_element(struct reading *r, const struct element *el)
         return VG_OK;
     }
     int (*one)(struct reading *, const struct element *, uint64_t) = read_other;
-    if (el->kind == FACE) one = read_face;
+    if (el->kind == FACE || el->kind == STRIPS) one = read_face;
     if (el->kind == EDGE) one = read_edge;
     int result = VG_OK;
     for (uint64_t i = 0; i < el->count && result == VG_OK; i++) result = one(r, el, i);
@@ -498,14 +550,14 @@ static int read_body(struct reading *r)
 {
     if (vgi_grow(&r->m->mesh.start, &r->start_cap, 1, sizeof *r->m->mesh.start, r->e) < 0) return VG_ENOMEM;
     r->m->mesh.start[0] = 0;
+    if (r->text) r->p += vgi_mark_bytes(r->p, (size_t)(r->end - r->p)); /* where header and body were put together */
     for (size_t i = 0; i < r->nelements; i++) {
         int result = read_element(r, &r->elements[i]);
         if (result < 0) return result;
     }
     while (r->text && r->p < r->end && is_space(*r->p)) r->p++;
     if (r->p < r->end)
-        return vg_fail(r->e, VG_EINPUT, "%s has %zu bytes behind its last element", r->subject,
-                       (size_t)(r->end - r->p));
+        vgi_note(&r->m->note, "left out %zu bytes behind the last element", (size_t)(r->end - r->p));
     if (r->m->mesh.nv == 0) return vg_fail(r->e, VG_EINPUT, "%s has no vertices", r->subject);
     return VG_OK;
 }

@@ -17,13 +17,13 @@ void vgi_play_stop(vgi_playing *p)
     *p = (vgi_playing){0};
 }
 
-int vgi_play_open(vgi_playing *p, const vgi_sequence_format *format, vgi_input *in, char *subject, char *stem,
-                  vg_head *h, vg_err *e)
+int vgi_play_open(vgi_playing *p, const vgi_sequence_format *format, vgi_input *in, const vg_reading *how,
+                  char *subject, char *stem, vg_head *h, vg_err *e)
 {
     *p = (vgi_playing){.in = in, .subject = subject, .stem = stem};
     if (!subject || !stem) return VG_ENOMEM;
     p->format = format;
-    int r = format->open(&p->state, h, in, subject, e);
+    int r = format->open(&p->state, h, in, how, subject, e);
     return r == VG_OK && h->body.mesh.nf ? vg_mesh_check(&h->body.mesh, subject, e) : r;
 }
 

@@ -17,8 +17,8 @@ typedef struct vgi_playing {
 
 /* vgi_play_open: p is empty, and h too, which is filled. in, subject and stem are taken over, also on failure; NULL
  * for one of these texts is VG_ENOMEM. */
-int vgi_play_open(vgi_playing *p, const vgi_sequence_format *format, vgi_input *in, char *subject, char *stem,
-                  vg_head *h, vg_err *e) VG_MUST_CHECK;
+int vgi_play_open(vgi_playing *p, const vgi_sequence_format *format, vgi_input *in, const vg_reading *how,
+                  char *subject, char *stem, vg_head *h, vg_err *e) VG_MUST_CHECK;
 /* vgi_play_borrow_faces: h, which has no faces, takes them, and a reference pose if it has none, from the mesh file
  * beside `path` (NULL: there is no place beside it); VG_EINPUT when there is none and the format needs it. */
 int vgi_play_borrow_faces(const vgi_playing *p, const char *path, vg_head *h, vg_err *e) VG_MUST_CHECK;

@@ -270,11 +270,13 @@ static int make_skeleton(reading *b, vg_err *e)
     return r;
 }
 
-static int open_skeleton(void **state, vg_head *h, vgi_input *in, const char *subject, vg_err *e)
+static int open_skeleton(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject,
+                         vg_err *e)
 {
+    (void)how;
     reading *b = *state = vgi_array(1, sizeof *b, e);
     if (!b) return VG_ENOMEM;
-    int r = vgi_input_slurp(in, &b->text, e);
+    int r = vgi_input_slurp_text(in, &b->text, e);
     if (r < 0) return r;
     vgi_lines t = vgi_lines_of(b->text.data, b->text.size, subject);
     if ((r = take_entries(&b->bones, &t, -1, e)) < 0 || (r = make_skeleton(b, e)) < 0) return r;

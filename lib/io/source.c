@@ -49,6 +49,7 @@ struct vg_source {
     size_t n, cap, next; /* next: the item to be opened */
     bool stdin_named;
     vgi_limits limits;
+    vg_reading reading;
     bool through;        /* one stream: handed on as it is */
     vg_head head;        /* of the joined sequence; the caller may change it */
     vg_head own;         /* what frames are measured by: mesh, kind, count; of a skeleton also its joints and
@@ -69,7 +70,7 @@ struct vg_source {
     uint64_t waiting;    /* bytes of their files */
     int failed;          /* what came behind those on the belt failed so */
     vg_err failure;
-    char warning[160];
+    char warning[VGI_SUBJECT + 2 * sizeof(vg_note)];
 };
 
 static const char *item_name(const item *it)
@@ -133,18 +134,9 @@ static void note_file(item *it)
 /* What is known to be no mesh comes first: a tar may begin with the name of a mesh, and a compressed file may be
  * called like one. What nothing else claims is left to libarchive, which knows more kinds than can be told here; of
  * what comes through a pipe it sees the start only, or a disk would fill with it first. */
-static int tell_content(item *it, vgi_input *in, vg_err *e)
+static int judge_start(item *it, const unsigned char *data, size_t n, vg_err *e)
 {
-    const unsigned char *data;
     const vgi_sequence_format *named = it->path ? vgi_sequence_by_suffix(it->path) : NULL;
-    size_t n;
-    /* enough for a stream: who writes one frame by frame is not kept waiting */
-    int r = vgi_input_peek(in, 8, &data, &n, e);
-    if (r == VG_OK && !vgi_is_stream(data, n)) r = vgi_input_peek(in, 4096, &data, &n, e);
-    if (r < 0) return r;
-    if (n == 0 && !it->path)
-        return vg_fail(e, VG_ETRUNC, "standard input is empty: look at the program before in the pipe");
-    if (n == 0) return vg_fail(e, VG_ETRUNC, "'%s' is empty", it->path);
     if (vgi_is_stream(data, n)) it->content = STREAM;
     else if ((it->sequence = vgi_sequence_by_content(data, n))) it->content = SEQUENCE;
     else if (vgi_is_archive(data, n)) it->content = ARCHIVE;
@@ -153,6 +145,24 @@ static int tell_content(item *it, vgi_input *in, vg_err *e)
     else if (it->regular || vgi_may_be_archive(data, n)) it->content = ARCHIVE;
     else return vgi_unknown_kind(item_name(it), e);
     return VG_OK;
+}
+
+static int tell_content(item *it, vgi_input *in, vg_err *e)
+{
+    const unsigned char *data;
+    vg_bytes own = {0};
+    size_t n;
+    /* enough for a stream: who writes one frame by frame is not kept waiting */
+    int r = vgi_input_peek(in, 8, &data, &n, e);
+    if (r == VG_OK && !vgi_is_stream(data, n)) r = vgi_input_peek(in, 4096, &data, &n, e);
+    if (r < 0) return r;
+    if (n == 0 && !it->path)
+        return vg_fail(e, VG_ETRUNC, "standard input is empty: look at the program before in the pipe");
+    if (n == 0) return vg_fail(e, VG_ETRUNC, "'%s' is empty", it->path);
+    r = vgi_plain_text(&own, &data, &n, e);
+    if (r == VG_OK) r = judge_start(it, data, n, e);
+    vg_bytes_clear(&own);
+    return r;
 }
 
 static int open_reader(const vg_source *s, item *it, vg_reader **reader, vg_err *e)
@@ -236,6 +246,33 @@ static int look_at_stream(vg_source *s, item *it, vg_err *e)
     return r;
 }
 
+static int open_file(const item *it, vg_err *e)
+{
+    int fd = it->path ? open(it->path, O_RDONLY | O_CLOEXEC) : fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
+    return fd < 0 ? vg_fail(e, VG_ESYS, "cannot open '%s': %s", item_name(it), strerror(errno)) : fd;
+}
+
+/* A stream that was compressed becomes one that can be read once: *in (NULL when the file is opened again later). */
+static int unpack_stream(const vg_source *s, item *it, vgi_input **in, vg_err *e)
+{
+    int fd = -1, stream, r = VG_OK;
+    if (it->regular) r = fd = open_file(it, e);
+    else r = vgi_input_spool(*in, &fd, e);
+    if (r >= 0) r = vgi_unpack_stream(fd, it->regular ? it->base : 0, item_name(it), &s->limits, &stream, e);
+    if (r == 1) {
+        it->content = STREAM, it->regular = false;
+        vgi_input_free(in);
+        r = vgi_input_fd(in, stream, true, item_name(it), e);
+    } else if (r == 0 && !it->regular) {
+        vgi_input_free(in);
+        if (lseek(fd, 0, SEEK_SET) < 0) r = vg_fail(e, VG_ESYS, "cannot read '%s': %s", item_name(it), strerror(errno));
+        else r = vgi_input_fd(in, fd, true, item_name(it), e), fd = -1;
+        if (r == VG_OK) vgi_input_limit(*in, &s->limits);
+    }
+    if (fd >= 0) close(fd);
+    return r;
+}
+
 static int look_at(vg_source *s, item *it, vg_err *e)
 {
     vgi_input *in = NULL;
@@ -243,6 +280,7 @@ static int look_at(vg_source *s, item *it, vg_err *e)
     int r = open_input(s, it, &in, e);
     if (r < 0) return r;
     r = tell_content(it, in, e);
+    if (r == VG_OK && it->content == ARCHIVE) r = unpack_stream(s, it, &in, e);
     /* standard input has been read from: its bytes are in `in`, even when the file could be read again */
     if (r < 0 || (it->regular && it->path)) vgi_input_free(&in);
     else it->input = in;
@@ -260,12 +298,17 @@ static int open_archive(vg_source *s, item *it, vg_err *e)
         r = vgi_input_spool(in, &fd, e);
         vgi_input_free(&in);
     } else {
-        fd = it->path ? open(it->path, O_RDONLY | O_CLOEXEC) : fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
-        if (fd < 0) r = vg_fail(e, VG_ESYS, "cannot open '%s': %s", item_name(it), strerror(errno));
+        r = fd = open_file(it, e);
     }
     if (r < 0) return r;
     s->archive_name = item_name(it);
     return vgi_archive_open(&s->archive, fd, it->base, s->archive_name, &s->limits, e);
+}
+
+/* What the first input that left something out did not need. */
+static void note_left_out(vg_source *s, const char *subject, const char *note)
+{
+    if (*note && !*s->warning) snprintf(s->warning, sizeof s->warning, "%.290s: %.320s", subject, note);
 }
 
 static int take_over_model(vg_source *s, pose *p, vg_err *e)
@@ -273,9 +316,7 @@ static int take_over_model(vg_source *s, pose *p, vg_err *e)
     vg_model *m = &p->model;
     int r = settle_mesh(s, &m->mesh, p->archive, p->path, e);
     if (r < 0) return r;
-    if (m->degenerate)
-        snprintf(s->warning, sizeof s->warning, "%s: left out %zu triangles of which two corners are at one place",
-                 s->own_name, m->degenerate);
+    note_left_out(s, s->own_name, m->note.text);
     s->head.body.mesh = m->mesh;
     s->head.body.attributes = m->attributes;
     m->mesh = (vg_mesh){0};
@@ -303,7 +344,7 @@ static int read_model(const vg_source *s, pose *p, vg_err *e)
     if (!subject) return VG_ENOMEM;
     int r = VG_OK;
     if (vgi_is_stream(p->data.data, p->data.size))
-        r = vg_fail(e, VG_EINPUT, "%s is a compressed stream: unpack it in the pipe before", subject);
+        r = vg_fail(e, VG_EINPUT, "%s is a stream: take it out of the archive first", subject);
     if (r == VG_OK) r = vgi_model_read(&p->model, p->data.data, p->data.size, NULL, p->path, subject, e);
     if (r == VG_OK && s->own_name) r = check_joins(s, &p->model.mesh, subject, e);
     free(subject);
@@ -469,7 +510,8 @@ static int play(vg_source *s, const vgi_sequence_format *format, vgi_input *in, 
 {
     vgi_playing *p = &s->playing;
     vg_head h = {0};
-    int r = vgi_play_open(p, format, in, subject_of(archive, path, e), pose_of(path, e), &h, e);
+    int r = vgi_play_open(p, format, in, &s->reading, subject_of(archive, path, e), pose_of(path, e), &h, e);
+    if (r == VG_OK && format->note) note_left_out(s, p->subject, format->note(p->state));
     if (r == VG_OK && format->join && !s->own.body.skeleton.njoints)
         r = vg_fail(e, VG_EINPUT, "%s holds joints by name: name the file of their skeleton with --mesh", p->subject);
     if (r == VG_OK) r = s->own_name ? join_sequence(s, &h, e) : take_over_head(s, archive, path, &h, e);
@@ -551,6 +593,7 @@ static int open_source(vg_source **out, const char *const *operands, size_t n, c
     vg_source *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
     s->limits = vgi_usual_limits;
+    if (o) s->reading = o->reading;
     if (o && o->most_bytes) s->limits.member_bytes = s->limits.total_bytes = o->most_bytes;
     int r = n ? make_belt(s, o ? o->threads : 1, e) : vg_fail(e, VG_EARG, "no input is named");
     if (r == VG_OK && mesh) r = settle_named_mesh(s, mesh, e);
@@ -678,20 +721,27 @@ void vg_source_close(vg_source **source)
     *source = NULL;
 }
 
-int vg_load(vg_head *h, const char *operand, const char *what, vg_err *e)
+int vg_load_with(vg_head *h, const char *operand, const char *what, const vg_source_options *o, vg_note *note, vg_err *e)
 {
     vg_source *s;
     char subject[420];
     *h = (vg_head){0};
-    int r = open_source(&s, &operand, 1, NULL, true, e);
+    if (note) *note = (vg_note){0};
+    int r = open_source(&s, &operand, 1, o, true, e);
     if (r < 0) return r;
     vg_head *from = vg_source_head(s);
     snprintf(subject, sizeof subject, "'%.400s'", operand);
     r = vg_head_need(from, what, subject, e);
     if (r == VG_OK && s->through) r = vg_head_copy(h, from, e);
     else if (r == VG_OK) *h = *from, *from = (vg_head){0};
+    if (r == VG_OK && note && vg_source_warning(s)) vgi_note(note, "%s", vg_source_warning(s));
     vg_source_close(&s);
     return r;
+}
+
+int vg_load(vg_head *h, const char *operand, const char *what, vg_err *e)
+{
+    return vg_load_with(h, operand, what, NULL, NULL, e);
 }
 
 int vg_load_mesh(vg_head *h, const char *operand, vg_err *e)

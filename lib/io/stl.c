@@ -3,7 +3,7 @@
  *
  * A corner has no number in STL. Corners at exactly one place (-0 is 0) become one vertex, numbered in order of
  * first appearance; nothing is guessed from nearness. A triangle of which two corners are at one place is no face:
- * it is left out and counted.
+ * it is left out and counted (vgi_note_dropped).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 #include "io/polygon.h"
@@ -21,7 +21,7 @@ struct reading {
     const char *subject;
     vg_err *e;
     vg_model *m;
-    size_t vertices_cap, start_cap, vert_cap, triangles;
+    size_t vertices_cap, start_cap, vert_cap, triangles, dropped;
     uint32_t *slots; /* hash table of vertices + 1; 0: free; nslots is a power of two */
     size_t nslots;
 };
@@ -90,7 +90,7 @@ static int add_triangle(struct reading *r, double x[9])
     }
     r->triangles++;
     if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) {
-        r->m->degenerate++;
+        r->dropped++;
         return VG_OK;
     }
     if (3 * (m->nf + 1) >= UINT32_MAX) return vg_fail(r->e, VG_EINPUT, "%s has too many triangles", r->subject);
@@ -118,8 +118,8 @@ static int read_binary(struct reading *r)
         return vg_fail(r->e, VG_ETRUNC, "%s announces %llu triangles, but ends after %llu", r->subject,
                        (unsigned long long)count, (unsigned long long)there);
     if (n - HEADER > count * FACET)
-        return vg_fail(r->e, VG_EINPUT, "%s has %llu bytes behind its %llu triangles", r->subject,
-                       (unsigned long long)(n - HEADER - count * FACET), (unsigned long long)count);
+        vgi_note(&r->m->note, "left out %llu bytes behind the last triangle",
+                 (unsigned long long)(n - HEADER - count * FACET));
     int result = VG_OK;
     const char *p = r->data + HEADER;
     for (uint64_t i = 0; i < count && result == VG_OK; i++, p += FACET) {
@@ -172,7 +172,7 @@ static int expect(struct reading *r, const char *what)
     return is(word, n, what) ? VG_OK : unexpected(r, word, n, what);
 }
 
-static int read_numbers(struct reading *r, double x[3])
+static int read_corner(struct reading *r, double x[3])
 {
     for (int k = 0; k < 3; k++) {
         size_t n;
@@ -182,17 +182,24 @@ static int read_numbers(struct reading *r, double x[3])
     return VG_OK;
 }
 
-/* A normal is never used: some programs write "nan" there. */
+/* A normal is not used, whatever stands there: "nan", "-1.#IND", fewer words or more. */
+static int skip_normal(struct reading *r)
+{
+    enum { MOST = 8 };
+    size_t n;
+    const char *word = next_word(r, &n);
+    for (int i = 0; i < MOST && n && !is(word, n, "outer"); i++) word = next_word(r, &n);
+    return is(word, n, "outer") ? VG_OK : unexpected(r, word, n, "outer");
+}
+
 static int read_facet(struct reading *r)
 {
-    double normal[3], x[9];
-    int result = expect(r, "normal");
-    if (result == VG_OK) result = read_numbers(r, normal);
-    if (result == VG_OK) result = expect(r, "outer");
+    double x[9];
+    int result = skip_normal(r);
     if (result == VG_OK) result = expect(r, "loop");
     for (int k = 0; k < 3 && result == VG_OK; k++) {
         result = expect(r, "vertex");
-        if (result == VG_OK) result = read_numbers(r, x + 3 * k);
+        if (result == VG_OK) result = read_corner(r, x + 3 * k);
     }
     if (result == VG_OK) result = expect(r, "endloop");
     if (result == VG_OK) result = expect(r, "endfacet");
@@ -244,7 +251,8 @@ static bool looks_binary(const unsigned char *data, size_t n)
     if (n < HEADER + FACET) return n == HEADER && vgi_get32(data + COUNT_OFF) == 0;
     uint64_t count = vgi_get32(data + COUNT_OFF), seen = (n - HEADER) / FACET;
     if (n - HEADER == count * FACET) return true;
-    if (seen > count) return false;
+    if (count == 0) return false;
+    if (seen > count) seen = count; /* bytes behind the last triangle */
     if (seen > 80) seen = 80;
     for (uint64_t i = 0; i < seen; i++) {
         const unsigned char *p = data + HEADER + i * FACET;
@@ -272,6 +280,7 @@ static int read_stl(vg_model *m, const char *data, size_t n, const char *subject
     bool text = starts_as_text(bytes, n) && !has_zero_byte(bytes, n);
     int result = text ? read_text(&r) : read_binary(&r);
     free(r.slots);
+    vgi_note_dropped(&m->note, r.dropped);
     if (result == VG_OK && r.triangles == 0) return vg_fail(e, VG_EINPUT, "%s has no triangles", subject);
     if (result == VG_OK && m->mesh.nf == 0)
         return vg_fail(e, VG_EINPUT, "%s has no triangle whose three corners are apart", subject);

@@ -61,6 +61,11 @@ const char *vg_isa_at(size_t i);
  * sets in the last digits. VG_EARG when there is none of that name or the machine does not have it. */
 int vg_isa_choose(const char *name, vg_err *e) VG_MUST_CHECK;
 
+/* What a reader left out or put right: one line for a warning; empty: nothing. */
+typedef struct vg_note {
+    char text[320];
+} vg_note;
+
 #ifdef __cplusplus
 }
 #endif

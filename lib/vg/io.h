@@ -49,6 +49,13 @@ void vg_writer_close(vg_writer **w);
  * More operands are joined into one sequence of vertices of one mesh. The first pose is the reference unless a stream
  * or a sequence brings its own. */
 typedef struct vg_source vg_source;
+
+/* What can be chosen about files that say more, or less, than a sequence of vertices. All zero: the usual. */
+typedef struct vg_reading {
+    const char *array_axes; /* NPZ: what the axes of the positions count, in their order: "fvx" (frames, vertices, x y z),
+                               "vxf", ...; NULL: told by their lengths, the faces and the reference */
+} vg_reading;
+
 int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err *e) VG_MUST_CHECK;
 typedef struct vg_source_options {
     const char *mesh;    /* an operand whose faces and reference pose are those of operands that hold none of their
@@ -58,11 +65,13 @@ typedef struct vg_source_options {
                             unpacked; 0: 1 GiB in one file, 64 GiB in all */
     int threads;         /* parse as many mesh files at a time; one more waits, if their bytes are less than 256 MiB.
                             What comes through a pipe is not read before it is asked for. 0 or 1: one after another */
+    vg_reading reading;
 } vg_source_options;
 /* vg_source_open_with: o may be NULL. */
 int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const vg_source_options *o,
                         vg_err *e) VG_MUST_CHECK;
-/* vg_source_warning: what was left out of the mesh, one line; NULL: nothing. Borrowed until close. */
+/* vg_source_warning: what was left out of the input that brought the mesh, one line; NULL: nothing. Borrowed until
+ * close. */
 const char *vg_source_warning(const vg_source *s);
 vg_head *vg_source_head(vg_source *s);
 int vg_source_next(vg_source *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
@@ -74,6 +83,9 @@ void vg_source_close(vg_source **s);
  * otherwise. The reference is the operand's reference pose (for a mesh file its only pose, for BVH the one without
  * rotations; for a stream its reference; for an archive or directory the first pose). Frames are not read. */
 int vg_load(vg_head *h, const char *operand, const char *what, vg_err *e) VG_MUST_CHECK;
+/* vg_load_with: the same with options (may be NULL), and what was left out of the mesh into *note (may be NULL). */
+int vg_load_with(vg_head *h, const char *operand, const char *what, const vg_source_options *o, vg_note *note,
+                 vg_err *e) VG_MUST_CHECK;
 /* vg_load_mesh: vg_load of a "mesh". */
 int vg_load_mesh(vg_head *h, const char *operand, vg_err *e) VG_MUST_CHECK;
 
@@ -180,8 +192,7 @@ typedef struct vg_model {
     vg_mesh mesh;
     double *vertices;
     vg_attributes attributes;
-    size_t degenerate; /* triangles left out on reading: two corners were at one place (STL, whose corners have no
-                          numbers) */
+    vg_note note; /* what reading left out or put right */
 } vg_model;
 
 void vg_model_clear(vg_model *m);

@@ -28,7 +28,7 @@ static int open_run(run *x, const void *data, size_t size, vg_err *e)
 {
     *x = (run){.out = {.fd = -1, .name = "fuzz"}};
     int r = vgi_input_memory(&x->in, data, size, "fuzz", e);
-    if (r == VG_OK) r = vgi_sequence_bvh.open(&x->state, &x->head, x->in, "'fuzz'", e);
+    if (r == VG_OK) r = vgi_sequence_bvh.open(&x->state, &x->head, x->in, &(vg_reading){0}, "'fuzz'", e);
     return r < 0 ? r : vg_frame_shape(&x->frame, &x->head, e);
 }
 

@@ -26,7 +26,7 @@ static int read_all(const vgi_sequence_format *format, const void *data, size_t 
     vg_frame f = {0};
     size_t frames = 0;
     demand(vgi_input_memory(&in, data, n, "fuzz", &e) == VG_OK);
-    int r = format->open(&state, h, in, "'fuzz'", &e);
+    int r = format->open(&state, h, in, &(vg_reading){0}, "'fuzz'", &e);
     while (r >= 0 && frames++ < MOST_FRAMES) {
         demand(vg_frame_shape(&f, h, &e) == VG_OK);
         if ((r = format->next(state, &f, &e)) <= 0) break;

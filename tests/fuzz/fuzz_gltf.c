@@ -29,7 +29,7 @@ static int open_run(run *x, const vgi_sequence_format *format, const void *data,
 {
     *x = (run){.format = format, .out = {.fd = -1, .name = "fuzz"}};
     int r = vgi_input_memory(&x->in, data, size, "fuzz", e);
-    if (r == VG_OK) r = format->open(&x->state, &x->head, x->in, "'fuzz'", e);
+    if (r == VG_OK) r = format->open(&x->state, &x->head, x->in, &(vg_reading){0}, "'fuzz'", e);
     if (r == VG_OK) r = vg_mesh_check(&x->head.body.mesh, "'fuzz'", e);
     return r < 0 ? r : vg_frame_shape(&x->frame, &x->head, e);
 }

@@ -22,7 +22,7 @@ static vg_head *skeleton(void)
     vg_err e;
     if (h.count) return &h;
     demand(vgi_input_memory(&in, text, sizeof text - 1, "skeleton", &e) == VG_OK);
-    demand(vgi_sequence_skeleton.open(&state, &h, in, "'skeleton'", &e) == VG_OK);
+    demand(vgi_sequence_skeleton.open(&state, &h, in, &(vg_reading){0}, "'skeleton'", &e) == VG_OK);
     vgi_sequence_skeleton.close(state);
     vgi_input_free(&in);
     return &h;
@@ -40,7 +40,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     vg_err e;
     (void)format->sniff(data, size < 4096 ? size : 4096);
     int r = vgi_input_memory(&in, data, size, "fuzz", &e);
-    if (r == VG_OK) r = format->open(&state, &h, in, "'fuzz'", &e);
+    if (r == VG_OK) r = format->open(&state, &h, in, &(vg_reading){0}, "'fuzz'", &e);
     if (r == VG_OK) r = format->join(state, with, &e);
     if (r == VG_OK) r = vg_frame_shape(&f, with, &e);
     while (r >= 0 && (r = format->next(state, &f, &e)) > 0) {

@@ -43,7 +43,7 @@ static void read_all(const vgi_sequence_format *format, const void *data, size_t
     vg_writer *w = NULL;
     if (nowhere < 0) nowhere = open("/dev/null", O_WRONLY);
     demand(vgi_input_memory(&in, data, n, "fuzz", &e) == VG_OK);
-    int r = format->open(&state, &h, in, "'fuzz'", &e);
+    int r = format->open(&state, &h, in, &(vg_reading){0}, "'fuzz'", &e);
     if (r == VG_OK && h.body.mesh.nf) r = vg_mesh_check(&h.body.mesh, "'fuzz'", &e);
     if (r == VG_OK) {
         complete(&h);

@@ -21,7 +21,7 @@ static void read_skeleton(const uint8_t *data, size_t size)
     vg_frame f = {0};
     vg_err e;
     int r = vgi_input_memory(&in, data, size, "fuzz", &e);
-    if (r == VG_OK) r = format->open(&state, &h, in, "'fuzz'", &e);
+    if (r == VG_OK) r = format->open(&state, &h, in, &(vg_reading){0}, "'fuzz'", &e);
     if (r == VG_OK) {
         demand(h.count > 0 && h.count % 2 == 0 && h.body.skeleton.njoints == h.count && h.body.mesh.nv == h.count);
         demand(vg_mesh_check(&h.body.mesh, "it", &e) == VG_OK && vgi_finite(h.body.reference, 3 * h.count));

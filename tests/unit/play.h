@@ -44,7 +44,7 @@ static played play(const vgi_sequence_format *format, const void *data, size_t n
     vgi_input *in;
     vg_frame f = {0};
     CHECK(vgi_input_memory(&in, data, n, "x", NULL) == VG_OK);
-    p.result = format->open(&state, &p.h, in, "'x'", &p.e);
+    p.result = format->open(&state, &p.h, in, &(vg_reading){0}, "'x'", &p.e);
     if (p.result == VG_OK && p.h.body.mesh.nf) p.result = vg_mesh_check(&p.h.body.mesh, "'x'", &p.e);
     while (p.result >= 0) {
         if ((p.result = vg_frame_shape(&f, &p.h, &p.e)) < 0 || (p.result = vg_frame_rename(&f, "", &p.e)) < 0) break;

@@ -178,8 +178,9 @@ static void large_face(uint32_t n)
         out.size = 0;
         vert[n / 2] = vert[3];
         CHECK(vg_model_write(&out, format_names[i], &mesh, x, NULL, true, &e) == VG_OK);
-        CHECK(read_bytes(&m, out.data, out.size, NULL, &e) == VG_EINPUT);
-        CHECK(strstr(e.message, "twice") && (strcmp(format_names[i], "obj") || strstr(e.message, " line ")));
+        CHECK(read_bytes(&m, out.data, out.size, NULL, &e) == VG_OK);
+        CHECK(strstr(m.note.text, "cut 1 face that names a vertex twice"));
+        vg_model_clear(&m);
         vert[n / 2] = n - 1 - n / 2;
         vg_bytes_clear(&out);
     }
@@ -310,29 +311,21 @@ static void refuses_broken_obj(void)
         {P3 "f -1 -2 -4\n", "'x' line 4: index -4 is out of range"},
         {P3 "f 1 2 4294967296\n", "'x' line 4: index 4294967296 is out of range"},
         {P3 "f 1 2 18446744073709551617\n", "'x' line 4: index 18446744073709551617 is out of range"},
-        {P3 "vt 0\nf 1/1 2/2 3/1\n", "'x' line 5: texture coordinate 2 is out of range, there are 1"},
-        {P3 "f 1/1 2/1 3/1\n", "'x' line 4: texture coordinate 1 is out of range, there are 0"},
         {P3 "f 1 2 x\n", "'x' line 4: an index expected, not 'x'"},
         {P3 "f 1 2 3x\n", "'x' line 4: a blank between corners expected, not 'x'"},
         {P3 "f 1.5 2 3\n", "'x' line 4: a blank between corners expected, not '.5'"},
         {P3 "f 1/x 2 3\n", "'x' line 4: an index expected, not 'x'"},
-        {P3 "f 1\n", "'x' line 4: face with 1 vertices"},
-        {P3 "f\n", "'x' line 4: face with 0 vertices"},
-        {P3 "l 2\n", "'x' line 4: line with 1 vertices"},
-        {P3 "f 1 2 2\n", "'x' line 4: vertex 2 is twice in one face"},
-        {P3 "l 1 2 2\n", "'x' line 4: vertex 2 is twice in one face"},
         {"v 0 0\n", "'x' line 1: vertex with 2 numbers (expected x y z)"},
         {"v 0 0 0\r\nv 1 2\r\n", "'x' line 2: vertex with 2 numbers (expected x y z)"},
         {"v 0 0 0\rv 0 0 a\r", "'x' line 2: a number expected, not 'a'"},
-        {"v 0 0 0 tail\n", "'x' line 1: a number expected, not 'tail'"},
-        {"v 0 0 1,5\n", "'x' line 1: a number expected, not ',5'"},
-        {"v 0 0 1-2\n", "'x' line 1: a number expected, not '-2'"},
+        {"v 0 0 1,5\n", "'x' line 1: '1,5' is not a finite number"},
+        {"v 0 0 1-2\n", "'x' line 1: '1-2' is not a finite number"},
+        {"v 0 -1.#IND00 0\n", "'x' line 1: '-1.#IND00' is not a finite number"},
+        {"v 1.#INF 0 0\n", "'x' line 1: '1.#INF' is not a finite number"},
+        {"v 0 0 1.#QNAN\n", "'x' line 1: '1.#QNAN' is not a finite number"},
         {"v 0 nan 0\n", "'x' line 1: 'nan' is not a finite number"},
         {"v 0 0 -inf\n", "'x' line 1: '-inf' is not a finite number"},
         {"v 0 0 1e999\n", "'x' line 1: '1e999' is not a finite number"},
-        {P3 "vt 1 2 3 4\n", "'x' line 4: end of line expected, not '4'"},
-        {P3 "vt\n", "'x' line 4: a number expected"},
-        {P3 "vt nan\n", "'x' line 4: 'nan' is not a finite number"},
         {"f 1 2 3\n", "'x' has no vertices (no line 'v x y z')"},
         {"o nothing\n", "'x' has no vertices (no line 'v x y z')"},
     };
@@ -409,7 +402,7 @@ static void reads_all_types_of_ply(void)
             }
             CHECK_READS((char *)file, n, "321 6654; 1 0");
             file[n] = 0;
-            CHECK_READS((char *)file, n + 1, "'x' has 1 bytes behind its last element");
+            CHECK_READS((char *)file, n + 1, "321 6654; 1 0"); /* with a byte behind the last element */
         }
 }
 
@@ -432,8 +425,6 @@ static void refuses_broken_ply(void)
         {"ply\nformat ascii 1.0\nelement vertex 2\n" XYZ "end_header\n1 2 3\n4000 5", "'x' ends in vertex 1 of 2"},
         {"ply\nformat ascii 1.0\nelement vertex 9\n" XYZ "end_header\n1 2 3\n",
          "'x' announces 9 of element 'vertex', but ends before"},
-        {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ "end_header\n1 2 3\n4",
-         "'x' has 1 bytes behind its last element"},
         {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ "end_header\n1 2 a\n",
          "'x': 'a' in vertex 0 is no number that fits there"},
         {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ "end_header\n1 2 nan\n", "'x': vertex 0 is not finite"},
@@ -441,16 +432,12 @@ static void refuses_broken_ply(void)
          "'x': face 0 names vertex 1 of 1"},
         {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ QUAD "end_header\n1 2 3\n3 0 -1 1\n",
          "'x': face 0 names vertex -1"},
-        {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ QUAD "end_header\n1 2 3\n2 0 0\n",
-         "'x': face 0 names a vertex twice"},
-        {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ QUAD "end_header\n1 2 3\n1 0\n",
-         "'x': face 0 has 1 vertices"},
         {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ QUAD "end_header\n1 2 3\n-3 0 1 2\n",
          "'x': face 0 has a list of negative length"},
         {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ QUAD "end_header\n1 2 3\n4000000000 0 1 2\n",
          "'x' ends in face 0 of 1"},
         {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ QUAD "end_header\n1 2 3\n3 0 1.5 2\n",
-         "'x': '1.5' in face 0 is no number that fits there"},
+         "'x': a number in face 0 should be whole and is 1.5"},
         {"ply\nformat ascii 1.0\nelement vertex 0\n" XYZ "end_header\n", "'x' has no vertices"},
         {"ply\nformat ascii 1.0\nend_header\n", "'x' has no vertices"},
         {"ply\nelement vertex 0\n" XYZ "end_header\n", "'x': the PLY header has no format line"},
@@ -462,10 +449,6 @@ static void refuses_broken_ply(void)
          "'x': the PLY header has an incomplete property"},
         {"ply\nformat ascii 1.0\nproperty float x\n", "'x': the PLY header has a property before any element"},
         {"ply\nformat ascii 1.0\nelement vertex 1\nproperty half x\n", "'x': PLY property 'x' has an unknown type"},
-        {"ply\nformat ascii 1.0\nelement vertex 1\nproperty list float int x\n",
-         "'x': PLY property 'x' has an unknown type"},
-        {"ply\nformat ascii 1.0\nelement face 1\nproperty list uchar float vertex_index\n",
-         "'x': PLY property 'vertex_index' is not of an integer type"},
         {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float x\n",
          "'x': PLY element 'vertex' has 'x' twice"},
         {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n",
@@ -474,9 +457,10 @@ static void refuses_broken_ply(void)
          "'x': its faces have no list vertex_indices"},
         {"ply\nformat ascii 1.0\nelement vertex 1\nelement vertex 1\n",
          "'x': the PLY header announces vertices twice"},
-        {"ply\nformat ascii 1.0\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n",
-         "'x' holds triangle strips, which are not read: write it with a list of faces"},
-        {"ply\nformat ascii 1.0\nsomething\n", "'x': unknown word 'something' in the PLY header"},
+        {"ply\nformat ascii 1.0\nelement vertex 1\n" XYZ
+         "element tristrips 1\nproperty list int int vertex_indices\nend_header\n1 2 3\n3 0 -2 0\n",
+         "'x': tristrips 0 names vertex -2"},
+        {"ply\nformat ascii 1.0\nsomething\n", "'x' ends inside the PLY header"},
         {"ply\nformat ascii 1.0\nelement vertex 1\n", "'x' ends inside the PLY header"},
         {"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\n" XYZ "end_header\n",
          "'x' announces 4000000000 of element 'vertex', but ends before"},
@@ -519,24 +503,22 @@ static void refuses_broken_off(void)
     static const struct {
         const char *text, *message;
     } broken[] = {
-        {"OFF\n", "'x' ends before the counts of vertices and faces"},
-        {"OFF\n3\n", "'x' line 2: a count expected"},
+        {"OFF\n", "'x' ends where a count is expected"},
+        {"OFF\n3\n", "'x' ends where a count is expected"},
         {"OFF\nx 1 0\n", "'x' line 2: a count expected, not 'x'"},
         {"OFF\n3 1 0 7\n", "'x' line 2: end of line expected, not '7'"},
         {"OFF\n-3 1 0\n", "'x' line 2: a count expected, not '-3'"},
-        {"OFF\n3 0 0\n0 0 0\n1 0 0\n", "'x' ends before vertex 2 of 3"},
+        {"OFF\n3 0 0\n0 0 0\n1.00000 0 0\n", "'x' ends before vertex 2 of 3"},
         {"OFF\n1 1 0\n0 0 0\n", "'x' ends before face 0 of 1"},
-        {"OFF\n1 0 0\n0 0\n", "'x' line 3: a number expected"},
+        {"OFF\n1 0 0\n0 0.0\n", "'x' ends where a finite number is expected"},
         {"OFF\n1 0 0\n0 0 inf\n", "'x' line 3: a finite number expected, not 'inf'"},
-        {"OFF\n1 0 0\n0 0 0 red\n", "'x' line 3: a number expected, not 'red'"},
+        {"OFF\n1 0 0\n0 -1.#IND 0\n", "'x' line 3: a finite number expected, not '-1.#IND'"},
         {"OFF\n2 1 0\n0 0 0\n1 0 0\n2 0 2\n",
          "'x' line 5: the index of a vertex below their count expected, not '2'"},
         {"OFF\n2 1 0\n0 0 0\n1 0 0\n2 0 -1\n",
-         "'x' line 5: the index of a vertex below their count expected, not '-1'"},
-        {"OFF\n2 1 0\n0 0 0\n1 0 0\n3 0 1 \n", "'x' line 5: face with less than the 3 vertices announced"},
-        {"OFF\n2 1 0\n0 0 0\n1 0 0\n1 0\n", "'x' line 5: face with 1 vertices"},
-        {"OFF\n2 1 0\n0 0 0\n1 0 0\n2 1 1\n", "'x': face 0 names a vertex twice"},
-        {"OFF\n1 0 0\n0 0 0\n1 1 1\n", "'x' line 4: more lines than announced"},
+         "'x' line 5: the index of a vertex expected, not '-1'"},
+        {"OFF\n2 1 0\n0 0 0\n1 0 0\n3 0 1  \n", "'x' ends where the index of a vertex is expected"},
+        {"OFF\n2 1 0\n0 0 0\n1 0 0\n30 0 1\n", "'x' line 5: face with less than the 30 vertices announced"},
         {"OFF\n0 0 0\n", "'x' has no vertices"},
         {"OFF\n1000000000 1000000000 0\n0 0 0\n",
          "'x' announces 1000000000 vertices and 1000000000 faces, but ends before"},
