@@ -98,7 +98,7 @@ static bool names_meshes(const char *name)
     static const char *const foreign[] = {".fbx", ".dae", ".abc", ".usd", ".usdc", ".usdz", NULL};
     struct stat st;
     bool exists = !stat(name, &st) && !S_ISREG(st.st_mode); /* a directory, a pipe: what it is goes before its name */
-    return (!exists && vg_sink_check(name, &(vg_sink_options){0}, NULL) == VG_OK) || ends_with_one(name, foreign);
+    return (!exists && vg_sink_check(name, &(vg_sink_options){.replace = true}, NULL) == VG_OK) || ends_with_one(name, foreign);
 }
 
 static void refuse_terminal(void) __attribute__((noreturn));

@@ -15,6 +15,8 @@ static const cli_option options[] = {
      "whatever the name says", .text = &sink_options.format},
     {"f64", 0, NULL, "numbers that read back to the same binary64, not binary32",
      .flag = &sink_options.full_precision},
+    {"replace", 0, NULL, "replace the mesh files that are in the directory, or have the pattern's names, as a whole",
+     .flag = &sink_options.replace},
     {"first-number", 0, "N", "what %d in the output's name starts at (default 0)", .integer = &first_number,
      .least = 0, .most = 1e9},
     {"mesh", 0, "MESH", "where the mesh of a point cache or array goes; default: beside it, as NAME.obj",

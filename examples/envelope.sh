@@ -30,7 +30,7 @@ leg() {
 }
 
 printf '\n# A man in 15 poses, four of which are set aside; his skeleton, with a frame for each:\n'
-run 'vg-decode $data/human-man-poses.tar.xz -o poses/'
+run 'vg-decode --replace $data/human-man-poses.tar.xz -o poses/'
 run 'xz -dc $data/human-man-poses.bvh.xz >man.bvh'
 run 'mkdir -p aside && mv poses/*_003_* poses/*_006_* poses/*_007_* poses/*_010_* aside/'
 run 'rows "1 2 3 5 6 9 10 12 13 14 15" man.bvh >fit.bvh; rows "4 7 8 11" man.bvh >dance.bvh'
@@ -64,9 +64,9 @@ run 'vg-encode --reference $data/trex.rest.obj $data/trex-attack.tar.xz |
     vg-view - --beside attack.vgs --frames 5 --size 280x200 --view 60,10 -o attack.png'
 
 printf '\n# Its foot in the walk, close up: as it is, by the envelope, by skinning:\n'
-run 'vg-decode walk.vgs -o steps/'
-run 'vg-play trex.rig walk.vgs | vg-decode -o steps-envelope/'
-run 'vg-play trex-skinning.rig walk.vgs | vg-decode -o steps-skinning/'
+run 'vg-decode --replace walk.vgs -o steps/'
+run 'vg-play trex.rig walk.vgs | vg-decode --replace -o steps-envelope/'
+run 'vg-play trex-skinning.rig walk.vgs | vg-decode --replace -o steps-skinning/'
 run 'for i in "" -envelope -skinning; do
     mkdir -p foot$i
     for n in 012 017 022; do leg steps$i/trex-walk_$n.obj >foot$i/$n.obj; done

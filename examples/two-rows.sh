@@ -6,8 +6,8 @@
 set -eu
 . "$(dirname "$0")/run.sh"
 
-run 'vg-decode $data/human-man-poses.tar.xz -o poses/'
-run 'vg-decode $data/human-heavy-poses.tar.xz -o truth/'
+run 'vg-decode --replace $data/human-man-poses.tar.xz -o poses/'
+run 'vg-decode --replace $data/human-heavy-poses.tar.xz -o truth/'
 run 'for i in 000 005 006 008 009 014; do echo poses/*_${i}_*.obj; done >poses.txt'
 run 'for i in 000 005 006 008 009 014; do echo truth/*_${i}_*.obj; done >truth.txt'
 

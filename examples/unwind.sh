@@ -28,7 +28,7 @@ run 'bar 400 >bar400.obj'
 run 'vg-encode bar0.obj bar400.obj | vg-interpolate 6 | vg-solve -o bar.vgs'
 run 'vg-view bar.vgs --frames 6 --columns 6 --size 160x300 --view 20,15 -o bar.png'
 
-run 'vg-decode $data/human-man-poses.tar.xz -o poses/'
+run 'vg-decode --replace $data/human-man-poses.tar.xz -o poses/'
 run 'vg-encode poses/*_000_*.obj poses/*_009_*.obj | vg-interpolate 6 | vg-solve -o between.vgs'
 run 'vg-view between.vgs --frames 6 --columns 6 --size 220x240 --view 25,10 -o interpolation.png'
 

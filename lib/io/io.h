@@ -275,8 +275,8 @@ typedef struct vgi_name_set {
 int vgi_name_set_add(vgi_name_set *set, const char *name, vg_err *e) VG_MUST_CHECK;
 void vgi_name_set_clear(vgi_name_set *set);
 
-/* vgi_natural_compare: order of names as people expect it: runs of digits by value, the rest by byte; ties by
- * strcmp. */
+/* vgi_natural_compare: order of names as people expect it: numbers by value, decimals and negative ones too, the rest by
+ * byte; ties by strcmp. */
 int vgi_natural_compare(const char *a, const char *b);
 /* vgi_to_utf8: n bytes of text as UTF-8: as they are, or else each taken for the letter that it is in Latin-1, which
  * most old files are in, and a zero byte for '?'. Free it. */
@@ -293,6 +293,8 @@ char *vgi_pose_name(const char *path, vg_err *e);
 /* vgi_operand_files: add the files that an operand names: itself, the mesh files of a directory, or those that match
  * a pattern. */
 int vgi_operand_files(vgi_names *paths, const char *operand, vg_err *e) VG_MUST_CHECK;
+/* vgi_directory_poses: add the paths of the files in a directory that hold one pose each, sorted. */
+int vgi_directory_poses(vgi_names *paths, const char *path, vg_err *e) VG_MUST_CHECK;
 
 /* ---- archive.c, pack.c: files out of archives and into them; with unpack.c, the files that know libarchive ---- */
 

@@ -72,34 +72,83 @@ static bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
-/* Compare the runs of digits at *a and *b by value and step over them. Any length: nothing is converted. */
-static int compare_digits(const char **a, const char **b)
+/* A name is compared as a list of characters and numbers. A number is a run of digits; with a point and digits behind it
+ * a decimal ("0.25"), unless another point and digits follow, as in a date or version ("1.2.10"), whose parts are whole
+ * numbers. It is negative behind a '-' that does not join it to a word: at the start, or after one of `separators`. */
+typedef struct token {
+    int character; /* 0: the end of the name; '0': a number */
+    bool minus;
+    const char *whole, *part; /* digits before and behind the point, without zeros in front and at the end */
+    size_t nwhole, npart;
+} token;
+
+static size_t count_digits(const char *s)
 {
-    while (**a == '0') ++*a;
-    while (**b == '0') ++*b;
-    const char *x = *a, *y = *b;
-    while (is_digit(**a)) ++*a;
-    while (is_digit(**b)) ++*b;
-    size_t nx = (size_t)(*a - x), ny = (size_t)(*b - y);
-    if (nx != ny) return nx < ny ? -1 : 1;
-    return memcmp(x, y, nx);
+    size_t n = 0;
+    while (is_digit(s[n])) n++;
+    return n;
+}
+
+static bool is_minus(const char *start, const char *p)
+{
+    static const char separators[] = "_@=~,:;/ ([{-+";
+    return *p == '-' && is_digit(p[1]) && (p == start || strchr(separators, p[-1]));
+}
+
+/* The digits behind the point of the number that starts at p and has n digits before it; 0: it is a whole number. */
+static size_t count_decimals(const char *start, const char *p, size_t n)
+{
+    bool within = p - start >= 2 && p[-1] == '.' && is_digit(p[-2]);
+    size_t decimals = p[n] == '.' ? count_digits(p + n + 1) : 0;
+    const char *behind = p + n + 1 + decimals;
+    return within || (decimals && *behind == '.' && is_digit(behind[1])) ? 0 : decimals;
+}
+
+/* The token at *p, which moves behind it. */
+static token next_token(const char *start, const char **p)
+{
+    token t = {.minus = is_minus(start, *p)};
+    if (!t.minus && !is_digit(**p)) {
+        t.character = (unsigned char)**p;
+        if (t.character) ++*p;
+        return t;
+    }
+    const char *digits = *p + t.minus;
+    t.character = '0';
+    t.nwhole = count_digits(digits), t.npart = count_decimals(start, digits, t.nwhole);
+    t.whole = digits, t.part = digits + t.nwhole + 1;
+    *p = t.npart ? t.part + t.npart : digits + t.nwhole;
+    for (; t.nwhole && *t.whole == '0'; t.whole++) t.nwhole--;
+    while (t.npart && t.part[t.npart - 1] == '0') t.npart--;
+    t.minus = t.minus && t.nwhole + t.npart; /* there is one zero */
+    return t;
+}
+
+/* Absolute values, of any length: nothing is converted. */
+static int compare_sizes(const token *a, const token *b)
+{
+    if (a->nwhole != b->nwhole) return a->nwhole < b->nwhole ? -1 : 1;
+    int order = memcmp(a->whole, b->whole, a->nwhole);
+    if (!order) order = memcmp(a->part, b->part, a->npart < b->npart ? a->npart : b->npart);
+    return order ? order : (a->npart > b->npart) - (a->npart < b->npart);
+}
+
+static int compare_tokens(const token *a, const token *b)
+{
+    if (a->character != b->character || a->character != '0') return a->character - b->character;
+    if (a->minus != b->minus) return a->minus ? -1 : 1;
+    return a->minus ? compare_sizes(b, a) : compare_sizes(a, b);
 }
 
 int vgi_natural_compare(const char *a, const char *b)
 {
     const char *p = a, *q = b;
-    while (*p && *q) {
-        if (is_digit(*p) && is_digit(*q)) {
-            int order = compare_digits(&p, &q);
-            if (order) return order;
-        } else if (*p == *q) {
-            p++, q++;
-        } else {
-            break;
-        }
+    for (;;) {
+        token x = next_token(a, &p), y = next_token(b, &q);
+        int order = compare_tokens(&x, &y);
+        if (order) return order;
+        if (!x.character) return strcmp(a, b);
     }
-    if (*p != *q) return (unsigned char)*p < (unsigned char)*q ? -1 : 1;
-    return strcmp(a, b);
 }
 
 static int compare_entries(const void *a, const void *b)

@@ -41,6 +41,34 @@ static int list_files(vgi_names *names, DIR *dir, vg_err *e)
     return r;
 }
 
+/* full: "DIR/NAME", without terminator */
+static int join_path(vg_bytes *full, const char *dir, const char *name, vg_err *e)
+{
+    size_t n = strlen(dir);
+    while (n > 1 && dir[n - 1] == '/') n--;
+    full->size = 0;
+    int r = vgi_bytes_append(full, dir, n, e);
+    if (r == VG_OK && dir[n - 1] != '/') r = vgi_bytes_append(full, "/", 1, e);
+    return r < 0 ? r : vgi_bytes_append(full, name, strlen(name), e);
+}
+
+int vgi_directory_poses(vgi_names *paths, const char *path, vg_err *e)
+{
+    DIR *dir = opendir(path);
+    struct dirent *d;
+    vg_bytes full = {0};
+    int r = dir ? VG_OK : vg_fail(e, VG_ESYS, "cannot open directory '%s': %s", path, strerror(errno));
+    while (r == VG_OK && (d = readdir(dir))) {
+        if (judge_file(dir, d->d_name) != ONE_POSE) continue;
+        r = join_path(&full, path, d->d_name, e);
+        if (r == VG_OK) r = vgi_names_add(paths, (char *)full.data, full.size, e);
+    }
+    if (dir) closedir(dir);
+    vg_bytes_clear(&full);
+    vgi_names_sort(paths);
+    return r;
+}
+
 static int list_directory(vgi_names *names, const char *path, vg_err *e)
 {
     DIR *dir = opendir(path);
@@ -58,14 +86,9 @@ static int add_directory(vgi_names *paths, const char *path, vg_err *e)
 {
     vgi_names names = {0};
     vg_bytes full = {0};
-    size_t n = strlen(path);
     int r = list_directory(&names, path, e);
-    while (n > 1 && path[n - 1] == '/') n--;
     for (size_t i = 0; r == VG_OK && i < names.n; i++) {
-        full.size = 0;
-        r = vgi_bytes_append(&full, path, n, e);
-        if (r == VG_OK && path[n - 1] != '/') r = vgi_bytes_append(&full, "/", 1, e);
-        if (r == VG_OK) r = vgi_bytes_append(&full, names.at[i], strlen(names.at[i]), e);
+        r = join_path(&full, path, names.at[i], e);
         if (r == VG_OK) r = vgi_names_add(paths, (char *)full.data, full.size, e);
     }
     vg_bytes_clear(&full);

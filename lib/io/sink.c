@@ -35,7 +35,8 @@ struct vg_sink {
     uint64_t number; /* of the next file of a series */
     uint64_t frames;
     bool made_directory, ended;
-    vgi_name_set names;  /* of frames in a directory or archive */
+    vgi_file_names names; /* of the files in a directory or archive, or of a series */
+    vgi_names earlier;    /* paths that --replace removes */
     vg_targets targets;
     int fd; /* the one file or archive; -1 */
     vgi_packer *packer;
@@ -58,19 +59,6 @@ struct vg_sink {
 };
 
 /* ---- the paths of files ---- */
-
-static int take_name(vg_sink *s, const char *name, vg_err *e)
-{
-    if (!*name || !strcmp(name, ".") || !strcmp(name, "..") || strchr(name, '/'))
-        return vg_fail(e, VG_EINPUT,
-                       "frame %llu is called '%s', which is no file name: number the files with a pattern like "
-                       "'pose-%%04d.obj'",
-                       (unsigned long long)s->frames, name);
-    int r = vgi_name_set_add(&s->names, name, e);
-    if (r != 0) return r < 0 ? r : VG_OK;
-    return vg_fail(e, VG_EINPUT,
-                   "two frames are called '%s': number the files with a pattern like 'pose-%%04d.obj'", name);
-}
 
 static int append_unescaped(vg_bytes *path, const char *s, size_t n, vg_err *e)
 {
@@ -96,15 +84,13 @@ static int series_path(const vg_sink *s, vg_bytes *path, vg_err *e)
 }
 
 /* "DIR/NAME.obj"; in an archive without the directory. */
-static int named_path(const vg_sink *s, const char *name, vg_bytes *path, vg_err *e)
+static int file_path(const vg_sink *s, const vg_bytes *file, vg_bytes *path, vg_err *e)
 {
-    const char *suffix = s->plan.format->suffix;
     size_t n = s->plan.kind == VGI_PLAN_DIRECTORY ? s->plan.length : 0;
     path->size = 0;
     int r = vgi_bytes_append(path, s->output, n, e);
     if (r == VG_OK && n && s->output[n - 1] != '/') r = vgi_bytes_append(path, "/", 1, e);
-    if (r == VG_OK) r = vgi_bytes_append(path, name, strlen(name), e);
-    return r < 0 ? r : vgi_bytes_append(path, suffix, strlen(suffix) + 1, e);
+    return r < 0 ? r : vgi_bytes_append(path, file->data, file->size, e);
 }
 
 /* ---- files ---- */
@@ -130,14 +116,26 @@ static int make_directory(vg_sink *s, vg_err *e)
 }
 
 /* A pipe cannot be patched: what goes there waits in a file without a name. */
-static int open_sequence(vg_sink *s, vg_err *e)
+static int open_patchable(vg_sink *s, vg_err *e)
 {
     s->fd = s->plan.to_stdout ? -1 : vg_targets_open(&s->targets, s->output, e);
     if (s->fd < 0 && !s->plan.to_stdout) return s->fd;
     bool patchable = s->fd >= 0 && !vg_targets_in_place(&s->targets);
     s->out.name = s->output;
     s->out.fd = patchable ? s->fd : vgi_nameless_file(e);
-    return s->out.fd < 0 ? s->out.fd : s->plan.sequence->begin(&s->state, s->head, &s->options, &s->out, e);
+    return s->out.fd < 0 ? s->out.fd : VG_OK;
+}
+
+static int open_sequence(vg_sink *s, vg_err *e)
+{
+    int r = open_patchable(s, e);
+    return r < 0 ? r : s->plan.sequence->begin(&s->state, s->head, &s->options, &s->out, e);
+}
+
+static int open_archive(vg_sink *s, vg_err *e)
+{
+    int r = open_patchable(s, e);
+    return r < 0 ? r : vgi_packer_open(&s->packer, s->out.fd, s->output, s->plan.length, e);
 }
 
 static int open_place(vg_sink *s, vg_err *e)
@@ -145,13 +143,13 @@ static int open_place(vg_sink *s, vg_err *e)
     switch (s->plan.kind) {
     case VGI_PLAN_SEQUENCE: return open_sequence(s, e);
     case VGI_PLAN_DIRECTORY: return make_directory(s, e);
+    case VGI_PLAN_ARCHIVE: return open_archive(s, e);
     case VGI_PLAN_SERIES: return VG_OK;
     default: break;
     }
     if (s->plan.to_stdout) return VG_OK;
-    if ((s->fd = vg_targets_open(&s->targets, s->output, e)) < 0) return s->fd;
-    if (s->plan.kind != VGI_PLAN_ARCHIVE) return VG_OK;
-    return vgi_packer_open(&s->packer, s->fd, s->output, s->plan.length, e);
+    s->fd = vg_targets_open(&s->targets, s->output, e);
+    return s->fd < 0 ? s->fd : VG_OK;
 }
 
 /* ---- the mesh beside a sequence ---- */
@@ -314,6 +312,7 @@ int vg_sink_open(vg_sink **out, const char *output, const vg_head *h, const vg_s
     int r = vgi_plan_make(&s->plan, output, o, e);
     if (r == VG_OK) r = vgi_plan_check_place(&s->plan, e);
     if (r == VG_OK) r = vgi_plan_check_head(&s->plan, h, output, e);
+    if (r == VG_OK) r = vgi_earlier_list(&s->earlier, &s->plan, o, e);
     if (r == VG_OK && !(s->output = vgi_copy_string(s->plan.name, s->plan.length, e))) r = VG_ENOMEM;
     if (r == VG_OK) r = drop_loose(s, o->drop_loose, e);
     if (r == VG_OK) r = put_mesh(s, o, e);
@@ -435,7 +434,8 @@ static int place_piece(vg_sink *s, piece *p, vg_err *e)
     bool series = s->plan.kind == VGI_PLAN_SERIES;
     if (s->plan.kind == VGI_PLAN_FILE)
         return VG_OK; /* its text waits for vg_sink_end, so that a second frame leaves nothing in a pipe */
-    int r = series ? series_path(s, &p->path, e) : named_path(s, p->name, &p->path, e);
+    int r = series ? series_path(s, &p->path, e) : file_path(s, &s->names.file, &p->path, e);
+    if (r == VG_OK && series) r = vgi_file_names_series(&s->names, (char *)p->path.data, e);
     s->number += series;
     if (r < 0 || s->plan.kind == VGI_PLAN_ARCHIVE) return r;
     p->fd = vg_targets_open(&s->targets, (char *)p->path.data, e);
@@ -462,6 +462,71 @@ static int finish_pieces(vg_sink *s, vg_err *e)
     return r;
 }
 
+/* ---- numbers in front of names ---- */
+
+/* Files in a directory have not got their final names yet. */
+static int renumber_files(vg_sink *s, vg_err *e)
+{
+    vg_bytes file = {0}, path = {0};
+    int r = VG_OK;
+    for (size_t i = 0; r == VG_OK && i < s->frames; i++) {
+        r = vgi_file_name_numbered(&file, i, s->names.frames.at[i], s->plan.format->suffix, e);
+        if (r == VG_OK) r = file_path(s, &file, &path, e);
+        if (r == VG_OK) r = vg_targets_name(&s->targets, i, (char *)path.data, e);
+    }
+    vg_bytes_clear(&file);
+    vg_bytes_clear(&path);
+    return r;
+}
+
+/* The members of `from`, which are those written so far, in order, into the archive that begins anew. */
+static int pack_again(vg_sink *s, vgi_archive *from, vg_err *e)
+{
+    vg_bytes file = {0}, data = {0};
+    const char *path;
+    int r = VG_OK;
+    for (size_t i = 0; r == VG_OK && i < s->frames; i++) {
+        r = vgi_archive_next(from, &path, &data, e);
+        if (r == 0) r = vg_fail(e, VG_ESYS, "cannot read back '%s'", s->output);
+        if (r > 0) r = vgi_file_name_numbered(&file, i, s->names.frames.at[i], s->plan.format->suffix, e);
+        if (r == VG_OK) r = vgi_packer_add(s->packer, (char *)file.data, data.data, data.size, e);
+    }
+    vg_bytes_clear(&file);
+    vg_bytes_clear(&data);
+    return r;
+}
+
+static int renumber_members(vg_sink *s, vg_err *e)
+{
+    const vgi_limits none = {.member_bytes = UINT64_MAX, .total_bytes = UINT64_MAX, .members = SIZE_MAX};
+    vgi_archive *from = NULL;
+    int copy = vgi_nameless_file(e), r = copy < 0 ? copy : vgi_packer_end(s->packer, e);
+    vgi_output to = {.fd = copy, .name = s->output};
+    vgi_packer_close(&s->packer);
+    off_t size = lseek(s->out.fd, 0, SEEK_END);
+    if (r == VG_OK) r = vgi_output_copy(&to, s->out.fd, (uint64_t)size, e);
+    if (r == VG_OK) r = vgi_output_flush(&to, e);
+    vgi_output_clear(&to);
+    if (r == VG_OK && (ftruncate(s->out.fd, 0) < 0 || lseek(s->out.fd, 0, SEEK_SET) < 0))
+        r = vg_fail(e, VG_ESYS, "cannot write to '%s': %s", s->output, strerror(errno));
+    if (r == VG_OK) r = vgi_packer_open(&s->packer, s->out.fd, s->output, s->plan.length, e);
+    if (r < 0 && copy >= 0) close(copy);
+    if (r == VG_OK) r = vgi_archive_open(&from, copy, 0, s->output, &none, e);
+    if (r == VG_OK) r = pack_again(s, from, e);
+    vgi_archive_close(&from);
+    return r;
+}
+
+/* The file that the next frame will have. */
+static int name_file(vg_sink *s, const char *name, vg_err *e)
+{
+    int begins = vgi_file_names_next(&s->names, name, s->plan.format->suffix, e);
+    if (begins <= 0 || s->frames == 0) return begins < 0 ? begins : VG_OK;
+    int r = finish_pieces(s, e);
+    if (r < 0) return r;
+    return s->plan.kind == VGI_PLAN_ARCHIVE ? renumber_members(s, e) : renumber_files(s, e);
+}
+
 int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
 {
     const char *name = f->name ? f->name : "";
@@ -475,7 +540,7 @@ int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
     }
     if (kind == VGI_PLAN_SEQUENCE) return put_into_sequence(s, f, e);
     if (kind == VGI_PLAN_FILE && s->frames > 0) return more_than_one(s, e);
-    if (kind == VGI_PLAN_DIRECTORY || kind == VGI_PLAN_ARCHIVE) r = take_name(s, name, e);
+    if (kind == VGI_PLAN_DIRECTORY || kind == VGI_PLAN_ARCHIVE) r = name_file(s, name, e);
     if (r == VG_OK) r = put_piece(s, f, name, e);
     if (r == VG_OK) s->frames++;
     return r;
@@ -496,17 +561,30 @@ static int no_pose(const vg_sink *s, vg_err *e)
     return vg_fail(e, VG_EINPUT, "there is no pose to be written to '%s'", s->output);
 }
 
+/* What has waited goes to the pipe. */
+static int copy_out(vg_sink *s, vg_err *e)
+{
+    if (s->out.fd == s->fd) return VG_OK;
+    off_t size = lseek(s->out.fd, 0, SEEK_END);
+    vgi_output to = {.fd = place_fd(s), .name = place_name(s)};
+    int r = vgi_output_copy(&to, s->out.fd, (uint64_t)size, e);
+    if (r == VG_OK) r = vgi_output_flush(&to, e);
+    vgi_output_clear(&to);
+    return r;
+}
+
 static int end_sequence(vg_sink *s, vg_err *e)
 {
     if (s->frames == 0) return no_pose(s, e);
     int r = s->plan.sequence->end(s->state, e);
     if (r == VG_OK) r = vgi_output_flush(&s->out, e);
-    if (r < 0 || s->out.fd == s->fd) return r;
-    vgi_output to = {.fd = place_fd(s), .name = place_name(s)};
-    r = vgi_output_copy(&to, s->out.fd, s->out.size, e);
-    if (r == VG_OK) r = vgi_output_flush(&to, e);
-    vgi_output_clear(&to);
-    return r;
+    return r < 0 ? r : copy_out(s, e);
+}
+
+static int end_archive(vg_sink *s, vg_err *e)
+{
+    int r = vgi_packer_end(s->packer, e);
+    return r < 0 ? r : copy_out(s, e);
 }
 
 static int end_single(vg_sink *s, vg_err *e)
@@ -521,7 +599,7 @@ int vg_sink_end(vg_sink *s, vg_err *e)
     int r = finish_pieces(s, e);
     if (r < 0) return r;
     if (s->plan.kind == VGI_PLAN_SEQUENCE) r = end_sequence(s, e);
-    else if (s->plan.kind == VGI_PLAN_ARCHIVE) r = vgi_packer_end(s->packer, e);
+    else if (s->plan.kind == VGI_PLAN_ARCHIVE) r = end_archive(s, e);
     else if (s->plan.kind == VGI_PLAN_FILE) r = end_single(s, e);
     if (r == VG_OK && s->fd >= 0) {
         if (s->out.fd == s->fd) s->out.fd = -1;
@@ -530,7 +608,9 @@ int vg_sink_end(vg_sink *s, vg_err *e)
     }
     if (r == VG_OK && s->frames) r = warn_of_losses(s, e);
     if (r == VG_OK) r = warn_of_loose(s, e);
+    if (r == VG_OK && s->names.numbered) r = vgi_file_names_warn(&s->names, s->plan.format->suffix, &s->warnings, e);
     if (r == VG_OK) r = vg_targets_rename(&s->targets, e);
+    if (r == VG_OK) r = vgi_earlier_remove(&s->earlier, &s->targets, e);
     s->ended = r == VG_OK;
     return r;
 }
@@ -568,7 +648,8 @@ void vg_sink_close(vg_sink **sink)
     vgi_output_clear(&s->out);
     if (s->fd >= 0) close(s->fd);
     vg_targets_clear(&s->targets);
-    vgi_name_set_clear(&s->names);
+    vgi_file_names_clear(&s->names);
+    vgi_names_clear(&s->earlier);
     vgi_names_clear(&s->warnings);
     vgi_slim_clear(&s->slim);
     free(s->mesh);

@@ -185,8 +185,11 @@ int vgi_plan_check_place(const vgi_plan *p, vg_err *e)
 int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e)
 {
     vgi_plan p;
+    vgi_names earlier = {0};
     int r = vgi_plan_make(&p, output, o, e);
     if (r == VG_OK) r = vgi_plan_check_place(&p, e);
+    if (r == VG_OK) r = vgi_earlier_list(&earlier, &p, o, e);
+    vgi_names_clear(&earlier);
     return r == VG_OK && o->mesh ? vg_target_check(o->mesh, e) : r;
 }
 

@@ -67,7 +67,7 @@ static int create_beside(vg_targets *t, vg_target *target, vg_err *e)
     if (path) *path = 0, target->temporary = path;
     for (int attempt = 0; path && fd < 0 && attempt < 1000; attempt++) {
         snprintf(path, n, "%s/.vg-%ld-%llu.tmp", dir, (long)getpid(), (unsigned long long)t->temporaries++);
-        fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        fd = open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
         if (fd < 0 && errno != EEXIST) break;
     }
     if (path && fd < 0) fd = vg_fail(e, VG_ESYS, "cannot create a file for '%s': %s", final, strerror(errno));
@@ -109,6 +109,18 @@ int vg_targets_open(vg_targets *t, const char *path, vg_err *e)
     }
     if (fd < 0) t->n--, free(target->final);
     return fd;
+}
+
+int vg_targets_name(vg_targets *t, size_t i, const char *path, vg_err *e)
+{
+    struct stat st;
+    int exists = look(path, &st, e);
+    if (exists < 0) return exists;
+    char *real = exists ? realpath(path, NULL) : NULL;
+    if (!real && !(real = vgi_copy_string(path, strlen(path), e))) return VG_ENOMEM;
+    free(t->at[i].final);
+    t->at[i].final = real;
+    return VG_OK;
 }
 
 bool vg_targets_in_place(const vg_targets *t)

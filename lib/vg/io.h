@@ -146,6 +146,8 @@ typedef struct vg_targets { /* consistent at any moment: vg_targets_remove may b
 int vg_target_check(const char *path, vg_err *e) VG_MUST_CHECK;
 /* vg_targets_open: open what will be `path`: a descriptor, or negative. */
 int vg_targets_open(vg_targets *t, const char *path, vg_err *e) VG_MUST_CHECK;
+/* vg_targets_name: change what target number i will be called, before vg_targets_rename. */
+int vg_targets_name(vg_targets *t, size_t i, const char *path, vg_err *e) VG_MUST_CHECK;
 /* vg_targets_in_place: is the file that was opened last a pipe or a device? */
 bool vg_targets_in_place(const vg_targets *t);
 /* vg_target_close: close a descriptor; messages call the file `name`. Some file systems report a full disk only here. */
@@ -158,7 +160,9 @@ void vg_targets_clear(vg_targets *t); /* forget the files, which stay */
 
 /* The door out: one mesh file, a '%04d' pattern, a directory ("out/"), an archive, or one file that holds the whole
  * sequence, told by the name and checked at once; "NAME:ply" chooses what is inside an archive or directory, `format`
- * (may be NULL) overrides. Everything is written under temporary names and takes its final name in vg_sink_end. */
+ * (may be NULL) overrides. Everything is written under temporary names and takes its final name in vg_sink_end. The
+ * frames of a directory or archive are read back in the order in which they were put: where their names do not sort so,
+ * or are no file names, the files have a number in front. */
 typedef struct vg_sink vg_sink;
 typedef struct vg_sink_options {
     const char *format;  /* "obj", "pc2", ...; NULL: told by the name */
@@ -169,6 +173,8 @@ typedef struct vg_sink_options {
     bool no_mesh;        /* nowhere */
     bool drop_loose;     /* leave out the vertices that are in no face */
     size_t most_targets; /* GLB, glTF: morph targets; more frames are mixed from so many. 0: 100 */
+    bool replace;        /* where a directory or a pattern has mesh files of an earlier set, remove those that are not
+                            overwritten once all is written; without it, such files are an error before any work */
     int threads;         /* of mesh files so many are made at a time, and one more waits: no more than 256 MiB, but two
                             in any case, and what went wrong with one is told by a later call. 0 or 1: each at once */
 } vg_sink_options;
