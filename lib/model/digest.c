@@ -1,9 +1,9 @@
-/* digest.c: one number that tells whether two sequences say the same, whatever commands and precision made them.
- * Leaves out the checksums of records, which guard bytes and not meaning (io/record.c).
+/* digest.c: a number that is equal for sequences of equal content, whatever commands and precision made them.
+ * Leaves out the checksums of records, which guard bytes (io/record.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/numbers_kernel.h"
 
-/* the state as a value, so that there is nothing to allocate; its layout is of the ABI */
+/* the XXH64 state by value, so that nothing has to be allocated; its layout is part of the library's ABI */
 #define XXH_STATIC_LINKING_ONLY
 #include <xxhash.h>
 
@@ -12,7 +12,7 @@ struct vg_digest {
     XXH64_state_t state;
 };
 
-/* All data goes in as little-endian 64-bit words, with a count before everything of variable length, so that two
+/* All data enters as little-endian 64-bit words, each variable-length part preceded by its count, so that
  * different contents never give the same bytes. */
 enum { WORDS = 512 };
 

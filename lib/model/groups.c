@@ -1,5 +1,5 @@
-/* groups.c: a skeleton that finds itself in every pose of a mesh: its joints are means of vertices (T 5.1).
- * Leaves out the text that names the vertices (io).
+/* groups.c: a skeleton that follows a mesh: its joints are means of vertices (T 5.1). Leaves out the text format
+ * that names the vertices (io).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "numeric/turn.h"
@@ -58,7 +58,7 @@ static void subtract(const double *a, const double *b, double d[3])
     for (int k = 0; k < 3; k++) d[k] = a[k] - b[k];
 }
 
-/* x without its part along u */
+/* the part of x perpendicular to u */
 static void reject(const double u[3], double x[3])
 {
     double along = 0, square = 0;
@@ -92,7 +92,7 @@ static void turn_joint(const vg_joint_groups *g, size_t j, const double *referen
             reject(below[0], d), reject(below[1], r); /* perpendicular to the bone: the frame is met exactly */
         add_pair(b, children == 1 ? 1 : 0.01, d, r);
     }
-    /* what all of this leaves open goes with the parent */
+    /* what the vertices leave open follows the parent */
     vgi_best_turn_near(b, 1e-9, group->parent == UINT32_MAX ? unturned : turns + 4 * (size_t)group->parent,
                        turns + 4 * j);
 }

@@ -1,5 +1,4 @@
-/* incidence.c: the lists of corners around each vertex, by a counting sort.
- * Leaves out checking the mesh: the caller's is valid.
+/* incidence.c: lists of the corners around each vertex, by counting sort. The mesh must be valid.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/incidence.h"
 

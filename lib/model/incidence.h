@@ -1,5 +1,5 @@
-/* incidence.h: which faces, and which of their corners, stand around a vertex.
- * Internal. Leaves out edges: the two at a corner are its neighbours in the face's cycle.
+/* incidence.h: the faces around each vertex, and their corners there. Internal. Edges are not listed: the two at a
+ * corner lead to its neighbours in the face.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_INCIDENCE_H
 #define VG_INCIDENCE_H
@@ -12,13 +12,14 @@ typedef struct vgi_incidence {
     uint32_t *corner, *face; /* one per corner of the mesh */
 } vgi_incidence;
 
-/* vgi_incidence_make: of a vg_mesh or vg_graph (nv, nf, start, vert as there). O(nv + corners). Failed: *x is 0. */
+/* vgi_incidence_make: for a vg_mesh or vg_graph (nv, nf, start, vert as there). O(nv + corners). On failure *x is
+ * 0. */
 int vgi_incidence_make(vgi_incidence *x, size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert,
                        vg_err *e) VG_MUST_CHECK;
 void vgi_incidence_clear(vgi_incidence *x);
 
-/* vgi_corner_edges: the vertices before and after a corner in its face: the other ends of the two edges that meet
- * there (the same vertex twice in a line segment). */
+/* vgi_corner_edges: the vertices before and after a corner in its face, which are the other ends of the two edges
+ * at the corner (the same vertex twice in a line segment). */
 static inline void vgi_corner_edges(const uint32_t *start, const uint32_t *vert, uint32_t face, uint32_t corner,
                                     uint32_t ends[2])
 {

@@ -1,7 +1,7 @@
-/* measures.c: how far two sequences of one connectivity are apart: vertices; orientation, area, planarity of faces.
- * Each pose is measured by itself, several by as many threads; their sums are added in the order of the poses, so
- * that the number of threads changes no digit. Leaves out the inner loop over faces (measures_kernel.c), and pairing
- * of frames and tolerances: those are vg-diff's.
+/* measures.c: the distance between two sequences of one connectivity: vertex errors; orientation, area and
+ * planarity of faces. Poses are measured independently, several in parallel; their sums are added in the order of
+ * the poses, so that the result does not depend on the number of threads. Leaves out the inner loop over faces
+ * (measures_kernel.c), pairing and tolerances (vg-diff).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/measures_kernel.h"
 
@@ -17,14 +17,14 @@ const double vg_error_edges[VG_ERROR_BINS] = {
     2e-1, 5e-1, 1e0, 2e0, 5e0,
 };
 
-/* What is measured of one pose by itself. */
+/* The measures of one pose. */
 typedef struct pose {
-    double sum, squares, largest; /* of the errors of vertices */
+    double sum, squares, largest; /* of the vertex errors */
     uint64_t histogram[VG_ERROR_BINS];
     vgi_face_sums faces;
 } pose;
 
-/* Where to look in the edges: for each exponent of a number the last edge below all numbers that have it. */
+/* For each exponent, the last edge below all numbers with that exponent: where a search starts. */
 enum { EXPONENT_SHIFT = 52, NEXPONENTS = 1 << 11 };
 
 struct vg_measures {
@@ -35,12 +35,12 @@ struct vg_measures {
     double diagonal;
     double sum, sum_squares, max;
     size_t max_vertex, max_frame;
-    double *vertex_mean, *vertex_squares; /* nv: Welford over poses */
+    double *vertex_mean, *vertex_squares; /* nv: Welford's sums over poses */
     uint64_t *bins;                       /* NBINS */
     uint64_t histogram[VG_ERROR_BINS];
     double edges[VG_ERROR_BINS];          /* the least error in each bin of the histogram, in mesh units */
     unsigned char edge_below[NEXPONENTS];
-    vgi_face_class *classes;              /* of faces of 3 corners and more, by their number */
+    vgi_face_class *classes;              /* of faces of 3 corners or more, by face number */
     size_t nclasses;
     vgi_face_sums faces;
     pose *poses; /* of one call */
@@ -49,7 +49,7 @@ struct vg_measures {
 
 /* ---- setting up ---- */
 
-/* The least error that is `edge` or more in units of D; without D that is all but 0. */
+/* The least error that is at least `edge` in units of D; if D is 0, any error but 0. */
 static double least_error(double edge, double diagonal)
 {
     double x = edge * diagonal;
@@ -76,7 +76,7 @@ static size_t face_size(const vg_mesh *m, size_t f)
     return m->start[f + 1] - m->start[f];
 }
 
-/* faces[r]: how many have r corners; then the number of their class. */
+/* faces[r]: the number of faces with r corners, then the number of their class. */
 static int make_classes(vg_measures *x, size_t *faces, size_t most, vg_err *e)
 {
     for (size_t r = 3; r <= most; r++) x->nclasses += faces[r] > 0;
@@ -171,12 +171,12 @@ static size_t bin_of(double error)
 {
     uint64_t bits;
     memcpy(&bits, &error, sizeof bits);
-    return (size_t)(bits >> BIN_SHIFT) & (NBINS - 1); /* the sign bit is 0, but for a NaN */
+    return (size_t)(bits >> BIN_SHIFT) & (NBINS - 1); /* the sign bit is 0 except for a NaN */
 }
 
 static double bin_middle(size_t bin)
 {
-    if (bin == 0) return 0; /* zero and what is next to it */
+    if (bin == 0) return 0; /* zero and its neighbourhood */
     uint64_t low = (uint64_t)bin << BIN_SHIFT, high = ((uint64_t)bin + 1) << BIN_SHIFT;
     double a, b;
     memcpy(&a, &low, sizeof a);
@@ -184,7 +184,7 @@ static double bin_middle(size_t bin)
     return 0.5 * (a + b);
 }
 
-/* The last edge that is not above the error. */
+/* The last edge not above the error. */
 static size_t edge_below(const vg_measures *x, double error)
 {
     uint64_t bits;
@@ -209,7 +209,7 @@ typedef struct call {
     double *const *errors;
 } call;
 
-/* What centring adds to the result. */
+/* The shift that centring adds. */
 static void find_shift(const vg_measures *x, const double *truth, const double *result, double shift[3])
 {
     double a[3] = {0, 0, 0}, b[3] = {0, 0, 0};
@@ -248,7 +248,7 @@ static void measure_pose(void *context, size_t i)
     x->poses[i] = p;
 }
 
-/* The means and deviations of some vertices over the poses. */
+/* Means and deviations of a range of vertices over the poses. */
 enum { SOME_VERTICES = 1024 };
 static void add_vertices(const call *c, size_t first, size_t last)
 {
@@ -263,7 +263,7 @@ static void add_vertices(const call *c, size_t first, size_t last)
     }
 }
 
-/* What goes over all poses, in shares that do not touch one another: the bins, and then vertices. */
+/* Work over all poses in disjoint shares: histogram bins first, then vertices. */
 static void add_share(void *context, size_t i)
 {
     const call *c = context;
@@ -317,7 +317,7 @@ int vg_measures_add(vg_measures *x, size_t n, const double *const *truth, const 
 
 /* ---- the report ---- */
 
-/* The smallest error that 95 of 100 do not exceed. */
+/* The smallest error that 95 % do not exceed. */
 static double percentile_95(const vg_measures *x)
 {
     uint64_t n = 0, seen = 0;

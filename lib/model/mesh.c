@@ -36,8 +36,8 @@ static int compare_indices(const void *p, const void *q)
     return (a > b) - (a < b);
 }
 
-/* Is a vertex twice in this face? Small faces by comparing pairs; large ones sorted in `sorted`. No list over all
- * vertices: their number may still be a lie. */
+/* Whether a vertex occurs twice in this face: small faces by comparing pairs, large ones by sorting into `sorted`.
+ * No array over all vertices is used, since nv may still be wrong. */
 static bool repeats(const uint32_t *vert, size_t size, uint32_t *sorted)
 {
     if (!sorted) {
@@ -115,7 +115,7 @@ int vg_mesh_components(const vg_mesh *m, uint32_t *label, size_t *count, vg_err 
             label[m->vert[c]] = 0;
             vgi_sets_join(parent, m->vert[m->start[f]], m->vert[c]);
         }
-    /* a set is known by its lowest vertex, so labels come out in order of first vertex */
+    /* a set is named by its lowest vertex, so labels are numbered in order of first vertex */
     size_t n = 0;
     for (uint32_t v = 0; v < m->nv; v++) {
         if (label[v] == UINT32_MAX) continue;

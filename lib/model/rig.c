@@ -96,7 +96,7 @@ bool vg_rig_axis(const vg_rig *r, size_t b, double axis[3])
     double sum[3] = {0, 0, 0}, length = 0;
     size_t own = r->bone[b];
     bool ends = false;
-    for (size_t j = 0; j < r->skeleton.njoints; j++) /* an end site says it, when there is one */
+    for (size_t j = 0; j < r->skeleton.njoints; j++) /* an end site, if any, gives the direction */
         ends |= r->skeleton.joints[j].parent == own && !r->skeleton.joints[j].nchannels;
     for (size_t j = 0; j < r->skeleton.njoints; j++) {
         const vg_joint *joint = &r->skeleton.joints[j];

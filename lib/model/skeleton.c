@@ -1,5 +1,5 @@
-/* skeleton.c: a skeleton as a mesh of bones, its pose from the values of its channels, and the values from a pose.
- * Leaves out the file that holds a skeleton (bvh.c) and how bones deform (deform.c).
+/* skeleton.c: a skeleton as a mesh of bones; its pose from channel values (forward kinematics), and channel values
+ * from a pose. Leaves out the file format (bvh.c) and the deformation of bones (deform.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "numeric/vec3.h"
@@ -61,7 +61,7 @@ static void turn_on(double q[4], int k, double degrees)
     vg_quat_multiply(q, r, q);
 }
 
-/* Where joint j is and how it is turned, from its parent's and its own values. */
+/* Position and rotation of joint j from its parent's and its own values. */
 static void place_joint(const vg_skeleton *s, size_t j, const double *values, double *positions, double *turns)
 {
     const vg_joint *joint = &s->joints[j];
@@ -91,11 +91,11 @@ void vg_skeleton_pose(const vg_skeleton *s, const double *values, double *positi
     }
 }
 
-/* ---- the best turn for several directions ---- */
+/* ---- the best rotation for several directions ---- */
 
-/* k: the sum of d o^T over directions o of the reference and d of now, divided by the sum of |o|^2. What k leaves
- * open (all directions on one line), and what it says with less force than its own misfit, stays as in q_before: each
- * step pulls towards the last result, so that what is well determined ends at its optimum all the same. */
+/* k: the sum of d o^T over directions o of the reference and d of the pose, divided by the sum of |o|^2. What k
+ * leaves open (all directions on one line), or determines less firmly than its own misfit, stays as in q_before:
+ * each step pulls towards the last result, so that a well-determined rotation still ends at its optimum. */
 static void fit_turn(const double k[9], const double q_before[4], double q[4])
 {
     double m[9], agreement = 0, prior[4];
@@ -107,22 +107,22 @@ static void fit_turn(const double k[9], const double q_before[4], double q[4])
     for (int step = 0; step < 3; step++) vgi_best_turn_near(k, weight, step ? q : prior, q);
 }
 
-/* ---- angles from a turn ---- */
+/* ---- Euler angles from a rotation ---- */
 
-/* Angles in degrees, a whole number of turns away, nearest to those of the pose before. */
+/* Angles in degrees, shifted by whole turns to be nearest to those of the previous pose. */
 static double near_to(double degrees, double before)
 {
     return degrees + 360 * nearbyint((before - degrees) / 360);
 }
 
-/* Three different axes, or the first again as the third: any turn has such angles. */
+/* Three different axes, or the first again as the third: such angles exist for every rotation. */
 static bool is_euler(const int axis[6], uint32_t n)
 {
     return n == 3 && axis[0] != axis[1] && axis[1] != axis[2];
 }
 
-/* m = R_i(a) R_j(b) R_k(c) with three different axes: 3 angles in radians. false: a and c turn about one line, and
- * only b is given. */
+/* m = R_i(a) R_j(b) R_k(c) with three different axes: 3 angles in radians. false: a and c turn about the same
+ * line, and only b is determined. */
 static bool angles_of_three(const double m[9], int i, int j, int k, double angle[3])
 {
     double s = (j - i + 3) % 3 == 1 ? 1 : -1; /* even or odd order of axes */
@@ -133,7 +133,7 @@ static bool angles_of_three(const double m[9], int i, int j, int k, double angle
     return cosine > 1e-7;
 }
 
-/* The same for R_i(a) R_j(b) R_i(c); l is the axis that does not occur. */
+/* The same for R_i(a) R_j(b) R_i(c); l is the third axis. */
 static bool angles_of_two(const double m[9], int i, int j, int l, double angle[3])
 {
     double s = (j - i + 3) % 3 == 1 ? 1 : -1;
@@ -144,7 +144,7 @@ static bool angles_of_two(const double m[9], int i, int j, int l, double angle[3
     return sine > 1e-7;
 }
 
-/* The angle about axis k of a turn that is about k only. */
+/* The angle of a rotation about axis k. */
 static double angle_about(const double q[4], int k)
 {
     return 2 * atan2(q[k + 1], q[0]) / DEGREE;
@@ -155,8 +155,8 @@ static void conjugate(const double q[4], double c[4])
     c[0] = q[0], c[1] = -q[1], c[2] = -q[2], c[3] = -q[3];
 }
 
-/* Degrees of the three rotations that make the turn q: of the two ways and all whole turns, what is nearest to the
- * angles before, which are replaced. */
+/* Degrees of the three rotations whose product is q: of the two solutions and all whole turns the one nearest to
+ * the previous angles, which are replaced. */
 static void euler_angles(const double q[4], const int axis[3], double *angles)
 {
     double m[9], a[2][3], distance[2] = {0, 0};
@@ -164,7 +164,7 @@ static void euler_angles(const double q[4], const int axis[3], double *angles)
     vg_quat_matrix(q, m);
     bool free = two ? angles_of_two(m, axis[0], axis[1], 3 - axis[0] - axis[1], a[0])
                     : angles_of_three(m, axis[0], axis[1], axis[2], a[0]);
-    if (!free) { /* gimbal lock: the first angle stays, the third takes what is left */
+    if (!free) { /* gimbal lock: keep the first angle and put the rest into the third */
         double done[4] = {1, 0, 0, 0}, back[4], rest[4];
         angles[1] = near_to(a[0][1] / DEGREE, angles[1]);
         turn_on(done, axis[0], angles[0]);
@@ -199,8 +199,8 @@ static void matrix_of(const int *axis, const double *angles, uint32_t n, double 
     vg_quat_matrix(q, m);
 }
 
-/* Rotations that cannot make every turn (a hinge), or can in many ways: each angle in turn is set to where
- * tr(R^T k) is largest, starting from the angles before, until nothing moves. */
+/* For rotations that cannot reach every orientation (a hinge), or reach it in many ways: set each angle in turn to
+ * where tr(R^T k) is largest, starting from the previous angles, until nothing changes. */
 static void climb_to_angles(const double k[9], const int *axis, uint32_t n, double *angles)
 {
     for (int round = 0; round < 200; round++) {
@@ -224,10 +224,10 @@ static void climb_to_angles(const double k[9], const int *axis, uint32_t n, doub
     }
 }
 
-/* ---- values of the channels from a pose ---- */
+/* ---- channel values from a pose ---- */
 
-/* A joint that turns with another and lies away from it: a child, or one behind joints that lie on the other. Between
- * may be a joint that turns it elsewhere: then it is loose. */
+/* An arm: a joint that turns with another and lies away from it (a child, or one behind joints that lie on the
+ * other). An arm is loose if a joint in between may turn it elsewhere. */
 typedef struct arm {
     uint32_t joint;
     bool loose;
@@ -238,13 +238,13 @@ struct vg_joint_fitter {
     const vg_skeleton *s;
     size_t *first_arm; /* njoints + 1 */
     arm *arms;
-    double *values; /* of the pose before */
-    double *positions, *turns; /* of the joints by these values */
+    double *values; /* of the previous pose */
+    double *positions, *turns; /* of the joints, by these values */
 };
 
-enum { MOST_STEPS = 16 }; /* up a chain of joints that lie on one another */
+enum { MOST_STEPS = 16 }; /* up a chain of joints at one place */
 
-/* Of whose arms is joint c? Up to MOST_STEPS into `owners`. */
+/* The joints that have joint c among their arms, up to MOST_STEPS of them, into `owners`. */
 static size_t list_owners(const vg_skeleton *s, size_t c, double shortest, uint32_t owners[MOST_STEPS])
 {
     size_t n = 0;
@@ -318,8 +318,8 @@ void vg_joint_fitter_free(vg_joint_fitter **fitter)
     *fitter = NULL;
 }
 
-/* What the arms of joint j, all or the firm ones, say about its turn: k as fit_turn takes it, how many say something,
- * the last of them. */
+/* What the arms of joint j (all, or the firm ones) say about its rotation: k as fit_turn takes it, the number of
+ * arms that say something, and the last of them. */
 static size_t gather_arms(const vg_joint_fitter *f, size_t j, const double *pose, bool firm, double k[9],
                           double offset[3], double now[3])
 {
@@ -342,14 +342,14 @@ static size_t gather_arms(const vg_joint_fitter *f, size_t j, const double *pose
     return n;
 }
 
-/* q, a first guess, becomes the turn that the arms ask for, and keeps what they leave open. */
+/* Improve q, a first guess, to the rotation that the arms ask for, keeping what they leave open. */
 static void turn_by_arms(const vg_joint_fitter *f, size_t j, const double *pose, bool firm, double k[9], double q[4])
 {
     double offset[3], now[3], swing[4], carried[3];
     size_t n = gather_arms(f, j, pose, firm, k, offset, now);
     if (n > 1) {
         fit_turn(k, q, q);
-    } else if (n == 1) { /* one direction: no turn about it */
+    } else if (n == 1) { /* one direction: no rotation about it */
         vg_quat_apply(q, offset, carried);
         vg_quat_between(carried, now, swing);
         vg_quat_multiply(swing, q, q);
@@ -358,8 +358,8 @@ static void turn_by_arms(const vg_joint_fitter *f, size_t j, const double *pose,
     for (int i = 0; i < 4; i++) q[i] /= l;
 }
 
-/* The turn of joint j, whose parent is turned by `parent`. The loose arms can still go where they belong by a turn of
- * their own, so that they only decide what the firm ones leave open. k: of the firm ones. */
+/* The rotation of joint j, whose parent is rotated by `parent`. Loose arms can also reach their place by a
+ * rotation of their own, so they only decide what the firm ones leave open. k: of the firm arms. */
 static void turn_joint(const vg_joint_fitter *f, size_t j, const double *pose, const double parent[4], double k[9],
                        double q[4])
 {
@@ -370,7 +370,8 @@ static void turn_joint(const vg_joint_fitter *f, size_t j, const double *pose, c
     turn_by_arms(f, j, pose, true, k, q);
 }
 
-/* The angles of joint j's rotations, from those before. turn: how it is turned; NULL: that is to be found. */
+/* The angles of joint j's rotations, starting from the previous ones. turn: the rotation of the joint if known;
+ * NULL: find it. */
 static void fit_angles(const vg_joint_fitter *f, size_t j, const double *pose, const double *turn, double *values)
 {
     static const double unturned[4] = {1, 0, 0, 0};
@@ -392,14 +393,14 @@ static void fit_angles(const vg_joint_fitter *f, size_t j, const double *pose, c
         double m[9], wish[9];
         vg_quat_matrix(back, m);
         vgi_multiply(m, k, k);
-        vg_quat_matrix(local, wish); /* of a turn that was found: decides what the directions leave open */
+        vg_quat_matrix(local, wish); /* used to decide what the directions leave open */
         for (int i = 0; i < 9; i++) k[i] += (turn ? 1 : 1e-6) * wish[i];
         climb_to_angles(k, axis, n, angles);
     }
     for (uint32_t i = 0; i < n; i++) values[place[i]] = angles[i];
 }
 
-/* The positions that joint j's channels give, in its parent's frame. */
+/* The position that joint j's channels give, in its parent's frame. */
 static void fit_offset(const vg_joint_fitter *f, size_t j, const double *pose, double *values)
 {
     const vg_joint *joint = &f->s->joints[j];

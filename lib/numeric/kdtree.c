@@ -8,11 +8,11 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { LEAF = 8 };     /* about the most points of a leaf */
-enum { DEEPEST = 32 }; /* leaves of 2^32 points are not as deep */
+enum { LEAF = 8 };     /* a leaf holds at most about this many points */
+enum { DEEPEST = 32 }; /* depth bound for 2^32 points */
 static const uint32_t NONE = UINT32_MAX;  /* no point */
 static const uint32_t MIXED = UINT32_MAX; /* no common label */
-static const uint64_t ANY = UINT64_MAX;   /* a label that neither points nor nodes have */
+static const uint64_t ANY = UINT64_MAX;   /* a label that no point or node has */
 
 struct point {
     double x[3];
@@ -20,9 +20,9 @@ struct point {
 };
 
 struct node {
-    double least[3], most[3]; /* tight box: prunes better than the cut when points lie on a surface */
-    uint32_t lowest;          /* lowest index within */
-    uint32_t label;           /* of all points within, or MIXED */
+    double least[3], most[3]; /* tight box: prunes better than the cutting plane when points lie on a surface */
+    uint32_t lowest;          /* lowest index in the box */
+    uint32_t label;           /* common label of all points in the box, or MIXED */
 };
 
 struct vgi_kdtree {
@@ -32,7 +32,7 @@ struct vgi_kdtree {
     struct node *node;   /* 2^(depth + 1); node[1] is the root, node[0] is not used */
 };
 
-/* A node on the way down, with its squared distance from the point asked about. */
+/* A node on the stack, with its squared distance from the query point. */
 struct place {
     uint64_t node;
     int depth;
@@ -48,7 +48,7 @@ static void node_range(const vgi_kdtree *t, uint64_t node, int depth, size_t *be
 
 /* ---- building ---- */
 
-/* A total order along an axis: equal coordinates go by index, so coincident points split, too. */
+/* A total order along an axis: equal coordinates are ordered by index, so that coincident points split too. */
 static inline bool before(const struct point *a, const struct point *b, int axis)
 {
     return a->x[axis] < b->x[axis] || (a->x[axis] == b->x[axis] && a->index < b->index);
@@ -61,7 +61,7 @@ static inline void swap(struct point *a, struct point *b)
     *b = c;
 }
 
-/* The middle one of three points taken from pseudo-random places: no order of the input makes the selection slow. */
+/* The median of three points at pseudo-random places, so that no order of the input makes the selection slow. */
 static struct point choose_pivot(const struct point *p, size_t n, int axis, vgi_random *random)
 {
     const struct point *three[3];
@@ -71,7 +71,7 @@ static struct point choose_pivot(const struct point *p, size_t n, int axis, vgi_
     return before(three[2], three[high], axis) ? *three[2] : *three[high];
 }
 
-/* Hoare's selection: bring the point of rank `middle` to its place, lesser ones before it. */
+/* Hoare's selection: move the point of rank `middle` to its place and lesser ones before it. */
 static void select_rank(struct point *p, size_t n, size_t middle, int axis)
 {
     vgi_random random = {.key = n};
@@ -85,7 +85,8 @@ static void select_rank(struct point *p, size_t n, size_t middle, int axis)
             if (i >= j) break;
             swap(&p[i++], &p[j--]);
         }
-        /* now nothing before i is above the pivot, nothing after j below it; j is i - 1, or i at the pivot itself */
+        /* now nothing before i is above the pivot and nothing after j is below it; j is i - 1, or i at the pivot
+           itself */
         if (middle < i) end = i;
         else if (middle > j) begin = j + 1;
         else return;
@@ -110,7 +111,7 @@ static int widest_axis(const struct node *node)
     return axis;
 }
 
-/* Depth first, so that a subtree is built while it is in cache. */
+/* Depth first, so that a subtree is built while it is in the cache. */
 static void build(vgi_kdtree *t)
 {
     struct place stack[DEEPEST + 2] = {{.node = 1}};
@@ -128,7 +129,7 @@ static void build(vgi_kdtree *t)
     }
 }
 
-/* What leaves know of their points, and nodes of their children: lowest index and common label. */
+/* Summaries, from points to leaves and from children to nodes: lowest index and common label. */
 static void summarise(vgi_kdtree *t)
 {
     uint64_t leaves = (uint64_t)1 << t->depth;
@@ -155,7 +156,7 @@ int vgi_kdtree_new(vgi_kdtree **out, const double *points, size_t n, vg_err *e)
     vgi_kdtree *t = *out = vgi_array(1, sizeof *t, e);
     if (!t) return VG_ENOMEM;
     t->n = n;
-    while (n >> t->depth > LEAF) t->depth++; /* then leaves hold up to LEAF + 1 points, and none is empty */
+    while (n >> t->depth > LEAF) t->depth++; /* leaves then hold up to LEAF + 1 points, and none is empty */
     t->point = vgi_array_raw(n, sizeof *t->point, e);
     t->node = vgi_array_raw((size_t)2 << t->depth, sizeof *t->node, e);
     if (!t->point || !t->node) return vgi_kdtree_free(out), VG_ENOMEM;
@@ -189,11 +190,11 @@ struct query {
     double p[3];
     uint64_t not_label; /* or ANY */
     size_t k;
-    vgi_near *near; /* k, nearest first, those not found yet at the limit with index NONE */
+    vgi_near *near; /* the k nearest so far; entries not found yet are at the limit with index NONE */
 };
 
-/* Every squared distance is summed by this one function, in this order: rounding is then monotone, the distance of a
- * box is never above that of a point inside, and a pair of points has one distance whichever is asked first. */
+/* The only function that sums a squared distance, always in this order: rounding is then monotone, a box is never
+ * farther than a point inside it, and a pair of points has the same distance from both sides. */
 static inline double square_sum(double x, double y, double z)
 {
     return x * x + y * y + z * z;
@@ -233,7 +234,7 @@ static void search_leaf(const vgi_kdtree *t, uint64_t node, struct query *q)
     }
 }
 
-/* Can nothing in this node be an answer? */
+/* Whether no point of this node can be an answer. */
 static inline bool hopeless(const struct node *node, double square, const struct query *q)
 {
     return node->label == q->not_label || !nearer(square, node->lowest, &q->near[q->k - 1]);
@@ -253,7 +254,7 @@ static size_t search(const vgi_kdtree *t, struct query *q, double limit)
         }
         const struct node *child = &t->node[2 * at.node];
         double a = box_square(child, q->p), b = box_square(child + 1, q->p);
-        /* the more promising child is put on top */
+        /* push the more promising child last */
         int first = b < a || (b == a && child[1].lowest < child[0].lowest);
         stack[top++] = (struct place){2 * at.node + !first, at.depth + 1, first ? a : b};
         stack[top++] = (struct place){2 * at.node + first, at.depth + 1, first ? b : a};

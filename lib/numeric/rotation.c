@@ -1,5 +1,5 @@
-/* rotation.c: deformations of a vector as quaternions whose squared length is the scale (MATH 4; T 3.19).
- * Leaves out the choice of the rotation of a corner (deform.c).
+/* rotation.c: deformations of a vector as quaternions whose squared length is the scale (MATH 4; T 3.19). Leaves
+ * out the choice of a corner's rotation (deform.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 
@@ -76,8 +76,8 @@ void vg_quat_exp(const double l[4], double q[4])
     for (int k = 1; k < 4; k++) q[k] = length * ratio * l[k];
 }
 
-/* A unit vector perpendicular to the unit vector r, chosen the same way every time:
- * across the axis r has least of. */
+/* A unit vector perpendicular to the unit vector r, chosen the same way every time: perpendicular to the axis of
+ * r's smallest component. */
 static void perpendicular(const double r[3], double p[3])
 {
     int k = fabs(r[0]) <= fabs(r[1]) ? (fabs(r[0]) <= fabs(r[2]) ? 0 : 2) : (fabs(r[1]) <= fabs(r[2]) ? 1 : 2);

@@ -1,5 +1,4 @@
-/* sets.h: disjoint sets of 0..n-1 (union-find) in an array of the caller's.
- * Leaves out counting and listing the sets.
+/* sets.h: disjoint sets of 0..n-1 (union-find) in an array of the caller. Does not count or list sets.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_SETS_H
 #define VG_SETS_H
@@ -8,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Every element its own set. */
+/* Make every element a set of its own. */
 static inline void vgi_sets_init(uint32_t *parent, size_t n)
 {
     for (size_t i = 0; i < n; i++) parent[i] = (uint32_t)i;
@@ -24,7 +23,7 @@ static inline uint32_t vgi_sets_find(uint32_t *parent, uint32_t i)
     return i;
 }
 
-/* Join the sets of i and j; false when they were one already. */
+/* Join the sets of i and j; false if they were one already. */
 static inline bool vgi_sets_join(uint32_t *parent, uint32_t i, uint32_t j)
 {
     i = vgi_sets_find(parent, i);

@@ -1,12 +1,13 @@
-/* turn.c: the rotation that fits pairs of vectors best.
- * Leaves out rotations of single vectors (rotation.c), and matrices that a faster way serves (numeric/polar.c).
+/* turn.c: the rotation that best fits pairs of vectors. Rotations of single vectors are in rotation.c, the faster
+ * polar decomposition in polar.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "numeric/turn.h"
 
 #include <math.h>
 
-/* The unit eigenvector of the largest eigenvalue of a symmetric matrix, by cyclic Jacobi rotations. a is used up. */
+/* The unit eigenvector of the largest eigenvalue of a symmetric matrix, by cyclic Jacobi rotations. a is
+ * overwritten. */
 static void largest_eigenvector(double a[4][4], double x[4])
 {
     double v[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
@@ -18,7 +19,7 @@ static void largest_eigenvector(double a[4][4], double x[4])
         for (int p = 0; p < 3; p++) {
             for (int q = p + 1; q < 4; q++) {
                 if (fabs(a[p][q]) <= 1e-19 * (fabs(a[p][p]) + fabs(a[q][q]))) {
-                    a[p][q] = a[q][p] = 0; /* beyond the last bit of what it stands beside */
+                    a[p][q] = a[q][p] = 0; /* below the last bit of its neighbours */
                     continue;
                 }
                 double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);

@@ -26,7 +26,7 @@ static inline void vgi_cross(const double a[3], const double b[3], double c[3])
     double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
     c[0] = x, c[1] = y, c[2] = z;
 }
-/* Newell's: the sum of the cross products of the successive ones of r vectors: twice the area of the face, along its
+/* Newell's formula: the sum of the cross products of r successive vectors: twice the area of the face, along its
  * normal. */
 static inline void vgi_area_vector(const double *w, size_t r, double n[3])
 {

@@ -1,13 +1,12 @@
-/* deform.h: what the files of lib/method share of the measuring of deformations.
- * Internal; what a C program may call is in vg.h.
+/* deform.h: internal part of the measuring of deformations. The public part is in vg/vectors.h.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_DEFORM_H
 #define VG_DEFORM_H
 
 #include "core/core.h"
 
-/* vgi_deformer_of_vectors: vg_deformer_new for a reference of which only the vectors are known (one per corner,
- * copied), and D. */
+/* vgi_deformer_of_vectors: like vg_deformer_new, for a reference given by its vectors (one per corner, copied) and
+ * D. */
 int vgi_deformer_of_vectors(vg_deformer **d, const vg_graph *g, const double *vectors, double diagonal, int threads,
                             vg_err *e) VG_MUST_CHECK;
 

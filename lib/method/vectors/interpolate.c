@@ -21,10 +21,10 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { CHUNK = 1024, /* corners of one task */
-       SLOTS = 3 };  /* a smooth curve looks at the segments before and after its own */
-static const double shortest = 1e-9; /* of D: a vector below has no direction */
-static const double exact = 1e-13;   /* of D: what turn and stretch miss by less is rounding */
+enum { CHUNK = 1024, /* corners per task */
+       SLOTS = 3 };  /* a smooth curve uses the segments before and after its own */
+static const double shortest = 1e-9; /* of D: a shorter vector has no direction */
+static const double exact = 1e-13;   /* of D: smaller residuals of rotation and scale are rounding */
 
 /* From one key to the next. */
 typedef struct segment {
@@ -33,10 +33,10 @@ typedef struct segment {
     double *turn;  /* 3 */
     double *rest;  /* 3, if has_rest */
     double *scale; /* 1: half the logarithm */
-    double *drift; /* 3, if has_drift: what turn and stretch do not give, before the turn: degenerate corners,
-                      anchors */
+    double *drift; /* 3, if has_drift: residual of rotation and scale, applied before the rotation: degenerate
+                      corners, anchors */
     bool has_rest, has_drift;
-    double root[2][3], middle[2][3]; /* at both keys; middle: of the anchors */
+    double root[2][3], middle[2][3]; /* at both keys; middle: mean of the anchors */
 } segment;
 
 struct vg_path {
@@ -45,9 +45,9 @@ struct vg_path {
     const vg_key *keys;
     size_t nkeys, corners, elements;
     double diagonal, shortest2, exact; /* mesh units */
-    double *reference; /* vectors, for keys that hold deformations */
+    double *reference; /* vectors, when the keys hold deformations */
     segment slots[SLOTS];
-    double *to, *q;    /* of the segment being made: vectors at its second key, a quaternion per element */
+    double *to, *q;    /* of the segment under construction: vectors at its second key, a quaternion per element */
     vgi_incidence around; /* if there are line segments */
     vg_path_facts facts;
 };
@@ -65,7 +65,7 @@ static void load_vectors(const vg_path *p, const vg_key *key, double *w)
     }
 }
 
-/* The anchors' mean, and the anchors from there. */
+/* The anchors' mean, and the anchors relative to it. */
 static void load_anchors(const vg_path *p, const vg_key *key, double *w, double middle[3])
 {
     vg_centroid(key->anchors, p->o.nanchors, middle);
@@ -79,8 +79,8 @@ static double length_of(const vg_path *p, size_t s)
 
 /* ---- line segments ---- */
 
-/* Two vectors leave open how far a line segment turns about itself. It does as the vectors around it do together,
- * and what these leave open as the whole body does; then comes the smallest rotation for the rest. */
+/* Two vectors do not determine how a line segment turns about itself. It follows the best common rotation of the
+ * vectors around it, and where these leave it open, of the whole body; the smallest rotation does the rest. */
 static void add_moment(const vg_path *p, const double *from, size_t f, double b[9], double *size)
 {
     for (size_t c = p->g->start[f]; c < p->g->start[f + 1]; c++) {
@@ -139,7 +139,7 @@ static int measure(vg_path *p, const segment *s, vg_err *e)
     return VG_OK;
 }
 
-/* Q = exp(turn) exp(rest), and half the logarithm of the scale. turn: in: of the face. */
+/* Q = exp(turn) exp(rest), and half the logarithm of the scale. turn: on input that of the face. */
 static void split(const double *q, const double face[3], bool beyond, double *turn, double *rest, double *scale)
 {
     double length = sqrt(q[0] * q[0] + vgi_dot(q + 1, q + 1)), unit[4];
@@ -158,7 +158,7 @@ static void split(const double *q, const double face[3], bool beyond, double *tu
     memcpy(rest, l + 1, 3 * sizeof *rest);
 }
 
-/* Anchors turn as the body does on the whole: the mean over its corners, by the squares of their lengths. */
+/* Anchors follow the body as a whole: the mean rotation over its corners, weighted by squared length. */
 static void turn_anchors(const vg_path *p, segment *s)
 {
     double mean[4] = {0, 0, 0, 0}, weight = 0;
@@ -229,7 +229,7 @@ static int fill(vg_path *p, segment *s, size_t number, vg_err *e)
     return VG_OK;
 }
 
-/* Segments that are looked at together differ by less than SLOTS. */
+/* The distance between segments in use at one time is less than SLOTS. */
 static int get_segment(vg_path *p, size_t number, const segment **s, vg_err *e)
 {
     segment *slot = &p->slots[p->o.smooth ? number % SLOTS : 0];
@@ -239,9 +239,9 @@ static int get_segment(vg_path *p, size_t number, const segment **s, vg_err *e)
 
 /* ---- velocities at keys ---- */
 
-/* At a key, between segments of lengths h0 and h1 whose velocities (per segment) are v0 and v1: that of the
- * parabola through three keys, v = before v0 + after v1, per unit of place. At the first and the last key it is
- * that of the parabola next to it. */
+/* At a key between segments of lengths h0 and h1 with velocities v0 and v1 (per segment): the velocity of the
+ * parabola through three keys, v = before v0 + after v1, per unit of place. At the first and last key: that of the
+ * adjacent parabola. */
 typedef struct knot {
     const segment *first, *second;
     double before, after;
@@ -249,7 +249,7 @@ typedef struct knot {
 
 static void make_knot(const vg_path *p, size_t key, knot *x)
 {
-    size_t s = key == 0 ? 1 : key == p->nkeys - 1 ? key - 1 : key; /* the key between both segments */
+    size_t s = key == 0 ? 1 : key == p->nkeys - 1 ? key - 1 : key; /* the key between the two segments */
     double h0 = length_of(p, s - 1), h1 = length_of(p, s);
     x->before = h1 / (h0 * (h0 + h1)), x->after = h0 / (h1 * (h0 + h1));
     if (key < s) x->before = 2 / h0 - x->before, x->after = -x->after;
@@ -267,14 +267,14 @@ typedef struct moment {
     const segment *s;
     bool bent;
     double along, drift;
-    double alpha, last_own, beta, first_own; /* weights in A and in B: of the difference, of the segment's own
+    double alpha, last_own, beta, first_own; /* weights in A and in B: of the difference, and of the segment's own
                                                 velocity */
     double length; /* of s in places */
     knot first, last;
     double *vectors, *offsets;
 } moment;
 
-/* What an element's turn and scale do in a unit of u, at the first (0) or last (1) key of a segment. */
+/* The change of an element's rotation and scale per unit of u, at the first (0) or last (1) key of a segment. */
 static void velocity(const segment *s, size_t i, int end, double v[4])
 {
     const double *turn = s->turn + 3 * i;
@@ -289,7 +289,7 @@ static void velocity(const segment *s, size_t i, int end, double v[4])
     for (int k = 0; k < 3; k++) v[k + 1] = turn[k] + r[k];
 }
 
-/* own: the segment's velocity there, excess: what the knot's is more. */
+/* own: the segment's velocity there; excess: by how much the knot's velocity exceeds it. */
 static void look_at_knot(const moment *m, const knot *x, size_t i, int end, double own[4], double excess[4])
 {
     double v0[4], v1[4];
@@ -348,7 +348,7 @@ static void turn_chunk(void *context, size_t chunk)
         turn_element(m, i, i < corners ? m->vectors + 3 * i : m->offsets + 3 * (i - corners));
 }
 
-/* The same for a point that does not turn: points are those of a segment at both its keys. */
+/* The same for a point that does not rotate: points are those of a segment at both its keys. */
 static void glide(const moment *m, double points(const segment *s, int key, int k), double to[3])
 {
     for (int k = 0; k < 3; k++) {

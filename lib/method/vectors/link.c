@@ -1,7 +1,7 @@
-/* link.c: virtual line segments that join the components of a mesh, so that eyes, teeth and clothes keep their place
- * when vectors are turned back into vertices (MATH 2): a minimum spanning tree of the components, by Boruvka's rounds
- * over a k-d tree, then links too short to turn steadily are moved on by an edge.
- * Leaves out how links deform (deform.c).
+/* link.c: virtual line segments that join the components of a mesh, so that eyes, teeth and clothes keep their
+ * place in the reconstruction (MATH 2): a minimum spanning tree of the components (Boruvka's algorithm over a k-d
+ * tree); then links that are too short to rotate steadily are moved on by an edge. Leaves out how links deform
+ * (deform.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "model/incidence.h"
@@ -25,11 +25,11 @@ struct joining {
     size_t n;         /* points: the vertices that are in a face */
     uint32_t *vertex; /* n */
     uint32_t *piece;  /* n: component of the point */
-    uint32_t *tree;   /* n: the lowest of the components its own is joined with so far */
+    uint32_t *tree;   /* n: the lowest of the components joined with the point's own so far */
     uint32_t *sets;   /* per component */
-    vgi_near *near;   /* n: last answer for the point, see look_around */
+    vgi_near *near;   /* n: the last answer for the point, see look_around */
     vgi_kdtree *points;
-    struct edge *best;   /* per component that stands for a tree: its shortest way out */
+    struct edge *best;   /* per component that represents a tree: its shortest connection to another tree */
     struct edge *chosen; /* components - 1 */
     size_t components, nchosen;
     vgi_incidence around;
@@ -64,7 +64,7 @@ static int scale_vertices(struct joining *j, const double *vertices, vg_err *e)
     return VG_OK;
 }
 
-/* Points are the vertices in faces: label is their component, NONE for the others. */
+/* Points are the vertices in faces; label is their component, NONE for all others. */
 static int gather_points(struct joining *j, const uint32_t *label, vg_err *e)
 {
     for (size_t v = 0; v < j->m->nv; v++) j->n += label[v] != NONE;
@@ -102,8 +102,8 @@ static int prepare(struct joining *j, const double *vertices, const uint32_t *la
 
 /* ---- the minimum spanning tree ---- */
 
-/* One order of all pairs, ties broken by index: then the shortest ways out never close a circle. Of the points at one
- * distance from i the lowest makes the least pair, which is the one the k-d tree gives. */
+/* A total order of pairs, ties broken by index, so that the shortest connections never close a cycle. Of the
+ * points at equal distance from i, the lowest makes the least pair; the k-d tree returns that one. */
 static bool shorter(const struct edge *p, const struct edge *q)
 {
     if (p->square != q->square) return p->square < q->square;
@@ -117,9 +117,10 @@ static void offer(struct joining *j, uint32_t from, vgi_near to)
     if (shorter(&edge, best)) *best = edge;
 }
 
-/* Find the shortest way out of every tree. near[i] keeps what was learnt about point i: the nearest point of another
- * tree at the time, or NONE when none was within the squared distance. Trees only grow, so such a point stays the
- * nearest until it joins i's tree, and its distance stays a bound below; most points are never asked about again. */
+/* Find the shortest connection of every tree. near[i] caches what is known about point i: the nearest point of
+ * another tree when it was asked, or NONE if there was none within the squared distance. Trees only grow, so that
+ * point stays the nearest until it joins i's tree, and its distance stays a lower bound; most points are never
+ * asked about again. */
 static void look_around(struct joining *j)
 {
     for (size_t c = 0; c < j->components; c++) j->best[c] = (struct edge){INFINITY, NONE, NONE};
@@ -136,7 +137,8 @@ static void look_around(struct joining *j)
     }
 }
 
-/* Boruvka: every tree takes its shortest way out, until there is one. Each round at least halves them. */
+/* Boruvka: every tree takes its shortest connection, until one tree is left. Each round at least halves their
+ * number. */
 static void span(struct joining *j)
 {
     while (j->nchosen < j->components - 1) {
@@ -159,7 +161,8 @@ static double distance(const struct joining *j, uint32_t u, uint32_t v)
     return sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) + (p[2] - q[2]) * (p[2] - q[2]));
 }
 
-/* The corners around v that are looked at: not all of a hub of thousands, on which thousands of links may end. */
+/* The corners around v that are examined: not all at a hub with thousands of faces, where thousands of links may
+ * end. */
 static uint32_t last_corner(const struct joining *j, uint32_t v)
 {
     enum { ENOUGH = 64 };
@@ -178,7 +181,7 @@ static double mean_edge(const struct joining *j, uint32_t v)
     return sum / (2.0 * (last - first));
 }
 
-/* Of b and its neighbours along edges the one farthest from a (the first of several). */
+/* Of b and its edge neighbours, the one farthest from a (the first of several). */
 static uint32_t farthest_around(const struct joining *j, uint32_t a, uint32_t b)
 {
     uint32_t last = last_corner(j, b), farthest = b, ends[2];
@@ -194,9 +197,9 @@ static uint32_t farthest_around(const struct joining *j, uint32_t a, uint32_t b)
 }
 
 /* From nearest points to a link. When two components move apart a little, a link between points that nearly touch
- * turns and stretches wildly, and what it does means nothing on another body. So a link shorter than the edges beside
- * it ends one edge further on, at the end with the longer edges, and turns about as those edges do. This holds for
- * points that coincide, too: a link without length could never open. */
+ * turns and stretches wildly, which means nothing on another body. A link shorter than the edges beside it
+ * therefore ends one edge further on, at the end with the longer edges, so that it turns about as those edges do.
+ * This also covers coinciding points: a link of length 0 could never open. */
 static void place_link(const struct joining *j, const struct edge *edge, uint32_t pair[2])
 {
     uint32_t a = j->vertex[edge->a], b = j->vertex[edge->b];
@@ -255,6 +258,6 @@ int vg_head_prepare_vectors(vg_head *h, vg_err *e)
     h->links = links;
     h->nlinks = n;
     h->has_links = true;
-    if (n && h->map.ncorners) vg_map_clear(&h->map); /* its corners are those of a graph without links */
+    if (n && h->map.ncorners) vg_map_clear(&h->map); /* corners are numbered as in a graph without links */
     return VG_OK;
 }

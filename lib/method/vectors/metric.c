@@ -7,7 +7,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* A thin face: its lesser moment counts as at least THIN of the greater, its area as at least SMALL of it. */
+/* Thin faces: the lesser moment counts as at least THIN of the greater, the area as at least SMALL of the greater
+ * moment. */
 static const double thin = 1e-4, small = 1e-3;
 
 static void make_face(vgi_face_metric *m, double *plane, const double *w, size_t r)
@@ -18,7 +19,7 @@ static void make_face(vgi_face_metric *m, double *plane, const double *w, size_t
     vgi_area_vector(w, r, n);
     double length = sqrt(vgi_dot(n, n));
     if (r < 3 || !(length > 0)) return;
-    /* axes of the plane: the first vector that is not along the normal, and across */
+    /* axes of the plane: along the first vector that is not parallel to the normal, and across */
     double a[3] = {0, 0, 0}, b[3], most = 0;
     for (int k = 0; k < 3; k++) n[k] /= length;
     for (size_t i = 0; i < r; i++) {

@@ -20,8 +20,8 @@ typedef struct vgi_metric {
     double *plane;         /* 3 per corner: its reference vector in the plane of its face */
 } vgi_metric;
 
-/* vgi_metric_make: the area metric of a graph in its reference pose (nv points). Segments and links weigh 1; a face
- * without extent is uniform, a thin one is kept from weighing too much or nothing. */
+/* vgi_metric_make: the area metric of a graph in its reference pose (nv points). Segments and links have weight 1;
+ * a face without extent is uniform; the weight of a thin face is bounded from both sides. */
 int vgi_metric_make(vgi_metric *m, const vg_graph *g, const double *reference, vg_err *e) VG_MUST_CHECK;
 void vgi_metric_clear(vgi_metric *m);
 

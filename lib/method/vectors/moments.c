@@ -1,11 +1,11 @@
-/* moments.c: normal and inverse second moments of one face. Leaves out all poses but the one it is given.
+/* moments.c: normal and inverse second moments of a single face.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/moments.h"
 #include "numeric/vec3.h"
 
-static const double flat = 1e-12; /* of the sum of squared lengths: see deform_kernel.c */
+static const double flat = 1e-12; /* relative to the sum of squared lengths: see deform_kernel.c */
 
-/* Twice the area, along the normal; its length, or 0 for none. */
+/* Twice the area along the normal; returns its length, 0 for none. */
 static double area_vector(const double *w, size_t r, double n[3])
 {
     double spread = 0;
@@ -22,7 +22,7 @@ bool vgi_unit_normal(const double *w, size_t r, double n[3])
     return size > 0;
 }
 
-/* false when it has no inverse */
+/* false if singular */
 static bool invert(const double a[6], double inverse[6])
 {
     double c0 = a[3] * a[5] - a[4] * a[4], c1 = a[2] * a[4] - a[1] * a[5], c2 = a[1] * a[4] - a[2] * a[3];

@@ -1,5 +1,5 @@
-/* move.c: where the whole body goes when a motion is carried over to another mesh (MATH 5).
- * Leaves out how its vectors turn and stretch (deform.c, transfer.c, shape.c), and what does not move at all (pin.c).
+/* move.c: the position of the whole body in a transfer to another mesh (MATH 5). Leaves out the vectors (deform.c,
+ * transfer.c, shape.c) and vertices that stay (pin.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 
@@ -7,7 +7,7 @@
 
 struct vg_mover {
     const vg_graph *to;
-    double ratio; /* of the target's size to the source's; 0: it stays */
+    double ratio; /* the target's size divided by the source's; 0: the body stays */
     size_t nanchors;
     double source[3], target[3];             /* roots of the references */
     double *source_anchors, *target_anchors; /* positions in the references */

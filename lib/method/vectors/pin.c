@@ -1,13 +1,13 @@
-/* pin.c: which vertices of a target have to stay, because nothing that moves in the source drives their faces.
- * Leaves out holding them: frames say it (vg_frame_pin), and the reconstruction does it.
+/* pin.c: the vertices of a target that must stay, because all faces that drive theirs stay. Leaves out holding
+ * them: the frame lists them (vg_frame_pin), the reconstruction holds them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-static const double still = 1e-6; /* of D: a vertex that is nearer to its place in the reference does not move */
-enum { MUCH = 10 };               /* a tenth of the vertices is much of a mesh */
+static const double still = 1e-6; /* of D: a vertex nearer than this to its reference position does not move */
+enum { MUCH = 10 };               /* vertices are pinned only if at least this share of the source stays */
 
 struct vg_pinner {
     const vg_graph *from, *to;
@@ -15,7 +15,7 @@ struct vg_pinner {
     const double *reference;        /* the source's */
     double least;
     bool always;
-    bool *moves, *face_moves; /* in the pose at hand: per source vertex and face */
+    bool *moves, *face_moves; /* in the current pose: per source vertex and face */
     bool *free;               /* per target vertex */
     uint32_t *list;
 };
@@ -47,7 +47,7 @@ void vg_pinner_free(vg_pinner **p)
     *p = NULL;
 }
 
-/* How many vertices of the source stay. */
+/* The number of source vertices that stay. */
 static size_t mark_moving(vg_pinner *p, const double *pose)
 {
     size_t n = 0;

@@ -12,9 +12,9 @@
 
 struct vg_guide {
     size_t n;               /* numbers of a pose */
-    int keys;               /* 0, 1, or 2: there is an interval */
+    int keys;               /* number of keys so far, 2 at most: then there is an interval */
     uint64_t from, to;      /* frames of the last two keys */
-    double *before, *after; /* what the keys add to them */
+    double *before, *after; /* the offsets at the keys */
 };
 
 int vg_guide_new(vg_guide **out, size_t nv, vg_err *e)
@@ -51,7 +51,7 @@ void vg_guide_apply(const vg_guide *g, uint64_t frame, double *pose)
 {
     const double *a = g->before, *b = g->after;
     if (g->keys == 2 && frame < g->to) {
-        /* written so that equal offsets give just that offset, and none gives the pose to the bit */
+        /* written so that equal offsets give exactly that offset, and zero offsets give the pose to the last bit */
         double t = (double)(frame - g->from) / (double)(g->to - g->from);
         for (size_t i = 0; i < g->n; i++) pose[i] += a[i] + t * (b[i] - a[i]);
     } else if (g->keys) {

@@ -1,5 +1,6 @@
-/* select.c: fewer faces that still determine the mesh (T 3.2, Algorithm 1), completed to keep every piece whole.
- * Leaves out geometry: the choice depends on the faces and their order alone, so that two poses of a mesh agree.
+/* select.c: a subset of the faces that still determines the mesh (T 3.2, Algorithm 1), completed so that every
+ * component stays connected. The choice depends on the faces and their order alone, not on positions, so that all
+ * poses of a mesh agree.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/incidence.h"
 #include "numeric/sets.h"
@@ -11,7 +12,7 @@ struct selection {
     vgi_incidence around;
     bool *chosen;    /* per face */
     uint32_t *taken; /* per vertex u: the last v for which the edge u v belongs to a chosen face */
-    uint32_t *sets;  /* per vertex: pieces joined by chosen faces */
+    uint32_t *sets;  /* per vertex: sets joined by chosen faces */
 };
 
 static int prepare(struct selection *s, const vg_mesh *m, vg_err *e)
@@ -36,9 +37,9 @@ static void clear(struct selection *s)
     free(s->sets);
 }
 
-/* Algorithm 1 at one vertex. Two faces around v that share an edge share one that ends at v, unless they are folded
- * onto each other; so only the two edges of each corner at v are looked at, and a vertex costs what it has corners,
- * however many faces stand around it and however many corners they have. */
+/* Algorithm 1 at one vertex. Two faces around v that share an edge share one that ends at v (unless they are
+ * folded onto each other), so it is enough to look at the two edges of each corner at v: the cost is the number of
+ * corners at v, whatever the size of the faces. */
 static void select_around(struct selection *s, uint32_t v)
 {
     const vg_mesh *m = s->m;
@@ -57,7 +58,7 @@ static void select_around(struct selection *s, uint32_t v)
     }
 }
 
-/* Join the vertices of a face; false when they were one set already. */
+/* Join the vertices of a face; false if they were in one set already. */
 static bool join_face(struct selection *s, size_t f)
 {
     const uint32_t *vert = s->m->vert;
@@ -67,8 +68,8 @@ static bool join_face(struct selection *s, size_t f)
     return joined;
 }
 
-/* Add the faces without which a component would fall apart. A vertex that the chosen faces left out is a piece by
- * itself until a face joins it, so this covers the vertices, too. */
+/* Add faces until every component is connected. A vertex that the chosen faces left out is a set of its own until
+ * a face joins it, so this also covers the vertices. */
 static void complete(struct selection *s)
 {
     for (size_t f = 0; f < s->m->nf; f++)

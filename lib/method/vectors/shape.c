@@ -1,5 +1,5 @@
-/* shape.c: transfer by shape deformation (T 4.1): no linear system, straight to vertices.
- * Leaves out where the body goes (move.c).
+/* shape.c: transfer by shape deformation (T 4.1): vertices without a linear system. Leaves out the position of the
+ * body (move.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 

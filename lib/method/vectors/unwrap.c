@@ -15,16 +15,17 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { SWEEPS = 50,       /* at most, and they end when no face changes its branch */
+enum { SWEEPS = 50,       /* at most; sweeps end when no face changes its branch */
        NEWTON_STEPS = 20, /* of the smooth field, at most, and in each */
        CG_STEPS = 200 };
 static const double trust = 2.5;        /* see vgi_branch_near: x / sin x for x = 2.15, a turn by 246 degrees */
-/* how much the axes of faces count for the smooth field, beside their angles */
+/* weight of the faces' axes in the smooth field, relative to their angles */
 static const double sideways = 0.1;
 static const double longest_step = 0.3; /* of a vector's coordinate */
-static const double usual = 0.3;        /* a face whose half angle from the field is more than this is an exception */
+static const double usual = 0.3;        /* a face whose half angle relative to the field exceeds this is an
+                                           exception */
 
-/* q exp(-l) or exp(-l) q have the same angle; this is half of it, in [0, pi / 2] */
+/* q exp(-l) and exp(-l) q have the same angle; this is half of it, in [0, pi / 2] */
 static double half_angle_between(const double q[4], const double l[3])
 {
     double to[4], log[4] = {0, -l[0], -l[1], -l[2]}, rest[4];
@@ -45,7 +46,7 @@ bool vgi_branch_near(const double q[4], const double near[3], double l[3])
     double sine = sqrt(vgi_dot(q + 1, q + 1)), length = sqrt(vgi_dot(near, near)), axis[3], gap2 = 0;
     double angle = atan2(sine, q[0]);
     for (int k = 0; k < 3; k++) axis[k] = sine > tiny ? q[k + 1] / sine : length > tiny ? near[k] / length : 0;
-    if (!(sine > tiny)) angle = 0; /* of q and -q it is the same, and about any axis */
+    if (!(sine > tiny)) angle = 0; /* equal for q and -q, and about any axis */
     angle += M_PI * nearbyint((vgi_dot(near, axis) - angle) / M_PI);
     for (int k = 0; k < 3; k++) {
         l[k] = angle * axis[k];
@@ -54,8 +55,8 @@ bool vgi_branch_near(const double q[4], const double near[3], double l[3])
     return sqrt(gap2) <= trust * half_angle_between(q, near) + tiny;
 }
 
-/* What a face that turns by q is given beside a neighbour, or neighbours' mean, at `near`: the branch, or where
- * that cannot be trusted the neighbour's axis, and by how much more q turns about it. */
+/* The vector of a face that turns by q, next to a neighbour (or neighbours' mean) at `near`: the nearest branch,
+ * or, where that cannot be trusted, the neighbour's axis with the angle by which q turns about it. */
 static bool follow(const double q[4], const double near[3], double l[3])
 {
     if (vgi_branch_near(q, near, l)) return true;
@@ -71,8 +72,8 @@ static bool follow(const double q[4], const double near[3], double l[3])
 
 /* ---- what is known of faces and vertices ---- */
 
-/* An edge of the tree's graph, between a face and one of its vertices, on its way into the heap. Nodes: faces,
- * then vertices. */
+/* A candidate edge of the tree, between a face and one of its vertices, in the heap. Nodes are numbered faces
+ * first, then vertices. */
 typedef struct edge {
     double cost;
     uint32_t from, to;
@@ -81,16 +82,16 @@ typedef struct edge {
 typedef struct choice {
     const vg_graph *g;
     vgi_incidence around;
-    double *q;    /* 4 per face, then per vertex: unit quaternions, the mean turns */
+    double *q;    /* 4 per face, then per vertex: unit quaternions, the mean rotations */
     double *turn; /* 3 per face */
-    double *at;   /* 3 per vertex: of the tree, then sums or means of its faces' turns */
+    double *at;   /* 3 per vertex: of the tree, then sums or means over its faces */
     bool *reached;
     edge *heap;
     size_t n, cap;
     bool beyond;
 } choice;
 
-/* Add to a sum of quaternions, in the sign that agrees with it. */
+/* Add to a sum of quaternions with the sign that agrees with it. */
 static void add(double sum[4], const double q[4])
 {
     double along = 0;
@@ -209,7 +210,7 @@ static int by_cost(const void *a_, const void *b_)
     return a->face < b->face ? -1 : a->face > b->face;
 }
 
-/* From the face that turns least; and again in each part that links do not join. */
+/* Start at the face that turns least, and again in each part that links do not join. */
 static int grow_trees(choice *c, vg_err *e)
 {
     size_t nf = c->g->nf;
@@ -240,7 +241,7 @@ static size_t faces_around(const choice *c, size_t v)
     return c->around.first[v + 1] - c->around.first[v];
 }
 
-/* The mean vector of the faces that share a vertex with f; false when there are none. c->at: sums. */
+/* The mean vector of the faces that share a vertex with f; false if there are none. c->at holds sums. */
 static bool mean_beside(const choice *c, size_t f, double mean[3])
 {
     const vg_graph *g = c->g;
@@ -255,8 +256,8 @@ static bool mean_beside(const choice *c, size_t f, double mean[3])
     return n > 0;
 }
 
-/* Each face to the branch with the least sum of squared differences from its neighbours, which is the one nearest
- * to their mean; how many changed. */
+/* Move each face to the branch with the least sum of squared differences from its neighbours, which is the one
+ * nearest to their mean; returns how many changed. */
 static size_t sweep(choice *c)
 {
     const vg_graph *g = c->g;
@@ -275,7 +276,7 @@ static size_t sweep(choice *c)
     return changed;
 }
 
-/* Beyond half a turn: a face whose vector is not its own shortest one, or a corner that its face takes along. */
+/* Beyond half a turn: a face whose vector is not its shortest one, or a corner that follows such a face. */
 static bool is_beyond(const choice *c, const double *corner)
 {
     const vg_graph *g = c->g;
@@ -324,7 +325,7 @@ static void make_jacobian(const double turn[3], double J[9])
     J[5] += first * v[0], J[6] += first * v[1], J[7] -= first * v[0];
 }
 
-/* y += L x; c->at is used up */
+/* y += L x; c->at is overwritten */
 static void add_laplacian(choice *c, const double *x, double *y)
 {
     const vg_graph *g = c->g;
@@ -374,7 +375,7 @@ static void linearise(choice *c, relaxation *r)
         vgi_shorter(rest);
         vg_quat_log(rest, l);
         make_jacobian(turn, J);
-        r->weight[f] = 1 / (1 + vgi_dot(l + 1, l + 1) / (usual * usual)); /* a face that flips does not pull much */
+        r->weight[f] = 1 / (1 + vgi_dot(l + 1, l + 1) / (usual * usual)); /* limits the pull of a face that flips */
         double length = sqrt(vgi_dot(turn, turn)), y[3];
         for (int k = 0; k < 3; k++) r->axis[3 * f + (size_t)k] = length > 0 ? turn[k] / length : 0;
         pull(r, f, l + 1, y);

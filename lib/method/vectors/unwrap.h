@@ -1,18 +1,17 @@
-/* unwrap.h: rotations of faces as rotation vectors that agree with their neighbours', beyond half a turn and
- * beyond a whole one.
- * Internal; used by interpolate.c.
+/* unwrap.h: unwrapping of face rotations: rotation vectors that agree with their neighbours' beyond half a turn
+ * and beyond a whole one. Internal; used by interpolate.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_UNWRAP_H
 #define VG_UNWRAP_H
 
 #include "core/core.h"
 
-/* vgi_shorter: of q and -q the one that turns by half a turn at most. */
+/* vgi_shorter: of q and -q, the one that turns by at most half a turn. */
 void vgi_shorter(double q[4]);
 
-/* vgi_branch_near: of all vectors l (axis times half angle) with exp(l) = q or -q the one nearest to `near`. q:
- * unit. False when it is much farther from there than the rotations are from one another, as it happens near whole
- * turns, where the axis says nothing. */
+/* vgi_branch_near: of all vectors l (axis times half angle) with exp(l) = q or -q, the one nearest to `near`. q:
+ * unit. False if it is much farther from `near` than the rotations are from one another, as happens near whole
+ * turns, where the axis is undetermined. */
 bool vgi_branch_near(const double q[4], const double near[3], double l[3]);
 
 /* vgi_choose_turns: for each face of a graph, links included, one vector (axis times half angle). q: a quaternion
