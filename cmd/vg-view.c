@@ -31,7 +31,7 @@ static void take_beside(const char *value, void *context)
 
 static const cli_option options[] = {
     {.name = "format", .value = "png|html", .text = &opts.format, .choice = &opts.kind,
-     .help = "whatever the name of the output (default: told by it, else png)"},
+     .help = "format of the output (default: from its name, else png)"},
     {.name = "frames", .value = "N",
      .help = "sheet: N evenly spaced frames, or all when there are fewer (default: 8)",
      .integer = &opts.frames, .least = 1, .most = 10000},
@@ -145,7 +145,7 @@ static bool ends_with(const char *name, const char *suffix)
     return n > k && !strcasecmp(name + n - k, suffix);
 }
 
-/* What is made is told by the name of the output, and options of the other kind are a misunderstanding. */
+/* The name of the output decides between page and sheet; options of the other kind are refused. */
 static void choose_kind(void)
 {
     struct stat st;

@@ -134,7 +134,7 @@ END
     refused 'a - 0 0 0 1 1\n' "line 1: a bone is 'BONE PARENT HEAD_X"
     refused 'a - 0 0 0 1 1 x\n' "line 1: 'x' is no number"
     refused 'a - 0 0 0 1 1 nan\n' "line 1: 'nan' is no number"
-    refused 'a b 0 0 0 1 1 1\n' "line 1: 'a' hangs on 'b', which is not there"
+    refused 'a b 0 0 0 1 1 1\n' "line 1: the parent 'b' of 'a' is not defined"
     refused 'a - 0 0 0 1 1 1\na - 0 0 0 1 1 1\n' "line 2: 'a' is there already, in line 1"
     refused 'a b 0 0 0 1 1 1\nb a 0 0 0 1 1 1\n' 'round in a circle'
     refused '# nothing\n' 'names no joint'

@@ -175,7 +175,7 @@ static int check_joints(const vgi_gltf_scene *x, const vgi_gltf_part *p, const v
     for (size_t i = 0; i < p->count; i++) {
         vgi_accessor_get(joints, i, j);
         if (!(j[0] < n && j[1] < n && j[2] < n && j[3] < n))
-            return vgi_gltf_bad(&x->g, e, "a vertex hangs on a joint that its skin has not");
+            return vgi_gltf_bad(&x->g, e, "a vertex refers to a joint that its skin does not have");
     }
     return VG_OK;
 }

@@ -98,7 +98,7 @@ static int check_weights(const vgi_gltf_writing *w, vg_err *e)
 {
     for (size_t v = 0; v < w->h->body.mesh.nv; v++)
         if (!(w->h->body.rig.skin_weight[VG_SKIN * v] > 0))
-            return vg_fail(e, VG_EINPUT, "vertex %zu hangs on no bone", v);
+            return vg_fail(e, VG_EINPUT, "vertex %zu has no bone", v);
     return VG_OK;
 }
 

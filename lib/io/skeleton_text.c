@@ -76,8 +76,8 @@ static int find_parents(entries *s, const char *subject, vg_err *e)
         const entry *above = b->above ? find_name(sorted, s->n, b->above) : NULL;
         b->parent = above ? (uint32_t)(above - s->at) : NONE;
         if (b->above && !above)
-            r = vg_fail(e, VG_EINPUT, "%s line %zu: '%.80s' hangs on '%.80s', which is not there ('-' for none)",
-                        subject, b->line, b->name, b->above);
+            r = vg_fail(e, VG_EINPUT, "%s line %zu: the parent '%.80s' of '%.80s' is not defined ('-' for none)",
+                        subject, b->line, b->above, b->name);
     }
     free(sorted);
     return r;

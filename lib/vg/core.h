@@ -20,19 +20,19 @@ extern "C" {
 #define VG_PRINTF(a, b)
 #endif
 
-/* The exit status of a program that stops on an error follows from the code: VG_EARG 2, VG_EINPUT and VG_ETRUNC 3,
- * VG_ESYS and VG_ENOMEM 4. */
+/* The exit status of a program that fails follows from the code: 2 for VG_EARG, 3 for VG_EINPUT and VG_ETRUNC, 4
+ * for VG_ESYS and VG_ENOMEM. */
 typedef enum vg_code {
     VG_OK = 0,
-    VG_EARG = -1,   /* the caller asked for something that does not exist or does not fit */
+    VG_EARG = -1,   /* the request is invalid, or does not fit the data */
     VG_EINPUT = -2, /* malformed input, or inputs that do not fit one another */
     VG_ETRUNC = -3, /* input that ends too early */
     VG_ESYS = -4,   /* the system refused: open, read, write, ... */
     VG_ENOMEM = -5
 } vg_code;
 
-/* What went wrong: one line without a final full stop, with the file or frame it is about. Control characters of
- * the input are replaced by '?'. */
+/* A failure: one line without a final full stop that names the file or frame. Control characters of the input are
+ * replaced by '?'. */
 typedef struct vg_err {
     int code;
     char message[480];
@@ -41,7 +41,7 @@ typedef struct vg_err {
 /* vg_fail: fill *e (unless NULL) and return `code`. Control characters are stripped from the result. */
 int vg_fail(vg_err *e, int code, const char *format, ...) VG_PRINTF(3, 4);
 
-/* vg_exit_status: the exit status that STYLE gives to a code (see vg_code). */
+/* vg_exit_status: the exit status of a program for a code (see vg_code). */
 int vg_exit_status(int code);
 
 /* Bytes that grow. data is NULL while cap is 0. */

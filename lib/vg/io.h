@@ -12,23 +12,24 @@ extern "C" {
 
 /* The stream (fmt/STREAM.md). A reader takes it from a descriptor or from memory and checks every byte. */
 typedef struct vg_reader vg_reader;
-/* vg_reader_open: read up to the FORM record. fd is borrowed and read to the END mark by vg_reader_next. `name` is
- * what messages call it. */
+/* vg_reader_open: read everything up to the FORM record. fd is borrowed; vg_reader_next reads it to the END mark.
+ * `name` is used in messages. */
 int vg_reader_open(vg_reader **r, int fd, const char *name, vg_err *e) VG_MUST_CHECK;
 int vg_reader_open_memory(vg_reader **r, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
-/* vg_reader_head: what was read; the caller may change it (it is what a filter hands to its writer). */
+/* vg_reader_head: the head that was read. The caller may change it: a filter hands it to its writer. */
 vg_head *vg_reader_head(vg_reader *r);
-/* What a stream says that its writer gave up on: the record FAIL. */
+/* The FAIL record: why the writer of the stream gave up. */
 typedef struct vg_failure {
     char *program; /* NULL: there is no such record */
     uint32_t status; /* exit status */
     char *message; /* one line */
 } vg_failure;
 
-/* vg_reader_next: 1 and the next frame; 0 at the END mark, nothing left behind it; negative on damage. */
+/* vg_reader_next: 1 and the next frame; 0 after the END mark, if nothing follows it; negative on damage. */
 int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e) VG_MUST_CHECK;
-vg_records *vg_reader_tail(vg_reader *r); /* unknown records after the last frame, valid when next has given 0 */
-/* vg_reader_failure: why vg_reader_next gave VG_ETRUNC, if the stream says it; else NULL. Borrowed until close. */
+vg_records *vg_reader_tail(vg_reader *r); /* unknown records after the last frame; valid once vg_reader_next has
+                                             returned 0 */
+/* vg_reader_failure: the reason for VG_ETRUNC, if the stream gives one; else NULL. Borrowed until close. */
 const vg_failure *vg_reader_failure(const vg_reader *r);
 void vg_reader_close(vg_reader **r);
 
@@ -36,18 +37,19 @@ typedef struct vg_writer vg_writer;
 /* vg_writer_open: write everything up to FORM. fd is borrowed. h is borrowed until close and must not change. */
 int vg_writer_open(vg_writer **w, int fd, const char *name, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 int vg_writer_put(vg_writer *w, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
-/* vg_writer_end: unknown records left over (may be NULL), END, flush. Without it the stream is not whole. */
+/* vg_writer_end: write remaining unknown records (may be NULL) and END, and flush. A stream without END is
+ * incomplete. */
 int vg_writer_end(vg_writer *w, const vg_records *tail, vg_err *e) VG_MUST_CHECK;
-/* vg_writer_abandon: say in a FAIL record who failed and why; best effort; no END will follow. */
+/* vg_writer_abandon: write a FAIL record that names the program and the cause. Best effort; END must not follow. */
 void vg_writer_abandon(vg_writer *w, const char *program, int exit_status, const char *message);
 void vg_writer_close(vg_writer **w);
 
-/* The door in. Operands are streams, mesh files, files that hold a whole sequence (point caches, arrays, ...),
- * archives of mesh files, directories, or "-" (standard input: any of them); what each one is, is told by its
- * content, for OBJ by its name or content. Directories and archives give their mesh files in natural order ("pose2"
- * before "pose10"); other files in them are passed over. One operand that is a stream gives that stream as it is.
- * More operands are joined into one sequence of vertices of one mesh. The first pose is the reference unless a stream
- * or a sequence brings its own. */
+/* A sequence to be read. Operands are streams, mesh files, files that hold a whole sequence (point caches, arrays,
+ * ...), archives of mesh files, directories, or "-" (standard input, any of these). The format is detected from
+ * the content, for OBJ also from the name. The mesh files of directories and archives are read in natural order
+ * ("pose2" before "pose10"); other files there are skipped. A single stream is passed on as it is; several
+ * operands are joined into one sequence of vertices of one mesh. The first pose is the reference unless a stream
+ * or sequence has its own. */
 typedef struct vg_source vg_source;
 
 /* What can be chosen about files that say more, or less, than a sequence of vertices. All zero: the usual. */
@@ -58,19 +60,19 @@ typedef struct vg_reading {
 
 int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err *e) VG_MUST_CHECK;
 typedef struct vg_source_options {
-    const char *mesh;    /* an operand whose faces and reference pose are those of operands that hold none of their
-                            own (point caches, arrays); NULL: those of the operand before, or of the file of the same
-                            name that ends in .obj or .ply */
-    uint64_t most_bytes; /* what an archive, a compressed file, or a file from a pipe that is no stream may hold,
-                            unpacked; 0: 1 GiB in one file, 64 GiB in all */
-    int threads;         /* parse as many mesh files at a time; one more waits, if their bytes are less than 256 MiB.
-                            What comes through a pipe is not read before it is asked for. 0 or 1: one after another */
+    const char *mesh;    /* the operand that gives faces and reference pose to operands without any (point caches,
+                            arrays); NULL: the previous operand, or the file of the same name ending in .obj or
+                            .ply */
+    uint64_t most_bytes; /* limit of the unpacked size of an archive, a compressed file, or a file from a pipe that
+                            is not a stream; 0: 1 GiB per file, 64 GiB in all */
+    int threads;         /* parse this many mesh files at a time and read one ahead, within 256 MiB. A pipe is not
+                            read before its data is needed. 0 or 1: one after another */
     vg_reading reading;
 } vg_source_options;
 /* vg_source_open_with: o may be NULL. */
 int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const vg_source_options *o,
                         vg_err *e) VG_MUST_CHECK;
-/* vg_source_warning: what was left out of the input that brought the mesh, one line; NULL: nothing. Borrowed until
+/* vg_source_warning: what was left out of the input that holds the mesh, in one line; NULL: nothing. Borrowed until
  * close. */
 const char *vg_source_warning(const vg_source *s);
 vg_head *vg_source_head(vg_source *s);
@@ -79,9 +81,9 @@ vg_records *vg_source_tail(vg_source *s);
 const vg_failure *vg_source_failure(const vg_source *s); /* as vg_reader_failure */
 void vg_source_close(vg_source **s);
 
-/* vg_load: the head behind one operand, which must hold `what` (vg_head_need); VG_EINPUT with the operand's name
- * otherwise. The reference is the operand's reference pose (for a mesh file its only pose, for BVH the one without
- * rotations; for a stream its reference; for an archive or directory the first pose). Frames are not read. */
+/* vg_load: the head of one operand, which must hold `what` (vg_head_need); otherwise VG_EINPUT with the operand's
+ * name. The reference is the operand's reference pose: the only pose of a mesh file, the pose without rotations of
+ * a BVH, the reference of a stream, the first pose of an archive or directory. Frames are not read. */
 int vg_load(vg_head *h, const char *operand, const char *what, vg_err *e) VG_MUST_CHECK;
 /* vg_load_with: the same with options (may be NULL), and what was left out of the mesh into *note (may be NULL). */
 int vg_load_with(vg_head *h, const char *operand, const char *what, const vg_source_options *o, vg_note *note,
@@ -89,41 +91,39 @@ int vg_load_with(vg_head *h, const char *operand, const char *what, const vg_sou
 /* vg_load_mesh: vg_load of a "mesh". */
 int vg_load_mesh(vg_head *h, const char *operand, vg_err *e) VG_MUST_CHECK;
 
-/* Frames that wait, first in, first out: in memory up to a limit,
- * then in a file without a name in $TMPDIR (or /tmp). */
+/* A queue of frames: in memory up to a limit, beyond it in an unnamed file in $TMPDIR (or /tmp). */
 typedef struct vg_spool vg_spool;
 typedef struct vg_spool_facts {
     uint64_t most_frames; /* that have waited at once */
     uint64_t file_bytes;  /* the largest size of the file; 0: there was none */
 } vg_spool_facts;
 
-/* vg_spool_new: h says what a frame holds; borrowed until free. limit: bytes of frames in memory. */
+/* vg_spool_new: h describes the frames; borrowed until free. limit: bytes of frames kept in memory. */
 int vg_spool_new(vg_spool **s, const vg_head *h, size_t limit, vg_err *e) VG_MUST_CHECK;
 void vg_spool_free(vg_spool **s);
-/* vg_spool_put: keep a copy of f, all of it. vg_spool_next: 1 and the frame that has waited longest;
- * 0 when none waits. */
+/* vg_spool_put: append a complete copy of f. vg_spool_next: 1 and the oldest frame; 0 if the queue is empty. */
 int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
 int vg_spool_next(vg_spool *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
 vg_spool_facts vg_spool_get_facts(const vg_spool *s);
 
-/* All frames of a sequence, any of them at any time: in memory up to a limit, beyond it in a file without a name in
- * $TMPDIR (or /tmp). What is read of a frame may be read by several threads at once. */
+/* A store of all frames of a sequence with random access: in memory up to a limit, beyond it in an unnamed file in
+ * $TMPDIR (or /tmp). Several threads may read at once. */
 typedef struct vg_poses vg_poses;
 typedef struct vg_poses_stats {
     uint64_t memory_bytes, file_bytes; /* what the frames take in each */
 } vg_poses_stats;
 
-/* vg_poses_new: h says what a frame holds; borrowed until free. limit: bytes of frames in memory. */
+/* vg_poses_new: h describes the frames; borrowed until free. limit: bytes of frames kept in memory. */
 int vg_poses_new(vg_poses **p, const vg_head *h, size_t limit, vg_err *e) VG_MUST_CHECK;
 void vg_poses_free(vg_poses **p);
-/* vg_poses_add: keep a copy of f, all of it, as the last frame. */
+/* vg_poses_add: append a complete copy of f. */
 int vg_poses_add(vg_poses *p, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
 size_t vg_poses_count(const vg_poses *p);
-/* vg_poses_values: the values of frame i < count (head.count * vg_kind_width(head.kind) numbers): *values is where they
- * are. A frame that is in the file is read into `room`, which has place for them. Borrowed until the next _add, and until
- * `room` is used again. */
+/* vg_poses_values: set *values to the values of frame i < count (head.count * vg_kind_width(head.kind) numbers). A
+ * frame in the file is read into `room`, which must be large enough. Borrowed until the next _add, and until
+ * `room` is reused. */
 int vg_poses_values(const vg_poses *p, size_t i, double *room, const double **values, vg_err *e) VG_MUST_CHECK;
-/* vg_poses_frame: frame i with name, time, and all that came with it. */
+/* vg_poses_frame: frame i with its name, time and everything that came with it. */
 int vg_poses_frame(const vg_poses *p, size_t i, vg_frame *f, vg_err *e) VG_MUST_CHECK;
 vg_poses_stats vg_poses_get_stats(const vg_poses *p);
 

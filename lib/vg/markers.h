@@ -27,7 +27,8 @@ void vg_markers_clear(vg_markers *m);
  * is the number of the first vertex, 0 or 1. name: what messages call the file. */
 int vg_markers_read(vg_markers *m, const void *data, size_t n, int base, const char *name, vg_err *e) VG_MUST_CHECK;
 
-/* A point of one mesh (weighted mean of three of its vertices, which may be one thrice) for a vertex of another. */
+/* A vertex and its place on another mesh: the weighted mean of three vertices, possibly the same vertex three
+ * times. */
 typedef struct vg_seed {
     uint32_t vertex, on[3];
     double weight[3];
@@ -38,8 +39,8 @@ typedef struct vg_seed {
 int vg_seeds_read(vg_seed **seeds, size_t *n, const void *data, size_t bytes, int base, const char *name,
                   vg_err *e) VG_MUST_CHECK;
 
-/* Joints as groups of mesh vertices (T 5.1): a joint is the mean of its vertices, in whatever pose they are; the roll
- * of its bone is told by the first of them. */
+/* Joints as groups of mesh vertices (T 5.1): a joint is the mean of its vertices in any pose; the first of them
+ * gives the roll of its bone. */
 typedef struct vg_joint_group {
     char *name;
     uint32_t parent;    /* less than its own number; UINT32_MAX: a root */
@@ -54,9 +55,9 @@ typedef struct vg_joint_groups {
 } vg_joint_groups;
 
 void vg_joint_groups_clear(vg_joint_groups *g);
-/* vg_joint_groups_read: text with a joint per line, "JOINT PARENT vertices VERTEX VERTEX ...", '-' for no parent, '#'
- * starts a comment. Parents may stand behind their children: they are put before them. Whether the vertices exist is
- * left to who has the mesh. `base` is the number of the first vertex, 0 or 1. name: what messages call the file. */
+/* vg_joint_groups_read: text with a joint per line, "JOINT PARENT vertices VERTEX VERTEX ...", '-' for no parent,
+ * '#' starts a comment. Parents may follow their children in the file; they are sorted first. The caller checks
+ * that the vertices exist. `base` is the number of the first vertex, 0 or 1. `name` is used in messages. */
 int vg_joint_groups_read(vg_joint_groups *g, const void *data, size_t n, int base, const char *name,
                          vg_err *e) VG_MUST_CHECK;
 

@@ -11,9 +11,9 @@
 extern "C" {
 #endif
 
-/* The vector graph of a sequence: the faces that carry vectors, in order (all, or the selected ones), then the links.
- * Layout as in vg_mesh; corner c of the graph is a position in vert.
- * `attached` counts the vertices that are in a face. */
+/* The vector graph of a sequence: the faces that carry vectors, in order (all or the selected ones), then the
+ * links. Layout as in vg_mesh; corner c of the graph is a position in vert. `attached` is the number of vertices
+ * in at least one face. */
 typedef struct vg_graph {
     size_t nv, nf, nlinks; /* nf includes the links, which are the last */
     uint32_t *start, *vert;
@@ -29,35 +29,34 @@ size_t vg_graph_corners(const vg_graph *g);
 
 /* vg_graph_vectors: w_c = v(c) - C_f (T 3.1). vertices: nv points in; vectors: one per corner out. */
 void vg_graph_vectors(const vg_graph *g, const double *vertices, double *vectors);
-/* vg_graph_root: the mean of the attached vertices (zeros when there are none). */
+/* vg_graph_root: the mean of the attached vertices; zeros if there are none. */
 void vg_graph_root(const vg_graph *g, const double *vertices, double root[3]);
-/* vg_graph_anchors: positions of the n anchors out of nv points. */
+/* vg_graph_anchors: the positions of n anchors out of nv points. */
 void vg_graph_anchors(const double *vertices, const uint32_t *anchors, size_t n, double *positions);
 
-/* vg_threads_with_room: how many threads, `most` at most, may multiply matrices in the address space that is left to
- * the process; 0: not even one. OpenBLAS does not return, ever, when it is refused the memory it works in, so ask
- * this before. */
+/* vg_threads_with_room: how many threads, at most `most`, may call BLAS in the address space that is left; 0:
+ * none. OpenBLAS never returns if its work memory is refused, so ask before. */
 int vg_threads_with_room(int most);
 
-/* vg_select_faces: fewer faces that still determine the mesh (T 3.2, Algorithm 1), completed so that every vertex
- * that is in a face stays in one and every component stays connected. *faces (ascending, caller frees with free())
- * and *n. */
+/* vg_select_faces: a subset of the faces that still determines the mesh (T 3.2, Algorithm 1), completed so that
+ * every vertex in a face stays in one and every component stays connected. Out: *faces (ascending, free with
+ * free()) and *n. */
 int vg_select_faces(const vg_mesh *m, uint32_t **faces, size_t *n, vg_err *e) VG_MUST_CHECK;
 
-/* vg_link_components: the fewest virtual line segments that join all components of m, between nearby vertices of
- * `vertices` (nv points): a minimum spanning tree of the components, where a link that would be shorter than the
- * edges beside it is moved on to the next vertex of the face. *pairs (2 per link, caller frees) and *n. VG_EARG when
- * a vertex is not finite. */
+/* vg_link_components: the fewest virtual line segments that join all components of m: a minimum spanning tree
+ * between nearby vertices of `vertices` (nv points), where a link shorter than the edges beside it is moved to the
+ * next vertex of the face. Out: *pairs (2 per link, free with free()) and *n. VG_EARG if a vertex is not finite. */
 int vg_link_components(const vg_mesh *m, const double *vertices, uint32_t **pairs, size_t *n,
                        vg_err *e) VG_MUST_CHECK;
 
-/* vg_head_prepare_vectors: choose h's links from its reference pose unless it has them. Every program that derives
- * vectors from vertices calls this before vg_graph_new. A map whose corners the links are not among is left out. */
+/* vg_head_prepare_vectors: choose the links of h from its reference pose unless it has links. To be called before
+ * vg_graph_new by every program that derives vectors from vertices. A map that was fitted without these links is
+ * dropped. */
 int vg_head_prepare_vectors(vg_head *h, vg_err *e) VG_MUST_CHECK;
 
-/* Deformation of vectors, reference pose to deformed pose (MATH 4): Frames (T 3.12 ff.) on faces of 3 or more,
- * Rodrigues on line segments, and on links the mean turn of the faces at their ends followed by Rodrigues. Degenerate
- * corners take the rotation of their face's other corners and scale 1. */
+/* Deformation of vectors from the reference pose to a deformed pose (MATH 4): Frames (T 3.12 ff.) on faces of 3
+ * corners or more, Rodrigues on line segments, and on links the mean rotation of the faces at their ends followed
+ * by Rodrigues. Degenerate corners take the rotation of their face's other corners and scale 1. */
 typedef struct vg_deformer vg_deformer;
 typedef struct vg_deform_counts {
     uint64_t corners;    /* degenerate corners met, over all poses */
@@ -68,30 +67,32 @@ typedef struct vg_deform_counts {
 int vg_deformer_new(vg_deformer **d, const vg_graph *g, const double *reference, int threads,
                     vg_err *e) VG_MUST_CHECK;
 void vg_deformer_free(vg_deformer **d);
-/* What is carried over to the target (MATH 5): the corner's turn and stretch (T 4.2); the face's deformation gradient
- * (Sumner and Popovic 2004), by polygons; the mean of both. Line segments and links always go by pose. */
+/* What is transferred to the target (MATH 5): the rotation and scale of the corner (T 4.2); the deformation
+ * gradient of the face (Sumner and Popovic 2004), for polygons; or the mean of both results. Line segments and
+ * links always use the first. */
 typedef enum vg_method { VG_BY_POSE = 0, VG_BY_GRADIENT = 1, VG_BY_BLEND = 2 } vg_method;
-/* vg_deformer_target: apply to these reference vectors (one per corner of the graph, copied) from now on. */
+/* vg_deformer_target: apply deformations to these reference vectors (one per corner of the graph, copied) from now
+ * on. */
 int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_method method, vg_err *e) VG_MUST_CHECK;
-/* vg_deformer_measure: n poses in (kind VG_VERTICES: nv points each, or VG_VECTORS: one vector per corner), n arrays
- * of a quaternion per corner out. With a target: vg_deformer_apply: quaternions in, deformed target vectors out;
- * vg_deformer_transfer: poses in, deformed target vectors out: by pose what measuring and applying gives, but for
- * rounding. One call at a time on one deformer. */
+/* vg_deformer_measure: n poses in (kind VG_VERTICES: nv points each; VG_VECTORS: one vector per corner), n arrays
+ * of one quaternion per corner out. With a target, vg_deformer_apply: quaternions in, deformed target vectors out;
+ * vg_deformer_transfer: poses in, deformed target vectors out (VG_BY_POSE: equal to measure and apply up to
+ * rounding). Calls on one deformer must not overlap. */
 void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses,
                          double *const *quaternions);
 void vg_deformer_transfer(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses, double *const *vectors);
 void vg_deformer_apply(vg_deformer *d, size_t n, const double *const *quaternions, double *const *vectors);
 vg_deform_counts vg_deformer_counts(const vg_deformer *d);
 
-/* A path through key poses (MATH 7; T 6.1): each vector turns and stretches along the geodesic from one key to the
- * next, neighbours the same way round also beyond half a turn; the root moves straight. Outside of the keys it goes
- * on as beside the first or last. */
+/* A path through key poses (MATH 7; T 6.1): each vector rotates and scales along the geodesic from one key to the
+ * next, in the same sense as its neighbours also beyond half a turn; the root moves in a straight line. Outside
+ * the keys the first or last segment is extrapolated. */
 typedef struct vg_path vg_path;
 typedef struct vg_key {
-    const double *values;  /* a frame's: of vertices, vectors or deformations; borrowed as long as the path lives */
+    const double *values;  /* of a frame of vertices, vectors or deformations; borrowed until the path is freed */
     double root[3];
     const double *anchors; /* nanchors points; borrowed */
-    double place;          /* grows from key to key: number, or time; says only how fast a smooth path goes by */
+    double place;          /* increases from key to key: a number or time; affects only the speed of a smooth path */
 } vg_key;
 typedef struct vg_path_options {
     vg_kind kind;    /* of the keys' values */
@@ -101,7 +102,7 @@ typedef struct vg_path_options {
 } vg_path_options;
 typedef struct vg_path_facts {
     size_t segments; /* between keys, looked at so far, again if come back to */
-    size_t beyond;   /* of these, where something turns by more than half a turn */
+    size_t beyond;   /* of these, those in which something turns by more than half a turn */
     vg_deform_counts degenerate;
 } vg_path_facts;
 
@@ -109,55 +110,56 @@ typedef struct vg_path_facts {
 int vg_path_new(vg_path **p, const vg_graph *g, const double *reference, const vg_key *keys, size_t nkeys,
                 const vg_path_options *o, vg_err *e) VG_MUST_CHECK;
 void vg_path_free(vg_path **p);
-/* vg_path_at: the pose at t: vectors (one per corner), root and anchors (NULL if there are none) out. Key i is at t
- * = i. What is between two keys is prepared when it is first asked for and kept until something else is (three
- * stretches if smooth): ask in order. */
+/* vg_path_at: the pose at t: vectors (one per corner), root and anchors (NULL if there are none) out. Key i is at
+ * t = i. A segment is prepared when it is first needed and cached until another one is (three segments if smooth),
+ * so ask in order. */
 int vg_path_at(vg_path *p, double t, double *vectors, double root[3], double *anchors, vg_err *e) VG_MUST_CHECK;
 vg_path_facts vg_path_get_facts(const vg_path *p);
 
-/* Shape deformation (T 4.1 to 4.6): what takes each source vector to the target's in the reference poses, applied to
- * the vectors of each pose and put at the source face's centroid; corners that share a vertex are averaged. No linear
- * system; fails for large deformations. Gives vertices: the mean of the attached ones is the source's. */
+/* Shape deformation (T 4.1 to 4.6): what takes each source vector to the target's in the reference poses is
+ * applied to the vectors of each pose at the source face's centroid; corners that share a vertex are averaged. No
+ * linear system; fails for large deformations. Gives vertices; the mean of the attached ones is the source's. */
 typedef struct vg_shaper vg_shaper;
 /* vg_shaper_new: g, the graph of both, is borrowed until free; references: nv points each, not kept. */
 int vg_shaper_new(vg_shaper **s, const vg_graph *g, const double *source_reference, const double *target_reference,
                   int threads, vg_err *e) VG_MUST_CHECK;
 void vg_shaper_free(vg_shaper **s);
-/* vg_shaper_transfer: n poses of the source in, n of the target out (nv points each); what is in no face is as in the
- * target's reference. */
+/* vg_shaper_transfer: n poses of the source in, n of the target out (nv points each); vertices in no face stay as
+ * in the target's reference. */
 void vg_shaper_transfer(vg_shaper *s, size_t n, const double *const *poses, double *const *vertices);
 
-/* Where the whole body goes when a motion is carried over (MATH 5): each root or anchor is as far from its place in
- * the target's reference as the source's is from its own, by the ratio of the diagonals of the references; or it
- * stays. */
+/* The position of the whole body in a transfer (MATH 5): root and anchors are displaced from their place in the
+ * target's reference as the source's are from theirs, scaled by the ratio of the reference diagonals; or they
+ * stay. */
 typedef struct vg_mover vg_mover;
-/* vg_mover_new: to is borrowed until free. anchors: of both, when they have the same vertices. */
+/* vg_mover_new: `to` is borrowed until free. anchors: of both meshes, if they have the same vertices. */
 int vg_mover_new(vg_mover **m, const vg_graph *from, const double *source_reference, const vg_graph *to,
                  const double *target_reference, const uint32_t *anchors, size_t nanchors, bool stay,
                  vg_err *e) VG_MUST_CHECK;
 void vg_mover_free(vg_mover **m);
-/* vg_mover_move: root and anchors of `in` become those of `out`. */
+/* vg_mover_move: set root and anchors of `out` from those of `in`. */
 void vg_mover_move(const vg_mover *m, const vg_frame *in, vg_frame *out);
-/* vg_mover_place: move a pose of the target as a whole until its root is there; vertices in no face stay. */
+/* vg_mover_place: translate a pose of the target until its root is at `root`; vertices in no face stay. */
 void vg_mover_place(const vg_mover *m, const double root[3], double *vertices);
 
-/* Which vertices of the target stay in a pose: those all of whose faces are driven only by faces of the source none
- * of whose vertices is further than 1e-6 D from its place in the reference. */
+/* The vertices of the target that stay in a pose: those all of whose faces are driven only by source faces whose
+ * vertices are all within 1e-6 D of their reference position. */
 typedef struct vg_pinner vg_pinner;
-/* vg_pinner_new: all is borrowed until free. pairs NULL: one connectivity. always: even when less than a tenth of the
- * source's vertices stay. */
+/* vg_pinner_new: all arguments are borrowed until free. pairs NULL: shared connectivity. always: also when less
+ * than a tenth of the source's vertices stay. */
 int vg_pinner_new(vg_pinner **p, const vg_graph *from, const double *source_reference, const vg_graph *to,
                   const vg_correspondence *pairs, bool always, vg_err *e) VG_MUST_CHECK;
 void vg_pinner_free(vg_pinner **p);
-/* vg_pinner_find: for a pose of the source, how many they are and which, ascending; borrowed until the next call. */
+/* vg_pinner_find: the number of vertices that stay in a pose of the source, and the vertices, ascending; borrowed
+ * until the next call. */
 size_t vg_pinner_find(vg_pinner *p, const double *pose, const uint32_t **vertices);
 
 /* Reconstruction: min over V of the squared difference between the vectors of V and the given ones (MATH 2; T
  * 3.7-3.9), by one sparse Cholesky factorisation, many poses per solve. */
 typedef struct vg_solver vg_solver;
-/* What a difference counts: every corner alike (T 3.7), or in the reference surface's own metric, which does not
- * depend on how the surface is cut into faces (on triangles the cotangent weights). Consistent vectors are met
- * exactly by both. */
+/* The metric of the misfit: every corner alike (T 3.7), or the reference surface's own metric, which does not
+ * depend on how the surface is cut into faces (cotangent weights on triangles). Both meet consistent vectors
+ * exactly. */
 typedef enum vg_weights { VG_WEIGHTS_UNIFORM = 0, VG_WEIGHTS_AREA = 1 } vg_weights;
 typedef struct vg_solver_facts {
     size_t unknowns, factor_entries; /* entries of the factor, explicit zeros included */
@@ -206,17 +208,17 @@ void vg_planar_load(const vg_planar *p, const double *vectors, double *normals);
 size_t vg_planar_solve(vg_planar *p, size_t n, const double *const *normals, double *const *x);
 vg_planar_facts vg_planar_get_facts(const vg_planar *p);
 
-/* Guidance in time (MATH 5; T 4.10, 4.16): a sequence keeps its second differences in time and meets given poses at
- * keys. Between two keys a < b the pose U_k becomes U_k + ((b - k) e_a + (k - a) e_b) / (b - a), e = given - U;
- * before the first key and after the last that key's own e is added. */
+/* Guidance in time (MATH 5; T 4.10, 4.16): a sequence keeps its second differences in time and meets given poses
+ * at keys. Between two keys a < b the pose U_k becomes U_k + ((b - k) e_a + (k - a) e_b) / (b - a), e = given - U;
+ * before the first key and after the last, that key's own e is added. */
 typedef struct vg_guide vg_guide;
 int vg_guide_new(vg_guide **g, size_t nv, vg_err *e) VG_MUST_CHECK;
 void vg_guide_free(vg_guide **g);
-/* vg_guide_key: frame number `frame`, later than the key before, has this pose (nv points), which becomes the given
- * one to the bit. Poses between both keys are to be applied before the next key is named. */
+/* vg_guide_key: set the pose (nv points) of frame number `frame`, which must be later than the previous key; the
+ * result meets it to the last bit. Apply the poses between two keys before setting the next one. */
 void vg_guide_key(vg_guide *g, uint64_t frame, double *pose, const double *given);
-/* vg_guide_apply: the pose of frame number `frame` in place: one between the last two keys, or behind the last, or,
- * when only one key was named, any. Without keys it stays. */
+/* vg_guide_apply: guide the pose of frame number `frame` in place: one between the last two keys, after the last
+ * key, or, with a single key, any. Without keys the pose is unchanged. */
 void vg_guide_apply(const vg_guide *g, uint64_t frame, double *pose);
 
 #ifdef __cplusplus

@@ -47,7 +47,7 @@ static void test_groups_refused(void)
         {"a - vertices\n", "line 1: a joint is 'JOINT PARENT vertices VERTEX VERTEX ...'"},
         {"a - 1 2 3\n", "line 1: a joint is"},
         {"a - 0 0 0 1 1 1\n", "line 1: a joint is"},
-        {"a - vertices 1\nb c vertices 2\n", "line 2: 'b' hangs on 'c', which is not there"},
+        {"a - vertices 1\nb c vertices 2\n", "line 2: the parent 'c' of 'b' is not defined"},
         {"a - vertices 1\nb a vertices 2\na b vertices 3\n", "line 3: 'a' is there already, in line 1"},
         {"a b vertices 1\nb a vertices 2\n", "round in a circle"},
         {"r - vertices 0\na a vertices 1\n", "round in a circle"},
