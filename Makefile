@@ -36,6 +36,7 @@ ARCHIVE_LIBS ?= $(shell $(PKG_CONFIG) --libs libarchive 2>/dev/null || echo -lar
 XXHASH_LIBS ?= -lxxhash
 PNG_CFLAGS ?= $(shell $(PKG_CONFIG) --cflags libpng 2>/dev/null)
 PNG_LIBS ?= $(shell $(PKG_CONFIG) --libs libpng 2>/dev/null || echo -lpng)
+WEBP_LIBS ?= $(shell $(PKG_CONFIG) --libs libwebpmux libwebp 2>/dev/null || echo -lwebpmux -lwebp)
 ZLIB_LIBS ?= $(shell $(PKG_CONFIG) --libs zlib 2>/dev/null || echo -lz)
 JANSSON_LIBS ?= $(shell $(PKG_CONFIG) --libs jansson 2>/dev/null || echo -ljansson)
 
@@ -69,7 +70,7 @@ FAST := -O3 -fno-math-errno -fno-trapping-math
 FAST_SRC := $(addprefix lib/,method/vectors/reconstruct method/pairs/transfer method/patches/segment signal/plane signal/spline_pose model/graph model/measures)
 # what a program does not call is not loaded: OpenBLAS starts threads that spin for a while as soon as it is there
 ALL_LDFLAGS += -Wl,--as-needed $(LDFLAGS)
-ALL_LIBS := $(CHOLMOD_LIBS) $(LAPACKE_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) -lpthread -lm $(LDLIBS)
+ALL_LIBS := $(CHOLMOD_LIBS) $(LAPACKE_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(WEBP_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) -lpthread -lm $(LDLIBS)
 
 KERNEL_SRC := $(sort $(wildcard lib/*/*_kernel.c lib/*/*/*_kernel.c))
 LIB_SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard lib/*/*.c lib/*/*/*.c)))

@@ -14,10 +14,10 @@ static struct {
     const char *size, *view, *against, *patches, *title, *format;
     const char *beside[VG_PAGE_SEQUENCES];
     size_t nbeside;
-    double scale, zoom;
+    double scale, zoom, turn;
     bool edges, ground, centred, silhouettes, scales, plain;
     size_t kind, up, fit; /* 1: html, z, figure */
-    bool page; /* what is made, else a sheet */
+    bool page, animated; /* what is made, else a sheet */
 } opts = {.view = "30,15"};
 
 static void take_beside(const char *value, void *context)
@@ -30,10 +30,10 @@ static void take_beside(const char *value, void *context)
 }
 
 static const cli_option options[] = {
-    {.name = "format", .value = "png|html", .text = &opts.format, .choice = &opts.kind,
+    {.name = "format", .value = "png|html|webp", .text = &opts.format, .choice = &opts.kind,
      .help = "format of the output (default: from its name, else png)"},
     {.name = "frames", .value = "N",
-     .help = "sheet: N evenly spaced frames, or all when there are fewer (default: 8)",
+     .help = "sheet: N evenly spaced frames, or all when there are fewer (default: 8; animation: 1000)",
      .integer = &opts.frames, .least = 1, .most = 10000},
     {.name = "columns", .value = "N", .help = "sheet: frames side by side (default: what makes it about 16 : 9)",
      .integer = &opts.columns, .least = 1, .most = 10000},
@@ -43,6 +43,8 @@ static const cli_option options[] = {
      .help = "from where, or azimuth and elevation in degrees (default: 30,15)"},
     {.name = "zoom", .value = "X", .help = "how large: 1 (the default) is what fits", .number = &opts.zoom,
      .least = 1e-3, .most = 1e3},
+    {.name = "turn", .value = "DEGREES", .help = "animation: go around the figure by so much from start to end",
+     .number = &opts.turn, .least = -36000, .most = 36000},
     {.name = "up", .value = "y|z", .help = "the axis that points up (default: y)", .choice = &opts.up},
     {.name = "fit", .value = "path|figure", .choice = &opts.fit,
      .help = "show the whole path with a camera that stays, or keep the figure in the middle (default: path; page: "
@@ -73,7 +75,7 @@ static const cli_program program = {
     .name = "vg-view",
     .synopsis = "[options] [FILE ...]",
     .summary =
-        "make a page (HTML) that plays a sequence, or a contact sheet (PNG) of it, with its shape or its errors",
+        "make a page (HTML) that plays a sequence, a contact sheet (PNG) or an animation (WebP), with its shape or errors",
     .options = options,
     .most_operands = (size_t)-1,
     .writes_file = true,
@@ -128,7 +130,8 @@ static vg_fit choose_fit(void)
 
 static vg_sheet_options sheet_options(void)
 {
-    vg_sheet_options o = {.frames = opts.frames ? (size_t)opts.frames : 8, .columns = (size_t)opts.columns,
+    vg_sheet_options o = {.frames = opts.frames ? (size_t)opts.frames : opts.animated ? 1000 : 8,
+                          .animated = opts.animated, .turn = opts.turn, .columns = (size_t)opts.columns,
                           .edges = opts.edges,
                           .ground = opts.ground, .fit = choose_fit(), .silhouettes = opts.silhouettes,
                           .zoom = opts.zoom, .tint = choose_tint(), .centred = opts.centred, .scale = opts.scale,
@@ -151,9 +154,14 @@ static void choose_kind(void)
     struct stat st;
     bool named = cli.output && (stat(cli.output, &st) || S_ISREG(st.st_mode)); /* not a pipe or device */
     bool html = named && (ends_with(cli.output, ".html") || ends_with(cli.output, ".htm"));
-    if (named && !html && !ends_with(cli.output, ".png") && !opts.format)
-        cli_usage("cannot write '%s': the name must end in .html or .png, or be '-' for standard output", cli.output);
+    bool webp = named && ends_with(cli.output, ".webp");
+    if (named && !html && !webp && !ends_with(cli.output, ".png") && !opts.format)
+        cli_usage("cannot write '%s': the name must end in .html, .png or .webp, or be '-' for standard output",
+                  cli.output);
     opts.page = opts.format ? opts.kind == 1 : html;
+    opts.animated = opts.format ? opts.kind == 2 : webp;
+    if (!opts.animated && cli_given("turn")) cli_usage("option '--turn' is about an animation: use -o FILE.webp");
+    if (opts.animated && opts.columns) cli_usage("option '--columns' is about a sheet: the output is an animation");
     if (opts.page && (opts.frames || opts.columns || opts.size || opts.silhouettes))
         cli_usage("option '--%s' is about a sheet: the output is a page",
                   opts.frames ? "frames" : opts.columns ? "columns" : opts.size ? "size" : "silhouettes");
@@ -162,7 +170,7 @@ static void choose_kind(void)
                   opts.against ? "against" : "scales");
     if (!opts.page && opts.title) cli_usage("option '--title' is about a page: use -o FILE.html");
     if (!cli.output && isatty(STDOUT_FILENO))
-        cli_usage("a %s is not written to a terminal: use -o FILE.html or -o FILE.png",
+        cli_usage("a %s is not written to a terminal: use -o FILE.html, FILE.png or FILE.webp",
                   opts.page ? "page" : "picture");
 }
 

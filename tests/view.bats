@@ -432,3 +432,48 @@ END
     must vg-view spread.vgs -o spread.html
     grep -q '"scale":0.1,' spread.html
 }
+
+@test "an animation: a picture for each frame, side by side, at the times of the frames; --turn goes around" {
+    mesh cube >one.obj
+    awk '/^v/ { print "v", 2 * $2, 2 * $3, 2 * $4; next } { print }' one.obj >two.obj
+    awk '/^v/ { print "v", $2 + 1, $3, $4; next } { print }' one.obj >three.obj
+    must vg-view one.obj two.obj three.obj --size 64x48 -o plain.webp
+    must vg-view one.obj two.obj three.obj --size 64x48 -j 2 -o again.webp
+    same_file plain.webp again.webp
+    must vg-view one.obj two.obj three.obj --beside two.obj --size 64x48 --turn 180 --format webp -o turned
+    py <<'END'
+import struct
+import make_corpus as m
+
+def parts(name):
+    data, at, frames, canvas = open(name, "rb").read(), 12, [], None
+    assert data[:4] == b"RIFF" and data[8:12] == b"WEBP" and struct.unpack("<I", data[4:8])[0] == len(data) - 8
+    while at < len(data):
+        tag, size = struct.unpack("<4sI", data[at:at + 8])
+        if tag == b"VP8X":
+            canvas = tuple(int.from_bytes(data[at + k:at + k + 3], "little") + 1 for k in (12, 15))
+        if tag == b"ANMF":
+            frames.append(int.from_bytes(data[at + 20:at + 23], "little"))
+        at += 8 + size + size % 2
+    return canvas, frames
+
+assert parts("plain.webp") == ((64 + 32, 48), [40, 40, 40]), parts("plain.webp")  # 25 frames a second
+assert parts("turned") == ((2 * 64 + 48, 48 + 22), [40, 40, 40]), parts("turned")
+m.write("timed.vgs", m.whole(m.content(frames=[m.pose("p%d" % i, [[x + i for x in p] for p in m.POINTS[:4]], time=t)
+                                               for i, t in enumerate((1, 1.5, 2.5))])))
+END
+    must vg-view timed.vgs --size 64x48 -o timed.webp
+    py <<'END'
+data = open("timed.webp", "rb").read()
+at, frames = 12, []
+while at < len(data):
+    size = int.from_bytes(data[at + 4:at + 8], "little")
+    if data[at:at + 4] == b"ANMF":
+        frames.append(int.from_bytes(data[at + 20:at + 23], "little"))
+    at += 8 + size + size % 2
+assert frames == [500, 1000, 750], frames  # the last one as long as the mean of the others
+END
+    must_fail 2 vg-view one.obj -o none.webp --columns 2
+    must_fail 2 vg-view one.obj -o none.png --turn 90
+    must_fail 4 vg-view one.obj --format webp -o /dev/full
+}

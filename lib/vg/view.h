@@ -31,6 +31,8 @@ typedef enum vg_fit {
 typedef struct vg_sheet vg_sheet;
 typedef struct vg_sheet_options {
     size_t frames;        /* how many are shown, at most: >= 1 */
+    bool animated;        /* one after another, as an animated WebP: several sequences stand side by side */
+    double turn;          /* animated: by how many degrees the viewer goes around the figure from first to last */
     size_t columns;       /* 0: automatic, about 16 : 9; with several sequences up to 8 */
     size_t width, height; /* of the picture of one frame, in pixels: 16 .. 4096 */
     double azimuth, elevation; /* of the viewer, in degrees: 0, 0 in front; 90, 0 at +x; 0, 90 above */

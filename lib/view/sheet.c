@@ -2,54 +2,18 @@
  * row and adds captions and a legend. Leaves out rasterisation (raster.c, shade.c), colours (tint.c), and the file
  * format (png.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "view/view.h"
+#include "view/sheet.h"
 
 #include <math.h>
 #include <stdio.h>
 
-enum {
-    MARGIN = 16,      /* margin and gap between pictures, in pixels */
-    CAPTION = 22,     /* below a picture */
-    NUMBERS = 18,     /* below the caption, when frames have numbers */
-    TITLE = 24,       /* above each row, when there are several sequences */
-    FOOTER = 24,      /* at the bottom, with a ground */
-    TEXT_BYTES = 512,
-    LEAST_SIDE = 16, MOST_SIDE = 4096,
-    WIDE_SIDE = 1536, /* pictures larger than this have 2 x 2 samples per pixel instead of 3 x 3 */
-    MOST_COLUMNS = 8, /* default with several sequences */
-};
-
-/* Points further away than this, in D, cannot be drawn together with the figure. */
-#define MOST_DISTANCE 1e9
-
 static const double title_dot = 1.75, caption_dot = 1.5, small_dot = 1.25;
 static const unsigned char page[3] = {255, 255, 255}, ink[3] = {38, 42, 50}, soft_ink[3] = {112, 118, 128};
 
-typedef struct sequence {
-    const char *label;
-    const vg_head *head;
-    vgi_figure figure;
-    vgi_album album;
-    vgi_meter meter;
-    double origin[3], unit;      /* points are kept as (p - origin) / unit */
-    double diagonal;             /* D; 0 when all points coincide, and then unit is 1 */
-    double ground_height;        /* in D, along the vertical */
-    bool tinted;
-    size_t *shot;                /* index into the album for column i */
-} sequence;
-
-struct vg_sheet {
-    vg_sheet_options o;
-    size_t nsequences;
-    sequence at[VG_SHEET_SEQUENCES];
-    vgi_tint tint;
-    bool tinted;                 /* at least one sequence has numbers */
-    vgi_palette palette;
-    size_t n, columns, oversampling; /* number of frames that are shown */
-    vgi_camera camera;
-    const sequence *largest_of, *least_of; /* the largest and the least number, and their sequences */
-    const vgi_shot *largest, *least;
-};
+/* Points further away than this, in D, cannot be drawn together with the figure. */
+#define MOST_DISTANCE 1e9
+/* Sequences whose diagonals differ by less than this factor have one scale. */
+#define ONE_SCALE 2
 
 /* ---- taking frames ---- */
 
@@ -61,8 +25,9 @@ static int check_options(const vg_sheet_options *o, vg_err *e)
         return vg_fail(e, VG_EARG, "a picture of %zu x %zu pixels is not possible: %d to %d each way", o->width,
                        o->height, LEAST_SIDE, MOST_SIDE);
     if (!(o->scale >= 0 && o->scale < INFINITY) || !(o->zoom >= 0 && o->zoom < INFINITY) || !isfinite(o->azimuth) ||
-        !isfinite(o->elevation))
-        return vg_fail(e, VG_EARG, "scale, zoom, azimuth and elevation must be numbers, scale and zoom not negative");
+        !isfinite(o->elevation) || !isfinite(o->turn))
+        return vg_fail(e, VG_EARG, "scale, zoom, azimuth, elevation and turn must be numbers, scale and zoom not "
+                                   "negative");
     if (o->tint == VG_TINT_SCALES && o->scale > 0 && !(o->scale > 1))
         return vg_fail(e, VG_EARG, "the colours of scales end at a factor above 1, not at %g", o->scale);
     return VG_OK;
@@ -96,11 +61,14 @@ void vg_sheet_free(vg_sheet **address)
     *address = NULL;
 }
 
-static void measure_reference(sequence *q, const double *reference, bool z_up)
+/* Bodies of about one size are drawn at one scale; others are scaled to D. */
+static void measure_reference(const vg_sheet *s, vgi_row *q, const double *reference, bool z_up)
 {
     size_t nv = q->head->body.mesh.nv, vertical = z_up ? 2 : 1;
+    double first = s->at->diagonal;
     q->diagonal = vg_diagonal(reference, nv);
     q->unit = q->diagonal > 0 ? q->diagonal : 1;
+    if (q != s->at && first > 0 && q->unit < ONE_SCALE * first && first < ONE_SCALE * q->unit) q->unit = first;
     vg_centroid(reference, nv, q->origin);
     q->ground_height = (vgi_ground_height(q->figure.drawn, nv, reference, z_up) - q->origin[vertical]) / q->unit;
 }
@@ -112,17 +80,18 @@ int vg_sheet_sequence(vg_sheet *s, const char *label, const vg_head *h, const vg
     if (h->kind != VG_VERTICES) return vg_fail(e, VG_EARG, "a sheet shows vertices, not %s", vg_kind_name(h->kind));
     if (truth && truth->body.mesh.nv != h->body.mesh.nv)
         return vg_fail(e, VG_EARG, "a sequence and its truth have another number of vertices");
-    sequence *q = s->at + s->nsequences++;
-    *q = (sequence){.label = label, .head = h};
+    vgi_row *q = s->at + s->nsequences++;
+    *q = (vgi_row){.label = label, .head = h};
     int r = vgi_figure_init(&q->figure, &h->body.mesh, e);
     if (r == VG_OK && s->o.silhouettes) r = vgi_figure_sides(&q->figure, e);
     if (r == VG_OK) r = vgi_album_init(&q->album, h->body.mesh.nv, s->o.frames, e);
     if (r < 0) return r;
-    measure_reference(q, truth ? truth->body.reference : h->body.reference, s->o.z_up);
-    return vgi_meter_init(&q->meter, &s->tint, &h->body.mesh, h->body.reference, q->unit, e);
+    measure_reference(s, q, truth ? truth->body.reference : h->body.reference, s->o.z_up);
+    return vgi_meter_init(&q->meter, &s->tint, &h->body.mesh, h->body.reference,
+                          q->diagonal > 0 ? q->diagonal : 1, e);
 }
 
-static int keep_points(const sequence *q, vgi_shot *shot, const double *vertices, vg_err *e)
+static int keep_points(const vgi_row *q, vgi_shot *shot, const double *vertices, vg_err *e)
 {
     for (size_t i = 0; i < 3 * q->album.nv; i++) {
         double x = (vertices[i] - q->origin[i % 3]) / q->unit;
@@ -133,7 +102,7 @@ static int keep_points(const sequence *q, vgi_shot *shot, const double *vertices
     return VG_OK;
 }
 
-static int keep_numbers(vg_sheet *s, sequence *q, vgi_shot *shot, const vg_frame *f, const double *truth, vg_err *e)
+static int keep_numbers(vg_sheet *s, vgi_row *q, vgi_shot *shot, const vg_frame *f, const double *truth, vg_err *e)
 {
     bool has = vgi_tint_has(&s->tint, f, truth);
     if (q->album.seen == 1) q->tinted = has;
@@ -151,27 +120,23 @@ static int keep_numbers(vg_sheet *s, sequence *q, vgi_shot *shot, const vg_frame
 int vg_sheet_add(vg_sheet *s, size_t i, const vg_frame *f, const double *truth, vg_err *e)
 {
     if (i >= s->nsequences) return vg_fail(e, VG_EARG, "a frame is for a sequence that the sheet does not have");
-    sequence *q = s->at + i;
+    vgi_row *q = s->at + i;
     vgi_shot *shot;
     int r = vgi_album_next(&q->album, &shot, e);
     if (r < 0) return r;
     free(shot->name);
     shot->name = vgi_copy_string(f->name, strlen(f->name), e);
     if (!shot->name) return VG_ENOMEM;
+    shot->time = f->has_time ? f->time : NAN;
     r = keep_points(q, shot, f->values, e);
     return r == VG_OK ? keep_numbers(s, q, shot, f, truth, e) : r;
 }
 
 /* ---- which frames: those of the longest sequence; shorter ones stay at their last frame ---- */
 
-static const vgi_shot *shot_of(const sequence *q, size_t i)
-{
-    return q->album.at + q->shot[i];
-}
-
 static int choose_frames(vg_sheet *s, vg_err *e)
 {
-    sequence *longest = s->at;
+    vgi_row *longest = s->at;
     for (size_t i = 1; i < s->nsequences; i++)
         if (s->at[i].album.seen > longest->album.seen) longest = s->at + i;
     s->n = vgi_album_close(&longest->album);
@@ -180,7 +145,7 @@ static int choose_frames(vg_sheet *s, vg_err *e)
     int r = frames ? VG_OK : VG_ENOMEM;
     for (size_t i = 0; i < s->n && r == VG_OK; i++) frames[i] = longest->album.at[i].index;
     for (size_t k = 0; k < s->nsequences && r == VG_OK; k++) {
-        sequence *q = s->at + k;
+        vgi_row *q = s->at + k;
         if (!q->album.seen) r = vg_fail(e, VG_EINPUT, "'%s' has no frames: there is nothing to draw", q->label);
         else if (!(q->shot = vgi_array_raw(s->n, sizeof *q->shot, e))) r = VG_ENOMEM;
         else if (q != longest) vgi_album_match(&q->album, frames, s->n, q->shot);
@@ -199,7 +164,7 @@ static int compare_floats(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static size_t count_drawn(const sequence *q)
+static size_t count_drawn(const vgi_row *q)
 {
     size_t n = 0;
     for (size_t v = 0; v < q->album.nv; v++) n += q->figure.drawn[v];
@@ -221,7 +186,7 @@ static int find_percentile(const vg_sheet *s, double *number, vg_err *e)
     float *all = vgi_array_raw(total, sizeof *all, e);
     if (!all) return VG_ENOMEM;
     for (size_t k = 0; k < s->nsequences; k++) {
-        const sequence *q = s->at + k;
+        const vgi_row *q = s->at + k;
         for (size_t i = 0; q->tinted && i < s->n; i++)
             for (size_t v = 0; v < q->album.nv; v++)
                 if (q->figure.drawn[v]) all[n++] = fabsf(shot_of(q, i)->numbers[v]);
@@ -283,7 +248,7 @@ static size_t choose_columns(const vg_sheet *s)
 }
 
 /* The centroid of a shot: the middle of its picture when the camera follows. */
-static void shot_middle(const vg_sheet *s, const sequence *q, const vgi_shot *shot, double middle[2])
+static void shot_middle(const vgi_camera *c, const vgi_row *q, const vgi_shot *shot, double middle[2])
 {
     double sum[3] = {0, 0, 0};
     size_t n = 0;
@@ -294,9 +259,18 @@ static void shot_middle(const vg_sheet *s, const sequence *q, const vgi_shot *sh
     }
     middle[0] = middle[1] = 0;
     for (int k = 0; k < 3 && n; k++) {
-        middle[0] += s->camera.right[k] * sum[k] / (double)n;
-        middle[1] += s->camera.up[k] * sum[k] / (double)n;
+        middle[0] += c->right[k] * sum[k] / (double)n;
+        middle[1] += c->up[k] * sum[k] / (double)n;
     }
+}
+
+/* The camera of picture i: in an animation it may turn around the figure. */
+static vgi_camera camera_of(const vg_sheet *s, size_t i)
+{
+    vgi_camera c = s->camera;
+    if (s->o.animated && s->o.turn != 0) /* so that the end meets the beginning */
+        vgi_camera_turn(&c, s->o.azimuth + s->o.turn * (double)i / (double)s->n, s->o.elevation, s->o.z_up);
+    return c;
 }
 
 /* One scale for all pictures, so that sizes compare; one place too, unless the camera follows. */
@@ -310,8 +284,9 @@ static void place_camera(vg_sheet *s)
         for (size_t i = 0; i < s->n; i++) {
             double middle[2] = {0, 0};
             const vgi_shot *shot = shot_of(s->at + k, i);
-            if (s->o.fit == VG_FIT_FIGURE) shot_middle(s, s->at + k, shot, middle);
-            vgi_camera_measure(&s->camera, &s->at[k].figure, shot->points, middle, &box);
+            vgi_camera camera = camera_of(s, i);
+            if (s->o.fit == VG_FIT_FIGURE) shot_middle(&camera, s->at + k, shot, middle);
+            vgi_camera_measure(&camera, &s->at[k].figure, shot->points, middle, &box);
         }
     vgi_camera_fit(&s->camera, &box, 0.06);
     if (s->o.zoom > 0) s->camera.scale *= s->o.zoom;
@@ -321,20 +296,20 @@ static void place_camera(vg_sheet *s)
 
 typedef struct row { /* how many pictures are drawn at the same time */
     const vg_sheet *s;
-    const sequence *of;
+    const vgi_row *of;
     size_t first;
     unsigned char **rgb; /* one picture each */
     vg_err *err;
 } row;
 
-static double nice_spacing(const sequence *q)
+static double nice_spacing(const vgi_row *q)
 {
     double want = 0.14 * q->unit, power = pow(10, floor(log10(want)));
     return (want / power < 1.5 ? 1 : want / power < 3.5 ? 2 : want / power < 7.5 ? 5 : 10) * power;
 }
 
 /* The grid surrounds the feet in all shots, or in this one when the camera follows. */
-static void place_ground(const vg_sheet *s, const sequence *q, size_t shot, vgi_ground *g)
+static void place_ground(const vg_sheet *s, const vgi_row *q, size_t shot, vgi_ground *g)
 {
     *g = (vgi_ground){.height = q->ground_height, .spacing = nice_spacing(q) / q->unit, .across = {1, 0, 0}};
     g->vertical[s->o.z_up ? 2 : 1] = 1;
@@ -348,19 +323,19 @@ static void place_ground(const vg_sheet *s, const sequence *q, size_t shot, vgi_
     g->reach = 0.45 + 0.5 * hypot(box.most[0] - box.least[0], box.most[1] - box.least[1]);
 }
 
-static int draw_shot(const vg_sheet *s, const sequence *q, size_t i, unsigned char *rgb, vg_err *e)
+int vgi_sheet_draw(const vg_sheet *s, const vgi_row *q, size_t i, unsigned char *rgb, vg_err *e)
 {
     const vgi_shot *shot = shot_of(q, i);
     size_t nv = q->album.nv;
     double side = fmin(s->camera.width, s->camera.height), pixel = (double)s->oversampling;
-    vgi_camera camera = s->camera;
+    vgi_camera camera = camera_of(s, i);
     vgi_raster raster = {0};
     vgi_ground ground = {0};
     float *values = NULL;
     int r = VG_OK;
     if (s->o.fit == VG_FIT_FIGURE) {
         double middle[2];
-        shot_middle(s, q, shot, middle);
+        shot_middle(&camera, q, shot, middle);
         camera.x += middle[0], camera.y += middle[1];
     }
     if (q->tinted) {
@@ -397,23 +372,23 @@ static int draw_shot(const vg_sheet *s, const sequence *q, size_t i, unsigned ch
 static void draw_task(void *context, size_t i)
 {
     row *k = context;
-    k->err[i].code = draw_shot(k->s, k->of, k->first + i, k->rgb[i], k->err + i);
+    k->err[i].code = vgi_sheet_draw(k->s, k->of, k->first + i, k->rgb[i], k->err + i);
 }
 
 /* ---- the page ---- */
 
-static void clear_canvas(vgi_canvas *c)
+void vgi_canvas_clear(vgi_canvas *c)
 {
     for (size_t i = 0; i < c->w * c->h; i++) memcpy(c->rgb + 3 * i, page, 3);
 }
 
-static void centre_text(vgi_canvas *c, double middle, double y, double dot, const unsigned char colour[3],
+void vgi_canvas_centre(vgi_canvas *c, double middle, double y, double dot, const unsigned char colour[3],
                         const char *text)
 {
     vgi_text(c, floor(middle - vgi_text_width(dot, text) / 2), y, dot, colour, text);
 }
 
-static void paste(vgi_canvas *c, size_t x, size_t y, const unsigned char *rgb, size_t w, size_t h)
+void vgi_canvas_paste(vgi_canvas *c, size_t x, size_t y, const unsigned char *rgb, size_t w, size_t h)
 {
     for (size_t j = 0; j < h; j++) memcpy(c->rgb + 3 * ((y + j) * c->w + x), rgb + 3 * j * w, 3 * w);
 }
@@ -433,15 +408,15 @@ static void put_caption(const vg_sheet *s, vgi_canvas *c, size_t x, const vgi_sh
     double middle = (double)x + (double)s->o.width / 2, y = (double)s->o.height + 8;
     print_label(line, sizeof line, shot);
     vgi_text_fit(text, sizeof text, caption_dot, (double)s->o.width, line);
-    centre_text(c, middle, y, caption_dot, ink, text);
+    vgi_canvas_centre(c, middle, y, caption_dot, ink, text);
     if (!shot->has_numbers) return;
     vgi_tint_caption(&s->tint, &shot->spread, line, sizeof line);
     vgi_text_fit(text, sizeof text, small_dot, (double)s->o.width, line);
-    centre_text(c, middle, y + CAPTION - 4, small_dot, soft_ink, text);
+    vgi_canvas_centre(c, middle, y + CAPTION - 4, small_dot, soft_ink, text);
 }
 
 /* Where an extreme value occurs: "1.5 in 'pose3'", with several sequences also in which. */
-static void print_place(const vg_sheet *s, char *to, size_t size, double number, const sequence *q,
+static void print_place(const vg_sheet *s, char *to, size_t size, double number, const vgi_row *q,
                         const vgi_shot *shot)
 {
     char text[VGI_NUMBER], label[TEXT_BYTES];
@@ -464,7 +439,7 @@ static void put_legend(const vg_sheet *s, vgi_canvas *c)
     vgi_legend(c, &s->tint, &s->palette, MARGIN, title, note);
 }
 
-static void put_title(vgi_canvas *c, const sequence *q)
+static void put_title(vgi_canvas *c, const vgi_row *q)
 {
     char text[TEXT_BYTES];
     vgi_text_fit(text, sizeof text, title_dot, (double)(c->w - 2 * MARGIN), q->label);
@@ -521,17 +496,17 @@ static void close_press(press *p, size_t columns)
     free(p->canvas.rgb);
 }
 
-static int print_row(press *p, const vg_sheet *s, const sequence *q, size_t first, vg_err *e)
+static int print_row(press *p, const vg_sheet *s, const vgi_row *q, size_t first, vg_err *e)
 {
     size_t n = s->n - first < s->columns ? s->n - first : s->columns;
     p->row.first = first, p->row.of = q;
     vgi_parallel(s->o.threads, n, draw_task, &p->row);
-    clear_canvas(&p->canvas);
+    vgi_canvas_clear(&p->canvas);
     if (title_height(s)) {
         put_title(&p->canvas, q);
         int r = vgi_png_rows(p->png, p->canvas.rgb, TITLE, e);
         if (r < 0) return r;
-        clear_canvas(&p->canvas);
+        vgi_canvas_clear(&p->canvas);
     }
     for (size_t i = 0; i < n; i++) {
         size_t x = MARGIN + i * (s->o.width + MARGIN);
@@ -539,7 +514,7 @@ static int print_row(press *p, const vg_sheet *s, const sequence *q, size_t firs
             if (e) *e = p->row.err[i];
             return p->row.err[i].code;
         }
-        paste(&p->canvas, x, 0, p->row.rgb[i], s->o.width, s->o.height);
+        vgi_canvas_paste(&p->canvas, x, 0, p->row.rgb[i], s->o.width, s->o.height);
         put_caption(s, &p->canvas, x, shot_of(q, first + i));
     }
     return vgi_png_rows(p->png, p->canvas.rgb, s->o.height + caption_height(s) + MARGIN, e);
@@ -547,17 +522,17 @@ static int print_row(press *p, const vg_sheet *s, const sequence *q, size_t firs
 
 static int print_sheet(press *p, const vg_sheet *s, vg_err *e)
 {
-    clear_canvas(&p->canvas);
+    vgi_canvas_clear(&p->canvas);
     int r = vgi_png_rows(p->png, p->canvas.rgb, MARGIN, e);
     for (size_t first = 0; r == VG_OK && first < s->n; first += s->columns)
         for (size_t k = 0; r == VG_OK && k < s->nsequences; k++) r = print_row(p, s, s->at + k, first, e);
     if (r == VG_OK && s->o.ground) {
-        clear_canvas(&p->canvas);
+        vgi_canvas_clear(&p->canvas);
         put_footer(s, &p->canvas);
         r = vgi_png_rows(p->png, p->canvas.rgb, FOOTER, e);
     }
     if (r == VG_OK && s->tinted) {
-        clear_canvas(&p->canvas);
+        vgi_canvas_clear(&p->canvas);
         put_legend(s, &p->canvas);
         r = vgi_png_rows(p->png, p->canvas.rgb, VGI_LEGEND, e);
     }
@@ -573,6 +548,7 @@ int vg_sheet_write(vg_sheet *s, int fd, const char *name, vg_err *e)
     s->oversampling = s->o.width > WIDE_SIDE || s->o.height > WIDE_SIDE ? 2 : 3;
     s->columns = s->o.columns ? (s->o.columns < s->n ? s->o.columns : s->n) : choose_columns(s);
     place_camera(s);
+    if (s->o.animated) return vgi_movie_write(s, fd, name, e);
     press p = {0};
     r = open_press(&p, s, fd, name, e);
     if (r == VG_OK) r = print_sheet(&p, s, e);

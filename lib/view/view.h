@@ -228,6 +228,7 @@ void vgi_legend(vgi_canvas *c, const vgi_tint *t, const vgi_palette *p, size_t m
 typedef struct vgi_shot {
     char *name;
     size_t index;   /* frame number in the sequence */
+    double time;    /* seconds; NAN: none */
     float *points;  /* nv */
     float *numbers; /* nv: the coloured numbers; valid only if has_numbers */
     bool has_numbers;
