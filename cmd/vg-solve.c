@@ -93,7 +93,11 @@ static void make_machine(work *w, machine *m, uint32_t *held, size_t nheld)
 {
     vg_err e;
     *m = (machine){.held = held, .nheld = nheld};
-    if (vg_solver_new(&m->solver, w->g, held, nheld, w->h->body.reference, w->weights, cli.threads, &e) < 0 ||
+    const double *reference = w->h->body.reference;
+    int r = m == &w->plain
+                ? vg_solver_new(&m->solver, w->g, held, nheld, reference, w->weights, cli.threads, &e)
+                : vg_solver_new_like(&m->solver, w->plain.solver, held, nheld, reference, &e);
+    if (r < 0 ||
         (opts.planar && vg_planar_new(&m->planar, m->solver, opts.planar_weights[0], opts.planar_weights[1], &e) < 0))
         cli_die(&e);
     vg_solver_facts facts = vg_solver_get_facts(m->solver);

@@ -143,7 +143,7 @@ static bool make_workspace(vgi_cholesky *c)
     return c->b && c->x && c->y && c->e;
 }
 
-int vgi_cholesky_new(vgi_cholesky **out, const vgi_sparse *a, vg_err *e)
+int vgi_cholesky_new(vgi_cholesky **out, const vgi_sparse *a, int *order, vg_err *e)
 {
     vgi_cholesky *c = *out = vgi_array(1, sizeof *c, e);
     if (!c) return VG_ENOMEM;
@@ -151,12 +151,12 @@ int vgi_cholesky_new(vgi_cholesky **out, const vgi_sparse *a, vg_err *e)
     c->common.print = 0;
     c->common.error_handler = NULL;
     c->common.nmethods = 1;
-    c->common.method[0].ordering = a->n < SMALL ? CHOLMOD_AMD : CHOLMOD_METIS;
+    c->common.method[0].ordering = order ? CHOLMOD_GIVEN : a->n < SMALL ? CHOLMOD_AMD : CHOLMOD_METIS;
     c->common.postorder = 1;
     c->common.supernodal = CHOLMOD_SUPERNODAL;
     cholmod_sparse A = view(a);
     int before = begin_alone();
-    c->L = cholmod_analyze(&A, &c->common);
+    c->L = cholmod_analyze_p(&A, order, NULL, 0, &c->common);
     end_alone(before);
     if (c->L) return VG_OK;
     vgi_cholesky_free(out);

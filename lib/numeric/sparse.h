@@ -36,8 +36,9 @@ static inline void vgi_triplets_put(vgi_triplets *t, size_t i, size_t j, double 
 int vgi_triplets_sum(const vgi_triplets *t, size_t rows, vgi_sparse *a, vg_err *e) VG_MUST_CHECK;
 
 typedef struct vgi_cholesky vgi_cholesky;
-/* vgi_cholesky_new: analyse the pattern of a, whose numbers are not looked at; a is not kept. VG_ENOMEM. */
-int vgi_cholesky_new(vgi_cholesky **c, const vgi_sparse *a, vg_err *e) VG_MUST_CHECK;
+/* vgi_cholesky_new: analyse the pattern of a, whose numbers are not looked at; a is not kept. order (n): eliminate
+ * the rows in about this order, which saves most of the time that an analysis takes; NULL: find one. VG_ENOMEM. */
+int vgi_cholesky_new(vgi_cholesky **c, const vgi_sparse *a, int *order, vg_err *e) VG_MUST_CHECK;
 void vgi_cholesky_free(vgi_cholesky **c);
 /* vgi_cholesky_factorize: the numbers of a, whose pattern is the one that was analysed. VG_EINPUT when it is not
  * positive definite. */

@@ -171,6 +171,10 @@ typedef struct vg_solver_facts {
  * face. VG_EINPUT when the graph is not connected, an anchor is in no face, or all of it is too large. */
 int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
                   vg_weights weights, int threads, vg_err *e) VG_MUST_CHECK;
+/* vg_solver_new_like: the same with other anchors, for the graph, weights and threads of another solver. Its order of
+ * elimination is taken over, which is most of the work that a new solver needs. Neither needs the other afterwards. */
+int vg_solver_new_like(vg_solver **s, const vg_solver *like, const uint32_t *anchors, size_t nanchors,
+                       const double *reference, vg_err *e) VG_MUST_CHECK;
 void vg_solver_free(vg_solver **s);
 /* vg_solver_load: the vectors of n poses (and their anchors, nanchors points each; NULL when there are none) become
  * first guesses x and right-hand sides, nv x 3 each: what the guesses miss. One call at a time on one solver; the

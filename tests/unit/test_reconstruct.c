@@ -333,6 +333,53 @@ static void test_anchors(void)
     }
 }
 
+/* The poses of vectors that nothing fits, by a solver that is like `base`, beside those of a new one: farthest in D. */
+static double apart_from_new(const vg_graph *g, const vg_solver *base, const double *reference, const uint32_t *anchors,
+                             size_t count, vg_weights weights)
+{
+    vg_solver *s;
+    vg_err e;
+    double *w = vectors_of(g, reference), *at = room(3 * count, sizeof *at), root[3] = {1, 2, 3};
+    double *x = room(3 * g->nv, sizeof *x), *rhs = room(3 * g->nv, sizeof *rhs);
+    const double *held = count ? at : root;
+    for (size_t c = 0; c < 3 * vg_graph_corners(g); c++) w[c] *= 1 + 0.2 * noise();
+    vg_graph_anchors(reference, anchors, count, at);
+    answer fresh = solve(g, reference, anchors, count, 1, (const double *const *)&w, &held, weights, 1, 1);
+    CHECK(fresh.code == VG_OK && vg_solver_new_like(&s, base, anchors, count, reference, &e) == VG_OK);
+    vg_solver_load(s, 1, (const double *const *)&w, &held, &x, &rhs);
+    vg_solver_solve(s, 1, (const double *const *)&rhs, &x, &held, &held);
+    double apart = farthest(x, fresh.x[0], g->nv) / vg_diagonal(reference, g->nv);
+    vg_solver_free(&s);
+    clear(&fresh);
+    free(w), free(at), free(x), free(rhs);
+    return apart;
+}
+
+/* Whatever the other solver holds: its order is taken over, its answers are not. */
+static void test_like(void)
+{
+    vg_head h;
+    const char *name;
+    for (size_t i = 0; make_any(i, &h, &name); i++) {
+        vg_graph *g = graph_of(&h);
+        for (size_t held = 0; held <= 5 && held <= g->attached; held += 5)
+            for (size_t count = 0; count <= 7 && count <= g->attached; count += count ? 3 : 1) {
+                uint32_t of_base[8], anchors[8];
+                vg_solver *base;
+                vg_err e;
+                vg_weights weights = all_weights[(held + count) % 2];
+                CHECK(spread_anchors(g, held, of_base) == held && spread_anchors(g, count, anchors) == count);
+                CHECK(vg_solver_new(&base, g, of_base, held, h.body.reference, weights, 1, &e) == VG_OK);
+                double apart = apart_from_new(g, base, h.body.reference, anchors, count, weights);
+                if (!(apart <= tight)) printf("%s, %zu anchors, like one with %zu:\n", name, count, held);
+                CHECK_NEAR(apart, 0, tight);
+                vg_solver_free(&base);
+            }
+        vg_graph_free(&g);
+        vg_head_clear(&h);
+    }
+}
+
 /* Anchors that contradict the vectors are met to the bit, and everything may be anchored. */
 static void test_contradicting_anchors(void)
 {
@@ -461,6 +508,7 @@ TESTS({"every generated mesh comes back", test_generated}, {"long and large mesh
       {"inconsistent vectors: the gradient vanishes on large meshes", test_normal_equations},
       {"anchors are met to the bit, isolated vertices stay", test_anchors},
       {"anchors that contradict the vectors", test_contradicting_anchors},
+      {"a solver like another has answers of its own", test_like},
       {"threads and batches change no bit", test_threads_and_batches},
       {"batch size and facts", test_batch_size_and_facts}, {"meshes without faces", test_without_faces},
       {"what is refused", test_refused})

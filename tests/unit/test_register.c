@@ -189,7 +189,7 @@ static void sparse_systems(void)
         if (i + 1 < N) a.row[n] = i + 1, a.value[n++] = -1;
         a.start[i + 1] = n;
     }
-    CHECK(vgi_cholesky_new(&c, &a, &e) == VG_OK);
+    CHECK(vgi_cholesky_new(&c, &a, NULL, &e) == VG_OK);
     for (int scale = 1; scale <= 4; scale *= 2) {
         for (int i = 0; i < n; i++) a.value[i] *= scale == 1 ? 1 : 2;
         memset(x, 0, 3 * N * sizeof *x);

@@ -271,7 +271,7 @@ static int make_smoother(fit *t, vg_err *e)
             if (L->to[i] > v) A.row[n] = (int)L->to[i], A.value[n++] = -strength * L->weight[i];
         A.start[v + 1] = (int)n;
     }
-    if (r == VG_OK) r = vgi_cholesky_new(&t->smoother, &A, e);
+    if (r == VG_OK) r = vgi_cholesky_new(&t->smoother, &A, NULL, e);
     if (r == VG_OK) r = vgi_cholesky_factorize(t->smoother, &A, e);
     vgi_sparse_clear(&A);
     return r;
@@ -486,7 +486,7 @@ static int prepare(fit *t, vg_err *e)
     if (r == VG_OK) r = vgi_springs_make(&t->L, t->in, e);
     if (r == VG_OK) measure_edges(t);
     if (r == VG_OK) r = vgi_smoothness_make(&t->smooth, &t->L, e);
-    if (r == VG_OK) r = vgi_cholesky_new(&t->solver, &t->smooth.matrix, e);
+    if (r == VG_OK) r = vgi_cholesky_new(&t->solver, &t->smooth.matrix, NULL, e);
     double **points[] = {&t->laplacian, &t->x, &t->rhs, &t->normal, &t->tmp, &t->goal};
     for (size_t i = 0; i < sizeof points / sizeof *points; i++)
         if (!(*points[i] = vgi_array(nv, 3 * sizeof(double), e))) return VG_ENOMEM;

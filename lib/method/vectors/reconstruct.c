@@ -35,6 +35,7 @@ struct vg_solver {
     size_t vertices_unknown;
     uint32_t pinned;  /* without anchors: the vertex that is held at 0 */
     uint32_t *row;    /* nv: row in the factor's order; NO_ROW if held or isolated */
+    const vg_solver *like; /* while it is made: the solver whose order of elimination it takes */
     vgi_metric metric;
     size_t nsteps;
     vgi_step *walk;       /* from the held vertices to all others */
@@ -206,13 +207,37 @@ static int assemble(const vg_solver *s, vgi_sparse *N, vg_err *e)
     return r;
 }
 
+/* The unknowns of s in the order in which its like eliminates them: those that the like holds come last. */
+static int *order_like(const vg_solver *s, vg_err *e)
+{
+    const vg_solver *like = s->like;
+    const int *perm = vgi_cholesky_order(like->cholesky);
+    int *order = vgi_array_raw(s->unknowns, sizeof *order, e);
+    uint32_t *unknown = vgi_array_raw(like->unknowns, sizeof *unknown, e); /* of s, by row of the like's factor */
+    size_t n = 0;
+    if (!order || !unknown) return free(order), free(unknown), NULL;
+    for (size_t i = 0; i < like->unknowns; i++) { /* centroids; vertices are put over the rest below */
+        size_t u = (size_t)perm[i];
+        unknown[i] = u < like->vertices_unknown ? NO_ROW : (uint32_t)(u - like->vertices_unknown + s->vertices_unknown);
+    }
+    for (size_t v = 0; v < s->g->nv; v++)
+        if (like->row[v] != NO_ROW) unknown[like->row[v]] = s->row[v];
+    for (size_t i = 0; i < like->unknowns; i++)
+        if (unknown[i] != NO_ROW) order[n++] = (int)unknown[i];
+    for (size_t v = 0; v < s->g->nv; v++)
+        if (like->row[v] == NO_ROW && s->row[v] != NO_ROW) order[n++] = (int)s->row[v];
+    free(unknown);
+    return order;
+}
+
 static int factorize(vg_solver *s, vg_err *e)
 {
     vgi_sparse N;
-    int r = assemble(s, &N, e);
+    int *order = NULL, r = assemble(s, &N, e);
     if (r < 0) return r;
     double t0 = seconds(), t1 = t0;
-    r = vgi_cholesky_new(&s->cholesky, &N, e);
+    if (s->like && s->like->cholesky && !(order = order_like(s, e))) r = VG_ENOMEM;
+    if (r == VG_OK) r = vgi_cholesky_new(&s->cholesky, &N, order, e);
     if (r == VG_OK) {
         t1 = seconds();
         r = vgi_cholesky_factorize(s->cholesky, &N, e);
@@ -222,6 +247,7 @@ static int factorize(vg_solver *s, vg_err *e)
         s->factor = vgi_cholesky_factor(s->cholesky);
     }
     vgi_sparse_clear(&N);
+    free(order);
     return r;
 }
 
@@ -269,12 +295,12 @@ static int make_metric(vg_solver *s, const double *reference, vg_err *e)
     return r;
 }
 
-int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, size_t nanchors,
-                  const double *reference, vg_weights weights, int threads, vg_err *e)
+static int make_solver(vg_solver **out, const vg_graph *g, const uint32_t *anchors, size_t nanchors,
+                       const double *reference, vg_weights weights, int threads, const vg_solver *like, vg_err *e)
 {
     vg_solver *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
-    s->g = g, s->threads = threads;
+    s->g = g, s->threads = threads, s->like = like;
     int r = weights == VG_WEIGHTS_AREA ? make_metric(s, reference, e) : VG_OK;
     if (r == VG_OK) r = number_unknowns(s, anchors, nanchors, reference, e);
     if (r == VG_OK) r = plan_walk(s, e);
@@ -284,8 +310,22 @@ int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, s
         if (r == VG_OK) r = permute_rows(s, e);
         if (r == VG_OK) r = make_workspace(s, e);
     }
+    s->like = NULL;
     if (r < 0) vg_solver_free(out);
     return r;
+}
+
+int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
+                  vg_weights weights, int threads, vg_err *e)
+{
+    return make_solver(s, g, anchors, nanchors, reference, weights, threads, NULL, e);
+}
+
+int vg_solver_new_like(vg_solver **s, const vg_solver *like, const uint32_t *anchors, size_t nanchors,
+                       const double *reference, vg_err *e)
+{
+    vg_weights weights = like->metric.face ? VG_WEIGHTS_AREA : VG_WEIGHTS_UNIFORM;
+    return make_solver(s, like->g, anchors, nanchors, reference, weights, like->threads, like, e);
 }
 
 void vg_solver_free(vg_solver **out)
