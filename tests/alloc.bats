@@ -85,7 +85,7 @@ each() {
     for ((; kilobytes < 1000000; kilobytes += kilobytes / 6)); do
         for command in 'vg-solve vectors.vgs -o out.vgs' 'vg-fitmap -q --patches patches.vgs poses.vgs -o out.vgs' \
             'vg-play map.vgs poses.vgs -o out.vgs' 'vg-segment -k 2 -j 8 poses.vgs -o out.vgs'; do
-            capture timeout 20 bash -c "ulimit -v $kilobytes && exec $command"
+            capture timeout 300 bash -c "ulimit -v $kilobytes && exec $command"
             [ "$status" = 0 ] || { [ "$status" = 4 ] && one_line && [ ! -e out.vgs ]; } || fail "$kilobytes: '$command': status $status"
             [ "$status" = 4 ] || solved=$((solved + 1))
             tried=$((tried + 1))

@@ -277,7 +277,7 @@ END
     [ $status = 2 ]
     grep -q 'a stream is not written to a terminal: use -o FILE or pipe it into' out
     status=0
-    timeout 20 python3 term.py vg-info >out </dev/null || status=$?
+    timeout 300 python3 term.py vg-info >out </dev/null || status=$?
     [ $status = 2 ]
     grep -q 'no input: name a stream' out
 }

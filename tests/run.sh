@@ -67,6 +67,8 @@ sanitizers() {
     export UBSAN_OPTIONS="halt_on_error=1:exitcode=99:print_stacktrace=1"
 }
 
+# Limits of time end what hangs: they are many times what anything takes, so that nothing fails because the machine is busy.
+
 # run_unit NAME [SET]: under that instruction set
 run_unit() {
     name=$1 log=$work/unit.log
@@ -81,7 +83,7 @@ run_unit() {
         count "$name" 0 1
         return
     fi
-    timeout -k 10 600 "$BUILD/unit/$name" >"$log" 2>&1
+    timeout -k 10 3600 "$BUILD/unit/$name" >"$log" 2>&1
     status=$?
     totals=$(sed -n '$s/^\([0-9][0-9]*\) passed, \([0-9][0-9]*\) failed$/\1 \2/p' "$log")
     good=${totals% *} bad=${totals#* }
@@ -102,7 +104,7 @@ run_replay() {
             [ ! -f "$file" ] || set -- "$@" "$file"
         done
     done
-    if [ $# != 0 ] && timeout -k 10 600 "$BUILD/fuzz/$name" "$@" >"$log" 2>&1; then
+    if [ $# != 0 ] && timeout -k 10 3600 "$BUILD/fuzz/$name" "$@" >"$log" 2>&1; then
         count "$name, $# files" 1 0
     else
         sed 's/^/    /' "$log"
@@ -113,7 +115,7 @@ run_replay() {
 # All of a bats file at once; what the plan promised and did not come is a failure.
 run_bats() {
     name=$1 log=$work/bats.log
-    timeout -k 10 1800 bats --tap "tests/$name" >"$log" 2>&1
+    timeout -k 10 10800 bats --tap "tests/$name" >"$log" 2>&1
     status=$?
     good=$(grep -c '^ok ' "$log")
     bad=$(grep -c '^not ok ' "$log")
@@ -134,7 +136,7 @@ narrower=$("$BUILD/bin/vg-info" --version --verbose | sed -n 's/.*this machine h
 
 untracked >"$work/before"
 sanitizers
-command -v pkill >/dev/null || command -v ps >/dev/null && export BATS_TEST_TIMEOUT=300 # bats needs one of them for it
+command -v pkill >/dev/null || command -v ps >/dev/null && export BATS_TEST_TIMEOUT=1800 # bats needs one of them for it
 
 for source in tests/unit/test_*.c; do
     name=$(basename "$source" .c)
