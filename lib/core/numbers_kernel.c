@@ -1,4 +1,4 @@
-/* numbers_kernel.c: are all numbers finite, and a copy without negative zeros.
+/* numbers_kernel.c: are all numbers finite; copies without negative zeros, and in binary32.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/numbers_kernel.h"
 #include "core/wide.h"
@@ -33,4 +33,16 @@ static void plain_zeros(double *to, const double *from, size_t n)
     for (; i < n; i++) to[i] = from[i] + 0.0;
 }
 
-const vgi_numbers_kernel VGI_OF_SET(vgi_numbers_kernel) = {all_finite, plain_zeros};
+/* The compiler makes vectors of this; the difference is 0 or NaN. */
+static bool to_single(float *restrict to, const double *restrict from, size_t n)
+{
+    uint32_t bad = 0;
+    for (size_t i = 0; i < n; i++) {
+        float y = (float)from[i], zero = y - y; /* NOLINT(misc-redundant-expression) */
+        to[i] = y;
+        bad |= vgi_float_bits(zero);
+    }
+    return bad == 0;
+}
+
+const vgi_numbers_kernel VGI_OF_SET(vgi_numbers_kernel) = {all_finite, plain_zeros, to_single};

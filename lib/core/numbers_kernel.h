@@ -8,6 +8,7 @@
 typedef struct vgi_numbers_kernel {
     bool (*finite)(const double *x, size_t n);
     void (*plain_zeros)(double *to, const double *from, size_t n);
+    bool (*to_single)(float *to, const double *from, size_t n);
 } vgi_numbers_kernel;
 VGI_KERNEL(vgi_numbers_kernel)
 
@@ -15,6 +16,12 @@ VGI_KERNEL(vgi_numbers_kernel)
 static inline void vgi_plain_zeros(double *to, const double *from, size_t n)
 {
     vgi_numbers_kernel_now()->plain_zeros(to, from, n);
+}
+
+/* vgi_to_single: n numbers rounded to binary32; false when one of them is not finite there. */
+static inline bool vgi_to_single(float *to, const double *from, size_t n)
+{
+    return vgi_numbers_kernel_now()->to_single(to, from, n);
 }
 
 #endif

@@ -2,6 +2,7 @@
  * Leaves out the other header records (artefact_io.c), numbers of vertices (payload_scal.c), record headers and
  * checksums (record.c) and the order of records (stream.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/numbers_kernel.h"
 #include "io/cursor.h"
 #include "model/artefact.h"
 
@@ -218,6 +219,7 @@ int vgi_values_encode(vg_bytes *b, const double *x, size_t n, vg_precision preci
     if (r < 0) return r;
     *data = b->data;
     if (precision == VG_F64) return put_doubles(b, x, n, e);
+    if (NATIVE && vgi_to_single((float *)(void *)b->data, x, n)) return VG_OK;
     for (size_t i = 0; i < n; i++) {
         float y = (float)x[i];
         if (!(y - y == 0)) return vg_fail(e, VG_EINPUT, "%g does not fit into binary32: write binary64", x[i]);

@@ -5,6 +5,7 @@
 #include "core/numbers_kernel.h"
 #include "method/pairs/transfer_kernel.h"
 #include "method/patches/segment_kernel.h"
+#include "method/rig/play_kernel.h"
 #include "method/vectors/deform_kernel.h"
 #include "method/vectors/guess.h"
 #include "method/vectors/planar_kernel.h"
@@ -70,9 +71,29 @@ static void check_numbers(void)
     }
 }
 
+static void check_singles(void)
+{
+    enum { MOST = 45 };
+    double x[MOST];
+    float y[MOST + 1];
+    for (size_t n = 0; n <= MOST; n++) {
+        for (size_t i = 0; i < MOST; i++) x[i] = wave(i), y[i] = 77;
+        y[MOST] = 77;
+        CHECK(vgi_to_single(y, x, n));
+        for (size_t i = 0; i <= MOST; i++) CHECK(y[i] == (i < n ? (float)x[i] : 77));
+        for (size_t i = 0; i < n; i++) {
+            double kept = x[i];
+            x[i] = i % 2 ? NAN : -1e39; /* too large for binary32 */
+            CHECK(!vgi_to_single(y, x, n));
+            x[i] = kept;
+        }
+    }
+}
+
 static void numbers_are_scanned(void)
 {
     under_each(check_numbers);
+    under_each(check_singles);
 }
 
 /* ---- solve ---- */
@@ -610,9 +631,43 @@ static void features_are_summed(void)
     under_each(check_features);
 }
 
+/* ---- maps at work ---- */
+
+/* Every number arrives at its place, and nothing is written beside it. */
+static void check_spread(void)
+{
+    enum { ROWS = 37, POSES = 5, FIRST = 2 };
+    float single[ROWS * 3 * POSES];
+    double twice[ROWS * 3 * POSES], roots[POSES][3], pose[POSES][3 * (ROWS + FIRST + 1)], *vertices[POSES];
+    for (size_t i = 0; i < ROWS * 3 * POSES; i++) single[i] = (float)(twice[i] = wave(i));
+    for (size_t rows = 1; rows <= ROWS; rows++)
+        for (int kind = 0; kind < 2; kind++) {
+            for (size_t k = 0; k < POSES; k++) {
+                vertices[k] = pose[k];
+                for (size_t i = 0; i < 3 * (ROWS + FIRST + 1); i++) pose[k][i] = 77;
+                for (size_t a = 0; a < 3; a++) roots[k][a] = wave(1000 + 3 * k + a);
+            }
+            const double(*at)[3] = (const double(*)[3])roots;
+            if (kind) vgi_play_kernel_now()->spread_single(single, rows, POSES, at, vertices, FIRST);
+            else vgi_play_kernel_now()->spread_double(twice, rows, POSES, at, vertices, FIRST);
+            for (size_t k = 0; k < POSES; k++)
+                for (size_t i = 0; i < 3 * (ROWS + FIRST + 1); i++) {
+                    size_t v = i / 3, a = i % 3, from = (v - FIRST) * 3 * POSES + 3 * k + a;
+                    bool there = v >= FIRST && v < FIRST + rows;
+                    CHECK(pose[k][i] == (!there ? 77 : (kind ? (double)single[from] : twice[from]) + roots[k][a]));
+                }
+        }
+}
+
+static void products_are_spread(void)
+{
+    under_each(check_spread);
+}
+
 TESTS({"choose by name", choose_by_name}, {"numbers are scanned", numbers_are_scanned},
       {"factors are solved", factors_are_solved}, {"rows come and go", rows_come_and_go},
       {"vectors are deformed", vectors_are_deformed}, {"poses are guessed", poses_are_guessed},
       {"rotations are found", rotations_are_found}, {"maps are followed", maps_are_followed},
       {"planes are sought", planes_are_sought}, {"faces are measured", faces_are_measured},
-      {"features are summed", features_are_summed})
+      {"features are summed", features_are_summed},
+      {"products are spread", products_are_spread})

@@ -4,6 +4,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
 #include "method/rig/map_parts.h"
+#include "method/rig/play_kernel.h"
 #include "numeric/blas.h"
 #include "model/rig.h"
 
@@ -320,21 +321,11 @@ static void play_rows(void *context, size_t task)
         float *c = (float *)p->product + first * stride;
         vgi_product_single(rows, stride, width, p->weights_single + first * width, width, p->columns, stride, c,
                            stride);
-        for (size_t k = 0; k < x->n; k++) {
-            double *to = x->vertices[k] + 3 * first;
-            const double *root = x->roots[k];
-            for (size_t v = 0; v < rows; v++)
-                for (size_t a = 0; a < 3; a++) to[3 * v + a] = (double)c[v * stride + 3 * k + a] + root[a];
-        }
+        vgi_play_kernel_now()->spread_single(c, rows, x->n, x->roots, x->vertices, first);
     } else {
         double *c = (double *)p->product + first * stride;
         vgi_product_double(rows, stride, width, p->m->weights + first * width, width, p->columns, stride, c, stride);
-        for (size_t k = 0; k < x->n; k++) {
-            double *to = x->vertices[k] + 3 * first;
-            const double *root = x->roots[k];
-            for (size_t v = 0; v < rows; v++)
-                for (size_t a = 0; a < 3; a++) to[3 * v + a] = c[v * stride + 3 * k + a] + root[a];
-        }
+        vgi_play_kernel_now()->spread_double(c, rows, x->n, x->roots, x->vertices, first);
     }
 }
 
