@@ -315,6 +315,126 @@ rigs() {
     rm -f motions.vgs "$n.rig" bones.txt
 }
 
+# core_of SET: the kernels of OpenBLAS that use no more than this instruction set
+core_of() {
+    case $1 in
+    avx512) echo SkylakeX ;;
+    avx2) echo Haswell ;;
+    sse2) echo Nehalem ;;
+    esac
+}
+
+# of_set STAGE: the row that was measured last, for the table of sets
+of_set() {
+    printf '%s\t%s\t%s\t%s\t%s\n' "$1" "$set" "$(rounded "$rate")" "$limit" "$ratio" >>sets
+}
+
+# under_sets NAME TEXT POSES SOME RUNS VERTICES: what differs between instruction sets, each beside its limit under the same set
+under_sets() {
+    n=$1 poses=$3 some=$4 runs=$5 k=50 input_before=$input gflops_before=$gflops cholmod_before=$cholmod
+    vg-segment "$n-11.vgs" -k $k -q -o "$n.patches"
+    vg-fitmap -q --patches "$n.patches" "$n-11.vgs" -o "$n.map"
+    # shellcheck disable=SC2046
+    vg-encode --f32 $(repeat 440 "$n-11.vgs") | vg-play "$n.map" --transforms -o motions.vgs
+    vg-register -q --aligned "$n-1.vgs" "$n-q.vgs" -o "$n-c.vgs"
+    in=$(bytes "$n.vgs") between=$(bytes "$n-w.vgs")
+    for set in $sets; do
+        export VG_ISA="$set" OPENBLAS_CORETYPE="$(core_of "$set")"
+        [ "$OPENBLAS_CORETYPE" ] || unset OPENBLAS_CORETYPE
+        input="$2, $set"
+        solver "$n" "$2, $set"
+        stage "$runs" "vg-deform $n.vgs --onto $n-b.vgs >/dev/null" "vg-deform $n-1.vgs --onto $n-b.vgs >/dev/null"
+        by_pipe $((in + between))
+        row 'vg-deform --onto' "$poses" $((in + between)) >/dev/null
+        of_set 'vg-deform --onto'
+        stage "$runs" "vg-solve $n-w.vgs >/dev/null" "vg-solve $n-1w.vgs >/dev/null"
+        by_cholmod "$poses"
+        row vg-solve "$poses" $((in + between)) >/dev/null
+        of_set vg-solve
+        stage "$runs" "vg-deform $n.vgs --onto $n-b.vgs | vg-solve >/dev/null" \
+            "vg-deform $n-1.vgs --onto $n-b.vgs | vg-solve >/dev/null"
+        by_cholmod "$poses"
+        row 'vg-deform --onto | vg-solve' "$poses" $((2 * in + between)) >/dev/null
+        of_set 'vg-deform --onto | vg-solve'
+        best "$runs" "vg-deform $n-some.vgs --onto $n-q.vgs --correspondence $n-c.vgs >/dev/null"
+        by_pipe $((3 * $(bytes "$n-some.vgs")))
+        row 'vg-deform --correspondence' "$some" "$(bytes "$n-some.vgs")" >/dev/null
+        of_set 'vg-deform --correspondence'
+        stage "$runs" "vg-solve --planar $n-p.vgs >/dev/null" "vg-solve --planar $n-p1.vgs >/dev/null"
+        by_cholmod 11
+        row 'vg-solve --planar, quads' 11 "$(bytes "$n-p.vgs")" >/dev/null
+        of_set 'vg-solve --planar, quads'
+        best "$runs" "vg-diff $n.vgs $n.vgs >/dev/null"
+        by_pipe $((2 * in))
+        row vg-diff "$poses" $((2 * in)) >/dev/null
+        of_set vg-diff
+        product=$(product "$k" "$6")
+        best "$runs" "vg-play $n.map motions.vgs >/dev/null"
+        limit=sgemm least=$(calc "4840 / ${product% *}")
+        row 'vg-play, binary32' 4840 $((4840 * $6 * 12)) >/dev/null
+        of_set 'vg-play, binary32'
+    done
+    unset VG_ISA OPENBLAS_CORETYPE
+    rm -f "$n.map" "$n.patches" "$n-c.vgs" motions.vgs
+    input=$input_before gflops=$gflops_before cholmod=$cholmod_before
+}
+
+# print_sets: a line for each stage, poses/s and ratio under each set
+print_sets() {
+    awk -F '\t' -v sets="$sets" '
+    !($1 in limit) { order[++n] = $1 }
+    { rate[$1, $2] = $3; limit[$1] = $4; ratio[$1, $2] = $5 }
+    END {
+        k = split(sets, set, " ")
+        printf "%-30s %-14s", "stage", "limit"
+        for (i = k; i > 0; i--) printf " %9s %5s", set[i], "ratio"
+        printf "\n%-30s %-14s", "-----", "-----"
+        for (i = k; i > 0; i--) printf " %9s %5s", "----", "-----"
+        print ""
+        for (j = 1; j <= n; j++) {
+            printf "%-30s %-14s", order[j], limit[order[j]]
+            for (i = k; i > 0; i--) printf " %9s %5s", rate[order[j], set[i]], ratio[order[j], set[i]]
+            print ""
+        }
+    }' sets
+}
+
+# ratio_of STAGE SET, rate_of STAGE SET: out of the table of sets
+ratio_of() {
+    awk -F '\t' -v stage="$1" -v set="$2" '$1 == stage && $2 == set { print $5 }' sets
+}
+rate_of() {
+    awk -F '\t' -v stage="$1" -v set="$2" '$1 == stage && $2 == set { print $3 }' sets
+}
+
+# busy N COMMAND: seconds of the command beside N processes that do nothing but take processors
+busy() {
+    others=
+    for _ in $(repeat "$1" x); do
+        sh -c 'while :; do :; done' &
+        others="$others $!"
+    done
+    best 1 "$2"
+    # shellcheck disable=SC2086 # a list of process numbers
+    kill $others
+    # shellcheck disable=SC2086
+    wait $others 2>/dev/null || :
+}
+
+# share NAME POSES: the part of its speed alone that the pipe keeps beside busy processes, and the part that is fair
+share() {
+    command="vg-deform $1.vgs --onto $1-b.vgs | vg-solve >/dev/null"
+    best "$RUNS" "$command"
+    alone=$seconds
+    for others_n in 2 6; do
+        busy $others_n "$command"
+        kept=$(calc "$alone / $seconds") fair=$(calc "$processors / ($others_n + $processors)")
+        printf '%-28s %6d %9s %8.2f %8.2f %8.2f\n' 'vg-deform | vg-solve' $others_n "$(rounded "$2 / $seconds")" "$kept" \
+            "$fair" "$(calc "$kept / $fair")" >>shares
+        least_share=$(awk "BEGIN { x = $kept / $fair; print x < ${least_share:-9} ? x : ${least_share:-9} }")
+    done
+}
+
 # setup NAME TEXT: from files to the first pose; the whole of vg-solve into $seconds
 setup() {
     best "$RUNS" "vg-deform $1-1.vgs --onto $1-b.vgs | vg-solve >/dev/null"
@@ -359,6 +479,8 @@ busy=$(load | awk '{ print ($1 > 0.7) ? "yes" : "no" }')
 ulimit=
 before=$(load)
 processors=$(getconf _NPROCESSORS_ONLN)
+sets=$(vg-info --version --verbose | sed -n 's/.*this machine has//p' | tr -d ',')
+widest=${sets##* }
 pipe=$(pipe 1048576 2000)
 pipe_small=$(pipe 65536 2000)
 memory=$(bandwidth 400)
@@ -413,6 +535,8 @@ goal '... frame by frame, a pose' "$live_seconds" ms '<=' 1
 vg-segment rod-11.vgs -k 50 -q -o eleven.patches
 best "$RUNS" 'vg-fitmap -q --patches eleven.patches rod-11.vgs -o eleven.map'
 goal 'fit of a map to 11 poses, 6,890 vertices' "$seconds" s '<=' 0.3
+under_sets rod '6,890 vertices' 539 99 "$RUNS" 6890
+share rod 539
 setup rod '6,890 / 13,776 triangles'
 rm -f rod* many.vgs eleven*
 
@@ -452,6 +576,13 @@ printf '%-28s %9s %9s %9s %11s %11s %8s %8s %10s\n' mesh load solve 'solve' chol
     ---- -------- -------- ------ ---------- ---------- ------ ------ ---------
 cat solves
 
+printf '\nUnder each instruction set, 6,890 vertices: poses/s, and the ratio beside the limit under the same set\n\n'
+print_sets
+
+printf '\nBeside busy processes: poses/s, the part of the speed alone that is kept, and the part that is fair\n\n'
+printf '%-28s %6s %9s %8s %8s %8s\n' stage others poses/s kept fair ratio ----- ------ ------- ---- ---- -----
+cat shares
+
 printf '\nSet-up: seconds from streams on disk to the first pose\n\n'
 printf '%-28s %12s %10s %9s %9s %14s %6s\n' mesh deform+solve vg-solve analyse factor 'factor entries' MiB \
     ---- ------------ -------- ------- ------ -------------- ---
@@ -461,9 +592,26 @@ printf '\nPeak memory in MiB of sequences of 135 and 540 poses, 13,380 vertices\
 printf '%-28s %10s %10s %8s\n' stage 135 540 ratio ----- --- --- -----
 cat memory
 
+case $widest in
+avx512) least_solve=1.1 least_both=0.45 least_gain=4 ;;
+*) least_solve=0.6 least_both=0.35 least_gain=3 ;;
+esac
+goal "vg-solve beside cholmod_solve2, 6,890 vertices, $widest" "$(ratio_of vg-solve "$widest")" times '>=' $least_solve
+goal "vg-deform | vg-solve beside cholmod_solve2, 6,890, $widest" "$(ratio_of 'vg-deform --onto | vg-solve' "$widest")" times '>=' \
+    $least_both
+goal "vg-deform --onto beside a pipe copy, 6,890, $widest" "$(ratio_of 'vg-deform --onto' "$widest")" times '>=' 0.9
+goal "playing a map beside sgemm, 6,890, $widest" "$(ratio_of 'vg-play, binary32' "$widest")" times '>=' 0.5
+case " $sets " in
+*' sse2 avx2 '*)
+    for stage in vg-solve 'vg-deform --onto' 'vg-deform --onto | vg-solve' vg-diff; do
+        goal "SSE2 beside AVX2, $stage" "$(calc "$(rate_of "$stage" sse2) / $(rate_of "$stage" avx2)")" times '>=' 0.5
+    done
+    ;;
+esac
+goal 'the fair share of the pipe that it keeps beside 2 and 6 busy processes' "$least_share" times '>=' 0.75
 goal 'vg-deform | vg-solve, 13,380 vertices' "$(calc "int($human_rate)")" poses/s '>=' 300
 goal 'vg-deform | vg-solve, 6,890 vertices' "$(calc "int($rod_rate)")" poses/s '>=' 1000
-goal 'solve alone, 50,002 vertices, 2 threads, beside CHOLMOD' "$tube_gain" times '>=' 4
+goal 'solve alone, 50,002 vertices, 2 threads, beside CHOLMOD' "$tube_gain" times '>=' "$least_gain"
 goal 'set-up, 13,380 vertices' "$human_setup" s '<=' 0.2
 goal 'reading OBJ text' "$(calc "int($rod_obj)")" MB/s '>=' 300
 goal 'largest growth of memory when poses become four times as many' "$worst" times '<=' 1.1
