@@ -2,6 +2,7 @@
  * Leaves out maps of patches (vg-fitmap.c) and driving a rig (playback.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "rigging.h"
+#include "fitting.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -11,8 +12,7 @@ enum { METHOD_NOT_GIVEN = 2 };
 
 struct rigging_options rigging = {.method = METHOD_NOT_GIVEN, .bones_per_corner = 2, .refine = 0.003};
 
-enum { BATCH = 32, SAMPLE = 32 };
-static const size_t in_memory = (size_t)256 << 20; /* bytes of poses that wait for the next pass */
+enum { SAMPLE = 64 };
 
 bool rigging_wanted(void)
 {
@@ -40,33 +40,20 @@ typedef struct motion {
     double *positions, *turns; /* n x 3 and 4 per joint */
 } motion;
 
-typedef struct errors {
-    double sum, most;
-    uint64_t poses;
-    double *first, *second; /* per vertex: sums of the error and of its square */
-} errors;
-
 typedef struct work {
     vg_head *h;
-    long holdout;
-    vg_spool *spool;           /* all poses, for the next pass */
-    uint64_t total, reference; /* poses; the first that is the reference, total: none is */
-    size_t nsample;            /* of the poses that are fitted, evenly spaced: */
-    uint64_t stride, sample_at[2 * SAMPLE];
-    double *sample[2 * SAMPLE];
+    fitting poses;
+    size_t reference; /* the first pose that is the reference; poses.n: none is */
+    size_t nsample, sample_at[SAMPLE];
+    double *sample[SAMPLE];
     motion given;
     vg_joint_groups groups;
     vg_inverse_skin *inverse; /* NULL: motions are known, or bones are free */
     vg_free_bones *free;      /* NULL: bones have a skeleton */
     double **transforms; /* of each pose */
     vg_map skinning;     /* linear blend skinning as a map, beside the envelope */
-    errors errors[2][2]; /* envelope, skinning; fitted, left out */
+    fitting_errors errors[2][2]; /* envelope, skinning; fitted, left out */
 } work;
-
-static bool is_left_out(const work *w, uint64_t i)
-{
-    return w->holdout && i % (uint64_t)w->holdout == (uint64_t)w->holdout - 1;
-}
 
 static void *room(size_t n, size_t size)
 {
@@ -75,62 +62,20 @@ static void *room(size_t n, size_t size)
 
 /* ---- poses ---- */
 
-/* Keeps every stride-th of the fitted poses; when there is no room, every second of these. */
-static void sample_pose(work *w, uint64_t i, const double *pose)
+static void look_for_reference(void *context, const fitting_batch *b)
 {
-    size_t bytes = 3 * w->h->body.mesh.nv * sizeof *pose;
-    if (is_left_out(w, i) || i % w->stride) return;
-    if (w->nsample == 2 * SAMPLE) {
-        size_t n = 0;
-        w->stride *= 2;
-        for (size_t k = 0; k < w->nsample; k++) {
-            if (w->sample_at[k] % w->stride == 0) {
-                w->sample_at[n] = w->sample_at[k];
-                double *kept = w->sample[k];
-                w->sample[k] = w->sample[n], w->sample[n++] = kept;
-            }
-        }
-        w->nsample = n;
-        if (i % w->stride) return;
-    }
-    double **to = &w->sample[w->nsample];
-    if (!*to) *to = room(3 * w->h->body.mesh.nv, sizeof **to);
-    w->sample_at[w->nsample++] = i;
-    memcpy(*to, pose, bytes);
+    work *w = context;
+    for (size_t i = 0; i < b->n && w->reference == w->poses.n; i++)
+        if (!memcmp(b->values[i], w->h->body.reference, 3 * w->h->body.mesh.nv * sizeof(double)))
+            w->reference = b->index[i];
 }
 
-static void read_poses(work *w, vg_source *s)
+static void read_poses(work *w, vg_source *s, long holdout)
 {
-    vg_err e;
-    vg_frame f = {0};
-    bool found = false;
-    if (vg_spool_new(&w->spool, w->h, in_memory, &e) < 0) cli_die(&e);
-    for (w->stride = 1; cli_next(s, &f); w->total++) {
-        if (vg_spool_put(w->spool, &f, &e) < 0) cli_die(&e);
-        if (!found && !memcmp(f.values, w->h->body.reference, 3 * w->h->body.mesh.nv * sizeof *f.values))
-            found = true, w->reference = w->total;
-        sample_pose(w, w->total, f.values);
-        cli_progress("poses", w->total + 1);
-    }
-    if (!found) w->reference = w->total;
-    vg_frame_clear(&f);
-    if (!w->total) cli_stop(VG_EINPUT, "the input has no poses to fit a rig to");
-}
-
-/* All poses once more, in batches; they go back into the spool. */
-static void pass(work *w, void (*step)(work *w, uint64_t first, size_t n, const vg_frame *frames))
-{
-    static vg_frame frames[BATCH];
-    vg_err e;
-    for (uint64_t first = 0; first < w->total;) {
-        size_t n = 0;
-        for (; n < BATCH && first + n < w->total; n++) {
-            int r = vg_spool_next(w->spool, &frames[n], &e);
-            if (r < 0 || vg_spool_put(w->spool, &frames[n], &e) < 0) cli_die(&e);
-        }
-        step(w, first, n, frames);
-        first += n;
-    }
+    fitting_collect(&w->poses, s, holdout, "fit a rig to");
+    w->reference = w->poses.n;
+    fitting_pass(&w->poses, NULL, look_for_reference, w);
+    w->nsample = fitting_sample(&w->poses, SAMPLE, w->sample_at, w->sample);
 }
 
 /* ---- the skeleton ---- */
@@ -186,7 +131,7 @@ static void locate_root(work *w, double *positions)
 {
     vg_err e;
     const motion *m = &w->given;
-    const double *poses[2 * SAMPLE], *at[2 * SAMPLE], *turns[2 * SAMPLE];
+    const double *poses[SAMPLE], *at[SAMPLE], *turns[SAMPLE];
     double shift[3], spread, d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
     size_t joints = m->skeleton.njoints;
     for (size_t i = 0; i < w->nsample; i++) {
@@ -236,15 +181,15 @@ static void place_skeleton(work *w)
     const motion *m = &w->given;
     size_t joints = m->skeleton.njoints;
     double *positions = room(3 * joints, sizeof *positions), *turns = room(4 * joints, sizeof *turns);
-    bool known = m->n == w->total && !rigging.learn;
+    bool known = m->n == w->poses.n && !rigging.learn;
     vg_skeleton_pose(&m->skeleton, NULL, positions, turns);
     if (!known && !rigging.learn && m->n > 1)
         cli_stop(VG_EINPUT,
-                 "'%s' has %zu frames and there are %llu poses: give one frame for each pose, or --learn the "
+                 "'%s' has %zu frames and there are %zu poses: give one frame for each pose, or --learn the "
                  "motion from the poses",
-                 rigging.skeleton, m->n, (unsigned long long)w->total);
-    if (known ? w->reference < w->total : m->n == 1) {
-        size_t frame = known ? (size_t)w->reference : 0;
+                 rigging.skeleton, m->n, w->poses.n);
+    if (known ? w->reference < w->poses.n : m->n == 1) {
+        size_t frame = known ? w->reference : 0;
         memcpy(positions, m->positions + 3 * joints * frame, 3 * joints * sizeof *positions);
         memcpy(turns, m->turns + 4 * joints * frame, 4 * joints * sizeof *turns);
     } else if (known && !rigging.has_root) {
@@ -308,26 +253,25 @@ static void find_bones(work *w)
 
 static vg_rig_fitter *fitter;
 
-static void measure_transforms(work *w, uint64_t first, size_t n, const vg_frame *frames)
+static void measure_transforms(work *w, const fitting_batch *b)
 {
     const vg_rig *r = &w->h->body.rig;
     size_t joints = r->skeleton.njoints;
-    const double *poses[BATCH];
-    for (size_t i = 0; i < n; i++) poses[i] = frames[i].values;
+    size_t first = b->index[0]; /* all poses take part: their numbers follow one another */
     if (w->inverse) {
-        vg_inverse_skin_fit(w->inverse, n, poses, w->transforms + first);
+        vg_inverse_skin_fit(w->inverse, b->n, b->values, w->transforms + first);
         return;
     }
     if (w->free) {
-        vg_free_bones_fit(w->free, n, poses, w->transforms + first);
+        vg_free_bones_fit(w->free, b->n, b->values, w->transforms + first);
         return;
     }
     double *positions = NULL, *turns = NULL;
     if (rigging.groups) positions = room(3 * joints, sizeof *positions), turns = room(4 * joints, sizeof *turns);
-    for (size_t i = 0; i < n; i++) {
-        size_t k = (size_t)first + i;
+    for (size_t i = 0; i < b->n; i++) {
+        size_t k = first + i;
         if (rigging.groups) {
-            vg_joint_groups_pose(&w->groups, w->h->body.reference, poses[i], positions, turns);
+            vg_joint_groups_pose(&w->groups, w->h->body.reference, b->values[i], positions, turns);
             vg_rig_transforms(r, positions, turns, w->transforms[k]);
         } else {
             vg_rig_transforms(r, w->given.positions + 3 * joints * k, w->given.turns + 4 * joints * k,
@@ -338,60 +282,40 @@ static void measure_transforms(work *w, uint64_t first, size_t n, const vg_frame
     free(turns);
 }
 
-static void fit_batch(work *w, uint64_t first, size_t n, const vg_frame *frames)
+static void fit_batch(void *context, const fitting_batch *b)
 {
-    const double *poses[BATCH], *transforms[BATCH];
+    work *w = context;
+    const double *poses[FITTING_BATCH], *transforms[FITTING_BATCH];
     size_t count = 0;
-    for (size_t i = 0; i < n; i++) w->transforms[first + i] = room(7 * w->h->body.rig.nbones, sizeof(double));
-    measure_transforms(w, first, n, frames);
-    for (size_t i = 0; i < n; i++) {
-        if (is_left_out(w, first + i)) continue;
-        poses[count] = frames[i].values, transforms[count++] = w->transforms[first + i];
+    for (size_t i = 0; i < b->n; i++)
+        w->transforms[b->index[i]] = room(7 * w->h->body.rig.nbones, sizeof(double));
+    measure_transforms(w, b);
+    for (size_t i = 0; i < b->n; i++) {
+        if (fitting_is_held_out(&w->poses, b->index[i])) continue;
+        poses[count] = b->values[i], transforms[count++] = w->transforms[b->index[i]];
     }
     vg_rig_fitter_add(fitter, count, poses, transforms);
-    cli_progress("poses fitted", first + n);
+    cli_progress("poses fitted", b->index[b->n - 1] + 1);
 }
 
 /* ---- the report ---- */
 
 static vg_player *players[2];
 
-static void compare(errors *x, const double *truth, const double *result, size_t nv)
+static void judge_batch(void *context, const fitting_batch *b)
 {
-    for (size_t v = 0; v < nv; v++) {
-        double square = 0;
-        for (size_t k = 0; k < 3; k++)
-            square += (truth[3 * v + k] - result[3 * v + k]) * (truth[3 * v + k] - result[3 * v + k]);
-        double far = sqrt(square);
-        x->sum += far / (double)nv, x->first[v] += far, x->second[v] += square;
-        if (far > x->most) x->most = far;
-    }
-    x->poses++;
-}
-
-static void judge_batch(work *w, uint64_t first, size_t n, const vg_frame *frames)
-{
-    static double *vertices[BATCH];
+    static double *vertices[FITTING_BATCH];
+    work *w = context;
     size_t nv = w->h->body.mesh.nv;
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < b->n; i++)
         if (!vertices[i]) vertices[i] = room(3 * nv, sizeof(double));
     for (int method = 0; method < 2; method++) {
         if (!players[method]) continue;
-        vg_player_pose(players[method], n, (const double *const *)w->transforms + first, vertices);
-        for (size_t i = 0; i < n; i++)
-            compare(&w->errors[method][is_left_out(w, first + i)], frames[i].values, vertices[i], nv);
+        vg_player_pose(players[method], b->n, (const double *const *)w->transforms + b->index[0], vertices);
+        for (size_t i = 0; i < b->n; i++)
+            fitting_compare(&w->errors[method][fitting_is_held_out(&w->poses, b->index[i])], b->values[i], vertices[i],
+                            nv, false);
     }
-}
-
-/* The largest over the vertices of the standard deviation over the poses (T 5.36). */
-static double sigma(const errors *x, size_t nv)
-{
-    double most = 0, n = (double)x->poses;
-    for (size_t v = 0; v < nv; v++) {
-        double mean = x->first[v] / n, variance = x->second[v] / n - mean * mean;
-        if (variance > most) most = variance;
-    }
-    return sqrt(most);
 }
 
 static void report(work *w)
@@ -409,17 +333,17 @@ static void report(work *w)
         vg_player_new(&players[1], &skinning, false, cli.threads, &e) < 0)
         cli_die(&e);
     for (int i = 0; i < 4; i++) {
-        errors *x = &w->errors[i / 2][i % 2];
+        fitting_errors *x = &w->errors[i / 2][i % 2];
         x->first = room(nv, sizeof *x->first), x->second = room(nv, sizeof *x->second);
     }
-    pass(w, judge_batch);
-    cli_say("%zu bones, %zu vertices, %llu poses; errors in 1e-3 D:  mean  sigma largest", w->h->body.rig.nbones, nv,
-            (unsigned long long)w->total);
+    fitting_pass(&w->poses, NULL, judge_batch, w);
+    cli_say("%zu bones, %zu vertices, %zu poses; errors in 1e-3 D:  mean  sigma largest", w->h->body.rig.nbones, nv,
+            w->poses.n);
     for (int i = 0; i < 4; i++) {
-        const errors *x = &w->errors[i / 2][i % 2];
+        const fitting_errors *x = &w->errors[i / 2][i % 2];
         if (x->poses)
-            cli_say("%-18s %6llu poses %#9.3g %#9.3g %#9.3g", names[i / 2][i % 2], (unsigned long long)x->poses,
-                    x->sum / (double)x->poses / d * 1e3, sigma(x, nv) / d * 1e3, x->most / d * 1e3);
+            cli_say("%-18s %6zu poses %#9.3g %#9.3g %#9.3g", names[i / 2][i % 2], x->poses, fitting_mean(x) / d * 1e3,
+                    fitting_sigma(x, nv) / d * 1e3, x->most / d * 1e3);
     }
     for (int i = 0; i < 2; i++) vg_player_free(&players[i]);
 }
@@ -433,8 +357,8 @@ static void fit(work *w, double hold)
                               .refine = rigging.refine,
                               .threads = cli.threads};
     if (vg_rig_fitter_new(&fitter, h, &o, &e) < 0) cli_die(&e);
-    w->transforms = room((size_t)w->total, sizeof *w->transforms);
-    pass(w, fit_batch);
+    w->transforms = room(w->poses.n, sizeof *w->transforms);
+    fitting_pass(&w->poses, NULL, fit_batch, w);
     if (vg_rig_fitter_finish(fitter, VG_RIG_LBS, &e) < 0) cli_die(&e);
     if (!by_skinning()) {
         w->skinning = h->map;
@@ -448,18 +372,18 @@ void rigging_run(vg_source *s, double hold, long holdout)
 {
     static work w; /* lives until the end: what it holds goes with the process */
     if (rigging.method == METHOD_NOT_GIVEN) rigging.method = rigging.bones ? VG_RIG_LBS : VG_RIG_ENVELOPE;
-    w.h = vg_source_head(s), w.holdout = holdout;
+    w.h = vg_source_head(s);
     if (w.h->body.skeleton.njoints) cli_stop(VG_EINPUT, "the input is a skeleton: vg-fitmap takes poses of a mesh");
     if (!w.h->body.mesh.nf) cli_stop(VG_EINPUT, "the input has no faces");
     vg_rig_clear(&w.h->body.rig);
     vg_map_clear(&w.h->map);
     if (rigging.skeleton) read_skeleton(&w);
-    read_poses(&w, s);
+    read_poses(&w, s, holdout);
     if (!w.nsample) cli_stop(VG_EINPUT, "all poses are left out of the fit: raise --holdout");
     if (rigging.groups) read_groups(&w);
     else if (rigging.bones) find_bones(&w);
     else place_skeleton(&w);
     fit(&w, hold);
     report(&w);
-    vg_spool_free(&w.spool);
+    fitting_clear(&w.poses);
 }

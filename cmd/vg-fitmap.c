@@ -1,8 +1,8 @@
 /* vg-fitmap: fit a map from the motions of patches or bones to the vertices of a body.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "fitting.h"
 #include "rigging.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -54,9 +54,6 @@ static const cli_program program = {
     .writes_map = true,
     .threaded = true};
 
-enum { BATCH = 32 };
-static const size_t in_memory = (size_t)256 << 20; /* bytes of poses that wait for the second pass */
-
 /* ---- fitting ---- */
 
 static void take_patches(vg_head *h)
@@ -79,118 +76,68 @@ static void take_patches(vg_head *h)
     vg_head_clear(&from);
 }
 
-static bool is_left_out(uint64_t i)
+typedef struct patch_fit {
+    const fitting *f;
+    vg_map_fitter *fitter;
+    vg_player *player;
+    double *transforms[FITTING_BATCH], *vertices[FITTING_BATCH];
+    fitting_errors errors[2][2]; /* given motions, rotations alone; fitted, left out */
+} patch_fit;
+
+static bool is_fitted(void *context, size_t i)
 {
-    return opts.holdout && i % (uint64_t)opts.holdout == (uint64_t)opts.holdout - 1;
+    return !fitting_is_held_out(((const patch_fit *)context)->f, i);
 }
 
-/* Poses that are fitted to go to the fitter; all go to the spool, for the report. */
-static uint64_t read_poses(vg_source *s, vg_map_fitter *f, vg_spool *spool)
+static void add_batch(void *context, const fitting_batch *b)
 {
-    static vg_frame frames[8];
-    const double *poses[8];
     vg_err e;
-    uint64_t total = 0;
-    size_t n = 0;
-    while (cli_next(s, &frames[n])) {
-        if (vg_spool_put(spool, &frames[n], &e) < 0) cli_die(&e);
-        cli_progress("poses", total + 1);
-        if (is_left_out(total++)) continue;
-        poses[n] = frames[n].values;
-        if (++n < 8) continue;
-        if (vg_map_fitter_add(f, n, poses, &e) < 0) cli_die(&e);
-        n = 0;
-    }
-    if (vg_map_fitter_add(f, n, poses, &e) < 0) cli_die(&e);
-    for (size_t i = 0; i < 8; i++) vg_frame_clear(&frames[i]);
-    return total;
+    if (vg_map_fitter_add(((patch_fit *)context)->fitter, b->n, b->values, &e) < 0) cli_die(&e);
 }
 
 /* ---- the report ---- */
 
-/* Sums over vertices of the distance between poses whose centroids have been laid on one another. */
-typedef struct errors {
-    double sum, most;
-    uint64_t poses;
-} errors;
-
-static void compare(errors *x, const double *truth, const double *result, size_t nv)
+static void judge_batch(void *context, const fitting_batch *b)
 {
-    double a[3], b[3];
-    vg_centroid(truth, nv, a);
-    vg_centroid(result, nv, b);
-    for (size_t v = 0; v < nv; v++) {
-        double square = 0;
-        for (size_t k = 0; k < 3; k++) {
-            double d = (truth[3 * v + k] - a[k]) - (result[3 * v + k] - b[k]);
-            square += d * d;
-        }
-        double far = sqrt(square);
-        x->sum += far / (double)nv;
-        if (far > x->most) x->most = far;
-    }
-    x->poses++;
-}
-
-typedef struct judging {
-    const vg_head *h;
-    vg_player *player;
-    vg_frame truth[BATCH];
-    double *transforms[BATCH], *vertices[BATCH];
-    errors x[2][2]; /* given motions, rotations alone; fitted, left out */
-} judging;
-
-static void judge_batch(judging *j, size_t n, uint64_t first)
-{
-    const double *truth[BATCH];
-    for (size_t i = 0; i < n; i++) truth[i] = j->truth[i].values;
-    vg_player_measure(j->player, n, truth, j->transforms);
+    patch_fit *x = context;
+    vg_player_measure(x->player, b->n, b->values, x->transforms);
     for (int way = 0; way < 2; way++) {
-        for (size_t i = 0; i < n && way == 1; i++) vg_player_place(j->player, j->transforms[i]);
-        vg_player_pose(j->player, n, (const double *const *)j->transforms, j->vertices);
-        for (size_t i = 0; i < n; i++)
-            compare(&j->x[way][is_left_out(first + i)], truth[i], j->vertices[i], j->h->body.mesh.nv);
+        for (size_t i = 0; i < b->n && way == 1; i++) vg_player_place(x->player, x->transforms[i]);
+        vg_player_pose(x->player, b->n, (const double *const *)x->transforms, x->vertices);
+        for (size_t i = 0; i < b->n; i++)
+            fitting_compare(&x->errors[way][fitting_is_held_out(x->f, b->index[i])], b->values[i], x->vertices[i],
+                            x->f->h->body.mesh.nv, true);
     }
 }
 
-static void describe(const errors *x, double d, const char *what, const char *which)
+static void describe(const fitting_errors *x, double d, const char *what, const char *which)
 {
     if (x->poses)
-        cli_say("%s, %s: mean error %.3g D, largest %.3g D, %llu poses", which, what, x->sum / (double)x->poses / d,
-                x->most / d, (unsigned long long)x->poses);
+        cli_say("%s, %s: mean error %.3g D, largest %.3g D, %zu poses", which, what, fitting_mean(x) / d, x->most / d,
+                x->poses);
 }
 
-static void report(const vg_head *h, vg_spool *spool)
+static void report(patch_fit *x)
 {
-    static judging j;
     vg_err e;
+    const vg_head *h = x->f->h;
     double d = vg_diagonal(h->body.reference, h->body.mesh.nv);
     if (cli.quiet || !(d > 0)) return;
-    j.h = h;
-    if (vg_player_new(&j.player, h, false, cli.threads, &e) < 0) cli_die(&e);
-    for (size_t i = 0; i < BATCH; i++) {
-        j.transforms[i] = cli_allocate(7 * h->map.n, sizeof(double), "the report");
-        j.vertices[i] = cli_allocate(3 * h->body.mesh.nv, sizeof(double), "the report");
+    if (vg_player_new(&x->player, h, false, cli.threads, &e) < 0) cli_die(&e);
+    for (size_t i = 0; i < FITTING_BATCH; i++) {
+        x->transforms[i] = cli_allocate(7 * h->map.n, sizeof(double), "the report");
+        x->vertices[i] = cli_allocate(3 * h->body.mesh.nv, sizeof(double), "the report");
     }
-    uint64_t first = 0;
-    int r;
-    do {
-        size_t n = 0;
-        while (n < BATCH && (r = vg_spool_next(spool, &j.truth[n], &e)) > 0) n++;
-        if (r < 0) cli_die(&e);
-        judge_batch(&j, n, first);
-        first += n;
-    } while (r > 0);
-    for (size_t i = 0; i < BATCH; i++) {
-        vg_frame_clear(&j.truth[i]);
-        free(j.transforms[i]);
-        free(j.vertices[i]);
+    fitting_pass(x->f, NULL, judge_batch, x);
+    for (size_t i = 0; i < FITTING_BATCH; i++) {
+        free(x->transforms[i]);
+        free(x->vertices[i]);
     }
-    vg_player_free(&j.player);
+    vg_player_free(&x->player);
     for (int left = 0; left < 2; left++) {
         const char *which = left ? "left out" : "fitted";
-        describe(&j.x[0][left], d, "patch motions given", which);
-        describe(&j.x[1][left], d, "rotations alone", which);
+        describe(&x->errors[0][left], d, "patch motions given", which);
+        describe(&x->errors[1][left], d, "rotations alone", which);
     }
 }
 
@@ -205,17 +152,17 @@ static void fit(vg_source *s)
     }
     take_patches(h);
     size_t before = h->body.patches.n;
-    vg_map_fitter *f;
-    vg_spool *spool;
-    if (vg_map_fitter_new(&f, h, opts.hold, cli.threads, &e) < 0 || vg_spool_new(&spool, h, in_memory, &e) < 0)
-        cli_die(&e);
+    fitting f;
+    patch_fit x = {.f = &f};
+    if (vg_map_fitter_new(&x.fitter, h, opts.hold, cli.threads, &e) < 0) cli_die(&e);
     if (h->body.patches.n != before)
         cli_note("%zu patches are in %zu pieces, each of which is a patch of the map", before, h->body.patches.n);
-    if (!read_poses(s, f, spool)) cli_stop(VG_EINPUT, "the input has no poses to fit a map to");
-    if (vg_map_fitter_finish(f, &e) < 0) cli_die(&e);
-    vg_map_fitter_free(&f);
-    report(h, spool);
-    vg_spool_free(&spool);
+    fitting_collect(&f, s, opts.holdout, "fit a map to");
+    fitting_pass(&f, is_fitted, add_batch, &x);
+    if (vg_map_fitter_finish(x.fitter, &e) < 0) cli_die(&e);
+    vg_map_fitter_free(&x.fitter);
+    report(&x);
+    fitting_clear(&f);
 }
 
 int main(int argc, char **argv)
