@@ -8,6 +8,7 @@
  *   vg/frames.h    head, artefacts, frames     vg/measures.h  errors, digest
  *   vg/vectors.h   the vector graph            vg/io.h        streams, mesh files, archives
  *   vg/markers.h   small text files            vg/view.h      pictures
+ *   vg/signal.h    continuous signals
  *
  * Conventions. Arrays of points and vectors are interleaved: xyzxyz... Index base is 0. Lengths are in the unit of
  * the mesh. D is the diagonal of the bounding box of the reference pose. Functions that can fail return an int:
@@ -33,6 +34,7 @@
 #include "vg/pairs.h"
 #include "vg/patches.h"
 #include "vg/rig.h"
+#include "vg/signal.h"
 #include "vg/measures.h"
 #include "vg/io.h"
 #include "vg/view.h"

@@ -72,14 +72,14 @@ int vgi_period(size_t n, size_t m, const double *x, double *period, vg_err *e)
 /* ---- positions ---- */
 
 /* Coordinates beside the shapes', n x MORE; how many. */
-static size_t further_coordinates(const vgi_layout *w, double period, size_t n, size_t m, const double *x, double *more)
+static size_t further_coordinates(const vg_layout_trial *w, double period, size_t n, size_t m, const double *x, double *more)
 {
     double size = 0, length = 0, weight = w->weight;
     for (size_t i = 0; i < n * m; i++) size += x[i] * x[i] / (double)n;
     size = sqrt(size);
     for (size_t i = 0; i < n; i++) {
         double phase = period > 0 ? 2 * M_PI * (double)i / period : 0, square = 0;
-        if (w->kind == VGI_RING) {
+        if (w->layout == VG_LAYOUT_RING) {
             more[MORE * i] = weight * size * cos(phase) / M_SQRT2;
             more[MORE * i + 1] = weight * size * sin(phase) / M_SQRT2;
             continue;
@@ -89,14 +89,14 @@ static size_t further_coordinates(const vgi_layout *w, double period, size_t n, 
         more[MORE * i] = length;
         more[MORE * i + 1] = 0;
     }
-    if (w->kind == VGI_TIME)
+    if (w->layout == VG_LAYOUT_TIME)
         for (size_t i = 0; i < n; i++) more[MORE * i] = length > 0 ? weight * size * (more[MORE * i] / length - 0.5) : 0;
     for (size_t c = 0; c < MORE; c++) {
         double mean = 0;
         for (size_t i = 0; i < n; i++) mean += more[MORE * i + c] / (double)n;
         for (size_t i = 0; i < n; i++) more[MORE * i + c] -= mean;
     }
-    return w->kind == VGI_RING ? 2 : w->kind == VGI_TIME ? 1 : 0;
+    return w->layout == VG_LAYOUT_RING ? 2 : w->layout == VG_LAYOUT_TIME ? 1 : 0;
 }
 
 /* The first three principal coordinates (n x 3) of shapes and further coordinates together. */
@@ -137,7 +137,7 @@ static int settle_freely(size_t n, const double *distance, const double *axes, d
 }
 
 /* Move p as a whole, mirrored or not, to where its pinned frames are nearest to their pins. */
-static void move_to_pins(size_t n, double *p, const vgi_pin *pins, size_t npins)
+static void move_to_pins(size_t n, double *p, const vg_pin *pins, size_t npins)
 {
     double a[2] = {0, 0}, b[2] = {0, 0}, plain[2] = {0, 0}, mirrored[2] = {0, 0};
     for (size_t i = 0; i < npins; i++)
@@ -158,7 +158,7 @@ static void move_to_pins(size_t n, double *p, const vgi_pin *pins, size_t npins)
     }
 }
 
-static int settle_pinned(size_t n, const double *distance, const vgi_pin *pins, size_t npins, double *p, vg_err *e)
+static int settle_pinned(size_t n, const double *distance, const vg_pin *pins, size_t npins, double *p, vg_err *e)
 {
     bool *held = vgi_array(n, sizeof *held, e);
     if (!held) return VG_ENOMEM;
@@ -172,7 +172,7 @@ static int settle_pinned(size_t n, const double *distance, const vgi_pin *pins, 
     return r;
 }
 
-int vgi_layout_make(const vgi_layout *layout, double period, size_t n, size_t m, const double *x, const vgi_pin *pins,
+int vgi_layout_make(const vg_layout_trial *layout, double period, size_t n, size_t m, const double *x, const vg_pin *pins,
                     size_t npins, double *p, vg_err *e)
 {
     int r = VG_ENOMEM;
@@ -180,7 +180,7 @@ int vgi_layout_make(const vgi_layout *layout, double period, size_t n, size_t m,
     double *axes = vgi_array(n, 3 * sizeof *axes, e), *best = vgi_array(n, 2 * sizeof *best, e), add[MORE];
     if (!distance || !more || !axes || !best) goto out;
     vgi_distances(n, m, x, m, distance);
-    size_t nmore = layout->kind == VGI_PLAIN ? 0 : further_coordinates(layout, period, n, m, x, more);
+    size_t nmore = layout->layout == VG_LAYOUT_PLAIN ? 0 : further_coordinates(layout, period, n, m, x, more);
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++) {
             for (size_t k = 0; k < MORE; k++) add[k] = more[MORE * i + k] - more[MORE * j + k];
@@ -224,7 +224,7 @@ static int prepare(judge *j, vg_err *e)
         vgi_plate_order(&j->plate, n, m, j->p, j->x, m, VGI_FARTHEST, e) < 0)
         goto out;
     vgi_natural_make(n, m, j->x, j->second, j->row);
-    vgi_plate_solve(&j->plate, j->plate.l, m, j->x, m, j->coefficients);
+    vgi_plate_solve(&j->plate, j->plate.apart, m, j->x, m, j->coefficients);
     for (size_t i = 0; i < n; i++) all[i] = (uint32_t)i;
     vgi_parameters(n, j->p, t);
     r = vgi_curve_fit(&j->curve, n, j->p, t, all, n, e);
@@ -242,7 +242,7 @@ static double between(size_t index) /* times i + 1/4, 1/2, 3/4 */
 /* Squares of the deviation at each time in between; returns the mean square of straight lines. */
 static double measure(judge *j, double *square)
 {
-    size_t n = j->n, m = j->m, l = j->plate.l, times = 3 * (n - 1);
+    size_t n = j->n, m = j->m, l = j->plate.apart, times = 3 * (n - 1);
     double straight = 0;
     for (size_t i = 0; i < times; i++) {
         double p[2];
@@ -293,13 +293,13 @@ int vgi_layout_judge(size_t n, size_t m, const double *x, const double *p, doubl
 typedef struct choice {
     size_t n, m;
     const double *x;
-    const vgi_pin *pins;
+    const vg_pin *pins;
     size_t npins;
     double period;
-    vgi_layout *tried;
+    vg_layout_trial *tried;
     double *p; /* 2 n for each of those tried */
     size_t first;
-    int status[VGI_LAYOUTS];
+    int status[VG_LAYOUT_TRIALS];
 } choice;
 
 static void try_one(void *context, size_t index)
@@ -312,14 +312,19 @@ static void try_one(void *context, size_t index)
         c->status[i] = vgi_layout_judge(c->n, c->m, c->x, p, &c->tried[i].ratio, NULL, NULL);
 }
 
-static size_t list_candidates(vgi_layout *list, double period)
+static size_t list_candidates(vg_layout_trial *list, double period, const vg_layout_trial *only)
 {
-    static const double times[] = {1, 1.5, 2, 3, 4, 6, 8, 12, 16, 24};
-    size_t count = 0;
-    list[count++] = (vgi_layout){.kind = VGI_PLAIN};
-    for (int c = 1; c <= 4 && period > 0; c++) list[count++] = (vgi_layout){.kind = VGI_RING, .weight = c};
-    for (size_t i = 0; i < sizeof times / sizeof *times; i++)
-        list[count++] = (vgi_layout){.kind = VGI_TIME, .weight = times[i]};
+    static const double rings[] = {1, 2, 3, 4}, times[] = {1, 1.5, 2, 3, 4, 6, 8, 12, 16, 24};
+    size_t count = 0, nrings = period > 0 ? sizeof rings / sizeof *rings : 0;
+    if (only && (only->weight > 0 || only->layout == VG_LAYOUT_PLAIN)) {
+        *list = *only;
+        return 1;
+    }
+    if (!only) list[count++] = (vg_layout_trial){.layout = VG_LAYOUT_PLAIN};
+    for (size_t i = 0; i < nrings && !(only && only->layout != VG_LAYOUT_RING); i++)
+        list[count++] = (vg_layout_trial){.layout = VG_LAYOUT_RING, .weight = rings[i]};
+    for (size_t i = 0; i < sizeof times / sizeof *times && !(only && only->layout != VG_LAYOUT_TIME); i++)
+        list[count++] = (vg_layout_trial){.layout = VG_LAYOUT_TIME, .weight = times[i]};
     return count;
 }
 
@@ -334,13 +339,17 @@ static size_t decide(const choice *c, size_t done, size_t count)
     return done == count ? best : SIZE_MAX;
 }
 
-int vgi_layout_choose(size_t n, size_t m, const double *x, const vgi_pin *pins, size_t npins, int threads, double *p,
-                      vgi_layout *chosen, double *period, vgi_layout *tried, size_t *ntried, vg_err *e)
+int vgi_layout_choose(size_t n, size_t m, const double *x, const vg_pin *pins, size_t npins,
+                      const vg_layout_trial *only, int threads, double *p, vg_layout_trial *chosen, double *period,
+                      vg_layout_trial *tried, size_t *ntried, vg_err *e)
 {
     choice c = {.n = n, .m = m, .x = x, .pins = pins, .npins = npins, .tried = tried};
     int r = vgi_period(n, m, x, &c.period, e);
-    size_t count = list_candidates(tried, c.period), found = SIZE_MAX, done = 0, wave = (size_t)threads;
-    if (r < 0 || !(c.p = vgi_array(2 * n * count, sizeof *c.p, e))) return VG_ENOMEM;
+    if (r < 0) return r;
+    if (only && only->layout == VG_LAYOUT_RING && !(c.period > 0))
+        return vg_fail(e, VG_EINPUT, "no cycle is found in these frames, so that there is no ring to lay them on");
+    size_t count = list_candidates(tried, c.period, only), found = SIZE_MAX, done = 0, wave = (size_t)threads;
+    if (!(c.p = vgi_array(2 * n * count, sizeof *c.p, e))) return VG_ENOMEM;
     vgi_blas_alone();
     while (found == SIZE_MAX && r == VG_OK) {
         c.first = done;

@@ -59,33 +59,23 @@ double vgi_plane_radius(size_t n, const double *p, double centre[2]);
 
 /* ---- layout.c: which distances ---- */
 
-typedef enum vgi_layout_kind { VGI_PLAIN, VGI_RING, VGI_TIME } vgi_layout_kind;
-typedef struct vgi_layout {
-    vgi_layout_kind kind;
-    double weight; /* of the ring or the time beside the shapes */
-    double ratio;  /* vgi_layout_judge's measure; NaN: not taken */
-} vgi_layout;
-typedef struct vgi_pin { /* a frame that the user has placed */
-    size_t frame;
-    double at[2];
-} vgi_pin;
-
 /* vgi_period: the length of a cycle in frames, 0: there is none. x: n x m. */
 int vgi_period(size_t n, size_t m, const double *x, double *period, vg_err *e) VG_MUST_CHECK;
 /* vgi_layout_make: positions p of rms radius 1, or with pins of about that, and the pins are met exactly. x: n x m
- * principal coordinates. period: for VGI_RING. */
-int vgi_layout_make(const vgi_layout *layout, double period, size_t n, size_t m, const double *x, const vgi_pin *pins,
+ * principal coordinates. period: for VG_LAYOUT_RING. */
+int vgi_layout_make(const vg_layout_trial *layout, double period, size_t n, size_t m, const double *x, const vg_pin *pins,
                     size_t npins, double *p, vg_err *e) VG_MUST_CHECK;
 /* vgi_layout_judge: rms distance of the chain of full fidelity at these positions from a cubic spline through the x, a
  * quarter, a half and three quarters between frames, beside that of straight lines. deviation (3 (n - 1) squares, may be
  * NULL): beside the mean square of straight lines. */
 int vgi_layout_judge(size_t n, size_t m, const double *x, const double *p, double *ratio, double *deviation,
                      vg_err *e) VG_MUST_CHECK;
-enum { VGI_LAYOUTS = 16 };
-/* vgi_layout_choose: the first candidate whose ratio is at most 0.6, or the best. tried: those that were judged, in
- * order; *ntried at most VGI_LAYOUTS. */
-int vgi_layout_choose(size_t n, size_t m, const double *x, const vgi_pin *pins, size_t npins, int threads, double *p,
-                      vgi_layout *chosen, double *period, vgi_layout *tried, size_t *ntried, vg_err *e) VG_MUST_CHECK;
+/* vgi_layout_choose: the first candidate whose ratio is at most 0.6, or the best. `only` (may be NULL): candidates of
+ * this layout, and of this weight unless it is 0. tried: those that were judged, in order; *ntried at most
+ * VG_LAYOUT_TRIALS. VG_EINPUT when a ring is asked for and there is no cycle. */
+int vgi_layout_choose(size_t n, size_t m, const double *x, const vg_pin *pins, size_t npins,
+                      const vg_layout_trial *only, int threads, double *p, vg_layout_trial *chosen, double *period,
+                      vg_layout_trial *tried, size_t *ntried, vg_err *e) VG_MUST_CHECK;
 
 typedef struct vgi_crossing {
     double a, b; /* times at which the curve is at the same place, a < b */
@@ -100,6 +90,8 @@ typedef struct vgi_plate {
     size_t anchors;  /* the first sites, whose functions are the linear ones: 3; 2 when all is on a line, 1 at a
                         point */
     size_t l;        /* sites */
+    size_t apart;    /* the first ones, which keep a distance from one another: between frames, near duplicates ruin
+                        the surface */
     size_t most;     /* sites that there is room for */
     double centre[2], scale; /* of the plane: what is computed with is (p - centre) / scale */
     double bary[9];  /* barycentric coordinates in the anchors are bary (3 x 3, row-major) times (1, x, y) */
@@ -140,9 +132,10 @@ typedef struct vgi_curve {
 
 /* vgi_parameters: centripetal parameters t of n points. */
 void vgi_parameters(size_t n, const double *p, double *t);
-/* vgi_monotone_slopes: Fritsch and Carlson's slopes of the monotone interpolant of y at 1, 2, ..., n. */
-void vgi_monotone_slopes(size_t n, const double *y, double *slope);
-double vgi_monotone_at(size_t n, const double *y, const double *slope, double x); /* x clamped to 1 .. n */
+/* vgi_monotone_slopes: Fritsch and Carlson's slopes of the monotone interpolant of y at places x; NULL: 1, 2, ..., n. */
+void vgi_monotone_slopes(size_t n, const double *x, const double *y, double *slope);
+/* vgi_monotone_at: at is clamped to the first and last place. */
+double vgi_monotone_at(size_t n, const double *x, const double *y, const double *slope, double at);
 /* vgi_curve_fit: least squares with natural ends; knots at the parameters of the frames `at` (count >= 2, ascending,
  * from 0 to n - 1): k = count + 2. n >= 2. */
 int vgi_curve_fit(vgi_curve *c, size_t n, const double *p, const double *t, const uint32_t *at, size_t count,

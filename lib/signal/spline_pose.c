@@ -13,7 +13,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double nearest = 1e-3;  /* sites keep this from one another: near duplicates ruin the surface */
+static const double nearest = 1e-3;  /* sites keep this from one another as long as there are others */
 static const double dependent = 1e-9; /* what is left of a function, beside it, that says nothing new */
 
 static double phi(double square)
@@ -194,19 +194,26 @@ static double write_function(const vgi_plate *s, size_t site, double *v, double 
     return sqrt(sum);
 }
 
-static bool near_others(const vgi_plate *s, size_t site)
+static bool near_others(const vgi_plate *s, size_t site, double apart)
 {
     for (size_t j = 0; j < s->l; j++)
-        if (square_between(s->p + 2 * site, s->p + 2 * s->site[j]) < nearest * nearest) return true;
+        if (square_between(s->p + 2 * site, s->p + 2 * s->site[j]) < apart * apart) return true;
     return false;
 }
 
 static bool add_site(vgi_plate *s, size_t site)
 {
-    if (s->l == s->most || near_others(s, site)) return false;
+    if (s->l == s->most) return false;
     double *lambda = s->weight + 3 * s->l, size = write_function(s, site, s->q + s->l * s->n, lambda);
     s->site[s->l] = (uint32_t)site;
     return orthogonalise(s, size);
+}
+
+static bool is_anchor(const vgi_plate *s, size_t site)
+{
+    for (size_t a = 0; a < s->anchors; a++)
+        if (s->site[a] == site) return true;
+    return false;
 }
 
 int vgi_plate_make(vgi_plate *s, size_t n, const double *p, const uint32_t *sites, size_t l, vg_err *e)
@@ -217,7 +224,9 @@ int vgi_plate_make(vgi_plate *s, size_t n, const double *p, const uint32_t *site
     }
     choose_anchors(s, sites, l);
     add_anchors(s);
-    for (size_t j = 0; j < l; j++) add_site(s, sites[j]); /* the anchors are near themselves */
+    for (size_t j = 0; j < l; j++)
+        if (!is_anchor(s, sites[j])) add_site(s, sites[j]);
+    s->apart = s->l;
     return VG_OK;
 }
 
@@ -312,6 +321,19 @@ static int start_gain(greedy *g, vg_err *e)
     return VG_OK;
 }
 
+/* All that keep `apart` from those before and say something new, one by one. */
+static void add_others(greedy *g, vgi_site_rule rule, double apart)
+{
+    vgi_plate *s = g->s;
+    for (size_t next; (next = rule == VGI_GAIN ? most_gain(g) : farthest(g)) != SIZE_MAX;) {
+        g->used[next] = true;
+        if (near_others(s, next, apart) || !add_site(s, next)) continue;
+        const double *v = s->q + (s->l - 1) * s->n;
+        take_out(g, v);
+        if (rule == VGI_GAIN) take_out_gain(g, v);
+    }
+}
+
 static int run(greedy *g, vgi_site_rule rule, vg_err *e)
 {
     vgi_plate *s = g->s;
@@ -320,13 +342,11 @@ static int run(greedy *g, vgi_site_rule rule, vg_err *e)
         g->used[s->site[j]] = true;
     }
     if (rule == VGI_GAIN && start_gain(g, e) < 0) return VG_ENOMEM;
-    for (size_t next; (next = rule == VGI_GAIN ? most_gain(g) : farthest(g)) != SIZE_MAX;) {
-        g->used[next] = true;
-        if (!add_site(s, next)) continue;
-        const double *v = s->q + (s->l - 1) * s->n;
-        take_out(g, v);
-        if (rule == VGI_GAIN) take_out_gain(g, v);
-    }
+    add_others(g, rule, nearest);
+    s->apart = s->l;
+    memset(g->used, 0, s->n * sizeof *g->used);
+    for (size_t j = 0; j < s->l; j++) g->used[s->site[j]] = true;
+    add_others(g, rule, 0);
     return VG_OK;
 }
 

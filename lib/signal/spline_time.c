@@ -24,35 +24,66 @@ void vgi_parameters(size_t n, const double *p, double *t)
     for (size_t i = 1; i < n; i++) t[i] = t[i - 1] + fmax(t[i], 1e-3 * mean);
 }
 
-void vgi_monotone_slopes(size_t n, const double *y, double *slope)
+static double place(const double *x, size_t i)
 {
-    if (n < 2) {
-        if (n) slope[0] = 0;
-        return;
-    }
-    for (size_t i = 1; i + 1 < n; i++) slope[i] = (y[i + 1] - y[i - 1]) / 2;
-    double first = y[1] - y[0], last = y[n - 1] - y[n - 2];
-    slope[0] = n > 2 ? (3 * first - (y[2] - y[1])) / 2 : first;
-    slope[n - 1] = n > 2 ? (3 * last - (y[n - 2] - y[n - 3])) / 2 : last;
-    for (size_t i = 0; i < n; i++) slope[i] = fmax(slope[i], 0);
-    for (size_t i = 0; i + 1 < n; i++)
-        if (!(y[i + 1] > y[i])) slope[i] = slope[i + 1] = 0;
-    for (size_t i = 0; i + 1 < n; i++) {
-        double rise = y[i + 1] - y[i];
-        if (!(rise > 0)) continue;
-        double a = slope[i] / rise, b = slope[i + 1] / rise, square = a * a + b * b;
-        if (square > 9) slope[i] = 3 / sqrt(square) * a * rise, slope[i + 1] = 3 / sqrt(square) * b * rise;
-    }
+    return x ? x[i] : (double)i + 1;
 }
 
-double vgi_monotone_at(size_t n, const double *y, const double *slope, double x)
+static double secant(const double *x, const double *y, size_t i)
 {
-    double s = fmin(fmax(x - 1, 0), (double)(n - 1));
-    size_t i = (size_t)s;
-    if (i + 1 >= n) return y[n - 1];
-    double h = s - (double)i, g = 1 - h;
-    if (h == 0) return y[i];
-    return y[i] * (1 + 2 * h) * g * g + slope[i] * h * g * g + y[i + 1] * h * h * (3 - 2 * h) - slope[i + 1] * h * h * g;
+    return (y[i + 1] - y[i]) / (place(x, i + 1) - place(x, i));
+}
+
+/* Slope at an end by the parabola through it and two more: h, d of the step there, g, c of the next. */
+static double end_slope(double h, double d, double g, double c)
+{
+    return ((2 * h + g) * d - h * c) / (h + g);
+}
+
+/* Not more than three times as steep as the secants, taken together. */
+static void limit_slopes(double d, double *left, double *right)
+{
+    if (!(d > 0)) {
+        *left = *right = 0;
+        return;
+    }
+    double a = *left / d, b = *right / d, square = a * a + b * b;
+    if (square > 9) *left = 3 / sqrt(square) * a * d, *right = 3 / sqrt(square) * b * d;
+}
+
+void vgi_monotone_slopes(size_t n, const double *x, const double *y, double *slope)
+{
+    if (n < 3) {
+        for (size_t i = 0; i < n; i++) slope[i] = n == 2 ? fmax(secant(x, y, 0), 0) : 0;
+        return;
+    }
+    for (size_t i = 0; i < n; i++) {
+        size_t j = i == 0 ? 0 : i + 1 < n ? i - 1 : n - 3;
+        double h = place(x, j + 1) - place(x, j), g = place(x, j + 2) - place(x, j + 1);
+        double d = secant(x, y, j), c = secant(x, y, j + 1);
+        slope[i] = i == 0 ? end_slope(h, d, g, c) : i + 1 < n ? (g * d + h * c) / (h + g) : end_slope(g, c, h, d);
+        slope[i] = fmax(slope[i], 0);
+    }
+    for (size_t i = 0; i + 1 < n; i++)
+        if (!(secant(x, y, i) > 0)) slope[i] = slope[i + 1] = 0;
+    for (size_t i = 0; i + 1 < n; i++) limit_slopes(secant(x, y, i), &slope[i], &slope[i + 1]);
+}
+
+double vgi_monotone_at(size_t n, const double *x, const double *y, const double *slope, double at)
+{
+    if (!(at > place(x, 0))) return y[0];
+    if (!(at < place(x, n - 1))) return y[n - 1];
+    size_t low = 0, high = n - 1;
+    if (!x) low = (size_t)at - 1, high = low + 1;
+    while (high - low > 1) {
+        size_t middle = (low + high) / 2;
+        if (at < x[middle]) high = middle;
+        else low = middle;
+    }
+    double width = place(x, high) - place(x, low), h = (at - place(x, low)) / width, g = 1 - h;
+    if (h == 0) return y[low];
+    return y[low] * (1 + 2 * h) * g * g + width * slope[low] * h * g * g + y[high] * h * h * (3 - 2 * h) -
+           width * slope[high] * h * h * g;
 }
 
 /* ---- the spline ---- */
@@ -104,7 +135,7 @@ static size_t basis_at(const double *knot, size_t k, double u, double b[4])
 
 double vgi_curve_parameter(const vgi_curve *c, double time)
 {
-    return vgi_monotone_at(c->n, c->t, c->slope, time);
+    return vgi_monotone_at(c->n, NULL, c->t, c->slope, time);
 }
 
 void vgi_curve_point(const vgi_curve *c, double parameter, double p[2])
@@ -226,7 +257,7 @@ static int make_room(vgi_curve *c, band *s, size_t n, const double *t, size_t mo
         !(c->control = vgi_array(most, 2 * sizeof *c->control, e)) ||
         !(s->r = vgi_array(most, 4 * sizeof *s->r, e)) || !(s->y = vgi_array(most, 2 * sizeof *s->y, e)))
         return VG_ENOMEM;
-    vgi_monotone_slopes(n, c->t, c->slope);
+    vgi_monotone_slopes(n, NULL, c->t, c->slope);
     return VG_OK;
 }
 

@@ -450,19 +450,19 @@ static void time_runs_forward(void)
     double p[2 * N] = {0}, t[N], slope[N], line[N];
     for (size_t i = 20; i < N; i++) p[2 * i] = noise() * (i % 5 == 0), p[2 * i + 1] = noise(); /* held at first */
     vgi_parameters(N, p, t);
-    vgi_monotone_slopes(N, t, slope);
+    vgi_monotone_slopes(N, NULL, t, slope);
     double before = -1;
     for (double x = 1; x <= N; x += 0.01) {
-        double y = vgi_monotone_at(N, t, slope, x);
+        double y = vgi_monotone_at(N, NULL, t, slope, x);
         CHECK(y > before);
         before = y;
     }
-    for (size_t i = 0; i < N; i++) CHECK_NEAR(vgi_monotone_at(N, t, slope, (double)i + 1), t[i], 0);
+    for (size_t i = 0; i < N; i++) CHECK_NEAR(vgi_monotone_at(N, NULL, t, slope, (double)i + 1), t[i], 0);
     for (size_t i = 0; i < N; i++) line[i] = 2 * (double)i;
-    vgi_monotone_slopes(N, line, slope);
-    CHECK_NEAR(vgi_monotone_at(N, line, slope, 7.3), 12.6, 1e-14);
-    CHECK_NEAR(vgi_monotone_at(N, line, slope, -3), 0, 0);
-    CHECK_NEAR(vgi_monotone_at(N, line, slope, 1e9), line[N - 1], 0);
+    vgi_monotone_slopes(N, NULL, line, slope);
+    CHECK_NEAR(vgi_monotone_at(N, NULL, line, slope, 7.3), 12.6, 1e-14);
+    CHECK_NEAR(vgi_monotone_at(N, NULL, line, slope, -3), 0, 0);
+    CHECK_NEAR(vgi_monotone_at(N, NULL, line, slope, 1e9), line[N - 1], 0);
 }
 
 /* Cubics whose second derivative is 0 at both ends come back; whole times give what was put in. */
@@ -491,13 +491,13 @@ static void layouts(void)
 {
     vgi_basis b = basis();
     double p[2 * N], period, ratio, deviation[3 * (N - 1)], sum = 0;
-    vgi_layout chosen, tried[VGI_LAYOUTS];
+    vg_layout_trial chosen, tried[VG_LAYOUT_TRIALS];
     size_t ntried;
     if (vgi_period(N, b.rank, b.x, &period, NULL) < 0) abort();
     CHECK_NEAR(period, 47, 0);
     for (int threads = 1; threads <= 3; threads++) {
-        if (vgi_layout_choose(N, b.rank, b.x, NULL, 0, threads, p, &chosen, &period, tried, &ntried, NULL) < 0) abort();
-        CHECK(ntried == 2 && chosen.kind == VGI_RING && chosen.weight == 1);
+        if (vgi_layout_choose(N, b.rank, b.x, NULL, 0, NULL, threads, p, &chosen, &period, tried, &ntried, NULL) < 0) abort();
+        CHECK(ntried == 2 && chosen.layout == VG_LAYOUT_RING && chosen.weight == 1);
         CHECK_NEAR(tried[0].ratio, 6.502477100937531, 2e-3);
         CHECK_NEAR(tried[1].ratio, 0.1287290426923371, 1e-4);
     }
@@ -506,8 +506,8 @@ static void layouts(void)
     for (size_t i = 0; i < 3 * (N - 1); i++) sum += deviation[i] / (3 * (N - 1));
     CHECK_NEAR(ratio, chosen.ratio, 1e-12);
     CHECK_NEAR(sum, ratio * ratio, 1e-12);
-    const vgi_pin pins[] = {{3, {2, 0.5}}, {40, {-1, 1}}, {11, {0, 0}}};
-    if (vgi_layout_choose(N, b.rank, b.x, pins, 3, 2, p, &chosen, &period, tried, &ntried, NULL) < 0) abort();
+    const vg_pin pins[] = {{3, {2, 0.5}}, {40, {-1, 1}}, {11, {0, 0}}};
+    if (vgi_layout_choose(N, b.rank, b.x, pins, 3, NULL, 2, p, &chosen, &period, tried, &ntried, NULL) < 0) abort();
     for (size_t i = 0; i < 3; i++) CHECK(p[2 * pins[i].frame] == pins[i].at[0] && p[2 * pins[i].frame + 1] == pins[i].at[1]);
     vgi_basis_clear(&b);
 }

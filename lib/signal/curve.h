@@ -1,0 +1,15 @@
+/* curve.h: the parts of a vg_signal as the numeric parts want them.
+ * Internal.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_SIGNAL_CURVE_H
+#define VG_SIGNAL_CURVE_H
+
+#include "signal/signal.h"
+
+/* vgi_signal_curve: its time signal, to be cleared; vgi_signal_set_curve: knots and control points of it. */
+int vgi_signal_curve(const vg_signal *s, vgi_curve *c, vg_err *e) VG_MUST_CHECK;
+int vgi_signal_set_curve(vg_signal *s, const vgi_curve *c, vg_err *e) VG_MUST_CHECK;
+/* vgi_signal_vector: basis vector j, d numbers, whatever precision it is kept with. */
+void vgi_signal_vector(const vg_signal *s, size_t j, double *h);
+
+#endif
