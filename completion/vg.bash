@@ -5,7 +5,7 @@
 # shellcheck shell=bash
 
 # what is read as a sequence: mesh files, whole sequences, archives, streams
-_vg_sequences='obj|ply|off|stl|bvh|glb|gltf|pc2|mdd|npy|npz|zip|7z|tar|tgz|txz|tar.*|xz|gz|zst|vgs|patches|map|rig'
+_vg_sequences='obj|ply|off|stl|bvh|glb|gltf|pc2|mdd|npy|npz|zip|7z|tar|tgz|txz|tar.*|xz|gz|zst|vgs|patches|map|rig|signal'
 
 # _vg_value PROGRAM OPTION: the place-holder of its value ("FILE", "pose|shape"); nothing when it takes none or is unknown
 _vg_value() {
@@ -111,5 +111,5 @@ _vg() {
     fi
 }
 
-complete -o filenames -F _vg vg-decode vg-deform vg-diff vg-encode vg-fitmap vg-info vg-interpolate vg-play vg-poisson vg-register \
-    vg-retarget vg-segment vg-solve vg-view
+complete -o filenames -F _vg vg-decode vg-deform vg-diff vg-encode vg-fitmap vg-fitsignal vg-info vg-interpolate vg-play vg-poisson vg-register \
+    vg-retarget vg-sample vg-segment vg-solve vg-view

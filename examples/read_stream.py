@@ -32,7 +32,7 @@ KINDS = {1: "vertices", 2: "vectors", 3: "deformations", 4: "transforms"}
 WIDTH = {"vertices": 3, "vectors": 3, "deformations": 4, "transforms": 7}
 LABEL_KINDS = {1: "object", 2: "group", 3: "material", 4: "smoothing", 5: "library"}
 NO_PARENT = 0xFFFFFFFF
-NEEDS = {**dict.fromkeys(("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP "), "MESH"), "SKIN": "RIG "}
+NEEDS = {**dict.fromkeys(("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP ", "SIGN"), "MESH"), "SKIN": "RIG "}
 TAG_BYTES = frozenset(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 ")
 
 
@@ -136,6 +136,32 @@ class Map:
 
 
 @dataclass
+class Signal:
+    """A sequence as continuous signals for time, pose and shape."""
+    n: int
+    space: int
+    d: int
+    m: int
+    bits: int
+    examples: bool
+    layout: int
+    numbers: array       # layout weight and ratio; errors of shape, pose, time, rms
+    mean: array
+    basis: array         # m x d; of 16 bits each pair of bytes as a number, in units
+    unit: array
+    coordinate: array    # n x m
+    position: array
+    site: array
+    parameter: array
+    knot: array
+    control: array
+    turn: array
+    shift: array
+    times: array
+    names: list
+
+
+@dataclass
 class Provenance:
     program: str
     version: str
@@ -174,6 +200,7 @@ class Stream:
     patches: object = None    # (count, array with the patch of each face)
     rig: object = None
     map: object = None
+    signal: object = None
     kind: str = ""
     precision: int = 0
     count: int = -1
@@ -732,6 +759,60 @@ class _Reader:
                               home if has_home else None, joint_at, joint_weight, corners, held_at, joints, held,
                               held_patch, per_corner, corner_bones)
 
+    def check_signal(self, p: _Payload, n: int, space: int, d: int, sites: int, k: int, bits: int, turns: int, layout: int):
+        if n < 2:
+            p.fail("it has fewer than 2 frames")
+        if k < 4:
+            p.fail("its curve has fewer than 4 control points")
+        if not 1 <= sites <= n:
+            p.fail("it has no sites, or more than frames")
+        if space != 1:
+            p.fail("its shape space is not known")
+        if d != 3 * self.stream.mesh.nv:
+            p.fail("its shapes are not of this mesh")
+        if bits not in (64, 32, 16):
+            p.fail("the precision of its basis is not known")
+        if turns:
+            p.fail("shapes of vertices have no turns")
+        if layout > 4:
+            p.fail("its layout is not known")
+
+    def sign(self, p: _Payload):
+        n, space, d, m, sites, k, bits = (p.u64() for _ in range(7))
+        rooted, timed, examples, turns, layout = p.flag(), p.flag(), p.flag(), p.u64(), p.word()
+        numbers, mean = p.f64s(6), p.f64s(d)
+        basis = array("d", [*p.f64s(m * d if bits == 64 else 0), *p.f64s(m * d if bits == 32 else 0, code="f")])
+        p.pad()
+        short = p.u8s(2 * m * d if bits == 16 else 0)
+        unit, coordinate, position = p.f64s(m if bits == 16 else 0), p.f64s(n * m), p.f64s(2 * n)
+        site, parameter, knot, control = p.u32s(sites), p.f64s(n), p.f64s(k + 2), p.f64s(2 * k)
+        turn, shift, _ = p.f64s(4 * n if rooted else 0), p.f64s(3 * n if rooted else 0), p.f64s(4 * turns)
+        times, names = p.f64s(n if timed else 0), p.texts(n)
+        p.end()
+        self.check_signal(p, n, space, d, sites, k, bits, turns, layout)
+        if any(not a < b for a, b in zip(parameter, parameter[1:])):
+            p.fail("its parameters do not rise")
+        if any(not a <= b for a, b in zip(knot, knot[1:])):
+            p.fail("its knots fall")
+        if not knot[2] < knot[k - 1]:
+            p.fail("its knots span nothing")
+        for what, numbers_ in (("a knot is too large", [*knot, *parameter]), ("a control point is too far away", control)):
+            if any(abs(x) > 1e100 for x in numbers_):
+                p.fail(what)
+        if any(x >= n for x in site):
+            p.fail("a site is no frame")
+        if len(set(site)) < sites:
+            p.fail("a frame is a site twice")
+        if any(abs(x) > 1e100 for x in position):
+            p.fail("a frame is too far away in the plane")
+        self.check_turns(p, turn)
+        if any(u <= 0 for u in unit):
+            p.fail("a unit of its basis is not positive")
+        if bits == 16:
+            basis = array("d", (int.from_bytes(bytes(short[i:i + 2]), "little", signed=True) for i in range(0, len(short), 2)))
+        self.stream.signal = Signal(n, space, d, m, bits, examples, layout, numbers, mean, basis, unit, coordinate, position,
+                                    site, parameter, knot, control, turn, shift, times, names)
+
     def form(self, p: _Payload):
         s = self.stream
         p.fits("it has a wrong length")
@@ -840,7 +921,7 @@ class _Reader:
 
     HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "SELE": sele, "LINK": link, "ANCH": anch,
                 "REFP": refp, "SKEL": skel, "CORR": corr, "PTCH": ptch,
-                "RIG ": rig, "SKIN": skin, "MAP ": map, "FORM": form, "SCAL": scal, "FRAM": fram, "FAIL": fail, "END ": end}
+                "RIG ": rig, "SKIN": skin, "MAP ": map, "SIGN": sign, "FORM": form, "SCAL": scal, "FRAM": fram, "FAIL": fail, "END ": end}
 
 
 def read_stream(file) -> Stream:
@@ -896,6 +977,12 @@ def _map_json(m: Map) -> dict:
             "held": list(m.held), "held_patch": list(m.held_patch)}
 
 
+def _signal_json(s: Signal) -> dict:
+    flat = {k: list(v) if isinstance(v, array) else v for k, v in vars(s).items() if k not in ("n", "d", "m")}
+    return dict(flat, basis=_rows(s.basis, s.d) if s.d else [], coordinate=_rows(s.coordinate, s.m) if s.m else [],
+                position=_rows(s.position, 2), control=_rows(s.control, 2), turn=_rows(s.turn, 4), shift=_rows(s.shift, 3))
+
+
 def to_json(s: Stream) -> dict:
     """The whole content as plain lists, dictionaries and numbers; what is absent is None."""
     m, t = s.mesh, s.texture
@@ -916,6 +1003,7 @@ def to_json(s: Stream) -> dict:
         "patches": s.patches and {"count": s.patches[0], "of_face": list(s.patches[1])},
         "rig": s.rig and _rig_json(s.rig),
         "map": s.map and _map_json(s.map),
+        "signal": s.signal and _signal_json(s.signal),
         "kind": s.kind, "precision": s.precision, "count": s.count,
         "extra": _extra_json(s.extra),
         "frames": [_frame_json(f, WIDTH[s.kind]) for f in s.frames],

@@ -89,6 +89,7 @@ types:
             '"RIG "': rig
             '"SKIN"': skin
             '"MAP "': map
+            '"SIGN"': sign
             '"FORM"': form
             '"SCAL"': scal
             '"FRAM"': fram
@@ -393,6 +394,43 @@ types:
         type: text
         repeat: expr
         repeat-expr: num_names
+  sign:
+    seq:
+      - id: num_frames
+        type: u8
+      - id: space
+        type: u8
+      - id: dimension
+        type: u8
+      - id: num_coordinates
+        type: u8
+      - id: num_sites
+        type: u8
+      - id: num_controls
+        type: u8
+      - id: basis_bits
+        type: u8
+      - id: has_root
+        type: u8
+      - id: has_times
+        type: u8
+      - id: of_examples
+        type: u8
+      - id: num_turns
+        type: u8
+      - id: layout
+        type: u8
+      - id: layout_and_errors
+        type: f8
+        repeat: expr
+        repeat-expr: 6
+      - id: mean
+        type: f8
+        repeat: expr
+        repeat-expr: dimension
+      - id: rest
+        size-eos: true
+        doc: basis, coordinates, positions, sites, parameters, knots, control points, root, turns, times, names (STREAM.md 3.20)
   form:
     seq:
       - id: kind

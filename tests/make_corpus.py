@@ -205,6 +205,17 @@ def fitted(m):
                   b"".join(map(text, m["names"])), CRITICAL)
 
 
+def signals(s):
+    n, m, d, bits = len(s["names"]), len(s["basis"]), len(s["mean"]), s["bits"]
+    head = u64(n, s["space"], d, m, len(s["site"]), len(s["control"]), bits, bool(s["turn"]), bool(s["times"]), s["examples"], 0,
+               s["layout"]) + f64(*s["numbers"], *s["mean"])
+    form = {64: "d", 32: "f", 16: "h"}[bits]
+    basis = pad(struct.pack(f"<{m * d}{form}", *flat(s["basis"])))
+    return Record("SIGN", head + basis + f64(*s["unit"], *flat(s["coordinate"]), *flat(s["position"])) + indices(*s["site"]) +
+                  f64(*s["parameter"], *s["knot"], *flat(s["control"]), *flat(s["turn"]), *flat(s["shift"]), *s["times"]) +
+                  b"".join(map(text, s["names"])), CRITICAL)
+
+
 def frame(c, f):
     name = f["name"].encode()
     flags = (f["time"] is not None) + 2 * (f["pins"] is not None) + 4 * (f["turns"] is not None)
@@ -253,6 +264,8 @@ def records_of(c):
             out.append(skin(c["rig"]["skin"]))
     if c["map"] is not None:
         out.append(fitted(c["map"]))
+    if c["signal"] is not None:
+        out.append(signals(c["signal"]))
     out += unknown(c["extra"])
     out.append(Record("FORM", u32(KINDS[c["kind"]], c["precision"]) + u64(c["count"]), CRITICAL))
     for f in c["frames"]:
@@ -289,7 +302,7 @@ def content(**changes):
         "minor": 0, "provenance": [], "mesh": {"vertices": 4, "faces": [[0, 1, 2], [0, 2, 3]]}, "texture": None,
         "labels": None, "selection": None, "links": None, "anchors": None,
         "reference": {"name": "rest", "positions": POINTS[:4]}, "skeleton": None, "correspondence": None,
-        "patches": None, "rig": None, "map": None,
+        "patches": None, "rig": None, "map": None, "signal": None,
         "kind": "vertices", "precision": 8, "count": 4, "extra": [],
         "frames": [pose("pose1", BENT[:4])], "tail": [],
     }
@@ -419,6 +432,17 @@ def map_content(home=False, corners=True, **changes):
     return content(links=[], frames=[], patches={"count": 2, "of_face": [0, 1]}, map=m, **changes)
 
 
+def signal_content(**changes):
+    """Two triangles at three times: two shape coordinates, three sites, a straight curve."""
+    s = {"space": 1, "bits": 64, "examples": False, "layout": 1, "numbers": [0, 0.25, 0, 0, 0, 0], "mean": flat(POINTS[:4]),
+         "basis": [[1] + [0] * 11, [0, 0, 0, 0, 1] + [0] * 7], "unit": [], "coordinate": [[-1, 0], [0, 0.5], [1, 0]],
+         "position": [[-1, 0], [0, 1], [1, 0]], "site": [2, 0, 1], "parameter": [0, 1, 2], "knot": [0, 0, 0, 2, 2, 2],
+         "control": [[-1, 0], [-0.25, 0.5], [0.25, 0.5], [1, 0]], "turn": [[1, 0, 0, 0]] * 3, "shift": [[0, 0, 0], [0, 0, 1], [0, 0, 2]],
+         "times": [0, 0.5, 1], "names": ["one", "tw\u00f6", ""]}
+    s.update(changes)
+    return content(frames=[], signal=s)
+
+
 NOTE = {"tag": "XNOT", "flags": COPY_SAFE, "payload": b"copied".hex()}
 FUTURE = {"tag": "X 1 ", "flags": COPY_SAFE | 0xABCD0000, "payload": bytes(range(8)).hex()}
 DROPPED = {"tag": "XTMP", "flags": 0, "payload": b"a filter drops this".hex()}
@@ -466,6 +490,7 @@ def golden():
         "patches": ("three faces in two patches", mixed(patches={"count": 2, "of_face": [1, 0, 1]})),
         "turns": ("a skeleton whose frame says how its joints have turned", skeleton_content(TURNED)),
         "map": ("two transforms, half of a quad each", map_content()),
+        "signal": ("three frames as signals", signal_content()),
         "rig": ("three bones that move the vertices of two triangles: their skin, and a map with two bones a corner",
                 bone_map_content()),
         "unknown-records": (
@@ -515,6 +540,9 @@ def accept():
         "correspondence-without-mesh": whole(content(mesh=None, reference=None, kind="transforms", count=0, frames=[],
                                                      correspondence=register_content()["correspondence"])),
         "correspondence-of-nothing": whole(content(correspondence={"source": nobody, "target": nobody, "faces": []})),
+        "sign-single": whole(signal_content(bits=32, times=[], turn=[], shift=[])),
+        "sign-int16": whole(signal_content(bits=16, unit=[1e-4, 2.5], basis=[[32767] + [0] * 11, [0, 0, -32768] + [0] * 9])),
+        "sign-no-coordinates": whole(signal_content(basis=[], coordinate=[[], [], []])),
         "map-with-home-and-names": whole(map_content(home=True)),
         "map-of-bones-one-per-corner": whole(bone_map_content(per_corner=1)),
         "map-of-bones-without-corners": whole(bone_map_content(corners=False)),
@@ -656,6 +684,7 @@ def reject_order():
     orphan = Record("PROV", u64(1, 0) + indices(0) + text("p") + text("1"), COPY_SAFE)
     late = Record("PROV", u64(0, 0) + text("p") + text("1"), COPY_SAFE)
     out.update({
+        "sign-before-mesh": whole(c, [signals(signal_content()["signal"]), of["MESH"], of["REFP"], of["FORM"]]),
         "rig-before-mesh": whole(c, [rig(rig_content()["rig"]), of["MESH"], of["REFP"], of["FORM"]]),
         "rig-twice": inserted(rig_content(), "FORM", rig(rig_content()["rig"])),
         "rig-after-map": whole(b, [by[t] for t in ("MESH", "LINK", "REFP", "MAP", "RIG", "SKIN", "FORM")]),
@@ -849,6 +878,29 @@ def reject_attachments():
         "map-of-bones-corner-bone": patched(b, "MAP ", -4, u32(3)),
         "map-of-bones-corner-zero": whole(dict(b, map=dict(b["map"], corners=[[0, 0, 0, 0]] * 12))),
         "map-of-bones-held-twice": whole(dict(b, map=dict(b["map"], held=[1, 1]))),
+        "sign-cut": lie(signal_content(), "SIGN", payload=lambda record: record.payload[:-8]),
+        "sign-long": lie(signal_content(), "SIGN", payload=lambda record: record.payload + bytes(8)),
+        "sign-frames-2-31": patched(signal_content(), "SIGN", 0, u64(1 << 31)),
+        "sign-space-9": whole(signal_content(space=9)),
+        "sign-dimension": whole(signal_content(mean=[0] * 9, basis=[[0] * 9] * 2)),
+        "sign-coordinates-2-63": patched(signal_content(), "SIGN", 24, u64(1 << 63)),
+        "sign-no-sites": whole(signal_content(site=[])),
+        "sign-site-twice": whole(signal_content(site=[2, 0, 2])),
+        "sign-site-out-of-range": whole(signal_content(site=[2, 0, 3])),
+        "sign-controls-3": whole(signal_content(control=[[0, 0]] * 3, knot=[0, 0, 1, 2, 2])),
+        "sign-controls-2-64-less-1": patched(signal_content(), "SIGN", 40, u64((1 << 64) - 1)),
+        "sign-bits-8": patched(signal_content(), "SIGN", 48, u64(8)),
+        "sign-flag": patched(signal_content(), "SIGN", 56, u64(2)),
+        "sign-turns": patched(signal_content(), "SIGN", 80, u64(1)),
+        "sign-layout-5": whole(signal_content(layout=5)),
+        "sign-mean-nan": whole(signal_content(mean=[NAN] * 12)),
+        "sign-parameters-fall": whole(signal_content(parameter=[0, 1, 1])),
+        "sign-knots-fall": whole(signal_content(knot=[0, 0, 0, 2, 2, 1])),
+        "sign-knots-of-no-length": whole(signal_content(knot=[0] * 6)),
+        "sign-control-far": whole(signal_content(control=[[0, 0], [0, 0], [0, 0], [0, 1e101]])),
+        "sign-position-far": whole(signal_content(position=[[0, 0], [0, 1e101], [1, 0]])),
+        "sign-turn-long": whole(signal_content(turn=[[1, 0.01, 0, 0]] * 3)),
+        "sign-unit-0": whole(signal_content(bits=16, unit=[1, 0])),
         "rig-cut": lie(g, "RIG ", payload=lambda record: record.payload[:-8]),
         "rig-long": lie(g, "RIG ", payload=lambda record: record.payload + bytes(8)),
         "rig-empty": lie(g, "RIG ", payload=b""),

@@ -77,6 +77,11 @@ void vg_map_clear(vg_map *m)
     vgi_fields_clear(&vgi_artefacts[VGI_MAP], m);
 }
 
+void vg_signal_clear(vg_signal *s)
+{
+    vgi_fields_clear(&vgi_artefacts[VGI_SIGN], s);
+}
+
 void vg_records_clear(vg_records *r)
 {
     for (size_t i = 0; i < r->n; i++) vg_bytes_clear(&r->at[i].payload);

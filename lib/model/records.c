@@ -182,6 +182,55 @@ static const vgi_member map_fields[] = {
     OPTIONAL(vg_map, U32, corner_bone, 1, map_corner_bones),
     OPTIONAL(vg_map, TEXT, names, 1, map_names)};
 
+LENGTH(signal_frames, vg_signal, a->n)
+LENGTH(signal_numbers, vg_signal, a->d)
+LENGTH(signal_basis, vg_signal, a->bits == 64 ? times(a->m, a->d) : 0)
+LENGTH(signal_basis_single, vg_signal, a->bits == 32 ? times(a->m, a->d) : 0)
+LENGTH(signal_basis_short, vg_signal, a->bits == 16 ? times(a->m, a->d) : 0)
+LENGTH(signal_units, vg_signal, a->bits == 16 ? a->m : 0)
+LENGTH(signal_coordinates, vg_signal, times(a->n, a->m))
+LENGTH(signal_sites, vg_signal, a->l)
+LENGTH(signal_knots, vg_signal, one_more(one_more(a->k)))
+LENGTH(signal_controls, vg_signal, a->k)
+LENGTH(signal_roots, vg_signal, a->rooted ? a->n : 0)
+LENGTH(signal_turns, vg_signal, a->nturns)
+LENGTH(signal_times, vg_signal, a->timed ? a->n : 0)
+static const vgi_member sign_fields[] = {
+    NUMBER(vg_signal, U64, n),
+    NUMBER(vg_signal, U64, space),
+    NUMBER(vg_signal, U64, d),
+    NUMBER(vg_signal, U64, m),
+    NUMBER(vg_signal, U64, l),
+    NUMBER(vg_signal, U64, k),
+    NUMBER(vg_signal, U64, bits),
+    NUMBER(vg_signal, U64, rooted),
+    NUMBER(vg_signal, U64, timed),
+    NUMBER(vg_signal, U64, examples),
+    NUMBER(vg_signal, U64, nturns),
+    NUMBER(vg_signal, U64, layout),
+    NUMBER(vg_signal, F64, layout_weight),
+    NUMBER(vg_signal, F64, layout_ratio),
+    NUMBER(vg_signal, F64, error_shape),
+    NUMBER(vg_signal, F64, error_pose),
+    NUMBER(vg_signal, F64, error_time),
+    NUMBER(vg_signal, F64, error_rms),
+    ARRAY(vg_signal, F64, mean, 1, signal_numbers),
+    OPTIONAL(vg_signal, F64, basis, 1, signal_basis),
+    OPTIONAL(vg_signal, F32, basis_single, 1, signal_basis_single),
+    OPTIONAL(vg_signal, U8, basis_short, 2, signal_basis_short),
+    OPTIONAL(vg_signal, F64, basis_unit, 1, signal_units),
+    ARRAY(vg_signal, F64, coordinate, 1, signal_coordinates),
+    ARRAY(vg_signal, F64, position, 2, signal_frames),
+    ARRAY(vg_signal, U32, site, 1, signal_sites),
+    ARRAY(vg_signal, F64, parameter, 1, signal_frames),
+    ARRAY(vg_signal, F64, knot, 1, signal_knots),
+    ARRAY(vg_signal, F64, control, 2, signal_controls),
+    OPTIONAL(vg_signal, F64, turn, 4, signal_roots),
+    OPTIONAL(vg_signal, F64, shift, 3, signal_roots),
+    OPTIONAL(vg_signal, F64, home_turn, 4, signal_turns),
+    OPTIONAL(vg_signal, F64, times, 1, signal_times),
+    ARRAY(vg_signal, TEXT, names, 1, signal_frames)};
+
 /* ---- the table ---- */
 
 #define IN_BODY(member) .in_body = true, .at = offsetof(vg_body, member)
@@ -222,4 +271,7 @@ const vgi_artefact vgi_artefacts[VGI_ARTEFACTS] = {
                   .check = vgi_check_skin},
     [VGI_MAP] = {.tag = "MAP ", .flags = VGI_CRITICAL, .name = "map", .advice = "make one with vg-fitmap",
                  .needs = "MESH", IN_HEAD(map), PRESENT(map.n), FIELDS(map_fields), .check = vgi_check_map},
+    [VGI_SIGN] = {.tag = "SIGN", .flags = VGI_CRITICAL, .name = "signal", .advice = "make one with vg-fitsignal",
+                  .needs = "MESH", IN_HEAD(signal), PRESENT(signal.n), FIELDS(sign_fields),
+                  .check = vgi_check_signal},
 };

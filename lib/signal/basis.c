@@ -31,7 +31,7 @@ void vgi_basis_clear(vgi_basis *b)
 typedef struct job {
     vgi_basis *b;
     const double *rows; /* of a Gram matrix */
-    size_t nrows;
+    size_t nrows, length;
     double *gram;
     const double *weight; /* rank x n: vectors = weight * centred */
     const double *factor; /* rank x rank, lower */
@@ -56,7 +56,7 @@ static size_t width_of(size_t d, size_t stripe)
 static void gram_tile(void *context, size_t index)
 {
     job *j = context;
-    size_t row = 0, n = j->nrows, d = j->b->d;
+    size_t row = 0, n = j->nrows, d = j->length;
     while ((row + 1) * (row + 2) / 2 <= index) row++;
     size_t column = index - row * (row + 1) / 2, i = row * TILE, k = column * TILE;
     size_t height = n - i < TILE ? n - i : TILE, width = n - k < TILE ? n - k : TILE;
@@ -64,11 +64,10 @@ static void gram_tile(void *context, size_t index)
     else vgi_product_double_transposed(height, width, d, j->rows + i * d, d, j->rows + k * d, d, j->gram + i * n + k, n);
 }
 
-/* the lower triangle, then all of it */
-static void gram(vgi_basis *b, const double *rows, size_t n, double *g, int threads)
+void vgi_gram(size_t n, size_t d, const double *rows, double *g, int threads)
 {
     size_t tiles = (n + TILE - 1) / TILE;
-    vgi_parallel(threads, tiles * (tiles + 1) / 2, gram_tile, &(job){.b = b, .rows = rows, .nrows = n, .gram = g});
+    vgi_parallel(threads, tiles * (tiles + 1) / 2, gram_tile, &(job){.rows = rows, .nrows = n, .length = d, .gram = g});
     for (size_t i = 0; i < n; i++)
         for (size_t k = i + 1; k < n; k++) g[i * n + k] = g[k * n + i];
 }
@@ -112,7 +111,7 @@ static int make_vectors(vgi_basis *b, double *weight, int threads, vg_err *e)
     double *g = vgi_array(rank * rank, sizeof *g, e);
     if (!g) return VG_ENOMEM;
     vgi_parallel(threads, stripes(b->d), multiply_stripe, &(job){.b = b, .weight = weight});
-    gram(b, b->vectors, rank, g, threads);
+    vgi_gram(rank, b->d, b->vectors, g, threads);
     bool definite = vgi_spd_factor(rank, g);
     if (definite) {
         vgi_parallel(threads, stripes(b->d), straighten_stripe, &(job){.b = b, .factor = g});
@@ -152,7 +151,7 @@ int vgi_basis_make(vgi_basis *b, double *poses, size_t n, size_t d, int threads,
     if (centre(b, e) < 0 || !(g = vgi_array(n * n, sizeof *g, e)) || !(weight = vgi_array(n * n, sizeof *weight, e)) ||
         !(b->value = vgi_array(n, sizeof *b->value, e)))
         goto out;
-    gram(b, poses, n, g, threads);
+    vgi_gram(n, d, poses, g, threads);
     if ((r = find_weights(b, g, weight, e)) < 0) goto out;
     r = VG_ENOMEM;
     size_t size;

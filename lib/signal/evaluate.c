@@ -76,8 +76,8 @@ static int take_basis(vg_sampler *p, vg_err *e)
     size_t size, batch;
     if (!vgi_mul(s->m, s->d, &size) || !vgi_mul(s->d, VG_SAMPLER_BATCH, &batch))
         return vg_fail(e, VG_ENOMEM, "a basis of %zu x %zu numbers is too large", s->m, s->d);
-    if (!p->single && s->bits == 64) p->basis = s->basis, p->borrowed = true;
-    else if (p->single && s->bits == 32) p->basis_single = s->basis_single, p->borrowed = true;
+    if (!p->single && s->bits == 64 && s->m) p->basis = s->basis, p->borrowed = true;
+    else if (p->single && s->bits == 32 && s->m) p->basis_single = s->basis_single, p->borrowed = true;
     else if (p->single) p->basis_single = vgi_array_raw(size, sizeof(float), e);
     else p->basis = vgi_array_raw(size, sizeof(double), e);
     double *row = vgi_array_raw(s->d, sizeof *row, e);

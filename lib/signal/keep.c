@@ -6,19 +6,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-void vg_signal_clear(vg_signal *s)
-{
-    double *arrays[] = {s->mean, s->basis, s->basis_unit, s->coordinate, s->position, s->parameter, s->knot, s->control,
-                        s->turn, s->shift, s->times};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
-    for (size_t i = 0; s->names && i < s->n; i++) free(s->names[i]);
-    free(s->names);
-    free(s->basis_single);
-    free(s->basis_short);
-    free(s->site);
-    *s = (vg_signal){0};
-}
-
 static int keep_short(vg_signal *s, const double *basis, vg_err *e)
 {
     size_t size = s->m * s->d;

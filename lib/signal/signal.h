@@ -34,6 +34,9 @@ typedef struct vgi_error {
 int vgi_basis_error(const vgi_basis *b, const double *x, size_t stride, size_t m, int threads, vgi_error *error,
                     vg_err *e) VG_MUST_CHECK;
 
+/* vgi_gram: g (n x n) := products of n rows of d numbers. Between vgi_blas_alone and _shared. */
+void vgi_gram(size_t n, size_t d, const double *rows, double *g, int threads);
+
 /* ---- natural.c: natural cubic splines through values at 1, 2, ..., n ---- */
 
 /* vgi_natural_make: second derivatives (n x w) of the spline through x (n x w). room: n numbers. */

@@ -5,6 +5,7 @@
 #define VG_PART_FRAMES_H
 
 #include "vg/body.h"
+#include "vg/signal.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -106,6 +107,7 @@ typedef struct vg_head {
     vg_correspondence correspondence; /* a stream of vg-register: mesh and reference are the source's, its frame is
                                          fitted to the target */
     vg_map map;           /* a stream of vg-fitmap */
+    vg_signal signal;     /* a stream of vg-fitsignal */
     bool has_selection;   /* only the faces `selected` (ascending) carry vectors; else all do */
     size_t nselected;
     uint32_t *selected;

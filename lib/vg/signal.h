@@ -50,9 +50,13 @@ typedef struct vg_signal {
     bool rooted;         /* the body's rigid motion is a signal of its own: */
     double *turn;        /* n unit quaternions, each nearer to the one before than its negative */
     double *shift;       /* n vectors */
+    size_t nturns;       /* of faces or corners; 0 in the space of vertices */
+    double *home_turn;   /* unit quaternions that the turns of a shape are counted from */
     char **names;        /* n: of the frames */
     bool timed;          /* the frames had times: */
     double *times;       /* n seconds */
+    bool examples;       /* the basis is of differences from the mean, which is a pose, to other poses, and not
+                            orthonormal */
     vg_layout layout;
     double layout_weight, layout_ratio; /* of the ring or time; deviation between frames beside that of straight
                                            lines */
@@ -111,6 +115,12 @@ int vg_signal_store(vg_signal *s, size_t bits, vg_err *e) VG_MUST_CHECK;
 /* vg_signal_floats: numbers that say the signal, and those of the poses, as C 3.4 counts them. */
 size_t vg_signal_floats(const vg_signal *s);
 
+/* vg_signal_pick: the `count` frames of n poses (n x 3 nv, destroyed: their rigid motion is taken out) by which the
+ * others are told best, each beside those before it. left: root of the share of the squared differences from the reference
+ * that is left then. */
+int vg_signal_pick(const vg_body *body, double *poses, size_t n, size_t count, int threads, uint32_t *frames, double *left,
+                   vg_err *e) VG_MUST_CHECK;
+
 /* Old times at which new frames are taken. */
 typedef struct vg_retime {
     size_t n;                 /* pairs, rising in both; 0: none */
@@ -127,6 +137,11 @@ double vg_retime_at(const vg_retime *r, double new_time);
  * VG_EINPUT names the line. On failure the signal is half edited. */
 int vg_signal_edit(vg_signal *s, vg_retime *retime, const char *text, size_t size, const char *name,
                    vg_err *e) VG_MUST_CHECK;
+
+/* vg_signal_sketch: positions of `frames` frames evenly along a curve: a cubic spline with these control points (at least
+ * 4), or the natural one through these points (at least 2). */
+int vg_signal_sketch(const double *points, size_t n, bool controls, size_t frames, double *positions,
+                     vg_err *e) VG_MUST_CHECK;
 
 /* Evaluates a signal. */
 typedef struct vg_sampler vg_sampler;

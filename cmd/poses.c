@@ -1,0 +1,43 @@
+/* poses.c: all poses of a sequence in memory.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "poses.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+poses poses_read(vg_source *s, size_t most)
+{
+    vg_frame f = {0};
+    const vg_head *h = vg_source_head(s);
+    poses p = {.numbers = h->count * vg_kind_width(h->kind)};
+    bool timed = true;
+    size_t cap = 0;
+    while (cli_next(s, &f)) {
+        cli_progress("poses", p.n + 1);
+        if (p.n == most)
+            cli_stop(VG_EINPUT, "there are more than %zu frames: take fewer with vg-encode --take, or one piece of the "
+                     "sequence after another", most);
+        if (p.n == cap) {
+            cap = cap ? 2 * cap : 32;
+            p.values = cli_resize(p.values, cap, p.numbers * sizeof *p.values, "the poses");
+            p.names = cli_resize(p.names, cap, sizeof *p.names, "the poses");
+            p.times = cli_resize(p.times, cap, sizeof *p.times, "the poses");
+        }
+        if (p.numbers) memcpy(p.values + p.n * p.numbers, f.values, p.numbers * sizeof *p.values);
+        p.names[p.n] = cli_copy_text(f.name ? f.name : "", "the poses");
+        timed = timed && f.has_time;
+        p.times[p.n++] = f.time;
+    }
+    if (!timed || !p.n) {
+        free(p.times);
+        p.times = NULL;
+    }
+    vg_frame_clear(&f);
+    return p;
+}
+
+void poses_name(poses *p, vg_signal *s)
+{
+    s->names = p->names, s->times = p->times, s->timed = p->times != NULL;
+    p->names = NULL, p->times = NULL;
+}

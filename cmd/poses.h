@@ -1,0 +1,20 @@
+/* poses.h: all poses of a sequence in memory, side by side, with their names and times.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_CMD_POSES_H
+#define VG_CMD_POSES_H
+
+#include "cli.h"
+
+typedef struct poses {
+    size_t n, numbers; /* poses, and numbers of each */
+    double *values;    /* n x numbers, from malloc */
+    char **names;
+    double *times;     /* n; NULL unless all have one */
+} poses;
+
+/* poses_read: to the end; stops when there are more than `most`. */
+poses poses_read(vg_source *s, size_t most);
+/* poses_name: names and times become the signal's. */
+void poses_name(poses *p, vg_signal *s);
+
+#endif

@@ -1,0 +1,264 @@
+/* vg-sample: give the poses of a signal, at any times, edited, along another curve.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "cli.h"
+#include "lines.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static struct {
+    const char *at, *retime, *edit, *curve;
+    double fps, speed;
+    long frames;
+} opts;
+
+static const cli_option options[] = {
+    {"at", 0, "LIST", "at these times: numbers, and ranges A:B:STEP, separated by commas; frame 1 is at time 1",
+     .text = &opts.at, .excludes = "frames|fps|speed|retime|curve"},
+    {"frames", 0, "N", "N frames, evenly from the first to the last", .integer = &opts.frames, .least = 1, .most = 1e9,
+     .excludes = "fps|speed"},
+    {"fps", 0, "RATE", "so many frames a second; the signal's frames have times", .number = &opts.fps, .least = 1e-6,
+     .most = 1e6, .excludes = "speed|curve"},
+    {"speed", 0, "X", "X times as fast: below 1 there are frames in between", .number = &opts.speed, .least = 1e-6,
+     .most = 1e6, .excludes = "curve"},
+    {"retime", 0, "FILE", "lines of an old and a new time: slow here, fast there", .text = &opts.retime, .reads = true,
+     .excludes = "curve"},
+    {"edit", 0, "FILE", "change the signal by these lines first: control, insert, remove, frame, site, time",
+     .text = &opts.edit, .reads = true},
+    {"curve", 0, "FILE", "poses along this curve through the plane: lines 'X Y' it goes through, or 'control X Y'",
+     .text = &opts.curve, .reads = true},
+    {.name = NULL}};
+
+static const cli_program program = {
+    .name = "vg-sample",
+    .synopsis = "[options] [FILE]",
+    .summary = "give the poses of a signal that vg-fitsignal has made, at any times",
+    .options = options,
+    .most_operands = 1,
+    .writes_stream = true};
+
+enum { MOST_FRAMES = 100000000 };
+
+/* What is sampled: at times, or at places of the plane. */
+typedef struct plan {
+    size_t n;
+    double *time, *place; /* one of them */
+} plan;
+
+static void add_time(plan *p, size_t *cap, double time)
+{
+    if (p->n == MOST_FRAMES) cli_stop(VG_EARG, "more than %d frames are asked for", MOST_FRAMES);
+    if (p->n == *cap) *cap = *cap ? 2 * *cap : 64, p->time = cli_resize(p->time, *cap, sizeof *p->time, "times");
+    p->time[p->n++] = time;
+}
+
+/* ---- at which times ---- */
+
+/* "A:B:STEP" or one number; false: it is neither. */
+static bool parse_range(char *text, double range[3])
+{
+    int n = 0;
+    for (char *part = text; part && n < 3; n++) {
+        char *colon = strchr(part, ':'), *end;
+        if (colon) *colon++ = 0;
+        range[n] = strtod(part, &end);
+        if (end == part || *end || !isfinite(range[n])) return false;
+        part = colon;
+        if (part && n == 2) return false;
+    }
+    if (n == 1) range[1] = range[0], range[2] = 1;
+    if (n == 2) range[2] = range[1] >= range[0] ? 1 : -1;
+    return range[2] != 0 && (range[1] - range[0]) * range[2] >= 0;
+}
+
+static void plan_list(plan *p, const vg_signal *s)
+{
+    char *list = cli_copy_text(opts.at, "times"), *next = list;
+    size_t cap = 0;
+    while (next) {
+        double range[3];
+        char *part = next;
+        if ((next = strchr(part, ','))) *next++ = 0;
+        if (!parse_range(part, range))
+            cli_usage("option '--at' needs times and ranges A:B:STEP, as in '1,4.5,10:20:0.25', not '%s'", opts.at);
+        for (size_t i = 0;; i++) {
+            double t = range[0] + (double)i * range[2];
+            if ((t - range[1]) * range[2] > 1e-9 * fabs(range[2]) * fabs(range[2])) break;
+            if (!(t >= 1 - 1e-9 && t <= (double)s->n + 1e-9))
+                cli_stop(VG_EARG, "there is no time %g: the signal goes from 1 to %zu", t, s->n);
+            add_time(p, &cap, t);
+        }
+    }
+    free(list);
+}
+
+static double seconds_between(const vg_signal *s)
+{
+    double all = s->timed ? s->times[s->n - 1] - s->times[0] : 0;
+    return all > 0 ? all / (double)(s->n - 1) : 0;
+}
+
+/* Evenly: how many old frames a step takes, from time 1 to the last, or through the retiming. */
+static void plan_even(plan *p, const vg_signal *s, const vg_retime *r)
+{
+    double first = r->n ? r->new_time[0] : 1, last = r->n ? r->new_time[r->n - 1] : (double)s->n, step = 1;
+    size_t cap = 0;
+    if (opts.speed > 0) step = opts.speed;
+    if (opts.fps > 0) {
+        double between = seconds_between(s);
+        if (!(between > 0)) cli_stop(VG_EINPUT, "the signal's frames have no times: --fps needs them (vg-encode --fps)");
+        step = 1 / (between * opts.fps);
+    }
+    if (opts.frames) step = opts.frames > 1 ? (last - first) / (double)(opts.frames - 1) : 1;
+    double count = opts.frames ? (double)opts.frames : floor((last - first) / step + 1e-9) + 1;
+    if (!(count <= MOST_FRAMES)) cli_stop(VG_EARG, "more than %d frames are asked for", MOST_FRAMES);
+    for (size_t i = 0; i < (size_t)count; i++) {
+        double t = fmin(first + (double)i * step, last);
+        add_time(p, &cap, r->n ? vg_retime_at(r, t) : t);
+    }
+}
+
+/* ---- files ---- */
+
+static void read_retime(vg_retime *r, const vg_signal *s)
+{
+    vg_err e;
+    lines l = lines_open(opts.retime);
+    double x[2];
+    while (lines_next(&l)) {
+        if (lines_numbers(&l, x, 2) != 2) lines_stop(&l, "an old and a new time are wanted");
+        if (!(x[0] >= 1 && x[0] <= (double)s->n)) lines_stop(&l, "time %g is not in the sequence, which is from 1 to %zu", x[0], s->n);
+        if (vg_retime_add(r, x[0], x[1], &e) < 0) lines_stop(&l, "%s", e.message);
+    }
+    if (r->n < 2) cli_stop(VG_EINPUT, "'%s' has fewer than two pairs of times", opts.retime);
+    lines_close(&l);
+}
+
+static void read_edits(vg_signal *s, vg_retime *r)
+{
+    vg_err e;
+    size_t size;
+    char *text = cli_read_file(opts.edit, &size);
+    if (vg_signal_edit(s, r, text, size, opts.edit, &e) < 0) cli_die(&e);
+    if (r->n == 1) cli_stop(VG_EINPUT, "'%s' has one line 'time': at least two say how time goes", opts.edit);
+    free(text);
+}
+
+static void plan_curve(plan *p, const vg_signal *s)
+{
+    vg_err e;
+    lines l = lines_open(opts.curve);
+    size_t n = 0, cap = 0, controls = 0;
+    double *point = NULL;
+    while (lines_next(&l)) {
+        bool control = lines_word(&l, "control");
+        if (n == cap) cap = cap ? 2 * cap : 64, point = cli_resize(point, cap, 2 * sizeof *point, "the curve");
+        if (lines_numbers(&l, point + 2 * n, 2) != 2) lines_stop(&l, "'X Y' or 'control X Y' is wanted");
+        controls += control;
+        if (controls != 0 && controls != n + 1) lines_stop(&l, "control points and points that the curve goes through are mixed");
+        n++;
+    }
+    p->n = opts.frames ? (size_t)opts.frames : s->n;
+    if (p->n > MOST_FRAMES) cli_stop(VG_EARG, "more than %d frames are asked for", MOST_FRAMES);
+    p->place = cli_allocate(p->n, 2 * sizeof *p->place, "the curve");
+    if (vg_signal_sketch(point, n, controls > 0, p->n, p->place, &e) < 0) cli_stop(e.code, "'%s': %s", opts.curve, e.message);
+    lines_close(&l);
+    free(point);
+}
+
+/* ---- sampling ---- */
+
+/* The name of the frame at or before the time, and how far behind it. */
+static void label(vg_frame *f, const vg_signal *s, const plan *p, size_t i)
+{
+    vg_err e;
+    char name[300];
+    f->has_time = false;
+    if (p->place) snprintf(name, sizeof name, "curve_%zu", i + 1);
+    else {
+        double t = p->time[i], whole = floor(t + 1e-9), rest = t - whole;
+        size_t at = (size_t)fmin(fmax(whole, 1), (double)s->n) - 1;
+        if (rest > 1e-9) snprintf(name, sizeof name, "%.250s+%.6g", s->names[at], rest);
+        else snprintf(name, sizeof name, "%.290s", s->names[at]);
+        double between = seconds_between(s);
+        if (opts.at || opts.frames || !s->timed) {
+            f->has_time = s->timed;
+            if (s->timed) f->time = s->times[at] + (at + 1 < s->n ? rest * (s->times[at + 1] - s->times[at]) : 0);
+        } else {
+            f->has_time = true;
+            f->time = s->times[0] + (double)i * (opts.fps > 0 ? 1 / opts.fps : between);
+        }
+    }
+    size_t cut = strlen(name);
+    while (cut && ((unsigned char)name[cut - 1] & 0xc0) == 0x80 && cut >= 290) name[--cut] = 0; /* no half letter */
+    if (vg_frame_rename(f, name, &e) < 0) cli_die(&e);
+}
+
+static void sample_batch(vg_sampler *sampler, const vg_signal *s, const plan *p, size_t first, size_t n, double *x,
+                         vg_frame *frames, size_t nv)
+{
+    double *shapes[VG_SAMPLER_BATCH], at[2];
+    for (size_t i = 0; i < n; i++) {
+        if (p->place) memcpy(at, p->place + 2 * (first + i), sizeof at);
+        else vg_sampler_position(sampler, p->time[first + i], at);
+        vg_sampler_coordinates(sampler, at, x + i * s->m);
+        shapes[i] = frames[i].values;
+    }
+    vg_sampler_shapes(sampler, n, x, shapes);
+    for (size_t i = 0; i < n; i++) {
+        if (p->time) vg_sampler_place(sampler, p->time[first + i], nv, shapes[i]);
+        label(&frames[i], s, p, first + i);
+        cli_stream_put(&frames[i]);
+        cli_progress("poses", first + i + 1);
+    }
+}
+
+static void sample(vg_head *h, const vg_signal *s, const plan *p)
+{
+    vg_err e;
+    static vg_frame frames[VG_SAMPLER_BATCH];
+    vg_sampler *sampler;
+    double *x = cli_allocate(VG_SAMPLER_BATCH, (s->m + 1) * sizeof *x, "coordinates");
+    if (vg_sampler_new(&sampler, s, h->precision == VG_F32, &e) < 0) cli_die(&e);
+    cli_stream_open(h);
+    for (size_t i = 0; i < VG_SAMPLER_BATCH; i++)
+        if (vg_frame_shape(&frames[i], h, &e) < 0) cli_die(&e);
+    for (size_t first = 0; first < p->n; first += VG_SAMPLER_BATCH) {
+        size_t n = p->n - first < VG_SAMPLER_BATCH ? p->n - first : VG_SAMPLER_BATCH;
+        sample_batch(sampler, s, p, first, n, x, frames, h->body.mesh.nv);
+    }
+    for (size_t i = 0; i < VG_SAMPLER_BATCH; i++) vg_frame_clear(&frames[i]);
+    vg_sampler_free(&sampler);
+    free(x);
+}
+
+int main(int argc, char **argv)
+{
+    char **operands;
+    size_t n = cli_start(&program, argc, argv, &operands);
+    vg_source *source = cli_source(operands, n);
+    vg_head *h = vg_source_head(source);
+    vg_frame frame = {0};
+    vg_retime retime = {0};
+    plan p = {0};
+    if (!h->signal.n) cli_stop(VG_EINPUT, "the input holds no signal: make one with vg-fitsignal");
+    while (cli_next(source, &frame)) continue; /* to the end, so that damage is seen; a signal has no frames */
+    vg_frame_clear(&frame);
+    vg_signal s = h->signal; /* the poses come without it */
+    h->signal = (vg_signal){0};
+    if (opts.edit) read_edits(&s, &retime);
+    if (opts.retime && retime.n) cli_usage("--retime and lines 'time' of --edit both say how time goes");
+    if (opts.retime) read_retime(&retime, &s);
+    if (opts.at) plan_list(&p, &s);
+    else if (opts.curve) plan_curve(&p, &s);
+    else plan_even(&p, &s, &retime);
+    sample(h, &s, &p);
+    cli_stream_end(vg_source_tail(source));
+    vg_retime_clear(&retime);
+    vg_signal_clear(&s);
+    free(p.time);
+    free(p.place);
+    vg_source_close(&source);
+    cli_finish(0);
+}

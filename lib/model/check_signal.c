@@ -1,0 +1,66 @@
+/* check_signal.c: what a signal must hold beside what every reader checks, so that it can be evaluated.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "model/artefact.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static const double farthest = 1e100; /* squares of distances in the plane are finite, and sums of them */
+
+static bool within(const double *x, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!(fabs(x[i]) <= farthest)) return false;
+    return true;
+}
+
+static const char *refuse_counts(const vg_signal *s, const vg_mesh *mesh)
+{
+    if (s->n < 2) return "it has fewer than 2 frames";
+    if (s->k < 4) return "its curve has fewer than 4 control points";
+    if (s->l < 1 || s->l > s->n) return "it has no sites, or more than frames";
+    if (s->space != VG_SPACE_VERTICES) return "its shape space is not known";
+    if (s->d != 3 * mesh->nv) return "its shapes are not of this mesh";
+    if (s->bits != 64 && s->bits != 32 && s->bits != 16) return "the precision of its basis is not known";
+    if (s->nturns) return "shapes of vertices have no turns";
+    if (s->layout > VG_LAYOUT_PLACED) return "its layout is not known";
+    return NULL;
+}
+
+static const char *refuse_curve(const vg_signal *s)
+{
+    for (size_t i = 0; i + 1 < s->n; i++)
+        if (!(s->parameter[i] < s->parameter[i + 1])) return "its parameters do not rise";
+    for (size_t i = 0; i <= s->k; i++)
+        if (!(s->knot[i] <= s->knot[i + 1])) return "its knots fall";
+    if (!(s->knot[2] < s->knot[s->k - 1])) return "its knots span nothing";
+    if (!within(s->knot, s->k + 2) || !within(s->parameter, s->n)) return "a knot is too large";
+    return within(s->control, 2 * s->k) ? NULL : "a control point is too far away";
+}
+
+static const char *refuse_sites(const vg_signal *s, bool *used)
+{
+    for (size_t i = 0; i < s->l; i++) {
+        if (s->site[i] >= s->n) return "a site is no frame";
+        if (used[s->site[i]]) return "a frame is a site twice";
+        used[s->site[i]] = true;
+    }
+    return within(s->position, 2 * s->n) ? NULL : "a frame is too far away in the plane";
+}
+
+int vgi_check_signal(vg_head *h, void *artefact, const char *where, vg_err *e)
+{
+    const vg_signal *s = artefact;
+    const char *why = refuse_counts(s, &h->body.mesh);
+    if (!why) why = refuse_curve(s);
+    if (!why) {
+        bool *used = vgi_array(s->n, sizeof *used, e);
+        if (!used) return VG_ENOMEM;
+        why = refuse_sites(s, used);
+        free(used);
+    }
+    if (!why && s->rooted && !vgi_are_turns(s->turn, s->n)) why = "a turn is no unit quaternion";
+    for (size_t j = 0; !why && s->bits == 16 && j < s->m; j++)
+        if (!(s->basis_unit[j] > 0)) why = "a unit of its basis is not positive";
+    return why ? vgi_wrong(where, why, e) : VG_OK;
+}

@@ -1,0 +1,243 @@
+#!/usr/bin/env bats
+# vg-fitsignal and vg-sample: the tolerance, options, times, edits, curves, and what is refused.
+# SPDX-License-Identifier: GPL-3.0-or-later
+load lib.bash
+bats_require_minimum_version 1.5.0
+
+setup_file() {
+    cd "$BATS_FILE_TMPDIR" || return 1
+    vg-encode --reference "$DATA/horse.rest.obj" "$DATA/horse-run.tar.xz" -o horse.vgs
+    vg-encode --fps 25 --reference "$DATA/trex.rest.obj" "$DATA/trex-walk.tar.xz" -o trex.vgs
+    vg-fitsignal -q horse.vgs -o horse.signal
+    vg-fitsignal -q trex.vgs -o trex.signal
+}
+
+horse() { echo "$BATS_FILE_TMPDIR/horse.$1"; }
+trex() { echo "$BATS_FILE_TMPDIR/trex.$1"; }
+
+# value KEY: of the report in JSON in $output
+value() { printf '%s' "$output" | python3 -c "import json, sys; print(json.load(sys.stdin)['$1'])"; }
+# within A B TOL: numbers
+within() { python3 -c "import sys; a, b, t = map(float, sys.argv[1:]); sys.exit(not abs(a - b) <= t)" "$@"; }
+# positions FILE: the poses as text, to be compared to the last bit
+positions() {
+    py "$1" <<'END'
+import sys
+from read_stream import read_stream
+for f in read_stream(sys.argv[1]).frames:
+    print(f.name, [x.hex() for x in f.values])
+END
+    printf '%s\n' "$output"
+}
+
+# k, l, m within 2 of those of the prototype (doc/MATH.md, section 11)
+fits_like() {
+    local signal=$1 tolerance=$2 k=$3 l=$4 m=$5
+    must vg-fitsignal -q --report - --json --tolerance "$tolerance" "$signal" -o out.signal
+    within "$(value control_points)" "$k" 2 && within "$(value sites)" "$l" 2 && within "$(value coordinates)" "$m" 2 || fail "$output"
+    python3 -c "import sys; sys.exit(not $(value error) <= $tolerance)" || fail "$output"
+}
+
+@test "control points, sites and coordinates are few, and the tolerance is kept" {
+    fits_like "$(horse vgs)" 1e-2 13 13 11
+    fits_like "$(horse vgs)" 5e-3 15 19 12
+    fits_like "$(horse vgs)" 1e-3 21 20 18
+    fits_like "$(trex vgs)" 1e-2 10 14 8
+    fits_like "$(trex vgs)" 5e-3 13 16 11
+    fits_like "$(trex vgs)" 1e-3 24 30 16
+    vg-sample out.signal | vg-diff -t 1e-3 "$(trex vgs)" -
+}
+
+@test "with as many of everything as there can be, frames come back; twice the same bytes with any threads" {
+    must vg-fitsignal -q -m 1000 -l 1000 -k 1002 -j 1 --no-provenance "$(trex vgs)" -o one.signal
+    must vg-fitsignal -q -m 1000 -l 1000 -k 1002 -j 3 --no-provenance "$(trex vgs)" -o three.signal
+    must cmp one.signal three.signal
+    vg-sample one.signal | vg-diff -t 1e-9 "$(trex vgs)" -
+}
+
+@test "--basis: bytes and errors" {
+    must vg-fitsignal -q -m 1000 -l 1000 -k 1002 --no-provenance "$(trex vgs)" -o double.signal
+    must vg-fitsignal -q -m 1000 -l 1000 -k 1002 --no-provenance --basis single "$(trex vgs)" -o single.signal
+    must vg-fitsignal -q -m 1000 -l 1000 -k 1002 --no-provenance --basis int16 "$(trex vgs)" -o short.signal
+    vg-sample single.signal | vg-diff -t 1e-6 "$(trex vgs)" -
+    vg-sample short.signal | vg-diff -t 2e-5 "$(trex vgs)" -
+    [ "$(stat -c %s single.signal)" -lt "$(stat -c %s double.signal)" ]
+    [ "$(stat -c %s short.signal)" -lt "$(stat -c %s single.signal)" ]
+    for s in double single short; do must vg-info --check $s.signal; done
+}
+
+@test "--root none keeps the body's motion in the shapes" {
+    must vg-fitsignal -q --root none -m 1000 -l 1000 -k 1002 "$(trex vgs)" -o none.signal
+    vg-sample none.signal | vg-diff -t 1e-9 "$(trex vgs)" -
+}
+
+@test "--pin is met exactly, --place is taken as it is" {
+    must vg-fitsignal -q --report - --json --pin 3=0.5,-0.25 --pin 10=-1,1 "$(horse vgs)" -o pinned.signal
+    printf '%s' "$output" | python3 -c "
+import json, sys
+f = json.load(sys.stdin)['frame_errors']
+assert (f[2]['x'], f[2]['y'], f[9]['x'], f[9]['y']) == (0.5, -0.25, -1, 1), f"
+    for i in $(seq 21); do echo "$((i % 5)) $((i * i % 7)) # frame $i"; done >places.txt
+    must vg-fitsignal -q --report - --json --place places.txt "$(horse vgs)" -o placed.signal
+    printf '%s' "$output" | python3 -c "
+import json, sys
+f = json.load(sys.stdin)['frame_errors']
+assert [(a['x'], a['y']) for a in f] == [(i % 5, i * i % 7) for i in range(1, 22)], f"
+    head -20 places.txt >short.txt
+    run -3 vg-fitsignal --place short.txt "$(horse vgs)" -o out.signal
+    [[ $output == *"'short.txt' places 20 frames of 21"* ]]
+    (cat places.txt && echo 1 2) >long.txt
+    run -3 vg-fitsignal --place long.txt "$(horse vgs)" -o out.signal
+    [[ $output == *"'long.txt' line 22: there are only 21 frames to place"* ]]
+    echo '1 x' >bad.txt
+    run -3 vg-fitsignal --place bad.txt "$(horse vgs)" -o out.signal
+    [[ $output == *"'bad.txt' line 1: two numbers are wanted"* ]]
+}
+
+@test "--layout, --sites; what does not exist is said" {
+    for layout in plain ring ring=2 time time=1.5 auto; do
+        must vg-fitsignal -q --report - --json --layout $layout "$(trex vgs)" -o out.signal
+        [ $layout = auto ] || [ "$(value layout)" = "${layout%=*}" ]
+    done
+    must vg-fitsignal -q --sites gain "$(trex vgs)" -o out.signal
+    vg-sample out.signal | vg-diff -t 1e-2 "$(trex vgs)" -
+    for layout in round ring=0 ring=x plain=2 time=; do
+        must_fail 2 vg-fitsignal --layout "$layout" "$(trex vgs)" -o out.vgs
+    done
+    must_fail 2 vg-fitsignal --pin 3=1 "$(trex vgs)" -o out.vgs
+    must_fail 2 vg-fitsignal --pin 0=1,1 "$(trex vgs)" -o out.vgs
+    must_fail 2 vg-fitsignal --pin 99=1,1 "$(trex vgs)" -o out.vgs
+    says 'there is no frame 99'
+    must_fail 3 vg-fitsignal "$DATA/horse.rest.obj" -o out.vgs
+    says 'a signal needs at least 2 frames, and there is 1'
+    must_fail 3 vg-sample "$(horse vgs)" -o out.vgs
+    says 'the input holds no signal: make one with vg-fitsignal'
+    [ ! -e out.vgs ]
+}
+
+@test "--pick names the frames that tell the others" {
+    must vg-fitsignal --pick 3 --json "$(trex vgs)"
+    printf '%s' "$output" | python3 -c "
+import json, sys
+f = json.load(sys.stdin)['frames']
+left = [a['left'] for a in f]
+assert len({a['frame'] for a in f}) == 3 and 1 > left[0] > left[1] > left[2] > 0, f"
+    must_fail 2 vg-fitsignal --pick 99 "$(trex vgs)"
+}
+
+@test "times: at, frames, speed, fps, and the names and times that come of them" {
+    must vg-sample "$(trex signal)" -o all.vgs
+    must vg-sample --at 1:34:0.25 "$(trex signal)" -o quarters.vgs
+    positions all.vgs >all.txt
+    positions quarters.vgs | awk 'NR % 4 == 1' >whole.txt
+    must cmp all.txt whole.txt # resampling at the same times changes nothing, in whatever company
+    must vg-sample --frames 34 "$(trex signal)" -o frames.vgs
+    positions frames.vgs | cmp - all.txt
+    must vg-sample --speed 0.25 "$(trex signal)" -o slow.vgs
+    positions slow.vgs | cmp - <(positions quarters.vgs)
+    must vg-sample --fps 50 "$(trex signal)" -o fast.vgs
+    py <<'END'
+from read_stream import read_stream
+f, s, a = (read_stream(n + ".vgs").frames for n in ("fast", "slow", "all"))
+assert len(f) == 67 and len(s) == 133 and len(a) == 34
+assert abs(f[1].time - f[0].time - 0.02) < 1e-12 and abs(s[1].time - s[0].time - 0.04) < 1e-12
+assert f[1].name == f[0].name + "+0.5" and f[2].name == a[1].name, (f[1].name, f[2].name)
+END
+    for at in 0 35 0.5:3:1 x 1:2:0 2:1:1 1:2:1:3 ''; do
+        must_fail 2 vg-sample --at "$at" "$(trex signal)" -o out.vgs
+    done
+    must_fail 3 vg-sample --fps 30 "$(horse signal)" -o out.vgs
+    says "the signal's frames have no times"
+}
+
+@test "--retime goes through its lines and never back" {
+    printf '1 1\n5 20 # slow\n34 40\n' >times.txt
+    must vg-sample --retime times.txt "$(trex signal)" -o out.vgs
+    must vg-sample "$(trex signal)" -o all.vgs
+    py <<'END'
+from read_stream import read_stream
+def place(f):
+    name, _, rest = f.name.partition("+")
+    return names.index(name) + float(rest or 0)
+a, r = read_stream("all.vgs").frames, read_stream("out.vgs").frames
+names = [f.name for f in a]
+assert len(r) == 40
+places = [place(f) for f in r]
+assert places == sorted(places) and abs(places[19] - 4) < 1e-5 and places[0] == 0 and places[39] == 33, places
+assert r[19].values == a[4].values
+END
+    printf '1 1\n5 0\n' >back.txt
+    must_fail 3 vg-sample --retime back.txt "$(trex signal)" -o out2.vgs
+    says "'back.txt' line 2: time 5 at new time 0"
+    printf '1 1\n50 9\n' >beyond.txt
+    must_fail 3 vg-sample --retime beyond.txt "$(trex signal)" -o out2.vgs
+    says "'beyond.txt' line 2: time 50 is not in the sequence"
+    printf '1 1\n' >one.txt
+    must_fail 3 vg-sample --retime one.txt "$(trex signal)" -o out2.vgs
+}
+
+@test "an edited control point changes the frames around it and no bit of the others" {
+    must vg-sample "$(trex signal)" -o all.vgs
+    echo 'control 5 2 -1' >edits.txt
+    must vg-sample --edit edits.txt "$(trex signal)" -o edited.vgs
+    positions all.vgs >a.txt
+    positions edited.vgs >b.txt
+    changed=$(diff a.txt b.txt | grep -c '^>')
+    [ "$changed" -gt 2 ] && [ "$changed" -lt 30 ] || fail "$changed frames are others"
+    printf 'insert 7.5\ninsert 20 # and one more\n\n' >more.txt
+    must vg-sample --edit more.txt "$(trex signal)" -o more.vgs
+    vg-diff -t 1e-12 all.vgs more.vgs
+    printf 'time 1 1\ntime 34 67\n' >slow.txt
+    must vg-sample --edit slow.txt "$(trex signal)" -o slow.vgs
+    must vg-sample --speed 0.5 "$(trex signal)" -o half.vgs
+    vg-diff -t 1e-12 slow.vgs half.vgs
+    for edit in 'frame 3 0.1 0.2' 'site 3' 'site -3' 'remove 4'; do
+        echo "$edit" >one.txt
+        capture vg-sample --edit one.txt "$(trex signal)" -o one.vgs
+        if [ "$status" = 3 ]; then says "frame 3 is no site"; else [ "$status" = 0 ]; fi
+    done
+}
+
+@test "every line of an edit that says nothing is named" {
+    for line in 'control 5' 'control 99 1 1' 'control 0 1 1' 'control 1.5 1 1' 'control 1 1 1 1' 'control 1 nan 1' 'control 1 1e999 1' \
+        'move 1 1 1' 'insert 1' 'insert 34' 'insert' 'remove 1' 'remove 2' 'remove 10' 'frame 99 1 1' 'frame 1 x 1' 'site 0' 'site 99' \
+        'time 0 1' 'time 1' $'control 1 1\x01 1'; do
+        printf '# a comment\n%s\n' "$line" >edits.txt
+        must_fail 3 vg-sample --edit edits.txt "$(trex signal)" -o out.vgs
+        says "'edits.txt' line 2: "
+    done
+    printf 'time 2 1\ntime 1 2\n' >edits.txt
+    must_fail 3 vg-sample --edit edits.txt "$(trex signal)" -o out.vgs
+    printf 'time 2 1\n' >edits.txt
+    must_fail 3 vg-sample --edit edits.txt "$(trex signal)" -o out.vgs
+    [ ! -e out.vgs ]
+}
+
+@test "--curve: through places of frames their shapes come; control points of a line give a line" {
+    must vg-fitsignal -q --report - --json --root none -m 1000 -l 1000 -k 1002 "$(trex vgs)" -o full.signal
+    printf '%s' "$output" | python3 -c "
+import json, sys
+for a in json.load(sys.stdin)['frame_errors'][2:9]: print(repr(a['x']), repr(a['y']))" >sketch.txt
+    must vg-sample --curve sketch.txt --frames 2 full.signal -o ends.vgs
+    vg-sample --at 3,9 full.signal | vg-diff -t 1e-9 - ends.vgs
+    printf 'control %s\n' '-1 0' '0 0' '1 0' '2 0' >line.txt
+    must vg-sample --curve line.txt --frames 3 full.signal -o line.vgs
+    printf '0 0\n0.5 0\n1 0\n' >points.txt
+    must vg-sample --curve points.txt --frames 3 full.signal -o points.vgs
+    vg-diff -t 1e-12 line.vgs points.vgs
+    printf 'control 1 1\n2 2\n' >mixed.txt
+    must_fail 3 vg-sample --curve mixed.txt full.signal -o out.vgs
+    says "'mixed.txt' line 2: control points and points that the curve goes through are mixed"
+    printf '1 1\n' >short.txt
+    must_fail 3 vg-sample --curve short.txt full.signal -o out.vgs
+    says 'a curve takes at least 2 points'
+}
+
+@test "a sequence that holds still, two frames, a single triangle" {
+    poses two 2
+    for i in 1 2 3 4; do cp pose1.obj same$i.obj; done
+    must vg-fitsignal -q same*.obj -o still.signal
+    vg-sample still.signal | vg-diff -t 1e-12 <(vg-encode same*.obj) -
+    must vg-fitsignal -q -k 4 -l 2 -m 1 pose1.obj pose2.obj -o two.signal
+    vg-sample two.signal | vg-diff -t 1e-9 <(vg-encode pose1.obj pose2.obj) -
+}
