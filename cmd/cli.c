@@ -317,6 +317,9 @@ vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o
     cli_expect_input(n);
     if (vg_source_open_with(&s, from, n ? n : 1, &options, &e) < 0) cli_die(&e);
     if (vg_source_warning(s)) cli_warn("%s", vg_source_warning(s));
+    const vg_head *h = vg_source_head(s);
+    if (h->kind == VG_OTHER && !cli.program->any_form)
+        cli_stop(VG_EINPUT, "the input holds '%s', a form of frames that this program does not know", vg_head_form(h));
     return upstream = s;
 }
 
@@ -335,7 +338,9 @@ void cli_need_vertices(const vg_head *h, const char *subject)
         [VG_DEFORMATIONS] = "apply them with 'vg-deform --onto MESH' and pipe that through 'vg-solve' first",
         [VG_TRANSFORMS] = "make vertices of them with 'vg-play MAP' first"};
     if (h->kind == VG_VERTICES) return;
-    cli_stop(VG_EINPUT, "%s holds %s: %s", subject, vg_kind_name(h->kind), advice[h->kind]);
+    bool known = h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS || h->kind == VG_TRANSFORMS;
+    cli_stop(VG_EINPUT, "%s holds %s: %s", subject, vg_head_form(h),
+             known ? advice[h->kind] : "vertices are needed here");
 }
 
 char *cli_read_file(const char *path, size_t *n)

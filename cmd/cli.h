@@ -48,6 +48,7 @@ typedef struct cli_program {
     bool writes_file;     /* has -o --output, whose bytes go through cli_text_open too */
     bool traces;          /* has --no-provenance also if its output is no stream: another one is */
     bool threaded;        /* has -j --threads */
+    bool any_form;        /* takes frames whose form nobody knows: it does not look into their values */
 } cli_program;
 
 /* What the shared options said. */

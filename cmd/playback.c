@@ -68,11 +68,11 @@ static void check_input(playback *p)
     if (p->kind == VG_VERTICES && h->body.skeleton.njoints) {
         take_skeleton(p);
     } else if (p->o->align) {
-        cli_usage("--align is for a skeleton that comes in, this input holds %s", vg_kind_name(p->kind));
+        cli_usage("--align is for a skeleton that comes in, this input holds %s", vg_head_form(h));
     } else if (p->kind == VG_VERTICES) {
         r = vg_mesh_same(&h->body.mesh, "the sequence", &p->map.body.mesh, name, &e);
     } else if (p->kind != VG_TRANSFORMS) {
-        r = vg_fail(&e, VG_EINPUT, "the input holds %s: vg-play takes vertices or transforms", vg_kind_name(p->kind));
+        r = vg_fail(&e, VG_EINPUT, "the input holds %s: vg-play takes vertices or transforms", vg_head_form(h));
     } else if (h->count != p->count) {
         r = vg_fail(&e, VG_EINPUT, "the input has %zu transforms a frame, the map %s takes %zu", h->count, name,
                     p->count);
@@ -120,9 +120,9 @@ static void take_transforms(playback *p, size_t n, const vg_frame *in, double *c
     const double *poses[BATCH] = {NULL};
     for (size_t i = 0; i < n; i++) poses[i] = in[i].values;
     for (size_t i = 0; i < n && p->driver; i++) {
-        const double *turns = in[i].turns;
-        size_t joint;
-        if (!in[i].nturns) {
+        size_t joint, known;
+        const double *turns = vg_frame_turns(&in[i], &known);
+        if (!known) {
             vg_joint_fitter_fit(p->fitter, poses[i], NULL, NULL, &joint);
             turns = vg_joint_fitter_turns(p->fitter);
         }

@@ -9,7 +9,7 @@ poses poses_read(vg_source *s, size_t most)
 {
     vg_frame f = {0};
     const vg_head *h = vg_source_head(s);
-    poses p = {.numbers = h->count * vg_kind_width(h->kind)};
+    poses p = {.numbers = h->count * vg_head_width(h)};
     bool timed = true;
     size_t cap = 0;
     while (cli_next(s, &f)) {

@@ -82,14 +82,14 @@ static void read_poses(work *w, vg_source *s, long holdout)
 
 static void keep_motion(motion *m, const vg_frame *f, vg_joint_fitter *fitter)
 {
-    size_t joints = m->skeleton.njoints, which;
-    const double *turns = f->turns;
+    size_t joints = m->skeleton.njoints, which, known;
+    const double *turns = vg_frame_turns(f, &known);
     if (m->n == m->cap) {
         m->cap = 2 * m->cap + 16;
         m->positions = cli_resize(m->positions, m->cap, 3 * joints * sizeof *m->positions, "the skeleton's motion");
         m->turns = cli_resize(m->turns, m->cap, 4 * joints * sizeof *m->turns, "the skeleton's motion");
     }
-    if (!f->nturns) {
+    if (!known) {
         vg_joint_fitter_fit(fitter, f->values, NULL, NULL, &which);
         turns = vg_joint_fitter_turns(fitter);
     }

@@ -104,7 +104,7 @@ static void set_root(work *w)
     if (opts.correspondence)
         cli_usage("--root V needs one connectivity: with --correspondence it is 'centroid' or 'stay'");
     if (w->kind != VG_VERTICES)
-        cli_usage("--root %u needs a sequence of vertices, this one holds %s", vertex[0], vg_kind_name(w->kind));
+        cli_usage("--root %u needs a sequence of vertices, this one holds %s", vertex[0], vg_head_form(w->h));
     free(w->h->anchors);
     w->h->anchors = vertex, w->h->nanchors = 1;
 }
@@ -132,7 +132,7 @@ static void finish_frame(work *w, vg_frame *in, vg_frame *out)
         vg_mover_move(w->mover, in, out);
     } else {
         memcpy(out->root, in->root, sizeof out->root);
-        if (w->h->nanchors) memcpy(out->anchors, in->anchors, 3 * w->h->nanchors * sizeof(double));
+        if (w->h->nanchors) memcpy(vg_frame_anchors(out), vg_frame_anchors(in), 3 * w->h->nanchors * sizeof(double));
     }
     if (w->way == SHAPE) vg_mover_place(w->mover, out->root, out->values);
     if (!w->pinner) return;
@@ -143,9 +143,12 @@ static void finish_frame(work *w, vg_frame *in, vg_frame *out)
 /* Frames of vertices carry neither root nor anchors: they are measured here, as vg-encode --vectors does. */
 static void fill_body(const work *w, vg_frame *f)
 {
+    vg_err e;
+    double *anchors;
     if (w->kind != VG_VERTICES) return;
     vg_graph_root(w->from, f->values, f->root);
-    vg_graph_anchors(f->values, w->h->anchors, w->h->nanchors, f->anchors);
+    if (vg_frame_make_anchors(f, w->h->nanchors, &anchors, &e) < 0) cli_die(&e);
+    vg_graph_anchors(f->values, w->h->anchors, w->h->nanchors, anchors);
 }
 
 static void deform_batch(void *context, size_t n, vg_frame *in)
@@ -184,13 +187,14 @@ static void warn_degenerate(void *context)
 static void check_kind(const work *w)
 {
     const char *advice = NULL;
-    if (w->kind == VG_TRANSFORMS) advice = "make vertices of them with 'vg-play MAP' first";
+    if (w->kind == VG_FEATURES || w->kind == VG_COORDINATES) advice = "vg-deform takes vertices, vectors or deformations";
+    else if (w->kind == VG_TRANSFORMS) advice = "make vertices of them with 'vg-play MAP' first";
     else if (w->kind == VG_DEFORMATIONS && !opts.onto) advice = "name the mesh to apply them to with --onto";
     else if (w->kind == VG_DEFORMATIONS && w->by != BY_POSE) advice = "they go --by pose only";
     else if (w->kind != VG_VERTICES && (w->by == BY_SHAPE || opts.correspondence))
         advice = "--by shape and --correspondence need vertices";
     if (!advice) return;
-    cli_stop(VG_EINPUT, "the input holds %s: %s", vg_kind_name(w->kind), advice);
+    cli_stop(VG_EINPUT, "the input holds %s: %s", vg_head_form(w->h), advice);
 }
 
 static void load_target(work *w)
@@ -283,7 +287,7 @@ static void make_followers(work *w)
     const vg_head *h = w->h;
     const vg_correspondence *pairs = opts.correspondence ? &w->pairs.correspondence : NULL;
     if (opts.pin_choice == PIN_ALWAYS && w->kind != VG_VERTICES)
-        cli_usage("--pin needs a sequence of vertices, this one holds %s", vg_kind_name(w->kind));
+        cli_usage("--pin needs a sequence of vertices, this one holds %s", vg_head_form(w->h));
     bool pins = w->kind == VG_VERTICES && (w->way == TRANSFER || w->way == CARRY) && opts.pin_choice != PIN_NONE;
     int r = VG_OK;
     if (opts.onto)

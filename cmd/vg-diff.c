@@ -159,8 +159,9 @@ static void put_heat(vg_frame *f, size_t nv, const double *errors, double diagon
 {
     const char *name = opts.centred ? "centred error" : "error", *unit = diagonal > 0 ? "D" : "";
     vg_err e;
-    if (vg_frame_scalars(f, name, unit, errors, nv, &e) < 0) cli_die(&e);
-    for (size_t v = 0; v < nv && diagonal > 0; v++) f->scalars[v] /= diagonal;
+    if (vg_frame_set_scalars(f, name, unit, errors, nv, &e) < 0) cli_die(&e);
+    double *scalars = vg_frame_scalars(f)->numbers;
+    for (size_t v = 0; v < nv && diagonal > 0; v++) scalars[v] /= diagonal;
     cli_stream_put(f);
 }
 

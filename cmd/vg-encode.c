@@ -40,6 +40,7 @@ static const cli_program program = {
     .options = options,
     .most_operands = SIZE_MAX,
     .writes_stream = true,
+    .any_form = true,
     .threaded = true};
 
 /* What was made on another reference pose, or on another choice of faces, is not true of the new one. */
@@ -98,9 +99,11 @@ static void apply_options(vg_head *h, bool selects, uint32_t *anchors, size_t na
 {
     if (h->kind != VG_VERTICES) {
         if (opts.vectors && h->kind == VG_VECTORS) opts.vectors = false;
+        if (opts.f32 && h->kind == VG_OTHER)
+            cli_stop(VG_EINPUT, "the input holds '%s': --f32 needs a form that this program knows", vg_head_form(h));
         if (opts.vectors || selects || opts.reference || opts.anchors)
             cli_stop(VG_EINPUT, "the input holds %s: --vectors, --faces, --reference and --anchor need vertices",
-                     vg_kind_name(h->kind));
+                     vg_head_form(h));
     } else {
         if (opts.reference) set_reference(h, opts.reference);
         if (selects) select_faces(h);
@@ -140,7 +143,7 @@ static vg_frame *to_vectors(work *w, vg_frame *in)
     if (vg_frame_label(out, in, &e) < 0) cli_die(&e);
     vg_graph_vectors(w->g, in->values, out->values);
     vg_graph_root(w->g, in->values, out->root);
-    vg_graph_anchors(in->values, w->h->anchors, w->h->nanchors, out->anchors);
+    vg_graph_anchors(in->values, w->h->anchors, w->h->nanchors, vg_frame_anchors(out));
     return out;
 }
 

@@ -32,18 +32,26 @@ static const cli_program program = {
     .options = options,
     .most_operands = 1,
     .writes_text = true,
+    .any_form = true,
 };
+
+/* A channel that frames bring. */
+typedef struct channel_note {
+    char *name, *unit, *element; /* of the first frame that has it */
+    size_t width;
+    uint64_t frames;
+    double least, most; /* numbers, or vertices of lists */
+} channel_note;
 
 /* What reading all frames tells. */
 typedef struct contents {
     uint64_t frames, timed, turned, extra; /* turned: that say how joints have turned; extra: unknown records before
                                               frames */
+    channel_note *channels;
+    size_t nchannels;
     char *first, *last;            /* names */
     double first_time, last_time;
     double D; /* of the first frame of vertices */
-    uint64_t scalars;              /* frames that bring them */
-    char *scalars_name, *scalars_unit; /* of the first of these */
-    double scalars_least, scalars_most;
     uint64_t digest;
 } contents;
 
@@ -51,6 +59,8 @@ static const report_column size_columns[] = {{.key = "size"}, {.key = "faces"}};
 static const report_column record_columns[] = {{.key = "tag"}, {.key = "bytes"}};
 static const report_column provenance_columns[] = {
     {.key = "program"}, {.key = "version"}, {.key = "args"}, {.key = "parents"}};
+static const report_column channel_columns[] = {{.key = "name"},   {.key = "unit"},  {.key = "element"}, {.key = "width"},
+                                                {.key = "frames"}, {.key = "least"}, {.key = "most"}};
 static const report_column vertex_columns[] = {
     {.key = "frame", .title = "frame"}, {.key = "name", .title = "name"},    {.key = "time", .title = "time"},
     {.key = "x", .title = "centroid x"}, {.key = "y", .title = "centroid y"}, {.key = "z", .title = "centroid z"}};
@@ -88,7 +98,7 @@ static void list_frame(report *r, const vg_head *h, const vg_frame *f, uint64_t 
         vg_centroid(f->values, h->count, at);
         for (int k = 0; k < 3; k++) row[3 + k] = report_number(at[k]);
     } else {
-        range_of(f->values, h->count * vg_kind_width(h->kind), &at[0], &at[1]);
+        range_of(f->values, h->count * vg_head_width(h), &at[0], &at[1]);
         for (int k = 0; k < 2; k++) row[3 + k] = report_number(at[k]);
     }
     report_row(r, row);
@@ -96,6 +106,7 @@ static void list_frame(report *r, const vg_head *h, const vg_frame *f, uint64_t 
 
 static void note_frame(contents *c, const vg_frame *f)
 {
+    size_t turned;
     if (c->frames == 0) replace_text(&c->first, f->name);
     replace_text(&c->last, f->name);
     if (f->has_time) {
@@ -103,22 +114,37 @@ static void note_frame(contents *c, const vg_frame *f)
         c->last_time = f->time;
         c->timed++;
     }
-    c->turned += f->nturns > 0;
+    vg_frame_turns(f, &turned);
+    c->turned += turned > 0;
     c->extra += f->extra.n;
     c->frames++;
 }
 
-static void note_scalars(contents *c, const vg_frame *f, size_t nv)
+static channel_note *note_of(contents *c, const vg_channel *channel)
 {
-    double least, most;
-    if (!f->has_scalars) return;
-    range_of(f->scalars, nv, &least, &most);
-    if (c->scalars++ == 0) {
-        replace_text(&c->scalars_name, f->scalars_name);
-        replace_text(&c->scalars_unit, f->scalars_unit);
-        c->scalars_least = least, c->scalars_most = most;
+    for (size_t i = 0; i < c->nchannels; i++)
+        if (!strcmp(c->channels[i].name, channel->name)) return &c->channels[i];
+    c->channels = cli_resize(c->channels, c->nchannels + 1, sizeof *c->channels, "the names of channels");
+    channel_note *n = &c->channels[c->nchannels++];
+    *n = (channel_note){.width = channel->width, .least = INFINITY, .most = -INFINITY};
+    n->name = cli_copy_text(channel->name, "the names of channels");
+    n->unit = cli_copy_text(channel->unit, "the names of channels");
+    n->element = cli_copy_text(channel->element_name, "the names of channels");
+    return n;
+}
+
+static void note_channels(contents *c, const vg_frame *f)
+{
+    for (size_t i = 0; i < f->nchannels; i++) {
+        const vg_channel *channel = &f->channels[i];
+        channel_note *n = note_of(c, channel);
+        size_t numbers = channel->width * channel->count;
+        for (size_t k = 0; k < numbers; k++) {
+            double x = channel->vertices ? channel->vertices[k] : channel->numbers[k];
+            n->least = fmin(n->least, x), n->most = fmax(n->most, x);
+        }
+        n->frames++;
     }
-    c->scalars_least = fmin(c->scalars_least, least), c->scalars_most = fmax(c->scalars_most, most);
 }
 
 /* Read to the end, which is what proves that the input is whole. `list` may be NULL. */
@@ -136,7 +162,7 @@ static void read_all(vg_source *s, contents *c, report *list)
         if (list) list_frame(list, h, &f, c->frames);
         if (c->frames == 0 && poses) c->D = vg_diagonal(f.values, h->count);
         note_frame(c, &f);
-        note_scalars(c, &f, h->body.mesh.nv);
+        if (!opts.digest && !opts.check) note_channels(c, &f);
         cli_progress("frame", c->frames);
     }
     cli_note("%" PRIu64 " frames read, and the end mark where there has to be one", c->frames);
@@ -149,11 +175,11 @@ static void read_all(vg_source *s, contents *c, report *list)
 static void report_frames(report *r, const vg_head *h, const contents *c)
 {
     char line[700];
-    size_t most = SIZE_MAX / 64, bytes = h->count < most ? h->count * vg_kind_width(h->kind) * h->precision : 0;
-    report_put(r, "kind", NULL, report_text(vg_kind_name(h->kind)));
+    size_t most = SIZE_MAX / 64, bytes = h->count < most ? h->count * vg_head_width(h) * h->precision : 0;
+    report_put(r, "kind", NULL, report_text(vg_head_form(h)));
     report_put(r, "precision", NULL, report_count(8 * h->precision));
     report_put(r, "elements", NULL, report_count(h->count));
-    snprintf(line, sizeof line, "%zu %s, binary%d", h->count, vg_kind_name(h->kind), 8 * (int)h->precision);
+    snprintf(line, sizeof line, "%zu %s, binary%d", h->count, vg_head_form(h), 8 * (int)h->precision);
     report_put(r, NULL, "a frame", report_text(line));
     report_put(r, "frame_bytes", "its bytes", report_count(bytes));
     report_put(r, "frames", NULL, report_count(c->frames));
@@ -170,23 +196,29 @@ static void report_frames(report *r, const vg_head *h, const contents *c)
     report_put(r, NULL, "times", report_text(line));
 }
 
-static void report_scalars(report *r, const contents *c)
+static void report_channels(report *r, const contents *c)
 {
-    char line[300];
-    if (!c->scalars) return;
-    int n = snprintf(line, sizeof line, "'%.100s' of each vertex in %" PRIu64 " of the frames", c->scalars_name,
-                     c->scalars);
-    if (c->scalars_least <= c->scalars_most) /* there are vertices */
-        snprintf(line + n, sizeof line - (size_t)n, ": %.6g to %.6g %.60s", c->scalars_least, c->scalars_most,
-                 c->scalars_unit);
-    report_put(r, NULL, "with them", report_text(line));
-    report_group(r, "scalars");
-    report_put(r, "name", NULL, report_text(c->scalars_name));
-    report_put(r, "unit", NULL, report_text(c->scalars_unit));
-    report_put(r, "frames", NULL, report_count(c->scalars));
-    report_put(r, "least", NULL, report_number(c->scalars_least));
-    report_put(r, "most", NULL, report_number(c->scalars_most));
-    report_end(r);
+    char line[400];
+    for (size_t i = 0; i < c->nchannels; i++) {
+        const channel_note *n = &c->channels[i];
+        if (!strcmp(n->name, "anchors") || !strcmp(n->name, "turns")) continue; /* mesh and skeleton say it */
+        int k = snprintf(line, sizeof line, "'%.100s' of each %.60s in %" PRIu64 " of the frames", n->name, n->element,
+                         n->frames);
+        if (n->least <= n->most) /* there is an element */
+            snprintf(line + k, sizeof line - (size_t)k, ": %.6g to %.6g %.60s", n->least, n->most, n->unit);
+        report_put(r, NULL, "with them", report_text(line));
+    }
+    if (!c->nchannels) return;
+    report_table(r, "channels", NULL, false, channel_columns, 7);
+    for (size_t i = 0; i < c->nchannels; i++) {
+        const channel_note *n = &c->channels[i];
+        bool some = n->least <= n->most;
+        report_value row[7] = {report_text(n->name), report_text(n->unit), report_text(n->element),
+                               report_count(n->width), report_count(n->frames),
+                               some ? report_number(n->least) : report_nothing(),
+                               some ? report_number(n->most) : report_nothing()};
+        report_row(r, row);
+    }
 }
 
 /* ------------------------------------------------------------------------------------------------ mesh -- */
@@ -522,7 +554,7 @@ static void report_all(report *r, const char *operand, const vg_head *h, const c
 {
     report_name(r, operand);
     report_frames(r, h, c);
-    report_scalars(r, c);
+    report_channels(r, c);
     report_mesh(r, h);
     report_correspondence(r, h, c->D);
     report_patches(r, h);

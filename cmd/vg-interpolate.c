@@ -65,7 +65,10 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     p->h = h, p->kind = h->kind;
     if (p->kind == VG_TRANSFORMS)
         cli_stop(VG_EINPUT, "the input holds transforms: interpolate them with 'vg-play MAP --interpolate N'");
-    p->numbers = p->h->count * vg_kind_width(p->kind);
+    if (p->kind == VG_FEATURES || p->kind == VG_COORDINATES)
+        cli_stop(VG_EINPUT, "the input holds %s: vg-interpolate takes vertices, vectors or deformations",
+                 vg_head_form(p->h));
+    p->numbers = p->h->count * vg_head_width(p->h);
     if (vg_head_prepare_vectors(p->h, &e) < 0 || vg_graph_new(&p->g, p->h, &e) < 0) cli_die(&e);
     p->h->kind = VG_VECTORS;
     p->h->count = vg_graph_corners(p->g);
@@ -89,7 +92,7 @@ static void keep(poses *p, const vg_frame *f)
         vg_graph_anchors(values, h->anchors, h->nanchors, anchors);
     } else {
         memcpy(k->root, f->root, sizeof k->root);
-        if (h->nanchors) memcpy(anchors, f->anchors, 3 * h->nanchors * sizeof *anchors);
+        if (h->nanchors) memcpy(anchors, vg_frame_anchors(f), 3 * h->nanchors * sizeof *anchors);
     }
     p->labels[p->n++] = (pose_key){cli_copy_text(f->name, "the key poses"), f->has_time, f->time};
 }
@@ -141,7 +144,7 @@ static void write_poses(const poses *p, vg_path *path)
     if (vg_frame_shape(&f, p->h, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < count; i++) {
         double t = pose_times_at(&opts.times, i, p->n);
-        if (vg_path_at(path, t, f.values, f.root, f.anchors, &e) < 0) cli_die(&e);
+        if (vg_path_at(path, t, f.values, f.root, vg_frame_anchors(&f), &e) < 0) cli_die(&e);
         key_label(&f, p->labels, p->n, t);
         check_finite(p, &f, t);
         cli_stream_put(&f);

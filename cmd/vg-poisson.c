@@ -193,8 +193,7 @@ static void guide(work *w, vg_frame *f, uint64_t n, bool last)
 {
     const double *given = find_given(w, n, f->name, last);
     vg_err e;
-    f->has_scalars = false; /* they are not those of where the vertices go */
-    f->nturns = 0; /* how joints turned goes with where they were */
+    vg_frame_drop_all(f); /* what came with the vertices is not true of where they go */
     if (given) {
         vg_guide_key(w->guide, n, f->values, given);
         w->begun = true;

@@ -155,13 +155,15 @@ static void solve_waiting(work *w)
 static uint32_t *unite(const work *w, const vg_frame *f, size_t *n)
 {
     const vg_head *h = w->h;
-    uint32_t *both = cli_allocate(h->nanchors + f->npins, sizeof *both, "a batch of poses");
+    size_t npins;
+    const uint32_t *pins = vg_frame_pins(f, &npins);
+    uint32_t *both = cli_allocate(h->nanchors + npins, sizeof *both, "a batch of poses");
     *n = 0;
-    for (size_t a = 0, p = 0; a < h->nanchors || p < f->npins;) {
-        bool anchor = p == f->npins || (a < h->nanchors && h->anchors[a] <= f->pins[p]);
-        uint32_t v = anchor ? h->anchors[a] : f->pins[p];
+    for (size_t a = 0, p = 0; a < h->nanchors || p < npins;) {
+        bool anchor = p == npins || (a < h->nanchors && h->anchors[a] <= pins[p]);
+        uint32_t v = anchor ? h->anchors[a] : pins[p];
         a += a < h->nanchors && h->anchors[a] == v;
-        p += p < f->npins && f->pins[p] == v;
+        p += p < npins && pins[p] == v;
         both[(*n)++] = v;
     }
     return both;
@@ -188,8 +190,9 @@ static void bring_to_front(work *w, size_t i)
 /* The machine for a frame. All poses of a batch share theirs, so a batch ends where pins change. */
 static const machine *machine_for(work *w, const vg_frame *f)
 {
-    if (f->npins == 0) return &w->plain;
     size_t n, i = 0;
+    vg_frame_pins(f, &n);
+    if (n == 0) return &w->plain;
     uint32_t *held = unite(w, f, &n);
     while (i < MACHINES &&
            !(w->pinned[i].solver && w->pinned[i].nheld == n && !memcmp(w->pinned[i].held, held, n * sizeof *held)))
@@ -220,9 +223,10 @@ static void place_held(const work *w, const machine *m, const vg_frame *f, waiti
         p->held_cap = 3 * m->nheld;
     }
     size_t a = 0;
+    const double *anchors = vg_frame_anchors(f);
     for (size_t i = 0; i < m->nheld; i++) {
         bool anchor = a < w->h->nanchors && w->h->anchors[a] == m->held[i];
-        const double *at = anchor ? f->anchors + 3 * a : w->h->body.reference + 3 * (size_t)m->held[i];
+        const double *at = anchor ? anchors + 3 * a : w->h->body.reference + 3 * (size_t)m->held[i];
         memcpy(p->held + 3 * i, at, 3 * sizeof *at);
         a += anchor;
     }
@@ -233,10 +237,12 @@ static void take_frame(work *w, size_t i, vg_frame *in)
 {
     vg_err e;
     const double *vectors = in->values;
+    double *anchors;
     if (w->kind == VG_VERTICES) {
+        if (vg_frame_make_anchors(in, w->h->nanchors, &anchors, &e) < 0) cli_die(&e);
         vg_graph_vectors(w->g, in->values, w->vectors[i]);
         vg_graph_root(w->g, in->values, in->root);
-        vg_graph_anchors(in->values, w->h->anchors, w->h->nanchors, in->anchors);
+        vg_graph_anchors(in->values, w->h->anchors, w->h->nanchors, anchors);
         vectors = w->vectors[i];
     }
     const machine *m = machine_for(w, in);
@@ -290,7 +296,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     w->h = h, w->kind = h->kind;
     if (w->kind != VG_VECTORS && w->kind != VG_VERTICES)
         cli_stop(VG_EINPUT, "the input holds %s, vg-solve takes vectors: apply them with 'vg-deform --onto MESH'",
-                 vg_kind_name(w->kind));
+                 vg_head_form(h));
     if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&w->g, h, &e) < 0) cli_die(&e);
     uint32_t *anchors = cli_allocate(h->nanchors, sizeof *anchors, "a batch of poses");
     if (h->nanchors) memcpy(anchors, h->anchors, h->nanchors * sizeof *anchors);

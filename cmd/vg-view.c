@@ -232,7 +232,7 @@ static bool next(side *s)
 {
     bool more = cli_next(s->source, &s->frame);
     s->frames += more;
-    s->coloured |= more && s->frame.has_scalars;
+    s->coloured |= more && vg_frame_scalars(&s->frame);
     return more;
 }
 

@@ -28,8 +28,12 @@ CRITICAL, COPY_SAFE, MUST_BE_ZERO = 1, 2, 0xFFFC
 LENGTH_LIMIT = 1 << 40
 INDEX_LIMIT = (1 << 32) - 1  # vertices and corners are fewer
 NO_TEXTURE = 0xFFFFFFFF
-KINDS = {1: "vertices", 2: "vectors", 3: "deformations", 4: "transforms"}
-WIDTH = {"vertices": 3, "vectors": 3, "deformations": 4, "transforms": 7}
+FORMS = {"vertices": ("vertex", 3), "vectors": ("corner", 3), "deformations": ("corner", 4), "transforms": ("transform", 7),
+         "features": ("vertex", None), "coordinates": ("frame", None)}  # element, width; None: any
+CHANNELS = {"time": ("frame", 1), "root": ("frame", 3), "anchors": ("anchor", 3), "pins": ("vertex list", 1),
+            "turns": ("joint", 4)}
+MOST_CHANNELS = 255
+INDICES, F32, F64 = 1, 4, 8  # Type of a channel
 LABEL_KINDS = {1: "object", 2: "group", 3: "material", 4: "smoothing", 5: "library"}
 NO_PARENT = 0xFFFFFFFF
 NEEDS = {**dict.fromkeys(("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP ", "SIGN"), "MESH"), "SKIN": "RIG "}
@@ -170,16 +174,59 @@ class Provenance:
 
 
 @dataclass
+class Channel:
+    """What comes with a frame beside its values: `width` numbers for each of `count` elements, or a list of vertices."""
+    name: str
+    unit: str
+    element: str
+    width: int
+    count: int
+    type: int      # INDICES, F32 or F64
+    values: array
+
+
+@dataclass
 class Frame:
     name: str
-    time: object  # seconds, or None
-    root: object  # [x, y, z] for vectors and deformations, else None
-    anchors: object  # array 'd', or None
     values: array
-    pins: object = None  # array: vertices that stay where the reference has them; None: no pins
-    turns: object = None  # array 'd': a unit quaternion for each joint of the skeleton; None: not known
+    channels: dict  # by name, in their order
     extra: list = field(default_factory=list)
-    scalars: object = None  # (name, unit, array with the number of each vertex), or None
+
+    def _of(self, name):
+        return self.channels[name].values if name in self.channels else None
+
+    @property
+    def time(self):
+        """Seconds, or None."""
+        return self._of("time")[0] if "time" in self.channels else None
+
+    @property
+    def root(self):
+        """[x, y, z] of frames on corners, else None."""
+        return list(self._of("root")) if "root" in self.channels else None
+
+    @property
+    def anchors(self):
+        """Positions; of frames on corners never None."""
+        return self._of("anchors") if "anchors" in self.channels or "root" not in self.channels else array("d")
+
+    @property
+    def pins(self):
+        """Vertices that stay where the reference has them; None: no pins."""
+        return self._of("pins")
+
+    @property
+    def turns(self):
+        """A unit quaternion for each joint of the skeleton; None: not known."""
+        return self._of("turns")
+
+    @property
+    def scalars(self):
+        """(name, unit, a number for each vertex): the first such channel; None: there is none."""
+        for c in self.channels.values():
+            if (c.element, c.width) == ("vertex", 1):
+                return c.name, c.unit, c.values
+        return None
 
 
 @dataclass
@@ -201,7 +248,9 @@ class Stream:
     rig: object = None
     map: object = None
     signal: object = None
-    kind: str = ""
+    kind: str = ""            # the form of frames by name
+    element: str = ""
+    width: int = 0
     precision: int = 0
     count: int = -1
     frames: list = field(default_factory=list)
@@ -441,7 +490,6 @@ class _Reader:
         self.input = _Input(file)
         self.stream = Stream()
         self.pending = []  # unknown records since the last frame
-        self.scalars = None  # what SCAL has said of the next frame
         self.seen = set()
         self.sums = bytearray()
         self.done = False
@@ -521,11 +569,7 @@ class _Reader:
         formed = "FORM" in self.seen
         if tag in ("FRAM", "END ") and not formed:
             raise StreamError("it has a frame before its FORM record" if tag == "FRAM" else "it has no FORM record")
-        if tag == "SCAL" and not formed:
-            raise StreamError("record SCAL must come after FORM")
-        if tag == "END " and self.scalars is not None:
-            raise StreamError("no frame comes behind the last SCAL record")
-        if tag in ("FRAM", "SCAL", "END ", "FAIL"):
+        if tag in ("FRAM", "END ", "FAIL"):
             return
         if formed:
             raise StreamError(f"record {tag} must come before FORM" if tag != "FORM" else "it has two FORM records")
@@ -813,96 +857,109 @@ class _Reader:
         self.stream.signal = Signal(n, space, d, m, bits, examples, layout, numbers, mean, basis, unit, coordinate, position,
                                     site, parameter, knot, control, turn, shift, times, names)
 
+    def elements(self, element: str):
+        """How many elements of that sort there are; None: that is not known."""
+        s = self.stream
+        m = s.mesh
+        return {"vertex": m.nv if m else 0, "corner": sum(map(len, s.graph())) if m else 0, "frame": 1,
+                "joint": len(s.skeleton or ()), "anchor": len(s.anchors or ()),
+                "transform": s.count if s.element == "transform" else None}.get(element)
+
     def form(self, p: _Payload):
         s = self.stream
+        s.kind, s.element = p.text(), p.text()
         p.fits("it has a wrong length")
-        kind, precision, s.count = p.u32(), p.u32(), p.u64()
+        s.width, s.count, s.precision = p.u64(), p.u64(), p.u64()
         p.end()
-        if kind not in KINDS:
-            p.fail("frames are of unknown kind")
-        if precision not in (4, 8):
+        if not s.kind:
+            p.fail("frames have no form")
+        if s.element == "vertex list":
+            p.fail("elements of frames are no lists")
+        element, width = FORMS.get(s.kind, (s.element, None))
+        if s.element != element or width not in (None, s.width):
+            p.fail("its elements or their width are not those of the form")
+        if s.precision not in (4, 8):
             p.fail("numbers are of unknown precision")
-        s.kind, s.precision = KINDS[kind], precision
+        self.fits_form(p)
+        s.extra, self.pending = self.pending, []
+
+    def fits_form(self, p: _Payload):
+        s = self.stream
         if s.map and len(s.map.corners) not in (0, 4 * s.map.per_corner * sum(map(len, s.graph()))):
             p.fail("the corners of record MAP do not fit the mesh")
         if s.map and s.map.kind == "patches" and (s.patches is None or s.patches[0] != len(s.map.centre) // 3):
             p.fail("record MAP has not as many patches as record PTCH")
-        if s.reference is None and (s.mesh is not None or s.kind != "transforms"):
+        if s.width == 0:
+            p.fail("its elements have no width")
+        if s.reference is None and (s.mesh is not None or s.element in ("vertex", "corner", "joint")):
             p.fail("a MESH and a REFP record must come before it")
-        if s.kind != "transforms":
-            if s.kind != "vertices" and s.links is None:
-                p.fail("a LINK record must come before it")
-            want = s.mesh.nv if s.kind == "vertices" else sum(map(len, s.graph()))
-            if s.count != want:
-                p.fail(f"its count does not fit the mesh: {s.count}, not {want}")
-        s.extra, self.pending = self.pending, []
+        if s.element == "corner" and s.links is None:
+            p.fail("a LINK record must come before it")
+        if self.elements(s.element) not in (None, s.count):
+            p.fail("its count does not fit its elements")
 
-    def pins(self, p: _Payload) -> array:
-        p.fits("its list of pins is cut or malformed")
-        n = p.u32()
-        if p.u32() or n == 0:
-            p.fail("its list of pins is cut or malformed")
-        pins = p.u32s(n)
-        for i, v in enumerate(pins):
-            if v >= self.stream.mesh.nv:
-                p.fail("an index is out of range")
-            if i and v <= pins[i - 1]:
-                p.fail("indices are not ascending")
-        return pins
+    def channel(self, p: _Payload, seen: dict) -> Channel:
+        name, unit, element = p.text(), p.text(), p.text()
+        width, count, kind = p.u64(), p.u64(), p.u64()
+        if not name:
+            p.fail("a channel has no name")
 
-    def scal(self, p: _Payload):
+        def fail(what):
+            p.fail(f"channel '{name}': {what}")
+        if name in seen:
+            fail("the frame has another one")
+        if width == 0:
+            fail("its elements have no width")
+        if (element == "vertex list") != (kind == INDICES):
+            fail("its type does not fit its elements")
+        if kind not in (INDICES, F32, F64):
+            fail("its type is unknown")
+        if kind == INDICES and width != 1:
+            fail("a list has one vertex for each element")
+        if self.elements(element) not in (None, count) or (kind == INDICES and count == 0):
+            fail("its count does not fit its elements")
+        if CHANNELS.get(name, (element, width)) != (element, width):
+            fail("its elements or their width are not those of its name")
         s = self.stream
-        p.where = f"record SCAL of frame {len(s.frames)}"
-        if s.kind != "vertices":
-            p.fail("frames are no vertices")
-        if self.scalars is not None:
-            p.fail("the frame has another one")
-        p.fits("it is too short, or reserved bytes are not zero")
-        name_length, unit_length = p.u32(), p.u32()
-        p.zero(8, "it is too short, or reserved bytes are")
-        if name_length == 0:
-            p.fail("it has no name")
-        name, unit = p.utf8(name_length), p.utf8(unit_length)
-        p.pad()
-        p.fits("its length does not fit the number of vertices")
-        self.scalars = (name, unit, p.f64s(s.mesh.nv, "a number", "d" if s.precision == 8 else "f"))
-        p.end()
+        if (name in ("root", "anchors") and s.element != "corner") or (name == "pins" and s.kind != "vectors") or \
+                (name == "turns" and (s.kind != "vertices" or not s.skeleton)):
+            fail("it does not go with these frames")
+        if width * count * (8 if kind == F64 else 4) > p.left():
+            fail("it is shorter than its counts say")
+        if kind == INDICES:
+            values = self.ascending(p, p.u32s(count), s.mesh.nv if s.mesh else 0)
+        else:
+            values = p.f64s(width * count, f"channel '{name}': a number", "d" if kind == F64 else "f")
+            p.pad()
+        if name == "turns":
+            self.check_turns(p, values)
+        return Channel(name, unit, element, width, count, kind, values)
 
     def fram(self, p: _Payload):
         s = self.stream
         p.where = f"frame {len(s.frames)}"
-        p.fits("it is too short, or unknown flags are set")
-        name_length, flags, time = p.u32(), p.u32(), p.f64()
-        turned = s.kind == "vertices" and s.skeleton
-        if flags & ~7 or (flags & 2 and s.kind != "vectors") or (flags & 4 and not turned):
-            p.fail("it is too short, or unknown flags are set")
-        if not math.isfinite(time) or (not flags & 1 and time != 0):
-            p.fail("its time is not finite, or set without its flag")
-        wrong = "its name is longer than the record, or no UTF-8"
-        name = p.utf8(name_length, wrong, wrong)
-        p.pad()
-        p.where += f" ('{name}')"
-        root = anchors = pins = turns = None
-        if s.kind in ("vectors", "deformations"):
-            p.fits("it ends before its root and anchors")
-            root = list(p.f64s(3, "its root or an anchor"))
-            anchors = p.f64s(3 * len(s.anchors or ()), "its root or an anchor")
-        if flags & 2:
-            pins = self.pins(p)
-        if flags & 4:
-            p.fits("it ends before its turns")
-            turns = p.f64s(4 * len(s.skeleton), "a turn is no unit quaternion:")
-            self.check_turns(p, turns)
-        width = WIDTH[s.kind]
+        name, channels = p.text(), {}
+        n = p.u64()
+        if n > MOST_CHANNELS:
+            p.fail("it has more than 255 channels")
+        for _ in range(n):
+            c = self.channel(p, channels)
+            channels[c.name] = c
+        if s.element == "corner" and "root" not in channels:
+            p.fail("it has no channel 'root'")
+        if s.element == "corner" and s.anchors and "anchors" not in channels:
+            p.fail("it has no channel 'anchors'")
         p.fits("its length does not fit the count of FORM")
-        values = p.f64s(s.count * width, "a value", "d" if s.precision == 8 else "f")
+        values = p.f64s(s.count * s.width, "a value", "d" if s.precision == 8 else "f")
+        if -p.at % 8 > p.left() or any(p.take(-p.at % 8)):
+            p.fail(p.short)
         p.end()
-        if width > 3:
-            for i in range(0, len(values), width):
+        if s.kind in ("deformations", "transforms"):
+            for i in range(0, len(values), s.width):
                 if not any(values[i:i + 4]):
                     p.fail("a quaternion is zero")
-        s.frames.append(Frame(name, time if flags & 1 else None, root, anchors, values, pins, turns, self.pending, self.scalars))
-        self.pending, self.scalars = [], None
+        s.frames.append(Frame(name, values, channels, self.pending))
+        self.pending = []
 
     def fail(self, p: _Payload):
         status, program, message = p.u64(), p.text(), p.text()
@@ -921,7 +978,7 @@ class _Reader:
 
     HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "SELE": sele, "LINK": link, "ANCH": anch,
                 "REFP": refp, "SKEL": skel, "CORR": corr, "PTCH": ptch,
-                "RIG ": rig, "SKIN": skin, "MAP ": map, "SIGN": sign, "FORM": form, "SCAL": scal, "FRAM": fram, "FAIL": fail, "END ": end}
+                "RIG ": rig, "SKIN": skin, "MAP ": map, "SIGN": sign, "FORM": form, "FRAM": fram, "FAIL": fail, "END ": end}
 
 
 def read_stream(file) -> Stream:
@@ -943,15 +1000,14 @@ def _extra_json(records) -> list:
     return [{"tag": r.tag, "flags": r.flags, "payload": r.payload.hex()} for r in records]
 
 
+def _channel_json(c: Channel) -> dict:
+    return {"name": c.name, "unit": c.unit, "element": c.element, "width": c.width, "type": c.type,
+            "values": _rows(c.values, c.width)}
+
+
 def _frame_json(f: Frame, width: int) -> dict:
-    anchors = None if f.anchors is None else _rows(f.anchors, 3)
-    out = {"name": f.name, "time": f.time, "root": f.root, "anchors": anchors,
-           "pins": None if f.pins is None else list(f.pins), "turns": None if f.turns is None else _rows(f.turns, 4),
-           "values": _rows(f.values, width), "extra": _extra_json(f.extra)}
-    if f.scalars:
-        name, unit, numbers = f.scalars
-        out["scalars"] = {"name": name, "unit": unit, "numbers": list(numbers)}
-    return out
+    return {"name": f.name, "channels": [_channel_json(c) for c in f.channels.values()],
+            "values": _rows(f.values, width), "extra": _extra_json(f.extra)}
 
 
 def _correspondence_json(c: Correspondence) -> dict:
@@ -1004,9 +1060,9 @@ def to_json(s: Stream) -> dict:
         "rig": s.rig and _rig_json(s.rig),
         "map": s.map and _map_json(s.map),
         "signal": s.signal and _signal_json(s.signal),
-        "kind": s.kind, "precision": s.precision, "count": s.count,
+        "kind": s.kind, "element": s.element, "width": s.width, "precision": s.precision, "count": s.count,
         "extra": _extra_json(s.extra),
-        "frames": [_frame_json(f, WIDTH[s.kind]) for f in s.frames],
+        "frames": [_frame_json(f, s.width) for f in s.frames],
         "tail": _extra_json(s.tail),
         "records": len(s.records) - 1, "checksum": f"{s.checksum:016x}",
     }

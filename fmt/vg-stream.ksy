@@ -8,19 +8,19 @@ meta:
   ks-version: 0.9
   endian: le
 doc: |
-  A mesh, its reference pose and a sequence of frames that hold vertices, vectors, deformations or transforms:
+  A mesh, its reference pose and a sequence of frames of one form (vertices, vectors, deformations, transforms, ...):
   a file header, then records of tag, flags, length, checksums and payload, up to the END record.
 doc-ref: STREAM.md
 seq:
   - id: file_header
     type: file_header
   - id: head
-    type: record(_index)
+    type: record
     repeat: until
     repeat-until: _.tag == "FORM" or _.tag == "FAIL"
     doc: everything before the frames; the last one is FORM
   - id: body
-    type: record(_index)
+    type: record
     repeat: until
     repeat-until: _.tag == "END " or _.tag == "FAIL"
     if: head.last.tag == "FORM"
@@ -30,11 +30,6 @@ instances:
     value: head.last.payload.as<form>
     if: head.last.tag == "FORM"
 enums:
-  kind:
-    1: vertices
-    2: vectors
-    3: deformations
-    4: transforms
   label_kind:
     1: object
     2: group
@@ -51,10 +46,6 @@ types:
       - id: reserved
         contents: [0, 0, 0, 0]
   record:
-    params:
-      - id: index
-        type: s4
-        doc: position in head or body
     seq:
       - id: tag
         type: str
@@ -91,7 +82,6 @@ types:
             '"MAP "': map
             '"SIGN"': sign
             '"FORM"': form
-            '"SCAL"': scal
             '"FRAM"': fram
             '"FAIL"': fail
             '"END "': end_mark
@@ -102,9 +92,6 @@ types:
         value: (flags & 1) != 0
       copy_safe:
         value: (flags & 2) != 0
-      num_anchors:
-        value: 'tag == "ANCH" ? payload.as<indices>.num : (index == 0 ? 0 : _root.head[index - 1].num_anchors.as<u8>)'
-        doc: of records in head, what ANCH up to here has said
   text:
     seq:
       - id: len
@@ -433,79 +420,30 @@ types:
         doc: basis, coordinates, positions, sites, parameters, knots, control points, root, turns, times, names (STREAM.md 3.20)
   form:
     seq:
-      - id: kind
-        type: u4
-        enum: kind
-      - id: precision
-        type: u4
-        doc: 4 binary32, 8 binary64
+      - id: name
+        type: text
+        doc: vertices, vectors, deformations, transforms, features, coordinates, or another
+      - id: element
+        type: text
+      - id: width
+        type: u8
+        doc: numbers of an element
       - id: count
         type: u8
         doc: elements of a frame
-    instances:
-      width:
-        value: 'kind == kind::transforms ? 7 : (kind == kind::deformations ? 4 : 3)'
-        doc: numbers of an element
-      on_graph:
-        value: kind == kind::vectors or kind == kind::deformations
-  scal:
-    seq:
-      - id: len_name
-        type: u4
-      - id: len_unit
-        type: u4
-      - id: reserved
+      - id: precision
         type: u8
-      - id: name
-        type: str
-        size: len_name
-        encoding: UTF-8
-      - id: unit
-        type: str
-        size: len_unit
-        encoding: UTF-8
-      - id: padding
-        size: (8 - (len_name + len_unit) % 8) % 8
-      - id: numbers
-        type:
-          switch-on: _root.form.precision
-          cases:
-            4: f4
-            8: f8
-        repeat: eos
-        doc: one for each vertex of the mesh
+        doc: 4 binary32, 8 binary64
   fram:
     seq:
-      - id: len_name
-        type: u4
-      - id: flags
-        type: u4
-      - id: time
-        type: f8
-        doc: seconds, if has_time
       - id: name
-        type: str
-        size: len_name
-        encoding: UTF-8
-      - id: padding
-        size: (8 - len_name % 8) % 8
-      - id: root
-        type: point
-        if: _root.form.on_graph
-      - id: anchors
-        type: point
+        type: text
+      - id: num_channels
+        type: u8
+      - id: channels
+        type: channel
         repeat: expr
-        repeat-expr: _root.head.last.num_anchors
-        if: _root.form.on_graph
-      - id: pins
-        type: pin_list
-        if: has_pins
-      - id: turns
-        type: f8
-        repeat: expr
-        repeat-expr: 4 * _root.form.count
-        if: has_turns
-        doc: a joint is a vertex
+        repeat-expr: num_channels
       - id: values
         type:
           switch-on: _root.form.precision
@@ -514,25 +452,38 @@ types:
             8: f8
         repeat: expr
         repeat-expr: _root.form.count * _root.form.width
-    instances:
-      has_time:
-        value: (flags & 1) != 0
-      has_pins:
-        value: (flags & 2) != 0
-      has_turns:
-        value: (flags & 4) != 0
-  pin_list:
-    seq:
-      - id: num_vertices
-        type: u4
-      - id: reserved
-        type: u4
-      - id: vertices
-        type: u4
-        repeat: expr
-        repeat-expr: num_vertices
       - id: padding
-        size: (num_vertices % 2) * 4
+        size: (8 - _root.form.count * _root.form.width * _root.form.precision % 8) % 8
+  channel:
+    seq:
+      - id: name
+        type: text
+      - id: unit
+        type: text
+      - id: element
+        type: text
+        doc: vertex, corner, joint, anchor, transform, frame, component, vertex list, or another
+      - id: width
+        type: u8
+      - id: count
+        type: u8
+      - id: type
+        type: u8
+        doc: 1 u4 (vertices of a list), 4 f4, 8 f8
+      - id: numbers
+        type:
+          switch-on: type
+          cases:
+            1: u4
+            4: f4
+            8: f8
+        repeat: expr
+        repeat-expr: count * width
+      - id: padding
+        size: (8 - count * width * len_number % 8) % 8
+    instances:
+      len_number:
+        value: 'type == 8 ? 8 : 4'
   fail:
     seq:
       - id: exit_status

@@ -398,8 +398,8 @@ END
     must vg-info heat.vgs
     shows "'error' of each vertex in 3 of the frames"
     must vg-info --json heat.vgs -o info.json
-    is info.json scalars.unit '"D"'
-    is info.json scalars.frames 3
+    is info.json channels.0.unit '"D"'
+    is info.json channels.0.frames 3
 }
 
 @test "heat passes where vertices stay, and goes where they move or a format cannot hold it" {

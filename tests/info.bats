@@ -402,7 +402,7 @@ END
     shows "'x' of each vertex in 1 of the frames"
     [[ $output != *nan* ]]
     must vg-info --json "$CORPUS/accept/scalars-of-nothing.vgs" -o s.json
-    is s.json scalars.least null
+    is s.json channels.0.least null
 }
 
 @test "a rig and its map are described, and its weights printed" {

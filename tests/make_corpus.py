@@ -17,7 +17,8 @@ import sys
 
 MAGIC = b"\x89VGS\r\n\x1a1"
 CRITICAL, COPY_SAFE = 1, 2
-KINDS = {"vertices": 1, "vectors": 2, "deformations": 3, "transforms": 4}
+FORMS = {"vertices": ("vertex", 3), "vectors": ("corner", 3), "deformations": ("corner", 4), "transforms": ("transform", 7)}
+U32, F32, F64 = 1, 4, 8  # Type of a channel
 LABELS = {"object": 1, "group": 2, "material": 3, "smoothing": 4, "library": 5}
 NAN, INF = float("nan"), float("inf")
 
@@ -216,26 +217,55 @@ def signals(s):
                   b"".join(map(text, s["names"])), CRITICAL)
 
 
-def frame(c, f):
-    name = f["name"].encode()
-    flags = (f["time"] is not None) + 2 * (f["pins"] is not None) + 4 * (f["turns"] is not None)
-    head = pad(u32(len(name), flags) + f64(f["time"] or 0) + name)
+def form_of(c):
+    """Element and width of a content's frames."""
+    return (c["element"], c["width"]) if "element" in c else FORMS[c["kind"]]
+
+
+def form(c):
+    element, width = form_of(c)
+    return Record("FORM", text(c["kind"]) + text(element) + u64(width, c["count"], c["precision"]), CRITICAL)
+
+
+def channel_of(name, element, rows, kind=F64, unit="", width=None):
+    """A channel as JSON shows it: a row of numbers for each element."""
+    rows = [list(r) for r in rows]
+    return {"name": name, "unit": unit, "element": element, "width": len(rows[0]) if width is None else width, "type": kind,
+            "values": rows}
+
+
+def channels_of(c, f):
+    """The channels of a frame, in the order in which programs write them."""
+    out = []
+    if f["time"] is not None:
+        out.append(channel_of("time", "frame", [[f["time"]]], unit="s"))
     if f["root"] is not None:
-        head += f64(*f["root"], *flat(f["anchors"]))
+        out.append(channel_of("root", "frame", [f["root"]]))
+    if f["anchors"]:
+        out.append(channel_of("anchors", "anchor", f["anchors"]))
     if f["pins"] is not None:
-        head += pad(u32(len(f["pins"]), 0, *f["pins"]))
+        out.append(channel_of("pins", "vertex list", [[v] for v in f["pins"]], U32, width=1))
     if f["turns"] is not None:
-        head += f64(*flat(f["turns"]))
-    values = flat(f["values"])
-    code = "d" if c["precision"] == 8 else "f"
-    return Record("FRAM", head + struct.pack(f"<{len(values)}{code}", *values), CRITICAL)
+        out.append(channel_of("turns", "joint", f["turns"]))
+    if "scalars" in f:
+        k = f["scalars"]
+        out.append(channel_of(k["name"], "vertex", [[x] for x in k["numbers"]], c["precision"], k["unit"], 1))
+    return out + f.get("channels", [])
 
 
-def scalars(c, s):
-    name, unit = s["name"].encode(), s["unit"].encode()
-    code = "d" if c["precision"] == 8 else "f"
-    return Record("SCAL", pad(u32(len(name), len(unit), 0, 0) + name + unit) +
-                  struct.pack(f"<{len(s['numbers'])}{code}", *s["numbers"]), 0)
+def array_of(kind, numbers):
+    return pad(struct.pack(f"<{len(numbers)}{ {U32: 'I', F32: 'f', F64: 'd'}[kind]}", *numbers))
+
+
+def channel(k):
+    head = text(k["name"]) + text(k["unit"]) + text(k["element"]) + u64(k["width"], len(k["values"]), k["type"])
+    return head + array_of(k["type"], flat(k["values"]))
+
+
+def frame(c, f):
+    channels = channels_of(c, f)
+    head = text(f["name"]) + u64(len(channels)) + b"".join(map(channel, channels))
+    return Record("FRAM", head + array_of(c["precision"], flat(f["values"])), CRITICAL)
 
 
 def records_of(c):
@@ -267,9 +297,9 @@ def records_of(c):
     if c["signal"] is not None:
         out.append(signals(c["signal"]))
     out += unknown(c["extra"])
-    out.append(Record("FORM", u32(KINDS[c["kind"]], c["precision"]) + u64(c["count"]), CRITICAL))
+    out.append(form(c))
     for f in c["frames"]:
-        out += unknown(f["extra"]) + ([scalars(c, f["scalars"])] if "scalars" in f else []) + [frame(c, f)]
+        out += unknown(f["extra"]) + [frame(c, f)]
     return out + unknown(c["tail"])
 
 
@@ -373,6 +403,26 @@ def skeleton_content(turns=None, **changes):
     bent = [[0, 1, 0], [0.5, 1, 0], [0.75, 1, 0], [0.125, 0, 0]]
     return content(mesh={"vertices": 4, "faces": [[0, 1], [1, 2], [0, 3]]}, frames=[pose("bent", bent, turns=turns)],
                    reference={"name": "rest", "positions": rest}, skeleton=JOINTS, **changes)
+
+
+def feature_content(**changes):
+    """9 numbers for each vertex."""
+    rows = [[v + k / 8 for k in range(9)] for v in range(4)]
+    return content(**{**dict(kind="features", element="vertex", width=9, frames=[pose("f", rows)]), **changes})
+
+
+def coordinate_content(**changes):
+    """2 numbers for each frame, no mesh; with them a parameter, and numbers of two components."""
+    first = dict(pose("c", [[0.25, -1]], time=1), channels=[
+        channel_of("parameter", "frame", [[3.5]]), channel_of("mass", "component", [[1], [2.5]], F32, "kg")])
+    return content(**{**dict(mesh=None, reference=None, kind="coordinates", element="frame", width=2, count=1,
+                             frames=[first, pose("d", [[0, 0]])]), **changes})
+
+
+def unknown_form_content(**changes):
+    """Frames of which nobody knows what they are, and of what."""
+    first = dict(pose("u", [[1, 2], [3, 4], [5, 6]]), channels=[channel_of("hue", "whisker", [[1, 0, 0]] * 5, F32, "1/m")])
+    return content(**{**dict(kind="m\u00f6bius", element="whisker", width=2, count=3, frames=[first]), **changes})
 
 
 HALF = [0.5, 0.5, 0.5, 0.5]  # a third of a turn
@@ -493,6 +543,11 @@ def golden():
         "signal": ("three frames as signals", signal_content()),
         "rig": ("three bones that move the vertices of two triangles: their skin, and a map with two bones a corner",
                 bone_map_content()),
+        "features": ("9 numbers for each vertex", feature_content()),
+        "coordinates": ("2 numbers for the frame as a whole, with channels of the frame and of components",
+                        coordinate_content()),
+        "unknown-form": ("frames of a form, and channels of elements, that no version has; vg-info and vg-encode pass them on",
+                         unknown_form_content()),
         "unknown-records": (
             "copy-safe records before FORM, between frames and at the end; one that a filter drops",
             content(extra=[NOTE, DROPPED], tail=[NOTE],
@@ -533,6 +588,18 @@ def accept():
         "scalars-of-nothing": whole(content(
             mesh={"vertices": 0, "faces": []}, reference={"name": "", "positions": []}, count=0,
             frames=[dict(pose("nothing", []), scalars={"name": "x", "unit": "m/s", "numbers": []})])),
+        "channels-255": whole(with_channels(content(), 255)),
+        "channels-of-all-elements": whole(dict(skeleton_content(TURNED), frames=[dict(
+            skeleton_content(TURNED)["frames"][0], channels=[
+                channel_of("a", "vertex", [[1, 2]] * 4), channel_of("b", "corner", [[k] for k in range(6)], F32),
+                channel_of("c", "joint", [[1]] * 4, unit="rad"), channel_of("d", "transform", [[1]] * 5),
+                channel_of("e", "frame", [[1, 2, 3, 4, 5]]), channel_of("f", "component", [], width=3),
+                channel_of("g", "vertex list", [[0], [3]], U32), channel_of("h", "anchor", [], width=1)])])),
+        "features-f32": whole(feature_content(precision=4)),
+        "form-unknown-of-vertices": whole(unknown_form_content(element="vertex", count=4, frames=[
+            pose("v", [[1, 2], [3, 4], [5, 6], [7, 8]])])),
+        "form-unknown-of-corners": whole(dict(graph_content("vectors"), kind="strains", element="corner", width=6, frames=[
+            dict(graph_content("vectors")["frames"][0], values=[[1, 2, 3, 4, 5, 6]] * 8)])),
         "scalars-behind-unknown": whole(dict(scaled(), frames=[dict(scaled()["frames"][0], extra=[FUTURE])])),
         "pins-with-selection": whole(dict(pinned(3), selection=[0], links=[[1, 4], [4, 5]])),
         "skeleton-of-nothing": whole(content(mesh={"vertices": 0, "faces": []}, count=0, frames=[], skeleton=[],
@@ -786,15 +853,28 @@ def reject_header():
         "refp-name-padding": patched(c, "REFP", 12, b"\0\0\0\1"),
         "refp-name-utf8": patched(c, "REFP", 8, b"\xff"),
         "refp-name-nul": patched(c, "REFP", 9, b"\0"),
-        "form-kind-0": patched(c, "FORM", 0, u32(0)),
-        "form-kind-5": patched(c, "FORM", 0, u32(5)),
-        "form-precision-2": patched(c, "FORM", 4, u32(2)),
-        "form-precision-16": patched(c, "FORM", 4, u32(16)),
-        "form-count-less": patched(c, "FORM", 8, u64(3)),
-        "form-count-2-63": patched(c, "FORM", 8, u64(1 << 63)),
-        "form-count-of-vectors": patched(graph_content("vectors"), "FORM", 8, u64(6)),
-        "form-transforms-2-63": patched(c, "FORM", 0, u32(4, 8) + u64(1 << 63)),
+        "form-name-empty": whole(content(kind="", element="vertex", width=3)),
+        "form-element": whole(content(element="corner", width=3)),
+        "form-width": whole(content(element="vertex", width=4, frames=[])),
+        "form-width-0": whole(feature_content(width=0, frames=[])),
+        "form-width-2-63": whole(feature_content(width=1 << 63, frames=[pose("f", [])])),
+        "form-of-lists": whole(content(kind="lists", element="vertex list", width=1, frames=[])),
+        "form-precision-2": patched(c, "FORM", -8, u64(2)),
+        "form-precision-16": patched(c, "FORM", -8, u64(16)),
+        "form-precision-2-32-and-8": patched(c, "FORM", -8, u64(1 << 32 | 8)),
+        "form-count-less": patched(c, "FORM", -16, u64(3)),
+        "form-count-2-63": patched(c, "FORM", -16, u64(1 << 63)),
+        "form-count-of-vectors": patched(graph_content("vectors"), "FORM", -16, u64(6)),
+        "form-count-of-coordinates": whole(coordinate_content(count=2, frames=[])),
+        "form-count-of-features": whole(feature_content(count=5, frames=[])),
+        "form-features-without-mesh": whole(feature_content(mesh=None, reference=None, frames=[])),
+        "form-unknown-without-mesh": whole(unknown_form_content(mesh=None, reference=None, element="vertex", frames=[])),
+        "form-unknown-without-link": whole(unknown_form_content(element="corner", frames=[])),
+        "form-transforms-2-63": whole(content(kind="transforms", count=1 << 63, frames=[pose("t", [[1, 0, 0, 0, 1, 2, 3]])])),
         "form-length": lie(c, "FORM", payload=lambda r: r.payload + bytes(8)),
+        "form-cut": lie(c, "FORM", payload=lambda r: r.payload[:-8]),
+        "form-empty": lie(c, "FORM", payload=b""),
+        "form-name-utf8": patched(c, "FORM", 8, b"\xff"),
         "prov-args-missing": inserted(c, "MESH", Record("PROV", prov, COPY_SAFE)),
         "prov-args-2-32-less-1": inserted(c, "MESH", Record("PROV", prov[:8] + u64(0xFFFFFFFF) + prov[16:], COPY_SAFE)),
         "prov-parents-2-32-less-1": inserted(c, "MESH", Record("PROV", u64(0xFFFFFFFF) + prov[8:], COPY_SAFE)),
@@ -950,70 +1030,124 @@ def reject_attachments():
     }
 
 
+def with_channel(c, **changes):
+    """The content with a channel more in its first frame: one number for each vertex, but for `changes`."""
+    k = channel_of("x", "vertex", [[1], [2], [3], [4]])
+    first = c["frames"][0]
+    return dict(c, frames=[dict(first, channels=[dict(k, **changes)])] + c["frames"][1:])
+
+
 def reject_frames():
     """Frames with content that does not hold."""
     c, v, q = content(), graph_content("vectors"), graph_content("deformations")
     t = content(mesh=None, reference=None, kind="transforms", count=1, frames=[pose("t", [[1, 0, 0, 0, 1, 2, 3]])])
-    timed = content(frames=[pose("pose1", BENT[:4], time=1)])
     second = content(frames=[pose("fine", BENT[:4]), pose("broken", BENT[:4])])
     records = records_of(second)
     records[-1].payload = records[-1].payload[:-8] + f64(INF)
     swapped = copy.deepcopy(c)
-    k = scaled()
-    p = pinned(1, 2, 4)  # payload: 24 bytes head and name, 24 root, 48 anchors, pins from byte 96
+    k = with_channel(c)
+    # payload of a frame: length of the name, name from byte 8, number of channels at 16; of its first channel, named x:
+    # 24 length of the name, 32 name, 40 length of the unit, 48 length of the element, 56 'vertex', 64 width, 72 count,
+    # 80 type, 88 numbers
+    p = pinned(1, 2, 4)
+    free = pinned(1)["frames"][1]
+
+    def holding(**changes):
+        return whole(with_channel(c, **changes))
+
+    def one(name, element, rows, kind=F64, of=c, width=None):
+        first = of["frames"][0]
+        return whole(dict(of, frames=[dict(first, channels=[channel_of(name, element, rows, kind, width=width)])]))
+
     return {
         "fram-before-form": whole(c, [records_of(swapped)[i] for i in (0, 1, 3, 2)]),
         "fram-short": lie(c, "FRAM", payload=lambda r: r.payload[:-8]),
         "fram-long": lie(c, "FRAM", payload=lambda r: r.payload + bytes(8)),
         "fram-empty": lie(c, "FRAM", payload=b""),
-        "fram-pins-of-vertices": patched(c, "FRAM", 4, u32(2)),
-        "fram-pins-of-deformations": whole(dict(q, frames=[dict(q["frames"][0], pins=[0])])),
-        "fram-flags-8": patched(c, "FRAM", 4, u32(8)),
-        "fram-turns-without-skeleton": patched(c, "FRAM", 4, u32(4)),
-        "fram-turns-of-vectors": patched(v, "FRAM", 4, u32(5)),
-        "fram-turns-missing": patched(skeleton_content(), "FRAM", 4, u32(4)),
-        "fram-turns-unmarked": patched(skeleton_content(TURNED), "FRAM", 4, u32(0)),
-        "fram-turn-short": whole(skeleton_content([[0.9, 0, 0, 0]] + TURNED[1:])),
-        "fram-turn-nan": whole(skeleton_content(TURNED[:3] + [[NAN, 0, 0, 0]])),
-        "fram-pins-none": whole(pinned()),
-        "fram-pins-twice": whole(pinned(2, 2)),
-        "fram-pins-order": whole(pinned(4, 1)),
-        "fram-pins-out-of-range": whole(pinned(1, 6)),
-        "fram-pins-reserved": patched(p, "FRAM", 100, u32(1)),
-        "fram-pins-padding": patched(p, "FRAM", 116, u32(1)),
-        "fram-pins-2-32-less-1": patched(p, "FRAM", 96, u32(0xFFFFFFFF)),
-        "fram-pins-missing": patched(v, "FRAM", 4, u32(3)),
-        "fram-name-2-32-less-1": patched(c, "FRAM", 0, u32(0xFFFFFFFF)),
-        "fram-name-utf8": patched(c, "FRAM", 16, b"\xc0\x80"),
-        "fram-name-nul": patched(c, "FRAM", 17, b"\0"),
-        "fram-name-padding": patched(c, "FRAM", 21, b"\0\0\1"),
+        "fram-f32-padding": patched(content(mesh={"vertices": 3, "faces": []}, count=3, precision=4,
+                                            reference={"name": "", "positions": POINTS[:3]}, frames=[pose("p", BENT[:3])]),
+                                    "FRAM", -4, u32(1)),
+        "fram-name-2-32-less-1": patched(c, "FRAM", 0, u64(0xFFFFFFFF)),
+        "fram-name-utf8": patched(c, "FRAM", 8, b"\xc0\x80"),
+        "fram-name-nul": patched(c, "FRAM", 9, b"\0"),
+        "fram-name-padding": patched(c, "FRAM", 13, b"\0\0\1"),
         "fram-value-nan": patched(c, "FRAM", -8, f64(NAN)),
         "fram-second-inf": whole(second, records),
         "fram-f32-inf": patched(content(precision=4), "FRAM", -4, struct.pack("<f", -INF)),
-        "fram-time-nan": patched(timed, "FRAM", 8, f64(NAN)),
-        "fram-time-unmarked": patched(timed, "FRAM", 4, u32(0)),
-        "fram-root-nan": patched(v, "FRAM", 24, f64(NAN)),
-        "fram-anchor-inf": patched(v, "FRAM", 48, f64(INF)),
-        "fram-without-root": lie(v, "FRAM", payload=lambda r: r.payload[:24] + r.payload[48:]),
-        "scal-before-form": inserted(c, "FORM", scalars(k, k["frames"][0]["scalars"])),
-        "scal-twice": inserted(k, "FRAM", scalars(k, k["frames"][0]["scalars"])),
-        "scal-behind-the-last-frame": inserted(k, None, scalars(k, k["frames"][0]["scalars"])),
-        "scal-of-vectors": inserted(v, "FRAM", scalars(k, {"name": "e", "unit": "", "numbers": [0] * 6})),
-        "scal-short": lie(k, "SCAL", payload=lambda r: r.payload[:-8]),
-        "scal-long": lie(k, "SCAL", payload=lambda r: r.payload + bytes(8)),
-        "scal-empty": lie(k, "SCAL", payload=b""),
-        "scal-reserved": patched(k, "SCAL", 12, u32(1)),
-        "scal-no-name": whole(scaled(name="")),
-        "scal-name-2-32-less-1": patched(k, "SCAL", 0, u32(0xFFFFFFFF)),
-        "scal-unit-2-32-less-1": patched(k, "SCAL", 4, u32(0xFFFFFFFF)),
-        "scal-name-utf8": patched(k, "SCAL", 16, b"\xc0\x80"),
-        "scal-unit-nul": patched(k, "SCAL", 21, b"\0"),
-        "scal-padding": patched(k, "SCAL", 22, b"\0\1"),
-        "scal-nan": patched(k, "SCAL", -8, f64(NAN)),
-        "scal-f32-inf": patched(scaled(numbers=(1, 2, 3, 4), precision=4), "SCAL", -4, struct.pack("<f", INF)),
+        "fram-channels-256": whole(with_channels(c, 256)),
+        "fram-channels-2-64-less-1": patched(c, "FRAM", 16, u64((1 << 64) - 1)),
+        "fram-channels-missing": patched(c, "FRAM", 16, u64(1)),
+        "channel-cut": lie(k, "FRAM", payload=lambda r: r.payload[:80]),
+        "channel-numbers-cut": lie(k, "FRAM", payload=lambda r: r.payload[:100]),
+        "channel-padding": patched(with_channel(c, element="whisker", type=F32, values=[[1]]), "FRAM", 92, b"\1"),
+        "channel-no-name": holding(name=""),
+        "channel-name-2-64-less-1": patched(k, "FRAM", 24, u64((1 << 64) - 1)),
+        "channel-name-utf8": patched(k, "FRAM", 32, b"\xff"),
+        "channel-unit-2-32-less-1": patched(k, "FRAM", 40, u64(0xFFFFFFFF)),
+        "channel-element-utf8": patched(k, "FRAM", 56, b"\xff"),
+        "channel-twice": whole(dict(c, frames=[dict(c["frames"][0], channels=[channel_of("x", "frame", [[1]])] * 2)])),
+        "channel-time-twice": whole(dict(c, frames=[dict(pose("t", BENT[:4], time=1), channels=[
+            channel_of("time", "frame", [[2]])])])),
+        "channel-width-0": holding(width=0, values=[[]] * 4),
+        "channel-count-of-vertices": holding(values=[[1], [2], [3]]),
+        "channel-count-of-frames": one("x", "frame", [[1], [2]]),
+        "channel-count-of-joints": one("x", "joint", [[1]]),
+        "channel-count-of-anchors": one("x", "anchor", [[1]]),
+        "channel-count-of-corners": one("x", "corner", [[1]]),
+        "channel-count-of-transforms": one("x", "transform", [[1], [2]], of=t),
+        "channel-count-2-63": patched(k, "FRAM", 72, u64(1 << 63)),
+        "channel-size-2-64": whole(dict(c, frames=[dict(c["frames"][0], channels=[
+            channel_of("x", "whisker", [[]] * 16, width=1 << 60)])])),
+        "channel-type-0": patched(k, "FRAM", 80, u64(0)),
+        "channel-type-2": patched(k, "FRAM", 80, u64(2)),
+        "channel-type-2-32-and-8": patched(k, "FRAM", 80, u64(1 << 32 | 8)),
+        "channel-indices-of-vertices": holding(type=U32),
+        "channel-nan": holding(values=[[1], [2], [NAN], [4]]),
+        "channel-f32-inf": holding(type=F32, values=[[1], [2], [3], [-INF]]),
+        "list-of-numbers": one("x", "vertex list", [[0.0]]),
+        "list-of-pairs": one("x", "vertex list", [[0, 1]], U32),
+        "list-of-nothing": one("x", "vertex list", [], U32, width=1),
+        "list-twice": one("x", "vertex list", [[1], [1]], U32),
+        "list-out-of-range": one("x", "vertex list", [[1], [4]], U32),
+        "list-without-mesh": one("x", "vertex list", [[0]], U32, of=t),
+        "time-nan": whole(content(frames=[pose("pose1", BENT[:4], time=NAN)])),
+        "time-of-vertices": holding(name="time"),
+        "time-of-two": one("time", "frame", [[1, 2]]),
+        "root-of-vertices": one("root", "frame", [[0, 0, 0]]),
+        "root-missing": whole(dict(v, frames=[dict(v["frames"][0], root=None)])),
+        "root-nan": whole(dict(v, frames=[dict(v["frames"][0], root=[0, NAN, 0])])),
+        "root-of-two": whole(dict(v, frames=[dict(v["frames"][0], root=[0, 0])])),
+        "anchors-missing": whole(dict(v, frames=[dict(v["frames"][0], anchors=None)])),
+        "anchors-inf": whole(dict(v, frames=[dict(v["frames"][0], anchors=[[0, 0, 0], [INF, 0, 0]])])),
+        "anchors-less": whole(dict(v, frames=[dict(v["frames"][0], anchors=[[0, 0, 0]])])),
+        "anchors-of-vertices": one("anchors", "anchor", [[0, 0, 0]], of=content(anchors=[0])),
+        "turns-without-skeleton": one("turns", "joint", [], width=4),
+        "turns-of-vectors": whole(dict(v, frames=[dict(v["frames"][0], channels=[channel_of("turns", "joint", [], width=4)])])),
+        "turns-of-three": whole(skeleton_content([[1, 0, 0]] * 4)),
+        "turns-less": whole(skeleton_content(TURNED[:3])),
+        "turns-short": whole(skeleton_content([[0.9, 0, 0, 0]] + TURNED[1:])),
+        "turns-nan": whole(skeleton_content(TURNED[:3] + [[NAN, 0, 0, 0]])),
+        "pins-none": whole(pinned()),
+        "pins-twice": whole(pinned(2, 2)),
+        "pins-order": whole(pinned(4, 1)),
+        "pins-out-of-range": whole(pinned(1, 6)),
+        "pins-of-vertices": one("pins", "vertex list", [[0]], U32),
+        "pins-of-deformations": whole(dict(q, frames=[dict(q["frames"][0], pins=[0])])),
+        "pins-of-numbers": one("pins", "vertex", [[1]] * 6, of=dict(v, frames=[free])),
+        "pins-padding": lie(p, "FRAM", payload=lambda r: odd_padding(r.payload)),
         "fram-quaternion-zero": patched(q, "FRAM", -32, f64(0, 0, 0, 0)),
         "fram-transform-zero": patched(t, "FRAM", -56, f64(0, 0, 0, -0.0)),
     }
+
+
+def with_channels(c, n):
+    return dict(c, frames=[dict(c["frames"][0], channels=[channel_of(f"x{i}", "frame", [[i]]) for i in range(n)])])
+
+
+def odd_padding(payload):
+    """A frame whose list of the pins 1 2 4 is padded with something."""
+    at = payload.index(u32(1, 2, 4)) + 12
+    return payload[:at] + b"\1" + payload[at + 1:]
 
 
 # ---- files ---------------------------------------------------------------------------------------------------------
@@ -1028,7 +1162,10 @@ def write(path, data):
 def expected_json(c, data):
     """The content as examples/read_stream.py --json shows it."""
     records = records_of(c)
-    out = dict(c, records=len(records), checksum=f"{struct.unpack('<Q', data[-8:])[0]:016x}")
+    element, width = form_of(c)
+    frames = [{"name": f["name"], "channels": channels_of(c, f), "values": f["values"], "extra": f["extra"]}
+              for f in c["frames"]]
+    out = dict(c, frames=frames, element=element, width=width, records=len(records), checksum=f"{struct.unpack('<Q', data[-8:])[0]:016x}")
     return (json.dumps(out, indent=1, sort_keys=True, ensure_ascii=False) + "\n").encode()
 
 

@@ -37,13 +37,14 @@ END
 
 @test "a stream that is passed through comes out as it was" {
     for name in smallest f32 times empty-sequence every-header-record vectors vectors-selected-f32 pins scalars deformations transforms \
-        skeleton correspondence patches map turns rig; do
+        features coordinates unknown-form skeleton correspondence patches map turns rig; do
         must vg-encode --no-provenance "$GOLDEN/$name.vgs" -o "$name.vgs"
         same_file "$GOLDEN/$name.vgs" "$name.vgs"
     done
     for name in extreme-numbers names line-segments-only points-without-faces transforms-with-mesh no-transforms \
         correspondence-without-mesh scalars-f32-without-unit scalars-of-nothing scalars-behind-unknown \
-        map-of-bones-one-per-corner map-of-bones-without-corners rig-without-skin rig-of-transforms turns-f32 turns-in-one-frame; do
+        map-of-bones-one-per-corner map-of-bones-without-corners rig-without-skin rig-of-transforms turns-f32 turns-in-one-frame \
+        channels-255 channels-of-all-elements features-f32 form-unknown-of-vertices form-unknown-of-corners; do
         must vg-encode --no-provenance "$CORPUS/accept/$name.vgs" -o "$name.vgs"
         same_file "$CORPUS/accept/$name.vgs" "$name.vgs"
     done
@@ -250,6 +251,55 @@ END
     must_fail 3 vg-view -o out.png </dev/null
     says "vg-view: " "empty"
     nothing_but
+}
+
+# ---- forms nobody knows -----------------------------------------------------------------------------------------------
+
+@test "frames of an unknown form are described and passed on, and stop everything else by their name" {
+    must vg-info "$GOLDEN/unknown-form.vgs"
+    shows "3 möbius, binary64"
+    shows "'hue' of each whisker in 1 of the frames: 0 to 1 1/m"
+    must vg-info --json "$GOLDEN/unknown-form.vgs" -o u.json
+    grep -q '"kind": "möbius"' u.json
+    for program in "vg-encode --vectors" "vg-encode --f32" vg-deform vg-solve "vg-interpolate 3" vg-segment vg-fitmap "vg-poisson --last $GOLDEN/smallest.vgs"; do
+        must_fail 3 $program "$GOLDEN/unknown-form.vgs" -o out
+        says "möbius"
+        one_line
+    done
+    must_fail 3 vg-decode "$GOLDEN/unknown-form.vgs" -o out.obj
+    says "möbius"
+    must_fail 3 vg-view "$GOLDEN/unknown-form.vgs" -o out.png
+    says "möbius"
+    must_fail 3 vg-diff "$GOLDEN/unknown-form.vgs" "$GOLDEN/smallest.vgs"
+    says "möbius"
+    must_fail 3 vg-encode "$GOLDEN/unknown-form.vgs" "$GOLDEN/smallest.vgs" -o out
+    says "möbius"
+    nothing_but u.json
+}
+
+@test "features and coordinates go where they can be used, and nowhere else" {
+    for form in features coordinates; do
+        must vg-info "$GOLDEN/$form.vgs"
+        shows " $form, binary64"
+        must vg-decode -q "$GOLDEN/$form.vgs" -o $form.npy
+        for program in "vg-encode --vectors" vg-deform vg-solve "vg-interpolate 3" vg-segment vg-fitmap; do
+            must_fail 3 $program "$GOLDEN/$form.vgs" -o out
+            says "$form"
+        done
+        must_fail 3 vg-view "$GOLDEN/$form.vgs" -o out.png
+        says "$form"
+    done
+    py "$GOLDEN" <<'END'
+import struct, sys
+import read_stream
+for form, shape in (("features", "(1, 4, 9)"), ("coordinates", "(2, 1, 2)")):
+    s = read_stream.read_stream(f"{sys.argv[1]}/{form}.vgs")
+    data = open(f"{form}.npy", "rb").read()
+    n, = struct.unpack_from("<H", data, 8)
+    assert shape in data[10:10 + n].decode(), data[:90]
+    numbers = [x for f in s.frames for x in f.values]
+    assert list(struct.unpack(f"<{len(numbers)}f", data[10 + n:])) == numbers
+END
 }
 
 # ---- records nobody knows -----------------------------------------------------------------------------------------------

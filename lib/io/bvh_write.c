@@ -310,9 +310,10 @@ int vgi_bvh_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi_
 int vgi_bvh_put(void *state, const vg_frame *f, vg_err *e)
 {
     writing *w = state;
-    size_t joint;
+    size_t joint, n;
     note_time(w, f);
-    const double *turns = f->nturns && f->nturns == w->skeleton.njoints ? f->turns : NULL;
+    const double *turns = vg_frame_turns(f, &n);
+    if (n != w->skeleton.njoints) turns = NULL;
     double distance = vg_joint_fitter_fit(w->fitter, f->values, turns, w->values, &joint);
     if (!vgi_finite(w->values, vg_skeleton_channels(&w->skeleton)))
         return vg_fail(e, VG_EINPUT, "its joints lie too far apart for a skeleton");

@@ -10,11 +10,8 @@
 
 int vgi_packing_make(vgi_packing *p, const vg_head *h, bool values, vg_err *e)
 {
-    bool graph = h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS;
     *p = (vgi_packing){.h = h};
-    if (vgi_mul(values ? h->count : 0, vg_kind_width(h->kind), &p->values) &&
-        vgi_mul(graph ? h->nanchors : 0, 3, &p->anchors))
-        return VG_OK;
+    if (vgi_mul(values ? h->count : 0, vg_head_width(h), &p->values)) return VG_OK;
     return vg_fail(e, VG_ENOMEM, "not enough memory for a frame of %zu elements", h->count);
 }
 
@@ -24,24 +21,40 @@ static bool add(size_t *sum, size_t n, size_t size)
     return vgi_mul(n, size, &bytes) && !__builtin_add_overflow(*sum, bytes, sum);
 }
 
+/* What precedes a channel's texts and numbers. */
+typedef struct channel_front {
+    size_t name, unit, element, width, count;
+    vg_precision precision;
+    bool list;
+} channel_front;
+
+static channel_front front_of(const vg_channel *c)
+{
+    return (channel_front){.name = strlen(c->name), .unit = strlen(c->unit), .element = strlen(c->element_name),
+                           .width = c->width, .count = c->count, .precision = c->precision,
+                           .list = c->vertices != NULL};
+}
+
+/* Bytes of the numbers, or of the list. */
+static size_t data_of(const channel_front *c)
+{
+    return c->width * c->count * (c->list ? sizeof(uint32_t) : sizeof(double));
+}
+
 int vgi_pack_measure(const vgi_packing *s, const vg_frame *f, vgi_packed *to, vg_err *e)
 {
     *to = (vgi_packed){.bytes = sizeof *to,
-                  .name = strlen(f->name),
-                  .records = f->extra.n,
-                  .pins = f->npins,
-                  .turns = f->nturns,
-                  .time = f->time,
-                  .has_time = f->has_time,
-                  .root = {f->root[0], f->root[1], f->root[2]}};
-    bool ok = add(&to->bytes, to->name, 1) && add(&to->bytes, to->pins, sizeof *f->pins) &&
-              add(&to->bytes, to->turns, 4 * sizeof *f->turns) && add(&to->bytes, s->anchors, sizeof(double)) &&
-              add(&to->bytes, s->values, sizeof(double));
-    if (f->has_scalars) {
-        to->scalars = s->h->body.mesh.nv;
-        to->scalars_name = strlen(f->scalars_name) + 1, to->scalars_unit = strlen(f->scalars_unit) + 1;
-        ok = ok && add(&to->bytes, to->scalars_name, 1) && add(&to->bytes, to->scalars_unit, 1) &&
-             add(&to->bytes, to->scalars, sizeof(double));
+                       .name = strlen(f->name),
+                       .records = f->extra.n,
+                       .channels = f->nchannels,
+                       .time = f->time,
+                       .has_time = f->has_time,
+                       .root = {f->root[0], f->root[1], f->root[2]}};
+    bool ok = add(&to->bytes, to->name, 1) && add(&to->bytes, s->values, sizeof(double));
+    for (size_t i = 0; ok && i < f->nchannels; i++) {
+        channel_front c = front_of(&f->channels[i]);
+        ok = add(&to->bytes, 1, sizeof c) && add(&to->bytes, c.name, 1) && add(&to->bytes, c.unit, 1) &&
+             add(&to->bytes, c.element, 1) && add(&to->bytes, data_of(&c), 1);
     }
     for (size_t i = 0; ok && i < f->extra.n; i++)
         ok = add(&to->bytes, 1, sizeof(vg_record)) && add(&to->bytes, f->extra.at[i].payload.size, 1);
@@ -54,6 +67,16 @@ static unsigned char *append(unsigned char *to, const void *from, size_t n)
     return to + n;
 }
 
+static unsigned char *pack_channel(const vg_channel *c, unsigned char *to)
+{
+    channel_front head = front_of(c);
+    to = append(to, &head, sizeof head);
+    to = append(to, c->name, head.name);
+    to = append(to, c->unit, head.unit);
+    to = append(to, c->element_name, head.element);
+    return append(to, head.list ? (const void *)c->vertices : c->numbers, data_of(&head));
+}
+
 void vgi_pack(const vgi_packing *s, const vg_frame *f, const vgi_packed *head, unsigned char *to)
 {
     to = append(to, head, sizeof *head);
@@ -62,13 +85,8 @@ void vgi_pack(const vgi_packing *s, const vg_frame *f, const vgi_packed *head, u
         to = append(to, &f->extra.at[i], sizeof f->extra.at[i]);
         to = append(to, f->extra.at[i].payload.data, f->extra.at[i].payload.size);
     }
-    to = append(to, f->pins, head->pins * sizeof *f->pins);
-    to = append(to, f->turns, head->turns * 4 * sizeof *f->turns);
-    to = append(to, f->anchors, s->anchors * sizeof *f->anchors);
-    to = append(to, f->values, s->values * sizeof *f->values);
-    to = append(to, f->scalars_name, head->scalars_name);
-    to = append(to, f->scalars_unit, head->scalars_unit);
-    append(to, f->scalars, head->scalars * sizeof *f->scalars);
+    for (size_t i = 0; i < head->channels; i++) to = pack_channel(&f->channels[i], to);
+    append(to, f->values, s->values * sizeof *f->values);
 }
 
 static const unsigned char *take(const unsigned char *from, void *to, size_t n)
@@ -92,33 +110,17 @@ static const unsigned char *unpack_records(const unsigned char *from, size_t n, 
     return from;
 }
 
-static const unsigned char *unpack_pins(const unsigned char *from, size_t n, vg_frame *f, vg_err *e)
+static const unsigned char *unpack_channel(const unsigned char *from, vg_frame *f, vg_err *e)
 {
-    uint32_t *pins = vgi_array_raw(n, sizeof *pins, e);
-    if (!pins) return NULL;
-    from = take(from, pins, n * sizeof *pins);
-    int r = vg_frame_pin(f, pins, n, e);
-    free(pins);
-    return r < 0 ? NULL : from;
-}
-
-static const unsigned char *unpack_turns(const unsigned char *from, size_t n, vg_frame *f, vg_err *e)
-{
-    double *turns = vgi_array_raw(n, 4 * sizeof *turns, e);
-    if (!turns) return NULL;
-    from = take(from, turns, n * 4 * sizeof *turns);
-    int r = vg_frame_turn(f, turns, n, e);
-    free(turns);
-    return r < 0 ? NULL : from;
-}
-
-static int unpack_scalars(const unsigned char *from, const vgi_packed *head, vg_frame *f, vg_err *e)
-{
-    const char *name = (const char *)from, *unit = name + head->scalars_name;
-    int r = vgi_frame_scalars(f, name, head->scalars_name - 1, unit, head->scalars_unit - 1, head->scalars, e);
-    if (r == VG_OK)
-        take(from + head->scalars_name + head->scalars_unit, f->scalars, head->scalars * sizeof *f->scalars);
-    return r;
+    channel_front head;
+    vg_channel *c;
+    from = take(from, &head, sizeof head);
+    vgi_channel_texts t = {.name_bytes = head.name, .unit_bytes = head.unit, .element_bytes = head.element};
+    t.name = (const char *)from, t.unit = t.name + head.name, t.element = t.unit + head.unit;
+    if (vgi_frame_add(f, &t, head.width, head.count, &c, e) < 0) return NULL;
+    c->precision = head.precision;
+    from += head.name + head.unit + head.element;
+    return take(from, head.list ? (void *)c->vertices : c->numbers, data_of(&head));
 }
 
 int vgi_unpack(const vgi_packing *s, const unsigned char *from, vg_frame *f, vg_err *e)
@@ -131,13 +133,13 @@ int vgi_unpack(const vgi_packing *s, const unsigned char *from, vg_frame *f, vg_
     if (r == VG_OK) r = vg_frame_shape(f, s->h, e);
     if (r < 0) return r;
     if (!(from = unpack_records(from + head.name, head.records, &f->extra, e))) return VG_ENOMEM;
-    if (!(from = unpack_pins(from, head.pins, f, e))) return VG_ENOMEM;
-    if (!(from = unpack_turns(from, head.turns, f, e))) return VG_ENOMEM;
+    vg_frame_drop_all(f);
+    for (size_t i = 0; i < head.channels; i++)
+        if (!(from = unpack_channel(from, f, e))) return VG_ENOMEM;
     f->has_time = head.has_time, f->time = head.time;
     memcpy(f->root, head.root, sizeof f->root);
-    from = take(from, f->anchors, s->anchors * sizeof *f->anchors);
-    from = take(from, f->values, s->values * sizeof *f->values);
-    return head.scalars_name ? unpack_scalars(from, &head, f, e) : VG_OK;
+    take(from, f->values, s->values * sizeof *f->values);
+    return VG_OK;
 }
 
 int vgi_pack_write(int fd, uint64_t off, const void *from, size_t n, const char *name, vg_err *e)

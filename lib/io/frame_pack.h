@@ -9,14 +9,13 @@
 /* What is packed of each frame of a head. */
 typedef struct vgi_packing {
     const vg_head *h;
-    size_t anchors, values; /* numbers of a frame; values 0: they are kept elsewhere */
+    size_t values; /* numbers of a frame; 0: they are kept elsewhere */
 } vgi_packing;
 
-/* What precedes a frame's name, records, pins, turns, anchors, values and scalars. */
+/* What precedes a frame's name, records, channels and values. */
 typedef struct vgi_packed {
     size_t bytes; /* of the whole frame, this included */
-    size_t name, records, pins, turns;
-    size_t scalars, scalars_name, scalars_unit; /* 0 numbers, or those of the mesh; their texts with terminators */
+    size_t name, records, channels;
     double time, root[3];
     bool has_time;
 } vgi_packed;

@@ -321,7 +321,7 @@ typedef struct writing {
 
 static void header(const writing *x, unsigned char to[VGI_NPY_HEADER])
 {
-    const uint64_t shape[3] = {x->frames, x->h->count, vg_kind_width(x->h->kind)};
+    const uint64_t shape[3] = {x->frames, x->h->count, vg_head_width(x->h)};
     vgi_npy_write(to, x->doubles ? "<f8" : "<f4", 3, shape);
 }
 
@@ -339,7 +339,7 @@ static int put_npy(void *state, const vg_frame *f, vg_err *e)
 {
     writing *x = state;
     x->frame.size = 0;
-    int r = vgi_npy_store(&x->frame, f->values, x->h->count * vg_kind_width(x->h->kind), x->doubles, e);
+    int r = vgi_npy_store(&x->frame, f->values, x->h->count * vg_head_width(x->h), x->doubles, e);
     x->frames++;
     return r < 0 ? r : vgi_output_put(x->out, x->frame.data, x->frame.size, e);
 }
@@ -370,5 +370,6 @@ static void release_npy(void *state)
 const vgi_sequence_format vgi_sequence_npy = {
     .name = "npy", .suffix = ".npy", .keeps = VGI_KEEPS_ORDER | VGI_KEEPS_DOUBLES, .bare = true,
     .sniff = sniff_npy, .open = open_npy, .next = next_npy, .frames = count_frames, .close = close_npy,
-    .kinds = 1 << VG_VERTICES | 1 << VG_VECTORS | 1 << VG_DEFORMATIONS | 1 << VG_TRANSFORMS,
+    .kinds = 1 << VG_VERTICES | 1 << VG_VECTORS | 1 << VG_DEFORMATIONS | 1 << VG_TRANSFORMS |
+             1 << VG_FEATURES | 1 << VG_COORDINATES,
     .begin = begin_npy, .put = put_npy, .end = end_npy, .warning = warn_npy, .release = release_npy};

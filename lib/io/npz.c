@@ -551,7 +551,8 @@ static int next_npz(void *state, vg_frame *f, vg_err *e)
     if (r == VG_OK) r = check_quaternions(x, f->values, e);
     if (r == VG_OK && x->values != POSITIONS) r = copy_floats(x, ROOTS, 3 * x->next, 3, f->root, e);
     if (r == VG_OK && x->nanchors)
-        r = copy_floats(x, ANCHOR_POSITIONS, 3 * x->nanchors * x->next, 3 * x->nanchors, f->anchors, e);
+        r = copy_floats(x, ANCHOR_POSITIONS, 3 * x->nanchors * x->next, 3 * x->nanchors,
+                        vg_frame_anchors(f), e);
     f->has_time = x->held[TIMES].there;
     if (r == VG_OK && f->has_time) r = copy_floats(x, TIMES, x->next, 1, &f->time, e);
     if (r == VG_OK) r = take_name(x, f, e);

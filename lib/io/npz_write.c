@@ -26,7 +26,7 @@ int vgi_npz_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi_
     writing *x = *state = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
     x->out = out, x->h = h, x->doubles = o->full_precision, x->timed = true;
-    x->per_frame = h->count * vg_kind_width(h->kind);
+    x->per_frame = h->count * vg_head_width(h);
     x->spool.name = "temporary file";
     x->spool.fd = vgi_nameless_file(e);
     return x->spool.fd < 0 ? x->spool.fd : VG_OK;
@@ -47,7 +47,7 @@ int vgi_npz_put(void *state, const vg_frame *f, vg_err *e)
     x->timed &= f->has_time;
     if (r == VG_OK) r = vgi_npy_store(&x->times, &time, 1, true, e);
     if (r == VG_OK && is_rooted(x->h)) r = vgi_npy_store(&x->roots, f->root, 3, true, e);
-    if (r == VG_OK && is_rooted(x->h)) r = vgi_npy_store(&x->anchors, f->anchors, 3 * x->h->nanchors, true, e);
+    if (r == VG_OK && is_rooted(x->h)) r = vgi_npy_store(&x->anchors, vg_frame_anchors(f), 3 * x->h->nanchors, true, e);
     x->frames++;
     return r < 0 ? r : vgi_output_put(&x->spool, x->frame.data, x->frame.size, e);
 }
@@ -166,7 +166,7 @@ static int copy_spool(writing *x, vg_err *e)
 
 static int add_values(writing *x, enum array i, vg_err *e)
 {
-    const uint64_t shape[3] = {x->frames, x->h->count, vg_kind_width(x->h->kind)};
+    const uint64_t shape[3] = {x->frames, x->h->count, vg_head_width(x->h)};
     int r = begin_array(x, i, x->doubles ? "<f8" : "<f4", x->doubles ? 8 : 4, 3, shape, e);
     if (r == VG_OK) r = copy_spool(x, e);
     return r < 0 ? r : vgi_packer_finish(x->packer, e);

@@ -4,7 +4,7 @@
 #ifndef VG_PAYLOAD_H
 #define VG_PAYLOAD_H
 
-#include "core/core.h"
+#include "model/form.h"
 
 typedef struct vgi_payload {
     const unsigned char *data;
@@ -16,16 +16,12 @@ int vgi_form_decode(const vgi_payload *p, vg_head *h, vg_err *e) VG_MUST_CHECK;
 int vgi_form_encode(vg_bytes *b, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 
 /* vgi_fram_decode: f->raw holds the payload. On a little-endian machine binary64 values are used where they lie. */
-int vgi_fram_decode(vg_frame *f, const vg_head *h, const char *where, vg_err *e) VG_MUST_CHECK;
+int vgi_fram_decode(vg_frame *f, const vgi_form *h, const char *where, vg_err *e) VG_MUST_CHECK;
 /* vgi_fram_encode: everything before the values. */
-int vgi_fram_encode(vg_bytes *b, const vg_head *h, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
-/* vgi_values_encode: n numbers as they lie in the stream: x itself if it already is, else converted into b. */
+int vgi_fram_encode(vg_bytes *b, const vgi_form *h, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
+/* vgi_values_encode: n numbers as they lie in the stream, padded: x itself if it already is, else converted into b. */
 int vgi_values_encode(vg_bytes *b, const double *x, size_t n, vg_precision precision, const void **data,
                       size_t *bytes, vg_err *e) VG_MUST_CHECK;
-
-/* SCAL, which belongs to the frame behind it: vgi_scal_encode is everything before the numbers. */
-int vgi_scal_decode(const vgi_payload *p, const vg_head *h, vg_frame *f, vg_err *e) VG_MUST_CHECK;
-int vgi_scal_encode(vg_bytes *b, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
 
 /* FAIL: VG_ETRUNC with the story of who failed. */
 int vgi_fail_decode(vg_failure *f, const vgi_payload *p, const char *stream, vg_err *e) VG_MUST_CHECK;

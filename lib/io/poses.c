@@ -30,7 +30,7 @@ int vg_poses_new(vg_poses **out, const vg_head *h, size_t limit, vg_err *e)
     if (!p) return VG_ENOMEM;
     *p = (vg_poses){.limit = limit, .fd = -1};
     int r = vgi_packing_make(&p->packing, h, false, e);
-    if (r == VG_OK && !vgi_mul(h->count, vg_kind_width(h->kind) * sizeof(double), &p->value_bytes))
+    if (r == VG_OK && !vgi_mul(h->count, vg_head_width(h) * sizeof(double), &p->value_bytes))
         r = vg_fail(e, VG_ENOMEM, "not enough memory for a frame of %zu elements", h->count);
     if (r < 0) vg_poses_free(out);
     return r;

@@ -108,7 +108,7 @@ static int read_frame(vgi_playing *p, const vg_head *own, vg_frame *f, vg_err *e
     int r = vg_frame_shape(f, own, e);
     if (r < 0) return r;
     vg_records_clear(&f->extra);
-    f->has_time = false, f->time = 0, f->nturns = 0;
+    f->has_time = false, f->time = 0;
     if ((r = vg_frame_rename(f, "", e)) < 0 || (r = p->format->next(p->state, f, e)) <= 0) return r;
     p->frames++;
     if (!*f->name && (r = name_frame(p, f, e)) < 0) return r;
@@ -134,7 +134,9 @@ int vgi_play_next(vgi_playing *p, const vg_head *own, vg_frame *f, vg_err *e)
     }
     p->waiting = false;
     if ((r = vg_frame_shape(f, own, e)) < 0 || (r = vg_frame_label(f, &p->first, e)) < 0) return r;
-    if ((r = vg_frame_turn(f, p->first.turns, p->first.nturns, e)) < 0) return r;
+    size_t n;
+    const double *turns = vg_frame_turns(&p->first, &n);
+    if ((r = vg_frame_turn(f, turns, n, e)) < 0) return r;
     memcpy(f->values, p->first.values, 3 * own->count * sizeof *f->values);
     vg_frame_clear(&p->first);
     return 1;

@@ -211,7 +211,7 @@ static int drop_loose(vg_sink *s, bool drop, vg_err *e)
 {
     if (s->head->kind != VG_VERTICES)
         return drop ? vg_fail(e, VG_EARG, "--drop-loose is for vertices: the input holds %s",
-                              vg_kind_name(s->head->kind))
+                              vg_head_form(s->head))
                     : VG_OK;
     if (!drop) return vgi_count_loose(&s->head->body.mesh, &s->loose, e);
     int r = vgi_slim_make(&s->slim, s->head, e);
@@ -532,8 +532,8 @@ int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e)
     const char *name = f->name ? f->name : "";
     vgi_plan_kind kind = s->plan.kind;
     int r = VG_OK;
-    if (f->has_scalars && !*s->scalars_lost)
-        snprintf(s->scalars_lost, sizeof s->scalars_lost, "%s", f->scalars_name);
+    const vg_channel *scalars = vg_frame_scalars(f);
+    if (scalars && !*s->scalars_lost) snprintf(s->scalars_lost, sizeof s->scalars_lost, "%s", scalars->name);
     if (s->slim.kept) {
         if ((r = vgi_slim_take(&s->slim, f, e)) < 0) return r;
         f = &s->slim.frame;

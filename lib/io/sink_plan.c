@@ -201,5 +201,5 @@ int vgi_plan_check_head(const vgi_plan *p, const vg_head *h, const char *output,
     if (h->kind == VG_VECTORS) advice = "pipe it through 'vg-solve' first";
     if (h->kind == VG_DEFORMATIONS)
         advice = "apply them with 'vg-deform --onto MESH' and pipe that through 'vg-solve' first";
-    return vg_fail(e, VG_EINPUT, "cannot write '%s': the input holds %s: %s", output, vg_kind_name(h->kind), advice);
+    return vg_fail(e, VG_EINPUT, "cannot write '%s': the input holds %s: %s", output, vg_head_form(h), advice);
 }

@@ -221,7 +221,7 @@ static int join_head(vg_source *s, const item *it, const vg_head *h, vg_err *e)
 {
     if (h->kind != VG_VERTICES)
         return vg_fail(e, VG_EINPUT, "'%s' holds %s: only streams of vertices can be joined with other inputs",
-                       item_name(it), vg_kind_name(h->kind));
+                       item_name(it), vg_head_form(h));
     if (s->own_name || it != s->items) return vg_head_merge_trace(&s->head, h, e);
     int r = vg_head_copy(&s->head, h, e);
     if (r == VG_OK) r = settle_mesh(s, &h->body.mesh, NULL, item_name(it), e);
@@ -418,7 +418,6 @@ static int hand_out(vg_source *s, vg_frame *f, vg_err *e)
         vg_records_clear(&f->extra);
         f->has_time = false;
         f->time = 0;
-        f->nturns = 0;
         r = 1;
     }
     clear_pose(s, p);
@@ -471,7 +470,7 @@ static int take_over_head(vg_source *s, const char *archive, const char *path, v
     size_t count = h->count;
     if (kind != VG_VERTICES && (s->n > 1 || archive))
         return vg_fail(e, VG_EINPUT, "%s holds %s: only vertices can be joined with other inputs", p->subject,
-                       vg_kind_name(kind));
+                       vg_head_form(h));
     int r = p->format->keeps & VGI_KEEPS_FACES
                 ? VG_OK
                 : vgi_play_borrow_faces(p, path == standard_input ? NULL : path, h, e);
@@ -497,7 +496,7 @@ static int join_sequence(const vg_source *s, const vg_head *h, vg_err *e)
     if (s->playing.format->join) return s->playing.format->join(s->playing.state, &s->own, e);
     if (h->kind != VG_VERTICES)
         return vg_fail(e, VG_EINPUT, "%s holds %s: only vertices can be joined with a mesh or other inputs", subject,
-                       vg_kind_name(h->kind));
+                       vg_head_form(h));
     if (h->body.mesh.nf) return check_joins(s, &h->body.mesh, subject, e);
     return h->body.mesh.nv == s->own.body.mesh.nv
                ? VG_OK

@@ -14,22 +14,12 @@ struct vg_reader {
     vgi_tally tally;
     vg_head head;
     bool seen[VGI_ARTEFACTS], formed; /* header records; FORM */
-    vg_head form; /* kind, precision, counts of the frames as they come (no arrays): the caller may change `head` */
+    vgi_form form; /* of the frames as they come: the caller may change `head` */
     vg_records tail;
     uint64_t frames;
     bool ended;
     vg_failure failure;
 };
-
-static void remember_form(vg_reader *r)
-{
-    r->form = (vg_head){.kind = r->head.kind,
-                        .precision = r->head.precision,
-                        .count = r->head.count,
-                        .nanchors = r->head.nanchors,
-                        .body.mesh.nv = r->head.body.mesh.nv,
-                        .body.skeleton.njoints = r->head.body.skeleton.njoints};
-}
 
 static int keep_unknown(vg_reader *r, vg_record *record, vg_records *list, vg_err *e)
 {
@@ -84,7 +74,6 @@ static int read_head_record(vg_reader *r, vg_record *record, vg_err *e)
     }
     if (!strcmp(record->tag, "FAIL")) return stopped_by_failure(r, record, e);
     if (!strcmp(record->tag, "FRAM")) return vg_fail(e, VG_EINPUT, "'%s' has a frame before its FORM record", name);
-    if (!strcmp(record->tag, "SCAL")) return vg_fail(e, VG_EINPUT, "'%s': record SCAL must come after FORM", name);
     return keep_unknown(r, record, &r->head.extra, e);
 }
 
@@ -103,7 +92,7 @@ static int read_head(vg_reader *r, vg_err *e)
     if (r->seen[VGI_MESH] && !r->head.body.reference)
         return vg_fail(e, VG_EINPUT, "'%s' has a MESH but no REFP record before FORM", vgi_input_name(r->in));
     if (!r->head.body.reference_name && !(r->head.body.reference_name = vgi_copy_string("", 0, e))) return VG_ENOMEM;
-    remember_form(r);
+    r->form = vgi_form_of(&r->head);
     return VG_OK;
 }
 
@@ -143,20 +132,10 @@ vg_records *vg_reader_tail(vg_reader *r)
     return &r->tail;
 }
 
-static int read_scalars(const vg_reader *r, const vg_record *record, vg_frame *f, vg_err *e)
-{
-    char where[240];
-    snprintf(where, sizeof where, "'%.150s': record SCAL of frame %llu", vgi_input_name(r->in),
-             (unsigned long long)r->frames);
-    vgi_payload p = {record->payload.data, record->payload.size, where};
-    return vgi_scal_decode(&p, &r->form, f, e);
-}
-
 /* The frame's raw buffer takes part in reading, so that a large payload is read straight to where it stays. */
 int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
 {
     vg_records_clear(&f->extra);
-    f->has_scalars = false;
     if (r->ended) return 0;
     vg_record record = {.payload = f->raw};
     vg_records before = {0};
@@ -164,7 +143,6 @@ int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
     while ((ok = vgi_record_read(r->in, &r->tally, &record, e)) > 0) {
         if (!strcmp(record.tag, "FRAM")) break;
         if (!strcmp(record.tag, "FAIL")) ok = stopped_by_failure(r, &record, e);
-        else if (!strcmp(record.tag, "SCAL")) ok = read_scalars(r, &record, f, e);
         else if (!strcmp(record.tag, "FORM"))
             ok = vg_fail(e, VG_EINPUT, "'%s' has two FORM records", vgi_input_name(r->in));
         else if (vgi_artefact_by_tag(record.tag))
@@ -173,8 +151,6 @@ int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
         if (ok < 0) break;
     }
     f->raw = record.payload;
-    if (ok == 0 && f->has_scalars)
-        ok = vg_fail(e, VG_EINPUT, "'%s': no frame comes behind the last SCAL record", vgi_input_name(r->in));
     if (ok <= 0) {
         if (ok == 0) r->ended = true, r->tail = before;
         else vg_records_clear(&before);
@@ -212,6 +188,7 @@ struct vg_writer {
     int fd;
     char *name;
     const vg_head *head;
+    vgi_form form;
     vgi_tally tally;
     vg_bytes front, values; /* reused from record to record */
 };
@@ -256,37 +233,19 @@ int vg_writer_open(vg_writer **out, int fd, const char *name, const vg_head *h, 
 {
     vg_writer *w = *out = vgi_array(1, sizeof *w, e);
     if (!w) return VG_ENOMEM;
-    w->fd = fd, w->head = h;
+    w->fd = fd, w->head = h, w->form = vgi_form_of(h);
     int r = (w->name = vgi_copy_string(name, strlen(name), e)) ? vgi_tally_init(&w->tally, e) : VG_ENOMEM;
     if (r == VG_OK) r = write_head(w, e);
     if (r < 0) vg_writer_close(out);
     return r;
 }
 
-static int write_scalars(vg_writer *w, const vg_frame *f, vg_err *e)
-{
-    const vg_head *h = w->head;
-    vgi_part parts[2];
-    if (h->kind != VG_VERTICES || !f->has_scalars) return VG_OK;
-    w->front.size = 0;
-    int r = vgi_scal_encode(&w->front, f, e);
-    if (r == VG_OK && !vgi_finite(f->scalars, h->body.mesh.nv))
-        r = vg_fail(e, VG_EINPUT, "a '%s' of frame '%s' is not finite", f->scalars_name, f->name ? f->name : "");
-    if (r == VG_OK)
-        r = vgi_values_encode(&w->values, f->scalars, h->body.mesh.nv, h->precision, &parts[1].data, &parts[1].size,
-                              e);
-    if (r < 0) return r;
-    parts[0] = (vgi_part){w->front.data, w->front.size};
-    return vgi_record_write(w->fd, w->name, &w->tally, "SCAL", 0, parts, 2, e);
-}
-
 int vg_writer_put(vg_writer *w, const vg_frame *f, vg_err *e)
 {
-    const vg_head *h = w->head;
-    size_t n = h->count * vg_kind_width(h->kind);
+    const vgi_form *h = &w->form;
+    size_t n = h->count * h->width;
     vgi_part parts[2];
     int r = write_extra(w, &f->extra, e);
-    if (r == VG_OK) r = write_scalars(w, f, e);
     if (r == VG_OK && !vgi_finite(f->values, n))
         r = vg_fail(e, VG_EINPUT, "frame '%s' holds a number that is not finite", f->name ? f->name : "");
     w->front.size = 0;

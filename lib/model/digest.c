@@ -58,6 +58,13 @@ static void mix_text(vg_digest *d, const char *s)
     if (n) XXH64_update(&d->state, s, n);
 }
 
+/* A form whose name does not say its width. */
+static void mix_form(vg_digest *d, const vg_head *h)
+{
+    mix_text(d, vg_head_form(h));
+    mix_count(d, vg_head_width(h));
+}
+
 int vg_digest_new(vg_digest **out, const vg_head *h, vg_err *e)
 {
     vg_digest *d = *out = vgi_array(1, sizeof *d, e);
@@ -65,6 +72,7 @@ int vg_digest_new(vg_digest **out, const vg_head *h, vg_err *e)
     d->head = h;
     XXH64_reset(&d->state, 0);
     mix_count(d, h->kind);
+    if (!vg_kind_width(h->kind)) mix_form(d, h);
     mix_count(d, h->count);
     mix_count(d, h->body.mesh.nv);
     mix_count(d, h->body.mesh.nf);
@@ -90,15 +98,17 @@ void vg_digest_add(vg_digest *d, const vg_frame *f)
     mix_text(d, f->name);
     mix_count(d, f->has_time);
     if (f->has_time) mix_doubles(d, &f->time, 1);
-    if (h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS) {
+    if (vg_head_element(h) == VG_OF_CORNER) {
         mix_doubles(d, f->root, 3);
-        mix_doubles(d, f->anchors, 3 * h->nanchors);
+        if (h->nanchors) mix_doubles(d, vg_frame_anchors(f), 3 * h->nanchors);
     }
     if (h->kind == VG_VERTICES && h->body.skeleton.njoints) {
-        mix_count(d, f->nturns);
-        mix_doubles(d, f->turns, 4 * f->nturns);
+        size_t n;
+        const double *turns = vg_frame_turns(f, &n);
+        mix_count(d, n);
+        mix_doubles(d, turns, 4 * n);
     }
-    mix_doubles(d, f->values, h->count * vg_kind_width(h->kind));
+    mix_doubles(d, f->values, h->count * vg_head_width(h));
 }
 
 uint64_t vg_digest_get(const vg_digest *d)

@@ -1,8 +1,8 @@
-/* head.c: what is known of a sequence before its frames, and the frame itself: making, copying, releasing.
- * Leaves out how either is written down (io) and what is computed from it (method).
+/* head.c: what is known of a sequence before its frames, making, copying, releasing.
+ * Leaves out frames (frame.c) and their forms (form.c), how it is written down (io) and what is computed from it (method).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/artefact.h"
-#include "model/frame.h"
+#include "model/form.h"
 
 #include <stdlib.h>
 
@@ -104,25 +104,6 @@ static int copy_records(vg_records *to, const vg_records *from, vg_err *e)
         }
     }
     return VG_OK;
-}
-
-static const struct { size_t width; const char *name; } kinds[] = {
-    [VG_VERTICES] = {3, "vertices"}, [VG_VECTORS] = {3, "vectors"},
-    [VG_DEFORMATIONS] = {4, "deformations"}, [VG_TRANSFORMS] = {7, "transforms"}};
-
-static bool is_kind(vg_kind k)
-{
-    return k >= VG_VERTICES && k <= VG_TRANSFORMS;
-}
-
-size_t vg_kind_width(vg_kind k)
-{
-    return is_kind(k) ? kinds[k].width : 0;
-}
-
-const char *vg_kind_name(vg_kind k)
-{
-    return is_kind(k) ? kinds[k].name : "unknown";
 }
 
 /* ---- provenance ---- */
@@ -255,6 +236,8 @@ void vg_head_clear(vg_head *h)
         for (size_t k = 0; k < n; k++) vgi_fields_clear(t, vgi_artefact_in(t, h, k));
     }
     free(h->provenance);
+    free(h->form);
+    free(h->form_element);
     vg_records_clear(&h->extra);
     *h = (vg_head){0};
 }
@@ -262,8 +245,9 @@ void vg_head_clear(vg_head *h)
 int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e)
 {
     *to = (vg_head){.has_selection = from->has_selection, .has_links = from->has_links, .kind = from->kind,
-                    .precision = from->precision, .count = from->count};
+                    .width = from->width, .precision = from->precision, .count = from->count};
     int r = vg_body_copy(&to->body, &from->body, e);
+    if (r == VG_OK) r = vgi_form_copy(to, from, e);
     for (size_t i = 0; r == VG_OK && i < VGI_ARTEFACTS; i++) {
         const vgi_artefact *t = &vgi_artefacts[i];
         if (t->in_body || t->each) continue;
@@ -282,97 +266,4 @@ int vg_head_need(const vg_head *h, const char *what, const char *subject, vg_err
     bool empty = t == &vgi_artefacts[VGI_MESH] && !h->body.mesh.nv;
     if (vgi_artefact_count(t, h) && !empty) return VG_OK;
     return vg_fail(e, VG_EINPUT, "%s holds no %s%s%s", subject, what, t->advice ? ": " : "", t->advice ? t->advice : "");
-}
-
-/* ---- frame ---- */
-
-void vg_frame_clear(vg_frame *f)
-{
-    free(f->name);
-    free(f->anchors);
-    free(f->pins);
-    free(f->turns);
-    free(f->scalars_name);
-    free(f->scalars_unit);
-    free(f->scalars);
-    free(f->values_own);
-    vg_bytes_clear(&f->raw);
-    vg_records_clear(&f->extra);
-    *f = (vg_frame){0};
-}
-
-int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e)
-{
-    size_t n, anchors;
-    if (!vgi_mul(h->count, vg_kind_width(h->kind), &n) || !vgi_mul(h->nanchors, 3, &anchors))
-        return vg_fail(e, VG_ENOMEM, "not enough memory for a frame of %zu elements", h->count);
-    int r = vgi_grow(&f->values_own, &f->values_cap, n, sizeof *f->values, e);
-    if (r == VG_OK) r = vgi_grow(&f->anchors, &f->anchors_cap, anchors, sizeof *f->anchors, e);
-    if (r == VG_OK) f->values = f->values_own;
-    f->has_scalars = false;
-    return r;
-}
-
-int vg_frame_pin(vg_frame *f, const uint32_t *vertices, size_t n, vg_err *e)
-{
-    int r = vgi_grow(&f->pins, &f->pins_cap, n, sizeof *f->pins, e);
-    if (r < 0) return r;
-    if (n) memcpy(f->pins, vertices, n * sizeof *f->pins);
-    f->npins = n;
-    return VG_OK;
-}
-
-int vg_frame_turn(vg_frame *f, const double *turns, size_t njoints, vg_err *e)
-{
-    int r = vgi_grow(&f->turns, &f->turns_cap, 4 * njoints, sizeof *f->turns, e);
-    if (r < 0) return r;
-    if (njoints) memcpy(f->turns, turns, 4 * njoints * sizeof *f->turns);
-    f->nturns = njoints;
-    return VG_OK;
-}
-
-int vg_frame_rename(vg_frame *f, const char *name, vg_err *e)
-{
-    size_t n = strlen(name) + 1;
-    int r = vgi_grow(&f->name, &f->name_cap, n, 1, e);
-    if (r == VG_OK) memcpy(f->name, name, n);
-    return r;
-}
-
-static int put_text(char **to, size_t *cap, const char *text, size_t n, vg_err *e)
-{
-    int r = vgi_grow(to, cap, n + 1, 1, e);
-    if (r < 0) return r;
-    if (n) memcpy(*to, text, n);
-    (*to)[n] = 0;
-    return VG_OK;
-}
-
-int vgi_frame_scalars(vg_frame *f, const char *name, size_t name_bytes, const char *unit, size_t unit_bytes,
-                      size_t nv, vg_err *e)
-{
-    f->has_scalars = false;
-    int r = put_text(&f->scalars_name, &f->scalars_name_cap, name, name_bytes, e);
-    if (r == VG_OK) r = put_text(&f->scalars_unit, &f->scalars_unit_cap, unit, unit_bytes, e);
-    if (r == VG_OK) r = vgi_grow(&f->scalars, &f->scalars_cap, nv, sizeof *f->scalars, e);
-    f->has_scalars = r == VG_OK;
-    return r;
-}
-
-int vg_frame_scalars(vg_frame *f, const char *name, const char *unit, const double *numbers, size_t nv, vg_err *e)
-{
-    int r = vgi_frame_scalars(f, name, strlen(name), unit, strlen(unit), nv, e);
-    if (r == VG_OK && nv) memcpy(f->scalars, numbers, nv * sizeof *numbers);
-    return r;
-}
-
-int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e)
-{
-    f->has_time = from->has_time;
-    f->has_scalars = false;
-    f->time = from->time;
-    vg_records_clear(&f->extra);
-    f->extra = from->extra;
-    from->extra = (vg_records){0};
-    return vg_frame_rename(f, from->name ? from->name : "", e);
 }

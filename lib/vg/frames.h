@@ -87,16 +87,38 @@ typedef struct vg_records {
 
 void vg_records_clear(vg_records *r);
 
-/* What the values of a frame are, per element. */
+/* What values are counted by. */
+typedef enum vg_element {
+    VG_OF_UNKNOWN = 0, /* an element that this version does not know */
+    VG_OF_VERTEX,      /* of the mesh */
+    VG_OF_CORNER,      /* of the vector graph */
+    VG_OF_JOINT,       /* of the skeleton of the mesh */
+    VG_OF_TRANSFORM,   /* of frames of transforms */
+    VG_OF_ANCHOR,
+    VG_OF_FRAME,       /* the frame as a whole: always one */
+    VG_OF_COMPONENT,   /* of the mesh or its selection */
+    VG_OF_LIST,        /* vertices of the mesh, ascending, in place of numbers */
+    VG_ELEMENTS
+} vg_element;
+
+const char *vg_element_name(vg_element e); /* "vertex", "corner", ..., "vertex list"; "unknown" */
+
+/* The form of frames: what their values are. A stream says name, element and width; these are the forms that this
+ * version knows (model/form.c has the table). */
 typedef enum vg_kind {
-    VG_VERTICES = 1,     /* 3 numbers per vertex: position */
-    VG_VECTORS = 2,      /* 3 per corner of the vector graph: from the face's centroid to the vertex */
-    VG_DEFORMATIONS = 3, /* 4 per corner of the vector graph: quaternion w x y z, squared length = scale */
-    VG_TRANSFORMS = 4    /* 7 per bone or patch: quaternion w x y z as above, then translation */
+    VG_OTHER = 0,         /* a form that this version does not know: vg_head.form is its name */
+    VG_VERTICES = 1,      /* 3 numbers per vertex: position */
+    VG_VECTORS = 2,       /* 3 per corner of the vector graph: from the face's centroid to the vertex */
+    VG_DEFORMATIONS = 3,  /* 4 per corner of the vector graph: quaternion w x y z, squared length = scale */
+    VG_TRANSFORMS = 4,    /* 7 per bone or patch: quaternion w x y z as above, then translation */
+    VG_FEATURES = 5,      /* vg_head.width per vertex */
+    VG_COORDINATES = 6,   /* vg_head.width per frame, which has one element */
+    VG_KINDS
 } vg_kind;
 
-size_t vg_kind_width(vg_kind k);         /* 3, 3, 4, 7 */
+size_t vg_kind_width(vg_kind k);         /* 3, 3, 4, 7; 0: the head says it */
 const char *vg_kind_name(vg_kind k);     /* "vertices", ... ; "unknown" */
+vg_element vg_kind_element(vg_kind k);
 
 typedef enum vg_precision { VG_F32 = 4, VG_F64 = 8 } vg_precision;
 
@@ -120,9 +142,18 @@ typedef struct vg_head {
     vg_provenance *provenance;
     vg_records extra;     /* unknown records, in order */
     vg_kind kind;
+    char *form;           /* VG_OTHER: the form's name */
+    char *form_element;   /* VG_OTHER: what its elements are called */
+    size_t width;         /* numbers of an element, of forms whose width is not fixed; see vg_head_width */
     vg_precision precision;
-    size_t count;         /* elements of a frame: nv, corners of the graph, or number of transforms */
+    size_t count;         /* elements of a frame: nv, corners of the graph, number of transforms, 1 */
 } vg_head;
+
+size_t vg_head_width(const vg_head *h);          /* numbers of an element of a frame */
+const char *vg_head_form(const vg_head *h);      /* the form's name, of any form */
+vg_element vg_head_element(const vg_head *h);
+/* vg_head_elements: how many elements of that sort a frame has; SIZE_MAX: nobody knows. */
+size_t vg_head_elements(const vg_head *h, vg_element e);
 
 void vg_head_clear(vg_head *h);
 int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e) VG_MUST_CHECK;
@@ -140,46 +171,69 @@ int vg_head_trace(vg_head *h, const char *program, int argc, char *const *argv, 
  * vg_head_trace). */
 int vg_head_merge_trace(vg_head *h, const vg_head *other, vg_err *e) VG_MUST_CHECK;
 
+/* What comes with a frame beside its values: so many numbers for each element, or a list of vertices. Some names have a
+ * meaning (fmt/STREAM.md, section 3.12): "anchors", "pins", "turns". */
+typedef struct vg_channel {
+    char *name, *unit;   /* UTF-8: "error", never ""; "D", or "" */
+    vg_element element;
+    char *element_name;  /* as the stream has it, also of an element that is not known */
+    size_t width, count; /* numbers of an element; elements */
+    double *numbers;     /* count * width; NULL: it is a list */
+    uint32_t *vertices;  /* of VG_OF_LIST: count; else NULL */
+    vg_precision precision; /* in a stream; 0: that of the values */
+    vg_bytes texts, data; /* private: what the pointers point to */
+} vg_channel;
+
 /* One pose. The struct is reused from frame to frame; its arrays grow and stay. */
 typedef struct vg_frame {
     char *name; /* UTF-8, never NULL in a frame that was read */
     bool has_time;
     double time; /* seconds */
-    double root[3];  /* vectors, deformations: mean of the vertices that are in the vector graph */
-    double *anchors; /* vectors, deformations: head.nanchors points */
-    size_t npins;    /* vectors: vertices (ascending) that stay where the reference has them, in this frame; set by
-                        vg_frame_pin */
-    uint32_t *pins;
-    size_t nturns;   /* vertices of a skeleton: number of joints when it is known how they have turned, else 0; set by
-                        vg_frame_turn */
-    double *turns;   /* a unit quaternion w x y z each, beside the skeleton's pose without rotations: positions do not
-                        say it all */
-    bool has_scalars; /* vertices: a number for each vertex comes with the frame, such as its error; set by
-                         vg_frame_scalars */
-    char *scalars_name, *scalars_unit; /* UTF-8: "error", never ""; "D", or "" */
-    double *scalars;  /* mesh.nv */
-    double *values;  /* head.count * vg_kind_width(head.kind) */
+    double root[3];  /* forms on corners: mean of the vertices that are in the vector graph */
+    size_t nchannels;
+    vg_channel *channels;
+    double *values;  /* head.count * vg_head_width(head) */
     vg_records extra; /* unknown records that came before this frame */
     /* private to the reader and to vg_frame_*: */
     vg_bytes raw;
-    size_t name_cap, anchors_cap, pins_cap, turns_cap, values_cap, scalars_name_cap, scalars_unit_cap, scalars_cap;
+    size_t name_cap, values_cap, channels_cap;
     double *values_own;
 } vg_frame;
 
 void vg_frame_clear(vg_frame *f);
-/* vg_frame_shape: make room for the values and anchors of a frame of h; contents undefined, no scalars. */
+/* vg_frame_shape: make room for the values, and for the anchors of forms on corners; contents undefined, no other
+ * channels. */
 int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e) VG_MUST_CHECK;
-/* vg_frame_pin, _turn, _rename: the frame has these from now on (copied; n or njoints 0: none). */
-int vg_frame_pin(vg_frame *f, const uint32_t *vertices, size_t n, vg_err *e) VG_MUST_CHECK;
-int vg_frame_turn(vg_frame *f, const double *turns, size_t njoints, vg_err *e) VG_MUST_CHECK;
 int vg_frame_rename(vg_frame *f, const char *name, vg_err *e) VG_MUST_CHECK;
-/* vg_frame_scalars: numbers (nv of them, copied) come with the frame from now on,
- * until it is shaped or labelled again. */
-int vg_frame_scalars(vg_frame *f, const char *name, const char *unit, const double *numbers, size_t nv,
-                     vg_err *e) VG_MUST_CHECK;
-/* vg_frame_label: take over name, time and unknown records of `from`, but no numbers, pins, turns or scalars; `from`
- * loses its records. */
+/* vg_frame_label: take over name, time and unknown records of `from`, but no numbers and no channels: f keeps its
+ * anchors alone. `from` loses its records. */
 int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e) VG_MUST_CHECK;
+
+/* vg_frame_channel: the channel of this name; NULL: there is none. */
+vg_channel *vg_frame_channel(const vg_frame *f, const char *name);
+/* vg_frame_add: make room for a channel, in place of the one of that name. Its contents are undefined. *c is valid until
+ * the next one is added or dropped. Nothing is allocated once the frame has had a channel as large. */
+int vg_frame_add(vg_frame *f, const char *name, const char *unit, vg_element element, size_t width, size_t count,
+                 vg_channel **c, vg_err *e) VG_MUST_CHECK;
+void vg_frame_drop(vg_frame *f, const char *name); /* may be there or not */
+void vg_frame_drop_all(vg_frame *f);
+
+/* The channels that have a meaning. They are set by copying; n = 0: none. */
+/* anchors: positions of head.nanchors vertices in frames on corners. NULL: there are none. vg_frame_make_anchors: room for
+ * n of them. */
+double *vg_frame_anchors(const vg_frame *f);
+int vg_frame_make_anchors(vg_frame *f, size_t n, double **positions, vg_err *e) VG_MUST_CHECK;
+/* pins: vertices (ascending) that stay where the reference has them, in this frame of vectors. */
+const uint32_t *vg_frame_pins(const vg_frame *f, size_t *n);
+int vg_frame_pin(vg_frame *f, const uint32_t *vertices, size_t n, vg_err *e) VG_MUST_CHECK;
+/* turns: a unit quaternion w x y z for each joint of the skeleton whose joints are the vertices: how it has turned beside
+ * the skeleton's pose without rotations, which positions alone do not say. */
+const double *vg_frame_turns(const vg_frame *f, size_t *n);
+int vg_frame_turn(vg_frame *f, const double *turns, size_t njoints, vg_err *e) VG_MUST_CHECK;
+/* scalars: the first channel with one number for each vertex, such as its error, under any name. */
+vg_channel *vg_frame_scalars(const vg_frame *f);
+int vg_frame_set_scalars(vg_frame *f, const char *name, const char *unit, const double *numbers, size_t nv,
+                         vg_err *e) VG_MUST_CHECK;
 
 #ifdef __cplusplus
 }

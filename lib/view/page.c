@@ -209,7 +209,7 @@ static int measure(sequence *s, vg_err *e)
 int vg_page_sequence(vg_page *p, const char *label, const vg_head *h, vg_err *e)
 {
     if (p->n == VG_PAGE_SEQUENCES) return vg_fail(e, VG_EARG, "a page has at most %d sequences", VG_PAGE_SEQUENCES);
-    if (h->kind != VG_VERTICES) return vg_fail(e, VG_EARG, "a page shows vertices, not %s", vg_kind_name(h->kind));
+    if (h->kind != VG_VERTICES) return vg_fail(e, VG_EARG, "a page shows vertices, not %s", vg_head_form(h));
     sequence *s = p->at + p->n;
     *s = (sequence){.label = label, .head = h, .timed = true, .last_time = -INFINITY};
     size_t i = p->n++;

@@ -77,7 +77,7 @@ int vg_sheet_sequence(vg_sheet *s, const char *label, const vg_head *h, const vg
 {
     if (s->nsequences == VG_SHEET_SEQUENCES)
         return vg_fail(e, VG_EARG, "a sheet has at most %d sequences", VG_SHEET_SEQUENCES);
-    if (h->kind != VG_VERTICES) return vg_fail(e, VG_EARG, "a sheet shows vertices, not %s", vg_kind_name(h->kind));
+    if (h->kind != VG_VERTICES) return vg_fail(e, VG_EARG, "a sheet shows vertices, not %s", vg_head_form(h));
     if (truth && truth->body.mesh.nv != h->body.mesh.nv)
         return vg_fail(e, VG_EARG, "a sequence and its truth have another number of vertices");
     vgi_row *q = s->at + s->nsequences++;

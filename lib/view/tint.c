@@ -96,21 +96,22 @@ static void measure_errors(vgi_meter *m, bool centred, const double *points, con
 
 static int same_name(vgi_tint *t, const vg_frame *f, vg_err *e)
 {
+    const vg_channel *c = vg_frame_scalars(f);
     if (!t->name) {
-        t->name = vgi_copy_string(f->scalars_name, strlen(f->scalars_name), e);
-        t->unit = vgi_copy_string(f->scalars_unit, strlen(f->scalars_unit), e);
+        t->name = vgi_copy_string(c->name, strlen(c->name), e);
+        t->unit = vgi_copy_string(c->unit, strlen(c->unit), e);
         return t->name && t->unit ? VG_OK : VG_ENOMEM;
     }
-    if (!strcmp(t->name, f->scalars_name) && !strcmp(t->unit, f->scalars_unit)) return VG_OK;
+    if (!strcmp(t->name, c->name) && !strcmp(t->unit, c->unit)) return VG_OK;
     return vg_fail(e, VG_EINPUT,
                    "frame '%s' brings '%s' in '%s', those before it '%s' in '%s': colours cannot say both", f->name,
-                   f->scalars_name, f->scalars_unit, t->name, t->unit);
+                   c->name, c->unit, t->name, t->unit);
 }
 
 bool vgi_tint_has(const vgi_tint *t, const vg_frame *f, const double *truth)
 {
     return t->what == VG_TINT_SCALES || (t->what == VG_TINT_ERRORS && truth) ||
-           (t->what == VG_TINT_SCALARS && f->has_scalars);
+           (t->what == VG_TINT_SCALARS && vg_frame_scalars(f));
 }
 
 int vgi_tint_read(vgi_tint *t, vgi_meter *m, const vg_frame *f, const double *truth, vgi_spread *s, vg_err *e)
@@ -121,7 +122,7 @@ int vgi_tint_read(vgi_tint *t, vgi_meter *m, const vg_frame *f, const double *tr
     else if (t->what == VG_TINT_ERRORS) measure_errors(m, t->centred, f->values, truth);
     else r = same_name(t, f, e);
     if (r < 0) return r;
-    if (t->what == VG_TINT_SCALARS && nv) memcpy(m->numbers, f->scalars, nv * sizeof *m->numbers);
+    if (t->what == VG_TINT_SCALARS && nv) memcpy(m->numbers, vg_frame_scalars(f)->numbers, nv * sizeof *m->numbers);
     *s = (vgi_spread){.least = nv ? m->numbers[0] : 0, .most = nv ? m->numbers[0] : 0};
     for (size_t v = 0; v < nv; v++) {
         s->mean += m->numbers[v] / (double)nv;

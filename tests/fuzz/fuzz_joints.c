@@ -44,9 +44,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (r == VG_OK) r = format->join(state, with, &e);
     if (r == VG_OK) r = vg_frame_shape(&f, with, &e);
     while (r >= 0 && (r = format->next(state, &f, &e)) > 0) {
-        demand(*f.name && vgi_finite(f.values, 3 * with->count) && f.nturns == with->count);
-        for (size_t j = 0; j < f.nturns; j++) {
-            const double *q = f.turns + 4 * j;
+        size_t n;
+        const double *turns = vg_frame_turns(&f, &n);
+        demand(*f.name && vgi_finite(f.values, 3 * with->count) && n == with->count);
+        for (size_t j = 0; j < n; j++) {
+            const double *q = turns + 4 * j;
             double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
             demand(square > 1 - 1e-9 && square < 1 + 1e-9);
         }

@@ -19,7 +19,7 @@ static void demand(bool holds)
 static void write_frame(vg_writer *w, const vg_head *h, const vg_frame *f)
 {
     vg_err e;
-    demand(vgi_finite(f->values, h->count * vg_kind_width(h->kind)) && (!f->has_time || vgi_finite(&f->time, 1)));
+    demand(vgi_finite(f->values, h->count * vg_head_width(h)) && (!f->has_time || vgi_finite(&f->time, 1)));
     demand(f->name && vgi_is_utf8(f->name, strlen(f->name)));
     demand(vg_writer_put(w, f, &e) == VG_OK);
 }

@@ -27,7 +27,9 @@ static void read_skeleton(const uint8_t *data, size_t size)
         demand(vg_mesh_check(&h.body.mesh, "it", &e) == VG_OK && vgi_finite(h.body.reference, 3 * h.count));
         for (size_t j = 0; j < h.count; j++)
             demand(h.body.skeleton.joints[j].parent == UINT32_MAX || h.body.skeleton.joints[j].parent < j);
-        demand(vg_frame_shape(&f, &h, &e) == VG_OK && format->next(state, &f, &e) == 1 && f.nturns == h.count);
+        demand(vg_frame_shape(&f, &h, &e) == VG_OK && format->next(state, &f, &e) == 1);
+        size_t turns;
+        demand(vg_frame_turns(&f, &turns) && turns == h.count);
         demand(!memcmp(f.values, h.body.reference, 3 * h.count * sizeof *f.values) &&
                format->next(state, &f, &e) == 0);
     }

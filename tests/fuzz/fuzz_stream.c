@@ -76,11 +76,16 @@ static void use_head(const vg_head *h)
 static void use_frame(const vg_frame *f, const vg_head *h)
 {
     demand(f->name != NULL && vgi_is_utf8(f->name, strlen(f->name)));
-    demand(vgi_finite(f->values, h->count * vg_kind_width(h->kind)));
-    if (f->has_scalars)
-        demand(*f->scalars_name && vgi_is_utf8(f->scalars_unit, strlen(f->scalars_unit)) &&
-               vgi_finite(f->scalars, h->body.mesh.nv));
-    if (h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS) demand(vgi_finite(f->anchors, 3 * h->nanchors));
+    demand(vgi_finite(f->values, h->count * vg_head_width(h)));
+    for (size_t i = 0; i < f->nchannels; i++) {
+        const vg_channel *c = &f->channels[i];
+        demand(*c->name && vgi_is_utf8(c->unit, strlen(c->unit)) && *c->element_name | !c->element && c->width);
+        if (c->vertices) demand(c->count && c->width == 1 && c->vertices[c->count - 1] < h->body.mesh.nv);
+        else demand(vgi_finite(c->numbers, c->width * c->count));
+        size_t n = vg_head_elements(h, c->element);
+        demand(c->vertices || n == SIZE_MAX || n == c->count);
+    }
+    if (vg_head_element(h) == VG_OF_CORNER) demand(vgi_finite(f->root, 3) && !h->nanchors == !vg_frame_anchors(f));
 }
 
 /* Read all of data; with fd >= 0 also write it there as a filter would. True when it was a whole stream. */

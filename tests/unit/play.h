@@ -27,7 +27,7 @@ static void played_clear(played *p)
 
 static void note_frame(played *p, const vg_frame *f)
 {
-    size_t n = p->h.count * vg_kind_width(p->h.kind), used = strlen(p->names);
+    size_t n = p->h.count * vg_head_width(&p->h), used = strlen(p->names);
     if (p->n + n <= sizeof p->values / sizeof *p->values) memcpy(p->values + p->n, f->values, n * sizeof *f->values);
     if (p->frames < 16) p->times[p->frames] = f->time;
     p->timed = f->has_time;

@@ -39,9 +39,11 @@ static int read_bytes(sequence *s, const char *text, size_t n, vg_err *e)
         size_t size = 3 * s->head.count * sizeof(double);
         s->at[s->n] = malloc(size ? size : 1);
         memcpy(s->at[s->n], frame.values, size);
-        CHECK(frame.nturns == s->head.count);
-        s->turns[s->n] = malloc(32 * frame.nturns + 1);
-        memcpy(s->turns[s->n], frame.turns, 32 * frame.nturns);
+        size_t joints;
+        const double *turns = vg_frame_turns(&frame, &joints);
+        CHECK(joints == s->head.count);
+        s->turns[s->n] = malloc(32 * joints + 1);
+        if (joints) memcpy(s->turns[s->n], turns, 32 * joints);
         s->time[s->n] = frame.time, s->timed[s->n++] = frame.has_time;
     }
     f->close(state);
@@ -70,8 +72,9 @@ static char *write_turned(const sequence *s, bool turned, bool full, char *warni
         char name[32];
         snprintf(name, sizeof name, "f%zu", i);
         vg_frame frame = {.name = name, .has_time = s->timed[i], .time = s->time[i], .values = s->at[i]};
-        if (turned) frame.nturns = s->head.count, frame.turns = s->turns[i];
-        r = f->put(state, &frame, e);
+        r = turned ? vg_frame_turn(&frame, s->turns[i], s->head.count, e) : VG_OK;
+        if (r == VG_OK) r = f->put(state, &frame, e);
+        frame.name = NULL, vg_frame_clear(&frame);
     }
     if (r == VG_OK) r = f->end(state, e);
     if (r == VG_OK) r = vgi_output_flush(&out, e);

@@ -358,8 +358,8 @@ static void test_frame(void)
     vg_head h = full_head();
     vg_frame a = {0}, b = {0};
     vg_err e;
-    CHECK(vg_frame_shape(&a, &h, &e) == VG_OK && a.values && a.anchors);
-    a.values[3 * h.body.mesh.nv - 1] = 1, a.anchors[2] = 1;
+    CHECK(vg_frame_shape(&a, &h, &e) == VG_OK && a.values && !a.nchannels);
+    a.values[3 * h.body.mesh.nv - 1] = 1;
     CHECK(vg_frame_rename(&a, "pose", &e) == VG_OK && vg_frame_rename(&a, "a longer name", &e) == VG_OK);
     a.has_time = true, a.time = 2.5;
     a.extra = (vg_records){1, room(1, sizeof(vg_record))};
@@ -377,7 +377,47 @@ static void test_frame(void)
     CHECK(vg_frame_shape(&b, &h, &e) == VG_ENOMEM);
     vg_frame_clear(&a);
     vg_frame_clear(&b);
-    CHECK(!a.name && !a.values && !a.anchors);
+    CHECK(!a.name && !a.values && !a.channels);
+    vg_head_clear(&h);
+}
+
+static void test_channels(void)
+{
+    vg_head h = full_head();
+    vg_frame f = {0};
+    vg_channel *c;
+    vg_err e;
+    size_t n;
+    CHECK(vg_frame_set_scalars(&f, "error", "D", h.body.reference, h.body.mesh.nv, &e) == VG_OK);
+    CHECK(vg_frame_pin(&f, (uint32_t[]){1, 3}, 2, &e) == VG_OK && f.nchannels == 2);
+    CHECK(vg_frame_add(&f, "spin", "rad/s", VG_OF_FRAME, 3, 1, &c, &e) == VG_OK && c->numbers && !c->vertices);
+    CHECK(c == vg_frame_channel(&f, "spin") && !vg_frame_channel(&f, "spi") && !vg_frame_channel(&f, "spins"));
+    CHECK_TEXT(c->unit, "rad/s");
+    CHECK_TEXT(c->element_name, "frame");
+    c->numbers[2] = 7;
+    vg_frame_drop(&f, "pins");
+    CHECK(f.nchannels == 2 && !vg_frame_pins(&f, &n) && n == 0);
+    CHECK(vg_frame_channel(&f, "spin")->numbers[2] == 7 && vg_frame_scalars(&f)->numbers[4] == h.body.reference[4]);
+    /* the same name again takes its place, another set of scalars that of the first */
+    CHECK(vg_frame_add(&f, "spin", "", VG_OF_LIST, 1, 5, &c, &e) == VG_OK && c->vertices && !c->numbers);
+    CHECK(f.nchannels == 2 && vg_frame_set_scalars(&f, "load", "N", h.body.reference, 1, &e) == VG_OK);
+    CHECK(f.nchannels == 2 && !vg_frame_channel(&f, "error") && vg_frame_scalars(&f)->count == 1);
+    CHECK(vg_frame_add(&f, "", "", VG_OF_FRAME, 1, 1, &c, &e) == VG_EARG);
+    CHECK(vg_frame_add(&f, "huge", "", VG_OF_COMPONENT, SIZE_MAX / 4, 8, &c, &e) == VG_ENOMEM);
+    /* places are used again: the buffers of a frame stay the same from pose to pose */
+    vg_frame_drop_all(&f);
+    CHECK(vg_frame_add(&f, "a", "", VG_OF_FRAME, 64, 1, &c, &e) == VG_OK);
+    const double *buffer = c->numbers;
+    vg_frame_drop_all(&f);
+    CHECK(vg_frame_add(&f, "b", "", VG_OF_FRAME, 64, 1, &c, &e) == VG_OK && c->numbers == buffer);
+    /* anchors are those of frames on corners; a label keeps them and nothing else */
+    vg_frame g = {0};
+    h.kind = VG_VECTORS;
+    CHECK(vg_frame_shape(&f, &h, &e) == VG_OK && f.nchannels == 1 && vg_frame_anchors(&f));
+    CHECK(vg_frame_turn(&f, (double[]){1, 0, 0, 0}, 1, &e) == VG_OK && vg_frame_turns(&f, &n) && n == 1);
+    CHECK(vg_frame_label(&f, &g, &e) == VG_OK && f.nchannels == 1 && vg_frame_anchors(&f));
+    vg_frame_clear(&f);
+    vg_frame_clear(&g);
     vg_head_clear(&h);
 }
 
@@ -385,9 +425,18 @@ static void test_kinds(void)
 {
     CHECK(vg_kind_width(VG_VERTICES) == 3 && vg_kind_width(VG_VECTORS) == 3);
     CHECK(vg_kind_width(VG_DEFORMATIONS) == 4 && vg_kind_width(VG_TRANSFORMS) == 7);
-    CHECK(vg_kind_width((vg_kind)0) == 0 && vg_kind_width((vg_kind)5) == 0);
+    CHECK(vg_kind_width(VG_OTHER) == 0 && vg_kind_width(VG_KINDS) == 0 && vg_kind_width((vg_kind)-1) == 0);
+    CHECK(vg_kind_width(VG_FEATURES) == 0 && vg_kind_element(VG_FEATURES) == VG_OF_VERTEX);
+    vg_head h = {.kind = VG_FEATURES, .width = 9, .count = 4, .body.mesh.nv = 4};
+    CHECK(vg_head_width(&h) == 9 && vg_head_elements(&h, VG_OF_VERTEX) == 4);
+    CHECK(vg_head_elements(&h, VG_OF_TRANSFORM) == SIZE_MAX && vg_head_elements(&h, VG_OF_FRAME) == 1);
+    h.kind = VG_VERTICES;
+    CHECK(vg_head_width(&h) == 3); /* what the head says counts only where the form leaves it open */
+    h = (vg_head){.kind = VG_OTHER, .form = (char[]){"strains"}, .form_element = (char[]){"vertex"}, .width = 6};
+    CHECK(vg_head_width(&h) == 6 && vg_head_element(&h) == VG_OF_VERTEX);
+    CHECK_TEXT(vg_head_form(&h), "strains");
     CHECK_TEXT(vg_kind_name(VG_DEFORMATIONS), "deformations");
-    CHECK_TEXT(vg_kind_name((vg_kind)5), "unknown");
+    CHECK_TEXT(vg_kind_name(VG_KINDS), "unknown");
 }
 
 TESTS({"which meshes are valid", test_check},
@@ -395,4 +444,5 @@ TESTS({"which meshes are valid", test_check},
       {"which meshes are the same", test_same}, {"no faces", test_empty}, {"components", test_components},
       {"diagonal and centroid", test_size_and_centre}, {"vectors sum to 0, and move as the mesh does", test_vectors},
       {"the graph has faces, selection and links", test_graph}, {"a copy is whole and its own", test_copy},
-      {"provenance has its parents", test_trace}, {"frames are reused", test_frame}, {"kinds", test_kinds})
+      {"provenance has its parents", test_trace}, {"frames are reused", test_frame}, {"kinds", test_kinds},
+      {"channels", test_channels})

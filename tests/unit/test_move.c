@@ -14,21 +14,22 @@ static void moved(bool stay, double times)
     vg_graph *g = graph_of(&h);
     motion far = turn(0, 2, 3), step = turn(0.4, 1, 5);
     double *target = move_points(&far, h.body.reference, g->nv), *pose = move_points(&step, h.body.reference, g->nv);
-    double roots[3][3], at[2][3], to[2][3];
-    vg_frame in = {.anchors = at[0]}, out = {.anchors = to[0]};
+    double roots[3][3], *at, *to;
+    vg_frame in = {0}, out = {0};
     vg_mover *m;
     vg_err e;
+    CHECK(vg_frame_make_anchors(&in, 2, &at, &e) == VG_OK && vg_frame_make_anchors(&out, 2, &to, &e) == VG_OK);
     CHECK(vg_mover_new(&m, g, h.body.reference, g, target, anchors, 2, stay, &e) == VG_OK);
     vg_graph_root(g, h.body.reference, roots[0]), vg_graph_root(g, target, roots[1]),
         vg_graph_root(g, pose, roots[2]);
     memcpy(in.root, roots[2], sizeof in.root);
-    vg_graph_anchors(pose, anchors, 2, in.anchors);
+    vg_graph_anchors(pose, anchors, 2, at);
     vg_mover_move(m, &in, &out);
     for (size_t k = 0; k < 3; k++) {
         CHECK_NEAR(out.root[k], roots[1][k] + times * (roots[2][k] - roots[0][k]), 1e-12);
         for (size_t i = 0; i < 2; i++) {
             size_t x = 3 * anchors[i] + k;
-            CHECK_NEAR(to[i][k], target[x] + times * (pose[x] - h.body.reference[x]), 1e-12);
+            CHECK_NEAR(to[3 * i + k], target[x] + times * (pose[x] - h.body.reference[x]), 1e-12);
         }
     }
     double *placed = move_points(&step, target, g->nv),
@@ -40,6 +41,7 @@ static void moved(bool stay, double times)
         CHECK_NEAR(placed[x] - before[x], g->in_face[x / 3] ? placed[x % 3] - before[x % 3] : 0, 1e-12);
     vg_mover_free(&m);
     CHECK(m == NULL);
+    vg_frame_clear(&in), vg_frame_clear(&out);
     free(target), free(pose), free(placed), free(before);
     vg_graph_free(&g);
     vg_head_clear(&h);

@@ -176,13 +176,17 @@ static double places[] = {1, 2, 3, 4, 5, 6};
 static void make_frames(vg_frame f[2])
 {
     static char *const names[] = {(char *)"sm\xc3\xaele \xf0\x9f\x90\x8e", (char *)"b"};
+    static vg_channel positions = {.name = (char *)"anchors", .unit = (char *)"", .element = VG_OF_ANCHOR,
+                                 .element_name = (char *)"anchor", .width = 3, .count = sizeof places / 24,
+                                 .numbers = places};
     for (int i = 0; i < 48; i++) values[i / 24][i % 24] = i / 3.0 + 0.125;
     for (int i = 0; i < 2; i++)
         f[i] = (vg_frame){.name = names[i],
                           .has_time = true,
                           .time = i + 0.5,
                           .root = {i, 2, 3},
-                          .anchors = places,
+                          .nchannels = 1,
+                          .channels = &positions,
                           .values = values[i]};
 }
 
@@ -205,7 +209,7 @@ static void npz_there_and_back(void)
         CHECK(p.h.body.reference_name && !strcmp(p.h.body.reference_name, h.body.reference_name));
         CHECK(vg_mesh_same(&h.body.mesh, "", &p.h.body.mesh, "", NULL) == VG_OK);
         CHECK(p.h.body.reference && !memcmp(p.h.body.reference, reference, sizeof reference));
-        size_t n = h.count * vg_kind_width(h.kind);
+        size_t n = h.count * vg_head_width(&h);
         CHECK(p.n == 2 * n && !memcmp(p.values, values[0], n * 8) && !memcmp(p.values + n, values[1], n * 8));
         CHECK(p.h.nselected == h.nselected && p.h.nlinks == h.nlinks && p.h.nanchors == h.nanchors);
         played_clear(&p);

@@ -2,6 +2,7 @@
  * stay, keys are met to the bit, and the relaxation of the thesis ends at the same sequence. Frames come out of the
  * spool and of the store of poses as they went in.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "frames.h"
 #include "meshes.h"
 
 enum { FRAMES = 12, POINTS = 7, N = 3 * POINTS };
@@ -128,11 +129,11 @@ static void fill(vg_frame *f, const vg_head *h, size_t k)
     if (vg_frame_shape(f, h, &e) < 0 || vg_frame_rename(f, k == 4 ? "" : name, &e) < 0) abort();
     f->has_time = k % 2, f->time = f->has_time ? 0.04 * (double)k : 0;
     for (size_t i = 0; i < 3; i++) f->root[i] = (double)(k + i);
-    for (size_t i = 0; i < 6; i++) f->anchors[i] = (double)(k * i) + 0.5;
-    for (size_t i = 0; i < POINTS * vg_kind_width(h->kind); i++) f->values[i] = (double)k + 0.001 * (double)i;
+    for (size_t i = 0; i < 6 && vg_frame_anchors(f); i++) vg_frame_anchors(f)[i] = (double)(k * i) + 0.5;
+    for (size_t i = 0; i < POINTS * vg_head_width(h); i++) f->values[i] = (double)k + 0.001 * (double)i;
     if (vg_frame_pin(f, (uint32_t[]){1, 4, 6}, h->kind == VG_VECTORS ? k % 4 : 0, &e) < 0) abort();
     if (h->kind == VG_VERTICES && k % 3 &&
-        vg_frame_scalars(f, name, k % 2 ? "D" : "", f->values + k % 3, POINTS, &e) < 0)
+        vg_frame_set_scalars(f, name, k % 2 ? "D" : "", f->values + k % 3, POINTS, &e) < 0)
         abort();
     static const double turns[12] = {1, 0, 0, 0, 0.6, 0.8, 0, 0, 0, 0, -0.6, 0.8};
     if (vg_frame_turn(f, turns, h->kind == VG_VERTICES ? k % 4 : 0, &e) < 0) abort();
@@ -151,17 +152,9 @@ static bool same_frame(const vg_frame *a, const vg_frame *b, const vg_head *h)
     bool graph = h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS;
     bool same = !strcmp(a->name, b->name) && a->has_time == b->has_time && a->time == b->time &&
                 a->extra.n == b->extra.n &&
-                !memcmp(a->values, b->values, POINTS * vg_kind_width(h->kind) * sizeof(double));
-    same = same && a->npins == b->npins && (!a->npins || !memcmp(a->pins, b->pins, a->npins * sizeof *a->pins));
-    same = same && a->nturns == b->nturns &&
-           (!a->nturns || !memcmp(a->turns, b->turns, 4 * a->nturns * sizeof *a->turns));
-    same = same && a->has_scalars == b->has_scalars;
-    if (same && a->has_scalars)
-        same = !strcmp(a->scalars_name, b->scalars_name) && !strcmp(a->scalars_unit, b->scalars_unit) &&
-               !memcmp(a->scalars, b->scalars, POINTS * sizeof(double));
-    if (graph)
-        same =
-            same && !memcmp(a->root, b->root, sizeof a->root) && !memcmp(a->anchors, b->anchors, 6 * sizeof(double));
+                !memcmp(a->values, b->values, POINTS * vg_head_width(h) * sizeof(double));
+    same = same && same_channels(a, b);
+    if (graph) same = same && !memcmp(a->root, b->root, sizeof a->root) && vg_frame_anchors(a);
     for (size_t i = 0; same && i < a->extra.n; i++) {
         const vg_record *x = &a->extra.at[i], *y = &b->extra.at[i];
         same = !strcmp(x->tag, y->tag) && x->flags == y->flags && x->payload.size == y->payload.size &&

@@ -50,9 +50,11 @@ static void go(const vg_mover *m, const double *source, const double *target, co
 
 void vg_mover_move(const vg_mover *m, const vg_frame *in, vg_frame *out)
 {
+    const double *from = vg_frame_anchors(in);
+    double *to = vg_frame_anchors(out);
     go(m, m->source, m->target, in->root, out->root);
     for (size_t i = 0; i < 3 * m->nanchors; i += 3)
-        go(m, m->source_anchors + i, m->target_anchors + i, in->anchors + i, out->anchors + i);
+        go(m, m->source_anchors + i, m->target_anchors + i, from + i, to + i);
 }
 
 void vg_mover_place(const vg_mover *m, const double root[3], double *vertices)
