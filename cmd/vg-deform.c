@@ -335,21 +335,16 @@ static void make_head(work *w)
     w->source_reference = h->body.reference;
     if (opts.onto) {
         if (vg_head_merge_trace(h, t, &e) < 0 || vg_head_merge_trace(h, &w->pairs, &e) < 0) cli_die(&e);
-        free(h->body.reference_name);
-        vg_attributes_clear(&h->body.attributes);
-        vg_skeleton_clear(&h->body.skeleton);
-        h->body.reference = t->body.reference, h->body.reference_name = t->body.reference_name;
-        h->body.attributes = t->body.attributes, h->body.skeleton = t->body.skeleton;
-        t->body.reference = NULL, t->body.reference_name = NULL;
-        t->body.attributes = (vg_attributes){0}, t->body.skeleton = (vg_skeleton){0};
+        h->body.reference = NULL; /* w->source_reference has it */
+        vg_head_take(h, t, "reference");
+        vg_head_take(h, t, "attributes");
+        vg_head_take(h, t, "skeleton");
     }
     vg_map_clear(&h->map); /* it is no property of the mesh */
     if (w->way == CARRY) {
         vg_patches_clear(&h->body.patches);
-        h->body.mesh = t->body.mesh;
-        free(h->links);
-        h->has_links = t->has_links, h->links = t->links, h->nlinks = t->nlinks;
-        t->body.mesh = (vg_mesh){0}, t->links = NULL;
+        vg_head_take(h, t, "mesh");
+        vg_head_take(h, t, "links");
     }
     h->kind = w->way == MEASURE ? VG_DEFORMATIONS : w->way == SHAPE ? VG_VERTICES : VG_VECTORS;
     h->count = h->kind == VG_VERTICES ? h->body.mesh.nv : vg_graph_corners(w->to);

@@ -52,15 +52,8 @@ static void set_reference(vg_head *h, const char *operand)
         vg_mesh_same(&r.body.mesh, "the reference", &h->body.mesh, "the sequence", &e) < 0 ||
         vg_head_merge_trace(h, &r, &e) < 0)
         cli_die(&e);
-    free(h->body.reference);
-    free(h->body.reference_name);
-    h->body.reference = r.body.reference, h->body.reference_name = r.body.reference_name;
-    r.body.reference = NULL, r.body.reference_name = NULL;
-    if (r.body.attributes.ntex || r.body.attributes.nlabels) {
-        vg_attributes_clear(&h->body.attributes);
-        h->body.attributes = r.body.attributes;
-        r.body.attributes = (vg_attributes){0};
-    }
+    vg_head_take(h, &r, "reference");
+    if (r.body.attributes.ntex || r.body.attributes.nlabels) vg_head_take(h, &r, "attributes");
     free(h->links);
     h->links = NULL, h->nlinks = 0, h->has_links = false;
     vg_rig_clear(&h->body.rig);

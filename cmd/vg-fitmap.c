@@ -70,9 +70,7 @@ static void take_patches(vg_head *h)
         vg_mesh_same(&h->body.mesh, "the sequence", &from.body.mesh, name, &e) < 0 ||
         vg_head_merge_trace(h, &from, &e) < 0)
         cli_die(&e);
-    vg_patches_clear(&h->body.patches);
-    h->body.patches = from.body.patches;
-    from.body.patches = (vg_patches){0};
+    vg_head_take(h, &from, "patches");
     vg_head_clear(&from);
 }
 

@@ -37,10 +37,9 @@ static void retarget(vg_head *h)
         vg_map_retarget(h, target.body.reference, opts.morph, cli.threads, &e) < 0 ||
         vg_head_merge_trace(h, &target, &e) < 0)
         cli_die(&e);
-    free(h->body.reference_name);
-    h->body.reference_name = target.body.reference_name, target.body.reference_name = NULL;
-    vg_attributes_clear(&h->body.attributes);
-    h->body.attributes = target.body.attributes, target.body.attributes = (vg_attributes){0};
+    char *map_name = h->body.reference_name; /* positions are those of the morphed body, the name is the target's */
+    h->body.reference_name = target.body.reference_name, target.body.reference_name = map_name;
+    vg_head_take(h, &target, "attributes");
     vg_head_clear(&target);
 }
 

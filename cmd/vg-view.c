@@ -359,9 +359,7 @@ static void take_patches(side *s)
     if (vg_load(&h, opts.patches, "patches", &e) < 0 ||
         vg_mesh_same(&h.body.mesh, name, &s->head->body.mesh, s->name, &e) < 0)
         cli_die(&e);
-    vg_patches_clear(&s->head->body.patches);
-    s->head->body.patches = h.body.patches;
-    h.body.patches = (vg_patches){0};
+    vg_head_take(s->head, &h, "patches");
     vg_head_clear(&h);
 }
 

@@ -60,15 +60,9 @@ static int borrow_mesh(const vgi_playing *p, vg_head *h, const char *path, vg_er
     if (r == VG_OK && from.body.mesh.nv != h->body.mesh.nv)
         r = vgi_different_count(h, p->subject, from.body.mesh.nv, vgi_quote(path, subject), e);
     if (r == VG_OK) {
-        vg_mesh_clear(&h->body.mesh);
-        vg_attributes_clear(&h->body.attributes);
-        h->body.mesh = from.body.mesh, h->body.attributes = from.body.attributes;
-        from.body.mesh = (vg_mesh){0}, from.body.attributes = (vg_attributes){0};
-        if (!h->body.reference) {
-            free(h->body.reference_name);
-            h->body.reference = from.body.reference, h->body.reference_name = from.body.reference_name;
-            from.body.reference = NULL, from.body.reference_name = NULL;
-        }
+        vg_head_take(h, &from, "mesh");
+        vg_head_take(h, &from, "attributes");
+        if (!h->body.reference) vg_head_take(h, &from, "reference");
     }
     vg_head_clear(&from);
     return r;

@@ -572,14 +572,8 @@ static int settle_named_mesh(vg_source *s, const char *mesh, vg_err *e)
     if (r == VG_OK) r = settle_mesh(s, &from.body.mesh, NULL, mesh, e);
     if (r == VG_OK) r = keep_skeleton(s, &from, e);
     if (r == VG_OK) r = vg_head_merge_trace(&s->head, &from, e);
-    if (r == VG_OK) {
-        s->head.body.mesh = from.body.mesh, s->head.body.attributes = from.body.attributes,
-        s->head.body.skeleton = from.body.skeleton;
-        from.body.skeleton = (vg_skeleton){0};
-        s->head.body.reference = from.body.reference, s->head.body.reference_name = from.body.reference_name;
-        from.body.mesh = (vg_mesh){0}, from.body.attributes = (vg_attributes){0};
-        from.body.reference = NULL, from.body.reference_name = NULL;
-    }
+    static const char *const parts[] = {"mesh", "attributes", "skeleton", "reference"};
+    for (size_t i = 0; r == VG_OK && i < sizeof parts / sizeof *parts; i++) vg_head_take(&s->head, &from, parts[i]);
     vg_head_clear(&from);
     return r;
 }

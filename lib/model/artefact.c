@@ -102,6 +102,17 @@ void vgi_fields_clear(const vgi_artefact *t, void *artefact)
     }
 }
 
+void vgi_fields_move(const vgi_artefact *t, void *to, void *from)
+{
+    vgi_fields_clear(t, to);
+    for (size_t i = 0; i < t->nfields; i++) {
+        const vgi_member *f = &t->fields[i];
+        size_t size = f->length || f->type == VGI_TEXT ? sizeof(void *) : f->size;
+        memcpy((char *)to + f->at, (char *)from + f->at, size);
+        memset((char *)from + f->at, 0, size);
+    }
+}
+
 /* The texts of a list whose other bytes are copied already: all pointers to the original's are replaced. */
 static int copy_texts(const vgi_member *f, char *array, size_t n, vg_err *e)
 {

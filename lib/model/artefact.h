@@ -73,7 +73,7 @@ typedef int vgi_check(vg_head *h, void *artefact, const char *where, vg_err *e);
 typedef struct vgi_artefact {
     const char *tag;
     uint32_t flags;
-    const char *name;   /* what people call it; NULL: nobody asks for it alone */
+    const char *name;   /* what people call it, alone or with other records; NULL: nobody asks for it */
     const char *advice; /* where to get one ("make one with vg-fitmap"); NULL: no idea */
     const char *needs; /* the tag of the record that must come before; NULL: none */
     bool in_body;
@@ -91,7 +91,7 @@ typedef struct vgi_artefact {
 
 extern const vgi_artefact vgi_artefacts[VGI_ARTEFACTS];
 
-/* vgi_artefact_by_tag, _by_name: NULL: unknown. */
+/* vgi_artefact_by_tag, _by_name: NULL: unknown. Of several records of one name, such as RIG and SKIN, the first. */
 const vgi_artefact *vgi_artefact_by_tag(const char *tag);
 const vgi_artefact *vgi_artefact_by_name(const char *name);
 /* vgi_artefact_in: where it lies in h, number i of those that repeat. */
@@ -103,6 +103,8 @@ int vgi_artefact_append(const vgi_artefact *t, vg_head *h, void **artefact, vg_e
 
 /* vgi_fields_clear: release what the fields hold and zero them. */
 void vgi_fields_clear(const vgi_artefact *t, void *artefact);
+/* vgi_fields_move: *to is cleared and becomes *from, which is left empty. */
+void vgi_fields_move(const vgi_artefact *t, void *to, void *from);
 /* vgi_fields_copy: `to` holds nothing that has to be released; it is cleared on failure. mesh: what lengths are
  * counted by, NULL where none needs it. */
 int vgi_fields_copy(const vgi_artefact *t, void *to, const void *from, const vg_mesh *mesh, vg_err *e) VG_MUST_CHECK;

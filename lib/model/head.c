@@ -259,6 +259,18 @@ int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e)
     return r;
 }
 
+void vg_head_take(vg_head *to, vg_head *from, const char *what)
+{
+    for (size_t i = 0; i < VGI_ARTEFACTS; i++) {
+        const vgi_artefact *t = &vgi_artefacts[i];
+        if (!t->name || strcmp(t->name, what)) continue;
+        vgi_fields_move(t, vgi_artefact_in(t, to, 0), vgi_artefact_in(t, from, 0));
+        if (!t->marks) continue;
+        bool *mark = (bool *)(void *)((char *)to + t->mark_at), *was = (bool *)(void *)((char *)from + t->mark_at);
+        *mark = *was, *was = false;
+    }
+}
+
 int vg_head_need(const vg_head *h, const char *what, const char *subject, vg_err *e)
 {
     const vgi_artefact *t = vgi_artefact_by_name(what);

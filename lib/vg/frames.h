@@ -158,8 +158,11 @@ size_t vg_head_elements(const vg_head *h, vg_element e);
 void vg_head_clear(vg_head *h);
 int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e) VG_MUST_CHECK;
 
-/* vg_head_need: VG_OK when h holds `what`: "mesh", "skeleton", "correspondence", "patches", "rig", "map"; else
- * VG_EINPUT: "<subject> holds no map: make one with vg-fitmap". */
+/* vg_head_take: move one thing from one head to another, by its name: "mesh", "attributes", "reference" (with its name),
+ * "skeleton", "patches", "rig" (with its skin), "selection", "links", "anchors", "correspondence", "map". What `to` had
+ * of it is released; `from` has none afterwards. */
+void vg_head_take(vg_head *to, vg_head *from, const char *what);
+/* vg_head_need: VG_OK when h holds it; else VG_EINPUT: "<subject> holds no map: make one with vg-fitmap". */
 int vg_head_need(const vg_head *h, const char *what, const char *subject, vg_err *e) VG_MUST_CHECK;
 
 /* vg_head_trace: append the record of this process. Its parents are the records that no other names as a parent: the

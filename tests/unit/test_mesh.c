@@ -381,6 +381,30 @@ static void test_frame(void)
     vg_head_clear(&h);
 }
 
+/* One thing goes over, whole, and what was there is released. */
+static void test_take(void)
+{
+    vg_head a = full_head(), b = full_head();
+    uint32_t *selected = a.selected, *vert = a.body.mesh.vert;
+    double *reference = a.body.reference;
+    vg_head_take(&b, &a, "selection");
+    CHECK(b.selected == selected && b.has_selection && !a.selected && !a.has_selection && !a.nselected);
+    vg_head_take(&b, &a, "reference");
+    CHECK(b.body.reference == reference && !a.body.reference && !a.body.reference_name && b.body.reference_name);
+    vg_head_take(&b, &a, "mesh");
+    CHECK(b.body.mesh.vert == vert && b.body.mesh.nf && !a.body.mesh.nf && !a.body.mesh.start);
+    vg_head_take(&b, &a, "attributes");
+    CHECK(b.body.attributes.nlabels && b.body.attributes.ntex && !a.body.attributes.labels && !a.body.attributes.tex);
+    vg_err e;
+    CHECK(vg_head_need(&b, "mesh", "b", &e) == VG_OK && vg_head_need(&a, "mesh", "it", &e) == VG_EINPUT);
+    CHECK_TEXT(e.message, "it holds no mesh");
+    CHECK(vg_head_need(&a, "map", "'x.vgs'", &e) == VG_EINPUT);
+    CHECK_TEXT(e.message, "'x.vgs' holds no map: make one with vg-fitmap");
+    CHECK(vg_head_need(&a, "nothing", "it", &e) == VG_EARG);
+    vg_head_clear(&a);
+    vg_head_clear(&b);
+}
+
 static void test_channels(void)
 {
     vg_head h = full_head();
@@ -445,4 +469,5 @@ TESTS({"which meshes are valid", test_check},
       {"diagonal and centroid", test_size_and_centre}, {"vectors sum to 0, and move as the mesh does", test_vectors},
       {"the graph has faces, selection and links", test_graph}, {"a copy is whole and its own", test_copy},
       {"provenance has its parents", test_trace}, {"frames are reused", test_frame}, {"kinds", test_kinds},
-      {"channels", test_channels})
+      {"channels", test_channels},
+      {"one thing of a head goes over to another", test_take})
