@@ -72,6 +72,7 @@ static void note_step(void *context, const vg_register_step *s)
     cli_note(
         "round %zu of %zu: %zu vertices near the target, %.3g D from it on average, at most %.3g D; stiffness %.3g",
         s->round, s->rounds, s->near, s->mean, s->largest, s->stiffness);
+    cli_progress("rounds of the fit", s->round);
 }
 
 static void note_alignment(const vg_register_result *r)
@@ -101,6 +102,34 @@ static void report_markers(const vg_markers *m, const vg_register_result *r)
 }
 
 enum { MOST_WARNINGS = 10 };
+
+typedef struct marked {
+    long vertex;
+    const vg_marker *by;
+} marked;
+
+static int compare_marked(const void *a, const void *b)
+{
+    const marked *x = a, *y = b;
+    if (x->vertex != y->vertex) return x->vertex < y->vertex ? -1 : 1;
+    return x->by->line < y->by->line ? -1 : x->by->line > y->by->line;
+}
+
+/* Two markers on one vertex of a side say different things of it, or one is there twice. */
+static void warn_shared(const vg_markers *m, bool target)
+{
+    size_t told = 0;
+    marked *at = cli_allocate(m->n, sizeof *at, "the markers");
+    for (size_t i = 0; i < m->n; i++)
+        at[i] = (marked){(long)(target ? m->at[i].target : m->at[i].source), &m->at[i]};
+    if (m->n) qsort(at, m->n, sizeof *at, compare_marked);
+    for (size_t i = 1; i < m->n; i++)
+        if (at[i].vertex == at[i - 1].vertex && told++ < MOST_WARNINGS)
+            cli_warn("the markers of lines %zu and %zu are both on vertex %ld of the %s", at[i - 1].by->line,
+                     at[i].by->line, at[i].vertex + opts.base, target ? "target" : "source");
+    if (told > MOST_WARNINGS) cli_warn("so it is with %zu more markers", told - MOST_WARNINGS);
+    free(at);
+}
 
 /* Faces without counterpart, by component of the target. */
 static void report_unmatched(const vg_mesh *m, const vg_correspondence *c)
@@ -201,6 +230,8 @@ int main(int argc, char **argv)
                             .target_uv = opts.uv ? &target.body.attributes : NULL,
                             .threads = cli.threads};
     read_pairs(&in, &markers, &seeds);
+    warn_shared(&markers, false);
+    warn_shared(&markers, true);
     if (vg_register(&r, &in, note_step, NULL, &e) < 0) cli_die(&e);
     note_alignment(&r);
     report_markers(&markers, &r);

@@ -111,6 +111,16 @@ number() {
         '1584 of 1584 faces of the target matched'
 }
 
+@test "two markers on one vertex of a side: a warning names both lines" {
+    bodies
+    { cat markers.txt; tail -n 1 markers.txt | awk '{print $(NF-1), $NF}'; } >twice.txt
+    n=$(wc -l <twice.txt)
+    must_warn vg-register walk-man.obj walk-woman.obj -m twice.txt -o t.vgs
+    read -r source target < <(tail -n 1 twice.txt)
+    says "the markers of lines $((n - 1)) and $n are both on vertex $source of the source" \
+        "the markers of lines $((n - 1)) and $n are both on vertex $target of the target"
+}
+
 @test "without markers: aligned, texture coordinates, dense" {
     body walk-man
     cp walk-man.obj other.obj
