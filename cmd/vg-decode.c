@@ -23,8 +23,13 @@ static const cli_option options[] = {
      .text = &sink_options.mesh},
     {"no-mesh", 0, NULL, "write no mesh beside a point cache or array", .flag = &sink_options.no_mesh},
     {"drop-loose", 0, NULL, "leave out the vertices that are in no face", .flag = &sink_options.drop_loose},
-    {"max-targets", 0, "N", "morph targets of a GLB or glTF; further frames are mixed from them (default 100)",
-     .integer = &most_targets, .least = 2, .most = 1e6},
+    {"max-targets", 0, "N", "morph targets of a GLB or glTF, at most: frames are mixed from so many",
+     .integer = &most_targets, .least = 1, .most = 1e6},
+    {"morph-tolerance", 0, "X", "how far mixing may take a vertex from its place, in D (default 0.001)",
+     .number = &sink_options.morph_tolerance, .least = 1e-7, .most = 1},
+    {"shapes", 0, NULL, "each frame is a morph target of a GLB or glTF, and there is no animation",
+     .flag = &sink_options.shapes},
+    {"name", 0, "NAME", "what the animation of a GLB or glTF is called", .text = &sink_options.name},
     {.name = NULL}};
 
 static const cli_program program = {

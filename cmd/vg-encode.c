@@ -8,7 +8,9 @@
 
 static struct {
     bool vectors, f32;
-    const char *reference, *anchors, *mesh, *most_bytes, *array_axes;
+    const char *reference, *anchors, *mesh, *most_bytes;
+    vg_reading reading;
+    size_t weld; /* 1: off */
     double fps;
     size_t faces; /* 1: selected */
     take_list take;
@@ -23,13 +25,18 @@ static const cli_option options[] = {
     {"mesh", 0, "MESH", "the faces and reference pose of point caches and arrays, which hold none",
      .text = &opts.mesh, .reads = true},
     {"array-axes", 0, "ORDER", "what the axes of positions in an NPZ count: fvx, vxf, ... (frames, vertices, x y z)",
-     .text = &opts.array_axes},
+     .text = &opts.reading.array_axes},
+    {"animation", 0, "NAME", "of several animations of a GLB or glTF the one of this name",
+     .text = &opts.reading.animation},
+    {"shapes", 0, NULL, "the morph targets of a GLB or glTF, whatever animations it has", .flag = &opts.reading.shapes},
+    {"weld", 0, "exact|off", "vertices of a GLB or glTF that are always at one place are one (default), or stay apart",
+     .choice = &opts.weld},
     {"max-bytes", 0, "SIZE", "what an archive or compressed file may unpack to (default: 1G in one file, 64G in all)",
      .text = &opts.most_bytes},
     {"anchor", 0, "V,V,...", "vertices that vg-solve must meet exactly", .text = &opts.anchors},
     {"take", 0, "FRAMES", "write these frames alone, counted from 0: 12, or 3,10-20, or 0-/2 for every other",
      .take = take_parse, .context = &opts.take},
-    {"fps", 0, "N", "give the poses times, N a second, from 0", .number = &opts.fps, .least = 1e-6, .most = 1e9},
+    {"fps", 0, "N", "give the poses times, N a second, from 0; sample animations of a GLB or glTF at them", .number = &opts.fps, .least = 1e-6, .most = 1e9},
     {"f32", 0, NULL, "write binary32 instead of binary64", .flag = &opts.f32},
     {.name = NULL}};
 
@@ -166,7 +173,9 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     work w = {0};
     if (opts.anchors) w.nanchors = cli_parse_vertices("--anchor", opts.anchors, &w.anchors);
-    vg_source_options from = {.mesh = opts.mesh, .reading.array_axes = opts.array_axes};
+    opts.reading.fps = opts.fps, opts.reading.unwelded = opts.weld == 1;
+    if (opts.reading.shapes && opts.reading.animation) cli_usage("--shapes and --animation exclude one another");
+    vg_source_options from = {.mesh = opts.mesh, .reading = opts.reading};
     if (opts.most_bytes && !(from.most_bytes = cli_parse_size("max-bytes", opts.most_bytes)))
         cli_usage("option '--max-bytes' needs a size of at least 1");
     vg_source *s = cli_source_with(operands, n, &from);

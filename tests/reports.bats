@@ -200,3 +200,150 @@ EOF
     pipe 'vg-encode pose1.obj.xz | vg-info'
     shows 'frames     1'
 }
+
+@test "glTF: morph targets of several meshes belong together by name" {
+    reports
+    must vg-encode arkit_partial.gltf -o out.vgs
+    must vg-decode -q -o shapes/ out.vgs
+    py <<'EOF'
+import os
+def least(name):
+    y = [float(l.split()[2]) for l in open('shapes/%s.obj' % name) if l.startswith('v ')]
+    assert len(y) == 24
+    return min(y[:8]), min(y[8:16])
+assert sorted(os.listdir('shapes')) == ['base.obj', 'eyeBlinkLeft.obj', 'jawOpen.obj', 'tongueOut.obj'], os.listdir('shapes')
+assert least('base') == (0, 0)
+assert least('eyeBlinkLeft') == (2, 0), least('eyeBlinkLeft')
+assert least('jawOpen') == (-1, -1), least('jawOpen')
+assert least('tongueOut') == (0, 5), least('tongueOut')
+EOF
+    # names in the extras of a primitive; meshes without names go by number; a name twice in one mesh is two shapes
+    py <<'EOF'
+import json
+def change(name, what):
+    g = json.load(open('arkit_partial.gltf'))
+    what(g)
+    json.dump(g, open(name, 'w'))
+def to_primitives(g):
+    for m in g['meshes'][:2]: m['primitives'][0]['extras'] = m.pop('extras')
+def nameless(g):
+    del g['meshes'][1]['extras']
+def twice(g):
+    g['meshes'][0]['extras']['targetNames'] = ['jawOpen', 'jawOpen']
+change('primitives.gltf', to_primitives)
+change('nameless.gltf', nameless)
+change('twice.gltf', twice)
+EOF
+    pipe 'vg-encode primitives.gltf | vg-info --digest'
+    [ "$output" = "$(vg-info --digest out.vgs)" ] || fail "names in the extras of primitives"
+    must vg-encode nameless.gltf -o nameless.vgs
+    must vg-decode -q -o nameless/ nameless.vgs
+    [ "$(ls nameless | tr '\n' ' ')" = 'base.obj eyeBlinkLeft.obj jawOpen.obj ' ] || fail "$(ls nameless)"
+    pipe 'vg-encode twice.gltf | vg-info --frames'
+    [ "$(grep -c jawOpen <<<"$output")" = 2 ] || fail "$output"
+}
+
+@test "glTF: a node that mirrors turns faces over; instances are shown; pointers animate" {
+    reports
+    py <<'EOF'
+import json
+g = json.load(open('negscale.gltf'))
+g['nodes'] = [{'mesh': 0}, {'matrix': [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -1, 0, 0, 1], 'children': [2]}, {'mesh': 0}]
+g['scenes'] = [{'nodes': [0, 1]}]
+json.dump(g, open('above.gltf', 'w'))          # the parent mirrors, by a matrix
+g['nodes'][2]['scale'] = [1, -1, 1]
+json.dump(g, open('twice.gltf', 'w'))          # twice mirrored is not
+g = json.load(open('instancing.gltf'))
+g['nodes'][0]['scale'] = [1, 1, -1]
+json.dump(g, open('mirrored.gltf', 'w'))
+EOF
+    local name
+    for name in negscale instancing above twice mirrored; do
+        must vg-encode $name.gltf -o $name.vgs
+        must vg-decode -q -o $name.obj $name.vgs
+    done
+    py <<'EOF'
+def volume(name):
+    v, total = [], 0
+    for l in open(name + '.obj'):
+        w = l.split()
+        if w and w[0] == 'v': v.append([float(x) for x in w[1:]])
+        if w and w[0] == 'f':
+            a, b, c = [v[int(x) - 1] for x in w[1:]]
+            total += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6
+    return len(v), total, v
+assert volume('negscale')[0] == 16 and abs(volume('negscale')[1] - 2) < 1e-9, volume('negscale')[:2]
+assert abs(volume('above')[1] - 2) < 1e-9 and abs(volume('twice')[1] - 2) < 1e-9
+n, v, at = volume('instancing')
+assert n == 24 and abs(v - 3) < 1e-9 and max(p[0] for p in at) == 5, (n, v)
+assert abs(volume('mirrored')[1] - 3) < 1e-9
+EOF
+    # the same animation, said by a node and by pointers
+    py <<'EOF'
+import base64, json, struct
+times, moves = struct.pack('<3f', 0, 1, 2), struct.pack('<9f', 0, 0, 0, 1, 0, 0, 0, 2, 0)
+points = struct.pack('<9f', 0, 0, 0, 1, 0, 0, 0, 1, 0)
+data = points + times + moves
+def write(name, target):
+    g = {'asset': {'version': '2.0'}, 'buffers': [{'byteLength': len(data), 'uri': 'data:application/octet-stream;base64,' + base64.b64encode(data).decode()}],
+        'bufferViews': [{'buffer': 0, 'byteOffset': 0, 'byteLength': 36}, {'buffer': 0, 'byteOffset': 36, 'byteLength': 12}, {'buffer': 0, 'byteOffset': 48, 'byteLength': 36}],
+        'accessors': [{'bufferView': 0, 'componentType': 5126, 'count': 3, 'type': 'VEC3', 'min': [0, 0, 0], 'max': [1, 1, 0]},
+            {'bufferView': 1, 'componentType': 5126, 'count': 3, 'type': 'SCALAR', 'min': [0], 'max': [2]}, {'bufferView': 2, 'componentType': 5126, 'count': 3, 'type': 'VEC3'}],
+        'meshes': [{'primitives': [{'attributes': {'POSITION': 0}}]}], 'nodes': [{'mesh': 0}], 'scenes': [{'nodes': [0]}], 'scene': 0,
+        'animations': [{'name': n, 'channels': [{'sampler': 0, 'target': target}], 'samplers': [{'input': 1, 'output': 2}]} for n in ('Walk', 'Run')]}
+    json.dump(g, open(name, 'w'))
+write('node.gltf', {'node': 0, 'path': 'translation'})
+write('pointer.gltf', {'path': 'pointer', 'extensions': {'KHR_animation_pointer': {'pointer': '/nodes/0/translation'}}})
+EOF
+    pipe 'vg-encode --animation Walk node.gltf | vg-info --digest'
+    local truth=$output
+    pipe 'vg-encode --animation Walk pointer.gltf | vg-info --digest'
+    [ "$output" = "$truth" ] || fail "the pointer does not animate"
+    # names, times, and sampling at a rate: half-way between keys it is the mean
+    pipe 'vg-encode --animation Walk node.gltf | vg-info --frames'
+    shows Walk.0001 Walk.0003
+    pipe 'vg-encode node.gltf | vg-info --frames'
+    shows Walk.0003 Run.0001
+    must_fail 3 vg-encode --animation Jump node.gltf -o no.vgs
+    one_line
+    says "no animation 'Jump'" "Walk, Run"
+    must vg-encode --animation Run --fps 2 node.gltf -o half.vgs
+    pipe 'vg-info half.vgs'
+    shows 'frames     5' '0 s to 2 s'
+    must vg-decode -q --format npy --no-mesh -o half.npy half.vgs
+    pipe "tail -c 180 half.npy | od -An -v -w36 -t f4 -j 36 -N 36 | tr -s ' '"
+    [ "$output" = ' 0.5 0 0 1.5 0 0 0.5 1 0' ] || fail "$output"
+}
+
+@test "glTF: an unknown extension is named, and none is called Draco that is not" {
+    reports
+    py <<'EOF'
+import json
+def write(name, key, *extensions):
+    g = json.load(open('negscale.gltf'))
+    g[key] = list(extensions)
+    json.dump(g, open(name, 'w'))
+write('used.gltf', 'extensionsUsed', 'VENDOR_bend', 'KHR_materials_unlit')
+write('required.gltf', 'extensionsRequired', 'VENDOR_bend')
+write('draco.gltf', 'extensionsRequired', 'KHR_draco_mesh_compression')
+write('meshopt.gltf', 'extensionsRequired', 'EXT_meshopt_compression')
+EOF
+    must_warn vg-encode used.gltf -o out.vgs
+    one_line
+    says "VENDOR_bend" "not known"
+    [[ $stderr != *unlit* ]] || fail "$stderr"
+    must_fail 3 vg-encode required.gltf -o no.vgs
+    says "requires the extension 'VENDOR_bend'"
+    must_fail 3 vg-encode draco.gltf -o no.vgs
+    says "compressed with Draco"
+    must_fail 3 vg-encode meshopt.gltf -o no.vgs
+    says "compressed with meshopt"
+}
+
+@test "glTF: vertices that touch in one neutral pose need not be welded" {
+    reports
+    pipe 'vg-encode lips_target.gltf | vg-info'
+    shows 'vertices    8'
+    pipe 'vg-encode --weld off lips_target.gltf | vg-info'
+    shows 'vertices    10'
+}

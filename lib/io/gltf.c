@@ -62,14 +62,37 @@ static bool starts_with(const char *s, const char *with)
     return !strncmp(s, with, strlen(with));
 }
 
-/* What changes no position may be required. */
-static bool is_harmless(const char *extension)
+/* Extensions that change no position, or that are read. A name that ends in _ stands for all that begin so. */
+static bool is_understood(const char *extension)
 {
-    static const char *const harmless[] = {"KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_",
-                                           "EXT_texture_"};
-    for (size_t i = 0; i < sizeof harmless / sizeof *harmless; i++)
-        if (starts_with(extension, harmless[i])) return true;
+    static const char *const understood[] = {
+        "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "KHR_xmp_",
+        "EXT_lights_", "EXT_mesh_gpu_instancing", "KHR_animation_pointer", "EXT_materials_", "KHR_audio_",
+        "MSFT_texture_", "MSFT_packing_", "KHR_node_selectability", "KHR_node_hoverability", "FB_"};
+    for (size_t i = 0; i < sizeof understood / sizeof *understood; i++)
+        if (starts_with(extension, understood[i])) return true;
     return false;
+}
+
+/* Those that could change what is seen of the geometry, and are neither read nor known to be harmless. */
+void vgi_gltf_note_extensions(const vgi_gltf *g, vg_note *note)
+{
+    const vgi_json *used = vgi_json_get(g->json, "extensionsUsed");
+    for (size_t i = 0; i < vgi_json_count(used); i++) {
+        const char *name = vgi_json_text(vgi_json_at(used, i));
+        if (name && !is_understood(name)) vgi_note(note, "the extension %.60s is not known and left out", name);
+    }
+}
+
+static int refuse_extension(const vgi_gltf *g, const char *name, vg_err *e)
+{
+    if (!strcmp(name, "KHR_draco_mesh_compression"))
+        return vgi_gltf_bad(g, e, "its meshes are compressed with Draco (%s), which is not read: export without compression",
+                            name);
+    if (strstr(name, "_meshopt_compression"))
+        return vgi_gltf_bad(g, e, "its data are compressed with meshopt (%s), which is not read: export without compression",
+                            name);
+    return vgi_gltf_bad(g, e, "it requires the extension '%.60s', which is not known", name);
 }
 
 static int check_claims(const vgi_gltf *g, vg_err *e)
@@ -81,10 +104,7 @@ static int check_claims(const vgi_gltf *g, vg_err *e)
         return vgi_gltf_bad(g, e, "it is glTF version '%.20s', and only version 2 is known", version);
     for (size_t i = 0; i < vgi_json_count(required); i++) {
         const char *name = vgi_json_text(vgi_json_at(required, i));
-        if (!name || !is_harmless(name))
-            return vgi_gltf_bad(g, e,
-                                "it requires the extension '%.60s', which is not known: export without compression",
-                                name ? name : "?");
+        if (!name || !is_understood(name)) return refuse_extension(g, name ? name : "?", e);
     }
     return VG_OK;
 }
@@ -353,7 +373,8 @@ int vgi_gltf_accessor(const vgi_gltf *g, const vgi_json *ref, size_t width, size
     a->width = width_of(vgi_json_text(vgi_json_get(from, "type")));
     a->normalized = vgi_json_is_true(vgi_json_get(from, "normalized"));
     if (a->width != width) return vgi_gltf_bad(g, e, "the accessor of %s is of another type", what);
-    if (a->count == 0 || (count && a->count != count))
+    if (a->count == 0) return vgi_gltf_bad(g, e, "the accessor of %s has no elements", what);
+    if (count && a->count != count)
         return vgi_gltf_bad(g, e, "the accessor of %s has %zu elements, not %zu", what, a->count, count);
     if (vgi_json_get(from, "bufferView"))
         r = find_bytes(g, from, a->count, width * component_bytes(a->component), &a->data, &a->stride, e);
@@ -433,12 +454,14 @@ enum { KINDS = 1 << VG_VERTICES | 1 << VG_TRANSFORMS }; /* the latter of a rig *
 
 const vgi_sequence_format vgi_sequence_glb = {
     .name = "glb", .suffix = ".glb", .keeps = KEEPS, .bare = true, .sniff = sniff_glb,
-    .open = vgi_gltf_play, .next = vgi_gltf_next, .frames = vgi_gltf_frames, .close = vgi_gltf_close,
+    .open = vgi_gltf_play, .next = vgi_gltf_next, .frames = vgi_gltf_frames, .note = vgi_gltf_note,
+    .close = vgi_gltf_close,
     .kinds = KINDS, .check = vgi_gltf_check, .begin = begin_glb, .put = vgi_gltf_put, .end = vgi_gltf_end,
     .warning = vgi_gltf_warning, .release = vgi_gltf_release};
 
 const vgi_sequence_format vgi_sequence_gltf = {
     .name = "gltf", .suffix = ".gltf", .keeps = KEEPS, .bare = true, .sniff = sniff_gltf,
-    .open = vgi_gltf_play, .next = vgi_gltf_next, .frames = vgi_gltf_frames, .close = vgi_gltf_close,
+    .open = vgi_gltf_play, .next = vgi_gltf_next, .frames = vgi_gltf_frames, .note = vgi_gltf_note,
+    .close = vgi_gltf_close,
     .kinds = KINDS, .check = vgi_gltf_check, .begin = begin_gltf, .put = vgi_gltf_put, .end = vgi_gltf_end,
     .warning = vgi_gltf_warning, .release = vgi_gltf_release};

@@ -70,10 +70,14 @@ bool vgi_accessor_is_index(const vgi_accessor *a);                  /* whole num
 int vgi_gltf_item(const vgi_gltf *g, const vgi_json *ref, const char *list, const vgi_json **item, size_t *number,
                   vg_err *e) VG_MUST_CHECK;
 
+/* vgi_gltf_note_extensions: those that may change geometry and are left out. */
+void vgi_gltf_note_extensions(const vgi_gltf *g, vg_note *note);
+
 /* ---- gltf_play.c, gltf_write.c: for the tables in gltf.c ---- */
 int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const vg_reading *how, const char *subject, vg_err *e);
 int vgi_gltf_next(void *state, vg_frame *f, vg_err *e);
 uint64_t vgi_gltf_frames(const void *state);
+const char *vgi_gltf_note(const void *state);
 void vgi_gltf_close(void *state);
 
 int vgi_gltf_check(const vg_head *h, const char *output, vg_err *e);

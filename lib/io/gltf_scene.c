@@ -1,10 +1,25 @@
 /* gltf_scene.c: what a scene of glTF shows: nodes, skins, and the vertices and faces of its meshes.
  * Leaves out cameras, materials, normals and texture coordinates; welding (gltf_weld.c), and what moves
- * (gltf_play.c).
+ * (gltf_clips.c, gltf_play.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_scene.h"
 
+#include <math.h>
 #include <stdlib.h>
+
+void vgi_gltf_local_matrix(const vgi_gltf_placed *p, double m[12])
+{
+    const double *q = p->rotation;
+    double r[9];
+    double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    const double unit[4] = {length > 0 ? q[3] / length : 1, length > 0 ? q[0] / length : 0,
+                            length > 0 ? q[1] / length : 0, length > 0 ? q[2] / length : 0};
+    vg_quat_matrix(unit, r);
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) m[4 * i + j] = r[3 * i + j] * p->scale[j];
+        m[4 * i + 3] = p->translation[i];
+    }
+}
 
 void vgi_gltf_from_columns(const double c[16], double m[12])
 {
@@ -68,6 +83,23 @@ static int order_nodes(vgi_gltf_scene *x, vg_err *e)
     return n == x->nnodes ? VG_OK : vgi_gltf_bad(&x->g, e, "its nodes are in a cycle");
 }
 
+static double determinant(const double m[12])
+{
+    return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
+           m[2] * (m[4] * m[9] - m[5] * m[8]);
+}
+
+/* Does it mirror, by itself and with all above it? Rotations do not. */
+static void find_mirrors(vgi_gltf_scene *x)
+{
+    for (size_t i = 0; i < x->nnodes; i++) {
+        vgi_gltf_node *n = &x->nodes[x->order[i]];
+        const double *s = n->rest.scale;
+        const bool here = n->fixed ? determinant(n->matrix) < 0 : (s[0] < 0) ^ (s[1] < 0) ^ (s[2] < 0);
+        n->mirrors = here ^ (n->parent != SIZE_MAX && x->nodes[n->parent].mirrors);
+    }
+}
+
 /* What the scene shows; without scenes, everything. */
 static int show_nodes(vgi_gltf_scene *x, vg_err *e)
 {
@@ -102,6 +134,7 @@ static int read_nodes(vgi_gltf_scene *x, vg_err *e)
     }
     for (size_t i = 0; i < n && r == VG_OK; i++) r = adopt_children(x, i, e);
     if (r == VG_OK) r = order_nodes(x, e);
+    if (r == VG_OK) find_mirrors(x);
     return r < 0 ? r : show_nodes(x, e);
 }
 
@@ -201,6 +234,49 @@ static int read_influences(vgi_gltf_scene *x, vgi_gltf_part *p, vg_err *e)
     return r;
 }
 
+/* Where the instances of a node's mesh are, and whether they mirror it. */
+typedef struct instances {
+    size_t n; /* 0: the node shows its mesh once, as usual */
+    vgi_accessor translation, rotation, scale;
+    bool moved, turned, scaled;
+} instances;
+
+static int read_instance_list(const vgi_gltf_scene *x, const vgi_json *attributes, const char *key, size_t width,
+                              vgi_accessor *a, bool *there, size_t *n, vg_err *e)
+{
+    const vgi_json *ref = vgi_json_get(attributes, key);
+    int r = ref ? vgi_gltf_accessor(&x->g, ref, width, *n, "instances", a, e) : VG_OK;
+    *there = ref;
+    if (r == VG_OK && ref) *n = a->count;
+    return r;
+}
+
+static int read_instances(vgi_gltf_scene *x, const vgi_json *node, instances *k, vg_err *e)
+{
+    const vgi_json *ext = vgi_json_get(vgi_json_get(node, "extensions"), "EXT_mesh_gpu_instancing");
+    const vgi_json *attributes = vgi_json_get(ext, "attributes");
+    *k = (instances){0};
+    int r = read_instance_list(x, attributes, "TRANSLATION", 3, &k->translation, &k->moved, &k->n, e);
+    if (r == VG_OK) r = read_instance_list(x, attributes, "ROTATION", 4, &k->rotation, &k->turned, &k->n, e);
+    if (r == VG_OK) r = read_instance_list(x, attributes, "SCALE", 3, &k->scale, &k->scaled, &k->n, e);
+    if (r < 0) return r;
+    if (k->n > vgi_gltf_most_instances - x->instances)
+        return vgi_gltf_bad(&x->g, e, "it shows more than %zu instances", vgi_gltf_most_instances);
+    x->instances += k->n;
+    return VG_OK;
+}
+
+/* Instance number i, from 1, into the place of a part; 0: the mesh itself. Does it mirror? */
+static bool place_instance(const instances *k, size_t i, double place[12])
+{
+    vgi_gltf_placed p = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
+    if (i && k->moved) vgi_accessor_get(&k->translation, i - 1, p.translation);
+    if (i && k->turned) vgi_accessor_get(&k->rotation, i - 1, p.rotation);
+    if (i && k->scaled) vgi_accessor_get(&k->scale, i - 1, p.scale);
+    vgi_gltf_local_matrix(&p, place);
+    return (p.scale[0] < 0) ^ (p.scale[1] < 0) ^ (p.scale[2] < 0);
+}
+
 static int add_part(vgi_gltf_scene *x, size_t at, int64_t skinned, const vgi_json *primitive, vg_err *e)
 {
     int r = vgi_grow(&x->parts, &x->parts_cap, x->nparts + 1, sizeof *x->parts, e);
@@ -272,19 +348,24 @@ static int add_faces(const vgi_gltf_scene *x, vgi_gltf_faces *f, size_t n, uint6
     if (mode == VGI_GLTF_LINE_LOOP && n < 2) return vgi_gltf_bad(&x->g, e, "a loop has %zu vertices", n);
     for (size_t i = 0; i < count && r == VG_OK; i++) {
         const size_t a = apart ? size * i : i, odd = mode == VGI_GLTF_STRIP && i % 2;
-        const size_t at[3] = {mode == VGI_GLTF_FAN ? 0 : a, (a + 1 + odd) % n, a + 2 - odd};
+        size_t at[3] = {mode == VGI_GLTF_FAN ? 0 : a, (a + 1 + odd) % n, a + 2 - odd};
+        if (f->turned && !lines) {
+            const size_t second = at[1];
+            at[1] = at[2], at[2] = second;
+        }
         r = add_face(x, f, at, size, e);
     }
     return r;
 }
 
-static int read_faces(const vgi_gltf_scene *x, vgi_gltf_faces *f, const vgi_gltf_part *p, const vgi_json *primitive,
+static int read_faces(vgi_gltf_scene *x, vgi_gltf_faces *f, const vgi_gltf_part *p, const vgi_json *primitive,
                       vg_err *e)
 {
     const vgi_json *indices = vgi_json_get(primitive, "indices"), *given = vgi_json_get(primitive, "mode");
     uint64_t mode = VGI_GLTF_TRIANGLES;
     if (given && (!vgi_json_whole(given, &mode) || mode > VGI_GLTF_FAN))
         return vgi_gltf_bad(&x->g, e, "a primitive's mode is not known");
+    x->strips |= mode > VGI_GLTF_TRIANGLES;
     f->part = p, f->indexed = indices;
     int r = indices ? vgi_gltf_accessor(&x->g, indices, 1, 0, "indices", &f->index, e) : VG_OK;
     if (r == VG_OK && indices && !vgi_accessor_is_index(&f->index))
@@ -300,9 +381,29 @@ static int take_weights(vgi_gltf_scene *x, size_t at, const vgi_json *mesh, vg_e
     if (n->nweights > x->most_targets) x->most_targets = n->nweights;
     n->weights = vgi_array(n->nweights, sizeof *n->weights, e);
     n->rest_weights = vgi_array(n->nweights, sizeof *n->rest_weights, e);
-    if (!n->weights || !n->rest_weights) return VG_ENOMEM;
+    n->shape_of = vgi_array(n->nweights, sizeof *n->shape_of, e);
+    if (!n->weights || !n->rest_weights || !n->shape_of) return VG_ENOMEM;
     return take_numbers(x, vgi_json_get(n->json, "weights") ? n->json : mesh, "weights", n->nweights,
                         n->rest_weights, e);
+}
+
+/* The primitives of a mesh, or of one instance of it. */
+static int read_primitives(vgi_gltf_scene *x, vgi_gltf_faces *f, size_t at, int64_t skin, const vgi_json *primitives,
+                           size_t instance, const double place[12], vg_err *e)
+{
+    const size_t from = x->nparts;
+    int r = VG_OK;
+    for (size_t i = 0; i < vgi_json_count(primitives) && r == VG_OK; i++) {
+        const vgi_json *primitive = vgi_json_at(primitives, i);
+        vgi_gltf_part *p = sharing(x, from, primitive);
+        if (!p && (r = add_part(x, at, skin, primitive, e)) == VG_OK) {
+            p = &x->parts[x->nparts - 1];
+            p->instance = instance;
+            memcpy(p->place, place, sizeof p->place);
+        }
+        if (r == VG_OK) r = read_faces(x, f, p, primitive, e);
+    }
+    return r;
 }
 
 static int read_mesh(vgi_gltf_scene *x, vgi_gltf_faces *f, size_t at, vg_err *e)
@@ -316,14 +417,14 @@ static int read_mesh(vgi_gltf_scene *x, vgi_gltf_faces *f, size_t at, vg_err *e)
     mark(x, at);
     if (k) mark_joints(x, &x->skins[skinned]);
     const vgi_json *primitives = vgi_json_get(mesh, "primitives");
-    const size_t from = x->nparts;
+    instances there;
     if (vgi_json_count(primitives) == 0) return vgi_gltf_bad(&x->g, e, "a mesh has no primitives");
-    for (size_t i = 0; i < vgi_json_count(primitives) && r == VG_OK; i++) {
-        const vgi_json *primitive = vgi_json_at(primitives, i);
-        vgi_gltf_part *p = sharing(x, from, primitive);
-        if (!p && (r = add_part(x, at, k ? (int64_t)skinned : VGI_GLTF_NONE, primitive, e)) == VG_OK)
-            p = &x->parts[x->nparts - 1];
-        if (r == VG_OK) r = read_faces(x, f, p, primitive, e);
+    if ((r = read_instances(x, n, &there, e)) < 0) return r;
+    if (k) there.n = 0; /* a skin places the vertices, wherever the node is */
+    for (size_t i = there.n ? 1 : 0; i <= there.n && r == VG_OK; i++) {
+        double place[12];
+        f->turned = (place_instance(&there, i, place) ^ x->nodes[at].mirrors) && !k;
+        r = read_primitives(x, f, at, k ? (int64_t)skinned : VGI_GLTF_NONE, primitives, i, place, e);
     }
     return r;
 }
@@ -350,6 +451,7 @@ void vgi_gltf_scene_clear(vgi_gltf_scene *x)
     for (size_t i = 0; i < x->nnodes; i++) {
         free(x->nodes[i].weights);
         free(x->nodes[i].rest_weights);
+        free(x->nodes[i].shape_of);
     }
     for (size_t i = 0; i < x->nskins; i++) {
         free(x->skins[i].joints);
@@ -361,5 +463,7 @@ void vgi_gltf_scene_clear(vgi_gltf_scene *x)
     }
     void *const arrays[] = {x->nodes, x->order, x->skins, x->parts, x->channels, x->clips, x->moments};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
+    vgi_name_set_clear(&x->shapes);
+    free(x->wanted);
     vgi_gltf_clear(&x->g);
 }

@@ -13,6 +13,7 @@ enum { VGI_GLTF_SETS = 8, VGI_GLTF_NONE = -1 };
  * more than any memory. */
 static const size_t vgi_gltf_most = (size_t)1 << 27; /* vertices, corners, keys */
 static const size_t vgi_gltf_most_targets = (size_t)1 << 21, vgi_gltf_most_moments = (size_t)1 << 24;
+static const size_t vgi_gltf_most_instances = (size_t)1 << 17;
 
 typedef enum vgi_gltf_path {
     VGI_GLTF_TRANSLATION,
@@ -29,12 +30,14 @@ typedef struct vgi_gltf_node {
     const vgi_json *json;
     size_t parent;         /* SIZE_MAX: none */
     bool shown, matters;   /* matters: it moves a vertex */
+    bool mirrors;          /* its matrix, with those above, turns left into right: in the pose of the file */
     bool fixed;            /* by a matrix */
     double matrix[12];     /* three rows of four */
     vgi_gltf_placed rest, now;
     double world[12];
     size_t nweights;       /* morph targets of its mesh */
     double *weights, *rest_weights;
+    size_t *shape_of;      /* of each morph target: the shape, of all meshes, that it is part of */
 } vgi_gltf_node;
 
 typedef struct vgi_gltf_skin {
@@ -49,6 +52,8 @@ typedef struct vgi_gltf_skin {
 typedef struct vgi_gltf_part {
     size_t node, count, first; /* first: number of its first vertex among all, before welding */
     int64_t skin;              /* VGI_GLTF_NONE */
+    size_t instance;           /* of the node's mesh, from 1; 0: there are none */
+    double place[12];          /* of the instance, in the node */
     const vgi_json *attributes, *targets;
     vgi_accessor position;
     size_t ntargets, nsets;
@@ -65,7 +70,8 @@ typedef struct vgi_gltf_channel {
 } vgi_gltf_channel;
 
 typedef struct vgi_gltf_clip {
-    size_t first, nchannels, frames;
+    size_t first, nchannels, frames; /* frames: its first moment */
+    const char *name;      /* NULL: it has none */
     const vgi_json *names; /* of its frames; NULL */
 } vgi_gltf_clip;
 
@@ -86,8 +92,17 @@ typedef struct vgi_gltf_scene {
     vgi_gltf_channel *channels;
     vgi_gltf_clip *clips;
     vgi_gltf_moment *moments;
+    size_t instances;
     size_t most_targets, frames, next;
+    vgi_name_set shapes; /* the morph targets of all meshes, by name */
     bool own;      /* our own file: its vertices and faces stay as they are */
+    size_t dropped; /* triangles without three vertices */
+    bool strips;    /* some faces are strips or fans */
+    char *wanted;  /* the animation that is asked for; NULL: all */
+    double rate;   /* sampled so often a second; 0: at the times of the keys */
+    bool unwelded; /* vertices stay as the file has them */
+    bool as_shapes; /* morph targets instead of animations */
+    vg_note note;
 } vgi_gltf_scene;
 
 /* The faces of all parts, of vertices before welding. */
@@ -95,7 +110,7 @@ typedef struct vgi_gltf_faces {
     vg_mesh mesh;
     size_t start_cap, vert_cap;
     vgi_accessor index;
-    bool indexed;
+    bool indexed, turned; /* turned: to be seen from the other side */
     const vgi_gltf_part *part;
 } vgi_gltf_faces;
 
@@ -103,7 +118,19 @@ typedef struct vgi_gltf_faces {
 /* vgi_gltf_scene_read: nodes, skins and meshes of an open file. The caller clears both, come what may. */
 int vgi_gltf_scene_read(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_scene_clear(vgi_gltf_scene *x);
+void vgi_gltf_local_matrix(const vgi_gltf_placed *p, double m[12]);
 void vgi_gltf_from_columns(const double c[16], double m[12]); /* the upper rows of a matrix of 16, columns first */
+
+/* ---- gltf_shapes.c: the morph targets of all meshes ---- */
+/* vgi_gltf_list_shapes: which morph targets of which meshes belong together. */
+int vgi_gltf_list_shapes(vgi_gltf_scene *x, vg_err *e) VG_MUST_CHECK;
+const char *vgi_gltf_shape_name(const vgi_gltf_scene *x, size_t shape); /* empty: it has none */
+
+/* ---- gltf_clips.c: animations ---- */
+/* vgi_gltf_read_animations: channels, clips and moments, as the scene's wanted and rate say. */
+int vgi_gltf_read_animations(vgi_gltf_scene *x, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_animate: nodes and weights at this moment. */
+int vgi_gltf_animate(vgi_gltf_scene *x, const vgi_gltf_moment *m, vg_err *e) VG_MUST_CHECK;
 
 /* ---- gltf_weld.c ---- */
 /* vgi_gltf_mend: put the mesh together as it was before it was exported: polygons of our own files, and vertices that

@@ -105,8 +105,9 @@ static int check_weights(const vgi_gltf_writing *w, vg_err *e)
 static int begin(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
 {
     const size_t n = joints_of(w);
-    if (o->most_targets)
-        return vg_fail(e, VG_EARG, "transforms become a skin, without morph targets: leave out --max-targets");
+    if (o->most_targets || o->morph_tolerance > 0 || o->shapes)
+        return vg_fail(e, VG_EARG, "transforms become a skin, without morph targets: leave out %s",
+                       o->most_targets ? "--max-targets" : o->shapes ? "--shapes" : "--morph-tolerance");
     skinning *x = w->own = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
     x->bone = vgi_array(n, sizeof *x->bone, e), x->channels = vgi_array(n, 3 * sizeof *x->channels, e);
@@ -321,7 +322,9 @@ static int say_mesh(vgi_gltf_writing *w, vg_err *e)
 static int say_animation(vgi_gltf_writing *w, vg_err *e)
 {
     const skinning *x = w->own;
-    int r = vgi_gltf_say(&w->json, e, "\"animations\":[{\"name\":\"sequence\",\"channels\":[");
+    int r = vgi_gltf_say(&w->json, e, "\"animations\":[{\"name\":");
+    if (r == VG_OK) r = vgi_gltf_say_clip_name(w, e);
+    if (r == VG_OK) r = vgi_gltf_say(&w->json, e, ",\"channels\":[");
     for (size_t i = 0; i < x->nchannels && r == VG_OK; i++)
         r = vgi_gltf_say(&w->json, e, "%s{\"sampler\":%zu,\"target\":{\"node\":%zu,\"path\":\"%s\"}}", i ? ",\n" : "",
                          i, x->channels[i].joint + 1, x->channels[i].path);

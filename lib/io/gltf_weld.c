@@ -153,7 +153,7 @@ static uint64_t hash_of(const vgi_gltf_part *p, size_t v)
 {
     double at[4];
     vgi_accessor_get(&p->position, v, at);
-    uint64_t hash = mix(p->node + 1, at, 3);
+    uint64_t hash = mix((uint64_t)p->instance << 32 ^ (p->node + 1), at, 3);
     for (size_t s = 0; s < p->nsets; s++) {
         vgi_accessor_get(&p->joints[s], v, at);
         hash = mix(hash, at, 4);
@@ -180,7 +180,7 @@ static bool same_element(const vgi_accessor *a, size_t i, const vgi_accessor *b,
 /* Do they stay together whatever moves? */
 static bool are_one(const vgi_gltf_part *p, size_t v, const vgi_gltf_part *q, size_t w)
 {
-    if (p->node != q->node || p->nsets != q->nsets || p->ntargets != q->ntargets) return false;
+    if (p->node != q->node || p->instance != q->instance || p->nsets != q->nsets || p->ntargets != q->ntargets) return false;
     if (!same_element(&p->position, v, &q->position, w)) return false;
     for (size_t s = 0; s < p->nsets; s++)
         if (!same_element(&p->joints[s], v, &q->joints[s], w) || !same_element(&p->shares[s], v, &q->shares[s], w))
@@ -205,7 +205,7 @@ static int weld_part(vgi_gltf_scene *x, const welding *k, vgi_gltf_part *p, size
 {
     if (!(p->kept = vgi_array_raw(p->count, sizeof *p->kept, e))) return VG_ENOMEM;
     for (size_t v = 0; v < p->count; v++) {
-        uint32_t *slot = x->own ? NULL : find_slot(k, p, v);
+        uint32_t *slot = x->own || x->unwelded ? NULL : find_slot(k, p, v);
         if (slot && *slot) {
             k->number[p->first + v] = k->number[*slot - 1];
             continue;
@@ -217,8 +217,8 @@ static int weld_part(vgi_gltf_scene *x, const welding *k, vgi_gltf_part *p, size
     return VG_OK;
 }
 
-/* Faces of the welded vertices; those that have shrunk to nothing are left out, as strips have them too. */
-static void renumber(vg_mesh *m, const uint32_t *number)
+/* Faces of the welded vertices; those that have shrunk to nothing are left out, as strips have them too. How many. */
+static size_t renumber(vg_mesh *m, const uint32_t *number)
 {
     size_t nf = 0, corners = 0;
     for (size_t f = 0; f < m->nf; f++) {
@@ -231,8 +231,10 @@ static void renumber(vg_mesh *m, const uint32_t *number)
         m->start[nf++] = (uint32_t)corners;
         corners += n;
     }
+    const size_t dropped = m->nf - nf;
     if (m->start) m->start[nf] = (uint32_t)corners;
     m->nf = nf;
+    return dropped;
 }
 
 static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
@@ -243,7 +245,7 @@ static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
     int r = k.slots && k.number ? VG_OK : VG_ENOMEM;
     size_t n = 0;
     for (size_t i = 0; i < x->nparts && r == VG_OK; i++) r = weld_part(x, &k, &x->parts[i], &n, e);
-    if (r == VG_OK) renumber(m, k.number);
+    if (r == VG_OK) x->dropped = renumber(m, k.number);
     m->nv = n;
     free(k.slots);
     free(k.number);

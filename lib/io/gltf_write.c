@@ -61,7 +61,7 @@ int vgi_gltf_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi
     vgi_gltf_writing *w = *state = vgi_array(1, sizeof *w, e);
     if (!w) return VG_ENOMEM;
     w->manner = h->kind == VG_TRANSFORMS ? &vgi_gltf_skin : &vgi_gltf_morphs;
-    w->out = out, w->h = h, w->binary = binary;
+    w->out = out, w->h = h, w->binary = binary, w->clip = o->name;
     w->spool.name = "temporary file";
     if ((w->spool.fd = vgi_nameless_file(e)) < 0) return w->spool.fd;
     int r = round_base(w, e);
@@ -152,6 +152,30 @@ int vgi_gltf_say_mesh_name(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_gltf_say_text(&w->json, *name ? name : "mesh", e);
 }
 
+/* Of "Walk.0001": how long "Walk" is; 0: it is no such name. */
+static size_t stem_of(const char *name)
+{
+    size_t n = strlen(name), end = n;
+    while (n > 0 && name[n - 1] >= '0' && name[n - 1] <= '9') n--;
+    return n > 1 && n < end && name[n - 1] == '.' ? n - 1 : 0;
+}
+
+/* What all frames are called after, or else a word. */
+int vgi_gltf_say_clip_name(vgi_gltf_writing *w, vg_err *e)
+{
+    if (w->clip) return vgi_gltf_say_text(&w->json, w->clip, e);
+    const char *first = w->names.n ? w->names.at[0] : "";
+    const size_t n = stem_of(first);
+    bool same = n > 0;
+    for (size_t i = 1; i < w->names.n && same; i++)
+        same = stem_of(w->names.at[i]) == n && !memcmp(w->names.at[i], first, n);
+    char *stem = same ? vgi_copy_string(first, n, e) : NULL;
+    if (same && !stem) return VG_ENOMEM;
+    int r = vgi_gltf_say_text(&w->json, stem ? stem : "sequence", e);
+    free(stem);
+    return r;
+}
+
 static int say_primitive(vgi_gltf_writing *w, bool first, int mode, bool indexed, size_t indices,
                          const vg_bytes *moving, vg_err *e)
 {
@@ -210,8 +234,9 @@ static int describe(vgi_gltf_writing *w, vg_err *e)
     int r = describe_indices(w, &w->shape.triangles, &w->triangles, e);
     if (r == VG_OK) r = describe_indices(w, &w->shape.lines, &w->lines, e);
     w->moments = w->naccessors;
-    if (r == VG_OK) r = vgi_gltf_view(w, VGI_GLTF_ITEM * w->frames, "", e);
-    if (r == VG_OK) r = vgi_gltf_say_accessor(w, 0, VGI_GLTF_FLOAT, w->frames, "SCALAR", between, 1, e);
+    if (r == VG_OK && !w->still) r = vgi_gltf_view(w, VGI_GLTF_ITEM * w->frames, "", e);
+    if (r == VG_OK && !w->still)
+        r = vgi_gltf_say_accessor(w, 0, VGI_GLTF_FLOAT, w->frames, "SCALAR", between, 1, e);
     return r < 0 ? r : w->manner->describe(w, e);
 }
 
@@ -268,7 +293,7 @@ static int emit_all(vgi_gltf_writing *w, vg_err *e)
 {
     int r = vgi_gltf_emit(w, w->shape.triangles.data, w->shape.triangles.size, e);
     if (r == VG_OK) r = vgi_gltf_emit(w, w->shape.lines.data, w->shape.lines.size, e);
-    for (size_t i = 0; i < w->frames && r == VG_OK; i++) {
+    for (size_t i = 0; i < w->frames && r == VG_OK && !w->still; i++) {
         float t = (float)time_of(w, i);
         r = vgi_gltf_emit_singles(w, &t, 1, e);
     }

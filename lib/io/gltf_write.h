@@ -40,6 +40,8 @@ struct vgi_gltf_writing {
     vgi_output *out, spool;    /* spool: frames as they wait, in a file without a name */
     const vg_head *h;
     bool binary, timed, some_timed;
+    bool still;                /* shapes without an animation */
+    const char *clip;          /* what the animation is called; NULL: after the frames */
     size_t frames;
     vgi_names names;
     double *times;
@@ -60,6 +62,8 @@ int vgi_gltf_say_numbers(vg_bytes *to, const char *before, const double *p, size
                          vg_err *e) VG_MUST_CHECK;
 /* vgi_gltf_say_names: "KEY":[names of frames `which`, or of the first n]. */
 int vgi_gltf_say_names(vgi_gltf_writing *w, const char *key, const size_t *which, size_t n, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_say_clip_name: what the animation is called, in quotes. */
+int vgi_gltf_say_clip_name(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
 /* vgi_gltf_say_primitives: "primitives":[...], one for each kind of face; moving: what is said of attributes and
  * targets. */
 int vgi_gltf_say_primitives(vgi_gltf_writing *w, const vg_bytes *moving, vg_err *e) VG_MUST_CHECK;

@@ -273,6 +273,8 @@ typedef struct vgi_name_set {
 } vgi_name_set;
 /* vgi_name_set_add: 1: it is new; 0: it was there. */
 int vgi_name_set_add(vgi_name_set *set, const char *name, vg_err *e) VG_MUST_CHECK;
+/* vgi_name_set_place: which one it is, in the order in which they came; it is added when it is new. */
+int vgi_name_set_place(vgi_name_set *set, const char *name, size_t *at, vg_err *e) VG_MUST_CHECK;
 void vgi_name_set_clear(vgi_name_set *set);
 
 /* vgi_natural_compare: order of names as people expect it: numbers by value, decimals and negative ones too, the rest by

@@ -49,15 +49,23 @@ static int grow_slots(vgi_name_set *set, vg_err *e)
     return VG_OK;
 }
 
-int vgi_name_set_add(vgi_name_set *set, const char *name, vg_err *e)
+int vgi_name_set_place(vgi_name_set *set, const char *name, size_t *at, vg_err *e)
 {
     int r = grow_slots(set, e);
     if (r < 0) return r;
     size_t slot = find_slot(set, name);
-    if (set->slots[slot]) return 0;
-    if ((r = vgi_names_add(&set->names, name, strlen(name), e)) < 0) return r;
-    set->slots[slot] = set->names.n;
-    return 1;
+    if (!set->slots[slot] && (r = vgi_names_add(&set->names, name, strlen(name), e)) == VG_OK)
+        set->slots[slot] = set->names.n;
+    if (r == VG_OK) *at = set->slots[slot] - 1;
+    return r;
+}
+
+int vgi_name_set_add(vgi_name_set *set, const char *name, vg_err *e)
+{
+    const size_t before = set->names.n;
+    size_t at;
+    int r = vgi_name_set_place(set, name, &at, e);
+    return r < 0 ? r : set->names.n > before;
 }
 
 void vgi_name_set_clear(vgi_name_set *set)

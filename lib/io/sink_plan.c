@@ -136,6 +136,21 @@ static int check_mesh_option(const vgi_plan *p, const vg_sink_options *o, vg_err
     return VG_OK;
 }
 
+static int check_gltf_options(const vgi_plan *p, const char *output, const vg_sink_options *o, vg_err *e)
+{
+    const char *given = o->most_targets          ? "--max-targets"
+                        : o->morph_tolerance > 0 ? "--morph-tolerance"
+                        : o->shapes              ? "--shapes"
+                                                 : NULL;
+    if (p->sequence == &vgi_sequence_glb || p->sequence == &vgi_sequence_gltf)
+        return o->shapes && (o->most_targets || o->morph_tolerance > 0 || o->name)
+                   ? vg_fail(e, VG_EARG, "--shapes writes each frame as it is, and no animation: leave out "
+                             "--max-targets, --morph-tolerance and --name")
+                   : VG_OK;
+    if (given) return vg_fail(e, VG_EARG, "%s is for GLB and glTF: '%s' has no morph targets", given, output);
+    return o->name ? vg_fail(e, VG_EARG, "--name is for GLB and glTF: '%s' has no animation to name", output) : VG_OK;
+}
+
 int vgi_plan_make(vgi_plan *p, const char *output, const vg_sink_options *o, vg_err *e)
 {
     *p = (vgi_plan){0};
@@ -154,8 +169,7 @@ int vgi_plan_make(vgi_plan *p, const char *output, const vg_sink_options *o, vg_
         !((p->sequence ? p->sequence->keeps : p->format->keeps) & VGI_KEEPS_DOUBLES))
         r = vg_fail(e, VG_EARG, "cannot write '%s' in full precision: %s holds binary32 only", output,
                     p->sequence ? p->sequence->name : p->format->name);
-    if (r == VG_OK && o->most_targets && p->sequence != &vgi_sequence_glb && p->sequence != &vgi_sequence_gltf)
-        r = vg_fail(e, VG_EARG, "--max-targets is for GLB and glTF: '%s' has no morph targets", output);
+    if (r == VG_OK) r = check_gltf_options(p, output, o, e);
     return r < 0 ? r : check_mesh_option(p, o, e);
 }
 

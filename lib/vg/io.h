@@ -56,6 +56,10 @@ typedef struct vg_source vg_source;
 typedef struct vg_reading {
     const char *array_axes; /* NPZ: what the axes of the positions count, in their order: "fvx" (frames, vertices, x y z),
                                "vxf", ...; NULL: told by their lengths, the faces and the reference */
+    const char *animation;  /* glTF: the one of this name; NULL: all, one after another */
+    double fps;             /* glTF: a frame so often a second, from the first key to the last; 0: at each key */
+    bool shapes;            /* glTF: morph targets, whatever animations there are */
+    bool unwelded;          /* glTF: vertices as the file has them, cut apart at seams */
 } vg_reading;
 
 int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err *e) VG_MUST_CHECK;
@@ -172,7 +176,11 @@ typedef struct vg_sink_options {
                             another mesh */
     bool no_mesh;        /* nowhere */
     bool drop_loose;     /* leave out the vertices that are in no face */
-    size_t most_targets; /* GLB, glTF: morph targets; more frames are mixed from so many. 0: 100 */
+    size_t most_targets; /* GLB, glTF: morph targets, at most. 0: as many as the tolerance asks for; up to 100 frames are
+                            targets as they are */
+    double morph_tolerance; /* GLB, glTF: how far a vertex may be from its place when frames are mixed, in D. 0: 0.001 */
+    bool shapes;         /* GLB, glTF: each frame is a morph target, and there is no animation */
+    const char *name;    /* GLB, glTF: of the animation; NULL: what its frames are called after */
     bool replace;        /* where a directory or a pattern has mesh files of an earlier set, remove those that are not
                             overwritten once all is written; without it, such files are an error before any work */
     int threads;         /* of mesh files so many are made at a time, and one more waits: no more than 256 MiB, but two
