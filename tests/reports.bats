@@ -347,3 +347,40 @@ EOF
     pipe 'vg-encode --weld off lips_target.gltf | vg-info'
     shows 'vertices    10'
 }
+
+@test "glTF: texture coordinates and the names of nodes and materials reach OBJ; images are named as left out" {
+    reports
+    py <<'EOF'
+import base64, json, struct
+# a square of two triangles, cut apart along the diagonal where the texture jumps
+points = [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0, 1, 1, 0, 0, 1, 0]
+uv = [0, 1, 0.5, 1, 0.5, 0.25, 0.5, 1, 1, 0, 0.5, 0]
+data = struct.pack('<18f', *points) + struct.pack('<12f', *uv)
+g = {'asset': {'version': '2.0'}, 'buffers': [{'byteLength': len(data), 'uri': 'data:application/octet-stream;base64,' + base64.b64encode(data).decode()}],
+    'bufferViews': [{'buffer': 0, 'byteOffset': 0, 'byteLength': 72}, {'buffer': 0, 'byteOffset': 72, 'byteLength': 48}],
+    'accessors': [{'bufferView': 0, 'componentType': 5126, 'count': 6, 'type': 'VEC3', 'min': [0, 0, 0], 'max': [1, 1, 0]},
+        {'bufferView': 1, 'componentType': 5126, 'count': 6, 'type': 'VEC2'}],
+    'images': [{'uri': 'skin.png'}], 'materials': [{'name': 'red skin'}],
+    'meshes': [{'primitives': [{'attributes': {'POSITION': 0, 'TEXCOORD_0': 1}, 'material': 0}]}],
+    'nodes': [{'mesh': 0, 'name': 'Flag'}], 'scenes': [{'nodes': [0]}], 'scene': 0}
+json.dump(g, open('flag.gltf', 'w'))
+g['accessors'][1]['count'] = 5
+json.dump(g, open('short.gltf', 'w'))
+EOF
+    must_warn vg-encode flag.gltf -o flag.vgs
+    one_line
+    says "'flag.gltf': left out 1 image of its materials"
+    must vg-decode -o flag.obj flag.vgs
+    [ "$(grep -c '^v ' flag.obj)" = 4 ] || fail "not welded" "$(cat flag.obj)"
+    grep -qx 'o Flag' flag.obj || fail "the node's name is lost"
+    grep -qx 'usemtl red skin' flag.obj || fail "the material's name is lost"
+    py <<'EOF'
+vt = [tuple(float(x) for x in l.split()[1:]) for l in open('flag.obj') if l.startswith('vt ')]
+f = [[tuple(int(x) - 1 for x in c.split('/')) for c in l.split()[1:]] for l in open('flag.obj') if l.startswith('f ')]
+assert [[c[0] for c in face] for face in f] == [[0, 1, 2], [0, 2, 3]], f
+# v grows upwards in OBJ, downwards in glTF
+assert [vt[c[1]] for face in f for c in face] == [(0, 0), (0.5, 0), (0.5, 0.75), (0.5, 0), (1, 1), (0.5, 1)], (vt, f)
+EOF
+    must_warn vg-encode short.gltf -o short.vgs
+    says "left out wrong texture coordinates"
+}

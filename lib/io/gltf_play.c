@@ -195,12 +195,15 @@ int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const vg_reading *how
     if (r == VG_OK) r = vgi_gltf_scene_read(x, &f, e);
     if (r == VG_OK) r = vgi_gltf_mend(x, &f, e);
     h->body.mesh = f.mesh;
+    if (r == VG_OK && !x->own) h->body.attributes = x->attributes, x->attributes = (vg_attributes){0};
     h->kind = VG_VERTICES, h->precision = VG_F32, h->count = h->body.mesh.nv;
     if (r == VG_OK && !x->as_shapes) r = vgi_gltf_read_animations(x, e);
     if (r == VG_OK) r = vgi_gltf_list_shapes(x, e);
     if (r < 0) return r;
     x->frames = x->nclips ? x->nmoments : x->shapes.names.n ? x->shapes.names.n + 1 : 1;
     if (!x->strips) vgi_note_dropped(&x->note, x->dropped); /* strips are made of such */
+    const size_t images = vgi_json_count(vgi_json_get(x->g.json, "images"));
+    if (images) vgi_note(&x->note, "left out %zu image%s of its materials", images, images == 1 ? "" : "s");
     vgi_gltf_note_extensions(&x->g, &x->note);
     return take_reference(x, h, e);
 }

@@ -1,5 +1,5 @@
 /* gltf_scene.c: what a scene of glTF shows: nodes, skins, and the vertices and faces of its meshes.
- * Leaves out cameras, materials, normals and texture coordinates; welding (gltf_weld.c), and what moves
+ * Leaves out cameras, what materials look like, and normals; welding (gltf_weld.c), and what moves
  * (gltf_clips.c, gltf_play.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_scene.h"
@@ -277,6 +277,17 @@ static bool place_instance(const instances *k, size_t i, double place[12])
     return (p.scale[0] < 0) ^ (p.scale[1] < 0) ^ (p.scale[2] < 0);
 }
 
+/* The first set of texture coordinates. One that is wrong costs nothing but itself. */
+static void read_uv(vgi_gltf_scene *x, vgi_gltf_part *p)
+{
+    const vgi_json *ref = vgi_json_get(p->attributes, "TEXCOORD_0");
+    if (!ref) return;
+    p->textured = vgi_gltf_accessor(&x->g, ref, 2, p->count, "texture coordinates", &p->uv, NULL) == VG_OK;
+    if (!p->textured && !strstr(x->note.text, "texture coord")) vgi_note(&x->note, "left out wrong texture coordinates");
+    p->first_uv = x->nuv;
+    if (p->textured) x->nuv += p->count;
+}
+
 static int add_part(vgi_gltf_scene *x, size_t at, int64_t skinned, const vgi_json *primitive, vg_err *e)
 {
     int r = vgi_grow(&x->parts, &x->parts_cap, x->nparts + 1, sizeof *x->parts, e);
@@ -293,6 +304,7 @@ static int add_part(vgi_gltf_scene *x, size_t at, int64_t skinned, const vgi_jso
     if (p->count > vgi_gltf_most - x->all)
         return vgi_gltf_bad(&x->g, e, "it shows more than %zu vertices", vgi_gltf_most);
     x->all += p->count;
+    read_uv(x, p);
     r = read_targets(x, p, e);
     return r < 0 || p->skin == VGI_GLTF_NONE ? r : read_influences(x, p, e);
 }
@@ -358,6 +370,35 @@ static int add_faces(const vgi_gltf_scene *x, vgi_gltf_faces *f, size_t n, uint6
     return r;
 }
 
+/* From the next face on it is called so. */
+static int add_label(vgi_gltf_scene *x, size_t face, vg_label_kind kind, const char *text, vg_err *e)
+{
+    vg_attributes *a = &x->attributes;
+    for (size_t i = a->nlabels; i-- > 0;)
+        if (a->labels[i].kind == (uint32_t)kind) {
+            if (!strcmp(a->labels[i].text, text)) return VG_OK;
+            break;
+        }
+    int r = vgi_grow(&a->labels, &x->labels_cap, a->nlabels + 1, sizeof *a->labels, e);
+    if (r < 0) return r;
+    char *copy = vgi_copy_string(text, strlen(text), e);
+    if (!copy) return VG_ENOMEM;
+    a->labels[a->nlabels++] = (vg_label){face, kind, copy};
+    return VG_OK;
+}
+
+/* The object is the node, the material that of the primitive, as far as they have names. */
+static int label_faces(vgi_gltf_scene *x, const vgi_gltf_faces *f, const vgi_gltf_part *p, const vgi_json *primitive,
+                       vg_err *e)
+{
+    const vgi_json *material = vgi_json_get(primitive, "material"), *item;
+    const char *object = vgi_json_text(vgi_json_get(x->nodes[p->node].json, "name")), *name = NULL;
+    if (material && vgi_gltf_item(&x->g, material, "materials", &item, NULL, NULL) == VG_OK)
+        name = vgi_json_text(vgi_json_get(item, "name"));
+    int r = object && *object ? add_label(x, f->mesh.nf, VG_LABEL_OBJECT, object, e) : VG_OK;
+    return r == VG_OK && name && *name ? add_label(x, f->mesh.nf, VG_LABEL_MATERIAL, name, e) : r;
+}
+
 static int read_faces(vgi_gltf_scene *x, vgi_gltf_faces *f, const vgi_gltf_part *p, const vgi_json *primitive,
                       vg_err *e)
 {
@@ -401,6 +442,7 @@ static int read_primitives(vgi_gltf_scene *x, vgi_gltf_faces *f, size_t at, int6
             p->instance = instance;
             memcpy(p->place, place, sizeof p->place);
         }
+        if (r == VG_OK) r = label_faces(x, f, p, primitive, e);
         if (r == VG_OK) r = read_faces(x, f, p, primitive, e);
     }
     return r;
@@ -463,6 +505,7 @@ void vgi_gltf_scene_clear(vgi_gltf_scene *x)
     }
     void *const arrays[] = {x->nodes, x->order, x->skins, x->parts, x->channels, x->clips, x->moments};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
+    vg_attributes_clear(&x->attributes);
     vgi_name_set_clear(&x->shapes);
     free(x->wanted);
     vgi_gltf_clear(&x->g);

@@ -55,7 +55,9 @@ typedef struct vgi_gltf_part {
     size_t instance;           /* of the node's mesh, from 1; 0: there are none */
     double place[12];          /* of the instance, in the node */
     const vgi_json *attributes, *targets;
-    vgi_accessor position;
+    vgi_accessor position, uv;
+    bool textured;             /* it has uv, */
+    size_t first_uv;           /* of which this is the first one among all */
     size_t ntargets, nsets;
     vgi_accessor *moved, joints[VGI_GLTF_SETS], shares[VGI_GLTF_SETS];
     uint32_t *kept;            /* those that are vertices of the mesh, ascending */
@@ -96,6 +98,9 @@ typedef struct vgi_gltf_scene {
     size_t most_targets, frames, next;
     vgi_name_set shapes; /* the morph targets of all meshes, by name */
     bool own;      /* our own file: its vertices and faces stay as they are */
+    size_t nuv;     /* texture coordinates of all parts */
+    vg_attributes attributes;
+    size_t labels_cap;
     size_t dropped; /* triangles without three vertices */
     bool strips;    /* some faces are strips or fans */
     char *wanted;  /* the animation that is asked for; NULL: all */

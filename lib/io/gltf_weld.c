@@ -217,14 +217,26 @@ static int weld_part(vgi_gltf_scene *x, const welding *k, vgi_gltf_part *p, size
     return VG_OK;
 }
 
-/* Faces of the welded vertices; those that have shrunk to nothing are left out, as strips have them too. How many. */
-static size_t renumber(vg_mesh *m, const uint32_t *number)
+static uint32_t uv_of(const vgi_gltf_scene *x, uint32_t v)
 {
-    size_t nf = 0, corners = 0;
+    const vgi_gltf_part *p = part_of(x, v);
+    return p->textured ? (uint32_t)(p->first_uv + (v - p->first)) : UINT32_MAX;
+}
+
+/* Faces of the welded vertices; those that have shrunk to nothing are left out, as strips have them too. How many. uv
+ * (may be NULL): of each corner its texture coordinate. Labels move along. */
+static size_t renumber(vgi_gltf_scene *x, vg_mesh *m, const uint32_t *number, uint32_t *uv)
+{
+    size_t nf = 0, corners = 0, label = 0;
     for (size_t f = 0; f < m->nf; f++) {
         const size_t start = m->start[f], n = m->start[f + 1] - start;
         bool distinct = true;
-        for (size_t k = 0; k < n; k++) m->vert[corners + k] = number[m->vert[start + k]];
+        for (; label < x->attributes.nlabels && x->attributes.labels[label].face <= f; label++)
+            x->attributes.labels[label].face = nf;
+        for (size_t k = 0; k < n; k++) {
+            if (uv) uv[corners + k] = uv_of(x, m->vert[start + k]);
+            m->vert[corners + k] = number[m->vert[start + k]];
+        }
         if (n <= 3)
             for (size_t k = 0; k < n; k++) distinct &= m->vert[corners + k] != m->vert[corners + (k + 1) % n];
         if (!distinct) continue;
@@ -234,7 +246,29 @@ static size_t renumber(vg_mesh *m, const uint32_t *number)
     const size_t dropped = m->nf - nf;
     if (m->start) m->start[nf] = (uint32_t)corners;
     m->nf = nf;
+    while (label < x->attributes.nlabels) x->attributes.labels[label++].face = nf;
     return dropped;
+}
+
+/* In OBJ and in the stream v grows upwards, in glTF downwards. */
+static int take_uv(vgi_gltf_scene *x, const vg_mesh *m, vg_err *e)
+{
+    vg_attributes *a = &x->attributes;
+    if (!x->nuv || x->nuv >= UINT32_MAX) return VG_OK;
+    a->tex = vgi_array_raw(x->nuv, 2 * sizeof *a->tex, e);
+    a->corner_tex = vgi_array_raw(vg_mesh_corners(m), sizeof *a->corner_tex, e);
+    if (!a->tex || !a->corner_tex) return VG_ENOMEM;
+    a->ntex = x->nuv, a->tex_dim = 2;
+    for (size_t i = 0; i < x->nparts; i++) {
+        const vgi_gltf_part *p = &x->parts[i];
+        for (size_t v = 0; p->textured && v < p->count; v++) {
+            double *to = a->tex + 2 * (p->first_uv + v);
+            vgi_accessor_get(&p->uv, v, to);
+            if (!vgi_finite(to, 2)) to[0] = 0, to[1] = 1;
+            to[1] = 1 - to[1];
+        }
+    }
+    return VG_OK;
 }
 
 static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
@@ -245,7 +279,8 @@ static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
     int r = k.slots && k.number ? VG_OK : VG_ENOMEM;
     size_t n = 0;
     for (size_t i = 0; i < x->nparts && r == VG_OK; i++) r = weld_part(x, &k, &x->parts[i], &n, e);
-    if (r == VG_OK) x->dropped = renumber(m, k.number);
+    if (r == VG_OK) r = take_uv(x, m, e);
+    if (r == VG_OK) x->dropped = renumber(x, m, k.number, x->attributes.corner_tex);
     m->nv = n;
     free(k.slots);
     free(k.number);
