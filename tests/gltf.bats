@@ -278,3 +278,64 @@ def targets(name):
 assert targets('long.glb') < targets('fine.glb') < 153, (targets('long.glb'), targets('fine.glb'))
 EOF
 }
+
+@test "texture coordinates: seams are cut apart for others and put together again" {
+    cat >cube.obj <<'EOF'
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+v 2 0 0
+v 2 1 0
+vt 0 0
+vt 0.5 0
+vt 0.5 1
+vt 0 1
+vt 0.75 0.25
+vt 1 0.25
+vt 1 0.5
+vt 0.75 0.5
+f 1/1 2/2 3/3 4/4
+f 2/5 5/6 6/7 3/8
+EOF
+    awk '/^v /{$4 = NR} {print}' cube.obj >moved.obj
+    must vg-encode cube.obj moved.obj -o two.vgs
+    must vg-decode -o two.glb two.vgs
+    must vg-decode -o two.gltf two.vgs
+    py <<'EOF'
+import json, struct
+b = open('two.glb', 'rb').read()
+n, = struct.unpack('<I', b[12:16])
+g, data = json.loads(b[20:20 + n]), b[28 + n:]
+p = g['meshes'][0]['primitives'][0]
+uv, points = (g['accessors'][p['attributes'][k]] for k in ('TEXCOORD_0', 'POSITION'))
+assert uv['count'] == points['count'] == 8 and uv['type'] == 'VEC2', (uv, points)
+assert g['meshes'][0]['extras']['vg_vertices'] == [6, 1, 2]
+at = lambda a: g['bufferViews'][a['bufferView']].get('byteOffset', 0) + a.get('byteOffset', 0)
+uv = struct.unpack_from('<16f', data, at(uv))
+assert uv[:4] == (0, 1, 0.5, 1) and uv[12:] == (0.75, 0.75, 0.75, 0.5), uv # v downwards
+x = struct.unpack_from('<24f', data, at(points))
+assert x[18:21] == x[3:6] and x[21:24] == x[6:9] # the copies
+for t in p['targets']: # which move along
+    a = g['accessors'][t['POSITION']]
+    d = struct.unpack_from('<24f', data, at(a))
+    assert a['count'] == 8 and d[18:21] == d[3:6] and d[21:24] == d[6:9]
+EOF
+    local kind
+    for kind in glb gltf; do
+        must vg-encode two.$kind -o back.vgs
+        must vg-diff -t 0 two.vgs back.vgs
+        must vg-decode -o back-%d.obj back.vgs
+        py <<'EOF'
+def read(name):
+    v, vt, f = [], [], []
+    for l in open(name):
+        w = l.split()
+        if w[0] == 'v': v.append(tuple(map(float, w[1:])))
+        if w[0] == 'vt': vt.append(tuple(map(float, w[1:])))
+        if w[0] == 'f': f.append([(v[int(c.split('/')[0]) - 1], vt[int(c.split('/')[1]) - 1]) for c in w[1:]])
+    return v, f
+assert read('cube.obj') == read('back-0.obj') and read('moved.obj') == read('back-1.obj')
+EOF
+    done
+}

@@ -448,7 +448,8 @@ static int begin_gltf(void **state, const vg_head *h, const vg_sink_options *o, 
     return vgi_gltf_begin(state, h, o, out, false, e);
 }
 
-enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_NAMES | VGI_KEEPS_TIMES };
+/* texture coordinates of vertices: a skin says itself that it has none */
+enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE | VGI_KEEPS_NAMES | VGI_KEEPS_TIMES };
 
 enum { KINDS = 1 << VG_VERTICES | 1 << VG_TRANSFORMS }; /* the latter of a rig */
 

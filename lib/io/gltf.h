@@ -26,6 +26,9 @@ enum {
  * extras of the animation. */
 #define VGI_GLTF_FACES "vg_faces"
 #define VGI_GLTF_FRAMES "vg_frames"
+/* And which vertices are copies, for the sake of texture coordinates: the number of those that are none, which come first,
+ * and of each copy the vertex that it is. */
+#define VGI_GLTF_VERTICES "vg_vertices"
 
 typedef struct vgi_gltf_buffer {
     const unsigned char *data;

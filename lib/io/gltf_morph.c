@@ -35,7 +35,7 @@ typedef struct morphs {
 
 static int begin(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
 {
-    const size_t nv = w->h->body.mesh.nv;
+    const size_t nv = w->seams.n;
     morphs *x = w->own = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
     w->still = x->shapes = o->shapes;
@@ -104,13 +104,16 @@ static int choose_targets(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
+/* Of all vertices of the file. */
 static int load_target(vgi_gltf_writing *w, size_t t, vg_err *e)
 {
     morphs *x = w->own;
     const size_t n = 3 * w->h->body.mesh.nv;
-    if (x->chosen) return load(w, x->chosen[t], x->first, e);
-    memcpy(x->first, x->basis.targets + t * n, n * sizeof *x->first);
-    return VG_OK;
+    int r = x->chosen ? load(w, x->chosen[t], x->first, e) : VG_OK;
+    if (!x->chosen) memcpy(x->first, x->basis.targets + t * n, n * sizeof *x->first);
+    for (size_t v = w->seams.nv; v < w->seams.n && r == VG_OK; v++)
+        memcpy(x->first + 3 * v, x->first + 3 * (size_t)w->seams.from[v], VGI_GLTF_POINT);
+    return r;
 }
 
 /* ---- how targets lie in the file ---- */
@@ -122,7 +125,7 @@ static bool moves(const float *d, size_t v)
 
 static size_t index_bytes(const vgi_gltf_writing *w)
 {
-    return w->h->body.mesh.nv <= 65536 ? 2 : 4;
+    return w->seams.n <= 65536 ? 2 : 4;
 }
 
 /* Of the indices of n vertices, filled up to whole numbers of 4. */
@@ -134,7 +137,7 @@ static size_t indices_size(const vgi_gltf_writing *w, size_t n)
 static int look_at_targets(vgi_gltf_writing *w, vg_err *e)
 {
     morphs *x = w->own;
-    const size_t nv = w->h->body.mesh.nv;
+    const size_t nv = w->seams.n;
     int r = (x->at = vgi_array(x->targets, sizeof *x->at, e)) ? VG_OK : VG_ENOMEM;
     for (size_t t = 0; t < x->targets && r == VG_OK; t++) {
         lying *l = &x->at[t];
@@ -155,7 +158,7 @@ static int say_sparse(vgi_gltf_writing *w, const lying *l, size_t view, size_t i
                          ",\n{\"componentType\":%d,\"count\":%zu,\"type\":\"VEC3\",\"sparse\":{\"count\":%zu,"
                          "\"indices\":{\"bufferView\":%zu,\"byteOffset\":%zu,\"componentType\":%d},"
                          "\"values\":{\"bufferView\":%zu,\"byteOffset\":%zu}}",
-                         VGI_GLTF_FLOAT, w->h->body.mesh.nv, l->moved, view, indices,
+                         VGI_GLTF_FLOAT, w->seams.n, l->moved, view, indices,
                          index_bytes(w) == 2 ? VGI_GLTF_USHORT : VGI_GLTF_UINT, view + 1, values);
     if (r == VG_OK) r = vgi_gltf_say_numbers(&w->accessors, ",\"min\":[", l->bounds, 3, "]", e);
     if (r == VG_OK) r = vgi_gltf_say_numbers(&w->accessors, ",\"max\":[", l->bounds + 3, 3, "]}", e);
@@ -167,7 +170,7 @@ static int say_sparse(vgi_gltf_writing *w, const lying *l, size_t view, size_t i
 static int describe_points(vgi_gltf_writing *w, vg_err *e)
 {
     morphs *x = w->own;
-    const size_t nv = w->h->body.mesh.nv, bytes = VGI_GLTF_POINT * nv;
+    const size_t nv = w->seams.n, bytes = VGI_GLTF_POINT * nv;
     size_t whole = 1, indices = 0, values = 0;
     double bounds[6];
     for (size_t t = 0; t < x->targets; t++) whole += !x->at[t].sparse;
@@ -201,7 +204,9 @@ static int say_primitives(vgi_gltf_writing *w, vg_err *e)
 {
     const morphs *x = w->own;
     vg_bytes moving = {0};
-    int r = vgi_gltf_say(&moving, e, "\"attributes\":{\"POSITION\":%zu}", x->points);
+    int r = vgi_gltf_say(&moving, e, "\"attributes\":{\"POSITION\":%zu", x->points);
+    if (r == VG_OK && w->seams.uv) r = vgi_gltf_say(&moving, e, ",\"TEXCOORD_0\":%zu", w->texture);
+    if (r == VG_OK) r = vgi_gltf_say(&moving, e, "}");
     for (size_t t = 0; t < x->targets && r == VG_OK; t++)
         r = vgi_gltf_say(&moving, e, "%s{\"POSITION\":%zu}", t ? "," : ",\"targets\":[", x->points + 1 + t);
     if (r == VG_OK && x->targets) r = vgi_gltf_say(&moving, e, "]");
@@ -222,6 +227,16 @@ static int say_target_names(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_gltf_say(&w->json, e, "]");
 }
 
+/* Which vertices the copies are of, so that our own reader can put them together again. */
+static int say_seams(vgi_gltf_writing *w, vg_err *e)
+{
+    const vgi_gltf_seams *s = &w->seams;
+    if (s->n == s->nv) return VG_OK;
+    int r = vgi_gltf_say(&w->json, e, ",\n\"" VGI_GLTF_VERTICES "\":[%zu", s->nv);
+    for (size_t v = s->nv; v < s->n && r == VG_OK; v++) r = vgi_gltf_say(&w->json, e, ",%u", s->from[v]);
+    return r < 0 ? r : vgi_gltf_say(&w->json, e, "]");
+}
+
 static int say_mesh(vgi_gltf_writing *w, vg_err *e)
 {
     const morphs *x = w->own;
@@ -233,6 +248,7 @@ static int say_mesh(vgi_gltf_writing *w, vg_err *e)
         r = vgi_gltf_say(&w->json, e, "%s0", t ? "," : ",\n\"weights\":[");
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "%s,\n\"extras\":{", x->targets ? "]" : "");
     if (r == VG_OK) r = say_target_names(w, e);
+    if (r == VG_OK) r = say_seams(w, e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, ",\n\"" VGI_GLTF_FACES "\":[");
     if (r == VG_OK) r = vgi_bytes_append(&w->json, w->shape.runs.data, w->shape.runs.size, e);
     return r < 0 ? r : vgi_gltf_say(&w->json, e, "]}}]");
@@ -282,7 +298,7 @@ static int emit_weights(vgi_gltf_writing *w, vg_err *e)
 static int emit_indices(vgi_gltf_writing *w, const lying *l, vg_err *e)
 {
     const morphs *x = w->own;
-    const size_t nv = w->h->body.mesh.nv, step = index_bytes(w);
+    const size_t nv = w->seams.n, step = index_bytes(w);
     unsigned char *p = x->packed, *start = p;
     for (size_t v = 0; v < nv; v++) {
         if (!moves(x->first, v)) continue;
@@ -299,7 +315,7 @@ static int emit_indices(vgi_gltf_writing *w, const lying *l, vg_err *e)
 static int emit_values(vgi_gltf_writing *w, vg_err *e)
 {
     const morphs *x = w->own;
-    const size_t nv = w->h->body.mesh.nv;
+    const size_t nv = w->seams.n;
     int r = VG_OK;
     size_t n = 0;
     for (size_t v = 0; v < nv && r == VG_OK; v++)
@@ -315,7 +331,7 @@ static int emit_targets(vgi_gltf_writing *w, int round, vg_err *e)
     for (size_t t = 0; t < x->targets && r == VG_OK; t++) {
         const lying *l = &x->at[t];
         if (l->sparse != (round > 0) || (r = load_target(w, t, e)) < 0) continue;
-        if (round == 0) r = vgi_gltf_emit_singles(w, x->first, 3 * w->h->body.mesh.nv, e);
+        if (round == 0) r = vgi_gltf_emit_singles(w, x->first, 3 * w->seams.n, e);
         else r = round == 1 ? emit_indices(w, l, e) : emit_values(w, e);
     }
     return r;
@@ -324,7 +340,7 @@ static int emit_targets(vgi_gltf_writing *w, int round, vg_err *e)
 static int emit(vgi_gltf_writing *w, vg_err *e)
 {
     int r = w->still ? VG_OK : emit_weights(w, e);
-    if (r == VG_OK) r = vgi_gltf_emit_singles(w, w->base, 3 * w->h->body.mesh.nv, e);
+    if (r == VG_OK) r = vgi_gltf_emit_singles(w, w->base, 3 * w->seams.n, e);
     for (int round = 0; round < 3 && r == VG_OK; round++) r = emit_targets(w, round, e);
     return r;
 }

@@ -201,6 +201,35 @@ static uint32_t *find_slot(const welding *k, const vgi_gltf_part *p, size_t v)
     return &k->slots[i];
 }
 
+/* Copies that our own writer made: number becomes the vertex that each is. How many vertices there are; 0: they are not
+ * told of, or not rightly. */
+static size_t own_vertices(const vgi_gltf_scene *x, uint32_t *number)
+{
+    const vgi_json *mesh;
+    uint64_t nv, v;
+    if (!x->own || vgi_gltf_item(&x->g, vgi_json_get(x->nodes[x->parts[0].node].json, "mesh"), "meshes", &mesh, NULL,
+                                 NULL) < 0)
+        return 0;
+    const vgi_json *list = vgi_json_get(vgi_json_get(mesh, "extras"), VGI_GLTF_VERTICES);
+    if (!vgi_json_whole(vgi_json_at(list, 0), &nv) || nv == 0 || nv > x->all || vgi_json_count(list) - 1 != x->all - nv)
+        return 0;
+    for (size_t i = 0; i < x->all; i++) {
+        number[i] = (uint32_t)i;
+        if (i < nv) continue;
+        if (!vgi_json_whole(vgi_json_at(list, 1 + i - (size_t)nv), &v) || v >= nv) return 0;
+        number[i] = (uint32_t)v;
+    }
+    return (size_t)nv;
+}
+
+static int keep_first(vgi_gltf_part *p, size_t n, vg_err *e)
+{
+    if (!(p->kept = vgi_array_raw(n, sizeof *p->kept, e))) return VG_ENOMEM;
+    for (size_t v = 0; v < n; v++) p->kept[v] = (uint32_t)v;
+    p->nkept = n;
+    return VG_OK;
+}
+
 static int weld_part(vgi_gltf_scene *x, const welding *k, vgi_gltf_part *p, size_t *n, vg_err *e)
 {
     if (!(p->kept = vgi_array_raw(p->count, sizeof *p->kept, e))) return VG_ENOMEM;
@@ -277,8 +306,10 @@ static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
     while (k.nslots < 2 * x->all) k.nslots *= 2;
     k.slots = vgi_array(k.nslots, sizeof *k.slots, e), k.number = vgi_array_raw(x->all, sizeof *k.number, e);
     int r = k.slots && k.number ? VG_OK : VG_ENOMEM;
-    size_t n = 0;
-    for (size_t i = 0; i < x->nparts && r == VG_OK; i++) r = weld_part(x, &k, &x->parts[i], &n, e);
+    size_t n = r == VG_OK ? own_vertices(x, k.number) : 0;
+    if (n) r = keep_first(&x->parts[0], n, e);
+    else
+        for (size_t i = 0; i < x->nparts && r == VG_OK; i++) r = weld_part(x, &k, &x->parts[i], &n, e);
     if (r == VG_OK) r = take_uv(x, m, e);
     if (r == VG_OK) x->dropped = renumber(x, m, k.number, x->attributes.corner_tex);
     m->nv = n;

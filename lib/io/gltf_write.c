@@ -1,6 +1,6 @@
 /* gltf_write.c: a sequence as a glTF file: a mesh, an animation with a time for each frame, and the bytes of both.
- * Leaves out how the mesh moves: by morph targets (gltf_morph.c) or by a skin (gltf_skin.c); and normals, which
- * change with the pose, materials, and texture coordinates.
+ * Leaves out how the mesh moves: by morph targets (gltf_morph.c) or by a skin (gltf_skin.c); where texture coordinates cut
+ * it apart (gltf_seams.c); and normals, which change with the pose, and materials.
  *
  * The frames wait in a file without a name.
  * SPDX-License-Identifier: GPL-3.0-or-later */
@@ -48,11 +48,13 @@ float vgi_gltf_get_single(const unsigned char *p)
 
 static int round_base(vgi_gltf_writing *w, vg_err *e)
 {
-    if (!(w->base = vgi_array_raw(w->h->body.mesh.nv, VGI_GLTF_POINT, e))) return VG_ENOMEM;
+    if (!(w->base = vgi_array_raw(w->seams.n, VGI_GLTF_POINT, e))) return VG_ENOMEM;
     for (size_t i = 0; i < 3 * w->h->body.mesh.nv; i++) {
         w->base[i] = (float)w->h->body.reference[i];
         if (!isfinite(w->base[i])) return vg_fail(e, VG_EINPUT, "a position is too large for binary32");
     }
+    for (size_t v = w->seams.nv; v < w->seams.n; v++)
+        memcpy(w->base + 3 * v, w->base + 3 * (size_t)w->seams.from[v], VGI_GLTF_POINT);
     return VG_OK;
 }
 
@@ -64,7 +66,9 @@ int vgi_gltf_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi
     w->out = out, w->h = h, w->binary = binary, w->clip = o->name;
     w->spool.name = "temporary file";
     if ((w->spool.fd = vgi_nameless_file(e)) < 0) return w->spool.fd;
-    int r = round_base(w, e);
+    static const vg_attributes none;
+    int r = vgi_gltf_seams_make(&w->seams, &h->body.mesh, h->kind == VG_VERTICES ? &h->body.attributes : &none, e);
+    if (r == VG_OK) r = round_base(w, e);
     return r < 0 ? r : w->manner->begin(w, o, e);
 }
 
@@ -228,11 +232,20 @@ static int describe_indices(vgi_gltf_writing *w, const vg_bytes *indices, size_t
                  : vgi_gltf_say_accessor(w, 0, VGI_GLTF_UINT, indices->size / VGI_GLTF_ITEM, "SCALAR", NULL, 0, e);
 }
 
+static int describe_texture(vgi_gltf_writing *w, vg_err *e)
+{
+    w->texture = w->naccessors;
+    if (!w->seams.uv) return VG_OK;
+    int r = vgi_gltf_view(w, 2 * VGI_GLTF_ITEM * w->seams.n, ",\"target\":34962", e);
+    return r < 0 ? r : vgi_gltf_say_accessor(w, 0, VGI_GLTF_FLOAT, w->seams.n, "VEC2", NULL, 0, e);
+}
+
 static int describe(vgi_gltf_writing *w, vg_err *e)
 {
     const double between[2] = {time_of(w, 0), time_of(w, w->frames - 1)};
     int r = describe_indices(w, &w->shape.triangles, &w->triangles, e);
     if (r == VG_OK) r = describe_indices(w, &w->shape.lines, &w->lines, e);
+    if (r == VG_OK) r = describe_texture(w, e);
     w->moments = w->naccessors;
     if (r == VG_OK && !w->still) r = vgi_gltf_view(w, VGI_GLTF_ITEM * w->frames, "", e);
     if (r == VG_OK && !w->still)
@@ -293,6 +306,7 @@ static int emit_all(vgi_gltf_writing *w, vg_err *e)
 {
     int r = vgi_gltf_emit(w, w->shape.triangles.data, w->shape.triangles.size, e);
     if (r == VG_OK) r = vgi_gltf_emit(w, w->shape.lines.data, w->shape.lines.size, e);
+    if (r == VG_OK && w->seams.uv) r = vgi_gltf_emit_singles(w, w->seams.uv, 2 * w->seams.n, e);
     for (size_t i = 0; i < w->frames && r == VG_OK && !w->still; i++) {
         float t = (float)time_of(w, i);
         r = vgi_gltf_emit_singles(w, &t, 1, e);
@@ -351,8 +365,26 @@ static void note_losses(vgi_gltf_writing *w)
     if (w->some_timed && !w->timed)
         n = (size_t)snprintf(w->warning, sizeof w->warning,
                              "the times of the frames: they do not ascend from 0 or later; ");
+    if (w->h->body.attributes.ntex && !w->seams.uv)
+        n += (size_t)snprintf(w->warning + n, sizeof w->warning - n, "texture coordinates; ");
     if (w->manner->warning) w->manner->warning(w, w->warning + n, sizeof w->warning - n);
     if (n && !w->warning[n]) w->warning[n - 2] = 0;
+}
+
+/* The faces, of vertices of the file. */
+static int make_shape(vgi_gltf_writing *w, vg_err *e)
+{
+    const vgi_gltf_seams *s = &w->seams;
+    vg_mesh mesh = w->h->body.mesh;
+    if (!s->corner) return vgi_gltf_shape_make(&w->shape, &mesh, w->h->body.reference, e);
+    double *points = vgi_array_raw(s->n, 3 * sizeof *points, e);
+    if (!points) return VG_ENOMEM;
+    for (size_t v = 0; v < s->n; v++)
+        memcpy(points + 3 * v, w->h->body.reference + 3 * (size_t)s->from[v], 3 * sizeof *points);
+    mesh.nv = s->n, mesh.vert = s->corner;
+    int r = vgi_gltf_shape_make(&w->shape, &mesh, points, e);
+    free(points);
+    return r;
 }
 
 int vgi_gltf_end(void *state, vg_err *e)
@@ -360,7 +392,7 @@ int vgi_gltf_end(void *state, vg_err *e)
     vgi_gltf_writing *w = state;
     w->timed = times_fit(w);
     int r = vgi_output_flush(&w->spool, e);
-    if (r == VG_OK) r = vgi_gltf_shape_make(&w->shape, &w->h->body.mesh, w->h->body.reference, e);
+    if (r == VG_OK) r = make_shape(w, e);
     if (r == VG_OK) r = say_all(w, e);
     if (r == VG_OK) r = w->binary ? put_binary(w, e) : put_text(w, e);
     note_losses(w);
@@ -384,6 +416,7 @@ void vgi_gltf_release(void *state)
     free(w->times);
     free(w->base);
     vgi_gltf_shape_clear(&w->shape);
+    vgi_gltf_seams_clear(&w->seams);
     vg_bytes_clear(&w->json);
     vg_bytes_clear(&w->views);
     vg_bytes_clear(&w->accessors);

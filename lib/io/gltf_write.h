@@ -5,6 +5,7 @@
 #define VG_GLTF_WRITE_H
 
 #include "io/gltf.h"
+#include "io/gltf_seams.h"
 
 enum { VGI_GLTF_ITEM = 4, VGI_GLTF_POINT = 12 }; /* bytes of a number, and of three */
 
@@ -46,11 +47,12 @@ struct vgi_gltf_writing {
     vgi_names names;
     double *times;
     size_t times_cap;
-    float *base;               /* the reference pose as it will be read */
+    vgi_gltf_seams seams;      /* vertices of the file; of a skin those of the mesh */
+    float *base;               /* the reference pose as it will be read, seams.n points */
     vgi_gltf_shape shape;
     vg_bytes json, views, accessors; /* text */
     size_t nviews, naccessors, bytes;
-    size_t triangles, lines, moments; /* numbers of their accessors; those of no bytes have none */
+    size_t triangles, lines, texture, moments; /* numbers of their accessors; those of no bytes have none */
     unsigned char carry[3];    /* base64: bytes that wait for their third */
     size_t ncarry;
     char warning[280];
