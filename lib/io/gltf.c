@@ -373,7 +373,7 @@ int vgi_gltf_accessor(const vgi_gltf *g, const vgi_json *ref, size_t width, size
     a->width = width_of(vgi_json_text(vgi_json_get(from, "type")));
     a->normalized = vgi_json_is_true(vgi_json_get(from, "normalized"));
     if (a->width != width) return vgi_gltf_bad(g, e, "the accessor of %s is of another type", what);
-    if (a->count == 0) return vgi_gltf_bad(g, e, "the accessor of %s has no elements", what);
+    if (a->count == 0) return vgi_gltf_bad(g, e, "the accessor of %s has 0 elements", what);
     if (count && a->count != count)
         return vgi_gltf_bad(g, e, "the accessor of %s has %zu elements, not %zu", what, a->count, count);
     if (vgi_json_get(from, "bufferView"))
