@@ -325,6 +325,7 @@ EOF
     for kind in glb gltf; do
         must vg-encode two.$kind -o back.vgs
         must vg-diff -t 0 two.vgs back.vgs
+        rm -f back-*.obj
         must vg-decode -o back-%d.obj back.vgs
         py <<'EOF'
 def read(name):
