@@ -343,6 +343,7 @@ static void make_head(work *w)
     vg_map_clear(&h->map); /* it is no property of the mesh */
     if (w->way == CARRY) {
         vg_patches_clear(&h->body.patches);
+        h->body.mesh = (vg_mesh){0}; /* w->source_mesh has it */
         vg_head_take(h, t, "mesh");
         vg_head_take(h, t, "links");
     }

@@ -318,8 +318,8 @@ END
     must vg-decode -q walk.vgs -o out.zip
     must vg-decode -q walk.vgs -o out.glb
     must vg-decode -q --mesh out.ply walk.vgs -o out.pc2
-    must vg-decode walk.vgs -o 'p%d.obj'
-    must vg-decode walk.vgs -o out/
+    must vg-decode --replace walk.vgs -o 'p%d.obj'
+    must vg-decode --replace walk.vgs -o out/
     for name in out.vgs out.txt out.png out.obj out.ply out.zip out.pc2 out.glb p0.obj p1.obj out/pose1.obj; do
         [ -s $name ] && [ "$(stat -c %a $name)" = 640 ] || fail "$name has mode $(stat -c %a $name), not 640"
     done
