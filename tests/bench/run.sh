@@ -18,7 +18,9 @@ case ${JSON:=} in
 *) JSON=$PWD/$JSON ;;
 esac
 W=$(mktemp -d "${TMPDIR:-/tmp}/vg-bench.XXXXXX")
-trap 'rm -rf "$W"' EXIT
+others= # processes that only take processors; see busy()
+# shellcheck disable=SC2086 # a list of process numbers
+trap 'kill $others 2>/dev/null || :; rm -rf "$W"' EXIT
 trap 'exit 130' INT TERM HUP
 cd "$W"
 if [ "$BENCH" != quick ] && [ "$BENCH" != full ]; then
@@ -419,6 +421,7 @@ busy() {
     kill $others
     # shellcheck disable=SC2086
     wait $others 2>/dev/null || :
+    others=
 }
 
 # share NAME POSES: the part of its speed alone that the pipe keeps beside busy processes, and the part that is fair
