@@ -3,6 +3,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 #include "report.h"
+#include "signals.h"
 #include "skeletons.h"
 
 #include <inttypes.h>
@@ -11,17 +12,19 @@
 #include <unistd.h>
 
 static struct {
-    bool check, frames, digest, weights;
+    bool check, frames, digest, weights, positions;
 } opts;
 
 static const cli_option options[] = {
     {.name = "check", .help = "read everything and only say whether it is whole", .flag = &opts.check,
-     .excludes = "digest|frames|weights"},
+     .excludes = "digest|frames|weights|positions"},
     {.name = "digest", .help = "only print a fingerprint of the content: 16 hexadecimal digits",
-     .flag = &opts.digest, .excludes = "frames|weights"},
-    {.name = "frames", .help = "list the frames", .flag = &opts.frames, .excludes = "weights"},
+     .flag = &opts.digest, .excludes = "frames|weights|positions"},
+    {.name = "frames", .help = "list the frames", .flag = &opts.frames, .excludes = "weights|positions"},
     {.name = "weights", .help = "only print the skinning weights of a rig, a vertex per line", .flag = &opts.weights,
-     .excludes = "json"},
+     .excludes = "json|positions"},
+    {.name = "positions", .help = "only print where control points and frames of a signal are, for vg-sample --edit",
+     .flag = &opts.positions, .excludes = "json"},
     {0},
 };
 
@@ -560,6 +563,7 @@ static void report_all(report *r, const char *operand, const vg_head *h, const c
     report_patches(r, h);
     report_skeletons(r, h, c);
     report_map(r, &h->map);
+    report_signal(r, &h->signal);
     report_provenance(r, h);
     report_unknown(r, h, c);
 }
@@ -586,6 +590,13 @@ static void print_weights(const vg_head *h, const char *operand)
     write_weights(cli_text_open(), &h->body.rig, h->body.mesh.nv);
 }
 
+static void print_positions(const vg_head *h, const char *operand)
+{
+    if (!h->signal.n)
+        cli_stop(VG_EINPUT, "'%s' holds no signal: make one with vg-fitsignal", operand ? operand : "standard input");
+    write_positions(cli_text_open(), &h->signal);
+}
+
 int main(int argc, char **argv)
 {
     char **operands;
@@ -597,9 +608,10 @@ int main(int argc, char **argv)
     const char *operand = n && strcmp(operands[0], "-") ? operands[0] : NULL;
     if (opts.check) report_check(r);
     else if (opts.digest) report_digest(r, &c);
-    else if ((!list || cli.json) && !opts.weights) report_all(r, operand, vg_source_head(s), &c);
+    else if ((!list || cli.json) && !opts.weights && !opts.positions) report_all(r, operand, vg_source_head(s), &c);
     if (list) report_join(r, list);
     if (opts.weights) print_weights(vg_source_head(s), operand);
+    else if (opts.positions) print_positions(vg_source_head(s), operand);
     else report_print(r, cli_text_open(), cli.json);
     cli_text_end();
     report_free(&r);

@@ -233,6 +233,20 @@ for a in json.load(sys.stdin)['frame_errors'][2:9]: print(repr(a['x']), repr(a['
     says 'a curve takes at least 2 points'
 }
 
+@test "vg-info: the numbers of a signal, and its places as an edit that changes nothing" {
+    must vg-info --json "$(trex signal)"
+    printf '%s' "$output" | python3 -c "
+import json, sys
+s = json.load(sys.stdin)['signal']
+assert (s['frames'], s['dimension'], s['basis_bits'], s['rooted'], s['layout']) == (34, 3 * 912, 64, True, 'plain'), s
+assert 0 < s['error_shape'] <= 0.7e-2 and 0 < s['error'] <= 1e-2 and s['compression'] > 3, s"
+    must vg-info --positions "$(trex signal)" -o all.txt
+    must vg-sample --no-provenance "$(trex signal)" -o as-it-is.vgs
+    must vg-sample --no-provenance --edit all.txt "$(trex signal)" -o edited.vgs
+    must cmp as-it-is.vgs edited.vgs
+    must_fail 3 vg-info --positions "$(trex vgs)"
+}
+
 @test "a sequence that holds still, two frames, a single triangle" {
     poses two 2
     for i in 1 2 3 4; do cp pose1.obj same$i.obj; done

@@ -1,0 +1,45 @@
+/* signals.c: what a signal is, in words and numbers.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "signals.h"
+
+#include <stdlib.h>
+
+void report_signal(report *r, const vg_signal *s)
+{
+    static const char *const layouts[] = {"unknown", "plain", "ring", "time", "placed"};
+    size_t floats = vg_signal_floats(s);
+    if (!s->n) return;
+    report_gap(r);
+    report_group(r, "signal");
+    report_put(r, "frames", "signal of", report_count(s->n));
+    report_put(r, "control_points", "control points", report_count(s->k));
+    report_put(r, "sites", "sites", report_count(s->l));
+    report_put(r, "coordinates", "coordinates", report_count(s->m));
+    report_put(r, "dimension", "dimension", report_count(s->d));
+    report_put(r, "basis_bits", "basis bits", report_count(s->bits));
+    report_put(r, "rooted", NULL, report_flag(s->rooted));
+    report_put(r, NULL, "root", report_text(s->rooted ? "a signal of its own" : "in the shapes"));
+    report_put(r, "layout", "layout", report_text(layouts[s->layout]));
+    report_put(r, "layout_weight", NULL, report_number(s->layout_weight));
+    report_put(r, "layout_ratio", "deviation", report_number(s->layout_ratio));
+    report_put(r, "numbers", "numbers", report_count(floats));
+    report_put(r, "compression", "compression", report_number((double)s->n * (double)s->d / (double)floats));
+    report_put(r, "error_shape", "error of shape, D", report_number(s->error_shape));
+    report_put(r, "error_pose", "and of pose, D", report_number(s->error_pose));
+    report_put(r, "error", "and of time, D", report_number(s->error_time));
+    report_put(r, "error_rms", "rms, D", report_number(s->error_rms));
+    report_end(r);
+}
+
+void write_positions(FILE *f, const vg_signal *s)
+{
+    bool *site = calloc(s->n, sizeof *site);
+    for (size_t i = 0; site && i < s->l; i++) site[s->site[i]] = true;
+    fprintf(f, "# %zu control points of the curve, and %zu frames in the plane: lines for vg-sample --edit\n", s->k, s->n);
+    for (size_t i = 0; i < s->k; i++)
+        fprintf(f, "control %zu %.17g %.17g\n", i + 1, s->control[2 * i], s->control[2 * i + 1]);
+    for (size_t i = 0; i < s->n; i++)
+        fprintf(f, "frame %zu %.17g %.17g%s\n", i + 1, s->position[2 * i], s->position[2 * i + 1],
+                site && site[i] ? " # a site" : "");
+    free(site);
+}
