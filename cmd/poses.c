@@ -36,6 +36,15 @@ poses poses_read(vg_source *s, size_t most)
     return p;
 }
 
+void poses_clear(poses *p)
+{
+    for (size_t i = 0; p->names && i < p->n; i++) free(p->names[i]);
+    free(p->names);
+    free(p->values);
+    free(p->times);
+    *p = (poses){0};
+}
+
 void poses_name(poses *p, vg_signal *s)
 {
     s->names = p->names, s->times = p->times, s->timed = p->times != NULL;

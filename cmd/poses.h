@@ -14,6 +14,7 @@ typedef struct poses {
 
 /* poses_read: to the end; stops when there are more than `most`. */
 poses poses_read(vg_source *s, size_t most);
+void poses_clear(poses *p);
 /* poses_name: names and times become the signal's. */
 void poses_name(poses *p, vg_signal *s);
 

@@ -1,13 +1,14 @@
 /* vg-deform: measure how each vector of a sequence deforms, and do the same to another mesh.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "batch.h"
+#include "poses.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 static struct {
-    const char *onto, *correspondence, *root;
+    const char *onto, *correspondence, *root, *examples, *sculpted;
     size_t by_choice, pin_choice; /* of enum by and enum pin */
 } opts;
 
@@ -24,6 +25,10 @@ static const cli_option options[] = {
     {"pin", 0, "auto|always|none",
      "hold what does not move in the source: where it is much of the mesh (default), ...",
      .choice = &opts.pin_choice, .needs = "onto"},
+    {"examples", 0, "FILE", "poses of the sequence's body that are known on the target, too: --sculpted",
+     .text = &opts.examples, .reads = true, .needs = "sculpted"},
+    {"sculpted", 0, "FILE", "the same poses of the target: the transfer meets them, and goes between them",
+     .text = &opts.sculpted, .reads = true, .needs = "examples"},
     {.name = NULL}};
 
 static const cli_moved moved[] = {{"interpolate", "is now the program vg-interpolate: vg-interpolate 30"},
@@ -71,6 +76,7 @@ typedef struct work {
     vg_shaper *shaper;
     vg_mover *mover;          /* NULL: poses are measured */
     vg_pinner *pinner;        /* NULL: nothing is held */
+    vg_corrector *corrector;  /* NULL: there are no examples */
     vg_frame out[BATCH];
 } work;
 
@@ -162,6 +168,7 @@ static void deform_batch(void *context, size_t n, vg_frame *in)
     }
     run_batch(w, n, from, to);
     for (size_t i = 0; i < n; i++) {
+        if (w->corrector) vg_corrector_apply(w->corrector, from[i], to[i]);
         finish_frame(w, &in[i], &w->out[i]);
         cli_stream_put(&w->out[i]);
     }
@@ -298,6 +305,48 @@ static void make_followers(work *w)
     if (r < 0) cli_die(&e);
 }
 
+/* Poses of one body, for an option. */
+static poses read_examples(work *w, const char *operand, const vg_mesh *mesh)
+{
+    vg_err e;
+    vg_source *s = cli_source((char *[]){(char *)operand}, 1);
+    vg_head *h = vg_source_head(s);
+    char name[200];
+    snprintf(name, sizeof name, "'%.190s'", operand);
+    cli_need_vertices(h, name);
+    if (vg_mesh_same(mesh, "its body", &h->body.mesh, name, &e) < 0 || vg_head_merge_trace(w->h, h, &e) < 0) cli_die(&e);
+    poses p = poses_read(s, 1000);
+    vg_source_close(&s);
+    return p;
+}
+
+static void make_corrector(work *w)
+{
+    vg_err e;
+    if (!opts.examples) return;
+    if (w->kind != VG_VERTICES || (w->way != TRANSFER && w->way != CARRY))
+        cli_usage("--examples needs --onto, a sequence of vertices, and another way than --by shape");
+    poses from = read_examples(w, opts.examples, &w->source_mesh), to = read_examples(w, opts.sculpted, &w->target.body.mesh);
+    if (from.n != to.n || !from.n)
+        cli_stop(VG_EINPUT, "'%s' has %zu poses and '%s' %zu: they must be the same ones", opts.examples, from.n, opts.sculpted, to.n);
+    const double **source = cli_allocate(from.n, sizeof *source, "examples"), **target = cli_allocate(from.n, sizeof *target, "examples");
+    double **made = cli_allocate(from.n, sizeof *made, "examples");
+    for (size_t i = 0; i < from.n; i++) {
+        source[i] = from.values + i * from.numbers, target[i] = to.values + i * to.numbers;
+        made[i] = cli_allocate(3 * vg_graph_corners(w->to), sizeof(double), "examples");
+        run_batch(w, 1, &source[i], &made[i]);
+    }
+    const vg_examples x = {from.n, source, target, (const double *const *)made};
+    if (vg_corrector_new(&w->corrector, w->from, w->h->body.reference, w->to, w->target.body.reference, &x, cli.threads, &e) < 0)
+        cli_die(&e);
+    for (size_t i = 0; i < from.n; i++) free(made[i]);
+    free(made);
+    free(source);
+    free(target);
+    poses_clear(&from);
+    poses_clear(&to);
+}
+
 static void make_step(work *w)
 {
     static const vg_method methods[] = {
@@ -325,6 +374,7 @@ static void make_step(work *w)
     }
     if (r < 0) cli_die(&e);
     make_followers(w);
+    make_corrector(w);
 }
 
 /* The output's head: the sequence's provenance and records, the target's mesh, reference and what its file said. */

@@ -247,6 +247,33 @@ assert 0 < s['error_shape'] <= 0.7e-2 and 0 < s['error'] <= 1e-2 and s['compress
     must_fail 3 vg-info --positions "$(trex vgs)"
 }
 
+@test "vg-deform --examples: sculpted poses are met, and others are nearer to the truth" {
+    vg-encode --take 0,3,6,9,12 "$DATA/human-man-poses.tar.xz" -o man.vgs
+    vg-encode --take 0,3,6,9,12 "$DATA/human-heavy-poses.tar.xz" -o heavy.vgs
+    vg-encode --take 1-3 man.vgs -o some.vgs
+    vg-encode --take 1-3 heavy.vgs -o sculpted.vgs
+    pipe "vg-deform --onto heavy.vgs --examples some.vgs --sculpted sculpted.vgs man.vgs | vg-solve -o out.vgs"
+    pipe "vg-deform --onto heavy.vgs man.vgs | vg-solve -o plain.vgs"
+    must vg-encode --take 0-3 out.vgs -o met.vgs
+    must vg-encode --take 0-3 heavy.vgs -o wanted.vgs
+    vg-diff -c -t 1e-9 wanted.vgs met.vgs # the examples, and the reference pose
+    must_fail 1 vg-diff -c -t 1e-2 heavy.vgs plain.vgs
+    py <<'END'
+import json, subprocess
+def mean(f):
+    out = subprocess.run(["vg-diff", "-c", "--json", "--frames", "heavy.vgs", f], capture_output=True, text=True)
+    return json.loads(out.stdout)["frame_errors"][4]["mean"]
+assert mean("out.vgs") < 0.9 * mean("plain.vgs"), (mean("out.vgs"), mean("plain.vgs"))
+END
+    must_fail 2 vg-deform --onto heavy.vgs --examples some.vgs man.vgs -o out2.vgs
+    must_fail 3 vg-deform --onto heavy.vgs --examples some.vgs --sculpted heavy.vgs man.vgs -o out2.vgs
+    says "they must be the same ones"
+    must_fail 3 vg-deform --onto heavy.vgs --examples man.vgs --sculpted heavy.vgs man.vgs -o out2.vgs
+    says "one of them is the reference pose"
+    must_fail 3 vg-deform --onto heavy.vgs --examples "$(trex vgs)" --sculpted heavy.vgs man.vgs -o out2.vgs
+    [ ! -e out2.vgs ]
+}
+
 @test "a sequence that holds still, two frames, a single triangle" {
     poses two 2
     for i in 1 2 3 4; do cp pose1.obj same$i.obj; done

@@ -74,6 +74,24 @@ vg_deform_counts vg_carrier_counts(const vg_carrier *c);
  * them, in the two references: the angle of the mean cosine between normals. A mesh that is inside out is not turned. */
 double vg_carrier_turned(const vg_carrier *c);
 
+/* Transfer that follows a few sculpted poses (MATH 11; after the example-based transfer of Cashman and Hormann 2012, 4.3,
+ * as a correction of plain transfer): what plain transfer misses in the examples is added in the measure in which a pose
+ * is like them. Examples are met exactly. */
+typedef struct vg_examples {
+    size_t n;
+    const double *const *source;      /* n poses of the source: vertices */
+    const double *const *target;      /* the same poses of the target: vertices */
+    const double *const *transferred; /* what plain transfer makes of them: vectors of the target's graph */
+} vg_examples;
+typedef struct vg_corrector vg_corrector;
+/* vg_corrector_new: graphs are borrowed until free; the rest is copied. VG_EINPUT when an example follows from the
+ * others. */
+int vg_corrector_new(vg_corrector **c, const vg_graph *source, const double *source_reference, const vg_graph *target,
+                     const double *target_reference, const vg_examples *examples, int threads, vg_err *e) VG_MUST_CHECK;
+void vg_corrector_free(vg_corrector **c);
+/* vg_corrector_apply: vectors that plain transfer has made of a pose of the source, in place. */
+void vg_corrector_apply(vg_corrector *c, const double *pose, double *vectors);
+
 #ifdef __cplusplus
 }
 #endif
