@@ -17,7 +17,7 @@ static const cli_option options[] = {
      .text = &opts.onto, .reads = true},
     {"correspondence", 0, "FILE", "the target has another connectivity: what vg-register found",
      .text = &opts.correspondence, .reads = true, .needs = "onto"},
-    {"by", 0, "pose|shape|gradient|blend", "what is carried over (default pose)",
+    {"by", 0, "blend|pose|gradient|shape", "what is carried over (default: blend)",
      .choice = &opts.by_choice, .needs = "onto"},
     {"root", 0, "centroid|stay|V",
      "where the body goes: as the centroid does (default), nowhere, or as vertex V does", .text = &opts.root,
@@ -57,7 +57,7 @@ enum { BATCH = 8 }; /* poses of one call: the lanes of the kernels */
 
 /* How poses become what is written. */
 typedef enum way { MEASURE, APPLY, TRANSFER, CARRY, SHAPE } way;
-typedef enum by { BY_POSE, BY_SHAPE, BY_GRADIENT, BY_BLEND } by;
+typedef enum by { BY_BLEND, BY_POSE, BY_GRADIENT, BY_SHAPE } by;
 typedef enum pin { PIN_AUTO, PIN_ALWAYS, PIN_NONE } pin;
 
 typedef struct work {
@@ -191,9 +191,10 @@ static void warn_degenerate(void *context)
 
 /* ---- setting up ---- */
 
-static void check_kind(const work *w)
+static void check_kind(work *w)
 {
     const char *advice = NULL;
+    if (w->kind == VG_DEFORMATIONS && !cli_given("by")) w->by = BY_POSE;
     if (w->kind == VG_FEATURES || w->kind == VG_COORDINATES) advice = "vg-deform takes vertices, vectors or deformations";
     else if (w->kind == VG_TRANSFORMS) advice = "make vertices of them with 'vg-play MAP' first";
     else if (w->kind == VG_DEFORMATIONS && !opts.onto) advice = "name the mesh to apply them to with --onto";

@@ -6,10 +6,13 @@
 #include <string.h>
 
 static struct {
-    size_t weights; /* 1: area */
+    size_t weights; /* 1: uniform */
+    size_t fit;     /* 1: squares */
+    long rounds;
+    double eps;
     bool planar;
     double planar_weights[2]; /* of the vectors, and of the planes */
-} opts = {.planar_weights = {0.5, 1}};
+} opts = {.rounds = 40, .eps = 0.5, .planar_weights = {0.5, 1}};
 
 static void take_planar_weights(const char *text, void *context)
 {
@@ -20,8 +23,14 @@ static void take_planar_weights(const char *text, void *context)
 }
 
 static const cli_option options[] = {
-    {"weights", 0, "uniform|area", "every corner counts alike (default), or by the reference surface's metric",
+    {"weights", 0, "area|uniform", "count by the reference surface's metric (default), or every corner alike",
      .choice = &opts.weights},
+    {"fit", 0, "absolute|squares", "least sum of the faces' misfits (default), or of their squares, which is faster",
+     .choice = &opts.fit},
+    {"rounds", 0, "N", "at most so many rounds of --fit absolute (default: 40)", .integer = &opts.rounds, .least = 1,
+     .most = 100000},
+    {"eps", 0, "X", "misfits below this part of the mean count by their squares (default: 0.5)",
+     .number = &opts.eps, .least = 1e-6, .most = 1e6},
     {"planar", 0, NULL, "make faces of four and more corners more nearly plane", .flag = &opts.planar},
     {"planar-weights", 0, "W1,W2", "how much the vectors and how much the planes count (default: 0.5,1)",
      .take = take_planar_weights, .needs = "planar"},
@@ -39,6 +48,7 @@ static const cli_program program = {
 /* A solver and the vertices it holds: the sequence's anchors, or those and the pins of some frames. */
 typedef struct machine {
     vg_solver *solver;
+    vg_robust *robust; /* with --fit absolute */
     vg_planar *planar; /* with --planar */
     uint32_t *held;    /* ascending */
     size_t nheld;
@@ -50,6 +60,7 @@ typedef struct waiting {
     const double *vectors; /* until it is loaded: of one of the frames that came in */
     double *rhs, *held, *normals; /* held: where the held vertices go; normals: with --planar */
     size_t held_cap;
+    float *misfit; /* with --fit absolute */
 } waiting;
 
 enum { MACHINES = 8, MOST_ENTRIES = 64 << 20 }; /* machines for pins that are kept, and entries of their factors */
@@ -65,13 +76,19 @@ typedef struct work {
     size_t n, most;
     size_t loaded;           /* of the n */
     double **vectors;        /* of the frames of a batch, when they come as vertices */
-    size_t most_steps, planar_faces;
+    double *sizes;           /* of those that wait, with --fit absolute */
+    size_t most_steps, planar_faces, most_rounds, unfinished;
     double worst_residual;
     vg_weights weights;
 } work;
 
-static void keep_planar_facts(work *w, const machine *m)
+static void keep_facts(work *w, const machine *m)
 {
+    if (m->robust) {
+        vg_robust_facts found = vg_robust_get_facts(m->robust);
+        if (found.most_rounds > w->most_rounds) w->most_rounds = found.most_rounds;
+        w->unfinished += found.unfinished;
+    }
     if (!m->planar) return;
     vg_planar_facts found = vg_planar_get_facts(m->planar);
     if (found.most_steps > w->most_steps) w->most_steps = found.most_steps;
@@ -81,8 +98,9 @@ static void keep_planar_facts(work *w, const machine *m)
 
 static void free_machine(work *w, machine *m)
 {
-    keep_planar_facts(w, m);
+    keep_facts(w, m);
     vg_planar_free(&m->planar);
+    vg_robust_free(&m->robust);
     vg_solver_free(&m->solver);
     free(m->held);
     *m = (machine){0};
@@ -98,6 +116,7 @@ static void make_machine(work *w, machine *m, uint32_t *held, size_t nheld)
                 ? vg_solver_new(&m->solver, w->g, held, nheld, reference, w->weights, cli.threads, &e)
                 : vg_solver_new_like(&m->solver, w->plain.solver, held, nheld, reference, &e);
     if (r < 0 ||
+        (opts.fit == 0 && vg_robust_new(&m->robust, m->solver, (size_t)opts.rounds, opts.eps, &e) < 0) ||
         (opts.planar && vg_planar_new(&m->planar, m->solver, opts.planar_weights[0], opts.planar_weights[1], &e) < 0))
         cli_die(&e);
     vg_solver_facts facts = vg_solver_get_facts(m->solver);
@@ -113,11 +132,15 @@ static void load_taken(work *w)
                  **held = cli_allocate(n, sizeof *held, "a batch of poses");
     double **x = cli_allocate(n, sizeof *x, "a batch of poses"),
            **rhs = cli_allocate(n, sizeof *rhs, "a batch of poses");
+    float **misfit = cli_allocate(n, sizeof *misfit, "a batch of poses");
     for (size_t i = 0; i < n; i++) {
         waiting *p = &w->waiting[w->loaded + i];
-        vectors[i] = p->vectors, held[i] = p->held, x[i] = p->frame.values, rhs[i] = p->rhs;
+        vectors[i] = p->vectors, held[i] = p->held, x[i] = p->frame.values, rhs[i] = p->rhs, misfit[i] = p->misfit;
     }
     if (n) vg_solver_load(w->at->solver, n, vectors, held, x, rhs);
+    if (n && w->at->robust)
+        vg_robust_load(w->at->robust, n, vectors, (const double *const *)x, misfit, w->sizes + w->loaded);
+    free(misfit);
     w->loaded = w->n;
     free(vectors);
     free(held);
@@ -132,12 +155,16 @@ static void solve_waiting(work *w)
                  **held = cli_allocate(w->n, sizeof *held, "a batch of poses");
     const double **roots = cli_allocate(w->n, sizeof *roots, "a batch of poses"),
                  **normals = cli_allocate(w->n, sizeof *normals, "a batch of poses");
+    const float **misfit = cli_allocate(w->n, sizeof *misfit, "a batch of poses");
     double **x = cli_allocate(w->n, sizeof *x, "a batch of poses");
     for (size_t i = 0; i < w->n; i++) {
         waiting *p = &w->waiting[i];
+        misfit[i] = p->misfit;
         rhs[i] = p->rhs, held[i] = p->held, roots[i] = p->frame.root, normals[i] = p->normals, x[i] = p->frame.values;
     }
-    if (w->n) vg_solver_solve(w->at->solver, w->n, rhs, x, held, roots);
+    if (w->n && w->at->robust) vg_robust_solve(w->at->robust, w->n, rhs, misfit, w->sizes, x, held, roots);
+    else if (w->n) vg_solver_solve(w->at->solver, w->n, rhs, x, held, roots);
+    free(misfit);
     size_t good = w->n && w->at->planar ? vg_planar_solve(w->at->planar, w->n, normals, x) : w->n;
     if (good < w->n)
         cli_no("frame '%s' is not planar yet after %zu steps: choose --planar-weights that are less far apart",
@@ -269,9 +296,12 @@ static void make_waiting(work *w)
     vg_err e;
     w->most = vg_solver_batch(w->plain.solver);
     w->waiting = cli_allocate(w->most, sizeof *w->waiting, "a batch of poses");
+    w->sizes = cli_allocate(w->most, sizeof *w->sizes, "a batch of poses");
     for (size_t i = 0; i < w->most; i++) {
         waiting *p = &w->waiting[i];
         p->rhs = cli_allocate(3 * w->h->body.mesh.nv, sizeof *p->rhs, "a batch of poses");
+        p->misfit = cli_allocate(w->plain.robust ? vg_robust_misfits(w->plain.robust) : 0, sizeof *p->misfit,
+                                 "a batch of poses");
         p->normals = cli_allocate(w->plain.planar ? 3 * vg_planar_faces(w->plain.planar) : 0, sizeof *p->normals,
                                   "a batch of poses");
         if (vg_frame_shape(&p->frame, w->h, &e) < 0) cli_die(&e);
@@ -315,6 +345,11 @@ static void clear(work *w)
 {
     free_machine(w, &w->plain);
     for (size_t i = 0; i < MACHINES; i++) free_machine(w, &w->pinned[i]);
+    if (opts.fit == 0) cli_note("least absolute misfit: at most %zu rounds", w->most_rounds);
+    if (w->unfinished)
+        cli_warn("%zu poses are not at their least misfit: in the last of %ld rounds it still fell by 0.1 %% or more; "
+                 "give more --rounds",
+                 w->unfinished, opts.rounds);
     if (opts.planar)
         cli_note("%zu faces of four and more, at most %zu steps to planarity, residual at most %.1e", w->planar_faces,
                  w->most_steps, w->worst_residual);
@@ -323,8 +358,10 @@ static void clear(work *w)
         free(w->waiting[i].rhs);
         free(w->waiting[i].held);
         free(w->waiting[i].normals);
+        free(w->waiting[i].misfit);
     }
     free(w->waiting);
+    free(w->sizes);
     for (size_t i = 0; i < (size_t)cli.threads; i++) free(w->vectors[i]);
     free(w->vectors);
     vg_graph_free(&w->g);
@@ -334,7 +371,7 @@ int main(int argc, char **argv)
 {
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
-    work w = {.weights = opts.weights == 1 ? VG_WEIGHTS_AREA : VG_WEIGHTS_UNIFORM};
+    work w = {.weights = opts.weights == 0 ? VG_WEIGHTS_AREA : VG_WEIGHTS_UNIFORM};
     vg_source *s = cli_source(operands, n);
     const step solve = {.batch = (size_t)cli.threads, /* so many are loaded side by side */
                         .unit = "poses",

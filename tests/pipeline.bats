@@ -35,9 +35,9 @@ frame_names() {
 @test "deformations in two steps give what one step gives" {
     poses two 4
     mesh two 0.05 2 >target.obj
-    pipe "vg-encode pose*.obj | vg-deform --onto target.obj | vg-solve >one.vgs"
-    pipe "vg-encode pose*.obj | vg-deform | vg-deform --onto target.obj | vg-solve >two.vgs"
-    pipe "vg-encode --vectors pose*.obj | vg-deform --onto target.obj | vg-solve >three.vgs"
+    pipe "vg-encode pose*.obj | vg-deform --by pose --onto target.obj | vg-solve >one.vgs"
+    pipe "vg-encode pose*.obj | vg-deform | vg-deform --onto target.obj | vg-solve >two.vgs" # deformations go by pose
+    pipe "vg-encode --vectors pose*.obj | vg-deform --by pose --onto target.obj | vg-solve >three.vgs"
     must vg-diff -t 1e-12 one.vgs two.vgs
     must vg-diff -t 1e-12 one.vgs three.vgs
 }

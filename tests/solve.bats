@@ -3,13 +3,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 load lib.bash
 
-@test "there and back: every data set within 1e-12 D, from all and from selected faces, with both weights" {
+@test "there and back: every data set within 1e-12 D, from all and from selected faces, with both weights and fits" {
     for name in trex.rest.obj horse.rest.obj woman-tanktop.rest.obj trex-walk.tar.xz horse-run.tar.xz faceA.tar.xz; do
         for faces in all selected; do
             pipe "vg-encode --vectors --faces $faces '$DATA/$name' | vg-solve >out.vgs"
             must vg-diff -t 1e-12 "$DATA/$name" out.vgs
         done
-        pipe "vg-encode --vectors '$DATA/$name' | vg-solve --weights area >out.vgs"
+        pipe "vg-encode --vectors '$DATA/$name' | vg-solve --weights uniform --fit squares >out.vgs"
         must vg-diff -t 1e-12 "$DATA/$name" out.vgs
     done
 }
@@ -153,4 +153,24 @@ END
     must vg-encode --anchor 2,9,11 rest.obj moved.obj -o in.vgs
     pipe 'vg-deform --onto rest.obj --pin always in.vgs | vg-solve >out.vgs'
     must vg-diff -t 1e-12 in.vgs out.vgs
+}
+
+@test "the least absolute misfit is nearer to the truth than least squares, and too few rounds are told" {
+    for fit in absolute squares; do
+        pipe "vg-encode '$DATA/faceA.tar.xz' | vg-deform --onto '$DATA/faceB.tar.xz' | vg-solve --fit $fit >$fit.vgs"
+        vg-diff -c --json "$DATA/faceB.tar.xz" $fit.vgs >$fit.json
+    done
+    py <<'END'
+import json
+a, s = (json.load(open(f + ".json"))["vertex_error"]["mean"]["error"] for f in ("absolute", "squares"))
+assert 0 < a < 0.97 * s, (a, s)
+END
+    pipe "vg-encode '$DATA/faceA.tar.xz' | vg-deform --onto '$DATA/faceB.tar.xz' -o vectors.vgs"
+    vg-solve --rounds 1 vectors.vgs -o out.vgs 2>err
+    grep -q 'poses are not at their least misfit: in the last of 1 rounds' err
+    vg-solve -q --rounds 1 vectors.vgs -o out.vgs 2>err
+    [ ! -s err ]
+    must_fail 2 vg-solve --rounds 0 vectors.vgs
+    must_fail 2 vg-solve --eps 0 vectors.vgs
+    must_fail 2 vg-solve --fit cubes vectors.vgs
 }

@@ -188,6 +188,31 @@ void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *c
 size_t vg_solver_batch(const vg_solver *s);
 vg_solver_facts vg_solver_get_facts(const vg_solver *s);
 
+/* The least absolute misfit (MATH 2, Robust): poses that minimise the sum over faces of sqrt(e^2 + c^2), e the misfit of
+ * a face in the metric of the solver, instead of the sum of e^2. What a few inconsistent faces want stays with them;
+ * consistent vectors are met exactly. By a quasi-Newton search from the plain solution, one solve a round. */
+typedef struct vg_robust vg_robust;
+typedef struct vg_robust_facts {
+    size_t most_rounds; /* of one pose so far */
+    size_t unfinished;  /* poses so far whose energy fell by 0.1 % or more in the last round */
+} vg_robust_facts;
+
+/* vg_robust_new: s borrowed until free. rounds: at most so many; eps: c as a part of the mean misfit of the plain
+ * solution. VG_EARG unless eps > 0. */
+int vg_robust_new(vg_robust **r, const vg_solver *s, size_t rounds, double eps, vg_err *e) VG_MUST_CHECK;
+void vg_robust_free(vg_robust **r);
+/* vg_robust_load: what a solve needs of the vectors of n poses, whose guesses vg_solver_load has made: misfits[i] has
+ * room for vg_robust_misfits numbers, sizes for one number a pose. */
+size_t vg_robust_misfits(const vg_robust *r);
+void vg_robust_load(const vg_robust *r, size_t n, const double *const *vectors, const double *const *guesses,
+                    float *const *misfits, double *sizes);
+/* vg_robust_solve: in place of vg_solver_solve. Returns the number of the first pose that needs more rounds; n when none
+ * does. */
+size_t vg_robust_solve(vg_robust *r, size_t n, const double *const *rhs, const float *const *misfits,
+                       const double *sizes, double *const *x, const double *const *anchors,
+                       const double *const *roots);
+vg_robust_facts vg_robust_get_facts(const vg_robust *r);
+
 /* Planarity (MATH 5; T 4.2.3): poses that minimise `fidelity` times the energy of the reconstruction plus `planarity`
  * times the sum over corners of faces of four and more of (m_f . t_c)^2, t_c the corner's vector, m_f the unit mean
  * of the cross products of successive given vectors of the face (no such term where that is 0). By conjugate

@@ -79,3 +79,18 @@ void vgi_metric_clear(vgi_metric *m)
     free(m->plane);
     *m = (vgi_metric){0};
 }
+
+double vgi_metric_weight(const vgi_metric *m, size_t f)
+{
+    return m->face ? m->face[f].weight : 1;
+}
+
+double vgi_metric_entry(const vgi_metric *m, const vg_graph *g, size_t f, size_t p, size_t q)
+{
+    size_t begin = g->start[f], r = g->start[f + 1] - begin;
+    double weight = vgi_metric_weight(m, f), x = (p == q ? weight : 0) - weight / (double)r;
+    if (!m->face) return x;
+    const double *s = m->face[f].s, *a = m->plane + 3 * (begin + p), *b = m->plane + 3 * (begin + q);
+    return x + a[0] * (s[0] * b[0] + s[1] * b[1] + s[2] * b[2]) + a[1] * (s[1] * b[0] + s[3] * b[1] + s[4] * b[2]) +
+           a[2] * (s[2] * b[0] + s[4] * b[1] + s[5] * b[2]);
+}

@@ -24,5 +24,8 @@ typedef struct vgi_metric {
  * a face without extent is uniform; the weight of a thin face is bounded from both sides. */
 int vgi_metric_make(vgi_metric *m, const vg_graph *g, const double *reference, vg_err *e) VG_MUST_CHECK;
 void vgi_metric_clear(vgi_metric *m);
+/* vgi_metric_entry: G of face f at its corners p and q. */
+double vgi_metric_entry(const vgi_metric *m, const vg_graph *g, size_t f, size_t p, size_t q);
+double vgi_metric_weight(const vgi_metric *m, size_t f);
 
 #endif

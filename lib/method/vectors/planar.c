@@ -11,7 +11,7 @@
  * Eight poses go side by side, each with coefficients and an end of its own, so that a pose does not depend on its
  * neighbours. Leaves out the loops over rows: planar_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "method/vectors/planar.h"
+#include "method/vectors/face_rows.h"
 #include "method/vectors/planar_kernel.h"
 
 #include <float.h>
@@ -35,115 +35,29 @@ typedef struct room {
 struct vg_planar {
     vgi_solver_view solver;
     double ratio;        /* w2 / w1: the search is for N + ratio P */
-    size_t nheld;        /* attached vertices without a row: they get the rows behind */
-    uint32_t *held;
-    size_t nf, corners;  /* faces of four and more */
-    uint32_t *face;      /* in the order of the graph */
-    uint32_t *order;     /* place of that face among `start`, which follows the rows, for the sake of the cache */
-    uint32_t *start, *row;
+    vgi_face_rows faces; /* of four and more corners */
     vgi_row *memory;
     room *rooms;         /* one per thread */
     vg_planar_facts *found; /* per thread */
     vg_planar_facts facts;
 };
 
-/* ---- faces ---- */
-
-typedef struct place {
-    uint32_t row, face;
-} place;
-
-static int compare_places(const void *a, const void *b)
-{
-    const place *x = a, *y = b;
-    return x->row != y->row ? (x->row > y->row) - (x->row < y->row) : (x->face > y->face) - (x->face < y->face);
-}
-
-static size_t face_size(const vg_graph *g, size_t f)
-{
-    return g->start[f + 1] - g->start[f];
-}
-
-static uint32_t least_row(const vg_graph *g, const uint32_t *row, size_t f)
-{
-    uint32_t least = UINT32_MAX;
-    for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++)
-        if (row[g->vert[c]] < least) least = row[g->vert[c]];
-    return least;
-}
-
-static void count_faces(vg_planar *p)
-{
-    const vg_graph *g = p->solver.g;
-    for (size_t f = 0; f < g->nf; f++) {
-        if (face_size(g, f) < CORNERS) continue;
-        p->nf++;
-        p->corners += face_size(g, f);
-    }
-    for (size_t v = 0; v < g->nv; v++) p->nheld += g->in_face[v] && p->solver.row[v] >= p->solver.rows;
-}
-
-/* rows: of all vertices, those held behind the others */
-static void list_faces(vg_planar *p, const uint32_t *rows, place *places)
-{
-    const vg_graph *g = p->solver.g;
-    size_t n = 0;
-    for (size_t f = 0; f < g->nf; f++) {
-        if (face_size(g, f) < CORNERS) continue;
-        p->face[n] = (uint32_t)f;
-        places[n] = (place){least_row(g, rows, f), (uint32_t)n};
-        n++;
-    }
-    qsort(places, n, sizeof *places, compare_places);
-    for (size_t i = 0; i < n; i++) {
-        size_t f = p->face[places[i].face];
-        p->order[places[i].face] = (uint32_t)i;
-        p->start[i + 1] = p->start[i];
-        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) p->row[p->start[i + 1]++] = rows[g->vert[c]];
-    }
-}
-
-static int prepare_faces(vg_planar *p, vg_err *e)
-{
-    const vg_graph *g = p->solver.g;
-    uint32_t *rows = vgi_copy_array(p->solver.row, g->nv, sizeof *rows, e);
-    place *places = vgi_array_raw(p->nf, sizeof *places, e);
-    p->held = vgi_array_raw(p->nheld, sizeof *p->held, e);
-    p->face = vgi_array_raw(p->nf, sizeof *p->face, e);
-    p->order = vgi_array_raw(p->nf, sizeof *p->order, e);
-    p->start = vgi_array(p->nf + 1, sizeof *p->start, e);
-    p->row = vgi_array_raw(p->corners, sizeof *p->row, e);
-    bool ok = rows && places && p->held && p->face && p->order && p->start && p->row;
-    if (ok) {
-        size_t n = 0;
-        for (size_t v = 0; v < g->nv; v++) {
-            if (!g->in_face[v] || rows[v] < p->solver.rows) continue;
-            rows[v] = (uint32_t)(p->solver.rows + n);
-            p->held[n++] = (uint32_t)v;
-        }
-        list_faces(p, rows, places);
-    }
-    free(rows);
-    free(places);
-    return ok ? VG_OK : VG_ENOMEM;
-}
-
 static int make_rooms(vg_planar *p, vg_err *e)
 {
-    size_t n = p->solver.rows, all = n + p->nheld, largest = (p->solver.g->max_corners + 2) / 3, each, total;
+    size_t n = p->solver.rows, all = n + p->faces.nheld, largest = (p->solver.g->max_corners + 2) / 3, each, total;
     size_t threads = (size_t)p->solver.threads;
-    each = 4 * n + 2 * all + p->nf + largest + 1; /* of the largest mesh there can be, all are below 2^33 */
+    each = 4 * n + 2 * all + p->faces.nf + largest + 1; /* of the largest mesh there can be, all are below 2^33 */
     p->rooms = vgi_array(threads, sizeof *p->rooms, e);
     p->found = vgi_array(threads, sizeof *p->found, e);
     if (!p->rooms || !p->found) return VG_ENOMEM;
     if (vgi_mul(each, threads, &total) && vgi_mul(total, sizeof *p->memory, &total))
         p->memory = aligned_alloc(sizeof(vgi_lanes), total);
-    if (!p->memory) return vg_fail(e, VG_ENOMEM, "not enough memory to make %zu faces planar", p->nf);
+    if (!p->memory) return vg_fail(e, VG_ENOMEM, "not enough memory to make %zu faces planar", p->faces.nf);
     for (size_t i = 0; i < threads; i++) {
         room *m = &p->rooms[i];
         vgi_row *at = p->memory + i * each;
         m->x = at, m->r = m->x + n, m->z = m->r + n, m->s = m->z + n, m->p = m->s + n, m->y = m->p + all;
-        m->normals = m->y + all, m->h = (m->normals + p->nf)->xyz;
+        m->normals = m->y + all, m->h = (m->normals + p->faces.nf)->xyz;
     }
     return VG_OK;
 }
@@ -158,9 +72,8 @@ int vg_planar_new(vg_planar **out, const vg_solver *s, double fidelity, double p
     if (!p) return VG_ENOMEM;
     p->solver = vgi_solver_look(s);
     p->ratio = planarity / fidelity;
-    count_faces(p);
-    p->facts.faces = p->nf;
-    int r = prepare_faces(p, e);
+    int r = vgi_face_rows_make(&p->faces, &p->solver, CORNERS, e);
+    p->facts.faces = p->faces.nf;
     if (r == VG_OK) r = make_rooms(p, e);
     if (r < 0) vg_planar_free(out);
     return r;
@@ -170,11 +83,7 @@ void vg_planar_free(vg_planar **out)
 {
     vg_planar *p = *out;
     if (!p) return;
-    free(p->held);
-    free(p->face);
-    free(p->order);
-    free(p->start);
-    free(p->row);
+    vgi_face_rows_clear(&p->faces);
     free(p->memory);
     free(p->rooms);
     free(p->found);
@@ -184,7 +93,7 @@ void vg_planar_free(vg_planar **out)
 
 size_t vg_planar_faces(const vg_planar *p)
 {
-    return p->nf;
+    return p->faces.nf;
 }
 
 vg_planar_facts vg_planar_get_facts(const vg_planar *p)
@@ -215,9 +124,9 @@ static void face_normal(const double *w, size_t r, double m[3])
 void vg_planar_load(const vg_planar *p, const double *vectors, double *normals)
 {
     const vg_graph *g = p->solver.g;
-    for (size_t i = 0; i < p->nf; i++) {
-        size_t f = p->face[i];
-        face_normal(vectors + 3 * (size_t)g->start[f], face_size(g, f), normals + 3 * i);
+    for (size_t i = 0; i < p->faces.nf; i++) {
+        size_t f = p->faces.face[i];
+        face_normal(vectors + 3 * (size_t)g->start[f], g->start[f + 1] - g->start[f], normals + 3 * i);
     }
 }
 
@@ -239,12 +148,12 @@ static void load_residual(const vg_planar *p, const room *m, const vgi_planar_fa
     const vgi_planar_kernel *kernel = vgi_planar_kernel_now();
     size_t n = p->solver.rows;
     vgi_lanes none, most, factor;
-    memset(m->y, 0, (n + p->nheld) * sizeof *m->y);
-    memset(m->p, 0, (n + p->nheld) * sizeof *m->p); /* rows of centroids stay 0 */
+    memset(m->y, 0, (n + p->faces.nheld) * sizeof *m->y);
+    memset(m->p, 0, (n + p->faces.nheld) * sizeof *m->p); /* rows of centroids stay 0 */
     vgi_load_rows(m->p, p->solver.row, p->solver.g->nv, n, pose);
-    for (size_t i = 0; i < p->nheld; i++)
+    for (size_t i = 0; i < p->faces.nheld; i++)
         for (size_t c = 0; c < 3; c++)
-            for (int k = 0; k < VGI_LANES; k++) m->p[n + i].xyz[c][k] = pose[k][3 * (size_t)p->held[i] + c];
+            for (int k = 0; k < VGI_LANES; k++) m->p[n + i].xyz[c][k] = pose[k][3 * (size_t)p->faces.held[i] + c];
     kernel->product(f, m->normals, m->p, m->y, m->h, none);
     kernel->largest(n, m->y, most);
     for (int k = 0; k < VGI_LANES; k++) unit[k] = p->ratio * most[k], factor[k] = most[k] > 0 ? -1 / most[k] : 0;
@@ -252,8 +161,8 @@ static void load_residual(const vg_planar *p, const room *m, const vgi_planar_fa
     memcpy(m->z, m->r, n * sizeof *m->z);
     memset(m->x, 0, n * sizeof *m->x);
     memset(m->s, 0, n * sizeof *m->s);
-    memset(m->y, 0, (n + p->nheld) * sizeof *m->y);
-    memset(m->p, 0, (n + p->nheld) * sizeof *m->p);
+    memset(m->y, 0, (n + p->faces.nheld) * sizeof *m->y);
+    memset(m->p, 0, (n + p->faces.nheld) * sizeof *m->p);
 }
 
 /* What is left of the residual of each pose, relative to the start; whether all of them are done. */
@@ -296,16 +205,6 @@ static size_t descend(const vg_planar *p, const room *m, const vgi_planar_faces 
     return steps;
 }
 
-/* The difference is 0 at the held vertex; without anchors the mean is what stays. */
-static void put_back(const vg_planar *p, double *x, const double before[3])
-{
-    const vg_graph *g = p->solver.g;
-    double now[3];
-    vg_graph_root(g, x, now);
-    for (size_t v = 0; v < g->nv; v++)
-        for (size_t k = 0; g->in_face[v] && k < 3; k++) x[3 * v + k] += before[k] - now[k];
-}
-
 static void note(vg_planar_facts *found, size_t steps, double left)
 {
     if (steps > found->most_steps) found->most_steps = steps;
@@ -318,7 +217,7 @@ static void plane_block(void *context, size_t i)
     vg_planar *p = j->p;
     const room *m = &p->rooms[i];
     size_t first = i * VGI_LANES, lanes = j->n - first < VGI_LANES ? j->n - first : VGI_LANES;
-    const vgi_planar_faces f = {p->nf, p->start, p->row};
+    const vgi_planar_faces f = {p->faces.nf, p->faces.start, p->faces.row};
     const double *normals[VGI_LANES], *pose[VGI_LANES];
     double left[VGI_LANES], root[VGI_LANES][3];
     for (size_t k = 0; k < VGI_LANES; k++) {
@@ -326,14 +225,15 @@ static void plane_block(void *context, size_t i)
         normals[k] = j->normals[from], pose[k] = j->x[from];
         vg_graph_root(p->solver.g, pose[k], root[k]);
     }
-    vgi_load_rows(m->normals, p->order, p->nf, p->nf, normals);
+    vgi_load_rows(m->normals, p->faces.order, p->faces.nf, p->faces.nf, normals);
     vgi_lanes unit;
     load_residual(p, m, &f, pose, unit);
     size_t steps = descend(p, m, &f, left);
     vgi_planar_kernel_now()->scale(p->solver.rows, unit, m->x, m->x);
     vgi_add_rows(m->x, p->solver.row, p->solver.g->nv, p->solver.rows, j->x + first, lanes);
     for (size_t k = 0; k < lanes; k++) {
-        if (!p->solver.anchored) put_back(p, j->x[first + k], root[k]);
+        /* the difference is 0 at the held vertex, but without anchors the mean is what stays */
+        if (!p->solver.anchored) vgi_keep_root(p->solver.g, j->x[first + k], root[k]);
         j->converged[first + k] = left[k] <= enough;
         note(&p->found[i], steps, left[k]);
     }
@@ -344,7 +244,7 @@ size_t vg_planar_solve(vg_planar *p, size_t n, const double *const *normals, dou
     enum { ROUND = 256 }; /* poses whose outcome is noted at once */
     bool converged[ROUND];
     size_t threads = (size_t)p->solver.threads, good = n;
-    if (p->nf == 0 || p->solver.rows == 0 || p->ratio == 0) return n; /* the plain solution, to the bit */
+    if (p->faces.nf == 0 || p->solver.rows == 0 || p->ratio == 0) return n; /* the plain solution, to the bit */
     size_t most = ROUND / VGI_LANES < threads ? ROUND / VGI_LANES : threads;
     for (size_t done = 0; done < n; done += most * VGI_LANES) {
         size_t some = n - done < most * VGI_LANES ? n - done : most * VGI_LANES;

@@ -15,7 +15,7 @@
  * solves (solve_kernel.c), that guess (guess_kernel.c) and the factorisation (sparse.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/guess.h"
-#include "method/vectors/planar.h"
+#include "method/vectors/face_rows.h"
 #include "numeric/sparse.h"
 #include "model/incidence.h"
 
@@ -63,7 +63,7 @@ static size_t face_size(const vg_graph *g, size_t f)
     return g->start[f + 1] - g->start[f];
 }
 
-static bool is_star(const vg_solver *s, size_t f)
+bool vgi_solver_is_star(const vg_solver *s, size_t f)
 {
     return face_size(s->g, f) >= (s->metric.face ? STAR_METRIC : STAR);
 }
@@ -96,7 +96,7 @@ static int number_unknowns(vg_solver *s, const uint32_t *anchors, size_t n, cons
         }
     }
     s->vertices_unknown = s->unknowns;
-    for (size_t f = 0; f < g->nf; f++) s->unknowns += is_star(s, f);
+    for (size_t f = 0; f < g->nf; f++) s->unknowns += vgi_solver_is_star(s, f);
     if (s->unknowns > INT32_MAX / 2) return vg_fail(e, VG_EINPUT, "a mesh of %zu unknowns is too large", s->unknowns);
     if (pinned < g->nv) s->row[pinned] = NO_ROW;
     s->pinned = (uint32_t)pinned;
@@ -148,31 +148,21 @@ static size_t count_entries(const vg_solver *s)
     size_t n = 0;
     for (size_t f = 0; f < s->g->nf; f++) {
         size_t r = face_size(s->g, f);
-        n += is_star(s, f) ? 2 * r + 1 : r * (r + 1) / 2;
+        n += vgi_solver_is_star(s, f) ? 2 * r + 1 : r * (r + 1) / 2;
     }
     return n;
-}
-
-static double quadratic(const double s[6], const double *a, const double *b)
-{
-    return a[0] * (s[0] * b[0] + s[1] * b[1] + s[2] * b[2]) + a[1] * (s[1] * b[0] + s[3] * b[1] + s[4] * b[2]) +
-           a[2] * (s[2] * b[0] + s[4] * b[1] + s[5] * b[2]);
 }
 
 static void assemble_pairs(vgi_triplets *t, const vg_solver *s, size_t f)
 {
     size_t begin = s->g->start[f], r = face_size(s->g, f);
     const uint32_t *vert = s->g->vert + begin;
-    const vgi_face_metric *m = s->metric.face ? &s->metric.face[f] : NULL;
-    const double *plane = m ? s->metric.plane + 3 * begin : NULL;
-    double weight = m ? m->weight : 1, share = weight / (double)r;
     for (size_t p = 0; p < r; p++) {
         size_t i = s->row[vert[p]];
         if (i >= s->unknowns) continue;
         for (size_t q = 0; q <= p; q++) {
             if (s->row[vert[q]] >= s->unknowns) continue;
-            double x = (p == q ? weight : 0) - share;
-            vgi_triplets_put(t, i, s->row[vert[q]], m ? x + quadratic(m->s, plane + 3 * p, plane + 3 * q) : x);
+            vgi_triplets_put(t, i, s->row[vert[q]], vgi_metric_entry(&s->metric, s->g, f, p, q));
         }
     }
 }
@@ -181,7 +171,7 @@ static void assemble_star(vgi_triplets *t, const vg_solver *s, size_t f, size_t 
 {
     size_t r = face_size(s->g, f);
     const uint32_t *vert = s->g->vert + s->g->start[f];
-    double weight = s->metric.face ? s->metric.face[f].weight : 1;
+    double weight = vgi_metric_weight(&s->metric, f);
     vgi_triplets_put(t, centre, centre, weight * (double)r);
     for (size_t p = 0; p < r; p++) {
         size_t i = s->row[vert[p]];
@@ -199,7 +189,7 @@ static int assemble(const vg_solver *s, vgi_sparse *N, vg_err *e)
     if (r < 0) return r;
     size_t centre = s->vertices_unknown;
     for (size_t f = 0; f < g->nf; f++) {
-        if (is_star(s, f)) assemble_star(&t, s, f, centre++);
+        if (vgi_solver_is_star(s, f)) assemble_star(&t, s, f, centre++);
         else assemble_pairs(&t, s, f);
     }
     r = vgi_triplets_sum(&t, s->unknowns, N, e);
@@ -291,7 +281,7 @@ static int make_metric(vg_solver *s, const double *reference, vg_err *e)
 {
     int r = vgi_metric_make(&s->metric, s->g, reference, e);
     for (size_t f = 0; r == VG_OK && f < s->g->nf; f++)
-        if (is_star(s, f)) memset(s->metric.face[f].s, 0, sizeof s->metric.face[f].s);
+        if (vgi_solver_is_star(s, f)) memset(s->metric.face[f].s, 0, sizeof s->metric.face[f].s);
     return r;
 }
 
@@ -348,6 +338,7 @@ void vg_solver_free(vg_solver **out)
 vgi_solver_view vgi_solver_look(const vg_solver *s)
 {
     return (vgi_solver_view){.g = s->g,
+                             .metric = &s->metric,
                              .factor = &s->factor,
                              .row = s->row,
                              .rows = s->unknowns,
@@ -402,8 +393,8 @@ typedef struct solve_job {
     size_t first; /* first block of this round */
 } solve_job;
 
-/* Move a pose whose held vertex is at 0 to its place: to the first anchor, or so that its mean becomes the root. */
-static void place(const vg_solver *s, double *x, const double *anchor, const double *root)
+/* What comes in has its held vertex at 0. */
+void vgi_solver_place(const vg_solver *s, double *x, const double *anchor, const double *root)
 {
     const vg_graph *g = s->g;
     double mean[3] = {0, 0, 0};
@@ -432,7 +423,7 @@ static void solve_block(void *context, size_t i)
         vgi_add_rows(x, s->row, s->g->nv, s->unknowns, j->x + first, lanes);
     }
     for (size_t k = first; k < first + lanes; k++)
-        place(s, j->x[k], s->nanchors ? j->anchors[k] : NULL, s->nanchors ? NULL : j->roots[k]);
+        vgi_solver_place(s, j->x[k], s->nanchors ? j->anchors[k] : NULL, s->nanchors ? NULL : j->roots[k]);
 }
 
 void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *const *x, const double *const *anchors,

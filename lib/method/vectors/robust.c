@@ -1,0 +1,429 @@
+/* robust.c: poses of least absolute misfit: min over V of sum over faces of e_f, e_f^2 = tr((X_f - W_f) G_f (X_f -
+ * W_f)'), G_f the metric of the solver (MATH 2, Robust). Least squares spreads what a few inconsistent faces want over
+ * the whole body; here they keep it to themselves.
+ *
+ * What is minimised is the sum of sqrt(e_f^2 + c^2), c a part of the mean misfit of the plain solution, so that it is
+ * smooth. Nothing is factorized again: the search starts from the plain solution and goes by a quasi-Newton method with
+ * a memory of one step (BFGS; Nocedal and Wright 2006, chapter 7), whose first Hessian is a multiple of the plain
+ * normal matrix. That is one triangular solve and one pass over the faces a round, and steps of length 1 are nearly
+ * always right. Beside it were tried: reweighting with a factorisation for each round (8 rounds for the same energy,
+ * each as long as 40 solves), more steps in the memory (no fewer rounds), and scaling the factor by the weights (worse).
+ *
+ * Eight poses go side by side, each with coefficients and an end of its own, so that a pose does not depend on its
+ * neighbours. Leaves out the loops over rows and faces: robust_kernel.c.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/vectors/face_rows.h"
+#include "method/vectors/robust_kernel.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+
+enum { HALVINGS = 30 };                /* of a step that does not lower the energy */
+static const double enough = 1e-3;     /* of the energy: a round that gains less is the last */
+static const double sufficient = 1e-4; /* of the fall that the slope promises: a step has to bring it */
+static const double exact = 1e-11;     /* of the mean length of the wanted vectors: less is no misfit */
+
+/* What one block of eight poses needs. */
+typedef struct room {
+    vgi_row *u, *trial, *g, *gn, *z, *zn, *d; /* rows of unknowns; all but z, zn and d also of the held vertices */
+    vgi_row *corners;                         /* of the largest face */
+    float *misfit;
+} room;
+
+struct vg_robust {
+    const vg_solver *s;
+    vgi_solver_view solver;
+    size_t rounds;
+    double eps;
+    vgi_face_rows rows;
+    uint32_t *face; /* of the graph, in the order of rows.start */
+    size_t *entry;
+    double *metric;
+    unsigned char *star;
+    size_t nmisfits;
+    vgi_row *memory;
+    float *misfit_memory;
+    room *rooms;            /* one per thread */
+    vg_robust_facts *found; /* per thread */
+    vg_robust_facts facts;
+};
+
+/* ---- making ---- */
+
+static size_t face_size(const vg_graph *g, size_t f)
+{
+    return g->start[f + 1] - g->start[f];
+}
+
+static size_t count_entries(const vg_robust *r)
+{
+    size_t n = 0;
+    for (size_t f = 0; f < r->solver.g->nf; f++) {
+        size_t corners = face_size(r->solver.g, f);
+        n += vgi_solver_is_star(r->s, f) ? 1 : corners * (corners - 1) / 2;
+    }
+    return n;
+}
+
+/* The metric of the differences to the first corner: what is left of it without its first row and column. */
+static size_t write_metric(vg_robust *r, size_t i, size_t at)
+{
+    const vg_graph *g = r->solver.g;
+    size_t f = r->face[i], corners = face_size(g, f);
+    r->entry[i] = at;
+    r->star[i] = vgi_solver_is_star(r->s, f);
+    if (r->star[i]) {
+        r->metric[at++] = vgi_metric_weight(r->solver.metric, f);
+        return at;
+    }
+    for (size_t p = 1; p < corners; p++)
+        for (size_t q = 1; q <= p; q++) r->metric[at++] = vgi_metric_entry(r->solver.metric, g, f, p, q);
+    return at;
+}
+
+static int prepare_faces(vg_robust *r, vg_err *e)
+{
+    const vg_graph *g = r->solver.g;
+    int ok = vgi_face_rows_make(&r->rows, &r->solver, 2, e);
+    if (ok < 0) return ok;
+    r->face = vgi_array_raw(g->nf, sizeof *r->face, e);
+    r->entry = vgi_array_raw(g->nf, sizeof *r->entry, e);
+    r->star = vgi_array_raw(g->nf, sizeof *r->star, e);
+    r->metric = vgi_array_raw(count_entries(r), sizeof *r->metric, e);
+    if (!r->face || !r->entry || !r->star || !r->metric) return VG_ENOMEM;
+    for (size_t i = 0; i < r->rows.nf; i++) r->face[r->rows.order[i]] = r->rows.face[i];
+    for (size_t i = 0, at = 0; i < r->rows.nf; i++) at = write_metric(r, i, at);
+    r->nmisfits = 3 * (vg_graph_corners(g) - g->nf);
+    return VG_OK;
+}
+
+static int make_rooms(vg_robust *r, vg_err *e)
+{
+    size_t n = r->solver.rows, all = n + r->rows.nheld, threads = (size_t)r->solver.threads, total, floats;
+    size_t each = 4 * all + 3 * n + 2 * r->solver.g->max_corners;
+    r->rooms = vgi_array(threads, sizeof *r->rooms, e);
+    r->found = vgi_array(threads, sizeof *r->found, e);
+    if (!r->rooms || !r->found) return VG_ENOMEM;
+    if (vgi_mul(each, threads, &total) && vgi_mul(total, sizeof *r->memory, &total))
+        r->memory = aligned_alloc(sizeof(vgi_lanes), total);
+    if (vgi_mul(r->nmisfits + 1, threads * VGI_LANES * sizeof(float), &floats) && floats <= SIZE_MAX - 64)
+        r->misfit_memory = aligned_alloc(64, (floats + 63) / 64 * 64);
+    if (!r->memory || !r->misfit_memory)
+        return vg_fail(e, VG_ENOMEM, "not enough memory for the misfits of %zu faces", r->rows.nf);
+    for (size_t i = 0; i < threads; i++) {
+        room *m = &r->rooms[i];
+        vgi_row *at = r->memory + i * each;
+        m->u = at, m->trial = m->u + all, m->g = m->trial + all, m->gn = m->g + all, m->z = m->gn + all;
+        m->zn = m->z + n, m->d = m->zn + n, m->corners = m->d + n;
+        m->misfit = r->misfit_memory + i * VGI_LANES * (r->nmisfits + 1);
+    }
+    return VG_OK;
+}
+
+int vg_robust_new(vg_robust **out, const vg_solver *s, size_t rounds, double eps, vg_err *e)
+{
+    *out = NULL;
+    if (!(eps > 0) || !isfinite(eps)) return vg_fail(e, VG_EARG, "eps is a number above 0, not %g", eps);
+    vg_robust *r = *out = vgi_array(1, sizeof *r, e);
+    if (!r) return VG_ENOMEM;
+    r->s = s, r->solver = vgi_solver_look(s), r->rounds = rounds, r->eps = eps;
+    int ok = prepare_faces(r, e);
+    if (ok == VG_OK) ok = make_rooms(r, e);
+    if (ok < 0) vg_robust_free(out);
+    return ok;
+}
+
+void vg_robust_free(vg_robust **out)
+{
+    vg_robust *r = *out;
+    if (!r) return;
+    vgi_face_rows_clear(&r->rows);
+    free(r->face);
+    free(r->entry);
+    free(r->metric);
+    free(r->star);
+    free(r->memory);
+    free(r->misfit_memory);
+    free(r->rooms);
+    free(r->found);
+    free(r);
+    *out = NULL;
+}
+
+size_t vg_robust_misfits(const vg_robust *r)
+{
+    return r->nmisfits;
+}
+
+vg_robust_facts vg_robust_get_facts(const vg_robust *r)
+{
+    return r->facts;
+}
+
+/* ---- loading ---- */
+
+typedef struct load_job {
+    const vg_robust *r;
+    const double *const *vectors, *const *guesses;
+    float *const *misfits;
+    double *sizes;
+} load_job;
+
+static double mean_length(const double *w, size_t n)
+{
+    double sum = 0;
+    for (size_t c = 0; c < n; c++) sum += fabs(w[3 * c]) + fabs(w[3 * c + 1]) + fabs(w[3 * c + 2]);
+    return n ? sum / (double)n : 0;
+}
+
+static void load_pose(void *context, size_t pose)
+{
+    const load_job *j = context;
+    const vg_graph *g = j->r->solver.g;
+    const double *w = j->vectors[pose], *x = j->guesses[pose];
+    float *misfit = j->misfits[pose];
+    double size = mean_length(w, vg_graph_corners(g));
+    size = size >= DBL_MIN && size <= 1 / DBL_MIN ? ldexp(1, ilogb(size)) : 0; /* so that scaling rounds nothing */
+    double unit = size > 0 ? 1 / size : 0;
+    for (size_t i = 0; i < j->r->rows.nf; i++) {
+        size_t begin = g->start[j->r->face[i]], end = g->start[j->r->face[i] + 1];
+        const double *x0 = x + 3 * (size_t)g->vert[begin], *w0 = w + 3 * begin;
+        for (size_t c = begin + 1; c < end; c++)
+            for (size_t k = 0; k < 3; k++)
+                *misfit++ = (float)(unit * ((x[3 * (size_t)g->vert[c] + k] - x0[k]) - (w[3 * c + k] - w0[k])));
+    }
+    j->sizes[pose] = size;
+}
+
+void vg_robust_load(const vg_robust *r, size_t n, const double *const *vectors, const double *const *guesses,
+                    float *const *misfits, double *sizes)
+{
+    load_job j = {r, vectors, guesses, misfits, sizes};
+    vgi_parallel(r->solver.threads, n, load_pose, &j);
+}
+
+/* ---- the search ---- */
+
+typedef struct search {
+    const vg_robust *r;
+    room m;
+    vgi_robust_faces faces;
+    vgi_lanes soft2, scale, slope, t, energy; /* scale: of the first Hessian, slope: of the energy along d */
+    bool active[VGI_LANES], falling[VGI_LANES]; /* falling: the last round gained more than enough */
+    size_t rounds;
+} search;
+
+static bool any_active(const search *s)
+{
+    bool any = false;
+    for (int k = 0; k < VGI_LANES; k++) any |= s->active[k];
+    return any;
+}
+
+/* The energy and gradient where the vertices are moved by u. */
+static void look(const search *s, const vgi_row *u, vgi_row *g, vgi_robust_sums *sums)
+{
+    memset(g, 0, (s->r->solver.rows + s->r->rows.nheld) * sizeof *g);
+    vgi_robust_kernel_now()->energy(&s->faces, s->m.misfit, u, s->soft2, g, s->m.corners, sums);
+}
+
+static void precondition(const search *s, const vgi_row *g, vgi_row *z)
+{
+    memcpy(z, g, s->r->solver.rows * sizeof *z);
+    vgi_factor_solve(s->r->solver.factor, z);
+}
+
+/* How soft the absolute value is at 0, from the misfits of the plain solution; which poses have any. */
+static void choose_softness(search *s)
+{
+    vgi_robust_sums sums;
+    vgi_robust_kernel_now()->energy(&s->faces, s->m.misfit, s->m.u, NULL, NULL, s->m.corners, &sums);
+    for (int k = 0; k < VGI_LANES; k++) {
+        double mean = sums.energy[k] / (double)s->r->rows.nf, soft = s->r->eps * mean;
+        s->active[k] = mean > exact && soft * soft >= DBL_MIN && isfinite(soft * soft);
+        s->soft2[k] = s->active[k] ? soft * soft : 1;
+    }
+}
+
+static void begin(search *s)
+{
+    size_t n = s->r->solver.rows;
+    vgi_robust_sums sums;
+    vgi_robust_products p;
+    vgi_lanes abc[3] = {{0}};
+    look(s, s->m.u, s->m.g, &sums);
+    precondition(s, s->m.g, s->m.z);
+    vgi_robust_kernel_now()->multiply(n, s->m.g, s->m.g, s->m.z, s->m.z, s->m.z, &p);
+    for (int k = 0; k < VGI_LANES; k++) {
+        s->scale[k] = (double)s->r->rows.nf / sums.weight[k];
+        s->energy[k] = sums.energy[k];
+        s->slope[k] = -s->scale[k] * p.gz[k];
+        s->t[k] = s->active[k];
+        abc[2][k] = s->active[k] ? -s->scale[k] : 0;
+    }
+    memset(s->m.d, 0, n * sizeof *s->m.d);
+    vgi_robust_kernel_now()->turn(n, abc, s->m.z, s->m.z, s->m.d);
+}
+
+/* Where the parabola through the energy at both ends and the slope at the first is least, but not too near to either. */
+static double shorter(double t, double slope, double rise)
+{
+    double least = -slope * t * t / (2 * (rise - slope * t));
+    return least > 0.1 * t && least < 0.5 * t ? least : least >= 0.5 * t ? 0.5 * t : 0.1 * t;
+}
+
+/* u := u + t d, where the energy is lower by enough; a pose for which there is no such place is done. */
+static void advance(search *s, vgi_robust_sums *sums)
+{
+    size_t n = s->r->solver.rows;
+    for (int tries = 0;; tries++) {
+        bool again = false;
+        vgi_robust_kernel_now()->step(n, s->m.u, s->t, s->m.d, s->m.trial);
+        look(s, s->m.trial, s->m.gn, sums);
+        for (int k = 0; k < VGI_LANES; k++) {
+            double rise = sums->energy[k] - s->energy[k];
+            if (!s->active[k] || rise <= sufficient * s->t[k] * s->slope[k]) continue;
+            if (tries == HALVINGS) s->t[k] = 0, s->active[k] = s->falling[k] = false;
+            else s->t[k] = shorter(s->t[k], s->slope[k], rise);
+            again = true;
+        }
+        if (!again) break;
+    }
+    vgi_row *u = s->m.u;
+    s->m.u = s->m.trial, s->m.trial = u;
+}
+
+static void judge(search *s, const vgi_robust_sums *sums)
+{
+    s->rounds++;
+    for (int k = 0; k < VGI_LANES; k++) {
+        if (!s->active[k]) continue;
+        s->falling[k] = s->energy[k] - sums->energy[k] >= enough * s->energy[k];
+        s->active[k] = s->falling[k];
+        s->energy[k] = sums->energy[k];
+    }
+}
+
+/* d := -H gn, H the inverse Hessian of BFGS after one step, s = t d, y = gn - g, from H0 = scale N^-1. */
+static void choose_direction(search *s)
+{
+    size_t n = s->r->solver.rows;
+    vgi_robust_products p;
+    vgi_lanes abc[3] = {{0}};
+    vgi_robust_kernel_now()->multiply(n, s->m.g, s->m.gn, s->m.z, s->m.zn, s->m.d, &p);
+    for (int k = 0; k < VGI_LANES; k++) {
+        if (!s->active[k]) {
+            s->t[k] = 0;
+            continue;
+        }
+        bool convex = p.dy[k] > 0 && p.yv[k] > 0;
+        if (convex) s->scale[k] = s->t[k] * p.dy[k] / p.yv[k];
+        double h = s->scale[k], a = convex ? p.dg[k] / p.dy[k] : 0;
+        double b = convex ? h * (p.yz[k] - a * p.yv[k]) / (s->t[k] * p.dy[k]) : 0;
+        abc[0][k] = convex ? (b - a) * s->t[k] : 0, abc[1][k] = -h * a, abc[2][k] = h * (a - 1);
+        s->slope[k] = abc[0][k] * p.dg[k] + abc[1][k] * (p.gz[k] - p.yz[k]) + abc[2][k] * p.gz[k];
+        s->t[k] = 1;
+    }
+    vgi_robust_kernel_now()->turn(n, abc, s->m.z, s->m.zn, s->m.d);
+    vgi_row *g = s->m.g, *z = s->m.z;
+    s->m.g = s->m.gn, s->m.gn = g, s->m.z = s->m.zn, s->m.zn = z;
+}
+
+static void descend(search *s)
+{
+    vgi_robust_sums sums;
+    choose_softness(s);
+    if (!any_active(s) || !s->r->rounds) return;
+    begin(s);
+    for (;;) {
+        advance(s, &sums);
+        judge(s, &sums);
+        if (!any_active(s) || s->rounds == s->r->rounds) return;
+        precondition(s, s->m.gn, s->m.zn);
+        choose_direction(s);
+    }
+}
+
+/* ---- blocks of eight poses ---- */
+
+typedef struct robust_job {
+    vg_robust *r;
+    size_t n;
+    const double *const *rhs;
+    const float *const *misfits;
+    const double *sizes;
+    double *const *x;
+    const double *const *anchors, *const *roots;
+    bool *falling; /* n */
+} robust_job;
+
+/* The plain solution, as the way there from the guess, in units of the size of each pose. */
+static void solve_plainly(const robust_job *j, search *s, size_t first, size_t lanes, vgi_lanes size)
+{
+    const vg_robust *r = j->r;
+    size_t all = r->solver.rows + r->rows.nheld;
+    const double *rhs[VGI_LANES];
+    const float *misfit[VGI_LANES];
+    vgi_lanes unit;
+    for (size_t k = 0; k < VGI_LANES; k++) {
+        size_t from = first + (k < lanes ? k : lanes - 1);
+        rhs[k] = j->rhs[from], misfit[k] = j->misfits[from];
+        size[k] = j->sizes[from] > 0 ? j->sizes[from] : 1, unit[k] = 1 / size[k];
+    }
+    memset(s->m.u, 0, all * sizeof *s->m.u); /* rows of centroids and held vertices stay 0 */
+    memset(s->m.trial, 0, all * sizeof *s->m.trial);
+    vgi_load_rows(s->m.u, r->solver.row, r->solver.g->nv, r->solver.rows, rhs);
+    vgi_factor_solve(r->solver.factor, s->m.u);
+    vgi_robust_kernel_now()->scale(r->solver.rows, unit, s->m.u);
+    vgi_robust_kernel_now()->interleave(r->nmisfits, misfit, s->m.misfit);
+}
+
+static void robust_block(void *context, size_t i)
+{
+    const robust_job *j = context;
+    const vg_robust *r = j->r;
+    const vg_graph *g = r->solver.g;
+    size_t first = i * VGI_LANES, lanes = j->n - first < VGI_LANES ? j->n - first : VGI_LANES;
+    search s = {.r = r, .m = r->rooms[i],
+                .faces = {r->rows.nf, r->rows.start, r->rows.row, r->entry, r->metric, r->star}};
+    vgi_lanes size;
+    if (r->solver.rows) {
+        solve_plainly(j, &s, first, lanes, size);
+        descend(&s);
+        vgi_robust_kernel_now()->scale(r->solver.rows, size, s.m.u);
+        vgi_add_rows(s.m.u, r->solver.row, g->nv, r->solver.rows, j->x + first, lanes);
+    }
+    vg_robust_facts *found = &r->found[i];
+    if (s.rounds > found->most_rounds) found->most_rounds = s.rounds;
+    for (size_t k = 0; k < lanes; k++) {
+        bool held = r->solver.anchored;
+        vgi_solver_place(r->s, j->x[first + k], held ? j->anchors[first + k] : NULL, held ? NULL : j->roots[first + k]);
+        j->falling[first + k] = s.falling[k];
+        found->unfinished += s.falling[k];
+    }
+}
+
+size_t vg_robust_solve(vg_robust *r, size_t n, const double *const *rhs, const float *const *misfits,
+                       const double *sizes, double *const *x, const double *const *anchors,
+                       const double *const *roots)
+{
+    enum { ROUND = 256 }; /* poses whose outcome is noted at once */
+    bool falling[ROUND];
+    size_t threads = (size_t)r->solver.threads, good = n;
+    size_t most = VGI_LANES * (ROUND / VGI_LANES < threads ? ROUND / VGI_LANES : threads);
+    for (size_t done = 0; done < n; done += most) {
+        size_t some = n - done < most ? n - done : most;
+        robust_job j = {r, some, rhs + done, misfits + done, sizes + done, x + done,
+                        r->solver.anchored ? anchors + done : NULL, r->solver.anchored ? NULL : roots + done, falling};
+        vgi_parallel(r->solver.threads, (some + VGI_LANES - 1) / VGI_LANES, robust_block, &j);
+        for (size_t k = 0; k < some && good == n; k++)
+            if (falling[k]) good = done + k;
+    }
+    r->facts = (vg_robust_facts){0};
+    for (size_t i = 0; i < threads; i++) {
+        if (r->found[i].most_rounds > r->facts.most_rounds) r->facts.most_rounds = r->found[i].most_rounds;
+        r->facts.unfinished += r->found[i].unfinished;
+    }
+    return good;
+}
