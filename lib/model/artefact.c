@@ -102,15 +102,18 @@ void vgi_fields_clear(const vgi_artefact *t, void *artefact)
     }
 }
 
+static size_t place_size(const vgi_member *f)
+{
+    return f->length || f->type == VGI_TEXT ? sizeof(void *) : f->size;
+}
+
+/* Columns of one array have the same place: all are moved before any is emptied. */
 void vgi_fields_move(const vgi_artefact *t, void *to, void *from)
 {
     vgi_fields_clear(t, to);
-    for (size_t i = 0; i < t->nfields; i++) {
-        const vgi_member *f = &t->fields[i];
-        size_t size = f->length || f->type == VGI_TEXT ? sizeof(void *) : f->size;
-        memcpy((char *)to + f->at, (char *)from + f->at, size);
-        memset((char *)from + f->at, 0, size);
-    }
+    for (size_t i = 0; i < t->nfields; i++)
+        memcpy((char *)to + t->fields[i].at, (char *)from + t->fields[i].at, place_size(&t->fields[i]));
+    for (size_t i = 0; i < t->nfields; i++) memset((char *)from + t->fields[i].at, 0, place_size(&t->fields[i]));
 }
 
 /* The texts of a list whose other bytes are copied already: all pointers to the original's are replaced. */
