@@ -213,7 +213,7 @@ blocks_of() {
 }
 
 @test "every key of a report as JSON is in its page" {
-    for name in every-header-record signal scalars turns rig map correspondence patches transforms unknown-records vectors; do
+    for name in every-header-record signal scalars turns rig map coordinates correspondence patches transforms unknown-records vectors; do
         must vg-info --json --frames "$GOLDEN/$name.vgs" -o "vg-info.$name.json"
     done
     must vg-info --json --check "$GOLDEN/smallest.vgs" -o vg-info.check.json

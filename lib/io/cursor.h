@@ -1,4 +1,4 @@
-/* cursor.h: what the files that know the contents of records share (payload.c, payload_scal.c, artefact_io.c): a cursor
+/* cursor.h: what the files that know the contents of records share (payload.c, frame_io.c, artefact_io.c): a cursor
  * that takes numbers, lists and texts from a payload, and the same for writing. No other file includes it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CURSOR_H
