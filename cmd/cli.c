@@ -4,6 +4,7 @@
 #include "cli.h"
 #include "options.h"
 #include "output.h"
+#include "progress.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -12,7 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
 enum {
@@ -34,16 +34,6 @@ static void leave(int status)
 
 /* ------------------------------------------------------------------------------------------- messages -- */
 
-static bool progress_shown;
-static double started;
-
-static double seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 /* C0, DEL, and C1 in UTF-8. */
 void cli_strip_controls(char *s)
 {
@@ -64,19 +54,13 @@ static void print_error(const char *text, size_t n)
     }
 }
 
-static void erase_progress(void)
-{
-    if (progress_shown) print_error("\r\033[K", 4);
-    progress_shown = false;
-}
-
 static void say_line(const char *kind, const char *format, va_list ap)
 {
     char body[MESSAGE_BYTES], line[MESSAGE_BYTES + 64];
     vsnprintf(body, sizeof body, format, ap);
     cli_strip_controls(body);
     int n = snprintf(line, sizeof line, "%s: %s%s\n", cli.program->name, kind, body);
-    erase_progress();
+    progress_erase();
     if (n > 0) print_error(line, (size_t)n < sizeof line ? (size_t)n : sizeof line - 1);
 }
 
@@ -114,21 +98,6 @@ static void say_error(const char *format, ...)
     va_start(ap, format);
     say_line("", format, ap);
     va_end(ap);
-}
-
-void cli_progress(const char *label, uint64_t n)
-{
-    static double last;
-    static int terminal = -1;
-    if (terminal < 0) terminal = isatty(STDERR_FILENO);
-    if (!terminal || cli.quiet) return;
-    double now = seconds();
-    if (now - started < 1 || now - last < 0.2) return;
-    last = now;
-    char line[128];
-    int k = snprintf(line, sizeof line, "\r\033[K%s: %.64s %llu", cli.program->name, label, (unsigned long long)n);
-    progress_shown = true;
-    if (k > 0) print_error(line, (size_t)k < sizeof line ? (size_t)k : sizeof line - 1);
 }
 
 /* ---------------------------------------------------------------------------------------- the end -- */
@@ -196,7 +165,7 @@ void cli_usage(const char *format, ...)
 
 void cli_finish(int status)
 {
-    erase_progress();
+    progress_erase();
     output_remove(); /* of an output that was never ended */
     output_flush();
     leave(status);
@@ -261,7 +230,7 @@ static void choose_kernels(void)
 
 size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands)
 {
-    started = seconds();
+    progress_start();
     cli.program = p, cli.argc = argc, cli.argv = argv;
     repair_descriptors();
     if (atexit(library_gave_up)) cli_stop(VG_ENOMEM, "not enough memory to start");

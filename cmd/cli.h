@@ -96,8 +96,11 @@ void cli_note(const char *format, ...) VG_PRINTF(1, 2); /* only with --verbose *
 void cli_say(const char *format, ...) VG_PRINTF(1, 2);
 /* cli_strip_controls: what a terminal would obey rather than show becomes '?'. Names come from files. */
 void cli_strip_controls(char *s);
-/* cli_progress: "label n" on standard error, rarely, only when it is a terminal and a second has passed. */
+/* cli_progress: "label n" on standard error, rarely, only when it is a terminal, a second has passed, and no other program
+ * of the pipe is slower; with --progress json as a line of JSON. label: what is counted, a text that stays. */
 void cli_progress(const char *label, uint64_t n);
+/* cli_progress_of: the same with a known total, 0: it is not known, and the time left. */
+void cli_progress_of(const char *label, uint64_t n, uint64_t total);
 
 /* cli_parse_number: the whole text as a finite number, or cli_usage naming the option. */
 double cli_parse_number(const char *option, const char *text);

@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "options.h"
 #include "processors.h"
+#include "progress.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -46,6 +47,10 @@ static bool applies(const cli_program *p, shared_use use)
     }
 }
 
+/* For programs that run others, and therefore not in the list of -h: vg(7) describes it. */
+static const cli_option progress_option = {
+    .name = "progress", .value = "json[:FD]", .help = "", .take = progress_take};
+
 /* All options of the program, its own first, and which of them were given. */
 static struct {
     size_t n;
@@ -59,6 +64,7 @@ static void gather_options(const cli_program *p)
     for (const cli_option *o = p->options; o && o->name && known.n < MOST_OPTIONS; o++) known.at[known.n++] = o;
     for (size_t i = 0; i < sizeof shared_options / sizeof *shared_options && known.n < MOST_OPTIONS; i++)
         if (applies(p, shared_options[i].use)) known.at[known.n++] = &shared_options[i].option;
+    if (known.n < MOST_OPTIONS) known.at[known.n++] = &progress_option;
     memset(known.given, 0, sizeof known.given);
 }
 
@@ -87,11 +93,13 @@ static void print_help(const cli_program *p)
     char text[128];
     int width = 0;
     for (size_t i = 0; i < known.n; i++) {
+        if (known.at[i] == &progress_option) continue;
         int w = option_text(known.at[i], text, sizeof text);
         if (w > width && w <= HELP_COLUMN) width = w;
     }
     printf("usage: %s %s\n%s\n\n", p->name, p->synopsis, p->summary);
     for (size_t i = 0; i < known.n; i++) {
+        if (known.at[i] == &progress_option) continue;
         bool fits = option_text(known.at[i], text, sizeof text) <= width;
         if (!fits) printf("%s\n", text);
         printf("%-*s  %s\n", width, fits ? text : "", known.at[i]->help);

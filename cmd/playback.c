@@ -178,7 +178,7 @@ static void play_between(void *context)
     if (p->keys.n == 0) cli_stop(VG_EINPUT, "the input has no poses to interpolate");
     for (size_t i = 0; i < (size_t)p->o->between.count; i++) {
         put_moment(p, &p->keys, pose_times_at(&p->o->between, i, p->keys.n));
-        cli_progress("poses", i + 1);
+        cli_progress_of("poses", i + 1, (uint64_t)p->o->between.count);
     }
     put_batch(p);
 }

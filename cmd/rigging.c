@@ -295,7 +295,7 @@ static void fit_batch(void *context, const fitting_batch *b)
         poses[count] = b->values[i], transforms[count++] = w->transforms[b->index[i]];
     }
     vg_rig_fitter_add(fitter, count, poses, transforms);
-    cli_progress("poses fitted", b->index[b->n - 1] + 1);
+    cli_progress_of("poses fitted", b->index[b->n - 1] + 1, w->poses.n);
 }
 
 /* ---- the report ---- */

@@ -6,6 +6,8 @@
 
 static vg_sink_options sink_options;
 static long first_number, most_targets;
+static double fps; /* 0: the times of the frames */
+static uint64_t written;
 static const char *output; /* not cli.output, which is NULL for "-" as for none */
 
 static const cli_option options[] = {
@@ -15,6 +17,7 @@ static const cli_option options[] = {
      "whatever the name says", .text = &sink_options.format},
     {"f64", 0, NULL, "numbers that read back to the same binary64, not binary32",
      .flag = &sink_options.full_precision},
+    {"fps", 0, "N", "give the frames times, N a second, from 0", .number = &fps, .least = 1e-6, .most = 1e9},
     {"replace", 0, NULL, "replace the mesh files that are in the directory, or have the pattern's names, as a whole",
      .flag = &sink_options.replace},
     {"first-number", 0, "N", "what %d in the output's name starts at (default 0)", .integer = &first_number,
@@ -50,8 +53,11 @@ static void put_frames(void *context, size_t n, vg_frame *in)
 {
     vg_err e;
     (void)context;
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < n; i++) {
+        if (fps > 0) in[i].has_time = true, in[i].time = (double)written / fps;
         if (vg_sink_put(sink, &in[i], &e) < 0) cli_die(&e);
+        written++;
+    }
 }
 
 static void decode(vg_source *s)

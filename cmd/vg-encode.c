@@ -1,6 +1,7 @@
 /* vg-encode: read poses from mesh files, archives, directories or streams into one stream.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "batch.h"
+#include "placing.h"
 #include "take.h"
 
 #include <stdlib.h>
@@ -14,6 +15,7 @@ static struct {
     double fps;
     size_t faces; /* 1: selected */
     take_list take;
+    placing placing;
 } opts;
 
 static const cli_option options[] = {
@@ -36,7 +38,15 @@ static const cli_option options[] = {
     {"anchor", 0, "V,V,...", "vertices that vg-solve must meet exactly", .text = &opts.anchors},
     {"take", 0, "FRAMES", "write these frames alone, counted from 0: 12, or 3,10-20, or 0-/2 for every other",
      .take = take_parse, .context = &opts.take},
-    {"fps", 0, "N", "give the poses times, N a second, from 0; sample animations of a GLB or glTF at them", .number = &opts.fps, .least = 1e-6, .most = 1e9},
+    {"fps", 0, "N", "give the poses times, N a second, from 0; sample animations of a GLB or glTF at them",
+     .number = &opts.fps, .least = 1e-6, .most = 1e9},
+    {"axes", 0, "y-up|z-up|FROM:TO", "turn the body: make y (or z) point up where z (or y) did; or 'xz-y:xyz'",
+     .take = placing_take_axes, .context = &opts.placing},
+    {"scale", 0, "X", "multiply all positions by X", .number = &opts.placing.scale, .least = 1e-12, .most = 1e12},
+    {"unit", 0, "FROM:TO", "scale from one unit to another, such as cm:m", .take = placing_take_unit,
+     .context = &opts.placing},
+    {"origin", 0, "centre|floor|X,Y,Z", "move this place of the reference pose to 0,0,0: its centroid, the floor below it",
+     .text = &opts.placing.origin},
     {"f32", 0, NULL, "write binary32 instead of binary64", .flag = &opts.f32},
     {.name = NULL}};
 
@@ -101,11 +111,14 @@ static void apply_options(vg_head *h, bool selects, uint32_t *anchors, size_t na
         if (opts.vectors && h->kind == VG_VECTORS) opts.vectors = false;
         if (opts.f32 && h->kind == VG_OTHER)
             cli_stop(VG_EINPUT, "the input holds '%s': --f32 needs a form that this program knows", vg_head_form(h));
-        if (opts.vectors || selects || opts.reference || opts.anchors)
-            cli_stop(VG_EINPUT, "the input holds %s: --vectors, --faces, --reference and --anchor need vertices",
+        if (opts.vectors || selects || opts.reference || opts.anchors || placing_wanted(&opts.placing))
+            cli_stop(VG_EINPUT,
+                     "the input holds %s: --vectors, --faces, --reference, --anchor, --axes, --scale, --unit and "
+                     "--origin need vertices",
                      vg_head_form(h));
     } else {
         if (opts.reference) set_reference(h, opts.reference);
+        if (placing_wanted(&opts.placing)) placing_head(&opts.placing, h);
         if (selects) select_faces(h);
         else if (cli_given("faces")) select_all_faces(h);
         if (opts.anchors) set_anchors(h, anchors, nanchors);
@@ -152,6 +165,7 @@ static void encode(void *context, size_t n, vg_frame *in)
     work *w = context;
     for (size_t i = 0; i < n; i++) {
         if (!take_wants(&opts.take, w->read++)) continue;
+        if (placing_wanted(&opts.placing)) placing_frame(&opts.placing, &in[i]);
         vg_frame *f = w->g ? to_vectors(w, &in[i]) : &in[i];
         if (opts.fps > 0) f->has_time = true, f->time = (double)w->written / opts.fps;
         cli_stream_put(f);

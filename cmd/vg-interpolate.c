@@ -148,7 +148,7 @@ static void write_poses(const poses *p, vg_path *path)
         key_label(&f, p->labels, p->n, t);
         check_finite(p, &f, t);
         cli_stream_put(&f);
-        cli_progress("poses", i + 1);
+        cli_progress_of("poses", i + 1, count);
     }
     vg_frame_clear(&f);
 }

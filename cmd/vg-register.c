@@ -69,6 +69,7 @@ static void check_options(size_t operands)
 static void note_step(void *context, const vg_register_step *s)
 {
     (void)context;
+    cli_progress_of("rounds", s->round, s->rounds);
     cli_note(
         "round %zu of %zu: %zu vertices near the target, %.3g D from it on average, at most %.3g D; stiffness %.3g",
         s->round, s->rounds, s->near, s->mean, s->largest, s->stiffness);

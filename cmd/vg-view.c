@@ -14,7 +14,7 @@ static struct {
     const char *size, *view, *against, *patches, *title, *format;
     const char *beside[VG_PAGE_SEQUENCES];
     size_t nbeside;
-    double scale, zoom, turn;
+    double scale, zoom, turn, fps;
     bool edges, ground, centred, silhouettes, scales, plain;
     size_t kind, up, fit; /* 1: html, z, figure */
     bool page, animated; /* what is made, else a sheet */
@@ -56,6 +56,8 @@ static const cli_option options[] = {
      .help = "show another sequence with the same camera: beside, or in a sheet below; repeatable"},
     {.name = "patches", .value = "PATCHES", .help = "colour the faces by the patches of a stream of vg-segment",
      .text = &opts.patches, .reads = true},
+    {.name = "fps", .value = "N", .help = "page, animation: play N frames a second, whatever times they have", .number = &opts.fps,
+     .least = 1e-3, .most = 1e6},
     {.name = "title", .value = "TEXT", .help = "page: its title (default: the name of the sequence)",
      .text = &opts.title},
     {.name = "against", .value = "TRUTH", .help = "colour by the distance of each vertex from its place in TRUTH",
@@ -168,6 +170,8 @@ static void choose_kind(void)
     if (!opts.page && opts.patches && (opts.against || opts.scales))
         cli_usage("a sheet has one kind of colours: leave out --patches or --%s",
                   opts.against ? "against" : "scales");
+    if (!opts.page && !opts.animated && opts.fps > 0)
+        cli_usage("option '--fps' is about a page or an animation: use -o FILE.html or -o FILE.webp");
     if (!opts.page && opts.title) cli_usage("option '--title' is about a page: use -o FILE.html");
     if (!cli.output && isatty(STDOUT_FILENO))
         cli_usage("a %s is not written to a terminal: use -o FILE.html, FILE.png or FILE.webp",
@@ -231,6 +235,7 @@ static void open_side(side *s, char **operands, size_t n)
 static bool next(side *s)
 {
     bool more = cli_next(s->source, &s->frame);
+    if (more && opts.fps > 0) s->frame.has_time = true, s->frame.time = (double)s->frames / opts.fps;
     s->frames += more;
     s->coloured |= more && vg_frame_scalars(&s->frame);
     return more;

@@ -277,3 +277,53 @@ END
     says "vg-encode: " "vg-decode: " "vg-encode failed with status 3"
     nothing_but pose1.obj pose2.obj pose3.obj pose4.obj
 }
+
+@test "--axes, --scale, --unit and --origin place the whole sequence" {
+    mesh two 0.3 0.25 >a.obj
+    mesh two 0.8 2 >b.obj
+    must vg-encode a.obj b.obj -o in.vgs
+    must vg-encode --axes y-up in.vgs -o y.vgs
+    must vg-encode --axes z-up y.vgs -o back.vgs
+    must vg-encode --axes xz-y:xyz in.vgs -o same.vgs
+    must vg-encode --axes z-up:y-up in.vgs -o words.vgs
+    must vg-encode --axes yzx:xyz in.vgs -o cycle.vgs
+    must vg-encode --scale 3 --unit cm:m in.vgs -o small.vgs
+    must vg-encode --unit in:mm in.vgs -o inches.vgs
+    must vg-encode --origin 1,-2,0.5 in.vgs -o moved.vgs
+    must vg-encode --origin centre in.vgs -o centre.vgs
+    must vg-encode --axes z-up --origin floor --scale 2 in.vgs -o floor.vgs
+    must vg-encode --vectors --scale 2 in.vgs -o vectors.vgs
+    must vg-encode --scale 2 in.vgs -o twice.vgs
+    pipe 'vg-solve vectors.vgs | vg-diff -t 1e-9 twice.vgs -'
+    py <<'END'
+import read_stream
+def load(name):
+    s = read_stream.read_stream(name + ".vgs")
+    return [list(zip(*[iter(v)] * 3)) for v in [s.reference] + [f.values for f in s.frames]]
+def check(name, f):
+    for given, found in zip(load("in"), load(name), strict=True):
+        for p, q in zip(given, found, strict=True):
+            assert max(abs(a - b) for a, b in zip(f(*p), q)) < 1e-14 * 60, (name, p, q)
+for name in "y", "same", "words":
+    check(name, lambda x, y, z: (x, z, -y))
+check("back", lambda x, y, z: (x, y, z))
+check("cycle", lambda x, y, z: (y, z, x))
+check("small", lambda x, y, z: (0.03 * x, 0.03 * y, 0.03 * z))
+check("inches", lambda x, y, z: (25.4 * x, 25.4 * y, 25.4 * z))
+check("moved", lambda x, y, z: (x - 1, y + 2, z - 0.5))
+rest = load("in")[0]
+mean = [sum(p[k] for p in rest) / len(rest) for k in range(3)]
+check("centre", lambda x, y, z: (x - mean[0], y - mean[1], z - mean[2]))
+low = min(p[1] for p in rest)
+check("floor", lambda x, y, z: (2 * (x - mean[0]), -2 * (z - mean[2]), 2 * (y - low)))
+END
+    for option in '--axes up' '--axes xyz' '--axes xyz:xy' '--axes xxz:xyz' '--axes xyz:-xyz' '--unit cm' '--unit cm:parsec' \
+        '--origin here' '--origin 1,2' '--scale 0' '--scale -1'; do
+        # shellcheck disable=SC2086 # words
+        must_fail 2 vg-encode $option in.vgs -o out.vgs
+        says "${option%% *}"
+    done
+    must_fail 3 vg-encode --scale 2 vectors.vgs -o out.vgs
+    must_fail 3 vg-encode --scale 2 "$DATA/sit01.bvh.xz" -o out.vgs
+    [ ! -e out.vgs ]
+}

@@ -398,3 +398,38 @@ END
     pipe 'vg-encode all.zip | vg-info'
     shows "frames     2: 'pose1' to 'pose2'"
 }
+
+@test "frames without times come 24 a second in every format, with --fps N a second" {
+    poses cube 3
+    must vg-encode pose*.obj -o in.vgs
+    must vg-decode -q in.vgs -o usual.mdd
+    must vg-decode -q in.vgs -o usual.glb
+    must vg-decode -q in.vgs -o usual.usda
+    must vg-decode -q --fps 10 in.vgs -o ten.mdd
+    must vg-decode -q --fps 10 in.vgs -o ten.glb
+    must vg-decode -q --fps 10 in.vgs -o ten.usda
+    grep -q 'timeCodesPerSecond = 24 *$' usual.usda
+    grep -q 'timeCodesPerSecond = 10 *$' ten.usda
+    for name in usual ten; do
+        must vg-encode $name.mdd -o $name.mdd.vgs
+        must vg-encode $name.glb -o $name.glb.vgs
+    done
+    must vg-decode -q "$GOLDEN/turns.vgs" -o usual.bvh
+    grep -q '^Frame Time: *0.0416666667$' usual.bvh
+    must vg-encode --take 0-2 "$DATA/human-man-poses.bvh.xz" -o sit.vgs
+    must vg-decode -q --fps 10 sit.vgs -o ten.bvh
+    grep -q '^Frame Time: *0.10*$' ten.bvh
+    must vg-view in.vgs -o usual.html
+    must vg-view --fps 10 in.vgs -o ten.html
+    grep -q 'FRAMES_PER_SECOND = 24;' usual.html
+    grep -q '"times":\[0,0.1,0.2\]' ten.html
+    must_fail 2 vg-view --fps 10 in.vgs -o ten.png
+    says '--fps' 'page'
+    py <<'END'
+import read_stream
+for name, rate in ("usual", 24), ("ten", 10):
+    for kind in "mdd", "glb":
+        times = [f.time for f in read_stream.read_stream(f"{name}.{kind}.vgs").frames]
+        assert max(abs(t - i / rate) for i, t in enumerate(times)) < 1e-7, (name, kind, times)
+END
+}

@@ -457,8 +457,8 @@ def parts(name):
         at += 8 + size + size % 2
     return canvas, frames
 
-assert parts("plain.webp") == ((64 + 32, 48), [40, 40, 40]), parts("plain.webp")  # 25 frames a second
-assert parts("turned") == ((2 * 64 + 48, 48 + 22), [40, 40, 40]), parts("turned")
+assert parts("plain.webp") == ((64 + 32, 48), [41, 42, 41]), parts("plain.webp")  # 24 frames a second
+assert parts("turned") == ((2 * 64 + 48, 48 + 22), [41, 42, 41]), parts("turned")
 m.write("timed.vgs", m.whole(m.content(frames=[m.pose("p%d" % i, [[x + i for x in p] for p in m.POINTS[:4]], time=t)
                                                for i, t in enumerate((1, 1.5, 2.5))])))
 END

@@ -7,6 +7,7 @@
  * then the positions. MDD, big-endian: int32 samples, int32 points, float32 time of each sample, then the positions.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
+#include "io/rate.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -17,7 +18,6 @@ enum { PC2_HEADER = 32, PC2_RATE_OFF = 20, PC2_SAMPLES_OFF = 28, MDD_HEADER = 8,
 static const char pc2_magic[12] = "POINTCACHE2";
 
 /* MDD wants a time for every sample: what is written when the sequence has none. */
-static const double usual_rate = 24;
 
 static uint32_t load(const unsigned char *p, bool big)
 {
@@ -272,7 +272,7 @@ static void note_time(writing *x, const vg_frame *f)
 static int keep_time(writing *x, const vg_frame *f, vg_err *e)
 {
     unsigned char time[4];
-    double t = f->has_time ? f->time : (double)x->samples / usual_rate;
+    double t = f->has_time ? f->time : (double)x->samples / VGI_FPS;
     if (!isfinite((float)t)) return vg_fail(e, VG_EINPUT, "its time %g does not fit single precision", t);
     store_float(time, (float)t, true);
     return vgi_bytes_append(&x->times, time, sizeof time, e);

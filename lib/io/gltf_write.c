@@ -5,6 +5,7 @@
  * The frames wait in a file without a name.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
+#include "io/rate.h"
 
 #include <float.h>
 #include <math.h>
@@ -12,7 +13,6 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-static const double usual_rate = 30;
 
 /* ---- what can be written ---- */
 
@@ -103,7 +103,7 @@ static bool times_fit(const vgi_gltf_writing *w)
 
 static double time_of(const vgi_gltf_writing *w, size_t i)
 {
-    return (float)(w->timed ? w->times[i] : (double)i / usual_rate);
+    return (float)(w->timed ? w->times[i] : (double)i / VGI_FPS);
 }
 
 /* ---- JSON ---- */

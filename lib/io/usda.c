@@ -5,13 +5,13 @@
  * patched.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
+#include "io/rate.h"
 
 #include <math.h>
 #include <stdlib.h>
 
 enum { ROOM = 26, PLACES = 4 }; /* bytes kept free for a number; such places */
 
-static const double usual_rate = 24;
 
 typedef struct writing {
     vgi_output *out;
@@ -98,7 +98,7 @@ static int begin_usda(void **state, const vg_head *h, const vg_sink_options *o, 
     (void)o;
     writing *x = *state = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
-    x->out = out, x->h = h, x->rate = usual_rate;
+    x->out = out, x->h = h, x->rate = VGI_FPS;
     int r = put_layer(x, e);
     return r < 0 ? r : put_faces(x, e);
 }
@@ -131,7 +131,7 @@ static int settle_rate(writing *x, const vg_frame *f, vg_err *e)
 {
     double step = f->time - x->first;
     x->rate = settled(1 / step);
-    if (!(x->rate > 0 && isfinite(x->rate))) x->rate = usual_rate;
+    if (!(x->rate > 0 && isfinite(x->rate))) x->rate = VGI_FPS;
     x->last_key = settled(x->first * x->rate);
     return fill_room(x, x->first_key_off, x->last_key, e);
 }

@@ -5,12 +5,12 @@
 
 #include "io/io.h"
 #include "view/webp.h"
+#include "io/rate.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-#define FRAMES_PER_SECOND 25
 static const double caption_dot = 1.5;
 static const unsigned char ink[3] = {38, 42, 50};
 
@@ -19,7 +19,7 @@ static int time_of(const vg_sheet *s, const vgi_row *q, size_t i)
 {
     bool timed = true;
     for (size_t k = 1; k < s->n; k++) timed = timed && shot_of(q, k)->time > shot_of(q, k - 1)->time;
-    if (s->n < 2 || !timed) return (int)(1000.0 / FRAMES_PER_SECOND * (double)shot_of(q, i)->index);
+    if (s->n < 2 || !timed) return (int)(1000.0 / VGI_FPS * (double)shot_of(q, i)->index);
     return (int)fmin(1000 * (shot_of(q, i)->time - shot_of(q, 0)->time), 1e8);
 }
 

@@ -7,7 +7,7 @@
 const $ = (id) => document.getElementById(id);
 const facts = JSON.parse($("facts").textContent);
 const canvas = $("canvas");
-const CREASE = Math.cos(50 * Math.PI / 180), MOST_RING = 64, TEXTURE_WIDTH = 2048, FRAMES_PER_SECOND = 25;
+const CREASE = Math.cos(50 * Math.PI / 180), MOST_RING = 64, TEXTURE_WIDTH = 2048, FRAMES_PER_SECOND = 24;
 const TINT = facts.tint || null; /* what colours say: numbers of vertices, of scales their logarithms to base 2 */
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 const state = {

@@ -211,7 +211,7 @@ static void points_come_back(void)
     CHECK(r == VG_OK && strstr(warning, "the times of the frames"));
     played p = play(&vgi_sequence_glb, b.data, b.size);
     CHECK(p.result == 0 && p.frames == 3 && p.h.count == 12 && p.h.body.mesh.nf == 0);
-    CHECK_NEAR(p.times[2], 2 / 30.0, 1e-6);
+    CHECK_NEAR(p.times[2], 2 / 24.0, 1e-6);
     played_clear(&p);
     vg_bytes_clear(&b);
     values[1][0] = 1e39;

@@ -1,0 +1,153 @@
+/* progress.c: what a program is doing, on a terminal or for another program. Leaves out messages (cli.c).
+ *
+ * Of the programs of a pipe only the slowest draws its line: the one whose input pipe is full, since it is waited for,
+ * and whose output pipe is not, since it waits for nobody.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "progress.h"
+#include "cli.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+static const double first_after = 1, interval = 0.2; /* seconds */
+
+static struct {
+    bool json, drawn;
+    int fd; /* of the reports in JSON */
+    double started, last;
+    const char *label; /* of the phase */
+    double phase_started;
+    uint64_t phase_first; /* count at its start */
+} progress = {.fd = STDERR_FILENO};
+
+static double now_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+void progress_start(void)
+{
+    progress.started = now_seconds();
+}
+
+void progress_take(const char *value, void *context)
+{
+    (void)context;
+    char *end = NULL;
+    long fd = STDERR_FILENO;
+    bool json = !strncmp(value, "json", 4) && (!value[4] || (value[4] == ':' && value[5] >= '0' && value[5] <= '9'));
+    if (json && value[4]) fd = strtol(value + 5, &end, 10);
+    if (!json || (end && *end) || fd < 0 || fd > 1 << 20)
+        cli_usage("option '--progress' needs 'json' or 'json:DESCRIPTOR', not '%s'", value);
+    if (fd == STDOUT_FILENO) cli_usage("option '--progress' needs another descriptor than standard output");
+    if (fcntl((int)fd, F_GETFD) < 0) cli_usage("option '--progress': descriptor %ld is not open", fd);
+    progress.json = true, progress.fd = (int)fd;
+}
+
+/* More than half full: 1; less: 0; no pipe: otherwise. */
+static int pipe_is_full(int fd, int otherwise)
+{
+    struct stat st;
+    int held = 0, size = fcntl(fd, F_GETPIPE_SZ);
+    if (fstat(fd, &st) || !S_ISFIFO(st.st_mode) || size <= 0 || ioctl(fd, FIONREAD, &held)) return otherwise;
+    return 2 * (long)held >= size;
+}
+
+/* Has whoever writes into standard input come to an end? Then nobody before this program is slower. */
+static bool input_has_ended(void)
+{
+    struct pollfd p = {.fd = STDIN_FILENO, .events = POLLIN};
+    return poll(&p, 1, 0) > 0 && (p.revents & POLLHUP);
+}
+
+static bool is_slowest(void)
+{
+    return (pipe_is_full(STDIN_FILENO, 1) || input_has_ended()) && !pipe_is_full(STDOUT_FILENO, 0);
+}
+
+static void write_some(int fd, const char *text, int n)
+{
+    ssize_t done;
+    do
+        done = write(fd, text, (size_t)n);
+    while (done < 0 && errno == EINTR);
+}
+
+void progress_erase(void)
+{
+    if (progress.drawn) write_some(STDERR_FILENO, "\r\033[K", 4);
+    progress.drawn = false;
+}
+
+/* "12 s", "3 min 20 s", "2 h 5 min" */
+static void print_duration(char *to, size_t size, double seconds)
+{
+    unsigned long long s = seconds < 1e9 ? (unsigned long long)(seconds + 0.5) : 1000000000;
+    if (s < 100) snprintf(to, size, "%llu s", s);
+    else if (s < 6000) snprintf(to, size, "%llu min %llu s", s / 60, s % 60);
+    else snprintf(to, size, "%llu h %llu min", s / 3600, s / 60 % 60);
+}
+
+static void draw(const char *label, uint64_t n, uint64_t total, double left)
+{
+    char line[192], duration[40];
+    int k = snprintf(line, sizeof line, "\r\033[K%s: %.64s %llu", cli.program->name, label, (unsigned long long)n);
+    if (total) k += snprintf(line + k, sizeof line - (size_t)k, " of %llu", (unsigned long long)total);
+    print_duration(duration, sizeof duration, left);
+    if (left >= 1) k += snprintf(line + k, sizeof line - (size_t)k, ", %s left", duration);
+    progress.drawn = true;
+    write_some(STDERR_FILENO, line, k);
+}
+
+/* Labels and names of programs are ours: nothing in them needs escaping. */
+static void print_json(const char *label, uint64_t n, uint64_t total, double left, double now)
+{
+    char line[256];
+    int k = snprintf(line, sizeof line, "{\"program\":\"%s\",\"doing\":\"%.64s\",\"done\":%llu", cli.program->name,
+                     label, (unsigned long long)n);
+    if (total) k += snprintf(line + k, sizeof line - (size_t)k, ",\"total\":%llu", (unsigned long long)total);
+    k += snprintf(line + k, sizeof line - (size_t)k, ",\"seconds\":%.3f", now - progress.started);
+    if (left >= 0) k += snprintf(line + k, sizeof line - (size_t)k, ",\"left\":%.3f", left);
+    k += snprintf(line + k, sizeof line - (size_t)k, "}\n");
+    write_some(progress.fd, line, k);
+}
+
+/* Seconds until `total`, at the speed of this phase so far; -1: not known. */
+static double time_left(uint64_t n, uint64_t total, double now)
+{
+    uint64_t done = n - progress.phase_first;
+    if (!total || n > total || n <= progress.phase_first || now <= progress.phase_started) return -1;
+    return (now - progress.phase_started) / (double)done * (double)(total - n);
+}
+
+void cli_progress_of(const char *label, uint64_t n, uint64_t total)
+{
+    static int terminal = -1;
+    if (terminal < 0) terminal = isatty(STDERR_FILENO) && !cli.quiet;
+    if (!terminal && !progress.json) return;
+    double now = now_seconds();
+    if (!progress.label || strcmp(progress.label, label)) {
+        progress.label = label, progress.phase_first = n;
+        progress.phase_started = now;
+    }
+    if (now - progress.last < interval || (!progress.json && now - progress.started < first_after)) return;
+    progress.last = now;
+    double left = time_left(n, total, now);
+    if (progress.json) print_json(label, n, total, left, now);
+    else if (is_slowest()) draw(label, n, total, left);
+    else progress_erase();
+}
+
+void cli_progress(const char *label, uint64_t n)
+{
+    cli_progress_of(label, n, 0);
+}

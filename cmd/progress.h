@@ -1,0 +1,13 @@
+/* progress.h: what cli.c and options.c ask of progress.c; the programs' side of it is in cli.h.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_PROGRESS_H
+#define VG_PROGRESS_H
+
+/* progress_start: the program has started now. */
+void progress_start(void);
+/* progress_take: the value of --progress; to be given to cli_option. */
+void progress_take(const char *value, void *context);
+/* progress_erase: take the line off the terminal, if there is one. */
+void progress_erase(void);
+
+#endif
