@@ -9,6 +9,7 @@
  *   vg/vectors.h   the vector graph            vg/io.h        streams, mesh files, archives
  *   vg/markers.h   small text files            vg/view.h      pictures
  *   vg/signal.h    continuous signals
+ *   vg/network.h   a trained network              vg/net.h       features, training, generation
  *
  * Conventions. Arrays of points and vectors are interleaved: xyzxyz... Index base is 0. Lengths are in the unit of
  * the mesh. D is the diagonal of the bounding box of the reference pose. Functions that can fail return an int:
@@ -28,6 +29,7 @@
 #include "vg/core.h"
 #include "vg/rotation.h"
 #include "vg/body.h"
+#include "vg/network.h"
 #include "vg/frames.h"
 #include "vg/vectors.h"
 #include "vg/markers.h"
@@ -36,6 +38,7 @@
 #include "vg/rig.h"
 #include "vg/signal.h"
 #include "vg/measures.h"
+#include "vg/net.h"
 #include "vg/io.h"
 #include "vg/view.h"
 

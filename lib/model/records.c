@@ -231,6 +231,63 @@ static const vgi_member sign_fields[] = {
     OPTIONAL(vg_signal, F64, times, 1, signal_times),
     ARRAY(vg_signal, TEXT, names, 1, signal_frames)};
 
+static size_t of_network(size_t entries, const vg_network *n)
+{
+    return times(entries, times(n->sets, n->nparameters));
+}
+
+LENGTH(net_features, vg_network, times(a->nv, a->width))
+LENGTH(net_rank, vg_network, a->rank)
+LENGTH(net_errors, vg_network, 2 * VG_NETWORK_METHODS * VG_NETWORK_FRAMES)
+LENGTH(net_regression, vg_network, a->model == VG_NETWORK_AUTO ? times(a->rank, one_more(one_more(times(a->rank, 3)))) : 0)
+LENGTH(net_root, vg_network, times(one_more(times(a->rank, 2)), one_more(a->parts)))
+LENGTH(net_parameters, vg_network, of_network(1, a))
+LENGTH(net_basis, vg_network, times(a->rank, times(a->nv, a->width)))
+LENGTH(net_moments, vg_network, a->open ? of_network(1, a) : 0)
+static const vgi_member netw_fields[] = {
+    NUMBER(vg_network, U64, model),
+    NUMBER(vg_network, U64, direction),
+    NUMBER(vg_network, U64, mesh_digest),
+    NUMBER(vg_network, U64, data_digest),
+    NUMBER(vg_network, U64, nv),
+    NUMBER(vg_network, U64, parts),
+    NUMBER(vg_network, U64, width),
+    NUMBER(vg_network, U64, numbers),
+    NUMBER(vg_network, U64, rank),
+    NUMBER(vg_network, U64, layers),
+    NUMBER(vg_network, U64, hidden),
+    NUMBER(vg_network, U64, convolutions),
+    NUMBER(vg_network, U64, uncertain),
+    NUMBER(vg_network, U64, sets),
+    NUMBER(vg_network, U64, nparameters),
+    NUMBER(vg_network, U64, seed),
+    NUMBER(vg_network, U64, frames),
+    NUMBER(vg_network, U64, iterations),
+    NUMBER(vg_network, U64, step),
+    NUMBER(vg_network, U64, windows),
+    NUMBER(vg_network, U64, open),
+    NUMBER(vg_network, U64, phase),
+    NUMBER(vg_network, U64, best_iteration),
+    NUMBER(vg_network, F64, best_error),
+    NUMBER(vg_network, F64, diagonal),
+    NUMBER(vg_network, F64, low[0]),
+    NUMBER(vg_network, F64, low[1]),
+    NUMBER(vg_network, F64, high[0]),
+    NUMBER(vg_network, F64, high[1]),
+    NUMBER(vg_network, F64, change),
+    NUMBER(vg_network, F64, ridge),
+    NUMBER(vg_network, F64, damping),
+    ARRAY(vg_network, F64, errors, 1, net_errors),
+    ARRAY(vg_network, F64, mean, 1, net_features),
+    ARRAY(vg_network, F64, scale, 2, net_rank),
+    ARRAY(vg_network, F64, range, 2, net_rank),
+    OPTIONAL(vg_network, F64, regression, 2, net_regression),
+    ARRAY(vg_network, F64, root, 3, net_root),
+    ARRAY(vg_network, F32, parameters, 1, net_parameters),
+    ARRAY(vg_network, F32, basis, 1, net_basis),
+    OPTIONAL(vg_network, F32, moments, 2, net_moments),
+    OPTIONAL(vg_network, F32, best, 1, net_moments)};
+
 /* ---- the table ---- */
 
 #define IN_BODY(member) .in_body = true, .at = offsetof(vg_body, member)
@@ -274,4 +331,7 @@ const vgi_artefact vgi_artefacts[VGI_ARTEFACTS] = {
     [VGI_SIGN] = {.tag = "SIGN", .flags = VGI_CRITICAL, .name = "signal", .advice = "make one with vg-fitsignal",
                   .needs = "MESH", IN_HEAD(signal), PRESENT(signal.n), FIELDS(sign_fields),
                   .check = vgi_check_signal},
+    [VGI_NETW] = {.tag = "NETW", .flags = VGI_CRITICAL, .name = "network", .advice = "make one with vg-train",
+                  .needs = "MESH", IN_HEAD(network), PRESENT(network.model), FIELDS(netw_fields),
+                  .check = vgi_check_network},
 };

@@ -67,6 +67,20 @@ static void solve_triangle(CBLAS_TRANSPOSE side, size_t n, const double *l, size
         cblas_dtrsm(CblasRowMajor, CblasLeft, CblasLower, side, CblasNonUnit, (int)n, (int)m, 1, l, (int)n, x, (int)m);
 }
 
+void vgi_gemm_single(bool turn_a, bool turn_b, size_t m, size_t n, size_t k, const float *a, size_t lda,
+                     const float *b, size_t ldb, float beta, float *c, size_t ldc)
+{
+    cblas_sgemm(CblasRowMajor, turn_a ? CblasTrans : CblasNoTrans, turn_b ? CblasTrans : CblasNoTrans, (int)m, (int)n,
+                (int)k, 1, a, (int)lda, b, (int)ldb, beta, c, (int)ldc);
+}
+
+void vgi_gemm_double(bool turn_a, bool turn_b, size_t m, size_t n, size_t k, const double *a, size_t lda,
+                     const double *b, size_t ldb, double beta, double *c, size_t ldc)
+{
+    cblas_dgemm(CblasRowMajor, turn_a ? CblasTrans : CblasNoTrans, turn_b ? CblasTrans : CblasNoTrans, (int)m, (int)n,
+                (int)k, 1, a, (int)lda, b, (int)ldb, beta, c, (int)ldc);
+}
+
 void vgi_product_double_transposed(size_t m, size_t n, size_t k, const double *a, size_t lda, const double *b,
                                    size_t ldb, double *c, size_t ldc)
 {

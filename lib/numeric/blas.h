@@ -4,6 +4,7 @@
 #ifndef VG_BLAS_H
 #define VG_BLAS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 /* vgi_blas_alone, vgi_blas_shared: around calls of BLAS or LAPACK from several threads at once: from the first _alone to
@@ -30,6 +31,12 @@ void vgi_product_transposed_double(size_t m, size_t n, size_t k, const double *a
                                    size_t ldb, double *c, size_t ldc);
 /* c (n x n, its lower triangle) := a a', a n x k */
 void vgi_product_gram(size_t n, size_t k, const double *a, size_t lda, double *c, size_t ldc);
+
+/* c (m x n) := a b + beta c, or a' b, a b', a' b' of matrices that are stored the other way round */
+void vgi_gemm_single(bool turn_a, bool turn_b, size_t m, size_t n, size_t k, const float *a, size_t lda,
+                     const float *b, size_t ldb, float beta, float *c, size_t ldc);
+void vgi_gemm_double(bool turn_a, bool turn_b, size_t m, size_t n, size_t k, const double *a, size_t lda,
+                     const double *b, size_t ldb, double beta, double *c, size_t ldc);
 
 /* x (n x m, row stride ldx) := l^-1 x, l a lower triangle of n x n */
 void vgi_solve_lower_stripe(size_t n, const double *l, size_t m, double *x, size_t ldx);

@@ -6,6 +6,7 @@
 
 #include "vg/body.h"
 #include "vg/signal.h"
+#include "vg/network.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -130,6 +131,7 @@ typedef struct vg_head {
                                          fitted to the target */
     vg_map map;           /* a stream of vg-fitmap */
     vg_signal signal;     /* a stream of vg-fitsignal */
+    vg_network network;   /* a stream of vg-train */
     bool has_selection;   /* only the faces `selected` (ascending) carry vectors; else all do */
     size_t nselected;
     uint32_t *selected;

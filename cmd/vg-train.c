@@ -1,0 +1,311 @@
+/* vg-train: learn how a sequence of poses goes on.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "cli.h"
+
+#include <math.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static struct {
+    size_t model, direction;
+    long layers, hidden, iterations, batch, frames, step, hold_at, seed, every;
+    double hold, rate, losses[3]; /* bidirectional, kl, l2; negative: the default of the model */
+    size_t given[2];              /* 0: the default */
+    bool nine;
+    const char *checkpoint, *resume, *log;
+} opts = {.hold_at = -1, .seed = 1, .every = 100, .hold = 0.2, .losses = {-1, -1, -1}};
+
+static void take_given(const char *text, void *context)
+{
+    (void)context;
+    char *end;
+    unsigned long least = strtoul(text, &end, 10), most = least;
+    if (*end == '-') most = strtoul(end + 1, &end, 10);
+    if (*end || text[0] < '1' || text[0] > '9' || most < least || most > 1000000)
+        cli_usage("option '--given' needs a count or a range such as 1-8, not '%s'", text);
+    opts.given[0] = least, opts.given[1] = most;
+}
+
+static void take_loss(const char *text, void *context)
+{
+    static const char *const names[] = {"bidirectional", "kl", "l2"};
+    (void)context;
+    for (const char *p = text; *p;) {
+        size_t which = 0, length = strcspn(p, "=");
+        while (which < 3 && (strlen(names[which]) != length || strncmp(p, names[which], length))) which++;
+        char *end = NULL;
+        double weight = which < 3 && p[length] ? strtod(p + length + 1, &end) : -1;
+        if (!end || end == p + length + 1 || (*end && *end != ',') || !(weight >= 0 && weight < INFINITY))
+            cli_usage("option '--loss' needs bidirectional=W, kl=W or l2=W, commas between, not '%s'", text);
+        opts.losses[which] = weight;
+        p = *end ? end + 1 : end;
+    }
+}
+
+static const cli_option options[] = {
+    {"model", 0, "auto|pca|fc|conv", "what stands around the recurrent layers (default auto)", .choice = &opts.model},
+    {"direction", 0, "shared|separate|forward", "chains both ways with one set of weights (default), two, or one way",
+     .choice = &opts.direction},
+    {"layers", 0, "N", "recurrent layers (default 3)", .integer = &opts.layers, .least = 1, .most = 8},
+    {"hidden", 0, "N", "numbers in each (default 128)", .integer = &opts.hidden, .least = 1, .most = 4096},
+    {"iterations", 0, "N", "learn so many times (default 300, of pca 2500, of fc and conv 7000)",
+     .integer = &opts.iterations, .least = 1, .most = 100000000},
+    {"batch", 0, "N", "from so many sequences at a time (default 8)", .integer = &opts.batch, .least = 1, .most = 4096},
+    {"frames", 0, "N", "of so many frames each (default 32)", .integer = &opts.frames, .least = 3, .most = 100000},
+    {"step", 0, "N", "of which only every Nth is looked at (default 1)", .integer = &opts.step, .least = 1,
+     .most = 1000},
+    {"given", 0, "N-M", "frames that are given, drawn anew each time (auto: 3-8, pca: 1-8, fc and conv: 1)",
+     .take = take_given},
+    {"hold", 0, "SHARE", "of each sequence, what is not learned from but judged (default 0.2)", .number = &opts.hold,
+     .least = 0, .most = 0.9},
+    {"hold-at", 0, "N", "from this frame of each sequence on (default: at its end)", .integer = &opts.hold_at,
+     .least = 0, .most = 1e9},
+    {"rate", 0, "X", "of learning (default 0.001, of the others 0.002)", .number = &opts.rate, .least = 1e-9,
+     .most = 1},
+    {"loss", 0, "NAME=W,...", "weights of bidirectional, kl and l2; 0 leaves one out", .take = take_loss},
+    {"nine", 0, NULL, "nine numbers a vertex, as printed, and not twelve", .flag = &opts.nine},
+    {"seed", 0, "N", "another choice of what is random (default 1)", .integer = &opts.seed, .least = 0,
+     .most = 4294967295.0},
+    {"checkpoint", 0, "FILE", "write the unfinished network there, whole, every so often", .text = &opts.checkpoint},
+    {"every", 0, "N", "with --checkpoint: after so many iterations (default 100)", .integer = &opts.every, .least = 1,
+     .most = 100000000, .needs = "checkpoint"},
+    {"resume", 0, "FILE", "go on from a checkpoint, with the same poses and options", .text = &opts.resume,
+     .reads = true},
+    {"log", 0, "FILE", "a line for each iteration there: numbers with tabs between", .text = &opts.log},
+    {.name = NULL}};
+
+static const cli_program program = {
+    .name = "vg-train",
+    .synopsis = "[options] [FILE ...]",
+    .summary = "learn how a sequence of poses goes on",
+    .options = options,
+    .most_operands = SIZE_MAX,
+    .writes_stream = true,
+    .threaded = true};
+
+static volatile sig_atomic_t interrupted;
+
+static void interrupt(int signal_number)
+{
+    (void)signal_number;
+    interrupted = 1;
+}
+
+static vg_train_options choose_options(void)
+{
+    vg_train_options o = vg_train_defaults((vg_network_model)(opts.model + 1));
+    o.direction = (vg_direction)opts.direction;
+    if (opts.layers) o.layers = (size_t)opts.layers;
+    if (opts.hidden) o.hidden = (size_t)opts.hidden;
+    if (opts.iterations) o.iterations = (size_t)opts.iterations;
+    if (opts.batch) o.batch = (size_t)opts.batch;
+    if (opts.frames) o.frames = (size_t)opts.frames;
+    if (opts.step) o.step = (size_t)opts.step;
+    if (opts.given[0]) o.given_least = opts.given[0], o.given_most = opts.given[1];
+    if (o.given_most >= o.frames) cli_usage("option '--given' must be less than the %zu frames of a sequence", o.frames);
+    if (opts.rate > 0) o.rate = opts.rate;
+    if (opts.losses[0] >= 0) o.bidirectional = opts.losses[0];
+    if (opts.losses[1] >= 0) o.divergence = opts.losses[1];
+    if (opts.losses[2] >= 0) o.decay = opts.losses[2];
+    o.hold = opts.hold, o.hold_at = opts.hold_at < 0 ? SIZE_MAX : (size_t)opts.hold_at;
+    o.nine = opts.nine, o.seed = (uint64_t)opts.seed, o.threads = cli.threads;
+    return o;
+}
+
+/* ---- poses ---- */
+
+static void read_sequence(vg_trainer *t, vg_source *s, uint64_t *poses)
+{
+    vg_frame f = {0};
+    vg_err e;
+    while (cli_next(s, &f)) {
+        const double *pose = f.values;
+        cli_progress("poses", ++*poses);
+        if (vg_trainer_add(t, 1, &pose, &e) < 0) cli_die(&e);
+    }
+    vg_frame_clear(&f);
+    vg_trainer_cut(t);
+}
+
+/* The operands behind the first: sequences of the same mesh. */
+static void read_others(vg_trainer *t, vg_head *h, char **operands, size_t n, uint64_t *poses)
+{
+    vg_err e;
+    for (size_t i = 1; i < n; i++) {
+        char name[200];
+        snprintf(name, sizeof name, "'%.190s'", operands[i]);
+        vg_source *s = cli_source(operands + i, 1);
+        cli_need_vertices(vg_source_head(s), name);
+        if (vg_mesh_same(&h->body.mesh, "the first sequence", &vg_source_head(s)->body.mesh, name, &e) < 0 ||
+            vg_head_merge_trace(h, vg_source_head(s), &e) < 0)
+            cli_die(&e);
+        read_sequence(t, s, poses);
+        vg_source_close(&s);
+    }
+}
+
+/* ---- checkpoints ---- */
+
+static void write_checkpoint(const vg_trainer *t, vg_head *h)
+{
+    static vg_targets targets;
+    vg_err e;
+    vg_writer *w;
+    int fd;
+    vg_network_clear(&h->network);
+    if (vg_trainer_network(t, false, &h->network, &e) < 0 || (fd = vg_targets_open(&targets, opts.checkpoint, &e)) < 0)
+        cli_die(&e);
+    int code = vg_writer_open(&w, fd, opts.checkpoint, h, &e);
+    if (code >= 0) {
+        code = vg_writer_end(w, NULL, &e);
+        vg_writer_close(&w);
+    }
+    vg_err close_error;
+    int closed = vg_target_close(fd, opts.checkpoint, &close_error);
+    if (code >= 0 && closed < 0) code = closed, e = close_error;
+    if (code >= 0) code = vg_targets_rename(&targets, &e);
+    if (code < 0) {
+        vg_targets_remove(&targets);
+        cli_die(&e);
+    }
+    vg_targets_clear(&targets);
+    vg_network_clear(&h->network);
+}
+
+static void resume(vg_trainer *t)
+{
+    vg_err e;
+    vg_head from = {0};
+    if (!opts.resume) return;
+    if (vg_load_mesh(&from, opts.resume, &e) < 0) cli_die(&e);
+    if (!from.network.model) cli_stop(VG_EINPUT, "'%.190s' holds no network: --resume takes what --checkpoint wrote", opts.resume);
+    if (vg_trainer_resume(t, &from.network, &e) < 0) cli_stop(VG_EINPUT, "cannot go on from '%.190s': %s", opts.resume, e.message);
+    vg_head_clear(&from);
+}
+
+/* ---- learning ---- */
+
+static double seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void show(const vg_train_state *s, double since)
+{
+    static double last;
+    double now = seconds();
+    if (cli.quiet || now - last < 1 || !isatty(STDERR_FILENO)) return;
+    last = now;
+    double left = (double)(s->iterations - s->iteration) * since / (double)(s->iteration ? s->iteration : 1);
+    cli_say("%s, iteration %llu of %llu: loss %.4g, held-out error %.4g, %.0f s left", s->phase ? "all frames" : "validation",
+            (unsigned long long)s->iteration, (unsigned long long)s->iterations, s->loss, s->validation, left);
+}
+
+/* True: to the end. */
+static bool learn(vg_trainer *t, vg_head *h, vg_train_state *s)
+{
+    vg_err e;
+    int r = 0;
+    FILE *log = opts.log ? fopen(opts.log, "w") : NULL;
+    if (opts.log && !log) cli_stop(VG_ESYS, "cannot write '%.190s'", opts.log);
+    if (log) fputs("phase\titeration\tloss\tgradient\tvalidation\n", log);
+    double start = seconds(), held = NAN;
+    while (!interrupted && (r = vg_trainer_step(t, s, &e)) > 0) {
+        if (!isnan(s->validation)) held = s->validation;
+        if (log)
+            fprintf(log, "%d\t%llu\t%.6g\t%.6g\t%.6g\n", s->phase, (unsigned long long)s->iteration, s->loss, s->gradient, held);
+        show(s, seconds() - start);
+        if (opts.checkpoint && s->iteration % (uint64_t)opts.every == 0) write_checkpoint(t, h);
+    }
+    if (log && (fflush(log), ferror(log) | fclose(log))) cli_stop(VG_ESYS, "cannot write '%.190s'", opts.log);
+    if (!interrupted && r < 0) cli_die(&e);
+    cli_note("learned in %.1f s", seconds() - start);
+    return !interrupted;
+}
+
+/* ---- the report ---- */
+
+static void print_row(const char *name, const vg_network_errors *x, int method)
+{
+    char text[200];
+    int n = snprintf(text, sizeof text, "%-22s", name);
+    for (int given = 0; given < 2; given++)
+        for (int i = 0; i < VG_NETWORK_FRAMES; i++) {
+            double value = x->at[given][method][i];
+            n += isnan(value) ? snprintf(text + n, sizeof text - (size_t)n, "%8s", "-")
+                              : snprintf(text + n, sizeof text - (size_t)n, "%8.2f", value);
+        }
+    cli_say("%s", text);
+}
+
+/* the method of least error behind three given frames */
+static int best_of(const vg_network_errors *x, int most)
+{
+    int best = 0;
+    double least = INFINITY;
+    for (int m = 0; m < most; m++) {
+        double sum = 0;
+        for (int i = 0; i < VG_NETWORK_FRAMES; i++) sum += isnan(x->at[1][m][i]) ? 0 : x->at[1][m][i];
+        if (sum < least) least = sum, best = m;
+    }
+    return best;
+}
+
+static void report(vg_trainer *t, const vg_train_state *s)
+{
+    static const char *const names[VG_NETWORK_METHODS] = {"the last frame again", "on in a line", "on in a line, damped",
+                                                          "the regression alone", "the network"};
+    vg_network_errors x;
+    vg_err e;
+    if (vg_trainer_judge(t, &x, &e) < 0) cli_die(&e);
+    if (!x.windows) {
+        cli_note("nothing is held out that could be judged");
+        return;
+    }
+    cli_say("%zu frames learned from, %zu held out: mean error of a vertex in %% of D, 5, 10 and 15 frames ahead", s->frames,
+            s->held);
+    cli_say("%-22s%24s%24s", "", "1 frame given", "3 frames given");
+    for (int m = 0; m < VG_NETWORK_METHODS; m++) print_row(names[m], &x, m);
+    int best = best_of(&x, VG_NETWORK_METHODS);
+    if (best != VG_NETWORK_METHODS - 1)
+        cli_say("the network is beaten where it has not been: '%s' is nearer to the truth", names[best]);
+}
+
+int main(int argc, char **argv)
+{
+    char **operands;
+    size_t n = cli_start(&program, argc, argv, &operands);
+    vg_train_options o = choose_options();
+    vg_source *s = cli_source(operands, n ? 1 : 0);
+    vg_head *h = vg_source_head(s);
+    vg_trainer *t;
+    vg_train_state state = {0};
+    vg_err e;
+    uint64_t poses = 0;
+    cli_need_vertices(h, "the input");
+    if (opts.checkpoint && vg_target_check(opts.checkpoint, &e) < 0) cli_die(&e);
+    if (vg_trainer_new(&t, &h->body.mesh, h->body.reference, &o, &e) < 0) cli_die(&e);
+    read_sequence(t, s, &poses);
+    read_others(t, h, operands, n, &poses);
+    if (vg_trainer_prepare(t, &e) < 0) cli_die(&e);
+    resume(t);
+    vg_network_clear(&h->network);
+    if (opts.checkpoint) signal(SIGINT, interrupt), signal(SIGTERM, interrupt);
+    if (!learn(t, h, &state)) {
+        write_checkpoint(t, h);
+        cli_stop(VG_ESYS, "interrupted after %llu iterations: go on with --resume %s", (unsigned long long)state.iteration,
+                 opts.checkpoint);
+    }
+    report(t, &state);
+    if (vg_trainer_network(t, true, &h->network, &e) < 0) cli_die(&e);
+    vg_trainer_free(&t);
+    cli_stream_open(h);
+    cli_stream_end(vg_source_tail(s));
+    vg_source_close(&s);
+    cli_finish(0);
+}

@@ -1,0 +1,489 @@
+/* chain.c: a frame goes through convolutions and a full layer (or scaled coordinates) into recurrent layers and back out
+ * as the change to the next frame; backward through time.
+ *
+ * Activations of convolutions are not kept: they are as large as the mesh, and are computed once more on the way back.
+ * Leaves out what is done number by number (layer_kernel.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "net/chain.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { PACK = 8 }; /* steps whose gradients of a full layer are summed by one product */
+
+#define FLAT(rows) ((real *)(rows))
+#define FLAT_IN(rows) ((const real *)(rows))
+
+/* ---- memory ---- */
+
+static size_t most(size_t a, size_t b)
+{
+    return a > b ? a : b;
+}
+
+static size_t frames_of(const vgi_shape *s)
+{
+    return s->front == VGI_FRONT_MESH ? 2 * s->convolutions + 12 : 6;
+}
+
+/* Places for all arrays in one block; with base NULL only their sum. */
+static size_t lay_out(net_chains *c, net_lanes *base)
+{
+    const vgi_shape *s = c->shape;
+    size_t n = 0, t = c->steps;
+#define PLACE(array, rows) (c->array = base ? base + n : NULL, n += (rows))
+    PLACE(state, t * s->numbers);
+    PLACE(latent, t * s->latent);
+    PLACE(spread, s->uncertain ? t * s->latent : 0);
+    PLACE(noise, s->uncertain ? t * s->latent : 0);
+    for (size_t l = 0; l < s->layers; l++) {
+        PLACE(input[l], (t + 1) * (vgi_shape_input(s, l) + s->hidden));
+        PLACE(gates[l], t * 4 * s->hidden);
+        PLACE(cell[l], (t + 1) * s->hidden);
+    }
+    PLACE(top, t * s->hidden);
+    for (size_t i = 0; i < frames_of(s); i++) PLACE(frame[i], s->numbers);
+    PLACE(row, (size_t)16 * most(s->latent, 4 * s->hidden));
+#undef PLACE
+    return n;
+}
+
+int net_chains_make(net_chains *c, const vgi_shape *s, size_t steps, vg_err *e)
+{
+    *c = (net_chains){.shape = s, .steps = steps};
+    size_t widest = s->front == VGI_FRONT_MESH ? 2 * PACK * (s->numbers + 3 * s->latent) : 0;
+    for (size_t l = 0; l < s->layers; l++)
+        widest = most(widest, steps * (vgi_shape_input(s, l) + 5 * s->hidden + s->numbers * (s->front == VGI_FRONT_LINEAR)));
+    c->pack_size = widest * NET_LANES;
+    c->memory = net_array(lay_out(c, NULL), e);
+    c->pack = c->memory ? vgi_array_raw(c->pack_size, sizeof *c->pack, e) : NULL;
+    if (!c->pack) return net_chains_clear(c), VG_ENOMEM;
+    lay_out(c, c->memory);
+    return VG_OK;
+}
+
+void net_chains_clear(net_chains *c)
+{
+    free(c->memory);
+    free(c->pack);
+    *c = (net_chains){0};
+}
+
+/* ---- forward ---- */
+
+static size_t input_rows(const vgi_shape *s, size_t l)
+{
+    return vgi_shape_input(s, l) + s->hidden;
+}
+
+void net_chains_begin(net_chains *c, const net_lanes *start)
+{
+    const vgi_shape *s = c->shape;
+    for (size_t l = 0; l < s->layers; l++) {
+        memcpy(c->input[l] + vgi_shape_input(s, l), start + 2 * l * s->hidden, s->hidden * sizeof *start);
+        memcpy(c->cell[l], start + (2 * l + 1) * s->hidden, s->hidden * sizeof *start);
+    }
+}
+
+static net_neighbours neighbours(const vgi_shape *s)
+{
+    return (net_neighbours){s->vertices, s->first, s->to};
+}
+
+static net_convolution layer(const net_drive *d, size_t k, bool mirrored)
+{
+    const vgi_shape *s = d->shape;
+    const real *p = d->parameters;
+    return (net_convolution){s->channels, p + s->own[k], p + s->mean[k],
+                             p + (mirrored ? s->bias_back[k] : s->bias[k]), mirrored};
+}
+
+/* frame[0 .. convolutions - 1]: what the convolutions make of x; returns the last */
+static const net_lanes *convolve_in(net_chains *c, const net_drive *d, const net_lanes *x)
+{
+    const vgi_shape *s = c->shape;
+    net_neighbours g = neighbours(s);
+    for (size_t k = 0; k < s->convolutions; k++) {
+        net_convolution one = layer(d, k, false);
+        net_convolve(&g, &one, x, c->frame[k], c->frame[2 * s->convolutions + 1]);
+        x = c->frame[k];
+    }
+    return x;
+}
+
+/* frame[convolutions .. 2 * convolutions]: from h of the last layer out to the change; returns the last */
+static net_lanes *convolve_out(net_chains *c, const net_drive *d, const net_lanes *top)
+{
+    const vgi_shape *s = c->shape;
+    net_neighbours g = neighbours(s);
+    net_lanes *x = c->frame[s->convolutions];
+    NET_GEMM(false, false, s->numbers, NET_LANES, s->latent, d->parameters + s->full, s->latent, FLAT_IN(top),
+             NET_LANES, 0, FLAT(x), NET_LANES);
+    if (!s->convolutions) net_tanh(x, s->numbers);
+    for (size_t i = 0; i < s->convolutions; i++) {
+        net_convolution one = layer(d, s->convolutions - 1 - i, true);
+        net_convolve(&g, &one, x, c->frame[s->convolutions + 1 + i], c->frame[2 * s->convolutions + 1]);
+        x = c->frame[s->convolutions + 1 + i];
+    }
+    return x;
+}
+
+static void add_spread(net_chains *c, const net_drive *d, size_t t, const net_lanes *x, net_lanes *in)
+{
+    const vgi_shape *s = c->shape;
+    net_lanes *spread = c->spread + t * s->latent, *noise = c->noise + t * s->latent;
+    NET_GEMM(true, false, s->latent, NET_LANES, s->numbers, d->parameters + s->variance, s->latent, FLAT_IN(x),
+             NET_LANES, 0, FLAT(spread), NET_LANES);
+    for (size_t k = 0; k < s->latent; k++)
+        for (int i = 0; i < NET_LANES; i++) {
+            real v = spread[k][i] + d->parameters[s->variance_bias + k];
+            spread[k][i] = v < -10 ? -10 : v > 5 ? 5 : v;
+            in[k][i] += (real)exp(0.5 * (double)spread[k][i]) * noise[k][i];
+        }
+}
+
+/* what the first recurrent layer sees of frame x */
+static void encode(net_chains *c, const net_drive *d, size_t t, const net_lanes *x)
+{
+    const vgi_shape *s = c->shape;
+    net_lanes *latent = c->latent + t * s->latent, *in = c->input[0] + t * input_rows(s, 0);
+    if (s->front == VGI_FRONT_LINEAR) {
+        for (size_t k = 0; k < s->numbers; k++) in[k] = x[k] * d->scale_in[k];
+        return;
+    }
+    x = convolve_in(c, d, x);
+    NET_GEMM(true, false, s->latent, NET_LANES, s->numbers, d->parameters + s->full, s->latent, FLAT_IN(x), NET_LANES,
+             0, FLAT(latent), NET_LANES);
+    memcpy(in, latent, s->latent * sizeof *in);
+    if (s->uncertain) add_spread(c, d, t, x, in);
+}
+
+static void recur(net_chains *c, const net_drive *d, size_t t)
+{
+    const vgi_shape *s = c->shape;
+    size_t h = s->hidden;
+    for (size_t l = 0; l < s->layers; l++) {
+        size_t rows = input_rows(s, l), in = vgi_shape_input(s, l);
+        net_lanes *gates = c->gates[l] + t * 4 * h, *cell = c->cell[l] + t * h, *next = c->input[l] + (t + 1) * rows + in;
+        const real *bias = d->parameters + s->gates_bias[l];
+        for (size_t k = 0; k < 4 * h; k++) gates[k] = (net_lanes){0} + bias[k];
+        NET_GEMM(true, false, 4 * h, NET_LANES, rows, d->parameters + s->gates[l], 4 * h,
+                 FLAT_IN(c->input[l] + t * rows), NET_LANES, 1, FLAT(gates), NET_LANES);
+        net_gates(h, gates, cell, cell + h, next);
+        net_lanes *above = l + 1 < s->layers ? c->input[l + 1] + t * input_rows(s, l + 1) : c->top + t * h;
+        memcpy(above, next, h * sizeof *next);
+    }
+}
+
+/* next += what the last recurrent layer says of the change */
+static void decode(net_chains *c, const net_drive *d, size_t t, net_lanes *next)
+{
+    const vgi_shape *s = c->shape;
+    const net_lanes *top = c->top + t * s->hidden;
+    if (s->front == VGI_FRONT_MESH) {
+        const net_lanes *y = convolve_out(c, d, top);
+        for (size_t k = 0; k < s->numbers; k++) next[k] += y[k];
+        return;
+    }
+    net_lanes *y = c->frame[0];
+    NET_GEMM(true, false, s->numbers, NET_LANES, s->hidden, d->parameters + s->full, s->numbers, FLAT_IN(top),
+             NET_LANES, 0, FLAT(y), NET_LANES);
+    for (size_t k = 0; k < s->numbers; k++)
+        next[k] += (y[k] + d->parameters[s->full_bias + k]) * d->scale_out[k];
+}
+
+/* y += m' x, or m x, for the lanes that run one way */
+static void add_way(const net_drive *d, bool back, const real *m, bool turn, const net_lanes *x, real sign, net_lanes *y)
+{
+    size_t n = d->shape->numbers, first = back ? d->forward : 0, lanes = back ? NET_LANES - d->forward : d->forward;
+    if (!lanes) return;
+    if (sign < 0) { /* BLAS's alpha is not at hand: y := -(m x - y) */
+        for (size_t k = 0; k < n; k++)
+            for (size_t i = first; i < first + lanes; i++) y[k][i] = -y[k][i];
+    }
+    NET_GEMM(turn, false, n, lanes, n, m, n, FLAT_IN(x) + first, NET_LANES, 1, FLAT(y) + first, NET_LANES);
+    if (sign < 0)
+        for (size_t k = 0; k < n; k++)
+            for (size_t i = first; i < first + lanes; i++) y[k][i] = -y[k][i];
+}
+
+static void add_skeleton(const net_drive *d, const net_lanes *x, const net_lanes *before, net_lanes *next)
+{
+    for (int back = 0; back < 2; back++) {
+        const net_skeleton *s = &d->skeleton[back];
+        for (size_t k = 0; k < d->shape->numbers; k++)
+            for (size_t i = back ? d->forward : 0; i < (back ? NET_LANES : d->forward); i++) next[k][i] += s->shift[k];
+        add_way(d, back, before ? s->sum : s->turn, true, x, 1, next);
+        if (before) add_way(d, back, s->change, true, before, -1, next);
+    }
+}
+
+void net_chains_step(net_chains *c, const net_drive *d, size_t t, const net_lanes *x, const net_lanes *before,
+                     net_lanes *next)
+{
+    encode(c, d, t, x);
+    recur(c, d, t);
+    memcpy(next, x, c->shape->numbers * sizeof *x);
+    decode(c, d, t, next);
+    if (d->skeleton) add_skeleton(d, x, before, next);
+}
+
+/* the input of step t: given, or the chains' own; given ones are put into `room` */
+static const net_lanes *input(const net_chains *c, const net_drive *d, size_t t, net_lanes *room)
+{
+    if (t >= d->given) return c->state + t * c->shape->numbers;
+    d->truth(d->context, t, room);
+    return room;
+}
+
+void net_chains_forward(net_chains *c, const net_drive *d)
+{
+    size_t n = c->shape->numbers, rooms = frames_of(c->shape);
+    const net_lanes *before = NULL;
+    d->truth(d->context, 0, c->state);
+    for (size_t t = 0; t + 1 < c->steps; t++) {
+        const net_lanes *x = input(c, d, t, c->frame[rooms - 1 - t % 2]);
+        net_chains_step(c, d, t, x, before, c->state + (t + 1) * n);
+        before = x;
+    }
+}
+
+/* ---- backward ---- */
+
+/* rows of `count` steps, `stride` rows apart, as one matrix: a row of it is that row in all steps */
+static void pack_rows(const net_lanes *from, size_t stride, size_t rows, size_t count, real *to)
+{
+    for (size_t t = 0; t < count; t++)
+        for (size_t k = 0; k < rows; k++)
+            memcpy(to + (k * count + t) * NET_LANES, from + t * stride + k, sizeof *from);
+}
+
+static void add_sums(const net_lanes *from, size_t stride, size_t rows, size_t count, real *to)
+{
+    for (size_t k = 0; k < rows; k++) {
+        net_lanes sum = {0};
+        for (size_t t = 0; t < count; t++) sum += from[t * stride + k];
+        for (int i = 0; i < NET_LANES; i++) to[k] += sum[i];
+    }
+}
+
+/* Products of full layers wait until there are several steps of them. */
+typedef struct waiting {
+    size_t steps;
+    real *in, *out;            /* numbers x (PACK * 8): frames as the full layer sees and gives them */
+    real *latent, *top, *spread; /* latent x (PACK * 8): gradients, h, gradients */
+} waiting;
+
+static void put_waiting(real *to, size_t step, const net_lanes *rows, size_t n)
+{
+    for (size_t k = 0; k < n; k++) memcpy(to + (k * PACK + step) * NET_LANES, rows + k, sizeof *rows);
+}
+
+static void settle(const vgi_shape *s, waiting *w, real *gradient)
+{
+    size_t k = w->steps * NET_LANES, apart = PACK * NET_LANES;
+    if (k) {
+        NET_GEMM(false, true, s->numbers, s->latent, k, w->in, apart, w->latent, apart, 1, gradient + s->full, s->latent);
+        NET_GEMM(false, true, s->numbers, s->latent, k, w->out, apart, w->top, apart, 1, gradient + s->full, s->latent);
+        if (s->uncertain)
+            NET_GEMM(false, true, s->numbers, s->latent, k, w->in, apart, w->spread, apart, 1, gradient + s->variance,
+                     s->latent);
+    }
+    w->steps = 0;
+}
+
+typedef struct backward {
+    net_chains *c;
+    const net_drive *d;
+    real *gradient;
+    double divergence;
+    const net_lanes *shares; /* one row: what each lane counts of the divergence */
+    net_lanes *dstate, *dinput; /* numbers */
+    net_lanes *dh[VGI_NET_LAYERS], *dc[VGI_NET_LAYERS]; /* hidden: from the step behind */
+    net_lanes *dlatent; /* latent */
+    net_lanes *dspread;
+    waiting w;
+} backward;
+
+/* dh of the last layer from the gradient of the change */
+static void decode_back(backward *b, size_t t, net_lanes *dtop)
+{
+    net_chains *c = b->c;
+    const vgi_shape *s = c->shape;
+    net_lanes *dy = c->frame[2 * s->convolutions + 4], *other = c->frame[2 * s->convolutions + 5];
+    if (s->front == VGI_FRONT_LINEAR) {
+        dy = c->frame[2]; /* kept until all steps are packed: see below */
+        for (size_t k = 0; k < s->numbers; k++) dy[k] = b->dstate[k] * b->d->scale_out[k];
+        memcpy(c->latent + t * s->latent, dy, s->numbers * sizeof *dy); /* as many: the mean is not needed */
+        NET_GEMM(false, false, s->hidden, NET_LANES, s->numbers, b->d->parameters + s->full, s->numbers, FLAT_IN(dy),
+                 NET_LANES, 0, FLAT(dtop), NET_LANES);
+        return;
+    }
+    net_neighbours g = neighbours(s);
+    const net_lanes *y = convolve_out(c, b->d, c->top + t * s->hidden);
+    memcpy(dy, b->dstate, s->numbers * sizeof *dy);
+    if (!s->convolutions)
+        for (size_t k = 0; k < s->numbers; k++) dy[k] *= (real)1 - y[k] * y[k];
+    for (size_t k = 0; k < s->convolutions; k++) {
+        size_t out = 2 * s->convolutions - k;
+        net_convolution one = layer(b->d, k, true);
+        net_convolve_back(&g, &one, c->frame[out - 1], c->frame[out], dy, other, b->gradient + s->own[k],
+                          b->gradient + s->mean[k], b->gradient + s->bias_back[k], c->frame[2 * s->convolutions + 2]);
+        net_lanes *swap = dy;
+        dy = other, other = swap;
+    }
+    put_waiting(b->w.out, b->w.steps, dy, s->numbers);
+    put_waiting(b->w.top, b->w.steps, c->top + t * s->hidden, s->hidden);
+    NET_GEMM(true, false, s->hidden, NET_LANES, s->numbers, b->d->parameters + s->full, s->latent, FLAT_IN(dy),
+             NET_LANES, 0, FLAT(dtop), NET_LANES);
+}
+
+/* dtop: gradient of h of the last layer; gradients of gates take the places of the gates */
+static void recur_back(backward *b, size_t t, net_lanes *dtop)
+{
+    net_chains *c = b->c;
+    const vgi_shape *s = c->shape;
+    size_t h = s->hidden;
+    net_lanes *dgates = c->row + 8 * most(s->latent, 4 * h), *din = c->row + 12 * most(s->latent, 4 * h);
+    for (size_t l = s->layers; l-- > 0;) {
+        size_t rows = input_rows(s, l), in = vgi_shape_input(s, l);
+        net_lanes *gates = c->gates[l] + t * 4 * h;
+        const net_lanes *cell = c->cell[l] + t * h;
+        for (size_t k = 0; k < h; k++) dtop[k] += b->dh[l][k];
+        net_gates_back(h, gates, cell, cell + h, dtop, b->dc[l], dgates);
+        memcpy(gates, dgates, 4 * h * sizeof *gates);
+        NET_GEMM(false, false, rows, NET_LANES, 4 * h, b->d->parameters + s->gates[l], 4 * h, FLAT_IN(gates),
+                 NET_LANES, 0, FLAT(din), NET_LANES);
+        memcpy(b->dh[l], din + in, h * sizeof *din);
+        memcpy(l ? dtop : b->dlatent, din, in * sizeof *din);
+    }
+}
+
+/* gradients of mean and log variance from those of what the recurrent layers see, and from the divergence */
+static void spread_back(backward *b, size_t t)
+{
+    const vgi_shape *s = b->c->shape;
+    const net_lanes *mean = b->c->latent + t * s->latent, *spread = b->c->spread + t * s->latent,
+                    *noise = b->c->noise + t * s->latent;
+    for (size_t k = 0; k < s->latent; k++)
+        for (int i = 0; i < NET_LANES; i++) {
+            double v = (double)spread[k][i], w = b->divergence * (double)b->shares[0][i];
+            bool clamped = v <= -10 || v >= 5;
+            double g = (double)b->dlatent[k][i] * (double)noise[k][i] * 0.5 * exp(0.5 * v) + w * 0.5 * (exp(v) - 1);
+            b->dspread[k][i] = clamped ? 0 : (real)g;
+            b->dlatent[k][i] += (real)(w * (double)mean[k][i]);
+        }
+}
+
+/* b->dinput: gradient of the input of step t, from that of what the recurrent layers see */
+static void encode_back(backward *b, size_t t, const net_lanes *x)
+{
+    net_chains *c = b->c;
+    const vgi_shape *s = c->shape;
+    if (s->front == VGI_FRONT_LINEAR) {
+        for (size_t k = 0; k < s->numbers; k++) b->dinput[k] = b->dlatent[k] * b->d->scale_in[k];
+        return;
+    }
+    net_neighbours g = neighbours(s);
+    net_lanes *dx = b->dinput, *other = c->frame[2 * s->convolutions + 5];
+    if (s->uncertain) spread_back(b, t);
+    const net_lanes *last = convolve_in(c, b->d, x);
+    put_waiting(b->w.in, b->w.steps, last, s->numbers);
+    put_waiting(b->w.latent, b->w.steps, b->dlatent, s->latent);
+    if (s->uncertain) {
+        put_waiting(b->w.spread, b->w.steps, b->dspread, s->latent);
+        add_sums(b->dspread, 0, s->latent, 1, b->gradient + s->variance_bias);
+    }
+    if (++b->w.steps == PACK) settle(s, &b->w, b->gradient);
+    NET_GEMM(false, false, s->numbers, NET_LANES, s->latent, b->d->parameters + s->full, s->latent,
+             FLAT_IN(b->dlatent), NET_LANES, 0, FLAT(dx), NET_LANES);
+    if (s->uncertain)
+        NET_GEMM(false, false, s->numbers, NET_LANES, s->latent, b->d->parameters + s->variance, s->latent,
+                 FLAT_IN(b->dspread), NET_LANES, 1, FLAT(dx), NET_LANES);
+    for (size_t k = s->convolutions; k-- > 0;) {
+        net_convolution one = layer(b->d, k, false);
+        net_convolve_back(&g, &one, k ? c->frame[k - 1] : x, c->frame[k], dx, other, b->gradient + s->own[k],
+                          b->gradient + s->mean[k], b->gradient + s->bias[k], c->frame[2 * s->convolutions + 2]);
+        net_lanes *swap = dx;
+        dx = other, other = swap;
+    }
+    if (dx != b->dinput) memcpy(b->dinput, dx, s->numbers * sizeof *dx);
+}
+
+/* The gradients of the recurrent layers, and of the output of coordinates, over all steps at once. */
+static void finish(backward *b)
+{
+    net_chains *c = b->c;
+    const vgi_shape *s = c->shape;
+    size_t steps = c->steps - 1, h = s->hidden, k = steps * NET_LANES;
+    if (s->front == VGI_FRONT_MESH) settle(s, &b->w, b->gradient); /* its work is where the next is */
+    for (size_t l = 0; l < s->layers; l++) {
+        size_t rows = input_rows(s, l);
+        real *in = c->pack, *out = in + rows * k;
+        pack_rows(c->input[l], rows, rows, steps, in);
+        pack_rows(c->gates[l], 4 * h, 4 * h, steps, out);
+        NET_GEMM(false, true, rows, 4 * h, k, in, k, out, k, 1, b->gradient + s->gates[l], 4 * h);
+        add_sums(c->gates[l], 4 * h, 4 * h, steps, b->gradient + s->gates_bias[l]);
+    }
+    if (s->front == VGI_FRONT_MESH) return;
+    real *top = c->pack, *out = top + h * k;
+    pack_rows(c->top, h, h, steps, top);
+    pack_rows(c->latent, s->numbers, s->numbers, steps, out);
+    NET_GEMM(false, true, h, s->numbers, k, top, k, out, k, 1, b->gradient + s->full, s->numbers);
+    add_sums(c->latent, s->numbers, s->numbers, steps, b->gradient + s->full_bias);
+}
+
+static void prepare(backward *b)
+{
+    net_chains *c = b->c;
+    const vgi_shape *s = c->shape;
+    size_t wide = most(s->latent, 4 * s->hidden), last = frames_of(s);
+    b->dlatent = c->row + wide, b->dspread = c->row + 2 * wide;
+    net_lanes *states = c->row + 3 * wide; /* layers * 2 * hidden <= 4 * wide */
+    for (size_t l = 0; l < s->layers; l++) {
+        b->dh[l] = states + 2 * l * s->hidden, b->dc[l] = b->dh[l] + s->hidden;
+        memset(b->dh[l], 0, 2 * s->hidden * sizeof *states);
+    }
+    b->dstate = c->frame[last - 3], b->dinput = c->frame[last - 4];
+    if (s->front != VGI_FRONT_MESH) return;
+    size_t columns = PACK * NET_LANES;
+    b->w = (waiting){.in = c->pack, .out = c->pack + s->numbers * columns};
+    b->w.latent = b->w.out + s->numbers * columns;
+    b->w.top = b->w.latent + s->latent * columns, b->w.spread = b->w.top + s->latent * columns;
+}
+
+/* What frame t has of frame t + 1 and, through a skeleton, of frame t + 2: from b->dstate and `later`. */
+static void pass_back(backward *b, size_t t, const net_lanes *later, net_lanes *to)
+{
+    size_t n = b->c->shape->numbers;
+    for (size_t k = 0; k < n; k++) to[k] = b->dstate[k] + b->dinput[k];
+    for (int back = 0; b->d->skeleton && back < 2; back++) {
+        const net_skeleton *s = &b->d->skeleton[back];
+        add_way(b->d, back, t ? s->sum : s->turn, false, b->dstate, 1, to);
+        if (later) add_way(b->d, back, s->change, false, later, -1, to);
+    }
+}
+
+void net_chains_backward(net_chains *c, const net_drive *d, void (*pull)(void *context, size_t t, net_lanes *g),
+                         void *context, double divergence, const net_lanes *shares, real *gradient, net_lanes *start)
+{
+    const vgi_shape *s = c->shape;
+    backward b = {.c = c, .d = d, .gradient = gradient, .divergence = divergence, .shares = shares};
+    prepare(&b);
+    size_t n = s->numbers, last = frames_of(s);
+    net_lanes *from_behind = c->frame[last - 5], *later = c->frame[last - 6], *dtop = c->row;
+    memset(from_behind, 0, n * sizeof *from_behind);
+    for (size_t t = c->steps - 1; t-- > 0;) {
+        if (t + 2 < c->steps) memcpy(later, b.dstate, n * sizeof *later);
+        memcpy(b.dstate, from_behind, n * sizeof *from_behind);
+        pull(context, t + 1, b.dstate);
+        decode_back(&b, t, dtop);
+        recur_back(&b, t, dtop);
+        encode_back(&b, t, input(c, d, t, c->frame[last - 1]));
+        if (t && t >= d->given) pass_back(&b, t, t + 2 < c->steps ? later : NULL, from_behind);
+        else memset(from_behind, 0, n * sizeof *from_behind);
+    }
+    finish(&b);
+    for (size_t l = 0; start && l < s->layers; l++)
+        memcpy(start + 2 * l * s->hidden, b.dh[l], 2 * s->hidden * sizeof *start);
+}

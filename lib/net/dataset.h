@@ -1,0 +1,60 @@
+/* dataset.h: the frames that a network is trained on: features of sequences, what is held out, principal coordinates.
+ * Internal. Leaves out training.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_DATASET_H
+#define VG_DATASET_H
+
+#include "net/network.h"
+#include "net/regression.h"
+
+/* A run of frames: first .. end - 1. */
+typedef struct vgi_span {
+    size_t first, end, sequence; /* sequence: the first frame of the sequence that it belongs to */
+} vgi_span;
+
+typedef struct vgi_spans {
+    size_t n, cap;
+    vgi_span *at;
+} vgi_spans;
+
+typedef struct vgi_dataset {
+    size_t nv, parts, d, n;   /* d: numbers of a frame, nv * width */
+    size_t main_part;         /* the largest component */
+    double diagonal;
+    float *features;          /* n x d: as vg_featurer gives them, lengths in D */
+    float *home;              /* n x nv x 3: poses without root, each part's centroid at 0 */
+    double *roots, *centroids; /* n x 4, n x parts x 3 */
+    size_t features_cap, home_cap, roots_cap, centroids_cap, sequences_cap;
+    size_t nsequences;
+    size_t *sequence;         /* first frame of each */
+    uint64_t digest;
+    size_t repeated;          /* poses that were left out */
+    /* after vgi_dataset_divide */
+    vgi_spans train, held;
+    /* after vgi_dataset_find_coordinates */
+    size_t rank;
+    double *coordinates;      /* n x rank */
+    double sigma;             /* standard deviation of the first coordinate */
+} vgi_dataset;
+
+/* vgi_dataset_add: a frame behind the last one. vertices: nv points. */
+int vgi_dataset_add(vgi_dataset *s, const double *features, size_t width, const double *root, const double *centroids,
+                    const double *home, vg_err *e) VG_MUST_CHECK;
+int vgi_dataset_cut(vgi_dataset *s, vg_err *e) VG_MUST_CHECK; /* another sequence begins */
+void vgi_dataset_clear(vgi_dataset *s);
+
+/* vgi_dataset_divide: every so manieth frame becomes a sequence of its own; a share of each sequence, at its end or from
+ * frame hold_at on, is held out. */
+int vgi_dataset_divide(vgi_dataset *s, size_t step, double hold, size_t hold_at, vg_err *e) VG_MUST_CHECK;
+/* vgi_dataset_find_coordinates: range and change of n's features, mean, basis, scales, range of the coordinates, root;
+ * of the frames in s->train. VG_EINPUT with fewer than 4. */
+int vgi_dataset_find_coordinates(vgi_dataset *s, vg_network *n, size_t most, int threads, vg_err *e) VG_MUST_CHECK;
+/* vgi_dataset_normalised: frame i as n learns it. */
+void vgi_dataset_normalised(const vgi_dataset *s, const vg_network *n, size_t i, double *x);
+
+int vgi_spans_add(vgi_spans *s, vgi_span span, vg_err *e) VG_MUST_CHECK;
+size_t vgi_spans_frames(const vgi_spans *s);
+/* vgi_spans_frames_of: coordinates of all frames of some spans, and where each begins: free(row), free(start). */
+int vgi_spans_coordinates(const vgi_spans *spans, const vgi_dataset *s, vgi_frames *f, vg_err *e) VG_MUST_CHECK;
+
+#endif

@@ -1,0 +1,439 @@
+/* feature_kernel.c: deformation gradients of rings, their rotations and stretches, and the reconstruction from them,
+ * for eight poses at once: two vectors of four, which every instruction set from AVX2 on holds in registers.
+ * Leaves out what is done once (rings.c) and the choice of branches (branch.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "net/feature_kernel.h"
+#include "numeric/polar.h"
+#include "numeric/vec3.h"
+
+#include <stdlib.h>
+
+#define INLINE static inline __attribute__((always_inline))
+/* as in core/wide.h, whose names vec3.h has for single points */
+#define JOINED(name, set) name##_##set
+#define JOIN(name, set) JOINED(name, set)
+#define OF_SET(name) JOIN(name, VGI_SET)
+
+typedef double four __attribute__((vector_size(32), may_alias));
+typedef int64_t four_mask __attribute__((vector_size(32)));
+enum { HALVES = 2, FOUR = 4 };
+
+INLINE four *half(vgi_lanes *p, int h)
+{
+    return (four *)p + h;
+}
+INLINE const four *half_of(const vgi_lanes *p, int h)
+{
+    return (const four *)p + h;
+}
+/* to += by * x, eight lanes */
+INLINE void add(vgi_lanes *to, double by, const vgi_lanes *x)
+{
+    for (int h = 0; h < HALVES; h++) *half(to, h) += by * *half_of(x, h);
+}
+INLINE four roots(four a)
+{
+    for (int i = 0; i < FOUR; i++) a[i] = __builtin_sqrt(a[i]);
+    return a;
+}
+
+/* ---- measuring ---- */
+
+INLINE void load_points(const vgi_rings *r, vgi_feature_block *b, const double *const *poses)
+{
+    for (size_t v = 0; v < r->nv; v++)
+        for (size_t k = 0; k < 3; k++)
+            for (size_t i = 0; i < VGI_LANES; i++) b->point[v].xyz[k][i] = poses[i][3 * v + k];
+}
+
+INLINE void add_normals(const vgi_rings *r, vgi_feature_block *b)
+{
+    memset(b->normal, 0, r->nv * sizeof *b->normal);
+    for (size_t t = 0; t < r->ntriangles; t++) {
+        const uint32_t *c = r->triangle + 3 * t;
+        for (int h = 0; h < HALVES; h++) {
+            four u[3], v[3];
+            for (int k = 0; k < 3; k++) {
+                four p = *half(&b->point[c[0]].xyz[k], h);
+                u[k] = *half(&b->point[c[1]].xyz[k], h) - p, v[k] = *half(&b->point[c[2]].xyz[k], h) - p;
+            }
+            for (int k = 0; k < 3; k++) {
+                int l = k == 2 ? 0 : k + 1, m = k == 0 ? 2 : k - 1;
+                four n = u[l] * v[m] - u[m] * v[l];
+                for (int j = 0; j < 3; j++) *half(&b->normal[c[j]].xyz[k], h) += n;
+            }
+        }
+    }
+}
+
+/* D of one vertex in four poses */
+INLINE void ring_gradient(const vgi_rings *r, vgi_feature_block *b, size_t v, int h, four *d)
+{
+    four p[3], n[3], n2 = {0};
+    for (int k = 0; k < 3; k++) {
+        p[k] = *half(&b->point[v].xyz[k], h), n[k] = *half(&b->normal[v].xyz[k], h);
+        n2 += n[k] * n[k];
+    }
+    four length = roots(n2);
+    for (int i = 0; i < FOUR; i++) length[i] = length[i] > 0 ? 1 / length[i] : 0;
+    for (int k = 0; k < 3; k++)
+        for (int j = 0; j < 3; j++) d[3 * k + j] = n[k] * length * r->across[3 * v + (size_t)j];
+    for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++) {
+        const double *g = r->gradient + 3 * (size_t)i;
+        vgi_row *to = &b->point[r->to[i]];
+        for (int k = 0; k < 3; k++) {
+            four edge = p[k] - *half(&to->xyz[k], h);
+            for (int j = 0; j < 3; j++) d[3 * k + j] += edge * g[j];
+        }
+    }
+}
+
+INLINE four cofactors(const four *x, four *c)
+{
+    c[0] = x[4] * x[8] - x[5] * x[7], c[1] = x[5] * x[6] - x[3] * x[8], c[2] = x[3] * x[7] - x[4] * x[6];
+    c[3] = x[2] * x[7] - x[1] * x[8], c[4] = x[0] * x[8] - x[2] * x[6], c[5] = x[1] * x[6] - x[0] * x[7];
+    c[6] = x[1] * x[5] - x[2] * x[4], c[7] = x[2] * x[3] - x[0] * x[5], c[8] = x[0] * x[4] - x[1] * x[3];
+    return x[0] * c[0] + x[1] * c[1] + x[2] * c[2];
+}
+
+INLINE four squares(const four *x)
+{
+    four s = {0};
+    for (int i = 0; i < 9; i++) s += x[i] * x[i];
+    return s;
+}
+
+/* Where Newton's iteration is not for d: flat, thin or inside out. */
+static void fit_one(const four *d, int lane, four *x)
+{
+    double one[9], turned[9];
+    for (int i = 0; i < 9; i++) one[i] = d[i][lane];
+    vgi_fit_rotation(one, turned);
+    for (int i = 0; i < 9; i++) x[i][lane] = turned[i];
+}
+
+/* the rotations nearest to four matrices */
+INLINE void polar(const four *d, four *x)
+{
+    enum { MOST = 16, SCALED = 3 };
+    static const double thin = 5.2e-3;
+    four c[9], shrink = squares(d);
+    for (int i = 0; i < FOUR; i++) shrink[i] = shrink[i] > 0 ? 3 / shrink[i] : 0;
+    shrink = roots(shrink);
+    for (int i = 0; i < 9; i++) x[i] = d[i] * shrink;
+    four_mask good = cofactors(x, c) > thin;
+    for (int i = 0; i < 9; i++)
+        for (int k = 0; k < FOUR; k++) x[i][k] = good[k] ? x[i][k] : i % 4 == 0;
+    four_mask going = {-1, -1, -1, -1};
+    for (int step = 0; step < MOST; step++) {
+        four det = cofactors(x, c), a = {0}, by, change = {0};
+        a += 0.5, by = 0.5 / det;
+        if (step < SCALED) {
+            four g = roots(roots(squares(c) / squares(x)) / det);
+            a = 0.5 * g, by = 0.5 / (g * det);
+        }
+        for (int i = 0; i < 9; i++) {
+            four y = a * x[i] + by * c[i];
+            change += (y - x[i]) * (y - x[i]);
+            x[i] = (four)((going & (four_mask)y) | (~going & (four_mask)x[i]));
+        }
+        /* quadratic: what is left is below 1e-15. Each lane stops by itself: bits do not depend on its neighbours. */
+        if (step >= SCALED) going &= change >= 1e-15;
+        if (!(going[0] | going[1] | going[2] | going[3])) break;
+    }
+    for (int k = 0; k < FOUR; k++)
+        if (!good[k]) fit_one(d, k, x);
+}
+
+/* d := x times the symmetric part of x' d, which is all that features say of it */
+INLINE void symmetrise(const four *x, four *d)
+{
+    four s[9];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) s[3 * i + k] = x[i] * d[k] + x[3 + i] * d[3 + k] + x[6 + i] * d[6 + k];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < i; k++) s[3 * i + k] = s[3 * k + i] = 0.5 * (s[3 * i + k] + s[3 * k + i]);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) d[3 * i + k] = x[3 * i] * s[k] + x[3 * i + 1] * s[3 + k] + x[3 * i + 2] * s[6 + k];
+}
+
+static void measure(const vgi_rings *r, vgi_feature_block *b, const double *const *poses)
+{
+    load_points(r, b, poses);
+    add_normals(r, b);
+    for (size_t v = 0; v < r->nv; v++)
+        for (int h = 0; h < HALVES; h++) {
+            four d[9], x[9];
+            ring_gradient(r, b, v, h, d);
+            polar(d, x);
+            if (r->is_open[v]) {
+                const double *open = r->open + 9 * v;
+                for (int i = 0; i < 3; i++)
+                    for (int k = 0; k < 3; k++)
+                        for (int j = 0; j < 3; j++) d[3 * i + k] += x[3 * i + j] * open[3 * j + k];
+            }
+            symmetrise(x, d);
+            for (size_t i = 0; i < 9; i++) {
+                *half(&b->gradient[9 * v + i], h) = d[i];
+                *half(&b->turn[9 * v + i], h) = x[i];
+            }
+        }
+}
+
+/* ---- reconstruction ---- */
+
+/* x := sum over edges of weight / 2 (D_v + D_to) (r_v - r_to) */
+INLINE void load_sides(const vgi_rings *r, vgi_feature_block *b)
+{
+    for (size_t v = 0; v < r->nv; v++) {
+        if (r->part[v] < 0) continue;
+        for (int h = 0; h < HALVES; h++) {
+            const vgi_lanes *own = b->gradient + 9 * v;
+            four s[3] = {{0}, {0}, {0}};
+            for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++) {
+                const vgi_lanes *other = b->gradient + 9 * (size_t)r->to[i];
+                double share = 0.5 * r->weight[i];
+                for (int k = 0; k < 3; k++)
+                    for (int j = 0; j < 3; j++)
+                        s[k] += (share * r->edge[3 * (size_t)i + (size_t)j]) *
+                                (*half_of(&own[3 * k + j], h) + *half_of(&other[3 * k + j], h));
+            }
+            for (int k = 0; k < 3; k++) *half(&b->x[r->row[v]].xyz[k], h) = s[k];
+        }
+    }
+}
+
+/* per part the sum of a row per vertex, over the size of the part */
+static void means(const vgi_rings *r, const vgi_row *row, vgi_row *sum)
+{
+    memset(sum, 0, r->nparts * sizeof *sum);
+    for (size_t v = 0; v < r->nv; v++)
+        for (int k = 0; k < 3 && r->part[v] >= 0; k++) add(&sum[r->part[v]].xyz[k], 1, &row[v].xyz[k]);
+    for (size_t p = 0; p < r->nparts; p++)
+        for (int k = 0; k < 3; k++) add(&sum[p].xyz[k], 1 / (double)r->part_size[p] - 1, &sum[p].xyz[k]);
+}
+
+/* b->normal: the points that fit the gradients, those of each part moved so that the part's centre is at 0 */
+static void reconstruct(const vgi_rings *r, vgi_feature_block *b)
+{
+    vgi_factor_solve(&r->factor, b->x);
+    for (size_t v = 0; v < r->nv; v++)
+        if (r->part[v] >= 0) b->normal[v] = b->x[r->row[v]];
+        else memset(&b->normal[v], 0, sizeof b->normal[v]);
+}
+
+/* ---- features out ---- */
+
+/* the rotation vector of a rotation matrix, |w| <= pi */
+static void log_rotation(const double m[9], double w[3])
+{
+    double q[4], l[4];
+    vg_quat_from_matrix(m, q);
+    if (q[0] < 0)
+        for (int k = 0; k < 4; k++) q[k] = -q[k];
+    double u = sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    l[0] = u > 0 ? 2 * atan2(u, q[0]) / u : 0;
+    for (int k = 0; k < 3; k++) w[k] = l[0] * q[k + 1];
+}
+
+static void put_turn(const vgi_feature_block *b, const vgi_lanes *turn, size_t lane, double w[3])
+{
+    const double *g = b->root[lane];
+    double m[9];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            m[3 * i + k] = g[i] * turn[k][lane] + g[3 + i] * turn[3 + k][lane] + g[6 + i] * turn[6 + k][lane];
+    log_rotation(m, w);
+}
+
+INLINE void put_vertex(const vgi_rings *r, const vgi_feature_block *b, size_t v, size_t width, double *const *values)
+{
+    static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
+    const vgi_lanes *t = b->turn + 9 * v, *d = b->gradient + 9 * v;
+    vgi_lanes out[9];
+    for (int i = 0; i < 6; i++) {
+        int a = row[i], c = column[i];
+        for (int h = 0; h < HALVES; h++) {
+            four one = {0}, other = {0};
+            for (int j = 0; j < 3; j++) {
+                one += *half_of(&t[3 * j + a], h) * *half_of(&d[3 * j + c], h);
+                other += *half_of(&t[3 * j + c], h) * *half_of(&d[3 * j + a], h);
+            }
+            *half(&out[i], h) = 0.5 * (one + other);
+        }
+    }
+    for (int k = 0; k < 3 && width == VGI_TWELVE; k++)
+        for (int h = 0; h < HALVES; h++) {
+            four s = {0};
+            for (int j = 0; j < 3; j++)
+                s += *half_of(&t[3 * j + k], h) *
+                     (*half_of(&b->point[v].xyz[j], h) - *half_of(&b->normal[v].xyz[j], h));
+            *half(&out[6 + k], h) = s;
+        }
+    for (size_t lane = 0; lane < VGI_LANES; lane++) {
+        double *to = values[lane] + width * v;
+        put_turn(b, t, lane, to);
+        for (size_t i = 3; i < width; i++) to[i] = out[i - 3][lane];
+    }
+    (void)r;
+}
+
+/* A vertex in no face rides with the root: no rotation of its own, no stretch, and its place in the root's frame. */
+static void put_loose(const vgi_rings *r, const vgi_feature_block *b, size_t v, size_t width, size_t lane,
+                      const double *pose, const double *rest_centre, const double *centre, double *values)
+{
+    double *to = values + width * v, far[3];
+    for (size_t i = 0; i < width; i++) to[i] = i == 3 || i == 6 || i == 8;
+    if (width == VGI_NINE) return;
+    for (size_t k = 0; k < 3; k++) far[k] = pose[3 * v + k] - centre[k];
+    for (size_t k = 0; k < 3; k++) {
+        const double *g = b->root[lane];
+        to[9 + k] = g[k] * far[0] + g[3 + k] * far[1] + g[6 + k] * far[2] - (r->reference[3 * v + k] - rest_centre[k]);
+    }
+}
+
+static void rest_centre(const vgi_rings *r, double centre[3])
+{
+    centre[0] = centre[1] = centre[2] = 0;
+    for (size_t v = 0; v < r->nv; v++)
+        for (size_t k = 0; k < 3 && r->part[v] == (int)r->main_part; k++)
+            centre[k] += r->reference[3 * v + k] / (double)r->part_size[r->main_part];
+}
+
+/* centroids out; points and reconstruction are moved so that each part's centre is at 0 */
+static void put_centroids(const vgi_rings *r, vgi_feature_block *b, bool both, double *const *centroids)
+{
+    means(r, b->point, b->sum);
+    for (size_t p = 0; p < r->nparts; p++)
+        for (size_t lane = 0; lane < VGI_LANES; lane++)
+            for (size_t k = 0; k < 3; k++) centroids[lane][3 * p + k] = b->sum[p].xyz[k][lane];
+    if (!both) return;
+    for (int pass = 0; pass < 2; pass++) {
+        vgi_row *row = pass ? b->normal : b->point;
+        if (pass) means(r, row, b->sum);
+        for (size_t v = 0; v < r->nv; v++)
+            for (int k = 0; k < 3 && r->part[v] >= 0; k++) add(&row[v].xyz[k], -1, &b->sum[r->part[v]].xyz[k]);
+    }
+}
+
+/* What a ring says nothing about turns as the root does: so the features of a pose that is turned stay as they are. */
+static const double leaning = 1e-3;
+
+static void close_open_rings(const vgi_rings *r, vgi_feature_block *b)
+{
+    for (size_t v = 0; v < r->nv; v++)
+        for (size_t lane = 0; r->is_open[v] && lane < VGI_LANES; lane++) {
+            const double *open = r->open + 9 * v, *g = b->root[lane];
+            double d[9], seen[9], back[9], turned[9];
+            for (size_t i = 0; i < 9; i++) d[i] = b->gradient[9 * v + i][lane], back[i] = g[3 * (i % 3) + i / 3];
+            vgi_multiply(d, open, seen);
+            for (int i = 0; i < 9; i++) d[i] -= seen[i];
+            vgi_multiply(back, d, turned);
+            double size = sqrt(vgi_dot(d, d) + vgi_dot(d + 3, d + 3) + vgi_dot(d + 6, d + 6));
+            for (int i = 0; i < 9; i += 4) turned[i] += leaning * size; /* towards no turn beside the root */
+            vgi_fit_rotation(turned, seen);
+            vgi_multiply(g, seen, turned);
+            vgi_multiply(turned, open, seen);
+            four all[9], whole[9];
+            for (int i = 0; i < 9; i++) all[i] = (four){0} + turned[i], whole[i] = (four){0} + d[i] + seen[i];
+            symmetrise(all, whole);
+            for (size_t i = 0; i < 9; i++)
+                b->gradient[9 * v + i][lane] = whole[i][0], b->turn[9 * v + i][lane] = turned[i];
+        }
+}
+
+static void put(const vgi_rings *r, vgi_feature_block *b, size_t width, const double *const *poses,
+                double *const *values, double *const *centroids)
+{
+    double rest[3];
+    if (r->nopen) close_open_rings(r, b);
+    if (width == VGI_TWELVE) {
+        load_sides(r, b);
+        reconstruct(r, b);
+    }
+    put_centroids(r, b, width == VGI_TWELVE, centroids);
+    rest_centre(r, rest);
+    for (size_t v = 0; v < r->nv; v++)
+        if (r->part[v] >= 0) put_vertex(r, b, v, width, values);
+        else
+            for (size_t lane = 0; lane < VGI_LANES; lane++)
+                put_loose(r, b, v, width, lane, poses[lane], rest, centroids[lane] + 3 * r->main_part, values[lane]);
+}
+
+/* ---- and back ---- */
+
+static void exp_rotation(const double w[3], double m[9])
+{
+    double angle = vgi_length(w), s = angle > 0 ? sin(angle) / angle : 1, half_sine = sin(angle / 2);
+    double c = angle > 0 ? 2 * half_sine * half_sine / (angle * angle) : 0.5;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) m[3 * i + k] = c * w[i] * w[k];
+    double diagonal = 1 - c * angle * angle;
+    m[0] += diagonal, m[4] += diagonal, m[8] += diagonal;
+    m[1] -= s * w[2], m[2] += s * w[1], m[3] += s * w[2];
+    m[5] -= s * w[0], m[6] -= s * w[1], m[7] += s * w[0];
+}
+
+static void take_turn(const vgi_feature_block *b, const double w[3], size_t lane, vgi_lanes *turn)
+{
+    double m[9];
+    exp_rotation(w, m);
+    vgi_multiply(b->root[lane], m, m);
+    for (size_t i = 0; i < 9; i++) turn[i][lane] = m[i];
+}
+
+/* D = R S of a vertex; what is left goes into b->point */
+INLINE void take_vertex(vgi_feature_block *b, size_t v, size_t width, const double *const *values)
+{
+    static const int at[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
+    vgi_lanes in[9], *t = b->turn + 9 * v, *d = b->gradient + 9 * v;
+    memset(in, 0, sizeof in);
+    for (size_t lane = 0; lane < VGI_LANES; lane++) {
+        const double *from = values[lane] + width * v;
+        take_turn(b, from, lane, t);
+        for (size_t i = 3; i < width; i++) in[i - 3][lane] = from[i];
+    }
+    for (int h = 0; h < HALVES; h++)
+        for (int i = 0; i < 3; i++) {
+            four left = {0};
+            for (int k = 0; k < 3; k++) {
+                four s = {0};
+                for (int j = 0; j < 3; j++) s += *half_of(&t[3 * i + j], h) * *half_of(&in[at[3 * j + k]], h);
+                *half(&d[3 * i + k], h) = s;
+                left += *half_of(&t[3 * i + k], h) * *half_of(&in[6 + k], h);
+            }
+            *half(&b->point[v].xyz[i], h) = left;
+        }
+}
+
+static void place(const vgi_rings *r, const vgi_feature_block *b, const double rest[3], size_t lane,
+                  const double *centroids, double *vertices)
+{
+    const double *root = centroids + 3 * r->main_part;
+    for (size_t v = 0; v < r->nv; v++) {
+        int part = r->part[v];
+        double home[3] = {0, 0, 0}, turned[3];
+        for (size_t k = 0; k < 3; k++) home[k] = r->reference[3 * v + k] - rest[k];
+        if (part < 0) vgi_multiply_vector(b->root[lane], home, turned);
+        for (size_t k = 0; k < 3; k++)
+            vertices[3 * v + k] = part < 0 ? root[k] + turned[k] + b->point[v].xyz[k][lane]
+                                           : centroids[3 * part + (int)k] + b->normal[v].xyz[k][lane] -
+                                                 b->sum[part].xyz[k][lane];
+    }
+}
+
+static void back(const vgi_rings *r, vgi_feature_block *b, size_t width, const double *const *values,
+                 const double *const *centroids, double *const *vertices, size_t lanes)
+{
+    double rest[3];
+    for (size_t v = 0; v < r->nv; v++) take_vertex(b, v, width, values);
+    load_sides(r, b);
+    reconstruct(r, b);
+    for (size_t v = 0; v < r->nv; v++)
+        for (int k = 0; k < 3; k++) add(&b->normal[v].xyz[k], 1, &b->point[v].xyz[k]);
+    means(r, b->normal, b->sum);
+    rest_centre(r, rest);
+    for (size_t lane = 0; lane < lanes; lane++) place(r, b, rest, lane, centroids[lane], vertices[lane]);
+}
+
+const vgi_feature_kernel OF_SET(vgi_feature_kernel) = {measure, put, back};

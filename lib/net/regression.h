@@ -1,0 +1,54 @@
+/* regression.h: the linear part of a sequence's next frame (MATH 12): c+ = c + c turn + (c - before) change + shift,
+ * pulled towards damped continuation, and made stable.
+ * Internal.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_REGRESSION_H
+#define VG_REGRESSION_H
+
+#include "core/core.h"
+
+/* Frames of a few sequences: rows of `numbers`; sequence i is rows start[i] .. start[i + 1] - 1. */
+typedef struct vgi_frames {
+    size_t numbers, n, nsequences;
+    const double *row;
+    const size_t *start; /* nsequences + 1 */
+} vgi_frames;
+
+typedef struct vgi_regression {
+    size_t numbers;
+    double *turn, *change; /* numbers x numbers */
+    double *shift;
+    double *first, *first_shift; /* where there is no frame before: c+ = c + c first + first_shift */
+} vgi_regression;
+
+/* the size of the one block that all of it lies in, from turn on */
+static inline size_t vgi_regression_size(size_t numbers)
+{
+    return 3 * numbers * numbers + 2 * numbers;
+}
+/* vgi_regression_view: of such a block, borrowed. */
+static inline vgi_regression vgi_regression_view(size_t n, double *block)
+{
+    return (vgi_regression){n, block, block + n * n, block + 2 * n * n, block + 2 * n * n + n, block + 3 * n * n + n};
+}
+
+int vgi_regression_make(vgi_regression *r, size_t numbers, vg_err *e) VG_MUST_CHECK;
+void vgi_regression_clear(vgi_regression *r);
+
+/* vgi_regression_fit: least squares over all frames with two before them. back: frames in the order of falling time.
+ * size: what coordinates are divided by; ridge: weight of the pull; damping: g, of the continuation that it is pulled
+ * to. The spectral radius is brought to 1.0005. O(frames numbers^2 + numbers^3). */
+int vgi_regression_fit(vgi_regression *r, const vgi_frames *f, bool back, double size, double ridge, double damping,
+                       vg_err *e) VG_MUST_CHECK;
+
+typedef struct vgi_choice {
+    double ridge, damping, error; /* error: mean distance per frame where it was tried */
+} vgi_choice;
+/* vgi_regression_choose: the ridge and damping that continue the frames `tried` best after a fit to `fitted`. */
+int vgi_regression_choose(const vgi_frames *fitted, const vgi_frames *tried, double size, int threads,
+                          vgi_choice *choice, vg_err *e) VG_MUST_CHECK;
+
+/* vgi_regression_next: next (numbers) from c and the frame before it; NULL: there is none. */
+void vgi_regression_next(const vgi_regression *r, const double *c, const double *before, double *next);
+
+#endif

@@ -1,0 +1,47 @@
+/* runner.h: a network at work: given some frames it goes on, eight chains at once, one frame at a time.
+ * Internal. Leaves out features and vertices.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_RUNNER_H
+#define VG_RUNNER_H
+
+#include "net/chain.h"
+#include "net/network.h"
+#include "net/regression.h"
+
+enum { VGI_SHORT_RUN = 24, VGI_LONG_GIVEN = 8, VGI_LONG_STEP = 4 };
+
+typedef struct vgi_runner {
+    const vg_network *net;    /* borrowed; its numbers may change between runs */
+    vgi_shape shape;
+    net_drive drive;
+    net_skeleton skeleton[2];
+    float *scale, *matrices;  /* as the layers take them */
+    vgi_regression backward, forward; /* views of net->regression */
+    net_chains chains;        /* of two steps: this one and the next */
+    net_lanes *start;         /* initial states */
+    net_lanes *now, *before, *next; /* numbers each */
+    bool begun, waiting, back; /* waiting: r->now has not been stepped from */
+} vgi_runner;
+
+/* vgi_runner_make: first, to: neighbours of each vertex, borrowed. steps: of the chains, >= 2. */
+int vgi_runner_make(vgi_runner *r, const vg_network *n, const uint32_t *first, const uint32_t *to, size_t steps,
+                    vg_err *e) VG_MUST_CHECK;
+void vgi_runner_clear(vgi_runner *r);
+
+/* vgi_runner_states: initial states of all lanes: value, or with `random` value * normal numbers of that seed. */
+void vgi_runner_states(vgi_runner *r, double value, bool random, uint64_t seed);
+/* vgi_runner_begin: forget what was; which way from now on. */
+void vgi_runner_begin(vgi_runner *r, bool back);
+/* vgi_runner_take: the next given frame of all lanes (numbers rows). */
+void vgi_runner_take(vgi_runner *r, const net_lanes *frame);
+/* vgi_runner_give: the next frame that the network gives; borrowed until the next call. */
+const net_lanes *vgi_runner_give(vgi_runner *r);
+/* vgi_runner_reach_back: two frames that the regression, run backwards, puts before a single given one. False: the
+ * network has no regression. */
+bool vgi_runner_reach_back(const vgi_runner *r, const net_lanes *frame, net_lanes *before, net_lanes *before_that);
+
+/* vgi_runner_go: `given` frames of up to eight lanes (numbers each, frame after frame) to n more each. */
+int vgi_runner_go(vgi_runner *r, size_t lanes, size_t given, const double *const *in, size_t n, double *const *out,
+                  vg_err *e) VG_MUST_CHECK;
+
+#endif

@@ -1,0 +1,535 @@
+/* train.c: a network learns by Adam on sequences drawn from the training frames (MATH 12).
+ *
+ * How long it learns is found out beside a validation block, the last fifth of what there is; a correction of a
+ * regression then learns once more from all of it, for as long. What is random depends on the seed and the iteration
+ * alone, groups of eight chains are always the same, and their gradients are added in order: the number of threads
+ * changes no bit, and training that was interrupted goes on as if it had not been.
+ * Leaves out features (feature.c), frames (dataset.c) and the report (judge.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "net/trainer.h"
+#include "core/random.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static const double clip = 5, least_rate = 0.02, repeats = 1e-5;
+enum { VALIDATE_EVERY = 20, CHUNK = 1 << 16, ERRORS = 2 * VG_NETWORK_METHODS * VG_NETWORK_FRAMES };
+
+vg_train_options vg_train_defaults(vg_network_model m)
+{
+    vg_train_options o = {.model = m, .layers = 3, .hidden = 128, .convolutions = 3, .iterations = 300, .batch = 8,
+                          .frames = 32, .step = 1, .given_least = 3, .given_most = 8, .coordinates = 200, .hold = 0.2,
+                          .hold_at = SIZE_MAX, .rate = 1e-3, .bidirectional = 0.5, .decay = 1e-3, .seed = 1,
+                          .threads = 1};
+    if (m == VG_NETWORK_AUTO) return o;
+    o.given_least = 1, o.rate = 2e-3, o.iterations = 2500, o.coordinates = 48, o.decay = 0;
+    if (m == VG_NETWORK_PCA) return o;
+    o.decay = 2e-3, o.divergence = 0.1, o.given_least = o.given_most = 1, o.iterations = 7000, o.coordinates = 16;
+    return o;
+}
+
+/* ---- poses ---- */
+
+static int check_options(const vg_train_options *o, vg_err *e)
+{
+    if (o->model < VG_NETWORK_AUTO || o->model > VG_NETWORK_CONV || (unsigned)o->direction > VG_FORWARD)
+        return vg_fail(e, VG_EARG, "there is no such network");
+    if (!o->batch || o->frames < 3 || !o->step || !o->given_least || o->given_least > o->given_most ||
+        o->given_most >= o->frames || !o->coordinates || !(o->hold >= 0 && o->hold < 1) || !(o->rate > 0))
+        return vg_fail(e, VG_EARG, "impossible options of training");
+    return VG_OK;
+}
+
+int vg_trainer_new(vg_trainer **out, const vg_mesh *m, const double *reference, const vg_train_options *o, vg_err *e)
+{
+    *out = NULL;
+    if (check_options(o, e) < 0) return VG_EARG;
+    vg_trainer *t = *out = vgi_array(1, sizeof *t, e);
+    if (!t) return VG_ENOMEM;
+    t->o = *o;
+    vg_feature_options f = {.nine = o->nine, .threads = o->threads};
+    int code = vg_featurer_new(&t->featurer, m, reference, &f, e);
+    if (code == VG_OK) code = vg_mesh_copy(&t->mesh, m, e);
+    if (code == VG_OK && !(t->last = vgi_array(3 * m->nv, sizeof *t->last, e))) code = VG_ENOMEM;
+    if (code < 0) return vg_trainer_free(out), code;
+    vg_feature_facts facts = vg_featurer_facts(t->featurer);
+    t->data = (vgi_dataset){.nv = m->nv, .parts = facts.parts, .main_part = facts.main_part, .d = m->nv * facts.width,
+                            .diagonal = vg_diagonal(reference, m->nv)};
+    t->net = (vg_network){.model = o->model, .direction = o->direction, .mesh_digest = vg_mesh_digest(m), .nv = m->nv,
+                          .parts = facts.parts, .width = facts.width, .layers = o->layers, .hidden = o->hidden,
+                          .convolutions = o->model == VG_NETWORK_CONV ? o->convolutions : 0,
+                          .uncertain = (o->model == VG_NETWORK_FC || o->model == VG_NETWORK_CONV) && o->divergence > 0,
+                          .sets = o->direction == VG_SEPARATE ? 2 : 1, .seed = o->seed, .step = o->step,
+                          .diagonal = t->data.diagonal};
+    if (!(t->data.diagonal > 0)) {
+        code = vg_fail(e, VG_EINPUT, "the reference pose has no extent");
+        vg_trainer_free(out);
+    }
+    return code;
+}
+
+static void clear_phase(vg_trainer *t)
+{
+    for (size_t i = 0; t->groups && i < t->ngroups; i++) net_group_clear(&t->groups[i]);
+    for (size_t i = 0; t->gradient && i < t->at_once; i++) free(t->gradient[i]);
+    for (int w = 0; w < 2; w++) vgi_regression_clear(&t->regression[w]);
+    free(t->fitted.at);
+    free(t->tried.at);
+    free(t->window);
+    free(t->groups);
+    free(t->gradient);
+    free(t->total);
+    vgi_runner_clear(&t->runner);
+    t->fitted = t->tried = (vgi_spans){0};
+    t->window = NULL, t->groups = NULL, t->gradient = NULL, t->total = NULL;
+    t->nwindows = t->ngroups = t->at_once = 0;
+}
+
+void vg_trainer_free(vg_trainer **out)
+{
+    vg_trainer *t = *out;
+    if (!t) return;
+    clear_phase(t);
+    vg_network_clear(&t->net);
+    vgi_dataset_clear(&t->data);
+    vg_mesh_clear(&t->mesh);
+    vg_featurer_free(&t->featurer);
+    free(t->last);
+    free(t->frames);
+    free(t->moments);
+    free(t->best);
+    free(t);
+    *out = NULL;
+}
+
+/* the pose without its root: each component's centroid at 0 */
+static void bring_home(const vg_trainer *t, const double *pose, const double *root, const double *centroids,
+                       double *home)
+{
+    const vgi_rings *r = vgi_featurer_rings(t->featurer);
+    const double back[4] = {root[0], -root[1], -root[2], -root[3]};
+    for (size_t v = 0; v < r->nv; v++) {
+        size_t part = r->part[v] < 0 ? r->main_part : (size_t)r->part[v];
+        double x[3];
+        for (size_t k = 0; k < 3; k++) x[k] = pose[3 * v + k] - centroids[3 * part + k];
+        vg_quat_apply(back, x, home + 3 * v);
+    }
+}
+
+static bool is_repeated(const vg_trainer *t, const double *pose)
+{
+    double sum = 0;
+    for (size_t v = 0; v < t->mesh.nv; v++) {
+        double far = 0;
+        for (size_t k = 3 * v; k < 3 * v + 3; k++) far += (pose[k] - t->last[k]) * (pose[k] - t->last[k]);
+        sum += sqrt(far);
+    }
+    return t->begun && sum < repeats * t->data.diagonal * (double)t->mesh.nv;
+}
+
+static int add_one(vg_trainer *t, const double *pose, double *room, vg_err *e)
+{
+    double *values = room, *root = values + t->data.d, *centroids = root + 4, *home = centroids + 3 * t->data.parts;
+    if (is_repeated(t, pose)) {
+        t->data.repeated++;
+        return VG_OK;
+    }
+    if (!t->begun) vg_featurer_restart(t->featurer);
+    if (t->cut && vgi_dataset_cut(&t->data, e) < 0) return VG_ENOMEM;
+    t->begun = true, t->cut = false;
+    memcpy(t->last, pose, 3 * t->mesh.nv * sizeof *pose);
+    int code = vg_featurer_measure(t->featurer, 1, &pose, &values, &root, &centroids, e);
+    if (code < 0) return code;
+    bring_home(t, pose, root, centroids, home);
+    return vgi_dataset_add(&t->data, values, t->net.width, root, centroids, home, e);
+}
+
+int vg_trainer_add(vg_trainer *t, size_t n, const double *const *poses, vg_err *e)
+{
+    double *room = vgi_array_raw(t->data.d + 4 + 3 * t->data.parts + 3 * t->mesh.nv, sizeof *room, e);
+    int code = room ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; code == VG_OK && i < n; i++) code = add_one(t, poses[i], room, e);
+    free(room);
+    return code;
+}
+
+void vg_trainer_cut(vg_trainer *t)
+{
+    t->begun = false;
+    t->cut = true;
+}
+
+/* ---- a phase ---- */
+
+/* The last fifth of each span, at least six frames, is tried; nothing when that leaves too few. */
+static int choose_block(vg_trainer *t, bool validate, vg_err *e)
+{
+    enum { LEAST_TRIED = 6, LEAST_FITTED = 12 };
+    for (size_t i = 0; i < t->data.train.n; i++) {
+        vgi_span s = t->data.train.at[i], rest = s;
+        size_t length = s.end - s.first, block = length / 5 < LEAST_TRIED ? LEAST_TRIED : length / 5;
+        if (!validate || length < block + LEAST_FITTED) block = 0;
+        s.end -= block, rest.first = s.end;
+        if (vgi_spans_add(&t->fitted, s, e) < 0 || vgi_spans_add(&t->tried, rest, e) < 0) return VG_ENOMEM;
+    }
+    return VG_OK;
+}
+
+/* Ridge and damping by the validation block, once; the regressions of both directions by what is learned from. */
+static int fit_regressions(vg_trainer *t, vg_err *e)
+{
+    vgi_frames fitted, tried;
+    vgi_choice choice;
+    int code = vgi_spans_coordinates(&t->fitted, &t->data, &fitted, e);
+    if (code < 0) return code;
+    if (!t->net.damping) {
+        code = vgi_spans_coordinates(&t->tried, &t->data, &tried, e);
+        if (code == VG_OK) {
+            code = vgi_regression_choose(&fitted, &tried, t->data.sigma, t->o.threads, &choice, e);
+            free((void *)tried.row);
+            free((void *)tried.start);
+        }
+        if (code == VG_OK) t->net.ridge = choice.ridge, t->net.damping = choice.damping;
+    }
+    vgi_blas_alone();
+    for (int back = 0; code == VG_OK && back < 2; back++) {
+        code = vgi_regression_make(&t->regression[back], t->data.rank, e);
+        if (code == VG_OK)
+            code = vgi_regression_fit(&t->regression[back], &fitted, back, t->data.sigma, t->net.ridge, t->net.damping, e);
+    }
+    vgi_blas_shared();
+    free((void *)fitted.row);
+    free((void *)fitted.start);
+    if (code < 0 || t->o.model != VG_NETWORK_AUTO) return code;
+    size_t all = vgi_regression_size(t->data.rank);
+    if (!t->net.regression && !(t->net.regression = vgi_array(2 * all, sizeof *t->net.regression, e))) return VG_ENOMEM;
+    for (int back = 0; back < 2; back++)
+        memcpy(t->net.regression + (size_t)back * all, t->regression[back].turn, all * sizeof *t->net.regression);
+    return VG_OK;
+}
+
+static int find_windows(vg_trainer *t, vg_err *e)
+{
+    size_t longest = 0, cap = 0;
+    for (size_t i = 0; i < t->fitted.n; i++) {
+        size_t length = t->fitted.at[i].end - t->fitted.at[i].first;
+        longest = length > longest ? length : longest;
+    }
+    t->length = t->o.frames < longest ? t->o.frames : longest;
+    if (t->length <= t->o.given_least || t->length < 3)
+        return vg_fail(e, VG_EINPUT, "the longest run of frames to learn from is %zu: that is too short", longest);
+    for (size_t i = 0; i < t->fitted.n; i++)
+        for (size_t w = t->fitted.at[i].first; w + t->length <= t->fitted.at[i].end; w++) {
+            if (vgi_grow(&t->window, &cap, t->nwindows + 1, sizeof *t->window, e) < 0) return VG_ENOMEM;
+            t->window[t->nwindows++] = w;
+        }
+    return VG_OK;
+}
+
+static int make_groups(vg_trainer *t, vg_err *e)
+{
+    size_t size = vgi_group_size(t->o.direction), all = t->net.sets * t->net.nparameters;
+    t->ngroups = (t->o.batch + size - 1) / size;
+    t->at_once = (size_t)t->o.threads < t->ngroups ? (size_t)t->o.threads : t->ngroups;
+    t->groups = vgi_array(t->ngroups, sizeof *t->groups, e);
+    t->gradient = vgi_array(t->at_once, sizeof *t->gradient, e);
+    t->total = vgi_array(all, sizeof *t->total, e);
+    if (!t->groups || !t->gradient || !t->total) return VG_ENOMEM;
+    for (size_t i = 0; i < t->at_once; i++)
+        if (!(t->gradient[i] = vgi_array(all, sizeof **t->gradient, e)) ||
+            net_group_make(&t->groups[i], &t->shape, t->o.direction, t->length, e) < 0)
+            return VG_ENOMEM;
+    return VG_OK;
+}
+
+static int start_parameters(vg_trainer *t, vg_err *e)
+{
+    size_t one = t->net.nparameters, all = t->net.sets * one;
+    if (!t->net.parameters && (!(t->net.parameters = vgi_array(all, sizeof *t->net.parameters, e)) ||
+                               !(t->moments = vgi_array(2 * all, sizeof *t->moments, e)) ||
+                               !(t->best = vgi_array(all, sizeof *t->best, e))))
+        return VG_ENOMEM;
+    memset(t->moments, 0, 2 * all * sizeof *t->moments);
+    for (size_t w = 0; w < t->net.sets; w++)
+        if (vgi_shape_start(&t->shape, t->o.seed + 1000003 * w, t->o.model == VG_NETWORK_AUTO, t->net.parameters + w * one, e) < 0)
+            return VG_ENOMEM;
+    return VG_OK;
+}
+
+/* All that follows from the frames of a phase; parameters start afresh. */
+static int begin_phase(vg_trainer *t, bool validate, vg_err *e)
+{
+    const vgi_rings *r = vgi_featurer_rings(t->featurer);
+    clear_phase(t);
+    int code = choose_block(t, validate, e);
+    if (code == VG_OK) code = fit_regressions(t, e);
+    if (code == VG_OK) code = find_windows(t, e);
+    if (code == VG_OK) code = start_parameters(t, e);
+    if (code == VG_OK) code = make_groups(t, e);
+    if (code == VG_OK) code = vgi_runner_make(&t->runner, &t->net, r->first, r->to, 2, e);
+    if (code < 0) return code;
+    t->state.iteration = 0;
+    t->state.phase = validate ? 0 : 1;
+    return VG_OK;
+}
+
+/* frames as the layers see them */
+static int make_frames(vg_trainer *t, vg_err *e)
+{
+    size_t n = t->net.numbers;
+    t->frames = vgi_array_raw(t->data.n * n, sizeof *t->frames, e);
+    double *x = vgi_array_raw(t->data.d, sizeof *x, e);
+    if (!t->frames || !x) return free(x), VG_ENOMEM;
+    for (size_t i = 0; i < t->data.n; i++) {
+        if (vgi_network_is_linear(&t->net)) memcpy(x, t->data.coordinates + i * n, n * sizeof *x);
+        else vgi_dataset_normalised(&t->data, &t->net, i, x);
+        for (size_t k = 0; k < n; k++) t->frames[i * n + k] = (float)x[k];
+    }
+    free(x);
+    return VG_OK;
+}
+
+int vg_trainer_prepare(vg_trainer *t, vg_err *e)
+{
+    const vgi_rings *r = vgi_featurer_rings(t->featurer);
+    int code = vgi_dataset_divide(&t->data, t->o.step, t->o.hold, t->o.hold_at, e);
+    if (code == VG_OK) code = vgi_dataset_find_coordinates(&t->data, &t->net, t->o.coordinates, t->o.threads, e);
+    if (code < 0) return code;
+    t->net.numbers = vgi_network_is_linear(&t->net) ? t->net.rank : t->data.d;
+    t->net.data_digest = t->data.digest;
+    t->net.frames = vgi_spans_frames(&t->data.train);
+    code = vgi_network_shape(&t->net, &t->shape, e);
+    if (code < 0) return code;
+    t->shape.first = r->first, t->shape.to = r->to;
+    t->net.nparameters = t->shape.total;
+    code = make_frames(t, e);
+    if (code == VG_OK && !(t->net.errors = vgi_array(ERRORS, sizeof *t->net.errors, e))) code = VG_ENOMEM;
+    for (int i = 0; code == VG_OK && i < ERRORS; i++) t->net.errors[i] = -1;
+    if (code == VG_OK) code = begin_phase(t, true, e);
+    if (code == VG_OK && !t->tried.n) t->state.phase = 1; /* too short for a block: all of it, for as long as is asked */
+    if (code < 0) return code;
+    t->state.parameters = t->net.sets * t->net.nparameters, t->state.coordinates = t->net.rank;
+    t->state.frames = t->net.frames, t->state.held = vgi_spans_frames(&t->data.held);
+    t->state.iterations = t->o.iterations;
+    t->best_error = INFINITY;
+    t->ready = true;
+    return VG_OK;
+}
+
+/* ---- an iteration ---- */
+
+typedef struct working {
+    vg_trainer *t;
+    size_t first;  /* the group of the first buffer */
+    size_t given, *start;
+    net_loss loss[64];
+} working;
+
+static void run_group(void *context, size_t i)
+{
+    working *w = context;
+    vg_trainer *t = w->t;
+    net_group *g = &t->groups[i];
+    size_t size = vgi_group_size(t->o.direction), first = (w->first + i) * size, one = t->net.nparameters;
+    net_drive d[2];
+    float *gradient[2] = {t->gradient[i], t->gradient[i] + (t->net.sets > 1 ? one : 0)};
+    memset(t->gradient[i], 0, t->net.sets * one * sizeof **t->gradient);
+    g->n = t->o.batch - first < size ? t->o.batch - first : size;
+    for (size_t k = 0; k < g->n; k++) g->start[k] = w->start[first + k];
+    g->frames = t->frames, g->batch = t->o.batch;
+    g->bidirectional = t->o.direction == VG_FORWARD ? 0 : t->o.bidirectional;
+    g->divergence = t->net.uncertain ? t->o.divergence : 0;
+    for (int k = 0; k < 2; k++) {
+        d[k] = t->runner.drive;
+        d[k].shape = &t->shape, d[k].given = w->given;
+        d[k].parameters = t->net.parameters + (k && t->net.sets > 1 ? one : 0);
+    }
+    w->loss[i % 64] = net_group_run(g, d, gradient, 0.1,
+                               vgi_random_mix(t->o.seed * 7919 + t->state.iteration) + w->first + i);
+}
+
+/* the gradient of one iteration, in t->total */
+static int run_groups(vg_trainer *t, double *loss, vg_err *e)
+{
+    size_t all = t->net.sets * t->net.nparameters;
+    vgi_random r = vgi_random_start(t->o.seed, t->state.iteration + 1);
+    working w = {.t = t, .start = vgi_array_raw(t->o.batch, sizeof *w.start, e)};
+    if (!w.start) return VG_ENOMEM;
+    for (size_t i = 0; i < t->o.batch; i++) w.start[i] = t->window[vgi_random_below(&r, t->nwindows)];
+    w.given = t->o.given_least + vgi_random_below(&r, t->o.given_most - t->o.given_least + 1);
+    if (w.given >= t->length) w.given = t->length - 1;
+    memset(t->total, 0, all * sizeof *t->total);
+    *loss = 0;
+    vgi_blas_alone();
+    for (w.first = 0; w.first < t->ngroups; w.first += t->at_once) {
+        size_t n = t->ngroups - w.first < t->at_once ? t->ngroups - w.first : t->at_once;
+        vgi_parallel(t->o.threads, n, run_group, &w);
+        for (size_t i = 0; i < n; i++) {
+            *loss += w.loss[i % 64].frames;
+            for (size_t k = 0; k < all; k++) t->total[k] += t->gradient[i][k];
+        }
+    }
+    vgi_blas_shared();
+    free(w.start);
+    return VG_OK;
+}
+
+typedef struct adam {
+    float *p, *first, *second, *gradient;
+    size_t n;
+    float shrink, rate, correction, decay;
+} adam;
+
+static void adam_chunk(void *context, size_t chunk)
+{
+    const adam *a = context;
+    size_t end = (chunk + 1) * CHUNK < a->n ? (chunk + 1) * CHUNK : a->n;
+    for (size_t i = chunk * CHUNK; i < end; i++) {
+        float g = a->shrink * a->gradient[i];
+        a->first[i] = 0.9f * a->first[i] + 0.1f * g;
+        a->second[i] = 0.999f * a->second[i] + 0.001f * g * g;
+        a->p[i] -= a->rate * a->first[i] / (sqrtf(a->second[i] * a->correction) + 1e-8f);
+    }
+}
+
+static double length_of(const float *g, size_t n)
+{
+    double sum = 0;
+    for (size_t from = 0; from < n; from += CHUNK) {
+        double part = 0;
+        for (size_t i = from; i < n && i < from + CHUNK; i++) part += (double)g[i] * (double)g[i];
+        sum += part;
+    }
+    return sqrt(sum);
+}
+
+static void learn(vg_trainer *t)
+{
+    size_t all = t->net.sets * t->net.nparameters;
+    double done = (double)t->state.iteration, share = done / (double)t->o.iterations;
+    for (size_t i = 0; i < all; i++) t->total[i] += (float)(2 * t->o.decay) * t->net.parameters[i];
+    t->state.gradient = length_of(t->total, all);
+    double rate = t->o.rate * (least_rate + (1 - least_rate) * 0.5 * (1 + cos(M_PI * fmin(share, 1))));
+    adam a = {.p = t->net.parameters, .first = t->moments, .second = t->moments + all, .gradient = t->total, .n = all,
+              .shrink = (float)(t->state.gradient > clip ? clip / t->state.gradient : 1),
+              .rate = (float)(rate / (1 - pow(0.9, done + 1))), .correction = (float)(1 / (1 - pow(0.999, done + 1)))};
+    if (t->state.gradient < 1e30) vgi_parallel(t->o.threads, (all + CHUNK - 1) / CHUNK, adam_chunk, &a);
+}
+
+/* ---- how long ---- */
+
+static void keep_best(vg_trainer *t, double error)
+{
+    if (!(error < t->best_error)) return;
+    t->best_error = error;
+    t->state.best_iteration = t->state.iteration;
+    memcpy(t->best, t->net.parameters, t->net.sets * t->net.nparameters * sizeof *t->best);
+}
+
+/* A correction that says nothing: the regression alone. */
+static void silence(vg_trainer *t)
+{
+    const vgi_shape *s = &t->shape;
+    for (size_t w = 0; w < t->net.sets; w++) {
+        float *p = t->net.parameters + w * t->net.nparameters;
+        memset(p + s->full, 0, s->hidden * s->numbers * sizeof *p);
+        memset(p + s->full_bias, 0, s->numbers * sizeof *p);
+    }
+}
+
+/* The end of what is learned beside the validation block. */
+static int end_phase(vg_trainer *t, vg_err *e)
+{
+    uint64_t best = t->state.best_iteration;
+    if (t->o.model != VG_NETWORK_AUTO) {
+        memcpy(t->net.parameters, t->best, t->net.sets * t->net.nparameters * sizeof *t->best);
+        t->ended = true;
+        return VG_OK;
+    }
+    if (begin_phase(t, false, e) < 0) return e ? e->code : VG_ENOMEM;
+    t->state.iterations = best;
+    if (!best) {
+        silence(t);
+        t->ended = true;
+    }
+    return VG_OK;
+}
+
+static int validate(vg_trainer *t, vg_err *e)
+{
+    double error;
+    t->state.validation = NAN;
+    if (t->state.phase || t->state.iteration % VALIDATE_EVERY) return VG_OK;
+    int code = vgi_trainer_validate(t, &error, e);
+    if (code < 0) return code;
+    t->state.validation = error;
+    keep_best(t, error);
+    return VG_OK;
+}
+
+static bool has_waited(const vg_trainer *t)
+{
+    uint64_t patience = t->o.iterations / 3 < 100 ? 100 : t->o.iterations / 3;
+    return t->state.iteration >= t->state.best_iteration + patience;
+}
+
+int vg_trainer_step(vg_trainer *t, vg_train_state *state, vg_err *e)
+{
+    double loss;
+    int code = t->ended ? VG_OK : validate(t, e);
+    bool last = t->state.iteration >= t->state.iterations || (!t->state.phase && has_waited(t));
+    if (code == VG_OK && !t->ended && last) {
+        if (t->state.phase) t->ended = true;
+        else code = end_phase(t, e);
+    }
+    if (code < 0 || t->ended) {
+        *state = t->state;
+        return code;
+    }
+    code = run_groups(t, &loss, e);
+    if (code < 0) return code;
+    learn(t);
+    t->state.loss = loss;
+    if (!(t->state.gradient < 1e30))
+        return vg_fail(e, VG_EINPUT, "the numbers run away at iteration %llu: choose a smaller --rate",
+                       (unsigned long long)t->state.iteration);
+    t->state.iteration++;
+    t->net.iterations = t->state.iteration;
+    *state = t->state;
+    return 1;
+}
+
+/* ---- networks out and in ---- */
+
+int vg_trainer_network(const vg_trainer *t, bool complete, vg_network *n, vg_err *e)
+{
+    vg_network view = t->net;
+    if (!complete) {
+        view.open = true;
+        view.moments = t->moments, view.best = t->best;
+        view.phase = (uint64_t)t->state.phase, view.best_iteration = t->state.best_iteration, view.best_error = t->best_error;
+        if (!(view.best_error < INFINITY)) view.best_error = -1;
+    }
+    return vg_network_copy(n, &view, e);
+}
+
+int vg_trainer_resume(vg_trainer *t, const vg_network *from, vg_err *e)
+{
+    const vg_network *n = &t->net;
+    size_t all = n->sets * n->nparameters;
+    if (!from->open) return vg_fail(e, VG_EINPUT, "its training has ended: there is nothing to resume");
+    if (from->mesh_digest != n->mesh_digest || from->data_digest != n->data_digest || from->frames != n->frames)
+        return vg_fail(e, VG_EINPUT, "it was trained on other poses");
+    if (from->model != n->model || from->direction != n->direction || from->nparameters != n->nparameters ||
+        from->rank != n->rank || from->seed != n->seed || from->step != n->step)
+        return vg_fail(e, VG_EINPUT, "it was trained with other options");
+    if (from->phase && !t->state.phase && begin_phase(t, false, e) < 0) return VG_ENOMEM;
+    memcpy(t->net.parameters, from->parameters, all * sizeof *t->best);
+    memcpy(t->moments, from->moments, 2 * all * sizeof *t->best);
+    memcpy(t->best, from->best, all * sizeof *t->best);
+    t->state.iteration = t->net.iterations = from->iterations;
+    t->state.best_iteration = from->best_iteration;
+    t->best_error = from->best_error < 0 ? INFINITY : from->best_error;
+    if (t->state.phase && t->tried.n == 0 && from->best_error >= 0) t->state.iterations = from->best_iteration;
+    return VG_OK;
+}

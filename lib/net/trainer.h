@@ -1,0 +1,40 @@
+/* trainer.h: what the training of a network holds.
+ * Internal; shared by train.c and judge.c.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_TRAINER_H
+#define VG_TRAINER_H
+
+#include "net/dataset.h"
+#include "net/loss.h"
+#include "net/feature.h"
+#include "net/runner.h"
+
+struct vg_trainer {
+    vg_train_options o;
+    vg_featurer *featurer;
+    vg_mesh mesh;
+    vgi_dataset data;
+    double *last;           /* the pose before, nv points; begun: there is one */
+    bool begun, cut; /* cut: the next pose begins a sequence */
+    vg_network net;         /* as it is now: parameters, basis, regression of this phase */
+    vgi_shape shape;
+    /* this phase */
+    vgi_spans fitted, tried; /* frames that are learned from, and the validation block */
+    float *frames;          /* n x numbers, as the layers see them */
+    size_t length;          /* frames of a training sequence */
+    size_t *window, nwindows; /* where they may begin */
+    vgi_regression regression[2]; /* fitted to the frames of this phase */
+    net_group *groups;
+    size_t ngroups, at_once; /* so many groups are run at a time */
+    float **gradient;       /* at_once x sets * nparameters */
+    float *total, *moments, *best;
+    vgi_runner runner;
+    bool ready, ended;
+    vg_train_state state;
+    double best_error;
+};
+
+/* vgi_trainer_validate: mean distance of runs in the validation block, in numbers of a frame. */
+int vgi_trainer_validate(vg_trainer *t, double *error, vg_err *e) VG_MUST_CHECK;
+
+#endif
