@@ -72,15 +72,15 @@ first_poses() {
 @test "a source that is turned and scaled as a whole does that to the target" {
     first_poses human-man-poses 1
     transform 1 0.5 100 <pose_0.obj >turned.obj
-    transform 1.7 -3 -170 <pose_0.obj >grown.obj
+    transform 1.7 -3 -170 <pose_0.obj >zoomed.obj
     must vg-decode --f64 "$DATA/human-heavy-poses.tar.xz" -o heavy/
     heavy=heavy/$(ls heavy | head -n 1)
     transform 1 0 100 <"$heavy" >heavy-turned.obj
     transform 1.7 0 -170 <"$heavy" >heavy-grown.obj
-    pipe "vg-encode pose_0.obj turned.obj grown.obj | vg-deform --onto $heavy | vg-solve | vg-decode --f64 -o out/"
+    pipe "vg-encode pose_0.obj turned.obj zoomed.obj | vg-deform --by pose --onto $heavy | vg-solve | vg-decode --f64 -o out/"
     must vg-diff -c -t 1e-10 heavy-turned.obj out/turned.obj
-    must vg-diff -c -t 1e-10 heavy-grown.obj out/grown.obj
-    differ heavy-turned.obj out/grown.obj # the comparison can say no
+    must vg-diff -c -t 1e-10 heavy-grown.obj out/zoomed.obj
+    differ heavy-turned.obj out/zoomed.obj # the comparison can say no
 }
 
 differ() {
@@ -125,10 +125,10 @@ differ() {
     for order in "0 1 2 3 4 5 6 7 8 9 10 11" "11 3 7 0 5 1 10 2 9 4 8 6" "5 3"; do
         files=
         for i in $order; do files="$files pose_$i.obj"; done
-        pipe "vg-encode --reference '$rest' $files | vg-deform --onto target.obj | vg-solve | vg-decode --f64 -o '${order%% *}/'"
+        pipe "vg-encode --reference '$rest' $files | vg-deform --onto target.obj | vg-solve | vg-decode -q --f64 -o '${order%% *}/'"
     done
-    for i in 0 1 2 3 4 5 6 7 8 9 10 11; do same_file 0/pose_$i.obj 11/pose_$i.obj; done
-    for i in 3 5; do same_file 0/pose_$i.obj 5/pose_$i.obj; done
+    for i in 0 1 2 3 4 5 6 7 8 9 10 11; do same_file 0/pose_$i.obj 11/*_pose_$i.obj; done # numbers in front keep the order
+    for i in 3 5; do same_file 0/pose_$i.obj 5/*_pose_$i.obj; done
     [ "$(ls 5 | wc -l)" = 2 ]
 }
 
@@ -146,9 +146,9 @@ differ() {
     for set in human-man-poses:human-heavy-poses faceA:faceB; do
         target=$DATA/${set#*:}.tar.xz
         must vg-encode "$DATA/${set%:*}.tar.xz" -o source.vgs
-        pipe "vg-deform source.vgs | vg-deform --onto '$target' | vg-solve >twice.vgs"
-        pipe "vg-deform --onto '$target' --pin none source.vgs | vg-solve >once.vgs"
-        pipe "vg-encode --vectors source.vgs | vg-deform --onto '$target' | vg-solve >vectors.vgs"
+        pipe "vg-deform source.vgs | vg-deform --onto '$target' | vg-solve --fit squares >twice.vgs"
+        pipe "vg-deform --onto '$target' --pin none --by pose source.vgs | vg-solve --fit squares >once.vgs"
+        pipe "vg-encode --vectors source.vgs | vg-deform --onto '$target' --by pose | vg-solve --fit squares >vectors.vgs"
         must vg-diff -t 1e-12 once.vgs twice.vgs
         must vg-diff -t 1e-12 once.vgs vectors.vgs
     done
