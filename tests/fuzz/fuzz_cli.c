@@ -43,6 +43,7 @@ static int fuzz_close(int fd)
 #include "../../cmd/options.c"
 #include "../../cmd/output.c"
 #include "../../cmd/processors.c"
+#include "../../cmd/progress.c"
 #undef _exit
 #undef write
 #undef close
