@@ -17,7 +17,7 @@ static const cli_option options[] = {
      .text = &opts.onto, .reads = true},
     {"correspondence", 0, "FILE", "the target has another connectivity: what vg-register found",
      .text = &opts.correspondence, .reads = true, .needs = "onto"},
-    {"by", 0, "blend|pose|gradient|shape", "what is carried over (default: blend)",
+    {"by", 0, "blend|pose|gradient|shape", "what is carried over (default: blend; gradient with --correspondence)",
      .choice = &opts.by_choice, .needs = "onto"},
     {"root", 0, "centroid|stay|V",
      "where the body goes: as the centroid does (default), nowhere, or as vertex V does", .text = &opts.root,
@@ -195,6 +195,7 @@ static void check_kind(work *w)
 {
     const char *advice = NULL;
     if (w->kind == VG_DEFORMATIONS && !cli_given("by")) w->by = BY_POSE;
+    if (opts.correspondence && !cli_given("by")) w->by = BY_GRADIENT;
     if (w->kind == VG_FEATURES || w->kind == VG_COORDINATES) advice = "vg-deform takes vertices, vectors or deformations";
     else if (w->kind == VG_TRANSFORMS) advice = "make vertices of them with 'vg-play MAP' first";
     else if (w->kind == VG_DEFORMATIONS && !opts.onto) advice = "name the mesh to apply them to with --onto";

@@ -9,8 +9,19 @@
 static struct {
     const char *markers, *dense, *dense_source;
     long base;
-    bool uv, aligned, keep_all;
+    bool uv, aligned, keep_all, all_components;
+    uint32_t *components;
+    size_t ncomponents;
 } opts;
+
+static void take_components(const char *text, void *context)
+{
+    (void)context;
+    free(opts.components);
+    opts.components = NULL, opts.ncomponents = 0;
+    opts.all_components = !strcmp(text, "all");
+    if (!opts.all_components) opts.ncomponents = cli_parse_vertices("components", text, &opts.components);
+}
 
 static const cli_option options[] = {
     {.name = "markers",
@@ -43,6 +54,10 @@ static const cli_option options[] = {
     {.name = "aligned",
      .help = "the two lie on one another as they are; markers are not needed",
      .flag = &opts.aligned},
+    {.name = "components",
+     .value = "all|K,...",
+     .help = "the components of SOURCE that take part, counted from 0 (default: those that explain the target)",
+     .take = take_components},
     {0},
 };
 
@@ -100,6 +115,21 @@ static void report_markers(const vg_markers *m, const vg_register_result *r)
         else
             cli_note("%s: %.3g D from where its neighbours expect it", which, r->residual[i]);
     }
+}
+
+/* One line: the components of the source that explain nothing of the target. */
+static void report_components(const vg_register_result *r)
+{
+    enum { LISTED = 12 };
+    char list[16 * LISTED + 8] = "";
+    size_t n = 0, at = 0;
+    for (size_t k = 0; k < r->components; k++) {
+        if (r->taken[k]) continue;
+        if (n++ < LISTED) at += (size_t)snprintf(list + at, sizeof list - at, at ? ", %zu" : "%zu", k);
+    }
+    if (!n || opts.ncomponents) return;
+    cli_warn("%zu of the %zu components of the source explain nothing of the target and are left out: %s%s", n,
+             r->components, list, n > LISTED ? ", ..." : "");
 }
 
 enum { MOST_WARNINGS = 10 };
@@ -227,6 +257,9 @@ int main(int argc, char **argv)
                             .target_points = target.body.reference,
                             .aligned = opts.aligned,
                             .keep_all = opts.keep_all,
+                            .components = opts.components,
+                            .ncomponents = opts.ncomponents,
+                            .all_components = opts.all_components,
                             .source_uv = opts.uv ? &source.body.attributes : NULL,
                             .target_uv = opts.uv ? &target.body.attributes : NULL,
                             .threads = cli.threads};
@@ -236,11 +269,13 @@ int main(int argc, char **argv)
     if (vg_register(&r, &in, note_step, NULL, &e) < 0) cli_die(&e);
     note_alignment(&r);
     report_markers(&markers, &r);
+    report_components(&r);
     report_unmatched(&target.body.mesh, &r.pairs);
     write_stream(&source, &target, &r);
     vg_register_result_clear(&r);
     vg_markers_clear(&markers);
     free(seeds);
+    free(opts.components);
     vg_head_clear(&source);
     vg_head_clear(&target);
     cli_finish(0);

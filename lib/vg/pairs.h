@@ -24,6 +24,9 @@ typedef struct vg_register_input {
                                                    together */
     bool aligned;               /* the two lie on one another as they are */
     bool keep_all;              /* markers that contradict the others are not left out */
+    const uint32_t *components; /* the components of the source that take part, numbered as by vg_mesh_components; */
+    size_t ncomponents;         /* 0: those that markers or seeds lie on, and others that explain more of the target */
+    bool all_components;        /* all of them */
     int threads;
 } vg_register_input;
 
@@ -44,6 +47,8 @@ typedef struct vg_register_result {
     bool *left_out;          /* per marker */
     double typical_residual; /* the median */
     size_t uv_pairs;         /* points paired by texture coordinates */
+    size_t components;       /* of the source */
+    bool *taken;             /* per component: it takes part */
 } vg_register_result;
 
 void vg_register_result_clear(vg_register_result *r);

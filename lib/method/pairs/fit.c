@@ -370,7 +370,7 @@ static void find_near(void *context, size_t block)
         /* the last answer bounds this one, if its normal still fits */
         bool guess = t->distance[v] < INFINITY && known < limit;
         t->distance[v] = INFINITY;
-        if (!(t->L.sum[v] > 0)) continue;
+        if (!(t->L.sum[v] > 0) || (t->in->take_vertex && !t->in->take_vertex[v])) continue;
         bool found = guess && vgi_surface_nearest(t->in->target, at, normal, COSINE, known * (1 + 1e-9), &hit);
         if (!found && !vgi_surface_nearest(t->in->target, at, normal, COSINE, limit, &hit)) continue;
         if (hit.border && !t->border[v]) continue;
@@ -407,7 +407,7 @@ static int follow_reverse(fit *t, double weight, vg_err *e)
 {
     size_t n = t->in->target_mesh->nv;
     vgi_surface_free(&t->now);
-    int r = vgi_surface_new(&t->now, t->m, t->x, e);
+    int r = vgi_surface_of(&t->now, t->m, t->x, t->in->take, e);
     if (r < 0) return r;
     vgi_parallel(t->in->threads, (n + BLOCK - 1) / BLOCK, find_reverse, t);
     for (size_t i = 0; i < n; i++) t->reverse[i].weight *= weight * (double)t->m->nv / (double)n;

@@ -188,7 +188,7 @@ static void give_block(void *context, size_t block)
         double sign = p->in->flipped ? -1 : 1, normal[3] = {sign * n[0], sign * n[1], sign * n[2]};
         vgi_hit hit;
         p->given[f] = UINT32_MAX;
-        if (p->used[f]) continue;
+        if (p->used[f] || (p->in->take && !p->in->take[f])) continue;
         if (vgi_surface_nearest(p->in->target_surface, centroid(p->in->source_surface, f), normal, COSINE, FAR * FAR,
                                 &hit) &&
             !hit.border && p->drivers[hit.face].n > 0)

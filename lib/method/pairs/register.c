@@ -31,6 +31,8 @@ struct registration {
     vgi_surface *source_surface, *target_surface, *fitted_surface;
     uint32_t *links;
     size_t nlinks;
+    uint32_t *component;        /* per vertex of the source */
+    bool *take, *take_vertex;   /* per face and vertex of the source: its component takes part */
     bool flipped;
     double *x;
 };
@@ -372,6 +374,8 @@ static int bend(struct registration *r, void (*step)(void *, const vg_register_s
                            .target_points = r->target,
                            .target = r->target_surface,
                            .flipped = r->flipped,
+                           .take = r->take,
+                           .take_vertex = r->take_vertex,
                            .links = r->links,
                            .nlinks = r->nlinks,
                            .tie = r->tie,
@@ -382,10 +386,74 @@ static int bend(struct registration *r, void (*step)(void *, const vg_register_s
     return vgi_fit(&f, r->x, e);
 }
 
+/* ---- which components take part ---- */
+
+static void spread_choice(struct registration *r)
+{
+    const vg_mesh *m = r->in->source;
+    vgi_take_faces(m, r->component, r->out->taken, r->take);
+    for (size_t v = 0; v < m->nv; v++) /* isolated vertices are in none */
+        r->take_vertex[v] = r->component[v] < r->out->components && r->out->taken[r->component[v]];
+}
+
+/* Those that the caller names, or that ties lie on; all when there are none. */
+static int begin_components(struct registration *r, vg_err *e)
+{
+    const vg_mesh *m = r->in->source;
+    vg_register_result *out = r->out;
+    r->component = vgi_array(m->nv, sizeof *r->component, e);
+    r->take = vgi_array(m->nf, sizeof *r->take, e);
+    r->take_vertex = vgi_array(m->nv, sizeof *r->take_vertex, e);
+    int ok = r->component && r->take && r->take_vertex ? VG_OK : VG_ENOMEM;
+    if (ok == VG_OK) ok = vg_mesh_components(m, r->component, &out->components, e);
+    if (ok == VG_OK && !(out->taken = vgi_array(out->components, sizeof *out->taken, e))) ok = VG_ENOMEM;
+    if (ok < 0) return ok;
+    bool any = false;
+    for (size_t i = 0; i < r->in->ncomponents; i++) {
+        if (r->in->components[i] >= out->components)
+            return vg_fail(e, VG_EINPUT, "the source has no component %u: it has %zu, counted from 0",
+                           r->in->components[i], out->components);
+        any = out->taken[r->in->components[i]] = true;
+    }
+    for (size_t i = 0; i < r->nties && !r->in->ncomponents && !r->in->all_components; i++)
+        for (int a = 0; a < 3; a++)
+            if (r->tie[i].weight > 0 && r->tie[i].share[a] > 0 &&
+                r->component[r->tie[i].vertex[a]] < out->components)
+                any = out->taken[r->component[r->tie[i].vertex[a]]] = true;
+    for (size_t k = 0; k < out->components && !any; k++) out->taken[k] = true;
+    spread_choice(r);
+    return VG_OK;
+}
+
+static size_t count_taken(const vg_register_result *out)
+{
+    size_t n = 0;
+    for (size_t k = 0; k < out->components; k++) n += out->taken[k];
+    return n;
+}
+
+/* Fit the components that take part; if others explain something of the target, all of these once more. */
+static int bend_components(struct registration *r, void (*step)(void *, const vg_register_step *), void *context,
+                           vg_err *e)
+{
+    int ok = bend(r, step, context, e);
+    size_t before = count_taken(r->out);
+    if (ok < 0 || before == r->out->components || r->in->ncomponents) return ok;
+    const vgi_component_choice c = {.source = r->in->source, .target = r->in->target, .points = r->x,
+                                    .rest = r->rest,
+                                    .target_surface = r->target_surface, .label = r->component,
+                                    .n = r->out->components, .flipped = r->flipped, .threads = r->in->threads};
+    ok = vgi_choose_components(&c, r->out->taken, e);
+    if (ok < 0 || count_taken(r->out) == before) return ok;
+    spread_choice(r);
+    return bend(r, step, context, e);
+}
+
 static int pair_faces(struct registration *r, vg_err *e)
 {
     const vgi_pairing p = {.source = r->in->source, .target = r->in->target, .source_surface = r->fitted_surface,
-                           .target_surface = r->target_surface, .flipped = r->flipped, .threads = r->in->threads};
+                           .target_surface = r->target_surface, .take = r->take, .flipped = r->flipped,
+                           .threads = r->in->threads};
     return vgi_pair(&p, &r->out->pairs, e);
 }
 
@@ -415,6 +483,9 @@ static void clear(struct registration *r)
     free(r->rest);
     free(r->tie);
     free(r->links);
+    free(r->component);
+    free(r->take);
+    free(r->take_vertex);
     free(r->x);
     vgi_surface_free(&r->source_surface);
     vgi_surface_free(&r->target_surface);
@@ -427,6 +498,7 @@ void vg_register_result_clear(vg_register_result *r)
     free(r->fitted);
     free(r->residual);
     free(r->left_out);
+    free(r->taken);
     *r = (vg_register_result){0};
 }
 
@@ -471,8 +543,9 @@ int vg_register(vg_register_result *out, const vg_register_input *in,
     if (ok == VG_OK) ok = vgi_surface_new(&r.target_surface, in->target, r.target, e);
     if (ok == VG_OK) ok = vgi_surface_new(&r.source_surface, in->source, r.rest, e);
     if (ok == VG_OK) find_sides(&r);
-    if (ok == VG_OK) ok = bend(&r, step, context, e);
-    if (ok == VG_OK) ok = vgi_surface_new(&r.fitted_surface, in->source, r.x, e);
+    if (ok == VG_OK) ok = begin_components(&r, e);
+    if (ok == VG_OK) ok = bend_components(&r, step, context, e);
+    if (ok == VG_OK) ok = vgi_surface_of(&r.fitted_surface, in->source, r.x, r.take, e);
     if (ok == VG_OK) ok = pair_faces(&r, e);
     if (ok == VG_OK) ok = hand_over(&r, e);
     clear(&r);

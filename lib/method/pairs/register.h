@@ -22,6 +22,7 @@ typedef struct vgi_fitting {
     const double *target_points;
     const vgi_surface *target;
     bool flipped;               /* the faces of one mesh turn the other way round: normals are to be opposite */
+    const bool *take, *take_vertex; /* per face and vertex of the source: the target pulls it; NULL: all */
     const uint32_t *links;      /* nlinks pairs of source vertices */
     size_t nlinks;
     const vgi_tie *tie;
@@ -37,11 +38,29 @@ int vgi_fit(const vgi_fitting *in, double *x, vg_err *e) VG_MUST_CHECK;
 typedef struct vgi_pairing {
     const vg_mesh *source, *target;
     const vgi_surface *source_surface, *target_surface; /* the source as fitted */
+    const bool *take; /* per face of the source: it may drive faces of the target; NULL: all */
     bool flipped;
     int threads;
 } vgi_pairing;
 
 /* vgi_pair: fill first, source, weight, distance (units of D), matched of *c. */
 int vgi_pair(const vgi_pairing *in, vg_correspondence *c, vg_err *e) VG_MUST_CHECK;
+
+/* What of the source, of which the taken components were fitted, explains the target. */
+typedef struct vgi_component_choice {
+    const vg_mesh *source, *target;
+    const double *points, *rest; /* of the source: as fitted, and as brought onto the target as a whole */
+    const vgi_surface *target_surface;
+    const uint32_t *label; /* per source vertex: its component */
+    size_t n;
+    bool flipped;
+    int threads;
+} vgi_component_choice;
+
+/* vgi_choose_components: add to `taken` (per component) those that explain something of the target that the taken
+ * ones do not. */
+int vgi_choose_components(const vgi_component_choice *in, bool *taken, vg_err *e) VG_MUST_CHECK;
+/* vgi_take_faces: faces[f]: is the component of face f taken? Nothing if faces is NULL. */
+void vgi_take_faces(const vg_mesh *m, const uint32_t *label, const bool *taken, bool *faces);
 
 #endif

@@ -93,7 +93,7 @@ static size_t fan_size(size_t r)
     return r <= 3 ? 1 : r;
 }
 
-static void make_triangles(vgi_surface *s, const double *points)
+static void make_triangles(vgi_surface *s, const double *points, const bool *take)
 {
     const vg_mesh *m = s->m;
     struct triangle *t = s->triangle;
@@ -109,9 +109,10 @@ static void make_triangles(vgi_surface *s, const double *points)
         s->size[f] = sqrt(length);
         for (int k = 0; k < 3; k++) n[k] = length > 0 ? n[k] / length : 0;
         const double *p = points + 3 * (size_t)vert[0], *q = points + 3 * (size_t)vert[1];
+        if (r == 2) s->size[f] = sqrt(vgi_square(p, q));
+        if (take && !take[f]) continue;
         if (r == 2) {
             set_triangle(t++, p, q, q, f, begin, 0);
-            s->size[f] = sqrt(vgi_dot(t[-1].ab, t[-1].ab));
         } else if (r == 3) {
             uint8_t edges = (uint8_t)(border[0] | border[1] << 1 | border[2] << 2);
             set_triangle(t++, p, q, points + 3 * (size_t)vert[2], f, begin, edges);
@@ -256,12 +257,17 @@ static int grow_tree(vgi_surface *s, vg_err *e)
     return VG_OK;
 }
 
-int vgi_surface_new(vgi_surface **out, const vg_mesh *m, const double *points, vg_err *e)
+int vgi_surface_new(vgi_surface **s, const vg_mesh *m, const double *points, vg_err *e)
+{
+    return vgi_surface_of(s, m, points, NULL, e);
+}
+
+int vgi_surface_of(vgi_surface **out, const vg_mesh *m, const double *points, const bool *take, vg_err *e)
 {
     vgi_surface *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
     s->m = m;
-    for (size_t f = 0; f < m->nf; f++) s->n += fan_size(m->start[f + 1] - m->start[f]);
+    for (size_t f = 0; f < m->nf; f++) s->n += !take || take[f] ? fan_size(m->start[f + 1] - m->start[f]) : 0;
     s->normal = vgi_array(m->nf, 3 * sizeof *s->normal, e);
     s->centroid = vgi_array(m->nf, 3 * sizeof *s->centroid, e);
     s->size = vgi_array(m->nf, sizeof *s->size, e);
@@ -271,7 +277,7 @@ int vgi_surface_new(vgi_surface **out, const vg_mesh *m, const double *points, v
     bool ok =
         s->normal && s->centroid && s->size && s->vertex_normal && s->border && s->triangle && find_borders(s, e);
     if (ok) {
-        make_triangles(s, points);
+        make_triangles(s, points, take);
         make_vertex_normals(s);
     }
     if (ok && grow_tree(s, e) == VG_OK) return VG_OK;
