@@ -598,7 +598,7 @@ static void says_what_is_lost(void)
     free(text);
     s.timed[0] = s.timed[1] = s.timed[2] = false;
     text = write_text(&s, false, warning, &e);
-    CHECK(text && !strstr(warning, "times") && strstr(text, " 0.0333333333\n"));
+    CHECK(text && !strstr(warning, "times") && strstr(text, " 0.0416666667\n"));
     free(text);
     vg_skeleton_clear(&s.head.body.skeleton);
     CHECK(!write_text(&s, false, warning, &e) &&
