@@ -43,7 +43,7 @@ answers() {
     must vg-info --json t.vgs
     [ "$(python3 -c 'import json,sys; print(json.load(sys.stdin)["frames"])' <.stdout)" = 5 ]
     [[ $output != *$'\033'* ]]
-    pipe "vg-encode names.tar.gz | vg-decode -o out/"
+    pipe "vg-encode names.tar.gz | vg-decode -q -o out/"
     [ "$(find out -type f -printf x)" = xxxxx ]
     nothing_but names.tar.gz names.zip t.vgs z.vgs out
 }
@@ -194,7 +194,7 @@ every_program() {
     answers vg-info "$k.vgs" || return 1
     answers vg-view "$k.vgs" -o a.png || return 1
     answers vg-view "$k.vgs" -o a.html || return 1
-    answers vg-decode -q "$k.vgs" -o 'a-%d.stl' || return 1
+    answers vg-decode -q --replace "$k.vgs" -o 'a-%d.stl' || return 1
     for out in a.zip:ply a.glb a.usda; do answers vg-decode -q "$k.vgs" -o $out || return 1; done
     answers vg-decode -q --no-mesh "$k.vgs" -o a.pc2 || return 1
 }
@@ -233,7 +233,7 @@ every_program() {
     for i in 1 2 3; do awk '/^v/ { printf "v %.17g %.17g %.17g\n", $2 / 1e20, $3 / 1e20, $4 / 1e20; next } { print }' huge-$i.obj >one-$i.obj; done
     awk '/^v/ { printf "v %.17g %.17g %.17g\n", $2 / 1e20, $3 / 1e20, $4 / 1e20; next } { print }' huge-target.obj >one-target.obj
     for kind in tiny huge one; do
-        pipe "vg-encode $kind-[123].obj | vg-deform --onto $kind-target.obj | vg-solve -o $kind.vgs"
+        pipe "vg-encode $kind-[123].obj | vg-deform --onto $kind-target.obj | vg-solve --fit squares -o $kind.vgs" # the other fit ends by a tolerance
     done
     py <<'END'
 import read_stream

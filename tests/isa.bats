@@ -81,6 +81,7 @@ PY
     run grep -rnE 'vector_size\((64|128|256)\)|target\("' lib cmd
     [ "$status" = 1 ]
     run grep -rlE 'vector_size' lib cmd
-    for file in "${lines[@]}"; do [[ $file == lib/core/wide.h || $file == *_kernel.c ]]; done
+    # lib/net/real.h names eight numbers of a network, 32 bytes, which only its kernels compute with
+    for file in "${lines[@]}"; do [[ $file == lib/core/wide.h || $file == lib/net/real.h || $file == *_kernel.c ]]; done
     grep -q 'vector_size(8 \* VGI_WIDTH)' lib/core/wide.h
 }

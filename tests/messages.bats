@@ -50,7 +50,7 @@ mistake() {
     mistake 2 'vg-decode walk.vgs -o out.obj' "use a pattern like 'out-%04d.obj', a directory or an archive"
     mistake 2 'vg-solve vectors.vgs -o out.obj' "the output is a stream: pipe it into 'vg-decode -o out.obj'"
     mistake 2 'vg-solve vectors.vgs -o out.png' "the output is a stream: pipe it into 'vg-view -o out.png'"
-    mistake 2 'vg-view walk.vgs -o out.jpg' "must end in .html or .png"
+    mistake 2 'vg-view walk.vgs -o out.jpg' "must end in .html, .png or .webp"
     mistake 4 'vg-decode walk.vgs -o nowhere/out.zip' "nowhere" "No such file or directory"
 
     # options
@@ -60,7 +60,7 @@ mistake() {
     mistake 2 'vg-solve --nonsense vectors.vgs' "unknown option '--nonsense': 'vg-solve --help' lists them"
     mistake 2 'vg-solve -x vectors.vgs' "'vg-solve --help' lists them"
     mistake 2 'vg-solve vectors.vgs -o' "option '--output' needs a value: FILE"
-    mistake 2 'vg-deform --by poses --onto pose2.obj walk.vgs' "'pose', 'shape', 'gradient' or 'blend', not 'poses'"
+    mistake 2 'vg-deform --by poses --onto pose2.obj walk.vgs' "'blend', 'pose', 'gradient' or 'shape', not 'poses'"
     mistake 2 'vg-deform --root x --onto pose2.obj walk.vgs' "'centroid', 'stay' or the number of a vertex, not 'x'"
     mistake 2 'vg-deform --root 99 --onto pose2.obj walk.vgs' "vertex 99, but there are 8, counted from 0"
     mistake 2 'vg-deform --by shape walk.vgs' "--by needs --onto"

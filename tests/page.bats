@@ -377,7 +377,7 @@ END
     grep -q '"patches":3' reference.html
     grep -q 'data-list="patches"' page.html
     must_fail 3 vg-view pose1.obj --patches pose2.obj -o none.html
-    says "'pose2.obj' holds no patches: make them with 'vg-segment'"
+    says "'pose2.obj' holds no patches: make them with vg-segment"
     must_fail 3 vg-view tetra.obj --patches cube.patches -o none.html
     [ ! -e none.html ]
     browse page.html <<'END'

@@ -50,6 +50,7 @@ static int make_rooms(vg_planar *p, vg_err *e)
     p->rooms = vgi_array(threads, sizeof *p->rooms, e);
     p->found = vgi_array(threads, sizeof *p->found, e);
     if (!p->rooms || !p->found) return VG_ENOMEM;
+    if (p->faces.nf == 0) return VG_OK; /* vg_planar_solve has nothing to do */
     if (vgi_mul(each, threads, &total) && vgi_mul(total, sizeof *p->memory, &total))
         p->memory = aligned_alloc(sizeof(vgi_lanes), total);
     if (!p->memory) return vg_fail(e, VG_ENOMEM, "not enough memory to make %zu faces planar", p->faces.nf);
