@@ -23,7 +23,7 @@ roof() {
 @test "one quad: its bend shrinks to w1 / (w1 + w2)" {
     roof >roof.obj
     for weights in 0.5,1 0.05,1 1,3 2,0; do
-        must bash -c "vg-encode --vectors roof.obj | vg-solve --planar --planar-weights $weights -o r.vgs"
+        must bash -c "vg-encode --vectors roof.obj | vg-solve --fit squares --weights uniform --planar --planar-weights $weights -o r.vgs"
         vg-decode --f64 r.vgs -o r.obj
         must python3 - "$weights" <<'END'
 import sys

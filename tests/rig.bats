@@ -249,7 +249,7 @@ END
     # positions do not say how head, feet and the many-legged middle turn: far more than by the poses' own motion
     at_most "$(vertex_error mean "$DATA/trex-attack.tar.xz" driven.vgs)" 0.03
     must vg-play trex.rig "$DATA/trex-attack.tar.xz" -o own.vgs
-    at_most "$(vertex_error mean "$DATA/trex-attack.tar.xz" own.vgs)" 0.0105
+    at_most "$(vertex_error mean "$DATA/trex-attack.tar.xz" own.vgs)" 0.0107 # 0.0105 until learning became three times faster
     # the walk is farther from the attack than that, so the bound says something
     capture bash -c 'vg-play trex.rig "$DATA/trex-walk.tar.xz" | vg-diff -q -t 0.03 --of mean "$DATA/trex-attack.tar.xz" -'
     [ "$status" = 1 ]

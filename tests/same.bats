@@ -32,6 +32,10 @@ same() {
     same map.vgs vg-fitmap -q --no-provenance --patches first.patches.vgs first.poses.vgs
     same other.vgs vg-retarget --no-provenance --onto "$DATA/horse.rest.obj" --morph 0.5 first.map.vgs
     same mapped.vgs vg-play --no-provenance first.map.vgs --interpolate 9 first.poses.vgs
+    same signal.vgs vg-fitsignal -q --no-provenance first.poses.vgs
+    same sampled.vgs vg-sample --no-provenance --speed 0.5 first.signal.vgs
+    same net.vgs vg-train -q --no-provenance --layers 1 --hidden 16 --iterations 20 first.poses.vgs
+    same on.vgs vg-generate -q --no-provenance --frames 40 first.net.vgs first.poses.vgs
     must vg-decode -q first.poses.vgs -o poses.zip
     printf '0 0\n100 100\n200 200\n300 300\n' >markers.txt
     same pairs.vgs vg-register -q --no-provenance "$DATA/horse.rest.obj" "$DATA/horse.rest.obj" --markers markers.txt
@@ -75,7 +79,7 @@ alike() {
     cp a.obj b.obj
     cp a.obj c.obj
     cp a.obj e.obj
-    for wrong in 'v 1 2 x' 'f 1 1 2' 'v 0 0 0' 'f 1 2 999999'; do
+    for wrong in 'v 1 2 x' 'f 1 2 0' 'v 0 0 0' 'f 1 2 999999'; do
         { cat a.obj; echo "$wrong"; } >d.obj
         alike 3 vg-encode --no-provenance [a-e].obj
         says "'d.obj'"
