@@ -162,8 +162,12 @@ static void solve_waiting(work *w)
         misfit[i] = p->misfit;
         rhs[i] = p->rhs, held[i] = p->held, roots[i] = p->frame.root, normals[i] = p->normals, x[i] = p->frame.values;
     }
-    if (w->n && w->at->robust) vg_robust_solve(w->at->robust, w->n, rhs, misfit, w->sizes, x, held, roots);
-    else if (w->n) vg_solver_solve(w->at->solver, w->n, rhs, x, held, roots);
+    if (w->n && w->at->robust) {
+        vg_err e;
+        if (vg_robust_solve(w->at->robust, w->n, rhs, misfit, w->sizes, x, held, roots, &e) < 0) cli_die(&e);
+    } else if (w->n) {
+        vg_solver_solve(w->at->solver, w->n, rhs, x, held, roots);
+    }
     free(misfit);
     size_t good = w->n && w->at->planar ? vg_planar_solve(w->at->planar, w->n, normals, x) : w->n;
     if (good < w->n)

@@ -206,11 +206,10 @@ void vg_robust_free(vg_robust **r);
 size_t vg_robust_misfits(const vg_robust *r);
 void vg_robust_load(const vg_robust *r, size_t n, const double *const *vectors, const double *const *guesses,
                     float *const *misfits, double *sizes);
-/* vg_robust_solve: in place of vg_solver_solve. Returns the number of the first pose that needs more rounds; n when none
- * does. */
-size_t vg_robust_solve(vg_robust *r, size_t n, const double *const *rhs, const float *const *misfits,
-                       const double *sizes, double *const *x, const double *const *anchors,
-                       const double *const *roots);
+/* vg_robust_solve: in place of vg_solver_solve. The first call makes room for one block of eight poses per thread. */
+int vg_robust_solve(vg_robust *r, size_t n, const double *const *rhs, const float *const *misfits, const double *sizes,
+                    double *const *x, const double *const *anchors, const double *const *roots,
+                    vg_err *e) VG_MUST_CHECK;
 vg_robust_facts vg_robust_get_facts(const vg_robust *r);
 
 /* Planarity (MATH 5; T 4.2.3): poses that minimise `fidelity` times the energy of the reconstruction plus `planarity`

@@ -28,6 +28,7 @@ static const double exact = 1e-11;     /* of the mean length of the wanted vecto
 typedef struct room {
     vgi_row *u, *trial, *g, *gn, *z, *zn, *d; /* rows of unknowns; all but z, zn and d also of the held vertices */
     vgi_row *corners;                         /* of the largest face */
+    vgi_row *memory;                          /* all of these */
     float *misfit;
 } room;
 
@@ -42,10 +43,9 @@ struct vg_robust {
     double *metric;
     unsigned char *star;
     size_t nmisfits;
-    vgi_row *memory;
-    float *misfit_memory;
-    room *rooms;            /* one per thread */
-    vg_robust_facts *found; /* per thread */
+    room *rooms; /* one per thread, nrooms of them made */
+    size_t nrooms;
+    vg_robust_facts *found; /* per room */
     vg_robust_facts facts;
 };
 
@@ -98,27 +98,36 @@ static int prepare_faces(vg_robust *r, vg_err *e)
     return VG_OK;
 }
 
-static int make_rooms(vg_robust *r, vg_err *e)
+static void free_room(room *m)
 {
-    size_t n = r->solver.rows, all = n + r->rows.nheld, threads = (size_t)r->solver.threads, total, floats;
-    size_t each = 4 * all + 3 * n + 2 * r->solver.g->max_corners;
-    r->rooms = vgi_array(threads, sizeof *r->rooms, e);
-    r->found = vgi_array(threads, sizeof *r->found, e);
-    if (!r->rooms || !r->found) return VG_ENOMEM;
-    if (vgi_mul(each, threads, &total) && vgi_mul(total, sizeof *r->memory, &total))
-        r->memory = aligned_alloc(sizeof(vgi_lanes), total);
-    if (vgi_mul(r->nmisfits + 1, threads * VGI_LANES * sizeof(float), &floats) && floats <= SIZE_MAX - 64)
-        r->misfit_memory = aligned_alloc(64, (floats + 63) / 64 * 64);
-    if (!r->memory || !r->misfit_memory)
-        return vg_fail(e, VG_ENOMEM, "not enough memory for the misfits of %zu faces", r->rows.nf);
-    for (size_t i = 0; i < threads; i++) {
-        room *m = &r->rooms[i];
-        vgi_row *at = r->memory + i * each;
-        m->u = at, m->trial = m->u + all, m->g = m->trial + all, m->gn = m->g + all, m->z = m->gn + all;
-        m->zn = m->z + n, m->d = m->zn + n, m->corners = m->d + n;
-        m->misfit = r->misfit_memory + i * VGI_LANES * (r->nmisfits + 1);
+    free(m->memory);
+    free(m->misfit);
+    *m = (room){0};
+}
+
+static bool make_room(room *m, const vg_robust *r)
+{
+    size_t n = r->solver.rows, all = n + r->rows.nheld, bytes;
+    if (vgi_mul(4 * all + 3 * n + 2 * r->solver.g->max_corners, sizeof *m->memory, &bytes))
+        m->memory = aligned_alloc(sizeof(vgi_lanes), bytes);
+    if (vgi_mul(r->nmisfits + 2, VGI_LANES * sizeof *m->misfit, &bytes)) m->misfit = aligned_alloc(64, bytes / 64 * 64);
+    if (!m->memory || !m->misfit) {
+        free_room(m);
+        return false;
     }
-    return VG_OK;
+    vgi_row *at = m->memory;
+    m->u = at, m->trial = m->u + all, m->g = m->trial + all, m->gn = m->g + all, m->z = m->gn + all;
+    m->zn = m->z + n, m->d = m->zn + n, m->corners = m->d + n;
+    return true;
+}
+
+/* Rooms for as many blocks as there are, at most one per thread: a short sequence on a large mesh needs one. Where
+ * memory ends, fewer blocks go side by side. */
+static int make_rooms(vg_robust *r, size_t blocks, vg_err *e)
+{
+    size_t most = blocks < (size_t)r->solver.threads ? blocks : (size_t)r->solver.threads;
+    while (r->nrooms < most && make_room(&r->rooms[r->nrooms], r)) r->nrooms++;
+    return r->nrooms ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory for the misfits of %zu faces", r->rows.nf);
 }
 
 int vg_robust_new(vg_robust **out, const vg_solver *s, size_t rounds, double eps, vg_err *e)
@@ -129,7 +138,11 @@ int vg_robust_new(vg_robust **out, const vg_solver *s, size_t rounds, double eps
     if (!r) return VG_ENOMEM;
     r->s = s, r->solver = vgi_solver_look(s), r->rounds = rounds, r->eps = eps;
     int ok = prepare_faces(r, e);
-    if (ok == VG_OK) ok = make_rooms(r, e);
+    if (ok == VG_OK) {
+        r->rooms = vgi_array((size_t)r->solver.threads, sizeof *r->rooms, e);
+        r->found = vgi_array((size_t)r->solver.threads, sizeof *r->found, e);
+        if (!r->rooms || !r->found) ok = VG_ENOMEM;
+    }
     if (ok < 0) vg_robust_free(out);
     return ok;
 }
@@ -143,8 +156,7 @@ void vg_robust_free(vg_robust **out)
     free(r->entry);
     free(r->metric);
     free(r->star);
-    free(r->memory);
-    free(r->misfit_memory);
+    for (size_t i = 0; i < r->nrooms; i++) free_room(&r->rooms[i]);
     free(r->rooms);
     free(r->found);
     free(r);
@@ -355,7 +367,6 @@ typedef struct robust_job {
     const double *sizes;
     double *const *x;
     const double *const *anchors, *const *roots;
-    bool *falling; /* n */
 } robust_job;
 
 /* The plain solution, as the way there from the guess, in units of the size of each pose. */
@@ -399,31 +410,27 @@ static void robust_block(void *context, size_t i)
     for (size_t k = 0; k < lanes; k++) {
         bool held = r->solver.anchored;
         vgi_solver_place(r->s, j->x[first + k], held ? j->anchors[first + k] : NULL, held ? NULL : j->roots[first + k]);
-        j->falling[first + k] = s.falling[k];
         found->unfinished += s.falling[k];
     }
 }
 
-size_t vg_robust_solve(vg_robust *r, size_t n, const double *const *rhs, const float *const *misfits,
-                       const double *sizes, double *const *x, const double *const *anchors,
-                       const double *const *roots)
+int vg_robust_solve(vg_robust *r, size_t n, const double *const *rhs, const float *const *misfits, const double *sizes,
+                    double *const *x, const double *const *anchors, const double *const *roots, vg_err *e)
 {
-    enum { ROUND = 256 }; /* poses whose outcome is noted at once */
-    bool falling[ROUND];
-    size_t threads = (size_t)r->solver.threads, good = n;
-    size_t most = VGI_LANES * (ROUND / VGI_LANES < threads ? ROUND / VGI_LANES : threads);
+    if (!n) return VG_OK;
+    int status = make_rooms(r, (n + VGI_LANES - 1) / VGI_LANES, e);
+    if (status < 0) return status;
+    size_t most = VGI_LANES * r->nrooms;
     for (size_t done = 0; done < n; done += most) {
         size_t some = n - done < most ? n - done : most;
         robust_job j = {r, some, rhs + done, misfits + done, sizes + done, x + done,
-                        r->solver.anchored ? anchors + done : NULL, r->solver.anchored ? NULL : roots + done, falling};
+                        r->solver.anchored ? anchors + done : NULL, r->solver.anchored ? NULL : roots + done};
         vgi_parallel(r->solver.threads, (some + VGI_LANES - 1) / VGI_LANES, robust_block, &j);
-        for (size_t k = 0; k < some && good == n; k++)
-            if (falling[k]) good = done + k;
     }
     r->facts = (vg_robust_facts){0};
-    for (size_t i = 0; i < threads; i++) {
+    for (size_t i = 0; i < r->nrooms; i++) {
         if (r->found[i].most_rounds > r->facts.most_rounds) r->facts.most_rounds = r->found[i].most_rounds;
         r->facts.unfinished += r->found[i].unfinished;
     }
-    return good;
+    return VG_OK;
 }
