@@ -19,12 +19,13 @@ typedef struct cli_option {
     /* what parsing does besides, the first that is not NULL: */
     bool *flag;
     const char **text;
+    const char **second; /* beside text: the option takes two words, and this is the other */
     double *number;
     long *integer;
     void (*take)(const char *value, void *context); /* repeated or structured options; dies by cli_usage */
     void *context;
     double least, most; /* for number and integer; both 0: any */
-    bool reads;         /* text is the name of an input: "-" is standard input */
+    bool reads;         /* text, and second, are names of inputs: "-" is standard input */
     const char *needs;  /* "a|b": one of these options must be there, too; NULL: none */
     const char *excludes; /* "a|b": none of these may be; said of one option of a pair */
 } cli_option;

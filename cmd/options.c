@@ -266,6 +266,17 @@ static void refuse_option(int problem, char **argv)
     cli_usage("unknown option '%.*s': '%s --help' lists them", length, text, cli.program->name);
 }
 
+/* An option of two words takes the next one, too: that is no option itself. */
+static void take_second(const cli_option *o, int argc, char **argv)
+{
+    const char *next = optind < argc ? argv[optind] : "-?";
+    const cli_moved *moved = strncmp(next, "--", 2) ? NULL : moved_option(next + 2, strcspn(next + 2, "="));
+    if (moved) cli_usage("--%s %s", moved->name, moved->now);
+    if (next[0] == '-' && next[1])
+        cli_usage("option '--%s' needs two values: %s", o->name, o->value);
+    *o->second = argv[optind++];
+}
+
 /* Operands are collected in order, options may stand between them; what follows "--" are operands. */
 static size_t parse(int argc, char **argv, char **operands)
 {
@@ -281,12 +292,15 @@ static size_t parse(int argc, char **argv, char **operands)
     letters[at] = 0;
     opterr = 0;
     for (int c; (c = getopt_long(argc, argv, letters, longs, NULL)) != -1;) {
-        if (c == 1)
+        if (c == 1) {
             operands[count++] = optarg;
-        else if (c != '?' && c != ':')
-            take_option(find_option(c), optarg);
-        else if (!want_version)
+        } else if (c != '?' && c != ':') {
+            size_t number = find_option(c);
+            take_option(number, optarg);
+            if (known.at[number]->second) take_second(known.at[number], argc, argv);
+        } else if (!want_version) {
             refuse_option(c, argv);
+        }
         if (want_help) return 0;
     }
     while (optind < argc) operands[count++] = argv[optind++];
@@ -329,6 +343,7 @@ static void check_together(void)
         if (o->needs) check_needs(o);
         check_excludes(o);
         if (o->reads && o->text) cli_claim_input(o->name, *o->text);
+        if (o->reads && o->second) cli_claim_input(o->name, *o->second);
     }
 }
 

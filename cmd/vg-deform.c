@@ -25,10 +25,8 @@ static const cli_option options[] = {
     {"pin", 0, "auto|always|none",
      "hold what does not move in the source: where it is much of the mesh (default), ...",
      .choice = &opts.pin_choice, .needs = "onto"},
-    {"examples", 0, "FILE", "poses of the sequence's body that are known on the target, too: --sculpted",
-     .text = &opts.examples, .reads = true, .needs = "sculpted"},
-    {"sculpted", 0, "FILE", "the same poses of the target: the transfer meets them, and goes between them",
-     .text = &opts.sculpted, .reads = true, .needs = "examples"},
+    {"examples", 0, "POSES SCULPTED", "poses of the sequence's body, and the same ones of the target: the transfer meets them",
+     .text = &opts.examples, .second = &opts.sculpted, .reads = true, .needs = "onto"},
     {.name = NULL}};
 
 static const cli_moved moved[] = {{"interpolate", "is now the program vg-interpolate: vg-interpolate 30"},
@@ -40,6 +38,7 @@ static const cli_moved moved[] = {{"interpolate", "is now the program vg-interpo
                                   {"joints", "is now an option of vg-play: vg-play MAP --joints"},
                                   {"transforms", "is now an option of vg-play: vg-play MAP --transforms"},
                                   {"live", "is now an option of vg-play: vg-play MAP --live"},
+                                  {"sculpted", "is now the second value of --examples: --examples POSES SCULPTED"},
                                   {.name = NULL}};
 
 static const cli_program program = {
@@ -77,6 +76,8 @@ typedef struct work {
     vg_mover *mover;          /* NULL: poses are measured */
     vg_pinner *pinner;        /* NULL: nothing is held */
     vg_corrector *corrector;  /* NULL: there are no examples */
+    bool *sculpted;           /* vertices that a sculpted pose moves: they are not held */
+    uint32_t *held;           /* room for the others */
     vg_frame out[BATCH];
 } work;
 
@@ -128,6 +129,15 @@ static void run_batch(work *w, size_t n, const double *const *in, double *const 
     }
 }
 
+/* Vertices that stay in the source, but for those that a sculpted pose moves. */
+static size_t leave_sculpted(work *w, const uint32_t *still, size_t n)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < n; i++)
+        if (!w->sculpted[still[i]]) w->held[kept++] = still[i];
+    return kept;
+}
+
 /* What a frame says beside its values. */
 static void finish_frame(work *w, vg_frame *in, vg_frame *out)
 {
@@ -143,6 +153,7 @@ static void finish_frame(work *w, vg_frame *in, vg_frame *out)
     if (w->way == SHAPE) vg_mover_place(w->mover, out->root, out->values);
     if (!w->pinner) return;
     size_t n = vg_pinner_find(w->pinner, in->values, &still);
+    if (w->sculpted) n = leave_sculpted(w, still, n), still = w->held;
     if (vg_frame_pin(out, still, n, &e) < 0) cli_die(&e);
 }
 
@@ -322,6 +333,17 @@ static poses read_examples(work *w, const char *operand, const vg_mesh *mesh)
     return p;
 }
 
+static void find_sculpted(work *w, const poses *p)
+{
+    const vg_body *b = &w->target.body;
+    double near = 1e-6 * vg_diagonal(b->reference, b->mesh.nv);
+    w->sculpted = cli_allocate(b->mesh.nv, sizeof *w->sculpted, "examples");
+    w->held = cli_allocate(b->mesh.nv, sizeof *w->held, "examples");
+    for (size_t i = 0; i < p->n * p->numbers; i++)
+        if (fabs(p->values[i] - b->reference[i % p->numbers]) > near) w->sculpted[i % p->numbers / 3] = true;
+}
+
+/* Plain transfer of the examples says what it misses in them. */
 static void make_corrector(work *w)
 {
     vg_err e;
@@ -341,6 +363,7 @@ static void make_corrector(work *w)
     const vg_examples x = {from.n, source, target, (const double *const *)made};
     if (vg_corrector_new(&w->corrector, w->from, w->h->body.reference, w->to, w->target.body.reference, &x, cli.threads, &e) < 0)
         cli_die(&e);
+    if (w->pinner) find_sculpted(w, &to);
     for (size_t i = 0; i < from.n; i++) free(made[i]);
     free(made);
     free(source);

@@ -182,6 +182,26 @@ static void say(const vg_signal *s, const vg_signal_report *r)
 
 /* ---- which frames to sculpt ---- */
 
+static int by_number(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* The frames as vg-encode --take wants them: "3,17,40". */
+static char *list_frames(const uint32_t *frame, size_t n)
+{
+    size_t size = 12 * n + 1, at = 0;
+    char *list = cli_allocate(size, 1, "frames");
+    uint32_t *sorted = cli_allocate(n, sizeof *sorted, "frames");
+    memcpy(sorted, frame, n * sizeof *sorted);
+    qsort(sorted, n, sizeof *sorted, by_number);
+    for (size_t i = 0; i < n; i++) at += (size_t)snprintf(list + at, size - at, "%s%u", i ? "," : "", sorted[i]);
+    free(sorted);
+    return list;
+}
+
+/* Frames count from 0 here, as vg-encode --take and vg-diff --frames count them. */
 static void pick(const vg_head *h, poses *p)
 {
     vg_err e;
@@ -195,12 +215,15 @@ static void pick(const vg_head *h, poses *p)
     left = cli_allocate(n, sizeof *left, "frames");
     if (vg_signal_pick(&h->body, p->values, p->n, n, cli.threads, frame, left, &e) < 0) cli_die(&e);
     report *t = report_new();
+    char *list = list_frames(frame, n);
+    report_put(t, "take", "take", report_text(list));
     report_table(t, "frames", "", false, columns, 3);
     for (size_t i = 0; i < n; i++)
-        report_row(t, (report_value[]){report_count(frame[i] + 1), report_text(p->names[frame[i]]), report_number(left[i])});
+        report_row(t, (report_value[]){report_count(frame[i]), report_text(p->names[frame[i]]), report_number(left[i])});
     report_print(t, cli_text_open(), cli.json);
     cli_text_end();
     report_free(&t);
+    free(list);
     cli_finish(0);
 }
 

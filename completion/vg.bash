@@ -50,7 +50,7 @@ _vg_complete_value() {
     *'|'*) mapfile -t COMPREPLY < <(compgen -W "$(_vg_choices "$1")" -- "$3") ;;
     MAP) _vg_files "$3" 'map|rig|vgs' ;;
     PATCHES) _vg_files "$3" 'patches|vgs' ;;
-    MESH | SKELETON | OTHER | TRUTH | *=MESH) _vg_files "$3" "$_vg_sequences" ;;
+    MESH | POSES | SKELETON | OTHER | TRUTH | *=MESH) _vg_files "$3" "$_vg_sequences" ;;
     FILE)
         case $2 in
         -o | --output) mapfile -t COMPREPLY < <(compgen -f -- "$3") ;;

@@ -122,6 +122,16 @@ import json, sys
 f = json.load(sys.stdin)['frames']
 left = [a['left'] for a in f]
 assert len({a['frame'] for a in f}) == 3 and 1 > left[0] > left[1] > left[2] > 0, f"
+    vg-encode --take "$(value take)" "$(trex vgs)" -o picked.vgs # the list is what --take takes; its frames are those named
+    names=$(printf '%s' "$output" | python3 -c "
+import json, sys
+print(*sorted(f['name'] for f in json.load(sys.stdin)['frames']))")
+    py picked.vgs <<'END'
+import sys
+from read_stream import read_stream
+print(*[f.name for f in read_stream(sys.argv[1]).frames])
+END
+    [ "$output" = "$names" ] || fail "$output is not $names"
     must_fail 2 vg-fitsignal --pick 99 "$(trex vgs)"
 }
 
@@ -252,7 +262,7 @@ assert 0 < s['error_shape'] <= 0.7e-2 and 0 < s['error'] <= 1e-2 and s['compress
     vg-encode --take 0,3,6,9,12 "$DATA/human-heavy-poses.tar.xz" -o heavy.vgs
     vg-encode --take 1-3 man.vgs -o some.vgs
     vg-encode --take 1-3 heavy.vgs -o sculpted.vgs
-    pipe "vg-deform --onto heavy.vgs --examples some.vgs --sculpted sculpted.vgs man.vgs | vg-solve -o out.vgs"
+    pipe "vg-deform --onto heavy.vgs --examples some.vgs sculpted.vgs man.vgs | vg-solve -o out.vgs"
     pipe "vg-deform --onto heavy.vgs man.vgs | vg-solve -o plain.vgs"
     must vg-encode --take 0-3 out.vgs -o met.vgs
     must vg-encode --take 0-3 heavy.vgs -o wanted.vgs
@@ -265,13 +275,93 @@ def mean(f):
     return json.loads(out.stdout)["frame_errors"][4]["mean"]
 assert mean("out.vgs") < 0.9 * mean("plain.vgs"), (mean("out.vgs"), mean("plain.vgs"))
 END
-    must_fail 2 vg-deform --onto heavy.vgs --examples some.vgs man.vgs -o out2.vgs
-    must_fail 3 vg-deform --onto heavy.vgs --examples some.vgs --sculpted heavy.vgs man.vgs -o out2.vgs
+    must_fail 2 vg-deform --onto heavy.vgs man.vgs --examples some.vgs
+    must_fail 2 vg-deform --onto heavy.vgs man.vgs --examples some.vgs --root stay
+    says "option '--examples' needs two values: POSES SCULPTED"
+    must_fail 2 vg-deform --onto heavy.vgs --examples some.vgs -o out2.vgs man.vgs
+    must_fail 2 vg-deform --onto heavy.vgs --examples some.vgs --sculpted sculpted.vgs man.vgs -o out2.vgs
+    says "--sculpted is now the second value of --examples"
+    must_fail 2 vg-deform --examples some.vgs sculpted.vgs man.vgs -o out2.vgs
+    says "--examples needs --onto"
+    must_fail 2 vg-deform --onto heavy.vgs --examples - - man.vgs -o out2.vgs
+    must_fail 3 vg-deform --onto heavy.vgs --examples some.vgs heavy.vgs man.vgs -o out2.vgs
     says "they must be the same ones"
-    must_fail 3 vg-deform --onto heavy.vgs --examples man.vgs --sculpted heavy.vgs man.vgs -o out2.vgs
+    must_fail 3 vg-deform --onto heavy.vgs --examples man.vgs heavy.vgs man.vgs -o out2.vgs
     says "one of them is the reference pose"
-    must_fail 3 vg-deform --onto heavy.vgs --examples "$(trex vgs)" --sculpted heavy.vgs man.vgs -o out2.vgs
+    must_fail 3 vg-deform --onto heavy.vgs --examples "$(trex vgs)" heavy.vgs man.vgs -o out2.vgs
     [ ! -e out2.vgs ]
+}
+
+# mean_of TRUTH RESULT FRAME...: over all frames but these, centroids at 0, in D of TRUTH
+mean_of() {
+    vg-diff -c --frames --json "$1" "$2" | python3 -c "
+import json, sys
+r = json.load(sys.stdin)
+e = [f['mean'] for i, f in enumerate(r['frame_errors']) if str(i) not in sys.argv[1:]]
+print(sum(e) / len(e) / r['D'])" "${@:3}"
+}
+below() { python3 -c "import sys; sys.exit(not float(sys.argv[1]) <= float(sys.argv[2]))" "$@" || fail "$1 is not below $2"; }
+
+@test "vg-deform --examples --correspondence: the same onto a mesh with other vertices" {
+    vg-encode --take 0-/2 "$(horse vgs)" -o run.vgs
+    vg-decode run.vgs -o run/
+    mkdir truth twin
+    cp "$DATA/horse.rest.obj" run/rest.obj
+    python3 - <<'END'
+# truth: the horse stretched, which no transfer knows of; its vertices in another order. twin: the horse in that order
+import os
+for name in os.listdir("run"):
+    lines = open("run/" + name).read().splitlines()
+    v = [list(map(float, l.split()[1:])) for l in lines if l.startswith("v ")]
+    faces = [[int(i.split("/")[0]) for i in l.split()[1:]] for l in lines if l.startswith("f ")]
+    for where, s in ("truth", (1, 1.4, 0.7)), ("twin", (1, 1, 1)):
+        with open(f"{where}/{name}", "w") as f:
+            for p in reversed(v): print("v", *[a * b for a, b in zip(p, s)], file=f)
+            for a in faces: print("f", *[len(v) + 1 - i for i in a], file=f)
+END
+    must vg-register --aligned run/rest.obj twin/rest.obj -o pairs.vgs
+    mv truth/rest.obj stretched.obj
+    vg-encode truth/ -o truth.vgs
+    vg-encode --take 2,5,8 run.vgs -o some.vgs
+    vg-encode --take 2,5,8 truth.vgs -o sculpted.vgs
+    pipe "vg-deform --onto stretched.obj --correspondence pairs.vgs run.vgs | vg-solve -o plain.vgs"
+    pipe "vg-deform --onto stretched.obj --correspondence pairs.vgs --examples some.vgs sculpted.vgs run.vgs | vg-solve -o out.vgs"
+    must vg-encode --take 2,5,8 out.vgs -o met.vgs
+    vg-diff -c -t 1e-9 sculpted.vgs met.vgs
+    below "$(mean_of truth.vgs out.vgs 2 5 8)" "$(python3 -c "print($(mean_of truth.vgs plain.vgs 2 5 8) / 2)")"
+}
+
+# as in the table of doc/MATH.md, section 11, and 5 %
+@test "vg-deform --examples: a walk onto a heavy man and onto a woman (needs VG_DATA, the data kit)" {
+    [ -d "${VG_DATA:-}/human" ] || skip "VG_DATA does not name the data kit"
+    kit=$VG_DATA/human
+    for body in man heavy woman; do
+        vg-encode --reference "$kit/walk-$body.rest.obj" "$kit/walk-$body.tar.gz" -o $body.vgs
+    done
+    for set in 4:1.15e-3 8:0.59e-3; do
+        must vg-fitsignal --pick ${set%:*} --json man.vgs
+        take=$(value take)
+        for body in man heavy woman; do vg-encode --take "$take" $body.vgs -o some-$body.vgs; done
+        pipe "vg-deform --onto $kit/walk-heavy.rest.obj --examples some-man.vgs some-heavy.vgs man.vgs | vg-solve -o out.vgs"
+        below "$(mean_of heavy.vgs out.vgs ${take//,/ })" ${set#*:}
+    done
+    vg-register --markers "$VG_DATA/correspondences/male1591-female1605.markers.txt" "$kit/walk-man.rest.obj" \
+        "$kit/walk-woman.rest.obj" -o pairs.vgs
+    pipe "vg-deform --onto $kit/walk-woman.rest.obj --correspondence pairs.vgs man.vgs | vg-solve -o plain.vgs"
+    pipe "vg-deform --onto $kit/walk-woman.rest.obj --correspondence pairs.vgs --examples some-man.vgs some-woman.vgs man.vgs |
+        vg-solve -o out.vgs"
+    below "$(mean_of woman.vgs out.vgs ${take//,/ })" "$(python3 -c "print($(mean_of woman.vgs plain.vgs) / 8)")"
+}
+
+@test "vg-deform --examples: poses of a man onto a heavy one" {
+    for body in man heavy; do vg-encode "$DATA/human-$body-poses.tar.xz" -o $body.vgs; done
+    for set in 4:5.76e-3 7:4.38e-3 11:2.55e-3; do
+        must vg-fitsignal --pick ${set%:*} --json man.vgs
+        take=$(value take)
+        for body in man heavy; do vg-encode --take "$take" $body.vgs -o some-$body.vgs; done
+        pipe "vg-deform --onto heavy.vgs --examples some-man.vgs some-heavy.vgs man.vgs | vg-solve -o out.vgs"
+        below "$(mean_of heavy.vgs out.vgs ${take//,/ })" ${set#*:}
+    done
 }
 
 @test "a sequence that holds still, two frames, a single triangle" {
