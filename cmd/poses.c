@@ -36,6 +36,20 @@ poses poses_read(vg_source *s, size_t most)
     return p;
 }
 
+poses poses_load(const char *operand, size_t most, const vg_mesh *mesh, vg_head *to)
+{
+    vg_err e;
+    vg_source *s = cli_source((char *[]){(char *)operand}, 1);
+    vg_head *h = vg_source_head(s);
+    char name[200];
+    snprintf(name, sizeof name, "'%.190s'", operand);
+    cli_need_vertices(h, name);
+    if (vg_mesh_same(mesh, "its body", &h->body.mesh, name, &e) < 0 || vg_head_merge_trace(to, h, &e) < 0) cli_die(&e);
+    poses p = poses_read(s, most);
+    vg_source_close(&s);
+    return p;
+}
+
 void poses_clear(poses *p)
 {
     for (size_t i = 0; p->names && i < p->n; i++) free(p->names[i]);

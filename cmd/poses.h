@@ -14,6 +14,8 @@ typedef struct poses {
 
 /* poses_read: to the end; stops when there are more than `most`. */
 poses poses_read(vg_source *s, size_t most);
+/* poses_load: those of an operand of an option: vertices of this mesh. `to` takes the provenance. */
+poses poses_load(const char *operand, size_t most, const vg_mesh *mesh, vg_head *to);
 void poses_clear(poses *p);
 /* poses_name: names and times become the signal's. */
 void poses_name(poses *p, vg_signal *s);

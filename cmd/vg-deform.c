@@ -52,7 +52,7 @@ static const cli_program program = {
     .writes_vectors = true,
     .threaded = true};
 
-enum { BATCH = 8 }; /* poses of one call: the lanes of the kernels */
+enum { BATCH = 8, MOST_EXAMPLES = 1000 }; /* poses of one call: the lanes of the kernels */
 
 /* How poses become what is written. */
 typedef enum way { MEASURE, APPLY, TRANSFER, CARRY, SHAPE } way;
@@ -318,21 +318,6 @@ static void make_followers(work *w)
     if (r < 0) cli_die(&e);
 }
 
-/* Poses of one body, for an option. */
-static poses read_examples(work *w, const char *operand, const vg_mesh *mesh)
-{
-    vg_err e;
-    vg_source *s = cli_source((char *[]){(char *)operand}, 1);
-    vg_head *h = vg_source_head(s);
-    char name[200];
-    snprintf(name, sizeof name, "'%.190s'", operand);
-    cli_need_vertices(h, name);
-    if (vg_mesh_same(mesh, "its body", &h->body.mesh, name, &e) < 0 || vg_head_merge_trace(w->h, h, &e) < 0) cli_die(&e);
-    poses p = poses_read(s, 1000);
-    vg_source_close(&s);
-    return p;
-}
-
 static void find_sculpted(work *w, const poses *p)
 {
     const vg_body *b = &w->target.body;
@@ -350,7 +335,8 @@ static void make_corrector(work *w)
     if (!opts.examples) return;
     if (w->kind != VG_VERTICES || (w->way != TRANSFER && w->way != CARRY))
         cli_usage("--examples needs --onto, a sequence of vertices, and another way than --by shape");
-    poses from = read_examples(w, opts.examples, &w->source_mesh), to = read_examples(w, opts.sculpted, &w->target.body.mesh);
+    poses from = poses_load(opts.examples, MOST_EXAMPLES, &w->source_mesh, w->h);
+    poses to = poses_load(opts.sculpted, MOST_EXAMPLES, &w->target.body.mesh, w->h);
     if (from.n != to.n || !from.n)
         cli_stop(VG_EINPUT, "'%s' has %zu poses and '%s' %zu: they must be the same ones", opts.examples, from.n, opts.sculpted, to.n);
     const double **source = cli_allocate(from.n, sizeof *source, "examples"), **target = cli_allocate(from.n, sizeof *target, "examples");

@@ -13,7 +13,7 @@ static struct {
     double tolerance;
     long m, l, k, pick;
     size_t root, sites, basis; /* numbers of choices */
-    const char *layout, *place, *report;
+    const char *layout, *place, *examples, *report;
     size_t npins;
     vg_pin *pins;
 } opts = {.tolerance = 1e-2};
@@ -53,6 +53,8 @@ static const cli_option options[] = {
     {"sites", 0, "farthest|gain", "sites are frames of the largest error (default), or those that help most",
      .choice = &opts.sites},
     {"basis", 0, "double|single|int16", "how precisely the basis is kept (default double)", .choice = &opts.basis},
+    {"examples", 0, "POSES", "shapes are sums of what these poses differ by from the first of them",
+     .text = &opts.examples, .reads = true, .excludes = "coordinates"},
     {"pick", 0, "N", "no fit: name the N frames from which the others are predicted best", .integer = &opts.pick,
      .least = 1, .most = 1000},
     {"report", 0, "FILE", "write what was fitted, and every frame's error, to FILE; '-' is standard output",
@@ -172,7 +174,7 @@ static void say(const vg_signal *s, const vg_signal_report *r)
     if (s->layout != VG_LAYOUT_PLACED)
         cli_note("layout %s %g, deviation between frames %.3g of that of straight lines, %zu crossings",
                  layout_name(s->layout), s->layout_weight, s->layout_ratio, r->ncrossings);
-    if (!(opts.m || opts.l || opts.k) && s->error_time > opts.tolerance)
+    if (!(opts.m || opts.l || opts.k || opts.examples) && s->error_time > opts.tolerance)
         cli_warn("the tolerance of %g D is not reached: frames that are nearly at one place in the plane differ by up to "
                  "%.3g D", opts.tolerance, s->error_time);
     if (s->layout_ratio > 2)
@@ -245,9 +247,13 @@ int main(int argc, char **argv)
     poses p = poses_read(source, VG_SIGNAL_FRAMES);
     if (opts.pick) pick(h, &p);
     if (opts.place) o.place = read_places(opts.place, p.n), o.layout = VG_LAYOUT_PLACED;
+    poses x = {0};
+    if (opts.examples) x = poses_load(opts.examples, VG_SIGNAL_FRAMES, &h->body.mesh, h);
+    o.examples = x.values, o.nexamples = x.n;
     vg_signal_clear(&h->signal);
     if (vg_signal_fit(&h->signal, &h->body, p.values, p.n, &o, &r, &e) < 0) cli_die(&e);
     poses_name(&p, &h->signal);
+    poses_clear(&x);
     say(&h->signal, &r);
     cli_stream_open(h);
     cli_stream_end(vg_source_tail(source));

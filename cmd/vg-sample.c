@@ -2,13 +2,14 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 #include "lines.h"
+#include "poses.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 static struct {
-    const char *at, *retime, *edit, *curve;
+    const char *at, *retime, *edit, *curve, *onto;
     double fps, speed;
     long frames;
 } opts;
@@ -28,6 +29,8 @@ static const cli_option options[] = {
      .text = &opts.edit, .reads = true},
     {"curve", 0, "FILE", "poses along this curve through the plane: lines 'X Y' it goes through, or 'control X Y'",
      .text = &opts.curve, .reads = true},
+    {"onto", 0, "POSES", "on another body: its poses take the place of those of vg-fitsignal --examples",
+     .text = &opts.onto, .reads = true},
     {.name = NULL}};
 
 static const cli_program program = {
@@ -233,6 +236,24 @@ static void sample(vg_head *h, const vg_signal *s, const plan *p)
     free(x);
 }
 
+/* The signal goes to the body of --onto, whose head is returned; source: to be closed. */
+static vg_head *change_body(vg_head *h, vg_signal *s, vg_source **source)
+{
+    vg_err e;
+    *source = cli_source((char *[]){(char *)opts.onto}, 1);
+    vg_head *to = vg_source_head(*source);
+    char name[200];
+    snprintf(name, sizeof name, "'%.190s'", opts.onto);
+    cli_need_vertices(to, name);
+    poses p = poses_read(*source, VG_SIGNAL_FRAMES);
+    if (vg_signal_onto(s, &h->body, &to->body, p.values, p.n, &e) < 0) cli_stop(e.code, "%s: %s", name, e.message);
+    p.values = NULL;
+    poses_clear(&p);
+    if (vg_head_merge_trace(to, h, &e) < 0) cli_die(&e);
+    vg_signal_clear(&to->signal);
+    return to;
+}
+
 int main(int argc, char **argv)
 {
     char **operands;
@@ -253,6 +274,8 @@ int main(int argc, char **argv)
     if (opts.at) plan_list(&p, &s);
     else if (opts.curve) plan_curve(&p, &s);
     else plan_even(&p, &s, &retime);
+    vg_source *other = NULL;
+    if (opts.onto) h = change_body(h, &s, &other);
     sample(h, &s, &p);
     cli_stream_end(vg_source_tail(source));
     vg_retime_clear(&retime);
@@ -260,5 +283,6 @@ int main(int argc, char **argv)
     free(p.time);
     free(p.place);
     vg_source_close(&source);
+    vg_source_close(&other);
     cli_finish(0);
 }

@@ -803,7 +803,7 @@ class _Reader:
                               home if has_home else None, joint_at, joint_weight, corners, held_at, joints, held,
                               held_patch, per_corner, corner_bones)
 
-    def check_signal(self, p: _Payload, n: int, space: int, d: int, sites: int, k: int, bits: int, turns: int, layout: int):
+    def check_signal(self, p: _Payload, n: int, space: int, d: int, sites: int, k: int, bits: int, layout: int):
         if n < 2:
             p.fail("it has fewer than 2 frames")
         if k < 4:
@@ -816,8 +816,6 @@ class _Reader:
             p.fail("its shapes are not of this mesh")
         if bits not in (64, 32, 16):
             p.fail("the precision of its basis is not known")
-        if turns:
-            p.fail("shapes of vertices have no turns")
         if layout > 4:
             p.fail("its layout is not known")
 
@@ -830,10 +828,15 @@ class _Reader:
         short = p.u8s(2 * m * d if bits == 16 else 0)
         unit, coordinate, position = p.f64s(m if bits == 16 else 0), p.f64s(n * m), p.f64s(2 * n)
         site, parameter, knot, control = p.u32s(sites), p.f64s(n), p.f64s(k + 2), p.f64s(2 * k)
-        turn, shift, _ = p.f64s(4 * n if rooted else 0), p.f64s(3 * n if rooted else 0), p.f64s(4 * turns)
+        turn, shift, home = p.f64s(4 * n if rooted else 0), p.f64s(3 * n if rooted else 0), p.f64s(4 * turns)
         times, names = p.f64s(n if timed else 0), p.texts(n)
         p.end()
-        self.check_signal(p, n, space, d, sites, k, bits, turns, layout)
+        self.check_signal(p, n, space, d, sites, k, bits, layout)
+        if turns and not (examples and rooted):
+            p.fail("its shapes have no turns")
+        if turns and turns - 1 != m:
+            p.fail("its turns are not those of its examples")
+        self.check_turns(p, home)
         if any(not a < b for a, b in zip(parameter, parameter[1:])):
             p.fail("its parameters do not rise")
         if any(not a <= b for a, b in zip(knot, knot[1:])):

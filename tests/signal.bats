@@ -364,6 +364,57 @@ END
     done
 }
 
+@test "--examples and --onto: shapes are sums of poses, and of those of another body" {
+    vg-encode --take 0,3,6,9,12 "$DATA/human-man-poses.tar.xz" -o man.vgs
+    vg-encode --take 0-3 man.vgs -o some.vgs
+    vg-encode --take 0-3 "$(trex vgs)" -o other.vgs # another body and connectivity: any poses will do
+    must vg-fitsignal -t 1e-9 --examples some.vgs --report - --json man.vgs -o of-some.signal
+    [ "$(value coordinates)" = 3 ] || fail "$output"
+    must vg-info --check of-some.signal
+    py of-some.signal <<'END'
+import sys
+from read_stream import read_stream
+assert read_stream(sys.argv[1]).signal.examples
+END
+    vg-sample of-some.signal -o own.vgs
+    must vg-encode --take 0-3 own.vgs -o met.vgs
+    vg-diff -t 1e-9 some.vgs met.vgs # the examples; the fifth frame is no sum of them
+    must_fail 1 vg-diff -t 1e-2 man.vgs own.vgs
+    must vg-sample --onto some.vgs of-some.signal -o same.vgs
+    vg-diff -t 1e-12 own.vgs same.vgs
+    must vg-sample --onto other.vgs of-some.signal -o onto.vgs
+    must vg-encode --take 0-3 onto.vgs -o met.vgs
+    vg-diff -c -t 1e-9 other.vgs met.vgs
+    # the fifth frame, laid on its least squares by the turn that was taken out: nothing of what is left is along the examples
+    must vg-fitsignal -q --root none -t 1e-9 --examples some.vgs man.vgs -o plain.signal
+    vg-sample plain.signal -o own.vgs
+    py <<'END'
+from read_stream import read_stream
+man, own = read_stream("man.vgs").frames, read_stream("own.vgs").frames
+left = [a - b for a, b in zip(man[4].values, own[4].values)]
+for j in (1, 2, 3):
+    along = [a - b for a, b in zip(man[j].values, man[0].values)]
+    dot = sum(a * b for a, b in zip(left, along))
+    assert abs(dot) < 1e-6 * sum(a * a for a in left) ** .5 * sum(a * a for a in along) ** .5, (j, dot)
+assert sum(a * a for a in left) > 0
+END
+    vg-encode --take 0-2 man.vgs -o three.vgs
+    must_fail 3 vg-sample --onto three.vgs of-some.signal -o no.vgs
+    says "there are 3 poses, and the signal has 4 examples: they must be the same ones"
+    must_fail 3 vg-sample --onto other.vgs "$(trex signal)" -o no.vgs
+    says "the signal's shapes are no sums of examples: fit it with vg-fitsignal --examples"
+    vg-encode man.vgs three.vgs -o twice.vgs
+    must_fail 3 vg-fitsignal --examples twice.vgs man.vgs -o no.signal
+    says "the examples are not independent"
+    vg-encode --take 0 man.vgs -o one.vgs
+    must_fail 3 vg-fitsignal --examples one.vgs man.vgs -o no.signal
+    says "there must be at least 2"
+    must_fail 3 vg-fitsignal --examples other.vgs man.vgs -o no.signal
+    must_fail 2 vg-fitsignal --examples some.vgs -m 3 man.vgs -o no.signal
+    must_fail 2 vg-sample --onto - - -o no.vgs
+    [ ! -e no.vgs ] && [ ! -e no.signal ]
+}
+
 @test "a sequence that holds still, two frames, a single triangle" {
     poses two 2
     for i in 1 2 3 4; do cp pose1.obj same$i.obj; done

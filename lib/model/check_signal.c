@@ -22,7 +22,8 @@ static const char *refuse_counts(const vg_signal *s, const vg_mesh *mesh)
     if (s->space != VG_SPACE_VERTICES) return "its shape space is not known";
     if (s->d != 3 * mesh->nv) return "its shapes are not of this mesh";
     if (s->bits != 64 && s->bits != 32 && s->bits != 16) return "the precision of its basis is not known";
-    if (s->nturns) return "shapes of vertices have no turns";
+    if (s->nturns && !(s->examples && s->rooted)) return "its shapes have no turns";
+    if (s->nturns && s->nturns - 1 != s->m) return "its turns are not those of its examples";
     if (s->layout > VG_LAYOUT_PLACED) return "its layout is not known";
     return NULL;
 }
@@ -59,6 +60,7 @@ int vgi_check_signal(vg_head *h, void *artefact, const char *where, vg_err *e)
         why = refuse_sites(s, used);
         free(used);
     }
+    if (!why && s->nturns && !vgi_are_turns(s->home_turn, s->nturns)) why = "a turn is no unit quaternion";
     if (!why && s->rooted && !vgi_are_turns(s->turn, s->n)) why = "a turn is no unit quaternion";
     for (size_t j = 0; !why && s->bits == 16 && j < s->m; j++)
         if (!(s->basis_unit[j] > 0)) why = "a unit of its basis is not positive";

@@ -7,6 +7,7 @@
 #include "numeric/blas.h"
 #include "signal/curve.h"
 #include "signal/root.h"
+#include "signal/span.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -18,6 +19,9 @@ typedef struct fitting {
     size_t n;
     double d, tolerance; /* D; the largest distance that is allowed */
     vgi_basis basis;
+    vgi_span span;         /* of examples */
+    double *other;         /* with examples: the frames as sums of them when basis has the frames, and the other way
+                              round; NULL: there are none */
     vgi_plate plate;
     double *room, *fitted; /* n x rank each */
     double *coefficients, *functions;
@@ -75,20 +79,30 @@ static int error_of_time(fitting *f, size_t knots, vgi_error *error, vg_err *e)
     return error_of(f, f->fitted, m, m, error, e);
 }
 
+/* Sites and control points are for what examples can say: a search compares with that, a report with the frames. */
+static void exchange_poses(fitting *f)
+{
+    double *poses = f->basis.centred;
+    if (!f->other) return;
+    f->basis.centred = f->other, f->other = poses;
+}
+
 /* The smallest of low .. high that is within the limit; high if none is. */
 static int smallest(fitting *f, size_t low, size_t high, double limit,
                     int (*measure)(fitting *f, size_t count, vgi_error *error, vg_err *e), size_t *found, vg_err *e)
 {
-    while (low < high) {
+    int r = VG_OK;
+    exchange_poses(f);
+    while (low < high && r == VG_OK) {
         size_t middle = (low + high) / 2;
         vgi_error error = {0};
-        int r = measure(f, middle, &error, e);
-        if (r < 0) return r;
+        r = measure(f, middle, &error, e);
         if (error.most <= limit) high = middle;
         else low = middle + 1;
     }
+    exchange_poses(f);
     *found = high;
-    return VG_OK;
+    return r;
 }
 
 /* ---- the steps ---- */
@@ -112,8 +126,9 @@ static int fit_shape(fitting *f, vg_err *e)
     int r = VG_ENOMEM;
     if (!(f->room = vgi_array(size, sizeof *f->room, e)) || !(f->fitted = vgi_array(size, sizeof *f->fitted, e)))
         return VG_ENOMEM;
-    s->m = f->o->m < rank ? f->o->m : rank;
-    if (!f->o->m && (r = smallest(f, 0, rank, 0.7 * f->tolerance, error_of_shape, &s->m, e)) < 0) return r;
+    s->m = f->o->m && f->o->m < rank ? f->o->m : rank;
+    if (f->o->nexamples && (r = vgi_span_project(&f->basis, &f->other, e)) < 0) return r;
+    if (!f->o->m && !f->o->nexamples && (r = smallest(f, 0, rank, 0.7 * f->tolerance, error_of_shape, &s->m, e)) < 0) return r;
     if ((r = error_of_shape(f, s->m, &error, e)) < 0) return r;
     s->error_shape = error.most / f->d;
     return VG_OK;
@@ -213,12 +228,24 @@ static int find_crossings(fitting *f, vg_err *e)
     return r;
 }
 
+static void keep_examples(fitting *f)
+{
+    vg_signal *s = f->s;
+    s->examples = true;
+    s->mean = f->span.home, f->span.home = NULL;
+    s->basis = f->span.difference, f->span.difference = NULL;
+    vgi_span_coordinates(&f->span, f->n, s->coordinate);
+}
+
 static int keep_shapes(fitting *f, vg_err *e)
 {
     vg_signal *s = f->s;
     s->bits = 64;
-    s->mean = f->basis.mean, f->basis.mean = NULL;
-    s->basis = f->basis.vectors, f->basis.vectors = NULL;
+    if (f->o->nexamples) keep_examples(f);
+    else {
+        s->mean = f->basis.mean, f->basis.mean = NULL;
+        s->basis = f->basis.vectors, f->basis.vectors = NULL;
+    }
     double *less = realloc(s->basis, s->m * s->d * sizeof *less + 1);
     if (less) s->basis = less;
     return f->o->bits && f->o->bits != 64 ? vg_signal_store(s, f->o->bits, e) : VG_OK;
@@ -231,10 +258,43 @@ static int check(const vg_body *body, size_t n, const vg_signal_options *o, vg_e
         return vg_fail(e, VG_EINPUT, "%zu frames are more than a signal shows at once (%d): take fewer with vg-encode "
                        "--take, or pieces of the sequence one by one", n, VG_SIGNAL_FRAMES);
     if (!body->mesh.nv) return vg_fail(e, VG_EINPUT, "the mesh has no vertices");
+    if (o->nexamples == 1) return vg_fail(e, VG_EINPUT, "one example says nothing: there must be at least 2");
     for (size_t i = 0; i < o->npins; i++)
         if (o->pins[i].frame >= n)
             return vg_fail(e, VG_EARG, "there is no frame %zu to be pinned: there are %zu", o->pins[i].frame + 1, n);
     return VG_OK;
+}
+
+/* Examples without the body's rigid motion: *examples is NULL when there are none. */
+static int take_examples(fitting *f, const vg_body *body, double **examples, vg_err *e)
+{
+    size_t n = f->o->nexamples, nv = body->mesh.nv;
+    *examples = NULL;
+    if (!n) return VG_OK;
+    double *shift = vgi_array(n, 3 * sizeof *shift, e);
+    *examples = vgi_copy_array(f->o->examples, n * nv, 3 * sizeof **examples, e);
+    int r = shift && *examples ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK && f->o->root) {
+        f->s->nturns = n;
+        if (!(f->s->home_turn = vgi_array(n, 4 * sizeof(double), e))) r = VG_ENOMEM;
+        else vgi_root_remove(n, nv, body->reference, *examples, f->s->home_turn, shift);
+    }
+    free(shift);
+    return r;
+}
+
+/* The basis of the poses, which are taken over. */
+static int fit_basis(fitting *f, const vg_body *body, double *poses, vg_err *e)
+{
+    double *examples = NULL;
+    int r = fit_root(f, body, poses, e);
+    if (r == VG_OK) r = take_examples(f, body, &examples, e);
+    if (r < 0) free(poses);
+    else if (examples)
+        r = vgi_span_make(&f->span, &f->basis, poses, f->n, f->s->d, examples, f->o->nexamples, f->o->threads, e);
+    else r = vgi_basis_make(&f->basis, poses, f->n, f->s->d, f->o->threads, e);
+    free(examples);
+    return r;
 }
 
 int vg_signal_fit(vg_signal *s, const vg_body *body, double *poses, size_t n, const vg_signal_options *o,
@@ -252,9 +312,7 @@ int vg_signal_fit(vg_signal *s, const vg_body *body, double *poses, size_t n, co
     if (!(f.d > 0)) f.d = 1;
     f.tolerance = o->tolerance * f.d;
     vgi_blas_alone();
-    r = fit_root(&f, body, poses, e);
-    if (r < 0) free(poses);
-    else r = vgi_basis_make(&f.basis, poses, n, s->d, o->threads, e);
+    r = fit_basis(&f, body, poses, e);
     report->rank = f.basis.rank;
     if (r < 0 || (r = fit_shape(&f, e)) < 0 || (r = place_frames(&f, e)) < 0 || (r = fit_pose(&f, e)) < 0 ||
         (r = fit_time(&f, e)) < 0 || (r = find_crossings(&f, e)) < 0 || (r = keep_shapes(&f, e)) < 0)
@@ -263,6 +321,8 @@ int vg_signal_fit(vg_signal *s, const vg_body *body, double *poses, size_t n, co
 out:
     vgi_blas_shared();
     vgi_basis_clear(&f.basis);
+    vgi_span_clear(&f.span);
+    free(f.other);
     vgi_plate_clear(&f.plate);
     vgi_curve_clear(&f.curve);
     free(f.room);

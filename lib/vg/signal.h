@@ -50,8 +50,8 @@ typedef struct vg_signal {
     bool rooted;         /* the body's rigid motion is a signal of its own: */
     double *turn;        /* n unit quaternions, each nearer to the one before than its negative */
     double *shift;       /* n vectors */
-    size_t nturns;       /* of faces or corners; 0 in the space of vertices */
-    double *home_turn;   /* unit quaternions that the turns of a shape are counted from */
+    size_t nturns;       /* m + 1 with a root and examples, else 0 */
+    double *home_turn;   /* unit quaternions: the rigid turns that were taken out of the examples */
     char **names;        /* n: of the frames */
     bool timed;          /* the frames had times: */
     double *times;       /* n seconds */
@@ -82,6 +82,9 @@ typedef struct vg_signal_options {
     size_t npins;
     const double *place; /* n points, with VG_LAYOUT_PLACED */
     size_t bits;         /* of the basis; 0: 64 */
+    const double *examples; /* nexamples poses: shapes are the first one and a sum of what the others differ by, m does
+                            not count, and sites and control points are for shapes of that sum; NULL: none */
+    size_t nexamples;    /* 0, or at least 2 */
     int threads;
 } vg_signal_options;
 
@@ -114,6 +117,11 @@ int vg_signal_fit(vg_signal *s, const vg_body *body, double *poses, size_t n, co
 int vg_signal_store(vg_signal *s, size_t bits, vg_err *e) VG_MUST_CHECK;
 /* vg_signal_floats: numbers that say the signal, and those of the poses, as C 3.4 counts them. */
 size_t vg_signal_floats(const vg_signal *s);
+
+/* vg_signal_onto: a signal of examples goes to another body: n poses of it (3 nv numbers each, from malloc, one array that
+ * is taken over) take the place of the examples, in their order. The centroid goes as that of `from` does, scaled by the
+ * bodies' sizes. */
+int vg_signal_onto(vg_signal *s, const vg_body *from, const vg_body *to, double *poses, size_t n, vg_err *e) VG_MUST_CHECK;
 
 /* vg_signal_pick: the `count` frames of n poses (n x 3 nv, destroyed: their rigid motion is taken out) by which the
  * others are told best, each beside those before it. left: root of the share of the squared differences from the reference
