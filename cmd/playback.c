@@ -48,13 +48,9 @@ static void take_skeleton(playback *p)
                  "the input is a skeleton, and '%s' is a map of patches: make one of bones with vg-fitmap --skeleton",
                  p->o->map);
     if (vg_skeleton_copy(&p->skeleton, &p->h->body.skeleton, &e) < 0 ||
-        vg_joint_fitter_new(&p->fitter, &p->skeleton, &e) < 0 ||
-        vg_driver_new(&p->driver, &p->map.body.rig, &p->skeleton, p->o->align, &e) < 0)
+        vg_joint_fitter_new(&p->fitter, &p->skeleton, &e) < 0)
         cli_die(&e);
-    size_t missing = vg_driver_missing(p->driver);
-    if (missing)
-        cli_warn("%zu of %zu bones are not in the skeleton by their names: they follow those above them", missing,
-                 p->count);
+    p->driver = driving_start(&p->o->driving, &p->map.body.rig, p->o->map, &p->skeleton);
 }
 
 static void check_input(playback *p)
@@ -65,10 +61,12 @@ static void check_input(playback *p)
     snprintf(name, sizeof name, "'%.190s'", p->o->map);
     p->kind = h->kind, p->count = p->map.map.n;
     int r = VG_OK;
+    if (p->o->feet && p->map.map.kind != VG_MAP_BONES)
+        cli_usage("--feet needs a map of bones, and %s is one of patches: make one with vg-fitmap --skeleton", name);
     if (p->kind == VG_VERTICES && h->body.skeleton.njoints) {
         take_skeleton(p);
-    } else if (p->o->align) {
-        cli_usage("--align is for a skeleton that comes in, this input holds %s", vg_head_form(h));
+    } else if (p->o->driving.align || p->o->driving.joints) {
+        cli_usage("--align and --joints are for a skeleton that comes in, this input holds %s", vg_head_form(h));
     } else if (p->kind == VG_VERTICES) {
         r = vg_mesh_same(&h->body.mesh, "the sequence", &p->map.body.mesh, name, &e);
     } else if (p->kind != VG_TRANSFORMS) {
@@ -106,7 +104,7 @@ static void put_batch(playback *p)
     for (size_t i = 0; i < p->n; i++) {
         from[i] = p->transforms[i], to[i] = p->out[i].values;
         bone_edits_apply(&p->o->edits, &p->map.body.rig, p->transforms[i]);
-        if (p->o->joints) vg_player_place(p->player, p->transforms[i]);
+        if (p->o->rotations) vg_player_place(p->player, p->transforms[i]);
         if (p->o->transforms) memcpy(to[i], from[i], 7 * p->count * sizeof *to[i]);
     }
     if (!p->o->transforms) vg_player_pose(p->player, p->n, from, to);
@@ -183,6 +181,23 @@ static void play_between(void *context)
     put_batch(p);
 }
 
+/* ---- with feet that stand ---- */
+
+static void play_standing(void *context)
+{
+    playback *p = context;
+    key_list *k = &p->keys;
+    vg_err e;
+    if (k->n && vg_feet_hold(&p->map.body.rig, k->n, k->transforms, &e) < 0) cli_die(&e);
+    for (size_t i = 0; i < k->n; i++) {
+        memcpy(p->transforms[p->n], k->transforms[i], 7 * p->count * sizeof(double));
+        key_label(&p->out[p->n], k->label, k->n, (double)i);
+        if (++p->n == p->most) put_batch(p);
+        cli_progress_of("poses", i + 1, k->n);
+    }
+    put_batch(p);
+}
+
 /* The reference pose, edited, is all there is. */
 static void play_reference(playback *p)
 {
@@ -217,6 +232,7 @@ void playback_run(playback_options *o, vg_source *s)
     p.o = o, p.most = o->live ? 1 : BATCH;
     step play = {.batch = p.most, .unit = "poses", .init = prepare, .process = play_batch};
     if (o->between.count) play.process = add_key, play.finish = play_between;
+    if (o->feet) play.process = add_key, play.finish = play_standing;
     if (s) {
         step_run(&play, &p, s);
         return;

@@ -4,11 +4,13 @@
 #define VG_PLAYBACK_H
 
 #include "bone_edits.h"
+#include "driving.h"
 #include "pose_times.h"
 
 typedef struct playback_options {
-    const char *map;                      /* the operand that brings the map */
-    bool live, joints, transforms, align; /* the options of these names */
+    const char *map;                        /* the operand that brings the map */
+    bool live, rotations, transforms, feet; /* the options of these names */
+    driving_options driving;
     bone_edits edits;
     pose_times between; /* count 0: every pose of the input is played */
 } playback_options;

@@ -22,7 +22,7 @@ made() {
     made
     must vg-play trex.map trex.vgs -o given.vgs
     at_most "$(vertex_error mean --centred trex.vgs given.vgs)" 0.0017
-    must vg-play trex.map --joints trex.vgs -o joints.vgs
+    must vg-play trex.map --rotations trex.vgs -o joints.vgs
     at_most "$(vertex_error mean --centred trex.vgs joints.vgs)" 0.00245
 }
 

@@ -52,7 +52,7 @@ setup() {
         refused "vg-deform $option walk.vgs -o out" "${option%%[ =]*} is now " 'vg-interpolate'
     done
     refused 'vg-deform --interpolate 30 walk.vgs -o out' '--interpolate is now the program vg-interpolate: vg-interpolate 30'
-    for option in '--map map.vgs' '--edit "a x 1"' --align --joints --transforms --live; do
+    for option in '--map map.vgs' '--edit "a x 1"' --align --rotations --transforms --live; do
         refused "vg-deform $option walk.vgs -o out" "${option%% *} is now " "vg-play MAP"
     done
     refused 'vg-fitmap --retarget target.obj map.vgs -o out' '--retarget is now the program vg-retarget: vg-retarget --onto MESH MAP'
@@ -94,7 +94,7 @@ setup() {
     refused 'vg-deform --onto target.obj --by shape --pin always walk.vgs -o out' '--pin' '--by shape'
     refused 'vg-deform --onto target.obj --pin always vectors.vgs -o out' '--pin needs a sequence of vertices' 'holds vectors'
     must vg-deform --onto target.obj --pin none vectors.vgs -o pinned.vgs # that is what happens
-    refused 'vg-play map.vgs --edit "a x 1" --align -o out' '--align' 'no input'
+    refused 'vg-play map.vgs --edit "a x 1" --align all -o out' '--align' 'no input'
     refused 'vg-view --patches patches.vgs --against walk.vgs walk.vgs -o out.png' '--patches' '--against'
     refused 'vg-view --patches patches.vgs --scales walk.vgs -o out.png' '--patches' '--scales'
     must vg-view --patches patches.vgs --scales walk.vgs -o both.html # a page shows either

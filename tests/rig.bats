@@ -397,7 +397,7 @@ stiff = [(root, angles[:3] + [(0.0, 0.0, 0.0)]) for root, angles in poses]
 write("stiff", stiff, NAMES[:3])
 END
     must_warn vg-play chain.rig stiff.bvh -o out.vgs
-    says '1 of 4 bones are not in the skeleton'
+    says '1 of 4 bones have no joint of the skeleton that belongs to them'
     one_line
     must vg-diff -t 1e-9 stiff/ out.vgs
     # twice as large: the rig keeps its size, and goes half as far
@@ -405,7 +405,7 @@ END
         fit.bvh >large.bvh
     must vg-play chain.rig large.bvh -o out.vgs
     must vg-diff -t 1e-6 fit/ out.vgs # awk writes six digits
-    # a skeleton that rests with its knee bent says so with --align
+    # a skeleton that rests with its knee bent
     sed '/^JOINT foot/,/CHANNELS/s/OFFSET 0 1 0/OFFSET -1 0 0/; /^JOINT toe/,/CHANNELS/s/OFFSET 0 1 0/OFFSET -1 0 0/
         /^End Site/,/}/s/OFFSET 0 1 0/OFFSET -1 0 0/; s/^Frames: .*/Frames: 1/; /^Frame Time/q' fit.bvh >bent.bvh
     echo 0.3 0.1 -0.2 0 0 0 0 0 0 0 0 0 0 0 0 >>bent.bvh
@@ -415,10 +415,76 @@ sys.path.insert(0, ".")
 from chain import *
 write("bent-truth", [(ROOT, [[0.0] * 3, [90.0, 0.0, 0.0], [0.0] * 3, [0.0] * 3])])
 END
-    must vg-play chain.rig --align bent.bvh -o out.vgs
-    must vg-diff -c -t 1e-6 bent-truth/ out.vgs # it is less spread, so the root goes less far
-    must vg-play chain.rig bent.bvh -o out.vgs
+    # a long bone of no known part is a limb: aligned by default, and said so
+    must_warn vg-play chain.rig bent.bvh -o out.vgs
+    says 'rests in another pose than the rig: aligned knee (90 degrees), foot (90), toe (90); --align none leaves them'
+    must vg-diff -t 1e-6 bent-truth/ out.vgs # bones are as long, so the root goes as far
+    must_warn vg-play chain.rig --align knee bent.bvh -o named.vgs
+    must vg-diff -t 1e-12 out.vgs named.vgs
+    must_warn vg-play chain.rig --align all bent.bvh -o all.vgs
+    must vg-diff -t 1e-6 bent-truth/ all.vgs
+    must vg-play chain.rig --align none bent.bvh -o out.vgs
     must vg-diff -c -t 1e-6 fit/p00.obj out.vgs
+}
+
+@test "names of other conventions, prefixes and orders; pairs by hand" {
+    made
+    must vg-play chain.rig fit.bvh -o truth.vgs
+    # pairs by hand, of names that mean nothing
+    sed 's/hip/a/; s/knee/b/; s/foot/c/; s/toe/d/' fit.bvh >names.bvh
+    printf '# bone joint\nhip a\nknee  b\nfoot c # an ankle\ntoe d\n' >pairs.txt
+    must vg-play chain.rig --joints pairs.txt names.bvh -o out.vgs
+    must vg-diff -t 1e-12 truth.vgs out.vgs
+    # one leg of CMU, driven by Mixamo's, Unreal's, Rigify's, MakeHuman's and Daz's names
+    py <<'END'
+names = {"cmu": "LeftUpLeg LeftLeg LeftFoot LeftToeBase",
+         "mixamo": "mixamorig:LeftUpLeg mixamorig:LeftLeg mixamorig:LeftFoot mixamorig:LeftToeBase",
+         "unreal": "thigh_l calf_l foot_l ball_l", "rigify": "DEF-thigh.L DEF-shin.L DEF-foot.L DEF-toe.L",
+         "makehuman": "upperleg01.L lowerleg01.L foot.L toe1-1.L", "daz": "lThigh lShin lFoot lToe",
+         "right": "RightUpLeg RightLeg RightFoot RightToeBase"}
+text = open("fit.bvh").read()
+for style, to in names.items():
+    out = text
+    for a, b in zip(["hip", "knee", "foot", "toe"], ["<0>", "<1>", "<2>", "<3>"]): out = out.replace(a, b)
+    for i, b in enumerate(to.split()): out = out.replace(f"<{i}>", b)
+    open(style + ".bvh", "w").write(out)
+END
+    must vg-fitmap -q --skeleton cmu.bvh fit/ -o leg.rig
+    must vg-play leg.rig cmu.bvh -o truth.vgs
+    for style in mixamo unreal rigify makehuman daz; do
+        must vg-play leg.rig $style.bvh -o out.vgs
+        must vg-diff -t 1e-12 truth.vgs out.vgs
+    done
+    must_fail 3 vg-play leg.rig right.bvh -o no.vgs # a right leg is no left one
+}
+
+@test "motion capture as it is recorded, on the body it was retargeted to; feet that stand" {
+    [ -n "${VG_DATA-}" ] || skip 'VG_DATA does not name the kit'
+    tar -xzf "$VG_DATA/human/walk-man.tar.gz"
+    must vg-encode walk-man/ --reference "$VG_DATA/human/walk-man.rest.obj" -o walk.vgs
+    must vg-fitmap -q --skeleton "$VG_DATA/skeletons/walk-man.bvh" walk.vgs -o man.rig
+    must vg-encode --take 0-/4 "$VG_DATA/mocap/cmu-02_01.bvh" -o cmu.vgs
+    must_warn vg-play man.rig cmu.vgs -o out.vgs
+    says 'aligned LeftArm (49 degrees), LeftForeArm (60)'
+    at_most "$(vertex_error mean --centred walk.vgs out.vgs)" 0.001 # 0.0005; arms inside out: 0.12
+    must_warn vg-play man.rig --feet cmu.vgs -o feet.vgs
+    at_most "$(vertex_error mean --centred walk.vgs feet.vgs)" 0.003
+    # the left foot stands from pose 4 to 18: how far its toe and its sole go meanwhile, in body heights
+    py "$VG_DATA/skeletons/walk-man.weights.txt" <<'END'
+import math, sys
+import read_stream
+def weights(line): return dict(zip(line[1::2], map(float, line[2::2])))
+rows = [l.split() for l in open(sys.argv[1]) if not l.startswith("#")]
+def slide(file, bone):
+    few = [int(r[0]) for r in rows if weights(r).get(bone, 0) > 0.9]
+    path = []
+    for f in read_stream.read_stream(file).frames[4:19]:
+        path.append([sum(f.values[3 * v + k] for v in few) / len(few) for k in (0, 2)])
+    return max(math.dist(a, b) for a in path for b in path) / 1.78
+for bone in "LeftToeBase", "LeftFoot":
+    before, after = slide("out.vgs", bone), slide("feet.vgs", bone)
+    assert after < 0.01 and before > 0.015, (bone, before, after)
+END
 }
 
 @test "another body takes the rig: the heavy man driven by a skeleton's motion" {
@@ -468,9 +534,20 @@ END
     says "no bone 'elbow'"
     must_fail 3 vg-play fit/ --edit 'knee z 20' -o no.vgs
     says "'fit/' holds no map: make one with vg-fitmap"
-    must_fail 2 vg-play chain.rig --align fit/ -o no.vgs
+    must_fail 2 vg-play chain.rig --align all fit/ -o no.vgs
+    must_fail 2 vg-play chain.rig --align knee,elbow fit.bvh -o no.vgs
+    says "'chain.rig' has no bone 'elbow'"
+    must_fail 3 vg-play chain.rig --feet fit.bvh -o no.vgs
+    says 'there are no feet to hold'
+    must_fail 2 vg-play trex.rig --feet --live trex.vgs -o no.vgs
+    for line in 'knee' 'knee shin knee' 'elbow knee' $'knee knee\nknee foot' 'knee elbow'; do
+        printf '%s\n' "$line" >pairs.txt
+        must_fail 3 vg-play chain.rig --joints pairs.txt fit.bvh -o no.vgs
+        says "'pairs.txt' line"
+    done
     sed 's/hip/a/; s/knee/b/; s/foot/c/; s/toe/d/' fit.bvh >names.bvh
     must_fail 3 vg-play chain.rig names.bvh -o no.vgs
+    says "no joint of the skeleton has the name of a bone of the rig, such as 'hip'"
     must_fail 3 vg-play chain.rig trex.vgs -o no.vgs
     must vg-play trex.rig --transforms trex.vgs -o motions.vgs
     must_fail 3 vg-play chain.rig motions.vgs -o no.vgs

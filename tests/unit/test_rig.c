@@ -594,9 +594,10 @@ static void other_skeletons_drive(void)
     stage x;
     vg_err e;
     vg_driver *d;
+    vg_driver_options plain = {.align = VG_ALIGN_NONE}, aligned = {.align = VG_ALIGN_ALL};
     double t[7 * BONES];
     set_stage(&x, make_limb(), 40);
-    CHECK(vg_driver_new(&d, &x.h.body.rig, &x.s, false, &e) == VG_OK);
+    CHECK(vg_driver_new(&d, &x.h.body.rig, &x.s, &plain, &e) == VG_OK);
     CHECK(vg_driver_missing(d) == 0);
     for (size_t k = 0; k < POSES; k++) {
         vg_driver_pose(d, x.positions[k], x.turns[k], t);
@@ -605,7 +606,7 @@ static void other_skeletons_drive(void)
     vg_driver_free(&d);
     vg_skeleton large = make_skeleton(10 * LENGTH), bent = make_skeleton(LENGTH);
     double positions[3 * JOINTS], turns[4 * JOINTS], values[6 + 3 * (BONES - 1)];
-    CHECK(vg_driver_new(&d, &x.h.body.rig, &large, false, &e) == VG_OK);
+    CHECK(vg_driver_new(&d, &x.h.body.rig, &large, &plain, &e) == VG_OK);
     memcpy(values, x.values[0], sizeof values);
     for (int k = 0; k < 3; k++) values[k] *= 10;
     vg_skeleton_pose(&large, values, positions, turns);
@@ -614,7 +615,7 @@ static void other_skeletons_drive(void)
     vg_driver_free(&d);
     for (size_t j = 1; j < JOINTS; j++)
         memcpy(bent.joints[j].offset, (const double[3]){LENGTH, 0, 0}, sizeof bent.joints[j].offset);
-    CHECK(vg_driver_new(&d, &x.h.body.rig, &bent, true, &e) == VG_OK);
+    CHECK(vg_driver_new(&d, &x.h.body.rig, &bent, &aligned, &e) == VG_OK);
     vg_skeleton_pose(&bent, NULL, positions, turns);
     vg_driver_pose(d, positions, turns, t);
     for (size_t b = 0; b < BONES; b++) { /* every joint of the rig is where the other's is */
@@ -625,14 +626,50 @@ static void other_skeletons_drive(void)
     vg_driver_free(&d);
     free(large.joints[1].name);
     large.joints[1].name = strdup("nothing alike");
-    CHECK(vg_driver_new(&d, &x.h.body.rig, &large, false, &e) == VG_OK);
+    CHECK(vg_driver_new(&d, &x.h.body.rig, &large, &plain, &e) == VG_OK);
     CHECK(vg_driver_missing(d) == 1);
     vg_driver_free(&d);
     for (size_t j = 0; j < JOINTS; j++) large.joints[j].name[0] = '?';
-    CHECK(vg_driver_new(&d, &x.h.body.rig, &large, false, &e) == VG_EINPUT && strstr(e.message, "'hip'"));
+    CHECK(vg_driver_new(&d, &x.h.body.rig, &large, &plain, &e) == VG_EINPUT && strstr(e.message, "'hip'"));
     vg_skeleton_clear(&large);
     vg_skeleton_clear(&bent);
     strike(&x);
+}
+
+/* Two skeletons of n joints in a row; of each joint of the first the joint of the second. */
+static void pair_rows(size_t n, const char *const *of, size_t m, const char *const *by, const int *expected)
+{
+    vg_joint joints[2][16] = {{{0}}};
+    vg_skeleton s[2] = {{n, joints[0]}, {m, joints[1]}};
+    uint32_t partner[16];
+    vg_err e;
+    for (int i = 0; i < 2; i++)
+        for (size_t j = 0; j < s[i].njoints; j++)
+            joints[i][j] = (vg_joint){(char *)(i ? by : of)[j], j ? (uint32_t)j - 1 : UINT32_MAX, {0, 1, 0}, 3, {4, 5, 6}};
+    CHECK(vg_skeleton_pair(&s[0], &s[1], partner, &e) == VG_OK);
+    for (size_t j = 0; j < n; j++) CHECK((int)partner[j] == expected[j]);
+}
+
+/* Names, then parts of the body; chains of other lengths end together, fingers begin together. */
+static void joints_find_their_partners(void)
+{
+    static const char *const cmu[] = {"Hips", "LowerBack", "Spine", "Spine1", "Neck", "Neck1", "Head", "LeftShoulder",
+                                      "LeftArm", "LeftForeArm", "LeftHand", "LThumb", "LHipJoint"};
+    static const char *const unreal[] = {"root", "pelvis", "spine_01", "spine_02", "neck_01", "head", "clavicle_l",
+                                         "upperarm_l", "upperarm_twist_01_l", "lowerarm_l", "hand_l", "thumb_01_l",
+                                         "thumb_02_l"};
+    pair_rows(13, cmu, 13, unreal, (const int[]){1, 2, 3, 3, 4, 4, 5, 6, 7, 9, 10, 11, -1});
+    pair_rows(13, unreal, 13, cmu, (const int[]){-1, 0, 2, 3, 5, 6, 7, 8, -1, 9, 10, 11, 11});
+    pair_rows(3, (const char *const[]){"b", "spine", "a"}, 3, (const char *const[]){"a", "b", "c"},
+              (const int[]){1, -1, 0}); /* any order */
+    /* a shoulder is a clavicle beside an arm, and the arm itself above an elbow */
+    pair_rows(3, (const char *const[]){"L_Collar", "L_Shoulder", "L_Elbow"}, 3,
+              (const char *const[]){"shoulder.L", "upper_arm.L", "forearm.L"}, (const int[]){0, 1, 2});
+    /* a hip is the middle of the body, or a thigh */
+    pair_rows(3, (const char *const[]){"Hip", "r_hip", "RightKnee"}, 3,
+              (const char *const[]){"Hips", "RightUpLeg", "RightLeg"}, (const int[]){0, 1, 2});
+    pair_rows(2, (const char *const[]){"ring", "LeftToe_End"}, 2, (const char *const[]){"LeftHandRing1", "LeftToeBase"},
+              (const int[]){-1, -1}); /* no side, no finger; an end is no toe */
 }
 
 /* A joint with two children on one line, as a hip between two legs may be: what they leave open, the turn about that
@@ -651,7 +688,7 @@ static void a_line_leaves_nothing_to_chance(void)
         memcpy(s.joints[1].offset, way, sizeof way);
         vg_skeleton_pose(&s, NULL, positions, turned);
         CHECK(vg_rig_make(&r, &s, positions, turned, &e) == VG_OK);
-        CHECK(vg_driver_new(&d, &r, &s, true, &e) == VG_OK);
+        CHECK(vg_driver_new(&d, &r, &s, &(vg_driver_options){.align = VG_ALIGN_ALL}, &e) == VG_OK);
         vg_driver_pose(d, positions, turned, t);
         for (size_t b = 0; b < BONES; b++) CHECK_NEAR(fabs(t[7 * b]), 1, 1e-12); /* it rests as it does */
         vg_driver_free(&d);
@@ -891,6 +928,7 @@ TESTS({"rigid bodies are met", rigid_bodies_are_met}, {"weights are found again"
       {"the root is found", the_root_is_found},
       {"the root is found among others", the_root_is_found_among_others},
       {"other skeletons drive", other_skeletons_drive},
+      {"joints find their partners", joints_find_their_partners},
       {"a line leaves nothing to chance", a_line_leaves_nothing_to_chance},
       {"edits turn what hangs on a bone", edits_turn_what_hangs_on_a_bone},
       {"rotations alone say where bones are", rotations_alone_say_where_bones_are},

@@ -1,0 +1,104 @@
+/* driving.c: --align and --joints of vg-play.
+ * Leaves out how joints are paired by their names and how limbs are turned (lib/method/rig).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "driving.h"
+#include "lines.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { NAMED = 6 }; /* limbs that a message names */
+
+static size_t find_joint(const vg_skeleton *s, const char *name, size_t length)
+{
+    size_t j = 0;
+    while (j < s->njoints && (strncmp(s->joints[j].name, name, length) || s->joints[j].name[length])) j++;
+    return j;
+}
+
+/* ---- --align ---- */
+
+static bool *choose_bones(const char *names, const vg_skeleton *s, const char *map)
+{
+    bool *chosen = cli_allocate(s->njoints, sizeof *chosen, "the joints");
+    for (const char *at = names;; at++) {
+        size_t n = strcspn(at, ","), j = find_joint(s, at, n);
+        if (j == s->njoints) cli_usage("--align: '%s' has no bone '%.*s'", map, (int)n, at);
+        chosen[j] = true;
+        at += n;
+        if (!*at) return chosen;
+    }
+}
+
+static void read_align(const driving_options *o, const vg_skeleton *s, const char *map, vg_driver_options *to,
+                       bool **chosen)
+{
+    const char *text = o->align ? o->align : "auto";
+    if (!strcmp(text, "auto")) to->align = VG_ALIGN_AUTO;
+    else if (!strcmp(text, "none")) to->align = VG_ALIGN_NONE;
+    else if (!strcmp(text, "all")) to->align = VG_ALIGN_ALL;
+    else to->align = VG_ALIGN_CHOSEN, to->chosen = *chosen = choose_bones(text, s, map);
+}
+
+/* "LeftArm (49 degrees), LeftForeArm (60) and 4 more" */
+static void note_aligned(const vg_driver *d, const vg_skeleton *s)
+{
+    char list[400] = "";
+    size_t n = 0, at = 0;
+    for (size_t j = 0; j < s->njoints; j++) {
+        double degrees = vg_driver_aligned(d, j);
+        if (!(degrees > 0.5) || ++n > NAMED) continue;
+        at += (size_t)snprintf(list + at, sizeof list - at, "%s%.40s (%.0f%s)", n > 1 ? ", " : "", s->joints[j].name,
+                               degrees, n > 1 ? "" : " degrees");
+    }
+    if (n > NAMED) snprintf(list + at, sizeof list - at, " and %zu more", n - NAMED);
+    if (n) cli_warn("the skeleton rests in another pose than the rig: aligned %s; --align none leaves them", list);
+}
+
+/* ---- --joints ---- */
+
+static uint32_t take_joint(lines *l, const vg_skeleton *s, const char *whose)
+{
+    size_t n = strcspn(l->now, " \t\r\n"), j = find_joint(s, l->now, n);
+    if (!n) lines_stop(l, "a line is a bone of the rig and a joint of the skeleton");
+    if (j == s->njoints) lines_stop(l, "%s has no joint '%.*s'", whose, (int)(n < 80 ? n : 80), l->now);
+    l->now += n;
+    l->now += strspn(l->now, " \t\r\n");
+    return (uint32_t)j;
+}
+
+/* Each line: a bone of the rig, a joint of the skeleton. What is not named has no partner. */
+static uint32_t *read_pairs(const char *file, const vg_skeleton *of, const vg_skeleton *by)
+{
+    uint32_t *partner = cli_allocate(of->njoints, sizeof *partner, "the joints");
+    for (size_t j = 0; j < of->njoints; j++) partner[j] = UINT32_MAX;
+    lines l = lines_open(file);
+    while (lines_next(&l)) {
+        uint32_t bone = take_joint(&l, of, "the rig"), joint = take_joint(&l, by, "the skeleton");
+        if (*l.now) lines_stop(&l, "a line is a bone of the rig and a joint of the skeleton");
+        if (partner[bone] != UINT32_MAX) lines_stop(&l, "bone '%.80s' is paired twice", of->joints[bone].name);
+        partner[bone] = joint;
+    }
+    lines_close(&l);
+    return partner;
+}
+
+vg_driver *driving_start(const driving_options *o, const vg_rig *rig, const char *map, const vg_skeleton *by)
+{
+    vg_err e;
+    vg_driver *d;
+    vg_driver_options how = {.align = VG_ALIGN_AUTO};
+    bool *chosen = NULL;
+    uint32_t *partner = o->joints ? read_pairs(o->joints, &rig->skeleton, by) : NULL;
+    read_align(o, &rig->skeleton, map, &how, &chosen);
+    how.partner = partner;
+    if (vg_driver_new(&d, rig, by, &how, &e) < 0) cli_die(&e);
+    size_t missing = vg_driver_missing(d);
+    if (missing)
+        cli_warn("%zu of %zu bones have no joint of the skeleton that belongs to them: they follow those above them",
+                 missing, rig->nbones);
+    note_aligned(d, &rig->skeleton);
+    free(chosen);
+    free(partner);
+    return d;
+}

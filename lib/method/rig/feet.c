@@ -1,0 +1,348 @@
+/* feet.c: feet that stand are kept from sliding: when the heel or the ball of a foot hardly moves and is low, it is held
+ * where it is, and thigh and shin bend so that the foot gets there. Between two stands the correction goes over
+ * smoothly. The foot keeps its turn, the rest of the body its motion, except that the body is lowered where a leg would
+ * be too short.
+ * Leaves out how a rig is driven (drive.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/rig/align.h"
+#include "numeric/vec3.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static const uint32_t NONE = UINT32_MAX;
+static const double SLOW = 0.15;    /* of a joint's fast speed, from which it no longer stands */
+static const double LOW = 0.12;     /* of the leg's length, above the joint's lowest place */
+static const double STRETCH = 0.999; /* of thigh and shin together, to which a leg is straightened */
+enum { SHORTEST = 3 };              /* poses of a stand */
+
+typedef enum group { BODY = 0, THIGH, SHIN, FOOT } group;
+
+/* One leg: joints; of each bone what it moves with; of each pose where the correction takes the foot. */
+typedef struct leg {
+    uint32_t thigh, shin, foot, toe; /* toe: NONE, or its joint */
+    uint8_t *group;                  /* of each bone */
+    double length[2];                /* of thigh and shin */
+    double *shift;                   /* 3 numbers a pose */
+    bool *known;                     /* of each pose: it is held; between, the shift is interpolated */
+} leg;
+
+typedef struct feet {
+    const vg_rig *r;
+    size_t n;
+    double *const *transforms;
+    int up;      /* the axis along which the legs stand */
+    double sign; /* 1: up is along it, -1: against it */
+    leg legs[2];
+    size_t nlegs;
+    double *path;  /* 3 numbers a pose: of the joint in hand */
+    bool *stands;  /* of each pose: of the joint in hand */
+    double *speed; /* of each pose */
+    double *lower; /* of each pose: by how much the body goes down */
+} feet;
+
+static size_t bone_of(const vg_rig *r, uint32_t joint)
+{
+    size_t b = 0;
+    while (b < r->nbones && r->bone[b] != joint) b++;
+    return b;
+}
+
+static void joint_at(const vg_rig *r, uint32_t joint, const double *transforms, double at[3])
+{
+    const double *t = transforms + 7 * bone_of(r, joint);
+    vg_quat_apply(t, r->at + 3 * (size_t)joint, at);
+    for (int k = 0; k < 3; k++) at[k] += t[4 + k];
+}
+
+static void group_bones(const vg_rig *r, leg *l)
+{
+    for (size_t b = 0; b < r->nbones; b++)
+        for (uint32_t j = r->bone[b]; j != NONE && !l->group[b]; j = r->skeleton.joints[j].parent)
+            l->group[b] = j == l->foot ? FOOT : j == l->shin ? SHIN : j == l->thigh ? THIGH : BODY;
+}
+
+static double rest_distance(const vg_rig *r, uint32_t a, uint32_t b)
+{
+    double d[3];
+    vgi_between(r->at, a, b, d);
+    return vgi_length(d);
+}
+
+/* The leg of a side; false: the rig has none there. */
+static bool find_leg(const vg_rig *r, const vgi_role *roles, int side, leg *l)
+{
+    uint32_t *joint[4] = {&l->thigh, &l->shin, &l->foot, &l->toe};
+    for (int i = 0; i < 4; i++) {
+        *joint[i] = vgi_find_role(&r->skeleton, roles, (vgi_part)(VGI_THIGH + i), side);
+        if (*joint[i] != NONE && bone_of(r, *joint[i]) == r->nbones) *joint[i] = NONE;
+        if (*joint[i] == NONE && i < 3) return false;
+    }
+    l->length[0] = rest_distance(r, l->thigh, l->shin), l->length[1] = rest_distance(r, l->shin, l->foot);
+    return l->length[0] > 0 && l->length[1] > 0;
+}
+
+static void find_up(feet *f)
+{
+    double most = 0;
+    f->up = 1, f->sign = 1;
+    for (int k = 0; k < 3; k++) {
+        double d = 0;
+        for (size_t i = 0; i < f->nlegs; i++)
+            d += f->r->at[3 * (size_t)f->legs[i].thigh + k] - f->r->at[3 * (size_t)f->legs[i].foot + k];
+        if (fabs(d) > most) most = fabs(d), f->up = k, f->sign = d > 0 ? 1 : -1;
+    }
+}
+
+static double height(const feet *f, const double point[3])
+{
+    return f->sign * point[f->up];
+}
+
+static int prepare(feet *f, vg_err *e)
+{
+    vgi_role *roles = vgi_array(f->r->skeleton.njoints, sizeof *roles, e);
+    int r = roles ? vgi_joint_roles(&f->r->skeleton, roles, e) : VG_ENOMEM;
+    for (int side = -1; r == VG_OK && side <= 1; side += 2) {
+        leg *l = &f->legs[f->nlegs];
+        if (!find_leg(f->r, roles, side, l)) continue;
+        f->nlegs++;
+        l->group = vgi_array(f->r->nbones, sizeof *l->group, e);
+        l->shift = vgi_array(f->n, 3 * sizeof *l->shift, e), l->known = vgi_array(f->n, sizeof *l->known, e);
+        if (!l->group || !l->shift || !l->known) r = VG_ENOMEM;
+        else group_bones(f->r, l);
+    }
+    free(roles);
+    if (r < 0) return r;
+    if (!f->nlegs)
+        return vg_fail(e, VG_EINPUT, "no bones of the rig have names of thigh, shin and foot: there are no feet to hold");
+    find_up(f);
+    f->path = vgi_array(f->n, 3 * sizeof *f->path, e), f->stands = vgi_array(f->n, sizeof *f->stands, e);
+    f->speed = vgi_array(2 * f->n, sizeof *f->speed, e), f->lower = vgi_array(2 * f->n, sizeof *f->lower, e);
+    return f->path && f->stands && f->speed && f->lower ? VG_OK : VG_ENOMEM;
+}
+
+/* ---- when a joint stands ---- */
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* The distance from pose to pose, the mean of before and after. */
+static void measure_speed(feet *f)
+{
+    double d[3];
+    for (size_t i = 0; i < f->n; i++) {
+        size_t a = i ? i - 1 : 0, b = i + 1 < f->n ? i + 1 : i;
+        vgi_between(f->path, a, b, d);
+        f->speed[i] = b > a ? vgi_length(d) / (double)(b - a) : 0;
+    }
+}
+
+static void drop_short_stands(feet *f)
+{
+    for (size_t i = 0, end; i < f->n; i = end + 1) {
+        for (end = i; end < f->n && f->stands[end]; end++) {}
+        if (end - i >= SHORTEST) continue;
+        while (i < end) f->stands[i++] = false;
+    }
+}
+
+static void find_stands(feet *f, uint32_t joint, double leg_length)
+{
+    double lowest = INFINITY;
+    for (size_t i = 0; i < f->n; i++) {
+        joint_at(f->r, joint, f->transforms[i], f->path + 3 * i);
+        lowest = fmin(lowest, height(f, f->path + 3 * i));
+    }
+    measure_speed(f);
+    memcpy(f->speed + f->n, f->speed, f->n * sizeof *f->speed);
+    qsort(f->speed + f->n, f->n, sizeof *f->speed, ascending);
+    double fast = f->speed[f->n + f->n * 9 / 10];
+    for (size_t i = 0; i < f->n; i++)
+        f->stands[i] = f->speed[i] <= SLOW * fast && height(f, f->path + 3 * i) <= lowest + LOW * leg_length;
+    drop_short_stands(f);
+}
+
+/* ---- where the foot goes ---- */
+
+/* A stand from pose i to end: where the foot is held already, the joint is held there, too; else in its mean place. */
+static void hold_stand(const feet *f, leg *l, size_t i, size_t end)
+{
+    double place[3] = {0, 0, 0};
+    size_t first = i;
+    while (first < end && !l->known[first]) first++;
+    for (int k = 0; k < 3; k++) {
+        for (size_t p = i; p < end; p++) place[k] += f->path[3 * p + (size_t)k] / (double)(end - i);
+        if (first < end) place[k] = f->path[3 * first + (size_t)k] + l->shift[3 * first + (size_t)k];
+    }
+    for (size_t p = i; p < end; p++) {
+        if (l->known[p]) continue;
+        l->known[p] = true;
+        for (int k = 0; k < 3; k++) l->shift[3 * p + (size_t)k] = place[k] - f->path[3 * p + (size_t)k];
+    }
+}
+
+static void hold_joint(feet *f, leg *l, uint32_t joint)
+{
+    if (joint == NONE) return;
+    find_stands(f, joint, l->length[0] + l->length[1]);
+    for (size_t i = 0, end; i < f->n; i = end + 1) {
+        for (end = i; end < f->n && f->stands[end]; end++) {}
+        if (end > i) hold_stand(f, l, i, end);
+    }
+}
+
+/* From the last held pose (a) to the next one (b), smoothly. */
+static void fill_between(leg *l, size_t a, size_t b)
+{
+    for (size_t p = a + 1; p < b; p++) {
+        double t = (double)(p - a) / (double)(b - a), s = t * t * (3 - 2 * t);
+        for (size_t k = 0; k < 3; k++)
+            l->shift[3 * p + k] = (1 - s) * l->shift[3 * a + k] + s * l->shift[3 * b + k];
+    }
+}
+
+static void fill_shifts(const feet *f, leg *l)
+{
+    size_t last = f->n;
+    for (size_t p = 0; p < f->n; p++) {
+        if (!l->known[p]) continue;
+        if (last < f->n) fill_between(l, last, p);
+        for (size_t q = 0; last == f->n && q < p; q++) memcpy(l->shift + 3 * q, l->shift + 3 * p, 3 * sizeof(double));
+        last = p;
+    }
+    for (size_t q = last + 1; last < f->n && q < f->n; q++)
+        memcpy(l->shift + 3 * q, l->shift + 3 * last, 3 * sizeof(double));
+}
+
+/* ---- the body goes down where a leg is too short ---- */
+
+static double lower_by(const feet *f, const leg *l, size_t p)
+{
+    double hip[3], foot[3], d[3], flat = 0, reach = STRETCH * (l->length[0] + l->length[1]);
+    joint_at(f->r, l->thigh, f->transforms[p], hip);
+    joint_at(f->r, l->foot, f->transforms[p], foot);
+    for (size_t k = 0; k < 3; k++) d[k] = hip[k] - foot[k] - l->shift[3 * p + k];
+    for (int k = 0; k < 3; k++) flat += k == f->up ? 0 : d[k] * d[k];
+    double now = vgi_length(d);
+    if (!(now > reach) || !(flat < reach * reach)) return 0;
+    return fabs(d[f->up]) - sqrt(reach * reach - flat);
+}
+
+/* The least smooth curve above what the legs need: the largest need nearby, then its mean over the same stretch. */
+static void lower_body(feet *f)
+{
+    enum { NEAR = 4 };
+    double *need = f->lower + f->n, *most = f->speed;
+    for (size_t p = 0; p < f->n; p++)
+        for (size_t i = 0; i < f->nlegs; i++)
+            if (f->legs[i].known[p]) need[p] = fmax(need[p], lower_by(f, &f->legs[i], p));
+    for (size_t p = 0; p < f->n; p++) {
+        most[p] = 0;
+        for (size_t q = p < NEAR ? 0 : p - NEAR; q <= p + NEAR && q < f->n; q++) most[p] = fmax(most[p], need[q]);
+    }
+    for (size_t p = 0; p < f->n; p++) {
+        double sum = 0;
+        size_t n = 0;
+        for (size_t q = p < NEAR ? 0 : p - NEAR; q <= p + NEAR && q < f->n; q++, n++) sum += most[q];
+        f->lower[p] = sum / (double)n;
+    }
+}
+
+/* ---- bending ---- */
+
+static void turn_between(const double a[3], const double b[3], double q[4])
+{
+    vg_quat_between(a, b, q);
+    double size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (int k = 0; k < 4; k++) q[k] /= size;
+}
+
+/* Turn a bone's transform by q, so that what was at `from` is at `to`. */
+static void move_bone(double *t, const double q[4], const double from[3], const double to[3])
+{
+    double d[3], turned[3];
+    for (int k = 0; k < 3; k++) d[k] = t[4 + k] - from[k];
+    vg_quat_apply(q, d, turned);
+    for (int k = 0; k < 3; k++) t[4 + k] = turned[k] + to[k];
+    vg_quat_multiply(q, t, t);
+}
+
+/* Where the knee goes when the foot goes to `foot`, as near to `foot` as the leg reaches, which is where it ends. The knee
+ * stays on the side to which it is bent; `forward` says which that is of a straight leg. */
+static void place_knee(const leg *l, const double hip[3], const double knee[3], const double before[3],
+                       const double forward[3], double foot[3], double now[3])
+{
+    double a = l->length[0], b = l->length[1], u[3], old[3], q[4], thigh[3], side[3];
+    for (int k = 0; k < 3; k++) u[k] = foot[k] - hip[k], old[k] = before[k] - hip[k], thigh[k] = knee[k] - hip[k];
+    double d = vgi_length(u), reach = fmin(fmax(d, fabs(a - b) / STRETCH), STRETCH * (a + b));
+    turn_between(old, u, q);
+    vg_quat_apply(q, thigh, side);
+    for (int k = 0; k < 3; k++) u[k] /= d, foot[k] = hip[k] + reach * u[k];
+    for (int pass = 0; pass < 2; pass++) { /* the thigh, or, of a straight leg, what is forward, across the leg */
+        double along = vgi_dot(side, u);
+        for (int k = 0; k < 3; k++) side[k] -= along * u[k];
+        if (vgi_length(side) > 1e-3 * a) break;
+        memcpy(side, forward, sizeof side);
+    }
+    double x = (a * a - b * b + reach * reach) / (2 * reach), y = sqrt(fmax(a * a - x * x, 0)), size = vgi_length(side);
+    for (int k = 0; k < 3; k++) now[k] = hip[k] + x * u[k] + (size > 0 ? y * side[k] / size : 0);
+}
+
+static void bend_leg(const feet *f, const leg *l, size_t p)
+{
+    double *t = f->transforms[p], hip[3], knee[3], foot[3], to[3], now[3], forward[3] = {0, 0, 1}, q[2][4], was[3], is[3];
+    joint_at(f->r, l->thigh, t, hip);
+    joint_at(f->r, l->shin, t, knee);
+    joint_at(f->r, l->foot, t, foot);
+    if (l->toe != NONE) {
+        joint_at(f->r, l->toe, t, forward);
+        for (int k = 0; k < 3; k++) forward[k] -= foot[k];
+    }
+    for (size_t k = 0; k < 3; k++) to[k] = foot[k] + l->shift[3 * p + k];
+    to[f->up] += f->sign * f->lower[p]; /* the body went down, the foot does not */
+    double away[3] = {to[0] - hip[0], to[1] - hip[1], to[2] - hip[2]};
+    if (!(vgi_length(away) > 0)) return;
+    place_knee(l, hip, knee, foot, forward, to, now);
+    for (int k = 0; k < 3; k++) was[k] = knee[k] - hip[k], is[k] = now[k] - hip[k];
+    turn_between(was, is, q[0]);
+    for (int k = 0; k < 3; k++) was[k] = foot[k] - knee[k], is[k] = to[k] - now[k];
+    turn_between(was, is, q[1]);
+    for (size_t b = 0; b < f->r->nbones; b++) {
+        if (l->group[b] == THIGH) move_bone(t + 7 * b, q[0], hip, hip);
+        if (l->group[b] == SHIN) move_bone(t + 7 * b, q[1], foot, to);
+        for (int k = 0; k < 3 && l->group[b] == FOOT; k++) t[7 * b + 4 + (size_t)k] += to[k] - foot[k];
+    }
+}
+
+static void move_pose(const feet *f, size_t p)
+{
+    for (size_t b = 0; b < f->r->nbones; b++) f->transforms[p][7 * b + 4 + (size_t)f->up] -= f->sign * f->lower[p];
+    for (size_t i = 0; i < f->nlegs; i++) bend_leg(f, &f->legs[i], p);
+}
+
+int vg_feet_hold(const vg_rig *r, size_t n, double *const *transforms, vg_err *e)
+{
+    feet f = {.r = r, .n = n, .transforms = transforms};
+    int code = prepare(&f, e);
+    for (size_t i = 0; code == VG_OK && i < f.nlegs; i++) {
+        hold_joint(&f, &f.legs[i], f.legs[i].toe);
+        hold_joint(&f, &f.legs[i], f.legs[i].foot);
+        fill_shifts(&f, &f.legs[i]);
+    }
+    if (code == VG_OK) lower_body(&f);
+    for (size_t p = 0; code == VG_OK && p < n; p++) move_pose(&f, p);
+    for (size_t i = 0; i < 2; i++) {
+        free(f.legs[i].group);
+        free(f.legs[i].shift);
+        free(f.legs[i].known);
+    }
+    free(f.path);
+    free(f.stands);
+    free(f.speed);
+    free(f.lower);
+    return code;
+}

@@ -1,0 +1,45 @@
+/* joint_roles.h: what part of a body a joint is, by its name.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_RIG_JOINT_ROLES_H
+#define VG_RIG_JOINT_ROLES_H
+
+#include "core/core.h"
+
+/* The part that a joint turns. Those from VGI_CLAVICLE on are on the left or on the right. */
+typedef enum vgi_part {
+    VGI_NO_PART = 0,
+    VGI_ROOT,
+    VGI_HIPS,
+    VGI_SPINE,
+    VGI_NECK,
+    VGI_HEAD,
+    VGI_CLAVICLE,
+    VGI_UPPER_ARM,
+    VGI_FOREARM,
+    VGI_HAND,
+    VGI_THUMB,
+    VGI_INDEX,
+    VGI_MIDDLE,
+    VGI_RING,
+    VGI_PINKY,
+    VGI_HIP_JOINT,
+    VGI_THIGH,
+    VGI_SHIN,
+    VGI_FOOT,
+    VGI_TOE,
+    VGI_SHOULDER, /* only while names are read: a clavicle, or an upper arm */
+    VGI_SIDED_HIP /* the same: a thigh, or a joint above it */
+} vgi_part;
+
+typedef struct vgi_role {
+    uint8_t part; /* a vgi_part */
+    int8_t side;  /* 1 left, -1 right, 0 the middle */
+} vgi_role;
+
+/* vgi_joint_roles: the role of each joint (njoints of them), by the names that Mixamo, CMU, Unreal, MakeHuman, Rigify,
+ * Biped, Daz and others give, and by which joint is below which. */
+int vgi_joint_roles(const vg_skeleton *s, vgi_role *roles, vg_err *e) VG_MUST_CHECK;
+/* vgi_role_is_limb: upper arm, forearm, thigh or shin. */
+bool vgi_role_is_limb(vgi_role r);
+
+#endif
