@@ -71,7 +71,7 @@ typedef struct work {
     by by;
     vg_kind kind;             /* what comes in */
     vg_deformer *deformer;
-    vg_carrier *carrier;
+    vg_cross_transfer *carrier;
     vg_shaper *shaper;
     vg_mover *mover;          /* NULL: poses are measured */
     vg_pinner *pinner;        /* NULL: nothing is held */
@@ -124,7 +124,7 @@ static void run_batch(work *w, size_t n, const double *const *in, double *const 
     case MEASURE: vg_deformer_measure(w->deformer, n, w->kind, in, out); break;
     case APPLY: vg_deformer_apply(w->deformer, n, in, out); break;
     case TRANSFER: vg_deformer_transfer(w->deformer, n, w->kind, in, out); break;
-    case CARRY: vg_carrier_transfer(w->carrier, n, in, out); break;
+    case CARRY: vg_cross_transfer_apply(w->carrier, n, in, out); break;
     case SHAPE: vg_shaper_transfer(w->shaper, n, in, out); break;
     }
 }
@@ -188,13 +188,13 @@ static void deform_batch(void *context, size_t n, vg_frame *in)
 static void warn_degenerate(void *context)
 {
     const work *w = context;
-    vg_deform_counts c = {0};
-    if (w->deformer) c = vg_deformer_counts(w->deformer);
+    vg_deform_stats c = {0};
+    if (w->deformer) c = vg_deformer_get_stats(w->deformer);
     if (c.corners)
         cli_warn("%llu corners without a direction took the turn of their face (the first in face %llu)",
                  (unsigned long long)c.corners, (unsigned long long)c.first_face);
     if (!w->carrier) return;
-    c = vg_carrier_counts(w->carrier);
+    c = vg_cross_transfer_get_stats(w->carrier);
     if (c.corners)
         cli_warn("%llu times a face of the source had no direction and drove nothing (the first is face %llu)",
                  (unsigned long long)c.corners, (unsigned long long)c.first_face);
@@ -292,7 +292,7 @@ static double degrees_apart(const work *w)
 static void warn_of_other_pose(const work *w)
 {
     if (!opts.onto || cli.quiet) return;
-    double degrees = w->carrier ? vg_carrier_turned(w->carrier) : degrees_apart(w), most = w->carrier ? 45 : 30;
+    double degrees = w->carrier ? vg_cross_transfer_turned(w->carrier) : degrees_apart(w), most = w->carrier ? 45 : 30;
     if (degrees > most)
         cli_warn(
             "the target does not stand as the reference pose '%s' does: they differ by %.0f degrees on average; name "
@@ -370,7 +370,7 @@ static void make_step(work *w)
     w->way = !opts.onto ? MEASURE : opts.correspondence ? CARRY : w->by == BY_SHAPE ? SHAPE
              : w->kind == VG_DEFORMATIONS ? APPLY : TRANSFER;
     if (w->way == CARRY) {
-        r = vg_carrier_new(&w->carrier, &w->source_mesh, h->body.reference, &w->pairs.correspondence, w->to,
+        r = vg_cross_transfer_new(&w->carrier, &w->source_mesh, h->body.reference, &w->pairs.correspondence, w->to,
                            t->body.reference, method, cli.threads, &e);
     } else if (w->way == SHAPE) {
         r = vg_shaper_new(&w->shaper, w->to, h->body.reference, t->body.reference, cli.threads, &e);

@@ -64,7 +64,7 @@ typedef struct batch {
 
 /* What is known when both sequences have been read. */
 typedef struct findings {
-    vg_measure_report measures;
+    vg_measure_stats measures;
     size_t frames; /* measured so far */
     double worst;
     char *worst_frame; /* name of the frame with the largest error */
@@ -262,7 +262,7 @@ static void compare(side *truth, side *result, findings *found, report *r)
         more = next_batch(&b, truth, result);
         measure_batch(x, &b, result, diagonal, found, r);
     }
-    vg_measures_get(x, &found->measures);
+    vg_measures_get_stats(x, &found->measures);
     vg_measures_free(&x);
     clear_batch(&b);
     if (!opts.heat) return;
@@ -270,7 +270,7 @@ static void compare(side *truth, side *result, findings *found, report *r)
     cli_redirect(report_file, false);
 }
 
-static void report_sides(report *r, const side *truth, const side *result, const vg_measure_report *m)
+static void report_sides(report *r, const side *truth, const side *result, const vg_measure_stats *m)
 {
     const side *const sides[2] = {truth, result};
     static const char *const keys[2] = {"truth", "result"};
@@ -303,7 +303,7 @@ static void report_error(report *r, const char *name, double error, double diago
 
 static void report_vertices(report *r, const findings *found)
 {
-    const vg_measure_report *m = &found->measures;
+    const vg_measure_stats *m = &found->measures;
     const report_value nowhere[3] = {report_nothing(), report_nothing(), report_nothing()};
     const char *name = found->worst_frame ? found->worst_frame : "";
     const report_value worst[3] = {report_count(m->max_vertex), report_count(m->max_frame), report_text(name)};
@@ -321,7 +321,7 @@ static void report_vertices(report *r, const findings *found)
     report_error(r, "sigma", m->sigma, m->diagonal, at_sigma, m->sigma > 0 ? unsteady : nowhere);
 }
 
-static void report_histogram(report *r, const vg_measure_report *m)
+static void report_histogram(report *r, const vg_measure_stats *m)
 {
     report_group(r, "histogram");
     report_put(r, "edges_D", NULL, report_numbers(vg_error_edges, VG_ERROR_BINS));
@@ -329,7 +329,7 @@ static void report_histogram(report *r, const vg_measure_report *m)
     report_end(r);
 }
 
-static void report_faces(report *r, const vg_measure_report *m)
+static void report_faces(report *r, const vg_measure_stats *m)
 {
     const report_value rows[2][COLUMNS_FACE] = {
         {report_text("orientation"), report_number(m->orientation_mean), report_number(m->orientation_sd),
@@ -353,7 +353,7 @@ static void report_faces(report *r, const vg_measure_report *m)
     }
 }
 
-static double error_asked_for(const vg_measure_report *m)
+static double error_asked_for(const vg_measure_stats *m)
 {
     const double errors[] = {[MEAN] = m->mean, [RMS] = m->rms, [P95] = m->p95, [MAX] = m->max};
     double error = errors[opts.which];
@@ -361,7 +361,7 @@ static double error_asked_for(const vg_measure_report *m)
 }
 
 /* Does the result satisfy? When a tolerance was given the report says so, and `line` is the answer in words. */
-static bool judge(report *r, const vg_measure_report *m, char *line, size_t size)
+static bool judge(report *r, const vg_measure_stats *m, char *line, size_t size)
 {
     if (opts.tolerance < 0) return true;
     double error = error_asked_for(m);

@@ -109,7 +109,7 @@ static const char *layout_name(vg_layout layout)
     return names[layout];
 }
 
-static void report_sizes(report *t, const vg_signal *s, const vg_signal_report *r)
+static void report_sizes(report *t, const vg_signal *s, const vg_signal_stats *r)
 {
     report_put(t, "frames", "frames", report_count(s->n));
     report_put(t, "control_points", "control points (k)", report_count(s->k));
@@ -126,7 +126,7 @@ static void report_sizes(report *t, const vg_signal *s, const vg_signal_report *
     report_put(t, "error_rms", "root mean square of all, D", report_number(s->error_rms));
 }
 
-static void report_layout(report *t, const vg_signal *s, const vg_signal_report *r)
+static void report_layout(report *t, const vg_signal *s, const vg_signal_stats *r)
 {
     static const report_column trials[] = {{"layout", "layout", false}, {"weight", "weight", false},
                                            {"ratio", "deviation between frames", false}};
@@ -141,7 +141,7 @@ static void report_layout(report *t, const vg_signal *s, const vg_signal_report 
                                        report_number(r->trials[i].ratio)});
 }
 
-static void report_frames(report *t, const vg_signal *s, const vg_signal_report *r)
+static void report_frames(report *t, const vg_signal *s, const vg_signal_stats *r)
 {
     static const report_column crossings[] = {{"time", "crossing at time", false}, {"again", "and at", false}};
     static const report_column frames[] = {{"frame", "frame", false}, {"name", "name", false}, {"error", "error, D", false},
@@ -155,7 +155,7 @@ static void report_frames(report *t, const vg_signal *s, const vg_signal_report 
                                        report_number(s->position[2 * i]), report_number(s->position[2 * i + 1])});
 }
 
-static void write_report(const vg_signal *s, const vg_signal_report *r)
+static void write_report(const vg_signal *s, const vg_signal_stats *r)
 {
     report *t = report_new();
     report_sizes(t, s, r);
@@ -167,7 +167,7 @@ static void write_report(const vg_signal *s, const vg_signal_report *r)
     report_free(&t);
 }
 
-static void say(const vg_signal *s, const vg_signal_report *r)
+static void say(const vg_signal *s, const vg_signal_stats *r)
 {
     cli_note("%zu frames: %zu control points, %zu sites, %zu shape coordinates; largest error %.3g D, rms %.3g D", s->n,
             s->k, s->l, s->m, s->error_time, s->error_rms);
@@ -235,7 +235,7 @@ int main(int argc, char **argv)
 {
     char **operands;
     vg_err e;
-    vg_signal_report r;
+    vg_signal_stats r;
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_signal_options o = {.tolerance = opts.tolerance, .m = (size_t)opts.m, .l = (size_t)opts.l, .k = (size_t)opts.k,
                            .root = opts.root == 0, .gain = opts.sites == 1, .pins = opts.pins, .npins = opts.npins,
@@ -258,7 +258,7 @@ int main(int argc, char **argv)
     cli_stream_open(h);
     cli_stream_end(vg_source_tail(source));
     if (opts.report) write_report(&h->signal, &r);
-    vg_signal_report_clear(&r);
+    vg_signal_stats_clear(&r);
     vg_source_close(&source);
     cli_finish(0);
 }

@@ -389,7 +389,7 @@ static void report_map(report *r, const vg_map *m)
     else if (!m->ncorners) snprintf(line, sizeof line, "%zu bones, by linear blend skinning alone", m->n);
     else snprintf(line, sizeof line, "%zu bones, %zu for each corner", m->n, m->per_corner);
     report_put(r, NULL, "map of", report_text(line));
-    report_put(r, "joints", bones ? NULL : "joints", report_count(m->njoints));
+    report_put(r, "hinges", bones ? NULL : "hinges", report_count(m->nhinges));
     report_put(r, "held_vertices", "held", report_count(m->nheld));
     report_put(r, "retargeted", NULL, report_flag(m->has_home));
     if (m->has_home) report_put(r, NULL, "body", report_text("another one than its poses are measured on"));

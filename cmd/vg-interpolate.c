@@ -155,9 +155,9 @@ static void write_poses(const poses *p, vg_path *path)
 
 static void report(const vg_path *path)
 {
-    vg_path_facts facts = vg_path_get_facts(path);
-    const vg_deform_counts *c = &facts.degenerate;
-    cli_note("%zu stretches between keys, %zu with turns by more than half a turn", facts.segments, facts.beyond);
+    vg_path_stats stats = vg_path_get_stats(path);
+    const vg_deform_stats *c = &stats.degenerate;
+    cli_note("%zu stretches between keys, %zu with turns by more than half a turn", stats.segments, stats.beyond);
     if (c->corners)
         cli_warn("%llu corners without a direction took the turn of their face (the first in face %llu)",
                  (unsigned long long)c->corners, (unsigned long long)c->first_face);

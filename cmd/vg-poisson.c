@@ -252,10 +252,10 @@ static void guide_last(void *context)
     work *w = context;
     if (w->frames) guide(w, &w->late, w->frames - 1, true);
     if (w->ahead) refuse_unmet(w->frames);
-    vg_spool_facts facts = vg_spool_get_facts(w->spool);
+    vg_spool_stats stats = vg_spool_get_stats(w->spool);
     cli_note("%llu frames, at most %llu waited, %llu bytes of them in a temporary file",
-             (unsigned long long)w->frames, (unsigned long long)facts.most_frames,
-             (unsigned long long)facts.file_bytes);
+             (unsigned long long)w->frames, (unsigned long long)stats.most_frames,
+             (unsigned long long)stats.file_bytes);
 }
 
 static void close_work(work *w)

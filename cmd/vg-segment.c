@@ -68,7 +68,7 @@ int main(int argc, char **argv)
     cli_need_vertices(h, "the input");
     vg_err e;
     vg_segmenter *s;
-    vg_segment_report report;
+    vg_segment_stats report;
     if (vg_segmenter_new(&s, &h->body.mesh, h->body.reference, cli.threads, &e) < 0) cli_die(&e);
     uint64_t poses = add_all(s, source);
     if (!poses) cli_stop(VG_EINPUT, "the input has no poses: what turns alike cannot be told");

@@ -82,15 +82,15 @@ typedef struct work {
     vg_weights weights;
 } work;
 
-static void keep_facts(work *w, const machine *m)
+static void keep_stats(work *w, const machine *m)
 {
     if (m->robust) {
-        vg_robust_facts found = vg_robust_get_facts(m->robust);
+        vg_robust_stats found = vg_robust_get_stats(m->robust);
         if (found.most_rounds > w->most_rounds) w->most_rounds = found.most_rounds;
         w->unfinished += found.unfinished;
     }
     if (!m->planar) return;
-    vg_planar_facts found = vg_planar_get_facts(m->planar);
+    vg_planar_stats found = vg_planar_get_stats(m->planar);
     if (found.most_steps > w->most_steps) w->most_steps = found.most_steps;
     if (found.worst_residual > w->worst_residual) w->worst_residual = found.worst_residual;
     w->planar_faces = found.faces;
@@ -98,7 +98,7 @@ static void keep_facts(work *w, const machine *m)
 
 static void free_machine(work *w, machine *m)
 {
-    keep_facts(w, m);
+    keep_stats(w, m);
     vg_planar_free(&m->planar);
     vg_robust_free(&m->robust);
     vg_solver_free(&m->solver);
@@ -119,9 +119,9 @@ static void make_machine(work *w, machine *m, uint32_t *held, size_t nheld)
         (opts.fit == 0 && vg_robust_new(&m->robust, m->solver, (size_t)opts.rounds, opts.eps, &e) < 0) ||
         (opts.planar && vg_planar_new(&m->planar, m->solver, opts.planar_weights[0], opts.planar_weights[1], &e) < 0))
         cli_die(&e);
-    vg_solver_facts facts = vg_solver_get_facts(m->solver);
-    cli_note("%zu unknowns, %zu entries in the factor, analysed in %.3f s, factorized in %.3f s", facts.unknowns,
-             facts.factor_entries, facts.analyse_seconds, facts.factor_seconds);
+    vg_solver_stats stats = vg_solver_get_stats(m->solver);
+    cli_note("%zu unknowns, %zu entries in the factor, analysed in %.3f s, factorized in %.3f s", stats.unknowns,
+             stats.factor_entries, stats.analyse_seconds, stats.factor_seconds);
 }
 
 /* Frames that came in become guesses and right-hand sides, and may be used again. */
@@ -172,7 +172,7 @@ static void solve_waiting(work *w)
     size_t good = w->n && w->at->planar ? vg_planar_solve(w->at->planar, w->n, normals, x) : w->n;
     if (good < w->n)
         cli_no("frame '%s' is not planar yet after %zu steps: choose --planar-weights that are less far apart",
-               w->waiting[good].frame.name, vg_planar_get_facts(w->at->planar).most_steps);
+               w->waiting[good].frame.name, vg_planar_get_stats(w->at->planar).most_steps);
     for (size_t i = 0; i < w->n; i++) cli_stream_put(&w->waiting[i].frame);
     w->n = w->loaded = 0;
     free(rhs);
@@ -206,7 +206,7 @@ static void make_room(work *w)
     size_t entries = 0;
     for (size_t i = 0; i < MACHINES; i++) {
         if (!w->pinned[i].solver) continue;
-        entries += vg_solver_get_facts(w->pinned[i].solver).factor_entries;
+        entries += vg_solver_get_stats(w->pinned[i].solver).factor_entries;
         if (i == MACHINES - 1 || entries > MOST_ENTRIES) free_machine(w, &w->pinned[i]);
     }
 }

@@ -158,16 +158,16 @@ static void write_checkpoint(const vg_trainer *t, vg_head *h)
     vg_network_clear(&h->network);
     if (vg_trainer_network(t, false, &h->network, &e) < 0 || (fd = vg_targets_open(&targets, opts.checkpoint, &e)) < 0)
         cli_die(&e);
-    int code = vg_writer_open(&w, fd, opts.checkpoint, h, &e);
-    if (code >= 0) {
-        code = vg_writer_end(w, NULL, &e);
+    int r = vg_writer_open(&w, fd, opts.checkpoint, h, &e);
+    if (r >= 0) {
+        r = vg_writer_end(w, NULL, &e);
         vg_writer_close(&w);
     }
     vg_err close_error;
     int closed = vg_target_close(fd, opts.checkpoint, &close_error);
-    if (code >= 0 && closed < 0) code = closed, e = close_error;
-    if (code >= 0) code = vg_targets_rename(&targets, &e);
-    if (code < 0) {
+    if (r >= 0 && closed < 0) r = closed, e = close_error;
+    if (r >= 0) r = vg_targets_rename(&targets, &e);
+    if (r < 0) {
         vg_targets_remove(&targets);
         cli_die(&e);
     }

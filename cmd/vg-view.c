@@ -428,22 +428,22 @@ static void page_frame(void *page, size_t i, const side *s, const double *truth)
     if (vg_page_add(page, i, &s->frame, truth, &e) < 0) cli_die(&e);
 }
 
-static void note_facts(const vg_page_facts *facts)
+static void note_stats(const vg_page_stats *stats)
 {
-    cli_note("%zu frames in %.2f MB; positions are within %.2g D of the input", facts->frames,
-             (double)facts->bytes / 1e6, facts->loss);
+    cli_note("%zu frames in %.2f MB; positions are within %.2g D of the input", stats->frames,
+             (double)stats->bytes / 1e6, stats->loss);
     if (opts.against)
-        cli_note("errors: mean %.3g D, max %.3g D; the colours end at %.3g D", facts->mean, facts->max, facts->scale);
-    else if (facts->tinted)
-        cli_note("colours: from %.3g to %.3g, mean %.3g; they end at %.3g", facts->least, facts->max, facts->mean,
-                 facts->scale);
+        cli_note("errors: mean %.3g D, max %.3g D; the colours end at %.3g D", stats->mean, stats->max, stats->scale);
+    else if (stats->tinted)
+        cli_note("colours: from %.3g to %.3g, mean %.3g; they end at %.3g", stats->least, stats->max, stats->mean,
+                 stats->scale);
 }
 
 static void make_page(cast *c)
 {
     vg_page_options o = page_options(&c->result);
     vg_page *page;
-    vg_page_facts facts;
+    vg_page_stats stats;
     vg_err e;
     if (opts.patches) take_patches(&c->result);
     FILE *out = cli_text_open();
@@ -454,10 +454,10 @@ static void make_page(cast *c)
     read_cast(c, true, page_frame, page);
     if (shows_reference(c)) put_reference(&c->result, page_frame, page);
     check_counts(c);
-    if (vg_page_end(page, &facts, &e) < 0) cli_die(&e);
+    if (vg_page_end(page, &stats, &e) < 0) cli_die(&e);
     cli_text_end();
     vg_page_free(&page);
-    note_facts(&facts);
+    note_stats(&stats);
 }
 
 int main(int argc, char **argv)

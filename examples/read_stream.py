@@ -128,11 +128,11 @@ class Map:
     home_centre: array
     share: array
     home: object         # array, or None
-    joint_at: array
-    joint_weight: array
+    hinge_at: array
+    hinge_weight: array
     corners: array
     held_at: array
-    joints: array
+    hinges: array
     held: array
     held_patch: array
     per_corner: int
@@ -750,7 +750,7 @@ class _Reader:
             p.fail("a face is in a patch that is not there")
         self.stream.patches = (count, patches)
 
-    def map_driver(self, p: _Payload, n: int, nj: int, bones: bool, per_corner: int):
+    def map_driver(self, p: _Payload, n: int, ng: int, bones: bool, per_corner: int):
         if not bones:
             if per_corner != 1:
                 p.fail("a corner must have one patch")
@@ -761,22 +761,22 @@ class _Reader:
             p.fail("it has not as many bones as the rig")
         if not 1 <= per_corner <= 2:
             p.fail("a corner must have 1 or 2 bones")
-        if nj:
+        if ng:
             p.fail("pairs of patches stand in a map of bones")
 
     def map(self, p: _Payload):
-        n, nv, nj, nc, nh = (p.u64() for _ in range(5))
+        n, nv, ng, nc, nh = (p.u64() for _ in range(5))
         kind, has_home, nnames, per_corner = p.word(), p.flag(), p.u64(), p.u64()
         size, bones = p.f64(), kind == 2
-        lengths = (4 * nv * n, 3 * n * n, 3 * n, 3 * n, n, 3 * nv if has_home else 0, 3 * nj, nj,
+        lengths = (4 * nv * n, 3 * n * n, 3 * n, 3 * n, n, 3 * nv if has_home else 0, 3 * ng, ng,
                    4 * per_corner * nc, 0 if bones else 3 * nh)
-        weights, place, centre, home_centre, share, home, joint_at, joint_weight, corners, held_at = (
+        weights, place, centre, home_centre, share, home, hinge_at, hinge_weight, corners, held_at = (
             p.f64s(length) for length in lengths)
-        joints, held, held_patch = p.u32s(2 * nj), p.u32s(nh), p.u32s(0 if bones else nh)
+        hinges, held, held_patch = p.u32s(2 * ng), p.u32s(nh), p.u32s(0 if bones else nh)
         corner_bones = p.u32s(per_corner * nc if bones else 0)
         names = p.texts(nnames)
         p.end()
-        if not 1 <= n < INDEX_LIMIT or nj >= INDEX_LIMIT or nc >= INDEX_LIMIT or nh > nv:
+        if not 1 <= n < INDEX_LIMIT or ng >= INDEX_LIMIT or nc >= INDEX_LIMIT or nh > nv:
             p.fail("its counts are out of range")
         if nv != self.stream.mesh.nv:
             p.fail("its count does not fit the mesh")
@@ -786,12 +786,12 @@ class _Reader:
             p.fail("names are missing")
         if size <= 0:
             p.fail("its size is not positive")
-        self.map_driver(p, n, nj, bones, per_corner)
+        self.map_driver(p, n, ng, bones, per_corner)
         if min(share) < 0 or abs(sum(share) - 1) >= 1e-9:
             p.fail("a share is negative, or the shares do not sum to 1")
-        pairs = list(zip(joints[::2], joints[1::2]))
-        if any(a >= n or b >= n or a == b for a, b in pairs) or any(w <= 0 for w in joint_weight):
-            p.fail("a joint is malformed")
+        pairs = list(zip(hinges[::2], hinges[1::2]))
+        if any(a >= n or b >= n or a == b for a, b in pairs) or any(w <= 0 for w in hinge_weight):
+            p.fail("a hinge is malformed")
         if any(not any(corners[i:i + 4 * per_corner]) for i in range(0, len(corners), 4 * per_corner)):
             p.fail("a quaternion is zero")
         if any(x >= n for x in corner_bones):
@@ -800,7 +800,7 @@ class _Reader:
             p.fail("a vertex is held by a transform that is not there")
         self.ascending(p, held, nv)
         self.stream.map = Map("bones" if bones else "patches", n, size, names, weights, place, centre, home_centre, share,
-                              home if has_home else None, joint_at, joint_weight, corners, held_at, joints, held,
+                              home if has_home else None, hinge_at, hinge_weight, corners, held_at, hinges, held,
                               held_patch, per_corner, corner_bones)
 
     def check_signal(self, p: _Payload, n: int, space: int, d: int, sites: int, k: int, bits: int, layout: int):
@@ -1031,8 +1031,8 @@ def _rig_json(r: Rig) -> dict:
 def _map_json(m: Map) -> dict:
     return {"kind": m.kind, "per_corner": m.per_corner, "corner_bones": _rows(m.corner_bones, m.per_corner), "size": m.size, "names": m.names, "weights": _rows(m.weights, 4 * m.n), "place": _rows(m.place, 3 * m.n),
             "centre": _rows(m.centre, 3), "home_centre": _rows(m.home_centre, 3), "share": list(m.share),
-            "home": m.home and _rows(m.home, 3), "joint_at": _rows(m.joint_at, 3), "joint_weight": list(m.joint_weight),
-            "corners": _rows(m.corners, 4), "held_at": _rows(m.held_at, 3), "joints": _rows(m.joints, 2),
+            "home": m.home and _rows(m.home, 3), "hinge_at": _rows(m.hinge_at, 3), "hinge_weight": list(m.hinge_weight),
+            "corners": _rows(m.corners, 4), "held_at": _rows(m.held_at, 3), "hinges": _rows(m.hinges, 2),
             "held": list(m.held), "held_patch": list(m.held_patch)}
 
 

@@ -312,7 +312,7 @@ types:
         type: u8
       - id: num_vertices
         type: u8
-      - id: num_joints
+      - id: num_hinges
         type: u8
       - id: num_corners
         type: u8
@@ -353,14 +353,14 @@ types:
         type: point
         repeat: expr
         repeat-expr: has_home * num_vertices
-      - id: joint_positions
+      - id: hinge_positions
         type: point
         repeat: expr
-        repeat-expr: num_joints
-      - id: joint_weights
+        repeat-expr: num_hinges
+      - id: hinge_weights
         type: f8
         repeat: expr
-        repeat-expr: num_joints
+        repeat-expr: num_hinges
       - id: corners
         type: f8
         repeat: expr
@@ -369,8 +369,8 @@ types:
         type: point
         repeat: expr
         repeat-expr: 'kind == 1 ? num_held : 0'
-      - id: joints
-        type: list_u4(2 * num_joints)
+      - id: hinges
+        type: list_u4(2 * num_hinges)
       - id: held_vertices
         type: list_u4(num_held)
       - id: held_patches

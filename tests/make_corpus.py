@@ -196,12 +196,12 @@ def patches(p):
 
 def fitted(m):
     n, corners, held = len(m["share"]), len(m["corners"]), len(m["held"])
-    counts = u64(n, len(m["weights"]), len(m["joints"]), corners // m["per_corner"], held)
+    counts = u64(n, len(m["weights"]), len(m["hinges"]), corners // m["per_corner"], held)
     counts += u64({"patches": 1, "bones": 2}[m["kind"]], m["home"] is not None, len(m["names"]), m["per_corner"])
     rows = ("weights", "place", "centre", "home_centre")
     numbers = [f64(m["size"])] + [f64(*flat(m[k])) for k in rows] + [f64(*m["share"]), f64(*flat(m["home"] or []))]
-    numbers += [f64(*flat(m["joint_at"])), f64(*m["joint_weight"]), f64(*flat(m["corners"])), f64(*flat(m["held_at"]))]
-    lists = [flat(m["joints"]), m["held"], m["held_patch"], flat(m["corner_bones"])]
+    numbers += [f64(*flat(m["hinge_at"])), f64(*m["hinge_weight"]), f64(*flat(m["corners"])), f64(*flat(m["held_at"]))]
+    lists = [flat(m["hinges"]), m["held"], m["held_patch"], flat(m["corner_bones"])]
     return Record("MAP ", counts + b"".join(numbers) + b"".join(indices(*x) for x in lists) +
                   b"".join(map(text, m["names"])), CRITICAL)
 
@@ -447,7 +447,7 @@ def bone_map_content(per_corner=2, corners=True, **changes):
     m = {"kind": "bones", "per_corner": per_corner, "size": 1.0, "names": [],
          "weights": [[*[x / 2 for x in p], 0.5, 0, 0, 0, 0, *[x / 2 for x in p], 0.5] for p in rest],
          "place": [[0.25 * k for k in range(9)]] * 3, "centre": rest[:3], "home_centre": rest[:3], "share": [0.5, 0.25, 0.25],
-         "home": None, "joint_at": [], "joint_weight": [], "held_at": [], "joints": [], "held": [1, 3], "held_patch": [],
+         "home": None, "hinge_at": [], "hinge_weight": [], "held_at": [], "hinges": [], "held": [1, 3], "held_patch": [],
          "corners": [q for c in lists for q in c[-per_corner:]] if corners else [],
          "corner_bones": [[0, 1, 2][-per_corner:] if per_corner < 3 else [0, 1, 2]] * 6 if corners else []}
     return rig_content(links=[], frames=[], map=m, **changes)
@@ -477,8 +477,8 @@ def map_content(home=False, corners=True, **changes):
     m = {"kind": "patches", "per_corner": 1, "corner_bones": [], "size": 1.5 if home else 1.0, "names": ["left", "r\u00e9st"] if home else [], "weights": weights,
          "place": [[-0.5, -0.25, 0, -0.25, -0.25, 0], [-0.5, -0.25, 0, -0.25, -0.25, 0]], "centre": centre,
          "home_centre": centre, "share": [0.5, 0.5], "home": [[2, 0, 0], [3, 0, 0], [3, 1, 0], [2, 1, 0]] if home else None,
-         "joint_at": [[0.5, 0.5, 0]], "joint_weight": [2.0], "corners": [[1, 0, 0, 0]] * 6 if corners else [], "held_at": [[0, 0, 0], [0, 1, 0]],
-         "joints": [[0, 1]], "held": [0, 3], "held_patch": [0, 1]}
+         "hinge_at": [[0.5, 0.5, 0]], "hinge_weight": [2.0], "corners": [[1, 0, 0, 0]] * 6 if corners else [], "held_at": [[0, 0, 0], [0, 1, 0]],
+         "hinges": [[0, 1]], "held": [0, 3], "held_patch": [0, 1]}
     return content(links=[], frames=[], patches={"count": 2, "of_face": [0, 1]}, map=m, **changes)
 
 
@@ -937,8 +937,8 @@ def reject_attachments():
         "map-cut": lie(map_content(), "MAP ", payload=lambda record: record.payload[:-4]),
         "map-long": lie(map_content(), "MAP ", payload=lambda record: record.payload + bytes(4)),
         "map-empty": lie(map_content(), "MAP ", payload=b""),
-        "map-transforms-0": mapped(share=[], weights=[[]] * 4, place=[], centre=[], home_centre=[], joints=[], joint_at=[],
-                                   joint_weight=[], held=[], held_at=[], held_patch=[], corners=[]),
+        "map-transforms-0": mapped(share=[], weights=[[]] * 4, place=[], centre=[], home_centre=[], hinges=[], hinge_at=[],
+                                   hinge_weight=[], held=[], held_at=[], held_patch=[], corners=[]),
         "map-transforms-2-31": patched(map_content(), "MAP ", 0, u64(1 << 31)),
         "map-vertices": mapped(weights=map_content()["map"]["weights"] + [[0, 0, 0, 1, 0, 0, 0, 0]]),
         "map-vertices-2-63": patched(map_content(), "MAP ", 8, u64(1 << 63)),
@@ -954,7 +954,7 @@ def reject_attachments():
         "map-per-corner-0": patched(map_content(corners=False), "MAP ", 64, u64(0)),
         "map-of-bones-per-corner-3": whole(dict(b, map=dict(b["map"], per_corner=3, corners=[STRAIGHT] * 18, corner_bones=[[0, 1, 2]] * 6))),
         "map-of-bones-of-another-rig": whole(dict(b, rig=dict(b["rig"], joints=joints_but_one, skin=None))),
-        "map-of-bones-with-joints": whole(dict(b, map=dict(b["map"], joints=[[0, 1]], joint_at=[[0, 0, 0]], joint_weight=[1.0]))),
+        "map-of-bones-with-joints": whole(dict(b, map=dict(b["map"], hinges=[[0, 1]], hinge_at=[[0, 0, 0]], hinge_weight=[1.0]))),
         "map-of-bones-corner-bone": patched(b, "MAP ", -4, u32(3)),
         "map-of-bones-corner-zero": whole(dict(b, map=dict(b["map"], corners=[[0, 0, 0, 0]] * 12))),
         "map-of-bones-held-twice": whole(dict(b, map=dict(b["map"], held=[1, 1]))),

@@ -106,9 +106,9 @@ static int damaged(const vgi_archive *a, struct archive *la, const char *path, v
         return vg_fail(e, VG_EINPUT, "'%s' is encrypted: unpack it first", a->name);
     if (!why) why = "truncated";
     bool cut = strcasestr(why, "truncated") || strcasestr(why, "end of file") || strcasestr(why, "premature");
-    int code = cut ? VG_ETRUNC : VG_EINPUT;
-    if (path) return vg_fail(e, code, "'%s' in '%s' is damaged or cut short: %s", path, a->name, why);
-    return vg_fail(e, code, "archive '%s' is damaged or cut short: %s", a->name, why);
+    int r = cut ? VG_ETRUNC : VG_EINPUT;
+    if (path) return vg_fail(e, r, "'%s' in '%s' is damaged or cut short: %s", path, a->name, why);
+    return vg_fail(e, r, "archive '%s' is damaged or cut short: %s", a->name, why);
 }
 
 static void walk_close(vgi_archive *a)

@@ -93,10 +93,10 @@ int vgi_record_read(vgi_input *in, vgi_tally *t, vg_record *r, vg_err *e)
     const char *name = vgi_input_name(in);
     unsigned char h[RECORD_HEADER], padding[8];
     size_t got = 0;
-    int ok = vgi_input_read(in, h, sizeof h, &got, e);
-    if (ok == VG_ETRUNC)
+    int code = vgi_input_read(in, h, sizeof h, &got, e);
+    if (code == VG_ETRUNC)
         return got ? cut_short(name, t, "inside the header of record", e) : cut_short(name, t, "before record", e);
-    if (ok < 0) return ok;
+    if (code < 0) return code;
     unsigned long long index = t->records;
     if (vgi_get64(h + 24) != XXH64(h, 24, 0))
         return vg_fail(e, VG_EINPUT, "'%s': the header of record %llu is damaged (checksum)", name, index);
@@ -112,10 +112,10 @@ int vgi_record_read(vgi_input *in, vgi_tally *t, vg_record *r, vg_err *e)
                        (unsigned long long)length);
 
     r->payload.size = 0;
-    ok = vgi_input_take(in, &r->payload, (size_t)length, NULL, e);
-    if (ok == VG_OK) ok = vgi_input_read(in, padding, (size_t)(-length & 7), NULL, e);
-    if (ok == VG_ETRUNC) return cut_short(name, t, "inside record", e);
-    if (ok < 0) return ok;
+    code = vgi_input_take(in, &r->payload, (size_t)length, NULL, e);
+    if (code == VG_OK) code = vgi_input_read(in, padding, (size_t)(-length & 7), NULL, e);
+    if (code == VG_ETRUNC) return cut_short(name, t, "inside record", e);
+    if (code < 0) return code;
     for (size_t i = 0; i < (size_t)(-length & 7); i++)
         if (padding[i])
             return vg_fail(e, VG_EINPUT, "'%s': the padding of record %llu (%s) is not zero", name, index, r->tag);

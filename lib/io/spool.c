@@ -19,7 +19,7 @@ struct vg_spool {
     int fd;                 /* -1: no file was needed yet */
     uint64_t read, written; /* places in the file; equal: nothing is in it */
     vg_bytes frame;         /* one frame on its way into or out of the file */
-    vg_spool_facts facts;
+    vg_spool_stats stats;
     uint64_t waiting;
 };
 
@@ -52,9 +52,9 @@ void vg_spool_free(vg_spool **out)
     *out = NULL;
 }
 
-vg_spool_facts vg_spool_get_facts(const vg_spool *s)
+vg_spool_stats vg_spool_get_stats(const vg_spool *s)
 {
-    return s->facts;
+    return s->stats;
 }
 
 /* ---- in and out ---- */
@@ -81,7 +81,7 @@ static int keep_in_file(vg_spool *s, const vg_frame *f, const vgi_packed *head, 
     vgi_pack(&s->packing, f, head, s->frame.data);
     if ((r = vgi_pack_write(s->fd, s->written, s->frame.data, head->bytes, f->name, e)) < 0) return r;
     s->written += head->bytes;
-    if (s->written > s->facts.file_bytes) s->facts.file_bytes = s->written;
+    if (s->written > s->stats.file_bytes) s->stats.file_bytes = s->written;
     return VG_OK;
 }
 
@@ -95,7 +95,7 @@ int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e)
     bool fits = s->read == s->written && head.bytes <= s->limit && s->used <= s->limit - head.bytes;
     r = fits ? keep_in_memory(s, f, &head, e) : keep_in_file(s, f, &head, e);
     if (r < 0) return r;
-    if (++s->waiting > s->facts.most_frames) s->facts.most_frames = s->waiting;
+    if (++s->waiting > s->stats.most_frames) s->stats.most_frames = s->waiting;
     return VG_OK;
 }
 

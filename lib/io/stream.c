@@ -29,8 +29,8 @@ static int keep_unknown(vg_reader *r, vg_record *record, vg_records *list, vg_er
                        vgi_input_name(r->in), record->tag);
     if (!(record->flags & VGI_COPY_SAFE)) return VG_OK;
     size_t cap = list->n;
-    int ok = vgi_grow(&list->at, &cap, list->n + 1, sizeof *list->at, e);
-    if (ok < 0) return ok;
+    int code = vgi_grow(&list->at, &cap, list->n + 1, sizeof *list->at, e);
+    if (code < 0) return code;
     list->at[list->n++] = *record;
     record->payload = (vg_bytes){0};
     return VG_OK;
@@ -79,16 +79,16 @@ static int read_head_record(vg_reader *r, vg_record *record, vg_err *e)
 
 static int read_head(vg_reader *r, vg_err *e)
 {
-    int ok = vgi_tally_init(&r->tally, e);
-    if (ok == VG_OK) ok = vgi_record_begin_read(r->in, e);
+    int code = vgi_tally_init(&r->tally, e);
+    if (code == VG_OK) code = vgi_record_begin_read(r->in, e);
     vg_record record = {.payload = {0}};
-    while (ok == VG_OK && !r->formed) {
-        ok = vgi_record_read(r->in, &r->tally, &record, e);
-        if (ok == 0) ok = vg_fail(e, VG_EINPUT, "'%s' has no FORM record", vgi_input_name(r->in));
-        else if (ok > 0) ok = read_head_record(r, &record, e);
+    while (code == VG_OK && !r->formed) {
+        code = vgi_record_read(r->in, &r->tally, &record, e);
+        if (code == 0) code = vg_fail(e, VG_EINPUT, "'%s' has no FORM record", vgi_input_name(r->in));
+        else if (code > 0) code = read_head_record(r, &record, e);
     }
     vg_bytes_clear(&record.payload);
-    if (ok < 0) return ok;
+    if (code < 0) return code;
     if (r->seen[VGI_MESH] && !r->head.body.reference)
         return vg_fail(e, VG_EINPUT, "'%s' has a MESH but no REFP record before FORM", vgi_input_name(r->in));
     if (!r->head.body.reference_name && !(r->head.body.reference_name = vgi_copy_string("", 0, e))) return VG_ENOMEM;
@@ -101,25 +101,25 @@ int vgi_reader_open_input(vg_reader **out, vgi_input *in, vg_err *e)
     vg_reader *r = *out = vgi_array(1, sizeof *r, e);
     if (!r) return vgi_input_free(&in), VG_ENOMEM;
     r->in = in;
-    int ok = read_head(r, e);
-    if (ok < 0) vg_reader_close(out);
-    return ok;
+    int code = read_head(r, e);
+    if (code < 0) vg_reader_close(out);
+    return code;
 }
 
 int vg_reader_open(vg_reader **r, int fd, const char *name, vg_err *e)
 {
     vgi_input *in;
     *r = NULL;
-    int ok = vgi_input_fd(&in, fd, false, name, e);
-    return ok < 0 ? ok : vgi_reader_open_input(r, in, e);
+    int code = vgi_input_fd(&in, fd, false, name, e);
+    return code < 0 ? code : vgi_reader_open_input(r, in, e);
 }
 
 int vg_reader_open_memory(vg_reader **r, const void *data, size_t n, const char *name, vg_err *e)
 {
     vgi_input *in;
     *r = NULL;
-    int ok = vgi_input_memory(&in, data, n, name, e);
-    return ok < 0 ? ok : vgi_reader_open_input(r, in, e);
+    int code = vgi_input_memory(&in, data, n, name, e);
+    return code < 0 ? code : vgi_reader_open_input(r, in, e);
 }
 
 vg_head *vg_reader_head(vg_reader *r)
@@ -139,28 +139,28 @@ int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
     if (r->ended) return 0;
     vg_record record = {.payload = f->raw};
     vg_records before = {0};
-    int ok;
-    while ((ok = vgi_record_read(r->in, &r->tally, &record, e)) > 0) {
+    int code;
+    while ((code = vgi_record_read(r->in, &r->tally, &record, e)) > 0) {
         if (!strcmp(record.tag, "FRAM")) break;
-        if (!strcmp(record.tag, "FAIL")) ok = stopped_by_failure(r, &record, e);
+        if (!strcmp(record.tag, "FAIL")) code = stopped_by_failure(r, &record, e);
         else if (!strcmp(record.tag, "FORM"))
-            ok = vg_fail(e, VG_EINPUT, "'%s' has two FORM records", vgi_input_name(r->in));
+            code = vg_fail(e, VG_EINPUT, "'%s' has two FORM records", vgi_input_name(r->in));
         else if (vgi_artefact_by_tag(record.tag))
-            ok = vg_fail(e, VG_EINPUT, "'%s': record %s must come before FORM", vgi_input_name(r->in), record.tag);
-        else ok = keep_unknown(r, &record, &before, e);
-        if (ok < 0) break;
+            code = vg_fail(e, VG_EINPUT, "'%s': record %s must come before FORM", vgi_input_name(r->in), record.tag);
+        else code = keep_unknown(r, &record, &before, e);
+        if (code < 0) break;
     }
     f->raw = record.payload;
-    if (ok <= 0) {
-        if (ok == 0) r->ended = true, r->tail = before;
+    if (code <= 0) {
+        if (code == 0) r->ended = true, r->tail = before;
         else vg_records_clear(&before);
-        return ok;
+        return code;
     }
     f->extra = before;
     char where[200];
     snprintf(where, sizeof where, "'%.150s': frame %llu", vgi_input_name(r->in), (unsigned long long)r->frames);
-    ok = vgi_fram_decode(f, &r->form, where, e);
-    if (ok < 0) return ok;
+    code = vgi_fram_decode(f, &r->form, where, e);
+    if (code < 0) return code;
     r->frames++;
     return 1;
 }

@@ -197,7 +197,7 @@ static bool is_zero(const double *q, size_t n)
 
 static const char *refuse_counts(const vg_map *m, const vg_head *h)
 {
-    if (m->n == 0 || m->n >= UINT32_MAX || m->njoints >= UINT32_MAX || m->ncorners >= UINT32_MAX || m->nheld > m->nv)
+    if (m->n == 0 || m->n >= UINT32_MAX || m->nhinges >= UINT32_MAX || m->ncorners >= UINT32_MAX || m->nheld > m->nv)
         return "its counts are out of range";
     if (m->nv != h->body.mesh.nv) return "its count does not fit the mesh";
     if (m->kind != VG_MAP_PATCHES && m->kind != VG_MAP_BONES) return "it is driven by something unknown";
@@ -212,7 +212,7 @@ static const char *refuse_driver(const vg_map *m, const vg_rig *g)
     if (!g->nbones) return "a RIG record must come before it";
     if (m->n != g->nbones) return "it has not as many bones as the rig";
     if (m->per_corner < 1 || m->per_corner > 2) return "a corner must have 1 or 2 bones";
-    return m->njoints ? "pairs of patches stand in a map of bones" : NULL;
+    return m->nhinges ? "pairs of patches stand in a map of bones" : NULL;
 }
 
 static const char *refuse_parts(const vg_map *m)
@@ -223,10 +223,10 @@ static const char *refuse_parts(const vg_map *m)
         sum += m->share[i];
     }
     if (!is_one(sum)) return "the shares do not sum to 1";
-    for (size_t i = 0; i < m->njoints; i++)
-        if (m->joint[2 * i] >= m->n || m->joint[2 * i + 1] >= m->n || m->joint[2 * i] == m->joint[2 * i + 1] ||
-            !(m->joint_weight[i] > 0))
-            return "a joint is malformed";
+    for (size_t i = 0; i < m->nhinges; i++)
+        if (m->hinge[2 * i] >= m->n || m->hinge[2 * i + 1] >= m->n || m->hinge[2 * i] == m->hinge[2 * i + 1] ||
+            !(m->hinge_weight[i] > 0))
+            return "a hinge is malformed";
     return NULL;
 }
 

@@ -330,10 +330,10 @@ static double percentile_95(const vg_measures *x)
     return 0;
 }
 
-void vg_measures_get(const vg_measures *x, vg_measure_report *r)
+void vg_measures_get_stats(const vg_measures *x, vg_measure_stats *r)
 {
     double n = (double)x->m->nv * (double)x->frames;
-    *r = (vg_measure_report){.frames = x->frames, .vertices = x->m->nv, .faces = x->m->nf, .diagonal = x->diagonal};
+    *r = (vg_measure_stats){.frames = x->frames, .vertices = x->m->nv, .faces = x->m->nf, .diagonal = x->diagonal};
     r->mean = n > 0 ? x->sum / n : 0;
     r->rms = n > 0 ? sqrt(x->sum_squares / n) : 0;
     r->max = x->max, r->max_vertex = x->max_vertex, r->max_frame = x->max_frame;

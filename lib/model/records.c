@@ -149,7 +149,7 @@ LENGTH(map_weights, vg_map, times(a->nv, a->n))
 LENGTH(map_place, vg_map, times(a->n, a->n))
 LENGTH(map_transforms, vg_map, a->n)
 LENGTH(map_home, vg_map, a->has_home ? a->nv : 0)
-LENGTH(map_joints, vg_map, a->njoints)
+LENGTH(map_hinges, vg_map, a->nhinges)
 LENGTH(map_corners, vg_map, times(a->ncorners, a->per_corner))
 LENGTH(map_held, vg_map, a->nheld)
 LENGTH(map_placed, vg_map, a->kind == VG_MAP_BONES ? 0 : a->nheld)
@@ -158,7 +158,7 @@ LENGTH(map_names, vg_map, a->nnames)
 static const vgi_member map_fields[] = {
     NUMBER(vg_map, U64, n),
     NUMBER(vg_map, U64, nv),
-    NUMBER(vg_map, U64, njoints),
+    NUMBER(vg_map, U64, nhinges),
     NUMBER(vg_map, U64, ncorners),
     NUMBER(vg_map, U64, nheld),
     NUMBER(vg_map, U64, kind),
@@ -172,11 +172,11 @@ static const vgi_member map_fields[] = {
     OPTIONAL(vg_map, F64, home_centre, 3, map_transforms),
     OPTIONAL(vg_map, F64, share, 1, map_transforms),
     OPTIONAL(vg_map, F64, home, 3, map_home),
-    OPTIONAL(vg_map, F64, joint_at, 3, map_joints),
-    OPTIONAL(vg_map, F64, joint_weight, 1, map_joints),
+    OPTIONAL(vg_map, F64, hinge_at, 3, map_hinges),
+    OPTIONAL(vg_map, F64, hinge_weight, 1, map_hinges),
     OPTIONAL(vg_map, F64, corner, 4, map_corners),
     OPTIONAL(vg_map, F64, held_at, 3, map_placed),
-    OPTIONAL(vg_map, U32, joint, 2, map_joints),
+    OPTIONAL(vg_map, U32, hinge, 2, map_hinges),
     OPTIONAL(vg_map, U32, held, 1, map_held),
     OPTIONAL(vg_map, U32, held_patch, 1, map_placed),
     OPTIONAL(vg_map, U32, corner_bone, 1, map_corner_bones),

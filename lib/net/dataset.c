@@ -85,21 +85,21 @@ static int reorder(void *rows, size_t size, const size_t *order, size_t n, vg_er
 static int split_by_step(vgi_dataset *s, size_t step, vg_err *e)
 {
     size_t *order = vgi_array_raw(s->n, sizeof *order, e), *first = NULL, cap = 0, n = 0, nfirst = 0;
-    int code = order ? VG_OK : VG_ENOMEM;
-    for (size_t q = 0; code == VG_OK && q < s->nsequences; q++) {
+    int r = order ? VG_OK : VG_ENOMEM;
+    for (size_t q = 0; r == VG_OK && q < s->nsequences; q++) {
         size_t begin = s->sequence[q], end = q + 1 < s->nsequences ? s->sequence[q + 1] : s->n;
-        for (size_t phase = 0; code == VG_OK && phase < step && begin + phase < end; phase++) {
-            code = vgi_grow(&first, &cap, nfirst + 1, sizeof *first, e);
-            if (code == VG_OK) first[nfirst++] = n;
+        for (size_t phase = 0; r == VG_OK && phase < step && begin + phase < end; phase++) {
+            r = vgi_grow(&first, &cap, nfirst + 1, sizeof *first, e);
+            if (r == VG_OK) first[nfirst++] = n;
             for (size_t i = begin + phase; i < end; i += step) order[n++] = i;
         }
     }
-    if (code == VG_OK) code = reorder(s->features, s->d * sizeof *s->features, order, s->n, e);
-    if (code == VG_OK) code = reorder(s->home, 3 * s->nv * sizeof *s->home, order, s->n, e);
-    if (code == VG_OK) code = reorder(s->roots, 4 * sizeof *s->roots, order, s->n, e);
-    if (code == VG_OK) code = reorder(s->centroids, 3 * s->parts * sizeof *s->centroids, order, s->n, e);
+    if (r == VG_OK) r = reorder(s->features, s->d * sizeof *s->features, order, s->n, e);
+    if (r == VG_OK) r = reorder(s->home, 3 * s->nv * sizeof *s->home, order, s->n, e);
+    if (r == VG_OK) r = reorder(s->roots, 4 * sizeof *s->roots, order, s->n, e);
+    if (r == VG_OK) r = reorder(s->centroids, 3 * s->parts * sizeof *s->centroids, order, s->n, e);
     free(order);
-    if (code < 0) return free(first), code;
+    if (r < 0) return free(first), r;
     free(s->sequence);
     s->sequence = first, s->sequences_cap = cap, s->nsequences = nfirst;
     return VG_OK;
@@ -259,8 +259,8 @@ int vgi_dataset_find_coordinates(vgi_dataset *s, vg_network *n, size_t most, int
     if (frames < LEAST_FRAMES)
         return vg_fail(e, VG_EINPUT, "%zu frames are left to learn from: at least %d are needed", frames, LEAST_FRAMES);
     find_range(s, n);
-    int code = find_basis(s, n, most, threads, e);
-    if (code == VG_OK) code = encode_all(s, n, threads, e);
-    if (code == VG_OK) code = find_scales(s, n, e);
-    return code == VG_OK ? vgi_root_fit(s, n, e) : code;
+    int r = find_basis(s, n, most, threads, e);
+    if (r == VG_OK) r = encode_all(s, n, threads, e);
+    if (r == VG_OK) r = find_scales(s, n, e);
+    return r == VG_OK ? vgi_root_fit(s, n, e) : r;
 }

@@ -50,18 +50,18 @@ int vg_featurer_new(vg_featurer **out, const vg_mesh *m, const double *reference
     f->width = o && o->nine ? VGI_NINE : VGI_TWELVE;
     f->plain = o && o->plain;
     f->threads = o && o->threads > 1 ? o->threads : 1;
-    int code = vgi_rings_make(&f->rings, m, reference, e);
+    int r = vgi_rings_make(&f->rings, m, reference, e);
     size_t n = (size_t)f->threads, spill = f->width * m->nv + 3 * (f->rings.nparts + m->nv);
-    if (code == VG_OK && (!(f->before = vgi_array(3 * m->nv, sizeof *f->before, e)) ||
+    if (r == VG_OK && (!(f->before = vgi_array(3 * m->nv, sizeof *f->before, e)) ||
                           !(f->blocks = vgi_array(n, sizeof *f->blocks, e)) ||
                           !(f->spill = vgi_array(n, sizeof *f->spill, e))))
-        code = VG_ENOMEM;
-    for (size_t i = 0; code == VG_OK && i < n; i++) {
-        code = vgi_feature_block_make(&f->blocks[i], &f->rings, e);
-        if (code == VG_OK && !(f->spill[i] = vgi_array(spill, sizeof **f->spill, e))) code = VG_ENOMEM;
+        r = VG_ENOMEM;
+    for (size_t i = 0; r == VG_OK && i < n; i++) {
+        r = vgi_feature_block_make(&f->blocks[i], &f->rings, e);
+        if (r == VG_OK && !(f->spill[i] = vgi_array(spill, sizeof **f->spill, e))) r = VG_ENOMEM;
     }
-    if (code < 0) vg_featurer_free(out);
-    return code;
+    if (r < 0) vg_featurer_free(out);
+    return r;
 }
 
 void vg_featurer_free(vg_featurer **out)
@@ -80,9 +80,9 @@ void vg_featurer_free(vg_featurer **out)
     *out = NULL;
 }
 
-vg_feature_facts vg_featurer_facts(const vg_featurer *f)
+vg_feature_stats vg_featurer_get_stats(const vg_featurer *f)
 {
-    return (vg_feature_facts){.width = f->width,
+    return (vg_feature_stats){.width = f->width,
                               .parts = f->rings.nparts,
                               .main_part = f->rings.main_part,
                               .open_rings = f->rings.nopen,

@@ -43,10 +43,10 @@ int vg_generator_new(vg_generator **out, const vg_network *n, const vg_mesh *m, 
     g->net = n, g->o = *o, g->nv = n->nv, g->d = n->nv * n->width;
     int code = vg_featurer_new(&g->featurer, m, reference, &f, e);
     if (code == VG_OK) {
-        vg_feature_facts facts = vg_featurer_facts(g->featurer);
+        vg_feature_stats stats = vg_featurer_get_stats(g->featurer);
         const vgi_rings *r = vgi_featurer_rings(g->featurer);
-        g->main_part = facts.main_part;
-        code = facts.parts == n->parts ? vgi_runner_make(&g->runner, n, r->first, r->to, 2, e)
+        g->main_part = stats.main_part;
+        code = stats.parts == n->parts ? vgi_runner_make(&g->runner, n, r->first, r->to, 2, e)
                                        : vg_fail(e, VG_EINPUT, "the network has another number of components");
     }
     size_t k = n->rank, all = 5 * g->d + 2 * k + vgi_network_roots(n) + 3 * n->parts;
@@ -104,8 +104,8 @@ static void remember(vg_generator *g, const net_lanes *frame)
 int vg_generator_give(vg_generator *g, const double *pose, vg_err *e)
 {
     double *values = g->features, *root = g->root, *centroids = g->centroids;
-    int code = vg_featurer_measure(g->featurer, 1, &pose, &values, &root, &centroids, e);
-    if (code < 0) return code;
+    int r = vg_featurer_measure(g->featurer, 1, &pose, &values, &root, &centroids, e);
+    if (r < 0) return r;
     vgi_network_normalise(g->net, values, g->x);
     note(g);
     bool linear = vgi_network_is_linear(g->net);
@@ -265,8 +265,8 @@ int vg_generator_between(vg_generator *g, const double *key, size_t n, double *c
         note_station(g, &s[i]);
     }
     g->given = g->made = g->npast = 0; /* whole turns of the key follow those of the key before */
-    int code = vg_generator_give(g, key, e);
-    if (code == VG_OK) {
+    int r = vg_generator_give(g, key, e);
+    if (r == VG_OK) {
         note_station(g, &s[n + 1]);
         if (miss) *miss = distance(s[n].x, s[n + 1].x, g->d) / span(g->net);
         for (size_t i = 0; i < n; i++) {
@@ -275,5 +275,5 @@ int vg_generator_between(vg_generator *g, const double *key, size_t n, double *c
         }
     }
     stations_free(s, n + 2);
-    return code;
+    return r;
 }

@@ -265,17 +265,17 @@ int vg_trainer_judge(vg_trainer *t, vg_network_errors *errors, vg_err *e)
     errors->windows = j.windows;
     double *room = vgi_array(3 * d + 4 * t->data.rank, sizeof *room, e);
     j.x = vgi_array(all, sizeof *j.x, e);
-    int code = j.x && room ? VG_OK : VG_ENOMEM;
-    if (code == VG_OK) {
+    int r = j.x && room ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) {
         j.features = j.x + NET_LANES * d, j.vertices = j.features + NET_LANES * d;
         j.centroids = j.vertices + NET_LANES * 3 * t->mesh.nv;
         vgi_blas_alone();
-        code = judge_all(&j, errors, room, e);
+        r = judge_all(&j, errors, room, e);
         vgi_blas_shared();
         take_means(&j, errors);
         keep(t, errors);
     }
     free(j.x);
     free(room);
-    return code;
+    return r;
 }

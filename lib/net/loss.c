@@ -9,11 +9,11 @@
 int net_group_make(net_group *g, const vgi_shape *s, vg_direction direction, size_t steps, vg_err *e)
 {
     *g = (net_group){.direction = direction, .steps = steps};
-    int code = net_chains_make(&g->chains[0], s, steps, e);
-    if (code == VG_OK && direction == VG_SEPARATE) code = net_chains_make(&g->chains[1], s, steps, e);
-    if (code == VG_OK && !(g->norm = vgi_array(steps * 3 * NET_LANES, sizeof *g->norm, e))) code = VG_ENOMEM;
-    if (code < 0) net_group_clear(g);
-    return code;
+    int r = net_chains_make(&g->chains[0], s, steps, e);
+    if (r == VG_OK && direction == VG_SEPARATE) r = net_chains_make(&g->chains[1], s, steps, e);
+    if (r == VG_OK && !(g->norm = vgi_array(steps * 3 * NET_LANES, sizeof *g->norm, e))) r = VG_ENOMEM;
+    if (r < 0) net_group_clear(g);
+    return r;
 }
 
 void net_group_clear(net_group *g)

@@ -96,8 +96,8 @@ int vgi_root_fit(const vgi_dataset *s, vg_network *n, vg_err *e)
         vgi_product_transposed_double(rows, w, row, z, rows, y, w, n->root, w);
     }
     for (size_t i = 0; i < rows; i++) a[i * rows + i] += ridge * (double)(row ? row : 1) * (i < 2 * k ? 1 : 1e-6);
-    int code = vgi_spd_factor(rows, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames leave the root's steps open");
-    if (code == VG_OK) vgi_spd_solve(rows, a, w, n->root);
+    int r = vgi_spd_factor(rows, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames leave the root's steps open");
+    if (r == VG_OK) vgi_spd_solve(rows, a, w, n->root);
     free(z);
-    return code;
+    return r;
 }

@@ -48,24 +48,24 @@ int vg_trainer_new(vg_trainer **out, const vg_mesh *m, const double *reference, 
     if (!t) return VG_ENOMEM;
     t->o = *o;
     vg_feature_options f = {.nine = o->nine, .threads = o->threads};
-    int code = vg_featurer_new(&t->featurer, m, reference, &f, e);
-    if (code == VG_OK) code = vg_mesh_copy(&t->mesh, m, e);
-    if (code == VG_OK && !(t->last = vgi_array(3 * m->nv, sizeof *t->last, e))) code = VG_ENOMEM;
-    if (code < 0) return vg_trainer_free(out), code;
-    vg_feature_facts facts = vg_featurer_facts(t->featurer);
-    t->data = (vgi_dataset){.nv = m->nv, .parts = facts.parts, .main_part = facts.main_part, .d = m->nv * facts.width,
+    int r = vg_featurer_new(&t->featurer, m, reference, &f, e);
+    if (r == VG_OK) r = vg_mesh_copy(&t->mesh, m, e);
+    if (r == VG_OK && !(t->last = vgi_array(3 * m->nv, sizeof *t->last, e))) r = VG_ENOMEM;
+    if (r < 0) return vg_trainer_free(out), r;
+    vg_feature_stats stats = vg_featurer_get_stats(t->featurer);
+    t->data = (vgi_dataset){.nv = m->nv, .parts = stats.parts, .main_part = stats.main_part, .d = m->nv * stats.width,
                             .diagonal = vg_diagonal(reference, m->nv)};
     t->net = (vg_network){.model = o->model, .direction = o->direction, .mesh_digest = vg_mesh_digest(m), .nv = m->nv,
-                          .parts = facts.parts, .width = facts.width, .layers = o->layers, .hidden = o->hidden,
+                          .parts = stats.parts, .width = stats.width, .layers = o->layers, .hidden = o->hidden,
                           .convolutions = o->model == VG_NETWORK_CONV ? o->convolutions : 0,
                           .uncertain = (o->model == VG_NETWORK_FC || o->model == VG_NETWORK_CONV) && o->divergence > 0,
                           .sets = o->direction == VG_SEPARATE ? 2 : 1, .seed = o->seed, .step = o->step,
                           .diagonal = t->data.diagonal};
     if (!(t->data.diagonal > 0)) {
-        code = vg_fail(e, VG_EINPUT, "the reference pose has no extent");
+        r = vg_fail(e, VG_EINPUT, "the reference pose has no extent");
         vg_trainer_free(out);
     }
-    return code;
+    return r;
 }
 
 static void clear_phase(vg_trainer *t)
@@ -138,8 +138,8 @@ static int add_one(vg_trainer *t, const double *pose, double *room, vg_err *e)
     if (t->cut && vgi_dataset_cut(&t->data, e) < 0) return VG_ENOMEM;
     t->begun = true, t->cut = false;
     memcpy(t->last, pose, 3 * t->mesh.nv * sizeof *pose);
-    int code = vg_featurer_measure(t->featurer, 1, &pose, &values, &root, &centroids, e);
-    if (code < 0) return code;
+    int r = vg_featurer_measure(t->featurer, 1, &pose, &values, &root, &centroids, e);
+    if (r < 0) return r;
     bring_home(t, pose, root, centroids, home);
     return vgi_dataset_add(&t->data, values, t->net.width, root, centroids, home, e);
 }
@@ -147,10 +147,10 @@ static int add_one(vg_trainer *t, const double *pose, double *room, vg_err *e)
 int vg_trainer_add(vg_trainer *t, size_t n, const double *const *poses, vg_err *e)
 {
     double *room = vgi_array_raw(t->data.d + 4 + 3 * t->data.parts + 3 * t->mesh.nv, sizeof *room, e);
-    int code = room ? VG_OK : VG_ENOMEM;
-    for (size_t i = 0; code == VG_OK && i < n; i++) code = add_one(t, poses[i], room, e);
+    int r = room ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; r == VG_OK && i < n; i++) r = add_one(t, poses[i], room, e);
     free(room);
-    return code;
+    return r;
 }
 
 void vg_trainer_cut(vg_trainer *t)
@@ -180,27 +180,27 @@ static int fit_regressions(vg_trainer *t, vg_err *e)
 {
     vgi_frames fitted, tried;
     vgi_choice choice;
-    int code = vgi_spans_coordinates(&t->fitted, &t->data, &fitted, e);
-    if (code < 0) return code;
+    int r = vgi_spans_coordinates(&t->fitted, &t->data, &fitted, e);
+    if (r < 0) return r;
     if (!t->net.damping) {
-        code = vgi_spans_coordinates(&t->tried, &t->data, &tried, e);
-        if (code == VG_OK) {
-            code = vgi_regression_choose(&fitted, &tried, t->data.sigma, t->o.threads, &choice, e);
+        r = vgi_spans_coordinates(&t->tried, &t->data, &tried, e);
+        if (r == VG_OK) {
+            r = vgi_regression_choose(&fitted, &tried, t->data.sigma, t->o.threads, &choice, e);
             free((void *)tried.row);
             free((void *)tried.start);
         }
-        if (code == VG_OK) t->net.ridge = choice.ridge, t->net.damping = choice.damping;
+        if (r == VG_OK) t->net.ridge = choice.ridge, t->net.damping = choice.damping;
     }
     vgi_blas_alone();
-    for (int back = 0; code == VG_OK && back < 2; back++) {
-        code = vgi_regression_make(&t->regression[back], t->data.rank, e);
-        if (code == VG_OK)
-            code = vgi_regression_fit(&t->regression[back], &fitted, back, t->data.sigma, t->net.ridge, t->net.damping, e);
+    for (int back = 0; r == VG_OK && back < 2; back++) {
+        r = vgi_regression_make(&t->regression[back], t->data.rank, e);
+        if (r == VG_OK)
+            r = vgi_regression_fit(&t->regression[back], &fitted, back, t->data.sigma, t->net.ridge, t->net.damping, e);
     }
     vgi_blas_shared();
     free((void *)fitted.row);
     free((void *)fitted.start);
-    if (code < 0 || t->o.model != VG_NETWORK_AUTO) return code;
+    if (r < 0 || t->o.model != VG_NETWORK_AUTO) return r;
     size_t all = vgi_regression_size(t->data.rank);
     if (!t->net.regression && !(t->net.regression = vgi_array(2 * all, sizeof *t->net.regression, e))) return VG_ENOMEM;
     for (int back = 0; back < 2; back++)
@@ -460,8 +460,8 @@ static int validate(vg_trainer *t, vg_err *e)
     double error;
     t->state.validation = NAN;
     if (t->state.phase || t->state.iteration % VALIDATE_EVERY) return VG_OK;
-    int code = vgi_trainer_validate(t, &error, e);
-    if (code < 0) return code;
+    int r = vgi_trainer_validate(t, &error, e);
+    if (r < 0) return r;
     t->state.validation = error;
     keep_best(t, error);
     return VG_OK;
@@ -476,18 +476,18 @@ static bool has_waited(const vg_trainer *t)
 int vg_trainer_step(vg_trainer *t, vg_train_state *state, vg_err *e)
 {
     double loss;
-    int code = t->ended ? VG_OK : validate(t, e);
+    int r = t->ended ? VG_OK : validate(t, e);
     bool last = t->state.iteration >= t->state.iterations || (!t->state.phase && has_waited(t));
-    if (code == VG_OK && !t->ended && last) {
+    if (r == VG_OK && !t->ended && last) {
         if (t->state.phase) t->ended = true;
-        else code = end_phase(t, e);
+        else r = end_phase(t, e);
     }
-    if (code < 0 || t->ended) {
+    if (r < 0 || t->ended) {
         *state = t->state;
-        return code;
+        return r;
     }
-    code = run_groups(t, &loss, e);
-    if (code < 0) return code;
+    r = run_groups(t, &loss, e);
+    if (r < 0) return r;
     learn(t);
     t->state.loss = loss;
     if (!(t->state.gradient < 1e30))

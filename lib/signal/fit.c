@@ -15,7 +15,7 @@
 typedef struct fitting {
     vg_signal *s;
     const vg_signal_options *o;
-    vg_signal_report *report;
+    vg_signal_stats *report;
     size_t n;
     double d, tolerance; /* D; the largest distance that is allowed */
     vgi_basis basis;
@@ -30,12 +30,12 @@ typedef struct fitting {
     vgi_curve curve;
 } fitting;
 
-void vg_signal_report_clear(vg_signal_report *r)
+void vg_signal_stats_clear(vg_signal_stats *r)
 {
     free(r->frame_error);
     free(r->deviation);
     free(r->crossing);
-    *r = (vg_signal_report){0};
+    *r = (vg_signal_stats){0};
 }
 
 /* ---- what a choice of m, l, k costs ---- */
@@ -139,7 +139,7 @@ static int place_frames(fitting *f, vg_err *e)
 {
     vg_signal *s = f->s;
     const vg_signal_options *o = f->o;
-    vg_signal_report *report = f->report;
+    vg_signal_stats *report = f->report;
     size_t n = f->n, rank = f->basis.rank;
     vg_layout_trial only = {.layout = o->layout, .weight = o->weight}, chosen = {.layout = o->layout};
     int r;
@@ -298,11 +298,11 @@ static int fit_basis(fitting *f, const vg_body *body, double *poses, vg_err *e)
 }
 
 int vg_signal_fit(vg_signal *s, const vg_body *body, double *poses, size_t n, const vg_signal_options *o,
-                  vg_signal_report *report, vg_err *e)
+                  vg_signal_stats *report, vg_err *e)
 {
     fitting f = {.s = s, .o = o, .report = report, .n = n};
     int r = check(body, n, o, e);
-    *report = (vg_signal_report){0};
+    *report = (vg_signal_stats){0};
     *s = (vg_signal){.space = VG_SPACE_VERTICES, .d = 3 * body->mesh.nv};
     if (r < 0) {
         free(poses);
@@ -335,7 +335,7 @@ out:
     if (r < 0) {
         s->n = n;
         vg_signal_clear(s);
-        vg_signal_report_clear(report);
+        vg_signal_stats_clear(report);
     }
     return r;
 }

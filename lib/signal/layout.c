@@ -126,7 +126,7 @@ static int settle_freely(size_t n, const double *distance, const double *axes, d
     static const size_t pairs[3][2] = {{0, 1}, {0, 2}, {1, 2}};
     double least = INFINITY;
     for (int start = 0; start < 3; start++) {
-        vgi_stress_facts f;
+        vgi_stress_stats f;
         for (size_t i = 0; i < n; i++)
             for (int k = 0; k < 2; k++) p[2 * i + (size_t)k] = axes[3 * i + pairs[start][k]];
         if (start && !(vgi_plane_radius(n, p, NULL) > 0)) break;

@@ -99,7 +99,7 @@ static void swap(double **a, double **b)
 }
 
 /* now: where it is; leads: where a step from there leads. After it, now is the end. */
-static vgi_stress_facts settle(const plane *s, double *room[4])
+static vgi_stress_stats settle(const plane *s, double *room[4])
 {
     enum { MOST_STEPS = 2000 };
     double **now = &room[0], **leads = &room[1], **far = &room[2], **beyond = &room[3];
@@ -120,10 +120,10 @@ static vgi_stress_facts settle(const plane *s, double *room[4])
         if (!(less > 1e-7 * stress)) break;
     }
     swap(now, leads); /* the last one as it is */
-    return (vgi_stress_facts){.stress = step(s, *now, *leads), .steps = steps};
+    return (vgi_stress_stats){.stress = step(s, *now, *leads), .steps = steps};
 }
 
-int vgi_plane_settle(size_t n, const double *distance, const bool *held, double *p, vgi_stress_facts *facts, vg_err *e)
+int vgi_plane_settle(size_t n, const double *distance, const bool *held, double *p, vgi_stress_stats *stats, vg_err *e)
 {
     plane s = {.n = n, .distance = distance, .held = held};
     double most = 0, *all = vgi_array(n, 8 * sizeof *all, e);
@@ -133,10 +133,10 @@ int vgi_plane_settle(size_t n, const double *distance, const bool *held, double 
     s.least = most > 0 ? 1e-12 * most : 1;
     double *room[4] = {all, all + 2 * n, all + 4 * n, all + 6 * n};
     for (size_t i = 0; i < n; i++) room[0][i] = p[2 * i], room[0][n + i] = p[2 * i + 1];
-    vgi_stress_facts f = {0};
+    vgi_stress_stats f = {0};
     if (s.nheld < n) f = settle(&s, room);
     for (size_t i = 0; i < n; i++) p[2 * i] = room[0][i], p[2 * i + 1] = room[0][n + i];
-    if (facts) *facts = f;
+    if (stats) *stats = f;
     free(all);
     return VG_OK;
 }

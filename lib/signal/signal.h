@@ -49,13 +49,13 @@ void vgi_natural_at(size_t n, size_t w, const double *x, const double *second, d
 /* vgi_distances: squares of the distances between n rows of m numbers (n x n), 0 on the diagonal. */
 void vgi_distances(size_t n, size_t m, const double *x, size_t stride, double *square);
 
-typedef struct vgi_stress_facts {
+typedef struct vgi_stress_stats {
     double stress; /* sum over pairs of (|p_i - p_j| - distance)^2 */
     size_t steps;
-} vgi_stress_facts;
+} vgi_stress_stats;
 /* vgi_plane_settle: Guttman's steps from p (n points) to a minimum of the stress; the stress never rises. distance: n
  * x n. held (n, may be NULL): frames that stay where p has them. */
-int vgi_plane_settle(size_t n, const double *distance, const bool *held, double *p, vgi_stress_facts *facts,
+int vgi_plane_settle(size_t n, const double *distance, const bool *held, double *p, vgi_stress_stats *stats,
                      vg_err *e) VG_MUST_CHECK;
 /* vgi_plane_radius: root of the mean squared distance from the centroid; centre (2 numbers) may be NULL. */
 double vgi_plane_radius(size_t n, const double *p, double centre[2]);

@@ -46,10 +46,10 @@ typedef struct vg_map {
     double size;         /* of this body beside the one that poses are measured on */
     bool has_home;       /* the body that poses are measured on is another one: */
     double *home;        /* its reference pose, nv points; NULL: the mesh's own */
-    size_t njoints;      /* pairs of patches that hang together; of bones none: their skeleton says how they do */
-    uint32_t *joint;     /* two patches each */
-    double *joint_at;    /* the point in the reference pose that both move alike, as well as can be */
-    double *joint_weight;
+    size_t nhinges;      /* pairs of patches that hang together; of bones none: their skeleton says how they do */
+    uint32_t *hinge;     /* two patches each */
+    double *hinge_at;    /* the point in the reference pose that both move alike, as well as can be */
+    double *hinge_weight;
     size_t ncorners;     /* of the vector graph; 0: vertices follow the skin of the rig alone */
     size_t per_corner;   /* transforms that drive a corner: 1, or 2 bones */
     double *corner;      /* per_corner quaternions each: the vector of the corner is the sum of A_p Q r Q* over its

@@ -97,10 +97,10 @@ int vg_load_mesh(vg_head *h, const char *operand, vg_err *e) VG_MUST_CHECK;
 
 /* A queue of frames: in memory up to a limit, beyond it in an unnamed file in $TMPDIR (or /tmp). */
 typedef struct vg_spool vg_spool;
-typedef struct vg_spool_facts {
+typedef struct vg_spool_stats {
     uint64_t most_frames; /* that have waited at once */
     uint64_t file_bytes;  /* the largest size of the file; 0: there was none */
-} vg_spool_facts;
+} vg_spool_stats;
 
 /* vg_spool_new: h describes the frames; borrowed until free. limit: bytes of frames kept in memory. */
 int vg_spool_new(vg_spool **s, const vg_head *h, size_t limit, vg_err *e) VG_MUST_CHECK;
@@ -108,7 +108,7 @@ void vg_spool_free(vg_spool **s);
 /* vg_spool_put: append a complete copy of f. vg_spool_next: 1 and the oldest frame; 0 if the queue is empty. */
 int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
 int vg_spool_next(vg_spool *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
-vg_spool_facts vg_spool_get_facts(const vg_spool *s);
+vg_spool_stats vg_spool_get_stats(const vg_spool *s);
 
 /* A store of all frames of a sequence with random access: in memory up to a limit, beyond it in an unnamed file in
  * $TMPDIR (or /tmp). Several threads may read at once. */

@@ -15,7 +15,7 @@ typedef struct vg_measures vg_measures;
 enum { VG_ERROR_BINS = 40 };
 /* in D: bin i holds what is at least edge i and less than the next, the last one all from 5 on */
 extern const double vg_error_edges[VG_ERROR_BINS];
-typedef struct vg_measure_report {
+typedef struct vg_measure_stats {
     size_t frames, vertices, faces;
     double diagonal; /* D of the truth's reference pose */
     double mean, rms, max, p95; /* vertex error, mesh units */
@@ -30,7 +30,7 @@ typedef struct vg_measure_report {
     double planarity_mean[2], planarity_max[2];
     size_t planarity_faces[2];
     uint64_t planarity_histogram[2][10];
-} vg_measure_report;
+} vg_measure_stats;
 
 /* vg_measures_new: m borrowed until free. centred: compare poses after moving each one's centroid to 0. threads >= 1:
  * their number changes no digit. p95 is exact to 0.4 % (a histogram of 1/256 octaves). */
@@ -44,7 +44,7 @@ typedef struct vg_pose_error {
  * together changes no digit. errors: for each nv distances out. found (may be NULL): n. When it fails none counts. */
 int vg_measures_add(vg_measures *x, size_t n, const double *const *truth, const double *const *result,
                     double *const *errors, vg_pose_error *found, vg_err *e) VG_MUST_CHECK;
-void vg_measures_get(const vg_measures *x, vg_measure_report *r);
+void vg_measures_get_stats(const vg_measures *x, vg_measure_stats *r);
 /* vg_error_p95: the least of n numbers that 95 of 100 do not exceed; 0 for none. Changes their order. O(n). */
 double vg_error_p95(double *numbers, size_t n);
 

@@ -21,20 +21,20 @@ typedef struct vg_feature_options {
     bool plain; /* the root is not turned: w is that of the pose as it is */
     int threads;
 } vg_feature_options;
-typedef struct vg_feature_facts {
+typedef struct vg_feature_stats {
     size_t width;      /* numbers per vertex: 9 or 12 */
     size_t parts, main_part; /* connected components; the largest */
     size_t open_rings; /* vertices whose neighbourhood, with its normal, does not span space */
     uint64_t jumps;    /* edges over which w jumps by more than half a turn, summed over the poses so far */
     uint64_t poses;    /* measured so far */
-} vg_feature_facts;
+} vg_feature_stats;
 
 /* vg_featurer_new: m is not kept; reference: nv points, copied. o NULL: 12 numbers, the root, one thread. VG_EINPUT
  * when the mesh has no faces. */
 int vg_featurer_new(vg_featurer **f, const vg_mesh *m, const double *reference, const vg_feature_options *o,
                     vg_err *e) VG_MUST_CHECK;
 void vg_featurer_free(vg_featurer **f);
-vg_feature_facts vg_featurer_facts(const vg_featurer *f);
+vg_feature_stats vg_featurer_get_stats(const vg_featurer *f);
 /* vg_featurer_restart: the next pose begins another sequence: its whole turns are chosen afresh. */
 void vg_featurer_restart(vg_featurer *f);
 /* vg_featurer_measure: n poses (nv points each), in order, to width numbers per vertex, a unit quaternion for the root

@@ -64,20 +64,20 @@ int vg_register(vg_register_result *r, const vg_register_input *in,
  * faces that drive it, and by pose its rotation (polar) with the stretch that the gradient gives the direction of
  * each vector. Here the normal stretches by the root of the area's ratio, for the target's vectors lie across the
  * source's planes. Faces without a match of their own turn rigidly. Links follow the faces at their ends. */
-typedef struct vg_carrier vg_carrier;
-/* vg_carrier_new: source: the whole source mesh and its reference pose; c: fits both meshes (checked: VG_EINPUT);
+typedef struct vg_cross_transfer vg_cross_transfer;
+/* vg_cross_transfer_new: source: the whole source mesh and its reference pose; c: fits both meshes (checked: VG_EINPUT);
  * target: the graph of the target (all faces, then links) and its reference. All are borrowed until free. */
-int vg_carrier_new(vg_carrier **c, const vg_mesh *source, const double *source_reference,
+int vg_cross_transfer_new(vg_cross_transfer **c, const vg_mesh *source, const double *source_reference,
                    const vg_correspondence *pairs, const vg_graph *target, const double *target_reference,
                    vg_method method, int threads, vg_err *e) VG_MUST_CHECK;
-void vg_carrier_free(vg_carrier **c);
-/* vg_carrier_transfer: n poses of the source (vertices) in, n times the target's wanted vectors out. */
-void vg_carrier_transfer(vg_carrier *c, size_t n, const double *const *poses, double *const *vectors);
+void vg_cross_transfer_free(vg_cross_transfer **c);
+/* vg_cross_transfer_apply: n poses of the source (vertices) in, n times the target's wanted vectors out. */
+void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const *poses, double *const *vectors);
 /* corners: source faces without a direction, over all poses */
-vg_deform_counts vg_carrier_counts(const vg_carrier *c);
-/* vg_carrier_turned: by how many degrees the matched faces of the target are turned against the source faces that drive
+vg_deform_stats vg_cross_transfer_get_stats(const vg_cross_transfer *c);
+/* vg_cross_transfer_turned: by how many degrees the matched faces of the target are turned against the source faces that drive
  * them, in the two references: the angle of the mean cosine between normals. A mesh that is inside out is not turned. */
-double vg_carrier_turned(const vg_carrier *c);
+double vg_cross_transfer_turned(const vg_cross_transfer *c);
 
 /* Transfer that follows a few sculpted poses (MATH 11; after the example-based transfer of Cashman and Hormann 2012, 4.3,
  * as a correction of plain transfer): what plain transfer misses in the examples is added in the measure in which a pose

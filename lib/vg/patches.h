@@ -15,10 +15,10 @@ extern "C" {
  * within about 5 %: memory does not grow with the number of poses. The same seed gives the same patches, whatever the
  * number of threads. */
 typedef struct vg_segmenter vg_segmenter;
-typedef struct vg_segment_report {
+typedef struct vg_segment_stats {
     size_t patches, rounds;
     double angle; /* in degrees: root mean square over faces and poses of the rotation between a face and its patch */
-} vg_segment_report;
+} vg_segment_stats;
 
 /* vg_segmenter_new: m is borrowed until free; reference: nv points, not kept. */
 int vg_segmenter_new(vg_segmenter **s, const vg_mesh *m, const double *reference, int threads,
@@ -31,7 +31,7 @@ int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_e
  * neighbours that turn alike until `patches` are left, or no neighbours. Fewer patches than asked for when fewer
  * faces turn differently. VG_EINPUT when there is no face. */
 int vg_segmenter_cut(vg_segmenter *s, size_t patches, uint64_t seed, bool connected, vg_patches *out,
-                     vg_segment_report *report, vg_err *e) VG_MUST_CHECK;
+                     vg_segment_stats *report, vg_err *e) VG_MUST_CHECK;
 
 /* The map from patch transforms to vertices (MATH 7; T 6.3), with its two remedies. */
 typedef struct vg_map_fitter vg_map_fitter;

@@ -94,7 +94,7 @@ typedef struct vg_layout_trial {
 } vg_layout_trial;
 enum { VG_LAYOUT_TRIALS = 16 };
 
-typedef struct vg_signal_report {
+typedef struct vg_signal_stats {
     size_t rank;           /* how many coordinates there could be */
     double diagonal;       /* D */
     double period;         /* of the cycle in frames; 0: none */
@@ -104,15 +104,15 @@ typedef struct vg_signal_report {
     double *deviation;     /* n - 1: between frame i and the next, beside the whole sequence's straight lines: squared */
     size_t ncrossings;     /* places where the curve crosses itself: */
     double *crossing;      /* two times each */
-} vg_signal_report;
+} vg_signal_stats;
 
-void vg_signal_report_clear(vg_signal_report *r);
+void vg_signal_stats_clear(vg_signal_stats *r);
 
 enum { VG_SIGNAL_FRAMES = 1000 };
 /* vg_signal_fit: n poses (3 nv numbers each, from malloc, one array that is taken over) of a body to a signal. 2 <= n <=
  * VG_SIGNAL_FRAMES, else VG_EINPUT. Names and times are left empty. Memory: four times the poses. */
 int vg_signal_fit(vg_signal *s, const vg_body *body, double *poses, size_t n, const vg_signal_options *o,
-                  vg_signal_report *report, vg_err *e) VG_MUST_CHECK;
+                  vg_signal_stats *report, vg_err *e) VG_MUST_CHECK;
 /* vg_signal_store: keep the basis with so many bits: 64, 32 or 16. */
 int vg_signal_store(vg_signal *s, size_t bits, vg_err *e) VG_MUST_CHECK;
 /* vg_signal_floats: numbers that say the signal, and those of the poses, as C 3.4 counts them. */

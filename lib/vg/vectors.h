@@ -58,10 +58,10 @@ int vg_head_prepare_vectors(vg_head *h, vg_err *e) VG_MUST_CHECK;
  * corners or more, Rodrigues on line segments, and on links the mean rotation of the faces at their ends followed
  * by Rodrigues. Degenerate corners take the rotation of their face's other corners and scale 1. */
 typedef struct vg_deformer vg_deformer;
-typedef struct vg_deform_counts {
+typedef struct vg_deform_stats {
     uint64_t corners;    /* degenerate corners met, over all poses */
     uint64_t first_face; /* the first face of the graph that has one; UINT64_MAX: none */
-} vg_deform_counts;
+} vg_deform_stats;
 
 /* vg_deformer_new: g borrowed until free; reference: nv points, copied in part. threads >= 1. */
 int vg_deformer_new(vg_deformer **d, const vg_graph *g, const double *reference, int threads,
@@ -82,7 +82,7 @@ void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *c
                          double *const *quaternions);
 void vg_deformer_transfer(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses, double *const *vectors);
 void vg_deformer_apply(vg_deformer *d, size_t n, const double *const *quaternions, double *const *vectors);
-vg_deform_counts vg_deformer_counts(const vg_deformer *d);
+vg_deform_stats vg_deformer_get_stats(const vg_deformer *d);
 
 /* A path through key poses (MATH 7; T 6.1): each vector rotates and scales along the geodesic from one key to the
  * next, in the same sense as its neighbours also beyond half a turn; the root moves in a straight line. Outside
@@ -100,11 +100,11 @@ typedef struct vg_path_options {
     bool smooth;     /* velocities do not jump at keys */
     int threads;     /* >= 1 */
 } vg_path_options;
-typedef struct vg_path_facts {
+typedef struct vg_path_stats {
     size_t segments; /* between keys, looked at so far, again if come back to */
     size_t beyond;   /* of these, those in which something turns by more than half a turn */
-    vg_deform_counts degenerate;
-} vg_path_facts;
+    vg_deform_stats degenerate;
+} vg_path_stats;
 
 /* vg_path_new: g and keys are borrowed until free; reference: nv points. VG_EARG with fewer than two keys. */
 int vg_path_new(vg_path **p, const vg_graph *g, const double *reference, const vg_key *keys, size_t nkeys,
@@ -114,7 +114,7 @@ void vg_path_free(vg_path **p);
  * t = i. A segment is prepared when it is first needed and cached until another one is (three segments if smooth),
  * so ask in order. */
 int vg_path_at(vg_path *p, double t, double *vectors, double root[3], double *anchors, vg_err *e) VG_MUST_CHECK;
-vg_path_facts vg_path_get_facts(const vg_path *p);
+vg_path_stats vg_path_get_stats(const vg_path *p);
 
 /* Shape deformation (T 4.1 to 4.6): what takes each source vector to the target's in the reference poses is
  * applied to the vectors of each pose at the source face's centroid; corners that share a vertex are averaged. No
@@ -161,10 +161,10 @@ typedef struct vg_solver vg_solver;
  * depend on how the surface is cut into faces (cotangent weights on triangles). Both meet consistent vectors
  * exactly. */
 typedef enum vg_weights { VG_WEIGHTS_UNIFORM = 0, VG_WEIGHTS_AREA = 1 } vg_weights;
-typedef struct vg_solver_facts {
+typedef struct vg_solver_stats {
     size_t unknowns, factor_entries; /* entries of the factor, explicit zeros included */
     double analyse_seconds, factor_seconds;
-} vg_solver_facts;
+} vg_solver_stats;
 
 /* vg_solver_new: g borrowed until free; anchors (n ascending vertices, each attached) are met exactly; without any,
  * the mean of the attached vertices is. reference (nv points, copied in part) places the vertices that are in no
@@ -186,16 +186,16 @@ void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const 
 void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *const *x, const double *const *anchors,
                      const double *const *roots);
 size_t vg_solver_batch(const vg_solver *s);
-vg_solver_facts vg_solver_get_facts(const vg_solver *s);
+vg_solver_stats vg_solver_get_stats(const vg_solver *s);
 
 /* The least absolute misfit (MATH 2, Robust): poses that minimise the sum over faces of sqrt(e^2 + c^2), e the misfit of
  * a face in the metric of the solver, instead of the sum of e^2. What a few inconsistent faces want stays with them;
  * consistent vectors are met exactly. By a quasi-Newton search from the plain solution, one solve a round. */
 typedef struct vg_robust vg_robust;
-typedef struct vg_robust_facts {
+typedef struct vg_robust_stats {
     size_t most_rounds; /* of one pose so far */
     size_t unfinished;  /* poses so far whose energy fell by 0.1 % or more in the last round */
-} vg_robust_facts;
+} vg_robust_stats;
 
 /* vg_robust_new: s borrowed until free. rounds: at most so many; eps: c as a part of the mean misfit of the plain
  * solution. VG_EARG unless eps > 0. */
@@ -210,18 +210,18 @@ void vg_robust_load(const vg_robust *r, size_t n, const double *const *vectors, 
 int vg_robust_solve(vg_robust *r, size_t n, const double *const *rhs, const float *const *misfits, const double *sizes,
                     double *const *x, const double *const *anchors, const double *const *roots,
                     vg_err *e) VG_MUST_CHECK;
-vg_robust_facts vg_robust_get_facts(const vg_robust *r);
+vg_robust_stats vg_robust_get_stats(const vg_robust *r);
 
 /* Planarity (MATH 5; T 4.2.3): poses that minimise `fidelity` times the energy of the reconstruction plus `planarity`
  * times the sum over corners of faces of four and more of (m_f . t_c)^2, t_c the corner's vector, m_f the unit mean
  * of the cross products of successive given vectors of the face (no such term where that is 0). By conjugate
  * gradients from the plain solution. */
 typedef struct vg_planar vg_planar;
-typedef struct vg_planar_facts {
+typedef struct vg_planar_stats {
     size_t faces;          /* of four and more corners */
     size_t most_steps;     /* of one pose so far */
     double worst_residual; /* left at the end, relative to that of the plain solution; NaN if numbers overflowed */
-} vg_planar_facts;
+} vg_planar_stats;
 
 /* vg_planar_new: s borrowed until free. VG_EARG unless fidelity > 0 and planarity >= 0. */
 int vg_planar_new(vg_planar **p, const vg_solver *s, double fidelity, double planarity, vg_err *e) VG_MUST_CHECK;
@@ -234,7 +234,7 @@ void vg_planar_load(const vg_planar *p, const double *vectors, double *normals);
  * stay, or the root does, and vertices in no face. Returns the number of the first pose that did not converge; n when
  * all did. */
 size_t vg_planar_solve(vg_planar *p, size_t n, const double *const *normals, double *const *x);
-vg_planar_facts vg_planar_get_facts(const vg_planar *p);
+vg_planar_stats vg_planar_get_stats(const vg_planar *p);
 
 /* Guidance in time (MATH 5; T 4.10, 4.16): a sequence keeps its second differences in time and meets given poses
  * at keys. Between two keys a < b the pose U_k becomes U_k + ((b - k) e_a + (k - a) e_b) / (b - a), e = given - U;

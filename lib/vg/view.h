@@ -80,14 +80,14 @@ typedef struct vg_page_options {
     double scale;  /* the end of the colours, as for a sheet, by all frames */
 } vg_page_options;
 enum { VG_PAGE_SEQUENCES = 8 };
-typedef struct vg_page_facts {
+typedef struct vg_page_stats {
     size_t frames;      /* of the longest sequence */
     uint64_t bytes;
     double loss;        /* the largest distance between a vertex and its position in the page, in D of its sequence */
     bool tinted;        /* the colours say something: */
     double scale;       /* end of the colours in D, in the unit of the scalars, or as a factor; in the same unit: */
     double mean, least, max;
-} vg_page_facts;
+} vg_page_stats;
 
 /* vg_page_new: write the first part of the page to fd (borrowed); `name` is used in messages. */
 int vg_page_new(vg_page **p, int fd, const char *name, const vg_page_options *o, vg_err *e) VG_MUST_CHECK;
@@ -100,7 +100,7 @@ int vg_page_sequence(vg_page *p, const char *label, const vg_head *h, vg_err *e)
 int vg_page_add(vg_page *p, size_t i, const vg_frame *f, const double *truth, vg_err *e) VG_MUST_CHECK;
 /* vg_page_end: write the rest. A page without it says that it is incomplete. VG_EINPUT if a sequence has no
  * frames. */
-int vg_page_end(vg_page *p, vg_page_facts *facts, vg_err *e) VG_MUST_CHECK;
+int vg_page_end(vg_page *p, vg_page_stats *stats, vg_err *e) VG_MUST_CHECK;
 
 #ifdef __cplusplus
 }

@@ -52,9 +52,9 @@ int vgi_ground_shadow(vgi_ground *g, const vgi_drawing *d, vg_err *e)
     vgi_drawing drawing = {.figure = d->figure, .camera = &below, .points = d->points, .wire = 0.6f};
     vgi_raster r = {0};
     g->shadow = vgi_array(SHADOW_SIZE * SHADOW_SIZE, sizeof *g->shadow, e);
-    int status = g->shadow ? vgi_raster_init(&r, SHADOW_SIZE, SHADOW_SIZE, e) : VG_ENOMEM;
-    if (status == VG_OK) status = vgi_draw(&r, &drawing, e);
-    if (status == VG_OK) {
+    int code = g->shadow ? vgi_raster_init(&r, SHADOW_SIZE, SHADOW_SIZE, e) : VG_ENOMEM;
+    if (code == VG_OK) code = vgi_draw(&r, &drawing, e);
+    if (code == VG_OK) {
         g->n = SHADOW_SIZE;
         g->step = (float)(1 / below.scale);
         g->origin[0] = (float)(below.x - 0.5 * SHADOW_SIZE / below.scale);
@@ -67,7 +67,7 @@ int vgi_ground_shadow(vgi_ground *g, const vgi_drawing *d, vg_err *e)
         blur(g->shadow, SHADOW_SIZE);
     }
     vgi_raster_clear(&r);
-    return status;
+    return code;
 }
 
 static float shadow_at(const vgi_ground *g, double across, double along)

@@ -404,16 +404,16 @@ static double find_percentile(const vg_page *p)
     return fmin(at ? LEAST_COUNTED * pow(10, (double)at / PER_DECADE) : 0, largest);
 }
 
-static void end_tint(vg_page *p, vg_page_facts *facts)
+static void end_tint(vg_page *p, vg_page_stats *stats)
 {
     vgi_tint_end(&p->tint, p->o.scale, find_percentile(p), p->spread.least, p->spread.most);
-    facts->tinted = p->counted_frames > 0;
-    if (!facts->tinted) return;
+    stats->tinted = p->counted_frames > 0;
+    if (!stats->tinted) return;
     p->spread.mean /= (double)p->counted_frames;
-    facts->scale = vgi_tint_shown(&p->tint, p->tint.high);
-    facts->mean = vgi_tint_shown(&p->tint, p->spread.mean);
-    facts->least = vgi_tint_shown(&p->tint, p->spread.least);
-    facts->max = vgi_tint_shown(&p->tint, p->spread.most);
+    stats->scale = vgi_tint_shown(&p->tint, p->tint.high);
+    stats->mean = vgi_tint_shown(&p->tint, p->spread.mean);
+    stats->least = vgi_tint_shown(&p->tint, p->spread.least);
+    stats->max = vgi_tint_shown(&p->tint, p->spread.most);
 }
 
 /* One process that took part: its command line, and the processes whose output it read. */
@@ -550,7 +550,7 @@ static int json_tint(vg_bytes *b, const vg_page *p, vg_err *e)
     return r == VG_OK ? vgi_page_raw(b, "}", e) : r;
 }
 
-static int json_page(vg_bytes *b, const vg_page *p, const vg_page_facts *facts, vg_err *e)
+static int json_page(vg_bytes *b, const vg_page *p, const vg_page_stats *stats, vg_err *e)
 {
     static const char *const fits[] = {"", "path", "figure"};
     int r = vgi_page_raw(b, "{", e);
@@ -564,12 +564,12 @@ static int json_page(vg_bytes *b, const vg_page *p, const vg_page_facts *facts, 
     if (r == VG_OK) r = vgi_page_field_flag(b, "ground", p->o.ground, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "zoom", p->o.zoom > 0 ? p->o.zoom : 1, e);
     if (r == VG_OK) r = vgi_page_field_flag(b, "patches", p->o.tint != VG_TINT_PLAIN, e);
-    if (r == VG_OK && facts->tinted) r = json_tint(b, p, e);
+    if (r == VG_OK && stats->tinted) r = json_tint(b, p, e);
     if (r == VG_OK) r = vgi_page_field_flag(b, "centred", p->o.centred, e);
-    if (r == VG_OK) r = vgi_page_field_number(b, "scale", facts->scale, e);
-    if (r == VG_OK) r = vgi_page_field_number(b, "mean", facts->mean, e);
-    if (r == VG_OK) r = vgi_page_field_number(b, "least", facts->least, e);
-    if (r == VG_OK) r = vgi_page_field_number(b, "max", facts->max, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "scale", stats->scale, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "mean", stats->mean, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "least", stats->least, e);
+    if (r == VG_OK) r = vgi_page_field_number(b, "max", stats->max, e);
     if (r == VG_OK) r = json_map(b, p->tint.diverging, e);
     if (r == VG_OK) r = vgi_page_field(b, "sequences", e);
     if (r == VG_OK) r = vgi_page_raw(b, "[", e);
@@ -577,7 +577,7 @@ static int json_page(vg_bytes *b, const vg_page *p, const vg_page_facts *facts, 
     return r == VG_OK ? vgi_page_raw(b, "]}", e) : r;
 }
 
-static int put_remaining(vg_page *p, vg_page_facts *facts, vg_err *e)
+static int put_remaining(vg_page *p, vg_page_stats *stats, vg_err *e)
 {
     int r = VG_OK;
     for (size_t i = 0; i < p->n && r == VG_OK; i++) {
@@ -586,28 +586,28 @@ static int put_remaining(vg_page *p, vg_page_facts *facts, vg_err *e)
         if (!s->frames) return vg_fail(e, VG_EINPUT, "'%s' has no frames: there is nothing to show", s->label);
         if (s->places.n) r = put_chunk(p, i, "places", &s->places, e);
         if (r == VG_OK && s->numbers.n) r = put_chunk(p, i, "numbers", &s->numbers, e);
-        facts->frames = s->frames > facts->frames ? s->frames : facts->frames;
-        facts->loss = fmax(facts->loss, s->loss / frame->unit);
+        stats->frames = s->frames > stats->frames ? s->frames : stats->frames;
+        stats->loss = fmax(stats->loss, s->loss / frame->unit);
     }
     return r;
 }
 
-int vg_page_end(vg_page *p, vg_page_facts *facts, vg_err *e)
+int vg_page_end(vg_page *p, vg_page_stats *stats, vg_err *e)
 {
     vg_bytes json = {0};
-    *facts = (vg_page_facts){0};
+    *stats = (vg_page_stats){0};
     if (p->n == 0) return vg_fail(e, VG_EINPUT, "there is no sequence to show");
-    int r = put_remaining(p, facts, e);
+    int r = put_remaining(p, stats, e);
     if (r < 0) return r;
-    end_tint(p, facts);
+    end_tint(p, stats);
     r = put_template(p, "@FACTS@", e);
-    if (r == VG_OK) r = json_page(&json, p, facts, e);
+    if (r == VG_OK) r = json_page(&json, p, stats, e);
     if (r == VG_OK) r = put(p, json.data, json.size, e);
     if (r == VG_OK) r = put_template(p, "@SCRIPT@", e);
     if (r == VG_OK) r = put_text(p, vgi_page_js, e);
     if (r == VG_OK) r = put_template(p, NULL, e);
     if (r == VG_OK) r = flush(p, e);
     vg_bytes_clear(&json);
-    facts->bytes = p->bytes;
+    stats->bytes = p->bytes;
     return r;
 }

@@ -26,11 +26,11 @@ static int deflate_all(vg_bytes *packed, const unsigned char *data, size_t n, vg
     packed->size = 0;
     /* the lower bytes of residuals are noise: searching them for repetitions only costs time */
     if (deflateInit2(&z, 4, Z_DEFLATED, 15, 9, Z_FILTERED) != Z_OK) return zlib_fails(&z, e);
-    int r, status = VG_OK;
+    int r, code = VG_OK;
     size_t at = 0;
     do {
-        status = vgi_bytes_reserve(packed, packed->size + (1 << 16), e);
-        if (status < 0) break;
+        code = vgi_bytes_reserve(packed, packed->size + (1 << 16), e);
+        if (code < 0) break;
         if (z.avail_in == 0 && at < n) {
             size_t take = n - at < DEFLATE_STEP ? n - at : DEFLATE_STEP;
             z.next_in = (unsigned char *)(uintptr_t)(data + at);
@@ -43,10 +43,10 @@ static int deflate_all(vg_bytes *packed, const unsigned char *data, size_t n, vg
         z.avail_out = (uInt)room;
         r = deflate(&z, at < n ? Z_NO_FLUSH : Z_FINISH);
         packed->size += room - z.avail_out;
-        if (r != Z_OK && r != Z_STREAM_END && r != Z_BUF_ERROR) status = zlib_fails(&z, e);
-    } while (status == VG_OK && r != Z_STREAM_END);
+        if (r != Z_OK && r != Z_STREAM_END && r != Z_BUF_ERROR) code = zlib_fails(&z, e);
+    } while (code == VG_OK && r != Z_STREAM_END);
     deflateEnd(&z);
-    return status;
+    return code;
 }
 
 /* ---- frames ---- */

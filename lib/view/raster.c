@@ -366,8 +366,8 @@ int vgi_draw(vgi_raster *r, const vgi_drawing *d, vg_err *e)
 {
     const vg_mesh *m = d->figure->mesh;
     work k = {.raster = r, .drawing = d};
-    int status = make_work(&k, e);
-    if (status == VG_OK) {
+    int code = make_work(&k, e);
+    if (code == VG_OK) {
         vgi_camera_project(d->camera, d->points, m->nv, k.seen);
         vgi_figure_normals(d->figure, d->points, k.face, k.normals);
         for (size_t f = 0; f < m->nf; f++) draw_face(&k, f);
@@ -379,5 +379,5 @@ int vgi_draw(vgi_raster *r, const vgi_drawing *d, vg_err *e)
         }
     }
     free_work(&k);
-    return status;
+    return code;
 }

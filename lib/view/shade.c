@@ -260,9 +260,9 @@ int vgi_shade(const vgi_look *l, const vgi_raster *r, const vgi_camera *c, unsig
 {
     pixels p = {.r = r, .w = r->w / l->oversampling, .h = r->h / l->oversampling, .step = l->oversampling};
     background b = {l, c, (double)r->h};
-    int status = light_corners(&p, l->reach, e);
-    for (size_t y = 0; status == VG_OK && y < p.h; y++)
+    int code = light_corners(&p, l->reach, e);
+    for (size_t y = 0; code == VG_OK && y < p.h; y++)
         for (size_t x = 0; x < p.w; x++) shade_pixel(l, &p, &b, x, y, rgb + 3 * (y * p.w + x));
     free(p.light);
-    return status;
+    return code;
 }

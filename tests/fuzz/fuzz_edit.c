@@ -10,14 +10,14 @@ enum { FRAMES = 6, POINTS = 2 };
 
 static int fit(vg_signal *s)
 {
-    vg_signal_report r;
+    vg_signal_stats r;
     double reference[3 * POINTS] = {0, 0, 0, 1, 0, 0}, *poses = calloc(FRAMES * 3 * POINTS, sizeof *poses);
     vg_body body = {.mesh = {.nv = POINTS}, .reference = reference};
     const vg_signal_options o = {.tolerance = 1e-3, .threads = 1};
     if (!poses) abort();
     for (size_t i = 0; i < FRAMES * 3 * POINTS; i++) poses[i] = sin((double)(i * i));
     int result = vg_signal_fit(s, &body, poses, FRAMES, &o, &r, NULL);
-    if (result == VG_OK) vg_signal_report_clear(&r);
+    if (result == VG_OK) vg_signal_stats_clear(&r);
     return result;
 }
 

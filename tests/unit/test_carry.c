@@ -45,19 +45,19 @@ static carried carry(const vg_head *source, vg_head *target, const vg_correspond
                      vg_method by, int threads)
 {
     vg_err e;
-    vg_carrier *c;
+    vg_cross_transfer *c;
     carried r = {.g = graph_of(target)};
     r.expected = vectors_of(r.g, target->body.reference);
     r.vectors = room(3 * vg_graph_corners(r.g), sizeof *r.vectors);
-    int code = vg_carrier_new(&c, &source->body.mesh, source->body.reference, k, r.g, target->body.reference, by,
+    int code = vg_cross_transfer_new(&c, &source->body.mesh, source->body.reference, k, r.g, target->body.reference, by,
                               threads, &e);
     CHECK(code == VG_OK);
     if (code < 0) abort();
     const double *in[3] = {pose, pose, pose};
     double *spare = room(3 * vg_graph_corners(r.g), sizeof *spare), *out[3] = {spare, spare, r.vectors};
-    vg_carrier_transfer(c, 3, in, out);
+    vg_cross_transfer_apply(c, 3, in, out);
     free(spare);
-    vg_carrier_free(&c);
+    vg_cross_transfer_free(&c);
     return r;
 }
 
@@ -193,17 +193,17 @@ static void degenerate_sources_are_counted(void)
     vg_head source = make_degenerate(), target = make_torus(6, 5);
     vg_correspondence k = chance_pairs(&source.body.mesh, &target.body.mesh, 1, true);
     vg_graph *g = graph_of(&target);
-    vg_carrier *c;
+    vg_cross_transfer *c;
     vg_err e;
     double *out = room(3 * vg_graph_corners(g), sizeof *out);
-    CHECK(vg_carrier_new(&c, &source.body.mesh, source.body.reference, &k, g, target.body.reference, VG_BY_POSE, 1,
+    CHECK(vg_cross_transfer_new(&c, &source.body.mesh, source.body.reference, &k, g, target.body.reference, VG_BY_POSE, 1,
                          &e) == VG_OK);
     const double *in = source.body.reference;
-    vg_carrier_transfer(c, 1, &in, &out);
-    CHECK(vg_carrier_counts(c).corners > 0 && vg_carrier_counts(c).first_face < source.body.mesh.nf);
+    vg_cross_transfer_apply(c, 1, &in, &out);
+    CHECK(vg_cross_transfer_get_stats(c).corners > 0 && vg_cross_transfer_get_stats(c).first_face < source.body.mesh.nf);
     for (size_t i = 0; i < 3 * vg_graph_corners(g); i++) CHECK(isfinite(out[i]));
     free(out);
-    vg_carrier_free(&c);
+    vg_cross_transfer_free(&c);
     vg_graph_free(&g);
     vg_correspondence_clear(&k);
     vg_head_clear(&source);
@@ -323,13 +323,13 @@ static void other_meshes_are_refused(void)
     vg_head a = make_torus(6, 5), b = make_torus(5, 6);
     vg_correspondence k = identity_pairs(&a.body.mesh);
     vg_graph *ga = graph_of(&a), *gb = graph_of(&b);
-    vg_carrier *c;
+    vg_cross_transfer *c;
     vg_err e;
-    CHECK(vg_carrier_new(&c, &b.body.mesh, b.body.reference, &k, ga, a.body.reference, VG_BY_POSE, 1, &e) ==
+    CHECK(vg_cross_transfer_new(&c, &b.body.mesh, b.body.reference, &k, ga, a.body.reference, VG_BY_POSE, 1, &e) ==
               VG_EINPUT &&
           !c);
     CHECK(strstr(e.message, "another source") != NULL);
-    CHECK(vg_carrier_new(&c, &a.body.mesh, a.body.reference, &k, gb, b.body.reference, VG_BY_POSE, 1, &e) ==
+    CHECK(vg_cross_transfer_new(&c, &a.body.mesh, a.body.reference, &k, gb, b.body.reference, VG_BY_POSE, 1, &e) ==
               VG_EINPUT &&
           !c);
     CHECK(strstr(e.message, "another target") != NULL);

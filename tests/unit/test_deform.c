@@ -259,7 +259,7 @@ static void test_rigid_transfer(void)
         for (size_t c = 0; c < n / 3; c++) move_vector(&by, w + 3 * c, w + 3 * c);
         vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &got);
         CHECK_NEAR(farthest(got, w, n / 3) / vg_diagonal(target, g->nv), 0, 1e-11);
-        CHECK(vg_deformer_counts(d).corners == 0);
+        CHECK(vg_deformer_get_stats(d).corners == 0);
         vg_deformer_free(&d);
         vg_graph_free(&g);
         if (!pairs[i].target) free(target);
@@ -368,7 +368,7 @@ static void test_threads_and_batches(void)
             vg_deformer_measure(d, 1, VG_VERTICES, CONST(poses + k), q1 + k);
             vg_deformer_transfer(d, 1, VG_VERTICES, CONST(poses + k), w1 + k);
         }
-        vg_deform_counts counts = vg_deformer_counts(d);
+        vg_deform_stats counts = vg_deformer_get_stats(d);
         vg_deformer_free(&d);
         for (int threads = 1; threads <= 3; threads++) {
             for (size_t batch = 1; batch <= POSES; batch++) {
@@ -385,8 +385,8 @@ static void test_threads_and_batches(void)
                             !memcmp(w[k], w1[k], 3 * corners * sizeof(double));
                 if (!same) printf("shape %zu, %d threads, %zu poses a call:\n", i, threads, batch);
                 CHECK(same);
-                CHECK(vg_deformer_counts(d).corners == counts.corners);
-                CHECK(vg_deformer_counts(d).first_face == counts.first_face);
+                CHECK(vg_deformer_get_stats(d).corners == counts.corners);
+                CHECK(vg_deformer_get_stats(d).first_face == counts.first_face);
                 vg_deformer_free(&d);
             }
         }
@@ -410,11 +410,11 @@ static void test_degenerate(void)
     static const double identity[4] = {1, 0, 0, 0};
     vg_quat_from_matrix(t.m, want);
     vg_deformer *d = deformer(g, h.body.reference, 1);
-    CHECK(vg_deformer_counts(d).corners == 0 && vg_deformer_counts(d).first_face == UINT64_MAX);
+    CHECK(vg_deformer_get_stats(d).corners == 0 && vg_deformer_get_stats(d).first_face == UINT64_MAX);
     vg_deformer_measure(d, 1, VG_VERTICES, CONST(&pose), &q);
     /* three on the face without area, three on the point, two on the segment without length,
      * one at its face's centroid */
-    CHECK(vg_deformer_counts(d).corners == 9 && vg_deformer_counts(d).first_face == 1);
+    CHECK(vg_deformer_get_stats(d).corners == 9 && vg_deformer_get_stats(d).first_face == 1);
     for (size_t f = 0; f < g->nf; f++)
         for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
             bool alone = f >= 1 && f <= 3, bone = f == 4;
@@ -423,7 +423,7 @@ static void test_degenerate(void)
     aim(d, g, h.body.reference);
     double *w = vectors_of(g, pose), *got = room(3 * corners, sizeof *got);
     vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &got);
-    CHECK(vg_deformer_counts(d).corners == 18);
+    CHECK(vg_deformer_get_stats(d).corners == 18);
     for (size_t f = 0; f < g->nf; f++)
         for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++)
             /* face 1 has vectors, but no turn */
@@ -449,11 +449,11 @@ static void test_collapsed_in_one_pose(void)
     vg_deformer *d = deformer(g, h.body.reference, 1);
     aim(d, g, poses[1]);
     vg_deformer_transfer(d, POSES, VG_VERTICES, CONST(poses), good);
-    CHECK(vg_deformer_counts(d).corners == 0);
+    CHECK(vg_deformer_get_stats(d).corners == 0);
     for (uint32_t c = 4 * 50; c < 4 * 51; c++) memcpy(poses[BAD] + 3 * g->vert[c], poses[BAD], 3 * sizeof(double));
     vg_deformer_transfer(d, POSES, VG_VERTICES, CONST(poses), bad);
-    CHECK(vg_deformer_counts(d).corners >= 4 && vg_deformer_counts(d).corners < 40);
-    CHECK(vg_deformer_counts(d).first_face <= 50 && vg_deformer_counts(d).first_face > 20);
+    CHECK(vg_deformer_get_stats(d).corners >= 4 && vg_deformer_get_stats(d).corners < 40);
+    CHECK(vg_deformer_get_stats(d).first_face <= 50 && vg_deformer_get_stats(d).first_face > 20);
     for (size_t k = 0; k < POSES; k++) {
         if (k != BAD) CHECK(!memcmp(good[k], bad[k], 3 * corners * sizeof(double)));
         CHECK(vgi_finite(bad[k], 3 * corners));
@@ -482,8 +482,8 @@ static void test_where_degenerate_begins(void)
         double *q = room(4 * vg_graph_corners(g), sizeof *q);
         vg_deformer *d = deformer(g, h.body.reference, 1);
         vg_deformer_measure(d, 1, VG_VERTICES, CONST(&h.body.reference), &q);
-        CHECK(vg_deformer_counts(d).corners == (factor ? 0 : 2));
-        CHECK(vg_deformer_counts(d).first_face == (factor ? UINT64_MAX : 1));
+        CHECK(vg_deformer_get_stats(d).corners == (factor ? 0 : 2));
+        CHECK(vg_deformer_get_stats(d).first_face == (factor ? UINT64_MAX : 1));
         vg_deformer_free(&d);
         free(q);
         vg_graph_free(&g);

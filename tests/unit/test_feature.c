@@ -8,7 +8,7 @@
 typedef struct measured {
     size_t n, width;
     double **values, **roots, **centroids;
-    vg_feature_facts facts;
+    vg_feature_stats stats;
 } measured;
 
 static double **lists(size_t n, size_t size)
@@ -43,13 +43,13 @@ static vg_featurer *featurer(const vg_head *h, bool nine, bool plain, int thread
 static measured measure(vg_featurer *f, const vg_head *h, size_t n, double *const *poses, size_t at_once)
 {
     vg_err e;
-    vg_feature_facts facts = vg_featurer_facts(f);
-    measured m = {n, facts.width, lists(n, facts.width * h->body.mesh.nv), lists(n, 4), lists(n, 3 * facts.parts), facts};
+    vg_feature_stats stats = vg_featurer_get_stats(f);
+    measured m = {n, stats.width, lists(n, stats.width * h->body.mesh.nv), lists(n, 4), lists(n, 3 * stats.parts), stats};
     for (size_t i = 0; i < n; i += at_once) {
         size_t some = n - i < at_once ? n - i : at_once;
         CHECK(vg_featurer_measure(f, some, CONST(poses + i), m.values + i, m.roots + i, m.centroids + i, &e) == VG_OK);
     }
-    m.facts = vg_featurer_facts(f);
+    m.stats = vg_featurer_get_stats(f);
     return m;
 }
 
@@ -160,7 +160,7 @@ static void whole_turns_of_a_bar(void)
     for (size_t i = 0; i < 40; i++) poses[i] = twist(&h, all * (double)(i + 1) / 40);
     vg_featurer *f = featurer(&h, false, false, 1);
     measured m = measure(f, &h, 40, poses, 40);
-    CHECK(m.facts.jumps == 0);
+    CHECK(m.stats.jumps == 0);
     const double step = all / 59;
     for (size_t i = 0; i < mesh->nf; i++)
         for (uint32_t c = mesh->start[i]; c + 1 < mesh->start[i + 1]; c++) {
@@ -177,7 +177,7 @@ static void whole_turns_of_a_bar(void)
     /* the first pose of a sequence finds its turns without one before */
     f = featurer(&h, false, false, 1);
     m = measure(f, &h, 1, poses + 39, 1);
-    CHECK(m.facts.jumps == 0);
+    CHECK(m.stats.jumps == 0);
     CHECK_NEAR(m.values[0][m.width * (mesh->nv - 1) + 2] - m.values[0][2], all, 0.15);
     measured_clear(&m);
     vg_featurer_free(&f);

@@ -261,7 +261,7 @@ static void degenerate_ends_are_exact(void)
     }
     double *x = at(&t, 1.5);
     CHECK(farthest(x, apart, h.body.mesh.nv) < INFINITY);
-    CHECK(vg_path_get_facts(t.path).degenerate.corners > 0);
+    CHECK(vg_path_get_stats(t.path).degenerate.corners > 0);
     free(x);
     trial_end(&t);
 }
@@ -374,7 +374,7 @@ static void bar_unwinds_evenly(void)
             CHECK(most < 3);
             CHECK(worst < 0.01);
             if (fabs(angles[i]) > 180) CHECK(plain > 60 || astray > 0.1);
-            CHECK(vg_path_get_facts(t.path).beyond == (fabs(angles[i]) > 180));
+            CHECK(vg_path_get_stats(t.path).beyond == (fabs(angles[i]) > 180));
             trial_end(&t);
         }
     }

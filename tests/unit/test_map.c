@@ -403,9 +403,9 @@ static void joints_are_found(void)
             }
         CHECK(vg_map_fitter_add(f, 1, poses, &e) == VG_OK);
     }
-    CHECK(vg_map_fitter_finish(f, &e) == VG_OK && h.map.njoints == 1);
+    CHECK(vg_map_fitter_finish(f, &e) == VG_OK && h.map.nhinges == 1);
     /* nearly: the halves share a ring, so the lower one is not quite rigid; the middle of the ring is 3.1 away */
-    CHECK(farthest(h.map.joint_at, hinge, 1) < 1);
+    CHECK(farthest(h.map.hinge_at, hinge, 1) < 1);
     played x = open_player(&h, false, 1);
     measure(&x, pose);
     for (size_t i = 0; i < 3; i++) x.transforms[4 + i] += 1, x.transforms[11 + i] -= 2;

@@ -24,10 +24,10 @@ static void add(vg_measures *x, const double *truth, const double *result)
     CHECK(vg_measures_add(x, 1, &truth, &result, (double *[]){errors}, NULL, &e) == VG_OK);
 }
 
-static vg_measure_report finish(vg_measures *x)
+static vg_measure_stats finish(vg_measures *x)
 {
-    vg_measure_report r;
-    vg_measures_get(x, &r);
+    vg_measure_stats r;
+    vg_measures_get_stats(x, &r);
     vg_measures_free(&x);
     CHECK(x == NULL);
     return r;
@@ -37,7 +37,7 @@ static void equal_sequences_have_no_error(void)
 {
     vg_measures *x = begin(&cube, cube_points, false);
     for (int i = 0; i < 3; i++) add(x, cube_points, cube_points);
-    vg_measure_report r = finish(x);
+    vg_measure_stats r = finish(x);
     CHECK(r.frames == 3 && r.vertices == 8 && r.faces == 6 && r.faces_measured == 18);
     CHECK_NEAR(r.diagonal, sqrt(3), 1e-15);
     CHECK(r.mean == 0 && r.rms == 0 && r.max == 0 && r.p95 == 0 && r.sigma == 0);
@@ -60,7 +60,7 @@ static void one_moved_vertex(void)
     CHECK_NEAR(found.mean, d / 8, 1e-16);
     CHECK_NEAR(found.max, d, 1e-16);
     CHECK(errors[6] == d && errors[0] == 0 && errors[7] == 0);
-    vg_measure_report r = finish(x);
+    vg_measure_stats r = finish(x);
     CHECK_NEAR(r.mean, d / 16, 1e-16);
     CHECK_NEAR(r.rms, d / 4, 1e-16); /* sqrt(d^2 / 16) */
     CHECK_NEAR(r.max, d, 1e-16);
@@ -78,7 +78,7 @@ static void percentile_is_that_of_the_sorted_errors(void)
     for (size_t i = 0; i < N; i++) result[3 * i + i % 3] = (double)(i * 7 % N + 1);
     vg_measures *x = begin(&points, truth, false);
     add(x, truth, result);
-    vg_measure_report r = finish(x);
+    vg_measure_stats r = finish(x);
     CHECK_NEAR(r.p95, 950, 950 * 0.004);
     CHECK_NEAR(r.mean, 500.5, 1e-9);
     CHECK(r.max == 1000 && r.diagonal == 0 && r.faces_measured == 0);
@@ -91,7 +91,7 @@ static void centring_takes_the_shift_out(void)
     vg_measures *x = begin(&cube, cube_points, false), *c = begin(&cube, cube_points, true);
     add(x, cube_points, shifted);
     add(c, cube_points, shifted);
-    vg_measure_report plain = finish(x), centred = finish(c);
+    vg_measure_stats plain = finish(x), centred = finish(c);
     CHECK_NEAR(plain.mean, 13, 1e-14);
     CHECK_NEAR(plain.max, 13, 1e-14);
     CHECK_NEAR(centred.max, 0, 1e-14);
@@ -114,7 +114,7 @@ static void a_turned_face_differs_by_its_angle(void)
         }
         vg_measures *x = begin(&m, truth, false);
         add(x, truth, result);
-        vg_measure_report r = finish(x);
+        vg_measure_stats r = finish(x);
         double expected = 1 - cos(angles[a]);
         if (angles[a] < 1e-3) expected = 0.5 * angles[a] * angles[a];
         CHECK_NEAR(r.orientation_max, expected, 1e-15);
@@ -132,7 +132,7 @@ static void a_scaled_mesh_differs_by_the_square(void)
         for (int i = 0; i < 24; i++) scaled[i] = scales[k] * cube_points[i];
         vg_measures *x = begin(&cube, cube_points, false);
         add(x, cube_points, scaled);
-        vg_measure_report r = finish(x);
+        vg_measure_stats r = finish(x);
         double expected = fabs(1 - scales[k] * scales[k]);
         CHECK_NEAR(r.area_mean, expected, 1e-13);
         CHECK_NEAR(r.area_max, expected, 1e-13);
@@ -151,7 +151,7 @@ static void planarity_of_a_bent_quad(void)
     vg_measures *x = begin(&m, flat, false);
     add(x, flat, bent);
     add(x, flat, flat);
-    vg_measure_report r = finish(x);
+    vg_measure_stats r = finish(x);
     CHECK(r.planarity_faces[0] == 2 && r.planarity_faces[1] == 2); /* the triangle has none */
     CHECK_NEAR(r.planarity_max[0], 0, 1e-16);
     CHECK_NEAR(r.planarity_max[1], 0.6, 1e-15);
@@ -172,11 +172,11 @@ static void faces_without_area_are_not_measured(void)
     double collapsed[24] = {0};
     vg_measures *x = begin(&m, truth, false);
     add(x, truth, truth);
-    vg_measure_report same = finish(x);
+    vg_measure_stats same = finish(x);
     CHECK(same.faces_measured == 1 && same.planarity_faces[0] == 0);
     x = begin(&m, truth, false);
     add(x, truth, collapsed);
-    vg_measure_report gone = finish(x);
+    vg_measure_stats gone = finish(x);
     CHECK(gone.faces_measured == 1);
     CHECK(gone.area_mean == 1 && gone.orientation_mean == 1); /* not passed over as if it were fine */
 }
@@ -188,14 +188,14 @@ static void sigma_is_stable_far_from_zero(void)
     const double truth[3] = {0, 0, 0};
     vg_measures *x = begin(&m, truth, false);
     for (int i = 0; i < 100; i++) add(x, truth, (double[3]){0, 1e6 + 1e-3 * i, 0});
-    vg_measure_report r = finish(x);
+    vg_measure_stats r = finish(x);
     /* of a uniform distribution; an error is known to 1e-10, its running mean to some ten times that */
     CHECK_NEAR(r.sigma, 1e-3 * sqrt((100.0 * 100 - 1) / 12), 1e-8);
 }
 
 static void nothing_added(void)
 {
-    vg_measure_report r = finish(begin(&cube, cube_points, false));
+    vg_measure_stats r = finish(begin(&cube, cube_points, false));
     CHECK(r.frames == 0 && r.mean == 0 && r.rms == 0 && r.p95 == 0 && r.sigma == 0 && r.planarity_mean[0] == 0);
     vg_mesh empty = {0, 0, NULL, NULL};
     vg_measures *x = begin(&empty, NULL, true);
@@ -306,7 +306,7 @@ static void faces_of_many_sizes_by_their_definition(void)
     }
     vg_measures *x = begin(&m.mesh, m.truth[0], false);
     for (size_t p = 0; p < POSES; p++) add(x, m.truth[p], m.result[p]);
-    vg_measure_report r = finish(x);
+    vg_measure_stats r = finish(x);
     CHECK(r.faces_measured == n && r.planarity_faces[0] == POSES * 22 && r.planarity_faces[1] == POSES * 22);
     CHECK_NEAR(r.orientation_mean, (double)mean[0], 1e-12);
     CHECK_NEAR(r.orientation_sd, (double)sqrtl(squares[0] / n), 1e-12);
@@ -323,7 +323,7 @@ static void batches_and_threads_change_no_digit(void)
     static double errors[POSES][POINTS];
     const double *truth[POSES], *result[POSES];
     double *to[POSES];
-    vg_measure_report reports[4];
+    vg_measure_stats reports[4];
     vg_err e;
     make_many(&m);
     for (size_t p = 0; p < POSES; p++) truth[p] = m.truth[p], result[p] = m.result[p], to[p] = errors[p];
@@ -337,7 +337,7 @@ static void batches_and_threads_change_no_digit(void)
             CHECK(vg_measures_add(x, n, truth + p, result + p, to + p, NULL, &e) == VG_OK);
         }
         memset(&reports[k], 0, sizeof *reports);
-        vg_measures_get(x, &reports[k]);
+        vg_measures_get_stats(x, &reports[k]);
         vg_measures_free(&x);
         CHECK(reports[k].frames == POSES && reports[k].max > 0 && reports[k].sigma > 0);
         CHECK(!memcmp(&reports[k], &reports[0], sizeof *reports));
@@ -376,7 +376,7 @@ static void the_histogram_counts_in_units_of_the_diagonal(void)
     moved[3] -= 0.5 * sqrt(3) * 1.001, moved[6] += 100;
     vg_measures *x = begin(&cube, cube_points, false);
     add(x, cube_points, moved);
-    vg_measure_report r = finish(x);
+    vg_measure_stats r = finish(x);
     CHECK(vg_error_edges[0] == 0 && vg_error_edges[1] == 1e-12 && vg_error_edges[VG_ERROR_BINS - 1] == 5);
     for (size_t i = 0; i < VG_ERROR_BINS; i++) {
         double edge = vg_error_edges[i];

@@ -184,7 +184,7 @@ static size_t count(const char *text, const char *what)
 static void test_page(void)
 {
     vg_page *p;
-    vg_page_facts facts;
+    vg_page_stats stats;
     vg_err e;
     vg_head h = make_head();
     vg_page_options o = {.title = "a <b> & \"c\"", .tint = VG_TINT_ERRORS};
@@ -202,19 +202,19 @@ static void test_page(void)
     }
     CHECK(vg_page_add(p, 0, &f, NULL, &e) == VG_EARG);
     CHECK(vg_page_add(p, 2, &f, NULL, &e) == VG_EARG);
-    CHECK(vg_page_end(p, &facts, &e) == VG_OK);
-    CHECK(facts.frames == 40);
-    CHECK_NEAR(facts.mean, 0.01 / sqrt(5), 1e-15);
-    CHECK_NEAR(facts.max, 0.01 / sqrt(5), 1e-15);
-    CHECK_NEAR(facts.scale, 0.005, 1e-15); /* 0.00447, rounded up */
+    CHECK(vg_page_end(p, &stats, &e) == VG_OK);
+    CHECK(stats.frames == 40);
+    CHECK_NEAR(stats.mean, 0.01 / sqrt(5), 1e-15);
+    CHECK_NEAR(stats.max, 0.01 / sqrt(5), 1e-15);
+    CHECK_NEAR(stats.scale, 0.005, 1e-15); /* 0.00447, rounded up */
     /* the middle of a side of length 2; ends of a box are exact */
-    CHECK_NEAR(facts.loss, 1 / 65535.0 / sqrt(5), 1e-15);
+    CHECK_NEAR(stats.loss, 1 / 65535.0 / sqrt(5), 1e-15);
     char *text = page_text(fd);
-    CHECK(strlen(text) == facts.bytes);
+    CHECK(strlen(text) == stats.bytes);
     CHECK(strstr(text, "<title>a &lt;b&gt; &amp; &quot;c&quot;</title>"));
     CHECK(strstr(text, "\"x\\u003c/script>\""));
     CHECK(strstr(text, "\"one\\u000a\\u0022\\u003c/script>\\u003c!--\""));
-    /* lists 2 x 3, chunks 3 x 2; facts, player */
+    /* lists 2 x 3, chunks 3 x 2; stats, player */
     CHECK(count(text, "<script") == 12 + 2 && count(text, "</script") == 12 + 2);
     CHECK(!strstr(text, "<!--") && !strstr(text, "@TITLE@") && !strstr(text, "@FACTS@") && !strstr(text, "@SCRIPT@"));
     CHECK(strstr(text, "data-frames=\"numbers\" data-count=\"32\""));
@@ -227,7 +227,7 @@ static void test_page(void)
 static void test_refusals(void)
 {
     vg_page *p;
-    vg_page_facts facts;
+    vg_page_stats stats;
     vg_err e;
     vg_head h = make_head(), vectors = make_head();
     vectors.kind = VG_VECTORS;
@@ -235,11 +235,11 @@ static void test_refusals(void)
     int fd = memfd_create("page", MFD_CLOEXEC);
     CHECK(vg_page_new(&p, fd, "page", &bad, &e) == VG_EARG && !p);
     CHECK(vg_page_new(&p, fd, "page", &o, &e) == VG_OK);
-    CHECK(vg_page_end(p, &facts, &e) == VG_EINPUT);
+    CHECK(vg_page_end(p, &stats, &e) == VG_EINPUT);
     CHECK(vg_page_sequence(p, "v", &vectors, &e) == VG_EARG);
     for (int i = 0; i < VG_PAGE_SEQUENCES; i++) CHECK(vg_page_sequence(p, "s", &h, &e) == VG_OK);
     CHECK(vg_page_sequence(p, "s", &h, &e) == VG_EARG);
-    CHECK(vg_page_end(p, &facts, &e) == VG_EINPUT);
+    CHECK(vg_page_end(p, &stats, &e) == VG_EINPUT);
     CHECK_TEXT(e.message, "'s' has no frames: there is nothing to show");
     vg_page_free(&p);
     CHECK(p == NULL);

@@ -19,7 +19,7 @@ typedef struct problem {
 typedef struct answer {
     double *plain[POSES], *x[POSES];
     size_t good;
-    vg_planar_facts facts;
+    vg_planar_stats stats;
 } answer;
 
 static void clear(answer *a, size_t n)
@@ -56,7 +56,7 @@ static answer solve(const problem *q, int threads, size_t batch)
         size_t good = vg_planar_solve(p, some, (const double *const *)normals + i, a.x + i);
         if (good < some && i + good < a.good) a.good = i + good;
     }
-    a.facts = vg_planar_get_facts(p);
+    a.stats = vg_planar_get_stats(p);
     for (size_t i = 0; i < q->n; i++) free(rhs[i]), free(normals[i]);
     vg_planar_free(&p);
     vg_solver_free(&s);
@@ -177,7 +177,7 @@ static void against_dense(vg_head *h, const char *name, vg_weights weights, size
     problem q = make_problem(h, g, list, nanchors, 0.02);
     q.weights = weights;
     answer a = solve(&q, 2, POSES);
-    CHECK(a.good == POSES && a.facts.worst_residual <= 1e-10);
+    CHECK(a.good == POSES && a.stats.worst_residual <= 1e-10);
     double D = vg_diagonal(h->body.reference, g->nv), worst = 0, moved = 0;
     for (size_t k = 0; k < POSES; k += 5) {
         double *want = dense(&q, k);
@@ -187,7 +187,7 @@ static void against_dense(vg_head *h, const char *name, vg_weights weights, size
     }
     if (!(worst <= 1e-8)) printf("%s, %zu anchors:\n", name, nanchors);
     CHECK_NEAR(worst, 0, 1e-8);
-    CHECK(a.facts.faces == 0 || moved > 1e-4);
+    CHECK(a.stats.faces == 0 || moved > 1e-4);
     clear(&a, POSES);
     clear_problem(&q);
     vg_graph_free(&g);
@@ -224,7 +224,7 @@ static void test_nothing_to_do(void)
         problem q = make_problem(&shapes[i], g, NULL, 0, 0.05);
         if (i == 3) q.planarity = 0; /* has faces of four, but they count for nothing */
         answer a = solve(&q, 1, POSES);
-        CHECK(a.good == POSES && (i == 3 || a.facts.faces == 0) && a.facts.most_steps == 0);
+        CHECK(a.good == POSES && (i == 3 || a.stats.faces == 0) && a.stats.most_steps == 0);
         for (size_t k = 0; k < POSES; k++) CHECK(!memcmp(a.x[k], a.plain[k], 3 * g->nv * sizeof(double)));
         clear(&a, POSES);
         clear_problem(&q);
@@ -308,10 +308,10 @@ static void test_threads_and_batches(void)
             for (size_t k = 0; k < POSES; k++) same &= !memcmp(a.x[k], one.x[k], 3 * g->nv * sizeof(double));
             if (!same) printf("%d threads, %zu poses a call:\n", threads, batch);
             CHECK(same);
-            CHECK(a.facts.most_steps == one.facts.most_steps);
+            CHECK(a.stats.most_steps == one.stats.most_steps);
             clear(&a, POSES);
         }
-    CHECK(one.facts.most_steps >= 20 && one.facts.most_steps <= 60);
+    CHECK(one.stats.most_steps >= 20 && one.stats.most_steps <= 60);
     clear(&one, POSES);
     clear_problem(&q);
     vg_graph_free(&g);
@@ -378,7 +378,7 @@ static void test_not_converged(void)
     q.fidelity = 1e-12, q.planarity = 1;
     q.n = 2;
     answer a = solve(&q, 1, 2);
-    CHECK(a.good == 1 && a.facts.worst_residual > 1e-10 && a.facts.most_steps == 1000);
+    CHECK(a.good == 1 && a.stats.worst_residual > 1e-10 && a.stats.most_steps == 1000);
     clear(&a, 2);
     q.n = POSES;
     clear_problem(&q);

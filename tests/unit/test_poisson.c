@@ -192,10 +192,10 @@ static void test_spool(void)
             CHECK(vg_spool_next(s, &out, &e) == 1 && same_frame(&out, &want, &h));
         }
         CHECK(vg_spool_next(s, &out, &e) == 0 && vg_spool_next(s, &out, &e) == 0);
-        vg_spool_facts facts = vg_spool_get_facts(s);
-        CHECK(facts.most_frames == most);
-        if (limit == 2000 && bursts[c / 20][0] == 1) CHECK(facts.file_bytes == 0); /* what has gone makes room */
-        CHECK(limit == 1 << 20 ? facts.file_bytes == 0 : limit > 1 || facts.file_bytes > 0);
+        vg_spool_stats stats = vg_spool_get_stats(s);
+        CHECK(stats.most_frames == most);
+        if (limit == 2000 && bursts[c / 20][0] == 1) CHECK(stats.file_bytes == 0); /* what has gone makes room */
+        CHECK(limit == 1 << 20 ? stats.file_bytes == 0 : limit > 1 || stats.file_bytes > 0);
         fill(&in, &h, 2);
         CHECK(vg_spool_put(s, &in, &e) == VG_OK); /* what is left inside is released */
         vg_spool_free(&s);

@@ -442,7 +442,7 @@ static void test_threads_and_batches(void)
     vg_head_clear(&flower);
 }
 
-static void test_batch_size_and_facts(void)
+static void test_batch_size_and_stats(void)
 {
     vg_head h = make_torus(20, 15);
     vg_graph *g = graph_of(&h);
@@ -451,9 +451,9 @@ static void test_batch_size_and_facts(void)
     for (int threads = 1; threads <= 3; threads++) {
         if (vg_solver_new(&s, g, NULL, 0, h.body.reference, VG_WEIGHTS_UNIFORM, threads, &e) < 0) abort();
         CHECK(vg_solver_batch(s) >= 8 && vg_solver_batch(s) % (size_t)threads == 0);
-        vg_solver_facts facts = vg_solver_get_facts(s);
-        CHECK(facts.unknowns == 299); /* one vertex is held */
-        CHECK(facts.factor_entries >= 299 && facts.analyse_seconds >= 0 && facts.factor_seconds >= 0);
+        vg_solver_stats stats = vg_solver_get_stats(s);
+        CHECK(stats.unknowns == 299); /* one vertex is held */
+        CHECK(stats.factor_entries >= 299 && stats.analyse_seconds >= 0 && stats.factor_seconds >= 0);
         vg_solver_free(&s);
     }
     vg_graph_free(&g);
@@ -510,5 +510,5 @@ TESTS({"every generated mesh comes back", test_generated}, {"long and large mesh
       {"anchors that contradict the vectors", test_contradicting_anchors},
       {"a solver like another has answers of its own", test_like},
       {"threads and batches change no bit", test_threads_and_batches},
-      {"batch size and facts", test_batch_size_and_facts}, {"meshes without faces", test_without_faces},
+      {"batch size and stats", test_batch_size_and_stats}, {"meshes without faces", test_without_faces},
       {"what is refused", test_refused})

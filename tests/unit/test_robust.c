@@ -18,7 +18,7 @@ typedef struct problem {
 
 typedef struct answer {
     double *plain[POSES], *x[POSES];
-    vg_robust_facts facts;
+    vg_robust_stats stats;
 } answer;
 
 static void clear(answer *a)
@@ -57,7 +57,7 @@ static answer solve(const problem *q, int threads, size_t batch)
             exit(1);
         }
     }
-    a.facts = vg_robust_get_facts(r);
+    a.stats = vg_robust_get_stats(r);
     for (size_t i = 0; i < POSES; i++) free(rhs[i]), free(misfits[i]);
     vg_robust_free(&r);
     vg_solver_free(&s);
@@ -181,7 +181,7 @@ static void against_dense(vg_head *h, const char *name, vg_weights weights, size
     problem q = make_problem(h, g, list, nanchors, 0.02);
     q.weights = weights;
     answer a = solve(&q, 2, POSES);
-    CHECK(a.facts.unfinished == 0 && a.facts.most_rounds > 1);
+    CHECK(a.stats.unfinished == 0 && a.stats.most_rounds > 1);
     double *rest = vectors_of(g, q.reference), *e = room(g->nf, sizeof *e), worst = 0;
     for (size_t k = 0; k < POSES; k += 5) {
         misfits_of(&q, k, rest, a.plain[k], e);
@@ -258,7 +258,7 @@ static void test_consistent(void)
         problem q = make_problem(&h, g, NULL, 0, 0);
         q.weights = i % 2 ? VG_WEIGHTS_AREA : VG_WEIGHTS_UNIFORM;
         answer a = solve(&q, 1, POSES);
-        CHECK(a.facts.most_rounds == 0);
+        CHECK(a.stats.most_rounds == 0);
         for (size_t k = 0; k < POSES; k++) CHECK(!memcmp(a.x[k], a.plain[k], 3 * g->nv * sizeof(double)));
         clear(&a);
         clear_problem(&q);
@@ -301,7 +301,7 @@ static void test_everything_anchored(void)
     uint32_t all[6] = {0, 1, 2, 3, 4, 5};
     problem q = make_problem(&h, g, all, 6, 0.1);
     answer a = solve(&q, 1, 3);
-    CHECK(a.facts.unfinished == 0);
+    CHECK(a.stats.unfinished == 0);
     for (size_t k = 0; k < POSES; k++) CHECK(!memcmp(a.x[k], q.at[k], 18 * sizeof(double)));
     clear(&a);
     clear_problem(&q);
@@ -322,7 +322,7 @@ static void test_threads_and_batches(void)
             for (size_t k = 0; k < POSES; k++) same &= !memcmp(a.x[k], one.x[k], 3 * g->nv * sizeof(double));
             if (!same) printf("%d threads, %zu poses a call:\n", threads, batch);
             CHECK(same);
-            CHECK(a.facts.most_rounds == one.facts.most_rounds);
+            CHECK(a.stats.most_rounds == one.stats.most_rounds);
             clear(&a);
         }
     clear(&one);
@@ -363,7 +363,7 @@ static void test_rounds_and_arguments(void)
     problem q = make_problem(&h, g, NULL, 0, 0.02);
     q.rounds = 1;
     answer a = solve(&q, 2, POSES);
-    CHECK(a.facts.unfinished == POSES && a.facts.most_rounds == 1);
+    CHECK(a.stats.unfinished == POSES && a.stats.most_rounds == 1);
     clear(&a);
     vg_solver *s;
     vg_robust *r;

@@ -95,7 +95,7 @@ static vg_patches cut(const vg_head *h, size_t k, bool connected, int threads)
     vg_segmenter *s;
     vg_err e;
     vg_patches p = {0};
-    vg_segment_report report;
+    vg_segment_stats report;
     double *pose = room(3 * h->body.mesh.nv, sizeof *pose);
     CHECK(vg_segmenter_new(&s, &h->body.mesh, h->body.reference, threads, &e) == VG_OK);
     for (int i = 1; i < 6; i++) {
@@ -238,9 +238,9 @@ static void add_pose(crowd *x)
     CHECK(vg_segmenter_add(x->s, 1, poses, NULL) == VG_OK);
 }
 
-static vg_segment_report cut_crowd(crowd *x, size_t k, uint64_t seed, vg_patches *p)
+static vg_segment_stats cut_crowd(crowd *x, size_t k, uint64_t seed, vg_patches *p)
 {
-    vg_segment_report report;
+    vg_segment_stats report;
     vg_err e;
     CHECK(vg_segmenter_cut(x->s, k, seed, false, p, &report, &e) == VG_OK);
     CHECK(report.patches == p->n);
@@ -280,7 +280,7 @@ static void groups_are_found(void)
         }
         for (size_t k = 6; k <= 9; k += 3) {
             vg_patches p;
-            vg_segment_report report = cut_crowd(&x, k, 1, &p);
+            vg_segment_stats report = cut_crowd(&x, k, 1, &p);
             CHECK(p.n == 6);
             CHECK_NEAR(report.angle, 0, 0.1);
             groups = 0;
@@ -326,7 +326,7 @@ static void as_few_as_will_do(void)
     vg_patches p, fewer;
     for (size_t f = 0; f < N; f++) turn_about(z, 190.0 * (double)f / N * M_PI / 180, x.rotation + 9 * f);
     add_pose(&x);
-    vg_segment_report report = cut_crowd(&x, 0, 1, &p), before;
+    vg_segment_stats report = cut_crowd(&x, 0, 1, &p), before;
     CHECK(report.angle <= 10 && (p.n == 6 || p.n == 8));
     before = cut_crowd(&x, p.n - 2, 1, &fewer);
     CHECK(before.angle > 10 && fewer.n == p.n - 2);

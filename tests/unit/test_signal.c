@@ -138,7 +138,7 @@ static void stress_falls(void)
     vgi_basis b = basis();
     double *d = distances(&b), p[2 * N], least = INFINITY;
     for (size_t start = 0; start < 3; start++) {
-        vgi_stress_facts f;
+        vgi_stress_stats f;
         for (size_t i = 0; i < N; i++) p[2 * i] = b.x[i * b.rank + start / 2], p[2 * i + 1] = b.x[i * b.rank + 1 + (start > 0)];
         double before = stress(N, p, d);
         if (vgi_plane_settle(N, d, NULL, p, &f, NULL) < 0) abort();

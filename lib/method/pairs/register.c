@@ -213,13 +213,13 @@ static int add_texture_ties(struct registration *r, vg_err *e)
     double *uv = NULL;
     vgi_surface *texture = NULL;
     bool *done = vgi_array(r->in->source->nv, sizeof *done, e);
-    int ok = done ? texture_surface(&texture, &flat, &uv, r->in->target, r->in->target_uv, e) : VG_ENOMEM;
-    if (ok == VG_OK) find_texture_ties(r, texture, uv, done);
+    int code = done ? texture_surface(&texture, &flat, &uv, r->in->target, r->in->target_uv, e) : VG_ENOMEM;
+    if (code == VG_OK) find_texture_ties(r, texture, uv, done);
     vgi_surface_free(&texture);
     vg_mesh_clear(&flat);
     free(uv);
     free(done);
-    return ok;
+    return code;
 }
 
 static int make_ties(struct registration *r, vg_err *e)
@@ -276,12 +276,12 @@ static int judge_markers(struct registration *r, vg_err *e)
     out->left_out = vgi_array(n, sizeof *out->left_out, e);
     double *from = vgi_array(n, 3 * sizeof *from, e), *way = vgi_array(n, 3 * sizeof *way, e),
            *room = vgi_array(n, sizeof *room, e);
-    int ok = out->residual && out->left_out && from && way && room ? VG_OK : VG_ENOMEM;
-    for (size_t i = 0; i < n && ok == VG_OK; i++) {
+    int code = out->residual && out->left_out && from && way && room ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; i < n && code == VG_OK; i++) {
         memcpy(from + 3 * i, r->rest + 3 * (size_t)r->tie[i].vertex[0], 3 * sizeof *from);
         for (size_t k = 0; k < 3; k++) way[3 * i + k] = r->tie[i].point[k] - from[3 * i + k];
     }
-    for (size_t left = 0; ok == VG_OK && n > 0 && left <= n / 4; left++) {
+    for (size_t left = 0; code == VG_OK && n > 0 && left <= n / 4; left++) {
         neighbour_residuals(from, way, out->left_out, n, out->residual);
         out->typical_residual = vgi_median(memcpy(room, out->residual, n * sizeof *room), n);
         size_t worst = n;
@@ -290,12 +290,12 @@ static int judge_markers(struct registration *r, vg_err *e)
         if (!(out->residual[worst] > WRONG_FAR && out->residual[worst] > WRONG_TIMES * out->typical_residual)) break;
         out->left_out[worst] = true;
     }
-    for (size_t i = 0; i < n && ok == VG_OK && !r->in->keep_all; i++)
+    for (size_t i = 0; i < n && code == VG_OK && !r->in->keep_all; i++)
         if (out->left_out[i]) r->tie[i].weight = 0;
     free(from);
     free(way);
     free(room);
-    return ok;
+    return code;
 }
 
 /* ---- one after the other ---- */
@@ -323,25 +323,25 @@ static int normalise(struct registration *r, vg_err *e)
 static int align(struct registration *r, vg_err *e)
 {
     r->s = (struct similarity){1, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
-    int ok = VG_OK;
+    int code = VG_OK;
     if (!r->in->aligned) {
         double *from = vgi_array(r->nties, 3 * sizeof *from, e), *to = vgi_array(r->nties, 3 * sizeof *to, e);
-        ok = from && to ? VG_OK : VG_ENOMEM;
-        for (size_t i = 0; i < r->nties && ok == VG_OK; i++) {
+        code = from && to ? VG_OK : VG_ENOMEM;
+        for (size_t i = 0; i < r->nties && code == VG_OK; i++) {
             tied_point(&r->tie[i], r->source, from + 3 * i);
             memcpy(to + 3 * i, r->tie[i].point, 3 * sizeof *to);
         }
-        if (ok == VG_OK && (r->nties < 3 || !spread_out(from, r->nties) || !spread_out(to, r->nties)))
-            ok = vg_fail(e, VG_EINPUT,
+        if (code == VG_OK && (r->nties < 3 || !spread_out(from, r->nties) || !spread_out(to, r->nties)))
+            code = vg_fail(e, VG_EINPUT,
                          "%zu pairs do not say how the meshes lie: give at least three that are not in line",
                          r->nties);
-        if (ok == VG_OK) ok = robust_similarity(&r->s, from, to, r->nties, e);
+        if (code == VG_OK) code = robust_similarity(&r->s, from, to, r->nties, e);
         free(from);
         free(to);
     }
-    for (size_t v = 0; v < r->in->source->nv && ok == VG_OK; v++)
+    for (size_t v = 0; v < r->in->source->nv && code == VG_OK; v++)
         apply_similarity(&r->s, r->source + 3 * v, r->rest + 3 * v);
-    return ok;
+    return code;
 }
 
 /* Do the faces of one mesh turn the other way round? Asked at the ties, or everywhere if there are none. */
@@ -404,10 +404,10 @@ static int begin_components(struct registration *r, vg_err *e)
     r->component = vgi_array(m->nv, sizeof *r->component, e);
     r->take = vgi_array(m->nf, sizeof *r->take, e);
     r->take_vertex = vgi_array(m->nv, sizeof *r->take_vertex, e);
-    int ok = r->component && r->take && r->take_vertex ? VG_OK : VG_ENOMEM;
-    if (ok == VG_OK) ok = vg_mesh_components(m, r->component, &out->components, e);
-    if (ok == VG_OK && !(out->taken = vgi_array(out->components, sizeof *out->taken, e))) ok = VG_ENOMEM;
-    if (ok < 0) return ok;
+    int code = r->component && r->take && r->take_vertex ? VG_OK : VG_ENOMEM;
+    if (code == VG_OK) code = vg_mesh_components(m, r->component, &out->components, e);
+    if (code == VG_OK && !(out->taken = vgi_array(out->components, sizeof *out->taken, e))) code = VG_ENOMEM;
+    if (code < 0) return code;
     bool any = false;
     for (size_t i = 0; i < r->in->ncomponents; i++) {
         if (r->in->components[i] >= out->components)
@@ -436,15 +436,15 @@ static size_t count_taken(const vg_register_result *out)
 static int bend_components(struct registration *r, void (*step)(void *, const vg_register_step *), void *context,
                            vg_err *e)
 {
-    int ok = bend(r, step, context, e);
+    int code = bend(r, step, context, e);
     size_t before = count_taken(r->out);
-    if (ok < 0 || before == r->out->components || r->in->ncomponents) return ok;
+    if (code < 0 || before == r->out->components || r->in->ncomponents) return code;
     const vgi_component_choice c = {.source = r->in->source, .target = r->in->target, .points = r->x,
                                     .rest = r->rest,
                                     .target_surface = r->target_surface, .label = r->component,
                                     .n = r->out->components, .flipped = r->flipped, .threads = r->in->threads};
-    ok = vgi_choose_components(&c, r->out->taken, e);
-    if (ok < 0 || count_taken(r->out) == before) return ok;
+    code = vgi_choose_components(&c, r->out->taken, e);
+    if (code < 0 || count_taken(r->out) == before) return code;
     spread_choice(r);
     return bend(r, step, context, e);
 }
@@ -534,21 +534,21 @@ int vg_register(vg_register_result *out, const vg_register_input *in,
 {
     struct registration r = {.in = in, .out = out};
     *out = (vg_register_result){0};
-    int ok = check_input(in, e);
-    if (ok == VG_OK) ok = normalise(&r, e);
-    if (ok == VG_OK) ok = make_ties(&r, e);
-    if (ok == VG_OK) ok = align(&r, e);
-    if (ok == VG_OK) ok = judge_markers(&r, e);
-    if (ok == VG_OK) ok = vg_link_components(in->source, r.rest, &r.links, &r.nlinks, e);
-    if (ok == VG_OK) ok = vgi_surface_new(&r.target_surface, in->target, r.target, e);
-    if (ok == VG_OK) ok = vgi_surface_new(&r.source_surface, in->source, r.rest, e);
-    if (ok == VG_OK) find_sides(&r);
-    if (ok == VG_OK) ok = begin_components(&r, e);
-    if (ok == VG_OK) ok = bend_components(&r, step, context, e);
-    if (ok == VG_OK) ok = vgi_surface_of(&r.fitted_surface, in->source, r.x, r.take, e);
-    if (ok == VG_OK) ok = pair_faces(&r, e);
-    if (ok == VG_OK) ok = hand_over(&r, e);
+    int code = check_input(in, e);
+    if (code == VG_OK) code = normalise(&r, e);
+    if (code == VG_OK) code = make_ties(&r, e);
+    if (code == VG_OK) code = align(&r, e);
+    if (code == VG_OK) code = judge_markers(&r, e);
+    if (code == VG_OK) code = vg_link_components(in->source, r.rest, &r.links, &r.nlinks, e);
+    if (code == VG_OK) code = vgi_surface_new(&r.target_surface, in->target, r.target, e);
+    if (code == VG_OK) code = vgi_surface_new(&r.source_surface, in->source, r.rest, e);
+    if (code == VG_OK) find_sides(&r);
+    if (code == VG_OK) code = begin_components(&r, e);
+    if (code == VG_OK) code = bend_components(&r, step, context, e);
+    if (code == VG_OK) code = vgi_surface_of(&r.fitted_surface, in->source, r.x, r.take, e);
+    if (code == VG_OK) code = pair_faces(&r, e);
+    if (code == VG_OK) code = hand_over(&r, e);
     clear(&r);
-    if (ok < 0) vg_register_result_clear(out);
-    return ok;
+    if (code < 0) vg_register_result_clear(out);
+    return code;
 }

@@ -25,18 +25,18 @@ static int add_spring(spring_list *l, uint32_t a, uint32_t b, double weight, vg_
 /* Every pair of corners of a small face; of a large one the edges, the next but one, and what is opposite. */
 static int add_face(spring_list *l, const uint32_t *vert, size_t r, vg_err *e)
 {
-    int ok = VG_OK;
+    int code = VG_OK;
     if (r <= VGI_SMALL_FACE) {
-        for (size_t i = 1; i < r && ok == VG_OK; i++)
-            for (size_t j = 0; j < i && ok == VG_OK; j++) ok = add_spring(l, vert[i], vert[j], 1.0 / (double)r, e);
-        return ok;
+        for (size_t i = 1; i < r && code == VG_OK; i++)
+            for (size_t j = 0; j < i && code == VG_OK; j++) code = add_spring(l, vert[i], vert[j], 1.0 / (double)r, e);
+        return code;
     }
-    for (size_t i = 0; i < r && ok == VG_OK; i++) {
-        ok = add_spring(l, vert[i], vert[(i + 1) % r], 0.25, e);
-        if (ok == VG_OK) ok = add_spring(l, vert[i], vert[(i + 2) % r], 0.125, e);
-        if (ok == VG_OK && i < r / 2) ok = add_spring(l, vert[i], vert[i + r / 2], 0.125, e);
+    for (size_t i = 0; i < r && code == VG_OK; i++) {
+        code = add_spring(l, vert[i], vert[(i + 1) % r], 0.25, e);
+        if (code == VG_OK) code = add_spring(l, vert[i], vert[(i + 2) % r], 0.125, e);
+        if (code == VG_OK && i < r / 2) code = add_spring(l, vert[i], vert[i + r / 2], 0.125, e);
     }
-    return ok;
+    return code;
 }
 
 static int gather_springs(spring_list *l, const vgi_fitting *in, vg_err *e)

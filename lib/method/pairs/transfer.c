@@ -14,7 +14,7 @@
 
 enum { CHUNK = 512, ENOUGH = 64 };
 
-struct vg_carrier {
+struct vg_cross_transfer {
     const vg_mesh *source;
     const vg_correspondence *pairs;
     const vg_graph *target;
@@ -41,12 +41,12 @@ struct vg_carrier {
     atomic_uint_fast64_t degenerate, first_face;
 };
 
-static size_t source_size(const vg_carrier *c, size_t f)
+static size_t source_size(const vg_cross_transfer *c, size_t f)
 {
     return c->source->start[f + 1] - c->source->start[f];
 }
 
-static void note_degenerate(vg_carrier *c, size_t f, unsigned lanes)
+static void note_degenerate(vg_cross_transfer *c, size_t f, unsigned lanes)
 {
     if (!lanes) return;
     atomic_fetch_add(&c->degenerate, (unsigned)__builtin_popcount(lanes));
@@ -72,7 +72,7 @@ static int check_fit(const vg_mesh *source, const vg_correspondence *k, const vg
     return VG_OK;
 }
 
-static int measure_source(vg_carrier *c, const double *reference, vg_err *e)
+static int measure_source(vg_cross_transfer *c, const double *reference, vg_err *e)
 {
     const vg_mesh *m = c->source;
     size_t most = 0;
@@ -102,7 +102,7 @@ static int measure_source(vg_carrier *c, const double *reference, vg_err *e)
 
 /* Which corner of source face s goes with the first of target face f:
  * the turn of the cycle in which their vectors agree best. */
-static size_t best_turn(const vg_carrier *c, const double *source_reference, size_t s, size_t f)
+static size_t best_turn(const vg_cross_transfer *c, const double *source_reference, size_t s, size_t f)
 {
     const uint32_t *vert = c->source->vert + c->source->start[s];
     const double *t = c->vectors + 3 * (size_t)c->target->start[f];
@@ -119,7 +119,7 @@ static size_t best_turn(const vg_carrier *c, const double *source_reference, siz
 }
 
 /* Choose the twins; the number of their corners. */
-static size_t choose_twins(vg_carrier *c)
+static size_t choose_twins(vg_cross_transfer *c)
 {
     enum { LARGEST = 64 }; /* trying all turns of a face costs the square of its corners */
     const vg_graph *g = c->target;
@@ -137,7 +137,7 @@ static size_t choose_twins(vg_carrier *c)
 
 /* Fill the twins' mesh over the source's vertices; twin_of[v]: the source's vertex for target vertex v,
  * UINT32_MAX: none. */
-static void fill_twins(const vg_carrier *c, const double *source_reference, vg_mesh *m, uint32_t *twin_of)
+static void fill_twins(const vg_cross_transfer *c, const double *source_reference, vg_mesh *m, uint32_t *twin_of)
 {
     const vg_graph *g = c->target;
     size_t at = 0;
@@ -155,7 +155,7 @@ static void fill_twins(const vg_carrier *c, const double *source_reference, vg_m
 }
 
 /* Links between vertices that have twins have one themselves. */
-static void link_twins(vg_carrier *c, const uint32_t *twin_of, vg_head *h)
+static void link_twins(vg_cross_transfer *c, const uint32_t *twin_of, vg_head *h)
 {
     const vg_graph *g = c->target;
     for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
@@ -169,7 +169,7 @@ static void link_twins(vg_carrier *c, const uint32_t *twin_of, vg_head *h)
 }
 
 /* The faces that go corner by corner, as a graph over the source's vertices in the order of the target's corners. */
-static int find_twins(vg_carrier *c, const double *source_reference, vg_err *e)
+static int find_twins(vg_cross_transfer *c, const double *source_reference, vg_err *e)
 {
     const vg_graph *g = c->target;
     c->twin = vgi_array(g->nf, sizeof *c->twin, e);
@@ -205,7 +205,7 @@ static int find_twins(vg_carrier *c, const double *source_reference, vg_err *e)
     return result;
 }
 
-static int make_arrays(vg_carrier *c, vg_err *e)
+static int make_arrays(vg_cross_transfer *c, vg_err *e)
 {
     size_t nf = c->source->nf;
     c->p = vgi_array(3 * vg_mesh_corners(c->source), sizeof *c->p, e);
@@ -219,14 +219,14 @@ static int make_arrays(vg_carrier *c, vg_err *e)
     return vg_fail(e, VG_ENOMEM, "not enough memory for a transfer of %zu faces", nf);
 }
 
-int vg_carrier_new(vg_carrier **out, const vg_mesh *source, const double *source_reference,
+int vg_cross_transfer_new(vg_cross_transfer **out, const vg_mesh *source, const double *source_reference,
                    const vg_correspondence *pairs, const vg_graph *target, const double *target_reference,
                    vg_method method, int threads, vg_err *e)
 {
     *out = NULL;
     int r = check_fit(source, pairs, target, e);
     if (r < 0) return r;
-    vg_carrier *c = *out = vgi_array(1, sizeof *c, e);
+    vg_cross_transfer *c = *out = vgi_array(1, sizeof *c, e);
     if (!c) return VG_ENOMEM;
     c->source = source, c->pairs = pairs, c->target = target, c->method = method, c->threads = threads;
     atomic_init(&c->first_face, UINT64_MAX);
@@ -241,11 +241,11 @@ int vg_carrier_new(vg_carrier **out, const vg_mesh *source, const double *source
         vg_graph_vectors(target, target_reference, c->vectors);
         r = find_twins(c, source_reference, e);
     }
-    if (r < 0) vg_carrier_free(out);
+    if (r < 0) vg_cross_transfer_free(out);
     return r;
 }
 
-double vg_carrier_turned(const vg_carrier *c)
+double vg_cross_transfer_turned(const vg_cross_transfer *c)
 {
     const vg_graph *t = c->target;
     const vg_correspondence *pairs = c->pairs;
@@ -262,9 +262,9 @@ double vg_carrier_turned(const vg_carrier *c)
     return count ? 180 / M_PI * acos(fmin(fabs(sum) / (double)count, 1)) : 0;
 }
 
-void vg_carrier_free(vg_carrier **out)
+void vg_cross_transfer_free(vg_cross_transfer **out)
 {
-    vg_carrier *c = *out;
+    vg_cross_transfer *c = *out;
     if (!c) return;
     free(c->p);
     free(c->q);
@@ -283,15 +283,15 @@ void vg_carrier_free(vg_carrier **out)
     *out = NULL;
 }
 
-vg_deform_counts vg_carrier_counts(const vg_carrier *c)
+vg_deform_stats vg_cross_transfer_get_stats(const vg_cross_transfer *c)
 {
-    return (vg_deform_counts){atomic_load(&c->degenerate), atomic_load(&c->first_face)};
+    return (vg_deform_stats){atomic_load(&c->degenerate), atomic_load(&c->first_face)};
 }
 
 /* ---- eight poses ---- */
 
 typedef struct carry_job {
-    vg_carrier *c;
+    vg_cross_transfer *c;
     const double *poses[VGI_LANES];
     double *const *out;
     size_t lanes;
@@ -300,7 +300,7 @@ typedef struct carry_job {
 /* A line segment's map: its smallest rotation and its stretch, lane by lane. */
 static void measure_segment(const carry_job *j, size_t f)
 {
-    const vg_carrier *c = j->c;
+    const vg_cross_transfer *c = j->c;
     const uint32_t *vert = c->source->vert + c->source->start[f];
     const double *r = c->segment + 3 * f;
     vgi_map *map = &c->maps[f];
@@ -321,7 +321,7 @@ static void measure_segment(const carry_job *j, size_t f)
 static void measure_chunk(void *context, size_t i)
 {
     carry_job *j = context;
-    vg_carrier *c = j->c;
+    vg_cross_transfer *c = j->c;
     size_t nf = c->source->nf, first = i * CHUNK, last = first + CHUNK < nf ? first + CHUNK : nf;
     const vgi_source s = {c->source->start, c->source->vert, c->p, c->q, c->slow, j->poses};
     vgi_transfer_kernel_now()->measure(&s, first, last, c->maps, c->bad);
@@ -333,14 +333,14 @@ static void measure_chunk(void *context, size_t i)
 }
 
 /* Add the mean map of a target face's sources to a sum; sources without a direction are left out. */
-static void add_sources(const vg_carrier *c, size_t f, vgi_map *sum, vgi_lanes weight)
+static void add_sources(const vg_cross_transfer *c, size_t f, vgi_map *sum, vgi_lanes weight)
 {
     const vgi_drivers d = {c->maps, c->bad, c->pairs->source, c->pairs->weight};
     vgi_transfer_kernel_now()->add(&d, c->pairs->first[f], c->pairs->first[f + 1], sum, weight);
 }
 
 /* The centre of the source faces that drive the target faces around a vertex, in eight poses. */
-static void centre_beside(const vg_carrier *c, uint32_t v, const double *const *poses, vgi_lanes centre[3])
+static void centre_beside(const vg_cross_transfer *c, uint32_t v, const double *const *poses, vgi_lanes centre[3])
 {
     const vg_correspondence *k = c->pairs;
     size_t faces = c->target->nf - c->target->nlinks;
@@ -368,7 +368,7 @@ static void centre_beside(const vg_carrier *c, uint32_t v, const double *const *
  * they share: eyes move in their sockets. In the target's size. */
 static void add_drift(const carry_job *j, size_t f, const vgi_map *map)
 {
-    const vg_carrier *c = j->c;
+    const vg_cross_transfer *c = j->c;
     size_t begin = c->target->start[f];
     const double *reference[VGI_LANES];
     for (int k = 0; k < VGI_LANES; k++) reference[k] = c->source_reference;
@@ -390,7 +390,7 @@ static void follow(const carry_job *j, size_t f)
 {
     static const vgi_follow how[] = {[VG_BY_POSE] = VGI_FOLLOW_POSE, [VG_BY_GRADIENT] = VGI_FOLLOW_GRADIENT,
                                      [VG_BY_BLEND] = VGI_FOLLOW_BLEND};
-    const vg_carrier *c = j->c;
+    const vg_cross_transfer *c = j->c;
     const vg_graph *g = c->target;
     size_t faces = g->nf - g->nlinks, begin = g->start[f];
     vgi_map sum;
@@ -424,7 +424,7 @@ static void follow_chunk(void *context, size_t i)
 /* Corner by corner, and from the order of the twins to that of the target. */
 static void transfer_twins(const carry_job *j)
 {
-    const vg_carrier *c = j->c;
+    const vg_cross_transfer *c = j->c;
     if (!c->ntwins) return;
     vg_deformer_transfer(c->deformer, j->lanes, VG_VERTICES, j->poses, c->twin_vectors);
     for (size_t k = 0; k < j->lanes; k++)
@@ -435,7 +435,7 @@ static void transfer_twins(const carry_job *j)
         }
 }
 
-void vg_carrier_transfer(vg_carrier *c, size_t n, const double *const *poses, double *const *vectors)
+void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const *poses, double *const *vectors)
 {
     for (size_t p = 0; p < n; p += VGI_LANES) {
         carry_job j = {.c = c, .out = vectors + p, .lanes = n - p < VGI_LANES ? n - p : VGI_LANES};

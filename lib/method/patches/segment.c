@@ -449,7 +449,7 @@ static double objective_of(clustering *c, size_t k)
     return sum;
 }
 
-static int cut(clustering *c, size_t k, uint64_t seed, bool connected, vg_segment_report *report, vg_err *e)
+static int cut(clustering *c, size_t k, uint64_t seed, bool connected, vg_segment_stats *report, vg_err *e)
 {
     double objective = 0;
     int r = VG_OK;
@@ -476,12 +476,12 @@ static int cut(clustering *c, size_t k, uint64_t seed, bool connected, vg_segmen
 }
 
 int vg_segmenter_cut(vg_segmenter *s, size_t patches, uint64_t seed, bool connected, vg_patches *out,
-                     vg_segment_report *report, vg_err *e)
+                     vg_segment_stats *report, vg_err *e)
 {
     static const size_t steps[] = {4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256};
     size_t nsteps = sizeof steps / sizeof *steps;
     *out = (vg_patches){0};
-    *report = (vg_segment_report){0};
+    *report = (vg_segment_stats){0};
     cut_down(s);
     for (size_t i = 0;; i++) {
         clustering c;

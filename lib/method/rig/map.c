@@ -10,8 +10,8 @@
  * What that leaves of the poses is taken up, vertex by vertex, by a ridge regression on the A of the vertex's own
  * patch and of its neighbours: skin between two bones is where patches do not move rigidly.
  *
- * Where only the A are known the t follow from joints, the points that two neighbours move alike, and from what the
- * poses show beyond that: a ridge regression of what joints miss on the A of all patches, as strong as makes it
+ * Where only the A are known the t follow from hinges, the points that two neighbours move alike, and from what the
+ * poses show beyond that: a ridge regression of what hinges miss on the A of all patches, as strong as makes it
  * predict left-out poses best.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
@@ -363,7 +363,7 @@ static void fit_corners(const vg_map_fitter *f, vg_map *m)
 
 /* The point c that patches i and j move alike: least squares over the poses, near the vertices that they share where
  * the poses do not say. */
-static void fit_joint(const vg_map_fitter *f, size_t i, size_t j, const double middle[3], double c[3], double *miss)
+static void fit_hinge(const vg_map_fitter *f, size_t i, size_t j, const double middle[3], double c[3], double *miss)
 {
     static const double firmness = 0.01;
     size_t n = f->shape.n;
@@ -393,35 +393,35 @@ static void fit_joint(const vg_map_fitter *f, size_t i, size_t j, const double m
     }
 }
 
-static int fit_joints(const vg_map_fitter *f, vg_map *m, vg_err *e)
+static int fit_hinges(const vg_map_fitter *f, vg_map *m, vg_err *e)
 {
-    static const double least = 2e-3; /* of D: how exactly a joint can be known */
-    static const double nothing = 1e-12; /* weight of a joint that is missed by thousands of D, or by no number at all */
+    static const double least = 2e-3; /* of D: how exactly a hinge can be known */
+    static const double nothing = 1e-12; /* weight of a hinge that is missed by thousands of D, or by no number at all */
     const vg_graph *g = f->g;
     uint32_t (*pair)[2], *shared;
     double d = vg_diagonal(f->h->body.reference, g->nv);
-    int r = vgi_neighbours(g->nv, g->nf, g->start, g->vert, f->of_face, &pair, &shared, &m->njoints, e);
+    int r = vgi_neighbours(g->nv, g->nf, g->start, g->vert, f->of_face, &pair, &shared, &m->nhinges, e);
     if (r < 0) return r;
-    m->joint = (uint32_t *)pair;
-    m->joint_at = vgi_array(3 * m->njoints, sizeof *m->joint_at, e);
-    m->joint_weight = vgi_array(m->njoints, sizeof *m->joint_weight, e);
-    double *middle = vgi_array(3 * m->njoints, sizeof *middle, e);
-    if (!m->joint_at || !m->joint_weight || !middle) r = VG_ENOMEM;
+    m->hinge = (uint32_t *)pair;
+    m->hinge_at = vgi_array(3 * m->nhinges, sizeof *m->hinge_at, e);
+    m->hinge_weight = vgi_array(m->nhinges, sizeof *m->hinge_weight, e);
+    double *middle = vgi_array(3 * m->nhinges, sizeof *middle, e);
+    if (!m->hinge_at || !m->hinge_weight || !middle) r = VG_ENOMEM;
     if (r == VG_OK)
-        r = vgi_shared_points(g->nv, g->nf, g->start, g->vert, f->of_face, m->joint, m->njoints, f->h->body.reference,
+        r = vgi_shared_points(g->nv, g->nf, g->start, g->vert, f->of_face, m->hinge, m->nhinges, f->h->body.reference,
                               middle, e);
-    for (size_t i = 0; r == VG_OK && i < m->njoints; i++) {
+    for (size_t i = 0; r == VG_OK && i < m->nhinges; i++) {
         double miss;
-        fit_joint(f, pair[i][0], pair[i][1], middle + 3 * i, m->joint_at + 3 * i, &miss);
-        m->joint_weight[i] = d > 0 ? shared[i] / (miss / (d * d) + least * least) * least * least : 1;
-        if (!(m->joint_weight[i] >= nothing)) m->joint_weight[i] = nothing;
+        fit_hinge(f, pair[i][0], pair[i][1], middle + 3 * i, m->hinge_at + 3 * i, &miss);
+        m->hinge_weight[i] = d > 0 ? shared[i] / (miss / (d * d) + least * least) * least * least : 1;
+        if (!(m->hinge_weight[i] >= nothing)) m->hinge_weight[i] = nothing;
     }
     free(middle);
     free(shared);
     return r;
 }
 
-/* What joints miss in pose k: delta (3 x n): t - root - place A. */
+/* What hinges miss in pose k: delta (3 x n): t - root - place A. */
 static void missed(const vg_map_fitter *f, const vg_map *m, size_t k, double *delta)
 {
     size_t n = m->n;
@@ -517,7 +517,7 @@ static double left_out(ridge *x, size_t k)
     return sum;
 }
 
-/* Correct what joints say by what the poses show, if that predicts poses better that were left out. */
+/* Correct what hinges say by what the poses show, if that predicts poses better that were left out. */
 static int correct_place(const vg_map_fitter *f, vg_map *m, vg_err *e)
 {
     static const double strengths[] = {1e-4, 1e-3, 1e-2, 0.1, 1};
@@ -661,8 +661,8 @@ int vg_map_fitter_finish(vg_map_fitter *f, vg_err *e)
     if (r == VG_OK) fit_corners(f, m);
     if (r == VG_OK) r = vgi_map_collapse(f->h, f->g, f->of_face, f->turns.vector, f->threads, e);
     if (r == VG_OK) r = fit_skin(f, m, e);
-    if (r == VG_OK) r = fit_joints(f, m, e);
-    if (r == VG_OK) r = vgi_place_by_joints(m, m->centre, m->place, e);
+    if (r == VG_OK) r = fit_hinges(f, m, e);
+    if (r == VG_OK) r = vgi_place_by_hinges(m, m->centre, m->place, e);
     if (r == VG_OK) r = correct_place(f, m, e);
     vgi_blas_shared();
     if (r < 0) vg_map_clear(m);

@@ -1,4 +1,4 @@
-/* map_eval.c: a map at work: transforms of patches or bones measured, placed by joints, interpolated, and turned into
+/* map_eval.c: a map at work: transforms of patches or bones measured, placed by hinges, interpolated, and turned into
  * vertices by one product.
  * Leaves out fitting (map.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
@@ -26,8 +26,8 @@ struct vg_player {
     void *columns;      /* 4n x 3 BLOCK: what the product multiplies, float or double */
     void *product;      /* nv x 3 BLOCK */
     double *motion;     /* 12 n: A row by row, then t */
-    double *ends;       /* 6 n: what joints miss at both ends, in each patch's own frame */
-    uint32_t *order, *parent; /* patches along a tree of joints, parents first; a root is its own parent */
+    double *ends;       /* 6 n: what hinges miss at both ends, in each patch's own frame */
+    uint32_t *order, *parent; /* patches along a tree of hinges, parents first; a root is its own parent */
 };
 
 /* Of bones: as their skeleton says. */
@@ -54,9 +54,9 @@ static int plan_patches(vg_player *p, vg_err *e)
             if (!seen[i] && (first == n || m->share[i] > m->share[first])) first = i;
         seen[first] = true, p->parent[first] = (uint32_t)first, p->order[tail++] = (uint32_t)first;
         for (; head < tail; head++)
-            for (size_t j = 0; j < m->njoints; j++)
+            for (size_t j = 0; j < m->nhinges; j++)
                 for (int k = 0; k < 2; k++) {
-                    uint32_t a = m->joint[2 * j + (size_t)k], b = m->joint[2 * j + 1 - (size_t)k];
+                    uint32_t a = m->hinge[2 * j + (size_t)k], b = m->hinge[2 * j + 1 - (size_t)k];
                     if (a != p->order[head] || seen[b]) continue;
                     seen[b] = true, p->parent[b] = a, p->order[tail++] = b;
                 }
@@ -187,7 +187,7 @@ static void root_of(const vg_player *p, const double *centre, double root[3])
     }
 }
 
-/* Where joints want patch i, from the root. */
+/* Where hinges want patch i, from the root. */
 static void placed(const vg_player *p, size_t i, double t[3])
 {
     size_t n = p->m->n;
@@ -214,7 +214,7 @@ void vg_player_place(vg_player *p, double *transforms)
 
 /* ---- interpolation ---- */
 
-/* What joints miss in a pose, seen by each patch, and the root. */
+/* What hinges miss in a pose, seen by each patch, and the root. */
 static void remember_end(vg_player *p, const double *transforms, double *miss, double root[3])
 {
     read_motion(p, transforms);

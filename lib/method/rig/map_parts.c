@@ -1,4 +1,4 @@
-/* map_parts.c: the geometry of patches, their joints, and the collapse of a map into one matrix (T 6.3; MATH 7).
+/* map_parts.c: the geometry of patches, their hinges, and the collapse of a map into one matrix (T 6.3; MATH 7).
  * Leaves out what is fitted to poses (map.c) and how a map is played (map_eval.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/map_parts.h"
@@ -97,23 +97,23 @@ void vgi_shape_measure(const vgi_shape *s, size_t p, const double *pose, vgi_mot
     }
 }
 
-/* ---- joints ---- */
+/* ---- hinges ---- */
 
-/* Least squares over the joints: t_i - t_j = A_j c - A_i c, all of them; and sum of share (A centre + t) = 0. Linear
+/* Least squares over the hinges: t_i - t_j = A_j c - A_i c, all of them; and sum of share (A centre + t) = 0. Linear
  * in the A. */
-int vgi_place_by_joints(const vg_map *m, const double *centre, double *place, vg_err *e)
+int vgi_place_by_hinges(const vg_map *m, const double *centre, double *place, vg_err *e)
 {
     size_t n = m->n;
     double *l = vgi_array(n, n * sizeof *l, e), trace = 1;
     if (!l) return VG_ENOMEM;
     memset(place, 0, 3 * n * n * sizeof *place);
-    for (size_t q = 0; q < m->njoints; q++) {
-        size_t i = m->joint[2 * q], j = m->joint[2 * q + 1];
-        double w = m->joint_weight[q];
+    for (size_t q = 0; q < m->nhinges; q++) {
+        size_t i = m->hinge[2 * q], j = m->hinge[2 * q + 1];
+        double w = m->hinge_weight[q];
         l[i * n + i] += w, l[j * n + j] += w, l[i * n + j] -= w, l[j * n + i] -= w;
         trace += 2 * w;
         for (size_t k = 0; k < 3; k++) {
-            double c = w * m->joint_at[3 * q + k];
+            double c = w * m->hinge_at[3 * q + k];
             place[i * 3 * n + 3 * i + k] -= c, place[i * 3 * n + 3 * j + k] += c;
             place[j * 3 * n + 3 * i + k] += c, place[j * 3 * n + 3 * j + k] -= c;
         }
@@ -156,7 +156,7 @@ int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *
     uint32_t *parent = vgi_array(n, sizeof *parent, e);
     double *mean = vgi_array(width, sizeof *mean, e);
     int code = parent && mean ? vgi_rig_parents(r, parent, e) : VG_ENOMEM;
-    for (size_t b = 0; code == VG_OK && b < n; b++) { /* where the joint is, from the first one */
+    for (size_t b = 0; code == VG_OK && b < n; b++) { /* where the hinge is, from the first one */
         double *row = place + b * width;
         if (b) memcpy(row, place + parent[b] * width, width * sizeof *row);
         else memset(row, 0, width * sizeof *row);

@@ -1,4 +1,4 @@
-/* map_parts.h: what fitting, changing and playing a map share: the geometry of patches, and where joints put them.
+/* map_parts.h: what fitting, changing and playing a map share: the geometry of patches, and where hinges put them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_MAP_PARTS_H
 #define VG_MAP_PARTS_H
@@ -31,8 +31,8 @@ static inline void vgi_move_point(const vgi_motion *m, const double x[3], double
     for (int i = 0; i < 3; i++) y[i] = m->a[3 * i] * x[0] + m->a[3 * i + 1] * x[1] + m->a[3 * i + 2] * x[2] + m->t[i];
 }
 
-/* vgi_place_by_joints: place (n x 3n) of the map from its joints, centres and shares. */
-int vgi_place_by_joints(const vg_map *m, const double *centre, double *place, vg_err *e) VG_MUST_CHECK;
+/* vgi_place_by_hinges: place (n x 3n) of the map from its hinges, centres and shares. */
+int vgi_place_by_hinges(const vg_map *m, const double *centre, double *place, vg_err *e) VG_MUST_CHECK;
 
 /* vgi_place_by_bones: the same from the skeleton of r, whose joints are at the map's centres:
  * bones keep their lengths. */

@@ -53,14 +53,14 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
     return r;
 }
 
-/* Of each joint, on one body: the mean of the vertices that both its patches have. */
+/* Of each hinge, on one body: the mean of the vertices that both its patches have. */
 static int meeting_points(const vg_map *m, const vg_graph *g, const uint32_t *of_face, const double *body,
                           double *mean, vg_err *e)
 {
-    return vgi_shared_points(g->nv, g->nf, g->start, g->vert, of_face, m->joint, m->njoints, body, mean, e);
+    return vgi_shared_points(g->nv, g->nf, g->start, g->vert, of_face, m->hinge, m->nhinges, body, mean, e);
 }
 
-/* Joints, centres and held points go with the body; corrections of what joints say grow with it. */
+/* Hinges, centres and held points go with the body; corrections of what hinges say grow with it. */
 static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *body, double ratio,
                        vg_err *e)
 {
@@ -68,20 +68,20 @@ static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, c
     size_t n = m->n;
     vgi_shape shape = {0};
     double *before = vgi_array(n, 3 * n * sizeof *before, e), *after = vgi_array(n, 3 * n * sizeof *after, e);
-    double *old = vgi_array(3 * m->njoints, sizeof *old, e), *now = vgi_array(3 * m->njoints, sizeof *now, e);
+    double *old = vgi_array(3 * m->nhinges, sizeof *old, e), *now = vgi_array(3 * m->nhinges, sizeof *now, e);
     vgi_blas_alone();
-    int r = before && after && old && now ? vgi_place_by_joints(m, m->centre, before, e) : VG_ENOMEM;
+    int r = before && after && old && now ? vgi_place_by_hinges(m, m->centre, before, e) : VG_ENOMEM;
     if (r == VG_OK) r = meeting_points(m, g, of_face, h->body.reference, old, e);
     if (r == VG_OK) r = meeting_points(m, g, of_face, body, now, e);
     if (r == VG_OK) r = vgi_shape_make(&shape, &h->body.mesh, &h->body.patches, body, e);
     if (r == VG_OK) {
-        for (size_t i = 0; i < 3 * m->njoints; i++) m->joint_at[i] = now[i] + ratio * (m->joint_at[i] - old[i]);
+        for (size_t i = 0; i < 3 * m->nhinges; i++) m->hinge_at[i] = now[i] + ratio * (m->hinge_at[i] - old[i]);
         for (size_t i = 0; i < m->nheld; i++)
             for (size_t k = 0; k < 3; k++) {
                 size_t x = 3 * (size_t)m->held[i] + k;
                 m->held_at[3 * i + k] = body[x] + ratio * (m->held_at[3 * i + k] - h->body.reference[x]);
             }
-        r = vgi_place_by_joints(m, shape.centre, after, e);
+        r = vgi_place_by_hinges(m, shape.centre, after, e);
     }
     vgi_blas_shared();
     if (r == VG_OK) {

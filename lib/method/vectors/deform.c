@@ -362,9 +362,9 @@ int vg_deformer_target(vg_deformer *d, const double *target_vectors, vg_method m
     return d->method == VGI_POSE ? VG_OK : make_gradients(d, e);
 }
 
-vg_deform_counts vg_deformer_counts(const vg_deformer *d)
+vg_deform_stats vg_deformer_get_stats(const vg_deformer *d)
 {
-    return (vg_deform_counts){atomic_load(&d->degenerate), atomic_load(&d->first_face)};
+    return (vg_deform_stats){atomic_load(&d->degenerate), atomic_load(&d->first_face)};
 }
 
 /* ---- many faces, many poses ---- */

@@ -49,7 +49,7 @@ struct vg_path {
     segment slots[SLOTS];
     double *to, *q;    /* of the segment under construction: vectors at its second key, a quaternion per element */
     vgi_incidence around; /* if there are line segments */
-    vg_path_facts facts;
+    vg_path_stats stats;
 };
 
 /* ---- keys ---- */
@@ -131,9 +131,9 @@ static int measure(vg_path *p, const segment *s, vg_err *e)
     double *q = p->q;
     if (vgi_deformer_of_vectors(&d, p->g, s->from, p->diagonal, p->o.threads, e) < 0) return VG_ENOMEM;
     vg_deformer_measure(d, 1, VG_VECTORS, &to, &q);
-    vg_deform_counts counts = vg_deformer_counts(d);
-    p->facts.degenerate.corners += counts.corners;
-    if (counts.first_face < p->facts.degenerate.first_face) p->facts.degenerate.first_face = counts.first_face;
+    vg_deform_stats counts = vg_deformer_get_stats(d);
+    p->stats.degenerate.corners += counts.corners;
+    if (counts.first_face < p->stats.degenerate.first_face) p->stats.degenerate.first_face = counts.first_face;
     vg_deformer_free(&d);
     turn_lines(p, s->from);
     return VG_OK;
@@ -221,8 +221,8 @@ static int fill(vg_path *p, segment *s, size_t number, vg_err *e)
     free(face);
     if (r < 0) return r;
     s->has_rest = beyond;
-    p->facts.beyond += beyond;
-    p->facts.segments++;
+    p->stats.beyond += beyond;
+    p->stats.segments++;
     turn_anchors(p, s);
     find_drift(p, s);
     s->number = number;
@@ -468,7 +468,7 @@ int vg_path_new(vg_path **out, const vg_graph *g, const double *reference, const
     p->diagonal = D;
     p->corners = vg_graph_corners(g), p->elements = p->corners + o->nanchors;
     p->shortest2 = shortest * D * shortest * D, p->exact = exact * D;
-    p->facts.degenerate.first_face = UINT64_MAX;
+    p->stats.degenerate.first_face = UINT64_MAX;
     int r = make_arrays(p, reference, e);
     if (r < 0) vg_path_free(out);
     return r;
@@ -494,7 +494,7 @@ void vg_path_free(vg_path **out)
     *out = NULL;
 }
 
-vg_path_facts vg_path_get_facts(const vg_path *p)
+vg_path_stats vg_path_get_stats(const vg_path *p)
 {
-    return p->facts;
+    return p->stats;
 }

@@ -38,8 +38,8 @@ struct vg_planar {
     vgi_face_rows faces; /* of four and more corners */
     vgi_row *memory;
     room *rooms;         /* one per thread */
-    vg_planar_facts *found; /* per thread */
-    vg_planar_facts facts;
+    vg_planar_stats *found; /* per thread */
+    vg_planar_stats stats;
 };
 
 static int make_rooms(vg_planar *p, vg_err *e)
@@ -74,7 +74,7 @@ int vg_planar_new(vg_planar **out, const vg_solver *s, double fidelity, double p
     p->solver = vgi_solver_look(s);
     p->ratio = planarity / fidelity;
     int r = vgi_face_rows_make(&p->faces, &p->solver, CORNERS, e);
-    p->facts.faces = p->faces.nf;
+    p->stats.faces = p->faces.nf;
     if (r == VG_OK) r = make_rooms(p, e);
     if (r < 0) vg_planar_free(out);
     return r;
@@ -97,9 +97,9 @@ size_t vg_planar_faces(const vg_planar *p)
     return p->faces.nf;
 }
 
-vg_planar_facts vg_planar_get_facts(const vg_planar *p)
+vg_planar_stats vg_planar_get_stats(const vg_planar *p)
 {
-    return p->facts;
+    return p->stats;
 }
 
 /* The mean of the cross products of successive vectors, made a unit; 0 if there is none. Moving all vectors of a
@@ -206,7 +206,7 @@ static size_t descend(const vg_planar *p, const room *m, const vgi_planar_faces 
     return steps;
 }
 
-static void note(vg_planar_facts *found, size_t steps, double left)
+static void note(vg_planar_stats *found, size_t steps, double left)
 {
     if (steps > found->most_steps) found->most_steps = steps;
     if (!isnan(found->worst_residual) && !(left <= found->worst_residual)) found->worst_residual = left;
@@ -254,6 +254,6 @@ size_t vg_planar_solve(vg_planar *p, size_t n, const double *const *normals, dou
         for (size_t k = 0; k < some && good == n; k++)
             if (!converged[k]) good = done + k;
     }
-    for (size_t i = 0; i < threads; i++) note(&p->facts, p->found[i].most_steps, p->found[i].worst_residual);
+    for (size_t i = 0; i < threads; i++) note(&p->stats, p->found[i].most_steps, p->found[i].worst_residual);
     return good;
 }

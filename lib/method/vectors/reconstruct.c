@@ -48,7 +48,7 @@ struct vg_solver {
     vgi_factor factor;
     vgi_row *x;       /* threads * unknowns */
     vgi_point *spare; /* of vg_solver_load: nv + max_corners for each thread */
-    vg_solver_facts facts;
+    vg_solver_stats stats;
 };
 
 static double seconds(void)
@@ -233,7 +233,7 @@ static int factorize(vg_solver *s, vg_err *e)
         r = vgi_cholesky_factorize(s->cholesky, &N, e);
     }
     if (r == VG_OK) {
-        s->facts = (vg_solver_facts){s->unknowns, vgi_cholesky_entries(s->cholesky), t1 - t0, seconds() - t1};
+        s->stats = (vg_solver_stats){s->unknowns, vgi_cholesky_entries(s->cholesky), t1 - t0, seconds() - t1};
         s->factor = vgi_cholesky_factor(s->cholesky);
     }
     vgi_sparse_clear(&N);
@@ -353,9 +353,9 @@ size_t vg_solver_batch(const vg_solver *s)
     return VGI_LANES * (size_t)s->threads;
 }
 
-vg_solver_facts vg_solver_get_facts(const vg_solver *s)
+vg_solver_stats vg_solver_get_stats(const vg_solver *s)
 {
-    return s->facts;
+    return s->stats;
 }
 
 typedef struct load_job {

@@ -45,8 +45,8 @@ struct vg_robust {
     size_t nmisfits;
     room *rooms; /* one per thread, nrooms of them made */
     size_t nrooms;
-    vg_robust_facts *found; /* per room */
-    vg_robust_facts facts;
+    vg_robust_stats *found; /* per room */
+    vg_robust_stats stats;
 };
 
 /* ---- making ---- */
@@ -85,8 +85,8 @@ static size_t write_metric(vg_robust *r, size_t i, size_t at)
 static int prepare_faces(vg_robust *r, vg_err *e)
 {
     const vg_graph *g = r->solver.g;
-    int ok = vgi_face_rows_make(&r->rows, &r->solver, 2, e);
-    if (ok < 0) return ok;
+    int code = vgi_face_rows_make(&r->rows, &r->solver, 2, e);
+    if (code < 0) return code;
     r->face = vgi_array_raw(g->nf, sizeof *r->face, e);
     r->entry = vgi_array_raw(g->nf, sizeof *r->entry, e);
     r->star = vgi_array_raw(g->nf, sizeof *r->star, e);
@@ -137,14 +137,14 @@ int vg_robust_new(vg_robust **out, const vg_solver *s, size_t rounds, double eps
     vg_robust *r = *out = vgi_array(1, sizeof *r, e);
     if (!r) return VG_ENOMEM;
     r->s = s, r->solver = vgi_solver_look(s), r->rounds = rounds, r->eps = eps;
-    int ok = prepare_faces(r, e);
-    if (ok == VG_OK) {
+    int code = prepare_faces(r, e);
+    if (code == VG_OK) {
         r->rooms = vgi_array((size_t)r->solver.threads, sizeof *r->rooms, e);
         r->found = vgi_array((size_t)r->solver.threads, sizeof *r->found, e);
-        if (!r->rooms || !r->found) ok = VG_ENOMEM;
+        if (!r->rooms || !r->found) code = VG_ENOMEM;
     }
-    if (ok < 0) vg_robust_free(out);
-    return ok;
+    if (code < 0) vg_robust_free(out);
+    return code;
 }
 
 void vg_robust_free(vg_robust **out)
@@ -168,9 +168,9 @@ size_t vg_robust_misfits(const vg_robust *r)
     return r->nmisfits;
 }
 
-vg_robust_facts vg_robust_get_facts(const vg_robust *r)
+vg_robust_stats vg_robust_get_stats(const vg_robust *r)
 {
-    return r->facts;
+    return r->stats;
 }
 
 /* ---- loading ---- */
@@ -405,7 +405,7 @@ static void robust_block(void *context, size_t i)
         vgi_robust_kernel_now()->scale(r->solver.rows, size, s.m.u);
         vgi_add_rows(s.m.u, r->solver.row, g->nv, r->solver.rows, j->x + first, lanes);
     }
-    vg_robust_facts *found = &r->found[i];
+    vg_robust_stats *found = &r->found[i];
     if (s.rounds > found->most_rounds) found->most_rounds = s.rounds;
     for (size_t k = 0; k < lanes; k++) {
         bool held = r->solver.anchored;
@@ -418,8 +418,8 @@ int vg_robust_solve(vg_robust *r, size_t n, const double *const *rhs, const floa
                     double *const *x, const double *const *anchors, const double *const *roots, vg_err *e)
 {
     if (!n) return VG_OK;
-    int status = make_rooms(r, (n + VGI_LANES - 1) / VGI_LANES, e);
-    if (status < 0) return status;
+    int code = make_rooms(r, (n + VGI_LANES - 1) / VGI_LANES, e);
+    if (code < 0) return code;
     size_t most = VGI_LANES * r->nrooms;
     for (size_t done = 0; done < n; done += most) {
         size_t some = n - done < most ? n - done : most;
@@ -427,10 +427,10 @@ int vg_robust_solve(vg_robust *r, size_t n, const double *const *rhs, const floa
                         r->solver.anchored ? anchors + done : NULL, r->solver.anchored ? NULL : roots + done};
         vgi_parallel(r->solver.threads, (some + VGI_LANES - 1) / VGI_LANES, robust_block, &j);
     }
-    r->facts = (vg_robust_facts){0};
+    r->stats = (vg_robust_stats){0};
     for (size_t i = 0; i < r->nrooms; i++) {
-        if (r->found[i].most_rounds > r->facts.most_rounds) r->facts.most_rounds = r->found[i].most_rounds;
-        r->facts.unfinished += r->found[i].unfinished;
+        if (r->found[i].most_rounds > r->stats.most_rounds) r->stats.most_rounds = r->found[i].most_rounds;
+        r->stats.unfinished += r->found[i].unfinished;
     }
     return VG_OK;
 }
