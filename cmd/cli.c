@@ -328,5 +328,6 @@ char *cli_read_file(const char *path, size_t *n)
     }
     if (!f || ferror(f)) cli_stop(VG_ESYS, "cannot read '%s': %s", path, strerror(errno ? errno : EIO));
     if (f != stdin) fclose(f);
+    data[*n] = 0; /* the last turn of the loop has read nothing into its room */
     return data;
 }

@@ -124,7 +124,7 @@ bool cli_next(vg_source *s, vg_frame *f);
  * message calls the sequence ("the input", "'a.vgs'"). */
 void cli_need_vertices(const vg_head *h, const char *subject);
 
-/* cli_read_file: a whole file ("-": standard input); free(). Dies when it cannot be read. */
+/* cli_read_file: a whole file ("-": standard input), with a 0 behind it; free(). Dies when it cannot be read. */
 char *cli_read_file(const char *path, size_t *n);
 
 /* The stream of a filter. cli_stream_open takes the head (adds this process to the provenance unless told not to) and

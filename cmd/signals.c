@@ -1,6 +1,7 @@
 /* signals.c: what a signal is, in words and numbers.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signals.h"
+#include "cli.h"
 
 #include <stdlib.h>
 
@@ -42,4 +43,19 @@ void write_positions(FILE *f, const vg_signal *s)
         fprintf(f, "frame %zu %.17g %.17g%s\n", i + 1, s->position[2 * i], s->position[2 * i + 1],
                 site && site[i] ? " # a site" : "");
     free(site);
+}
+
+void write_curve(FILE *f, const vg_signal *s, double diagonal)
+{
+    enum { PARTS = 4 };
+    vg_trace t;
+    vg_err e;
+    if (vg_signal_trace(&t, s, PARTS, &e) < 0) cli_die(&e);
+    fprintf(f, "# %zu points of the curve: X Y # time, distance from a cubic spline through the frames in D (rms)\n", t.n);
+    for (size_t i = 0; i < t.n; i++)
+        fprintf(f, "%.17g %.17g # %g %.3g\n", t.position[2 * i], t.position[2 * i + 1], 1 + (double)i / PARTS,
+                diagonal > 0 ? t.deviation[i] / diagonal : 0);
+    for (size_t i = 0; i < t.ncrossings; i++)
+        fprintf(f, "# the curve is at one place at the times %.6g and %.6g\n", t.crossing[2 * i], t.crossing[2 * i + 1]);
+    vg_trace_clear(&t);
 }

@@ -9,5 +9,8 @@
 void report_signal(report *r, const vg_signal *s);
 /* write_positions: a line for each control point and frame; comments say which frames are sites. */
 void write_positions(FILE *f, const vg_signal *s);
+/* write_curve: points of the curve, four to a frame, as vg-sample --curve takes them; comments give times, deviations, in
+ * units of `diagonal`, and crossings. */
+void write_curve(FILE *f, const vg_signal *s, double diagonal);
 
 #endif

@@ -12,19 +12,21 @@
 #include <unistd.h>
 
 static struct {
-    bool check, frames, digest, weights, positions;
+    bool check, frames, digest, weights, positions, curve;
 } opts;
 
 static const cli_option options[] = {
     {.name = "check", .help = "read everything and only say whether it is whole", .flag = &opts.check,
-     .excludes = "digest|frames|weights|positions"},
+     .excludes = "digest|frames|weights|positions|curve"},
     {.name = "digest", .help = "only print a fingerprint of the content: 16 hexadecimal digits",
-     .flag = &opts.digest, .excludes = "frames|weights|positions"},
-    {.name = "frames", .help = "list the frames", .flag = &opts.frames, .excludes = "weights|positions"},
+     .flag = &opts.digest, .excludes = "frames|weights|positions|curve"},
+    {.name = "frames", .help = "list the frames", .flag = &opts.frames, .excludes = "weights|positions|curve"},
     {.name = "weights", .help = "only print the skinning weights of a rig, a vertex per line", .flag = &opts.weights,
-     .excludes = "json|positions"},
+     .excludes = "json|positions|curve"},
     {.name = "positions", .help = "only print where control points and frames of a signal are, for vg-sample --edit",
-     .flag = &opts.positions, .excludes = "json"},
+     .flag = &opts.positions, .excludes = "json|curve"},
+    {"curve", 0, NULL, "only print the curve of a signal: points for vg-sample --curve, their times, where it crosses itself",
+     .flag = &opts.curve, .excludes = "json"},
     {0},
 };
 
@@ -590,11 +592,12 @@ static void print_weights(const vg_head *h, const char *operand)
     write_weights(cli_text_open(), &h->body.rig, h->body.mesh.nv);
 }
 
-static void print_positions(const vg_head *h, const char *operand)
+static void print_signal(const vg_head *h, const char *operand)
 {
     if (!h->signal.n)
         cli_stop(VG_EINPUT, "'%s' holds no signal: make one with vg-fitsignal", operand ? operand : "standard input");
-    write_positions(cli_text_open(), &h->signal);
+    if (opts.positions) write_positions(cli_text_open(), &h->signal);
+    else write_curve(cli_text_open(), &h->signal, vg_diagonal(h->body.reference, h->body.mesh.nv));
 }
 
 int main(int argc, char **argv)
@@ -608,10 +611,10 @@ int main(int argc, char **argv)
     const char *operand = n && strcmp(operands[0], "-") ? operands[0] : NULL;
     if (opts.check) report_check(r);
     else if (opts.digest) report_digest(r, &c);
-    else if ((!list || cli.json) && !opts.weights && !opts.positions) report_all(r, operand, vg_source_head(s), &c);
+    else if ((!list || cli.json) && !opts.weights && !opts.positions && !opts.curve) report_all(r, operand, vg_source_head(s), &c);
     if (list) report_join(r, list);
     if (opts.weights) print_weights(vg_source_head(s), operand);
-    else if (opts.positions) print_positions(vg_source_head(s), operand);
+    else if (opts.positions || opts.curve) print_signal(vg_source_head(s), operand);
     else report_print(r, cli_text_open(), cli.json);
     cli_text_end();
     report_free(&r);

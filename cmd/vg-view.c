@@ -380,6 +380,25 @@ static void sheet_frame(void *sheet, size_t i, const side *s, const double *trut
     if (vg_sheet_add(sheet, i, &s->frame, truth, &e) < 0) cli_die(&e);
 }
 
+/* A signal is drawn as its curve through the pose plane. */
+static void make_plane(cast *c)
+{
+    vg_err e;
+    vg_sheet_options o = sheet_options();
+    vg_plane_options plane = {.azimuth = o.azimuth, .elevation = o.elevation, .z_up = o.z_up};
+    static const char *const strange[] = {"frames", "columns", "size", "zoom", "fit", "ground", "edges", "silhouettes", "beside",
+                                          "against", "scales", "scale", "turn", "fps"};
+    for (size_t i = 0; i < sizeof strange / sizeof *strange; i++)
+        if (cli_given(strange[i]))
+            cli_usage("option '--%s' is about a sequence: of a signal the pose plane is drawn", strange[i]);
+    if (opts.animated) cli_usage("a signal is drawn as PNG: an animation is made of the poses of vg-sample");
+    if (opts.patches) take_patches(&c->result);
+    while (next(&c->result)) continue; /* to the end, so that damage is seen */
+    FILE *out = cli_text_open();
+    if (vg_plane_write(c->result.head, &plane, fileno(out), cli.output ? cli.output : "standard output", &e) < 0) cli_die(&e);
+    cli_text_end();
+}
+
 static void make_sheet(cast *c)
 {
     vg_sheet_options o = sheet_options();
@@ -469,6 +488,7 @@ int main(int argc, char **argv)
     choose_kind();
     open_cast(&c, operands, n);
     if (opts.page) make_page(&c);
+    else if (c.result.head->signal.n) make_plane(&c);
     else make_sheet(&c);
     warn_scale(&c);
     close_cast(&c);

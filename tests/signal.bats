@@ -255,6 +255,16 @@ assert 0 < s['error_shape'] <= 0.7e-2 and 0 < s['error'] <= 1e-2 and s['compress
     must vg-sample --no-provenance --edit all.txt "$(trex signal)" -o edited.vgs
     must cmp as-it-is.vgs edited.vgs
     must_fail 3 vg-info --positions "$(trex vgs)"
+    must_fail 3 vg-info --curve "$(trex vgs)"
+    must_fail 2 vg-info --curve --positions "$(trex signal)"
+    must vg-info --curve "$(trex signal)" -o curve.txt
+    [ "$(grep -c '^[-0-9]' curve.txt)" = $((33 * 4 + 1)) ] || fail "$(head -3 curve.txt)"
+    must vg-sample --curve curve.txt --frames 2 "$(trex signal)" -o ends.vgs # from its first to its last point
+    must vg-fitsignal -q --root none "$(trex vgs)" -o still.signal
+    must vg-sample --at 1,34 still.signal -o wanted.vgs
+    must vg-info --curve still.signal -o curve.txt
+    must vg-sample --curve curve.txt --frames 2 still.signal -o ends.vgs
+    vg-diff -t 1e-12 wanted.vgs ends.vgs
 }
 
 @test "vg-deform --examples: sculpted poses are met, and others are nearer to the truth" {
@@ -413,6 +423,57 @@ END
     must_fail 2 vg-fitsignal --examples some.vgs -m 3 man.vgs -o no.signal
     must_fail 2 vg-sample --onto - - -o no.vgs
     [ ! -e no.vgs ] && [ ! -e no.signal ]
+}
+
+# red FILE: pixels of exactly the colour of a crossing in a PNG, and its size; red enough to be nothing else
+red() {
+    py "$1" <<'END'
+import struct, sys, zlib
+data = open(sys.argv[1], "rb").read()
+at, rest, size = 8, b"", None
+while at < len(data):
+    n, tag = struct.unpack(">I4s", data[at:at + 8])
+    if tag == b"IHDR": size = struct.unpack(">IIBB", data[at + 8:at + 18])
+    if tag == b"IDAT": rest += data[at + 8:at + 8 + n]
+    at += 12 + n
+w, h, depth, kind = size
+assert (depth, kind) == (8, 2)
+raw, last, red = zlib.decompress(rest), bytes(3 * w), 0
+for y in range(h):
+    how, row = raw[y * (3 * w + 1)], bytearray(raw[y * (3 * w + 1) + 1:(y + 1) * (3 * w + 1)])
+    for i in range(3 * w):
+        a, b, c = row[i - 3] if i > 2 else 0, last[i], last[i - 3] if i > 2 else 0
+        p = a + b - c
+        near = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
+        row[i] = (row[i] + (0, a, b, (a + b) // 2, near)[how]) % 256
+    red += sum(row[i] == 205 and row[i + 1] == 30 and row[i + 2] == 40 for i in range(0, 3 * w, 3))
+    last = row
+print(w, h, red)
+END
+    printf '%s\n' "$output"
+}
+
+@test "vg-view draws the pose plane of a signal: crossings where there are some" {
+    poses two 4
+    printf '%s\n' '-1 -1' '1 1' '1 -1' '-1 1' >cross.txt
+    printf '%s\n' '-1 -1' '1 -1' '1 1' '-1 1' >round.txt
+    for way in cross round; do
+        must vg-fitsignal -q --place $way.txt pose1.obj pose2.obj pose3.obj pose4.obj --json --report - -o $way.signal
+        [ "$(value crossings)" = "$([ $way = cross ] && echo 1 || echo 0)" ] || fail "$output"
+        must vg-view $way.signal -o $way.png
+    done
+    read -r width height crosses <<<"$(red cross.png)"
+    [ "$width $height" = '1400 1124' ] && [ "$crosses" -gt 20 ] && [ "$crosses" -lt 200 ] || fail "$width $height $crosses"
+    [ "$(red round.png)" = '1400 1124 0' ] || fail "$(red round.png)"
+    must vg-view - -o again.png <cross.signal
+    cmp cross.png again.png
+    must vg-view -j 1 "$(trex signal)" -o trex.png
+    must_fail 2 vg-view --frames 3 cross.signal -o no.png
+    says "option '--frames' is about a sequence: of a signal the pose plane is drawn"
+    must_fail 2 vg-view cross.signal -o no.webp
+    head -c -300 cross.signal >short.signal
+    must_fail 3 vg-view short.signal -o no.png
+    [ ! -e no.png ] && [ ! -e no.webp ]
 }
 
 @test "a sequence that holds still, two frames, a single triangle" {

@@ -9,6 +9,9 @@
 /* vgi_signal_curve: its time signal, to be cleared; vgi_signal_set_curve: knots and control points of it. */
 int vgi_signal_curve(const vg_signal *s, vgi_curve *c, vg_err *e) VG_MUST_CHECK;
 int vgi_signal_set_curve(vg_signal *s, const vgi_curve *c, vg_err *e) VG_MUST_CHECK;
+/* vgi_curve_crossings: pairs of times (the caller's to free) at which the curve is at one place, found on `parts` straight
+ * stretches between frames. */
+int vgi_curve_crossings(const vgi_curve *c, size_t parts, double **times, size_t *count, vg_err *e) VG_MUST_CHECK;
 /* vgi_signal_vector: basis vector j, d numbers, whatever precision it is kept with. */
 void vgi_signal_vector(const vg_signal *s, size_t j, double *h);
 

@@ -12,6 +12,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+enum { CROSSING_PARTS = 16 }; /* straight stretches between frames on which crossings are looked for */
+
 typedef struct fitting {
     vg_signal *s;
     const vg_signal_options *o;
@@ -207,27 +209,6 @@ static int fit_time(fitting *f, vg_err *e)
     return vgi_signal_set_curve(s, &f->curve, e);
 }
 
-/* Places where the curve crosses itself: found on sixteen stretches between frames. */
-static int find_crossings(fitting *f, vg_err *e)
-{
-    enum { PARTS = 16 };
-    size_t points = (f->n - 1) * PARTS + 1;
-    vgi_crossing *list = NULL;
-    double *p = vgi_array(points, 2 * sizeof *p, e);
-    if (!p) return VG_ENOMEM;
-    for (size_t i = 0; i < points; i++) vgi_curve_at(&f->curve, 1 + (double)i / PARTS, p + 2 * i);
-    int r = vgi_crossings(points, p, &list, &f->report->ncrossings, e);
-    free(p);
-    if (r < 0) return r;
-    if (!(f->report->crossing = vgi_array(f->report->ncrossings, 2 * sizeof(double), e))) r = VG_ENOMEM;
-    for (size_t i = 0; r == VG_OK && i < f->report->ncrossings; i++) {
-        f->report->crossing[2 * i] = 1 + (list[i].a - 1) / PARTS;
-        f->report->crossing[2 * i + 1] = 1 + (list[i].b - 1) / PARTS;
-    }
-    free(list);
-    return r;
-}
-
 static void keep_examples(fitting *f)
 {
     vg_signal *s = f->s;
@@ -315,7 +296,8 @@ int vg_signal_fit(vg_signal *s, const vg_body *body, double *poses, size_t n, co
     r = fit_basis(&f, body, poses, e);
     report->rank = f.basis.rank;
     if (r < 0 || (r = fit_shape(&f, e)) < 0 || (r = place_frames(&f, e)) < 0 || (r = fit_pose(&f, e)) < 0 ||
-        (r = fit_time(&f, e)) < 0 || (r = find_crossings(&f, e)) < 0 || (r = keep_shapes(&f, e)) < 0)
+        (r = fit_time(&f, e)) < 0 ||
+        (r = vgi_curve_crossings(&f.curve, CROSSING_PARTS, &report->crossing, &report->ncrossings, e)) < 0 || (r = keep_shapes(&f, e)) < 0)
         goto out;
     s->n = n;
 out:

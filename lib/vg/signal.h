@@ -166,6 +166,17 @@ void vg_sampler_shapes(vg_sampler *p, size_t n, const double *x, double *const *
 /* vg_sampler_place: vertices where the root takes them at a time; nothing when the signal has no root. */
 void vg_sampler_place(const vg_sampler *p, double time, size_t nv, double *vertices);
 
+/* The curve of a signal, `parts` steps from one frame to the next. */
+typedef struct vg_trace {
+    size_t parts, n;   /* n points: (frames - 1) * parts + 1 */
+    double *position;  /* n points of the plane */
+    double *deviation; /* n: root mean squared distance of the vertices from the natural cubic spline through the frames */
+    size_t ncrossings; /* places where the curve crosses itself: */
+    double *crossing;  /* two times each */
+} vg_trace;
+int vg_signal_trace(vg_trace *t, const vg_signal *s, size_t parts, vg_err *e) VG_MUST_CHECK;
+void vg_trace_clear(vg_trace *t);
+
 #ifdef __cplusplus
 }
 #endif

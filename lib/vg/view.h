@@ -66,6 +66,14 @@ int vg_sheet_add(vg_sheet *s, size_t i, const vg_frame *f, const double *truth, 
  * its last frame. */
 int vg_sheet_write(vg_sheet *s, int fd, const char *name, vg_err *e) VG_MUST_CHECK;
 
+/* A picture of the signal of h: its curve through the pose plane, and some poses around it, as PNG. */
+typedef struct vg_plane_options {
+    double azimuth, elevation; /* of the poses' viewer, as for a sheet */
+    bool z_up;
+} vg_plane_options;
+/* vg_plane_write: to fd (borrowed). `name` is used in messages. VG_EINPUT when there is no signal. */
+int vg_plane_write(const vg_head *h, const vg_plane_options *o, int fd, const char *name, vg_err *e) VG_MUST_CHECK;
+
 /* A page: one HTML file that plays sequences side by side in a browser and needs nothing else. It is written as
  * frames come; memory holds 32 frames of each sequence, or as many as fit in 64 MiB, and all names. */
 typedef struct vg_page vg_page;
