@@ -21,27 +21,29 @@
 
 #include <stdlib.h>
 
-static const double REST = 1e-7;           /* what holds a vertex where it is when nothing else does */
-static const double IDENTITY_TRUST = 1e-6; /* where no face tells how it is deformed */
+static const double REST = 1e-7;           /* pull to the present place, for vertices without other terms */
+static const double IDENTITY_TRUST = 1e-6; /* where no face determines the deformation */
 
-/* Lengths are in D. What was tried on real pairs: within a factor of two of these the results are the same. */
-static const double MARKER = 3;           /* firmness of ties, where the bending of the mesh is 1 */
-static const double STRETCH = 0.03;       /* above this length stretching counts more than bending */
-static const double FIRST_SPAN = 0.075;   /* what a nearest point pulls along with it in the first round */
+/* Lengths are in D. Within a factor of two of these values the results on real pairs are the same. */
+static const double MARKER = 3;           /* weight of ties, relative to bending */
+static const double STRETCH = 0.03;       /* length above which stretching counts more than bending */
+static const double FIRST_SPAN = 0.075;   /* radius over which a nearest point pulls its neighbourhood, in the
+                                             first round */
 static const double LAST_SPAN = 0.7;      /* and in the last, in mean edge lengths */
-static const double FIRST_LIMIT = 0.1, LAST_LIMIT = 0.02; /* nearest points farther than this are none */
-static const double COSINE = 0.4;         /* least of normals that fit */
-static const double MAP_SPAN = 0.07;      /* over which the maps of faces are smoothed */
-static const double KEPT_STRETCH = 0.8;   /* power of a map's stretch: what nothing holds goes back to its size */
+static const double FIRST_LIMIT = 0.1, LAST_LIMIT = 0.02; /* nearest points farther away are ignored */
+static const double COSINE = 0.4;         /* least cosine of the angle between matching normals */
+static const double MAP_SPAN = 0.07;      /* length over which the maps of faces are smoothed */
+static const double KEPT_STRETCH = 0.8;   /* exponent of a map's stretch: parts without constraints return to their
+                                             size */
 
 enum {
-    BLOCK = 256,     /* vertices of a task */
-    TIED_SOLVES = 5, /* from the ties alone */
-    ROUNDS = 8,      /* with nearest points: one factorisation each */
+    BLOCK = 256,     /* vertices per task */
+    TIED_SOLVES = 5, /* rounds from the ties alone */
+    ROUNDS = 8,      /* rounds with nearest points; one factorisation each */
     SOLVES = 4       /* of a round */
 };
 
-/* A vertex of the target pulls the point of a source face that is nearest to it. */
+/* A target vertex pulls the nearest point of the source surface. */
 typedef struct reverse {
     uint32_t face; /* of the source */
     double weight, share[VGI_SMALL_FACE]; /* of the face's corners, all of which are joined by springs */
@@ -68,7 +70,7 @@ typedef struct fit {
     double *goal;      /* nv x 3: the nearest point */
     double *distance;  /* nv */
     reverse *reverse;  /* per vertex of the target; weight 0: it pulls nothing */
-    vgi_surface *now;  /* the source as it lies at the start of a round */
+    vgi_surface *now;  /* the source at the start of the round */
     double limit;
     double stretch;    /* weight of first differences */
 } fit;
@@ -111,7 +113,7 @@ static int factorize(fit *t, vg_err *e)
     return vgi_cholesky_factorize(t->solver, A, e);
 }
 
-/* ---- how the faces are deformed ---- */
+/* deformation of the faces */
 
 static void face_centre(const double *x, const uint32_t *vert, size_t r, double centre[3])
 {
@@ -197,7 +199,8 @@ static void face_maps(fit *t, const double *x)
     }
 }
 
-/* Of vertices: the trusted mean of the faces around, smoothed: (trust + length^2 L) D = sum of trusted D. */
+/* Maps of vertices: the mean of the adjacent faces' maps, weighted by trust and smoothed: (trust + length^2 L) D =
+ * sum of trusted D. */
 static int smooth_maps(fit *t, vg_err *e)
 {
     size_t nv = t->m->nv;
@@ -251,7 +254,7 @@ static int update_maps(fit *t, vg_err *e)
     return r;
 }
 
-/* What smooths the maps: as the matrix, with first neighbours only. */
+/* The smoothing operator of the maps: the matrix with first neighbours only. */
 static int make_smoother(fit *t, vg_err *e)
 {
     const vgi_springs *L = &t->L;
@@ -357,8 +360,8 @@ static void vertex_normals(const vg_mesh *m, const double *x, double sign, doubl
     }
 }
 
-/* A nearest point on the border of the target is true only for a vertex on the border of the source:
- * others are beyond it. */
+/* Only a border vertex of the source may use a nearest point on the border of the target: interior vertices would
+ * be pulled from beyond it. */
 static void find_near(void *context, size_t block)
 {
     fit *t = context;
@@ -367,7 +370,7 @@ static void find_near(void *context, size_t block)
         vgi_hit hit;
         const double *at = t->x + 3 * v, *normal = t->normal + 3 * v;
         double limit = t->limit * t->limit, known = vgi_square(at, t->goal + 3 * v);
-        /* the last answer bounds this one, if its normal still fits */
+        /* the previous answer is an upper bound, if its normal still matches */
         bool guess = t->distance[v] < INFINITY && known < limit;
         t->distance[v] = INFINITY;
         if (!(t->L.sum[v] > 0) || (t->in->take_vertex && !t->in->take_vertex[v])) continue;
@@ -401,8 +404,7 @@ static void find_reverse(void *context, size_t block)
     }
 }
 
-/* What the target asks of the source, in the places that the source would not find by itself: tips,
- * and what is drawn in. */
+/* Pulls from target vertices to source points that the source itself would not find: tips and concavities. */
 static int follow_reverse(fit *t, double weight, vg_err *e)
 {
     size_t n = t->in->target_mesh->nv;
@@ -414,7 +416,8 @@ static int follow_reverse(fit *t, double weight, vg_err *e)
     return VG_OK;
 }
 
-/* first: pulls are chosen anew. Later in a round the matrix stays: who has lost the target stays where it is. */
+/* first: choose the pulls again. Later in a round the matrix stays, and a vertex that has lost its target keeps
+ * its place. */
 static void follow_target(fit *t, double weight, bool first)
 {
     vertex_normals(t->m, t->x, t->in->flipped ? -1 : 1, t->normal);
@@ -451,7 +454,7 @@ static int run(fit *t, vg_err *e)
     for (int round = 0; round < ROUNDS && r == VG_OK; round++) {
         double progress = round / (double)(ROUNDS - 1), first = FIRST_SPAN / t->edge;
         double span = first > LAST_SPAN ? first * pow(LAST_SPAN / first, progress) : LAST_SPAN;
-        double weight = pow(span, -4); /* bending is of fourth order in length */
+        double weight = pow(span, -4); /* bending scales with the fourth power of length */
         t->limit = FIRST_LIMIT * pow(LAST_LIMIT / FIRST_LIMIT, progress);
         for (int i = 0; i < SOLVES && r == VG_OK; i++) {
             follow_target(t, weight, i == 0);
@@ -464,7 +467,7 @@ static int run(fit *t, vg_err *e)
     return r;
 }
 
-/* The length scale of the mesh, which sets that of its smoothness. */
+/* The mean edge length, which sets the scale of smoothing. */
 static void measure_edges(fit *t)
 {
     const vgi_springs *L = &t->L;

@@ -1,13 +1,11 @@
-/* pair.c: which source faces drive each target face, once the source lies on the target (MATH 9).
+/* pair.c: which source faces drive each target face, once the source is fitted to the target (MATH 9).
  *
- * Where a target face has a source face under its centroid that looks the same way, it takes that one and those
- * around it whose centroids are near, weighted by nearness over a radius that is the larger of the two faces' sizes:
- * a fine source is averaged, a coarse one interpolated. Neighbours are reached over the surface, so that fingers do
- * not mix. Source faces that nobody took are given to the target face they lie on. What finds nothing rides with
- * matched faces: a hole with the nearest over its edges, a piece of its own with the nearest ones in space, all of it
- * alike so that it stays rigid.
- *
- * Leaves out the fit (fit.c).
+ * If a source face with a matching normal lies under the centroid of a target face, that face and nearby source
+ * faces drive it. Their weights fall with the distance of the centroids, over a radius equal to the larger of the
+ * two face sizes: a fine source is averaged, a coarse one interpolated. Neighbours are found over the surface, so
+ * that fingers do not mix. Source faces without a target are given to the target face they lie on. A target face
+ * without a source follows matched faces: in a hole the nearest across edges, in a component without matches the
+ * nearest in space, the same for the whole component so that it stays rigid. The fit is in fit.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/register.h"
 #include "model/incidence.h"
@@ -16,14 +14,14 @@
 #include <stdlib.h>
 
 enum {
-    BLOCK = 128,  /* faces of a task */
-    MOST = 24,    /* sources of one target face, but for those that would be left over */
-    AROUND = 512, /* source faces that are looked at around one target face */
-    HOSTS = 4     /* faces that a piece without counterpart rides with */
+    BLOCK = 128,  /* faces per task */
+    MOST = 24,    /* most sources per target face, without source faces that are given to it later */
+    AROUND = 512, /* most source faces examined per target face */
+    HOSTS = 4     /* matched faces that a component without counterpart follows */
 };
 static const double COINCIDENT = 1e-6; /* in D */
-static const double COSINE = 0.5;      /* of normals that agree */
-static const double FAR = 0.03;        /* in D: farther is no match */
+static const double COSINE = 0.5;      /* least cosine of the angle between normals that match */
+static const double FAR = 0.03;        /* in D: largest distance of a match */
 static const double REACH = 1.2;       /* radius of the kernel, in sizes of faces */
 
 struct candidate {
@@ -44,7 +42,7 @@ struct pairing {
     struct drivers *drivers;           /* per target face */
     uint32_t *given;                   /* per source face: the target face that it is given to; UINT32_MAX: none */
     bool *used;                        /* per source face */
-    uint32_t *host;                    /* per target face: the matched face that it rides with */
+    uint32_t *host;                    /* per target face: the matched face that it follows */
 };
 
 static const double *centroid(const vgi_surface *s, size_t f)
@@ -52,7 +50,7 @@ static const double *centroid(const vgi_surface *s, size_t f)
     return vgi_surface_centroids(s) + 3 * f;
 }
 
-/* Faces without a normal agree with all. */
+/* A face without a normal matches every normal. */
 static bool agree(const struct pairing *p, size_t target, size_t source)
 {
     const double *a = vgi_surface_normals(p->in->target_surface) + 3 * target;
@@ -77,7 +75,7 @@ static bool coincide(const struct pairing *p, size_t target, size_t source)
 
 /* ---- from target to source ---- */
 
-/* The faces around a first one, over shared vertices, as far as their centroids are within a radius of a point. */
+/* The faces connected to a first face by shared vertices whose centroids are within a radius of a point. */
 struct walk {
     uint32_t face[AROUND];
     size_t n;
@@ -166,10 +164,10 @@ static void match_block(void *context, size_t block)
         struct drivers *d = &p->drivers[g];
         vgi_hit hit;
         d->n = 0;
-        if (g < p->in->source->nf && coincide(p, g, g)) { /* the same mesh, where faces may lie on one another */
+        if (g < p->in->source->nf && coincide(p, g, g)) { /* the same mesh: faces may coincide */
             *d = (struct drivers){1, {{(uint32_t)g, 1}}};
         } else if (nearest_source(p, g, &hit)) {
-            /* bones are not mixed: that would bend the limbs between joints */
+            /* bones are not mixed, which would bend limbs between joints */
             bool alone = face_size(p->in->target, g) == 2 || coincide(p, g, hit.face);
             if (alone) *d = (struct drivers){1, {{hit.face, 1}}};
             else find_drivers(p, g, hit.face, d);
@@ -196,7 +194,8 @@ static void give_block(void *context, size_t block)
     }
 }
 
-/* A source face left over joins the others with what its distance leaves, but never more than the least of them. */
+/* A source face without a target joins the drivers of its target face, weighted by its distance, but at most as
+ * the least of them. */
 static double given_weight(const struct pairing *p, size_t f)
 {
     const struct drivers *d = &p->drivers[p->given[f]];
@@ -205,10 +204,10 @@ static double given_weight(const struct pairing *p, size_t f)
     return d->at[d->n - 1].weight;
 }
 
-/* ---- what found nothing ---- */
+/* target faces without a match */
 
-/* A component of the target of which less than half found something has no counterpart:
- * what it found is of others. */
+/* A target component with matches for less than half of its faces has no counterpart: the matches belong to other
+ * components. */
 static int drop_strangers(struct pairing *p, vg_err *e)
 {
     const vg_mesh *m = p->in->target;
@@ -232,7 +231,7 @@ static int drop_strangers(struct pairing *p, vg_err *e)
     return r;
 }
 
-/* Breadth first from the matched faces: each other one takes the host of the face it was reached from. */
+/* Breadth first from the matched faces: each other face takes the host of the face it was reached from. */
 static void fill_holes(struct pairing *p, uint32_t *queue)
 {
     const vg_mesh *m = p->in->target;
@@ -255,7 +254,7 @@ static void fill_holes(struct pairing *p, uint32_t *queue)
     }
 }
 
-/* Put the drivers of the host with a share of the weight into d, where the same source counts once. */
+/* Add the drivers of the host, scaled by a share, to d; equal sources are merged. */
 static void borrow(struct drivers *d, const struct drivers *host)
 {
     double sum = 0;
@@ -268,7 +267,7 @@ static void borrow(struct drivers *d, const struct drivers *host)
     }
 }
 
-/* The hosts of a piece: the matched faces nearest to the mean of its centroids. */
+/* The hosts of a component: the matched faces nearest to the mean of its centroids. */
 static void find_hosts(const struct pairing *p, const vgi_kdtree *tree, const uint32_t *matched, const double at[3],
                        struct drivers *out)
 {
@@ -314,7 +313,7 @@ static int seat_pieces(struct pairing *p, vg_err *e)
 {
     const vg_mesh *m = p->in->target;
     uint32_t *label = vgi_array(m->nv, sizeof *label, e), *matched = vgi_array_raw(m->nf, sizeof *matched, e);
-    uint32_t *first = NULL; /* per piece: its first face, UINT32_MAX before it was met */
+    uint32_t *first = NULL; /* per component: its first face; UINT32_MAX before it was visited */
     double *centre = NULL;
     size_t *faces = NULL, pieces = 0;
     vgi_kdtree *tree = NULL;
@@ -348,7 +347,7 @@ static int seat_pieces(struct pairing *p, vg_err *e)
     return r;
 }
 
-/* ---- all together ---- */
+/* total */
 
 static void count_pairs(struct pairing *p)
 {

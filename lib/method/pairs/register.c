@@ -11,8 +11,8 @@
 
 enum { NEIGHBOURS = 4, ROBUST_ROUNDS = 20 };
 
-/* A wrong pair is one that is this many times the typical distance from where its neighbours expect it,
- * and this far, in D. */
+/* A pair is wrong if it is this many times the typical distance, and at least this far in D, from where its
+ * neighbours predict it. */
 static const double WRONG_TIMES = 5, WRONG_FAR = 0.08;
 
 struct similarity {
@@ -24,7 +24,7 @@ struct registration {
     vg_register_result *out;
     double unit, centre[3];     /* of the target: lengths are divided by D, its centroid is at 0 */
     double *source, *target;    /* points, normalised */
-    double *rest;               /* source on target as a whole */
+    double *rest;               /* the similarity that aligns source and target */
     vgi_tie *tie;
     size_t nties, nmarkers;     /* the first ones are the markers */
     struct similarity s;
@@ -32,7 +32,7 @@ struct registration {
     uint32_t *links;
     size_t nlinks;
     uint32_t *component;        /* per vertex of the source */
-    bool *take, *take_vertex;   /* per face and vertex of the source: its component takes part */
+    bool *take, *take_vertex;   /* per face and per vertex of the source: whether its component takes part */
     bool flipped;
     double *x;
 };
@@ -71,7 +71,7 @@ static void apply_similarity(const struct similarity *s, const double x[3], doub
     for (int k = 0; k < 3; k++) y[k] = s->scale * t[k] + s->shift[k];
 }
 
-/* Are they neither in one point nor on one line? Then the sum of squares has a second direction. */
+/* False if the points coincide or lie on one line: the covariance needs a second non-zero eigenvalue. */
 static bool spread_out(const double *x, size_t n)
 {
     double centre[3], S[9] = {0};
@@ -85,7 +85,7 @@ static bool spread_out(const double *x, size_t n)
     return minors > 1e-8 * trace * trace;
 }
 
-/* Pairs that miss by much more than most count less and less (Geman and McClure). */
+/* Reweight pairs: those with much larger residuals than most count less and less (Geman and McClure). */
 static int robust_similarity(struct similarity *s, const double *from, const double *to, size_t n, vg_err *e)
 {
     double *weight = vgi_array(n, sizeof *weight, e), *miss = vgi_array(n, sizeof *miss, e),
@@ -142,7 +142,7 @@ static void add_seed_ties(struct registration *r)
     }
 }
 
-/* The texture of a mesh as a surface in the plane: each corner is a vertex of its own. */
+/* The texture coordinates as a planar mesh: each corner is a vertex of its own. */
 static int texture_surface(vgi_surface **s, vg_mesh *flat, double **points, const vg_mesh *m, const vg_attributes *a,
                            vg_err *e)
 {
@@ -160,8 +160,8 @@ static int texture_surface(vgi_surface **s, vg_mesh *flat, double **points, cons
     return vgi_surface_new(s, flat, *points, e);
 }
 
-/* The point of a target face at the same place as a point of its texture: mean value coordinates would be exact for
- * polygons; least squares of an affine map of the corners is, for what a face spans. */
+/* The point of a target face with the same texture coordinates. For triangles it is exact; in larger faces it
+ * comes from the affine map that fits the corners best. */
 static bool lift(const vg_mesh *m, uint32_t face, const double *uv, const double *points, const double at[3],
                  double out[3])
 {
@@ -240,7 +240,7 @@ static void tied_point(const vgi_tie *t, const double *x, double p[3])
         for (size_t k = 0; k < 3; k++) p[k] += t->share[a] * x[3 * (size_t)t->vertex[a] + k];
 }
 
-/* ---- pairs that contradict the others ---- */
+/* pairs inconsistent with the others */
 
 /* residual[i]: how far the way of tie i to its place differs from what the nearest ones kept say. */
 static void neighbour_residuals(const double *from, const double *way, const bool *out, size_t n, double *residual)
@@ -267,7 +267,7 @@ static void neighbour_residuals(const double *from, const double *way, const boo
     }
 }
 
-/* The worst goes first, for it makes its neighbours look bad; and so on. */
+/* Remove the worst pair first, since it raises the residuals of its neighbours; then repeat. */
 static int judge_markers(struct registration *r, vg_err *e)
 {
     size_t n = r->nmarkers;
@@ -344,13 +344,13 @@ static int align(struct registration *r, vg_err *e)
     return code;
 }
 
-/* Do the faces of one mesh turn the other way round? Asked at the ties, or everywhere if there are none. */
+/* Do the two meshes have opposite face orientation? Judged at the ties, or over all faces if there are none. */
 static void find_sides(struct registration *r)
 {
     double votes = 0;
     const double *n = vgi_surface_normals(r->source_surface), *c = vgi_surface_centroids(r->source_surface);
     const vg_mesh *m = r->in->source;
-    /* without room for it all faces vote: as good, but slower */
+    /* if memory is short all faces vote: the same answer, but slower */
     bool *tied = r->nties ? calloc(m->nv + 1, sizeof *tied) : NULL;
     for (size_t i = 0; i < r->nties && tied; i++) tied[r->tie[i].vertex[0]] = r->tie[i].weight > 0;
     for (size_t f = 0; f < m->nf; f++) {
@@ -392,11 +392,11 @@ static void spread_choice(struct registration *r)
 {
     const vg_mesh *m = r->in->source;
     vgi_take_faces(m, r->component, r->out->taken, r->take);
-    for (size_t v = 0; v < m->nv; v++) /* isolated vertices are in none */
+    for (size_t v = 0; v < m->nv; v++) /* isolated vertices belong to no component */
         r->take_vertex[v] = r->component[v] < r->out->components && r->out->taken[r->component[v]];
 }
 
-/* Those that the caller names, or that ties lie on; all when there are none. */
+/* The components that the caller names, or that carry ties; all if there are none. */
 static int begin_components(struct registration *r, vg_err *e)
 {
     const vg_mesh *m = r->in->source;
@@ -432,7 +432,7 @@ static size_t count_taken(const vg_register_result *out)
     return n;
 }
 
-/* Fit the components that take part; if others explain something of the target, all of these once more. */
+/* Fit the components that take part; if other components explain part of the target, fit again with them. */
 static int bend_components(struct registration *r, void (*step)(void *, const vg_register_step *), void *context,
                            vg_err *e)
 {

@@ -22,7 +22,7 @@ static int add_spring(spring_list *l, uint32_t a, uint32_t b, double weight, vg_
     return r;
 }
 
-/* Every pair of corners of a small face; of a large one the edges, the next but one, and what is opposite. */
+/* Springs between all corners of a small face; in a large one along edges, to the second neighbour, and across. */
 static int add_face(spring_list *l, const uint32_t *vert, size_t r, vg_err *e)
 {
     int code = VG_OK;
@@ -47,7 +47,7 @@ static int gather_springs(spring_list *l, const vgi_fitting *in, vg_err *e)
         r = add_face(l, m->vert + m->start[f], m->start[f + 1] - m->start[f], e);
     for (size_t i = 0; i < in->nlinks && r == VG_OK; i++)
         r = add_spring(l, in->links[2 * i], in->links[2 * i + 1], 0.5, e);
-    /* points that a tie joins: no force, only room in the matrix */
+    /* points joined by a tie: an entry in the matrix without a spring */
     for (size_t i = 0; i < in->nties; i++)
         for (int k = 0; k < 3 && r == VG_OK; k++) {
             uint32_t a = in->tie[i].vertex[k], b = in->tie[i].vertex[(k + 1) % 3];
@@ -61,7 +61,7 @@ static int compare_springs(const void *a, const void *b)
     const struct spring *x = a, *y = b;
     if (x->a != y->a) return x->a < y->a ? -1 : 1;
     if (x->b != y->b) return x->b < y->b ? -1 : 1;
-    return x->weight < y->weight ? -1 : x->weight > y->weight; /* sums must not depend on the sorting */
+    return x->weight < y->weight ? -1 : x->weight > y->weight; /* sums must not depend on the order of sorting */
 }
 
 int vgi_springs_make(vgi_springs *L, const vgi_fitting *in, vg_err *e)
@@ -142,7 +142,7 @@ static size_t column_rows(const vgi_springs *L, uint32_t column, int *rows, uint
     size_t n = 0;
     mark[column] = column + 1, rows[n++] = (int)column;
     for (uint32_t i = L->first[column]; i <= L->first[column + 1]; i++) {
-        uint32_t k = i < L->first[column + 1] ? L->to[i] : column; /* the column itself comes last */
+        uint32_t k = i < L->first[column + 1] ? L->to[i] : column; /* the column itself is appended last */
         if (k != column && vgi_is_hub(L, k)) continue;
         for (uint32_t j = L->first[k]; j < L->first[k + 1]; j++) {
             uint32_t v = L->to[j];

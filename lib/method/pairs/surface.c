@@ -1,5 +1,4 @@
-/* surface.c: a tree of boxes over the triangles of polygons, searched nearest box first.
- * Leaves out what a nearest point is good for (fit.c, pair.c).
+/* surface.c: a bounding volume tree over the triangles of a polygon mesh, searched nearest box first.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/random.h"
 #include "method/pairs/surface.h"
@@ -62,7 +61,7 @@ static bool find_borders(vgi_surface *s, vg_err *e)
             uint32_t next = c + 1 < m->start[f + 1] ? c + 1 : m->start[f], v = m->vert[c], w = m->vert[next], ends[2];
             bool shared = false;
             if (around.first[v + 1] - around.first[v] > around.first[w + 1] - around.first[w]) {
-                uint32_t swap = v; /* look around the end with fewer faces: the other may be the hub of a large fan */
+                uint32_t swap = v; /* search at the end with fewer faces: the other may be the hub of a large fan */
                 v = w, w = swap;
             }
             for (uint32_t i = around.first[v]; i < around.first[v + 1] && !shared; i++) {
@@ -139,7 +138,7 @@ static void make_vertex_normals(vgi_surface *s)
     }
 }
 
-/* An order along an axis, by the middle of the triangles; a total one, so that the tree is always the same. */
+/* Compares triangles by their middle along an axis; a total order, so that the tree is always the same. */
 struct key {
     double middle[3];
     uint32_t index;
@@ -150,7 +149,7 @@ static inline bool before(const struct key *a, const struct key *b, int axis)
     return a->middle[axis] < b->middle[axis] || (a->middle[axis] == b->middle[axis] && a->index < b->index);
 }
 
-/* Hoare's selection: bring the key of rank `middle` to its place, lesser ones before it. */
+/* Hoare's selection: moves the key of rank `middle` to its place, smaller keys before it. */
 static void select_rank(struct key *p, size_t n, size_t middle, int axis)
 {
     size_t begin = 0, end = n;
@@ -362,7 +361,7 @@ static void try_edge(const struct triangle *t, const double p[3], int edge, doub
         square += d * d;
     }
     if (square < *best) *best = square, u[0] = x[0], u[1] = x[1], *touched = (uint8_t)(1 << edge);
-    else if (!(square > *best)) *touched |= (uint8_t)(1 << edge); /* a corner: both edges */
+    else if (!(square > *best)) *touched |= (uint8_t)(1 << edge); /* a corner touches both edges */
 }
 
 /* Squared distance of p from a triangle; u: the nearest point as a + u0 ab + u1 ac; touched: the edges that it is
@@ -398,7 +397,8 @@ static const double *corner_normal(const vgi_surface *s, uint32_t corner)
     return s->vertex_normal + 3 * (size_t)s->m->vert[corner];
 }
 
-/* On sharp edges and tips the vertex normals are those of the surface, not those of the faces that meet there. */
+/* On sharp edges and tips, vertex normals are tested too: those of the adjacent faces do not represent the surface
+ * there. */
 static bool fits(const vgi_surface *s, const struct triangle *t, const double u[2], const double *normal,
                  double cosine)
 {

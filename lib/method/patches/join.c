@@ -8,16 +8,16 @@
 
 #define NONE UINT32_MAX
 
-/* The pairs that are left, and those at each piece: end e of pair e / 2, in lists from first[piece] over next[e].
- * Pairs that are gone stay in the list of the other piece until it is walked. */
+/* The remaining pairs, and the list of pairs at each piece: end e of pair e / 2, from first[piece] along next[e].
+ * A removed pair stays in the other piece's list until that list is walked. */
 typedef struct state {
     vgi_joining *j;
     uint32_t *set;
     double *cost;
-    uint32_t *heap, *place; /* pairs by cost; where each is in there, NONE: gone */
+    uint32_t *heap, *place; /* heap of pairs by cost; position of each pair in it, NONE: removed */
     size_t left;            /* pairs in the heap */
     uint32_t *first, *last, *next;
-    uint32_t *seen;         /* per piece: the pair that joins it with the one at hand */
+    uint32_t *seen;         /* per piece: the pair that joins it with the current piece */
 } state;
 
 static double cost_of(const vgi_joining *j, uint32_t a, uint32_t b)
@@ -41,7 +41,7 @@ static void put(state *s, size_t at, uint32_t p)
     s->heap[at] = p, s->place[p] = (uint32_t)at;
 }
 
-/* To where a pair belongs that has come to place `at`. */
+/* Restore the heap at position `at`. */
 static void settle(state *s, size_t at)
 {
     uint32_t p = s->heap[at];
@@ -73,21 +73,21 @@ static void append(state *s, uint32_t piece, uint32_t end)
     s->last[piece] = end, s->next[end] = NONE;
 }
 
-/* The piece that pair p joins with piece a; a itself: none. */
+/* The piece that pair p joins with piece a; a itself if there is none. */
 static uint32_t beyond(const state *s, uint32_t p, uint32_t a)
 {
     uint32_t x = vgi_sets_find(s->set, s->j->pair[p][0]), y = vgi_sets_find(s->set, s->j->pair[p][1]);
     return x == a ? y : x;
 }
 
-/* b becomes part of a. Of two pairs that now join the same pieces the first stays. */
+/* Merge b into a. If two pairs now join the same pieces the first one stays. */
 static void join(state *s, uint32_t a, uint32_t b)
 {
     vgi_joining *j = s->j;
     double sum = j->size[a] + j->size[b], *x = j->mean + a * j->width, *y = j->mean + b * j->width;
     for (size_t i = 0; i < j->width; i++) x[i] = (j->size[a] * x[i] + j->size[b] * y[i]) / sum;
     j->size[a] = sum;
-    vgi_sets_join(s->set, a, b); /* a < b stays the name of both */
+    vgi_sets_join(s->set, a, b); /* the merged piece is named a, with a < b */
     uint32_t lists[2] = {s->first[a], s->first[b]};
     s->first[a] = NONE;
     for (int i = 0; i < 2; i++)

@@ -1,5 +1,5 @@
-/* pieces.c: connected pieces of labelled faces, neighbouring labels, and the points where they meet.
- * Leaves out how faces come by their labels (segment.c), and components of whole meshes (mesh.c).
+/* pieces.c: connected pieces of labelled faces, adjacent labels, and the points where they meet. Segmentation is
+ * in segment.c, components of whole meshes in mesh.c. SPDX-License-Identifier: GPL-3.0-or-later
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/patches/pieces.h"
 #include "model/incidence.h"
@@ -7,7 +7,7 @@
 
 #include <stdlib.h>
 
-enum { MOST = 32 }; /* labels looked at around one vertex */
+enum { MOST = 32 }; /* most labels examined around one vertex */
 
 int vgi_connected_pieces(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label,
                          size_t nlabels, uint32_t *piece, size_t *count, vg_err *e)
@@ -18,7 +18,7 @@ int vgi_connected_pieces(size_t nv, size_t nf, const uint32_t *start, const uint
     uint32_t *at = vgi_array_raw(nlabels, sizeof *at, e), *last = vgi_array_raw(nlabels, sizeof *last, e);
     uint32_t *number = vgi_array_raw(nf, sizeof *number, e);
     if (at && last && number) {
-        memset(at, 0xff, nlabels * sizeof *at); /* the vertex at which a label was last seen, and in which face */
+        memset(at, 0xff, nlabels * sizeof *at); /* per label: the last vertex at which it was seen, and the face */
         vgi_sets_init(piece, nf);
         for (size_t v = 0; v < nv; v++)
             for (uint32_t i = around.first[v]; i < around.first[v + 1]; i++) {
@@ -101,7 +101,7 @@ int vgi_neighbours(size_t nv, size_t nf, const uint32_t *start, const uint32_t *
     return r;
 }
 
-/* Where a pair is in an ascending list; n: it is not there. */
+/* Binary search for a pair; n if it is not there. */
 static size_t find_pair(const uint32_t *pairs, size_t n, uint32_t a, uint32_t b)
 {
     size_t low = 0, high = n;

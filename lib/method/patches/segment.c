@@ -1,6 +1,6 @@
-/* segment.c: faces that turn alike, by K-means over their rotations (T 6.2), and patches that hang together.
- * Leaves out how the rotation of a face is measured (polar.c), what hangs together (pieces.c), and which
- * pieces are joined (join.c).
+/* segment.c: faces that rotate alike, by K-means over their rotations (T 6.2), and connected patches made of them.
+ * Rotations of faces are in polar.c, connected pieces in pieces.c, merging in join.c. SPDX-License-Identifier:
+ * GPL-3.0-or-later
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/random.h"
 #include "method/patches/join.h"
@@ -14,8 +14,8 @@
 #include <stdlib.h>
 
 enum {
-    WIDTH = 1024,  /* numbers kept of a face's rotations, at most, */
-    NARROW = 128,  /* and at first */
+    WIDTH = 1024,  /* most features per face, */
+    NARROW = 128,  /* features per face at first */
     ROUNDS = 40,
     CHUNK = 256,   /* faces of one task */
     STRIPE = 64    /* dimensions of one task */
@@ -31,7 +31,7 @@ struct vg_segmenter {
     int threads;
     size_t poses;
     float *feature; /* nf x width */
-    size_t width;   /* grows with the poses; in the end it is cut down to what is used */
+    size_t width;   /* grows with the poses; cut to what is used at the end */
 };
 
 int vg_segmenter_new(vg_segmenter **out, const vg_mesh *m, const double *reference, int threads, vg_err *e)
@@ -65,7 +65,7 @@ typedef struct adding {
     vg_segmenter *s;
     const double *poses[VGI_LANES];
     size_t lanes;
-    uint32_t at[9 * VGI_LANES]; /* where number i of pose k goes, and with which sign */
+    uint32_t at[9 * VGI_LANES]; /* the feature that entry i of pose k is added to, and its sign */
     float sign[9 * VGI_LANES];
 } adding;
 
@@ -82,7 +82,7 @@ static void add_chunk(void *context, size_t i)
     }
 }
 
-/* Rows of at least `numbers` numbers, or WIDTH. */
+/* Width of rows: at least `numbers`, at least WIDTH. */
 static int widen(vg_segmenter *s, uint64_t numbers, vg_err *e)
 {
     size_t nf = s->turns.nf, width = s->width, old = s->width, n;
@@ -98,8 +98,7 @@ static int widen(vg_segmenter *s, uint64_t numbers, vg_err *e)
     return VG_OK;
 }
 
-/* The first features have a place of their own; later ones are added to one of them, chosen by chance,
- * with a random sign. */
+/* The first entries have a feature of their own; each later entry is added to a random feature with a random sign. */
 int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_err *e)
 {
     int r = widen(s, 9 * ((uint64_t)s->poses + n), e);
@@ -118,7 +117,7 @@ int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_e
     return VG_OK;
 }
 
-/* Rows as short as what is in use, in whole vectors. */
+/* Cut rows to the features in use, rounded up to whole vectors. */
 static void cut_down(vg_segmenter *s)
 {
     size_t used = 9 * s->poses < WIDTH ? 9 * s->poses : WIDTH, width = (used + FLOATS - 1) / FLOATS * FLOATS;
@@ -147,10 +146,10 @@ typedef struct clustering {
     uint32_t *sizes;
     float *products;       /* per worker: CHUNK x most */
     size_t workers;
-    atomic_size_t next;    /* first chunk nobody has taken */
+    atomic_size_t next;    /* first chunk that no worker has taken */
     size_t most, changed;
     uint32_t *chunk_changed;
-    const float *fresh;    /* the centre that was added last */
+    const float *fresh;    /* the most recent centre */
     uint32_t fresh_label;
 } clustering;
 
@@ -164,8 +163,8 @@ static float inner(const float *a, const float *b, size_t n)
     return vgi_segment_kernel_now()->inner(a, b, n);
 }
 
-/* Distances to the centre that was added last; the sum of the nearest ones,
- * chunk by chunk so that it does not depend on threads. */
+/* Update distances with the most recent centre; sum the nearest distances by chunks, so that the sum does not
+ * depend on the number of threads. */
 static void near_chunk(void *context, size_t i)
 {
     clustering *c = context;
@@ -174,7 +173,7 @@ static void near_chunk(void *context, size_t i)
     double sum = 0;
     for (size_t f = first; f < last; f++) {
         float d = c->norm[f] + square - 2 * inner(c->s->feature + f * width, c->fresh, width);
-        if (!(d > 1e-6f * (c->norm[f] + square))) d = 0; /* what rounding leaves of the same feature */
+        if (!(d > 1e-6f * (c->norm[f] + square))) d = 0; /* below this two features are equal but for rounding */
         if (d < c->nearest[f]) c->nearest[f] = d, c->label[f] = c->fresh_label;
         sum += (double)c->nearest[f];
     }
@@ -188,7 +187,7 @@ static double add_up(const clustering *c)
     return sum;
 }
 
-/* The face at which the running sum of squared distances passes `at`. */
+/* The face at which the cumulative sum of squared distances exceeds `at`. */
 static size_t draw(const clustering *c, double at)
 {
     size_t i = 0, last = 0;
@@ -216,7 +215,7 @@ static void seed_centres(clustering *c, size_t k, uint64_t seed)
     add_centre(c, (size_t)(vgi_random_mix(seed) % c->n));
     while (c->k < k) {
         double sum = add_up(c), share = (double)(vgi_random_mix(seed ^ vgi_random_mix(c->k)) >> 11) * 0x1p-53;
-        if (!(sum > 0)) break; /* every face turns like one of the centres */
+        if (!(sum > 0)) break; /* every face equals one of the centres */
         size_t face = draw(c, share * sum);
         if (!(c->nearest[face] > 0)) break;
         add_centre(c, face);
@@ -271,7 +270,7 @@ static void mean_stripe(void *context, size_t i)
     }
 }
 
-/* Few faces move in later rounds: only they are looked at. */
+/* In later rounds few faces change: only those are updated. */
 static void find_means(clustering *c)
 {
     c->nmoved = 0;
@@ -281,14 +280,14 @@ static void find_means(clustering *c)
     memcpy(c->counted, c->label, c->n * sizeof *c->counted);
 }
 
-/* before labels get another meaning */
+/* before labels are renumbered */
 static void forget_means(clustering *c)
 {
     memset(c->counted, 0xff, c->n * sizeof *c->counted);
     memset(c->total, 0, c->most * c->s->width * sizeof *c->total);
 }
 
-/* A patch that has lost its faces gets the one that fits worst where it is. */
+/* An empty patch takes the face with the largest distance to its centre. */
 static void fill_empty(clustering *c)
 {
     memset(c->sizes, 0, c->k * sizeof *c->sizes);
@@ -382,7 +381,7 @@ static int make_clustering(clustering *c, const vg_segmenter *s, size_t most, vg
 
 /* ---- pieces ---- */
 
-/* Patches in one piece each: pieces of the same label, joined with neighbours that turn alike until k are left. */
+/* Connected patches: connected pieces of one label, merged with neighbours that rotate alike until k are left. */
 static int connect(const vg_segmenter *s, uint32_t *label, size_t nlabels, size_t k, size_t *count, vg_err *e)
 {
     const vg_mesh *m = s->mesh;
@@ -417,7 +416,7 @@ static int connect(const vg_segmenter *s, uint32_t *label, size_t nlabels, size_
     return r;
 }
 
-/* Patches in the order of their first faces. */
+/* Number patches by their first faces. */
 static int renumber(uint32_t *label, size_t nf, size_t *k, vg_err *e)
 {
     uint32_t *number = vgi_array_raw(*k, sizeof *number, e);
@@ -433,7 +432,7 @@ static int renumber(uint32_t *label, size_t nf, size_t *k, vg_err *e)
     return VG_OK;
 }
 
-/* Within patches as they have become by joining. */
+/* K-means steps within the merged patches. */
 static double objective_of(clustering *c, size_t k)
 {
     c->k = k;
@@ -459,7 +458,7 @@ static int cut(clustering *c, size_t k, uint64_t seed, bool connected, vg_segmen
     if (connected) {
         size_t pieces = n;
         r = connect(c->s, c->label, n, k, &pieces, e);
-        if (r == VG_OK && pieces > c->most) { /* more components than patches: room for all of them */
+        if (r == VG_OK && pieces > c->most) { /* more components than requested patches: allocate for all of them */
             clustering larger;
             if ((r = make_clustering(&larger, c->s, pieces, e)) < 0) return r;
             memcpy(larger.label, c->label, c->n * sizeof *c->label);
