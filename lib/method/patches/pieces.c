@@ -1,5 +1,5 @@
 /* pieces.c: connected pieces of labelled faces, adjacent labels, and the points where they meet. Segmentation is
- * in segment.c, components of whole meshes in mesh.c. SPDX-License-Identifier: GPL-3.0-or-later
+ * in segment.c, components of whole meshes in mesh.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/patches/pieces.h"
 #include "model/incidence.h"

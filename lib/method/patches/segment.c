@@ -1,6 +1,5 @@
 /* segment.c: faces that rotate alike, by K-means over their rotations (T 6.2), and connected patches made of them.
- * Rotations of faces are in polar.c, connected pieces in pieces.c, merging in join.c. SPDX-License-Identifier:
- * GPL-3.0-or-later
+ * Rotations of faces are in polar.c, connected pieces in pieces.c, merging in join.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/random.h"
 #include "method/patches/join.h"

@@ -1,9 +1,9 @@
 /* decompose.c: skinning decomposition: bones, weights and motions from poses alone (MATH 6; Le and Deng 2012).
  *
- * Clusters of vertices that move rigidly come first: one cluster is divided where it is worst, and vertices go over to
- * the cluster whose motion suits them, until there are more than the bones that are wanted; those that move most nearly
- * alike are merged. Each becomes a bone; then weights and motions are fitted in turn.
- * Leaves out the motions of bones for given weights (free_bones.c) and weights for given motions (skin.c).
+ * First clusters of vertices that move rigidly are found. The cluster with the largest error is split, and
+ * vertices change to the cluster whose motion fits them best, until there are more clusters than wanted bones;
+ * then those with the most similar motions are merged. Each cluster becomes a bone. Finally weights and motions
+ * are fitted in turn. Motions for given weights are in free_bones.c, weights for given motions in skin.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/free_bones.h"
 #include "method/rig/learn.h"
@@ -17,18 +17,18 @@
 #include <stdlib.h>
 
 enum { SOME = 4096, LLOYD = 4, CHUNK = 256 };
-/* Clusters are divided beyond the number that is wanted, to twice it and by no more than EXTRA, then merged; not when
- * there are more than MOST_MERGED: the cost of all pairs is looked at. */
+/* Split beyond the wanted number, to twice as many but by no more than EXTRA, then merge. No merging above
+ * MOST_MERGED clusters, because the cost of every pair is examined. */
 enum { EXTRA = 64, MOST_MERGED = 256 };
-static const double EXACT = 1e-12; /* of the mean square of the vertices: what costs less is met */
+static const double EXACT = 1e-12; /* relative to the mean square of the vertices: an error below this is zero */
 
-/* A division of some vertices into clusters. Cluster j is bone j of a rig of which there is only the skin yet. */
+/* A partition of some vertices into clusters. Cluster j is bone j of a rig that has only its skin so far. */
 typedef struct dividing {
     vgi_learning *l;
     size_t n;          /* clusters */
     double *at;        /* 3 per cluster: centroid of its vertices in the reference pose */
     double *cost;      /* per cluster: sum of the squared distances */
-    size_t *size, *worst; /* vertices; the one that a new cluster begins with, + 1 */
+    size_t *size, *worst; /* vertices; the seed of a new cluster, + 1 */
     double spread;        /* mean over the vertices of the squared distance from the centroid, summed over the poses */
     vgi_rig_sums sums;
 } dividing;
@@ -51,7 +51,7 @@ static void find_centroids(dividing *d)
         if (d->size[i / 3]) d->at[i] /= (double)d->size[i / 3];
 }
 
-/* Squared distance of vertex v from where bone j takes it, summed over the poses. */
+/* Squared distance of vertex v from its position under bone j, summed over the poses. */
 static double rigid_cost(const dividing *d, size_t v, size_t j)
 {
     const vgi_rig_sums *s = &d->sums;
@@ -83,7 +83,8 @@ static void assign_chunk(void *context, size_t task)
     }
 }
 
-/* Motions of the clusters, then each vertex to the cluster that suits it; what each cluster costs. */
+/* Fit the motions of the clusters, assign each vertex to the cluster with the least error, and sum the errors per
+ * cluster. */
 static int assign(dividing *d, vg_err *e)
 {
     vg_free_bones *bones = NULL;
@@ -103,7 +104,8 @@ static int assign(dividing *d, vg_err *e)
     return r;
 }
 
-/* For each cluster its cost, and the vertex whose cost times squared distance from the centroid is largest. */
+/* For each cluster: its error, and the vertex with the largest product of error and squared distance from the
+ * centroid. */
 static void weigh_clusters(dividing *d)
 {
     memset(d->cost, 0, d->n * sizeof *d->cost);
@@ -119,7 +121,7 @@ static void weigh_clusters(dividing *d)
     }
 }
 
-/* The vertices of cluster j that are nearer to its worst vertex than to its centroid become a new one. */
+/* Split cluster j: the vertices nearer to its worst vertex than to its centroid form a new one. */
 static void divide(dividing *d, size_t j)
 {
     const double *from = d->at + 3 * j, *to = d->l->reference + 3 * (d->worst[j] - 1);
@@ -130,10 +132,10 @@ static void divide(dividing *d, size_t j)
     d->n++;
 }
 
-/* Divide the costliest clusters: at most as many as there are. false: none of them can be. */
+/* Split the clusters with the largest errors, at most as many as exist. false: none can be split. */
 static bool divide_some(dividing *d, size_t wanted)
 {
-    enum { LEAST = 6 }; /* vertices of a cluster that is divided */
+    enum { LEAST = 6 }; /* least number of vertices of a cluster to split */
     size_t before = d->n, room = wanted - before < before ? wanted - before : before;
     weigh_clusters(d);
     for (size_t i = 0; i < room; i++) {
@@ -149,7 +151,7 @@ static bool divide_some(dividing *d, size_t wanted)
     return d->n > before;
 }
 
-/* Clusters that have lost all their vertices go. */
+/* Remove empty clusters. */
 static void drop_empty(dividing *d)
 {
     size_t n = 0;
@@ -163,7 +165,7 @@ static void drop_empty(dividing *d)
     d->n = n;
 }
 
-/* Motions and clusters in turn. */
+/* Fit motions and clusters in turn. */
 static int settle(dividing *d, vg_err *e)
 {
     int r = VG_OK;
@@ -177,19 +179,20 @@ static int settle(dividing *d, vg_err *e)
 
 /* ---- merging ---- */
 
-/* What the cost of a rigid motion depends on; of two clusters together it is their sum. */
+/* The moments that the error of a rigid motion depends on; those of a union are the sum. */
 typedef struct moments {
     double n, p[3], square; /* vertices; sum of places in the reference pose, from its centroid; of their squares */
 } moments;
 
-enum { PER_POSE = 13 }; /* sum of y p', row by row; sum of y; sum of squares of y: y from the centroid of the pose */
+enum { PER_POSE = 13 }; /* sum of y p', row-major; sum of y; sum of squares of y: y is seen from the centroid of
+                           the pose */
 
 typedef struct merging {
     dividing *d;
     moments *of;  /* n */
     double *pose; /* n x poses x PER_POSE */
-    double *cost; /* n x n: what two clusters together cost more than apart, for row < column */
-    double *own;  /* n: what each costs */
+    double *cost; /* n x n: increase of the error when two clusters are merged, for row < column */
+    double *own;  /* n: error of each cluster */
     bool *gone;
 } merging;
 
@@ -202,7 +205,7 @@ static void sum_moments(merging *m)
 {
     const vgi_learning *l = m->d->l;
     double centre[3], y[3], p[3];
-    for (size_t k = 0; k <= l->n; k++) { /* the reference pose is the last */
+    for (size_t k = 0; k <= l->n; k++) { /* the last one is the reference pose */
         vg_centroid(k < l->n ? l->poses[k] : l->reference, l->nv, centre);
         double reference[3];
         vg_centroid(l->reference, l->nv, reference);
@@ -223,7 +226,7 @@ static void sum_moments(merging *m)
     }
 }
 
-/* What the best rigid motions of clusters i and j as one leave; j == i: of one. */
+/* The error of the best rigid motions of clusters i and j merged; j == i: of one cluster. */
 static double cost_together(const merging *m, size_t i, size_t j)
 {
     bool two = i != j;
@@ -250,7 +253,7 @@ static void cost_row(void *context, size_t i)
             m->cost[i * m->d->n + j] = cost_together(m, i, j) - m->own[i] - m->own[j];
 }
 
-/* Cluster j becomes part of cluster i < j. */
+/* Merge cluster j into cluster i < j. */
 static void merge_pair(merging *m, size_t i, size_t j)
 {
     size_t n = m->d->n;
@@ -303,7 +306,7 @@ static int merge(dividing *d, size_t wanted, vg_err *e)
 
 /* ---- clusters ---- */
 
-/* How many clusters there may be for a while. */
+/* The largest number of clusters before merging. */
 static size_t most_clusters(size_t wanted, size_t nv)
 {
     size_t extra = wanted > MOST_MERGED ? 0 : wanted < EXTRA ? wanted : EXTRA;
@@ -324,7 +327,7 @@ static int divide_all(dividing *d, size_t wanted, vg_err *e)
     return r;
 }
 
-/* A skeleton of free joints where the clusters are. */
+/* A skeleton of unconnected joints at the clusters. */
 static int make_rig(vg_rig *rig, size_t n, const double *at, vg_err *e)
 {
     static const uint8_t channels[6] = {1, 2, 3, 4, 5, 6};
@@ -364,7 +367,7 @@ static int find_clusters(vgi_learning *l, size_t wanted, dividing *d, vg_err *e)
     d->size = vgi_array(most, sizeof *d->size, e), d->worst = vgi_array(most, sizeof *d->worst, e);
     l->rig.skin_bone = vgi_array(l->nv, VG_SKIN * sizeof *l->rig.skin_bone, e);
     l->rig.skin_weight = vgi_array(l->nv, VG_SKIN * sizeof *l->rig.skin_weight, e);
-    /* the place of bone j is joint j, while there is no skeleton */
+    /* without a skeleton the transform of bone j is that of joint j */
     l->rig.bone = vgi_array_raw(most, sizeof *l->rig.bone, e), l->rig.at = d->at;
     bool ok = d->cost && d->size && d->worst && l->rig.skin_bone && l->rig.skin_weight && l->rig.bone;
     for (size_t j = 0; ok && j < most; j++) l->rig.bone[j] = (uint32_t)j;
@@ -377,7 +380,7 @@ static int find_clusters(vgi_learning *l, size_t wanted, dividing *d, vg_err *e)
     return r;
 }
 
-/* Clusters, a rig, weights and motions on some of the vertices; then on all. */
+/* Clusters, a rig, weights and motions on a subset of the vertices; then on all. */
 static int decompose(vgi_learning *l, vg_rig *rig, size_t nv, const double *reference, size_t wanted, size_t n,
                      const double *const *poses, double *miss, vg_err *e)
 {

@@ -111,7 +111,7 @@ double vg_driver_aligned(const vg_driver *d, size_t joint)
     return d->degrees[joint];
 }
 
-/* How far the other's joint k is from where its bone's length puts it: what position channels have done. */
+/* The offset of the other's joint k from its place at the end of its bone: the effect of position channels. */
 static void read_slip(const vg_driver *d, size_t k, const double *positions, const double *turns, double slip[3])
 {
     uint32_t parent = d->by->joints[k].parent;

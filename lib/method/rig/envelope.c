@@ -1,6 +1,6 @@
-/* envelope.c: the fit of a map of bones to poses (MATH 6; T 5): which bone each corner goes with and how it lies in
- * it, the vertices that are held, and the operator that all of it collapses into.
- * Leaves out the sums over the poses (rig_sums.c), weights (skin.c), and motions that are not known (inverse_skin.c).
+/* envelope.c: fit of a map of bones to poses (MATH 6; T 5): the bone and offset of each corner, the held vertices,
+ * and the linear operator they collapse into. Sums over poses are in rig_sums.c, weights in skin.c, unknown
+ * motions in inverse_skin.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
 #include "numeric/lapack.h"
@@ -19,7 +19,7 @@ struct vg_rig_fitter {
     vg_graph *g;
     vgi_turns turns;
     vgi_rig_sums sums;
-    double *miss; /* nv: what linear blend skinning leaves */
+    double *miss; /* nv: error of linear blend skinning */
 };
 
 int vg_rig_fitter_new(vg_rig_fitter **out, vg_head *h, const vg_rig_options *o, vg_err *e)
@@ -63,7 +63,7 @@ void vg_rig_fitter_add(vg_rig_fitter *f, size_t n, const double *const *poses, c
     size_t count = 0;
     for (size_t k = 0; k < n; k++) {
         if (!memcmp(poses[k], f->h->body.reference, 3 * f->h->body.mesh.nv * sizeof(double)))
-            continue; /* it says nothing */
+            continue; /* it carries no information */
         p[count] = poses[k], t[count++] = transforms[k];
         if (count == SOME) {
             vgi_rig_sums_add(&f->sums, count, p, t, f->o.threads);
@@ -98,7 +98,7 @@ static void face_turn(const vgi_rig_sums *s, size_t face, size_t j, double q[4])
     vg_quat_from_matrix(h, q);
 }
 
-/* The quaternion that takes reference vector r to u: as its face turns, then by the smallest rotation. */
+/* The quaternion that maps reference vector r to u: the rotation of its face, then the smallest rotation. */
 static void corner_quaternion(const vgi_rig_sums *s, size_t face, size_t j, const double r[3], const double u[3],
                               double q[4])
 {
@@ -110,7 +110,7 @@ static void corner_quaternion(const vgi_rig_sums *s, size_t face, size_t j, cons
     vg_quat_multiply(rest, turn, q);
 }
 
-/* The bones that a face may go with: those that move its vertices, by their skin. */
+/* The candidate bones of a face: those in the skin of its vertices. */
 static size_t face_bones(const vg_rig_fitter *f, size_t face, uint32_t *list)
 {
     const vg_rig *r = &f->h->body.rig;
@@ -124,8 +124,8 @@ static size_t face_bones(const vg_rig_fitter *f, size_t face, uint32_t *list)
     return n;
 }
 
-/* Least squares for d = A_a x + A_b y over the poses: x and y; returns how much of sum |d|^2 they explain. The
- * unknowns are x + y and y, the latter with a ridge: where both bones move alike the first has it all. */
+/* Least squares for d = A_a x + A_b y over the poses: x and y. Returns the explained part of sum |d|^2. The
+ * unknowns are x + y and y, the latter with a ridge: where both bones move alike the first takes everything. */
 static double pair_vectors(const vgi_rig_sums *s, size_t a, size_t b, const double *raw, double x[3], double y[3])
 {
     static const double ridge = 1e-4;
@@ -211,14 +211,14 @@ static int fit_corners(const vg_rig_fitter *f, vg_map *m, vg_err *e)
     vgi_parallel(f->o.threads, x.chunks, fit_faces, &x);
     for (size_t i = m->per_corner * (size_t)f->g->start[f->g->nf - f->g->nlinks]; i < m->per_corner * m->ncorners;
          i++)
-        m->corner[4 * i] = 1; /* links follow the skin of their ends */
+        m->corner[4 * i] = 1; /* a link follows the skin of its ends */
     free(x.space);
     return VG_OK;
 }
 
-/* ---- vertices that are held ---- */
+/* the held vertices */
 
-/* How far from rigid vertex v moves with the bone that suits it best, in mesh units. */
+/* The distance from rigid motion of vertex v with its best bone, in mesh units. */
 static double rigidity(const vgi_rig_sums *s, size_t v)
 {
     size_t width = 4 * s->n;
@@ -234,8 +234,8 @@ static double rigidity(const vgi_rig_sums *s, size_t v)
 
 typedef struct choosing {
     const vg_rig_fitter *f;
-    double *doubt;    /* per vertex: how little it moves rigidly and as its skin does */
-    double *distance; /* squared, from the nearest one chosen; -1: not to be chosen */
+    double *doubt;    /* per vertex: its deviation from rigid motion and from its skin */
+    double *distance; /* squared distance from the nearest chosen vertex; -1: excluded */
     uint32_t *list;
     size_t n;
 } choosing;
@@ -252,7 +252,7 @@ static void hold(choosing *x, size_t v)
     x->distance[v] = -1;
 }
 
-/* One vertex for each bone of each component: the least doubtful. */
+/* One vertex per bone and component: the one with the least deviation. */
 static int hold_groups(choosing *x, vg_err *e)
 {
     const vg_head *h = x->f->h;
@@ -280,10 +280,10 @@ static int by_number(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-/* Then those far from all chosen ones and little doubtful, until the share is reached. */
+/* Then vertices far from all chosen ones with small deviations, until the share is reached. */
 static int choose_held(const vg_rig_fitter *f, vg_map *m, vg_err *e)
 {
-    static const double tolerance = 1e-3; /* of D: doubts below it do not count */
+    static const double tolerance = 1e-3; /* in D: deviations below it count as zero */
     size_t nv = f->g->nv, want = (size_t)(f->o.hold * (double)f->g->attached + 0.5);
     double d = vg_diagonal(f->h->body.reference, nv);
     choosing x = {.f = f,
@@ -316,7 +316,7 @@ static int choose_held(const vg_rig_fitter *f, vg_map *m, vg_err *e)
     return r;
 }
 
-/* ---- what is left ---- */
+/* the residual */
 
 typedef struct refining {
     const vg_rig_fitter *f;
@@ -339,7 +339,7 @@ static double cross_with_reference(const refining *x, size_t i, size_t k, size_t
     return sum + (a[0] - o[0]) * (b[0] - o[0]) + (a[1] - o[1]) * (b[1] - o[1]) + (a[2] - o[2]) * (b[2] - o[2]);
 }
 
-/* What the poses have of vertex v beyond what row z (seen from the joints) makes, along number k of bone i. */
+/* The residual of vertex v, beyond what row z (seen from the joints) gives, along number k of bone i. */
 static double missing(const refining *x, size_t v, const double *z, size_t i, size_t k)
 {
     const vgi_rig_sums *s = &x->f->sums;
@@ -353,7 +353,7 @@ static double missing(const refining *x, size_t v, const double *z, size_t i, si
     return sum;
 }
 
-/* The vertex's own bones, then those above and below the first two. */
+/* The bones of the vertex, then the neighbours of the first two in the skeleton. */
 static size_t bones_around(const refining *x, size_t v, uint32_t *list)
 {
     const vg_rig *r = &x->f->h->body.rig;
@@ -370,8 +370,8 @@ static size_t bones_around(const refining *x, size_t v, uint32_t *list)
     return n;
 }
 
-/* Ridge regression on the motions of the vertex's own bones; of their places only differences count, so that what
- * moves as a whole does so still. */
+/* Ridge regression on the motions of the vertex's bones. Only differences of translations enter, so that a motion
+ * of the whole is kept. */
 static void refine_vertex(const refining *x, size_t v, double *z)
 {
     enum { MOST = 4 * AROUND };

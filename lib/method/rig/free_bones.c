@@ -128,7 +128,7 @@ static void place_bone(const double *g, size_t stride, const double m[12], doubl
     }
 }
 
-/* Each bone by itself, as if it alone moved its vertices. One without vertices moves with the whole. */
+/* Fit each bone alone, as if only it moved its vertices. A bone without vertices moves with the whole. */
 static void start(const vg_free_bones *x, working *w)
 {
     size_t width = 4 * x->n;
@@ -152,7 +152,7 @@ static void find_left(const vg_free_bones *x, working *w)
         }
 }
 
-/* Bone j beside the others; the largest change of its rotation. */
+/* Fit bone j with the other bones fixed; returns the largest change of its rotation. */
 static double improve_bone(const vg_free_bones *x, working *w, size_t j)
 {
     size_t width = 4 * x->n;
@@ -183,7 +183,7 @@ typedef struct fitting {
     bool begun;
 } fitting;
 
-/* T from the transforms that are there. */
+/* Set T from the given transforms. */
 static void continue_from(const vg_free_bones *x, const double *transforms, const double centre[3], working *w)
 {
     size_t width = 4 * x->n;
@@ -201,7 +201,7 @@ static void continue_from(const vg_free_bones *x, const double *transforms, cons
 
 static void fit_pose(void *context, size_t k)
 {
-    static const double still = 1e-6; /* radians, about: a bone that turns less does not count */
+    static const double still = 1e-6; /* radians, approximately: a smaller change ends the search */
     const fitting *f = context;
     const vg_free_bones *x = f->x;
     size_t width = 4 * x->n;

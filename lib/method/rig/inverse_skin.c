@@ -21,31 +21,33 @@
 
 enum { BLOCK = 8, SHARES = 8, SWEEPS = 8, STEPS = 30, FIRST_STEPS = 8 };
 static const double FIRST_PRIOR = 1e-3,
-                    LAST_PRIOR = 1e-10; /* pull of a bone towards its parent, beside that of the vertices */
+                    LAST_PRIOR = 1e-10; /* weight of the pull of a bone towards its parent, relative to its
+                                           vertices */
 
 struct vg_inverse_skin {
     size_t nv, n; /* vertices, bones */
     int threads;
-    double least;     /* turns smaller than this, in radians, are none */
-    int steps;        /* at most, of each descent */
-    uint32_t *parent; /* of each bone; each before its children */
+    double least;     /* radians: smaller rotations count as zero */
+    int steps;        /* most steps of each descent */
+    uint32_t *parent; /* parent of each bone; parents come first */
     double *at;       /* 3 n: the joints */
     double *offset;   /* 3 n: from the parent's joint */
     uint32_t *bone;   /* VG_SKIN per vertex */
     double *weight,
-        *local;    /* per bone of a vertex: its weight, and weight times the vertex, seen from the joint: 3 numbers */
+        *local;    /* per bone of a vertex: its weight, and weight times the vertex relative to the joint: 3
+                      numbers */
     double *g;     /* 3 n x 3 n */
     double *mean;  /* 3 n: mean of q */
     double *size;  /* n: trace of the diagonal blocks of g */
     double *own;   /* 4 n: sums over a bone's own vertices of local and of the weight */
-    bool *carries; /* n: whether a bone, or one below it, has vertices */
+    bool *carries; /* n: whether a bone or a descendant has vertices */
     double *space; /* BLOCK times working space */
 };
 
 /* Working space of one pose. */
 typedef struct working {
-    double *r, *trial, *b; /* 9 n each: rotations, those that are tried, B */
-    double *left;          /* 9 n: B - R G, where the objective was asked for last */
+    double *r, *trial, *b; /* 9 n each: rotations, trial rotations, B */
+    double *left;          /* 9 n: B - R G at the last evaluation of the objective */
     double *rows;          /* 18 n: R, and R G, as 3 x 3 n */
     double *sum, *step;    /* 3 n each */
     double *h;             /* (3 n)^2 */
@@ -84,10 +86,11 @@ static size_t vertex_row(const vg_inverse_skin *x, size_t v, uint32_t *list, dou
     return count;
 }
 
-/* The sums over one share of the vertices; shares are fixed, so that the threads do not change the result. */
+/* The sums over one share of the vertices. Shares are fixed, so that the number of threads does not change the
+ * result. */
 typedef struct summing {
     const vg_inverse_skin *x;
-    uint32_t *list; /* n for each share, as all else */
+    uint32_t *list; /* n per share, like all others */
     bool *seen;
     double *q, *mean, *g; /* 3 n, 3 n, 3 n x 3 n: blocks with row >= column */
 } summing;
@@ -131,7 +134,7 @@ static void finish_quadratic(vg_inverse_skin *x, const summing *s)
         for (size_t k = 0; k < 3; k++) x->size[j] += x->g[(3 * j + k) * (width + 1)];
         if (x->size[j] > largest) largest = x->size[j];
     }
-    for (size_t j = 0; j < n; j++) /* bones that move nothing */
+    for (size_t j = 0; j < n; j++) /* bones without vertices */
         if (!(x->size[j] > 1e-6 * largest)) x->size[j] = largest > 0 ? 1e-6 * largest : 1;
 }
 
@@ -172,7 +175,7 @@ static int make_arrays(vg_inverse_skin *x, const vg_rig *r, vg_err *e)
     return ok ? VG_OK : VG_ENOMEM;
 }
 
-/* The rest of the bones and of the vertices, seen from them. */
+/* The reference pose of the bones, and the vertices relative to them. */
 static void read_rest(vg_inverse_skin *x, const vg_rig *r, const double *reference)
 {
     for (size_t b = 0; b < x->n; b++)
@@ -231,8 +234,7 @@ void vg_inverse_skin_free(vg_inverse_skin **out)
     *out = NULL;
 }
 
-/* B of a pose whose centroid is taken for the origin: 3 x 3 for each bone, first what its own vertices say,
- * then what it carries. */
+/* B of a pose relative to its centroid: 3 x 3 per bone, first of its own vertices, then of its descendants. */
 static void load(const vg_inverse_skin *x, const double *pose, const double centre[3], working *w)
 {
     size_t n = x->n;
@@ -261,7 +263,7 @@ static void carry(const vg_inverse_skin *x, working *w)
     }
 }
 
-/* m = B_j - sum over i of R_i G_ij, the bone itself left out */
+/* m = B_j - sum over i != j of R_i G_ij */
 static void left_for(const vg_inverse_skin *x, const working *w, size_t j, double m[9])
 {
     size_t width = 3 * x->n;
@@ -305,7 +307,7 @@ static double objective(const vg_inverse_skin *x, working *w, const double *r, d
     return f;
 }
 
-/* m += prior * (what the parent and the children are) */
+/* m += prior * (rotations of parent and children) */
 static void add_prior(const vg_inverse_skin *x, const double *r, size_t j, double prior, double m[9])
 {
     for (size_t i = 0; i < 9; i++) {
@@ -315,7 +317,7 @@ static void add_prior(const vg_inverse_skin *x, const double *r, size_t j, doubl
     }
 }
 
-/* The same for all bones: left += prior * (what parents and children are). */
+/* The same for all bones: left += prior * (rotations of parents and children). */
 static void add_priors(const vg_inverse_skin *x, const double *r, double prior, double *left)
 {
     for (size_t j = 1; j < x->n; j++) {
@@ -362,8 +364,8 @@ static void make_rows(const vg_inverse_skin *x, working *w, size_t i)
     }
 }
 
-/* The Gauss-Newton system in small turns of all bones: the lower triangle of h, and the right-hand side, from B - R G at
- * r. */
+/* The Gauss-Newton system in small rotations of all bones: the lower triangle of h, and the right-hand side from B
+ * - R G at r. */
 static void make_system(const vg_inverse_skin *x, working *w, double prior, double damping)
 {
     size_t n = x->n, width = 3 * n;
@@ -386,7 +388,7 @@ static void make_system(const vg_inverse_skin *x, working *w, double prior, doub
     }
 }
 
-/* trial = exp(step) r; the largest turn */
+/* trial = exp(step) r; returns the largest rotation */
 static double turn_bones(const vg_inverse_skin *x, working *w)
 {
     double most = 0;
@@ -424,9 +426,9 @@ static void descend(const vg_inverse_skin *x, working *w, double prior)
         memcpy(w->r, w->trial, 9 * x->n * sizeof *w->r);
         f = now, damping *= 0.1, moved = true;
         if (gain < noise * fabs(f))
-            break; /* the step that was just taken is the last that can be told from rounding */
+            break; /* the last step that exceeds rounding */
     }
-    for (size_t j = 0; j < x->n; j++) { /* what rounding has done to the products */
+    for (size_t j = 0; j < x->n; j++) { /* rounding error of the products */
         double m[9];
         memcpy(m, w->r + 9 * j, sizeof m);
         vgi_fit_rotation(m, w->r + 9 * j);
@@ -437,11 +439,12 @@ typedef struct fitting {
     const vg_inverse_skin *x;
     const double *const *poses;
     double *const *transforms;
-    double *rotations; /* NULL, or 9 n for each pose: where to begin, and where it ends */
-    bool begun;        /* rotations are there to begin with */
+    double *rotations; /* NULL, or 9 n per pose: initial and final rotations */
+    bool begun;        /* rotations hold initial values */
 } fitting;
 
-/* Each bone by itself at first, about the centroid of its own vertices; one without vertices as its parent. */
+/* Start with each bone alone, about the centroid of its own vertices; a bone without vertices takes its parent's
+ * rotation. */
 static void start(const vg_inverse_skin *x, working *w, size_t j)
 {
     const double *own = x->own + 4 * j, *sum = w->sum + 3 * j;
@@ -532,7 +535,7 @@ static int find_motions(vgi_learning *l, void *context, bool begun, vg_err *e)
     return r;
 }
 
-/* Roughly on some of the vertices first, then exactly on all of them. */
+/* First approximately on a subset of the vertices, then exactly on all of them. */
 static int learn(vgi_learning *l, vg_head *h, size_t n, const double *const *poses, double *rotations, double *miss,
                  vg_err *e)
 {

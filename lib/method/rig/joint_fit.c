@@ -1,9 +1,8 @@
-/* joint_fit.c: where the root of a skeleton is in a mesh, from poses of both.
+/* joint_fit.c: the position of the root of a skeleton in a mesh, from poses of both.
  *
- * A vertex that is rigid with joint j is at R (x - at_j) + p in every pose: R and p are known, x too, and at_j but
- * for a shift that all joints share. So every vertex has an opinion, x - offset_j - mean of R' (y - p), of the joint
- * that it moves most nearly rigidly with.
- * Leaves out everything else about rigs (envelope.c).
+ * A vertex that is rigid with joint j lies at R (x - at_j) + p in every pose. R, p and x are known, and at_j is
+ * known but for a shift that all joints share. So each vertex estimates the shift as x - offset_j - mean of R' (y
+ * - p), for the joint that it follows most rigidly.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "numeric/stats.h"

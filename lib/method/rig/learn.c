@@ -1,5 +1,5 @@
-/* learn.c: weights and motions of bones in turn, on all vertices or on some.
- * Leaves out how either is found (skin.c, inverse_skin.c, free_bones.c).
+/* learn.c: alternate fitting of weights and motions of bones, on all vertices or a subset. Each fit is elsewhere
+ * (skin.c, inverse_skin.c, free_bones.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/learn.h"
 #include "method/rig/skin.h"

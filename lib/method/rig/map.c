@@ -29,7 +29,7 @@
 enum { CHUNK = 256, LEAST_FACES = 3, MOST_TRIED = 48, NEAR = 7 };
 #define NOBODY UINT32_MAX
 
-/* A patch, and the neighbours with which it shares most vertices. */
+/* A patch and the neighbours that share most vertices with it. */
 typedef struct vicinity {
     size_t n;
     uint32_t patch[NEAR], shared[NEAR];
@@ -50,7 +50,7 @@ struct vg_map_fitter {
     uint32_t *held, *held_patch;
     double *held_pull;    /* 3 per held vertex: sum of A' (x - t) */
     vicinity *near;       /* per patch */
-    uint32_t *owner;      /* per vertex: its patch; NOBODY: it is in no face */
+    uint32_t *owner;      /* per vertex: its patch; NOBODY: none, it is in no face */
     double *want;         /* 3 NEAR per vertex: sum of A' (x - t of the owner), for each patch of the vicinity */
     size_t poses, cap;
     vgi_motion *motion;   /* poses x patches */
@@ -58,8 +58,7 @@ struct vg_map_fitter {
 
 /* ---- patches ---- */
 
-/* The pieces that patches consist of become the patches; crumbs join the neighbour that they share most vertices
- * with. */
+/* Split patches into connected pieces; merge tiny pieces into the neighbour that shares most vertices. */
 static int split_patches(vg_head *h, vg_err *e)
 {
     const vg_mesh *m = &h->body.mesh;
@@ -73,7 +72,7 @@ static int split_patches(vg_head *h, vg_err *e)
              *best = vgi_array(n, sizeof *best, e);
     if (!size || !set || !best) r = VG_ENOMEM;
     if (r == VG_OK &&
-        n > h->body.patches.n) { /* patches that came in one piece each stay as they are, however small */
+        n > h->body.patches.n) { /* a patch that was connected from the start stays, however small */
         for (size_t f = 0; f < m->nf; f++) size[piece[f]]++;
         vgi_sets_init(set, n);
         for (size_t i = 0; i < npairs; i++)
@@ -116,7 +115,7 @@ static int by_vertex(const void *a, const void *b)
     return x->vertex < y->vertex ? -1 : x->vertex > y->vertex;
 }
 
-/* The vertices nearest the centre of each patch, inner ones first; one is held by one patch only. */
+/* The vertices nearest the centre of each patch, inner ones first. A vertex is held by one patch only. */
 static int choose_held(vg_map_fitter *f, vg_err *e)
 {
     const vgi_shape *s = &f->shape;
@@ -133,7 +132,7 @@ static int choose_held(vg_map_fitter *f, vg_err *e)
             const double *l = s->local + 3 * i;
             uint32_t v = s->member[i];
             if (used[v] || !g->in_face[v]) continue;
-            double border = count[v] > 1 ? 4 * d * d : 0; /* behind all others */
+            double border = count[v] > 1 ? 4 * d * d : 0; /* after all others */
             list[n++] = (candidate){l[0] * l[0] + l[1] * l[1] + l[2] * l[2] + border, v, (uint32_t)p};
         }
         if (n) qsort(list, n, sizeof *list, by_distance);
@@ -155,7 +154,7 @@ static int choose_held(vg_map_fitter *f, vg_err *e)
     return ok ? VG_OK : VG_ENOMEM;
 }
 
-/* A neighbour that shares so many vertices, after those that share more or as many. */
+/* Insert a neighbour, in descending order of shared vertices. */
 static void come_near(vicinity *x, uint32_t patch, uint32_t shared)
 {
     size_t at = x->n < NEAR ? x->n++ : shared > x->shared[NEAR - 1] ? NEAR - 1 : NEAR;
@@ -164,7 +163,7 @@ static void come_near(vicinity *x, uint32_t patch, uint32_t shared)
     if (at < NEAR) x->shared[at] = shared, x->patch[at] = patch;
 }
 
-/* The neighbours of each patch, those first with which it shares most vertices. */
+/* The neighbours of each patch, in descending order of shared vertices. */
 static int find_near(vg_map_fitter *f, vg_err *e)
 {
     const vg_graph *g = f->g;
@@ -354,15 +353,15 @@ static void fit_corners(const vg_map_fitter *f, vg_map *m)
                 u[k] = f->pull[3 * c + k] / f->b2[f->of_face[face]];
                 u2 += u[k] * u[k], r2 += r[k] * r[k];
             }
-            /* else it has no direction: it turns with its face */
+            /* otherwise it has no direction and turns with its face */
             if (r2 > 0 && u2 > 1e-18 * r2) vg_quat_between(turned, u, rest);
             vg_quat_multiply(rest, q, m->corner + 4 * c);
         }
     }
 }
 
-/* The point c that patches i and j move alike: least squares over the poses, near the vertices that they share where
- * the poses do not say. */
+/* The point c that patches i and j move alike, by least squares over the poses; near their shared vertices where
+ * the poses leave it open. */
 static void fit_hinge(const vg_map_fitter *f, size_t i, size_t j, const double middle[3], double c[3], double *miss)
 {
     static const double firmness = 0.01;
@@ -471,7 +470,7 @@ static void gather(ridge *x)
             }
         }
     }
-    for (size_t c = 0; c < 3; c++) /* the reference pose, in which nothing is missed */
+    for (size_t c = 0; c < 3; c++) /* the reference pose, where the error is 0 */
         for (size_t i = c; i < w; i += 3)
             for (size_t j = c; j <= i; j += 3) x->s[i * w + j] += 1;
 }
@@ -531,7 +530,7 @@ static int correct_place(const vg_map_fitter *f, vg_map *m, vg_err *e)
         double least = 0, best = -1, trace = 0;
         gather(&x);
         for (size_t i = 0; i < w; i++) trace += x.s[i * w + i] / (double)w;
-        for (size_t i = 0; i < tried; i++) { /* no correction at all */
+        for (size_t i = 0; i < tried; i++) { /* without correction */
             missed(f, m, i * f->poses / tried, x.delta);
             for (size_t p = 0; p < n; p++)
                 for (size_t c = 0; c < 3; c++) least += m->share[p] * x.delta[c * n + p] * x.delta[c * n + p];
@@ -571,8 +570,8 @@ static void add_block(double *to, size_t stride, const double a[9], const double
         for (size_t j = 0; j < 3; j++) to[i * stride + j] += a[i] * b[j] + a[3 + i] * b[3 + j] + a[6 + i] * b[6 + j];
 }
 
-/* What the map so far gives where `want` has the poses, and the reference pose as one more: then what is missing, and
- * who takes it up. */
+/* The residual of the map so far, over the poses in `want` and the reference pose; then the regression that takes
+ * it up. */
 static void skin_patch(void *context, size_t p)
 {
     skinning *x = context;

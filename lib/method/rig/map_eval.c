@@ -1,6 +1,5 @@
-/* map_eval.c: a map at work: transforms of patches or bones measured, placed by hinges, interpolated, and turned into
- * vertices by one product.
- * Leaves out fitting (map.c).
+/* map_eval.c: evaluation of a map: transforms of patches or bones measured, placed by joints, interpolated, and
+ * turned into vertices by one matrix product. Fitting is in map.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
 #include "method/rig/map_parts.h"
@@ -19,7 +18,7 @@ struct vg_player {
     size_t nv;
     int threads;
     bool single;
-    vgi_shape shape;    /* patches: of the body that poses are measured on */
+    vgi_shape shape;    /* patches of the body on which poses are measured */
     vg_inverse_skin *inverse; /* bones of a skeleton */
     vg_free_bones *free;      /* bones without one */
     float *weights_single;
@@ -30,7 +29,7 @@ struct vg_player {
     uint32_t *order, *parent; /* patches along a tree of hinges, parents first; a root is its own parent */
 };
 
-/* Of bones: as their skeleton says. */
+/* Tree of bones: that of their skeleton. */
 static int plan_bones(vg_player *p, const vg_rig *r, vg_err *e)
 {
     int code = vgi_rig_parents(r, p->parent, e);
@@ -41,7 +40,7 @@ static int plan_bones(vg_player *p, const vg_rig *r, vg_err *e)
     return code;
 }
 
-/* Of patches: breadth first from the largest; what it does not reach starts anew. */
+/* Tree of patches: breadth first from the largest; patches not reached start a new tree. */
 static int plan_patches(vg_player *p, vg_err *e)
 {
     const vg_map *m = p->m;
@@ -203,7 +202,7 @@ static void placed(const vg_player *p, size_t i, double t[3])
 void vg_player_place(vg_player *p, double *transforms)
 {
     double root[3], t[3];
-    if (p->m->has_home) return; /* it is what vg_player_pose does in any case */
+    if (p->m->has_home) return; /* vg_player_pose does this in any case */
     read_motion(p, transforms);
     root_of(p, p->m->centre, root);
     for (size_t i = 0; i < p->m->n; i++) {
@@ -228,8 +227,8 @@ static void remember_end(vg_player *p, const double *transforms, double *miss, d
     }
 }
 
-/* The logarithm of b a^-1, that branch of it which is nearest to that of a neighbour: l[1..3] is half the angle, so
- * branches are half turns apart. */
+/* The logarithm of b a^-1 on the branch nearest to a neighbour's: l[1..3] is half the angle, so branches differ by
+ * half turns. */
 static void difference(const double *a, const double *b, const double *neighbour, double l[4])
 {
     double s = a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + a[3] * a[3], q[4];
@@ -250,7 +249,7 @@ static void difference(const double *a, const double *b, const double *neighbour
 void vg_player_between(vg_player *p, const double *a, const double *b, double t, double *out)
 {
     size_t n = p->m->n;
-    double root_a[3], root_b[3], *logs = p->motion; /* not in use before read_motion below; 4 numbers of 12 */
+    double root_a[3], root_b[3], *logs = p->motion; /* not used before read_motion below; 4 numbers of 12 */
     remember_end(p, a, p->ends, root_a);
     remember_end(p, b, p->ends + 3 * n, root_b);
     for (size_t k = 0; k < n; k++) {

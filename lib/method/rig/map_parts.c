@@ -1,5 +1,5 @@
-/* map_parts.c: the geometry of patches, their hinges, and the collapse of a map into one matrix (T 6.3; MATH 7).
- * Leaves out what is fitted to poses (map.c) and how a map is played (map_eval.c).
+/* map_parts.c: geometry of patches, their joints, and the collapse of a map into one matrix (T 6.3; MATH 7).
+ * Fitting to poses is in map.c, evaluation in map_eval.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/map_parts.h"
 #include "numeric/lapack.h"
@@ -72,14 +72,14 @@ void vgi_shape_clear(vgi_shape *s)
 
 void vgi_shape_measure(const vgi_shape *s, size_t p, const double *pose, vgi_motion *to)
 {
-    static const double least = 1e-6; /* a patch that shrinks to a point keeps a scale */
+    static const double least = 1e-6; /* a patch that collapses to a point keeps a scale */
     size_t first = s->first[p], last = s->first[p + 1];
     double m[9] = {0}, mean[3] = {0, 0, 0}, r[9], b = 0;
     const double *o = first < last ? pose + 3 * (size_t)s->member[first] : mean;
     for (size_t i = first; i < last; i++) {
         const double *x = pose + 3 * (size_t)s->member[i], *l = s->local + 3 * i;
         for (int k = 0; k < 3; k++) {
-            double d = x[k] - o[k]; /* the local vectors sum to 0: any point will do for a centre */
+            double d = x[k] - o[k]; /* the local vectors sum to 0: any point serves as the centre */
             mean[k] += d;
             m[3 * k] += d * l[0], m[3 * k + 1] += d * l[1], m[3 * k + 2] += d * l[2];
         }
@@ -175,7 +175,7 @@ int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *
 
 /* ---- collapse ---- */
 
-/* How much of vertex v goes with bone p, by its skin. */
+/* The skin weight of bone p at vertex v. */
 static double skin_share(const vg_rig *r, size_t v, size_t p)
 {
     double w = 0;
@@ -184,7 +184,7 @@ static double skin_share(const vg_rig *r, size_t v, size_t p)
     return w;
 }
 
-/* The vectors that transform p alone makes, when it is the identity. */
+/* The vectors produced by transform p alone, when it is the identity. */
 static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *of_face, const double *vectors,
                            size_t p, double *wanted)
 {
@@ -203,8 +203,8 @@ static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *o
     }
 }
 
-/* The links of a map of bones go from where the skin takes one end to where it takes the other. at: of the ends, nv
- * points, or NULL: 1, into number k. */
+/* The links of a map of bones, between the positions of their ends under the skin. at: of the ends, nv points, or
+ * NULL: 1, into number k. */
 static void link_vectors(const vg_head *h, const vg_graph *g, size_t p, const double *at, size_t k, double *wanted)
 {
     for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
@@ -217,7 +217,7 @@ static void link_vectors(const vg_head *h, const vg_graph *g, size_t p, const do
     }
 }
 
-/* How much transform p counts for held vertex i; the point that it takes along. */
+/* The weight of transform p at held vertex i, and the point that it moves. */
 static double hold_of(const vg_head *h, size_t i, size_t p, const double **at)
 {
     const vg_map *m = &h->map;
@@ -226,7 +226,7 @@ static double hold_of(const vg_head *h, size_t i, size_t p, const double **at)
     return bones ? skin_share(&h->body.rig, m->held[i], p) : m->held_patch[i] == p;
 }
 
-/* Wanted vectors and held vertices when only the j-th number of A_p is at work, j = 0 1 2 at once as x y z; or t of
+/* Wanted vectors and held vertices for a unit value of entry j of A_p, j = 0 1 2 at once as x y z; or of t of
  * three transforms. */
 static void column_input(const vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors,
                          size_t column, double *wanted, double *anchors)
@@ -276,7 +276,7 @@ void vgi_map_skin_row(vg_head *h, size_t v)
     }
 }
 
-/* Vertices in no face go with the patch whose centre is nearest, or as their skin does. */
+/* A vertex in no face follows the patch with the nearest centre, or its skin. */
 static void carry_loose(vg_head *h, const vg_graph *g)
 {
     vg_map *m = &h->map;

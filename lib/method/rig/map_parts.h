@@ -1,4 +1,5 @@
-/* map_parts.h: what fitting, changing and playing a map share: the geometry of patches, and where hinges put them.
+/* map_parts.h: shared by fitting, retargeting and evaluating a map: geometry of patches, and their placement by
+ * joints.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_MAP_PARTS_H
 #define VG_MAP_PARTS_H

@@ -1,5 +1,5 @@
-/* retarget.c: a map for another body of the same faces (T 6.5), or for one on the way to it (T 6.6).
- * Leaves out how maps are fitted (map.c of patches, envelope.c of bones).
+/* retarget.c: a map for another body of the same faces (T 6.5), or for a body between two (T 6.6). Fitting is in
+ * map.c (patches) and envelope.c (bones).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
 #include "method/rig/map_parts.h"
@@ -10,8 +10,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* The body on the way: vectors turned and stretched along geodesics, then reconstructed;
- * its root on the line between both. */
+/* The body between two: vectors rotated and scaled along geodesics, then reconstructed; its root is on the line
+ * between both. */
 static int morph_body(const vg_head *h, const vg_graph *g, const double *target, double morph, double *body,
                       int threads, vg_err *e)
 {
@@ -28,7 +28,7 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
         vg_graph_vectors(g, target, b);
         for (size_t c = 0; c < corners; c++) {
             double *x = a + 3 * c, *y = b + 3 * c, q[4], l[4];
-            if (!(vgi_dot(x, x) > 0 && vgi_dot(y, y) > 0)) { /* no direction: in a line */
+            if (!(vgi_dot(x, x) > 0 && vgi_dot(y, y) > 0)) { /* no direction: interpolate linearly */
                 for (size_t k = 0; k < 3; k++) x[k] += morph * (y[k] - x[k]);
                 continue;
             }
@@ -99,15 +99,15 @@ static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, c
 
 /* ---- joints of a rig ---- */
 
-/* A joint goes with the vertices around it: those that its bone and the one above share, or else its own; the nearest
- * count most, and it keeps its place among them as they grow. */
+/* A joint follows the vertices around it: those shared by its bone and the parent, or else its own. Near vertices
+ * count most, and the joint keeps its position relative to them under scaling. */
 static void move_joint(const vg_rig *r, size_t nv, const double *from, const double *to, uint32_t bone,
                        uint32_t above, double *at)
 {
     static const double soft = 1e-4; /* of D squared */
     double d = vg_diagonal(from, nv), before[3] = {0, 0, 0}, after[3] = {0, 0, 0}, sum = 0, spread[2] = {0, 0};
     double shared = 0, own = 0;
-    for (int round = 0; round < 3; round++) { /* is anything shared; where is it; how wide is it */
+    for (int round = 0; round < 3; round++) { /* are there shared vertices; their mean; their extent */
         for (size_t v = 0; v < nv; v++) {
             double w[2] = {0, 0}, near, pull;
             for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++)
@@ -172,8 +172,8 @@ static int move_bones(vg_head *h, const double *body, vg_err *e)
     return vgi_place_by_bones(&h->body.rig, m, m->place, e);
 }
 
-/* What regression has added grows with the body; of a bone it is about its joint, so that what it adds to the share
- * of a bone stays. */
+/* Regression terms scale with the body. Those of a bone are relative to its joint, so that their addition to the
+ * share of a bone is kept. */
 static void add_regression(const vg_map *m, const double *skin, const double *joints_before, double ratio)
 {
     for (size_t i = 0; i < m->nv * m->n; i++) {
@@ -190,7 +190,7 @@ static void add_regression(const vg_map *m, const double *skin, const double *jo
 
 /* ---- the whole ---- */
 
-/* The rows that skinning alone gives, for a map without corners. */
+/* The rows of skinning alone, for a map without corners. */
 static void skin_rows(vg_head *h)
 {
     for (size_t v = 0; v < h->map.nv; v++) vgi_map_skin_row(h, v);
@@ -214,7 +214,7 @@ int vg_map_retarget(vg_head *h, const double *target, double morph, int threads,
     if (r == VG_OK && !bones && !(of_face = vgi_graph_patches(h, g, e))) r = VG_ENOMEM;
     if (r == VG_OK && !(vectors = vgi_array(3 * vg_graph_corners(g), sizeof *vectors, e))) r = VG_ENOMEM;
     if (r == VG_OK && corners && !(skin = vgi_copy_array(m->weights, size, sizeof *skin, e))) r = VG_ENOMEM;
-    if (r == VG_OK && corners) { /* what regression has added to the reconstruction */
+    if (r == VG_OK && corners) { /* what regression added to the reconstruction */
         vg_graph_vectors(g, h->body.reference, vectors);
         r = vgi_map_collapse(h, g, of_face, vectors, threads, e);
         for (size_t i = 0; r == VG_OK && i < size; i++) skin[i] -= m->weights[i];

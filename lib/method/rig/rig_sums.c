@@ -1,6 +1,5 @@
-/* rig_sums.c: the sums over poses that weights and corners of a rig are fitted from, each one matrix product per
- * block of poses.
- * Leaves out what is made of them (skin.c, envelope.c).
+/* rig_sums.c: the sums over poses to which weights and corners of a rig are fitted, one matrix product per block
+ * of poses. They are used in skin.c and envelope.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/rig_sums.h"
 #include "numeric/blas.h"
@@ -54,7 +53,7 @@ typedef struct adding {
     const double *const *poses;
 } adding;
 
-/* The T of all bones in pose k, as three rows of `motions`, and their A alone. */
+/* The T of all bones in pose k as three rows of `motions`, and their A. */
 static void place_motions(vgi_rig_sums *s, size_t k, const double *transforms)
 {
     for (size_t j = 0; j < s->n; j++) {

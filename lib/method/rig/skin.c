@@ -12,9 +12,10 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { CHUNK = 64, MOST = 20, BEST = 14 }; /* bones that a vertex considers; of these by how well each does alone */
+enum { CHUNK = 64, MOST = 20, BEST = 14 }; /* candidate bones per vertex; of these, chosen by how well each does
+                                              alone */
 
-/* What a bone is in the reference pose: line segments from its joint to the joints below. */
+/* A bone in the reference pose: line segments from its joint to its child joints. */
 typedef struct bones {
     const vg_rig *r;
     size_t nsegments;
@@ -42,7 +43,7 @@ static int make_bones(bones *b, const vg_rig *r, vg_err *e)
         return VG_ENOMEM;
     }
     vgi_rig_movers(r, mover);
-    for (size_t j = 0; j < joints; j++) { /* a segment from the parent, and a point that is the joint's own */
+    for (size_t j = 0; j < joints; j++) { /* a segment from the parent, and a point at the joint */
         uint32_t parent = r->skeleton.joints[j].parent;
         for (int own = 0; own < 2; own++) {
             uint32_t from = own ? (uint32_t)j : parent, bone = from == UINT32_MAX ? UINT32_MAX : mover[from];
@@ -114,7 +115,7 @@ typedef struct quadratic {
     size_t n;
     uint32_t bone[MOST];
     double g[MOST][MOST], b[MOST];
-    double ridge; /* on all weights but that of the last bone chosen */
+    double ridge; /* ridge on all weights but that of the last bone chosen */
 } quadratic;
 
 /* Up to four of a quadratic's bones. */
@@ -154,7 +155,7 @@ static void solve_small(double a[3][3], double *b, size_t n)
     memcpy(b, x, n * sizeof *b);
 }
 
-/* Weights of the bones chosen, those that would be negative left out one by one, and the value of the quadratic. */
+/* Weights of the chosen bones, removing one by one those that would be negative, and the value of the quadratic. */
 static void weigh(const quadratic *q, choice *c)
 {
     for (;;) {
@@ -201,7 +202,7 @@ static void choose(const quadratic *q, double least_gain, choice *best)
     for (size_t k = 0; k < q->n; k++)
         if (q->g[k][k] - 2 * q->b[k] < q->g[best->at[0]][best->at[0]] - 2 * q->b[best->at[0]]) best->at[0] = k;
     weigh(q, best);
-    for (int round = 0; round < 2 * VG_SKIN; round++) { /* add one, or put one in another's place */
+    for (int round = 0; round < 2 * VG_SKIN; round++) { /* add a bone, or replace one */
         choice next = *best;
         for (size_t k = 0; k < q->n; k++) {
             if (has(best, k)) continue;
@@ -218,7 +219,7 @@ static void choose(const quadratic *q, double least_gain, choice *best)
     }
 }
 
-/* The bone of the largest weight becomes the last. */
+/* Move the bone of the largest weight to the end. */
 static void first_last(choice *c)
 {
     size_t best = 0, last = c->n - 1;
@@ -239,7 +240,7 @@ typedef struct skinning {
     size_t chunks;
 } skinning;
 
-/* One entry of G: the product of what bones i and j make of the point. */
+/* One entry of G: the product of bones i and j at the point. */
 static double product(const skinning *x, size_t i, size_t j, const double *v)
 {
     size_t width = 4 * x->s->n;
@@ -265,12 +266,13 @@ static void take_up(quadratic *q, size_t bone)
     if (q->n < MOST) q->bone[q->n++] = (uint32_t)bone;
 }
 
-/* The bones that do best alone, then those above and below the first two of them. */
+/* The bones that fit best alone, then the neighbours in the skeleton of the best two. */
 static void find_candidates(const skinning *x, const double *alone, quadratic *q)
 {
     const vg_rig *r = x->r;
     q->n = 0;
-    for (size_t j = 0; j < r->nbones; j++) { /* the best so far, in order; of equal ones the first stays before */
+    for (size_t j = 0; j < r->nbones; j++) { /* the best so far, in order; of equal ones the first found comes
+                                                first */
         size_t i = q->n;
         if (i == BEST && !(alone[j] < alone[q->bone[i - 1]])) continue;
         if (i < BEST) q->n++;
@@ -288,8 +290,8 @@ static void find_candidates(const skinning *x, const double *alone, quadratic *q
 
 static void skin_vertex(const skinning *x, size_t v, double *far, double *alone)
 {
-    /* Per pose, what a bone has to gain for each squared distance from the vertex, and at least (of D^2); and the
-     * way, in D, that a bone has to go apart from the vertex's first one to count beside it. */
+    /* Least gain of a bone per pose, per squared distance from the vertex, and in D^2; and the least distance, in
+     * D, between its motion and the first bone's for it to count. */
     static const double nearness = 1e-8, least_gain = 1e-13, apart = 1e-5;
     const vgi_rig_sums *s = x->s;
     const double *p = x->reference + 3 * v;
