@@ -70,7 +70,8 @@ static void set_reference(vg_head *h, const char *operand)
         vg_head_merge_trace(h, &r, &e) < 0)
         cli_die(&e);
     vg_head_take(h, &r, "reference");
-    if (r.body.attributes.ntex || r.body.attributes.nlabels) vg_head_take(h, &r, "attributes");
+    if (!r.body.asset.n) r.body.asset = h->body.asset, h->body.asset = (vg_asset){0}; /* it is of the same mesh */
+    if (r.body.attributes.ntex || r.body.attributes.nlabels || r.body.asset.n) vg_head_take(h, &r, "attributes");
     free(h->links);
     h->links = NULL, h->nlinks = 0, h->has_links = false;
     vg_rig_clear(&h->body.rig);

@@ -300,6 +300,9 @@ static void report_mesh(report *r, const vg_head *h)
     report_put(r, "D", "D", report_number(vg_diagonal(h->body.reference, h->body.mesh.nv)));
     report_put(r, "reference", "reference", report_text(h->body.reference_name ? h->body.reference_name : ""));
     report_put(r, "texture_coordinates", a->ntex ? "texture coordinates" : NULL, report_count(a->ntex));
+    char asset[200];
+    vg_asset_text(&h->body.asset, asset, sizeof asset);
+    report_put(r, "asset", h->body.asset.n ? "asset" : NULL, h->body.asset.n ? report_text(asset) : report_nothing());
     report_put(r, "labels", a->nlabels ? "labels" : NULL, report_count(a->nlabels));
     report_put(r, "selected_faces", h->has_selection ? "selected faces" : NULL,
                h->has_selection ? report_count(h->nselected) : report_nothing());

@@ -36,7 +36,7 @@ MOST_CHANNELS = 255
 INDICES, F32, F64 = 1, 4, 8  # Type of a channel
 LABEL_KINDS = {1: "object", 2: "group", 3: "material", 4: "smoothing", 5: "library"}
 NO_PARENT = 0xFFFFFFFF
-NEEDS = {**dict.fromkeys(("TEXC", "LABL", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP ", "SIGN"), "MESH"), "SKIN": "RIG "}
+NEEDS = {**dict.fromkeys(("TEXC", "LABL", "ASST", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP ", "SIGN"), "MESH"), "SKIN": "RIG "}
 TAG_BYTES = frozenset(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 ")
 
 
@@ -237,6 +237,7 @@ class Stream:
     mesh: object = None
     texture: object = None
     labels: object = None     # list of (face, kind name, text)
+    asset: object = None      # (digest of the mesh, vertex of the mesh for each of the file, bytes)
     selection: object = None  # array, or None: all faces
     links: object = None      # array of pairs
     anchors: object = None
@@ -632,6 +633,16 @@ class _Reader:
             p.fail("a label is of unknown kind")
         self.stream.labels = [(f, LABEL_KINDS[k], x) for f, k, x in zip(faces, kinds, texts)]
 
+    def asst(self, p: _Payload):
+        n, digest, size = p.u64(), p.u64(), p.u64()
+        vertex, data = p.u32s(n), bytes(p.u8s(size))
+        p.end()
+        if not 1 <= n < INDEX_LIMIT or size == 0:
+            p.fail("its counts are out of range")
+        if any(v >= self.stream.mesh.nv for v in vertex):
+            p.fail("it names a vertex that is not there")
+        self.stream.asset = (digest, vertex, data)
+
     def indices(self, p: _Payload, width: int = 1) -> array:
         a = p.u32s(p.u64() * width)
         p.end()
@@ -979,7 +990,7 @@ class _Reader:
             raise StreamError("the END mark's checksum is wrong: records were changed or moved")
         self.stream.tail, self.stream.checksum, self.done = self.pending, running, True
 
-    HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "SELE": sele, "LINK": link, "ANCH": anch,
+    HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "ASST": asst, "SELE": sele, "LINK": link, "ANCH": anch,
                 "REFP": refp, "SKEL": skel, "CORR": corr, "PTCH": ptch,
                 "RIG ": rig, "SKIN": skin, "MAP ": map, "SIGN": sign, "FORM": form, "FRAM": fram, "FAIL": fail, "END ": end}
 
@@ -1053,6 +1064,8 @@ def to_json(s: Stream) -> dict:
         "texture": t and {"dim": t.dim, "coordinates": _rows(t.coordinates, t.dim),
                           "corners": [None if c == NO_TEXTURE else c for c in t.corners]},
         "labels": None if s.labels is None else [{"face": f, "kind": k, "text": x} for f, k, x in s.labels],
+        "asset": s.asset and {"digest": f"{s.asset[0]:016x}", "vertex": list(s.asset[1]),
+                              "data": s.asset[2].decode("latin-1")},
         "selection": None if s.selection is None else list(s.selection),
         "links": None if s.links is None else _rows(s.links, 2),
         "anchors": None if s.anchors is None else list(s.anchors),

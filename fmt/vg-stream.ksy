@@ -70,6 +70,7 @@ types:
             '"MESH"': mesh
             '"TEXC"': texc
             '"LABL"': labl
+            '"ASST"': asst
             '"SELE"': indices
             '"LINK"': link
             '"ANCH"': indices
@@ -192,6 +193,23 @@ types:
         type: text
         repeat: expr
         repeat-expr: num_labels
+  asst:
+    seq:
+      - id: num_vertices
+        type: u8
+        doc: of the file that the asset is from
+      - id: mesh_digest
+        type: u8
+      - id: len_data
+        type: u8
+      - id: vertices
+        type: list_u4(num_vertices)
+        doc: the vertex of the mesh that each vertex of the file is
+      - id: data
+        size: len_data
+        doc: a GLB
+      - id: padding
+        size: (8 - len_data % 8) % 8
   indices:
     seq:
       - id: num

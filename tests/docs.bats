@@ -200,7 +200,7 @@ END
 }
 
 @test "vg-stream.ksy names every record" {
-    for tag in PROV MESH TEXC LABL SELE LINK ANCH REFP SKEL CORR PTCH 'RIG ' SKIN 'MAP ' SIGN FORM FRAM FAIL 'END '; do
+    for tag in PROV MESH TEXC LABL ASST SELE LINK ANCH REFP SKEL CORR PTCH 'RIG ' SKIN 'MAP ' SIGN FORM FRAM FAIL 'END '; do
         for file in fmt/vg-stream.ksy fmt/STREAM.md man/vg-stream.5; do
             grep -q -e "\"$tag\"" -e "\`$tag\`" -e "^\.It ${tag% }\$" "$ROOT/$file" || fail "$file does not have $tag"
         done
@@ -213,7 +213,7 @@ blocks_of() {
 }
 
 @test "every key of a report as JSON is in its page" {
-    for name in every-header-record signal scalars turns rig map coordinates correspondence patches transforms unknown-records vectors; do
+    for name in every-header-record asset signal scalars turns rig map coordinates correspondence patches transforms unknown-records vectors; do
         must vg-info --json --frames "$GOLDEN/$name.vgs" -o "vg-info.$name.json"
     done
     must vg-info --json --check "$GOLDEN/smallest.vgs" -o vg-info.check.json

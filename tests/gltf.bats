@@ -193,6 +193,189 @@ END
     says 'transforms of no skeleton'
 }
 
+@test "a character comes back: nodes, materials, picture, skin, texture coordinates, colours, normals" {
+    py <<'END'
+import make_character
+make_character.main("in.glb")
+END
+    must vg-encode --animation Wave in.glb -o wave.vgs
+    pipe 'vg-info wave.vgs'
+    shows 'asset                2 materials, 1 texture, normals, colours of vertices, further texture coordinates, 1 skin, 1 camera'
+    must vg-decode wave.vgs -o out.glb
+    must vg-encode out.glb -o back.vgs
+    must vg-diff -t 1e-7 wave.vgs back.vgs
+    py <<'END'
+import json, struct
+import make_character
+def load(name):
+    b = open(name, "rb").read()
+    n, = struct.unpack("<I", b[12:16])
+    return json.loads(b[20:20 + n]), b[28 + n:]
+def read(g, data, i):
+    a = g["accessors"][i]
+    code, size = {5121: ("B", 1), 5123: ("H", 2), 5125: ("I", 4), 5126: ("f", 4)}[a["componentType"]]
+    width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}[a["type"]]
+    rows = [[0] * width for _ in range(a["count"])]
+    def take(view, offset, n, code=code, size=size, width=width):
+        v = g["bufferViews"][view]
+        at, step = v.get("byteOffset", 0) + offset, v.get("byteStride", width * size)
+        return [list(struct.unpack_from(f"<{width}{code}", data, at + k * step)) for k in range(n)]
+    if "bufferView" in a:
+        rows = take(a["bufferView"], a.get("byteOffset", 0), a["count"])
+    if "sparse" in a:
+        s = a["sparse"]
+        code2, size2 = {5123: ("H", 2), 5125: ("I", 4)}[s["indices"]["componentType"]]
+        which = take(s["indices"]["bufferView"], s["indices"]["byteOffset"], s["count"], code2, size2, 1)
+        for (k,), row in zip(which, take(s["values"]["bufferView"], s["values"]["byteOffset"], s["count"])):
+            rows[k] = row
+    return rows
+g, data = load("in.glb")
+h, out = load("out.glb")
+for key in "scenes", "cameras", "materials", "textures", "samplers", "extensionsUsed", "scene":
+    assert g[key] == h[key], key
+assert g["asset"]["copyright"] == h["asset"]["copyright"]
+assert g["nodes"] == h["nodes"], h["nodes"]
+assert [m["name"] for m in h["meshes"]] == ["BodyMesh", "BallMesh"]
+image = h["bufferViews"][h["images"][0]["bufferView"]]
+assert out[image["byteOffset"]:][:image["byteLength"]] == make_character.picture() and h["images"][0]["name"] == "Weave"
+old, new = dict(g["skins"][0]), dict(h["skins"][0])
+assert read(g, data, old.pop("inverseBindMatrices")) == read(h, out, new.pop("inverseBindMatrices")) and old == new
+for m, n in zip(g["meshes"], h["meshes"]):
+    for p, q in zip(m["primitives"], n["primitives"]):
+        assert p["material"] == q["material"] and read(g, data, p["indices"]) == read(h, out, q["indices"])
+        assert p["attributes"].keys() == q["attributes"].keys()
+        for key in p["attributes"]:
+            assert read(g, data, p["attributes"][key]) == read(h, out, q["attributes"][key]), key
+assert [a["name"] for a in h["animations"]] == ["Wave"]
+assert [c["target"] for c in h["animations"][0]["channels"]] == [{"node": 3, "path": "weights"}, {"node": 4, "path": "weights"}]
+# The upper cube turns a quarter about z at (0, 1, 0) in the second frame: (x, y) -> (1 - y, 1 + x); so do its normals.
+upper = h["meshes"][0]["primitives"][1]
+def shown(key, target):
+    base, moved = read(h, out, upper["attributes"][key]), read(h, out, upper["targets"][target][key])
+    return [[a + b for a, b in zip(p, d)] for p, d in zip(base, moved)]
+for (x, y, z), p in zip(read(g, data, g["meshes"][0]["primitives"][1]["attributes"]["POSITION"]), shown("POSITION", 1)):
+    assert max(abs(a - b) for a, b in zip(p, (1 - y, 1 + x, z))) < 1e-6
+for (x, y, z), p in zip(read(g, data, g["meshes"][0]["primitives"][1]["attributes"]["NORMAL"]), shown("NORMAL", 1)):
+    assert max(abs(a - b) for a, b in zip(p, (-y, x, z))) < 1e-6
+# What stands still has a target that moves nothing: one vertex, by nothing.
+still = h["accessors"][h["meshes"][1]["primitives"][0]["targets"][1]["POSITION"]]
+assert still["sparse"]["count"] == 1 and still["min"] == still["max"] == [0, 0, 0]
+END
+}
+
+@test "a character with another reference pose, and mixed from few targets: the frames are the same" {
+    py <<'END'
+import make_character
+make_character.main("in.glb")
+END
+    must vg-encode --animation Wave in.glb -o wave.vgs
+    must_warn vg-decode wave.vgs -o wave-%d.obj
+    must vg-encode --reference wave-1.obj wave.vgs -o bent.vgs
+    must vg-decode bent.vgs -o bent.glb
+    must vg-encode bent.glb -o back.vgs
+    must vg-diff -t 1e-6 wave.vgs back.vgs
+    must vg-encode --animation Wave --fps 60 in.glb -o long.vgs
+    must vg-decode --morph-tolerance 1e-6 long.vgs -o long.glb
+    pipe 'vg-encode long.glb | vg-diff -t 2e-6 long.vgs -'
+    py <<'END'
+import json, struct
+def floats(g, data, i):
+    a = g["accessors"][i]
+    v = g["bufferViews"][a["bufferView"]]
+    return struct.unpack_from(f"<{3 * a['count']}f", data, v["byteOffset"] + a.get("byteOffset", 0))
+def load(name):
+    b = open(name, "rb").read()
+    n, = struct.unpack("<I", b[12:16])
+    return json.loads(b[20:20 + n]), b[28 + n:]
+# In the space of the skin the upper cube lies as it does in the second frame, its normals with it.
+(g, data), (h, out) = load("in.glb"), load("bent.glb")
+before, after = (m["meshes"][0]["primitives"][1]["attributes"] for m in (g, h))
+p, q = floats(g, data, before["POSITION"]), floats(h, out, after["POSITION"])
+m, n = floats(g, data, before["NORMAL"]), floats(h, out, after["NORMAL"])
+for i in range(0, len(p), 3):
+    assert max(abs(a - b) for a, b in zip(q[i:i + 3], (1 - p[i + 1], 1 + p[i], p[i + 2]))) < 1e-6
+    assert max(abs(a - b) for a, b in zip(n[i:i + 3], (-m[i + 1], m[i], m[i + 2]))) < 1e-6
+# Between two quarter turns there are as many targets as the error asks for, and no more than frames.
+h, out = load("long.glb")
+targets = h["meshes"][0]["primitives"][1]["targets"]
+assert 1 < len(targets) < 46 and all("NORMAL" in t for t in targets), len(targets)
+END
+}
+
+@test "what a format cannot keep of a character is named once; it is of its own mesh only" {
+    local all='2 materials, 1 texture, normals, colours of vertices, further texture coordinates, 1 skin, 1 camera'
+    py <<'END'
+import make_character
+make_character.main("in.glb")
+END
+    must vg-encode --animation Nod in.glb -o nod.vgs
+    must_warn vg-decode nod.vgs -o nod-%d.obj
+    one_line
+    says "not kept in 'nod-%d.obj': $all"
+    must_warn vg-decode nod.vgs -o nod.usda
+    says "texture coordinates; groups and materials; $all"
+    must vg-decode --drop-loose nod.vgs -o nod.glb
+    py <<'END'
+import read_stream, make_corpus
+s = read_stream.read_stream("nod.vgs")
+digest, vertex, data = s.asset
+assert len(vertex) == 72 and len(set(vertex)) == 24 and data[:4] == b"glTF"
+assert digest == make_corpus.digest({"vertices": 24, "faces": s.mesh.faces()})
+# One vertex more: the digest is wrong, as after a filter that does not know the record.
+b = open("nod.vgs", "rb").read()
+i = b.index(digest.to_bytes(8, "little"))
+def fixed(b, at):
+    import struct
+    size, = struct.unpack_from("<Q", b, at + 8)
+    payload = b[at + 32:at + 32 + size]
+    head = b[at:at + 16] + make_corpus.u64(make_corpus.xxh64(payload))
+    return head + make_corpus.u64(make_corpus.xxh64(head)) + payload
+at = b.index(b"ASST")
+other = bytearray(b)
+other[i] ^= 1
+record = fixed(bytes(other), at)
+other[at:at + len(record)] = record
+sums, k = b"", 16 if other[8:12] not in (b"PROV", b"MESH") else 8
+records = 0
+while bytes(other[k:k + 4]) != b"END ":
+    size = int.from_bytes(other[k + 8:k + 16], "little")
+    sums += other[k + 24:k + 32]
+    k += 32 + (size + 7) // 8 * 8
+    records += 1
+end = make_corpus.u64(records, make_corpus.xxh64(sums))
+head = bytes(other[k:k + 16]) + make_corpus.u64(make_corpus.xxh64(end))
+other[k:] = head + make_corpus.u64(make_corpus.xxh64(head)) + end
+open("other.vgs", "wb").write(other)
+END
+    must_warn vg-decode other.vgs -o other.glb
+    says "not kept in 'other.glb': $all; groups and materials"
+    pipe 'vg-encode other.glb | vg-diff -t 1e-6 nod.vgs -'
+}
+
+@test "three.js shows a character as it was: positions, normals, texture coordinates, materials, names" {
+    command -v node >/dev/null || skip "node is not installed"
+    node -e 'require("three")' 2>/dev/null || skip "the node module three is not installed"
+    py <<'END'
+import make_character
+make_character.main("in.glb")
+END
+    local clip
+    for clip in Wave Nod; do
+        must vg-encode --animation $clip in.glb -o clip.vgs
+        must vg-decode clip.vgs -o clip.glb
+        must node "$ROOT/tests/node/characters.mjs" in.glb clip.glb $clip
+        printf '%s\n' "$output" >$clip.json
+    done
+    py <<'END'
+import json
+for clip in "Wave", "Nod":
+    r = json.load(open(clip + ".json"))
+    assert r["vertices"] == 72 and r["moved"] > 0.3 and r["frames"] > 1, r
+    assert r["rest"] < 1e-7 and r["position"] < 1e-6 and r["uv"] == 0 and r["normal"] == 0 and r["turned"] < 0.1, r
+    assert r["materials"] and r["nodes"] and r["animations"] == [clip], r
+END
+}
+
 @test "the Khronos validator finds neither error nor warning" {
     command -v node >/dev/null || skip "node is not installed"
     node -e 'require("gltf-validator")' 2>/dev/null || skip "the node module gltf-validator is not installed"
@@ -210,6 +393,14 @@ import make_skin
 make_skin.make()
 END
     must vg-decode -o bar.glb bar.vgs
+    py <<'END'
+import make_character
+make_character.main("in.glb")
+END
+    must vg-encode --animation Wave in.glb -o wave.vgs
+    must vg-decode -o character.glb wave.vgs
+    must vg-decode -o character.gltf wave.vgs
+    must vg-decode --shapes -o shapes.glb wave.vgs
     cat >validate.js <<'END'
 const validator = require('gltf-validator'), fs = require('fs');
 (async () => {
@@ -220,9 +411,9 @@ const validator = require('gltf-validator'), fs = require('fs');
     }
 })();
 END
-    must node validate.js walk.glb walk.gltf horse.glb lines.glb points.glb bar.glb
+    must node validate.js walk.glb walk.gltf horse.glb lines.glb points.glb bar.glb character.glb character.gltf shapes.glb
     local file
-    for file in walk.glb walk.gltf horse.glb lines.glb points.glb bar.glb; do shows "$file 0 errors 0 warnings"; done
+    for file in walk.glb walk.gltf horse.glb lines.glb points.glb bar.glb character.glb character.gltf shapes.glb; do shows "$file 0 errors 0 warnings"; done
 }
 
 @test "blendshapes: sparse targets, names, no animation; what comes back is what went in" {

@@ -143,6 +143,12 @@ def labels(entries):
     return Record("LABL", u64(len(entries), *(x["face"] for x in entries)) + kinds + texts, 0)
 
 
+def asset(a):
+    data = a["data"].encode()
+    counts = u64(len(a["vertex"]), int(a["digest"], 16), len(data))
+    return Record("ASST", counts + indices(*a["vertex"]) + pad(data), 0)
+
+
 def index_list(tag, rows):
     """SELE, ANCH: faces or vertices; LINK: pairs of vertices."""
     return Record(tag, u64(len(rows)) + indices(*(flat(rows) if tag == "LINK" else rows)), CRITICAL)
@@ -277,6 +283,8 @@ def records_of(c):
         out.append(texture(c["texture"]))
     if c["labels"] is not None:
         out.append(labels(c["labels"]))
+    if c["asset"] is not None:
+        out.append(asset(c["asset"]))
     for tag, value in (("SELE", c["selection"]), ("LINK", c["links"]), ("ANCH", c["anchors"])):
         if value is not None:
             out.append(index_list(tag, value))
@@ -326,11 +334,14 @@ POINTS = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [1.5, 0.5, 0.25], [2, 0.5,
 BENT = [[0, 0, 0.5], [1, 0, 0], [1, 1, 0], [0, 1, 0.5], [1.5, 0.5, 0.75], [1.75, 0.5, 1.5]]
 
 
+ASSET = {"digest": "0123456789abcdef", "vertex": [0, 1, 2, 3, 2], "data": "not a GLB! "}
+
+
 def content(**changes):
     """A stream of vertices, as small as it gets: a mesh of two triangles, one frame. With `changes`."""
     c = {
         "minor": 0, "provenance": [], "mesh": {"vertices": 4, "faces": [[0, 1, 2], [0, 2, 3]]}, "texture": None,
-        "labels": None, "selection": None, "links": None, "anchors": None,
+        "labels": None, "asset": None, "selection": None, "links": None, "anchors": None,
         "reference": {"name": "rest", "positions": POINTS[:4]}, "skeleton": None, "correspondence": None,
         "patches": None, "rig": None, "map": None, "signal": None,
         "kind": "vertices", "precision": 8, "count": 4, "extra": [],
@@ -537,6 +548,8 @@ def golden():
                     frames=[pose("t", [[1, 0, 0, 0, 0, 0, 0], [0.5, 0.5, -0.5, 0.5, 1, 2, 3]], time=-1.5)])),
         "skeleton": ("the joints of a skeleton, whose bones are the mesh's faces", skeleton_content()),
         "correspondence": ("three faces of a target driven by two faces of a source", register_content()),
+        "asset": ("two vertices of a file for one of the mesh, and 11 bytes that only writers of such files know",
+                  content(asset=ASSET)),
         "patches": ("three faces in two patches", mixed(patches={"count": 2, "of_face": [1, 0, 1]})),
         "turns": ("a skeleton whose frame says how its joints have turned", skeleton_content(TURNED)),
         "map": ("two transforms, half of a quad each", map_content()),
@@ -929,6 +942,14 @@ def reject_attachments():
         "skel-name-utf8": patched(s, "SKEL", 168, b"\xff"),
         "skel-padding": patched(skeleton_content(), "SKEL", -1, b"\1"),
         "skel-cut": lie(s, "SKEL", payload=lambda record: record.payload[:-8]),
+        "asst-cut": lie(content(asset=ASSET), "ASST", payload=lambda record: record.payload[:-8]),
+        "asst-long": lie(content(asset=ASSET), "ASST", payload=lambda record: record.payload + bytes(8)),
+        "asst-empty": whole(content(asset=dict(ASSET, vertex=[]))),
+        "asst-no-data": whole(content(asset=dict(ASSET, data=""))),
+        "asst-vertex-out-of-range": whole(content(asset=dict(ASSET, vertex=[0, 4]))),
+        "asst-size-2-63": patched(content(asset=ASSET), "ASST", 16, u64(1 << 63)),
+        "asst-padding": patched(content(asset=ASSET), "ASST", -1, b"\1"),
+        "asst-before-mesh": whole(content(), [asset(ASSET)] + records_of(content())),
         "ptch-cut": lie(content(patches={"count": 2, "of_face": [0, 1]}), "PTCH", payload=lambda record: record.payload[:-4]),
         "ptch-long": lie(content(patches={"count": 2, "of_face": [0, 1]}), "PTCH", payload=lambda record: record.payload + bytes(8)),
         "ptch-none": whole(content(patches={"count": 0, "of_face": [0, 0]})),

@@ -6,6 +6,8 @@
 #include <stdarg.h>
 #include <stdlib.h>
 
+static const uint64_t vgi_gltf_most_elements = (uint64_t)1 << 27; /* of an accessor, which may have no bytes */
+
 int vgi_gltf_bad(const vgi_gltf *g, vg_err *e, const char *format, ...)
 {
     char text[256];
@@ -63,7 +65,7 @@ static bool starts_with(const char *s, const char *with)
 }
 
 /* Extensions that change no position, or that are read. A name that ends in _ stands for all that begin so. */
-static bool is_understood(const char *extension)
+bool vgi_gltf_is_understood(const char *extension)
 {
     static const char *const understood[] = {
         "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "KHR_xmp_",
@@ -80,7 +82,7 @@ void vgi_gltf_note_extensions(const vgi_gltf *g, vg_note *note)
     const vgi_json *used = vgi_json_get(g->json, "extensionsUsed");
     for (size_t i = 0; i < vgi_json_count(used); i++) {
         const char *name = vgi_json_text(vgi_json_at(used, i));
-        if (name && !is_understood(name)) vgi_note(note, "the extension %.60s is not known and left out", name);
+        if (name && !vgi_gltf_is_understood(name)) vgi_note(note, "the extension %.60s is not known and left out", name);
     }
 }
 
@@ -104,7 +106,7 @@ static int check_claims(const vgi_gltf *g, vg_err *e)
         return vgi_gltf_bad(g, e, "it is glTF version '%.20s', and only version 2 is known", version);
     for (size_t i = 0; i < vgi_json_count(required); i++) {
         const char *name = vgi_json_text(vgi_json_at(required, i));
-        if (!name || !is_understood(name)) return refuse_extension(g, name ? name : "?", e);
+        if (!name || !vgi_gltf_is_understood(name)) return refuse_extension(g, name ? name : "?", e);
     }
     return VG_OK;
 }
@@ -162,6 +164,7 @@ static int path_beside(const vgi_gltf *g, const char *from, const char *uri, vg_
     return VG_OK;
 }
 
+/* n bytes of it, or all: SIZE_MAX. */
 static int read_beside(const vgi_gltf *g, vgi_input *in, const char *uri, size_t n, vg_bytes *to, vg_err *e)
 {
     const char *from = vgi_input_path(in);
@@ -172,10 +175,16 @@ static int read_beside(const vgi_gltf *g, vgi_input *in, const char *uri, size_t
                             uri);
     int r = path_beside(g, from, uri, &path, e);
     if (r == VG_OK) r = vgi_input_file(&beside, (char *)path.data, e);
-    if (r == VG_OK) r = vgi_input_take(beside, to, n, NULL, e);
+    if (r == VG_OK)
+        r = n == SIZE_MAX ? vgi_input_slurp(beside, to, e) : vgi_input_take(beside, to, n, NULL, e);
     vgi_input_free(&beside);
     vg_bytes_clear(&path);
     return r;
+}
+
+int vgi_gltf_read_beside(const vgi_gltf *g, vgi_input *in, const char *uri, vg_bytes *to, vg_err *e)
+{
+    return read_beside(g, in, uri, SIZE_MAX, to, e);
 }
 
 static int read_buffer(const vgi_gltf *g, vgi_gltf_buffer *b, const vgi_json *from, vgi_input *in, vg_err *e)
@@ -309,6 +318,21 @@ static int find_bytes(const vgi_gltf *g, const vgi_json *from, size_t count, siz
     return VG_OK;
 }
 
+int vgi_gltf_view_bytes(const vgi_gltf *g, const vgi_json *ref, const unsigned char **data, size_t *n, vg_err *e)
+{
+    const vgi_json *view, *buffer;
+    size_t number = 0, start = 0;
+    int r = vgi_gltf_item(g, ref, "bufferViews", &view, NULL, e);
+    if (r == VG_OK) r = vgi_gltf_item(g, vgi_json_get(view, "buffer"), "buffers", &buffer, &number, e);
+    if (r == VG_OK) r = take_whole(g, view, "byteOffset", &start, e);
+    if (r == VG_OK) r = take_whole(g, view, "byteLength", n, e);
+    if (r < 0) return r;
+    const vgi_gltf_buffer *b = &g->buffers[number];
+    if (start > b->size || *n > b->size - start) return vgi_gltf_bad(g, e, "a buffer view goes beyond its buffer");
+    *data = b->data + start;
+    return VG_OK;
+}
+
 static double number_at(const unsigned char *p, int component)
 {
     switch (component) {
@@ -361,6 +385,18 @@ static size_t width_of(const char *type)
     return 0;
 }
 
+int vgi_gltf_any_accessor(const vgi_gltf *g, const vgi_json *ref, vgi_accessor *a, vg_err *e)
+{
+    const vgi_json *from;
+    uint64_t count;
+    int r = vgi_gltf_item(g, ref, "accessors", &from, NULL, e);
+    if (r < 0) return r;
+    const size_t width = width_of(vgi_json_text(vgi_json_get(from, "type")));
+    if (!width || !vgi_json_whole(vgi_json_get(from, "count"), &count) || count > vgi_gltf_most_elements)
+        return vgi_gltf_bad(g, e, "an accessor is of an unknown type or count");
+    return vgi_gltf_accessor(g, ref, width, (size_t)count, "the asset", a, e);
+}
+
 int vgi_gltf_accessor(const vgi_gltf *g, const vgi_json *ref, size_t width, size_t count, const char *what,
                       vgi_accessor *a, vg_err *e)
 {
@@ -383,8 +419,7 @@ int vgi_gltf_accessor(const vgi_gltf *g, const vgi_json *ref, size_t width, size
     return r;
 }
 
-/* Where element i is; NULL: it is zeros. */
-static const unsigned char *element_at(const vgi_accessor *a, size_t i)
+const unsigned char *vgi_accessor_at(const vgi_accessor *a, size_t i)
 {
     size_t low = 0, high = a->nsparse;
     while (low < high) {
@@ -410,12 +445,17 @@ static double normal_of(double x, int component)
 
 void vgi_accessor_get(const vgi_accessor *a, size_t i, double *to)
 {
-    const unsigned char *p = element_at(a, i);
+    const unsigned char *p = vgi_accessor_at(a, i);
     size_t bytes = component_bytes(a->component);
     for (size_t k = 0; k < a->width; k++) {
         double x = p ? number_at(p + k * bytes, a->component) : 0;
         to[k] = a->normalized ? normal_of(x, a->component) : x;
     }
+}
+
+size_t vgi_accessor_bytes(const vgi_accessor *a)
+{
+    return a->width * component_bytes(a->component);
 }
 
 bool vgi_accessor_is_index(const vgi_accessor *a)
@@ -448,8 +488,9 @@ static int begin_gltf(void **state, const vg_head *h, const vg_sink_options *o, 
     return vgi_gltf_begin(state, h, o, out, false, e);
 }
 
-/* texture coordinates of vertices: a skin says itself that it has none */
-enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE | VGI_KEEPS_NAMES | VGI_KEEPS_TIMES };
+/* Labels, and texture coordinates of vertices: the writer says itself where it keeps none. */
+enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS | VGI_KEEPS_NAMES |
+               VGI_KEEPS_TIMES | VGI_KEEPS_ASSET };
 
 enum { KINDS = 1 << VG_VERTICES | 1 << VG_TRANSFORMS }; /* the latter of a rig */
 

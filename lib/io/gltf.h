@@ -66,6 +66,17 @@ typedef struct vgi_accessor {
  * messages. Without a count what it says must be backed by bytes. */
 int vgi_gltf_accessor(const vgi_gltf *g, const vgi_json *ref, size_t width, size_t count, const char *what,
                       vgi_accessor *a, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_any_accessor: of any width and count that is known. */
+int vgi_gltf_any_accessor(const vgi_gltf *g, const vgi_json *ref, vgi_accessor *a, vg_err *e) VG_MUST_CHECK;
+size_t vgi_accessor_bytes(const vgi_accessor *a); /* of an element */
+const unsigned char *vgi_accessor_at(const vgi_accessor *a, size_t i); /* the bytes of element i; NULL: they are zeros */
+/* vgi_gltf_view_bytes: all bytes of the buffer view whose number `ref` is. */
+int vgi_gltf_view_bytes(const vgi_gltf *g, const vgi_json *ref, const unsigned char **data, size_t *n,
+                        vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_read_beside: the whole file that a URI names, beside or below the one that `in` reads. */
+int vgi_gltf_read_beside(const vgi_gltf *g, vgi_input *in, const char *uri, vg_bytes *to, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_is_understood: an extension that changes no position, or that is read. */
+bool vgi_gltf_is_understood(const char *extension);
 void vgi_accessor_get(const vgi_accessor *a, size_t i, double *to); /* width numbers */
 bool vgi_accessor_is_index(const vgi_accessor *a);                  /* whole numbers from 0 on */
 

@@ -84,6 +84,30 @@ static bool bend(const vgi_gltf_scene *x, const vgi_gltf_part *p, size_t v, cons
     return sum != 0;
 }
 
+void vgi_gltf_rest(vgi_gltf_scene *x)
+{
+    rest(x, false);
+    place_nodes(x);
+    place_joints(x);
+}
+
+void vgi_gltf_vertex_matrix(const vgi_gltf_scene *x, const vgi_gltf_part *p, size_t v, double m[12])
+{
+    double sum = 0, joints[4], shares[4], total[12] = {0};
+    for (size_t s = 0; s < (p->skin == VGI_GLTF_NONE ? 0 : p->nsets); s++) {
+        vgi_accessor_get(&p->joints[s], v, joints);
+        vgi_accessor_get(&p->shares[s], v, shares);
+        for (int i = 0; i < 4; i++) {
+            if (shares[i] == 0) continue;
+            for (int k = 0; k < 12; k++) total[k] += shares[i] * x->skins[p->skin].matrices[12 * (size_t)joints[i] + (size_t)k];
+            sum += shares[i];
+        }
+    }
+    if (sum == 0) multiply(x->nodes[p->node].world, p->place, m);
+    else
+        for (int k = 0; k < 12; k++) m[k] = total[k] / sum;
+}
+
 static void pose_part(const vgi_gltf_scene *x, const vgi_gltf_part *p, double *to)
 {
     const vgi_gltf_node *n = &x->nodes[p->node];
@@ -197,13 +221,12 @@ int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const vg_reading *how
     h->body.mesh = f.mesh;
     if (r == VG_OK) h->body.attributes = x->attributes, x->attributes = (vg_attributes){0};
     h->kind = VG_VERTICES, h->precision = VG_F32, h->count = h->body.mesh.nv;
+    if (r == VG_OK) r = vgi_gltf_take_asset(x, in, &h->body.mesh, &h->body.asset, e);
     if (r == VG_OK && !x->as_shapes) r = vgi_gltf_read_animations(x, e);
     if (r == VG_OK) r = vgi_gltf_list_shapes(x, e);
     if (r < 0) return r;
     x->frames = x->nclips ? x->nmoments : x->shapes.names.n ? x->shapes.names.n + 1 : 1;
     if (!x->strips) vgi_note_dropped(&x->note, x->dropped); /* strips are made of such */
-    const size_t images = vgi_json_count(vgi_json_get(x->g.json, "images"));
-    if (images) vgi_note(&x->note, "left out %zu image%s of its materials", images, images == 1 ? "" : "s");
     vgi_gltf_note_extensions(&x->g, &x->note);
     return take_reference(x, h, e);
 }

@@ -442,6 +442,8 @@ static int read_primitives(vgi_gltf_scene *x, vgi_gltf_faces *f, size_t at, int6
             p->instance = instance;
             memcpy(p->place, place, sizeof p->place);
         }
+        if (r == VG_OK) r = vgi_grow(&x->pieces, &x->pieces_cap, x->npieces + 1, sizeof *x->pieces, e);
+        if (r == VG_OK) x->pieces[x->npieces++] = (vgi_gltf_piece){primitive, (size_t)(p - x->parts)};
         if (r == VG_OK) r = label_faces(x, f, p, primitive, e);
         if (r == VG_OK) r = read_faces(x, f, p, primitive, e);
     }
@@ -503,7 +505,7 @@ void vgi_gltf_scene_clear(vgi_gltf_scene *x)
         free(x->parts[i].moved);
         free(x->parts[i].kept);
     }
-    void *const arrays[] = {x->nodes, x->order, x->skins, x->parts, x->channels, x->clips, x->moments};
+    void *const arrays[] = {x->nodes, x->order, x->skins, x->parts, x->channels, x->clips, x->moments, x->number, x->pieces};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     vg_attributes_clear(&x->attributes);
     vgi_name_set_clear(&x->shapes);

@@ -82,6 +82,7 @@ typedef struct vgi_gltf_moment {
     double time;
 } vgi_gltf_moment;
 
+struct vgi_gltf_piece;
 typedef struct vgi_gltf_scene {
     vgi_gltf g;
     size_t nnodes, nskins, nparts, parts_cap, nchannels, channels_cap, nclips, clips_cap, nmoments, moments_cap;
@@ -89,6 +90,8 @@ typedef struct vgi_gltf_scene {
     size_t *order; /* nodes, parents first */
     vgi_gltf_skin *skins;
     vgi_gltf_part *parts;
+    size_t npieces, pieces_cap;
+    struct vgi_gltf_piece *pieces;
     size_t all;    /* vertices of all parts, before welding */
     size_t targets, keys; /* morph targets of all parts; times of all channels */
     vgi_gltf_channel *channels;
@@ -101,6 +104,7 @@ typedef struct vgi_gltf_scene {
     size_t nuv;     /* texture coordinates of all parts */
     vg_attributes attributes;
     size_t labels_cap;
+    uint32_t *number; /* all: the vertex of the mesh that each is */
     size_t dropped; /* triangles without three vertices */
     bool strips;    /* some faces are strips or fans */
     char *wanted;  /* the animation that is asked for; NULL: all */
@@ -109,6 +113,12 @@ typedef struct vgi_gltf_scene {
     bool as_shapes; /* morph targets instead of animations */
     vg_note note;
 } vgi_gltf_scene;
+
+/* A primitive of a mesh as a node shows it. */
+typedef struct vgi_gltf_piece {
+    const vgi_json *json;
+    size_t part;
+} vgi_gltf_piece;
 
 /* The faces of all parts, of vertices before welding. */
 typedef struct vgi_gltf_faces {
@@ -126,6 +136,12 @@ void vgi_gltf_scene_clear(vgi_gltf_scene *x);
 void vgi_gltf_local_matrix(const vgi_gltf_placed *p, double m[12]);
 void vgi_gltf_from_columns(const double c[16], double m[12]); /* the upper rows of a matrix of 16, columns first */
 
+/* ---- gltf_play.c ---- */
+/* vgi_gltf_rest: nodes and joints as the file has them, without morph targets. */
+void vgi_gltf_rest(vgi_gltf_scene *x);
+/* vgi_gltf_vertex_matrix: what takes vertex v of a part into the world, as nodes and joints are now. */
+void vgi_gltf_vertex_matrix(const vgi_gltf_scene *x, const vgi_gltf_part *p, size_t v, double m[12]);
+
 /* ---- gltf_shapes.c: the morph targets of all meshes ---- */
 /* vgi_gltf_list_shapes: which morph targets of which meshes belong together. */
 int vgi_gltf_list_shapes(vgi_gltf_scene *x, vg_err *e) VG_MUST_CHECK;
@@ -136,6 +152,10 @@ const char *vgi_gltf_shape_name(const vgi_gltf_scene *x, size_t shape); /* empty
 int vgi_gltf_read_animations(vgi_gltf_scene *x, vg_err *e) VG_MUST_CHECK;
 /* vgi_gltf_animate: nodes and weights at this moment. */
 int vgi_gltf_animate(vgi_gltf_scene *x, const vgi_gltf_moment *m, vg_err *e) VG_MUST_CHECK;
+
+/* ---- gltf_asset.c ---- */
+/* vgi_gltf_take_asset: what the file holds beside shape and motion; nothing when there is none. */
+int vgi_gltf_take_asset(vgi_gltf_scene *x, vgi_input *in, const vg_mesh *mesh, vg_asset *to, vg_err *e) VG_MUST_CHECK;
 
 /* ---- gltf_weld.c ---- */
 /* vgi_gltf_mend: put the mesh together as it was before it was exported: polygons of our own files, and vertices that

@@ -456,4 +456,4 @@ static void release(void *own)
     free(x);
 }
 
-const vgi_gltf_manner vgi_gltf_skin = {begin, put, describe, emit, NULL, release, "write fewer frames"};
+const vgi_gltf_manner vgi_gltf_by_skin = {begin, put, describe, emit, NULL, release, "write fewer frames"};

@@ -125,7 +125,7 @@ static int restore_polygons(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e)
 typedef struct welding {
     const vgi_gltf_scene *x;
     uint32_t *slots;  /* positions among all vertices, + 1; 0: free */
-    uint32_t *number; /* which vertex of the mesh each becomes */
+    uint32_t *number; /* which vertex of the mesh each becomes; the scene's */
     size_t nslots;
 } welding;
 
@@ -304,7 +304,7 @@ static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
 {
     welding k = {.x = x, .nslots = 4};
     while (k.nslots < 2 * x->all) k.nslots *= 2;
-    k.slots = vgi_array(k.nslots, sizeof *k.slots, e), k.number = vgi_array_raw(x->all, sizeof *k.number, e);
+    k.slots = vgi_array(k.nslots, sizeof *k.slots, e), k.number = x->number = vgi_array_raw(x->all, sizeof *k.number, e);
     int r = k.slots && k.number ? VG_OK : VG_ENOMEM;
     size_t n = r == VG_OK ? own_vertices(x, k.number) : 0;
     if (n) r = keep_first(&x->parts[0], n, e);
@@ -314,7 +314,6 @@ static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
     if (r == VG_OK) x->dropped = renumber(x, m, k.number, x->attributes.corner_tex);
     m->nv = n;
     free(k.slots);
-    free(k.number);
     return r;
 }
 

@@ -58,16 +58,31 @@ static int round_base(vgi_gltf_writing *w, vg_err *e)
     return VG_OK;
 }
 
+static int open_character(vgi_gltf_writing *w, vg_err *e)
+{
+    if (!w->h->body.asset.n) return VG_OK;
+    if (!(w->character = vgi_array(1, sizeof *w->character, e))) return VG_ENOMEM;
+    int r = vgi_gltf_character_open(w->character, &w->h->body, e);
+    if (r == 1) return VG_OK;
+    vgi_gltf_character_clear(w->character);
+    free(w->character);
+    w->character = NULL;
+    return r;
+}
+
 int vgi_gltf_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi_output *out, bool binary, vg_err *e)
 {
     vgi_gltf_writing *w = *state = vgi_array(1, sizeof *w, e);
     if (!w) return VG_ENOMEM;
-    w->manner = h->kind == VG_TRANSFORMS ? &vgi_gltf_skin : &vgi_gltf_morphs;
+    w->manner = h->kind == VG_TRANSFORMS ? &vgi_gltf_by_skin : &vgi_gltf_by_morphs;
     w->out = out, w->h = h, w->binary = binary, w->clip = o->name;
     w->spool.name = "temporary file";
     if ((w->spool.fd = vgi_nameless_file(e)) < 0) return w->spool.fd;
     static const vg_attributes none;
-    int r = vgi_gltf_seams_make(&w->seams, &h->body.mesh, h->kind == VG_VERTICES ? &h->body.attributes : &none, e);
+    int r = h->kind == VG_VERTICES ? open_character(w, e) : VG_OK;
+    if (r == VG_OK)
+        r = vgi_gltf_seams_make(&w->seams, &h->body.mesh,
+                                h->kind == VG_VERTICES && !w->character ? &h->body.attributes : &none, e);
     if (r == VG_OK) r = round_base(w, e);
     return r < 0 ? r : w->manner->begin(w, o, e);
 }
@@ -240,10 +255,19 @@ static int describe_texture(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_gltf_say_accessor(w, 0, VGI_GLTF_FLOAT, w->seams.n, "VEC2", NULL, 0, e);
 }
 
+/* What the character's file has keeps its numbers. */
+static int describe_character(vgi_gltf_writing *w, vg_err *e)
+{
+    const vgi_gltf_character *c = w->character;
+    int r = vgi_gltf_say_elements(c, "bufferViews", &w->views, &w->nviews, e);
+    w->bytes = c->scene.g.nbuffers ? c->scene.g.buffers[0].size : 0;
+    return r < 0 ? r : vgi_gltf_say_elements(c, "accessors", &w->accessors, &w->naccessors, e);
+}
+
 static int describe(vgi_gltf_writing *w, vg_err *e)
 {
     const double between[2] = {time_of(w, 0), time_of(w, w->frames - 1)};
-    int r = describe_indices(w, &w->shape.triangles, &w->triangles, e);
+    int r = w->character ? describe_character(w, e) : describe_indices(w, &w->shape.triangles, &w->triangles, e);
     if (r == VG_OK) r = describe_indices(w, &w->shape.lines, &w->lines, e);
     if (r == VG_OK) r = describe_texture(w, e);
     w->moments = w->naccessors;
@@ -255,7 +279,9 @@ static int describe(vgi_gltf_writing *w, vg_err *e)
 
 static int say_all(vgi_gltf_writing *w, vg_err *e)
 {
-    int r = vgi_gltf_say(&w->json, e, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"vg " VG_VERSION "\"},\n");
+    int r = w->character ? vgi_gltf_say_cast_asset(w, e)
+                         : vgi_gltf_say(&w->json, e,
+                                        "{\"asset\":{\"version\":\"2.0\",\"generator\":\"vg " VG_VERSION "\"},\n");
     if (r == VG_OK) r = describe(w, e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, ",\n\"accessors\":[");
     if (r == VG_OK) r = vgi_bytes_append(&w->json, w->accessors.data, w->accessors.size, e);
@@ -304,7 +330,9 @@ int vgi_gltf_emit_singles(vgi_gltf_writing *w, const float *p, size_t n, vg_err 
 
 static int emit_all(vgi_gltf_writing *w, vg_err *e)
 {
-    int r = vgi_gltf_emit(w, w->shape.triangles.data, w->shape.triangles.size, e);
+    const vgi_gltf *g = w->character ? &w->character->scene.g : NULL;
+    int r = g && g->nbuffers ? vgi_gltf_emit(w, g->buffers[0].data, g->buffers[0].size, e) : VG_OK;
+    if (r == VG_OK) r = vgi_gltf_emit(w, w->shape.triangles.data, w->shape.triangles.size, e);
     if (r == VG_OK) r = vgi_gltf_emit(w, w->shape.lines.data, w->shape.lines.size, e);
     if (r == VG_OK && w->seams.uv) r = vgi_gltf_emit_singles(w, w->seams.uv, 2 * w->seams.n, e);
     for (size_t i = 0; i < w->frames && r == VG_OK && !w->still; i++) {
@@ -359,14 +387,24 @@ static int put_text(vgi_gltf_writing *w, vg_err *e)
 
 /* ---- the end ---- */
 
+static void note_loss(vgi_gltf_writing *w, const char *what)
+{
+    const size_t n = strlen(w->warning);
+    snprintf(w->warning + n, sizeof w->warning - n, "%s; ", what);
+}
+
 static void note_losses(vgi_gltf_writing *w)
 {
-    size_t n = 0;
-    if (w->some_timed && !w->timed)
-        n = (size_t)snprintf(w->warning, sizeof w->warning,
-                             "the times of the frames: they do not ascend from 0 or later; ");
-    if (w->h->body.attributes.ntex && !w->seams.uv)
-        n += (size_t)snprintf(w->warning + n, sizeof w->warning - n, "texture coordinates; ");
+    const vg_body *b = &w->h->body;
+    if (w->some_timed && !w->timed) note_loss(w, "the times of the frames: they do not ascend from 0 or later");
+    if (!w->character) {
+        char asset[120];
+        vg_asset_text(&b->asset, asset, sizeof asset);
+        if (*asset) note_loss(w, asset);
+        if (b->attributes.ntex && !w->seams.uv) note_loss(w, "texture coordinates");
+        if (b->attributes.nlabels) note_loss(w, "groups and materials");
+    }
+    const size_t n = strlen(w->warning);
     if (w->manner->warning) w->manner->warning(w, w->warning + n, sizeof w->warning - n);
     if (n && !w->warning[n]) w->warning[n - 2] = 0;
 }
@@ -392,7 +430,7 @@ int vgi_gltf_end(void *state, vg_err *e)
     vgi_gltf_writing *w = state;
     w->timed = times_fit(w);
     int r = vgi_output_flush(&w->spool, e);
-    if (r == VG_OK) r = make_shape(w, e);
+    if (r == VG_OK && !w->character) r = make_shape(w, e);
     if (r == VG_OK) r = say_all(w, e);
     if (r == VG_OK) r = w->binary ? put_binary(w, e) : put_text(w, e);
     note_losses(w);
@@ -410,6 +448,8 @@ void vgi_gltf_release(void *state)
     vgi_gltf_writing *w = state;
     if (!w) return;
     w->manner->release(w->own);
+    if (w->character) vgi_gltf_character_clear(w->character);
+    free(w->character);
     if (w->spool.fd >= 0) close(w->spool.fd);
     vgi_output_clear(&w->spool);
     vgi_names_clear(&w->names);

@@ -1,10 +1,11 @@
-/* gltf_write.h: what gltf_write.c, gltf_faces.c, gltf_morph.c and gltf_skin.c share: a glTF file that is being made.
+/* gltf_write.h: what gltf_write.c, gltf_faces.c, gltf_morph.c, gltf_cast.c and gltf_skin.c share: a glTF file that is being made.
  * gltf_write.c is the file; how a mesh moves in it is one of two manners.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_GLTF_WRITE_H
 #define VG_GLTF_WRITE_H
 
 #include "io/gltf.h"
+#include "io/gltf_character.h"
 #include "io/gltf_seams.h"
 
 enum { VGI_GLTF_ITEM = 4, VGI_GLTF_POINT = 12 }; /* bytes of a number, and of three */
@@ -33,7 +34,7 @@ typedef struct vgi_gltf_manner {
     void (*release)(void *own);
     const char *too_big; /* what to do about it */
 } vgi_gltf_manner;
-extern const vgi_gltf_manner vgi_gltf_morphs, vgi_gltf_skin;
+extern const vgi_gltf_manner vgi_gltf_by_morphs, vgi_gltf_by_skin;
 
 struct vgi_gltf_writing {
     const vgi_gltf_manner *manner;
@@ -47,6 +48,7 @@ struct vgi_gltf_writing {
     vgi_names names;
     double *times;
     size_t times_cap;
+    vgi_gltf_character *character; /* whose nodes, materials and attributes are written; NULL: none */
     vgi_gltf_seams seams;      /* vertices of the file; of a skin those of the mesh */
     float *base;               /* the reference pose as it will be read, seams.n points */
     vgi_gltf_shape shape;
@@ -55,8 +57,32 @@ struct vgi_gltf_writing {
     size_t triangles, lines, texture, moments; /* numbers of their accessors; those of no bytes have none */
     unsigned char carry[3];    /* base64: bytes that wait for their third */
     size_t ncarry;
-    char warning[280];
+    char warning[400];
 };
+
+/* Vertices of the file that a primitive of a mesh refers to. */
+typedef struct vgi_gltf_list {
+    size_t first, count;
+    bool normals;
+    size_t position, normal; /* their accessors */
+} vgi_gltf_list;
+
+/* ---- gltf_cast.c: the nodes, meshes and materials of a character ---- */
+/* vgi_gltf_say_cast: all members of the file that are not made by the writer. A list for each part of the character's
+ * scene; target: the accessor of the positions of morph target t of list l, that of its normals follows. names: of the
+ * morph targets, a text in brackets. */
+typedef struct vgi_gltf_cast {
+    const vgi_gltf_list *lists;
+    size_t targets;
+    size_t (*target)(const void *context, size_t t, size_t l);
+    const void *context;
+    const vgi_json *names;
+} vgi_gltf_cast;
+int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_say_elements: the elements of a list of the character's file, as text. */
+int vgi_gltf_say_elements(const vgi_gltf_character *c, const char *list, vg_bytes *to, size_t *n,
+                          vg_err *e) VG_MUST_CHECK;
+int vgi_gltf_say_cast_asset(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
 
 int vgi_gltf_say(vg_bytes *to, vg_err *e, const char *format, ...) VG_PRINTF(3, 4);
 int vgi_gltf_say_text(vg_bytes *to, const char *s, vg_err *e) VG_MUST_CHECK; /* in quotes */

@@ -134,7 +134,8 @@ enum { /* what a format keeps of a sequence beside its numbers; of what it does 
     VGI_KEEPS_NAMES = 32,   /* of frames */
     VGI_KEEPS_TIMES = 64,   /* of frames, any; a format that keeps only some says so in warning() */
     VGI_KEEPS_SKELETON = 128,
-    VGI_KEEPS_DOUBLES = 256 /* when full precision is asked for, which is refused otherwise */
+    VGI_KEEPS_DOUBLES = 256, /* when full precision is asked for, which is refused otherwise */
+    VGI_KEEPS_ASSET = 512    /* materials, normals, skins; a format that keeps only some says so in warning() */
 };
 
 typedef struct vgi_writing {

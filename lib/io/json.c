@@ -1,4 +1,4 @@
-/* json.c: JSON through Jansson. Leaves out writing: text is put together where it is known what it says.
+/* json.c: JSON through Jansson: reading, looking up, changing, printing.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/json.h"
 
@@ -92,4 +92,85 @@ const char *vgi_json_text(const vgi_json *j)
 bool vgi_json_same(const vgi_json *a, const vgi_json *b)
 {
     return a == b || json_equal(a, b);
+}
+
+const char *vgi_json_key(const vgi_json *object, const char *before)
+{
+    json_t *o = (json_t *)object; /* Jansson walks through objects that could be changed */
+    void *at = before ? json_object_iter_next(o, json_object_key_to_iter(before)) : json_object_iter(o);
+    return at ? json_object_iter_key(at) : NULL;
+}
+
+/* ---- making and changing ---- */
+
+static vgi_json *made(vgi_json *j, vg_err *e)
+{
+    if (!j) vg_fail(e, VG_ENOMEM, "not enough memory for JSON");
+    return j;
+}
+
+vgi_json *vgi_json_object(vg_err *e)
+{
+    return made(json_object(), e);
+}
+
+vgi_json *vgi_json_array(vg_err *e)
+{
+    return made(json_array(), e);
+}
+
+vgi_json *vgi_json_of_whole(uint64_t x, vg_err *e)
+{
+    return made(json_integer((json_int_t)x), e);
+}
+
+vgi_json *vgi_json_of_number(double x, vg_err *e)
+{
+    return made(json_real(x), e);
+}
+
+vgi_json *vgi_json_of_text(const char *utf8, vg_err *e)
+{
+    return made(json_string(utf8), e);
+}
+
+vgi_json *vgi_json_copy(const vgi_json *j, vg_err *e)
+{
+    return made(json_deep_copy(j), e);
+}
+
+int vgi_json_put(vgi_json *object, const char *key, vgi_json *value, vg_err *e)
+{
+    if (!value) return VG_ENOMEM;
+    return json_object_set_new(object, key, value) ? vg_fail(e, VG_ENOMEM, "not enough memory for JSON") : VG_OK;
+}
+
+int vgi_json_add(vgi_json *array, vgi_json *value, vg_err *e)
+{
+    if (!value) return VG_ENOMEM;
+    return json_array_append_new(array, value) ? vg_fail(e, VG_ENOMEM, "not enough memory for JSON") : VG_OK;
+}
+
+void vgi_json_drop(vgi_json *object, const char *key)
+{
+    json_object_del(object, key);
+}
+
+vgi_json *vgi_json_inner(vgi_json *object, const char *key)
+{
+    return json_object_get(object, key);
+}
+
+vgi_json *vgi_json_inner_at(vgi_json *array, size_t i)
+{
+    return json_array_get(array, i);
+}
+
+int vgi_json_print(const vgi_json *j, vg_bytes *to, vg_err *e)
+{
+    char *text = json_dumps(j, JSON_COMPACT | JSON_ENCODE_ANY);
+    if (!text) return vg_fail(e, VG_ENOMEM, "not enough memory for JSON");
+    int r = vgi_bytes_append(to, text, strlen(text), e);
+    free(text);
+    return r;
 }

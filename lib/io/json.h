@@ -21,6 +21,28 @@ bool vgi_json_is_true(const vgi_json *j);
 bool vgi_json_number(const vgi_json *j, double *x);
 bool vgi_json_whole(const vgi_json *j, uint64_t *x); /* a whole number from 0 to 2^53 */
 const char *vgi_json_text(const vgi_json *j);        /* NULL: it is no string. Valid UTF-8, borrowed */
+/* vgi_json_key: the name of the member behind the one of that name (its own text, from here), or of the first one: NULL.
+ * NULL: there is none. Borrowed. */
+const char *vgi_json_key(const vgi_json *object, const char *before);
 bool vgi_json_same(const vgi_json *a, const vgi_json *b);
+
+/* ---- making and changing ---- */
+
+vgi_json *vgi_json_object(vg_err *e); /* NULL: no memory, as below */
+vgi_json *vgi_json_array(vg_err *e);
+vgi_json *vgi_json_of_whole(uint64_t x, vg_err *e);
+vgi_json *vgi_json_of_number(double x, vg_err *e);
+vgi_json *vgi_json_of_text(const char *utf8, vg_err *e);
+vgi_json *vgi_json_copy(const vgi_json *j, vg_err *e);
+/* vgi_json_put, vgi_json_add: value is taken over, also on failure; NULL: it could not be made, VG_ENOMEM. Replaces a member
+ * of that name. */
+int vgi_json_put(vgi_json *object, const char *key, vgi_json *value, vg_err *e) VG_MUST_CHECK;
+int vgi_json_add(vgi_json *array, vgi_json *value, vg_err *e) VG_MUST_CHECK;
+void vgi_json_drop(vgi_json *object, const char *key);
+/* A member or element that is to be changed. */
+vgi_json *vgi_json_inner(vgi_json *object, const char *key);
+vgi_json *vgi_json_inner_at(vgi_json *array, size_t i);
+/* vgi_json_print: append the text, without blanks. */
+int vgi_json_print(const vgi_json *j, vg_bytes *to, vg_err *e) VG_MUST_CHECK;
 
 #endif

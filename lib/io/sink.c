@@ -245,7 +245,8 @@ static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
     if (s->mesh)
         keeps |= s->mesh_format->keeps &
                  (VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS);
-    char scalars[120];
+    char scalars[120], asset[160];
+    vg_asset_text(&h->body.asset, asset, sizeof asset);
     snprintf(scalars, sizeof scalars, "the '%s' of the vertices", s->scalars_lost);
     bool faces = keeps & VGI_KEEPS_FACES, triangles = faces && !(keeps & VGI_KEEPS_POLYGONS);
     const struct {
@@ -257,6 +258,7 @@ static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
                {!(keeps & VGI_KEEPS_ORDER), "the numbers of the vertices, and those in no face"},
                {!(keeps & VGI_KEEPS_TEXTURE) && h->body.attributes.ntex, "texture coordinates"},
                {!(keeps & VGI_KEEPS_LABELS) && h->body.attributes.nlabels, "groups and materials"},
+               {!(keeps & VGI_KEEPS_ASSET) && h->body.asset.n, asset},
                {!(keeps & VGI_KEEPS_SKELETON) && h->body.skeleton.njoints, "the skeleton"},
                {f && !(keeps & VGI_KEEPS_NAMES) && s->names_lost && s->frames > 1, "the names of the frames"},
                {f && !(keeps & VGI_KEEPS_TIMES) && s->times_lost, "the times of the frames"},

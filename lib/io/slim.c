@@ -29,6 +29,17 @@ int vgi_count_loose(const vg_mesh *m, size_t *loose, vg_err *e)
     return VG_OK;
 }
 
+/* The asset's vertices by their new numbers. Those that it has beside, and are in no face, are lost with it. */
+static void move_asset(vg_body *b, const uint32_t *number, const bool *attached)
+{
+    vg_asset *a = &b->asset;
+    bool whole = true;
+    for (size_t i = 0; i < a->n && whole; i++) whole = attached[a->vertex[i]];
+    if (!whole) vg_asset_clear(a);
+    for (size_t i = 0; i < a->n; i++) a->vertex[i] = number[a->vertex[i]];
+    if (a->n) a->digest = vg_mesh_digest(&b->mesh);
+}
+
 /* number: room for one of each vertex of the whole head. */
 static void close_up(vgi_slim *s, const vg_head *h, const bool *attached, uint32_t *number)
 {
@@ -43,6 +54,7 @@ static void close_up(vgi_slim *s, const vg_head *h, const bool *attached, uint32
     for (size_t c = 0; c < vg_mesh_corners(&h->body.mesh); c++) to->body.mesh.vert[c] = number[h->body.mesh.vert[c]];
     to->body.mesh.nv = to->count = n;
     vg_skeleton_clear(&to->body.skeleton); /* its joints are vertices */
+    move_asset(&to->body, number, attached);
 }
 
 int vgi_slim_make(vgi_slim *s, const vg_head *h, vg_err *e)

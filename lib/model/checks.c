@@ -61,6 +61,16 @@ int vgi_check_labels(vg_head *h, void *artefact, const char *where, vg_err *e)
     return VG_OK;
 }
 
+/* Nothing is said of its data, which concern only who writes such files. */
+int vgi_check_asset(vg_head *h, void *artefact, const char *where, vg_err *e)
+{
+    const vg_asset *a = artefact;
+    if (a->n == 0 || a->n >= UINT32_MAX || a->size == 0) return vgi_wrong(where, "its counts are out of range", e);
+    for (size_t i = 0; i < a->n; i++)
+        if (a->vertex[i] >= h->body.mesh.nv) return vgi_wrong(where, "it names a vertex that is not there", e);
+    return VG_OK;
+}
+
 int vgi_check_selection(vg_head *h, void *artefact, const char *where, vg_err *e)
 {
     (void)artefact;

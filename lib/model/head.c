@@ -31,6 +31,11 @@ void vg_attributes_clear(vg_attributes *a)
     clear_parts(a, attributes_parts, 2);
 }
 
+void vg_asset_clear(vg_asset *a)
+{
+    vgi_fields_clear(&vgi_artefacts[VGI_ASST], a);
+}
+
 int vg_attributes_copy(vg_attributes *to, const vg_attributes *from, const vg_mesh *mesh, vg_err *e)
 {
     return copy_parts(to, from, sizeof *to, attributes_parts, 2, mesh, e);

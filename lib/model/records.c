@@ -83,6 +83,15 @@ static const vgi_member labl_fields[] = {
     COLUMN(vg_attributes, U32, labels, vg_label, kind, 1, labels),
     COLUMN(vg_attributes, TEXT, labels, vg_label, text, 1, labels)};
 
+LENGTH(asset_vertices, vg_asset, a->n)
+LENGTH(asset_bytes, vg_asset, a->size)
+static const vgi_member asst_fields[] = {
+    NUMBER(vg_asset, U64, n),
+    NUMBER(vg_asset, U64, digest),
+    NUMBER(vg_asset, U64, size),
+    ARRAY(vg_asset, U32, vertex, 1, asset_vertices),
+    ARRAY(vg_asset, U8, data, 1, asset_bytes)};
+
 LENGTH(mesh_vertices, vg_body, mesh->nv)
 static const vgi_member refp_fields[] = {
     NUMBER(vg_body, TEXT, reference_name),
@@ -307,6 +316,8 @@ const vgi_artefact vgi_artefacts[VGI_ARTEFACTS] = {
                   FIELDS(texc_fields), .check = vgi_check_texture},
     [VGI_LABL] = {.tag = "LABL", .name = "attributes", .needs = "MESH", IN_BODY(attributes), PRESENT(body.attributes.nlabels),
                   FIELDS(labl_fields), .check = vgi_check_labels},
+    [VGI_ASST] = {.tag = "ASST", .name = "attributes", .needs = "MESH", IN_BODY(asset), PRESENT(body.asset.n),
+                  FIELDS(asst_fields), .check = vgi_check_asset},
     [VGI_SELE] = {.tag = "SELE", .flags = VGI_CRITICAL, .name = "selection", .needs = "MESH", MARKED(has_selection), FIELDS(sele_fields),
                   .check = vgi_check_selection},
     [VGI_LINK] = {.tag = "LINK", .flags = VGI_CRITICAL, .name = "links", .needs = "MESH", MARKED(has_links), FIELDS(link_fields),

@@ -71,6 +71,20 @@ typedef struct vg_attributes {
 void vg_attributes_clear(vg_attributes *a);
 int vg_attributes_copy(vg_attributes *to, const vg_attributes *from, const vg_mesh *mesh, vg_err *e) VG_MUST_CHECK;
 
+/* What a file holds of a character beside its shape: materials, textures, normals, a skin, nodes. It is kept as a whole,
+ * for a writer of the same kind of file. */
+typedef struct vg_asset {
+    size_t n;         /* vertices of the file; 0: there is no asset */
+    uint64_t digest;  /* vg_mesh_digest of the mesh that it belongs to */
+    uint32_t *vertex; /* n: which vertex of the mesh each is */
+    size_t size;
+    uint8_t *data;    /* a GLB of the character at rest */
+} vg_asset;
+
+void vg_asset_clear(vg_asset *a);
+/* vg_asset_text: what it holds, "2 materials, 1 texture, normals, 1 skin"; empty when there is none. */
+void vg_asset_text(const vg_asset *a, char *to, size_t room);
+
 /* A skeleton: joint j is vertex j of the mesh, whose faces are the bones (parent, child) in the order of their
  * children. */
 typedef struct vg_joint {
@@ -165,6 +179,7 @@ typedef struct vg_body {
     double *reference;    /* nv points: the undeformed pose; present whenever the mesh has vertices */
     char *reference_name; /* never NULL in a body that was read */
     vg_attributes attributes;
+    vg_asset asset;
     vg_skeleton skeleton;
     vg_patches patches;   /* a stream of vg-segment, and those that come of it */
     vg_rig rig;           /* of a map of bones; also in streams of transforms of bones */

@@ -1,0 +1,58 @@
+/* asset_text.c: what an asset holds, in words: for reports, and for warnings of writers that cannot keep it.
+ * Leaves out the asset itself (gltf_asset.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf.h"
+
+static size_t count(const vgi_gltf *g, const char *list)
+{
+    return vgi_json_count(vgi_json_get(g->json, list));
+}
+
+/* Of all primitives: how many have such an attribute. */
+static size_t having(const vgi_gltf *g, const char *attribute)
+{
+    const vgi_json *meshes = vgi_json_get(g->json, "meshes");
+    size_t n = 0;
+    for (size_t m = 0; m < vgi_json_count(meshes); m++) {
+        const vgi_json *primitives = vgi_json_get(vgi_json_at(meshes, m), "primitives");
+        for (size_t p = 0; p < vgi_json_count(primitives); p++)
+            n += vgi_json_get(vgi_json_get(vgi_json_at(primitives, p), "attributes"), attribute) != NULL;
+    }
+    return n;
+}
+
+static void say(char *to, size_t room, const char *text)
+{
+    const size_t n = strlen(to);
+    if (n < room) snprintf(to + n, room - n, "%s%s", n ? ", " : "", text);
+}
+
+static void say_count(char *to, size_t room, size_t n, const char *thing)
+{
+    char text[60];
+    snprintf(text, sizeof text, "%zu %s%s", n, thing, n == 1 ? "" : "s");
+    if (n) say(to, room, text);
+}
+
+/* An asset that cannot be read is called so: nothing else is known of it. */
+void vg_asset_text(const vg_asset *a, char *to, size_t room)
+{
+    vgi_gltf g = {0};
+    vgi_input *in = NULL;
+    *to = 0;
+    int r = a->n ? vgi_input_memory(&in, a->data, a->size, "asset", NULL) : VG_EINPUT;
+    if (r == VG_OK) r = vgi_gltf_open(&g, in, "the asset", NULL);
+    if (r == VG_OK) {
+        say_count(to, room, count(&g, "materials"), "material");
+        say_count(to, room, count(&g, "images"), "texture");
+        if (having(&g, "NORMAL")) say(to, room, "normals");
+        if (having(&g, "TANGENT")) say(to, room, "tangents");
+        if (having(&g, "COLOR_0")) say(to, room, "colours of vertices");
+        if (having(&g, "TEXCOORD_1")) say(to, room, "further texture coordinates");
+        say_count(to, room, count(&g, "skins"), "skin");
+        say_count(to, room, count(&g, "cameras"), "camera");
+    }
+    if (!*to && a->n) say(to, room, r == VG_OK ? "nodes" : "an asset");
+    vgi_input_free(&in);
+    vgi_gltf_clear(&g);
+}

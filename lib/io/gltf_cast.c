@@ -1,0 +1,170 @@
+/* gltf_cast.c: the file of a character again, with meshes that move: its nodes, skins, materials, textures, images, cameras
+ * and lights as they were, and for each node that shows a mesh a mesh of its own, since each moves by itself.
+ * Leaves out bytes and accessors (gltf_morph.c), and where vertices are (gltf_character.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf_write.h"
+
+#include <stdlib.h>
+
+int vgi_gltf_say_elements(const vgi_gltf_character *c, const char *list, vg_bytes *to, size_t *n, vg_err *e)
+{
+    const vgi_json *all = vgi_json_get(c->scene.g.json, list);
+    int r = VG_OK;
+    for (*n = 0; *n < vgi_json_count(all) && r == VG_OK; ++*n) {
+        if (*n) r = vgi_bytes_append(to, ",\n", 2, e);
+        if (r == VG_OK) r = vgi_json_print(vgi_json_at(all, *n), to, e);
+    }
+    return r;
+}
+
+/* Copyright and the like stay; it is written by another program now. */
+int vgi_gltf_say_cast_asset(vgi_gltf_writing *w, vg_err *e)
+{
+    vgi_json *asset = vgi_json_copy(vgi_json_get(w->character->scene.g.json, "asset"), e);
+    int r = asset ? vgi_json_put(asset, "generator", vgi_json_of_text("vg " VG_VERSION, e), e) : VG_ENOMEM;
+    if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "{\"asset\":");
+    if (r == VG_OK) r = vgi_json_print(asset, &w->json, e);
+    vgi_json_free(&asset);
+    return r < 0 ? r : vgi_gltf_say(&w->json, e, ",\n");
+}
+
+/* ---- meshes ---- */
+
+static int put_number(vgi_json *object, const char *key, size_t x, vg_err *e)
+{
+    return vgi_json_put(object, key, vgi_json_of_whole(x, e), e);
+}
+
+static int add_targets(vgi_json *primitive, const vgi_gltf_cast *k, size_t l, vg_err *e)
+{
+    vgi_json *targets = vgi_json_array(e);
+    int r = k->targets ? vgi_json_put(primitive, "targets", targets, e) : VG_OK;
+    if (!k->targets) vgi_json_free(&targets);
+    for (size_t t = 0; t < k->targets && r == VG_OK; t++) {
+        vgi_json *target = vgi_json_object(e);
+        const size_t at = k->target(k->context, t, l);
+        r = vgi_json_add(targets, target, e);
+        if (r == VG_OK) r = put_number(target, "POSITION", at, e);
+        if (r == VG_OK && k->lists[l].normals) r = put_number(target, "NORMAL", at + 1, e);
+    }
+    return r;
+}
+
+static int add_primitive(vgi_json *primitives, const vgi_gltf_piece *piece, const vgi_gltf_cast *k, vg_err *e)
+{
+    const vgi_gltf_list *l = &k->lists[piece->part];
+    vgi_json *primitive = vgi_json_copy(piece->json, e);
+    int r = vgi_json_add(primitives, primitive, e);
+    if (r < 0) return r;
+    vgi_json *attributes = vgi_json_inner(primitive, "attributes");
+    r = put_number(attributes, "POSITION", l->position, e);
+    if (r == VG_OK && l->normals) r = put_number(attributes, "NORMAL", l->normal, e);
+    return r < 0 ? r : add_targets(primitive, k, piece->part, e);
+}
+
+static int add_weights(vgi_json *mesh, size_t n, vg_err *e)
+{
+    vgi_json *weights = vgi_json_array(e);
+    int r = vgi_json_put(mesh, "weights", weights, e);
+    for (size_t t = 0; t < n && r == VG_OK; t++) r = vgi_json_add(weights, vgi_json_of_whole(0, e), e);
+    return r;
+}
+
+static int add_names(vgi_json *mesh, const vgi_json *names, vg_err *e)
+{
+    if (!vgi_json_is_object(vgi_json_get(mesh, "extras"))) {
+        int r = vgi_json_put(mesh, "extras", vgi_json_object(e), e);
+        if (r < 0) return r;
+    }
+    return vgi_json_put(vgi_json_inner(mesh, "extras"), "targetNames", vgi_json_copy(names, e), e);
+}
+
+/* The mesh of a node: the original one with the primitives that the node shows. */
+static int add_mesh(vgi_json *meshes, const vgi_gltf_scene *x, size_t node, const vgi_gltf_cast *k, vg_err *e)
+{
+    const vgi_json *old;
+    int r = vgi_gltf_item(&x->g, vgi_json_get(x->nodes[node].json, "mesh"), "meshes", &old, NULL, e);
+    vgi_json *mesh = r == VG_OK ? vgi_json_copy(old, e) : NULL, *primitives = NULL;
+    if (r == VG_OK) r = vgi_json_add(meshes, mesh, e);
+    if (r == VG_OK) r = vgi_json_put(mesh, "primitives", primitives = vgi_json_array(e), e);
+    for (size_t i = 0; i < x->npieces && r == VG_OK; i++)
+        if (x->parts[x->pieces[i].part].node == node) r = add_primitive(primitives, &x->pieces[i], k, e);
+    if (r == VG_OK && k->targets) r = add_weights(mesh, k->targets, e);
+    return r == VG_OK && k->targets ? add_names(mesh, k->names, e) : r;
+}
+
+/* ---- nodes ---- */
+
+static void drop_instancing(vgi_json *holder)
+{
+    static const char key[] = "extensions";
+    vgi_json_drop(vgi_json_inner(holder, key), "EXT_mesh_gpu_instancing");
+    if (vgi_json_get(holder, key) && !vgi_json_key(vgi_json_get(holder, key), NULL)) vgi_json_drop(holder, key);
+}
+
+static bool shows_mesh(const vgi_gltf_scene *x, size_t node)
+{
+    return x->nodes[node].shown && vgi_json_get(x->nodes[node].json, "mesh");
+}
+
+/* A mesh for each node that shows one; of other scenes, none. */
+static int cast_nodes(vgi_json *doc, const vgi_gltf_scene *x, const vgi_gltf_cast *k, vg_err *e)
+{
+    vgi_json *nodes = vgi_json_inner(doc, "nodes"), *meshes = vgi_json_array(e);
+    int r = vgi_json_put(doc, "meshes", meshes, e);
+    for (size_t i = 0; i < x->nnodes && r == VG_OK; i++) {
+        vgi_json *node = vgi_json_inner_at(nodes, i);
+        drop_instancing(node);
+        if (!shows_mesh(x, i)) {
+            vgi_json_drop(node, "mesh");
+            vgi_json_drop(node, "skin");
+            continue;
+        }
+        r = put_number(node, "mesh", vgi_json_count(meshes), e);
+        if (r == VG_OK) r = add_mesh(meshes, x, i, k, e);
+    }
+    return r;
+}
+
+static int drop_from_list(vgi_json *doc, const char *key, const char *gone, vg_err *e)
+{
+    const vgi_json *old = vgi_json_get(doc, key);
+    vgi_json *list = vgi_json_array(e);
+    int r = list ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; i < vgi_json_count(old) && r == VG_OK; i++) {
+        const char *name = vgi_json_text(vgi_json_at(old, i));
+        if (name && strcmp(name, gone)) r = vgi_json_add(list, vgi_json_of_text(name, e), e);
+    }
+    if (r == VG_OK && vgi_json_count(list)) return vgi_json_put(doc, key, list, e);
+    vgi_json_free(&list);
+    vgi_json_drop(doc, key);
+    return r;
+}
+
+static int say_members(vgi_gltf_writing *w, const vgi_json *doc, vg_err *e)
+{
+    int r = VG_OK;
+    bool first = true;
+    for (const char *key = vgi_json_key(doc, NULL); key && r == VG_OK; key = vgi_json_key(doc, key), first = false) {
+        if (!first) r = vgi_gltf_say(&w->json, e, ",\n");
+        if (r == VG_OK) r = vgi_gltf_say_text(&w->json, key, e);
+        if (r == VG_OK) r = vgi_gltf_say(&w->json, e, ":");
+        if (r == VG_OK) r = vgi_json_print(vgi_json_get(doc, key), &w->json, e);
+    }
+    return r;
+}
+
+int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e)
+{
+    static const char *const made[] = {"asset", "accessors", "bufferViews", "buffers"};
+    static const char instancing[] = "EXT_mesh_gpu_instancing";
+    vgi_json *doc = vgi_json_copy(w->character->scene.g.json, e);
+    int r = doc ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; doc && i < sizeof made / sizeof *made; i++) vgi_json_drop(doc, made[i]);
+    if (r == VG_OK) r = drop_from_list(doc, "extensionsUsed", instancing, e);
+    if (r == VG_OK) r = drop_from_list(doc, "extensionsRequired", instancing, e);
+    if (r == VG_OK) r = cast_nodes(doc, &w->character->scene, k, e);
+    if (r == VG_OK) r = say_members(w, doc, e);
+    vgi_json_free(&doc);
+    return r;
+}

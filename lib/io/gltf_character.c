@@ -1,0 +1,346 @@
+/* gltf_character.c: a character of glTF in other poses than its own: where its vertices and normals are, in the space of
+ * its meshes.
+ * Leaves out how it is read and packed (gltf_asset.c) and what is written (gltf_morph.c, gltf_cast.c).
+ *
+ * A vertex at p goes into the world as M p, where M is the matrix of its node, or the mean of those of its joints. A pose of
+ * the mesh comes back by the inverse of M at rest: skin, nodes and morph targets together then show the pose.
+ *
+ * Normals keep what their artist made of them: each is turned as the normal of the faces around it turns. Vertices that
+ * are one in the mesh and have the same normal share these faces, so that edges stay hard and seams stay smooth.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf_character.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* ---- matrices ---- */
+
+static void linear(const double m[12], const double p[3], double to[3])
+{
+    for (int i = 0; i < 3; i++) to[i] = m[4 * i] * p[0] + m[4 * i + 1] * p[1] + m[4 * i + 2] * p[2];
+}
+
+static void linear_transposed(const double m[12], const double p[3], double to[3])
+{
+    for (int i = 0; i < 3; i++) to[i] = m[i] * p[0] + m[4 + i] * p[1] + m[8 + i] * p[2];
+}
+
+static void affine(const double m[12], const double p[3], double to[3])
+{
+    linear(m, p, to);
+    for (int i = 0; i < 3; i++) to[i] += m[4 * i + 3];
+}
+
+/* false: it flattens space. */
+static bool invert(const double m[12], double to[12])
+{
+    double size = 0, det = 0, c[9];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const int a = (j + 1) % 3, b = (j + 2) % 3, s = (i + 1) % 3, t = (i + 2) % 3;
+            c[3 * i + j] = m[4 * a + s] * m[4 * b + t] - m[4 * a + t] * m[4 * b + s];
+            size += m[4 * i + j] * m[4 * i + j];
+        }
+    for (int j = 0; j < 3; j++) det += m[4 * j] * c[j];
+    if (!(fabs(det) > 1e-9 * size * sqrt(size))) return false;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) to[4 * i + j] = c[3 * i + j] / det;
+    for (int i = 0; i < 3; i++)
+        to[4 * i + 3] = -(to[4 * i] * m[3] + to[4 * i + 1] * m[7] + to[4 * i + 2] * m[11]);
+    return true;
+}
+
+static double length(const double p[3])
+{
+    return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+}
+
+static void unit(double p[3])
+{
+    const double l = length(p);
+    for (int k = 0; k < 3; k++) p[k] = l > 0 ? p[k] / l : 0;
+}
+
+/* x by the least rotation that takes a to b; a, b: unit or zero. */
+static void turn(const double a[3], const double b[3], const double x[3], double to[3])
+{
+    const double c = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    const double k[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    const double along = (k[0] * x[0] + k[1] * x[1] + k[2] * x[2]) / (1 + c);
+    const double y[3] = {k[1] * x[2] - k[2] * x[1], k[2] * x[0] - k[0] * x[2], k[0] * x[1] - k[1] * x[0]};
+    for (int i = 0; i < 3; i++) to[i] = c > -0.999999 ? c * x[i] + y[i] + along * k[i] : -x[i];
+}
+
+/* ---- where the vertices are ---- */
+
+/* 1; 0: a node or skin flattens a part. */
+static int place(vgi_gltf_character *c, vg_err *e)
+{
+    const vgi_gltf_scene *x = &c->scene;
+    c->out = vgi_array_raw(c->n, 12 * sizeof(double), e), c->in = vgi_array_raw(c->n, 12 * sizeof(double), e);
+    c->skinned = vgi_array(c->n, sizeof *c->skinned, e);
+    if (!c->out || !c->in || !c->skinned) return VG_ENOMEM;
+    for (size_t i = 0; i < x->nparts; i++) {
+        const vgi_gltf_part *p = &x->parts[i];
+        for (size_t v = 0; v < p->count; v++) {
+            const size_t at = 12 * (p->first + v);
+            c->skinned[p->first + v] = p->skin != VGI_GLTF_NONE;
+            vgi_gltf_vertex_matrix(x, p, v, c->out + at);
+            if (!vgi_finite(c->out + at, 12) || !invert(c->out + at, c->in + at)) return 0;
+        }
+    }
+    return 1;
+}
+
+static void point_of(const vgi_gltf_character *c, const vgi_gltf_part *p, size_t v, double at[3], double shown[3])
+{
+    vgi_accessor_get(&p->position, v, at);
+    affine(c->out + 12 * (p->first + v), at, shown);
+}
+
+/* Does the file show the reference pose? */
+static bool shows(const vgi_gltf_character *c, const vg_body *b)
+{
+    const double near = 1e-7 * vg_diagonal(b->reference, b->mesh.nv);
+    for (size_t i = 0; i < c->scene.nparts; i++) {
+        const vgi_gltf_part *p = &c->scene.parts[i];
+        for (size_t v = 0; v < p->count; v++) {
+            const double *to = b->reference + 3 * (size_t)c->vertex[p->first + v];
+            double at[3], shown[3];
+            point_of(c, p, v, at, shown);
+            for (int k = 0; k < 3; k++)
+                if (!(fabs(shown[k] - to[k]) <= near)) return false;
+        }
+    }
+    return true;
+}
+
+/* Positions of the file itself where they are right. */
+static int find_base(vgi_gltf_character *c, const vg_body *b, vg_err *e)
+{
+    if (!(c->base = vgi_array_raw(c->n, 3 * sizeof *c->base, e))) return VG_ENOMEM;
+    c->kept = shows(c, b);
+    for (size_t i = 0; i < c->scene.nparts; i++) {
+        const vgi_gltf_part *p = &c->scene.parts[i];
+        for (size_t v = 0; v < p->count; v++) {
+            const size_t f = p->first + v;
+            double at[3];
+            if (c->kept) vgi_accessor_get(&p->position, v, at);
+            else affine(c->in + 12 * f, b->reference + 3 * (size_t)c->vertex[f], at);
+            for (int k = 0; k < 3; k++) {
+                c->base[3 * f + k] = (float)at[k];
+                if (!isfinite(c->base[3 * f + k])) return vg_fail(e, VG_EINPUT, "a position is too large for binary32");
+            }
+        }
+    }
+    return VG_OK;
+}
+
+/* ---- normals ---- */
+
+/* A skin takes normals by M itself, as all viewers do; a node by the transpose of its inverse. */
+static void normal_out(const vgi_gltf_character *c, size_t f, const double n[3], double to[3])
+{
+    if (c->skinned[f]) linear(c->out + 12 * f, n, to);
+    else linear_transposed(c->in + 12 * f, n, to);
+    unit(to);
+}
+
+static void normal_in(const vgi_gltf_character *c, size_t f, const double n[3], double to[3])
+{
+    if (c->skinned[f]) linear(c->in + 12 * f, n, to);
+    else linear_transposed(c->out + 12 * f, n, to);
+    unit(to);
+}
+
+static int read_normals(vgi_gltf_character *c, vg_err *e)
+{
+    const vgi_gltf_scene *x = &c->scene;
+    for (size_t i = 0; i < x->nparts; i++) {
+        const vgi_gltf_part *p = &x->parts[i];
+        const vgi_json *ref = vgi_json_get(p->attributes, "NORMAL");
+        vgi_accessor a;
+        if (!ref || vgi_gltf_accessor(&x->g, ref, 3, p->count, "normals", &a, NULL) < 0) continue;
+        if (!c->normal && (!(c->normal = vgi_array(c->n, 3 * sizeof *c->normal, e)) ||
+                           !(c->world_normal = vgi_array(c->n, 3 * sizeof *c->world_normal, e))))
+            return VG_ENOMEM;
+        for (size_t v = 0; v < p->count; v++) {
+            const size_t f = p->first + v;
+            double n[3];
+            vgi_accessor_get(&a, v, n);
+            if (!vgi_finite(n, 3)) continue;
+            for (int k = 0; k < 3; k++) c->normal[3 * f + k] = (float)n[k];
+            normal_out(c, f, n, c->world_normal + 3 * f);
+        }
+    }
+    return VG_OK;
+}
+
+/* Chains of the vertices of the file that are one vertex of the mesh. */
+static int group_normals(vgi_gltf_character *c, vg_err *e)
+{
+    uint32_t *head = vgi_array(c->nv, sizeof *head, e), *next = vgi_array(c->n, sizeof *next, e); /* + 1 */
+    c->group = vgi_array_raw(c->n, sizeof *c->group, e);
+    int r = head && next && c->group ? VG_OK : VG_ENOMEM;
+    for (size_t f = 0; f < c->n && r == VG_OK; f++) {
+        const float *n = c->normal + 3 * f;
+        c->group[f] = UINT32_MAX;
+        if (length(c->world_normal + 3 * f) == 0) continue;
+        uint32_t *at = &head[c->vertex[f]];
+        while (*at && memcmp(c->normal + 3 * (size_t)(*at - 1), n, 3 * sizeof *n)) at = &next[*at - 1];
+        if (!*at) *at = (uint32_t)f + 1, c->group[f] = (uint32_t)c->ngroups++;
+        else c->group[f] = c->group[*at - 1];
+    }
+    free(head);
+    free(next);
+    return r;
+}
+
+/* Each face says its normal to the groups at its corners, by its angle there. */
+static void face_normals(const vgi_gltf_character *c, const double *world, double *to)
+{
+    const vg_mesh *m = &c->faces.mesh;
+    memset(to, 0, 3 * c->ngroups * sizeof *to);
+    for (size_t f = 0; f < m->nf; f++) {
+        if (m->start[f + 1] - m->start[f] != 3) continue;
+        const uint32_t *v = m->vert + m->start[f];
+        const double *p[3];
+        double side[3][3], n[3];
+        for (int k = 0; k < 3; k++) p[k] = world + 3 * (size_t)c->vertex[v[k]];
+        for (int k = 0; k < 3; k++) {
+            for (int i = 0; i < 3; i++) side[k][i] = p[(k + 1) % 3][i] - p[k][i];
+            unit(side[k]);
+        }
+        for (int i = 0; i < 3; i++)
+            n[i] = side[0][(i + 1) % 3] * side[1][(i + 2) % 3] - side[0][(i + 2) % 3] * side[1][(i + 1) % 3];
+        unit(n);
+        for (int k = 0; k < 3; k++) {
+            const double *s = side[k], *t = side[(k + 2) % 3];
+            const double angle = acos(fmax(-1, fmin(1, -(s[0] * t[0] + s[1] * t[1] + s[2] * t[2]))));
+            if (c->group[v[k]] == UINT32_MAX) continue;
+            for (int i = 0; i < 3; i++) to[3 * (size_t)c->group[v[k]] + i] += angle * n[i];
+        }
+    }
+    for (size_t g = 0; g < c->ngroups; g++) unit(to + 3 * g);
+}
+
+/* A normal in another pose, in the space of its mesh. */
+static void normal_now(const vgi_gltf_character *c, size_t f, double to[3])
+{
+    const double *a = c->rest + 3 * (size_t)c->group[f], *b = c->now + 3 * (size_t)c->group[f];
+    double turned[3];
+    if (length(a) == 0 || length(b) == 0) memcpy(turned, c->world_normal + 3 * f, sizeof turned);
+    else turn(a, b, c->world_normal + 3 * f, turned);
+    normal_in(c, f, turned, to);
+}
+
+void vgi_gltf_character_turn(vgi_gltf_character *c, const double *world, float *to)
+{
+    face_normals(c, world, c->now);
+    for (size_t f = 0; f < c->n; f++) {
+        float *d = to + 3 * f;
+        double n[3];
+        memset(d, 0, 3 * sizeof *d);
+        if (c->group[f] == UINT32_MAX) continue;
+        const size_t g = 3 * (size_t)c->group[f];
+        if (!memcmp(c->rest + g, c->now + g, 3 * sizeof *c->now)) continue;
+        normal_now(c, f, n);
+        for (int k = 0; k < 3; k++) d[k] = (float)(n[k] - c->normal[3 * f + k]);
+    }
+}
+
+/* Normals of another reference pose than the file shows. */
+static int turn_base(vgi_gltf_character *c, const vg_body *b, vg_err *e)
+{
+    double *shown = vgi_array(c->nv, 3 * sizeof *shown, e), at[3];
+    float *turned = vgi_array(c->n, 3 * sizeof *turned, e);
+    int r = shown && turned ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; i < c->scene.nparts && r == VG_OK; i++) {
+        const vgi_gltf_part *p = &c->scene.parts[i];
+        for (size_t v = 0; v < p->count; v++) point_of(c, p, v, at, shown + 3 * (size_t)c->vertex[p->first + v]);
+    }
+    if (r == VG_OK) {
+        face_normals(c, shown, c->rest);
+        vgi_gltf_character_turn(c, b->reference, turned);
+        for (size_t f = 0; f < c->n; f++) {
+            float *n = c->normal + 3 * f;
+            for (int k = 0; k < 3; k++) n[k] += turned[3 * f + k];
+            normal_out(c, f, (const double[3]){n[0], n[1], n[2]}, c->world_normal + 3 * f);
+        }
+    }
+    free(shown);
+    free(turned);
+    return r;
+}
+
+static int find_normals(vgi_gltf_character *c, const vg_body *b, vg_err *e)
+{
+    int r = read_normals(c, e);
+    if (r < 0 || !c->normal) return r;
+    if ((r = group_normals(c, e)) < 0) return r;
+    c->rest = vgi_array(c->ngroups, 3 * sizeof(double), e), c->now = vgi_array(c->ngroups, 3 * sizeof(double), e);
+    if (!c->rest || !c->now) return VG_ENOMEM;
+    if (!c->kept && (r = turn_base(c, b, e)) < 0) return r;
+    face_normals(c, b->reference, c->rest);
+    return VG_OK;
+}
+
+/* ---- poses ---- */
+
+void vgi_gltf_character_pose(const vgi_gltf_character *c, const double *world, const float *moved, float *to)
+{
+    for (size_t f = 0; f < c->n; f++) {
+        const size_t v = 3 * (size_t)c->vertex[f];
+        double local[3];
+        affine(c->in + 12 * f, world + v, local);
+        const bool stays = moved[v] == 0 && moved[v + 1] == 0 && moved[v + 2] == 0;
+        for (int k = 0; k < 3; k++) to[3 * f + k] = stays ? 0 : (float)(local[k] - c->base[3 * f + k]);
+    }
+}
+
+void vgi_gltf_character_move(const vgi_gltf_character *c, const float *moved, float *to)
+{
+    for (size_t f = 0; f < c->n; f++) {
+        const float *d = moved + 3 * (size_t)c->vertex[f];
+        double local[3];
+        linear(c->in + 12 * f, (const double[3]){d[0], d[1], d[2]}, local);
+        for (int k = 0; k < 3; k++) to[3 * f + k] = (float)local[k];
+    }
+}
+
+/* ---- opening ---- */
+
+static int open_asset(vgi_gltf_character *c, const vg_asset *a, vg_err *e)
+{
+    vgi_input *in = NULL;
+    int r = vgi_input_memory(&in, a->data, a->size, "asset", e);
+    if (r < 0) return r;
+    r = vgi_gltf_open(&c->scene.g, in, "the asset", e);
+    vgi_input_free(&in);
+    if (r == VG_OK) r = vgi_gltf_scene_read(&c->scene, &c->faces, e);
+    if (r == VG_OK && c->scene.all != a->n) r = VG_EINPUT;
+    return r;
+}
+
+int vgi_gltf_character_open(vgi_gltf_character *c, const vg_body *b, vg_err *e)
+{
+    const vg_asset *a = &b->asset;
+    if (!a->n || a->digest != vg_mesh_digest(&b->mesh)) return 0;
+    int r = open_asset(c, a, e);
+    if (r == VG_ENOMEM) return r;
+    if (r < 0) return 0;
+    c->n = a->n, c->nv = b->mesh.nv, c->vertex = a->vertex;
+    vgi_gltf_rest(&c->scene);
+    if ((r = place(c, e)) <= 0) return r;
+    r = find_base(c, b, e);
+    if (r == VG_OK) r = find_normals(c, b, e);
+    return r < 0 ? r : 1;
+}
+
+void vgi_gltf_character_clear(vgi_gltf_character *c)
+{
+    void *const arrays[] = {c->out, c->in, c->base, c->normal, c->world_normal, c->skinned, c->group, c->rest, c->now};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
+    vg_mesh_clear(&c->faces.mesh);
+    vgi_gltf_scene_clear(&c->scene);
+}
