@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 static struct {
     const char *onto, *correspondence, *root, *examples, *sculpted;
@@ -226,6 +227,26 @@ static void load_target(work *w)
     if (vg_load(&w->pairs, opts.correspondence, "correspondence", &e) < 0) cli_die(&e);
 }
 
+static bool fits(const work *w, const vg_head *target)
+{
+    return vg_mesh_same(&w->h->body.mesh, "", &target->body.mesh, "", NULL) == VG_OK;
+}
+
+/* A GLB of the sequence's own vertices may have been welded in another way, by what touches in its only pose. */
+static void weld_like_sequence(work *w)
+{
+    const vg_source_options like = {.reading.like = &w->h->body};
+    struct stat st;
+    vg_head again = {0};
+    if (!opts.onto || opts.correspondence || fits(w, &w->target) || stat(opts.onto, &st) < 0 || !S_ISREG(st.st_mode))
+        return;
+    if (vg_load_with(&again, opts.onto, "mesh", &like, NULL, NULL) == VG_OK && fits(w, &again)) {
+        const vg_head old = w->target;
+        w->target = again, again = old;
+    }
+    vg_head_clear(&again);
+}
+
 /* The graphs: of a pair with one connectivity, the source's serves both. */
 static void make_graphs(work *w)
 {
@@ -418,6 +439,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     vg_err e;
     w->h = h, w->kind = h->kind;
     check_kind(w);
+    weld_like_sequence(w);
     set_root(w);
     make_graphs(w);
     for (size_t i = 0; i < BATCH && w->kind == VG_VERTICES; i++) /* room for the anchors that fill_body measures */

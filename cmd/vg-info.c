@@ -48,12 +48,20 @@ typedef struct channel_note {
     double least, most; /* numbers, or vertices of lists */
 } channel_note;
 
+/* Frames that are called "Walk.0001", "Walk.0002" and so on. */
+typedef struct animation {
+    char *name;
+    uint64_t frames;
+    double first_time, last_time; /* NaN: it has none */
+} animation;
+
 /* What reading all frames tells. */
 typedef struct contents {
     uint64_t frames, timed, turned, extra; /* turned: that say how joints have turned; extra: unknown records before
                                               frames */
     channel_note *channels;
-    size_t nchannels;
+    size_t nchannels, nanimations;
+    animation *animations;
     char *first, *last;            /* names */
     double first_time, last_time;
     double D; /* of the first frame of vertices */
@@ -66,6 +74,8 @@ static const report_column provenance_columns[] = {
     {.key = "program"}, {.key = "version"}, {.key = "args"}, {.key = "parents"}};
 static const report_column channel_columns[] = {{.key = "name"},   {.key = "unit"},  {.key = "element"}, {.key = "width"},
                                                 {.key = "frames"}, {.key = "least"}, {.key = "most"}};
+static const report_column animation_columns[] = {
+    {.key = "name"}, {.key = "frames"}, {.key = "first_time"}, {.key = "last_time"}};
 static const report_column vertex_columns[] = {
     {.key = "frame", .title = "frame"}, {.key = "name", .title = "name"},    {.key = "time", .title = "time"},
     {.key = "x", .title = "centroid x"}, {.key = "y", .title = "centroid y"}, {.key = "z", .title = "centroid z"}};
@@ -109,6 +119,34 @@ static void list_frame(report *r, const vg_head *h, const vg_frame *f, uint64_t 
     report_row(r, row);
 }
 
+/* "Walk.0001" is number 1 of an animation of 4 letters; 0: it is of none. */
+static size_t animation_of(const char *name, uint64_t *number)
+{
+    const char *dot = strrchr(name, '.');
+    char *end;
+    if (!dot || dot == name || dot[1] < '0' || dot[1] > '9') return 0;
+    *number = strtoull(dot + 1, &end, 10);
+    return *end ? 0 : (size_t)(dot - name);
+}
+
+/* The frame goes on with the last animation, or begins one. */
+static void note_animation(contents *c, const vg_frame *f)
+{
+    uint64_t number = 0;
+    const size_t n = animation_of(f->name, &number);
+    animation *last = c->nanimations ? &c->animations[c->nanimations - 1] : NULL;
+    const double time = f->has_time ? f->time : NAN;
+    if (n && last && number == last->frames + 1 && strlen(last->name) == n && !memcmp(last->name, f->name, n)) {
+        last->frames++;
+        last->last_time = time;
+    } else if (n && number == 1) {
+        c->animations = cli_resize(c->animations, c->nanimations + 1, sizeof *c->animations, "the names of animations");
+        last = &c->animations[c->nanimations++];
+        *last = (animation){cli_copy_text(f->name, "the names of animations"), 1, time, time};
+        last->name[n] = 0;
+    }
+}
+
 static void note_frame(contents *c, const vg_frame *f)
 {
     size_t turned;
@@ -119,6 +157,7 @@ static void note_frame(contents *c, const vg_frame *f)
         c->last_time = f->time;
         c->timed++;
     }
+    note_animation(c, f);
     vg_frame_turns(f, &turned);
     c->turned += turned > 0;
     c->extra += f->extra.n;
@@ -177,6 +216,28 @@ static void read_all(vg_source *s, contents *c, report *list)
     vg_frame_clear(&f);
 }
 
+/* A single one is said with the frames. */
+static void report_animations(report *r, const contents *c)
+{
+    char line[400];
+    for (size_t i = 0; i < c->nanimations && c->nanimations > 1; i++) {
+        const animation *a = &c->animations[i];
+        int k = snprintf(line, sizeof line, "'%.300s': %" PRIu64 " frames", a->name, a->frames);
+        if (!isnan(a->first_time))
+            snprintf(line + k, sizeof line - (size_t)k, ", %.6g s to %.6g s", a->first_time, a->last_time);
+        report_put(r, NULL, "animation", report_text(line));
+    }
+    if (!c->nanimations) return;
+    report_table(r, "animations", NULL, false, animation_columns, 4);
+    for (size_t i = 0; i < c->nanimations; i++) {
+        const animation *a = &c->animations[i];
+        const report_value row[4] = {report_text(a->name), report_count(a->frames),
+                                     isnan(a->first_time) ? report_nothing() : report_number(a->first_time),
+                                     isnan(a->last_time) ? report_nothing() : report_number(a->last_time)};
+        report_row(r, row);
+    }
+}
+
 static void report_frames(report *r, const vg_head *h, const contents *c)
 {
     char line[700];
@@ -196,7 +257,7 @@ static void report_frames(report *r, const vg_head *h, const contents *c)
     else if (c->frames == 1) snprintf(line, sizeof line, "1: '%.300s'", c->first);
     else snprintf(line, sizeof line, "%" PRIu64 ": '%.300s' to '%.300s'", c->frames, c->first, c->last);
     report_put(r, NULL, "frames", report_text(line));
-    if (!c->timed) return;
+    if (!c->timed || c->nanimations > 1) return;
     snprintf(line, sizeof line, "%.6g s to %.6g s", c->first_time, c->last_time);
     report_put(r, NULL, "times", report_text(line));
 }
@@ -302,7 +363,7 @@ static void report_mesh(report *r, const vg_head *h)
     report_put(r, "texture_coordinates", a->ntex ? "texture coordinates" : NULL, report_count(a->ntex));
     char asset[200];
     vg_asset_text(&h->body.asset, asset, sizeof asset);
-    report_put(r, "asset", h->body.asset.n ? "asset" : NULL, h->body.asset.n ? report_text(asset) : report_nothing());
+    report_put(r, "asset", *asset ? "asset" : NULL, h->body.asset.n ? report_text(asset) : report_nothing());
     report_put(r, "labels", a->nlabels ? "labels" : NULL, report_count(a->nlabels));
     report_put(r, "selected_faces", h->has_selection ? "selected faces" : NULL,
                h->has_selection ? report_count(h->nselected) : report_nothing());
@@ -562,6 +623,7 @@ static void report_all(report *r, const char *operand, const vg_head *h, const c
 {
     report_name(r, operand);
     report_frames(r, h, c);
+    report_animations(r, c);
     report_channels(r, c);
     report_mesh(r, h);
     report_correspondence(r, h, c->D);

@@ -302,6 +302,39 @@ assert 1 < len(targets) < 46 and all("NORMAL" in t for t in targets), len(target
 END
 }
 
+@test "several animations: vg-info lists them, vg-decode writes them, each with its own times" {
+    py <<'END'
+import make_character
+make_character.main("in.glb")
+END
+    must vg-encode in.glb -o all.vgs
+    pipe 'vg-info all.vgs'
+    shows "animation  'Wave': 3 frames, 0.25 s to 1 s" "animation  'Nod': 2 frames, 0 s to 0.5 s"
+    must vg-decode all.vgs -o out.glb
+    must vg-encode out.glb -o back.vgs
+    must vg-diff -t 1e-7 all.vgs back.vgs
+    pipe 'vg-info --frames back.vgs'
+    shows '    2  Wave.0003     1  ' '    3  Nod.0001      0  ' '    4  Nod.0002    0.5  '
+    must vg-encode --animation Nod out.glb -o nod.vgs
+    pipe 'vg-info nod.vgs'
+    shows "frames     2: 'Nod.0001' to 'Nod.0002'" 'times      0 s to 0.5 s'
+    # Names that are no animations make one.
+    cat >names.py <<'END'
+import make_corpus as m, sys
+def write(name, names):
+    open(name, "wb").write(m.whole(m.content(frames=[m.pose(n, m.BENT[:4]) for n in names])))
+write("single.vgs", ["A.0001", "B.0001", "C.0001"])
+write("gap.vgs", ["A.0001", "A.0002", "B.0001", "B.0003"])
+write("two.vgs", ["A.1", "A.2", "B.1", "B.2", "B.3"])
+END
+    must env PYTHONPATH="$ROOT/tests" python3 names.py
+    local name
+    for name in single gap two; do
+        must vg-decode --replace -o $name.glb $name.vgs
+        [ "$(tr '{' '\n' <$name.glb | grep -a -c '"channels"')" = "$([ $name = two ] && echo 2 || echo 1)" ] || fail "$name.glb"
+    done
+}
+
 @test "what a format cannot keep of a character is named once; it is of its own mesh only" {
     local all='2 materials, 1 texture, normals, colours of vertices, further texture coordinates, 1 skin, 1 camera'
     py <<'END'

@@ -346,6 +346,24 @@ EOF
     shows 'vertices    8'
     pipe 'vg-encode --weld off lips_target.gltf | vg-info'
     shows 'vertices    10'
+    # As a target it takes the welding of the source, in which the lips are apart: the mouth opens, by half a unit in the source.
+    pipe 'vg-encode lips_source.gltf | vg-deform --onto lips_target.gltf | vg-solve | vg-decode -o - --format npz >out.npz'
+    py <<'END'
+import io, struct, zipfile, ast
+z = zipfile.ZipFile("out.npz")
+def array(name):
+    b = z.read(name + ".npy")
+    n, = struct.unpack("<H", b[8:10])
+    shape = ast.literal_eval(b[10:10 + n].decode())["shape"]
+    return shape, struct.unpack(f"<{len(b[10 + n:]) // 4}f", b[10 + n:])
+(frames, nv, _), p = array("positions")
+assert (frames, nv) == (2, 10), (frames, nv)
+at = [[p[30 * f + 3 * v:30 * f + 3 * v + 3] for v in range(10)] for f in range(2)]
+pairs = [(a, b) for a in range(10) for b in range(a) if max(abs(x - y) for x, y in zip(at[0][a], at[0][b])) < 1e-6]
+assert len(pairs) == 2, pairs
+for a, b in pairs:
+    assert abs(sum((x - y) ** 2 for x, y in zip(at[1][a], at[1][b])) ** 0.5 - 0.5) < 0.1
+END
 }
 
 @test "glTF: texture coordinates and the names of nodes and materials reach OBJ; images are named as left out" {

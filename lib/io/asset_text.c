@@ -34,7 +34,6 @@ static void say_count(char *to, size_t room, size_t n, const char *thing)
     if (n) say(to, room, text);
 }
 
-/* An asset that cannot be read is called so: nothing else is known of it. */
 void vg_asset_text(const vg_asset *a, char *to, size_t room)
 {
     vgi_gltf g = {0};
@@ -52,7 +51,6 @@ void vg_asset_text(const vg_asset *a, char *to, size_t room)
         say_count(to, room, count(&g, "skins"), "skin");
         say_count(to, room, count(&g, "cameras"), "camera");
     }
-    if (!*to && a->n) say(to, room, r == VG_OK ? "nodes" : "an asset");
     vgi_input_free(&in);
     vgi_gltf_clear(&g);
 }

@@ -289,14 +289,14 @@ static int put_file(packing *k, vg_bytes *to, vg_err *e)
     return VG_OK;
 }
 
-/* Is there more than the mesh itself has: faces, positions, the first texture coordinates? */
-static bool has_more(const vgi_gltf_scene *x)
+/* Is there more than the mesh itself has: faces, positions, the first texture coordinates, as many vertices? */
+static bool has_more(const vgi_gltf_scene *x, const vg_mesh *mesh)
 {
     static const char *const lists[] = {"materials", "skins", "cameras", "images"};
     const vgi_json *doc = x->g.json;
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
         if (vgi_json_count(vgi_json_get(doc, lists[i]))) return true;
-    if (x->nnodes > 1) return true;
+    if (x->nnodes > 1 || (mesh->nv != x->all && !x->own)) return true;
     for (size_t i = 0; i < x->nparts; i++)
         for (const char *key = vgi_json_key(x->parts[i].attributes, NULL); key;
              key = vgi_json_key(x->parts[i].attributes, key))
@@ -308,7 +308,7 @@ int vgi_gltf_take_asset(vgi_gltf_scene *x, vgi_input *in, const vg_mesh *mesh, v
 {
     packing k = {.g = &x->g, .in = in, .note = &x->note};
     vg_bytes file = {0};
-    if (!has_more(x)) return VG_OK;
+    if (!has_more(x, mesh)) return VG_OK;
     k.doc = vgi_json_copy(x->g.json, e);
     k.accessor_of = vgi_array(vgi_json_count(vgi_json_get(x->g.json, "accessors")), sizeof *k.accessor_of, e);
     int r = k.doc && k.accessor_of ? move_all(&k, e) : VG_ENOMEM;

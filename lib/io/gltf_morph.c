@@ -390,7 +390,12 @@ static int describe_weights(vgi_gltf_writing *w, vg_err *e)
     morphs *x = w->own;
     x->weights = w->naccessors;
     int r = vgi_gltf_view(w, VGI_GLTF_ITEM * w->frames * x->targets, "", e);
-    return r < 0 ? r : vgi_gltf_say_accessor(w, 0, VGI_GLTF_FLOAT, w->frames * x->targets, "SCALAR", NULL, 0, e);
+    for (size_t i = 0; i < w->ntakes && r == VG_OK; i++) {
+        const vgi_gltf_take *t = &w->takes[i];
+        r = vgi_gltf_say_accessor(w, VGI_GLTF_ITEM * t->first * x->targets, VGI_GLTF_FLOAT, t->count * x->targets, "SCALAR",
+                                  NULL, 0, e);
+    }
+    return r;
 }
 
 static int say_primitives(vgi_gltf_writing *w, vg_err *e)
@@ -472,19 +477,27 @@ static int say_channels(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-static int say_animation(vgi_gltf_writing *w, vg_err *e)
+static int say_take(vgi_gltf_writing *w, size_t number, vg_err *e)
 {
     const morphs *x = w->own;
-    int r = vgi_gltf_say(&w->json, e, ",\n\"animations\":[{\"name\":");
-    if (r == VG_OK) r = vgi_gltf_say_clip_name(w, e);
+    const vgi_gltf_take *t = &w->takes[number];
+    int r = vgi_gltf_say(&w->json, e, "%s{\"name\":", number ? ",\n" : "");
+    if (r == VG_OK) r = vgi_gltf_say_take_name(w, t, e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, ",\"channels\":[");
     if (r == VG_OK) r = say_channels(w, e);
     if (r == VG_OK)
         r = vgi_gltf_say(&w->json, e,
                          "],\"samplers\":[{\"input\":%zu,\"output\":%zu,\"interpolation\":\"LINEAR\"}],\n\"extras\":{",
-                         w->moments, x->weights);
-    if (r == VG_OK) r = vgi_gltf_say_names(w, VGI_GLTF_FRAMES, NULL, w->frames, e);
-    return r < 0 ? r : vgi_gltf_say(&w->json, e, "}}]");
+                         t->moments, x->weights + number);
+    if (r == VG_OK) r = vgi_gltf_say_names(w, VGI_GLTF_FRAMES, t->first, t->count, e);
+    return r < 0 ? r : vgi_gltf_say(&w->json, e, "}}");
+}
+
+static int say_animations(vgi_gltf_writing *w, vg_err *e)
+{
+    int r = vgi_gltf_say(&w->json, e, ",\n\"animations\":[");
+    for (size_t i = 0; i < w->ntakes && r == VG_OK; i++) r = say_take(w, i, e);
+    return r < 0 ? r : vgi_gltf_say(&w->json, e, "]");
 }
 
 static size_t target_of(const void *context, size_t t, size_t l)
@@ -518,7 +531,7 @@ static int describe(vgi_gltf_writing *w, vg_err *e)
     if (r == VG_OK && !w->still) r = describe_weights(w, e);
     if (r == VG_OK) r = describe_points(w, e);
     if (r == VG_OK) r = w->character ? say_cast(w, e) : say_scene(w, e);
-    return r < 0 || w->still ? r : say_animation(w, e);
+    return r < 0 || w->still ? r : say_animations(w, e);
 }
 
 /* ---- bytes ---- */
@@ -636,4 +649,4 @@ static void release(void *own)
     free(x);
 }
 
-const vgi_gltf_manner vgi_gltf_by_morphs = {begin, put, describe, emit, warning, release, "use --max-targets"};
+const vgi_gltf_manner vgi_gltf_by_morphs = {begin, put, describe, emit, warning, release, "use --max-targets", true};

@@ -157,7 +157,7 @@ static int begin_moment(vgi_gltf_scene *x, size_t i, vg_frame *f, vg_err *e)
     const vgi_gltf_moment *m = &x->moments[i];
     const vgi_gltf_clip *c = &x->clips[m->clip];
     const char *name = vgi_json_text(vgi_json_at(c->names, i - c->frames));
-    f->has_time = x->nclips == 1, f->time = f->has_time ? m->time : 0; /* else time would start again */
+    f->has_time = true, f->time = m->time; /* of each animation anew */
     int r = vgi_gltf_animate(x, m, e);
     if (r == VG_OK && name) return vg_frame_rename(f, name, e);
     return r == VG_OK && c->name && !x->own ? name_by_clip(f, c->name, i - c->frames + 1, e) : r;
@@ -205,7 +205,7 @@ static int take_reference(vgi_gltf_scene *x, vg_head *h, vg_err *e)
 
 static int set_up(vgi_gltf_scene *x, const vg_reading *how, vg_err *e)
 {
-    x->rate = how->fps, x->as_shapes = how->shapes, x->unwelded = how->unwelded;
+    x->rate = how->fps, x->as_shapes = how->shapes, x->unwelded = how->unwelded, x->like = how->like;
     if (!how->animation) return VG_OK;
     return (x->wanted = vgi_copy_string(how->animation, strlen(how->animation), e)) ? VG_OK : VG_ENOMEM;
 }

@@ -109,6 +109,7 @@ typedef struct vgi_gltf_scene {
     bool strips;    /* some faces are strips or fans */
     char *wanted;  /* the animation that is asked for; NULL: all */
     double rate;   /* sampled so often a second; 0: at the times of the keys */
+    const vg_body *like; /* its welding is taken where it fits; while the file is opened; NULL */
     bool unwelded; /* vertices stay as the file has them */
     bool as_shapes; /* morph targets instead of animations */
     vg_note note;

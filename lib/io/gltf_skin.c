@@ -323,7 +323,7 @@ static int say_animation(vgi_gltf_writing *w, vg_err *e)
 {
     const skinning *x = w->own;
     int r = vgi_gltf_say(&w->json, e, "\"animations\":[{\"name\":");
-    if (r == VG_OK) r = vgi_gltf_say_clip_name(w, e);
+    if (r == VG_OK) r = vgi_gltf_say_take_name(w, &w->takes[0], e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, ",\"channels\":[");
     for (size_t i = 0; i < x->nchannels && r == VG_OK; i++)
         r = vgi_gltf_say(&w->json, e, "%s{\"sampler\":%zu,\"target\":{\"node\":%zu,\"path\":\"%s\"}}", i ? ",\n" : "",
@@ -331,9 +331,9 @@ static int say_animation(vgi_gltf_writing *w, vg_err *e)
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "],\n\"samplers\":[");
     for (size_t i = 0; i < x->nchannels && r == VG_OK; i++)
         r = vgi_gltf_say(&w->json, e, "%s{\"input\":%zu,\"output\":%zu,\"interpolation\":\"LINEAR\"}", i ? ",\n" : "",
-                         w->moments, x->outputs + i);
+                         w->takes[0].moments, x->outputs + i);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "],\n\"extras\":{");
-    if (r == VG_OK) r = vgi_gltf_say_names(w, VGI_GLTF_FRAMES, NULL, w->frames, e);
+    if (r == VG_OK) r = vgi_gltf_say_names(w, VGI_GLTF_FRAMES, 0, w->frames, e);
     return r < 0 ? r : vgi_gltf_say(&w->json, e, "}}]");
 }
 
@@ -456,4 +456,4 @@ static void release(void *own)
     free(x);
 }
 
-const vgi_gltf_manner vgi_gltf_by_skin = {begin, put, describe, emit, NULL, release, "write fewer frames"};
+const vgi_gltf_manner vgi_gltf_by_skin = {begin, put, describe, emit, NULL, release, "write fewer frames", false};

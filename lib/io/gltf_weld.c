@@ -222,6 +222,65 @@ static size_t own_vertices(const vgi_gltf_scene *x, uint32_t *number)
     return (size_t)nv;
 }
 
+/* Positions of vertices v and w, before welding, of one node. */
+static bool at_one_place(const vgi_gltf_scene *x, size_t v, size_t w)
+{
+    const vgi_gltf_part *p = part_of(x, v), *q = part_of(x, w);
+    return p->node == q->node && p->instance == q->instance &&
+           same_element(&p->position, v - p->first, &q->position, w - q->first);
+}
+
+static bool is_whole(const uint32_t *v, size_t n, const uint32_t *number)
+{
+    for (size_t k = 0; k < n && n <= 3; k++)
+        if (number[v[k]] == number[v[(k + 1) % n]]) return false;
+    return true;
+}
+
+/* Do these numbers make the faces of `to`, but for those that shrink to nothing? */
+static bool makes_faces(const vg_mesh *m, const uint32_t *number, const vg_mesh *to)
+{
+    size_t face = 0;
+    for (size_t f = 0; f < m->nf; f++) {
+        const uint32_t *v = m->vert + m->start[f];
+        const size_t n = m->start[f + 1] - m->start[f];
+        if (!is_whole(v, n, number)) continue;
+        if (face == to->nf || to->start[face + 1] - to->start[face] != n) return false;
+        for (size_t k = 0; k < n; k++)
+            if (number[v[k]] != to->vert[to->start[face] + k]) return false;
+        face++;
+    }
+    return face == to->nf;
+}
+
+/* The welding of another file of the same vertices, so that what is one there is one here, and what is not, is not: lips
+ * that touch in this pose alone. How many vertices; 0: it does not fit. */
+static size_t vertices_of_like(const vgi_gltf_scene *x, const vg_mesh *m, uint32_t *number, uint32_t *first)
+{
+    const vg_asset *a = x->like && x->like->asset.n ? &x->like->asset : NULL;
+    size_t n = 0;
+    if (!x->like || x->own || x->unwelded || (a ? a->n : x->like->mesh.nv) != x->all) return 0;
+    if (a && a->digest != vg_mesh_digest(&x->like->mesh)) return 0;
+    for (size_t v = 0; v < x->all; v++) {
+        const uint32_t to = a ? a->vertex[v] : (uint32_t)v;
+        if (to > n || (to < n && !at_one_place(x, v, first[to]))) return 0;
+        if (to == n) first[n++] = (uint32_t)v;
+        number[v] = to;
+    }
+    return n == x->like->mesh.nv && makes_faces(m, number, &x->like->mesh) ? n : 0;
+}
+
+/* Each vertex as the first of the file's that are it. */
+static int keep_listed(vgi_gltf_scene *x, const uint32_t *first, size_t n, vg_err *e)
+{
+    for (size_t i = 0, at = 0; i < x->nparts; i++) {
+        vgi_gltf_part *p = &x->parts[i];
+        if (!(p->kept = vgi_array_raw(p->count, sizeof *p->kept, e))) return VG_ENOMEM;
+        while (at < n && first[at] < p->first + p->count) p->kept[p->nkept++] = (uint32_t)(first[at++] - p->first);
+    }
+    return VG_OK;
+}
+
 static int keep_first(vgi_gltf_part *p, size_t n, vg_err *e)
 {
     if (!(p->kept = vgi_array_raw(n, sizeof *p->kept, e))) return VG_ENOMEM;
@@ -300,16 +359,28 @@ static int take_uv(vgi_gltf_scene *x, const vg_mesh *m, vg_err *e)
     return VG_OK;
 }
 
+static int weld_parts(vgi_gltf_scene *x, const welding *k, size_t *n, vg_err *e)
+{
+    int r = VG_OK;
+    *n = 0;
+    for (size_t i = 0; i < x->nparts && r == VG_OK; i++) r = weld_part(x, k, &x->parts[i], n, e);
+    return r;
+}
+
 static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
 {
     welding k = {.x = x, .nslots = 4};
     while (k.nslots < 2 * x->all) k.nslots *= 2;
     k.slots = vgi_array(k.nslots, sizeof *k.slots, e), k.number = x->number = vgi_array_raw(x->all, sizeof *k.number, e);
     int r = k.slots && k.number ? VG_OK : VG_ENOMEM;
-    size_t n = r == VG_OK ? own_vertices(x, k.number) : 0;
-    if (n) r = keep_first(&x->parts[0], n, e);
-    else
-        for (size_t i = 0; i < x->nparts && r == VG_OK; i++) r = weld_part(x, &k, &x->parts[i], &n, e);
+    size_t own = r == VG_OK ? own_vertices(x, k.number) : 0, n = own;
+    if (r == VG_OK && !n) n = vertices_of_like(x, m, k.number, k.slots);
+    if (own) r = keep_first(&x->parts[0], n, e);
+    else if (n) r = keep_listed(x, k.slots, n, e);
+    else if (r == VG_OK) {
+        memset(k.slots, 0, k.nslots * sizeof *k.slots);
+        r = weld_parts(x, &k, &n, e);
+    }
     if (r == VG_OK) r = take_uv(x, m, e);
     if (r == VG_OK) x->dropped = renumber(x, m, k.number, x->attributes.corner_tex);
     m->nv = n;

@@ -5,9 +5,7 @@
  * The frames wait in a file without a name.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
-#include "io/rate.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -95,30 +93,12 @@ int vgi_gltf_put(void *state, const vg_frame *f, vg_err *e)
     if (r == VG_OK) r = vgi_grow(&w->times, &w->times_cap, w->frames + 1, sizeof *w->times, e);
     if (r < 0) return r;
     w->times[w->frames++] = f->has_time ? f->time : NAN;
-    w->some_timed |= f->has_time;
     return VG_OK;
 }
 
 int vgi_gltf_load(const vgi_gltf_writing *w, uint64_t off, unsigned char *to, size_t n, vg_err *e)
 {
     return vgi_read_back(w->spool.fd, off, to, n, e);
-}
-
-/* ---- times ---- */
-
-/* An animation begins at 0 or later and goes on, in binary32. */
-static bool times_fit(const vgi_gltf_writing *w)
-{
-    for (size_t i = 0; i < w->frames; i++) {
-        double t = w->times[i];
-        if (!(t >= 0 && t <= FLT_MAX) || (i > 0 && !((float)t > (float)w->times[i - 1]))) return false;
-    }
-    return true;
-}
-
-static double time_of(const vgi_gltf_writing *w, size_t i)
-{
-    return (float)(w->timed ? w->times[i] : (double)i / VGI_FPS);
 }
 
 /* ---- JSON ---- */
@@ -154,12 +134,12 @@ int vgi_gltf_say_numbers(vg_bytes *to, const char *before, const double *p, size
     return r < 0 ? r : vgi_gltf_say(to, e, "%s", behind);
 }
 
-int vgi_gltf_say_names(vgi_gltf_writing *w, const char *key, const size_t *which, size_t n, vg_err *e)
+int vgi_gltf_say_names(vgi_gltf_writing *w, const char *key, size_t first, size_t n, vg_err *e)
 {
     int r = vgi_gltf_say(&w->json, e, "\"%s\":[", key);
     for (size_t i = 0; i < n && r == VG_OK; i++) {
         if (i > 0) r = vgi_gltf_say(&w->json, e, ",");
-        if (r == VG_OK) r = vgi_gltf_say_text(&w->json, w->names.at[which ? which[i] : i], e);
+        if (r == VG_OK) r = vgi_gltf_say_text(&w->json, w->names.at[first + i], e);
     }
     return r < 0 ? r : vgi_gltf_say(&w->json, e, "]");
 }
@@ -169,30 +149,6 @@ int vgi_gltf_say_mesh_name(vgi_gltf_writing *w, vg_err *e)
     const char *name = w->h->body.reference_name ? w->h->body.reference_name : "";
     int r = vgi_gltf_say(&w->json, e, "\"name\":");
     return r < 0 ? r : vgi_gltf_say_text(&w->json, *name ? name : "mesh", e);
-}
-
-/* Of "Walk.0001": how long "Walk" is; 0: it is no such name. */
-static size_t stem_of(const char *name)
-{
-    size_t n = strlen(name), end = n;
-    while (n > 0 && name[n - 1] >= '0' && name[n - 1] <= '9') n--;
-    return n > 1 && n < end && name[n - 1] == '.' ? n - 1 : 0;
-}
-
-/* What all frames are called after, or else a word. */
-int vgi_gltf_say_clip_name(vgi_gltf_writing *w, vg_err *e)
-{
-    if (w->clip) return vgi_gltf_say_text(&w->json, w->clip, e);
-    const char *first = w->names.n ? w->names.at[0] : "";
-    const size_t n = stem_of(first);
-    bool same = n > 0;
-    for (size_t i = 1; i < w->names.n && same; i++)
-        same = stem_of(w->names.at[i]) == n && !memcmp(w->names.at[i], first, n);
-    char *stem = same ? vgi_copy_string(first, n, e) : NULL;
-    if (same && !stem) return VG_ENOMEM;
-    int r = vgi_gltf_say_text(&w->json, stem ? stem : "sequence", e);
-    free(stem);
-    return r;
 }
 
 static int say_primitive(vgi_gltf_writing *w, bool first, int mode, bool indexed, size_t indices,
@@ -266,14 +222,10 @@ static int describe_character(vgi_gltf_writing *w, vg_err *e)
 
 static int describe(vgi_gltf_writing *w, vg_err *e)
 {
-    const double between[2] = {time_of(w, 0), time_of(w, w->frames - 1)};
     int r = w->character ? describe_character(w, e) : describe_indices(w, &w->shape.triangles, &w->triangles, e);
     if (r == VG_OK) r = describe_indices(w, &w->shape.lines, &w->lines, e);
     if (r == VG_OK) r = describe_texture(w, e);
-    w->moments = w->naccessors;
-    if (r == VG_OK && !w->still) r = vgi_gltf_view(w, VGI_GLTF_ITEM * w->frames, "", e);
-    if (r == VG_OK && !w->still)
-        r = vgi_gltf_say_accessor(w, 0, VGI_GLTF_FLOAT, w->frames, "SCALAR", between, 1, e);
+    if (r == VG_OK && !w->still) r = vgi_gltf_describe_times(w, e);
     return r < 0 ? r : w->manner->describe(w, e);
 }
 
@@ -335,10 +287,7 @@ static int emit_all(vgi_gltf_writing *w, vg_err *e)
     if (r == VG_OK) r = vgi_gltf_emit(w, w->shape.triangles.data, w->shape.triangles.size, e);
     if (r == VG_OK) r = vgi_gltf_emit(w, w->shape.lines.data, w->shape.lines.size, e);
     if (r == VG_OK && w->seams.uv) r = vgi_gltf_emit_singles(w, w->seams.uv, 2 * w->seams.n, e);
-    for (size_t i = 0; i < w->frames && r == VG_OK && !w->still; i++) {
-        float t = (float)time_of(w, i);
-        r = vgi_gltf_emit_singles(w, &t, 1, e);
-    }
+    if (r == VG_OK && !w->still) r = vgi_gltf_emit_times(w, e);
     return r < 0 ? r : w->manner->emit(w, e);
 }
 
@@ -396,7 +345,7 @@ static void note_loss(vgi_gltf_writing *w, const char *what)
 static void note_losses(vgi_gltf_writing *w)
 {
     const vg_body *b = &w->h->body;
-    if (w->some_timed && !w->timed) note_loss(w, "the times of the frames: they do not ascend from 0 or later");
+    if (w->times_lost) note_loss(w, "the times of the frames: they do not ascend from 0 or later");
     if (!w->character) {
         char asset[120];
         vg_asset_text(&b->asset, asset, sizeof asset);
@@ -428,8 +377,8 @@ static int make_shape(vgi_gltf_writing *w, vg_err *e)
 int vgi_gltf_end(void *state, vg_err *e)
 {
     vgi_gltf_writing *w = state;
-    w->timed = times_fit(w);
     int r = vgi_output_flush(&w->spool, e);
+    if (r == VG_OK) r = vgi_gltf_find_takes(w, w->manner->splits, e);
     if (r == VG_OK && !w->character) r = make_shape(w, e);
     if (r == VG_OK) r = say_all(w, e);
     if (r == VG_OK) r = w->binary ? put_binary(w, e) : put_text(w, e);
@@ -454,6 +403,7 @@ void vgi_gltf_release(void *state)
     vgi_output_clear(&w->spool);
     vgi_names_clear(&w->names);
     free(w->times);
+    free(w->takes);
     free(w->base);
     vgi_gltf_shape_clear(&w->shape);
     vgi_gltf_seams_clear(&w->seams);

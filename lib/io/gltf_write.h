@@ -33,28 +33,39 @@ typedef struct vgi_gltf_manner {
     void (*warning)(const vgi_gltf_writing *w, char *to, size_t room);
     void (*release)(void *own);
     const char *too_big; /* what to do about it */
+    bool splits;         /* there may be several animations */
 } vgi_gltf_manner;
 extern const vgi_gltf_manner vgi_gltf_by_morphs, vgi_gltf_by_skin;
+
+typedef struct vgi_gltf_take {
+    size_t first, count;  /* frames */
+    size_t stem;          /* length of what their names begin with; 0: nothing */
+    bool timed;           /* they have times that an animation can have */
+    size_t moments;       /* number of their accessor */
+} vgi_gltf_take;
 
 struct vgi_gltf_writing {
     const vgi_gltf_manner *manner;
     void *own;                 /* of the manner */
     vgi_output *out, spool;    /* spool: frames as they wait, in a file without a name */
     const vg_head *h;
-    bool binary, timed, some_timed;
+    bool binary;
     bool still;                /* shapes without an animation */
     const char *clip;          /* what the animation is called; NULL: after the frames */
     size_t frames;
     vgi_names names;
-    double *times;
+    double *times;             /* NaN: it has none */
     size_t times_cap;
+    vgi_gltf_take *takes;      /* at the end: frames 0 to frames - 1, one after the other */
+    size_t ntakes;
+    bool times_lost;
     vgi_gltf_character *character; /* whose nodes, materials and attributes are written; NULL: none */
     vgi_gltf_seams seams;      /* vertices of the file; of a skin those of the mesh */
     float *base;               /* the reference pose as it will be read, seams.n points */
     vgi_gltf_shape shape;
     vg_bytes json, views, accessors; /* text */
     size_t nviews, naccessors, bytes;
-    size_t triangles, lines, texture, moments; /* numbers of their accessors; those of no bytes have none */
+    size_t triangles, lines, texture; /* numbers of their accessors; those of no bytes have none */
     unsigned char carry[3];    /* base64: bytes that wait for their third */
     size_t ncarry;
     char warning[400];
@@ -88,10 +99,16 @@ int vgi_gltf_say(vg_bytes *to, vg_err *e, const char *format, ...) VG_PRINTF(3, 
 int vgi_gltf_say_text(vg_bytes *to, const char *s, vg_err *e) VG_MUST_CHECK; /* in quotes */
 int vgi_gltf_say_numbers(vg_bytes *to, const char *before, const double *p, size_t n, const char *behind,
                          vg_err *e) VG_MUST_CHECK;
-/* vgi_gltf_say_names: "KEY":[names of frames `which`, or of the first n]. */
-int vgi_gltf_say_names(vgi_gltf_writing *w, const char *key, const size_t *which, size_t n, vg_err *e) VG_MUST_CHECK;
-/* vgi_gltf_say_clip_name: what the animation is called, in quotes. */
-int vgi_gltf_say_clip_name(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_say_names: "KEY":[names of n frames from `first` on]. */
+int vgi_gltf_say_names(vgi_gltf_writing *w, const char *key, size_t first, size_t n, vg_err *e) VG_MUST_CHECK;
+
+/* ---- gltf_takes.c: which frames are one animation, what it is called, and when they are ---- */
+/* vgi_gltf_find_takes: all are one; or, split, as many as their names say: "Walk.0001", "Walk.0002", "Run.0001". */
+int vgi_gltf_find_takes(vgi_gltf_writing *w, bool split, vg_err *e) VG_MUST_CHECK;
+int vgi_gltf_describe_times(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
+int vgi_gltf_emit_times(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
+int vgi_gltf_say_take_name(vgi_gltf_writing *w, const vgi_gltf_take *t, vg_err *e) VG_MUST_CHECK; /* in quotes */
+
 /* vgi_gltf_say_primitives: "primitives":[...], one for each kind of face; moving: what is said of attributes and
  * targets. */
 int vgi_gltf_say_primitives(vgi_gltf_writing *w, const vg_bytes *moving, vg_err *e) VG_MUST_CHECK;

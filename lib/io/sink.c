@@ -258,7 +258,7 @@ static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
                {!(keeps & VGI_KEEPS_ORDER), "the numbers of the vertices, and those in no face"},
                {!(keeps & VGI_KEEPS_TEXTURE) && h->body.attributes.ntex, "texture coordinates"},
                {!(keeps & VGI_KEEPS_LABELS) && h->body.attributes.nlabels, "groups and materials"},
-               {!(keeps & VGI_KEEPS_ASSET) && h->body.asset.n, asset},
+               {!(keeps & VGI_KEEPS_ASSET) && *asset, asset},
                {!(keeps & VGI_KEEPS_SKELETON) && h->body.skeleton.njoints, "the skeleton"},
                {f && !(keeps & VGI_KEEPS_NAMES) && s->names_lost && s->frames > 1, "the names of the frames"},
                {f && !(keeps & VGI_KEEPS_TIMES) && s->times_lost, "the times of the frames"},

@@ -82,7 +82,8 @@ typedef struct vg_asset {
 } vg_asset;
 
 void vg_asset_clear(vg_asset *a);
-/* vg_asset_text: what it holds, "2 materials, 1 texture, normals, 1 skin"; empty when there is none. */
+/* vg_asset_text: what it holds, "2 materials, 1 texture, normals, 1 skin"; empty when there is none, or
+ * nothing but nodes and vertices. */
 void vg_asset_text(const vg_asset *a, char *to, size_t room);
 
 /* A skeleton: joint j is vertex j of the mesh, whose faces are the bones (parent, child) in the order of their

@@ -60,6 +60,8 @@ typedef struct vg_reading {
     double fps;             /* glTF: a frame so often a second, from the first key to the last; 0: at each key */
     bool shapes;            /* glTF: morph targets, whatever animations there are */
     bool unwelded;          /* glTF: vertices as the file has them, cut apart at seams */
+    const vg_body *like;    /* glTF: a body; a file with as many vertices as that one's file, or it itself, which make the
+                               same faces, is welded as it is. NULL: by itself */
 } vg_reading;
 
 int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err *e) VG_MUST_CHECK;

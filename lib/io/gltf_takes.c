@@ -1,0 +1,125 @@
+/* gltf_takes.c: which frames of a sequence are one animation of glTF, what it is called, and when they are.
+ * Frames "Walk.0001", "Walk.0002", "Run.0001", "Run.0002" are two, as the reader calls the frames of two animations.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf_write.h"
+#include "io/rate.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+
+/* Of "Walk.0001": how long "Walk" is; 0: it is no such name. *number: 1. */
+static size_t stem_of(const char *name, uint64_t *number)
+{
+    size_t n = strlen(name), end = n;
+    *number = 0;
+    while (n > 0 && name[n - 1] >= '0' && name[n - 1] <= '9') n--;
+    for (size_t i = n; i < end; i++) *number = 10 * *number + (uint64_t)(name[i] - '0');
+    return n > 1 && n < end && name[n - 1] == '.' ? n - 1 : 0;
+}
+
+static bool same_stem(const char *a, const char *b, size_t n)
+{
+    uint64_t number;
+    return n && stem_of(a, &number) == n && stem_of(b, &number) == n && !memcmp(a, b, n);
+}
+
+/* Is frame i the first of an animation, by the names? Their numbers count from 1. */
+static bool begins(const vgi_gltf_writing *w, size_t i)
+{
+    uint64_t number;
+    return i == 0 || (stem_of(w->names.at[i], &number) && number == 1);
+}
+
+/* Can the names be taken so: from 1 on, one after the other, more than one frame each? */
+static bool are_counted(const vgi_gltf_writing *w)
+{
+    for (size_t i = 0, first = 0; i < w->frames; i++) {
+        uint64_t number;
+        const size_t n = stem_of(w->names.at[i], &number);
+        if (begins(w, i)) {
+            if (i > 0 && i - first < 2) return false;
+            first = i;
+        }
+        if (number != i - first + 1 || !same_stem(w->names.at[i], w->names.at[first], n)) return false;
+        if (i + 1 == w->frames && i == first) return false;
+    }
+    return true;
+}
+
+/* Times of an animation begin at 0 or later and ascend, in binary32. */
+static bool times_fit(const vgi_gltf_writing *w, const vgi_gltf_take *t)
+{
+    for (size_t i = t->first; i < t->first + t->count; i++) {
+        const double at = w->times[i];
+        if (!(at >= 0 && at <= FLT_MAX) || (i > t->first && !((float)at > (float)w->times[i - 1]))) return false;
+    }
+    return true;
+}
+
+static void finish_take(vgi_gltf_writing *w, vgi_gltf_take *t)
+{
+    uint64_t number;
+    const char *first = w->names.at[t->first];
+    t->stem = stem_of(first, &number);
+    t->timed = times_fit(w, t);
+    for (size_t i = t->first; i < t->first + t->count; i++) {
+        if (!same_stem(first, w->names.at[i], t->stem)) t->stem = 0;
+        w->times_lost |= !t->timed && !isnan(w->times[i]);
+    }
+}
+
+int vgi_gltf_find_takes(vgi_gltf_writing *w, bool split, vg_err *e)
+{
+    size_t n = 1;
+    split = split && !w->clip && are_counted(w);
+    for (size_t i = 1; i < w->frames && split; i++) n += begins(w, i);
+    if (!(w->takes = vgi_array(n, sizeof *w->takes, e))) return VG_ENOMEM;
+    for (size_t i = 0; i < w->frames; i++) {
+        if (i == 0 || (split && begins(w, i))) w->takes[w->ntakes++].first = i;
+        w->takes[w->ntakes - 1].count++;
+    }
+    for (size_t i = 0; i < w->ntakes; i++) finish_take(w, &w->takes[i]);
+    return VG_OK;
+}
+
+/* ---- what is written ---- */
+
+static double time_of(const vgi_gltf_writing *w, const vgi_gltf_take *t, size_t i)
+{
+    return (float)(t->timed ? w->times[t->first + i] : (double)i / VGI_FPS);
+}
+
+int vgi_gltf_describe_times(vgi_gltf_writing *w, vg_err *e)
+{
+    int r = vgi_gltf_view(w, VGI_GLTF_ITEM * w->frames, "", e);
+    for (size_t i = 0; i < w->ntakes && r == VG_OK; i++) {
+        vgi_gltf_take *t = &w->takes[i];
+        const double between[2] = {time_of(w, t, 0), time_of(w, t, t->count - 1)};
+        t->moments = w->naccessors;
+        r = vgi_gltf_say_accessor(w, VGI_GLTF_ITEM * t->first, VGI_GLTF_FLOAT, t->count, "SCALAR", between, 1, e);
+    }
+    return r;
+}
+
+int vgi_gltf_emit_times(vgi_gltf_writing *w, vg_err *e)
+{
+    int r = VG_OK;
+    for (size_t k = 0; k < w->ntakes; k++)
+        for (size_t i = 0; i < w->takes[k].count && r == VG_OK; i++) {
+            const float t = (float)time_of(w, &w->takes[k], i);
+            r = vgi_gltf_emit_singles(w, &t, 1, e);
+        }
+    return r;
+}
+
+/* What it is to be called, or else what its frames are called after, or else a word. */
+int vgi_gltf_say_take_name(vgi_gltf_writing *w, const vgi_gltf_take *t, vg_err *e)
+{
+    if (w->clip) return vgi_gltf_say_text(&w->json, w->clip, e);
+    char *stem = t->stem ? vgi_copy_string(w->names.at[t->first], t->stem, e) : NULL;
+    if (t->stem && !stem) return VG_ENOMEM;
+    int r = vgi_gltf_say_text(&w->json, stem ? stem : "sequence", e);
+    free(stem);
+    return r;
+}
