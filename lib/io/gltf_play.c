@@ -157,7 +157,8 @@ static int begin_moment(vgi_gltf_scene *x, size_t i, vg_frame *f, vg_err *e)
     const vgi_gltf_moment *m = &x->moments[i];
     const vgi_gltf_clip *c = &x->clips[m->clip];
     const char *name = vgi_json_text(vgi_json_at(c->names, i - c->frames));
-    f->has_time = true, f->time = m->time; /* of each animation anew */
+    f->has_time = x->nclips == 1 || c->name; /* names tell animations apart, each with times of its own */
+    f->time = f->has_time ? m->time : 0;
     int r = vgi_gltf_animate(x, m, e);
     if (r == VG_OK && name) return vg_frame_rename(f, name, e);
     return r == VG_OK && c->name && !x->own ? name_by_clip(f, c->name, i - c->frames + 1, e) : r;
