@@ -1,6 +1,7 @@
-/* vg-solve: reconstruct vertices from vectors, one factorisation for all poses.
+/* vg-solve: reconstruct vertices from vectors or features, one factorisation for all poses.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "batch.h"
+#include "features.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -371,12 +372,26 @@ static void clear(work *w)
     vg_graph_free(&w->g);
 }
 
+/* Features leave nothing to choose. */
+static void refuse_options(void)
+{
+    static const char *const of_vectors[] = {"weights", "fit", "rounds", "eps", "planar", "planar-weights"};
+    for (size_t i = 0; i < sizeof of_vectors / sizeof *of_vectors; i++)
+        if (cli_given(of_vectors[i])) cli_usage("--%s is for vectors, the input holds features", of_vectors[i]);
+}
+
 int main(int argc, char **argv)
 {
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     work w = {.weights = opts.weights == 0 ? VG_WEIGHTS_AREA : VG_WEIGHTS_UNIFORM};
     vg_source *s = cli_source(operands, n);
+    if (vg_source_head(s)->kind == VG_FEATURES) {
+        refuse_options();
+        features_solve(s);
+        vg_source_close(&s);
+        cli_finish(0);
+    }
     const step solve = {.batch = (size_t)cli.threads, /* so many are loaded side by side */
                         .unit = "poses",
                         .init = prepare,

@@ -111,5 +111,5 @@ _vg() {
     fi
 }
 
-complete -o filenames -F _vg vg-decode vg-deform vg-diff vg-encode vg-fitmap vg-fitsignal vg-generate vg-info vg-interpolate vg-play vg-poisson vg-register \
+complete -o filenames -F _vg vg-decode vg-deform vg-diff vg-encode vg-features vg-fitmap vg-fitsignal vg-generate vg-info vg-interpolate vg-play vg-poisson vg-register \
     vg-retarget vg-sample vg-segment vg-solve vg-train vg-view

@@ -33,6 +33,7 @@ same() {
     same other.vgs vg-retarget --no-provenance --onto "$DATA/horse.rest.obj" --morph 0.5 first.map.vgs
     same mapped.vgs vg-play --no-provenance first.map.vgs --interpolate 9 first.poses.vgs
     same signal.vgs vg-fitsignal -q --no-provenance first.poses.vgs
+    same features.vgs vg-features --no-provenance first.poses.vgs
     same sampled.vgs vg-sample --no-provenance --speed 0.5 first.signal.vgs
     same net.vgs vg-train -q --no-provenance --layers 1 --hidden 16 --iterations 20 first.poses.vgs
     same on.vgs vg-generate -q --no-provenance --frames 40 first.net.vgs first.poses.vgs

@@ -11,9 +11,9 @@
 #include <sys/stat.h>
 
 const char *const vgi_npz_names[ARRAYS] = {
-    "anchor_positions", "anchors", "deformations", "face_offsets", "face_vertices", "faces", "graph_offsets",
-    "graph_vertices", "links", "names", "positions", "reference", "reference_name", "roots", "selected", "times",
-    "transforms", "vectors"};
+    "anchor_positions", "anchors", "centroids", "deformations", "face_offsets", "face_vertices", "faces", "features",
+    "graph_offsets", "graph_vertices", "links", "names", "positions", "reference", "reference_name", "root_turns", "roots",
+    "selected", "times", "transforms", "vectors"};
 
 /* What others call positions and faces; our own names go before these, and earlier ones before later ones. */
 static const struct {
@@ -257,8 +257,8 @@ static int holds_no_frames(const reading *x, vg_err *e)
                        "vertices first; it has: %s",
                        x->subject, x->inventory);
     return vg_fail(e, VG_EINPUT,
-                   "%s has no array of positions (called positions, vertices, verts, v or points), vectors or "
-                   "deformations; it has: %s",
+                   "%s has no array of positions (called positions, vertices, verts, v or points), vectors, "
+                   "deformations or features; it has: %s",
                    x->subject, *x->inventory ? x->inventory : "nothing");
 }
 
@@ -340,10 +340,10 @@ static int find_axes(reading *x, struct held *h, vg_err *e)
 
 static int choose_values(reading *x, vg_head *h, const vg_reading *how, vg_err *e)
 {
-    static const enum array all[] = {POSITIONS, VECTORS, DEFORMATIONS};
-    static const vg_kind kinds[] = {VG_VERTICES, VG_VECTORS, VG_DEFORMATIONS};
+    static const enum array all[] = {POSITIONS, VECTORS, DEFORMATIONS, FEATURES};
+    static const vg_kind kinds[] = {VG_VERTICES, VG_VECTORS, VG_DEFORMATIONS, VG_FEATURES};
     int found = -1;
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 4; i++) {
         if (!x->held[all[i]].there) continue;
         if (found >= 0)
             return vg_fail(e, VG_EINPUT, "%s has both '%s' and '%s': frames are one of them", x->subject,
@@ -364,9 +364,11 @@ static int choose_values(reading *x, vg_head *h, const vg_reading *how, vg_err *
         a->shape[2] = a->shape[1], a->shape[1] = a->shape[0], a->shape[0] = 1;
         a->ndim = 3;
     }
-    if (a->ndim != 3 || a->shape[2] != x->width || a->shape[1] == 0 || a->shape[1] >= UINT32_MAX)
+    if (kinds[found] == VG_FEATURES && a->ndim == 3 && a->shape[2] < 1 << 20) x->width = h->width = (size_t)a->shape[2];
+    if (a->ndim != 3 || a->shape[2] != x->width || x->width == 0 || a->shape[1] == 0 || a->shape[1] >= UINT32_MAX)
         return wrong(
             x, x->values,
+            kinds[found] == VG_FEATURES ? "is not of shape (frames, vertices, numbers)" :
             x->width == 3 ? "is not of shape (frames, elements, 3)" : "is not of shape (frames, elements, 4)", e);
     if (a->shape[0] == 0) return wrong(x, x->values, "holds no frame", e);
     x->frames = (size_t)a->shape[0], x->count = (size_t)a->shape[1];
@@ -378,10 +380,10 @@ static int choose_values(reading *x, vg_head *h, const vg_reading *how, vg_err *
 static int take_reference(reading *x, vg_head *h, vg_err *e)
 {
     const struct held *r = &x->held[REFERENCE];
-    bool vertices = h->kind == VG_VERTICES;
+    bool vertices = h->kind == VG_VERTICES || h->kind == VG_FEATURES;
     const uint64_t shape[2] = {vertices ? x->count : UINT64_MAX, 3};
     h->body.mesh.nv = x->count;
-    if (!r->there) return vertices ? VG_OK : missing(x, REFERENCE, x->values, e);
+    if (!r->there) return h->kind == VG_VERTICES ? VG_OK : missing(x, REFERENCE, x->values, e);
     if (!is_float(r) || !has_shape(r, 2, shape) || r->a.shape[0] == 0 || r->a.shape[0] >= UINT32_MAX - 1)
         return wrong(x, REFERENCE, "is not of shape (vertices, 3) with float32 or float64", e);
     h->body.mesh.nv = (size_t)r->a.shape[0];
@@ -483,6 +485,20 @@ static int take_graph(reading *x, vg_head *h, vg_err *e)
                    vgi_npz_names[x->values], x->subject, x->count, corners);
 }
 
+/* What stands beside features, as far as it is there. */
+static int check_features(reading *x, const vg_head *h, vg_err *e)
+{
+    const uint64_t turns[2] = {x->frames, 4}, centroids[3] = {x->frames, UINT64_MAX, 3};
+    const struct held *t = &x->held[ROOT_TURNS], *c = &x->held[CENTROIDS];
+    int r = vg_mesh_check(&h->body.mesh, x->subject, e);
+    if (r < 0) return r;
+    if (t->there && (!is_float(t) || !has_shape(t, 2, turns)))
+        return wrong(x, ROOT_TURNS, "is not of shape (frames, 4) with float32 or float64", e);
+    if (c->there && (!is_float(c) || !has_shape(c, 3, centroids) || c->a.shape[1] == 0))
+        return wrong(x, CENTROIDS, "is not of shape (frames, components, 3) with float32 or float64", e);
+    return VG_OK;
+}
+
 static int check_labels(const reading *x, vg_err *e)
 {
     const uint64_t shape[1] = {x->frames};
@@ -520,13 +536,13 @@ static int open_npz(void **state, vg_head *h, vgi_input *in, const vg_reading *h
     if (r == VG_OK) r = take_reference(x, h, e);
     if (r == VG_OK) r = take_faces(x, h, e);
     if (r == VG_OK) r = mend(x, h, e);
-    if (r == VG_OK) r = take_graph(x, h, e);
+    if (r == VG_OK) r = h->kind == VG_FEATURES ? check_features(x, h, e) : take_graph(x, h, e);
     return r < 0 ? r : check_labels(x, e);
 }
 
 static int check_quaternions(const reading *x, const double *q, vg_err *e)
 {
-    for (size_t i = 0; x->width == 4 && i < x->count; i++, q += 4)
+    for (size_t i = 0; x->values == DEFORMATIONS && i < x->count; i++, q += 4)
         if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0)
             return wrong(x, x->values, "holds a quaternion that is zero", e);
     return VG_OK;
@@ -542,6 +558,26 @@ static int take_name(reading *x, vg_frame *f, vg_err *e)
     return r;
 }
 
+static int take_channel(reading *x, vg_frame *f, enum array i, const char *name, vg_element element, size_t width,
+                        size_t count, vg_err *e)
+{
+    vg_channel *c;
+    int r = vg_frame_add(f, name, "", element, width, count, &c, e);
+    if (r < 0) return r;
+    c->precision = x->held[i].a.item == 4 ? VG_F32 : VG_F64;
+    return copy_floats(x, i, x->next * width * count, width * count, c->numbers, e);
+}
+
+static int take_channels(reading *x, vg_frame *f, vg_err *e)
+{
+    int r = VG_OK;
+    vg_frame_drop_all(f);
+    if (x->held[ROOT_TURNS].there) r = take_channel(x, f, ROOT_TURNS, VGI_NPZ_ROOT_TURN, VG_OF_FRAME, 4, 1, e);
+    if (r == VG_OK && x->held[CENTROIDS].there)
+        r = take_channel(x, f, CENTROIDS, VGI_NPZ_CENTROIDS, VG_OF_COMPONENT, 3, (size_t)x->held[CENTROIDS].a.shape[1], e);
+    return r;
+}
+
 static int next_npz(void *state, vg_frame *f, vg_err *e)
 {
     reading *x = state;
@@ -549,7 +585,9 @@ static int next_npz(void *state, vg_frame *f, vg_err *e)
     if (x->next == x->frames) return 0;
     int r = copy_floats(x, x->values, x->next * per_frame, per_frame, f->values, e);
     if (r == VG_OK) r = check_quaternions(x, f->values, e);
-    if (r == VG_OK && x->values != POSITIONS) r = copy_floats(x, ROOTS, 3 * x->next, 3, f->root, e);
+    if (r == VG_OK && x->values == FEATURES) r = take_channels(x, f, e);
+    if (r == VG_OK && (x->values == VECTORS || x->values == DEFORMATIONS))
+        r = copy_floats(x, ROOTS, 3 * x->next, 3, f->root, e);
     if (r == VG_OK && x->nanchors)
         r = copy_floats(x, ANCHOR_POSITIONS, 3 * x->nanchors * x->next, 3 * x->nanchors,
                         vg_frame_anchors(f), e);
@@ -588,6 +626,6 @@ const vgi_sequence_format vgi_sequence_npz = {
              VGI_KEEPS_DOUBLES,
     .sniff = sniff_npz, .open = open_npz, .next = next_npz, .frames = count_frames, .note = note_of,
     .close = close_npz,
-    .kinds = 1 << VG_VERTICES | 1 << VG_VECTORS | 1 << VG_DEFORMATIONS | 1 << VG_TRANSFORMS,
+    .kinds = 1 << VG_VERTICES | 1 << VG_VECTORS | 1 << VG_DEFORMATIONS | 1 << VG_TRANSFORMS | 1 << VG_FEATURES,
     .begin = vgi_npz_begin, .put = vgi_npz_put, .end = vgi_npz_end, .warning = vgi_npz_warning,
     .release = vgi_npz_release};

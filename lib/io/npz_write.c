@@ -17,6 +17,9 @@ typedef struct writing {
     size_t per_frame;
     uint64_t frames;
     vg_bytes frame, roots, anchors, times;
+    vg_bytes turns, centroids; /* of features: channels that every frame has */
+    bool turned, placed;
+    size_t parts;
     vgi_names names;
     vgi_packer *packer;
 } writing;
@@ -26,6 +29,7 @@ int vgi_npz_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi_
     writing *x = *state = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
     x->out = out, x->h = h, x->doubles = o->full_precision, x->timed = true;
+    x->turned = x->placed = h->kind == VG_FEATURES;
     x->per_frame = h->count * vg_head_width(h);
     x->spool.name = "temporary file";
     x->spool.fd = vgi_nameless_file(e);
@@ -35,6 +39,22 @@ int vgi_npz_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi_
 static bool is_rooted(const vg_head *h)
 {
     return h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS;
+}
+
+/* The numbers of a channel; false from the first frame on that has none of this shape. */
+static int put_channel(vg_bytes *to, bool *all, const vg_frame *f, const char *name, size_t width, size_t count, vg_err *e)
+{
+    const vg_channel *c = *all ? vg_frame_channel(f, name) : NULL;
+    *all = c && c->numbers && c->width == width && c->count == count;
+    return *all ? vgi_npy_store(to, c->numbers, width * count, true, e) : VG_OK;
+}
+
+static int put_channels(writing *x, const vg_frame *f, vg_err *e)
+{
+    const vg_channel *c = vg_frame_channel(f, VGI_NPZ_CENTROIDS);
+    if (x->frames == 0 && c) x->parts = c->count;
+    int r = put_channel(&x->turns, &x->turned, f, VGI_NPZ_ROOT_TURN, 4, 1, e);
+    return r < 0 ? r : put_channel(&x->centroids, &x->placed, f, VGI_NPZ_CENTROIDS, 3, x->parts, e);
 }
 
 int vgi_npz_put(void *state, const vg_frame *f, vg_err *e)
@@ -48,6 +68,7 @@ int vgi_npz_put(void *state, const vg_frame *f, vg_err *e)
     if (r == VG_OK) r = vgi_npy_store(&x->times, &time, 1, true, e);
     if (r == VG_OK && is_rooted(x->h)) r = vgi_npy_store(&x->roots, f->root, 3, true, e);
     if (r == VG_OK && is_rooted(x->h)) r = vgi_npy_store(&x->anchors, vg_frame_anchors(f), 3 * x->h->nanchors, true, e);
+    if (r == VG_OK && x->h->kind == VG_FEATURES) r = put_channels(x, f, e);
     x->frames++;
     return r < 0 ? r : vgi_output_put(&x->spool, x->frame.data, x->frame.size, e);
 }
@@ -189,6 +210,8 @@ static bool belongs(const writing *x, enum array i)
     switch (i) {
     case ANCHORS: return is_rooted(h) && h->nanchors;
     case ANCHOR_POSITIONS: return is_rooted(h) && h->nanchors;
+    case CENTROIDS: return x->placed && x->frames;
+    case ROOT_TURNS: return x->turned && x->frames;
     case GRAPH_OFFSETS: return is_rooted(h); /* with graph_vertices */
     case LINKS: return is_rooted(h) && h->has_links;
     case SELECTED: return is_rooted(h) && h->has_selection;
@@ -202,6 +225,7 @@ static bool belongs(const writing *x, enum array i)
     case VECTORS: return h->kind == VG_VECTORS;
     case DEFORMATIONS: return h->kind == VG_DEFORMATIONS;
     case TRANSFORMS: return h->kind == VG_TRANSFORMS;
+    case FEATURES: return h->kind == VG_FEATURES;
     default: return false;
     }
 }
@@ -210,11 +234,14 @@ static int add(writing *x, enum array i, vg_err *e)
 {
     const vg_head *h = x->h;
     const uint64_t places[3] = {x->frames, h->nanchors, 3}, roots[2] = {x->frames, 3}, links[2] = {h->nlinks, 2};
+    const uint64_t parts[3] = {x->frames, x->parts, 3}, turns[2] = {x->frames, 4};
     const uint64_t anchors = h->nanchors, selected = h->nselected, frames = x->frames;
     if (!belongs(x, i)) return VG_OK;
     switch (i) {
     case ANCHOR_POSITIONS: return add_doubles(x, i, 3, places, &x->anchors, e);
     case ANCHORS: return add_indices(x, i, 1, &anchors, h->anchors, h->nanchors, e);
+    case CENTROIDS: return add_doubles(x, i, 3, parts, &x->centroids, e);
+    case ROOT_TURNS: return add_doubles(x, i, 2, turns, &x->turns, e);
     case FACE_OFFSETS:
         return add_mesh(x, i, FACE_VERTICES, h->body.mesh.start, h->body.mesh.vert, h->body.mesh.nf, e);
     case GRAPH_OFFSETS: return add_graph(x, e);
@@ -262,5 +289,7 @@ void vgi_npz_release(void *state)
     vg_bytes_clear(&x->roots);
     vg_bytes_clear(&x->anchors);
     vg_bytes_clear(&x->times);
+    vg_bytes_clear(&x->turns);
+    vg_bytes_clear(&x->centroids);
     free(x);
 }

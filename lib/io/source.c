@@ -467,7 +467,7 @@ static int take_over_head(vg_source *s, const char *archive, const char *path, v
     vgi_playing *p = &s->playing;
     vg_kind kind = h->kind;
     vg_precision precision = h->precision;
-    size_t count = h->count;
+    size_t count = h->count, width = h->width;
     if (kind != VG_VERTICES && (s->n > 1 || archive))
         return vg_fail(e, VG_EINPUT, "%s holds %s: only vertices can be joined with other inputs", p->subject,
                        vg_head_form(h));
@@ -479,7 +479,7 @@ static int take_over_head(vg_source *s, const char *archive, const char *path, v
     vg_head_clear(&s->head);
     s->head = *h;
     *h = (vg_head){0};
-    s->own.kind = kind, s->own.precision = precision, s->own.count = count;
+    s->own.kind = kind, s->own.precision = precision, s->own.count = count, s->own.width = width;
     if (s->head.nanchors &&
         !(s->own.anchors = vgi_copy_array(s->head.anchors, s->head.nanchors, sizeof *s->head.anchors, e)))
         return VG_ENOMEM;

@@ -260,8 +260,8 @@ static void npz_refuses_what_is_missing(void)
     vg_bytes x = numbers(24, 4, false);
     CHECK(refused_alone("other.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 4)}", x.data,
                         x.size) == VG_EINPUT);
-    CHECK_TEXT(message, "'x' has no array of positions (called positions, vertices, verts, v or points), vectors or "
-                        "deformations; it has: other (2, 3, 4)");
+    CHECK_TEXT(message, "'x' has no array of positions (called positions, vertices, verts, v or points), vectors, "
+                        "deformations or features; it has: other (2, 3, 4)");
     CHECK(refused_alone("vectors.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 2, 3)}", x.data,
                         x.size) == VG_EINPUT);
     CHECK_TEXT(message, "'x' has an array 'vectors', but none called 'reference'");
