@@ -75,10 +75,30 @@ for other in of[1:]:
 PY
 }
 
+@test "a signal has the same numbers for any set, and the same bytes for any number of threads" {
+    vg-encode "$DATA/trex-walk.tar.xz" -o trex.vgs
+    for set in $(sets); do
+        for threads in 1 3; do
+            VG_ISA=$set vg-fitsignal -q --no-provenance -j $threads trex.vgs -o "trex-$set-$threads.signal"
+        done
+        cmp "trex-$set-1.signal" "trex-$set-3.signal"
+        vg-info --json "trex-$set-1.signal" | python3 -c "
+import json, sys
+s = json.load(sys.stdin)['signal']
+print(s['control_points'], s['sites'], s['coordinates'], s['layout'])" >"numbers-$set"
+        vg-sample "trex-$set-1.signal" -o "trex-$set.vgs"
+    done
+    widest=$(sets | awk '{ print $NF }')
+    for set in $(sets); do
+        cmp "numbers-$widest" "numbers-$set"
+        vg-diff -t 1e-9 "trex-$widest.vgs" "trex-$set.vgs"
+    done
+}
+
 @test "vectors wider than the registers are in no file that is compiled for a narrower set" {
     # 8 * VGI_WIDTH bytes are what the set has; 16 and 32 are lowered well everywhere they are used
     cd "$ROOT"
-    run grep -rnE 'vector_size\((64|128|256)\)|target\("' lib cmd
+    run grep -rnE 'vector_size\((64|128|256)\)|target(_clones)?\("' lib cmd
     [ "$status" = 1 ]
     run grep -rlE 'vector_size' lib cmd
     # lib/net/real.h names eight numbers of a network, 32 bytes, which only its kernels compute with

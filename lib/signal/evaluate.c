@@ -165,9 +165,7 @@ void vg_sampler_coordinates(vg_sampler *p, const double at[2], double *x)
 {
     size_t m = p->s->m;
     vgi_plate_functions(&p->plate, p->plate.l, at, p->functions);
-    memset(x, 0, m * sizeof *x);
-    for (size_t j = 0; j < p->plate.l; j++)
-        for (size_t c = 0; c < m; c++) x[c] += p->functions[j] * p->coefficients[j * m + c];
+    if (m) vgi_product_double(1, m, p->plate.l, p->functions, p->plate.l, p->coefficients, m, x, m);
 }
 
 static void shapes_single(vg_sampler *p, size_t n, const double *x, double *const *shapes)

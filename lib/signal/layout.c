@@ -47,14 +47,12 @@ static double refine(double a, double b, double c)
     return fabs(off) > 0.05 ? off : 0;
 }
 
-int vgi_period(size_t n, size_t m, const double *x, double *period, vg_err *e)
+int vgi_period(size_t n, const double *square, double *period, vg_err *e)
 {
     *period = 0;
     if (n < 5) return VG_OK;
-    double *square = vgi_array_raw(n * n, sizeof *square, e), *room = vgi_array_raw(n * n, sizeof *room, e);
-    double *middle = vgi_array(n + 1, sizeof *middle, e);
-    if (square && room && middle) {
-        vgi_distances(n, m, x, m, square);
+    double *room = vgi_array_raw(n * n, sizeof *room, e), *middle = vgi_array(n + 1, sizeof *middle, e);
+    if (room && middle) {
         for (size_t i = 0; i <= n; i++) middle[i] = INFINITY;
         lag_medians(n, square, middle, room);
         for (size_t lag = 4; lag < n && !*period; lag++)
@@ -62,8 +60,7 @@ int vgi_period(size_t n, size_t m, const double *x, double *period, vg_err *e)
                 *period = (double)lag + (lag + 1 < n && isfinite(middle[lag - 1])
                                              ? refine(middle[lag - 1], middle[lag], middle[lag + 1]) : 0);
     }
-    int r = square && room && middle ? VG_OK : VG_ENOMEM;
-    free(square);
+    int r = room && middle ? VG_OK : VG_ENOMEM;
     free(room);
     free(middle);
     return r;
@@ -172,19 +169,18 @@ static int settle_pinned(size_t n, const double *distance, const vg_pin *pins, s
     return r;
 }
 
-int vgi_layout_make(const vg_layout_trial *layout, double period, size_t n, size_t m, const double *x, const vg_pin *pins,
-                    size_t npins, double *p, vg_err *e)
+int vgi_layout_make(const vg_layout_trial *layout, double period, size_t n, size_t m, const double *x, const double *square,
+                    const vg_pin *pins, size_t npins, double *p, vg_err *e)
 {
     int r = VG_ENOMEM;
     double *distance = vgi_array_raw(n * n, sizeof *distance, e), *more = vgi_array(n, MORE * sizeof *more, e);
     double *axes = vgi_array(n, 3 * sizeof *axes, e), *best = vgi_array(n, 2 * sizeof *best, e), add[MORE];
     if (!distance || !more || !axes || !best) goto out;
-    vgi_distances(n, m, x, m, distance);
     size_t nmore = layout->layout == VG_LAYOUT_PLAIN ? 0 : further_coordinates(layout, period, n, m, x, more);
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++) {
             for (size_t k = 0; k < MORE; k++) add[k] = more[MORE * i + k] - more[MORE * j + k];
-            distance[i * n + j] = sqrt(distance[i * n + j] + add[0] * add[0] + add[1] * add[1]);
+            distance[i * n + j] = sqrt(square[i * n + j] + add[0] * add[0] + add[1] * add[1]);
         }
     if ((r = principal(n, m, x, nmore, more, axes, e)) < 0 || (r = settle_freely(n, distance, axes, p, best, e)) < 0)
         goto out;
@@ -293,6 +289,7 @@ int vgi_layout_judge(size_t n, size_t m, const double *x, const double *p, doubl
 typedef struct choice {
     size_t n, m;
     const double *x;
+    double *square; /* n x n: of the distances between rows of x */
     const vg_pin *pins;
     size_t npins;
     double period;
@@ -307,7 +304,8 @@ static void try_one(void *context, size_t index)
     choice *c = context;
     size_t i = c->first + index;
     double *p = c->p + 2 * c->n * i;
-    c->status[i] = vgi_layout_make(&c->tried[i], c->period, c->n, c->m, c->x, c->pins, c->npins, p, NULL);
+    c->status[i] = vgi_layout_make(&c->tried[i], c->period, c->n, c->m, c->x, c->square, c->pins, c->npins, p,
+                                  NULL);
     if (c->status[i] == VG_OK)
         c->status[i] = vgi_layout_judge(c->n, c->m, c->x, p, &c->tried[i].ratio, NULL, NULL);
 }
@@ -344,12 +342,13 @@ int vgi_layout_choose(size_t n, size_t m, const double *x, const vg_pin *pins, s
                       vg_layout_trial *tried, size_t *ntried, vg_err *e)
 {
     choice c = {.n = n, .m = m, .x = x, .pins = pins, .npins = npins, .tried = tried};
-    int r = vgi_period(n, m, x, &c.period, e);
-    if (r < 0) return r;
-    if (only && only->layout == VG_LAYOUT_RING && !(c.period > 0))
-        return vg_fail(e, VG_EINPUT, "no cycle is found in these frames, so that there is no ring to lay them on");
+    if (!(c.square = vgi_array_raw(n * n, sizeof *c.square, e))) return VG_ENOMEM;
+    vgi_distances(n, m, x, m, c.square);
+    int r = vgi_period(n, c.square, &c.period, e);
+    if (r == VG_OK && only && only->layout == VG_LAYOUT_RING && !(c.period > 0))
+        r = vg_fail(e, VG_EINPUT, "no cycle is found in these frames, so that there is no ring to lay them on");
     size_t count = list_candidates(tried, c.period, only), found = SIZE_MAX, done = 0, wave = (size_t)threads;
-    if (!(c.p = vgi_array(2 * n * count, sizeof *c.p, e))) return VG_ENOMEM;
+    if (r == VG_OK && !(c.p = vgi_array(2 * n * count, sizeof *c.p, e))) r = VG_ENOMEM;
     vgi_blas_alone();
     while (found == SIZE_MAX && r == VG_OK) {
         c.first = done;
@@ -369,6 +368,7 @@ int vgi_layout_choose(size_t n, size_t m, const double *x, const vg_pin *pins, s
         *ntried = tried[found].ratio <= good ? found + 1 : count;
     }
     free(c.p);
+    free(c.square);
     return r;
 }
 

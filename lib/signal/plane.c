@@ -5,6 +5,7 @@
  * Leaves out which distances (layout.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/signal.h"
+#include "signal/signal_kernel.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -12,13 +13,9 @@
 void vgi_distances(size_t n, size_t m, const double *x, size_t stride, double *square)
 {
     for (size_t i = 0; i < n; i++) {
+        vgi_signal_kernel_now()->distances(x + i * stride, x, i, stride, m, square + i * n);
         square[i * n + i] = 0;
-        for (size_t j = 0; j < i; j++) {
-            const double *a = x + i * stride, *b = x + j * stride;
-            double sum = 0;
-            for (size_t c = 0; c < m; c++) sum += (a[c] - b[c]) * (a[c] - b[c]);
-            square[i * n + j] = square[j * n + i] = sum;
-        }
+        for (size_t j = 0; j < i; j++) square[j * n + i] = square[i * n + j];
     }
 }
 
@@ -40,46 +37,22 @@ typedef struct plane {
     size_t nheld;
 } plane;
 
-enum { WIDE = 8 };
-
-/* Stress of frame i against all, twice for each pair in the end, and what pulls at it: the row of B P. */
-__attribute__((target_clones("avx2,fma", "default")))
-static double pull(const plane *s, size_t i, const double *x, const double *y, double bx[1], double by[1])
-{
-    const double *want = s->distance + i * s->n;
-    double xi = x[i], yi = y[i], least = s->least;
-    double sum[WIDE] = {0}, px[WIDE] = {0}, py[WIDE] = {0};
-    size_t j = 0;
-    for (; j + WIDE <= s->n; j += WIDE)
-        for (size_t q = 0; q < WIDE; q++) {
-            double dx = xi - x[j + q], dy = yi - y[j + q], d = sqrt(dx * dx + dy * dy), w = want[j + q];
-            double over = d - w, pulls = w / (d > least ? d : least);
-            sum[q] += over * over;
-            px[q] += pulls * dx;
-            py[q] += pulls * dy;
-        }
-    for (; j < s->n; j++) {
-        double dx = xi - x[j], dy = yi - y[j], d = sqrt(dx * dx + dy * dy), w = want[j];
-        double over = d - w, pulls = w / (d > least ? d : least);
-        sum[0] += over * over;
-        px[0] += pulls * dx;
-        py[0] += pulls * dy;
-    }
-    double total = 0, tx = 0, ty = 0;
-    for (size_t q = 0; q < WIDE; q++) total += sum[q], tx += px[q], ty += py[q];
-    *bx = tx, *by = ty;
-    return total;
-}
-
 /* The stress at p (x then y), and where a step leads. */
 static double step(const plane *s, const double *p, double *to)
 {
     size_t n = s->n;
     double stress = 0, sum[2] = {0, 0};
-    for (size_t i = 0; i < n; i++) stress += pull(s, i, p, p + n, to + i, to + n + i);
+    memset(to, 0, 2 * n * sizeof *to);
+    for (size_t i = 0; i < n; i++) {
+        vgi_pull one = {.count = i, .want = s->distance + i * n, .x = p, .y = p + n, .least = s->least,
+                        .at = {p[i], p[n + i]}, .bx = to, .by = to + n};
+        vgi_signal_kernel_now()->pull(&one);
+        stress += one.stress;
+        to[i] += one.sum[0], to[n + i] += one.sum[1];
+    }
     if (!s->nheld) {
         for (size_t i = 0; i < 2 * n; i++) to[i] /= (double)n;
-        return stress / 2;
+        return stress;
     }
     /* the others' part of the matrix n I - 1 1' has the inverse (I + 1 1' / nheld) / n */
     double fixed[2] = {0, 0};
@@ -89,7 +62,7 @@ static double step(const plane *s, const double *p, double *to)
         if (!s->held[i % n]) sum[i / n] += to[i] += fixed[i / n];
     for (size_t i = 0; i < 2 * n; i++)
         to[i] = s->held[i % n] ? p[i] : (to[i] + sum[i / n] / (double)s->nheld) / (double)n;
-    return stress / 2;
+    return stress;
 }
 
 static void swap(double **a, double **b)

@@ -62,12 +62,12 @@ double vgi_plane_radius(size_t n, const double *p, double centre[2]);
 
 /* ---- layout.c: which distances ---- */
 
-/* vgi_period: the length of a cycle in frames, 0: there is none. x: n x m. */
-int vgi_period(size_t n, size_t m, const double *x, double *period, vg_err *e) VG_MUST_CHECK;
+/* vgi_period: the length of a cycle in frames, 0: there is none. square: as of vgi_distances. */
+int vgi_period(size_t n, const double *square, double *period, vg_err *e) VG_MUST_CHECK;
 /* vgi_layout_make: positions p of rms radius 1, or with pins of about that, and the pins are met exactly. x: n x m
- * principal coordinates. period: for VG_LAYOUT_RING. */
-int vgi_layout_make(const vg_layout_trial *layout, double period, size_t n, size_t m, const double *x, const vg_pin *pins,
-                    size_t npins, double *p, vg_err *e) VG_MUST_CHECK;
+ * principal coordinates. square: their distances. period: for VG_LAYOUT_RING. */
+int vgi_layout_make(const vg_layout_trial *layout, double period, size_t n, size_t m, const double *x, const double *square,
+                    const vg_pin *pins, size_t npins, double *p, vg_err *e) VG_MUST_CHECK;
 /* vgi_layout_judge: rms distance of the chain of full fidelity at these positions from a cubic spline through the x, a
  * quarter, a half and three quarters between frames, beside that of straight lines. deviation (3 (n - 1) squares, may be
  * NULL): beside the mean square of straight lines. */

@@ -9,6 +9,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "signal/signal.h"
+#include "signal/signal_kernel.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -108,37 +109,6 @@ static void choose_anchors(vgi_plate *s, const uint32_t *among, size_t count)
 
 /* ---- functions, orthogonalised on the frames ---- */
 
-/* v -= sum of the rows of q times their products with v, which are added to c; four rows at a time */
-__attribute__((target_clones("avx2,fma", "default")))
-static void project(const double *q, size_t rows, size_t n, double *v, double *c, size_t stride)
-{
-    size_t j = 0;
-    for (; j + 4 <= rows; j += 4) {
-        const double *a = q + j * n, *b = a + n, *d = b + n, *f = d + n;
-        double s[4][4] = {{0}};
-        size_t i = 0;
-        for (; i + 4 <= n; i += 4)
-            for (size_t k = 0; k < 4; k++) {
-                double x = v[i + k];
-                s[0][k] += a[i + k] * x, s[1][k] += b[i + k] * x, s[2][k] += d[i + k] * x, s[3][k] += f[i + k] * x;
-            }
-        for (; i < n; i++) s[0][0] += a[i] * v[i], s[1][0] += b[i] * v[i], s[2][0] += d[i] * v[i], s[3][0] += f[i] * v[i];
-        double t[4];
-        for (size_t k = 0; k < 4; k++) {
-            t[k] = (s[k][0] + s[k][1]) + (s[k][2] + s[k][3]);
-            c[(j + k) * stride] += t[k];
-        }
-        for (i = 0; i < n; i++) v[i] -= (t[0] * a[i] + t[1] * b[i]) + (t[2] * d[i] + t[3] * f[i]);
-    }
-    for (; j < rows; j++) {
-        const double *a = q + j * n;
-        double t = 0;
-        for (size_t i = 0; i < n; i++) t += a[i] * v[i];
-        c[j * stride] += t;
-        for (size_t i = 0; i < n; i++) v[i] -= t * a[i];
-    }
-}
-
 static double norm(const double *v, size_t n)
 {
     double sum = 0;
@@ -153,7 +123,7 @@ static bool orthogonalise(vgi_plate *s, double size)
     size_t j = s->l;
     double *v = s->q + j * s->n, *column = s->r + j;
     for (size_t i = 0; i < j; i++) column[i * s->most] = 0;
-    for (int pass = 0; pass < 2; pass++) project(s->q, j, s->n, v, column, s->most);
+    for (int pass = 0; pass < 2; pass++) vgi_signal_kernel_now()->project(s->q, j, s->n, v, column, s->most);
     double left = norm(v, s->n);
     if (!(left > dependent * size)) return false;
     column[j * s->most] = left;
@@ -245,29 +215,9 @@ typedef struct greedy {
 } greedy;
 
 /* rest -= v v' rest */
-__attribute__((target_clones("avx2,fma", "default")))
 static void take_out(greedy *g, const double *v)
 {
-    size_t n = g->s->n, m = g->m;
-    double *restrict w = g->sums;
-    memset(w, 0, m * sizeof *w);
-    for (size_t i = 0; i < n; i++) {
-        const double *row = g->rest + i * m;
-        double f = v[i];
-        for (size_t c = 0; c < m; c++) w[c] += f * row[c];
-    }
-    for (size_t i = 0; i < n; i++) {
-        double *row = g->rest + i * m, f = v[i], sum[4] = {0};
-        size_t c = 0;
-        for (; c + 4 <= m; c += 4)
-            for (size_t k = 0; k < 4; k++) {
-                double x = row[c + k] - f * w[c + k];
-                row[c + k] = x;
-                sum[k] += x * x;
-            }
-        for (; c < m; c++) row[c] -= f * w[c], sum[0] += row[c] * row[c];
-        g->square[i] = (sum[0] + sum[1]) + (sum[2] + sum[3]);
-    }
+    vgi_signal_kernel_now()->take_out(g->s->n, g->m, v, g->rest, g->sums, g->square);
 }
 
 static size_t farthest(const greedy *g)
@@ -315,7 +265,7 @@ static int start_gain(greedy *g, vg_err *e)
     for (size_t i = 0; i < n; i++) write_function(g->s, i, g->left + i * n, lambda);
     for (size_t i = 0; i < n; i++) {
         memset(g->along, 0, n * sizeof *g->along);
-        project(g->s->q, g->s->l, n, g->left + i * n, g->along, 1);
+        vgi_signal_kernel_now()->project(g->s->q, g->s->l, n, g->left + i * n, g->along, 1);
     }
     vgi_product_double(n, m, n, g->left, n, g->rest, m, g->match, m);
     return VG_OK;

@@ -622,6 +622,10 @@ if [ "$BENCH" = full ]; then
     goal 'set-up, 1,000,002 vertices' "$cable_setup" s '<=' 30
     goal 'memory of vg-solve, 1,000,002 vertices' "$(calc "$cable_kib / 1048576")" GiB '<=' 8
 fi
+printf '\nContinuous signals\n\n'
+signal | tee signals
+goal 'shape signal, 100 frames, beside dsyrk and dgemm' "$(sed -n '1s/.*: //p' signals)" times '<=' 2
+goal 'all sites of 295 frames beside dgemm' "$(sed -n '2s/.*: //p' signals)" times '<=' 3
 printf '\nWhat it must reach\n\n'
 if [ "$busy" = yes ]; then
     printf 'Something else was running when this began: a verdict here says little about the programs.\n\n'
