@@ -302,6 +302,45 @@ assert 1 < len(targets) < 46 and all("NORMAL" in t for t in targets), len(target
 END
 }
 
+@test "OBJ: materials of the MTL beside it, with their pictures, come into a GLB; polygons come back" {
+    py <<'END'
+import make_character
+open("weave two.png", "wb").write(make_character.picture())
+open("q.mtl", "w").write("newmtl red\nKd 0.8 0.1 0.1\nNs 98\nd 0.5\nnewmtl cloth\nKd 1 0 0\nmap_Kd weave two.png\nnewmtl gone\n")
+points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (2, 0, 0), (2, 1, 0)]
+for name, bend in ("a", 0), ("b", 0.5):
+    open(name + ".obj", "w").write("mtllib q.mtl\n" + "".join(f"v {x} {y} {z + bend * x}\n" for x, y, z in points) +
+        "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl red\nf 1/1 2/2 3/3 4/4\nusemtl cloth\nf 2/1 5/2 6/3 3/4\nusemtl plain\nf 1 2 5\n")
+END
+    must vg-encode a.obj b.obj -o poses.vgs
+    pipe 'vg-info poses.vgs'
+    shows 'asset                3 materials, 1 texture'
+    must vg-decode poses.vgs -o poses.glb
+    must vg-decode poses.vgs -o again-%d.obj
+    grep -qx 'mtllib q.mtl' again-0.obj || fail "the library's name is lost"
+    must vg-encode poses.glb -o back.vgs
+    must vg-diff -t 1e-7 poses.vgs back.vgs
+    pipe 'vg-info back.vgs'
+    shows '3: 1 of 3, 2 of 4'
+    py <<'END'
+import json, struct, make_character
+b = open("poses.glb", "rb").read()
+n, = struct.unpack("<I", b[12:16])
+g, data = json.loads(b[20:20 + n]), b[28 + n:]
+red, cloth, plain = g["materials"]
+assert red["name"] == "red" and red["pbrMetallicRoughness"]["baseColorFactor"] == [0.8, 0.1, 0.1, 0.5], red
+assert red["alphaMode"] == "BLEND" and abs(red["pbrMetallicRoughness"]["roughnessFactor"] - (2 / 100) ** 0.5) < 1e-12
+assert cloth["pbrMetallicRoughness"]["baseColorTexture"] == {"index": 0} and plain == {"name": "plain"}
+primitives = g["meshes"][0]["primitives"]
+assert [(p["material"], g["accessors"][p["indices"]]["count"]) for p in primitives] == [(0, 6), (1, 6), (2, 3)]
+view = g["bufferViews"][g["images"][g["textures"][0]["source"]]["bufferView"]]
+assert data[view["byteOffset"]:][:view["byteLength"]] == make_character.picture()
+END
+    rm q.mtl "weave two.png"
+    must vg-encode a.obj b.obj -o without.vgs
+    must vg-decode without.vgs -o without.glb
+}
+
 @test "several animations: vg-info lists them, vg-decode writes them, each with its own times" {
     py <<'END'
 import make_character
@@ -381,7 +420,7 @@ other[k:] = head + make_corpus.u64(make_corpus.xxh64(head)) + end
 open("other.vgs", "wb").write(other)
 END
     must_warn vg-decode other.vgs -o other.glb
-    says "not kept in 'other.glb': $all; groups and materials"
+    says "not kept in 'other.glb': $all; groups"
     pipe 'vg-encode other.glb | vg-diff -t 1e-6 nod.vgs -'
 }
 

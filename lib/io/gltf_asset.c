@@ -3,20 +3,14 @@
  * behind. The stream carries it as it is (record ASST).
  * Leaves out how such an asset is written again (gltf_character.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf_pack.h"
 #include "io/gltf_scene.h"
 
 #include <stdlib.h>
 
 enum { ARRAY_BUFFER = 34962, ELEMENT_BUFFER = 34963, NO_TARGET = 0, ALIGNED = 8 };
 
-typedef struct packing {
-    const vgi_gltf *g;
-    vgi_input *in;
-    vgi_json *doc, *accessors, *views; /* the new ones; borrowed from doc */
-    size_t *accessor_of; /* of each old accessor the new one + 1; 0: it is not there yet */
-    vg_bytes data;
-    vg_note *note;
-} packing;
+typedef vgi_gltf_packing packing;
 
 /* ---- views and accessors ---- */
 
@@ -100,7 +94,7 @@ static int move_accessors(packing *k, vgi_json *holder, int target, vg_err *e)
 
 /* ---- images ---- */
 
-static const char *image_type(const unsigned char *p, size_t n)
+const char *vgi_gltf_image_type(const unsigned char *p, size_t n)
 {
     if (n >= 8 && !memcmp(p, "\x89PNG\r\n\x1a\n", 8)) return "image/png";
     if (n >= 3 && !memcmp(p, "\xff\xd8\xff", 3)) return "image/jpeg";
@@ -108,7 +102,7 @@ static const char *image_type(const unsigned char *p, size_t n)
     return n >= 12 && !memcmp(p, "\xabKTX 20\xbb\r\n\x1a\n", 12) ? "image/ktx2" : NULL;
 }
 
-static int embed(packing *k, vgi_json *image, const unsigned char *p, size_t n, const char *type, vg_err *e)
+int vgi_gltf_embed(packing *k, vgi_json *image, const unsigned char *p, size_t n, const char *type, vg_err *e)
 {
     size_t start, view = 0;
     int r = align(k, e);
@@ -126,8 +120,8 @@ static int embed_beside(packing *k, vgi_json *image, const char *uri, vg_err *e)
 {
     vg_bytes bytes = {0};
     int r = vgi_gltf_read_beside(k->g, k->in, uri, &bytes, NULL);
-    const char *type = r == VG_OK ? image_type(bytes.data, bytes.size) : NULL;
-    if (type) r = embed(k, image, bytes.data, bytes.size, type, e);
+    const char *type = r == VG_OK ? vgi_gltf_image_type(bytes.data, bytes.size) : NULL;
+    if (type) r = vgi_gltf_embed(k, image, bytes.data, bytes.size, type, e);
     else vgi_note(k->note, "the image '%.60s' is not beside it", uri), r = VG_OK;
     vg_bytes_clear(&bytes);
     return r;
@@ -141,7 +135,7 @@ static int move_image(packing *k, vgi_json *image, vg_err *e)
     if (uri && !strncmp(uri, "data:", 5)) return VG_OK;
     if (uri) return embed_beside(k, image, uri, e);
     if (vgi_gltf_view_bytes(k->g, vgi_json_get(image, "bufferView"), &data, &n, NULL) == VG_OK)
-        return embed(k, image, data, n, NULL, e);
+        return vgi_gltf_embed(k, image, data, n, NULL, e);
     vgi_json_drop(image, "bufferView");
     vgi_note(k->note, "left out an image without bytes");
     return vgi_json_put(image, "uri", vgi_json_of_text("data:,", e), e);
@@ -242,8 +236,7 @@ static int move_all(packing *k, vg_err *e)
     strip(k->doc);
     int r = filter_list(k->doc, "extensionsUsed", e);
     if (r == VG_OK) r = filter_list(k->doc, "extensionsRequired", e);
-    if (r == VG_OK) r = vgi_json_put(k->doc, "accessors", k->accessors = vgi_json_array(e), e);
-    if (r == VG_OK) r = vgi_json_put(k->doc, "bufferViews", k->views = vgi_json_array(e), e);
+    if (r == VG_OK) r = vgi_gltf_pack_begin(k, e);
     if (r == VG_OK) r = for_each(k, "meshes", move_mesh, e);
     if (r == VG_OK) r = for_each(k, "nodes", move_node, e);
     if (r == VG_OK) r = for_each(k, "skins", move_skin, e);
@@ -272,21 +265,38 @@ static int put_chunk(vg_bytes *to, uint32_t type, const vg_bytes *from, char fil
     return r;
 }
 
-static int put_file(packing *k, vg_bytes *to, vg_err *e)
+int vgi_gltf_pack_end(packing *k, vg_bytes *to, vg_err *e)
 {
     unsigned char head[VGI_GLTF_HEADER] = "glTF";
     vg_bytes text = {0};
     int r = align(k, e);
-    if (r == VG_OK) r = put_buffer(k, e);
+    static const char *const lists[] = {"accessors", "bufferViews"};
+    for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
+        if (!vgi_json_count(vgi_json_get(k->doc, lists[i]))) vgi_json_drop(k->doc, lists[i]); /* none may be empty */
+    if (r == VG_OK && k->data.size) r = put_buffer(k, e);
     if (r == VG_OK) r = vgi_json_print(k->doc, &text, e);
     if (r == VG_OK) r = vgi_bytes_append(to, head, sizeof head, e);
     if (r == VG_OK) r = put_chunk(to, VGI_GLTF_JSON, &text, ' ', e);
-    if (r == VG_OK) r = put_chunk(to, VGI_GLTF_BIN, &k->data, 0, e);
+    if (r == VG_OK && k->data.size) r = put_chunk(to, VGI_GLTF_BIN, &k->data, 0, e);
     vg_bytes_clear(&text);
     if (r < 0) return r;
     vgi_put32(to->data + 4, 2);
     vgi_put32(to->data + 8, (uint32_t)to->size);
     return VG_OK;
+}
+
+int vgi_gltf_pack_begin(packing *k, vg_err *e)
+{
+    if (!k->doc && !(k->doc = vgi_json_object(e))) return VG_ENOMEM;
+    int r = vgi_json_put(k->doc, "accessors", k->accessors = vgi_json_array(e), e);
+    return r < 0 ? r : vgi_json_put(k->doc, "bufferViews", k->views = vgi_json_array(e), e);
+}
+
+void vgi_gltf_pack_clear(packing *k)
+{
+    vgi_json_free(&k->doc);
+    free(k->accessor_of);
+    vg_bytes_clear(&k->data);
 }
 
 /* Is there more than the mesh itself has: faces, positions, the first texture coordinates, as many vertices? */
@@ -312,14 +322,12 @@ int vgi_gltf_take_asset(vgi_gltf_scene *x, vgi_input *in, const vg_mesh *mesh, v
     k.doc = vgi_json_copy(x->g.json, e);
     k.accessor_of = vgi_array(vgi_json_count(vgi_json_get(x->g.json, "accessors")), sizeof *k.accessor_of, e);
     int r = k.doc && k.accessor_of ? move_all(&k, e) : VG_ENOMEM;
-    if (r == VG_OK) r = put_file(&k, &file, e);
+    if (r == VG_OK) r = vgi_gltf_pack_end(&k, &file, e);
     if (r == VG_OK && file.size <= UINT32_MAX) {
         *to = (vg_asset){x->all, vg_mesh_digest(mesh), x->number, file.size, file.data};
         x->number = NULL, file = (vg_bytes){0};
     }
-    vgi_json_free(&k.doc);
-    free(k.accessor_of);
-    vg_bytes_clear(&k.data);
+    vgi_gltf_pack_clear(&k);
     vg_bytes_clear(&file);
     return r;
 }

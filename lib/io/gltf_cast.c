@@ -6,9 +6,9 @@
 
 #include <stdlib.h>
 
-int vgi_gltf_say_elements(const vgi_gltf_character *c, const char *list, vg_bytes *to, size_t *n, vg_err *e)
+int vgi_gltf_say_elements(const vgi_json *document, const char *list, vg_bytes *to, size_t *n, vg_err *e)
 {
-    const vgi_json *all = vgi_json_get(c->scene.g.json, list);
+    const vgi_json *all = vgi_json_get(document, list);
     int r = VG_OK;
     for (*n = 0; *n < vgi_json_count(all) && r == VG_OK; ++*n) {
         if (*n) r = vgi_bytes_append(to, ",\n", 2, e);

@@ -5,9 +5,12 @@
 #include "io/gltf_write.h"
 #include "io/polygon.h"
 
+#include <stdlib.h>
+
 typedef struct shaping {
     const vg_mesh *mesh;
     const double *reference;
+    const vg_attributes *a;
     vgi_gltf_shape *to;
 } shaping;
 
@@ -88,28 +91,60 @@ static int put_run(const shaping *x, size_t count, size_t size, vg_err *e)
     return vgi_bytes_append(&x->to->runs, text, (size_t)n, e);
 }
 
+static int add_run(vgi_gltf_shape *s, const char *material, vg_err *e)
+{
+    int r = vgi_grow(&s->run, &s->runs_cap, s->nruns + 2, sizeof *s->run, e);
+    if (r == VG_OK) s->run[s->nruns] = (vgi_gltf_run){s->triangles.size, s->lines.size, material};
+    return r;
+}
+
+/* With face f another material may begin; *label: the next label. */
+static int take_material(const shaping *x, size_t f, size_t *label, vg_err *e)
+{
+    vgi_gltf_shape *s = x->to;
+    const char *name = s->nruns ? s->run[s->nruns - 1].material : NULL, *old = name;
+    for (; x->a && *label < x->a->nlabels && x->a->labels[*label].face <= f; ++*label)
+        if (x->a->labels[*label].kind == VG_LABEL_MATERIAL) name = x->a->labels[*label].text;
+    if (s->nruns && (name == old || (name && old && !strcmp(name, old)))) return VG_OK;
+    int r = add_run(s, name, e);
+    if (r == VG_OK) s->nruns++;
+    return r;
+}
+
+static int end_runs(vgi_gltf_shape *s, vg_err *e)
+{
+    if (s->nruns > VGI_GLTF_MOST_RUNS) s->run[0].material = NULL, s->nruns = 1;
+    int r = s->nruns ? VG_OK : add_run(s, NULL, e);
+    if (r == VG_OK && !s->nruns) s->nruns = 1;
+    return r < 0 ? r : add_run(s, NULL, e);
+}
+
 static int put_faces(const shaping *x, vg_err *e)
 {
     const vg_mesh *m = x->mesh;
-    size_t count = 0, size = 0;
+    size_t count = 0, size = 0, label = 0;
     int r = VG_OK;
     for (size_t f = 0; f < m->nf && r == VG_OK; f++) {
+        if ((r = take_material(x, f, &label, e)) < 0) break;
         size_t n = m->start[f + 1] - m->start[f];
         if (n != size && count) r = put_run(x, count, size, e);
         count = n == size ? count + 1 : 1, size = n;
         if (r == VG_OK) r = put_face(x, m->vert + m->start[f], n, e);
     }
-    return r == VG_OK && count ? put_run(x, count, size, e) : r;
+    if (r == VG_OK && count) r = put_run(x, count, size, e);
+    return r < 0 ? r : end_runs(x->to, e);
 }
 
-int vgi_gltf_shape_make(vgi_gltf_shape *s, const vg_mesh *m, const double *reference, vg_err *e)
+int vgi_gltf_shape_make(vgi_gltf_shape *s, const vg_mesh *m, const double *reference, const vg_attributes *a,
+                        vg_err *e)
 {
     *s = (vgi_gltf_shape){0};
-    return put_faces(&(shaping){m, reference, s}, e);
+    return put_faces(&(shaping){m, reference, a, s}, e);
 }
 
 void vgi_gltf_shape_clear(vgi_gltf_shape *s)
 {
+    free(s->run);
     vg_bytes_clear(&s->triangles);
     vg_bytes_clear(&s->lines);
     vg_bytes_clear(&s->runs);

@@ -518,7 +518,8 @@ static int say_cast(vgi_gltf_writing *w, vg_err *e)
 
 static int say_scene(vgi_gltf_writing *w, vg_err *e)
 {
-    int r = vgi_gltf_say(&w->json, e, "\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\n");
+    int r = vgi_gltf_say_materials(w, e);
+    if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\n");
     return r < 0 ? r : say_mesh(w, e);
 }
 

@@ -151,22 +151,29 @@ int vgi_gltf_say_mesh_name(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_gltf_say_text(&w->json, *name ? name : "mesh", e);
 }
 
-static int say_primitive(vgi_gltf_writing *w, bool first, int mode, bool indexed, size_t indices,
+static int say_primitive(vgi_gltf_writing *w, size_t *n, int mode, size_t indices, const char *material,
                          const vg_bytes *moving, vg_err *e)
 {
-    int r = vgi_gltf_say(&w->json, e, "%s{\"mode\":%d,", first ? "" : ",\n", mode);
-    if (r == VG_OK && indexed) r = vgi_gltf_say(&w->json, e, "\"indices\":%zu,", indices);
+    int r = vgi_gltf_say(&w->json, e, "%s{\"mode\":%d,", (*n)++ ? ",\n" : "", mode);
+    if (r == VG_OK && indices != SIZE_MAX) r = vgi_gltf_say(&w->json, e, "\"indices\":%zu,", indices);
+    if (r == VG_OK && material) r = vgi_gltf_say(&w->json, e, "\"material\":%zu,", vgi_gltf_material(w, material));
     if (r == VG_OK) r = vgi_bytes_append(&w->json, moving->data, moving->size, e);
     return r < 0 ? r : vgi_gltf_say(&w->json, e, "}");
 }
 
 int vgi_gltf_say_primitives(vgi_gltf_writing *w, const vg_bytes *moving, vg_err *e)
 {
-    const bool triangles = w->shape.triangles.size, lines = w->shape.lines.size;
+    const vgi_gltf_shape *s = &w->shape;
+    size_t n = 0, triangles = w->triangles, lines = w->lines;
     int r = vgi_gltf_say(&w->json, e, "\"primitives\":[");
-    if (r == VG_OK && triangles) r = say_primitive(w, true, VGI_GLTF_TRIANGLES, true, w->triangles, moving, e);
-    if (r == VG_OK && lines) r = say_primitive(w, !triangles, VGI_GLTF_LINES, true, w->lines, moving, e);
-    if (r == VG_OK && !triangles && !lines) r = say_primitive(w, true, VGI_GLTF_POINTS, false, 0, moving, e);
+    for (size_t i = 0; i < s->nruns && r == VG_OK; i++) {
+        const vgi_gltf_run *run = &s->run[i];
+        if (run[1].triangles > run->triangles)
+            r = say_primitive(w, &n, VGI_GLTF_TRIANGLES, triangles++, run->material, moving, e);
+        if (r == VG_OK && run[1].lines > run->lines)
+            r = say_primitive(w, &n, VGI_GLTF_LINES, lines++, run->material, moving, e);
+    }
+    if (r == VG_OK && !n) r = say_primitive(w, &n, VGI_GLTF_POINTS, SIZE_MAX, NULL, moving, e);
     return r < 0 ? r : vgi_gltf_say(&w->json, e, "]");
 }
 
@@ -194,13 +201,24 @@ int vgi_gltf_say_accessor(vgi_gltf_writing *w, size_t off, int component, size_t
     return r < 0 ? r : vgi_gltf_say(&w->accessors, e, "}");
 }
 
-static int describe_indices(vgi_gltf_writing *w, const vg_bytes *indices, size_t *accessor, vg_err *e)
+static size_t bytes_before(const vgi_gltf_run *run, bool lines)
 {
+    return lines ? run->lines : run->triangles;
+}
+
+/* One view, and an accessor for each run that has some. */
+static int describe_indices(vgi_gltf_writing *w, bool lines, size_t *accessor, vg_err *e)
+{
+    const vg_bytes *indices = lines ? &w->shape.lines : &w->shape.triangles;
     *accessor = w->naccessors;
     if (!indices->size) return VG_OK;
     int r = vgi_gltf_view(w, indices->size, ",\"target\":34963", e);
-    return r < 0 ? r
-                 : vgi_gltf_say_accessor(w, 0, VGI_GLTF_UINT, indices->size / VGI_GLTF_ITEM, "SCALAR", NULL, 0, e);
+    for (size_t i = 0; i < w->shape.nruns && r == VG_OK; i++) {
+        const size_t from = bytes_before(&w->shape.run[i], lines), to = bytes_before(&w->shape.run[i + 1], lines);
+        if (to > from)
+            r = vgi_gltf_say_accessor(w, from, VGI_GLTF_UINT, (to - from) / VGI_GLTF_ITEM, "SCALAR", NULL, 0, e);
+    }
+    return r;
 }
 
 static int describe_texture(vgi_gltf_writing *w, vg_err *e)
@@ -215,15 +233,16 @@ static int describe_texture(vgi_gltf_writing *w, vg_err *e)
 static int describe_character(vgi_gltf_writing *w, vg_err *e)
 {
     const vgi_gltf_character *c = w->character;
-    int r = vgi_gltf_say_elements(c, "bufferViews", &w->views, &w->nviews, e);
+    int r = vgi_gltf_say_elements(c->scene.g.json, "bufferViews", &w->views, &w->nviews, e);
     w->bytes = c->scene.g.nbuffers ? c->scene.g.buffers[0].size : 0;
-    return r < 0 ? r : vgi_gltf_say_elements(c, "accessors", &w->accessors, &w->naccessors, e);
+    return r < 0 ? r : vgi_gltf_say_elements(c->scene.g.json, "accessors", &w->accessors, &w->naccessors, e);
 }
 
 static int describe(vgi_gltf_writing *w, vg_err *e)
 {
-    int r = w->character ? describe_character(w, e) : describe_indices(w, &w->shape.triangles, &w->triangles, e);
-    if (r == VG_OK) r = describe_indices(w, &w->shape.lines, &w->lines, e);
+    int r = w->character ? describe_character(w, e) : vgi_gltf_describe_library(w, e);
+    if (r == VG_OK && !w->character) r = describe_indices(w, false, &w->triangles, e);
+    if (r == VG_OK) r = describe_indices(w, true, &w->lines, e);
     if (r == VG_OK) r = describe_texture(w, e);
     if (r == VG_OK && !w->still) r = vgi_gltf_describe_times(w, e);
     return r < 0 ? r : w->manner->describe(w, e);
@@ -282,8 +301,8 @@ int vgi_gltf_emit_singles(vgi_gltf_writing *w, const float *p, size_t n, vg_err 
 
 static int emit_all(vgi_gltf_writing *w, vg_err *e)
 {
-    const vgi_gltf *g = w->character ? &w->character->scene.g : NULL;
-    int r = g && g->nbuffers ? vgi_gltf_emit(w, g->buffers[0].data, g->buffers[0].size, e) : VG_OK;
+    const vgi_gltf *g = w->character ? &w->character->scene.g : &w->library;
+    int r = g->nbuffers ? vgi_gltf_emit(w, g->buffers[0].data, g->buffers[0].size, e) : VG_OK;
     if (r == VG_OK) r = vgi_gltf_emit(w, w->shape.triangles.data, w->shape.triangles.size, e);
     if (r == VG_OK) r = vgi_gltf_emit(w, w->shape.lines.data, w->shape.lines.size, e);
     if (r == VG_OK && w->seams.uv) r = vgi_gltf_emit_singles(w, w->seams.uv, 2 * w->seams.n, e);
@@ -342,6 +361,13 @@ static void note_loss(vgi_gltf_writing *w, const char *what)
     snprintf(w->warning + n, sizeof w->warning - n, "%s; ", what);
 }
 
+static bool has_groups(const vg_attributes *a)
+{
+    for (size_t i = 0; i < a->nlabels; i++)
+        if (a->labels[i].kind != VG_LABEL_MATERIAL && a->labels[i].kind != VG_LABEL_LIBRARY) return true;
+    return false;
+}
+
 static void note_losses(vgi_gltf_writing *w)
 {
     const vg_body *b = &w->h->body;
@@ -349,9 +375,10 @@ static void note_losses(vgi_gltf_writing *w)
     if (!w->character) {
         char asset[120];
         vg_asset_text(&b->asset, asset, sizeof asset);
-        if (*asset) note_loss(w, asset);
+        if (*asset && !w->library.json) note_loss(w, asset);
         if (b->attributes.ntex && !w->seams.uv) note_loss(w, "texture coordinates");
-        if (b->attributes.nlabels) note_loss(w, "groups and materials");
+        if (has_groups(&b->attributes)) note_loss(w, w->materials.names.n ? "groups" : "groups and materials");
+        else if (b->attributes.nlabels && !w->materials.names.n) note_loss(w, "groups and materials");
     }
     const size_t n = strlen(w->warning);
     if (w->manner->warning) w->manner->warning(w, w->warning + n, sizeof w->warning - n);
@@ -363,13 +390,14 @@ static int make_shape(vgi_gltf_writing *w, vg_err *e)
 {
     const vgi_gltf_seams *s = &w->seams;
     vg_mesh mesh = w->h->body.mesh;
-    if (!s->corner) return vgi_gltf_shape_make(&w->shape, &mesh, w->h->body.reference, e);
+    const vg_attributes *a = w->h->kind == VG_VERTICES ? &w->h->body.attributes : NULL;
+    if (!s->corner) return vgi_gltf_shape_make(&w->shape, &mesh, w->h->body.reference, a, e);
     double *points = vgi_array_raw(s->n, 3 * sizeof *points, e);
     if (!points) return VG_ENOMEM;
     for (size_t v = 0; v < s->n; v++)
         memcpy(points + 3 * v, w->h->body.reference + 3 * (size_t)s->from[v], 3 * sizeof *points);
     mesh.nv = s->n, mesh.vert = s->corner;
-    int r = vgi_gltf_shape_make(&w->shape, &mesh, points, e);
+    int r = vgi_gltf_shape_make(&w->shape, &mesh, points, a, e);
     free(points);
     return r;
 }
@@ -380,6 +408,7 @@ int vgi_gltf_end(void *state, vg_err *e)
     int r = vgi_output_flush(&w->spool, e);
     if (r == VG_OK) r = vgi_gltf_find_takes(w, w->manner->splits, e);
     if (r == VG_OK && !w->character) r = make_shape(w, e);
+    if (r == VG_OK && !w->character) r = vgi_gltf_find_materials(w, e);
     if (r == VG_OK) r = say_all(w, e);
     if (r == VG_OK) r = w->binary ? put_binary(w, e) : put_text(w, e);
     note_losses(w);
@@ -397,6 +426,8 @@ void vgi_gltf_release(void *state)
     vgi_gltf_writing *w = state;
     if (!w) return;
     w->manner->release(w->own);
+    vgi_gltf_clear(&w->library);
+    vgi_name_set_clear(&w->materials);
     if (w->character) vgi_gltf_character_clear(w->character);
     free(w->character);
     if (w->spool.fd >= 0) close(w->spool.fd);

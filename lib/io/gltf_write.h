@@ -11,11 +11,22 @@
 enum { VGI_GLTF_ITEM = 4, VGI_GLTF_POINT = 12 }; /* bytes of a number, and of three */
 
 /* ---- gltf_faces.c: faces as triangles and lines ---- */
+typedef struct vgi_gltf_run { /* faces of one material */
+    size_t triangles, lines;  /* bytes of indices before it */
+    const char *material;     /* its name; NULL: none */
+} vgi_gltf_run;
+
+enum { VGI_GLTF_MOST_RUNS = 256 };
+
 typedef struct vgi_gltf_shape {
     vg_bytes triangles, lines; /* indices of 32 bits */
+    size_t nruns, runs_cap;
+    vgi_gltf_run *run;         /* nruns, and one more behind the last */
     vg_bytes runs;             /* for VGI_GLTF_FACES: count, size, count, size, ... as text */
 } vgi_gltf_shape;
-int vgi_gltf_shape_make(vgi_gltf_shape *s, const vg_mesh *m, const double *reference, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_shape_make: a (may be NULL): whose labels say the materials; of more than VGI_GLTF_MOST_RUNS runs there is one. */
+int vgi_gltf_shape_make(vgi_gltf_shape *s, const vg_mesh *m, const double *reference, const vg_attributes *a,
+                        vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_shape_clear(vgi_gltf_shape *s);
 
 /* ---- gltf_write.c ---- */
@@ -60,6 +71,8 @@ struct vgi_gltf_writing {
     size_t ntakes;
     bool times_lost;
     vgi_gltf_character *character; /* whose nodes, materials and attributes are written; NULL: none */
+    vgi_gltf library;          /* of materials, without meshes; json NULL: none */
+    vgi_name_set materials;    /* the names of those that are written */
     vgi_gltf_seams seams;      /* vertices of the file; of a skin those of the mesh */
     float *base;               /* the reference pose as it will be read, seams.n points */
     vgi_gltf_shape shape;
@@ -90,10 +103,16 @@ typedef struct vgi_gltf_cast {
     const vgi_json *names;
 } vgi_gltf_cast;
 int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e) VG_MUST_CHECK;
-/* vgi_gltf_say_elements: the elements of a list of the character's file, as text. */
-int vgi_gltf_say_elements(const vgi_gltf_character *c, const char *list, vg_bytes *to, size_t *n,
+/* vgi_gltf_say_elements: the elements of a list of a file, as text. */
+int vgi_gltf_say_elements(const vgi_json *document, const char *list, vg_bytes *to, size_t *n,
                           vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_say_cast_asset(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
+
+/* ---- gltf_library.c: materials of a mesh that has only their names, and of a library if there is one ---- */
+int vgi_gltf_find_materials(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
+int vgi_gltf_describe_library(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
+int vgi_gltf_say_materials(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK; /* "materials":[...], and what they need */
+size_t vgi_gltf_material(const vgi_gltf_writing *w, const char *name);
 
 int vgi_gltf_say(vg_bytes *to, vg_err *e, const char *format, ...) VG_PRINTF(3, 4);
 int vgi_gltf_say_text(vg_bytes *to, const char *s, vg_err *e) VG_MUST_CHECK; /* in quotes */

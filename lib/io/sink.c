@@ -230,6 +230,14 @@ static bool has_faces_of(const vg_mesh *m, size_t least, size_t most)
     return false;
 }
 
+/* An OBJ names the file of its materials, and goes on to do so. */
+static bool names_library(const vg_body *b)
+{
+    for (size_t i = 0; i < b->attributes.nlabels; i++)
+        if (b->attributes.labels[i].kind == VG_LABEL_LIBRARY) return true;
+    return false;
+}
+
 static int add_loss(vg_bytes *line, const char *what, vg_err *e)
 {
     int r = line->size ? vgi_bytes_append(line, "; ", 2, e) : VG_OK;
@@ -258,7 +266,7 @@ static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
                {!(keeps & VGI_KEEPS_ORDER), "the numbers of the vertices, and those in no face"},
                {!(keeps & VGI_KEEPS_TEXTURE) && h->body.attributes.ntex, "texture coordinates"},
                {!(keeps & VGI_KEEPS_LABELS) && h->body.attributes.nlabels, "groups and materials"},
-               {!(keeps & VGI_KEEPS_ASSET) && *asset, asset},
+               {!(keeps & VGI_KEEPS_ASSET) && *asset && !(keeps & VGI_KEEPS_LABELS && names_library(&h->body)), asset},
                {!(keeps & VGI_KEEPS_SKELETON) && h->body.skeleton.njoints, "the skeleton"},
                {f && !(keeps & VGI_KEEPS_NAMES) && s->names_lost && s->frames > 1, "the names of the frames"},
                {f && !(keeps & VGI_KEEPS_TIMES) && s->times_lost, "the times of the frames"},

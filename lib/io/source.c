@@ -9,6 +9,7 @@
  * opened again one after another when it is their turn. What can be read only once (standard input, a pipe named by
  * the shell) stays open in between.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf_pack.h"
 #include "io/sequence_reader.h"
 
 #include <errno.h>
@@ -319,8 +320,12 @@ static int take_over_model(vg_source *s, pose *p, vg_err *e)
     note_left_out(s, s->own_name, m->note.text);
     s->head.body.mesh = m->mesh;
     s->head.body.attributes = m->attributes;
+    vg_note note = {0};
+    if (!p->archive) r = vgi_take_materials(&s->head.body, p->path, &note, e);
+    note_left_out(s, s->own_name, note.text);
     m->mesh = (vg_mesh){0};
     m->attributes = (vg_attributes){0};
+    if (r < 0) return r;
     s->head.body.reference = vgi_copy_array(m->vertices, 3 * s->own.count, sizeof(double), e);
     s->head.body.reference_name = vgi_copy_string(p->name, strlen(p->name), e);
     return s->head.body.reference && s->head.body.reference_name ? VG_OK : VG_ENOMEM;
