@@ -8,27 +8,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { METHOD_NOT_GIVEN = 2 };
-
-struct rigging_options rigging = {.method = METHOD_NOT_GIVEN, .bones_per_corner = 2, .refine = 0.003};
-
 enum { SAMPLE = 64 };
 
-bool rigging_wanted(void)
+bool rigging_wanted(const rigging_options *o)
 {
-    return rigging.skeleton || rigging.groups || rigging.bones;
+    return o->skeleton || o->groups || o->bones;
 }
 
-static bool by_skinning(void)
+static bool by_skinning(const rigging_options *o)
 {
-    return rigging.method == VG_RIG_LBS;
+    return o->method == RIGGING_METHOD_NOT_GIVEN ? o->bones > 0 : o->method == VG_RIG_LBS;
 }
 
 void rigging_take_root(const char *text, void *context)
 {
-    (void)context;
-    rigging.has_root = cli_parse_numbers(text, rigging.root_at, 3) == 3;
-    if (!rigging.has_root) cli_usage("option '--root-at' needs X,Y,Z, not '%s'", text);
+    rigging_options *o = context;
+    o->has_root = cli_parse_numbers(text, o->root_at, 3) == 3;
+    if (!o->has_root) cli_usage("option '--root-at' needs X,Y,Z, not '%s'", text);
 }
 
 /* ---- what is at hand ---- */
@@ -41,6 +37,7 @@ typedef struct motion {
 } motion;
 
 typedef struct work {
+    const rigging_options *o;
     vg_head *h;
     fitting poses;
     size_t reference; /* the first pose that is the reference; poses.n: none is */
@@ -70,9 +67,9 @@ static void look_for_reference(void *context, const fitting_batch *b)
             w->reference = b->index[i];
 }
 
-static void read_poses(work *w, vg_source *s, long holdout)
+static void read_poses(work *w, vg_source *s)
 {
-    fitting_collect(&w->poses, s, holdout, "fit a rig to");
+    fitting_collect(&w->poses, s, w->o->holdout, "fit a rig to");
     w->reference = w->poses.n;
     fitting_pass(&w->poses, NULL, look_for_reference, w);
     w->nsample = fitting_sample(&w->poses, SAMPLE, w->sample_at, w->sample);
@@ -103,11 +100,11 @@ static void read_skeleton(work *w)
     vg_source *s;
     vg_frame f = {0};
     vg_joint_fitter *fitter;
-    if (vg_source_open(&s, &rigging.skeleton, 1, &e) < 0) cli_die(&e);
+    if (vg_source_open(&s, &w->o->skeleton, 1, &e) < 0) cli_die(&e);
     vg_head *h = vg_source_head(s);
     if (!h->body.skeleton.njoints || h->kind != VG_VERTICES)
         cli_stop(VG_EINPUT, "'%s' holds no skeleton: give a BVH file, or lines of 'bone parent head tail'",
-                 rigging.skeleton);
+                 w->o->skeleton);
     if (vg_skeleton_copy(&w->given.skeleton, &h->body.skeleton, &e) < 0 ||
         vg_joint_fitter_new(&fitter, &w->given.skeleton, &e) < 0)
         cli_die(&e);
@@ -181,22 +178,22 @@ static void place_skeleton(work *w)
     const motion *m = &w->given;
     size_t joints = m->skeleton.njoints;
     double *positions = room(3 * joints, sizeof *positions), *turns = room(4 * joints, sizeof *turns);
-    bool known = m->n == w->poses.n && !rigging.learn;
+    bool known = m->n == w->poses.n && !w->o->learn;
     vg_skeleton_pose(&m->skeleton, NULL, positions, turns);
-    if (!known && !rigging.learn && m->n > 1)
+    if (!known && !w->o->learn && m->n > 1)
         cli_stop(VG_EINPUT,
                  "'%s' has %zu frames and there are %zu poses: give one frame for each pose, or --learn the "
                  "motion from the poses",
-                 rigging.skeleton, m->n, w->poses.n);
+                 w->o->skeleton, m->n, w->poses.n);
     if (known ? w->reference < w->poses.n : m->n == 1) {
         size_t frame = known ? w->reference : 0;
         memcpy(positions, m->positions + 3 * joints * frame, 3 * joints * sizeof *positions);
         memcpy(turns, m->turns + 4 * joints * frame, 4 * joints * sizeof *turns);
-    } else if (known && !rigging.has_root) {
+    } else if (known && !w->o->has_root) {
         locate_root(w, positions);
     }
-    if (rigging.has_root) {
-        move_root(&m->skeleton, rigging.root_at, positions);
+    if (w->o->has_root) {
+        move_root(&m->skeleton, w->o->root_at, positions);
     } else if (!known && m->n > 1) {
         cli_warn("the root of the skeleton is taken to be at its offset, %g %g %g, in the reference pose: --root-at "
                  "says otherwise",
@@ -220,8 +217,8 @@ static void read_groups(work *w)
     vg_err e;
     size_t n;
     vg_skeleton s;
-    char *text = cli_read_file(rigging.groups, &n), name[200];
-    snprintf(name, sizeof name, "'%.190s'", rigging.groups);
+    char *text = cli_read_file(w->o->groups, &n), name[200];
+    snprintf(name, sizeof name, "'%.190s'", w->o->groups);
     if (vg_joint_groups_read(&w->groups, text, n, 0, name, &e) < 0 ||
         vg_joint_groups_skeleton(&w->groups, w->h->body.mesh.nv, w->h->body.reference, &s, &e) < 0)
         cli_die(&e);
@@ -239,7 +236,7 @@ static void find_bones(work *w)
 {
     vg_err e;
     double miss, d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
-    size_t nv = w->h->body.mesh.nv, wanted = (size_t)rigging.bones;
+    size_t nv = w->h->body.mesh.nv, wanted = (size_t)w->o->bones;
     if (vg_rig_decompose(&w->h->body.rig, nv, w->h->body.reference, wanted, w->nsample,
                          (const double *const *)w->sample, cli.threads, &miss, &e) < 0 ||
         vg_free_bones_new(&w->free, &w->h->body.rig, nv, w->h->body.reference, cli.threads, &e) < 0)
@@ -267,10 +264,10 @@ static void measure_transforms(work *w, const fitting_batch *b)
         return;
     }
     double *positions = NULL, *turns = NULL;
-    if (rigging.groups) positions = room(3 * joints, sizeof *positions), turns = room(4 * joints, sizeof *turns);
+    if (w->o->groups) positions = room(3 * joints, sizeof *positions), turns = room(4 * joints, sizeof *turns);
     for (size_t i = 0; i < b->n; i++) {
         size_t k = first + i;
-        if (rigging.groups) {
+        if (w->o->groups) {
             vg_joint_groups_pose(&w->groups, w->h->body.reference, b->values[i], positions, turns);
             vg_rig_transforms(r, positions, turns, w->transforms[k]);
         } else {
@@ -328,8 +325,8 @@ static void report(work *w)
     double d = vg_diagonal(w->h->body.reference, nv);
     if (cli.quiet || !(d > 0)) return;
     skinning = *w->h;
-    if (!by_skinning()) skinning.map = w->skinning;
-    if ((!by_skinning() && vg_player_new(&players[0], w->h, false, cli.threads, &e) < 0) ||
+    if (!by_skinning(w->o)) skinning.map = w->skinning;
+    if ((!by_skinning(w->o) && vg_player_new(&players[0], w->h, false, cli.threads, &e) < 0) ||
         vg_player_new(&players[1], &skinning, false, cli.threads, &e) < 0)
         cli_die(&e);
     for (int i = 0; i < 4; i++) {
@@ -348,19 +345,19 @@ static void report(work *w)
     for (int i = 0; i < 2; i++) vg_player_free(&players[i]);
 }
 
-static void fit(work *w, double hold)
+static void fit(work *w)
 {
     vg_err e;
     vg_head *h = w->h;
-    const vg_rig_options o = {.bones_per_corner = (size_t)rigging.bones_per_corner,
-                              .hold = hold,
-                              .refine = rigging.refine,
+    const vg_rig_options o = {.bones_per_corner = (size_t)w->o->bones_per_corner,
+                              .hold = w->o->hold,
+                              .refine = w->o->refine,
                               .threads = cli.threads};
     if (vg_rig_fitter_new(&fitter, h, &o, &e) < 0) cli_die(&e);
     w->transforms = room(w->poses.n, sizeof *w->transforms);
     fitting_pass(&w->poses, NULL, fit_batch, w);
     if (vg_rig_fitter_finish(fitter, VG_RIG_LBS, &e) < 0) cli_die(&e);
-    if (!by_skinning()) {
+    if (!by_skinning(w->o)) {
         w->skinning = h->map;
         h->map = (vg_map){0};
         if (vg_rig_fitter_finish(fitter, VG_RIG_ENVELOPE, &e) < 0) cli_die(&e);
@@ -368,22 +365,22 @@ static void fit(work *w, double hold)
     vg_rig_fitter_free(&fitter);
 }
 
-void rigging_run(vg_source *s, double hold, long holdout)
+void rigging_run(vg_source *s, const rigging_options *o)
 {
     static work w; /* lives until the end: what it holds goes with the process */
-    if (rigging.method == METHOD_NOT_GIVEN) rigging.method = rigging.bones ? VG_RIG_LBS : VG_RIG_ENVELOPE;
+    w.o = o;
     w.h = vg_source_head(s);
     if (w.h->body.skeleton.njoints) cli_stop(VG_EINPUT, "the input is a skeleton: vg-fitmap takes poses of a mesh");
     if (!w.h->body.mesh.nf) cli_stop(VG_EINPUT, "the input has no faces");
     vg_rig_clear(&w.h->body.rig);
     vg_map_clear(&w.h->map);
-    if (rigging.skeleton) read_skeleton(&w);
-    read_poses(&w, s, holdout);
+    if (o->skeleton) read_skeleton(&w);
+    read_poses(&w, s);
     if (!w.nsample) cli_stop(VG_EINPUT, "all poses are left out of the fit: raise --holdout");
-    if (rigging.groups) read_groups(&w);
-    else if (rigging.bones) find_bones(&w);
+    if (o->groups) read_groups(&w);
+    else if (o->bones) find_bones(&w);
     else place_skeleton(&w);
-    fit(&w, hold);
+    fit(&w);
     report(&w);
     fitting_clear(&w.poses);
 }

@@ -5,7 +5,7 @@
 
 #include "cli.h"
 
-extern struct rigging_options {
+typedef struct rigging_options {
     const char *skeleton, *groups; /* NULL: not given */
     double root_at[3];
     bool has_root, learn;
@@ -13,14 +13,18 @@ extern struct rigging_options {
     long bones;    /* without a skeleton; 0: not given */
     long bones_per_corner;
     double refine;
-} rigging;
+    double hold;  /* share of the vertices that go where their bones take them */
+    long holdout; /* hold out every Nth pose; 0: none */
+} rigging_options;
 
-/* rigging_wanted: is --skeleton, --groups or --bones there? */
-bool rigging_wanted(void);
-/* rigging_take_root: "X,Y,Z" into rigging.root_at; to be given to cli_option. */
+/* What method is before --method is read: envelope, or skinning with --bones. */
+enum { RIGGING_METHOD_NOT_GIVEN = 2 };
+
+/* rigging_wanted: is --skeleton, --groups or --bones given? */
+bool rigging_wanted(const rigging_options *o);
+/* rigging_take_root: "X,Y,Z" into root_at of the rigging_options that context is; for cli_option. */
 void rigging_take_root(const char *text, void *context);
-/* rigging_run: the fit, into the head of s: hold: share of the vertices; holdout: every so manieth pose is left out,
- * 0: none. */
-void rigging_run(vg_source *s, double hold, long holdout);
+/* rigging_run: the fit, into the head of s. */
+void rigging_run(vg_source *s, const rigging_options *o);
 
 #endif

@@ -8,35 +8,34 @@
 
 static struct {
     const char *patches;
-    long holdout;
-    double hold;
-} opts = {.hold = 0.03};
+    rigging_options rig; /* hold and holdout: of maps of patches, too */
+} opts = {.rig = {.method = RIGGING_METHOD_NOT_GIVEN, .bones_per_corner = 2, .refine = 0.003, .hold = 0.03}};
 
 static const cli_option options[] = {
     {"patches", 0, "FILE", "the patches: what vg-segment wrote; default: those of the input", .text = &opts.patches,
      .reads = true, .excludes = "skeleton|groups|bones"},
     {"skeleton", 0, "FILE", "a skeleton drives the mesh: BVH, a stream of it, or lines of text",
-     .text = &rigging.skeleton, .reads = true, .excludes = "groups|bones"},
+     .text = &opts.rig.skeleton, .reads = true, .excludes = "groups|bones"},
     {"groups", 0, "FILE", "a skeleton drives the mesh: each joint is the mean of some of its vertices",
-     .text = &rigging.groups, .reads = true, .excludes = "bones"},
+     .text = &opts.rig.groups, .reads = true, .excludes = "bones"},
     {"bones", 0, "N", "no skeleton: find N bones that move freely, with their motions, in the poses",
-     .integer = &rigging.bones, .least = 1, .most = 65536},
+     .integer = &opts.rig.bones, .least = 1, .most = 65536},
     {"learn", 0, NULL, "with --skeleton: find its motion from the poses, whatever motion it comes with",
-     .flag = &rigging.learn, .needs = "skeleton"},
+     .flag = &opts.rig.learn, .needs = "skeleton"},
     {"root-at", 0, "X,Y,Z", "with --skeleton: where its root is in the reference pose",
-     .take = rigging_take_root, .needs = "skeleton"},
+     .take = rigging_take_root, .context = &opts.rig, .needs = "skeleton"},
     {"method", 0, "envelope|lbs",
      "with bones: vectors and held vertices (default), or linear blend skinning alone",
-     .choice = &rigging.method, .needs = "skeleton|groups|bones"},
+     .choice = &opts.rig.method, .needs = "skeleton|groups|bones"},
     {"bones-per-corner", 0, "N", "with bones: how many bones drive a corner, 1 or 2 (default 2)",
-     .integer = &rigging.bones_per_corner, .least = 1, .most = 2, .needs = "skeleton|groups|bones"},
+     .integer = &opts.rig.bones_per_corner, .least = 1, .most = 2, .needs = "skeleton|groups|bones"},
     {"refine", 0, "RIDGE",
      "with bones: the ridge with which bones take up what is left (default 0.003; 0: they do not)",
-     .number = &rigging.refine, .least = 0, .most = 1e6, .needs = "skeleton|groups|bones"},
-    {"holdout", 0, "N", "leave every Nth pose out of the fit, and report the error there", .integer = &opts.holdout,
+     .number = &opts.rig.refine, .least = 0, .most = 1e6, .needs = "skeleton|groups|bones"},
+    {"holdout", 0, "N", "leave every Nth pose out of the fit, and report the error there", .integer = &opts.rig.holdout,
      .least = 2, .most = 1000000000},
     {"hold", 0, "SHARE", "of the vertices, those that go where their patch or bones take them (default 0.03)",
-     .number = &opts.hold, .least = 0, .most = 1},
+     .number = &opts.rig.hold, .least = 0, .most = 1},
     {.name = NULL}};
 
 static const cli_moved moved[] = {{"retarget", "is now the program vg-retarget: vg-retarget --onto MESH MAP"},
@@ -144,18 +143,18 @@ static void fit(vg_source *s)
     vg_err e;
     vg_head *h = vg_source_head(s);
     cli_need_vertices(h, "the input");
-    if (rigging_wanted()) {
-        rigging_run(s, opts.hold, opts.holdout);
+    if (rigging_wanted(&opts.rig)) {
+        rigging_run(s, &opts.rig);
         return;
     }
     take_patches(h);
     size_t before = h->body.patches.n;
     fitting f;
     patch_fit x = {.f = &f};
-    if (vg_map_fitter_new(&x.fitter, h, opts.hold, cli.threads, &e) < 0) cli_die(&e);
+    if (vg_map_fitter_new(&x.fitter, h, opts.rig.hold, cli.threads, &e) < 0) cli_die(&e);
     if (h->body.patches.n != before)
         cli_note("%zu patches are in %zu pieces, each of which is a patch of the map", before, h->body.patches.n);
-    fitting_collect(&f, s, opts.holdout, "fit a map to");
+    fitting_collect(&f, s, opts.rig.holdout, "fit a map to");
     fitting_pass(&f, is_fitted, add_batch, &x);
     if (vg_map_fitter_finish(x.fitter, &e) < 0) cli_die(&e);
     vg_map_fitter_free(&x.fitter);
