@@ -222,7 +222,7 @@ static void load_target(work *w)
 {
     vg_err e;
     if (!opts.onto) return;
-    if (vg_load_mesh(&w->target, opts.onto, &e) < 0) cli_die(&e);
+    if (vg_load(&w->target, opts.onto, "mesh", &e) < 0) cli_die(&e);
     if (!opts.correspondence) return;
     if (vg_load(&w->pairs, opts.correspondence, "correspondence", &e) < 0) cli_die(&e);
 }
@@ -255,7 +255,7 @@ static void make_graphs(work *w)
         w->h->has_selection = false; /* every face may drive one */
         w->target.has_selection = false;
         w->h->nanchors = 0;
-        if (vg_head_prepare_vectors(&w->target, &e) < 0 || vg_graph_new(&w->to, &w->target, &e) < 0) cli_die(&e);
+        if (vg_head_prepare_vectors(&w->target, &e) < 0 || vg_head_graph(&w->to, &w->target, &e) < 0) cli_die(&e);
     } else if (opts.onto) {
         char name[200];
         snprintf(name, sizeof name, "'%.190s'", opts.onto);
@@ -265,7 +265,7 @@ static void make_graphs(work *w)
             cli_die(&e);
         }
     }
-    if (vg_head_prepare_vectors(w->h, &e) < 0 || vg_graph_new(&w->from, w->h, &e) < 0) cli_die(&e);
+    if (vg_head_prepare_vectors(w->h, &e) < 0 || vg_head_graph(&w->from, w->h, &e) < 0) cli_die(&e);
     if (!w->to) w->to = w->from;
 }
 
@@ -276,13 +276,11 @@ static vg_graph *sample_graph(const vg_head *h)
 {
     vg_err e;
     vg_graph *g;
-    vg_head some = *h; /* lent */
-    size_t stride = h->body.mesh.nf / SAMPLE + 1;
-    some.has_selection = true, some.nselected = 0, some.nlinks = 0;
-    some.selected = cli_allocate(h->body.mesh.nf / stride, sizeof *some.selected, "a sample of the faces");
-    for (size_t f = 0; f < h->body.mesh.nf; f += stride) some.selected[some.nselected++] = (uint32_t)f;
-    if (vg_graph_new(&g, &some, &e) < 0) cli_die(&e);
-    free(some.selected);
+    size_t stride = h->body.mesh.nf / SAMPLE + 1, n = 0;
+    uint32_t *selected = cli_allocate(h->body.mesh.nf / stride + 1, sizeof *selected, "a sample of the faces");
+    for (size_t face = 0; face < h->body.mesh.nf; face += stride) selected[n++] = (uint32_t)face;
+    if (vg_graph_new(&g, &h->body.mesh, n, selected, 0, NULL, &e) < 0) cli_die(&e);
+    free(selected);
     return g;
 }
 

@@ -65,7 +65,7 @@ static void set_reference(vg_head *h, const char *operand)
 {
     vg_err e;
     vg_head r = {0};
-    if (vg_load_mesh(&r, operand, &e) < 0 ||
+    if (vg_load(&r, operand, "mesh", &e) < 0 ||
         vg_mesh_same(&r.body.mesh, "the reference", &h->body.mesh, "the sequence", &e) < 0 ||
         vg_head_merge_trace(h, &r, &e) < 0)
         cli_die(&e);
@@ -144,7 +144,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     w->h = h;
     apply_options(h, opts.faces == 1, w->anchors, w->nanchors);
     if (!opts.vectors) return;
-    if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&w->g, h, &e) < 0) cli_die(&e);
+    if (vg_head_prepare_vectors(h, &e) < 0 || vg_head_graph(&w->g, h, &e) < 0) cli_die(&e);
     h->kind = VG_VECTORS, h->count = vg_graph_corners(w->g);
     if (vg_frame_shape(&w->vectors, h, &e) < 0) cli_die(&e);
 }

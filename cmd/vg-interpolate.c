@@ -69,7 +69,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
         cli_stop(VG_EINPUT, "the input holds %s: vg-interpolate takes vertices, vectors or deformations",
                  vg_head_form(p->h));
     p->numbers = p->h->count * vg_head_width(p->h);
-    if (vg_head_prepare_vectors(p->h, &e) < 0 || vg_graph_new(&p->g, p->h, &e) < 0) cli_die(&e);
+    if (vg_head_prepare_vectors(p->h, &e) < 0 || vg_head_graph(&p->g, p->h, &e) < 0) cli_die(&e);
     p->h->kind = VG_VECTORS;
     p->h->count = vg_graph_corners(p->g);
 }

@@ -32,7 +32,7 @@ static void retarget(vg_head *h)
     vg_head target = {0};
     char name[200];
     snprintf(name, sizeof name, "'%.190s'", opts.onto);
-    if (vg_head_need(h, "map", "the input", &e) < 0 || vg_load_mesh(&target, opts.onto, &e) < 0 ||
+    if (vg_head_need(h, "map", "the input", &e) < 0 || vg_load(&target, opts.onto, "mesh", &e) < 0 ||
         vg_mesh_same(&h->body.mesh, "the map", &target.body.mesh, name, &e) < 0 ||
         vg_map_retarget(h, target.body.reference, opts.morph, cli.threads, &e) < 0 ||
         vg_head_merge_trace(h, &target, &e) < 0)

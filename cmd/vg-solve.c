@@ -332,7 +332,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     if (w->kind != VG_VECTORS && w->kind != VG_VERTICES)
         cli_stop(VG_EINPUT, "the input holds %s, vg-solve takes vectors: apply them with 'vg-deform --onto MESH'",
                  vg_head_form(h));
-    if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&w->g, h, &e) < 0) cli_die(&e);
+    if (vg_head_prepare_vectors(h, &e) < 0 || vg_head_graph(&w->g, h, &e) < 0) cli_die(&e);
     uint32_t *anchors = cli_allocate(h->nanchors, sizeof *anchors, "a batch of poses");
     if (h->nanchors) memcpy(anchors, h->anchors, h->nanchors * sizeof *anchors);
     make_machine(w, &w->plain, anchors, h->nanchors);

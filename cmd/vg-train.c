@@ -180,7 +180,7 @@ static void resume(vg_trainer *t)
     vg_err e;
     vg_head from = {0};
     if (!opts.resume) return;
-    if (vg_load_mesh(&from, opts.resume, &e) < 0) cli_die(&e);
+    if (vg_load(&from, opts.resume, "mesh", &e) < 0) cli_die(&e);
     if (!from.network.model) cli_stop(VG_EINPUT, "'%.190s' holds no network: --resume takes what --checkpoint wrote", opts.resume);
     if (vg_trainer_resume(t, &from.network, &e) < 0) cli_stop(VG_EINPUT, "cannot go on from '%.190s': %s", opts.resume, e.message);
     vg_head_clear(&from);

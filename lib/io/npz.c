@@ -477,7 +477,7 @@ static int take_graph(reading *x, vg_head *h, vg_err *e)
     if (!is_float(&x->held[ROOTS]) || !has_shape(&x->held[ROOTS], 2, roots))
         return wrong(x, ROOTS, "is not of shape (frames, 3) with float32 or float64", e);
     vg_graph *g;
-    if ((r = vg_graph_new(&g, h, e)) < 0) return r;
+    if ((r = vg_head_graph(&g, h, e)) < 0) return r;
     size_t corners = vg_graph_corners(g);
     vg_graph_free(&g);
     if (corners == x->count) return VG_OK;

@@ -124,7 +124,7 @@ static int add_mesh(writing *x, enum array offsets, enum array vertices, const u
 static int add_graph(writing *x, vg_err *e)
 {
     vg_graph *g;
-    int r = vg_graph_new(&g, x->h, e);
+    int r = vg_head_graph(&g, x->h, e);
     if (r == VG_OK) r = add_mesh(x, GRAPH_OFFSETS, GRAPH_VERTICES, g->start, g->vert, g->nf, e);
     vg_graph_free(&g);
     return r;

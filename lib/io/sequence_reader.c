@@ -56,7 +56,7 @@ static int borrow_mesh(const vgi_playing *p, vg_head *h, const char *path, vg_er
 {
     vg_head from = {0};
     char subject[VGI_SUBJECT];
-    int r = vg_load_mesh(&from, path, e);
+    int r = vg_load(&from, path, "mesh", e);
     if (r == VG_OK && from.body.mesh.nv != h->body.mesh.nv)
         r = vgi_different_count(h, p->subject, from.body.mesh.nv, vgi_quote(path, subject), e);
     if (r == VG_OK) {

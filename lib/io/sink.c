@@ -165,7 +165,7 @@ static bool same_singles(const double *a, const double *b, size_t n)
 static int keep_mesh(const vg_sink *s, vg_err *e)
 {
     vg_head there = {0};
-    int r = vg_load_mesh(&there, s->mesh, NULL);
+    int r = vg_load(&there, s->mesh, "mesh", NULL);
     bool same = r == VG_OK && vg_mesh_same(&there.body.mesh, "", &s->head->body.mesh, "", NULL) == VG_OK &&
                 same_singles(there.body.reference, s->head->body.reference, 3 * there.body.mesh.nv);
     vg_head_clear(&there);

@@ -573,7 +573,7 @@ static int find_mesh(vg_source *s, vg_err *e)
 static int settle_named_mesh(vg_source *s, const char *mesh, vg_err *e)
 {
     vg_head from;
-    int r = vg_load_mesh(&from, mesh, e);
+    int r = vg_load(&from, mesh, "mesh", e);
     if (r == VG_OK) r = settle_mesh(s, &from.body.mesh, NULL, mesh, e);
     if (r == VG_OK) r = keep_skeleton(s, &from, e);
     if (r == VG_OK) r = vg_head_merge_trace(&s->head, &from, e);
@@ -740,9 +740,4 @@ int vg_load_with(vg_head *h, const char *operand, const char *what, const vg_sou
 int vg_load(vg_head *h, const char *operand, const char *what, vg_err *e)
 {
     return vg_load_with(h, operand, what, NULL, NULL, e);
-}
-
-int vg_load_mesh(vg_head *h, const char *operand, vg_err *e)
-{
-    return vg_load(h, operand, "mesh", e);
 }

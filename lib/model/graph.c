@@ -19,38 +19,49 @@ static void mark_attached(vg_graph *g)
     }
 }
 
-int vg_graph_new(vg_graph **out, const vg_head *h, vg_err *e)
+static void fill_faces(vg_graph *g, const vg_mesh *m, const uint32_t *selected, const uint32_t *links)
 {
-    const vg_mesh *m = &h->body.mesh;
-    size_t faces = h->has_selection ? h->nselected : m->nf, corners = 0;
+    uint32_t at = 0;
+    size_t faces = g->nf - g->nlinks;
     for (size_t i = 0; i < faces; i++) {
-        size_t f = h->has_selection ? h->selected[i] : i;
+        size_t f = selected ? selected[i] : i;
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) g->vert[at++] = m->vert[c];
+        g->start[i + 1] = at;
+    }
+    for (size_t i = 0; i < g->nlinks; i++) {
+        g->vert[at++] = links[2 * i];
+        g->vert[at++] = links[2 * i + 1];
+        g->start[faces + i + 1] = at;
+    }
+}
+
+int vg_graph_new(vg_graph **out, const vg_mesh *m, size_t nselected, const uint32_t *selected, size_t nlinks,
+                 const uint32_t *links, vg_err *e)
+{
+    size_t faces = selected ? nselected : m->nf, corners = 2 * nlinks;
+    for (size_t i = 0; i < faces; i++) {
+        size_t f = selected ? selected[i] : i;
         corners += m->start[f + 1] - m->start[f];
     }
-    corners += 2 * h->nlinks;
     if (corners >= UINT32_MAX) return vg_fail(e, VG_EINPUT, "too many corners: %zu (the limit is 2^32 - 2)", corners);
 
     vg_graph *g = *out = vgi_array(1, sizeof *g, e);
     if (!g) return VG_ENOMEM;
-    g->nv = m->nv, g->nf = faces + h->nlinks, g->nlinks = h->nlinks;
+    g->nv = m->nv, g->nf = faces + nlinks, g->nlinks = nlinks;
     g->start = vgi_array(g->nf + 1, sizeof *g->start, e);
     g->vert = vgi_array(corners, sizeof *g->vert, e);
     g->in_face = vgi_array(g->nv, sizeof *g->in_face, e);
     if (!g->start || !g->vert || !g->in_face) return vg_graph_free(out), VG_ENOMEM;
-
-    uint32_t at = 0;
-    for (size_t i = 0; i < faces; i++) {
-        size_t f = h->has_selection ? h->selected[i] : i;
-        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) g->vert[at++] = m->vert[c];
-        g->start[i + 1] = at;
-    }
-    for (size_t i = 0; i < h->nlinks; i++) {
-        g->vert[at++] = h->links[2 * i];
-        g->vert[at++] = h->links[2 * i + 1];
-        g->start[faces + i + 1] = at;
-    }
+    fill_faces(g, m, selected, links);
     mark_attached(g);
     return VG_OK;
+}
+
+int vg_head_graph(vg_graph **g, const vg_head *h, vg_err *e)
+{
+    static const uint32_t none[1];
+    const uint32_t *selected = h->has_selection ? h->nselected ? h->selected : none : NULL;
+    return vg_graph_new(g, &h->body.mesh, h->nselected, selected, h->nlinks, h->links, e);
 }
 
 void vg_graph_free(vg_graph **g)

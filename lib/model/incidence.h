@@ -12,10 +12,9 @@ typedef struct vgi_incidence {
     uint32_t *corner, *face; /* one per corner of the mesh */
 } vgi_incidence;
 
-/* vgi_incidence_make: for a vg_mesh or vg_graph (nv, nf, start, vert as there). O(nv + corners). On failure *x is
+/* vgi_incidence_make: of a mesh, or of the faces of a graph. O(nv + corners). On failure *x is
  * 0. */
-int vgi_incidence_make(vgi_incidence *x, size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert,
-                       vg_err *e) VG_MUST_CHECK;
+int vgi_incidence_make(vgi_incidence *x, const vg_mesh *m, vg_err *e) VG_MUST_CHECK;
 void vgi_incidence_clear(vgi_incidence *x);
 
 /* vgi_corner_edges: the vertices before and after a corner in its face, which are the other ends of the two edges

@@ -94,8 +94,6 @@ int vg_load(vg_head *h, const char *operand, const char *what, vg_err *e) VG_MUS
 /* vg_load_with: the same with options (may be NULL), and what was left out of the mesh into *note (may be NULL). */
 int vg_load_with(vg_head *h, const char *operand, const char *what, const vg_source_options *o, vg_note *note,
                  vg_err *e) VG_MUST_CHECK;
-/* vg_load_mesh: vg_load of a "mesh". */
-int vg_load_mesh(vg_head *h, const char *operand, vg_err *e) VG_MUST_CHECK;
 
 /* A queue of frames: in memory up to a limit, beyond it in an unnamed file in $TMPDIR (or /tmp). */
 typedef struct vg_spool vg_spool;

@@ -15,15 +15,24 @@ extern "C" {
  * links. Layout as in vg_mesh; corner c of the graph is a position in vert. `attached` is the number of vertices
  * in at least one face. */
 typedef struct vg_graph {
-    size_t nv, nf, nlinks; /* nf includes the links, which are the last */
-    uint32_t *start, *vert;
+    union { /* its faces are those of a mesh, and may be given where a mesh is wanted */
+        vg_mesh faces;
+        struct {
+            size_t nv, nf; /* nf includes the links, which are the last */
+            uint32_t *start, *vert;
+        };
+    };
+    size_t nlinks;
     size_t attached, max_corners;
     bool *in_face; /* nv */
 } vg_graph;
 
-/* vg_graph_new: the graph of h's mesh, selection and links. h must hold links (vg_link_components) when it has more
- * than one component; this is not checked here. O(corners). */
-int vg_graph_new(vg_graph **g, const vg_head *h, vg_err *e) VG_MUST_CHECK;
+/* vg_graph_new: the graph of nselected faces of m (ascending; NULL: all faces) and nlinks links (pairs of vertices).
+ * Links must join all components of m (vg_link_components); this is not checked here. O(corners). */
+int vg_graph_new(vg_graph **g, const vg_mesh *m, size_t nselected, const uint32_t *selected, size_t nlinks,
+                 const uint32_t *links, vg_err *e) VG_MUST_CHECK;
+/* vg_head_graph: the graph of h's mesh, selection and links. */
+int vg_head_graph(vg_graph **g, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 void vg_graph_free(vg_graph **g);
 size_t vg_graph_corners(const vg_graph *g);
 
@@ -50,7 +59,7 @@ int vg_link_components(const vg_mesh *m, const double *vertices, uint32_t **pair
                        vg_err *e) VG_MUST_CHECK;
 
 /* vg_head_prepare_vectors: choose the links of h from its reference pose unless it has links. To be called before
- * vg_graph_new by every program that derives vectors from vertices. A map that was fitted without these links is
+ * vg_head_graph by every program that derives vectors from vertices. A map that was fitted without these links is
  * dropped. */
 int vg_head_prepare_vectors(vg_head *h, vg_err *e) VG_MUST_CHECK;
 

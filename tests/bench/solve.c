@@ -270,7 +270,7 @@ int main(int argc, char **argv)
     const vg_head *h = vg_source_head(s);
     if (h->kind != VG_VECTORS || h->nanchors) die("the stream must hold vectors without anchors");
     problem p = {.reference = h->body.reference};
-    check(vg_graph_new(&p.g, h, &e), &e);
+    check(vg_head_graph(&p.g, h, &e), &e);
     read_poses(&p, s, h);
     compare(&p, vg_diagonal(h->body.reference, h->body.mesh.nv));
     for (size_t i = 0; i < POSES; i++) {

@@ -67,7 +67,7 @@ static void use_head(const vg_head *h)
         demand(vg_mesh_same(&h->body.mesh, "first", &copy.body.mesh, "second", &e) == VG_OK);
     }
     if (h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS) {
-        demand(vg_graph_new(&g, h, &e) == VG_OK && vg_graph_corners(g) == h->count);
+        demand(vg_head_graph(&g, h, &e) == VG_OK && vg_graph_corners(g) == h->count);
         vg_graph_free(&g);
     }
     vg_head_clear(&copy);

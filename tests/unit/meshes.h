@@ -278,7 +278,7 @@ static inline film load_film(const char *name, const char *rest_name, size_t mos
     if (rest_name) {
         vg_head rest = {0};
         snprintf(path, sizeof path, "tests/data/%s", rest_name);
-        if (vg_load_mesh(&rest, path, &e) < 0) printf("%s\n", e.message), exit(1);
+        if (vg_load(&rest, path, "mesh", &e) < 0) printf("%s\n", e.message), exit(1);
         memcpy(x.h.body.reference, rest.body.reference, 3 * x.h.body.mesh.nv * sizeof(double));
         vg_head_clear(&rest);
     }
@@ -356,7 +356,7 @@ static inline vg_graph *graph_of(vg_head *h)
 {
     vg_graph *g = NULL;
     vg_err e = {0, ""};
-    if (vg_head_prepare_vectors(h, &e) < 0 || vg_graph_new(&g, h, &e) < 0) printf("%s\n", e.message), exit(1);
+    if (vg_head_prepare_vectors(h, &e) < 0 || vg_head_graph(&g, h, &e) < 0) printf("%s\n", e.message), exit(1);
     return g;
 }
 

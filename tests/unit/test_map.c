@@ -130,7 +130,7 @@ static void collapsed_is_uncollapsed(void)
     vg_solver *s;
     vg_err e;
     fit(&h, bend);
-    CHECK(vg_graph_new(&g, &h, &e) == VG_OK);
+    CHECK(vg_head_graph(&g, &h, &e) == VG_OK);
     uint32_t *of_face = vgi_graph_patches(&h, g, &e);
     size_t corners = vg_graph_corners(g), nv = h.body.mesh.nv;
     double *vectors = room(3 * corners, sizeof *vectors), *wanted = room(3 * corners, sizeof *wanted);

@@ -247,7 +247,7 @@ static void test_graph(void)
     CHECK(g == NULL);
     h.has_selection = true, h.nselected = 2, h.selected = room(2, sizeof *h.selected);
     h.selected[0] = 3, h.selected[1] = (uint32_t)h.body.mesh.nf - 1;
-    CHECK(vg_graph_new(&g, &h, &e) == VG_OK);
+    CHECK(vg_head_graph(&g, &h, &e) == VG_OK);
     CHECK(g->nf == 6 && vg_graph_corners(g) == 4 + 3 + 8 && g->start[1] == 4 && g->start[2] == 7 && g->start[3] == 9);
     CHECK(!memcmp(g->vert, h.body.mesh.vert + h.body.mesh.start[3], 4 * sizeof *g->vert));
     double root[3], sum[3] = {0, 0, 0};

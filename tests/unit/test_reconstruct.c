@@ -469,7 +469,7 @@ static void test_without_faces(void)
     for (int points = 0; points < 2; points++) {
         if (points) add_isolated(&h);
         vg_graph *g;
-        CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK && vg_graph_new(&g, &h, &e) == VG_OK);
+        CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK && vg_head_graph(&g, &h, &e) == VG_OK);
         double none = 0, root[3] = {1, 2, 3};
         const double *w = &none, *at = root;
         answer a = solve(g, h.body.reference, NULL, 0, 1, &w, &at, all_weights[points], 1, 1);
@@ -488,7 +488,7 @@ static void test_refused(void)
     vg_solver *s;
     vg_err e;
     h.has_links = true; /* and none are there */
-    CHECK(vg_graph_new(&g, &h, &e) == VG_OK);
+    CHECK(vg_head_graph(&g, &h, &e) == VG_OK);
     CHECK(vg_solver_new(&s, g, NULL, 0, h.body.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_EINPUT && !s);
     CHECK(strstr(e.message, "link is missing") != NULL);
     uint32_t anchors[] = {0, 1};

@@ -12,7 +12,7 @@ static vg_head load(const char *name)
     vg_err e = {0, ""};
     char path[200];
     snprintf(path, sizeof path, "tests/data/%s", name);
-    if (vg_load_mesh(&h, path, &e) < 0) printf("%s\n", e.message), exit(1);
+    if (vg_load(&h, path, "mesh", &e) < 0) printf("%s\n", e.message), exit(1);
     return h;
 }
 

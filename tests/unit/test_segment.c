@@ -131,13 +131,14 @@ static void thirds(void)
 
 static void pieces(void)
 {
-    const uint32_t start[] = {0, 3, 6, 9, 11}, vert[] = {0, 1, 2, 2, 1, 3, 4, 5, 6, 6, 3}, label[] = {0, 0, 0, 1};
+    uint32_t start[] = {0, 3, 6, 9, 11}, vert[] = {0, 1, 2, 2, 1, 3, 4, 5, 6, 6, 3}, label[] = {0, 0, 0, 1};
     uint32_t piece[4], (*pair)[2], *shared;
     size_t n, npairs;
     vg_err e;
-    CHECK(vgi_connected_pieces(7, 4, start, vert, label, 2, piece, &n, &e) == VG_OK);
+    const vg_mesh faces = {7, 4, start, vert};
+    CHECK(vgi_connected_pieces(&faces, label, 2, piece, &n, &e) == VG_OK);
     CHECK(n == 3 && piece[0] == 0 && piece[1] == 0 && piece[2] == 1 && piece[3] == 2);
-    CHECK(vgi_neighbours(7, 4, start, vert, piece, &pair, &shared, &npairs, &e) == VG_OK);
+    CHECK(vgi_neighbours(&faces, piece, &pair, &shared, &npairs, &e) == VG_OK);
     CHECK(npairs == 2 && pair[0][0] == 0 && pair[0][1] == 2 && pair[1][0] == 1 && pair[1][1] == 2);
     CHECK(npairs == 2 && shared[0] == 1 && shared[1] == 1);
     free(pair);
@@ -162,9 +163,9 @@ static void sectors_meet(void)
     const uint32_t rim[3] = {0, 100, 70};
     double mean[9];
     const vg_mesh *m = &h.body.mesh;
-    CHECK(vgi_neighbours(m->nv, m->nf, m->start, m->vert, label, &pair, &shared, &n, &e) == VG_OK);
+    CHECK(vgi_neighbours(m, label, &pair, &shared, &n, &e) == VG_OK);
     CHECK(n == 3 && pair[0][0] == 0 && pair[0][1] == 1 && pair[1][1] == 2 && pair[2][0] == 1 && pair[2][1] == 2);
-    CHECK(vgi_shared_points(m->nv, m->nf, m->start, m->vert, label, pair[0], n, h.body.reference, mean, &e) == VG_OK);
+    CHECK(vgi_shared_points(m, label, pair[0], n, h.body.reference, mean, &e) == VG_OK);
     for (size_t i = 0; i < 3; i++) {
         CHECK(shared[i] == 2);
         for (size_t k = 0; k < 3; k++)
@@ -174,7 +175,7 @@ static void sectors_meet(void)
     free(shared);
     /* every face a patch: at the hub 32 of them are looked at, which makes 31 pairs each; and those over the rim */
     for (uint32_t i = 0; i < RIM; i++) label[i] = RIM - i;
-    CHECK(vgi_neighbours(m->nv, m->nf, m->start, m->vert, label, &pair, &shared, &n, &e) == VG_OK);
+    CHECK(vgi_neighbours(m, label, &pair, &shared, &n, &e) == VG_OK);
     CHECK(n == 32 * 31 / 2 + RIM - 31);
     for (size_t i = 1; i < n; i++)
         CHECK(pair[i][0] > pair[i - 1][0] || (pair[i][0] == pair[i - 1][0] && pair[i][1] > pair[i - 1][1]));

@@ -120,7 +120,7 @@ static const vg_sink_options plain = {0};
 static void make_head(vg_head *h)
 {
     write_pose("head.obj", 1);
-    CHECK(vg_load_mesh(h, "head.obj", NULL) == VG_OK);
+    CHECK(vg_load(h, "head.obj", "mesh", NULL) == VG_OK);
     unlink("head.obj");
 }
 
@@ -244,7 +244,7 @@ static void order_of_operands(void)
     CHECK(s.result == 0 && s.n == 5 && s.x[0] == 20 && s.x[1] == 1 && s.x[3] == 3 && s.x[4] == 21);
     CHECK_TEXT(s.names, "b pose1 pose2 pose10 a ");
     vg_head h;
-    CHECK(vg_load_mesh(&h, "c.zip", NULL) == VG_OK);
+    CHECK(vg_load(&h, "c.zip", "mesh", NULL) == VG_OK);
     CHECK(h.body.mesh.nv == 4 && h.body.mesh.nf == 4 && h.body.reference[11] == 1 && h.kind == VG_VERTICES &&
           h.count == 4);
     CHECK_TEXT(h.body.reference_name, "pose1");
@@ -276,7 +276,7 @@ static void compressed_files(void)
     enter_place();
     write_bytes("p1.obj.gz", joined, sizeof joined);
     vg_head h;
-    CHECK(vg_load_mesh(&h, "p1.obj.gz", NULL) == VG_OK);
+    CHECK(vg_load(&h, "p1.obj.gz", "mesh", NULL) == VG_OK);
     CHECK(h.body.mesh.nv == 3 && h.body.mesh.nf == 1);
     CHECK_TEXT(h.body.reference_name, "p1");
     vg_head_clear(&h);
@@ -285,7 +285,7 @@ static void compressed_files(void)
         if (n == 30)
             continue; /* the first stream alone: whole for gzip, and two vertices without a face are a mesh */
         write_bytes("cut.obj.gz", joined, n);
-        CHECK(vg_load_mesh(&h, "cut.obj.gz", &e) < 0 && vg_exit_status(e.code) == 3);
+        CHECK(vg_load(&h, "cut.obj.gz", "mesh", &e) < 0 && vg_exit_status(e.code) == 3);
     }
     unsigned char bad[sizeof joined];
     for (size_t i = 10; i < sizeof joined; i++) { /* the ten bytes of the first header hold nothing that matters */
@@ -293,7 +293,7 @@ static void compressed_files(void)
         memcpy(bad, joined, sizeof bad);
         bad[i] ^= 0x11;
         write_bytes("bad.obj.gz", bad, sizeof bad);
-        int r = vg_load_mesh(&h, "bad.obj.gz", NULL);
+        int r = vg_load(&h, "bad.obj.gz", "mesh", NULL);
         CHECK(r == VG_EINPUT || r == VG_ETRUNC);
         if (r == VG_OK) vg_head_clear(&h);
     }
@@ -551,13 +551,13 @@ static void cut_behind_the_end_mark(void)
         CHECK(vgi_bytes_append(&b, "\0\0\0", 3, NULL) == VG_OK); /* padding of a tape */
         write_bytes("padded", b.data, b.size);
         vg_head h;
-        int r = vg_load_mesh(&h, "padded", NULL);
+        int r = vg_load(&h, "padded", "mesh", NULL);
         CHECK(i > 0 || r == VG_OK);
         if (r == VG_OK) vg_head_clear(&h);
         if (i == 0) {
             b.data[b.size - 1] = 'x';
             write_bytes("more", b.data, b.size);
-            CHECK(vg_load_mesh(&h, "more", NULL) == VG_EINPUT);
+            CHECK(vg_load(&h, "more", "mesh", NULL) == VG_EINPUT);
         }
         vg_bytes_clear(&b);
     }

@@ -485,7 +485,7 @@ static int prepare(fit *t, vg_err *e)
 {
     const vg_mesh *m = t->m;
     size_t nv = m->nv, nf = m->nf;
-    int r = vgi_incidence_make(&t->around, nv, nf, m->start, m->vert, e);
+    int r = vgi_incidence_make(&t->around, m, e);
     if (r == VG_OK) r = vgi_springs_make(&t->L, t->in, e);
     if (r == VG_OK) measure_edges(t);
     if (r == VG_OK) r = vgi_smoothness_make(&t->smooth, &t->L, e);

@@ -432,8 +432,8 @@ int vgi_pair(const vgi_pairing *in, vg_correspondence *c, vg_err *e)
     p.given = vgi_array_raw(s->nf, sizeof *p.given, e);
     p.used = vgi_array(s->nf, sizeof *p.used, e);
     bool room = c->first && c->distance && c->matched && p.drivers && p.host && p.given && p.used;
-    int r = room ? vgi_incidence_make(&p.source_around, s->nv, s->nf, s->start, s->vert, e) : VG_ENOMEM;
-    if (r == VG_OK) r = vgi_incidence_make(&p.target_around, t->nv, t->nf, t->start, t->vert, e);
+    int r = room ? vgi_incidence_make(&p.source_around, s, e) : VG_ENOMEM;
+    if (r == VG_OK) r = vgi_incidence_make(&p.target_around, t, e);
     if (r == VG_OK) r = match(&p, e);
     if (r == VG_OK) r = write_down(&p, e);
     vgi_incidence_clear(&p.source_around);

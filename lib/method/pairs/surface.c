@@ -55,7 +55,7 @@ static bool find_borders(vgi_surface *s, vg_err *e)
 {
     const vg_mesh *m = s->m;
     vgi_incidence around;
-    if (vgi_incidence_make(&around, m->nv, m->nf, m->start, m->vert, e) < 0) return false;
+    if (vgi_incidence_make(&around, m, e) < 0) return false;
     for (size_t f = 0; f < m->nf; f++)
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
             uint32_t next = c + 1 < m->start[f + 1] ? c + 1 : m->start[f], v = m->vert[c], w = m->vert[next], ends[2];

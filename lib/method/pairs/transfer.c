@@ -155,17 +155,19 @@ static void fill_twins(const vg_cross_transfer *c, const double *source_referenc
 }
 
 /* Links between vertices that have twins have one themselves. */
-static void link_twins(vg_cross_transfer *c, const uint32_t *twin_of, vg_head *h)
+/* The links between twins; how many. */
+static size_t link_twins(vg_cross_transfer *c, const uint32_t *twin_of, uint32_t *links)
 {
     const vg_graph *g = c->target;
+    size_t n = 0;
     for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
         uint32_t a = twin_of[g->vert[g->start[f]]], b = twin_of[g->vert[g->start[f] + 1]];
         if (a == UINT32_MAX || b == UINT32_MAX || a == b) continue;
-        h->links[2 * h->nlinks] = a, h->links[2 * h->nlinks + 1] = b;
-        h->nlinks++;
+        links[2 * n] = a, links[2 * n++ + 1] = b;
         c->is_twin[f] = 1;
         c->twin[c->ntwins++] = (uint32_t)f;
     }
+    return n;
 }
 
 /* The faces that go corner by corner, as a graph over the source's vertices in the order of the target's corners. */
@@ -177,32 +179,31 @@ static int find_twins(vg_cross_transfer *c, const double *source_reference, vg_e
     if (!c->twin || !c->is_twin) return VG_ENOMEM;
     size_t corners = choose_twins(c);
     if (!c->ntwins) return VG_OK;
-    vg_head h = {.body.mesh = {c->source->nv, c->ntwins, NULL, NULL}};
-    h.body.mesh.start = vgi_array(c->ntwins + 1, sizeof *h.body.mesh.start, e);
-    h.body.mesh.vert = vgi_array(corners, sizeof *h.body.mesh.vert, e);
-    h.links = vgi_array(2 * g->nlinks, sizeof *h.links, e);
+    vg_mesh twins = {c->source->nv, c->ntwins, NULL, NULL};
+    twins.start = vgi_array(c->ntwins + 1, sizeof *twins.start, e);
+    twins.vert = vgi_array(corners, sizeof *twins.vert, e);
+    uint32_t *links = vgi_array(2 * g->nlinks, sizeof *links, e);
     uint32_t *twin_of = vgi_array(g->nv, sizeof *twin_of, e);
     corners += 2 * g->nlinks;
     double *target = vgi_array(3 * corners, sizeof *target, e);
-    int result = h.body.mesh.start && h.body.mesh.vert && h.links && twin_of && target ? VG_OK : VG_ENOMEM;
-    if (result == VG_OK) {
-        fill_twins(c, source_reference, &h.body.mesh, twin_of);
-        link_twins(c, twin_of, &h);
-        result = vg_graph_new(&c->twins, &h, e);
+    int r = twins.start && twins.vert && links && twin_of && target ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) {
+        fill_twins(c, source_reference, &twins, twin_of);
+        r = vg_graph_new(&c->twins, &twins, 0, NULL, link_twins(c, twin_of, links), links, e);
     }
-    for (size_t i = 0; result == VG_OK && i < c->ntwins; i++) {
+    for (size_t i = 0; r == VG_OK && i < c->ntwins; i++) {
         size_t at = c->twins->start[i], n = c->twins->start[i + 1] - at;
         memcpy(target + 3 * at, c->vectors + 3 * (size_t)g->start[c->twin[i]], 3 * n * sizeof *target);
     }
-    if (result == VG_OK) result = vg_deformer_new(&c->deformer, c->twins, source_reference, c->threads, e);
-    if (result == VG_OK) result = vg_deformer_target(c->deformer, target, c->method, e);
-    for (size_t i = 0; result == VG_OK && i < VGI_LANES; i++)
-        if (!(c->twin_vectors[i] = vgi_array(3 * corners, sizeof *target, e))) result = VG_ENOMEM;
-    vg_mesh_clear(&h.body.mesh);
-    free(h.links);
+    if (r == VG_OK) r = vg_deformer_new(&c->deformer, c->twins, source_reference, c->threads, e);
+    if (r == VG_OK) r = vg_deformer_target(c->deformer, target, c->method, e);
+    for (size_t i = 0; r == VG_OK && i < VGI_LANES; i++)
+        if (!(c->twin_vectors[i] = vgi_array(3 * corners, sizeof *target, e))) r = VG_ENOMEM;
+    vg_mesh_clear(&twins);
+    free(links);
     free(twin_of);
     free(target);
-    return result;
+    return r;
 }
 
 static int make_arrays(vg_cross_transfer *c, vg_err *e)
@@ -235,7 +236,7 @@ int vg_cross_transfer_new(vg_cross_transfer **out, const vg_mesh *source, const 
     c->ratio = before > 0 ? vg_diagonal(target_reference, target->nv) / before : 1;
     r = make_arrays(c, e);
     if (r == VG_OK && target->nlinks)
-        r = vgi_incidence_make(&c->around, target->nv, target->nf, target->start, target->vert, e);
+        r = vgi_incidence_make(&c->around, &target->faces, e);
     if (r == VG_OK) r = measure_source(c, source_reference, e);
     if (r == VG_OK) {
         vg_graph_vectors(target, target_reference, c->vectors);

@@ -9,29 +9,29 @@
 
 enum { MOST = 32 }; /* most labels examined around one vertex */
 
-int vgi_connected_pieces(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label,
-                         size_t nlabels, uint32_t *piece, size_t *count, vg_err *e)
+int vgi_connected_pieces(const vg_mesh *m, const uint32_t *label, size_t nlabels, uint32_t *piece, size_t *count,
+                         vg_err *e)
 {
     vgi_incidence around;
-    int r = vgi_incidence_make(&around, nv, nf, start, vert, e);
+    int r = vgi_incidence_make(&around, m, e);
     if (r < 0) return r;
     uint32_t *at = vgi_array_raw(nlabels, sizeof *at, e), *last = vgi_array_raw(nlabels, sizeof *last, e);
-    uint32_t *number = vgi_array_raw(nf, sizeof *number, e);
+    uint32_t *number = vgi_array_raw(m->nf, sizeof *number, e);
     if (at && last && number) {
         memset(at, 0xff, nlabels * sizeof *at); /* per label: the last vertex at which it was seen, and the face */
-        vgi_sets_init(piece, nf);
-        for (size_t v = 0; v < nv; v++)
+        vgi_sets_init(piece, m->nf);
+        for (size_t v = 0; v < m->nv; v++)
             for (uint32_t i = around.first[v]; i < around.first[v + 1]; i++) {
                 uint32_t f = around.face[i], k = label[f];
                 if (at[k] == v) vgi_sets_join(piece, f, last[k]);
                 at[k] = (uint32_t)v, last[k] = f;
             }
         *count = 0;
-        for (size_t f = 0; f < nf; f++) { /* the root of a set is its lowest face */
+        for (size_t f = 0; f < m->nf; f++) { /* the root of a set is its lowest face */
             uint32_t root = vgi_sets_find(piece, (uint32_t)f);
             if (root == f) number[f] = (uint32_t)(*count)++;
         }
-        for (size_t f = nf; f-- > 0;) piece[f] = number[vgi_sets_find(piece, (uint32_t)f)];
+        for (size_t f = m->nf; f-- > 0;) piece[f] = number[vgi_sets_find(piece, (uint32_t)f)];
     } else {
         r = VG_ENOMEM;
     }
@@ -63,16 +63,16 @@ static int by_pair(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-int vgi_neighbours(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label,
-                   uint32_t (**pair)[2], uint32_t **shared, size_t *count, vg_err *e)
+int vgi_neighbours(const vg_mesh *m, const uint32_t *label, uint32_t (**pair)[2], uint32_t **shared, size_t *count,
+                   vg_err *e)
 {
     vgi_incidence around;
     uint64_t *all = NULL;
     size_t n = 0, cap = 0;
     *pair = NULL, *shared = NULL, *count = 0;
-    int r = vgi_incidence_make(&around, nv, nf, start, vert, e);
+    int r = vgi_incidence_make(&around, m, e);
     if (r < 0) return r;
-    for (size_t v = 0; r == VG_OK && v < nv; v++) {
+    for (size_t v = 0; r == VG_OK && v < m->nv; v++) {
         uint32_t seen[MOST];
         size_t nseen = labels_around(&around, v, label, seen);
         if (nseen > 1) r = vgi_grow(&all, &cap, n + nseen * nseen / 2 + 1, sizeof *all, e);
@@ -113,16 +113,16 @@ static size_t find_pair(const uint32_t *pairs, size_t n, uint32_t a, uint32_t b)
     return low < n && pairs[2 * low] == a && pairs[2 * low + 1] == b ? low : n;
 }
 
-int vgi_shared_points(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label,
-                      const uint32_t *pairs, size_t n, const double *points, double *mean, vg_err *e)
+int vgi_shared_points(const vg_mesh *m, const uint32_t *label, const uint32_t *pairs, size_t n, const double *points,
+                      double *mean, vg_err *e)
 {
     vgi_incidence around;
     uint32_t *count = vgi_array(n, sizeof *count, e);
     if (!count) return VG_ENOMEM;
-    int r = vgi_incidence_make(&around, nv, nf, start, vert, e);
+    int r = vgi_incidence_make(&around, m, e);
     if (r < 0) return free(count), r;
     memset(mean, 0, 3 * n * sizeof *mean);
-    for (size_t v = 0; v < nv; v++) {
+    for (size_t v = 0; v < m->nv; v++) {
         uint32_t seen[MOST];
         size_t nseen = labels_around(&around, v, label, seen);
         for (size_t b = 1; b < nseen; b++)

@@ -9,17 +9,17 @@
 
 /* vgi_connected_pieces: piece[f]: connected pieces of faces of one label, numbered in the order of their first faces.
  * Labels are less than nlabels. */
-int vgi_connected_pieces(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label,
-                         size_t nlabels, uint32_t *piece, size_t *count, vg_err *e) VG_MUST_CHECK;
+int vgi_connected_pieces(const vg_mesh *m, const uint32_t *label, size_t nlabels, uint32_t *piece, size_t *count,
+                         vg_err *e) VG_MUST_CHECK;
 
 /* vgi_neighbours: pairs a < b of labels that share vertices, ascending, and how many vertices each pair shares;
  * around one vertex 32 labels are looked at. free() both. */
-int vgi_neighbours(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label,
-                   uint32_t (**pair)[2], uint32_t **shared, size_t *count, vg_err *e) VG_MUST_CHECK;
+int vgi_neighbours(const vg_mesh *m, const uint32_t *label, uint32_t (**pair)[2], uint32_t **shared, size_t *count,
+                   vg_err *e) VG_MUST_CHECK;
 
 /* vgi_shared_points: for n such pairs (two labels each) the mean of the vertices that both share. points: nv, mean:
  * n points. */
-int vgi_shared_points(size_t nv, size_t nf, const uint32_t *start, const uint32_t *vert, const uint32_t *label,
-                      const uint32_t *pairs, size_t n, const double *points, double *mean, vg_err *e) VG_MUST_CHECK;
+int vgi_shared_points(const vg_mesh *m, const uint32_t *label, const uint32_t *pairs, size_t n, const double *points,
+                      double *mean, vg_err *e) VG_MUST_CHECK;
 
 #endif

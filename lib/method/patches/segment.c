@@ -388,8 +388,8 @@ static int connect(const vg_segmenter *s, uint32_t *label, size_t nlabels, size_
     vgi_joining j = {.width = width};
     uint32_t *piece = vgi_array_raw(m->nf, sizeof *piece, e), *shared = NULL, *set = NULL;
     if (!piece) return VG_ENOMEM;
-    int r = vgi_connected_pieces(m->nv, m->nf, m->start, m->vert, label, nlabels, piece, &j.n, e);
-    if (r == VG_OK) r = vgi_neighbours(m->nv, m->nf, m->start, m->vert, piece, &j.pair, &shared, &j.npairs, e);
+    int r = vgi_connected_pieces(m, label, nlabels, piece, &j.n, e);
+    if (r == VG_OK) r = vgi_neighbours(m, piece, &j.pair, &shared, &j.npairs, e);
     if (r == VG_OK) {
         j.mean = vgi_array(j.n, width * sizeof *j.mean, e), j.size = vgi_array(j.n, sizeof *j.size, e);
         set = vgi_array_raw(j.n, sizeof *set, e);
@@ -404,7 +404,7 @@ static int connect(const vg_segmenter *s, uint32_t *label, size_t nlabels, size_
         r = vgi_join_pieces(&j, k, set, e);
     }
     for (size_t f = 0; r == VG_OK && f < m->nf; f++) label[f] = set[piece[f]];
-    if (r == VG_OK) r = vgi_connected_pieces(m->nv, m->nf, m->start, m->vert, label, j.n, piece, count, e);
+    if (r == VG_OK) r = vgi_connected_pieces(m, label, j.n, piece, count, e);
     if (r == VG_OK) memcpy(label, piece, m->nf * sizeof *label);
     free(piece);
     free(shared);

@@ -35,7 +35,7 @@ int vg_rig_fitter_new(vg_rig_fitter **out, vg_head *h, const vg_rig_options *o, 
     int r = at ? vg_head_prepare_vectors(h, e) : VG_ENOMEM;
     for (size_t b = 0; r == VG_OK && b < h->body.rig.nbones; b++)
         memcpy(at + 3 * b, h->body.rig.at + 3 * (size_t)h->body.rig.bone[b], 3 * sizeof *at);
-    if (r == VG_OK) r = vg_graph_new(&f->g, h, e);
+    if (r == VG_OK) r = vg_head_graph(&f->g, h, e);
     if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->nf, f->g->start, f->g->vert, h->body.reference, e);
     if (r == VG_OK) r = vgi_rig_sums_make(&f->sums, h->body.mesh.nv, h->body.rig.nbones, at, &f->turns, e);
     if (r == VG_OK && !(f->miss = vgi_array(h->body.mesh.nv, sizeof *f->miss, e))) r = VG_ENOMEM;

@@ -66,8 +66,8 @@ static int split_patches(vg_head *h, vg_err *e)
              (*pair)[2] = NULL;
     size_t n = 0, npairs = 0;
     if (!piece) return VG_ENOMEM;
-    int r = vgi_connected_pieces(m->nv, m->nf, m->start, m->vert, label, h->body.patches.n, piece, &n, e);
-    if (r == VG_OK) r = vgi_neighbours(m->nv, m->nf, m->start, m->vert, piece, &pair, &shared, &npairs, e);
+    int r = vgi_connected_pieces(m, label, h->body.patches.n, piece, &n, e);
+    if (r == VG_OK) r = vgi_neighbours(m, piece, &pair, &shared, &npairs, e);
     uint32_t *size = vgi_array(n, sizeof *size, e), *set = vgi_array(n, sizeof *set, e),
              *best = vgi_array(n, sizeof *best, e);
     if (!size || !set || !best) r = VG_ENOMEM;
@@ -83,7 +83,7 @@ static int split_patches(vg_head *h, vg_err *e)
         for (size_t p = 0; p < n; p++)
             if (size[p] < LEAST_FACES && best[p]) vgi_sets_join(set, pair[best[p] - 1][0], pair[best[p] - 1][1]);
         for (size_t f = 0; f < m->nf; f++) label[f] = vgi_sets_find(set, piece[f]);
-        r = vgi_connected_pieces(m->nv, m->nf, m->start, m->vert, label, n, piece, &n, e);
+        r = vgi_connected_pieces(m, label, n, piece, &n, e);
     }
     if (r == VG_OK) {
         memcpy(label, piece, m->nf * sizeof *label);
@@ -172,7 +172,7 @@ static int find_near(vg_map_fitter *f, vg_err *e)
     f->near = vgi_array(n, sizeof *f->near, e), f->owner = vgi_array(g->nv, sizeof *f->owner, e);
     f->want = vgi_array(g->nv, 3 * NEAR * sizeof *f->want, e);
     if (!f->near || !f->owner || !f->want) return VG_ENOMEM;
-    int r = vgi_neighbours(g->nv, g->nf, g->start, g->vert, f->of_face, &pair, &shared, &npairs, e);
+    int r = vgi_neighbours(&g->faces, f->of_face, &pair, &shared, &npairs, e);
     if (r < 0) return r;
     for (size_t p = 0; p < n; p++) f->near[p] = (vicinity){.n = 1, .patch = {(uint32_t)p}};
     for (size_t i = 0; i < npairs; i++)
@@ -195,7 +195,7 @@ int vg_map_fitter_new(vg_map_fitter **out, vg_head *h, double hold, int threads,
     f->h = h, f->threads = threads, f->hold = hold;
     int r = split_patches(h, e);
     if (r == VG_OK) r = vg_head_prepare_vectors(h, e);
-    if (r == VG_OK) r = vg_graph_new(&f->g, h, e);
+    if (r == VG_OK) r = vg_head_graph(&f->g, h, e);
     if (r == VG_OK && !(f->of_face = vgi_graph_patches(h, f->g, e))) r = VG_ENOMEM;
     if (r == VG_OK) r = vgi_shape_make(&f->shape, &h->body.mesh, &h->body.patches, h->body.reference, e);
     if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->nf, f->g->start, f->g->vert, h->body.reference, e);
@@ -399,7 +399,7 @@ static int fit_hinges(const vg_map_fitter *f, vg_map *m, vg_err *e)
     const vg_graph *g = f->g;
     uint32_t (*pair)[2], *shared;
     double d = vg_diagonal(f->h->body.reference, g->nv);
-    int r = vgi_neighbours(g->nv, g->nf, g->start, g->vert, f->of_face, &pair, &shared, &m->nhinges, e);
+    int r = vgi_neighbours(&g->faces, f->of_face, &pair, &shared, &m->nhinges, e);
     if (r < 0) return r;
     m->hinge = (uint32_t *)pair;
     m->hinge_at = vgi_array(3 * m->nhinges, sizeof *m->hinge_at, e);
@@ -407,7 +407,7 @@ static int fit_hinges(const vg_map_fitter *f, vg_map *m, vg_err *e)
     double *middle = vgi_array(3 * m->nhinges, sizeof *middle, e);
     if (!m->hinge_at || !m->hinge_weight || !middle) r = VG_ENOMEM;
     if (r == VG_OK)
-        r = vgi_shared_points(g->nv, g->nf, g->start, g->vert, f->of_face, m->hinge, m->nhinges, f->h->body.reference,
+        r = vgi_shared_points(&g->faces, f->of_face, m->hinge, m->nhinges, f->h->body.reference,
                               middle, e);
     for (size_t i = 0; r == VG_OK && i < m->nhinges; i++) {
         double miss;

@@ -57,7 +57,7 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
 static int meeting_points(const vg_map *m, const vg_graph *g, const uint32_t *of_face, const double *body,
                           double *mean, vg_err *e)
 {
-    return vgi_shared_points(g->nv, g->nf, g->start, g->vert, of_face, m->hinge, m->nhinges, body, mean, e);
+    return vgi_shared_points(&g->faces, of_face, m->hinge, m->nhinges, body, mean, e);
 }
 
 /* Hinges, centres and held points go with the body; corrections of what hinges say grow with it. */
@@ -208,7 +208,7 @@ int vg_map_retarget(vg_head *h, const double *target, double morph, int threads,
     double *body = vgi_copy_array(target, 3 * nv, sizeof *body, e), *vectors = NULL, *home = NULL, *skin = NULL,
            ratio = 1;
     double *joints = vgi_copy_array(m->centre, 3 * m->n, sizeof *joints, e);
-    int r = body && joints ? vg_graph_new(&g, h, e) : VG_ENOMEM;
+    int r = body && joints ? vg_head_graph(&g, h, e) : VG_ENOMEM;
     if (r == VG_OK && corners && m->ncorners != vg_graph_corners(g))
         r = vg_fail(e, VG_EINPUT, "the map does not say how its corners turn");
     if (r == VG_OK && !bones && !(of_face = vgi_graph_patches(h, g, e))) r = VG_ENOMEM;

@@ -266,7 +266,7 @@ static int make_deformer(vg_deformer **out, const vg_graph *g, double diagonal, 
     d->slow = vgi_array(g->nf, sizeof *d->slow, e);
     bool ok = d->vector && d->length && d->frame && d->slow && make_workspace(d, e) == VG_OK;
     if (ok && g->nlinks) {
-        ok = vgi_incidence_make(&d->around, g->nv, g->nf, g->start, g->vert, e) == VG_OK;
+        ok = vgi_incidence_make(&d->around, &g->faces, e) == VG_OK;
     }
     if (!ok) return vg_deformer_free(out), VG_ENOMEM;
     return VG_OK;

@@ -449,7 +449,7 @@ static int make_arrays(vg_path *p, const double *reference, vg_err *e)
         if (!p->reference) return VG_ENOMEM;
         vg_graph_vectors(g, reference, p->reference);
     }
-    if (has_lines(g)) r = vgi_incidence_make(&p->around, g->nv, g->nf, g->start, g->vert, e);
+    if (has_lines(g)) r = vgi_incidence_make(&p->around, &g->faces, e);
     for (int i = 0; r == VG_OK && i < (p->o.smooth ? SLOTS : 1); i++) r = make_slot(p, &p->slots[i], e);
     return r;
 }

@@ -90,7 +90,7 @@ static int prepare(struct joining *j, const double *vertices, const uint32_t *la
 {
     int r = scale_vertices(j, vertices, e);
     if (r == VG_OK) r = gather_points(j, label, e);
-    if (r == VG_OK) r = vgi_incidence_make(&j->around, j->m->nv, j->m->nf, j->m->start, j->m->vert, e);
+    if (r == VG_OK) r = vgi_incidence_make(&j->around, j->m, e);
     if (r < 0) return r;
     j->sets = vgi_array_raw(j->components, sizeof *j->sets, e);
     j->best = vgi_array_raw(j->components, sizeof *j->best, e);

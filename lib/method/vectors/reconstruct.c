@@ -108,7 +108,7 @@ static int plan_walk(vg_solver *s, vg_err *e)
 {
     const vg_graph *g = s->g;
     vgi_incidence around;
-    if (vgi_incidence_make(&around, g->nv, g->nf, g->start, g->vert, e) < 0) return VG_ENOMEM;
+    if (vgi_incidence_make(&around, &g->faces, e) < 0) return VG_ENOMEM;
     bool *reached = vgi_array(g->nv, sizeof *reached, e), *used = vgi_array(g->nf, sizeof *used, e);
     uint32_t *queue = vgi_array_raw(g->nv, sizeof *queue, e);
     s->walk = vgi_array_raw(g->attached, sizeof *s->walk, e);

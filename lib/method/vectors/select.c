@@ -18,7 +18,7 @@ struct selection {
 static int prepare(struct selection *s, const vg_mesh *m, vg_err *e)
 {
     s->m = m;
-    int r = vgi_incidence_make(&s->around, m->nv, m->nf, m->start, m->vert, e);
+    int r = vgi_incidence_make(&s->around, m, e);
     if (r < 0) return r;
     s->chosen = vgi_array(m->nf, sizeof *s->chosen, e);
     s->taken = vgi_array_raw(m->nv, sizeof *s->taken, e);

@@ -434,7 +434,7 @@ static int relax(choice *c, vg_err *e)
 int vgi_choose_turns(const vg_graph *g, const double *q, double *turn, bool *beyond, vg_err *e)
 {
     choice c = {.g = g, .turn = turn};
-    int r = vgi_incidence_make(&c.around, g->nv, g->nf, g->start, g->vert, e);
+    int r = vgi_incidence_make(&c.around, &g->faces, e);
     if (r == VG_OK) {
         c.q = vgi_array(g->nf + g->nv, 4 * sizeof *c.q, e);
         c.at = vgi_array(g->nv, 3 * sizeof *c.at, e);
