@@ -3,6 +3,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 #include "report.h"
+#include "networks.h"
 #include "signals.h"
 #include "skeletons.h"
 
@@ -631,6 +632,7 @@ static void report_all(report *r, const char *operand, const vg_head *h, const c
     report_skeletons(r, h, c);
     report_map(r, &h->map);
     report_signal(r, &h->signal);
+    report_network(r, &h->network);
     report_provenance(r, h);
     report_unknown(r, h, c);
 }

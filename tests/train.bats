@@ -70,6 +70,22 @@ END
     [ ! -e no.vgs ]
 }
 
+@test "vg-info says what a network is; a checkpoint is not finished" {
+    must vg-train $small --model pca --checkpoint half.net --every 7 "$(horse vgs)" -o whole.net
+    must vg-info whole.net
+    shows "network " "pca" "their digest"
+    must bash -c 'for n in whole half; do vg-info --json $n.net >$n.json; done'
+    py <<'END'
+import json
+whole, half = (json.load(open(n + ".json"))["network"] for n in ("whole", "half"))
+assert whole["finished"] and not half["finished"]
+assert (whole["layers"], whole["hidden"], whole["width"]) == (1, 8, 12)
+k, h = whole["coordinates"], 8
+assert whole["parameters"] == 4 * h * (k + h + 1) + h * k + k, whole["parameters"]  # gates, output, biases
+assert whole["training"] == half["training"] and len(whole["training"]) == 16
+END
+}
+
 @test "wrong usage of vg-train" {
     must_fail 2 vg-train --given 8-3 "$(horse vgs)" -o no.net
     must_fail 2 vg-train --given 32 "$(horse vgs)" -o no.net
