@@ -444,3 +444,19 @@ END
     says "vg-encode: " "vg-solve: " "vg-decode: "
     nothing_but a1.obj a2.obj broken.vgs
 }
+
+@test "a stream of an earlier layout is named as such" {
+    py <<'END'
+import make_corpus as m
+def text32(s): return m.u32(len(s)) + s.encode()
+old = m.u32(1, 1, 0) + text32("vg-solve") + text32("0.1") + text32("-v")
+c = m.content()
+for name, payload in ("old.vgs", old), ("cut.vgs", old[:-1]):
+    record = m.Record("PROV", payload, m.COPY_SAFE)
+    open(name, "wb").write(m.whole(c, [record] + m.records_of(dict(c, provenance=[]))))
+END
+    must_fail 3 vg-info old.vgs
+    says "'old.vgs' was written by an earlier version of this program"
+    must_fail 3 vg-info cut.vgs
+    says "'cut.vgs': record PROV: "
+}

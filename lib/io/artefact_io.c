@@ -188,3 +188,14 @@ int vgi_artefact_encode(const vgi_artefact *t, vg_bytes *b, const vg_head *h, si
     for (size_t k = 0; r == VG_OK && k < t->nfields; k++) r = write_field(b, &t->fields[k], artefact, &h->body.mesh, e);
     return r;
 }
+
+/* Two counts of 32 bits, the parents, and texts that follow their lengths without padding. */
+bool vgi_is_earlier_provenance(const vgi_artefact *t, const vgi_payload *p)
+{
+    if (strcmp(t->tag, "PROV")) return false;
+    cursor c = start(p);
+    uint64_t nparents = take32(&c), texts = (uint64_t)take32(&c) + 2; /* program and version, too */
+    take_array(&c, nparents, 4);
+    while (!c.bad && texts--) take(&c, take32(&c));
+    return !c.bad && !left(&c);
+}

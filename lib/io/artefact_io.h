@@ -11,4 +11,7 @@ int vgi_artefact_decode(const vgi_artefact *t, const vgi_payload *p, vg_head *h,
 /* vgi_artefact_encode: append what h has, number i of those that repeat; b begins on the payload's first byte. */
 int vgi_artefact_encode(const vgi_artefact *t, vg_bytes *b, const vg_head *h, size_t i, vg_err *e) VG_MUST_CHECK;
 
+/* vgi_is_earlier_provenance: is this a PROV record as it was before its counts had 64 bits (fmt/CHANGES.md)? */
+bool vgi_is_earlier_provenance(const vgi_artefact *t, const vgi_payload *p);
+
 #endif

@@ -57,7 +57,11 @@ static int read_known(vg_reader *r, const vgi_artefact *t, const vgi_payload *p,
     if (t->needs && !seen(r, vgi_artefact_by_tag(t->needs)))
         return vg_fail(e, VG_EINPUT, "'%s': record %s must come after %s", name, t->tag, t->needs);
     r->seen[t - vgi_artefacts] = true;
-    return vgi_artefact_decode(t, p, &r->head, e);
+    int code = vgi_artefact_decode(t, p, &r->head, e);
+    if (code == VG_EINPUT && vgi_is_earlier_provenance(t, p))
+        return vg_fail(e, VG_EINPUT, "'%s' was written by an earlier version of this program, whose streams are laid "
+                       "out in another way: make it again from its sources", name);
+    return code;
 }
 
 static int read_head_record(vg_reader *r, vg_record *record, vg_err *e)
