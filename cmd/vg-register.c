@@ -226,8 +226,7 @@ static void write_stream(vg_head *h, const vg_head *target, vg_register_result *
 {
     vg_err e;
     vg_frame f = {0};
-    h->correspondence = r->pairs;
-    r->pairs = (vg_correspondence){0};
+    vg_head_put(h, &r->pairs, "correspondence");
     h->kind = VG_VERTICES, h->count = h->body.mesh.nv;
     if (vg_head_merge_trace(h, target, &e) < 0) cli_die(&e);
     cli_stream_open(h);

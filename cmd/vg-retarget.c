@@ -3,6 +3,7 @@
 #include "cli.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 static struct {
     const char *onto;
@@ -37,8 +38,9 @@ static void retarget(vg_head *h)
         vg_map_retarget(h, target.body.reference, opts.morph, cli.threads, &e) < 0 ||
         vg_head_merge_trace(h, &target, &e) < 0)
         cli_die(&e);
-    char *map_name = h->body.reference_name; /* positions are those of the morphed body, the name is the target's */
-    h->body.reference_name = target.body.reference_name, target.body.reference_name = map_name;
+    const double *morphed = h->body.reference; /* its positions, under the target's name */
+    if (h->body.mesh.nv) memcpy(target.body.reference, morphed, 3 * h->body.mesh.nv * sizeof *morphed);
+    vg_head_take(h, &target, "reference");
     vg_head_take(h, &target, "attributes");
     vg_head_clear(&target);
 }

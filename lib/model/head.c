@@ -4,6 +4,7 @@
 #include "model/artefact.h"
 #include "model/form.h"
 
+#include <assert.h>
 #include <stdlib.h>
 
 /* ---- by the table of records ---- */
@@ -274,6 +275,13 @@ void vg_head_take(vg_head *to, vg_head *from, const char *what)
         bool *mark = (bool *)(void *)((char *)to + t->mark_at), *was = (bool *)(void *)((char *)from + t->mark_at);
         *mark = *was, *was = false;
     }
+}
+
+void vg_head_put(vg_head *to, void *from, const char *what)
+{
+    const vgi_artefact *t = vgi_artefact_by_name(what);
+    assert(t && !t->marks);
+    vgi_fields_move(t, vgi_artefact_in(t, to, 0), from);
 }
 
 int vg_head_need(const vg_head *h, const char *what, const char *subject, vg_err *e)

@@ -164,6 +164,8 @@ int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e) VG_MUST_CHECK;
  * "skeleton", "patches", "rig" (with its skin), "selection", "links", "anchors", "correspondence", "map". What `to` had
  * of it is released; `from` has none afterwards. */
 void vg_head_take(vg_head *to, vg_head *from, const char *what);
+/* vg_head_put: the same from the struct of the thing alone: "map", a vg_map; "correspondence", a vg_correspondence. */
+void vg_head_put(vg_head *to, void *from, const char *what);
 /* vg_head_need: VG_OK when h holds it; else VG_EINPUT: "<subject> holds no map: make one with vg-fitmap". */
 int vg_head_need(const vg_head *h, const char *what, const char *subject, vg_err *e) VG_MUST_CHECK;
 
