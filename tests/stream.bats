@@ -283,6 +283,7 @@ END
         shows " $form, binary64"
         must vg-decode -q "$GOLDEN/$form.vgs" -o $form.npy
         for program in "vg-encode --vectors" vg-deform vg-solve "vg-interpolate 3" vg-segment vg-fitmap; do
+            [[ $form$program == featuresvg-solve ]] && continue # it takes them back to vertices
             must_fail 3 $program "$GOLDEN/$form.vgs" -o out
             says "$form"
         done
