@@ -112,4 +112,4 @@ _vg() {
 }
 
 complete -o filenames -F _vg vg-decode vg-deform vg-diff vg-encode vg-features vg-fitmap vg-fitsignal vg-generate vg-info vg-interpolate vg-play vg-poisson vg-register \
-    vg-retarget vg-sample vg-segment vg-solve vg-train vg-view
+    vg-retarget vg-sample vg-segment vg-smooth vg-solve vg-train vg-view

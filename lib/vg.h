@@ -8,7 +8,7 @@
  *   vg/frames.h    head, artefacts, frames     vg/measures.h  errors, digest
  *   vg/vectors.h   the vector graph            vg/io.h        streams, mesh files, archives
  *   vg/markers.h   small text files            vg/view.h      pictures
- *   vg/signal.h    continuous signals
+ *   vg/signal.h    continuous signals             vg/smooth.h    noise taken out of a sequence
  *   vg/network.h   a trained network              vg/net.h       features, training, generation
  *
  * Conventions. Arrays of points and vectors are interleaved: xyzxyz... Index base is 0. Lengths are in the unit of
@@ -37,6 +37,7 @@
 #include "vg/patches.h"
 #include "vg/rig.h"
 #include "vg/signal.h"
+#include "vg/smooth.h"
 #include "vg/measures.h"
 #include "vg/net.h"
 #include "vg/io.h"

@@ -14,6 +14,7 @@ setup_file() {
     python3 -m zipfile -c poses.zip pose2.obj pose1.obj pose3.obj
     cp "$CORPUS/fuzz_bvh/arm.bvh" .
     vg-encode pose*.obj -o poses.vgs
+    vg-encode pose?.obj pose?.obj pose?.obj -o nine.vgs
     vg-encode --vectors pose*.obj -o vectors.vgs
     vg-decode -q poses.vgs -o poses.glb
     vg-segment -k 2 poses.vgs -o patches.vgs
@@ -54,6 +55,10 @@ each() {
 
 @test "memory runs out: vg-solve" {
     each 'vg-solve vectors.vgs -o out.vgs' 'vg-solve --planar --weights area vectors.vgs -o out.vgs'
+}
+
+@test "memory runs out: vg-smooth" {
+    each 'vg-smooth poses.vgs -o out.vgs' 'vg-smooth --filter together --memory 1K nine.vgs -o out.vgs'
 }
 
 @test "memory runs out: vg-poisson" {

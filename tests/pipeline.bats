@@ -521,7 +521,7 @@ END
     py <<'END'
 import os, resource, subprocess
 COMMANDS = ["vg-encode p.vgs -o out.vgs", "vg-solve v.vgs -o out.vgs", "vg-deform p.vgs -o out.vgs",
-            "vg-poisson --first pose2.obj p.vgs -o out.vgs", "vg-segment -k 2 p.vgs -o out.vgs",
+            "vg-poisson --first pose2.obj p.vgs -o out.vgs", "vg-smooth p.vgs -o out.vgs", "vg-segment -k 2 p.vgs -o out.vgs",
             "vg-info p.vgs -o out.txt", "vg-diff p.vgs p.vgs -o out.txt", "vg-view p.vgs -o out.png",
             "vg-view p.vgs -o out.html", "vg-decode -q p.vgs -o out.zip", "vg-decode -q p.vgs -o out.tar.gz",
             "vg-decode -q p.vgs -o out.npz", "vg-decode -q p.vgs -o out.npy", "vg-decode -q p.vgs -o out.glb",

@@ -28,6 +28,7 @@ same() {
     same solved.vgs vg-solve --no-provenance first.pose.vgs
     same planar.vgs vg-solve --no-provenance --planar --weights area first.vectors.vgs
     same guided.vgs vg-poisson --no-provenance --first "$DATA/horse.rest.obj" first.poses.vgs
+    for filter in lowpass polynomial robust together; do same calm.vgs vg-smooth --no-provenance --filter $filter first.poses.vgs; done
     same patches.vgs vg-segment --no-provenance -k 12 first.poses.vgs
     same map.vgs vg-fitmap -q --no-provenance --patches first.patches.vgs first.poses.vgs
     same other.vgs vg-retarget --no-provenance --onto "$DATA/horse.rest.obj" --morph 0.5 first.map.vgs

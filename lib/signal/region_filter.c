@@ -1,0 +1,236 @@
+/* region_filter.c: noise taken out of each frame by what neighbouring vertices have in common over all frames.
+ * Leaves out how regions grow (regions.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "signal/regions.h"
+#include "numeric/blas.h"
+#include "numeric/lapack.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { AFFINE = 4, FEWEST = 8, ROUNDS = 20 }; /* rank of a region that moves affinely; frames */
+
+struct vg_region_filter {
+    size_t nv, nregions, nframes;
+    int threads;
+    vgi_region *region;
+    size_t *matrix;    /* nregions + 1: where the matrix of each begins */
+    double *matrices;  /* n x n: first sums of products over rows, then the filter */
+    double *noise;     /* nregions: standard deviation of a coordinate; negative: not known */
+    double *total;     /* nv: the weights of all regions that a vertex is in */
+};
+
+void vg_region_filter_free(vg_region_filter **out)
+{
+    vg_region_filter *r = *out;
+    if (!r) return;
+    free(r->region);
+    free(r->matrix);
+    free(r->matrices);
+    free(r->noise);
+    free(r->total);
+    free(r);
+    *out = NULL;
+}
+
+/* of vertex i of a region: it knows most about its middle */
+static double weight_of(const vgi_region *p, size_t i)
+{
+    return 1 - 0.8 * (double)i / (double)p->n;
+}
+
+static int make_room(vg_region_filter *r, vg_err *e)
+{
+    r->matrix = vgi_array(r->nregions + 1, sizeof *r->matrix, e);
+    r->noise = vgi_array(r->nregions, sizeof *r->noise, e);
+    r->total = vgi_array(r->nv, sizeof *r->total, e);
+    if (!r->matrix || !r->noise || !r->total) return VG_ENOMEM;
+    for (size_t i = 0; i < r->nregions; i++) {
+        const vgi_region *p = &r->region[i];
+        r->matrix[i + 1] = r->matrix[i] + p->n * p->n;
+        for (size_t k = 0; k < p->n; k++) r->total[p->vertex[k]] += weight_of(p, k);
+    }
+    r->matrices = vgi_array(r->matrix[r->nregions], sizeof *r->matrices, e);
+    return r->matrices ? VG_OK : VG_ENOMEM;
+}
+
+int vg_region_filter_new(vg_region_filter **out, const vg_mesh *m, const double *reference, int threads, vg_err *e)
+{
+    vg_region_filter *r = *out = vgi_array(1, sizeof *r, e);
+    if (!r) return VG_ENOMEM;
+    *r = (vg_region_filter){.nv = m->nv, .threads = threads};
+    int ok = vgi_regions_grow(m, reference, &r->region, &r->nregions, e);
+    if (ok == VG_OK) ok = make_room(r, e);
+    if (ok < 0) vg_region_filter_free(out);
+    return ok;
+}
+
+/* ---- the first pass ---- */
+
+typedef struct looking {
+    vg_region_filter *r;
+    size_t n;
+    const double *const *vertices;
+} looking;
+
+/* three rows of a region's matrix: x, y and z of its vertices in a frame, from the origin */
+static void gather(const vgi_region *p, const double *vertices, const double origin[3], double *rows)
+{
+    for (size_t i = 0; i < p->n; i++)
+        for (size_t k = 0; k < 3; k++) rows[k * p->n + i] = vertices[3 * p->vertex[i] + k] - origin[k];
+}
+
+static void look_at_region(void *context, size_t i)
+{
+    const looking *l = context;
+    const vgi_region *p = &l->r->region[i];
+    double rows[3 * VGI_REGION], *sum = l->r->matrices + l->r->matrix[i], origin[3];
+    for (size_t f = 0; f < l->n; f++) {
+        vg_centroid(l->vertices[f], l->r->nv, origin);
+        gather(p, l->vertices[f], origin, rows);
+        vgi_gemm_double(true, false, p->n, p->n, 3, rows, p->n, rows, p->n, 1, sum, p->n);
+    }
+}
+
+void vg_region_filter_look(vg_region_filter *r, size_t n, const double *const *vertices)
+{
+    looking l = {r, n, vertices};
+    r->nframes += n;
+    vgi_blas_alone();
+    vgi_parallel(r->threads, r->nregions, look_at_region, &l);
+    vgi_blas_shared();
+}
+
+/* ---- what a region keeps ---- */
+
+/* The noise (variance) is what is left outside of the rank, for each degree of freedom there; the rank is how many
+ * singular values noise alone would not give. Begun at the rank of an affine motion, until both agree. */
+static double find_noise(size_t rows, size_t n, const double *square)
+{
+    double variance = 0, spread = sqrt((double)rows) + sqrt((double)n);
+    size_t rank = AFFINE;
+    for (int round = 0; round < ROUNDS; round++) {
+        double rest = 0;
+        size_t above = AFFINE;
+        for (size_t i = rank; i < n; i++) rest += fmax(square[i], 0);
+        variance = rest / ((double)(rows - rank) * (double)(n - rank));
+        while (above < n && square[above] > 1.02 * variance * spread * spread) above++;
+        if (above <= rank || above + 1 >= n || above + 1 >= rows) break;
+        rank = above;
+    }
+    return variance;
+}
+
+/* the best factor of a singular value for the Frobenius norm; `square` is in units of the noise of a row */
+static double shrink(double square, double shape)
+{
+    double edge = 1 + sqrt(shape), a = square - shape - 1;
+    return square > edge * edge ? sqrt(fmax(a * a - 4 * shape, 0)) / square : 0;
+}
+
+/* the filter: sum of factor v v' over the eigenvectors v */
+static void compose(size_t n, double *vectors, double *values, size_t rows, double variance, double *filter,
+                    double *scaled)
+{
+    for (size_t i = 0; i < n; i++) {
+        double factor = variance > 0 ? shrink(values[i] / (variance * (double)rows), (double)n / (double)rows) : 1;
+        for (size_t k = 0; k < n; k++) scaled[i * n + k] = factor * vectors[i * n + k];
+    }
+    vgi_gemm_double(true, false, n, n, n, vectors, n, scaled, n, 0, filter, n);
+}
+
+static void keep_all(size_t n, double *filter)
+{
+    memset(filter, 0, n * n * sizeof *filter);
+    for (size_t i = 0; i < n; i++) filter[i * n + i] = 1;
+}
+
+static int learn_region(vg_region_filter *r, size_t i, double *values, double *vectors, double *scaled, vg_err *e)
+{
+    size_t n = r->region[i].n, rows = 3 * r->nframes;
+    double *filter = r->matrices + r->matrix[i];
+    r->noise[i] = -1;
+    if (n < 2 * AFFINE) { /* too few to tell noise from motion */
+        keep_all(n, filter);
+        return VG_OK;
+    }
+    int ok = vgi_eigen(n, filter, VGI_LARGEST, n, values, vectors, e);
+    if (ok < 0) return ok;
+    double variance = find_noise(rows, n, values);
+    r->noise[i] = sqrt(variance);
+    compose(n, vectors, values, rows, variance, filter, scaled);
+    return VG_OK;
+}
+
+int vg_region_filter_learn(vg_region_filter *r, vg_err *e)
+{
+    if (r->nframes < FEWEST)
+        return vg_fail(e, VG_EINPUT, "there are %zu frames: what moves together is told from noise in %d or more",
+                       r->nframes, FEWEST);
+    double *room = vgi_array_raw(2 * VGI_REGION * VGI_REGION + VGI_REGION, sizeof *room, e);
+    double *values = room, *vectors = room + VGI_REGION;
+    int ok = room ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; i < r->nregions && ok == VG_OK; i++)
+        ok = learn_region(r, i, values, vectors, vectors + VGI_REGION * VGI_REGION, e);
+    free(room);
+    return ok;
+}
+
+static int by_size(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+double vg_region_filter_noise(const vg_region_filter *r)
+{
+    vg_err e;
+    size_t n = 0;
+    double *known = vgi_array_raw(r->nregions, sizeof *known, &e), middle = 0;
+    for (size_t i = 0; known && i < r->nregions; i++)
+        if (r->noise[i] >= 0) known[n++] = r->noise[i];
+    if (n) {
+        qsort(known, n, sizeof *known, by_size);
+        middle = known[n / 2];
+    }
+    free(known);
+    return sqrt(3) * middle;
+}
+
+/* ---- the second pass ---- */
+
+typedef struct applying {
+    const vg_region_filter *r;
+    const double *const *in;
+    double *const *out;
+} applying;
+
+static void add_region(const vg_region_filter *r, size_t i, const double *in, const double origin[3], double *sum)
+{
+    const vgi_region *p = &r->region[i];
+    double rows[3 * VGI_REGION], kept[3 * VGI_REGION];
+    gather(p, in, origin, rows);
+    vgi_product_double(3, p->n, p->n, rows, p->n, r->matrices + r->matrix[i], p->n, kept, p->n);
+    for (size_t k = 0; k < p->n; k++)
+        for (size_t c = 0; c < 3; c++) sum[3 * p->vertex[k] + c] += weight_of(p, k) * kept[c * p->n + k];
+}
+
+static void filter_frame(void *context, size_t f)
+{
+    const applying *a = context;
+    const vg_region_filter *r = a->r;
+    double origin[3], *out = a->out[f];
+    vg_centroid(a->in[f], r->nv, origin);
+    memset(out, 0, 3 * r->nv * sizeof *out);
+    for (size_t i = 0; i < r->nregions; i++) add_region(r, i, a->in[f], origin, out);
+    for (size_t v = 0; v < r->nv; v++)
+        for (size_t k = 0; k < 3; k++) out[3 * v + k] = out[3 * v + k] / r->total[v] + origin[k];
+}
+
+void vg_region_filter_apply(const vg_region_filter *r, size_t n, const double *const *in, double *const *out)
+{
+    applying a = {r, in, out};
+    vgi_blas_alone();
+    vgi_parallel(r->threads, n, filter_frame, &a);
+    vgi_blas_shared();
+}
