@@ -179,7 +179,9 @@ every_program() {
     answers vg-interpolate --at -1,0.5,2.5 --smooth "$k.vgs" -o i.vgs || return 1
     if [ "$status" = 0 ]; then answers vg-solve i.vgs -o s.vgs || return 1; fi
     answers vg-poisson --first "$k-target.obj" "$k.vgs" -o p.vgs || return 1
-    for filter in lowpass polynomial robust together; do answers vg-smooth --filter $filter --frames 2 "$k.vgs" -o sm.vgs || return 1; done
+    for filter in lowpass polynomial robust; do answers vg-smooth --filter $filter --frames 2 "$k.vgs" -o sm.vgs || return 1; done
+    answers vg-encode "$k"-[123].obj "$k"-[123].obj "$k"-[123].obj -o nine.vgs || return 1
+    if [ "$status" = 0 ]; then answers vg-smooth --filter together nine.vgs -o sm.vgs || return 1; fi
     answers vg-segment -k 2 "$k.vgs" -o seg.vgs || return 1
     if [ "$status" = 0 ] && [ "$2" != no-map ]; then
         answers vg-fitmap -q --patches seg.vgs "$k.vgs" -o map.vgs || return 1
