@@ -176,7 +176,7 @@ void cli_finish(int status)
 static void library_gave_up(void)
 {
     output_discard();
-    cli_stop(VG_ENOMEM, "a library gave up, for lack of memory most likely");
+    cli_stop(VG_ENOMEM, "a library failed, most likely for lack of memory");
 }
 
 /* ---------------------------------------------------------------------------------------------- memory -- */

@@ -376,7 +376,7 @@ void rigging_run(vg_source *s, const rigging_options *o)
     vg_map_clear(&w.h->map);
     if (o->skeleton) read_skeleton(&w);
     read_poses(&w, s);
-    if (!w.nsample) cli_stop(VG_EINPUT, "all poses are left out of the fit: raise --holdout");
+    if (!w.nsample) cli_stop(VG_EINPUT, "all poses are held out of the fit: raise --holdout");
     if (o->groups) read_groups(&w);
     else if (o->bones) find_bones(&w);
     else place_skeleton(&w);

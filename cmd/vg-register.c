@@ -184,7 +184,7 @@ static void report_unmatched(const vg_mesh *m, const vg_correspondence *c)
                      without[k] < faces[k] ? "those beside them" : "the nearest faces that have one");
     }
     if (told > MOST_WARNINGS)
-        cli_warn("so it is with faces of %zu more components of the target", told - MOST_WARNINGS);
+        cli_warn("so do faces of %zu more components of the target", told - MOST_WARNINGS);
     cli_note("%zu of %zu faces of the target matched, %zu pairs", m->nf - unmatched, m->nf,
              (size_t)c->first[c->target_nf]);
     free(label);

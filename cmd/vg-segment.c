@@ -71,7 +71,7 @@ int main(int argc, char **argv)
     vg_segment_stats report;
     if (vg_segmenter_new(&s, &h->body.mesh, h->body.reference, cli.threads, &e) < 0) cli_die(&e);
     uint64_t poses = add_all(s, source);
-    if (!poses) cli_stop(VG_EINPUT, "the input has no poses: what turns alike cannot be told");
+    if (!poses) cli_stop(VG_EINPUT, "the input has no poses: rotations cannot be compared");
     vg_patches_clear(&h->body.patches);
     vg_map_clear(&h->map);
     if (vg_segmenter_cut(s, k, (uint64_t)opts.seed, opts.connected, &h->body.patches, &report, &e) < 0) cli_die(&e);

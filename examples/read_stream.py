@@ -500,7 +500,7 @@ class _Reader:
         while not self.done:
             self.record()
         if self.input.upto(1):
-            raise StreamError("it goes on behind the END mark")
+            raise StreamError("it has data after the END mark")
         return self.stream
 
     def file_header(self):

@@ -377,7 +377,7 @@ END
     for format in pc2 mdd npy; do
         { cat walk.$format && printf x; } >long.$format
         must_fail 3 vg-encode --mesh pose1.obj long.$format -o out.vgs
-        says 'goes on behind'
+        says 'has data after its'
         [ ! -e out.vgs ]
     done
 }

@@ -135,8 +135,8 @@ END
     refused 'a - 0 0 0 1 1 x\n' "line 1: 'x' is no number"
     refused 'a - 0 0 0 1 1 nan\n' "line 1: 'nan' is no number"
     refused 'a b 0 0 0 1 1 1\n' "line 1: the parent 'b' of 'a' is not defined"
-    refused 'a - 0 0 0 1 1 1\na - 0 0 0 1 1 1\n' "line 2: 'a' is there already, in line 1"
-    refused 'a b 0 0 0 1 1 1\nb a 0 0 0 1 1 1\n' 'round in a circle'
+    refused 'a - 0 0 0 1 1 1\na - 0 0 0 1 1 1\n' "line 2: 'a' is already defined, in line 1"
+    refused 'a b 0 0 0 1 1 1\nb a 0 0 0 1 1 1\n' 'has a cycle of joints'
     refused '# nothing\n' 'names no joint'
     refused 'a - vertices 1 2 3\n' 'vg-fitmap --groups'
     printf 'a - vertices 1 2 3\n' >groups.txt
@@ -151,7 +151,7 @@ END
     }
     moved '0 a 0 0 0\n' "has no joint 'b' in frame 0"
     moved '0 a 0 0 0\n0 b 0 0 1\n0 c 0 0 1\n' "line 3: the skeleton has no joint 'c'"
-    moved '0 a 0 0 0\n0 b 0 0 1\n0 a 0 0 1\n' "line 3: joint 'a' is there already"
+    moved '0 a 0 0 0\n0 b 0 0 1\n0 a 0 0 1\n' "line 3: joint 'a' is already defined"
     moved '0 a 0 0 0\n0 b 0 0 1\n1 a 0 0 1\n' "has no joint 'b' in frame 1"
     moved '0 a 0 0 0\n0 b 0 0 1\n1 a.end 0 0 1\n' "line 3: joint 'a.end' is not in the frames before"
     moved '1 a 0 0 0\n1 b 0 0 1\n0 a 0 0 1\n' 'line 3: frame 0 comes after frame 1'

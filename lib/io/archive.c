@@ -279,7 +279,7 @@ static int check_packed_end(vgi_archive *a, vg_err *e)
     if (!vgi_sum_agrees(u->sum, trailer) && !vgi_gzip_parts_whole(&a->file, end))
         return vg_fail(e, VG_EINPUT, "'%s' is damaged: its contents do not agree with its checksum", a->name);
     if (!vgi_zero_to_end(&a->file, end))
-        return vg_fail(e, VG_EINPUT, "'%s' is damaged: it goes on behind its end", a->name);
+        return vg_fail(e, VG_EINPUT, "'%s' is damaged: data follows its end", a->name);
     return VG_OK;
 }
 

@@ -364,7 +364,7 @@ static int check_places(reading *b, const double *positions, const char *what, v
 {
     for (size_t j = 0; j < b->skeleton.njoints; j++)
         if (!vgi_finite(positions + 3 * j, 3))
-            return vg_fail(e, VG_EINPUT, "%s line %zu: %s, joint '%s' lies beyond all numbers", b->subject,
+            return vg_fail(e, VG_EINPUT, "%s line %zu: %s, joint '%s' is at a position that no number can hold", b->subject,
                            line_of(b, b->at), what, b->skeleton.joints[j].name);
     return VG_OK;
 }

@@ -80,7 +80,7 @@ static int finish(reading *x, vg_err *e)
 {
     int r = vgi_input_ended(x->in, e);
     if (r != 0) return r < 0 ? r : 0;
-    return vg_fail(e, VG_EINPUT, "%s goes on behind its %u samples of %u points", x->subject, x->samples, x->points);
+    return vg_fail(e, VG_EINPUT, "%s has data after its %u samples of %u points", x->subject, x->samples, x->points);
 }
 
 static int check_counts(const reading *x, vg_err *e)

@@ -119,7 +119,7 @@ static int count_bytes(const vgi_npy *a, size_t *bytes, const char *subject, vg_
     *bytes = a->item;
     for (size_t d = 0; d < a->ndim; d++)
         if (a->shape[d] > SIZE_MAX || !vgi_mul(*bytes, (size_t)a->shape[d], bytes))
-            return vg_fail(e, VG_EINPUT, "%s announces an array that no machine can hold", subject);
+            return vg_fail(e, VG_EINPUT, "%s announces an array that is too large for this machine", subject);
     return VG_OK;
 }
 
@@ -148,7 +148,7 @@ int vgi_npy_read(vgi_npy *a, size_t *bytes, vgi_input *in, const char *subject, 
     r = cut_short(vgi_input_take(in, &b, n, NULL, e), subject, e);
     struct text t = {(const char *)b.data, b.data ? (const char *)b.data + b.size : NULL};
     if (r == VG_OK && !(n && parse(&t, a)))
-        r = vg_fail(e, VG_EINPUT, "%s: the header of the array is none that is understood: plain numbers or text, at "
+        r = vg_fail(e, VG_EINPUT, "%s: the header of the array is not supported: plain numbers or text, at "
                     "most %d dimensions", subject, VGI_NPY_DIMENSIONS);
     vg_bytes_clear(&b);
     return r < 0 ? r : count_bytes(a, bytes, subject, e);
@@ -272,7 +272,7 @@ static int finish(reading *x, vg_err *e)
 {
     int r = vgi_input_ended(x->in, e);
     if (r != 0) return r < 0 ? r : 0;
-    return vg_fail(e, VG_EINPUT, "%s goes on behind its %zu frames of %zu points", x->subject, x->frames, x->points);
+    return vg_fail(e, VG_EINPUT, "%s has data after its %zu frames of %zu points", x->subject, x->frames, x->points);
 }
 
 static int next_npy(void *state, vg_frame *f, vg_err *e)

@@ -96,7 +96,7 @@ static int hold(reading *x, enum array i, vgi_input *in, const char *subject, vg
     if (r == VG_ETRUNC) return vg_fail(e, r, "%s ends too early", subject);
     if (r == VG_OK) r = vgi_input_ended(in, e);
     if (r != 0) return r < 0 ? r : VG_OK;
-    return vg_fail(e, VG_EINPUT, "%s goes on behind its elements", subject);
+    return vg_fail(e, VG_EINPUT, "%s has data after its elements", subject);
 }
 
 static int hold_member(reading *x, const char *path, const vg_bytes *data, vg_err *e)

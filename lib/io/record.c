@@ -85,7 +85,7 @@ static int check_end(vgi_input *in, const vgi_tally *t, const vg_record *r, vg_e
         return vg_fail(e, VG_EINPUT, "'%s': the END mark's checksum is wrong: records were changed or moved", name);
     int ended = vgi_input_ended(in, e);
     if (ended != 0) return ended < 0 ? ended : 0;
-    return vg_fail(e, VG_EINPUT, "'%s' goes on behind the END mark: join streams with vg-encode, not cat", name);
+    return vg_fail(e, VG_EINPUT, "'%s' has data after the END mark: join streams with vg-encode, not cat", name);
 }
 
 int vgi_record_read(vgi_input *in, vgi_tally *t, vg_record *r, vg_err *e)

@@ -69,7 +69,7 @@ static int find_parents(entries *s, const char *subject, vg_err *e)
     int r = VG_OK;
     for (size_t i = 1; r == VG_OK && i < s->n; i++)
         if (!strcmp(sorted[i]->name, sorted[i - 1]->name))
-            r = vg_fail(e, VG_EINPUT, "%s line %zu: '%.80s' is there already, in line %zu", subject, sorted[i]->line,
+            r = vg_fail(e, VG_EINPUT, "%s line %zu: '%.80s' is already defined, in line %zu", subject, sorted[i]->line,
                         sorted[i]->name, sorted[i - 1]->line);
     for (size_t i = 0; r == VG_OK && i < s->n; i++) {
         entry *b = &s->at[i];
@@ -110,7 +110,7 @@ static int order_entries(entries *s, const char *subject, vg_err *e)
     free(first);
     free(next);
     if (r == VG_OK && met < n)
-        r = vg_fail(e, VG_EINPUT, "%s has joints that hang on themselves, round in a circle", subject);
+        r = vg_fail(e, VG_EINPUT, "%s has a cycle of joints", subject);
     return r;
 }
 
@@ -226,7 +226,7 @@ static int add_joint(reading *b, char *name, uint32_t parent, const double at[3]
     for (int k = 0; k < 3; k++) j->offset[k] = at[k] - (parent == NONE ? 0 : b->places[3 * (size_t)parent + k]);
     return vgi_finite(j->offset, 3)
                ? VG_OK
-               : vg_fail(e, VG_EINPUT, "joint '%.80s' lies beyond all numbers from its parent", name);
+               : vg_fail(e, VG_EINPUT, "joint '%.80s' is too far from its parent for a number to hold", name);
 }
 
 static int add_head(reading *b, entry *bone, uint32_t parent, vg_err *e)

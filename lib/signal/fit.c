@@ -239,7 +239,7 @@ static int check(const vg_body *body, size_t n, const vg_signal_options *o, vg_e
         return vg_fail(e, VG_EINPUT, "%zu frames are more than a signal shows at once (%d): take fewer with vg-encode "
                        "--take, or pieces of the sequence one by one", n, VG_SIGNAL_FRAMES);
     if (!body->mesh.nv) return vg_fail(e, VG_EINPUT, "the mesh has no vertices");
-    if (o->nexamples == 1) return vg_fail(e, VG_EINPUT, "one example says nothing: there must be at least 2");
+    if (o->nexamples == 1) return vg_fail(e, VG_EINPUT, "one example is not enough: there must be at least 2");
     for (size_t i = 0; i < o->npins; i++)
         if (o->pins[i].frame >= n)
             return vg_fail(e, VG_EARG, "there is no frame %zu to be pinned: there are %zu", o->pins[i].frame + 1, n);

@@ -239,7 +239,7 @@ static void refuses(void)
     check_refused("HIERARCHY ROOT a\n{ OFFSET 0 0 0 } MOTION Frames: 999999999999999999 Frame Time: 1\n",
                   VG_ETRUNC, "fewer than the");
     check_refused("HIERARCHY ROOT a\n{ OFFSET 0 0 1e308 JOINT b\n{ OFFSET 0 0 1e308 } } MOTION Frames: 0 Frame Time: 1\n",
-                  VG_EINPUT, "joint 'b' lies beyond all numbers");
+                  VG_EINPUT, "joint 'b' is at a position that no number can hold");
 }
 
 /* Each prefix of a file is refused, in words, but those that only lack the line end, and the hierarchy alone, which is a

@@ -271,7 +271,7 @@ static void npz_refuses_what_is_missing(void)
                         92) == VG_ETRUNC);
     CHECK(refused_alone("positions.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (3, 2, 3)}", x.data,
                         96) == VG_EINPUT);
-    CHECK_TEXT(message, "array 'positions' in 'x' goes on behind its elements");
+    CHECK_TEXT(message, "array 'positions' in 'x' has data after its elements");
     CHECK(refused_alone("positions.npy", "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 2, 3)}", x.data,
                         96) == 0);
     vg_bytes_clear(&x);
