@@ -214,13 +214,13 @@ def fitted(m):
 
 def signals(s):
     n, m, d, bits = len(s["names"]), len(s["basis"]), len(s["mean"]), s["bits"]
-    head = u64(n, s["space"], d, m, len(s["site"]), len(s["control"]), bits, bool(s["turn"]), bool(s["times"]), s["examples"], 0,
+    head = u64(n, s["space"], d, m, len(s["site"]), len(s["control"]), bits, bool(s["turn"]), bool(s["times"]), s["examples"], len(s.get("home", [])),
                s["layout"]) + f64(*s["numbers"], *s["mean"])
     form = {64: "d", 32: "f", 16: "h"}[bits]
     basis = pad(struct.pack(f"<{m * d}{form}", *flat(s["basis"])))
     return Record("SIGN", head + basis + f64(*s["unit"], *flat(s["coordinate"]), *flat(s["position"])) + indices(*s["site"]) +
-                  f64(*s["parameter"], *s["knot"], *flat(s["control"]), *flat(s["turn"]), *flat(s["shift"]), *s["times"]) +
-                  b"".join(map(text, s["names"])), CRITICAL)
+                  f64(*s["parameter"], *s["knot"], *flat(s["control"]), *flat(s["turn"]), *flat(s["shift"]), *flat(s.get("home", [])),
+                      *s["times"]) + b"".join(map(text, s["names"])), CRITICAL)
 
 
 def form_of(c):
@@ -622,6 +622,7 @@ def accept():
         "correspondence-of-nothing": whole(content(correspondence={"source": nobody, "target": nobody, "faces": []})),
         "sign-single": whole(signal_content(bits=32, times=[], turn=[], shift=[])),
         "sign-int16": whole(signal_content(bits=16, unit=[1e-4, 2.5], basis=[[32767] + [0] * 11, [0, 0, -32768] + [0] * 9])),
+        "sign-examples": whole(signal_content(examples=True, home=[[1, 0, 0, 0], [0.6, 0, 0.8, 0], [0, 0, 0, -1]])),
         "sign-no-coordinates": whole(signal_content(basis=[], coordinate=[[], [], []])),
         "map-with-home-and-names": whole(map_content(home=True)),
         "map-of-bones-one-per-corner": whole(bone_map_content(per_corner=1)),
@@ -1000,6 +1001,10 @@ def reject_attachments():
         "sign-knots-of-no-length": whole(signal_content(knot=[0] * 6)),
         "sign-control-far": whole(signal_content(control=[[0, 0], [0, 0], [0, 0], [0, 1e101]])),
         "sign-position-far": whole(signal_content(position=[[0, 0], [0, 1e101], [1, 0]])),
+        "sign-home-without-examples": whole(signal_content(home=[[1, 0, 0, 0]] * 3)),
+        "sign-home-without-root": whole(signal_content(examples=True, home=[[1, 0, 0, 0]] * 3, turn=[], shift=[])),
+        "sign-home-of-two": whole(signal_content(examples=True, home=[[1, 0, 0, 0]] * 2)),
+        "sign-home-long": whole(signal_content(examples=True, home=[[1, 0, 0, 0], [1, 0.01, 0, 0], [1, 0, 0, 0]])),
         "sign-turn-long": whole(signal_content(turn=[[1, 0.01, 0, 0]] * 3)),
         "sign-unit-0": whole(signal_content(bits=16, unit=[1, 0])),
         "rig-cut": lie(g, "RIG ", payload=lambda record: record.payload[:-8]),

@@ -298,7 +298,7 @@ static void put_ends(chart *c)
         to_canvas(c, c->trace.position + (i ? 2 * (c->trace.n - 1) : 0), at);
         vgi_paint_disc(&c->canvas, at, 6, ink);
         vgi_paint_disc(&c->canvas, at, 3, white);
-        vgi_text(&c->canvas, floor(at[0]) + 10, floor(at[1]) - 12, text_dot, ink, words[i]);
+        vgi_text(&c->canvas, floor(at[0]) + 10, floor(at[1]) + (i ? 8 : -14), text_dot, ink, words[i]);
     }
 }
 
