@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { AFFINE = 4, FEWEST = 8, ROUNDS = 20 }; /* rank of a region that moves affinely; frames */
+enum { AFFINE = 4, FEWEST = 8, ROUNDS = 20, BLOCK = 16 }; /* rank of a region that moves affinely; frames */
 
 struct vg_region_filter {
     size_t nv, nregions, nframes;
@@ -71,6 +71,7 @@ typedef struct looking {
     vg_region_filter *r;
     size_t n;
     const double *const *vertices;
+    double origin[BLOCK][3]; /* the centroid of each frame */
 } looking;
 
 /* three rows of a region's matrix: x, y and z of its vertices in a frame, from the origin */
@@ -84,20 +85,22 @@ static void look_at_region(void *context, size_t i)
 {
     const looking *l = context;
     const vgi_region *p = &l->r->region[i];
-    double rows[3 * VGI_REGION], *sum = l->r->matrices + l->r->matrix[i], origin[3];
+    double rows[3 * VGI_REGION], *sum = l->r->matrices + l->r->matrix[i];
     for (size_t f = 0; f < l->n; f++) {
-        vg_centroid(l->vertices[f], l->r->nv, origin);
-        gather(p, l->vertices[f], origin, rows);
+        gather(p, l->vertices[f], l->origin[f], rows);
         vgi_gemm_double(true, false, p->n, p->n, 3, rows, p->n, rows, p->n, 1, sum, p->n);
     }
 }
 
 void vg_region_filter_look(vg_region_filter *r, size_t n, const double *const *vertices)
 {
-    looking l = {r, n, vertices};
     r->nframes += n;
     vgi_blas_alone();
-    vgi_parallel(r->threads, r->nregions, look_at_region, &l);
+    for (size_t from = 0; from < n; from += BLOCK) {
+        looking l = {.r = r, .n = n - from < BLOCK ? n - from : BLOCK, .vertices = vertices + from};
+        for (size_t f = 0; f < l.n; f++) vg_centroid(l.vertices[f], r->nv, l.origin[f]);
+        vgi_parallel(r->threads, r->nregions, look_at_region, &l);
+    }
     vgi_blas_shared();
 }
 
