@@ -120,6 +120,31 @@ END
     [ ! -e no.vgs ]
 }
 
+@test "a GLB whose attribute claims 100 million elements without bytes: the attribute alone is left out" {
+    python3 - <<'END'
+import json, struct
+def glb(count, name):
+    document = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}, {"name": "beside"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "_MASS": 1}}]}], "buffers": [{"byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+                      {"componentType": 5126, "count": count, "type": "SCALAR"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}]}
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    data = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0)
+    with open(name, "wb") as f:
+        f.write(b"glTF" + struct.pack("<II", 2, 28 + len(text) + len(data)) + struct.pack("<I4s", len(text), b"JSON") + text +
+                struct.pack("<I4s", len(data), b"BIN\0") + data)
+glb(3, "few.glb")
+glb(100000000, "many.glb")
+END
+    must vg-encode few.glb -o few.vgs
+    must soon vg-encode many.glb -o many.vgs
+    must vg-diff few.vgs many.vgs
+    [ "$(stat -c %s many.vgs)" -lt "$(stat -c %s few.vgs)" ] && [ "$(stat -c %s many.vgs)" -gt 1000 ]
+}
+
 @test "without --max-bytes a file in an archive may hold 1 GiB" {
     [ "${CONFIG:-release}" = release ] || skip "a sanitizer takes too long"
     python3 - <<'END'

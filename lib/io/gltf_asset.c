@@ -59,14 +59,15 @@ static int describe(packing *k, const vgi_json *old, size_t view, vg_err *e)
     return r < 0 ? r : vgi_json_put(copy, "bufferView", vgi_json_of_whole(view, e), e);
 }
 
-/* Member `key`, a reference to an accessor, gets the number of its copy. 0: it cannot be copied. */
-static int move_accessor(packing *k, vgi_json *holder, const char *key, int target, vg_err *e)
+/* Member `key`, a reference to an accessor of `count` elements (0: of any number), gets the number of its copy. 0: it cannot
+ * be copied. */
+static int move_accessor(packing *k, vgi_json *holder, const char *key, int target, size_t count, vg_err *e)
 {
     const vgi_json *ref = vgi_json_get(holder, key), *old;
     size_t number, view, stride;
     vgi_accessor a;
     if (vgi_gltf_item(k->g, ref, "accessors", &old, &number, NULL) < 0 ||
-        vgi_gltf_any_accessor(k->g, ref, &a, NULL) < 0)
+        vgi_gltf_any_accessor(k->g, ref, &a, NULL) < 0 || (count && a.count != count))
         return 0;
     if (!k->accessor_of[number]) {
         const size_t start = (k->data.size + ALIGNED - 1) / ALIGNED * ALIGNED;
@@ -81,11 +82,11 @@ static int move_accessor(packing *k, vgi_json *holder, const char *key, int targ
 }
 
 /* All members of an object that are such references; those that cannot be copied are dropped. */
-static int move_accessors(packing *k, vgi_json *holder, int target, vg_err *e)
+static int move_accessors(packing *k, vgi_json *holder, int target, size_t count, vg_err *e)
 {
     for (const char *key = vgi_json_key(holder, NULL), *next; key; key = next) {
         next = vgi_json_key(holder, key);
-        int r = move_accessor(k, holder, key, target, e);
+        int r = move_accessor(k, holder, key, target, count, e);
         if (r < 0) return r;
         if (!r) vgi_json_drop(holder, key);
     }
@@ -191,9 +192,12 @@ static void drop_target_names(vgi_json *holder)
 
 static int move_primitive(packing *k, vgi_json *primitive, vg_err *e)
 {
+    vgi_json *attributes = vgi_json_inner(primitive, "attributes");
+    vgi_accessor position = {0};
     drop_target_names(primitive);
-    int r = move_accessors(k, vgi_json_inner(primitive, "attributes"), ARRAY_BUFFER, e);
-    if (r == VG_OK && vgi_json_get(primitive, "indices")) r = move_accessor(k, primitive, "indices", ELEMENT_BUFFER, e);
+    if (vgi_gltf_any_accessor(k->g, vgi_json_get(attributes, "POSITION"), &position, NULL) < 0) position.count = 0;
+    int r = move_accessors(k, attributes, ARRAY_BUFFER, position.count, e);
+    if (r == VG_OK && vgi_json_get(primitive, "indices")) r = move_accessor(k, primitive, "indices", ELEMENT_BUFFER, 0, e);
     return r < 0 ? r : VG_OK;
 }
 
@@ -211,13 +215,13 @@ static int move_node(packing *k, vgi_json *node, vg_err *e)
 {
     vgi_json *instances = vgi_json_inner(vgi_json_inner(node, "extensions"), "EXT_mesh_gpu_instancing");
     vgi_json_drop(node, "weights");
-    return move_accessors(k, vgi_json_inner(instances, "attributes"), NO_TARGET, e);
+    return move_accessors(k, vgi_json_inner(instances, "attributes"), NO_TARGET, 0, e);
 }
 
 static int move_skin(packing *k, vgi_json *skin, vg_err *e)
 {
     static const char key[] = "inverseBindMatrices";
-    int r = vgi_json_get(skin, key) ? move_accessor(k, skin, key, NO_TARGET, e) : VG_OK;
+    int r = vgi_json_get(skin, key) ? move_accessor(k, skin, key, NO_TARGET, 0, e) : VG_OK;
     return r < 0 ? r : VG_OK;
 }
 
