@@ -186,12 +186,12 @@ transfer() {
     stage "$3" "vg-deform $1.vgs --onto $1-b.vgs >/dev/null" "vg-deform $1-1.vgs --onto $1-b.vgs >/dev/null"
     by_pipe $((in + between))
     row 'vg-deform --onto' "$2" $((in + between))
-    stage "$3" "vg-solve $1-w.vgs >/dev/null" "vg-solve $1-1w.vgs >/dev/null"
+    stage "$3" "vg-solve --fit squares $1-w.vgs >/dev/null" "vg-solve --fit squares $1-1w.vgs >/dev/null"
     solve_kib=$kib
     by_cholmod "$2"
     row vg-solve "$2" $((in + between))
-    stage "$3" "$ulimit vg-deform $1.vgs --onto $1-b.vgs | vg-solve >/dev/null" \
-        "vg-deform $1-1.vgs --onto $1-b.vgs | vg-solve >/dev/null"
+    stage "$3" "$ulimit vg-deform $1.vgs --onto $1-b.vgs | vg-solve --fit squares >/dev/null" \
+        "vg-deform $1-1.vgs --onto $1-b.vgs | vg-solve --fit squares >/dev/null"
     by_cholmod "$2"
     row 'vg-deform --onto | vg-solve' "$2" $((2 * in + between))
 }
@@ -246,7 +246,7 @@ every_stage() {
     row 'vg-info --check' "$poses" "$(bytes "$n.vgs")"
     mkdir out
     for format in obj ply; do
-        best "$runs" "vg-decode $n-some.vgs -o 'out/%02d.$format'"
+        best "$runs" "vg-decode --replace $n-some.vgs -o 'out/%02d.$format'"
         by_pipe "$(bytes out/*)"
         row "vg-decode, $format" "$some" "$(bytes out/*)"
         rm -f out/*
@@ -257,7 +257,7 @@ every_stage() {
     best "$runs" "vg-view -q $n-some.vgs -o out/page.html"
     by_pipe "$few"
     row 'vg-view, page' "$some" "$few"
-    best "$runs" "$ulimit vg-encode $n.tar | vg-deform --onto $n-b.vgs | vg-solve | vg-decode -o 'out/%04d.ply'"
+    best "$runs" "$ulimit vg-encode $n.tar | vg-deform --onto $n-b.vgs | vg-solve --fit squares | vg-decode --replace -o 'out/%04d.ply'"
     by_cholmod "$some"
     row 'encode | deform | solve | decode' "$some" $((text + few))
     rm -rf out "$n.tar"
@@ -349,12 +349,12 @@ under_sets() {
         by_pipe $((in + between))
         row 'vg-deform --onto' "$poses" $((in + between)) >/dev/null
         of_set 'vg-deform --onto'
-        stage "$runs" "vg-solve $n-w.vgs >/dev/null" "vg-solve $n-1w.vgs >/dev/null"
+        stage "$runs" "vg-solve --fit squares $n-w.vgs >/dev/null" "vg-solve --fit squares $n-1w.vgs >/dev/null"
         by_cholmod "$poses"
         row vg-solve "$poses" $((in + between)) >/dev/null
         of_set vg-solve
-        stage "$runs" "vg-deform $n.vgs --onto $n-b.vgs | vg-solve >/dev/null" \
-            "vg-deform $n-1.vgs --onto $n-b.vgs | vg-solve >/dev/null"
+        stage "$runs" "vg-deform $n.vgs --onto $n-b.vgs | vg-solve --fit squares >/dev/null" \
+            "vg-deform $n-1.vgs --onto $n-b.vgs | vg-solve --fit squares >/dev/null"
         by_cholmod "$poses"
         row 'vg-deform --onto | vg-solve' "$poses" $((2 * in + between)) >/dev/null
         of_set 'vg-deform --onto | vg-solve'
@@ -426,7 +426,7 @@ busy() {
 
 # share NAME POSES: the part of its speed alone that the pipe keeps beside busy processes, and the part that is fair
 share() {
-    command="vg-deform $1.vgs --onto $1-b.vgs | vg-solve >/dev/null"
+    command="vg-deform $1.vgs --onto $1-b.vgs | vg-solve --fit squares >/dev/null"
     best "$RUNS" "$command"
     alone=$seconds
     for others_n in 2 6; do
@@ -440,13 +440,13 @@ share() {
 
 # setup NAME TEXT: from files to the first pose; the whole of vg-solve into $seconds
 setup() {
-    best "$RUNS" "vg-deform $1-1.vgs --onto $1-b.vgs | vg-solve >/dev/null"
+    best "$RUNS" "vg-deform $1-1.vgs --onto $1-b.vgs | vg-solve --fit squares >/dev/null"
     both=$seconds
     : >facts
     for _ in $(repeat "$RUNS" x); do
-        vg-solve -v "$1-1w.vgs" 2>>facts >/dev/null
+        vg-solve --fit squares -v "$1-1w.vgs" 2>>facts >/dev/null
     done
-    best "$RUNS" "vg-solve $1-1w.vgs >/dev/null"
+    best "$RUNS" "vg-solve --fit squares $1-1w.vgs >/dev/null"
     # frames with pins have systems of their own: the facts are those of the largest
     awk -v input="$2" -v both="$both" -v all="$seconds" -v mib=$((kib / 1024)) '/factorized in/ {
         gsub(",", "")
@@ -512,8 +512,8 @@ grows 'vg-encode OBJ' "vg-encode $quarter >/dev/null" "vg-encode $poses >/dev/nu
 grows 'vg-encode --vectors' "vg-encode --vectors human-quarter.vgs >/dev/null" "vg-encode --vectors human.vgs >/dev/null"
 grows 'vg-deform' "vg-deform human-quarter.vgs --onto human-b.vgs >/dev/null" \
     "vg-deform human.vgs --onto human-b.vgs >/dev/null"
-grows 'vg-solve' "vg-solve human-quarter-w.vgs >/dev/null" "vg-solve human-w.vgs >/dev/null"
-grows 'vg-decode PLY' "vg-decode human-quarter.vgs -o 'out/%04d.ply'" "vg-decode human.vgs -o 'out/%04d.ply'"
+grows 'vg-solve' "vg-solve --fit squares human-quarter-w.vgs >/dev/null" "vg-solve --fit squares human-w.vgs >/dev/null"
+grows 'vg-decode PLY' "vg-decode --replace human-quarter.vgs -o 'out/%04d.ply'" "vg-decode --replace human.vgs -o 'out/%04d.ply'"
 grows 'vg-diff' "vg-diff human-quarter.vgs quarter-result.vgs >/dev/null" \
     "vg-diff human.vgs human-result.vgs >/dev/null"
 grows 'vg-info --check' "vg-info --check human-quarter.vgs >/dev/null" "vg-info --check human.vgs >/dev/null"
