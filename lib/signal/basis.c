@@ -232,7 +232,8 @@ int vgi_basis_error(const vgi_basis *b, const double *x, size_t stride, size_t m
         if (error->of_frame) error->of_frame[i] = sqrt(largest);
         error->most = fmax(error->most, sqrt(largest));
     }
-    error->rms = b->d ? sqrt(total / (double)n / (double)(b->d / 3)) : 0;
+    const size_t nv = b->d / 3;
+    error->rms = nv ? sqrt(total / (double)n / (double)nv) : 0;
     r = VG_OK;
 out:
     vgi_blas_shared();

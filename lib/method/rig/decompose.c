@@ -47,8 +47,8 @@ static void find_centroids(dividing *d)
         for (size_t k = 0; k < 3; k++) d->at[3 * j + k] += d->l->reference[3 * v + k];
         d->size[j]++;
     }
-    for (size_t i = 0; i < 3 * d->n; i++)
-        if (d->size[i / 3]) d->at[i] /= (double)d->size[i / 3];
+    for (size_t j = 0; j < d->n; j++)
+        for (size_t k = 0; k < 3 && d->size[j]; k++) d->at[3 * j + k] /= (double)d->size[j];
 }
 
 /* Squared distance of vertex v from its position under bone j, summed over the poses. */
