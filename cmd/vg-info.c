@@ -120,21 +120,11 @@ static void list_frame(report *r, const vg_head *h, const vg_frame *f, uint64_t 
     report_row(r, row);
 }
 
-/* "Walk.0001" is number 1 of an animation of 4 letters; 0: it is of none. */
-static size_t animation_of(const char *name, uint64_t *number)
-{
-    const char *dot = strrchr(name, '.');
-    char *end;
-    if (!dot || dot == name || dot[1] < '0' || dot[1] > '9') return 0;
-    *number = strtoull(dot + 1, &end, 10);
-    return *end ? 0 : (size_t)(dot - name);
-}
-
 /* The frame goes on with the last animation, or begins one. */
 static void note_animation(contents *c, const vg_frame *f)
 {
     uint64_t number = 0;
-    const size_t n = animation_of(f->name, &number);
+    const size_t n = vg_frame_stem(f->name, &number);
     animation *last = c->nanimations ? &c->animations[c->nanimations - 1] : NULL;
     const double time = f->has_time ? f->time : NAN;
     if (n && last && number == last->frames + 1 && strlen(last->name) == n && !memcmp(last->name, f->name, n)) {

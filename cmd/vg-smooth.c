@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TOGETHER = 3, BATCH = 16, FPS = 24 }; /* choices of --filter after those of vg_filter; frames; without times */
+enum { TOGETHER = 3, BATCH = 16 }; /* choice of --filter after those of vg_filter; frames of a batch */
 
 static struct {
     size_t filter;
@@ -69,7 +69,7 @@ static double span_in_frames(double span, double each)
 static void make_smoother(timing *t, double each)
 {
     vg_err e;
-    double fallback = 1.0 / FPS, span = cli_given("frames") ? opts.frames : cli_given("seconds") ? opts.seconds : 0.1;
+    double fallback = 1.0 / VG_FPS, span = cli_given("frames") ? opts.frames : cli_given("seconds") ? opts.seconds : 0.1;
     if (!cli_given("frames") && each < 0) cli_stop(VG_EINPUT, "the times of the frames do not increase: use '--frames'");
     vg_smoother_options o = {.filter = (vg_filter)opts.filter, .threads = cli.threads};
     o.span = span_in_frames(span, each > 0 ? each : fallback);

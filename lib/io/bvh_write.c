@@ -2,7 +2,6 @@
  * Leaves out kinematics, from joints to channels (skeleton.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/bvh.h"
-#include "io/rate.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -324,11 +323,11 @@ int vgi_bvh_put(void *state, const vg_frame *f, vg_err *e)
     return r < 0 ? r : put_text(w, e);
 }
 
-/* Seconds from frame to frame: 1 / VGI_FPS when nothing is known. Over the whole length: one step may have been rounded. */
+/* Seconds from frame to frame: 1 / VG_FPS when nothing is known. Over the whole length: one step may have been rounded. */
 static double frame_time(const writing *w)
 {
     if (w->timed && w->frames > 1 && !w->uneven) return (w->last_time - w->first_time) / (double)(w->frames - 1);
-    return w->timed && w->step > 0 ? w->step : 1.0 / VGI_FPS;
+    return w->timed && w->step > 0 ? w->step : 1.0 / VG_FPS;
 }
 
 /* The number in w->text goes to the right end of its field. */

@@ -7,7 +7,6 @@
  * then the positions. MDD, big-endian: int32 samples, int32 points, float32 time of each sample, then the positions.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
-#include "io/rate.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -272,7 +271,7 @@ static void note_time(writing *x, const vg_frame *f)
 static int keep_time(writing *x, const vg_frame *f, vg_err *e)
 {
     unsigned char time[4];
-    double t = f->has_time ? f->time : (double)x->samples / VGI_FPS;
+    double t = f->has_time ? f->time : (double)x->samples / VG_FPS;
     if (!isfinite((float)t)) return vg_fail(e, VG_EINPUT, "its time %g does not fit single precision", t);
     store_float(time, (float)t, true);
     return vgi_bytes_append(&x->times, time, sizeof time, e);
@@ -350,7 +349,7 @@ const vgi_sequence_format vgi_sequence_pc2 = {
     .kinds = 1 << VG_VERTICES, .check = check_points, .begin = begin_pc2, .put = put_sample, .end = end_pc2,
     .warning = warn_pc2, .release = release_cache};
 
-/* Two counts are no signature: it is told by its name. */
+/* The file begins with two counts and has no signature: the suffix identifies the format. */
 const vgi_sequence_format vgi_sequence_mdd = {
     .name = "mdd", .suffix = ".mdd", .keeps = VGI_KEEPS_ORDER | VGI_KEEPS_TIMES,
     .open = open_mdd, .next = next_sample, .frames = count_samples, .close = close_cache,

@@ -2,33 +2,22 @@
  * Frames "Walk.0001", "Walk.0002", "Run.0001", "Run.0002" are two, as the reader calls the frames of two animations.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
-#include "io/rate.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 
-/* Of "Walk.0001": how long "Walk" is; 0: it is no such name. *number: 1. */
-static size_t stem_of(const char *name, uint64_t *number)
-{
-    size_t n = strlen(name), end = n;
-    *number = 0;
-    while (n > 0 && name[n - 1] >= '0' && name[n - 1] <= '9') n--;
-    for (size_t i = n; i < end; i++) *number = 10 * *number + (uint64_t)(name[i] - '0');
-    return n > 1 && n < end && name[n - 1] == '.' ? n - 1 : 0;
-}
-
 static bool same_stem(const char *a, const char *b, size_t n)
 {
     uint64_t number;
-    return n && stem_of(a, &number) == n && stem_of(b, &number) == n && !memcmp(a, b, n);
+    return n && vg_frame_stem(a, &number) == n && vg_frame_stem(b, &number) == n && !memcmp(a, b, n);
 }
 
 /* Is frame i the first of an animation, by the names? Their numbers count from 1. */
 static bool begins(const vgi_gltf_writing *w, size_t i)
 {
     uint64_t number;
-    return i == 0 || (stem_of(w->names.at[i], &number) && number == 1);
+    return i == 0 || (vg_frame_stem(w->names.at[i], &number) && number == 1);
 }
 
 /* Can the names be taken so: from 1 on, one after the other, more than one frame each? */
@@ -36,7 +25,7 @@ static bool are_counted(const vgi_gltf_writing *w)
 {
     for (size_t i = 0, first = 0; i < w->frames; i++) {
         uint64_t number;
-        const size_t n = stem_of(w->names.at[i], &number);
+        const size_t n = vg_frame_stem(w->names.at[i], &number);
         if (begins(w, i)) {
             if (i > 0 && i - first < 2) return false;
             first = i;
@@ -61,7 +50,7 @@ static void finish_take(vgi_gltf_writing *w, vgi_gltf_take *t)
 {
     uint64_t number;
     const char *first = w->names.at[t->first];
-    t->stem = stem_of(first, &number);
+    t->stem = vg_frame_stem(first, &number);
     t->timed = times_fit(w, t);
     for (size_t i = t->first; i < t->first + t->count; i++) {
         if (!same_stem(first, w->names.at[i], t->stem)) t->stem = 0;
@@ -87,7 +76,7 @@ int vgi_gltf_find_takes(vgi_gltf_writing *w, bool split, vg_err *e)
 
 static double time_of(const vgi_gltf_writing *w, const vgi_gltf_take *t, size_t i)
 {
-    return (float)(t->timed ? w->times[t->first + i] : (double)i / VGI_FPS);
+    return (float)(t->timed ? w->times[t->first + i] : (double)i / VG_FPS);
 }
 
 int vgi_gltf_describe_times(vgi_gltf_writing *w, vg_err *e)

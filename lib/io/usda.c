@@ -5,7 +5,6 @@
  * patched.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
-#include "io/rate.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -98,7 +97,7 @@ static int begin_usda(void **state, const vg_head *h, const vg_sink_options *o, 
     (void)o;
     writing *x = *state = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
-    x->out = out, x->h = h, x->rate = VGI_FPS;
+    x->out = out, x->h = h, x->rate = VG_FPS;
     int r = put_layer(x, e);
     return r < 0 ? r : put_faces(x, e);
 }
@@ -131,7 +130,7 @@ static int settle_rate(writing *x, const vg_frame *f, vg_err *e)
 {
     double step = f->time - x->first;
     x->rate = settled(1 / step);
-    if (!(x->rate > 0 && isfinite(x->rate))) x->rate = VGI_FPS;
+    if (!(x->rate > 0 && isfinite(x->rate))) x->rate = VG_FPS;
     x->last_key = settled(x->first * x->rate);
     return fill_room(x, x->first_key_off, x->last_key, e);
 }

@@ -135,6 +135,15 @@ int vg_frame_shape(vg_frame *f, const vg_head *h, vg_err *e)
     return r == VG_OK && vg_head_element(h) == VG_OF_CORNER ? vg_frame_make_anchors(f, h->nanchors, &anchors, e) : r;
 }
 
+size_t vg_frame_stem(const char *name, uint64_t *number)
+{
+    size_t n = strlen(name), end = n;
+    *number = 0;
+    while (n > 0 && name[n - 1] >= '0' && name[n - 1] <= '9') n--;
+    for (size_t i = n; i < end; i++) *number = 10 * *number + (uint64_t)(name[i] - '0');
+    return n > 1 && n < end && name[n - 1] == '.' ? n - 1 : 0;
+}
+
 int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e)
 {
     f->has_time = from->has_time;

@@ -216,6 +216,12 @@ int vg_frame_rename(vg_frame *f, const char *name, vg_err *e) VG_MUST_CHECK;
  * anchors alone. `from` loses its records. */
 int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e) VG_MUST_CHECK;
 
+/* The rate of sequences whose frames have no times, in frames per second; also in page_read.js, and stated in vg(7). */
+enum { VG_FPS = 24 };
+/* vg_frame_stem: a frame called "Walk.0001" is number 1 of the animation "Walk": the length of "Walk". 0: the name has no
+ * such form; number is then of no meaning. */
+size_t vg_frame_stem(const char *name, uint64_t *number);
+
 /* vg_frame_channel: the channel of this name; NULL: there is none. */
 vg_channel *vg_frame_channel(const vg_frame *f, const char *name);
 /* vg_frame_add: make room for a channel, in place of the one of that name. Its contents are undefined. *c is valid until

@@ -5,7 +5,6 @@
 
 #include "io/io.h"
 #include "view/webp.h"
-#include "io/rate.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -19,7 +18,7 @@ static int time_of(const vg_sheet *s, const vgi_row *q, size_t i)
 {
     bool timed = true;
     for (size_t k = 1; k < s->n; k++) timed = timed && shot_of(q, k)->time > shot_of(q, k - 1)->time;
-    if (s->n < 2 || !timed) return (int)(1000.0 / VGI_FPS * (double)shot_of(q, i)->index);
+    if (s->n < 2 || !timed) return (int)(1000.0 / VG_FPS * (double)shot_of(q, i)->index);
     return (int)fmin(1000 * (shot_of(q, i)->time - shot_of(q, 0)->time), 1e8);
 }
 
