@@ -9,6 +9,7 @@
  * are one in the mesh and have the same normal share these faces, so that edges stay hard and seams stay smooth.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_character.h"
+#include "numeric/vec3.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -17,7 +18,7 @@
 
 static void linear(const double m[12], const double p[3], double to[3])
 {
-    for (int i = 0; i < 3; i++) to[i] = m[4 * i] * p[0] + m[4 * i + 1] * p[1] + m[4 * i + 2] * p[2];
+    for (int i = 0; i < 3; i++) to[i] = vgi_dot(m + 4 * i, p);
 }
 
 static void linear_transposed(const double m[12], const double p[3], double to[3])
@@ -25,49 +26,35 @@ static void linear_transposed(const double m[12], const double p[3], double to[3
     for (int i = 0; i < 3; i++) to[i] = m[i] * p[0] + m[4 + i] * p[1] + m[8 + i] * p[2];
 }
 
-static void affine(const double m[12], const double p[3], double to[3])
-{
-    linear(m, p, to);
-    for (int i = 0; i < 3; i++) to[i] += m[4 * i + 3];
-}
-
 /* false: it flattens space. */
 static bool invert(const double m[12], double to[12])
 {
-    double size = 0, det = 0, c[9];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            const int a = (j + 1) % 3, b = (j + 2) % 3, s = (i + 1) % 3, t = (i + 2) % 3;
-            c[3 * i + j] = m[4 * a + s] * m[4 * b + t] - m[4 * a + t] * m[4 * b + s];
-            size += m[4 * i + j] * m[4 * i + j];
-        }
-    for (int j = 0; j < 3; j++) det += m[4 * j] * c[j];
+    const double a[9] = {m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, shift[3] = {m[3], m[7], m[11]};
+    double c[9], size = 0;
+    const double det = vgi_cofactors(a, c);
+    for (int k = 0; k < 9; k++) size += a[k] * a[k];
     if (!(fabs(det) > 1e-9 * size * sqrt(size))) return false;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) to[4 * i + j] = c[3 * i + j] / det;
-    for (int i = 0; i < 3; i++)
-        to[4 * i + 3] = -(to[4 * i] * m[3] + to[4 * i + 1] * m[7] + to[4 * i + 2] * m[11]);
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) to[4 * i + j] = c[3 * j + i] / det;
+        to[4 * i + 3] = -vgi_dot(to + 4 * i, shift);
+    }
     return true;
-}
-
-static double length(const double p[3])
-{
-    return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
 }
 
 static void unit(double p[3])
 {
-    const double l = length(p);
+    const double l = vgi_length(p);
     for (int k = 0; k < 3; k++) p[k] = l > 0 ? p[k] / l : 0;
 }
 
 /* x by the least rotation that takes a to b; a, b: unit or zero. */
 static void turn(const double a[3], const double b[3], const double x[3], double to[3])
 {
-    const double c = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    const double k[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    const double along = (k[0] * x[0] + k[1] * x[1] + k[2] * x[2]) / (1 + c);
-    const double y[3] = {k[1] * x[2] - k[2] * x[1], k[2] * x[0] - k[0] * x[2], k[0] * x[1] - k[1] * x[0]};
+    const double c = vgi_dot(a, b);
+    double k[3], y[3];
+    vgi_cross(a, b, k);
+    vgi_cross(k, x, y);
+    const double along = vgi_dot(k, x) / (1 + c);
     for (int i = 0; i < 3; i++) to[i] = c > -0.999999 ? c * x[i] + y[i] + along * k[i] : -x[i];
 }
 
@@ -95,7 +82,7 @@ static int place(vgi_gltf_character *c, vg_err *e)
 static void point_of(const vgi_gltf_character *c, const vgi_gltf_part *p, size_t v, double at[3], double shown[3])
 {
     vgi_accessor_get(&p->position, v, at);
-    affine(c->out + 12 * (p->first + v), at, shown);
+    vgi_gltf_move_point(c->out + 12 * (p->first + v), at, shown);
 }
 
 /* Does the file show the reference pose? */
@@ -126,7 +113,7 @@ static int find_base(vgi_gltf_character *c, const vg_body *b, vg_err *e)
             const size_t f = p->first + v;
             double at[3];
             if (c->kept) vgi_accessor_get(&p->position, v, at);
-            else affine(c->in + 12 * f, b->reference + 3 * (size_t)c->vertex[f], at);
+            else vgi_gltf_move_point(c->in + 12 * f, b->reference + 3 * (size_t)c->vertex[f], at);
             for (int k = 0; k < 3; k++) {
                 c->base[3 * f + k] = (float)at[k];
                 if (!isfinite(c->base[3 * f + k])) return vg_fail(e, VG_EINPUT, "a position is too large for binary32");
@@ -185,7 +172,7 @@ static int group_normals(vgi_gltf_character *c, vg_err *e)
     for (size_t f = 0; f < c->n && r == VG_OK; f++) {
         const float *n = c->normal + 3 * f;
         c->group[f] = UINT32_MAX;
-        if (length(c->world_normal + 3 * f) == 0) continue;
+        if (vgi_length(c->world_normal + 3 * f) == 0) continue;
         uint32_t *at = &head[c->vertex[f]];
         while (*at && memcmp(c->normal + 3 * (size_t)(*at - 1), n, 3 * sizeof *n)) at = &next[*at - 1];
         if (!*at) *at = (uint32_t)f + 1, c->group[f] = (uint32_t)c->ngroups++;
@@ -211,12 +198,11 @@ static void face_normals(const vgi_gltf_character *c, const double *world, doubl
             for (int i = 0; i < 3; i++) side[k][i] = p[(k + 1) % 3][i] - p[k][i];
             unit(side[k]);
         }
-        for (int i = 0; i < 3; i++)
-            n[i] = side[0][(i + 1) % 3] * side[1][(i + 2) % 3] - side[0][(i + 2) % 3] * side[1][(i + 1) % 3];
+        vgi_cross(side[0], side[1], n);
         unit(n);
         for (int k = 0; k < 3; k++) {
             const double *s = side[k], *t = side[(k + 2) % 3];
-            const double angle = acos(fmax(-1, fmin(1, -(s[0] * t[0] + s[1] * t[1] + s[2] * t[2]))));
+            const double angle = acos(fmax(-1, fmin(1, -vgi_dot(s, t))));
             if (c->group[v[k]] == UINT32_MAX) continue;
             for (int i = 0; i < 3; i++) to[3 * (size_t)c->group[v[k]] + i] += angle * n[i];
         }
@@ -229,7 +215,7 @@ static void normal_now(const vgi_gltf_character *c, size_t f, double to[3])
 {
     const double *a = c->rest + 3 * (size_t)c->group[f], *b = c->now + 3 * (size_t)c->group[f];
     double turned[3];
-    if (length(a) == 0 || length(b) == 0) memcpy(turned, c->world_normal + 3 * f, sizeof turned);
+    if (vgi_length(a) == 0 || vgi_length(b) == 0) memcpy(turned, c->world_normal + 3 * f, sizeof turned);
     else turn(a, b, c->world_normal + 3 * f, turned);
     normal_in(c, f, turned, to);
 }
@@ -292,7 +278,7 @@ void vgi_gltf_character_pose(const vgi_gltf_character *c, const double *world, c
     for (size_t f = 0; f < c->n; f++) {
         const size_t v = 3 * (size_t)c->vertex[f];
         double local[3];
-        affine(c->in + 12 * f, world + v, local);
+        vgi_gltf_move_point(c->in + 12 * f, world + v, local);
         const bool stays = moved[v] == 0 && moved[v + 1] == 0 && moved[v + 2] == 0;
         for (int k = 0; k < 3; k++) to[3 * f + k] = stays ? 0 : (float)(local[k] - c->base[3 * f + k]);
     }

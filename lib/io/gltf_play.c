@@ -20,7 +20,7 @@ static void multiply(const double a[12], const double b[12], double to[12])
         }
 }
 
-static void move_point(const double m[12], const double p[3], double to[3])
+void vgi_gltf_move_point(const double m[12], const double p[3], double to[3])
 {
     for (int i = 0; i < 3; i++) to[i] = m[4 * i] * p[0] + m[4 * i + 1] * p[1] + m[4 * i + 2] * p[2] + m[4 * i + 3];
 }
@@ -64,7 +64,7 @@ static void rest(vgi_gltf_scene *x, bool morphed)
     }
 }
 
-/* Where the joints take p; false: it hangs on none. */
+/* The position of vertex v under its joints; false: it has no joint of any weight. */
 static bool bend(const vgi_gltf_scene *x, const vgi_gltf_part *p, size_t v, const double at[3], double to[3])
 {
     const vgi_gltf_skin *k = &x->skins[p->skin];
@@ -75,7 +75,7 @@ static bool bend(const vgi_gltf_scene *x, const vgi_gltf_part *p, size_t v, cons
         for (int i = 0; i < 4; i++) {
             double moved[3];
             if (shares[i] == 0) continue;
-            move_point(k->matrices + 12 * (size_t)joints[i], at, moved);
+            vgi_gltf_move_point(k->matrices + 12 * (size_t)joints[i], at, moved);
             for (int c = 0; c < 3; c++) total[c] += shares[i] * moved[c];
             sum += shares[i];
         }
@@ -124,7 +124,7 @@ static void pose_part(const vgi_gltf_scene *x, const vgi_gltf_part *p, double *t
     multiply(n->world, p->place, world);
     for (size_t i = 0; i < p->nkept; i++) {
         memcpy(at, to + 3 * i, sizeof at);
-        if (p->skin == VGI_GLTF_NONE || !bend(x, p, p->kept[i], at, to + 3 * i)) move_point(world, at, to + 3 * i);
+        if (p->skin == VGI_GLTF_NONE || !bend(x, p, p->kept[i], at, to + 3 * i)) vgi_gltf_move_point(world, at, to + 3 * i);
     }
 }
 

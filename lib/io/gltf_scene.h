@@ -140,6 +140,7 @@ void vgi_gltf_from_columns(const double c[16], double m[12]); /* the upper rows 
 /* ---- gltf_play.c ---- */
 /* vgi_gltf_rest: nodes and joints as the file has them, without morph targets. */
 void vgi_gltf_rest(vgi_gltf_scene *x);
+void vgi_gltf_move_point(const double m[12], const double p[3], double to[3]); /* to = m p; to is not p */
 /* vgi_gltf_vertex_matrix: what takes vertex v of a part into the world, as nodes and joints are now. */
 void vgi_gltf_vertex_matrix(const vgi_gltf_scene *x, const vgi_gltf_part *p, size_t v, double m[12]);
 

@@ -53,7 +53,7 @@ typedef enum vgi_type { VGI_U8, VGI_U32, VGI_U64, VGI_F32, VGI_F64, VGI_TEXT } v
 
 /* How many entries an array has, before it is multiplied by its width. It is called when the fields before it are
  * known, which may be any numbers; SIZE_MAX stands for what no size can be. */
-typedef size_t vgi_length(const void *artefact, const vg_mesh *mesh);
+typedef size_t vgi_array_length(const void *artefact, const vg_mesh *mesh);
 
 typedef struct vgi_member {
     vgi_type type;
@@ -64,7 +64,7 @@ typedef struct vgi_member {
     size_t row_at;      /* arrays of structs: offset in such a row; the field is one column of the array */
     bool rows;
     size_t width;       /* elements of each entry */
-    vgi_length *length; /* NULL: a single number or text */
+    vgi_array_length *length; /* NULL: a single number or text */
 } vgi_member;
 
 /* A record's check: VG_OK, or VG_EINPUT with "where: what is wrong". artefact lies in h. */

@@ -64,3 +64,10 @@ void vgi_best_turn_near(const double b[9], double weight, const double prior[4],
     for (int i = 0; i < 9; i++) m[i] = b[i] + weight * m[i];
     vgi_best_turn(m, q);
 }
+
+void vgi_turn_between(const double a[3], const double b[3], double q[4])
+{
+    vg_quat_between(a, b, q);
+    double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (int k = 0; k < 4; k++) q[k] /= length;
+}

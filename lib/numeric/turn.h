@@ -10,5 +10,8 @@ void vgi_best_turn(const double b[9], double q[4]);
 /* vgi_best_turn_near: the same for b + weight * (the rotation of the unit quaternion `prior`): with a small
  * weight, what b leaves open is as in `prior`. */
 void vgi_best_turn_near(const double b[9], double weight, const double prior[4], double q[4]);
+/* vgi_turn_between: the unit quaternion of the smallest rotation that takes the direction of a to that of b. Neither may
+ * be 0. */
+void vgi_turn_between(const double a[3], const double b[3], double q[4]);
 
 #endif

@@ -4,6 +4,7 @@
 #include "signal/regions.h"
 #include "numeric/blas.h"
 #include "numeric/lapack.h"
+#include "numeric/stats.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -59,10 +60,10 @@ int vg_region_filter_new(vg_region_filter **out, const vg_mesh *m, const double 
     vg_region_filter *r = *out = vgi_array(1, sizeof *r, e);
     if (!r) return VG_ENOMEM;
     *r = (vg_region_filter){.nv = m->nv, .threads = threads};
-    int ok = vgi_regions_grow(m, reference, &r->region, &r->nregions, e);
-    if (ok == VG_OK) ok = make_room(r, e);
-    if (ok < 0) vg_region_filter_free(out);
-    return ok;
+    int code = vgi_regions_grow(m, reference, &r->region, &r->nregions, e);
+    if (code == VG_OK) code = make_room(r, e);
+    if (code < 0) vg_region_filter_free(out);
+    return code;
 }
 
 /* ---- the first pass ---- */
@@ -157,8 +158,8 @@ static int learn_region(vg_region_filter *r, size_t i, double *values, double *v
         keep_all(n, filter);
         return VG_OK;
     }
-    int ok = vgi_eigen(n, filter, VGI_LARGEST, n, values, vectors, e);
-    if (ok < 0) return ok;
+    int code = vgi_eigen(n, filter, VGI_LARGEST, n, values, vectors, e);
+    if (code < 0) return code;
     double variance = find_noise(rows, n, values);
     r->noise[i] = sqrt(variance);
     compose(n, vectors, values, rows, variance, filter, scaled);
@@ -172,30 +173,21 @@ int vg_region_filter_learn(vg_region_filter *r, vg_err *e)
                        r->nframes, FEWEST);
     double *room = vgi_array_raw(2 * VGI_REGION * VGI_REGION + VGI_REGION, sizeof *room, e);
     double *values = room, *vectors = room + VGI_REGION;
-    int ok = room ? VG_OK : VG_ENOMEM;
-    for (size_t i = 0; i < r->nregions && ok == VG_OK; i++)
-        ok = learn_region(r, i, values, vectors, vectors + VGI_REGION * VGI_REGION, e);
+    int code = room ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; i < r->nregions && code == VG_OK; i++)
+        code = learn_region(r, i, values, vectors, vectors + VGI_REGION * VGI_REGION, e);
     free(room);
-    return ok;
-}
-
-static int by_size(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
+    return code;
 }
 
 double vg_region_filter_noise(const vg_region_filter *r)
 {
     vg_err e;
     size_t n = 0;
-    double *known = vgi_array_raw(r->nregions, sizeof *known, &e), middle = 0;
+    double *known = vgi_array_raw(r->nregions, sizeof *known, &e);
     for (size_t i = 0; known && i < r->nregions; i++)
         if (r->noise[i] >= 0) known[n++] = r->noise[i];
-    if (n) {
-        qsort(known, n, sizeof *known, by_size);
-        middle = known[n / 2];
-    }
+    double middle = vgi_median(known, n);
     free(known);
     return sqrt(3) * middle;
 }

@@ -2,6 +2,7 @@
  * do not influence: least squares, repeated with weights (Cleveland 1979).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/smooth.h"
+#include "numeric/stats.h"
 #include "numeric/vec3.h"
 
 #include <math.h>
@@ -12,7 +13,7 @@ enum { TERMS = 3, MOST_WIDTH = 4, ABSOLUTE = 4, BISQUARE = 3 }; /* rounds of eac
 typedef struct track {
     size_t n, width;
     const double **place; /* n */
-    double *time, *weight, *distance, *sorted;
+    double *time, *weight, *distance, *room;
     double coefficient[TERMS][MOST_WIDTH];
 } track;
 
@@ -46,22 +47,16 @@ static void measure_distances(track *t)
     }
 }
 
-static int by_size(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
 static double median_distance(track *t)
 {
-    memcpy(t->sorted, t->distance, t->n * sizeof *t->sorted);
-    qsort(t->sorted, t->n, sizeof *t->sorted, by_size);
-    return t->sorted[t->n / 2];
+    memcpy(t->room, t->distance, t->n * sizeof *t->room);
+    return vgi_median(t->room, t->n);
 }
 
 static void weigh_again(track *t, bool bisquare)
 {
-    double middle = median_distance(t), largest = t->sorted[t->n - 1];
+    double middle = median_distance(t), largest = 0;
+    for (size_t j = 0; j < t->n; j++) largest = fmax(largest, t->distance[j]);
     for (size_t j = 0; j < t->n; j++) {
         double r = t->distance[j];
         if (!bisquare) {
@@ -90,10 +85,10 @@ static void follow(track *t)
 void vgi_robust_points(size_t npoints, size_t width, size_t n, const double *const *frame, size_t at, double reach,
                        double *out)
 {
-    double time[VGI_MOST_ROBUST], weight[VGI_MOST_ROBUST], distance[VGI_MOST_ROBUST], sorted[VGI_MOST_ROBUST];
+    double time[VGI_MOST_ROBUST], weight[VGI_MOST_ROBUST], distance[VGI_MOST_ROBUST], room[VGI_MOST_ROBUST];
     const double *place[VGI_MOST_ROBUST];
     track t = {.n = n, .width = width, .place = place, .time = time, .weight = weight, .distance = distance,
-               .sorted = sorted};
+               .room = room};
     for (size_t j = 0; j < n; j++) time[j] = ((double)j - (double)at) / reach;
     for (size_t p = 0; p < npoints; p++) {
         for (size_t j = 0; j < n; j++) place[j] = frame[j] + width * p;

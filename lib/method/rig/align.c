@@ -156,13 +156,8 @@ static void choose_limbs(const vgi_rests *x, bool *wanted)
 static double align_joint(const directions *d, double q[4])
 {
     if (d->n == 0) return 0;
-    if (d->n > 1) {
-        vgi_best_turn_near(d->b, 1e-9, q, q);
-    } else {
-        vg_quat_between(d->ours, d->theirs, q);
-        double size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-        for (int k = 0; k < 4; k++) q[k] /= size;
-    }
+    if (d->n > 1) vgi_best_turn_near(d->b, 1e-9, q, q);
+    else vgi_turn_between(d->ours, d->theirs, q);
     return 2 * atan2(vgi_length(q + 1), fabs(q[0])) * (180 / M_PI);
 }
 

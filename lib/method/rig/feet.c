@@ -5,6 +5,8 @@
  * Leaves out how a rig is driven (drive.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/align.h"
+#include "numeric/stats.h"
+#include "numeric/turn.h"
 #include "numeric/vec3.h"
 
 #include <math.h>
@@ -124,12 +126,6 @@ static int prepare(feet *f, vg_err *e)
 
 /* ---- when a joint stands ---- */
 
-static int ascending(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* The distance from pose to pose, the mean of before and after. */
 static void measure_speed(feet *f)
 {
@@ -159,8 +155,7 @@ static void find_stands(feet *f, uint32_t joint, double leg_length)
     }
     measure_speed(f);
     memcpy(f->speed + f->n, f->speed, f->n * sizeof *f->speed);
-    qsort(f->speed + f->n, f->n, sizeof *f->speed, ascending);
-    double fast = f->speed[f->n + f->n * 9 / 10];
+    double fast = f->n ? vgi_select(f->speed + f->n, f->n, f->n * 9 / 10) : 0;
     for (size_t i = 0; i < f->n; i++)
         f->stands[i] = f->speed[i] <= SLOW * fast && height(f, f->path + 3 * i) <= lowest + LOW * leg_length;
     drop_short_stands(f);
@@ -254,13 +249,6 @@ static void lower_body(feet *f)
 
 /* ---- bending ---- */
 
-static void turn_between(const double a[3], const double b[3], double q[4])
-{
-    vg_quat_between(a, b, q);
-    double size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    for (int k = 0; k < 4; k++) q[k] /= size;
-}
-
 /* Turn a bone's transform by q, so that what was at `from` is at `to`. */
 static void move_bone(double *t, const double q[4], const double from[3], const double to[3])
 {
@@ -279,7 +267,7 @@ static void place_knee(const leg *l, const double hip[3], const double knee[3], 
     double a = l->length[0], b = l->length[1], u[3], old[3], q[4], thigh[3], side[3];
     for (int k = 0; k < 3; k++) u[k] = foot[k] - hip[k], old[k] = before[k] - hip[k], thigh[k] = knee[k] - hip[k];
     double d = vgi_length(u), reach = fmin(fmax(d, fabs(a - b) / STRETCH), STRETCH * (a + b));
-    turn_between(old, u, q);
+    vgi_turn_between(old, u, q);
     vg_quat_apply(q, thigh, side);
     for (int k = 0; k < 3; k++) u[k] /= d, foot[k] = hip[k] + reach * u[k];
     for (int pass = 0; pass < 2; pass++) { /* the thigh, or, of a straight leg, what is forward, across the leg */
@@ -294,10 +282,12 @@ static void place_knee(const leg *l, const double hip[3], const double knee[3], 
 
 static void bend_leg(const feet *f, const leg *l, size_t p)
 {
-    double *t = f->transforms[p], hip[3], knee[3], foot[3], to[3], now[3], forward[3] = {0, 0, 1}, q[2][4], was[3], is[3];
+    double *t = f->transforms[p], hip[3], knee[3], foot[3], to[3], now[3], forward[3] = {0}, q[2][4], was[3], is[3];
     joint_at(f->r, l->thigh, t, hip);
     joint_at(f->r, l->shin, t, knee);
     joint_at(f->r, l->foot, t, foot);
+    if (f->up == 2) forward[1] = -1; /* as bodies usually look that stand along z */
+    else forward[2] = 1;
     if (l->toe != NONE) {
         joint_at(f->r, l->toe, t, forward);
         for (int k = 0; k < 3; k++) forward[k] -= foot[k];
@@ -308,9 +298,9 @@ static void bend_leg(const feet *f, const leg *l, size_t p)
     if (!(vgi_length(away) > 0)) return;
     place_knee(l, hip, knee, foot, forward, to, now);
     for (int k = 0; k < 3; k++) was[k] = knee[k] - hip[k], is[k] = now[k] - hip[k];
-    turn_between(was, is, q[0]);
+    vgi_turn_between(was, is, q[0]);
     for (int k = 0; k < 3; k++) was[k] = foot[k] - knee[k], is[k] = to[k] - now[k];
-    turn_between(was, is, q[1]);
+    vgi_turn_between(was, is, q[1]);
     for (size_t b = 0; b < f->r->nbones; b++) {
         if (l->group[b] == THIGH) move_bone(t + 7 * b, q[0], hip, hip);
         if (l->group[b] == SHIN) move_bone(t + 7 * b, q[1], foot, to);
