@@ -190,3 +190,11 @@ END
     must grep -c '^Frames: *20000$' out.bvh
     must vg-diff -t 1e-6 walk.bvh out.bvh
 }
+
+@test "a target skeleton of other joints is refused with vg-play as the way, not vg-register" {
+    walk 3 >walk.bvh
+    must_fail 3 vg-deform --onto "$DATA/human-man-poses.bvh.xz" walk.bvh -o no.vgs
+    says "vg-play drives a rig by a skeleton of other joints"
+    [[ $stderr != *vg-register* ]]
+    [ ! -e no.vgs ]
+}

@@ -99,3 +99,22 @@ END
     says "has a 'root_turn' that is no rotation"
     [ ! -e no.vgs ]
 }
+
+@test "what an array or an archive of arrays cannot keep of features is said" {
+    must_warn vg-decode "$(horse features.vgs)" -o horse.npy
+    says "rotations of the root and centroids"
+    must vg-decode --f64 -o horse.npz "$(horse features.vgs)"
+    [ -z "$stderr" ]
+    PYTHONPATH=$ROOT/examples/python python3 - "$(horse features.vgs)" <<'END'
+import sys, vgstream
+with vgstream.Reader(sys.argv[1]) as s:
+    w = vgstream.Writer("some.vgs", s)
+    for i, frame in enumerate(s):
+        if i == 3:
+            frame.drop_channels()
+        w.put(frame)
+    w.close(s.tail)
+END
+    must_warn vg-decode some.vgs -o some.npz
+    says "rotations of the root or centroids: not every frame has them"
+}

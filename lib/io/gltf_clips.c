@@ -107,7 +107,7 @@ static int add_pointed(vgi_gltf_scene *x, const vgi_json *animation, const vgi_j
     if (!at) return VG_OK;
     if (!strncmp(at, nodes, strlen(nodes)) && split_pointer(at + strlen(nodes), &number, &path))
         return number < x->nnodes ? add_channel(x, animation, from, number, path, e)
-                                  : vgi_gltf_bad(&x->g, e, "an animation points at '%.60s', which is not there", at);
+                                  : vgi_gltf_bad(&x->g, e, "an animation targets '%.60s', which does not exist", at);
     if (strncmp(at, meshes, strlen(meshes)) || !split_pointer(at + strlen(meshes), &number, &path) ||
         path != VGI_GLTF_WEIGHTS)
         return VG_OK;

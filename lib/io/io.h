@@ -326,7 +326,7 @@ int vgi_unpack_stream(int fd, int64_t base, const char *name, const vgi_limits *
 typedef struct vgi_packer vgi_packer;
 bool vgi_packer_knows(const char *name, size_t n); /* do the first n bytes of name end like an archive we write? */
 const char *vgi_packer_suffixes(void);             /* ".zip .tar ..." for messages */
-/* vgi_packer_open: the kind is told by the first n bytes of `name`, which is also what messages call it. fd is
+/* vgi_packer_open: the suffix of the first n bytes of `name` selects the kind of archive; messages use this name. fd is
  * borrowed. */
 int vgi_packer_open(vgi_packer **p, int fd, const char *name, size_t n, vg_err *e) VG_MUST_CHECK;
 /* vgi_packer_open_plain: a zip whose members are stored as they are, whatever its name. */

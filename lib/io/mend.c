@@ -3,8 +3,8 @@
  * Leaves out which file they come from (format.c and the readers of sequences).
  *
  * A vertex named twice in a row is kept once. What has no two distinct corners left, or goes out along an edge and
- * back, is dropped. A hole in a face is told by a bridge whose ends are named twice: ears are cut off, as triangles,
- * until no vertex is named twice in what is left.
+ * back, is dropped. A face with a hole has a bridge to it, whose ends are named twice: ears are cut off as
+ * triangles until the rest names no vertex twice.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 #include "io/polygon.h"

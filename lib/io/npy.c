@@ -356,6 +356,7 @@ static const char *warn_npy(void *state)
 {
     const writing *x = state;
     bool rooted = x->h->kind == VG_VECTORS || x->h->kind == VG_DEFORMATIONS;
+    if (x->h->kind == VG_FEATURES) return "rotations of the root and centroids (an .npz keeps them)";
     return rooted ? "where the frames are in space (an .npz keeps it)" : NULL;
 }
 

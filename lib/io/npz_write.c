@@ -18,7 +18,7 @@ typedef struct writing {
     uint64_t frames;
     vg_bytes frame, roots, anchors, times;
     vg_bytes turns, centroids; /* of features: channels that every frame has */
-    bool turned, placed;
+    bool turned, placed, lost; /* lost: a frame has one of them that others have not, or of another shape */
     size_t parts;
     vgi_names names;
     vgi_packer *packer;
@@ -41,11 +41,13 @@ static bool is_rooted(const vg_head *h)
     return h->kind == VG_VECTORS || h->kind == VG_DEFORMATIONS;
 }
 
-/* The numbers of a channel; false from the first frame on that has none of this shape. */
-static int put_channel(vg_bytes *to, bool *all, const vg_frame *f, const char *name, size_t width, size_t count, vg_err *e)
+/* The numbers of a channel; *all: every frame so far has them in this shape. */
+static int put_channel(writing *x, vg_bytes *to, bool *all, const vg_frame *f, const char *name, size_t width, size_t count,
+                       vg_err *e)
 {
-    const vg_channel *c = *all ? vg_frame_channel(f, name) : NULL;
-    *all = c && c->numbers && c->width == width && c->count == count;
+    const vg_channel *c = vg_frame_channel(f, name);
+    *all = *all && c && c->numbers && c->width == width && c->count == count;
+    x->lost |= !*all && (c || to->size);
     return *all ? vgi_npy_store(to, c->numbers, width * count, true, e) : VG_OK;
 }
 
@@ -53,8 +55,8 @@ static int put_channels(writing *x, const vg_frame *f, vg_err *e)
 {
     const vg_channel *c = vg_frame_channel(f, VGI_NPZ_CENTROIDS);
     if (x->frames == 0 && c) x->parts = c->count;
-    int r = put_channel(&x->turns, &x->turned, f, VGI_NPZ_ROOT_TURN, 4, 1, e);
-    return r < 0 ? r : put_channel(&x->centroids, &x->placed, f, VGI_NPZ_CENTROIDS, 3, x->parts, e);
+    int r = put_channel(x, &x->turns, &x->turned, f, VGI_NPZ_ROOT_TURN, 4, 1, e);
+    return r < 0 ? r : put_channel(x, &x->centroids, &x->placed, f, VGI_NPZ_CENTROIDS, 3, x->parts, e);
 }
 
 int vgi_npz_put(void *state, const vg_frame *f, vg_err *e)
@@ -274,7 +276,10 @@ const char *vgi_npz_warning(void *state)
     const writing *x = state;
     size_t timed = 0;
     for (size_t i = 0; i + 8 <= x->times.size; i += 8) timed += vgi_get64(x->times.data + i) != 0;
-    return !x->timed && timed ? "the times of the frames: not every frame has one" : NULL;
+    const bool times = !x->timed && timed;
+    if (times && x->lost) return "times, rotations of the root or centroids: not every frame has them";
+    if (x->lost) return "rotations of the root or centroids: not every frame has them";
+    return times ? "the times of the frames: not every frame has one" : NULL;
 }
 
 void vgi_npz_release(void *state)
