@@ -35,8 +35,11 @@ CHANNELS = {"time": ("frame", 1), "root": ("frame", 3), "anchors": ("anchor", 3)
 MOST_CHANNELS = 255
 INDICES, F32, F64 = 1, 4, 8  # Type of a channel
 LABEL_KINDS = {1: "object", 2: "group", 3: "material", 4: "smoothing", 5: "library"}
+NETWORK_COUNTS = ("model", "direction", "mesh_digest", "data_digest", "vertices", "parts", "width", "numbers", "rank", "layers",
+                  "hidden", "convolutions", "uncertain", "sets", "parameters", "seed", "frames", "iterations", "step", "windows",
+                  "open", "phase", "best_iteration")
 NO_PARENT = 0xFFFFFFFF
-NEEDS = {**dict.fromkeys(("TEXC", "LABL", "ASST", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP ", "SIGN"), "MESH"), "SKIN": "RIG "}
+NEEDS = {**dict.fromkeys(("TEXC", "LABL", "ASST", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP ", "SIGN", "NETW"), "MESH"), "SKIN": "RIG "}
 TAG_BYTES = frozenset(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 ")
 
 
@@ -137,6 +140,23 @@ class Map:
     held_patch: array
     per_corner: int
     corner_bones: array  # of bones: per_corner for each corner
+
+
+@dataclass
+class Network:
+    """A network that has learned how a sequence goes on."""
+    counts: dict         # by the names of NETWORK_COUNTS
+    numbers: array       # best error; diagonal, low (2), high (2), change, ridge, damping
+    errors: array
+    mean: array
+    scale: array
+    range: array
+    regression: array
+    root: array
+    parameters: array
+    basis: array
+    moments: array
+    best: array
 
 
 @dataclass
@@ -249,6 +269,7 @@ class Stream:
     rig: object = None
     map: object = None
     signal: object = None
+    network: object = None
     kind: str = ""            # the form of frames by name
     element: str = ""
     width: int = 0
@@ -871,6 +892,41 @@ class _Reader:
         self.stream.signal = Signal(n, space, d, m, bits, examples, layout, numbers, mean, basis, unit, coordinate, position,
                                     site, parameter, knot, control, turn, shift, times, names)
 
+    def netw(self, p: _Payload):
+        c = {name: int(p.flag()) if name in ("open", "uncertain") else p.u64() for name in NETWORK_COUNTS}
+        features, k = c["vertices"] * c["width"], c["rank"]
+        numbers, errors, mean = p.f64s(9), p.f64s(30), p.f64s(features)
+        scale, range_ = p.f64s(2 * k), p.f64s(2 * k)
+        regression = p.f64s(2 * (3 * k * k + 2 * k) if c["model"] == 1 else 0)
+        root = p.f64s(3 * (2 * k + 1) * (c["parts"] + 1))
+        count = c["sets"] * c["parameters"]
+        lists = []
+        for n in (count, k * features, 2 * count if c["open"] else 0, count if c["open"] else 0):
+            lists.append(p.f64s(n, code="f"))
+            p.pad()
+        p.end()
+        for wrong, why in self.wrong_network(c, features, numbers, scale, range_):
+            if wrong:
+                p.fail(why)
+        self.stream.network = Network(c, numbers, errors, mean, scale, range_, regression, root, *lists)
+
+    def wrong_network(self, c: dict, features: int, numbers: array, scale: array, range_: array):
+        """What may be wrong with a network whose fields have the right sizes."""
+        linear, k, low, high = c["model"] in (1, 2), c["rank"], numbers[2:4], numbers[4:6]
+        yield c["model"] > 4, "its model is not known"
+        yield c["direction"] > 2, "its direction is not known"
+        yield c["width"] not in (9, 12), "its features are not 9 or 12 numbers"
+        yield 0 in (k, c["parts"], c["step"]), "a count is 0"
+        yield c["numbers"] != (k if linear else features), "its frames have a wrong number of numbers"
+        yield c["sets"] != (2 if c["direction"] == 1 else 1), "its sets of parameters do not suit its direction"
+        yield linear and c["uncertain"], "a network of coordinates has no variance"
+        yield numbers[1] <= 0, "the diagonal is not above 0"
+        yield any(a >= b for a, b in zip(low, high)), "a range is empty"
+        yield any(x <= 0 for x in scale), "a scale is not above 0"
+        yield any(a > b for a, b in zip(range_[:k], range_[k:])), "a range of coordinates is empty"
+        yield c["phase"] > 1, "its phase of training is not known"
+        yield c["vertices"] != self.stream.mesh.nv or c["mesh_digest"] != self.stream.digest(), "the network's mesh"
+
     def elements(self, element: str):
         """How many elements of that sort there are; None: that is not known."""
         s = self.stream
@@ -992,7 +1048,7 @@ class _Reader:
 
     HANDLERS = {"PROV": prov, "MESH": mesh, "TEXC": texc, "LABL": labl, "ASST": asst, "SELE": sele, "LINK": link, "ANCH": anch,
                 "REFP": refp, "SKEL": skel, "CORR": corr, "PTCH": ptch,
-                "RIG ": rig, "SKIN": skin, "MAP ": map, "SIGN": sign, "FORM": form, "FRAM": fram, "FAIL": fail, "END ": end}
+                "RIG ": rig, "SKIN": skin, "MAP ": map, "SIGN": sign, "NETW": netw, "FORM": form, "FRAM": fram, "FAIL": fail, "END ": end}
 
 
 def read_stream(file) -> Stream:
@@ -1047,6 +1103,11 @@ def _map_json(m: Map) -> dict:
             "held": list(m.held), "held_patch": list(m.held_patch)}
 
 
+def _network_json(n: Network) -> dict:
+    counts = dict(n.counts, mesh_digest=f"{n.counts['mesh_digest']:016x}", data_digest=f"{n.counts['data_digest']:016x}")
+    return dict({k: list(v) for k, v in vars(n).items() if k != "counts"}, counts=counts)
+
+
 def _signal_json(s: Signal) -> dict:
     flat = {k: list(v) if isinstance(v, array) else v for k, v in vars(s).items() if k not in ("n", "d", "m")}
     return dict(flat, basis=_rows(s.basis, s.d) if s.d else [], coordinate=_rows(s.coordinate, s.m) if s.m else [],
@@ -1076,6 +1137,7 @@ def to_json(s: Stream) -> dict:
         "rig": s.rig and _rig_json(s.rig),
         "map": s.map and _map_json(s.map),
         "signal": s.signal and _signal_json(s.signal),
+        "network": s.network and _network_json(s.network),
         "kind": s.kind, "element": s.element, "width": s.width, "precision": s.precision, "count": s.count,
         "extra": _extra_json(s.extra),
         "frames": [_frame_json(f, s.width) for f in s.frames],

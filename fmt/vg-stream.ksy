@@ -82,6 +82,7 @@ types:
             '"SKIN"': skin
             '"MAP "': map
             '"SIGN"': sign
+            '"NETW"': netw
             '"FORM"': form
             '"FRAM"': fram
             '"FAIL"': fail
@@ -436,6 +437,84 @@ types:
       - id: rest
         size-eos: true
         doc: basis, coordinates, positions, sites, parameters, knots, control points, root, turns, times, names (STREAM.md 3.20)
+  netw:
+    seq:
+      - id: model
+        type: u8
+        doc: 1 auto, 2 pca, 3 fc, 4 conv
+      - id: direction
+        type: u8
+        doc: 0 shared, 1 separate, 2 forward
+      - id: mesh_digest
+        type: u8
+      - id: data_digest
+        type: u8
+      - id: num_vertices
+        type: u8
+      - id: num_parts
+        type: u8
+      - id: width
+        type: u8
+      - id: frame_numbers
+        type: u8
+      - id: rank
+        type: u8
+      - id: layers
+        type: u8
+      - id: hidden
+        type: u8
+      - id: convolutions
+        type: u8
+      - id: uncertain
+        type: u8
+      - id: num_sets
+        type: u8
+      - id: num_parameters
+        type: u8
+        doc: of each set
+      - id: training
+        type: u8
+        repeat: expr
+        repeat-expr: 5
+        doc: seed, frames, iterations, step, windows
+      - id: is_open
+        type: u8
+      - id: phase
+        type: u8
+      - id: best_iteration
+        type: u8
+      - id: numbers
+        type: f8
+        repeat: expr
+        repeat-expr: 9
+        doc: best error, diagonal, low (2), high (2), change, ridge, damping
+      - id: errors
+        type: f8
+        repeat: expr
+        repeat-expr: 30
+      - id: mean
+        type: f8
+        repeat: expr
+        repeat-expr: num_vertices * width
+      - id: scale
+        type: f8
+        repeat: expr
+        repeat-expr: 2 * rank
+      - id: range
+        type: f8
+        repeat: expr
+        repeat-expr: 2 * rank
+      - id: regression
+        type: f8
+        repeat: expr
+        repeat-expr: "model == 1 ? 2 * (3 * rank * rank + 2 * rank) : 0"
+      - id: root
+        type: f8
+        repeat: expr
+        repeat-expr: 3 * (2 * rank + 1) * (num_parts + 1)
+      - id: rest
+        size-eos: true
+        doc: parameters, basis, moments, best, each an array of f4 with its padding (STREAM.md 3.21)
   form:
     seq:
       - id: name

@@ -200,7 +200,7 @@ END
 }
 
 @test "vg-stream.ksy names every record" {
-    for tag in PROV MESH TEXC LABL ASST SELE LINK ANCH REFP SKEL CORR PTCH 'RIG ' SKIN 'MAP ' SIGN FORM FRAM FAIL 'END '; do
+    for tag in PROV MESH TEXC LABL ASST SELE LINK ANCH REFP SKEL CORR PTCH 'RIG ' SKIN 'MAP ' SIGN NETW FORM FRAM FAIL 'END '; do
         for file in fmt/vg-stream.ksy fmt/STREAM.md man/vg-stream.5; do
             grep -q -e "\"$tag\"" -e "\`$tag\`" -e "^\.It ${tag% }\$" "$ROOT/$file" || fail "$file does not have $tag"
         done

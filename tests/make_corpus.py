@@ -223,6 +223,13 @@ def signals(s):
                       *s["times"]) + b"".join(map(text, s["names"])), CRITICAL)
 
 
+def network(n):
+    c, lists = n["counts"], [n["numbers"], n["errors"], n["mean"], n["scale"], n["range"], n["regression"], n["root"]]
+    head = u64(*(int(x, 16) if isinstance(x, str) else x for x in c.values())) + b"".join(f64(*x) for x in lists)
+    return Record("NETW", head + b"".join(pad(struct.pack(f"<{len(n[k])}f", *n[k])) for k in ("parameters", "basis", "moments", "best")),
+                  CRITICAL)
+
+
 def form_of(c):
     """Element and width of a content's frames."""
     return (c["element"], c["width"]) if "element" in c else FORMS[c["kind"]]
@@ -304,6 +311,8 @@ def records_of(c):
         out.append(fitted(c["map"]))
     if c["signal"] is not None:
         out.append(signals(c["signal"]))
+    if c["network"] is not None:
+        out.append(network(c["network"]))
     out += unknown(c["extra"])
     out.append(form(c))
     for f in c["frames"]:
@@ -343,7 +352,7 @@ def content(**changes):
         "minor": 0, "provenance": [], "mesh": {"vertices": 4, "faces": [[0, 1, 2], [0, 2, 3]]}, "texture": None,
         "labels": None, "asset": None, "selection": None, "links": None, "anchors": None,
         "reference": {"name": "rest", "positions": POINTS[:4]}, "skeleton": None, "correspondence": None,
-        "patches": None, "rig": None, "map": None, "signal": None,
+        "patches": None, "rig": None, "map": None, "signal": None, "network": None,
         "kind": "vertices", "precision": 8, "count": 4, "extra": [],
         "frames": [pose("pose1", BENT[:4])], "tail": [],
     }
@@ -504,6 +513,22 @@ def signal_content(**changes):
     return content(frames=[], signal=s)
 
 
+def network_content(counts=(), **changes):
+    """Two triangles, one coordinate, one layer of one: 2 numbers of the output, 12 of the gates; training goes on."""
+    c = {"model": 1, "direction": 0, "mesh_digest": f"{digest(content()['mesh']):016x}", "data_digest": "0123456789abcdef", "vertices": 4,
+         "parts": 1, "width": 9, "numbers": 1, "rank": 1, "layers": 1, "hidden": 1, "convolutions": 0, "uncertain": 0, "sets": 1,
+         "parameters": 14, "seed": 7, "frames": 32, "iterations": 300, "step": 2, "windows": 8, "open": 1, "phase": 0,
+         "best_iteration": 200}
+    c.update(counts)
+    features, p = c["vertices"] * c["width"], c["sets"] * c["parameters"]
+    n = {"counts": c, "numbers": [0.5, 2.5, -1, -2, 1, 2, 0.125, 0.01, 0.8], "errors": [-1.0] * 29 + [1.5], "mean": [0.25] * features,
+         "scale": [1.5, 0.5], "range": [-1, 1], "regression": [0.5] * 10 if c["model"] == 1 else [], "root": [0.0] * 17 + [1.0],
+         "parameters": [0.5] * p, "basis": [1.0] + [0.0] * (c["rank"] * features - 1), "moments": [0.25] * (2 * p if c["open"] else 0),
+         "best": [0.75] * (p if c["open"] else 0)}
+    n.update(changes)
+    return content(frames=[], network=n)
+
+
 NOTE = {"tag": "XNOT", "flags": COPY_SAFE, "payload": b"copied".hex()}
 FUTURE = {"tag": "X 1 ", "flags": COPY_SAFE | 0xABCD0000, "payload": bytes(range(8)).hex()}
 DROPPED = {"tag": "XTMP", "flags": 0, "payload": b"a filter drops this".hex()}
@@ -554,6 +579,7 @@ def golden():
         "turns": ("a skeleton whose frame says how its joints have turned", skeleton_content(TURNED)),
         "map": ("two transforms, half of a quad each", map_content()),
         "signal": ("three frames as signals", signal_content()),
+        "network": ("a network whose training goes on", network_content()),
         "rig": ("three bones that move the vertices of two triangles: their skin, and a map with two bones a corner",
                 bone_map_content()),
         "features": ("9 numbers for each vertex", feature_content()),
@@ -980,6 +1006,28 @@ def reject_attachments():
         "map-of-bones-corner-bone": patched(b, "MAP ", -4, u32(3)),
         "map-of-bones-corner-zero": whole(dict(b, map=dict(b["map"], corners=[[0, 0, 0, 0]] * 12))),
         "map-of-bones-held-twice": whole(dict(b, map=dict(b["map"], held=[1, 1]))),
+        "netw-cut": lie(network_content(), "NETW", payload=lambda record: record.payload[:-8]),
+        "netw-long": lie(network_content(), "NETW", payload=lambda record: record.payload + bytes(8)),
+        "netw-model-5": patched(network_content({"model": 4, "numbers": 36}), "NETW", 0, u64(5)),
+        "netw-direction-3": patched(network_content(), "NETW", 8, u64(3)),
+        "netw-other-mesh": patched(network_content(), "NETW", 16, u64(1)),
+        "netw-width-10": whole(network_content({"width": 10})),
+        "netw-numbers": patched(network_content(), "NETW", 56, u64(2)),
+        "netw-rank-2-32": patched(network_content(), "NETW", 64, u64(1 << 32)),
+        "netw-rank-2-63": patched(network_content(), "NETW", 64, u64(1 << 63)),
+        "netw-uncertain": whole(network_content({"uncertain": 1})),
+        "netw-uncertain-2": patched(network_content({"model": 4, "numbers": 36}), "NETW", 96, u64(2)),
+        "netw-sets-2": whole(network_content({"sets": 2})),
+        "netw-parameters-2-62": patched(network_content(), "NETW", 112, u64(1 << 62)),
+        "netw-step-0": patched(network_content(), "NETW", 144, u64(0)),
+        "netw-open-2": patched(network_content(), "NETW", 160, u64(2)),
+        "netw-phase-2": patched(network_content(), "NETW", 168, u64(2)),
+        "netw-diagonal-0": whole(network_content(numbers=[0.5, 0, -1, -2, 1, 2, 0.125, 0.01, 0.8])),
+        "netw-range-empty": whole(network_content(numbers=[0.5, 2.5, 1, -2, 1, 2, 0.125, 0.01, 0.8])),
+        "netw-scale-0": whole(network_content(scale=[1.5, 0])),
+        "netw-coordinates-empty": whole(network_content(range=[1, -1])),
+        "netw-parameter-nan": whole(network_content(parameters=[NAN] * 14)),
+        "netw-before-mesh": whole(content(), [network(network_content()["network"])] + records_of(content())),
         "sign-cut": lie(signal_content(), "SIGN", payload=lambda record: record.payload[:-8]),
         "sign-long": lie(signal_content(), "SIGN", payload=lambda record: record.payload + bytes(8)),
         "sign-frames-2-31": patched(signal_content(), "SIGN", 0, u64(1 << 31)),

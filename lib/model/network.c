@@ -33,13 +33,13 @@ int vg_network_fits(const vg_network *n, const vg_mesh *m, const char *subject, 
 static const char *refuse_sizes(const vg_network *n)
 {
     bool linear = n->model == VG_NETWORK_AUTO || n->model == VG_NETWORK_PCA;
-    if ((unsigned)n->model > VG_NETWORK_CONV) return "a kind of network that does not exist";
-    if ((unsigned)n->direction > VG_FORWARD) return "a direction that does not exist";
-    if (n->width != 9 && n->width != 12) return "features are 9 or 12 numbers";
+    if ((unsigned)n->model > VG_NETWORK_CONV) return "its model is not known";
+    if ((unsigned)n->direction > VG_FORWARD) return "its direction is not known";
+    if (n->width != 9 && n->width != 12) return "its features are not 9 or 12 numbers";
     if (!n->rank || !n->parts || !n->step) return "a count is 0";
-    if (n->numbers != (linear ? n->rank : n->nv * n->width)) return "frames have another number of numbers";
-    if (n->sets != (n->direction == VG_SEPARATE ? 2 : 1)) return "another number of sets of weights";
-    return linear && n->uncertain ? "coordinates have no variance" : NULL;
+    if (n->numbers != (linear ? n->rank : n->nv * n->width)) return "its frames have a wrong number of numbers";
+    if (n->sets != (n->direction == VG_SEPARATE ? 2 : 1)) return "its sets of parameters do not suit its direction";
+    return linear && n->uncertain ? "a network of coordinates has no variance" : NULL;
 }
 
 static const char *refuse_numbers(const vg_network *n)
@@ -51,7 +51,7 @@ static const char *refuse_numbers(const vg_network *n)
         if (!(n->scale[i] > 0)) return "a scale is not above 0";
     for (size_t i = 0; i < n->rank; i++)
         if (!(n->range[i] <= n->range[n->rank + i])) return "a range of coordinates is empty";
-    return n->phase > 1 ? "a phase of training that does not exist" : NULL;
+    return n->phase > 1 ? "its phase of training is not known" : NULL;
 }
 
 int vgi_check_network(vg_head *h, void *artefact, const char *where, vg_err *e)
