@@ -28,7 +28,7 @@ static void check_form(const vg_head *h)
         cli_stop(VG_EINPUT, "the input has no reference pose, which features are measured against");
 }
 
-/* Centroids where the reference pose has them, for frames that do not say. */
+/* The centroids of the reference pose, for frames without centroids. */
 static void measure_rest(work *w, const vg_head *h)
 {
     vg_err e;
@@ -70,7 +70,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
 
 /* ---- frames ---- */
 
-/* A channel of this name and of any other shape stops the program. */
+/* NULL: the frame has no such channel; one of another shape stops the program. */
 static const double *find(const vg_frame *f, const char *name, size_t width, size_t count)
 {
     const vg_channel *c = vg_frame_channel(f, name);
@@ -81,7 +81,7 @@ static const double *find(const vg_frame *f, const char *name, size_t width, siz
     return c->numbers;
 }
 
-/* Learners do not keep quaternions at length 1. NULL: not turned. */
+/* Normalise: learners do not keep quaternions at length 1. NULL: no rotation. */
 static const double *find_root(const vg_frame *f, double unit[4])
 {
     const double *q = find(f, FEATURES_ROOT, 4, 1);

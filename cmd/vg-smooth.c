@@ -1,5 +1,5 @@
-/* vg-smooth: take noise out of a sequence: by filters in time, or by what moves together.
- * Leaves out the filters (lib/signal).
+/* vg-smooth: remove noise from a sequence, by filters in time or by what neighbouring vertices have in common. The
+ * filters are in lib/signal.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "batch.h"
 
@@ -47,10 +47,10 @@ static const cli_program program = {
 
 typedef struct timing {
     const vg_head *h;
-    vg_smoother *smoother; /* made when the second frame has told the time between frames */
-    vg_frame first;        /* it waits for that */
+    vg_smoother *smoother; /* made once the second frame gives the time step */
+    vg_frame first;        /* held until then */
     bool begun;            /* a frame has come */
-    double step, last;     /* seconds between frames, of the last frame; step 0: frames have no times */
+    double step, last;     /* seconds between frames (0: frames have no times); time of the last frame */
     vg_frame *label;       /* ring: what goes with the frames of the window */
     size_t places, put, given;
 } timing;
@@ -90,11 +90,11 @@ static void write_ready(timing *t)
     }
 }
 
-/* The frame goes into the ring by exchange, so that its arrays are used again. */
+/* Swap the frame into the ring, so that its arrays are used again. */
 static void add_frame(timing *t, vg_frame *f)
 {
     vg_frame *place = &t->label[t->put % t->places], old = *place;
-    vg_frame_drop_all(f); /* what came with the vertices is not true of where they go */
+    vg_frame_drop_all(f); /* the channels belong to the vertices before filtering */
     vg_smoother_add(t->smoother, f->values);
     *place = *f, *f = old;
     t->put++;
@@ -134,7 +134,7 @@ static void finish_in_time(void *context)
 {
     timing *t = context;
     if (!t->begun) return;
-    if (!t->smoother) { /* one frame: nothing to filter, but the options are looked at */
+    if (!t->smoother) { /* one frame: nothing to filter, but check the options */
         make_smoother(t, 0);
         add_frame(t, &t->first);
     }

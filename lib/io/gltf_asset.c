@@ -34,7 +34,7 @@ static int add_view(packing *k, size_t start, int target, size_t stride, size_t 
     return r;
 }
 
-/* Its elements one after the other, those of vertices each on a multiple of 4. */
+/* Write the elements contiguously; those of vertices start at multiples of 4. */
 static int put_elements(packing *k, const vgi_accessor *a, bool vertices, size_t *stride, vg_err *e)
 {
     static const unsigned char zeros[64];
@@ -81,7 +81,7 @@ static int move_accessor(packing *k, vgi_json *holder, const char *key, int targ
     return r < 0 ? r : 1;
 }
 
-/* All members of an object that are such references; those that cannot be copied are dropped. */
+/* Move all members that refer to accessors; drop those that cannot be copied. */
 static int move_accessors(packing *k, vgi_json *holder, int target, size_t count, vg_err *e)
 {
     for (const char *key = vgi_json_key(holder, NULL), *next; key; key = next) {
@@ -116,7 +116,7 @@ int vgi_gltf_embed(packing *k, vgi_json *image, const unsigned char *p, size_t n
     return r;
 }
 
-/* An image that is not to be had stays where the file says that it is. */
+/* An image that cannot be read keeps its URI. */
 static int embed_beside(packing *k, vgi_json *image, const char *uri, vg_err *e)
 {
     vg_bytes bytes = {0};
@@ -303,7 +303,7 @@ void vgi_gltf_pack_clear(packing *k)
     vg_bytes_clear(&k->data);
 }
 
-/* Is there more than the mesh itself has: faces, positions, the first texture coordinates, as many vertices? */
+/* Does the file hold more than faces, positions, the first texture coordinates and the vertices of the mesh? */
 static bool has_more(const vgi_gltf_scene *x, const vg_mesh *mesh)
 {
     static const char *const lists[] = {"materials", "skins", "cameras", "images"};

@@ -1,12 +1,13 @@
-/* gltf_character.c: a character of glTF in other poses than its own: where its vertices and normals are, in the space of
- * its meshes.
- * Leaves out how it is read and packed (gltf_asset.c) and what is written (gltf_morph.c, gltf_cast.c).
+/* gltf_character.c: a glTF character in other poses than its own: positions and normals of its vertices, in the space
+ * of its meshes. Reading and packing are in gltf_asset.c, writing in gltf_morph.c and gltf_cast.c.
  *
- * A vertex at p goes into the world as M p, where M is the matrix of its node, or the mean of those of its joints. A pose of
- * the mesh comes back by the inverse of M at rest: skin, nodes and morph targets together then show the pose.
+ * A vertex at p is shown at M p, where M is the matrix of its node, or the weighted mean of the matrices of its
+ * joints. A pose is taken back into the space of the mesh by the inverse of M at rest: skin, nodes and morph targets
+ * together then show the pose.
  *
- * Normals keep what their artist made of them: each is turned as the normal of the faces around it turns. Vertices that
- * are one in the mesh and have the same normal share these faces, so that edges stay hard and seams stay smooth.
+ * Normals keep their artist's shading: each is rotated by the rotation of the normal of the adjacent faces.
+ * Vertices that are one vertex of the mesh and have equal normals share these faces, so that edges stay hard and
+ * seams stay smooth.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_character.h"
 #include "numeric/vec3.h"
@@ -26,7 +27,7 @@ static void linear_transposed(const double m[12], const double p[3], double to[3
     for (int i = 0; i < 3; i++) to[i] = m[i] * p[0] + m[4 + i] * p[1] + m[8 + i] * p[2];
 }
 
-/* false: it flattens space. */
+/* false: the matrix is singular */
 static bool invert(const double m[12], double to[12])
 {
     const double a[9] = {m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, shift[3] = {m[3], m[7], m[11]};
@@ -60,7 +61,7 @@ static void turn(const double a[3], const double b[3], const double x[3], double
 
 /* ---- where the vertices are ---- */
 
-/* 1; 0: a node or skin flattens a part. */
+/* 1; 0: the matrix of a node or skin is singular */
 static int place(vgi_gltf_character *c, vg_err *e)
 {
     const vgi_gltf_scene *x = &c->scene;
@@ -102,7 +103,7 @@ static bool shows(const vgi_gltf_character *c, const vg_body *b)
     return true;
 }
 
-/* Positions of the file itself where they are right. */
+/* Keep the positions of the file if it shows the reference pose. */
 static int find_base(vgi_gltf_character *c, const vg_body *b, vg_err *e)
 {
     if (!(c->base = vgi_array_raw(c->n, 3 * sizeof *c->base, e))) return VG_ENOMEM;
@@ -125,7 +126,7 @@ static int find_base(vgi_gltf_character *c, const vg_body *b, vg_err *e)
 
 /* ---- normals ---- */
 
-/* A skin takes normals by M itself, as all viewers do; a node by the transpose of its inverse. */
+/* A skin transforms normals by M itself, as all viewers do; a node by the inverse transpose. */
 static void normal_out(const vgi_gltf_character *c, size_t f, const double n[3], double to[3])
 {
     if (c->skinned[f]) linear(c->out + 12 * f, n, to);
@@ -183,7 +184,7 @@ static int group_normals(vgi_gltf_character *c, vg_err *e)
     return r;
 }
 
-/* Each face says its normal to the groups at its corners, by its angle there. */
+/* Sum the normals of the faces at the corners of each group, weighted by the angle there. */
 static void face_normals(const vgi_gltf_character *c, const double *world, double *to)
 {
     const vg_mesh *m = &c->faces.mesh;
@@ -235,7 +236,7 @@ void vgi_gltf_character_turn(vgi_gltf_character *c, const double *world, float *
     }
 }
 
-/* Normals of another reference pose than the file shows. */
+/* Rotate the normals from the pose that the file shows to the reference pose. */
 static int turn_base(vgi_gltf_character *c, const vg_body *b, vg_err *e)
 {
     double *shown = vgi_array(c->nv, 3 * sizeof *shown, e), at[3];

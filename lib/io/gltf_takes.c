@@ -13,14 +13,14 @@ static bool same_stem(const char *a, const char *b, size_t n)
     return n && vg_frame_stem(a, &number) == n && vg_frame_stem(b, &number) == n && !memcmp(a, b, n);
 }
 
-/* Is frame i the first of an animation, by the names? Their numbers count from 1. */
+/* Does frame i begin an animation, by its name? Numbers count from 1. */
 static bool begins(const vgi_gltf_writing *w, size_t i)
 {
     uint64_t number;
     return i == 0 || (vg_frame_stem(w->names.at[i], &number) && number == 1);
 }
 
-/* Can the names be taken so: from 1 on, one after the other, more than one frame each? */
+/* Do the names number the frames of each animation from 1 without gaps, with more than one frame each? */
 static bool are_counted(const vgi_gltf_writing *w)
 {
     for (size_t i = 0, first = 0; i < w->frames; i++) {
@@ -102,7 +102,7 @@ int vgi_gltf_emit_times(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-/* What it is to be called, or else what its frames are called after, or else a word. */
+/* The name given by the caller, or the stem of the frame names, or "sequence". */
 int vgi_gltf_say_take_name(vgi_gltf_writing *w, const vgi_gltf_take *t, vg_err *e)
 {
     if (w->clip) return vgi_gltf_say_text(&w->json, w->clip, e);

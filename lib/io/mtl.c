@@ -16,7 +16,7 @@ typedef struct making {
 
 /* ---- images ---- */
 
-/* As the file names it, or else under its own name beside: paths are often those of another machine. */
+/* By the name in the file, or by its last part beside the file: paths are often those of another machine. */
 static int read_image(making *k, const char *name, vg_bytes *to)
 {
     const char *base = name;
@@ -27,7 +27,7 @@ static int read_image(making *k, const char *name, vg_bytes *to)
     return base == name ? VG_EINPUT : vgi_gltf_read_beside(k->pack.g, k->pack.in, base, to, NULL);
 }
 
-/* The number of the texture with this image; -1: it is not to be had. */
+/* The number of the texture with this image; -1: it cannot be read. */
 static int find_texture(making *k, const char *name, int *number, vg_err *e)
 {
     vg_bytes bytes = {0};
@@ -52,7 +52,7 @@ static int find_texture(making *k, const char *name, int *number, vg_err *e)
     return r;
 }
 
-/* "map_Kd -s 1 1 1 cloth.png": what stands behind the options; names with blanks are those without options. */
+/* "map_Kd -s 1 1 1 cloth.png": the name follows the options; a name may hold blanks if there are no options. */
 static char *image_name(const vgi_line *l, vg_err *e)
 {
     const char *at = l->at[0].end, *begin = l->at[1].begin, *end = l->end;
@@ -102,7 +102,7 @@ static int begin_material(making *k, const vgi_line *l, vg_err *e)
     return r;
 }
 
-/* The factor of a colour, whose last number is how much light it stops. */
+/* Set the base colour and its opacity, either of which may be NULL. */
 static int put_colour(making *k, const double *rgb, const double *alpha, vg_err *e)
 {
     static const char key[] = "baseColorFactor";

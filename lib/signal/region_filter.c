@@ -9,7 +9,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { AFFINE = 4, FEWEST = 8, ROUNDS = 20, BLOCK = 16 }; /* rank of a region that moves affinely; frames */
+enum { AFFINE = 4, FEWEST = 8, ROUNDS = 20, BLOCK = 16 }; /* rank of a region that moves affinely; fewest frames;
+                                                             rounds of the search for the noise; frames of a block */
 
 struct vg_region_filter {
     size_t nv, nregions, nframes;
@@ -34,7 +35,7 @@ void vg_region_filter_free(vg_region_filter **out)
     *out = NULL;
 }
 
-/* of vertex i of a region: it knows most about its middle */
+/* weight of vertex i of a region: largest at its centre */
 static double weight_of(const vgi_region *p, size_t i)
 {
     return 1 - 0.8 * (double)i / (double)p->n;
@@ -75,7 +76,7 @@ typedef struct looking {
     double origin[BLOCK][3]; /* the centroid of each frame */
 } looking;
 
-/* three rows of a region's matrix: x, y and z of its vertices in a frame, from the origin */
+/* three rows of a region's matrix: x, y and z of its vertices in a frame, relative to the origin */
 static void gather(const vgi_region *p, const double *vertices, const double origin[3], double *rows)
 {
     for (size_t i = 0; i < p->n; i++)
@@ -107,8 +108,9 @@ void vg_region_filter_look(vg_region_filter *r, size_t n, const double *const *v
 
 /* ---- what a region keeps ---- */
 
-/* The noise (variance) is what is left outside of the rank, for each degree of freedom there; the rank is how many
- * singular values noise alone would not give. Begun at the rank of an affine motion, until both agree. */
+/* The variance of the noise is the residual outside the rank, per degree of freedom there; the rank is the number
+ * of singular values above those of noise alone. Starts at the rank of an affine motion and repeats until both
+ * agree. */
 static double find_noise(size_t rows, size_t n, const double *square)
 {
     double variance = 0, spread = sqrt((double)rows) + sqrt((double)n);
@@ -154,7 +156,7 @@ static int learn_region(vg_region_filter *r, size_t i, double *values, double *v
     size_t n = r->region[i].n, rows = 3 * r->nframes;
     double *filter = r->matrices + r->matrix[i];
     r->noise[i] = -1;
-    if (n < 2 * AFFINE) { /* too few to tell noise from motion */
+    if (n < 2 * AFFINE) { /* too few vertices to separate noise from motion */
         keep_all(n, filter);
         return VG_OK;
     }
@@ -169,7 +171,7 @@ static int learn_region(vg_region_filter *r, size_t i, double *values, double *v
 int vg_region_filter_learn(vg_region_filter *r, vg_err *e)
 {
     if (r->nframes < FEWEST)
-        return vg_fail(e, VG_EINPUT, "there are %zu frames: what moves together is told from noise in %d or more",
+        return vg_fail(e, VG_EINPUT, "%zu frames are too few to separate motion from noise: at least %d are needed",
                        r->nframes, FEWEST);
     double *room = vgi_array_raw(2 * VGI_REGION * VGI_REGION + VGI_REGION, sizeof *room, e);
     double *values = room, *vectors = room + VGI_REGION;

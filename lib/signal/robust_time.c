@@ -1,5 +1,5 @@
-/* robust_time.c: the value in the middle of a parabola through the places of a point in time, which places far from it
- * do not influence: least squares, repeated with weights (Cleveland 1979).
+/* robust_time.c: the value at the middle of a parabola through the positions of a point in time, insensitive to
+ * outliers: least squares repeated with weights (Cleveland 1979).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/smooth.h"
 #include "numeric/stats.h"
@@ -27,7 +27,7 @@ static void fit_parabola(track *t)
             for (size_t c = 0; c < t->width; c++) right[k][c] += t->weight[j] * x[k] * t->place[j][c];
     }
     double det = vgi_cofactors(a, inverse);
-    if (!(det > 0)) return; /* fewer than three places have weight: the former parabola stays */
+    if (!(det > 0)) return; /* fewer than three positions have weight: keep the previous parabola */
     for (size_t k = 0; k < TERMS; k++)
         for (size_t c = 0; c < t->width; c++) {
             t->coefficient[k][c] = 0;
@@ -68,7 +68,7 @@ static void weigh_again(track *t, bool bisquare)
     }
 }
 
-/* Least squares, least absolute distances, bisquare. It ends early where nothing is left over. */
+/* Least squares, then least absolute distances, then bisquare weights. Stops early when the residual is zero. */
 static void follow(track *t)
 {
     for (size_t j = 0; j < t->n; j++) t->weight[j] = 1;

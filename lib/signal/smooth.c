@@ -1,5 +1,5 @@
-/* smooth.c: a window of frames that moves along a sequence: rigid motion and pose apart, each by its filter in time.
- * Leaves out the filters (weights.c, robust_time.c).
+/* smooth.c: a moving window of frames; rigid motion and pose are filtered separately. The filters are in weights.c
+ * and robust_time.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/smooth.h"
 #include "numeric/turn.h"
@@ -19,7 +19,7 @@ struct vg_smoother {
     double *window;           /* places x (ROOT + 3 nv): root, then the pose without it */
     double *weight;           /* places */
     const double **frame;     /* places: the frames of a window, in order */
-    size_t known, given;      /* frames that have come, and gone */
+    size_t known, given;      /* frames added, frames given back */
     bool ended;
 };
 
@@ -70,7 +70,7 @@ size_t vg_smoother_reach(const vg_smoother *s)
 
 /* ---- rigid motion and pose ---- */
 
-/* What the reference leaves open (the rotation about a line of points) is as in the frame before. */
+/* If the reference does not determine the rotation (points on a line), the previous frame's is kept. */
 static void find_turn(const vg_smoother *s, const double *vertices, const double *before, double root[ROOT])
 {
     double b[9] = {0}, size = 0, same = 0;
@@ -111,7 +111,7 @@ typedef struct filtering {
     const vg_smoother *s;
     const vgi_time_filter *t;
     size_t lo, n, at; /* window; the frame's place in it */
-    size_t first, width, numbers; /* of a frame: from here, points of so many numbers, so many numbers in all */
+    size_t first, width, numbers; /* of a frame: first number, numbers per point, total */
     double *out;
 } filtering;
 
@@ -133,7 +133,7 @@ static void filter_chunk(void *context, size_t task)
     }
 }
 
-/* numbers of frame `given`, from `first` on, through one filter */
+/* apply one filter to the numbers of frame `given` that begin at `first` */
 static void filter_part(vg_smoother *s, const vgi_time_filter *t, size_t first, size_t width, size_t numbers, double *out)
 {
     filtering f = {.s = s, .t = t, .first = first, .width = width, .numbers = numbers, .out = out};
@@ -147,7 +147,7 @@ static void filter_part(vg_smoother *s, const vgi_time_filter *t, size_t first, 
 bool vg_smoother_next(vg_smoother *s, double *vertices)
 {
     double root[ROOT], m[9], length = 0;
-    /* the first frames wait until the window is full, for near the start they need all of it */
+    /* the first frames wait until the window is full: near the start they depend on all of it */
     size_t needs = s->given + s->reach + 1 > s->places ? s->given + s->reach + 1 : s->places;
     if (s->given == s->known || (!s->ended && s->known < needs)) return false;
     filter_part(s, &s->root, 0, 4, 4, root);

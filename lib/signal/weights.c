@@ -8,7 +8,7 @@
 #include <stdlib.h>
 
 enum { DEGREE = 3 };
-static const double negligible = 1e-7; /* weights of the low-pass from here on are left out */
+static const double negligible = 1e-7; /* weights of the low-pass below this are dropped */
 
 /* The impulse response of the biquad: a Butterworth low-pass of second order whose amplitude after two passes is
  * 1/sqrt(2) at `frequency` (cycles a frame). */
@@ -67,8 +67,8 @@ void vgi_time_window(const vgi_time_filter *t, size_t i, size_t known, bool ende
     *n = known - *lo < width ? known - *lo : width;
 }
 
-/* Frame i + offset as weights of the frames that are there: each reflection in an end takes 2 of the end frame and turns
- * the sign. */
+/* Adds a frame beyond the ends as weights of existing frames: each reflection in an end adds twice the end frame
+ * and changes the sign. */
 static void add_reflected(ptrdiff_t at, ptrdiff_t end, double w, size_t lo, double *weight)
 {
     while (at < 0 || at > end) {

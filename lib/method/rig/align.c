@@ -11,7 +11,8 @@
 
 static const uint32_t NONE = UINT32_MAX;
 static const double APART = 20, ALIKE = 10;
-static const double LONG = 0.1; /* a bone of no known part is a limb from this share of the skeleton's diagonal on */
+static const double LONG = 0.1; /* a bone of unknown part counts as a limb from this share of the skeleton's
+                                   diagonal on */
 
 int vgi_rests_new(vgi_rests *x, const vg_skeleton *of, const vg_skeleton *by, const uint32_t *from, vg_err *e)
 {
@@ -47,7 +48,7 @@ uint32_t vgi_find_role(const vg_skeleton *s, const vgi_role *roles, vgi_part par
     return NONE;
 }
 
-/* From the first joint of a limb to the first of what follows it. */
+/* From the first joint of a limb to the first joint of the next part. */
 static bool span_limb(const vg_skeleton *s, const vgi_role *roles, const double *positions, vgi_role limb,
                       double d[3])
 {
@@ -123,7 +124,7 @@ static double degrees_between(const double a[3], const double b[3])
     return acos(fmax(-1, fmin(1, vgi_dot(a, b)))) * (180 / M_PI);
 }
 
-/* How well directions agree once ours are turned by q: the sum of cosines. */
+/* Agreement of the directions after rotating ours by q: the sum of cosines. */
 static double agreement(const directions *d, const double q[4])
 {
     double m[9], sum = 0;
@@ -134,7 +135,7 @@ static double agreement(const directions *d, const double q[4])
 
 /* ---- which, and how ---- */
 
-/* By how many degrees joint j rests apart when it is a limb; 0: it is none. */
+/* The angle in degrees between the rest directions of joint j if it is a limb; 0 otherwise. */
 static double limb_apart(const vgi_rests *x, size_t j, double shortest)
 {
     if (x->from[j] == NONE) return 0;

@@ -1,8 +1,7 @@
-/* feet.c: feet that stand are kept from sliding: when the heel or the ball of a foot hardly moves and is low, it is held
- * where it is, and thigh and shin bend so that the foot gets there. Between two stands the correction goes over
- * smoothly. The foot keeps its turn, the rest of the body its motion, except that the body is lowered where a leg would
- * be too short.
- * Leaves out how a rig is driven (drive.c).
+/* feet.c: keeps standing feet from sliding. While the heel or the ball of a foot hardly moves and is low, it is
+ * held in place, and thigh and shin bend so that the foot reaches it. Between two stands the correction changes
+ * smoothly. The foot keeps its rotation and the body its motion, except that the body is lowered where a leg would
+ * be too short. Driving a rig is in drive.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/align.h"
 #include "numeric/stats.h"
@@ -13,20 +12,20 @@
 #include <stdlib.h>
 
 static const uint32_t NONE = UINT32_MAX;
-static const double SLOW = 0.15;    /* of a joint's fast speed, from which it no longer stands */
-static const double LOW = 0.12;     /* of the leg's length, above the joint's lowest place */
-static const double STRETCH = 0.999; /* of thigh and shin together, to which a leg is straightened */
+static const double SLOW = 0.15;    /* a joint stands below this share of its fast speed */
+static const double LOW = 0.12;     /* and below this height above its lowest position, in lengths of the leg */
+static const double STRETCH = 0.999; /* largest distance from hip to foot, in lengths of the leg */
 enum { SHORTEST = 3 };              /* poses of a stand */
 
 typedef enum group { BODY = 0, THIGH, SHIN, FOOT } group;
 
 /* One leg: joints; of each bone what it moves with; of each pose where the correction takes the foot. */
 typedef struct leg {
-    uint32_t thigh, shin, foot, toe; /* toe: NONE, or its joint */
+    uint32_t thigh, shin, foot, toe; /* NONE if there is no toe */
     uint8_t *group;                  /* of each bone */
     double length[2];                /* of thigh and shin */
     double *shift;                   /* 3 numbers a pose */
-    bool *known;                     /* of each pose: it is held; between, the shift is interpolated */
+    bool *known;                     /* per pose: whether the foot is held; elsewhere the shift is interpolated */
 } leg;
 
 typedef struct feet {
@@ -40,7 +39,7 @@ typedef struct feet {
     double *path;  /* 3 numbers a pose: of the joint in hand */
     bool *stands;  /* of each pose: of the joint in hand */
     double *speed; /* of each pose */
-    double *lower; /* of each pose: by how much the body goes down */
+    double *lower; /* per pose: how far the body is lowered */
 } feet;
 
 static size_t bone_of(const vg_rig *r, uint32_t joint)
@@ -71,7 +70,7 @@ static double rest_distance(const vg_rig *r, uint32_t a, uint32_t b)
     return vgi_length(d);
 }
 
-/* The leg of a side; false: the rig has none there. */
+/* Find the leg of a side; false: the rig has none. */
 static bool find_leg(const vg_rig *r, const vgi_role *roles, int side, leg *l)
 {
     uint32_t *joint[4] = {&l->thigh, &l->shin, &l->foot, &l->toe};
@@ -163,7 +162,8 @@ static void find_stands(feet *f, uint32_t joint, double leg_length)
 
 /* ---- where the foot goes ---- */
 
-/* A stand from pose i to end: where the foot is held already, the joint is held there, too; else in its mean place. */
+/* A stand from pose i to end. If the foot is held already the joint keeps that position; otherwise it is held at
+ * its mean position. */
 static void hold_stand(const feet *f, leg *l, size_t i, size_t end)
 {
     double place[3] = {0, 0, 0};
@@ -190,7 +190,7 @@ static void hold_joint(feet *f, leg *l, uint32_t joint)
     }
 }
 
-/* From the last held pose (a) to the next one (b), smoothly. */
+/* Interpolate smoothly from the last held pose a to the next one b. */
 static void fill_between(leg *l, size_t a, size_t b)
 {
     for (size_t p = a + 1; p < b; p++) {
@@ -227,7 +227,7 @@ static double lower_by(const feet *f, const leg *l, size_t p)
     return fabs(d[f->up]) - sqrt(reach * reach - flat);
 }
 
-/* The least smooth curve above what the legs need: the largest need nearby, then its mean over the same stretch. */
+/* A smooth curve above the need of the legs: the running maximum, then its running mean. */
 static void lower_body(feet *f)
 {
     enum { NEAR = 4 };
@@ -249,7 +249,7 @@ static void lower_body(feet *f)
 
 /* ---- bending ---- */
 
-/* Turn a bone's transform by q, so that what was at `from` is at `to`. */
+/* Rotate a bone's transform by q and move the point `from` to `to`. */
 static void move_bone(double *t, const double q[4], const double from[3], const double to[3])
 {
     double d[3], turned[3];
@@ -259,8 +259,8 @@ static void move_bone(double *t, const double q[4], const double from[3], const 
     vg_quat_multiply(q, t, t);
 }
 
-/* Where the knee goes when the foot goes to `foot`, as near to `foot` as the leg reaches, which is where it ends. The knee
- * stays on the side to which it is bent; `forward` says which that is of a straight leg. */
+/* The position of the knee for a foot at `foot`, which is first moved within reach of the leg. The knee stays on
+ * the side to which it is bent; `forward` decides for a straight leg. */
 static void place_knee(const leg *l, const double hip[3], const double knee[3], const double before[3],
                        const double forward[3], double foot[3], double now[3])
 {
