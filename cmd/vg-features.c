@@ -1,7 +1,7 @@
 /* vg-features: measure poses as features, which learners take and vg-solve takes back.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "batch.h"
-#include "features.h"
+#include "solve_features.h"
 
 #include <math.h>
 #include <stdlib.h>

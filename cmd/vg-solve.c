@@ -1,7 +1,7 @@
 /* vg-solve: reconstruct vertices from vectors or features, one factorisation for all poses.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "batch.h"
-#include "features.h"
+#include "solve_features.h"
 
 #include <stdlib.h>
 #include <string.h>

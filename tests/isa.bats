@@ -61,6 +61,7 @@ answers() {
         done
         VG_ISA=$set vg-diff --json "solved-$set-1.vgs" walk.vgs >"apart-$set.json" || true
     done
+    # shellcheck disable=SC2046 # each set is a word
     python3 - $(sets) <<'PY'
 import json, sys
 def numbers(x):

@@ -34,7 +34,9 @@ END
 fits_like() {
     local signal=$1 tolerance=$2 k=$3 l=$4 m=$5
     must vg-fitsignal -q --report - --json --tolerance "$tolerance" "$signal" -o out.signal
-    within "$(value control_points)" "$k" 2 && within "$(value sites)" "$l" 2 && within "$(value coordinates)" "$m" 2 || fail "$output"
+    if ! within "$(value control_points)" "$k" 2 || ! within "$(value sites)" "$l" 2 || ! within "$(value coordinates)" "$m" 2; then
+        fail "$output"
+    fi
     python3 -c "import sys; sys.exit(not $(value error) <= $tolerance)" || fail "$output"
 }
 

@@ -27,7 +27,8 @@ enum {
 #define VGI_GLTF_FACES "vg_faces"
 #define VGI_GLTF_FRAMES "vg_frames"
 /* And which vertices are copies, for the sake of texture coordinates: the number of those that are none, which come first,
- * and of each copy the vertex that it is. */
+ * and of each copy the vertex that it is. In the extras of the asset of a character: the number of vertices, and of
+ * each vertex of the file the one that it is; there only if vertices that are not one lie on one another at rest. */
 #define VGI_GLTF_VERTICES "vg_vertices"
 
 typedef struct vgi_gltf_buffer {

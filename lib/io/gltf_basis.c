@@ -185,6 +185,21 @@ static void finish(making *k)
     }
 }
 
+static bool are_finite(const float *x, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(x[i])) return false;
+    return true;
+}
+
+/* Sums of displacements near the limit of binary32 overflow. */
+static int check(const making *k, vg_err *e)
+{
+    const vgi_gltf_basis *b = k->to;
+    if (are_finite(b->targets, b->n * k->width) && are_finite(b->weights, b->n * k->in->frames)) return VG_OK;
+    return vg_fail(e, VG_EINPUT, "the frames are too large to be mixed in binary32");
+}
+
 static int make_all(making *k, size_t most, vg_err *e)
 {
     k->gram = vgi_array(k->rows, k->rows * sizeof *k->gram, e);
@@ -201,8 +216,9 @@ static int make_all(making *k, size_t most, vg_err *e)
     r = make_directions(k, e);
     if (r == VG_OK) r = project(k, e);
     if (r == VG_OK) r = choose(k, e);
-    if (r == VG_OK) finish(k);
-    return r;
+    if (r < 0) return r;
+    finish(k);
+    return check(k, e);
 }
 
 int vgi_gltf_basis_make(vgi_gltf_basis *b, const vgi_gltf_frames_in *in, size_t most, double tolerance, vg_err *e)

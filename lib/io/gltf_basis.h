@@ -22,7 +22,8 @@ typedef struct vgi_gltf_frames_in {
 
 /* vgi_gltf_basis_make: the leading left and right singular vectors of the matrix of all frames, as many as bring the error
  * to `tolerance` (mesh units), but no more than `most`. At most 2048 frames, evenly spread, say what the targets are; all
- * are met as well as these can. Memory: n and a few more targets, and 2048 x 2048 numbers. */
+ * are met as well as these can. Memory: n and a few more targets, and 2048 x 2048 numbers.
+ * VG_EINPUT: the frames are too large for sums in binary32. */
 int vgi_gltf_basis_make(vgi_gltf_basis *b, const vgi_gltf_frames_in *in, size_t most, double tolerance,
                         vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_basis_clear(vgi_gltf_basis *b);

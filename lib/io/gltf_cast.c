@@ -17,11 +17,29 @@ int vgi_gltf_say_elements(const vgi_json *document, const char *list, vg_bytes *
     return r;
 }
 
+static int list_vertices(const vgi_gltf_character *c, vgi_json *extras, vg_err *e)
+{
+    vgi_json *list = vgi_json_array(e);
+    int r = vgi_json_put(extras, VGI_GLTF_VERTICES, list, e);
+    if (r == VG_OK) r = vgi_json_add(list, vgi_json_of_whole(c->nv, e), e);
+    for (size_t f = 0; f < c->n && r == VG_OK; f++) r = vgi_json_add(list, vgi_json_of_whole(c->vertex[f], e), e);
+    return r;
+}
+
+static int ensure_extras(vgi_json *holder, vg_err *e)
+{
+    if (vgi_json_is_object(vgi_json_get(holder, "extras"))) return VG_OK;
+    return vgi_json_put(holder, "extras", vgi_json_object(e), e);
+}
+
 /* Copyright and the like stay; it is written by another program now. */
 int vgi_gltf_say_cast_asset(vgi_gltf_writing *w, vg_err *e)
 {
     vgi_json *asset = vgi_json_copy(vgi_json_get(w->character->scene.g.json, "asset"), e);
     int r = asset ? vgi_json_put(asset, "generator", vgi_json_of_text("vg " VG_VERSION, e), e) : VG_ENOMEM;
+    if (r == VG_OK) vgi_json_drop(vgi_json_inner(asset, "extras"), VGI_GLTF_VERTICES);
+    if (r == VG_OK && w->character->touches) r = ensure_extras(asset, e);
+    if (r == VG_OK && w->character->touches) r = list_vertices(w->character, vgi_json_inner(asset, "extras"), e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "{\"asset\":");
     if (r == VG_OK) r = vgi_json_print(asset, &w->json, e);
     vgi_json_free(&asset);
@@ -72,11 +90,8 @@ static int add_weights(vgi_json *mesh, size_t n, vg_err *e)
 
 static int add_names(vgi_json *mesh, const vgi_json *names, vg_err *e)
 {
-    if (!vgi_json_is_object(vgi_json_get(mesh, "extras"))) {
-        int r = vgi_json_put(mesh, "extras", vgi_json_object(e), e);
-        if (r < 0) return r;
-    }
-    return vgi_json_put(vgi_json_inner(mesh, "extras"), "targetNames", vgi_json_copy(names, e), e);
+    int r = ensure_extras(mesh, e);
+    return r < 0 ? r : vgi_json_put(vgi_json_inner(mesh, "extras"), "targetNames", vgi_json_copy(names, e), e);
 }
 
 /* The mesh of a node: the original one with the primitives that the node shows. */

@@ -124,6 +124,44 @@ static int find_base(vgi_gltf_character *c, const vg_body *b, vg_err *e)
     return VG_OK;
 }
 
+typedef struct seat {
+    float at[3];
+    uint32_t vertex; /* of the mesh */
+    size_t node, instance;
+} seat;
+
+/* By place, then by vertex. */
+static int by_seat(const void *a, const void *b)
+{
+    const seat *s = a, *t = b;
+    if (s->node != t->node) return s->node < t->node ? -1 : 1;
+    if (s->instance != t->instance) return s->instance < t->instance ? -1 : 1;
+    for (int k = 0; k < 3; k++)
+        if (s->at[k] < t->at[k] || s->at[k] > t->at[k]) return s->at[k] < t->at[k] ? -1 : 1;
+    return (s->vertex > t->vertex) - (s->vertex < t->vertex);
+}
+
+static int find_touches(vgi_gltf_character *c, vg_err *e)
+{
+    seat *seats = vgi_array_raw(c->n, sizeof *seats, e);
+    if (!seats) return VG_ENOMEM;
+    for (size_t i = 0; i < c->scene.nparts; i++) {
+        const vgi_gltf_part *p = &c->scene.parts[i];
+        for (size_t f = p->first; f < p->first + p->count; f++) {
+            const float *at = c->base + 3 * f;
+            seats[f] = (seat){{at[0], at[1], at[2]}, c->vertex[f], p->node, (size_t)p->instance};
+        }
+    }
+    qsort(seats, c->n, sizeof *seats, by_seat);
+    for (size_t i = 1; i < c->n && !c->touches; i++) {
+        seat before = seats[i - 1];
+        before.vertex = seats[i].vertex;
+        c->touches = seats[i - 1].vertex != seats[i].vertex && by_seat(&before, &seats[i]) == 0;
+    }
+    free(seats);
+    return VG_OK;
+}
+
 /* ---- normals ---- */
 
 /* A skin transforms normals by M itself, as all viewers do; a node by the inverse transpose. */
@@ -320,6 +358,7 @@ int vgi_gltf_character_open(vgi_gltf_character *c, const vg_body *b, vg_err *e)
     vgi_gltf_rest(&c->scene);
     if ((r = place(c, e)) <= 0) return r;
     r = find_base(c, b, e);
+    if (r == VG_OK) r = find_touches(c, e);
     if (r == VG_OK) r = find_normals(c, b, e);
     return r < 0 ? r : 1;
 }

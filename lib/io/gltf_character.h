@@ -18,6 +18,7 @@ typedef struct vgi_gltf_character {
     float *base, *normal;   /* n x 3: the reference pose and its normals; normal is NULL without any */
     double *world_normal;   /* n x 3 */
     bool kept;              /* the reference pose is the one that the asset shows */
+    bool touches;           /* vertices that are not one lie on one another in it: a reader could weld them */
     uint32_t *group;        /* n: vertices that are one and have one normal; UINT32_MAX: those that have none */
     size_t ngroups;
     double *rest, *now;     /* ngroups x 3: normals of the faces around, in the reference pose and in another */

@@ -253,20 +253,41 @@ static bool makes_faces(const vg_mesh *m, const uint32_t *number, const vg_mesh 
     return face == to->nf;
 }
 
+/* Each vertex of the file becomes the vertex `to` of the mesh, of which the file has those of one number at one place, in the
+ * order of their first ones. How many there are; 0: they do not fit. */
+static size_t number_as(const vgi_gltf_scene *x, const uint32_t *to, uint32_t *number, uint32_t *first)
+{
+    size_t n = 0;
+    for (size_t v = 0; v < x->all; v++) {
+        const uint32_t t = to ? to[v] : (uint32_t)v;
+        if (t > n || (t < n && !at_one_place(x, v, first[t]))) return 0;
+        if (t == n) first[n++] = (uint32_t)v;
+        number[v] = t;
+    }
+    return n;
+}
+
+/* As the file of a character that we wrote says; 0: it says nothing, or nothing that fits. */
+static size_t vertices_of_asset(const vgi_gltf_scene *x, uint32_t *number, uint32_t *first)
+{
+    const vgi_json *list = vgi_json_get(vgi_json_get(vgi_json_get(x->g.json, "asset"), "extras"), VGI_GLTF_VERTICES);
+    uint64_t nv, v;
+    if (x->own || x->unwelded || vgi_json_count(list) != 1 + x->all || !vgi_json_whole(vgi_json_at(list, 0), &nv)) return 0;
+    for (size_t i = 0; i < x->all; i++) {
+        if (!vgi_json_whole(vgi_json_at(list, 1 + i), &v) || v >= nv || nv > x->all) return 0;
+        number[i] = (uint32_t)v;
+    }
+    return number_as(x, number, number, first) == nv ? (size_t)nv : 0;
+}
+
 /* The welding of another file of the same vertices, so that what is one there is one here, and what is not, is not: lips
  * that touch in this pose alone. How many vertices; 0: it does not fit. */
 static size_t vertices_of_like(const vgi_gltf_scene *x, const vg_mesh *m, uint32_t *number, uint32_t *first)
 {
     const vg_asset *a = x->like && x->like->asset.n ? &x->like->asset : NULL;
-    size_t n = 0;
     if (!x->like || x->own || x->unwelded || (a ? a->n : x->like->mesh.nv) != x->all) return 0;
     if (a && a->digest != vg_mesh_digest(&x->like->mesh)) return 0;
-    for (size_t v = 0; v < x->all; v++) {
-        const uint32_t to = a ? a->vertex[v] : (uint32_t)v;
-        if (to > n || (to < n && !at_one_place(x, v, first[to]))) return 0;
-        if (to == n) first[n++] = (uint32_t)v;
-        number[v] = to;
-    }
+    const size_t n = number_as(x, a ? a->vertex : NULL, number, first);
     return n == x->like->mesh.nv && makes_faces(m, number, &x->like->mesh) ? n : 0;
 }
 
@@ -375,6 +396,7 @@ static int weld(vgi_gltf_scene *x, vg_mesh *m, vg_err *e)
     int r = k.slots && k.number ? VG_OK : VG_ENOMEM;
     size_t own = r == VG_OK ? own_vertices(x, k.number) : 0, n = own;
     if (r == VG_OK && !n) n = vertices_of_like(x, m, k.number, k.slots);
+    if (r == VG_OK && !n) n = vertices_of_asset(x, k.number, k.slots);
     if (own) r = keep_first(&x->parts[0], n, e);
     else if (n) r = keep_listed(x, k.slots, n, e);
     else if (r == VG_OK) {

@@ -232,7 +232,8 @@ out:
 
 static double between(size_t index) /* times i + 1/4, 1/2, 3/4 */
 {
-    return 1 + (double)(index / 3) + 0.25 * (double)(1 + index % 3);
+    const size_t whole = index / 3;
+    return 1 + (double)whole + 0.25 * (double)(1 + index % 3);
 }
 
 /* Squares of the deviation at each time in between; returns the mean square of straight lines. */

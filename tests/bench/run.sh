@@ -341,7 +341,8 @@ under_sets() {
     vg-register -q --aligned "$n-1.vgs" "$n-q.vgs" -o "$n-c.vgs"
     in=$(bytes "$n.vgs") between=$(bytes "$n-w.vgs")
     for set in $sets; do
-        export VG_ISA="$set" OPENBLAS_CORETYPE="$(core_of "$set")"
+        OPENBLAS_CORETYPE=$(core_of "$set")
+        export VG_ISA="$set" OPENBLAS_CORETYPE
         [ "$OPENBLAS_CORETYPE" ] || unset OPENBLAS_CORETYPE
         input="$2, $set"
         solver "$n" "$2, $set"

@@ -1,6 +1,6 @@
-/* features.c: frames of features back to vertices (MATH 12). Leaves out how they are measured (vg-features.c).
+/* solve_features.c: frames of features back to vertices (MATH 12). Leaves out how they are measured (vg-features.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "features.h"
+#include "solve_features.h"
 #include "batch.h"
 
 #include <math.h>

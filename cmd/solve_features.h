@@ -1,4 +1,4 @@
-/* features.h: features of poses as frames, and the step that takes them back: what vg-features and vg-solve share.
+/* solve_features.h: features of poses as frames, and the step that takes them back: what vg-features and vg-solve share.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CMD_FEATURES_H
 #define VG_CMD_FEATURES_H
