@@ -1,6 +1,7 @@
 #!/usr/bin/env bats
 # vg-fitsignal and vg-sample: the tolerance, options, times, edits, curves, and what is refused.
 # SPDX-License-Identifier: GPL-3.0-or-later
+# shellcheck disable=SC2086 # lists of numbers in variables are words
 load lib.bash
 bats_require_minimum_version 1.5.0
 

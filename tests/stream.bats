@@ -2,6 +2,7 @@
 # The stream against its second implementation: examples/read_stream.py reads what the programs write, the programs read what
 # tests/make_corpus.py writes, and both refuse the same.
 # SPDX-License-Identifier: GPL-3.0-or-later
+# shellcheck disable=SC2086 # programs with options in variables are words
 load lib.bash
 
 # ---- golden and accept ------------------------------------------------------------------------------------------------

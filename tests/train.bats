@@ -1,6 +1,7 @@
 #!/usr/bin/env bats
 # vg-train and vg-generate: the same bytes again, resumed training, keys, other meshes, damage.
 # SPDX-License-Identifier: GPL-3.0-or-later
+# shellcheck disable=SC2086 # options in variables are words
 load lib.bash
 bats_require_minimum_version 1.5.0
 

@@ -59,9 +59,9 @@ vg_poses_stats vg_poses_get_stats(const vg_poses *p)
 
 static int keep_in_file(vg_poses *p, const vg_frame *f, kept *k, size_t bytes, vg_err *e)
 {
-    if (p->fd < 0 && (p->fd = vgi_nameless_file(e)) < 0) return p->fd;
+    int r = p->fd < 0 ? p->fd = vgi_nameless_file(e) : VG_OK;
     k->off = p->stats.file_bytes;
-    int r = vgi_pack_write(p->fd, k->off, k->bytes, bytes, f->name, e);
+    if (r >= 0) r = vgi_pack_write(p->fd, k->off, k->bytes, bytes, f->name, e);
     free(k->bytes);
     k->bytes = NULL;
     if (r == VG_OK) p->stats.file_bytes += bytes;

@@ -77,8 +77,8 @@ static bool find_leg(const vg_rig *r, const vgi_role *roles, int side, leg *l)
     for (int i = 0; i < 4; i++) {
         *joint[i] = vgi_find_role(&r->skeleton, roles, (vgi_part)(VGI_THIGH + i), side);
         if (*joint[i] != NONE && bone_of(r, *joint[i]) == r->nbones) *joint[i] = NONE;
-        if (*joint[i] == NONE && i < 3) return false;
     }
+    if (l->thigh == NONE || l->shin == NONE || l->foot == NONE) return false;
     l->length[0] = rest_distance(r, l->thigh, l->shin), l->length[1] = rest_distance(r, l->shin, l->foot);
     return l->length[0] > 0 && l->length[1] > 0;
 }
