@@ -108,16 +108,20 @@ endef
 $(foreach set,$(SETS),$(eval $(call kernel_of_set,$(set))))
 
 # what the pages of vg-view are made of, as strings of C; all ASCII
-# The player is one script in several files: the first opens its scope, the last closes it and starts it.
-PAGE_html := lib/view/page.html
-PAGE_css := lib/view/page.css
-PAGE_js := $(addprefix lib/view/page_,read.js draw.js pick.js play.js)
-PAGE_PARTS := html css js
-$(B)/page_text.c: $(PAGE_html) $(PAGE_css) $(PAGE_js) Makefile
+# A script is several files: the first opens its scope, the last closes it and starts it.
+PART_page_html := lib/view/page.html
+PART_page_css := lib/view/page.css
+PART_page_js := $(addprefix lib/view/page_,read.js draw.js pick.js play.js)
+PART_signal_html := lib/view/signal.html
+PART_signal_css := lib/view/page.css lib/view/signal.css
+PART_signal_js := $(addprefix lib/view/,page_read.js page_draw.js page_pick.js signal_math.js signal_edit.js signal_live.js \
+    signal_plane.js signal_time.js signal_play.js)
+PAGE_PARTS := page_html page_css page_js signal_html signal_css signal_js
+$(B)/page_text.c: $(foreach part,$(PAGE_PARTS),$(PART_$(part))) Makefile
 	@mkdir -p $(@D)
 	@{ echo '#include "view/page.h"'; \
-	   $(foreach part,$(PAGE_PARTS),echo 'const char vgi_page_$(part)[] = {'; \
-	       cat $(PAGE_$(part)) | od -An -v -tu1 | sed 's/[0-9][0-9]*/&,/g'; echo '0};';) } > $@
+	   $(foreach part,$(PAGE_PARTS),echo 'const char vgi_$(part)[] = {'; \
+	       cat $(PART_$(part)) | od -An -v -tu1 | sed 's/[0-9][0-9]*/&,/g'; echo '0};';) } > $@
 
 $(B)/page_text.o: $(B)/page_text.c $(B)/flags
 	$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<

@@ -4,6 +4,7 @@
 #include "cli.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
@@ -458,6 +459,57 @@ static void note_stats(const vg_page_stats *stats)
                  stats->scale);
 }
 
+/* Options that are about frames or several sequences do not go with a signal. */
+static void refuse_beside_signal(const char *what)
+{
+    static const char *const strange[] = {"frames", "columns", "size", "silhouettes", "beside", "against", "scales", "scale", "turn", "fps"};
+    for (size_t i = 0; i < sizeof strange / sizeof *strange; i++)
+        if (cli_given(strange[i])) cli_usage("option '--%s' is about a sequence: of a signal %s", strange[i], what);
+}
+
+/* The frames of a signal, sampled, say what the camera has to show. */
+static void add_sampled(vg_page *page, side *s)
+{
+    vg_err e;
+    const vg_signal *signal = &s->head->signal;
+    vg_sampler *sampler;
+    double at[2], *x = cli_allocate(signal->m + 1, sizeof *x, "coordinates");
+    if (vg_sampler_new(&sampler, signal, false, &e) < 0 || vg_frame_shape(&s->frame, s->head, &e) < 0) cli_die(&e);
+    for (size_t i = 0; i < signal->n; i++) {
+        vg_sampler_position(sampler, (double)i + 1, at);
+        vg_sampler_coordinates(sampler, at, x);
+        vg_sampler_shapes(sampler, 1, x, &s->frame.values);
+        vg_sampler_place(sampler, (double)i + 1, s->head->body.mesh.nv, s->frame.values);
+        s->frame.has_time = signal->timed;
+        s->frame.time = signal->timed ? signal->times[i] : 0;
+        if (vg_frame_rename(&s->frame, signal->names[i], &e) < 0) cli_die(&e);
+        page_frame(page, 0, s, NULL);
+    }
+    vg_sampler_free(&sampler);
+    free(x);
+}
+
+/* A page on which the signal is edited. */
+static void make_signal_page(cast *c)
+{
+    vg_page_options o = page_options(&c->result);
+    vg_page *page;
+    vg_page_stats stats;
+    vg_err e;
+    refuse_beside_signal("the pose plane is shown");
+    o.signal = true;
+    if (opts.patches) take_patches(&c->result);
+    while (next(&c->result)) continue; /* to the end, so that damage is seen */
+    FILE *out = cli_text_open();
+    if (vg_page_new(&page, fileno(out), cli.output ? cli.output : "standard output", &o, &e) < 0) cli_die(&e);
+    add_sequence(page, &c->result);
+    add_sampled(page, &c->result);
+    if (vg_page_end(page, &stats, &e) < 0) cli_die(&e);
+    cli_text_end();
+    vg_page_free(&page);
+    cli_note("a signal of %zu frames in %.2f MB", stats.frames, (double)stats.bytes / 1e6);
+}
+
 static void make_page(cast *c)
 {
     vg_page_options o = page_options(&c->result);
@@ -487,7 +539,8 @@ int main(int argc, char **argv)
     sheet_options(); /* what is wrong with them is told before the input is opened */
     choose_kind();
     open_cast(&c, operands, n);
-    if (opts.page) make_page(&c);
+    if (opts.page && c.result.head->signal.n) make_signal_page(&c);
+    else if (opts.page) make_page(&c);
     else if (c.result.head->signal.n) make_plane(&c);
     else make_sheet(&c);
     warn_scale(&c);

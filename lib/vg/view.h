@@ -86,6 +86,8 @@ typedef struct vg_page_options {
     vg_tint tint;  /* VG_TINT_ERRORS: the second sequence is the truth */
     bool centred;
     double scale;  /* the end of the colours, as for a sheet, by all frames */
+    bool signal;   /* edit the signal of the only sequence in its pose plane: its frames, sampled, say what the camera has
+                      to show, and are not kept */
 } vg_page_options;
 enum { VG_PAGE_SEQUENCES = 8 };
 typedef struct vg_page_stats {

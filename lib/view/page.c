@@ -102,8 +102,7 @@ static int put_packed(vg_page *p, const vg_bytes *packed, vg_err *e)
 
 /* ---- the mesh of a sequence ---- */
 
-static int put_list(vg_page *p, size_t i, const char *what, const uint32_t *list, size_t n, bool differences,
-                    vg_err *e)
+int vgi_page_list(vg_page *p, size_t i, const char *what, const uint32_t *list, size_t n, bool differences, vg_err *e)
 {
     char head[128];
     vg_bytes packed = {0};
@@ -170,7 +169,7 @@ static int put_triangles(vg_page *p, size_t i, const vg_mesh *m, const double *p
             size_t n = m->start[f + 1] - m->start[f];
             if (n > 2) cut_face(&k, m->vert + m->start[f], n, points, out + at), at += 3 * (n - 2);
         }
-        r = put_list(p, i, "triangles", out, at, false, e);
+        r = vgi_page_list(p, i, "triangles", out, at, false, e);
     }
     free(k.xy);
     free(k.work);
@@ -185,11 +184,11 @@ static int put_mesh(vg_page *p, size_t i, const vg_head *h, vg_err *e)
     uint32_t *sizes = vgi_array_raw(m->nf, sizeof *sizes, e);
     if (!sizes) return VG_ENOMEM;
     for (size_t f = 0; f < m->nf; f++) sizes[f] = m->start[f + 1] - m->start[f];
-    int r = put_list(p, i, "sizes", sizes, m->nf, false, e);
+    int r = vgi_page_list(p, i, "sizes", sizes, m->nf, false, e);
     free(sizes);
-    if (r == VG_OK) r = put_list(p, i, "corners", m->vert, vg_mesh_corners(m), true, e);
+    if (r == VG_OK) r = vgi_page_list(p, i, "corners", m->vert, vg_mesh_corners(m), true, e);
     if (r == VG_OK) r = put_triangles(p, i, m, h->body.reference, e);
-    if (r == VG_OK && h->body.patches.n) r = put_list(p, i, "patches", h->body.patches.of_face, m->nf, false, e);
+    if (r == VG_OK && h->body.patches.n) r = vgi_page_list(p, i, "patches", h->body.patches.of_face, m->nf, false, e);
     return r;
 }
 
@@ -210,12 +209,14 @@ int vg_page_sequence(vg_page *p, const char *label, const vg_head *h, vg_err *e)
 {
     if (p->n == VG_PAGE_SEQUENCES) return vg_fail(e, VG_EARG, "a page has at most %d sequences", VG_PAGE_SEQUENCES);
     if (h->kind != VG_VERTICES) return vg_fail(e, VG_EARG, "a page shows vertices, not %s", vg_head_form(h));
+    if (p->o.signal && (p->n || !h->signal.n)) return vg_fail(e, VG_EARG, "a page edits one sequence with a signal");
     sequence *s = p->at + p->n;
     *s = (sequence){.label = label, .head = h, .timed = true, .last_time = -INFINITY};
     size_t i = p->n++;
     int r = measure(s, e);
-    if (r == VG_OK) r = vgi_track_init(&s->places, h->body.mesh.nv, 3, e);
-    return r == VG_OK ? put_mesh(p, i, h, e) : r;
+    if (r == VG_OK && !p->o.signal) r = vgi_track_init(&s->places, h->body.mesh.nv, 3, e);
+    if (r == VG_OK) r = put_mesh(p, i, h, e);
+    return r == VG_OK && p->o.signal ? vgi_signal_page_lists(p, &h->signal, e) : r;
 }
 
 static int put_chunk(vg_page *p, size_t i, const char *what, vgi_track *t, vg_err *e)
@@ -329,6 +330,11 @@ int vg_page_add(vg_page *p, size_t i, const vg_frame *f, const double *truth, vg
     sequence *s = p->at + i;
     if (s->compared && !truth) return vg_fail(e, VG_EARG, "a frame that is compared needs a truth");
     int r = add_label(s, f, e);
+    if (r == VG_OK && p->o.signal) {
+        add_extent(s, f->values);
+        s->frames++;
+        return VG_OK;
+    }
     if (r == VG_OK && s->frames == 0) r = begin_numbers(p, s, f, truth, e);
     if (r < 0) return r;
     memcpy(vgi_track_next(&s->places), f->values, 3 * s->head->body.mesh.nv * sizeof *f->values);
@@ -355,12 +361,12 @@ int vg_page_new(vg_page **out, int fd, const char *name, const vg_page_options *
     p->o = *o;
     p->tint = (vgi_tint){.what = o->tint, .centred = o->centred};
     p->fd = fd;
-    p->rest = vgi_page_html;
+    p->rest = o->signal ? vgi_signal_html : vgi_page_html;
     p->name = vgi_copy_string(name, strlen(name), e);
     int r = p->name ? put_template(p, "@TITLE@", e) : VG_ENOMEM;
     if (r == VG_OK) r = put_escaped(p, o->title, e);
     if (r == VG_OK) r = put_template(p, "@STYLE@", e);
-    if (r == VG_OK) r = put_text(p, vgi_page_css, e);
+    if (r == VG_OK) r = put_text(p, o->signal ? vgi_signal_css : vgi_page_css, e);
     if (r == VG_OK) r = put_template(p, "@DATA@", e);
     if (r < 0) {
         vg_page_free(&p);
@@ -449,7 +455,7 @@ static int json_provenance(vg_bytes *b, const vg_head *h, vg_err *e)
     return r;
 }
 
-static int json_numbers(vg_bytes *b, const char *name, const double *x, size_t n, vg_err *e)
+int vgi_page_field_numbers(vg_bytes *b, const char *name, const double *x, size_t n, vg_err *e)
 {
     vg_bytes list = {0};
     int r = VG_OK;
@@ -477,7 +483,7 @@ static int json_joints(vg_bytes *b, const vg_body *body, vg_err *e)
     }
     if (r == VG_OK) r = vgi_page_field_list(b, "joints", &names, e);
     if (r == VG_OK) r = vgi_page_field_list(b, "parents", &parents, e);
-    if (r == VG_OK && rig) r = json_numbers(b, "jointsAt", rig->at, 3 * s->njoints, e);
+    if (r == VG_OK && rig) r = vgi_page_field_numbers(b, "jointsAt", rig->at, 3 * s->njoints, e);
     vg_bytes_clear(&names);
     vg_bytes_clear(&parents);
     return r;
@@ -501,10 +507,10 @@ static int json_sequence(vg_bytes *b, const vg_page *p, size_t i, vg_err *e)
     if (r == VG_OK) r = vgi_page_field_number(b, "faces", (double)m->nf, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "patches", (double)s->head->body.patches.n, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "diagonal", frame->diagonal, e);
-    if (r == VG_OK) r = json_numbers(b, "centre", frame->centre, 3, e);
+    if (r == VG_OK) r = vgi_page_field_numbers(b, "centre", frame->centre, 3, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "ground", frame->path.n ? -frame->path.reach[up + VGI_HULL / 2] : 0, e);
-    if (r == VG_OK) r = json_numbers(b, "path", s->path.at[0], 3 * s->path.n, e);
-    if (r == VG_OK) r = json_numbers(b, "figure", s->figure.at[0], 3 * s->figure.n, e);
+    if (r == VG_OK) r = vgi_page_field_numbers(b, "path", s->path.at[0], 3 * s->path.n, e);
+    if (r == VG_OK) r = vgi_page_field_numbers(b, "figure", s->figure.at[0], 3 * s->figure.n, e);
     if (r == VG_OK) r = vgi_page_field_number(b, "loss", s->loss / frame->unit, e);
     if (r == VG_OK) r = json_provenance(b, s->head, e);
     if (r == VG_OK) r = json_joints(b, &s->head->body, e);
@@ -574,7 +580,9 @@ static int json_page(vg_bytes *b, const vg_page *p, const vg_page_stats *stats, 
     if (r == VG_OK) r = vgi_page_field(b, "sequences", e);
     if (r == VG_OK) r = vgi_page_raw(b, "[", e);
     for (size_t i = 0; i < p->n && r == VG_OK; i++) r = json_sequence(b, p, i, e);
-    return r == VG_OK ? vgi_page_raw(b, "]}", e) : r;
+    if (r == VG_OK) r = vgi_page_raw(b, "]", e);
+    if (r == VG_OK && p->o.signal) r = vgi_signal_page_facts(b, &p->at[0].head->signal, e);
+    return r == VG_OK ? vgi_page_raw(b, "}", e) : r;
 }
 
 static int put_remaining(vg_page *p, vg_page_stats *stats, vg_err *e)
@@ -604,7 +612,7 @@ int vg_page_end(vg_page *p, vg_page_stats *stats, vg_err *e)
     if (r == VG_OK) r = json_page(&json, p, stats, e);
     if (r == VG_OK) r = put(p, json.data, json.size, e);
     if (r == VG_OK) r = put_template(p, "@SCRIPT@", e);
-    if (r == VG_OK) r = put_text(p, vgi_page_js, e);
+    if (r == VG_OK) r = put_text(p, p->o.signal ? vgi_signal_js : vgi_page_js, e);
     if (r == VG_OK) r = put_template(p, NULL, e);
     if (r == VG_OK) r = flush(p, e);
     vg_bytes_clear(&json);

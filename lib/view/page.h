@@ -75,5 +75,22 @@ void vgi_hull_add(vgi_hull *h, const double *points, const bool *drawn, size_t n
 /* ---- page_text.c, made by the Makefile from page.html, page.css and page_*.js; each ends with a 0 ---- */
 
 extern const char vgi_page_html[], vgi_page_css[], vgi_page_js[];
+extern const char vgi_signal_html[], vgi_signal_css[], vgi_signal_js[];
+
+/* ---- page.c ---- */
+
+/* vgi_page_list: write n 32-bit numbers as list `what` of sequence i. */
+int vgi_page_list(vg_page *p, size_t i, const char *what, const uint32_t *list, size_t n, bool differences,
+                  vg_err *e) VG_MUST_CHECK;
+int vgi_page_field_numbers(vg_bytes *b, const char *name, const double *x, size_t n, vg_err *e) VG_MUST_CHECK;
+
+/* ---- signal_page.c: what a page needs of a signal ----
+ *
+ * Lists of 32-bit words: "mean" (d binary64 numbers, the lower word first), "coordinate" (n x m of them), "basis": for
+ * each of d numbers of a shape its m numbers of the basis, as binary32, or two int16 in a word when the signal keeps 16
+ * bits. All else is in the facts. */
+
+int vgi_signal_page_lists(vg_page *p, const vg_signal *s, vg_err *e) VG_MUST_CHECK;
+int vgi_signal_page_facts(vg_bytes *b, const vg_signal *s, vg_err *e) VG_MUST_CHECK;
 
 #endif

@@ -95,7 +95,7 @@ function describe({s, v, face, joint}) {
 /* The path of the pinned vertex over all frames, once these are unpacked. */
 function trackPinned() {
     const {s, v} = pinned, points = [];
-    if (v === undefined || s.frames < 2) return;
+    if (v === undefined || s.frames < 2 || s.live) return;
     for (let f = 0; f < s.frames; f++) {
         const p = placeIn(s, v, f);
         if (!p) return;

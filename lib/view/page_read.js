@@ -232,6 +232,7 @@ function readPlaces(s, chunk, frame, xyz) {
 
 /* Where one vertex is in a frame that is unpacked; null: it is not yet. */
 function placeIn(s, v, frame) {
+    if (s.live) return s.live.placeOf(v, frame);
     const chunk = chunkOf(s.places, frame);
     if (!chunk.q) return null;
     return AXES.map(([axis, sign]) => sign * (chunk.origin[axis] - s.about.centre[axis] +
@@ -265,6 +266,7 @@ function fill(s, slot, frame) {
 
 /* The frame that is shown, and how far the sequence is on its way to the next one. True: it is there. */
 function take(s) {
+    if (s.live) return s.live.take();
     const frame = Math.min(state.frame, s.frames - 1), next = Math.min(frame + 1, s.frames - 1);
     if (s.slots[1].frame === frame) s.slots.reverse();
     if (!fill(s, s.slots[0], frame)) return false;
