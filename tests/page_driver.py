@@ -139,6 +139,21 @@ class Page:
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=box[0], y=box[1], button="left", clickCount=1)
 
+    def saved(self, selector, folder="downloads"):
+        """Click a button that saves a file: the path of that file."""
+        folder, session = pathlib.Path(folder, str(self.number)).resolve(), self.session  # one of its own: names repeat
+        folder.mkdir(parents=True)
+        self.session = None
+        self.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
+        self.session = session
+        self.click(selector)
+        while time.monotonic() < self.end:
+            new = [f for f in folder.iterdir() if not f.name.endswith(".crdownload") and f.stat().st_size]
+            if new:
+                return str(new[0])
+            time.sleep(0.05)
+        raise RuntimeError(f"{selector} saved nothing")
+
     def settle(self):
         self.value("new Promise(f => requestAnimationFrame(() => requestAnimationFrame(() => f(true))))")
 
