@@ -381,17 +381,25 @@ static void sheet_frame(void *sheet, size_t i, const side *s, const double *trut
     if (vg_sheet_add(sheet, i, &s->frame, truth, &e) < 0) cli_die(&e);
 }
 
+/* Options that are about frames or several sequences do not go with a signal. */
+static void refuse_beside_signal(const char *what)
+{
+    static const char *const strange[] = {"frames", "columns", "size", "silhouettes", "beside", "against", "scales", "scale", "turn", "fps"};
+    for (size_t i = 0; i < sizeof strange / sizeof *strange; i++)
+        if (cli_given(strange[i])) cli_usage("option '--%s' is about a sequence: of a signal %s", strange[i], what);
+}
+
 /* A signal is drawn as its curve through the pose plane. */
 static void make_plane(cast *c)
 {
     vg_err e;
     vg_sheet_options o = sheet_options();
     vg_plane_options plane = {.azimuth = o.azimuth, .elevation = o.elevation, .z_up = o.z_up};
-    static const char *const strange[] = {"frames", "columns", "size", "zoom", "fit", "ground", "edges", "silhouettes", "beside",
-                                          "against", "scales", "scale", "turn", "fps"};
+    static const char *const strange[] = {"zoom", "fit", "ground", "edges"};
     for (size_t i = 0; i < sizeof strange / sizeof *strange; i++)
         if (cli_given(strange[i]))
             cli_usage("option '--%s' is about a sequence: of a signal the pose plane is drawn", strange[i]);
+    refuse_beside_signal("the pose plane is drawn");
     if (opts.animated) cli_usage("a signal is drawn as PNG: an animation is made of the poses of vg-sample");
     if (opts.patches) take_patches(&c->result);
     while (next(&c->result)) continue; /* to the end, so that damage is seen */
@@ -457,14 +465,6 @@ static void note_stats(const vg_page_stats *stats)
     else if (stats->tinted)
         cli_note("colours: from %.3g to %.3g, mean %.3g; they end at %.3g", stats->least, stats->max, stats->mean,
                  stats->scale);
-}
-
-/* Options that are about frames or several sequences do not go with a signal. */
-static void refuse_beside_signal(const char *what)
-{
-    static const char *const strange[] = {"frames", "columns", "size", "silhouettes", "beside", "against", "scales", "scale", "turn", "fps"};
-    for (size_t i = 0; i < sizeof strange / sizeof *strange; i++)
-        if (cli_given(strange[i])) cli_usage("option '--%s' is about a sequence: of a signal %s", strange[i], what);
 }
 
 /* The frames of a signal, sampled, say what the camera has to show. */

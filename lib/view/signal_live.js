@@ -77,7 +77,7 @@ function evaluate() {
     return vertices;
 }
 
-/* Vertices to the axes and unit of the page, with normals; returns how long it took, in milliseconds. */
+/* Vertices to the axes and unit of the page, with normals. */
 function showVertices(p) {
     const [slot] = body.slots, {xyz} = slot, {centre} = body.about, sum = [0, 0, 0];
     for (let k = 0; k < 3; k++) {
@@ -92,13 +92,13 @@ function showVertices(p) {
 
 /* ---- drawn by page_draw.js ---- */
 
-let stale = true, spent = 0;
+let stale = true;
 const live = {
     take() {
         if (!stale && body.slots[0].frame === 0) return true; /* -1: the graphics were reset */
         const start = performance.now();
         showVertices(evaluate());
-        spent = performance.now() - start;
+        document.documentElement.dataset.spent = (performance.now() - start).toFixed(2); /* milliseconds */
         stale = false;
         body.slots[0].frame = 0;
         return true;

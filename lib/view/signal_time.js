@@ -23,7 +23,7 @@ function showStrip() {
     const most = change ? change.reduce((a, b) => Math.max(a, b), 0) : 0;
     for (let i = 0; change && most > 1e-7 && i < base.n; i++) {
         if (change[i] <= 1e-7) continue;
-        const x = toX(first + (last - first) * (i / (base.n - 1 || 1))), h = 2 + 14 * change[i] / most;
+        const x = toX(newTime(i + 1)), h = 2 + 14 * change[i] / most;
         element("rect", {class: "change", x: x - 1.5, y: bottom - h, width: 3, height: h}, strip);
     }
     element("path", {class: "map", d: points.map((t, i) => `${i ? "L" : "M"}${toX(t).toFixed(1)} ${toY(oldTime(t)).toFixed(1)}`).join("")}, strip);
@@ -33,11 +33,22 @@ function showStrip() {
     element("text", {x: PAD + 4, y: 12}, strip).textContent = `speed here ${short(now_)}\u00d7${now.retime ? "" : "; two clicks add a time"}`;
 }
 
+/* The first new time at which an old one is reached. */
+function newTime(old) {
+    let low = firstTime(), high = lastTime();
+    for (let step = 0; step < 30; step++) {
+        const middle = (low + high) / 2;
+        if (oldTime(middle) < old) low = middle;
+        else high = middle;
+    }
+    return high;
+}
+
 /* Move pair i; both times keep rising. */
 function movePair(i, old, t) {
     const pairs = pairsNow().map((p) => [...p]), before = pairs[i - 1], after = pairs[i + 1], gap = 0.05;
-    const newTime = i === 0 ? pairs[0][1] : Math.max(before[1] + gap, after ? Math.min(after[1] - gap, t) : t);
-    pairs[i] = [Math.max(before ? before[0] : 1, Math.min(after ? after[0] : base.n, old)), newTime].map((x) => +x.toPrecision(8));
+    const t2 = i === 0 ? pairs[0][1] : Math.max(before[1] + gap, after ? Math.min(after[1] - gap, t) : t);
+    pairs[i] = [Math.max(before ? before[0] : 1, Math.min(after ? after[0] : base.n, old)), t2].map((x) => +x.toPrecision(8));
     edits = {...edits, retime: pairs};
 }
 
