@@ -141,8 +141,8 @@ class Page:
 
     def saved(self, selector, folder="downloads"):
         """Click a button that saves a file: the path of that file."""
-        folder, session = pathlib.Path(folder, str(self.number)).resolve(), self.session  # one of its own: names repeat
-        folder.mkdir(parents=True)
+        pathlib.Path(folder).mkdir(parents=True, exist_ok=True)
+        folder, session = pathlib.Path(tempfile.mkdtemp(dir=folder)).resolve(), self.session  # one of its own: names repeat
         self.session = None
         self.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
         self.session = session
