@@ -2,7 +2,7 @@
  * Leaves out maps of patches (vg-fitmap.c) and driving a rig (playback.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "rigging.h"
-#include "fitting.h"
+#include "rig_choice.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -18,6 +18,11 @@ bool rigging_wanted(const rigging_options *o)
 static bool by_skinning(const rigging_options *o)
 {
     return o->method == RIGGING_METHOD_NOT_GIVEN ? o->bones > 0 : o->method == VG_RIG_LBS;
+}
+
+static bool by_choice(const rigging_options *o)
+{
+    return o->method == RIGGING_METHOD_NOT_GIVEN ? !o->bones : o->method == RIGGING_METHOD_AUTO;
 }
 
 void rigging_take_root(const char *text, void *context)
@@ -49,6 +54,7 @@ typedef struct work {
     vg_free_bones *free;      /* NULL: bones have a skeleton */
     double **transforms; /* of each pose */
     vg_map skinning;     /* linear blend skinning as a map, beside the envelope */
+    rig_choice choice;
     fitting_errors errors[2][2]; /* envelope, skinning; fitted, left out */
 } work;
 
@@ -279,19 +285,25 @@ static void measure_transforms(work *w, const fitting_batch *b)
     free(turns);
 }
 
-static void fit_batch(void *context, const fitting_batch *b)
+static void add_again(void *context, const fitting_batch *b)
 {
     work *w = context;
     const double *poses[FITTING_BATCH], *transforms[FITTING_BATCH];
     size_t count = 0;
-    for (size_t i = 0; i < b->n; i++)
-        w->transforms[b->index[i]] = room(7 * w->h->body.rig.nbones, sizeof(double));
-    measure_transforms(w, b);
     for (size_t i = 0; i < b->n; i++) {
         if (fitting_is_held_out(&w->poses, b->index[i])) continue;
         poses[count] = b->values[i], transforms[count++] = w->transforms[b->index[i]];
     }
     vg_rig_fitter_add(fitter, count, poses, transforms);
+}
+
+static void fit_batch(void *context, const fitting_batch *b)
+{
+    work *w = context;
+    for (size_t i = 0; i < b->n; i++)
+        w->transforms[b->index[i]] = room(7 * w->h->body.rig.nbones, sizeof(double));
+    measure_transforms(w, b);
+    add_again(w, b);
     cli_progress_of("poses fitted", b->index[b->n - 1] + 1, w->poses.n);
 }
 
@@ -315,12 +327,32 @@ static void judge_batch(void *context, const fitting_batch *b)
     }
 }
 
+/* Rows of the map: `share` of the envelope, the rest of skinning. */
+static void mix_rows(vg_map *m, const vg_map *skinning, const double *share)
+{
+    size_t width = 4 * m->n;
+    for (size_t v = 0; v < m->nv; v++)
+        for (size_t i = v * width; i < (v + 1) * width; i++)
+            m->weights[i] = skinning->weights[i] + share[v] * (m->weights[i] - skinning->weights[i]);
+}
+
+static void report_choice(const rig_choice *c)
+{
+    if (c->folds < 2) cli_say("mixed: skinning alone, since a single pose cannot be held out");
+    else if (c->mean > 0)
+        cli_say("mixed by %zu held-out blocks of poses: envelope %.0f %%, %zu bone%s per corner, ridge %g; skinning %.0f %%",
+                c->folds, 100 * c->mean, c->bones_per_corner, c->bones_per_corner == 1 ? "" : "s", c->refine,
+                100 * (1 - c->mean));
+    else cli_say("mixed by %zu held-out blocks of poses: skinning alone", c->folds);
+}
+
 static void report(work *w)
 {
     vg_err e;
     static vg_head skinning; /* h with another map */
     static const char *const names[2][2] = {{"envelope, fitted", "envelope, left out"},
                                             {"skinning, fitted", "skinning, left out"}};
+    static const char *const mixed[2] = {"mixed, fitted", "mixed, left out"};
     size_t nv = w->h->body.mesh.nv;
     double d = vg_diagonal(w->h->body.reference, nv);
     if (cli.quiet || !(d > 0)) return;
@@ -339,9 +371,11 @@ static void report(work *w)
     for (int i = 0; i < 4; i++) {
         const fitting_errors *x = &w->errors[i / 2][i % 2];
         if (x->poses)
-            cli_say("%-18s %6zu poses %#9.3g %#9.3g %#9.3g", names[i / 2][i % 2], x->poses, fitting_mean(x) / d * 1e3,
-                    fitting_sigma(x, nv) / d * 1e3, x->most / d * 1e3);
+            cli_say("%-18s %6zu poses %#9.3g %#9.3g %#9.3g",
+                    i < 2 && by_choice(w->o) ? mixed[i] : names[i / 2][i % 2], x->poses,
+                    fitting_mean(x) / d * 1e3, fitting_sigma(x, nv) / d * 1e3, x->most / d * 1e3);
     }
+    if (by_choice(w->o)) report_choice(&w->choice);
     for (int i = 0; i < 2; i++) vg_player_free(&players[i]);
 }
 
@@ -349,10 +383,10 @@ static void fit(work *w)
 {
     vg_err e;
     vg_head *h = w->h;
-    const vg_rig_options o = {.bones_per_corner = (size_t)w->o->bones_per_corner,
-                              .hold = w->o->hold,
-                              .refine = w->o->refine,
-                              .threads = cli.threads};
+    vg_rig_options o = {.bones_per_corner = w->o->bones_per_corner ? (size_t)w->o->bones_per_corner : 2,
+                        .hold = w->o->hold,
+                        .refine = w->o->refine < 0 ? 0.003 : w->o->refine,
+                        .threads = cli.threads};
     if (vg_rig_fitter_new(&fitter, h, &o, &e) < 0) cli_die(&e);
     w->transforms = room(w->poses.n, sizeof *w->transforms);
     fitting_pass(&w->poses, NULL, fit_batch, w);
@@ -360,7 +394,15 @@ static void fit(work *w)
     if (!by_skinning(w->o)) {
         w->skinning = h->map;
         h->map = (vg_map){0};
+        if (by_choice(w->o)) {
+            vg_rig_fitter_free(&fitter);
+            rig_choose(&w->poses, w->transforms, &o, w->o->bones_per_corner > 0, w->o->refine >= 0, &w->choice);
+            o.bones_per_corner = w->choice.bones_per_corner, o.refine = w->choice.refine;
+            if (vg_rig_fitter_new(&fitter, h, &o, &e) < 0) cli_die(&e);
+            fitting_pass(&w->poses, NULL, add_again, w);
+        }
         if (vg_rig_fitter_finish(fitter, VG_RIG_ENVELOPE, &e) < 0) cli_die(&e);
+        if (by_choice(w->o)) mix_rows(&h->map, &w->skinning, w->choice.share);
     }
     vg_rig_fitter_free(&fitter);
 }

@@ -9,16 +9,16 @@ typedef struct rigging_options {
     const char *skeleton, *groups; /* NULL: not given */
     double root_at[3];
     bool has_root, learn;
-    size_t method; /* a vg_rig_method */
-    long bones;    /* without a skeleton; 0: not given */
-    long bones_per_corner;
-    double refine;
+    size_t method;         /* a vg_rig_method, or one of those below */
+    long bones;            /* without a skeleton; 0: not given */
+    long bones_per_corner; /* 0: not given */
+    double refine;         /* below 0: not given */
     double hold;  /* share of the vertices that go where their bones take them */
     long holdout; /* hold out every Nth pose; 0: none */
 } rigging_options;
 
-/* What method is before --method is read: envelope, or skinning with --bones. */
-enum { RIGGING_METHOD_NOT_GIVEN = 2 };
+/* Both mixed by held-out poses; what method is before --method is read: skinning with --bones, else both mixed. */
+enum { RIGGING_METHOD_AUTO = 2, RIGGING_METHOD_NOT_GIVEN = 3 };
 
 /* rigging_wanted: is --skeleton, --groups or --bones given? */
 bool rigging_wanted(const rigging_options *o);

@@ -9,7 +9,7 @@
 static struct {
     const char *patches;
     rigging_options rig; /* hold and holdout: of maps of patches, too */
-} opts = {.rig = {.method = RIGGING_METHOD_NOT_GIVEN, .bones_per_corner = 2, .refine = 0.003, .hold = 0.03}};
+} opts = {.rig = {.method = RIGGING_METHOD_NOT_GIVEN, .refine = -1, .hold = 0.03}};
 
 static const cli_option options[] = {
     {"patches", 0, "FILE", "the patches: what vg-segment wrote; default: those of the input", .text = &opts.patches,
@@ -24,8 +24,9 @@ static const cli_option options[] = {
      .flag = &opts.rig.learn, .needs = "skeleton"},
     {"root-at", 0, "X,Y,Z", "with --skeleton: where its root is in the reference pose",
      .take = rigging_take_root, .context = &opts.rig, .needs = "skeleton"},
-    {"method", 0, "envelope|lbs",
-     "with bones: vectors and held vertices (default), or linear blend skinning alone",
+    {"method", 0, "envelope|lbs|auto",
+     "with bones: vectors and held vertices, linear blend skinning alone, or, vertex by vertex, the mixture that best "
+     "predicts held-out poses (default)",
      .choice = &opts.rig.method, .needs = "skeleton|groups|bones"},
     {"bones-per-corner", 0, "N", "with bones: how many bones drive a corner, 1 or 2 (default 2)",
      .integer = &opts.rig.bones_per_corner, .least = 1, .most = 2, .needs = "skeleton|groups|bones"},

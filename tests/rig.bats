@@ -8,9 +8,9 @@ setup_file() {
     cd "$BATS_FILE_TMPDIR" || return 1
     write_chain >chain.py
     xz -dc "$DATA/human-man-poses.bvh.xz" >man.bvh
-    vg-fitmap --holdout 5 --skeleton man.bvh "$DATA/human-man-poses.tar.xz" -o man.rig 2>man.report
+    vg-fitmap --method envelope --holdout 5 --skeleton man.bvh "$DATA/human-man-poses.tar.xz" -o man.rig 2>man.report
     vg-encode --reference "$DATA/trex.rest.obj" "$DATA/trex-walk.tar.xz" -o trex.vgs
-    vg-fitmap --skeleton "$DATA/trex.skeleton.txt" trex.vgs -o trex.rig 2>trex.report
+    vg-fitmap --method envelope --skeleton "$DATA/trex.skeleton.txt" trex.vgs -o trex.rig 2>trex.report
     chain fit --rest --frames 12 --seed 1
     vg-fitmap -q --skeleton fit.bvh fit/ -o chain.rig
 }
@@ -122,7 +122,7 @@ of_report() {
     made
     chain moving --frames 10 --seed 3
     must vg-encode --reference fit/p00.obj moving/ -o moving.vgs
-    must_warn vg-fitmap -v --skeleton moving.bvh moving.vgs -o moving.rig
+    must_warn vg-fitmap --method envelope -v --skeleton moving.bvh moving.vgs -o moving.rig
     says 'the root of the skeleton is at 0.3 0.1 -0.2 in the reference pose'
     must vg-play moving.rig fit.bvh -o again.vgs
     must vg-diff -t 1e-9 fit/ again.vgs
@@ -131,7 +131,7 @@ of_report() {
     mv man/human-man_000_rest.obj rest.obj
     awk '/^Frames:/{print "Frames: 14"; next} {print} /^Frame Time/{getline}' man.bvh >rows.bvh
     must vg-encode --reference rest.obj man/ -o poses.vgs
-    capture vg-fitmap -v --skeleton rows.bvh poses.vgs -o /dev/null
+    capture vg-fitmap --method envelope -v --skeleton rows.bvh poses.vgs -o /dev/null
     [ "$status" = 0 ] || fail "$stderr"
     printf '%s\n' "$stderr" >found.report
     py "$stderr" <<'END'
@@ -186,6 +186,20 @@ END
     read -r fitted left largest < <(awk '/skinning, fitted/ {f = $(NF-2)} /skinning, left out/ {l = $(NF-2); m = $NF}
         END {print f, l, m}' report)
     awk -v f="$fitted" -v l="$left" -v m="$largest" 'BEGIN {exit !(f < 0.5 && l < 1.4 && m < 25)}'
+}
+
+@test "--method auto: the error in held-out poses is at most 1.1 times that of skinning" {
+    made
+    must_fit() { vg-fitmap "$@" 2>report || fail "$(cat report)"; }
+    must_fit --holdout 3 --skeleton man.bvh "$DATA/human-man-poses.tar.xz" -o auto.rig
+    grep -Eq 'mixed by 3 held-out blocks of poses: (envelope [0-9]+ %|skinning alone)' report
+    for number in mean largest; do
+        py "$(of_report report mixed 'left out' $number)" "$(of_report report skinning 'left out' $number)" <<'END'
+import sys
+mixed, skinning = map(float, sys.argv[1:])
+assert mixed <= 1.1 * skinning, (mixed, skinning)
+END
+    done
 }
 
 @test "joints that are means of vertices find themselves: the toy to 1e-7 D" {
@@ -499,7 +513,7 @@ END
 
 @test "a face is not moved by bones: a fit that is honest about it, and status 0" {
     printf '%s\n' 'head - 0 0 4 0 8 4' 'jaw head 0 -1 4 0 -7 9' 'brow head 0 4 8 0 6 10' >face.skeleton.txt
-    capture vg-fitmap --skeleton face.skeleton.txt "$DATA/faceA.tar.xz" -o face.rig
+    capture vg-fitmap --method envelope --skeleton face.skeleton.txt "$DATA/faceA.tar.xz" -o face.rig
     [ "$status" = 0 ] || fail "$stderr"
     printf '%s\n' "$stderr" >report
     must vg-play face.rig "$DATA/faceA.tar.xz" -o out.vgs
@@ -576,7 +590,7 @@ END
     [ -d "${VG_DATA:-}/human" ] || skip "VG_DATA does not name the data kit"
     poses=$VG_DATA/human/walk-man.tar.gz bvh=$VG_DATA/skeletons/walk-man.bvh
     must vg-encode --reference "$VG_DATA/human/walk-man.rest.obj" "$poses" -o walk.vgs
-    must_warn vg-fitmap --holdout 5 --skeleton "$bvh" walk.vgs -o walk.rig
+    must_warn vg-fitmap --method envelope --holdout 5 --skeleton "$bvh" walk.vgs -o walk.rig
     printf '%s\n' "$stderr" >report
     for which in fitted 'left out'; do
         at_most "$(of_report report envelope "$which" mean)" 1.2e-3
@@ -590,7 +604,7 @@ END
     for pose in all/*; do [ $((n++ % 5)) != 0 ] || cp "$pose" fifth/; done
     awk '/^Frames:/{print "Frames: 18"; next} moving && n++ % 5 {next} {print} /^Frame Time/{moving = 1}' "$bvh" >fifth.bvh
     must vg-encode --reference rest.obj fifth/ -o fifth.vgs
-    must vg-fitmap -q --skeleton fifth.bvh fifth.vgs -o fifth.rig
+    must vg-fitmap --method envelope -q --skeleton fifth.bvh fifth.vgs -o fifth.rig
     must vg-play fifth.rig "$bvh" -o driven.vgs
     at_most "$(vertex_error mean "$poses" driven.vgs)" 1.2e-3
     must vg-fitmap -q --method lbs --skeleton fifth.bvh fifth.vgs -o fifth.rig
@@ -601,7 +615,7 @@ END
 @test "cloth is not moved by bones either (needs VG_DATA, the data kit)" {
     [ -d "${VG_DATA:-}/cloth" ] || skip "VG_DATA does not name the data kit"
     printf '%s\n' 'middle - 0 1.05 0 0 1.05 0.5' 'east middle 0.5 1.05 0 1 1.05 0' 'west middle -0.5 1.05 0 -1 1.05 0' >cloth.skeleton.txt
-    capture vg-fitmap --skeleton cloth.skeleton.txt "$VG_DATA/cloth/cloth-drop.tar.gz" -o cloth.rig
+    capture vg-fitmap --method envelope --skeleton cloth.skeleton.txt "$VG_DATA/cloth/cloth-drop.tar.gz" -o cloth.rig
     [ "$status" = 0 ] || fail "$stderr"
     printf '%s\n' "$stderr" >report
     at_most 0.005 "$(of_report report envelope fitted mean)"

@@ -88,6 +88,11 @@ void vg_signal_clear(vg_signal *s)
     vgi_fields_clear(&vgi_artefacts[VGI_SIGN], s);
 }
 
+int vg_map_copy(vg_map *to, const vg_map *from, const vg_mesh *mesh, vg_err *e)
+{
+    return vgi_fields_copy(&vgi_artefacts[VGI_MAP], to, from, mesh, e);
+}
+
 void vg_records_clear(vg_records *r)
 {
     for (size_t i = 0; i < r->n; i++) vg_bytes_clear(&r->at[i].payload);

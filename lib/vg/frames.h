@@ -64,6 +64,8 @@ typedef struct vg_map {
 } vg_map;
 
 void vg_map_clear(vg_map *m);
+/* vg_map_copy: `to` is written over; mesh: that of the map. */
+int vg_map_copy(vg_map *to, const vg_map *from, const vg_mesh *mesh, vg_err *e) VG_MUST_CHECK;
 
 /* One process that took part in making a stream. parents are positions in the same list, each before its own. */
 typedef struct vg_provenance {

@@ -109,6 +109,8 @@ void vg_rig_fitter_free(vg_rig_fitter **f);
 /* vg_rig_fitter_add: n poses (nv points) and the transforms of the bones in them.
  * Poses that are the reference are passed over. */
 void vg_rig_fitter_add(vg_rig_fitter *f, size_t n, const double *const *poses, const double *const *transforms);
+/* vg_rig_fitter_choose: another number of bones per corner, another ridge, for the next finish. */
+void vg_rig_fitter_choose(vg_rig_fitter *f, size_t bones_per_corner, double refine);
 /* vg_rig_fitter_finish: fill h->map and the weights of h->rig. May be called again for another method.
  * VG_EINPUT without poses. */
 int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_err *e) VG_MUST_CHECK;

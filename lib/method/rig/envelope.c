@@ -20,6 +20,8 @@ struct vg_rig_fitter {
     vgi_turns turns;
     vgi_rig_sums sums;
     double *miss; /* nv: error of linear blend skinning */
+    bool skinned; /* the skin is fitted to all poses that were added */
+    vg_map base;  /* the envelope before it is refined, for so many bones per corner; n 0: not made yet */
 };
 
 int vg_rig_fitter_new(vg_rig_fitter **out, vg_head *h, const vg_rig_options *o, vg_err *e)
@@ -52,8 +54,15 @@ void vg_rig_fitter_free(vg_rig_fitter **out)
     vgi_turns_clear(&f->turns);
     vgi_rig_sums_clear(&f->sums);
     free(f->miss);
+    vg_map_clear(&f->base);
     free(f);
     *out = NULL;
+}
+
+void vg_rig_fitter_choose(vg_rig_fitter *f, size_t bones_per_corner, double refine)
+{
+    if (bones_per_corner != f->o.bones_per_corner) vg_map_clear(&f->base);
+    f->o.bones_per_corner = bones_per_corner, f->o.refine = refine;
 }
 
 void vg_rig_fitter_add(vg_rig_fitter *f, size_t n, const double *const *poses, const double *const *transforms)
@@ -61,6 +70,8 @@ void vg_rig_fitter_add(vg_rig_fitter *f, size_t n, const double *const *poses, c
     enum { SOME = 32 };
     const double *p[SOME], *t[SOME];
     size_t count = 0;
+    f->skinned = false;
+    vg_map_clear(&f->base);
     for (size_t k = 0; k < n; k++) {
         if (!memcmp(poses[k], f->h->body.reference, 3 * f->h->body.mesh.nv * sizeof(double)))
             continue; /* it carries no information */
@@ -460,22 +471,32 @@ static int make_arrays(const vg_rig_fitter *f, vg_map *m, bool corners, vg_err *
     return vgi_place_by_bones(r, m, m->place, e);
 }
 
+/* The envelope before it is refined. */
+static int make_base(vg_rig_fitter *f, vg_map *m, vg_err *e)
+{
+    int r = make_arrays(f, m, true, e);
+    if (r == VG_OK) r = fit_corners(f, m, e);
+    if (r == VG_OK) r = choose_held(f, m, e);
+    if (r == VG_OK) r = vgi_map_collapse(f->h, f->g, NULL, f->turns.vector, f->o.threads, e);
+    return r < 0 ? r : vg_map_copy(&f->base, m, &f->h->body.mesh, e);
+}
+
 int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_err *e)
 {
     vg_head *h = f->h;
     vg_map *m = &h->map;
+    int r = VG_OK;
     if (!f->sums.poses) return vg_fail(e, VG_EINPUT, "there are no poses but the reference to fit a rig to");
     vg_map_clear(m);
-    int r = vgi_skin_fit(&h->body.rig, &f->sums, h->body.reference, f->o.threads, f->miss, e);
-    if (r == VG_OK) r = make_arrays(f, m, method == VG_RIG_ENVELOPE, e);
+    if (!f->skinned) r = vgi_skin_fit(&h->body.rig, &f->sums, h->body.reference, f->o.threads, f->miss, e);
+    f->skinned = r == VG_OK;
     if (r == VG_OK && method == VG_RIG_LBS) {
-        for (size_t v = 0; v < m->nv; v++) vgi_map_skin_row(h, v);
-        return VG_OK;
+        r = make_arrays(f, m, false, e);
+        for (size_t v = 0; r == VG_OK && v < m->nv; v++) vgi_map_skin_row(h, v);
+    } else if (r == VG_OK) {
+        r = f->base.n ? vg_map_copy(m, &f->base, &h->body.mesh, e) : make_base(f, m, e);
+        if (r == VG_OK) r = refine(f, m, e);
     }
-    if (r == VG_OK) r = fit_corners(f, m, e);
-    if (r == VG_OK) r = choose_held(f, m, e);
-    if (r == VG_OK) r = vgi_map_collapse(h, f->g, NULL, f->turns.vector, f->o.threads, e);
-    if (r == VG_OK) r = refine(f, m, e);
     if (r < 0) vg_map_clear(m);
     return r;
 }

@@ -1,0 +1,186 @@
+/* rig_choice.c: mix envelope and skinning, vertex by vertex, with the least error in poses left out of the fit.
+ *
+ * In a pose left out, vertex v has the error s by skinning and s + d by the envelope; with a share a of the envelope it has
+ * s + a d. The share of least squares is -(sum of s d) / (sum of d d), summed over all poses, each left out once, and over
+ * the faces around the vertex.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "rig_choice.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { FOLDS = 3, MOST_CANDIDATES = 6, SMOOTHINGS = 2 };
+static const size_t large = 1000000; /* vertices times bones: beyond it one number of bones per corner is tried */
+
+typedef struct candidate {
+    size_t bones_per_corner;
+    double refine;
+    double *sums; /* 2 nv: s d, d d */
+} candidate;
+
+typedef struct choosing {
+    const fitting *f;
+    double *const *transforms;
+    size_t fold, folds, fitted; /* blocks; poses that are not held out */
+    size_t *rank;               /* of each of these poses among them */
+    vg_rig_fitter *fitter;
+    vg_player *players[2];      /* skinning, envelope */
+    double *out[2][FITTING_BATCH];
+    candidate at[MOST_CANDIDATES], *now;
+    size_t n;
+} choosing;
+
+static void *room(size_t n, size_t size)
+{
+    return cli_allocate(n, size, "the choice of a map");
+}
+
+static bool is_in_fold(const choosing *x, size_t i)
+{
+    return x->rank[i] * x->folds / x->fitted == x->fold;
+}
+
+static bool is_fitted(void *context, size_t i)
+{
+    const choosing *x = context;
+    return !fitting_is_held_out(x->f, i) && !is_in_fold(x, i);
+}
+
+static bool is_left_out(void *context, size_t i)
+{
+    const choosing *x = context;
+    return !fitting_is_held_out(x->f, i) && is_in_fold(x, i);
+}
+
+static void add_batch(void *context, const fitting_batch *b)
+{
+    choosing *x = context;
+    const double *transforms[FITTING_BATCH];
+    for (size_t i = 0; i < b->n; i++) transforms[i] = x->transforms[b->index[i]];
+    vg_rig_fitter_add(x->fitter, b->n, b->values, transforms);
+}
+
+static void judge_batch(void *context, const fitting_batch *b)
+{
+    choosing *x = context;
+    double *transforms[FITTING_BATCH];
+    size_t nv = x->f->h->body.mesh.nv;
+    for (size_t i = 0; i < b->n; i++) transforms[i] = x->transforms[b->index[i]];
+    for (int way = 0; way < 2; way++)
+        vg_player_pose(x->players[way], b->n, (const double *const *)transforms, x->out[way]);
+    for (size_t i = 0; i < b->n; i++)
+        for (size_t k = 0; k < 3 * nv; k++) {
+            double s = x->out[0][i][k] - b->values[i][k], d = x->out[1][i][k] - x->out[0][i][k];
+            double *sums = x->now->sums + 2 * (k / 3);
+            sums[0] += s * d, sums[1] += d * d;
+        }
+}
+
+/* All candidates on one fold. */
+static void try_fold(choosing *x, const vg_rig_options *o)
+{
+    vg_err e;
+    vg_head *h = x->f->h, skinned;
+    if (vg_rig_fitter_new(&x->fitter, h, o, &e) < 0) cli_die(&e);
+    fitting_pass(x->f, is_fitted, add_batch, x);
+    if (vg_rig_fitter_finish(x->fitter, VG_RIG_LBS, &e) < 0) cli_die(&e);
+    skinned = *h;
+    h->map = (vg_map){0};
+    for (size_t c = 0; c < x->n; c++) {
+        x->now = &x->at[c];
+        vg_rig_fitter_choose(x->fitter, x->now->bones_per_corner, x->now->refine);
+        if (vg_rig_fitter_finish(x->fitter, VG_RIG_ENVELOPE, &e) < 0 ||
+            vg_player_new(&x->players[0], &skinned, false, cli.threads, &e) < 0 ||
+            vg_player_new(&x->players[1], h, false, cli.threads, &e) < 0)
+            cli_die(&e);
+        fitting_pass(x->f, is_left_out, judge_batch, x);
+        vg_player_free(&x->players[0]);
+        vg_player_free(&x->players[1]);
+        vg_map_clear(&h->map);
+    }
+    vg_map_clear(&skinned.map);
+    vg_rig_fitter_free(&x->fitter);
+}
+
+/* Sums over the faces around each vertex. */
+static void smooth(const vg_mesh *m, double *sums, double *work)
+{
+    memset(work, 0, 2 * m->nv * sizeof *work);
+    for (size_t f = 0; f < m->nf; f++)
+        for (int k = 0; k < 2; k++) {
+            double sum = 0;
+            for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) sum += sums[2 * (size_t)m->vert[c] + (size_t)k];
+            for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) work[2 * (size_t)m->vert[c] + (size_t)k] += sum;
+        }
+    for (size_t i = 0; i < 2 * m->nv; i++)
+        if (work[i / 2 * 2 + 1] > 0) sums[i] = work[i];
+}
+
+/* The shares of one candidate, in share; what the sum of squares changes by. */
+static double find_shares(const vg_mesh *m, const candidate *c, double *share, double *smoothed, double *work)
+{
+    double change = 0;
+    memcpy(smoothed, c->sums, 2 * m->nv * sizeof *smoothed);
+    for (int i = 0; i < SMOOTHINGS; i++) smooth(m, smoothed, work);
+    for (size_t v = 0; v < m->nv; v++) {
+        double a = smoothed[2 * v + 1] > 0 ? -smoothed[2 * v] / smoothed[2 * v + 1] : 0;
+        share[v] = a < 0 ? 0 : a > 1 ? 1 : a;
+        change += 2 * share[v] * c->sums[2 * v] + share[v] * share[v] * c->sums[2 * v + 1];
+    }
+    return change;
+}
+
+static void choose_best(const choosing *x, rig_choice *choice)
+{
+    const vg_mesh *m = &x->f->h->body.mesh;
+    double *share = room(m->nv, sizeof *share), *smoothed = room(2 * m->nv, sizeof *smoothed),
+           *work = room(2 * m->nv, sizeof *work), best = 0;
+    choice->share = room(m->nv, sizeof *choice->share);
+    choice->mean = 0, choice->folds = x->folds;
+    choice->bones_per_corner = x->at[0].bones_per_corner, choice->refine = x->at[0].refine;
+    for (size_t c = 0; c < x->n; c++) {
+        double change = find_shares(m, &x->at[c], share, smoothed, work);
+        if (!(change < best)) continue;
+        best = change;
+        memcpy(choice->share, share, m->nv * sizeof *share);
+        choice->bones_per_corner = x->at[c].bones_per_corner, choice->refine = x->at[c].refine;
+    }
+    for (size_t v = 0; v < m->nv; v++) choice->mean += choice->share[v] / (double)m->nv;
+    free(share);
+    free(smoothed);
+    free(work);
+}
+
+static void list_candidates(choosing *x, const vg_rig_options *o, bool corners_given, bool refine_given)
+{
+    static const double strengths[] = {0.003, 0.03, 0.3};
+    const vg_head *h = x->f->h;
+    size_t least = corners_given || h->body.mesh.nv * h->body.rig.nbones > large ? o->bones_per_corner : 1;
+    for (size_t corners = o->bones_per_corner + 1; corners-- > least;)
+        for (size_t i = 0; i < (refine_given ? 1 : 3); i++)
+            x->at[x->n++] = (candidate){corners, refine_given ? o->refine : strengths[i],
+                                        room(2 * h->body.mesh.nv, sizeof(double))};
+}
+
+void rig_choose(const fitting *f, double *const *transforms, const vg_rig_options *o, bool corners_given,
+                bool refine_given, rig_choice *choice)
+{
+    choosing x = {.f = f, .transforms = transforms};
+    size_t nv = f->h->body.mesh.nv;
+    x.rank = room(f->n, sizeof *x.rank);
+    for (size_t i = 0; i < f->n; i++)
+        if (!fitting_is_held_out(f, i)) x.rank[i] = x.fitted++;
+    x.folds = x.fitted < FOLDS ? x.fitted : FOLDS;
+    for (int way = 0; way < 2; way++)
+        for (size_t i = 0; i < FITTING_BATCH; i++) x.out[way][i] = room(3 * nv, sizeof(double));
+    list_candidates(&x, o, corners_given, refine_given);
+    for (x.fold = 0; x.fold < x.folds && x.folds > 1; x.fold++) {
+        cli_progress("folds", x.fold + 1);
+        try_fold(&x, o);
+    }
+    choose_best(&x, choice);
+    for (size_t c = 0; c < x.n; c++) free(x.at[c].sums);
+    for (int way = 0; way < 2; way++)
+        for (size_t i = 0; i < FITTING_BATCH; i++) free(x.out[way][i]);
+    free(x.rank);
+}
