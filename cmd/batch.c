@@ -1,4 +1,4 @@
-/* batch.c: the one loop of the filters. Leaves out what is done to the frames, which is a program's step.
+/* batch.c: the loop that all filters share. What a filter does to frames is its step.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "batch.h"
 

@@ -1,4 +1,4 @@
-/* bone_edits.c: --edit of vg-play: parses turns of single bones, finds the bones in a rig, and turns them.
+/* bone_edits.c: --edit of vg-play: parses rotations of single bones, finds the bones in a rig, and rotates them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "bone_edits.h"
 
@@ -28,7 +28,7 @@ void bone_edits_take(const char *text, void *edits)
         .bone = copy, .axis = twist ? 't' : *axis, .degrees = cli_parse_number("--edit", angle)};
 }
 
-/* Axes x, y and z are those of the skeleton's pose without rotations, carried along with the bone. */
+/* Axes x, y and z are those of the skeleton's pose without rotations; they move with the bone. */
 static void find_bone(struct bone_edit *edit, const vg_rig *r, const char *operand)
 {
     edit->number = vg_rig_find(r, edit->bone);

@@ -1,5 +1,5 @@
 /* cli.c: what all programs share: start, messages, exit, input. The only file that prints to standard error.
- * Leaves out the command line (options.c) and where output goes (output.c).
+ * options.c has the command line, output.c the output.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 #include "options.h"
@@ -22,8 +22,8 @@ enum {
 
 struct cli_state cli;
 
-/* Programs end without the C library's clean-up, which would flush half a report. A coverage build wants its counters
- * written all the same. */
+/* Programs exit without the C library's clean-up, which would flush half a report. A coverage build needs it to
+ * write its counters. */
 void __gcov_dump(void) __attribute__((weak));
 static void leave(int status) __attribute__((noreturn));
 static void leave(int status)
@@ -49,7 +49,7 @@ static void print_error(const char *text, size_t n)
     while (n) {
         ssize_t k = write(STDERR_FILENO, text, n);
         if (k < 0 && errno == EINTR) continue;
-        if (k <= 0) return; /* there is nobody left to tell */
+        if (k <= 0) return; /* a failure to write the message cannot be reported */
         text += k, n -= (size_t)k;
     }
 }
@@ -102,9 +102,9 @@ static void say_error(const char *format, ...)
 
 /* ---------------------------------------------------------------------------------------- the end -- */
 
-static vg_source *upstream; /* of cli_source: it may know of a program before this one that failed */
+static vg_source *upstream; /* the input of cli_source: it may hold the message of an earlier program that failed */
 
-/* Nothing half-written stays. Of a pipe's programs the first that failed is named to all behind it. */
+/* Remove half-written output. All later programs of a pipe name the first one that failed. */
 static void give_up(int code, int status, const char *message) __attribute__((noreturn));
 static void give_up(int code, int status, const char *message)
 {
@@ -166,13 +166,13 @@ void cli_usage(const char *format, ...)
 void cli_finish(int status)
 {
     progress_erase();
-    output_remove(); /* of an output that was never ended */
+    output_remove(); /* the temporary file of an unfinished output */
     output_flush();
     leave(status);
 }
 
-/* Programs leave by leave(): whoever calls exit() is a library that gives up, as libarchive does without memory. Its
- * status would say something else, and half a file would stay. */
+/* Programs exit by leave(). Only a library that gives up calls exit(), as libarchive does without memory; its
+ * status would be wrong, and half a file would remain. */
 static void library_gave_up(void)
 {
     output_discard();
@@ -202,10 +202,10 @@ char *cli_copy_text(const char *text, const char *what)
     return copy;
 }
 
-/* -------------------------------------------------------------------------------------- the beginning -- */
+/* no file was read before */
 
-/* A descriptor that was closed by the parent would be taken by the next file we open, and be written over. It is
- * opened the wrong way round, so that using it fails instead of losing output in silence. */
+/* If the parent closed a standard descriptor, the next open would take its number, and output would overwrite that
+ * file. Open it with the opposite access mode, so that using it fails. */
 static void repair_descriptors(void)
 {
     for (int fd = 0; fd <= 2; fd++)
@@ -217,7 +217,9 @@ static void widen_pipe(int fd)
     struct stat st;
     if (fstat(fd, &st) || !S_ISFIFO(st.st_mode)) return;
     int now = fcntl(fd, F_GETPIPE_SZ);
-    if (now >= 0 && now < PIPE_BYTES && fcntl(fd, F_SETPIPE_SZ, PIPE_BYTES) < 0) return; /* as it was: only slower */
+    if (now >= 0 && now < PIPE_BYTES && fcntl(fd, F_SETPIPE_SZ, PIPE_BYTES) < 0) return; /* on failure the pipe
+                                                                                            keeps its size: only
+                                                                                            slower */
 }
 
 /* VG_ISA: the instruction set of the kernels. */
@@ -234,8 +236,8 @@ size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands)
     cli.program = p, cli.argc = argc, cli.argv = argv;
     repair_descriptors();
     if (atexit(library_gave_up)) cli_stop(VG_ENOMEM, "not enough memory to start");
-    signal(SIGPIPE, SIG_DFL); /* a parent may have ignored it */
-    signal(SIGXFSZ, SIG_IGN); /* a file size limit is a failed write, with a message */
+    signal(SIGPIPE, SIG_DFL); /* the parent may have ignored SIGPIPE */
+    signal(SIGXFSZ, SIG_IGN); /* exceeding a file size limit becomes a failed write with a message */
     choose_kernels();
     *operands = cli_allocate((size_t)argc, sizeof **operands, "the operands");
     size_t n = options_parse(argc, argv, *operands);
@@ -248,7 +250,7 @@ size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands)
 
 /* ----------------------------------------------------------------------------------------------- input -- */
 
-static char input_is_for[64]; /* what reads standard input; empty: nothing yet */
+static char input_is_for[64]; /* the option or operand that reads standard input; empty: none yet */
 
 void cli_claim_input(const char *option, const char *operand)
 {
@@ -328,6 +330,6 @@ char *cli_read_file(const char *path, size_t *n)
     }
     if (!f || ferror(f)) cli_stop(VG_ESYS, "cannot read '%s': %s", path, strerror(errno ? errno : EIO));
     if (f != stdin) fclose(f);
-    data[*n] = 0; /* the last turn of the loop has read nothing into its room */
+    data[*n] = 0; /* the last read found the end of the input */
     return data;
 }

@@ -1,5 +1,4 @@
-/* driving.c: --align and --joints of vg-play.
- * Leaves out how joints are paired by their names and how limbs are turned (lib/method/rig).
+/* driving.c: --align and --joints of vg-play. lib/method/rig pairs joints by name and aligns limbs.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "driving.h"
 #include "lines.h"
@@ -67,7 +66,7 @@ static uint32_t take_joint(lines *l, const vg_skeleton *s, const char *whose)
     return (uint32_t)j;
 }
 
-/* Each line: a bone of the rig, a joint of the skeleton. What is not named has no partner. */
+/* Each line has a bone of the rig and a joint of the skeleton. Bones that are not listed have no partner. */
 static uint32_t *read_pairs(const char *file, const vg_skeleton *of, const vg_skeleton *by)
 {
     uint32_t *partner = cli_allocate(of->njoints, sizeof *partner, "the joints");

@@ -1,5 +1,4 @@
-/* fitting.c: the driver of fits: collect, hold out, pass, sample, judge.
- * Leaves out what is fitted (vg-fitmap.c, rigging.c).
+/* fitting.c: the driver of fits: collect, hold out, pass, sample, judge. The fits themselves are in the programs.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "fitting.h"
 
@@ -7,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const size_t in_memory = (size_t)256 << 20; /* bytes of poses; beyond it they are in a file */
+static const size_t in_memory = (size_t)256 << 20; /* bytes of poses in memory; the rest goes to a file */
 
 void fitting_collect(fitting *f, vg_source *s, long holdout, const char *what)
 {

@@ -1,4 +1,4 @@
-/* lines.c: small text files of options, line by line.
+/* lines.c: reads small text files of options line by line.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "lines.h"
 

@@ -1,4 +1,4 @@
-/* options.c: the command line: options and operands, what they may be, and -h. Leaves out what they are for.
+/* options.c: the command line: options, operands and -h.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "options.h"
 #include "processors.h"
@@ -17,7 +17,7 @@ enum { MOST_OPTIONS = 64, MOST_THREADS = 256, HELP_COLUMN = 32 };
 static bool want_help, want_version;
 static long threads_asked;
 
-/* The options that programs share, and which programs have them. */
+/* The shared options, and which programs have them. */
 typedef enum shared_use { ALL, OUTPUT, TEXT, STREAM, THREADS } shared_use;
 static const struct shared {
     shared_use use;
@@ -47,11 +47,11 @@ static bool applies(const cli_program *p, shared_use use)
     }
 }
 
-/* For programs that run others, and therefore not in the list of -h: vg(7) describes it. */
+/* For scripts and other programs, so not listed by -h: vg(7) describes it. */
 static const cli_option progress_option = {
     .name = "progress", .value = "json[:FD]", .help = "", .take = progress_take};
 
-/* All options of the program, its own first, and which of them were given. */
+/* All options of the program, its own first, and whether each was given. */
 static struct {
     size_t n;
     const cli_option *at[MOST_OPTIONS];
@@ -87,7 +87,7 @@ static int option_text(const cli_option *o, char *to, size_t n)
     return snprintf(to, n, "  %s--%s%s%s", letter, o->name, o->value ? " " : "", o->value ? o->value : "");
 }
 
-/* An option that is too long for the column has its explanation on a line of its own. */
+/* The help of an option too long for its column goes on the next line. */
 static void print_help(const cli_program *p)
 {
     char text[128];
@@ -106,7 +106,7 @@ static void print_help(const cli_program *p)
     }
 }
 
-/* strtod takes more than a person means by a number: blanks before it, hexadecimal, names. */
+/* strtod also accepts leading blanks, hexadecimal numbers and names. */
 static bool parse_number(const char *text, double *x)
 {
     char *end;
@@ -191,7 +191,7 @@ static void take_option(size_t number, const char *value)
 
 enum { LONG_BASE = 256 }; /* getopt's value of option i is LONG_BASE + i, whether it has a letter or not */
 
-/* The number of the option that getopt means; known.n: none. */
+/* The index of the option for getopt's value; known.n: none. */
 static size_t find_option(int value)
 {
     if (value >= LONG_BASE) return (size_t)(value - LONG_BASE);
@@ -200,7 +200,7 @@ static size_t find_option(int value)
     return i;
 }
 
-/* The least number of letters to insert, drop, replace or swap with a neighbour that makes `text` of `name`. */
+/* The edit distance: the smallest number of letters to insert, delete, replace or swap with a neighbour. */
 static size_t edit_distance(const char *text, size_t n, const char *name)
 {
     enum { MOST = 32 };
@@ -223,7 +223,7 @@ static size_t edit_distance(const char *text, size_t n, const char *name)
     return row[k];
 }
 
-/* The option that was meant, most likely: the nearest, unless a third of it or more would be wrong. */
+/* The most similar option, unless a third or more of its letters differ. */
 static const cli_option *likely_option(const char *text, size_t length)
 {
     const cli_option *likely = NULL;
@@ -242,7 +242,7 @@ static const cli_moved *moved_option(const char *text, size_t length)
     return NULL;
 }
 
-/* What getopt did not like, in our words. */
+/* The error of getopt in our words. */
 static void refuse_option(int problem, char **argv) __attribute__((noreturn));
 static void refuse_option(int problem, char **argv)
 {
@@ -266,7 +266,7 @@ static void refuse_option(int problem, char **argv)
     cli_usage("unknown option '%.*s': '%s --help' lists them", length, text, cli.program->name);
 }
 
-/* An option of two words takes the next one, too: that is no option itself. */
+/* An option of two words takes the next argument, too, unless that is an option. */
 static void take_second(const cli_option *o, int argc, char **argv)
 {
     const char *next = optind < argc ? argv[optind] : "-?";
@@ -277,7 +277,7 @@ static void take_second(const cli_option *o, int argc, char **argv)
     *o->second = argv[optind++];
 }
 
-/* Operands are collected in order, options may stand between them; what follows "--" are operands. */
+/* Collect operands in order; options may stand between them; everything after "--" is an operand. */
 static size_t parse(int argc, char **argv, char **operands)
 {
     struct option longs[MOST_OPTIONS + 1] = {{0}};
@@ -323,7 +323,7 @@ static void check_excludes(const cli_option *o)
             cli_usage("--%s does not go with --%.*s", o->name, (int)strcspn(p, "|"), p);
 }
 
-/* Not before the options are read: --verbose may follow --version. */
+/* Print the version after all options are read: --verbose may follow --version. */
 static void print_version(const char *name)
 {
     printf("%s (vg) %s\nstream 1.0\n", name, VG_VERSION);
@@ -334,7 +334,7 @@ static void print_version(const char *name)
     putchar('\n');
 }
 
-/* Do the options that were given stand together? */
+/* Check that the given options are compatible. */
 static void check_together(void)
 {
     for (size_t i = 0; i < known.n; i++) {
@@ -369,7 +369,7 @@ size_t options_parse(int argc, char **argv, char **operands)
 
 /* --------------------------------------------------------------------------------------------- values -- */
 
-/* An option's name, whether it was given with its dashes or without. */
+/* Compare names of options with or without their dashes. */
 static const char *bare(const char *option)
 {
     return option + strspn(option, "-");

@@ -1,5 +1,5 @@
-/* output.c: where the stream or text of a program goes: standard output, or a file that is replaced as a whole once it is
- * complete (vg_targets). Leaves out mesh files, which are vg_sink's.
+/* output.c: the stream or text output of a program: standard output, or a file that is replaced as a whole when it
+ * is complete (vg_targets). Mesh files are written by vg_sink.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "output.h"
 #include "cli.h"
@@ -19,11 +19,11 @@ static struct {
     int fd; /* -1: not open */
     FILE *text;
     vg_writer *writer;
-    char shown[PATH_MAX + 8]; /* what messages call it */
+    char shown[PATH_MAX + 8]; /* its name in messages */
     vg_targets targets;       /* empty: standard output */
 } out = {.fd = -1};
 
-static void (*discard_other)(void); /* output that is not ours; NULL: none */
+static void (*discard_other)(void); /* removes other output; NULL: there is none */
 
 static bool has_temporary(void)
 {
@@ -52,7 +52,7 @@ void output_abandon(const char *program, int status, const char *message)
 static void end_by_signal(int number)
 {
     output_discard();
-    raise(number); /* the handler was one-shot: the second time ends the process, and by the right signal */
+    raise(number); /* the handler is reset: raising the signal again ends the process by it */
 }
 
 static void catch_signals(void)
@@ -86,7 +86,7 @@ static bool ends_with_one(const char *name, const char *const *suffixes)
     return false;
 }
 
-/* Names that promise something else than a stream: better said before an hour of work than after it. */
+/* Names of other formats: refused before the work, not after an hour of it. */
 static bool names_picture(const char *name)
 {
     static const char *const pictures[] = {".png", ".html", ".htm", NULL};
@@ -97,7 +97,7 @@ static bool names_meshes(const char *name)
 {
     static const char *const foreign[] = {".fbx", ".dae", ".abc", ".usd", ".usdc", ".usdz", NULL};
     struct stat st;
-    bool exists = !stat(name, &st) && !S_ISREG(st.st_mode); /* a directory, a pipe: what it is goes before its name */
+    bool exists = !stat(name, &st) && !S_ISREG(st.st_mode); /* for a directory or a pipe the suffix does not matter */
     return (!exists && vg_sink_check(name, &(vg_sink_options){.replace = true}, NULL) == VG_OK) || ends_with_one(name, foreign);
 }
 
@@ -146,7 +146,7 @@ static void open_output(void)
     if (out.fd < 0) cli_die(&e);
 }
 
-/* Close the output and give it its final name. Standard output stays for cli_finish. */
+/* Close the output and rename it. Standard output is left to cli_finish. */
 static void close_output(void)
 {
     vg_err e;
@@ -201,7 +201,7 @@ void cli_stream_open(vg_head *h)
     open_output();
     if (isatty(out.fd)) refuse_terminal();
     if (!cli.no_provenance) {
-        /* the program's own name instead of the path it was found by: same command, same bytes, on any machine */
+        /* the program's name without its path: the same bytes on any machine */
         char *called = cli.argv[0];
         cli.argv[0] = (char *)(uintptr_t)cli.program->name;
         int r = vg_head_trace(h, cli.program->name, cli.argc, cli.argv, &e);

@@ -1,4 +1,4 @@
-/* playback.h: the job of vg-play: poses from a map of transforms of patches or bones.
+/* playback.h: the job of vg-play: poses from a map of patches or bones.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_PLAYBACK_H
 #define VG_PLAYBACK_H
@@ -15,8 +15,8 @@ typedef struct playback_options {
     pose_times between; /* count 0: every pose of the input is played */
 } playback_options;
 
-/* playback_run: the whole job, from the head of the input to the end of the output. Without input (s NULL) the
- * reference pose of the map is edited. */
+/* playback_run: the whole job, from the head of the input to the end of the output. Without input (s NULL) it
+ * edits the reference pose of the map. */
 void playback_run(playback_options *o, vg_source *s);
 
 #endif

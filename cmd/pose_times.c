@@ -1,5 +1,5 @@
-/* pose_times.c: moments of a path through key poses: the options N and --at, and names of the poses there. Leaves out the
- * paths themselves (lib/method).
+/* pose_times.c: the positions that N and --at ask for along a path through key poses, and the names of poses
+ * there. The paths are in lib/method.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "pose_times.h"
 

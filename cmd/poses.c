@@ -1,4 +1,4 @@
-/* poses.c: all poses of a sequence in memory.
+/* poses.c: reads all poses of a sequence into memory.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "poses.h"
 

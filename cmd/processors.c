@@ -1,5 +1,5 @@
-/* processors.c: how many processors this process may use: its affinity mask, and what its control groups allow; and
- * that libraries, while they are loaded, see but one. Leaves out what is done with them (lib/core/threads.c).
+/* processors.c: the number of processors that this process may use, by its affinity mask and its control groups;
+ * and hides all but one from libraries while they are loaded. lib/core/threads.c uses the number.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "processors.h"
 
@@ -13,9 +13,9 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-/* OpenBLAS, when it is loaded, starts a thread for each processor: they spin, take 128 MB of address space each, and try
- * for ever where that is not to be had. The programs' own threads call it, one product each, so that none of them is
- * ever of use. What runs before the libraries' constructors is system calls only. */
+/* When OpenBLAS is loaded it starts a thread per processor. They spin, take 128 MB of address space each, and are
+ * retried for ever without it. They are of no use here, because the programs' own threads make one product each.
+ * Before the libraries' constructors only system calls may run. */
 static struct {
     unsigned long all[1024 / sizeof(long)];
     long bytes; /* of the mask; not positive: nothing was hidden */
@@ -47,7 +47,7 @@ static bool read_line(const char *path, char *line, size_t n)
     return ok;
 }
 
-/* CPUs of one control group as its files give them; a large number when it sets no limit. */
+/* The CPUs that one control group allows; a large number without a limit. */
 static double group_limit(const char *directory)
 {
     char path[PATH_MAX + 32], line[64];
@@ -62,8 +62,8 @@ static double group_limit(const char *directory)
     return (double)quota / (double)period;
 }
 
-/* The limit of a group is that of the tightest of it and those above it. In a container the path may name groups that
- * cannot be seen from inside: then only the root counts, which is the container's own. */
+/* The limit is the lowest of the group and its parents. In a container the path may name groups that are not
+ * visible; then only the root counts, which is the container's own. */
 static double path_limit(const char *root, const char *group)
 {
     char path[PATH_MAX];

@@ -1,4 +1,4 @@
-/* processors.h: how many threads a program starts unless told.
+/* processors.h: the default number of threads.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_PROCESSORS_H
 #define VG_PROCESSORS_H

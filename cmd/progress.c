@@ -1,7 +1,6 @@
-/* progress.c: what a program is doing, on a terminal or for another program. Leaves out messages (cli.c).
+/* progress.c: shows progress on a terminal or to another program. Messages are in cli.c.
  *
- * Of the programs of a pipe only the slowest draws its line: the one whose input pipe is full, since it is waited for,
- * and whose output pipe is not, since it waits for nobody.
+ * In a pipe only the slowest program draws its line: its input pipe is full and its output pipe is not.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "progress.h"
 #include "cli.h"
@@ -62,7 +61,7 @@ static int pipe_is_full(int fd, int otherwise)
     return 2 * (long)held >= size;
 }
 
-/* Has whoever writes into standard input come to an end? Then nobody before this program is slower. */
+/* Has the writer of standard input ended? Then no earlier program is slower. */
 static bool input_has_ended(void)
 {
     struct pollfd p = {.fd = STDIN_FILENO, .events = POLLIN};
@@ -108,7 +107,7 @@ static void draw(const char *label, uint64_t n, uint64_t total, double left)
     write_some(STDERR_FILENO, line, k);
 }
 
-/* Labels and names of programs are ours: nothing in them needs escaping. */
+/* Labels and program names are ours and need no escaping. */
 static void print_json(const char *label, uint64_t n, uint64_t total, double left, double now)
 {
     char line[256];
@@ -121,7 +120,7 @@ static void print_json(const char *label, uint64_t n, uint64_t total, double lef
     write_some(progress.fd, line, k);
 }
 
-/* Seconds until `total`, at the speed of this phase so far; -1: not known. */
+/* Seconds until `total` at the speed of this phase so far; -1: not known. */
 static double time_left(uint64_t n, uint64_t total, double now)
 {
     uint64_t done = n - progress.phase_first;

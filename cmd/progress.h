@@ -1,4 +1,4 @@
-/* progress.h: what cli.c and options.c ask of progress.c; the programs' side of it is in cli.h.
+/* progress.h: the interface of progress.c for cli.c and options.c; programs use cli.h.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_PROGRESS_H
 #define VG_PROGRESS_H
@@ -7,7 +7,7 @@
 void progress_start(void);
 /* progress_take: the value of --progress; to be given to cli_option. */
 void progress_take(const char *value, void *context);
-/* progress_erase: take the line off the terminal, if there is one. */
+/* progress_erase: clear the line on the terminal, if there is one. */
 void progress_erase(void);
 
 #endif

@@ -1,5 +1,4 @@
-/* report.c: named values and tables, printed as aligned text or as JSON; of cmd/ the one file that knows Jansson.
- * Leaves out what is reported and where it goes.
+/* report.c: named values and tables, printed as aligned text or as JSON; the only file of cmd/ that uses Jansson.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "report.h"
 #include "cli.h"
@@ -203,7 +202,7 @@ void report_row(report *r, const report_value *cells)
 
 /* ----------------------------------------------------------------------------------------------- text -- */
 
-/* A value as text, in memory of the caller's to free. */
+/* A value as text; caller frees it. */
 static char *shown(const report_value *v)
 {
     char *text = NULL;
@@ -232,7 +231,7 @@ static char *shown(const report_value *v)
     return text;
 }
 
-/* Columns on a terminal that a text takes, every code point counted as one. */
+/* The width of a text on a terminal; each code point counts as one column. */
 static int width_of(const char *s)
 {
     int n = 0;
@@ -255,7 +254,7 @@ static bool ends_run(const item *t)
     return t->kind == NOTE || (t->kind == TABLE && t->label);
 }
 
-/* The lines of a run of values share one width of labels. */
+/* Consecutive values align their labels. */
 static size_t print_values(const report *r, size_t first, FILE *f)
 {
     size_t end = first;
@@ -282,7 +281,7 @@ static bool is_numeric(const item *t, size_t column)
     return true;
 }
 
-/* Cells of one row: numbers to the right, words to the left of their columns; no blanks at the end of the line. */
+/* One row: numbers right-aligned, words left-aligned, no trailing blanks. */
 static void print_row(const item *t, char *const *cells, const int *width, const bool *numeric, FILE *f)
 {
     int owed = 0;
@@ -338,13 +337,13 @@ static void print_text(const report *r, FILE *f)
 
 /* ----------------------------------------------------------------------------------------------- JSON -- */
 
-/* Jansson goes on without what it did not get, and gives half a text. */
+/* Jansson continues after a failed allocation and would write an incomplete text. */
 static void *json_memory(size_t n)
 {
     return checked(malloc(n));
 }
 
-/* JSON is UTF-8; a file name need not be: what is not becomes '?'. */
+/* JSON is UTF-8, but a file name need not be: invalid bytes become '?'. */
 static json_t *json_of_text(const char *s)
 {
     json_t *j = json_string(s);
@@ -414,7 +413,7 @@ static void print_json(const report *r, FILE *f)
         if (t->kind == TABLE && t->key) set(open[depth], t->key, json_of_table(t));
         if (t->kind == GROUP && depth + 1 < MOST_DEPTH) {
             open[depth + 1] = json_object();
-            set(open[depth], t->key, open[depth + 1]); /* takes the reference over; it lives as long as its parent */
+            set(open[depth], t->key, open[depth + 1]); /* takes ownership; it lives as long as its parent */
             depth++;
         }
         if (t->kind == END && depth > 0) depth--;

@@ -1,6 +1,7 @@
-/* report.h: one builder for all reports: named values and tables, printed as aligned text or as JSON.
- * Every item has a key, its name in JSON, and a label, its name in the text; with only one of them it is only there.
- * Running out of memory ends the program. Numbers do not follow the locale; one that is not finite is "-" or null.
+/* report.h: one builder for all reports: named values and tables, printed as aligned text or as JSON. Every item
+ * has a key, its name in JSON, and a label, its name in the text; an item without one of them appears only in the
+ * other form. Without memory the program stops. Numbers do not depend on the locale; non-finite ones are "-" or
+ * null.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_REPORT_H
 #define VG_REPORT_H
@@ -45,21 +46,22 @@ typedef struct report_column {
 report *report_new(void);
 void report_free(report **r);
 
-/* report_put: one named value. label NULL: only in JSON; key NULL: only in the text. */
+/* report_put: one named value. label NULL: JSON only; key NULL: text only. */
 void report_put(report *r, const char *key, const char *label, report_value value);
-/* report_note: a line of text that JSON leaves out. report_gap: an empty one. */
+/* report_note: a line of text that is not in JSON. report_gap: an empty line. */
 void report_note(report *r, const char *format, ...) VG_PRINTF(2, 3);
 void report_gap(report *r);
-/* report_group .. report_end: what is between is an object of its own in JSON; the text just goes on. */
+/* report_group .. report_end: the items between are an object in JSON; the text does not change. */
 void report_group(report *r, const char *key);
 void report_end(report *r);
 
-/* report_table: rows to follow by report_row. In JSON an array of objects, or when `keyed` an object of objects named
- * by the first column. title NULL: only in JSON; "": a table without a title. columns are borrowed until free. */
+/* report_table: starts a table; report_row adds rows. In JSON an array of objects, or if `keyed` an object of
+ * objects named by the first column. title NULL: JSON only; "": a table without a title. columns are borrowed
+ * until free. */
 void report_table(report *r, const char *key, const char *title, bool keyed, const report_column *columns, size_t n);
 void report_row(report *r, const report_value *cells); /* one per column */
 
-/* report_join: all of `more` behind what r has; frees `more`. */
+/* report_join: append `more` to r, and free `more`. */
 void report_join(report *r, report *more);
 
 void report_print(const report *r, FILE *f, bool json);

@@ -1,4 +1,4 @@
-/* signals.c: what a signal is, in words and numbers.
+/* signals.c: describes a signal in reports.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signals.h"
 #include "cli.h"

@@ -1,15 +1,15 @@
-/* signals.h: a signal in reports, and as the lines that vg-sample --edit takes.
+/* signals.h: a signal in reports, and as lines for vg-sample.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CMD_SIGNALS_H
 #define VG_CMD_SIGNALS_H
 
 #include "report.h"
 
-/* report_signal: sizes and errors, as in the source's table 1. */
+/* report_signal: sizes and errors, as in table 1 of Cashman and Hormann. */
 void report_signal(report *r, const vg_signal *s);
-/* write_positions: a line for each control point and frame; comments say which frames are sites. */
+/* write_positions: one line per control point and frame, for vg-sample --edit; comments mark the sites. */
 void write_positions(FILE *f, const vg_signal *s);
-/* write_curve: points of the curve, four to a frame, as vg-sample --curve takes them; comments give times, deviations, in
+/* write_curve: points of the curve, four per frame, for vg-sample --curve; comments give times, deviations in
  * units of `diagonal`, and crossings. */
 void write_curve(FILE *f, const vg_signal *s, double diagonal);
 

@@ -1,5 +1,4 @@
-/* skeletons.c: what vg-info tells of skeletons and rigs: the tree of joints, and skinning weights as text.
- * Leaves out how skeletons are read (lib/io) and fitted (vg-fitmap).
+/* skeletons.c: describes skeletons and rigs for vg-info: the tree of joints, and skinning weights as text.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "skeletons.h"
 #include "cli.h"
@@ -9,7 +8,7 @@
 
 static const uint32_t NONE = UINT32_MAX;
 enum {
-    MOST_INDENTS = 20,  /* what is nested deeper is not moved further to the right */
+    MOST_INDENTS = 20,  /* deeper levels are not indented further */
     CHANNELS_LINE = 128 /* six times ", rotation x" and some */
 };
 
@@ -17,10 +16,11 @@ static const char *const channel_names[] = {"Xposition", "Yposition", "Zposition
                                             "Xrotation", "Yrotation", "Zrotation"};
 static const report_column columns[] = {{.key = "name"}, {.key = "parent"}, {.key = "channels"}, {.key = "offset"}};
 
-/* Who is below whom: children of j, or the roots (at njoints), are a list. */
+/* Linked lists of the children of each joint j, and of the roots (at njoints). */
 typedef struct kin {
     uint32_t *first, *next;
-    bool *folded; /* ends that are told with their parent: no channels, no children, the parent's name and ".end" */
+    bool *folded; /* end sites shown with their parent: no channels, no children, named after the parent with
+                     ".end" */
 } kin;
 
 static bool is_end(const vg_skeleton *s, size_t j)

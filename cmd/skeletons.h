@@ -1,14 +1,13 @@
-/* skeletons.h: what vg-info tells of skeletons and rigs.
+/* skeletons.h: skeletons and rigs in reports.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_SKELETONS_H
 #define VG_SKELETONS_H
 
 #include "report.h"
 
-/* report_skeleton: its joints as a tree, in a group that the caller has begun. label: what it is called in the
- * text. */
+/* report_skeleton: the joints as a tree, in a group that the caller has begun. label: its name in the text. */
 void report_skeleton(report *r, const char *label, const vg_skeleton *s);
-/* write_weights: the skin of a rig as text, a vertex per line. */
+/* write_weights: the skinning weights of a rig as text, one vertex per line. */
 void write_weights(FILE *f, const vg_rig *g, size_t nv);
 
 #endif

@@ -1,4 +1,4 @@
-/* take.c: which frames of a sequence are wanted, as numbers and ranges on the command line. Leaves out names of frames.
+/* take.c: parses which frames of a sequence are wanted, as numbers and ranges.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "take.h"
 
@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const uint64_t most = UINT64_MAX / 4; /* so that nothing below overflows */
+static const uint64_t most = UINT64_MAX / 4; /* so that sums cannot overflow */
 
-/* digits to a number; NULL: there are none, or too many */
+/* parse digits; NULL: there are none, or too many */
 static const char *take_number(const char *p, uint64_t *x)
 {
     const char *start = p;
@@ -19,7 +19,7 @@ static const char *take_number(const char *p, uint64_t *x)
     return p == start ? NULL : p;
 }
 
-/* "7", "7-9", "7-", the last two with "/2" behind them or not */
+/* "7", "7-9" or "7-"; the last two may end in "/2" */
 static const char *take_one(const char *p, take_range *r)
 {
     p = take_number(p, &r->first);
