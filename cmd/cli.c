@@ -217,9 +217,7 @@ static void widen_pipe(int fd)
     struct stat st;
     if (fstat(fd, &st) || !S_ISFIFO(st.st_mode)) return;
     int now = fcntl(fd, F_GETPIPE_SZ);
-    if (now >= 0 && now < PIPE_BYTES && fcntl(fd, F_SETPIPE_SZ, PIPE_BYTES) < 0) return; /* on failure the pipe
-                                                                                            keeps its size: only
-                                                                                            slower */
+    if (now >= 0 && now < PIPE_BYTES && fcntl(fd, F_SETPIPE_SZ, PIPE_BYTES) < 0) return; /* else only slower */
 }
 
 /* VG_ISA: the instruction set of the kernels. */

@@ -22,8 +22,7 @@ typedef struct cli_option {
     const char **second; /* with text: the option takes two words, and this is the second */
     double *number;
     long *integer;
-    void (*take)(const char *value, void *context); /* for repeated or structured options; reports errors by
-                                                       cli_usage */
+    void (*take)(const char *value, void *context); /* repeated or structured options; fails by cli_usage */
     void *context;
     double least, most; /* for number and integer; both 0: any */
     bool reads;         /* text and second name inputs: "-" is standard input */
@@ -48,8 +47,7 @@ typedef struct cli_program {
     bool writes_map;      /* the stream holds a map and no frames: it is for vg-play */
     bool writes_text;     /* has -o --output and --json */
     bool writes_file;     /* has -o --output, written through cli_text_open */
-    bool traces;          /* has --no-provenance although its main output is no stream, because it writes another
-                             one */
+    bool traces;          /* has --no-provenance, because it writes another stream */
     bool threaded;        /* has -j --threads */
     bool any_form;        /* accepts frames of unknown form, because it does not use their values */
 } cli_program;

@@ -19,8 +19,7 @@ static const report_column columns[] = {{.key = "name"}, {.key = "parent"}, {.ke
 /* Linked lists of the children of each joint j, and of the roots (at njoints). */
 typedef struct kin {
     uint32_t *first, *next;
-    bool *folded; /* end sites shown with their parent: no channels, no children, named after the parent with
-                     ".end" */
+    bool *folded; /* end sites shown with their parent, after which they are named with ".end" */
 } kin;
 
 static bool is_end(const vg_skeleton *s, size_t j)

@@ -36,14 +36,14 @@ static void allow_formats(struct archive *la)
 
 typedef struct member {
     char *path;
-    size_t index;     /* place among the mesh files of the archive */
+    size_t index;     /* index among the mesh files of the archive */
     int64_t off;      /* in the spool */
     size_t bytes;
 } member;
 
 struct vgi_archive {
     char *name;
-    bool (*wanted)(const char *path); /* which members are ours */
+    bool (*wanted)(const char *path); /* selects the members to read */
     vgi_limits limits;
     locale_t utf8;
     vgi_tap file;
@@ -53,8 +53,8 @@ struct vgi_archive {
     vg_bytes path; /* of the current member, with terminator */
     member *members;
     size_t n, cap, next;
-    uint64_t total;  /* bytes that this walk has unpacked */
-    size_t entries;  /* that it has passed */
+    uint64_t total;  /* bytes unpacked in this pass */
+    size_t entries;  /* members passed */
     int spool; /* -1: members come from a second pass */
 };
 
@@ -81,8 +81,7 @@ bool vgi_is_archive(const unsigned char *data, size_t n)
            starts(data, n, "7z\xbc\xaf\x27\x1c", 6) || (n >= 262 && !memcmp(data + 257, "ustar", 5));
 }
 
-/* The formats that one can tell from their start; libarchive takes what it does not know for raw data, and zeros for
- * the end of a tar. */
+/* Formats with a signature. libarchive takes unknown data for raw data, and zeros for the end of a tar. */
 bool vgi_may_be_archive(const unsigned char *data, size_t n)
 {
     struct archive_entry *entry;
@@ -141,7 +140,7 @@ static int walk_open(vgi_archive *a, vg_err *e)
     return r < ARCHIVE_WARN ? damaged(a, a->la, NULL, e) : VG_OK;
 }
 
-/* Bytes unpacked so far, those passed over included. */
+/* Bytes unpacked so far, with those of skipped members. */
 static int check_total(const vgi_archive *a, vg_err *e)
 {
     uint64_t seen = a->packed ? a->unpacker.sum->bytes : a->total;
@@ -164,7 +163,7 @@ static int set_path(vgi_archive *a, const char *s, size_t n, vg_err *e)
     return r < 0 ? r : vgi_bytes_append(&a->path, "", 1, e);
 }
 
-/* A path from an archive is only ever a name here, so all that "./" and "/" in front say is where it once lay. */
+/* Paths from an archive are used only as names, so a leading "./" or "/" is dropped. */
 static int take_path(vgi_archive *a, struct archive_entry *entry, vg_err *e)
 {
     locale_t before = vgi_enter_utf8(a->utf8);
@@ -176,7 +175,7 @@ static int take_path(vgi_archive *a, struct archive_entry *entry, vg_err *e)
     return set_path(a, s, strlen(s), e);
 }
 
-/* As in directories, hidden files are none of ours: archives made on a Mac have "._pose1.obj" beside "pose1.obj". */
+/* Hidden files are skipped, as in directories: archives made on a Mac have "._pose1.obj" beside "pose1.obj". */
 static bool is_pose_name(const char *path)
 {
     return *vgi_base_name(path) != '.' && vgi_format_by_suffix(path);
@@ -211,7 +210,7 @@ static int judge_member(vgi_archive *a, struct archive_entry *entry, vg_err *e)
     return 1;
 }
 
-/* A member that is none of ours has to be unpacked all the same where several are packed as one. */
+/* A skipped member must be unpacked all the same if several are packed as one. */
 static void pass_over(vgi_archive *a, struct archive_entry *entry)
 {
     switch (archive_format(a->la)) {
@@ -260,7 +259,7 @@ static int read_member(vgi_archive *a, vg_bytes *data, vg_err *e)
 
 /* ---- is all of it there? ---- */
 
-/* What follows the last member of a compressed archive: the rest of the packed data, and gzip's trailer. */
+/* Read the rest of a compressed archive: packed data, and gzip's trailer. */
 static int check_packed_end(vgi_archive *a, vg_err *e)
 {
     vgi_unpacker *u = &a->unpacker;
@@ -283,7 +282,7 @@ static int check_packed_end(vgi_archive *a, vg_err *e)
     return VG_OK;
 }
 
-/* A tar that was cut between two members looks whole but for the blocks of zeros in the end. */
+/* A tar that was cut between two members lacks only the blocks of zeros at the end. */
 static int check_tar_end(const vgi_archive *a, vg_err *e)
 {
     if ((archive_format(a->la) & ARCHIVE_FORMAT_BASE_MASK) != ARCHIVE_FORMAT_TAR) return VG_OK;
@@ -319,7 +318,7 @@ static int holds_no_mesh(const vgi_archive *a, vg_err *e)
     return vg_fail(e, VG_EINPUT, "archive '%s' holds no mesh file (%s)", a->name, vgi_kinds_read());
 }
 
-/* Nor is a zip without a member one for libarchive. */
+/* libarchive does not recognise a zip without members. */
 static int not_an_archive(const vgi_archive *a, vg_err *e)
 {
     unsigned char start[512];
@@ -331,7 +330,7 @@ static int not_an_archive(const vgi_archive *a, vg_err *e)
     return vgi_unknown_kind(a->name, e);
 }
 
-/* Files of whole sequences count only where there are no mesh files, as in directories. */
+/* Files that hold a sequence are read only if there are no mesh files, as in directories. */
 static void prefer_poses(vgi_archive *a)
 {
     size_t poses = 0, n = 0;
@@ -376,7 +375,7 @@ static int compare_members(const void *p, const void *q)
     return order ? order : (a->index > b->index) - (a->index < b->index);
 }
 
-/* The next member of a walk must be the one that was listed. */
+/* The second pass must find the members that were listed. */
 static int read_listed(vgi_archive *a, size_t i, vg_bytes *data, vg_err *e)
 {
     int r = walk_next(a, e);
@@ -441,7 +440,7 @@ int vgi_archive_open_for(vgi_archive **out, int fd, int64_t base, const char *na
 
 /* ---- a compressed stream ---- */
 
-/* Is it compressed, and does what is in there begin like a stream? */
+/* Is this a compressed stream? */
 static bool begins_like_stream(const vgi_archive *a)
 {
     unsigned char start[8];

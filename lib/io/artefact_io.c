@@ -1,5 +1,5 @@
-/* artefact_io.c: header records as bytes, both directions, by the table of records (model/artefact.h; fmt/STREAM.md,
- * section 3). Leaves out what the contents must hold (model/checks.c) and the order of records (stream.c).
+/* artefact_io.c: reads and writes header records by the table of records (model/artefact.h; fmt/STREAM.md, section
+ * 3). model/checks.c checks contents, stream.c the order of records.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/artefact_io.h"
 #include "io/cursor.h"
@@ -13,7 +13,7 @@ static void *member(const vgi_member *f, const void *artefact)
 
 /* ---- reading ---- */
 
-/* A u64 as the member has it, which may be shorter. */
+/* Store a u64 in the member, which may be narrower. */
 static int set_number(const vgi_member *f, void *to, uint64_t x, const vgi_payload *p, vg_err *e)
 {
     uint32_t word = (uint32_t)x;
@@ -71,7 +71,7 @@ static int read_texts(cursor *c, const vgi_member *f, char *array, size_t n, con
     return r;
 }
 
-/* Memory is taken when the bytes that fill it are there: those of a text are at least its length's. */
+/* Allocate memory only when the bytes that fill it are present: at least the length of each text. */
 static int read_array(cursor *c, const vgi_member *f, void **to, size_t n, size_t rows, const vgi_payload *p, vg_err *e)
 {
     size_t size = f->type == VGI_TEXT ? 8 : vgi_type_size(f->type);
@@ -170,7 +170,7 @@ static int write_array(vg_bytes *b, const vgi_member *f, const char *from, size_
     return r == VG_OK ? put_padding(b, 0, e) : r;
 }
 
-/* A mesh without faces may be without its list of starts, which then is a single 0. */
+/* A mesh without faces may lack its list of starts, which is then a single 0. */
 static int write_field(vg_bytes *b, const vgi_member *f, const void *artefact, const vg_mesh *mesh, vg_err *e)
 {
     static const uint32_t zero;
@@ -189,7 +189,7 @@ int vgi_artefact_encode(const vgi_artefact *t, vg_bytes *b, const vg_head *h, si
     return r;
 }
 
-/* Two counts of 32 bits, the parents, and texts that follow their lengths without padding. */
+/* The earlier form: two counts of 32 bits, the parents, and texts behind their lengths without padding. */
 bool vgi_is_earlier_provenance(const vgi_artefact *t, const vgi_payload *p)
 {
     if (strcmp(t->tag, "PROV")) return false;

@@ -1,4 +1,4 @@
-/* artefact_io.h: header records as bytes, by the table of model/artefact.h.
+/* artefact_io.h: reads and writes header records by the table of model/artefact.h.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_ARTEFACT_IO_H
 #define VG_ARTEFACT_IO_H
@@ -6,12 +6,13 @@
 #include "io/payload.h"
 #include "model/artefact.h"
 
-/* vgi_artefact_decode: the payload of a record into h, checked. On failure h may be cleared and nothing else. */
+/* vgi_artefact_decode: decode and check the payload of a record into h. On failure h may only be cleared. */
 int vgi_artefact_decode(const vgi_artefact *t, const vgi_payload *p, vg_head *h, vg_err *e) VG_MUST_CHECK;
-/* vgi_artefact_encode: append what h has, number i of those that repeat; b begins on the payload's first byte. */
+/* vgi_artefact_encode: append the record of h, number i of those that repeat; b starts at the first byte of the
+ * payload. */
 int vgi_artefact_encode(const vgi_artefact *t, vg_bytes *b, const vg_head *h, size_t i, vg_err *e) VG_MUST_CHECK;
 
-/* vgi_is_earlier_provenance: is this a PROV record as it was before its counts had 64 bits (fmt/CHANGES.md)? */
+/* vgi_is_earlier_provenance: does this PROV record have the earlier form, with counts of 32 bits (fmt/CHANGES.md)? */
 bool vgi_is_earlier_provenance(const vgi_artefact *t, const vgi_payload *p);
 
 #endif

@@ -16,7 +16,7 @@ enum { PC2_HEADER = 32, PC2_RATE_OFF = 20, PC2_SAMPLES_OFF = 28, MDD_HEADER = 8,
 
 static const char pc2_magic[12] = "POINTCACHE2";
 
-/* MDD wants a time for every sample: what is written when the sequence has none. */
+/* MDD has a time for every sample: the interval for sequences without times. */
 
 static uint32_t load(const unsigned char *p, bool big)
 {
@@ -45,7 +45,7 @@ typedef struct reading {
     vgi_input *in;
     const char *subject;
     bool big;
-    uint32_t samples, points, next; /* next: sample to be handed out */
+    uint32_t samples, points, next; /* next: number of the next sample */
     vg_bytes ahead;                 /* its bytes, when have_ahead */
     bool have_ahead;
     bool timed;
@@ -74,7 +74,7 @@ static int take_sample(reading *x, vg_err *e)
     return r;
 }
 
-/* 0, which ends the sequence, if the file ends too. */
+/* 0, the end of the sequence, if the file ends too. */
 static int finish(reading *x, vg_err *e)
 {
     int r = vgi_input_ended(x->in, e);
@@ -99,7 +99,7 @@ static int begin_reading(reading **out, void **state, vgi_input *in, const char 
     return VG_OK;
 }
 
-/* The first sample comes before the count of points is believed. */
+/* Read the first sample before the count of points is trusted. */
 static int finish_head(reading *x, vg_head *h, vg_err *e)
 {
     int r = take_sample(x, e);
@@ -109,8 +109,8 @@ static int finish_head(reading *x, vg_head *h, vg_err *e)
     return VG_OK;
 }
 
-/* The rate's unit is frames of the scene for some programs and seconds for others. Samples at whole numbers, one by
- * one, only count frames: they give no times. */
+/* Some programs give the rate in frames of the scene, others in seconds. Samples at consecutive integers only
+ * count frames: they give no times. */
 static void judge_times(reading *x)
 {
     x->timed = !(x->rate == 1 && x->start == floorf(x->start));
@@ -206,14 +206,14 @@ static bool sniff_pc2(const unsigned char *data, size_t n)
 /* ------------------------------------------------------------------------------------------- writing -- */
 
 typedef struct writing {
-    vgi_output *out; /* MDD: the file; its positions wait in `spool`, for the times come before them */
+    vgi_output *out; /* MDD: the file; its positions wait in `spool`, because the times come first */
     vgi_output spool;
     bool big;
     size_t points;
     uint32_t samples;
     vg_bytes sample;
     /* times: */
-    bool untimed, uneven; /* a frame without time; not at equal distances */
+    bool untimed, uneven; /* some frame has no time; times are not evenly spaced */
     double first, last, step;
     vg_bytes times; /* MDD: as they are written */
 } writing;
@@ -240,7 +240,7 @@ static int begin_pc2(void **state, const vg_head *h, const vg_sink_options *o, v
     memcpy(head, pc2_magic, sizeof pc2_magic);
     vgi_put32(head + 12, 1);
     vgi_put32(head + 16, (uint32_t)x->points);
-    return vgi_output_put(out, head, sizeof head, e); /* start, rate and samples are set in the end */
+    return vgi_output_put(out, head, sizeof head, e); /* start, rate and samples are set at the end */
 }
 
 static int begin_mdd(void **state, const vg_head *h, const vg_sink_options *o, vgi_output *out, vg_err *e)
@@ -253,7 +253,7 @@ static int begin_mdd(void **state, const vg_head *h, const vg_sink_options *o, v
     return x->spool.fd < 0 ? x->spool.fd : VG_OK;
 }
 
-/* Equal distances: to what binary32 can tell of them. */
+/* Are the times evenly spaced, within the precision of binary32? */
 static void note_time(writing *x, const vg_frame *f)
 {
     uint32_t i = x->samples;
@@ -302,7 +302,7 @@ static int end_pc2(void *state, vg_err *e)
     writing *x = state;
     float start = 0, rate = 1;
     if (!x->untimed && !x->uneven) {
-        /* over the whole length: a step between two frames may have been rounded */
+        /* from the whole duration, because single steps may have been rounded */
         start = (float)x->first;
         if (x->samples > 1) rate = (float)((x->last - x->first) / (x->samples - 1));
     }

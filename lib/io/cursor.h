@@ -1,5 +1,5 @@
-/* cursor.h: what the files that know the contents of records share (payload.c, frame_io.c, artefact_io.c): a cursor
- * that takes numbers, lists and texts from a payload, and the same for writing. No other file includes it.
+/* cursor.h: a cursor that takes numbers, lists and texts from a payload, and the same for writing. Shared by the
+ * files that know the contents of records (payload.c, frame_io.c, artefact_io.c); no other file includes it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CURSOR_H
 #define VG_CURSOR_H
@@ -12,7 +12,7 @@ enum { NATIVE = 1 };
 enum { NATIVE = 0 };
 #endif
 
-/* ---- a cursor that cannot run over, and never reports more than is there ---- */
+/* a cursor that never passes the end of the payload */
 
 typedef struct cursor {
     const unsigned char *at, *end;
@@ -52,7 +52,7 @@ static inline double take_double(cursor *c)
     return vgi_as_double(take64(c));
 }
 
-/* n elements of `size` bytes, but only if they are really there */
+/* n elements of `size` bytes, if they are present */
 static inline const unsigned char *take_array(cursor *c, uint64_t n, size_t size)
 {
     if (n > (size_t)(c->end - c->at) / size) {
@@ -101,7 +101,7 @@ static inline int put64(vg_bytes *b, uint64_t x, vg_err *e)
     return vgi_bytes_append(b, p, sizeof p, e);
 }
 
-/* What a reader would refuse is not written: all numbers are finite. */
+/* Readers refuse numbers that are not finite, so none is written. */
 static inline int put_doubles(vg_bytes *b, const double *x, size_t n, vg_err *e)
 {
     if (!vgi_finite(x, n)) return vg_fail(e, VG_EINPUT, "the result holds a number that is not finite");
@@ -149,7 +149,8 @@ static inline bool take_padding(cursor *c, size_t n)
     return p != NULL;
 }
 
-/* A text: its length, its bytes, padding. Where it lies in the payload, and *n; NULL and *r set when it is malformed. */
+/* A text: its length, bytes and padding. Returns its address in the payload and sets *n; NULL and *r if it is
+ * malformed. */
 static inline const char *peek_text(cursor *c, size_t *n, const vgi_payload *p, int *r, vg_err *e)
 {
     uint64_t length = take64(c);
@@ -162,7 +163,7 @@ static inline const char *peek_text(cursor *c, size_t *n, const vgi_payload *p, 
     return NULL;
 }
 
-/* The same as a copy. */
+/* The same, copied. */
 static inline char *take_text(cursor *c, const vgi_payload *p, int *r, vg_err *e)
 {
     size_t n;

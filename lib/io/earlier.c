@@ -1,6 +1,5 @@
-/* earlier.c: mesh files that are already where a set of them is to be written. A reader would take those that are not
- * overwritten for frames of the new set.
- * Leaves out the writing (sink.c).
+/* earlier.c: finds mesh files of an earlier set where a new set is to be written. A reader would take those that
+ * are not overwritten for frames of the new set. sink.c writes.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sink.h"
 
@@ -10,7 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* A part of a pattern like "pose-%04d.obj" for glob(3): "%%" is a percent sign, and nothing is special to glob. */
+/* Quote a part of a pattern such as "pose-%04d.obj" for glob(3); "%%" is a percent sign. */
 static int append_literal(vg_bytes *to, const char *s, size_t n, vg_err *e)
 {
     int r = VG_OK;
@@ -29,7 +28,7 @@ static size_t literal_length(const char *s, size_t n)
     return length;
 }
 
-/* Is what a path has between `before` and `after` bytes a number from `first` on? */
+/* Is the part of the path between `before` and `after` bytes a number from `first` on? */
 static bool has_number(const char *path, size_t before, size_t after, uint64_t first)
 {
     size_t n = strlen(path);

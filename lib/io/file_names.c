@@ -1,6 +1,6 @@
-/* file_names.c: the files of frames in a directory or archive. Readers take them in natural order, so their names have to
- * ascend; where the names of the frames do not, the files get a number in front.
- * Leaves out the files (sink.c) and the order itself (names.c).
+/* file_names.c: the file names of frames in a directory or archive. Readers sort files naturally, so names must
+ * ascend in that order; if the names of the frames do not, files get a number in front. sink.c writes the files,
+ * names.c defines the order.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sink.h"
 
@@ -18,13 +18,13 @@ int vgi_file_name_numbered(vg_bytes *file, uint64_t number, const char *name, co
     return r < 0 ? r : vgi_bytes_append(file, suffix, strlen(suffix) + 1, e);
 }
 
-/* May a file be called so, and do readers take it for a pose? Of a zip they may take '\' for '/'. */
+/* Is this a possible file name, which readers take for a pose? In a zip they may read '\' as '/'. */
 static bool is_file_name(const char *name)
 {
     return *name && *name != '.' && !strpbrk(name, "/\\");
 }
 
-/* Remember `file` as the last one; false: it does not follow the last one in natural order. */
+/* Remember `file` as the last one; false: it does not sort behind the one before. */
 static int follow(vgi_file_names *t, const char *file, bool *follows, vg_err *e)
 {
     *follows = !t->last.size || vgi_natural_compare((char *)t->last.data, file) < 0;

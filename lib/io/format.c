@@ -1,13 +1,13 @@
-/* format.c: the table of mesh formats, and reading and writing one mesh file in memory.
- * Leaves out the formats themselves (obj.c, ply.c, off.c, stl.c) and where the bytes come from and go to.
+/* format.c: the table of mesh formats; reads and writes one mesh file in memory. The formats are in obj.c, ply.c,
+ * off.c and stl.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-/* By content the first that says yes is taken, so those with a signature come before STL and OBJ, which have none.
- * By suffix, the first with that suffix. */
+/* By content the first match is taken, so formats with a signature come before STL and OBJ, which have none. By
+ * suffix, the first with that suffix. */
 static const vgi_format *const formats[] = {&vgi_format_ply, &vgi_format_ply_ascii, &vgi_format_ply_be,
                                             &vgi_format_off, &vgi_format_stl,
                                             &vgi_format_stl_ascii, &vgi_format_obj};
@@ -88,7 +88,7 @@ int vg_model_read(vg_model *m, const void *data, size_t n, const char *format, c
     return vgi_model_read(m, data, n, known, name, subject, e);
 }
 
-/* Are n numbers finite in the precision asked for? */
+/* Are n numbers finite in the given precision? */
 static int check_range(const double *x, size_t n, size_t per_item, const char *what, bool full_precision, vg_err *e)
 {
     for (size_t i = 0; i < n; i++) {

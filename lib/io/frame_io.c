@@ -1,5 +1,5 @@
-/* frame_io.c: a frame as bytes, both directions side by side (fmt/STREAM.md, section 3.12): name, channels, values.
- * Leaves out headers and checksums of records (record.c) and their order (stream.c).
+/* frame_io.c: reads and writes a frame (fmt/STREAM.md, section 3.12): name, channels, values. record.c has record
+ * headers and checksums, stream.c their order.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/numbers_kernel.h"
 #include "io/cursor.h"
@@ -10,7 +10,7 @@
 enum { AS_INDICES = 1 }; /* Type of a channel; the others are a vg_precision */
 enum { MOST_CHANNELS = 255 };
 
-/* Channels that have a meaning, and where they may be. */
+/* Channels with a meaning, and the forms that may have them. */
 enum { TIME, ROOT, ANCHORS, PINS, TURNS, MEANINGS };
 static const struct {
     const char *name;
@@ -48,7 +48,7 @@ static bool count_fits(const vgi_form *h, vg_element element, uint64_t count)
 
 /* ---- reading ---- */
 
-typedef struct taken { /* what stands before the numbers of a channel */
+typedef struct taken { /* the fields before the numbers of a channel */
     vgi_channel_texts texts;
     uint64_t width, count, type;
 } taken;
@@ -89,7 +89,7 @@ static const char *refuse_channel(const taken *t, vg_element element, const vgi_
     return count_fits(h, element, t->count) ? refuse_meaning(t, element, h) : "its count does not fit its elements";
 }
 
-/* The numbers of a channel to where they belong: time and root have a place of their own. */
+/* Store the numbers of a channel; time and root have their own members. */
 static int take_numbers(cursor *c, vg_frame *f, const vgi_form *h, const taken *t, const vgi_payload *p, vg_err *e)
 {
     size_t n, size = t->type == VG_F64 ? 8 : 4;
@@ -167,7 +167,7 @@ static bool has_zero_quaternion(const vgi_form *h, const double *values)
     return false;
 }
 
-/* Binary64 is used where it lies. */
+/* Binary64 is used in place. */
 static int take_values(cursor *c, vg_frame *f, const vgi_form *h, const vgi_payload *p, vg_err *e)
 {
     size_t n;
@@ -205,7 +205,7 @@ int vgi_fram_decode(vg_frame *f, const vgi_form *h, const char *where, vg_err *e
 
 /* ---- writing ---- */
 
-/* Channels whose elements are no longer those of the head are left out, such as turns of a skeleton that was replaced. */
+/* Channels whose elements no longer match the head are dropped, such as rotations of a skeleton that was replaced. */
 static bool is_written(const vg_channel *c, const vgi_form *h)
 {
     int meaning = meaning_of(c->name, strlen(c->name));
@@ -234,7 +234,7 @@ static int put_own(vg_bytes *b, int meaning, const char *unit, const double *num
 static int append_values(vg_bytes *b, const double *x, size_t n, vg_precision precision, vg_err *e)
 {
     if (precision == VG_F64) return put_doubles(b, x, n, e);
-    int r = vgi_bytes_reserve(b, b->size + 4 * n, e); /* what is there ends on a multiple of 8 */
+    int r = vgi_bytes_reserve(b, b->size + 4 * n, e); /* the content so far ends at a multiple of 8 */
     if (r == VG_OK && NATIVE && vgi_to_single((float *)(void *)(b->data + b->size), x, n)) b->size += 4 * n, n = 0;
     for (size_t i = 0; r == VG_OK && i < n; i++, b->size += 4) {
         float y = (float)x[i];
@@ -254,7 +254,7 @@ static int put_channel(vg_bytes *b, const vg_channel *c, const vgi_form *h, vg_e
     return r < 0 ? r : put_padding(b, 0, e);
 }
 
-/* What a reader would refuse is not written. */
+/* Check what a reader would refuse. */
 static int check_channel(const vg_channel *c, const vgi_form *h, const char *name, vg_err *e)
 {
     char where[200];
@@ -266,7 +266,7 @@ static int check_channel(const vg_channel *c, const vgi_form *h, const char *nam
     return VG_OK;
 }
 
-/* The values' own finiteness is vg_writer_put's to check. */
+/* vg_writer_put checks that the values are finite. */
 static int check_frame(const vgi_form *h, const vg_frame *f, const char *name, uint64_t *written, vg_err *e)
 {
     int r = VG_OK;

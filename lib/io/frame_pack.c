@@ -1,5 +1,4 @@
-/* frame_pack.c: a frame as one run of bytes.
- * Leaves out where the bytes are kept (spool.c, poses.c).
+/* frame_pack.c: a frame as one block of bytes. spool.c and poses.c store the blocks.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/frame_pack.h"
 #include "model/frame.h"
@@ -21,7 +20,7 @@ static bool add(size_t *sum, size_t n, size_t size)
     return vgi_mul(n, size, &bytes) && !__builtin_add_overflow(*sum, bytes, sum);
 }
 
-/* What precedes a channel's texts and numbers. */
+/* The header of a channel's texts and numbers. */
 typedef struct channel_front {
     size_t name, unit, element, width, count;
     vg_precision precision;
@@ -35,7 +34,7 @@ static channel_front front_of(const vg_channel *c)
                            .list = c->vertices != NULL};
 }
 
-/* Bytes of the numbers, or of the list. */
+/* Size of the numbers or of the list in bytes. */
 static size_t data_of(const channel_front *c)
 {
     return c->width * c->count * (c->list ? sizeof(uint32_t) : sizeof(double));

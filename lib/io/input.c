@@ -1,5 +1,5 @@
-/* input.c: bytes from a descriptor or from memory, with a look ahead; nothing is trusted before it has arrived.
- * Leaves out what the bytes mean.
+/* input.c: bytes from a descriptor or from memory, with lookahead. Counts in the input are not trusted before the
+ * bytes have arrived.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -9,21 +9,21 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* Small reads go through a buffer of this size; larger ones straight to their place. */
+/* Small reads go through a buffer of this size; larger ones directly to their destination. */
 enum { BUFFER = 256 * 1024, AHEAD = 4096 };
 
-/* A member of an archive is in memory as a whole, and as a mesh takes several times its size; the total guards
- * spools; all three guard the time. */
+/* Limits. A member of an archive is in memory as a whole, and as a mesh takes several times its size; the total
+ * limits temporary files; all three limit the time. */
 const vgi_limits vgi_usual_limits = {
     .member_bytes = (uint64_t)1 << 30, .total_bytes = (uint64_t)64 << 30, .members = (size_t)1 << 21};
 
 struct vgi_input {
     int fd; /* -1: memory only */
     bool own, ended;
-    bool known; /* a regular file or memory: it holds what it holds, however often it is looked at */
+    bool known; /* a regular file or memory, whose size does not change */
     char *name;
     unsigned char *buffer;     /* NULL for memory */
-    const unsigned char *data; /* what has been read and not taken */
+    const unsigned char *data; /* bytes read but not yet taken */
     size_t size;
     vgi_limits limits;
 };
@@ -165,7 +165,7 @@ int vgi_input_take(vgi_input *in, vg_bytes *b, size_t n, size_t *got, vg_err *e)
     size_t piece = 1u << 20, have = 0, some = 0;
     int r = VG_OK;
     while (r == VG_OK && have < n) {
-        /* what the buffer already has room for costs nothing; beyond it, at most as much again as has arrived */
+        /* room that the buffer has costs nothing; beyond it, at most double what has arrived */
         size_t room = b->cap - b->size, step = room > piece ? room : piece;
         if (step > n - have) step = n - have;
         if ((r = vgi_bytes_reserve(b, b->size + step, e)) < 0) break;

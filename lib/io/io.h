@@ -6,10 +6,10 @@
 
 #include "core/core.h"
 
-/* ---- input.c: bytes from a descriptor or from memory, with a look ahead ---- */
+/* input.c: bytes from a descriptor or from memory, with lookahead */
 
 typedef struct vgi_input vgi_input;
-/* own: close it in the end */
+/* own: close it at the end */
 int vgi_input_fd(vgi_input **in, int fd, bool own, const char *name, vg_err *e) VG_MUST_CHECK;
 /* data is borrowed */
 int vgi_input_memory(vgi_input **in, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
@@ -18,43 +18,44 @@ int vgi_input_file(vgi_input **in, const char *path, vg_err *e) VG_MUST_CHECK;
 void vgi_input_free(vgi_input **in);
 const char *vgi_input_name(const vgi_input *in);
 const char *vgi_input_path(const vgi_input *in); /* of the file it was opened from; NULL: it is none */
-/* vgi_input_peek: the next bytes without taking them, up to n <= 4096; *got is less only at the end of input. */
+/* vgi_input_peek: the next bytes without taking them, up to n <= 4096; *got is smaller only at the end of input. */
 int vgi_input_peek(vgi_input *in, size_t n, const unsigned char **data, size_t *got, vg_err *e) VG_MUST_CHECK;
-/* vgi_input_ended: 1 when nothing is left, 0 when something is, negative when it cannot be read. */
+/* vgi_input_ended: 1 at the end of input, 0 before, negative if it cannot be read. */
 int vgi_input_ended(vgi_input *in, vg_err *e) VG_MUST_CHECK;
-/* vgi_input_read: exactly n bytes; VG_ETRUNC when the input ends before. *got (may be NULL): how many came. */
+/* vgi_input_read: exactly n bytes; VG_ETRUNC if the input ends before. *got (may be NULL): the number that came. */
 int vgi_input_read(vgi_input *in, void *to, size_t n, size_t *got, vg_err *e) VG_MUST_CHECK;
-/* vgi_input_take: append exactly n bytes to b, which grows as they arrive (a false n costs no memory). */
+/* vgi_input_take: append exactly n bytes to b, which grows as they arrive, so that a wrong n costs no memory. */
 int vgi_input_take(vgi_input *in, vg_bytes *b, size_t n, size_t *got, vg_err *e) VG_MUST_CHECK;
-/* What an input may hold, so that a small file cannot fill a machine, nor a pipe that never ends. */
+/* Limits of an input, so that a small file or an endless pipe cannot exhaust the machine. */
 typedef struct vgi_limits {
-    uint64_t member_bytes, total_bytes; /* unpacked, of an archive; an input that is no regular file as a whole may be
-                                           slurped up to the first and spooled up to the second */
+    /* unpacked, of an archive; an input that is not a regular file may have up to the first limit in memory, and up
+       to the second in a temporary file */
+    uint64_t member_bytes, total_bytes;
     size_t members;                     /* entries of any kind */
 } vgi_limits;
 extern const vgi_limits vgi_usual_limits;
-void vgi_input_limit(vgi_input *in, const vgi_limits *limits); /* else the usual ones */
+void vgi_input_limit(vgi_input *in, const vgi_limits *limits); /* else the defaults */
 const vgi_limits *vgi_input_limits(const vgi_input *in);
-/* vgi_input_slurp: append all that is left. */
+/* vgi_input_slurp: append the rest of the input. */
 int vgi_input_slurp(vgi_input *in, vg_bytes *b, vg_err *e) VG_MUST_CHECK;
-/* vg_reader over an input; the reader takes the input over, also when it fails. */
+/* A vg_reader over an input, which the reader takes over, also on failure. */
 int vgi_reader_open_input(vg_reader **r, vgi_input *in, vg_err *e) VG_MUST_CHECK;
 /* Does data start like a stream? */
 bool vgi_is_stream(const unsigned char *data, size_t n);
 
-/* vgi_nameless_file: a new file without a name in $TMPDIR (or /tmp), for reading and writing; its descriptor. */
+/* vgi_nameless_file: create an unnamed file in $TMPDIR (or /tmp), for reading and writing; returns its descriptor. */
 int vgi_nameless_file(vg_err *e) VG_MUST_CHECK;
-/* vgi_read_back: n bytes of such a file, from off on; VG_ESYS when they are not to be had. */
+/* vgi_read_back: read n bytes of such a file from `off` on; VG_ESYS if they cannot be read. */
 int vgi_read_back(int fd, uint64_t off, void *to, size_t n, vg_err *e) VG_MUST_CHECK;
-/* vgi_input_spool: copy what is left of an input that can be read only once into a file without a name. */
+/* vgi_input_spool: copy the rest of an input that can be read only once into an unnamed file. */
 int vgi_input_spool(vgi_input *in, int *fd, vg_err *e) VG_MUST_CHECK;
-/* vgi_write_all: write n bytes to fd, whatever the interruptions; VG_ESYS naming `name`. */
+/* vgi_write_all: write n bytes to fd, continuing after interruptions; VG_ESYS naming `name`. */
 int vgi_write_all(int fd, const void *data, size_t n, const char *name, vg_err *e) VG_MUST_CHECK;
 
-/* ---- number.c: numbers as text, whatever the locale ---- */
+/* number.c: numbers as text, independent of the locale */
 
-/* vgi_parse_double: the number at the start of [s, end): decimal, exponent, sign; "nan" and "inf" are read as such.
- * The result is correctly rounded. Returns the first byte behind it, or NULL when there is none. */
+/* vgi_parse_double: the number at the start of [s, end): decimal, exponent, sign; "nan" and "inf" are accepted.
+ * Correctly rounded. Returns the address behind it, or NULL if there is none. */
 const char *vgi_parse_double(const char *s, const char *end, double *x);
 /* vgi_parse_int: the same for a decimal integer that fits in int64_t. */
 const char *vgi_parse_int(const char *s, const char *end, int64_t *x);
@@ -67,24 +68,25 @@ size_t vgi_print_uint(char *to, uint64_t x); /* at most 20 bytes */
 
 /* ---- plain.c: text files as plain UTF-8 ---- */
 
-/* vgi_plain_text: step over the mark of UTF-8; text in UTF-16 is converted into `own`, which is empty, and *data points
- * there. Anything else stays as it is. A part of a file is treated as the whole would be. */
+/* vgi_plain_text: skip a UTF-8 byte order mark; convert UTF-16 text into `own`, which is empty, and set *data to
+ * it. Other text does not change. A part of a file is treated as the whole would be. */
 int vgi_plain_text(vg_bytes *own, const unsigned char **data, size_t *n, vg_err *e) VG_MUST_CHECK;
-/* vgi_input_slurp_text: all that is left, of a text, as plain UTF-8. */
+/* vgi_input_slurp_text: the rest of the input, a text, as plain UTF-8. */
 int vgi_input_slurp_text(vgi_input *in, vg_bytes *b, vg_err *e) VG_MUST_CHECK;
-size_t vgi_mark_bytes(const void *data, size_t n); /* of the mark of UTF-8 in front; 0: there is none */
+size_t vgi_mark_bytes(const void *data, size_t n); /* length of a UTF-8 byte order mark; 0: there is none */
 int vgi_append_letter(vg_bytes *to, uint32_t letter, vg_err *e) VG_MUST_CHECK; /* as UTF-8 */
 
-/* ---- mend.c: what a reader left out or put right ---- */
+/* mend.c: what a reader dropped or repaired */
 
 void vgi_note(vg_note *to, const char *format, ...) VG_PRINTF(2, 3); /* add to the line */
-void vgi_note_dropped(vg_note *to, size_t faces);                    /* as vgi_mend_faces says it */
-/* vgi_mend_faces: vg_mesh_check, but faces that name a vertex twice or have fewer than 2 corners are left out, shortened
- * or cut until the mesh is valid. points: of its vertices; a (may be NULL): its labels and corner_tex move along. */
+void vgi_note_dropped(vg_note *to, size_t faces);                    /* set by vgi_mend_faces */
+/* vgi_mend_faces: as vg_mesh_check, but drops, shortens or cuts faces that name a vertex twice or have fewer than
+ * 2 corners, until the mesh is valid. points: of its vertices; a (may be NULL): its labels and corner_tex are kept
+ * in step. */
 int vgi_mend_faces(vg_mesh *m, const double *points, vg_attributes *a, vg_note *notes, const char *subject,
                    vg_err *e) VG_MUST_CHECK;
 
-/* ---- lines.c: text of fields between blanks, a thing per line; '#' in front of a field begins a comment ---- */
+/* lines.c: text with one item per line, whose fields are separated by blanks; '#' before a field starts a comment */
 
 enum { VGI_FIELDS = 8, VGI_SUBJECT = 300 };
 
@@ -93,28 +95,28 @@ typedef struct vgi_field {
 } vgi_field;
 
 typedef struct vgi_line {
-    size_t number, n; /* of the line, from 1; of its fields, of which no more than VGI_FIELDS are kept */
+    size_t number, n; /* line number, from 1; number of its fields, of which at most VGI_FIELDS are kept */
     vgi_field at[VGI_FIELDS];
-    const char *begin, *end; /* the whole line, comment included */
+    const char *begin, *end; /* the whole line with its comment */
 } vgi_line;
 
 typedef struct vgi_lines {
     const char *at, *end;
     size_t number;       /* of the last line taken */
-    const char *subject; /* how messages call the text, quotes included; borrowed */
+    const char *subject; /* the name of the text in messages, with quotes; borrowed */
 } vgi_lines;
 
 vgi_lines vgi_lines_of(const void *data, size_t n, const char *subject);
-/* vgi_quote: how messages call a file of this name; in `subject`. */
+/* vgi_quote: the name of this file in messages, in `subject`. */
 const char *vgi_quote(const char *name, char subject[VGI_SUBJECT]);
-/* vgi_lines_next: the next line that says something; false at the end. Blanks are space, tab, CR,
- * comma and semicolon. */
+/* vgi_lines_next: advance to the next line with content; false at the end. Blanks are space, tab, CR, comma and
+ * semicolon. */
 bool vgi_lines_next(vgi_lines *t, vgi_line *l);
-/* vgi_line_more: the next field at or behind *at, which goes on behind it; for lines of any number of fields. */
+/* vgi_line_more: the next field at or behind *at, which moves behind it; for lines of any number of fields. */
 bool vgi_line_more(const vgi_line *l, const char **at, vgi_field *f);
 bool vgi_field_is(const vgi_field *f, const char *word);
-bool vgi_field_number(const vgi_field *f, double *x); /* is it one, and finite? */
-/* A field as what it has to be, or VG_EINPUT naming the line. vertex: `base` is the number of the first one. */
+bool vgi_field_number(const vgi_field *f, double *x); /* is it a finite number? */
+/* Convert a field, or VG_EINPUT naming the line. vertex: `base` is the number of the first one. */
 int vgi_field_vertex(const vgi_lines *t, const vgi_line *l, const vgi_field *f, int base, uint32_t *vertex,
                      vg_err *e) VG_MUST_CHECK;
 int vgi_line_vertex(const vgi_lines *t, const vgi_line *l, size_t field, int base, uint32_t *vertex,
@@ -123,36 +125,35 @@ int vgi_line_number(const vgi_lines *t, const vgi_line *l, size_t field, double 
 /* free it */
 int vgi_line_name(const vgi_lines *t, const vgi_line *l, size_t field, char **name, vg_err *e) VG_MUST_CHECK;
 
-/* ---- format.c: the table of mesh formats; obj.c ply.c off.c stl.c: one each ---- */
+/* format.c: the table of mesh formats; obj.c ply.c off.c stl.c: one format each */
 
-enum { /* what a format keeps of a sequence beside its numbers; of what it does not, the program warns */
+enum { /* what a format keeps of a sequence besides positions; the program warns of the rest */
     VGI_KEEPS_FACES = 1,    /* which are split into triangles without VGI_KEEPS_POLYGONS */
     VGI_KEEPS_POLYGONS = 2,
     VGI_KEEPS_ORDER = 4,    /* vertices keep their numbers, those in no face too */
     VGI_KEEPS_TEXTURE = 8,
     VGI_KEEPS_LABELS = 16,
     VGI_KEEPS_NAMES = 32,   /* of frames */
-    VGI_KEEPS_TIMES = 64,   /* of frames, any; a format that keeps only some says so in warning() */
+    VGI_KEEPS_TIMES = 64,   /* of frames, any; a format that keeps some of them says so in warning() */
     VGI_KEEPS_SKELETON = 128,
-    VGI_KEEPS_DOUBLES = 256, /* when full precision is asked for, which is refused otherwise */
-    VGI_KEEPS_ASSET = 512    /* materials, normals, skins; a format that keeps only some says so in warning() */
+    VGI_KEEPS_DOUBLES = 256, /* with full precision, which is refused otherwise */
+    VGI_KEEPS_ASSET = 512    /* materials, normals, skins; a format that keeps some of them says so in warning() */
 };
 
 typedef struct vgi_writing {
     const vg_mesh *mesh;
     const double *vertices;
-    const double *shape; /* a pose by which polygons are split, where they must be: the same for all poses of a
-                            sequence */
+    const double *shape; /* the pose by which polygons of all poses are split */
     const vg_attributes *attributes; /* may be NULL */
     bool full_precision;
-    const vg_patches *patches; /* may be NULL: a colour for each face, where the format has them */
-    const vg_bytes *rest;      /* what the format's `rest` gives for this sequence, made before; NULL: it is made */
+    const vg_patches *patches; /* may be NULL: a colour for each face, if the format has them */
+    const vg_bytes *rest;      /* the output of the format's `rest` for this sequence; NULL: compute it */
 } vgi_writing;
 
 typedef struct vgi_format {
-    const char *name;   /* what --format and NAME:format call it */
+    const char *name;   /* its name in --format and NAME:format */
     const char *suffix; /* ".obj" */
-    bool (*sniff)(const unsigned char *data, size_t n); /* does it start like one? (first 4096 bytes or all) */
+    bool (*sniff)(const unsigned char *data, size_t n); /* by the first 4096 bytes or all */
     /* read: fill *m, which is empty, from the whole file; on failure the caller clears it. `subject` is how messages
      * call the file, quotes included: "'a.obj'" or "'b.obj' in 'a.zip'"; they add the line. The faces
      * are checked by the caller with vgi_mend_faces; NaN and Inf are refused here. What is not used cannot stop it: it
@@ -166,7 +167,7 @@ typedef struct vgi_format {
 
 extern const vgi_format vgi_format_obj, vgi_format_ply, vgi_format_ply_ascii, vgi_format_ply_be, vgi_format_off,
     vgi_format_stl, vgi_format_stl_ascii;
-/* obj_write.c, ply_write.c: for the tables in obj.c and ply.c */
+/* obj_write.c, ply_write.c: used by the tables in obj.c and ply.c */
 int vgi_obj_write(vg_bytes *out, const vgi_writing *w, vg_err *e);
 int vgi_obj_rest(vg_bytes *out, const vgi_writing *w, vg_err *e);
 int vgi_ply_write_little(vg_bytes *out, const vgi_writing *w, vg_err *e);
@@ -176,23 +177,23 @@ int vgi_ply_rest_little(vg_bytes *out, const vgi_writing *w, vg_err *e);
 int vgi_ply_rest_text(vg_bytes *out, const vgi_writing *w, vg_err *e);
 int vgi_ply_rest_big(vg_bytes *out, const vgi_writing *w, vg_err *e);
 const vgi_format *vgi_format_by_name(const char *name, size_t n);     /* NULL: none */
-const vgi_format *vgi_format_by_suffix(const char *file_name);        /* case does not matter; NULL: none */
+const vgi_format *vgi_format_by_suffix(const char *file_name);        /* case-insensitive; NULL: none */
 const vgi_format *vgi_format_by_content(const unsigned char *data, size_t n);
 const char *vgi_format_names(void); /* "obj, ply, ..." for messages */
-/* vgi_model_read: vg_model_read for a file that messages call `subject` (quotes included). format NULL: told by
- * content, then by file_name. */
+/* vgi_model_read: vg_model_read for a file whose name in messages is `subject` (with quotes). format NULL:
+ * detected from content, then from file_name. */
 int vgi_model_read(vg_model *m, const void *data, size_t n, const vgi_format *format, const char *file_name,
                    const char *subject, vg_err *e) VG_MUST_CHECK;
 
-/* ---- sequence.c: the table of formats whose one file holds a sequence; caches.c npy.c bvh.c ...: each one ---- */
+/* sequence.c: the table of formats whose file holds a sequence; caches.c npy.c bvh.c ...: one format each */
 
-/* The bytes of a file that is being made: collected, and written from byte 0 on of a regular file. What a header says
- * of the whole is set at last, by patching. */
+/* An output file: bytes are buffered and written to a regular file from byte 0 on. Totals in a header are patched
+ * in at the end. */
 typedef struct vgi_output {
     int fd;
-    const char *name; /* what messages call it, borrowed */
+    const char *name; /* its name in messages; borrowed */
     vg_bytes waiting;
-    uint64_t size;    /* of all that was put */
+    uint64_t size;    /* number of bytes put */
 } vgi_output;
 int vgi_output_put(vgi_output *o, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
 /* of what was put */
@@ -205,8 +206,8 @@ void vgi_output_clear(vgi_output *o);
 typedef struct vgi_sequence_format {
     const char *name, *suffix;
     unsigned keeps;
-    bool bare; /* a file without faces is read all the same, as points */
-    /* the first 4096 bytes or all; NULL: nothing tells it but its name */
+    bool bare; /* read a file without faces as points */
+    /* the first 4096 bytes or all; NULL: recognised by its name alone */
     bool (*sniff)(const unsigned char *data, size_t n);
 
     /* Reading. Whatever the file says, memory grows only as bytes arrive: open has the first frame at hand before it
@@ -223,9 +224,9 @@ typedef struct vgi_sequence_format {
      * (there is one) and reference that the frames are of; open then says nothing of the mesh.
      * `with` is borrowed for the call only. */
     int (*join)(void *state, const vg_head *with, vg_err *e);
-    /* how many the file announces; a single one is called like the file. NULL: unknown */
+    /* the number of frames that the file states; a single frame is named after the file. NULL: unknown */
     uint64_t (*frames)(const void *state);
-    /* note (may be NULL): what open left out or put right, one line, empty when it was nothing. */
+    /* note (may be NULL): what open dropped or repaired, in one line; empty: nothing. */
     const char *(*note)(const void *state);
     void (*close)(void *state);
 
@@ -248,11 +249,11 @@ extern const vgi_sequence_format vgi_sequence_pc2, vgi_sequence_mdd, vgi_sequenc
 const vgi_sequence_format *vgi_sequence_by_name(const char *name, size_t n);   /* NULL: none */
 const vgi_sequence_format *vgi_sequence_by_suffix(const char *file_name);      /* case does not matter; NULL: none */
 const vgi_sequence_format *vgi_sequence_by_content(const unsigned char *data, size_t n);
-/* vgi_packable: the sequence format, or NULL, of a file that can stand for poses in a directory or archive:
- * it brings its faces. */
+/* vgi_packable: the sequence format, or NULL, of a file that can be a pose in a directory or archive, because it
+ * has faces. */
 const vgi_sequence_format *vgi_packable(const char *file_name);
 const char *vgi_sequence_names(void); /* "pc2, mdd, ..." for messages, those that are written */
-const char *vgi_kinds_read(void); /* "OBJ, PLY, ..." for messages: all that is read, but for streams and archives */
+const char *vgi_kinds_read(void); /* "OBJ, PLY, ...": all but streams and archives */
 
 /* vgi_model_write: vg_model_write with a shape, which is not checked. */
 int vgi_model_write(vg_bytes *out, const char *format, const vgi_writing *w, vg_err *e) VG_MUST_CHECK;
@@ -267,72 +268,73 @@ void vgi_names_clear(vgi_names *names);
 int vgi_names_add(vgi_names *names, const char *s, size_t n, vg_err *e) VG_MUST_CHECK;
 void vgi_names_sort(vgi_names *names); /* in natural order */
 
-/* Names each of which is there once. */
+/* A set of names. */
 typedef struct vgi_name_set {
     vgi_names names;
     size_t *slots, nslots; /* hash table: positions in names + 1, 0 = free; nslots is a power of two */
 } vgi_name_set;
-/* vgi_name_set_add: 1: it is new; 0: it was there. */
+/* vgi_name_set_add: 1: it is new; 0: the set has it. */
 int vgi_name_set_add(vgi_name_set *set, const char *name, vg_err *e) VG_MUST_CHECK;
-/* vgi_name_set_place: which one it is, in the order in which they came; it is added when it is new. */
+/* vgi_name_set_place: its index in order of first use; adds it if it is new. */
 int vgi_name_set_place(vgi_name_set *set, const char *name, size_t *at, vg_err *e) VG_MUST_CHECK;
 void vgi_name_set_clear(vgi_name_set *set);
 
-/* vgi_natural_compare: order of names as people expect it: numbers by value, decimals and negative ones too, the rest by
+/* vgi_natural_compare: natural order: numbers by value, with decimals and negative numbers, other characters by
  * byte; ties by strcmp. */
 int vgi_natural_compare(const char *a, const char *b);
-/* vgi_to_utf8: n bytes of text as UTF-8: as they are, or else each taken for the letter that it is in Latin-1, which
- * most old files are in, and a zero byte for '?'. Free it. */
+/* vgi_to_utf8: n bytes of text as UTF-8: unchanged if valid, else read as Latin-1, which most old files use, with
+ * '?' for zero bytes. Caller frees it. */
 char *vgi_to_utf8(const char *s, size_t n, vg_err *e);
 const char *vgi_base_name(const char *path); /* behind the last '/' */
-/* of the first n bytes, with something before it; any case */
+/* suffix of the first n bytes, with something before it; case-insensitive */
 bool vgi_has_suffix(const char *name, size_t n, const char *suffix);
 /* length of name without ".gz" or another suffix of one compressed file */
 size_t vgi_packed_stem(const char *name);
-/* vgi_pose_name: what a pose from this file is called: "dir/pose1.obj.gz" is "pose1". Valid UTF-8; free it; NULL: no
- * memory. */
+/* vgi_pose_name: the name of a pose from this file: "pose1" for "dir/pose1.obj.gz". Valid UTF-8; caller frees it;
+ * NULL: no memory. */
 char *vgi_pose_name(const char *path, vg_err *e);
 
-/* vgi_operand_files: add the files that an operand names: itself, the mesh files of a directory, or those that match
- * a pattern. */
+/* vgi_operand_files: add the files that an operand names: itself, the mesh files of a directory, or the files that
+ * match a pattern. */
 int vgi_operand_files(vgi_names *paths, const char *operand, vg_err *e) VG_MUST_CHECK;
 /* vgi_directory_poses: add the paths of the files in a directory that hold one pose each, sorted. */
 int vgi_directory_poses(vgi_names *paths, const char *path, vg_err *e) VG_MUST_CHECK;
 
-/* ---- archive.c, pack.c: files out of archives and into them; with unpack.c, the files that know libarchive ---- */
+/* archive.c, pack.c: read and write archives; with unpack.c, the files that use libarchive */
 
-/* The mesh files of an archive, or the single one that was compressed without an archive, in natural order. */
+/* The mesh files of an archive, or a single compressed file, in natural order. */
 typedef struct vgi_archive vgi_archive;
 /* vgi_is_archive: does data start like an archive or a compressed file? (first 4096 bytes or all) */
 bool vgi_is_archive(const unsigned char *data, size_t n);
-/* vgi_may_be_archive: could libarchive take it for one of the rarer kinds, too? Of what nothing else claims. */
+/* vgi_may_be_archive: might libarchive read it as one of the rarer kinds? For data that no other format claims. */
 bool vgi_may_be_archive(const unsigned char *data, size_t n);
-int vgi_unknown_kind(const char *name, vg_err *e); /* the failure of what is nothing that is known */
-/* vgi_archive_open: list what is there. fd is a regular file that is read from byte `base` on; it is taken over, also
- * on failure. name is what messages call the archive. VG_EINPUT when there is no mesh file in it. */
+int vgi_unknown_kind(const char *name, vg_err *e); /* the failure for unknown data */
+/* vgi_archive_open: list the files. fd is a regular file that is read from byte `base` on; it is taken over, also
+ * on failure. Messages call the archive `name`. VG_EINPUT if there is no mesh file in it. */
 int vgi_archive_open(vgi_archive **a, int fd, int64_t base, const char *name, const vgi_limits *limits,
                      vg_err *e) VG_MUST_CHECK;
-/* vgi_archive_open_for: the same for those members whose path is wanted. */
+/* vgi_archive_open_for: the same for the members whose path `wanted` selects. */
 int vgi_archive_open_for(vgi_archive **a, int fd, int64_t base, const char *name, bool (*wanted)(const char *path),
                          const vgi_limits *limits, vg_err *e) VG_MUST_CHECK;
-/* vgi_archive_next: 1, path (borrowed until the next call) and contents of the next file; 0 behind the last one. */
+/* vgi_archive_next: 1 with path (borrowed until the next call) and contents of the next file; 0 after the last
+ * one. */
 int vgi_archive_next(vgi_archive *a, const char **path, vg_bytes *data, vg_err *e) VG_MUST_CHECK;
 void vgi_archive_close(vgi_archive **a);
-/* vgi_unpack_stream: 1 when the file, read from byte `base` on, is a stream that was compressed without an archive:
- * unpacked whole into a file without a name, *stream, at its start; 0 when it is something else. fd is borrowed. */
+/* vgi_unpack_stream: 1 if the file, read from byte `base` on, is a compressed stream: it is unpacked into an
+ * unnamed file, *stream, at its start; 0 if it is anything else. fd is borrowed. */
 int vgi_unpack_stream(int fd, int64_t base, const char *name, const vgi_limits *limits, int *stream,
                       vg_err *e) VG_MUST_CHECK;
 /* Writing. The bytes depend on names and contents only. */
 typedef struct vgi_packer vgi_packer;
-bool vgi_packer_knows(const char *name, size_t n); /* do the first n bytes of name end like an archive we write? */
+bool vgi_packer_knows(const char *name, size_t n); /* is it a suffix of an archive we write? */
 const char *vgi_packer_suffixes(void);             /* ".zip .tar ..." for messages */
 /* vgi_packer_open: the suffix of the first n bytes of `name` selects the kind of archive; messages use this name. fd is
  * borrowed. */
 int vgi_packer_open(vgi_packer **p, int fd, const char *name, size_t n, vg_err *e) VG_MUST_CHECK;
-/* vgi_packer_open_plain: a zip whose members are stored as they are, whatever its name. */
+/* vgi_packer_open_plain: a zip with uncompressed members, whatever its name. */
 int vgi_packer_open_plain(vgi_packer **p, int fd, const char *name, vg_err *e) VG_MUST_CHECK;
 int vgi_packer_add(vgi_packer *p, const char *path, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
-/* A file in pieces: begin with its size, more until that is reached, finish. */
+/* Write a file in pieces: begin with its size, more until that is reached, finish. */
 int vgi_packer_begin(vgi_packer *p, const char *path, uint64_t n, vg_err *e) VG_MUST_CHECK;
 int vgi_packer_more(vgi_packer *p, const void *data, size_t n, vg_err *e) VG_MUST_CHECK;
 int vgi_packer_finish(vgi_packer *p, vg_err *e) VG_MUST_CHECK;

@@ -1,4 +1,4 @@
-/* json.c: JSON through Jansson: reading, looking up, changing, printing.
+/* json.c: reads, looks up, changes and prints JSON through Jansson.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/json.h"
 
@@ -6,7 +6,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 
-/* Jansson takes the lack of memory for wrong JSON in most places, so it is noted where it is met. */
+/* Jansson reports most failed allocations as wrong JSON, so they are recorded here. */
 static _Thread_local bool out_of_memory;
 
 static void *noting_malloc(size_t n)
@@ -18,7 +18,7 @@ static void *noting_malloc(size_t n)
 
 static void note_memory(void)
 {
-    json_set_alloc_funcs(noting_malloc, free); /* what is used anyway, for those who use Jansson beside us */
+    json_set_alloc_funcs(noting_malloc, free); /* the default seed, as other users of Jansson in the process expect */
 }
 
 int vgi_json_parse(vgi_json **j, const void *text, size_t n, const char *subject, vg_err *e)

@@ -1,5 +1,5 @@
-/* json.h: JSON that was read, as values to be looked up. json.c is the one file of the library that knows Jansson.
- * Lookups take NULL, for what was not found before, and find nothing in it.
+/* json.h: JSON values. json.c is the only file of the library that uses Jansson. Lookups accept NULL, the result
+ * of a failed lookup, and return "not found".
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_JSON_H
 #define VG_JSON_H
@@ -8,19 +8,19 @@
 
 typedef struct json_t vgi_json;
 
-/* vgi_json_parse: one JSON text, nothing behind it; VG_EINPUT naming `subject` (quotes included) otherwise. */
+/* vgi_json_parse: parse one JSON text with nothing behind it; else VG_EINPUT naming `subject` (with quotes). */
 int vgi_json_parse(vgi_json **j, const void *text, size_t n, const char *subject, vg_err *e) VG_MUST_CHECK;
 void vgi_json_free(vgi_json **j);
 
 const vgi_json *vgi_json_get(const vgi_json *object, const char *key); /* NULL: there is none, or it is no object */
 const vgi_json *vgi_json_at(const vgi_json *array, size_t i);          /* NULL: the same for an array */
-size_t vgi_json_count(const vgi_json *array);                          /* 0: it is no array, or empty */
+size_t vgi_json_count(const vgi_json *array);                          /* 0 also if it is not an array */
 bool vgi_json_is_object(const vgi_json *j);
 bool vgi_json_is_array(const vgi_json *j);
 bool vgi_json_is_true(const vgi_json *j);
 bool vgi_json_number(const vgi_json *j, double *x);
-bool vgi_json_whole(const vgi_json *j, uint64_t *x); /* a whole number from 0 to 2^53 */
-const char *vgi_json_text(const vgi_json *j);        /* NULL: it is no string. Valid UTF-8, borrowed */
+bool vgi_json_whole(const vgi_json *j, uint64_t *x); /* an integer from 0 to 2^53 */
+const char *vgi_json_text(const vgi_json *j);        /* NULL: it is not a string. Valid UTF-8, borrowed */
 /* vgi_json_key: the name of the member behind the one of that name (its own text, from here), or of the first one: NULL.
  * NULL: there is none. Borrowed. */
 const char *vgi_json_key(const vgi_json *object, const char *before);
@@ -34,12 +34,12 @@ vgi_json *vgi_json_of_whole(uint64_t x, vg_err *e);
 vgi_json *vgi_json_of_number(double x, vg_err *e);
 vgi_json *vgi_json_of_text(const char *utf8, vg_err *e);
 vgi_json *vgi_json_copy(const vgi_json *j, vg_err *e);
-/* vgi_json_put, vgi_json_add: value is taken over, also on failure; NULL: it could not be made, VG_ENOMEM. Replaces a member
- * of that name. */
+/* vgi_json_put, vgi_json_add: value is taken over, also on failure; NULL: it could not be created, VG_ENOMEM.
+ * vgi_json_put replaces a member of that name. */
 int vgi_json_put(vgi_json *object, const char *key, vgi_json *value, vg_err *e) VG_MUST_CHECK;
 int vgi_json_add(vgi_json *array, vgi_json *value, vg_err *e) VG_MUST_CHECK;
 void vgi_json_drop(vgi_json *object, const char *key);
-/* A member or element that is to be changed. */
+/* A member or element for changes. */
 vgi_json *vgi_json_inner(vgi_json *object, const char *key);
 vgi_json *vgi_json_inner_at(vgi_json *array, size_t i);
 /* vgi_json_print: append the text, without blanks. */

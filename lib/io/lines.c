@@ -1,9 +1,9 @@
-/* lines.c: text of fields between blanks, a thing per line, as people write markers and skeletons by hand.
- * Leaves out what the fields mean (markers.c, skeleton_text.c).
+/* lines.c: text with one item per line, whose fields are separated by blanks, as people write markers and
+ * skeletons by hand. markers.c and skeleton_text.c interpret the fields.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
-enum { SHOWN = 40 }; /* bytes of a field that a message shows */
+enum { SHOWN = 40 }; /* length of a field in messages */
 
 vgi_lines vgi_lines_of(const void *data, size_t n, const char *subject)
 {
@@ -28,7 +28,7 @@ bool vgi_line_more(const vgi_line *l, const char **at, vgi_field *f)
     const char *p = *at;
     while (p < l->end && is_blank(*p)) p++;
     const char *begin = p;
-    if (p < l->end && *p != '#') /* within a word it is none: Windows writes NaN as "-1.#IND" */
+    if (p < l->end && *p != '#') /* not inside a word: Windows writes NaN as "-1.#IND" */
         while (p < l->end && !is_blank(*p)) p++;
     *f = (vgi_field){begin, p};
     *at = p;

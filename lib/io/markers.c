@@ -1,5 +1,5 @@
-/* markers.c: pairs of vertices and dense correspondences as text, a pair per line.
- * Leaves out whether the vertices exist: who has the meshes knows (register.c).
+/* markers.c: pairs of vertices and dense correspondences as text, one per line. register.c checks that the
+ * vertices exist.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 

@@ -1,5 +1,4 @@
-/* names.c: lists of names, the order people expect of them, and the name a pose takes from its file.
- * Leaves out what a suffix means: format.c knows the mesh formats.
+/* names.c: lists of names, their natural order, and the name of a pose. format.c knows the suffixes of formats.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -30,7 +29,7 @@ static size_t hash_name(const char *s)
     return (size_t)(h ^ h >> 32);
 }
 
-/* Where the name is in the table, or the free slot where it belongs. */
+/* The slot of the name in the table, or the free slot for it. */
 static size_t find_slot(const vgi_name_set *set, const char *name)
 {
     size_t i = hash_name(name) & (set->nslots - 1);
@@ -80,9 +79,10 @@ static bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
-/* A name is compared as a list of characters and numbers. A number is a run of digits; with a point and digits behind it
- * a decimal ("0.25"), unless another point and digits follow, as in a date or version ("1.2.10"), whose parts are whole
- * numbers. It is negative behind a '-' that does not join it to a word: at the start, or after one of `separators`. */
+/* Names are compared as lists of characters and numbers. A number is a run of digits; with a point and digits
+ * behind it a decimal ("0.25"), unless another point and digits follow, as in a date or version ("1.2.10"), whose
+ * parts are integers. It is negative behind a '-' that is not a hyphen: at the start, or after one of
+ * `separators`. */
 typedef struct token {
     int character; /* 0: the end of the name; '0': a number */
     bool minus;
@@ -112,7 +112,7 @@ static size_t count_decimals(const char *start, const char *p, size_t n)
     return within || (decimals && *behind == '.' && is_digit(behind[1])) ? 0 : decimals;
 }
 
-/* The token at *p, which moves behind it. */
+/* The token at *p; *p moves behind it. */
 static token next_token(const char *start, const char **p)
 {
     token t = {.minus = is_minus(start, *p)};
@@ -128,11 +128,11 @@ static token next_token(const char *start, const char **p)
     *p = t.npart ? t.part + t.npart : digits + t.nwhole;
     for (; t.nwhole && *t.whole == '0'; t.whole++) t.nwhole--;
     while (t.npart && t.part[t.npart - 1] == '0') t.npart--;
-    t.minus = t.minus && t.nwhole + t.npart; /* there is one zero */
+    t.minus = t.minus && t.nwhole + t.npart; /* zero has no sign */
     return t;
 }
 
-/* Absolute values, of any length: nothing is converted. */
+/* Compare absolute values of any length without converting them. */
 static int compare_sizes(const token *a, const token *b)
 {
     if (a->nwhole != b->nwhole) return a->nwhole < b->nwhole ? -1 : 1;
@@ -194,7 +194,7 @@ char *vgi_to_utf8(const char *s, size_t n, vg_err *e)
 {
     size_t twice;
     if (vgi_is_utf8(s, n)) return vgi_copy_string(s, n, e);
-    if (!vgi_mul(n, 2, &twice)) twice = SIZE_MAX - 1; /* fails for want of memory below */
+    if (!vgi_mul(n, 2, &twice)) twice = SIZE_MAX - 1; /* the allocation below fails */
     char *out = vgi_array_raw(twice + 1, 1, e), *to = out;
     if (!out) return NULL;
     for (size_t i = 0; i < n; i++) {
@@ -219,7 +219,7 @@ char *vgi_pose_name(const char *path, vg_err *e)
     const vgi_sequence_format *sequence = format ? NULL : vgi_sequence_by_suffix(name);
     if (format) name[strlen(name) - strlen(format->suffix)] = 0;
     if (sequence) name[strlen(name) - strlen(sequence->suffix)] = 0;
-    char *utf8 = vgi_to_utf8(name, strlen(name), e); /* old archives and file systems have other names */
+    char *utf8 = vgi_to_utf8(name, strlen(name), e); /* old archives and file systems use other encodings */
     free(name);
     return utf8;
 }

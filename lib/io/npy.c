@@ -212,7 +212,7 @@ typedef struct reading {
     vgi_input *in;
     const char *subject;
     size_t frames, points, next;
-    bool whole;     /* Fortran order scatters a frame over the whole file: all of it is in `data`, else one frame */
+    bool whole;     /* Fortran order scatters frames: `data` holds the whole file, else one frame */
     bool have_data;
     vg_bytes data;
 } reading;

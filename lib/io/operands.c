@@ -1,6 +1,5 @@
-/* operands.c: the files that an operand of a command line names: itself, the mesh files of a directory, or all that
- * match a pattern that the shell left alone.
- * Leaves out what is in them (source.c).
+/* operands.c: the files that an operand names: itself, the mesh files of a directory, or all that match a quoted
+ * pattern. source.c reads them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -23,8 +22,8 @@ static enum worth judge_file(DIR *dir, const char *name)
     return worth && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISREG(st.st_mode) ? worth : NOTHING;
 }
 
-/* Files of whole sequences count only where there are no mesh files:
- * a skeleton or an array beside them is about the same poses. */
+/* Files that hold a sequence are read only if there are no mesh files: a skeleton or an array beside meshes
+ * describes the same poses. */
 static int list_files(vgi_names *names, DIR *dir, vg_err *e)
 {
     enum worth best = WHOLE_SEQUENCE;

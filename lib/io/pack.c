@@ -1,12 +1,11 @@
-/* pack.c: files into archives. The bytes depend on names and contents only.
- * Leaves out reading (archive.c) and what the files mean.
+/* pack.c: writes archives. The bytes depend on names and contents only. archive.c reads them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/unpack.h"
 
 #include <errno.h>
 #include <stdlib.h>
 
-/* The longest suffix first: ".tar.gz" also ends in what ".gz" would. */
+/* Longest suffix first: ".tar.gz" also ends in ".gz". */
 static const struct packing {
     const char *suffix;
     int format, filter;
@@ -22,7 +21,7 @@ static const struct packing {
     {".7z", ARCHIVE_FORMAT_7ZIP, ARCHIVE_FILTER_NONE, false},
 };
 
-/* Not told by a name, and with members as NumPy's savez writes them. */
+/* Not chosen by a name; members are uncompressed, as NumPy's savez writes them. */
 static const struct packing plain_zip = {"", ARCHIVE_FORMAT_ZIP, ARCHIVE_FILTER_NONE, true};
 
 struct vgi_packer {
@@ -31,7 +30,7 @@ struct vgi_packer {
     locale_t utf8;
     int fd;
     char *name;
-    vg_err failure; /* of our own write, which libarchive only hears of */
+    vg_err failure; /* the error of our own write callback */
 };
 
 static const struct packing *find_packing(const char *name, size_t n)
@@ -51,8 +50,8 @@ const char *vgi_packer_suffixes(void)
     return ".zip .tar .tar.gz .tgz .tar.xz .txz .tar.zst .7z";
 }
 
-/* libarchive is not told of a failure: it would then never free its buffers. What comes after one goes nowhere, and
- * check_packer says so. */
+/* A failure is not reported to libarchive, which would then never free its buffers. Later data is discarded, and
+ * check_packer reports the failure. */
 static la_ssize_t packer_write(struct archive *la, void *context, const void *data, size_t n)
 {
     (void)la;
@@ -61,7 +60,7 @@ static la_ssize_t packer_write(struct archive *la, void *context, const void *da
     return (la_ssize_t)n;
 }
 
-/* ok: what libarchive thinks of its last call. */
+/* ok: the result of the last call of libarchive. */
 static int check_packer(vgi_packer *p, bool ok, vg_err *e)
 {
     if (p->failure.code) return vg_fail(e, p->failure.code, "%s", p->failure.message);
@@ -190,7 +189,7 @@ void vgi_packer_close(vgi_packer **packer)
 {
     vgi_packer *p = *packer;
     if (!p) return;
-    p->failure.code = VG_ESYS; /* freeing writes an end unless vgi_packer_end has: it goes nowhere */
+    p->failure.code = VG_ESYS; /* freeing writes the end of the archive unless vgi_packer_end has; it is discarded */
     if (p->la) archive_write_free(p->la);
     archive_entry_free(p->entry);
     if (p->utf8) freelocale(p->utf8);
