@@ -9,6 +9,7 @@
 # make fuzz        search for input that breaks the readers (clang; FUZZ_SECONDS=60 each)
 # make install     PREFIX=/usr/local LIBDIR=$(PREFIX)/lib DESTDIR=   make uninstall, make clean
 # make dist        build/vg-VERSION.tar.xz, the same bytes each time; make distcheck builds and tests from it (TESTS=)
+# make blender     build/vg_tools.zip, the add-on for Blender, the same bytes each time
 # make deb         Debian packages into build/deb (what it takes: debian/control)
 .DEFAULT_GOAL := all
 .SUFFIXES:
@@ -255,6 +256,11 @@ dist:
 .PHONY: distcheck
 distcheck: dist
 	@MAKE='$(MAKE)' sh tests/dist.sh check $(DIST) vg-$(VERSION)
+
+.PHONY: blender
+blender: build/vg_tools.zip
+build/vg_tools.zip: $(wildcard examples/blender/vg_tools/*.py) examples/python/vgstream.py examples/blender/pack.py COPYING
+	@python3 examples/blender/pack.py $@
 
 .PHONY: deb
 deb: dist

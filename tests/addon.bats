@@ -1,0 +1,186 @@
+#!/usr/bin/env bats
+# The add-on for Blender, as its zip installs it: every operator on real data gives what the same pipe gives in a shell, to the precision of
+# Blender's binary32. Runs where Blender is installed.
+# SPDX-License-Identifier: GPL-3.0-or-later
+load lib.bash
+
+setup_file() {
+    command -v blender >/dev/null || return 0
+    local BATS_TEST_TMPDIR=$BATS_FILE_TMPDIR # where capture keeps what was said
+    cd "$BATS_FILE_TMPDIR" || return 1
+    python3 "$ROOT/examples/blender/pack.py" vg_tools.zip
+    # what the tests share: worlds made of streams, and how far a result is from a stream
+    cat >world.py <<'END'
+import bpy, numpy, os, sys, traceback
+HERE = os.path.dirname(os.path.abspath(__file__))
+if 'bool' not in numpy.__dict__: numpy.bool = bool
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.preferences.addon_install(filepath=os.path.join(HERE, 'vg_tools.zip'))
+bpy.ops.preferences.addon_enable(module='vg_tools')
+import vg_tools
+from vg_tools import vgstream, bodies
+scene = bpy.context.scene
+vg = scene.vg
+
+def stream(path):
+    reader = vgstream.Reader(path)
+    return reader, [f for f in reader]
+def mesh_of(name, points, faces):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(bodies.from_file(points).tolist(), [f for f in faces if len(f) == 2], [f for f in faces if len(f) > 2])
+    thing = bpy.data.objects.new(name, mesh)
+    scene.collection.objects.link(thing)
+    return thing
+def rest_of(reader):
+    return numpy.array(reader.reference).reshape(-1, 3)
+def body(name, path, played=True):
+    """A stream as an object: the reference pose as its mesh, frames as shape keys, played from frame 1 on."""
+    reader, frames = stream(path)
+    thing = mesh_of(name, rest_of(reader), reader.faces)
+    bodies.give_keys(thing, [f.name for f in frames], [f.values for f in frames], list(range(1, len(frames) + 1)) if played else None, scene)
+    if played: scene.frame_start, scene.frame_end = 1, len(frames)
+    return thing
+def shown(thing, frame):
+    scene.frame_set(frame)
+    return bodies.shown_points(thing, scene)
+def far(a, b):
+    """The largest distance of a vertex, in the diagonal of b."""
+    a, b = numpy.asarray(a, float), numpy.asarray(b, float)
+    assert a.shape == b.shape, (a.shape, b.shape)
+    return numpy.sqrt(((a - b) ** 2).sum(1)).max() / numpy.sqrt(((b.max(0) - b.min(0)) ** 2).sum())
+def check(what, worst, bound):
+    print('WORST %s %.2e' % (what, worst))
+    assert worst <= bound, (what, worst, bound)
+def plays(thing, path, bound=5e-6, first=1):
+    """The object plays the frames of a stream on the time line."""
+    _, frames = stream(path)
+    check(thing.name, max(far(shown(thing, first + i), f.values) for i, f in enumerate(frames)), bound)
+def refused(op, words):
+    before = set(bpy.data.objects.keys())
+    try: op()
+    except RuntimeError as error:
+        assert words in str(error), (words, str(error))
+        assert set(bpy.data.objects.keys()) == before, 'something was made'
+    else: raise AssertionError('not refused: ' + words)
+def newest(before):
+    new = [o for o in bpy.data.objects if o.name not in before]
+    assert len(new) == 1, new
+    return new[0]
+def made_by(op):
+    before = set(bpy.data.objects.keys())
+    assert op() == {'FINISHED'}
+    return newest(before)
+END
+}
+
+setup() {
+    command -v blender >/dev/null || skip "blender is not installed"
+    cd "$BATS_TEST_TMPDIR" || return 1
+    export BLENDER_USER_SCRIPTS=$BATS_TEST_TMPDIR/scripts BLENDER_USER_CONFIG=$BATS_TEST_TMPDIR/config
+}
+
+# in_blender: the script from standard input, which must succeed
+in_blender() {
+    cat >script.py
+    capture env PYTHONPATH="$BATS_FILE_TMPDIR" blender --background --factory-startup --python-use-system-env --python-exit-code 1 --python script.py
+    [ "$status" = 0 ] || fail "$output" "$stderr"
+}
+
+@test "transfer: the same faces, as shape keys and as a cache; n-gons, modifiers, a scene of centimetres" {
+    must vg-encode --reference "$DATA/trex.rest.obj" --take 0-5 "$DATA/trex-attack.tar.xz" -o trex.vgs
+    awk '$1 == "v" {print "v", 1.4 * $2, $3, 0.8 * $4} $1 != "v"' "$DATA/trex.rest.obj" >stout.obj
+    must vg-encode stout.obj -o stout.vgs
+    pipe 'vg-deform --onto stout.obj trex.vgs | vg-solve -o want.vgs'
+    pipe 'vg-deform --onto stout.obj --by pose --root stay trex.vgs | vg-solve --fit squares -o fast.vgs'
+    in_blender <<'END'
+from world import *
+source, target = body('trex', 'trex.vgs'), body('stout', 'stout.vgs', False)
+target.shape_key_clear()
+target.modifiers.new('round', 'SUBSURF').levels = 1
+source.modifiers.new('round', 'SUBSURF').levels = 1
+vg.source.object, vg.target = source, target
+scene.frame_set(3)
+made = made_by(bpy.ops.vg.transfer)
+assert scene.frame_current == 3 and made.data is not target.data and not target.data.shape_keys
+assert source.modifiers['round'].show_viewport and made.modifiers['round'].show_viewport
+sizes = [len(p.vertices) for p in made.data.polygons]
+assert sizes == [len(p.vertices) for p in target.data.polygons] and max(sizes) > 10
+made.modifiers['round'].show_viewport = False
+plays(made, 'want.vgs')
+assert [k.name for k in made.data.shape_keys.key_blocks][1] == 'trex.0001'
+
+vg.by, vg.root, vg.fast, vg.result, vg.folder = 'POSE', 'STAY', True, 'CACHE', os.getcwd()
+cached = made_by(bpy.ops.vg.transfer)
+cached.modifiers['round'].show_viewport = False
+plays(cached, 'fast.vgs')
+vg.source.whole, vg.source.start, vg.source.end, vg.source.step = False, 2, 6, 2
+sparse = made_by(bpy.ops.vg.transfer)
+sparse.modifiers['round'].show_viewport = False
+_, fast = stream('fast.vgs')
+
+check('sparse', max(far(shown(sparse, f), fast[f - 1].values) for f in (2, 4, 6)), 5e-6)
+vg.folder = '//'
+refused(bpy.ops.vg.transfer, 'save the .blend file first')
+vg.result, vg.source.whole = 'KEYS', True
+
+# the same in a scene whose unit is a centimetre: objects are larger by 100
+from mathutils import Matrix
+scene.unit_settings.system, scene.unit_settings.scale_length = 'METRIC', 0.01
+for thing in source, target: thing.matrix_world = Matrix.Scale(100, 4)
+vg.by, vg.root, vg.fast = 'DEFAULT', 'CENTROID', False
+again = made_by(bpy.ops.vg.transfer)
+again.modifiers['round'].show_viewport = False
+plays(again, 'want.vgs')
+
+vg.source.whole, vg.source.start, vg.source.end, vg.source.step = False, 1, 5, 2
+few = made_by(bpy.ops.vg.transfer)
+assert len(few.data.shape_keys.key_blocks) == 4 and few.data.shape_keys.key_blocks[2].name == 'trex.0003'
+END
+    shows 'WORST stout as trex ' 'WORST stout as trex.001' 'WORST sparse' 'WORST stout as trex.003'
+}
+
+@test "transfer: other faces by pairs of vertex groups and empties, refused without; what a program says is kept" {
+    must vg-encode --reference "$DATA/velociraptor.rest.obj" --take 0-3 "$DATA/velociraptor-run.tar.xz" -o run.vgs
+    must vg-encode "$DATA/trex.rest.obj" -o trex.vgs
+    sed 's|#.*||; /^ *$/d' "$DATA/velociraptor-trex.markers.txt" | awk '{row[NR] = $0} END {for (k = 0; k < 2; k++) for (i = 2 - k; i <= NR; i += 2) print row[i]}' >markers.txt
+    in_blender <<'END'
+from world import *
+source, target = body('raptor', 'run.vgs'), body('trex', 'trex.vgs', False)
+vg.source.object, vg.target = source, target
+refused(bpy.ops.vg.transfer, 'at least 3 are needed')
+rows = [line.split() for line in open('markers.txt')]
+for i, words in enumerate(rows):
+    for thing, v in zip((source, target), map(int, words[-2:])):
+        if i < len(rows) // 2:
+            thing.vertex_groups.new(name='m%02d' % i).add([v], 1, 'REPLACE')
+        else:
+            spot = bpy.data.objects.new('e%02d' % i, None)
+            scene.collection.objects.link(spot)
+            spot.parent, spot.location = thing, bodies.rest_points(thing)[v]
+bpy.context.view_layer.update()
+found = vg_tools.transfer.pairs(source, target)
+assert sorted(p[1:] for p in found) == sorted(tuple(map(int, w[-2:])) for w in rows), found
+made = made_by(bpy.ops.vg.transfer)
+# pairing amplifies the rounding to binary32 (nearest points), so the shell gets the rounded positions
+vg_tools.programs.Body(bodies.rest_body(source, scene).reference, bodies.faces_of(source.data)).write('source.vgs')
+bodies.rest_body(target, scene).write('target.vgs')
+bodies.all_of(bodies.poses(vg.source, scene)).write('run32.vgs')
+for name, thing in ('run.vgs', source),: check('source', max(far(shown(thing, 1 + i), f.values) for i, f in enumerate(stream(name)[1])), 1e-6)
+import subprocess
+subprocess.run('vg-register -q source.vgs target.vgs --markers markers.txt -o pairs.vgs && '
+               'vg-deform --onto target.vgs --correspondence pairs.vgs run32.vgs | vg-solve -o want.vgs', shell=True, check=True)
+plays(made, 'want.vgs')
+
+bpy.ops.object.select_all(action='DESELECT')
+for thing, v in (source, 7), (target, 9):
+    thing.select_set(True)
+    thing.data.vertices.foreach_set('select', [i == v for i in range(len(thing.data.vertices))])
+bpy.context.view_layer.objects.active = target
+assert bpy.ops.vg.pair() == {'FINISHED'}
+assert ('pair_01', 7, 9) in vg_tools.transfer.pairs(source, target)
+vg_tools.programs.Programs.folder = '/nowhere'
+refused(bpy.ops.vg.transfer, "'/nowhere' has no vg-register")
+assert vg_tools.work.State.failed and not vg_tools.work.State.title
+END
+    shows 'WORST source' 'WORST trex as raptor'
+}
