@@ -49,7 +49,6 @@ static const cli_program program = {
 /* A solver and the vertices it holds: the sequence's anchors, or those and the pins of some frames. */
 typedef struct machine {
     vg_solver *solver;
-    vg_robust *robust; /* with --fit absolute */
     vg_planar *planar; /* with --planar */
     uint32_t *held;    /* ascending */
     size_t nheld;
@@ -58,26 +57,28 @@ typedef struct machine {
 /* A pose that waits for its solve. Its vectors are not kept so long: it costs 6 numbers a vertex, not 3 a corner. */
 typedef struct waiting {
     vg_frame frame; /* values: first guess, then vertices */
+    const machine *machine;
     const double *vectors; /* until it is loaded: of one of the frames that came in */
     double *rhs, *held, *normals; /* held: where the held vertices go; normals: with --planar */
     size_t held_cap;
     float *misfit; /* with --fit absolute */
+    double size;
 } waiting;
 
-enum { MACHINES = 8, MOST_ENTRIES = 64 << 20 }; /* machines for pins that are kept, and entries of their factors */
+enum { KEPT = 8, MOST_ENTRIES = 64 << 20 }; /* machines for pins that are kept, and entries of their factors */
 
 typedef struct work {
     vg_head *h;
     vg_graph *g;
     vg_kind kind;            /* what comes in */
     machine plain;
-    machine pinned[MACHINES]; /* for pins of frames gone by, the latest first: shapes come again */
-    const machine *at;       /* what the waiting poses wait for */
+    vg_robust *robust;       /* with --fit absolute */
+    machine **pinned;        /* npinned for pins of frames gone by, the latest first: shapes come again */
+    size_t npinned;
     waiting *waiting;
     size_t n, most;
     size_t loaded;           /* of the n */
     double **vectors;        /* of the frames of a batch, when they come as vertices */
-    double *sizes;           /* of those that wait, with --fit absolute */
     size_t most_steps, planar_faces, most_rounds, unfinished;
     double worst_residual;
     vg_weights weights;
@@ -85,11 +86,6 @@ typedef struct work {
 
 static void keep_stats(work *w, const machine *m)
 {
-    if (m->robust) {
-        vg_robust_stats found = vg_robust_get_stats(m->robust);
-        if (found.most_rounds > w->most_rounds) w->most_rounds = found.most_rounds;
-        w->unfinished += found.unfinished;
-    }
     if (!m->planar) return;
     vg_planar_stats found = vg_planar_get_stats(m->planar);
     if (found.most_steps > w->most_steps) w->most_steps = found.most_steps;
@@ -101,87 +97,137 @@ static void free_machine(work *w, machine *m)
 {
     keep_stats(w, m);
     vg_planar_free(&m->planar);
-    vg_robust_free(&m->robust);
     vg_solver_free(&m->solver);
     free(m->held);
     *m = (machine){0};
 }
 
-/* takes `held` over */
-static void make_machine(work *w, machine *m, uint32_t *held, size_t nheld)
+/* What a machine needs besides its solver. */
+static void equip(machine *m)
 {
     vg_err e;
-    *m = (machine){.held = held, .nheld = nheld};
-    const double *reference = w->h->body.reference;
-    int r = m == &w->plain
-                ? vg_solver_new(&m->solver, w->g, held, nheld, reference, w->weights, cli.threads, &e)
-                : vg_solver_new_like(&m->solver, w->plain.solver, held, nheld, reference, &e);
-    if (r < 0 ||
-        (opts.fit == 0 && vg_robust_new(&m->robust, m->solver, (size_t)opts.rounds, opts.eps, &e) < 0) ||
-        (opts.planar && vg_planar_new(&m->planar, m->solver, opts.planar_weights[0], opts.planar_weights[1], &e) < 0))
+    if (opts.planar && vg_planar_new(&m->planar, m->solver, opts.planar_weights[0], opts.planar_weights[1], &e) < 0)
         cli_die(&e);
     vg_solver_stats stats = vg_solver_get_stats(m->solver);
     cli_note("%zu unknowns, %zu entries in the factor, analysed in %.3f s, factorized in %.3f s", stats.unknowns,
              stats.factor_entries, stats.analyse_seconds, stats.factor_seconds);
 }
 
+/* takes `held` over */
+static void make_plain(work *w, uint32_t *held, size_t nheld)
+{
+    vg_err e;
+    machine *m = &w->plain;
+    *m = (machine){.held = held, .nheld = nheld};
+    if (vg_solver_new(&m->solver, w->g, held, nheld, w->h->body.reference, w->weights, cli.threads, &e) < 0 ||
+        (opts.fit == 0 && vg_robust_new(&w->robust, m->solver, (size_t)opts.rounds, opts.eps, &e) < 0))
+        cli_die(&e);
+    equip(m);
+}
+
+/* What the poses of a batch need, one element each. */
+typedef struct batch {
+    size_t n;
+    waiting **pose;
+    vg_solver **solver;
+    const double **vectors, **held, **roots, **normals;
+    double **x, **rhs;
+    float **misfit;
+    double *sizes;
+} batch;
+
+static void free_batch(batch *b)
+{
+    free(b->pose);
+    free(b->solver);
+    free(b->vectors);
+    free(b->held);
+    free(b->roots);
+    free(b->normals);
+    free(b->x);
+    free(b->rhs);
+    free(b->misfit);
+    free(b->sizes);
+}
+
+/* Those that wait from `first` on; eight without pins in a row go together. */
+static batch make_batch(work *w, size_t first)
+{
+    size_t most = w->n - first;
+    const char *what = "a batch of poses";
+    batch b = {.pose = cli_allocate(most, sizeof *b.pose, what),
+               .solver = cli_allocate(most, sizeof *b.solver, what),
+               .vectors = cli_allocate(most, sizeof *b.vectors, what),
+               .held = cli_allocate(most, sizeof *b.held, what),
+               .roots = cli_allocate(most, sizeof *b.roots, what),
+               .normals = cli_allocate(most, sizeof *b.normals, what),
+               .x = cli_allocate(most, sizeof *b.x, what),
+               .rhs = cli_allocate(most, sizeof *b.rhs, what),
+               .misfit = cli_allocate(most, sizeof *b.misfit, what),
+               .sizes = cli_allocate(most, sizeof *b.sizes, what)};
+    for (int pins = 0; pins < 2; pins++)
+        for (size_t i = first; i < w->n; i++) {
+            waiting *p = &w->waiting[i];
+            if ((p->machine != &w->plain) != pins) continue;
+            b.pose[b.n] = p, b.solver[b.n] = p->machine->solver, b.vectors[b.n] = p->vectors, b.held[b.n] = p->held;
+            b.roots[b.n] = p->frame.root, b.normals[b.n] = p->normals, b.x[b.n] = p->frame.values;
+            b.rhs[b.n] = p->rhs, b.misfit[b.n] = p->misfit, b.sizes[b.n++] = p->size;
+        }
+    return b;
+}
+
 /* Frames that came in become guesses and right-hand sides, and may be used again. */
 static void load_taken(work *w)
 {
-    size_t n = w->n - w->loaded;
-    const double **vectors = cli_allocate(n, sizeof *vectors, "a batch of poses"),
-                 **held = cli_allocate(n, sizeof *held, "a batch of poses");
-    double **x = cli_allocate(n, sizeof *x, "a batch of poses"),
-           **rhs = cli_allocate(n, sizeof *rhs, "a batch of poses");
-    float **misfit = cli_allocate(n, sizeof *misfit, "a batch of poses");
-    for (size_t i = 0; i < n; i++) {
-        waiting *p = &w->waiting[w->loaded + i];
-        vectors[i] = p->vectors, held[i] = p->held, x[i] = p->frame.values, rhs[i] = p->rhs, misfit[i] = p->misfit;
-    }
-    if (n) vg_solver_load(w->at->solver, n, vectors, held, x, rhs);
-    if (n && w->at->robust)
-        vg_robust_load(w->at->robust, n, vectors, (const double *const *)x, misfit, w->sizes + w->loaded);
-    free(misfit);
+    batch b = make_batch(w, w->loaded);
+    vg_solver_load_each(b.n, b.solver, b.vectors, b.held, b.x, b.rhs);
+    if (w->robust) vg_robust_load(w->robust, b.n, b.vectors, (const double *const *)b.x, b.misfit, b.sizes);
+    for (size_t i = 0; i < b.n; i++) b.pose[i]->size = b.sizes[i];
     w->loaded = w->n;
-    free(vectors);
-    free(held);
-    free(x);
-    free(rhs);
+    free_batch(&b);
+}
+
+static void make_planar(const batch *b)
+{
+    for (size_t i = 0, n; i < b->n; i += n) {
+        const machine *m = b->pose[i]->machine;
+        for (n = 1; i + n < b->n && b->pose[i + n]->machine == m;) n++;
+        size_t good = vg_planar_solve(m->planar, n, b->normals + i, b->x + i);
+        if (good < n)
+            cli_no("frame '%s' is not planar yet after %zu steps: choose --planar-weights that are less far apart",
+                   b->pose[i + good]->frame.name, vg_planar_get_stats(m->planar).most_steps);
+    }
+}
+
+/* Those of the solve just done. */
+static void keep_rounds(work *w)
+{
+    if (!w->robust) return;
+    vg_robust_stats found = vg_robust_get_stats(w->robust);
+    if (found.most_rounds > w->most_rounds) w->most_rounds = found.most_rounds;
+    w->unfinished += found.unfinished;
 }
 
 static void solve_waiting(work *w)
 {
+    vg_err e;
+    if (!w->n) return;
     load_taken(w);
-    const double **rhs = cli_allocate(w->n, sizeof *rhs, "a batch of poses"),
-                 **held = cli_allocate(w->n, sizeof *held, "a batch of poses");
-    const double **roots = cli_allocate(w->n, sizeof *roots, "a batch of poses"),
-                 **normals = cli_allocate(w->n, sizeof *normals, "a batch of poses");
-    const float **misfit = cli_allocate(w->n, sizeof *misfit, "a batch of poses");
-    double **x = cli_allocate(w->n, sizeof *x, "a batch of poses");
-    for (size_t i = 0; i < w->n; i++) {
-        waiting *p = &w->waiting[i];
-        misfit[i] = p->misfit;
-        rhs[i] = p->rhs, held[i] = p->held, roots[i] = p->frame.root, normals[i] = p->normals, x[i] = p->frame.values;
-    }
-    if (w->n && w->at->robust) {
-        vg_err e;
-        if (vg_robust_solve(w->at->robust, w->n, rhs, misfit, w->sizes, x, held, roots, &e) < 0) cli_die(&e);
-    } else if (w->n) {
-        vg_solver_solve(w->at->solver, w->n, rhs, x, held, roots);
-    }
-    free(misfit);
-    size_t good = w->n && w->at->planar ? vg_planar_solve(w->at->planar, w->n, normals, x) : w->n;
-    if (good < w->n)
-        cli_no("frame '%s' is not planar yet after %zu steps: choose --planar-weights that are less far apart",
-               w->waiting[good].frame.name, vg_planar_get_stats(w->at->planar).most_steps);
+    batch b = make_batch(w, 0);
+    const double *const *rhs = (const double *const *)b.rhs;
+    if (!w->robust)
+        vg_solver_solve_each(b.n, b.solver, rhs, b.x, b.held, b.roots);
+    else if (vg_robust_solve(w->robust, b.n, b.solver, rhs, (const float *const *)b.misfit, b.sizes, b.x, b.held, b.roots,
+                             &e) < 0)
+        cli_die(&e);
+    keep_rounds(w);
+    if (opts.planar) make_planar(&b);
     for (size_t i = 0; i < w->n; i++) cli_stream_put(&w->waiting[i].frame);
     w->n = w->loaded = 0;
-    free(rhs);
-    free(held);
-    free(roots);
-    free(normals);
-    free(x);
+    free_batch(&b);
 }
+
+/* ---- pins ---- */
 
 /* Anchors and pins, ascending, each once. */
 static uint32_t *unite(const work *w, const vg_frame *f, size_t *n)
@@ -201,54 +247,76 @@ static uint32_t *unite(const work *w, const vg_frame *f, size_t *n)
     return both;
 }
 
-/* Drop the machines that have not been asked for longest, until there is room for another. */
-static void make_room(work *w)
+/* Keep `most` machines at most, and not too many entries: drop those that have not been asked for longest. No pose may
+ * wait for them. */
+static void drop_machines(work *w, size_t most)
+{
+    size_t entries = 0, kept = 0;
+    for (; kept < w->npinned && kept < most; kept++) {
+        entries += vg_solver_get_stats(w->pinned[kept]->solver).factor_entries;
+        if (entries > MOST_ENTRIES) break;
+    }
+    while (w->npinned > kept) {
+        free_machine(w, w->pinned[--w->npinned]);
+        free(w->pinned[w->npinned]);
+    }
+}
+
+/* Waiting poses have machines of their own; with --planar they are large. */
+static bool is_crowded(const work *w)
 {
     size_t entries = 0;
-    for (size_t i = 0; i < MACHINES; i++) {
-        if (!w->pinned[i].solver) continue;
-        entries += vg_solver_get_stats(w->pinned[i].solver).factor_entries;
-        if (i == MACHINES - 1 || entries > MOST_ENTRIES) free_machine(w, &w->pinned[i]);
-    }
+    for (size_t i = 0; i < w->npinned; i++) entries += vg_solver_get_stats(w->pinned[i]->solver).factor_entries;
+    return entries > MOST_ENTRIES || (opts.planar && w->npinned > KEPT);
 }
 
-static void bring_to_front(work *w, size_t i)
+/* The machine that holds these; a new one has no solver yet. Takes `held` over. */
+static machine *find_machine(work *w, uint32_t *held, size_t n)
 {
-    machine m = w->pinned[i];
-    memmove(w->pinned + 1, w->pinned, i * sizeof m);
-    w->pinned[0] = m;
-}
-
-/* The machine for a frame. All poses of a batch share theirs, so a batch ends where pins change. */
-static const machine *machine_for(work *w, const vg_frame *f)
-{
-    size_t n, i = 0;
-    vg_frame_pins(f, &n);
-    if (n == 0) return &w->plain;
-    uint32_t *held = unite(w, f, &n);
-    while (i < MACHINES &&
-           !(w->pinned[i].solver && w->pinned[i].nheld == n && !memcmp(w->pinned[i].held, held, n * sizeof *held)))
-        i++;
-    if (i == 0) {
+    size_t i = 0;
+    while (i < w->npinned && !(w->pinned[i]->nheld == n && !memcmp(w->pinned[i]->held, held, n * sizeof *held))) i++;
+    machine *m;
+    if (i < w->npinned) {
+        m = w->pinned[i];
         free(held);
-        return w->pinned;
-    }
-    solve_waiting(w); /* machines move */
-    if (i < MACHINES) {
-        free(held);
-        bring_to_front(w, i);
     } else {
-        make_room(w);
-        bring_to_front(w, MACHINES - 1); /* an empty place */
-        make_machine(w, w->pinned, held, n);
+        m = cli_allocate(1, sizeof *m, "a set of pins");
+        *m = (machine){.held = held, .nheld = n};
+        w->npinned++;
     }
-    w->at = NULL;
-    return w->pinned;
+    memmove(w->pinned + 1, w->pinned, i * sizeof *w->pinned);
+    return w->pinned[0] = m;
+}
+
+/* The machines of n frames; new ones are made side by side. */
+static void find_machines(work *w, size_t n, const vg_frame *in, machine **of)
+{
+    vg_err e;
+    vg_solver **solver = cli_allocate(n, sizeof *solver, "a set of pins");
+    const uint32_t **held = cli_allocate(n, sizeof *held, "a set of pins");
+    size_t *nheld = cli_allocate(n, sizeof *nheld, "a set of pins"), fresh = 0;
+    machine **made = cli_allocate(n, sizeof *made, "a set of pins");
+    for (size_t i = 0; i < n; i++) {
+        size_t count, before = w->npinned;
+        vg_frame_pins(&in[i], &count);
+        of[i] = count ? find_machine(w, unite(w, &in[i], &count), count) : &w->plain;
+        if (w->npinned > before) made[fresh] = of[i], held[fresh] = of[i]->held, nheld[fresh++] = of[i]->nheld;
+    }
+    if (fresh && vg_solver_new_like(solver, fresh, w->plain.solver, held, nheld, &e) < 0) cli_die(&e);
+    for (size_t i = 0; i < fresh; i++) {
+        made[i]->solver = solver[i];
+        equip(made[i]);
+    }
+    free(solver);
+    free(held);
+    free(nheld);
+    free(made);
 }
 
 /* Where the held vertices go: anchors as the frame says, pins where the reference has them. */
-static void place_held(const work *w, const machine *m, const vg_frame *f, waiting *p)
+static void place_held(const work *w, const vg_frame *f, waiting *p)
 {
+    const machine *m = p->machine;
     if (p->held_cap < 3 * m->nheld || !p->held) {
         free(p->held);
         p->held = cli_allocate(3 * m->nheld, sizeof *p->held, "a batch of poses");
@@ -265,7 +333,7 @@ static void place_held(const work *w, const machine *m, const vg_frame *f, waiti
 }
 
 /* Frame i of a batch. Its vectors stay until load_taken. */
-static void take_frame(work *w, size_t i, vg_frame *in)
+static void take_frame(work *w, size_t i, vg_frame *in, const machine *m)
 {
     vg_err e;
     const double *vectors = in->values;
@@ -277,23 +345,28 @@ static void take_frame(work *w, size_t i, vg_frame *in)
         vg_graph_anchors(in->values, w->h->anchors, w->h->nanchors, anchors);
         vectors = w->vectors[i];
     }
-    const machine *m = machine_for(w, in);
-    if (m != w->at) solve_waiting(w);
-    w->at = m;
-    waiting *p = &w->waiting[w->n];
+    waiting *p = &w->waiting[w->n++];
     if (vg_frame_label(&p->frame, in, &e) < 0) cli_die(&e);
     memcpy(p->frame.root, in->root, sizeof in->root);
-    place_held(w, m, in, p);
+    p->machine = m;
+    place_held(w, in, p);
     p->vectors = vectors;
     if (m->planar) vg_planar_load(m->planar, vectors, p->normals);
-    if (++w->n == w->most) solve_waiting(w);
 }
 
 static void take_batch(void *context, size_t n, vg_frame *in)
 {
     work *w = context;
-    for (size_t i = 0; i < n; i++) take_frame(w, i, &in[i]);
+    machine **of = cli_allocate(n, sizeof *of, "a batch of poses");
+    if (is_crowded(w)) solve_waiting(w);
+    if (!w->n) drop_machines(w, KEPT);
+    find_machines(w, n, in, of);
+    for (size_t i = 0; i < n; i++) {
+        take_frame(w, i, &in[i], of[i]);
+        if (w->n == w->most) solve_waiting(w);
+    }
     load_taken(w);
+    free(of);
 }
 
 static void make_waiting(work *w)
@@ -301,11 +374,11 @@ static void make_waiting(work *w)
     vg_err e;
     w->most = vg_solver_batch(w->plain.solver);
     w->waiting = cli_allocate(w->most, sizeof *w->waiting, "a batch of poses");
-    w->sizes = cli_allocate(w->most, sizeof *w->sizes, "a batch of poses");
+    w->pinned = cli_allocate(KEPT + w->most + (size_t)cli.threads, sizeof *w->pinned, "a batch of poses");
     for (size_t i = 0; i < w->most; i++) {
         waiting *p = &w->waiting[i];
         p->rhs = cli_allocate(3 * w->h->body.mesh.nv, sizeof *p->rhs, "a batch of poses");
-        p->misfit = cli_allocate(w->plain.robust ? vg_robust_misfits(w->plain.robust) : 0, sizeof *p->misfit,
+        p->misfit = cli_allocate(w->robust ? vg_robust_misfits(w->robust) : 0, sizeof *p->misfit,
                                  "a batch of poses");
         p->normals = cli_allocate(w->plain.planar ? 3 * vg_planar_faces(w->plain.planar) : 0, sizeof *p->normals,
                                   "a batch of poses");
@@ -335,7 +408,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     if (vg_head_prepare_vectors(h, &e) < 0 || vg_head_graph(&w->g, h, &e) < 0) cli_die(&e);
     uint32_t *anchors = cli_allocate(h->nanchors, sizeof *anchors, "a batch of poses");
     if (h->nanchors) memcpy(anchors, h->anchors, h->nanchors * sizeof *anchors);
-    make_machine(w, &w->plain, anchors, h->nanchors);
+    make_plain(w, anchors, h->nanchors);
     make_room_for_vertices(w, in);
     h->kind = VG_VERTICES, h->count = h->body.mesh.nv;
     make_waiting(w);
@@ -348,8 +421,10 @@ static void solve_rest(void *context)
 
 static void clear(work *w)
 {
+    vg_robust_free(&w->robust);
+    drop_machines(w, 0);
+    free(w->pinned);
     free_machine(w, &w->plain);
-    for (size_t i = 0; i < MACHINES; i++) free_machine(w, &w->pinned[i]);
     if (opts.fit == 0) cli_note("least absolute misfit: at most %zu rounds", w->most_rounds);
     if (w->unfinished)
         cli_warn("%zu poses are not at their least misfit: in the last of %ld rounds it still fell by 0.1 %% or more; "
@@ -366,7 +441,6 @@ static void clear(work *w)
         free(w->waiting[i].misfit);
     }
     free(w->waiting);
-    free(w->sizes);
     for (size_t i = 0; i < (size_t)cli.threads; i++) free(w->vectors[i]);
     free(w->vectors);
     vg_graph_free(&w->g);

@@ -99,7 +99,7 @@ VGI_INLINE void forward(const vgi_factor *f, double *x)
         size_t first = (size_t)f->super[s], columns = (size_t)f->super[s + 1] - first;
         size_t nrows = (size_t)(f->pi[s + 1] - f->pi[s]), i = columns;
         const int *rows = f->rows + f->pi[s];
-        const double *l = f->values + f->px[s];
+        const double *l = f->block[s];
         double *head = x + first * ROW, *target[TOGETHER];
         eliminate_head(l, nrows, columns, head);
         for (; i + TOGETHER <= nrows; i += TOGETHER) {
@@ -147,7 +147,7 @@ VGI_INLINE void backward(const vgi_factor *f, double *x)
         size_t first = (size_t)f->super[s], columns = (size_t)f->super[s + 1] - first, k = columns;
         size_t nrows = (size_t)(f->pi[s + 1] - f->pi[s]);
         const int *rows = f->rows + f->pi[s];
-        const double *l = f->values + f->px[s];
+        const double *l = f->block[s];
         double *head = x + first * ROW;
         for (; k >= TOGETHER; k -= TOGETHER)
             finish_columns(l, nrows, columns, rows, x, head, k - TOGETHER, TOGETHER);
@@ -162,6 +162,132 @@ static void solve(const vgi_factor *f, vgi_row *x)
         backward(f, (double *)x + share * SHARE);
     }
 }
+
+/* ---- one pose ---- */
+
+/* A row is x, y, z and 0: one vector of four, or two of two. */
+#if VGI_WIDTH == 2
+typedef vgi_wide piece;
+typedef vgi_wide_at piece_at;
+enum { PIECES = 2, MANY = 4 };
+#else
+typedef double piece __attribute__((vector_size(32)));
+typedef double piece_at __attribute__((vector_size(32), aligned(8), may_alias));
+enum { PIECES = 1, MANY = 8 }; /* rows or columns together: as many as there are additions under way at a time */
+#endif
+enum { POINT = 4 };
+
+typedef struct point {
+    piece at[PIECES];
+} point;
+
+VGI_INLINE point load_point(const double *p)
+{
+    point x;
+#pragma GCC unroll 2
+    for (int c = 0; c < PIECES; c++) x.at[c] = ((const piece_at *)p)[c];
+    return x;
+}
+
+VGI_INLINE void store_point(double *p, const point *x)
+{
+#pragma GCC unroll 2
+    for (int c = 0; c < PIECES; c++) ((piece_at *)p)[c] = x->at[c];
+}
+
+VGI_INLINE void subtract_point(point *s, double factor, const point *x)
+{
+#pragma GCC unroll 2
+    for (int c = 0; c < PIECES; c++) s->at[c] -= factor * x->at[c];
+}
+
+VGI_INLINE void scale_point(point *s, double factor)
+{
+#pragma GCC unroll 2
+    for (int c = 0; c < PIECES; c++) s->at[c] *= factor;
+}
+
+/* n rows below a supernode: x[rows[i]] -= sum over k < columns of l[k stride + i] head[k]. */
+VGI_INLINE void eliminate_points(const double *l, size_t stride, size_t columns, const double *head, const int *rows,
+                                 double *x, int n)
+{
+    point s[MANY];
+#pragma GCC unroll 8
+    for (int i = 0; i < n; i++) s[i] = load_point(x + (size_t)rows[i] * POINT);
+    for (size_t k = 0; k < columns; k++, l += stride) {
+        point h = load_point(head + k * POINT);
+#pragma GCC unroll 8
+        for (int i = 0; i < n; i++) subtract_point(&s[i], l[i], &h);
+    }
+#pragma GCC unroll 8
+    for (int i = 0; i < n; i++) store_point(x + (size_t)rows[i] * POINT, &s[i]);
+}
+
+VGI_INLINE void forward_one(const vgi_factor *f, double *x)
+{
+    for (size_t s = 0; s < f->supernodes; s++) {
+        size_t columns = (size_t)(f->super[s + 1] - f->super[s]), nrows = (size_t)(f->pi[s + 1] - f->pi[s]), i = columns;
+        const int *rows = f->rows + f->pi[s];
+        const double *l = f->block[s];
+        double *head = x + (size_t)f->super[s] * POINT;
+        for (size_t k = 0; k < columns; k++) {
+            point h = load_point(head + k * POINT);
+            scale_point(&h, 1 / l[k * nrows + k]);
+            store_point(head + k * POINT, &h);
+            for (size_t j = k + 1; j < columns; j++) {
+                point t = load_point(head + j * POINT);
+                subtract_point(&t, l[k * nrows + j], &h);
+                store_point(head + j * POINT, &t);
+            }
+        }
+        for (; i + MANY <= nrows; i += MANY) eliminate_points(l + i, nrows, columns, head, rows + i, x, MANY);
+        for (; i + 2 <= nrows; i += 2) eliminate_points(l + i, nrows, columns, head, rows + i, x, 2);
+        for (; i < nrows; i++) eliminate_points(l + i, nrows, columns, head, rows + i, x, 1);
+    }
+}
+
+/* Columns k .. k + n - 1 of a supernode, those behind them being done. */
+VGI_INLINE void finish_points(const double *l, size_t stride, size_t columns, const int *rows, const double *x,
+                              double *head, size_t k, int n)
+{
+    point s[MANY];
+    l += k * stride;
+#pragma GCC unroll 8
+    for (int i = 0; i < n; i++) s[i] = load_point(head + (k + (size_t)i) * POINT);
+    for (size_t j = k + (size_t)n; j < stride; j++) {
+        point t = load_point(j < columns ? head + j * POINT : x + (size_t)rows[j] * POINT);
+#pragma GCC unroll 8
+        for (int i = 0; i < n; i++) subtract_point(&s[i], l[(size_t)i * stride + j], &t);
+    }
+#pragma GCC unroll 8
+    for (int i = n; i-- > 0;) {
+#pragma GCC unroll 8
+        for (int j = n; j-- > i + 1;) subtract_point(&s[i], l[(size_t)i * stride + k + (size_t)j], &s[j]);
+        scale_point(&s[i], 1 / l[(size_t)i * stride + k + (size_t)i]);
+        store_point(head + (k + (size_t)i) * POINT, &s[i]);
+    }
+}
+
+VGI_INLINE void backward_one(const vgi_factor *f, double *x)
+{
+    for (size_t s = f->supernodes; s-- > 0;) {
+        size_t columns = (size_t)(f->super[s + 1] - f->super[s]), nrows = (size_t)(f->pi[s + 1] - f->pi[s]), k = columns;
+        const int *rows = f->rows + f->pi[s];
+        const double *l = f->block[s];
+        double *head = x + (size_t)f->super[s] * POINT;
+        for (; k >= MANY; k -= MANY) finish_points(l, nrows, columns, rows, x, head, k - MANY, MANY);
+        for (; k >= 2; k -= 2) finish_points(l, nrows, columns, rows, x, head, k - 2, 2);
+        if (k) finish_points(l, nrows, columns, rows, x, head, 0, 1);
+    }
+}
+
+static void solve_one(const vgi_factor *f, double *x)
+{
+    forward_one(f, x);
+    backward_one(f, x);
+}
+
+/* ---- from poses to rows and back ---- */
 
 /* Rows are met in the order of vertices, which is not theirs: ask for the lines of one ahead. */
 VGI_INLINE void ask(const vgi_row *x, const uint32_t *row, size_t v, size_t nv, size_t rows)
@@ -207,4 +333,4 @@ static void add_rows(const vgi_row *x, const uint32_t *row, size_t nv, size_t ro
     }
 }
 
-const vgi_solve_kernel VGI_OF_SET(vgi_solve_kernel) = {solve, load_rows, add_rows};
+const vgi_solve_kernel VGI_OF_SET(vgi_solve_kernel) = {solve, solve_one, load_rows, add_rows};

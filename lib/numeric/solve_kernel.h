@@ -7,12 +7,12 @@
 #include "core/lanes.h"
 
 /* A supernodal factor as CHOLMOD lays it out, borrowed. Supernode s holds columns super[s] .. super[s+1]-1; its rows
- * are rows[pi[s]] .. rows[pi[s+1]-1], the first of which are its own columns; its entries are a column-major block of
- * that many rows at values + px[s]. Only the lower triangle of the block's head is defined. */
+ * are rows[pi[s]] .. rows[pi[s+1]-1], the first of which are its own columns; its entries are block[s], column-major,
+ * of that many rows. Only the lower triangle of the block's head is defined. */
 typedef struct vgi_factor {
     size_t n, supernodes;
-    const int *super, *pi, *px, *rows;
-    const double *values;
+    const int *super, *pi, *rows;
+    const double *const *block;
 } vgi_factor;
 
 /* The unknowns of a block of poses: x, y and z of eight poses side by side for each row of the factor. */
@@ -22,6 +22,7 @@ typedef struct vgi_row {
 
 typedef struct vgi_solve_kernel {
     void (*solve)(const vgi_factor *f, vgi_row *x);
+    void (*solve_one)(const vgi_factor *f, double *x);
     void (*load)(vgi_row *x, const uint32_t *row, size_t nv, size_t rows, const double *const *rhs);
     void (*add)(const vgi_row *x, const uint32_t *row, size_t nv, size_t rows, double *const *pose, size_t lanes);
 } vgi_solve_kernel;
@@ -31,6 +32,12 @@ VGI_KERNEL(vgi_solve_kernel)
 static inline void vgi_factor_solve(const vgi_factor *f, vgi_row *x)
 {
     vgi_solve_kernel_now()->solve(f, x);
+}
+
+/* vgi_factor_solve_one: the same for one pose: each row of x is x, y, z and a number that does not matter, say 0. */
+static inline void vgi_factor_solve_one(const vgi_factor *f, double *x)
+{
+    vgi_solve_kernel_now()->solve_one(f, x);
 }
 
 /* vgi_load_rows: x[row[v]] := rhs of vertex v in 8 poses (nv x 3 each), for every v with row[v] < rows. */

@@ -17,6 +17,7 @@ struct vgi_cholesky {
     cholmod_factor *L;
     cholmod_dense *x, *y, *e; /* what cholmod_solve2 works in */
     double *b;                /* n x 3, by columns */
+    const double **block;     /* of each supernode, once it is factorized */
 };
 
 /* Of the libraries below; where they are not, nothing has to be kept back. */
@@ -158,7 +159,7 @@ int vgi_cholesky_new(vgi_cholesky **out, const vgi_sparse *a, int *order, vg_err
     int before = begin_alone();
     c->L = cholmod_analyze_p(&A, order, NULL, 0, &c->common);
     end_alone(before);
-    if (c->L) return VG_OK;
+    if (c->L && (c->block = vgi_array(c->L->nsuper, sizeof *c->block, NULL))) return VG_OK;
     vgi_cholesky_free(out);
     return vg_fail(e, VG_ENOMEM, "not enough memory to factorize %zu unknowns", a->n);
 }
@@ -173,6 +174,7 @@ void vgi_cholesky_free(vgi_cholesky **out)
     cholmod_free_factor(&c->L, &c->common);
     cholmod_finish(&c->common);
     free(c->b);
+    free(c->block);
     free(c);
     *out = NULL;
 }
@@ -187,6 +189,8 @@ int vgi_cholesky_factorize(vgi_cholesky *c, const vgi_sparse *a, vg_err *e)
         return vg_fail(e, VG_ENOMEM, "not enough memory to factorize %zu unknowns", a->n);
     if (c->common.status != CHOLMOD_OK || c->L->minor != c->L->n)
         return vg_fail(e, VG_EINPUT, "cannot factorize: not positive definite at row %zu", c->L->minor);
+    for (size_t s = 0; s < c->L->nsuper; s++)
+        c->block[s] = (const double *)c->L->x + ((const int *)c->L->px)[s];
     return VG_OK;
 }
 
@@ -216,7 +220,7 @@ size_t vgi_cholesky_entries(const vgi_cholesky *c)
 vgi_factor vgi_cholesky_factor(const vgi_cholesky *c)
 {
     const cholmod_factor *L = c->L;
-    return (vgi_factor){L->n, L->nsuper, L->super, L->pi, L->px, L->s, L->x};
+    return (vgi_factor){L->n, L->nsuper, L->super, L->pi, L->s, c->block};
 }
 
 const int *vgi_cholesky_order(const vgi_cholesky *c)

@@ -46,7 +46,8 @@ int vgi_cholesky_factorize(vgi_cholesky *c, const vgi_sparse *a, vg_err *e) VG_M
 /* vgi_cholesky_solve: x := A^-1 x for three right-hand sides side by side: x is n x 3. VG_ENOMEM. */
 int vgi_cholesky_solve(vgi_cholesky *c, double *x, vg_err *e) VG_MUST_CHECK;
 size_t vgi_cholesky_entries(const vgi_cholesky *c); /* of the factor */
-/* vgi_cholesky_factor: the factor itself, borrowed. Its row number i is row vgi_cholesky_order()[i] of the matrix. */
+/* vgi_cholesky_factor: the factor itself, borrowed; its blocks are NULL until it is factorized. Its row number i is row
+ * vgi_cholesky_order()[i] of the matrix. */
 vgi_factor vgi_cholesky_factor(const vgi_cholesky *c);
 const int *vgi_cholesky_order(const vgi_cholesky *c);
 

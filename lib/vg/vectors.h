@@ -180,10 +180,12 @@ typedef struct vg_solver_stats {
  * face. VG_EINPUT when the graph is not connected, an anchor is in no face, or all of it is too large. */
 int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
                   vg_weights weights, int threads, vg_err *e) VG_MUST_CHECK;
-/* vg_solver_new_like: the same with other anchors, for the graph, weights and threads of another solver. Its order of
- * elimination is taken over, which is most of the work that a new solver needs. Neither needs the other afterwards. */
-int vg_solver_new_like(vg_solver **s, const vg_solver *like, const uint32_t *anchors, size_t nanchors,
-                       const double *reference, vg_err *e) VG_MUST_CHECK;
+/* vg_solver_new_like: n solvers for the graph and weights of `like` (from vg_solver_new), each with the anchors of that
+ * one and others besides (nanchors[i] ascending vertices), for poses that hold vertices of their own. They cost far less
+ * than new ones: what the anchors do not affect is shared. like is borrowed until they are freed. The threads share the
+ * solvers. Errors as above; VG_EARG when an anchor of like is missing. */
+int vg_solver_new_like(vg_solver **s, size_t n, vg_solver *like, const uint32_t *const *anchors, const size_t *nanchors,
+                       vg_err *e) VG_MUST_CHECK;
 void vg_solver_free(vg_solver **s);
 /* vg_solver_load: the vectors of n poses (and their anchors, nanchors points each; NULL when there are none) become
  * first guesses x and right-hand sides, nv x 3 each: what the guesses miss. One call at a time on one solver; the
@@ -194,6 +196,11 @@ void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const 
  * pose i, or roots[i]: its root; the other is not looked at. Best when n is a multiple of vg_solver_batch. */
 void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *const *x, const double *const *anchors,
                      const double *const *roots);
+/* vg_solver_load_each, vg_solver_solve_each: pose i is of solver each[i]: of one made by vg_solver_new, or like that. */
+void vg_solver_load_each(size_t n, vg_solver *const *each, const double *const *vectors, const double *const *anchors,
+                         double *const *x, double *const *rhs);
+void vg_solver_solve_each(size_t n, vg_solver *const *each, const double *const *rhs, double *const *x,
+                          const double *const *anchors, const double *const *roots);
 size_t vg_solver_batch(const vg_solver *s);
 vg_solver_stats vg_solver_get_stats(const vg_solver *s);
 
@@ -215,8 +222,9 @@ void vg_robust_free(vg_robust **r);
 size_t vg_robust_misfits(const vg_robust *r);
 void vg_robust_load(const vg_robust *r, size_t n, const double *const *vectors, const double *const *guesses,
                     float *const *misfits, double *sizes);
-/* vg_robust_solve: in place of vg_solver_solve. The first call makes room for one block of eight poses per thread. */
-int vg_robust_solve(vg_robust *r, size_t n, const double *const *rhs, const float *const *misfits, const double *sizes,
+/* vg_robust_solve: in place of vg_solver_solve, or of vg_solver_solve_each where each is not NULL; its solvers are that
+ * of r, or like it. The first call makes room for one block of eight poses per thread. */
+int vg_robust_solve(vg_robust *r, size_t n, vg_solver *const *each, const double *const *rhs, const float *const *misfits, const double *sizes,
                     double *const *x, const double *const *anchors, const double *const *roots,
                     vg_err *e) VG_MUST_CHECK;
 vg_robust_stats vg_robust_get_stats(const vg_robust *r);

@@ -101,7 +101,7 @@ static void numbers_are_scanned(void)
 enum { N = 11 };
 
 /* A factor of two supernodes, 5 columns over rows 0-4, 6, 7, 9 and 6 columns over rows 5-10, as a dense L. */
-static void make_factor(double *values, double dense[N][N], vgi_factor *f)
+static void make_factor(const double **block, double *values, double dense[N][N], vgi_factor *f)
 {
     static const int super[3] = {0, 5, N}, pi[3] = {0, 8, 14}, px[3] = {0, 40, 76};
     static const int rows[14] = {0, 1, 2, 3, 4, 6, 7, 9, 5, 6, 7, 8, 9, 10};
@@ -115,15 +115,17 @@ static void make_factor(double *values, double dense[N][N], vgi_factor *f)
                 if (i >= k) dense[rows[pi[s] + i]][super[s] + k] = *to;
             }
     }
-    *f = (vgi_factor){N, 2, super, pi, px, rows, values};
+    block[0] = values, block[1] = values + px[1];
+    *f = (vgi_factor){N, 2, super, pi, rows, block};
 }
 
-/* b = L L' x of known x gives x back. */
+/* b = L L' x of known x gives x back, for eight poses and for one. */
 static void check_solve(void)
 {
-    double values[76], L[N][N];
+    double values[76], L[N][N], one[N][4] = {{0}};
+    const double *block[2];
     vgi_factor f;
-    make_factor(values, L, &f);
+    make_factor(block, values, L, &f);
     vgi_row x[N];
     for (size_t c = 0; c < 3; c++)
         for (size_t k = 0; k < VGI_LANES; k++) {
@@ -135,10 +137,15 @@ static void check_solve(void)
                 for (size_t j = 0; j < N; j++) x[i].xyz[c][k] += L[i][j] * y[j];
             }
         }
-    vgi_factor_solve(&f, x);
     for (size_t i = 0; i < N; i++)
-        for (size_t c = 0; c < 3; c++)
+        for (size_t c = 0; c < 3; c++) one[i][c] = x[i].xyz[c][5];
+    vgi_factor_solve(&f, x);
+    vgi_factor_solve_one(&f, *one);
+    for (size_t i = 0; i < N; i++)
+        for (size_t c = 0; c < 3; c++) {
             for (size_t k = 0; k < VGI_LANES; k++) CHECK_NEAR(x[i].xyz[c][k], wave(100 * i + 10 * c + k), 1e-13);
+            CHECK_NEAR(one[i][c], wave(100 * i + 10 * c + 5), 1e-13);
+        }
 }
 
 static void check_rows(void)

@@ -333,51 +333,91 @@ static void test_anchors(void)
     }
 }
 
-/* The poses of vectors that nothing fits, by a solver that is like `base`, beside those of a new one: farthest in D. */
-static double apart_from_new(const vg_graph *g, const vg_solver *base, const double *reference, const uint32_t *anchors,
-                             size_t count, vg_weights weights)
+/* The poses of vectors that nothing fits, each by a solver that is like `base`, beside those of a new one: farthest in D.
+ * Solver i has the first count[i] of the anchors. */
+static double apart_from_new(const vg_graph *g, vg_solver *base, const double *reference, const uint32_t *anchors,
+                             size_t n, const size_t *count, vg_weights weights)
 {
-    vg_solver *s;
+    enum { MOST = 4 };
+    vg_solver *s[MOST + 1];
     vg_err e;
-    double *w = vectors_of(g, reference), *at = room(3 * count, sizeof *at), root[3] = {1, 2, 3};
-    double *x = room(3 * g->nv, sizeof *x), *rhs = room(3 * g->nv, sizeof *rhs);
-    const double *held = count ? at : root;
+    double *w = vectors_of(g, reference), *at = room(3 * g->nv, sizeof *at), root[3] = {1, 2, 3}, worst = 0;
+    double *x[MOST + 1], *rhs[MOST + 1];
+    const double *given[MOST + 1], *held[MOST + 1], *roots[MOST + 1];
+    const uint32_t *lists[MOST];
     for (size_t c = 0; c < 3 * vg_graph_corners(g); c++) w[c] *= 1 + 0.2 * noise();
-    vg_graph_anchors(reference, anchors, count, at);
-    answer fresh = solve(g, reference, anchors, count, 1, (const double *const *)&w, &held, weights, 1, 1);
-    CHECK(fresh.code == VG_OK && vg_solver_new_like(&s, base, anchors, count, reference, &e) == VG_OK);
-    vg_solver_load(s, 1, (const double *const *)&w, &held, &x, &rhs);
-    vg_solver_solve(s, 1, (const double *const *)&rhs, &x, &held, &held);
-    double apart = farthest(x, fresh.x[0], g->nv) / vg_diagonal(reference, g->nv);
-    vg_solver_free(&s);
-    clear(&fresh);
-    free(w), free(at), free(x), free(rhs);
-    return apart;
+    for (size_t i = 0; i <= n; i++) {
+        x[i] = room(3 * g->nv, sizeof **x), rhs[i] = room(3 * g->nv, sizeof **rhs);
+        given[i] = w, held[i] = at, roots[i] = root;
+    }
+    for (size_t i = 0; i < n; i++) lists[i] = anchors;
+    vg_graph_anchors(reference, anchors, count[n - 1], at);
+    CHECK(vg_solver_new_like(s, n, base, lists, count, &e) == VG_OK);
+    s[n] = base;
+    vg_solver_load_each(n + 1, s, given, held, x, rhs);
+    vg_solver_solve_each(n + 1, s, (const double *const *)rhs, x, held, roots);
+    for (size_t i = 0; i < n; i++) {
+        const double *where = count[i] ? at : root;
+        answer fresh = solve(g, reference, anchors, count[i], 1, given, &where, weights, 1, 1);
+        CHECK(fresh.code == VG_OK);
+        worst = fmax(worst, farthest(x[i], fresh.x[0], g->nv) / vg_diagonal(reference, g->nv));
+        vg_solver_load(s[i], 1, given, held, x, rhs);
+        vg_solver_solve(s[i], 1, (const double *const *)rhs, x, held, roots);
+        worst = fmax(worst, farthest(x[0], fresh.x[0], g->nv) / vg_diagonal(reference, g->nv));
+        clear(&fresh);
+        vg_solver_free(&s[i]);
+    }
+    for (size_t i = 0; i <= n; i++) free(x[i]), free(rhs[i]);
+    free(w), free(at);
+    return worst;
 }
 
-/* Whatever the other solver holds: its order is taken over, its answers are not. */
+/* A solver that is like another one gives the answer of a new one, whatever it holds besides. */
 static void test_like(void)
 {
     vg_head h;
     const char *name;
     for (size_t i = 0; make_any(i, &h, &name); i++) {
         vg_graph *g = graph_of(&h);
-        for (size_t held = 0; held <= 5 && held <= g->attached; held += 5)
-            for (size_t count = 0; count <= 7 && count <= g->attached; count += count ? 3 : 1) {
-                uint32_t of_base[8], anchors[8];
-                vg_solver *base;
-                vg_err e;
-                vg_weights weights = all_weights[(held + count) % 2];
-                CHECK(spread_anchors(g, held, of_base) == held && spread_anchors(g, count, anchors) == count);
-                CHECK(vg_solver_new(&base, g, of_base, held, h.body.reference, weights, 1, &e) == VG_OK);
-                double apart = apart_from_new(g, base, h.body.reference, anchors, count, weights);
-                if (!(apart <= tight)) printf("%s, %zu anchors, like one with %zu:\n", name, count, held);
-                CHECK_NEAR(apart, 0, tight);
-                vg_solver_free(&base);
-            }
+        size_t most = g->attached < 40 ? g->attached : 40;
+        uint32_t *anchors = room(most, sizeof *anchors);
+        CHECK(spread_anchors(g, most, anchors) == most);
+        for (size_t held = 0; held <= 5 && held <= most; held += 5) {
+            size_t count[4] = {held, held < most ? held + 1 : most, most / 2 > held ? most / 2 : most, most};
+            vg_solver *base;
+            vg_err e;
+            vg_weights weights = all_weights[(held + i) % 2];
+            CHECK(vg_solver_new(&base, g, anchors, held, h.body.reference, weights, 2, &e) == VG_OK);
+            double apart = apart_from_new(g, base, h.body.reference, anchors, 4, count, weights);
+            if (!(apart <= tight)) printf("%s, like one with %zu anchors:\n", name, held);
+            CHECK_NEAR(apart, 0, tight);
+            vg_solver_free(&base);
+        }
+        free(anchors);
         vg_graph_free(&g);
         vg_head_clear(&h);
     }
+}
+
+/* What the other solver holds has to be held, and a vertex without faces cannot be; on failure no solver is made. */
+static void test_unlike(void)
+{
+    vg_head h = make_flower(14);
+    vg_graph *g = graph_of(&h);
+    uint32_t base_anchors[2] = {1, 3}, good[3] = {1, 2, 3}, bad[2] = {1, 2};
+    const uint32_t *lists[2] = {good, bad};
+    size_t counts[2] = {3, 2};
+    vg_solver *base, *s[2];
+    vg_err e;
+    CHECK(vg_solver_new(&base, g, base_anchors, 2, h.body.reference, VG_WEIGHTS_AREA, 2, &e) == VG_OK);
+    CHECK(vg_solver_new_like(s, 2, base, lists, counts, &e) == VG_EARG && !s[0] && !s[1]);
+    CHECK(strstr(e.message, "vertex 3") != NULL);
+    CHECK(vg_solver_new_like(s, 1, base, lists, counts, &e) == VG_OK);
+    CHECK(vg_solver_new_like(s + 1, 1, s[0], lists, counts, &e) == VG_EARG);
+    vg_solver_free(&s[0]);
+    vg_solver_free(&base);
+    vg_graph_free(&g);
+    vg_head_clear(&h);
 }
 
 /* Anchors that contradict the vectors are met to the bit, and everything may be anchored. */
@@ -509,6 +549,7 @@ TESTS({"every generated mesh comes back", test_generated}, {"long and large mesh
       {"anchors are met to the bit, isolated vertices stay", test_anchors},
       {"anchors that contradict the vectors", test_contradicting_anchors},
       {"a solver like another has answers of its own", test_like},
+      {"what a solver cannot be like", test_unlike},
       {"threads and batches change no bit", test_threads_and_batches},
       {"batch size and stats", test_batch_size_and_stats}, {"meshes without faces", test_without_faces},
       {"what is refused", test_refused})

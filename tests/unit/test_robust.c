@@ -51,7 +51,7 @@ static answer solve(const problem *q, int threads, size_t batch)
     vg_solver_solve(s, POSES, b, a.plain, anchors, roots);
     for (size_t i = 0; i < POSES; i += batch) {
         size_t some = POSES - i < batch ? POSES - i : batch;
-        if (vg_robust_solve(r, some, b + i, (const float *const *)misfits + i, sizes + i, a.x + i,
+        if (vg_robust_solve(r, some, NULL, b + i, (const float *const *)misfits + i, sizes + i, a.x + i,
                             anchors ? anchors + i : NULL, roots ? roots + i : NULL, &e) < 0) {
             printf("%s\n", e.message);
             exit(1);

@@ -14,10 +14,7 @@
  * Without anchors one vertex is held at 0 and the pose is moved to its root in the end. Leaves out the triangular
  * solves (solve_kernel.c), that guess (guess_kernel.c) and the factorisation (sparse.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "method/vectors/guess.h"
-#include "method/vectors/face_rows.h"
-#include "numeric/sparse.h"
-#include "model/incidence.h"
+#include "method/vectors/solver.h"
 
 #include <stdlib.h>
 #include <time.h>
@@ -26,32 +23,8 @@ enum {
     STAR = 12,         /* from this many corners on a face gets its centroid as an unknown ... */
     STAR_METRIC = 200  /* ... or from this many, if it has a metric of its own; then its metric is the weight alone */
 };
-#define NO_ROW UINT32_MAX
 
-struct vg_solver {
-    const vg_graph *g;
-    int threads;
-    size_t unknowns;  /* attached vertices that are no anchors, then centroids */
-    size_t vertices_unknown;
-    uint32_t pinned;  /* without anchors: the vertex that is held at 0 */
-    uint32_t *row;    /* nv: row in the factor's order; NO_ROW if held or isolated */
-    const vg_solver *like; /* while it is made: the solver whose order of elimination it takes */
-    vgi_metric metric;
-    size_t nsteps;
-    vgi_step *walk;       /* from the held vertices to all others */
-    uint32_t *anchors;
-    size_t nanchors;  /* those the caller gave; 0: one vertex is pinned */
-    size_t nisolated;
-    uint32_t *isolated;
-    double *isolated_at;
-    vgi_cholesky *cholesky;
-    vgi_factor factor;
-    vgi_row *x;       /* threads * unknowns */
-    vgi_point *spare; /* of vg_solver_load: nv + max_corners for each thread */
-    vg_solver_stats stats;
-};
-
-static double seconds(void)
+double vgi_solver_seconds(void)
 {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
@@ -104,11 +77,9 @@ static int number_unknowns(vg_solver *s, const uint32_t *anchors, size_t n, cons
 }
 
 /* Breadth first from the held vertices, so that paths are short and few roundings add up. */
-static int plan_walk(vg_solver *s, vg_err *e)
+int vgi_solver_plan_walk(vg_solver *s, const vgi_incidence *around, vg_err *e)
 {
     const vg_graph *g = s->g;
-    vgi_incidence around;
-    if (vgi_incidence_make(&around, &g->faces, e) < 0) return VG_ENOMEM;
     bool *reached = vgi_array(g->nv, sizeof *reached, e), *used = vgi_array(g->nf, sizeof *used, e);
     uint32_t *queue = vgi_array_raw(g->nv, sizeof *queue, e);
     s->walk = vgi_array_raw(g->attached, sizeof *s->walk, e);
@@ -119,15 +90,15 @@ static int plan_walk(vg_solver *s, vg_err *e)
     if (r == VG_OK && s->pinned < g->nv) queue[tail++] = s->pinned, reached[s->pinned] = true;
     while (r == VG_OK && head < tail) {
         uint32_t v = queue[head++];
-        for (uint32_t i = around.first[v]; i < around.first[v + 1]; i++) {
-            uint32_t f = around.face[i];
+        for (uint32_t i = around->first[v]; i < around->first[v + 1]; i++) {
+            uint32_t f = around->face[i];
             if (used[f]) continue;
             used[f] = true;
             for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
                 if (reached[g->vert[c]]) continue;
                 reached[g->vert[c]] = true;
                 queue[tail++] = g->vert[c];
-                s->walk[s->nsteps++] = (vgi_step){c, around.corner[i]};
+                s->walk[s->nsteps++] = (vgi_step){c, around->corner[i]};
             }
         }
     }
@@ -135,10 +106,18 @@ static int plan_walk(vg_solver *s, vg_err *e)
         r = vg_fail(e, VG_EINPUT,
                     "the vectors leave %zu vertices in pieces that nothing joins to the rest: a link is missing",
                     g->attached - tail);
-    vgi_incidence_clear(&around);
     free(reached);
     free(used);
     free(queue);
+    return r;
+}
+
+static int plan_walk(vg_solver *s, vg_err *e)
+{
+    vgi_incidence around;
+    if (vgi_incidence_make(&around, &s->g->faces, e) < 0) return VG_ENOMEM;
+    int r = vgi_solver_plan_walk(s, &around, e);
+    vgi_incidence_clear(&around);
     return r;
 }
 
@@ -153,91 +132,78 @@ static size_t count_entries(const vg_solver *s)
     return n;
 }
 
-static void assemble_pairs(vgi_triplets *t, const vg_solver *s, size_t f)
+static void assemble_pairs(vgi_triplets *t, const vg_solver *s, const uint32_t *row, size_t rows, size_t f)
 {
     size_t begin = s->g->start[f], r = face_size(s->g, f);
     const uint32_t *vert = s->g->vert + begin;
     for (size_t p = 0; p < r; p++) {
-        size_t i = s->row[vert[p]];
-        if (i >= s->unknowns) continue;
+        size_t i = row[vert[p]];
+        if (i >= rows) continue;
         for (size_t q = 0; q <= p; q++) {
-            if (s->row[vert[q]] >= s->unknowns) continue;
-            vgi_triplets_put(t, i, s->row[vert[q]], vgi_metric_entry(&s->metric, s->g, f, p, q));
+            if (row[vert[q]] >= rows) continue;
+            vgi_triplets_put(t, i, row[vert[q]], vgi_metric_entry(&s->metric, s->g, f, p, q));
         }
     }
 }
 
-static void assemble_star(vgi_triplets *t, const vg_solver *s, size_t f, size_t centre)
+static void assemble_star(vgi_triplets *t, const vg_solver *s, const uint32_t *row, size_t rows, size_t f, size_t centre)
 {
     size_t r = face_size(s->g, f);
     const uint32_t *vert = s->g->vert + s->g->start[f];
     double weight = vgi_metric_weight(&s->metric, f);
     vgi_triplets_put(t, centre, centre, weight * (double)r);
     for (size_t p = 0; p < r; p++) {
-        size_t i = s->row[vert[p]];
-        if (i >= s->unknowns) continue;
+        size_t i = row[vert[p]];
+        if (i >= rows) continue;
         vgi_triplets_put(t, i, i, weight);
         vgi_triplets_put(t, i, centre, -weight);
     }
 }
 
-static int assemble(const vg_solver *s, vgi_sparse *N, vg_err *e)
+int vgi_solver_assemble(const vg_solver *s, const uint32_t *row, const uint32_t *centre, size_t rows, vgi_sparse *N,
+                        vg_err *e)
 {
     const vg_graph *g = s->g;
     vgi_triplets t;
     int r = vgi_triplets_make(&t, count_entries(s), e);
     if (r < 0) return r;
-    size_t centre = s->vertices_unknown;
     for (size_t f = 0; f < g->nf; f++) {
-        if (vgi_solver_is_star(s, f)) assemble_star(&t, s, f, centre++);
-        else assemble_pairs(&t, s, f);
+        if (vgi_solver_is_star(s, f)) assemble_star(&t, s, row, rows, f, *centre++);
+        else assemble_pairs(&t, s, row, rows, f);
     }
-    r = vgi_triplets_sum(&t, s->unknowns, N, e);
+    r = vgi_triplets_sum(&t, rows, N, e);
     vgi_triplets_clear(&t);
     return r;
 }
 
-/* The unknowns of s in the order in which its like eliminates them: those that the like holds come last. */
-static int *order_like(const vg_solver *s, vg_err *e)
+/* Centroids are the last unknowns. */
+static int assemble(const vg_solver *s, vgi_sparse *N, vg_err *e)
 {
-    const vg_solver *like = s->like;
-    const int *perm = vgi_cholesky_order(like->cholesky);
-    int *order = vgi_array_raw(s->unknowns, sizeof *order, e);
-    uint32_t *unknown = vgi_array_raw(like->unknowns, sizeof *unknown, e); /* of s, by row of the like's factor */
-    size_t n = 0;
-    if (!order || !unknown) return free(order), free(unknown), NULL;
-    for (size_t i = 0; i < like->unknowns; i++) { /* centroids; vertices are put over the rest below */
-        size_t u = (size_t)perm[i];
-        unknown[i] = u < like->vertices_unknown ? NO_ROW : (uint32_t)(u - like->vertices_unknown + s->vertices_unknown);
-    }
-    for (size_t v = 0; v < s->g->nv; v++)
-        if (like->row[v] != NO_ROW) unknown[like->row[v]] = s->row[v];
-    for (size_t i = 0; i < like->unknowns; i++)
-        if (unknown[i] != NO_ROW) order[n++] = (int)unknown[i];
-    for (size_t v = 0; v < s->g->nv; v++)
-        if (like->row[v] == NO_ROW && s->row[v] != NO_ROW) order[n++] = (int)s->row[v];
-    free(unknown);
-    return order;
+    size_t n = s->unknowns - s->vertices_unknown;
+    uint32_t *centre = vgi_array_raw(n, sizeof *centre, e);
+    if (!centre) return VG_ENOMEM;
+    for (size_t i = 0; i < n; i++) centre[i] = (uint32_t)(s->vertices_unknown + i);
+    int r = vgi_solver_assemble(s, s->row, centre, s->unknowns, N, e);
+    free(centre);
+    return r;
 }
 
 static int factorize(vg_solver *s, vg_err *e)
 {
     vgi_sparse N;
-    int *order = NULL, r = assemble(s, &N, e);
+    int r = assemble(s, &N, e);
     if (r < 0) return r;
-    double t0 = seconds(), t1 = t0;
-    if (s->like && s->like->cholesky && !(order = order_like(s, e))) r = VG_ENOMEM;
-    if (r == VG_OK) r = vgi_cholesky_new(&s->cholesky, &N, order, e);
+    double t0 = vgi_solver_seconds(), t1 = t0;
+    r = vgi_cholesky_new(&s->cholesky, &N, NULL, e);
     if (r == VG_OK) {
-        t1 = seconds();
+        t1 = vgi_solver_seconds();
         r = vgi_cholesky_factorize(s->cholesky, &N, e);
     }
     if (r == VG_OK) {
-        s->stats = (vg_solver_stats){s->unknowns, vgi_cholesky_entries(s->cholesky), t1 - t0, seconds() - t1};
+        s->stats = (vg_solver_stats){s->unknowns, vgi_cholesky_entries(s->cholesky), t1 - t0, vgi_solver_seconds() - t1};
         s->factor = vgi_cholesky_factor(s->cholesky);
     }
     vgi_sparse_clear(&N);
-    free(order);
     return r;
 }
 
@@ -255,7 +221,7 @@ static int permute_rows(vg_solver *s, vg_err *e)
 }
 
 /* n elements for each thread, aligned for vectors; sizes of elements are multiples of 32 */
-static void *for_threads(const vg_solver *s, size_t n, size_t size, vg_err *e)
+void *vgi_solver_for_threads(const vg_solver *s, size_t n, size_t size, vg_err *e)
 {
     size_t all;
     void *p = NULL;
@@ -267,13 +233,13 @@ static void *for_threads(const vg_solver *s, size_t n, size_t size, vg_err *e)
 
 static int make_spare(vg_solver *s, vg_err *e)
 {
-    s->spare = for_threads(s, s->g->nv + s->g->max_corners, sizeof *s->spare, e);
+    s->spare = vgi_solver_for_threads(s, s->g->nv + s->g->max_corners, sizeof *s->spare, e);
     return s->spare ? VG_OK : VG_ENOMEM;
 }
 
 static int make_workspace(vg_solver *s, vg_err *e)
 {
-    s->x = for_threads(s, s->unknowns, sizeof *s->x, e);
+    s->x = vgi_solver_for_threads(s, s->unknowns, sizeof *s->x, e);
     return s->x ? VG_OK : VG_ENOMEM;
 }
 
@@ -285,12 +251,12 @@ static int make_metric(vg_solver *s, const double *reference, vg_err *e)
     return r;
 }
 
-static int make_solver(vg_solver **out, const vg_graph *g, const uint32_t *anchors, size_t nanchors,
-                       const double *reference, vg_weights weights, int threads, const vg_solver *like, vg_err *e)
+int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
+                  vg_weights weights, int threads, vg_err *e)
 {
     vg_solver *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
-    s->g = g, s->threads = threads, s->like = like;
+    s->g = g, s->threads = threads;
     int r = weights == VG_WEIGHTS_AREA ? make_metric(s, reference, e) : VG_OK;
     if (r == VG_OK) r = number_unknowns(s, anchors, nanchors, reference, e);
     if (r == VG_OK) r = plan_walk(s, e);
@@ -300,36 +266,29 @@ static int make_solver(vg_solver **out, const vg_graph *g, const uint32_t *ancho
         if (r == VG_OK) r = permute_rows(s, e);
         if (r == VG_OK) r = make_workspace(s, e);
     }
-    s->like = NULL;
     if (r < 0) vg_solver_free(out);
     return r;
 }
 
-int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, size_t nanchors, const double *reference,
-                  vg_weights weights, int threads, vg_err *e)
+static void free_own(vg_solver *s)
 {
-    return make_solver(s, g, anchors, nanchors, reference, weights, threads, NULL, e);
-}
-
-int vg_solver_new_like(vg_solver **s, const vg_solver *like, const uint32_t *anchors, size_t nanchors,
-                       const double *reference, vg_err *e)
-{
-    vg_weights weights = like->metric.face ? VG_WEIGHTS_AREA : VG_WEIGHTS_UNIFORM;
-    return make_solver(s, like->g, anchors, nanchors, reference, weights, like->threads, like, e);
+    vgi_metric_clear(&s->metric);
+    free(s->isolated);
+    free(s->isolated_at);
+    free(s->spare);
 }
 
 void vg_solver_free(vg_solver **out)
 {
     vg_solver *s = *out;
     if (!s) return;
+    if (!s->like) free_own(s);
+    vgi_sharing_free(&s->sharing);
+    vgi_held_factor_clear(&s->held);
     vgi_cholesky_free(&s->cholesky);
     free(s->row);
     free(s->anchors);
     free(s->walk);
-    free(s->spare);
-    vgi_metric_clear(&s->metric);
-    free(s->isolated);
-    free(s->isolated_at);
     free(s->x);
     free(s);
     *out = NULL;
@@ -360,6 +319,7 @@ vg_solver_stats vg_solver_get_stats(const vg_solver *s)
 
 typedef struct load_job {
     const vg_solver *s;
+    vg_solver *const *each; /* of the poses; NULL: s */
     size_t n, share; /* poses, and how many of them are one task */
     const double *const *vectors, *const *anchors;
     double *const *x, *const *rhs;
@@ -368,20 +328,33 @@ typedef struct load_job {
 static void load_share(void *context, size_t task)
 {
     const load_job *j = context;
-    const vg_solver *s = j->s;
-    vgi_guesser g = {.g = s->g, .metric = &s->metric, .walk = s->walk, .nsteps = s->nsteps, .pinned = s->pinned,
-                     .anchors = s->anchors, .nanchors = s->nanchors};
-    for (size_t i = task * j->share; i < j->n && i < (task + 1) * j->share; i++)
-        vgi_guess(&g, j->vectors[i], s->nanchors ? j->anchors[i] : NULL, j->x[i], j->rhs[i],
-                  s->spare + task * (s->g->nv + s->g->max_corners));
+    vgi_point *spare = j->s->spare + task * (j->s->g->nv + j->s->g->max_corners);
+    for (size_t i = task * j->share; i < j->n && i < (task + 1) * j->share; i++) {
+        const vg_solver *s = j->each ? j->each[i] : j->s;
+        vgi_guesser g = {.g = s->g, .metric = &s->metric, .walk = s->walk, .nsteps = s->nsteps, .pinned = s->pinned,
+                         .anchors = s->anchors, .nanchors = s->nanchors};
+        vgi_guess(&g, j->vectors[i], s->nanchors ? j->anchors[i] : NULL, j->x[i], j->rhs[i], spare);
+    }
+}
+
+static void load(const vg_solver *s, vg_solver *const *each, size_t n, const double *const *vectors,
+                 const double *const *anchors, double *const *x, double *const *rhs)
+{
+    size_t tasks = (size_t)s->threads < n ? (size_t)s->threads : n;
+    load_job j = {s, each, n, tasks ? (n + tasks - 1) / tasks : 0, vectors, anchors, x, rhs};
+    vgi_parallel(s->threads, tasks, load_share, &j);
 }
 
 void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const double *const *anchors,
                     double *const *x, double *const *rhs)
 {
-    size_t tasks = (size_t)s->threads < n ? (size_t)s->threads : n;
-    load_job j = {s, n, tasks ? (n + tasks - 1) / tasks : 0, vectors, anchors, x, rhs};
-    vgi_parallel(s->threads, tasks, load_share, &j);
+    load(s, NULL, n, vectors, anchors, x, rhs);
+}
+
+void vg_solver_load_each(size_t n, vg_solver *const *each, const double *const *vectors, const double *const *anchors,
+                         double *const *x, double *const *rhs)
+{
+    if (n) load(each[0], each, n, vectors, anchors, x, rhs);
 }
 
 typedef struct solve_job {
@@ -426,8 +399,8 @@ static void solve_block(void *context, size_t i)
         vgi_solver_place(s, j->x[k], s->nanchors ? j->anchors[k] : NULL, s->nanchors ? NULL : j->roots[k]);
 }
 
-void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *const *x, const double *const *anchors,
-                     const double *const *roots)
+static void solve_plainly(vg_solver *s, size_t n, const double *const *rhs, double *const *x,
+                          const double *const *anchors, const double *const *roots)
 {
     solve_job j = {.s = s, .n = n, .rhs = rhs, .x = x, .anchors = anchors, .roots = roots};
     size_t blocks = (n + VGI_LANES - 1) / VGI_LANES;
@@ -435,4 +408,28 @@ void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *c
         size_t round = blocks - j.first < (size_t)s->threads ? blocks - j.first : (size_t)s->threads;
         vgi_parallel(s->threads, round, solve_block, &j);
     }
+}
+
+static size_t run_of(size_t n, vg_solver *const *each)
+{
+    size_t i = 1;
+    while (i < n && (each[0]->like ? each[i]->like != NULL : each[i] == each[0])) i++;
+    return i;
+}
+
+void vg_solver_solve_each(size_t n, vg_solver *const *each, const double *const *rhs, double *const *x,
+                          const double *const *anchors, const double *const *roots)
+{
+    for (size_t i = 0, run; i < n; i += run) {
+        run = run_of(n - i, each + i);
+        if (each[i]->like) vgi_solver_solve_like(run, NULL, each + i, rhs + i, x + i, anchors + i, roots + i);
+        else solve_plainly(each[i], run, rhs + i, x + i, anchors + i, roots + i);
+    }
+}
+
+void vg_solver_solve(vg_solver *s, size_t n, const double *const *rhs, double *const *x, const double *const *anchors,
+                     const double *const *roots)
+{
+    if (s->like) vgi_solver_solve_like(n, s, NULL, rhs, x, anchors, roots);
+    else solve_plainly(s, n, rhs, x, anchors, roots);
 }

@@ -12,7 +12,7 @@
  * Eight poses go side by side, each with coefficients and an end of its own, so that a pose does not depend on its
  * neighbours. Leaves out the loops over rows and faces: robust_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "method/vectors/face_rows.h"
+#include "method/vectors/solver.h"
 #include "method/vectors/robust_kernel.h"
 
 #include <float.h>
@@ -26,7 +26,8 @@ static const double exact = 1e-11;     /* of the mean length of the wanted vecto
 
 /* What one block of eight poses needs. */
 typedef struct room {
-    vgi_row *u, *trial, *g, *gn, *z, *zn, *d; /* rows of unknowns; all but z, zn and d also of the held vertices */
+    vgi_row *u, *trial, *g, *gn; /* rows of unknowns and of held vertices */
+    vgi_row *z, *zn, *d;         /* rows that may move */
     vgi_row *corners;                         /* of the largest face */
     vgi_row *memory;                          /* all of these */
     float *misfit;
@@ -43,6 +44,7 @@ struct vg_robust {
     double *metric;
     unsigned char *star;
     size_t nmisfits;
+    size_t moved; /* rows that a pose may move: those of the solver and, without anchors, the vertex it holds */
     room *rooms; /* one per thread, nrooms of them made */
     size_t nrooms;
     vg_robust_stats *found; /* per room */
@@ -95,6 +97,7 @@ static int prepare_faces(vg_robust *r, vg_err *e)
     for (size_t i = 0; i < r->rows.nf; i++) r->face[r->rows.order[i]] = r->rows.face[i];
     for (size_t i = 0, at = 0; i < r->rows.nf; i++) at = write_metric(r, i, at);
     r->nmisfits = 3 * (vg_graph_corners(g) - g->nf);
+    r->moved = r->solver.rows + (r->solver.anchored ? 0 : r->rows.nheld);
     return VG_OK;
 }
 
@@ -107,7 +110,7 @@ static void free_room(room *m)
 
 static bool make_room(room *m, const vg_robust *r)
 {
-    size_t n = r->solver.rows, all = n + r->rows.nheld, bytes;
+    size_t n = r->moved, all = r->solver.rows + r->rows.nheld, bytes;
     if (vgi_mul(4 * all + 3 * n + 2 * r->solver.g->max_corners, sizeof *m->memory, &bytes))
         m->memory = aligned_alloc(sizeof(vgi_lanes), bytes);
     if (vgi_mul(r->nmisfits + 2, VGI_LANES * sizeof *m->misfit, &bytes)) m->misfit = aligned_alloc(64, bytes / 64 * 64);
@@ -224,6 +227,9 @@ typedef struct search {
     vgi_lanes soft2, scale, slope, t, energy; /* scale: of the first Hessian, slope: of the energy along d */
     bool active[VGI_LANES], falling[VGI_LANES]; /* falling: the last round gained more than enough */
     size_t rounds;
+    size_t lanes;                      /* poses */
+    const vg_solver *other[VGI_LANES]; /* that a pose has instead of r's, or NULL */
+    vgi_point *points;                 /* for these */
 } search;
 
 static bool any_active(const search *s)
@@ -240,10 +246,20 @@ static void look(const search *s, const vgi_row *u, vgi_row *g, vgi_robust_sums 
     vgi_robust_kernel_now()->energy(&s->faces, s->m.misfit, u, s->soft2, g, s->m.corners, sums);
 }
 
+/* z := N^-1 g, each pose by its own solver; 0 where that one holds. */
 static void precondition(const search *s, const vgi_row *g, vgi_row *z)
 {
-    memcpy(z, g, s->r->solver.rows * sizeof *z);
-    vgi_factor_solve(s->r->solver.factor, z);
+    size_t rows = s->r->solver.rows, plain = 0;
+    for (size_t k = 0; k < s->lanes; k++) plain += !s->other[k];
+    if (plain) {
+        memcpy(z, g, rows * sizeof *z);
+        vgi_factor_solve(s->r->solver.factor, z);
+        memset(z + rows, 0, (s->r->moved - rows) * sizeof *z);
+    } else {
+        memset(z, 0, s->r->moved * sizeof *z);
+    }
+    for (size_t k = 0; k < s->lanes; k++)
+        if (s->other[k]) vgi_solver_solve_lane(s->other[k], k, g, z, s->points);
 }
 
 /* How soft the absolute value is at 0, from the misfits of the plain solution; which poses have any. */
@@ -253,14 +269,14 @@ static void choose_softness(search *s)
     vgi_robust_kernel_now()->energy(&s->faces, s->m.misfit, s->m.u, NULL, NULL, s->m.corners, &sums);
     for (int k = 0; k < VGI_LANES; k++) {
         double mean = sums.energy[k] / (double)s->r->rows.nf, soft = s->r->eps * mean;
-        s->active[k] = mean > exact && soft * soft >= DBL_MIN && isfinite(soft * soft);
+        s->active[k] = (size_t)k < s->lanes && mean > exact && soft * soft >= DBL_MIN && isfinite(soft * soft);
         s->soft2[k] = s->active[k] ? soft * soft : 1;
     }
 }
 
 static void begin(search *s)
 {
-    size_t n = s->r->solver.rows;
+    size_t n = s->r->moved;
     vgi_robust_sums sums;
     vgi_robust_products p;
     vgi_lanes abc[3] = {{0}};
@@ -288,7 +304,7 @@ static double shorter(double t, double slope, double rise)
 /* u := u + t d, where the energy is lower by enough; a pose for which there is no such place is done. */
 static void advance(search *s, vgi_robust_sums *sums)
 {
-    size_t n = s->r->solver.rows;
+    size_t n = s->r->moved;
     for (int tries = 0;; tries++) {
         bool again = false;
         vgi_robust_kernel_now()->step(n, s->m.u, s->t, s->m.d, s->m.trial);
@@ -320,7 +336,7 @@ static void judge(search *s, const vgi_robust_sums *sums)
 /* d := -H gn, H the inverse Hessian of BFGS after one step, s = t d, y = gn - g, from H0 = scale N^-1. */
 static void choose_direction(search *s)
 {
-    size_t n = s->r->solver.rows;
+    size_t n = s->r->moved;
     vgi_robust_products p;
     vgi_lanes abc[3] = {{0}};
     vgi_robust_kernel_now()->multiply(n, s->m.g, s->m.gn, s->m.z, s->m.zn, s->m.d, &p);
@@ -362,6 +378,7 @@ static void descend(search *s)
 typedef struct robust_job {
     vg_robust *r;
     size_t n;
+    vg_solver *const *each;
     const double *const *rhs;
     const float *const *misfits;
     const double *sizes;
@@ -369,8 +386,29 @@ typedef struct robust_job {
     const double *const *anchors, *const *roots;
 } robust_job;
 
+/* The right-hand sides as rows. */
+static void load_rows(const search *s, const double *const *rhs, vgi_row *g)
+{
+    const vgi_solver_view *v = &s->r->solver;
+    memset(g, 0, (v->rows + s->r->rows.nheld) * sizeof *g); /* those of centroids are 0 */
+    vgi_load_rows(g, v->row, v->g->nv, v->rows, rhs);
+    for (size_t i = v->rows; i < s->r->moved; i++)
+        for (size_t c = 0; c < 3; c++)
+            for (size_t k = 0; k < VGI_LANES; k++) g[i].xyz[c][k] = rhs[k][3 * (size_t)s->r->rows.held[i - v->rows] + c];
+}
+
+/* What the poses have moved by. */
+static void add_rows(const search *s, double *const *x)
+{
+    const vgi_solver_view *v = &s->r->solver;
+    vgi_add_rows(s->m.u, v->row, v->g->nv, v->rows, x, s->lanes);
+    for (size_t i = v->rows; i < s->r->moved; i++)
+        for (size_t c = 0; c < 3; c++)
+            for (size_t k = 0; k < s->lanes; k++) x[k][3 * (size_t)s->r->rows.held[i - v->rows] + c] += s->m.u[i].xyz[c][k];
+}
+
 /* The plain solution, as the way there from the guess, in units of the size of each pose. */
-static void solve_plainly(const robust_job *j, search *s, size_t first, size_t lanes, vgi_lanes size)
+static void solve_plainly(const robust_job *j, search *s, size_t first, vgi_lanes size)
 {
     const vg_robust *r = j->r;
     size_t all = r->solver.rows + r->rows.nheld;
@@ -378,43 +416,50 @@ static void solve_plainly(const robust_job *j, search *s, size_t first, size_t l
     const float *misfit[VGI_LANES];
     vgi_lanes unit;
     for (size_t k = 0; k < VGI_LANES; k++) {
-        size_t from = first + (k < lanes ? k : lanes - 1);
+        size_t from = first + (k < s->lanes ? k : s->lanes - 1);
         rhs[k] = j->rhs[from], misfit[k] = j->misfits[from];
         size[k] = j->sizes[from] > 0 ? j->sizes[from] : 1, unit[k] = 1 / size[k];
     }
-    memset(s->m.u, 0, all * sizeof *s->m.u); /* rows of centroids and held vertices stay 0 */
+    memset(s->m.u, 0, all * sizeof *s->m.u); /* rows of held vertices stay 0 */
     memset(s->m.trial, 0, all * sizeof *s->m.trial);
-    vgi_load_rows(s->m.u, r->solver.row, r->solver.g->nv, r->solver.rows, rhs);
-    vgi_factor_solve(r->solver.factor, s->m.u);
-    vgi_robust_kernel_now()->scale(r->solver.rows, unit, s->m.u);
+    load_rows(s, rhs, s->m.g);
+    precondition(s, s->m.g, s->m.u);
+    vgi_robust_kernel_now()->scale(r->moved, unit, s->m.u);
     vgi_robust_kernel_now()->interleave(r->nmisfits, misfit, s->m.misfit);
+}
+
+static void choose_solvers(const robust_job *j, search *s, size_t first)
+{
+    for (size_t k = 0; k < s->lanes && j->each; k++) s->other[k] = j->each[first + k] != j->r->s ? j->each[first + k] : NULL;
 }
 
 static void robust_block(void *context, size_t i)
 {
     const robust_job *j = context;
     const vg_robust *r = j->r;
-    const vg_graph *g = r->solver.g;
     size_t first = i * VGI_LANES, lanes = j->n - first < VGI_LANES ? j->n - first : VGI_LANES;
-    search s = {.r = r, .m = r->rooms[i],
+    search s = {.r = r, .m = r->rooms[i], .lanes = lanes,
                 .faces = {r->rows.nf, r->rows.start, r->rows.row, r->entry, r->metric, r->star}};
     vgi_lanes size;
-    if (r->solver.rows) {
-        solve_plainly(j, &s, first, lanes, size);
+    choose_solvers(j, &s, first);
+    if (r->s->sharing) s.points = r->s->sharing->points + i * vgi_solver_all_rows(r->s);
+    if (r->moved) {
+        solve_plainly(j, &s, first, size);
         descend(&s);
-        vgi_robust_kernel_now()->scale(r->solver.rows, size, s.m.u);
-        vgi_add_rows(s.m.u, r->solver.row, g->nv, r->solver.rows, j->x + first, lanes);
+        vgi_robust_kernel_now()->scale(r->moved, size, s.m.u);
+        add_rows(&s, j->x + first);
     }
     vg_robust_stats *found = &r->found[i];
     if (s.rounds > found->most_rounds) found->most_rounds = s.rounds;
     for (size_t k = 0; k < lanes; k++) {
-        bool held = r->solver.anchored;
-        vgi_solver_place(r->s, j->x[first + k], held ? j->anchors[first + k] : NULL, held ? NULL : j->roots[first + k]);
+        const vg_solver *own = s.other[k] ? s.other[k] : r->s;
+        bool held = own->nanchors > 0;
+        vgi_solver_place(own, j->x[first + k], held ? j->anchors[first + k] : NULL, held ? NULL : j->roots[first + k]);
         found->unfinished += s.falling[k];
     }
 }
 
-int vg_robust_solve(vg_robust *r, size_t n, const double *const *rhs, const float *const *misfits, const double *sizes,
+int vg_robust_solve(vg_robust *r, size_t n, vg_solver *const *each, const double *const *rhs, const float *const *misfits, const double *sizes,
                     double *const *x, const double *const *anchors, const double *const *roots, vg_err *e)
 {
     if (!n) return VG_OK;
@@ -423,8 +468,8 @@ int vg_robust_solve(vg_robust *r, size_t n, const double *const *rhs, const floa
     size_t most = VGI_LANES * r->nrooms;
     for (size_t done = 0; done < n; done += most) {
         size_t some = n - done < most ? n - done : most;
-        robust_job j = {r, some, rhs + done, misfits + done, sizes + done, x + done,
-                        r->solver.anchored ? anchors + done : NULL, r->solver.anchored ? NULL : roots + done};
+        robust_job j = {r, some, each ? each + done : NULL, rhs + done, misfits + done, sizes + done, x + done,
+                        anchors ? anchors + done : NULL, roots ? roots + done : NULL};
         vgi_parallel(r->solver.threads, (some + VGI_LANES - 1) / VGI_LANES, robust_block, &j);
     }
     r->stats = (vg_robust_stats){0};

@@ -1,0 +1,211 @@
+/* hold.c: solvers that are like another one and hold more vertices, as poses with pins need them. Most of their factor is
+ * that of the other solver, or follows from it (fronts.c), so that a set of vertices that one pose alone holds costs about
+ * as much as two solves. Poses are solved one by one: it is seldom that eight in a row hold the same vertices.
+ *
+ * Without anchors the other solver holds one vertex at 0, which is free here: its row is behind all others.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/vectors/solver.h"
+
+#include <stdlib.h>
+
+/* ---- what they share ---- */
+
+static uint32_t row_of_vertex(const vg_solver *like, size_t v)
+{
+    return v == like->pinned ? (uint32_t)like->unknowns : like->row[v];
+}
+
+static int assemble_all(const vg_solver *s, vgi_sparse *N, vg_err *e)
+{
+    size_t centres = s->unknowns - s->vertices_unknown;
+    uint32_t *row = vgi_array_raw(s->g->nv, sizeof *row, e), *centre = vgi_array_raw(centres, sizeof *centre, e);
+    int r = row && centre ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) {
+        const int *order = s->cholesky ? vgi_cholesky_order(s->cholesky) : NULL;
+        for (size_t v = 0; v < s->g->nv; v++) row[v] = row_of_vertex(s, v);
+        for (size_t i = 0; i < s->unknowns; i++)
+            if ((size_t)order[i] >= s->vertices_unknown) centre[(size_t)order[i] - s->vertices_unknown] = (uint32_t)i;
+        r = vgi_solver_assemble(s, row, centre, vgi_solver_all_rows(s), N, e);
+    }
+    free(row);
+    free(centre);
+    return r;
+}
+
+int vgi_solver_share(vg_solver *s, vg_err *e)
+{
+    const vg_graph *g = s->g;
+    vgi_sparse N = {0};
+    if (s->sharing) return VG_OK;
+    vgi_sharing *x = s->sharing = vgi_array(1, sizeof *x, e);
+    if (!x) return VG_ENOMEM;
+    int r = vgi_incidence_make(&x->around, &g->faces, e);
+    if (r == VG_OK && vgi_solver_all_rows(s)) {
+        x->points = vgi_solver_for_threads(s, vgi_solver_all_rows(s), sizeof *x->points, e);
+        r = x->points ? assemble_all(s, &N, e) : VG_ENOMEM;
+        if (r == VG_OK) r = vgi_fronts_new(&x->fronts, &N, e);
+        vgi_sparse_clear(&N);
+    }
+    if (r < 0) vgi_sharing_free(&s->sharing);
+    return r;
+}
+
+void vgi_sharing_free(vgi_sharing **x)
+{
+    if (!*x) return;
+    vgi_incidence_clear(&(*x)->around);
+    vgi_fronts_free(&(*x)->fronts);
+    free((*x)->points);
+    free(*x);
+    *x = NULL;
+}
+
+/* ---- one solver ---- */
+
+/* held: of all rows of the solver that s is like. What that one holds must be among the anchors. */
+static int mark_held(const vg_solver *s, bool *held, vg_err *e)
+{
+    const vg_solver *like = s->like;
+    size_t known = 0;
+    for (size_t i = 0; i < s->nanchors; i++) {
+        uint32_t v = s->anchors[i], row = row_of_vertex(like, v);
+        if (!s->g->in_face[v]) return vg_fail(e, VG_EINPUT, "anchor %u is in no face", v);
+        if (row < vgi_solver_all_rows(like)) held[row] = true;
+        known += known < like->nanchors && like->anchors[known] == v;
+    }
+    if (known < like->nanchors)
+        return vg_fail(e, VG_EARG, "vertex %u is an anchor of the other solver and not of this one", like->anchors[known]);
+    if (s->pinned < s->g->nv) held[like->unknowns] = true;
+    return VG_OK;
+}
+
+static int number_rows(vg_solver *s, vg_err *e)
+{
+    const vg_solver *like = s->like;
+    size_t all = vgi_solver_all_rows(like);
+    if (!(s->row = vgi_array_raw(s->g->nv, sizeof *s->row, e))) return VG_ENOMEM;
+    for (size_t v = 0; v < s->g->nv; v++) {
+        uint32_t row = row_of_vertex(like, v);
+        s->row[v] = row < all ? s->held.row[row] : NO_ROW;
+    }
+    return VG_OK;
+}
+
+static int hold(vg_solver *s, vg_err *e)
+{
+    const vgi_sharing *shared = s->like->sharing;
+    double begin = vgi_solver_seconds();
+    bool *held = vgi_array(vgi_solver_all_rows(s->like), sizeof *held, e);
+    int r = held ? mark_held(s, held, e) : VG_ENOMEM;
+    if (r == VG_OK && shared->fronts) r = vgi_fronts_hold(shared->fronts, held, &s->held, e);
+    if (r == VG_OK) r = number_rows(s, e);
+    s->factor = s->held.factor;
+    s->unknowns = s->factor.n;
+    s->stats = (vg_solver_stats){s->unknowns, s->held.entries, 0, vgi_solver_seconds() - begin};
+    free(held);
+    return r;
+}
+
+static int make_like(vg_solver **out, const vg_solver *like, const uint32_t *anchors, size_t n, vg_err *e)
+{
+    vg_solver *s = *out = vgi_array(1, sizeof *s, e);
+    if (!s) return VG_ENOMEM;
+    s->like = like, s->g = like->g, s->threads = like->threads, s->metric = like->metric, s->spare = like->spare;
+    s->nisolated = like->nisolated, s->isolated = like->isolated, s->isolated_at = like->isolated_at;
+    s->pinned = n ? (uint32_t)s->g->nv : like->pinned;
+    s->nanchors = n;
+    s->anchors = vgi_copy_array(anchors, n, sizeof *anchors, e);
+    int r = s->anchors ? hold(s, e) : VG_ENOMEM;
+    if (r == VG_OK) r = vgi_solver_plan_walk(s, &like->sharing->around, e);
+    if (r < 0) vg_solver_free(out);
+    return r;
+}
+
+typedef struct make_job {
+    vg_solver **s;
+    const vg_solver *like;
+    const uint32_t *const *anchors;
+    const size_t *nanchors;
+    vg_err *errors;
+} make_job;
+
+static void make_one(void *context, size_t i)
+{
+    const make_job *j = context;
+    if (make_like(&j->s[i], j->like, j->anchors[i], j->nanchors[i], &j->errors[i]) < 0) j->s[i] = NULL;
+}
+
+int vg_solver_new_like(vg_solver **s, size_t n, vg_solver *like, const uint32_t *const *anchors, const size_t *nanchors,
+                       vg_err *e)
+{
+    for (size_t i = 0; i < n; i++) s[i] = NULL;
+    if (like->like) return vg_fail(e, VG_EARG, "a solver that is like another one cannot be taken as a pattern");
+    vg_err *errors = vgi_array(n, sizeof *errors, e);
+    if (!errors || vgi_solver_share(like, e) < 0) return free(errors), VG_ENOMEM;
+    make_job j = {s, like, anchors, nanchors, errors};
+    vgi_parallel(like->threads, n, make_one, &j);
+    size_t failed = 0;
+    while (failed < n && s[failed]) failed++;
+    int r = failed < n ? errors[failed].code : VG_OK;
+    if (r < 0) {
+        if (e) *e = errors[failed];
+        for (size_t i = 0; i < n; i++) vg_solver_free(&s[i]);
+    }
+    free(errors);
+    return r;
+}
+
+/* ---- solving ---- */
+
+void vgi_solver_solve_lane(const vg_solver *s, size_t lane, const vgi_row *from, vgi_row *to, vgi_point *points)
+{
+    size_t all = vgi_solver_all_rows(s->like);
+    const uint32_t *row = s->held.row;
+    for (size_t i = 0; i < all; i++) {
+        if (row[i] == NO_ROW) continue;
+        for (size_t c = 0; c < 3; c++) points[row[i]][c] = from[i].xyz[c][lane];
+        points[row[i]][3] = 0;
+    }
+    if (s->unknowns) vgi_factor_solve_one(&s->factor, *points);
+    for (size_t i = 0; i < all; i++)
+        for (size_t c = 0; c < 3; c++) to[i].xyz[c][lane] = row[i] == NO_ROW ? 0 : points[row[i]][c];
+}
+
+typedef struct solve_job {
+    size_t n, share; /* poses, and how many of them are one task */
+    const vg_solver *s;
+    vg_solver *const *each;
+    const double *const *rhs;
+    double *const *x;
+    const double *const *anchors, *const *roots;
+} solve_job;
+
+static void solve_pose(const vg_solver *s, const double *rhs, double *x, vgi_point *points)
+{
+    memset(points, 0, s->unknowns * sizeof *points);
+    for (size_t v = 0; v < s->g->nv; v++)
+        if (s->row[v] != NO_ROW) memcpy(points[s->row[v]], rhs + 3 * v, 3 * sizeof *rhs);
+    vgi_factor_solve_one(&s->factor, *points);
+    for (size_t v = 0; v < s->g->nv; v++)
+        for (size_t k = 0; s->row[v] != NO_ROW && k < 3; k++) x[3 * v + k] += points[s->row[v]][k];
+}
+
+static void solve_share(void *context, size_t task)
+{
+    const solve_job *j = context;
+    for (size_t i = task * j->share; i < j->n && i < (task + 1) * j->share; i++) {
+        const vg_solver *s = j->each ? j->each[i] : j->s;
+        vgi_point *points = s->like->sharing->points + task * vgi_solver_all_rows(s->like);
+        if (s->unknowns) solve_pose(s, j->rhs[i], j->x[i], points);
+        vgi_solver_place(s, j->x[i], s->nanchors ? j->anchors[i] : NULL, s->nanchors ? NULL : j->roots[i]);
+    }
+}
+
+void vgi_solver_solve_like(size_t n, const vg_solver *s, vg_solver *const *each, const double *const *rhs,
+                           double *const *x, const double *const *anchors, const double *const *roots)
+{
+    if (!s) s = each[0];
+    size_t tasks = (size_t)s->threads < n ? (size_t)s->threads : n;
+    solve_job j = {n, tasks ? (n + tasks - 1) / tasks : 0, s, each, rhs, x, anchors, roots};
+    vgi_parallel(s->threads, tasks, solve_share, &j);
+}

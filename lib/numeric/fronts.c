@@ -1,0 +1,434 @@
+/* fronts.c: Cholesky factors of many principal submatrices of one matrix, by the multifrontal method (Duff and Reid
+ * 1983) on CHOLMOD's analysis of the whole.
+ *
+ * A supernode is eliminated in a dense front: its entries of the matrix, and what is left (the update) of the fronts of
+ * its children. A row that is held is left out of all fronts. That changes numbers only in the supernode of the row and
+ * its ancestors; blocks and updates of all others are computed once, for all sets of held rows. Where only rows below a
+ * block are held, they are dropped from a copy. The root is never shared: whatever is held, it changes, and before
+ * anything is held it may be singular.
+ *
+ * Updates of one set are on a stack, since supernodes are in postorder. Leaves out the dense arithmetic
+ * (fronts_kernel.c) and triangular solves (solve_kernel.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "numeric/fronts.h"
+#include "numeric/fronts_kernel.h"
+
+#include <stdlib.h>
+
+#define NONE UINT32_MAX
+enum { MOST_SHARED = 16 << 20 }; /* numbers in shared blocks and updates; a larger matrix shares none */
+
+struct vgi_fronts {
+    vgi_cholesky *analysis;
+    vgi_factor f;    /* without blocks */
+    uint32_t *row;   /* per row of the matrix: its row in f */
+    int *parent;     /* per supernode; -1: root */
+    int *child, *next; /* per supernode: its last child, its sibling before; -1: none */
+    size_t most_rows;  /* of a front */
+    int *start, *at; /* the lower triangle by columns, rows and columns as in f */
+    double *value;
+    double *shared;  /* blocks and updates of all but roots; NULL: none */
+    const double **block, **update; /* per supernode; NULL: not shared */
+};
+
+typedef struct front {
+    size_t rows, columns; /* that are not held */
+    bool changed;         /* its numbers are not the shared ones */
+} front;
+
+/* One set of held rows. */
+typedef struct elimination {
+    const vgi_fronts *b;
+    const bool *held; /* per row of f; NULL: nothing, blocks and updates are to be shared */
+    front *front;     /* per supernode */
+    uint32_t *place;  /* per row of f: its place in the front at hand, or NONE */
+    double *stack;
+    const double **update; /* per supernode */
+    uint32_t *to;     /* places of a child's rows */
+} elimination;
+
+static size_t rows_of(const vgi_factor *f, size_t s)
+{
+    return (size_t)(f->pi[s + 1] - f->pi[s]);
+}
+
+static size_t columns_of(const vgi_factor *f, size_t s)
+{
+    return (size_t)(f->super[s + 1] - f->super[s]);
+}
+
+static bool is_held(const elimination *x, int row)
+{
+    return x->held && x->held[row];
+}
+
+/* ---- what is shared ---- */
+
+static int find_parents(vgi_fronts *b, vg_err *e)
+{
+    const vgi_factor *f = &b->f;
+    int *owner = vgi_array_raw(f->n, sizeof *owner, e);
+    if (!owner) return VG_ENOMEM;
+    for (size_t s = 0; s < f->supernodes; s++)
+        for (int j = f->super[s]; j < f->super[s + 1]; j++) owner[j] = (int)s;
+    for (size_t s = 0; s < f->supernodes; s++)
+        b->parent[s] = rows_of(f, s) > columns_of(f, s) ? owner[f->rows[(size_t)f->pi[s] + columns_of(f, s)]] : -1;
+    free(owner);
+    return VG_OK;
+}
+
+static int permute_matrix(vgi_fronts *b, const vgi_sparse *a, vg_err *e)
+{
+    const int *order = vgi_cholesky_order(b->analysis);
+    size_t entries = (size_t)a->start[a->n];
+    b->row = vgi_array_raw(a->n, sizeof *b->row, e);
+    b->start = vgi_array(a->n + 2, sizeof *b->start, e);
+    b->at = vgi_array_raw(entries, sizeof *b->at, e);
+    b->value = vgi_array_raw(entries, sizeof *b->value, e);
+    if (!b->row || !b->start || !b->at || !b->value) return VG_ENOMEM;
+    for (size_t i = 0; i < a->n; i++) b->row[order[i]] = (uint32_t)i;
+    int *next = b->start + 1; /* becomes the start of the column behind */
+    for (int pass = 0; pass < 2; pass++) {
+        for (size_t j = 0; j < a->n; j++)
+            for (int k = a->start[j]; k < a->start[j + 1]; k++) {
+                uint32_t p = b->row[j], q = b->row[a->row[k]], column = p < q ? p : q;
+                if (pass == 0) {
+                    next[column + 1]++;
+                } else {
+                    b->at[next[column]] = (int)(p < q ? q : p);
+                    b->value[next[column]++] = a->value[k];
+                }
+            }
+        for (size_t j = 0; pass == 0 && j < a->n; j++) next[j + 1] += next[j];
+    }
+    return VG_OK;
+}
+
+/* Place of each supernode's numbers: those of blocks, then those of updates. Returns how many. */
+static size_t count_shared(const vgi_fronts *b)
+{
+    size_t n = 0;
+    for (size_t s = 0; s < b->f.supernodes; s++) {
+        size_t rows = rows_of(&b->f, s), columns = columns_of(&b->f, s), left = rows - columns;
+        if (b->parent[s] >= 0) n += rows * columns + left * left;
+    }
+    return n;
+}
+
+static void place_shared(vgi_fronts *b)
+{
+    double *at = b->shared;
+    for (size_t s = 0; s < b->f.supernodes; s++) {
+        size_t rows = rows_of(&b->f, s), columns = columns_of(&b->f, s), left = rows - columns;
+        if (b->parent[s] < 0) continue;
+        b->block[s] = at, at += rows * columns;
+        b->update[s] = at, at += left * left;
+    }
+}
+
+/* ---- assembly and elimination ---- */
+
+/* The rows of front s that are not held get their places. */
+static void open_front(const elimination *x, size_t s)
+{
+    const vgi_factor *f = &x->b->f;
+    uint32_t n = 0;
+    for (int i = f->pi[s]; i < f->pi[s + 1]; i++)
+        if (!is_held(x, f->rows[i])) x->place[f->rows[i]] = n++;
+}
+
+static void close_front(const elimination *x, size_t s)
+{
+    const vgi_factor *f = &x->b->f;
+    for (int i = f->pi[s]; i < f->pi[s + 1]; i++) x->place[f->rows[i]] = NONE;
+}
+
+static void add_matrix(const elimination *x, size_t s, double *l)
+{
+    const vgi_fronts *b = x->b;
+    size_t rows = x->front[s].rows;
+    for (int j = b->f.super[s]; j < b->f.super[s + 1]; j++) {
+        if (is_held(x, j)) continue;
+        double *column = l + x->place[j] * rows;
+        for (int k = b->start[j]; k < b->start[j + 1]; k++)
+            if (x->place[b->at[k]] != NONE) column[x->place[b->at[k]]] += b->value[k];
+    }
+}
+
+/* Add the update of child s to the front at hand, of m rows and c columns. A shared update still has rows of held ones. */
+static void add_update(const elimination *x, size_t s, size_t m, size_t c, double *l, double *u)
+{
+    uint32_t *to = x->to;
+    const vgi_factor *f = &x->b->f;
+    const int *rows = f->rows + f->pi[s];
+    size_t n = 0;
+    for (size_t i = columns_of(f, s); i < rows_of(f, s); i++)
+        if (!x->front[s].changed || !is_held(x, rows[i])) to[n++] = x->place[rows[i]];
+    const double *from = x->update[s];
+    for (size_t j = 0; j < n; j++, from += n) {
+        if (to[j] == NONE) continue;
+        size_t above = to[j] < c ? 0 : c; /* rows above the first of l or u */
+        double *column = to[j] < c ? l + to[j] * m : u + (to[j] - c) * (m - c);
+        for (size_t i = j; i < n; i++)
+            if (to[i] != NONE) column[to[i] - above] += from[i];
+    }
+}
+
+/* Front s: l and u get its block and its update. */
+static int eliminate(const elimination *x, size_t s, double *l, double *u, vg_err *e)
+{
+    size_t m = x->front[s].rows, c = x->front[s].columns, left = m - c;
+    memset(l, 0, m * c * sizeof *l);
+    memset(u, 0, left * left * sizeof *u);
+    open_front(x, s);
+    add_matrix(x, s, l);
+    for (int k = x->b->child[s]; k >= 0; k = x->b->next[k]) add_update(x, (size_t)k, m, c, l, u);
+    close_front(x, s);
+    size_t done = vgi_fronts_kernel_now()->eliminate(m, c, l, u);
+    if (done == c) return VG_OK;
+    return vg_fail(e, VG_EINPUT, "cannot factorize: not positive definite at row %zu", (size_t)x->b->f.super[s] + done);
+}
+
+static int make_elimination(elimination *x, const vgi_fronts *b, vg_err *e)
+{
+    *x = (elimination){.b = b};
+    x->front = vgi_array(b->f.supernodes, sizeof *x->front, e);
+    x->place = vgi_array_raw(b->f.n, sizeof *x->place, e);
+    x->to = vgi_array_raw(b->most_rows, sizeof *x->to, e);
+    x->update = vgi_copy_array(b->update, b->f.supernodes, sizeof *x->update, e);
+    if (!x->front || !x->place || !x->to || !x->update) return VG_ENOMEM;
+    for (size_t i = 0; i < b->f.n; i++) x->place[i] = NONE;
+    return VG_OK;
+}
+
+static void clear_elimination(elimination *x)
+{
+    free(x->front);
+    free(x->place);
+    free(x->to);
+    free(x->update);
+    free(x->stack);
+}
+
+/* ---- what is shared: numbers ---- */
+
+static int share(vgi_fronts *b, vg_err *e)
+{
+    elimination x;
+    size_t n = count_shared(b);
+    if (n > MOST_SHARED) return VG_OK;
+    int r = make_elimination(&x, b, e);
+    if (r == VG_OK && !(b->shared = vgi_array_raw(n, sizeof *b->shared, e))) r = VG_ENOMEM;
+    if (r == VG_OK) {
+        place_shared(b);
+        memcpy(x.update, b->update, b->f.supernodes * sizeof *x.update);
+    }
+    for (size_t s = 0; r == VG_OK && s < b->f.supernodes; s++) {
+        x.front[s] = (front){.rows = rows_of(&b->f, s), .columns = columns_of(&b->f, s)};
+        if (b->parent[s] >= 0) r = eliminate(&x, s, (double *)b->block[s], (double *)b->update[s], e);
+    }
+    clear_elimination(&x);
+    return r;
+}
+
+static int make_tree(vgi_fronts *b, vg_err *e)
+{
+    size_t n = b->f.supernodes;
+    b->parent = vgi_array_raw(n, sizeof *b->parent, e);
+    b->child = vgi_array_raw(n, sizeof *b->child, e);
+    b->next = vgi_array_raw(n, sizeof *b->next, e);
+    b->block = vgi_array(n, sizeof *b->block, e);
+    b->update = vgi_array(n, sizeof *b->update, e);
+    if (!b->parent || !b->child || !b->next || !b->block || !b->update || find_parents(b, e) < 0) return VG_ENOMEM;
+    for (size_t s = 0; s < n; s++) b->child[s] = b->next[s] = -1;
+    for (size_t s = 0; s < n; s++) {
+        if (rows_of(&b->f, s) > b->most_rows) b->most_rows = rows_of(&b->f, s);
+        if (b->parent[s] < 0) continue;
+        b->next[s] = b->child[b->parent[s]];
+        b->child[b->parent[s]] = (int)s;
+    }
+    return VG_OK;
+}
+
+int vgi_fronts_new(vgi_fronts **out, const vgi_sparse *a, vg_err *e)
+{
+    vgi_fronts *b = *out = vgi_array(1, sizeof *b, e);
+    int *order = vgi_array_raw(a->n, sizeof *order, e);
+    int r = b && order ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; r == VG_OK && i < a->n; i++) order[i] = (int)i;
+    if (r == VG_OK) r = vgi_cholesky_new(&b->analysis, a, order, e);
+    if (r == VG_OK) {
+        b->f = vgi_cholesky_factor(b->analysis);
+        r = make_tree(b, e);
+    }
+    if (r == VG_OK) r = permute_matrix(b, a, e);
+    if (r == VG_OK) r = share(b, e);
+    free(order);
+    if (r < 0) vgi_fronts_free(out);
+    return r;
+}
+
+void vgi_fronts_free(vgi_fronts **out)
+{
+    vgi_fronts *b = *out;
+    if (!b) return;
+    vgi_cholesky_free(&b->analysis);
+    free(b->row);
+    free(b->parent);
+    free(b->child);
+    free(b->next);
+    free(b->start);
+    free(b->at);
+    free(b->value);
+    free(b->shared);
+    free(b->block);
+    free(b->update);
+    free(b);
+    *out = NULL;
+}
+
+/* ---- one set of held rows ---- */
+
+static bool is_copied(const elimination *x, size_t s)
+{
+    return x->front[s].changed || x->front[s].rows < rows_of(&x->b->f, s);
+}
+
+static void measure_fronts(elimination *x)
+{
+    const vgi_factor *f = &x->b->f;
+    for (size_t s = 0; s < f->supernodes; s++) {
+        front *t = &x->front[s];
+        for (int i = f->pi[s]; i < f->pi[s + 1]; i++) t->rows += !is_held(x, f->rows[i]);
+        for (int j = f->super[s]; j < f->super[s + 1]; j++) t->columns += !is_held(x, j);
+        t->changed |= !x->b->block[s] || t->columns < columns_of(f, s);
+        if (t->changed && x->b->parent[s] >= 0) x->front[x->b->parent[s]].changed = true;
+    }
+}
+
+/* The numbers on the stack that front s takes from its children. */
+static size_t count_taken(const elimination *x, size_t s)
+{
+    size_t n = 0;
+    for (int k = x->b->child[s]; k >= 0; k = x->b->next[k]) {
+        size_t left = x->front[k].rows - x->front[k].columns;
+        n += x->front[k].changed ? left * left : 0;
+    }
+    return n;
+}
+
+static int make_stack(elimination *x, vg_err *e)
+{
+    size_t top = 0, most = 0;
+    for (size_t s = 0; s < x->b->f.supernodes; s++) {
+        size_t left = x->front[s].rows - x->front[s].columns;
+        if (!x->front[s].changed) continue;
+        if (top + left * left > most) most = top + left * left;
+        top += left * left - count_taken(x, s);
+    }
+    x->stack = vgi_array_raw(most, sizeof *x->stack, e);
+    return x->stack ? VG_OK : VG_ENOMEM;
+}
+
+static int make_factor(const elimination *x, const uint32_t *number, vgi_held_factor *out, vg_err *e)
+{
+    const vgi_factor *f = &x->b->f;
+    size_t rows = 0, values = 0, n = 0;
+    for (size_t s = 0; s < f->supernodes; s++) {
+        const front *t = &x->front[s];
+        if (!t->columns) continue;
+        n++, rows += t->rows, out->entries += t->rows * t->columns;
+        values += is_copied(x, s) ? t->rows * t->columns : 0;
+    }
+    out->super = vgi_array(n + 1, sizeof *out->super, e);
+    out->pi = vgi_array(n + 1, sizeof *out->pi, e);
+    out->rows = vgi_array_raw(rows, sizeof *out->rows, e);
+    out->block = vgi_array(n, sizeof *out->block, e);
+    out->values = vgi_array_raw(values, sizeof *out->values, e);
+    if (!out->super || !out->pi || !out->rows || !out->block || !out->values) return VG_ENOMEM;
+    double *at = out->values;
+    size_t u = 0, nrows = 0;
+    for (size_t s = 0; s < f->supernodes; s++) {
+        const front *t = &x->front[s];
+        if (!t->columns) continue;
+        for (int i = f->pi[s]; i < f->pi[s + 1]; i++)
+            if (!is_held(x, f->rows[i])) out->rows[nrows++] = (int)number[f->rows[i]];
+        out->block[u] = is_copied(x, s) ? at : x->b->block[s];
+        at += is_copied(x, s) ? t->rows * t->columns : 0;
+        out->super[u + 1] = out->super[u] + (int)t->columns;
+        out->pi[++u] = (int)nrows;
+    }
+    out->factor = (vgi_factor){(size_t)out->super[n], n, out->super, out->pi, out->rows, out->block};
+    return VG_OK;
+}
+
+/* A shared block without the rows that are held, which are below it. */
+static void drop_rows(const elimination *x, size_t s, double *to)
+{
+    const vgi_factor *f = &x->b->f;
+    const double *from = x->b->block[s];
+    size_t rows = rows_of(f, s);
+    for (size_t j = 0; j < columns_of(f, s); j++, from += rows)
+        for (size_t i = 0; i < rows; i++)
+            if (!is_held(x, f->rows[(size_t)f->pi[s] + i])) *to++ = from[i];
+}
+
+static int factorize(elimination *x, const vgi_held_factor *out, vg_err *e)
+{
+    double *at = out->values, *top = x->stack;
+    int r = VG_OK;
+    for (size_t s = 0; r == VG_OK && s < x->b->f.supernodes; s++) {
+        const front *t = &x->front[s];
+        size_t left = t->rows - t->columns;
+        if (t->changed) {
+            double *u = top;
+            r = eliminate(x, s, at, u, e);
+            top -= count_taken(x, s);
+            memmove(top, u, left * left * sizeof *u);
+            x->update[s] = top;
+            top += left * left;
+        } else if (is_copied(x, s)) {
+            drop_rows(x, s, at);
+        }
+        if (is_copied(x, s)) at += t->rows * t->columns;
+    }
+    return r;
+}
+
+int vgi_fronts_hold(const vgi_fronts *b, const bool *held, vgi_held_factor *out, vg_err *e)
+{
+    elimination x;
+    size_t n = b->f.n;
+    *out = (vgi_held_factor){0};
+    bool *of_row = vgi_array(n, sizeof *of_row, e);
+    uint32_t *number = vgi_array_raw(n, sizeof *number, e), free_rows = 0;
+    out->row = vgi_array_raw(n, sizeof *out->row, e);
+    int r = make_elimination(&x, b, e);
+    if (!of_row || !number || !out->row) r = VG_ENOMEM;
+    if (r == VG_OK) {
+        for (size_t i = 0; i < n; i++) of_row[b->row[i]] = held[i];
+        for (size_t i = 0; i < n; i++) number[i] = of_row[i] ? NONE : free_rows++;
+        for (size_t i = 0; i < n; i++) out->row[i] = number[b->row[i]];
+        x.held = of_row;
+        measure_fronts(&x);
+        r = make_stack(&x, e);
+    }
+    if (r == VG_OK) r = make_factor(&x, number, out, e);
+    if (r == VG_OK) r = factorize(&x, out, e);
+    clear_elimination(&x);
+    free(of_row);
+    free(number);
+    if (r < 0) vgi_held_factor_clear(out);
+    return r;
+}
+
+void vgi_held_factor_clear(vgi_held_factor *h)
+{
+    free(h->row);
+    free(h->super);
+    free(h->pi);
+    free(h->rows);
+    free(h->block);
+    free(h->values);
+    *h = (vgi_held_factor){0};
+}

@@ -1,0 +1,16 @@
+/* fronts_kernel.h: dense partial Cholesky factorisation of one front.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_FRONTS_KERNEL_H
+#define VG_FRONTS_KERNEL_H
+
+#include "core/isa.h"
+
+typedef struct vgi_fronts_kernel {
+    /* eliminate: the first c of m columns of a symmetric matrix, whose lower triangle is given: its first c columns in l
+     * (m rows, column-major), the others in u (m - c rows). l becomes the columns of the factor, u what is left to
+     * eliminate. Above the diagonal both may be overwritten. Returns c, or the first column that is not positive. */
+    size_t (*eliminate)(size_t m, size_t c, double *l, double *u);
+} vgi_fronts_kernel;
+VGI_KERNEL(vgi_fronts_kernel)
+
+#endif
