@@ -299,7 +299,11 @@ static void find_machines(work *w, size_t n, const vg_frame *in, machine **of)
     for (size_t i = 0; i < n; i++) {
         size_t count, before = w->npinned;
         vg_frame_pins(&in[i], &count);
-        of[i] = count ? find_machine(w, unite(w, &in[i], &count), count) : &w->plain;
+        of[i] = &w->plain;
+        if (count) {
+            uint32_t *both = unite(w, &in[i], &count);
+            of[i] = find_machine(w, both, count);
+        }
         if (w->npinned > before) made[fresh] = of[i], held[fresh] = of[i]->held, nheld[fresh++] = of[i]->nheld;
     }
     if (fresh && vg_solver_new_like(solver, fresh, w->plain.solver, held, nheld, &e) < 0) cli_die(&e);

@@ -62,21 +62,31 @@ void vgi_sharing_free(vgi_sharing **x)
 
 /* ---- one solver ---- */
 
-/* held: of all rows of the solver that s is like. What that one holds must be among the anchors. */
+/* What the other solver holds must be among the anchors. */
+static int check_anchors(const vg_solver *s, vg_err *e)
+{
+    bool *here = vgi_array(s->g->nv, sizeof *here, e);
+    if (!here) return VG_ENOMEM;
+    for (size_t i = 0; i < s->nanchors; i++) here[s->anchors[i]] = true;
+    int r = VG_OK;
+    for (size_t i = 0; r == VG_OK && i < s->like->nanchors; i++)
+        if (!here[s->like->anchors[i]])
+            r = vg_fail(e, VG_EARG, "vertex %u is an anchor of the other solver and not of this one", s->like->anchors[i]);
+    free(here);
+    return r;
+}
+
+/* held: of all rows of the solver that s is like. */
 static int mark_held(const vg_solver *s, bool *held, vg_err *e)
 {
-    const vg_solver *like = s->like;
-    size_t known = 0;
+    size_t all = vgi_solver_all_rows(s->like);
     for (size_t i = 0; i < s->nanchors; i++) {
-        uint32_t v = s->anchors[i], row = row_of_vertex(like, v);
+        uint32_t v = s->anchors[i], row = row_of_vertex(s->like, v);
         if (!s->g->in_face[v]) return vg_fail(e, VG_EINPUT, "anchor %u is in no face", v);
-        if (row < vgi_solver_all_rows(like)) held[row] = true;
-        known += known < like->nanchors && like->anchors[known] == v;
+        if (row < all) held[row] = true;
     }
-    if (known < like->nanchors)
-        return vg_fail(e, VG_EARG, "vertex %u is an anchor of the other solver and not of this one", like->anchors[known]);
-    if (s->pinned < s->g->nv) held[like->unknowns] = true;
-    return VG_OK;
+    if (s->pinned < s->g->nv) held[s->like->unknowns] = true;
+    return check_anchors(s, e);
 }
 
 static int number_rows(vg_solver *s, vg_err *e)
