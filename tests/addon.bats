@@ -82,7 +82,7 @@ setup() {
 # in_blender: the script from standard input, which must succeed
 in_blender() {
     cat >script.py
-    capture env PYTHONPATH="$BATS_FILE_TMPDIR" blender --background --factory-startup --python-use-system-env --python-exit-code 1 --python script.py
+    capture env DATA="$DATA" PYTHONPATH="$BATS_FILE_TMPDIR" blender --background --factory-startup --python-use-system-env --python-exit-code 1 --python script.py
     [ "$status" = 0 ] || fail "$output" "$stderr"
 }
 
@@ -183,4 +183,173 @@ refused(bpy.ops.vg.transfer, "'/nowhere' has no vg-register")
 assert vg_tools.work.State.failed and not vg_tools.work.State.title
 END
     shows 'WORST source' 'WORST trex as raptor'
+}
+
+@test "shapes: names, ranges and drivers; onto a head that has some already; follow sculpted poses" {
+    must vg-encode --take 1-5 --reference "$DATA/faceA.tar.xz" "$DATA/faceA.tar.xz" -o a.vgs
+    must vg-encode --take 0-5 "$DATA/faceB.tar.xz" -o b.vgs
+    pipe 'vg-encode --take 0 b.vgs -o neutral.vgs && vg-deform --onto neutral.vgs a.vgs | vg-solve -o want.vgs'
+    must vg-encode --take 2,4 b.vgs -o sculpted.vgs
+    must vg-encode --take 1,3 a.vgs -o known.vgs
+    pipe 'vg-deform --onto neutral.vgs --examples known.vgs sculpted.vgs a.vgs | vg-solve -o better.vgs'
+    pipe 'vg-encode --take 2 b.vgs -o key.vgs && vg-deform --onto neutral.vgs a.vgs | vg-solve | vg-poisson --key 1=key.vgs -o guided.vgs'
+    in_blender <<'END'
+from world import *
+source, target = body('a', 'a.vgs', False), body('b', 'neutral.vgs', False)
+target.shape_key_clear()
+names = [k.name for k in source.data.shape_keys.key_blocks][1:]
+target.shape_key_add(name='Basis')
+target.shape_key_add(name='own').data[0].co.x += 1
+target.shape_key_add(name=names[1])
+source.data.shape_keys.key_blocks[names[2]].slider_max = 2
+source['smile'] = 0.25
+driver = source.data.shape_keys.driver_add('key_blocks["%s"].value' % names[0]).driver
+variable = driver.variables.new()
+variable.targets[0].id, variable.targets[0].data_path, driver.expression = source, '["smile"]', 'var * 2'
+vg.source.kind, vg.source.object, vg.target = 'KEYS', source, target
+assert bpy.ops.vg.shapes() == {'FINISHED'}
+keys = target.data.shape_keys
+assert [k.name for k in keys.key_blocks] == ['Basis', 'own', names[1], names[0]] + names[2:]
+_, want = stream('want.vgs')
+check('shapes', max(far(bodies.to_file(bodies.positions(keys.key_blocks[n].data)), f.values) for n, f in zip(names, want)), 1e-5)
+assert keys.key_blocks[names[2]].slider_max == 2
+bpy.context.view_layer.update()
+assert abs(keys.evaluated_get(bpy.context.evaluated_depsgraph_get()).key_blocks[names[0]].value - 0.5) < 1e-6
+
+# what is sculpted by the names of poses is followed, in all poses or in time
+sculpted, frames = body('sculpted', 'neutral.vgs', False), stream('sculpted.vgs')[1]
+sculpted.shape_key_clear()
+for n, f in zip((names[1], names[3]), frames): bodies.add_key(sculpted, n, bodies.from_file(f.values))
+vg.guide = sculpted
+made = made_by(bpy.ops.vg.transfer)
+of = lambda thing, n: bodies.to_file(bodies.positions(thing.data.shape_keys.key_blocks[n].data))
+_, better = stream('better.vgs')
+check('examples', max(far(of(made, n), f.values) for n, f in zip(names, better)), 1e-5)
+sculpted.shape_key_remove(sculpted.data.shape_keys.key_blocks[names[3]])
+vg.guide_by = 'POISSON'
+made = made_by(bpy.ops.vg.transfer)
+_, guided = stream('guided.vgs')
+check('poisson', max(far(of(made, n), f.values) for n, f in zip(names, guided)), 1e-5)
+check('key', far(of(made, names[1]), frames[0].values), 1e-6)
+sculpted.data.shape_keys.key_blocks[1].name = 'other'
+refused(bpy.ops.vg.transfer, 'has the name of a pose')
+END
+    shows 'WORST shapes' 'WORST examples' 'WORST poisson'
+}
+
+@test "envelope: a rig learnt and fitted, the mesh follows the bones as vg-play has them, turned bones, a baked motion; a skeleton's motion for another" {
+    must vg-encode --reference "$DATA/trex.rest.obj" --take 0-28/2 "$DATA/trex-attack.tar.xz" -o poses.vgs
+    pipe 'vg-encode '"$DATA"'/trex.rest.obj poses.vgs | vg-fitmap -q --skeleton '"$DATA"'/trex.skeleton.txt -o learnt.rig'
+    must vg-play --transforms learnt.rig poses.vgs -o motions.vgs
+    in_blender <<'END'
+from world import *
+from vg_tools import envelope, skeleton
+import subprocess
+data = os.environ['DATA']
+shell = lambda line: subprocess.run(['bash', '-o', 'pipefail', '-c', line], check=True)
+trex = body('trex', 'poses.vgs')
+rows = [line.split() for line in open(data + '/trex.skeleton.txt') if line.strip() and not line.startswith('#')]
+def armature(name, scale):
+    arm = bpy.data.objects.new(name, bpy.data.armatures.new(name))
+    scene.collection.objects.link(arm)
+    bpy.context.view_layer.objects.active = arm
+    bpy.ops.object.mode_set(mode='EDIT')
+    for w in rows:
+        bone = arm.data.edit_bones.new(w[0])
+        bone.head, bone.tail = bodies.from_file(numpy.array([w[2:5], w[5:8]], float) * scale)
+        bone.parent = arm.data.edit_bones.get(w[1])
+    bpy.ops.object.mode_set(mode='OBJECT')
+    return arm
+arm = armature('rig', 1)
+vg.source.object, vg.armature, vg.learn, vg.body = trex, arm, True, trex
+refused(bpy.ops.vg.envelope, 'choose where the rig is written')
+vg.rig_file = os.path.abspath('blender.rig')
+assert bpy.ops.vg.envelope() == {'FINISHED'}
+assert any('bones' in line for line in vg_tools.work.State.lines), vg_tools.work.State.lines
+shell('vg-play blender.rig poses.vgs -o b.vgs && vg-play learnt.rig poses.vgs -o s.vgs')
+pairs = list(zip(stream('b.vgs')[1], stream('s.vgs')[1]))
+check('learnt', max(far(a.values, b.values) for a, b in pairs), 1e-4)
+
+# the motion of the bones, baked on the armature from what vg-play says of them
+moved, frames = stream('motions.vgs')
+rig = envelope.Rig('learnt.rig')
+joints = skeleton.Joints(arm, scene)
+number = [rig.bones.index(b.replace(' ', '_')) for b in joints.bones]
+motion = []
+for f in frames:
+    q = numpy.array([skeleton.rotation(f.values[k, :4]) for k in number])
+    motion.append((numpy.einsum('jab,jb->ja', q, joints.rest) + f.values[number, 4:], q))
+skeleton.bake(arm, joints, motion, list(range(1, len(frames) + 1)), 'walk')
+driver = envelope.Driver(envelope.Rig('blender.rig'), arm, scene)
+worst = 0
+for i, f in enumerate(frames):
+    scene.frame_set(i + 1)
+    got = driver.motions(arm)
+    want = f.values[[rig.bones.index(b) for b in driver.rig.bones]]
+    sign = numpy.sign((got[:, :4] * want[:, :4]).sum(1))[:, None]
+    worst = max(worst, numpy.abs(got[:, :4] * sign - want[:, :4]).max())
+check('turns', worst, 2e-6)
+
+# live: the mesh follows; what it shows is what vg-play gives for the same motion
+vg.rig_file = os.path.abspath('learnt.rig')
+shell('vg-play learnt.rig motions.vgs -o want.vgs')
+_, want = stream('want.vgs')
+before = trex.data.copy()
+assert bpy.ops.vg.follow() == {'FINISHED'} and envelope.Follow.active()
+for key in trex.data.shape_keys.key_blocks[1:-1]: key.mute = True
+worst = 0
+for i, f in enumerate(want):
+    scene.frame_set(i + 1)
+    envelope.follow_now(bpy.context)
+    bpy.context.view_layer.update()
+    worst = max(worst, far(bodies.shown_points(trex, scene), f.values))
+check('follow', worst, 1e-4)
+scene.frame_set(1)
+bpy.context.view_layer.objects.active = arm
+arm.animation_data.action = None
+for b in arm.pose.bones: b.matrix_basis.identity()
+bpy.ops.object.mode_set(mode='POSE')
+arm.data.bones.active = arm.data.bones['Head']
+bpy.ops.vg.turn(axis='TWIST', angle=0.5)
+arm.data.bones.active = arm.data.bones['Tail1']
+bpy.ops.vg.turn(axis='Y', angle=-0.4)
+shell("vg-play learnt.rig --edit 'Tail1 y %.12g' -o edit.vgs" % numpy.degrees(-0.4))
+arm.pose.bones['Head'].matrix_basis.identity()
+envelope.follow_now(bpy.context)
+bpy.context.view_layer.update()
+_, edited = stream('edit.vgs')
+check('edit', far(bodies.shown_points(trex, scene), edited[0].values), 1e-4)
+bpy.ops.object.mode_set(mode='OBJECT')
+assert bpy.ops.vg.follow() == {'FINISHED'} and not envelope.Follow.active()
+assert 'vg live' not in trex.data.shape_keys.key_blocks
+
+# baked, and fitted with the motion known
+arm.animation_data.action = bpy.data.actions['walk']
+made = made_by(bpy.ops.vg.bake)
+plays(made, 'want.vgs', 1e-4)
+vg.learn, vg.rig_file = False, os.path.abspath('known.rig')
+for key in trex.data.shape_keys.key_blocks: key.mute = False
+assert bpy.ops.vg.envelope() == {'FINISHED'}
+made = made_by(bpy.ops.vg.bake)
+_, truth = stream('poses.vgs')
+mean = lambda path_or_obj: numpy.mean([numpy.sqrt(((shown(path_or_obj, i + 1) - f.values) ** 2).sum(1)).mean() for i, f in enumerate(truth)])
+learnt = numpy.mean([numpy.sqrt(((w.values - f.values) ** 2).sum(1)).mean() for w, f in zip(want, truth)])
+print('FITTED', mean(made), learnt)
+assert mean(made) < 1.1 * learnt
+
+# the motion for an armature of other proportions
+other = armature('other', numpy.array([1.2, 0.9, 1.1]))
+vg.source.object, vg.target = arm, other
+baked = made_by(bpy.ops.vg.transfer)
+source, onto = bodies.all_of(skeleton.walk(arm, vg.source, scene)), skeleton.Skeleton(skeleton.Joints(other, scene))
+source.write('arm.vgs'); onto.write('other.vgs')
+shell('vg-deform --onto other.vgs arm.vgs | vg-solve | vg-decode -q -o out.bvh && vg-encode out.bvh -o out.vgs')
+_, want = stream('out.vgs')
+joints, worst = skeleton.Joints(baked, scene), 0
+for i, f in enumerate(want):
+    scene.frame_set(i + 1)
+    worst = max(worst, far(joints.pose(baked)[0], f.values))
+check('skeleton', worst, 1e-5)
+END
+    shows 'WORST learnt' 'WORST follow' 'WORST edit' FITTED 'WORST skeleton'
 }

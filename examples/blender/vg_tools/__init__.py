@@ -16,7 +16,7 @@ bl_info = {
 
 import bpy  # noqa: E402
 
-from . import panels, scene, transfer, work  # noqa: E402
+from . import between, envelope, panels, scene, shapes, signals, transfer, work  # noqa: E402
 from .programs import Programs  # noqa: E402
 
 
@@ -35,7 +35,13 @@ class VG_Preferences(bpy.types.AddonPreferences):
             self.layout.label(text="The vg programs are not found", icon="ERROR")
 
 
-modules = (scene, work, transfer, panels)
+@bpy.app.handlers.persistent
+def leave_file(*_):
+    """Another file is opened: what runs for this one ends."""
+    between.end_slide()
+
+
+modules = (scene, work, transfer, shapes, envelope, between, signals, panels)
 
 
 def register():
@@ -44,12 +50,15 @@ def register():
         for c in module.classes:
             bpy.utils.register_class(c)
     scene.attach()
+    bpy.app.handlers.load_pre.append(leave_file)
     entry = bpy.context.preferences.addons.get(__name__)
     if entry and entry.preferences:
         entry.preferences.changed(bpy.context)
 
 
 def unregister():
+    between.end_slide()
+    bpy.app.handlers.load_pre.remove(leave_file)
     scene.detach()
     for module in reversed(modules):
         for c in reversed(module.classes):

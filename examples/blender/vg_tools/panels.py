@@ -7,7 +7,7 @@ import time
 
 import bpy
 
-from . import transfer
+from . import between, envelope, transfer
 from .programs import Programs
 from .work import State
 
@@ -99,6 +99,123 @@ def alike(a, b):
     return all(len(getattr(a.data, n)) == len(getattr(b.data, n)) for n in ("vertices", "edges", "polygons", "loops"))
 
 
+class VG_PT_shapes(Panel, bpy.types.Panel):
+    bl_label, bl_options = "Shapes", {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        vg, c = context.scene.vg, self.column()
+        c.prop(vg, "target")
+        source = vg.source.object
+        keys = source.data.shape_keys if source and source.type == "MESH" else None
+        c.label(text=f"{len(keys.key_blocks) - 1} shape keys of '{source.name}'" if keys else "the source has no shape keys")
+        c.prop(vg, "fast")
+        c.operator("vg.shapes", icon="SHAPEKEY_DATA")
+
+
+class VG_PT_envelope(Panel, bpy.types.Panel):
+    bl_label, bl_options = "Envelope", {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        vg, c = context.scene.vg, self.column()
+        c.prop(vg, "armature")
+        c.prop(vg, "rig_file")
+        c.prop(vg, "method")
+        c.prop(vg, "learn")
+        c.prop(vg, "holdout")
+        c.operator("vg.envelope", icon="MOD_ARMATURE")
+        c.separator()
+        c.prop(vg, "body")
+        c.operator("vg.follow", icon="PAUSE" if envelope.Follow.active() else "PLAY", depress=envelope.Follow.active())
+        row = c.row(align=True)
+        row.operator("vg.turn", text="Twist").axis = "TWIST"
+        for axis in "XYZ":
+            row.operator("vg.turn", text=axis.lower()).axis = axis
+        c.separator()
+        c.prop(vg, "result")
+        if vg.result == "CACHE":
+            c.prop(vg, "folder")
+        c.operator("vg.bake", icon="ACTION")
+
+
+class VG_PT_between(Panel, bpy.types.Panel):
+    bl_label, bl_options = "Interpolate and Morph", {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        vg, c = context.scene.vg, self.column()
+        for name in "count", "t_min", "t_max", "way":
+            c.prop(vg, name)
+        c.prop(vg, "map_file" if vg.way == "MAP" else "smooth")
+        c.operator("vg.interpolate", icon="IPO_EASE_IN_OUT")
+        c.separator()
+        c.prop(vg, "target")
+        c.operator("vg.morph", icon="MOD_SIMPLEDEFORM")
+
+
+class VG_PT_patches(Panel, bpy.types.Panel):
+    bl_label, bl_options = "Patches and Maps", {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        vg, c = context.scene.vg, self.column()
+        c.prop(vg, "patches")
+        c.prop(vg, "connected")
+        c.operator("vg.patches", icon="COLOR")
+        c.separator()
+        c.prop(vg, "map_file")
+        c.operator("vg.map", icon="MOD_MESHDEFORM")
+        c.separator()
+        c.prop(vg, "body")
+        c.operator("vg.play", icon="PLAY")
+        running = between.Slider.live is not None
+        c.operator("vg.slide", icon="PAUSE" if running else "PLAY", depress=running)
+        if running:
+            c.prop(vg, "slider", slider=True)
+        c.separator()
+        for name in "target", "morph_by", "map_out":
+            c.prop(vg, name)
+        c.operator("vg.retarget", icon="CON_TRANSLIKE")
+
+
+class VG_PT_signals(Panel, bpy.types.Panel):
+    bl_label, bl_options = "Signals", {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        vg, c = context.scene.vg, self.column()
+        c.prop(vg, "signal_file")
+        c.prop(vg, "tolerance")
+        c.operator("vg.fit_signal", icon="FCURVE")
+        c.separator()
+        c.operator("vg.plane", icon="URL")
+        c.prop(vg, "edits_file")
+        c.prop(vg, "timing")
+        if vg.timing == "SPEED":
+            c.prop(vg, "speed")
+        if vg.timing == "KEYED":
+            self.layout.use_property_decorate = True
+            self.layout.prop(vg, "moment")
+        c = self.column()
+        c.prop(vg, "cycle")
+        c.operator("vg.sample", icon="PLAY")
+
+
+class VG_PT_generate(Panel, bpy.types.Panel):
+    bl_label, bl_options = "Generate", {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return Programs.has("vg-generate")
+
+    def draw(self, context):
+        vg, c = context.scene.vg, self.column()
+        c.prop(vg, "network_file")
+        c.prop(vg, "iterations")
+        c.operator("vg.train", icon="SORTTIME")
+        c.separator()
+        c.prop(vg, "generate")
+        c.prop(vg, "between" if vg.generate == "BETWEEN" else "count")
+        c.prop(vg, "seed")
+        c.operator("vg.generate", icon="PLAY")
+
+
 class VG_PT_messages(Panel, bpy.types.Panel):
     """What runs, and what the programs said."""
     bl_label = "Messages"
@@ -118,4 +235,4 @@ class VG_PT_messages(Panel, bpy.types.Panel):
         spread(context, c.box().column(align=True), lines[-24:] or ["nothing to say"], "ERROR" if State.failed else "NONE")
 
 
-classes = (VG_PT_source, VG_PT_transfer, VG_PT_messages)
+classes = (VG_PT_source, VG_PT_transfer, VG_PT_shapes, VG_PT_envelope, VG_PT_between, VG_PT_patches, VG_PT_signals, VG_PT_generate, VG_PT_messages)
