@@ -303,7 +303,7 @@ for i, f in enumerate(want):
     envelope.follow_now(bpy.context)
     bpy.context.view_layer.update()
     worst = max(worst, far(bodies.shown_points(trex, scene), f.values))
-check('follow', worst, 1e-4)
+check('follow', worst, 5e-6)
 scene.frame_set(1)
 bpy.context.view_layer.objects.active = arm
 arm.animation_data.action = None
@@ -318,7 +318,7 @@ arm.pose.bones['Head'].matrix_basis.identity()
 envelope.follow_now(bpy.context)
 bpy.context.view_layer.update()
 _, edited = stream('edit.vgs')
-check('edit', far(bodies.shown_points(trex, scene), edited[0].values), 1e-4)
+check('edit', far(bodies.shown_points(trex, scene), edited[0].values), 5e-6)
 bpy.ops.object.mode_set(mode='OBJECT')
 assert bpy.ops.vg.follow() == {'FINISHED'} and not envelope.Follow.active()
 assert 'vg live' not in trex.data.shape_keys.key_blocks
@@ -326,7 +326,7 @@ assert 'vg live' not in trex.data.shape_keys.key_blocks
 # baked, and fitted with the motion known
 arm.animation_data.action = bpy.data.actions['walk']
 made = made_by(bpy.ops.vg.bake)
-plays(made, 'want.vgs', 1e-4)
+plays(made, 'want.vgs')
 vg.learn, vg.rig_file = False, os.path.abspath('known.rig')
 for key in trex.data.shape_keys.key_blocks: key.mute = False
 assert bpy.ops.vg.envelope() == {'FINISHED'}
@@ -352,4 +352,129 @@ for i, f in enumerate(want):
 check('skeleton', worst, 1e-5)
 END
     shows 'WORST learnt' 'WORST follow' 'WORST edit' FITTED 'WORST skeleton'
+}
+
+@test "between: interpolation and extrapolation, by geodesics and by a map; morphing; patches as colours; a slider; the map of another body" {
+    must vg-encode --reference "$DATA/horse.rest.obj" "$DATA/horse-run.tar.xz" -o run.vgs
+    must vg-encode --take 0,5 run.vgs -o keys.vgs
+    must vg-decode -q -o key-%d.obj keys.vgs
+    pipe 'vg-encode key-0.obj key-1.obj | vg-interpolate --at -0.5,0,0.5,1,1.5 | vg-solve -o first.vgs' # the first pose is the rest pose
+    awk '$1 == "v" {print "v", 1.3 * $2, $3, 0.8 * $4} $1 != "v"' "$DATA/horse.rest.obj" >stout.obj
+    must vg-encode stout.obj -o stout.vgs
+    must vg-encode "$DATA/horse.rest.obj" -o rest.vgs
+    pipe 'vg-interpolate --at -0.5,0,0.5,1,1.5 keys.vgs | vg-solve -o between.vgs'
+    pipe 'vg-encode '"$DATA"'/horse.rest.obj stout.obj | vg-interpolate --at 0,0.5,1 | vg-solve -o morphed.vgs'
+    must vg-segment -q -k 12 --connected run.vgs -o horse.patches
+    in_blender <<'END'
+from world import *
+from vg_tools import between
+keys = body('keys', 'keys.vgs')
+run = body('run', 'run.vgs')
+stout = body('stout', 'stout.vgs', False)
+stout.shape_key_clear()
+vg.source.object, vg.source.kind, vg.count, vg.t_min, vg.t_max = keys, 'KEYS', 5, -0.5, 1.5
+made = made_by(bpy.ops.vg.interpolate)
+plays(made, 'between.vgs')
+single = [o for o in (mesh_of('p%d' % i, f.values, stream('keys.vgs')[0].faces) for i, f in enumerate(stream('keys.vgs')[1]))]
+poses = bpy.data.collections.new('poses')
+for o in single: poses.objects.link(o); o.location.x += 5
+vg.source.kind, vg.source.collection = 'OBJECTS', poses
+made = made_by(bpy.ops.vg.interpolate)
+assert made.location.x == 0
+plays(made, 'first.vgs')
+vg.source.kind, vg.source.object, vg.target, vg.count, vg.t_min, vg.t_max = 'FRAMES', run, stout, 3, 0, 1
+made = made_by(bpy.ops.vg.morph)
+plays(made, 'morphed.vgs')
+
+scene.frame_end = 21
+vg.patches, vg.map_file = 12, os.path.abspath('b.map')
+assert bpy.ops.vg.patches() == {'FINISHED'}
+patch, count = between.patches_of('horse.patches')
+got = [v.value for v in run.data.attributes['vg patch'].data]
+assert got == list(patch), 'other patches'
+colours = numpy.array([tuple(c.color_srgb) for c in run.data.color_attributes['vg patches'].data])
+ends = numpy.cumsum([len(p.vertices) for p in run.data.polygons])
+assert len({tuple(colours[e - 1]) for e in ends}) == len(set(patch)) and run.data.color_attributes.active_color.name == 'vg patches'
+assert all(numpy.ptp(colours[a:b], 0).max() == 0 for a, b in zip([0, *ends], ends)), 'a face of two colours'
+assert bpy.ops.vg.map() == {'FINISHED'}
+# the fit of a map to 21 poses amplifies the rounding to binary32, so the shell gets the rounded positions
+bodies.all_of(bodies.poses(vg.source, scene)).write('run32.vgs')
+import subprocess
+subprocess.run("""set -e
+vg-segment -q -k 12 --connected run32.vgs -o p.patches
+vg-fitmap -q --patches p.patches run32.vgs -o horse.map
+vg-play horse.map --at -0.5,0,0.5,1,1.5 keys.vgs -o mapped.vgs
+vg-play horse.map run32.vgs -o played.vgs
+vg-retarget --onto stout.obj --morph 0.5 horse.map -o half.map
+vg-play half.map run32.vgs -o half.vgs
+vg-play horse.map --at 0.3 keys.vgs -o slid.vgs""", shell=True, check=True)
+made = made_by(bpy.ops.vg.play)
+plays(made, 'played.vgs')
+vg.source.kind, vg.source.object, vg.way, vg.count, vg.t_min, vg.t_max = 'KEYS', keys, 'MAP', 5, -0.5, 1.5
+plays(made_by(bpy.ops.vg.interpolate), 'mapped.vgs')
+
+vg.body = run
+assert bpy.ops.vg.slide() == {'FINISHED'} and between.Slider.live
+vg.slider = 0.3
+between.Slider.live.wait()
+vg.slider = 0.2; vg.slider = 0.3
+points = between.Slider.live.wait()
+check('slider', far(points, stream('slid.vgs')[1][0].values), 1e-4)
+assert bpy.ops.vg.slide() == {'FINISHED'} and not between.Slider.live
+
+vg.map_out, vg.morph_by, vg.source.kind, vg.source.object, vg.body = os.path.abspath('b-half.map'), 0.5, 'FRAMES', run, stout
+assert bpy.ops.vg.retarget() == {'FINISHED'} and vg.map_file == vg.map_out
+plays(made_by(bpy.ops.vg.play), 'half.vgs')
+vg.map_file = os.path.abspath('nothing.map')
+refused(bpy.ops.vg.play, 'there is no file')
+END
+    shows 'WORST keys between' 'WORST p0 between' 'WORST run morphed' 'WORST run played' 'WORST slider' 'WORST stout played'
+}
+
+@test "signals: fit, the pose plane's page, edits, speed, keyed moments, forth and back for ever; a network goes on" {
+    must vg-encode --reference "$DATA/horse.rest.obj" "$DATA/horse-run.tar.xz" -o run.vgs
+    must vg-fitsignal -q --tolerance 0.01 run.vgs -o horse.signal
+    echo 'control 5 0.1 0.3' >edits.txt
+    must vg-sample --edit edits.txt horse.signal -o edited.vgs
+    must vg-sample --speed 0.5 horse.signal -o slow.vgs
+    must vg-sample --at 1,3.5,6,8.5,11 horse.signal -o retimed.vgs
+    must vg-train -q --iterations 3 run.vgs -o horse.net
+    must vg-encode --take 0-4 run.vgs -o some.vgs
+    pipe 'vg-generate -q horse.net --frames 6 --diversity 0.3 --seed 3 some.vgs | vg-solve -o on.vgs'
+    in_blender <<'END'
+from world import *
+run = body('run', 'run.vgs')
+vg.source.object, vg.signal_file = run, os.path.abspath('b.signal')
+assert bpy.ops.vg.fit_signal() == {'FINISHED'}
+vg.edits_file = os.path.abspath('edits.txt')
+plays(made_by(bpy.ops.vg.sample), 'edited.vgs', 2e-5)
+vg.edits_file, vg.timing, vg.speed = '', 'SPEED', 0.5
+plays(made_by(bpy.ops.vg.sample), 'slow.vgs', 2e-5)
+vg.timing, scene.frame_end = 'KEYED', 5
+refused(bpy.ops.vg.sample, "key 'Moment' at two frames")
+for frame, moment in (1, 1), (5, 11):
+    vg.moment = moment
+    scene.keyframe_insert('vg.moment', frame=frame)
+for c in scene.animation_data.action.fcurves:
+    for p in c.keyframe_points: p.interpolation = 'LINEAR'
+made = made_by(bpy.ops.vg.sample)
+plays(made, 'retimed.vgs', 2e-5)
+vg.timing, vg.cycle, scene.frame_end = 'FORTH', True, 21
+made = made_by(bpy.ops.vg.sample)
+assert len(made.data.shape_keys.key_blocks) == 1 + 41
+check('round', far(shown(made, 1 + 40 * 3), shown(made, 1)), 1e-6)
+check('back', far(shown(made, 22), shown(made, 20)), 1e-6)
+assert bpy.ops.vg.plane() == {'FINISHED'}
+text = open(vg.page).read()
+assert '<canvas' in text and 'edits' in text
+
+vg.network_file, vg.iterations, vg.cycle = os.path.abspath('b.net'), 3, False
+assert bpy.ops.vg.train() == {'FINISHED'}
+vg.source.whole, vg.source.start, vg.source.end, vg.count, vg.seed, vg.diversity = False, 1, 5, 6, 3, 0.3
+vg.network_file = os.path.abspath('horse.net')
+plays(made_by(bpy.ops.vg.generate), 'on.vgs', 2e-5)
+vg.network_file = vg.signal_file
+refused(bpy.ops.vg.generate, 'network')
+END
+    shows 'WORST run sampled' 'WORST round' 'WORST run generated'
 }

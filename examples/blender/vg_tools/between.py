@@ -43,9 +43,8 @@ def at(values):
     return "--at=" + ",".join(f"{t:.9g}" for t in values)
 
 
-class VG_OT_interpolate(Work, bpy.types.Operator):
-    """Poses between the poses of the source and beyond them, through any number of turns; 0 is the first, 1 the second"""
-    bl_idname, bl_label = "vg.interpolate", "Interpolate"
+class Between(Work):
+    """What interpolation and morphing have in common."""
     morph = False
 
     def gather(self, context):
@@ -73,7 +72,7 @@ class VG_OT_interpolate(Work, bpy.types.Operator):
 
     def finish(self, context, result):
         scene, vg, (names, shapes) = context.scene, context.scene.vg, result
-        made = bodies.new_object(scene.objects[self.thing], f"{self.thing} {'morphed' if self.morph else 'between'}")
+        made = bodies.new_object(scene.objects[self.thing], f"{self.thing} {'morphed' if self.morph else 'between'}", None if self.morph else vg.source)
         try:
             bodies.give(made, vg.result, names, shapes, [scene.frame_start + i for i in range(len(shapes))], scene, vg.folder)
         except BaseException:
@@ -83,7 +82,12 @@ class VG_OT_interpolate(Work, bpy.types.Operator):
         return f"'{made.name}': {len(shapes)} poses"
 
 
-class VG_OT_morph(VG_OT_interpolate):
+class VG_OT_interpolate(Between, bpy.types.Operator):
+    """Poses between the poses of the source and beyond them, through any number of turns; 0 is the first, 1 the second"""
+    bl_idname, bl_label = "vg.interpolate", "Interpolate"
+
+
+class VG_OT_morph(Between, bpy.types.Operator):
     """From the body of the source to that of the target, both in their rest poses"""
     bl_idname, bl_label = "vg.morph", "Morph"
     morph = True
@@ -214,7 +218,7 @@ class VG_OT_play(Work, bpy.types.Operator):
     def gather(self, context):
         scene, vg = context.scene, context.scene.vg
         self.path = artefact(vg.map_file, "map")
-        self.target = bodies.mesh_object(vg.body or vg.target or vg.source.object, "the body of the map").name
+        self.target = bodies.mesh_object(vg.body or vg.source.object, "the body of the map").name
         self.moments = bodies.moments_of(vg.source, scene, 0)
         return (yield from bodies.poses(vg.source, scene))
 

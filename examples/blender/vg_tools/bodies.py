@@ -244,8 +244,9 @@ def free_name(name):
     return name if name not in taken else next(f"{name}.{i:03d}" for i in range(1, 1000000) if f"{name}.{i:03d}" not in taken)
 
 
-def new_object(target, name):
-    """A copy of the target, with its materials, texture coordinates, normals and modifiers, that moves by nothing but what is given to it."""
+def new_object(target, name, source=None):
+    """A copy of the target, with its materials, texture coordinates, normals and modifiers, that moves by nothing but what is given to it.
+    source: where the poses come from; of a collection they do not say where objects stand."""
     made = target.copy()
     made.data = target.data.copy()
     made.name = made.data.name = free_name(name)
@@ -254,6 +255,8 @@ def new_object(target, name):
     made.animation_data_clear()
     made.constraints.clear()
     world = target.matrix_world.copy()
+    if source and source.kind == "OBJECTS":
+        world.translation = (0, 0, 0)
     made.parent, made.matrix_world = None, world
     for m in made.modifiers:
         if m.type in ("ARMATURE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "CLOTH", "SOFT_BODY"):

@@ -212,7 +212,9 @@ class VG_PT_generate(Panel, bpy.types.Panel):
         c.separator()
         c.prop(vg, "generate")
         c.prop(vg, "between" if vg.generate == "BETWEEN" else "count")
-        c.prop(vg, "seed")
+        c.prop(vg, "diversity")
+        if vg.diversity > 0:
+            c.prop(vg, "seed")
         c.operator("vg.generate", icon="PLAY")
 
 

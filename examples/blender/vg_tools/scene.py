@@ -102,6 +102,7 @@ class VG_Scene(bpy.types.PropertyGroup):
     network_file: a_file("Network", "The file of the network")
     generate: EnumProperty(name="What", items=[("ON", "Go on", "From the last of the poses"), ("BETWEEN", "Between", "From each pose to the next")])
     between: IntProperty(name="Between", default=10, min=1, max=10000, description="Poses between each pose and the next")
+    diversity: FloatProperty(name="Diversity", default=0.0, min=0.0, soft_max=1.0, description="0: as the training began; 0.3 is lively")
     seed: IntProperty(name="Seed", default=1, min=0)
     iterations: IntProperty(name="Iterations", default=0, min=0, description="0: as many as vg-train finds right")
 

@@ -20,7 +20,7 @@ def give_result(context, thing, title, names, shapes, first):
     scene, vg = context.scene, context.scene.vg
     if len(thing.data.vertices) != len(shapes[0]):
         raise Trouble(f"the result has {len(shapes[0])} vertices, '{thing.name}' {len(thing.data.vertices)}: choose its body")
-    made = bodies.new_object(thing, f"{thing.name} {title}")
+    made = bodies.new_object(thing, f"{thing.name} {title}", vg.source)
     try:
         bodies.give(made, vg.result, names, shapes, [first + i for i in range(len(shapes))], scene, vg.folder)
     except BaseException:
@@ -110,7 +110,7 @@ def clipped(times, last):
 def there_and_back(count):
     """Forth and back, so that the end meets the beginning."""
     forth = [float(i) for i in range(1, count + 1)]
-    return forth + forth[-2:0:-1]
+    return forth + forth[-2::-1]
 
 
 class VG_OT_sample(Work, bpy.types.Operator):
@@ -151,7 +151,7 @@ class VG_OT_generate(Work, bpy.types.Operator):
         self.path, self.thing = artefact(vg.network_file, "network"), body_of(vg).name
         words = ["--between", str(vg.between)] if vg.generate == "BETWEEN" else ["--frames", str(vg.count)]
         body = yield from bodies.poses(vg.source, scene)
-        return body, words + ["--seed", str(vg.seed)] + (["--root", "stay"] if vg.root == "STAY" else [])
+        return body, words + (["--diversity", f"{vg.diversity:.6g}", "--seed", str(vg.seed)] if vg.diversity > 0 else []) + (["--root", "stay"] if vg.root == "STAY" else [])
 
     def compute(self, job, gathered):
         body, words = gathered
