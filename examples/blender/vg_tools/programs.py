@@ -86,7 +86,7 @@ class Job:
     def __init__(self, work):
         self.work, self.result, self.error = work, None, None
         self.lines, self.done, self.total, self.step = [], 0, 0, ""
-        self.folder, self.processes, self.lock, self.stopped = None, [], threading.Lock(), False
+        self.folder, self.processes, self.listeners, self.lock, self.stopped = None, [], [], threading.Lock(), False
         self.thread = threading.Thread(target=self._run, daemon=True)
 
     # ---- from outside ----
@@ -168,7 +168,7 @@ class Job:
 
     def _begin(self, commands, feed, last):
         self.check()
-        processes, before = [], subprocess.PIPE if feed is not None else subprocess.DEVNULL
+        processes, self.listeners, before = [], [], subprocess.PIPE if feed is not None else subprocess.DEVNULL
         try:
             for i, command in enumerate(commands):
                 p = subprocess.Popen([Programs.find(command[0]), *command[1:]], stdin=before, stderr=subprocess.PIPE,
@@ -177,7 +177,8 @@ class Job:
                     before.close()
                 processes.append(p)
                 before = p.stdout
-                threading.Thread(target=said, args=(p.stderr, self.lines, command[0]), daemon=True).start()
+                self.listeners.append(threading.Thread(target=said, args=(p.stderr, self.lines, command[0]), daemon=True))
+                self.listeners[-1].start()
         except BaseException:
             for p in processes:
                 p.kill()
@@ -205,8 +206,8 @@ class Job:
         processes[-1].stdout.close()
         for p in processes:
             p.wait()
-        if feeder:
-            feeder.join()
+        for thread in self.listeners + ([feeder] if feeder else []):
+            thread.join()
         self.check()
         failed = [p for p in processes if p.returncode > 0] or [p for p in processes if p.returncode]
         if failed:
