@@ -80,25 +80,27 @@ static void judge_batch(void *context, const fitting_batch *b)
 static void try_fold(choosing *x, const vg_rig_options *o)
 {
     vg_err e;
-    vg_head *h = x->f->h, skinned;
+    const vg_head *h = x->f->h;
+    vg_rig rig;
+    vg_map skinning, envelope;
     if (vg_rig_fitter_new(&x->fitter, h, o, &e) < 0) cli_die(&e);
     fitting_pass(x->f, is_fitted, add_batch, x);
-    if (vg_rig_fitter_finish(x->fitter, VG_RIG_LBS, &e) < 0) cli_die(&e);
-    skinned = *h;
-    h->map = (vg_map){0};
+    if (vg_rig_fitter_finish(x->fitter, VG_RIG_LBS, &rig, &skinning, &e) < 0) cli_die(&e);
+    vg_head_put(x->f->h, &rig, "rig");
     for (size_t c = 0; c < x->n; c++) {
         x->now = &x->at[c];
         vg_rig_fitter_choose(x->fitter, x->now->bones_per_corner, x->now->refine);
-        if (vg_rig_fitter_finish(x->fitter, VG_RIG_ENVELOPE, &e) < 0 ||
-            vg_player_new(&x->players[0], &skinned, false, cli.threads, &e) < 0 ||
-            vg_player_new(&x->players[1], h, false, cli.threads, &e) < 0)
+        if (vg_rig_fitter_finish(x->fitter, VG_RIG_ENVELOPE, &rig, &envelope, &e) < 0 ||
+            vg_player_new(&x->players[0], &h->body, &skinning, false, cli.threads, &e) < 0 ||
+            vg_player_new(&x->players[1], &h->body, &envelope, false, cli.threads, &e) < 0)
             cli_die(&e);
         fitting_pass(x->f, is_left_out, judge_batch, x);
         vg_player_free(&x->players[0]);
         vg_player_free(&x->players[1]);
-        vg_map_clear(&h->map);
+        vg_map_clear(&envelope);
+        vg_rig_clear(&rig);
     }
-    vg_map_clear(&skinned.map);
+    vg_map_clear(&skinning);
     vg_rig_fitter_free(&x->fitter);
 }
 

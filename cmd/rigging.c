@@ -53,7 +53,7 @@ typedef struct work {
     vg_inverse_skin *inverse; /* NULL: motions are known, or bones are free */
     vg_free_bones *free;      /* NULL: bones have a skeleton */
     double **transforms; /* of each pose */
-    vg_map skinning;     /* linear blend skinning as a map, beside the envelope */
+    vg_map maps[2];      /* by vg_rig_method; the envelope only when it is asked for */
     rig_choice choice;
     fitting_errors errors[2][2]; /* envelope, skinning; fitted, left out */
 } work;
@@ -211,7 +211,7 @@ static void place_skeleton(work *w)
     warn_outside(w);
     if (known) return;
     double miss, d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
-    if (vg_rig_learn(w->h, w->nsample, (const double *const *)w->sample, cli.threads, &miss, &e) < 0 ||
+    if (vg_rig_learn(&w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, w->nsample, (const double *const *)w->sample, cli.threads, &miss, &e) < 0 ||
         vg_inverse_skin_new(&w->inverse, &w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, cli.threads, &e) < 0)
         cli_die(&e);
     cli_note("the motion of the bones is learned from %zu poses: what skinning leaves is %.3g D", w->nsample,
@@ -254,7 +254,7 @@ static void find_bones(work *w)
 
 /* ---- the fit ---- */
 
-static vg_rig_fitter *fitter;
+static vg_rig_fitter *rig_fitter;
 
 static void measure_transforms(work *w, const fitting_batch *b)
 {
@@ -294,7 +294,7 @@ static void add_again(void *context, const fitting_batch *b)
         if (fitting_is_held_out(&w->poses, b->index[i])) continue;
         poses[count] = b->values[i], transforms[count++] = w->transforms[b->index[i]];
     }
-    vg_rig_fitter_add(fitter, count, poses, transforms);
+    vg_rig_fitter_add(rig_fitter, count, poses, transforms);
 }
 
 static void fit_batch(void *context, const fitting_batch *b)
@@ -349,18 +349,14 @@ static void report_choice(const rig_choice *c)
 static void report(work *w)
 {
     vg_err e;
-    static vg_head skinning; /* h with another map */
     static const char *const names[2][2] = {{"envelope, fitted", "envelope, left out"},
                                             {"skinning, fitted", "skinning, left out"}};
     static const char *const mixed[2] = {"mixed, fitted", "mixed, left out"};
     size_t nv = w->h->body.mesh.nv;
     double d = vg_diagonal(w->h->body.reference, nv);
     if (cli.quiet || !(d > 0)) return;
-    skinning = *w->h;
-    if (!by_skinning(w->o)) skinning.map = w->skinning;
-    if ((!by_skinning(w->o) && vg_player_new(&players[0], w->h, false, cli.threads, &e) < 0) ||
-        vg_player_new(&players[1], &skinning, false, cli.threads, &e) < 0)
-        cli_die(&e);
+    for (int i = 0; i < 2; i++)
+        if (w->maps[i].n && vg_player_new(&players[i], &w->h->body, &w->maps[i], false, cli.threads, &e) < 0) cli_die(&e);
     for (int i = 0; i < 4; i++) {
         fitting_errors *x = &w->errors[i / 2][i % 2];
         x->first = room(nv, sizeof *x->first), x->second = room(nv, sizeof *x->second);
@@ -379,6 +375,15 @@ static void report(work *w)
     for (int i = 0; i < 2; i++) vg_player_free(&players[i]);
 }
 
+/* The map by one method, and the weights of the bones, which are the same for both. */
+static void finish(work *w, vg_rig_method method)
+{
+    vg_err e;
+    vg_rig rig;
+    if (vg_rig_fitter_finish(rig_fitter, method, &rig, &w->maps[method], &e) < 0) cli_die(&e);
+    vg_head_put(w->h, &rig, "rig");
+}
+
 static void fit(work *w)
 {
     vg_err e;
@@ -387,24 +392,20 @@ static void fit(work *w)
                         .hold = w->o->hold,
                         .refine = w->o->refine < 0 ? 0.003 : w->o->refine,
                         .threads = cli.threads};
-    if (vg_rig_fitter_new(&fitter, h, &o, &e) < 0) cli_die(&e);
+    if (vg_head_prepare_vectors(h, &e) < 0 || vg_rig_fitter_new(&rig_fitter, h, &o, &e) < 0) cli_die(&e);
     w->transforms = room(w->poses.n, sizeof *w->transforms);
     fitting_pass(&w->poses, NULL, fit_batch, w);
-    if (vg_rig_fitter_finish(fitter, VG_RIG_LBS, &e) < 0) cli_die(&e);
-    if (!by_skinning(w->o)) {
-        w->skinning = h->map;
-        h->map = (vg_map){0};
-        if (by_choice(w->o)) {
-            vg_rig_fitter_free(&fitter);
-            rig_choose(&w->poses, w->transforms, &o, w->o->bones_per_corner > 0, w->o->refine >= 0, &w->choice);
-            o.bones_per_corner = w->choice.bones_per_corner, o.refine = w->choice.refine;
-            if (vg_rig_fitter_new(&fitter, h, &o, &e) < 0) cli_die(&e);
-            fitting_pass(&w->poses, NULL, add_again, w);
-        }
-        if (vg_rig_fitter_finish(fitter, VG_RIG_ENVELOPE, &e) < 0) cli_die(&e);
-        if (by_choice(w->o)) mix_rows(&h->map, &w->skinning, w->choice.share);
+    finish(w, VG_RIG_LBS);
+    if (by_choice(w->o)) {
+        vg_rig_fitter_free(&rig_fitter);
+        rig_choose(&w->poses, w->transforms, &o, w->o->bones_per_corner > 0, w->o->refine >= 0, &w->choice);
+        o.bones_per_corner = w->choice.bones_per_corner, o.refine = w->choice.refine;
+        if (vg_rig_fitter_new(&rig_fitter, h, &o, &e) < 0) cli_die(&e);
+        fitting_pass(&w->poses, NULL, add_again, w);
     }
-    vg_rig_fitter_free(&fitter);
+    if (!by_skinning(w->o)) finish(w, VG_RIG_ENVELOPE);
+    if (by_choice(w->o)) mix_rows(&w->maps[VG_RIG_ENVELOPE], &w->maps[VG_RIG_LBS], w->choice.share);
+    vg_rig_fitter_free(&rig_fitter);
 }
 
 void rigging_run(vg_source *s, const rigging_options *o)
@@ -424,5 +425,6 @@ void rigging_run(vg_source *s, const rigging_options *o)
     else place_skeleton(&w);
     fit(&w);
     report(&w);
+    vg_head_put(w.h, &w.maps[by_skinning(o) ? VG_RIG_LBS : VG_RIG_ENVELOPE], "map");
     fitting_clear(&w.poses);
 }

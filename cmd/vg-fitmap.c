@@ -121,7 +121,7 @@ static void report(patch_fit *x)
     const vg_head *h = x->f->h;
     double d = vg_diagonal(h->body.reference, h->body.mesh.nv);
     if (cli.quiet || !(d > 0)) return;
-    if (vg_player_new(&x->player, h, false, cli.threads, &e) < 0) cli_die(&e);
+    if (vg_player_new(&x->player, &h->body, &h->map, false, cli.threads, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < FITTING_BATCH; i++) {
         x->transforms[i] = cli_allocate(7 * h->map.n, sizeof(double), "the report");
         x->vertices[i] = cli_allocate(3 * h->body.mesh.nv, sizeof(double), "the report");
@@ -149,16 +149,20 @@ static void fit(vg_source *s)
         return;
     }
     take_patches(h);
-    size_t before = h->body.patches.n;
     fitting f;
     patch_fit x = {.f = &f};
-    if (vg_map_fitter_new(&x.fitter, h, opts.rig.hold, cli.threads, &e) < 0) cli_die(&e);
-    if (h->body.patches.n != before)
-        cli_note("%zu patches are in %zu pieces, each of which is a patch of the map", before, h->body.patches.n);
+    vg_patches pieces;
+    vg_map map;
+    if (vg_head_prepare_vectors(h, &e) < 0 || vg_map_fitter_new(&x.fitter, h, opts.rig.hold, cli.threads, &e) < 0)
+        cli_die(&e);
     fitting_collect(&f, s, opts.rig.holdout, "fit a map to");
     fitting_pass(&f, is_fitted, add_batch, &x);
-    if (vg_map_fitter_finish(x.fitter, &e) < 0) cli_die(&e);
+    if (vg_map_fitter_finish(x.fitter, &pieces, &map, &e) < 0) cli_die(&e);
     vg_map_fitter_free(&x.fitter);
+    if (pieces.n != h->body.patches.n)
+        cli_note("%zu patches are in %zu pieces, each of which is a patch of the map", h->body.patches.n, pieces.n);
+    vg_head_put(h, &pieces, "patches");
+    vg_head_put(h, &map, "map");
     report(&x);
     fitting_clear(&f);
 }

@@ -31,16 +31,18 @@ static void retarget(vg_head *h)
 {
     vg_err e;
     vg_head target = {0};
+    vg_map map = {0};
+    vg_rig rig = {0};
     char name[200];
     snprintf(name, sizeof name, "'%.190s'", opts.onto);
     if (vg_head_need(h, "map", "the input", &e) < 0 || vg_load(&target, opts.onto, "mesh", &e) < 0 ||
         vg_mesh_same(&h->body.mesh, "the map", &target.body.mesh, name, &e) < 0 ||
-        vg_map_retarget(h, target.body.reference, opts.morph, cli.threads, &e) < 0 ||
+        vg_map_retarget(h, target.body.reference, opts.morph, cli.threads, &map, &rig, target.body.reference, &e) < 0 ||
         vg_head_merge_trace(h, &target, &e) < 0)
         cli_die(&e);
-    const double *morphed = h->body.reference; /* its positions, under the target's name */
-    if (h->body.mesh.nv) memcpy(target.body.reference, morphed, 3 * h->body.mesh.nv * sizeof *morphed);
-    vg_head_take(h, &target, "reference");
+    vg_head_put(h, &map, "map");
+    vg_head_put(h, &rig, "rig");
+    vg_head_take(h, &target, "reference"); /* where the body is, under the target's name */
     vg_head_take(h, &target, "attributes");
     vg_head_clear(&target);
 }

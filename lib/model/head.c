@@ -67,6 +67,12 @@ void vg_patches_clear(vg_patches *p)
     vgi_fields_clear(&vgi_artefacts[VGI_PTCH], p);
 }
 
+int vg_patches_copy(vg_patches *to, const vg_patches *from, size_t nf, vg_err *e)
+{
+    vg_mesh counts = {.nf = nf};
+    return vgi_fields_copy(&vgi_artefacts[VGI_PTCH], to, from, &counts, e);
+}
+
 void vg_rig_clear(vg_rig *r)
 {
     clear_parts(r, rig_parts, 2);
@@ -83,14 +89,14 @@ void vg_map_clear(vg_map *m)
     vgi_fields_clear(&vgi_artefacts[VGI_MAP], m);
 }
 
+int vg_map_copy(vg_map *to, const vg_map *from, vg_err *e)
+{
+    return vgi_fields_copy(&vgi_artefacts[VGI_MAP], to, from, NULL, e);
+}
+
 void vg_signal_clear(vg_signal *s)
 {
     vgi_fields_clear(&vgi_artefacts[VGI_SIGN], s);
-}
-
-int vg_map_copy(vg_map *to, const vg_map *from, const vg_mesh *mesh, vg_err *e)
-{
-    return vgi_fields_copy(&vgi_artefacts[VGI_MAP], to, from, mesh, e);
 }
 
 void vg_records_clear(vg_records *r)
@@ -282,11 +288,15 @@ void vg_head_take(vg_head *to, vg_head *from, const char *what)
     }
 }
 
+/* Records of one name, such as RIG and SKIN, have their fields in one struct. */
 void vg_head_put(vg_head *to, void *from, const char *what)
 {
-    const vgi_artefact *t = vgi_artefact_by_name(what);
-    assert(t && !t->marks);
-    vgi_fields_move(t, vgi_artefact_in(t, to, 0), from);
+    for (size_t i = 0; i < VGI_ARTEFACTS; i++) {
+        const vgi_artefact *t = &vgi_artefacts[i];
+        if (!t->name || strcmp(t->name, what)) continue;
+        assert(!t->marks);
+        vgi_fields_move(t, vgi_artefact_in(t, to, 0), from);
+    }
 }
 
 int vg_head_need(const vg_head *h, const char *what, const char *subject, vg_err *e)

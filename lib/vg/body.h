@@ -138,6 +138,7 @@ typedef struct vg_patches {
 } vg_patches;
 
 void vg_patches_clear(vg_patches *p);
+int vg_patches_copy(vg_patches *to, const vg_patches *from, size_t nf, vg_err *e) VG_MUST_CHECK;
 
 /* A skeleton that drives the mesh, with linear blend skinning (MATH 6; T 5). Transform b of the rig is the rigid
  * motion of joint bone[b] from the reference pose. */

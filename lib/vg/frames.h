@@ -64,8 +64,7 @@ typedef struct vg_map {
 } vg_map;
 
 void vg_map_clear(vg_map *m);
-/* vg_map_copy: `to` is written over; mesh: that of the map. */
-int vg_map_copy(vg_map *to, const vg_map *from, const vg_mesh *mesh, vg_err *e) VG_MUST_CHECK;
+int vg_map_copy(vg_map *to, const vg_map *from, vg_err *e) VG_MUST_CHECK;
 
 /* One process that took part in making a stream. parents are positions in the same list, each before its own. */
 typedef struct vg_provenance {
@@ -163,10 +162,11 @@ void vg_head_clear(vg_head *h);
 int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e) VG_MUST_CHECK;
 
 /* vg_head_take: move one thing from one head to another, by its name: "mesh", "attributes", "reference" (with its name),
- * "skeleton", "patches", "rig" (with its skin), "selection", "links", "anchors", "correspondence", "map". What `to` had
+ * "skeleton", "patches", "rig" (with its skin), "selection", "links", "anchors", "correspondence", "map", "signal",
+ * "network". What `to` had
  * of it is released; `from` has none afterwards. */
 void vg_head_take(vg_head *to, vg_head *from, const char *what);
-/* vg_head_put: the same from the struct of the thing alone: "map", a vg_map; "correspondence", a vg_correspondence. */
+/* vg_head_put: the same from the struct of the thing alone: a vg_map for "map", a vg_rig for "rig", and so on. */
 void vg_head_put(vg_head *to, void *from, const char *what);
 /* vg_head_need: VG_OK when h holds it; else VG_EINPUT: "<subject> holds no map: make one with vg-fitmap". */
 int vg_head_need(const vg_head *h, const char *what, const char *subject, vg_err *e) VG_MUST_CHECK;

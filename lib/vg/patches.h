@@ -35,27 +35,29 @@ int vg_segmenter_cut(vg_segmenter *s, size_t patches, uint64_t seed, bool connec
 
 /* The map from patch transforms to vertices (MATH 7; T 6.3), with its two remedies. */
 typedef struct vg_map_fitter vg_map_fitter;
-/* vg_map_fitter_new: h: mesh, reference, links, and patches, which are split into connected pieces: these become the
- * patches of h. hold: share of the vertices that are held, those nearest the patches' centres; at least one a patch.
- * h is borrowed until free. */
-int vg_map_fitter_new(vg_map_fitter **f, vg_head *h, double hold, int threads, vg_err *e) VG_MUST_CHECK;
+/* vg_map_fitter_new: h: mesh, reference, links (vg_head_prepare_vectors) and patches; borrowed until free. hold: share
+ * of the vertices that are held, those nearest the patches' centres; at least one a patch. */
+int vg_map_fitter_new(vg_map_fitter **f, const vg_head *h, double hold, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_map_fitter_free(vg_map_fitter **f);
 int vg_map_fitter_add(vg_map_fitter *f, size_t n, const double *const *poses, vg_err *e) VG_MUST_CHECK;
-/* vg_map_fitter_finish: fill h->map, which is empty on failure. VG_EINPUT without poses. */
-int vg_map_fitter_finish(vg_map_fitter *f, vg_err *e) VG_MUST_CHECK;
+/* vg_map_fitter_finish: the map, and its patches: the connected pieces of those of h, small ones joined with a neighbour.
+ * Both are empty on failure. VG_EINPUT without poses. */
+int vg_map_fitter_finish(vg_map_fitter *f, vg_patches *patches, vg_map *map, vg_err *e) VG_MUST_CHECK;
 
-/* vg_map_retarget: the map of h for another body of the same faces (T 6.5), or one on the way to it (T 6.6): its
- * vectors are those of h's reference, turned and stretched towards the target's by `morph` (1: all the way). h's
- * reference becomes that body's. target: nv points. Patches are still measured on the body that the map was fitted
- * on; the joints of a rig go with the vertices around them, and its transforms are those of the other body. VG_EINPUT
- * when there is no map, or a body has no extent. On failure h may be neither body's: it can only be cleared. */
-int vg_map_retarget(vg_head *h, const double *target, double morph, int threads, vg_err *e) VG_MUST_CHECK;
+/* vg_map_retarget: the map of h for another body of the same faces (T 6.5), or for one on the way to it (T 6.6), whose
+ * vectors are those of h's reference, rotated and scaled towards the target's by `morph` (1: all the way).
+ * target: nv points. Out: the map; the rig, when h has one: its joints follow the vertices around them, and its
+ * transforms are those of the other body; reference: nv points, that body, which may be `target` itself. Patches are
+ * still measured on the body that the map was fitted on. VG_EINPUT when there is no map, or a body has no extent; map and
+ * rig are empty on failure. */
+int vg_map_retarget(const vg_head *h, const double *target, double morph, int threads, vg_map *map, vg_rig *rig,
+                    double *reference, vg_err *e) VG_MUST_CHECK;
 
 /* A map at work. Transforms are 7 numbers each, as in VG_TRANSFORMS. */
 typedef struct vg_player vg_player;
-/* vg_player_new: h has a map and its patches, or the weights of its rig; borrowed until free. single: the product is
- * formed in binary32. VG_EINPUT when h has not. */
-int vg_player_new(vg_player **p, const vg_head *h, bool single, int threads, vg_err *e) VG_MUST_CHECK;
+/* vg_player_new: a map, and the body that it moves, with the map's patches or the weights of its rig; both are borrowed
+ * until free. single: the product is formed in binary32. VG_EINPUT when they do not belong together. */
+int vg_player_new(vg_player **p, const vg_body *body, const vg_map *map, bool single, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_player_free(vg_player **p);
 /* vg_player_measure: n poses (nv points each) to the best similarity of each patch. */
 void vg_player_measure(vg_player *p, size_t n, const double *const *poses, double *const *transforms);

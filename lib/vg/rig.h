@@ -51,7 +51,7 @@ int vg_feet_hold(const vg_rig *r, size_t n, double *const *transforms, vg_err *e
  *
  * vg_inverse_skin: the other way round: the motions of the bones in a pose of vertices, joints staying together, so that
  * linear blend skinning comes as near to the vertices as it can (damped Gauss-Newton over all bones at once). Bones
- * that no vertex tells about go with their parents. */
+ * without weighted vertices follow their parents. */
 typedef struct vg_inverse_skin vg_inverse_skin;
 /* vg_inverse_skin_new: r has weights (else VG_EINPUT); it and reference (nv points) are not kept. */
 int vg_inverse_skin_new(vg_inverse_skin **b, const vg_rig *r, size_t nv, const double *reference, int threads,
@@ -60,10 +60,12 @@ void vg_inverse_skin_free(vg_inverse_skin **b);
 /* vg_inverse_skin_fit: n poses (nv points each) to n times nbones transforms of 7 numbers. */
 void vg_inverse_skin_fit(vg_inverse_skin *b, size_t n, const double *const *poses, double *const *transforms);
 
-/* vg_rig_learn: give h's rig weights when the motions of its bones are not known: weights and motions are fitted in
- * turn to n poses. miss: the mean distance that linear blend skinning leaves, in mesh units. */
-int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, double *miss,
-                 vg_err *e) VG_MUST_CHECK;
+/* vg_rig_learn: give a rig weights when the motions of its bones are not known: weights and motions are fitted in turn
+ * to n poses (nv points each) of the reference (nv points). miss: the mean distance that linear blend skinning leaves, in
+ * mesh units. On failure the rig is as it was. */
+int vg_rig_learn(vg_rig *rig, size_t nv, const double *reference, size_t n, const double *const *poses, int threads,
+                 double *miss, vg_err *e) VG_MUST_CHECK;
+
 /* Bones without a skeleton (skinning decomposition; Le and Deng 2012).
  *
  * vg_rig_decompose: a rig of at most `bones` free bones, fewer where the poses do not tell more apart, with weights, from
@@ -103,17 +105,18 @@ typedef struct vg_rig_options {
     int threads;
 } vg_rig_options;
 
-/* vg_rig_fitter_new: h: mesh, reference and a rig (its weights, if any, are replaced); borrowed until free. */
-int vg_rig_fitter_new(vg_rig_fitter **f, vg_head *h, const vg_rig_options *o, vg_err *e) VG_MUST_CHECK;
+/* vg_rig_fitter_new: h: mesh, reference, links (vg_head_prepare_vectors) and a rig, whose weights do not matter; borrowed
+ * until free. */
+int vg_rig_fitter_new(vg_rig_fitter **f, const vg_head *h, const vg_rig_options *o, vg_err *e) VG_MUST_CHECK;
 void vg_rig_fitter_free(vg_rig_fitter **f);
 /* vg_rig_fitter_add: n poses (nv points) and the transforms of the bones in them.
  * Poses that are the reference are passed over. */
 void vg_rig_fitter_add(vg_rig_fitter *f, size_t n, const double *const *poses, const double *const *transforms);
 /* vg_rig_fitter_choose: another number of bones per corner, another ridge, for the next finish. */
 void vg_rig_fitter_choose(vg_rig_fitter *f, size_t bones_per_corner, double refine);
-/* vg_rig_fitter_finish: fill h->map and the weights of h->rig. May be called again for another method.
- * VG_EINPUT without poses. */
-int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_err *e) VG_MUST_CHECK;
+/* vg_rig_fitter_finish: the rig with its weights, and the map of its bones; both are empty on failure. May be called
+ * again for another method. VG_EINPUT without poses. */
+int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_rig *rig, vg_map *map, vg_err *e) VG_MUST_CHECK;
 
 #ifdef __cplusplus
 }

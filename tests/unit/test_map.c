@@ -47,19 +47,30 @@ static void turn_all(const vg_head *h, double angle, double *pose)
     }
 }
 
+static void finish(vg_map_fitter *f, vg_head *h)
+{
+    vg_patches patches;
+    vg_map map;
+    vg_err e;
+    CHECK(vg_map_fitter_finish(f, &patches, &map, &e) == VG_OK);
+    vg_map_fitter_free(&f);
+    vg_head_put(h, &patches, "patches");
+    vg_head_put(h, &map, "map");
+}
+
 static void fit(vg_head *h, void (*make)(const vg_head *, double, double *))
 {
     vg_map_fitter *f;
     vg_err e;
     double *pose = room(3 * h->body.mesh.nv, sizeof *pose);
+    CHECK(vg_head_prepare_vectors(h, &e) == VG_OK);
     CHECK(vg_map_fitter_new(&f, h, 0.03, 2, &e) == VG_OK);
     for (int i = 0; i < POSES; i++) {
         const double *poses[1] = {pose};
         make(h, 0.2 * (i + 1), pose);
         CHECK(vg_map_fitter_add(f, 1, poses, &e) == VG_OK);
     }
-    CHECK(vg_map_fitter_finish(f, &e) == VG_OK);
-    vg_map_fitter_free(&f);
+    finish(f, h);
     free(pose);
 }
 
@@ -79,7 +90,7 @@ static played open_player(const vg_head *h, bool single, int threads)
 {
     vg_err e;
     played x = {NULL, room(7 * h->map.n, sizeof(double)), room(3 * h->body.mesh.nv, sizeof(double))};
-    CHECK(vg_player_new(&x.p, h, single, threads, &e) == VG_OK);
+    CHECK(vg_player_new(&x.p, &h->body, &h->map, single, threads, &e) == VG_OK);
     return x;
 }
 
@@ -131,14 +142,14 @@ static void collapsed_is_uncollapsed(void)
     vg_err e;
     fit(&h, bend);
     CHECK(vg_head_graph(&g, &h, &e) == VG_OK);
-    uint32_t *of_face = vgi_graph_patches(&h, g, &e);
+    uint32_t *of_face = vgi_graph_patches(&h, &h.body.patches, g, &e);
     size_t corners = vg_graph_corners(g), nv = h.body.mesh.nv;
     double *vectors = room(3 * corners, sizeof *vectors), *wanted = room(3 * corners, sizeof *wanted);
     double *anchors = room(3 * h.map.nheld, sizeof *anchors), *x = room(3 * nv, sizeof *x),
            *rhs = room(3 * nv, sizeof *rhs);
     double *pose = room(3 * nv, sizeof *pose);
     vg_graph_vectors(g, h.body.reference, vectors);
-    CHECK(vgi_map_collapse(&h, g, of_face, vectors, 2, &e) == VG_OK);
+    CHECK(vgi_map_collapse(&h.map, &(vgi_map_body){.reference = h.body.reference}, g, of_face, vectors, 2, &e) == VG_OK);
     played p = open_player(&h, false, 2);
     bend(&h, 1.3, pose);
     measure(&p, pose);
@@ -276,7 +287,10 @@ static void other_bodies(void)
         memcpy(own, x.vertices, 3 * nv * sizeof *own);
         close_player(&x);
         for (size_t i = 0; i < 3 * nv; i++) target[i] = 2 * h.body.reference[i] + 1;
-        CHECK(vg_map_retarget(&h, target, half ? 0.5 : 1, 2, &e) == VG_OK);
+        vg_map moved;
+        vg_rig none;
+        CHECK(vg_map_retarget(&h, target, half ? 0.5 : 1, 2, &moved, &none, h.body.reference, &e) == VG_OK);
+        vg_head_put(&h, &moved, "map");
         x = open_player(&h, false, 1);
         measure(&x, pose);
         play(&x);
@@ -359,7 +373,7 @@ static void what_hangs_loose(void)
     CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK && h.nlinks == 1);
     fit(&h, bend);
     vg_graph *g = graph_of(&h);
-    uint32_t *all = vgi_graph_patches(&h, g, &e);
+    uint32_t *all = vgi_graph_patches(&h, &h.body.patches, g, &e);
     CHECK(g->nlinks == 1 && all[g->nf - 1] == 4); /* the rod's vertices come first */
     double *pose = room(3 * h.body.mesh.nv, sizeof *pose);
     played x = open_player(&h, false, 1);
@@ -389,6 +403,7 @@ static void joints_are_found(void)
     CHECK(vgi_shape_make(&shape, &h.body.mesh, &h.body.patches, h.body.reference, &e) == VG_OK);
     bool *upper = room(nv, sizeof *upper);
     for (size_t i = shape.first[1]; i < shape.first[2]; i++) upper[shape.member[i]] = true;
+    CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK);
     CHECK(vg_map_fitter_new(&f, &h, 0.03, 1, &e) == VG_OK);
     for (int k = 0; k < 12; k++) {
         double l[4] = {0, noise(), noise(), noise()}, q[4];
@@ -403,7 +418,8 @@ static void joints_are_found(void)
             }
         CHECK(vg_map_fitter_add(f, 1, poses, &e) == VG_OK);
     }
-    CHECK(vg_map_fitter_finish(f, &e) == VG_OK && h.map.nhinges == 1);
+    finish(f, &h);
+    CHECK(h.map.nhinges == 1);
     /* nearly: the halves share a ring, so the lower one is not quite rigid; the middle of the ring is 3.1 away */
     CHECK(farthest(h.map.hinge_at, hinge, 1) < 1);
     played x = open_player(&h, false, 1);
@@ -416,7 +432,6 @@ static void joints_are_found(void)
     vg_centroid(x.vertices, nv, now);
     for (size_t i = 0; i < 3 * nv; i++) x.vertices[i] += root[i % 3] - now[i % 3];
     CHECK(farthest(x.vertices, pose, nv) < 0.03 * D); /* without skin 0.12 */
-    vg_map_fitter_free(&f);
     vgi_shape_clear(&shape);
     free(upper);
     free(pose);
@@ -462,6 +477,7 @@ static void units_do_not_matter(void)
         size_t n = 3 * h.body.mesh.nv;
         double *pose = room(n, sizeof *pose);
         for (size_t i = 0; i < n; i++) h.body.reference[i] *= unit;
+        CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK);
         CHECK(vg_map_fitter_new(&f, &h, 0.03, 2, &e) == VG_OK);
         for (int k = 0; k < POSES; k++) {
             const double *poses[1] = {pose};
@@ -470,8 +486,7 @@ static void units_do_not_matter(void)
             for (size_t i = 0; i < n; i++) h.body.reference[i] *= unit, pose[i] *= unit;
             CHECK(vg_map_fitter_add(f, 1, poses, &e) == VG_OK);
         }
-        CHECK(vg_map_fitter_finish(f, &e) == VG_OK);
-        vg_map_fitter_free(&f);
+        finish(f, &h);
         played x = open_player(&h, false, 1);
         measure(&x, pose);
         vg_player_place(x.p, x.transforms);
@@ -491,13 +506,19 @@ static void refusals(void)
     vg_head h = make_rod(5, 4, true);
     vg_map_fitter *f;
     vg_player *p;
+    vg_patches patches;
+    vg_map map;
+    vg_rig rig;
     vg_err e;
     CHECK(vg_map_fitter_new(&f, &h, 0.03, 1, &e) == VG_EINPUT && !f);
-    CHECK(vg_player_new(&p, &h, false, 1, &e) == VG_EINPUT && !p);
-    CHECK(vg_map_retarget(&h, h.body.reference, 1, 1, &e) == VG_EINPUT);
+    CHECK(vg_player_new(&p, &h.body, &h.map, false, 1, &e) == VG_EINPUT && !p);
+    CHECK(vg_map_retarget(&h, h.body.reference, 1, 1, &map, &rig, h.body.reference, &e) == VG_EINPUT && !map.n);
     vg_head body = make_body(3);
+    body.has_links = false;
+    CHECK(vg_map_fitter_new(&f, &body, 0.03, 1, &e) == VG_EARG && !f);
+    CHECK(vg_head_prepare_vectors(&body, &e) == VG_OK);
     CHECK(vg_map_fitter_new(&f, &body, 0.03, 1, &e) == VG_OK);
-    CHECK(vg_map_fitter_finish(f, &e) == VG_EINPUT && !body.map.n);
+    CHECK(vg_map_fitter_finish(f, &patches, &map, &e) == VG_EINPUT && !map.n && !patches.n);
     vg_map_fitter_free(&f);
     vg_head_clear(&body);
     vg_head_clear(&h);

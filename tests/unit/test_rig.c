@@ -92,15 +92,36 @@ static void skin_poses(stage *x)
         vg_rig_skin(&x->h.body.rig, x->h.body.mesh.nv, x->h.body.reference, x->transforms[k], x->poses[k]);
 }
 
-static vg_rig_fitter *fit(stage *x, vg_rig_method method, size_t bones, double refine, int threads)
+/* The fit to all poses; the stage has its rig and map. */
+static void fit_with(stage *x, vg_rig_method method, const vg_rig_options *o)
 {
     vg_err e;
     vg_rig_fitter *f;
-    const vg_rig_options o = {bones, 0.03, refine, threads};
-    CHECK(vg_rig_fitter_new(&f, &x->h, &o, &e) == VG_OK);
+    vg_rig rig;
+    vg_map map;
+    CHECK(vg_head_prepare_vectors(&x->h, &e) == VG_OK);
+    CHECK(vg_rig_fitter_new(&f, &x->h, o, &e) == VG_OK);
     vg_rig_fitter_add(f, POSES, (const double *const *)x->poses, (const double *const *)x->transforms);
-    CHECK(vg_rig_fitter_finish(f, method, &e) == VG_OK);
-    return f;
+    CHECK(vg_rig_fitter_finish(f, method, &rig, &map, &e) == VG_OK);
+    vg_rig_fitter_free(&f);
+    vg_head_put(&x->h, &rig, "rig");
+    vg_head_put(&x->h, &map, "map");
+}
+
+static void fit(stage *x, vg_rig_method method, size_t bones, double refine, int threads)
+{
+    const vg_rig_options o = {bones, 0.03, refine, threads};
+    fit_with(x, method, &o);
+}
+
+static void retarget(vg_head *h, const double *target)
+{
+    vg_err e;
+    vg_map map;
+    vg_rig rig;
+    CHECK(vg_map_retarget(h, target, 1, 1, &map, &rig, h->body.reference, &e) == VG_OK);
+    vg_head_put(h, &map, "map");
+    vg_head_put(h, &rig, "rig");
 }
 
 /* The farthest that the map is from the poses. */
@@ -109,7 +130,7 @@ static double misses(const stage *x)
     vg_err e;
     vg_player *p;
     double most = 0, *out = room(3 * x->h.body.mesh.nv, sizeof *out), *outs[1] = {out};
-    CHECK(vg_player_new(&p, &x->h, false, 2, &e) == VG_OK);
+    CHECK(vg_player_new(&p, &x->h.body, &x->h.map, false, 2, &e) == VG_OK);
     for (size_t k = 0; k < POSES; k++) {
         const double *t[1] = {x->transforms[k]};
         vg_player_pose(p, 1, t, outs);
@@ -150,9 +171,8 @@ static void rigid_bodies_are_met(void)
                         x.poses[k][3 * v + i] =
                             x.positions[k][3 * b + i] + m[3 * i] * d[0] + m[3 * i + 1] * d[1] + m[3 * i + 2] * d[2];
                 }
-            vg_rig_fitter *f = fit(&x, method ? VG_RIG_LBS : VG_RIG_ENVELOPE, bones, 0.003, 2);
+            fit(&x, method ? VG_RIG_LBS : VG_RIG_ENVELOPE, bones, 0.003, 2);
             CHECK_NEAR(misses(&x), 0, 1e-9 * vg_diagonal(x.h.body.reference, x.h.body.mesh.nv));
-            vg_rig_fitter_free(&f);
             strike(&x);
         }
 }
@@ -167,7 +187,7 @@ static void weights_are_found_again(void)
     double *truth = room(nv * BONES, sizeof *truth), most = 0;
     for (size_t s = 0; s < VG_SKIN * nv; s++)
         truth[s / VG_SKIN * BONES + x.h.body.rig.skin_bone[s]] += x.h.body.rig.skin_weight[s];
-    vg_rig_fitter *f = fit(&x, VG_RIG_LBS, 1, 0, 2);
+    fit(&x, VG_RIG_LBS, 1, 0, 2);
     for (size_t v = 0; v < nv; v++) {
         double sum = 0;
         for (size_t s = VG_SKIN * v; s < VG_SKIN * (v + 1); s++) {
@@ -180,7 +200,6 @@ static void weights_are_found_again(void)
     for (size_t i = 0; i < nv * BONES; i++) most = fmax(most, fabs(truth[i]));
     CHECK_NEAR(most, 0, 1e-5);
     CHECK_NEAR(misses(&x), 0, 1e-5);
-    vg_rig_fitter_free(&f);
     free(truth);
     strike(&x);
 }
@@ -298,10 +317,9 @@ static void units_do_not_matter(void)
         CHECK(vg_rig_locate(&x.s, x.h.body.mesh.nv, x.h.body.reference, POSES, (const double *const *)x.poses,
                             (const double *const *)x.positions, (const double *const *)x.turns, 1, shift[i], &spread,
                             &e) == VG_OK);
-        vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, 2, 0.003, 1);
+        fit(&x, VG_RIG_ENVELOPE, 2, 0.003, 1);
         miss[i] = misses(&x) / unit;
-        vg_rig_fitter_free(&f);
-        CHECK(vg_rig_learn(&x.h, POSES, (const double *const *)x.poses, 1, &learned[i], &e) == VG_OK);
+        CHECK(vg_rig_learn(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, POSES, (const double *const *)x.poses, 1, &learned[i], &e) == VG_OK);
         learned[i] /= unit;
         for (size_t k = 0; k < 7 * BONES; k++) turned[i][k] /= k % 7 > 3 ? unit : 1;
         for (int k = 0; k < 3; k++) shift[i][k] /= unit;
@@ -323,7 +341,7 @@ static void a_rig_is_learned_from_poses_alone(void)
     set_stage(&x, make_limb(), 40);
     paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.2);
     skin_poses(&x);
-    CHECK(vg_rig_learn(&x.h, POSES, (const double *const *)x.poses, 2, &miss, &e) == VG_OK);
+    CHECK(vg_rig_learn(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, POSES, (const double *const *)x.poses, 2, &miss, &e) == VG_OK);
     CHECK_NEAR(miss, 0, 1e-3 * vg_diagonal(x.h.body.reference, x.h.body.mesh.nv));
     strike(&x);
 }
@@ -419,7 +437,7 @@ static void the_map_is_its_chain(void)
         skin_poses(&x);
         for (size_t k = 0; k < POSES; k++) /* skin that skinning does not know */
             for (size_t i = 0; i < 3 * x.h.body.mesh.nv; i++) x.poses[k][i] += 0.05 * sin(x.poses[k][i] * 3);
-        vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, per, 0, 2);
+        fit(&x, VG_RIG_ENVELOPE, per, 0, 2);
         const vg_map *m = &x.h.map;
         size_t nv = x.h.body.mesh.nv;
         vg_graph *g = graph_of(&x.h);
@@ -427,7 +445,7 @@ static void the_map_is_its_chain(void)
         vg_player *p;
         CHECK(m->nheld >= BONES && m->per_corner == per && m->ncorners == vg_graph_corners(g));
         CHECK(vg_solver_new(&s, g, m->held, m->nheld, x.h.body.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_OK);
-        CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
+        CHECK(vg_player_new(&p, &x.h.body, &x.h.map, false, 1, &e) == VG_OK);
         double *vectors = vectors_of(g, x.h.body.reference), *wanted = room(3 * m->ncorners, sizeof *wanted);
         double *held = room(3 * m->nheld, sizeof *held), *skin = room(3 * nv, sizeof *skin);
         double *chain = room(3 * nv, sizeof *chain), *rhs = room(3 * nv, sizeof *rhs),
@@ -460,7 +478,6 @@ static void the_map_is_its_chain(void)
         vg_player_free(&p);
         vg_solver_free(&s);
         vg_graph_free(&g);
-        vg_rig_fitter_free(&f);
         strike(&x);
     }
 }
@@ -485,19 +502,14 @@ static void near_bones(void)
 static void every_component_is_held(void)
 {
     stage x;
-    vg_err e;
-    vg_rig_fitter *f;
     const vg_rig_options o = {1, 0, 0, 1};
     set_stage(&x, make_beads(), 40);
     size_t each = x.h.body.mesh.nv / BONES, held[BONES] = {0};
     paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0);
     skin_poses(&x);
-    CHECK(vg_rig_fitter_new(&f, &x.h, &o, &e) == VG_OK);
-    vg_rig_fitter_add(f, POSES, (const double *const *)x.poses, (const double *const *)x.transforms);
-    CHECK(vg_rig_fitter_finish(f, VG_RIG_ENVELOPE, &e) == VG_OK);
+    fit_with(&x, VG_RIG_ENVELOPE, &o);
     for (size_t i = 0; i < x.h.map.nheld; i++) held[x.h.map.held[i] / each]++;
     for (size_t b = 0; b < BONES; b++) CHECK(held[b] > 0);
-    vg_rig_fitter_free(&f);
     strike(&x);
 }
 
@@ -511,9 +523,8 @@ static void two_bones_come_nearer(void)
         set_stage(&x, make_limb(), 40);
         paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.4);
         skin_poses(&x);
-        vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, per, 0, 1);
+        fit(&x, VG_RIG_ENVELOPE, per, 0, 1);
         miss[per] = misses(&x);
-        vg_rig_fitter_free(&f);
         strike(&x);
     }
     CHECK(miss[2] < 0.5 * miss[1]);
@@ -528,9 +539,8 @@ static void refinement_brings_nearer(void)
         set_stage(&x, make_limb(), 40);
         paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.4);
         skin_poses(&x);
-        vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, 1, i ? 0.003 : 0, 2);
+        fit(&x, VG_RIG_ENVELOPE, 1, i ? 0.003 : 0, 2);
         miss[i] = misses(&x);
-        vg_rig_fitter_free(&f);
         strike(&x);
     }
     CHECK(miss[0] > 1e-3);
@@ -731,8 +741,8 @@ static void rotations_alone_say_where_bones_are(void)
     set_stage(&x, make_limb(), 40);
     paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.2);
     skin_poses(&x);
-    vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, 2, 0.003, 1);
-    CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
+    fit(&x, VG_RIG_ENVELOPE, 2, 0.003, 1);
+    CHECK(vg_player_new(&p, &x.h.body, &x.h.map, false, 1, &e) == VG_OK);
     double t[7 * BONES], shift[3];
     memcpy(t, x.transforms[0], sizeof t);
     vg_player_place(p, t); /* they hang together already: nothing moves */
@@ -744,7 +754,6 @@ static void rotations_alone_say_where_bones_are(void)
     for (size_t b = 0; b < BONES; b++) /* they hang together again: all are shifted alike */
         for (size_t k = 0; k < 3; k++) CHECK_NEAR(t[7 * b + 4 + k] - x.transforms[0][7 * b + 4 + k], shift[k], 1e-9);
     vg_player_free(&p);
-    vg_rig_fitter_free(&f);
     strike(&x);
 }
 
@@ -758,18 +767,17 @@ static void a_rig_serves_another_body(void)
         size_t nv = x.h.body.mesh.nv;
         paint(&x.h.body.rig, nv, x.h.body.reference, 0.2);
         skin_poses(&x);
-        vg_rig_fitter *f = fit(&x, method ? VG_RIG_LBS : VG_RIG_ENVELOPE, 2, 0.003, 1);
-        vg_rig_fitter_free(&f);
+        fit(&x, method ? VG_RIG_LBS : VG_RIG_ENVELOPE, 2, 0.003, 1);
         double *target = room(3 * nv, sizeof *target), *before = room(3 * nv, sizeof *before),
                *after = room(3 * nv, sizeof *after);
         double *list[1] = {before}, t[7 * BONES];
         vg_player *p;
         for (size_t i = 0; i < 3 * nv; i++) target[i] = 2 * x.h.body.reference[i] + (double)(i % 3);
         const double *from[1] = {x.transforms[0]};
-        CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
+        CHECK(vg_player_new(&p, &x.h.body, &x.h.map, false, 1, &e) == VG_OK);
         vg_player_pose(p, 1, from, list);
         vg_player_free(&p);
-        CHECK(vg_map_retarget(&x.h, target, 1, 1, &e) == VG_OK);
+        retarget(&x.h, target);
         for (size_t j = 0; j < JOINTS; j++)
             for (size_t k = 0; k < 3; k++)
                 CHECK_NEAR(x.h.body.rig.at[3 * j + k], (k == 2 ? 2 * LENGTH * (double)j : 0) + (double)k, 1e-6);
@@ -777,7 +785,7 @@ static void a_rig_serves_another_body(void)
             for (size_t k = 0; k < 3; k++) x.positions[0][3 * j + k] = 2 * x.positions[0][3 * j + k] + (double)k;
         vg_rig_transforms(&x.h.body.rig, x.positions[0], x.turns[0], t);
         from[0] = t, list[0] = after;
-        CHECK(vg_player_new(&p, &x.h, false, 1, &e) == VG_OK);
+        CHECK(vg_player_new(&p, &x.h.body, &x.h.map, false, 1, &e) == VG_OK);
         vg_player_pose(p, 1, from, list);
         vg_player_free(&p);
         for (size_t i = 0; i < 3 * nv; i++) before[i] = 2 * before[i] + (double)(i % 3);
@@ -815,12 +823,11 @@ static void joints_go_with_their_own(void)
     x.h.body.rig = turned;
     memcpy(x.h.body.reference, x.poses[0], 3 * nv * sizeof(double));
     for (size_t k = 0; k < POSES; k++) vg_rig_transforms(&x.h.body.rig, x.positions[k], x.turns[k], x.transforms[k]);
-    vg_rig_fitter *f = fit(&x, VG_RIG_LBS, 1, 0, 1);
-    vg_rig_fitter_free(&f);
+    fit(&x, VG_RIG_LBS, 1, 0, 1);
     double *target = room(3 * nv, sizeof *target), positions[3 * JOINTS], turned_to[4 * JOINTS];
     for (size_t i = 0; i < 3 * nv; i++)
         target[i] = i < 3 * limb ? 2 * x.h.body.reference[i] : x.h.body.reference[i] + 9;
-    CHECK(vg_map_retarget(&x.h, target, 1, 1, &e) == VG_OK);
+    retarget(&x.h, target);
     for (size_t i = 3; i < 9; i++) /* knee and foot are in the limb */
         CHECK_NEAR(x.h.body.rig.at[i], 2 * x.positions[0][i], 0.05);
     vg_skeleton_pose(&x.h.body.rig.skeleton, x.values[0], positions, turned_to);
@@ -881,14 +888,13 @@ static void threads_do_not_matter(void)
         set_stage(&x, make_limb(), 40);
         paint(&x.h.body.rig, x.h.body.mesh.nv, x.h.body.reference, 0.3);
         skin_poses(&x);
-        vg_rig_fitter *f = fit(&x, VG_RIG_ENVELOPE, 2, 0.003, threads);
+        fit(&x, VG_RIG_ENVELOPE, 2, 0.003, threads);
         size_t n = x.h.body.mesh.nv * 4 * BONES;
         if (!first) {
             first = room(n, sizeof *first);
             memcpy(first, x.h.map.weights, n * sizeof *first);
         }
         CHECK(!memcmp(first, x.h.map.weights, n * sizeof *first));
-        vg_rig_fitter_free(&f);
         strike(&x);
     }
     free(first);
@@ -899,13 +905,17 @@ static void what_cannot_be_fitted_is_refused(void)
     stage x;
     vg_err e;
     vg_rig_fitter *f;
+    vg_rig rig;
+    vg_map map;
     set_stage(&x, make_limb(), 40);
     const vg_rig_options three = {3, 0.03, 0, 1}, one = {1, 0.03, 0, 1};
     CHECK(vg_rig_fitter_new(&f, &x.h, &three, &e) == VG_EARG);
+    CHECK(vg_rig_fitter_new(&f, &x.h, &one, &e) == VG_EARG && strstr(e.message, "links"));
+    CHECK(vg_head_prepare_vectors(&x.h, &e) == VG_OK);
     CHECK(vg_rig_fitter_new(&f, &x.h, &one, &e) == VG_OK);
     const double *poses[1] = {x.h.body.reference}, *transforms[1] = {x.transforms[0]};
     vg_rig_fitter_add(f, 1, poses, transforms); /* the reference says nothing */
-    CHECK(vg_rig_fitter_finish(f, VG_RIG_ENVELOPE, &e) == VG_EINPUT && strstr(e.message, "no poses"));
+    CHECK(vg_rig_fitter_finish(f, VG_RIG_ENVELOPE, &rig, &map, &e) == VG_EINPUT && !map.n && strstr(e.message, "no poses"));
     vg_rig_fitter_free(&f);
     vg_rig_clear(&x.h.body.rig);
     CHECK(vg_rig_fitter_new(&f, &x.h, &one, &e) == VG_EINPUT);

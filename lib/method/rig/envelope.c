@@ -14,7 +14,8 @@
 enum { CHUNK = 64, MOST_HELD = 2048, NEAR = 32, AROUND = 8 };
 
 struct vg_rig_fitter {
-    vg_head *h;
+    const vg_head *h;
+    vg_rig rig;  /* that of h, with the weights of the last fit */
     vg_rig_options o;
     vg_graph *g;
     vgi_turns turns;
@@ -24,17 +25,18 @@ struct vg_rig_fitter {
     vg_map base;  /* the envelope before it is refined, for so many bones per corner; n 0: not made yet */
 };
 
-int vg_rig_fitter_new(vg_rig_fitter **out, vg_head *h, const vg_rig_options *o, vg_err *e)
+int vg_rig_fitter_new(vg_rig_fitter **out, const vg_head *h, const vg_rig_options *o, vg_err *e)
 {
     *out = NULL;
     if (!h->body.rig.nbones) return vg_fail(e, VG_EINPUT, "there is no skeleton to fit");
     if (o->bones_per_corner < 1 || o->bones_per_corner > 2)
         return vg_fail(e, VG_EARG, "a corner has 1 or 2 bones, not %zu", o->bones_per_corner);
+    if (!h->has_links) return vg_fail(e, VG_EARG, "the links are not chosen: call vg_head_prepare_vectors first");
     vg_rig_fitter *f = *out = vgi_array(1, sizeof *f, e);
     if (!f) return VG_ENOMEM;
     f->h = h, f->o = *o;
     double *at = vgi_array(3 * h->body.rig.nbones, sizeof *at, e);
-    int r = at ? vg_head_prepare_vectors(h, e) : VG_ENOMEM;
+    int r = at ? vg_rig_copy(&f->rig, &h->body.rig, h->body.mesh.nv, e) : VG_ENOMEM;
     for (size_t b = 0; r == VG_OK && b < h->body.rig.nbones; b++)
         memcpy(at + 3 * b, h->body.rig.at + 3 * (size_t)h->body.rig.bone[b], 3 * sizeof *at);
     if (r == VG_OK) r = vg_head_graph(&f->g, h, e);
@@ -50,6 +52,7 @@ void vg_rig_fitter_free(vg_rig_fitter **out)
 {
     vg_rig_fitter *f = *out;
     if (!f) return;
+    vg_rig_clear(&f->rig);
     vg_graph_free(&f->g);
     vgi_turns_clear(&f->turns);
     vgi_rig_sums_clear(&f->sums);
@@ -124,7 +127,7 @@ static void corner_quaternion(const vgi_rig_sums *s, size_t face, size_t j, cons
 /* The candidate bones of a face: those in the skin of its vertices. */
 static size_t face_bones(const vg_rig_fitter *f, size_t face, uint32_t *list)
 {
-    const vg_rig *r = &f->h->body.rig;
+    const vg_rig *r = &f->rig;
     size_t n = 0;
     for (uint32_t c = f->g->start[face]; c < f->g->start[face + 1]; c++)
         for (size_t s = VG_SKIN * f->g->vert[c]; s < VG_SKIN * (f->g->vert[c] + 1); s++) {
@@ -267,7 +270,7 @@ static void hold(choosing *x, size_t v)
 static int hold_groups(choosing *x, vg_err *e)
 {
     const vg_head *h = x->f->h;
-    size_t nv = h->body.mesh.nv, bones = h->body.rig.nbones, components, slots;
+    size_t nv = h->body.mesh.nv, bones = x->f->rig.nbones, components, slots;
     uint32_t *label = vgi_array(nv, sizeof *label, e), *best = NULL;
     int r = label ? vg_mesh_components(&h->body.mesh, label, &components, e) : VG_ENOMEM;
     if (r == VG_OK && !vgi_mul(components, bones, &slots))
@@ -275,7 +278,7 @@ static int hold_groups(choosing *x, vg_err *e)
     if (r == VG_OK && !(best = vgi_array(slots, sizeof *best, e))) r = VG_ENOMEM;
     for (size_t v = 0; r == VG_OK && v < nv; v++) {
         if (x->distance[v] < 0) continue;
-        uint32_t *to = &best[label[v] * bones + h->body.rig.skin_bone[VG_SKIN * v]];
+        uint32_t *to = &best[label[v] * bones + x->f->rig.skin_bone[VG_SKIN * v]];
         if (!*to || x->doubt[v] < x->doubt[*to - 1]) *to = (uint32_t)v + 1;
     }
     for (size_t i = 0; r == VG_OK && i < slots && x->n < MOST_HELD; i++)
@@ -367,7 +370,7 @@ static double missing(const refining *x, size_t v, const double *z, size_t i, si
 /* The bones of the vertex, then the neighbours of the first two in the skeleton. */
 static size_t bones_around(const refining *x, size_t v, uint32_t *list)
 {
-    const vg_rig *r = &x->f->h->body.rig;
+    const vg_rig *r = &x->f->rig;
     size_t n = 0, own;
     while (n < VG_SKIN && r->skin_weight[VG_SKIN * v + n] > 0) list[n] = r->skin_bone[VG_SKIN * v + n], n++;
     own = n < 2 ? n : 2;
@@ -438,7 +441,7 @@ static int refine(const vg_rig_fitter *f, vg_map *m, vg_err *e)
     if (!(f->o.refine > 0)) return VG_OK;
     x.space = vgi_array(x.chunks, 4 * m->n * sizeof *x.space, e);
     x.parent = vgi_array(m->n, sizeof *x.parent, e);
-    int r = x.space && x.parent ? vgi_rig_parents(&f->h->body.rig, x.parent, e) : VG_ENOMEM;
+    int r = x.space && x.parent ? vgi_rig_parents(&f->rig, x.parent, e) : VG_ENOMEM;
     vg_centroid(f->h->body.reference, m->nv, x.origin);
     if (r == VG_OK) vgi_parallel(f->o.threads, x.chunks, refine_chunk, &x);
     free(x.space);
@@ -450,7 +453,7 @@ static int refine(const vg_rig_fitter *f, vg_map *m, vg_err *e)
 
 static int make_arrays(const vg_rig_fitter *f, vg_map *m, bool corners, vg_err *e)
 {
-    const vg_rig *r = &f->h->body.rig;
+    const vg_rig *r = &f->rig;
     size_t n = r->nbones, nv = f->g->nv;
     *m = (vg_map){.n = n,
                   .nv = nv,
@@ -474,29 +477,30 @@ static int make_arrays(const vg_rig_fitter *f, vg_map *m, bool corners, vg_err *
 /* The envelope before it is refined. */
 static int make_base(vg_rig_fitter *f, vg_map *m, vg_err *e)
 {
+    const vgi_map_body body = {f->h->body.reference, &f->rig};
     int r = make_arrays(f, m, true, e);
     if (r == VG_OK) r = fit_corners(f, m, e);
     if (r == VG_OK) r = choose_held(f, m, e);
-    if (r == VG_OK) r = vgi_map_collapse(f->h, f->g, NULL, f->turns.vector, f->o.threads, e);
-    return r < 0 ? r : vg_map_copy(&f->base, m, &f->h->body.mesh, e);
+    if (r == VG_OK) r = vgi_map_collapse(m, &body, f->g, NULL, f->turns.vector, f->o.threads, e);
+    return r < 0 ? r : vg_map_copy(&f->base, m, e);
 }
 
-int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_err *e)
+int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_rig *rig, vg_map *m, vg_err *e)
 {
-    vg_head *h = f->h;
-    vg_map *m = &h->map;
+    const vgi_map_body body = {f->h->body.reference, &f->rig};
     int r = VG_OK;
+    *rig = (vg_rig){0}, *m = (vg_map){0};
     if (!f->sums.poses) return vg_fail(e, VG_EINPUT, "there are no poses but the reference to fit a rig to");
-    vg_map_clear(m);
-    if (!f->skinned) r = vgi_skin_fit(&h->body.rig, &f->sums, h->body.reference, f->o.threads, f->miss, e);
+    if (!f->skinned) r = vgi_skin_fit(&f->rig, &f->sums, body.reference, f->o.threads, f->miss, e);
     f->skinned = r == VG_OK;
     if (r == VG_OK && method == VG_RIG_LBS) {
         r = make_arrays(f, m, false, e);
-        for (size_t v = 0; r == VG_OK && v < m->nv; v++) vgi_map_skin_row(h, v);
+        for (size_t v = 0; r == VG_OK && v < m->nv; v++) vgi_map_skin_row(m, &body, v);
     } else if (r == VG_OK) {
-        r = f->base.n ? vg_map_copy(m, &f->base, &h->body.mesh, e) : make_base(f, m, e);
+        r = f->base.n ? vg_map_copy(m, &f->base, e) : make_base(f, m, e);
         if (r == VG_OK) r = refine(f, m, e);
     }
+    if (r == VG_OK) r = vg_rig_copy(rig, &f->rig, f->g->nv, e);
     if (r < 0) vg_map_clear(m);
     return r;
 }

@@ -536,26 +536,25 @@ static int find_motions(vgi_learning *l, void *context, bool begun, vg_err *e)
 }
 
 /* First approximately on a subset of the vertices, then exactly on all of them. */
-static int learn(vgi_learning *l, vg_head *h, size_t n, const double *const *poses, double *rotations, double *miss,
-                 vg_err *e)
+static int learn(vgi_learning *l, const vg_rig *rig, size_t nv, const double *reference, size_t n,
+                 const double *const *poses, double *rotations, double *miss, vg_err *e)
 {
     enum { SOME = 4096 };
     turning rough = {rotations, 1e-4, 2}, fine = {rotations, 1e-5, 8};
-    size_t nv = h->body.mesh.nv;
-    l->rig = h->body.rig, l->rig.skin_bone = NULL, l->rig.skin_weight = NULL;
-    int r = vgi_learning_gather(l, nv, h->body.reference, n, poses, SOME, e);
+    l->rig = *rig, l->rig.skin_bone = NULL, l->rig.skin_weight = NULL;
+    int r = vgi_learning_gather(l, nv, reference, n, poses, SOME, e);
     if (r == VG_OK) r = vgi_skin_near(&l->rig, l->nv, l->reference, e);
     if (r == VG_OK) r = vgi_learning_alternate(l, find_motions, &rough, false, miss, e);
     vgi_learning_clear(l);
-    if (r == VG_OK) r = vgi_learning_gather(l, nv, h->body.reference, n, poses, nv, e);
+    if (r == VG_OK) r = vgi_learning_gather(l, nv, reference, n, poses, nv, e);
     if (r == VG_OK) r = vgi_learning_weights(l, miss, e);
     if (r == VG_OK) r = vgi_learning_alternate(l, find_motions, &fine, true, miss, e);
     return r;
 }
 
-int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, double *miss, vg_err *e)
+int vg_rig_learn(vg_rig *rig, size_t nv, const double *reference, size_t n, const double *const *poses, int threads,
+                 double *miss, vg_err *e)
 {
-    vg_rig *rig = &h->body.rig;
     size_t bones = rig->nbones;
     vgi_learning l = {.threads = threads};
     double *space = vgi_array(n, 7 * bones * sizeof *space, e), *rotations = vgi_array(n, 9 * bones * sizeof *space, e);
@@ -565,7 +564,7 @@ int vg_rig_learn(vg_head *h, size_t n, const double *const *poses, int threads, 
     for (size_t i = 0; r == VG_OK && i < n; i++) l.transforms[i] = space + 7 * bones * i;
     for (size_t b = 0; r == VG_OK && b < bones; b++)
         memcpy(l.at + 3 * b, rig->at + 3 * (size_t)rig->bone[b], 3 * sizeof *l.at);
-    if (r == VG_OK) r = learn(&l, h, n, poses, rotations, miss, e);
+    if (r == VG_OK) r = learn(&l, rig, nv, reference, n, poses, rotations, miss, e);
     if (r == VG_OK) vgi_learning_keep(&l, rig);
     vgi_learning_clear(&l);
     free(space);

@@ -36,7 +36,8 @@ typedef struct vicinity {
 } vicinity;
 
 struct vg_map_fitter {
-    vg_head *h;
+    const vg_head *h;
+    vg_patches patches;   /* the connected pieces of those of h */
     vg_graph *g;
     int threads;
     double hold;
@@ -59,20 +60,18 @@ struct vg_map_fitter {
 /* ---- patches ---- */
 
 /* Split patches into connected pieces; merge tiny pieces into the neighbour that shares most vertices. */
-static int split_patches(vg_head *h, vg_err *e)
+static int split_patches(vg_patches *patches, const vg_mesh *m, vg_err *e)
 {
-    const vg_mesh *m = &h->body.mesh;
-    uint32_t *label = h->body.patches.of_face, *piece = vgi_array(m->nf, sizeof *piece, e), *shared = NULL,
+    uint32_t *label = patches->of_face, *piece = vgi_array(m->nf, sizeof *piece, e), *shared = NULL,
              (*pair)[2] = NULL;
     size_t n = 0, npairs = 0;
     if (!piece) return VG_ENOMEM;
-    int r = vgi_connected_pieces(m, label, h->body.patches.n, piece, &n, e);
+    int r = vgi_connected_pieces(m, label, patches->n, piece, &n, e);
     if (r == VG_OK) r = vgi_neighbours(m, piece, &pair, &shared, &npairs, e);
     uint32_t *size = vgi_array(n, sizeof *size, e), *set = vgi_array(n, sizeof *set, e),
              *best = vgi_array(n, sizeof *best, e);
     if (!size || !set || !best) r = VG_ENOMEM;
-    if (r == VG_OK &&
-        n > h->body.patches.n) { /* a patch that was connected from the start stays, however small */
+    if (r == VG_OK && n > patches->n) { /* a patch that was connected from the start stays, however small */
         for (size_t f = 0; f < m->nf; f++) size[piece[f]]++;
         vgi_sets_init(set, n);
         for (size_t i = 0; i < npairs; i++)
@@ -87,7 +86,7 @@ static int split_patches(vg_head *h, vg_err *e)
     }
     if (r == VG_OK) {
         memcpy(label, piece, m->nf * sizeof *label);
-        h->body.patches.n = n;
+        patches->n = n;
     }
     free(piece);
     free(shared);
@@ -185,26 +184,27 @@ static int find_near(vg_map_fitter *f, vg_err *e)
     return VG_OK;
 }
 
-int vg_map_fitter_new(vg_map_fitter **out, vg_head *h, double hold, int threads, vg_err *e)
+int vg_map_fitter_new(vg_map_fitter **out, const vg_head *h, double hold, int threads, vg_err *e)
 {
     *out = NULL;
     if (!h->body.patches.n || !h->body.mesh.nf)
         return vg_fail(e, VG_EINPUT, "there are no patches: make them with vg-segment");
+    if (!h->has_links) return vg_fail(e, VG_EARG, "the links are not chosen: call vg_head_prepare_vectors first");
     vg_map_fitter *f = *out = vgi_array(1, sizeof *f, e);
     if (!f) return VG_ENOMEM;
     f->h = h, f->threads = threads, f->hold = hold;
-    int r = split_patches(h, e);
-    if (r == VG_OK) r = vg_head_prepare_vectors(h, e);
+    int r = vg_patches_copy(&f->patches, &h->body.patches, h->body.mesh.nf, e);
+    if (r == VG_OK) r = split_patches(&f->patches, &h->body.mesh, e);
     if (r == VG_OK) r = vg_head_graph(&f->g, h, e);
-    if (r == VG_OK && !(f->of_face = vgi_graph_patches(h, f->g, e))) r = VG_ENOMEM;
-    if (r == VG_OK) r = vgi_shape_make(&f->shape, &h->body.mesh, &h->body.patches, h->body.reference, e);
+    if (r == VG_OK && !(f->of_face = vgi_graph_patches(h, &f->patches, f->g, e))) r = VG_ENOMEM;
+    if (r == VG_OK) r = vgi_shape_make(&f->shape, &h->body.mesh, &f->patches, h->body.reference, e);
     if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->nf, f->g->start, f->g->vert, h->body.reference, e);
     if (r == VG_OK) r = choose_held(f, e);
     if (r == VG_OK) r = find_near(f, e);
     if (r == VG_OK) {
         f->pull = vgi_array(3 * vg_graph_corners(f->g), sizeof *f->pull, e);
         f->turn = vgi_array(9 * f->g->nf, sizeof *f->turn, e);
-        f->b2 = vgi_array(h->body.patches.n, sizeof *f->b2, e);
+        f->b2 = vgi_array(f->patches.n, sizeof *f->b2, e);
         if (!f->pull || !f->turn || !f->b2) r = VG_ENOMEM;
     }
     if (r < 0) vg_map_fitter_free(out);
@@ -215,6 +215,7 @@ void vg_map_fitter_free(vg_map_fitter **out)
 {
     vg_map_fitter *f = *out;
     if (!f) return;
+    vg_patches_clear(&f->patches);
     vg_graph_free(&f->g);
     vgi_shape_clear(&f->shape);
     vgi_turns_clear(&f->turns);
@@ -650,20 +651,21 @@ static int make_arrays(vg_map *m, const vg_map_fitter *f, vg_err *e)
     return VG_OK;
 }
 
-int vg_map_fitter_finish(vg_map_fitter *f, vg_err *e)
+int vg_map_fitter_finish(vg_map_fitter *f, vg_patches *patches, vg_map *m, vg_err *e)
 {
-    vg_map *m = &f->h->map;
+    const vgi_map_body body = {.reference = f->h->body.reference};
+    *patches = (vg_patches){0}, *m = (vg_map){0};
     if (!f->poses) return vg_fail(e, VG_EINPUT, "there are no poses to fit a map to");
-    vg_map_clear(m);
     vgi_blas_alone();
     int r = make_arrays(m, f, e);
     if (r == VG_OK) fit_corners(f, m);
-    if (r == VG_OK) r = vgi_map_collapse(f->h, f->g, f->of_face, f->turns.vector, f->threads, e);
+    if (r == VG_OK) r = vgi_map_collapse(m, &body, f->g, f->of_face, f->turns.vector, f->threads, e);
     if (r == VG_OK) r = fit_skin(f, m, e);
     if (r == VG_OK) r = fit_hinges(f, m, e);
     if (r == VG_OK) r = vgi_place_by_hinges(m, m->centre, m->place, e);
     if (r == VG_OK) r = correct_place(f, m, e);
     vgi_blas_shared();
+    if (r == VG_OK) r = vg_patches_copy(patches, &f->patches, f->h->body.mesh.nf, e);
     if (r < 0) vg_map_clear(m);
     return r;
 }

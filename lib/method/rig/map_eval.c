@@ -64,32 +64,31 @@ static int plan_patches(vg_player *p, vg_err *e)
     return VG_OK;
 }
 
-int vg_player_new(vg_player **out, const vg_head *h, bool single, int threads, vg_err *e)
+int vg_player_new(vg_player **out, const vg_body *body, const vg_map *m, bool single, int threads, vg_err *e)
 {
-    const vg_map *m = &h->map;
     *out = NULL;
     if (!m->n) return vg_fail(e, VG_EINPUT, "there is no map: make one with vg-fitmap");
     bool bones = m->kind == VG_MAP_BONES;
-    if (!bones && h->body.patches.n != m->n)
-        return vg_fail(e, VG_EINPUT, "the map has %zu transforms, the mesh %zu patches", m->n, h->body.patches.n);
-    if (bones && (h->body.rig.nbones != m->n || !h->body.rig.skin_bone))
-        return vg_fail(e, VG_EINPUT, "the map has %zu transforms, its skeleton %zu bones", m->n, h->body.rig.nbones);
-    if (m->n > INT32_MAX / 4 || h->body.mesh.nv > INT32_MAX / (3 * BLOCK))
-        return vg_fail(e, VG_EINPUT, "a map of %zu transforms and %zu vertices is too large", m->n, h->body.mesh.nv);
+    if (!bones && body->patches.n != m->n)
+        return vg_fail(e, VG_EINPUT, "the map has %zu transforms, the mesh %zu patches", m->n, body->patches.n);
+    if (bones && (body->rig.nbones != m->n || !body->rig.skin_bone))
+        return vg_fail(e, VG_EINPUT, "the map has %zu transforms, its skeleton %zu bones", m->n, body->rig.nbones);
+    if (m->n > INT32_MAX / 4 || body->mesh.nv > INT32_MAX / (3 * BLOCK))
+        return vg_fail(e, VG_EINPUT, "a map of %zu transforms and %zu vertices is too large", m->n, body->mesh.nv);
     vg_player *p = *out = vgi_array(1, sizeof *p, e);
     if (!p) return VG_ENOMEM;
-    p->m = m, p->nv = h->body.mesh.nv, p->threads = threads, p->single = single;
+    p->m = m, p->nv = body->mesh.nv, p->threads = threads, p->single = single;
     size_t size = single ? sizeof(float) : sizeof(double);
-    const double *measured = m->home ? m->home : h->body.reference;
+    const double *measured = m->home ? m->home : body->reference;
     p->order = vgi_array(m->n, sizeof *p->order, e), p->parent = vgi_array(m->n, sizeof *p->parent, e);
     int r = p->order && p->parent ? VG_OK : VG_ENOMEM;
-    if (r == VG_OK) r = bones ? plan_bones(p, &h->body.rig, e) : plan_patches(p, e);
-    if (r == VG_OK && bones && vgi_rig_is_free(&h->body.rig))
-        r = vg_free_bones_new(&p->free, &h->body.rig, p->nv, measured, threads, e);
+    if (r == VG_OK) r = bones ? plan_bones(p, &body->rig, e) : plan_patches(p, e);
+    if (r == VG_OK && bones && vgi_rig_is_free(&body->rig))
+        r = vg_free_bones_new(&p->free, &body->rig, p->nv, measured, threads, e);
     else if (r == VG_OK && bones)
-        r = vg_inverse_skin_new(&p->inverse, &h->body.rig, p->nv, measured, threads, e);
+        r = vg_inverse_skin_new(&p->inverse, &body->rig, p->nv, measured, threads, e);
     else if (r == VG_OK)
-        r = vgi_shape_make(&p->shape, &h->body.mesh, &h->body.patches, measured, e);
+        r = vgi_shape_make(&p->shape, &body->mesh, &body->patches, measured, e);
     if (r == VG_OK) {
         p->columns = vgi_array(4 * m->n, 3 * BLOCK * size, e);
         p->product = vgi_array(p->nv, 3 * BLOCK * size, e);

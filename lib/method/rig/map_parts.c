@@ -132,13 +132,13 @@ int vgi_place_by_hinges(const vg_map *m, const double *centre, double *place, vg
     return ok ? VG_OK : vg_fail(e, VG_EINPUT, "the patches do not hang together");
 }
 
-uint32_t *vgi_graph_patches(const vg_head *h, const vg_graph *g, vg_err *e)
+uint32_t *vgi_graph_patches(const vg_head *h, const vg_patches *patches, const vg_graph *g, vg_err *e)
 {
     size_t faces = g->nf - g->nlinks;
     uint32_t *of_face = vgi_array(g->nf, sizeof *of_face, e), *of_vertex = vgi_array(g->nv, sizeof *of_vertex, e);
     if (of_face && of_vertex) {
         for (size_t f = faces; f-- > 0;) {
-            of_face[f] = h->body.patches.of_face[h->has_selection ? h->selected[f] : f];
+            of_face[f] = patches->of_face[h->has_selection ? h->selected[f] : f];
             for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) of_vertex[g->vert[c]] = of_face[f];
         }
         for (size_t f = faces; f < g->nf; f++) of_face[f] = of_vertex[g->vert[g->start[f]]];
@@ -205,11 +205,11 @@ static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *o
 
 /* The links of a map of bones, between the positions of their ends under the skin. at: of the ends, nv points, or
  * NULL: 1, into number k. */
-static void link_vectors(const vg_head *h, const vg_graph *g, size_t p, const double *at, size_t k, double *wanted)
+static void link_vectors(const vg_rig *r, const vg_graph *g, size_t p, const double *at, size_t k, double *wanted)
 {
     for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
         const uint32_t *end = g->vert + g->start[f];
-        double w[2] = {0.5 * skin_share(&h->body.rig, end[0], p), 0.5 * skin_share(&h->body.rig, end[1], p)};
+        double w[2] = {0.5 * skin_share(r, end[0], p), 0.5 * skin_share(r, end[1], p)};
         for (size_t i = at ? 0 : k; i < (at ? 3 : k + 1); i++) {
             double d = at ? w[0] * at[3 * (size_t)end[0] + i] - w[1] * at[3 * (size_t)end[1] + i] : w[0] - w[1];
             wanted[3 * (size_t)g->start[f] + i] = d, wanted[3 * (size_t)g->start[f] + 3 + i] = -d;
@@ -218,27 +218,25 @@ static void link_vectors(const vg_head *h, const vg_graph *g, size_t p, const do
 }
 
 /* The weight of transform p at held vertex i, and the point that it moves. */
-static double hold_of(const vg_head *h, size_t i, size_t p, const double **at)
+static double hold_of(const vg_map *m, const vgi_map_body *body, size_t i, size_t p, const double **at)
 {
-    const vg_map *m = &h->map;
     bool bones = m->kind == VG_MAP_BONES;
-    *at = bones ? h->body.reference + 3 * (size_t)m->held[i] : m->held_at + 3 * i;
-    return bones ? skin_share(&h->body.rig, m->held[i], p) : m->held_patch[i] == p;
+    *at = bones ? body->reference + 3 * (size_t)m->held[i] : m->held_at + 3 * i;
+    return bones ? skin_share(body->rig, m->held[i], p) : m->held_patch[i] == p;
 }
 
 /* Wanted vectors and held vertices for a unit value of entry j of A_p, j = 0 1 2 at once as x y z; or of t of
  * three transforms. */
-static void column_input(const vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors,
-                         size_t column, double *wanted, double *anchors)
+static void column_input(const vg_map *m, const vgi_map_body *body, const vg_graph *g, const uint32_t *of_face,
+                         const double *vectors, size_t column, double *wanted, double *anchors)
 {
-    const vg_map *m = &h->map;
     const double *at;
     bool bones = m->kind == VG_MAP_BONES;
     if (column < m->n) {
         driven_vectors(m, g, of_face, vectors, column, wanted);
-        if (bones) link_vectors(h, g, column, h->body.reference, 0, wanted);
+        if (bones) link_vectors(body->rig, g, column, body->reference, 0, wanted);
         for (size_t i = 0; i < m->nheld; i++) {
-            double w = hold_of(h, i, column, &at);
+            double w = hold_of(m, body, i, column, &at);
             for (size_t k = 0; k < 3; k++) anchors[3 * i + k] = w * at[k];
         }
         return;
@@ -246,8 +244,8 @@ static void column_input(const vg_head *h, const vg_graph *g, const uint32_t *of
     memset(wanted, 0, 3 * vg_graph_corners(g) * sizeof *wanted);
     for (size_t k = 0; k < 3; k++) {
         size_t p = 3 * (column - m->n) + k;
-        if (bones && p < m->n) link_vectors(h, g, p, NULL, k, wanted);
-        for (size_t i = 0; i < m->nheld; i++) anchors[3 * i + k] = p < m->n ? hold_of(h, i, p, &at) : 0;
+        if (bones && p < m->n) link_vectors(body->rig, g, p, NULL, k, wanted);
+        for (size_t i = 0; i < m->nheld; i++) anchors[3 * i + k] = p < m->n ? hold_of(m, body, i, p, &at) : 0;
     }
 }
 
@@ -265,28 +263,28 @@ static void store_column(vg_map *m, const vg_graph *g, size_t column, const doub
     }
 }
 
-void vgi_map_skin_row(vg_head *h, size_t v)
+void vgi_map_skin_row(vg_map *m, const vgi_map_body *body, size_t v)
 {
-    double *row = h->map.weights + v * 4 * h->map.n;
-    memset(row, 0, 4 * h->map.n * sizeof *row);
+    const vg_rig *r = body->rig;
+    double *row = m->weights + v * 4 * m->n;
+    memset(row, 0, 4 * m->n * sizeof *row);
     for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++) {
-        double w = h->body.rig.skin_weight[s], *to = row + 4 * (size_t)h->body.rig.skin_bone[s];
-        for (size_t k = 0; k < 3; k++) to[k] += w * h->body.reference[3 * v + k];
+        double w = r->skin_weight[s], *to = row + 4 * (size_t)r->skin_bone[s];
+        for (size_t k = 0; k < 3; k++) to[k] += w * body->reference[3 * v + k];
         to[3] += w;
     }
 }
 
 /* A vertex in no face follows the patch with the nearest centre, or its skin. */
-static void carry_loose(vg_head *h, const vg_graph *g)
+static void carry_loose(vg_map *m, const vgi_map_body *body, const vg_graph *g)
 {
-    vg_map *m = &h->map;
     for (size_t v = 0; v < g->nv; v++) {
         if (g->in_face[v]) continue;
         if (m->kind == VG_MAP_BONES) {
-            vgi_map_skin_row(h, v);
+            vgi_map_skin_row(m, body, v);
             continue;
         }
-        const double *x = h->body.reference + 3 * v;
+        const double *x = body->reference + 3 * v;
         size_t best = 0;
         double least = INFINITY;
         for (size_t p = 0; p < m->n; p++) {
@@ -299,12 +297,11 @@ static void carry_loose(vg_head *h, const vg_graph *g)
     }
 }
 
-int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors, int threads,
-                     vg_err *e)
+int vgi_map_collapse(vg_map *m, const vgi_map_body *body, const vg_graph *g, const uint32_t *of_face,
+                     const double *vectors, int threads, vg_err *e)
 {
-    vg_map *m = &h->map;
     vg_solver *s;
-    int r = vg_solver_new(&s, g, m->held, m->nheld, h->body.reference, VG_WEIGHTS_UNIFORM, threads, e);
+    int r = vg_solver_new(&s, g, m->held, m->nheld, body->reference, VG_WEIGHTS_UNIFORM, threads, e);
     if (r < 0) return r;
     size_t batch = vg_solver_batch(s), columns = m->n + (m->n + 2) / 3, nv = g->nv;
     double *wanted = vgi_array(3 * vg_graph_corners(g), sizeof *wanted, e);
@@ -322,7 +319,7 @@ int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, con
         for (size_t first = 0; first < columns; first += batch) {
             size_t n = columns - first < batch ? columns - first : batch;
             for (size_t i = 0; i < n; i++) {
-                column_input(h, g, of_face, vectors, first + i, wanted, anchors[i]);
+                column_input(m, body, g, of_face, vectors, first + i, wanted, anchors[i]);
                 vg_solver_load(s, 1, (const double *const *)&wanted, (const double *const *)anchors + i, x + i,
                                rhs + i);
             }
@@ -330,7 +327,7 @@ int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, con
                             (const double *const *)(x + 3 * batch));
             for (size_t i = 0; i < n; i++) store_column(m, g, first + i, x[i]);
         }
-        carry_loose(h, g);
+        carry_loose(m, body, g);
     } else {
         r = VG_ENOMEM;
     }

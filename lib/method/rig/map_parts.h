@@ -39,13 +39,20 @@ int vgi_place_by_hinges(const vg_map *m, const double *centre, double *place, vg
  * bones keep their lengths. */
 int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *e) VG_MUST_CHECK;
 
-/* vgi_map_skin_row: the weights of vertex v of a map of bones become those of linear blend skinning by h's rig. */
-void vgi_map_skin_row(vg_head *h, size_t v);
-/* vgi_map_collapse: fill weights from corners, held vertices and the body that h's reference is. of_face: patch of
- * each face of g; NULL for a map of bones. */
-int vgi_map_collapse(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *vectors, int threads,
-                     vg_err *e) VG_MUST_CHECK;
-/* vgi_graph_patches: patch of each face of g, links too; free(). NULL: no memory. */
-uint32_t *vgi_graph_patches(const vg_head *h, const vg_graph *g, vg_err *e);
+/* The body whose vertices a map moves. */
+typedef struct vgi_map_body {
+    const double *reference;
+    const vg_rig *rig; /* with weights; NULL for a map of patches */
+} vgi_map_body;
+
+/* vgi_map_skin_row: the weights of vertex v of a map of bones become those of linear blend skinning. */
+void vgi_map_skin_row(vg_map *m, const vgi_map_body *body, size_t v);
+/* vgi_map_collapse: compute the map's weights from its corners and held vertices. of_face: the patch of each face of g;
+ * NULL for a map of bones. vectors: 3 per corner of g, of the body's reference. */
+int vgi_map_collapse(vg_map *m, const vgi_map_body *body, const vg_graph *g, const uint32_t *of_face,
+                     const double *vectors, int threads, vg_err *e) VG_MUST_CHECK;
+/* vgi_graph_patches: the patch of each face of g, the graph of h; a link has that of a face at its first vertex. patches:
+ * those of h's mesh. free(). NULL: no memory. */
+uint32_t *vgi_graph_patches(const vg_head *h, const vg_patches *patches, const vg_graph *g, vg_err *e);
 
 #endif

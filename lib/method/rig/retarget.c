@@ -61,25 +61,24 @@ static int meeting_points(const vg_map *m, const vg_graph *g, const uint32_t *of
 }
 
 /* Hinges, centres and held points go with the body; corrections of what hinges say grow with it. */
-static int move_points(vg_head *h, const vg_graph *g, const uint32_t *of_face, const double *body, double ratio,
-                       vg_err *e)
+static int move_points(vg_map *m, const vg_body *b, const vg_graph *g, const uint32_t *of_face, const double *body,
+                       double ratio, vg_err *e)
 {
-    vg_map *m = &h->map;
     size_t n = m->n;
     vgi_shape shape = {0};
     double *before = vgi_array(n, 3 * n * sizeof *before, e), *after = vgi_array(n, 3 * n * sizeof *after, e);
     double *old = vgi_array(3 * m->nhinges, sizeof *old, e), *now = vgi_array(3 * m->nhinges, sizeof *now, e);
     vgi_blas_alone();
     int r = before && after && old && now ? vgi_place_by_hinges(m, m->centre, before, e) : VG_ENOMEM;
-    if (r == VG_OK) r = meeting_points(m, g, of_face, h->body.reference, old, e);
+    if (r == VG_OK) r = meeting_points(m, g, of_face, b->reference, old, e);
     if (r == VG_OK) r = meeting_points(m, g, of_face, body, now, e);
-    if (r == VG_OK) r = vgi_shape_make(&shape, &h->body.mesh, &h->body.patches, body, e);
+    if (r == VG_OK) r = vgi_shape_make(&shape, &b->mesh, &b->patches, body, e);
     if (r == VG_OK) {
         for (size_t i = 0; i < 3 * m->nhinges; i++) m->hinge_at[i] = now[i] + ratio * (m->hinge_at[i] - old[i]);
         for (size_t i = 0; i < m->nheld; i++)
             for (size_t k = 0; k < 3; k++) {
                 size_t x = 3 * (size_t)m->held[i] + k;
-                m->held_at[3 * i + k] = body[x] + ratio * (m->held_at[3 * i + k] - h->body.reference[x]);
+                m->held_at[3 * i + k] = body[x] + ratio * (m->held_at[3 * i + k] - b->reference[x]);
             }
         r = vgi_place_by_hinges(m, shape.centre, after, e);
     }
@@ -161,15 +160,14 @@ static int move_joints(vg_rig *r, size_t nv, const double *from, const double *t
     return VG_OK;
 }
 
-static int move_bones(vg_head *h, const double *body, vg_err *e)
+static int move_bones(vg_map *m, vg_rig *rig, const double *from, const double *to, vg_err *e)
 {
-    vg_map *m = &h->map;
-    int r = move_joints(&h->body.rig, m->nv, h->body.reference, body, e);
+    int r = move_joints(rig, m->nv, from, to, e);
     if (r < 0) return r;
     for (size_t b = 0; b < m->n; b++)
         for (size_t k = 0; k < 3; k++)
-            m->centre[3 * b + k] = m->home_centre[3 * b + k] = h->body.rig.at[3 * (size_t)h->body.rig.bone[b] + k];
-    return vgi_place_by_bones(&h->body.rig, m, m->place, e);
+            m->centre[3 * b + k] = m->home_centre[3 * b + k] = rig->at[3 * (size_t)rig->bone[b] + k];
+    return vgi_place_by_bones(rig, m, m->place, e);
 }
 
 /* Regression terms scale with the body. Those of a bone are relative to its joint, so that their addition to the
@@ -190,60 +188,112 @@ static void add_regression(const vg_map *m, const double *skin, const double *jo
 
 /* ---- the whole ---- */
 
-/* The rows of skinning alone, for a map without corners. */
-static void skin_rows(vg_head *h)
+typedef struct retargeting {
+    const vg_head *h; /* with the map as it is */
+    vg_map *m;        /* what it becomes, first a copy; the rig, too */
+    vg_rig *rig;
+    double *body;     /* nv points: where the vertices go */
+    double ratio;     /* of its size to that of the body before */
+    int threads;
+    vg_graph *g;
+    uint32_t *of_face;
+    double *vectors;  /* 3 per corner: room */
+    double *skin;     /* what regression added to the reconstruction; of maps with corners */
+} retargeting;
+
+static int collapse(const retargeting *x, const vgi_map_body *body, vg_err *e)
 {
-    for (size_t v = 0; v < h->map.nv; v++) vgi_map_skin_row(h, v);
+    vg_graph_vectors(x->g, body->reference, x->vectors);
+    return vgi_map_collapse(x->m, body, x->g, x->of_face, x->vectors, x->threads, e);
 }
 
-int vg_map_retarget(vg_head *h, const double *target, double morph, int threads, vg_err *e)
+static int check_map(const vg_head *h, vg_err *e)
 {
-    vg_map *m = &h->map;
-    vg_graph *g = NULL;
-    uint32_t *of_face = NULL;
-    size_t nv = h->body.mesh.nv, size = nv * 4 * m->n;
-    bool bones = m->kind == VG_MAP_BONES, corners = m->ncorners > 0;
-    if (!m->n || (bones ? h->body.rig.nbones : h->body.patches.n) != m->n)
-        return vg_fail(e, VG_EINPUT, "there is no map to retarget");
-    double *body = vgi_copy_array(target, 3 * nv, sizeof *body, e), *vectors = NULL, *home = NULL, *skin = NULL,
-           ratio = 1;
-    double *joints = vgi_copy_array(m->centre, 3 * m->n, sizeof *joints, e);
-    int r = body && joints ? vg_head_graph(&g, h, e) : VG_ENOMEM;
-    if (r == VG_OK && corners && m->ncorners != vg_graph_corners(g))
+    bool bones = h->map.kind == VG_MAP_BONES;
+    return h->map.n && (bones ? h->body.rig.nbones : h->body.patches.n) == h->map.n
+               ? VG_OK
+               : vg_fail(e, VG_EINPUT, "there is no map to retarget");
+}
+
+static int prepare(retargeting *x, vg_err *e)
+{
+    const vg_head *h = x->h;
+    int r = vg_head_graph(&x->g, h, e);
+    if (r == VG_OK && h->map.ncorners && h->map.ncorners != vg_graph_corners(x->g))
         r = vg_fail(e, VG_EINPUT, "the map does not say how its corners turn");
-    if (r == VG_OK && !bones && !(of_face = vgi_graph_patches(h, g, e))) r = VG_ENOMEM;
-    if (r == VG_OK && !(vectors = vgi_array(3 * vg_graph_corners(g), sizeof *vectors, e))) r = VG_ENOMEM;
-    if (r == VG_OK && corners && !(skin = vgi_copy_array(m->weights, size, sizeof *skin, e))) r = VG_ENOMEM;
-    if (r == VG_OK && corners) { /* what regression added to the reconstruction */
-        vg_graph_vectors(g, h->body.reference, vectors);
-        r = vgi_map_collapse(h, g, of_face, vectors, threads, e);
-        for (size_t i = 0; r == VG_OK && i < size; i++) skin[i] -= m->weights[i];
-    }
-    if (r == VG_OK && !bones && !m->has_home && !(home = vgi_copy_array(h->body.reference, 3 * nv, sizeof *home, e)))
+    if (r == VG_OK) r = vg_map_copy(x->m, &h->map, e);
+    if (r == VG_OK) r = vg_rig_copy(x->rig, &h->body.rig, h->body.mesh.nv, e);
+    if (r == VG_OK && h->map.kind == VG_MAP_PATCHES && !(x->of_face = vgi_graph_patches(h, &h->body.patches, x->g, e)))
         r = VG_ENOMEM;
-    if (r == VG_OK && morph != 1) r = morph_body(h, g, target, morph, body, threads, e);
-    if (r == VG_OK) {
-        double before = vg_diagonal(h->body.reference, nv), after = vg_diagonal(body, nv);
-        ratio = after / before;
-        if (!(before > 0 && after > 0)) r = vg_fail(e, VG_EINPUT, "a body without extent cannot be retargeted");
-        else if (!(isfinite(ratio * m->size) && ratio * m->size > 0))
-            r = vg_fail(e, VG_EINPUT, "the new body is too large or too small beside that of the map");
-        else r = bones ? move_bones(h, body, e) : move_points(h, g, of_face, body, ratio, e);
-    }
-    if (r == VG_OK) {
-        if (home) m->home = home, m->has_home = true, home = NULL;
-        memcpy(h->body.reference, body, 3 * nv * sizeof *body);
-        vg_graph_vectors(g, body, vectors);
-        if (corners) r = vgi_map_collapse(h, g, of_face, vectors, threads, e);
-        else skin_rows(h);
-        if (r == VG_OK && corners) add_regression(m, skin, joints, ratio);
-    }
-    vg_graph_free(&g);
-    free(of_face);
-    free(skin);
-    free(vectors);
-    free(body);
-    free(joints);
-    free(home);
+    if (r == VG_OK && !(x->vectors = vgi_array(3 * vg_graph_corners(x->g), sizeof *x->vectors, e))) r = VG_ENOMEM;
+    return r;
+}
+
+/* What regression added to the reconstruction. */
+static int keep_regression(retargeting *x, vg_err *e)
+{
+    const vg_head *h = x->h;
+    const vgi_map_body before = {h->body.reference, &h->body.rig};
+    size_t size = h->body.mesh.nv * 4 * h->map.n;
+    if (!h->map.ncorners) return VG_OK;
+    if (!(x->skin = vgi_copy_array(h->map.weights, size, sizeof *x->skin, e))) return VG_ENOMEM;
+    int r = collapse(x, &before, e);
+    for (size_t i = 0; r == VG_OK && i < size; i++) x->skin[i] -= x->m->weights[i];
+    return r;
+}
+
+/* Patches are measured on the body that the map was fitted on. */
+static int keep_home(retargeting *x, vg_err *e)
+{
+    const vg_body *b = &x->h->body;
+    if (x->m->kind == VG_MAP_BONES || x->m->has_home) return VG_OK;
+    if (!(x->m->home = vgi_copy_array(b->reference, 3 * b->mesh.nv, sizeof *x->m->home, e))) return VG_ENOMEM;
+    x->m->has_home = true;
+    return VG_OK;
+}
+
+static int move_map(retargeting *x, vg_err *e)
+{
+    const vg_body *from = &x->h->body;
+    double before = vg_diagonal(from->reference, from->mesh.nv), after = vg_diagonal(x->body, from->mesh.nv);
+    x->ratio = after / before;
+    if (!(before > 0 && after > 0)) return vg_fail(e, VG_EINPUT, "a body without extent cannot be retargeted");
+    if (!(isfinite(x->ratio * x->m->size) && x->ratio * x->m->size > 0))
+        return vg_fail(e, VG_EINPUT, "the new body is too large or too small beside that of the map");
+    return x->m->kind == VG_MAP_BONES ? move_bones(x->m, x->rig, from->reference, x->body, e)
+                                      : move_points(x->m, from, x->g, x->of_face, x->body, x->ratio, e);
+}
+
+static int weigh(retargeting *x, vg_err *e)
+{
+    const vgi_map_body body = {x->body, x->rig};
+    for (size_t v = 0; !x->m->ncorners && v < x->m->nv; v++) vgi_map_skin_row(x->m, &body, v);
+    if (!x->m->ncorners) return VG_OK;
+    int r = collapse(x, &body, e);
+    if (r == VG_OK) add_regression(x->m, x->skin, x->h->map.centre, x->ratio);
+    return r;
+}
+
+int vg_map_retarget(const vg_head *h, const double *target, double morph, int threads, vg_map *map, vg_rig *rig,
+                    double *reference, vg_err *e)
+{
+    size_t nv = h->body.mesh.nv;
+    retargeting x = {.h = h, .m = map, .rig = rig, .threads = threads};
+    *map = (vg_map){0}, *rig = (vg_rig){0};
+    int r = check_map(h, e);
+    if (r == VG_OK && !(x.body = vgi_copy_array(target, 3 * nv, sizeof *x.body, e))) r = VG_ENOMEM;
+    if (r == VG_OK) r = prepare(&x, e);
+    if (r == VG_OK) r = keep_regression(&x, e);
+    if (r == VG_OK && morph != 1) r = morph_body(h, x.g, target, morph, x.body, threads, e);
+    if (r == VG_OK) r = move_map(&x, e);
+    if (r == VG_OK) r = keep_home(&x, e);
+    if (r == VG_OK) r = weigh(&x, e);
+    if (r == VG_OK && nv) memcpy(reference, x.body, 3 * nv * sizeof *reference);
+    if (r < 0) vg_map_clear(map), vg_rig_clear(rig);
+    vg_graph_free(&x.g);
+    free(x.of_face);
+    free(x.vectors);
+    free(x.skin);
+    free(x.body);
     return r;
 }
