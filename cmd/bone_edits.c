@@ -41,13 +41,13 @@ static void find_bone(struct bone_edit *edit, const vg_rig *r, const char *opera
     }
 }
 
-void bone_edits_find(bone_edits *e, const vg_head *map, const char *operand)
+void bone_edits_find(bone_edits *e, const vg_map *map, const vg_rig *rig, const char *operand)
 {
     if (!e->n) return;
-    if (map->map.kind != VG_MAP_BONES)
+    if (map->kind != VG_MAP_BONES)
         cli_stop(VG_EINPUT, "'%s' is a map of patches, --edit needs one of bones: make it with vg-fitmap --skeleton",
                  operand);
-    for (size_t i = 0; i < e->n; i++) find_bone(&e->at[i], &map->body.rig, operand);
+    for (size_t i = 0; i < e->n; i++) find_bone(&e->at[i], rig, operand);
 }
 
 void bone_edits_apply(const bone_edits *e, const vg_rig *rig, double *transforms)

@@ -14,7 +14,7 @@ typedef struct bone_edits {
 void bone_edits_take(const char *text, void *edits);
 /* bone_edits_find: find the bones in the rig of a map; messages call the map `operand`. A missing bone is wrong
  * usage. */
-void bone_edits_find(bone_edits *e, const vg_head *map, const char *operand);
+void bone_edits_find(bone_edits *e, const vg_map *map, const vg_rig *rig, const char *operand);
 /* bone_edits_apply: apply the edits in order to the transforms of one pose, 7 numbers per bone. */
 void bone_edits_apply(const bone_edits *e, const vg_rig *rig, double *transforms);
 

@@ -21,7 +21,8 @@ typedef struct key_list {
 typedef struct playback {
     playback_options *o;
     vg_head *h; /* the input's, then the output's */
-    vg_head map;
+    vg_head home; /* of the map, which has been taken out of it */
+    vg_map map;
     vg_kind kind; /* what comes in */
     size_t count; /* transforms */
     vg_player *player;
@@ -37,20 +38,21 @@ typedef struct playback {
 static void load_map(playback *p)
 {
     vg_err e;
-    if (vg_load(&p->map, p->o->map, "map", &e) < 0) cli_die(&e);
+    if (vg_load(&p->home, p->o->map, "map", &e) < 0) cli_die(&e);
+    vg_head_take_out(&p->map, &p->home, "map");
 }
 
 static void take_skeleton(playback *p)
 {
     vg_err e;
-    if (p->map.map.kind != VG_MAP_BONES)
+    if (p->map.kind != VG_MAP_BONES)
         cli_stop(VG_EINPUT,
                  "the input is a skeleton, and '%s' is a map of patches: make one of bones with vg-fitmap --skeleton",
                  p->o->map);
     if (vg_skeleton_copy(&p->skeleton, &p->h->body.skeleton, &e) < 0 ||
         vg_joint_fitter_new(&p->fitter, &p->skeleton, &e) < 0)
         cli_die(&e);
-    p->driver = driving_start(&p->o->driving, &p->map.body.rig, p->o->map, &p->skeleton);
+    p->driver = driving_start(&p->o->driving, &p->home.body.rig, p->o->map, &p->skeleton);
 }
 
 static void check_input(playback *p)
@@ -59,16 +61,16 @@ static void check_input(playback *p)
     const vg_head *h = p->h;
     char name[200];
     snprintf(name, sizeof name, "'%.190s'", p->o->map);
-    p->kind = h->kind, p->count = p->map.map.n;
+    p->kind = h->kind, p->count = p->map.n;
     int r = VG_OK;
-    if (p->o->feet && p->map.map.kind != VG_MAP_BONES)
+    if (p->o->feet && p->map.kind != VG_MAP_BONES)
         cli_usage("--feet needs a map of bones, and %s is one of patches: make one with vg-fitmap --skeleton", name);
     if (p->kind == VG_VERTICES && h->body.skeleton.njoints) {
         take_skeleton(p);
     } else if (p->o->driving.align || p->o->driving.joints) {
         cli_usage("--align and --joints are for a skeleton that comes in, this input holds %s", vg_head_form(h));
     } else if (p->kind == VG_VERTICES) {
-        r = vg_mesh_same(&h->body.mesh, "the sequence", &p->map.body.mesh, name, &e);
+        r = vg_mesh_same(&h->body.mesh, "the sequence", &p->home.body.mesh, name, &e);
     } else if (p->kind != VG_TRANSFORMS) {
         r = vg_fail(&e, VG_EINPUT, "the input holds %s: vg-play takes vertices or transforms", vg_head_form(h));
     } else if (h->count != p->count) {
@@ -82,17 +84,11 @@ static void check_input(playback *p)
 static void make_head(playback *p)
 {
     vg_err e;
-    vg_head old = *p->h, *h = p->h;
-    if (vg_head_merge_trace(&old, &p->map, &e) < 0) cli_die(&e);
-    vg_rig rig = {0}; /* of transforms it says what they move; the player has the other one */
-    if (p->o->transforms && vg_rig_copy(&rig, &p->map.body.rig, p->map.body.mesh.nv, &e) < 0) cli_die(&e);
-    *h = p->map;
-    h->body.rig = rig;
-    h->nprovenance = old.nprovenance, h->provenance = old.provenance;
-    h->extra = old.extra, h->precision = old.precision;
-    h->map = (vg_map){0}; /* stays with p->map, where the player has it */
-    old.provenance = NULL, old.nprovenance = 0, old.extra = (vg_records){0};
-    vg_head_clear(&old);
+    vg_head home, *h = p->h; /* the player goes on using p->home */
+    if (vg_head_merge_trace(h, &p->home, &e) < 0 || vg_head_copy(&home, &p->home, &e) < 0) cli_die(&e);
+    vg_head_take(h, &home, NULL);
+    vg_head_clear(&home);
+    if (!p->o->transforms) vg_head_drop(h, "rig"); /* of transforms it says what they move */
     h->kind = p->o->transforms ? VG_TRANSFORMS : VG_VERTICES;
     h->count = p->o->transforms ? p->count : h->body.mesh.nv;
 }
@@ -103,7 +99,7 @@ static void put_batch(playback *p)
     double *to[BATCH];
     for (size_t i = 0; i < p->n; i++) {
         from[i] = p->transforms[i], to[i] = p->out[i].values;
-        bone_edits_apply(&p->o->edits, &p->map.body.rig, p->transforms[i]);
+        bone_edits_apply(&p->o->edits, &p->home.body.rig, p->transforms[i]);
         if (p->o->rotations) vg_player_place(p->player, p->transforms[i]);
         if (p->o->transforms) memcpy(to[i], from[i], 7 * p->count * sizeof *to[i]);
     }
@@ -188,7 +184,7 @@ static void play_standing(void *context)
     playback *p = context;
     key_list *k = &p->keys;
     vg_err e;
-    if (k->n && vg_feet_hold(&p->map.body.rig, k->n, k->transforms, &e) < 0) cli_die(&e);
+    if (k->n && vg_feet_hold(&p->home.body.rig, k->n, k->transforms, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < k->n; i++) {
         memcpy(p->transforms[p->n], k->transforms[i], 7 * p->count * sizeof(double));
         key_label(&p->out[p->n], k->label, k->n, (double)i);
@@ -215,9 +211,9 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     p->h = h;
     load_map(p);
     if (in) check_input(p);
-    else p->count = p->map.map.n, h->precision = p->map.precision;
-    bone_edits_find(&p->o->edits, &p->map, p->o->map);
-    if (vg_player_new(&p->player, &p->map.body, &p->map.map, h->precision == VG_F32, cli.threads, &e) < 0) cli_die(&e);
+    else p->count = p->map.n, h->precision = p->home.precision;
+    bone_edits_find(&p->o->edits, &p->map, &p->home.body.rig, p->o->map);
+    if (vg_player_new(&p->player, &p->home.body, &p->map, h->precision == VG_F32, cli.threads, &e) < 0) cli_die(&e);
     make_head(p);
     for (size_t i = 0; i < p->most; i++) {
         p->transforms[i] = cli_allocate(7 * p->count, sizeof(double), "the transforms");

@@ -64,9 +64,8 @@ typedef struct work {
     vg_head *h;               /* the source's until the output's is made of it */
     vg_head target;
     vg_head pairs;            /* holds the correspondence */
-    vg_mesh source_mesh;      /* arrays of the sequence's mesh; with a correspondence the head gets the target's
-                                 instead */
-    double *source_reference; /* the steps borrow it */
+    vg_head source;           /* mesh and reference of the sequence, whose head gets the target's: the steps borrow
+                                 them */
     vg_graph *from, *to;      /* graphs of source and target: the same one without a correspondence */
     way way;
     by by;
@@ -333,10 +332,10 @@ static void make_followers(work *w)
     bool pins = w->kind == VG_VERTICES && (w->way == TRANSFER || w->way == CARRY) && opts.pin_choice != PIN_NONE;
     int r = VG_OK;
     if (opts.onto)
-        r = vg_mover_new(&w->mover, w->from, h->body.reference, w->to, w->target.body.reference, h->anchors,
+        r = vg_mover_new(&w->mover, w->from, w->source.body.reference, w->to, w->target.body.reference, h->anchors,
                          h->nanchors, root_stays(), &e);
     if (r == VG_OK && pins)
-        r = vg_pinner_new(&w->pinner, w->from, h->body.reference, w->to, pairs, opts.pin_choice == PIN_ALWAYS, &e);
+        r = vg_pinner_new(&w->pinner, w->from, w->source.body.reference, w->to, pairs, opts.pin_choice == PIN_ALWAYS, &e);
     if (r < 0) cli_die(&e);
 }
 
@@ -357,7 +356,7 @@ static void make_corrector(work *w)
     if (!opts.examples) return;
     if (w->kind != VG_VERTICES || (w->way != TRANSFER && w->way != CARRY))
         cli_usage("--examples needs --onto, a sequence of vertices, and another way than --by shape");
-    poses from = poses_load(opts.examples, MOST_EXAMPLES, &w->source_mesh, w->h);
+    poses from = poses_load(opts.examples, MOST_EXAMPLES, &w->source.body.mesh, w->h);
     poses to = poses_load(opts.sculpted, MOST_EXAMPLES, &w->target.body.mesh, w->h);
     if (from.n != to.n || !from.n)
         cli_stop(VG_EINPUT, "'%s' has %zu poses and '%s' %zu: they must be the same ones", opts.examples, from.n, opts.sculpted, to.n);
@@ -369,7 +368,7 @@ static void make_corrector(work *w)
         run_batch(w, 1, &source[i], &made[i]);
     }
     const vg_examples x = {from.n, source, target, (const double *const *)made};
-    if (vg_corrector_new(&w->corrector, w->from, w->h->body.reference, w->to, w->target.body.reference, &x, cli.threads, &e) < 0)
+    if (vg_corrector_new(&w->corrector, w->from, w->source.body.reference, w->to, w->target.body.reference, &x, cli.threads, &e) < 0)
         cli_die(&e);
     if (w->pinner) find_sculpted(w, &to);
     for (size_t i = 0; i < from.n; i++) free(made[i]);
@@ -380,24 +379,34 @@ static void make_corrector(work *w)
     poses_clear(&to);
 }
 
+static void keep_source(work *w)
+{
+    vg_err e;
+    const vg_body *from = &w->h->body;
+    vg_body *to = &w->source.body;
+    if (vg_mesh_copy(&to->mesh, &from->mesh, &e) < 0) cli_die(&e);
+    to->reference = cli_allocate(3 * from->mesh.nv, sizeof *to->reference, "the mesh of the sequence");
+    if (from->mesh.nv) memcpy(to->reference, from->reference, 3 * from->mesh.nv * sizeof *to->reference);
+}
+
 static void make_step(work *w)
 {
     static const vg_method methods[] = {
         [BY_POSE] = VG_BY_POSE, [BY_SHAPE] = VG_BY_POSE, [BY_GRADIENT] = VG_BY_GRADIENT, [BY_BLEND] = VG_BY_BLEND};
     vg_err e;
-    const vg_head *h = w->h, *t = &w->target;
+    const vg_head *t = &w->target;
     vg_method method = methods[w->by];
     int r = VG_OK;
-    w->source_mesh = h->body.mesh;
+    keep_source(w);
     w->way = !opts.onto ? MEASURE : opts.correspondence ? CARRY : w->by == BY_SHAPE ? SHAPE
              : w->kind == VG_DEFORMATIONS ? APPLY : TRANSFER;
     if (w->way == CARRY) {
-        r = vg_cross_transfer_new(&w->carrier, &w->source_mesh, h->body.reference, &w->pairs.correspondence, w->to,
+        r = vg_cross_transfer_new(&w->carrier, &w->source.body.mesh, w->source.body.reference, &w->pairs.correspondence, w->to,
                            t->body.reference, method, cli.threads, &e);
     } else if (w->way == SHAPE) {
-        r = vg_shaper_new(&w->shaper, w->to, h->body.reference, t->body.reference, cli.threads, &e);
+        r = vg_shaper_new(&w->shaper, w->to, w->source.body.reference, t->body.reference, cli.threads, &e);
     } else {
-        r = vg_deformer_new(&w->deformer, w->from, h->body.reference, cli.threads, &e);
+        r = vg_deformer_new(&w->deformer, w->from, w->source.body.reference, cli.threads, &e);
         double *vectors = cli_allocate(3 * vg_graph_corners(w->from), sizeof *vectors, "the mesh of the sequence");
         if (r == VG_OK && opts.onto) {
             vg_graph_vectors(w->from, t->body.reference, vectors);
@@ -415,18 +424,16 @@ static void make_head(work *w)
 {
     vg_err e;
     vg_head *h = w->h, *t = &w->target;
-    w->source_reference = h->body.reference;
     if (opts.onto) {
         if (vg_head_merge_trace(h, t, &e) < 0 || vg_head_merge_trace(h, &w->pairs, &e) < 0) cli_die(&e);
-        h->body.reference = NULL; /* w->source_reference has it */
         vg_head_take(h, t, "reference");
         vg_head_take(h, t, "attributes");
+        vg_head_take(h, t, "asset");
         vg_head_take(h, t, "skeleton");
     }
-    vg_map_clear(&h->map); /* it is no property of the mesh */
+    vg_head_drop(h, "map"); /* it is no property of the mesh */
     if (w->way == CARRY) {
-        vg_patches_clear(&h->body.patches);
-        h->body.mesh = (vg_mesh){0}; /* w->source_mesh has it */
+        vg_head_drop(h, "patches");
         vg_head_take(h, t, "mesh");
         vg_head_take(h, t, "links");
     }

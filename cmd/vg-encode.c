@@ -70,12 +70,11 @@ static void set_reference(vg_head *h, const char *operand)
         vg_head_merge_trace(h, &r, &e) < 0)
         cli_die(&e);
     vg_head_take(h, &r, "reference");
-    if (!r.body.asset.n) r.body.asset = h->body.asset, h->body.asset = (vg_asset){0}; /* it is of the same mesh */
     if (r.body.attributes.ntex || r.body.attributes.nlabels || r.body.asset.n) vg_head_take(h, &r, "attributes");
-    free(h->links);
-    h->links = NULL, h->nlinks = 0, h->has_links = false;
-    vg_rig_clear(&h->body.rig);
-    vg_map_clear(&h->map);
+    if (r.body.asset.n) vg_head_take(h, &r, "asset");
+    vg_head_drop(h, "links");
+    vg_head_drop(h, "rig");
+    vg_head_drop(h, "map");
     vg_head_clear(&r);
 }
 
@@ -83,16 +82,14 @@ static void set_anchors(vg_head *h, uint32_t *anchors, size_t n)
 {
     if (n && anchors[n - 1] >= h->body.mesh.nv)
         cli_usage("--anchor names vertex %u, but there are %zu, counted from 0", anchors[n - 1], h->body.mesh.nv);
-    free(h->anchors);
+    vg_head_drop(h, "anchors");
     h->anchors = anchors, h->nanchors = n;
 }
 
 static void select_all_faces(vg_head *h)
 {
-    free(h->selected);
-    free(h->links);
-    h->has_selection = h->has_links = false;
-    h->selected = NULL, h->nselected = 0, h->links = NULL, h->nlinks = 0;
+    vg_head_drop(h, "selection");
+    vg_head_drop(h, "links");
 }
 
 static void select_faces(vg_head *h)

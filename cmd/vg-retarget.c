@@ -44,6 +44,7 @@ static void retarget(vg_head *h)
     vg_head_put(h, &rig, "rig");
     vg_head_take(h, &target, "reference"); /* where the body is, under the target's name */
     vg_head_take(h, &target, "attributes");
+    vg_head_take(h, &target, "asset");
     vg_head_clear(&target);
 }
 

@@ -266,8 +266,8 @@ int main(int argc, char **argv)
     if (!h->signal.n) cli_stop(VG_EINPUT, "the input holds no signal: make one with vg-fitsignal");
     while (cli_next(source, &frame)) continue; /* to the end, so that damage is seen; a signal has no frames */
     vg_frame_clear(&frame);
-    vg_signal s = h->signal; /* the poses come without it */
-    h->signal = (vg_signal){0};
+    vg_signal s;
+    vg_head_take_out(&s, h, "signal"); /* the poses come without it */
     if (opts.edit) read_edits(&s, &retime);
     if (opts.retime && retime.n) cli_usage("--retime and lines 'time' of --edit both say how time goes");
     if (opts.retime) read_retime(&retime, &s);

@@ -219,8 +219,8 @@ int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const vg_reading *how
     if (r == VG_OK) r = vgi_gltf_open(&x->g, in, subject, e);
     if (r == VG_OK) r = vgi_gltf_scene_read(x, &f, e);
     if (r == VG_OK) r = vgi_gltf_mend(x, &f, e);
-    h->body.mesh = f.mesh;
-    if (r == VG_OK) h->body.attributes = x->attributes, x->attributes = (vg_attributes){0};
+    vg_head_put(h, &f.mesh, "mesh");
+    if (r == VG_OK) vg_head_put(h, &x->attributes, "attributes");
     h->kind = VG_VERTICES, h->precision = VG_F32, h->count = h->body.mesh.nv;
     if (r == VG_OK) r = vgi_gltf_take_asset(x, in, &h->body.mesh, &h->body.asset, e);
     if (r == VG_OK && !x->as_shapes) r = vgi_gltf_read_animations(x, e);

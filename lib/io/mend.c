@@ -215,9 +215,7 @@ int vgi_mend_faces(vg_mesh *m, const double *points, vg_attributes *a, vg_note *
     mending k = {.from = m, .points = points, .to = {.nv = m->nv}};
     r = mend_all(&k, a, e);
     if (r == VG_OK) {
-        vg_mesh_clear(m);
-        *m = k.to;
-        k.to = (vg_mesh){0};
+        vg_mesh_take(m, &k.to);
         note_mending(&k, notes);
         r = vg_mesh_check(m, subject, e);
     }

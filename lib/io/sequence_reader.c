@@ -62,6 +62,7 @@ static int borrow_mesh(const vgi_playing *p, vg_head *h, const char *path, vg_er
     if (r == VG_OK) {
         vg_head_take(h, &from, "mesh");
         vg_head_take(h, &from, "attributes");
+        vg_head_take(h, &from, "asset");
         if (!h->body.reference) vg_head_take(h, &from, "reference");
     }
     vg_head_clear(&from);

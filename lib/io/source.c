@@ -318,13 +318,11 @@ static int take_over_model(vg_source *s, pose *p, vg_err *e)
     int r = settle_mesh(s, &m->mesh, p->archive, p->path, e);
     if (r < 0) return r;
     note_left_out(s, s->own_name, m->note.text);
-    s->head.body.mesh = m->mesh;
-    s->head.body.attributes = m->attributes;
+    vg_head_put(&s->head, &m->mesh, "mesh");
+    vg_head_put(&s->head, &m->attributes, "attributes");
     vg_note note = {0};
     if (!p->archive) r = vgi_take_materials(&s->head.body, p->path, &note, e);
     note_left_out(s, s->own_name, note.text);
-    m->mesh = (vg_mesh){0};
-    m->attributes = (vg_attributes){0};
     if (r < 0) return r;
     s->head.body.reference = vgi_copy_array(m->vertices, 3 * s->own.count, sizeof(double), e);
     s->head.body.reference_name = vgi_copy_string(p->name, strlen(p->name), e);
@@ -481,9 +479,7 @@ static int take_over_head(vg_source *s, const char *archive, const char *path, v
                 : vgi_play_borrow_faces(p, path == standard_input ? NULL : path, h, e);
     if (r == VG_OK) r = settle_mesh(s, &h->body.mesh, archive, path, e);
     if (r < 0) return r;
-    vg_head_clear(&s->head);
-    s->head = *h;
-    *h = (vg_head){0};
+    vg_head_move(&s->head, h);
     s->own.kind = kind, s->own.precision = precision, s->own.count = count, s->own.width = width;
     if (s->head.nanchors &&
         !(s->own.anchors = vgi_copy_array(s->head.anchors, s->head.nanchors, sizeof *s->head.anchors, e)))
@@ -577,7 +573,7 @@ static int settle_named_mesh(vg_source *s, const char *mesh, vg_err *e)
     if (r == VG_OK) r = settle_mesh(s, &from.body.mesh, NULL, mesh, e);
     if (r == VG_OK) r = keep_skeleton(s, &from, e);
     if (r == VG_OK) r = vg_head_merge_trace(&s->head, &from, e);
-    static const char *const parts[] = {"mesh", "attributes", "skeleton", "reference"};
+    static const char *const parts[] = {"mesh", "attributes", "asset", "skeleton", "reference"};
     for (size_t i = 0; r == VG_OK && i < sizeof parts / sizeof *parts; i++) vg_head_take(&s->head, &from, parts[i]);
     vg_head_clear(&from);
     return r;
@@ -731,7 +727,7 @@ int vg_load_with(vg_head *h, const char *operand, const char *what, const vg_sou
     snprintf(subject, sizeof subject, "'%.400s'", operand);
     r = vg_head_need(from, what, subject, e);
     if (r == VG_OK && s->through) r = vg_head_copy(h, from, e);
-    else if (r == VG_OK) *h = *from, *from = (vg_head){0};
+    else if (r == VG_OK) vg_head_move(h, from);
     if (r == VG_OK && note && vg_source_warning(s)) vgi_note(note, "%s", vg_source_warning(s));
     vg_source_close(&s);
     return r;

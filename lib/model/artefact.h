@@ -78,6 +78,7 @@ typedef struct vgi_artefact {
     const char *needs; /* the tag of the record that must come before; NULL: none */
     bool in_body;
     size_t at;         /* offset in vg_head, or in vg_body */
+    size_t size;       /* of the struct there; 0: its fields are members of vg_head or vg_body */
     size_t present_at, present_size; /* the member of vg_head that is 0 when there is none */
     size_t mark_at;    /* with `marks`: a bool in vg_head that is set when the record has been read */
     bool marks;

@@ -25,6 +25,11 @@ static int copy_parts(void *to, const void *from, size_t size, const int *entrie
     return r;
 }
 
+void vg_mesh_take(vg_mesh *to, vg_mesh *from)
+{
+    vgi_fields_move(&vgi_artefacts[VGI_MESH], to, from);
+}
+
 static const int attributes_parts[] = {VGI_TEXC, VGI_LABL}, rig_parts[] = {VGI_RIG, VGI_SKIN};
 
 void vg_attributes_clear(vg_attributes *a)
@@ -276,15 +281,31 @@ int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e)
     return r;
 }
 
+void vg_head_move(vg_head *to, vg_head *from)
+{
+    vg_head_clear(to);
+    *to = *from;
+    *from = (vg_head){0};
+}
+
+static bool *mark_of(const vgi_artefact *t, const vg_head *h)
+{
+    return (bool *)(uintptr_t)((const char *)h + t->mark_at);
+}
+
+/* what NULL: all that have a name. */
+static bool is_called(const vgi_artefact *t, const char *what)
+{
+    return t->name && (!what || !strcmp(t->name, what));
+}
+
 void vg_head_take(vg_head *to, vg_head *from, const char *what)
 {
     for (size_t i = 0; i < VGI_ARTEFACTS; i++) {
         const vgi_artefact *t = &vgi_artefacts[i];
-        if (!t->name || strcmp(t->name, what)) continue;
+        if (!is_called(t, what)) continue;
         vgi_fields_move(t, vgi_artefact_in(t, to, 0), vgi_artefact_in(t, from, 0));
-        if (!t->marks) continue;
-        bool *mark = (bool *)(void *)((char *)to + t->mark_at), *was = (bool *)(void *)((char *)from + t->mark_at);
-        *mark = *was, *was = false;
+        if (t->marks) *mark_of(t, to) = *mark_of(t, from), *mark_of(t, from) = false;
     }
 }
 
@@ -293,9 +314,29 @@ void vg_head_put(vg_head *to, void *from, const char *what)
 {
     for (size_t i = 0; i < VGI_ARTEFACTS; i++) {
         const vgi_artefact *t = &vgi_artefacts[i];
-        if (!t->name || strcmp(t->name, what)) continue;
-        assert(!t->marks);
+        if (!is_called(t, what)) continue;
+        assert(t->size);
         vgi_fields_move(t, vgi_artefact_in(t, to, 0), from);
+    }
+}
+
+void vg_head_take_out(void *to, vg_head *from, const char *what)
+{
+    const vgi_artefact *first = vgi_artefact_by_name(what);
+    assert(first && first->size);
+    memset(to, 0, first->size);
+    for (size_t i = 0; i < VGI_ARTEFACTS; i++)
+        if (is_called(&vgi_artefacts[i], what))
+            vgi_fields_move(&vgi_artefacts[i], to, vgi_artefact_in(&vgi_artefacts[i], from, 0));
+}
+
+void vg_head_drop(vg_head *h, const char *what)
+{
+    for (size_t i = 0; i < VGI_ARTEFACTS; i++) {
+        const vgi_artefact *t = &vgi_artefacts[i];
+        if (!is_called(t, what)) continue;
+        vgi_fields_clear(t, vgi_artefact_in(t, h, 0));
+        if (t->marks) *mark_of(t, h) = false;
     }
 }
 

@@ -299,8 +299,8 @@ static const vgi_member netw_fields[] = {
 
 /* ---- the table ---- */
 
-#define IN_BODY(member) .in_body = true, .at = offsetof(vg_body, member)
-#define IN_HEAD(member) .at = offsetof(vg_head, member)
+#define IN_BODY(member) .in_body = true, .at = offsetof(vg_body, member), .size = SIZE_OF(vg_body, member)
+#define IN_HEAD(member) .at = offsetof(vg_head, member), .size = SIZE_OF(vg_head, member)
 #define PRESENT(member) .present_at = offsetof(vg_head, member), .present_size = SIZE_OF(vg_head, member)
 #define MARKED(member) PRESENT(member), .marks = true, .mark_at = offsetof(vg_head, member)
 #define REPEATS(pointer, count) \
@@ -316,7 +316,7 @@ const vgi_artefact vgi_artefacts[VGI_ARTEFACTS] = {
                   FIELDS(texc_fields), .check = vgi_check_texture},
     [VGI_LABL] = {.tag = "LABL", .name = "attributes", .needs = "MESH", IN_BODY(attributes), PRESENT(body.attributes.nlabels),
                   FIELDS(labl_fields), .check = vgi_check_labels},
-    [VGI_ASST] = {.tag = "ASST", .name = "attributes", .needs = "MESH", IN_BODY(asset), PRESENT(body.asset.n),
+    [VGI_ASST] = {.tag = "ASST", .name = "asset", .needs = "MESH", IN_BODY(asset), PRESENT(body.asset.n),
                   FIELDS(asst_fields), .check = vgi_check_asset},
     [VGI_SELE] = {.tag = "SELE", .flags = VGI_CRITICAL, .name = "selection", .needs = "MESH", MARKED(has_selection), FIELDS(sele_fields),
                   .check = vgi_check_selection},

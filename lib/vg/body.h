@@ -22,6 +22,7 @@ typedef struct vg_mesh {
 size_t vg_mesh_corners(const vg_mesh *m); /* start[nf], or 0 for a mesh without faces */
 void vg_mesh_clear(vg_mesh *m);
 int vg_mesh_copy(vg_mesh *to, const vg_mesh *from, vg_err *e) VG_MUST_CHECK;
+void vg_mesh_take(vg_mesh *to, vg_mesh *from); /* as vg_body_take */
 
 /* vg_mesh_check: VG_OK, or VG_EINPUT naming the first face that is too small, has an index out of range or names a
  * vertex twice, or when a count exceeds its limit. `subject` is what the message calls the mesh ("file 'a.obj'").

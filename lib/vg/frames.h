@@ -160,14 +160,19 @@ size_t vg_head_elements(const vg_head *h, vg_element e);
 
 void vg_head_clear(vg_head *h);
 int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e) VG_MUST_CHECK;
+/* vg_head_move: all of *from into *to, whose former content is released; *from becomes empty. */
+void vg_head_move(vg_head *to, vg_head *from);
 
-/* vg_head_take: move one thing from one head to another, by its name: "mesh", "attributes", "reference" (with its name),
- * "skeleton", "patches", "rig" (with its skin), "selection", "links", "anchors", "correspondence", "map", "signal",
- * "network". What `to` had
- * of it is released; `from` has none afterwards. */
+/* vg_head_take: move one thing from one head to another, by its name: "mesh", "attributes", "asset", "reference" (with its
+ * name), "skeleton", "patches", "rig" (with its skin), "selection", "links", "anchors", "correspondence", "map", "signal",
+ * "network"; NULL: all of them. What `to` had of it is released; `from` has none afterwards. */
 void vg_head_take(vg_head *to, vg_head *from, const char *what);
 /* vg_head_put: the same from the struct of the thing alone: a vg_map for "map", a vg_rig for "rig", and so on. */
 void vg_head_put(vg_head *to, void *from, const char *what);
+/* vg_head_take_out: the other way round: the struct `to`, which need not be initialised, gets what `from` has. */
+void vg_head_take_out(void *to, vg_head *from, const char *what);
+/* vg_head_drop: release one thing, by its name. */
+void vg_head_drop(vg_head *h, const char *what);
 /* vg_head_need: VG_OK when h holds it; else VG_EINPUT: "<subject> holds no map: make one with vg-fitmap". */
 int vg_head_need(const vg_head *h, const char *what, const char *subject, vg_err *e) VG_MUST_CHECK;
 
