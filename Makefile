@@ -179,7 +179,7 @@ check: all $(CHECK_UNITS:%=$(B)/unit/%) $(CHECK_FUZZERS:%=$(B)/fuzz/%) $(B)/tool
 # The kernels' tests, compiled for ARM of 64 bits and run by an emulator: what they link needs neither CHOLMOD nor BLAS.
 ARM_CC ?= aarch64-linux-gnu-gcc
 ARM_RUN ?= qemu-aarch64 -L /usr/aarch64-linux-gnu
-ARM_OBJ = $(patsubst %.c,$(B)/%.o,$(wildcard lib/core/*.c) $(addprefix lib/numeric/,polar.c rotation.c stats.c turn.c) tests/unit/test_isa.c)
+ARM_OBJ = $(patsubst %.c,$(B)/%.o,$(wildcard lib/core/*.c) $(addprefix lib/numeric/,polar.c rotation.c stats.c) tests/unit/test_isa.c)
 .PHONY: check-aarch64 check-kernels
 check-aarch64:
 	@if ! command -v $(firstword $(ARM_CC)) >/dev/null || ! command -v $(firstword $(ARM_RUN)) >/dev/null; then \

@@ -186,8 +186,8 @@ VGI_INLINE unsigned vgi_bits(vgi_mask mask)
 #endif
 }
 
-/* vgi_dot: of two points. */
-VGI_INLINE vgi_wide vgi_dot(const vgi_wide *a, const vgi_wide *b)
+/* vgi_wide_dot: of two points. */
+VGI_INLINE vgi_wide vgi_wide_dot(const vgi_wide *a, const vgi_wide *b)
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }

@@ -2,7 +2,7 @@
  * that names the vertices (io).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
-#include "numeric/turn.h"
+#include "numeric/polar.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -65,7 +65,7 @@ VGI_INLINE vgi_wide perimeters(const uint32_t *vert, size_t r, const double *poi
     for (size_t i = 0; i < r; i++) {
         load(points, vert + i * VGI_LANES, b);
         for (int k = 0; k < 3; k++) a[k] -= b[k];
-        sum += vgi_roots(vgi_dot(a, a));
+        sum += vgi_roots(vgi_wide_dot(a, a));
         for (int k = 0; k < 3; k++) a[k] = b[k];
     }
     return sum;
@@ -89,7 +89,7 @@ VGI_INLINE void shape_of(const uint32_t *vert, size_t r, double diagonal, const 
         n[2] += a[0] * b[1] - a[1] * b[0];
         for (int k = 0; k < 3; k++) edges += (b[k] - a[k]) * (b[k] - a[k]), a[k] = b[k];
     }
-    vgi_wide length = vgi_roots(vgi_dot(n, n)), half = 0.5 * length;
+    vgi_wide length = vgi_roots(vgi_wide_dot(n, n)), half = 0.5 * length;
     double least = FLAT * diagonal;
     /* the perimeter is no longer than the root of r times the squared edges */
     s->ok = half * half > 1.001 * least * least * (double)r * edges;
@@ -106,9 +106,9 @@ VGI_INLINE vgi_wide planarity_of(const uint32_t *vert, size_t r, const double *p
     for (size_t i = 0; i < r; i++) {
         load(points, vert + i * VGI_LANES, w);
         for (int k = 0; k < 3; k++) w[k] -= s->centroid[k];
-        vgi_wide length = vgi_roots(vgi_dot(w, w));
+        vgi_wide length = vgi_roots(vgi_wide_dot(w, w));
         vgi_mask directed = length > vgi_same(0);
-        sum += vgi_only(directed, vgi_absolute(vgi_dot(w, s->normal)) / length);
+        sum += vgi_only(directed, vgi_absolute(vgi_wide_dot(w, s->normal)) / length);
         n += vgi_only(directed, vgi_same(1));
     }
     return at_most(vgi_only(n > vgi_same(0), sum / n), 1);
@@ -118,7 +118,7 @@ VGI_INLINE vgi_wide planarity_of(const uint32_t *vert, size_t r, const double *p
 VGI_INLINE vgi_wide normals_apart(const vgi_wide a[3], const vgi_wide b[3])
 {
     vgi_wide d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-    return at_most(0.5 * vgi_dot(d, d), 2);
+    return at_most(0.5 * vgi_wide_dot(d, d), 2);
 }
 
 VGI_INLINE void count_planarity(uint64_t histogram[10], vgi_wide p, vgi_mask which)

@@ -3,7 +3,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "numeric/vec3.h"
-#include "numeric/turn.h"
+#include "numeric/polar.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,154 +1,86 @@
 /* feature_kernel.c: deformation gradients of rings, their rotations and stretches, and the reconstruction from them,
- * for eight poses at once: two vectors of four, which every instruction set from AVX2 on holds in registers.
+ * for eight poses at once, in vectors as wide as the registers.
  * Leaves out what is done once (rings.c) and the choice of branches (branch.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/feature_kernel.h"
-#include "numeric/polar.h"
 #include "numeric/vec3.h"
+#include "numeric/wide_polar.h"
 
 #include <stdlib.h>
 
-#define INLINE static inline __attribute__((always_inline))
-/* as in core/wide.h, whose names vec3.h has for single points */
-#define JOINED(name, set) name##_##set
-#define JOIN(name, set) JOINED(name, set)
-#define OF_SET(name) JOIN(name, VGI_SET)
-
-typedef double four __attribute__((vector_size(32), may_alias));
-typedef int64_t four_mask __attribute__((vector_size(32)));
-enum { HALVES = 2, FOUR = 4 };
-
-INLINE four *half(vgi_lanes *p, int h)
+VGI_INLINE vgi_wide_at *wide(vgi_lanes *p, int h)
 {
-    return (four *)p + h;
+    return (vgi_wide_at *)p + h;
 }
-INLINE const four *half_of(const vgi_lanes *p, int h)
+
+VGI_INLINE const vgi_wide_at *wide_of(const vgi_lanes *p, int h)
 {
-    return (const four *)p + h;
+    return (const vgi_wide_at *)p + h;
 }
+
 /* to += by * x, eight lanes */
-INLINE void add(vgi_lanes *to, double by, const vgi_lanes *x)
+VGI_INLINE void add(vgi_lanes *to, double by, const vgi_lanes *x)
 {
-    for (int h = 0; h < HALVES; h++) *half(to, h) += by * *half_of(x, h);
+    for (int h = 0; h < VGI_PARTS; h++) *wide(to, h) += by * *wide_of(x, h);
 }
-INLINE four roots(four a)
-{
-    for (int i = 0; i < FOUR; i++) a[i] = __builtin_sqrt(a[i]);
-    return a;
-}
-
 /* ---- measuring ---- */
 
-INLINE void load_points(const vgi_rings *r, vgi_feature_block *b, const double *const *poses)
+VGI_INLINE void load_points(const vgi_rings *r, vgi_feature_block *b, const double *const *poses)
 {
     for (size_t v = 0; v < r->nv; v++)
-        for (size_t k = 0; k < 3; k++)
-            for (size_t i = 0; i < VGI_LANES; i++) b->point[v].xyz[k][i] = poses[i][3 * v + k];
+        for (int h = 0; h < VGI_PARTS; h++) {
+            vgi_wide x[3];
+            vgi_gather_point(poses + h * VGI_WIDTH, 3 * v, x);
+            for (int k = 0; k < 3; k++) *wide(&b->point[v].xyz[k], h) = x[k];
+        }
 }
 
-INLINE void add_normals(const vgi_rings *r, vgi_feature_block *b)
+VGI_INLINE void add_normals(const vgi_rings *r, vgi_feature_block *b)
 {
     memset(b->normal, 0, r->nv * sizeof *b->normal);
     for (size_t t = 0; t < r->ntriangles; t++) {
         const uint32_t *c = r->triangle + 3 * t;
-        for (int h = 0; h < HALVES; h++) {
-            four u[3], v[3];
+        for (int h = 0; h < VGI_PARTS; h++) {
+            vgi_wide u[3], v[3];
             for (int k = 0; k < 3; k++) {
-                four p = *half(&b->point[c[0]].xyz[k], h);
-                u[k] = *half(&b->point[c[1]].xyz[k], h) - p, v[k] = *half(&b->point[c[2]].xyz[k], h) - p;
+                vgi_wide p = *wide(&b->point[c[0]].xyz[k], h);
+                u[k] = *wide(&b->point[c[1]].xyz[k], h) - p, v[k] = *wide(&b->point[c[2]].xyz[k], h) - p;
             }
             for (int k = 0; k < 3; k++) {
                 int l = k == 2 ? 0 : k + 1, m = k == 0 ? 2 : k - 1;
-                four n = u[l] * v[m] - u[m] * v[l];
-                for (int j = 0; j < 3; j++) *half(&b->normal[c[j]].xyz[k], h) += n;
+                vgi_wide n = u[l] * v[m] - u[m] * v[l];
+                for (int j = 0; j < 3; j++) *wide(&b->normal[c[j]].xyz[k], h) += n;
             }
         }
     }
 }
 
-/* D of one vertex in four poses */
-INLINE void ring_gradient(const vgi_rings *r, vgi_feature_block *b, size_t v, int h, four *d)
+/* D of one vertex in vgi_wide poses */
+VGI_INLINE void ring_gradient(const vgi_rings *r, vgi_feature_block *b, size_t v, int h, vgi_wide *d)
 {
-    four p[3], n[3], n2 = {0};
+    vgi_wide p[3], n[3], n2 = {0};
     for (int k = 0; k < 3; k++) {
-        p[k] = *half(&b->point[v].xyz[k], h), n[k] = *half(&b->normal[v].xyz[k], h);
+        p[k] = *wide(&b->point[v].xyz[k], h), n[k] = *wide(&b->normal[v].xyz[k], h);
         n2 += n[k] * n[k];
     }
-    four length = roots(n2);
-    for (int i = 0; i < FOUR; i++) length[i] = length[i] > 0 ? 1 / length[i] : 0;
+    vgi_wide length = vgi_roots(n2);
+    length = vgi_only(length > vgi_same(0), 1.0 / length);
     for (int k = 0; k < 3; k++)
         for (int j = 0; j < 3; j++) d[3 * k + j] = n[k] * length * r->across[3 * v + (size_t)j];
     for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++) {
         const double *g = r->gradient + 3 * (size_t)i;
         vgi_row *to = &b->point[r->to[i]];
         for (int k = 0; k < 3; k++) {
-            four edge = p[k] - *half(&to->xyz[k], h);
+            vgi_wide edge = p[k] - *wide(&to->xyz[k], h);
             for (int j = 0; j < 3; j++) d[3 * k + j] += edge * g[j];
         }
     }
 }
 
-INLINE four cofactors(const four *x, four *c)
-{
-    c[0] = x[4] * x[8] - x[5] * x[7], c[1] = x[5] * x[6] - x[3] * x[8], c[2] = x[3] * x[7] - x[4] * x[6];
-    c[3] = x[2] * x[7] - x[1] * x[8], c[4] = x[0] * x[8] - x[2] * x[6], c[5] = x[1] * x[6] - x[0] * x[7];
-    c[6] = x[1] * x[5] - x[2] * x[4], c[7] = x[2] * x[3] - x[0] * x[5], c[8] = x[0] * x[4] - x[1] * x[3];
-    return x[0] * c[0] + x[1] * c[1] + x[2] * c[2];
-}
-
-INLINE four squares(const four *x)
-{
-    four s = {0};
-    for (int i = 0; i < 9; i++) s += x[i] * x[i];
-    return s;
-}
-
-/* Where Newton's iteration is not for d: flat, thin or inside out. */
-static void fit_one(const four *d, int lane, four *x)
-{
-    double one[9], turned[9];
-    for (int i = 0; i < 9; i++) one[i] = d[i][lane];
-    vgi_fit_rotation(one, turned);
-    for (int i = 0; i < 9; i++) x[i][lane] = turned[i];
-}
-
-/* the rotations nearest to four matrices */
-INLINE void polar(const four *d, four *x)
-{
-    enum { MOST = 16, SCALED = 3 };
-    static const double thin = 5.2e-3;
-    four c[9], shrink = squares(d);
-    for (int i = 0; i < FOUR; i++) shrink[i] = shrink[i] > 0 ? 3 / shrink[i] : 0;
-    shrink = roots(shrink);
-    for (int i = 0; i < 9; i++) x[i] = d[i] * shrink;
-    four_mask good = cofactors(x, c) > thin;
-    for (int i = 0; i < 9; i++)
-        for (int k = 0; k < FOUR; k++) x[i][k] = good[k] ? x[i][k] : i % 4 == 0;
-    four_mask going = {-1, -1, -1, -1};
-    for (int step = 0; step < MOST; step++) {
-        four det = cofactors(x, c), a = {0}, by, change = {0};
-        a += 0.5, by = 0.5 / det;
-        if (step < SCALED) {
-            four g = roots(roots(squares(c) / squares(x)) / det);
-            a = 0.5 * g, by = 0.5 / (g * det);
-        }
-        for (int i = 0; i < 9; i++) {
-            four y = a * x[i] + by * c[i];
-            change += (y - x[i]) * (y - x[i]);
-            x[i] = (four)((going & (four_mask)y) | (~going & (four_mask)x[i]));
-        }
-        /* quadratic: what is left is below 1e-15. Each lane stops by itself: bits do not depend on its neighbours. */
-        if (step >= SCALED) going &= change >= 1e-15;
-        if (!(going[0] | going[1] | going[2] | going[3])) break;
-    }
-    for (int k = 0; k < FOUR; k++)
-        if (!good[k]) fit_one(d, k, x);
-}
-
 /* d := x times the symmetric part of x' d, which is all that features say of it */
-INLINE void symmetrise(const four *x, four *d)
+VGI_INLINE void symmetrise(const vgi_wide *x, vgi_wide *d)
 {
-    four s[9];
+    vgi_wide s[9];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) s[3 * i + k] = x[i] * d[k] + x[3 + i] * d[3 + k] + x[6 + i] * d[6 + k];
     for (int i = 0; i < 3; i++)
@@ -157,15 +89,18 @@ INLINE void symmetrise(const four *x, four *d)
         for (int k = 0; k < 3; k++) d[3 * i + k] = x[3 * i] * s[k] + x[3 * i + 1] * s[3 + k] + x[3 * i + 2] * s[6 + k];
 }
 
+/* what is left of a rotation is rounding */
+static const vgi_polar_stop stop = {.scaled = 3, .enough = 1e-15, .alone = true};
+
 static void measure(const vgi_rings *r, vgi_feature_block *b, const double *const *poses)
 {
     load_points(r, b, poses);
     add_normals(r, b);
     for (size_t v = 0; v < r->nv; v++)
-        for (int h = 0; h < HALVES; h++) {
-            four d[9], x[9];
+        for (int h = 0; h < VGI_PARTS; h++) {
+            vgi_wide d[9], x[9];
             ring_gradient(r, b, v, h, d);
-            polar(d, x);
+            vgi_wide_polar(d, x, stop);
             if (r->is_open[v]) {
                 const double *open = r->open + 9 * v;
                 for (int i = 0; i < 3; i++)
@@ -174,8 +109,8 @@ static void measure(const vgi_rings *r, vgi_feature_block *b, const double *cons
             }
             symmetrise(x, d);
             for (size_t i = 0; i < 9; i++) {
-                *half(&b->gradient[9 * v + i], h) = d[i];
-                *half(&b->turn[9 * v + i], h) = x[i];
+                *wide(&b->gradient[9 * v + i], h) = d[i];
+                *wide(&b->turn[9 * v + i], h) = x[i];
             }
         }
 }
@@ -183,22 +118,22 @@ static void measure(const vgi_rings *r, vgi_feature_block *b, const double *cons
 /* ---- reconstruction ---- */
 
 /* x := sum over edges of weight / 2 (D_v + D_to) (r_v - r_to) */
-INLINE void load_sides(const vgi_rings *r, vgi_feature_block *b)
+VGI_INLINE void load_sides(const vgi_rings *r, vgi_feature_block *b)
 {
     for (size_t v = 0; v < r->nv; v++) {
         if (r->part[v] < 0) continue;
-        for (int h = 0; h < HALVES; h++) {
+        for (int h = 0; h < VGI_PARTS; h++) {
             const vgi_lanes *own = b->gradient + 9 * v;
-            four s[3] = {{0}, {0}, {0}};
+            vgi_wide s[3] = {{0}, {0}, {0}};
             for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++) {
                 const vgi_lanes *other = b->gradient + 9 * (size_t)r->to[i];
                 double share = 0.5 * r->weight[i];
                 for (int k = 0; k < 3; k++)
                     for (int j = 0; j < 3; j++)
                         s[k] += (share * r->edge[3 * (size_t)i + (size_t)j]) *
-                                (*half_of(&own[3 * k + j], h) + *half_of(&other[3 * k + j], h));
+                                (*wide_of(&own[3 * k + j], h) + *wide_of(&other[3 * k + j], h));
             }
-            for (int k = 0; k < 3; k++) *half(&b->x[r->row[v]].xyz[k], h) = s[k];
+            for (int k = 0; k < 3; k++) *wide(&b->x[r->row[v]].xyz[k], h) = s[k];
         }
     }
 }
@@ -246,29 +181,29 @@ static void put_turn(const vgi_feature_block *b, const vgi_lanes *turn, size_t l
     log_rotation(m, w);
 }
 
-INLINE void put_vertex(const vgi_rings *r, const vgi_feature_block *b, size_t v, size_t width, double *const *values)
+VGI_INLINE void put_vertex(const vgi_rings *r, const vgi_feature_block *b, size_t v, size_t width, double *const *values)
 {
     static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
     const vgi_lanes *t = b->turn + 9 * v, *d = b->gradient + 9 * v;
     vgi_lanes out[9];
     for (int i = 0; i < 6; i++) {
         int a = row[i], c = column[i];
-        for (int h = 0; h < HALVES; h++) {
-            four one = {0}, other = {0};
+        for (int h = 0; h < VGI_PARTS; h++) {
+            vgi_wide one = {0}, other = {0};
             for (int j = 0; j < 3; j++) {
-                one += *half_of(&t[3 * j + a], h) * *half_of(&d[3 * j + c], h);
-                other += *half_of(&t[3 * j + c], h) * *half_of(&d[3 * j + a], h);
+                one += *wide_of(&t[3 * j + a], h) * *wide_of(&d[3 * j + c], h);
+                other += *wide_of(&t[3 * j + c], h) * *wide_of(&d[3 * j + a], h);
             }
-            *half(&out[i], h) = 0.5 * (one + other);
+            *wide(&out[i], h) = 0.5 * (one + other);
         }
     }
     for (int k = 0; k < 3 && width == VGI_TWELVE; k++)
-        for (int h = 0; h < HALVES; h++) {
-            four s = {0};
+        for (int h = 0; h < VGI_PARTS; h++) {
+            vgi_wide s = {0};
             for (int j = 0; j < 3; j++)
-                s += *half_of(&t[3 * j + k], h) *
-                     (*half_of(&b->point[v].xyz[j], h) - *half_of(&b->normal[v].xyz[j], h));
-            *half(&out[6 + k], h) = s;
+                s += *wide_of(&t[3 * j + k], h) *
+                     (*wide_of(&b->point[v].xyz[j], h) - *wide_of(&b->normal[v].xyz[j], h));
+            *wide(&out[6 + k], h) = s;
         }
     for (size_t lane = 0; lane < VGI_LANES; lane++) {
         double *to = values[lane] + width * v;
@@ -334,8 +269,8 @@ static void close_open_rings(const vgi_rings *r, vgi_feature_block *b)
             vgi_fit_rotation(turned, seen);
             vgi_multiply(g, seen, turned);
             vgi_multiply(turned, open, seen);
-            four all[9], whole[9];
-            for (int i = 0; i < 9; i++) all[i] = (four){0} + turned[i], whole[i] = (four){0} + d[i] + seen[i];
+            vgi_wide all[9], whole[9];
+            for (int i = 0; i < 9; i++) all[i] = vgi_same(turned[i]), whole[i] = vgi_same(d[i] + seen[i]);
             symmetrise(all, whole);
             for (size_t i = 0; i < 9; i++)
                 b->gradient[9 * v + i][lane] = whole[i][0], b->turn[9 * v + i][lane] = turned[i];
@@ -383,7 +318,7 @@ static void take_turn(const vgi_feature_block *b, const double w[3], size_t lane
 }
 
 /* D = R S of a vertex; what is left goes into b->point */
-INLINE void take_vertex(vgi_feature_block *b, size_t v, size_t width, const double *const *values)
+VGI_INLINE void take_vertex(vgi_feature_block *b, size_t v, size_t width, const double *const *values)
 {
     static const int at[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
     vgi_lanes in[9], *t = b->turn + 9 * v, *d = b->gradient + 9 * v;
@@ -393,16 +328,16 @@ INLINE void take_vertex(vgi_feature_block *b, size_t v, size_t width, const doub
         take_turn(b, from, lane, t);
         for (size_t i = 3; i < width; i++) in[i - 3][lane] = from[i];
     }
-    for (int h = 0; h < HALVES; h++)
+    for (int h = 0; h < VGI_PARTS; h++)
         for (int i = 0; i < 3; i++) {
-            four left = {0};
+            vgi_wide left = {0};
             for (int k = 0; k < 3; k++) {
-                four s = {0};
-                for (int j = 0; j < 3; j++) s += *half_of(&t[3 * i + j], h) * *half_of(&in[at[3 * j + k]], h);
-                *half(&d[3 * i + k], h) = s;
-                left += *half_of(&t[3 * i + k], h) * *half_of(&in[6 + k], h);
+                vgi_wide s = {0};
+                for (int j = 0; j < 3; j++) s += *wide_of(&t[3 * i + j], h) * *wide_of(&in[at[3 * j + k]], h);
+                *wide(&d[3 * i + k], h) = s;
+                left += *wide_of(&t[3 * i + k], h) * *wide_of(&in[6 + k], h);
             }
-            *half(&b->point[v].xyz[i], h) = left;
+            *wide(&b->point[v].xyz[i], h) = left;
         }
 }
 
@@ -436,4 +371,4 @@ static void back(const vgi_rings *r, vgi_feature_block *b, size_t width, const d
     for (size_t lane = 0; lane < lanes; lane++) place(r, b, rest, lane, centroids[lane], vertices[lane]);
 }
 
-const vgi_feature_kernel OF_SET(vgi_feature_kernel) = {measure, put, back};
+const vgi_feature_kernel VGI_OF_SET(vgi_feature_kernel) = {measure, put, back};

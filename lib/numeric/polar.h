@@ -1,5 +1,6 @@
-/* polar.h: the rotation nearest to a 3 x 3 matrix, whatever the matrix is; rotations of faces in eight poses
- * at once.
+/* polar.h: the rotation nearest to a 3 x 3 matrix, whatever the matrix is; the one that best fits pairs of vectors;
+ * rotations of faces in eight poses at once.
+ * Internal.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_POLAR_H
 #define VG_POLAR_H
@@ -10,6 +11,17 @@
 /* vgi_fit_rotation: the rotation R that maximises tr(R'm): for m = sum of d r' that which takes the r nearest to the
  * d. Row-major. Where several do, one that turns least; the identity for 0. */
 void vgi_fit_rotation(const double m[9], double r[9]);
+
+/* vgi_best_turn: the unit quaternion of the rotation R that maximises tr(R^T b) (b row-major). With b = sum of d
+ * o^T it is the rotation that takes the vectors o nearest to the d. Never a reflection; if b leaves it open, one
+ * of the best. */
+void vgi_best_turn(const double b[9], double q[4]);
+/* vgi_best_turn_near: the same for b + weight * (the rotation of the unit quaternion `prior`): with a small
+ * weight, what b leaves open is as in `prior`. */
+void vgi_best_turn_near(const double b[9], double weight, const double prior[4], double q[4]);
+/* vgi_turn_between: the unit quaternion of the smallest rotation that takes the direction of a to that of b. Neither may
+ * be 0. */
+void vgi_turn_between(const double a[3], const double b[3], double q[4]);
 
 /* What the rotations of faces are measured against. Faces and corners as in a vg_graph. */
 typedef struct vgi_turns {

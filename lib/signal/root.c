@@ -1,7 +1,7 @@
 /* root.c: the rigid motion of a whole body: the rotation and the shift that take its reference nearest to each pose.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/root.h"
-#include "numeric/turn.h"
+#include "numeric/polar.h"
 #include "numeric/vec3.h"
 
 static void find(size_t nv, const double *reference, const double from[3], const double *pose, double turn[4],

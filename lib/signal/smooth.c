@@ -2,7 +2,7 @@
  * and robust_time.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/smooth.h"
-#include "numeric/turn.h"
+#include "numeric/polar.h"
 #include "numeric/vec3.h"
 
 #include <math.h>

@@ -5,7 +5,7 @@
 #include "method/pairs/register.h"
 #include "numeric/kdtree.h"
 #include "numeric/stats.h"
-#include "numeric/turn.h"
+#include "numeric/polar.h"
 
 #include <stdlib.h>
 

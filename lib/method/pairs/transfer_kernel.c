@@ -3,9 +3,10 @@
  * Leaves out which faces drive which (transfer.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/transfer_kernel.h"
+#include "numeric/wide_face.h"
 #include "numeric/wide_polar.h"
 
-static const double enough = 1e-16; /* squared change: what is left of a rotation is rounding */
+static const vgi_polar_stop to_rounding = {.scaled = 4, .enough = 1e-16};
 
 VGI_INLINE void load_map(const vgi_map *map, size_t part, vgi_wide *m)
 {
@@ -22,29 +23,10 @@ VGI_INLINE void store_map(vgi_map *map, size_t part, const vgi_wide *m)
 /* Returns the lanes in which the face has no normal. */
 VGI_INLINE unsigned measure_part(const vgi_source *s, size_t f, size_t part, vgi_map *map)
 {
-    uint32_t begin = s->start[f], end = s->start[f + 1];
-    const double *const *poses = s->poses + part * VGI_WIDTH;
-    vgi_wide first[3], before[3] = {{0}}, n[3] = {{0}}, spread = {0}, d[9] = {{0}};
-    /* p sums to 0 over the face, so any point will do for a centre; the first corner keeps numbers small */
-    vgi_gather_point(poses, 3 * (size_t)s->vert[begin], first);
-    for (uint32_t c = begin + 1; c < end; c++) {
-        vgi_wide x[3];
-        const double *p = s->p + 3 * (size_t)c;
-        vgi_gather_point(poses, 3 * (size_t)s->vert[c], x);
-#pragma GCC unroll 3
-        for (int i = 0; i < 3; i++) {
-            x[i] -= first[i];
-            spread += x[i] * x[i];
-#pragma GCC unroll 3
-            for (int j = 0; j < 3; j++) d[3 * i + j] += x[i] * vgi_same(p[j]);
-        }
-        n[0] += before[1] * x[2] - before[2] * x[1];
-        n[1] += before[2] * x[0] - before[0] * x[2];
-        n[2] += before[0] * x[1] - before[1] * x[0];
-#pragma GCC unroll 3
-        for (int i = 0; i < 3; i++) before[i] = x[i];
-    }
-    vgi_wide n2 = vgi_dot(n, n), share = 1.0 / vgi_roots(vgi_roots(n2));
+    size_t begin = s->start[f];
+    vgi_wide n[3] = {{0}}, spread = {0}, d[9] = {{0}};
+    vgi_wide_face(s->poses + part * VGI_WIDTH, s->vert + begin, s->start[f + 1] - begin, s->p + 3 * begin, d, n, &spread);
+    vgi_wide n2 = vgi_wide_dot(n, n), share = 1.0 / vgi_roots(vgi_roots(n2));
 #pragma GCC unroll 3
     for (int i = 0; i < 3; i++)
 #pragma GCC unroll 3
@@ -106,7 +88,7 @@ static void polar(const vgi_map *a, vgi_map *rotation)
     for (size_t part = 0; part < VGI_PARTS; part++) {
         vgi_wide m[9], x[9];
         load_map(a, part, m);
-        vgi_wide_polar(m, x, enough);
+        vgi_wide_polar(m, x, to_rounding);
         store_map(rotation, part, x);
     }
 }
@@ -125,7 +107,7 @@ VGI_INLINE void follow_vector(const vgi_wide *d, const vgi_wide *turn, vgi_follo
     apply(d, v, w);
     if (how == VGI_FOLLOW_GRADIENT) return;
     double length2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-    vgi_wide t[3], stretch = vgi_roots(vgi_dot(w, w) * vgi_same(1 / (length2 > 0 ? length2 : 1)));
+    vgi_wide t[3], stretch = vgi_roots(vgi_wide_dot(w, w) * vgi_same(1 / (length2 > 0 ? length2 : 1)));
     apply(turn, v, t);
 #pragma GCC unroll 3
     for (int i = 0; i < 3; i++) {
@@ -140,7 +122,7 @@ static void follow(const vgi_map *map, vgi_follow how, const double *vectors, si
     for (size_t part = 0; part * VGI_WIDTH < lanes; part++) {
         vgi_wide d[9], turn[9] = {{0}}, w[3];
         load_map(map, part, d);
-        if (how != VGI_FOLLOW_GRADIENT) vgi_wide_polar(d, turn, enough);
+        if (how != VGI_FOLLOW_GRADIENT) vgi_wide_polar(d, turn, to_rounding);
         for (size_t c = 0; c < r; c++) {
             follow_vector(d, turn, how, vectors + 3 * c, w);
             vgi_scatter_point(out + part * VGI_WIDTH, vgi_part_lanes(lanes, part), offset + 3 * c, w);

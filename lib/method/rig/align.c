@@ -3,7 +3,7 @@
  * are not: what their joints mean differs more between skeletons than how they rest.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/align.h"
-#include "numeric/turn.h"
+#include "numeric/polar.h"
 #include "numeric/vec3.h"
 
 #include <math.h>

@@ -5,7 +5,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/align.h"
 #include "numeric/stats.h"
-#include "numeric/turn.h"
+#include "numeric/polar.h"
 #include "numeric/vec3.h"
 
 #include <math.h>

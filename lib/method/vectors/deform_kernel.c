@@ -19,7 +19,7 @@ typedef struct vec {
 
 VGI_INLINE vgi_wide dot(vec a, vec b)
 {
-    return vgi_dot(a.at, b.at);
+    return vgi_wide_dot(a.at, b.at);
 }
 
 VGI_INLINE vec cross(vec a, vec b)

@@ -16,7 +16,7 @@
 #include "method/vectors/unwrap.h"
 #include "method/vectors/deform.h"
 #include "model/incidence.h"
-#include "numeric/turn.h"
+#include "numeric/polar.h"
 
 #include <math.h>
 #include <stdlib.h>

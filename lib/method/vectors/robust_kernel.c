@@ -93,7 +93,7 @@ VGI_INLINE void face(const face_job *j, size_t f, size_t n, size_t i, point *e, 
     if (j->f->star[f]) weigh_star(*metric, n, e, q);
     else weigh(metric, n, e, q);
     vgi_wide square = vgi_same(0);
-    for (size_t c = 0; c < n; c++) square += vgi_dot(e[c].at, q[c].at);
+    for (size_t c = 0; c < n; c++) square += vgi_wide_dot(e[c].at, q[c].at);
     if (!j->soft2) {
         *energy += vgi_roots(vgi_either(square > 0, square, vgi_same(0)));
         return;
