@@ -2,6 +2,7 @@
  * out the choice of faces and links (select.c, link.c) and their deformation (deform.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
+#include "numeric/vec3.h"
 
 #include <stdlib.h>
 
@@ -85,8 +86,8 @@ void vg_graph_vectors(const vg_graph *g, const double *vertices, double *vectors
         uint32_t begin = g->start[f], end = g->start[f + 1];
         double centre[3] = {0, 0, 0}, share = 1.0 / (double)(end - begin);
         for (uint32_t c = begin; c < end; c++)
-            for (int k = 0; k < 3; k++) centre[k] += vertices[3 * (size_t)g->vert[c] + k];
-        for (int k = 0; k < 3; k++) centre[k] *= share;
+            vgi_add(centre, vertices + 3 * (size_t)g->vert[c]);
+        vgi_scale(centre, share);
         for (uint32_t c = begin; c < end; c++)
             for (int k = 0; k < 3; k++)
                 vectors[3 * (size_t)c + k] = vertices[3 * (size_t)g->vert[c] + k] - centre[k];
@@ -98,7 +99,7 @@ void vg_graph_root(const vg_graph *g, const double *vertices, double root[3])
     double sum[3] = {0, 0, 0};
     for (size_t v = 0; v < g->nv; v++)
         if (g->in_face[v])
-            for (int k = 0; k < 3; k++) sum[k] += vertices[3 * v + k];
+            vgi_add(sum, vertices + 3 * v);
     for (int k = 0; k < 3; k++) root[k] = g->attached ? sum[k] / (double)g->attached : 0;
 }
 

@@ -2,6 +2,7 @@
  * that names the vertices (io).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
+#include "numeric/vec3.h"
 #include "numeric/polar.h"
 
 #include <math.h>
@@ -55,7 +56,7 @@ static void add_pair(double b[9], double weight, const double d[3], const double
 
 static void subtract(const double *a, const double *b, double d[3])
 {
-    for (int k = 0; k < 3; k++) d[k] = a[k] - b[k];
+    vgi_subtract(a, b, d);
 }
 
 /* the part of x perpendicular to u */

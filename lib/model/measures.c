@@ -4,6 +4,7 @@
  * (measures_kernel.c), pairing and tolerances (vg-diff).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/measures_kernel.h"
+#include "numeric/vec3.h"
 
 #include <math.h>
 
@@ -217,7 +218,7 @@ static void find_shift(const vg_measures *x, const double *truth, const double *
         vg_centroid(truth, x->m->nv, a);
         vg_centroid(result, x->m->nv, b);
     }
-    for (int k = 0; k < 3; k++) shift[k] = a[k] - b[k];
+    vgi_subtract(a, b, shift);
 }
 
 static void measure_vertices(const vg_measures *x, const double *truth, const double *result, double *errors, pose *p)

@@ -2,6 +2,7 @@
  * Leaves out attributes and poses (head.c) and vectors (graph.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
+#include "numeric/vec3.h"
 #include "numeric/sets.h"
 
 #include <math.h>
@@ -145,6 +146,6 @@ void vg_centroid(const double *points, size_t n, double centroid[3])
 {
     double sum[3] = {0, 0, 0};
     for (size_t i = 0; i < n; i++)
-        for (int k = 0; k < 3; k++) sum[k] += points[3 * i + k];
+        vgi_add(sum, points + 3 * i);
     for (int k = 0; k < 3; k++) centroid[k] = n ? sum[k] / (double)n : 0;
 }

@@ -3,6 +3,7 @@
  * Leaves out how weights and transforms are fitted (method/rig/skin.c, method/rig/inverse_skin.c) and other skeletons (drive.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/rig.h"
+#include "numeric/vec3.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -63,7 +64,7 @@ void vg_rig_transforms(const vg_rig *r, const double *positions, const double *t
         double *to = transforms + 7 * b, moved[3];
         vg_quat_multiply(turns + 4 * j, back, to);
         vg_quat_apply(to, r->at + 3 * j, moved);
-        for (size_t k = 0; k < 3; k++) to[4 + k] = positions[3 * j + k] - moved[k];
+        vgi_subtract(positions + 3 * j, moved, to + 4);
     }
 }
 
@@ -122,13 +123,13 @@ void vg_rig_edit(const vg_rig *r, size_t b, const double axis[3], double degrees
     for (int k = 0; k < 3; k++) size += now[k] * now[k];
     for (int k = 0; k < 3 && size > 0; k++) q[k + 1] = sin(half) * now[k] / sqrt(size);
     vg_quat_apply(own, r->at + 3 * (size_t)r->bone[b], centre);
-    for (int k = 0; k < 3; k++) centre[k] += own[4 + k];
+    vgi_add(centre, own + 4);
     for (size_t d = 0; d < r->nbones; d++) {
         if (!hangs_on(r, r->bone[d], r->bone[b])) continue;
         double *t = transforms + 7 * d, from[3], to[3];
-        for (int k = 0; k < 3; k++) from[k] = t[4 + k] - centre[k];
+        vgi_subtract(t + 4, centre, from);
         vg_quat_apply(q, from, to);
-        for (int k = 0; k < 3; k++) t[4 + k] = to[k] + centre[k];
+        vgi_sum(to, centre, t + 4);
         vg_quat_multiply(q, t, t);
     }
 }

@@ -80,7 +80,7 @@ static void place_joint(const vg_skeleton *s, size_t j, const double *values, do
     const double *parent = turns + 4 * (size_t)joint->parent;
     vg_quat_multiply(parent, local, turns + 4 * j);
     vg_quat_apply(parent, offset, positions + 3 * j);
-    for (int k = 0; k < 3; k++) positions[3 * j + k] += positions[3 * (size_t)joint->parent + k];
+    vgi_add(positions + 3 * j, positions + 3 * (size_t)joint->parent);
 }
 
 void vg_skeleton_pose(const vg_skeleton *s, const double *values, double *positions, double *turns)
@@ -329,10 +329,10 @@ static size_t gather_arms(const vg_joint_fitter *f, size_t j, const double *pose
     for (size_t i = f->first_arm[j]; i < f->first_arm[j + 1]; i++) {
         const arm *a = &f->arms[i];
         double d[3], l = vgi_length(a->offset), dl;
-        for (int x = 0; x < 3; x++) d[x] = pose[3 * (size_t)a->joint + x] - pose[3 * j + x];
+        vgi_subtract(pose + 3 * (size_t)a->joint, pose + 3 * j, d);
         if ((firm && a->loose) || !((dl = vgi_length(d)) > 1e-9 * l)) continue;
         for (int x = 0; x < 3; x++)
-            for (int y = 0; y < 3; y++) k[3 * x + y] += l * d[x] / dl * a->offset[y];
+            vgi_add_scaled(k + 3 * x, l * d[x] / dl, a->offset);
         total += l * l;
         n++;
         memcpy(offset, a->offset, 3 * sizeof *offset);
@@ -408,7 +408,7 @@ static void fit_offset(const vg_joint_fitter *f, size_t j, const double *pose, d
     memcpy(local, pose + 3 * j, sizeof local);
     if (joint->parent != NONE) {
         double back[4];
-        for (int k = 0; k < 3; k++) d[k] = pose[3 * j + k] - f->positions[3 * (size_t)joint->parent + k];
+        vgi_subtract(pose + 3 * j, f->positions + 3 * (size_t)joint->parent, d);
         conjugate(f->turns + 4 * (size_t)joint->parent, back);
         vg_quat_apply(back, d, local);
     }
@@ -425,7 +425,7 @@ double vg_joint_fitter_fit(vg_joint_fitter *f, const double *pose, const double 
         fit_angles(f, j, pose, turns ? turns + 4 * j : NULL, values);
         fit_offset(f, j, pose, values);
         place_joint(f->s, j, values, f->positions, f->turns);
-        for (int k = 0; k < 3; k++) d[k] = f->positions[3 * j + k] - pose[3 * j + k];
+        vgi_subtract(f->positions + 3 * j, pose + 3 * j, d);
         if (vgi_length(d) > most) most = vgi_length(d), *joint = j;
         values += f->s->joints[j].nchannels;
     }

@@ -7,7 +7,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/rings.h"
 #include "net/heap.h"
-#include "numeric/vec3.h"
+#include "numeric/face.h"
 
 #include <stdlib.h>
 
@@ -24,9 +24,8 @@ static const double *point(const vgi_rings *r, size_t v)
 /* twice the area over the sum of squared sides: the larger, the better the triangle */
 static double quality(const double *a, const double *b, const double *c)
 {
-    double u[3], v[3], n[3];
-    for (int k = 0; k < 3; k++) u[k] = b[k] - a[k], v[k] = c[k] - a[k];
-    vgi_cross(u, v, n);
+    double n[3];
+    vgi_triangle_normal(a, b, c, n);
     return vgi_length(n) / (vgi_square(a, b) + vgi_square(a, c) + vgi_square(b, c) + 1e-300);
 }
 
@@ -92,7 +91,7 @@ static size_t put_both(half_edge *list, size_t n, uint32_t a, uint32_t b, double
 static double cotangent(const double *a, const double *b, const double *c)
 {
     double u[3], v[3], n[3];
-    for (int k = 0; k < 3; k++) u[k] = b[k] - a[k], v[k] = c[k] - a[k];
+    vgi_subtract(b, a, u), vgi_subtract(c, a, v);
     vgi_cross(u, v, n);
     return vgi_dot(u, v) / fmax(vgi_length(n), 1e-12 * fmax(vgi_dot(u, u), vgi_dot(v, v)) + 1e-300);
 }
@@ -145,7 +144,7 @@ static int make_edges(vgi_rings *r, const vg_mesh *m, vg_err *e)
         r->first[list[i].a + 1]++;
         r->to[i] = list[i].b;
         r->weight[i] = list[i].segment ? 1 : fmin(fmax(list[i].weight, least_weight), most_weight);
-        for (size_t k = 0; k < 3; k++) r->edge[3 * i + k] = point(r, list[i].a)[k] - point(r, list[i].b)[k];
+        vgi_subtract(point(r, list[i].a), point(r, list[i].b), r->edge + 3 * i);
     }
     for (size_t v = 0; v < r->nv; v++) r->first[v + 1] += r->first[v];
     free(list);
@@ -299,17 +298,11 @@ static void unit_normals(const vgi_rings *r, double *n)
     memset(n, 0, 3 * r->nv * sizeof *n);
     for (size_t i = 0; i < r->ntriangles; i++) {
         const uint32_t *t = r->triangle + 3 * i;
-        double u[3], v[3], c[3];
-        for (int k = 0; k < 3; k++)
-            u[k] = point(r, t[1])[k] - point(r, t[0])[k], v[k] = point(r, t[2])[k] - point(r, t[0])[k];
-        vgi_cross(u, v, c);
-        for (int j = 0; j < 3; j++)
-            for (size_t k = 0; k < 3; k++) n[3 * (size_t)t[j] + k] += c[k];
+        double c[3];
+        vgi_triangle_normal(point(r, t[0]), point(r, t[1]), point(r, t[2]), c);
+        for (int j = 0; j < 3; j++) vgi_add(n + 3 * (size_t)t[j], c);
     }
-    for (size_t v = 0; v < r->nv; v++) {
-        double length = vgi_length(n + 3 * v);
-        for (size_t k = 0; k < 3; k++) n[3 * v + k] = length > 0 ? n[3 * v + k] / length : 0;
-    }
+    for (size_t v = 0; v < r->nv; v++) vgi_make_unit(n + 3 * v);
 }
 
 static void make_ring(vgi_rings *r, size_t v, const double n[3])
@@ -324,11 +317,11 @@ static void make_ring(vgi_rings *r, size_t v, const double n[3])
     r->is_open[v] = invert_ring(m, inverse, r->open + 9 * v);
     r->nopen += r->is_open[v] && r->part[v] >= 0;
     vgi_multiply_vector(inverse, n, r->across + 3 * v);
-    for (size_t k = 0; k < 3; k++) r->across[3 * v + k] *= size / 2;
+    vgi_scale(r->across + 3 * v, size / 2);
     for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++) {
         double *g = r->gradient + 3 * (size_t)i;
         vgi_multiply_vector(inverse, r->edge + 3 * (size_t)i, g);
-        for (int k = 0; k < 3; k++) g[k] *= r->weight[i];
+        vgi_scale(g, r->weight[i]);
     }
 }
 

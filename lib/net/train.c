@@ -7,6 +7,7 @@
  * Leaves out features (feature.c), frames (dataset.c) and the report (judge.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/trainer.h"
+#include "numeric/vec3.h"
 #include "core/random.h"
 
 #include <math.h>
@@ -111,7 +112,7 @@ static void bring_home(const vg_trainer *t, const double *pose, const double *ro
     for (size_t v = 0; v < r->nv; v++) {
         size_t part = r->part[v] < 0 ? r->main_part : (size_t)r->part[v];
         double x[3];
-        for (size_t k = 0; k < 3; k++) x[k] = pose[3 * v + k] - centroids[3 * part + k];
+        vgi_subtract(pose + 3 * v, centroids + 3 * part, x);
         vg_quat_apply(back, x, home + 3 * v);
     }
 }

@@ -4,7 +4,7 @@
  * Leaves out the rotations of faces, eight poses at a time (polar_kernel.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/polar.h"
-#include "numeric/vec3.h"
+#include "numeric/face.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -140,14 +140,9 @@ int vgi_turns_make(vgi_turns *t, size_t nf, const uint32_t *start, const uint32_
     if (!t->vector || !t->normal) return vgi_turns_clear(t), VG_ENOMEM;
     for (size_t f = 0; f < nf; f++) {
         size_t begin = start[f], r = start[f + 1] - begin;
-        double centre[3] = {0, 0, 0}, *w = t->vector + 3 * begin, n[3], spread = 0;
-        for (size_t i = 0; i < r; i++)
-            for (size_t k = 0; k < 3; k++) centre[k] += reference[3 * (size_t)vert[begin + i] + k] / (double)r;
-        for (size_t i = 0; i < r; i++)
-            for (size_t k = 0; k < 3; k++) {
-                w[3 * i + k] = reference[3 * (size_t)vert[begin + i] + k] - centre[k];
-                spread += w[3 * i + k] * w[3 * i + k];
-            }
+        double *w = t->vector + 3 * begin, n[3], spread = 0;
+        vgi_face_vectors(reference, vert + begin, r, w);
+        for (size_t i = 0; i < 3 * r; i++) spread += w[i] * w[i];
         vgi_area_vector(w, r, n);
         double length = vgi_length(n);
         for (size_t k = 0; k < 3; k++)

@@ -2,6 +2,7 @@
  * out the choice of a corner's rotation (deform.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
+#include "numeric/vec3.h"
 
 #include <math.h>
 
@@ -86,7 +87,7 @@ static void perpendicular(const double r[3], double p[3])
     p[1] = r[2] * axis[0] - r[0] * axis[2];
     p[2] = r[0] * axis[1] - r[1] * axis[0];
     double length = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
-    for (int i = 0; i < 3; i++) p[i] /= length;
+    vgi_divide(p, length);
 }
 
 /* With unit vectors r and d: q = (1 + r.d, r x d), normalised, is the half-angle quaternion of Rodrigues' rotation.

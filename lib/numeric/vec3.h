@@ -8,6 +8,30 @@
 #include <stddef.h>
 #include <string.h>
 
+static inline void vgi_subtract(const double a[3], const double b[3], double d[3]) /* d = a - b */
+{
+    for (int k = 0; k < 3; k++) d[k] = a[k] - b[k];
+}
+static inline void vgi_sum(const double a[3], const double b[3], double s[3])
+{
+    for (int k = 0; k < 3; k++) s[k] = a[k] + b[k];
+}
+static inline void vgi_add(double x[3], const double y[3]) /* x += y */
+{
+    for (int k = 0; k < 3; k++) x[k] += y[k];
+}
+static inline void vgi_add_scaled(double x[3], double s, const double y[3]) /* x += s y */
+{
+    for (int k = 0; k < 3; k++) x[k] += s * y[k];
+}
+static inline void vgi_scale(double x[3], double s)
+{
+    for (int k = 0; k < 3; k++) x[k] *= s;
+}
+static inline void vgi_divide(double x[3], double s)
+{
+    for (int k = 0; k < 3; k++) x[k] /= s;
+}
 static inline double vgi_dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -15,6 +39,12 @@ static inline double vgi_dot(const double a[3], const double b[3])
 static inline double vgi_length(const double a[3])
 {
     return sqrt(vgi_dot(a, a));
+}
+static inline double vgi_make_unit(double x[3]) /* 0 stays 0; returns the length before */
+{
+    double length = vgi_length(x);
+    for (int k = 0; k < 3; k++) x[k] = length > 0 ? x[k] / length : 0;
+    return length;
 }
 static inline double vgi_square(const double a[3], const double b[3]) /* squared distance */
 {

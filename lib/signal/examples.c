@@ -168,6 +168,6 @@ void vg_corrector_apply(vg_corrector *c, const double *pose, double *vectors)
         for (size_t j = 0; j < c->n; j++)
             for (size_t k = 0; k < 3; k++) sum[k] += c->x[j] * c->miss[3 * (j * c->to + i) + k];
         vg_quat_apply(c->quaternions + 4 * i, sum, turned);
-        for (size_t k = 0; k < 3; k++) vectors[3 * i + k] += turned[k];
+        vgi_add(vectors + 3 * i, turned);
     }
 }

@@ -16,7 +16,7 @@ static void find(size_t nv, const double *reference, const double from[3], const
     }
     vgi_best_turn(b, turn);
     vg_quat_apply(turn, from, moved);
-    for (int k = 0; k < 3; k++) shift[k] = to[k] - moved[k];
+    vgi_subtract(to, moved, shift);
 }
 
 void vgi_root_remove(size_t n, size_t nv, const double *reference, double *poses, double *turn, double *shift)
@@ -43,6 +43,6 @@ void vgi_root_apply(const double turn[4], const double shift[3], size_t nv, doub
     for (size_t v = 0; v < nv; v++) {
         double *p = vertices + 3 * v, moved[3];
         vgi_multiply_vector(m, p, moved);
-        for (int k = 0; k < 3; k++) p[k] = moved[k] + shift[k];
+        vgi_sum(moved, shift, p);
     }
 }

@@ -159,7 +159,7 @@ bool vg_smoother_next(vg_smoother *s, double *vertices)
     vg_quat_matrix(root, m);
     for (size_t v = 0; v < s->nv; v++) {
         vgi_multiply_vector(m, vertices + 3 * v, vertices + 3 * v);
-        for (int k = 0; k < 3; k++) vertices[3 * v + k] += root[4 + k];
+        vgi_add(vertices + 3 * v, root + 4);
     }
     s->given++;
     return true;

@@ -4,6 +4,7 @@
  * body can take their place. Cholesky's factor of the differences' products leads from one to the other.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/span.h"
+#include "numeric/vec3.h"
 #include "numeric/blas.h"
 #include "numeric/lapack.h"
 #include "signal/root.h"
@@ -138,7 +139,7 @@ static void turn_back(const vg_signal *s, const double *reference, double *poses
         double *pose = poses + 3 * nv * i, shift[3];
         vg_centroid(pose, nv, centre);
         vg_quat_apply(back, centre, moved);
-        for (int k = 0; k < 3; k++) shift[k] = home[k] - moved[k];
+        vgi_subtract(home, moved, shift);
         vgi_root_apply(back, shift, nv, pose);
     }
 }

@@ -17,6 +17,7 @@
  * Leaves out how the meshes come to lie roughly on one another (register.c), and L with its matrices (springs.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/springs.h"
+#include "numeric/face.h"
 #include "model/incidence.h"
 
 #include <stdlib.h>
@@ -115,13 +116,6 @@ static int factorize(fit *t, vg_err *e)
 
 /* deformation of the faces */
 
-static void face_centre(const double *x, const uint32_t *vert, size_t r, double centre[3])
-{
-    centre[0] = centre[1] = centre[2] = 0;
-    for (size_t i = 0; i < r; i++)
-        for (int k = 0; k < 3; k++) centre[k] += x[3 * (size_t)vert[i] + (size_t)k] / (double)r;
-}
-
 static void prepare_faces(fit *t)
 {
     const vg_mesh *m = t->m;
@@ -129,13 +123,13 @@ static void prepare_faces(fit *t)
         const uint32_t *vert = m->vert + m->start[f];
         size_t r = m->start[f + 1] - m->start[f];
         double C[3], S[9] = {0}, n[3], *out = t->inverse + 9 * f;
-        face_centre(t->in->rest, vert, r, C);
+        vgi_face_centre(t->in->rest, vert, r, C);
         for (size_t i = 0; i < r; i++) {
             double w[3];
-            for (int k = 0; k < 3; k++) w[k] = t->in->rest[3 * (size_t)vert[i] + (size_t)k] - C[k];
+            vgi_subtract(t->in->rest + 3 * (size_t)vert[i], C, w);
             vgi_add_outer(S, 1, w, w);
         }
-        vgi_newell(t->in->rest, vert, r, n);
+        vgi_face_area(t->in->rest, vert, r, n);
         double area = vgi_length(n), h = 0.5 * (S[0] + S[4] + S[8]), c[9];
         t->area[f] = area;
         if (r == 2 || !(area > 0)) {
@@ -183,13 +177,13 @@ static void face_maps(fit *t, const double *x)
             bone_map(x, t->in->rest, vert, D);
             continue;
         }
-        face_centre(x, vert, r, C);
+        vgi_face_centre(x, vert, r, C);
         for (size_t i = 0; i < r; i++) {
             double d[3];
-            for (int k = 0; k < 3; k++) d[k] = x[3 * (size_t)vert[i] + (size_t)k] - C[k];
+            vgi_subtract(x + 3 * (size_t)vert[i], C, d);
             vgi_add_outer(S, 1, d, t->in->rest + 3 * (size_t)vert[i]);
         }
-        vgi_newell(x, vert, r, n);
+        vgi_face_area(x, vert, r, n);
         double area = vgi_length(n);
         if (area > 0) vgi_add_outer(S, sqrt(area / t->area[f]) / area, n, t->h_normal + 3 * f);
         const double *P = t->inverse + 9 * f;
@@ -297,7 +291,7 @@ static void add_smoothness(fit *t)
         for (uint32_t i = L->first[v]; i < L->first[v + 1]; i++) {
             size_t u = L->to[i];
             double d[3], a[3], b[3];
-            for (int k = 0; k < 3; k++) d[k] = t->in->rest[3 * v + (size_t)k] - t->in->rest[3 * u + (size_t)k];
+            vgi_subtract(t->in->rest + 3 * v, t->in->rest + 3 * u, d);
             vgi_multiply_vector(t->map + 9 * v, d, a);
             vgi_multiply_vector(t->map + 9 * u, d, b);
             for (int k = 0; k < 3; k++) to[k] += t->stretch * L->weight[i] * 0.5 * (a[k] + b[k]);
@@ -350,9 +344,9 @@ static void vertex_normals(const vg_mesh *m, const double *x, double sign, doubl
     memset(normal, 0, 3 * m->nv * sizeof *normal);
     for (size_t f = 0; f < m->nf; f++) {
         double n[3];
-        vgi_newell(x, m->vert + m->start[f], m->start[f + 1] - m->start[f], n);
+        vgi_face_area(x, m->vert + m->start[f], m->start[f + 1] - m->start[f], n);
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
-            for (size_t k = 0; k < 3; k++) normal[3 * (size_t)m->vert[c] + k] += n[k];
+            vgi_add(normal + 3 * (size_t)m->vert[c], n);
     }
     for (size_t v = 0; v < m->nv; v++) {
         double *n = normal + 3 * v, size = vgi_length(n);

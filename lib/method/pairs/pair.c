@@ -8,6 +8,7 @@
  * nearest in space, the same for the whole component so that it stays rigid. The fit is in fit.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/register.h"
+#include "numeric/vec3.h"
 #include "model/incidence.h"
 #include "numeric/kdtree.h"
 
@@ -290,7 +291,7 @@ static void piece_centres(const struct pairing *p, const uint32_t *label, double
         faces[k]++;
     }
     for (size_t k = 0; k < pieces; k++)
-        for (size_t l = 0; l < 3; l++) centre[3 * k + l] /= (double)faces[k];
+        vgi_divide(centre + 3 * k, (double)faces[k]);
 }
 
 /* The matched faces and a tree of their centroids. */

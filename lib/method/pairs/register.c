@@ -3,6 +3,7 @@
  * (pair.c), and files.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/register.h"
+#include "numeric/vec3.h"
 #include "numeric/kdtree.h"
 #include "numeric/stats.h"
 #include "numeric/polar.h"
@@ -45,9 +46,9 @@ static void fit_similarity(struct similarity *s, const double *from, const doubl
     double sum = 0, a[3] = {0}, b[3] = {0}, S[9] = {0}, aa = 0, bb = 0;
     for (size_t i = 0; i < n; i++) {
         sum += weight[i];
-        for (size_t k = 0; k < 3; k++) a[k] += weight[i] * from[3 * i + k], b[k] += weight[i] * to[3 * i + k];
+        vgi_add_scaled(a, weight[i], from + 3 * i), vgi_add_scaled(b, weight[i], to + 3 * i);
     }
-    for (int k = 0; k < 3; k++) a[k] /= sum, b[k] /= sum;
+    vgi_divide(a, sum), vgi_divide(b, sum);
     for (size_t i = 0; i < n; i++) {
         double x[3], y[3];
         for (size_t k = 0; k < 3; k++) {
@@ -260,7 +261,7 @@ static void neighbour_residuals(const double *from, const double *way, const boo
         for (size_t k = 0; k < found; k++) {
             double w = 1 / (square[k] + 1e-6);
             sum += w;
-            for (size_t l = 0; l < 3; l++) mean[l] += w * way[3 * near[k] + l];
+            vgi_add_scaled(mean, w, way + 3 * near[k]);
         }
         for (int l = 0; l < 3; l++) mean[l] = found ? mean[l] / sum : 0;
         residual[i] = sqrt(vgi_square(mean, way + 3 * i));

@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/random.h"
 #include "method/pairs/surface.h"
-#include "numeric/vec3.h"
+#include "numeric/face.h"
 #include "model/incidence.h"
 
 #include <math.h>
@@ -34,20 +34,6 @@ struct vgi_surface {
     struct triangle *triangle;
     struct box *box;
 };
-
-void vgi_newell(const double *points, const uint32_t *vert, size_t r, double area[3])
-{
-    /* relative to a corner, so that far from the origin no digits are lost */
-    const double *o = points + 3 * (size_t)vert[0];
-    area[0] = area[1] = area[2] = 0;
-    for (size_t i = 1; i + 1 < r; i++) {
-        const double *p = points + 3 * (size_t)vert[i], *q = points + 3 * (size_t)vert[i + 1];
-        double u[3] = {p[0] - o[0], p[1] - o[1], p[2] - o[2]}, v[3] = {q[0] - o[0], q[1] - o[1], q[2] - o[2]};
-        area[0] += 0.5 * (u[1] * v[2] - u[2] * v[1]);
-        area[1] += 0.5 * (u[2] * v[0] - u[0] * v[2]);
-        area[2] += 0.5 * (u[0] * v[1] - u[1] * v[0]);
-    }
-}
 
 /* ---- building ---- */
 
@@ -100,13 +86,10 @@ static void make_triangles(vgi_surface *s, const double *points, const bool *tak
         size_t begin = m->start[f], r = m->start[f + 1] - begin;
         const uint32_t *vert = m->vert + begin;
         const uint8_t *border = s->border + begin;
-        double *C = s->centroid + 3 * f, *n = s->normal + 3 * f, length;
-        for (size_t i = 0; i < r; i++)
-            for (int k = 0; k < 3; k++) C[k] += points[3 * (size_t)vert[i] + (size_t)k] / (double)r;
-        vgi_newell(points, vert, r, n);
-        length = sqrt(vgi_dot(n, n));
-        s->size[f] = sqrt(length);
-        for (int k = 0; k < 3; k++) n[k] = length > 0 ? n[k] / length : 0;
+        double *C = s->centroid + 3 * f, *n = s->normal + 3 * f;
+        vgi_face_centre(points, vert, r, C);
+        vgi_face_area(points, vert, r, n);
+        s->size[f] = sqrt(vgi_make_unit(n));
         const double *p = points + 3 * (size_t)vert[0], *q = points + 3 * (size_t)vert[1];
         if (r == 2) s->size[f] = sqrt(vgi_square(p, q));
         if (take && !take[f]) continue;
@@ -129,13 +112,9 @@ static void make_vertex_normals(vgi_surface *s)
     for (size_t f = 0; f < m->nf; f++) {
         if (m->start[f + 1] - m->start[f] == 2) continue;
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
-            for (size_t k = 0; k < 3; k++)
-                s->vertex_normal[3 * (size_t)m->vert[c] + k] += s->size[f] * s->size[f] * s->normal[3 * f + k];
+            vgi_add_scaled(s->vertex_normal + 3 * (size_t)m->vert[c], s->size[f] * s->size[f], s->normal + 3 * f);
     }
-    for (size_t v = 0; v < m->nv; v++) {
-        double *n = s->vertex_normal + 3 * v, length = sqrt(vgi_dot(n, n));
-        for (int k = 0; k < 3; k++) n[k] = length > 0 ? n[k] / length : 0;
-    }
+    for (size_t v = 0; v < m->nv; v++) vgi_make_unit(s->vertex_normal + 3 * v);
 }
 
 /* Compares triangles by their middle along an axis; a total order, so that the tree is always the same. */
@@ -227,7 +206,7 @@ static void make_boxes(vgi_surface *s)
         for (size_t j = begin; j < end; j++) {
             const struct triangle *t = &s->triangle[j];
             double b[3], c[3];
-            for (int k = 0; k < 3; k++) b[k] = t->a[k] + t->ab[k], c[k] = t->a[k] + t->ac[k];
+            vgi_sum(t->a, t->ab, b), vgi_sum(t->a, t->ac, c);
             widen(box, t->a, t->a);
             widen(box, b, b);
             widen(box, c, c);
@@ -352,7 +331,7 @@ static void try_edge(const struct triangle *t, const double p[3], int edge, doub
                      uint8_t *touched)
 {
     double bc[3], b[3], share, x[2], square = 0;
-    for (int k = 0; k < 3; k++) b[k] = t->a[k] + t->ab[k], bc[k] = t->ac[k] - t->ab[k];
+    vgi_sum(t->a, t->ab, b), vgi_subtract(t->ac, t->ab, bc);
     if (edge == 0) share = on_segment(t->a, t->ab, p), x[0] = share, x[1] = 0;
     else if (edge == 1) share = on_segment(b, bc, p), x[0] = 1 - share, x[1] = share;
     else share = on_segment(t->a, t->ac, p), x[0] = 0, x[1] = share;

@@ -41,7 +41,5 @@ bool vgi_surface_border(const vgi_surface *s, uint32_t corner);
 bool vgi_surface_nearest(const vgi_surface *s, const double p[3], const double *normal, double cosine, double limit,
                          vgi_hit *hit);
 
-/* vgi_newell: the vector area of a face, whose length is its area (0 for line segments). */
-void vgi_newell(const double *points, const uint32_t *vert, size_t r, double area[3]);
 
 #endif

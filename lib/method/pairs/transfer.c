@@ -5,6 +5,7 @@
  * Leaves out how the correspondence is found (register.c) and the loops over corners (transfer_kernel.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/transfer_kernel.h"
+#include "numeric/face.h"
 #include "method/vectors/moments.h"
 #include "model/incidence.h"
 
@@ -81,16 +82,13 @@ static int measure_source(vg_cross_transfer *c, const double *reference, vg_err 
     if (!w) return VG_ENOMEM;
     for (size_t f = 0; f < m->nf; f++) {
         size_t begin = m->start[f], r = source_size(c, f);
-        double centre[3] = {0, 0, 0}, P[6], size;
-        for (size_t i = 0; i < r; i++)
-            for (size_t k = 0; k < 3; k++) centre[k] += reference[3 * (size_t)m->vert[begin + i] + k] / (double)r;
-        for (size_t i = 0; i < r; i++)
-            for (size_t k = 0; k < 3; k++) w[3 * i + k] = reference[3 * (size_t)m->vert[begin + i] + k] - centre[k];
+        double P[6], size;
+        vgi_face_vectors(reference, m->vert + begin, r, w);
         memcpy(c->segment + 3 * f, w, 3 * sizeof *w);
         if (r == 2) {
             c->slow[f] = w[0] != 0 || w[1] != 0 || w[2] != 0 ? 1 : 2;
         } else if (vgi_gradient_moments(w, r, P, c->q + 3 * f, &size)) {
-            for (size_t k = 0; k < 3; k++) c->q[3 * f + k] /= sqrt(size);
+            vgi_divide(c->q + 3 * f, sqrt(size));
             for (size_t i = 0; i < r; i++) vgi_symmetric_times(P, w + 3 * i, c->p + 3 * (begin + i));
         } else {
             c->slow[f] = 2;

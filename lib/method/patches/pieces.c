@@ -2,6 +2,7 @@
  * in segment.c, components of whole meshes in mesh.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/patches/pieces.h"
+#include "numeric/vec3.h"
 #include "model/incidence.h"
 #include "numeric/sets.h"
 
@@ -130,7 +131,7 @@ int vgi_shared_points(const vg_mesh *m, const uint32_t *label, const uint32_t *p
                 size_t at = find_pair(pairs, n, seen[a], seen[b]);
                 if (at == n) continue;
                 count[at]++;
-                for (size_t c = 0; c < 3; c++) mean[3 * at + c] += points[3 * v + c];
+                vgi_add(mean + 3 * at, points + 3 * v);
             }
     }
     for (size_t i = 0; i < n; i++)

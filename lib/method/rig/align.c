@@ -38,7 +38,7 @@ void vgi_rests_clear(vgi_rests *x)
 
 void vgi_between(const double *positions, size_t a, size_t b, double d[3])
 {
-    for (size_t k = 0; k < 3; k++) d[k] = positions[3 * b + k] - positions[3 * a + k];
+    vgi_subtract(positions + 3 * b, positions + 3 * a, d);
 }
 
 uint32_t vgi_find_role(const vg_skeleton *s, const vgi_role *roles, vgi_part part, int side)

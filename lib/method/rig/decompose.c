@@ -44,7 +44,7 @@ static void find_centroids(dividing *d)
     memset(d->size, 0, d->n * sizeof *d->size);
     for (size_t v = 0; v < d->l->nv; v++) {
         size_t j = *cluster_of(d, v);
-        for (size_t k = 0; k < 3; k++) d->at[3 * j + k] += d->l->reference[3 * v + k];
+        vgi_add(d->at + 3 * j, d->l->reference + 3 * v);
         d->size[j]++;
     }
     for (size_t j = 0; j < d->n; j++)
@@ -211,15 +211,15 @@ static void sum_moments(merging *m)
         vg_centroid(l->reference, l->nv, reference);
         for (size_t v = 0; v < l->nv; v++) {
             size_t j = *cluster_of(m->d, v);
-            for (size_t c = 0; c < 3; c++) p[c] = l->reference[3 * v + c] - reference[c];
+            vgi_subtract(l->reference + 3 * v, reference, p);
             if (k == l->n) {
                 moments *to = &m->of[j];
                 to->n++, to->square += vgi_dot(p, p);
-                for (size_t c = 0; c < 3; c++) to->p[c] += p[c];
+                vgi_add(to->p, p);
                 continue;
             }
             double *to = pose_sums(m, j, k);
-            for (size_t c = 0; c < 3; c++) y[c] = l->poses[k][3 * v + c] - centre[c], to[9 + c] += y[c];
+            vgi_subtract(l->poses[k] + 3 * v, centre, y), vgi_add(to + 9, y);
             vgi_add_outer(to, 1, y, p);
             to[12] += vgi_dot(y, y);
         }

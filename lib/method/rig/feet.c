@@ -53,7 +53,7 @@ static void joint_at(const vg_rig *r, uint32_t joint, const double *transforms, 
 {
     const double *t = transforms + 7 * bone_of(r, joint);
     vg_quat_apply(t, r->at + 3 * (size_t)joint, at);
-    for (int k = 0; k < 3; k++) at[k] += t[4 + k];
+    vgi_add(at, t + 4);
 }
 
 static void group_bones(const vg_rig *r, leg *l)
@@ -176,7 +176,7 @@ static void hold_stand(const feet *f, leg *l, size_t i, size_t end)
     for (size_t p = i; p < end; p++) {
         if (l->known[p]) continue;
         l->known[p] = true;
-        for (int k = 0; k < 3; k++) l->shift[3 * p + (size_t)k] = place[k] - f->path[3 * p + (size_t)k];
+        vgi_subtract(place, f->path + 3 * p, l->shift + 3 * p);
     }
 }
 
@@ -253,9 +253,9 @@ static void lower_body(feet *f)
 static void move_bone(double *t, const double q[4], const double from[3], const double to[3])
 {
     double d[3], turned[3];
-    for (int k = 0; k < 3; k++) d[k] = t[4 + k] - from[k];
+    vgi_subtract(t + 4, from, d);
     vg_quat_apply(q, d, turned);
-    for (int k = 0; k < 3; k++) t[4 + k] = turned[k] + to[k];
+    vgi_sum(turned, to, t + 4);
     vg_quat_multiply(q, t, t);
 }
 
@@ -265,7 +265,7 @@ static void place_knee(const leg *l, const double hip[3], const double knee[3], 
                        const double forward[3], double foot[3], double now[3])
 {
     double a = l->length[0], b = l->length[1], u[3], old[3], q[4], thigh[3], side[3];
-    for (int k = 0; k < 3; k++) u[k] = foot[k] - hip[k], old[k] = before[k] - hip[k], thigh[k] = knee[k] - hip[k];
+    vgi_subtract(foot, hip, u), vgi_subtract(before, hip, old), vgi_subtract(knee, hip, thigh);
     double d = vgi_length(u), reach = fmin(fmax(d, fabs(a - b) / STRETCH), STRETCH * (a + b));
     vgi_turn_between(old, u, q);
     vg_quat_apply(q, thigh, side);
@@ -292,14 +292,14 @@ static void bend_leg(const feet *f, const leg *l, size_t p)
         joint_at(f->r, l->toe, t, forward);
         for (int k = 0; k < 3; k++) forward[k] -= foot[k];
     }
-    for (size_t k = 0; k < 3; k++) to[k] = foot[k] + l->shift[3 * p + k];
+    vgi_sum(foot, l->shift + 3 * p, to);
     to[f->up] += f->sign * f->lower[p]; /* the body went down, the foot does not */
     double away[3] = {to[0] - hip[0], to[1] - hip[1], to[2] - hip[2]};
     if (!(vgi_length(away) > 0)) return;
     place_knee(l, hip, knee, foot, forward, to, now);
-    for (int k = 0; k < 3; k++) was[k] = knee[k] - hip[k], is[k] = now[k] - hip[k];
+    vgi_subtract(knee, hip, was), vgi_subtract(now, hip, is);
     vgi_turn_between(was, is, q[0]);
-    for (int k = 0; k < 3; k++) was[k] = foot[k] - knee[k], is[k] = to[k] - now[k];
+    vgi_subtract(foot, knee, was), vgi_subtract(to, now, is);
     vgi_turn_between(was, is, q[1]);
     for (size_t b = 0; b < f->r->nbones; b++) {
         if (l->group[b] == THIGH) move_bone(t + 7 * b, q[0], hip, hip);

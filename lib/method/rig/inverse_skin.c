@@ -79,7 +79,7 @@ static size_t vertex_row(const vg_inverse_skin *x, size_t v, uint32_t *list, dou
                 seen[j] = true, list[count++] = j;
                 q[3 * j] = q[3 * j + 1] = q[3 * j + 2] = 0;
             }
-            for (size_t k = 0; k < 3; k++) q[3 * j + k] += w * add[k];
+            vgi_add_scaled(q + 3 * j, w, add);
         }
     }
     for (size_t i = 0; i < count; i++) seen[list[i]] = false;
@@ -106,7 +106,7 @@ static void sum_share(void *context, size_t share)
         size_t count = vertex_row(x, v, list, q, s->seen + share * n);
         for (size_t a = 0; a < count; a++) {
             const double *p = q + 3 * (size_t)list[a];
-            for (size_t k = 0; k < 3; k++) mean[3 * list[a] + k] += p[k];
+            vgi_add(mean + 3 * list[a], p);
             for (size_t b = 0; b < count; b++) {
                 if (list[b] > list[a]) continue;
                 const double *r = q + 3 * (size_t)list[b];
@@ -247,7 +247,7 @@ static void load(const vg_inverse_skin *x, const double *pose, const double cent
         for (int c = 0; c < 3; c++) {
             double d = (y[c] - centre[c]) / (double)x->nv;
             sum[c] += x->weight[s] * d;
-            for (int k = 0; k < 3; k++) b[3 * c + k] += d * q[k];
+            vgi_add_scaled(b + 3 * c, d, q);
         }
     }
 }

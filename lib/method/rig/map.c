@@ -14,7 +14,7 @@
  * poses show beyond that: a ridge regression of what hinges miss on the A of all patches, as strong as makes it
  * predict left-out poses best.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "numeric/vec3.h"
+#include "numeric/face.h"
 #include "numeric/lapack.h"
 #include "method/rig/map_parts.h"
 #include "method/patches/pieces.h"
@@ -267,9 +267,8 @@ static void add_face(const adding *a, size_t face)
     double *sum = f->turn + 9 * face;
     for (size_t k = 0; k < a->lanes; k++) {
         const vgi_motion *m = &a->motion[k * n + f->of_face[face]];
-        double centre[3] = {0, 0, 0}, b = sqrt(m->b2);
-        for (size_t i = 0; i < r; i++)
-            for (size_t c = 0; c < 3; c++) centre[c] += a->poses[k][3 * (size_t)g->vert[begin + i] + c] / (double)r;
+        double centre[3], b = sqrt(m->b2);
+        vgi_face_centre(a->poses[k], g->vert + begin, r, centre);
         for (size_t i = 0; i < r; i++) {
             const double *x = a->poses[k] + 3 * (size_t)g->vert[begin + i];
             const double d[3] = {x[0] - centre[0], x[1] - centre[1], x[2] - centre[2]};
@@ -374,7 +373,7 @@ static void fit_hinge(const vg_map_fitter *f, size_t i, size_t j, const double m
         for (int q = 0; q < 9; q++) d[q] = a->a[q] - b->a[q];
         vgi_move_point(a, middle, at_a);
         vgi_move_point(b, middle, at_b);
-        for (int q = 0; q < 3; q++) gap[q] = at_b[q] - at_a[q];
+        vgi_subtract(at_b, at_a, gap);
         add_back(d, gap, y);
         for (int p = 0; p < 3; p++)
             for (int q = 0; q < 3; q++)
@@ -383,7 +382,7 @@ static void fit_hinge(const vg_map_fitter *f, size_t i, size_t j, const double m
     for (int q = 0; q < 3; q++) s[4 * q] += firmness * (double)f->poses;
     if (vgi_spd_factor(3, s)) vgi_spd_solve(3, s, 1, y);
     else y[0] = y[1] = y[2] = 0;
-    for (int q = 0; q < 3; q++) c[q] = middle[q] + y[q];
+    vgi_sum(middle, y, c);
     *miss = 0;
     for (size_t k = 0; k < f->poses; k++) {
         double at_a[3], at_b[3];

@@ -206,7 +206,7 @@ void vg_player_place(vg_player *p, double *transforms)
     root_of(p, p->m->centre, root);
     for (size_t i = 0; i < p->m->n; i++) {
         placed(p, i, t);
-        for (size_t k = 0; k < 3; k++) transforms[7 * i + 4 + k] = t[k] + root[k];
+        vgi_sum(t, root, transforms + 7 * i + 4);
     }
 }
 

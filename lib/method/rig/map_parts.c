@@ -2,6 +2,7 @@
  * Fitting to poses is in map.c, evaluation in map_eval.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/map_parts.h"
+#include "numeric/vec3.h"
 #include "numeric/lapack.h"
 #include "numeric/polar.h"
 #include "model/rig.h"
@@ -39,7 +40,7 @@ int vgi_shape_make(vgi_shape *s, const vg_mesh *m, const vg_patches *patches, co
         size_t p = (size_t)(all[i] >> 32);
         s->member[i] = (uint32_t)all[i];
         s->first[p + 1] = (uint32_t)i + 1;
-        for (size_t k = 0; k < 3; k++) s->centre[3 * p + k] += points[3 * (size_t)s->member[i] + k];
+        vgi_add(s->centre + 3 * p, points + 3 * (size_t)s->member[i]);
     }
     for (size_t p = 0; p < s->n; p++) {
         if (s->first[p + 1] < s->first[p]) s->first[p + 1] = s->first[p];
@@ -199,7 +200,7 @@ static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *o
         if (m->corner_bone[i] != p) continue;
         double *to = wanted + 3 * (i / m->per_corner), d[3];
         vg_quat_apply(m->corner + 4 * i, vectors + 3 * (i / m->per_corner), d);
-        for (int k = 0; k < 3; k++) to[k] += d[k];
+        vgi_add(to, d);
     }
 }
 
@@ -270,7 +271,7 @@ void vgi_map_skin_row(vg_map *m, const vgi_map_body *body, size_t v)
     memset(row, 0, 4 * m->n * sizeof *row);
     for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++) {
         double w = r->skin_weight[s], *to = row + 4 * (size_t)r->skin_bone[s];
-        for (size_t k = 0; k < 3; k++) to[k] += w * body->reference[3 * v + k];
+        vgi_add_scaled(to, w, body->reference + 3 * v);
         to[3] += w;
     }
 }

@@ -122,7 +122,7 @@ static void move_joint(const vg_rig *r, size_t nv, const double *from, const dou
             pull = (shared > 1e-3 ? w[0] * w[1] : own > 1e-3 ? w[0] : 1) / (near * near);
             if (round == 1) {
                 sum += pull;
-                for (int k = 0; k < 3; k++) before[k] += pull * x[k], after[k] += pull * y[k];
+                vgi_add_scaled(before, pull, x), vgi_add_scaled(after, pull, y);
                 continue;
             }
             for (int k = 0; k < 3; k++) {
@@ -153,7 +153,7 @@ static int move_joints(vg_rig *r, size_t nv, const double *from, const double *t
         if (joint->parent == UINT32_MAX) continue;
         const double *q = r->turn + 4 * (size_t)joint->parent, back[4] = {q[0], -q[1], -q[2], -q[3]};
         double d[3];
-        for (size_t k = 0; k < 3; k++) d[k] = r->at[3 * j + k] - r->at[3 * (size_t)joint->parent + k];
+        vgi_subtract(r->at + 3 * j, r->at + 3 * (size_t)joint->parent, d);
         vg_quat_apply(back, d, joint->offset);
     }
     free(mover);

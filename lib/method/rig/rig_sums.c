@@ -1,6 +1,7 @@
 /* rig_sums.c: the sums over poses to which weights and corners of a rig are fitted, one matrix product per block
  * of poses. They are used in skin.c and envelope.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "numeric/face.h"
 #include "method/rig/rig_sums.h"
 #include "numeric/blas.h"
 
@@ -94,9 +95,8 @@ static void add_lengths(const adding *a, size_t face)
     const vgi_turns *t = a->s->turns;
     uint32_t begin = t->start[face], end = t->start[face + 1];
     for (size_t k = 0; k < a->count; k++) {
-        double centre[3] = {0, 0, 0};
-        for (uint32_t c = begin; c < end; c++)
-            for (size_t i = 0; i < 3; i++) centre[i] += a->poses[k][3 * (size_t)t->vert[c] + i] / (end - begin);
+        double centre[3];
+        vgi_face_centre(a->poses[k], t->vert + begin, end - begin, centre);
         for (uint32_t c = begin; c < end; c++)
             for (size_t i = 0; i < 3; i++) {
                 double d = a->poses[k][3 * (size_t)t->vert[c] + i] - centre[i];

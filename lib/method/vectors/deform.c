@@ -59,7 +59,7 @@ static bool corner_frame(const vg_deformer *d, const double w[3], const double n
     for (int k = 0; k < 3; k++) m[k] = n[k] - along * u[k];
     double sine = vgi_length(m);
     if (!(sine > flat)) return false;
-    for (int k = 0; k < 3; k++) m[k] /= sine;
+    vgi_divide(m, sine);
     vgi_cross(m, u, b);
     const double matrix[9] = {u[0], b[0], m[0], u[1], b[1], m[1], u[2], b[2], m[2]};
     vg_quat_from_matrix(matrix, q);
@@ -150,7 +150,7 @@ static void face_vectors(const vg_graph *g, size_t f, vg_kind kind, const double
     double centre[3] = {0, 0, 0};
     for (size_t i = 0; i < r; i++)
         for (int k = 0; k < 3; k++) centre[k] += w[3 * i + k] = pose[3 * (size_t)g->vert[begin + i] + k];
-    for (int k = 0; k < 3; k++) centre[k] /= (double)r;
+    vgi_divide(centre, (double)r);
     for (size_t i = 0; i < r; i++)
         for (int k = 0; k < 3; k++) w[3 * i + k] -= centre[k];
 }

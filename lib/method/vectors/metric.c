@@ -21,14 +21,14 @@ static void make_face(vgi_face_metric *m, double *plane, const double *w, size_t
     if (r < 3 || !(length > 0)) return;
     /* axes of the plane: along the first vector that is not parallel to the normal, and across */
     double a[3] = {0, 0, 0}, b[3], most = 0;
-    for (int k = 0; k < 3; k++) n[k] /= length;
+    vgi_divide(n, length);
     for (size_t i = 0; i < r; i++) {
         double t[3], along = vgi_dot(n, w + 3 * i);
         for (size_t k = 0; k < 3; k++) plane[3 * i + k] = t[k] = w[3 * i + k] - along * n[k];
         if (vgi_dot(t, t) > most) most = vgi_dot(t, t), memcpy(a, t, sizeof a);
     }
     if (!(most > 0)) return;
-    for (int k = 0; k < 3; k++) a[k] /= sqrt(most);
+    vgi_divide(a, sqrt(most));
     vgi_cross(n, a, b);
     double aa = 0, ab = 0, bb = 0;
     for (size_t i = 0; i < r; i++) {

@@ -51,12 +51,12 @@ bool vgi_gradient_moments(const double *w, size_t r, double P[6], double q[3], d
     }
     *size = area_vector(w, r, n);
     if (!(*size > 0)) return false;
-    for (int k = 0; k < 3; k++) n[k] /= *size;
+    vgi_divide(n, *size);
     double h = (sum[0] + sum[3] + sum[5]) / 2;
     sum[0] += h * n[0] * n[0], sum[1] += h * n[0] * n[1], sum[2] += h * n[0] * n[2];
     sum[3] += h * n[1] * n[1], sum[4] += h * n[1] * n[2], sum[5] += h * n[2] * n[2];
     if (!invert(sum, P)) return false;
     vgi_symmetric_times(P, n, q);
-    for (int k = 0; k < 3; k++) q[k] *= h;
+    vgi_scale(q, h);
     return true;
 }

@@ -15,6 +15,7 @@
  * solves (solve_kernel.c), that guess (guess_kernel.c) and the factorisation (sparse.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/solver.h"
+#include "numeric/vec3.h"
 
 #include <stdlib.h>
 #include <time.h>
@@ -375,7 +376,7 @@ void vgi_solver_place(const vg_solver *s, double *x, const double *anchor, const
     double shift[3];
     for (int k = 0; k < 3; k++) shift[k] = s->nanchors ? anchor[k] : root[k] - mean[k];
     for (size_t v = 0; v < g->nv; v++)
-        for (size_t k = 0; k < 3; k++) x[3 * v + k] += shift[k];
+        vgi_add(x + 3 * v, shift);
     for (size_t i = 0; i < s->nanchors; i++) memcpy(x + 3 * (size_t)s->anchors[i], anchor + 3 * i, 3 * sizeof *x);
     for (size_t i = 0; i < s->nisolated; i++)
         memcpy(x + 3 * (size_t)s->isolated[i], s->isolated_at + 3 * i, 3 * sizeof *x);

@@ -2,6 +2,7 @@
  * body (move.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
+#include "numeric/vec3.h"
 
 #include <stdlib.h>
 
@@ -76,11 +77,11 @@ static void shape_pose(void *context, size_t i)
         uint32_t begin = g->start[f], end = g->start[f + 1];
         double centre[3] = {0, 0, 0}, part = 1.0 / (double)(end - begin);
         for (uint32_t c = begin; c < end; c++)
-            for (size_t k = 0; k < 3; k++) centre[k] += in[3 * (size_t)g->vert[c] + k];
-        for (int k = 0; k < 3; k++) centre[k] *= part;
+            vgi_add(centre, in + 3 * (size_t)g->vert[c]);
+        vgi_scale(centre, part);
         for (uint32_t c = begin; c < end; c++) {
             double w[3], *to = out + 3 * (size_t)g->vert[c];
-            for (size_t k = 0; k < 3; k++) w[k] = in[3 * (size_t)g->vert[c] + k] - centre[k];
+            vgi_subtract(in + 3 * (size_t)g->vert[c], centre, w);
             vg_quat_apply(s->quaternion + 4 * (size_t)c, w, w);
             for (int k = 0; k < 3; k++) to[k] += centre[k] + w[k];
         }

@@ -233,7 +233,7 @@ static void sum_around(choice *c)
     memset(c->at, 0, 3 * g->nv * sizeof *c->at);
     for (size_t f = 0; f < g->nf; f++)
         for (size_t i = g->start[f]; i < g->start[f + 1]; i++)
-            for (size_t k = 0; k < 3; k++) c->at[3 * (size_t)g->vert[i] + k] += c->turn[3 * f + k];
+            vgi_add(c->at + 3 * (size_t)g->vert[i], c->turn + 3 * f);
 }
 
 static size_t faces_around(const choice *c, size_t v)
@@ -266,10 +266,10 @@ static size_t sweep(choice *c)
         double mean[3], l[3], step[3], *now = c->turn + 3 * f;
         if (!mean_beside(c, f, mean)) continue;
         follow(c->q + 4 * f, mean, l);
-        for (int k = 0; k < 3; k++) step[k] = l[k] - now[k];
+        vgi_subtract(l, now, step);
         if (!(vgi_dot(step, step) > M_PI * M_PI / 4)) continue;
         for (size_t i = g->start[f]; i < g->start[f + 1]; i++)
-            for (size_t k = 0; k < 3; k++) c->at[3 * (size_t)g->vert[i] + k] += step[k];
+            vgi_add(c->at + 3 * (size_t)g->vert[i], step);
         memcpy(now, l, sizeof l);
         changed++;
     }
@@ -285,7 +285,7 @@ static bool is_beyond(const choice *c, const double *corner)
         const double *turn = c->turn + 3 * f;
         double l[3], shortest[3], off[3];
         vgi_branch_near(c->q + 4 * f, turn, l);
-        for (int k = 0; k < 3; k++) off[k] = l[k] - turn[k];
+        vgi_subtract(l, turn, off);
         if (!(vgi_dot(off, off) <= rounding) || !(sqrt(vgi_dot(turn, turn)) <= M_PI / 2 + rounding)) return true;
         for (size_t i = g->start[f]; i < g->start[f + 1]; i++) {
             double q[4];
@@ -293,7 +293,7 @@ static bool is_beyond(const choice *c, const double *corner)
             make_unit(q);
             vgi_branch_near(q, turn, l);
             vgi_branch_near(q, none, shortest);
-            for (int k = 0; k < 3; k++) off[k] = l[k] - shortest[k];
+            vgi_subtract(l, shortest, off);
             if (vgi_dot(off, off) > 1 && !(sqrt(vgi_dot(l, l)) <= M_PI / 2 + rounding)) return true;
         }
     }
@@ -332,7 +332,7 @@ static void add_laplacian(choice *c, const double *x, double *y)
     memset(c->at, 0, 3 * g->nv * sizeof *c->at);
     for (size_t f = 0; f < g->nf; f++)
         for (size_t i = g->start[f]; i < g->start[f + 1]; i++)
-            for (size_t k = 0; k < 3; k++) c->at[3 * (size_t)g->vert[i] + k] += x[3 * f + k];
+            vgi_add(c->at + 3 * (size_t)g->vert[i], x + 3 * f);
     for (size_t v = 0; v < g->nv; v++)
         for (size_t k = 0; k < 3 && faces_around(c, v); k++) c->at[3 * v + k] /= (double)faces_around(c, v);
     for (size_t f = 0; f < g->nf; f++)
@@ -379,7 +379,7 @@ static void linearise(choice *c, relaxation *r)
         double length = sqrt(vgi_dot(turn, turn)), y[3];
         for (int k = 0; k < 3; k++) r->axis[3 * f + (size_t)k] = length > 0 ? turn[k] / length : 0;
         pull(r, f, l + 1, y);
-        for (int k = 0; k < 3; k++) b[k] = y[k] - b[k];
+        vgi_subtract(y, b, b);
     }
 }
 
