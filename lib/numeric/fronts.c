@@ -1,11 +1,14 @@
 /* fronts.c: Cholesky factors of many principal submatrices of one matrix, by the multifrontal method (Duff and Reid
- * 1983) on CHOLMOD's analysis of the whole.
+ * 1983) on the supernodes of a factor that CHOLMOD has made.
  *
  * A supernode is eliminated in a dense front: its entries of the matrix, and what is left (the update) of the fronts of
  * its children. A row that is held is left out of all fronts. That changes numbers only in the supernode of the row and
- * its ancestors; blocks and updates of all others are computed once, for all sets of held rows. Where only rows below a
- * block are held, they are dropped from a copy. The root is never shared: whatever is held, it changes, and before
- * anything is held it may be singular.
+ * its ancestors. Blocks of all others are those of CHOLMOD, and their updates are computed once, for all sets of held
+ * rows. Where only rows below a block are held, they are dropped from a copy.
+ *
+ * The border is a supernode of its own, the last, and a row of every front above a row that it has an entry in. Blocks
+ * and updates of these fronts are made with it, and shared as well; the border's own block is not: unless rows are held,
+ * it may be singular.
  *
  * Updates of one set are on a stack, since supernodes are in postorder. Leaves out the dense arithmetic
  * (fronts_kernel.c) and triangular solves (solve_kernel.c).
@@ -19,15 +22,15 @@
 enum { MOST_SHARED = 16 << 20 }; /* numbers in shared blocks and updates; a larger matrix shares none */
 
 struct vgi_fronts {
-    vgi_cholesky *analysis;
-    vgi_factor f;    /* without blocks */
-    uint32_t *row;   /* per row of the matrix: its row in f */
+    vgi_factor base; /* as CHOLMOD made it, borrowed */
+    vgi_factor f;    /* with the border, without blocks */
+    int *super, *pi, *rows; /* of f */
     int *parent;     /* per supernode; -1: root */
     int *child, *next; /* per supernode: its last child, its sibling before; -1: none */
     size_t most_rows;  /* of a front */
-    int *start, *at; /* the lower triangle by columns, rows and columns as in f */
+    int *start, *at; /* the lower triangle by columns, in the order of f */
     double *value;
-    double *shared;  /* blocks and updates of all but roots; NULL: none */
+    double *shared;  /* updates, and blocks that the border is in; NULL: none */
     const double **block, **update; /* per supernode; NULL: not shared */
 };
 
@@ -44,7 +47,7 @@ typedef struct elimination {
     uint32_t *place;  /* per row of f: its place in the front at hand, or NONE */
     double *stack;
     const double **update; /* per supernode */
-    uint32_t *to;     /* places of a child's rows */
+    uint32_t *at, *to, *run; /* rows of a child's update, their places in the front at hand, runs of them */
 } elimination;
 
 static size_t rows_of(const vgi_factor *f, size_t s)
@@ -62,55 +65,151 @@ static bool is_held(const elimination *x, int row)
     return x->held && x->held[row];
 }
 
-/* ---- what is shared ---- */
+/* ---- supernodes, with the border ---- */
 
-static int find_parents(vgi_fronts *b, vg_err *e)
+static int find_parents(const vgi_factor *f, int *parent, vg_err *e)
 {
-    const vgi_factor *f = &b->f;
     int *owner = vgi_array_raw(f->n, sizeof *owner, e);
     if (!owner) return VG_ENOMEM;
     for (size_t s = 0; s < f->supernodes; s++)
         for (int j = f->super[s]; j < f->super[s + 1]; j++) owner[j] = (int)s;
     for (size_t s = 0; s < f->supernodes; s++)
-        b->parent[s] = rows_of(f, s) > columns_of(f, s) ? owner[f->rows[(size_t)f->pi[s] + columns_of(f, s)]] : -1;
+        parent[s] = rows_of(f, s) > columns_of(f, s) ? owner[f->rows[(size_t)f->pi[s] + columns_of(f, s)]] : -1;
     free(owner);
     return VG_OK;
 }
 
-static int permute_matrix(vgi_fronts *b, const vgi_sparse *a, vg_err *e)
+/* The rows in the order of the factor that the border has entries in. */
+static int mark_entries(const vgi_cholesky *c, const vgi_border *border, bool *entry, vg_err *e)
 {
-    const int *order = vgi_cholesky_order(b->analysis);
-    size_t entries = (size_t)a->start[a->n];
-    b->row = vgi_array_raw(a->n, sizeof *b->row, e);
-    b->start = vgi_array(a->n + 2, sizeof *b->start, e);
-    b->at = vgi_array_raw(entries, sizeof *b->at, e);
-    b->value = vgi_array_raw(entries, sizeof *b->value, e);
-    if (!b->row || !b->start || !b->at || !b->value) return VG_ENOMEM;
-    for (size_t i = 0; i < a->n; i++) b->row[order[i]] = (uint32_t)i;
-    int *next = b->start + 1; /* becomes the start of the column behind */
-    for (int pass = 0; pass < 2; pass++) {
-        for (size_t j = 0; j < a->n; j++)
-            for (int k = a->start[j]; k < a->start[j + 1]; k++) {
-                uint32_t p = b->row[j], q = b->row[a->row[k]], column = p < q ? p : q;
-                if (pass == 0) {
-                    next[column + 1]++;
-                } else {
-                    b->at[next[column]] = (int)(p < q ? q : p);
-                    b->value[next[column]++] = a->value[k];
-                }
-            }
-        for (size_t j = 0; pass == 0 && j < a->n; j++) next[j + 1] += next[j];
+    size_t n = vgi_cholesky_factor(c).n;
+    const int *order = vgi_cholesky_order(c);
+    bool *of_matrix = vgi_array(n, sizeof *of_matrix, e);
+    if (!of_matrix) return VG_ENOMEM;
+    for (size_t i = 0; i < border->n; i++) of_matrix[border->row[i]] = true;
+    for (size_t i = 0; i < n; i++) entry[i] = of_matrix[order[i]];
+    free(of_matrix);
+    return VG_OK;
+}
+
+/* The supernodes of base that get the border as their last row. */
+static int mark_bordered(vgi_fronts *b, const vgi_cholesky *c, const vgi_border *border, bool *bordered, vg_err *e)
+{
+    bool *entry = vgi_array(b->base.n, sizeof *entry, e);
+    int *parent = vgi_array_raw(b->base.supernodes, sizeof *parent, e);
+    int r = entry && parent ? mark_entries(c, border, entry, e) : VG_ENOMEM;
+    if (r == VG_OK) r = find_parents(&b->base, parent, e);
+    for (size_t s = 0; r == VG_OK && s < b->base.supernodes; s++) {
+        for (int j = b->base.super[s]; j < b->base.super[s + 1]; j++) bordered[s] |= entry[j];
+        if (bordered[s] && parent[s] >= 0) bordered[parent[s]] = true;
+    }
+    free(entry);
+    free(parent);
+    return r;
+}
+
+static int make_supernodes(vgi_fronts *b, const vgi_cholesky *c, const vgi_border *border, vg_err *e)
+{
+    const vgi_factor *base = &b->base;
+    size_t n = base->supernodes, all = n + (border != NULL), nrows = 0;
+    bool *bordered = vgi_array(n, sizeof *bordered, e);
+    b->super = vgi_array(all + 1, sizeof *b->super, e);
+    b->pi = vgi_array(all + 1, sizeof *b->pi, e);
+    b->rows = vgi_array_raw((n ? (size_t)base->pi[n] : 0) + all, sizeof *b->rows, e);
+    int r = bordered && b->super && b->pi && b->rows ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK && border) r = mark_bordered(b, c, border, bordered, e);
+    for (size_t s = 0; r == VG_OK && s < all; s++) {
+        for (int i = s < n ? base->pi[s] : 0; s < n && i < base->pi[s + 1]; i++) b->rows[nrows++] = base->rows[i];
+        if (s == n || bordered[s]) b->rows[nrows++] = (int)base->n;
+        b->super[s + 1] = s < n ? base->super[s + 1] : (int)base->n + 1;
+        b->pi[s + 1] = (int)nrows;
+    }
+    b->f = (vgi_factor){base->n + (border != NULL), all, b->super, b->pi, b->rows, NULL};
+    free(bordered);
+    return r;
+}
+
+static int make_tree(vgi_fronts *b, vg_err *e)
+{
+    size_t n = b->f.supernodes;
+    b->parent = vgi_array_raw(n, sizeof *b->parent, e);
+    b->child = vgi_array_raw(n, sizeof *b->child, e);
+    b->next = vgi_array_raw(n, sizeof *b->next, e);
+    b->block = vgi_array(n, sizeof *b->block, e);
+    b->update = vgi_array(n, sizeof *b->update, e);
+    if (!b->parent || !b->child || !b->next || !b->block || !b->update) return VG_ENOMEM;
+    if (find_parents(&b->f, b->parent, e) < 0) return VG_ENOMEM;
+    for (size_t s = 0; s < n; s++) b->child[s] = b->next[s] = -1;
+    for (size_t s = 0; s < n; s++) {
+        if (rows_of(&b->f, s) > b->most_rows) b->most_rows = rows_of(&b->f, s);
+        if (b->parent[s] < 0) continue;
+        b->next[s] = b->child[b->parent[s]];
+        b->child[b->parent[s]] = (int)s;
     }
     return VG_OK;
 }
 
-/* Place of each supernode's numbers: those of blocks, then those of updates. Returns how many. */
+/* ---- the matrix ---- */
+
+static void count_entry(int *next, uint32_t p, uint32_t q)
+{
+    next[(p < q ? p : q) + 1]++;
+}
+
+static void put_entry(vgi_fronts *b, int *next, uint32_t p, uint32_t q, double value)
+{
+    int to = next[p < q ? p : q]++;
+    b->at[to] = (int)(p < q ? q : p);
+    b->value[to] = value;
+}
+
+/* new: per row of a, its row in f. */
+static void copy_entries(vgi_fronts *b, const vgi_sparse *a, const vgi_border *border, const uint32_t *new)
+{
+    size_t last = a->n;
+    int *next = b->start + 1; /* becomes the start of the column behind */
+    for (size_t j = 0; j < a->n; j++)
+        for (int k = a->start[j]; k < a->start[j + 1]; k++) count_entry(next, new[j], new[a->row[k]]);
+    for (size_t i = 0; border && i < border->n; i++) count_entry(next, new[border->row[i]], (uint32_t)last);
+    if (border) next[last + 1]++;
+    for (size_t j = 0; j < b->f.n; j++) next[j + 1] += next[j];
+    for (size_t j = 0; j < a->n; j++)
+        for (int k = a->start[j]; k < a->start[j + 1]; k++) put_entry(b, next, new[j], new[a->row[k]], a->value[k]);
+    for (size_t i = 0; border && i < border->n; i++)
+        put_entry(b, next, new[border->row[i]], (uint32_t)last, border->value[i]);
+    if (border) put_entry(b, next, (uint32_t)last, (uint32_t)last, border->diagonal);
+}
+
+static int permute_matrix(vgi_fronts *b, const vgi_sparse *a, const vgi_cholesky *c, const vgi_border *border, vg_err *e)
+{
+    const int *order = vgi_cholesky_order(c);
+    size_t entries = (size_t)a->start[a->n] + (border ? border->n + 1 : 0);
+    uint32_t *new = vgi_array_raw(a->n, sizeof *new, e);
+    b->start = vgi_array(b->f.n + 2, sizeof *b->start, e);
+    b->at = vgi_array_raw(entries, sizeof *b->at, e);
+    b->value = vgi_array_raw(entries, sizeof *b->value, e);
+    int r = new && b->start && b->at && b->value ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; r == VG_OK && i < a->n; i++) new[order[i]] = (uint32_t)i;
+    if (r == VG_OK) copy_entries(b, a, border, new);
+    free(new);
+    return r;
+}
+
+/* ---- what is shared: places ---- */
+
+/* Whether CHOLMOD has eliminated front s as it is. */
+static bool is_of_base(const vgi_fronts *b, size_t s)
+{
+    return s < b->base.supernodes && rows_of(&b->f, s) == rows_of(&b->base, s);
+}
+
+/* Numbers of the blocks that are not CHOLMOD's, and of updates. */
 static size_t count_shared(const vgi_fronts *b)
 {
     size_t n = 0;
-    for (size_t s = 0; s < b->f.supernodes; s++) {
+    for (size_t s = 0; s < b->base.supernodes; s++) {
         size_t rows = rows_of(&b->f, s), columns = columns_of(&b->f, s), left = rows - columns;
-        if (b->parent[s] >= 0) n += rows * columns + left * left;
+        n += left * left + (is_of_base(b, s) ? 0 : rows * columns);
     }
     return n;
 }
@@ -118,10 +217,10 @@ static size_t count_shared(const vgi_fronts *b)
 static void place_shared(vgi_fronts *b)
 {
     double *at = b->shared;
-    for (size_t s = 0; s < b->f.supernodes; s++) {
+    for (size_t s = 0; s < b->base.supernodes; s++) {
         size_t rows = rows_of(&b->f, s), columns = columns_of(&b->f, s), left = rows - columns;
-        if (b->parent[s] < 0) continue;
-        b->block[s] = at, at += rows * columns;
+        b->block[s] = is_of_base(b, s) ? b->base.block[s] : at;
+        at += is_of_base(b, s) ? 0 : rows * columns;
         b->update[s] = at, at += left * left;
     }
 }
@@ -155,23 +254,19 @@ static void add_matrix(const elimination *x, size_t s, double *l)
     }
 }
 
-/* Add the update of child s to the front at hand, of m rows and c columns. A shared update still has rows of held ones. */
+/* Add the update of child s to the front at hand, of m rows and c columns; l NULL: to u alone. A shared update still has
+ * rows of held ones. */
 static void add_update(const elimination *x, size_t s, size_t m, size_t c, double *l, double *u)
 {
-    uint32_t *to = x->to;
     const vgi_factor *f = &x->b->f;
     const int *rows = f->rows + f->pi[s];
-    size_t n = 0;
-    for (size_t i = columns_of(f, s); i < rows_of(f, s); i++)
-        if (!x->front[s].changed || !is_held(x, rows[i])) to[n++] = x->place[rows[i]];
-    const double *from = x->update[s];
-    for (size_t j = 0; j < n; j++, from += n) {
-        if (to[j] == NONE) continue;
-        size_t above = to[j] < c ? 0 : c; /* rows above the first of l or u */
-        double *column = to[j] < c ? l + to[j] * m : u + (to[j] - c) * (m - c);
-        for (size_t i = j; i < n; i++)
-            if (to[i] != NONE) column[to[i] - above] += from[i];
+    uint32_t n = 0, ld = 0;
+    for (size_t i = columns_of(f, s); i < rows_of(f, s); i++) {
+        bool gone = is_held(x, rows[i]);
+        if (!gone) x->at[n] = ld, x->to[n++] = x->place[rows[i]];
+        ld += !gone || !x->front[s].changed;
     }
+    vgi_fronts_kernel_now()->scatter(n, x->at, x->to, x->run, ld, x->update[s], m, c, l, u);
 }
 
 /* Front s: l and u get its block and its update. */
@@ -189,14 +284,26 @@ static int eliminate(const elimination *x, size_t s, double *l, double *u, vg_er
     return vg_fail(e, VG_EINPUT, "cannot factorize: not positive definite at row %zu", (size_t)x->b->f.super[s] + done);
 }
 
+/* The update of front s, whose block is known. */
+static void find_update(const elimination *x, size_t s, double *u)
+{
+    size_t m = x->front[s].rows, c = x->front[s].columns, left = m - c;
+    memset(u, 0, left * left * sizeof *u);
+    open_front(x, s);
+    for (int k = x->b->child[s]; k >= 0; k = x->b->next[k]) add_update(x, (size_t)k, m, c, NULL, u);
+    close_front(x, s);
+    vgi_fronts_kernel_now()->complete(m, c, x->b->block[s], u);
+}
+
 static int make_elimination(elimination *x, const vgi_fronts *b, vg_err *e)
 {
     *x = (elimination){.b = b};
     x->front = vgi_array(b->f.supernodes, sizeof *x->front, e);
     x->place = vgi_array_raw(b->f.n, sizeof *x->place, e);
-    x->to = vgi_array_raw(b->most_rows, sizeof *x->to, e);
+    x->at = vgi_array_raw(3 * b->most_rows, sizeof *x->at, e);
     x->update = vgi_copy_array(b->update, b->f.supernodes, sizeof *x->update, e);
-    if (!x->front || !x->place || !x->to || !x->update) return VG_ENOMEM;
+    if (!x->front || !x->place || !x->at || !x->update) return VG_ENOMEM;
+    x->to = x->at + b->most_rows, x->run = x->to + b->most_rows;
     for (size_t i = 0; i < b->f.n; i++) x->place[i] = NONE;
     return VG_OK;
 }
@@ -205,7 +312,7 @@ static void clear_elimination(elimination *x)
 {
     free(x->front);
     free(x->place);
-    free(x->to);
+    free(x->at);
     free(x->update);
     free(x->stack);
 }
@@ -223,47 +330,24 @@ static int share(vgi_fronts *b, vg_err *e)
         place_shared(b);
         memcpy(x.update, b->update, b->f.supernodes * sizeof *x.update);
     }
-    for (size_t s = 0; r == VG_OK && s < b->f.supernodes; s++) {
+    for (size_t s = 0; r == VG_OK && s < b->base.supernodes; s++) {
         x.front[s] = (front){.rows = rows_of(&b->f, s), .columns = columns_of(&b->f, s)};
-        if (b->parent[s] >= 0) r = eliminate(&x, s, (double *)b->block[s], (double *)b->update[s], e);
+        if (is_of_base(b, s)) find_update(&x, s, (double *)b->update[s]);
+        else r = eliminate(&x, s, (double *)b->block[s], (double *)b->update[s], e);
     }
     clear_elimination(&x);
     return r;
 }
 
-static int make_tree(vgi_fronts *b, vg_err *e)
-{
-    size_t n = b->f.supernodes;
-    b->parent = vgi_array_raw(n, sizeof *b->parent, e);
-    b->child = vgi_array_raw(n, sizeof *b->child, e);
-    b->next = vgi_array_raw(n, sizeof *b->next, e);
-    b->block = vgi_array(n, sizeof *b->block, e);
-    b->update = vgi_array(n, sizeof *b->update, e);
-    if (!b->parent || !b->child || !b->next || !b->block || !b->update || find_parents(b, e) < 0) return VG_ENOMEM;
-    for (size_t s = 0; s < n; s++) b->child[s] = b->next[s] = -1;
-    for (size_t s = 0; s < n; s++) {
-        if (rows_of(&b->f, s) > b->most_rows) b->most_rows = rows_of(&b->f, s);
-        if (b->parent[s] < 0) continue;
-        b->next[s] = b->child[b->parent[s]];
-        b->child[b->parent[s]] = (int)s;
-    }
-    return VG_OK;
-}
-
-int vgi_fronts_new(vgi_fronts **out, const vgi_sparse *a, vg_err *e)
+int vgi_fronts_new(vgi_fronts **out, const vgi_sparse *a, const vgi_cholesky *c, const vgi_border *border, vg_err *e)
 {
     vgi_fronts *b = *out = vgi_array(1, sizeof *b, e);
-    int *order = vgi_array_raw(a->n, sizeof *order, e);
-    int r = b && order ? VG_OK : VG_ENOMEM;
-    for (size_t i = 0; r == VG_OK && i < a->n; i++) order[i] = (int)i;
-    if (r == VG_OK) r = vgi_cholesky_new(&b->analysis, a, order, e);
-    if (r == VG_OK) {
-        b->f = vgi_cholesky_factor(b->analysis);
-        r = make_tree(b, e);
-    }
-    if (r == VG_OK) r = permute_matrix(b, a, e);
+    if (!b) return VG_ENOMEM;
+    b->base = vgi_cholesky_factor(c);
+    int r = make_supernodes(b, c, border, e);
+    if (r == VG_OK) r = make_tree(b, e);
+    if (r == VG_OK) r = permute_matrix(b, a, c, border, e);
     if (r == VG_OK) r = share(b, e);
-    free(order);
     if (r < 0) vgi_fronts_free(out);
     return r;
 }
@@ -272,8 +356,9 @@ void vgi_fronts_free(vgi_fronts **out)
 {
     vgi_fronts *b = *out;
     if (!b) return;
-    vgi_cholesky_free(&b->analysis);
-    free(b->row);
+    free(b->super);
+    free(b->pi);
+    free(b->rows);
     free(b->parent);
     free(b->child);
     free(b->next);
@@ -330,7 +415,7 @@ static int make_stack(elimination *x, vg_err *e)
     return x->stack ? VG_OK : VG_ENOMEM;
 }
 
-static int make_factor(const elimination *x, const uint32_t *number, vgi_held_factor *out, vg_err *e)
+static int make_factor(const elimination *x, vgi_held_factor *out, vg_err *e)
 {
     const vgi_factor *f = &x->b->f;
     size_t rows = 0, values = 0, n = 0;
@@ -352,7 +437,7 @@ static int make_factor(const elimination *x, const uint32_t *number, vgi_held_fa
         const front *t = &x->front[s];
         if (!t->columns) continue;
         for (int i = f->pi[s]; i < f->pi[s + 1]; i++)
-            if (!is_held(x, f->rows[i])) out->rows[nrows++] = (int)number[f->rows[i]];
+            if (!is_held(x, f->rows[i])) out->rows[nrows++] = (int)out->row[f->rows[i]];
         out->block[u] = is_copied(x, s) ? at : x->b->block[s];
         at += is_copied(x, s) ? t->rows * t->columns : 0;
         out->super[u + 1] = out->super[u] + (int)t->columns;
@@ -400,24 +485,19 @@ int vgi_fronts_hold(const vgi_fronts *b, const bool *held, vgi_held_factor *out,
     elimination x;
     size_t n = b->f.n;
     *out = (vgi_held_factor){0};
-    bool *of_row = vgi_array(n, sizeof *of_row, e);
-    uint32_t *number = vgi_array_raw(n, sizeof *number, e), free_rows = 0;
+    uint32_t free_rows = 0;
     out->row = vgi_array_raw(n, sizeof *out->row, e);
     int r = make_elimination(&x, b, e);
-    if (!of_row || !number || !out->row) r = VG_ENOMEM;
+    if (!out->row) r = VG_ENOMEM;
     if (r == VG_OK) {
-        for (size_t i = 0; i < n; i++) of_row[b->row[i]] = held[i];
-        for (size_t i = 0; i < n; i++) number[i] = of_row[i] ? NONE : free_rows++;
-        for (size_t i = 0; i < n; i++) out->row[i] = number[b->row[i]];
-        x.held = of_row;
+        for (size_t i = 0; i < n; i++) out->row[i] = held[i] ? NONE : free_rows++;
+        x.held = held;
         measure_fronts(&x);
         r = make_stack(&x, e);
     }
-    if (r == VG_OK) r = make_factor(&x, number, out, e);
+    if (r == VG_OK) r = make_factor(&x, out, e);
     if (r == VG_OK) r = factorize(&x, out, e);
     clear_elimination(&x);
-    free(of_row);
-    free(number);
     if (r < 0) vgi_held_factor_clear(out);
     return r;
 }

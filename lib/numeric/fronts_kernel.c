@@ -86,6 +86,14 @@ static bool finish(size_t m, size_t j, size_t n, double *l)
     return true;
 }
 
+static void complete(size_t m, size_t c, const double *l, double *u)
+{
+    for (size_t j = 0, left = m - c; c && j < left; j += COLUMNS) {
+        size_t n = left - j < COLUMNS ? left - j : COLUMNS;
+        update(n, left - j, c, l + c + j, m, l + c + j, m, u + j * left + j, left);
+    }
+}
+
 static size_t eliminate(size_t m, size_t c, double *l, double *u)
 {
     for (size_t j = 0; j < c; j += COLUMNS) {
@@ -93,11 +101,32 @@ static size_t eliminate(size_t m, size_t c, double *l, double *u)
         if (j) update(n, m - j, j, l + j, m, l + j, m, l + j * m + j, m);
         if (!finish(m, j, n, l)) return j;
     }
-    for (size_t j = 0, left = m - c; c && j < left; j += COLUMNS) {
-        size_t n = left - j < COLUMNS ? left - j : COLUMNS;
-        update(n, left - j, c, l + c + j, m, l + c + j, m, u + j * left + j, left);
-    }
+    complete(m, c, l, u);
     return c;
 }
 
-const vgi_fronts_kernel VGI_OF_SET(vgi_fronts_kernel) = {eliminate};
+VGI_INLINE void add_run(size_t n, const double *from, double *to)
+{
+    size_t i = 0;
+    for (; i + VGI_WIDTH <= n; i += VGI_WIDTH) vgi_store(to + i, vgi_load(to + i) + vgi_load(from + i));
+    for (; i < n; i++) to[i] += from[i];
+}
+
+/* Rows that follow one another on both sides are added together: run[i] is the first behind those. */
+static void scatter(size_t n, const uint32_t *at, const uint32_t *to, uint32_t *run, size_t ld, const double *from,
+                    size_t m, size_t c, double *l, double *u)
+{
+    for (size_t i = n; i-- > 0;) {
+        bool last = i + 1 == n || to[i + 1] != to[i] + 1 || at[i + 1] != at[i] + 1;
+        run[i] = last ? (uint32_t)i + 1 : run[i + 1];
+    }
+    for (size_t j = 0; j < n; j++) {
+        bool in_l = to[j] < c;
+        if (in_l && !l) continue;
+        size_t above = in_l ? 0 : c; /* rows above the first of l or u */
+        double *column = in_l ? l + to[j] * m : u + (to[j] - c) * (m - c);
+        for (size_t i = j; i < n; i = run[i]) add_run(run[i] - i, from + at[j] * ld + at[i], column + (to[i] - above));
+    }
+}
+
+const vgi_fronts_kernel VGI_OF_SET(vgi_fronts_kernel) = {eliminate, complete, scatter};

@@ -18,11 +18,11 @@ typedef double vgi_point[4] __attribute__((aligned(32)));
 typedef struct vgi_guesser { /* all borrowed */
     const vg_graph *g;
     const vgi_metric *metric;
-    const vgi_step *walk;    /* from the held vertices to all others */
+    const vgi_step *walk;    /* from one vertex, or from some of the anchors, to all others */
     size_t nsteps;
-    uint32_t pinned;         /* without anchors: the vertex that is held at 0 */
-    const uint32_t *anchors; /* the held vertices, or */
-    size_t nanchors;         /* 0: one vertex is pinned */
+    uint32_t pinned;         /* that vertex; at least nv: from anchors */
+    const uint32_t *anchors; /* the held vertices */
+    size_t nanchors;
 } vgi_guesser;
 
 typedef struct vgi_guess_kernel {
@@ -31,7 +31,7 @@ typedef struct vgi_guess_kernel {
 } vgi_guess_kernel;
 VGI_KERNEL(vgi_guess_kernel)
 
-/* vgi_guess: x (nv points): the pose that the walk gives, relative to the first anchor or the pinned vertex, so that
+/* vgi_guess: x (nv points): the pose that the walk gives, relative to the first anchor or, without any, the pinned vertex, so that
  * a pose far from the origin loses no digits. rhs (nv x 3): A G (W* - A' x), what it misses. anchors: nanchors
  * points. space: nv + max_corners. */
 static inline void vgi_guess(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs,

@@ -71,17 +71,35 @@ VGI_INLINE point times(double s, point a)
     return a;
 }
 
+VGI_INLINE void put_anchors(const vgi_guesser *s, const double *anchors, double *x)
+{
+    for (size_t i = 0; i < s->nanchors; i++)
+        store(x + 3 * (size_t)s->anchors[i], less(load(anchors + 3 * i), load(anchors)));
+}
+
+/* Move all vertices so that the anchors are where they are to be, on average. */
+VGI_INLINE void move_to_anchors(const vgi_guesser *s, const double *anchors, double *x)
+{
+    point shift = {0};
+    for (size_t i = 0; i < s->nanchors; i++)
+        shift = add(shift, less(less(load(anchors + 3 * i), load(anchors)), load(x + 3 * (size_t)s->anchors[i])));
+    shift = times(1.0 / (double)s->nanchors, shift);
+    for (size_t v = 0; v < s->g->nv; v++) store(x + 3 * v, add(load(x + 3 * v), shift));
+}
+
 VGI_INLINE void walk(const vgi_guesser *s, const double *w, const double *anchors, double *x)
 {
     const uint32_t *vert = s->g->vert;
-    if (s->pinned < s->g->nv) memset(x + 3 * (size_t)s->pinned, 0, 3 * sizeof *x);
-    for (size_t i = 0; i < s->nanchors; i++)
-        store(x + 3 * (size_t)s->anchors[i], less(load(anchors + 3 * i), load(anchors)));
+    bool from_one = s->pinned < s->g->nv;
+    if (from_one) memset(x + 3 * (size_t)s->pinned, 0, 3 * sizeof *x);
+    else put_anchors(s, anchors, x);
     for (size_t i = 0; i < s->nsteps; i++) {
         size_t c = s->walk[i].corner, from = s->walk[i].from;
         point step = less(load(w + 3 * c), load(w + 3 * from));
         store(x + 3 * (size_t)vert[c], add(load(x + 3 * (size_t)vert[from]), step));
     }
+    if (from_one && s->nanchors) move_to_anchors(s, anchors, x);
+    put_anchors(s, anchors, x);
 }
 
 VGI_INLINE void add_to(vgi_point *sum, uint32_t v, point a)

@@ -1,6 +1,7 @@
 /* hold.c: solvers that are like another one and hold more vertices, as poses with pins need them. Most of their factor is
  * that of the other solver, or follows from it (fronts.c), so that a set of vertices that one pose alone holds costs about
  * as much as two solves. Poses are solved one by one: it is seldom that eight in a row hold the same vertices.
+ * The first guess is that of the other solver, moved to where the vertices are held.
  *
  * Without anchors the other solver holds one vertex at 0, which is free here: its row is behind all others.
  * SPDX-License-Identifier: GPL-3.0-or-later */
@@ -15,36 +16,58 @@ static uint32_t row_of_vertex(const vg_solver *like, size_t v)
     return v == like->pinned ? (uint32_t)like->unknowns : like->row[v];
 }
 
-static int assemble_all(const vg_solver *s, vgi_sparse *N, vg_err *e)
+/* Entries that corner p of face f gives to the row of its vertex. Those of one place add up. star: the row of the face's
+ * centroid, if it has one. */
+static void add_to_border(const vg_solver *s, size_t f, size_t p, size_t star, vgi_border *border)
 {
-    size_t centres = s->unknowns - s->vertices_unknown;
-    uint32_t *row = vgi_array_raw(s->g->nv, sizeof *row, e), *centre = vgi_array_raw(centres, sizeof *centre, e);
-    int r = row && centre ? VG_OK : VG_ENOMEM;
-    if (r == VG_OK) {
-        const int *order = s->cholesky ? vgi_cholesky_order(s->cholesky) : NULL;
-        for (size_t v = 0; v < s->g->nv; v++) row[v] = row_of_vertex(s, v);
-        for (size_t i = 0; i < s->unknowns; i++)
-            if ((size_t)order[i] >= s->vertices_unknown) centre[(size_t)order[i] - s->vertices_unknown] = (uint32_t)i;
-        r = vgi_solver_assemble(s, row, centre, vgi_solver_all_rows(s), N, e);
+    const vg_graph *g = s->g;
+    const int *order = vgi_cholesky_order(s->cholesky);
+    const uint32_t *vert = g->vert + g->start[f];
+    if (vgi_solver_is_star(s, f)) {
+        double weight = vgi_metric_weight(&s->metric, f);
+        border->row[border->n] = (uint32_t)star, border->value[border->n++] = -weight;
+        border->diagonal += weight;
+        return;
     }
-    free(row);
-    free(centre);
-    return r;
+    for (size_t q = 0; q < g->start[f + 1] - g->start[f]; q++) {
+        double entry = vgi_metric_entry(&s->metric, g, f, p, q);
+        if (vert[q] == vert[p]) border->diagonal += entry;
+        else border->row[border->n] = (uint32_t)order[s->row[vert[q]]], border->value[border->n++] = entry;
+    }
+}
+
+/* The row of the vertex that s holds at 0. */
+static int make_border(const vg_solver *s, vgi_border *border, vg_err *e)
+{
+    const vg_graph *g = s->g;
+    size_t most = 0, star = s->vertices_unknown;
+    for (size_t f = 0; f < g->nf; f++)
+        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++)
+            if (g->vert[c] == s->pinned) most += g->start[f + 1] - g->start[f];
+    border->row = vgi_array_raw(most, sizeof *border->row, e);
+    border->value = vgi_array_raw(most, sizeof *border->value, e);
+    if (!border->row || !border->value) return VG_ENOMEM;
+    for (size_t f = 0; f < g->nf; f++) {
+        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++)
+            if (g->vert[c] == s->pinned) add_to_border(s, f, c - g->start[f], star, border);
+        star += vgi_solver_is_star(s, f);
+    }
+    return VG_OK;
 }
 
 int vgi_solver_share(vg_solver *s, vg_err *e)
 {
-    const vg_graph *g = s->g;
-    vgi_sparse N = {0};
     if (s->sharing) return VG_OK;
     vgi_sharing *x = s->sharing = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
-    int r = vgi_incidence_make(&x->around, &g->faces, e);
-    if (r == VG_OK && vgi_solver_all_rows(s)) {
+    int r = VG_OK;
+    if (s->unknowns) {
+        vgi_border border = {0};
         x->points = vgi_solver_for_threads(s, vgi_solver_all_rows(s), sizeof *x->points, e);
-        r = x->points ? assemble_all(s, &N, e) : VG_ENOMEM;
-        if (r == VG_OK) r = vgi_fronts_new(&x->fronts, &N, e);
-        vgi_sparse_clear(&N);
+        r = x->points ? make_border(s, &border, e) : VG_ENOMEM;
+        if (r == VG_OK) r = vgi_fronts_new(&x->fronts, &s->matrix, s->cholesky, s->pinned < s->g->nv ? &border : NULL, e);
+        free(border.row);
+        free(border.value);
     }
     if (r < 0) vgi_sharing_free(&s->sharing);
     return r;
@@ -53,7 +76,6 @@ int vgi_solver_share(vg_solver *s, vg_err *e)
 void vgi_sharing_free(vgi_sharing **x)
 {
     if (!*x) return;
-    vgi_incidence_clear(&(*x)->around);
     vgi_fronts_free(&(*x)->fronts);
     free((*x)->points);
     free(*x);
@@ -96,7 +118,7 @@ static int number_rows(vg_solver *s, vg_err *e)
     if (!(s->row = vgi_array_raw(s->g->nv, sizeof *s->row, e))) return VG_ENOMEM;
     for (size_t v = 0; v < s->g->nv; v++) {
         uint32_t row = row_of_vertex(like, v);
-        s->row[v] = row < all ? s->held.row[row] : NO_ROW;
+        s->row[v] = row < all && like->sharing->fronts ? s->held.row[row] : NO_ROW;
     }
     return VG_OK;
 }
@@ -120,13 +142,12 @@ static int make_like(vg_solver **out, const vg_solver *like, const uint32_t *anc
 {
     vg_solver *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
-    s->like = like, s->g = like->g, s->threads = like->threads, s->metric = like->metric, s->spare = like->spare;
+    s->like = like, s->g = like->g, s->walk = like->walk, s->nsteps = like->nsteps, s->threads = like->threads, s->metric = like->metric, s->spare = like->spare;
     s->nisolated = like->nisolated, s->isolated = like->isolated, s->isolated_at = like->isolated_at;
     s->pinned = n ? (uint32_t)s->g->nv : like->pinned;
     s->nanchors = n;
     s->anchors = vgi_copy_array(anchors, n, sizeof *anchors, e);
     int r = s->anchors ? hold(s, e) : VG_ENOMEM;
-    if (r == VG_OK) r = vgi_solver_plan_walk(s, &like->sharing->around, e);
     if (r < 0) vg_solver_free(out);
     return r;
 }

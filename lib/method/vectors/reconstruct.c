@@ -15,6 +15,7 @@
  * solves (solve_kernel.c), that guess (guess_kernel.c) and the factorisation (sparse.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/solver.h"
+#include "model/incidence.h"
 #include "numeric/vec3.h"
 
 #include <stdlib.h>
@@ -78,7 +79,7 @@ static int number_unknowns(vg_solver *s, const uint32_t *anchors, size_t n, cons
 }
 
 /* Breadth first from the held vertices, so that paths are short and few roundings add up. */
-int vgi_solver_plan_walk(vg_solver *s, const vgi_incidence *around, vg_err *e)
+static int walk_from_held(vg_solver *s, const vgi_incidence *around, vg_err *e)
 {
     const vg_graph *g = s->g;
     bool *reached = vgi_array(g->nv, sizeof *reached, e), *used = vgi_array(g->nf, sizeof *used, e);
@@ -117,7 +118,7 @@ static int plan_walk(vg_solver *s, vg_err *e)
 {
     vgi_incidence around;
     if (vgi_incidence_make(&around, &s->g->faces, e) < 0) return VG_ENOMEM;
-    int r = vgi_solver_plan_walk(s, &around, e);
+    int r = walk_from_held(s, &around, e);
     vgi_incidence_clear(&around);
     return r;
 }
@@ -133,78 +134,64 @@ static size_t count_entries(const vg_solver *s)
     return n;
 }
 
-static void assemble_pairs(vgi_triplets *t, const vg_solver *s, const uint32_t *row, size_t rows, size_t f)
+static void assemble_pairs(vgi_triplets *t, const vg_solver *s, size_t f)
 {
     size_t begin = s->g->start[f], r = face_size(s->g, f);
     const uint32_t *vert = s->g->vert + begin;
     for (size_t p = 0; p < r; p++) {
-        size_t i = row[vert[p]];
-        if (i >= rows) continue;
+        size_t i = s->row[vert[p]];
+        if (i == NO_ROW) continue;
         for (size_t q = 0; q <= p; q++) {
-            if (row[vert[q]] >= rows) continue;
-            vgi_triplets_put(t, i, row[vert[q]], vgi_metric_entry(&s->metric, s->g, f, p, q));
+            if (s->row[vert[q]] == NO_ROW) continue;
+            vgi_triplets_put(t, i, s->row[vert[q]], vgi_metric_entry(&s->metric, s->g, f, p, q));
         }
     }
 }
 
-static void assemble_star(vgi_triplets *t, const vg_solver *s, const uint32_t *row, size_t rows, size_t f, size_t centre)
+static void assemble_star(vgi_triplets *t, const vg_solver *s, size_t f, size_t centre)
 {
     size_t r = face_size(s->g, f);
     const uint32_t *vert = s->g->vert + s->g->start[f];
     double weight = vgi_metric_weight(&s->metric, f);
     vgi_triplets_put(t, centre, centre, weight * (double)r);
     for (size_t p = 0; p < r; p++) {
-        size_t i = row[vert[p]];
-        if (i >= rows) continue;
+        size_t i = s->row[vert[p]];
+        if (i == NO_ROW) continue;
         vgi_triplets_put(t, i, i, weight);
         vgi_triplets_put(t, i, centre, -weight);
     }
 }
 
-int vgi_solver_assemble(const vg_solver *s, const uint32_t *row, const uint32_t *centre, size_t rows, vgi_sparse *N,
-                        vg_err *e)
-{
-    const vg_graph *g = s->g;
-    vgi_triplets t;
-    int r = vgi_triplets_make(&t, count_entries(s), e);
-    if (r < 0) return r;
-    for (size_t f = 0; f < g->nf; f++) {
-        if (vgi_solver_is_star(s, f)) assemble_star(&t, s, row, rows, f, *centre++);
-        else assemble_pairs(&t, s, row, rows, f);
-    }
-    r = vgi_triplets_sum(&t, rows, N, e);
-    vgi_triplets_clear(&t);
-    return r;
-}
-
 /* Centroids are the last unknowns. */
 static int assemble(const vg_solver *s, vgi_sparse *N, vg_err *e)
 {
-    size_t n = s->unknowns - s->vertices_unknown;
-    uint32_t *centre = vgi_array_raw(n, sizeof *centre, e);
-    if (!centre) return VG_ENOMEM;
-    for (size_t i = 0; i < n; i++) centre[i] = (uint32_t)(s->vertices_unknown + i);
-    int r = vgi_solver_assemble(s, s->row, centre, s->unknowns, N, e);
-    free(centre);
+    size_t centre = s->vertices_unknown;
+    vgi_triplets t;
+    int r = vgi_triplets_make(&t, count_entries(s), e);
+    if (r < 0) return r;
+    for (size_t f = 0; f < s->g->nf; f++) {
+        if (vgi_solver_is_star(s, f)) assemble_star(&t, s, f, centre++);
+        else assemble_pairs(&t, s, f);
+    }
+    r = vgi_triplets_sum(&t, s->unknowns, N, e);
+    vgi_triplets_clear(&t);
     return r;
 }
 
 static int factorize(vg_solver *s, vg_err *e)
 {
-    vgi_sparse N;
-    int r = assemble(s, &N, e);
+    int r = assemble(s, &s->matrix, e);
     if (r < 0) return r;
     double t0 = vgi_solver_seconds(), t1 = t0;
-    r = vgi_cholesky_new(&s->cholesky, &N, NULL, e);
+    r = vgi_cholesky_new(&s->cholesky, &s->matrix, NULL, e);
     if (r == VG_OK) {
         t1 = vgi_solver_seconds();
-        r = vgi_cholesky_factorize(s->cholesky, &N, e);
+        r = vgi_cholesky_factorize(s->cholesky, &s->matrix, e);
     }
     if (r == VG_OK) {
         s->stats = (vg_solver_stats){s->unknowns, vgi_cholesky_entries(s->cholesky), t1 - t0, vgi_solver_seconds() - t1};
         s->factor = vgi_cholesky_factor(s->cholesky);
     }
-    vgi_sparse_clear(&N);
     return r;
 }
 
@@ -274,9 +261,11 @@ int vg_solver_new(vg_solver **out, const vg_graph *g, const uint32_t *anchors, s
 static void free_own(vg_solver *s)
 {
     vgi_metric_clear(&s->metric);
+    vgi_sparse_clear(&s->matrix);
     free(s->isolated);
     free(s->isolated_at);
     free(s->spare);
+    free(s->walk);
 }
 
 void vg_solver_free(vg_solver **out)
@@ -289,7 +278,6 @@ void vg_solver_free(vg_solver **out)
     vgi_cholesky_free(&s->cholesky);
     free(s->row);
     free(s->anchors);
-    free(s->walk);
     free(s->x);
     free(s);
     *out = NULL;
@@ -332,8 +320,8 @@ static void load_share(void *context, size_t task)
     vgi_point *spare = j->s->spare + task * (j->s->g->nv + j->s->g->max_corners);
     for (size_t i = task * j->share; i < j->n && i < (task + 1) * j->share; i++) {
         const vg_solver *s = j->each ? j->each[i] : j->s;
-        vgi_guesser g = {.g = s->g, .metric = &s->metric, .walk = s->walk, .nsteps = s->nsteps, .pinned = s->pinned,
-                         .anchors = s->anchors, .nanchors = s->nanchors};
+        vgi_guesser g = {.g = s->g, .metric = &s->metric, .walk = s->walk, .nsteps = s->nsteps,
+                         .pinned = s->like ? s->like->pinned : s->pinned, .anchors = s->anchors, .nanchors = s->nanchors};
         vgi_guess(&g, j->vectors[i], s->nanchors ? j->anchors[i] : NULL, j->x[i], j->rhs[i], spare);
     }
 }

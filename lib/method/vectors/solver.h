@@ -5,7 +5,6 @@
 
 #include "method/vectors/face_rows.h"
 #include "method/vectors/guess.h"
-#include "model/incidence.h"
 #include "numeric/fronts.h"
 
 #define NO_ROW UINT32_MAX
@@ -13,7 +12,6 @@
 /* What the solvers like one share. All rows are those of its factor, in its order, and behind them the vertex that it
  * holds at 0 if it has no anchors. */
 typedef struct vgi_sharing {
-    vgi_incidence around;
     vgi_fronts *fronts; /* NULL: there are no rows */
     vgi_point *points;  /* threads * rows */
 } vgi_sharing;
@@ -33,13 +31,14 @@ struct vg_solver {
     size_t nisolated;
     uint32_t *isolated;
     double *isolated_at;
+    vgi_sparse matrix; /* the vertices that are not held in their order, then centroids; kept for solvers like this one */
     vgi_cholesky *cholesky;
     vgi_factor factor;
     vgi_row *x;       /* threads * unknowns */
     vgi_point *spare; /* of vg_solver_load: nv + max_corners for each thread */
     vg_solver_stats stats;
     vgi_sharing *sharing; /* with the solvers that are like this one; NULL: there were none yet */
-    const vg_solver *like; /* NULL, or from here come graph, metric, isolated vertices and room */
+    const vg_solver *like; /* NULL, or from here come graph, metric, walk, isolated vertices and room */
     vgi_held_factor held;  /* with `like`: instead of `cholesky` */
 };
 
@@ -50,12 +49,6 @@ static inline size_t vgi_solver_all_rows(const vg_solver *s)
     return s->unknowns + (s->pinned < s->g->nv);
 }
 
-/* vgi_solver_assemble: the normal matrix over rows: row[v] of a vertex (at least `rows`: none) and centre[i] of the
- * i-th centroid. */
-int vgi_solver_assemble(const vg_solver *s, const uint32_t *row, const uint32_t *centre, size_t rows, vgi_sparse *N,
-                        vg_err *e) VG_MUST_CHECK;
-/* vgi_solver_plan_walk: `around`: of the graph. */
-int vgi_solver_plan_walk(vg_solver *s, const vgi_incidence *around, vg_err *e) VG_MUST_CHECK;
 void *vgi_solver_for_threads(const vg_solver *s, size_t n, size_t size, vg_err *e);
 /* vgi_solver_share: make what the solvers like s share, unless it is there. */
 int vgi_solver_share(vg_solver *s, vg_err *e) VG_MUST_CHECK;
