@@ -113,11 +113,14 @@ VGI_INLINE void forward(const vgi_factor *f, double *x)
     }
 }
 
+/* Backward, the rows of a column are taken from the last to the first, however many columns go together, here and for
+ * one pose: so both give the same bits. */
+
 /* s[k] -= sum over rows below the head of l[k stride + row] x[row], for n columns. */
 VGI_INLINE void gather_below(sums *s, int n, const double *l, size_t stride, size_t columns, const int *rows,
                              const double *x)
 {
-    for (size_t i = columns; i < stride; i++) subtract(s, n, l + i, stride, x + (size_t)rows[i] * ROW);
+    for (size_t i = stride; i-- > columns;) subtract(s, n, l + i, stride, x + (size_t)rows[i] * ROW);
 }
 
 /* Columns k .. k + n - 1 of a supernode, those behind them being done: each one is finished in turn. */
@@ -129,7 +132,7 @@ VGI_INLINE void finish_columns(const double *l, size_t stride, size_t columns, c
 #pragma GCC unroll 4
     for (int i = 0; i < n; i++) s[i] = load_sums(head + (k + (size_t)i) * ROW);
     gather_below(s, n, l, stride, columns, rows, x);
-    for (size_t j = k + (size_t)n; j < columns; j++) subtract(s, n, l + j, stride, head + j * ROW);
+    for (size_t j = columns; j-- > k + (size_t)n;) subtract(s, n, l + j, stride, head + j * ROW);
 #pragma GCC unroll 4
     for (int i = n; i-- > 0;) {
         double *at = head + (k + (size_t)i) * ROW;
@@ -254,7 +257,7 @@ VGI_INLINE void finish_points(const double *l, size_t stride, size_t columns, co
     l += k * stride;
 #pragma GCC unroll 8
     for (int i = 0; i < n; i++) s[i] = load_point(head + (k + (size_t)i) * POINT);
-    for (size_t j = k + (size_t)n; j < stride; j++) {
+    for (size_t j = stride; j-- > k + (size_t)n;) {
         point t = load_point(j < columns ? head + j * POINT : x + (size_t)rows[j] * POINT);
 #pragma GCC unroll 8
         for (int i = 0; i < n; i++) subtract_point(&s[i], l[(size_t)i * stride + j], &t);

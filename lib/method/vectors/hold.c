@@ -188,18 +188,27 @@ int vg_solver_new_like(vg_solver **s, size_t n, vg_solver *like, const uint32_t 
 
 /* ---- solving ---- */
 
+/* Row i of all rows of the plain solver. */
+static uint32_t row_in_factor(const vg_solver *s, size_t i)
+{
+    if (s->like) return s->held.row[i];
+    return i < s->unknowns ? (uint32_t)i : NO_ROW;
+}
+
 void vgi_solver_solve_lane(const vg_solver *s, size_t lane, const vgi_row *from, vgi_row *to, vgi_point *points)
 {
-    size_t all = vgi_solver_all_rows(s->like);
-    const uint32_t *row = s->held.row;
+    size_t all = vgi_solver_all_rows(s->like ? s->like : s);
     for (size_t i = 0; i < all; i++) {
-        if (row[i] == NO_ROW) continue;
-        for (size_t c = 0; c < 3; c++) points[row[i]][c] = from[i].xyz[c][lane];
-        points[row[i]][3] = 0;
+        uint32_t row = row_in_factor(s, i);
+        if (row == NO_ROW) continue;
+        for (size_t c = 0; c < 3; c++) points[row][c] = from[i].xyz[c][lane];
+        points[row][3] = 0;
     }
     if (s->unknowns) vgi_factor_solve_one(&s->factor, *points);
-    for (size_t i = 0; i < all; i++)
-        for (size_t c = 0; c < 3; c++) to[i].xyz[c][lane] = row[i] == NO_ROW ? 0 : points[row[i]][c];
+    for (size_t i = 0; i < all; i++) {
+        uint32_t row = row_in_factor(s, i);
+        for (size_t c = 0; c < 3; c++) to[i].xyz[c][lane] = row == NO_ROW ? 0 : points[row][c];
+    }
 }
 
 typedef struct solve_job {

@@ -29,6 +29,7 @@ typedef struct room {
     vgi_row *u, *trial, *g, *gn; /* rows of unknowns and of held vertices */
     vgi_row *z, *zn, *d;         /* rows that may move */
     vgi_row *corners;                         /* of the largest face */
+    vgi_point *points;                        /* all rows of one pose */
     vgi_row *memory;                          /* all of these */
     float *misfit;
 } room;
@@ -111,7 +112,8 @@ static void free_room(room *m)
 static bool make_room(room *m, const vg_robust *r)
 {
     size_t n = r->moved, all = r->solver.rows + r->rows.nheld, bytes;
-    if (vgi_mul(4 * all + 3 * n + 2 * r->solver.g->max_corners, sizeof *m->memory, &bytes))
+    size_t point_rows = all * sizeof *m->points / sizeof *m->memory + 1;
+    if (vgi_mul(4 * all + 3 * n + 2 * r->solver.g->max_corners + point_rows, sizeof *m->memory, &bytes))
         m->memory = aligned_alloc(sizeof(vgi_lanes), bytes);
     if (vgi_mul(r->nmisfits + 2, VGI_LANES * sizeof *m->misfit, &bytes)) m->misfit = aligned_alloc(64, bytes / 64 * 64);
     if (!m->memory || !m->misfit) {
@@ -121,6 +123,7 @@ static bool make_room(room *m, const vg_robust *r)
     vgi_row *at = m->memory;
     m->u = at, m->trial = m->u + all, m->g = m->trial + all, m->gn = m->g + all, m->z = m->gn + all;
     m->zn = m->z + n, m->d = m->zn + n, m->corners = m->d + n;
+    m->points = (vgi_point *)(m->corners + 2 * r->solver.g->max_corners);
     return true;
 }
 
@@ -229,7 +232,6 @@ typedef struct search {
     size_t rounds;
     size_t lanes;                      /* poses */
     const vg_solver *other[VGI_LANES]; /* that a pose has instead of r's, or NULL */
-    vgi_point *points;                 /* for these */
 } search;
 
 static bool any_active(const search *s)
@@ -246,20 +248,24 @@ static void look(const search *s, const vgi_row *u, vgi_row *g, vgi_robust_sums 
     vgi_robust_kernel_now()->energy(&s->faces, s->m.misfit, u, s->soft2, g, s->m.corners, sums);
 }
 
-/* z := N^-1 g, each pose by its own solver; 0 where that one holds. */
-static void precondition(const search *s, const vgi_row *g, vgi_row *z)
+enum { FEW = 5 }; /* so many poses are solved faster one by one than all lanes together */
+
+/* z := N^-1 g, each pose by its own solver; 0 where that one holds. of: the poses that it is wanted for; the others' z
+ * is any number. */
+static void precondition(const search *s, const bool *of, const vgi_row *g, vgi_row *z)
 {
     size_t rows = s->r->solver.rows, plain = 0;
-    for (size_t k = 0; k < s->lanes; k++) plain += !s->other[k];
-    if (plain) {
+    for (size_t k = 0; k < s->lanes; k++) plain += of[k] && !s->other[k];
+    if (plain > FEW) {
         memcpy(z, g, rows * sizeof *z);
         vgi_factor_solve(s->r->solver.factor, z);
         memset(z + rows, 0, (s->r->moved - rows) * sizeof *z);
+        plain = 0;
     } else {
         memset(z, 0, s->r->moved * sizeof *z);
     }
     for (size_t k = 0; k < s->lanes; k++)
-        if (s->other[k]) vgi_solver_solve_lane(s->other[k], k, g, z, s->points);
+        if (of[k] && (s->other[k] || plain)) vgi_solver_solve_lane(s->other[k] ? s->other[k] : s->r->s, k, g, z, s->m.points);
 }
 
 /* How soft the absolute value is at 0, from the misfits of the plain solution; which poses have any. */
@@ -281,7 +287,7 @@ static void begin(search *s)
     vgi_robust_products p;
     vgi_lanes abc[3] = {{0}};
     look(s, s->m.u, s->m.g, &sums);
-    precondition(s, s->m.g, s->m.z);
+    precondition(s, s->active, s->m.g, s->m.z);
     vgi_robust_kernel_now()->multiply(n, s->m.g, s->m.g, s->m.z, s->m.z, s->m.z, &p);
     for (int k = 0; k < VGI_LANES; k++) {
         s->scale[k] = (double)s->r->rows.nf / sums.weight[k];
@@ -368,7 +374,7 @@ static void descend(search *s)
         advance(s, &sums);
         judge(s, &sums);
         if (!any_active(s) || s->rounds == s->r->rounds) return;
-        precondition(s, s->m.gn, s->m.zn);
+        precondition(s, s->active, s->m.gn, s->m.zn);
         choose_direction(s);
     }
 }
@@ -423,7 +429,9 @@ static void solve_plainly(const robust_job *j, search *s, size_t first, vgi_lane
     memset(s->m.u, 0, all * sizeof *s->m.u); /* rows of held vertices stay 0 */
     memset(s->m.trial, 0, all * sizeof *s->m.trial);
     load_rows(s, rhs, s->m.g);
-    precondition(s, s->m.g, s->m.u);
+    bool every[VGI_LANES];
+    for (size_t k = 0; k < VGI_LANES; k++) every[k] = true;
+    precondition(s, every, s->m.g, s->m.u);
     vgi_robust_kernel_now()->scale(r->moved, unit, s->m.u);
     vgi_robust_kernel_now()->interleave(r->nmisfits, misfit, s->m.misfit);
 }
@@ -442,7 +450,6 @@ static void robust_block(void *context, size_t i)
                 .faces = {r->rows.nf, r->rows.start, r->rows.row, r->entry, r->metric, r->star}};
     vgi_lanes size;
     choose_solvers(j, &s, first);
-    if (r->s->sharing) s.points = r->s->sharing->points + i * vgi_solver_all_rows(r->s);
     if (r->moved) {
         solve_plainly(j, &s, first, size);
         descend(&s);

@@ -56,7 +56,7 @@ void vgi_sharing_free(vgi_sharing **x);
 /* vgi_solver_solve_like: vg_solver_solve for n poses of s, which is like another solver; s NULL: pose i is each[i]'s. */
 void vgi_solver_solve_like(size_t n, const vg_solver *s, vg_solver *const *each, const double *const *rhs,
                            double *const *x, const double *const *anchors, const double *const *roots);
-/* vgi_solver_solve_lane: to := N^-1 from in one lane, over all rows of the solver that s is like; 0 where s holds.
+/* vgi_solver_solve_lane: to := N^-1 from in one lane, over all rows of s or the solver that it is like; 0 where s holds.
  * points: as many. */
 void vgi_solver_solve_lane(const vg_solver *s, size_t lane, const vgi_row *from, vgi_row *to, vgi_point *points);
 
