@@ -38,6 +38,9 @@ def from_file(points, scale=1.0):
     return numpy.stack([points[..., 0], -points[..., 2], points[..., 1]], axis=-1) / scale
 
 
+BLENDERS = numpy.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)  # takes a point of a file to Blender's axes
+
+
 def moved(points, matrix):
     m = numpy.array(matrix, float)
     return points @ m[:3, :3].T + m[:3, 3]
@@ -268,8 +271,9 @@ def new_object(target, name, source=None):
 
 def to_local(thing, points, scene, matrix=None):
     """Points of a stream in the space of an object."""
-    inverse = (matrix or thing.matrix_world).inverted_safe()
-    return moved(from_file(points, metres(scene)), inverse)
+    inverse = numpy.array((matrix or thing.matrix_world).inverted_safe(), float)
+    turn = inverse[:3, :3] @ BLENDERS / metres(scene)
+    return points @ turn.T + inverse[:3, 3]
 
 
 def play_key(action, key, place, before, behind):

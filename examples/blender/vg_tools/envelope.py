@@ -73,25 +73,20 @@ class Driver:
 
     def __init__(self, rig, thing, scene):
         self.rig, self.scale = rig, bodies.metres(scene)
-        self.posed = {}
-        by_name = {b.name.replace(" ", "_"): b.name for b in thing.data.bones}
+        number = {b.name.replace(" ", "_"): i for i, b in enumerate(thing.pose.bones)}
         for name in rig.bones:
-            bone = by_name.get(name)
-            if bone is None:
+            if name not in number:
                 raise Trouble(f"'{thing.name}' has no bone '{name}': the rig is that of another armature")
-            self.posed[name] = bone
-        world = thing.matrix_world
-        self.rest = [skeleton.turn_of(world @ thing.data.bones[self.posed[n]].matrix_local) for n in rig.bones]
+        self.posed = numpy.array([number[name] for name in rig.bones])
+        rest = [thing.matrix_world @ thing.pose.bones[i].bone.matrix_local for i in self.posed.tolist()]
+        self.back = numpy.array([skeleton.turn_of(m).T @ turn.T for m, turn in zip(rest, rig.turns)])
 
     def motions(self, thing):
         """(bones, 7) of the armature as it stands; thing may be the evaluated one."""
-        out, world = numpy.empty((len(self.rig.bones), 7)), thing.matrix_world
-        for i, name in enumerate(self.rig.bones):
-            matrix = world @ thing.pose.bones[self.posed[name]].matrix
-            turn = skeleton.turn_of(matrix) @ self.rest[i].T @ self.rig.turns[i].T
-            out[i, :4] = skeleton.quaternion(turn)
-            out[i, 4:] = skeleton.place(matrix, scale=self.scale) - turn @ self.rig.places[i]
-        return out
+        matrices = skeleton.pose_matrices(thing)[self.posed]
+        turns = skeleton.turns_of(matrices[:, :3, :3]) @ self.back
+        places = bodies.to_file(matrices[:, :3, 3], self.scale)
+        return numpy.hstack([skeleton.quaternions(turns), places - numpy.einsum("nab,nb->na", turns, self.rig.places)])
 
 
 # ---- fitting ----
@@ -134,7 +129,7 @@ class VG_OT_envelope(Work, bpy.types.Operator):
 class Follow:
     """The mesh that follows an armature now."""
     live, mesh, armature, driver, key, muted, scene = None, "", "", None, "", [], ""
-    count, since = 0, 0.0
+    count, changed = 0, False
 
     @classmethod
     def active(cls):
@@ -175,7 +170,7 @@ def begin_follow(context):
     bpy.app.handlers.depsgraph_update_post.append(pose_changed)
     bpy.app.handlers.frame_change_post.append(pose_changed)
     bpy.app.timers.register(show_newest, first_interval=0.01)
-    pose_changed(scene, context.evaluated_depsgraph_get())
+    Follow.changed = True
 
 
 def end_follow():
@@ -208,11 +203,7 @@ def pose_changed(scene, graph=None):
     if graph is not None:
         if graph.updates and not any(u.id and u.id.original in (arm, arm.data) for u in graph.updates):
             return
-        arm = arm.evaluated_get(graph)
-    try:
-        Follow.live.send(Follow.driver.motions(arm))
-    except (Trouble, KeyError) as error:
-        fail(error)
+    Follow.changed = True
 
 
 def fail(error):
@@ -225,24 +216,28 @@ def show(points):
     if thing is None or not thing.data.shape_keys or KEY not in thing.data.shape_keys.key_blocks:
         raise Trouble("the mesh that follows has been removed")
     local = bodies.to_local(thing, points, bpy.data.scenes[Follow.scene])
-    thing.data.shape_keys.key_blocks[KEY].data.foreach_set("co", local.astype(numpy.float32).ravel())
+    thing.data.shape_keys.key_blocks[KEY].data.foreach_set("co", numpy.ascontiguousarray(local, numpy.float32).ravel())
     thing.data.update_tag()
     Follow.count += 1
 
 
 def show_newest():
-    """A timer: what has come out since goes into the mesh."""
+    """A timer: what has come out since goes into the mesh, and if the pose has changed meanwhile, it goes in."""
     if not Follow.live:
         return None
     try:
         points = Follow.live.newest()
+        if Follow.changed and Follow.live.idle:
+            arm = bpy.data.objects[Follow.armature].evaluated_get(bpy.context.evaluated_depsgraph_get())
+            Follow.changed = False
+            Follow.live.send(Follow.driver.motions(arm))
         if points is not None:
             show(points)
             redraw()
     except (Trouble, KeyError) as error:
         fail(error)
         return None
-    return 0.01
+    return 0.004
 
 
 def follow_now(context):

@@ -33,6 +33,10 @@ class Live:
             self.waiting = numpy.ascontiguousarray(motions, "<f4")
             self.gate.notify_all()
 
+    @property
+    def idle(self):
+        return self.waiting is None and self.got == self.sent
+
     def newest(self):
         """Vertices (n, 3) that have not been asked for, or None."""
         with self.gate:

@@ -22,9 +22,37 @@ def turn_of(matrix):
     return u @ numpy.diag([1, 1, numpy.linalg.det(u @ v)]) @ v
 
 
-def quaternion(rotation):
-    q = Matrix(rotation.tolist()).to_quaternion()
-    return numpy.array(q)
+def turns_of(matrices):
+    """The same of many: (n, 3, 3). Most have no shear: their columns are at right angles."""
+    m = UPRIGHT @ matrices @ UPRIGHT.T
+    turns = m / numpy.maximum(numpy.linalg.norm(m, axis=1, keepdims=True), 1e-30)
+    bent = numpy.abs(numpy.transpose(turns, (0, 2, 1)) @ turns - numpy.eye(3)).max((1, 2)) > 1e-6
+    bent |= numpy.linalg.det(turns) < 0
+    for i in numpy.flatnonzero(bent):
+        turns[i] = turn_of(matrices[i])
+    return turns
+
+
+def quaternions(turns):
+    """w x y z of rotations (n, 3, 3), by the largest of the four."""
+    m, k = turns, numpy.empty((len(turns), 4, 4))
+    diagonal = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
+    k[:, 0, 0] = 1 + diagonal[0] + diagonal[1] + diagonal[2]
+    for i in range(3):
+        j, l = (i + 1) % 3, (i + 2) % 3
+        k[:, i + 1, i + 1] = 1 + diagonal[i] - diagonal[j] - diagonal[l]
+        k[:, 0, i + 1] = k[:, i + 1, 0] = m[:, l, j] - m[:, j, l]
+        k[:, i + 1, j + 1] = k[:, j + 1, i + 1] = m[:, i, j] + m[:, j, i]
+    rows = k[numpy.arange(len(k)), numpy.argmax(numpy.diagonal(k, axis1=1, axis2=2), axis=1)]
+    return rows / numpy.linalg.norm(rows, axis=1, keepdims=True)
+
+
+def pose_matrices(thing):
+    """Of all pose bones in their order, in the world: (n, 4, 4)."""
+    bones = thing.pose.bones
+    flat = numpy.empty(16 * len(bones), numpy.float32)
+    bones.foreach_get("matrix", flat)
+    return numpy.array(thing.matrix_world, float) @ flat.reshape(-1, 4, 4).transpose(0, 2, 1).astype(float)
 
 
 def rotation(q):
@@ -129,7 +157,7 @@ class Skeleton(Body):
             for i, points in enumerate(self.points):
                 if job:
                     job.check()
-                turns = numpy.array([quaternion(t) for t in self.turns[i]]).ravel()
+                turns = quaternions(self.turns[i]).ravel()
                 frame = vgstream.Frame(self.names[i], numpy.ascontiguousarray(points, float),
                                        [vgstream.Channel("turns", "", "joint", 4, turns)])
                 frame.time = self.times[i]
