@@ -14,7 +14,8 @@ setup_file() {
 import bpy, numpy, os, sys, traceback
 HERE = os.path.dirname(os.path.abspath(__file__))
 if 'bool' not in numpy.__dict__: numpy.bool = bool
-bpy.ops.wm.read_factory_settings(use_empty=True)
+if bpy.app.background: bpy.ops.wm.read_factory_settings(use_empty=True)
+else: bpy.data.batch_remove(list(bpy.data.objects)) # the window's context stays
 bpy.ops.preferences.addon_install(filepath=os.path.join(HERE, 'vg_tools.zip'))
 bpy.ops.preferences.addon_enable(module='vg_tools')
 import vg_tools
@@ -477,4 +478,79 @@ vg.network_file = vg.signal_file
 refused(bpy.ops.vg.generate, 'network')
 END
     shows 'WORST run sampled' 'WORST round' 'WORST run generated'
+}
+
+@test "in a window: a button's work is modal, Cancel leaves the scene as it was, one undo takes a result back, the mesh follows by itself" {
+    command -v xvfb-run >/dev/null || skip "xvfb-run is not installed"
+    must vg-encode --take 0-9 "$DATA/horse-run.tar.xz" -o run.vgs
+    must vg-segment -q -k 8 run.vgs -o horse.patches
+    must vg-fitmap -q --patches horse.patches run.vgs -o horse.map
+    cat >script.py <<'END'
+import world
+from world import *
+from vg_tools.work import State
+from vg_tools import between
+bpy.context.preferences.view.show_splash = False
+run, other = body('run', 'run.vgs'), body('other', 'run.vgs', False)
+other.shape_key_clear()
+vg.source.object, vg.target = run, other
+bpy.ops.ed.undo_push(message='made')
+names = lambda: sorted(o.name for o in bpy.data.objects)
+start = names()
+done = []
+
+def steps():
+    """Each yield lets the interface go on for a while."""
+    global vg, scene
+    yield
+    assert bpy.ops.vg.transfer('INVOKE_DEFAULT') == {'RUNNING_MODAL'}
+    assert State.title == 'Transfer' and not bpy.ops.vg.shapes.poll(), 'another could start'
+    while State.job is None: yield
+    assert bpy.ops.vg.cancel() == {'FINISHED'}
+    while State.title: yield
+    assert names() == start and State.lines == ['cancelled'] and bpy.context.scene.frame_current == 1
+    done.append('CANCELLED')
+    assert bpy.ops.vg.transfer('INVOKE_DEFAULT') == {'RUNNING_MODAL'}
+    while State.title: yield
+    assert names() == sorted(start + ['other as run']), names()
+    yield
+    bpy.ops.ed.undo()
+    yield
+    assert names() == start, names()
+    done.append('UNDONE')
+    scene = world.scene = bpy.context.scene
+    vg = scene.vg
+    for o in list(bpy.data.objects): bpy.data.objects.remove(o)
+    horse = body('horse', 'run.vgs')
+    vg.source.kind, vg.source.object, vg.map_file = 'KEYS', horse, os.path.abspath('horse.map')
+    assert bpy.ops.vg.slide() == {'FINISHED'}
+    for k in range(5):
+        vg.slider = k
+        before = between.envelope.Follow.count
+        while between.envelope.Follow.count == before: yield
+    shape = bodies.positions(horse.data.shape_keys.key_blocks['vg live'].data)
+    want = bodies.from_file(stream('run.vgs')[1][4].values)
+    assert numpy.abs(shape - want).max() < 0.05 * numpy.ptp(want), 'the slider shows something else'
+    bpy.ops.vg.slide()
+    done.append('FOLLOWED')
+
+going = steps()
+def tick():
+    try:
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]): next(going)
+    except StopIteration:
+        print(*done, flush=True)
+        bpy.ops.wm.quit_blender()
+        return None
+    except BaseException:
+        traceback.print_exc()
+        sys.stderr.flush()
+        os._exit(1)
+    return 0.05
+bpy.app.timers.register(tick, first_interval=0.5)
+END
+    capture env PYTHONPATH="$BATS_FILE_TMPDIR" LIBGL_ALWAYS_SOFTWARE=1 xvfb-run -a -s '-screen 0 640x480x24' timeout 300 \
+        blender --factory-startup --python-use-system-env --window-geometry 0 0 640 480 --python script.py
+    [ "$status" = 0 ] || fail "$output" "$stderr"
+    shows 'CANCELLED UNDONE FOLLOWED'
 }

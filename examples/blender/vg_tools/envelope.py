@@ -113,7 +113,7 @@ class VG_OT_envelope(Work, bpy.types.Operator):
             raise Trouble("a rig is learned from poses: there is none")
         known = Body(body.reference, body.faces, [body.reference, *body.points], ["rest", *body.names])
         words = ["--holdout", str(vg.holdout)] if vg.holdout else []
-        return known, joints, words + (["--learn"] if learn else []) + ([] if vg.method == "ENVELOPE" else ["--method", "lbs"])
+        return known, joints, words + (["--learn"] if learn else []) + ([] if vg.method == "DEFAULT" else ["--method", vg.method.lower()])
 
     def compute(self, job, gathered):
         body, joints, words = gathered

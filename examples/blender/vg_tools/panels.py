@@ -64,9 +64,8 @@ class VG_PT_transfer(Panel, bpy.types.Panel):
             c.prop(vg, "guide")
             if vg.guide:
                 c.prop(vg, "guide_by")
-            row = c.row(align=True)
-            row.prop(vg, "picks")
-            row.operator("vg.pick", text="Copy to Sculpt")
+            c.prop(vg, "picks")
+            c.operator("vg.pick", icon="SCULPTMODE_HLT")
             c.separator()
             c.prop(vg, "result")
             if vg.result == "CACHE":

@@ -69,8 +69,10 @@ class VG_Scene(bpy.types.PropertyGroup):
     body: PointerProperty(name="Body", type=bpy.types.Object, poll=is_mesh, description="The mesh that the rig or the map moves; empty: the source")
     rig_file: a_file("Rig", "The file of the rig")
     learn: BoolProperty(name="Learn bones", description="The armature does not move with the poses: learn from them how its bones move")
-    holdout: IntProperty(name="Hold out", min=0, max=100, description="Leave every so manieth pose out, and report how far the rig is from these; 0: none")
-    method: EnumProperty(name="Method", items=[("ENVELOPE", "Envelope", "Turned vectors and held vertices"), ("LBS", "Skinning", "Linear blend skinning alone")])
+    holdout: IntProperty(name="Hold out", min=0, max=100, description="Leave every Nth pose out, and report how far the rig is from these; 0: none")
+    method: EnumProperty(name="Method", items=[
+        ("DEFAULT", "Mixed", "Envelope and skinning, mixed by how they do on poses that are left out"),
+        ("ENVELOPE", "Envelope", "Turned vectors and held vertices"), ("LBS", "Skinning", "Linear blend skinning alone")])
 
     # between, patches, maps
     way: EnumProperty(name="By", items=[("GEODESIC", "Geodesic", "Each corner turns the shortest way"),
