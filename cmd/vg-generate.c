@@ -6,20 +6,39 @@
 #include <string.h>
 
 static struct {
-    long frames, between, seed;
-    double diversity;
+    long frames, between, given, seed;
+    double diversity, merge;
     size_t root; /* 1: stays */
+    bool optimise, loop;
 } opts = {.frames = 30, .seed = 1};
+
+/* "5%" or "0.05" */
+static void take_merge(const char *text, void *context)
+{
+    (void)context;
+    char *end;
+    opts.merge = strtod(text, &end);
+    if (*end == '%' && !end[1]) opts.merge /= 100, end++;
+    if (*end || end == text || !(opts.merge > 0 && opts.merge <= 1))
+        cli_usage("option '--merge' needs a share of the training's range such as 5%%, not '%s'", text);
+}
 
 static const cli_option options[] = {
     {"frames", 0, "N", "go on for so many poses (default 30)", .integer = &opts.frames, .least = 1, .most = 1000000000,
      .excludes = "between"},
+    {"given", 0, "N", "go on from the first N poses that come in; leave out the others (default: from all)",
+     .integer = &opts.given, .least = 1, .most = 1000000000, .excludes = "between"},
     {"between", 0, "N", "the poses that come in are keys: so many between each and the next", .integer = &opts.between,
      .least = 1, .most = 1000000},
-    {"diversity", 0, "X", "begin from random states of this deviation: 0.3 is lively (default 0: always the same)",
+    {"loop", 0, NULL, "make a cycle: lead back to the first pose at the end", .flag = &opts.loop},
+    {"optimise", 0, NULL, "look for the way that ends nearest to the key", .flag = &opts.optimise, .needs = "between|loop",
+     .excludes = "merge"},
+    {"merge", 0, "SHARE", "try random ways from both keys until they are so near, as 5% of the range", .take = take_merge,
+     .needs = "between|loop"},
+    {"diversity", 0, "X", "begin from random states of this deviation (with --seed 0.3, else 0: always the same)",
      .number = &opts.diversity, .least = 0, .most = 100},
-    {"seed", 0, "N", "another choice of them (default 1)", .integer = &opts.seed, .least = 0, .most = 4294967295.0,
-     .needs = "diversity"},
+    {"seed", 0, "N", "another choice of random states (default 1)", .integer = &opts.seed, .least = 0,
+     .most = 4294967295.0},
     {"root", 0, "move|stay", "the body as a whole moves on as it learned to (default), or stays", .choice = &opts.root},
     {.name = NULL}};
 
@@ -36,8 +55,9 @@ static vg_generator *make_generator(const vg_network *n, const vg_head *h)
 {
     vg_generator *g;
     vg_err e;
+    if (cli_given("seed") && !cli_given("diversity")) opts.diversity = 0.3;
     vg_generate_options o = {.stay = opts.root == 1, .diversity = opts.diversity, .seed = (uint64_t)opts.seed,
-                             .threads = cli.threads};
+                             .optimise = opts.optimise, .merge = opts.merge, .threads = cli.threads};
     if (vg_generator_new(&g, n, &h->body.mesh, h->body.reference, &o, &e) < 0) cli_die(&e);
     return g;
 }
@@ -51,55 +71,137 @@ static void put(vg_frame *f, uint64_t number)
     cli_stream_put(f);
 }
 
-/* The poses that come in go out, and as many more as are asked for. */
-static void go_on(vg_generator *g, vg_source *s)
+/* ---- from pose to pose ---- */
+
+/* The poses between two keys. */
+typedef struct gap {
+    size_t n;
+    vg_frame *frame;
+    double **poses;
+    uint64_t number; /* of poses that are written */
+} gap;
+
+static void make_gap(gap *w, size_t n, const vg_head *h)
 {
-    vg_frame f = {0};
     vg_err e;
-    uint64_t given = 0;
-    while (cli_next(s, &f)) {
-        if (vg_generator_give(g, f.values, &e) < 0) cli_die(&e);
-        given++;
+    *w = (gap){.n = n, .frame = cli_allocate(n, sizeof *w->frame, "the poses between two keys"),
+               .poses = cli_allocate(n, sizeof *w->poses, "the poses between two keys")};
+    for (size_t i = 0; i < n; i++) {
+        if (vg_frame_shape(&w->frame[i], h, &e) < 0) cli_die(&e);
+        w->poses[i] = w->frame[i].values;
     }
-    if (!given) cli_stop(VG_EINPUT, "the input has no pose to go on from");
-    vg_frame_clear(&f);
-    if (vg_frame_shape(&f, vg_source_head(s), &e) < 0) cli_die(&e);
-    for (uint64_t i = 0; i < (uint64_t)opts.frames; i++) {
-        if (vg_generator_next(g, f.values, &e) < 0) cli_die(&e);
-        put(&f, i + 1);
-    }
-    double change = vg_generator_change(g);
-    if (change < 0.5) cli_warn("the motion freezes: at the end it is %.2f times as lively as what was learned", change);
-    if (change > 2) cli_warn("the motion runs away: at the end it is %.2f times as lively as what was learned", change);
-    vg_frame_clear(&f);
+}
+
+static void free_gap(gap *w)
+{
+    for (size_t i = 0; i < w->n; i++) vg_frame_clear(&w->frame[i]);
+    free(w->frame);
+    free(w->poses);
+}
+
+static void say_way(const vg_way *way, const char *to)
+{
+    double miss = 100 * way->miss;
+    if (opts.merge > 0 && !way->merged)
+        cli_warn("on the way to %s: of %zu pairs of ways none came within %.3g %% of the range, the nearest within %.3g %%: they "
+                 "are joined there", to, way->tries, 100 * opts.merge, miss);
+    else if (opts.merge > 0) cli_note("to %s: the ways from both keys came within %.3g %% of the range, pair %zu", to, miss, way->tries);
+    else if (opts.optimise)
+        cli_note("to %s: after %zu rounds of search the way ended %.3g %% of the range away", to, way->tries, miss);
+    else cli_note("to %s: the way %s missed it by %.3g %% of the range", to, way->backward ? "from there back" : "there", miss);
+}
+
+static void cross(gap *w, vg_generator *g, const double *key, bool loop, const char *to)
+{
+    vg_err e;
+    vg_way way;
+    if (vg_generator_between(g, key, loop, w->n, w->poses, &way, &e) < 0) cli_die(&e);
+    say_way(&way, to);
+    for (size_t i = 0; i < w->n; i++) put(&w->frame[i], ++w->number);
+}
+
+static double *copy_pose(const double *pose, const vg_head *h)
+{
+    size_t n = 3 * h->body.mesh.nv;
+    double *copy = cli_allocate(n, sizeof *copy, "the first pose");
+    memcpy(copy, pose, n * sizeof *copy);
+    return copy;
 }
 
 static void lead(vg_generator *g, vg_source *s)
 {
-    vg_frame key = {0}, *between = cli_allocate((size_t)opts.between, sizeof *between, "the poses between two keys");
-    double **poses = cli_allocate((size_t)opts.between, sizeof *poses, "the poses between two keys"), miss;
+    vg_frame key = {0};
+    gap w;
     vg_err e;
-    uint64_t keys = 0, number = 0;
-    for (size_t i = 0; i < (size_t)opts.between; i++) {
-        if (vg_frame_shape(&between[i], vg_source_head(s), &e) < 0) cli_die(&e);
-        poses[i] = between[i].values;
-    }
+    double *first = NULL;
+    uint64_t keys = 0;
+    make_gap(&w, (size_t)opts.between, vg_source_head(s));
     while (cli_next(s, &key)) {
-        if (keys++ == 0) {
-            if (vg_generator_give(g, key.values, &e) < 0) cli_die(&e);
-        } else {
-            if (vg_generator_between(g, key.values, (size_t)opts.between, poses, &miss, &e) < 0) cli_die(&e);
-            cli_note("key %llu: the network's own way ended %.1f %% of its range away", (unsigned long long)keys, 100 * miss);
-            for (size_t i = 0; i < (size_t)opts.between; i++) put(&between[i], ++number);
-        }
-        number++;
+        char name[40];
+        snprintf(name, sizeof name, "key %llu", (unsigned long long)++keys);
+        if (keys > 1) cross(&w, g, key.values, false, name);
+        else if (vg_generator_give(g, key.values, &e) < 0) cli_die(&e);
+        if (opts.loop && !first) first = copy_pose(key.values, vg_source_head(s));
+        w.number++;
         cli_stream_put(&key);
     }
-    if (keys < 2) cli_stop(VG_EINPUT, "--between needs at least two keys, the input has %llu", (unsigned long long)keys);
-    for (size_t i = 0; i < (size_t)opts.between; i++) vg_frame_clear(&between[i]);
+    if (keys < 2 && !opts.loop)
+        cli_stop(VG_EINPUT, "--between needs at least two keys, the input has %llu", (unsigned long long)keys);
+    if (!keys) cli_stop(VG_EINPUT, "the input has no pose to begin from");
+    if (opts.loop) cross(&w, g, first, true, "the first pose");
+    free(first);
+    free_gap(&w);
     vg_frame_clear(&key);
-    free(between);
-    free(poses);
+}
+
+/* ---- on and on ---- */
+
+static void warn_of_motion(const vg_generator *g)
+{
+    double change = vg_generator_change(g), drift = vg_generator_drift(g);
+    if (change < 0.5) cli_warn("the motion freezes: at the end it is %.2f times as lively as what was learned", change);
+    if (change > 2) cli_warn("the motion runs away: at the end it is %.2f times as lively as what was learned", change);
+    if (drift > 0.1)
+        cli_warn("the poses drift: at the end they are %.0f %% of the range of what was learned outside of it", 100 * drift);
+}
+
+/* The poses that are given go out, too, each before the next is read; then those that go on, each before the next is
+ * computed. */
+static void go_on(vg_generator *g, vg_source *s)
+{
+    vg_frame f = {0};
+    vg_err e;
+    uint64_t given = 0, most = opts.given ? (uint64_t)opts.given : UINT64_MAX;
+    double *first = NULL;
+    while (given < most && cli_next(s, &f)) {
+        if (vg_generator_give(g, f.values, &e) < 0) cli_die(&e);
+        if (opts.loop && !first) first = copy_pose(f.values, vg_source_head(s));
+        given++;
+        cli_stream_put(&f);
+    }
+    if (!given) cli_stop(VG_EINPUT, "the input has no pose to go on from");
+    if (opts.given && given < most)
+        cli_stop(VG_EINPUT, "--given %ld needs as many poses, the input has %llu", opts.given, (unsigned long long)given);
+    vg_frame_clear(&f);
+    if (opts.loop) {
+        gap w;
+        make_gap(&w, (size_t)opts.frames, vg_source_head(s));
+        w.number = given;
+        cross(&w, g, first, true, "the first pose");
+        free_gap(&w);
+    } else {
+        if (vg_frame_shape(&f, vg_source_head(s), &e) < 0) cli_die(&e);
+        for (uint64_t i = 0; i < (uint64_t)opts.frames; i++) {
+            if (vg_generator_next(g, f.values, &e) < 0) cli_die(&e);
+            put(&f, given + i + 1);
+        }
+        warn_of_motion(g);
+        vg_frame_clear(&f);
+    }
+    free(first);
+    while (cli_next(s, &f)) /* so that a program before this one is heard when it fails */
+        ;
+    vg_frame_clear(&f);
 }
 
 int main(int argc, char **argv)

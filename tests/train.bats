@@ -38,27 +38,88 @@ horse() { echo "$BATS_FILE_TMPDIR/horse.$1"; }
     [ ! -e no.net ]
 }
 
-@test "keys go out as they came in, with poses between" {
+@test "keys go out as they came in, with poses between: by the better way, by the best found, by ways that meet" {
     must vg-encode --reference "$DATA/horse.rest.obj" --take 1,9,15 "$DATA/horse-run.tar.xz" -o keys.vgs
-    must vg-generate --between 4 "$(horse net)" keys.vgs -o between.vgs
-    py <<'END'
+    for options in "" "--optimise" "--merge 5%" "--seed 7" "--root stay"; do
+        must vg-generate -q --no-provenance -j 1 --between 4 $options "$(horse net)" keys.vgs -o between.vgs
+        must vg-generate -q --no-provenance -j 3 --between 4 $options "$(horse net)" keys.vgs -o again.vgs
+        must cmp between.vgs again.vgs
+        py <<'END'
 from read_stream import read_stream
 keys, all = read_stream("keys.vgs").frames, read_stream("between.vgs").frames
 assert len(all) == 11, len(all)
 for i, key in enumerate(keys):
     assert list(all[5 * i].values) == list(key.values)
 END
+        cp between.vgs "way$options.vgs"
+    done
+    cmp -s way.vgs "way--seed 7.vgs" && fail "a seed changed nothing"
+    cmp -s way.vgs "way--optimise.vgs" && fail "a search changed nothing"
     must_fail 3 vg-generate --between 4 "$(horse net)" "$DATA/horse.rest.obj" -o no.vgs
     says "--between needs at least two keys, the input has 1"
+    must vg-generate -v --between 4 --optimise "$(horse net)" keys.vgs -o no.vgs
+    says "rounds of search the way ended"
+    must_fail 2 vg-generate --optimise "$(horse net)" keys.vgs -o no2.vgs
+    must_fail 2 vg-generate --between 4 --merge 5% --optimise "$(horse net)" keys.vgs -o no2.vgs
+    must_fail 2 vg-generate --between 4 --merge 200% "$(horse net)" keys.vgs -o no2.vgs
+    says "needs a share of the training's range such as 5%"
 }
 
-@test "any number of frames from one pose; the same with any number of threads" {
+@test "a search ends nearer to the key than the plain way" {
+    must vg-encode --reference "$DATA/horse.rest.obj" --take 1,12 "$DATA/horse-run.tar.xz" -o keys.vgs
+    miss() { sed -n 's/.*\(missed it by\|the way ended\) \([0-9.e+-]*\) %.*/\2/p' <<<"$stderr$output"; }
+    must vg-generate -v --between 10 "$(horse net)" keys.vgs -o plain.vgs
+    plain=$(miss)
+    must vg-generate -v --between 10 --optimise "$(horse net)" keys.vgs -o best.vgs
+    best=$(miss)
+    awk -v a="$best" -v b="$plain" 'BEGIN { exit !(a > 0 && b > 0 && a < b) }' || fail "miss $best after the search, $plain before"
+}
+
+@test "a cycle leads back to its first pose: between keys, and behind given poses" {
+    must vg-encode --reference "$DATA/horse.rest.obj" --take 1,9 "$DATA/horse-run.tar.xz" -o keys.vgs
+    must vg-generate -q --between 6 --loop "$(horse net)" keys.vgs -o cycle.vgs
+    must vg-generate -q --frames 6 --loop "$(horse net)" keys.vgs -o round.vgs
+    py <<'END'
+from read_stream import read_stream
+keys, cycle = read_stream("keys.vgs").frames, read_stream("cycle.vgs").frames
+assert len(cycle) == 14 and list(cycle[0].values) == list(keys[0].values) and list(cycle[7].values) == list(keys[1].values)
+around = read_stream("round.vgs").frames
+assert len(around) == 8 and list(around[1].values) == list(keys[1].values)
+def centred(f):
+    v = f.values
+    m = [sum(v[k::3]) / (len(v) // 3) for k in range(3)]
+    return [x - m[i % 3] for i, x in enumerate(v)]
+def apart(a, b):
+    return max(abs(x - y) for x, y in zip(centred(a), centred(b)))
+steps = [apart(a, b) for a, b in zip(cycle[7:], cycle[8:])]
+# the step that closes the cycle is one like the others
+assert apart(cycle[-1], cycle[0]) < 2 * max(steps), (apart(cycle[-1], cycle[0]), steps)
+END
+}
+
+@test "any number of frames from one pose or from the first few; the same with any number of threads" {
     must vg-generate -q --no-provenance --frames 70 -j 1 "$(horse net)" "$DATA/horse.rest.obj" -o one.vgs
     must vg-generate -q --no-provenance --frames 70 -j 3 "$(horse net)" "$DATA/horse.rest.obj" -o three.vgs
     must cmp one.vgs three.vgs
     must vg-info --check one.vgs
     must vg-generate -q --no-provenance --frames 70 --diversity 0.3 "$(horse net)" "$DATA/horse.rest.obj" -o other.vgs
     if cmp -s one.vgs other.vgs; then fail "random states changed nothing"; fi
+    must vg-generate -q --given 3 --frames 5 "$(horse net)" "$(horse vgs)" -o given.vgs
+    py <<END
+from read_stream import read_stream
+came, out = read_stream("$(horse vgs)").frames, read_stream("given.vgs").frames
+assert len(out) == 8 and [f.name for f in out[3:]] == ["frame%d" % i for i in range(4, 9)]
+for a, b in zip(came[:3], out):
+    assert a.name == b.name and list(a.values) == list(b.values)
+END
+    must_fail 3 vg-generate --given 300 "$(horse net)" "$(horse vgs)" -o no.vgs
+    says "--given 300 needs as many poses, the input has"
+    must_fail 2 vg-generate --given 3 --between 3 "$(horse net)" "$(horse vgs)" -o no.vgs
+}
+
+@test "a frame is out before the next is computed: a run without end is read from as it comes" {
+    run timeout 20 bash -c "vg-generate -q --frames 1000000000 '$(horse net)' '$DATA/horse.rest.obj' | head -c 300000 | wc -c"
+    [ "$output" = 300000 ]
 }
 
 @test "a network is refused on another mesh, what is no network, and a damaged one" {

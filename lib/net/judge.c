@@ -66,7 +66,7 @@ int vgi_trainer_validate(vg_trainer *t, double *error, vg_err *e)
             if (lanes < NET_LANES && i < t->tried.n) continue;
             for (size_t l = 0; l < lanes; l++)
                 for (size_t g = 0; g < GIVEN; g++) take_frame(t, starts[l] - GIVEN + g, r.in[l] + g * n);
-            code = vgi_runner_go(&t->runner, lanes, GIVEN, (const double *const *)r.in, LONGEST, r.out, e);
+            code = vgi_runner_go(&t->runner, false, lanes, GIVEN, (const double *const *)r.in, LONGEST, r.out, e);
             for (size_t l = 0; code == VG_OK && l < lanes; l++, total++)
                 for (size_t g = 0; g < lengths[l]; g++)
                     sum += distance(t->frames + (starts[l] + g) * n, r.out[l] + g * n, n) / (double)lengths[l];
@@ -205,7 +205,7 @@ static int network_alone(judging *j, size_t first, size_t lanes, int given, runs
     size_t n = t->net.numbers;
     for (size_t l = 0; l < lanes; l++)
         for (size_t g = 0; g < r->given; g++) take_frame(t, j->start[first + l] - r->given + g, r->in[l] + g * n);
-    if (vgi_runner_go(&t->runner, lanes, r->given, (const double *const *)r->in, AHEAD, r->out, e) < 0) return VG_ENOMEM;
+    if (vgi_runner_go(&t->runner, false, lanes, r->given, (const double *const *)r->in, AHEAD, r->out, e) < 0) return VG_ENOMEM;
     for (size_t l = 0; l < lanes; l++) {
         size_t s = j->start[first + l];
         find_kept(t, s - 1, room, room + t->data.d);

@@ -3,6 +3,8 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/network.h"
 
+#include <math.h>
+
 static const double reach = 0.95; /* normalised numbers of the training frames lie within -reach .. reach */
 
 int vgi_network_shape(const vg_network *n, vgi_shape *s, vg_err *e)
@@ -57,4 +59,11 @@ void vgi_network_decode(const vg_network *n, const double *c, double *x)
     memcpy(x, n->mean, d * sizeof *x);
     for (size_t k = 0; k < n->rank; k++)
         for (size_t i = 0; i < d; i++) x[i] += c[k] * (double)n->basis[k * d + i];
+}
+
+double vgi_network_span(const vg_network *n)
+{
+    double sum = 0;
+    for (size_t i = 0; i < n->rank; i++) sum += (n->range[n->rank + i] - n->range[i]) * (n->range[n->rank + i] - n->range[i]);
+    return sqrt(sum);
 }

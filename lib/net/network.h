@@ -25,5 +25,7 @@ void vgi_network_features(const vg_network *n, const double *x, double *features
 /* Those numbers to rank coordinates, and back. */
 void vgi_network_encode(const vg_network *n, const double *x, double *c);
 void vgi_network_decode(const vg_network *n, const double *c, double *x);
+/* vgi_network_span: the diagonal of the box that the coordinates of the training fill. */
+double vgi_network_span(const vg_network *n);
 
 #endif

@@ -145,13 +145,13 @@ static void gather(size_t lanes, size_t n, const double *const *in, size_t t, ne
         for (size_t i = 0; i < NET_LANES; i++) frame[k][i] = (real)in[i < lanes ? i : 0][t * n + k];
 }
 
-int vgi_runner_go(vgi_runner *r, size_t lanes, size_t given, const double *const *in, size_t n, double *const *out,
-                  vg_err *e)
+int vgi_runner_go(vgi_runner *r, bool back, size_t lanes, size_t given, const double *const *in, size_t n,
+                  double *const *out, vg_err *e)
 {
     size_t w = r->shape.numbers;
     net_lanes *frame = net_array(3 * w, e);
     if (!frame) return VG_ENOMEM;
-    vgi_runner_begin(r, false);
+    vgi_runner_begin(r, back);
     gather(lanes, w, in, 0, frame);
     if (given == 1 && vgi_runner_reach_back(r, frame, frame + w, frame + 2 * w)) {
         vgi_runner_take(r, frame + 2 * w);

@@ -40,8 +40,18 @@ const net_lanes *vgi_runner_give(vgi_runner *r);
  * network has no regression. */
 bool vgi_runner_reach_back(const vgi_runner *r, const net_lanes *frame, net_lanes *before, net_lanes *before_that);
 
-/* vgi_runner_go: `given` frames of up to eight lanes (numbers each, frame after frame) to n more each. */
-int vgi_runner_go(vgi_runner *r, size_t lanes, size_t given, const double *const *in, size_t n, double *const *out,
+/* vgi_runner_go: `given` frames of up to eight lanes (numbers each, frame after frame) to n more each; back: in
+ * the order of falling time. */
+int vgi_runner_go(vgi_runner *r, bool back, size_t lanes, size_t given, const double *const *in, size_t n, double *const *out,
                   vg_err *e) VG_MUST_CHECK;
+
+typedef struct vgi_reach {
+    double first, last; /* distance from the target with the initial states that were there, and that were found */
+    size_t rounds;
+} vgi_reach;
+/* vgi_runner_reach: look for initial states from which frame n behind the `given` ones is nearest to `target` (numbers);
+ * it begins with those of lane 0, and all lanes get what it finds. (reach.c) */
+int vgi_runner_reach(vgi_runner *r, size_t given, const double *in, size_t n, const double *target, size_t rounds,
+                     vgi_reach *found, vg_err *e) VG_MUST_CHECK;
 
 #endif

@@ -103,8 +103,21 @@ typedef struct vg_generate_options {
     bool stay;         /* the root stays where the last given pose has it; else it moves as it learned to */
     double diversity;  /* deviation of random initial states; 0: those of the training */
     uint64_t seed;
+    /* between keys: */
+    bool optimise;     /* search for the initial states whose way ends nearest to the key */
+    double merge;      /* > 0: as printed: random initial states until the ways from both keys come so near to one another,
+                          as a share of the training's range */
     int threads;
 } vg_generate_options;
+
+/* How a way from key to key was found. */
+typedef struct vg_way {
+    bool backward;     /* it is the way from the second key back to the first */
+    bool merged;       /* both ways came near enough, and are joined where they are nearest */
+    double miss;       /* how far the end was from the key, or both ways from one another, as a share of the training's
+                          range, before it was spread over the way */
+    size_t tries;      /* pairs of ways that were looked at, or rounds of the search */
+} vg_way;
 
 /* vg_generator_new: n: borrowed until free, fits m (else VG_EINPUT); reference: nv points. */
 int vg_generator_new(vg_generator **g, const vg_network *n, const vg_mesh *m, const double *reference,
@@ -116,13 +129,16 @@ void vg_generator_restart(vg_generator *g);
 /* vg_generator_next: the next pose (nv points out), from what was given and what came of it. */
 int vg_generator_next(vg_generator *g, double *pose, vg_err *e) VG_MUST_CHECK;
 /* vg_generator_between: n poses that lead from the last given pose to `key`, which then is the last given one: the
- * network's way from the first, whose miss at the end is spread over it. miss (may be NULL): how far off the end was,
- * as a share of the range of the training. */
-int vg_generator_between(vg_generator *g, const double *key, size_t n, double *const *poses, double *miss,
+ * better of the network's ways from the first and back from the second, whose miss at the end is spread over it; or as
+ * the options say. loop: the key closes a cycle: its body is met, and the root's shift goes on as the network moves it.
+ * way may be NULL. */
+int vg_generator_between(vg_generator *g, const double *key, bool loop, size_t n, double *const *poses, vg_way *way,
                          vg_err *e) VG_MUST_CHECK;
 /* vg_generator_change: mean change of features over the last frames that came out, beside that of the training:
  * far below 1, and the motion freezes; far above, and it runs away. */
 double vg_generator_change(const vg_generator *g);
+/* vg_generator_drift: how far the last coordinates wanted to be outside of the range of the training, as a share of it. */
+double vg_generator_drift(const vg_generator *g);
 
 #ifdef __cplusplus
 }

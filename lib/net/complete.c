@@ -1,0 +1,312 @@
+/* complete.c: from key to key (L 4.4; MATH 12).
+ *
+ * A way runs from the first key forward, or from the second back; it misses the other key, and the miss is spread over
+ * it linearly, so that both keys are met exactly. By default the better of the two ways is taken. Or the initial states
+ * are optimised first; or, as printed, random ones are tried until the ways from both keys meet.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "net/generator.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { RESTARTS = 64, ROUNDS = 30 };
+
+/* A pose: normalised features, coordinates, what the basis misses, the frame as the layers see it, root. */
+typedef struct station {
+    double *x, *c, *kept, *frame, *centroids, root[4];
+} station;
+
+/* A way of n frames between two stations. */
+typedef struct way {
+    vg_generator *g;
+    size_t n;
+    station from, to;
+    double *forward[NET_LANES], *back[NET_LANES]; /* n + 1 frames each: behind the first key, before the second */
+    double *path;      /* n frames that are chosen */
+    double *past;      /* the frames before the second key was given; npast of them */
+    size_t npast;
+    double *centroids, *roots; /* n + 1 each */
+    double *memory;
+    vg_way found;
+} way;
+
+static size_t station_size(const vg_generator *g)
+{
+    return 2 * g->d + g->net->rank + g->net->numbers + 3 * g->net->parts;
+}
+
+static double *place_station(const vg_generator *g, station *s, double *at)
+{
+    s->x = at, s->kept = at += g->d, s->c = at += g->d, s->frame = at += g->net->rank;
+    s->centroids = at += g->net->numbers;
+    return at + 3 * g->net->parts;
+}
+
+static void note_station(const vg_generator *g, station *s)
+{
+    memcpy(s->x, g->x, g->d * sizeof *s->x);
+    memcpy(s->kept, g->kept, g->d * sizeof *s->kept);
+    memcpy(s->c, g->c, g->net->rank * sizeof *s->c);
+    memcpy(s->frame, vgi_network_is_linear(g->net) ? g->c : g->x, g->net->numbers * sizeof *s->frame);
+    memcpy(s->root, g->root, sizeof s->root);
+    memcpy(s->centroids, g->centroids, 3 * g->net->parts * sizeof *s->centroids);
+}
+
+/* lanes: how many ways there are in each direction */
+static int make_way(way *w, vg_generator *g, size_t n, size_t lanes, vg_err *e)
+{
+    size_t numbers = g->net->numbers, parts = g->net->parts, frames, all;
+    *w = (way){.g = g, .n = n};
+    if (!vgi_mul(2 * lanes + 1, n + 1, &frames) || !vgi_mul(frames, numbers, &all))
+        return vg_fail(e, VG_ENOMEM, "%zu poses between two keys are too many", n);
+    double *at = w->memory = vgi_array(all + 2 * station_size(g) + (n + 1) * (3 * parts + 4) +
+                                            VGI_LONG_GIVEN * numbers, sizeof *at, e);
+    if (!at) return VG_ENOMEM;
+    at = place_station(g, &w->from, at);
+    at = place_station(g, &w->to, at);
+    for (size_t i = 0; i < lanes; i++) w->forward[i] = at, w->back[i] = at += (n + 1) * numbers, at += (n + 1) * numbers;
+    w->path = at, w->centroids = at += (n + 1) * numbers, w->roots = at += 3 * parts * (n + 1), w->past = at + 4 * (n + 1);
+    return VG_OK;
+}
+
+/* ---- frames ---- */
+
+static double distance(const double *a, const double *b, size_t n)
+{
+    double sum = 0;
+    for (size_t i = 0; i < n; i++) sum += (a[i] - b[i]) * (a[i] - b[i]);
+    return sqrt(sum);
+}
+
+/* a distance of frames as a share of the training's range */
+static double share(const way *w, double far)
+{
+    double span = vgi_network_span(w->g->net);
+    return span > 0 ? far / span : 0;
+}
+
+/* The ways of all lanes from the first key: from it and the poses before it. */
+static int run_forward(way *w, size_t lanes, vg_err *e)
+{
+    const double *in[NET_LANES];
+    for (size_t i = 0; i < NET_LANES; i++) in[i] = w->past;
+    return vgi_runner_go(&w->g->runner, false, lanes, w->npast, in, w->n + 1, w->forward, e);
+}
+
+static int run_back(way *w, size_t lanes, vg_err *e)
+{
+    const double *in[NET_LANES];
+    for (size_t i = 0; i < NET_LANES; i++) in[i] = w->to.frame;
+    return vgi_runner_go(&w->g->runner, true, lanes, 1, in, w->n + 1, w->back, e);
+}
+
+/* The first `count` frames of the way `along` go into the path, with `miss` spread over the first `length` of them. back:
+ * the way begins at the second key. */
+static void spread(way *w, const double *along, const double *miss, size_t length, size_t count, bool back)
+{
+    size_t numbers = w->g->net->numbers;
+    for (size_t t = 0; t < count; t++) {
+        double part = (double)(t + 1) / (double)length, *to = w->path + (back ? w->n - 1 - t : t) * numbers;
+        for (size_t k = 0; k < numbers; k++) to[k] = along[t * numbers + k] + part * miss[k];
+    }
+}
+
+static void difference(const double *a, const double *b, size_t n, double *to)
+{
+    for (size_t k = 0; k < n; k++) to[k] = a[k] - b[k];
+}
+
+/* The better of the ways there and back. */
+static int find_spread(way *w, vg_err *e)
+{
+    vg_generator *g = w->g;
+    size_t n = w->n, numbers = g->net->numbers;
+    double *miss = g->numbers, far[2] = {0, INFINITY};
+    vgi_reach reach;
+    int code = VG_OK;
+    vgi_generator_states(g, false, 0);
+    if (g->o.optimise) {
+        code = vgi_runner_reach(&g->runner, w->npast, w->past, n + 1, w->to.frame, ROUNDS, &reach, e);
+        if (code == VG_OK) w->found.tries = reach.rounds;
+    }
+    if (code == VG_OK) code = run_forward(w, 1, e);
+    if (code < 0) return code;
+    far[0] = distance(w->to.frame, w->forward[0] + n * numbers, numbers);
+    if (!g->o.optimise && g->net->direction != VG_FORWARD) {
+        vgi_generator_states(g, true, 0);
+        code = run_back(w, 1, e);
+        far[1] = distance(w->from.frame, w->back[0] + n * numbers, numbers);
+    }
+    w->found.backward = far[1] < far[0];
+    const double *along = w->found.backward ? w->back[0] : w->forward[0];
+    difference(w->found.backward ? w->from.frame : w->to.frame, along + n * numbers, numbers, miss);
+    w->found.miss = share(w, fmin(far[0], far[1]));
+    spread(w, along, miss, n + 1, n, w->found.backward);
+    return code;
+}
+
+/* Where the two ways of a lane are nearest at the same time: frame at + 1 of n; returns how near. */
+static double nearest(const way *w, size_t lane, size_t *at)
+{
+    size_t numbers = w->g->net->numbers;
+    double least = INFINITY;
+    for (size_t t = 0; t < w->n; t++) {
+        double far = distance(w->forward[lane] + t * numbers, w->back[lane] + (w->n - 1 - t) * numbers, numbers);
+        if (far < least) least = far, *at = t;
+    }
+    return least;
+}
+
+/* Both ways lead to the middle between them at frame `at`. */
+static void join(way *w, size_t lane, size_t at)
+{
+    size_t numbers = w->g->net->numbers;
+    double *half = w->g->numbers;
+    const double *there = w->forward[lane] + at * numbers, *back = w->back[lane] + (w->n - 1 - at) * numbers;
+    difference(back, there, numbers, half);
+    for (size_t k = 0; k < numbers; k++) half[k] /= 2;
+    spread(w, w->forward[lane], half, at + 1, at + 1, false);
+    for (size_t k = 0; k < numbers; k++) half[k] = -half[k];
+    spread(w, w->back[lane], half, w->n - at, w->n - 1 - at, true);
+}
+
+/* As printed: random initial states, until the ways come near enough; else the nearest of all are joined. */
+static int find_merge(way *w, vg_err *e)
+{
+    vg_generator *g = w->g;
+    size_t at = 0;
+    double best = INFINITY;
+    int code = VG_OK;
+    for (uint64_t batch = 0; code == VG_OK && batch < RESTARTS / NET_LANES && !w->found.merged; batch++) {
+        vgi_generator_states(g, false, 2 * batch);
+        code = run_forward(w, NET_LANES, e);
+        vgi_generator_states(g, true, 2 * batch + 1);
+        if (code == VG_OK) code = run_back(w, NET_LANES, e);
+        for (size_t i = 0; code == VG_OK && i < NET_LANES && !w->found.merged; i++) {
+            double far = share(w, nearest(w, i, &at));
+            w->found.tries++;
+            if (!(far < best)) continue;
+            best = far;
+            w->found.merged = far <= g->o.merge;
+            join(w, i, at);
+        }
+    }
+    w->found.miss = best;
+    return code;
+}
+
+/* ---- poses ---- */
+
+/* Coordinates of frame t of the path; behind the last one those of the second key. */
+static const double *coordinates(const way *w, size_t t, double *room)
+{
+    const double *frame = w->path + t * w->g->net->numbers;
+    if (t >= w->n) return w->to.c;
+    if (vgi_network_is_linear(w->g->net)) return frame;
+    vgi_network_encode(w->g->net, frame, room);
+    return room;
+}
+
+/* The root along the path, as the body moves it. */
+static void move_root(way *w)
+{
+    vg_generator *g = w->g;
+    size_t wide = 3 * g->net->parts;
+    double root[4], *centroids = g->centroids, *c = g->c, *before = g->c_before;
+    memcpy(root, w->from.root, sizeof root);
+    memcpy(centroids, w->from.centroids, wide * sizeof *centroids);
+    memcpy(before, w->from.c, g->net->rank * sizeof *before);
+    for (size_t t = 0; t <= w->n; t++) {
+        memmove(c, coordinates(w, t, c), g->net->rank * sizeof *c);
+        vgi_generator_move(g, c, before, root, centroids);
+        memcpy(before, c, g->net->rank * sizeof *c);
+        memcpy(w->roots + 4 * t, root, sizeof root);
+        memcpy(w->centroids + wide * t, centroids, wide * sizeof *centroids);
+    }
+}
+
+/* The root's turn `miss`, a rotation vector, in part. */
+static void turn_by(const double miss[3], double part, double root[4])
+{
+    double l[4] = {0, part * miss[0], part * miss[1], part * miss[2]}, q[4];
+    vg_quat_exp(l, q);
+    vg_quat_multiply(root, q, root);
+}
+
+/* What the root misses at the second key is spread over the way; of a cycle its shift is left as it is. */
+static void bend_root(way *w, bool loop)
+{
+    size_t parts = w->g->net->parts, main_part = w->g->main_part, wide = 3 * parts;
+    const double *end = w->roots + 4 * w->n, *reached = w->centroids + wide * w->n;
+    double back[4] = {end[0], -end[1], -end[2], -end[3]}, turn[4], l[4], *miss = w->g->centroids;
+    vg_quat_multiply(back, w->to.root, turn);
+    for (int k = 0; k < 4 && turn[0] < 0; k++) turn[k] = -turn[k];
+    vg_quat_log(turn, l);
+    for (size_t i = 0; i < wide; i++) {
+        double shift = loop ? reached[3 * main_part + i % 3] - w->to.centroids[3 * main_part + i % 3] : 0;
+        miss[i] = w->to.centroids[i] + shift - reached[i];
+    }
+    for (size_t t = 0; t < w->n; t++) {
+        double part = (double)(t + 1) / (double)(w->n + 1);
+        turn_by(l + 1, part, w->roots + 4 * t);
+        for (size_t i = 0; i < wide; i++) w->centroids[wide * t + i] += part * miss[i];
+    }
+}
+
+static int make_poses(way *w, double *const *poses, vg_err *e)
+{
+    vg_generator *g = w->g;
+    int code = VG_OK;
+    for (size_t t = 0; code == VG_OK && t < w->n; t++) {
+        const double *frame = w->path + t * g->net->numbers;
+        double part = (double)(t + 1) / (double)(w->n + 1);
+        if (vgi_network_is_linear(g->net)) {
+            vgi_network_decode(g->net, frame, g->x);
+            for (size_t i = 0; i < g->d; i++) g->x[i] += (1 - part) * w->from.kept[i] + part * w->to.kept[i];
+        } else memcpy(g->x, frame, g->d * sizeof *g->x);
+        code = vgi_generator_pose(g, g->x, w->roots + 4 * t, w->centroids + 3 * g->net->parts * t, poses[t], e);
+    }
+    return code;
+}
+
+/* The second key is the last given pose; what came before it is remembered by a network that looks at several frames. */
+static void arrive(way *w)
+{
+    vg_generator *g = w->g;
+    size_t n = g->net->numbers, before = w->n < VGI_LONG_GIVEN - 1 ? w->n : VGI_LONG_GIVEN - 1;
+    memcpy(g->x, w->to.x, g->d * sizeof *g->x);
+    memcpy(g->before, w->to.x, g->d * sizeof *g->x);
+    memcpy(g->c, w->to.c, g->net->rank * sizeof *g->c);
+    memcpy(g->root, w->to.root, sizeof g->root);
+    memcpy(g->centroids, w->to.centroids, 3 * g->net->parts * sizeof *g->centroids);
+    g->npast = 0;
+    for (size_t t = w->n - before; t < w->n && vgi_network_is_linear(g->net); t++)
+        vgi_generator_remember(g, w->path + t * n);
+    vgi_generator_remember(g, w->to.frame);
+}
+
+int vg_generator_between(vg_generator *g, const double *key, bool loop, size_t n, double *const *poses, vg_way *found,
+                         vg_err *e)
+{
+    way w;
+    if (!g->given) return vg_fail(e, VG_EINPUT, "no pose is given to begin from");
+    if (g->o.merge > 0 && g->net->direction == VG_FORWARD)
+        return vg_fail(e, VG_EINPUT, "the network runs forward only: its ways from two keys cannot meet");
+    int code = make_way(&w, g, n, g->o.merge > 0 ? NET_LANES : 1, e);
+    if (code < 0) return code;
+    note_station(g, &w.from);
+    memcpy(w.past, g->past, g->npast * g->net->numbers * sizeof *w.past);
+    w.npast = g->npast;
+    code = vg_generator_give(g, key, e);
+    note_station(g, &w.to);
+    if (code == VG_OK) code = g->o.merge > 0 ? find_merge(&w, e) : find_spread(&w, e);
+    if (code == VG_OK) {
+        move_root(&w);
+        bend_root(&w, loop);
+        code = make_poses(&w, poses, e);
+        arrive(&w);
+    }
+    if (found) *found = w.found;
+    free(w.memory);
+    return code;
+}

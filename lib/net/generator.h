@@ -1,0 +1,41 @@
+/* generator.h: what a network at work holds.
+ * Internal; shared by generate.c and complete.c.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef VG_GENERATOR_H
+#define VG_GENERATOR_H
+
+#include "net/feature.h"
+#include "net/root.h"
+#include "net/runner.h"
+
+enum { VGI_WATCHED = 16 }; /* frames whose change and drift are looked at */
+
+struct vg_generator {
+    const vg_network *net;
+    vg_generate_options o;
+    vg_featurer *featurer;
+    vgi_runner runner;
+    size_t d, nv, main_part;
+    size_t given, made;     /* poses of this run */
+    double *past;           /* VGI_LONG_GIVEN x numbers: the last frames, the latest last; npast of them */
+    size_t npast;
+    net_lanes *frame;       /* 3 x numbers */
+    double *x, *before, *kept, *features; /* d each: the last frame normalised, the one before, what the basis misses */
+    double *c, *c_before, *steps;         /* rank, rank, roots */
+    double root[4], *centroids;
+    double *numbers;        /* numbers of one frame, as the layers see it */
+    double changes[VGI_WATCHED], drifts[VGI_WATCHED];
+    bool begun;
+};
+
+/* vgi_generator_remember: a frame behind the last one. */
+void vgi_generator_remember(vg_generator *g, const double *frame);
+/* vgi_generator_states: initial states of all lanes: those of the training, or random ones; try: of the random ones. */
+void vgi_generator_states(vg_generator *g, bool back, uint64_t try);
+/* vgi_generator_move: from the coordinates g->c and those before: root and centroids become the next ones. */
+void vgi_generator_move(const vg_generator *g, const double *c, const double *before, double *root, double *centroids);
+/* vgi_generator_pose: the pose (nv points) of normalised features x, by a root and centroids. */
+int vgi_generator_pose(vg_generator *g, const double *x, const double *root, const double *centroids, double *pose,
+                       vg_err *e) VG_MUST_CHECK;
+
+#endif
