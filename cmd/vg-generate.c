@@ -107,7 +107,8 @@ static void say_way(const vg_way *way, const char *to)
                  "are joined there", to, way->tries, 100 * opts.merge, miss);
     else if (opts.merge > 0) cli_note("to %s: the ways from both keys came within %.3g %% of the range, pair %zu", to, miss, way->tries);
     else if (opts.optimise)
-        cli_note("to %s: after %zu rounds of search the way ended %.3g %% of the range away", to, way->tries, miss);
+        cli_note("to %s: after %zu rounds of search the way %s missed it by %.3g %% of the range", to, way->tries,
+                 way->backward ? "from there back" : "there", miss);
     else cli_note("to %s: the way %s missed it by %.3g %% of the range", to, way->backward ? "from there back" : "there", miss);
 }
 

@@ -132,7 +132,7 @@ static int find_spread(way *w, vg_err *e)
     if (code == VG_OK) code = run_forward(w, 1, e);
     if (code < 0) return code;
     far[0] = distance(w->to.frame, w->forward[0] + n * numbers, numbers);
-    if (!g->o.optimise && g->net->direction != VG_FORWARD) {
+    if (g->net->direction != VG_FORWARD) {
         vgi_generator_states(g, true, 0);
         code = run_back(w, 1, e);
         far[1] = distance(w->from.frame, w->back[0] + n * numbers, numbers);
