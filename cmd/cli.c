@@ -292,6 +292,14 @@ vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o
     return upstream = s;
 }
 
+void cli_load(vg_head *h, const char *operand, const char *what)
+{
+    vg_note note;
+    vg_err e;
+    if (vg_load_with(h, operand, what, NULL, &note, &e) < 0) cli_die(&e);
+    if (*note.text) cli_warn("%s", note.text);
+}
+
 bool cli_next(vg_source *s, vg_frame *f)
 {
     vg_err e;

@@ -123,6 +123,8 @@ vg_source *cli_source_with(char **operands, size_t n, const vg_source_options *o
 
 /* cli_next: the next frame; false at the end. Damage ends the program. */
 bool cli_next(vg_source *s, vg_frame *f);
+/* cli_load: vg_load, which says what was left out of the mesh, and stops when it fails. */
+void cli_load(vg_head *h, const char *operand, const char *what);
 /* cli_need_vertices: stop unless the frames are vertices, with a message that names the program to use first.
  * Messages call the sequence `subject` ("the input", "'a.vgs'"). */
 void cli_need_vertices(const vg_head *h, const char *subject);

@@ -1,6 +1,7 @@
 /* fitting.c: the driver of fits: collect, hold out, pass, sample, judge. The fits themselves are in the programs.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "fitting.h"
+#include "batch.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -8,17 +9,49 @@
 
 static const size_t in_memory = (size_t)256 << 20; /* bytes of poses in memory; the rest goes to a file */
 
+/* ---- reading ---- */
+
+typedef struct streaming {
+    fitting_step *each;
+    void *context;
+    size_t done;
+} streaming;
+
+static void stream_batch(void *work, size_t n, vg_frame *in)
+{
+    streaming *x = work;
+    fitting_batch b = {.n = n};
+    for (size_t i = 0; i < n; i++) b.index[i] = x->done++, b.values[i] = in[i].values;
+    x->each(x->context, &b);
+}
+
+uint64_t fitting_stream(vg_source *s, fitting_step *each, void *context)
+{
+    static const step reading = {.batch = FITTING_BATCH, .unit = "poses", .process = stream_batch};
+    streaming x = {each, context, 0};
+    vg_frame *in = batch_frames(&reading);
+    uint64_t n = batch_read(&reading, &x, s, in);
+    batch_frames_free(&reading, in);
+    return n;
+}
+
+static void collect_batch(void *work, size_t n, vg_frame *in)
+{
+    fitting *f = work;
+    vg_err e;
+    for (size_t i = 0; i < n; i++, f->n++)
+        if (vg_poses_add(f->poses, &in[i], &e) < 0) cli_die(&e);
+}
+
 void fitting_collect(fitting *f, vg_source *s, long holdout, const char *what)
 {
+    static const step reading = {.batch = 1, .unit = "poses", .process = collect_batch};
     vg_err e;
-    vg_frame frame = {0};
+    vg_frame *in = batch_frames(&reading);
     *f = (fitting){.h = vg_source_head(s), .holdout = (size_t)holdout};
     if (vg_poses_new(&f->poses, f->h, in_memory, &e) < 0) cli_die(&e);
-    while (cli_next(s, &frame)) {
-        if (vg_poses_add(f->poses, &frame, &e) < 0) cli_die(&e);
-        cli_progress("poses", ++f->n);
-    }
-    vg_frame_clear(&frame);
+    batch_read(&reading, f, s, in);
+    batch_frames_free(&reading, in);
     if (!f->n) cli_stop(VG_EINPUT, "the input has no poses to %s", what);
 }
 
@@ -34,10 +67,10 @@ bool fitting_is_held_out(const fitting *f, size_t i)
 }
 
 void fitting_pass(const fitting *f, bool (*wanted)(void *context, size_t i),
-                  void (*step)(void *context, const fitting_batch *b), void *context)
+                  fitting_step *each, void *context)
 {
     vg_err e;
-    size_t width = f->h->count * vg_kind_width(f->h->kind);
+    size_t width = f->h->count * vg_head_width(f->h);
     double *room = cli_allocate(FITTING_BATCH, width * sizeof *room, "a batch of poses");
     fitting_batch b = {0};
     for (size_t i = 0; i < f->n; i++) {
@@ -45,10 +78,10 @@ void fitting_pass(const fitting *f, bool (*wanted)(void *context, size_t i),
         b.index[b.n] = i;
         if (vg_poses_values(f->poses, i, room + b.n * width, &b.values[b.n], &e) < 0) cli_die(&e);
         if (++b.n < FITTING_BATCH) continue;
-        step(context, &b);
+        each(context, &b);
         b.n = 0;
     }
-    if (b.n) step(context, &b);
+    if (b.n) each(context, &b);
     free(room);
 }
 
@@ -62,7 +95,7 @@ static size_t count_multiples(const fitting *f, size_t stride)
 size_t fitting_sample(const fitting *f, size_t most, size_t *index, double **values)
 {
     vg_err e;
-    size_t n = 0, stride = 1, width = f->h->count * vg_kind_width(f->h->kind);
+    size_t n = 0, stride = 1, width = f->h->count * vg_head_width(f->h);
     while (count_multiples(f, stride) > most) stride *= 2;
     for (size_t i = 0; i < f->n; i += stride) {
         if (fitting_is_held_out(f, i)) continue;

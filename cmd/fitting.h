@@ -26,9 +26,14 @@ typedef struct fitting_batch {
     const double *values[FITTING_BATCH];
 } fitting_batch;
 
-/* fitting_pass: call step(context, batch) for all poses i with wanted(context, i), in order; wanted NULL: for all. */
+typedef void fitting_step(void *context, const fitting_batch *b);
+
+/* fitting_stream: each(context, batch) for the frames of s as they come, for fits that need each pose once. Nothing is
+ * kept. Returns how many there were. */
+uint64_t fitting_stream(vg_source *s, fitting_step *each, void *context);
+/* fitting_pass: call each(context, batch) for all poses i with wanted(context, i), in order; wanted NULL: for all. */
 void fitting_pass(const fitting *f, bool (*wanted)(void *context, size_t i),
-                  void (*step)(void *context, const fitting_batch *b), void *context);
+                  fitting_step *each, void *context);
 /* fitting_sample: take at most `most` of the poses that are not held out: those whose number is a multiple of a
  * power of two. Sets their numbers and copies of their values; returns the count. */
 size_t fitting_sample(const fitting *f, size_t most, size_t *index, double **values);

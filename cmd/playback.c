@@ -37,8 +37,7 @@ typedef struct playback {
 
 static void load_map(playback *p)
 {
-    vg_err e;
-    if (vg_load(&p->home, p->o->map, "map", &e) < 0) cli_die(&e);
+    cli_load(&p->home, p->o->map, "map");
     vg_head_take_out(&p->map, &p->home, "map");
 }
 

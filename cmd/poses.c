@@ -1,39 +1,50 @@
 /* poses.c: reads all poses of a sequence into memory.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "poses.h"
+#include "batch.h"
 
 #include <stdlib.h>
 #include <string.h>
 
+typedef struct gathering {
+    poses p;
+    size_t cap, most;
+    bool timed;
+} gathering;
+
+static void gather(void *work, size_t n, vg_frame *f)
+{
+    gathering *g = work;
+    poses *p = &g->p;
+    (void)n; /* one at a time */
+    if (p->n == g->most)
+        cli_stop(VG_EINPUT, "there are more than %zu frames: take fewer with vg-encode --take, or one piece of the "
+                 "sequence after another", g->most);
+    if (p->n == g->cap) {
+        g->cap = g->cap ? 2 * g->cap : 32;
+        p->values = cli_resize(p->values, g->cap, p->numbers * sizeof *p->values, "the poses");
+        p->names = cli_resize(p->names, g->cap, sizeof *p->names, "the poses");
+        p->times = cli_resize(p->times, g->cap, sizeof *p->times, "the poses");
+    }
+    if (p->numbers) memcpy(p->values + p->n * p->numbers, f->values, p->numbers * sizeof *p->values);
+    p->names[p->n] = cli_copy_text(f->name ? f->name : "", "the poses");
+    g->timed = g->timed && f->has_time;
+    p->times[p->n++] = f->time;
+}
+
 poses poses_read(vg_source *s, size_t most)
 {
-    vg_frame f = {0};
+    static const step reading = {.batch = 1, .unit = "poses", .process = gather};
     const vg_head *h = vg_source_head(s);
-    poses p = {.numbers = h->count * vg_head_width(h)};
-    bool timed = true;
-    size_t cap = 0;
-    while (cli_next(s, &f)) {
-        cli_progress("poses", p.n + 1);
-        if (p.n == most)
-            cli_stop(VG_EINPUT, "there are more than %zu frames: take fewer with vg-encode --take, or one piece of the "
-                     "sequence after another", most);
-        if (p.n == cap) {
-            cap = cap ? 2 * cap : 32;
-            p.values = cli_resize(p.values, cap, p.numbers * sizeof *p.values, "the poses");
-            p.names = cli_resize(p.names, cap, sizeof *p.names, "the poses");
-            p.times = cli_resize(p.times, cap, sizeof *p.times, "the poses");
-        }
-        if (p.numbers) memcpy(p.values + p.n * p.numbers, f.values, p.numbers * sizeof *p.values);
-        p.names[p.n] = cli_copy_text(f.name ? f.name : "", "the poses");
-        timed = timed && f.has_time;
-        p.times[p.n++] = f.time;
+    gathering g = {.p = {.numbers = h->count * vg_head_width(h)}, .most = most, .timed = true};
+    vg_frame *in = batch_frames(&reading);
+    batch_read(&reading, &g, s, in);
+    batch_frames_free(&reading, in);
+    if (!g.timed || !g.p.n) {
+        free(g.p.times);
+        g.p.times = NULL;
     }
-    if (!timed || !p.n) {
-        free(p.times);
-        p.times = NULL;
-    }
-    vg_frame_clear(&f);
-    return p;
+    return g.p;
 }
 
 poses poses_load(const char *operand, size_t most, const vg_mesh *mesh, vg_head *to)

@@ -219,11 +219,8 @@ static void check_kind(work *w)
 
 static void load_target(work *w)
 {
-    vg_err e;
-    if (!opts.onto) return;
-    if (vg_load(&w->target, opts.onto, "mesh", &e) < 0) cli_die(&e);
-    if (!opts.correspondence) return;
-    if (vg_load(&w->pairs, opts.correspondence, "correspondence", &e) < 0) cli_die(&e);
+    if (opts.onto) cli_load(&w->target, opts.onto, "mesh");
+    if (opts.correspondence) cli_load(&w->pairs, opts.correspondence, "correspondence");
 }
 
 static bool fits(const work *w, const vg_head *target)
@@ -240,8 +237,7 @@ static void weld_like_sequence(work *w)
     if (!opts.onto || opts.correspondence || fits(w, &w->target) || stat(opts.onto, &st) < 0 || !S_ISREG(st.st_mode))
         return;
     if (vg_load_with(&again, opts.onto, "mesh", &like, NULL, NULL) == VG_OK && fits(w, &again)) {
-        const vg_head old = w->target;
-        w->target = again, again = old;
+        vg_head_move(&w->target, &again);
     }
     vg_head_clear(&again);
 }
@@ -450,8 +446,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     weld_like_sequence(w);
     set_root(w);
     make_graphs(w);
-    for (size_t i = 0; i < BATCH && w->kind == VG_VERTICES; i++) /* room for the anchors that fill_body measures */
-        if (vg_frame_shape(&in[i], h, &e) < 0) cli_die(&e);
+    (void)in;
     make_step(w);
     warn_of_other_pose(w);
     make_head(w);

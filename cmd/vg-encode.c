@@ -65,8 +65,8 @@ static void set_reference(vg_head *h, const char *operand)
 {
     vg_err e;
     vg_head r = {0};
-    if (vg_load(&r, operand, "mesh", &e) < 0 ||
-        vg_mesh_same(&r.body.mesh, "the reference", &h->body.mesh, "the sequence", &e) < 0 ||
+    cli_load(&r, operand, "mesh");
+    if (vg_mesh_same(&r.body.mesh, "the reference", &h->body.mesh, "the sequence", &e) < 0 ||
         vg_head_merge_trace(h, &r, &e) < 0)
         cli_die(&e);
     vg_head_take(h, &r, "reference");

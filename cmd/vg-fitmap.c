@@ -66,8 +66,8 @@ static void take_patches(vg_head *h)
         return;
     }
     snprintf(name, sizeof name, "'%.190s'", opts.patches);
-    if (vg_load(&from, opts.patches, "patches", &e) < 0 ||
-        vg_mesh_same(&h->body.mesh, "the sequence", &from.body.mesh, name, &e) < 0 ||
+    cli_load(&from, opts.patches, "patches");
+    if (vg_mesh_same(&h->body.mesh, "the sequence", &from.body.mesh, name, &e) < 0 ||
         vg_head_merge_trace(h, &from, &e) < 0)
         cli_die(&e);
     vg_head_take(h, &from, "patches");

@@ -212,8 +212,7 @@ int main(int argc, char **argv)
     vg_head from = {0};
     size_t n = cli_start(&program, argc, argv, &operands);
     if (!n) cli_usage("a network is needed: what vg-train wrote");
-    if (vg_load(&from, operands[0], "mesh", &e) < 0) cli_die(&e);
-    if (!from.network.model) cli_stop(VG_EINPUT, "'%.190s' holds no network: make one with vg-train", operands[0]);
+    cli_load(&from, operands[0], "network");
     vg_source *s = cli_source(operands + 1, n - 1);
     vg_head *h = vg_source_head(s);
     cli_need_vertices(h, "the input");

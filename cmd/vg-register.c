@@ -215,8 +215,7 @@ static void read_pairs(vg_register_input *in, vg_markers *markers, vg_seed **see
 
 static void load(vg_head *h, const char *operand)
 {
-    vg_err e;
-    if (vg_load(h, operand, "mesh", &e) < 0) cli_die(&e);
+    cli_load(h, operand, "mesh");
     if (opts.uv && h->body.attributes.ntex == 0)
         cli_stop(VG_EINPUT, "'%s' has no texture coordinates: --uv needs them in both meshes", operand);
 }

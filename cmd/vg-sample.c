@@ -117,8 +117,10 @@ static void plan_even(plan *p, const vg_signal *s, const vg_retime *r)
     double count = opts.frames ? (double)opts.frames : floor((last - first) / step + 1e-9) + 1;
     if (!(count <= MOST_FRAMES)) cli_stop(VG_EARG, "more than %d frames are asked for", MOST_FRAMES);
     for (size_t i = 0; i < (size_t)count; i++) {
+        vg_err e;
         double t = fmin(first + (double)i * step, last);
-        add_time(p, &cap, r->n ? vg_retime_at(r, t) : t);
+        if (r->n && vg_retime_at(r, t, &t, &e) < 0) cli_die(&e);
+        add_time(p, &cap, t);
     }
 }
 

@@ -1,6 +1,6 @@
 /* vg-segment: divide the faces of a sequence into patches that turn alike.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "cli.h"
+#include "fitting.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -28,8 +28,6 @@ static const cli_program program = {
     .writes_stream = true,
     .threaded = true};
 
-enum { BATCH = 8 };
-
 static size_t parse_patches(void)
 {
     if (!strcmp(opts.patches, "auto")) return 0;
@@ -40,23 +38,10 @@ static size_t parse_patches(void)
     return (size_t)k;
 }
 
-static uint64_t add_all(vg_segmenter *s, vg_source *source)
+static void add_batch(void *context, const fitting_batch *b)
 {
-    static vg_frame frames[BATCH];
-    const double *poses[BATCH];
     vg_err e;
-    uint64_t total = 0;
-    size_t n = 0;
-    while (cli_next(source, &frames[n])) {
-        poses[n] = frames[n].values;
-        cli_progress("poses", ++total);
-        if (++n < BATCH) continue;
-        if (vg_segmenter_add(s, n, poses, &e) < 0) cli_die(&e);
-        n = 0;
-    }
-    if (vg_segmenter_add(s, n, poses, &e) < 0) cli_die(&e);
-    for (size_t i = 0; i < BATCH; i++) vg_frame_clear(&frames[i]);
-    return total;
+    if (vg_segmenter_add(context, b->n, b->values, &e) < 0) cli_die(&e);
 }
 
 int main(int argc, char **argv)
@@ -70,10 +55,10 @@ int main(int argc, char **argv)
     vg_segmenter *s;
     vg_segment_stats report;
     if (vg_segmenter_new(&s, &h->body.mesh, h->body.reference, cli.threads, &e) < 0) cli_die(&e);
-    uint64_t poses = add_all(s, source);
-    if (!poses) cli_stop(VG_EINPUT, "the input has no poses: rotations cannot be compared");
-    vg_patches_clear(&h->body.patches);
-    vg_map_clear(&h->map);
+    if (!fitting_stream(source, add_batch, s))
+        cli_stop(VG_EINPUT, "the input has no poses: rotations cannot be compared");
+    vg_head_drop(h, "patches");
+    vg_head_drop(h, "map");
     if (vg_segmenter_cut(s, k, (uint64_t)opts.seed, opts.connected, &h->body.patches, &report, &e) < 0) cli_die(&e);
     vg_segmenter_free(&s);
     if (k && report.patches < k)

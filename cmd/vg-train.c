@@ -1,6 +1,6 @@
 /* vg-train: learn how a sequence of poses goes on.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "cli.h"
+#include "fitting.h"
 
 #include <math.h>
 #include <signal.h>
@@ -117,21 +117,20 @@ static vg_train_options choose_options(void)
 
 /* ---- poses ---- */
 
-static void read_sequence(vg_trainer *t, vg_source *s, uint64_t *poses)
+static void add_batch(void *context, const fitting_batch *b)
 {
-    vg_frame f = {0};
     vg_err e;
-    while (cli_next(s, &f)) {
-        const double *pose = f.values;
-        cli_progress("poses", ++*poses);
-        if (vg_trainer_add(t, 1, &pose, &e) < 0) cli_die(&e);
-    }
-    vg_frame_clear(&f);
+    if (vg_trainer_add(context, b->n, b->values, &e) < 0) cli_die(&e);
+}
+
+static void read_sequence(vg_trainer *t, vg_source *s)
+{
+    fitting_stream(s, add_batch, t);
     vg_trainer_cut(t);
 }
 
 /* The operands behind the first: sequences of the same mesh. */
-static void read_others(vg_trainer *t, vg_head *h, char **operands, size_t n, uint64_t *poses)
+static void read_others(vg_trainer *t, vg_head *h, char **operands, size_t n)
 {
     vg_err e;
     for (size_t i = 1; i < n; i++) {
@@ -142,7 +141,7 @@ static void read_others(vg_trainer *t, vg_head *h, char **operands, size_t n, ui
         if (vg_mesh_same(&h->body.mesh, "the first sequence", &vg_source_head(s)->body.mesh, name, &e) < 0 ||
             vg_head_merge_trace(h, vg_source_head(s), &e) < 0)
             cli_die(&e);
-        read_sequence(t, s, poses);
+        read_sequence(t, s);
         vg_source_close(&s);
     }
 }
@@ -180,7 +179,7 @@ static void resume(vg_trainer *t)
     vg_err e;
     vg_head from = {0};
     if (!opts.resume) return;
-    if (vg_load(&from, opts.resume, "mesh", &e) < 0) cli_die(&e);
+    cli_load(&from, opts.resume, "mesh");
     if (!from.network.model) cli_stop(VG_EINPUT, "'%.190s' holds no network: --resume takes what --checkpoint wrote", opts.resume);
     if (vg_trainer_resume(t, &from.network, &e) < 0) cli_stop(VG_EINPUT, "cannot go on from '%.190s': %s", opts.resume, e.message);
     vg_head_clear(&from);
@@ -286,12 +285,11 @@ int main(int argc, char **argv)
     vg_trainer *t;
     vg_train_state state = {0};
     vg_err e;
-    uint64_t poses = 0;
     cli_need_vertices(h, "the input");
     if (opts.checkpoint && vg_target_check(opts.checkpoint, &e) < 0) cli_die(&e);
     if (vg_trainer_new(&t, &h->body.mesh, h->body.reference, &o, &e) < 0) cli_die(&e);
-    read_sequence(t, s, &poses);
-    read_others(t, h, operands, n, &poses);
+    read_sequence(t, s);
+    read_others(t, h, operands, n);
     if (vg_trainer_prepare(t, &e) < 0) cli_die(&e);
     resume(t);
     vg_network_clear(&h->network);

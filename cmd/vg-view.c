@@ -362,8 +362,8 @@ static void take_patches(side *s)
     vg_err e;
     char name[420];
     snprintf(name, sizeof name, "'%.400s'", opts.patches);
-    if (vg_load(&h, opts.patches, "patches", &e) < 0 ||
-        vg_mesh_same(&h.body.mesh, name, &s->head->body.mesh, s->name, &e) < 0)
+    cli_load(&h, opts.patches, "patches");
+    if (vg_mesh_same(&h.body.mesh, name, &s->head->body.mesh, s->name, &e) < 0)
         cli_die(&e);
     vg_head_take(s->head, &h, "patches");
     vg_head_clear(&h);

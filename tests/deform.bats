@@ -185,3 +185,12 @@ for i, x in enumerate(s.frames[1].values):
     assert abs(abs(x) - (2 if i % 4 == 0 else 0)) < 1e-14, (i, x) # squared length is the scale
 END
 }
+
+@test "what is left out of the mesh of --onto is said once" {
+    mesh cube >cube.obj
+    { cat cube.obj; echo 'f 1 1 2'; } >odd.obj
+    must vg-encode cube.obj -o in.vgs
+    must_warn vg-deform --onto odd.obj in.vgs -o out.vgs
+    says "'odd.obj': left out 1 face that names a vertex twice or has fewer than 2 corners"
+    one_line
+}

@@ -569,7 +569,9 @@ static int find_mesh(vg_source *s, vg_err *e)
 static int settle_named_mesh(vg_source *s, const char *mesh, vg_err *e)
 {
     vg_head from;
-    int r = vg_load(&from, mesh, "mesh", e);
+    vg_note note;
+    int r = vg_load_with(&from, mesh, "mesh", NULL, &note, e);
+    if (r == VG_OK) snprintf(s->warning, sizeof s->warning, "%s", note.text);
     if (r == VG_OK) r = settle_mesh(s, &from.body.mesh, NULL, mesh, e);
     if (r == VG_OK) r = keep_skeleton(s, &from, e);
     if (r == VG_OK) r = vg_head_merge_trace(&s->head, &from, e);

@@ -41,14 +41,14 @@ int vg_retime_add(vg_retime *r, double old_time, double new_time, vg_err *e)
     return VG_OK;
 }
 
-double vg_retime_at(const vg_retime *r, double new_time)
+int vg_retime_at(const vg_retime *r, double new_time, double *old_time, vg_err *e)
 {
-    double some[64], *slope = r->n <= 64 ? some : malloc(r->n * sizeof *slope), at;
-    if (!slope) return r->old_time[0];
+    double some[64], *slope = r->n <= 64 ? some : vgi_array_raw(r->n, sizeof *slope, e);
+    if (!slope) return VG_ENOMEM;
     vgi_monotone_slopes(r->n, r->new_time, r->old_time, slope);
-    at = vgi_monotone_at(r->n, r->new_time, r->old_time, slope, new_time);
+    *old_time = vgi_monotone_at(r->n, r->new_time, r->old_time, slope, new_time);
     if (slope != some) free(slope);
-    return at;
+    return VG_OK;
 }
 
 /* ---- lines ---- */

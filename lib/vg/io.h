@@ -123,7 +123,7 @@ void vg_poses_free(vg_poses **p);
 /* vg_poses_add: append a complete copy of f. */
 int vg_poses_add(vg_poses *p, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
 size_t vg_poses_count(const vg_poses *p);
-/* vg_poses_values: set *values to the values of frame i < count (head.count * vg_kind_width(head.kind) numbers). A
+/* vg_poses_values: set *values to the values of frame i < count (head.count * vg_head_width(head) numbers). A
  * frame in the file is read into `room`, which must be large enough. Borrowed until the next _add, and until
  * `room` is reused. */
 int vg_poses_values(const vg_poses *p, size_t i, double *room, const double **values, vg_err *e) VG_MUST_CHECK;

@@ -138,7 +138,7 @@ void vg_retime_clear(vg_retime *r);
 /* vg_retime_add: keeps the pairs in order; VG_EINPUT when the new time falls where the old one rises. */
 int vg_retime_add(vg_retime *r, double old_time, double new_time, vg_err *e) VG_MUST_CHECK;
 /* vg_retime_at: the old time at a new one: Fritsch and Carlson's monotone interpolant, clamped to the ends. */
-double vg_retime_at(const vg_retime *r, double new_time);
+int vg_retime_at(const vg_retime *r, double new_time, double *old_time, vg_err *e) VG_MUST_CHECK;
 
 /* vg_signal_edit: apply lines of text: "control I X Y", "insert T", "remove I" (control points), "frame I X Y" (its
  * position), "site I", "site -I" (more, fewer), "time OLD NEW" (to retime). Numbers count from 1. '#' begins a comment.

@@ -46,8 +46,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (fit(&s) < 0) abort();
     if (vg_signal_edit(&s, &r, (const char *)data, size, "edits.txt", &e) == VG_OK) {
         sample(&s);
+        double old_time;
         for (double t = -1; t < FRAMES + 2 && r.n; t += 0.5)
-            if (!isfinite(vg_retime_at(&r, t))) abort();
+            if (vg_retime_at(&r, t, &old_time, &e) < 0 || !isfinite(old_time)) abort();
     } else if (e.code != VG_EINPUT && e.code != VG_ENOMEM) abort();
     vg_retime_clear(&r);
     vg_signal_clear(&s);
