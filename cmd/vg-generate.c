@@ -24,11 +24,11 @@ static void take_merge(const char *text, void *context)
 }
 
 static const cli_option options[] = {
-    {"frames", 0, "N", "go on for so many poses (default 30)", .integer = &opts.frames, .least = 1, .most = 1000000000,
+    {"frames", 0, "N", "how many poses to add (default 30)", .integer = &opts.frames, .least = 1, .most = 1000000000,
      .excludes = "between"},
     {"given", 0, "N", "go on from the first N poses that come in; leave out the others (default: from all)",
      .integer = &opts.given, .least = 1, .most = 1000000000, .excludes = "between"},
-    {"between", 0, "N", "the poses that come in are keys: so many between each and the next", .integer = &opts.between,
+    {"between", 0, "N", "the input poses are keys: put N poses between each and the next", .integer = &opts.between,
      .least = 1, .most = 1000000},
     {"loop", 0, NULL, "make a cycle: lead back to the first pose at the end", .flag = &opts.loop},
     {"optimise", 0, NULL, "look for the way that ends nearest to the key", .flag = &opts.optimise, .needs = "between|loop",

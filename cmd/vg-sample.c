@@ -19,7 +19,7 @@ static const cli_option options[] = {
      .text = &opts.at, .excludes = "frames|fps|speed|retime|curve"},
     {"frames", 0, "N", "N frames, evenly from the first to the last", .integer = &opts.frames, .least = 1, .most = 1e9,
      .excludes = "fps|speed"},
-    {"fps", 0, "RATE", "so many frames a second; the signal's frames have times", .number = &opts.fps, .least = 1e-6,
+    {"fps", 0, "RATE", "frames per second; needs a signal whose frames have times", .number = &opts.fps, .least = 1e-6,
      .most = 1e6, .excludes = "speed|curve"},
     {"speed", 0, "X", "X times as fast: below 1 there are frames in between", .number = &opts.speed, .least = 1e-6,
      .most = 1e6, .excludes = "curve"},

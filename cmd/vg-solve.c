@@ -28,7 +28,7 @@ static const cli_option options[] = {
      .choice = &opts.weights},
     {"fit", 0, "absolute|squares", "least sum of the faces' misfits (default), or of their squares, which is faster",
      .choice = &opts.fit},
-    {"rounds", 0, "N", "at most so many rounds of --fit absolute (default: 40)", .integer = &opts.rounds, .least = 1,
+    {"rounds", 0, "N", "the most rounds of --fit absolute (default: 40)", .integer = &opts.rounds, .least = 1,
      .most = 100000},
     {"eps", 0, "X", "misfits below this part of the mean count by their squares (default: 0.5)",
      .number = &opts.eps, .least = 1e-6, .most = 1e6},
@@ -470,7 +470,7 @@ int main(int argc, char **argv)
         vg_source_close(&s);
         cli_finish(0);
     }
-    const step solve = {.batch = (size_t)cli.threads, /* so many are loaded side by side */
+    const step solve = {.batch = (size_t)cli.threads, /* loaded in parallel */
                         .unit = "poses",
                         .init = prepare,
                         .process = take_batch,

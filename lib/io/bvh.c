@@ -341,8 +341,8 @@ static rows look_at_rows(const reading *b)
     return k;
 }
 
-/* Rows may be wrapped anyhow, as long as their values are as many as the frames ask for. But where lines are rows, one
- * that lacks a value would shift all that follow. An end that is missing is told when it is its turn. */
+/* Rows may be wrapped anywhere, as long as the number of values is right. But where lines are rows, a missing value
+ * would shift all that follow. A truncated file is reported when its end is reached. */
 static int check_rows(reading *b, vg_err *e)
 {
     const size_t width = b->kept.size;

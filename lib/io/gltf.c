@@ -294,7 +294,7 @@ static int take_component(const vgi_gltf *g, const vgi_json *from, int *componen
     return r;
 }
 
-/* Where count elements of so many bytes are: part of a buffer view, from its byteOffset on. */
+/* Locate count elements of the given size: part of a buffer view, from its byteOffset on. */
 static int find_bytes(const vgi_gltf *g, const vgi_json *from, size_t count, size_t element,
                       const unsigned char **data, size_t *stride, vg_err *e)
 {

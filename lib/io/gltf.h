@@ -1,5 +1,4 @@
-/* gltf.h: what the files of glTF share: a file as JSON with its buffers, and accessors into
- * them.
+/* gltf.h: shared by the files of glTF: a file as JSON with its buffers, and accessors into them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_GLTF_H
 #define VG_GLTF_H
@@ -45,7 +44,7 @@ typedef struct vgi_gltf {
     vgi_gltf_buffer *buffers;
 } vgi_gltf;
 
-/* vgi_gltf_open: read a whole file, .glb or .gltf, with the buffers it needs. The caller clears it, come what may. */
+/* vgi_gltf_open: read a whole file, .glb or .gltf, with the buffers it needs. The caller clears it, also on failure. */
 int vgi_gltf_open(vgi_gltf *g, vgi_input *in, const char *subject, vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_clear(vgi_gltf *g);
 /* vgi_gltf_bad: VG_EINPUT, with the name of the file in front. */

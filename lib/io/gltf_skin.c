@@ -18,8 +18,8 @@ enum { TURN = 0, PLACE = 4, SIZE = 7, LOCAL = 8, NOTHING = UINT32_MAX };
  * to 1 are 1: as near as transforms of binary32 come. */
 static const double still = 1e-6;
 
-/* Frames come one after another and channels are written one after another:
- * so many bytes of them are sorted at a time. */
+/* Frames arrive one after another and channels are written one after another: this many bytes are transposed at a time.
+ */
 static const size_t sorting_bytes = (size_t)16 << 20;
 
 /* What an animation has of a joint in each frame: `width` numbers; a scale is the same in all directions. */

@@ -167,7 +167,7 @@ static int find_aims(reading *b, vg_err *e)
     return r;
 }
 
-/* The joints that the first frame has given, hung on one another: what the fitter works on. */
+/* Make the skeleton of the joints in the first frame, which the fitter works on. */
 static int make_part(reading *b, vg_err *e)
 {
     vg_skeleton *s = &b->part;
@@ -228,7 +228,7 @@ static int take_joint(reading *b, double *places, vg_err *e)
     return r;
 }
 
-/* All lines of a frame; what is missing. */
+/* Read all lines of a frame; report what is missing. */
 static int take_frame(reading *b, vg_frame *f, vg_err *e)
 {
     int64_t number, next;
@@ -319,7 +319,7 @@ static void close_joints(void *state)
     free(b);
 }
 
-/* Its first line is a joint in a frame. */
+/* Is its first line a joint in a frame? */
 static bool sniff_joints(const unsigned char *data, size_t n)
 {
     vgi_lines t = vgi_lines_of(data, n, "");

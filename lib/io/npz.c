@@ -15,7 +15,8 @@ const char *const vgi_npz_names[ARRAYS] = {
     "graph_offsets", "graph_vertices", "links", "names", "positions", "reference", "reference_name", "root_turns", "roots",
     "selected", "times", "transforms", "vectors"};
 
-/* What others call positions and faces; our own names go before these, and earlier ones before later ones. */
+/* Names that other programs use for positions and faces; our own names go before these, and earlier ones before later
+ * ones. */
 static const struct {
     const char *name;
     enum array array;
@@ -126,7 +127,7 @@ static int hold_all(reading *x, vgi_input *in, vg_err *e)
     vgi_limits limits = *vgi_input_limits(in);
     struct stat st;
     int fd = -1, r = vgi_input_spool(in, &fd, e);
-    if (r == VG_OK && fstat(fd, &st) == 0) { /* an array that is stored as it is fills no machine */
+    if (r == VG_OK && fstat(fd, &st) == 0) { /* an array that is not compressed is no bomb */
         if ((uint64_t)st.st_size > limits.member_bytes) limits.member_bytes = (uint64_t)st.st_size;
         if ((uint64_t)st.st_size > limits.total_bytes) limits.total_bytes = (uint64_t)st.st_size;
     }

@@ -255,7 +255,7 @@ struct binary {
     uint64_t m;
     int e;
     bool narrow_below; /* the gap to the number below is half the gap above */
-    int most_digits;   /* so many digits name every number of the kind: 9 or 17 */
+    int most_digits;   /* this many digits identify every number of the kind: 9 or 17 */
     bool is_float;
 };
 

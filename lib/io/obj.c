@@ -109,7 +109,7 @@ static inline bool ends_word(const struct reading *r, const char *p)
     return is_line_end(r, p) || *p == ' ' || *p == '\t' || *p == '\r' || *p == '\\';
 }
 
-/* Words that nobody wants, up to the end of the statement or a comment. */
+/* Skip words up to the end of the statement or a comment. */
 static const char *skip_words(const struct reading *r, const char *p)
 {
     for (p = skip_blanks(r, p); !at_end(r, p); p = skip_blanks(r, p))
@@ -458,7 +458,7 @@ static struct reading start_reading(vg_model *m, const char *data, size_t n, con
                             .sought_face = SIZE_MAX};
 }
 
-/* The line of a face that turned out to be wrong: found by reading again, so that good files pay nothing for it. */
+/* Find the line of a wrong face by reading the file again, so that good files pay nothing for it. */
 static size_t line_of_face(const struct reading *r, size_t face)
 {
     vg_model again = {0};

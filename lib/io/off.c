@@ -153,7 +153,7 @@ static int read_corner(struct reading *r, uint32_t *to)
     return VG_OK;
 }
 
-/* A count and so many indices. */
+/* A count, followed by that many indices. */
 static int read_face(struct reading *r)
 {
     vg_mesh *m = &r->m->mesh;

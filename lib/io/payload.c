@@ -14,7 +14,7 @@ static bool needs_mesh(vg_element e)
     return e == VG_OF_VERTEX || e == VG_OF_CORNER || e == VG_OF_JOINT;
 }
 
-/* Why frames of h->count elements do not go with what stands before them; NULL: they do. */
+/* Why frames of h->count elements contradict the records before them; NULL: they do not. */
 static const char *refuse_form(const vg_head *h)
 {
     vg_element element = vg_head_element(h);
@@ -29,7 +29,7 @@ static const char *refuse_form(const vg_head *h)
     return h->count != vg_head_elements(h, element) ? "its count does not fit its elements" : NULL;
 }
 
-/* Of a form that is known, element and width are known, too; of one that is not, they are kept. */
+/* The table says element and width of a known form; of an unknown form they are kept as they are. */
 static const char *take_form(vg_head *h, char *name, char *element, uint64_t width)
 {
     h->kind = vgi_form_find(name);

@@ -1,6 +1,5 @@
-/* plain.c: text files as plain UTF-8: without the mark that some programs put in front, and from UTF-16, in which
- * Windows programs save "Unicode".
- * Leaves out other encodings: what is not ASCII in them is in names only (vgi_to_utf8).
+/* plain.c: text files as plain UTF-8: removes a byte order mark and converts UTF-16, which Windows programs call
+ * "Unicode". Leaves out other encodings: text in them is passed on, since only names are affected (vgi_to_utf8).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -11,7 +10,7 @@ static uint32_t unit_at(const unsigned char *p, bool big)
     return big ? (uint32_t)p[0] << 8 | p[1] : (uint32_t)p[1] << 8 | p[0];
 }
 
-/* A binary file may begin with the same two bytes: behind the mark of a text stands a letter of ASCII. */
+/* A binary file may begin with the same two bytes: in text an ASCII character follows the mark. */
 static bool is_utf16(const unsigned char *data, size_t n, bool *big)
 {
     if (n < 4) return false;

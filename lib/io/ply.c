@@ -11,7 +11,7 @@ enum { MOST_WORDS = 6, SHOWN = 40 }; /* of a line of the header; bytes of the in
 enum type { NO_TYPE, I8, U8, I16, U16, I32, U32, F32, F64 };
 static const unsigned char type_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
 
-/* What a property is to us. X, Y, Z in this order. */
+/* The properties that are read. X, Y, Z in this order. */
 enum role { PASSED_OVER, X, Y, Z, INDICES, FROM, TO };
 enum kind { OTHER, VERTEX, FACE, EDGE, STRIPS };
 
@@ -172,7 +172,7 @@ static int read_property_line(struct reading *r, const struct word *words, size_
     return VG_OK;
 }
 
-/* Do the elements have what is needed of them? And how many bytes does each need? */
+/* Check that the required properties exist; compute how many bytes each element needs at least. */
 static int finish_element(struct reading *r, struct element *el)
 {
     el->fixed = !r->text;
@@ -277,7 +277,7 @@ static inline double number_at(const char *p, enum type t, bool swap)
     return (double)integer_at(p, t, swap);
 }
 
-/* A whole number that is written as any other, "3.0" or in a type of floating point. */
+/* A whole number written in another way: "3.0", or in a floating-point type. */
 static int read_whole(struct reading *r, enum type t, const struct element *el, uint64_t i, int64_t *x)
 {
     double value = NAN;
@@ -325,7 +325,7 @@ static inline int read_number(struct reading *r, enum type t, const struct eleme
     return VG_OK;
 }
 
-/* n numbers that nobody wants. n is what the file says: it is compared with what is there. */
+/* Skip n numbers. n comes from the file: it is compared with the bytes that remain. */
 static int skip_numbers(struct reading *r, enum type t, uint64_t n, const struct element *el, uint64_t i)
 {
     if (r->text) {
@@ -416,8 +416,8 @@ static int strip_index(struct reading *r, const struct property *p, const struct
     return result;
 }
 
-/* Each vertex behind the first two makes a triangle with the two before it, every other one the other way round; -1
- * ends a strip. A triangle that names a vertex twice only carries the strip on. */
+/* Each vertex after the first two makes a triangle with the two before it, with alternating orientation; -1 ends a
+ * strip. A triangle that names a vertex twice only continues the strip. */
 static int read_strips(struct reading *r, const struct property *p, const struct element *el, uint64_t i)
 {
     uint64_t n = 0, length = 0;
@@ -490,7 +490,7 @@ static int read_other(struct reading *r, const struct element *el, uint64_t i)
     return VG_OK;
 }
 
-/* Vertices of fixed size in binary: their place is known, so nothing is checked in the loop. */
+/* Binary vertices of fixed size: their positions are known, so the loop checks nothing. */
 static void read_fixed_vertices(struct reading *r, const struct element *el)
 {
     size_t offset[3] = {0}, at = 0;
@@ -528,7 +528,7 @@ static int read_vertices(struct reading *r, const struct element *el)
 static int read_element(struct reading *r, const struct element *el)
 {
     size_t left = (size_t)(r->end - r->p);
-    /* the last number of a text needs no blank behind it */
+    /* no blank is needed after the last number */
     if (el->least && el->count > (left + (r->text ? 1 : 0)) / el->least)
         return vg_fail(r->e, VG_ETRUNC, "%s announces %llu of element '%s', but ends before", r->subject,
                        (unsigned long long)el->count, el->name);

@@ -86,7 +86,7 @@ static int write_header(struct writing *x)
     return result == VG_OK ? vgi_bytes_append(x->out, "end_header\n", 11, x->e) : result;
 }
 
-/* Room for n numbers of at most `most` bytes; where to write them. NULL: no memory. */
+/* Reserve room for n numbers of at most `most` bytes and return where to write them. NULL: no memory. */
 static char *room(struct writing *x, size_t n, size_t most)
 {
     if (vgi_bytes_reserve(x->out, x->out->size + n * most, x->e) < 0) return NULL;

@@ -13,7 +13,7 @@ void vgi_triangle_normal(const double *points, uint32_t a, uint32_t b, uint32_t 
     normal[2] = u[0] * v[1] - u[1] * v[0];
 }
 
-/* Positive when the triangle looks where the face does; 0: it looks nowhere. */
+/* Positive when the triangle has the orientation of the face; 0: it has no area. */
 static double facing(const double *points, uint32_t a, uint32_t b, uint32_t c, const double normal[3])
 {
     double n[3];

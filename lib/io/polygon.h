@@ -1,17 +1,17 @@
-/* polygon.h: what the writers of triangles share: where a face of more corners can be cut.
- * A face is n vertices v, a ring; points are those of the mesh.
+/* polygon.h: shared by the writers of triangles: how a face of more than three corners can be cut. A face is a ring of
+ * n vertices v; points are those of the mesh.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_POLYGON_H
 #define VG_POLYGON_H
 
 #include "core/core.h"
 
-/* Beyond this, a face is split as a fan whatever its shape: clipping takes quadratic time and more. */
+/* A face with more corners is split as a fan whatever its shape: clipping takes at least quadratic time. */
 enum { VGI_MOST_CLIPPED = 512 };
 
 /* vgi_triangle_normal: (b - a) x (c - a). */
 void vgi_triangle_normal(const double *points, uint32_t a, uint32_t b, uint32_t c, double normal[3]);
-/* vgi_face_normal: twice the vector area (Newell): where the face looks. */
+/* vgi_face_normal: twice the vector area (Newell). */
 void vgi_face_normal(const double *points, const uint32_t *v, size_t n, double normal[3]);
 /* vgi_is_fan: does the fan of triangles around the first vertex cover the face? */
 bool vgi_is_fan(const double *points, const uint32_t *v, size_t n, const double normal[3]);

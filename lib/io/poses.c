@@ -1,6 +1,6 @@
-/* poses.c: all frames of a sequence, any of them at any time: in memory up to a limit, beyond it in a file without a
- * name. The values of a frame are kept apart from the rest of it, so that passes over the values copy nothing.
- * Leaves out frames that wait for their turn once (spool.c).
+/* poses.c: a store of all frames of a sequence with random access: in memory up to a limit, beyond it in an unnamed
+ * file. The values of a frame are stored apart from its other data, so that passes over the values copy nothing.
+ * Leaves out queues of frames (spool.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/frame_pack.h"
 
@@ -20,7 +20,7 @@ struct vg_poses {
     size_t limit;
     kept *at;
     size_t n, cap;
-    int fd; /* -1: no file was needed yet */
+    int fd; /* -1: not created yet */
     vg_poses_stats stats;
 };
 

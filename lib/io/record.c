@@ -1,5 +1,5 @@
 /* record.c: the bytes of the stream's file header, records and END mark, both directions (fmt/STREAM.md).
- * Leaves out what is in a record: payload.c; and in which order they may stand: stream.c.
+ * Leaves out the payloads (payload.c) and the order of records (stream.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/record.h"
 

@@ -1,7 +1,6 @@
-/* sequence.c: the table of formats whose one file holds a whole sequence, and the bytes of such a file while it is
- * made.
- * Leaves out the formats themselves (caches.c, npy.c, npz.c, usda.c, skeleton_text.c, ...) and who opens files
- * (source.c, sink.c).
+/* sequence.c: the table of formats that hold a whole sequence in one file, and the output buffer of such a file.
+ * Leaves out the formats themselves (caches.c, npy.c, npz.c, usda.c, skeleton_text.c, ...) and opening files (source.c,
+ * sink.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 

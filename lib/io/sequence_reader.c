@@ -1,6 +1,6 @@
-/* sequence_reader.c: a file that holds a whole sequence, as the door in reads it: frame after frame, with the names that the
- * file does not give and the faces that lie beside it.
- * Leaves out the formats (sequence.c) and how several inputs become one sequence (source.c).
+/* sequence_reader.c: reads a file that holds a whole sequence, frame by frame; adds names where the file has none, and
+ * faces from the mesh file beside it.
+ * Leaves out the formats (sequence.c) and joining several inputs (source.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sequence_reader.h"
 
@@ -29,7 +29,8 @@ int vgi_play_open(vgi_playing *p, const vgi_sequence_format *format, vgi_input *
 
 /* ---- faces ---- */
 
-/* The mesh file beside: "walk.obj" or "walk.ply" for "walk.pc2"; free it. NULL with VG_OK: there is none. */
+/* The mesh file beside the sequence: "walk.obj" or "walk.ply" for "walk.pc2"; free it. NULL with VG_OK: there is none.
+ */
 static int find_beside(const char *file, const char *suffix, char **path, vg_err *e)
 {
     static const char *const suffixes[] = {".obj", ".ply"};

@@ -1,4 +1,4 @@
-/* sequence_reader.h: what source.c needs of sequence_reader.c: a file that holds a whole sequence, being read.
+/* sequence_reader.h: a file that holds a whole sequence, being read; for source.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_SEQUENCE_READER_H
 #define VG_SEQUENCE_READER_H
@@ -15,16 +15,16 @@ typedef struct vgi_playing {
     bool waiting;         /* and has not been handed out */
 } vgi_playing;
 
-/* vgi_play_open: p is empty, and h too, which is filled. in, subject and stem are taken over, also on failure; NULL
- * for one of these texts is VG_ENOMEM. */
+/* vgi_play_open: fill p and h, which are empty. in, subject and stem are taken over, also on failure; a NULL text is
+ * VG_ENOMEM. */
 int vgi_play_open(vgi_playing *p, const vgi_sequence_format *format, vgi_input *in, const vg_reading *how,
                   char *subject, char *stem, vg_head *h, vg_err *e) VG_MUST_CHECK;
-/* vgi_play_borrow_faces: h, which has no faces, takes them, and a reference pose if it has none, from the mesh file
- * beside `path` (NULL: there is no place beside it); VG_EINPUT when there is none and the format needs it. */
+/* vgi_play_borrow_faces: give h, which has no faces, those of the mesh file beside `path`, and its reference pose if h
+ * has none. path NULL: there is no such file. VG_EINPUT when the format needs the file and it is missing. */
 int vgi_play_borrow_faces(const vgi_playing *p, const char *path, vg_head *h, vg_err *e) VG_MUST_CHECK;
-/* vgi_play_first: the first frame, which is handed out all the same; own: what frames are measured by. */
+/* vgi_play_first: look at the first frame without consuming it. own: the head of frames. */
 int vgi_play_first(vgi_playing *p, const vg_head *own, const vg_frame **first, vg_err *e) VG_MUST_CHECK;
-/* vgi_play_next: 1 and a frame; 0 behind the last one, and then p is empty again. */
+/* vgi_play_next: 1 and a frame; 0 at the end, and then p is empty again. */
 int vgi_play_next(vgi_playing *p, const vg_head *own, vg_frame *f, vg_err *e) VG_MUST_CHECK;
 void vgi_play_stop(vgi_playing *p);
 /* vgi_different_count: VG_EINPUT: h has another number of points than the mesh. */

@@ -1,10 +1,10 @@
-/* sink.c: the door out: one mesh file, a numbered series, a directory, an archive, standard output, or one file that
- * holds the whole sequence.
+/* sink.c: output: one mesh file, a numbered series, a directory, an archive, standard output, or one file that holds
+ * the whole sequence.
  * Leaves out what the name of an output asks for (sink_plan.c), temporary names (targets.c), the text of a mesh file
  * (format.c), the bytes of a sequence (sequence.c) and those of an archive (pack.c).
  *
- * Everything is written beside its place under a temporary name and takes its final one in vg_sink_end; pipes and
- * devices, which cannot be replaced, are written where they are.
+ * Everything is written beside its place under a temporary name and renamed in vg_sink_end; pipes and devices, which
+ * cannot be replaced, are written directly.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sink.h"
 
@@ -13,18 +13,18 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* A frame on its way into a mesh file: taken over, made into text, and written, by whichever thread; what goes into
- * an archive or the one file is written in the order of the frames, when it has been taken off the belt. */
+/* A frame that becomes a mesh file: taken over, formatted and written by any thread; members of an archive, and the one
+ * file, are written in the order of the frames, by the caller's thread. */
 typedef struct piece {
     char *name;
     double *values;
     vg_bytes path, text;
-    int fd; /* of its file, which text is written to and which is closed then; -1: it has none of its own */
+    int fd; /* the file that the text is written to, closed afterwards; -1: none */
     int result;
     vg_err error;
 } piece;
 
-/* What may wait at a time: as many bytes, but two pieces in any case. */
+/* Limit of what is in work: this many bytes, but always two pieces. */
 enum { MOST_WAITING = 256 << 20, TEXT_OF_VERTEX = 48 };
 
 struct vg_sink {
@@ -48,13 +48,13 @@ struct vg_sink {
     /* a sequence: */
     vg_sink_options options;
     void *state;
-    vgi_output out;      /* fd: the file itself, or a nameless one when that is a pipe, which cannot be patched */
+    vgi_output out;      /* fd: the file itself; of a pipe, which cannot be patched, an unnamed file */
     char *mesh;          /* where its mesh went; NULL: nowhere */
     const vgi_format *mesh_format;
     vgi_slim slim;       /* head points into it when vertices are left out */
     size_t loose;        /* vertices in no face that are written */
     bool names_lost, times_lost;
-    char scalars_lost[80]; /* what comes with the vertices: no format keeps it */
+    char scalars_lost[80]; /* channels of the vertices, which no format keeps */
     vgi_names warnings;
 };
 
@@ -115,7 +115,7 @@ static int make_directory(vg_sink *s, vg_err *e)
     return vg_fail(e, VG_ESYS, "cannot make directory '%s': %s", s->output, strerror(errno));
 }
 
-/* A pipe cannot be patched: what goes there waits in a file without a name. */
+/* A pipe cannot be patched: its bytes are collected in an unnamed file. */
 static int open_patchable(vg_sink *s, vg_err *e)
 {
     s->fd = s->plan.to_stdout ? -1 : vg_targets_open(&s->targets, s->output, e);
@@ -161,7 +161,7 @@ static bool same_singles(const double *a, const double *b, size_t n)
     return true;
 }
 
-/* Nobody named this file, so what is there stays: it may be the very mesh, or else the user must choose. */
+/* The user did not name this file, so an existing one is not replaced. */
 static int keep_mesh(const vg_sink *s, vg_err *e)
 {
     vg_head there = {0};
@@ -230,7 +230,7 @@ static bool has_faces_of(const vg_mesh *m, size_t least, size_t most)
     return false;
 }
 
-/* An OBJ names the file of its materials, and goes on to do so. */
+/* An OBJ names its material library, and keeps doing so. */
 static bool names_library(const vg_body *b)
 {
     for (size_t i = 0; i < b->attributes.nlabels; i++)
@@ -244,7 +244,7 @@ static int add_loss(vg_bytes *line, const char *what, vg_err *e)
     return r < 0 ? r : vgi_bytes_append(line, what, strlen(what), e);
 }
 
-/* The sequence's own words come behind what can be told by its head. */
+/* What the format itself reports follows what the head tells. */
 static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
 {
     const vgi_sequence_format *f = s->plan.sequence;
@@ -347,7 +347,7 @@ static int more_than_one(const vg_sink *s, vg_err *e)
                    s->output, (int)n, s->output, suffix);
 }
 
-/* Is it what a reader would call the frame that comes next, of whichever file? */
+/* Is it the name that a reader would give the next frame, whatever the file? */
 static bool is_counted_name(const vg_sink *s, const char *name)
 {
     char number[32];
@@ -413,7 +413,7 @@ static int make_rest(vg_sink *s, const vg_frame *first, vg_err *e)
     return r < 0 ? unwritable(s, first->name ? first->name : "", r, &cause, e) : r;
 }
 
-/* Pieces wait for other threads only: a single one makes each before the next comes. */
+/* With one thread each piece is made before the next one comes. */
 static int start_belt(vg_sink *s, const vg_frame *first, vg_err *e)
 {
     int r = make_rest(s, first, e), threads = s->options.threads;
@@ -438,12 +438,13 @@ static int finish_oldest(vg_sink *s, vg_err *e)
     return vgi_packer_add(s->packer, (char *)p->path.data, p->text.data, p->text.size, e);
 }
 
-/* Where the piece goes. Its file is opened here, in the order of the frames. */
+/* Choose the output of the piece. Its file is opened here, in the order of the frames. */
 static int place_piece(vg_sink *s, piece *p, vg_err *e)
 {
     bool series = s->plan.kind == VGI_PLAN_SERIES;
     if (s->plan.kind == VGI_PLAN_FILE)
-        return VG_OK; /* its text waits for vg_sink_end, so that a second frame leaves nothing in a pipe */
+        return VG_OK; /* its text is kept until vg_sink_end, so that an error in a second frame leaves nothing in the
+                       * pipe */
     int r = series ? series_path(s, &p->path, e) : file_path(s, &s->names.file, &p->path, e);
     if (r == VG_OK && series) r = vgi_file_names_series(&s->names, (char *)p->path.data, e);
     s->number += series;
@@ -489,7 +490,7 @@ static int renumber_files(vg_sink *s, vg_err *e)
     return r;
 }
 
-/* The members of `from`, which are those written so far, in order, into the archive that begins anew. */
+/* Copy the members written so far, in order, into the archive that is begun anew. */
 static int pack_again(vg_sink *s, vgi_archive *from, vg_err *e)
 {
     vg_bytes file = {0}, data = {0};
@@ -527,7 +528,7 @@ static int renumber_members(vg_sink *s, vg_err *e)
     return r;
 }
 
-/* The file that the next frame will have. */
+/* The name of the next frame's file. */
 static int name_file(vg_sink *s, const char *name, vg_err *e)
 {
     int begins = vgi_file_names_next(&s->names, name, s->plan.format->suffix, e);
@@ -571,7 +572,7 @@ static int no_pose(const vg_sink *s, vg_err *e)
     return vg_fail(e, VG_EINPUT, "there is no pose to be written to '%s'", s->output);
 }
 
-/* What has waited goes to the pipe. */
+/* Copy the collected bytes to the pipe. */
 static int copy_out(vg_sink *s, vg_err *e)
 {
     if (s->out.fd == s->fd) return VG_OK;
@@ -650,7 +651,7 @@ void vg_sink_close(vg_sink **sink)
     if (!s) return;
     vgi_belt_free(&s->belt);
     if (!s->ended) remove_files(s);
-    *sink = NULL; /* before anything is freed: vg_sink_discard may come at any moment */
+    *sink = NULL; /* before anything is freed: vg_sink_discard may be called from a signal handler */
     clear_pieces(s);
     vgi_packer_close(&s->packer);
     if (s->state) s->plan.sequence->release(s->state);

@@ -1,5 +1,5 @@
-/* sink.h: what sink.c is made of: the plan of an output (sink_plan.c), names of files (file_names.c), files of an
- * earlier set (earlier.c), and a sequence without the vertices that are in no face (slim.c).
+/* sink.h: the parts of sink.c: the plan of an output (sink_plan.c), names of files (file_names.c), files of an earlier
+ * set (earlier.c), and a sequence without the vertices that are in no face (slim.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_SINK_H
 #define VG_SINK_H
@@ -29,19 +29,19 @@ typedef struct vgi_plan {
 
 /* vgi_plan_make: name is output, borrowed. */
 int vgi_plan_make(vgi_plan *p, const char *output, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;
-/* vgi_plan_check_place: can a file be made there? */
+/* vgi_plan_check_place: check that a file can be created there. */
 int vgi_plan_check_place(const vgi_plan *p, vg_err *e) VG_MUST_CHECK;
-/* vgi_plan_check_head: can frames of this head be written so? */
+/* vgi_plan_check_head: check that frames of this head can be written in that format. */
 int vgi_plan_check_head(const vgi_plan *p, const vg_head *h, const char *output, vg_err *e) VG_MUST_CHECK;
 /* vgi_plan_lacks_faces: does the file need a mesh beside it? */
 bool vgi_plan_lacks_faces(const vgi_plan *p);
 bool vgi_is_directory(const char *path);
 /* vgi_parent_directory: the directory of the file `path` (n bytes); free it. Also in targets.c. */
 char *vgi_parent_directory(const char *path, size_t n, vg_err *e);
-/* vgi_check_directory: can files be made in `dir`? Messages say that `output` cannot be written. */
+/* vgi_check_directory: check that files can be created in `dir`. Messages say that `output` cannot be written. */
 int vgi_check_directory(const char *dir, const char *output, vg_err *e) VG_MUST_CHECK;
 
-/* ---- file_names.c: the files of frames, whose names ascend in natural order, as readers take them ---- */
+/* ---- file_names.c: names of files, ascending in natural order, in which readers take them ---- */
 
 typedef struct vgi_file_names {
     vgi_names frames;      /* the names of all frames so far */
@@ -51,24 +51,24 @@ typedef struct vgi_file_names {
     vg_bytes last;         /* the file name, or the path of a series, that the next must follow */
 } vgi_file_names;
 
-/* vgi_file_names_next: t->file becomes that of the next frame. 1: with this frame numbering begins, so that the files
- * of all frames before it are to be renamed; 0: otherwise. */
+/* vgi_file_names_next: set t->file for the next frame. 1: numbering begins with this frame, so that the files of all
+ * frames before it have to be renamed; 0: otherwise. */
 int vgi_file_names_next(vgi_file_names *t, const char *name, const char *suffix, vg_err *e) VG_MUST_CHECK;
 /* vgi_file_name_numbered: "0003_name.obj"; '/' and '\' in the name become '_'. */
 int vgi_file_name_numbered(vg_bytes *file, uint64_t number, const char *name, const char *suffix,
                            vg_err *e) VG_MUST_CHECK;
-/* vgi_file_names_series: VG_EARG unless `path` follows the last one. */
+/* vgi_file_names_series: VG_EARG unless `path` sorts after the previous one. */
 int vgi_file_names_series(vgi_file_names *t, const char *path, vg_err *e) VG_MUST_CHECK;
-/* vgi_file_names_warn: if files are numbered, say so. */
+/* vgi_file_names_warn: note that files are numbered, if they are. */
 int vgi_file_names_warn(const vgi_file_names *t, const char *suffix, vgi_names *warnings, vg_err *e) VG_MUST_CHECK;
 void vgi_file_names_clear(vgi_file_names *t);
 
-/* ---- earlier.c: mesh files of an earlier set, which a reader would take together with those that are written ---- */
+/* ---- earlier.c: mesh files of an earlier run, which a reader would take together with the new ones ---- */
 
-/* vgi_earlier_list: paths of the mesh files that are in the directory, or that the pattern names from the first number
- * on; VG_EARG when there are some that are not to be replaced. */
+/* vgi_earlier_list: list the mesh files that are in the directory, or that match the pattern from the first number on;
+ * VG_EARG when there are some and they may not be replaced. */
 int vgi_earlier_list(vgi_names *paths, const vgi_plan *p, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;
-/* vgi_earlier_remove: those that are none of the targets. */
+/* vgi_earlier_remove: remove those that were not written again. */
 int vgi_earlier_remove(const vgi_names *paths, const vg_targets *t, vg_err *e) VG_MUST_CHECK;
 
 /* ---- slim.c: a sequence without its loose vertices, those in no face ---- */

@@ -1,5 +1,5 @@
-/* sink_plan.c: what the name of an output asks for: one mesh file, a numbered series, a directory, an archive,
- * standard output or one file for all poses, and of which format; and whether it can be had, told before any work.
+/* sink_plan.c: parses the name of an output: one mesh file, a numbered series, a directory, an archive, standard output
+ * or one file for all poses, and its format; and checks before any work that it can be written.
  * Leaves out the writing (sink.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sink.h"
@@ -17,7 +17,7 @@ bool vgi_is_directory(const char *path)
     return stat(path, &st) == 0 && S_ISDIR(st.st_mode);
 }
 
-/* "NAME:ply": does this name hold many files, so that what stands behind the colon chooses their format? */
+/* "NAME:ply": does the name stand for many files, so that the text after the colon is their format? */
 static bool holds_many(const char *name, size_t n, vg_err *e)
 {
     if (n == 0) return false;

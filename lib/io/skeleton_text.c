@@ -1,6 +1,6 @@
-/* skeleton_text.c: skeletons as people write them, a bone per line: "BONE PARENT HEAD_X HEAD_Y HEAD_Z TAIL_X TAIL_Y
- * TAIL_Z", and joints as groups of mesh vertices: "JOINT PARENT vertices VERTEX VERTEX ...".
- * Leaves out motion (joints_text.c, bvh.c) and where the groups are (who has the mesh knows).
+/* skeleton_text.c: skeletons as text, one bone per line: "BONE PARENT HEAD_X HEAD_Y HEAD_Z TAIL_X TAIL_Y TAIL_Z"; and
+ * joints as groups of mesh vertices: "JOINT PARENT vertices VERTEX VERTEX ...".
+ * Leaves out motion (joints_text.c, bvh.c) and the positions of groups (model/groups.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -12,7 +12,7 @@ static const char end_suffix[] = ".end";
 
 enum { BONE_FIELDS = 8, FIRST_NUMBER = 2 };
 
-/* A line of either kind: a name, that of its parent, and where it was said. */
+/* A line of either kind: the name, its parent's name, and the line number. */
 typedef struct entry {
     char *name, *above; /* above NULL: a root */
     size_t line;
@@ -83,7 +83,7 @@ static int find_parents(entries *s, const char *subject, vg_err *e)
     return r;
 }
 
-/* Down from the roots, in the order of the file. Who is not met hangs on itself. */
+/* Depth first from the roots, in the order of the file. Entries that are not reached are part of a cycle. */
 static int order_entries(entries *s, const char *subject, vg_err *e)
 {
     size_t n = s->n, met = 0;
@@ -215,7 +215,7 @@ static char *end_name(const char *bone, vg_err *e)
     return name;
 }
 
-/* The next joint, which takes the name over (NULL: there was no memory for it). */
+/* Append a joint, which takes the name over (NULL: there was no memory for it). */
 static int add_joint(reading *b, char *name, uint32_t parent, const double at[3], vg_err *e)
 {
     vg_skeleton *s = &b->skeleton;
@@ -242,7 +242,7 @@ static int add_head(reading *b, entry *bone, uint32_t parent, vg_err *e)
     return r;
 }
 
-/* From bone i on upward to bone `up`, not included: all that is below them is there, so that their ends come. */
+/* Append the end sites from bone i up to bone `up`, which is not included: everything below them is there. */
 static int add_ends(reading *b, const uint32_t *place, uint32_t i, uint32_t up, vg_err *e)
 {
     int r = VG_OK;
@@ -288,7 +288,7 @@ static int open_skeleton(void **state, vg_head *h, vgi_input *in, const vg_readi
     return r;
 }
 
-/* The rest pose: nothing has turned. */
+/* The rest pose, without rotations. */
 static int next_pose(void *state, vg_frame *f, vg_err *e)
 {
     reading *b = state;
@@ -321,7 +321,7 @@ static void close_skeleton(void *state)
     free(b);
 }
 
-/* Its first line is a bone, or a group, which is refused by its right name. */
+/* Is its first line a bone or a group? Groups are refused with a message of their own. */
 static bool sniff_skeleton(const unsigned char *data, size_t n)
 {
     vgi_lines t = vgi_lines_of(data, n, "");

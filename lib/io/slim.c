@@ -5,7 +5,7 @@
 
 #include <stdlib.h>
 
-/* Which vertices are in a face; free it. */
+/* Mark the vertices that are in a face; free it. */
 static bool *find_attached(const vg_mesh *m, vg_err *e)
 {
     bool *attached = vgi_array(m->nv, sizeof *attached, e);
@@ -29,7 +29,7 @@ int vgi_count_loose(const vg_mesh *m, size_t *loose, vg_err *e)
     return VG_OK;
 }
 
-/* The asset's vertices by their new numbers. Those that it has beside, and are in no face, are lost with it. */
+/* Renumber the vertices of the asset. Those that are in no face are lost with it. */
 static void move_asset(vg_body *b, const uint32_t *number, const bool *attached)
 {
     vg_asset *a = &b->asset;

@@ -1,13 +1,13 @@
-/* source.c: the door in: whatever the operands are, the caller gets one head and frame after frame.
+/* source.c: input: joins all operands into one head and a sequence of frames.
  * Leaves out which files an operand names (operands.c) and how a stream, an archive, a mesh file or a sequence
- * (sequence_reader.c) is read; it only tells them apart and joins them.
+ * (sequence_reader.c) is read.
  *
- * Mesh files become poses by several threads, some before they are asked for. What comes through a pipe is not waited
- * for before its turn, and what goes wrong is told when it is its turn.
+ * Mesh files become poses in several threads, some before they are asked for. Pipes are read only when it is their
+ * turn. Errors are reported in input order.
  *
- * All are first looked at, so that a missing file or a stream that does not fit is told before any work; files are
- * opened again one after another when it is their turn. What can be read only once (standard input, a pipe named by
- * the shell) stays open in between.
+ * All operands are looked at first, so that a missing file or a stream that does not fit is reported before any work;
+ * files are opened again when it is their turn. What can be read only once (standard input, a pipe named by the shell)
+ * stays open in between.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_pack.h"
 #include "io/sequence_reader.h"
@@ -24,7 +24,7 @@ enum content { MESH, ARCHIVE, STREAM, SEQUENCE };
 
 typedef struct item {
     char *path;      /* NULL: standard input */
-    bool regular;    /* a file that can be opened, or read from `base` on, a second time */
+    bool regular;    /* can be opened, or read from `base` on, a second time */
     int64_t base;    /* where standard input stood */
     enum content content;
     const vgi_sequence_format *sequence;
@@ -32,7 +32,7 @@ typedef struct item {
     vg_reader *reader; /* the same, when it is a stream */
 } item;
 
-/* A mesh file on its way to a frame. */
+/* A mesh file that becomes a frame. */
 typedef struct pose {
     char *path;          /* of the file, or of the member of an archive */
     const char *archive; /* borrowed; NULL: none */
@@ -43,7 +43,7 @@ typedef struct pose {
     vg_err error;
 } pose;
 
-enum { MOST_WAITING = 256 << 20 }; /* bytes of files: with as many no further one is read before it is asked for */
+enum { MOST_WAITING = 256 << 20 }; /* bytes of files: above it no further file is read ahead */
 
 struct vg_source {
     item *items;
@@ -51,11 +51,10 @@ struct vg_source {
     bool stdin_named;
     vgi_limits limits;
     vg_reading reading;
-    bool through;        /* one stream: handed on as it is */
+    bool through;        /* one stream: its head and frames are passed on as they are */
     vg_head head;        /* of the joined sequence; the caller may change it */
-    vg_head own;         /* what frames are measured by: mesh, kind, count; of a skeleton also its joints and
-                            reference */
-    char *own_name;      /* who brought the mesh, quoted for messages; NULL: nobody yet */
+    vg_head own;         /* the head of frames: mesh, kind, count; of a skeleton also its joints and reference */
+    char *own_name;      /* the input that the mesh is from, quoted for messages; NULL: none yet */
     vg_records tail;
     /* the item being read: */
     vg_reader *reader;
@@ -67,9 +66,9 @@ struct vg_source {
     pose *poses;
     size_t nposes;
     vgi_belt *belt;
-    pose *first;         /* has brought the mesh and has not been handed out; NULL: there is none */
+    pose *first;         /* its mesh has been taken over, its frame has not been returned; NULL: there is none */
     uint64_t waiting;    /* bytes of their files */
-    int failed;          /* what came behind those on the belt failed so */
+    int failed;          /* the error of reading on, to be reported after the poses that wait */
     vg_err failure;
     char warning[VGI_SUBJECT + 2 * sizeof(vg_note)];
 };
@@ -132,9 +131,9 @@ static void note_file(item *it)
     it->regular = it->base >= 0;
 }
 
-/* What is known to be no mesh comes first: a tar may begin with the name of a mesh, and a compressed file may be
- * called like one. What nothing else claims is left to libarchive, which knows more kinds than can be told here; of
- * what comes through a pipe it sees the start only, or a disk would fill with it first. */
+/* Files that are certainly no meshes are recognised first: a tar may begin with the name of a mesh, and a compressed
+ * file may be called like one. Everything unknown is left to libarchive, which knows more kinds than are recognised
+ * here; of a pipe it sees only the start, or a disk would fill with it first. */
 static int judge_start(item *it, const unsigned char *data, size_t n, vg_err *e)
 {
     const vgi_sequence_format *named = it->path ? vgi_sequence_by_suffix(it->path) : NULL;
@@ -153,7 +152,7 @@ static int tell_content(item *it, vgi_input *in, vg_err *e)
     const unsigned char *data;
     vg_bytes own = {0};
     size_t n;
-    /* enough for a stream: who writes one frame by frame is not kept waiting */
+    /* enough for a stream: a program that writes frame by frame is not kept waiting */
     int r = vgi_input_peek(in, 8, &data, &n, e);
     if (r == VG_OK && !vgi_is_stream(data, n)) r = vgi_input_peek(in, 4096, &data, &n, e);
     if (r < 0) return r;
@@ -188,7 +187,7 @@ static char *subject_of(const char *archive, const char *path, vg_err *e)
     return s;
 }
 
-/* What a pose from there is called; free it. */
+/* The name of a pose from that file; free it. */
 static char *pose_of(const char *path, vg_err *e)
 {
     return path == standard_input ? vgi_copy_string("stdin", 5, e) : vgi_pose_name(path, e);
@@ -206,7 +205,7 @@ static int settle_mesh(vg_source *s, const vg_mesh *mesh, const char *archive, c
     return (s->own_name = subject_of(archive, path, e)) ? VG_OK : VG_ENOMEM;
 }
 
-/* The skeleton that files of joints by name are about, when the mesh is one. */
+/* Keep the skeleton, for files of joints by name. */
 static int keep_skeleton(vg_source *s, const vg_head *h, vg_err *e)
 {
     if (!h->body.skeleton.njoints) return VG_OK;
@@ -306,7 +305,7 @@ static int open_archive(vg_source *s, item *it, vg_err *e)
     return vgi_archive_open(&s->archive, fd, it->base, s->archive_name, &s->limits, e);
 }
 
-/* What the first input that left something out did not need. */
+/* Keep the first note about something that was left out. */
 static void note_left_out(vg_source *s, const char *subject, const char *note)
 {
     if (*note && !*s->warning) snprintf(s->warning, sizeof s->warning, "%.290s: %.320s", subject, note);
@@ -329,7 +328,7 @@ static int take_over_model(vg_source *s, pose *p, vg_err *e)
     return s->head.body.reference && s->head.body.reference_name ? VG_OK : VG_ENOMEM;
 }
 
-/* Does what comes next have the faces of what came before? */
+/* VG_EINPUT when the next input has other faces than those before. */
 static int check_joins(const vg_source *s, const vg_mesh *next, const char *subject, vg_err *e)
 {
     int r = vg_mesh_same(&s->own.body.mesh, s->own_name, next, subject, e);
@@ -370,7 +369,7 @@ static int make_belt(vg_source *s, int threads, vg_err *e)
     return vgi_belt_new(&s->belt, threads, n, make_pose, s, e);
 }
 
-/* What a pose holds but its buffer, which is kept when it is no larger than its share. */
+/* Release a pose, but keep its buffer when that is no larger than its share. */
 static void clear_pose(const vg_source *s, pose *p)
 {
     free(p->path);
@@ -380,7 +379,7 @@ static void clear_pose(const vg_source *s, pose *p)
     if (p->data.cap > MOST_WAITING / s->nposes) vg_bytes_clear(&p->data);
 }
 
-/* The mesh file in s->data goes onto the belt. */
+/* Put the mesh file in s->data on the belt. */
 static int put_pose(vg_source *s, const char *archive, const char *path, vg_err *e)
 {
     pose *p = &s->poses[vgi_belt_place(s->belt)];
@@ -402,7 +401,7 @@ static int take_pose(vg_source *s, pose **out, vg_err *e)
     return p->result;
 }
 
-/* The first one brings the mesh, unless that is known. It stays where it is until it is handed out. */
+/* The first one defines the mesh, unless it is known. It stays in place until its frame is returned. */
 static int take_first(vg_source *s, vg_err *e)
 {
     int r = take_pose(s, &s->first, e);
@@ -452,7 +451,7 @@ static int open_stream(vg_source *s, item *it, vg_err *e)
 
 /* ---- sequences ---- */
 
-/* No reference came with the sequence: it is the first pose, which is handed out all the same. */
+/* The sequence has no reference: its first pose becomes the reference, and is a frame, too. */
 static int reference_from_first(vg_source *s, vg_err *e)
 {
     vg_head *h = &s->head;
@@ -464,7 +463,7 @@ static int reference_from_first(vg_source *s, vg_err *e)
     return h->body.reference && h->body.reference_name ? VG_OK : VG_ENOMEM;
 }
 
-/* The sequence brings the mesh: its head becomes that of the source. */
+/* The sequence defines the mesh: its head becomes that of the source. */
 static int take_over_head(vg_source *s, const char *archive, const char *path, vg_head *h, vg_err *e)
 {
     vgi_playing *p = &s->playing;
@@ -557,7 +556,7 @@ static int next_member(vg_source *s, vg_err *e)
 
 /* ---- the door ---- */
 
-/* Until the mesh is known: a stream among several operands brings it when it is looked at. */
+/* Open inputs until the mesh is known. Of several operands, streams define it when they are looked at. */
 static int find_mesh(vg_source *s, vg_err *e)
 {
     int r = VG_OK;
@@ -581,7 +580,7 @@ static int settle_named_mesh(vg_source *s, const char *mesh, vg_err *e)
     return r;
 }
 
-/* first_only: no more than the first item is wanted, so the others are not even looked at. */
+/* first_only: only the first item is wanted; the others are not opened. */
 static int open_source(vg_source **out, const char *const *operands, size_t n, const vg_source_options *o,
                        bool first_only, vg_err *e)
 {
@@ -651,8 +650,7 @@ static int end_reader(vg_source *s, vg_err *e)
     return r;
 }
 
-/* May what comes next be read before it is asked for? A member of the archive that is open, or a mesh file that is
- * there. */
+/* May the next input be read ahead? True for members of the open archive, and for regular mesh files. */
 static bool may_read_ahead(const vg_source *s)
 {
     if (s->failed || vgi_belt_full(s->belt) || s->waiting >= MOST_WAITING) return false;
@@ -660,7 +658,7 @@ static bool may_read_ahead(const vg_source *s)
     return s->archive || (s->next < s->n && s->items[s->next].content == MESH && s->items[s->next].regular);
 }
 
-/* Take a step: 1 and a frame; VG_OK: look again. Something is left. */
+/* Advance by one input or frame: 1 and a frame; VG_OK: call again. Something is left to read. */
 static int step(vg_source *s, vg_frame *f, vg_err *e)
 {
     if (s->playing.format) return vgi_play_next(&s->playing, &s->own, f, e);
@@ -682,7 +680,7 @@ int vg_source_next(vg_source *s, vg_frame *f, vg_err *e)
         if (!s->playing.format && !s->reader && !s->archive && s->next == s->n) return 0;
         int r = step(s, f, &s->failure);
         if (r > 0) return r;
-        s->failed = r; /* told behind the poses that wait */
+        s->failed = r; /* reported after the poses that wait */
     }
 }
 

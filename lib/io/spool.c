@@ -1,5 +1,5 @@
-/* spool.c: frames that wait for their turn, first in, first out: in memory up to a limit, beyond it in a file without a
- * name. Leaves out what they wait for, and what the bytes of a frame are (frame_pack.c).
+/* spool.c: a queue of frames, first in, first out: in memory up to a limit, beyond it in an unnamed file. Leaves out
+ * the bytes of a frame (frame_pack.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/frame_pack.h"
 
@@ -16,7 +16,7 @@ struct vg_spool {
     vgi_packing packing;
     size_t limit, used;     /* bytes in memory */
     held *first, *last;
-    int fd;                 /* -1: no file was needed yet */
+    int fd;                 /* -1: not created yet */
     uint64_t read, written; /* places in the file; equal: nothing is in it */
     vg_bytes frame;         /* one frame on its way into or out of the file */
     vg_spool_stats stats;
@@ -85,8 +85,8 @@ static int keep_in_file(vg_spool *s, const vg_frame *f, const vgi_packed *head, 
     return VG_OK;
 }
 
-/* What is in memory is older than what is in the file: once the file is begun,
- * it takes all until it is empty again. */
+/* Frames in memory are older than those in the file: once the file is begun, all new frames go there until it is empty
+ * again. */
 int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e)
 {
     vgi_packed head;

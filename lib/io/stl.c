@@ -349,7 +349,7 @@ static int put_fan(struct writing *x, const uint32_t *v, size_t n)
     return r;
 }
 
-/* Ear by ear; what has none any more (it crosses itself) goes as a fan. */
+/* Cut ears; a face that has none left (it crosses itself) becomes a fan. */
 static int clip_ears(struct writing *x, const uint32_t *v, size_t n, const double normal[3])
 {
     int r = vgi_grow(&x->ring, &x->ring_cap, n, sizeof *x->ring, x->e);

@@ -1,5 +1,5 @@
-/* stream.c: reader and writer of whole streams: which records may stand where, what is passed on, what stops.
- * Leaves out bytes of records (record.c) and of their contents (payload.c).
+/* stream.c: reader and writer of whole streams: the order of records, what is passed on, what is an error.
+ * Leaves out the bytes of records (record.c) and their payloads (payload.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/artefact_io.h"
 #include "io/payload.h"
@@ -136,7 +136,7 @@ vg_records *vg_reader_tail(vg_reader *r)
     return &r->tail;
 }
 
-/* The frame's raw buffer takes part in reading, so that a large payload is read straight to where it stays. */
+/* A large payload is read directly into the frame's raw buffer, where it stays. */
 int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
 {
     vg_records_clear(&f->extra);

@@ -156,7 +156,7 @@ void vg_targets_remove(const vg_targets *t)
 void vg_targets_clear(vg_targets *t)
 {
     vg_targets old = *t;
-    *t = (vg_targets){0}; /* before anything is freed: vg_targets_remove may come at any moment */
+    *t = (vg_targets){0}; /* before anything is freed: vg_targets_remove may be called from a signal handler */
     for (size_t i = 0; i < old.n; i++) {
         free(old.at[i].final);
         free(old.at[i].temporary);

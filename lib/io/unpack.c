@@ -1,5 +1,5 @@
-/* unpack.c: bytes for libarchive from a range of a file, through its decompressors, and whether a compressed file is
- * whole: libarchive neither compares the checksum of gzip nor looks behind the end of what it unpacked.
+/* unpack.c: decompresses a range of a file for libarchive, and checks that a compressed file is complete: libarchive
+ * neither compares the checksum of gzip nor looks beyond the end of what it unpacked.
  * Leaves out archives and their members (archive.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/unpack.h"
@@ -100,7 +100,7 @@ bool vgi_sum_agrees(const vgi_sum *s, const unsigned char trailer[8])
     return vgi_get32(trailer) == ~s->crc && vgi_get32(trailer + 4) == (uint32_t)s->bytes;
 }
 
-/* No programs are started and no other files opened, whatever the input says: neither filters that run a command, nor
+/* Whatever the input says, no programs are started and no other files opened: neither filters that run a command nor
  * the mtree format. */
 static void allow_filters(struct archive *la)
 {

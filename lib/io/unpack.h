@@ -1,4 +1,4 @@
-/* unpack.h: what the files that know libarchive share: unpack.c, archive.c, pack.c.
+/* unpack.h: shared by the files that use libarchive: unpack.c, archive.c, pack.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_UNPACK_H
 #define VG_UNPACK_H
@@ -58,7 +58,7 @@ typedef struct vgi_unpacker {
     vgi_sum *sum;
 } vgi_unpacker;
 
-/* vgi_unpacker_open: VG_EINPUT when libarchive does not like it; u->la says why. */
+/* vgi_unpacker_open: VG_EINPUT when libarchive refuses it; u->la says why. */
 int vgi_unpacker_open(vgi_unpacker *u, vgi_tap *t, vg_err *e) VG_MUST_CHECK;
 void vgi_unpacker_close(vgi_unpacker *u);
 /* vgi_unpack_some: the next bytes; 0 at the end, negative when libarchive finds damage. */

@@ -18,7 +18,7 @@ typedef struct writing {
     vg_bytes text, extents;
     vgi_names names;
     uint64_t frames, first_key_off, place_off[PLACES];
-    bool timed, ignored_times; /* what the first frame says; a later one had a time all the same */
+    bool timed, ignored_times; /* what the first frame says; a later one had a time nevertheless */
     double first, last, rate, last_key;
     size_t segments;
 } writing;

@@ -1,4 +1,4 @@
-/* artefact.c: what is done with the table of header records: find, count, clear, copy.
+/* artefact.c: operations on the table of header records: find, count, clear, copy, move.
  * Leaves out the table itself (records.c) and its bytes (io/artefact_io.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/artefact.h"

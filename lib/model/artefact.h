@@ -73,8 +73,8 @@ typedef int vgi_check(vg_head *h, void *artefact, const char *where, vg_err *e);
 typedef struct vgi_artefact {
     const char *tag;
     uint32_t flags;
-    const char *name;   /* what people call it, alone or with other records; NULL: nobody asks for it */
-    const char *advice; /* where to get one ("make one with vg-fitmap"); NULL: no idea */
+    const char *name;   /* the name by which programs ask for it, alone or with other records; NULL: none asks */
+    const char *advice; /* where to get one ("make one with vg-fitmap"); NULL: nothing is advised */
     const char *needs; /* the tag of the record that must come before; NULL: none */
     bool in_body;
     size_t at;         /* offset in vg_head, or in vg_body */

@@ -13,7 +13,7 @@ void vgi_rig_movers(const vg_rig *r, uint32_t *mover);
 /* vgi_rig_parents: for each bone the bone that carries its joint; the first bone has none,
  * and other roots hang on the first. */
 int vgi_rig_parents(const vg_rig *r, uint32_t *parent, vg_err *e) VG_MUST_CHECK;
-/* vgi_rig_is_free: there are several bones, and none hangs on another (vg_rig_decompose). */
+/* vgi_rig_is_free: there are several bones, and none is the parent of another (vg_rig_decompose). */
 bool vgi_rig_is_free(const vg_rig *r);
 
 #endif

@@ -26,7 +26,7 @@ typedef struct net_drive {
     const real *parameters;
     const real *scale_in, *scale_out; /* coordinates: per number; the network sees c * scale_in, gives y * scale_out */
     const net_skeleton *skeleton;     /* NULL: none; else of the forward and of the backward chains */
-    size_t forward;                   /* the first so many lanes run forward, the others backward */
+    size_t forward;                   /* the first `forward` lanes run forward, the others backward */
     size_t given;                     /* frames that are given; from then on a chain goes on from its own */
     void (*truth)(const void *context, size_t t, net_lanes *frame); /* frame t of all lanes */
     const void *context;

@@ -25,7 +25,7 @@ struct vg_trainer {
     size_t *window, nwindows; /* where they may begin */
     vgi_regression regression[2]; /* fitted to the frames of this phase */
     net_group *groups;
-    size_t ngroups, at_once; /* so many groups are run at a time */
+    size_t ngroups, at_once; /* at_once groups are run at a time */
     float **gradient;       /* at_once x sets * nparameters */
     float *total, *moments, *best;
     vgi_runner runner;

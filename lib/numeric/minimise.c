@@ -74,7 +74,7 @@ static int try_steps(search *s, const double *x, double value, double slope, dou
     return best;
 }
 
-/* What the step from x to point `taken` says of the curvature. */
+/* Record what the step from x to point `taken` says of the curvature. */
 static void remember(search *s, const double *x, int taken)
 {
     size_t n = s->f->n, k = s->pairs < MEMORY ? s->pairs : MEMORY - 1;

@@ -292,7 +292,7 @@ static void solve_one(const vgi_factor *f, double *x)
 
 /* ---- from poses to rows and back ---- */
 
-/* Rows are met in the order of vertices, which is not theirs: ask for the lines of one ahead. */
+/* Rows are visited in the order of vertices, which is not their own: prefetch them. */
 VGI_INLINE void ask(const vgi_row *x, const uint32_t *row, size_t v, size_t nv, size_t rows)
 {
     enum { AHEAD = 8 };

@@ -185,7 +185,7 @@ int vg_head_trace(vg_head *h, const char *program, int argc, char *const *argv, 
  * vg_head_trace). */
 int vg_head_merge_trace(vg_head *h, const vg_head *other, vg_err *e) VG_MUST_CHECK;
 
-/* What comes with a frame beside its values: so many numbers for each element, or a list of vertices. Some names have a
+/* Data of a frame beside its values: `width` numbers for each element, or a list of vertices. Some names have a
  * meaning (fmt/STREAM.md, section 3.12): "anchors", "pins", "turns". */
 typedef struct vg_channel {
     char *name, *unit;   /* UTF-8: "error", never ""; "D", or "" */

@@ -55,7 +55,7 @@ typedef struct vg_source vg_source;
 /* What can be chosen about files that say more, or less, than a sequence of vertices. All zero: the usual. */
 typedef struct vg_reading {
     const char *array_axes; /* NPZ: what the axes of the positions count, in their order: "fvx" (frames, vertices, x y z),
-                               "vxf", ...; NULL: told by their lengths, the faces and the reference */
+                               "vxf", ...; NULL: found from their lengths, the faces and the reference */
     const char *animation;  /* glTF: the one of this name; NULL: all, one after another */
     double fps;             /* glTF: a frame so often a second, from the first key to the last; 0: at each key */
     bool shapes;            /* glTF: morph targets, whatever animations there are */
@@ -163,13 +163,13 @@ void vg_targets_remove(const vg_targets *t);
 void vg_targets_clear(vg_targets *t); /* forget the files, which stay */
 
 /* The door out: one mesh file, a '%04d' pattern, a directory ("out/"), an archive, or one file that holds the whole
- * sequence, told by the name and checked at once; "NAME:ply" chooses what is inside an archive or directory, `format`
+ * sequence, as the name says (checked at once); "NAME:ply" chooses what is inside an archive or directory, `format`
  * (may be NULL) overrides. Everything is written under temporary names and takes its final name in vg_sink_end. The
  * frames of a directory or archive are read back in the order in which they were put: where their names do not sort so,
  * or are no file names, the files have a number in front. */
 typedef struct vg_sink vg_sink;
 typedef struct vg_sink_options {
-    const char *format;  /* "obj", "pc2", ...; NULL: told by the name */
+    const char *format;  /* "obj", "pc2", ...; NULL: as the name says */
     bool full_precision; /* numbers read back to the same binary64, not binary32 */
     long first_number;   /* what %d starts at; 0 */
     const char *mesh;    /* where the mesh of a file without faces goes; NULL: beside it, NAME.obj, which must not be
@@ -183,8 +183,8 @@ typedef struct vg_sink_options {
     const char *name;    /* GLB, glTF: of the animation; NULL: what its frames are called after */
     bool replace;        /* where a directory or a pattern has mesh files of an earlier set, remove those that are not
                             overwritten once all is written; without it, such files are an error before any work */
-    int threads;         /* of mesh files so many are made at a time, and one more waits: no more than 256 MiB, but two
-                            in any case, and what went wrong with one is told by a later call. 0 or 1: each at once */
+    int threads;         /* this many mesh files are made at a time, and one more waits, in at most 256 MiB, but always
+                            two; their errors are reported by a later call. 0 or 1: each at once */
 } vg_sink_options;
 /* vg_sink_check: is this a name and format that can be written? To be called before any work. */
 int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;
@@ -210,7 +210,7 @@ typedef struct vg_model {
 } vg_model;
 
 void vg_model_clear(vg_model *m);
-/* vg_model_read: format NULL: told by content, then by the name. name is what messages call it. */
+/* vg_model_read: format NULL: detected from the content, then from the name. name is what messages call it. */
 int vg_model_read(vg_model *m, const void *data, size_t n, const char *format, const char *name,
                   vg_err *e) VG_MUST_CHECK;
 /* vg_model_write: append to out. attributes may be NULL. */

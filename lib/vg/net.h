@@ -51,8 +51,8 @@ typedef struct vg_train_options {
     vg_network_model model;
     vg_direction direction;
     size_t layers, hidden, convolutions;
-    size_t iterations, batch, frames; /* sequences of so many frames, so many at a time */
-    size_t step;              /* every so manieth frame */
+    size_t iterations, batch, frames; /* batch: sequences per iteration; frames: length of each */
+    size_t step;              /* use every step-th frame */
     size_t given_least, given_most; /* frames that are given, drawn for each iteration */
     size_t coordinates;       /* at most */
     double hold;              /* share of each sequence that is held out, at its end */

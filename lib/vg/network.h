@@ -41,8 +41,8 @@ typedef struct vg_network {
     size_t layers, hidden, convolutions;
     bool uncertain;         /* the latent numbers have a variance */
     size_t sets, nparameters; /* sets of weights: 1, or 2 of separate directions; parameters of one */
-    uint64_t seed, frames, iterations; /* trained on so many frames, for so many iterations */
-    size_t step;            /* every so manieth frame of what it was trained on */
+    uint64_t seed, frames, iterations; /* frames: how many it was trained on */
+    size_t step;            /* it was trained on every step-th frame */
     double diagonal;        /* D */
     double low[2], high[2]; /* range of w, and of S and the rest, in training: brought to -0.95 .. 0.95 */
     double change;          /* mean change of a feature from frame to frame in training */

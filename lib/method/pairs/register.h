@@ -7,8 +7,8 @@
 #include "numeric/vec3.h"
 #include "method/pairs/surface.h"
 
-/* A point of the source, share-weighted mean of up to three vertices (the same one thrice for a vertex), that belongs
- * at a point of space, with a weight: 1 is as firm as the surface is stiff in the end. */
+/* A point of the source, the mean of up to three vertices by their shares (of a single vertex, that vertex three
+ * times), that belongs at a point of space. weight 1: as firm as the surface is stiff in the end. */
 typedef struct vgi_tie {
     uint32_t vertex[3];
     double share[3], point[3], weight;

@@ -8,7 +8,7 @@
 #include "method/pairs/register.h"
 #include "numeric/sparse.h"
 
-/* All corners of a face of so many or fewer are joined with one another; larger ones have fewer springs. */
+/* In faces of up to this many corners all corners are joined with one another; larger faces have fewer springs. */
 enum { VGI_SMALL_FACE = 8 };
 
 /* Those of vertex v are first[v] .. first[v + 1] - 1, by ascending neighbour. */
@@ -24,7 +24,7 @@ int vgi_springs_make(vgi_springs *L, const vgi_fitting *in, vg_err *e) VG_MUST_C
 void vgi_springs_clear(vgi_springs *L);
 /* vgi_springs_apply: y = L x, nv points */
 void vgi_springs_apply(const vgi_springs *L, const double *x, double *y);
-/* vgi_is_hub: does it have so many neighbours that it does not count bending? All of them would be joined. */
+/* vgi_is_hub: does v have so many neighbours that its bending term is left out? It would join all of them. */
 bool vgi_is_hub(const vgi_springs *L, size_t v);
 
 typedef struct vgi_smoothness {

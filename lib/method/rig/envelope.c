@@ -22,7 +22,7 @@ struct vg_rig_fitter {
     vgi_rig_sums sums;
     double *miss; /* nv: error of linear blend skinning */
     bool skinned; /* the skin is fitted to all poses that were added */
-    vg_map base;  /* the envelope before it is refined, for so many bones per corner; n 0: not made yet */
+    vg_map base;  /* the envelope before it is refined, for o.bones_per_corner; n 0: not made yet */
 };
 
 int vg_rig_fitter_new(vg_rig_fitter **out, const vg_head *h, const vg_rig_options *o, vg_err *e)

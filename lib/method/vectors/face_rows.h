@@ -24,8 +24,8 @@ bool vgi_solver_is_star(const vg_solver *s, size_t f);
  * vertices are set. */
 void vgi_solver_place(const vg_solver *s, double *x, const double *anchor, const double *root);
 
-/* The faces of at least so many corners, sorted by their least row for the sake of the cache. Held vertices get the
- * rows behind those of the factor, in ascending order. */
+/* The faces of at least a given number of corners, sorted by their least row for the sake of the cache. Held vertices
+ * get the rows after those of the factor, in ascending order. */
 typedef struct vgi_face_rows {
     size_t nheld, nf;
     uint32_t *held; /* nheld vertices that are in a face and have no row */
