@@ -7,6 +7,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/rings.h"
 #include "net/heap.h"
+#include "model/laplacian.h"
 #include "numeric/face.h"
 
 #include <stdlib.h>
@@ -67,25 +68,7 @@ static int cut_faces(vgi_rings *r, const vg_mesh *m, vg_err *e)
 
 /* ---- edges ---- */
 
-typedef struct half_edge { /* from a to b */
-    uint32_t a, b;
-    double weight;
-    bool segment;
-} half_edge;
-
-static int by_ends(const void *x, const void *y)
-{
-    const half_edge *p = x, *q = y;
-    if (p->a != q->a) return p->a < q->a ? -1 : 1;
-    return p->b < q->b ? -1 : p->b > q->b;
-}
-
-static size_t put_both(half_edge *list, size_t n, uint32_t a, uint32_t b, double weight, bool segment)
-{
-    list[n] = (half_edge){a, b, weight, segment};
-    list[n + 1] = (half_edge){b, a, weight, segment};
-    return n + 2;
-}
+enum { OF_TRIANGLE = 1, OF_SEGMENT = 2 }; /* kinds of edges */
 
 /* the cotangent of the angle at a */
 static double cotangent(const double *a, const double *b, const double *c)
@@ -96,59 +79,43 @@ static double cotangent(const double *a, const double *b, const double *c)
     return vgi_dot(u, v) / fmax(vgi_length(n), 1e-12 * fmax(vgi_dot(u, u), vgi_dot(v, v)) + 1e-300);
 }
 
-static size_t list_edges(const vgi_rings *r, const vg_mesh *m, half_edge *list)
+static int list_edges(const vgi_rings *r, const vg_mesh *m, vgi_edges *list, vg_err *e)
 {
-    size_t n = 0;
+    int code = VG_OK;
     for (size_t i = 0; i < r->ntriangles; i++) {
         const uint32_t *t = r->triangle + 3 * i;
-        for (int k = 0; k < 3; k++) {
+        for (int k = 0; k < 3 && code == VG_OK; k++) {
             uint32_t a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3];
-            n = put_both(list, n, b, c, cotangent(point(r, a), point(r, b), point(r, c)) / 2, false);
+            code = vgi_edges_add(list, b, c, cotangent(point(r, a), point(r, b), point(r, c)) / 2, OF_TRIANGLE, e);
         }
     }
-    for (size_t f = 0; f < m->nf; f++) {
+    for (size_t f = 0; f < m->nf && code == VG_OK; f++) {
         const uint32_t *vert = m->vert + m->start[f];
-        if (m->start[f + 1] - m->start[f] == 2) n = put_both(list, n, vert[0], vert[1], 0, true);
+        if (m->start[f + 1] - m->start[f] == 2) code = vgi_edges_add(list, vert[0], vert[1], 0, OF_SEGMENT, e);
     }
-    return n;
-}
-
-/* Edges that are named several times become one, whose weight is the sum. Returns how many are left. */
-static size_t unite_edges(half_edge *list, size_t n)
-{
-    qsort(list, n, sizeof *list, by_ends);
-    size_t kept = 0;
-    for (size_t i = 0; i < n; i++) {
-        if (kept && !by_ends(&list[kept - 1], &list[i])) {
-            list[kept - 1].weight += list[i].weight;
-            list[kept - 1].segment &= list[i].segment;
-        } else {
-            list[kept++] = list[i];
-        }
-    }
-    return kept;
+    return code;
 }
 
 static int make_edges(vgi_rings *r, const vg_mesh *m, vg_err *e)
 {
-    half_edge *list = vgi_array_raw(6 * r->ntriangles + 2 * m->nf, sizeof *list, e);
-    if (!list) return VG_ENOMEM;
-    size_t n = unite_edges(list, list_edges(r, m, list));
-    r->first = vgi_array(r->nv + 1, sizeof *r->first, e);
-    r->to = vgi_array_raw(n, sizeof *r->to, e);
-    r->weight = vgi_array_raw(n, sizeof *r->weight, e);
+    vgi_edges list = {0};
+    vgi_laplacian L = {0};
+    int code = list_edges(r, m, &list, e);
+    if (code == VG_OK) code = vgi_laplacian_make(&L, r->nv, &list, e);
+    vgi_edges_clear(&list);
+    if (code < 0) return code;
+    size_t n = L.first[r->nv];
     r->edge = vgi_array_raw(3 * n, sizeof *r->edge, e);
     r->gradient = vgi_array_raw(3 * n, sizeof *r->gradient, e);
-    if (!r->first || !r->to || !r->weight || !r->edge || !r->gradient) return free(list), VG_ENOMEM;
-    for (size_t i = 0; i < n; i++) {
-        r->first[list[i].a + 1]++;
-        r->to[i] = list[i].b;
-        r->weight[i] = list[i].segment ? 1 : fmin(fmax(list[i].weight, least_weight), most_weight);
-        vgi_subtract(point(r, list[i].a), point(r, list[i].b), r->edge + 3 * i);
-    }
-    for (size_t v = 0; v < r->nv; v++) r->first[v + 1] += r->first[v];
-    free(list);
-    return VG_OK;
+    for (size_t i = 0; i < n; i++)
+        L.weight[i] = L.kinds[i] == OF_SEGMENT ? 1 : fmin(fmax(L.weight[i], least_weight), most_weight);
+    for (size_t v = 0; r->edge && v < r->nv; v++)
+        for (uint32_t i = L.first[v]; i < L.first[v + 1]; i++)
+            vgi_subtract(point(r, v), point(r, L.to[i]), r->edge + 3 * (size_t)i);
+    r->first = L.first, r->to = L.to, r->weight = L.weight;
+    L.first = L.to = NULL, L.weight = NULL;
+    vgi_laplacian_clear(&L);
+    return r->edge && r->gradient ? VG_OK : VG_ENOMEM;
 }
 
 /* ---- components, their centres, the ball ---- */

@@ -54,7 +54,7 @@ typedef struct fit {
     const vgi_fitting *in;
     const vg_mesh *m;
     vgi_incidence around;
-    vgi_springs L;
+    vgi_laplacian L;
     double *laplacian; /* nv x 3: L s */
     double *inverse;   /* nf x 9: (sum r r' + h n n')^-1, see prepare_faces() */
     double *h_normal;  /* nf x 3: h n, of the rest */
@@ -251,7 +251,7 @@ static int update_maps(fit *t, vg_err *e)
 /* The smoothing operator of the maps: the matrix with first neighbours only. */
 static int make_smoother(fit *t, vg_err *e)
 {
-    const vgi_springs *L = &t->L;
+    const vgi_laplacian *L = &t->L;
     size_t n = 0;
     double strength = MAP_SPAN / t->edge * MAP_SPAN / t->edge;
     vgi_sparse A = {.n = L->nv,
@@ -278,14 +278,14 @@ static int make_smoother(fit *t, vg_err *e)
 
 static void add_smoothness(fit *t)
 {
-    const vgi_springs *L = &t->L;
+    const vgi_laplacian *L = &t->L;
     double *wanted = t->tmp;
     for (size_t v = 0; v < L->nv; v++) {
         double *w = wanted + 3 * v;
         vgi_multiply_vector(t->map + 9 * v, t->laplacian + 3 * v, w);
         for (int k = 0; k < 3; k++) w[k] = L->sum[v] > 0 && !vgi_is_hub(L, v) ? w[k] / L->sum[v] : 0;
     }
-    vgi_springs_apply(L, wanted, t->rhs);
+    vgi_laplacian_apply(L, wanted, t->rhs);
     for (size_t v = 0; v < L->nv; v++) {
         double *to = t->rhs + 3 * v;
         for (uint32_t i = L->first[v]; i < L->first[v + 1]; i++) {
@@ -464,7 +464,7 @@ static int run(fit *t, vg_err *e)
 /* The mean edge length, which sets the scale of smoothing. */
 static void measure_edges(fit *t)
 {
-    const vgi_springs *L = &t->L;
+    const vgi_laplacian *L = &t->L;
     double sum = 0, weight = 0;
     for (size_t v = 0; v < L->nv; v++)
         for (uint32_t i = L->first[v]; i < L->first[v + 1]; i++) {
@@ -508,7 +508,7 @@ static int prepare(fit *t, vg_err *e)
     for (size_t v = 0; v < nv; v++)
         for (size_t k = 0; k < 9; k += 4) t->map[9 * v + k] = 1;
     memcpy(t->x, t->in->rest, 3 * nv * sizeof *t->x);
-    vgi_springs_apply(&t->L, t->in->rest, t->laplacian);
+    vgi_laplacian_apply(&t->L, t->in->rest, t->laplacian);
     prepare_faces(t);
     return make_smoother(t, e);
 }
@@ -519,7 +519,7 @@ static void clear(fit *t)
                         t->map, t->x, t->rhs, t->normal, t->tmp, t->pull, t->goal,
                         t->distance};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
-    vgi_springs_clear(&t->L);
+    vgi_laplacian_clear(&t->L);
     vgi_smoothness_clear(&t->smooth);
     free(t->border);
     free(t->reverse);

@@ -7,125 +7,53 @@
 
 enum { HUB = 100 }; /* neighbours */
 
-typedef struct spring_list {
-    size_t n, cap;
-    struct spring {
-        uint32_t a, b;
-        double weight;
-    } *at;
-} spring_list;
-
-static int add_spring(spring_list *l, uint32_t a, uint32_t b, double weight, vg_err *e)
-{
-    int r = vgi_grow(&l->at, &l->cap, l->n + 1, sizeof *l->at, e);
-    if (r == VG_OK) l->at[l->n++] = (struct spring){a, b, weight};
-    return r;
-}
-
 /* Springs between all corners of a small face; in a large one along edges, to the second neighbour, and across. */
-static int add_face(spring_list *l, const uint32_t *vert, size_t r, vg_err *e)
+static int add_face(vgi_edges *l, const uint32_t *vert, size_t r, vg_err *e)
 {
     int code = VG_OK;
     if (r <= VGI_SMALL_FACE) {
         for (size_t i = 1; i < r && code == VG_OK; i++)
-            for (size_t j = 0; j < i && code == VG_OK; j++) code = add_spring(l, vert[i], vert[j], 1.0 / (double)r, e);
+            for (size_t j = 0; j < i && code == VG_OK; j++) code = vgi_edges_add(l, vert[i], vert[j], 1.0 / (double)r, 0, e);
         return code;
     }
     for (size_t i = 0; i < r && code == VG_OK; i++) {
-        code = add_spring(l, vert[i], vert[(i + 1) % r], 0.25, e);
-        if (code == VG_OK) code = add_spring(l, vert[i], vert[(i + 2) % r], 0.125, e);
-        if (code == VG_OK && i < r / 2) code = add_spring(l, vert[i], vert[i + r / 2], 0.125, e);
+        code = vgi_edges_add(l, vert[i], vert[(i + 1) % r], 0.25, 0, e);
+        if (code == VG_OK) code = vgi_edges_add(l, vert[i], vert[(i + 2) % r], 0.125, 0, e);
+        if (code == VG_OK && i < r / 2) code = vgi_edges_add(l, vert[i], vert[i + r / 2], 0.125, 0, e);
     }
     return code;
 }
 
-static int gather_springs(spring_list *l, const vgi_fitting *in, vg_err *e)
+static int gather_springs(vgi_edges *l, const vgi_fitting *in, vg_err *e)
 {
     const vg_mesh *m = in->source;
     int r = VG_OK;
     for (size_t f = 0; f < m->nf && r == VG_OK; f++)
         r = add_face(l, m->vert + m->start[f], m->start[f + 1] - m->start[f], e);
     for (size_t i = 0; i < in->nlinks && r == VG_OK; i++)
-        r = add_spring(l, in->links[2 * i], in->links[2 * i + 1], 0.5, e);
+        r = vgi_edges_add(l, in->links[2 * i], in->links[2 * i + 1], 0.5, 0, e);
     /* points joined by a tie: an entry in the matrix without a spring */
     for (size_t i = 0; i < in->nties; i++)
         for (int k = 0; k < 3 && r == VG_OK; k++) {
             uint32_t a = in->tie[i].vertex[k], b = in->tie[i].vertex[(k + 1) % 3];
-            if (a != b) r = add_spring(l, a, b, 0, e);
+            if (a != b) r = vgi_edges_add(l, a, b, 0, 0, e);
         }
     return r;
 }
 
-static int compare_springs(const void *a, const void *b)
+int vgi_springs_make(vgi_laplacian *L, const vgi_fitting *in, vg_err *e)
 {
-    const struct spring *x = a, *y = b;
-    if (x->a != y->a) return x->a < y->a ? -1 : 1;
-    if (x->b != y->b) return x->b < y->b ? -1 : 1;
-    return x->weight < y->weight ? -1 : x->weight > y->weight; /* sums must not depend on the order of sorting */
-}
-
-int vgi_springs_make(vgi_springs *L, const vgi_fitting *in, vg_err *e)
-{
-    spring_list list = {0};
+    vgi_edges list = {0};
     int r = gather_springs(&list, in, e);
-    size_t n = list.n, nv = in->source->nv;
-    *L = (vgi_springs){.nv = nv};
-    if (r == VG_OK && n > INT32_MAX / 2)
-        r = vg_fail(e, VG_EINPUT, "a mesh of %zu vertices is too large to be fitted", nv);
-    for (size_t i = 0; i < n && r == VG_OK; i++)
-        r = add_spring(&list, list.at[i].b, list.at[i].a, list.at[i].weight, e);
-    L->first = vgi_array(nv + 1, sizeof *L->first, e);
-    L->to = vgi_array_raw(list.n, sizeof *L->to, e);
-    L->weight = vgi_array_raw(list.n, sizeof *L->weight, e);
-    L->sum = vgi_array(nv, sizeof *L->sum, e);
-    if (r == VG_OK && !(L->first && L->to && L->weight && L->sum)) r = VG_ENOMEM;
-    if (r < 0) {
-        vgi_springs_clear(L);
-        free(list.at);
-        return r;
-    }
-    if (list.n) qsort(list.at, list.n, sizeof *list.at, compare_springs);
-    size_t to = 0;
-    for (size_t i = 0; i < list.n; i++) {
-        const struct spring *s = &list.at[i];
-        if (i && s[-1].a == s->a && s[-1].b == s->b) {
-            L->weight[to - 1] += s->weight;
-        } else {
-            L->to[to] = s->b, L->weight[to++] = s->weight;
-            L->first[s->a + 1]++;
-        }
-        L->sum[s->a] += s->weight;
-    }
-    for (size_t v = 0; v < nv; v++) L->first[v + 1] += L->first[v];
-    free(list.at);
-    return VG_OK;
-}
-
-void vgi_springs_clear(vgi_springs *L)
-{
-    free(L->first);
-    free(L->to);
-    free(L->weight);
-    free(L->sum);
-    *L = (vgi_springs){0};
-}
-
-void vgi_springs_apply(const vgi_springs *L, const double *x, double *y)
-{
-    for (size_t v = 0; v < L->nv; v++) {
-        double *to = y + 3 * v;
-        const double *at = x + 3 * v;
-        to[0] = to[1] = to[2] = 0;
-        for (uint32_t i = L->first[v]; i < L->first[v + 1]; i++) {
-            const double *from = x + 3 * (size_t)L->to[i];
-            for (int k = 0; k < 3; k++) to[k] += L->weight[i] * (at[k] - from[k]);
-        }
-    }
+    if (r == VG_OK) return vgi_laplacian_make(L, in->source->nv, &list, e);
+    vgi_edges_clear(&list);
+    *L = (vgi_laplacian){0};
+    return r;
 }
 
 /* ---- smoothness ---- */
 
-bool vgi_is_hub(const vgi_springs *L, size_t v)
+bool vgi_is_hub(const vgi_laplacian *L, size_t v)
 {
     return L->first[v + 1] - L->first[v] >= HUB;
 }
@@ -137,7 +65,7 @@ static int compare_ints(const void *a, const void *b)
 }
 
 /* Rows >= column of the column's neighbours' neighbours, ascending. mark[v] == column + 1: seen. */
-static size_t column_rows(const vgi_springs *L, uint32_t column, int *rows, uint32_t *mark)
+static size_t column_rows(const vgi_laplacian *L, uint32_t column, int *rows, uint32_t *mark)
 {
     size_t n = 0;
     mark[column] = column + 1, rows[n++] = (int)column;
@@ -154,7 +82,7 @@ static size_t column_rows(const vgi_springs *L, uint32_t column, int *rows, uint
     return n;
 }
 
-static int make_pattern(vgi_smoothness *s, const vgi_springs *L, vg_err *e)
+static int make_pattern(vgi_smoothness *s, const vgi_laplacian *L, vg_err *e)
 {
     vgi_sparse *A = &s->matrix;
     size_t cap = 0, n = 0, nv = L->nv;
@@ -181,7 +109,7 @@ static int make_pattern(vgi_smoothness *s, const vgi_springs *L, vg_err *e)
 }
 
 /* L_ij with L_ii = sum */
-static void fill_column(const vgi_springs *L, size_t j, double *bend, double *stretch)
+static void fill_column(const vgi_laplacian *L, size_t j, double *bend, double *stretch)
 {
     stretch[j] = L->sum[j];
     for (uint32_t i = L->first[j]; i <= L->first[j + 1]; i++) {
@@ -196,7 +124,7 @@ static void fill_column(const vgi_springs *L, size_t j, double *bend, double *st
     }
 }
 
-static int fill(vgi_smoothness *s, const vgi_springs *L, vg_err *e)
+static int fill(vgi_smoothness *s, const vgi_laplacian *L, vg_err *e)
 {
     const vgi_sparse *A = &s->matrix;
     double *bend = vgi_array(L->nv, sizeof *bend, e), *stretch = vgi_array(L->nv, sizeof *stretch, e);
@@ -217,7 +145,7 @@ static int fill(vgi_smoothness *s, const vgi_springs *L, vg_err *e)
     return VG_OK;
 }
 
-int vgi_smoothness_make(vgi_smoothness *s, const vgi_springs *L, vg_err *e)
+int vgi_smoothness_make(vgi_smoothness *s, const vgi_laplacian *L, vg_err *e)
 {
     *s = (vgi_smoothness){0};
     int r = make_pattern(s, L, e);

@@ -6,26 +6,17 @@
 #define VG_SPRINGS_H
 
 #include "method/pairs/register.h"
+#include "model/laplacian.h"
 #include "numeric/sparse.h"
 
 /* In faces of up to this many corners all corners are joined with one another; larger faces have fewer springs. */
 enum { VGI_SMALL_FACE = 8 };
 
-/* Those of vertex v are first[v] .. first[v + 1] - 1, by ascending neighbour. */
-typedef struct vgi_springs {
-    size_t nv;
-    uint32_t *first, *to;
-    double *weight, *sum; /* per spring; per vertex: L_vv, 0 for a vertex in no face */
-} vgi_springs;
-
 /* vgi_springs_make: of the source's faces and links; vertices that a tie joins have springs without weight.
  * Failed: *L is 0. */
-int vgi_springs_make(vgi_springs *L, const vgi_fitting *in, vg_err *e) VG_MUST_CHECK;
-void vgi_springs_clear(vgi_springs *L);
-/* vgi_springs_apply: y = L x, nv points */
-void vgi_springs_apply(const vgi_springs *L, const double *x, double *y);
+int vgi_springs_make(vgi_laplacian *L, const vgi_fitting *in, vg_err *e) VG_MUST_CHECK;
 /* vgi_is_hub: does v have so many neighbours that its bending term is left out? It would join all of them. */
-bool vgi_is_hub(const vgi_springs *L, size_t v);
+bool vgi_is_hub(const vgi_laplacian *L, size_t v);
 
 typedef struct vgi_smoothness {
     vgi_sparse matrix;            /* the pattern; its numbers are the caller's to set */
@@ -33,7 +24,7 @@ typedef struct vgi_smoothness {
 } vgi_smoothness;
 
 /* vgi_smoothness_make: failed: *s is 0. */
-int vgi_smoothness_make(vgi_smoothness *s, const vgi_springs *L, vg_err *e) VG_MUST_CHECK;
+int vgi_smoothness_make(vgi_smoothness *s, const vgi_laplacian *L, vg_err *e) VG_MUST_CHECK;
 void vgi_smoothness_clear(vgi_smoothness *s);
 
 #endif
