@@ -2,7 +2,6 @@
  * The root's steps are a regression of their own: what the body does says how it moves on.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/dataset.h"
-#include "net/root.h"
 #include "numeric/blas.h"
 #include "signal/signal.h"
 
@@ -261,6 +260,5 @@ int vgi_dataset_find_coordinates(vgi_dataset *s, vg_network *n, size_t most, int
     find_range(s, n);
     int r = find_basis(s, n, most, threads, e);
     if (r == VG_OK) r = encode_all(s, n, threads, e);
-    if (r == VG_OK) r = find_scales(s, n, e);
-    return r == VG_OK ? vgi_root_fit(s, n, e) : r;
+    return r == VG_OK ? find_scales(s, n, e) : r;
 }

@@ -46,7 +46,7 @@ void vgi_dataset_clear(vgi_dataset *s);
 /* vgi_dataset_divide: make a sequence of every step-th frame, starting at each of the first `step` frames; hold out a
  * share of each sequence, at its end or from frame hold_at on. */
 int vgi_dataset_divide(vgi_dataset *s, size_t step, double hold, size_t hold_at, vg_err *e) VG_MUST_CHECK;
-/* vgi_dataset_find_coordinates: range and change of n's features, mean, basis, scales, range of the coordinates, root;
+/* vgi_dataset_find_coordinates: range and change of n's features, mean, basis, scales, range of the coordinates;
  * of the frames in s->train. VG_EINPUT with fewer than 4. */
 int vgi_dataset_find_coordinates(vgi_dataset *s, vg_network *n, size_t most, int threads, vg_err *e) VG_MUST_CHECK;
 /* vgi_dataset_normalised: frame i as n learns it. */

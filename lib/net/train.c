@@ -7,6 +7,7 @@
  * Leaves out features (feature.c), frames (dataset.c) and the report (judge.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/trainer.h"
+#include "net/root.h"
 #include "numeric/vec3.h"
 #include "core/random.h"
 
@@ -295,6 +296,7 @@ int vg_trainer_prepare(vg_trainer *t, vg_err *e)
     const vgi_rings *r = vgi_featurer_rings(t->featurer);
     int code = vgi_dataset_divide(&t->data, t->o.step, t->o.hold, t->o.hold_at, e);
     if (code == VG_OK) code = vgi_dataset_find_coordinates(&t->data, &t->net, t->o.coordinates, t->o.threads, e);
+    if (code == VG_OK) code = vgi_root_fit(&t->data, &t->net, e);
     if (code < 0) return code;
     t->net.numbers = vgi_network_is_linear(&t->net) ? t->net.rank : t->data.d;
     t->net.data_digest = t->data.digest;
