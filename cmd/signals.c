@@ -5,6 +5,12 @@
 
 #include <stdlib.h>
 
+const char *signal_space(vg_space space)
+{
+    static const char *const names[] = {"unknown", "vertices", "vectors", "gradients", "rotations", "lengths"};
+    return names[space];
+}
+
 void report_signal(report *r, const vg_signal *s)
 {
     static const char *const layouts[] = {"unknown", "plain", "ring", "time", "placed"};
@@ -16,6 +22,7 @@ void report_signal(report *r, const vg_signal *s)
     report_put(r, "control_points", "control points", report_count(s->k));
     report_put(r, "sites", "sites", report_count(s->l));
     report_put(r, "coordinates", "coordinates", report_count(s->m));
+    report_put(r, "space", "shapes of", report_text(signal_space(s->space)));
     report_put(r, "dimension", "dimension", report_count(s->d));
     report_put(r, "basis_bits", "basis bits", report_count(s->bits));
     report_put(r, "rooted", NULL, report_flag(s->rooted));
@@ -51,7 +58,9 @@ void write_curve(FILE *f, const vg_signal *s, double diagonal)
     vg_trace t;
     vg_err e;
     if (vg_signal_trace(&t, s, PARTS, &e) < 0) cli_die(&e);
-    fprintf(f, "# %zu points of the curve: X Y # time, distance from a cubic spline through the frames in D (rms)\n", t.n);
+    fprintf(f, "# %zu points of the curve: X Y # time, distance from a cubic spline through the frames%s\n", t.n,
+            s->space == VG_SPACE_VERTICES ? " in D (rms)" : "");
+    if (s->space != VG_SPACE_VERTICES) diagonal = 1;
     for (size_t i = 0; i < t.n; i++)
         fprintf(f, "%.17g %.17g # %g %.3g\n", t.position[2 * i], t.position[2 * i + 1], 1 + (double)i / PARTS,
                 diagonal > 0 ? t.deviation[i] / diagonal : 0);

@@ -5,6 +5,7 @@
 
 #include "report.h"
 
+const char *signal_space(vg_space space); /* "vertices", ...: as vg-fitsignal --space names them */
 /* report_signal: sizes and errors, as in table 1 of Cashman and Hormann. */
 void report_signal(report *r, const vg_signal *s);
 /* write_positions: one line per control point and frame, for vg-sample --edit; comments mark the sites. */

@@ -4,6 +4,7 @@
 #include "lines.h"
 #include "poses.h"
 #include "report.h"
+#include "signals.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -12,7 +13,7 @@
 static struct {
     double tolerance;
     long m, l, k, pick;
-    size_t root, sites, basis; /* numbers of choices */
+    size_t root, space, sites, basis; /* numbers of choices */
     const char *layout, *place, *examples, *report;
     size_t npins;
     vg_pin *pins;
@@ -43,6 +44,9 @@ static const cli_option options[] = {
      .integer = &opts.k, .least = 4, .most = 1002},
     {"root", 0, "rigid|none", "the motion of the whole body is a signal of its own (default), or part of the shapes",
      .choice = &opts.root},
+    {"space", 0, "vertices|vectors|gradients|rotations|lengths",
+     "what is added up to shapes: positions (default), turns of corners or of triangles, turns or angles between triangles",
+     .choice = &opts.space},
     {"layout", 0, "auto|plain|ring[=C]|time[=C]",
      "how frames are laid out in the plane: by distances alone, with a cycle, with time (default auto)",
      .text = &opts.layout},
@@ -54,7 +58,7 @@ static const cli_option options[] = {
      .choice = &opts.sites},
     {"basis", 0, "double|single|int16", "how precisely the basis is kept (default double)", .choice = &opts.basis},
     {"examples", 0, "POSES", "shapes are sums of what these poses differ by from the first of them",
-     .text = &opts.examples, .reads = true, .excludes = "coordinates"},
+     .text = &opts.examples, .reads = true, .excludes = "coordinates|space"},
     {"pick", 0, "N", "no fit: name the N frames from which the others are predicted best", .integer = &opts.pick,
      .least = 1, .most = 1000},
     {"report", 0, "FILE", "write what was fitted, and every frame's error, to FILE; '-' is standard output",
@@ -116,6 +120,7 @@ static void report_sizes(report *t, const vg_signal *s, const vg_signal_stats *r
     report_put(t, "sites", "sites (l)", report_count(s->l));
     report_put(t, "coordinates", "shape coordinates (m)", report_count(s->m));
     report_put(t, "rank", "rank", report_count(r->rank));
+    report_put(t, "space", "shapes are of", report_text(signal_space(s->space)));
     report_put(t, "dimension", "numbers of a shape (d)", report_count(s->d));
     size_t floats = vg_signal_floats(s);
     report_put(t, "numbers", "numbers of the signal", report_count(floats));
@@ -135,6 +140,8 @@ static void report_layout(report *t, const vg_signal *s, const vg_signal_stats *
     report_put(t, "layout_ratio", "deviation between frames beside straight lines", report_number(s->layout_ratio));
     report_put(t, "period", "frames of a cycle", r->period > 0 ? report_number(r->period) : report_nothing());
     report_put(t, "crossings", "crossings of the curve", report_count(r->ncrossings));
+    report_put(t, "jumps", "jumps left in the logarithms",
+               s->space == VG_SPACE_VERTICES ? report_nothing() : report_count(r->jumps));
     if (r->ntrials) report_table(t, "layouts", "layouts tried", false, trials, 3);
     for (size_t i = 0; i < r->ntrials; i++)
         report_row(t, (report_value[]){report_text(layout_name(r->trials[i].layout)), report_number(r->trials[i].weight),
@@ -238,7 +245,7 @@ int main(int argc, char **argv)
     vg_signal_stats r;
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_signal_options o = {.tolerance = opts.tolerance, .m = (size_t)opts.m, .l = (size_t)opts.l, .k = (size_t)opts.k,
-                           .root = opts.root == 0, .gain = opts.sites == 1, .pins = opts.pins, .npins = opts.npins,
+                           .root = opts.root == 0, .space = (vg_space)(VG_SPACE_VERTICES + opts.space), .gain = opts.sites == 1, .pins = opts.pins, .npins = opts.npins,
                            .bits = (size_t[]){64, 32, 16}[opts.basis], .threads = cli.threads};
     parse_layout(&o);
     vg_source *source = cli_source(operands, n);
@@ -251,9 +258,13 @@ int main(int argc, char **argv)
     if (opts.examples) x = poses_load(opts.examples, VG_SIGNAL_FRAMES, &h->body.mesh, h);
     o.examples = x.values, o.nexamples = x.n;
     vg_signal_clear(&h->signal);
+    vg_graph *graph = NULL;
+    if (o.space != VG_SPACE_VERTICES && (vg_head_prepare_vectors(h, &e) < 0 || vg_head_graph(&graph, h, &e) < 0)) cli_die(&e);
+    o.graph = graph;
     if (vg_signal_fit(&h->signal, &h->body, p.values, p.n, &o, &r, &e) < 0) cli_die(&e);
     poses_name(&p, &h->signal);
     poses_clear(&x);
+    vg_graph_free(&graph);
     say(&h->signal, &r);
     cli_stream_open(h);
     cli_stream_end(vg_source_tail(source));

@@ -174,6 +174,36 @@ static void plan_curve(plan *p, const vg_signal *s)
 
 /* ---- sampling ---- */
 
+/* What makes frames of shapes: nothing when these are vertices. */
+typedef struct making {
+    vg_unshaper *unshaper;
+    vg_graph *graph;
+    double *shapes, root[3]; /* of a batch; of the reference */
+} making;
+
+/* Shapes that are no vertices come as vectors. */
+static void prepare_vectors(making *m, vg_head *h, const vg_signal *s)
+{
+    vg_err e;
+    if (s->space == VG_SPACE_VERTICES) return;
+    if (vg_head_graph(&m->graph, h, &e) < 0 || vg_unshaper_new(&m->unshaper, s, m->graph, h->body.reference, &e) < 0) cli_die(&e);
+    vg_graph_root(m->graph, h->body.reference, m->root);
+    h->kind = VG_VECTORS, h->count = vg_graph_corners(m->graph), h->nanchors = 0;
+    m->shapes = cli_allocate(VG_SAMPLER_BATCH, s->d * sizeof *m->shapes, "shapes");
+}
+
+static void finish_vectors(making *m, const vg_sampler *sampler, const double *time, const double *shape, vg_frame *f)
+{
+    vg_err e;
+    double turn[4], shift[3], root[3];
+    if (vg_unshaper_vectors(m->unshaper, shape, f->values, &e) < 0) cli_die(&e);
+    memcpy(f->root, m->root, sizeof f->root);
+    if (!time || !vg_sampler_root(sampler, *time, turn, shift)) return;
+    vg_quat_apply(turn, m->root, root);
+    for (int k = 0; k < 3; k++) f->root[k] = root[k] + shift[k];
+    for (size_t i = 0; i < vg_graph_corners(m->graph); i++) vg_quat_apply(turn, f->values + 3 * i, f->values + 3 * i);
+}
+
 /* The name of the frame at or before the time, and how far behind it. */
 static void label(vg_frame *f, const vg_signal *s, const plan *p, size_t i)
 {
@@ -201,18 +231,19 @@ static void label(vg_frame *f, const vg_signal *s, const plan *p, size_t i)
 }
 
 static void sample_batch(vg_sampler *sampler, const vg_signal *s, const plan *p, size_t first, size_t n, double *x,
-                         vg_frame *frames, size_t nv)
+                         vg_frame *frames, making *m, size_t nv)
 {
     double *shapes[VG_SAMPLER_BATCH], at[2];
     for (size_t i = 0; i < n; i++) {
         if (p->place) memcpy(at, p->place + 2 * (first + i), sizeof at);
         else vg_sampler_position(sampler, p->time[first + i], at);
         vg_sampler_coordinates(sampler, at, x + i * s->m);
-        shapes[i] = frames[i].values;
+        shapes[i] = m->unshaper ? m->shapes + i * s->d : frames[i].values;
     }
     vg_sampler_shapes(sampler, n, x, shapes);
     for (size_t i = 0; i < n; i++) {
-        if (p->time) vg_sampler_place(sampler, p->time[first + i], nv, shapes[i]);
+        if (m->unshaper) finish_vectors(m, sampler, p->time ? p->time + first + i : NULL, shapes[i], &frames[i]);
+        else if (p->time) vg_sampler_place(sampler, p->time[first + i], nv, shapes[i]);
         label(&frames[i], s, p, first + i);
         cli_stream_put(&frames[i]);
         cli_progress("poses", first + i + 1);
@@ -224,17 +255,22 @@ static void sample(vg_head *h, const vg_signal *s, const plan *p)
     vg_err e;
     static vg_frame frames[VG_SAMPLER_BATCH];
     vg_sampler *sampler;
+    making m = {0};
     double *x = cli_allocate(VG_SAMPLER_BATCH, (s->m + 1) * sizeof *x, "coordinates");
-    if (vg_sampler_new(&sampler, s, h->precision == VG_F32, &e) < 0) cli_die(&e);
+    prepare_vectors(&m, h, s);
+    if (vg_sampler_new(&sampler, s, h->precision == VG_F32 && !m.unshaper, &e) < 0) cli_die(&e);
     cli_stream_open(h);
     for (size_t i = 0; i < VG_SAMPLER_BATCH; i++)
         if (vg_frame_shape(&frames[i], h, &e) < 0) cli_die(&e);
     for (size_t first = 0; first < p->n; first += VG_SAMPLER_BATCH) {
         size_t n = p->n - first < VG_SAMPLER_BATCH ? p->n - first : VG_SAMPLER_BATCH;
-        sample_batch(sampler, s, p, first, n, x, frames, h->body.mesh.nv);
+        sample_batch(sampler, s, p, first, n, x, frames, &m, h->body.mesh.nv);
     }
     for (size_t i = 0; i < VG_SAMPLER_BATCH; i++) vg_frame_clear(&frames[i]);
     vg_sampler_free(&sampler);
+    vg_unshaper_free(&m.unshaper);
+    vg_graph_free(&m.graph);
+    free(m.shapes);
     free(x);
 }
 

@@ -497,6 +497,9 @@ static void make_signal_page(cast *c)
     vg_page_stats stats;
     vg_err e;
     refuse_beside_signal("the pose plane is shown");
+    if (c->result.head->signal.space != VG_SPACE_VERTICES)
+        cli_stop(VG_EINPUT, "a page shows signals whose shapes are vertices: pipe 'vg-sample | vg-solve | vg-view', or fit it "
+                 "with 'vg-fitsignal --space vertices'");
     o.signal = true;
     if (opts.patches) take_patches(&c->result);
     while (next(&c->result)) continue; /* to the end, so that damage is seen */

@@ -842,9 +842,9 @@ class _Reader:
             p.fail("its curve has fewer than 4 control points")
         if not 1 <= sites <= n:
             p.fail("it has no sites, or more than frames")
-        if space != 1:
+        if not 1 <= space <= 5:
             p.fail("its shape space is not known")
-        if d != 3 * self.stream.mesh.nv:
+        if space == 1 and d != 3 * self.stream.mesh.nv:
             p.fail("its shapes are not of this mesh")
         if bits not in (64, 32, 16):
             p.fail("the precision of its basis is not known")
@@ -864,10 +864,16 @@ class _Reader:
         times, names = p.f64s(n if timed else 0), p.texts(n)
         p.end()
         self.check_signal(p, n, space, d, sites, k, bits, layout)
-        if turns and not (examples and rooted):
+        if space == 1 and turns and not (examples and rooted):
             p.fail("its shapes have no turns")
-        if turns and turns - 1 != m:
+        if space == 1 and turns and turns - 1 != m:
             p.fail("its turns are not those of its examples")
+        if space > 1 and examples:
+            p.fail("only shapes of vertices are of examples")
+        if space > 1 and not rooted:
+            p.fail("the place of its shapes is not known")
+        if space > 1 and (space in (2, 3)) != (turns > 0):
+            p.fail("its turns are not those of its shape space")
         self.check_turns(p, home)
         if any(not a < b for a, b in zip(parameter, parameter[1:])):
             p.fail("its parameters do not rise")

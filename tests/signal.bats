@@ -74,6 +74,73 @@ fits_like() {
     vg-sample none.signal | vg-diff -t 1e-9 "$(trex vgs)" -
 }
 
+@test "--space: frames come back through vg-solve, and errors are those of its vertices" {
+    for space in vectors gradients rotations lengths; do
+        must vg-fitsignal -q --space $space -m 1000 -l 1000 -k 1002 --no-provenance -j 1 "$(horse vgs)" -o full.signal
+        vg-sample full.signal | vg-solve | vg-diff -t 1e-9 "$(horse vgs)" - || fail "$space"
+        must vg-info --check full.signal
+        must vg-info --json full.signal
+        [[ $output == *"\"space\": \"$space\""* ]] || fail "$output"
+        must vg-fitsignal -q --space $space --report fit.json --json "$(horse vgs)" -o some.signal
+        vg-sample some.signal | vg-solve --fit squares -o back.vgs
+        vg-diff --json "$(horse vgs)" back.vgs >diff.json
+        python3 -c "
+import json
+r, d = json.load(open('fit.json')), json.load(open('diff.json'))
+assert r['space'] == '$space' and r['jumps'] == 0 and r['error'] <= 1e-2, r
+assert abs(r['error'] - d['vertex_error']['max']['D']) < 1e-9, (r['error'], d)" || fail "$space"
+    done
+    must vg-fitsignal -q --space gradients -m 1000 -l 1000 -k 1002 --no-provenance -j 1 "$(horse vgs)" -o one.signal
+    must vg-fitsignal -q --space gradients -m 1000 -l 1000 -k 1002 --no-provenance -j 3 "$(horse vgs)" -o three.signal
+    must cmp one.signal three.signal
+    must vg-fitsignal -q --space gradients --root none -m 1000 -l 1000 -k 1002 "$(trex vgs)" -o none.signal
+    vg-sample none.signal | vg-solve | vg-diff -t 1e-9 "$(trex vgs)" -
+    must vg-fitsignal -q --space lengths --basis int16 -m 1000 -l 1000 -k 1002 "$(trex vgs)" -o short.signal
+    vg-sample short.signal | vg-solve | vg-diff -t 1e-3 "$(trex vgs)" -
+}
+
+# hinge SUFFIX ANGLE: two quads, the second one turned about the edge that they share, in degrees
+hinge() {
+    python3 - "$@" <<'END'
+import math, sys
+c, s = (f(math.radians(float(sys.argv[2]))) for f in (math.cos, math.sin))
+with open(f"hinge{sys.argv[1]}.obj", "w") as f:
+    for x in (-1, 0, 1):
+        for y in (0, 1): print("v", *((x, y, 0) if x <= 0 else (x * c, y, x * s)), file=f)
+    print("f 1 3 4 2\nf 3 5 6 4", file=f)
+END
+}
+
+@test "--space: between poses that turn limbs keep their lengths; what goes with vertices alone is refused" {
+    hinge 0 0 && hinge 1 80 && hinge 2 160
+    vg-encode hinge0.obj hinge1.obj hinge2.obj -o hinge.vgs
+    for space in vectors gradients rotations lengths; do
+        must vg-fitsignal -q --root none --space $space -m 1000 -l 1000 -k 1002 hinge.vgs -o hinge.signal
+        vg-sample --at 1.5 hinge.signal | vg-solve | vg-decode -o half.obj
+        python3 -c "
+import math
+v = [list(map(float, l.split()[1:])) for l in open('half.obj') if l.startswith('v ')]
+for a, b in ((0, 2), (2, 4), (4, 5)): assert abs(math.dist(v[a], v[b]) - 1) < 1e-6, v" || fail "$space"
+    done
+    must vg-fitsignal -q --root none -m 1000 -l 1000 -k 1002 hinge.vgs -o straight.signal
+    vg-sample --at 1.5 straight.signal | vg-decode -o half.obj
+    python3 -c "
+import math
+v = [list(map(float, l.split()[1:])) for l in open('half.obj') if l.startswith('v ')]
+assert math.dist(v[2], v[4]) < 0.9, v"
+    printf '0 0\n0.5 0\n' >line.txt
+    pipe "vg-sample --curve line.txt --frames 3 hinge.signal | vg-solve -o line.vgs"
+    must_fail 2 vg-fitsignal --space gradients --examples hinge.vgs hinge.vgs -o out.vgs
+    must_fail 3 vg-sample --onto hinge.vgs hinge.signal -o out.vgs
+    must_fail 3 vg-view hinge.signal -o out.html
+    says "a page shows signals whose shapes are vertices"
+    must vg-view hinge.signal -o plane.png
+    printf 'v 0 0 0\nv 1 0 0\n' >points.obj
+    must_fail 3 vg-fitsignal --space gradients points.obj points.obj -o out.vgs
+    says "the mesh has no faces: only vertices are a space of shapes then"
+    [ ! -e out.vgs ]
+}
+
 @test "--pin is met exactly, --place is taken as it is" {
     must vg-fitsignal -q --report - --json --pin 3=0.5,-0.25 --pin 10=-1,1 "$(horse vgs)" -o pinned.signal
     printf '%s' "$output" | python3 -c "

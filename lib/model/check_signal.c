@@ -14,17 +14,26 @@ static bool within(const double *x, size_t n)
     return true;
 }
 
+/* Of shapes that are no vertices; how many turns there are is known of the graph (vg_unshaper_new). */
+static const char *refuse_turns(const vg_signal *s)
+{
+    bool homes = s->space == VG_SPACE_VECTORS || s->space == VG_SPACE_GRADIENTS;
+    if (s->examples) return "only shapes of vertices are of examples";
+    if (!s->rooted) return "the place of its shapes is not known";
+    return homes == (s->nturns > 0) ? NULL : "its turns are not those of its shape space";
+}
+
 static const char *refuse_counts(const vg_signal *s, const vg_mesh *mesh)
 {
     if (s->n < 2) return "it has fewer than 2 frames";
     if (s->k < 4) return "its curve has fewer than 4 control points";
     if (s->l < 1 || s->l > s->n) return "it has no sites, or more than frames";
-    if (s->space != VG_SPACE_VERTICES) return "its shape space is not known";
-    if (s->d != 3 * mesh->nv) return "its shapes are not of this mesh";
+    if (s->space < VG_SPACE_VERTICES || s->space > VG_SPACE_LENGTHS) return "its shape space is not known";
+    if (s->space == VG_SPACE_VERTICES && s->d != 3 * mesh->nv) return "its shapes are not of this mesh";
     if (s->bits != 64 && s->bits != 32 && s->bits != 16) return "the precision of its basis is not known";
+    if (s->space != VG_SPACE_VERTICES) return refuse_turns(s);
     if (s->nturns && !(s->examples && s->rooted)) return "its shapes have no turns";
     if (s->nturns && s->nturns - 1 != s->m) return "its turns are not those of its examples";
-    if (s->layout > VG_LAYOUT_PLACED) return "its layout is not known";
     return NULL;
 }
 
@@ -52,7 +61,7 @@ static const char *refuse_sites(const vg_signal *s, bool *used)
 int vgi_check_signal(vg_head *h, void *artefact, const char *where, vg_err *e)
 {
     const vg_signal *s = artefact;
-    const char *why = refuse_counts(s, &h->body.mesh);
+    const char *why = s->layout > VG_LAYOUT_PLACED ? "its layout is not known" : refuse_counts(s, &h->body.mesh);
     if (!why) why = refuse_curve(s);
     if (!why) {
         bool *used = vgi_array(s->n, sizeof *used, e);

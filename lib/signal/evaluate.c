@@ -194,14 +194,20 @@ void vg_sampler_shapes(vg_sampler *p, size_t n, const double *x, double *const *
         for (size_t c = 0; c < d; c++) shapes[i][c] = p->s->mean[c] + p->shape[i * d + c];
 }
 
-void vg_sampler_place(const vg_sampler *p, double time, size_t nv, double *vertices)
+bool vg_sampler_root(const vg_sampler *p, double time, double turn[4], double shift[3])
 {
     const vg_signal *s = p->s;
-    double turn[4], shift[3], size = 0;
-    if (!s->rooted) return;
+    double size = 0;
+    if (!s->rooted) return false;
     vgi_natural_at(s->n, 4, s->turn, p->turn_second, time, turn);
     vgi_natural_at(s->n, 3, s->shift, p->shift_second, time, shift);
     for (int k = 0; k < 4; k++) size += turn[k] * turn[k];
     for (int k = 0; k < 4; k++) turn[k] = size > 0 ? turn[k] / sqrt(size) : k == 0;
-    vgi_root_apply(turn, shift, nv, vertices);
+    return true;
+}
+
+void vg_sampler_place(const vg_sampler *p, double time, size_t nv, double *vertices)
+{
+    double turn[4], shift[3];
+    if (vg_sampler_root(p, time, turn, shift)) vgi_root_apply(turn, shift, nv, vertices);
 }

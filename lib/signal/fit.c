@@ -8,6 +8,7 @@
 #include "signal/curve.h"
 #include "signal/root.h"
 #include "signal/span.h"
+#include "signal/unshape.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -22,6 +23,8 @@ typedef struct fitting {
     double d, tolerance; /* D; the largest distance that is allowed */
     vgi_basis basis;
     vgi_span span;         /* of examples */
+    vgi_unshape unshape;   /* when shapes are no vertices */
+    double limit;          /* an error beyond it need not be known exactly */
     double *other;         /* with examples: the frames as sums of them when basis has the frames, and the other way
                               round; NULL: there are none */
     vgi_plate plate;
@@ -42,8 +45,14 @@ void vg_signal_stats_clear(vg_signal_stats *r)
 
 /* ---- what a choice of m, l, k costs ---- */
 
+static bool of_vertices(const fitting *f)
+{
+    return f->s->space == VG_SPACE_VERTICES;
+}
+
 static int error_of(fitting *f, const double *x, size_t stride, size_t m, vgi_error *error, vg_err *e)
 {
+    if (!of_vertices(f)) return vgi_unshape_error(&f->unshape, &f->basis, x, stride, m, f->limit, error, e);
     return vgi_basis_error(&f->basis, x, stride, m, f->o->threads, error, e);
 }
 
@@ -95,6 +104,7 @@ static int smallest(fitting *f, size_t low, size_t high, double limit,
 {
     int r = VG_OK;
     exchange_poses(f);
+    f->limit = limit;
     while (low < high && r == VG_OK) {
         size_t middle = (low + high) / 2;
         vgi_error error = {0};
@@ -103,6 +113,7 @@ static int smallest(fitting *f, size_t low, size_t high, double limit,
         else low = middle + 1;
     }
     exchange_poses(f);
+    f->limit = INFINITY;
     *found = high;
     return r;
 }
@@ -112,12 +123,34 @@ static int smallest(fitting *f, size_t low, size_t high, double limit,
 static int fit_root(fitting *f, const vg_body *body, double *poses, vg_err *e)
 {
     vg_signal *s = f->s;
-    if (!f->o->root) return VG_OK;
+    if (!f->o->root && of_vertices(f)) return VG_OK;
     s->rooted = true;
     if (!(s->turn = vgi_array(f->n, 4 * sizeof *s->turn, e)) || !(s->shift = vgi_array(f->n, 3 * sizeof *s->shift, e)))
         return VG_ENOMEM;
-    vgi_root_remove(f->n, body->mesh.nv, body->reference, poses, s->turn, s->shift);
+    for (size_t i = 0; i < f->n; i++) s->turn[4 * i] = 1;
+    if (f->o->root) vgi_root_remove(f->n, body->mesh.nv, body->reference, poses, s->turn, s->shift);
+    if (!of_vertices(f)) vgi_root_centre(f->n, f->o->graph, f->unshape.root, poses, s->turn, s->shift);
     return VG_OK;
+}
+
+/* Shapes of the poses, which are kept for the errors. */
+static int fit_space(fitting *f, const vg_body *body, double *poses, vg_err *e)
+{
+    vg_signal *s = f->s;
+    vgi_unshape *u = &f->unshape;
+    u->poses = poses;
+    s->d = u->space.d;
+    double *values = vgi_array_raw(f->n * s->d, sizeof *values, e);
+    int r = values ? vgi_space_measure(&u->space, body->reference, f->n, poses, values, u->home, &f->report->jumps,
+                                       f->o->threads, e) : VG_ENOMEM;
+    if (r == VG_OK && vgi_space_homes(&u->space)) {
+        s->nturns = vgi_space_homes(&u->space);
+        s->home_turn = vgi_copy_array(u->home, s->nturns, 4 * sizeof(double), e);
+        if (!s->home_turn) r = VG_ENOMEM;
+    }
+    if (r == VG_OK) return vgi_basis_make(&f->basis, values, f->n, s->d, f->o->threads, e);
+    free(values);
+    return r;
 }
 
 static int fit_shape(fitting *f, vg_err *e)
@@ -239,6 +272,8 @@ static int check(const vg_body *body, size_t n, const vg_signal_options *o, vg_e
         return vg_fail(e, VG_EINPUT, "%zu frames are more than a signal shows at once (%d): take fewer with vg-encode "
                        "--take, or pieces of the sequence one by one", n, VG_SIGNAL_FRAMES);
     if (!body->mesh.nv) return vg_fail(e, VG_EINPUT, "the mesh has no vertices");
+    if (o->space > VG_SPACE_VERTICES && (!o->graph || o->nexamples || o->space > VG_SPACE_LENGTHS))
+        return vg_fail(e, VG_EARG, "another space than vertices needs a graph, and goes without examples");
     if (o->nexamples == 1) return vg_fail(e, VG_EINPUT, "one example is not enough: there must be at least 2");
     for (size_t i = 0; i < o->npins; i++)
         if (o->pins[i].frame >= n)
@@ -268,9 +303,12 @@ static int take_examples(fitting *f, const vg_body *body, double **examples, vg_
 static int fit_basis(fitting *f, const vg_body *body, double *poses, vg_err *e)
 {
     double *examples = NULL;
-    int r = fit_root(f, body, poses, e);
+    int r = VG_OK;
+    if (!of_vertices(f)) r = vgi_unshape_make(&f->unshape, f->s->space, f->o->graph, body->reference, f->o->threads, e);
+    if (r == VG_OK) r = fit_root(f, body, poses, e);
     if (r == VG_OK) r = take_examples(f, body, &examples, e);
     if (r < 0) free(poses);
+    else if (!of_vertices(f)) r = fit_space(f, body, poses, e);
     else if (examples)
         r = vgi_span_make(&f->span, &f->basis, poses, f->n, f->s->d, examples, f->o->nexamples, f->o->threads, e);
     else r = vgi_basis_make(&f->basis, poses, f->n, f->s->d, f->o->threads, e);
@@ -284,7 +322,8 @@ int vg_signal_fit(vg_signal *s, const vg_body *body, double *poses, size_t n, co
     fitting f = {.s = s, .o = o, .report = report, .n = n};
     int r = check(body, n, o, e);
     *report = (vg_signal_stats){0};
-    *s = (vg_signal){.space = VG_SPACE_VERTICES, .d = 3 * body->mesh.nv};
+    *s = (vg_signal){.space = o->space ? o->space : VG_SPACE_VERTICES, .d = 3 * body->mesh.nv};
+    f.limit = INFINITY;
     if (r < 0) {
         free(poses);
         return r;
@@ -304,6 +343,7 @@ out:
     vgi_blas_shared();
     vgi_basis_clear(&f.basis);
     vgi_span_clear(&f.span);
+    vgi_unshape_clear(&f.unshape);
     free(f.other);
     vgi_plate_clear(&f.plate);
     vgi_curve_clear(&f.curve);

@@ -9,6 +9,9 @@
 /* vgi_root_remove: poses (n x 3 nv) become what turn (n quaternions) and shift (n vectors) take back to where they were:
  * pose = turn of (what is left) + shift. Least squares against the reference; quaternions are continuous in sign. */
 void vgi_root_remove(size_t n, size_t nv, const double *reference, double *poses, double *turn, double *shift);
+/* vgi_root_centre: move what is left so that the mean of the graph's vertices is at `centre` in every pose; the shifts
+ * follow. */
+void vgi_root_centre(size_t n, const vg_graph *g, const double centre[3], double *poses, const double *turn, double *shift);
 /* vgi_root_apply: in place */
 void vgi_root_apply(const double turn[4], const double shift[3], size_t nv, double *vertices);
 

@@ -13,7 +13,11 @@ extern "C" {
 
 /* What the numbers of a shape are. */
 typedef enum vg_space {
-    VG_SPACE_VERTICES = 1 /* positions of the vertices */
+    VG_SPACE_VERTICES = 1,  /* positions of the vertices */
+    VG_SPACE_VECTORS = 2,   /* logarithms of the turn and scale of each corner of the vector graph */
+    VG_SPACE_GRADIENTS = 3, /* of the turn of each triangle, and its stretch; faces of more corners are cut into triangles */
+    VG_SPACE_ROTATIONS = 4, /* turns from triangle to triangle, and stretches */
+    VG_SPACE_LENGTHS = 5    /* lengths of edges, and angles between triangles */
 } vg_space;
 
 /* How positions in the plane are found. */
@@ -50,8 +54,10 @@ typedef struct vg_signal {
     bool rooted;         /* the body's rigid motion is a signal of its own: */
     double *turn;        /* n unit quaternions, each nearer to the one before than its negative */
     double *shift;       /* n vectors */
-    size_t nturns;       /* m + 1 with a root and examples, else 0 */
-    double *home_turn;   /* unit quaternions: the rigid turns that were taken out of the examples */
+    size_t nturns;       /* m + 1 with a root and examples; in the spaces of vectors and gradients one for each face or
+                            triangle; else 0 */
+    double *home_turn;   /* unit quaternions: the rigid turns that were taken out of the examples, or those that the shapes'
+                            turns are measured from */
     char **names;        /* n: of the frames */
     bool timed;          /* the frames had times: */
     double *times;       /* n seconds */
@@ -71,7 +77,10 @@ typedef struct vg_pin {
     double at[2];
 } vg_pin;
 
+struct vg_graph;
 typedef struct vg_signal_options {
+    vg_space space;      /* 0: vertices */
+    const struct vg_graph *graph; /* of the body, for the other spaces */
     double tolerance;    /* largest distance of a vertex in D, for those of m, l, k that are 0 */
     size_t m, l, k;
     bool root;           /* the rigid motion of the body apart */
@@ -96,6 +105,8 @@ enum { VG_LAYOUT_TRIALS = 16 };
 
 typedef struct vg_signal_stats {
     size_t rank;           /* how many coordinates there could be */
+    size_t jumps;          /* spaces of turns: pairs of neighbours, over all frames, whose logarithms are more than 180
+                              degrees apart */
     double diagonal;       /* D */
     double period;         /* of the cycle in frames; 0: none */
     size_t ntrials;
@@ -110,7 +121,9 @@ void vg_signal_stats_clear(vg_signal_stats *r);
 
 enum { VG_SIGNAL_FRAMES = 1000 };
 /* vg_signal_fit: n poses (3 nv numbers each, from malloc, one array that is taken over) of a body to a signal. 2 <= n <=
- * VG_SIGNAL_FRAMES, else VG_EINPUT. Names and times are left empty. Memory: four times the poses. */
+ * VG_SIGNAL_FRAMES, else VG_EINPUT. Names and times are left empty. Memory: four times the poses; in other spaces than
+ * vertices the poses and four times their shapes of d numbers. Errors are of vertices in all spaces; vertices in no face
+ * stay as in the reference and do not count, unless the space is of vertices. */
 int vg_signal_fit(vg_signal *s, const vg_body *body, double *poses, size_t n, const vg_signal_options *o,
                   vg_signal_stats *report, vg_err *e) VG_MUST_CHECK;
 /* vg_signal_store: keep the basis with so many bits: 64, 32 or 16. */
@@ -166,11 +179,25 @@ void vg_sampler_shapes(vg_sampler *p, size_t n, const double *x, double *const *
 /* vg_sampler_place: vertices where the root takes them at a time; nothing when the signal has no root. */
 void vg_sampler_place(const vg_sampler *p, double time, size_t nv, double *vertices);
 
+/* vg_sampler_root: the turn (a unit quaternion) and shift of the root at a time; false: the signal has no root. */
+bool vg_sampler_root(const vg_sampler *p, double time, double turn[4], double shift[3]);
+
+/* Turns shapes of spaces other than vertices into vectors of the vector graph. */
+typedef struct vg_unshaper vg_unshaper;
+/* vg_unshaper_new: s and g are borrowed until free; reference: nv points, not kept. VG_EINPUT when the signal's shapes are
+ * not of this graph. */
+int vg_unshaper_new(vg_unshaper **u, const vg_signal *s, const struct vg_graph *g, const double *reference,
+                    vg_err *e) VG_MUST_CHECK;
+void vg_unshaper_free(vg_unshaper **u);
+/* vg_unshaper_vectors: a shape (d numbers) to one vector per corner. */
+int vg_unshaper_vectors(vg_unshaper *u, const double *shape, double *vectors, vg_err *e) VG_MUST_CHECK;
+
 /* The curve of a signal, `parts` steps from one frame to the next. */
 typedef struct vg_trace {
     size_t parts, n;   /* n points: (frames - 1) * parts + 1 */
     double *position;  /* n points of the plane */
-    double *deviation; /* n: root mean squared distance of the vertices from the natural cubic spline through the frames */
+    double *deviation; /* n: root mean squared distance of the vertices from the natural cubic spline through the frames; in
+                          other spaces than vertices the distance of the shapes */
     size_t ncrossings; /* places where the curve crosses itself: */
     double *crossing;  /* two times each */
 } vg_trace;

@@ -4,6 +4,7 @@
  * Leaves out the page on which the curve can be moved.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/paint.h"
+#include "signal/unshape.h"
 #include "vg/signal.h"
 
 #include <math.h>
@@ -76,7 +77,8 @@ static int compare_deviations(const void *a, const void *b)
 /* The colours end at what 99 % of the curve do not exceed. */
 static int choose_colours(chart *c, vg_err *e)
 {
-    double unit = vg_diagonal(c->h->body.reference, c->h->body.mesh.nv);
+    bool of_vertices = c->s->space == VG_SPACE_VERTICES;
+    double unit = of_vertices ? vg_diagonal(c->h->body.reference, c->h->body.mesh.nv) : 1;
     for (size_t i = 0; i < c->trace.n; i++) c->trace.deviation[i] /= unit > 0 ? unit : 1;
     double *sorted = vgi_copy_array(c->trace.deviation, c->trace.n, sizeof *sorted, e);
     if (!sorted) return VG_ENOMEM;
@@ -148,23 +150,52 @@ static void choose_poses(chart *c)
 
 /* ---- pictures of poses ---- */
 
+/* Shapes that are no vertices are solved for them. */
+static int sample_vectors(chart *c, vg_sampler *p, double *x, double *const *points, vg_err *e)
+{
+    vg_graph *g = NULL;
+    vg_unshaper *u = NULL;
+    double *shape = vgi_array(c->s->d, sizeof *shape, e);
+    int r = shape ? vg_head_graph(&g, c->h, e) : VG_ENOMEM;
+    if (r == VG_OK) r = vg_unshaper_new(&u, c->s, g, c->h->body.reference, e);
+    for (size_t i = 0; r == VG_OK && i < c->nposes; i++) {
+        vg_sampler_coordinates(p, c->s->position + 2 * c->frame[i].index, x);
+        vg_sampler_shapes(p, 1, x, &shape);
+        r = vgi_unshaper_vertices(u, shape, points[i], e);
+    }
+    vg_unshaper_free(&u);
+    vg_graph_free(&g);
+    free(shape);
+    return r;
+}
+
+static void sample_vertices(chart *c, vg_sampler *p, double *x, double *const *points)
+{
+    for (size_t i = 0; i < c->nposes; i++) {
+        vg_sampler_coordinates(p, c->s->position + 2 * c->frame[i].index, x);
+        vg_sampler_shapes(p, 1, x, points + i);
+    }
+}
+
 static int sample_poses(chart *c, vg_err *e)
 {
     size_t nv = c->h->body.mesh.nv;
-    double centre[3], unit = vg_diagonal(c->h->body.reference, nv), *shape = vgi_array(nv, 3 * sizeof *shape, e);
-    double *x = vgi_array(c->s->m, sizeof *x, e);
+    double centre[3], unit = vg_diagonal(c->h->body.reference, nv), *shapes = vgi_array(c->nposes * nv, 3 * sizeof *shapes, e);
+    double *x = vgi_array(c->s->m, sizeof *x, e), **points = vgi_array(c->nposes, sizeof *points, e);
     vg_sampler *p = NULL;
-    int r = shape && x && (c->points = vgi_array(c->nposes * nv, 3 * sizeof *c->points, e)) ? VG_OK : VG_ENOMEM;
+    int r = shapes && x && points && (c->points = vgi_array(c->nposes * nv, 3 * sizeof *c->points, e)) ? VG_OK : VG_ENOMEM;
     if (r == VG_OK) r = vg_sampler_new(&p, c->s, false, e);
+    for (size_t i = 0; r == VG_OK && i < c->nposes; i++) points[i] = shapes + 3 * nv * i;
+    if (r == VG_OK && c->s->space == VG_SPACE_VERTICES) sample_vertices(c, p, x, points);
+    else if (r == VG_OK) r = sample_vectors(c, p, x, points, e);
     for (size_t i = 0; r == VG_OK && i < c->nposes; i++) {
-        vg_sampler_coordinates(p, c->s->position + 2 * c->frame[i].index, x);
-        vg_sampler_shapes(p, 1, x, (double *const[]){shape});
-        vg_centroid(shape, nv, centre);
+        vg_centroid(points[i], nv, centre);
         for (size_t k = 0; k < 3 * nv; k++)
-            c->points[3 * nv * i + k] = (float)((shape[k] - centre[k % 3]) / (unit > 0 ? unit : 1));
+            c->points[3 * nv * i + k] = (float)((points[i][k] - centre[k % 3]) / (unit > 0 ? unit : 1));
     }
     vg_sampler_free(&p);
-    free(shape);
+    free(shapes);
+    free(points);
     free(x);
     return r;
 }
@@ -316,7 +347,8 @@ static void put_words(chart *c)
 static void put_legend(chart *c)
 {
     vgi_canvas strip = {.w = WIDTH, .h = VGI_LEGEND, .rgb = c->canvas.rgb + 3 * WIDTH * (HEIGHT - VGI_LEGEND)};
-    vgi_legend(&strip, &c->tint, &c->palette, GAP, "rms distance of the vertices from a cubic spline through the frames, D", "");
+    vgi_legend(&strip, &c->tint, &c->palette, GAP, c->s->space == VG_SPACE_VERTICES ? "rms distance of the vertices from a cubic spline through the frames, D"
+                                                : "distance of the shapes from a cubic spline through the frames", "");
 }
 
 static int draw(chart *c, vg_err *e)

@@ -55,9 +55,7 @@ bool vgi_branch_near(const double q[4], const double near[3], double l[3])
     return sqrt(gap2) <= trust * half_angle_between(q, near) + tiny;
 }
 
-/* The vector of a face that turns by q, next to a neighbour (or neighbours' mean) at `near`: the nearest branch,
- * or, where that cannot be trusted, the neighbour's axis with the angle by which q turns about it. */
-static bool follow(const double q[4], const double near[3], double l[3])
+bool vgi_branch_follow(const double q[4], const double near[3], double l[3])
 {
     if (vgi_branch_near(q, near, l)) return true;
     double length2 = vgi_dot(near, near), back[4] = {0, -near[0], -near[1], -near[2]}, rest[4], more[4];
@@ -192,7 +190,7 @@ static int grow_tree(choice *c, size_t seed, vg_err *e)
         edge next = pop(c);
         if (c->reached[next.to]) continue;
         c->reached[next.to] = true;
-        follow(c->q + 4 * (size_t)next.to, vector_of(c, next.from), vector_of(c, next.to));
+        vgi_branch_follow(c->q + 4 * (size_t)next.to, vector_of(c, next.from), vector_of(c, next.to));
         r = push_neighbours(c, next.to, e);
     }
     return r;
@@ -265,7 +263,7 @@ static size_t sweep(choice *c)
     for (size_t f = 0; f < g->nf; f++) {
         double mean[3], l[3], step[3], *now = c->turn + 3 * f;
         if (!mean_beside(c, f, mean)) continue;
-        follow(c->q + 4 * f, mean, l);
+        vgi_branch_follow(c->q + 4 * f, mean, l);
         vgi_subtract(l, now, step);
         if (!(vgi_dot(step, step) > M_PI * M_PI / 4)) continue;
         for (size_t i = g->start[f]; i < g->start[f + 1]; i++)

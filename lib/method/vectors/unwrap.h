@@ -14,6 +14,10 @@ void vgi_shorter(double q[4]);
  * turns, where the axis is undetermined. */
 bool vgi_branch_near(const double q[4], const double near[3], double l[3]);
 
+/* vgi_branch_follow: the vector of a face that turns by q, next to a neighbour (or neighbours' mean) at `near`: the nearest
+ * branch, or, where that cannot be trusted, the neighbour's axis with the angle by which q turns about it (false). */
+bool vgi_branch_follow(const double q[4], const double near[3], double l[3]);
+
 /* vgi_choose_turns: for each face of a graph, links included, one vector (axis times half angle). q: a quaternion
  * per corner, none 0. *beyond: whether some face or corner turns by more than half a turn. If none does, vectors
  * are logarithms of the faces' mean turns. If some does, the vectors vary smoothly over the mesh, and exp(turn) is
