@@ -1,9 +1,9 @@
 /* vg-fitsignal: fit continuous signals for time, pose and shape to a sequence.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
-#include "lines.h"
 #include "poses.h"
 #include "report.h"
+#include "signal_texts.h"
 #include "signals.h"
 
 #include <math.h>
@@ -88,21 +88,6 @@ static void parse_layout(vg_signal_options *o)
     o->layout = (vg_layout)i;
     if (equals && (cli_parse_numbers(equals + 1, &o->weight, 1) != 1 || !(o->weight > 0 && o->weight <= 1e6)))
         cli_usage("option '--layout' needs a weight above 0 and up to a million behind '=', not '%s'", equals + 1);
-}
-
-/* Lines of two numbers, one for each frame. */
-static double *read_places(const char *file, size_t frames)
-{
-    size_t n = 0;
-    double *place = cli_allocate(frames, 2 * sizeof *place, "places");
-    lines l = lines_open(file);
-    for (; lines_next(&l); n++) {
-        if (n == frames) lines_stop(&l, "there are only %zu frames to place", frames);
-        if (lines_numbers(&l, place + 2 * n, 2) != 2) lines_stop(&l, "two numbers are wanted");
-    }
-    if (n < frames) cli_stop(VG_EINPUT, "'%s' places %zu frames of %zu", file, n, frames);
-    lines_close(&l);
-    return place;
 }
 
 /* ---- the report ---- */

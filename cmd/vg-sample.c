@@ -1,8 +1,8 @@
 /* vg-sample: give the poses of a signal, at any times, edited, along another curve.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
-#include "lines.h"
 #include "poses.h"
+#include "signal_texts.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -126,20 +126,6 @@ static void plan_even(plan *p, const vg_signal *s, const vg_retime *r)
 
 /* ---- files ---- */
 
-static void read_retime(vg_retime *r, const vg_signal *s)
-{
-    vg_err e;
-    lines l = lines_open(opts.retime);
-    double x[2];
-    while (lines_next(&l)) {
-        if (lines_numbers(&l, x, 2) != 2) lines_stop(&l, "an old and a new time are wanted");
-        if (!(x[0] >= 1 && x[0] <= (double)s->n)) lines_stop(&l, "time %g is not in the sequence, which is from 1 to %zu", x[0], s->n);
-        if (vg_retime_add(r, x[0], x[1], &e) < 0) lines_stop(&l, "%s", e.message);
-    }
-    if (r->n < 2) cli_stop(VG_EINPUT, "'%s' has fewer than two pairs of times", opts.retime);
-    lines_close(&l);
-}
-
 static void read_edits(vg_signal *s, vg_retime *r)
 {
     vg_err e;
@@ -153,22 +139,13 @@ static void read_edits(vg_signal *s, vg_retime *r)
 static void plan_curve(plan *p, const vg_signal *s)
 {
     vg_err e;
-    lines l = lines_open(opts.curve);
-    size_t n = 0, cap = 0, controls = 0;
-    double *point = NULL;
-    while (lines_next(&l)) {
-        bool control = lines_word(&l, "control");
-        if (n == cap) cap = cap ? 2 * cap : 64, point = cli_resize(point, cap, 2 * sizeof *point, "the curve");
-        if (lines_numbers(&l, point + 2 * n, 2) != 2) lines_stop(&l, "'X Y' or 'control X Y' is wanted");
-        controls += control;
-        if (controls != 0 && controls != n + 1) lines_stop(&l, "control points and points that the curve goes through are mixed");
-        n++;
-    }
+    size_t n;
+    bool controls;
+    double *point = read_curve(opts.curve, &n, &controls);
     p->n = opts.frames ? (size_t)opts.frames : s->n;
     if (p->n > MOST_FRAMES) cli_stop(VG_EARG, "more than %d frames are asked for", MOST_FRAMES);
     p->place = cli_allocate(p->n, 2 * sizeof *p->place, "the curve");
-    if (vg_signal_sketch(point, n, controls > 0, p->n, p->place, &e) < 0) cli_stop(e.code, "'%s': %s", opts.curve, e.message);
-    lines_close(&l);
+    if (vg_signal_sketch(point, n, controls, p->n, p->place, &e) < 0) cli_stop(e.code, "'%s': %s", opts.curve, e.message);
     free(point);
 }
 
@@ -308,7 +285,7 @@ int main(int argc, char **argv)
     vg_head_take_out(&s, h, "signal"); /* the poses come without it */
     if (opts.edit) read_edits(&s, &retime);
     if (opts.retime && retime.n) cli_usage("--retime and lines 'time' of --edit both say how time goes");
-    if (opts.retime) read_retime(&retime, &s);
+    if (opts.retime) read_retime(opts.retime, s.n, &retime);
     if (opts.at) plan_list(&p, &s);
     else if (opts.curve) plan_curve(&p, &s);
     else plan_even(&p, &s, &retime);

@@ -55,7 +55,42 @@ static void mend(unsigned char *p, size_t size)
 
 /* ---- reading and writing ---- */
 
-/* A head or frame is used as programs use it: copied, and its vector graph built. */
+/* A signal is sampled within and outside of its times and traced; shapes that are no vertices become vectors, or the signal is
+ * refused. */
+static void use_signal(const vg_head *h)
+{
+    const vg_signal *s = &h->signal;
+    vg_err e = {0};
+    vg_sampler *p = NULL;
+    vg_unshaper *u = NULL;
+    vg_graph *g = NULL;
+    vg_trace trace;
+    double at[2], *x = calloc(s->m + 1, sizeof *x), *shape = calloc(s->d + 1, sizeof *shape), *vectors = NULL;
+    demand(x && shape);
+    int r = vg_sampler_new(&p, s, false, &e);
+    demand(r == VG_OK || r == VG_EINPUT || r == VG_ENOMEM);
+    if (r == VG_OK && s->space != VG_SPACE_VERTICES) {
+        demand(vg_head_graph(&g, h, &e) == VG_OK && (vectors = calloc(vg_graph_corners(g) + 1, 3 * sizeof *vectors)));
+        r = vg_unshaper_new(&u, s, g, h->body.reference, &e);
+        demand(r == VG_OK || r == VG_EINPUT);
+    }
+    for (double time = 0.5; r == VG_OK && time <= 4; time += 0.75) {
+        vg_sampler_position(p, time, at);
+        vg_sampler_coordinates(p, at, x);
+        vg_sampler_shapes(p, 1, x, (double *const[]){shape});
+        if (u && vgi_finite(shape, s->d)) (void)!vg_unshaper_vectors(u, shape, vectors, &e);
+        else if (!u) vg_sampler_place(p, time, h->body.mesh.nv, shape);
+    }
+    if (r == VG_OK && s->n * s->m * s->m < 1000 && vg_signal_trace(&trace, s, 2, &e) == VG_OK) vg_trace_clear(&trace);
+    vg_unshaper_free(&u);
+    vg_sampler_free(&p);
+    vg_graph_free(&g);
+    free(x);
+    free(shape);
+    free(vectors);
+}
+
+/* A head or frame is used as programs use it: copied, its vector graph built, its signal sampled. */
 static void use_head(const vg_head *h)
 {
     vg_err e = {0};
@@ -70,6 +105,7 @@ static void use_head(const vg_head *h)
         demand(vg_head_graph(&g, h, &e) == VG_OK && vg_graph_corners(g) == h->count);
         vg_graph_free(&g);
     }
+    if (h->signal.n) use_signal(h);
     vg_head_clear(&copy);
 }
 
