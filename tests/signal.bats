@@ -337,6 +337,53 @@ assert 0 < s['error_shape'] <= 0.7e-2 and 0 < s['error'] <= 1e-2 and s['compress
     vg-diff -t 1e-12 wanted.vgs ends.vgs
 }
 
+# held_out SEQUENCE [REFERENCE]: fitted to every other frame with as many of everything as there can be: the root mean squared
+# error of the frames between beside that of natural cubic splines through the vertices
+held_out() {
+    vg-encode ${2:+--reference "$2"} "$1" -o all.vgs
+    vg-encode --take 0-/2 all.vgs -o even.vgs
+    vg-fitsignal -q -m 1000 -l 1000 -k 1002 even.vgs -o even.signal
+    vg-sample --at "1.5:$(vg-info --json even.vgs | python3 -c 'import json, sys; print(json.load(sys.stdin)["frames"])'):1" even.signal -o odd.vgs
+    py <<'END'
+from read_stream import read_stream
+a, even, odd = ([f.values for f in read_stream(n + ".vgs").frames] for n in ("all", "even", "odd"))
+n, truth = len(even), a[1::2][:len(even) - 1]
+assert len(odd) == n - 1
+c = [0] * n # second derivatives: m[i - 1] + 4 m[i] + m[i + 1] = 6 (y[i - 1] - 2 y[i] + y[i + 1]), 0 at the ends
+for i in range(1, n - 1): c[i] = 1 / (4 - c[i - 1])
+def sums(k):
+    m = [0] * n
+    for i in range(1, n - 1): m[i] = (6 * (even[i - 1][k] - 2 * even[i][k] + even[i + 1][k]) - m[i - 1]) * c[i]
+    for i in range(n - 2, 0, -1): m[i] -= c[i] * m[i + 1]
+    spline = sum(((even[i][k] + even[i + 1][k]) / 2 - (m[i] + m[i + 1]) / 16 - truth[i][k]) ** 2 for i in range(n - 1))
+    return spline, sum((odd[i][k] - truth[i][k]) ** 2 for i in range(n - 1))
+s = [sums(k) for k in range(len(truth[0]))]
+print((sum(b for _, b in s) / sum(a for a, _ in s)) ** 0.5)
+END
+    [ "$status" = 0 ] || fail "$output"
+}
+
+@test "between frames a signal misses by at most 1.75 times what a cubic spline misses" {
+    held_out "$(horse vgs)"
+    below "$output" 1.05
+    held_out "$(trex vgs)"
+    below "$output" 1.05
+    held_out "$DATA/trex-attack.tar.xz" "$DATA/trex.rest.obj"
+    below "$output" 1.05
+}
+
+@test "between frames, on all sequences of the kit but woman-tanktop-jump (needs VG_DATA, the data kit)" {
+    [ -d "${VG_DATA:-}/human" ] || skip "VG_DATA does not name the data kit"
+    for sequence in hybrid/{cow-run,trex-run,velociraptor-walk,velociraptor-run,velociraptor-attack} human/{walk-man,walk-heavy,walk-woman,dance-man}; do
+        rest=$VG_DATA/${sequence%-*}.rest.obj
+        [ -e "$rest" ] || rest=$VG_DATA/$sequence.rest.obj
+        held_out "$VG_DATA/$sequence.tar.gz" "$rest"
+        below "$output" 1.75
+    done
+    held_out "$VG_DATA/cloth/cloth-drop.tar.gz"
+    below "$output" 1.75
+}
+
 @test "vg-deform --examples: sculpted poses are met, and others are nearer to the truth" {
     vg-encode --take 0,3,6,9,12 "$DATA/human-man-poses.tar.xz" -o man.vgs
     vg-encode --take 0,3,6,9,12 "$DATA/human-heavy-poses.tar.xz" -o heavy.vgs
