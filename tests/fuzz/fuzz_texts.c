@@ -80,12 +80,14 @@ static void try_places(void)
 static vg_retime retime;
 static void try_retime(void)
 {
+    vg_err e;
     read_retime("times", FRAMES, &retime);
     demand(retime.n >= 2);
     double last = 0;
     for (size_t i = 0; i <= 50; i++) {
         double share = (double)i / 50, t = retime.new_time[0] * (1 - share) + retime.new_time[retime.n - 1] * share;
-        double old = vg_retime_at(&retime, t);
+        double old;
+        demand(vg_retime_at(&retime, t, &old, &e) == VG_OK);
         demand(old >= last - 1e-12 && old >= 1 - 1e-12 && old <= FRAMES + 1e-12);
         last = old;
     }
