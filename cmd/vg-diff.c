@@ -3,6 +3,7 @@
  * error (vg-view).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
+#include "error_plot.h"
 #include "report.h"
 
 #include <math.h>
@@ -11,7 +12,7 @@ enum which { MEAN, RMS, P95, MAX };
 
 static struct {
     double tolerance; /* in units of D; negative: none was asked for */
-    const char *of, *heat;
+    const char *of, *heat, *plot;
     size_t which; /* of enum which */
     bool centred, frames;
 } opts = {.tolerance = -1, .of = "max", .which = MAX};
@@ -28,6 +29,8 @@ static const cli_option options[] = {
     {.name = "heat", .value = "FILE", .text = &opts.heat,
      .help = "write RESULT with the error of each vertex as a stream, which vg-view colours; "
              "'-': instead of the report"},
+    {.name = "plot", .value = "FILE", .text = &opts.plot,
+     .help = "draw the errors of the frames, and how many vertices have which, as FILE.svg or FILE.png"},
     {0},
 };
 
@@ -66,6 +69,7 @@ typedef struct batch {
 typedef struct findings {
     vg_measure_stats measures;
     size_t frames; /* measured so far */
+    error_curves curves; /* for --plot */
     double worst;
     char *worst_frame; /* name of the frame with the largest error */
 } findings;
@@ -239,9 +243,10 @@ static void measure_batch(vg_measures *x, batch *b, const side *result, double d
         const char *name = b->truth[i].name;
         note_worst(found, &b->found[i], name);
         if (opts.heat) put_heat(&b->result[i], nv, b->errors[i], diagonal);
-        if (!opts.frames) continue;
+        if (!opts.frames && !opts.plot) continue;
         const double errors[3] = {b->found[i].mean, vg_error_p95(b->errors[i], nv), b->found[i].max};
-        report_frame(r, found->frames, name, errors, diagonal);
+        if (opts.plot) error_curves_add(&found->curves, errors, diagonal);
+        if (opts.frames) report_frame(r, found->frames, name, errors, diagonal);
     }
 }
 
@@ -390,6 +395,7 @@ static void parse_options(int argc, char **argv, char ***operands)
     size_t n = cli_start(&program, argc, argv, operands);
     if (n < 2) cli_usage("two sequences are needed: TRUTH and RESULT");
     report_file = cli.output;
+    if (opts.plot) error_plot_check(opts.plot, report_file, opts.heat);
     if (!opts.heat && cli.no_provenance) cli_usage("--no-provenance is about the stream that --heat writes");
     if (!opts.heat) return;
     if (replaces_report() && (cli.json || opts.frames))
@@ -426,6 +432,8 @@ int main(int argc, char **argv)
         cli_text_end();
     }
     report_free(&r);
+    if (opts.plot) error_plot_write(&found.curves, &found.measures, truth.name, result.name, opts.plot);
+    error_curves_clear(&found.curves);
     free(found.worst_frame);
     vg_source_close(&truth.source);
     vg_source_close(&result.source);

@@ -75,7 +75,7 @@ each() {
 }
 
 @test "memory runs out: vg-diff, vg-info" {
-    each 'vg-diff poses.vgs poses.zip' 'vg-diff --json poses.vgs poses.vgs -o out.json' 'vg-info poses.vgs' \
+    each 'vg-diff poses.vgs poses.zip' 'vg-diff --plot e.svg poses.vgs poses.vgs' 'vg-diff --plot e.png poses.vgs poses.vgs' 'vg-diff --json poses.vgs poses.vgs -o out.json' 'vg-info poses.vgs' \
         'vg-info --json map.vgs -o out.json'
 }
 

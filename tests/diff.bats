@@ -444,3 +444,48 @@ END
     must vg-diff a.obj a.obj --heat - --json -o report.json
     is report.json comparable true
 }
+
+@test "--plot: the curves are the errors of the frames, the bars the histogram, as SVG; as PNG a picture of the same size" {
+    must vg-encode --take 0-19 "$DATA/trex-attack.tar.xz" -o truth.vgs
+    must vg-encode --fps 24 truth.vgs -o timed.vgs
+    must vg-smooth -q --seconds 0.2 timed.vgs -o 'a<b&c.vgs'
+    must vg-diff --plot e.svg --json --frames truth.vgs 'a<b&c.vgs' -o report.json
+    must vg-diff --plot e.png truth.vgs 'a<b&c.vgs' -o report.txt
+    must vg-diff --plot again.png truth.vgs 'a<b&c.vgs' --heat heat.vgs -o report.txt
+    cmp e.png again.png
+    py <<'END'
+import json, re, struct
+import xml.etree.ElementTree as tree
+report, svg = json.load(open("report.json")), tree.parse("e.svg").getroot()
+ns = "{http://www.w3.org/2000/svg}"
+texts = [(float(t.get("x")), float(t.get("y")), t.text) for t in svg.iter(ns + "text")]
+assert any(t[2].startswith("a<b&c.vgs beside truth.vgs") for t in texts), texts
+def ticks(low, high): # of the vertical axis: label -> height of its line
+    return {float(text): y - 4 for x, y, text in texts if x < 80 and low < y < high}
+def reader(marks):
+    (a, ya), (b, yb) = min(marks.items()), max(marks.items())
+    return lambda y: a + (y - ya) / (yb - ya) * (b - a)
+value, most = reader(ticks(0, 320)), max(ticks(0, 320))
+for colour, key in ("#1f5fa8", "mean_D"), ("#d86014", "p95_D"), ("#5a5a5a", "max_D"):
+    lines = [[float(w) for w in re.findall(r"[-0-9.]+", p.get("d"))] for p in svg.iter(ns + "path")
+             if p.get("stroke") == colour and p.get("stroke-width") == "1.8"]
+    assert len(lines) == 19, (key, len(lines))
+    assert abs(lines[0][0] - 84) < 0.06 and abs(lines[-1][2] - 876) < 0.06
+    got = [value(lines[0][1])] + [value(l[3]) for l in lines]
+    want = [f[key] for f in report["frame_errors"]]
+    assert max(abs(a - b) for a, b in zip(got, want)) < 0.001 * most, (key, got, want)
+counts, share = report["histogram"]["counts"], reader(ticks(340, 660))
+bars = [(float(r.get("y")) + float(r.get("height")), float(r.get("y"))) for r in svg.iter(ns + "rect") if r.get("fill") == "#1f5fa8"]
+want = [100 * c / sum(counts) for c in counts[1:] if c]
+assert len(bars) == len(want) > 3
+assert max(abs(share(top) - w) for (_, top), w in zip(bars, want)) < 0.001 * max(ticks(340, 660)), (bars, want)
+width, height = struct.unpack(">II", open("e.png", "rb").read()[16:24])
+assert (width, height) == (int(svg.get("width")), int(svg.get("height")))
+END
+    must vg-diff --plot same.svg truth.vgs truth.vgs
+    must_fail 2 vg-diff --plot e.pdf truth.vgs truth.vgs
+    says 'must end in .svg or .png'
+    must_fail 2 vg-diff --plot e.svg truth.vgs truth.vgs -o e.svg
+    must_fail 2 vg-diff --plot h.svg --heat h.svg truth.vgs truth.vgs
+    must_fail 4 vg-diff --plot nowhere/e.svg truth.vgs truth.vgs
+}
