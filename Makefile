@@ -112,10 +112,10 @@ $(foreach set,$(SETS),$(eval $(call kernel_of_set,$(set))))
 # A script is several files: the first opens its scope, the last closes it and starts it.
 PART_page_html := lib/view/page.html
 PART_page_css := lib/view/page.css
-PART_page_js := $(addprefix lib/view/page_,read.js draw.js pick.js play.js)
+PART_page_js := $(addprefix lib/view/page_,read.js skin.js draw.js pick.js play.js)
 PART_signal_html := lib/view/signal.html
 PART_signal_css := lib/view/page.css lib/view/signal.css
-PART_signal_js := $(addprefix lib/view/,page_read.js page_draw.js page_pick.js signal_math.js signal_edit.js signal_live.js \
+PART_signal_js := $(addprefix lib/view/,page_read.js page_skin.js page_draw.js page_pick.js signal_math.js signal_edit.js signal_live.js \
     signal_plane.js signal_time.js signal_play.js)
 PAGE_PARTS := page_html page_css page_js signal_html signal_css signal_js
 $(B)/page_text.c: $(foreach part,$(PAGE_PARTS),$(PART_$(part))) Makefile

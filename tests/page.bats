@@ -308,6 +308,53 @@ page.wait("location.hash.includes('layout=wipe')")
 END
 }
 
+@test "browser: a character has the colours and the picture of its materials, tells them, and keeps them when graphics are lost" {
+    PYTHONPATH="$ROOT/tests" python3 -c 'import make_character; make_character.main("c.glb")'
+    pipe 'vg-encode -q c.glb | vg-view -o page.html'
+    pipe 'vg-encode -q c.glb | vg-view --plain -o plain.html'
+    grep -q 'data-list="materials"' page.html
+    py <<'END'
+import base64, json, make_character, re
+text = open("page.html").read()
+facts = json.loads(re.search(r'<script type="application/json" id="facts">(.*?)</script>', text, re.S).group(1))
+cloth, skin = facts["sequences"][0]["materials"]
+assert (cloth["name"], cloth["picture"], skin["name"], skin.get("picture")) == ("Cloth", 0, "Skin", None)
+head, data = facts["sequences"][0]["pictures"][0].split(",")
+assert head == "data:image/png;base64" and base64.b64decode(data) == make_character.picture()
+END
+    browse page.html '#frame=0&view=20,10' <<'END'
+def vivid(picture): # pixels whose colour is far from any grey
+    return sum(max(row[3 * x:3 * x + 3]) - min(row[3 * x:3 * x + 3]) > 110 for row in picture[2] for x in range(picture[0]))
+assert page.value("document.querySelector('#colour').value") == "materials"
+before = page.picture()
+page.value("location.hash = '#frame=0&view=20,10&colour=plain'")
+page.wait("document.querySelector('#colour').value === 'plain'")
+plain = page.picture()
+assert vivid(before) > 500 and vivid(before) > 20 * vivid(plain), (vivid(before), vivid(plain))
+page.value("location.hash = '#frame=0&view=20,10&colour=materials'")
+page.wait("document.querySelector('#colour').value === 'materials'")
+assert page.picture()[2] == before[2]
+box = page.value("(r => [r.x, r.y, r.width, r.height])(document.querySelector('#canvas').getBoundingClientRect())")
+told = set()
+for k in range(1, 10):
+    for j in range(1, 10):
+        page.call("Input.dispatchMouseEvent", type="mouseMoved", x=box[0] + box[2] * k / 10, y=box[1] + box[3] * j / 10)
+        told |= {n for n in ("Cloth", "Skin") if n in (page.value("document.querySelector('#readout').innerText") or "")}
+assert told == {"Cloth", "Skin"}, told
+page.call("Input.dispatchMouseEvent", type="mouseMoved", x=box[0] + 2, y=box[1] + 2)
+page.value("window.lose = document.querySelector('#canvas').getContext('webgl2').getExtension('WEBGL_lose_context'), window.lose.loseContext()")
+page.wait("document.querySelector('#message').innerText.includes('reset')")
+page.value("window.lose.restoreContext()")
+page.wait("document.querySelector('#message').hidden")
+page.settle()
+assert page.picture()[2] == before[2]
+page.trouble = [t for t in page.trouble if "CONTEXT_LOST" not in str(t)]
+END
+    browse plain.html <<'END'
+assert page.value("document.querySelector('#colour').value") != "materials"
+END
+}
+
 @test "browser: graphics that are lost come back" {
     poses cube 2
     must vg-view pose*.obj -o page.html

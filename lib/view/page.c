@@ -189,7 +189,7 @@ static int put_mesh(vg_page *p, size_t i, const vg_head *h, vg_err *e)
     if (r == VG_OK) r = vgi_page_list(p, i, "corners", m->vert, vg_mesh_corners(m), true, e);
     if (r == VG_OK) r = put_triangles(p, i, m, h->body.reference, e);
     if (r == VG_OK && h->body.patches.n) r = vgi_page_list(p, i, "patches", h->body.patches.of_face, m->nf, false, e);
-    return r;
+    return r == VG_OK ? vgi_page_skin_lists(p, i, &h->body, e) : r;
 }
 
 /* ---- sequences ---- */
@@ -514,6 +514,7 @@ static int json_sequence(vg_bytes *b, const vg_page *p, size_t i, vg_err *e)
     if (r == VG_OK) r = vgi_page_field_number(b, "loss", s->loss / frame->unit, e);
     if (r == VG_OK) r = json_provenance(b, s->head, e);
     if (r == VG_OK) r = json_joints(b, &s->head->body, e);
+    if (r == VG_OK) r = vgi_page_skin_facts(b, &s->head->body, e);
     if (r == VG_OK) r = vgi_page_field_list(b, "names", &s->names, e);
     if (r == VG_OK && s->timed) r = vgi_page_field_list(b, "times", &s->times, e);
     if (r == VG_OK && s->tinted) r = vgi_page_field_list(b, "means", &s->means, e);

@@ -84,6 +84,14 @@ int vgi_page_list(vg_page *p, size_t i, const char *what, const uint32_t *list, 
                   vg_err *e) VG_MUST_CHECK;
 int vgi_page_field_numbers(vg_bytes *b, const char *name, const double *x, size_t n, vg_err *e) VG_MUST_CHECK;
 
+/* ---- page_skin.c: the materials of a body, when it has an asset ----
+ *
+ * Lists "materials": of each face the number of its material, from 1 on, 0: none; "coordinates": of each corner u and v as
+ * binary32. In the facts "materials", each with name, colour, cutoff and the number of its picture, and "pictures". */
+
+int vgi_page_skin_lists(vg_page *p, size_t i, const vg_body *b, vg_err *e) VG_MUST_CHECK;
+int vgi_page_skin_facts(vg_bytes *b, const vg_body *body, vg_err *e) VG_MUST_CHECK;
+
 /* ---- signal_page.c: what a page needs of a signal ----
  *
  * Lists of 32-bit words: "mean" (d binary64 numbers, the lower word first), "coordinate" (n x m of them), "basis": for

@@ -24,19 +24,24 @@ layout(location = 0) in uint vertex;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 patchColour;
 layout(location = 3) in vec3 nextNormal;
+layout(location = 4) in vec4 look; /* of its material: colour, and from where on it is opaque */
+layout(location = 5) in vec3 spot; /* in a picture: u, v, which one; -1: none, -2: no material */
 uniform float ground;
-out vec3 eye, turned, tint;
+out vec3 eye, turned, tint, where;
+out vec4 material;
 out float value, height;
 void main() {
     vec4 p = placeOf(vertex), e = view * vec4(p.xyz, 1.0);
     vec3 n = mix(normal, nextNormal, part);
-    eye = e.xyz, turned = mat3(view) * n, tint = patchColour, value = p.w, height = p.y - ground;
+    eye = e.xyz, turned = mat3(view) * n, tint = patchColour, material = look, where = spot, value = p.w, height = p.y - ground;
     gl_Position = projection * e;
 }`, HEAD + LIGHT + `
 uniform sampler2D map;
+uniform mediump sampler2DArray pictures;
 uniform int mode;
 uniform vec4 wash; /* the colour of a sequence that lies over another one, and how much shows through */
-in vec3 eye, turned, tint;
+in vec3 eye, turned, tint, where;
+in vec4 material;
 in float value, height;
 out vec4 colour;
 void main() {
@@ -45,8 +50,13 @@ void main() {
     n *= side;
     if (dot(n, v) < 0.0) n = normalize(n - 1.02 * dot(n, v) * v);
     vec3 c;
-    if (mode == 0) {
+    if (mode == 0 || mode == 3) {
         vec3 base = gl_FrontFacing ? vec3(0.60, 0.47, 0.37) : vec3(0.16, 0.28, 0.55);
+        if (mode == 3 && where.z > -1.5) {
+            vec4 seen = where.z < -0.5 ? vec4(1.0) : texture(pictures, where);
+            if (seen.a < material.a) discard;
+            base = material.rgb * fromScreen(seen.rgb);
+        }
         float key = max(dot(n, normalize(vec3(-0.45, 0.65, 0.62))), 0.0), fill = max(dot(n, normalize(vec3(0.75, 0.1, 0.5))), 0.0);
         float sky = 0.5 + 0.5 * n.y;
         sky *= 1.0 - 0.45 * exp(-height / 0.08) * clamp(0.6 - n.y, 0.0, 1.0); /* little light comes from the ground nearby */
@@ -245,7 +255,7 @@ function lineArray(ends) {
 }
 
 /* The surface from one slot to the other. */
-function surfaceArray(s, tints, here, next) {
+function surfaceArray(s, tints, looks, here, next) {
     const array = gl.createVertexArray();
     gl.bindVertexArray(array);
     gl.bindBuffer(gl.ARRAY_BUFFER, s.cornerBuffer);
@@ -261,6 +271,7 @@ function surfaceArray(s, tints, here, next) {
         gl.enableVertexAttribArray(2);
         gl.vertexAttribPointer(2, 3, gl.UNSIGNED_BYTE, true, 4, 0);
     }
+    if (looks) bindLooks(looks);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, s.indexBuffer);
     return array;
 }
@@ -279,9 +290,9 @@ function prepare(s) {
         slot.texture = makeTexture();
         slot.normalBuffer = makeBuffer(gl.ARRAY_BUFFER, slot.normals);
     }
-    const [a, b] = s.slots;
-    a.surface = surfaceArray(s, tints, a, b);
-    b.surface = surfaceArray(s, tints, b, a);
+    const [a, b] = s.slots, looks = s.materials ? makeLooks(s) : null;
+    a.surface = surfaceArray(s, tints, looks, a, b);
+    b.surface = surfaceArray(s, tints, looks, b, a);
     s.edgeArray = lineArray(s.edges);
     s.boneArray = lineArray(s.bones);
     s.empty = gl.createVertexArray();
@@ -523,7 +534,7 @@ function drawGround(cam, s, ink) {
 
 function modeOf(s) {
     if (TINT && state.colour === TINT.kind) return s.numbers.length ? 1 : 0;
-    return state.colour === "patches" && s.patches ? 2 : 0;
+    return state.colour === "patches" && s.patches ? 2 : state.colour === "materials" && s.materials ? 3 : 0;
 }
 
 const WASHES = [[0.15, 0.45, 0.85], [0.85, 0.35, 0.15], [0.2, 0.6, 0.3], [0.6, 0.3, 0.7]];
@@ -531,6 +542,7 @@ const WASHES = [[0.15, 0.45, 0.85], [0.85, 0.35, 0.15], [0.2, 0.6, 0.3], [0.6, 0
 function drawSurface(panel, cam, size, scale) {
     const {s} = panel, at = use(programs.surface, cam, s);
     gl.uniform1i(at.mode, modeOf(s));
+    showPictures(s, at.pictures);
     gl.uniform1f(at.ground, groundOf(s));
     gl.uniform4fv(at.wash, panel.over ? [...WASHES[(s.number - 1) % WASHES.length], 0.5] : [0, 0, 0, 0]);
     gl.bindVertexArray(s.slots[0].surface);

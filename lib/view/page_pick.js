@@ -78,7 +78,7 @@ function describe({s, v, face, joint}) {
     const lines = sequences.length > 1 ? [s.about.label] : [], names = s.about.joints;
     if (joint !== undefined) return [...lines, `joint ${names[joint]}`];
     lines.push(names.length && !s.about.jointsAt ? `joint ${names[v]} (vertex ${v})` : `vertex ${v}`);
-    if (face >= 0) lines.push(`face ${face}${s.patches ? `, patch ${s.patches[face]}` : ""}`);
+    if (face >= 0) lines.push(`face ${face}${s.patches ? `, patch ${s.patches[face]}` : ""}${s.materials && s.materials[face] ? `, ${s.about.materials[s.materials[face] - 1].name}` : ""}`);
     if (s.components > 1 && s.component[v]) lines.push(`component ${s.component[v]} of ${s.components}`);
     const number = TINT ? numberIn(s, v, Math.min(state.frame, s.frames - 1)) : null;
     if (number !== null) lines.push(`${TINT.kind === "errors" ? "error" : TINT.kind === "scales" ? "length" : TINT.title.split(" in units")[0]} ` +

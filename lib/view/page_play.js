@@ -430,6 +430,7 @@ function listen() {
     option($("colour"), "plain", "plain");
     if (TINT) option($("colour"), TINT.kind, TINT.kind === "scalars" ? TINT.title.split(" in units")[0] : TINT.kind);
     if (sequences.some((s) => s.patches)) option($("colour"), "patches", "patches");
+    if (sequences.some((s) => s.materials)) option($("colour"), "materials", "materials");
     $("colour-label").hidden = $("colour").options.length < 2;
     sequences.forEach((s, i) => {
         if (sequences.length < 2) return;
@@ -472,7 +473,7 @@ function readHash() {
     if (hash.has("play")) play(hash.get("play") !== "0");
 }
 
-const initialColour = () => TINT ? TINT.kind : sequences.some((s) => s.patches) ? "patches" : "plain";
+const initialColour = () => TINT ? TINT.kind : sequences.some((s) => s.patches) ? "patches" : sequences.some((s) => s.materials) ? "materials" : "plain";
 
 /* A page opens playing, unless its address names a frame, or the reader prefers that nothing moves. */
 function playsAtFirst() {

@@ -104,6 +104,9 @@ async function makeSequence(number) {
     const sizes = await unpackList(number, "sizes", false), triangles = await unpackList(number, "triangles", false);
     s.corners = await unpackList(number, "corners", true);
     s.patches = facts.patches ? await unpackList(number, "patches", false) : null;
+    s.materials = facts.patches && about.materials ? await unpackList(number, "materials", false) : null;
+    s.coordinates = s.materials && about.pictures ? await unpackList(number, "coordinates", false) : null;
+    s.pictures = s.coordinates ? await loadPictures(about.pictures) : [];
     s.nf = sizes.length;
     s.start = new Uint32Array(s.nf + 1);
     for (let f = 0; f < s.nf; f++) s.start[f + 1] = s.start[f] + sizes[f];
