@@ -2,6 +2,7 @@
  * Leaves out how a pose becomes pixels, and what is in a page: that is lib/view.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
+#include "vg/look.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -12,7 +13,7 @@
 
 static struct {
     long frames, columns;
-    const char *size, *view, *against, *patches, *title, *format;
+    const char *size, *view, *against, *patches, *title, *format, *look;
     const char *beside[VG_PAGE_SEQUENCES];
     size_t nbeside;
     double scale, zoom, turn, fps;
@@ -50,6 +51,8 @@ static const cli_option options[] = {
     {.name = "fit", .value = "path|figure", .choice = &opts.fit,
      .help = "show the whole path with a camera that stays, or keep the figure in the middle (default: path; page: "
              "figure if it goes far)"},
+    {.name = "look-at", .value = "VERTEX|NAME", .text = &opts.look, .excludes = "fit",
+     .help = "sheet, animation: keep a vertex, a joint, or an object, group or material of the mesh in the middle; with --zoom"},
     {.name = "ground", .help = "draw a grid where the reference pose stands, and a shadow", .flag = &opts.ground},
     {.name = "edges", .help = "draw the edges of the polygons", .flag = &opts.edges},
     {.name = "silhouettes", .help = "sheet: draw the contours of surfaces as lines", .flag = &opts.silhouettes},
@@ -168,6 +171,7 @@ static void choose_kind(void)
     if (opts.page && (opts.frames || opts.columns || opts.size || opts.silhouettes))
         cli_usage("option '--%s' is about a sheet: the output is a page",
                   opts.frames ? "frames" : opts.columns ? "columns" : opts.size ? "size" : "silhouettes");
+    if (opts.page && opts.look) cli_usage("option '--look-at' is about a sheet or an animation: in a page one can turn and zoom");
     if (!opts.page && opts.patches && (opts.against || opts.scales))
         cli_usage("a sheet has one kind of colours: leave out --patches or --%s",
                   opts.against ? "against" : "scales");
@@ -369,10 +373,22 @@ static void take_patches(side *s)
     vg_head_clear(&h);
 }
 
-static void add_row(vg_sheet *sheet, const side *s, const side *truth)
+/* What --look-at names in each sequence of a sheet. */
+static void look_at(vg_sheet *sheet, size_t i, const side *s)
+{
+    vg_err e;
+    uint32_t *vertices;
+    size_t n;
+    if (vg_look_find(&s->head->body, opts.look, &vertices, &n, &e) < 0) cli_usage("--look-at: in %s %s", s->name, e.message);
+    if (vg_sheet_look_at(sheet, i, vertices, n, &e) < 0) cli_die(&e);
+    free(vertices);
+}
+
+static void add_row(vg_sheet *sheet, size_t i, const side *s, const side *truth)
 {
     vg_err e;
     if (vg_sheet_sequence(sheet, s->label, s->head, truth ? truth->head : NULL, &e) < 0) cli_die(&e);
+    if (opts.look) look_at(sheet, i, s);
 }
 
 static void sheet_frame(void *sheet, size_t i, const side *s, const double *truth)
@@ -384,7 +400,7 @@ static void sheet_frame(void *sheet, size_t i, const side *s, const double *trut
 /* Options that are about frames or several sequences do not go with a signal. */
 static void refuse_beside_signal(const char *what)
 {
-    static const char *const strange[] = {"frames", "columns", "size", "silhouettes", "beside", "against", "scales", "scale", "turn", "fps"};
+    static const char *const strange[] = {"frames", "columns", "size", "silhouettes", "look-at", "beside", "against", "scales", "scale", "turn", "fps"};
     for (size_t i = 0; i < sizeof strange / sizeof *strange; i++)
         if (cli_given(strange[i])) cli_usage("option '--%s' is about a sequence: of a signal %s", strange[i], what);
 }
@@ -415,8 +431,8 @@ static void make_sheet(cast *c)
     vg_err e;
     if (opts.patches) take_patches(&c->result);
     if (vg_sheet_new(&sheet, &o, &e) < 0) cli_die(&e);
-    add_row(sheet, &c->result, opts.against ? &c->truth : NULL);
-    for (size_t i = 0; i < opts.nbeside; i++) add_row(sheet, &c->beside[i], c->compared[i] ? &c->truth : NULL);
+    add_row(sheet, 0, &c->result, opts.against ? &c->truth : NULL);
+    for (size_t i = 0; i < opts.nbeside; i++) add_row(sheet, i + 1, &c->beside[i], c->compared[i] ? &c->truth : NULL);
     read_cast(c, false, sheet_frame, sheet);
     if (shows_reference(c)) put_reference(&c->result, sheet_frame, sheet);
     check_counts(c);

@@ -477,3 +477,43 @@ END
     must_fail 2 vg-view one.obj -o none.png --turn 90
     must_fail 4 vg-view one.obj --format webp -o /dev/full
 }
+
+@test "--look-at: a vertex, a joint or a group is in the middle of each picture, whatever moves" {
+    must vg-encode --take 0,9,18 "$DATA/trex-attack.tar.xz" -o trex.vgs
+    must vg-decode -q -o rest-%d.obj trex.vgs
+    # a red tag at one vertex: a triangle of its own group, far out of the body
+    local i
+    for i in 0 1 2; do
+        awk -v i=$i '{print} END {x = 3 * i; for (k = 0; k < 3; k++) print "v", x + 40 + (k == 1), 10 * i + (k == 2), 0; print "g tag\nf -3 -2 -1"}' rest-$i.obj >tag-$i.obj
+    done
+    for i in 0 2; do
+        must vg-encode --reference tag-0.obj tag-$i.obj -o one.vgs
+        must vg-view --view front --size 201x201 --look-at tag --zoom 8 one.vgs -o tag-$i.png
+        must vg-view --view front --size 201x201 --look-at 912 --zoom 8 one.vgs -o vertex-$i.png
+    done
+    PYTHONPATH="$ROOT/tests" must python3 - <<'END'
+from page_driver import read_png
+def drawn(name): # the pixels of the picture that are not its ground
+    rows = [row[48:48 + 603] for row in read_png(open(name, "rb").read())[2][16:217]]
+    return [(x, y) for y, row in enumerate(rows) for x in range(201) if max(abs(row[3 * x + k] - row[k]) for k in range(3)) > 25]
+for i in (0, 2):
+    for name in ("tag", "vertex"):
+        at = drawn("%s-%d.png" % (name, i))
+        assert 40 < len(at) < 4000, (name, i, len(at))
+        x, y = [p[0] for p in at], [p[1] for p in at]
+        # corners at (0, 0), (1, 0), (0, 1): their mean is a third of a side away from the first
+        side, seen = (max(x) - min(x) + max(y) - min(y)) / 2, (100 - min(x), max(y) - 100)
+        want = side / 3 if name == "tag" else 0
+        assert abs(max(x) - min(x) - (max(y) - min(y))) < 3 and all(abs(s - want) < 2.5 for s in seen), (name, i, side, seen)
+END
+    xz -dc "$DATA/trex-attack.joints.txt.xz" >joints.txt
+    must vg-encode --mesh "$DATA/trex.skeleton.txt" joints.txt -o bones.vgs
+    must vg-view --look-at Head --frames 3 bones.vgs -o head.png
+    must_fail 2 vg-view --look-at Nose --frames 3 bones.vgs -o nose.png
+    says "there is no joint, object, group or material 'Nose'"
+    must_fail 2 vg-view --look-at 99999 tag-0.obj -o far.png
+    says 'there is no vertex 99999: it has 915'
+    must_fail 2 vg-view --look-at 1 tag-0.obj -o page.html
+    says "'--look-at' is about a sheet"
+    must_fail 2 vg-view --look-at 1 --fit path tag-0.obj -o p.png
+}

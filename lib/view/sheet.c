@@ -55,6 +55,7 @@ void vg_sheet_free(vg_sheet **address)
         vgi_meter_clear(&s->at[i].meter);
         vgi_figure_clear(&s->at[i].figure);
         free(s->at[i].shot);
+        free(s->at[i].look);
     }
     vgi_tint_clear(&s->tint);
     free(s);
@@ -247,13 +248,19 @@ static size_t choose_columns(const vg_sheet *s)
     return best;
 }
 
-/* The centroid of a shot: the middle of its picture when the camera follows. */
+static bool follows(const vg_sheet *s)
+{
+    return s->o.fit == VG_FIT_FIGURE || s->at[0].look;
+}
+
+/* The middle of a picture when the camera follows: of what it looks at, else the centroid of the shot. */
 static void shot_middle(const vgi_camera *c, const vgi_row *q, const vgi_shot *shot, double middle[2])
 {
     double sum[3] = {0, 0, 0};
     size_t n = 0;
-    for (size_t v = 0; v < q->album.nv; v++) {
-        if (!q->figure.drawn[v]) continue;
+    for (size_t i = 0; i < (q->look ? q->nlook : q->album.nv); i++) {
+        size_t v = q->look ? q->look[i] : i;
+        if (!q->look && !q->figure.drawn[v]) continue;
         for (size_t k = 0; k < 3; k++) sum[k] += shot->points[3 * v + k];
         n++;
     }
@@ -285,9 +292,13 @@ static void place_camera(vg_sheet *s)
             double middle[2] = {0, 0};
             const vgi_shot *shot = shot_of(s->at + k, i);
             vgi_camera camera = camera_of(s, i);
-            if (s->o.fit == VG_FIT_FIGURE) shot_middle(&camera, s->at + k, shot, middle);
+            if (follows(s)) shot_middle(&camera, s->at + k, shot, middle);
             vgi_camera_measure(&camera, &s->at[k].figure, shot->points, middle, &box);
         }
+    for (int k = 0; k < 2 && s->at[0].look && box.least[k] <= box.most[k]; k++) { /* what is looked at stays in the middle */
+        box.most[k] = fmax(fabs(box.least[k]), fabs(box.most[k]));
+        box.least[k] = -box.most[k];
+    }
     vgi_camera_fit(&s->camera, &box, 0.06);
     if (s->o.zoom > 0) s->camera.scale *= s->o.zoom;
 }
@@ -317,7 +328,7 @@ static void place_ground(const vg_sheet *s, const vgi_row *q, size_t shot, vgi_g
     vgi_camera above = {0};
     for (int k = 0; k < 3; k++) above.right[k] = (float)g->across[k], above.up[k] = (float)g->along[k];
     vgi_box box = vgi_box_empty();
-    for (size_t i = s->o.fit == VG_FIT_FIGURE ? shot : 0; i < (s->o.fit == VG_FIT_FIGURE ? shot + 1 : s->n); i++)
+    for (size_t i = follows(s) ? shot : 0; i < (follows(s) ? shot + 1 : s->n); i++)
         vgi_camera_measure(&above, &q->figure, shot_of(q, i)->points, (double[2]){0, 0}, &box);
     for (int k = 0; k < 2; k++) g->middle[k] = (box.least[k] + box.most[k]) / 2;
     g->reach = 0.45 + 0.5 * hypot(box.most[0] - box.least[0], box.most[1] - box.least[1]);
@@ -333,7 +344,7 @@ int vgi_sheet_draw(const vg_sheet *s, const vgi_row *q, size_t i, unsigned char 
     vgi_ground ground = {0};
     float *values = NULL;
     int r = VG_OK;
-    if (s->o.fit == VG_FIT_FIGURE) {
+    if (follows(s)) {
         double middle[2];
         shot_middle(&camera, q, shot, middle);
         camera.x += middle[0], camera.y += middle[1];

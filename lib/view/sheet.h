@@ -28,6 +28,8 @@ typedef struct vgi_row {
     double diagonal;             /* D; 0 when all points coincide, and then unit is 1 */
     double ground_height;        /* in D, along the vertical */
     bool tinted;
+    uint32_t *look;              /* nlook vertices whose mean is in the middle; NULL: none were asked for */
+    size_t nlook;
     size_t *shot;                /* index into the album for column i */
 } vgi_row;
 
