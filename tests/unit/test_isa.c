@@ -3,6 +3,7 @@
  * (make check-aarch64).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/numbers_kernel.h"
+#include "kernels.h"
 #include "method/pairs/transfer_kernel.h"
 #include "method/patches/segment_kernel.h"
 #include "method/rig/play_kernel.h"
@@ -13,21 +14,6 @@
 #include "numeric/polar.h"
 #include "numeric/solve_kernel.h"
 #include "test.h"
-
-/* Call `run` once for each set, and come back to the widest. */
-static void under_each(void (*run)(void))
-{
-    vg_err e;
-    const char *set;
-    for (size_t i = 0; (set = vg_isa_at(i)); i++) {
-        CHECK(vg_isa_choose(set, &e) == VG_OK);
-        CHECK_TEXT(vg_isa(), set);
-        int before = test_bad;
-        run();
-        if (test_bad > before) printf("with %s\n", set);
-    }
-    CHECK(vg_isa_choose(NULL, &e) == VG_OK);
-}
 
 /* A number in (-1, 1) that depends on i alone, so to the last bit: it is not folded in one place and called in another. */
 __attribute__((noinline, noclone)) static double wave(size_t i)
@@ -677,4 +663,5 @@ TESTS({"choose by name", choose_by_name}, {"numbers are scanned", numbers_are_sc
       {"rotations are found", rotations_are_found}, {"maps are followed", maps_are_followed},
       {"planes are sought", planes_are_sought}, {"faces are measured", faces_are_measured},
       {"features are summed", features_are_summed},
-      {"products are spread", products_are_spread})
+      {"products are spread", products_are_spread}, {"signals are fitted", signals_are_fitted},
+      {"layers are passed", layers_are_passed}, {"fronts are eliminated", fronts_are_eliminated})
