@@ -342,10 +342,11 @@ static void warn_scale(const cast *c)
         cli_warn("--scale is where colours end, and there are none: the input brings no numbers of its vertices");
 }
 
-/* A stream of patches has no frames: they are shown on the reference pose. */
+/* A stream of patches, and a rig, have no frames: they are shown on the reference pose. */
 static bool shows_reference(const cast *c)
 {
-    return !c->result.frames && !opts.against && c->result.head->body.patches.n;
+    const vg_body *b = &c->result.head->body;
+    return !c->result.frames && !opts.against && (b->patches.n || b->rig.skeleton.njoints);
 }
 
 static void put_reference(side *s, take_frame *put, void *context)

@@ -435,6 +435,25 @@ assert page.picture()[2] != coloured[2]
 END
 }
 
+@test "browser: a rig without frames is shown in its reference pose, with its bones and their names; as a picture, too" {
+    must vg-encode --reference "$DATA/trex.rest.obj" --take 0-28/4 "$DATA/trex-attack.tar.xz" -o poses.vgs
+    must vg-fitmap -q --skeleton "$DATA/trex.skeleton.txt" poses.vgs -o trex.rig
+    must vg-view trex.rig -o rig.html
+    must vg-view trex.rig --look-at Head --zoom 2 -o rig.png
+    must_fail 2 vg-view trex.rig --look-at Nose -o no.png
+    browse rig.html '#view=60,10' <<'END'
+facts = page.value("JSON.parse(document.querySelector('#facts').textContent).sequences[0]")
+assert "Head" in facts["joints"] and len(facts["jointsAt"]) == 3 * len(facts["joints"]) and len(facts["names"]) == 1
+box = page.value("(r => [r.x, r.y, r.width, r.height])(document.querySelector('#canvas').getBoundingClientRect())")
+with_bones = page.picture()
+page.key("j")
+assert page.picture()[2] != with_bones[2]
+page.key("j")
+assert page.picture()[2] == with_bones[2]
+assert 0.02 < share_drawn(with_bones) < 0.9
+END
+}
+
 @test "browser: bones, points, no extent, and a page that is cut short" {
     printf 'v 0 0 0\nv 0 1 0\nv 1 1 0\nl 1 2\nl 2 3\n' >bones.obj
     printf 'v 0 0 0\nv 1 2 3\nv 1 0 0\n' >points.obj
