@@ -113,11 +113,13 @@ $(foreach set,$(SETS),$(eval $(call kernel_of_set,$(set))))
 PART_page_html := lib/view/page.html
 PART_page_css := lib/view/page.css
 PART_page_js := $(addprefix lib/view/page_,read.js skin.js draw.js pick.js play.js)
+PART_pairs_css := lib/view/page.css lib/view/pairs.css
+PART_pairs_js := $(addprefix lib/view/page_,read.js skin.js draw.js pick.js pairs_fit.js pairs.js play.js)
 PART_signal_html := lib/view/signal.html
 PART_signal_css := lib/view/page.css lib/view/signal.css
 PART_signal_js := $(addprefix lib/view/,page_read.js page_skin.js page_draw.js page_pick.js signal_math.js signal_edit.js signal_live.js \
     signal_plane.js signal_time.js signal_play.js)
-PAGE_PARTS := page_html page_css page_js signal_html signal_css signal_js
+PAGE_PARTS := page_html page_css page_js pairs_css pairs_js signal_html signal_css signal_js
 $(B)/page_text.c: $(foreach part,$(PAGE_PARTS),$(PART_$(part))) Makefile
 	@mkdir -p $(@D)
 	@{ echo '#include "view/page.h"'; \

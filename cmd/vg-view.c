@@ -17,7 +17,7 @@ static struct {
     const char *beside[VG_PAGE_SEQUENCES];
     size_t nbeside;
     double scale, zoom, turn, fps;
-    bool edges, ground, centred, silhouettes, scales, plain;
+    bool edges, ground, centred, silhouettes, scales, plain, pick;
     size_t kind, up, fit; /* 1: html, z, figure */
     bool page, animated; /* what is made, else a sheet */
 } opts = {.view = "30,15"};
@@ -58,6 +58,8 @@ static const cli_option options[] = {
     {.name = "silhouettes", .help = "sheet: draw the contours of surfaces as lines", .flag = &opts.silhouettes},
     {.name = "beside", .value = "OTHER", .take = take_beside,
      .help = "show another sequence with the same camera: beside, or in a sheet below; repeatable"},
+    {.name = "pick", .flag = &opts.pick, .needs = "beside", .excludes = "patches|against|scales|scale|fps",
+     .help = "page: click pairs of points on the mesh and the one beside it, and save them as markers for vg-register"},
     {.name = "patches", .value = "PATCHES", .help = "colour the faces by the patches of a stream of vg-segment",
      .text = &opts.patches, .reads = true},
     {.name = "fps", .value = "N", .help = "page, animation: play N frames a second, whatever times they have", .number = &opts.fps,
@@ -177,6 +179,9 @@ static void choose_kind(void)
                   opts.against ? "against" : "scales");
     if (!opts.page && !opts.animated && opts.fps > 0)
         cli_usage("option '--fps' is about a page or an animation: use -o FILE.html or -o FILE.webp");
+    if (opts.pick && !opts.page) cli_usage("option '--pick' is about a page: use -o FILE.html");
+    if (opts.pick && opts.nbeside != 1) cli_usage("option '--pick' is about two meshes: give --beside once");
+    if (opts.pick && !cli_given("view")) opts.view = "front";
     if (!opts.page && opts.title) cli_usage("option '--title' is about a page: use -o FILE.html");
     if (!cli.output && isatty(STDOUT_FILENO))
         cli_usage("a %s is not written to a terminal: use -o FILE.html, FILE.png or FILE.webp",
@@ -458,7 +463,8 @@ static vg_page_options page_options(const side *result)
                              .zoom = view.zoom,
                              .tint = view.tint,
                              .centred = opts.centred,
-                             .scale = opts.scale};
+                             .scale = opts.scale,
+                             .pick = opts.pick};
 }
 
 static void add_sequence(vg_page *page, const side *s)
@@ -544,7 +550,7 @@ static void make_page(cast *c)
     for (size_t i = 0; i < opts.nbeside; i++) add_sequence(page, &c->beside[i]);
     read_cast(c, true, page_frame, page);
     if (shows_reference(c)) put_reference(&c->result, page_frame, page);
-    check_counts(c);
+    if (!opts.pick) check_counts(c);
     if (vg_page_end(page, &stats, &e) < 0) cli_die(&e);
     cli_text_end();
     vg_page_free(&page);

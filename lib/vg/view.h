@@ -88,6 +88,7 @@ typedef struct vg_page_options {
     double scale;  /* the end of the colours, as for a sheet, by all frames */
     bool signal;   /* edit the signal of the only sequence in its pose plane: its frames, sampled, say what the camera has
                       to show, and are not kept */
+    bool pick;     /* pairs of vertices of two sequences are picked by clicks, in the first frame of each; others are dropped */
 } vg_page_options;
 enum { VG_PAGE_SEQUENCES = 8 };
 typedef struct vg_page_stats {

@@ -328,6 +328,7 @@ int vg_page_add(vg_page *p, size_t i, const vg_frame *f, const double *truth, vg
     if (i >= p->n || (truth && (p->n < 2 || p->at[i].head->body.mesh.nv != p->at[1].head->body.mesh.nv)))
         return vg_fail(e, VG_EARG, "a frame is for a sequence that the page does not have");
     sequence *s = p->at + i;
+    if (p->o.pick && s->frames) return VG_OK;
     if (s->compared && !truth) return vg_fail(e, VG_EARG, "a frame that is compared needs a truth");
     int r = add_label(s, f, e);
     if (r == VG_OK && p->o.signal) {
@@ -366,7 +367,7 @@ int vg_page_new(vg_page **out, int fd, const char *name, const vg_page_options *
     int r = p->name ? put_template(p, "@TITLE@", e) : VG_ENOMEM;
     if (r == VG_OK) r = put_escaped(p, o->title, e);
     if (r == VG_OK) r = put_template(p, "@STYLE@", e);
-    if (r == VG_OK) r = put_text(p, o->signal ? vgi_signal_css : vgi_page_css, e);
+    if (r == VG_OK) r = put_text(p, o->signal ? vgi_signal_css : o->pick ? vgi_pairs_css : vgi_page_css, e);
     if (r == VG_OK) r = put_template(p, "@DATA@", e);
     if (r < 0) {
         vg_page_free(&p);
@@ -613,7 +614,7 @@ int vg_page_end(vg_page *p, vg_page_stats *stats, vg_err *e)
     if (r == VG_OK) r = json_page(&json, p, stats, e);
     if (r == VG_OK) r = put(p, json.data, json.size, e);
     if (r == VG_OK) r = put_template(p, "@SCRIPT@", e);
-    if (r == VG_OK) r = put_text(p, p->o.signal ? vgi_signal_js : vgi_page_js, e);
+    if (r == VG_OK) r = put_text(p, p->o.signal ? vgi_signal_js : p->o.pick ? vgi_pairs_js : vgi_page_js, e);
     if (r == VG_OK) r = put_template(p, NULL, e);
     if (r == VG_OK) r = flush(p, e);
     vg_bytes_clear(&json);

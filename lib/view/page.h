@@ -75,6 +75,7 @@ void vgi_hull_add(vgi_hull *h, const double *points, const bool *drawn, size_t n
 /* ---- page_text.c, made by the Makefile from page.html, page.css and page_*.js; each ends with a 0 ---- */
 
 extern const char vgi_page_html[], vgi_page_css[], vgi_page_js[];
+extern const char vgi_pairs_css[], vgi_pairs_js[];
 extern const char vgi_signal_html[], vgi_signal_css[], vgi_signal_js[];
 
 /* ---- page.c ---- */

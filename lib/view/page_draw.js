@@ -533,6 +533,7 @@ function drawGround(cam, s, ink) {
 }
 
 function modeOf(s) {
+    if (s.tinted) return 1;
     if (TINT && state.colour === TINT.kind) return s.numbers.length ? 1 : 0;
     return state.colour === "patches" && s.patches ? 2 : state.colour === "materials" && s.materials ? 3 : 0;
 }
@@ -618,6 +619,7 @@ function render() {
     for (const panel of list) drawPanel(panel, scale);
     drawn = list;
     showPicked();
+    if (afterDraw) afterDraw();
     document.documentElement.dataset.part = state.part.toFixed(4);
     document.documentElement.dataset.drawn = String(state.frame);
 }

@@ -4,6 +4,9 @@
 
 let hovered = null, pinned = null; /* {s, v, face, track} */
 
+/* What a page for picking pairs sets (page_pairs.js). */
+let onClick = pin, afterDraw = null, beforeListening = null, whenThere = null;
+
 /* From the eye through a place on the canvas, in CSS pixels. */
 function rayOf(panel, x, y) {
     const {cam} = panel, a = (2 * (x - panel.x) / panel.w - 1) * cam.tangent * cam.aspect, b = (1 - 2 * (y - panel.y) / panel.h) * cam.tangent;

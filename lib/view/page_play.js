@@ -391,7 +391,7 @@ function listenToPointers() {
     for (const name of ["pointerup", "pointercancel"])
         canvas.addEventListener(name, (event) => {
             const start = down.get(event.pointerId), [x, y] = placeOf(event);
-            if (name === "pointerup" && start && down.size === 1 && Math.hypot(event.clientX - start.x0, event.clientY - start.y0) < 4) pin(x, y);
+            if (name === "pointerup" && start && down.size === 1 && Math.hypot(event.clientX - start.x0, event.clientY - start.y0) < 4) onClick(x, y);
             down.delete(event.pointerId);
             if (!down.size) canvas.classList.remove("moving");
         });
@@ -493,6 +493,7 @@ async function main() {
     $("scrub").max = frames - 1;
     state.colour = initialColour();
     if (!facts.fit) state.follow = goesFar();
+    if (beforeListening) beforeListening();
     listen();
     showAbout();
     showGraph();
@@ -500,6 +501,7 @@ async function main() {
     await Promise.all(sequences.flatMap((s) => [[s.places, 3], [s.numbers, 1]].filter(([list]) => list.length)
         .map(([list, width]) => need(chunkOf(list, Math.min(state.frame, s.frames - 1)), s.nv, width))));
     tell("");
+    if (whenThere) sequences.forEach((s) => take(s)), whenThere();
     draw();
     if (playsAtFirst()) play(true);
     for (const s of sequences) /* the others, one after the other, so that the page answers meanwhile */
