@@ -23,6 +23,7 @@ static struct {
     size_t nkeys;
     key *keys;
     uint64_t memory; /* bytes */
+    size_t over;     /* 0: time, 1: pose */
 } opts = {.memory = 256 << 20};
 
 static key *add_key(int by, const char *option, const char *mesh)
@@ -90,6 +91,10 @@ static const cli_option options[] = {
     {"last", 0, "MESH", "the last frame becomes this pose", .take = take_last},
     {"key", 0, "FRAME=MESH", "this frame, by name or by number from 0, becomes this pose; repeat as needed",
      .take = take_key},
+    {"over", 0, "time|pose",
+     "how keys share the frames between them: linearly in time (default for one or two), or by how much the pose is "
+     "like theirs",
+     .choice = &opts.over},
     {"memory", 0, "SIZE", "hold this much of waiting frames in memory, the rest in a file (default: 256M)",
      .take = take_memory},
     {0}};
@@ -128,7 +133,8 @@ static void load_key(key *k, vg_head *h)
 
 typedef struct work {
     vg_head *h;
-    vg_guide *guide;
+    vg_guide *guide;      /* in time */
+    vg_pose_guide *poses; /* over the pose; NULL: in time */
     vg_spool *spool;
     vg_frame held;     /* a frame on its way out of the spool */
     vg_frame late;     /* the latest frame: it may turn out to be the last */
@@ -178,12 +184,24 @@ static const double *find_given(work *w, uint64_t n, const char *name, bool last
     return found ? found->pose : NULL;
 }
 
+static void apply(work *w, uint64_t n, double *pose)
+{
+    if (w->poses) vg_pose_guide_apply(w->poses, n, pose);
+    else vg_guide_apply(w->guide, n, pose);
+}
+
+static void set_key(work *w, uint64_t n, double *pose, const double *given)
+{
+    if (w->poses) vg_pose_guide_key(w->poses, n, pose, given);
+    else vg_guide_key(w->guide, n, pose, given);
+}
+
 static void release_held(work *w)
 {
     vg_err e;
     int r;
     while ((r = vg_spool_next(w->spool, &w->held, &e)) > 0) {
-        vg_guide_apply(w->guide, w->released++, w->held.values);
+        apply(w, w->released++, w->held.values);
         cli_stream_put(&w->held);
     }
     if (r < 0) cli_die(&e);
@@ -195,15 +213,16 @@ static void guide(work *w, vg_frame *f, uint64_t n, bool last)
     vg_err e;
     vg_frame_drop_all(f); /* what came with the vertices is not true of where they go */
     if (given) {
-        vg_guide_key(w->guide, n, f->values, given);
+        set_key(w, n, f->values, given);
         w->begun = true;
-        release_held(w);
-    } else if (!w->begun || w->ahead) {
+    }
+    /* over the pose, all frames wait for the last key */
+    if (w->poses ? w->ahead > 0 : !given && (!w->begun || w->ahead)) {
         if (vg_spool_put(w->spool, f, &e) < 0) cli_die(&e);
         return;
-    } else {
-        vg_guide_apply(w->guide, n, f->values);
     }
+    if (given) release_held(w);
+    if (!given || w->poses) apply(w, n, f->values);
     w->released = n + 1;
     cli_stream_put(f);
 }
@@ -244,6 +263,8 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     cli_need_vertices(h, "the input");
     for (size_t i = 0; i < opts.nkeys; i++) load_key(&opts.keys[i], h);
     w->ahead = opts.nkeys;
+    bool over_pose = cli_given("over") ? opts.over == 1 : opts.nkeys > 2;
+    if (over_pose && vg_pose_guide_new(&w->poses, h->body.mesh.nv, opts.nkeys, &e) < 0) cli_die(&e);
     if (vg_guide_new(&w->guide, h->body.mesh.nv, &e) < 0 || vg_spool_new(&w->spool, h, limit, &e) < 0) cli_die(&e);
 }
 
@@ -264,6 +285,7 @@ static void close_work(work *w)
     vg_frame_clear(&w->late);
     vg_spool_free(&w->spool);
     vg_guide_free(&w->guide);
+    vg_pose_guide_free(&w->poses);
     for (size_t i = 0; i < opts.nkeys; i++) {
         key *k = &opts.keys[i];
         if (k->frame) free((char *)(uintptr_t)k->option);

@@ -63,6 +63,7 @@ each() {
 
 @test "memory runs out: vg-poisson" {
     each 'vg-poisson --first target.obj --last pose1.obj --memory 1K poses.vgs -o out.vgs'
+    each 'vg-poisson --over pose --first target.obj --last pose1.obj --memory 1K poses.vgs -o out.vgs'
 }
 
 @test "memory runs out: vg-segment, vg-fitmap" {

@@ -71,7 +71,7 @@ walk() {
 
 @test "keys by name and by number; before the first and behind the last its own offset holds" {
     walk
-    must vg-poisson --key walk8=c.obj --key 2=a.obj --key walk6=b.obj u.vgs -o t.vgs
+    must vg-poisson --over time --key walk8=c.obj --key 2=a.obj --key walk6=b.obj u.vgs -o t.vgs
     is_frame t.vgs 2 a.obj
     is_frame t.vgs 5 b.obj
     is_frame t.vgs 7 c.obj
@@ -247,6 +247,33 @@ END
     must vg-poisson --first "$GOLDEN/turns.vgs" "$GOLDEN/turns.vgs" -o guided.vgs
     must vg-info guided.vgs
     shows 'known in 0 of 1 frames'
+}
+
+@test "over the pose: keys are met to the bit, frames wait for the last key, and a third pose is not worse than two" {
+    mkdir truth
+    vg-encode --reference "$DATA/trex.rest.obj" "$DATA/trex-walk.tar.xz" -o u.vgs
+    must vg-decode u.vgs -o 'walk%02d.obj'
+    for file in walk*.obj "$DATA/trex.rest.obj"; do # another body whose true walk is known: taller, and slimmer
+        LC_ALL=C awk '$1 == "v" {printf "v %.6f %.6f %.6f\n", 0.8 * $2, 1.3 * $3, $4; next} 1' "$file" >"truth/$(basename "$file")"
+    done
+    pipe 'vg-deform --onto truth/trex.rest.obj u.vgs | vg-solve >t.vgs'
+    mv truth/trex.rest.obj rest.obj
+    vg-encode --reference rest.obj truth -o truth.vgs
+    ends=(--first truth/walk00.obj --last truth/walk33.obj)
+    must vg-poisson "${ends[@]}" t.vgs -o two.vgs
+    for middle in 8 16 25; do
+        must vg-poisson "${ends[@]}" --key "$middle=truth/walk$(printf %02d "$middle").obj" t.vgs --no-provenance -o three.vgs
+        is_frame three.vgs 0 truth/walk00.obj
+        is_frame three.vgs "$middle" "truth/walk$(printf %02d "$middle").obj"
+        is_frame three.vgs 33 truth/walk33.obj
+        must python3 -c 'import sys; assert float(sys.argv[2]) <= float(sys.argv[1]), sys.argv' \
+            "$(vertex_error mean --centred truth.vgs two.vgs)" "$(vertex_error mean --centred truth.vgs three.vgs)"
+    done
+    must vg-poisson --memory 1K "${ends[@]}" --key 25=truth/walk25.obj t.vgs --no-provenance -o again.vgs
+    same_file again.vgs three.vgs
+    must vg-poisson --over pose "${ends[@]}" t.vgs -o pose.vgs
+    must_fail 3 vg-poisson "${ends[@]}" --key 99=truth/walk25.obj t.vgs -o none.vgs
+    [ ! -e none.vgs ]
 }
 
 @test "three true poses take a third off the error of a transferred walk" {

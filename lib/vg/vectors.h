@@ -266,6 +266,18 @@ void vg_guide_key(vg_guide *g, uint64_t frame, double *pose, const double *given
  * key, or, with a single key, any. Without keys the pose is unchanged. */
 void vg_guide_apply(const vg_guide *g, uint64_t frame, double *pose);
 
+/* Guidance over the pose: the offsets of all keys are mixed by the coordinates of a pose in the keys' poses, so that a key
+ * helps wherever poses are like its own. In time where two keys have the same pose. */
+typedef struct vg_pose_guide vg_pose_guide;
+/* keys: the largest number of keys. */
+int vg_pose_guide_new(vg_pose_guide **g, size_t nv, size_t keys, vg_err *e) VG_MUST_CHECK;
+void vg_pose_guide_free(vg_pose_guide **g);
+/* vg_pose_guide_key: frame number `frame`, later than the previous key, has this pose (nv points) and becomes `given`. */
+void vg_pose_guide_key(vg_pose_guide *g, uint64_t frame, const double *pose, const double *given);
+/* vg_pose_guide_apply: guide the pose of frame number `frame` in place, once all keys are set; a key's frame meets it to
+ * the last bit. */
+void vg_pose_guide_apply(vg_pose_guide *g, uint64_t frame, double *pose);
+
 #ifdef __cplusplus
 }
 #endif

@@ -1,5 +1,5 @@
 /* test_poisson.c: the closed form of guidance is the solution of the Poisson equation in time: second differences
- * stay, keys are met to the bit, and the relaxation of the thesis ends at the same sequence. Frames come out of the
+ * stay, keys are met to the bit, and the relaxation of the thesis ends at the same sequence; over the pose an affine error vanishes. Frames come out of the
  * spool and of the store of poses as they went in.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "frames.h"
@@ -283,6 +283,68 @@ static void test_poses(void)
     vg_frame_clear(&want);
 }
 
+static void guide_over_pose(sequence *t, const size_t keys[3], double (*given)[N])
+{
+    vg_pose_guide *g;
+    vg_err e;
+    if (vg_pose_guide_new(&g, POINTS, 3, &e) < 0) abort();
+    for (size_t i = 0; i < 3; i++) vg_pose_guide_key(g, keys[i], t->at[keys[i]], given[i]);
+    for (size_t k = 0; k < FRAMES; k++) vg_pose_guide_apply(g, k, t->at[k]);
+    vg_pose_guide_free(&g);
+    CHECK(g == NULL);
+}
+
+/* Poses that are affine combinations of the keys', by weights that do not follow time: an error that is affine in the pose is
+ * corrected completely. */
+static void test_over_pose(void)
+{
+    static const size_t keys[] = {2, 6, 9};
+    sequence u = make_sequence(), t, truth;
+    double given[3][N];
+    for (size_t k = 0; k < FRAMES; k++) {
+        double a = 0.3 * sin(3.0 * (double)k), b = 0.15 * cos(5.0 * (double)k);
+        for (size_t i = 0; i < N && k != 2 && k != 6 && k != 9; i++)
+            u.at[k][i] = (1 - a - b) * u.at[2][i] + a * u.at[6][i] + b * u.at[9][i];
+    }
+    for (size_t k = 0; k < FRAMES; k++)
+        for (size_t p = 0; p < POINTS; p++) { /* stretched, sheared and moved */
+            const double *x = u.at[k] + 3 * p;
+            double *y = truth.at[k] + 3 * p;
+            y[0] = 1.3 * x[0] + 0.2 * x[1] - 1, y[1] = 0.8 * x[1] + 2, y[2] = x[2] - 0.1 * x[0];
+        }
+    for (size_t j = 0; j < 3; j++) memcpy(given[j], truth.at[keys[j]], sizeof given[j]);
+    t = u;
+    guide_over_pose(&t, keys, given);
+    for (size_t j = 0; j < 3; j++) CHECK(!memcmp(t.at[keys[j]], given[j], sizeof given[j]));
+    for (size_t k = 0; k < FRAMES; k++)
+        for (size_t i = 0; i < N; i++) CHECK(fabs(t.at[k][i] - truth.at[k][i]) < 1e-12);
+}
+
+/* Two keys of one pose: in time, to rounding. A pose far beyond the keys, with weights -99, 100, 0 over the pose and 0, 0.6, 0.4
+ * in time: a share of 1 / 198 of the former makes sum |w| = 2. */
+static void test_over_pose_falls_back(void)
+{
+    static const size_t keys[] = {1, 5, 10};
+    sequence u = make_sequence(), t, timed;
+    double given[3][N];
+    memcpy(u.at[5], u.at[1], sizeof u.at[5]);
+    for (size_t j = 0; j < 3; j++)
+        for (size_t i = 0; i < N; i++) given[j][i] = u.at[keys[j]][i] + noise();
+    t = u;
+    guide_over_pose(&t, keys, given);
+    timed = guide(&u, 3, keys, given);
+    for (size_t k = 0; k < FRAMES; k++)
+        for (size_t i = 0; i < N; i++) CHECK(fabs(t.at[k][i] - timed.at[k][i]) < 1e-14);
+    u = make_sequence();
+    for (size_t i = 0; i < N; i++) u.at[7][i] = u.at[1][i] + 100 * (u.at[5][i] - u.at[1][i]);
+    for (size_t j = 0; j < 3; j++)
+        for (size_t i = 0; i < N; i++) given[j][i] = u.at[keys[j]][i] + (j == 1 ? -1 : 1);
+    t = u;
+    guide_over_pose(&t, keys, given);
+    for (size_t i = 0; i < N; i++) CHECK(fabs(t.at[7][i] - u.at[7][i] + 0.2 + 198.8 / 198) < 1e-8);
+}
+
 TESTS({"keys, second differences, relaxation", test_keys}, {"one offset for all", test_same_offset},
+      {"over the pose", test_over_pose}, {"over the pose, in time", test_over_pose_falls_back},
       {"frames come out as they went in", test_spool}, {"frames at random", test_poses},
       {"no room", test_spool_without_room})

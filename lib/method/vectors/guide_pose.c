@@ -1,0 +1,186 @@
+/* guide_pose.c: guidance over the pose: the offsets of the keys are mixed by how much a pose is like theirs.
+ *
+ * The error of a transferred sequence follows the pose, not the time. With V_k the poses of the keys, centroid at 0, and V
+ * that of a frame, the weights w, whose sum is 1, make sum w_k V_k the nearest point of the keys' affine span to V; then
+ * the frame moves by sum w_k e_k. Weights in time, those of poisson.c, take over in part where sum |w_k| would exceed 2, and
+ * completely where the keys' poses do not span: two of them are alike. Leaves out guidance in time (poisson.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "core/core.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+
+static const double LEAST_PIVOT = 1e-8; /* relative to the largest of the keys' distances, squared */
+static const double MOST_WEIGHT = 2;    /* largest sum of |w| */
+
+typedef struct pose_key {
+    uint64_t frame;
+    double *given, *offset; /* n each */
+    double *from_first;     /* n: V_k - V_0; of the first key V_0 */
+    double centre[3];       /* of the pose */
+} pose_key;
+
+struct vg_pose_guide {
+    size_t n;               /* numbers of a pose */
+    size_t nkeys, cap;
+    pose_key *key;
+    double *factor;         /* cap x cap: Cholesky factor of the products of V_k - V_0, from key 1 on */
+    double *weight, *timed; /* cap */
+    bool spans;
+};
+
+int vg_pose_guide_new(vg_pose_guide **out, size_t nv, size_t keys, vg_err *e)
+{
+    vg_pose_guide *g = *out = vgi_array(1, sizeof *g, e);
+    if (!g) return VG_ENOMEM;
+    bool fits = vgi_mul(nv, 3, &g->n);
+    g->cap = keys;
+    g->spans = true;
+    g->key = vgi_array(keys, sizeof *g->key, e);
+    g->factor = vgi_array(keys, keys * sizeof *g->factor, e);
+    g->weight = vgi_array(keys, sizeof *g->weight, e);
+    g->timed = vgi_array(keys, sizeof *g->timed, e);
+    bool there = fits && g->key && g->factor && g->weight && g->timed;
+    for (size_t k = 0; k < keys && there; k++) {
+        pose_key *x = &g->key[k];
+        x->given = vgi_array(g->n, sizeof *x->given, e);
+        x->offset = vgi_array(g->n, sizeof *x->offset, e);
+        x->from_first = vgi_array(g->n, sizeof *x->from_first, e);
+        there = x->given && x->offset && x->from_first;
+    }
+    if (there) return VG_OK;
+    vg_pose_guide_free(out);
+    return vg_fail(e, VG_ENOMEM, "not enough memory for %zu given poses of %zu vertices", keys, nv);
+}
+
+void vg_pose_guide_free(vg_pose_guide **out)
+{
+    vg_pose_guide *g = *out;
+    if (!g) return;
+    for (size_t k = 0; k < g->cap && g->key; k++) {
+        free(g->key[k].given);
+        free(g->key[k].offset);
+        free(g->key[k].from_first);
+    }
+    free(g->key);
+    free(g->factor);
+    free(g->weight);
+    free(g->timed);
+    free(g);
+    *out = NULL;
+}
+
+/* pose - its centroid - V_0 */
+static double away(const vg_pose_guide *g, const double *pose, const double centre[3], size_t i)
+{
+    return pose[i] - centre[i % 3] - (g->nkeys ? g->key[0].from_first[i] : 0);
+}
+
+/* The last row of the factor: of the key that was added last. */
+static void extend_factor(vg_pose_guide *g)
+{
+    size_t m = g->nkeys - 1, row = m - 1; /* key 0 has none */
+    double largest = 0, *L = g->factor;
+    for (size_t j = 0; j <= row; j++) {
+        const double *a = g->key[m].from_first, *b = g->key[j + 1].from_first;
+        double sum = 0;
+        for (size_t i = 0; i < g->n; i++) sum += a[i] * b[i];
+        if (j == row) largest = sum;
+        for (size_t k = 0; k < j; k++) sum -= L[row * g->cap + k] * L[j * g->cap + k];
+        if (j < row) {
+            L[row * g->cap + j] = sum / L[j * g->cap + j];
+        } else {
+            g->spans = g->spans && sum > LEAST_PIVOT * largest;
+            L[row * g->cap + row] = sum > 0 ? sqrt(sum) : 1;
+        }
+    }
+}
+
+void vg_pose_guide_key(vg_pose_guide *g, uint64_t frame, const double *pose, const double *given)
+{
+    assert(g->nkeys < g->cap);
+    pose_key *x = &g->key[g->nkeys];
+    x->frame = frame;
+    vg_centroid(pose, g->n / 3, x->centre);
+    for (size_t i = 0; i < g->n; i++) {
+        x->from_first[i] = away(g, pose, x->centre, i);
+        x->offset[i] = given[i] - pose[i];
+        x->given[i] = given[i];
+    }
+    if (g->nkeys++ > 0) extend_factor(g);
+}
+
+/* Linear between the two keys around a frame; all of the nearest key's before the first and after the last. */
+static void weigh_in_time(vg_pose_guide *g, uint64_t frame)
+{
+    size_t after = 0;
+    while (after < g->nkeys && g->key[after].frame < frame) after++;
+    for (size_t k = 0; k < g->nkeys; k++) g->timed[k] = 0;
+    if (after == 0 || after == g->nkeys) {
+        g->timed[after ? after - 1 : 0] = 1;
+        return;
+    }
+    uint64_t a = g->key[after - 1].frame, b = g->key[after].frame;
+    g->timed[after] = (double)(frame - a) / (double)(b - a);
+    g->timed[after - 1] = 1 - g->timed[after];
+}
+
+/* The coordinates of a pose in the keys, by least squares. */
+static void weigh_over_pose(vg_pose_guide *g, const double *pose)
+{
+    double centre[3], *w = g->weight, *L = g->factor, rest = 1;
+    size_t m = g->nkeys - 1;
+    vg_centroid(pose, g->n / 3, centre);
+    for (size_t j = 0; j < m; j++) {
+        double sum = 0;
+        for (size_t i = 0; i < g->n; i++) sum += g->key[j + 1].from_first[i] * away(g, pose, centre, i);
+        for (size_t k = 0; k < j; k++) sum -= L[j * g->cap + k] * w[k + 1];
+        w[j + 1] = sum / L[j * g->cap + j];
+    }
+    for (size_t j = m; j-- > 0;) {
+        for (size_t k = j + 1; k < m; k++) w[j + 1] -= L[k * g->cap + j] * w[k + 1];
+        w[j + 1] /= L[j * g->cap + j];
+    }
+    for (size_t j = 0; j < m; j++) rest -= w[j + 1];
+    w[0] = rest;
+}
+
+static double size_at(const vg_pose_guide *g, double share)
+{
+    double sum = 0;
+    for (size_t k = 0; k < g->nkeys; k++) sum += fabs(g->timed[k] + share * (g->weight[k] - g->timed[k]));
+    return sum;
+}
+
+/* The largest share of the weights over the pose, beside those in time, with sum |w| at most MOST_WEIGHT. The sum is convex
+ * in the share and 1 at 0. */
+static double share_of_pose(const vg_pose_guide *g)
+{
+    if (!g->spans) return 0;
+    if (size_at(g, 1) <= MOST_WEIGHT) return 1;
+    double low = 0, high = 1;
+    for (int i = 0; i < 50; i++) {
+        double middle = (low + high) / 2;
+        if (size_at(g, middle) > MOST_WEIGHT) high = middle;
+        else low = middle;
+    }
+    return low;
+}
+
+void vg_pose_guide_apply(vg_pose_guide *g, uint64_t frame, double *pose)
+{
+    if (!g->nkeys) return;
+    weigh_in_time(g, frame);
+    for (size_t k = 0; k < g->nkeys; k++)
+        if (g->key[k].frame == frame) {
+            memcpy(pose, g->key[k].given, g->n * sizeof *pose);
+            return;
+        }
+    if (g->spans) weigh_over_pose(g, pose);
+    double share = share_of_pose(g);
+    for (size_t k = 0; k < g->nkeys; k++) {
+        double w = g->spans ? g->timed[k] + share * (g->weight[k] - g->timed[k]) : g->timed[k];
+        for (size_t i = 0; i < g->n && w != 0; i++) pose[i] += w * g->key[k].offset[i];
+    }
+}
