@@ -88,7 +88,6 @@ static void note_step(void *context, const vg_register_step *s)
     cli_note(
         "round %zu of %zu: %zu vertices near the target, %.3g D from it on average, at most %.3g D; stiffness %.3g",
         s->round, s->rounds, s->near, s->mean, s->largest, s->stiffness);
-    cli_progress("rounds of the fit", s->round);
 }
 
 static void note_alignment(const vg_register_result *r)

@@ -171,3 +171,21 @@ number() {
     must_fail 4 vg-register a.obj none.obj --aligned -o c.vgs
     nothing_but a.obj two.txt out.txt short.txt
 }
+
+@test "--components: what explains nothing of the target is left out by default, and says so; --components overrides" {
+    local horse=$DATA/horse.rest.obj n
+    n=$(grep -c '^v ' "$horse")
+    # the source: a horse, and another, smaller one inside of it
+    awk '$1 == "v" {printf "v %.6f %.6f %.6f\n", 0.9 * $2, 0.9 * $3 + 0.05, 0.9 * $4}' "$horse" >inner
+    { grep '^v ' "$horse"; cat inner; grep '^f ' "$horse"
+      grep '^f ' "$horse" | awk -v n="$n" '{for (i = 2; i <= NF; i++) $i += n; print}'; } >two.obj
+    awk -v n="$n" 'BEGIN {for (i = 0; i < n; i += 12) print i, i}' >markers.txt
+    must_warn vg-register two.obj "$horse" --markers markers.txt -o default.vgs
+    says '1 of the 2 components of the source explain nothing of the target and are left out: 1'
+    must vg-register two.obj "$horse" --markers markers.txt --components 0 -o one.vgs
+    must vg-register -q two.obj "$horse" --markers markers.txt --components all -o all.vgs
+    # the same pairs by default as by --components 0
+    cmp <(vg-decode -q default.vgs -o default.obj && cat default.obj) <(vg-decode -q one.vgs -o one.obj && cat one.obj)
+    must_fail 3 vg-register two.obj "$horse" --markers markers.txt --components 7 -o none.vgs
+    [ ! -e none.vgs ]
+}
