@@ -12,6 +12,7 @@ static struct {
     const char *reference, *anchors, *mesh, *most_bytes;
     vg_reading reading;
     size_t weld; /* 1: off */
+    size_t objects; /* 1: frames */
     double fps;
     size_t faces; /* 1: selected */
     take_list take;
@@ -28,6 +29,8 @@ static const cli_option options[] = {
      .text = &opts.mesh, .reads = true},
     {"array-axes", 0, "ORDER", "what the axes of positions in an NPZ count: fvx, vxf, ... (frames, vertices, x y z)",
      .text = &opts.reading.array_axes},
+    {"objects", 0, "parts|frames", "objects of an OBJ are parts of one mesh (default), or each a frame",
+     .choice = &opts.objects},
     {"animation", 0, "NAME", "of several animations of a GLB or glTF the one of this name",
      .text = &opts.reading.animation},
     {"shapes", 0, NULL, "the morph targets of a GLB or glTF, whatever animations it has", .flag = &opts.reading.shapes},
@@ -185,7 +188,7 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     work w = {0};
     if (opts.anchors) w.nanchors = cli_parse_vertices("--anchor", opts.anchors, &w.anchors);
-    opts.reading.fps = opts.fps, opts.reading.unwelded = opts.weld == 1;
+    opts.reading.fps = opts.fps, opts.reading.unwelded = opts.weld == 1, opts.reading.objects = opts.objects == 1;
     if (opts.reading.shapes && opts.reading.animation) cli_usage("--shapes and --animation exclude one another");
     vg_source_options from = {.mesh = opts.mesh, .reading = opts.reading};
     if (opts.most_bytes && !(from.most_bytes = cli_parse_size("max-bytes", opts.most_bytes)))

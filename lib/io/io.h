@@ -167,6 +167,11 @@ typedef struct vgi_format {
 
 extern const vgi_format vgi_format_obj, vgi_format_ply, vgi_format_ply_ascii, vgi_format_ply_be, vgi_format_off,
     vgi_format_stl, vgi_format_stl_ascii;
+/* obj.c: read a file of OBJ, as the format's read does, without the offer to read objects as frames */
+int vgi_obj_read(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e) VG_MUST_CHECK;
+/* objects.c: how many objects of one topology the file consists of, 0: it does not; are they numbered like frames? */
+size_t vgi_obj_frames(const vg_model *m);
+bool vgi_obj_numbered(const vg_model *m, size_t frames);
 /* obj_write.c, ply_write.c: used by the tables in obj.c and ply.c */
 int vgi_obj_write(vg_bytes *out, const vgi_writing *w, vg_err *e);
 int vgi_obj_rest(vg_bytes *out, const vgi_writing *w, vg_err *e);
@@ -246,6 +251,7 @@ typedef struct vgi_sequence_format {
 extern const vgi_sequence_format vgi_sequence_pc2, vgi_sequence_mdd, vgi_sequence_npy, vgi_sequence_npz,
     vgi_sequence_usda, vgi_sequence_bvh, vgi_sequence_glb, vgi_sequence_gltf, vgi_sequence_skeleton,
     vgi_sequence_joints;
+extern const vgi_sequence_format vgi_sequence_objects; /* for who asks for it: not in the table */
 const vgi_sequence_format *vgi_sequence_by_name(const char *name, size_t n);   /* NULL: none */
 const vgi_sequence_format *vgi_sequence_by_suffix(const char *file_name);      /* case does not matter; NULL: none */
 const vgi_sequence_format *vgi_sequence_by_content(const unsigned char *data, size_t n);

@@ -99,7 +99,7 @@ static size_t count_digits(const char *s)
 
 static bool is_minus(const char *start, const char *p)
 {
-    static const char separators[] = "_@=~,:;/ ([{-+";
+    static const char separators[] = "_.@=~,:;/ ([{-+";
     return *p == '-' && is_digit(p[1]) && (p == start || strchr(separators, p[-1]));
 }
 

@@ -24,10 +24,16 @@ static const struct {
                    {"f", FACES},            {"triangles", FACES}};
 enum { OTHER_NAMES = sizeof other_names / sizeof *other_names, OWN_NAME = 0 };
 
+/* What files of SMPL and its kin hold in place of vertices. */
+static const char *const body_names[] = {"poses", "pose", "betas", "pose_body", "body_pose", "root_orient", "global_orient"};
+
+enum { SHAPE_TEXT = 24 * VGI_NPY_DIMENSIONS + 3 };
+
 struct held {
     bool there;
     const char *name; /* in the file */
-    size_t rank;      /* OWN_NAME, or that of other_names + 1 */
+    size_t rank;      /* OWN_NAME, or that of other_names + 1, or, of a name in other letters, beyond those */
+    char shape[SHAPE_TEXT]; /* in the file */
     vgi_npy a;
     bool strided;     /* the axes have been put in another order: */
     size_t stride[VGI_NPY_DIMENSIONS];
@@ -37,7 +43,7 @@ struct held {
 typedef struct reading {
     const char *subject;
     char inventory[240]; /* all arrays of the file with their shapes, as far as there is room, for messages */
-    bool has_poses, has_betas;
+    bool of_body; /* has an array of body_names */
     vg_note note;
     struct held held[ARRAYS];
     enum array values; /* which of them holds the frames */
@@ -55,33 +61,51 @@ static bool is_called(const char *path, const char *name)
     return strlen(name) == n && !memcmp(name, path, n);
 }
 
+/* The same, whatever the letters: V and F, Vertices and Faces. */
+static bool is_called_loosely(const char *path, const char *name)
+{
+    size_t n = strlen(path) - 4;
+    return strlen(name) == n && !strncasecmp(name, path, n);
+}
+
 static enum array find_array(const char *path, const char **name, size_t *rank)
 {
     for (int i = 0; i < ARRAYS; i++)
         if (is_called(path, *name = vgi_npz_names[i])) return *rank = OWN_NAME, (enum array)i;
     for (size_t i = 0; i < OTHER_NAMES; i++)
         if (is_called(path, *name = other_names[i].name)) return *rank = i + 1, other_names[i].array;
+    for (size_t i = 0; i < OTHER_NAMES; i++)
+        if (is_called_loosely(path, *name = other_names[i].name))
+            return *rank = OTHER_NAMES + i + 1, other_names[i].array;
+    if (is_called_loosely(path, *name = vgi_npz_names[FACES])) return *rank = OTHER_NAMES + 1, FACES;
     return ARRAYS;
+}
+
+/* "(120, 6890, 3)" */
+static void write_shape(char text[SHAPE_TEXT], const vgi_npy *a)
+{
+    size_t n = 0;
+    text[n++] = '(';
+    for (size_t d = 0; d < a->ndim; d++)
+        n += (size_t)snprintf(text + n, SHAPE_TEXT - n, "%s%llu", d ? ", " : "", (unsigned long long)a->shape[d]);
+    snprintf(text + n, SHAPE_TEXT - n, ")");
 }
 
 /* "positions (120, 6890, 3)" */
 static void list_array(reading *x, const char *path, const vg_bytes *data)
 {
     vgi_npy a = {0};
+    char shape[SHAPE_TEXT] = "(?)";
     size_t bytes, n = strlen(x->inventory);
     vgi_input *in;
     int known = vgi_input_memory(&in, data->data, data->size, path, NULL);
     if (known == VG_OK) known = vgi_npy_read(&a, &bytes, in, "it", NULL);
     vgi_input_free(&in);
-    x->has_poses |= is_called(path, "poses") || is_called(path, "pose");
-    x->has_betas |= is_called(path, "betas") || is_called(path, "trans");
-    if (n + 80 > sizeof x->inventory) return;
-    n += (size_t)snprintf(x->inventory + n, sizeof x->inventory - n, "%s%.*s (", n ? ", " : "",
-                          (int)(strlen(path) - 4 > 30 ? 30 : strlen(path) - 4), path);
-    for (size_t d = 0; known == VG_OK && d < a.ndim && n + 24 < sizeof x->inventory; d++)
-        n += (size_t)snprintf(x->inventory + n, sizeof x->inventory - n, "%s%llu", d ? ", " : "",
-                              (unsigned long long)a.shape[d]);
-    snprintf(x->inventory + n, sizeof x->inventory - n, known == VG_OK ? ")" : "?)");
+    for (size_t i = 0; i < sizeof body_names / sizeof *body_names; i++) x->of_body |= is_called(path, body_names[i]);
+    if (known == VG_OK) write_shape(shape, &a);
+    if (n + strlen(shape) + 34 > sizeof x->inventory) return;
+    snprintf(x->inventory + n, sizeof x->inventory - n, "%s%.*s %s", n ? ", " : "",
+             (int)(strlen(path) - 4 > 30 ? 30 : strlen(path) - 4), path, shape);
 }
 
 /* `in` starts at an array that fills it to its end. */
@@ -92,6 +116,7 @@ static int hold(reading *x, enum array i, vgi_input *in, const char *subject, vg
     int r = vgi_npy_read(&h->a, &bytes, in, subject, e);
     if (r < 0) return r;
     h->there = true;
+    write_shape(h->shape, &h->a);
     h->data.size = 0;
     r = vgi_input_take(in, &h->data, bytes, NULL, e);
     if (r == VG_ETRUNC) return vg_fail(e, r, "%s ends too early", subject);
@@ -143,6 +168,12 @@ static int hold_all(reading *x, vgi_input *in, vg_err *e)
 static int wrong(const reading *x, enum array i, const char *what, vg_err *e)
 {
     return vg_fail(e, VG_EINPUT, "array '%s' in %s %s", x->held[i].name, x->subject, what);
+}
+
+static int wrong_shape(const reading *x, enum array i, const char *shape, vg_err *e)
+{
+    return vg_fail(e, VG_EINPUT, "array '%s' in %s is of shape %s, not %s", x->held[i].name, x->subject,
+                   x->held[i].shape, shape);
 }
 
 static int missing(const reading *x, enum array i, enum array because, vg_err *e)
@@ -252,9 +283,9 @@ static int text_at(const reading *x, enum array i, size_t k, char **text, vg_err
 
 static int holds_no_frames(const reading *x, vg_err *e)
 {
-    if (x->has_poses && x->has_betas)
+    if (x->of_body)
         return vg_fail(e, VG_EINPUT,
-                       "%s holds angles of a body model (SMPL: poses, betas) and no vertices: let the model make the "
+                       "%s holds parameters of a body model (SMPL: poses, betas) and no vertices: let the model make the "
                        "vertices first; it has: %s",
                        x->subject, x->inventory);
     return vg_fail(e, VG_EINPUT,
@@ -367,10 +398,12 @@ static int choose_values(reading *x, vg_head *h, const vg_reading *how, vg_err *
     }
     if (kinds[found] == VG_FEATURES && a->ndim == 3 && a->shape[2] < 1 << 20) x->width = h->width = (size_t)a->shape[2];
     if (a->ndim != 3 || a->shape[2] != x->width || x->width == 0 || a->shape[1] == 0 || a->shape[1] >= UINT32_MAX)
-        return wrong(
-            x, x->values,
-            kinds[found] == VG_FEATURES ? "is not of shape (frames, vertices, numbers)" :
-            x->width == 3 ? "is not of shape (frames, elements, 3)" : "is not of shape (frames, elements, 4)", e);
+        return wrong_shape(x, x->values,
+                           kinds[found] == VG_FEATURES   ? "(frames, vertices, numbers)"
+                           : kinds[found] == VG_VERTICES ? "(frames, vertices, 3)"
+                           : x->width == 3               ? "(frames, elements, 3)"
+                                                         : "(frames, elements, 4)",
+                           e);
     if (a->shape[0] == 0) return wrong(x, x->values, "holds no frame", e);
     x->frames = (size_t)a->shape[0], x->count = (size_t)a->shape[1];
     h->kind = kinds[found], h->count = x->count;
@@ -423,7 +456,7 @@ static int take_equal_faces(reading *x, vg_head *h, vg_err *e)
     vg_mesh *m = &h->body.mesh;
     if (x->held[FACE_OFFSETS].there)
         return wrong(x, FACES, "is there beside 'face_offsets': faces are told by one of them", e);
-    if (f->a.ndim != 2 || f->a.shape[1] < 2) return wrong(x, FACES, "is not of shape (faces, corners of a face)", e);
+    if (f->a.ndim != 2 || f->a.shape[1] < 2) return wrong_shape(x, FACES, "(faces, corners of a face)", e);
     int r = copy_indices(x, FACES, m->nv, &m->vert, &corners, e);
     if (r < 0) return r;
     if (corners >= UINT32_MAX || f->a.shape[0] >= UINT32_MAX) return wrong(x, FACES, "is too long", e);
@@ -445,7 +478,7 @@ static int take_links(reading *x, vg_head *h, vg_err *e)
 {
     static const uint64_t pairs[2] = {UINT64_MAX, 2};
     if (!x->held[LINKS].there) return missing(x, LINKS, x->values, e);
-    if (!has_shape(&x->held[LINKS], 2, pairs)) return wrong(x, LINKS, "is not of shape (links, 2)", e);
+    if (!has_shape(&x->held[LINKS], 2, pairs)) return wrong_shape(x, LINKS, "(links, 2)", e);
     h->has_links = true;
     size_t n;
     int r = copy_indices(x, LINKS, h->body.mesh.nv, &h->links, &n, e);

@@ -543,7 +543,7 @@ static int finish_tex(struct reading *r)
     return VG_OK;
 }
 
-static int read_obj(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
+int vgi_obj_read(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
 {
     vg_err own;
     struct reading r = start_reading(m, data, n, subject, e ? e : &own);
@@ -552,6 +552,15 @@ static int read_obj(vg_model *m, const char *data, size_t n, const char *subject
     if (m->mesh.nv == 0) return vg_fail(e, VG_EINPUT, "%s has no vertices (no line 'v x y z')", subject);
     result = check_vertices(&r);
     return result == VG_OK ? finish_tex(&r) : result;
+}
+
+static int read_obj(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
+{
+    int r = vgi_obj_read(m, data, n, subject, e);
+    size_t frames = r == VG_OK ? vgi_obj_frames(m) : 0;
+    if (frames && vgi_obj_numbered(m, frames))
+        vgi_note(&m->note, "its %zu objects are of one topology: --objects frames reads them as a sequence", frames);
+    return r;
 }
 
 /* Is the first statement one of OBJ? Text that has comments only is left to its name. */

@@ -1,9 +1,9 @@
 /* off.c: OFF, the object file format of Geomview, as text: vertices and faces.
  * Leaves out normals, colours and texture coordinates (skipped), binary files and other dimensions than 3 (refused).
  *
- * OFF is a sequence of words, whatever the lines; only colours, normals and the like, which may or may not be there, are
- * told by the end of the line. So a file is read so that what stands behind an element on its line is passed over, and
- * when that fails, as words alone.
+ * OFF is a sequence of words, whatever the lines; only colours, normals and the like, which may or may not be there, end
+ * with the line. So up to three readings are tried, until one fits: elements end with their line, whatever else stands
+ * there; the vertices are words, three each, and faces end with their line; all are words.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -16,7 +16,7 @@ enum { MOST_NUMBER = 26, MOST_INDEX = 11, SHOWN = 40 };
 
 struct reading {
     const char *data, *end, *p;
-    bool bare; /* words alone: three to a vertex, no colours */
+    bool bare_vertices, bare_faces; /* words alone: three to a vertex, no colours */
     const char *subject;
     vg_err *e;
     vg_model *m;
@@ -111,11 +111,12 @@ static size_t keyword(const char *s, const char *end)
     return ends ? (size_t)(p - s) : 0;
 }
 
-/* The keyword and the counts: of vertices, of faces, and of edges, which some writers leave out. */
+/* The keyword, which a file called .off may lack, and the counts: of vertices, of faces, and of edges, which some writers
+ * leave out. */
 static int read_header(struct reading *r, size_t *nv, size_t *nf)
 {
     size_t n = find_word(r) ? keyword(r->p, r->end) : 0, edges;
-    if (n == 0) return fail_here(r, "OFF");
+    if (n == 0 && (r->p == r->end || *r->p < '0' || *r->p > '9')) return fail_here(r, "OFF");
     if (memchr(r->p, 'n', n) || memchr(r->p, '4', n))
         return vg_fail(r->e, VG_EINPUT, "%s is %.*s, with vertices of other than 3 coordinates, which is not read",
                        r->subject, (int)n, r->p);
@@ -124,8 +125,8 @@ static int read_header(struct reading *r, size_t *nv, size_t *nf)
         return vg_fail(r->e, VG_EINPUT, "%s is binary OFF, which is not read: write it as text", r->subject);
     int result = read_count(r, nv);
     if (result == VG_OK) result = read_count(r, nf);
-    if (result == VG_OK && (r->bare || line_goes_on(r))) result = read_count(r, &edges);
-    return result == VG_OK && !r->bare && line_goes_on(r) ? fail_here(r, "end of line") : result;
+    if (result == VG_OK && (r->bare_faces || line_goes_on(r))) result = read_count(r, &edges);
+    return result == VG_OK && !r->bare_vertices && line_goes_on(r) ? fail_here(r, "end of line") : result;
 }
 
 /* The shortest vertex is "0 0 0", the shortest face "0", with a blank that the last may lack. Counts beyond what is left
@@ -185,12 +186,12 @@ static int read_elements(struct reading *r, size_t nv, size_t nf)
     for (size_t v = 0; v < nv && result == VG_OK; v++) {
         if (!find_word(r)) return fail_short(r, "vertex", v, nv);
         for (int k = 0; k < 3 && result == VG_OK; k++) result = read_coordinate(r, m->vertices + 3 * v + k);
-        if (!r->bare) skip_line(r);
+        if (!r->bare_vertices) skip_line(r);
     }
     for (size_t f = 0; f < nf && result == VG_OK; f++) {
         if (!find_word(r)) return fail_short(r, "face", f, nf);
         result = read_face(r);
-        if (!r->bare) skip_line(r);
+        if (!r->bare_faces) skip_line(r);
     }
     return result;
 }
@@ -199,14 +200,16 @@ static int read_elements(struct reading *r, size_t nv, size_t nf)
 static int finish(struct reading *r)
 {
     if (!find_word(r)) return VG_OK;
-    if (r->bare) return fail_here(r, "the end of the file");
+    if (r->bare_vertices) return fail_here(r, "the end of the file");
     vgi_note(&r->m->note, "left out what stands behind the last face, from line %zu on", line_of(r, r->p));
     return VG_OK;
 }
 
-static int read_as(vg_model *m, bool bare, const char *data, size_t n, const char *subject, vg_err *e)
+/* bare: nothing, the vertices, or vertices and faces are words alone */
+static int read_as(vg_model *m, int bare, const char *data, size_t n, const char *subject, vg_err *e)
 {
-    struct reading r = {.data = data, .end = data + n, .p = data, .bare = bare, .subject = subject, .e = e, .m = m};
+    struct reading r = {.data = data, .end = data + n, .p = data, .subject = subject, .e = e, .m = m};
+    r.bare_vertices = bare > 0, r.bare_faces = bare > 1;
     size_t nv = 0, nf = 0;
     int result = read_header(&r, &nv, &nf);
     if (result == VG_OK) result = check_counts(&r, nv, nf);
@@ -221,14 +224,19 @@ static int read_as(vg_model *m, bool bare, const char *data, size_t n, const cha
 
 static int read_off(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
 {
-    int result = read_as(m, false, data, n, subject, e);
-    if (result != VG_EINPUT && result != VG_ETRUNC) return result;
-    vg_model words = {0};
-    int again = read_as(&words, true, data, n, subject, NULL);
-    if (again < 0) return vg_model_clear(&words), again == VG_ENOMEM ? vg_fail(e, again, "not enough memory") : result;
-    vg_model_clear(m);
-    *m = words;
-    return VG_OK;
+    int result = read_as(m, 0, data, n, subject, e);
+    for (int bare = 1; bare <= 2 && (result == VG_EINPUT || result == VG_ETRUNC); bare++) {
+        vg_model words = {0};
+        int again = read_as(&words, bare, data, n, subject, NULL);
+        if (again == VG_OK) {
+            vg_model_clear(m);
+            *m = words;
+            return VG_OK;
+        }
+        vg_model_clear(&words);
+        if (again == VG_ENOMEM) result = vg_fail(e, again, "not enough memory");
+    }
+    return result;
 }
 
 static bool sniff_off(const unsigned char *data, size_t n)

@@ -131,23 +131,33 @@ static void note_file(item *it)
     it->regular = it->base >= 0;
 }
 
+static const vgi_format *mesh_format(const item *it, const unsigned char *data, size_t n)
+{
+    const vgi_format *f = vgi_format_by_content(data, n);
+    return f || !it->path ? f : vgi_format_by_suffix(it->path);
+}
+
 /* Files that are certainly no meshes are recognised first: a tar may begin with the name of a mesh, and a compressed
  * file may be called like one. Everything unknown is left to libarchive, which knows more kinds than are recognised
  * here; of a pipe it sees only the start, or a disk would fill with it first. */
-static int judge_start(item *it, const unsigned char *data, size_t n, vg_err *e)
+static int judge_start(const vg_source *s, item *it, const unsigned char *data, size_t n, vg_err *e)
 {
     const vgi_sequence_format *named = it->path ? vgi_sequence_by_suffix(it->path) : NULL;
+    const vgi_format *mesh;
     if (vgi_is_stream(data, n)) it->content = STREAM;
     else if ((it->sequence = vgi_sequence_by_content(data, n))) it->content = SEQUENCE;
     else if (vgi_is_archive(data, n)) it->content = ARCHIVE;
     else if (named && named->open) it->content = SEQUENCE, it->sequence = named;
-    else if (vgi_format_by_content(data, n) || (it->path && vgi_format_by_suffix(it->path))) it->content = MESH;
+    else if ((mesh = mesh_format(it, data, n))) {
+        it->sequence = s->reading.objects && mesh == &vgi_format_obj ? &vgi_sequence_objects : NULL;
+        it->content = it->sequence ? SEQUENCE : MESH;
+    }
     else if (it->regular || vgi_may_be_archive(data, n)) it->content = ARCHIVE;
     else return vgi_unknown_kind(item_name(it), e);
     return VG_OK;
 }
 
-static int tell_content(item *it, vgi_input *in, vg_err *e)
+static int tell_content(const vg_source *s, item *it, vgi_input *in, vg_err *e)
 {
     const unsigned char *data;
     vg_bytes own = {0};
@@ -160,7 +170,7 @@ static int tell_content(item *it, vgi_input *in, vg_err *e)
         return vg_fail(e, VG_ETRUNC, "standard input is empty: look at the program before in the pipe");
     if (n == 0) return vg_fail(e, VG_ETRUNC, "'%s' is empty", it->path);
     r = vgi_plain_text(&own, &data, &n, e);
-    if (r == VG_OK) r = judge_start(it, data, n, e);
+    if (r == VG_OK) r = judge_start(s, it, data, n, e);
     vg_bytes_clear(&own);
     return r;
 }
@@ -279,7 +289,7 @@ static int look_at(vg_source *s, item *it, vg_err *e)
     note_file(it);
     int r = open_input(s, it, &in, e);
     if (r < 0) return r;
-    r = tell_content(it, in, e);
+    r = tell_content(s, it, in, e);
     if (r == VG_OK && it->content == ARCHIVE) r = unpack_stream(s, it, &in, e);
     /* standard input has been read from: its bytes are in `in`, even when the file could be read again */
     if (r < 0 || (it->regular && it->path)) vgi_input_free(&in);
@@ -551,6 +561,7 @@ static int next_member(vg_source *s, vg_err *e)
     if (r == 0) vgi_archive_close(&s->archive);
     if (r <= 0) return r;
     const vgi_sequence_format *sequence = vgi_packable(path);
+    if (s->reading.objects && vgi_format_by_suffix(path) == &vgi_format_obj) sequence = &vgi_sequence_objects;
     return sequence ? play_member(s, sequence, path, e) : put_pose(s, s->archive_name, path, e);
 }
 

@@ -137,9 +137,14 @@ static bool is_space(char c)
     return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == '\v' || c == '\f';
 }
 
-static const char *next_word(struct reading *r, size_t *n)
+static void skip_spaces(struct reading *r)
 {
     while (r->p < r->end && is_space(*r->p)) r->p++;
+}
+
+static const char *next_word(struct reading *r, size_t *n)
+{
+    skip_spaces(r);
     const char *word = r->p;
     while (r->p < r->end && !is_space(*r->p)) r->p++;
     *n = (size_t)(r->p - word);
@@ -226,14 +231,17 @@ static int read_solid(struct reading *r)
     return result;
 }
 
+/* One solid after another; what else stands behind the last is left out. */
 static int read_text(struct reading *r)
 {
-    for (;;) {
-        int result = read_solid(r);
-        if (result < 0) return result;
-        while (r->p < r->end && is_space(*r->p)) r->p++;
-        if (r->p == r->end) return VG_OK;
-    }
+    int result;
+    do {
+        result = read_solid(r);
+        skip_spaces(r);
+    } while (result == VG_OK && r->end - r->p >= 5 && !strncasecmp(r->p, "solid", 5));
+    if (result == VG_OK && r->p < r->end)
+        vgi_note(&r->m->note, "left out what stands behind the last solid, from line %zu on", line_of(r, r->p));
+    return result;
 }
 
 /* ---- which of both ---- */

@@ -56,6 +56,7 @@ typedef struct vg_source vg_source;
 typedef struct vg_reading {
     const char *array_axes; /* NPZ: what the axes of the positions count, in their order: "fvx" (frames, vertices, x y z),
                                "vxf", ...; NULL: found from their lengths, the faces and the reference */
+    bool objects;           /* OBJ: each object is a frame, all of one topology */
     const char *animation;  /* glTF: the one of this name; NULL: all, one after another */
     double fps;             /* glTF: a frame so often a second, from the first key to the last; 0: at each key */
     bool shapes;            /* glTF: morph targets, whatever animations there are */
