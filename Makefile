@@ -41,6 +41,14 @@ WEBP_LIBS ?= $(shell $(PKG_CONFIG) --libs libwebpmux libwebp 2>/dev/null || echo
 ZLIB_LIBS ?= $(shell $(PKG_CONFIG) --libs zlib 2>/dev/null || echo -lz)
 JANSSON_LIBS ?= $(shell $(PKG_CONFIG) --libs jansson 2>/dev/null || echo -ljansson)
 
+# Compressed glTF is read where these libraries are installed (WITH_DRACO=0 WITH_MESHOPT=0: without them).
+CXX ?= g++
+has_header = $(shell $(CXX) $(CPPFLAGS) -include $(1) -E -x c++ /dev/null >/dev/null 2>&1 && echo 1 || echo 0)
+WITH_DRACO ?= $(call has_header,draco/draco_features.h)
+WITH_MESHOPT ?= $(call has_header,meshoptimizer.h)
+CODEC_CPPFLAGS := $(if $(filter 1,$(WITH_DRACO)),-DVG_DRACO) $(if $(filter 1,$(WITH_MESHOPT)),-DVG_MESHOPT)
+CODEC_LIBS := $(if $(filter 1,$(WITH_DRACO)),-ldraco -lstdc++) $(if $(filter 1,$(WITH_MESHOPT)),-lmeshoptimizer)
+
 ALL_CPPFLAGS := -D_GNU_SOURCE -Ilib -include lib/core/banned.h $(CHOLMOD_CFLAGS) $(ARCHIVE_CFLAGS) $(PNG_CFLAGS) $(CPPFLAGS)
 ALL_CFLAGS := -std=gnu11 -fPIC -Wall -Wextra -Wshadow -Wvla -Wstrict-prototypes -Wmissing-prototypes -Wpointer-arith -Wwrite-strings -Wno-psabi
 ifeq ($(WERROR),1)
@@ -76,7 +84,8 @@ ALL_LIBS := $(CHOLMOD_LIBS) $(LAPACKE_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHAS
 KERNEL_SRC := $(sort $(wildcard lib/*/*_kernel.c lib/*/*/*_kernel.c))
 LIB_SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard lib/*/*.c lib/*/*/*.c)))
 KERNEL_OBJ := $(foreach set,$(SETS),$(KERNEL_SRC:%.c=$(B)/%.$(set).o))
-LIB_OBJ := $(LIB_SRC:%.c=$(B)/%.o) $(KERNEL_OBJ) $(B)/page_text.o
+CODEC_OBJ := $(if $(filter 1,$(WITH_DRACO)),$(B)/lib/io/codec_draco.o)
+LIB_OBJ := $(LIB_SRC:%.c=$(B)/%.o) $(CODEC_OBJ) $(KERNEL_OBJ) $(B)/page_text.o
 PROGRAMS := $(patsubst cmd/%.c,%,$(sort $(wildcard cmd/vg-*.c)))
 CMD_SHARED := $(filter-out cmd/vg-%.c,$(sort $(wildcard cmd/*.c)))
 CMD_OBJ := $(CMD_SHARED:%.c=$(B)/%.o)
@@ -96,6 +105,17 @@ $(B)/flags: FORCE
 FORCE:
 
 $(FAST_SRC:%=$(B)/%.o) $(KERNEL_OBJ): ALL_CFLAGS += $(FAST)
+
+# which codecs there are, these files alone ask for
+$(B)/codecs: FORCE
+	@mkdir -p $(B)
+	@echo '$(CXX) $(CODEC_CPPFLAGS) $(CODEC_LIBS)' | cmp -s - $@ || echo '$(CXX) $(CODEC_CPPFLAGS) $(CODEC_LIBS)' > $@
+CODEC_C_OBJ := $(addprefix $(B)/lib/io/,codec_meshopt.o codec_none.o)
+$(CODEC_C_OBJ): $(B)/codecs
+$(CODEC_C_OBJ): ALL_CPPFLAGS += $(CODEC_CPPFLAGS)
+$(B)/%.o: %.cc $(B)/flags $(B)/codecs
+	@mkdir -p $(@D)
+	$(CXX) -Ilib $(CPPFLAGS) $(CODEC_CPPFLAGS) -std=c++17 -fPIC -Wall -Wextra $(filter -Werror -O% -g% -fsanitize% -fno-% --coverage,$(ALL_CFLAGS)) -MMD -MP -c -o $@ $<
 
 $(B)/%.o: %.c $(B)/flags
 	@mkdir -p $(@D)
@@ -129,9 +149,9 @@ $(B)/page_text.c: $(foreach part,$(PAGE_PARTS),$(PART_$(part))) Makefile
 $(B)/page_text.o: $(B)/page_text.c $(B)/flags
 	$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
 
-$(B)/libvg.a: $(LIB_OBJ)
+$(B)/libvg.a: $(LIB_OBJ) $(B)/codecs
 	@rm -f $@
-	$(AR) rcs $@ $^
+	$(AR) rcs $@ $(LIB_OBJ)
 
 $(B)/shared.a: $(CMD_OBJ)
 	@rm -f $@
@@ -139,15 +159,15 @@ $(B)/shared.a: $(CMD_OBJ)
 
 $(B)/bin/%: $(B)/cmd/%.o $(B)/shared.a $(B)/libvg.a
 	@mkdir -p $(@D)
-	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(ALL_LIBS)
+	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(CODEC_LIBS) $(ALL_LIBS)
 
 $(B)/unit/%: $(B)/tests/unit/%.o $(B)/libvg.a
 	@mkdir -p $(@D)
-	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(ALL_LIBS)
+	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(CODEC_LIBS) $(ALL_LIBS)
 
 $(B)/bench/%: $(B)/tests/bench/%.o $(B)/libvg.a
 	@mkdir -p $(@D)
-	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(ALL_LIBS)
+	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(CODEC_LIBS) $(ALL_LIBS)
 
 # with CONFIG=fuzz the engine brings main; otherwise replay.c does, and the same files run over the corpora
 ifeq ($(CONFIG),fuzz)
@@ -159,7 +179,7 @@ FUZZ_LINK :=
 endif
 $(B)/fuzz/%: $(B)/tests/fuzz/%.o $(FUZZ_MAIN) $(B)/libvg.a
 	@mkdir -p $(@D)
-	$(CC) $(ALL_CFLAGS) $(FUZZ_LINK) $(ALL_LDFLAGS) -o $@ $^ $(ALL_LIBS)
+	$(CC) $(ALL_CFLAGS) $(FUZZ_LINK) $(ALL_LDFLAGS) -o $@ $^ $(CODEC_LIBS) $(ALL_LIBS)
 
 # preloaded into the programs by tests/alloc.bats; without sanitizers, whatever they have
 $(B)/tools/%.so: tests/tools/%.c $(B)/flags
@@ -237,7 +257,7 @@ install: all
 	install -m 644 lib/vg.h $(INCLUDE_TO)
 	install -m 644 $(sort $(wildcard lib/vg/*.h)) $(INCLUDE_TO)/vg
 	sed -e 's|@PREFIX@|$(PREFIX)|' -e 's|@LIBDIR@|$(LIBDIR)|' -e 's|@VERSION@|$(VERSION)|' \
-	    -e 's|@LIBS@|$(strip $(ALL_LIBS))|' lib/libvg.pc.in > $(LIB_TO)/pkgconfig/libvg.pc
+	    -e 's|@LIBS@|$(strip $(CODEC_LIBS) $(ALL_LIBS))|' lib/libvg.pc.in > $(LIB_TO)/pkgconfig/libvg.pc
 	for page in man/*.[1-9]; do install -m 644 $$page $(MAN_TO)/man$${page##*.} || exit 1; done
 	install -m 644 completion/vg.bash $(COMPLETION_TO)/vg
 	for program in $(PROGRAMS); do ln -sf vg $(COMPLETION_TO)/$$program || exit 1; done

@@ -34,7 +34,7 @@ version() {
             ls -d "$ROOT"/$path >/dev/null || fail "$list: there is no $path"
         done <"$list"
     done
-    needed=$(sed 's/#.*//' "$ROOT/debian-packages.txt" | grep -v -x -e gcc -e libc6-dev -e make -e '')
+    needed=$(sed 's/#.*//' "$ROOT/debian-packages.txt" | grep -v -x -F -e gcc -e g++ -e libc6-dev -e make -e '')
     for package in $needed; do
         grep -q "^ *$package\( <!nocheck>\)\?,\?\$" "$ROOT/debian/control" || fail "debian/control does not name $package"
     done

@@ -1,5 +1,6 @@
 /* gltf.c: glTF 2.0 as a container: GLB chunks, JSON, buffers inside or beside, accessors; the tables of both formats.
- * Leaves out what a scene is (gltf_play.c), how a sequence becomes one (gltf_write.c), and compressed geometry.
+ * Leaves out what a scene is (gltf_play.c), how a sequence becomes one (gltf_write.c), and compressed geometry
+ * (gltf_unpack.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf.h"
 
@@ -70,7 +71,8 @@ bool vgi_gltf_is_understood(const char *extension)
     static const char *const understood[] = {
         "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "KHR_xmp_",
         "EXT_lights_", "EXT_mesh_gpu_instancing", "KHR_animation_pointer", "EXT_materials_", "KHR_audio_",
-        "MSFT_texture_", "MSFT_packing_", "KHR_node_selectability", "KHR_node_hoverability", "FB_"};
+        "MSFT_texture_", "MSFT_packing_", "KHR_node_selectability", "KHR_node_hoverability", "FB_",
+        "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"};
     for (size_t i = 0; i < sizeof understood / sizeof *understood; i++)
         if (starts_with(extension, understood[i])) return true;
     return false;
@@ -86,17 +88,6 @@ void vgi_gltf_note_extensions(const vgi_gltf *g, vg_note *note)
     }
 }
 
-static int refuse_extension(const vgi_gltf *g, const char *name, vg_err *e)
-{
-    if (!strcmp(name, "KHR_draco_mesh_compression"))
-        return vgi_gltf_bad(g, e, "its meshes are compressed with Draco (%s), which is not read: export without compression",
-                            name);
-    if (strstr(name, "_meshopt_compression"))
-        return vgi_gltf_bad(g, e, "its data are compressed with meshopt (%s), which is not read: export without compression",
-                            name);
-    return vgi_gltf_bad(g, e, "it requires the extension '%.60s', which is not known", name);
-}
-
 static int check_claims(const vgi_gltf *g, vg_err *e)
 {
     const char *version = vgi_json_text(vgi_json_get(vgi_json_get(g->json, "asset"), "version"));
@@ -106,7 +97,8 @@ static int check_claims(const vgi_gltf *g, vg_err *e)
         return vgi_gltf_bad(g, e, "it is glTF version '%.20s', and only version 2 is known", version);
     for (size_t i = 0; i < vgi_json_count(required); i++) {
         const char *name = vgi_json_text(vgi_json_at(required, i));
-        if (!name || !vgi_gltf_is_understood(name)) return refuse_extension(g, name ? name : "?", e);
+        if (!name || !vgi_gltf_is_understood(name))
+            return vgi_gltf_bad(g, e, "it requires the extension '%.60s', which is not known", name ? name : "?");
     }
     return VG_OK;
 }
@@ -202,6 +194,7 @@ static int read_buffer(const vgi_gltf *g, vgi_gltf_buffer *b, const vgi_json *fr
         if (r < 0) return r;
         b->data = b->own.data, b->size = b->own.size;
     }
+    if (n > b->size && vgi_gltf_is_fallback(from)) return VG_OK; /* its views are compressed, elsewhere */
     if (n > b->size)
         return vgi_gltf_bad(g, e, "a buffer is to have %llu bytes and has %zu", (unsigned long long)n, b->size);
     b->size = (size_t)n;
@@ -213,6 +206,7 @@ static int read_buffers(vgi_gltf *g, const unsigned char *bin, size_t nbin, vgi_
     const vgi_json *list = vgi_json_get(g->json, "buffers");
     size_t n = vgi_json_count(list);
     if (!(g->buffers = vgi_array(n, sizeof *g->buffers, e))) return VG_ENOMEM;
+    g->buffers_cap = n;
     int r = VG_OK;
     for (; g->nbuffers < n && r == VG_OK; g->nbuffers++) {
         vgi_gltf_buffer *b = &g->buffers[g->nbuffers];
@@ -232,7 +226,8 @@ int vgi_gltf_open(vgi_gltf *g, vgi_input *in, const char *subject, vg_err *e)
     if (g->file.size >= 4 && !memcmp(g->file.data, "glTF", 4)) r = read_binary(g, &bin, &nbin, e);
     else r = vgi_json_parse(&g->json, g->file.data, g->file.size, subject, e);
     if (r == VG_OK) r = check_claims(g, e);
-    return r < 0 ? r : read_buffers(g, bin, nbin, in, e);
+    if (r == VG_OK) r = read_buffers(g, bin, nbin, in, e);
+    return r < 0 ? r : vgi_gltf_unpack(g, e);
 }
 
 void vgi_gltf_clear(vgi_gltf *g)
@@ -271,7 +266,7 @@ static int take_whole(const vgi_gltf *g, const vgi_json *from, const char *key, 
     return VG_OK;
 }
 
-static size_t component_bytes(int component)
+size_t vgi_gltf_component_bytes(int component)
 {
     switch (component) {
     case VGI_GLTF_BYTE:
@@ -288,7 +283,7 @@ static int take_component(const vgi_gltf *g, const vgi_json *from, int *componen
 {
     size_t x = 0;
     int r = take_whole(g, from, "componentType", &x, e);
-    if (r == VG_OK && (x > INT32_MAX || !component_bytes((int)x)))
+    if (r == VG_OK && (x > INT32_MAX || !vgi_gltf_component_bytes((int)x)))
         r = vgi_gltf_bad(g, e, "an accessor's componentType is not known");
     if (r == VG_OK) *component = (int)x;
     return r;
@@ -347,7 +342,7 @@ static double number_at(const unsigned char *p, int component)
 
 static double sparse_number(const vgi_accessor *a, size_t i)
 {
-    return number_at(a->sparse + i * component_bytes(a->sparse_component), a->sparse_component);
+    return number_at(a->sparse + i * vgi_gltf_component_bytes(a->sparse_component), a->sparse_component);
 }
 
 static int take_sparse(const vgi_gltf *g, const vgi_json *from, vgi_accessor *a, vg_err *e)
@@ -362,10 +357,10 @@ static int take_sparse(const vgi_gltf *g, const vgi_json *from, vgi_accessor *a,
         a->sparse_component != VGI_GLTF_UINT)
         r = vgi_gltf_bad(g, e, "a sparse accessor's indices are no whole numbers");
     if (r == VG_OK)
-        r = find_bytes(g, indices, a->nsparse, component_bytes(a->sparse_component), &a->sparse, &stride, e);
-    if (r == VG_OK && stride != component_bytes(a->sparse_component))
+        r = find_bytes(g, indices, a->nsparse, vgi_gltf_component_bytes(a->sparse_component), &a->sparse, &stride, e);
+    if (r == VG_OK && stride != vgi_gltf_component_bytes(a->sparse_component))
         r = vgi_gltf_bad(g, e, "a sparse accessor's indices have a stride");
-    const size_t element = a->width * component_bytes(a->component);
+    const size_t element = a->width * vgi_gltf_component_bytes(a->component);
     if (r == VG_OK) r = find_bytes(g, vgi_json_get(from, "values"), a->nsparse, element, &a->replaced, &stride, e);
     if (r == VG_OK && stride != element) r = vgi_gltf_bad(g, e, "a sparse accessor's values have a stride");
     for (size_t i = 0; i < a->nsparse && r == VG_OK; i++)
@@ -374,7 +369,7 @@ static int take_sparse(const vgi_gltf *g, const vgi_json *from, vgi_accessor *a,
     return r;
 }
 
-static size_t width_of(const char *type)
+size_t vgi_gltf_width(const char *type)
 {
     static const struct {
         const char *name;
@@ -391,7 +386,7 @@ int vgi_gltf_any_accessor(const vgi_gltf *g, const vgi_json *ref, vgi_accessor *
     uint64_t count;
     int r = vgi_gltf_item(g, ref, "accessors", &from, NULL, e);
     if (r < 0) return r;
-    const size_t width = width_of(vgi_json_text(vgi_json_get(from, "type")));
+    const size_t width = vgi_gltf_width(vgi_json_text(vgi_json_get(from, "type")));
     if (!width || !vgi_json_whole(vgi_json_get(from, "count"), &count) || count > vgi_gltf_most_elements)
         return vgi_gltf_bad(g, e, "an accessor is of an unknown type or count");
     return vgi_gltf_accessor(g, ref, width, (size_t)count, "the asset", a, e);
@@ -406,14 +401,14 @@ int vgi_gltf_accessor(const vgi_gltf *g, const vgi_json *ref, size_t width, size
     if (r == VG_OK) r = take_whole(g, from, "count", &a->count, e);
     if (r == VG_OK) r = take_component(g, from, &a->component, e);
     if (r < 0) return r;
-    a->width = width_of(vgi_json_text(vgi_json_get(from, "type")));
+    a->width = vgi_gltf_width(vgi_json_text(vgi_json_get(from, "type")));
     a->normalized = vgi_json_is_true(vgi_json_get(from, "normalized"));
     if (a->width != width) return vgi_gltf_bad(g, e, "the accessor of %s is of another type", what);
     if (a->count == 0) return vgi_gltf_bad(g, e, "the accessor of %s has 0 elements", what);
     if (count && a->count != count)
         return vgi_gltf_bad(g, e, "the accessor of %s has %zu elements, not %zu", what, a->count, count);
     if (vgi_json_get(from, "bufferView"))
-        r = find_bytes(g, from, a->count, width * component_bytes(a->component), &a->data, &a->stride, e);
+        r = find_bytes(g, from, a->count, width * vgi_gltf_component_bytes(a->component), &a->data, &a->stride, e);
     else if (!count) return vgi_gltf_bad(g, e, "the accessor of %s has no bytes", what);
     if (r == VG_OK && vgi_json_get(from, "sparse")) r = take_sparse(g, vgi_json_get(from, "sparse"), a, e);
     return r;
@@ -428,7 +423,7 @@ const unsigned char *vgi_accessor_at(const vgi_accessor *a, size_t i)
         else high = mid;
     }
     if (low < a->nsparse && sparse_number(a, low) == (double)i)
-        return a->replaced + low * a->width * component_bytes(a->component);
+        return a->replaced + low * a->width * vgi_gltf_component_bytes(a->component);
     return a->data ? a->data + i * a->stride : NULL;
 }
 
@@ -446,7 +441,7 @@ static double normal_of(double x, int component)
 void vgi_accessor_get(const vgi_accessor *a, size_t i, double *to)
 {
     const unsigned char *p = vgi_accessor_at(a, i);
-    size_t bytes = component_bytes(a->component);
+    size_t bytes = vgi_gltf_component_bytes(a->component);
     for (size_t k = 0; k < a->width; k++) {
         double x = p ? number_at(p + k * bytes, a->component) : 0;
         to[k] = a->normalized ? normal_of(x, a->component) : x;
@@ -455,7 +450,7 @@ void vgi_accessor_get(const vgi_accessor *a, size_t i, double *to)
 
 size_t vgi_accessor_bytes(const vgi_accessor *a)
 {
-    return a->width * component_bytes(a->component);
+    return a->width * vgi_gltf_component_bytes(a->component);
 }
 
 bool vgi_accessor_is_index(const vgi_accessor *a)

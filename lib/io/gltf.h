@@ -40,13 +40,19 @@ typedef struct vgi_gltf {
     const char *subject; /* borrowed */
     vg_bytes file;
     vgi_json *json;
-    size_t nbuffers;
+    size_t nbuffers, buffers_cap;
+    size_t given; /* buffers of the file: those behind them are what was compressed */
     vgi_gltf_buffer *buffers;
 } vgi_gltf;
 
 /* vgi_gltf_open: read a whole file, .glb or .gltf, with the buffers it needs. The caller clears it, also on failure. */
 int vgi_gltf_open(vgi_gltf *g, vgi_input *in, const char *subject, vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_clear(vgi_gltf *g);
+/* gltf_unpack.c: what is compressed is not any more, and has buffers of its own. */
+int vgi_gltf_unpack(vgi_gltf *g, vg_err *e) VG_MUST_CHECK;
+bool vgi_gltf_is_fallback(const vgi_json *buffer); /* for readers that cannot decompress: it may have no bytes */
+size_t vgi_gltf_component_bytes(int component);    /* 0: it is none */
+size_t vgi_gltf_width(const char *type);           /* numbers of an element of this type, "VEC3"; NULL, or 0: it is none */
 /* vgi_gltf_bad: VG_EINPUT, with the name of the file in front. */
 int vgi_gltf_bad(const vgi_gltf *g, vg_err *e, const char *format, ...) VG_PRINTF(3, 4);
 
