@@ -25,16 +25,44 @@ assert struct.unpack('<I4s', b[20 + n:28 + n]) == (len(bin), b'BIN\0') and len(b
 def floats(i):
     a = j['accessors'][i]
     width = {'SCALAR': 1, 'VEC3': 3}[a['type']]
-    off = j['bufferViews'][a['bufferView']]['byteOffset'] + a['byteOffset']
-    return struct.unpack_from('<%df' % (a['count'] * width), bin, off)
+    place = lambda x: j['bufferViews'][x['bufferView']]['byteOffset'] + x['byteOffset']
+    if 'bufferView' in a: return struct.unpack_from('<%df' % (a['count'] * width), bin, place(a))
+    s, values = a['sparse'], [0.0] * (a['count'] * width)
+    for k, v in enumerate(struct.unpack_from('<%dH' % s['count'], bin, place(s['indices']))):
+        values[3 * v:3 * v + 3] = struct.unpack_from('<3f', bin, place(s['values']) + 12 * k)
+    return values
 mesh = j['meshes'][0]
+copies = mesh['extras'].pop('vg_vertices')
 assert mesh['extras'] == {'targetNames': ['pose1', 'pose2', 'pose3'], 'vg_faces': [6, 4]}, mesh['extras']
+# the edges of a cube are sharp: a vertex for each corner of each face
+assert copies[0] == 8 and sorted(list(range(8)) + copies[1:]) == sorted(3 * list(range(8)))
 truth = [float(w) for w in open('truth.txt').read().split()]
 primitive = mesh['primitives'][0]
 base = floats(primitive['attributes']['POSITION'])
 for t, target in enumerate(primitive['targets']):
     moved = floats(target['POSITION'])
     assert max(abs(p + d - q) for p, d, q in zip(base, moved, truth[24 * t:24 * t + 24])) < 1e-6
+# the normals of a pose are those of its faces, which are two triangles each: weighted by their angles at the corner
+a = j['accessors'][primitive['indices']]
+index = struct.unpack_from('<%dI' % a['count'], bin, j['bufferViews'][a['bufferView']]['byteOffset'] + a['byteOffset'])
+def cross(a, b): return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+def unit(a):
+    l = sum(x * x for x in a) ** 0.5
+    return [x / l for x in a]
+for t in [None, 0, 1, 2]:
+    p, n = list(base), list(floats(primitive['attributes']['NORMAL']))
+    if t is not None:
+        p = [a + b for a, b in zip(p, floats(primitive['targets'][t]['POSITION']))]
+        n = [a + b for a, b in zip(n, floats(primitive['targets'][t]['NORMAL']))]
+    of = {}
+    for i in range(0, len(index), 3):
+        a, b, c = (p[3 * v:3 * v + 3] for v in index[i:i + 3])
+        for v in index[i:i + 3]: of.setdefault(v, []).append(cross([y - x for x, y in zip(a, b)], [y - x for x, y in zip(a, c)]))
+    assert len(of) == 24
+    for v, normals in of.items():
+        got = n[3 * v:3 * v + 3]
+        assert abs(sum(x * x for x in got) - 1) < 1e-5
+        assert min(sum(x * y for x, y in zip(got, unit(m))) for m in normals) > 0.99, (t, v, got, normals)
 sampler = j['animations'][0]['samplers'][0]
 assert floats(sampler['output']) == (1, 0, 0, 0, 1, 0, 0, 0, 1)
 assert max(abs(t - i / 25) for i, t in enumerate(floats(sampler['input']))) < 1e-7
@@ -516,7 +544,16 @@ EOF
     awk '/^v /{n++; if (n == 7) {$2 += 0.5}} {print}' rest.obj >shape.obj
     must vg-encode rest.obj shape.obj -o few.vgs
     must vg-decode --shapes -o few.glb few.vgs
-    [ "$(grep -ac '"sparse":{"count":1,' few.glb)" = 1 ] || fail "no sparse target"
+    py <<'EOF'
+import json, struct
+b = open('few.glb', 'rb').read()
+g = json.loads(b[20:20 + struct.unpack('<I', b[12:16])[0]])
+mesh = g['meshes'][0]
+copies = mesh['extras']['vg_vertices'][1:].count(6) # of the vertex that moves
+target, = mesh['primitives'][0]['targets']
+assert g['accessors'][target['POSITION']]['sparse']['count'] == 1 + copies, copies
+assert 1 + copies < g['accessors'][target['NORMAL']]['sparse']['count'] < 60
+EOF
     must vg-encode few.glb -o few-back.vgs
     must vg-diff -t 1e-7 few.vgs few-back.vgs
     # an animation keeps its name

@@ -310,11 +310,12 @@ static bool has_more(const vgi_gltf_scene *x, const vg_mesh *mesh)
     const vgi_json *doc = x->g.json;
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
         if (vgi_json_count(vgi_json_get(doc, lists[i]))) return true;
+    const bool plain = x->own && x->nparts == 1; /* its normals were made by the writer */
     if (x->nnodes > 1 || (mesh->nv != x->all && !x->own)) return true;
     for (size_t i = 0; i < x->nparts; i++)
         for (const char *key = vgi_json_key(x->parts[i].attributes, NULL); key;
              key = vgi_json_key(x->parts[i].attributes, key))
-            if (strcmp(key, "POSITION") && strcmp(key, "TEXCOORD_0")) return true;
+            if (strcmp(key, "POSITION") && strcmp(key, "TEXCOORD_0") && !(plain && !strcmp(key, "NORMAL"))) return true;
     return false;
 }
 

@@ -122,7 +122,11 @@ static int list_plain(vgi_gltf_writing *w, vg_err *e)
     if (!(x->lists = vgi_array(1, sizeof *x->lists, e))) return VG_ENOMEM;
     x->nlists = 1, x->n = w->seams.n, x->base[POSITIONS] = w->base;
     x->lists[0] = (vgi_gltf_list){.count = x->n};
-    return VG_OK;
+    if (!w->normals.n) return VG_OK;
+    x->lists[0].normals = true, x->base[NORMALS] = w->normals.base;
+    x->file[NORMALS] = vgi_array(x->n, VGI_GLTF_POINT, e);
+    x->world = vgi_array(w->h->body.mesh.nv, 3 * sizeof *x->world, e);
+    return x->file[NORMALS] && x->world ? VG_OK : VG_ENOMEM;
 }
 
 static int list_parts(vgi_gltf_writing *w, vg_err *e)
@@ -172,18 +176,29 @@ static void spread_plain(const vgi_gltf_writing *w)
         memcpy(to + 3 * v, x->first + 3 * (size_t)w->seams.from[v], VGI_GLTF_POINT);
 }
 
+/* The normals of x->world. */
+static void turn_normals(vgi_gltf_writing *w)
+{
+    morphs *x = w->own;
+    if (!x->file[NORMALS]) return;
+    if (w->character) vgi_gltf_character_turn(w->character, x->world, x->file[NORMALS]);
+    else vgi_gltf_normals_turn(&w->normals, x->world, x->file[NORMALS]);
+}
+
 static void spread_frame(vgi_gltf_writing *w)
 {
     morphs *x = w->own;
-    find_world(w, x->first);
-    vgi_gltf_character_pose(w->character, x->world, x->first, x->file[POSITIONS]);
-    if (x->file[NORMALS]) vgi_gltf_character_turn(w->character, x->world, x->file[NORMALS]);
+    if (x->world) find_world(w, x->first);
+    if (w->character) vgi_gltf_character_pose(w->character, x->world, x->first, x->file[POSITIONS]);
+    else spread_plain(w);
+    turn_normals(w);
 }
 
 static void spread_basis(vgi_gltf_writing *w, size_t t)
 {
     morphs *x = w->own;
-    vgi_gltf_character_move(w->character, x->first, x->file[POSITIONS]);
+    if (w->character) vgi_gltf_character_move(w->character, x->first, x->file[POSITIONS]);
+    else spread_plain(w);
     if (x->file[NORMALS]) memcpy(x->file[NORMALS], x->turned + t * 3 * x->n, VGI_GLTF_POINT * x->n);
 }
 
@@ -222,7 +237,7 @@ static int turn_basis(vgi_gltf_writing *w, vg_err *e)
     for (size_t f = 0; f < w->frames && r == VG_OK; f++) {
         if ((r = load(w, f, x->first, e)) < 0) break;
         find_world(w, x->first);
-        vgi_gltf_character_turn(w->character, x->world, x->file[NORMALS]);
+        turn_normals(w);
         for (size_t t = 0; t < x->targets; t++) {
             const float share = (float)solved[t * w->frames + f];
             float *to = x->turned + t * 3 * x->n;
@@ -241,8 +256,7 @@ static int load_target(vgi_gltf_writing *w, size_t t, vg_err *e)
     int r = x->chosen ? load(w, x->chosen[t], x->first, e) : VG_OK;
     if (!x->chosen) memcpy(x->first, x->basis.targets + t * n, n * sizeof *x->first);
     if (r < 0) return r;
-    if (!w->character) spread_plain(w);
-    else if (x->chosen) spread_frame(w);
+    if (x->chosen) spread_frame(w);
     else spread_basis(w, t);
     return VG_OK;
 }
@@ -403,11 +417,16 @@ static int say_primitives(vgi_gltf_writing *w, vg_err *e)
     const morphs *x = w->own;
     vg_bytes moving = {0};
     int r = vgi_gltf_say(&moving, e, "\"attributes\":{\"POSITION\":%zu", x->lists[0].position);
+    if (r == VG_OK && w->normals.n) r = vgi_gltf_say(&moving, e, ",\"NORMAL\":%zu", x->lists[0].normal);
     if (r == VG_OK && w->seams.uv) r = vgi_gltf_say(&moving, e, ",\"TEXCOORD_0\":%zu", w->texture);
     if (r == VG_OK) r = vgi_gltf_say(&moving, e, "}");
-    for (size_t t = 0; t < x->targets && r == VG_OK; t++)
-        r = vgi_gltf_say(&moving, e, "%s{\"POSITION\":%zu}", t ? "," : ",\"targets\":[",
+    for (size_t t = 0; t < x->targets && r == VG_OK; t++) {
+        r = vgi_gltf_say(&moving, e, "%s{\"POSITION\":%zu", t ? "," : ",\"targets\":[",
                          lying_of(x, t, 0, POSITIONS)->accessor);
+        if (r == VG_OK && w->normals.n)
+            r = vgi_gltf_say(&moving, e, ",\"NORMAL\":%zu", lying_of(x, t, 0, NORMALS)->accessor);
+        if (r == VG_OK) r = vgi_gltf_say(&moving, e, "}");
+    }
     if (r == VG_OK && x->targets) r = vgi_gltf_say(&moving, e, "]");
     if (r == VG_OK) r = vgi_gltf_say_primitives(w, &moving, e);
     vg_bytes_clear(&moving);
@@ -437,16 +456,6 @@ static int say_target_names(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-/* Which vertices the copies are of, so that our own reader can put them together again. */
-static int say_seams(vgi_gltf_writing *w, vg_err *e)
-{
-    const vgi_gltf_seams *s = &w->seams;
-    if (s->n == s->nv) return VG_OK;
-    int r = vgi_gltf_say(&w->json, e, ",\n\"" VGI_GLTF_VERTICES "\":[%zu", s->nv);
-    for (size_t v = s->nv; v < s->n && r == VG_OK; v++) r = vgi_gltf_say(&w->json, e, ",%u", s->from[v]);
-    return r < 0 ? r : vgi_gltf_say(&w->json, e, "]");
-}
-
 static int say_mesh(vgi_gltf_writing *w, vg_err *e)
 {
     const morphs *x = w->own;
@@ -458,7 +467,7 @@ static int say_mesh(vgi_gltf_writing *w, vg_err *e)
         r = vgi_gltf_say(&w->json, e, "%s0", t ? "," : ",\n\"weights\":[");
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "%s,\n\"extras\":{", x->targets ? "]" : "");
     if (r == VG_OK) r = say_target_names(w, e);
-    if (r == VG_OK) r = say_seams(w, e);
+    if (r == VG_OK) r = vgi_gltf_say_seams(w, e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, ",\n\"" VGI_GLTF_FACES "\":[");
     if (r == VG_OK) r = vgi_bytes_append(&w->json, w->shape.runs.data, w->shape.runs.size, e);
     return r < 0 ? r : vgi_gltf_say(&w->json, e, "]}}]");

@@ -43,7 +43,7 @@ typedef struct skinning {
     size_t joint_bytes;   /* of a number in JOINTS_0 */
     channel *channels;
     size_t nchannels;
-    size_t points, joints, weights, inverse, outputs; /* numbers of accessors; outputs: of the first channel */
+    size_t points, normals, joints, weights, inverse, outputs; /* numbers of accessors; outputs: of the first channel */
 } skinning;
 
 static size_t joints_of(const vgi_gltf_writing *w)
@@ -201,7 +201,7 @@ static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
 static int describe_points(vgi_gltf_writing *w, vg_err *e)
 {
     skinning *x = w->own;
-    const size_t nv = w->h->body.mesh.nv;
+    const size_t nv = w->seams.n;
     double bounds[6];
     char stride[48];
     snprintf(stride, sizeof stride, ",\"target\":34962,\"byteStride\":%zu", VG_SKIN * x->joint_bytes);
@@ -209,6 +209,9 @@ static int describe_points(vgi_gltf_writing *w, vg_err *e)
     x->points = w->naccessors;
     int r = vgi_gltf_view(w, VGI_GLTF_POINT * nv, ",\"target\":34962,\"byteStride\":12", e);
     if (r == VG_OK) r = vgi_gltf_say_accessor(w, 0, VGI_GLTF_FLOAT, nv, "VEC3", bounds, 3, e);
+    x->normals = w->naccessors;
+    if (r == VG_OK && w->normals.n) r = vgi_gltf_view(w, VGI_GLTF_POINT * nv, ",\"target\":34962,\"byteStride\":12", e);
+    if (r == VG_OK && w->normals.n) r = vgi_gltf_say_accessor(w, 0, VGI_GLTF_FLOAT, nv, "VEC3", NULL, 0, e);
     x->joints = w->naccessors;
     if (r == VG_OK) r = vgi_gltf_view(w, VG_SKIN * x->joint_bytes * nv, stride, e);
     if (r == VG_OK)
@@ -307,16 +310,21 @@ static int say_mesh(vgi_gltf_writing *w, vg_err *e)
 {
     const skinning *x = w->own;
     vg_bytes moving = {0};
-    int r = vgi_gltf_say(&moving, e, "\"attributes\":{\"POSITION\":%zu,\"JOINTS_0\":%zu,\"WEIGHTS_0\":%zu}",
-                         x->points, x->joints, x->weights);
+    int r = vgi_gltf_say(&moving, e, "\"attributes\":{\"POSITION\":%zu,\"JOINTS_0\":%zu,\"WEIGHTS_0\":%zu", x->points,
+                         x->joints, x->weights);
+    if (r == VG_OK && w->normals.n) r = vgi_gltf_say(&moving, e, ",\"NORMAL\":%zu", x->normals);
+    if (r == VG_OK && w->seams.uv) r = vgi_gltf_say(&moving, e, ",\"TEXCOORD_0\":%zu", w->texture);
+    if (r == VG_OK) r = vgi_gltf_say(&moving, e, "}");
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "\"meshes\":[{");
     if (r == VG_OK) r = vgi_gltf_say_mesh_name(w, e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, ",");
     if (r == VG_OK) r = vgi_gltf_say_primitives(w, &moving, e);
     if (r == VG_OK) r = vgi_gltf_say(&w->json, e, ",\n\"extras\":{\"" VGI_GLTF_FACES "\":[");
     if (r == VG_OK) r = vgi_bytes_append(&w->json, w->shape.runs.data, w->shape.runs.size, e);
+    if (r == VG_OK) r = vgi_gltf_say(&w->json, e, "]");
+    if (r == VG_OK) r = vgi_gltf_say_seams(w, e);
     vg_bytes_clear(&moving);
-    return r < 0 ? r : vgi_gltf_say(&w->json, e, "]}}],\n");
+    return r < 0 ? r : vgi_gltf_say(&w->json, e, "}}],\n");
 }
 
 static int say_animation(vgi_gltf_writing *w, vg_err *e)
@@ -342,6 +350,7 @@ static int describe(vgi_gltf_writing *w, vg_err *e)
     int r = describe_points(w, e);
     if (r == VG_OK) r = describe_inverse(w, e);
     if (r == VG_OK) r = describe_channels(w, e);
+    if (r == VG_OK) r = vgi_gltf_say_materials(w, e);
     if (r == VG_OK) r = say_nodes(w, e);
     if (r == VG_OK) r = say_skin(w, e);
     if (r == VG_OK) r = say_mesh(w, e);
@@ -368,23 +377,29 @@ static void influences(const vg_rig *rig, size_t v, uint32_t bone[VG_SKIN], floa
     }
 }
 
+/* The vertex of the mesh that vertex v of the file is. */
+static size_t vertex_of(const vgi_gltf_writing *w, size_t v)
+{
+    return w->seams.from ? w->seams.from[v] : v;
+}
+
 static int emit_joints(vgi_gltf_writing *w, vg_err *e)
 {
     const skinning *x = w->own;
     uint32_t bone[VG_SKIN];
     float weight[VG_SKIN];
     int r = VG_OK;
-    for (size_t v = 0; v < w->h->body.mesh.nv && r == VG_OK; v++) {
+    for (size_t v = 0; v < w->seams.n && r == VG_OK; v++) {
         unsigned char p[2 * VG_SKIN];
-        influences(&w->h->body.rig, v, bone, weight);
+        influences(&w->h->body.rig, vertex_of(w, v), bone, weight);
         for (size_t i = 0; i < VG_SKIN; i++) {
             p[x->joint_bytes * i] = (unsigned char)bone[i];
             if (x->joint_bytes == 2) p[2 * i + 1] = (unsigned char)(bone[i] >> 8);
         }
         r = vgi_gltf_emit(w, p, x->joint_bytes * VG_SKIN, e);
     }
-    for (size_t v = 0; v < w->h->body.mesh.nv && r == VG_OK; v++) {
-        influences(&w->h->body.rig, v, bone, weight);
+    for (size_t v = 0; v < w->seams.n && r == VG_OK; v++) {
+        influences(&w->h->body.rig, vertex_of(w, v), bone, weight);
         r = vgi_gltf_emit_singles(w, weight, VG_SKIN, e);
     }
     return r;
@@ -440,7 +455,8 @@ static int emit_channels(vgi_gltf_writing *w, vg_err *e)
 
 static int emit(vgi_gltf_writing *w, vg_err *e)
 {
-    int r = vgi_gltf_emit_singles(w, w->base, 3 * w->h->body.mesh.nv, e);
+    int r = vgi_gltf_emit_singles(w, w->base, 3 * w->seams.n, e);
+    if (r == VG_OK && w->normals.n) r = vgi_gltf_emit_singles(w, w->normals.base, 3 * w->normals.n, e);
     if (r == VG_OK) r = emit_joints(w, e);
     if (r == VG_OK) r = emit_inverse(w, e);
     return r < 0 ? r : emit_channels(w, e);

@@ -1,6 +1,6 @@
 /* gltf_write.c: a sequence as a glTF file: a mesh, an animation with a time for each frame, and the bytes of both.
  * Leaves out how the mesh moves: by morph targets (gltf_morph.c) or by a skin (gltf_skin.c); where texture coordinates cut
- * it apart (gltf_seams.c); and normals, which change with the pose, and materials.
+ * it apart (gltf_seams.c), and normals (gltf_normals.c).
  *
  * The frames wait in a file without a name.
  * SPDX-License-Identifier: GPL-3.0-or-later */
@@ -68,6 +68,19 @@ static int open_character(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
+/* The vertices of the file, and their normals; a character has its own. */
+static int cut_mesh(vgi_gltf_writing *w, vg_err *e)
+{
+    static const vg_attributes none;
+    const vg_body *b = &w->h->body;
+    const vg_attributes *a = w->character ? &none : &b->attributes;
+    int r = VG_OK;
+    if (!w->character) r = vgi_gltf_normals_make(&w->normals, &b->mesh, a, b->reference, e);
+    const bool shaded = w->normals.ngroups > 0;
+    if (r == VG_OK) r = vgi_gltf_seams_make(&w->seams, &b->mesh, a, shaded ? w->normals.corner : NULL, e);
+    return r == VG_OK && shaded ? vgi_gltf_normals_place(&w->normals, w->seams.n, w->seams.corner, b->reference, e) : r;
+}
+
 int vgi_gltf_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi_output *out, bool binary, vg_err *e)
 {
     vgi_gltf_writing *w = *state = vgi_array(1, sizeof *w, e);
@@ -76,11 +89,8 @@ int vgi_gltf_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi
     w->out = out, w->h = h, w->binary = binary, w->clip = o->name;
     w->spool.name = "temporary file";
     if ((w->spool.fd = vgi_nameless_file(e)) < 0) return w->spool.fd;
-    static const vg_attributes none;
     int r = h->kind == VG_VERTICES ? open_character(w, e) : VG_OK;
-    if (r == VG_OK)
-        r = vgi_gltf_seams_make(&w->seams, &h->body.mesh,
-                                h->kind == VG_VERTICES && !w->character ? &h->body.attributes : &none, e);
+    if (r == VG_OK) r = cut_mesh(w, e);
     if (r == VG_OK) r = round_base(w, e);
     return r < 0 ? r : w->manner->begin(w, o, e);
 }
@@ -149,6 +159,16 @@ int vgi_gltf_say_mesh_name(vgi_gltf_writing *w, vg_err *e)
     const char *name = w->h->body.reference_name ? w->h->body.reference_name : "";
     int r = vgi_gltf_say(&w->json, e, "\"name\":");
     return r < 0 ? r : vgi_gltf_say_text(&w->json, *name ? name : "mesh", e);
+}
+
+/* Which vertices the copies are of, so that our own reader can put them together again. */
+int vgi_gltf_say_seams(vgi_gltf_writing *w, vg_err *e)
+{
+    const vgi_gltf_seams *s = &w->seams;
+    if (s->n == s->nv) return VG_OK;
+    int r = vgi_gltf_say(&w->json, e, ",\n\"" VGI_GLTF_VERTICES "\":[%zu", s->nv);
+    for (size_t v = s->nv; v < s->n && r == VG_OK; v++) r = vgi_gltf_say(&w->json, e, ",%u", s->from[v]);
+    return r < 0 ? r : vgi_gltf_say(&w->json, e, "]");
 }
 
 static int say_primitive(vgi_gltf_writing *w, size_t *n, int mode, size_t indices, const char *material,
@@ -390,7 +410,7 @@ static int make_shape(vgi_gltf_writing *w, vg_err *e)
 {
     const vgi_gltf_seams *s = &w->seams;
     vg_mesh mesh = w->h->body.mesh;
-    const vg_attributes *a = w->h->kind == VG_VERTICES ? &w->h->body.attributes : NULL;
+    const vg_attributes *a = &w->h->body.attributes;
     if (!s->corner) return vgi_gltf_shape_make(&w->shape, &mesh, w->h->body.reference, a, e);
     double *points = vgi_array_raw(s->n, 3 * sizeof *points, e);
     if (!points) return VG_ENOMEM;
@@ -438,6 +458,7 @@ void vgi_gltf_release(void *state)
     free(w->base);
     vgi_gltf_shape_clear(&w->shape);
     vgi_gltf_seams_clear(&w->seams);
+    vgi_gltf_normals_clear(&w->normals);
     vg_bytes_clear(&w->json);
     vg_bytes_clear(&w->views);
     vg_bytes_clear(&w->accessors);

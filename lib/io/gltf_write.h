@@ -6,6 +6,7 @@
 
 #include "io/gltf.h"
 #include "io/gltf_character.h"
+#include "io/gltf_normals.h"
 #include "io/gltf_seams.h"
 
 enum { VGI_GLTF_ITEM = 4, VGI_GLTF_POINT = 12 }; /* bytes of a number, and of three */
@@ -73,7 +74,8 @@ struct vgi_gltf_writing {
     vgi_gltf_character *character; /* whose nodes, materials and attributes are written; NULL: none */
     vgi_gltf library;          /* of materials, without meshes; json NULL: none */
     vgi_name_set materials;    /* the names of those that are written */
-    vgi_gltf_seams seams;      /* vertices of the file; of a skin those of the mesh */
+    vgi_gltf_seams seams;      /* vertices of the file */
+    vgi_gltf_normals normals;  /* n 0: there are none, or they are those of the character */
     float *base;               /* the reference pose as it will be read, seams.n points */
     vgi_gltf_shape shape;
     vg_bytes json, views, accessors; /* text */
@@ -131,6 +133,8 @@ int vgi_gltf_say_take_name(vgi_gltf_writing *w, const vgi_gltf_take *t, vg_err *
 /* vgi_gltf_say_primitives: "primitives":[...], one for each kind of face; moving: what is said of attributes and
  * targets. */
 int vgi_gltf_say_primitives(vgi_gltf_writing *w, const vg_bytes *moving, vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_say_seams: which vertices the copies are of, for extras, a comma in front; nothing without copies. */
+int vgi_gltf_say_seams(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_say_mesh_name(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
 /* vgi_gltf_view: the next bytes of the buffer; more: further JSON. */
 int vgi_gltf_view(vgi_gltf_writing *w, size_t bytes, const char *more, vg_err *e) VG_MUST_CHECK;

@@ -1,0 +1,228 @@
+/* gltf_normals.c: normals of a mesh that has none, for glTF, whose viewers would show it faceted: those of the faces around
+ * a vertex, weighted by their angles there, where the faces are one smooth surface.
+ * Leaves out the normals of a character, which its artist has made (gltf_character.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "io/gltf_normals.h"
+#include "numeric/vec3.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static const double least_cosine = 0.5; /* of the angle at which faces are still one surface: 60 degrees */
+
+static size_t face_size(const vg_mesh *m, size_t f)
+{
+    return m->start[f + 1] - m->start[f];
+}
+
+static void unit(double p[3])
+{
+    const double l = vgi_length(p);
+    for (int k = 0; k < 3; k++) p[k] = l > 0 ? p[k] / l : 0;
+}
+
+/* The unit normal of a face that may be bent; zero: it has no area. */
+static void face_normal(const vg_mesh *m, size_t f, const double *pose, double n[3])
+{
+    const uint32_t *v = m->vert + m->start[f];
+    const double *o = pose + 3 * (size_t)v[0];
+    n[0] = n[1] = n[2] = 0;
+    for (size_t i = 1; i + 1 < face_size(m, f); i++) {
+        double a[3], b[3], c[3];
+        for (int k = 0; k < 3; k++) a[k] = pose[3 * (size_t)v[i] + (size_t)k] - o[k], b[k] = pose[3 * (size_t)v[i + 1] + (size_t)k] - o[k];
+        vgi_cross(a, b, c);
+        for (int k = 0; k < 3; k++) n[k] += c[k];
+    }
+    unit(n);
+}
+
+/* ---- which corners are one surface ---- */
+
+/* An edge of a face: from corner c to the next one of its face, between the vertices low < high. */
+typedef struct side {
+    uint32_t low, high, face, at_low, at_high; /* at_low, at_high: the corners there */
+} side;
+
+static int by_vertices(const void *a, const void *b)
+{
+    const side *s = a, *t = b;
+    if (s->low != t->low) return s->low < t->low ? -1 : 1;
+    if (s->high != t->high) return s->high < t->high ? -1 : 1;
+    return (s->face > t->face) - (s->face < t->face);
+}
+
+static size_t list_sides(const vg_mesh *m, side *to)
+{
+    size_t n = 0;
+    for (size_t f = 0; f < m->nf; f++) {
+        const uint32_t first = m->start[f], size = (uint32_t)face_size(m, f);
+        for (uint32_t i = 0; i < size && size > 2; i++) {
+            const uint32_t c = first + i, d = first + (i + 1) % size;
+            const bool rising = m->vert[c] < m->vert[d];
+            to[n++] = rising ? (side){m->vert[c], m->vert[d], (uint32_t)f, c, d}
+                             : (side){m->vert[d], m->vert[c], (uint32_t)f, d, c};
+        }
+    }
+    qsort(to, n, sizeof *to, by_vertices);
+    return n;
+}
+
+static uint32_t find_root(uint32_t *parent, uint32_t c)
+{
+    while (parent[c] != c) c = parent[c] = parent[parent[c]];
+    return c;
+}
+
+/* The smaller number stays, so that groups do not depend on the order of edges. */
+static void unite(uint32_t *parent, uint32_t c, uint32_t d)
+{
+    c = find_root(parent, c), d = find_root(parent, d);
+    if (c < d) parent[d] = c;
+    else parent[c] = d;
+}
+
+/* Of each face its smoothing: SMOOTH_BY_ANGLE without any label, 0: flat, else a number that neighbours must share. */
+enum { SMOOTH_BY_ANGLE = -1 };
+
+static void read_smoothing(const vg_mesh *m, const vg_attributes *a, int64_t *of)
+{
+    size_t next = 0;
+    int64_t now = SMOOTH_BY_ANGLE;
+    for (size_t f = 0; f < m->nf; f++) {
+        for (; a && next < a->nlabels && a->labels[next].face <= f; next++)
+            if (a->labels[next].kind == VG_LABEL_SMOOTHING) now = labs(strtol(a->labels[next].text, NULL, 10)); /* "off": 0 */
+        of[f] = now;
+    }
+}
+
+static bool is_smooth(const side *s, const side *t, const int64_t *smoothing, const double *normal)
+{
+    if (smoothing[s->face] != smoothing[t->face]) return false;
+    if (smoothing[s->face] != SMOOTH_BY_ANGLE) return smoothing[s->face] != 0;
+    return vgi_dot(normal + 3 * (size_t)s->face, normal + 3 * (size_t)t->face) > least_cosine;
+}
+
+static void unite_corners(uint32_t *parent, const side *sides, size_t n, const int64_t *smoothing, const double *normal)
+{
+    for (size_t i = 1; i < n; i++) {
+        const side *s = &sides[i - 1], *t = &sides[i];
+        if (s->low != t->low || s->high != t->high || !is_smooth(s, t, smoothing, normal)) continue;
+        unite(parent, s->at_low, t->at_low);
+        unite(parent, s->at_high, t->at_high);
+    }
+}
+
+/* Groups are numbered by their first corners. */
+static void number_groups(vgi_gltf_normals *x, uint32_t *parent)
+{
+    const vg_mesh *m = x->mesh;
+    for (size_t f = 0; f < m->nf; f++)
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
+            const uint32_t root = find_root(parent, c);
+            x->corner[c] = face_size(m, f) < 3 ? UINT32_MAX : root == c ? (uint32_t)x->ngroups++ : x->corner[root];
+        }
+}
+
+int vgi_gltf_normals_make(vgi_gltf_normals *x, const vg_mesh *m, const vg_attributes *a, const double *reference, vg_err *e)
+{
+    const size_t corners = vg_mesh_corners(m);
+    *x = (vgi_gltf_normals){.mesh = m};
+    uint32_t *parent = vgi_array_raw(corners, sizeof *parent, e);
+    side *sides = vgi_array_raw(corners, sizeof *sides, e);
+    int64_t *smoothing = vgi_array_raw(m->nf, sizeof *smoothing, e);
+    double *normal = vgi_array_raw(m->nf, 3 * sizeof *normal, e);
+    x->corner = vgi_array_raw(corners, sizeof *x->corner, e);
+    int r = parent && sides && smoothing && normal && x->corner ? VG_OK : VG_ENOMEM;
+
+    if (r == VG_OK) {
+        read_smoothing(m, a, smoothing);
+        for (uint32_t c = 0; c < corners; c++) parent[c] = c;
+        for (size_t f = 0; f < m->nf; f++) face_normal(m, f, reference, normal + 3 * f);
+        unite_corners(parent, sides, list_sides(m, sides), smoothing, normal);
+        number_groups(x, parent);
+        if (!(x->sum = vgi_array(x->ngroups, 3 * sizeof *x->sum, e))) r = VG_ENOMEM;
+    }
+    free(parent);
+    free(sides);
+    free(smoothing);
+    free(normal);
+    return r;
+}
+
+void vgi_gltf_normals_clear(vgi_gltf_normals *x)
+{
+    free(x->corner);
+    free(x->sum);
+    free(x->group);
+    free(x->base);
+    *x = (vgi_gltf_normals){0};
+}
+
+/* ---- normals ---- */
+
+/* The angle of a face at corner number i of its size. */
+static double angle_at(const vg_mesh *m, size_t f, size_t i, const double *pose)
+{
+    const size_t size = face_size(m, f);
+    const uint32_t *v = m->vert + m->start[f];
+    double arm[2][3];
+    for (int k = 0; k < 3; k++) {
+        const double at = pose[3 * (size_t)v[i] + (size_t)k];
+        arm[0][k] = pose[3 * (size_t)v[(i + 1) % size] + (size_t)k] - at;
+        arm[1][k] = pose[3 * (size_t)v[(i + size - 1) % size] + (size_t)k] - at;
+    }
+    unit(arm[0]), unit(arm[1]);
+    return acos(fmax(-1, fmin(1, vgi_dot(arm[0], arm[1]))));
+}
+
+static void sum_normals(vgi_gltf_normals *x, const double *pose)
+{
+    const vg_mesh *m = x->mesh;
+    memset(x->sum, 0, 3 * x->ngroups * sizeof *x->sum);
+    for (size_t f = 0; f < m->nf; f++) {
+        double n[3];
+        if (face_size(m, f) < 3) continue;
+        face_normal(m, f, pose, n);
+        for (size_t i = 0; i < face_size(m, f); i++) {
+            const double angle = angle_at(m, f, i, pose);
+            double *to = x->sum + 3 * (size_t)x->corner[m->start[f] + i];
+            for (int k = 0; k < 3; k++) to[k] += angle * n[k];
+        }
+    }
+    for (size_t g = 0; g < x->ngroups; g++) unit(x->sum + 3 * g);
+}
+
+/* Without area, and in no face: any unit vector, since glTF has no other. */
+static void base_of(const vgi_gltf_normals *x, size_t v, float to[3])
+{
+    static const double up[3] = {0, 0, 1};
+    const double *n = x->group[v] == UINT32_MAX ? up : x->sum + 3 * (size_t)x->group[v];
+    if (vgi_length(n) == 0) n = up;
+    for (int k = 0; k < 3; k++) to[k] = (float)n[k];
+}
+
+int vgi_gltf_normals_place(vgi_gltf_normals *x, size_t n, const uint32_t *corner, const double *reference, vg_err *e)
+{
+    const size_t corners = vg_mesh_corners(x->mesh);
+    x->n = n;
+    x->group = vgi_array_raw(n, sizeof *x->group, e), x->base = vgi_array_raw(n, 3 * sizeof *x->base, e);
+    if (!x->group || !x->base) return VG_ENOMEM;
+    for (size_t v = 0; v < n; v++) x->group[v] = UINT32_MAX;
+    for (size_t c = 0; c < corners; c++)
+        if (x->corner[c] != UINT32_MAX) x->group[corner ? corner[c] : x->mesh->vert[c]] = x->corner[c];
+    sum_normals(x, reference);
+    for (size_t v = 0; v < n; v++) base_of(x, v, x->base + 3 * v);
+    return VG_OK;
+}
+
+void vgi_gltf_normals_turn(vgi_gltf_normals *x, const double *pose, float *to)
+{
+    sum_normals(x, pose);
+    for (size_t v = 0; v < x->n; v++) {
+        const double *n = x->group[v] == UINT32_MAX ? NULL : x->sum + 3 * (size_t)x->group[v];
+        for (int k = 0; k < 3; k++) {
+            const float now = n && vgi_length(n) > 0 ? (float)n[k] : x->base[3 * v + (size_t)k];
+            to[3 * v + (size_t)k] = now - x->base[3 * v + (size_t)k];
+        }
+    }
+}
