@@ -30,6 +30,8 @@ static const cli_option options[] = {
      .integer = &most_targets, .least = 1, .most = 1e6},
     {"morph-tolerance", 0, "X", "how far mixing may take a vertex from its place, in D (default 0.001)",
      .number = &sink_options.morph_tolerance, .least = 1e-7, .most = 1},
+    {"no-normals", 0, NULL, "leave out the normals of a GLB or glTF that the input does not have: a smaller file",
+     .flag = &sink_options.no_normals},
     {"shapes", 0, NULL, "each frame is a morph target of a GLB or glTF, and there is no animation",
      .flag = &sink_options.shapes},
     {"name", 0, "NAME", "what the animation of a GLB or glTF is called", .text = &sink_options.name},

@@ -13,17 +13,19 @@
 #include <unistd.h>
 
 static struct {
-    bool check, frames, digest, weights, positions, curve;
+    bool check, frames, digest, weights, positions, curve, vertices;
 } opts;
 
 static const cli_option options[] = {
     {.name = "check", .help = "read everything and only say whether it is whole", .flag = &opts.check,
-     .excludes = "digest|frames|weights|positions|curve"},
+     .excludes = "digest|frames|weights|positions|curve|vertices"},
     {.name = "digest", .help = "only print a fingerprint of the content: 16 hexadecimal digits",
      .flag = &opts.digest, .excludes = "frames|weights|positions|curve"},
     {.name = "frames", .help = "list the frames", .flag = &opts.frames, .excludes = "weights|positions|curve"},
     {.name = "weights", .help = "only print the skinning weights of a rig, a vertex per line", .flag = &opts.weights,
      .excludes = "json|positions|curve"},
+    {.name = "vertices", .help = "only print which vertex each vertex of a GLB or glTF is, after welding", .flag = &opts.vertices,
+     .excludes = "json|digest|frames|weights|positions|curve"},
     {.name = "positions", .help = "only print where control points and frames of a signal are, for vg-sample --edit",
      .flag = &opts.positions, .excludes = "json|curve"},
     {"curve", 0, NULL, "only print the curve of a signal: points for vg-sample --curve, their times, where it crosses itself",
@@ -649,12 +651,69 @@ static void print_weights(const vg_head *h, const char *operand)
     write_weights(cli_text_open(), &h->body.rig, h->body.mesh.nv);
 }
 
+/* A vertex of the file. */
+typedef struct placed_vertex {
+    char *node;
+    size_t primitive, index;
+    uint32_t vertex;
+} placed_vertex;
+
+typedef struct placed_list {
+    placed_vertex *at;
+    size_t n, cap;
+} placed_list;
+
+static void take_vertex(void *context, const char *node, size_t primitive, size_t index, uint32_t vertex)
+{
+    placed_list *list = context;
+    if (list->n == list->cap) {
+        list->cap = list->cap ? 2 * list->cap : 1024;
+        list->at = cli_resize(list->at, list->cap, sizeof *list->at, "the vertices of the file");
+    }
+    list->at[list->n++] = (placed_vertex){cli_copy_text(node, "the vertices of the file"), primitive, index, vertex};
+}
+
+static int by_vertex(const void *a, const void *b)
+{
+    const placed_vertex *p = a, *q = b;
+    if (p->vertex != q->vertex) return p->vertex < q->vertex ? -1 : 1;
+    int order = strcmp(p->node, q->node);
+    if (order) return order;
+    if (p->primitive != q->primitive) return p->primitive < q->primitive ? -1 : 1;
+    return (p->index > q->index) - (p->index < q->index);
+}
+
+/* A line for each vertex of the file, those of one vertex together. Without an asset nothing was welded. */
+static void print_vertices(const vg_head *h)
+{
+    FILE *f = cli_text_open();
+    const vg_asset *a = &h->body.asset;
+    placed_list list = {0};
+    vg_err e;
+    if (a->n && vg_asset_vertices(a, take_vertex, &list, &e) < 0) cli_die(&e);
+    for (size_t v = 0; !list.n && v < h->body.mesh.nv; v++) fprintf(f, "%zu - 0 %zu\n", v, v);
+    if (list.n) qsort(list.at, list.n, sizeof *list.at, by_vertex);
+    for (size_t i = 0; i < list.n; i++) {
+        placed_vertex *p = &list.at[i];
+        for (char *c = p->node; *c; c++)
+            if ((unsigned char)*c <= ' ') *c = '_';
+        fprintf(f, "%u %s %zu %zu\n", p->vertex, *p->node ? p->node : "-", p->primitive, p->index);
+        free(p->node);
+    }
+    free(list.at);
+}
+
 static void print_signal(const vg_head *h, const char *operand)
 {
     if (!h->signal.n)
         cli_stop(VG_EINPUT, "'%s' holds no signal: make one with vg-fitsignal", operand ? operand : "standard input");
     if (opts.positions) write_positions(cli_text_open(), &h->signal);
     else write_curve(cli_text_open(), &h->signal, vg_diagonal(h->body.reference, h->body.mesh.nv));
+}
+
+static bool prints_alone(void)
+{
+    return opts.weights || opts.vertices || opts.positions || opts.curve;
 }
 
 int main(int argc, char **argv)
@@ -668,9 +727,10 @@ int main(int argc, char **argv)
     const char *operand = n && strcmp(operands[0], "-") ? operands[0] : NULL;
     if (opts.check) report_check(r);
     else if (opts.digest) report_digest(r, &c);
-    else if ((!list || cli.json) && !opts.weights && !opts.positions && !opts.curve) report_all(r, operand, vg_source_head(s), &c);
+    else if ((!list || cli.json) && !prints_alone()) report_all(r, operand, vg_source_head(s), &c);
     if (list) report_join(r, list);
     if (opts.weights) print_weights(vg_source_head(s), operand);
+    else if (opts.vertices) print_vertices(vg_source_head(s));
     else if (opts.positions || opts.curve) print_signal(vg_source_head(s), operand);
     else report_print(r, cli_text_open(), cli.json);
     cli_text_end();

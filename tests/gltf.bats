@@ -641,3 +641,81 @@ assert read('cube.obj') == read('back-0.obj') and read('moved.obj') == read('bac
 EOF
     done
 }
+
+@test "normals of plain meshes: by smoothing groups, or by the angle; --no-normals; a file that was read has them made again" {
+    # a roof: two quads that meet at 90 degrees, and at 30
+    roof() {
+        printf 'v -1 0 0\nv -1 0 1\nv 0 %s 0\nv 0 %s 1\nv 1 0 0\nv 1 0 1\n%s\nf 1 2 4 3\n%s\nf 3 4 6 5\n' "$1" "$1" "$2" "$3" >roof.obj
+        must vg-encode roof.obj -o roof.vgs
+        must vg-decode -o roof.glb "${@:4}" roof.vgs
+    }
+    # normals ANSWER: how many vertices the file has, and the normal at the first corner of the ridge
+    normals() {
+        cat >normals.py <<'EOF'
+import json, struct, sys
+b = open('roof.glb', 'rb').read()
+n, = struct.unpack('<I', b[12:16])
+g, data = json.loads(b[20:20 + n]), b[28 + n:]
+at = g['meshes'][0]['primitives'][0]['attributes']
+count = g['accessors'][at['POSITION']]['count']
+if 'NORMAL' not in at: sys.exit(print(count, 'none'))
+a = g['accessors'][at['NORMAL']]
+x = struct.unpack_from('<3f', data, g['bufferViews'][a['bufferView']]['byteOffset'] + a['byteOffset'] + 12 * 2)
+print(count, *['%.4f' % (c + 0.0) for c in x])
+EOF
+        must python3 normals.py
+        [ "$output" = "$1" ] || fail "$output, not $1"
+    }
+    roof 1 '' ''
+    normals '8 -0.7071 0.7071 0.0000'
+    roof 0.26794919 '' ''
+    normals '6 0.0000 1.0000 0.0000'
+    roof 1 's 1' ''
+    normals '6 0.0000 1.0000 0.0000'
+    roof 1 's 1' 's 2'
+    normals '8 -0.7071 0.7071 0.0000'
+    roof 0.26794919 's off' ''
+    normals '8 -0.2588 0.9659 0.0000'
+    roof 1 '' '' --no-normals
+    normals '6 none'
+    roof 1 '' ''
+    must vg-encode roof.glb -o back.vgs
+    pipe 'vg-info back.vgs'
+    shows 'vertices    6' 'faces       2: 2 of 4'
+    must vg-decode -o again.glb back.vgs
+    must vg-diff -t 0 roof.vgs again.glb
+    must vg-decode -o plain.obj back.vgs
+    must_fail 2 vg-decode --no-normals -o roof.ply roof.vgs
+    says "--no-normals is for GLB and glTF"
+}
+
+@test "vg-info --vertices: which vertex of a file is which of the mesh" {
+    py <<'END'
+import make_character
+make_character.main("in.glb")
+END
+    must vg-encode --animation Wave in.glb -o wave.vgs
+    must vg-info --vertices wave.vgs
+    cp .stdout vertices.txt
+    py <<'END'
+import json, struct
+b = open("in.glb", "rb").read()
+n, = struct.unpack("<I", b[12:16])
+g, data = json.loads(b[20:20 + n]), b[28 + n:]
+rows = [l.split() for l in open("vertices.txt")]
+assert len(rows) == 72 and {int(r[0]) for r in rows} == set(range(24))
+assert [int(r[0]) for r in rows] == sorted(int(r[0]) for r in rows)
+def position(node, primitive, index):
+    mesh = next(g["meshes"][n["mesh"]] for n in g["nodes"] if n.get("name", "-").replace(" ", "_") == node and "mesh" in n)
+    a = g["accessors"][mesh["primitives"][primitive]["attributes"]["POSITION"]]
+    v = g["bufferViews"][a["bufferView"]]
+    return struct.unpack_from("<3f", data, v.get("byteOffset", 0) + a.get("byteOffset", 0) + index * v.get("byteStride", 12))
+# those of one vertex lie at one place, and each vertex of a primitive is there once
+for v in range(24):
+    assert len({(r[1], position(r[1], int(r[2]), int(r[3]))) for r in rows if int(r[0]) == v}) == 1, v
+assert len({tuple(r[1:]) for r in rows}) == 72
+END
+    mesh cube >cube.obj
+    must vg-info --vertices cube.obj
+    [ "$(tail -1 <<<"$output")" = '7 - 0 7' ] || fail "$output"
+}

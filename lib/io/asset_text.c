@@ -1,7 +1,10 @@
 /* asset_text.c: what an asset holds, in words: for reports, and for warnings of writers that cannot keep it.
+ * And which vertices of its file are which of the mesh.
  * Leaves out the asset itself (gltf_asset.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "io/gltf.h"
+#include "io/gltf_scene.h"
+
+#include <stdlib.h>
 
 static size_t count(const vgi_gltf *g, const char *list)
 {
@@ -53,4 +56,40 @@ void vg_asset_text(const vg_asset *a, char *to, size_t room)
     }
     vgi_input_free(&in);
     vgi_gltf_clear(&g);
+}
+
+/* ---- vertices ---- */
+
+/* Of the pieces of one node, the number of the first one whose vertices are those of this part. */
+static size_t primitive_of(const vgi_gltf_scene *x, size_t part)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < x->npieces && x->pieces[i].part != part; i++)
+        n += x->parts[x->pieces[i].part].node == x->parts[part].node &&
+             x->parts[x->pieces[i].part].instance == x->parts[part].instance;
+    return n;
+}
+
+static void take_part(const vgi_gltf_scene *x, size_t i, const vg_asset *a, vg_asset_take *take, void *context)
+{
+    const vgi_gltf_part *p = &x->parts[i];
+    const char *name = vgi_json_text(vgi_json_get(x->nodes[p->node].json, "name"));
+    const size_t primitive = primitive_of(x, i);
+    for (size_t v = 0; v < p->count; v++) take(context, name ? name : "", primitive, v, a->vertex[p->first + v]);
+}
+
+int vg_asset_vertices(const vg_asset *a, vg_asset_take *take, void *context, vg_err *e)
+{
+    vgi_gltf_scene x = {0};
+    vgi_gltf_faces faces = {0};
+    vgi_input *in = NULL;
+    int r = vgi_input_memory(&in, a->data, a->size, "asset", e);
+    if (r == VG_OK) r = vgi_gltf_open(&x.g, in, "the asset", e);
+    vgi_input_free(&in);
+    if (r == VG_OK) r = vgi_gltf_scene_read(&x, &faces, e);
+    if (r == VG_OK && x.nparts && x.all != a->n) r = vg_fail(e, VG_EINPUT, "the asset has another number of vertices");
+    for (size_t i = 0; r == VG_OK && i < x.nparts; i++) take_part(&x, i, a, take, context);
+    vg_mesh_clear(&faces.mesh);
+    vgi_gltf_scene_clear(&x);
+    return r;
 }

@@ -69,13 +69,13 @@ static int open_character(vgi_gltf_writing *w, vg_err *e)
 }
 
 /* The vertices of the file, and their normals; a character has its own. */
-static int cut_mesh(vgi_gltf_writing *w, vg_err *e)
+static int cut_mesh(vgi_gltf_writing *w, bool normals, vg_err *e)
 {
     static const vg_attributes none;
     const vg_body *b = &w->h->body;
     const vg_attributes *a = w->character ? &none : &b->attributes;
     int r = VG_OK;
-    if (!w->character) r = vgi_gltf_normals_make(&w->normals, &b->mesh, a, b->reference, e);
+    if (!w->character && normals) r = vgi_gltf_normals_make(&w->normals, &b->mesh, a, b->reference, e);
     const bool shaded = w->normals.ngroups > 0;
     if (r == VG_OK) r = vgi_gltf_seams_make(&w->seams, &b->mesh, a, shaded ? w->normals.corner : NULL, e);
     return r == VG_OK && shaded ? vgi_gltf_normals_place(&w->normals, w->seams.n, w->seams.corner, b->reference, e) : r;
@@ -90,7 +90,7 @@ int vgi_gltf_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi
     w->spool.name = "temporary file";
     if ((w->spool.fd = vgi_nameless_file(e)) < 0) return w->spool.fd;
     int r = h->kind == VG_VERTICES ? open_character(w, e) : VG_OK;
-    if (r == VG_OK) r = cut_mesh(w, e);
+    if (r == VG_OK) r = cut_mesh(w, !o->no_normals, e);
     if (r == VG_OK) r = round_base(w, e);
     return r < 0 ? r : w->manner->begin(w, o, e);
 }
@@ -381,10 +381,21 @@ static void note_loss(vgi_gltf_writing *w, const char *what)
     snprintf(w->warning + n, sizeof w->warning - n, "%s; ", what);
 }
 
-static bool has_groups(const vg_attributes *a)
+/* Groups and objects; groups of smoothing, too, unless normals show them. */
+static bool has_groups(const vgi_gltf_writing *w)
+{
+    const vg_attributes *a = &w->h->body.attributes;
+    for (size_t i = 0; i < a->nlabels; i++) {
+        const uint32_t kind = a->labels[i].kind;
+        if (kind == VG_LABEL_OBJECT || kind == VG_LABEL_GROUP || (kind == VG_LABEL_SMOOTHING && !w->normals.n)) return true;
+    }
+    return false;
+}
+
+static bool has_materials(const vg_attributes *a)
 {
     for (size_t i = 0; i < a->nlabels; i++)
-        if (a->labels[i].kind != VG_LABEL_MATERIAL && a->labels[i].kind != VG_LABEL_LIBRARY) return true;
+        if (a->labels[i].kind == VG_LABEL_MATERIAL || a->labels[i].kind == VG_LABEL_LIBRARY) return true;
     return false;
 }
 
@@ -397,8 +408,9 @@ static void note_losses(vgi_gltf_writing *w)
         vg_asset_text(&b->asset, asset, sizeof asset);
         if (*asset && !w->library.json) note_loss(w, asset);
         if (b->attributes.ntex && !w->seams.uv) note_loss(w, "texture coordinates");
-        if (has_groups(&b->attributes)) note_loss(w, w->materials.names.n ? "groups" : "groups and materials");
-        else if (b->attributes.nlabels && !w->materials.names.n) note_loss(w, "groups and materials");
+        const bool materials_lost = has_materials(&b->attributes) && !w->materials.names.n;
+        if (has_groups(w) || materials_lost)
+            note_loss(w, w->materials.names.n ? "groups" : "groups and materials");
     }
     const size_t n = strlen(w->warning);
     if (w->manner->warning) w->manner->warning(w, w->warning + n, sizeof w->warning - n);

@@ -140,6 +140,7 @@ static int check_gltf_options(const vgi_plan *p, const char *output, const vg_si
 {
     const char *given = o->most_targets          ? "--max-targets"
                         : o->morph_tolerance > 0 ? "--morph-tolerance"
+                        : o->no_normals          ? "--no-normals"
                         : o->shapes              ? "--shapes"
                                                  : NULL;
     if (p->sequence == &vgi_sequence_glb || p->sequence == &vgi_sequence_gltf)

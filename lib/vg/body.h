@@ -86,6 +86,10 @@ void vg_asset_clear(vg_asset *a);
 /* vg_asset_text: what it holds, "2 materials, 1 texture, normals, 1 skin"; empty when there is none, or
  * nothing but nodes and vertices. */
 void vg_asset_text(const vg_asset *a, char *to, size_t room);
+/* vg_asset_vertices: call take for every vertex of the file, in its order: the name of the node that shows it (empty: it has
+ * none), the number of the primitive in the node's mesh, its number in the primitive, and the vertex of the mesh that it is. */
+typedef void vg_asset_take(void *context, const char *node, size_t primitive, size_t index, uint32_t vertex);
+int vg_asset_vertices(const vg_asset *a, vg_asset_take *take, void *context, vg_err *e) VG_MUST_CHECK;
 
 /* A skeleton: joint j is vertex j of the mesh, whose faces are the bones (parent, child) in the order of their
  * children. */

@@ -180,6 +180,7 @@ typedef struct vg_sink_options {
     size_t most_targets; /* GLB, glTF: morph targets, at most. 0: as many as the tolerance asks for; up to 100 frames are
                             targets as they are */
     double morph_tolerance; /* GLB, glTF: how far a vertex may be from its place when frames are mixed, in D. 0: 0.001 */
+    bool no_normals;     /* GLB, glTF: leave out normals that the input does not have; viewers show such a mesh faceted */
     bool shapes;         /* GLB, glTF: each frame is a morph target, and there is no animation */
     const char *name;    /* GLB, glTF: of the animation; NULL: what its frames are called after */
     bool replace;        /* where a directory or a pattern has mesh files of an earlier set, remove those that are not

@@ -481,7 +481,7 @@ static void malformed_is_refused(void)
         {NODE MESH "'accessors':[{'bufferView':0,'componentType':5130,'count':3,'type':'VEC3'}]", "componentType is not known"},
         {NODE MESH "'accessors':[{'bufferView':7,'componentType':5126,'count':3,'type':'VEC3'}]", "'bufferViews' that is not there"},
         {NODE MESH GOOD ",'bufferViews':[{'buffer':0,'byteLength':60,'byteStride':8}]", "byteStride is less than an element"},
-        {NODE MESH GOOD ",'extensionsRequired':['KHR_draco_mesh_compression']", "compressed with Draco (KHR_draco_mesh_compression)"},
+        {NODE MESH GOOD ",'extensionsRequired':['KHR_draco_mesh']", "requires the extension 'KHR_draco_mesh', which is not known"},
         {NODE "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':1}]}],'accessors':[" FLOATS(0, 3, "VEC3")
          ",{'bufferView':0,'byteOffset':48,'componentType':5125,'count':3,'type':'SCALAR'}]", "an index is 1084227584 where there are 3"},
         {NODE "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':0}]}]," GOOD, "of another type"},
