@@ -56,7 +56,7 @@ mistake() {
     # options
     mistake 2 'vg-solve --wieghts area vectors.vgs' "unknown option '--wieghts': did you mean '--weights'?"
     mistake 2 'vg-deform --on-to=pose2.obj walk.vgs' "did you mean '--onto'?"
-    mistake 2 'vg-info --ver walk.vgs' "ambiguous option '--ver': it could be '--verbose' or '--version'"
+    mistake 2 'vg-info --ver walk.vgs' "ambiguous option '--ver': it could be '--vertices' or '--version'"
     mistake 2 'vg-solve --nonsense vectors.vgs' "unknown option '--nonsense': 'vg-solve --help' lists them"
     mistake 2 'vg-solve -x vectors.vgs' "'vg-solve --help' lists them"
     mistake 2 'vg-solve vectors.vgs -o' "option '--output' needs a value: FILE"
