@@ -719,3 +719,52 @@ END
     must vg-info --vertices cube.obj
     [ "$(tail -1 <<<"$output")" = '7 - 0 7' ] || fail "$output"
 }
+
+@test "normals that lean against their surface turn with it, about its normal too" {
+    py <<'END'
+import json, struct
+import make_character
+make_character.main("in.glb")
+b = bytearray(open("in.glb", "rb").read())
+n, = struct.unpack("<I", b[12:16])
+g = json.loads(b[20:20 + n])
+for mesh in g["meshes"]:
+    for p in mesh["primitives"]:
+        a = g["accessors"][p["attributes"]["NORMAL"]]
+        v = g["bufferViews"][a["bufferView"]]
+        for k in range(a["count"]):
+            at = 28 + n + v.get("byteOffset", 0) + a.get("byteOffset", 0) + k * v.get("byteStride", 12)
+            x = [c + d for c, d in zip(struct.unpack_from("<3f", b, at), (0.3, 0.2, 0.4))]
+            l = sum(c * c for c in x) ** 0.5
+            struct.pack_into("<3f", b, at, *[c / l for c in x])
+open("lean.glb", "wb").write(b)
+END
+    must vg-encode --animation Wave lean.glb -o wave.vgs
+    must vg-decode wave.vgs -o out.glb
+    py <<'END'
+import json, struct
+def load(name):
+    b = open(name, "rb").read()
+    n, = struct.unpack("<I", b[12:16])
+    return json.loads(b[20:20 + n]), b[28 + n:]
+def read(g, data, i):
+    a = g["accessors"][i]
+    def at(x): return g["bufferViews"][x["bufferView"]].get("byteOffset", 0) + x.get("byteOffset", 0)
+    step = g["bufferViews"][a["bufferView"]].get("byteStride", 12) if "bufferView" in a else 12
+    rows = [list(struct.unpack_from("<3f", data, at(a) + k * step)) if "bufferView" in a else [0, 0, 0] for k in range(a["count"])]
+    s = a.get("sparse")
+    for k in range(s["count"] if s else 0):
+        v, = struct.unpack_from("<H", data, at(s["indices"]) + 2 * k)
+        rows[v] = list(struct.unpack_from("<3f", data, at(s["values"]) + 12 * k))
+    return rows
+g, data = load("lean.glb")
+h, out = load("out.glb")
+# The upper cube turns a quarter about z in the second frame: any normal (x, y, z) becomes (-y, x, z); on the lids that is a turn about them.
+before = read(g, data, g["meshes"][0]["primitives"][1]["attributes"]["NORMAL"])
+p = h["meshes"][0]["primitives"][1]
+base, moved = read(h, out, p["attributes"]["NORMAL"]), read(h, out, p["targets"][1]["NORMAL"])
+assert max(abs(a - b) for p, q in zip(before, base) for a, b in zip(p, q)) < 1e-6
+for (x, y, z), n, d in zip(before, base, moved):
+    assert max(abs(a + b - c) for a, b, c in zip(n, d, (-y, x, z))) < 1e-6, (x, y, z, n, d)
+END
+}

@@ -5,7 +5,7 @@
  * joints. A pose is taken back into the space of the mesh by the inverse of M at rest: skin, nodes and morph targets
  * together then show the pose.
  *
- * Normals keep their artist's shading: each is rotated by the rotation of the normal of the adjacent faces.
+ * Normals keep their artist's shading: each is rotated as the adjacent faces are, with their normal and about it.
  * Vertices that are one vertex of the mesh and have equal normals share these faces, so that edges stay hard and
  * seams stay smooth.
  * SPDX-License-Identifier: GPL-3.0-or-later */
@@ -249,26 +249,79 @@ static void face_normals(const vgi_gltf_character *c, const double *world, doubl
     for (size_t g = 0; g < c->ngroups; g++) unit(to + 3 * g);
 }
 
+/* Of the sides of a face at corner k: how they have turned about the normal of its group. */
+static void add_twist(const vgi_gltf_character *c, const uint32_t *v, int k, const double *world)
+{
+    const size_t g = c->group[v[k]];
+    const double *a = c->rest + 3 * g, *b = c->now + 3 * g;
+    const bool still = !memcmp(a, b, 3 * sizeof *a);
+    for (int next = 1; next <= 2; next++) {
+        const size_t from = 3 * (size_t)c->vertex[v[k]], to = 3 * (size_t)c->vertex[v[(k + next) % 3]];
+        double before[3], now[3], turned[3], across[3];
+        for (size_t i = 0; i < 3; i++) {
+            before[i] = c->rest_world[to + i] - c->rest_world[from + i];
+            now[i] = world[to + i] - world[from + i];
+        }
+        unit(before), unit(now);
+        if (still) memcpy(turned, before, sizeof turned);
+        else turn(a, b, before, turned);
+        vgi_cross(turned, now, across);
+        const double along = vgi_dot(turned, b) * vgi_dot(now, b);
+        c->twist[2 * g] += vgi_dot(turned, now) - along;
+        c->twist[2 * g + 1] += vgi_dot(across, b);
+    }
+}
+
+static void find_twists(const vgi_gltf_character *c, const double *world)
+{
+    const vg_mesh *m = &c->faces.mesh;
+    memset(c->twist, 0, 2 * c->ngroups * sizeof *c->twist);
+    for (size_t f = 0; f < m->nf; f++) {
+        const uint32_t *v = m->vert + m->start[f];
+        for (int k = 0; k < 3 && m->start[f + 1] - m->start[f] == 3; k++)
+            if (c->group[v[k]] != UINT32_MAX) add_twist(c, v, k, world);
+    }
+}
+
+/* Turn x about the unit vector b, by the angle whose cosine and sine have this ratio. */
+static void twist_about(const double b[3], const double twist[2], double x[3])
+{
+    const double l = hypot(twist[0], twist[1]), cosine = l > 0 ? twist[0] / l : 1, sine = l > 0 ? twist[1] / l : 0;
+    const double along = vgi_dot(b, x) * (1 - cosine);
+    double across[3];
+    vgi_cross(b, x, across);
+    for (int i = 0; i < 3; i++) x[i] = cosine * x[i] + sine * across[i] + along * b[i];
+}
+
+/* Do the faces around a group lie as they do in the pose of rest? */
+static bool is_still(const vgi_gltf_character *c, size_t g)
+{
+    return !memcmp(c->rest + 3 * g, c->now + 3 * g, 3 * sizeof *c->now) && c->twist[2 * g + 1] == 0 && c->twist[2 * g] >= 0;
+}
+
 /* A normal in another pose, in the space of its mesh. */
 static void normal_now(const vgi_gltf_character *c, size_t f, double to[3])
 {
     const double *a = c->rest + 3 * (size_t)c->group[f], *b = c->now + 3 * (size_t)c->group[f];
     double turned[3];
     if (vgi_length(a) == 0 || vgi_length(b) == 0) memcpy(turned, c->world_normal + 3 * f, sizeof turned);
-    else turn(a, b, c->world_normal + 3 * f, turned);
+    else {
+        turn(a, b, c->world_normal + 3 * f, turned);
+        twist_about(b, c->twist + 2 * (size_t)c->group[f], turned);
+    }
     normal_in(c, f, turned, to);
 }
 
 void vgi_gltf_character_turn(vgi_gltf_character *c, const double *world, float *to)
 {
     face_normals(c, world, c->now);
+    find_twists(c, world);
     for (size_t f = 0; f < c->n; f++) {
         float *d = to + 3 * f;
         double n[3];
         memset(d, 0, 3 * sizeof *d);
         if (c->group[f] == UINT32_MAX) continue;
-        const size_t g = 3 * (size_t)c->group[f];
-        if (!memcmp(c->rest + g, c->now + g, 3 * sizeof *c->now)) continue;
+        if (is_still(c, c->group[f])) continue;
         normal_now(c, f, n);
         for (int k = 0; k < 3; k++) d[k] = (float)(n[k] - c->normal[3 * f + k]);
     }
@@ -286,6 +339,7 @@ static int turn_base(vgi_gltf_character *c, const vg_body *b, vg_err *e)
     }
     if (r == VG_OK) {
         face_normals(c, shown, c->rest);
+        c->rest_world = shown;
         vgi_gltf_character_turn(c, b->reference, turned);
         for (size_t f = 0; f < c->n; f++) {
             float *n = c->normal + 3 * f;
@@ -304,9 +358,11 @@ static int find_normals(vgi_gltf_character *c, const vg_body *b, vg_err *e)
     if (r < 0 || !c->normal) return r;
     if ((r = group_normals(c, e)) < 0) return r;
     c->rest = vgi_array(c->ngroups, 3 * sizeof(double), e), c->now = vgi_array(c->ngroups, 3 * sizeof(double), e);
-    if (!c->rest || !c->now) return VG_ENOMEM;
+    c->twist = vgi_array(c->ngroups, 2 * sizeof *c->twist, e);
+    if (!c->rest || !c->now || !c->twist) return VG_ENOMEM;
     if (!c->kept && (r = turn_base(c, b, e)) < 0) return r;
     face_normals(c, b->reference, c->rest);
+    c->rest_world = b->reference;
     return VG_OK;
 }
 
@@ -365,7 +421,7 @@ int vgi_gltf_character_open(vgi_gltf_character *c, const vg_body *b, vg_err *e)
 
 void vgi_gltf_character_clear(vgi_gltf_character *c)
 {
-    void *const arrays[] = {c->out, c->in, c->base, c->normal, c->world_normal, c->skinned, c->group, c->rest, c->now};
+    void *const arrays[] = {c->out, c->in, c->base, c->normal, c->world_normal, c->skinned, c->group, c->rest, c->now, c->twist};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     vg_mesh_clear(&c->faces.mesh);
     vgi_gltf_scene_clear(&c->scene);

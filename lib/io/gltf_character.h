@@ -22,6 +22,8 @@ typedef struct vgi_gltf_character {
     uint32_t *group;        /* n: vertices that are one and have one normal; UINT32_MAX: those that have none */
     size_t ngroups;
     double *rest, *now;     /* ngroups x 3: normals of the faces around, in the reference pose and in another */
+    double *twist;          /* ngroups x 2: cosine and sine of how the faces around turn about that normal, not of length 1 */
+    const double *rest_world; /* nv x 3: the pose of rest; borrowed */
 } vgi_gltf_character;
 
 /* vgi_gltf_character_open: 1: the body has an asset that belongs to its mesh; 0: it has none, or one that cannot be
