@@ -1,7 +1,9 @@
-/* placing.c: --axes, --scale, --unit and --origin of vg-encode: poses are turned, scaled and moved, in this order.
+/* placing.c: --axes, --scale, --unit, --mirror and --origin of vg-encode: poses are turned, scaled, mirrored and moved, in
+ * this order.
  * Leaves out what else is changed of a sequence (vg-encode.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "placing.h"
+#include "units.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -61,30 +63,26 @@ void placing_take_axes(const char *text, void *context)
     memcpy(p->up, to + 3, sizeof p->up);
 }
 
-static double metres(const char *name, size_t n)
-{
-    static const struct {
-        const char *name;
-        double metres;
-    } units[] = {{"mm", 1e-3}, {"cm", 1e-2}, {"dm", 1e-1}, {"m", 1}, {"km", 1e3}, {"in", 0.0254}, {"ft", 0.3048}};
-    for (size_t i = 0; i < sizeof units / sizeof *units; i++)
-        if (strlen(units[i].name) == n && !memcmp(units[i].name, name, n)) return units[i].metres;
-    return 0;
-}
-
 void placing_take_unit(const char *text, void *context)
 {
     placing *p = context;
     size_t n = strcspn(text, ":");
-    double from = metres(text, n), to = text[n] ? metres(text + n + 1, strlen(text + n + 1)) : 0;
+    double from = unit_metres(text, n), to = text[n] ? unit_metres(text + n + 1, strlen(text + n + 1)) : 0;
     if (from <= 0 || to <= 0)
-        cli_usage("option '--unit' needs FROM:TO, such as cm:m, of mm, cm, dm, m, km, in and ft, not '%s'", text);
+        cli_usage("option '--unit' needs FROM:TO, such as cm:m, of " UNITS_LIST ", not '%s'", text);
     p->unit = from / to;
+}
+
+void placing_take_mirror(const char *text, void *context)
+{
+    placing *p = context;
+    if (!*text || text[1] || *text < 'x' || *text > 'z') cli_usage("option '--mirror' needs x, y or z, not '%s'", text);
+    p->mirror = *text - 'x' + 1;
 }
 
 bool placing_wanted(const placing *p)
 {
-    return p->axes[0] != 0 || p->axes[1] != 0 || p->axes[2] != 0 || p->scale > 0 || p->unit > 0 || p->origin;
+    return p->mirror || p->axes[0] != 0 || p->axes[1] != 0 || p->axes[2] != 0 || p->scale > 0 || p->unit > 0 || p->origin;
 }
 
 /* ---- poses ---- */
@@ -104,10 +102,63 @@ static void move(const placing *p, double *x)
     for (size_t i = 0; i < 3 * p->nv; i++) x[i] += p->shift[i % 3];
 }
 
+static void mirror(const placing *p, double *x)
+{
+    if (!p->mirror || !p->nv) return;
+    vg_mirror_pose(&p->mirrored, x, p->room);
+    memcpy(x, p->room, 3 * p->nv * sizeof *x);
+}
+
 void placing_frame(const placing *p, vg_frame *f)
 {
     turn_and_scale(p, f->values);
+    mirror(p, f->values);
     move(p, f->values);
+}
+
+/* ---- the mirror ---- */
+
+/* The lines of a file: two vertices each, '#' before a remark. */
+static uint32_t (*read_pairs(const char *file, size_t *n))[2]
+{
+    size_t size, line = 0;
+    char *data = cli_read_file(file, &size), *next = data;
+    uint32_t(*pairs)[2] = cli_allocate(size / 4 + 1, sizeof *pairs, "the pairs");
+    *n = 0;
+    while (next) {
+        char *text = strsep(&next, "\n"), *end;
+        double x[2];
+        line++;
+        text[strcspn(text, "#\r")] = 0;
+        for (end = text; *end; end++)
+            if (*end == ' ' || *end == '\t' || *end == ';') *end = ',';
+        while (*text == ',') text++;
+        while (end > text && end[-1] == ',') *--end = 0;
+        if (!*text) continue;
+        if (cli_parse_numbers(text, x, 2) != 2 || x[0] != (uint32_t)x[0] || x[1] != (uint32_t)x[1])
+            cli_stop(VG_EINPUT, "'%s', line %zu: two vertices are needed, not '%s'", file, line, text);
+        pairs[*n][0] = (uint32_t)x[0], pairs[(*n)++][1] = (uint32_t)x[1];
+    }
+    free(data);
+    return pairs;
+}
+
+static void find_mirror(placing *p, const vg_body *b)
+{
+    vg_err e;
+    size_t n = 0;
+    bool file = p->pairs && strcmp(p->pairs, "auto");
+    uint32_t(*pairs)[2] = file ? read_pairs(p->pairs, &n) : NULL;
+    double D = vg_diagonal(b->reference, b->mesh.nv);
+    if (vg_mirror_find(&p->mirrored, &b->mesh, b->reference, (size_t)p->mirror - 1, (const uint32_t(*)[2])pairs, n, &e) < 0)
+        cli_stop(e.code, "%s%s", e.message, file ? "" : "; name them with --pairs FILE");
+    free(pairs);
+    const vg_mirror *m = &p->mirrored;
+    p->room = cli_allocate(3 * p->nv, sizeof *p->room, "a mirrored pose");
+    cli_note("the mirror is at %c = %.6g; the two sides of the rest pose differ by %.3g %% of D on average, at most %.3g %% at vertex %u",
+             (int)('w' + p->mirror), m->plane, 100 * m->mean / D, 100 * m->largest / D, m->farthest);
+    if (m->broken * 50 > m->edges)
+        cli_warn("%zu of %zu edges have no edge on the other side: the mesh is not symmetric", m->broken, m->edges);
 }
 
 /* ---- the head ---- */
@@ -139,10 +190,12 @@ static void find_shift(placing *p, const double *reference)
 void placing_head(placing *p, vg_head *h)
 {
     if (h->body.skeleton.njoints)
-        cli_stop(VG_EINPUT, "the input is a skeleton: --axes, --scale, --unit and --origin are for meshes");
+        cli_stop(VG_EINPUT, "the input is a skeleton: --axes, --scale, --unit, --mirror and --origin are for meshes");
     p->nv = h->body.mesh.nv;
     make_matrix(p);
     turn_and_scale(p, h->body.reference);
+    if (p->mirror) find_mirror(p, &h->body);
+    mirror(p, h->body.reference);
     find_shift(p, h->body.reference);
     move(p, h->body.reference);
     vg_rig_clear(&h->body.rig);

@@ -1,8 +1,11 @@
 /* vg-decode: write the poses of a stream as mesh files, a directory or an archive of them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "batch.h"
+#include "raw.h"
 
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static vg_sink_options sink_options;
 static long first_number, most_targets;
@@ -11,7 +14,7 @@ static uint64_t written;
 static const char *output; /* not cli.output, which is NULL for "-" as for none */
 
 static const cli_option options[] = {
-    {"output", 'o', "FILE", "a.obj, 'a-%04d.ply', DIR/, a.zip, a.pc2, a.npz, ...; '-' is standard output",
+    {"output", 'o', "FILE", "a.obj, 'a-%04d.ply', DIR/, a.zip, a.npz, ...; '-' is standard output; '-:f32' numbers alone",
      .text = &output},
     {"format", 0, "obj|ply|ply-ascii|ply-be|off|stl|stl-ascii|pc2|mdd|npy|npz|usda|glb|gltf|bvh",
      "whatever the name says", .text = &sink_options.format},
@@ -62,6 +65,37 @@ static void put_frames(void *context, size_t n, vg_frame *in)
     }
 }
 
+/* ---- frames as numbers with nothing around them ---- */
+
+typedef struct numbers {
+    FILE *to;
+    size_t count, width; /* numbers of a frame, bytes of a number */
+} numbers;
+
+static void put_numbers(void *context, size_t n, vg_frame *in)
+{
+    const numbers *x = context;
+    for (size_t i = 0; i < n; i++) raw_write(x->to, &in[i], x->count, x->width);
+}
+
+static void refuse_raw_options(void)
+{
+    for (const cli_option *o = options; o->name; o++)
+        if (strcmp(o->name, "output") && cli_given(o->name))
+            cli_usage("option '--%s' has no meaning for frames that are numbers alone", o->name);
+}
+
+static void decode_raw(vg_source *s, size_t width)
+{
+    static const step writing = {.batch = 1, .unit = "poses", .process = put_numbers};
+    const vg_head *h = vg_source_head(s);
+    numbers x = {cli_text_open(), h->count * vg_head_width(h), width};
+    vg_frame *in = batch_frames(&writing);
+    if (!batch_read(&writing, &x, s, in)) cli_warn("the input has no poses: '%s' holds none", output);
+    batch_frames_free(&writing, in);
+    cli_text_end();
+}
+
 static void decode(vg_source *s)
 {
     static const step writing = {.batch = 1, .unit = "poses", .process = put_frames};
@@ -87,11 +121,21 @@ int main(int argc, char **argv)
     sink_options.first_number = first_number, sink_options.most_targets = (size_t)most_targets;
     sink_options.threads = cli.threads;
     if (!output) cli_usage("name the output: -o poses.zip, -o 'pose-%%04d.obj', or -o poses/");
-    if (vg_sink_check(output, &sink_options, &e) < 0) cli_die(&e);
+    size_t raw = 0;
+    char *file = NULL;
+    if (raw_output(output, &raw, &file)) {
+        refuse_raw_options();
+        cli_redirect(file, false);
+        if (!cli.output && isatty(STDOUT_FILENO)) cli_usage("numbers are not written to a terminal: pipe them into a program");
+    } else if (vg_sink_check(output, &sink_options, &e) < 0) {
+        cli_die(&e);
+    }
     if (cli_given("first-number") && !strchr(output, '%'))
         cli_usage("--first-number is for files with numbers, such as 'pose-%%04d.obj': '%s' has none", output);
     vg_source *s = cli_source(operands, n);
-    decode(s);
+    if (raw) decode_raw(s, raw);
+    else decode(s);
+    free(file);
     vg_source_close(&s);
     cli_finish(0);
 }

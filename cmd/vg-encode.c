@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "batch.h"
 #include "placing.h"
+#include "raw.h"
 #include "take.h"
 
 #include <stdlib.h>
@@ -15,6 +16,7 @@ static struct {
     size_t objects; /* 1: frames */
     double fps;
     size_t faces; /* 1: selected */
+    size_t raw;   /* of enum raw */
     take_list take;
     placing placing;
 } opts;
@@ -48,8 +50,14 @@ static const cli_option options[] = {
     {"scale", 0, "X", "multiply all positions by X", .number = &opts.placing.scale, .least = 1e-12, .most = 1e12},
     {"unit", 0, "FROM:TO", "scale from one unit to another, such as cm:m", .take = placing_take_unit,
      .context = &opts.placing},
+    {"mirror", 0, "x|y|z", "mirror the body in its middle: vertices change places with those on the other side",
+     .take = placing_take_mirror, .context = &opts.placing},
+    {"pairs", 0, "auto|FILE", "which these are: found in the reference pose (default), or a file, two vertices a line",
+     .text = &opts.placing.pairs, .reads = true, .needs = "mirror"},
     {"origin", 0, "centre|floor|X,Y,Z", "move this place of the reference pose to 0,0,0: its centroid, the floor below it",
      .text = &opts.placing.origin},
+    {"raw", 0, "f32|f64", "read frames that are numbers alone, x y z of each vertex of --mesh, little-endian",
+     .choice = &opts.raw, .needs = "mesh", .excludes = "array-axes|animation|shapes|weld|max-bytes"},
     {"f32", 0, NULL, "write binary32 instead of binary64", .flag = &opts.f32},
     {.name = NULL}};
 
@@ -114,8 +122,8 @@ static void apply_options(vg_head *h, bool selects, uint32_t *anchors, size_t na
             cli_stop(VG_EINPUT, "the input holds '%s': --f32 needs a form that this program knows", vg_head_form(h));
         if (opts.vectors || selects || opts.reference || opts.anchors || placing_wanted(&opts.placing))
             cli_stop(VG_EINPUT,
-                     "the input holds %s: --vectors, --faces, --reference, --anchor, --axes, --scale, --unit and "
-                     "--origin need vertices",
+                     "the input holds %s: --vectors, --faces, --reference, --anchor, --axes, --scale, --unit, "
+                     "--mirror and --origin need vertices",
                      vg_head_form(h));
     } else {
         if (opts.reference) set_reference(h, opts.reference);
@@ -180,6 +188,31 @@ static void check_taken(void *context)
     take_end(&opts.take, w->read);
 }
 
+/* Frames that are numbers alone: what step_run does, without a source. */
+static void encode_raw(work *w, char **operands, size_t n)
+{
+    vg_err e;
+    vg_head h = {0};
+    vg_frame f = {0};
+    if (n > 1) cli_usage("--raw reads one file or pipe, not %zu", n);
+    if (vg_load(&h, opts.mesh, "mesh", &e) < 0) cli_die(&e);
+    cli_expect_input(n);
+    h.kind = VG_VERTICES, h.count = h.body.mesh.nv, h.precision = VG_F64;
+    raw_input in = raw_open(n ? operands[0] : "-", 3 * h.count, opts.raw == 1 ? 8 : 4);
+    if (vg_frame_shape(&f, &h, &e) < 0) cli_die(&e);
+    prepare(w, &h, &f);
+    cli_stream_open(&h);
+    while (raw_next(&in, &f)) {
+        encode(w, 1, &f);
+        cli_progress("poses", w->read);
+    }
+    check_taken(w);
+    cli_stream_end(NULL);
+    raw_close(&in);
+    vg_frame_clear(&f);
+    vg_head_clear(&h);
+}
+
 int main(int argc, char **argv)
 {
     static const step encoding = {
@@ -193,10 +226,14 @@ int main(int argc, char **argv)
     vg_source_options from = {.mesh = opts.mesh, .reading = opts.reading};
     if (opts.most_bytes && !(from.most_bytes = cli_parse_size("max-bytes", opts.most_bytes)))
         cli_usage("option '--max-bytes' needs a size of at least 1");
-    vg_source *s = cli_source_with(operands, n, &from);
-    step_run(&encoding, &w, s);
+    if (cli_given("raw")) {
+        encode_raw(&w, operands, n);
+    } else {
+        vg_source *s = cli_source_with(operands, n, &from);
+        step_run(&encoding, &w, s);
+        vg_source_close(&s);
+    }
     vg_frame_clear(&w.vectors);
     vg_graph_free(&w.g);
-    vg_source_close(&s);
     cli_finish(0);
 }

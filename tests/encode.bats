@@ -327,3 +327,105 @@ END
     must_fail 3 vg-encode --scale 2 "$DATA/sit01.bvh.xz" -o out.vgs
     [ ! -e out.vgs ]
 }
+
+@test "--raw reads the numbers that vg-decode -o NAME:f64 writes, from files and pipes, frame by frame" {
+    poses two 4
+    must vg-encode pose1.obj pose2.obj pose3.obj pose4.obj -o in.vgs
+    must vg-decode in.vgs -o numbers:f64
+    [ "$(stat -c %s numbers)" = $((4 * 12 * 3 * 8)) ]
+    must vg-encode --raw f64 --mesh pose1.obj numbers -o back.vgs
+    must vg-diff -t 0 in.vgs back.vgs
+    pipe 'vg-decode in.vgs -o -:f32 | vg-encode --raw f32 --mesh pose1.obj | vg-diff -t 1e-7 in.vgs -'
+    py <<'END'
+import array, read_stream
+s = read_stream.read_stream("in.vgs")
+numbers = array.array("d")
+numbers.frombytes(open("numbers", "rb").read())
+assert list(numbers) == [x for f in s.frames for x in f.values]
+END
+    names back.vgs
+    [ "$output" = "0 1 2 3" ]
+    must vg-encode --raw f64 --mesh pose1.obj --vectors --take 1-2 numbers -o vectors.vgs
+    pipe 'vg-solve vectors.vgs | vg-encode - | vg-diff -t 1e-9 - <(vg-encode --take 1-2 in.vgs)'
+    # a frame is passed on before the next one comes
+    mkfifo to from
+    vg-encode --raw f64 --mesh pose1.obj --no-provenance <to >from &
+    exec 5>to
+    exec 6<from
+    head -c 288 numbers >&5
+    timeout 20 head -c 1000 <&6 >first
+    [ "$(stat -c %s first)" = 1000 ]
+    exec 5>&-
+    cat <&6 >/dev/null
+    exec 6<&-
+    wait
+    # what is wrong
+    head -c 300 numbers >cut
+    must_fail 3 vg-encode --raw f64 --mesh pose1.obj cut -o out.vgs
+    says "frame 1" "12 bytes of 288"
+    printf '\0\0\xc0\x7f%.0s' {1..36} >nan
+    must_fail 3 vg-encode --raw f32 --mesh pose1.obj nan -o out.vgs
+    says "not finite"
+    must_fail 2 vg-encode --raw f32 numbers -o out.vgs
+    must_fail 2 vg-encode --raw f32 --mesh pose1.obj numbers numbers -o out.vgs
+    must_fail 2 vg-encode --raw i16 --mesh pose1.obj numbers -o out.vgs
+    must_fail 2 vg-decode --no-mesh in.vgs -o x:f32
+    says "--no-mesh"
+    must_fail 4 vg-encode --raw f32 --mesh pose1.obj missing -o out.vgs
+    LC_ALL=C awk '$1 == "v" {$2 = 1e300} {print}' pose1.obj >huge.obj
+    must_fail 3 vg-decode huge.obj -o x:f32
+    says "':f64'"
+    [ ! -e out.vgs ] && [ ! -e x ]
+}
+
+@test "--mirror: left is right, vertices change partners, faces stay" {
+    # a grid from -3 to 4 with its middle at 0.5; the second pose lifts what is right of it, and pulls it forward
+    py <<'END'
+def write(name, f):
+    with open(name, "w") as o:
+        for j in range(4):
+            for i in range(8):
+                print("v", *f(i - 3 - 0.5, j), file=o)
+        for j in range(3):
+            for i in range(7):
+                a = 8 * j + i + 1
+                print("f", a, a + 1, a + 9, a + 8, file=o)
+write("rest.obj", lambda x, y: (x + 0.5, y, 0.1 * x * x))
+write("right.obj", lambda x, y: (x + 0.5 + (x > 0) * 0.25 * y, y + max(x, 0), 0.1 * x * x + 1))
+write("left.obj", lambda x, y: (x + 0.5 - (x < 0) * 0.25 * y, y + max(-x, 0), 0.1 * x * x + 1))
+with open("pairs.txt", "w") as o:
+    print("# partners", file=o)
+    for j in range(4):
+        for i in range(4):
+            print(8 * j + i, 8 * j + 7 - i, file=o)
+END
+    must vg-encode --mirror x --reference rest.obj right.obj -o mirrored.vgs
+    must vg-diff -t 1e-15 left.obj mirrored.vgs
+    must vg-encode --mirror x mirrored.vgs -o back.vgs
+    must vg-diff -t 1e-15 right.obj back.vgs
+    must vg-encode --mirror x --pairs pairs.txt --reference rest.obj right.obj -o named.vgs
+    must vg-diff -t 1e-15 left.obj named.vgs
+    must vg-encode --mirror x --pairs auto --scale 2 --origin 1,0,0 --reference rest.obj right.obj -o placed.vgs
+    pipe 'vg-encode --scale 2 --origin 1,0,0 left.obj | vg-diff -t 1e-15 - placed.vgs'
+    capture vg-encode -v --mirror x --reference rest.obj right.obj -o mirrored.vgs
+    says "x = 0.5" "differ by 0 %"
+    # a real body is nearly its own mirror image
+    must vg-encode --mirror x "$DATA/walk-man.rest.obj.xz" -o a.vgs
+    must vg-diff --of mean -t 1e-4 "$DATA/walk-man.rest.obj.xz" a.vgs
+    must vg-encode --mirror x a.vgs -o b.vgs
+    must vg-diff -t 1e-15 "$DATA/walk-man.rest.obj.xz" b.vgs
+    # what is not symmetric
+    must_fail 3 vg-encode --mirror x right.obj -o out.vgs
+    says "not symmetric" "--pairs FILE"
+    echo '0 99' >wrong.txt
+    must_fail 3 vg-encode --mirror x --pairs wrong.txt rest.obj -o out.vgs
+    says "99"
+    printf '0 1\n0 2\n' >wrong.txt
+    must_fail 3 vg-encode --mirror x --pairs wrong.txt rest.obj -o out.vgs
+    echo 'left right' >wrong.txt
+    must_fail 3 vg-encode --mirror x --pairs wrong.txt rest.obj -o out.vgs
+    says "line 1"
+    must_fail 2 vg-encode --mirror left rest.obj -o out.vgs
+    must_fail 2 vg-encode --pairs auto rest.obj -o out.vgs
+    [ ! -e out.vgs ]
+}

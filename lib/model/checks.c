@@ -170,7 +170,9 @@ static const char *refuse_driven(const vg_correspondence *c, size_t f)
         sum += c->weight[i];
     }
     if (!is_one(sum)) return "the weights of a face do not sum to 1";
-    return c->distance[f] < 0 || c->matched[f] > 1 ? "a distance or mark is out of range" : NULL;
+    return c->distance[f] < 0 || c->matched[f] > 2 || (c->matched[f] == 2) != (c->matched[0] == 2)
+               ? "a distance or mark is out of range"
+               : NULL;
 }
 
 int vgi_check_correspondence(vg_head *h, void *artefact, const char *where, vg_err *e)

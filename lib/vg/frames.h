@@ -22,7 +22,8 @@ typedef struct vg_correspondence {
     double *weight;     /* of each pair, > 0; of one target face they sum to 1 */
     double *distance;   /* target_nf: from its centroid to the matched source face's, after fitting, mesh units of the
                            target */
-    uint8_t *matched;   /* target_nf: 1: found near by; 0: rides with the nearest matched face */
+    uint8_t *matched;   /* target_nf: 1: found near by; 0: rides with the nearest matched face; 2, for all faces or none:
+                           the target is bound to the source (vg_bind) */
 } vg_correspondence;
 
 void vg_correspondence_clear(vg_correspondence *c);

@@ -97,6 +97,65 @@ void vg_corrector_free(vg_corrector **c);
 /* vg_corrector_apply: vectors that plain transfer has made of a pose of the source, in place. */
 void vg_corrector_apply(vg_corrector *c, const double *pose, double *vectors);
 
+/* The vertices that change places when a body is mirrored in the middle of its rest pose. */
+typedef struct vg_mirror {
+    size_t nv, axis;     /* 0 1 2 = x y z */
+    double plane;        /* the mirror is where this coordinate has this value */
+    uint32_t *partner;   /* nv: partner[partner[v]] = v; on the middle line the vertex itself */
+    double mean, largest; /* distance of the mirrored partner from the vertex in the rest pose, mesh units */
+    uint32_t farthest;   /* the vertex with the largest */
+    size_t edges, broken; /* edges of the mesh, and those whose partners are no edge */
+} vg_mirror;
+
+void vg_mirror_clear(vg_mirror *m);
+/* vg_mirror_find: pair the vertices by position, and by normal where several are at one place. VG_EINPUT when a vertex has
+ * no partner within 2 % of D. pairs (npairs of two vertices): what is known, then nothing is searched and all other vertices
+ * stay in their places; NULL: search. O(n log n). */
+int vg_mirror_find(vg_mirror *m, const vg_mesh *mesh, const double *points, size_t axis, const uint32_t (*pairs)[2],
+                   size_t npairs, vg_err *e) VG_MUST_CHECK;
+/* vg_mirror_pose: nv points in, nv mirrored points out; out is not in. */
+void vg_mirror_pose(const vg_mirror *m, const double *in, double *out);
+
+/* The distance between two surfaces of any connectivity, both ways: of points of one from the nearest point of the other,
+ * which is exact. The points are the vertices and the centroids of triangles, weighted so that mean and rms integrate
+ * quadratic functions over each triangle exactly; a face of four or more corners is a fan around its centroid. */
+typedef struct vg_surface_distance {
+    double mean, rms, p95, max; /* weighted by area; mesh units. p95 is exact to 0.3 % */
+    double at[3];               /* the point with the largest */
+    size_t frame;               /* ... and its frame, counted from 0 */
+} vg_surface_distance;
+typedef struct vg_surface_measures vg_surface_measures;
+/* vg_surface_measures_new: the meshes are borrowed until free; both need faces (VG_EINPUT). scale: D, or any length of that
+ * order. */
+int vg_surface_measures_new(vg_surface_measures **x, const vg_mesh *truth, const vg_mesh *result, double scale, int threads,
+                            vg_err *e) VG_MUST_CHECK;
+void vg_surface_measures_free(vg_surface_measures **x);
+/* vg_surface_measures_add: one frame. found (may be NULL): of this frame, [0] from the truth to the result, [1] back. */
+int vg_surface_measures_add(vg_surface_measures *x, const double *truth, const double *result,
+                            vg_surface_distance found[2], vg_err *e) VG_MUST_CHECK;
+/* vg_surface_measures_get: of all frames, as found. */
+void vg_surface_measures_get(const vg_surface_measures *x, vg_surface_distance found[2]);
+/* vg_surface_measures_vertices: the distance of each vertex of the result in the last frame. Borrowed until the next call. */
+const double *vg_surface_measures_vertices(const vg_surface_measures *x);
+
+/* A mesh that rides on another one: clothes, hair, a prop, a cage. */
+/* vg_bind: each face of the target is bound to the source faces around the point that is nearest to its centroid in the
+ * two rest poses. matched is VG_BOUND for all faces. VG_EINPUT when the source has no face with an area. */
+enum { VG_BOUND = 2 };
+int vg_bind(vg_correspondence *c, const vg_mesh *source, const double *source_points, const vg_mesh *target,
+            const double *target_points, int threads, vg_err *e) VG_MUST_CHECK;
+bool vg_is_bound(const vg_correspondence *c);
+
+/* Each vertex of the target keeps its nearest point on the source. What it is away from there turns and stretches with the
+ * source faces that its faces are bound to: along a face as that does, along its normal without stretch. */
+typedef struct vg_rider vg_rider;
+/* vg_rider_new: c is bound and fits both meshes (VG_EINPUT); source and source_points are borrowed until free. */
+int vg_rider_new(vg_rider **r, const vg_mesh *source, const double *source_points, const vg_correspondence *c,
+                 const vg_mesh *target, const double *target_points, int threads, vg_err *e) VG_MUST_CHECK;
+void vg_rider_free(vg_rider **r);
+/* vg_rider_apply: a pose of the source in, the vertices of the target out. */
+void vg_rider_apply(vg_rider *r, const double *pose, double *vertices);
+
 #ifdef __cplusplus
 }
 #endif

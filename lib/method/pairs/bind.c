@@ -1,0 +1,420 @@
+/* bind.c: a mesh that rides on another one: which faces carry it, and where it is in a pose of these.
+ * Leaves out meshes that correspond part by part, which are registered (register.c).
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "method/pairs/surface.h"
+#include "model/incidence.h"
+#include "numeric/kdtree.h"
+#include "numeric/vec3.h"
+
+#include <stdlib.h>
+
+enum {
+    BLOCK = 64,   /* faces or vertices of a task */
+    AROUND = 96   /* faces of the source that carry one of the target, at most */
+};
+static const double REACH = 1.2; /* faces within this many sizes, or distances from the surface, carry */
+
+/* ---- which faces ---- */
+
+typedef struct carried { /* of one face of the target */
+    uint32_t n, face[AROUND];
+    double weight[AROUND], distance;
+} carried;
+
+typedef struct binding {
+    const vg_mesh *source, *target;
+    const double *target_points;
+    vgi_surface *surface;
+    vgi_incidence around; /* of the source */
+    const bool *take;
+    carried *by; /* of each face of the target */
+} binding;
+
+static double centroid_of(const vg_mesh *m, const double *points, size_t f, double centre[3])
+{
+    double size = 0;
+    size_t r = m->start[f + 1] - m->start[f];
+    const uint32_t *v = m->vert + m->start[f];
+    memset(centre, 0, 3 * sizeof *centre);
+    for (size_t i = 0; i < r; i++)
+        for (size_t k = 0; k < 3; k++) centre[k] += points[3 * (size_t)v[i] + k] / (double)r;
+    for (size_t i = 0; i < r; i++) size = fmax(size, vgi_square(points + 3 * (size_t)v[i], centre));
+    return sqrt(size);
+}
+
+static bool has(const carried *c, uint32_t face)
+{
+    for (uint32_t i = 0; i < c->n; i++)
+        if (c->face[i] == face) return true;
+    return false;
+}
+
+/* Faces beside those that are there, over the surface: a hand on a hip does not carry trousers. */
+static void walk(const binding *b, carried *c, const double at[3], double reach)
+{
+    const vg_mesh *m = b->source;
+    const double *centroids = vgi_surface_centroids(b->surface);
+    for (uint32_t i = 0; i < c->n; i++)
+        for (uint32_t k = m->start[c->face[i]]; k < m->start[c->face[i] + 1]; k++)
+            for (uint32_t j = b->around.first[m->vert[k]]; j < b->around.first[m->vert[k] + 1]; j++) {
+                uint32_t face = b->around.face[j];
+                if (c->n == AROUND) return;
+                if (!b->take[face] || has(c, face) || vgi_square(centroids + 3 * (size_t)face, at) >= reach * reach) continue;
+                c->face[c->n++] = face;
+            }
+}
+
+static void weigh(const binding *b, carried *c, const double at[3], double reach)
+{
+    const double *centroids = vgi_surface_centroids(b->surface), *sizes = vgi_surface_sizes(b->surface);
+    double sum = 0;
+    for (uint32_t i = 0; i < c->n; i++) {
+        double x = vgi_square(centroids + 3 * (size_t)c->face[i], at) / (reach * reach), size = sizes[c->face[i]];
+        c->weight[i] = x < 1 ? (1 - x) * (1 - x) * size * size : 0;
+        sum += c->weight[i];
+    }
+    if (!(sum > 0)) c->n = 1, c->weight[0] = sum = 1;
+    for (uint32_t i = 0; i < c->n; i++) c->weight[i] /= sum;
+}
+
+static void bind_face(const binding *b, size_t f)
+{
+    carried *c = &b->by[f];
+    vgi_hit hit;
+    double centre[3], reach = centroid_of(b->target, b->target_points, f, centre);
+    if (!vgi_surface_nearest(b->surface, centre, NULL, 0, INFINITY, &hit)) return;
+    c->distance = sqrt(hit.square);
+    reach = fmax(reach, fmax(c->distance, vgi_surface_sizes(b->surface)[hit.face])) * REACH;
+    c->n = 1, c->face[0] = hit.face;
+    walk(b, c, hit.point, reach);
+    weigh(b, c, hit.point, reach);
+}
+
+static void bind_block(void *context, size_t block)
+{
+    const binding *b = context;
+    for (size_t f = BLOCK * block; f < BLOCK * (block + 1) && f < b->target->nf; f++) bind_face(b, f);
+}
+
+static int write_pairs(const binding *b, vg_correspondence *c, vg_err *e)
+{
+    size_t pairs = 0, nf = b->target->nf;
+    for (size_t f = 0; f < nf; f++)
+        for (uint32_t i = 0; i < b->by[f].n; i++) pairs += b->by[f].weight[i] > 0;
+    if (pairs >= UINT32_MAX) return vg_fail(e, VG_EINPUT, "there are too many faces to bind");
+    c->first = vgi_array(nf + 1, sizeof *c->first, e), c->source = vgi_array(pairs, sizeof *c->source, e);
+    c->weight = vgi_array(pairs, sizeof *c->weight, e), c->distance = vgi_array(nf, sizeof *c->distance, e);
+    c->matched = vgi_array(nf, sizeof *c->matched, e);
+    if (!c->first || !c->source || !c->weight || !c->distance || !c->matched) return VG_ENOMEM;
+    for (size_t f = 0; f < nf; f++) {
+        const carried *by = &b->by[f];
+        c->first[f + 1] = c->first[f];
+        for (uint32_t i = 0; i < by->n; i++) {
+            if (!(by->weight[i] > 0)) continue;
+            c->source[c->first[f + 1]] = by->face[i];
+            c->weight[c->first[f + 1]++] = by->weight[i];
+        }
+        c->distance[f] = by->distance, c->matched[f] = VG_BOUND;
+    }
+    return VG_OK;
+}
+
+/* Faces with an area, which have a frame. */
+static bool *faces_with_area(const vg_mesh *m, const double *points, size_t *n, vg_err *e)
+{
+    bool *take = vgi_array(m->nf, sizeof *take, e);
+    for (size_t f = 0; take && f < m->nf; f++) {
+        double area[3];
+        size_t r = m->start[f + 1] - m->start[f];
+        vgi_newell(points, m->vert + m->start[f], r, area);
+        *n += take[f] = r > 2 && vgi_length(area) > 0;
+    }
+    return take;
+}
+
+int vg_bind(vg_correspondence *c, const vg_mesh *source, const double *source_points, const vg_mesh *target,
+            const double *target_points, int threads, vg_err *e)
+{
+    binding b = {.source = source, .target = target, .target_points = target_points};
+    size_t areas = 0;
+    *c = (vg_correspondence){.source_nv = source->nv, .source_nf = source->nf, .target_nv = target->nv,
+                             .target_nf = target->nf, .source_digest = vg_mesh_digest(source),
+                             .target_digest = vg_mesh_digest(target)};
+    bool *take = faces_with_area(source, source_points, &areas, e);
+    int r = take ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK && !areas) r = vg_fail(e, VG_EINPUT, "no face of the source has an area: nothing can ride on it");
+    if (r == VG_OK && !target->nf) r = vg_fail(e, VG_EINPUT, "the target has no faces");
+    b.take = take;
+    if (r == VG_OK) r = vgi_surface_of(&b.surface, source, source_points, take, e);
+    if (r == VG_OK) r = vgi_incidence_make(&b.around, source, e);
+    if (r == VG_OK && !(b.by = vgi_array(target->nf, sizeof *b.by, e))) r = VG_ENOMEM;
+    if (r == VG_OK) {
+        vgi_parallel(threads, (target->nf + BLOCK - 1) / BLOCK, bind_block, &b);
+        r = write_pairs(&b, c, e);
+    }
+    if (r < 0) vg_correspondence_clear(c);
+    vgi_surface_free(&b.surface);
+    vgi_incidence_clear(&b.around);
+    free(b.by);
+    free(take);
+    return r;
+}
+
+bool vg_is_bound(const vg_correspondence *c)
+{
+    return c->first && c->target_nf && c->matched[0] == VG_BOUND;
+}
+
+/* ---- where it is in a pose ---- */
+
+/* A face of the source that carries something. */
+typedef struct frame {
+    uint32_t face;
+    double centre[3], normal[3]; /* in the rest pose; the normal is as long as the face is wide */
+    double inverse[9];           /* (sum of w w' over the corners, from the centroid, and of n n')^-1 */
+    double now[3], matrix[9];    /* in the pose: its centroid; what turns and stretches directions */
+} frame;
+
+struct vg_rider {
+    const vg_mesh *source;
+    size_t nv, nframes;
+    int threads;
+    frame *frames;
+    uint32_t *first, *by; /* nv + 1; the frames of each vertex, and their weights */
+    double *weight;
+    vgi_hit *foot;        /* nv: the nearest point of the source at rest */
+    double *above;        /* nv: from there to the vertex */
+    const double *source_rest;
+    const double *pose;   /* of the call */
+    double *out;
+};
+
+/* The centroid of a face, and its normal, `length` long; 0 for a face without an area. */
+static void face_frame(const vg_mesh *m, const double *points, uint32_t f, double length, double centre[3], double normal[3])
+{
+    centroid_of(m, points, f, centre);
+    vgi_newell(points, m->vert + m->start[f], m->start[f + 1] - m->start[f], normal);
+    double size = vgi_length(normal);
+    for (int k = 0; k < 3; k++) normal[k] = size > 0 ? normal[k] / size * length : 0;
+}
+
+/* The sum of a b' over the corners, from the centroids, and over the normals: a in one pose, b at rest. */
+static void sum_outer(const vg_mesh *m, const frame *x, const double *points, const double *rest, const double centre[3],
+                      const double normal[3], double S[9])
+{
+    memset(S, 0, 9 * sizeof *S);
+    for (uint32_t i = m->start[x->face]; i < m->start[x->face + 1]; i++) {
+        const double *p = points + 3 * (size_t)m->vert[i], *q = rest + 3 * (size_t)m->vert[i];
+        double u[3], v[3];
+        for (int k = 0; k < 3; k++) u[k] = p[k] - centre[k], v[k] = q[k] - x->centre[k];
+        vgi_add_outer(S, 1, u, v);
+    }
+    vgi_add_outer(S, 1, normal, x->normal);
+}
+
+static void rest_frame(const vg_mesh *m, frame *x, const double *rest)
+{
+    double area[3], S[9], cofactors[9];
+    vgi_newell(rest, m->vert + m->start[x->face], m->start[x->face + 1] - m->start[x->face], area);
+    face_frame(m, rest, x->face, sqrt(vgi_length(area)), x->centre, x->normal);
+    sum_outer(m, x, rest, rest, x->centre, x->normal, S);
+    double determinant = vgi_cofactors(S, cofactors);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) x->inverse[3 * i + k] = determinant > 0 ? cofactors[3 * k + i] / determinant : 0;
+}
+
+static void pose_block(void *context, size_t block)
+{
+    vg_rider *r = context;
+    for (size_t i = BLOCK * block; i < BLOCK * (block + 1) && i < r->nframes; i++) {
+        frame *x = &r->frames[i];
+        double normal[3], S[9];
+        face_frame(r->source, r->pose, x->face, vgi_length(x->normal), x->now, normal);
+        sum_outer(r->source, x, r->pose, r->source_rest, x->now, normal, S);
+        vgi_multiply(S, x->inverse, x->matrix);
+    }
+}
+
+/* The foot of a vertex in the pose: where it is in its triangle stays (see vgi_hit). */
+static void foot_in_pose(const vg_rider *r, const vgi_hit *hit, double at[3])
+{
+    const vg_mesh *m = r->source;
+    uint32_t begin = m->start[hit->face], end = m->start[hit->face + 1], next = hit->corner + 1 < end ? hit->corner + 1 : begin,
+             last = next + 1 < end ? next + 1 : begin;
+    const double *a = r->pose + 3 * (size_t)m->vert[hit->corner], *b = r->pose + 3 * (size_t)m->vert[next];
+    double centre[3];
+    const double *c = r->pose + 3 * (size_t)m->vert[last];
+    if (end - begin > 3) centroid_of(m, r->pose, hit->face, centre), c = centre;
+    for (int k = 0; k < 3; k++) at[k] = a[k] + hit->u[0] * (b[k] - a[k]) + hit->u[1] * (c[k] - a[k]);
+}
+
+/* What is above the foot follows the frames of the faces around. */
+static void vertex_block(void *context, size_t block)
+{
+    vg_rider *r = context;
+    for (size_t v = BLOCK * block; v < BLOCK * (block + 1) && v < r->nv; v++) {
+        double at[3];
+        foot_in_pose(r, &r->foot[v], at);
+        for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++) {
+            double above[3];
+            vgi_multiply_vector(r->frames[r->by[i]].matrix, r->above + 3 * v, above);
+            for (int k = 0; k < 3; k++) at[k] += r->weight[i] * above[k];
+        }
+        memcpy(r->out + 3 * v, at, sizeof at);
+    }
+}
+
+void vg_rider_apply(vg_rider *r, const double *pose, double *vertices)
+{
+    r->pose = pose, r->out = vertices;
+    vgi_parallel(r->threads, (r->nframes + BLOCK - 1) / BLOCK, pose_block, r);
+    vgi_parallel(r->threads, (r->nv + BLOCK - 1) / BLOCK, vertex_block, r);
+}
+
+/* ---- setting up ---- */
+
+/* The source faces that are used, each once; number[f] is the place of face f among them. */
+static int make_frames(vg_rider *r, const vg_correspondence *c, uint32_t *number, vg_err *e)
+{
+    memset(number, 0xff, c->source_nf * sizeof *number);
+    for (uint32_t i = 0; i < c->first[c->target_nf]; i++)
+        if (number[c->source[i]] == UINT32_MAX) number[c->source[i]] = (uint32_t)r->nframes++;
+    r->frames = vgi_array(r->nframes, sizeof *r->frames, e);
+    if (!r->frames) return VG_ENOMEM;
+    for (size_t f = 0; f < c->source_nf; f++) {
+        if (number[f] == UINT32_MAX) continue;
+        frame *x = &r->frames[number[f]];
+        x->face = (uint32_t)f;
+        rest_frame(r->source, x, r->source_rest);
+    }
+    return VG_OK;
+}
+
+typedef struct feet {
+    vg_rider *r;
+    const vgi_surface *surface;
+    const double *points;
+} feet;
+
+static void find_feet(void *context, size_t block)
+{
+    const feet *x = context;
+    vg_rider *r = x->r;
+    for (size_t v = BLOCK * block; v < BLOCK * (block + 1) && v < r->nv; v++) {
+        vgi_hit *hit = &r->foot[v];
+        if (!vgi_surface_nearest(x->surface, x->points + 3 * v, NULL, 0, INFINITY, hit)) continue;
+        for (size_t k = 0; k < 3; k++) r->above[3 * v + k] = x->points[3 * v + k] - hit->point[k];
+    }
+}
+
+/* Feet are on faces that carry something. */
+static int make_feet(vg_rider *r, const uint32_t *number, const double *points, vg_err *e)
+{
+    vgi_surface *surface = NULL;
+    bool *take = vgi_array(r->source->nf, sizeof *take, e);
+    r->foot = vgi_array(r->nv, sizeof *r->foot, e);
+    r->above = vgi_array(3 * r->nv, sizeof *r->above, e);
+    int result = take && r->foot && r->above ? VG_OK : VG_ENOMEM;
+    for (size_t f = 0; result == VG_OK && f < r->source->nf; f++) take[f] = number[f] != UINT32_MAX;
+    if (result == VG_OK) result = vgi_surface_of(&surface, r->source, r->source_rest, take, e);
+    feet x = {r, surface, points};
+    if (result == VG_OK) vgi_parallel(r->threads, (r->nv + BLOCK - 1) / BLOCK, find_feet, &x);
+    vgi_surface_free(&surface);
+    free(take);
+    return result;
+}
+
+/* The vertex whose faces carry each vertex: itself, or the nearest that has faces. */
+static uint32_t *find_hosts(const vgi_incidence *around, const double *points, size_t nv, vg_err *e)
+{
+    vgi_kdtree *tree = NULL;
+    uint32_t *host = vgi_array_raw(nv, sizeof *host, e), *without = vgi_array_raw(nv, sizeof *without, e);
+    bool loose = false;
+    for (size_t v = 0; host && without && v < nv; v++) {
+        without[v] = around->first[v] == around->first[v + 1];
+        host[v] = (uint32_t)v, loose |= without[v];
+    }
+    if (!host || !without || (loose && vgi_kdtree_new(&tree, points, nv, e) < 0)) {
+        free(without);
+        return free(host), NULL;
+    }
+    if (loose) vgi_kdtree_label(tree, without);
+    for (size_t v = 0; loose && v < nv; v++) {
+        vgi_near near;
+        if (without[v] && vgi_kdtree_nearest_other(tree, points + 3 * v, 1, INFINITY, &near)) host[v] = near.index;
+    }
+    vgi_kdtree_free(&tree);
+    free(without);
+    return host;
+}
+
+/* A vertex is carried by what carries its faces, in equal shares. A face that carries several of these is listed for each. */
+static int make_weights(vg_rider *r, const vg_correspondence *c, const vg_mesh *target, const double *points,
+                        const uint32_t *number, vg_err *e)
+{
+    vgi_incidence around = {0};
+    uint32_t *host = NULL;
+    size_t cap = 0, weight_cap = 0, n = 0;
+    int result = vgi_incidence_make(&around, target, e);
+    r->first = vgi_array(r->nv + 1, sizeof *r->first, e);
+    if (result == VG_OK && (!r->first || !(host = find_hosts(&around, points, r->nv, e)))) result = VG_ENOMEM;
+    for (size_t v = 0; result == VG_OK && v < r->nv; v++) {
+        uint32_t begin = around.first[host[v]], end = around.first[host[v] + 1];
+        for (uint32_t j = begin; j < end && result == VG_OK; j++) {
+            uint32_t f = around.face[j];
+            size_t more = c->first[f + 1] - c->first[f];
+            result = vgi_grow(&r->by, &cap, n + more, sizeof *r->by, e);
+            if (result == VG_OK) result = vgi_grow(&r->weight, &weight_cap, n + more, sizeof *r->weight, e);
+            for (uint32_t i = c->first[f]; result == VG_OK && i < c->first[f + 1]; i++, n++)
+                r->by[n] = number[c->source[i]], r->weight[n] = c->weight[i] / (end - begin);
+        }
+        if (n >= UINT32_MAX) result = vg_fail(e, VG_EINPUT, "there are too many faces to ride on");
+        r->first[v + 1] = (uint32_t)n;
+    }
+    vgi_incidence_clear(&around);
+    free(host);
+    return result;
+}
+
+static int check_fit(const vg_correspondence *c, const vg_mesh *source, const vg_mesh *target, vg_err *e)
+{
+    if (!vg_is_bound(c)) return vg_fail(e, VG_EINPUT, "the correspondence binds nothing: make one with vg-register --bind");
+    if (c->source_nv != source->nv || c->source_nf != source->nf || c->source_digest != vg_mesh_digest(source))
+        return vg_fail(e, VG_EINPUT, "the correspondence is for another source mesh (%zu vertices, %zu faces)", c->source_nv,
+                       c->source_nf);
+    if (c->target_nv != target->nv || c->target_nf != target->nf || c->target_digest != vg_mesh_digest(target))
+        return vg_fail(e, VG_EINPUT, "the correspondence is for another target mesh (%zu vertices, %zu faces)", c->target_nv,
+                       c->target_nf);
+    return VG_OK;
+}
+
+int vg_rider_new(vg_rider **out, const vg_mesh *source, const double *source_points, const vg_correspondence *c,
+                 const vg_mesh *target, const double *target_points, int threads, vg_err *e)
+{
+    *out = NULL;
+    if (check_fit(c, source, target, e) < 0) return VG_EINPUT;
+    vg_rider *r = vgi_array(1, sizeof *r, e);
+    uint32_t *number = vgi_array_raw(source->nf, sizeof *number, e);
+    int result = r && number ? VG_OK : VG_ENOMEM;
+    if (result == VG_OK) r->source = source, r->source_rest = source_points, r->nv = target->nv, r->threads = threads;
+    if (result == VG_OK) result = make_frames(r, c, number, e);
+    if (result == VG_OK) result = make_weights(r, c, target, target_points, number, e);
+    if (result == VG_OK) result = make_feet(r, number, target_points, e);
+    free(number);
+    if (result < 0 && r) vg_rider_free(&r);
+    *out = r;
+    return result;
+}
+
+void vg_rider_free(vg_rider **r)
+{
+    if (!*r) return;
+    free((*r)->frames);
+    free((*r)->first);
+    free((*r)->by);
+    free((*r)->weight);
+    free((*r)->foot);
+    free((*r)->above);
+    free(*r);
+    *r = NULL;
+}
