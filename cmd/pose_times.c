@@ -3,6 +3,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "pose_times.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,7 +20,15 @@ void pose_times_take(const char *list, void *to)
 double pose_times_at(const pose_times *m, size_t i, size_t keys)
 {
     if (m->at) return m->at[i];
+    if (m->speed > 0) return fmin((double)i * m->speed, (double)(keys - 1));
     return m->count < 2 ? 0 : (double)i * (double)(keys - 1) / (double)(m->count - 1);
+}
+
+size_t pose_times_count(const pose_times *m, size_t keys)
+{
+    double n = m->speed > 0 ? floor((double)(keys - 1) / m->speed * (1 + 1e-12)) + 1 : (double)m->count;
+    if (n > 1e9) cli_usage("--speed %g makes more than 1000000000 poses", m->speed);
+    return (size_t)n;
 }
 
 void key_label(vg_frame *f, const pose_key *keys, size_t nkeys, double t)

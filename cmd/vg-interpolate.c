@@ -15,13 +15,15 @@ static struct {
 
 static const cli_option options[] = {
     {"at", 0, "T,...", "write the poses at these moments: 0 is the first pose, 1 the second; outside is extrapolated",
-     .take = pose_times_take, .context = &opts.times},
+     .take = pose_times_take, .context = &opts.times, .excludes = "speed"},
+    {"speed", 0, "X", "play at this speed, as many frames a second as before: 0.5 is slow motion, with twice as many",
+     .number = &opts.times.speed, .least = 1e-4, .most = 1e4},
     {"smooth", 0, NULL, "keep the velocity continuous at the poses that are interpolated", .flag = &opts.smooth},
     {.name = NULL}};
 
 static const cli_program program = {
     .name = "vg-interpolate",
-    .synopsis = "[options] N | --at T,... [FILE]",
+    .synopsis = "[options] N | --at T,... | --speed X [FILE]",
     .summary = "write N poses, evenly spaced from the first pose of the input to the last, or poses at given moments",
     .options = options,
     .most_operands = 2,
@@ -34,6 +36,10 @@ static size_t take_count(char **operands, size_t n)
 {
     if (opts.times.at) {
         if (n > 1) cli_usage("--at says which poses are written, so '%s' is one operand too many", operands[0]);
+        return 0;
+    }
+    if (opts.times.speed > 0) {
+        if (n > 1) cli_usage("--speed says how many poses are written, so '%s' is one operand too many", operands[0]);
         return 0;
     }
     if (n == 0) cli_usage("say how many poses to write: vg-interpolate 30, or which: vg-interpolate --at 0,0.5,1");
@@ -136,16 +142,41 @@ static void check_finite(const poses *p, const vg_frame *f, double t)
     cli_stop(VG_EARG, "frame '%s' is so far outside that numbers overflow: choose --at nearer to the keys", f->name);
 }
 
+/* The stem that the names of all keys have, as in "Walk.0001"; 0: they have none in common. number: of the first. */
+static size_t common_stem(const poses *p, uint64_t *number)
+{
+    uint64_t other;
+    size_t n = vg_frame_stem(p->labels[0].name, number);
+    for (size_t i = 1; n && i < p->n; i++)
+        if (vg_frame_stem(p->labels[i].name, &other) != n || memcmp(p->labels[i].name, p->labels[0].name, n)) n = 0;
+    return n;
+}
+
+/* Frames of another speed are numbered on as those of an animation are, and last so much longer. */
+static void label_speed(const poses *p, vg_frame *f, size_t i)
+{
+    vg_err e;
+    uint64_t number;
+    size_t stem = common_stem(p, &number);
+    f->time = p->labels[0].time + (f->time - p->labels[0].time) / opts.times.speed;
+    if (!stem) return;
+    char *name = cli_allocate(stem + 30, 1, "the name of a pose");
+    snprintf(name, stem + 30, "%.*s.%04llu", (int)stem, p->labels[0].name, (unsigned long long)number + i);
+    if (vg_frame_rename(f, name, &e) < 0) cli_die(&e);
+    free(name);
+}
+
 static void write_poses(const poses *p, vg_path *path)
 {
     vg_err e;
     vg_frame f = {0};
-    size_t count = (size_t)opts.times.count;
+    size_t count = pose_times_count(&opts.times, p->n);
     if (vg_frame_shape(&f, p->h, &e) < 0) cli_die(&e);
     for (size_t i = 0; i < count; i++) {
         double t = pose_times_at(&opts.times, i, p->n);
         if (vg_path_at(path, t, f.values, f.root, vg_frame_anchors(&f), &e) < 0) cli_die(&e);
         key_label(&f, p->labels, p->n, t);
+        if (opts.times.speed > 0) label_speed(p, &f, i);
         check_finite(p, &f, t);
         cli_stream_put(&f);
         cli_progress_of("poses", i + 1, count);

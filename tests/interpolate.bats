@@ -190,3 +190,21 @@ END
     pipe_fail 2 "vg-encode pose1.obj large.obj | vg-interpolate --at 1e6 >out.vgs"
     says "so far outside that numbers overflow"
 }
+
+@test "--speed: every keyth frame is a key, times last as much longer, and animations are numbered on" {
+    for i in 1 2 3 4 5; do mesh cube "0.$i" >"Walk.000$i.obj"; done
+    must vg-encode --fps 10 'Walk.*.obj' -o walk.vgs
+    pipe 'vg-interpolate --speed 0.5 walk.vgs | vg-solve -o slow.vgs'
+    py <<'END'
+import read_stream
+a, b = (read_stream.read_stream(n).frames for n in ("walk.vgs", "slow.vgs"))
+assert [f.name for f in b] == ["Walk.%04d" % (i + 1) for i in range(9)]
+assert all(abs(f.time - 0.1 * i) < 1e-12 for i, f in enumerate(b))
+for i, f in enumerate(a):
+    assert max(abs(x - y) for x, y in zip(f.values, b[2 * i].values)) < 1e-9
+END
+    pipe 'vg-interpolate --speed 3 walk.vgs | vg-solve | vg-diff -t 1e-9 <(vg-encode --take 0-/3 walk.vgs) -'
+    must_fail 2 vg-interpolate --speed 0.5 --at 1,2 walk.vgs
+    must_fail 2 vg-interpolate --speed 0.5 30 walk.vgs
+    must_fail 2 vg-interpolate --speed 0 walk.vgs
+}
