@@ -5,22 +5,55 @@
 #include "cli.h"
 #include "error_plot.h"
 #include "report.h"
+#include "surfaces.h"
+#include "units.h"
 
 #include <math.h>
 
 enum which { MEAN, RMS, P95, MAX };
 
 static struct {
-    double tolerance; /* in units of D; negative: none was asked for */
+    double tolerance; /* in units of D, or `metres`; negative: none was asked for */
+    bool metres;
+    const char *limit; /* the tolerance as it was said */
+    const char *unit;  /* of the meshes */
     const char *of, *heat, *plot;
     size_t which; /* of enum which */
-    bool centred, frames;
+    bool centred, frames, surface;
 } opts = {.tolerance = -1, .of = "max", .which = MAX};
 static const char *report_file; /* NULL: standard output */
 
+/* "0.001", "1e-3D", "0.1%" of D; "0.1mm" */
+static void take_tolerance(const char *text, void *context)
+{
+    char number[64];
+    const char *unit = text + strspn(text, "0123456789.+-eE"), *named = unit;
+    (void)context;
+    if (!strcmp(text, "inf")) named = unit = text + 3;
+    size_t n = (size_t)(unit - text);
+    double x = -1, metres = 0;
+    if (n && n < sizeof number) {
+        memcpy(number, text, n);
+        number[n] = 0;
+        x = strcmp(number, "inf") ? (cli_parse_numbers(number, &x, 1) == 1 ? x : -1) : INFINITY;
+    }
+    bool of_D = !*named || !strcmp(named, "D") || !strcmp(named, "%");
+    if (!of_D) metres = unit_metres(named, strlen(named));
+    if (!(x >= 0) || (!of_D && metres <= 0))
+        cli_usage("option '--tolerance' needs a number of at least 0, in D, as 1e-3 or 1e-3D or 0.1%%, or with a unit, as 0.1mm, not '%s'",
+                  text);
+    opts.tolerance = *named == '%' ? x / 100 : of_D ? x : x * metres;
+    opts.metres = !of_D, opts.limit = text;
+}
+
 static const cli_option options[] = {
-    {.name = "tolerance", .letter = 't', .value = "X", .help = "exit 1 when the error exceeds X, in units of D",
-     .number = &opts.tolerance, .least = 0, .most = INFINITY},
+    {.name = "tolerance", .letter = 't', .value = "X[UNIT]",
+     .help = "exit 1 when the error exceeds X, in units of D, in per cent of it, or in a unit of length",
+     .take = take_tolerance},
+    {.name = "unit", .value = "UNIT", .help = "what a unit of the meshes is, for such a tolerance (default: m)",
+     .text = &opts.unit, .needs = "tolerance"},
+    {.name = "surface", .help = "the distance between the surfaces, both ways, whatever their vertices and faces",
+     .flag = &opts.surface, .excludes = "centred|plot"},
     {.name = "of", .value = "mean|rms|p95|max", .help = "the error it is about (default: max)",
      .text = &opts.of, .choice = &opts.which, .needs = "tolerance"},
     {.name = "centred", .letter = 'c', .help = "move the centroid of every pose to 0 before comparing",
@@ -92,6 +125,14 @@ static const report_column planarity_columns[] = {
 
 enum { COLUMNS_FRAME = 8, COLUMNS_ERROR = 7, COLUMNS_FACE = 4, COLUMNS_PLANARITY = 5 };
 
+/* The answer is no: in a line, but nothing is said with --quiet, as by 'cmp -s'. */
+static void answer_no(const char *line) __attribute__((noreturn));
+static void answer_no(const char *line)
+{
+    if (cli.quiet) cli_finish(1);
+    cli_no("%s", line);
+}
+
 /* The answer "these cannot be compared": a line for people, and for programs an object that says so. */
 static void cannot_compare(const char *reason) __attribute__((noreturn));
 static void cannot_compare(const char *reason)
@@ -104,7 +145,7 @@ static void cannot_compare(const char *reason)
         report_free(&r);
         cli_text_end();
     }
-    cli_no("%s", reason);
+    answer_no(reason);
 }
 
 static void open_side(side *s, char *operand)
@@ -275,6 +316,30 @@ static void compare(side *truth, side *result, findings *found, report *r)
     cli_redirect(report_file, false);
 }
 
+/* --surface: frame by frame, for a frame has a search tree of its own. */
+static void compare_surfaces(surfaces *s, side *truth, side *result, report *r)
+{
+    batch b = {0};
+    size_t n = 0, nv = result->head->body.mesh.nv;
+    surfaces_begin(s, &truth->head->body, &result->head->body, opts.frames ? r : NULL);
+    open_heat(result, truth);
+    b.most = 1;
+    b.truth = cli_allocate(1, sizeof *b.truth, "a pose"), b.result = cli_allocate(1, sizeof *b.result, "a pose");
+    for (int i = 0; i < 2; i++) b.poses[i] = cli_allocate(1, sizeof *b.poses[i], "a pose");
+    while (next_batch(&b, truth, result)) {
+        const double *distance = surfaces_add(s, n++, b.truth->name, b.poses[0][0], b.poses[1][0]);
+        if (opts.heat) put_heat(b.result, nv, distance, s->diagonal);
+    }
+    vg_frame_clear(b.truth);
+    vg_frame_clear(b.result);
+    free(b.truth);
+    free(b.result);
+    for (int i = 0; i < 2; i++) free(b.poses[i]);
+    if (!opts.heat) return;
+    cli_stream_end(vg_source_tail(result->source));
+    cli_redirect(report_file, false);
+}
+
 static void report_sides(report *r, const side *truth, const side *result, const vg_measure_stats *m)
 {
     const side *const sides[2] = {truth, result};
@@ -324,6 +389,9 @@ static void report_vertices(report *r, const findings *found)
     report_error(r, "p95", m->p95, m->diagonal, "", nowhere);
     report_error(r, "max", m->max, m->diagonal, at_max, m->max > 0 ? worst : nowhere);
     report_error(r, "sigma", m->sigma, m->diagonal, at_sigma, m->sigma > 0 ? unsteady : nowhere);
+    report_note(r, "From each vertex to where the truth has it, over all vertices and frames. p95: 95 %% of them are nearer.");
+    report_note(r, "sigma: the largest standard deviation over the frames of the error of one vertex.");
+    report_note(r, "D: the diagonal of the box around the reference pose of the truth.");
 }
 
 static void report_histogram(report *r, const vg_measure_stats *m)
@@ -346,6 +414,7 @@ static void report_faces(report *r, const vg_measure_stats *m)
     report_table(r, "face_error", any ? "" : NULL, true, face_columns, COLUMNS_FACE);
     report_row(r, rows[0]);
     report_row(r, rows[1]);
+    if (any) report_note(r, "orientation: 1 - cosine between the normals. area: how far the ratio of the areas is from 1.");
     any = m->planarity_faces[0] || m->planarity_faces[1];
     if (any) report_gap(r);
     report_table(r, "planarity", any ? "" : NULL, true, planarity_columns, COLUMNS_PLANARITY);
@@ -358,26 +427,25 @@ static void report_faces(report *r, const vg_measure_stats *m)
     }
 }
 
-static double error_asked_for(const vg_measure_stats *m)
-{
-    const double errors[] = {[MEAN] = m->mean, [RMS] = m->rms, [P95] = m->p95, [MAX] = m->max};
-    double error = errors[opts.which];
-    return in_diagonals(error, m->diagonal);
-}
-
 /* Does the result satisfy? When a tolerance was given the report says so, and `line` is the answer in words. */
-static bool judge(report *r, const vg_measure_stats *m, char *line, size_t size)
+static bool judge(report *r, const double found[4], double diagonal, char *line, size_t size)
 {
     if (opts.tolerance < 0) return true;
-    double error = error_asked_for(m);
-    bool within = error <= opts.tolerance;
-    snprintf(line, size, "%s error %.6g D %s the tolerance of %.6g D", opts.of, error,
-             within ? "is within" : "exceeds", opts.tolerance);
+    const char *of_unit = opts.unit ? opts.unit : "m";
+    double error = in_diagonals(found[opts.which], diagonal), limit = opts.tolerance;
+    if (opts.metres) limit = in_diagonals(opts.tolerance / unit_metres(of_unit, strlen(of_unit)), diagonal);
+    bool within = error <= limit;
+    if (opts.metres)
+        snprintf(line, size, "%s error %.6g %s (%.4g D) %s the tolerance of %s", opts.of, found[opts.which], of_unit, error,
+                 within ? "is within" : "exceeds", opts.limit);
+    else
+        snprintf(line, size, "%s error %.6g D %s the tolerance of %.6g D", opts.of, error, within ? "is within" : "exceeds",
+                 limit);
     report_gap(r);
     report_note(r, "%s", line);
     report_group(r, "tolerance");
     report_put(r, "of", NULL, report_text(opts.of));
-    report_put(r, "limit", NULL, report_number(opts.tolerance));
+    report_put(r, "limit", NULL, report_number(limit));
     report_put(r, "error", NULL, report_number(error));
     report_put(r, "within", NULL, report_flag(within));
     report_end(r);
@@ -396,6 +464,9 @@ static void parse_options(int argc, char **argv, char ***operands)
     if (n < 2) cli_usage("two sequences are needed: TRUTH and RESULT");
     report_file = cli.output;
     if (opts.plot) error_plot_check(opts.plot, report_file, opts.heat);
+    if (opts.unit && !unit_metres(opts.unit, strlen(opts.unit)))
+        cli_usage("option '--unit' needs one of " UNITS_LIST ", not '%s'", opts.unit);
+    if (opts.unit && !opts.metres) cli_usage("--unit is for a tolerance with a unit, such as 0.1mm");
     if (!opts.heat && cli.no_provenance) cli_usage("--no-provenance is about the stream that --heat writes");
     if (!opts.heat) return;
     if (replaces_report() && (cli.json || opts.frames))
@@ -406,40 +477,90 @@ static void parse_options(int argc, char **argv, char ***operands)
     cli_redirect(report_file, false);
 }
 
+/* With --quiet there is no report but one that was asked for by its name. */
+static bool wants_report(void)
+{
+    return !replaces_report() && (!cli.quiet || report_file || cli.json);
+}
+
+static void report_all(report *r, const side *truth, const side *result, const findings *found, double errors[4])
+{
+    const vg_measure_stats *m = &found->measures;
+    const double all[] = {[MEAN] = m->mean, [RMS] = m->rms, [P95] = m->p95, [MAX] = m->max};
+    memcpy(errors, all, sizeof all);
+    report_sides(r, truth, result, m);
+    report_vertices(r, found);
+    report_histogram(r, m);
+    report_faces(r, m);
+}
+
+static void report_surfaces(report *r, const side *truth, const side *result, surfaces *s, double errors[4])
+{
+    const side *const sides[2] = {truth, result};
+    static const char *const keys[2] = {"truth", "result"};
+    report_put(r, "comparable", NULL, report_flag(true));
+    for (int i = 0; i < 2; i++) {
+        const vg_mesh *m = &sides[i]->head->body.mesh;
+        char line[600];
+        snprintf(line, sizeof line, "%.500s, %zu frame%s of %zu vertices and %zu faces", sides[i]->name, sides[i]->frames,
+                 sides[i]->frames == 1 ? "" : "s", m->nv, m->nf);
+        report_put(r, NULL, keys[i], report_text(line));
+        report_group(r, keys[i]);
+        report_put(r, "name", NULL, report_text(sides[i]->name));
+        report_put(r, "frames", NULL, report_count(sides[i]->frames));
+        report_put(r, "vertices", NULL, report_count(m->nv));
+        report_put(r, "faces", NULL, report_count(m->nf));
+        report_end(r);
+    }
+    report_put(r, "D", "D", report_number(s->diagonal));
+    surfaces_report(s, r, errors);
+}
+
+static void answer(const side *truth, const side *result, bool within, const char *line) __attribute__((noreturn));
+static void answer(const side *truth, const side *result, bool within, const char *line)
+{
+    char counts[1100];
+    size_t least = truth->frames < result->frames ? truth->frames : result->frames;
+    snprintf(counts, sizeof counts, "'%.400s' has %zu frames and '%.400s' has %zu: only the first %zu were compared",
+             truth->name, truth->frames, result->name, result->frames, least);
+    if (truth->frames != result->frames) answer_no(counts);
+    if (!within) answer_no(line);
+    cli_finish(0);
+}
+
 int main(int argc, char **argv)
 {
-    char **operands;
+    char **operands, line[300];
     side truth = {0}, result = {0};
     findings found = {0};
+    surfaces s = {0};
+    double errors[4];
     parse_options(argc, argv, &operands);
     open_side(&truth, operands[0]);
     open_side(&result, operands[1]);
-    check_same_mesh(&truth, &result);
+    if (!opts.surface) check_same_mesh(&truth, &result);
 
     report *frames = report_new(), *r = report_new();
-    compare(&truth, &result, &found, frames);
-    report_sides(r, &truth, &result, &found.measures);
-    report_vertices(r, &found);
-    report_histogram(r, &found.measures);
-    report_faces(r, &found.measures);
-    char answer[200];
-    bool within = judge(r, &found.measures, answer, sizeof answer);
+    if (opts.surface) {
+        compare_surfaces(&s, &truth, &result, frames);
+        report_surfaces(r, &truth, &result, &s, errors);
+    } else {
+        compare(&truth, &result, &found, frames);
+        report_all(r, &truth, &result, &found, errors);
+    }
+    bool within = judge(r, errors, opts.surface ? s.diagonal : found.measures.diagonal, line, sizeof line);
     if (opts.frames) report_gap(r);
     report_join(r, frames);
-
-    if (!replaces_report()) {
+    if (wants_report()) {
         report_print(r, cli_text_open(), cli.json);
         cli_text_end();
     }
     report_free(&r);
     if (opts.plot) error_plot_write(&found.curves, &found.measures, truth.name, result.name, opts.plot);
     error_curves_clear(&found.curves);
+    surfaces_end(&s);
     free(found.worst_frame);
     vg_source_close(&truth.source);
     vg_source_close(&result.source);
-    if (truth.frames != result.frames)
-        cli_no("'%s' has %zu frames and '%s' has %zu: only the first %zu were compared", truth.name, truth.frames,
-               result.name, result.frames, found.measures.frames);
-    if (!within) cli_no("%s", answer);
-    cli_finish(0);
+    answer(&truth, &result, within, line);
 }

@@ -489,3 +489,94 @@ END
     must_fail 2 vg-diff --plot h.svg --heat h.svg truth.vgs truth.vgs
     must_fail 4 vg-diff --plot nowhere/e.svg truth.vgs truth.vgs
 }
+
+# plane NAME CELLS SIZE HEIGHT: a square of so many cells a side, from 0 to SIZE
+plane() {
+    LC_ALL=C awk -v n="$2" -v s="$3" -v z="$4" 'BEGIN {
+        for (j = 0; j <= n; j++) for (i = 0; i <= n; i++) printf "v %.17g %.17g %.17g\n", i * s / n, j * s / n, z
+        for (j = 0; j < n; j++) for (i = 0; i < n; i++) {
+            a = j * (n + 1) + i + 1; print "f", a, a + 1, a + n + 2, a + n + 1
+        }
+    }' >"$1"
+}
+
+@test "--surface: planes apart, whatever their vertices, and a part that is missing in one way only" {
+    plane fine.obj 8 2 0
+    plane coarse.obj 3 2 0.25
+    plane half.obj 4 1 0
+    must vg-diff --surface --json fine.obj coarse.obj
+    python3 - "$output" <<'END'
+import json, sys
+r = json.loads(sys.argv[1])
+for way in "truth_to_result", "result_to_truth":
+    for key in "mean", "rms", "max":
+        assert abs(r["surface_distance"][way][key] - 0.25) < 1e-12, (way, key)
+    assert abs(r["surface_distance"][way]["p95"] - 0.25) < 0.25 * 0.006
+assert abs(r["hausdorff"] - 0.25) < 1e-12 and abs(r["D"] - 8 ** 0.5) < 1e-12
+END
+    # from the square of side 2 to that of side 1 in its corner: (x - 1)+ and (y - 1)+ are the distances along the axes
+    plane dense.obj 64 2 0
+    must vg-diff --surface --json dense.obj half.obj
+    python3 - "$output" <<'END'
+import json, math, sys
+d = json.loads(sys.argv[1])["surface_distance"]
+back, there = d["result_to_truth"], d["truth_to_result"]
+assert back["max"] < 1e-12
+assert abs(there["max"] - 2 ** 0.5) < 1e-12 and there["at"] == [2, 2, 0]
+# mean: two unit squares of mean 1/2, one of mean (sqrt 2 + asinh 1) / 3, one of 0; mean square: 1/3, 1/3, 2/3, 0
+assert abs(there["mean"] - (1 + (2 ** 0.5 + math.asinh(1)) / 3) / 4) < 2e-5
+assert abs(there["rms"] - (4 / 3 / 4) ** 0.5) < 2e-5
+END
+    # frame by frame; the vertices of the result as colours
+    must vg-encode fine.obj fine.obj -o two.vgs
+    must vg-encode --reference coarse.obj coarse.obj coarse.obj -o raised.vgs
+    must vg-diff --surface --frames --heat heat.vgs two.vgs raised.vgs
+    shows "Hausdorff" "p95: 95 %" "D: the diagonal"
+    [ "$(grep -c 'coarse\|fine' <<<"$output")" = 2 ]
+    py <<'END'
+import read_stream
+for f in read_stream.read_stream("heat.vgs").frames:
+    assert all(abs(x - 0.25 / 8 ** 0.5) < 1e-12 for x in f.scalars[2]), f.scalars
+END
+    must_fail 1 vg-diff --surface -t 0.24m fine.obj coarse.obj
+    says "max error 0.25 m" "0.24m"
+    must vg-diff --surface -t 0.26m fine.obj coarse.obj
+    must_fail 2 vg-diff --surface -c fine.obj coarse.obj
+    grep '^v' fine.obj >points.obj
+    must_fail 3 vg-diff --surface fine.obj points.obj
+    says "no faces"
+}
+
+@test "a tolerance in D, in per cent of it, and as a length in the unit of the meshes" {
+    mesh cube >a.obj
+    mesh cube 0 0.0173 >b.obj # D is sqrt 3: 0.00999 D, 17.3 mm in metres
+    for tolerance in 0.01 1e-2D 1% 17.4mm 1.74cm 0.0174m 0.69in; do must vg-diff -t "$tolerance" a.obj b.obj; done
+    for tolerance in 0.0099 9.9e-3D 0.99% 17.2mm 1.72cm 0.0172m 0.67in; do
+        must_fail 1 vg-diff -t "$tolerance" a.obj b.obj
+        says "max error" "exceeds the tolerance"
+    done
+    must vg-diff -t 0.18mm --unit cm a.obj b.obj
+    must_fail 1 vg-diff -t 0.17mm --unit cm a.obj b.obj
+    says "0.0173 cm" "0.17mm"
+    for wrong in '-t 1furlong' '-t mm' '-t -1mm' '-t 1e-3 --unit cm' '-t 1mm --unit D' '--unit m'; do
+        # shellcheck disable=SC2086 # words
+        must_fail 2 vg-diff $wrong a.obj b.obj
+    done
+}
+
+@test "--quiet says nothing, whatever the answer; a report that is asked for is written" {
+    mesh cube >a.obj
+    mesh cube 0 0.1 >b.obj
+    must vg-diff -q a.obj b.obj
+    [ -z "$output" ]
+    capture vg-diff -q -t 0 a.obj b.obj
+    [ "$status" = 1 ] && [ -z "$output$stderr" ]
+    mesh tetra >c.obj
+    capture vg-diff -q a.obj c.obj
+    [ "$status" = 1 ] && [ -z "$output$stderr" ]
+    must vg-diff -q a.obj b.obj -o report
+    grep -q rms report
+    must vg-diff -q --json a.obj b.obj
+    shows rms
+    must_fail 4 vg-diff -q a.obj missing.obj
+}
