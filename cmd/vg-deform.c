@@ -56,7 +56,7 @@ static const cli_program program = {
 enum { BATCH = 8, MOST_EXAMPLES = 1000 }; /* poses of one call: the lanes of the kernels */
 
 /* How poses become what is written. */
-typedef enum way { MEASURE, APPLY, TRANSFER, CARRY, SHAPE } way;
+typedef enum way { MEASURE, APPLY, TRANSFER, CARRY, SHAPE, RIDE } way;
 typedef enum by { BY_BLEND, BY_POSE, BY_GRADIENT, BY_SHAPE } by;
 typedef enum pin { PIN_AUTO, PIN_ALWAYS, PIN_NONE } pin;
 
@@ -73,6 +73,7 @@ typedef struct work {
     vg_deformer *deformer;
     vg_cross_transfer *carrier;
     vg_shaper *shaper;
+    vg_rider *rider;
     vg_mover *mover;          /* NULL: poses are measured */
     vg_pinner *pinner;        /* NULL: nothing is held */
     vg_corrector *corrector;  /* NULL: there are no examples */
@@ -126,6 +127,9 @@ static void run_batch(work *w, size_t n, const double *const *in, double *const 
     case TRANSFER: vg_deformer_transfer(w->deformer, n, w->kind, in, out); break;
     case CARRY: vg_cross_transfer_apply(w->carrier, n, in, out); break;
     case SHAPE: vg_shaper_transfer(w->shaper, n, in, out); break;
+    case RIDE:
+        for (size_t i = 0; i < n; i++) vg_rider_apply(w->rider, in[i], out[i]);
+        break;
     }
 }
 
@@ -144,6 +148,7 @@ static void finish_frame(work *w, vg_frame *in, vg_frame *out)
     vg_err e;
     const uint32_t *still;
     if (vg_frame_label(out, in, &e) < 0) cli_die(&e);
+    if (w->way == RIDE) return;
     if (w->mover) {
         vg_mover_move(w->mover, in, out);
     } else {
@@ -162,7 +167,7 @@ static void fill_body(const work *w, vg_frame *f)
 {
     vg_err e;
     double *anchors;
-    if (w->kind != VG_VERTICES) return;
+    if (w->kind != VG_VERTICES || w->way == RIDE) return;
     vg_graph_root(w->from, f->values, f->root);
     if (vg_frame_make_anchors(f, w->h->nanchors, &anchors, &e) < 0) cli_die(&e);
     vg_graph_anchors(f->values, w->h->anchors, w->h->nanchors, anchors);
@@ -428,13 +433,40 @@ static void make_head(work *w)
         vg_head_take(h, t, "skeleton");
     }
     vg_head_drop(h, "map"); /* it is no property of the mesh */
-    if (w->way == CARRY) {
+    if (w->way == CARRY || w->way == RIDE) {
         vg_head_drop(h, "patches");
         vg_head_take(h, t, "mesh");
         vg_head_take(h, t, "links");
     }
-    h->kind = w->way == MEASURE ? VG_DEFORMATIONS : w->way == SHAPE ? VG_VERTICES : VG_VECTORS;
+    h->kind = w->way == MEASURE ? VG_DEFORMATIONS : w->way == SHAPE || w->way == RIDE ? VG_VERTICES : VG_VECTORS;
     h->count = h->kind == VG_VERTICES ? h->body.mesh.nv : vg_graph_corners(w->to);
+}
+
+/* A target that is bound to the sequence needs no vector graph. */
+static void make_rider(work *w)
+{
+    vg_err e;
+    vg_head *h = w->h;
+    const vg_body *t = &w->target.body;
+    if (opts.root || opts.examples || cli_given("by") || cli_given("pin"))
+        cli_usage("'%s' binds the target to the sequence: --by, --root, --pin and --examples have no meaning", opts.correspondence);
+    w->way = RIDE;
+    keep_source(w);
+    if (vg_rider_new(&w->rider, &w->source.body.mesh, w->source.body.reference, &w->pairs.correspondence, &t->mesh, t->reference,
+                     cli.threads, &e) < 0)
+        cli_die(&e);
+    vg_head_drop(h, "selection");
+    vg_head_drop(h, "links");
+    vg_head_drop(h, "anchors");
+}
+
+static void prepare_steps(work *w)
+{
+    weld_like_sequence(w);
+    set_root(w);
+    make_graphs(w);
+    make_step(w);
+    warn_of_other_pose(w);
 }
 
 static void prepare(void *context, vg_head *h, vg_frame *in)
@@ -443,12 +475,9 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     vg_err e;
     w->h = h, w->kind = h->kind;
     check_kind(w);
-    weld_like_sequence(w);
-    set_root(w);
-    make_graphs(w);
+    if (vg_is_bound(&w->pairs.correspondence)) make_rider(w);
+    else prepare_steps(w);
     (void)in;
-    make_step(w);
-    warn_of_other_pose(w);
     make_head(w);
     for (size_t i = 0; i < BATCH; i++)
         if (vg_frame_shape(&w->out[i], h, &e) < 0) cli_die(&e);

@@ -9,7 +9,7 @@
 static struct {
     const char *markers, *dense, *dense_source;
     long base;
-    bool uv, aligned, keep_all, all_components;
+    bool uv, aligned, bind, keep_all, all_components;
     uint32_t *components;
     size_t ncomponents;
 } opts;
@@ -54,6 +54,10 @@ static const cli_option options[] = {
     {.name = "aligned",
      .help = "the two lie on one another as they are; markers are not needed",
      .flag = &opts.aligned},
+    {.name = "bind",
+     .help = "TARGET rides on SOURCE as they are, as a shirt, hair or a prop; nothing is fitted",
+     .flag = &opts.bind,
+     .excludes = "markers|dense|dense-source|uv|aligned|components"},
     {.name = "components",
      .value = "all|K,...",
      .help = "the components of SOURCE that take part, counted from 0 (default: those that explain the target)",
@@ -74,9 +78,9 @@ static const cli_program program = {
 static void check_options(size_t operands)
 {
     if (operands != 2) cli_usage("two meshes are needed: SOURCE and TARGET");
-    if (!opts.markers && !opts.dense && !opts.dense_source && !opts.uv && !opts.aligned)
+    if (!opts.markers && !opts.dense && !opts.dense_source && !opts.uv && !opts.aligned && !opts.bind)
         cli_usage("nothing says which point belongs to which: give --markers FILE, --dense FILE, --uv, or --aligned "
-                  "when the meshes lie on one another");
+                  "when the meshes lie on one another; --bind for clothes and props");
 }
 
 /* ---- what is said on standard error ---- */
@@ -219,46 +223,54 @@ static void load(vg_head *h, const char *operand)
         cli_stop(VG_EINPUT, "'%s' has no texture coordinates: --uv needs them in both meshes", operand);
 }
 
-/* The stream: the source's mesh and reference, one frame that is the source on the target, and the pairs. */
-static void write_stream(vg_head *h, const vg_head *target, vg_register_result *r)
+/* The stream: the source's mesh and reference, one frame, and the pairs. */
+static void write_stream(vg_head *h, const vg_head *target, vg_correspondence *pairs, const double *vertices)
 {
     vg_err e;
     vg_frame f = {0};
-    vg_head_put(h, &r->pairs, "correspondence");
+    vg_head_put(h, pairs, "correspondence");
     h->kind = VG_VERTICES, h->count = h->body.mesh.nv;
     if (vg_head_merge_trace(h, target, &e) < 0) cli_die(&e);
     cli_stream_open(h);
     if (vg_frame_shape(&f, h, &e) < 0 ||
         vg_frame_rename(&f, target->body.reference_name ? target->body.reference_name : "", &e) < 0)
         cli_die(&e);
-    if (h->body.mesh.nv) memcpy(f.values, r->fitted, 3 * h->body.mesh.nv * sizeof *f.values);
+    if (h->body.mesh.nv) memcpy(f.values, vertices, 3 * h->body.mesh.nv * sizeof *f.values);
     cli_stream_put(&f);
     cli_stream_end(NULL);
     vg_frame_clear(&f);
 }
 
-int main(int argc, char **argv)
+/* --bind */
+static void bind_target(vg_head *source, vg_head *target)
 {
-    char **operands;
     vg_err e;
-    vg_head source = {0}, target = {0};
+    vg_correspondence c;
+    const vg_body *s = &source->body, *t = &target->body;
+    if (vg_bind(&c, &s->mesh, s->reference, &t->mesh, t->reference, cli.threads, &e) < 0) cli_die(&e);
+    double farthest = 0, D = vg_diagonal(s->reference, s->mesh.nv);
+    for (size_t f = 0; f < c.target_nf; f++) farthest = c.distance[f] > farthest ? c.distance[f] : farthest;
+    cli_note("%zu faces ride on the source, the farthest %.3g %% of D from it", c.target_nf, 100 * farthest / D);
+    write_stream(source, target, &c, s->reference);
+}
+
+static void pair_meshes(vg_head *source, vg_head *target)
+{
+    vg_err e;
     vg_markers markers = {0};
     vg_seed *seeds = NULL;
     vg_register_result r;
-    check_options(cli_start(&program, argc, argv, &operands));
-    load(&source, operands[0]);
-    load(&target, operands[1]);
-    vg_register_input in = {.source = &source.body.mesh,
-                            .target = &target.body.mesh,
-                            .source_points = source.body.reference,
-                            .target_points = target.body.reference,
+    vg_register_input in = {.source = &source->body.mesh,
+                            .target = &target->body.mesh,
+                            .source_points = source->body.reference,
+                            .target_points = target->body.reference,
                             .aligned = opts.aligned,
                             .keep_all = opts.keep_all,
                             .components = opts.components,
                             .ncomponents = opts.ncomponents,
                             .all_components = opts.all_components,
-                            .source_uv = opts.uv ? &source.body.attributes : NULL,
-                            .target_uv = opts.uv ? &target.body.attributes : NULL,
+                            .source_uv = opts.uv ? &source->body.attributes : NULL,
+                            .target_uv = opts.uv ? &target->body.attributes : NULL,
                             .threads = cli.threads};
     read_pairs(&in, &markers, &seeds);
     warn_shared(&markers, false);
@@ -267,11 +279,22 @@ int main(int argc, char **argv)
     note_alignment(&r);
     report_markers(&markers, &r);
     report_components(&r);
-    report_unmatched(&target.body.mesh, &r.pairs);
-    write_stream(&source, &target, &r);
+    report_unmatched(&target->body.mesh, &r.pairs);
+    write_stream(source, target, &r.pairs, r.fitted);
     vg_register_result_clear(&r);
     vg_markers_clear(&markers);
     free(seeds);
+}
+
+int main(int argc, char **argv)
+{
+    char **operands;
+    vg_head source = {0}, target = {0};
+    check_options(cli_start(&program, argc, argv, &operands));
+    load(&source, operands[0]);
+    load(&target, operands[1]);
+    if (opts.bind) bind_target(&source, &target);
+    else pair_meshes(&source, &target);
     free(opts.components);
     vg_head_clear(&source);
     vg_head_clear(&target);

@@ -217,6 +217,10 @@ every_program() {
     if [ "$status" = 0 ] && [ -f c.vgs ]; then
         answers vg-deform --onto "$k-target.obj" --correspondence c.vgs "$k.vgs" -o d.vgs || return 1
     fi
+    answers vg-register -q --bind "$k-1.obj" "$k-target.obj" -o bound.vgs || return 1
+    if [ "$status" = 0 ]; then answers vg-deform --onto "$k-target.obj" --correspondence bound.vgs "$k.vgs" -o d.vgs || return 1; fi
+    answers vg-encode --mirror x "$k.vgs" -o mirrored.vgs || return 1
+    answers vg-diff --surface --frames "$k.vgs" "$k-target.obj" || return 1
     answers vg-diff "$k.vgs" s.vgs || return 1
     answers vg-diff --json "$k.vgs" s.vgs || return 1
     answers vg-info "$k.vgs" || return 1

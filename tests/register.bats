@@ -189,3 +189,73 @@ number() {
     must_fail 3 vg-register two.obj "$horse" --markers markers.txt --components 7 -o none.vgs
     [ ! -e none.vgs ]
 }
+
+@test "--bind: what rides on a body turns with it, stays on it, and keeps its distance where that bends" {
+    must vg-encode --take 0-/4 "$DATA/human-man-poses.tar.xz" -o man.vgs
+    must vg-encode --take 0 man.vgs -o first.vgs
+    must vg-decode first.vgs --f64 -o rest.obj
+    # on itself: every vertex stays on its point
+    must vg-register --bind rest.obj rest.obj -o self.vgs
+    must vg-deform --onto rest.obj --correspondence self.vgs man.vgs -o on-itself.vgs
+    must vg-diff -t 1e-14 man.vgs on-itself.vgs
+    # a sheet that is rolled to a cylinder, and a finer one above it: rolled too, by the height less of radius
+    py <<'END'
+import math
+def sheet(name, nx, ny, z, radius=None, turn=0):
+    with open(name, "w") as o:
+        for j in range(ny + 1):
+            for i in range(nx + 1):
+                x, y, h = 6 * i / nx - 3, 2 * j / ny - 1, z
+                if radius:
+                    x, h = (radius - z) * math.sin(x / radius), radius - (radius - z) * math.cos(x / radius)
+                c, s = math.cos(turn), math.sin(turn)
+                print("v", repr(c * x - s * h + turn), repr(y - 3 * turn), repr(s * x + c * h), file=o)
+        for j in range(ny):
+            for i in range(nx):
+                a = j * (nx + 1) + i + 1
+                print("f", a, a + 1, a + nx + 2, a + nx + 1, file=o)
+sheet("body.obj", 60, 10, 0)
+sheet("rolled.obj", 60, 10, 0, 2)
+sheet("turned.obj", 60, 10, 0, None, 1.1)
+sheet("shirt.obj", 83, 17, 0.1)
+sheet("shirt-rolled.obj", 83, 17, 0.1, 2)
+sheet("shirt-turned.obj", 83, 17, 0.1, None, 1.1)
+END
+    must vg-register --bind body.obj shirt.obj -o bound.vgs
+    must vg-info bound.vgs
+    shows "1411 faces"
+    must vg-encode --reference body.obj rolled.obj turned.obj -o poses.vgs
+    must vg-deform --onto shirt.obj --correspondence bound.vgs poses.vgs -o worn.vgs
+    must vg-encode --reference shirt.obj shirt-rolled.obj shirt-turned.obj -o truth.vgs
+    must vg-encode --take 1 truth.vgs -o truth1.vgs
+    must vg-encode --take 1 worn.vgs -o worn1.vgs
+    must vg-diff -t 1e-14 truth1.vgs worn1.vgs
+    # faces of 0.1 on a radius of 2 lie up to 0.1^2 / 16 = 1e-4 D inside of it, two thirds of that on average; at the border the
+    # faces that carry lie on one side, on average 0.06 away, and half a face: 0.1 above them is up to 0.1 (0.06 + 0.05) / 2 = 9e-4 D off
+    must vg-diff --of mean -t 6.6e-5 truth.vgs worn.vgs
+    must vg-diff -t 9e-4 truth.vgs worn.vgs
+    must vg-deform -j 3 --onto shirt.obj --correspondence bound.vgs --no-provenance poses.vgs -o a.vgs
+    must vg-deform -j 1 --onto shirt.obj --correspondence bound.vgs --no-provenance poses.vgs -o b.vgs
+    same_file a.vgs b.vgs
+    # concave faces and loose vertices
+    printf 'v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 0.1 0\nv 0 1 0\nf 1 2 3 4 5\n' >concave.obj
+    printf 'v 0.5 0.2 0.5\nv 1.5 0.2 0.5\nv 1 0.2 0.6\nv 1 5 5\nf 1 2 3\n' >prop.obj
+    LC_ALL=C awk '$1 == "v" {print "v", -$3 + 4, $2, $4; next} {print}' concave.obj >unused.obj
+    LC_ALL=C awk '$1 == "v" {print "v", -$3 + 4, $2 + 1, $4 - 2; next} {print}' concave.obj >moved.obj
+    LC_ALL=C awk '$1 == "v" {print "v", -$3 + 4, $2 + 1, $4 - 2; next} {print}' prop.obj >prop-moved.obj
+    must vg-register --bind concave.obj prop.obj -o bound.vgs
+    must vg-encode --reference concave.obj moved.obj -o poses.vgs
+    must vg-deform --onto prop.obj --correspondence bound.vgs poses.vgs -o out.vgs
+    must vg-diff -t 1e-14 prop-moved.obj out.vgs
+    # what does not fit
+    must_fail 2 vg-deform --root stay --onto prop.obj --correspondence bound.vgs poses.vgs -o no.vgs
+    must_fail 3 vg-deform --onto concave.obj --correspondence bound.vgs poses.vgs -o no.vgs
+    says "another target"
+    must_fail 3 vg-deform --onto prop.obj --correspondence bound.vgs man.vgs -o no.vgs
+    says "another source"
+    must_fail 2 vg-register --bind --aligned concave.obj prop.obj -o no.vgs
+    printf 'v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n' >flat.obj
+    must_fail 3 vg-register --bind flat.obj prop.obj -o no.vgs
+    says "area"
+    [ ! -e no.vgs ]
+}
