@@ -348,17 +348,22 @@ END
     must vg-encode --raw f64 --mesh pose1.obj --vectors --take 1-2 numbers -o vectors.vgs
     pipe 'vg-solve vectors.vgs | vg-encode - | vg-diff -t 1e-9 - <(vg-encode --take 1-2 in.vgs)'
     # a frame is passed on before the next one comes
-    mkfifo to from
-    vg-encode --raw f64 --mesh pose1.obj --no-provenance <to >from &
-    exec 5>to
-    exec 6<from
-    head -c 288 numbers >&5
-    timeout 20 head -c 1000 <&6 >first
-    [ "$(stat -c %s first)" = 1000 ]
-    exec 5>&-
-    cat <&6 >/dev/null
-    exec 6<&-
-    wait
+    py <<'END'
+import subprocess
+numbers = open("numbers", "rb").read()
+encode = subprocess.Popen(["vg-encode", "--raw", "f64", "--mesh", "pose1.obj", "--no-provenance"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+got = b""
+for i in range(4):
+    encode.stdin.write(numbers[288 * i:288 * i + 288])
+    encode.stdin.flush()
+    while numbers[288 * i:288 * i + 288] not in got:
+        more = encode.stdout.read1(4096)
+        assert more, "the stream ended early"
+        got += more
+encode.stdin.close()
+encode.stdout.read()
+assert encode.wait() == 0
+END
     # what is wrong
     head -c 300 numbers >cut
     must_fail 3 vg-encode --raw f64 --mesh pose1.obj cut -o out.vgs
