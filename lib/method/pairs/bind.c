@@ -3,8 +3,8 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/surface.h"
 #include "model/incidence.h"
+#include "numeric/face.h"
 #include "numeric/kdtree.h"
-#include "numeric/vec3.h"
 
 #include <stdlib.h>
 
@@ -126,7 +126,7 @@ static bool *faces_with_area(const vg_mesh *m, const double *points, size_t *n, 
     for (size_t f = 0; take && f < m->nf; f++) {
         double area[3];
         size_t r = m->start[f + 1] - m->start[f];
-        vgi_newell(points, m->vert + m->start[f], r, area);
+        vgi_face_area(points, m->vert + m->start[f], r, area);
         *n += take[f] = r > 2 && vgi_length(area) > 0;
     }
     return take;
@@ -193,7 +193,7 @@ struct vg_rider {
 static void face_frame(const vg_mesh *m, const double *points, uint32_t f, double length, double centre[3], double normal[3])
 {
     centroid_of(m, points, f, centre);
-    vgi_newell(points, m->vert + m->start[f], m->start[f + 1] - m->start[f], normal);
+    vgi_face_area(points, m->vert + m->start[f], m->start[f + 1] - m->start[f], normal);
     double size = vgi_length(normal);
     for (int k = 0; k < 3; k++) normal[k] = size > 0 ? normal[k] / size * length : 0;
 }
@@ -215,7 +215,7 @@ static void sum_outer(const vg_mesh *m, const frame *x, const double *points, co
 static void rest_frame(const vg_mesh *m, frame *x, const double *rest)
 {
     double area[3], S[9], cofactors[9];
-    vgi_newell(rest, m->vert + m->start[x->face], m->start[x->face + 1] - m->start[x->face], area);
+    vgi_face_area(rest, m->vert + m->start[x->face], m->start[x->face + 1] - m->start[x->face], area);
     face_frame(m, rest, x->face, sqrt(vgi_length(area)), x->centre, x->normal);
     sum_outer(m, x, rest, rest, x->centre, x->normal, S);
     double determinant = vgi_cofactors(S, cofactors);
