@@ -28,11 +28,25 @@ void bone_edits_take(const char *text, void *edits)
         .bone = copy, .axis = twist ? 't' : *axis, .degrees = cli_parse_number("--edit", angle)};
 }
 
+static const char *bone_name(const void *rig, size_t i)
+{
+    const vg_rig *r = rig;
+    return r->skeleton.joints[r->bone[i]].name;
+}
+
+static void refuse_bone(const char *bone, const vg_rig *r, const char *operand) __attribute__((noreturn));
+static void refuse_bone(const char *bone, const vg_rig *r, const char *operand)
+{
+    size_t likely = cli_likely(bone, strlen(bone), r->nbones, bone_name, r);
+    if (likely < r->nbones) cli_usage("the rig has no bone '%s': did you mean '%s'?", bone, bone_name(r, likely));
+    cli_usage("the rig has no bone '%s': 'vg-info %s' lists them", bone, operand);
+}
+
 /* Axes x, y and z are those of the skeleton's pose without rotations; they move with the bone. */
 static void find_bone(struct bone_edit *edit, const vg_rig *r, const char *operand)
 {
     edit->number = vg_rig_find(r, edit->bone);
-    if (edit->number == r->nbones) cli_usage("the rig has no bone '%s': 'vg-info %s' lists them", edit->bone, operand);
+    if (edit->number == r->nbones) refuse_bone(edit->bone, r, operand);
     if (edit->axis != 't') {
         double unit[3] = {edit->axis == 'x', edit->axis == 'y', edit->axis == 'z'};
         vg_quat_apply(r->turn + 4 * (size_t)r->bone[edit->number], unit, edit->around);

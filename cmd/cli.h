@@ -68,6 +68,9 @@ size_t cli_start(const cli_program *p, int argc, char **argv, char ***operands);
 
 /* cli_given: is the option on the command line? */
 bool cli_given(const char *name);
+/* cli_likely: which of n names is the most similar to the first `length` bytes of text; n when a third or more of the letters
+ * differ. For "did you mean". */
+size_t cli_likely(const char *text, size_t length, size_t n, const char *(*name)(const void *names, size_t i), const void *names);
 /* cli_claim_input: declare that `operand` will be read, for an option (NULL: as the input). It is wrong usage if
  * standard input would be read twice. cli_start claims the operands and the options that say `reads`. */
 void cli_claim_input(const char *option, const char *operand);

@@ -47,7 +47,7 @@ static bool applies(const cli_program *p, shared_use use)
     }
 }
 
-/* For scripts and other programs, so not listed by -h: vg(7) describes it. */
+/* For scripts and other programs, so -h only mentions it: vg(7) describes it. */
 static const cli_option progress_option = {
     .name = "progress", .value = "json[:FD]", .help = "", .take = progress_take};
 
@@ -104,6 +104,7 @@ static void print_help(const cli_program *p)
         if (!fits) printf("%s\n", text);
         printf("%-*s  %s\n", width, fits ? text : "", known.at[i]->help);
     }
+    printf("\nFor programs that wait: --progress json[:DESCRIPTOR], see vg(7).\n");
 }
 
 /* strtod also accepts leading blanks, hexadecimal numbers and names. */
@@ -223,16 +224,26 @@ static size_t edit_distance(const char *text, size_t n, const char *name)
     return row[k];
 }
 
-/* The most similar option, unless a third or more of its letters differ. */
-static const cli_option *likely_option(const char *text, size_t length)
+size_t cli_likely(const char *text, size_t length, size_t n, const char *(*name)(const void *names, size_t i), const void *names)
 {
-    const cli_option *likely = NULL;
-    size_t least = length / 3 + 1;
-    for (size_t i = 0; i < known.n; i++) {
-        size_t d = edit_distance(text, length, known.at[i]->name);
-        if (d < least) least = d, likely = known.at[i];
+    size_t least = length / 3 + 1, likely = n;
+    for (size_t i = 0; i < n; i++) {
+        size_t d = edit_distance(text, length, name(names, i));
+        if (d < least) least = d, likely = i;
     }
     return likely;
+}
+
+static const char *option_name(const void *names, size_t i)
+{
+    (void)names;
+    return known.at[i]->name;
+}
+
+static const cli_option *likely_option(const char *text, size_t length)
+{
+    size_t i = cli_likely(text, length, known.n, option_name, NULL);
+    return i < known.n ? known.at[i] : NULL;
 }
 
 static const cli_moved *moved_option(const char *text, size_t length)

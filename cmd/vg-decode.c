@@ -96,6 +96,24 @@ static void decode_raw(vg_source *s, size_t width)
     cli_text_end();
 }
 
+/* An artefact has no poses: its reference pose is written. */
+static bool put_reference(const vg_head *h)
+{
+    static const char *const artefacts[] = {"map", "signal", "network", "patches"},
+                      *const advice[] = {"vg-play plays it", "vg-sample evaluates it", "vg-generate uses it", "vg-view colours them"};
+    vg_err e;
+    vg_frame f = {0};
+    size_t i = 0, n = sizeof artefacts / sizeof *artefacts;
+    while (i < n && vg_head_need(h, artefacts[i], "it", NULL) < 0) i++;
+    if (i == n || h->kind != VG_VERTICES || !h->body.mesh.nv) return false;
+    if (vg_frame_shape(&f, h, &e) < 0 || vg_frame_rename(&f, h->body.reference_name, &e) < 0) cli_die(&e);
+    memcpy(f.values, h->body.reference, 3 * h->body.mesh.nv * sizeof *f.values);
+    if (vg_sink_put(sink, &f, &e) < 0) cli_die(&e);
+    vg_frame_clear(&f);
+    cli_warn("the input holds no poses but a %s: its reference pose is written; %s", artefacts[i], advice[i]);
+    return true;
+}
+
 static void decode(vg_source *s)
 {
     static const step writing = {.batch = 1, .unit = "poses", .process = put_frames};
@@ -104,10 +122,10 @@ static void decode(vg_source *s)
     if (vg_sink_open(&sink, output, vg_source_head(s), &sink_options, &e) < 0) cli_die(&e);
     vg_frame *in = batch_frames(&writing);
     uint64_t frames = batch_read(&writing, NULL, s, in);
+    bool reference = !frames && put_reference(vg_source_head(s));
     if (vg_sink_end(sink, &e) < 0) cli_die(&e);
-    if (!frames)
-        cli_warn("the input has no poses: '%s' holds none%s", output,
-                 vg_source_head(s)->map.n ? "; vg-play plays a map" : "");
+    if (!frames && !reference)
+        cli_warn("the input has no poses: '%s' holds none", output);
     for (size_t i = 0; vg_sink_warning(sink, i); i++) cli_warn("%s", vg_sink_warning(sink, i));
     vg_sink_close(&sink);
     batch_frames_free(&writing, in);

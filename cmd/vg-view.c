@@ -347,11 +347,44 @@ static void warn_scale(const cast *c)
         cli_warn("--scale is where colours end, and there are none: the input brings no numbers of its vertices");
 }
 
-/* A stream of patches, and a rig, have no frames: they are shown on the reference pose. */
+/* An artefact has no frames: it is shown on the reference pose. */
 static bool shows_reference(const cast *c)
 {
-    const vg_body *b = &c->result.head->body;
-    return !c->result.frames && !opts.against && (b->patches.n || b->rig.skeleton.njoints);
+    static const char *const artefacts[] = {"patches", "map", "network"};
+    const vg_head *h = c->result.head;
+    if (c->result.frames || opts.against || !h->body.mesh.nv) return false;
+    for (size_t i = 0; i < sizeof artefacts / sizeof *artefacts; i++)
+        if (vg_head_need(h, artefacts[i], "it", NULL) == VG_OK) return true;
+    return false;
+}
+
+/* The bone that moves most of a face. share: room for a number of each bone, zero. */
+static uint32_t bone_of_face(const vg_body *b, size_t f, double *share)
+{
+    const vg_mesh *m = &b->mesh;
+    uint32_t best = 0;
+    for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
+        for (size_t k = 0; k < VG_SKIN; k++) {
+            size_t at = VG_SKIN * (size_t)m->vert[c] + k;
+            share[b->rig.skin_bone[at]] += b->rig.skin_weight[at];
+            if (share[b->rig.skin_bone[at]] > share[best]) best = b->rig.skin_bone[at];
+        }
+    for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
+        for (size_t k = 0; k < VG_SKIN; k++) share[b->rig.skin_bone[VG_SKIN * (size_t)m->vert[c] + k]] = 0;
+    return best;
+}
+
+/* A rig is coloured by its bones, as a map of patches is by these. */
+static void colour_bones(vg_head *h)
+{
+    vg_body *b = &h->body;
+    vg_patches bones = {.n = b->rig.nbones};
+    if (h->map.kind != VG_MAP_BONES || !h->map.n || b->patches.n || !b->rig.skin_bone || !bones.n || !b->mesh.nf) return;
+    double *share = cli_allocate(bones.n, sizeof *share, "the bones");
+    bones.of_face = cli_allocate(b->mesh.nf, sizeof *bones.of_face, "the bones");
+    for (size_t f = 0; f < b->mesh.nf; f++) bones.of_face[f] = bone_of_face(b, f, share);
+    vg_head_put(h, &bones, "patches");
+    free(share);
 }
 
 static void put_reference(side *s, take_frame *put, void *context)
@@ -565,6 +598,7 @@ int main(int argc, char **argv)
     sheet_options(); /* what is wrong with them is told before the input is opened */
     choose_kind();
     open_cast(&c, operands, n);
+    colour_bones(c.result.head);
     if (opts.page && c.result.head->signal.n) make_signal_page(&c);
     else if (opts.page) make_page(&c);
     else if (c.result.head->signal.n) make_plane(&c);

@@ -89,6 +89,11 @@ mistake() {
     must_warn vg-decode empty.vgs -o out.zip
     says "vg-decode: warning: the input has no poses: 'out.zip' holds none"
     [[ $stderr != *--map* ]]
-    must_warn vg-decode "$GOLDEN/map.vgs" -o out/
-    says "'out/' holds none; vg-play plays a map"
+    # an artefact shows its reference pose
+    must_warn vg-decode "$GOLDEN/map.vgs" -o out.obj
+    says "holds no poses but a map: its reference pose is written; vg-play plays it"
+    must vg-diff -t 1e-7 "$GOLDEN/map.vgs" "$GOLDEN/map.vgs"
+    [ -s out.obj ]
+    for artefact in map signal patches network rig; do must vg-info "$GOLDEN/$artefact.vgs"; done
+    for artefact in map patches network; do must vg-view "$GOLDEN/$artefact.vgs" -o "$artefact.png"; done
 }

@@ -546,6 +546,8 @@ END
     done
     must_fail 2 vg-play chain.rig --edit 'elbow z 20' -o no.vgs
     says "no bone 'elbow'"
+    must_fail 2 vg-play chain.rig --edit 'Knee z 30' -o no.vgs
+    says "no bone 'Knee': did you mean 'knee'?"
     must_fail 3 vg-play fit/ --edit 'knee z 20' -o no.vgs
     says "'fit/' holds no map: make one with vg-fitmap"
     must_fail 2 vg-play chain.rig --align all fit/ -o no.vgs
