@@ -87,6 +87,9 @@ KERNEL_OBJ := $(foreach set,$(SETS),$(KERNEL_SRC:%.c=$(B)/%.$(set).o))
 CODEC_OBJ := $(if $(filter 1,$(WITH_DRACO)),$(B)/lib/io/codec_draco.o)
 LIB_OBJ := $(LIB_SRC:%.c=$(B)/%.o) $(CODEC_OBJ) $(KERNEL_OBJ) $(B)/page_text.o
 PROGRAMS := $(patsubst cmd/%.c,%,$(sort $(wildcard cmd/vg-*.c)))
+# The shared library, for programs of others: only vg_* is seen. Its number changes when a program would have to be compiled again.
+SO := 0
+SHARED := $(if $(filter fuzz,$(CONFIG)),,$(B)/libvg.so.$(VERSION))
 CMD_SHARED := $(filter-out cmd/vg-%.c,$(sort $(wildcard cmd/*.c)))
 CMD_OBJ := $(CMD_SHARED:%.c=$(B)/%.o)
 UNITS := $(patsubst tests/unit/%.c,%,$(sort $(wildcard tests/unit/test_*.c)))
@@ -94,7 +97,7 @@ FUZZERS := $(patsubst tests/fuzz/%.c,%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
 BENCHES := $(patsubst tests/bench/%.c,%,$(sort $(wildcard tests/bench/*.c)))
 
 .PHONY: all
-all: $(PROGRAMS:%=$(B)/bin/%) $(B)/libvg.a
+all: $(PROGRAMS:%=$(B)/bin/%) $(B)/bin/vg $(B)/libvg.a $(SHARED) $(B)/vg-api.html
 
 # objects depend on the flags they were made with
 FLAGS_NOW := $(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(FAST) $(SET_avx2) $(SET_avx512) $(ALL_LDFLAGS) $(ALL_LIBS)
@@ -153,6 +156,15 @@ $(B)/libvg.a: $(LIB_OBJ) $(B)/codecs
 	@rm -f $@
 	$(AR) rcs $@ $(LIB_OBJ)
 
+$(B)/libvg.so.$(VERSION): $(LIB_OBJ) lib/libvg.map
+	$(CC) $(ALL_CFLAGS) -shared -Wl,-soname,libvg.so.$(SO) -Wl,--version-script=lib/libvg.map $(ALL_LDFLAGS) -o $@ $(LIB_OBJ) $(ALL_LIBS)
+	@ln -sf $(@F) $(B)/libvg.so.$(SO)
+
+# the pages of the library's functions: what the headers say
+$(B)/vg-api.html: lib/api.awk lib/vg.h $(wildcard lib/vg/*.h)
+	@mkdir -p $(@D)
+	awk -v version='$(VERSION)' -f lib/api.awk lib/vg.h $(sort $(wildcard lib/vg/*.h)) > $@
+
 $(B)/shared.a: $(CMD_OBJ)
 	@rm -f $@
 	$(AR) rcs $@ $^
@@ -160,6 +172,10 @@ $(B)/shared.a: $(CMD_OBJ)
 $(B)/bin/%: $(B)/cmd/%.o $(B)/shared.a $(B)/libvg.a
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CFLAGS) $(ALL_LDFLAGS) -o $@ $^ $(CODEC_LIBS) $(ALL_LIBS)
+
+$(B)/bin/vg: cmd/vg
+	@mkdir -p $(@D)
+	@install -m 755 $< $@
 
 $(B)/unit/%: $(B)/tests/unit/%.o $(B)/libvg.a
 	@mkdir -p $(@D)
@@ -247,13 +263,21 @@ BIN_TO := $(DESTDIR)$(PREFIX)/bin
 LIB_TO := $(DESTDIR)$(LIBDIR)
 INCLUDE_TO := $(DESTDIR)$(PREFIX)/include
 MAN_TO := $(DESTDIR)$(PREFIX)/share/man
-COMPLETION_TO := $(DESTDIR)$(PREFIX)/share/bash-completion/completions
+SHARE_TO := $(DESTDIR)$(PREFIX)/share
+COMPLETION_TO := $(SHARE_TO)/bash-completion/completions
+ZSH_TO := $(SHARE_TO)/zsh/site-functions
+FISH_TO := $(SHARE_TO)/fish/vendor_completions.d
+DOC_TO := $(SHARE_TO)/doc/vg
+# what is installed of examples/: all but pictures that only the README shows
+EXAMPLES := $(filter-out examples/pictures/% %.pyc,$(shell find examples -type f ! -path '*/__pycache__/*' ! -path 'examples/asset-build/out/*'))
 
 .PHONY: install
 install: all
-	install -d $(BIN_TO) $(LIB_TO)/pkgconfig $(INCLUDE_TO)/vg $(MAN_TO)/man1 $(MAN_TO)/man5 $(MAN_TO)/man7 $(COMPLETION_TO)
-	install -m 755 $(PROGRAMS:%=$(B)/bin/%) $(BIN_TO)
-	install -m 644 $(B)/libvg.a $(LIB_TO)
+	install -d $(BIN_TO) $(LIB_TO)/pkgconfig $(INCLUDE_TO)/vg $(MAN_TO)/man1 $(MAN_TO)/man5 $(MAN_TO)/man7 $(COMPLETION_TO) $(ZSH_TO) $(FISH_TO) $(DOC_TO)
+	install -m 755 $(PROGRAMS:%=$(B)/bin/%) $(B)/bin/vg $(BIN_TO)
+	install -m 644 $(B)/libvg.a $(SHARED) $(LIB_TO)
+	ln -sf libvg.so.$(VERSION) $(LIB_TO)/libvg.so.$(SO)
+	ln -sf libvg.so.$(SO) $(LIB_TO)/libvg.so
 	install -m 644 lib/vg.h $(INCLUDE_TO)
 	install -m 644 $(sort $(wildcard lib/vg/*.h)) $(INCLUDE_TO)/vg
 	sed -e 's|@PREFIX@|$(PREFIX)|' -e 's|@LIBDIR@|$(LIBDIR)|' -e 's|@VERSION@|$(VERSION)|' \
@@ -261,12 +285,21 @@ install: all
 	for page in man/*.[1-9]; do install -m 644 $$page $(MAN_TO)/man$${page##*.} || exit 1; done
 	install -m 644 completion/vg.bash $(COMPLETION_TO)/vg
 	for program in $(PROGRAMS); do ln -sf vg $(COMPLETION_TO)/$$program || exit 1; done
+	install -m 644 completion/_vg $(ZSH_TO)
+	install -m 644 completion/vg.fish $(FISH_TO)
+	for program in $(PROGRAMS); do ln -sf vg.fish $(FISH_TO)/$$program.fish || exit 1; done
+	install -m 644 $(B)/vg-api.html README.md $(DOC_TO)
+	for file in $(EXAMPLES); do mkdir -p $(DOC_TO)/$${file%/*} && cp -f $$file $(DOC_TO)/$$file || exit 1; done
+	mkdir -p $(DOC_TO)/examples/data $(DOC_TO)/examples/pictures
+	install -m 644 $(filter-out tests/data/reports tests/data/licences,$(wildcard tests/data/*)) $(DOC_TO)/examples/data
+	install -m 644 $(wildcard examples/pictures/tutorial-*) $(DOC_TO)/examples/pictures
 
 .PHONY: uninstall
 uninstall:
-	rm -f $(PROGRAMS:%=$(BIN_TO)/%) $(LIB_TO)/libvg.a $(INCLUDE_TO)/vg.h $(patsubst lib/%,$(INCLUDE_TO)/%,$(wildcard lib/vg/*.h)) $(LIB_TO)/pkgconfig/libvg.pc \
+	rm -f $(PROGRAMS:%=$(BIN_TO)/%) $(BIN_TO)/vg $(LIB_TO)/libvg.a $(LIB_TO)/libvg.so* $(INCLUDE_TO)/vg.h $(patsubst lib/%,$(INCLUDE_TO)/%,$(wildcard lib/vg/*.h)) $(LIB_TO)/pkgconfig/libvg.pc \
 	    $(foreach page,$(notdir $(wildcard man/*.[1-9])),$(MAN_TO)/man$(subst .,,$(suffix $(page)))/$(page)) \
-	    $(COMPLETION_TO)/vg $(PROGRAMS:%=$(COMPLETION_TO)/%)
+	    $(COMPLETION_TO)/vg $(PROGRAMS:%=$(COMPLETION_TO)/%) $(ZSH_TO)/_vg $(FISH_TO)/vg.fish $(PROGRAMS:%=$(FISH_TO)/%.fish)
+	rm -rf $(DOC_TO)
 	rmdir $(INCLUDE_TO)/vg 2>/dev/null || :
 
 # The same tree gives the same bytes: names sorted, nobody's user and mask, one time for all files. DIST tells where it is.

@@ -89,3 +89,34 @@ offers() {
     complete_line vg-diff -- m
     offers man.map man.obj man.patches
 }
+
+@test "every program is completed by zsh and fish, too" {
+    must diff <(each_program) <(head -n 1 "$ROOT/completion/_vg" | tr ' ' '\n' | grep ^vg- | LC_ALL=C sort)
+    must diff <(each_program) <(grep -A 2 '^for program in' "$ROOT/completion/vg.fish" | grep -o 'vg-[a-z]*' | LC_ALL=C sort)
+}
+
+@test "fish: options with their help, values of fixed choice" {
+    command -v fish >/dev/null || skip "fish is not installed"
+    export HOME=$PWD XDG_CONFIG_HOME=$PWD XDG_DATA_HOME=$PWD
+    must fish --no-config -c "source '$ROOT/completion/vg.fish'; complete --do-complete 'vg-solve --no-p'"
+    [[ $output == --no-provenance$'\t'?* ]]
+    must fish --no-config -c "source '$ROOT/completion/vg.fish'; complete --do-complete 'vg-deform --by '"
+    [ "$(cut -f 1 <<<"$output" | LC_ALL=C sort | tr '\n' ' ')" = 'blend gradient pose shape ' ]
+    for program in vg-encode vg-diff; do
+        must fish --no-config -c "source '$ROOT/completion/vg.fish'; complete --do-complete '$program --'"
+        diff <(cut -f 1 <<<"$output" | sed 's/=$//' | LC_ALL=C sort) \
+            <("$program" --help | grep -o '^  \(-., \|    \)--[a-z0-9-]*' | sed 's/.*--/--/' | LC_ALL=C sort)
+    done
+}
+
+@test "zsh: the options that it hands to _arguments are those of the program" {
+    command -v zsh >/dev/null || skip "zsh is not installed"
+    for program in vg-deform vg-encode; do
+        # shellcheck disable=SC2016 # zsh's
+        must zsh -f -c 'source <(sed "/^_vg \"/d" "$1"); _vg_specs "$2"' zsh "$ROOT/completion/_vg" "$program"
+        diff <(sed -n 's/^\(--[a-z0-9-]*\)[=[].*/\1/p' <<<"$output" | LC_ALL=C sort) \
+            <("$program" --help | grep -o '^  \(-., \|    \)--[a-z0-9-]*' | sed 's/.*--/--/' | LC_ALL=C sort)
+    done
+    must zsh -f -c 'source <(sed "/^_vg \"/d" "$1"); _vg_specs vg-deform' zsh "$ROOT/completion/_vg"
+    shows '--by=[' ':(blend pose gradient shape)' ':(centroid stay)' '-o[write'
+}

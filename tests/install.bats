@@ -12,17 +12,40 @@ make_into_root() {
 # flags --cflags|--libs: of libvg as installed in ./root
 flags() {
     PKG_CONFIG_LIBDIR=$PWD/root/usr/lib/pkgconfig PKG_CONFIG_SYSROOT_DIR=$PWD/root \
-        PKG_CONFIG_ALLOW_SYSTEM_CFLAGS=1 PKG_CONFIG_ALLOW_SYSTEM_LIBS=1 pkg-config "$1" libvg
+        PKG_CONFIG_ALLOW_SYSTEM_CFLAGS=1 PKG_CONFIG_ALLOW_SYSTEM_LIBS=1 pkg-config "$@" libvg
 }
 
 @test "install, use from C, uninstall" {
     make_into_root install
 
     # programs and pages
-    must diff <(each_program) <(ls root/usr/bin)
+    must diff <(echo vg && each_program) <(ls root/usr/bin)
     must diff <(each_program | sed 's/$/.1/') <(ls root/usr/share/man/man1)
     [ -s root/usr/share/man/man5/vg-stream.5 ] && [ -s root/usr/share/man/man7/vg.7 ]
     must root/usr/bin/vg-info --check "$GOLDEN/smallest.vgs"
+
+    # vg lists them; tutorial and examples, the library's page, completion
+    must root/usr/bin/vg
+    for program in $(each_program); do shows "$program  "; done
+    shows "vg help transfer"
+    must root/usr/bin/vg info --check "$GOLDEN/smallest.vgs"
+    must_fail 2 root/usr/bin/vg nonsense
+    must_fail 2 root/usr/bin/vg help nonsense
+    grep -q 'id="vg_solver_new"' root/usr/share/doc/vg/vg-api.html
+    for file in README.md examples/tutorial.md examples/farm/shot examples/c/transfer.c examples/blender/vg_tools/__init__.py \
+        examples/python/vgstream.py examples/data/trex.rest.obj; do
+        [ -s "root/usr/share/doc/vg/$file" ] || fail "not installed: $file"
+    done
+    [ -s root/usr/share/zsh/site-functions/_vg ] && [ -s root/usr/share/fish/vendor_completions.d/vg-solve.fish ]
+
+    # of the shared library only vg_* is seen, in one version
+    must nm --dynamic --defined-only root/usr/lib/libvg.so.0
+    [ "$(awk '$2 != "A" && $3 !~ /^vg_.*@@VG_0$/' <<<"$output" | grep -v -e ' __asan' -e ' __odr' -e ' gcov' -c)" = 0 ] ||
+        fail "seen besides: $(awk '$3 !~ /^vg_/' <<<"$output" | head)"
+    [ "$(grep -c '@@VG_0' <<<"$output")" -gt 200 ]
+    must readelf -d root/usr/lib/libvg.so
+    shows "soname: [libvg.so.0]"
+    export LD_LIBRARY_PATH=$PWD/root/usr/lib
 
     # the library, from a program that knows only its header and its .pc file
     cat >count.c <<'END'
@@ -56,6 +79,29 @@ END
     capture ./count "$CORPUS/reject/no-end.vgs"
     [ "$status" = 3 ]
     says "no-end.vgs" "cut short"
+
+    # it is the shared one that was linked; the static one does as well
+    must readelf -d count
+    shows "[libvg.so.0]"
+    # shellcheck disable=SC2046,SC2086 # words
+    must ${CC:-cc} -Wall -std=c11 $sanitize $(flags --cflags) -o static count.c "$PWD/root/usr/lib/libvg.a" $(flags --static --libs)
+    must env -u LD_LIBRARY_PATH ./static "$GOLDEN/times.vgs"
+
+    # the examples in C, against the same by the programs
+    cp -r root/usr/share/doc/vg/examples/c .
+    PKG_CONFIG_LIBDIR=$PWD/root/usr/lib/pkgconfig PKG_CONFIG_SYSROOT_DIR=$PWD/root PKG_CONFIG_ALLOW_SYSTEM_CFLAGS=1 \
+        PKG_CONFIG_ALLOW_SYSTEM_LIBS=1 make -s -C c CC="${CC:-cc}" CFLAGS="-O1 -Wall -Wextra -Werror $sanitize"
+    must vg-encode --take 0-3 "$DATA/human-man-poses.tar.xz" -o man.vgs
+    must c/transfer man.vgs "$DATA/human-heavy-poses.tar.xz" heavy.npz
+    pipe 'vg-deform --by pose --pin none --onto "$DATA/human-heavy-poses.tar.xz" man.vgs | vg-solve --fit squares -o heavy.vgs'
+    must vg-diff -q -t 1e-7 heavy.vgs heavy.npz # binary32
+    must_fail 3 c/transfer "$DATA/horse.rest.obj" "$DATA/human-heavy-poses.tar.xz" no.npz
+    [ ! -e no.npz ]
+    pipe 'c/shift 1 -2 0.5 <man.vgs | vg-encode --origin 1,-2,0.5 - | vg-diff -t 1e-14 man.vgs -'
+    pipe_fail 3 'head -c 100000 man.vgs | c/shift 1 2 3 | vg-info -'
+    says "shift: "
+    must c/centroids "$DATA/horse.rest.obj"
+    [[ $output == 'horse.rest '* ]]
 
     # the program of the README
     sed -n '/^    #include <stdio.h>/,/^    }/s/^    //p' "$ROOT/README.md" >centroids.c
