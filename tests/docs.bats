@@ -252,42 +252,24 @@ END
     done
 }
 
-# commands_of_readme: its indented lines that begin with a program; what stands for the rest of a pipe is put in
+# commands_of_readme: its indented lines that begin with a program
 commands_of_readme() {
-    sed -n 's/^    \(\(vg-\|\.\.\. |\).*\)/\1/p' "$ROOT/README.md" |
-        sed 's/^\.\.\. |/vg-encode walk.zip | vg-deform --onto woman.obj |/; s/| \.\.\.$/>last.vgs/'
+    sed -n 's/^    \(vg-.*\)/\1/p' "$ROOT/README.md"
 }
 
-@test "the commands of the README run, in order" {
+@test "the commands of the README run as they stand, in order, on the files that examples/files.sh makes" {
     commands_of_readme >script
-    [ "$(wc -l <script)" -ge 24 ]
-    mkdir work work/shapes
-    cd work
-    # a horse, a wider one, and its run under the names of the README
-    vg-decode "$DATA/horse-run.tar.xz" -o walk.zip
-    cp "$DATA/horse.rest.obj" rest.obj
-    LC_ALL=C awk '$1 == "v" {$2 *= 1.3} {print}' rest.obj >woman.obj
-    vg-encode --reference rest.obj walk.zip | vg-deform --onto woman.obj | vg-solve | vg-decode -o truth.zip
-    vg-decode walk.zip -o 'p%d.obj'
-    vg-decode truth.zip -o 'w%d.obj'
-    for name in man poses; do cp walk.zip $name.zip; done
-    for name in horse neutral a; do cp p0.obj $name.obj; done
-    for name in heavy head; do cp woman.obj $name.obj; done
-    cp p5.obj b.obj && cp p9.obj c.obj && cp w0.obj woman-a.obj && cp w20.obj woman-z.obj && cp p3.obj p7.obj shapes
-    cp a.obj bar0.obj && cp b.obj bar400.obj
-    xz -dc "$DATA/human-man-poses.bvh.xz" >walk.bvh
-    xz -dc "$DATA/human-heavy-poses.bvh.xz" >actor2.bvh
-    # a skeleton that stands still, with a frame for each pose of the run, and one that moves
-    twisting_skeleton 21 0 >man.bvh
-    twisting_skeleton 4 10 >dance.bvh
-    cp "$DATA/velociraptor.rest.obj" velociraptor.obj
-    cp "$DATA/trex.rest.obj" trex.obj
-    cp "$DATA/velociraptor-trex.markers.txt" markers.txt
-    cp "$DATA/velociraptor-run.tar.xz" run.zip # a kind is told by content
+    [ "$(wc -l <script)" -ge 40 ]
+    must env BUILD="$BUILD" sh "$ROOT/examples/files.sh" try
+    cd try
     while IFS= read -r line; do
         capture bash -e -u -o pipefail -c "$line"
         [ "$status" = 0 ] || fail "status $status: $line" "$stderr"
     done <../script
+    # the names in them are those of files, and what the first lines promise is there
+    [ -s trex.glb ] && [ -s head.glb ] && [ -s man.glb ]
+    must vg-info --frames head.glb
+    for shape in shapes/*.obj; do shows "$(basename "$shape" .obj)"; done
 }
 
 @test "every format that is known is in vg(7), in the help of vg-decode, and completed" {
