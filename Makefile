@@ -5,6 +5,7 @@
 # make coverage    lines of lib that make check runs, file by file
 # make check-aarch64   the kernels' tests on an emulated ARM processor, where its tools are installed
 # make lint        the static analysers that are installed
+# make bench-train accuracy and speed of networks on the kit (VG_DATA) beside their bounds: some minutes; ONLY="walk keys": parts
 # make bench       throughput of every stage beside its limit; BENCH=full: up to 1,000,002 vertices; JSON=FILE: also as JSON
 # make fuzz        search for input that breaks the readers (clang; FUZZ_SECONDS=60 each)
 # make install     PREFIX=/usr/local LIBDIR=$(PREFIX)/lib DESTDIR=   make uninstall, make clean
@@ -68,6 +69,12 @@ CC := clang
 ALL_CFLAGS += -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined
 ALL_LDFLAGS := -fsanitize=address,undefined
 endif
+# MPI=1: vg-train may be started by mpirun, each process with some of the chains
+MPI ?= 0
+ifeq ($(MPI),1)
+ALL_CPPFLAGS += -DVG_MPI $(shell $(PKG_CONFIG) --cflags ompi-c)
+MPI_LIBS ?= $(shell $(PKG_CONFIG) --libs ompi-c)
+endif
 ALL_CFLAGS += $(CFLAGS)
 # Numeric kernels are compiled once for each instruction set of the target (lib/core/isa.h); the compiler may unroll and
 # vectorise them and what else is listed; nothing here reorders sums.
@@ -79,7 +86,7 @@ FAST := -O3 -fno-math-errno -fno-trapping-math
 FAST_SRC := $(addprefix lib/,method/vectors/reconstruct method/pairs/transfer method/patches/segment signal/plane signal/spline_pose model/graph model/measures)
 # what a program does not call is not loaded: OpenBLAS starts threads that spin for a while as soon as it is there
 ALL_LDFLAGS += -Wl,--as-needed $(LDFLAGS)
-ALL_LIBS := $(CHOLMOD_LIBS) $(LAPACKE_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(WEBP_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) -lpthread -lm $(LDLIBS)
+ALL_LIBS := $(CHOLMOD_LIBS) $(LAPACKE_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(WEBP_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) $(MPI_LIBS) -lpthread -lm $(LDLIBS)
 
 KERNEL_SRC := $(sort $(wildcard lib/*/*_kernel.c lib/*/*/*_kernel.c))
 LIB_SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard lib/*/*.c lib/*/*/*.c)))
@@ -245,6 +252,10 @@ demo: all
 .PHONY: bench
 bench: all $(BENCHES:%=$(B)/bench/%)
 	@BUILD=$(B) BENCH='$(BENCH)' RUNS='$(RUNS)' JSON='$(JSON)' sh tests/bench/run.sh
+
+.PHONY: bench-train
+bench-train: all
+	@PATH=$(abspath $(B))/bin:$$PATH ONLY='$(ONLY)' python3 tests/bench/train.py
 
 .PHONY: fuzz
 fuzz:

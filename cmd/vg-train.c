@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "fitting.h"
 
+#include <errno.h>
 #include <math.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -11,12 +12,13 @@
 
 static struct {
     size_t model, direction;
-    long layers, hidden, iterations, batch, frames, step, hold_at, seed, every;
+    long layers, hidden, iterations, batch, frames, step, seed, every;
+    size_t hold_at;
     double hold, rate, losses[3]; /* bidirectional, kl, l2; negative: the default of the model */
     size_t given[2];              /* 0: the default */
     bool nine;
     const char *checkpoint, *resume, *log;
-} opts = {.hold_at = -1, .seed = 1, .every = 100, .hold = 0.2, .losses = {-1, -1, -1}};
+} opts = {.hold_at = VG_HOLD_BY_SEED, .seed = 1, .every = 100, .hold = 0.2, .losses = {-1, -1, -1}};
 
 static void take_given(const char *text, void *context)
 {
@@ -45,12 +47,26 @@ static void take_loss(const char *text, void *context)
     }
 }
 
+static void take_hold(const char *text, void *context)
+{
+    (void)context;
+    char *end;
+    if (!strcmp(text, "end")) {
+        opts.hold_at = SIZE_MAX;
+        return;
+    }
+    unsigned long at = strtoul(text, &end, 10);
+    if (*end || text[0] < '0' || text[0] > '9' || at > 1000000000)
+        cli_usage("option '--hold-at' needs the number of a frame or end, not '%s'", text);
+    opts.hold_at = at;
+}
+
 static const cli_option options[] = {
     {"model", 0, "auto|pca|fc|conv", "what stands around the recurrent layers (default auto)", .choice = &opts.model},
     {"direction", 0, "shared|separate|forward", "chains both ways with one set of weights (default), two, or one way",
      .choice = &opts.direction},
-    {"layers", 0, "N", "recurrent layers (default 3)", .integer = &opts.layers, .least = 1, .most = 8},
-    {"hidden", 0, "N", "numbers in each (default 128)", .integer = &opts.hidden, .least = 1, .most = 4096},
+    {"layers", 0, "N", "recurrent layers (default 1, of the others 3)", .integer = &opts.layers, .least = 1, .most = 8},
+    {"hidden", 0, "N", "numbers in each (default 64, of the others 128)", .integer = &opts.hidden, .least = 1, .most = 4096},
     {"iterations", 0, "N", "how many iterations (default 300, of pca 2500, of fc and conv 7000)",
      .integer = &opts.iterations, .least = 1, .most = 100000000},
     {"batch", 0, "N", "sequences per iteration (default 8)", .integer = &opts.batch, .least = 1, .most = 4096},
@@ -61,8 +77,8 @@ static const cli_option options[] = {
      .take = take_given},
     {"hold", 0, "SHARE", "of each sequence, what is not learned from but judged (default 0.2)", .number = &opts.hold,
      .least = 0, .most = 0.9},
-    {"hold-at", 0, "N", "from this frame of each sequence on (default: at its end)", .integer = &opts.hold_at,
-     .least = 0, .most = 1e9},
+    {"hold-at", 0, "N|end", "from this frame of each sequence on, or at its end (default: where the seed says)",
+     .take = take_hold},
     {"rate", 0, "X", "of learning (default 0.001, of the others 0.002)", .number = &opts.rate, .least = 1e-9,
      .most = 1},
     {"loss", 0, "NAME=W,...", "weights of bidirectional, kl and l2; 0 leaves one out", .take = take_loss},
@@ -87,6 +103,7 @@ static const cli_program program = {
     .threaded = true};
 
 static volatile sig_atomic_t interrupted;
+static bool is_first; /* of the processes that train together: the one that writes and reports */
 
 static void interrupt(int signal_number)
 {
@@ -110,7 +127,7 @@ static vg_train_options choose_options(void)
     if (opts.losses[0] >= 0) o.bidirectional = opts.losses[0];
     if (opts.losses[1] >= 0) o.divergence = opts.losses[1];
     if (opts.losses[2] >= 0) o.decay = opts.losses[2];
-    o.hold = opts.hold, o.hold_at = opts.hold_at < 0 ? SIZE_MAX : (size_t)opts.hold_at;
+    o.hold = opts.hold, o.hold_at = opts.hold_at;
     o.nine = opts.nine, o.seed = (uint64_t)opts.seed, o.threads = cli.threads;
     return o;
 }
@@ -185,6 +202,62 @@ static void resume(vg_trainer *t)
     vg_head_clear(&from);
 }
 
+/* ---- the log ---- */
+
+static const char log_head[] = "phase\titeration\tloss\tgradient\tvalidation\n";
+
+/* What the log of an interrupted training says of the iterations that are not done again. */
+static void put_old_log(FILE *to, const vg_train_state *done)
+{
+    size_t size;
+    char *text = cli_read_file(opts.log, &size);
+    for (char *line = text, *end; (end = strchr(line, '\n')); line = end + 1) {
+        int phase;
+        unsigned long long iteration;
+        *end = 0;
+        if (sscanf(line, "%d\t%llu\t", &phase, &iteration) == 2 &&
+            (phase < done->phase || (phase == done->phase && iteration <= done->iteration)))
+            fprintf(to, "%s\n", line);
+    }
+    free(text);
+}
+
+static void log_failed(void)
+{
+    cli_stop(VG_ESYS, "cannot write '%.190s': %s", opts.log, strerror(errno));
+}
+
+/* The log begins as a whole under another name; from then on it grows by whole lines. */
+static FILE *open_log(const vg_train_state *done)
+{
+    static vg_targets targets;
+    vg_err e;
+    if (!opts.log) return NULL;
+    int fd = vg_targets_open(&targets, opts.log, &e);
+    if (fd < 0) cli_die(&e);
+    FILE *log = fdopen(dup(fd), "w");
+    if (!log) log_failed();
+    setvbuf(log, NULL, _IOLBF, 0);
+    fputs(log_head, log);
+    if (opts.resume && access(opts.log, R_OK) == 0) put_old_log(log, done);
+    if (fflush(log) || ferror(log)) log_failed();
+    if (vg_target_close(fd, opts.log, &e) < 0 || vg_targets_rename(&targets, &e) < 0) {
+        vg_targets_remove(&targets);
+        cli_die(&e);
+    }
+    vg_targets_clear(&targets);
+    return log;
+}
+
+static void write_log(FILE *log, const vg_train_state *s)
+{
+    if (!log) return;
+    fprintf(log, "%d\t%llu\t%.6g\t%.6g\t", s->phase, (unsigned long long)s->iteration, s->loss, s->gradient);
+    if (isnan(s->validation)) fputs("\n", log);
+    else fprintf(log, "%.6g\n", s->validation);
+    if (ferror(log)) log_failed();
+}
+
 /* ---- learning ---- */
 
 static double seconds(void)
@@ -210,21 +283,19 @@ static bool learn(vg_trainer *t, vg_head *h, vg_train_state *s)
 {
     vg_err e;
     int r = 0;
-    FILE *log = opts.log ? fopen(opts.log, "w") : NULL;
-    if (opts.log && !log) cli_stop(VG_ESYS, "cannot write '%.190s'", opts.log);
-    if (log) fputs("phase\titeration\tloss\tgradient\tvalidation\n", log);
-    double start = seconds(), held = NAN;
-    while (!interrupted && (r = vg_trainer_step(t, s, &e)) > 0) {
-        if (!isnan(s->validation)) held = s->validation;
-        if (log)
-            fprintf(log, "%d\t%llu\t%.6g\t%.6g\t%.6g\n", s->phase, (unsigned long long)s->iteration, s->loss, s->gradient, held);
+    double start = seconds();
+    *s = vg_trainer_get_state(t);
+    FILE *log = is_first ? open_log(s) : NULL;
+    bool stopped;
+    while (!(stopped = vg_train_any(interrupted)) && (r = vg_trainer_step(t, s, &e)) > 0) {
+        write_log(log, s);
         show(s, seconds() - start);
-        if (opts.checkpoint && s->iteration % (uint64_t)opts.every == 0) write_checkpoint(t, h);
+        if (opts.checkpoint && is_first && s->iteration % (uint64_t)opts.every == 0) write_checkpoint(t, h);
     }
-    if (log && (fflush(log), ferror(log) | fclose(log))) cli_stop(VG_ESYS, "cannot write '%.190s'", opts.log);
-    if (!interrupted && r < 0) cli_die(&e);
+    if (log && fclose(log)) log_failed();
+    if (!stopped && r < 0) cli_die(&e);
     cli_note("learned in %.1f s", seconds() - start);
-    return !interrupted;
+    return !stopped;
 }
 
 /* ---- the report ---- */
@@ -272,7 +343,20 @@ static void report(vg_trainer *t, const vg_train_state *s)
     for (int m = 0; m < VG_NETWORK_METHODS; m++) print_row(names[m], &x, m);
     int best = best_of(&x, VG_NETWORK_METHODS);
     if (best != VG_NETWORK_METHODS - 1)
-        cli_say("the network is beaten where it has not been: '%s' is nearer to the truth", names[best]);
+        cli_say("the network is beaten on what it has not seen: '%s' is nearer to the truth", names[best]);
+}
+
+/* What is written besides the network has names of its own. */
+static void check_outputs(void)
+{
+    const char *names[] = {cli.output, opts.checkpoint, opts.log};
+    vg_err e;
+    for (int i = 1; i < 3; i++) {
+        if (!names[i]) continue;
+        for (int k = 0; k < i; k++)
+            if (names[k] && cli_same_output(names[i], names[k])) cli_usage("'%.190s' would be written twice", names[i]);
+        if (vg_target_check(names[i], &e) < 0) cli_die(&e);
+    }
 }
 
 int main(int argc, char **argv)
@@ -280,13 +364,15 @@ int main(int argc, char **argv)
     char **operands;
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_train_options o = choose_options();
+    is_first = vg_train_process() == 0;
+    cli.quiet |= !is_first;
     vg_source *s = cli_source(operands, n ? 1 : 0);
     vg_head *h = vg_source_head(s);
     vg_trainer *t;
     vg_train_state state = {0};
     vg_err e;
     cli_need_vertices(h, "the input");
-    if (opts.checkpoint && vg_target_check(opts.checkpoint, &e) < 0) cli_die(&e);
+    check_outputs();
     if (vg_trainer_new(&t, &h->body.mesh, h->body.reference, &o, &e) < 0) cli_die(&e);
     read_sequence(t, s);
     read_others(t, h, operands, n);
@@ -295,10 +381,11 @@ int main(int argc, char **argv)
     vg_network_clear(&h->network);
     if (opts.checkpoint) signal(SIGINT, interrupt), signal(SIGTERM, interrupt);
     if (!learn(t, h, &state)) {
-        write_checkpoint(t, h);
+        if (is_first) write_checkpoint(t, h);
         cli_stop(VG_ESYS, "interrupted after %llu iterations: go on with --resume %s", (unsigned long long)state.iteration,
                  opts.checkpoint);
     }
+    if (!is_first) cli_finish(0);
     report(t, &state);
     if (vg_trainer_network(t, true, &h->network, &e) < 0) cli_die(&e);
     vg_trainer_free(&t);

@@ -5,7 +5,7 @@
 load lib.bash
 bats_require_minimum_version 1.5.0
 
-small="--no-provenance -q --layers 1 --hidden 8 --batch 5 --frames 12 --iterations 24"
+small="--no-provenance -q --hold-at end --layers 1 --hidden 8 --batch 5 --frames 12 --iterations 24"
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR" || return 1
@@ -31,6 +31,10 @@ horse() { echo "$BATS_FILE_TMPDIR/horse.$1"; }
     must vg-train $small --model pca --resume half.net "$(horse vgs)" -o resumed.net
     must cmp whole.net resumed.net
     [ "$(head -1 log.tsv)" = $'phase\titeration\tloss\tgradient\tvalidation' ]
+    [ "$(wc -l <log.tsv)" = 25 ]
+    cp log.tsv long.tsv
+    must vg-train $small --model pca --resume half.net --log long.tsv "$(horse vgs)" -o resumed.net
+    must cmp log.tsv long.tsv
     must_fail 3 vg-train $small --model pca --seed 9 --resume half.net "$(horse vgs)" -o no.net
     says "cannot go on from 'half.net': it was trained with other options"
     must_fail 3 vg-train $small --model pca --resume whole.net "$(horse vgs)" -o no.net
@@ -122,6 +126,29 @@ END
     must_fail 2 vg-generate --given 3 --between 3 "$(horse net)" "$(horse vgs)" -o no.vgs
 }
 
+@test "a network of every other frame keeps the speed of the motion, and meets its keys" {
+    must vg-train $small --model pca --iterations 60 --frames 6 --given 1-3 --hold 0 --step 2 "$(horse vgs)" -o step.net
+    must vg-generate -q --given 6 --frames 4 step.net "$(horse vgs)" -o on.vgs
+    must vg-encode --reference "$DATA/horse.rest.obj" --take 1,8,15 "$DATA/horse-run.tar.xz" -o keys.vgs
+    must vg-generate -q --between 6 step.net keys.vgs -o way.vgs
+    py <<'END'
+from read_stream import read_stream
+v = [list(f.values) for f in read_stream("on.vgs").frames]
+assert len(v) == 10
+def apart(a, b):
+    return max(abs(x - y) for x, y in zip(a, b))
+# frames of the network are 7 and 9; 6 and 8 are the poses between, close to the middle of their neighbours
+for i in (6, 8):
+    middle = [(x + y) / 2 for x, y in zip(v[i - 1], v[i + 1])]
+    assert apart(v[i], middle) < 0.2 * apart(v[i - 1], v[i + 1]), i
+    assert 0.3 < apart(v[i - 1], v[i]) / apart(v[i], v[i + 1]) < 3, i
+way, keys = read_stream("way.vgs").frames, read_stream("keys.vgs").frames
+assert len(way) == 15
+for i, key in enumerate(keys):
+    assert list(way[7 * i].values) == list(key.values)
+END
+}
+
 @test "a frame is out before the next is computed: a run without end is read from as it comes" {
     run timeout 20 bash -c "vg-generate -q --frames 1000000000 '$(horse net)' '$DATA/horse.rest.obj' | head -c 300000 | wc -c"
     [ "$output" = 300000 ]
@@ -161,4 +188,71 @@ END
     must_fail 2 vg-train --every 5 "$(horse vgs)" -o no.net
     must_fail 3 vg-train "$DATA/horse.rest.obj" -o no.net
     says "at least 4 are needed"
+}
+
+@test "the block that is held out is where the seed says, at the end, or where it is told to be" {
+    held() { vg-train $small --model pca --iterations 1 "$@" "$(horse vgs)" -o held.net; }
+    digest() { sha256sum <held.net; }
+    must held --hold-at end
+    end=$(digest)
+    must held --hold-at 1000
+    [ "$(digest)" = "$end" ] || fail "a block beyond the end is not the one at the end"
+    must held --hold-at 4
+    [ "$(digest)" != "$end" ] || fail "--hold-at changed nothing"
+    must_fail 2 vg-train $small --hold-at middle "$(horse vgs)" -o held.net
+    says "needs the number of a frame or end, not 'middle'"
+}
+
+@test "killed at any moment, training leaves a whole checkpoint, from which it goes on" {
+    must vg-train $small --model pca --iterations 60 "$(horse vgs)" -o whole.net
+    for delay in 0.05 0.1 0.2 0.3; do
+        vg-train $small --model pca --iterations 60 --checkpoint kept.net --every 1 "$(horse vgs)" -o killed.net &
+        sleep "$delay"
+        kill -KILL $! 2>/dev/null || :
+        wait $! || :
+        if [ -e kept.net ]; then
+            must vg-info --check kept.net
+            must vg-train $small --model pca --iterations 60 --resume kept.net "$(horse vgs)" -o resumed.net
+            must cmp whole.net resumed.net
+        fi
+    done
+    rm -f kept.net
+    vg-train $small --iterations 100000 --rate 0.0001 --checkpoint kept.net --every 1 "$(horse vgs)" -o killed.net &
+    while [ ! -e kept.net ]; do sleep 0.05; done
+    kill -INT $!
+    status=0
+    wait $! || status=$?
+    [ "$status" = 4 ] || fail "ended with status $status"
+    must vg-info --check kept.net
+    [ ! -e killed2.net ]
+}
+
+@test "a full disk and numbers that run away leave what was there" {
+    must vg-train $small --model pca --iterations 5 "$(horse vgs)" -o there.net
+    cp there.net before.net
+    must_fail 4 vg-train $small --model pca --iterations 5 --log /dev/full "$(horse vgs)" -o there.net
+    must_fail 3 vg-train $small --model pca --iterations 5 --loss l2=1e38 "$(horse vgs)" -o there.net
+    says "the numbers run away at iteration 0: choose a smaller --rate"
+    must_fail 2 vg-train $small --checkpoint there.net "$(horse vgs)" -o there.net
+    says "'there.net' would be written twice"
+    must cmp there.net before.net
+    must bash -c 'vg-encode --take 0-9 "$1" | python3 -c "
+import sys, struct
+b = bytearray(sys.stdin.buffer.read())
+sys.stdout.buffer.write(b[:-40])" >cut.vgs' _ "$(horse vgs)"
+    must_fail 3 vg-train $small cut.vgs -o there.net
+    must cmp there.net before.net
+}
+
+@test "of several processes each runs some of the chains: the same bytes (MPI=1)" {
+    ldd "$(command -v vg-train)" | grep -q libmpi || skip "built without MPI=1"
+    command -v mpirun >/dev/null || skip "needs mpirun"
+    export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+    for model in auto conv; do
+        must vg-train $small --batch 13 --model $model --iterations 6 -j 1 "$(horse vgs)" -o one.net
+        for n in 2 3; do
+            must mpirun -q --oversubscribe -n $n vg-train $small --batch 13 --model $model --iterations 6 -j 1 "$(horse vgs)" -o two.net
+            must cmp one.net two.net
+        done
+    done
 }

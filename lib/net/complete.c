@@ -16,7 +16,7 @@ typedef struct station {
     double *x, *c, *kept, *frame, *centroids, root[4];
 } station;
 
-/* A way of n frames between two stations. */
+/* A way of n frames of the network between two stations. */
 typedef struct way {
     vg_generator *g;
     size_t n;
@@ -225,46 +225,58 @@ static void move_root(way *w)
     }
 }
 
-/* The root's turn `miss`, a rotation vector, in part. */
-static void turn_by(const double miss[3], double part, double root[4])
-{
-    double l[4] = {0, part * miss[0], part * miss[1], part * miss[2]}, q[4];
-    vg_quat_exp(l, q);
-    vg_quat_multiply(root, q, root);
-}
-
 /* What the root misses at the second key is spread over the way; of a cycle its shift is left as it is. */
 static void bend_root(way *w, bool loop)
 {
     size_t parts = w->g->net->parts, main_part = w->g->main_part, wide = 3 * parts;
-    const double *end = w->roots + 4 * w->n, *reached = w->centroids + wide * w->n;
-    double back[4] = {end[0], -end[1], -end[2], -end[3]}, turn[4], l[4], *miss = w->g->centroids;
-    vg_quat_multiply(back, w->to.root, turn);
-    for (int k = 0; k < 4 && turn[0] < 0; k++) turn[k] = -turn[k];
-    vg_quat_log(turn, l);
+    const double *reached = w->centroids + wide * w->n;
+    double end[4], turned[4], back[4], *miss = w->g->centroids;
+    memcpy(end, w->roots + 4 * w->n, sizeof end);
     for (size_t i = 0; i < wide; i++) {
         double shift = loop ? reached[3 * main_part + i % 3] - w->to.centroids[3 * main_part + i % 3] : 0;
         miss[i] = w->to.centroids[i] + shift - reached[i];
     }
-    for (size_t t = 0; t < w->n; t++) {
-        double part = (double)(t + 1) / (double)(w->n + 1);
-        turn_by(l + 1, part, w->roots + 4 * t);
+    for (size_t t = 0; t <= w->n; t++) {
+        double part = (double)(t + 1) / (double)(w->n + 1), *root = w->roots + 4 * t;
+        vgi_turn_towards(end, w->to.root, part, turned);
+        double left[4] = {end[0], -end[1], -end[2], -end[3]}; /* the part of the turn that is missing, behind the root's own */
+        vg_quat_multiply(left, turned, back);
+        vg_quat_multiply(root, back, root);
         for (size_t i = 0; i < wide; i++) w->centroids[wide * t + i] += part * miss[i];
     }
 }
 
-static int make_poses(way *w, double *const *poses, vg_err *e)
+/* Normalised features at `part` between frame k of the way, 0: the first key, and the next. */
+static void mix_features(way *w, size_t k, double part, double *x)
 {
     vg_generator *g = w->g;
+    size_t n = g->net->numbers;
+    const double *a = k ? w->path + (k - 1) * n : w->from.frame, *b = k < w->n ? w->path + k * n : w->to.frame;
+    double whole = ((double)k + part) / (double)(w->n + 1);
+    for (size_t i = 0; i < n; i++) g->numbers[i] = (1 - part) * a[i] + part * b[i];
+    if (!vgi_network_is_linear(g->net)) {
+        memcpy(x, g->numbers, n * sizeof *x);
+        return;
+    }
+    vgi_network_decode(g->net, g->numbers, x);
+    for (size_t i = 0; i < g->d; i++) x[i] += (1 - whole) * w->from.kept[i] + whole * w->to.kept[i];
+}
+
+/* n poses from the way, whose frames may be farther apart. */
+static int make_poses(way *w, size_t n, double *const *poses, vg_err *e)
+{
+    vg_generator *g = w->g;
+    size_t wide = 3 * g->net->parts;
     int code = VG_OK;
-    for (size_t t = 0; code == VG_OK && t < w->n; t++) {
-        const double *frame = w->path + t * g->net->numbers;
-        double part = (double)(t + 1) / (double)(w->n + 1);
-        if (vgi_network_is_linear(g->net)) {
-            vgi_network_decode(g->net, frame, g->x);
-            for (size_t i = 0; i < g->d; i++) g->x[i] += (1 - part) * w->from.kept[i] + part * w->to.kept[i];
-        } else memcpy(g->x, frame, g->d * sizeof *g->x);
-        code = vgi_generator_pose(g, g->x, w->roots + 4 * t, w->centroids + 3 * g->net->parts * t, poses[t], e);
+    for (size_t i = 0; code == VG_OK && i < n; i++) {
+        double at = (double)((i + 1) * (w->n + 1)) / (double)(n + 1), part = at - floor(at), root[4];
+        size_t k = (size_t)at;
+        const double *a = k ? w->roots + 4 * (k - 1) : w->from.root, *c = k ? w->centroids + wide * (k - 1) : w->from.centroids;
+        mix_features(w, k, part, g->x);
+        if (part > 0) vgi_turn_towards(a, w->roots + 4 * k, part, root);
+        else memcpy(root, a, sizeof root);
+        for (size_t j = 0; j < wide; j++) g->centroids[j] = (1 - part) * c[j] + part * w->centroids[wide * k + j];
+        code = vgi_generator_pose(g, g->x, root, g->centroids, poses[i], e);
     }
     return code;
 }
@@ -279,7 +291,7 @@ static void arrive(way *w)
     memcpy(g->c, w->to.c, g->net->rank * sizeof *g->c);
     memcpy(g->root, w->to.root, sizeof g->root);
     memcpy(g->centroids, w->to.centroids, 3 * g->net->parts * sizeof *g->centroids);
-    g->npast = 0;
+    g->npast = 0, g->sparse = true;
     for (size_t t = w->n - before; t < w->n && vgi_network_is_linear(g->net); t++)
         vgi_generator_remember(g, w->path + t * n);
     vgi_generator_remember(g, w->to.frame);
@@ -292,9 +304,12 @@ int vg_generator_between(vg_generator *g, const double *key, bool loop, size_t n
     if (!g->given) return vg_fail(e, VG_EINPUT, "no pose is given to begin from");
     if (g->o.merge > 0 && g->net->direction == VG_FORWARD)
         return vg_fail(e, VG_EINPUT, "the network runs forward only: its ways from two keys cannot meet");
-    int code = make_way(&w, g, n, g->o.merge > 0 ? NET_LANES : 1, e);
+    size_t frames = g->net->step > 1 ? (n + 1 + g->net->step / 2) / g->net->step : n + 1; /* of the network, the key is the last */
+    if (frames < 2) frames = 2;
+    int code = make_way(&w, g, frames - 1, g->o.merge > 0 ? NET_LANES : 1, e);
     if (code < 0) return code;
     note_station(g, &w.from);
+    vgi_generator_thin(g);
     memcpy(w.past, g->past, g->npast * g->net->numbers * sizeof *w.past);
     w.npast = g->npast;
     code = vg_generator_give(g, key, e);
@@ -303,7 +318,7 @@ int vg_generator_between(vg_generator *g, const double *key, bool loop, size_t n
     if (code == VG_OK) {
         move_root(&w);
         bend_root(&w, loop);
-        code = make_poses(&w, poses, e);
+        code = make_poses(&w, n, poses, e);
         arrive(&w);
     }
     if (found) *found = w.found;

@@ -2,6 +2,7 @@
  * The root's steps are a regression of their own: what the body does says how it moves on.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/dataset.h"
+#include "core/random.h"
 #include "numeric/blas.h"
 #include "signal/signal.h"
 
@@ -104,13 +105,23 @@ static int split_by_step(vgi_dataset *s, size_t step, vg_err *e)
     return VG_OK;
 }
 
-int vgi_dataset_divide(vgi_dataset *s, size_t step, double hold, size_t hold_at, vg_err *e)
+/* Where the block of `held` frames begins. Three frames are left before it: so many are given to judge by. */
+static size_t hold_from(size_t length, size_t held, size_t hold_at, uint64_t seed, size_t sequence)
+{
+    enum { BEFORE = 3 };
+    size_t end = length - held;
+    if (hold_at != VG_HOLD_BY_SEED) return hold_at < end ? hold_at : end;
+    if (end <= BEFORE) return end;
+    vgi_random r = vgi_random_start(seed, UINT64_MAX - sequence);
+    return BEFORE + vgi_random_below(&r, end - BEFORE + 1);
+}
+
+int vgi_dataset_divide(vgi_dataset *s, size_t step, double hold, size_t hold_at, uint64_t seed, vg_err *e)
 {
     if (step > 1 && split_by_step(s, step, e) < 0) return VG_ENOMEM;
     for (size_t q = 0; q < s->nsequences; q++) {
         size_t begin = s->sequence[q], end = q + 1 < s->nsequences ? s->sequence[q + 1] : s->n, length = end - begin;
-        size_t held = (size_t)(hold * (double)length + 0.5), at = length - held;
-        if (hold_at < at) at = hold_at;
+        size_t held = (size_t)(hold * (double)length + 0.5), at = hold_from(length, held, hold_at, seed, q);
         vgi_span whole[3] = {{begin, begin + at, begin}, {begin + at, begin + at + held, begin},
                              {begin + at + held, end, begin + at + held}};
         for (int i = 0; i < 3; i++)

@@ -44,8 +44,9 @@ int vgi_dataset_cut(vgi_dataset *s, vg_err *e) VG_MUST_CHECK; /* another sequenc
 void vgi_dataset_clear(vgi_dataset *s);
 
 /* vgi_dataset_divide: make a sequence of every step-th frame, starting at each of the first `step` frames; hold out a
- * share of each sequence, at its end or from frame hold_at on. */
-int vgi_dataset_divide(vgi_dataset *s, size_t step, double hold, size_t hold_at, vg_err *e) VG_MUST_CHECK;
+ * share of each sequence, one block: from frame hold_at on, at its end (SIZE_MAX), or where the seed says
+ * (VG_HOLD_BY_SEED). */
+int vgi_dataset_divide(vgi_dataset *s, size_t step, double hold, size_t hold_at, uint64_t seed, vg_err *e) VG_MUST_CHECK;
 /* vgi_dataset_find_coordinates: range and change of n's features, mean, basis, scales, range of the coordinates;
  * of the frames in s->train. VG_EINPUT with fewer than 4. */
 int vgi_dataset_find_coordinates(vgi_dataset *s, vg_network *n, size_t most, int threads, vg_err *e) VG_MUST_CHECK;

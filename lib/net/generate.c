@@ -17,11 +17,13 @@ static const double margin = 0.05, lively = 0.3; /* lively: deviation of random 
 static int make_rooms(vg_generator *g, vg_err *e)
 {
     size_t d = g->d, k = g->net->rank, n = g->net->numbers, roots = vgi_network_roots(g->net);
-    double *at = g->x = vgi_array(4 * d + 2 * k + roots + 3 * g->net->parts + (KEPT + 1) * n, sizeof *at, e);
+    size_t parts = 3 * g->net->parts, kept = KEPT * g->net->step;
+    double *at = g->x = vgi_array(6 * d + 2 * k + roots + 3 * parts + (kept + 1) * n, sizeof *at, e);
     g->frame = at ? net_array(3 * n, e) : NULL;
     if (!g->frame) return VG_ENOMEM;
     g->before = at += d, g->kept = at += d, g->features = at += d, g->c = at += d, g->c_before = at += k;
-    g->steps = at += k, g->centroids = at += roots, g->past = at += 3 * g->net->parts, g->numbers = at + KEPT * n;
+    g->steps = at += k, g->centroids = at += roots, g->past = at += parts, g->numbers = at += kept * n;
+    g->x_from = at += n, g->centroids_from = at += d, g->room = at + parts;
     return VG_OK;
 }
 
@@ -62,8 +64,8 @@ void vg_generator_free(vg_generator **out)
 
 void vg_generator_restart(vg_generator *g)
 {
-    g->given = g->made = g->npast = 0;
-    g->begun = false;
+    g->given = g->made = g->npast = g->part = 0;
+    g->begun = g->sparse = false;
     vg_featurer_restart(g->featurer);
 }
 
@@ -80,9 +82,18 @@ static void note_change(vg_generator *g)
 
 void vgi_generator_remember(vg_generator *g, const double *frame)
 {
-    size_t n = g->net->numbers;
-    if (g->npast == KEPT) memmove(g->past, g->past + n, (KEPT - 1) * n * sizeof *g->past), g->npast--;
+    size_t n = g->net->numbers, most = g->sparse ? KEPT : KEPT * g->net->step;
+    if (g->npast == most) memmove(g->past, g->past + n, (most - 1) * n * sizeof *g->past), g->npast--;
     memcpy(g->past + g->npast++ * n, frame, n * sizeof *frame);
+}
+
+void vgi_generator_thin(vg_generator *g)
+{
+    size_t n = g->net->numbers, step = g->net->step, left = g->sparse ? g->npast : (g->npast + step - 1) / step;
+    for (size_t i = 0; i < left && !g->sparse; i++)
+        memmove(g->past + i * n, g->past + (g->npast - 1 - (left - 1 - i) * step) * n, n * sizeof *g->past);
+    g->npast = left;
+    g->sparse = true;
 }
 
 int vg_generator_give(vg_generator *g, const double *pose, vg_err *e)
@@ -97,10 +108,11 @@ int vg_generator_give(vg_generator *g, const double *pose, vg_err *e)
     vgi_network_encode(g->net, g->x, g->c);
     if (!g->given) memcpy(g->c_before, g->c, k * sizeof *g->c);
     note_change(g);
+    if (g->sparse) g->npast = 0, g->sparse = false;
     vgi_generator_remember(g, linear ? g->c : g->x);
     vgi_network_decode(g->net, g->c, g->kept);
     for (size_t i = 0; i < g->d; i++) g->kept[i] = linear ? g->x[i] - g->kept[i] : 0;
-    g->given++, g->made = 0;
+    g->given++, g->made = g->part = 0;
     g->begun = false;
     return VG_OK;
 }
@@ -123,6 +135,7 @@ static void put_frame(const double *from, size_t n, net_lanes *to)
 static void begin(vg_generator *g)
 {
     size_t n = g->net->numbers;
+    vgi_generator_thin(g);
     vgi_generator_states(g, false, 0);
     vgi_runner_begin(&g->runner, false);
     put_frame(g->past, n, g->frame);
@@ -191,12 +204,43 @@ int vgi_generator_pose(vg_generator *g, const double *x, const double *root, con
     return VG_OK;
 }
 
+void vgi_turn_towards(const double a[4], const double b[4], double part, double to[4])
+{
+    double back[4] = {a[0], -a[1], -a[2], -a[3]}, turn[4], l[4], q[4];
+    vg_quat_multiply(back, b, turn);
+    double sign = turn[0] < 0 ? -1 : 1;
+    for (int k = 0; k < 4; k++) turn[k] *= sign;
+    vg_quat_log(turn, l);
+    for (int k = 1; k < 4; k++) l[k] *= part;
+    l[0] = 0;
+    vg_quat_exp(l, q);
+    vg_quat_multiply(a, q, to);
+}
+
+/* The pose on the way from the network's frame before to its last one. */
+static int pose_between(vg_generator *g, double part, double *pose, vg_err *e)
+{
+    double root[4], *x = g->room, *centroids = g->room + g->d;
+    if (part >= 1) return vgi_generator_pose(g, g->x, g->root, g->centroids, pose, e);
+    vgi_turn_towards(g->root_from, g->root, part, root);
+    for (size_t i = 0; i < g->d; i++) x[i] = (1 - part) * g->x_from[i] + part * g->x[i];
+    for (size_t i = 0; i < 3 * g->net->parts; i++) centroids[i] = (1 - part) * g->centroids_from[i] + part * g->centroids[i];
+    return vgi_generator_pose(g, x, root, centroids, pose, e);
+}
+
 int vg_generator_next(vg_generator *g, double *pose, vg_err *e)
 {
     if (!g->given) return vg_fail(e, VG_EINPUT, "no pose is given to go on from");
-    advance(g);
-    vgi_generator_move(g, g->c, g->c_before, g->root, g->centroids);
-    return vgi_generator_pose(g, g->x, g->root, g->centroids, pose, e);
+    if (!g->part) {
+        memcpy(g->x_from, g->x, g->d * sizeof *g->x);
+        memcpy(g->root_from, g->root, sizeof g->root);
+        memcpy(g->centroids_from, g->centroids, 3 * g->net->parts * sizeof *g->centroids);
+        advance(g);
+        vgi_generator_move(g, g->c, g->c_before, g->root, g->centroids);
+    }
+    double part = (double)++g->part / (double)g->net->step;
+    g->part %= g->net->step;
+    return pose_between(g, part, pose, e);
 }
 
 /* the mean over the frames that are looked at */

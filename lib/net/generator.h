@@ -17,12 +17,16 @@ struct vg_generator {
     vgi_runner runner;
     size_t d, nv, main_part;
     size_t given, made;     /* poses of this run */
-    double *past;           /* VGI_LONG_GIVEN x numbers: the last frames, the latest last; npast of them */
+    double *past;           /* VGI_LONG_GIVEN * step x numbers: the last frames, the latest last; npast of them */
     size_t npast;
+    bool sparse;            /* they are as far apart as the network's frames; else as the poses that came in */
+    size_t part;            /* between two frames of the network: so many steps behind the first */
+    double *x_from, *centroids_from, root_from[4]; /* the first of them */
     net_lanes *frame;       /* 3 x numbers */
     double *x, *before, *kept, *features; /* d each: the last frame normalised, the one before, what the basis misses */
     double *c, *c_before, *steps;         /* rank, rank, roots */
     double root[4], *centroids;
+    double *room;           /* d and the centroids */
     double *numbers;        /* numbers of one frame, as the layers see it */
     double changes[VGI_WATCHED], drifts[VGI_WATCHED];
     bool begun;
@@ -30,6 +34,10 @@ struct vg_generator {
 
 /* vgi_generator_remember: a frame behind the last one. */
 void vgi_generator_remember(vg_generator *g, const double *frame);
+/* vgi_generator_thin: of the frames that are remembered only those stay that are as far apart as the network's. */
+void vgi_generator_thin(vg_generator *g);
+/* vgi_turn_towards: to := the root that has gone `part` of the shortest way from a to b. */
+void vgi_turn_towards(const double a[4], const double b[4], double part, double to[4]);
 /* vgi_generator_states: initial states of all lanes: those of the training, or random ones; try: of the random ones. */
 void vgi_generator_states(vg_generator *g, bool back, uint64_t try);
 /* vgi_generator_move: from the coordinates g->c and those before: root and centroids become the next ones. */

@@ -39,6 +39,10 @@ static const real *frame_of(const side *s, size_t lane, size_t t)
     size_t half = g->direction == VG_SHARED ? NET_LANES / 2 : NET_LANES, sequence = lane % half;
     bool back = s->which == 1 || lane >= half;
     if (sequence >= g->n) sequence = 0; /* a lane that is not in use */
+    if (g->before && t < 2) {
+        size_t third = g->start[sequence] + (back ? g->steps - 3 : 2);
+        return g->before + ((third * 2 + back) * 2 + t) * g->chains[0].shape->numbers;
+    }
     return g->frames + (g->start[sequence] + (back ? g->steps - 1 - t : t)) * g->chains[0].shape->numbers;
 }
 
@@ -70,6 +74,12 @@ static double *norms(const net_group *g, int which, size_t t)
     return g->norm + (3 * t + (size_t)which) * NET_LANES;
 }
 
+/* Is frame t compared with the truth? Those that are put before the first one are not. */
+static bool counts(const net_group *g, size_t t)
+{
+    return t > (g->before ? 2 : 0);
+}
+
 /* Distances into g->norm; sums into *loss. */
 static void measure(side *s, net_loss *loss)
 {
@@ -85,8 +95,8 @@ static void measure(side *s, net_loss *loss)
             if (s->which == 0) between[i] = sqrt(apart[i] + 1e-12);
             if (!in_use(g, i)) continue;
             bool forward = s->which == 0 && i < half;
-            if (t) loss->total += to_truth[i] / (double)g->batch;
-            if (t && forward) loss->frames += to_truth[i] / (double)g->batch / (double)(g->steps - 1);
+            if (counts(g, t)) loss->total += to_truth[i] / (double)g->batch;
+            if (counts(g, t) && forward) loss->frames += to_truth[i] / (double)g->batch / (double)(g->steps - 1);
             if (forward && other(s, t)) loss->total += g->bidirectional * between[i] / (double)g->batch;
         }
     }
@@ -103,7 +113,7 @@ static void pull(void *context, size_t t, net_lanes *gradient)
         /* seen from the second of separate chains, time runs the other way */
         const double *between = norms(g, 2, s->which ? g->steps - 1 - t : t);
         if (!in_use(g, i)) continue;
-        by[0][i] = (real)(1 / (norms(g, s->which, t)[i] * (double)g->batch));
+        by[0][i] = counts(g, t) ? (real)(1 / (norms(g, s->which, t)[i] * (double)g->batch)) : 0;
         by[1][i] = (real)(g->bidirectional / (between[i] * (double)g->batch));
     }
     truth(s, t, s->truth);

@@ -28,6 +28,8 @@ typedef struct net_group {
     net_chains chains[2]; /* the second of separate weights */
     double *norm;         /* steps x 3 x 8: distances from the truth of both, and between them */
     const real *frames;   /* all frames that there are, a row of shape.numbers each; borrowed */
+    const real *before;   /* NULL, or sequences whose first frame is their third: two that are put before each frame of all, of
+                             forward chains and of backward ones: 2 x 2 rows a frame; borrowed */
     size_t start[NET_LANES], n; /* first frame of each sequence, and how many sequences */
     double bidirectional, divergence; /* weights of the losses */
     size_t batch;         /* sequences of all groups: what each loss is divided by */

@@ -139,10 +139,11 @@ static void put_rows(const vgi_frames *f, bool back, double size, double damping
 }
 
 /* The same without the change: z is made of the first numbers of each row, 1 behind them. */
-static int fit_first(vgi_regression *r, size_t rows, double *z, double *y, double size, double ridge, double damping,
+static int fit_first(vgi_regression *r, size_t rows, double *z, double *y, double size, const vgi_choice *choice,
                      vg_err *e)
 {
     size_t n = r->numbers, w = n + 1;
+    double ridge = choice->first_ridge, damping = choice->damping;
     double *a = vgi_array(w * w + w * n, sizeof *a, e);
     if (!a) return VG_ENOMEM;
     double *x = a + w * w;
@@ -164,11 +165,11 @@ static int fit_first(vgi_regression *r, size_t rows, double *z, double *y, doubl
     return code;
 }
 
-int vgi_regression_fit(vgi_regression *r, const vgi_frames *f, bool back, double size, double ridge, double damping,
-                       vg_err *e)
+/* The fit as it is, stable or not. */
+static int fit(vgi_regression *r, const vgi_frames *f, bool back, double size, const vgi_choice *choice, vg_err *e)
 {
     size_t n = f->numbers, w = 2 * n + 1, rows = count_rows(f);
-    double *z = vgi_array_raw(rows * (w + n) + w * w + w * n, sizeof *z, e);
+    double damping = choice->damping, *z = vgi_array_raw(rows * (w + n) + w * w + w * n, sizeof *z, e);
     if (!z) return VG_ENOMEM;
     double *y = z + rows * w, *a = y + rows * n, *x = a + w * w;
     put_rows(f, back, size, damping, z, y);
@@ -177,7 +178,8 @@ int vgi_regression_fit(vgi_regression *r, const vgi_frames *f, bool back, double
         vgi_product_transposed_double(w, w, rows, z, w, z, w, a, w);
         vgi_product_transposed_double(w, n, rows, z, w, y, n, x, n);
     }
-    for (size_t i = 0; i < w; i++) a[i * w + i] += ridge * (double)(rows ? rows : 1) * (i < 2 * n ? 1 : free_shift);
+    for (size_t i = 0; i < w; i++)
+        a[i * w + i] += choice->ridge * (double)(rows ? rows : 1) * (i < 2 * n ? 1 : free_shift);
     int code = vgi_spd_factor(w, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames leave a regression open");
     if (code == VG_OK) {
         vgi_spd_solve(w, a, n, x);
@@ -187,26 +189,40 @@ int vgi_regression_fit(vgi_regression *r, const vgi_frames *f, bool back, double
                 r->change[i * n + j] = change_weight * x[(n + i) * n + j] + (i == j ? damping : 0);
             }
         for (size_t j = 0; j < n; j++) r->shift[j] = size * x[2 * n * n + j];
-        code = make_stable(r, damping, e);
-        if (code == VG_OK) code = fit_first(r, rows, z, y, size, ridge, damping, e);
+        code = fit_first(r, rows, z, y, size, choice, e);
     }
     free(z);
     return code;
 }
 
+int vgi_regression_fit(vgi_regression *r, const vgi_frames *f, bool back, double size, const vgi_choice *choice,
+                       vg_err *e)
+{
+    int code = fit(r, f, back, size, choice, e);
+    return code == VG_OK ? make_stable(r, choice->damping, e) : code;
+}
+
 /* ---- which ridge ---- */
 
-/* mean distance per frame over runs of up to twelve frames that begin every third; room: 3 numbers */
-static double try_out(const vgi_regression *r, const vgi_frames *f, double *room)
+/* A sum of errors and how many there are. */
+typedef struct trial_sum {
+    double sum;
+    size_t n;
+} trial_sum;
+
+/* distances per frame over runs of up to twelve frames that begin every third; back: the frame before the first is not
+ * given, but what this says of it; room: 3 numbers */
+static trial_sum try_out(const vgi_regression *r, const vgi_regression *back, const vgi_frames *f, double *room)
 {
     enum { LONGEST = 12, SHORTEST = 5, APART = 3 };
-    size_t n = r->numbers, runs = 0;
-    double sum = 0;
+    size_t n = r->numbers;
+    trial_sum all = {0, 0};
     for (size_t s = 0; s < f->nsequences; s++)
-        for (size_t t = f->start[s] + 2; t + SHORTEST <= f->start[s + 1]; t += APART, runs++) {
+        for (size_t t = f->start[s] + 2; t + SHORTEST <= f->start[s + 1]; t += APART, all.n++) {
             size_t length = f->start[s + 1] - t < LONGEST ? f->start[s + 1] - t : LONGEST;
             double *before = room, *c = room + n, *next = room + 2 * n, run = 0;
             memcpy(room, f->row + (t - 2) * n, 2 * n * sizeof *room);
+            if (back) vgi_regression_next(back, c, NULL, before);
             for (size_t i = 0; i < length; i++) {
                 vgi_regression_next(r, c, before, next);
                 double far = 0;
@@ -215,46 +231,83 @@ static double try_out(const vgi_regression *r, const vgi_frames *f, double *room
                 double *swap = before;
                 before = c, c = next, next = swap;
             }
-            sum += run;
+            all.sum += run;
         }
-    return runs ? sum / (double)runs : INFINITY;
+    return all;
 }
 
 static const double ridges[] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10}, dampings[] = {0.8, 0.9, 0.95};
-enum { RIDGES = sizeof ridges / sizeof *ridges, DAMPINGS = sizeof dampings / sizeof *dampings };
+enum { RIDGES = sizeof ridges / sizeof *ridges, DAMPINGS = sizeof dampings / sizeof *dampings, CHOICES = RIDGES * DAMPINGS };
 
+/* Some choices, each in each fold: task i is choice i % n in fold i / n. */
 typedef struct choosing {
-    const vgi_frames *fitted, *tried;
-    double size, error[RIDGES * DAMPINGS];
-    int code[RIDGES * DAMPINGS];
+    const vgi_fold *folds;
+    double size;
+    const vgi_choice *choices;
+    size_t n;
+    bool first; /* runs begin from one frame */
+    trial_sum *found;
+    int *code;
 } choosing;
 
-static void try_one(void *context, size_t i)
+static void try_one(void *context, size_t task)
 {
     choosing *c = context;
-    vgi_regression r;
-    double *room = vgi_array_raw(3 * c->fitted->numbers, sizeof *room, NULL);
-    c->error[i] = INFINITY;
-    c->code[i] = room ? vgi_regression_make(&r, c->fitted->numbers, NULL) : VG_ENOMEM;
-    if (c->code[i] == VG_OK) {
-        c->code[i] = vgi_regression_fit(&r, c->fitted, false, c->size, ridges[i / DAMPINGS], dampings[i % DAMPINGS], NULL);
-        if (c->code[i] == VG_OK) c->error[i] = try_out(&r, c->tried, room);
-        vgi_regression_clear(&r);
-    }
+    const vgi_fold *f = &c->folds[task / c->n];
+    const vgi_choice *choice = &c->choices[task % c->n];
+    size_t n = f->fitted.numbers;
+    vgi_regression r = {0}, back = {0};
+    double *room = vgi_array_raw(3 * n, sizeof *room, NULL);
+    int code = room ? vgi_regression_make(&r, n, NULL) : VG_ENOMEM;
+    if (code == VG_OK) code = fit(&r, &f->fitted, false, c->size, choice, NULL);
+    if (code == VG_OK && c->first) code = vgi_regression_make(&back, n, NULL);
+    if (code == VG_OK && c->first) code = fit(&back, &f->fitted, true, c->size, choice, NULL);
+    c->found[task] = code == VG_OK ? try_out(&r, c->first ? &back : NULL, &f->tried, room) : (trial_sum){INFINITY, 1};
+    c->code[task] = code;
+    vgi_regression_clear(&r);
+    vgi_regression_clear(&back);
     free(room);
 }
 
-int vgi_regression_choose(const vgi_frames *fitted, const vgi_frames *tried, double size, int threads,
-                          vgi_choice *choice, vg_err *e)
+/* The best of some choices over all folds; what it was when there is nothing to try it on. */
+static int pick(choosing *c, size_t folds, int threads, vgi_choice *best, vg_err *e)
 {
-    choosing c = {.fitted = fitted, .tried = tried, .size = size};
+    c->found = vgi_array(folds * c->n, sizeof *c->found, e);
+    c->code = vgi_array(folds * c->n, sizeof *c->code, e);
+    if (!c->found || !c->code) return VG_ENOMEM;
     vgi_blas_alone();
-    vgi_parallel(threads, RIDGES * DAMPINGS, try_one, &c);
+    vgi_parallel(threads, folds * c->n, try_one, c);
     vgi_blas_shared();
-    *choice = (vgi_choice){ridges[RIDGES - 1], 0.9, INFINITY}; /* nothing to try it on: nearly damped continuation */
-    for (size_t i = 0; i < RIDGES * DAMPINGS; i++) {
-        if (c.code[i] == VG_ENOMEM) return vg_fail(e, VG_ENOMEM, "out of memory: a regression of %zu numbers", fitted->numbers);
-        if (c.error[i] < choice->error) *choice = (vgi_choice){ridges[i / DAMPINGS], dampings[i % DAMPINGS], c.error[i]};
+    double least = INFINITY;
+    for (size_t i = 0; i < c->n; i++) {
+        trial_sum all = {0, 0};
+        for (size_t f = 0; f < folds; f++) {
+            if (c->code[f * c->n + i] == VG_ENOMEM)
+                return vg_fail(e, VG_ENOMEM, "out of memory: a regression of %zu numbers", c->folds->fitted.numbers);
+            all.sum += c->found[f * c->n + i].sum, all.n += c->found[f * c->n + i].n;
+        }
+        if (!all.n || !(all.sum / (double)all.n < least)) continue;
+        least = all.sum / (double)all.n;
+        *best = c->choices[i];
     }
     return VG_OK;
+}
+
+int vgi_regression_choose(const vgi_fold *folds, size_t n, double size, int threads, vgi_choice *choice, vg_err *e)
+{
+    vgi_choice all[CHOICES];
+    *choice = (vgi_choice){ridges[RIDGES - 1], 0.9, ridges[RIDGES - 1]}; /* nearly damped continuation */
+    int code = VG_OK;
+    for (int first = 0; code == VG_OK && first < 2; first++) {
+        choosing c = {.folds = folds, .size = size, .choices = all, .n = first ? RIDGES : CHOICES, .first = first};
+        for (size_t i = 0; i < c.n; i++) {
+            all[i] = *choice;
+            if (first) all[i].first_ridge = ridges[i];
+            else all[i].ridge = ridges[i / DAMPINGS], all[i].damping = dampings[i % DAMPINGS], all[i].first_ridge = all[i].ridge;
+        }
+        code = pick(&c, n, threads, choice, e);
+        free(c.found);
+        free(c.code);
+    }
+    return code;
 }

@@ -35,18 +35,23 @@ static inline vgi_regression vgi_regression_view(size_t n, double *block)
 int vgi_regression_make(vgi_regression *r, size_t numbers, vg_err *e) VG_MUST_CHECK;
 void vgi_regression_clear(vgi_regression *r);
 
+typedef struct vgi_choice {
+    double ridge, damping; /* weight of the pull, and g of the damped continuation that the regression is pulled to */
+    double first_ridge;    /* of the part for a first frame */
+} vgi_choice;
+
 /* vgi_regression_fit: least squares over all frames with two before them. back: frames in the order of falling time.
- * size: what coordinates are divided by; ridge: weight of the pull; damping: g, of the continuation that it is pulled
- * to. The spectral radius is brought to 1.0005. O(frames numbers^2 + numbers^3). */
-int vgi_regression_fit(vgi_regression *r, const vgi_frames *f, bool back, double size, double ridge, double damping,
+ * size: what coordinates are divided by. The spectral radius is brought to 1.0005. O(frames numbers^2 + numbers^3). */
+int vgi_regression_fit(vgi_regression *r, const vgi_frames *f, bool back, double size, const vgi_choice *choice,
                        vg_err *e) VG_MUST_CHECK;
 
-typedef struct vgi_choice {
-    double ridge, damping, error; /* error: mean distance per frame where it was tried */
-} vgi_choice;
-/* vgi_regression_choose: the ridge and damping that continue the frames `tried` best after a fit to `fitted`. */
-int vgi_regression_choose(const vgi_frames *fitted, const vgi_frames *tried, double size, int threads,
-                          vgi_choice *choice, vg_err *e) VG_MUST_CHECK;
+/* A block that is left out of the fit and then continued. The first two frames of each sequence in `tried` are given. */
+typedef struct vgi_fold {
+    vgi_frames fitted, tried;
+} vgi_fold;
+/* vgi_regression_choose: the ridges and damping that continue the blocks best, over all folds together. */
+int vgi_regression_choose(const vgi_fold *folds, size_t n, double size, int threads, vgi_choice *choice,
+                          vg_err *e) VG_MUST_CHECK;
 
 /* vgi_regression_next: next (numbers) from c and the frame before it; NULL: there is none. */
 void vgi_regression_next(const vgi_regression *r, const double *c, const double *before, double *next);

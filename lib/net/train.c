@@ -10,21 +10,23 @@
 #include "net/root.h"
 #include "numeric/vec3.h"
 #include "core/random.h"
+#include "net/ranks.h"
 
 #include <math.h>
 #include <stdlib.h>
 
 static const double clip = 5, least_rate = 0.02, repeats = 1e-5;
-enum { VALIDATE_EVERY = 20, CHUNK = 1 << 16, ERRORS = 2 * VG_NETWORK_METHODS * VG_NETWORK_FRAMES };
+enum { VALIDATE_EVERY = 20, FOLDS = 5, SINGLE = 4, /* of so many iterations one begins from single frames */
+       CHUNK = 1 << 16, ERRORS = 2 * VG_NETWORK_METHODS * VG_NETWORK_FRAMES };
 
 vg_train_options vg_train_defaults(vg_network_model m)
 {
-    vg_train_options o = {.model = m, .layers = 3, .hidden = 128, .convolutions = 3, .iterations = 300, .batch = 8,
+    vg_train_options o = {.model = m, .layers = 1, .hidden = 64, .convolutions = 3, .iterations = 300, .batch = 8,
                           .frames = 32, .step = 1, .given_least = 3, .given_most = 8, .coordinates = 200, .hold = 0.2,
-                          .hold_at = SIZE_MAX, .rate = 1e-3, .bidirectional = 0.5, .decay = 1e-3, .seed = 1,
+                          .hold_at = VG_HOLD_BY_SEED, .rate = 1e-3, .bidirectional = 0.5, .decay = 1e-3, .seed = 1,
                           .threads = 1};
     if (m == VG_NETWORK_AUTO) return o;
-    o.given_least = 1, o.rate = 2e-3, o.iterations = 2500, o.coordinates = 48, o.decay = 0;
+    o.layers = 3, o.hidden = 128, o.given_least = 1, o.rate = 2e-3, o.iterations = 2500, o.coordinates = 48, o.decay = 0;
     if (m == VG_NETWORK_PCA) return o;
     o.decay = 2e-3, o.divergence = 0.1, o.given_least = o.given_most = 1, o.iterations = 7000, o.coordinates = 16;
     return o;
@@ -81,9 +83,10 @@ static void clear_phase(vg_trainer *t)
     free(t->groups);
     free(t->gradient);
     free(t->total);
+    free(t->before);
     vgi_runner_clear(&t->runner);
     t->fitted = t->tried = (vgi_spans){0};
-    t->window = NULL, t->groups = NULL, t->gradient = NULL, t->total = NULL;
+    t->window = NULL, t->before = NULL, t->groups = NULL, t->gradient = NULL, t->total = NULL;
     t->nwindows = t->ngroups = t->at_once = 0;
 }
 
@@ -177,27 +180,60 @@ static int choose_block(vg_trainer *t, bool validate, vg_err *e)
     return VG_OK;
 }
 
-/* Ridge and damping by the validation block, once; the regressions of both directions by what is learned from. */
+static void free_fold(vgi_fold *f)
+{
+    free((void *)f->fitted.row);
+    free((void *)f->fitted.start);
+    free((void *)f->tried.row);
+    free((void *)f->tried.start);
+}
+
+/* Fold k leaves out the k-th fifth of each span; it is continued from the two frames before it. */
+static int make_fold(const vg_trainer *t, size_t k, vgi_fold *f, vg_err *e)
+{
+    vgi_spans fitted = {0}, tried = {0};
+    int code = VG_OK;
+    for (size_t i = 0; code == VG_OK && i < t->data.train.n; i++) {
+        vgi_span s = t->data.train.at[i], before = s, block = s, behind = s;
+        size_t length = s.end - s.first;
+        before.end = block.first = s.first + k * length / FOLDS;
+        behind.first = block.end = s.first + (k + 1) * length / FOLDS;
+        if (k) block.first -= block.first - s.first < 2 ? 0 : 2;
+        if (vgi_spans_add(&fitted, before, e) < 0 || vgi_spans_add(&fitted, behind, e) < 0 ||
+            vgi_spans_add(&tried, block, e) < 0)
+            code = VG_ENOMEM;
+    }
+    if (code == VG_OK) code = vgi_spans_coordinates(&fitted, &t->data, &f->fitted, e);
+    if (code == VG_OK) code = vgi_spans_coordinates(&tried, &t->data, &f->tried, e);
+    free(fitted.at);
+    free(tried.at);
+    return code;
+}
+
+/* Ridges and damping by five blocks that are left out in turn: one block alone may be like nothing else. */
+static int choose_regression(vg_trainer *t, vg_err *e)
+{
+    vgi_fold folds[FOLDS] = {0};
+    int code = VG_OK;
+    for (size_t k = 0; code == VG_OK && k < FOLDS; k++) code = make_fold(t, k, &folds[k], e);
+    if (code == VG_OK) code = vgi_regression_choose(folds, FOLDS, t->data.sigma, t->o.threads, &t->choice, e);
+    for (size_t k = 0; k < FOLDS; k++) free_fold(&folds[k]);
+    t->net.ridge = t->choice.ridge, t->net.damping = t->choice.damping;
+    return code;
+}
+
+/* The regressions of both directions by what is learned from. */
 static int fit_regressions(vg_trainer *t, vg_err *e)
 {
-    vgi_frames fitted, tried;
-    vgi_choice choice;
+    vgi_frames fitted;
+    if (!t->net.damping && choose_regression(t, e) < 0) return VG_ENOMEM;
     int r = vgi_spans_coordinates(&t->fitted, &t->data, &fitted, e);
     if (r < 0) return r;
-    if (!t->net.damping) {
-        r = vgi_spans_coordinates(&t->tried, &t->data, &tried, e);
-        if (r == VG_OK) {
-            r = vgi_regression_choose(&fitted, &tried, t->data.sigma, t->o.threads, &choice, e);
-            free((void *)tried.row);
-            free((void *)tried.start);
-        }
-        if (r == VG_OK) t->net.ridge = choice.ridge, t->net.damping = choice.damping;
-    }
     vgi_blas_alone();
     for (int back = 0; r == VG_OK && back < 2; back++) {
         r = vgi_regression_make(&t->regression[back], t->data.rank, e);
         if (r == VG_OK)
-            r = vgi_regression_fit(&t->regression[back], &fitted, back, t->data.sigma, t->net.ridge, t->net.damping, e);
+            r = vgi_regression_fit(&t->regression[back], &fitted, back, t->data.sigma, &t->choice, e);
     }
     vgi_blas_shared();
     free((void *)fitted.row);
@@ -207,6 +243,28 @@ static int fit_regressions(vg_trainer *t, vg_err *e)
     if (!t->net.regression && !(t->net.regression = vgi_array(2 * all, sizeof *t->net.regression, e))) return VG_ENOMEM;
     for (int back = 0; back < 2; back++)
         memcpy(t->net.regression + (size_t)back * all, t->regression[back].turn, all * sizeof *t->net.regression);
+    return VG_OK;
+}
+
+/* The two frames that the regressions put before each frame, of forward chains and of backward ones: so runs from a single
+ * frame begin. */
+static int find_before(vg_trainer *t, vg_err *e)
+{
+    size_t n = t->data.rank;
+    if (t->o.model != VG_NETWORK_AUTO) return VG_OK;
+    double *one = vgi_array_raw(2 * n, sizeof *one, e);
+    t->before = vgi_array_raw(t->data.n * 4 * n, sizeof *t->before, e);
+    if (!one || !t->before) return free(one), VG_ENOMEM;
+    for (size_t i = 0; i < t->data.n; i++)
+        for (size_t back = 0; back < 2; back++) {
+            const vgi_regression *r = &t->regression[1 - back];
+            const double *c = t->data.coordinates + i * n;
+            float *to = t->before + (2 * i + back) * 2 * n;
+            vgi_regression_next(r, c, NULL, one);
+            vgi_regression_next(r, one, c, one + n);
+            for (size_t k = 0; k < n; k++) to[k] = (float)one[n + k], to[n + k] = (float)one[k];
+        }
+    free(one);
     return VG_OK;
 }
 
@@ -232,7 +290,7 @@ static int make_groups(vg_trainer *t, vg_err *e)
 {
     size_t size = vgi_group_size(t->o.direction), all = t->net.sets * t->net.nparameters;
     t->ngroups = (t->o.batch + size - 1) / size;
-    t->at_once = (size_t)t->o.threads < t->ngroups ? (size_t)t->o.threads : t->ngroups;
+    t->at_once = (size_t)t->o.threads * vgi_ranks() < t->ngroups ? (size_t)t->o.threads * vgi_ranks() : t->ngroups;
     t->groups = vgi_array(t->ngroups, sizeof *t->groups, e);
     t->gradient = vgi_array(t->at_once, sizeof *t->gradient, e);
     t->total = vgi_array(all, sizeof *t->total, e);
@@ -265,6 +323,7 @@ static int begin_phase(vg_trainer *t, bool validate, vg_err *e)
     clear_phase(t);
     int code = choose_block(t, validate, e);
     if (code == VG_OK) code = fit_regressions(t, e);
+    if (code == VG_OK) code = find_before(t, e);
     if (code == VG_OK) code = find_windows(t, e);
     if (code == VG_OK) code = start_parameters(t, e);
     if (code == VG_OK) code = make_groups(t, e);
@@ -294,7 +353,7 @@ static int make_frames(vg_trainer *t, vg_err *e)
 int vg_trainer_prepare(vg_trainer *t, vg_err *e)
 {
     const vgi_rings *r = vgi_featurer_rings(t->featurer);
-    int code = vgi_dataset_divide(&t->data, t->o.step, t->o.hold, t->o.hold_at, e);
+    int code = vgi_dataset_divide(&t->data, t->o.step, t->o.hold, t->o.hold_at, t->o.seed, e);
     if (code == VG_OK) code = vgi_dataset_find_coordinates(&t->data, &t->net, t->o.coordinates, t->o.threads, e);
     if (code == VG_OK) code = vgi_root_fit(&t->data, &t->net, e);
     if (code < 0) return code;
@@ -325,13 +384,16 @@ typedef struct working {
     vg_trainer *t;
     size_t first;  /* the group of the first buffer */
     size_t given, *start;
+    bool single; /* the first frames are those that the regression puts before a single one */
     net_loss loss[64];
 } working;
 
-static void run_group(void *context, size_t i)
+/* Of the groups at hand every so manieth is this process' own. */
+static void run_group(void *context, size_t number)
 {
     working *w = context;
     vg_trainer *t = w->t;
+    size_t i = number * vgi_ranks() + vgi_rank();
     net_group *g = &t->groups[i];
     size_t size = vgi_group_size(t->o.direction), first = (w->first + i) * size, one = t->net.nparameters;
     net_drive d[2];
@@ -339,7 +401,7 @@ static void run_group(void *context, size_t i)
     memset(t->gradient[i], 0, t->net.sets * one * sizeof **t->gradient);
     g->n = t->o.batch - first < size ? t->o.batch - first : size;
     for (size_t k = 0; k < g->n; k++) g->start[k] = w->start[first + k];
-    g->frames = t->frames, g->batch = t->o.batch;
+    g->frames = t->frames, g->batch = t->o.batch, g->before = w->single ? t->before : NULL;
     g->bidirectional = t->o.direction == VG_FORWARD ? 0 : t->o.bidirectional;
     g->divergence = t->net.uncertain ? t->o.divergence : 0;
     for (int k = 0; k < 2; k++) {
@@ -361,13 +423,17 @@ static int run_groups(vg_trainer *t, double *loss, vg_err *e)
     for (size_t i = 0; i < t->o.batch; i++) w.start[i] = t->window[vgi_random_below(&r, t->nwindows)];
     w.given = t->o.given_least + vgi_random_below(&r, t->o.given_most - t->o.given_least + 1);
     if (w.given >= t->length) w.given = t->length - 1;
+    w.single = t->before && t->length > 3 && vgi_random_below(&r, SINGLE) == 0;
+    if (w.single) w.given = 3;
     memset(t->total, 0, all * sizeof *t->total);
     *loss = 0;
     vgi_blas_alone();
     for (w.first = 0; w.first < t->ngroups; w.first += t->at_once) {
-        size_t n = t->ngroups - w.first < t->at_once ? t->ngroups - w.first : t->at_once;
-        vgi_parallel(t->o.threads, n, run_group, &w);
+        size_t n = t->ngroups - w.first < t->at_once ? t->ngroups - w.first : t->at_once, own = vgi_rank(), ranks = vgi_ranks();
+        vgi_parallel(t->o.threads, n > own ? (n - own - 1) / ranks + 1 : 0, run_group, &w);
         for (size_t i = 0; i < n; i++) {
+            vgi_ranks_share(i % ranks, t->gradient[i], all);
+            vgi_ranks_share_double(i % ranks, &w.loss[i % 64].frames, 1);
             *loss += w.loss[i % 64].frames;
             for (size_t k = 0; k < all; k++) t->total[k] += t->gradient[i][k];
         }
@@ -476,6 +542,11 @@ static bool has_waited(const vg_trainer *t)
     return t->state.iteration >= t->state.best_iteration + patience;
 }
 
+vg_train_state vg_trainer_get_state(const vg_trainer *t)
+{
+    return t->state;
+}
+
 int vg_trainer_step(vg_trainer *t, vg_train_state *state, vg_err *e)
 {
     double loss;
@@ -500,6 +571,18 @@ int vg_trainer_step(vg_trainer *t, vg_train_state *state, vg_err *e)
     t->net.iterations = t->state.iteration;
     *state = t->state;
     return 1;
+}
+
+/* ---- several processes ---- */
+
+size_t vg_train_process(void)
+{
+    return vgi_rank();
+}
+
+bool vg_train_any(bool yes)
+{
+    return vgi_ranks_any(yes);
 }
 
 /* ---- networks out and in ---- */

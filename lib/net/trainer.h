@@ -23,7 +23,9 @@ struct vg_trainer {
     float *frames;          /* n x numbers, as the layers see them */
     size_t length;          /* frames of a training sequence */
     size_t *window, nwindows; /* where they may begin */
+    vgi_choice choice;      /* once for both phases */
     vgi_regression regression[2]; /* fitted to the frames of this phase */
+    float *before;          /* of a network that corrects a regression: what this puts before each frame: net_group */
     net_group *groups;
     size_t ngroups, at_once; /* at_once groups are run at a time */
     float **gradient;       /* at_once x sets * nparameters */

@@ -47,6 +47,7 @@ void vg_featurer_solve(vg_featurer *f, size_t n, const double *const *values, co
 /* vg_featurer_batch: how many poses make the threads work best at a time. */
 size_t vg_featurer_batch(const vg_featurer *f);
 
+#define VG_HOLD_BY_SEED (SIZE_MAX - 1)
 typedef struct vg_train_options {
     vg_network_model model;
     vg_direction direction;
@@ -55,8 +56,8 @@ typedef struct vg_train_options {
     size_t step;              /* use every step-th frame */
     size_t given_least, given_most; /* frames that are given, drawn for each iteration */
     size_t coordinates;       /* at most */
-    double hold;              /* share of each sequence that is held out, at its end */
-    size_t hold_at;           /* or from this frame of each sequence on; SIZE_MAX: at its end */
+    double hold;              /* share of each sequence that is held out: one block */
+    size_t hold_at;           /* from this frame of each sequence on; SIZE_MAX: at its end; VG_HOLD_BY_SEED: by the seed */
     double rate;              /* of Adam, falling to 2 % by a cosine */
     double bidirectional, divergence, decay; /* weights of losses: between the chains, KL, squared parameters */
     bool nine;                /* features as printed */
@@ -90,12 +91,20 @@ void vg_trainer_cut(vg_trainer *t);
 int vg_trainer_prepare(vg_trainer *t, vg_err *e) VG_MUST_CHECK;
 /* vg_trainer_resume: go on where the training of `from`, prepared in the same way from the same poses, was. */
 int vg_trainer_resume(vg_trainer *t, const vg_network *from, vg_err *e) VG_MUST_CHECK;
+/* vg_trainer_get_state: as it is now; no loss is known before the first iteration. */
+vg_train_state vg_trainer_get_state(const vg_trainer *t);
 /* vg_trainer_step: one iteration: 1, or 0 when training has ended. VG_EINPUT when numbers have run away. */
 int vg_trainer_step(vg_trainer *t, vg_train_state *state, vg_err *e) VG_MUST_CHECK;
 /* vg_trainer_judge: measure the errors in what is held out; kept in the network. */
 int vg_trainer_judge(vg_trainer *t, vg_network_errors *errors, vg_err *e) VG_MUST_CHECK;
 /* vg_trainer_network: as it is now; complete: nothing is kept that only training needs. */
 int vg_trainer_network(const vg_trainer *t, bool complete, vg_network *n, vg_err *e) VG_MUST_CHECK;
+
+/* Several processes may train together (make MPI=1, started by mpirun): each adds the same poses and takes the same steps,
+ * and all have the same network, which is that of one process to the last bit.
+ * vg_train_process: the number of this one, from 0. vg_train_any: does any of them say yes? Without MPI: 0, and yes. */
+size_t vg_train_process(void);
+bool vg_train_any(bool yes);
 
 /* A network at work: some poses are given, and it goes on from the last. */
 typedef struct vg_generator vg_generator;

@@ -1,0 +1,95 @@
+/* ranks.c: MPI, or one process. Nothing is summed here: gradients are sent as they are and added in one order by all, so
+ * that the number of processes changes no bit.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "net/ranks.h"
+
+#ifdef VG_MPI
+#include <limits.h>
+#include <mpi.h>
+#include <stdlib.h>
+
+static int count, own;
+
+static void end(int status, void *unused)
+{
+    (void)unused;
+    if (status) MPI_Abort(MPI_COMM_WORLD, status);
+    MPI_Finalize();
+}
+
+static void start(void)
+{
+    if (count) return;
+    MPI_Init(NULL, NULL);
+    MPI_Comm_size(MPI_COMM_WORLD, &count);
+    MPI_Comm_rank(MPI_COMM_WORLD, &own);
+    on_exit(end, NULL);
+}
+
+size_t vgi_ranks(void)
+{
+    start();
+    return (size_t)count;
+}
+
+size_t vgi_rank(void)
+{
+    start();
+    return (size_t)own;
+}
+
+/* MPI counts in int */
+static void share(size_t from, void *x, size_t n, size_t size, MPI_Datatype type)
+{
+    for (size_t at = 0; at < n; at += INT_MAX / 8) {
+        size_t part = n - at < INT_MAX / 8 ? n - at : INT_MAX / 8;
+        MPI_Bcast((char *)x + at * size, (int)part, type, (int)from, MPI_COMM_WORLD);
+    }
+}
+
+void vgi_ranks_share(size_t from, float *x, size_t n)
+{
+    if (vgi_ranks() > 1) share(from, x, n, sizeof *x, MPI_FLOAT);
+}
+
+void vgi_ranks_share_double(size_t from, double *x, size_t n)
+{
+    if (vgi_ranks() > 1) share(from, x, n, sizeof *x, MPI_DOUBLE);
+}
+
+bool vgi_ranks_any(bool yes)
+{
+    int all = 0, one = yes;
+    if (vgi_ranks() == 1) return yes;
+    MPI_Allreduce(&one, &all, 1, MPI_INT, MPI_LOR, MPI_COMM_WORLD);
+    return all;
+}
+
+#else
+
+size_t vgi_ranks(void)
+{
+    return 1;
+}
+
+size_t vgi_rank(void)
+{
+    return 0;
+}
+
+void vgi_ranks_share(size_t from, float *x, size_t n)
+{
+    (void)from, (void)x, (void)n;
+}
+
+void vgi_ranks_share_double(size_t from, double *x, size_t n)
+{
+    (void)from, (void)x, (void)n;
+}
+
+bool vgi_ranks_any(bool yes)
+{
+    return yes;
+}
+
+#endif

@@ -1,0 +1,188 @@
+#!/usr/bin/env python3
+"""make bench-train: how well networks go on, beside the bounds of doc/MATH.md 12, on the kit of real animations.
+
+VG_DATA names the folder of the kit. ONLY="walk dance": these parts alone; of: walk dance trex cow keys long ablation speed.
+Prints a table in Markdown; a row ends with its bound and "missed" when it is not met; then the exit status is 1.
+SPDX-License-Identifier: GPL-3.0-or-later
+"""
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+
+KIT = os.environ.get("VG_DATA", "")
+ONLY = os.environ.get("ONLY", "").split()
+SEEDS = (1, 2, 3)
+missed = 0
+
+
+def run(command):
+    """stderr of a shell command that must succeed"""
+    done = subprocess.run(["bash", "-o", "pipefail", "-c", command], stderr=subprocess.PIPE, text=True, check=False)
+    if done.returncode:
+        sys.exit(f"train.py: '{command}' ended with status {done.returncode}: {done.stderr}")
+    return done.stderr
+
+
+def sequence(name, folder, times=1):
+    """a stream of a sequence of the kit, so many times behind itself"""
+    body = "trex" if name.startswith("trex") else name.split("-")[0] if folder == "hybrid" else name
+    out = f"{name}.{times}.vgs"
+    if not os.path.exists(out):
+        files = " ".join([f"{KIT}/{folder}/{name}.tar.gz"] * times)
+        run(f"vg-encode -q --reference {KIT}/{folder}/{body}.rest.obj {files} -o {out}")
+    return out
+
+
+def train(poses, options, out="x.net"):
+    """errors by (method, given), and seconds"""
+    began = time.monotonic()
+    told = run(f"vg-train -v {options} {poses} -o {out}")
+    learned = float(re.search(r"learned in ([0-9.]+) s", told).group(1))
+    table = json.loads(subprocess.check_output(["vg-info", "--json", out]))["network"].get("errors", [])
+    errors = {(r["method"], r["given"]): [r["frame_5"], r["frame_10"], r["frame_15"]] for r in table}
+    return errors, learned, time.monotonic() - began
+
+
+def row(what, values, bound=None, least=None):
+    """one line of the table; bound: none of the values may be above its own; least: nor below"""
+    global missed
+    text = " ".join("-" if v is None else f"{v:.2f}" for v in values)
+    over = bound and any(v is not None and v > b for v, b in zip(values, bound))
+    under = least and any(v < b for v, b in zip(values, least))
+    missed += bool(over or under)
+    limits = ("" if not bound else " ".join(f"{b:g}" for b in bound)) + ("" if not least else f" (at least {least[0]:g})")
+    print(f"| {what} | {text} | {limits}{' **missed**' if over or under else ''} |", flush=True)
+
+
+def wanted(part):
+    return not ONLY or part in ONLY
+
+
+def walk():
+    poses = sequence("walk-man", "human")
+    for seed in SEEDS:
+        errors, learned, _ = train(poses, f"--hold 0.2326 --hold-at end --seed {seed}", f"walk.{seed}.net")
+        if seed == 1:
+            for method in ("repeat", "linear", "damped"):
+                row(f"walk-man, {method}, 3 given", errors[method, 3])
+            row("walk-man, regression, 1 given", errors["regression", 1])
+            row("walk-man, regression, 3 given", errors["regression", 3], (1.1, 1.7, 1.9))
+        row(f"walk-man, network, seed {seed}, 1 given", errors["network", 1], (1.9, 1.8, 1.9))
+        row(f"walk-man, network, seed {seed}, 3 given", errors["network", 3], (1.0, 1.1, 1.7))
+        row(f"walk-man, seed {seed}, seconds", [learned], (10,))
+    errors, _, _ = train(poses, "--hold 0.2 --hold-at end")
+    row("walk-man, 17 frames held out, regression, 3 given", errors["regression", 3])
+    row("walk-man, 17 frames held out, network, 3 given", errors["network", 3])
+
+
+def dance():
+    errors, learned, _ = train(sequence("dance-man", "human"), "--hold 0.2 --hold-at end", "dance.net")
+    row("dance-man, damped, 3 given", errors["damped", 3])
+    row("dance-man, regression, 3 given", errors["regression", 3])
+    row("dance-man, network, 3 given", errors["network", 3], (1.2, 2.5, 3.7))
+    row("dance-man, seconds", [learned])
+
+
+def trex():
+    errors, learned, _ = train(sequence("trex-walk", "hybrid", 5),
+                               "--model pca --given 1 --iterations 800 --hold-at end", "trex.net")
+    row("trex-walk five times, pca, 1 given", errors["network", 1], (0.3, 0.2, 0.2))
+    row("trex-walk five times, pca, seconds", [learned])
+
+
+def cow():
+    errors, learned, _ = train(sequence("cow-run", "hybrid", 5),
+                               "--model conv --iterations 350 --rate 0.002 --hold-at end", "cow.net")
+    row("cow-run five times, conv, 1 given", errors["network", 1], (2.1, 1.4, 1.3))
+    row("cow-run five times, conv, seconds", [learned])
+
+
+def gaps(poses, net, first, frames, options):
+    """mean errors between keys 10, 17 and 33 frames apart"""
+    means = []
+    for gap in (10, 17, 33):
+        room = frames - first - gap
+        starts = [first - 1 + room * k // 2 for k in range(3)] if gap < 20 else [frames - 1 - gap - 4 * k for k in range(3)]
+        total = 0
+        for at in starts:
+            run(f"vg-encode -q --take {at},{at + gap} {poses} -o keys.vgs")
+            run(f"vg-encode -q --take {at + 1}-{at + gap - 1} {poses} -o truth.vgs")
+            run(f"vg-generate -q --between {gap - 1} {options} {net} keys.vgs | vg-encode -q --take 1-{gap - 1} - -o way.vgs")
+            total += 100 * apart("truth.vgs", "way.vgs") / len(starts)
+        means.append(total)
+    return means
+
+
+def apart(truth, result):
+    """mean distance of a vertex, centred, as a share of D"""
+    report = json.loads(subprocess.check_output(["vg-diff", "-q", "-c", "--json", truth, result]))
+    return report["vertex_error"]["mean"]["D"]
+
+
+def keys():
+    poses = sequence("walk-man", "human")
+    if not os.path.exists("walk.1.net"):
+        train(poses, "--hold 0.2326 --hold-at end", "walk.1.net")
+    for name, options in (("the better way", ""), ("optimised", "--optimise"), ("merged", "--merge 5%")):
+        row(f"walk-man, keys 10, 17, 33 apart, {name}", gaps(poses, "walk.1.net", 66, 86, options))
+    poses = sequence("trex-walk", "hybrid", 5)
+    if not os.path.exists("trex.net"):
+        train(poses, "--model pca --given 1 --iterations 800 --hold-at end", "trex.net")
+    count = json.loads(subprocess.check_output(["vg-info", "--json", poses]))["frames"]
+    row("trex-walk, keys 10, 17, 33 apart, the better way", gaps(poses, "trex.net", count - 34, count, ""), (0.45, 0.35, 0.30))
+    row("trex-walk, keys 10, 17, 33 apart, merged", gaps(poses, "trex.net", count - 34, count, "--merge 5%"))
+
+
+def long_run():
+    poses = sequence("walk-man", "human")
+    if not os.path.exists("walk.1.net"):
+        train(poses, "--hold 0.2326 --hold-at end", "walk.1.net")
+    run(f"vg-encode -q --take 65 {poses} | vg-generate -q --frames 300 walk.1.net -o long.vgs")
+
+    def liveliness(stream, take):
+        """mean length of a vertex' step, centred, frame by frame"""
+        first, last = take
+        run(f"vg-encode -q --take {first}-{last - 1} {stream} -o one.vgs; vg-encode -q --take {first + 1}-{last} {stream} -o two.vgs")
+        return apart("one.vgs", "two.vgs")
+    truth = liveliness(poses, (0, 85))
+    for first, last in ((0, 50), (100, 150), (250, 299)):
+        row(f"walk-man, 300 frames from one, change at {first} to {last} over the truth's",
+            [liveliness("long.vgs", (first + 1, last)) / truth], (1.1,), (0.9,))
+
+
+def ablation():
+    poses = sequence("walk-man", "human")
+    for name, options in (("shared", ""), ("separate", "--direction separate"), ("forward", "--direction forward"),
+                          ("no distance between chains", "--loss bidirectional=0")):
+        errors, _, _ = train(poses, f"--model pca --iterations 500 --hold 0.2326 --hold-at end {options}")
+        row(f"walk-man, pca, {name}, 1 given", errors["network", 1])
+        row(f"walk-man, pca, {name}, 3 given", errors["network", 3])
+
+
+def speed():
+    poses = sequence("walk-man", "human")
+    for model, iterations, bound in (("auto", 200, None), ("pca", 40, 35), ("fc", 12, 250), ("conv", 6, 500)):
+        _, learned, _ = train(poses, f"-j 1 --model {model} --iterations {iterations} --hold 0.01")
+        row(f"{model}, ms an iteration, one thread", [1000 * learned / iterations / (2 if model == "auto" else 1)],
+            bound and (bound,))
+
+
+def main():
+    if not os.path.isdir(f"{KIT}/human"):
+        sys.exit("train.py: VG_DATA must name the folder of the kit")
+    print("| what | mean error, % of D, 5 10 15 frames ahead (or as it says) | bound |\n|---|---|---|", flush=True)
+    parts = {"walk": walk, "dance": dance, "trex": trex, "cow": cow, "keys": keys, "long": long_run,
+             "ablation": ablation, "speed": speed}
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        for name, part in parts.items():
+            if wanted(name):
+                part()
+    sys.exit(1 if missed else 0)
+
+
+main()
