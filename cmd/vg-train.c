@@ -382,10 +382,14 @@ int main(int argc, char **argv)
     if (opts.checkpoint) signal(SIGINT, interrupt), signal(SIGTERM, interrupt);
     if (!learn(t, h, &state)) {
         if (is_first) write_checkpoint(t, h);
+        vg_trainer_free(&t);
         cli_stop(VG_ESYS, "interrupted after %llu iterations: go on with --resume %s", (unsigned long long)state.iteration,
                  opts.checkpoint);
     }
-    if (!is_first) cli_finish(0);
+    if (!is_first) {
+        vg_trainer_free(&t);
+        cli_finish(0);
+    }
     report(t, &state);
     if (vg_trainer_network(t, true, &h->network, &e) < 0) cli_die(&e);
     vg_trainer_free(&t);

@@ -6,16 +6,8 @@
 #ifdef VG_MPI
 #include <limits.h>
 #include <mpi.h>
-#include <stdlib.h>
 
 static int count, own;
-
-static void end(int status, void *unused)
-{
-    (void)unused;
-    if (status) MPI_Abort(MPI_COMM_WORLD, status);
-    MPI_Finalize();
-}
 
 static void start(void)
 {
@@ -23,7 +15,6 @@ static void start(void)
     MPI_Init(NULL, NULL);
     MPI_Comm_size(MPI_COMM_WORLD, &count);
     MPI_Comm_rank(MPI_COMM_WORLD, &own);
-    on_exit(end, NULL);
 }
 
 size_t vgi_ranks(void)
@@ -65,6 +56,13 @@ bool vgi_ranks_any(bool yes)
     return all;
 }
 
+void vgi_ranks_end(void)
+{
+    int ended = 0;
+    MPI_Finalized(&ended);
+    if (count && !ended) MPI_Finalize();
+}
+
 #else
 
 size_t vgi_ranks(void)
@@ -90,6 +88,10 @@ void vgi_ranks_share_double(size_t from, double *x, size_t n)
 bool vgi_ranks_any(bool yes)
 {
     return yes;
+}
+
+void vgi_ranks_end(void)
+{
 }
 
 #endif

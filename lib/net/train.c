@@ -105,6 +105,7 @@ void vg_trainer_free(vg_trainer **out)
     free(t->best);
     free(t);
     *out = NULL;
+    vgi_ranks_end();
 }
 
 /* the pose without its root: each component's centroid at 0 */
