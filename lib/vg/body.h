@@ -25,8 +25,7 @@ int vg_mesh_copy(vg_mesh *to, const vg_mesh *from, vg_err *e) VG_MUST_CHECK;
 void vg_mesh_take(vg_mesh *to, vg_mesh *from); /* as vg_body_take */
 
 /* vg_mesh_check: VG_OK, or VG_EINPUT naming the first face that is too small, has an index out of range or names a
- * vertex twice, or when a count exceeds its limit. `subject` is what the message calls the mesh ("file 'a.obj'").
- * O(corners). */
+ * vertex twice, or a count that exceeds its limit. Messages call the mesh `subject` ("file 'a.obj'"). O(corners). */
 int vg_mesh_check(const vg_mesh *m, const char *subject, vg_err *e) VG_MUST_CHECK;
 
 /* vg_mesh_same: VG_OK if both have the same vertex count and the same faces in the same order; else VG_EINPUT with
@@ -44,7 +43,7 @@ double vg_diagonal(const double *points, size_t n);
 /* vg_centroid: mean of n points; zeros for n = 0. */
 void vg_centroid(const double *points, size_t n, double centroid[3]);
 
-/* Attributes of a mesh file beside positions and faces, kept so that they can be written again. */
+/* Attributes of a mesh file other than positions and faces, kept so that they can be written again. */
 typedef enum vg_label_kind {
     VG_LABEL_OBJECT = 1,    /* OBJ o */
     VG_LABEL_GROUP = 2,     /* OBJ g */
@@ -72,19 +71,19 @@ typedef struct vg_attributes {
 void vg_attributes_clear(vg_attributes *a);
 int vg_attributes_copy(vg_attributes *to, const vg_attributes *from, const vg_mesh *mesh, vg_err *e) VG_MUST_CHECK;
 
-/* What a file holds of a character beside its shape: materials, textures, normals, a skin, nodes. It is kept as a whole,
- * for a writer of the same kind of file. */
+/* The materials, textures, normals, skin and nodes of the file that the mesh came from, kept as a whole for a
+ * writer of the same format. */
 typedef struct vg_asset {
     size_t n;         /* vertices of the file; 0: there is no asset */
     uint64_t digest;  /* vg_mesh_digest of the mesh that it belongs to */
-    uint32_t *vertex; /* n: which vertex of the mesh each is */
+    uint32_t *vertex; /* n: the vertex of the mesh for each vertex of the file */
     size_t size;
     uint8_t *data;    /* a GLB of the character at rest */
 } vg_asset;
 
 void vg_asset_clear(vg_asset *a);
-/* vg_asset_text: what it holds, "2 materials, 1 texture, normals, 1 skin"; empty when there is none, or
- * nothing but nodes and vertices. */
+/* vg_asset_text: a summary, "2 materials, 1 texture, normals, 1 skin"; empty if there is none, or only nodes and
+ * vertices. */
 void vg_asset_text(const vg_asset *a, char *to, size_t room);
 /* vg_asset_vertices: call take for every vertex of the file, in its order: the name of the node that shows it (empty: it has
  * none), the number of the primitive in the node's mesh, its number in the primitive, and the vertex of the mesh that it is. */
@@ -126,11 +125,11 @@ typedef struct vg_joint_fitter vg_joint_fitter;
 /* s borrowed until free */
 int vg_joint_fitter_new(vg_joint_fitter **f, const vg_skeleton *s, vg_err *e) VG_MUST_CHECK;
 void vg_joint_fitter_free(vg_joint_fitter **f);
-/* vg_joint_fitter_fit: positions (njoints points) in; values out (may be NULL), with angles nearest to those of
+/* vg_joint_fitter_fit: positions (njoints points) in; values out (may be NULL), with angles closest to those of
  * the previous call. turns (may be NULL): the known rotations of the joints, as from vg_skeleton_pose; then they
- * are not estimated. Returns the largest distance between a joint and where the values put it, and that joint:
- * bones keep their lengths unless the joint has position channels, and a joint with fewer than three rotations
- * cannot reach every orientation. */
+ * are not estimated. Returns the largest distance between a joint and its position by these values, and that
+ * joint: bones keep their lengths unless the joint has position channels, and a joint with fewer than three
+ * rotations cannot reach every orientation. */
 double vg_joint_fitter_fit(vg_joint_fitter *f, const double *positions, const double *turns, double *values,
                            size_t *joint);
 /* vg_joint_fitter_turns: the rotations of all joints from the last fit. Borrowed until the next fit. */
@@ -188,12 +187,12 @@ typedef struct vg_body {
     vg_attributes attributes;
     vg_asset asset;
     vg_skeleton skeleton;
-    vg_patches patches;   /* a stream of vg-segment, and those that come of it */
-    vg_rig rig;           /* of a map of bones; also in streams of transforms of bones */
+    vg_patches patches;   /* of a stream of vg-segment and of streams made from it */
+    vg_rig rig;           /* of a map of bones, and of streams of transforms of bones */
 } vg_body;
 
 void vg_body_clear(vg_body *b);
-/* vg_body_copy: all of it. */
+/* vg_body_copy: a deep copy. */
 int vg_body_copy(vg_body *to, const vg_body *from, vg_err *e) VG_MUST_CHECK;
 /* vg_body_take: move *from into *to; the former content of *to is released, *from becomes empty. */
 void vg_body_take(vg_body *to, vg_body *from);

@@ -27,7 +27,7 @@ typedef enum vg_code {
     VG_EARG = -1,   /* the request is invalid, or does not fit the data */
     VG_EINPUT = -2, /* malformed input, or inputs that do not fit one another */
     VG_ETRUNC = -3, /* input that ends too early */
-    VG_ESYS = -4,   /* the system refused: open, read, write, ... */
+    VG_ESYS = -4,   /* a system call failed: open, read, write, ... */
     VG_ENOMEM = -5
 } vg_code;
 
@@ -44,7 +44,7 @@ int vg_fail(vg_err *e, int code, const char *format, ...) VG_PRINTF(3, 4);
 /* vg_exit_status: the exit status of a program for a code (see vg_code). */
 int vg_exit_status(int code);
 
-/* Bytes that grow. data is NULL while cap is 0. */
+/* A growing array of bytes. data is NULL while cap is 0. */
 typedef struct vg_bytes {
     unsigned char *data;
     size_t size, cap;
@@ -55,13 +55,13 @@ void vg_bytes_clear(vg_bytes *b);
 /* The instruction set of the numeric kernels: avx512, avx2 or sse2 on x86-64, neon on ARM of 64 bits; elsewhere plain.
  * vg_isa: the one in use, at first the widest that the machine has. */
 const char *vg_isa(void);
-/* vg_isa_at: those that the machine has, narrowest first; NULL from some i on. */
+/* vg_isa_at: instruction set i of this machine, narrowest first; NULL from some i on. */
 const char *vg_isa_at(size_t i);
-/* vg_isa_choose: use this one from now on; NULL: the widest. Not while another thread computes. Results differ between
- * sets in the last digits. VG_EARG when there is none of that name or the machine does not have it. */
+/* vg_isa_choose: use this one from now on; NULL: the widest. Do not call it while another thread computes. Results
+ * differ between sets in the last digits. VG_EARG if the name is unknown or the machine does not have it. */
 int vg_isa_choose(const char *name, vg_err *e) VG_MUST_CHECK;
 
-/* What a reader left out or put right: one line for a warning; empty: nothing. */
+/* What a reader dropped or repaired: one line for a warning; empty: nothing. */
 typedef struct vg_note {
     char text[320];
 } vg_note;

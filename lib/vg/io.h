@@ -20,7 +20,7 @@ int vg_reader_open_memory(vg_reader **r, const void *data, size_t n, const char 
 vg_head *vg_reader_head(vg_reader *r);
 /* The FAIL record: why the writer of the stream gave up. */
 typedef struct vg_failure {
-    char *program; /* NULL: there is no such record */
+    char *program; /* NULL: there is none */
     uint32_t status; /* exit status */
     char *message; /* one line */
 } vg_failure;
@@ -52,17 +52,17 @@ void vg_writer_close(vg_writer **w);
  * or sequence has its own. */
 typedef struct vg_source vg_source;
 
-/* What can be chosen about files that say more, or less, than a sequence of vertices. All zero: the usual. */
+/* Options for files that hold more, or less, than a sequence of vertices. All zero: the defaults. */
 typedef struct vg_reading {
-    const char *array_axes; /* NPZ: what the axes of the positions count, in their order: "fvx" (frames, vertices, x y z),
-                               "vxf", ...; NULL: found from their lengths, the faces and the reference */
+    const char *array_axes; /* NPZ: the meaning of the axes of positions: "fvx" (frames, vertices, x y z), "vxf",
+                               ...; NULL: detected from their lengths, the faces and the reference */
     bool objects;           /* OBJ: each object is a frame, all of one topology */
-    const char *animation;  /* glTF: the one of this name; NULL: all, one after another */
-    double fps;             /* glTF: a frame so often a second, from the first key to the last; 0: at each key */
+    const char *animation;  /* glTF: the animation of this name; NULL: all, one after another */
+    double fps;             /* glTF: frames per second, from the first key to the last; 0: a frame at each key */
     bool shapes;            /* glTF: morph targets, whatever animations there are */
-    bool unwelded;          /* glTF: vertices as the file has them, cut apart at seams */
-    const vg_body *like;    /* glTF: a body; a file with as many vertices as that one's file, or it itself, which make the
-                               same faces, is welded as it is. NULL: by itself */
+    bool unwelded;          /* glTF: keep the vertices of the file, split at seams */
+    const vg_body *like;    /* glTF: a body whose welding is used by files with as many vertices as its own file,
+                               if they make the same faces. NULL: each file is welded by itself */
 } vg_reading;
 
 int vg_source_open(vg_source **s, const char *const *operands, size_t n, vg_err *e) VG_MUST_CHECK;
@@ -79,8 +79,8 @@ typedef struct vg_source_options {
 /* vg_source_open_with: o may be NULL. */
 int vg_source_open_with(vg_source **s, const char *const *operands, size_t n, const vg_source_options *o,
                         vg_err *e) VG_MUST_CHECK;
-/* vg_source_warning: what was left out of the input that holds the mesh, in one line; NULL: nothing. Borrowed until
- * close. */
+/* vg_source_warning: one line on what was dropped from the input that holds the mesh; NULL: nothing. Borrowed
+ * until close. */
 const char *vg_source_warning(const vg_source *s);
 vg_head *vg_source_head(vg_source *s);
 int vg_source_next(vg_source *s, vg_frame *f, vg_err *e) VG_MUST_CHECK;
@@ -92,14 +92,14 @@ void vg_source_close(vg_source **s);
  * name. The reference is the operand's reference pose: the only pose of a mesh file, the pose without rotations of
  * a BVH, the reference of a stream, the first pose of an archive or directory. Frames are not read. */
 int vg_load(vg_head *h, const char *operand, const char *what, vg_err *e) VG_MUST_CHECK;
-/* vg_load_with: the same with options (may be NULL), and what was left out of the mesh into *note (may be NULL). */
+/* vg_load_with: the same with options (may be NULL); what was dropped from the mesh goes into *note (may be NULL). */
 int vg_load_with(vg_head *h, const char *operand, const char *what, const vg_source_options *o, vg_note *note,
                  vg_err *e) VG_MUST_CHECK;
 
 /* A queue of frames: in memory up to a limit, beyond it in an unnamed file in $TMPDIR (or /tmp). */
 typedef struct vg_spool vg_spool;
 typedef struct vg_spool_stats {
-    uint64_t most_frames; /* that have waited at once */
+    uint64_t most_frames; /* the largest number that waited */
     uint64_t file_bytes;  /* the largest size of the file; 0: there was none */
 } vg_spool_stats;
 
@@ -115,7 +115,7 @@ vg_spool_stats vg_spool_get_stats(const vg_spool *s);
  * $TMPDIR (or /tmp). Several threads may read at once. */
 typedef struct vg_poses vg_poses;
 typedef struct vg_poses_stats {
-    uint64_t memory_bytes, file_bytes; /* what the frames take in each */
+    uint64_t memory_bytes, file_bytes; /* bytes of the frames in each */
 } vg_poses_stats;
 
 /* vg_poses_new: h describes the frames; borrowed until free. limit: bytes of frames kept in memory. */
@@ -128,91 +128,92 @@ size_t vg_poses_count(const vg_poses *p);
  * frame in the file is read into `room`, which must be large enough. Borrowed until the next _add, and until
  * `room` is reused. */
 int vg_poses_values(const vg_poses *p, size_t i, double *room, const double **values, vg_err *e) VG_MUST_CHECK;
-/* vg_poses_frame: frame i with its name, time and everything that came with it. */
+/* vg_poses_frame: frame i with its name, time and all channels. */
 int vg_poses_frame(const vg_poses *p, size_t i, vg_frame *f, vg_err *e) VG_MUST_CHECK;
 vg_poses_stats vg_poses_get_stats(const vg_poses *p);
 
-/* Files that are replaced as a whole. Each is written beside its place under a temporary name; all are renamed together
- * when they are complete, or removed. A file that is replaced keeps its permissions. A link is followed: the file it
- * points to is replaced, not the link. Pipes and devices cannot be replaced and are written in place. */
+/* Files that are replaced as a whole. Each is written under a temporary name in the same directory; all are
+ * renamed together when they are complete, or removed. A replaced file keeps its permissions. A link is followed:
+ * the file it points to is replaced, not the link. Pipes and devices cannot be replaced and are written directly. */
 typedef struct vg_target {
-    char *final, *temporary; /* temporary NULL: written in place */
+    char *final, *temporary; /* temporary NULL: written directly */
     bool renamed;
 } vg_target;
 
-typedef struct vg_targets { /* consistent at any moment: vg_targets_remove may be called by a signal handler */
+typedef struct vg_targets { /* always consistent: vg_targets_remove may be called by a signal handler */
     vg_target *at;
     size_t n, cap;
-    uint64_t temporaries; /* temporary names tried so far */
+    uint64_t temporaries; /* number of temporary names tried */
 } vg_targets;
 
 /* vg_target_check: can `path` be written or replaced? A directory, a link that leads nowhere, or a directory without
  * permission is VG_ESYS. */
 int vg_target_check(const char *path, vg_err *e) VG_MUST_CHECK;
-/* vg_targets_open: open what will be `path`: a descriptor, or negative. */
+/* vg_targets_open: open a file that will become `path`. Returns its descriptor, or a negative status. */
 int vg_targets_open(vg_targets *t, const char *path, vg_err *e) VG_MUST_CHECK;
-/* vg_targets_name: change what target number i will be called, before vg_targets_rename. */
+/* vg_targets_name: change the final name of target i, before vg_targets_rename. */
 int vg_targets_name(vg_targets *t, size_t i, const char *path, vg_err *e) VG_MUST_CHECK;
 /* vg_targets_in_place: is the file that was opened last a pipe or a device? */
 bool vg_targets_in_place(const vg_targets *t);
-/* vg_target_close: close a descriptor; messages call the file `name`. Some file systems report a full disk only here. */
+/* vg_target_close: close a descriptor; messages call the file `name`. Some file systems report a full disk only
+ * here. */
 int vg_target_close(int fd, const char *name, vg_err *e) VG_MUST_CHECK;
 int vg_targets_rename(vg_targets *t, vg_err *e) VG_MUST_CHECK;
-/* vg_targets_remove: unlink the files, also those that have been renamed, since half a series would look like a whole
- * one. Calls nothing but unlink. */
+/* vg_targets_remove: unlink the files, also those already renamed, because half a series would look complete.
+ * Calls only unlink. */
 void vg_targets_remove(const vg_targets *t);
-void vg_targets_clear(vg_targets *t); /* forget the files, which stay */
+void vg_targets_clear(vg_targets *t); /* forget the files and keep them */
 
-/* The door out: one mesh file, a '%04d' pattern, a directory ("out/"), an archive, or one file that holds the whole
- * sequence, as the name says (checked at once); "NAME:ply" chooses what is inside an archive or directory, `format`
- * (may be NULL) overrides. Everything is written under temporary names and takes its final name in vg_sink_end. The
- * frames of a directory or archive are read back in the order in which they were put: where their names do not sort so,
- * or are no file names, the files have a number in front. */
+/* The output of a sequence: one mesh file, a '%04d' pattern, a directory ("out/"), an archive, or one file that
+ * holds the whole sequence. The name chooses, and is checked at once; "NAME:ply" chooses the format inside an
+ * archive or directory, and `format` (may be NULL) overrides both. Everything is written under temporary names and
+ * renamed by vg_sink_end. The frames of a directory or archive are read back in the order in which they were put:
+ * if their names do not sort in that order, or are no file names, the files get a number in front. */
 typedef struct vg_sink vg_sink;
 typedef struct vg_sink_options {
-    const char *format;  /* "obj", "pc2", ...; NULL: as the name says */
+    const char *format;  /* "obj", "pc2", ...; NULL: by the name */
     bool full_precision; /* numbers read back to the same binary64, not binary32 */
-    long first_number;   /* what %d starts at; 0 */
-    const char *mesh;    /* where the mesh of a file without faces goes; NULL: beside it, NAME.obj, which must not be
+    long first_number;   /* the number of the first file of a pattern */
+    const char *mesh;    /* path of the mesh of a file without faces; NULL: NAME.obj beside it, which must not be
                             another mesh */
     bool no_mesh;        /* nowhere */
-    bool drop_loose;     /* leave out the vertices that are in no face */
-    size_t most_targets; /* GLB, glTF: morph targets, at most. 0: as many as the tolerance asks for; up to 100 frames are
-                            targets as they are */
-    double morph_tolerance; /* GLB, glTF: how far a vertex may be from its place when frames are mixed, in D. 0: 0.001 */
+    bool drop_loose;     /* drop the vertices that are in no face */
+    size_t most_targets; /* GLB, glTF: the largest number of morph targets. 0: as many as the tolerance needs; up
+                            to 100 frames are targets themselves */
+    double morph_tolerance; /* GLB, glTF: the largest error of a vertex when frames are combined from fewer
+                               targets, in D. 0: 0.001 */
     bool no_normals;     /* GLB, glTF: leave out normals that the input does not have; viewers show such a mesh faceted */
-    bool shapes;         /* GLB, glTF: each frame is a morph target, and there is no animation */
-    const char *name;    /* GLB, glTF: of the animation; NULL: what its frames are called after */
-    bool replace;        /* where a directory or a pattern has mesh files of an earlier set, remove those that are not
-                            overwritten once all is written; without it, such files are an error before any work */
+    bool shapes;         /* GLB, glTF: each frame is a morph target, without an animation */
+    const char *name;    /* GLB, glTF: the name of the animation; NULL: from its frames */
+    bool replace;        /* if a directory or a pattern has mesh files of an earlier set, remove those that are not
+                            overwritten once all is written; otherwise such files are an error before any work */
     int threads;         /* this many mesh files are made at a time, and one more waits, in at most 256 MiB, but always
                             two; their errors are reported by a later call. 0 or 1: each at once */
 } vg_sink_options;
-/* vg_sink_check: is this a name and format that can be written? To be called before any work. */
+/* vg_sink_check: can this name and format be written? Call it before any work. */
 int vg_sink_check(const char *output, const vg_sink_options *o, vg_err *e) VG_MUST_CHECK;
 int vg_sink_open(vg_sink **s, const char *output, const vg_head *h, const vg_sink_options *o,
                  vg_err *e) VG_MUST_CHECK;
 /* a frame of vertices; arrays take any kind */
 int vg_sink_put(vg_sink *s, const vg_frame *f, vg_err *e) VG_MUST_CHECK;
 int vg_sink_end(vg_sink *s, vg_err *e) VG_MUST_CHECK;
-/* vg_sink_discard: remove what was written, unless vg_sink_end has given it its names. For the handler of a signal
- * that ends the program: it calls nothing but unlink and rmdir, and leaves the sink as it is. */
+/* vg_sink_discard: remove the files, unless vg_sink_end has renamed them. For the handler of a signal that ends
+ * the program: it calls only unlink and rmdir, and does not change the sink. */
 void vg_sink_discard(const vg_sink *s);
-/* vg_sink_warning: line number i of what the output does not keep, after vg_sink_end; NULL: no more.
- * Borrowed until close. */
+/* vg_sink_warning: line i of what the output cannot hold, after vg_sink_end; NULL: no more. Borrowed until close. */
 const char *vg_sink_warning(const vg_sink *s, size_t i);
-void vg_sink_close(vg_sink **s); /* without _end: nothing is left behind */
+void vg_sink_close(vg_sink **s); /* without _end, nothing is left behind */
 
 /* A mesh file in memory, read or written as a whole. */
 typedef struct vg_model {
     vg_mesh mesh;
     double *vertices;
     vg_attributes attributes;
-    vg_note note; /* what reading left out or put right */
+    vg_note note; /* what reading dropped or repaired */
 } vg_model;
 
 void vg_model_clear(vg_model *m);
-/* vg_model_read: format NULL: detected from the content, then from the name. name is what messages call it. */
+/* vg_model_read: format NULL: detected from content, then from the name. Messages call the file `name`. */
 int vg_model_read(vg_model *m, const void *data, size_t n, const char *format, const char *name,
                   vg_err *e) VG_MUST_CHECK;
 /* vg_model_write: append to out. attributes may be NULL. */

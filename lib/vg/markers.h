@@ -10,11 +10,11 @@
 extern "C" {
 #endif
 
-/* A pair of vertices that belong together. */
+/* A pair of corresponding vertices. */
 typedef struct vg_marker {
     uint32_t source, target;
     char *name;  /* NULL: it has none */
-    size_t line; /* of the file, from 1; 0: of no file */
+    size_t line; /* line in the file, from 1; 0: not from a file */
 } vg_marker;
 
 typedef struct vg_markers {
@@ -23,11 +23,11 @@ typedef struct vg_markers {
 } vg_markers;
 
 void vg_markers_clear(vg_markers *m);
-/* vg_markers_read: text with a pair per line, "SOURCE TARGET" or "NAME SOURCE TARGET"; '#' starts a comment. `base`
- * is the number of the first vertex, 0 or 1. name: what messages call the file. */
+/* vg_markers_read: text with a pair per line, "SOURCE TARGET" or "NAME SOURCE TARGET"; '#' starts a comment.
+ * `base` is the number of the first vertex, 0 or 1. Messages call the file `name`. */
 int vg_markers_read(vg_markers *m, const void *data, size_t n, int base, const char *name, vg_err *e) VG_MUST_CHECK;
 
-/* A vertex and its place on another mesh: the weighted mean of three vertices, possibly the same vertex three
+/* A vertex and its position on another mesh: the weighted mean of three vertices, possibly the same vertex three
  * times. */
 typedef struct vg_seed {
     uint32_t vertex, on[3];
@@ -45,7 +45,7 @@ typedef struct vg_joint_group {
     char *name;
     uint32_t parent;    /* less than its own number; UINT32_MAX: a root */
     size_t nvertices;   /* > 0 */
-    uint32_t *vertices; /* in the order of the file; none twice */
+    uint32_t *vertices; /* in the order of the file, without duplicates */
     size_t line;        /* of the file, from 1 */
 } vg_joint_group;
 
@@ -61,13 +61,13 @@ void vg_joint_groups_clear(vg_joint_groups *g);
 int vg_joint_groups_read(vg_joint_groups *g, const void *data, size_t n, int base, const char *name,
                          vg_err *e) VG_MUST_CHECK;
 
-/* vg_joint_groups_skeleton: the joints in a pose of nv vertices as a skeleton.
- * VG_EINPUT when a vertex is not there. */
+/* vg_joint_groups_skeleton: the joints in a pose of nv vertices as a skeleton. VG_EINPUT if a vertex does not
+ * exist. */
 int vg_joint_groups_skeleton(const vg_joint_groups *g, size_t nv, const double *reference, vg_skeleton *s,
                              vg_err *e) VG_MUST_CHECK;
-/* vg_joint_groups_pose: positions of the joints in a pose, and their turns beside the reference pose: with one joint
- * below, that of the frame of bone and roll (T 5.1); else what takes joints below and the group's vertices nearest to
- * where they are. */
+/* vg_joint_groups_pose: positions of the joints in a pose, and their rotations relative to the reference pose:
+ * with one child, that of the frame of bone and roll (T 5.1); else the rotation that fits the children and the
+ * group's vertices best. */
 void vg_joint_groups_pose(const vg_joint_groups *g, const double *reference, const double *pose, double *positions,
                           double *turns);
 

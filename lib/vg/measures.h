@@ -1,5 +1,5 @@
-/* vg/measures.h: how far two sequences are apart; what tells sequences apart.
- * A part of vg.h, which says what holds for all parts.
+/* vg/measures.h: distances between two sequences, and fingerprints of sequences. A part of vg.h, which says what
+ * holds for all parts.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_PART_MEASURES_H
 #define VG_PART_MEASURES_H
@@ -13,7 +13,7 @@ extern "C" {
 /* Measures of two sequences of one connectivity (MATH 8), accumulated pose by pose in bounded memory. */
 typedef struct vg_measures vg_measures;
 enum { VG_ERROR_BINS = 40 };
-/* in D: bin i holds what is at least edge i and less than the next, the last one all from 5 on */
+/* in D: bin i holds the errors from edge i up to the next; the last bin has no upper edge */
 extern const double vg_error_edges[VG_ERROR_BINS];
 typedef struct vg_measure_stats {
     size_t frames, vertices, faces;
@@ -32,26 +32,26 @@ typedef struct vg_measure_stats {
     uint64_t planarity_histogram[2][10];
 } vg_measure_stats;
 
-/* vg_measures_new: m borrowed until free. centred: compare poses after moving each one's centroid to 0. threads >= 1:
- * their number changes no digit. p95 is exact to 0.4 % (a histogram of 1/256 octaves). */
+/* vg_measures_new: m borrowed until free. centred: move the centroid of each pose to 0 before comparing. threads
+ * >= 1; the result does not depend on it. p95 is exact to 0.4 % (a histogram of 1/256 octaves). */
 int vg_measures_new(vg_measures **x, const vg_mesh *m, const double *reference, bool centred, int threads,
                     vg_err *e) VG_MUST_CHECK;
 void vg_measures_free(vg_measures **x);
 typedef struct vg_pose_error {
     double mean, max;
 } vg_pose_error;
-/* vg_measures_add: n poses of the truth and of the result (nv points each); how these are added one after another or
- * together changes no digit. errors: for each nv distances out. found (may be NULL): n. When it fails none counts. */
+/* vg_measures_add: n poses of the truth and of the result (nv points each); the grouping of poses into calls does
+ * not change the result. errors: nv distances out for each. found (may be NULL): n. On failure no pose counts. */
 int vg_measures_add(vg_measures *x, size_t n, const double *const *truth, const double *const *result,
                     double *const *errors, vg_pose_error *found, vg_err *e) VG_MUST_CHECK;
 void vg_measures_get_stats(const vg_measures *x, vg_measure_stats *r);
-/* vg_error_p95: the least of n numbers that 95 of 100 do not exceed; 0 for none. Changes their order. O(n). */
+/* vg_error_p95: the smallest of n numbers that 95 % do not exceed; 0 for none. Changes their order. O(n). */
 double vg_error_p95(double *numbers, size_t n);
 
-/* A fingerprint of what a sequence says, whoever made it: XXH64 over kind, faces, selection, links, anchors,
- * reference positions, and of every frame name, time, root, anchors, turns of joints and values, all numbers as
- * binary64 (-0 as 0). Provenance, attributes, scalars, pins, unknown records and the precision they are written in
- * do not count, nor does what is no sequence: skeletons, pairs of faces, patches, rigs and maps. */
+/* A fingerprint of a sequence: XXH64 over kind, faces, selection, links, anchors, reference positions, and of
+ * every frame name, time, root, anchors, turns of joints and values, all numbers as binary64 (-0 as 0). It does
+ * not cover provenance, attributes, scalars, pins, unknown records, the precision of the values, nor skeletons,
+ * correspondences, patches, rigs and maps. */
 typedef struct vg_digest vg_digest;
 int vg_digest_new(vg_digest **d, const vg_head *h, vg_err *e) VG_MUST_CHECK; /* h is borrowed until free */
 void vg_digest_free(vg_digest **d);

@@ -11,21 +11,19 @@
 extern "C" {
 #endif
 
-/* What is known about which point belongs to which. */
+/* The known correspondences. */
 typedef struct vg_register_input {
     const vg_mesh *source, *target;
     const double *source_points, *target_points;
     const vg_markers *markers;  /* may be NULL */
     const vg_seed *seeds;       /* may be NULL */
     size_t nseeds;
-    bool seeds_of_source;       /* seeds are vertices of the source on the target; else vertices of the target on the
-                                   source */
-    const vg_attributes *source_uv, *target_uv; /* both, or NULL: points of the same texture coordinates belong
-                                                   together */
-    bool aligned;               /* the two lie on one another as they are */
-    bool keep_all;              /* markers that contradict the others are not left out */
+    bool seeds_of_source;       /* seeds are vertices of the source on the target; else of the target on the source */
+    const vg_attributes *source_uv, *target_uv; /* both, or NULL: points with equal texture coordinates correspond */
+    bool aligned;               /* the two meshes are aligned */
+    bool keep_all;              /* keep markers that contradict the others */
     const uint32_t *components; /* the components of the source that take part, numbered as by vg_mesh_components; */
-    size_t ncomponents;         /* 0: those that markers or seeds lie on, and others that explain more of the target */
+    size_t ncomponents;         /* 0: those with markers or seeds, and others that explain more of the target */
     bool all_components;        /* all of them */
     int threads;
 } vg_register_input;
@@ -34,16 +32,16 @@ typedef struct vg_register_input {
 typedef struct vg_register_step {
     size_t round, rounds;
     size_t near;      /* source vertices that the target pulls */
-    double stiffness; /* weight of smoothness, that of the target being 1 */
+    double stiffness; /* weight of smoothness, relative to the target's */
     double mean, largest; /* distance of these vertices from the target, in D */
 } vg_register_step;
 
 typedef struct vg_register_result {
     vg_correspondence pairs;
-    double *fitted;          /* source nv points: the source on the target, in the target's place and size */
-    double scale, rotation[9], shift[3]; /* the similarity that brings the source onto the target as a whole */
-    bool flipped;            /* the faces of one mesh turn the other way round */
-    double *residual;        /* per marker: how far it is from where its neighbours expect it, in D of the target */
+    double *fitted;          /* source nv points: the source fitted to the target */
+    double scale, rotation[9], shift[3]; /* the similarity that aligns the source with the target */
+    bool flipped;            /* the two meshes have opposite orientations */
+    double *residual;        /* per marker: its distance from where its neighbours predict it, in D of the target */
     bool *left_out;          /* per marker */
     double typical_residual; /* the median */
     size_t uv_pairs;         /* points paired by texture coordinates */
@@ -53,9 +51,9 @@ typedef struct vg_register_result {
 
 void vg_register_result_clear(vg_register_result *r);
 
-/* vg_register: pair the faces of two meshes (MATH 9; after Sumner and Popovic 2004, section 5). step (may be NULL) is
- * told of each round of the fit. VG_EINPUT when the pairs given do not say how the meshes lie (three that are not in
- * line are needed). */
+/* vg_register: pair the faces of two meshes (MATH 9; after Sumner and Popovic 2004, section 5). step (may be NULL)
+ * is called after each round of the fit. VG_EINPUT if the given pairs do not determine the alignment (three that
+ * are not collinear are needed). */
 int vg_register(vg_register_result *r, const vg_register_input *in,
                 void (*step)(void *context, const vg_register_step *step), void *context, vg_err *e) VG_MUST_CHECK;
 
@@ -75,26 +73,27 @@ void vg_cross_transfer_free(vg_cross_transfer **c);
 void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const *poses, double *const *vectors);
 /* corners: source faces without a direction, over all poses */
 vg_deform_stats vg_cross_transfer_get_stats(const vg_cross_transfer *c);
-/* vg_cross_transfer_turned: by how many degrees the matched faces of the target are turned against the source faces that drive
- * them, in the two references: the angle of the mean cosine between normals. A mesh that is inside out is not turned. */
+/* vg_cross_transfer_turned: the rotation in degrees of the matched faces of the target relative to the source
+ * faces that drive them, in the two references: the angle of the mean cosine between normals. Opposite orientation
+ * does not count. */
 double vg_cross_transfer_turned(const vg_cross_transfer *c);
 
-/* Transfer that follows a few sculpted poses (MATH 11; after the example-based transfer of Cashman and Hormann 2012, 4.3,
- * as a correction of plain transfer): what plain transfer misses in the examples is added in the measure in which a pose
- * is like them. Examples are met exactly. */
+/* Transfer that is exact at a few sculpted poses (MATH 11; after the example-based transfer of Cashman and Hormann
+ * 2012, 4.3, as a correction of plain transfer): the error of plain transfer in the examples is subtracted in
+ * proportion to a pose's similarity to them. */
 typedef struct vg_examples {
     size_t n;
     const double *const *source;      /* n poses of the source: vertices */
     const double *const *target;      /* the same poses of the target: vertices */
-    const double *const *transferred; /* what plain transfer makes of them: vectors of the target's graph */
+    const double *const *transferred; /* plain transfer of these poses: vectors of the target's graph */
 } vg_examples;
 typedef struct vg_corrector vg_corrector;
-/* vg_corrector_new: graphs are borrowed until free; the rest is copied. VG_EINPUT when an example follows from the
- * others. */
+/* vg_corrector_new: graphs are borrowed until free; the rest is copied. VG_EINPUT if an example depends linearly
+ * on the others. */
 int vg_corrector_new(vg_corrector **c, const vg_graph *source, const double *source_reference, const vg_graph *target,
                      const double *target_reference, const vg_examples *examples, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_corrector_free(vg_corrector **c);
-/* vg_corrector_apply: vectors that plain transfer has made of a pose of the source, in place. */
+/* vg_corrector_apply: correct, in place, the vectors that plain transfer gave for a pose of the source. */
 void vg_corrector_apply(vg_corrector *c, const double *pose, double *vectors);
 
 /* The vertices that change places when a body is mirrored in the middle of its rest pose. */

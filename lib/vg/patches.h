@@ -1,5 +1,5 @@
-/* vg/patches.h: faces that turn alike, and the map from their motions to vertices.
- * A part of vg.h, which says what holds for all parts.
+/* vg/patches.h: patches of faces that rotate alike, and the map from their motions to vertices. A part of vg.h,
+ * which says what holds for all parts.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_PART_PATCHES_H
 #define VG_PART_PATCHES_H
@@ -10,10 +10,10 @@
 extern "C" {
 #endif
 
-/* Segmentation (T 6.2): K-means over faces whose feature is their rotation in every pose; nothing in it is spatial.
- * Features of more than about a hundred poses are folded into 1,024 numbers by random signs, which keeps distances
- * within about 5 %: memory does not grow with the number of poses. The same seed gives the same patches, whatever the
- * number of threads. */
+/* Segmentation (T 6.2): K-means over faces whose feature is their rotation in every pose; it does not use
+ * positions. Features of more than about a hundred poses are folded into 1,024 numbers by random signs, which
+ * keeps distances within about 5 %: memory does not grow with the number of poses. The same seed gives the same
+ * patches, whatever the number of threads. */
 typedef struct vg_segmenter vg_segmenter;
 typedef struct vg_segment_stats {
     size_t patches, rounds;
@@ -53,13 +53,13 @@ int vg_map_fitter_finish(vg_map_fitter *f, vg_patches *patches, vg_map *map, vg_
 int vg_map_retarget(const vg_head *h, const double *target, double morph, int threads, vg_map *map, vg_rig *rig,
                     double *reference, vg_err *e) VG_MUST_CHECK;
 
-/* A map at work. Transforms are 7 numbers each, as in VG_TRANSFORMS. */
+/* The evaluation of a map. Transforms are 7 numbers each, as in VG_TRANSFORMS. */
 typedef struct vg_player vg_player;
 /* vg_player_new: a map, and the body that it moves, with the map's patches or the weights of its rig; both are borrowed
  * until free. single: the product is formed in binary32. VG_EINPUT when they do not belong together. */
 int vg_player_new(vg_player **p, const vg_body *body, const vg_map *map, bool single, int threads, vg_err *e) VG_MUST_CHECK;
 void vg_player_free(vg_player **p);
-/* vg_player_measure: n poses (nv points each) to the best similarity of each patch. */
+/* vg_player_measure: n poses (nv points each) to the best-fitting similarity of each patch. */
 void vg_player_measure(vg_player *p, size_t n, const double *const *poses, double *const *transforms);
 /* vg_player_place: keep rotations, scales and root, and put the patches where their joints want them, in place. A map
  * of another body than its home does so whenever it is posed: there nothing is done. */
@@ -67,7 +67,7 @@ void vg_player_place(vg_player *p, double *transforms);
 /* vg_player_between: from a (t = 0) to b (t = 1) and beyond: rotations and scales go along geodesics, the root in a
  * line, joints hold. transforms: neither a nor b. */
 void vg_player_between(vg_player *p, const double *a, const double *b, double t, double *transforms);
-/* vg_player_pose: n times transforms to vertices, by one product. */
+/* vg_player_pose: vertices from n times transforms, by one matrix product. */
 void vg_player_pose(vg_player *p, size_t n, const double *const *transforms, double *const *vertices);
 
 #ifdef __cplusplus

@@ -10,41 +10,41 @@
 extern "C" {
 #endif
 
-/* vg_skeleton_pair: for each joint of a skeleton (njoints of `of`) the joint of another one that it belongs to,
- * UINT32_MAX: none. Joints of one name belong together, whatever their order and number; then joints whose names mean
- * the same part of a body by the conventions of Mixamo, CMU, Unreal, MakeHuman, Rigify and others. */
+/* vg_skeleton_pair: for each joint of a skeleton (njoints of `of`) the corresponding joint of another one,
+ * UINT32_MAX: none. Joints correspond by name, whatever their order and number; then by the body part that their
+ * names mean by the conventions of Mixamo, CMU, Unreal, MakeHuman, Rigify and others. */
 int vg_skeleton_pair(const vg_skeleton *of, const vg_skeleton *by, uint32_t *partner, vg_err *e) VG_MUST_CHECK;
 
-/* A rig driven by a skeleton of its own or another one. Joints of the rig that the other does not have follow those above
- * them. The rig keeps the lengths of its bones; translations are scaled by the ratio of the lengths of the legs, or of
+/* A rig driven by its own skeleton or another one. Joints of the rig that the other skeleton lacks follow their
+ * parents. The rig keeps the lengths of its bones; translations are scaled by the ratio of the leg lengths, or of
  * all bones that both have. */
 typedef struct vg_driver vg_driver;
 typedef enum vg_align {
-    VG_ALIGN_AUTO = 0, /* when a limb rests more than 20 degrees apart: the limbs that are more than 10 apart */
-    VG_ALIGN_NONE,     /* rotations count from both rest poses, as they are */
-    VG_ALIGN_ALL,      /* all joints that have others below them */
+    VG_ALIGN_AUTO = 0, /* if a limb differs by more than 20 degrees at rest: all limbs that differ by more than 10 */
+    VG_ALIGN_NONE,     /* no alignment: both rest poses as they are */
+    VG_ALIGN_ALL,      /* all joints that have children */
     VG_ALIGN_CHOSEN    /* those of `chosen` */
 } vg_align;
 typedef struct vg_driver_options {
     vg_align align;
     const bool *chosen;      /* of each joint of the rig; read when align is VG_ALIGN_CHOSEN */
-    const uint32_t *partner; /* of each joint of the rig; NULL: as vg_skeleton_pair says */
+    const uint32_t *partner; /* of each joint of the rig; NULL: by vg_skeleton_pair */
 } vg_driver_options;
 
-/* vg_driver_new: rig and skeleton are borrowed until free, the options are not. VG_EINPUT when no joints belong
- * together. */
+/* vg_driver_new: rig and skeleton are borrowed until free, the options are not. VG_EINPUT if no joints correspond. */
 int vg_driver_new(vg_driver **d, const vg_rig *r, const vg_skeleton *by, const vg_driver_options *o,
                   vg_err *e) VG_MUST_CHECK;
 void vg_driver_free(vg_driver **d);
-size_t vg_driver_missing(const vg_driver *d); /* bones of the rig that follow others */
-/* vg_driver_aligned: by how many degrees a joint of the rig was turned to point as the other's does; 0: it was not. */
+size_t vg_driver_missing(const vg_driver *d); /* bones of the rig that follow their parents */
+/* vg_driver_aligned: the angle in degrees by which a joint of the rig was aligned with the other skeleton; 0: it
+ * was not. */
 double vg_driver_aligned(const vg_driver *d, size_t joint);
 /* vg_driver_pose: positions and turns of the other skeleton's joints to nbones transforms. */
 void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, double *transforms);
 
 
-/* vg_feet_hold: n poses of a rig, one after the other in time, as nbones transforms each: feet that stand no longer
- * slide. VG_EINPUT when no bones have names of thigh, shin and foot. */
+/* vg_feet_hold: keep standing feet from sliding, in n consecutive poses of a rig, as nbones transforms each.
+ * VG_EINPUT if no bones have names of thigh, shin and foot. */
 int vg_feet_hold(const vg_rig *r, size_t n, double *const *transforms, vg_err *e) VG_MUST_CHECK;
 
 /* Enveloping (MATH 6; T 5): a skeleton drives the mesh, learned from example poses.
@@ -60,9 +60,9 @@ void vg_inverse_skin_free(vg_inverse_skin **b);
 /* vg_inverse_skin_fit: n poses (nv points each) to n times nbones transforms of 7 numbers. */
 void vg_inverse_skin_fit(vg_inverse_skin *b, size_t n, const double *const *poses, double *const *transforms);
 
-/* vg_rig_learn: give a rig weights when the motions of its bones are not known: weights and motions are fitted in turn
- * to n poses (nv points each) of the reference (nv points). miss: the mean distance that linear blend skinning leaves, in
- * mesh units. On failure the rig is as it was. */
+/* vg_rig_learn: fit weights to a rig when the motions of its bones are not known: weights and motions are fitted
+ * in turn to n poses (nv points each) of the reference (nv points). miss: the mean error of linear blend skinning,
+ * in mesh units. On failure the rig does not change. */
 int vg_rig_learn(vg_rig *rig, size_t nv, const double *reference, size_t n, const double *const *poses, int threads,
                  double *miss, vg_err *e) VG_MUST_CHECK;
 

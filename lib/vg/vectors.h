@@ -15,7 +15,7 @@ extern "C" {
  * links. Layout as in vg_mesh; corner c of the graph is a position in vert. `attached` is the number of vertices
  * in at least one face. */
 typedef struct vg_graph {
-    union { /* its faces are those of a mesh, and may be given where a mesh is wanted */
+    union { /* its faces as a mesh, for functions that take one */
         vg_mesh faces;
         struct {
             size_t nv, nf; /* nf includes the links, which are the last */
@@ -43,8 +43,8 @@ void vg_graph_root(const vg_graph *g, const double *vertices, double root[3]);
 /* vg_graph_anchors: the positions of n anchors out of nv points. */
 void vg_graph_anchors(const double *vertices, const uint32_t *anchors, size_t n, double *positions);
 
-/* vg_threads_with_room: how many threads, at most `most`, may call BLAS in the address space that is left; 0:
- * none. OpenBLAS never returns if its work memory is refused, so ask before. */
+/* vg_threads_with_room: the number of threads, at most `most`, that may call BLAS in the remaining address space;
+ * 0: none. Ask first, because OpenBLAS never returns if its work memory is refused. */
 int vg_threads_with_room(int most);
 
 /* vg_select_faces: a subset of the faces that still determines the mesh (T 3.2, Algorithm 1), completed so that
@@ -110,8 +110,8 @@ typedef struct vg_path_options {
     int threads;     /* >= 1 */
 } vg_path_options;
 typedef struct vg_path_stats {
-    size_t segments; /* between keys, looked at so far, again if come back to */
-    size_t beyond;   /* of these, those in which something turns by more than half a turn */
+    size_t segments; /* segments between keys prepared so far, counted again if prepared again */
+    size_t beyond;   /* of these, those with rotations by more than half a turn */
     vg_deform_stats degenerate;
 } vg_path_stats;
 
@@ -125,9 +125,10 @@ void vg_path_free(vg_path **p);
 int vg_path_at(vg_path *p, double t, double *vectors, double root[3], double *anchors, vg_err *e) VG_MUST_CHECK;
 vg_path_stats vg_path_get_stats(const vg_path *p);
 
-/* Shape deformation (T 4.1 to 4.6): what takes each source vector to the target's in the reference poses is
- * applied to the vectors of each pose at the source face's centroid; corners that share a vertex are averaged. No
- * linear system; fails for large deformations. Gives vertices; the mean of the attached ones is the source's. */
+/* Shape deformation (T 4.1 to 4.6): the deformations that take the source's reference vectors to those of the
+ * target are applied to the vectors of each pose at the source face's centroid; corners that share a vertex are
+ * averaged. No linear system; fails for large deformations. Gives vertices; the mean of the attached ones is the
+ * source's. */
 typedef struct vg_shaper vg_shaper;
 /* vg_shaper_new: g, the graph of both, is borrowed until free; references: nv points each, not kept. */
 int vg_shaper_new(vg_shaper **s, const vg_graph *g, const double *source_reference, const double *target_reference,
@@ -137,8 +138,8 @@ void vg_shaper_free(vg_shaper **s);
  * in the target's reference. */
 void vg_shaper_transfer(vg_shaper *s, size_t n, const double *const *poses, double *const *vertices);
 
-/* The position of the whole body in a transfer (MATH 5): root and anchors are displaced from their place in the
- * target's reference as the source's are from theirs, scaled by the ratio of the reference diagonals; or they
+/* The position of the whole body in a transfer (MATH 5): root and anchors move from their positions in the
+ * target's reference as the source's move from theirs, scaled by the ratio of the reference diagonals; or they
  * stay. */
 typedef struct vg_mover vg_mover;
 /* vg_mover_new: `to` is borrowed until free. anchors: of both meshes, if they have the same vertices. */
@@ -166,9 +167,8 @@ size_t vg_pinner_find(vg_pinner *p, const double *pose, const uint32_t **vertice
 /* Reconstruction: min over V of the squared difference between the vectors of V and the given ones (MATH 2; T
  * 3.7-3.9), by one sparse Cholesky factorisation, many poses per solve. */
 typedef struct vg_solver vg_solver;
-/* The metric of the misfit: every corner alike (T 3.7), or the reference surface's own metric, which does not
- * depend on how the surface is cut into faces (cotangent weights on triangles). Both meet consistent vectors
- * exactly. */
+/* The metric of the misfit: all corners alike (T 3.7), or the reference surface's metric, which does not depend on
+ * how the surface is cut into faces (cotangent weights on triangles). Both meet consistent vectors exactly. */
 typedef enum vg_weights { VG_WEIGHTS_UNIFORM = 0, VG_WEIGHTS_AREA = 1 } vg_weights;
 typedef struct vg_solver_stats {
     size_t unknowns, factor_entries; /* entries of the factor, explicit zeros included */
@@ -187,9 +187,9 @@ int vg_solver_new(vg_solver **s, const vg_graph *g, const uint32_t *anchors, siz
 int vg_solver_new_like(vg_solver **s, size_t n, vg_solver *like, const uint32_t *const *anchors, const size_t *nanchors,
                        vg_err *e) VG_MUST_CHECK;
 void vg_solver_free(vg_solver **s);
-/* vg_solver_load: the vectors of n poses (and their anchors, nanchors points each; NULL when there are none) become
- * first guesses x and right-hand sides, nv x 3 each: what the guesses miss. One call at a time on one solver; the
- * threads share the poses. */
+/* vg_solver_load: from the vectors of n poses (and their anchors, nanchors points each; NULL if there are none),
+ * compute first guesses x and right-hand sides for the difference to them, nv x 3 each. One call at a time per
+ * solver; the threads share the poses. */
 void vg_solver_load(vg_solver *s, size_t n, const double *const *vectors, const double *const *anchors,
                     double *const *x, double *const *rhs);
 /* vg_solver_solve: n guesses x, with their right-hand sides, become n poses in place. anchors[i]: nanchors points of
@@ -209,7 +209,7 @@ vg_solver_stats vg_solver_get_stats(const vg_solver *s);
  * consistent vectors are met exactly. By a quasi-Newton search from the plain solution, one solve a round. */
 typedef struct vg_robust vg_robust;
 typedef struct vg_robust_stats {
-    size_t most_rounds; /* of one pose so far */
+    size_t most_rounds; /* largest number for one pose so far */
     size_t unfinished;  /* poses so far whose energy fell by 0.1 % or more in the last round */
 } vg_robust_stats;
 

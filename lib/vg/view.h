@@ -10,19 +10,19 @@
 extern "C" {
 #endif
 
-/* What the colours of a picture show. A sequence without such numbers is coloured by its patches, or drawn as
- * clay. */
+/* What the colours of a picture show. A sequence without such numbers has the colours of its patches, or looks
+ * like clay. */
 typedef enum vg_tint {
     VG_TINT_SCALARS = 0, /* the scalars of the frames; none if the first frame of a sequence has none */
-    VG_TINT_ERRORS,      /* the distance of a vertex from its place in a truth, in D */
+    VG_TINT_ERRORS,      /* the distance of a vertex from its position in a truth, in D */
     VG_TINT_SCALES,      /* the length of a vertex's vectors relative to the reference pose: their geometric mean */
     VG_TINT_PLAIN        /* nothing, not even patches */
 } vg_tint;
 
-/* What a picture has to hold. */
+/* What must fit into a picture. */
 typedef enum vg_fit {
     VG_FIT_AUTO = 0,
-    VG_FIT_PATH,  /* all that is shown: the camera stays where it is */
+    VG_FIT_PATH,  /* everything that is shown: the camera does not move */
     VG_FIT_FIGURE /* the figure: its centroid stays in the middle */
 } vg_fit;
 
@@ -32,7 +32,7 @@ typedef struct vg_sheet vg_sheet;
 typedef struct vg_sheet_options {
     size_t frames;        /* how many are shown, at most: >= 1 */
     bool animated;        /* one after another, as an animated WebP: several sequences stand side by side */
-    double turn;          /* animated: by how many degrees the viewer goes around the figure from first to last */
+    double turn;          /* animated: degrees by which the viewer goes around the figure from first to last frame */
     size_t columns;       /* 0: automatic, about 16 : 9; with several sequences up to 8 */
     size_t width, height; /* of the picture of one frame, in pixels: 16 .. 4096 */
     double azimuth, elevation; /* of the viewer, in degrees: 0, 0 in front; 90, 0 at +x; 0, 90 above */
@@ -42,7 +42,7 @@ typedef struct vg_sheet_options {
     bool edges, ground;   /* draw edges of polygons; a grid where the reference stands, with the figure's shadow */
     bool silhouettes;     /* draw the contours of surfaces as lines */
     vg_tint tint;
-    bool centred;         /* of errors the shift of the centroid is no part */
+    bool centred;         /* move centroids to 0 before measuring errors */
     double scale;         /* end of the colour map: in D, in the unit of the scalars, or a factor > 1; 0: the 99th
                              percentile of the numbers shown, rounded up */
     int threads;
@@ -95,7 +95,7 @@ typedef struct vg_page_stats {
     size_t frames;      /* of the longest sequence */
     uint64_t bytes;
     double loss;        /* the largest distance between a vertex and its position in the page, in D of its sequence */
-    bool tinted;        /* the colours say something: */
+    bool tinted;        /* the colours have a meaning: */
     double scale;       /* end of the colours in D, in the unit of the scalars, or as a factor; in the same unit: */
     double mean, least, max;
 } vg_page_stats;
