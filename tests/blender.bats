@@ -224,7 +224,7 @@ END
     must vg-decode -q -o big.pc2 --mesh rest.obj big.vgs
     must vg-decode -q -o big.mdd --no-mesh big.vgs
     must vg-decode -q -o big-%d.obj big.vgs
-    must vg-decode -q -o big.glb big.vgs
+    must vg-decode -q --no-normals -o big.glb big.vgs # which would cut vertices apart at sharp edges
     must_hand to_blender big.pc2 --mesh rest.obj -o keys.blend
     must_hand to_blender --cache --mesh rest.obj big.mdd -o cache.blend
     must_hand to_blender big.glb -o glb.blend
@@ -263,8 +263,8 @@ END
 @test "what Blender exports of a mesh with seams reads as the motion of its own vertices" {
     local name
     for name in keys bones; do
-        pipe "vg-encode $BATS_FILE_TMPDIR/$name.glb | vg-info"
-        shows 'vertices    8' 'faces       12: 12 of 3' 'frames     5'
+        pipe "vg-encode $BATS_FILE_TMPDIR/$name.glb | vg-info | tr -s ' '"
+        shows 'vertices 8' 'faces 12: 12 of 3' 'frames 5'
         must vg-decode -q -o $name-%d.obj "$BATS_FILE_TMPDIR/$name.glb"
         py $name "$BATS_FILE_TMPDIR/$name.txt" <<'END'
 import sys
@@ -286,7 +286,8 @@ END
     must vg-encode --fps 25 pose1.obj pose2.obj pose3.obj -o walk.vgs
     awk '$1 == "v" {print $2, $3, $4}' pose1.obj pose2.obj pose3.obj >truth.txt
     local suffix
-    for suffix in pc2 mdd glb; do must vg-decode -q -o walk.$suffix walk.vgs; done
+    for suffix in pc2 mdd; do must vg-decode -q -o walk.$suffix walk.vgs; done
+    must vg-decode -q --no-normals -o walk.glb walk.vgs
     for suffix in obj ply stl; do must vg-decode -q -o pose.$suffix pose2.obj; done
     cat >play.py <<'END'
 import bpy, numpy, os
@@ -341,7 +342,7 @@ END
 import make_skin
 make_skin.make()
 END
-    must vg-decode -o bar.glb bar.vgs
+    must vg-decode --no-normals -o bar.glb bar.vgs
     cat >play.py <<'END'
 import bpy, json, numpy
 from look import body, places, show
