@@ -163,8 +163,8 @@ $(B)/libvg.a: $(LIB_OBJ) $(B)/codecs
 	@rm -f $@
 	$(AR) rcs $@ $(LIB_OBJ)
 
-$(B)/libvg.so.$(VERSION): $(LIB_OBJ) lib/libvg.map
-	$(CC) $(ALL_CFLAGS) -shared -Wl,-soname,libvg.so.$(SO) -Wl,--version-script=lib/libvg.map $(ALL_LDFLAGS) -o $@ $(LIB_OBJ) $(ALL_LIBS)
+$(B)/libvg.so.$(VERSION): $(LIB_OBJ) $(B)/codecs lib/libvg.map
+	$(CC) $(ALL_CFLAGS) -shared -Wl,-soname,libvg.so.$(SO) -Wl,--version-script=lib/libvg.map $(ALL_LDFLAGS) -o $@ $(LIB_OBJ) $(CODEC_LIBS) $(ALL_LIBS)
 	@ln -sf $(@F) $(B)/libvg.so.$(SO)
 
 # the pages of the library's functions: what the headers say
