@@ -118,41 +118,25 @@ void placing_frame(const placing *p, vg_frame *f)
 
 /* ---- the mirror ---- */
 
-/* The lines of a file: two vertices each, '#' before a remark. */
-static uint32_t (*read_pairs(const char *file, size_t *n))[2]
+static void read_pairs(vg_markers *pairs, const char *file)
 {
-    size_t size, line = 0;
-    char *data = cli_read_file(file, &size), *next = data;
-    uint32_t(*pairs)[2] = cli_allocate(size / 4 + 1, sizeof *pairs, "the pairs");
-    *n = 0;
-    while (next) {
-        char *text = strsep(&next, "\n"), *end;
-        double x[2];
-        line++;
-        text[strcspn(text, "#\r")] = 0;
-        for (end = text; *end; end++)
-            if (*end == ' ' || *end == '\t' || *end == ';') *end = ',';
-        while (*text == ',') text++;
-        while (end > text && end[-1] == ',') *--end = 0;
-        if (!*text) continue;
-        if (cli_parse_numbers(text, x, 2) != 2 || x[0] != (uint32_t)x[0] || x[1] != (uint32_t)x[1])
-            cli_stop(VG_EINPUT, "'%s', line %zu: two vertices are needed, not '%s'", file, line, text);
-        pairs[*n][0] = (uint32_t)x[0], pairs[(*n)++][1] = (uint32_t)x[1];
-    }
+    vg_err e;
+    size_t n;
+    char *data = cli_read_file(file, &n);
+    if (vg_markers_read(pairs, data, n, 0, file, &e) < 0) cli_die(&e);
     free(data);
-    return pairs;
 }
 
 static void find_mirror(placing *p, const vg_body *b)
 {
     vg_err e;
-    size_t n = 0;
+    vg_markers pairs = {0};
     bool file = p->pairs && strcmp(p->pairs, "auto");
-    uint32_t(*pairs)[2] = file ? read_pairs(p->pairs, &n) : NULL;
+    if (file) read_pairs(&pairs, p->pairs);
     double D = vg_diagonal(b->reference, b->mesh.nv);
-    if (vg_mirror_find(&p->mirrored, &b->mesh, b->reference, (size_t)p->mirror - 1, (const uint32_t(*)[2])pairs, n, &e) < 0)
+    if (vg_mirror_find(&p->mirrored, &b->mesh, b->reference, (size_t)p->mirror - 1, file ? &pairs : NULL, &e) < 0)
         cli_stop(e.code, "%s%s", e.message, file ? "" : "; name them with --pairs FILE");
-    free(pairs);
+    vg_markers_clear(&pairs);
     const vg_mirror *m = &p->mirrored;
     p->room = cli_allocate(3 * p->nv, sizeof *p->room, "a mirrored pose");
     cli_note("the mirror is at %c = %.6g; the two sides of the rest pose differ by %.3g %% of D on average, at most %.3g %% at vertex %u",

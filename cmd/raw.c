@@ -51,9 +51,9 @@ void raw_write(FILE *f, const vg_frame *from, size_t count, size_t width)
 
 raw_input raw_open(const char *file, size_t count, size_t width)
 {
-    raw_input in = {.shown = file, .count = count, .width = width};
+    raw_input in = {.shown = "standard input", .quote = "", .count = count, .width = width};
     bool standard = !strcmp(file, "-");
-    if (standard) in.shown = "standard input";
+    if (!standard) in.shown = file, in.quote = "'";
     in.fd = standard ? STDIN_FILENO : open(file, O_RDONLY | O_CLOEXEC);
     if (in.fd < 0) cli_stop(VG_ESYS, "cannot open '%s': %s", file, strerror(errno));
     in.room = cli_allocate(count, width, "a frame");
@@ -67,7 +67,7 @@ static size_t read_block(raw_input *in, size_t n)
     while (got < n) {
         ssize_t r = read(in->fd, in->room + got, n - got);
         if (r < 0 && errno == EINTR) continue;
-        if (r < 0) cli_stop(VG_ESYS, "cannot read %s: %s", in->shown, strerror(errno));
+        if (r < 0) cli_stop(VG_ESYS, "cannot read %s%s%s: %s", in->quote, in->shown, in->quote, strerror(errno));
         if (r == 0) break;
         got += (size_t)r;
     }
@@ -93,12 +93,12 @@ bool raw_next(raw_input *in, vg_frame *f)
     vg_err e;
     if (got == 0) return false;
     if (got < bytes)
-        cli_stop(VG_ETRUNC, "%s ends within frame %llu: %zu bytes of %zu, which are %zu numbers of %zu bytes", in->shown,
-                 (unsigned long long)in->frames, got, bytes, in->count, in->width);
+        cli_stop(VG_ETRUNC, "%s%s%s ends within frame %llu: %zu bytes of %zu, which are %zu numbers of %zu bytes", in->quote,
+                 in->shown, in->quote, (unsigned long long)in->frames, got, bytes, in->count, in->width);
     for (size_t i = 0; i < in->count; i++) {
         f->values[i] = load_number(in->room + i * in->width, in->width);
         if (!isfinite(f->values[i]))
-            cli_stop(VG_EINPUT, "%s: number %zu of frame %llu is not finite", in->shown, i, (unsigned long long)in->frames);
+            cli_stop(VG_EINPUT, "%s%s%s: number %zu of frame %llu is not finite", in->quote, in->shown, in->quote, i, (unsigned long long)in->frames);
     }
     snprintf(name, sizeof name, "%llu", (unsigned long long)in->frames++);
     if (vg_frame_rename(f, name, &e) < 0) cli_die(&e);

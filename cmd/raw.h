@@ -13,7 +13,7 @@ void raw_write(FILE *f, const vg_frame *from, size_t count, size_t width);
 
 typedef struct raw_input {
     int fd;
-    const char *shown; /* its name in messages */
+    const char *shown, *quote; /* its name in messages, and the quotes around it */
     size_t count, width; /* numbers of a frame, bytes of a number */
     unsigned char *room;
     uint64_t frames;   /* that have been read */

@@ -414,6 +414,12 @@ END
     pipe 'vg-encode --scale 2 --origin 1,0,0 left.obj | vg-diff -t 1e-15 - placed.vgs'
     capture vg-encode -v --mirror x --reference rest.obj right.obj -o mirrored.vgs
     says "x = 0.5" "differ by 0 %"
+    # a file may name a vertex of the middle, too
+    printf 'v -1 0 0\nv 1 0 2\nv 0 1 0\nf 1 2 3\n' >lopsided.obj
+    printf 'left 0 1\n2 2\n' >middle.txt
+    must vg-encode --mirror x --pairs middle.txt lopsided.obj -o lopsided.vgs
+    printf 'v -1 0 2\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >other.obj
+    must vg-diff -t 1e-15 other.obj lopsided.vgs
     # a real body is nearly its own mirror image
     must vg-encode --mirror x "$DATA/walk-man.rest.obj.xz" -o a.vgs
     must vg-diff --of mean -t 1e-4 "$DATA/walk-man.rest.obj.xz" a.vgs
@@ -427,9 +433,15 @@ END
     says "99"
     printf '0 1\n0 2\n' >wrong.txt
     must_fail 3 vg-encode --mirror x --pairs wrong.txt rest.obj -o out.vgs
-    echo 'left right' >wrong.txt
+    printf '0 1\n1 0\n' >wrong.txt
     must_fail 3 vg-encode --mirror x --pairs wrong.txt rest.obj -o out.vgs
-    says "line 1"
+    says "twice"
+    local pair
+    for pair in 'left right' '-1 2' '1e30 2' '4294967296 2'; do
+        echo "$pair" >wrong.txt
+        must_fail 3 vg-encode --mirror x --pairs wrong.txt rest.obj -o out.vgs
+        says "line 1"
+    done
     must_fail 2 vg-encode --mirror left rest.obj -o out.vgs
     must_fail 2 vg-encode --pairs auto rest.obj -o out.vgs
     [ ! -e out.vgs ]

@@ -108,10 +108,10 @@ typedef struct vg_mirror {
 
 void vg_mirror_clear(vg_mirror *m);
 /* vg_mirror_find: pair the vertices by position, and by normal where several are at one place. VG_EINPUT when a vertex has
- * no partner within 2 % of D. pairs (npairs of two vertices): what is known, then nothing is searched and all other vertices
- * stay in their places; NULL: search. O(n log n). */
-int vg_mirror_find(vg_mirror *m, const vg_mesh *mesh, const double *points, size_t axis, const uint32_t (*pairs)[2],
-                   size_t npairs, vg_err *e) VG_MUST_CHECK;
+ * no partner within 2 % of D. pairs: the known pairs; nothing is searched then, and all other vertices are their own partners.
+ * NULL: search. O(n log n). */
+int vg_mirror_find(vg_mirror *m, const vg_mesh *mesh, const double *points, size_t axis, const vg_markers *pairs,
+                   vg_err *e) VG_MUST_CHECK;
 /* vg_mirror_pose: nv points in, nv mirrored points out; out is not in. */
 void vg_mirror_pose(const vg_mirror *m, const double *in, double *out);
 

@@ -180,30 +180,33 @@ out:
     return r;
 }
 
-static int take_pairs(search *s, const uint32_t (*pairs)[2], size_t npairs, vg_err *e)
+static int pair_up(vg_mirror *m, uint32_t v, uint32_t other, vg_err *e)
+{
+    if (v >= m->nv) return vg_fail(e, VG_EINPUT, "there is no vertex %u: there are %zu, counted from 0", v, m->nv);
+    if (m->partner[v] == other && v != other) return vg_fail(e, VG_EINPUT, "vertices %u and %u are paired twice", v, other);
+    if (m->partner[v] != UINT32_MAX && m->partner[v] != other)
+        return vg_fail(e, VG_EINPUT, "vertex %u has two partners, %u and %u", v, m->partner[v], other);
+    m->partner[v] = other;
+    return VG_OK;
+}
+
+static int take_pairs(search *s, const vg_markers *pairs, vg_err *e)
 {
     vg_mirror *m = s->m;
     double *middle = vgi_array_raw(m->nv, sizeof *middle, e);
-    if (!middle) return VG_ENOMEM;
-    for (size_t i = 0; i < npairs; i++)
-        for (size_t side = 0; side < 2; side++) {
-            uint32_t v = pairs[i][side], other = pairs[i][1 - side];
-            if (v < m->nv && m->partner[v] == UINT32_MAX) {
-                m->partner[v] = other;
-                continue;
-            }
-            free(middle);
-            if (v < m->nv && m->partner[v] == other) return vg_fail(e, VG_EINPUT, "vertices %u and %u are paired twice", v, other);
-            return v >= m->nv ? vg_fail(e, VG_EINPUT, "there is no vertex %u: there are %zu, counted from 0", v, m->nv)
-                              : vg_fail(e, VG_EINPUT, "vertex %u has two partners, %u and %u", v, m->partner[v], other);
-        }
-    for (size_t v = 0; v < m->nv; v++) {
+    int r = middle ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; i < pairs->n && r == VG_OK; i++) {
+        uint32_t a = pairs->at[i].source, b = pairs->at[i].target;
+        r = pair_up(m, a, b, e);
+        if (r == VG_OK && a != b) r = pair_up(m, b, a, e);
+    }
+    for (size_t v = 0; v < m->nv && r == VG_OK; v++) {
         if (m->partner[v] == UINT32_MAX) m->partner[v] = (uint32_t)v;
         middle[v] = (s->points[3 * v + m->axis] + s->points[3 * (size_t)m->partner[v] + m->axis]) / 2;
     }
-    if (m->nv) m->plane = vgi_median(middle, m->nv);
+    if (m->nv && r == VG_OK) m->plane = vgi_median(middle, m->nv);
     free(middle);
-    return VG_OK;
+    return r;
 }
 
 /* ---- how good they are ---- */
@@ -249,15 +252,14 @@ static int count_broken(vg_mirror *m, const vg_mesh *mesh, vg_err *e)
     return VG_OK;
 }
 
-int vg_mirror_find(vg_mirror *m, const vg_mesh *mesh, const double *points, size_t axis, const uint32_t (*pairs)[2],
-                   size_t npairs, vg_err *e)
+int vg_mirror_find(vg_mirror *m, const vg_mesh *mesh, const double *points, size_t axis, const vg_markers *pairs, vg_err *e)
 {
     search s = {.m = m, .points = points, .diagonal = vg_diagonal(points, mesh->nv)};
     *m = (vg_mirror){.nv = mesh->nv, .axis = axis};
     m->partner = vgi_array_raw(mesh->nv, sizeof *m->partner, e);
     if (!m->partner) return VG_ENOMEM;
     memset(m->partner, 0xff, mesh->nv * sizeof *m->partner);
-    int r = pairs ? take_pairs(&s, pairs, npairs, e) : search_partners(&s, mesh, e);
+    int r = pairs ? take_pairs(&s, pairs, e) : search_partners(&s, mesh, e);
     if (r == VG_OK) measure(&s), r = count_broken(m, mesh, e);
     if (r < 0) vg_mirror_clear(m);
     return r;
