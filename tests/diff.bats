@@ -527,6 +527,10 @@ assert abs(there["max"] - 2 ** 0.5) < 1e-12 and there["at"] == [2, 2, 0]
 assert abs(there["mean"] - (1 + (2 ** 0.5 + math.asinh(1)) / 3) / 4) < 2e-5
 assert abs(there["rms"] - (4 / 3 / 4) ** 0.5) < 2e-5
 END
+    # vertices in no face are not on the surface
+    { cat coarse.obj && echo 'v 0 0 9'; } >stray.obj
+    must vg-diff --surface --json fine.obj stray.obj
+    python3 -c 'import json, sys; assert abs(json.loads(sys.argv[1])["hausdorff"] - 0.25) < 1e-12' "$output"
     # frame by frame; the vertices of the result as colours
     must vg-encode fine.obj fine.obj -o two.vgs
     must vg-encode --reference coarse.obj coarse.obj coarse.obj -o raised.vgs

@@ -30,16 +30,18 @@ typedef struct binding {
     carried *by; /* of each face of the target */
 } binding;
 
-static double centroid_of(const vg_mesh *m, const double *points, size_t f, double centre[3])
+static void centre_of(const vg_mesh *m, const double *points, size_t f, double centre[3])
 {
-    double size = 0;
-    size_t r = m->start[f + 1] - m->start[f];
-    const uint32_t *v = m->vert + m->start[f];
-    memset(centre, 0, 3 * sizeof *centre);
-    for (size_t i = 0; i < r; i++)
-        for (size_t k = 0; k < 3; k++) centre[k] += points[3 * (size_t)v[i] + k] / (double)r;
-    for (size_t i = 0; i < r; i++) size = fmax(size, vgi_square(points + 3 * (size_t)v[i], centre));
-    return sqrt(size);
+    vgi_face_centre(points, m->vert + m->start[f], m->start[f + 1] - m->start[f], centre);
+}
+
+/* From the centre to the farthest vertex. */
+static double radius_of(const vg_mesh *m, const double *points, size_t f, const double centre[3])
+{
+    double square = 0;
+    for (uint32_t i = m->start[f]; i < m->start[f + 1]; i++)
+        square = fmax(square, vgi_square(points + 3 * (size_t)m->vert[i], centre));
+    return sqrt(square);
 }
 
 static bool has(const carried *c, uint32_t face)
@@ -81,10 +83,12 @@ static void bind_face(const binding *b, size_t f)
 {
     carried *c = &b->by[f];
     vgi_hit hit;
-    double centre[3], reach = centroid_of(b->target, b->target_points, f, centre);
+    double centre[3], reach;
+    centre_of(b->target, b->target_points, f, centre);
     if (!vgi_surface_nearest(b->surface, centre, NULL, 0, INFINITY, &hit)) return;
     c->distance = sqrt(hit.square);
-    reach = fmax(reach, fmax(c->distance, vgi_surface_sizes(b->surface)[hit.face])) * REACH;
+    reach = fmax(radius_of(b->target, b->target_points, f, centre), vgi_surface_sizes(b->surface)[hit.face]);
+    reach = fmax(reach, c->distance) * REACH;
     c->n = 1, c->face[0] = hit.face;
     walk(b, c, hit.point, reach);
     weigh(b, c, hit.point, reach);
@@ -192,10 +196,10 @@ struct vg_rider {
 /* The centroid of a face, and its normal, `length` long; 0 for a face without an area. */
 static void face_frame(const vg_mesh *m, const double *points, uint32_t f, double length, double centre[3], double normal[3])
 {
-    centroid_of(m, points, f, centre);
+    centre_of(m, points, f, centre);
     vgi_face_area(points, m->vert + m->start[f], m->start[f + 1] - m->start[f], normal);
-    double size = vgi_length(normal);
-    for (int k = 0; k < 3; k++) normal[k] = size > 0 ? normal[k] / size * length : 0;
+    vgi_make_unit(normal);
+    vgi_scale(normal, length);
 }
 
 /* The sum of a b' over the corners, from the centroids, and over the normals: a in one pose, b at rest. */
@@ -206,7 +210,7 @@ static void sum_outer(const vg_mesh *m, const frame *x, const double *points, co
     for (uint32_t i = m->start[x->face]; i < m->start[x->face + 1]; i++) {
         const double *p = points + 3 * (size_t)m->vert[i], *q = rest + 3 * (size_t)m->vert[i];
         double u[3], v[3];
-        for (int k = 0; k < 3; k++) u[k] = p[k] - centre[k], v[k] = q[k] - x->centre[k];
+        vgi_subtract(p, centre, u), vgi_subtract(q, x->centre, v);
         vgi_add_outer(S, 1, u, v);
     }
     vgi_add_outer(S, 1, normal, x->normal);
@@ -244,7 +248,7 @@ static void foot_in_pose(const vg_rider *r, const vgi_hit *hit, double at[3])
     const double *a = r->pose + 3 * (size_t)m->vert[hit->corner], *b = r->pose + 3 * (size_t)m->vert[next];
     double centre[3];
     const double *c = r->pose + 3 * (size_t)m->vert[last];
-    if (end - begin > 3) centroid_of(m, r->pose, hit->face, centre), c = centre;
+    if (end - begin > 3) centre_of(m, r->pose, hit->face, centre), c = centre;
     for (int k = 0; k < 3; k++) at[k] = a[k] + hit->u[0] * (b[k] - a[k]) + hit->u[1] * (c[k] - a[k]);
 }
 
@@ -258,7 +262,7 @@ static void vertex_block(void *context, size_t block)
         for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++) {
             double above[3];
             vgi_multiply_vector(r->frames[r->by[i]].matrix, r->above + 3 * v, above);
-            for (int k = 0; k < 3; k++) at[k] += r->weight[i] * above[k];
+            vgi_add_scaled(at, r->weight[i], above);
         }
         memcpy(r->out + 3 * v, at, sizeof at);
     }
@@ -303,7 +307,7 @@ static void find_feet(void *context, size_t block)
     for (size_t v = BLOCK * block; v < BLOCK * (block + 1) && v < r->nv; v++) {
         vgi_hit *hit = &r->foot[v];
         if (!vgi_surface_nearest(x->surface, x->points + 3 * v, NULL, 0, INFINITY, hit)) continue;
-        for (size_t k = 0; k < 3; k++) r->above[3 * v + k] = x->points[3 * v + k] - hit->point[k];
+        vgi_subtract(x->points + 3 * v, hit->point, r->above + 3 * v);
     }
 }
 

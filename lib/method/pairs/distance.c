@@ -2,7 +2,7 @@
  * Leaves out the search for the nearest point (surface.c), and which vertex belongs to which (model/measures.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/surface.h"
-#include "numeric/vec3.h"
+#include "numeric/face.h"
 
 #include <stdlib.h>
 
@@ -71,12 +71,9 @@ static void clear_samples(samples *s)
 static void add_triangle(samples *s, size_t at, uint32_t a, uint32_t b, const double *third, const uint32_t *owner, size_t owners)
 {
     const double *x = s->point + 3 * (size_t)a, *y = s->point + 3 * (size_t)b;
-    double u[3], v[3], n[3];
-    for (int k = 0; k < 3; k++) {
-        u[k] = y[k] - x[k], v[k] = third[k] - x[k];
-        s->point[3 * at + (size_t)k] = (x[k] + y[k] + third[k]) / 3;
-    }
-    vgi_cross(u, v, n);
+    double n[3];
+    for (size_t k = 0; k < 3; k++) s->point[3 * at + k] = (x[k] + y[k] + third[k]) / 3;
+    vgi_triangle_normal(x, y, third, n);
     double area = vgi_length(n) / 2;
     s->weight[at] = OF_CENTROID * area;
     s->weight[a] += OF_CORNER * area, s->weight[b] += OF_CORNER * area;
@@ -92,11 +89,10 @@ static void place_samples(samples *s, const double *points)
     for (size_t f = 0; f < m->nf; f++) {
         const uint32_t *v = m->vert + m->start[f];
         size_t r = m->start[f + 1] - m->start[f];
-        double centre[3] = {0};
+        double centre[3];
         if (r == 3) add_triangle(s, at++, v[0], v[1], points + 3 * (size_t)v[2], v + 2, 1);
         if (r <= 3) continue;
-        for (size_t i = 0; i < r; i++)
-            for (size_t k = 0; k < 3; k++) centre[k] += points[3 * (size_t)v[i] + k] / (double)r;
+        vgi_face_centre(points, v, r, centre);
         for (size_t i = 0; i < r; i++) add_triangle(s, at++, v[i], v[i + 1 < r ? i + 1 : 0], centre, v, r);
     }
     double total = 0;
@@ -133,6 +129,7 @@ static void add_to(tally *t, const samples *s, double scale, size_t frame)
 {
     for (size_t i = 0; i < s->n; i++) {
         double d = s->distance[i], w = s->weight[i];
+        if (!(w > 0)) continue; /* a vertex in no face is not on the surface */
         t->weight += w, t->sum += w * d, t->squares += w * d * d;
         t->bins[bin_of(d, scale)] += w;
         if (d > t->found.max || t->weight == w) {
