@@ -90,6 +90,12 @@ twisting_skeleton() {
     for page in vg-stream.5 vg.7; do [ -s "$ROOT/man/$page" ]; done
 }
 
+@test "the README has a row for every program, and shows the commands that .ci/run calls" {
+    local file
+    for file in "$ROOT"/cmd/vg-*.c; do must grep -qF "| \`$(basename "$file" .c)\` |" "$ROOT/README.md"; done
+    while IFS= read -r line; do must grep -qF "    $line" "$ROOT/README.md"; done < <(grep '^make ' "$ROOT/.ci/run")
+}
+
 @test "pages are without warnings" {
     for page in "$ROOT"/man/*.[1-9]; do must mandoc -Tlint -W warning "$page"; done
 }

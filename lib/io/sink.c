@@ -639,7 +639,7 @@ static void clear_pieces(vg_sink *s)
         free(p->values);
         vg_bytes_clear(&p->path);
         vg_bytes_clear(&p->text);
-        if (p->fd >= 0) close(p->fd); /* nobody came to make it */
+        if (p->fd >= 0) close(p->fd); /* it was never made */
     }
     free(s->pieces);
     vg_bytes_clear(&s->rest);

@@ -389,7 +389,7 @@ typedef struct working {
     net_loss loss[64];
 } working;
 
-/* Of the groups at hand every so manieth is this process' own. */
+/* With n ranks, this process computes every nth group. */
 static void run_group(void *context, size_t number)
 {
     working *w = context;

@@ -21,7 +21,7 @@ typedef struct vgi_hit {
 
 /* vgi_surface_new: m borrowed until free; points (nv x 3, finite) copied in part. O(n log n). */
 int vgi_surface_new(vgi_surface **s, const vg_mesh *m, const double *points, vg_err *e) VG_MUST_CHECK;
-/* vgi_surface_of: only faces f with take[f] are ever found (NULL: all); what is asked of a face is answered for all. */
+/* vgi_surface_of: searches find only faces f with take[f] (NULL: all); normals, centroids and sizes are those of all faces. */
 int vgi_surface_of(vgi_surface **s, const vg_mesh *m, const double *points, const bool *take,
                    vg_err *e) VG_MUST_CHECK;
 void vgi_surface_free(vgi_surface **s);

@@ -378,7 +378,7 @@ struct deform_job {
     const double *const *in;
     double *const *out;
     deform_step *step;
-    atomic_size_t next; /* first face nobody has taken */
+    atomic_size_t next; /* the first face that no worker has taken */
 };
 
 static void run_worker(void *context, size_t worker)
