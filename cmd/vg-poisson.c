@@ -133,8 +133,8 @@ static void load_key(key *k, vg_head *h)
 
 typedef struct work {
     vg_head *h;
-    vg_guide *guide;      /* in time */
-    vg_pose_guide *poses; /* over the pose; NULL: in time */
+    vg_guide *guide;      /* in time, or */
+    vg_pose_guide *poses; /* over the pose: one of them is NULL */
     vg_spool *spool;
     vg_frame held;     /* a frame on its way out of the spool */
     vg_frame late;     /* the latest frame: it may turn out to be the last */
@@ -264,8 +264,9 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     for (size_t i = 0; i < opts.nkeys; i++) load_key(&opts.keys[i], h);
     w->ahead = opts.nkeys;
     bool over_pose = cli_given("over") ? opts.over == 1 : opts.nkeys > 2;
-    if (over_pose && vg_pose_guide_new(&w->poses, h->body.mesh.nv, opts.nkeys, &e) < 0) cli_die(&e);
-    if (vg_guide_new(&w->guide, h->body.mesh.nv, &e) < 0 || vg_spool_new(&w->spool, h, limit, &e) < 0) cli_die(&e);
+    int r = over_pose ? vg_pose_guide_new(&w->poses, h->body.mesh.nv, opts.nkeys, &e)
+                      : vg_guide_new(&w->guide, h->body.mesh.nv, &e);
+    if (r < 0 || vg_spool_new(&w->spool, h, limit, &e) < 0) cli_die(&e);
 }
 
 static void guide_last(void *context)

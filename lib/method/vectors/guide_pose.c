@@ -5,13 +5,14 @@
  * the frame moves by sum w_k e_k. Weights in time, those of poisson.c, take over in part where sum |w_k| would exceed 2, and
  * completely where the keys' poses do not span: two of them are alike. Leaves out guidance in time (poisson.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "core/core.h"
+#include "numeric/lapack.h"
 
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 
-static const double LEAST_PIVOT = 1e-8; /* relative to the largest of the keys' distances, squared */
+static const double LEAST_PIVOT = 1e-8; /* of the part of V_k - V_0 that the keys before it do not span, squared and
+                                           relative to all of it */
 static const double MOST_WEIGHT = 2;    /* largest sum of |w| */
 
 typedef struct pose_key {
@@ -25,9 +26,12 @@ struct vg_pose_guide {
     size_t n;               /* numbers of a pose */
     size_t nkeys, cap;
     pose_key *key;
-    double *factor;         /* cap x cap: Cholesky factor of the products of V_k - V_0, from key 1 on */
+    double *product;        /* cap x cap: of V_k - V_0, from key 1 on: the lower triangle */
+    double *factor;         /* (nkeys - 1)^2: Cholesky factor of the products */
+    bool factored;
+    bool spans;             /* the keys' poses are affinely independent */
     double *weight, *timed; /* cap */
-    bool spans;
+    double *from_pose;      /* n: V - V_0 of the frame at hand */
 };
 
 int vg_pose_guide_new(vg_pose_guide **out, size_t nv, size_t keys, vg_err *e)
@@ -36,12 +40,13 @@ int vg_pose_guide_new(vg_pose_guide **out, size_t nv, size_t keys, vg_err *e)
     if (!g) return VG_ENOMEM;
     bool fits = vgi_mul(nv, 3, &g->n);
     g->cap = keys;
-    g->spans = true;
     g->key = vgi_array(keys, sizeof *g->key, e);
+    g->product = vgi_array(keys, keys * sizeof *g->product, e);
     g->factor = vgi_array(keys, keys * sizeof *g->factor, e);
     g->weight = vgi_array(keys, sizeof *g->weight, e);
     g->timed = vgi_array(keys, sizeof *g->timed, e);
-    bool there = fits && g->key && g->factor && g->weight && g->timed;
+    g->from_pose = fits ? vgi_array(g->n, sizeof *g->from_pose, e) : NULL;
+    bool there = g->from_pose && g->key && g->product && g->factor && g->weight && g->timed;
     for (size_t k = 0; k < keys && there; k++) {
         pose_key *x = &g->key[k];
         x->given = vgi_array(g->n, sizeof *x->given, e);
@@ -64,9 +69,11 @@ void vg_pose_guide_free(vg_pose_guide **out)
         free(g->key[k].from_first);
     }
     free(g->key);
+    free(g->product);
     free(g->factor);
     free(g->weight);
     free(g->timed);
+    free(g->from_pose);
     free(g);
     *out = NULL;
 }
@@ -77,24 +84,23 @@ static double away(const vg_pose_guide *g, const double *pose, const double cent
     return pose[i] - centre[i % 3] - (g->nkeys ? g->key[0].from_first[i] : 0);
 }
 
-/* The last row of the factor: of the key that was added last. */
-static void extend_factor(vg_pose_guide *g)
+static double dot(const double *a, const double *b, size_t n)
 {
-    size_t m = g->nkeys - 1, row = m - 1; /* key 0 has none */
-    double largest = 0, *L = g->factor;
-    for (size_t j = 0; j <= row; j++) {
-        const double *a = g->key[m].from_first, *b = g->key[j + 1].from_first;
-        double sum = 0;
-        for (size_t i = 0; i < g->n; i++) sum += a[i] * b[i];
-        if (j == row) largest = sum;
-        for (size_t k = 0; k < j; k++) sum -= L[row * g->cap + k] * L[j * g->cap + k];
-        if (j < row) {
-            L[row * g->cap + j] = sum / L[j * g->cap + j];
-        } else {
-            g->spans = g->spans && sum > LEAST_PIVOT * largest;
-            L[row * g->cap + row] = sum > 0 ? sqrt(sum) : 1;
-        }
+    double sum = 0;
+    for (size_t i = 0; i < n; i++) sum += a[i] * b[i];
+    return sum;
+}
+
+static void factor_products(vg_pose_guide *g)
+{
+    size_t m = g->nkeys - 1; /* key 0 has no row */
+    for (size_t i = 0; i < m; i++) memcpy(g->factor + i * m, g->product + i * g->cap, (i + 1) * sizeof *g->factor);
+    g->spans = m == 0 || vgi_spd_factor(m, g->factor);
+    for (size_t i = 0; i < m && g->spans; i++) {
+        double pivot = g->factor[i * m + i];
+        g->spans = pivot * pivot > LEAST_PIVOT * g->product[i * g->cap + i];
     }
+    g->factored = true;
 }
 
 void vg_pose_guide_key(vg_pose_guide *g, uint64_t frame, const double *pose, const double *given)
@@ -108,7 +114,9 @@ void vg_pose_guide_key(vg_pose_guide *g, uint64_t frame, const double *pose, con
         x->offset[i] = given[i] - pose[i];
         x->given[i] = given[i];
     }
-    if (g->nkeys++ > 0) extend_factor(g);
+    for (size_t j = 1; j <= g->nkeys; j++)
+        g->product[(g->nkeys - 1) * g->cap + j - 1] = dot(x->from_first, g->key[j].from_first, g->n);
+    g->nkeys++, g->factored = false;
 }
 
 /* Linear between the two keys around a frame; all of the nearest key's before the first and after the last. */
@@ -129,21 +137,14 @@ static void weigh_in_time(vg_pose_guide *g, uint64_t frame)
 /* The coordinates of a pose in the keys, by least squares. */
 static void weigh_over_pose(vg_pose_guide *g, const double *pose)
 {
-    double centre[3], *w = g->weight, *L = g->factor, rest = 1;
+    double centre[3], *w = g->weight, *d = g->from_pose;
     size_t m = g->nkeys - 1;
     vg_centroid(pose, g->n / 3, centre);
-    for (size_t j = 0; j < m; j++) {
-        double sum = 0;
-        for (size_t i = 0; i < g->n; i++) sum += g->key[j + 1].from_first[i] * away(g, pose, centre, i);
-        for (size_t k = 0; k < j; k++) sum -= L[j * g->cap + k] * w[k + 1];
-        w[j + 1] = sum / L[j * g->cap + j];
-    }
-    for (size_t j = m; j-- > 0;) {
-        for (size_t k = j + 1; k < m; k++) w[j + 1] -= L[k * g->cap + j] * w[k + 1];
-        w[j + 1] /= L[j * g->cap + j];
-    }
-    for (size_t j = 0; j < m; j++) rest -= w[j + 1];
-    w[0] = rest;
+    for (size_t i = 0; i < g->n; i++) d[i] = away(g, pose, centre, i);
+    for (size_t j = 1; j <= m; j++) w[j] = dot(g->key[j].from_first, d, g->n);
+    if (m) vgi_spd_solve(m, g->factor, 1, w + 1);
+    w[0] = 1;
+    for (size_t j = 1; j <= m; j++) w[0] -= w[j];
 }
 
 static double size_at(const vg_pose_guide *g, double share)
@@ -171,6 +172,7 @@ static double share_of_pose(const vg_pose_guide *g)
 void vg_pose_guide_apply(vg_pose_guide *g, uint64_t frame, double *pose)
 {
     if (!g->nkeys) return;
+    if (!g->factored) factor_products(g);
     weigh_in_time(g, frame);
     for (size_t k = 0; k < g->nkeys; k++)
         if (g->key[k].frame == frame) {

@@ -171,13 +171,15 @@ int vg_solver_new_like(vg_solver **s, size_t n, vg_solver *like, const uint32_t 
 {
     for (size_t i = 0; i < n; i++) s[i] = NULL;
     if (like->like) return vg_fail(e, VG_EARG, "a solver that is like another one cannot be taken as a pattern");
+    int r = vgi_solver_share(like, e);
+    if (r < 0) return r;
     vg_err *errors = vgi_array(n, sizeof *errors, e);
-    if (!errors || vgi_solver_share(like, e) < 0) return free(errors), VG_ENOMEM;
+    if (!errors) return VG_ENOMEM;
     make_job j = {s, like, anchors, nanchors, errors};
     vgi_parallel(like->threads, n, make_one, &j);
     size_t failed = 0;
     while (failed < n && s[failed]) failed++;
-    int r = failed < n ? errors[failed].code : VG_OK;
+    r = failed < n ? errors[failed].code : VG_OK;
     if (r < 0) {
         if (e) *e = errors[failed];
         for (size_t i = 0; i < n; i++) vg_solver_free(&s[i]);
