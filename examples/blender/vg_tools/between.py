@@ -73,13 +73,7 @@ class Between(Work):
     def finish(self, context, result):
         scene, vg, (names, shapes) = context.scene, context.scene.vg, result
         made = bodies.new_object(scene.objects[self.thing], f"{self.thing} {'morphed' if self.morph else 'between'}", None if self.morph else vg.source)
-        try:
-            bodies.give(made, vg.result, names, shapes, [scene.frame_start + i for i in range(len(shapes))], scene, vg.folder)
-        except BaseException:
-            bodies.remove(made)
-            raise
-        bodies.show_only(context, made)
-        return f"'{made.name}': {len(shapes)} poses"
+        return bodies.play_shapes(context, made, names, shapes, [scene.frame_start + i for i in range(len(shapes))])
 
 
 class VG_OT_interpolate(Between, bpy.types.Operator):
@@ -227,18 +221,12 @@ class VG_OT_play(Work, bpy.types.Operator):
         return body.names, [f.values for f in frames]
 
     def finish(self, context, result):
-        scene, vg, (names, shapes) = context.scene, context.scene.vg, result
+        scene, (names, shapes) = context.scene, result
         thing = scene.objects[self.target]
         if len(thing.data.vertices) != len(shapes[0]):
             raise Trouble(f"the map has {len(shapes[0])} vertices, '{thing.name}' {len(thing.data.vertices)}: choose its body")
         made = bodies.new_object(thing, f"{thing.name} played")
-        try:
-            bodies.give(made, vg.result, names, shapes, self.moments, scene, vg.folder)
-        except BaseException:
-            bodies.remove(made)
-            raise
-        bodies.show_only(context, made)
-        return f"'{made.name}': {len(shapes)} poses"
+        return bodies.play_shapes(context, made, names, shapes, self.moments)
 
 
 # ---- the slider ----

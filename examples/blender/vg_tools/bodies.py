@@ -355,6 +355,16 @@ def remove(thing):
         bpy.data.meshes.remove(data)
 
 
+def play_shapes(context, made, names, shapes, moments):
+    """Give the poses to an object that new_object made, select it, and say so; on failure the object is removed."""
+    vg = context.scene.vg
+    try:
+        give(made, vg.result, names, shapes, moments, context.scene, vg.folder)
+    except BaseException:
+        remove(made)
+        raise
+    show_only(context, made)
+    return f"'{made.name}': {len(shapes)} poses"
 
 
 def show_only(context, thing):

@@ -321,15 +321,9 @@ class VG_OT_bake(Work, bpy.types.Operator):
         return motions.names, [f.values for f in frames]
 
     def finish(self, context, result):
-        scene, vg, (names, shapes) = context.scene, context.scene.vg, result
+        scene, (names, shapes) = context.scene, result
         made = bodies.new_object(scene.objects[self.mesh], f"{self.mesh} baked")
-        try:
-            bodies.give(made, vg.result, names, shapes, self.moments, scene, vg.folder)
-        except BaseException:
-            bodies.remove(made)
-            raise
-        bodies.show_only(context, made)
-        return f"'{made.name}': {len(shapes)} poses"
+        return bodies.play_shapes(context, made, names, shapes, self.moments)
 
 
 class Motions:

@@ -21,15 +21,10 @@ def give_result(context, thing, title, names, shapes, first):
     if len(thing.data.vertices) != len(shapes[0]):
         raise Trouble(f"the result has {len(shapes[0])} vertices, '{thing.name}' {len(thing.data.vertices)}: choose its body")
     made = bodies.new_object(thing, f"{thing.name} {title}", vg.source)
-    try:
-        bodies.give(made, vg.result, names, shapes, [first + i for i in range(len(shapes))], scene, vg.folder)
-    except BaseException:
-        bodies.remove(made)
-        raise
+    said = bodies.play_shapes(context, made, names, shapes, [first + i for i in range(len(shapes))])
     if vg.cycle:
         repeat(made)
-    bodies.show_only(context, made)
-    return f"'{made.name}': {len(shapes)} poses"
+    return said
 
 
 def repeat(thing):

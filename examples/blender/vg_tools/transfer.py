@@ -197,13 +197,7 @@ class VG_OT_transfer(Work, bpy.types.Operator):
             raise Trouble(f"'{self.target}' has been removed")
         what = vg.source.object.name if vg.source.object else vg.source.collection.name
         made = bodies.new_object(target, f"{target.name} as {what}")
-        try:
-            bodies.give(made, vg.result, names, shapes, self.moments, scene, vg.folder)
-        except BaseException:
-            bodies.remove(made)
-            raise
-        bodies.show_only(context, made)
-        return f"'{made.name}': {len(shapes)} poses"
+        return bodies.play_shapes(context, made, names, shapes, self.moments)
 
 
 class VG_OT_pick(Work, bpy.types.Operator):
