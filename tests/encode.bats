@@ -365,8 +365,8 @@ encode.stdout.read()
 assert encode.wait() == 0
 END
     # what is wrong
-    head -c 300 numbers >cut
-    must_fail 3 vg-encode --raw f64 --mesh pose1.obj cut -o out.vgs
+    head -c 300 numbers >short
+    must_fail 3 vg-encode --raw f64 --mesh pose1.obj short -o out.vgs
     says "frame 1" "12 bytes of 288"
     printf '\0\0\xc0\x7f%.0s' {1..36} >nan
     must_fail 3 vg-encode --raw f32 --mesh pose1.obj nan -o out.vgs

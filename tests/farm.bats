@@ -83,6 +83,23 @@ all_whole() {
     shows "3 whole" "3 missing"
 }
 
+@test "plan: names keep what tells files apart, and two files of one name are refused" {
+    mkdir -p other
+    touch rest.obj markers.txt walk.v1.vgs walk.v2.vgs run.tar.xz other/run.zip "a b.obj" other/c.obj c.obj
+    must "$FARM/plan" rest.obj markers.txt out walk.v1.vgs walk.v2.vgs run.tar.xz -- "a b.obj" c.obj
+    printf '%s\n' "$output" >job
+    capture "$FARM/report" job
+    [ "$status" = 1 ]
+    local name
+    for name in 'a b-walk.v1' 'c-walk.v1' 'a b-walk.v2' 'c-walk.v2' 'a b-run' 'c-run'; do shows "$name: not begun"; done
+    capture "$FARM/plan" rest.obj markers.txt out run.tar.xz other/run.zip -- c.obj
+    [ "$status" = 2 ] && [ -z "$output" ]
+    says "two files are called 'run'"
+    capture "$FARM/plan" rest.obj markers.txt out run.tar.xz -- c.obj other/c.obj
+    [ "$status" = 2 ] && [ -z "$output" ]
+    says "two files are called 'c'"
+}
+
 @test "GNU parallel: a log of jobs, retries, a task that is killed, and resuming" {
     command -v parallel >/dev/null || skip "GNU parallel is not installed"
     job

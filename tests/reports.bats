@@ -399,7 +399,7 @@ for i, view in enumerate(g['bufferViews']):
 EOF
     local file
     for file in broken-*.glb; do
-        capture vg-encode -q $file -o out.vgs
+        capture vg-encode -q "$file" -o out.vgs
         [ "$status" = 0 ] || [ "$status" = 3 ] || fail "$file: status $status" "$stderr"
     done
 }
