@@ -288,10 +288,28 @@ typedef struct walking {
     size_t n, npairs;
     double *turns, *cost, *l, *exact; /* l: of two frames */
     uint32_t *pair;
+    double *sum;                  /* for add_logs */
+    const double *home;           /* for keep_logs, and so are those: */
+    double *values;
+    size_t *jumps;
 } walking;
 
-/* All frames, one after another; what is done with the logarithms of each: summed (sum), or put (values). */
-static int walk(walking *w, double *sum, const double *home, double *values, size_t *jumps, vg_err *e)
+static void add_logs(walking *w, size_t f, const double *now)
+{
+    (void)f;
+    for (size_t i = 0; i < 3 * w->s->nodes; i++) w->sum[i] += now[i];
+}
+
+static void keep_logs(walking *w, size_t f, const double *now)
+{
+    const vgi_space *s = w->s;
+    memcpy(w->exact, now, 3 * s->nodes * sizeof *now);
+    put_logs(s, w->turns + 4 * f * s->nodes, w->home, w->exact, w->values + f * s->d);
+    *w->jumps += count_jumps(w->npairs, w->pair, w->exact);
+}
+
+/* Give the logarithms of each frame to `take`, one frame after another. */
+static int walk(walking *w, void (*take)(walking *w, size_t f, const double *now), vg_err *e)
 {
     const vgi_space *s = w->s;
     vgi_branches branches;
@@ -300,11 +318,7 @@ static int walk(walking *w, double *sum, const double *home, double *values, siz
     for (size_t f = 0; r == VG_OK && f < w->n; f++) {
         double *now = w->l + 3 * s->nodes * (f & 1), *before = w->l + 3 * s->nodes * (1 - (f & 1));
         vgi_branches_walk(&branches, w->turns + 4 * f * s->nodes, f ? before : NULL, now);
-        for (size_t i = 0; sum && i < 3 * s->nodes; i++) sum[i] += now[i];
-        if (sum) continue;
-        memcpy(w->exact, now, 3 * s->nodes * sizeof *now);
-        put_logs(s, w->turns + 4 * f * s->nodes, home, w->exact, values + f * s->d);
-        *jumps += count_jumps(w->npairs, w->pair, w->exact);
+        take(w, f, now);
     }
     vgi_branches_clear(&branches);
     return r;
@@ -314,18 +328,18 @@ static int put_turns(const vgi_space *s, size_t n, double *turns, double *values
 {
     walking w = {.s = s, .n = n, .turns = turns, .pair = vgi_array(s->pieces.npairs, 2 * sizeof(uint32_t), e),
                  .cost = vgi_array(s->pieces.npairs, sizeof(double), e), .l = vgi_array(2 * s->nodes, 3 * sizeof(double), e),
-                 .exact = vgi_array(s->nodes, 3 * sizeof(double), e)};
-    double *sum = vgi_array(s->nodes, 3 * sizeof *sum, e);
-    int r = w.pair && w.cost && w.l && w.exact && sum ? walk(&w, sum, NULL, NULL, NULL, e) : VG_ENOMEM;
+                 .exact = vgi_array(s->nodes, 3 * sizeof(double), e), .sum = vgi_array(s->nodes, 3 * sizeof(double), e),
+                 .home = home, .values = values, .jumps = jumps};
+    int r = w.pair && w.cost && w.l && w.exact && w.sum ? walk(&w, add_logs, e) : VG_ENOMEM;
     if (r == VG_OK) {
-        move_homes(s, n, sum, turns, home);
-        r = walk(&w, NULL, home, values, jumps, e);
+        move_homes(s, n, w.sum, turns, home);
+        r = walk(&w, keep_logs, e);
     }
     free(w.pair);
     free(w.cost);
     free(w.l);
     free(w.exact);
-    free(sum);
+    free(w.sum);
     return r;
 }
 
