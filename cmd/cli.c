@@ -188,6 +188,21 @@ void *cli_allocate(size_t n, size_t size, const char *what)
     return p;
 }
 
+FILE *cli_line_open(cli_line *line, const char *what)
+{
+    *line = (cli_line){.what = what};
+    if (!(line->f = open_memstream(&line->text, &line->size))) cli_stop(VG_ENOMEM, "not enough memory for %s", what);
+    return line->f;
+}
+
+char *cli_line_close(cli_line *line)
+{
+    bool lost = ferror(line->f) != 0;
+    if (fclose(line->f) || lost || !line->text) /* glibc may close well and have no text */
+        cli_stop(VG_ENOMEM, "not enough memory for %s", line->what);
+    return line->text;
+}
+
 void *cli_resize(void *p, size_t n, size_t size, const char *what)
 {
     p = reallocarray(p, n ? n : 1, size);

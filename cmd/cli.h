@@ -98,6 +98,16 @@ void cli_warn(const char *format, ...) VG_PRINTF(1, 2); /* unless --quiet */
 void cli_note(const char *format, ...) VG_PRINTF(1, 2); /* only with --verbose */
 /* a result that the user asked for, on standard error; unless --quiet */
 void cli_say(const char *format, ...) VG_PRINTF(1, 2);
+/* cli_line_open: a stream that collects a text; cli_line_close returns it, and the caller frees it. Both stop like
+ * cli_allocate. */
+typedef struct cli_line {
+    FILE *f;
+    char *text;
+    size_t size;
+    const char *what;
+} cli_line;
+FILE *cli_line_open(cli_line *line, const char *what);
+char *cli_line_close(cli_line *line);
 /* cli_strip_controls: replace control characters by '?', because names from files may contain terminal escapes. */
 void cli_strip_controls(char *s);
 /* cli_progress: show "label n" on standard error, if it is a terminal, a second has passed, and no other program

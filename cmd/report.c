@@ -205,9 +205,8 @@ void report_row(report *r, const report_value *cells)
 /* A value as text; caller frees it. */
 static char *shown(const report_value *v)
 {
-    char *text = NULL;
-    size_t size;
-    FILE *f = checked(open_memstream(&text, &size));
+    cli_line line;
+    FILE *f = cli_line_open(&line, "the report");
     switch (v->type) {
     case REPORT_NOTHING: break;
     case REPORT_TEXT: fputs(v->is.text, f); break;
@@ -224,9 +223,7 @@ static char *shown(const report_value *v)
         for (size_t i = 0; i < v->n; i++) fprintf(f, "%s%.6g", i ? " " : "", v->is.numbers[i]);
         break;
     }
-    bool lost = ferror(f);
-    if (fclose(f) || lost) checked(NULL);
-    checked(text);
+    char *text = cli_line_close(&line);
     cli_strip_controls(text);
     return text;
 }

@@ -4,6 +4,7 @@
 #include "cli.h"
 
 #include <ctype.h>
+#include <inttypes.h>
 #include <stdlib.h>
 
 static const uint32_t NONE = UINT32_MAX;
@@ -142,4 +143,27 @@ void write_weights(FILE *f, const vg_rig *g, size_t nv)
         }
         fputc('\n', f);
     }
+}
+
+void report_skeletons(report *r, const vg_head *h, uint64_t turned, uint64_t frames)
+{
+    const vg_rig *g = &h->body.rig;
+    char line[80];
+    if (h->body.skeleton.njoints) {
+        report_gap(r);
+        report_group(r, "skeleton");
+        report_skeleton(r, "skeleton", &h->body.skeleton);
+        report_put(r, "turned_frames", NULL, report_count(turned));
+        snprintf(line, sizeof line, "known in %" PRIu64 " of %" PRIu64 " frames", turned, frames);
+        report_put(r, NULL, "turns", report_text(line));
+        report_end(r);
+    }
+    if (!g->skeleton.njoints) return;
+    report_gap(r);
+    report_group(r, "rig");
+    report_skeleton(r, "rig", &g->skeleton);
+    report_put(r, "skinned", NULL, report_flag(g->skin_weight != NULL));
+    report_put(r, NULL, "skin",
+               report_text(g->skin_weight ? "weights of linear blend skinning: --weights" : "no weights"));
+    report_end(r);
 }

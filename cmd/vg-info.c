@@ -1,14 +1,16 @@
 /* vg-info.c: say what is in a sequence, whether it is whole, and who made it.
- * Leaves out changing anything: it writes text.
+ * Leaves out what reading the frames tells (contents.c) and the reports on parts of the head that have their own file;
+ * it changes nothing: it writes text.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
-#include "report.h"
+#include "contents.h"
+#include "correspondences.h"
+#include "meshes.h"
 #include "networks.h"
 #include "signals.h"
 #include "skeletons.h"
 
 #include <inttypes.h>
-#include <math.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -43,396 +45,11 @@ static const cli_program program = {
     .any_form = true,
 };
 
-/* A channel that frames bring. */
-typedef struct channel_note {
-    char *name, *unit, *element; /* of the first frame that has it */
-    size_t width;
-    uint64_t frames;
-    double least, most; /* numbers, or vertices of lists */
-} channel_note;
-
-/* Frames that are called "Walk.0001", "Walk.0002" and so on. */
-typedef struct animation {
-    char *name;
-    uint64_t frames;
-    double first_time, last_time; /* NaN: it has none */
-} animation;
-
-/* What reading all frames tells. */
-typedef struct contents {
-    uint64_t frames, timed, turned, extra; /* turned: that say how joints have turned; extra: unknown records before
-                                              frames */
-    channel_note *channels;
-    size_t nchannels, nanimations;
-    animation *animations;
-    char *first, *last;            /* names */
-    double first_time, last_time;
-    double D; /* of the first frame of vertices */
-    uint64_t digest;
-} contents;
-
-static const report_column size_columns[] = {{.key = "size"}, {.key = "faces"}};
 static const report_column record_columns[] = {{.key = "tag"}, {.key = "bytes"}};
 static const report_column provenance_columns[] = {
     {.key = "program"}, {.key = "version"}, {.key = "args"}, {.key = "parents"}};
-static const report_column channel_columns[] = {{.key = "name"},   {.key = "unit"},  {.key = "element"}, {.key = "width"},
-                                                {.key = "frames"}, {.key = "least"}, {.key = "most"}};
-static const report_column animation_columns[] = {
-    {.key = "name"}, {.key = "frames"}, {.key = "first_time"}, {.key = "last_time"}};
-static const report_column vertex_columns[] = {
-    {.key = "frame", .title = "frame"}, {.key = "name", .title = "name"},    {.key = "time", .title = "time"},
-    {.key = "x", .title = "centroid x"}, {.key = "y", .title = "centroid y"}, {.key = "z", .title = "centroid z"}};
-static const report_column value_columns[] = {
-    {.key = "frame", .title = "frame"}, {.key = "name", .title = "name"}, {.key = "time", .title = "time"},
-    {.key = "least", .title = "least"}, {.key = "most", .title = "most"}};
 
-static void replace_text(char **to, const char *from)
-{
-    free(*to);
-    *to = cli_copy_text(from, "the name of a frame");
-}
-
-/* Close a stream that wrote into *line; false: something of it was lost. glibc may close well and have no line. */
-static bool close_line(FILE *f, char *const *line)
-{
-    bool lost = ferror(f) != 0;
-    return fclose(f) == 0 && !lost && *line;
-}
-
-/* ---------------------------------------------------------------------------------------------- frames -- */
-
-static void range_of(const double *x, size_t n, double *least, double *most)
-{
-    *least = *most = n ? x[0] : NAN;
-    for (size_t i = 1; i < n; i++) *least = fmin(*least, x[i]), *most = fmax(*most, x[i]);
-}
-
-static void list_frame(report *r, const vg_head *h, const vg_frame *f, uint64_t i)
-{
-    double at[3];
-    report_value row[6] = {report_count(i), report_text(f->name),
-                           f->has_time ? report_number(f->time) : report_nothing()};
-    if (h->kind == VG_VERTICES) {
-        vg_centroid(f->values, h->count, at);
-        for (int k = 0; k < 3; k++) row[3 + k] = report_number(at[k]);
-    } else {
-        range_of(f->values, h->count * vg_head_width(h), &at[0], &at[1]);
-        for (int k = 0; k < 2; k++) row[3 + k] = report_number(at[k]);
-    }
-    report_row(r, row);
-}
-
-/* The frame goes on with the last animation, or begins one. */
-static void note_animation(contents *c, const vg_frame *f)
-{
-    uint64_t number = 0;
-    const size_t n = vg_frame_stem(f->name, &number);
-    animation *last = c->nanimations ? &c->animations[c->nanimations - 1] : NULL;
-    const double time = f->has_time ? f->time : NAN;
-    if (n && last && number == last->frames + 1 && strlen(last->name) == n && !memcmp(last->name, f->name, n)) {
-        last->frames++;
-        last->last_time = time;
-    } else if (n && number == 1) {
-        c->animations = cli_resize(c->animations, c->nanimations + 1, sizeof *c->animations, "the names of animations");
-        last = &c->animations[c->nanimations++];
-        *last = (animation){cli_copy_text(f->name, "the names of animations"), 1, time, time};
-        last->name[n] = 0;
-    }
-}
-
-static void note_frame(contents *c, const vg_frame *f)
-{
-    size_t turned;
-    if (c->frames == 0) replace_text(&c->first, f->name);
-    replace_text(&c->last, f->name);
-    if (f->has_time) {
-        if (c->timed == 0) c->first_time = f->time;
-        c->last_time = f->time;
-        c->timed++;
-    }
-    note_animation(c, f);
-    vg_frame_turns(f, &turned);
-    c->turned += turned > 0;
-    c->extra += f->extra.n;
-    c->frames++;
-}
-
-static channel_note *note_of(contents *c, const vg_channel *channel)
-{
-    for (size_t i = 0; i < c->nchannels; i++)
-        if (!strcmp(c->channels[i].name, channel->name)) return &c->channels[i];
-    c->channels = cli_resize(c->channels, c->nchannels + 1, sizeof *c->channels, "the names of channels");
-    channel_note *n = &c->channels[c->nchannels++];
-    *n = (channel_note){.width = channel->width, .least = INFINITY, .most = -INFINITY};
-    n->name = cli_copy_text(channel->name, "the names of channels");
-    n->unit = cli_copy_text(channel->unit, "the names of channels");
-    n->element = cli_copy_text(channel->element_name, "the names of channels");
-    return n;
-}
-
-static void note_channels(contents *c, const vg_frame *f)
-{
-    for (size_t i = 0; i < f->nchannels; i++) {
-        const vg_channel *channel = &f->channels[i];
-        channel_note *n = note_of(c, channel);
-        size_t numbers = channel->width * channel->count;
-        for (size_t k = 0; k < numbers; k++) {
-            double x = channel->vertices ? channel->vertices[k] : channel->numbers[k];
-            n->least = fmin(n->least, x), n->most = fmax(n->most, x);
-        }
-        n->frames++;
-    }
-}
-
-/* Read to the end, which is what proves that the input is whole. `list` may be NULL. */
-static void read_all(vg_source *s, contents *c, report *list)
-{
-    const vg_head *h = vg_source_head(s);
-    vg_frame f = {0};
-    vg_digest *digest = NULL;
-    vg_err e;
-    bool poses = h->kind == VG_VERTICES;
-    if (list) report_table(list, "frame_list", "", false, poses ? vertex_columns : value_columns, poses ? 6 : 5);
-    if (vg_digest_new(&digest, h, &e) < 0) cli_die(&e);
-    while (cli_next(s, &f)) {
-        if (opts.digest) vg_digest_add(digest, &f);
-        if (list) list_frame(list, h, &f, c->frames);
-        if (c->frames == 0 && poses) c->D = vg_diagonal(f.values, h->count);
-        note_frame(c, &f);
-        if (!opts.digest && !opts.check) note_channels(c, &f);
-        cli_progress("frame", c->frames);
-    }
-    cli_note("%" PRIu64 " frames read, and the end mark where there has to be one", c->frames);
-    c->digest = vg_digest_get(digest);
-    c->extra += vg_source_tail(s)->n;
-    vg_digest_free(&digest);
-    vg_frame_clear(&f);
-}
-
-/* A single one is said with the frames. */
-static void report_animations(report *r, const contents *c)
-{
-    char line[400];
-    for (size_t i = 0; i < c->nanimations && c->nanimations > 1; i++) {
-        const animation *a = &c->animations[i];
-        int k = snprintf(line, sizeof line, "'%.300s': %" PRIu64 " frames", a->name, a->frames);
-        if (!isnan(a->first_time))
-            snprintf(line + k, sizeof line - (size_t)k, ", %.6g s to %.6g s", a->first_time, a->last_time);
-        report_put(r, NULL, "animation", report_text(line));
-    }
-    if (!c->nanimations) return;
-    report_table(r, "animations", NULL, false, animation_columns, 4);
-    for (size_t i = 0; i < c->nanimations; i++) {
-        const animation *a = &c->animations[i];
-        const report_value row[4] = {report_text(a->name), report_count(a->frames),
-                                     isnan(a->first_time) ? report_nothing() : report_number(a->first_time),
-                                     isnan(a->last_time) ? report_nothing() : report_number(a->last_time)};
-        report_row(r, row);
-    }
-}
-
-static void report_frames(report *r, const vg_head *h, const contents *c)
-{
-    char line[700];
-    size_t most = SIZE_MAX / 64, bytes = h->count < most ? h->count * vg_head_width(h) * h->precision : 0;
-    report_put(r, "kind", NULL, report_text(vg_head_form(h)));
-    report_put(r, "precision", NULL, report_count(8 * h->precision));
-    report_put(r, "elements", NULL, report_count(h->count));
-    snprintf(line, sizeof line, "%zu %s, binary%d", h->count, vg_head_form(h), 8 * (int)h->precision);
-    report_put(r, NULL, "a frame", report_text(line));
-    report_put(r, "frame_bytes", "its bytes", report_count(bytes));
-    report_put(r, "frames", NULL, report_count(c->frames));
-    report_put(r, "first", NULL, c->frames ? report_text(c->first) : report_nothing());
-    report_put(r, "last", NULL, c->frames ? report_text(c->last) : report_nothing());
-    report_put(r, "first_time", NULL, c->timed ? report_number(c->first_time) : report_nothing());
-    report_put(r, "last_time", NULL, c->timed ? report_number(c->last_time) : report_nothing());
-    if (c->frames == 0) snprintf(line, sizeof line, "0");
-    else if (c->frames == 1) snprintf(line, sizeof line, "1: '%.300s'", c->first);
-    else snprintf(line, sizeof line, "%" PRIu64 ": '%.300s' to '%.300s'", c->frames, c->first, c->last);
-    report_put(r, NULL, "frames", report_text(line));
-    if (!c->timed || c->nanimations > 1) return;
-    snprintf(line, sizeof line, "%.6g s to %.6g s", c->first_time, c->last_time);
-    report_put(r, NULL, "times", report_text(line));
-}
-
-static void report_channels(report *r, const contents *c)
-{
-    char line[400];
-    for (size_t i = 0; i < c->nchannels; i++) {
-        const channel_note *n = &c->channels[i];
-        if (!strcmp(n->name, "anchors") || !strcmp(n->name, "turns")) continue; /* mesh and skeleton say it */
-        int k = snprintf(line, sizeof line, "'%.100s' of each %.60s in %" PRIu64 " of the frames", n->name, n->element,
-                         n->frames);
-        if (n->least <= n->most) /* there is an element */
-            snprintf(line + k, sizeof line - (size_t)k, ": %.6g to %.6g %.60s", n->least, n->most, n->unit);
-        report_put(r, NULL, "with them", report_text(line));
-    }
-    if (!c->nchannels) return;
-    report_table(r, "channels", NULL, false, channel_columns, 7);
-    for (size_t i = 0; i < c->nchannels; i++) {
-        const channel_note *n = &c->channels[i];
-        bool some = n->least <= n->most;
-        report_value row[7] = {report_text(n->name), report_text(n->unit), report_text(n->element),
-                               report_count(n->width), report_count(n->frames),
-                               some ? report_number(n->least) : report_nothing(),
-                               some ? report_number(n->most) : report_nothing()};
-        report_row(r, row);
-    }
-}
-
-/* ------------------------------------------------------------------------------------------------ mesh -- */
-
-static uint32_t face_size(const vg_mesh *m, size_t f)
-{
-    return m->start[f + 1] - m->start[f];
-}
-
-enum { SIZES_SHOWN = 3 };
-
-/* "838: 134 of 3, 626 of 4, 78 of 5 to 21": more than a few sizes are put together. */
-static char *size_line(const vg_mesh *m, const uint64_t *count, size_t largest)
-{
-    char *line = NULL;
-    size_t bytes, kinds = 0, at = 0, first = 0;
-    uint64_t rest = 0;
-    FILE *f = open_memstream(&line, &bytes);
-    if (!f) cli_stop(VG_ENOMEM, "not enough memory for the sizes of faces");
-    for (size_t k = 2; k <= largest; k++) kinds += count[k] > 0;
-    fprintf(f, "%zu", m->nf);
-    for (size_t k = 2; k <= largest; k++) {
-        if (!count[k]) continue;
-        if (kinds <= SIZES_SHOWN || at < SIZES_SHOWN - 1)
-            fprintf(f, "%s%" PRIu64 " of %zu", at ? ", " : ": ", count[k], k);
-        else rest += count[k], first = first ? first : k;
-        at++;
-    }
-    if (rest) fprintf(f, ", %" PRIu64 " of %zu to %zu", rest, first, largest);
-    if (!close_line(f, &line)) cli_stop(VG_ENOMEM, "not enough memory for the sizes of faces");
-    return line;
-}
-
-/* How many faces there are of each size, as rows in JSON and as one line in the text. */
-static void report_faces(report *r, const vg_mesh *m)
-{
-    size_t largest = 0;
-    for (size_t f = 0; f < m->nf; f++) largest = face_size(m, f) > largest ? face_size(m, f) : largest;
-    uint64_t *count = cli_allocate(largest, sizeof *count, "the sizes of faces");
-    for (size_t f = 0; f < m->nf; f++) count[face_size(m, f)]++;
-    char *line = size_line(m, count, largest);
-    report_put(r, "faces", NULL, report_count(m->nf));
-    report_put(r, NULL, "faces", report_text(line));
-    report_table(r, "face_sizes", NULL, false, size_columns, 2);
-    for (size_t k = 2; k <= largest; k++) {
-        const report_value row[2] = {report_count(k), report_count(count[k])};
-        if (count[k]) report_row(r, row);
-    }
-    free(line);
-    free(count);
-}
-
-static void report_components(report *r, const vg_mesh *m)
-{
-    size_t components = 0, isolated = 0;
-    vg_err e;
-    uint32_t *label = cli_allocate(m->nv, sizeof *label, "the components of the mesh");
-    if (vg_mesh_components(m, label, &components, &e) < 0) cli_die(&e);
-    for (size_t v = 0; v < m->nv; v++) isolated += label[v] == UINT32_MAX;
-    free(label);
-    report_put(r, "components", "components", report_count(components));
-    report_put(r, "isolated_vertices", isolated ? "isolated" : NULL, report_count(isolated));
-}
-
-static void report_mesh(report *r, const vg_head *h)
-{
-    const vg_attributes *a = &h->body.attributes;
-    if (!h->body.reference) return;
-    report_gap(r);
-    report_group(r, "mesh");
-    report_put(r, "vertices", "vertices", report_count(h->body.mesh.nv));
-    report_faces(r, &h->body.mesh);
-    report_components(r, &h->body.mesh);
-    report_put(r, "D", "D", report_number(vg_diagonal(h->body.reference, h->body.mesh.nv)));
-    report_put(r, "reference", "reference", report_text(h->body.reference_name ? h->body.reference_name : ""));
-    report_put(r, "texture_coordinates", a->ntex ? "texture coordinates" : NULL, report_count(a->ntex));
-    char asset[200];
-    vg_asset_text(&h->body.asset, asset, sizeof asset);
-    report_put(r, "asset", *asset ? "asset" : NULL, h->body.asset.n ? report_text(asset) : report_nothing());
-    report_put(r, "labels", a->nlabels ? "labels" : NULL, report_count(a->nlabels));
-    report_put(r, "selected_faces", h->has_selection ? "selected faces" : NULL,
-               h->has_selection ? report_count(h->nselected) : report_nothing());
-    report_put(r, "links", h->has_links ? "links" : NULL, h->has_links ? report_count(h->nlinks) : report_nothing());
-    report_put(r, "anchors", h->nanchors ? "anchors" : NULL, report_count(h->nanchors));
-    report_end(r);
-}
-
-/* -------------------------------------------------------------------------------------- correspondence -- */
-
-/* What a correspondence covers: how many faces, how near, by how many. */
-typedef struct coverage {
-    uint64_t matched, most_pairs, used;
-    double sum, largest; /* distances of matched faces */
-} coverage;
-
-static int ascending(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return (x > y) - (x < y);
-}
-
-/* How many faces of the source drive anything: counted among the pairs, for how many it has is the stream's word only. */
-static uint64_t count_sources(const vg_correspondence *c)
-{
-    size_t n = c->first[c->target_nf];
-    uint32_t *faces = cli_allocate(n, sizeof *faces, "the pairs of a correspondence");
-    uint64_t used = n > 0;
-    if (n) memcpy(faces, c->source, n * sizeof *faces);
-    qsort(faces, n, sizeof *faces, ascending);
-    for (size_t i = 1; i < n; i++) used += faces[i] != faces[i - 1];
-    free(faces);
-    return used;
-}
-
-static coverage cover(const vg_correspondence *c)
-{
-    coverage x = {.used = count_sources(c)};
-    for (size_t f = 0; f < c->target_nf; f++) {
-        uint64_t pairs = c->first[f + 1] - c->first[f];
-        if (pairs > x.most_pairs) x.most_pairs = pairs;
-        if (!c->matched[f]) continue;
-        x.matched++;
-        x.sum += c->distance[f];
-        x.largest = fmax(x.largest, c->distance[f]);
-    }
-    return x;
-}
-
-static double percent(uint64_t part, uint64_t all)
-{
-    return all ? 100.0 * (double)part / (double)all : 0;
-}
-
-static void report_skeletons(report *r, const vg_head *h, const contents *c)
-{
-    const vg_rig *g = &h->body.rig;
-    char line[80];
-    if (h->body.skeleton.njoints) {
-        report_gap(r);
-        report_group(r, "skeleton");
-        report_skeleton(r, "skeleton", &h->body.skeleton);
-        report_put(r, "turned_frames", NULL, report_count(c->turned));
-        snprintf(line, sizeof line, "known in %" PRIu64 " of %" PRIu64 " frames", c->turned, c->frames);
-        report_put(r, NULL, "turns", report_text(line));
-        report_end(r);
-    }
-    if (!g->skeleton.njoints) return;
-    report_gap(r);
-    report_group(r, "rig");
-    report_skeleton(r, "rig", &g->skeleton);
-    report_put(r, "skinned", NULL, report_flag(g->skin_weight != NULL));
-    report_put(r, NULL, "skin",
-               report_text(g->skin_weight ? "weights of linear blend skinning: --weights" : "no weights"));
-    report_end(r);
-}
+/* ------------------------------------------------------------------------------------------- artefacts -- */
 
 static void report_map(report *r, const vg_map *m)
 {
@@ -464,49 +81,6 @@ static void report_patches(report *r, const vg_head *h)
     report_end(r);
 }
 
-/* D is that of the source as it lies on the target, which is what the stream holds of the target. */
-static void report_correspondence(report *r, const vg_head *h, double D)
-{
-    const vg_correspondence *c = &h->correspondence;
-    char line[160];
-    if (!c->first) return;
-    coverage x = cover(c);
-    uint64_t pairs = c->first[c->target_nf];
-    double mean = x.matched ? x.sum / (double)x.matched : NAN, largest = x.matched ? x.largest : NAN;
-    report_gap(r);
-    report_group(r, "correspondence");
-    report_put(r, "source_vertices", NULL, report_count(c->source_nv));
-    report_put(r, "source_faces", NULL, report_count(c->source_nf));
-    report_put(r, "target_vertices", NULL, report_count(c->target_nv));
-    report_put(r, "target_faces", NULL, report_count(c->target_nf));
-    snprintf(line, sizeof line, "%zu faces, %zu vertices", c->target_nf, c->target_nv);
-    report_put(r, NULL, "target", report_text(line));
-    report_put(r, "matched_faces", NULL, report_count(x.matched));
-    report_put(r, "unmatched_faces", NULL, report_count(c->target_nf - x.matched));
-    snprintf(line, sizeof line, "%" PRIu64 " of %zu faces (%.4g %%), %" PRIu64 " ride with others", x.matched,
-             c->target_nf, percent(x.matched, c->target_nf), (uint64_t)c->target_nf - x.matched);
-    report_put(r, NULL, "matched", report_text(line));
-    report_put(r, "source_faces_used", NULL, report_count(x.used));
-    snprintf(line, sizeof line, "%" PRIu64 " of %zu faces (%.4g %%)", x.used, c->source_nf,
-             percent(x.used, c->source_nf));
-    report_put(r, NULL, "source used", report_text(line));
-    report_put(r, "pairs", NULL, report_count(pairs));
-    report_put(r, "most_pairs", NULL, report_count(x.most_pairs));
-    snprintf(line, sizeof line, "%" PRIu64 ", %.3g a face on average, at most %" PRIu64, pairs,
-             c->target_nf ? (double)pairs / (double)c->target_nf : 0, x.most_pairs);
-    report_put(r, NULL, "pairs", report_text(line));
-    report_put(r, "mean_distance", NULL, report_number(mean));
-    report_put(r, "largest_distance", NULL, report_number(largest));
-    report_put(r, "mean_distance_D", NULL, report_number(D > 0 ? mean / D : NAN));
-    report_put(r, "largest_distance_D", NULL, report_number(D > 0 ? largest / D : NAN));
-    if (x.matched && D > 0) {
-        snprintf(line, sizeof line, "mean %.3g, at most %.3g (%.3g D and %.3g D)", mean, largest, mean / D,
-                 largest / D);
-        report_put(r, NULL, "distances", report_text(line));
-    }
-    report_end(r);
-}
-
 /* ------------------------------------------------------------------------------------------ provenance -- */
 
 /* An argument as a person would have to type it. */
@@ -525,18 +99,16 @@ static void print_quoted(FILE *f, const char *s)
 
 static void note_process(report *r, const vg_provenance *p, size_t depth)
 {
-    char *line = NULL;
-    size_t size;
-    FILE *f = open_memstream(&line, &size);
-    if (!f) cli_stop(VG_ENOMEM, "not enough memory for the command lines");
+    cli_line line;
+    FILE *f = cli_line_open(&line, "the command lines");
     if (p->nargs == 0) print_quoted(f, p->program);
     for (size_t i = 0; i < p->nargs; i++) {
         if (i) fputc(' ', f);
         print_quoted(f, p->args[i]);
     }
-    if (!close_line(f, &line)) cli_stop(VG_ENOMEM, "not enough memory for the command lines");
-    report_note(r, "  %*s%s", (int)(2 * (depth < 20 ? depth : 20)), "", line);
-    free(line);
+    char *text = cli_line_close(&line);
+    report_note(r, "  %*s%s", (int)(2 * (depth < 20 ? depth : 20)), "", text);
+    free(text);
 }
 
 typedef struct step {
@@ -621,7 +193,7 @@ static void report_all(report *r, const char *operand, const vg_head *h, const c
     report_mesh(r, h);
     report_correspondence(r, h, c->D);
     report_patches(r, h);
-    report_skeletons(r, h, c);
+    report_skeletons(r, h, c->turned, c->frames);
     report_map(r, &h->map);
     report_signal(r, &h->signal);
     report_network(r, &h->network);
@@ -723,7 +295,7 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     vg_source *s = cli_source(operands, n);
     report *r = report_new(), *list = opts.frames ? report_new() : NULL;
-    read_all(s, &c, list);
+    contents_read(&c, s, opts.digest, !opts.digest && !opts.check, list);
     const char *operand = n && strcmp(operands[0], "-") ? operands[0] : NULL;
     if (opts.check) report_check(r);
     else if (opts.digest) report_digest(r, &c);

@@ -1,36 +1,15 @@
 /* source.c: input: joins all operands into one head and a sequence of frames.
- * Leaves out which files an operand names (operands.c) and how a stream, an archive, a mesh file or a sequence
- * (sequence_reader.c) is read.
+ * Leaves out which files operands name and what each holds (items.c), and how a stream, an archive, a mesh file or a
+ * sequence (sequence_reader.c) is read.
  *
+ * All operands are looked at first, so that a missing file or a stream that does not fit is reported before any work.
  * Mesh files become poses in several threads, some before they are asked for. Pipes are read only when it is their
  * turn. Errors are reported in input order.
- *
- * All operands are looked at first, so that a missing file or a stream that does not fit is reported before any work;
- * files are opened again when it is their turn. What can be read only once (standard input, a pipe named by the shell)
- * stays open in between.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_pack.h"
-#include "io/sequence_reader.h"
+#include "io/items.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <stdlib.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
-static const char standard_input[] = "standard input";
-
-enum content { MESH, ARCHIVE, STREAM, SEQUENCE };
-
-typedef struct item {
-    char *path;      /* NULL: standard input */
-    bool regular;    /* can be opened, or read from `base` on, a second time */
-    int64_t base;    /* where standard input stood */
-    enum content content;
-    const vgi_sequence_format *sequence;
-    vgi_input *input;  /* kept from the first look, when there can be no second */
-    vg_reader *reader; /* the same, when it is a stream */
-} item;
 
 /* A mesh file that becomes a frame. */
 typedef struct pose {
@@ -46,10 +25,8 @@ typedef struct pose {
 enum { MOST_WAITING = 256 << 20 }; /* bytes of files: above it no further file is read ahead */
 
 struct vg_source {
-    item *items;
-    size_t n, cap, next; /* next: the item to be opened */
-    bool stdin_named;
-    vgi_limits limits;
+    vgi_items items;
+    size_t next;         /* the item to be opened */
     vg_reading reading;
     bool through;        /* one stream: its head and frames are passed on as they are */
     vg_head head;        /* of the joined sequence; the caller may change it */
@@ -73,119 +50,7 @@ struct vg_source {
     char warning[VGI_SUBJECT + 2 * sizeof(vg_note)];
 };
 
-static const char *item_name(const item *it)
-{
-    return it->path ? it->path : standard_input;
-}
-
-/* ---- operands to items ---- */
-
-static int add_item(vg_source *s, const char *path, vg_err *e)
-{
-    item it = {0};
-    int r = vgi_grow(&s->items, &s->cap, s->n + 1, sizeof *s->items, e);
-    if (r < 0) return r;
-    if (path && !(it.path = vgi_copy_string(path, strlen(path), e))) return VG_ENOMEM;
-    s->items[s->n++] = it;
-    return VG_OK;
-}
-
-static int add_standard_input(vg_source *s, vg_err *e)
-{
-    if (s->stdin_named) return vg_fail(e, VG_EARG, "standard input ('-') can be named only once");
-    s->stdin_named = true;
-    return add_item(s, NULL, e);
-}
-
-static int add_operand(vg_source *s, const char *operand, vg_err *e)
-{
-    if (!strcmp(operand, "-")) return add_standard_input(s, e);
-    vgi_names paths = {0};
-    int r = vgi_operand_files(&paths, operand, e);
-    for (size_t i = 0; r == VG_OK && i < paths.n; i++) r = add_item(s, paths.at[i], e);
-    vgi_names_clear(&paths);
-    return r;
-}
-
-/* ---- the first look ---- */
-
-static int open_input(const vg_source *s, item *it, vgi_input **in, vg_err *e)
-{
-    if (it->input) {
-        *in = it->input;
-        it->input = NULL;
-        return VG_OK;
-    }
-    int r = it->path ? vgi_input_file(in, it->path, e) : vgi_input_fd(in, STDIN_FILENO, false, standard_input, e);
-    if (r == VG_OK) vgi_input_limit(*in, &s->limits);
-    return r;
-}
-
-static void note_file(item *it)
-{
-    struct stat st;
-    bool known = (it->path ? stat(it->path, &st) : fstat(STDIN_FILENO, &st)) == 0;
-    it->regular = known && S_ISREG(st.st_mode);
-    if (it->path || !it->regular) return;
-    it->base = lseek(STDIN_FILENO, 0, SEEK_CUR);
-    it->regular = it->base >= 0;
-}
-
-static const vgi_format *mesh_format(const item *it, const unsigned char *data, size_t n)
-{
-    const vgi_format *f = vgi_format_by_content(data, n);
-    return f || !it->path ? f : vgi_format_by_suffix(it->path);
-}
-
-/* Files that are certainly no meshes are recognised first: a tar may begin with the name of a mesh, and a compressed
- * file may be called like one. Everything unknown is left to libarchive, which knows more kinds than are recognised
- * here; of a pipe it sees only the start, or a disk would fill with it first. */
-static int judge_start(const vg_source *s, item *it, const unsigned char *data, size_t n, vg_err *e)
-{
-    const vgi_sequence_format *named = it->path ? vgi_sequence_by_suffix(it->path) : NULL;
-    const vgi_format *mesh;
-    if (vgi_is_stream(data, n)) it->content = STREAM;
-    else if ((it->sequence = vgi_sequence_by_content(data, n))) it->content = SEQUENCE;
-    else if (vgi_is_archive(data, n)) it->content = ARCHIVE;
-    else if (named && named->open) it->content = SEQUENCE, it->sequence = named;
-    else if ((mesh = mesh_format(it, data, n))) {
-        it->sequence = s->reading.objects && mesh == &vgi_format_obj ? &vgi_sequence_objects : NULL;
-        it->content = it->sequence ? SEQUENCE : MESH;
-    }
-    else if (it->regular || vgi_may_be_archive(data, n)) it->content = ARCHIVE;
-    else return vgi_unknown_kind(item_name(it), e);
-    return VG_OK;
-}
-
-static int tell_content(const vg_source *s, item *it, vgi_input *in, vg_err *e)
-{
-    const unsigned char *data;
-    vg_bytes own = {0};
-    size_t n;
-    /* enough for a stream: a program that writes frame by frame is not kept waiting */
-    int r = vgi_input_peek(in, 8, &data, &n, e);
-    if (r == VG_OK && !vgi_is_stream(data, n)) r = vgi_input_peek(in, 4096, &data, &n, e);
-    if (r < 0) return r;
-    if (n == 0 && !it->path)
-        return vg_fail(e, VG_ETRUNC, "standard input is empty: look at the program before in the pipe");
-    if (n == 0) return vg_fail(e, VG_ETRUNC, "'%s' is empty", it->path);
-    r = vgi_plain_text(&own, &data, &n, e);
-    if (r == VG_OK) r = judge_start(s, it, data, n, e);
-    vg_bytes_clear(&own);
-    return r;
-}
-
-static int open_reader(const vg_source *s, item *it, vg_reader **reader, vg_err *e)
-{
-    if (it->reader) {
-        *reader = it->reader;
-        it->reader = NULL;
-        return VG_OK;
-    }
-    vgi_input *in;
-    int r = open_input(s, it, &in, e);
-    return r < 0 ? r : vgi_reader_open_input(reader, in, e);
-}
+/* ---- one mesh for all inputs ---- */
 
 /* What messages call a file, or a member of an archive. */
 static char *subject_of(const char *archive, const char *path, vg_err *e)
@@ -200,7 +65,7 @@ static char *subject_of(const char *archive, const char *path, vg_err *e)
 /* The name of a pose from that file; free it. */
 static char *pose_of(const char *path, vg_err *e)
 {
-    return path == standard_input ? vgi_copy_string("stdin", 5, e) : vgi_pose_name(path, e);
+    return path == vgi_standard_input ? vgi_copy_string("stdin", 5, e) : vgi_pose_name(path, e);
 }
 
 /* The mesh that every further pose must have. */
@@ -227,25 +92,26 @@ static int keep_skeleton(vg_source *s, const vg_head *h, vg_err *e)
 }
 
 /* The head of a stream among several operands: the first one's is taken over, of later ones only the provenance. */
-static int join_head(vg_source *s, const item *it, const vg_head *h, vg_err *e)
+static int join_head(vg_source *s, const vgi_item *it, const vg_head *h, vg_err *e)
 {
     if (h->kind != VG_VERTICES)
         return vg_fail(e, VG_EINPUT, "'%s' holds %s: only streams of vertices can be joined with other inputs",
-                       item_name(it), vg_head_form(h));
-    if (s->own_name || it != s->items) return vg_head_merge_trace(&s->head, h, e);
+                       vgi_item_name(it), vg_head_form(h));
+    if (s->own_name || it != s->items.at) return vg_head_merge_trace(&s->head, h, e);
     int r = vg_head_copy(&s->head, h, e);
-    if (r == VG_OK) r = settle_mesh(s, &h->body.mesh, NULL, item_name(it), e);
+    if (r == VG_OK) r = settle_mesh(s, &h->body.mesh, NULL, vgi_item_name(it), e);
     return r < 0 ? r : keep_skeleton(s, h, e);
 }
 
-static int look_at_stream(vg_source *s, item *it, vg_err *e)
+/* Of several operands, streams define the mesh when they are looked at. */
+static int look_at_stream(vg_source *s, vgi_item *it, vg_err *e)
 {
-    if (s->own_name && s->n == 1)
-        return vg_fail(e, VG_EARG, "'%s' is a stream, which brings its own mesh: leave out --mesh", item_name(it));
+    if (s->own_name && s->items.n == 1)
+        return vg_fail(e, VG_EARG, "'%s' is a stream, which brings its own mesh: leave out --mesh", vgi_item_name(it));
     vg_reader *reader = NULL;
-    int r = open_reader(s, it, &reader, e);
+    int r = vgi_item_reader(&s->items, it, &reader, e);
     if (r < 0) return r;
-    if (s->n == 1) {
+    if (s->items.n == 1) {
         s->reader = reader;
         s->through = true;
         return VG_OK;
@@ -256,63 +122,10 @@ static int look_at_stream(vg_source *s, item *it, vg_err *e)
     return r;
 }
 
-static int open_file(const item *it, vg_err *e)
+static int open_archive(vg_source *s, vgi_item *it, vg_err *e)
 {
-    int fd = it->path ? open(it->path, O_RDONLY | O_CLOEXEC) : fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
-    return fd < 0 ? vg_fail(e, VG_ESYS, "cannot open '%s': %s", item_name(it), strerror(errno)) : fd;
-}
-
-/* A stream that was compressed becomes one that can be read once: *in (NULL when the file is opened again later). */
-static int unpack_stream(const vg_source *s, item *it, vgi_input **in, vg_err *e)
-{
-    int fd = -1, stream, r = VG_OK;
-    if (it->regular) r = fd = open_file(it, e);
-    else r = vgi_input_spool(*in, &fd, e);
-    if (r >= 0) r = vgi_unpack_stream(fd, it->regular ? it->base : 0, item_name(it), &s->limits, &stream, e);
-    if (r == 1) {
-        it->content = STREAM, it->regular = false;
-        vgi_input_free(in);
-        r = vgi_input_fd(in, stream, true, item_name(it), e);
-    } else if (r == 0 && !it->regular) {
-        vgi_input_free(in);
-        if (lseek(fd, 0, SEEK_SET) < 0) r = vg_fail(e, VG_ESYS, "cannot read '%s': %s", item_name(it), strerror(errno));
-        else r = vgi_input_fd(in, fd, true, item_name(it), e), fd = -1;
-        if (r == VG_OK) vgi_input_limit(*in, &s->limits);
-    }
-    if (fd >= 0) close(fd);
-    return r;
-}
-
-static int look_at(vg_source *s, item *it, vg_err *e)
-{
-    vgi_input *in = NULL;
-    note_file(it);
-    int r = open_input(s, it, &in, e);
-    if (r < 0) return r;
-    r = tell_content(s, it, in, e);
-    if (r == VG_OK && it->content == ARCHIVE) r = unpack_stream(s, it, &in, e);
-    /* standard input has been read from: its bytes are in `in`, even when the file could be read again */
-    if (r < 0 || (it->regular && it->path)) vgi_input_free(&in);
-    else it->input = in;
-    return r == VG_OK && it->content == STREAM ? look_at_stream(s, it, e) : r;
-}
-
-/* ---- one item after another ---- */
-
-static int open_archive(vg_source *s, item *it, vg_err *e)
-{
-    int fd = -1, r = VG_OK;
-    if (!it->regular) {
-        vgi_input *in;
-        if ((r = open_input(s, it, &in, e)) < 0) return r;
-        r = vgi_input_spool(in, &fd, e);
-        vgi_input_free(&in);
-    } else {
-        r = fd = open_file(it, e);
-    }
-    if (r < 0) return r;
-    s->archive_name = item_name(it);
-    return vgi_archive_open(&s->archive, fd, it->base, s->archive_name, &s->limits, e);
+    s->archive_name = vgi_item_name(it);
+    return vgi_item_archive(&s->items, it, &s->archive, e);
 }
 
 /* Keep the first note about something that was left out. */
@@ -436,23 +249,23 @@ static int hand_out(vg_source *s, vg_frame *f, vg_err *e)
     return r;
 }
 
-static int open_mesh(vg_source *s, item *it, vg_err *e)
+static int open_mesh(vg_source *s, vgi_item *it, vg_err *e)
 {
     vgi_input *in;
-    int r = open_input(s, it, &in, e);
+    int r = vgi_item_input(&s->items, it, &in, e);
     if (r < 0) return r;
     s->data.size = 0;
     r = vgi_input_slurp(in, &s->data, e);
     vgi_input_free(&in);
-    return r < 0 ? r : put_pose(s, NULL, item_name(it), e);
+    return r < 0 ? r : put_pose(s, NULL, vgi_item_name(it), e);
 }
 
-static int open_stream(vg_source *s, item *it, vg_err *e)
+static int open_stream(vg_source *s, vgi_item *it, vg_err *e)
 {
-    int r = open_reader(s, it, &s->reader, e);
+    int r = vgi_item_reader(&s->items, it, &s->reader, e);
     if (r < 0) return r;
     const vg_head *h = vg_reader_head(s->reader);
-    char *subject = subject_of(NULL, item_name(it), e);
+    char *subject = subject_of(NULL, vgi_item_name(it), e);
     if (!subject) return VG_ENOMEM;
     r = s->own_name ? check_joins(s, &h->body.mesh, subject, e) : VG_OK;
     free(subject);
@@ -480,12 +293,12 @@ static int take_over_head(vg_source *s, const char *archive, const char *path, v
     vg_kind kind = h->kind;
     vg_precision precision = h->precision;
     size_t count = h->count, width = h->width;
-    if (kind != VG_VERTICES && (s->n > 1 || archive))
+    if (kind != VG_VERTICES && (s->items.n > 1 || archive))
         return vg_fail(e, VG_EINPUT, "%s holds %s: only vertices can be joined with other inputs", p->subject,
                        vg_head_form(h));
     int r = p->format->keeps & VGI_KEEPS_FACES
                 ? VG_OK
-                : vgi_play_borrow_faces(p, path == standard_input ? NULL : path, h, e);
+                : vgi_play_borrow_faces(p, path == vgi_standard_input ? NULL : path, h, e);
     if (r == VG_OK) r = settle_mesh(s, &h->body.mesh, archive, path, e);
     if (r < 0) return r;
     vg_head_move(&s->head, h);
@@ -528,11 +341,11 @@ static int play(vg_source *s, const vgi_sequence_format *format, vgi_input *in, 
     return r;
 }
 
-static int open_sequence(vg_source *s, item *it, vg_err *e)
+static int open_sequence(vg_source *s, vgi_item *it, vg_err *e)
 {
     vgi_input *in;
-    int r = open_input(s, it, &in, e);
-    return r < 0 ? r : play(s, it->sequence, in, NULL, item_name(it), e);
+    int r = vgi_item_input(&s->items, it, &in, e);
+    return r < 0 ? r : play(s, it->sequence, in, NULL, vgi_item_name(it), e);
 }
 
 /* The member of an archive in s->data. */
@@ -545,11 +358,11 @@ static int play_member(vg_source *s, const vgi_sequence_format *format, const ch
 
 static int open_next(vg_source *s, vg_err *e)
 {
-    item *it = &s->items[s->next++];
+    vgi_item *it = &s->items.at[s->next++];
     switch (it->content) {
-    case STREAM: return open_stream(s, it, e);
-    case ARCHIVE: return open_archive(s, it, e);
-    case SEQUENCE: return open_sequence(s, it, e);
+    case VGI_STREAM: return open_stream(s, it, e);
+    case VGI_ARCHIVE: return open_archive(s, it, e);
+    case VGI_SEQUENCE: return open_sequence(s, it, e);
     default: return open_mesh(s, it, e);
     }
 }
@@ -566,6 +379,12 @@ static int next_member(vg_source *s, vg_err *e)
 }
 
 /* ---- the door ---- */
+
+static int look_at(vg_source *s, vgi_item *it, vg_err *e)
+{
+    int r = vgi_item_look(&s->items, it, e);
+    return r == VG_OK && it->content == VGI_STREAM ? look_at_stream(s, it, e) : r;
+}
 
 /* Open inputs until the mesh is known. Of several operands, streams define it when they are looked at. */
 static int find_mesh(vg_source *s, vg_err *e)
@@ -598,14 +417,16 @@ static int open_source(vg_source **out, const char *const *operands, size_t n, c
     const char *mesh = o ? o->mesh : NULL;
     vg_source *s = *out = vgi_array(1, sizeof *s, e);
     if (!s) return VG_ENOMEM;
-    s->limits = vgi_usual_limits;
+    vgi_items *items = &s->items;
+    items->limits = vgi_usual_limits;
     if (o) s->reading = o->reading;
-    if (o && o->most_bytes) s->limits.member_bytes = s->limits.total_bytes = o->most_bytes;
+    items->objects = s->reading.objects;
+    if (o && o->most_bytes) items->limits.member_bytes = items->limits.total_bytes = o->most_bytes;
     int r = n ? make_belt(s, o ? o->threads : 1, e) : vg_fail(e, VG_EARG, "no input is named");
     if (r == VG_OK && mesh) r = settle_named_mesh(s, mesh, e);
-    for (size_t i = 0; r == VG_OK && i < n; i++) r = add_operand(s, operands[i], e);
-    while (first_only && s->n > 1) free(s->items[--s->n].path);
-    for (size_t i = 0; r == VG_OK && i < s->n; i++) r = look_at(s, &s->items[i], e);
+    for (size_t i = 0; r == VG_OK && i < n; i++) r = vgi_items_add(items, operands[i], e);
+    if (first_only && items->n) vgi_items_keep(items, 1);
+    for (size_t i = 0; r == VG_OK && i < items->n; i++) r = look_at(s, &items->at[i], e);
     if (r == VG_OK) r = find_mesh(s, e);
     if (r < 0) vg_source_close(out);
     return r;
@@ -666,7 +487,9 @@ static bool may_read_ahead(const vg_source *s)
 {
     if (s->failed || vgi_belt_full(s->belt) || s->waiting >= MOST_WAITING) return false;
     if (s->playing.format || s->reader) return false;
-    return s->archive || (s->next < s->n && s->items[s->next].content == MESH && s->items[s->next].regular);
+    if (s->archive || s->next == s->items.n) return s->archive != NULL;
+    const vgi_item *next = &s->items.at[s->next];
+    return next->content == VGI_MESH && next->regular;
 }
 
 /* Advance by one input or frame: 1 and a frame; VG_OK: call again. Something is left to read. */
@@ -688,26 +511,18 @@ int vg_source_next(vg_source *s, vg_frame *f, vg_err *e)
             if (e) *e = s->failure;
             return s->failed;
         }
-        if (!s->playing.format && !s->reader && !s->archive && s->next == s->n) return 0;
+        if (!s->playing.format && !s->reader && !s->archive && s->next == s->items.n) return 0;
         int r = step(s, f, &s->failure);
         if (r > 0) return r;
         s->failed = r; /* reported after the poses that wait */
     }
 }
 
-static void clear_item(item *it)
-{
-    free(it->path);
-    vgi_input_free(&it->input);
-    vg_reader_close(&it->reader);
-}
-
 void vg_source_close(vg_source **source)
 {
     vg_source *s = *source;
     if (!s) return;
-    for (size_t i = 0; i < s->n; i++) clear_item(&s->items[i]);
-    free(s->items);
+    vgi_items_clear(&s->items);
     vg_reader_close(&s->reader);
     vgi_archive_close(&s->archive);
     vgi_play_stop(&s->playing);
