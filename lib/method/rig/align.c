@@ -1,6 +1,8 @@
-/* align.c: rest poses of two skeletons are compared by the directions of bones. By default limbs are aligned when any
- * of them differs by more than APART degrees: all that differ by more than ALIKE. The spine, clavicles, feet and fingers
- * are not: what their joints mean differs more between skeletons than how they rest.
+/* align.c: aligns the rest poses of two skeletons by the directions of their bones.
+ *
+ * By default limbs are aligned when any of them differs by more than APART degrees; then all limbs that differ by
+ * more than ALIKE degrees are aligned. The spine, clavicles, feet and fingers are left alone: skeletons differ more
+ * in where they place these joints than in their rest poses.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/align.h"
 #include "numeric/polar.h"
@@ -11,8 +13,8 @@
 
 static const uint32_t NONE = UINT32_MAX;
 static const double APART = 20, ALIKE = 10;
-static const double LONG = 0.1; /* a bone of unknown part counts as a limb from this share of the skeleton's
-                                   diagonal on */
+static const double LONG = 0.1; /* a bone of unknown role counts as a limb if it is at least this long, relative to
+                                 * the skeleton's diagonal */
 
 int vgi_rests_new(vgi_rests *x, const vg_skeleton *of, const vg_skeleton *by, const uint32_t *from, vg_err *e)
 {
@@ -48,7 +50,7 @@ uint32_t vgi_find_role(const vg_skeleton *s, const vgi_role *roles, vgi_part par
     return NONE;
 }
 
-/* From the first joint of a limb to the first joint of the next part. */
+/* Vector from the first joint of a limb to the first joint of the next part. */
 static bool span_limb(const vg_skeleton *s, const vgi_role *roles, const double *positions, vgi_role limb,
                       double d[3])
 {
@@ -75,12 +77,12 @@ double vgi_leg_length(const vg_skeleton *s, const vgi_role *roles, const double 
 
 /* ---- directions of one pair of joints ---- */
 
-/* Unit vectors to what is below joint j, in both skeletons: up to `most`; how many. */
+/* Unit vectors from joint j to the joints below it, in both skeletons, at most `most`. */
 typedef struct directions {
     size_t n;
-    double ours[3], theirs[3]; /* of the last */
-    double length;             /* of ours, before it became a unit vector */
-    double b[9];               /* the sum of theirs ours^T */
+    double ours[3], theirs[3]; /* of the last direction: unit vectors */
+    double length;             /* of our vector before normalisation */
+    double b[9];               /* sum of theirs ours^T */
 } directions;
 
 static void add_direction(directions *x, const double ours[3], const double theirs[3])
@@ -106,7 +108,7 @@ static directions children_of(const vgi_rests *x, size_t j)
     return d;
 }
 
-/* Of a limb along it, of other joints to their children. */
+/* For a limb, the direction along it; for other joints, the directions to their children. */
 static directions directions_of(const vgi_rests *x, size_t j)
 {
     directions d = {0};
@@ -124,7 +126,7 @@ static double degrees_between(const double a[3], const double b[3])
     return acos(fmax(-1, fmin(1, vgi_dot(a, b)))) * (180 / M_PI);
 }
 
-/* Agreement of the directions after rotating ours by q: the sum of cosines. */
+/* Agreement of the directions after rotating ours by q: sum of cosines. */
 static double agreement(const directions *d, const double q[4])
 {
     double m[9], sum = 0;
@@ -133,9 +135,9 @@ static double agreement(const directions *d, const double q[4])
     return sum;
 }
 
-/* ---- which, and how ---- */
+/* ---- ---- choice of joints, rotations ---- */
 
-/* The angle in degrees between the rest directions of joint j if it is a limb; 0 otherwise. */
+/* Angle in degrees between the rest directions of joint j if it is a limb, otherwise 0. */
 static double limb_apart(const vgi_rests *x, size_t j, double shortest)
 {
     if (x->from[j] == NONE) return 0;
@@ -153,7 +155,7 @@ static void choose_limbs(const vgi_rests *x, bool *wanted)
     for (size_t j = 0; j < x->of->njoints && most > APART; j++) wanted[j] = limb_apart(x, j, shortest) > ALIKE;
 }
 
-/* Turn q, that of the joint above, to where the directions of both agree. */
+/* Change q, the rotation of the joint above, so that the directions of both skeletons agree. */
 static double align_joint(const directions *d, double q[4])
 {
     if (d->n == 0) return 0;

@@ -1,9 +1,9 @@
 /* decompose.c: skinning decomposition: bones, weights and motions from poses alone (MATH 6; Le and Deng 2012).
  *
- * First clusters of vertices that move rigidly are found. The cluster with the largest error is split, and
- * vertices change to the cluster whose motion fits them best, until there are more clusters than wanted bones;
- * then those with the most similar motions are merged. Each cluster becomes a bone. Finally weights and motions
- * are fitted in turn. Motions for given weights are in free_bones.c, weights for given motions in skin.c.
+ * First the vertices are clustered by rigid motion. The cluster with the largest error is split, and vertices move to
+ * the cluster whose motion fits them best, until there are more clusters than wanted bones. Then the clusters with
+ * the most similar motions are merged. Each cluster becomes a bone. Finally weights and motions are fitted
+ * alternately. Motions for given weights are in free_bones.c, weights for given motions in skin.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/free_bones.h"
 #include "method/rig/learn.h"
@@ -17,18 +17,18 @@
 #include <stdlib.h>
 
 enum { SOME = 4096, LLOYD = 4, CHUNK = 256 };
-/* Split beyond the wanted number, to twice as many but by no more than EXTRA, then merge. No merging above
- * MOST_MERGED clusters, because the cost of every pair is examined. */
+/* Split into twice the wanted number of clusters, but at most EXTRA more, then merge. Above MOST_MERGED clusters
+ * nothing is merged, because merging examines every pair. */
 enum { EXTRA = 64, MOST_MERGED = 256 };
-static const double EXACT = 1e-12; /* relative to the mean square of the vertices: an error below this is zero */
+static const double EXACT = 1e-12; /* relative to the mean square of the vertices: a smaller error counts as zero */
 
-/* A partition of some vertices into clusters. Cluster j is bone j of a rig that has only its skin so far. */
+/* A partition of a set of vertices into clusters. Cluster j is bone j of a rig that has no skeleton yet. */
 typedef struct dividing {
     vgi_learning *l;
-    size_t n;          /* clusters */
+    size_t n;          /* number of clusters */
     double *at;        /* 3 per cluster: centroid of its vertices in the reference pose */
-    double *cost;      /* per cluster: sum of the squared distances */
-    size_t *size, *worst; /* vertices; the seed of a new cluster, + 1 */
+    double *cost;      /* per cluster: sum of squared distances */
+    size_t *size, *worst; /* number of vertices; the vertex that seeds a new cluster, + 1 */
     double spread;        /* mean over the vertices of the squared distance from the centroid, summed over the poses */
     vgi_rig_sums sums;
 } dividing;
@@ -132,10 +132,10 @@ static void divide(dividing *d, size_t j)
     d->n++;
 }
 
-/* Split the clusters with the largest errors, at most as many as exist. false: none can be split. */
+/* Split the clusters with the largest errors, at most as many as exist. Returns false if none can be split. */
 static bool divide_some(dividing *d, size_t wanted)
 {
-    enum { LEAST = 6 }; /* least number of vertices of a cluster to split */
+    enum { LEAST = 6 }; /* fewest vertices of a cluster that is split */
     size_t before = d->n, room = wanted - before < before ? wanted - before : before;
     weigh_clusters(d);
     for (size_t i = 0; i < room; i++) {
@@ -165,7 +165,7 @@ static void drop_empty(dividing *d)
     d->n = n;
 }
 
-/* Fit motions and clusters in turn. */
+/* Fit motions and assign vertices alternately. */
 static int settle(dividing *d, vg_err *e)
 {
     int r = VG_OK;
@@ -179,13 +179,14 @@ static int settle(dividing *d, vg_err *e)
 
 /* ---- merging ---- */
 
-/* The moments that the error of a rigid motion depends on; those of a union are the sum. */
+/* The moments that determine the error of a rigid motion. The moments of a union are the sum. */
 typedef struct moments {
-    double n, p[3], square; /* vertices; sum of places in the reference pose, from its centroid; of their squares */
+    double n, p[3], square; /* number of vertices; sum of their reference positions relative to the centroid; sum of
+                             * the squares */
 } moments;
 
-enum { PER_POSE = 13 }; /* sum of y p', row-major; sum of y; sum of squares of y: y is seen from the centroid of
-                           the pose */
+enum { PER_POSE = 13 }; /* sum of y p', row-major; sum of y; sum of squares of y; y is relative to the centroid of the
+                         * pose */
 
 typedef struct merging {
     dividing *d;
@@ -226,7 +227,7 @@ static void sum_moments(merging *m)
     }
 }
 
-/* The error of the best rigid motions of clusters i and j merged; j == i: of one cluster. */
+/* Error of the best rigid motions of clusters i and j merged; for j == i, of one cluster. */
 static double cost_together(const merging *m, size_t i, size_t j)
 {
     bool two = i != j;
@@ -327,7 +328,7 @@ static int divide_all(dividing *d, size_t wanted, vg_err *e)
     return r;
 }
 
-/* A skeleton of unconnected joints at the clusters. */
+/* A skeleton of unconnected joints at the cluster centroids. */
 static int make_rig(vg_rig *rig, size_t n, const double *at, vg_err *e)
 {
     static const uint8_t channels[6] = {1, 2, 3, 4, 5, 6};
@@ -367,7 +368,7 @@ static int find_clusters(vgi_learning *l, size_t wanted, dividing *d, vg_err *e)
     d->size = vgi_array(most, sizeof *d->size, e), d->worst = vgi_array(most, sizeof *d->worst, e);
     l->rig.skin_bone = vgi_array(l->nv, VG_SKIN * sizeof *l->rig.skin_bone, e);
     l->rig.skin_weight = vgi_array(l->nv, VG_SKIN * sizeof *l->rig.skin_weight, e);
-    /* without a skeleton the transform of bone j is that of joint j */
+    /* without a skeleton, the transform of bone j is that of joint j */
     l->rig.bone = vgi_array_raw(most, sizeof *l->rig.bone, e), l->rig.at = d->at;
     bool ok = d->cost && d->size && d->worst && l->rig.skin_bone && l->rig.skin_weight && l->rig.bone;
     for (size_t j = 0; ok && j < most; j++) l->rig.bone[j] = (uint32_t)j;
@@ -380,7 +381,7 @@ static int find_clusters(vgi_learning *l, size_t wanted, dividing *d, vg_err *e)
     return r;
 }
 
-/* Clusters, a rig, weights and motions on a subset of the vertices; then on all. */
+/* Fit clusters, a rig, weights and motions on a subset of the vertices, then on all. */
 static int decompose(vgi_learning *l, vg_rig *rig, size_t nv, const double *reference, size_t wanted, size_t n,
                      const double *const *poses, double *miss, vg_err *e)
 {

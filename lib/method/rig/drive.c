@@ -1,6 +1,5 @@
 /* drive.c: a rig driven by another skeleton.
- * Leaves out which joints belong together (pair_joints.c), how rest poses are made alike (align.c), and what a rig does
- * with its transforms (map_eval.c).
+ * Joints are paired in pair_joints.c, rest poses aligned in align.c; map_eval.c evaluates the rig's transforms.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/align.h"
 #include "model/rig.h"
@@ -14,16 +13,17 @@ static const uint32_t NONE = UINT32_MAX;
 struct vg_driver {
     const vg_rig *r;
     const vg_skeleton *by;
-    uint32_t *from;  /* of each joint of the rig: the other's joint; UINT32_MAX: none */
-    bool *carried;   /* of each joint of the rig: paired, and no joint above it is */
-    double *before;  /* of each joint of the rig: a turn that comes before the other's: 4 numbers */
-    double *degrees; /* of each joint of the rig: by how much it was aligned */
+    uint32_t *from;  /* per joint of the rig: the paired joint, or UINT32_MAX */
+    bool *carried;   /* per joint of the rig: paired, with no paired joint above it */
+    double *before;  /* per joint of the rig: a rotation applied before the other's, 4 numbers */
+    double *degrees; /* per joint of the rig: the angle of alignment */
     double scale;
     size_t missing;
-    double *positions, *turns; /* of the rig's joints */
+    double *positions, *turns; /* of the joints of the rig */
 };
 
-/* Size of the rig beside the other: by the legs, which carry the body; without legs, by all bones that both have. */
+/* Ratio of the sizes, rig to skeleton: by leg length, because legs carry the body; without legs, by all paired
+ * bones. */
 static double compare_sizes(const vg_driver *d, const vgi_rests *x)
 {
     double legs[2] = {vgi_leg_length(x->of, x->roles, x->rest), vgi_leg_length(x->by, x->their_roles, x->theirs)};
@@ -111,7 +111,7 @@ double vg_driver_aligned(const vg_driver *d, size_t joint)
     return d->degrees[joint];
 }
 
-/* The offset of the other's joint k from its place at the end of its bone: the effect of position channels. */
+/* Offset of the other's joint k from the end of its bone, as position channels cause it. */
 static void read_slip(const vg_driver *d, size_t k, const double *positions, const double *turns, double slip[3])
 {
     uint32_t parent = d->by->joints[k].parent;
@@ -130,7 +130,7 @@ static void turn_joint(vg_driver *d, size_t j, const double *turns)
     else memcpy(q, (const double[4]){1, 0, 0, 0}, 4 * sizeof *q);
 }
 
-/* Joints that nothing above carries are where the other's are, in the rig's size. */
+/* A joint with no paired joint above it takes the other joint's position, scaled to the rig's size. */
 static void place_joint(vg_driver *d, size_t j, const double *positions, const double *turns)
 {
     const vg_joint *joint = &d->r->skeleton.joints[j];

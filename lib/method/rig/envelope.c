@@ -1,6 +1,6 @@
-/* envelope.c: fit of a map of bones to poses (MATH 6; T 5): the bone and offset of each corner, the held vertices,
- * and the linear operator they collapse into. Sums over poses are in rig_sums.c, weights in skin.c, unknown
- * motions in inverse_skin.c.
+/* envelope.c: fits a map of bones to poses (MATH 6; T 5): bone and offset of each corner, held vertices, and the
+ * linear operator they collapse into. Sums over poses are in rig_sums.c, weights in skin.c, unknown motions in
+ * inverse_skin.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
 #include "numeric/lapack.h"
@@ -15,14 +15,14 @@ enum { CHUNK = 64, MOST_HELD = 2048, NEAR = 32, AROUND = 8 };
 
 struct vg_rig_fitter {
     const vg_head *h;
-    vg_rig rig;  /* that of h, with the weights of the last fit */
+    vg_rig rig;  /* the rig of h with the weights of the last fit */
     vg_rig_options o;
     vg_graph *g;
     vgi_turns turns;
     vgi_rig_sums sums;
-    double *miss; /* nv: error of linear blend skinning */
-    bool skinned; /* the skin is fitted to all poses that were added */
-    vg_map base;  /* the envelope before it is refined, for o.bones_per_corner; n 0: not made yet */
+    double *miss; /* nv: error of linear blend skinning per vertex */
+    bool skinned; /* the skin was fitted to all poses added so far */
+    vg_map base;  /* the envelope before refinement, for o.bones_per_corner; n == 0: not computed yet */
 };
 
 int vg_rig_fitter_new(vg_rig_fitter **out, const vg_head *h, const vg_rig_options *o, vg_err *e)
@@ -77,7 +77,7 @@ void vg_rig_fitter_add(vg_rig_fitter *f, size_t n, const double *const *poses, c
     vg_map_clear(&f->base);
     for (size_t k = 0; k < n; k++) {
         if (!memcmp(poses[k], f->h->body.reference, 3 * f->h->body.mesh.nv * sizeof(double)))
-            continue; /* it carries no information */
+            continue; /* carries no information */
         p[count] = poses[k], t[count++] = transforms[k];
         if (count == SOME) {
             vgi_rig_sums_add(&f->sums, count, p, t, f->o.threads);
@@ -96,13 +96,13 @@ typedef struct cornering {
     double *space; /* per chunk: 4 n */
 } cornering;
 
-/* The sum of squared scales of a bone. */
+/* Sum of squared scales of a bone. */
 static double weight_of(const vgi_rig_sums *s, size_t j)
 {
     return s->cross[4 * j * 4 * s->n + 4 * j];
 }
 
-/* The rotation of a face beside bone j. */
+/* Rotation of a face relative to bone j. */
 static void face_turn(const vgi_rig_sums *s, size_t face, size_t j, double q[4])
 {
     double m[9], h[9];
@@ -120,11 +120,11 @@ static void corner_quaternion(const vgi_rig_sums *s, size_t face, size_t j, cons
     face_turn(s, face, j, turn);
     vg_quat_apply(turn, r, turned);
     if (vgi_dot(r, r) > 0 && vgi_dot(u, u) > 1e-18 * vgi_dot(r, r)) vg_quat_between(turned, u, rest);
-    else if (vgi_dot(r, r) > 0) rest[0] = 1e-9; /* it vanishes */
+    else if (vgi_dot(r, r) > 0) rest[0] = 1e-9; /* u vanishes */
     vg_quat_multiply(rest, turn, q);
 }
 
-/* The candidate bones of a face: those in the skin of its vertices. */
+/* Candidate bones of a face: those in the skin of its vertices. */
 static size_t face_bones(const vg_rig_fitter *f, size_t face, uint32_t *list)
 {
     const vg_rig *r = &f->rig;
@@ -138,8 +138,8 @@ static size_t face_bones(const vg_rig_fitter *f, size_t face, uint32_t *list)
     return n;
 }
 
-/* Least squares for d = A_a x + A_b y over the poses: x and y. Returns the explained part of sum |d|^2. The
- * unknowns are x + y and y, the latter with a ridge: where both bones move alike the first takes everything. */
+/* Least squares for d = A_a x + A_b y over the poses, for x and y. Returns the explained part of sum |d|^2. The
+ * unknowns are x + y and y, the latter with a ridge: where both bones move alike, the first takes everything. */
 static double pair_vectors(const vgi_rig_sums *s, size_t a, size_t b, const double *raw, double x[3], double y[3])
 {
     static const double ridge = 1e-4;
@@ -162,7 +162,7 @@ static double pair_vectors(const vgi_rig_sums *s, size_t a, size_t b, const doub
     return explained;
 }
 
-/* One corner: raw: for each bone the sum of A' d, in steps of 4. */
+/* Fit one corner. raw: for each bone the sum of A' d, in steps of 4. */
 static void fit_corner(const cornering *x, size_t face, size_t c, const double *raw, const uint32_t *list, size_t n)
 {
     const vgi_rig_sums *s = &x->f->sums;
@@ -232,7 +232,7 @@ static int fit_corners(const vg_rig_fitter *f, vg_map *m, vg_err *e)
 
 /* the held vertices */
 
-/* The distance from rigid motion of vertex v with its best bone, in mesh units. */
+/* Distance of vertex v from rigid motion with its best bone, in mesh units. */
 static double rigidity(const vgi_rig_sums *s, size_t v)
 {
     size_t width = 4 * s->n;
@@ -248,7 +248,7 @@ static double rigidity(const vgi_rig_sums *s, size_t v)
 
 typedef struct choosing {
     const vg_rig_fitter *f;
-    double *doubt;    /* per vertex: its deviation from rigid motion and from its skin */
+    double *doubt;    /* per vertex: deviation from rigid motion and from its skin */
     double *distance; /* squared distance from the nearest chosen vertex; -1: excluded */
     uint32_t *list;
     size_t n;
@@ -266,7 +266,7 @@ static void hold(choosing *x, size_t v)
     x->distance[v] = -1;
 }
 
-/* One vertex per bone and component: the one with the least deviation. */
+/* Choose one vertex per bone and component: the one with the smallest deviation. */
 static int hold_groups(choosing *x, vg_err *e)
 {
     const vg_head *h = x->f->h;
@@ -294,10 +294,10 @@ static int by_number(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-/* Then vertices far from all chosen ones with small deviations, until the share is reached. */
+/* Then choose vertices with small deviations far from all chosen ones, until the share is reached. */
 static int choose_held(const vg_rig_fitter *f, vg_map *m, vg_err *e)
 {
-    static const double tolerance = 1e-3; /* in D: deviations below it count as zero */
+    static const double tolerance = 1e-3; /* in D; smaller deviations count as zero */
     size_t nv = f->g->nv, want = (size_t)(f->o.hold * (double)f->g->attached + 0.5);
     double d = vg_diagonal(f->h->body.reference, nv);
     choosing x = {.f = f,
@@ -330,7 +330,7 @@ static int choose_held(const vg_rig_fitter *f, vg_map *m, vg_err *e)
     return r;
 }
 
-/* the residual */
+/* The residual of the envelope. */
 
 typedef struct refining {
     const vg_rig_fitter *f;
@@ -341,7 +341,7 @@ typedef struct refining {
     double *space; /* per chunk: 4 n */
 } refining;
 
-/* Element (i, k) x (j, l) of the sums of T_i' T_j, the reference pose among the poses. */
+/* Element (i, k) x (j, l) of the sums of T_i' T_j, with the reference pose among the poses. */
 static double cross_with_reference(const refining *x, size_t i, size_t k, size_t j, size_t l)
 {
     const vgi_rig_sums *s = &x->f->sums;
@@ -353,7 +353,7 @@ static double cross_with_reference(const refining *x, size_t i, size_t k, size_t
     return sum + (a[0] - o[0]) * (b[0] - o[0]) + (a[1] - o[1]) * (b[1] - o[1]) + (a[2] - o[2]) * (b[2] - o[2]);
 }
 
-/* The residual of vertex v, beyond what row z (seen from the joints) gives, along number k of bone i. */
+/* Residual of vertex v, minus the contribution of row z (relative to the joints), along component k of bone i. */
 static double missing(const refining *x, size_t v, const double *z, size_t i, size_t k)
 {
     const vgi_rig_sums *s = &x->f->sums;
@@ -367,7 +367,7 @@ static double missing(const refining *x, size_t v, const double *z, size_t i, si
     return sum;
 }
 
-/* The bones of the vertex, then the neighbours of the first two in the skeleton. */
+/* Bones of the vertex, then the neighbours of the first two in the skeleton. */
 static size_t bones_around(const refining *x, size_t v, uint32_t *list)
 {
     const vg_rig *r = &x->f->rig;
@@ -384,8 +384,8 @@ static size_t bones_around(const refining *x, size_t v, uint32_t *list)
     return n;
 }
 
-/* Ridge regression on the motions of the vertex's bones. Only differences of translations enter, so that a motion
- * of the whole is kept. */
+/* Ridge regression on the motions of the vertex's bones. Only differences of translations enter, so that rigid motion
+ * of the whole body is preserved. */
 static void refine_vertex(const refining *x, size_t v, double *z)
 {
     enum { MOST = 4 * AROUND };
@@ -474,7 +474,7 @@ static int make_arrays(const vg_rig_fitter *f, vg_map *m, bool corners, vg_err *
     return vgi_place_by_bones(r, m, m->place, e);
 }
 
-/* The envelope before it is refined. */
+/* The envelope before refinement. */
 static int make_base(vg_rig_fitter *f, vg_map *m, vg_err *e)
 {
     const vgi_map_body body = {f->h->body.reference, &f->rig};

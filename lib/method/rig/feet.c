@@ -1,7 +1,7 @@
-/* feet.c: keeps standing feet from sliding. While the heel or the ball of a foot hardly moves and is low, it is
- * held in place, and thigh and shin bend so that the foot reaches it. Between two stands the correction changes
- * smoothly. The foot keeps its rotation and the body its motion, except that the body is lowered where a leg would
- * be too short. Driving a rig is in drive.c.
+/* feet.c: keeps standing feet from sliding (foot contact). While the heel or the ball of a foot is slow and low, it
+ * is held in place, and thigh and shin bend so that the foot reaches it. Between two contacts the correction is
+ * interpolated smoothly. The foot keeps its rotation and the body its motion, except that the body is lowered where a
+ * leg would be too short. The rig is driven in drive.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/align.h"
 #include "numeric/stats.h"
@@ -13,18 +13,19 @@
 
 static const uint32_t NONE = UINT32_MAX;
 static const double SLOW = 0.15;    /* a joint stands below this share of its fast speed */
-static const double LOW = 0.12;     /* and below this height above its lowest position, in lengths of the leg */
-static const double STRETCH = 0.999; /* largest distance from hip to foot, in lengths of the leg */
-enum { SHORTEST = 3 };              /* poses of a stand */
+static const double LOW = 0.12;     /* and below this height above its lowest position, relative to the length of the
+                                     * leg */
+static const double STRETCH = 0.999; /* largest distance from hip to foot, relative to the length of the leg */
+enum { SHORTEST = 3 };              /* fewest poses of a contact */
 
 typedef enum group { BODY = 0, THIGH, SHIN, FOOT } group;
 
-/* One leg: joints; of each bone what it moves with; of each pose where the correction takes the foot. */
+/* One leg: its joints, the group of each bone, and the correction of the foot in each pose. */
 typedef struct leg {
     uint32_t thigh, shin, foot, toe; /* NONE if there is no toe */
     uint8_t *group;                  /* of each bone */
     double length[2];                /* of thigh and shin */
-    double *shift;                   /* 3 numbers a pose */
+    double *shift;                   /* 3 per pose */
     bool *known;                     /* per pose: whether the foot is held; elsewhere the shift is interpolated */
 } leg;
 
@@ -32,13 +33,13 @@ typedef struct feet {
     const vg_rig *r;
     size_t n;
     double *const *transforms;
-    int up;      /* the axis along which the legs stand */
-    double sign; /* 1: up is along it, -1: against it */
+    int up;      /* vertical axis */
+    double sign; /* 1 if up is along the axis, -1 if against it */
     leg legs[2];
     size_t nlegs;
-    double *path;  /* 3 numbers a pose: of the joint in hand */
-    bool *stands;  /* of each pose: of the joint in hand */
-    double *speed; /* of each pose */
+    double *path;  /* 3 per pose: path of the current joint */
+    bool *stands;  /* per pose: whether the current joint stands */
+    double *speed; /* per pose */
     double *lower; /* per pose: how far the body is lowered */
 } feet;
 
@@ -70,7 +71,7 @@ static double rest_distance(const vg_rig *r, uint32_t a, uint32_t b)
     return vgi_length(d);
 }
 
-/* Find the leg of a side; false: the rig has none. */
+/* Find the leg of a side. Returns false if the rig has none. */
 static bool find_leg(const vg_rig *r, const vgi_role *roles, int side, leg *l)
 {
     uint32_t *joint[4] = {&l->thigh, &l->shin, &l->foot, &l->toe};
@@ -123,9 +124,9 @@ static int prepare(feet *f, vg_err *e)
     return f->path && f->stands && f->speed && f->lower ? VG_OK : VG_ENOMEM;
 }
 
-/* ---- when a joint stands ---- */
+/* ---- ---- contacts ---- */
 
-/* The distance from pose to pose, the mean of before and after. */
+/* Distance between consecutive poses: the mean of those before and after. */
 static void measure_speed(feet *f)
 {
     double d[3];
@@ -160,9 +161,9 @@ static void find_stands(feet *f, uint32_t joint, double leg_length)
     drop_short_stands(f);
 }
 
-/* ---- where the foot goes ---- */
+/* ---- ---- target of the foot ---- */
 
-/* A stand from pose i to end. If the foot is held already the joint keeps that position; otherwise it is held at
+/* A contact from pose i to end. If the foot is held already, the joint keeps its position; otherwise it is held at
  * its mean position. */
 static void hold_stand(const feet *f, leg *l, size_t i, size_t end)
 {
@@ -190,7 +191,7 @@ static void hold_joint(feet *f, leg *l, uint32_t joint)
     }
 }
 
-/* Interpolate smoothly from the last held pose a to the next one b. */
+/* Interpolate smoothly between the held poses a and b. */
 static void fill_between(leg *l, size_t a, size_t b)
 {
     for (size_t p = a + 1; p < b; p++) {
@@ -227,7 +228,7 @@ static double lower_by(const feet *f, const leg *l, size_t p)
     return fabs(d[f->up]) - sqrt(reach * reach - flat);
 }
 
-/* A smooth curve above the need of the legs: the running maximum, then its running mean. */
+/* A smooth curve above what the legs need: the running maximum, then its running mean. */
 static void lower_body(feet *f)
 {
     enum { NEAR = 4 };
@@ -259,8 +260,8 @@ static void move_bone(double *t, const double q[4], const double from[3], const 
     vg_quat_multiply(q, t, t);
 }
 
-/* The position of the knee for a foot at `foot`, which is first moved within reach of the leg. The knee stays on
- * the side to which it is bent; `forward` decides for a straight leg. */
+/* Position of the knee for a foot at `foot`, which is first moved within reach of the leg. The knee stays on the side
+ * to which it bends; for a straight leg `forward` decides. */
 static void place_knee(const leg *l, const double hip[3], const double knee[3], const double before[3],
                        const double forward[3], double foot[3], double now[3])
 {
@@ -270,7 +271,7 @@ static void place_knee(const leg *l, const double hip[3], const double knee[3], 
     vgi_turn_between(old, u, q);
     vg_quat_apply(q, thigh, side);
     for (int k = 0; k < 3; k++) u[k] /= d, foot[k] = hip[k] + reach * u[k];
-    for (int pass = 0; pass < 2; pass++) { /* the thigh, or, of a straight leg, what is forward, across the leg */
+    for (int pass = 0; pass < 2; pass++) { /* perpendicular to the leg: the thigh, or `forward` for a straight leg */
         double along = vgi_dot(side, u);
         for (int k = 0; k < 3; k++) side[k] -= along * u[k];
         if (vgi_length(side) > 1e-3 * a) break;
@@ -286,14 +287,14 @@ static void bend_leg(const feet *f, const leg *l, size_t p)
     joint_at(f->r, l->thigh, t, hip);
     joint_at(f->r, l->shin, t, knee);
     joint_at(f->r, l->foot, t, foot);
-    if (f->up == 2) forward[1] = -1; /* as bodies usually look that stand along z */
+    if (f->up == 2) forward[1] = -1; /* characters with z up usually face -y */
     else forward[2] = 1;
     if (l->toe != NONE) {
         joint_at(f->r, l->toe, t, forward);
         for (int k = 0; k < 3; k++) forward[k] -= foot[k];
     }
     vgi_sum(foot, l->shift + 3 * p, to);
-    to[f->up] += f->sign * f->lower[p]; /* the body went down, the foot does not */
+    to[f->up] += f->sign * f->lower[p]; /* the body was lowered, the foot stays */
     double away[3] = {to[0] - hip[0], to[1] - hip[1], to[2] - hip[2]};
     if (!(vgi_length(away) > 0)) return;
     place_knee(l, hip, knee, foot, forward, to, now);

@@ -1,10 +1,10 @@
-/* free_bones.c: the motions of bones without a skeleton in poses that are known by their vertices.
+/* free_bones.c: fits the motions of bones without a skeleton to poses given as vertices.
  *
- * Linear blend skinning is linear in the 3 x 4 matrices T_j = [R_j t_j] of the bones, which take (p - at_j, 1) to the
- * pose. Over all vertices the squared distance is the quadratic tr(T G T') - 2 tr(T B') in T = [T_1 T_2 ...], whose G
- * belongs to the weights and whose B is one pass over the pose. It is minimised bone by bone, each the rotation and
- * translation that are best beside the others (Le and Deng 2012), until no bone turns any more.
- * Leaves out bones that hang together (inverse_skin.c) and where the weights come from (decompose.c).
+ * Linear blend skinning is linear in the 3 x 4 matrices T_j = [R_j t_j] of the bones, which map (p - at_j, 1) to the
+ * pose. Summed over all vertices the squared distance is the quadratic tr(T G T') - 2 tr(T B') in T = [T_1 T_2 ...].
+ * G depends on the weights alone; B takes one pass over the pose. The quadratic is minimised bone by bone, each with
+ * the best rotation and translation for fixed other bones (Le and Deng 2012), until no bone rotates any more.
+ * Bones connected by a skeleton are in inverse_skin.c, weights in decompose.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/free_bones.h"
 #include "numeric/polar.h"
@@ -23,10 +23,10 @@ struct vg_free_bones {
     double *local;    /* 4 per bone of a vertex: its weight times (p - at, 1) */
     double *g;        /* 4 n x 4 n */
     double *own;      /* 16 n: per bone the sum of weight (p - at, 1) (p - at, 1)' */
-    double *space;    /* BLOCK times working space */
+    double *space;    /* BLOCK times the workspace */
 };
 
-/* Working space of one pose. */
+/* Workspace of one pose. */
 typedef struct working {
     double *t, *b, *left; /* 12 n each, as 3 x 4 n: T, B, B - T G */
 } working;
@@ -100,7 +100,7 @@ void vg_free_bones_free(vg_free_bones **out)
 
 /* ---- one pose ---- */
 
-/* B of a pose whose centroid is taken for the origin. */
+/* B of a pose relative to its centroid. */
 static void load(const vg_free_bones *x, const double *pose, const double centre[3], working *w)
 {
     size_t width = 4 * x->n;
@@ -128,7 +128,7 @@ static void place_bone(const double *g, size_t stride, const double m[12], doubl
     }
 }
 
-/* Fit each bone alone, as if only it moved its vertices. A bone without vertices moves with the whole. */
+/* Fit each bone alone, as if no other bone moved its vertices. A bone without vertices follows the whole body. */
 static void start(const vg_free_bones *x, working *w)
 {
     size_t width = 4 * x->n;
@@ -152,7 +152,7 @@ static void find_left(const vg_free_bones *x, working *w)
         }
 }
 
-/* Fit bone j with the other bones fixed; returns the largest change of its rotation. */
+/* Fit bone j with the other bones fixed. Returns the largest change of its rotation. */
 static double improve_bone(const vg_free_bones *x, working *w, size_t j)
 {
     size_t width = 4 * x->n;
@@ -183,7 +183,7 @@ typedef struct fitting {
     bool begun;
 } fitting;
 
-/* Set T from the given transforms. */
+/* Initialise T with the given transforms. */
 static void continue_from(const vg_free_bones *x, const double *transforms, const double centre[3], working *w)
 {
     size_t width = 4 * x->n;
@@ -201,7 +201,7 @@ static void continue_from(const vg_free_bones *x, const double *transforms, cons
 
 static void fit_pose(void *context, size_t k)
 {
-    static const double still = 1e-6; /* radians, approximately: a smaller change ends the search */
+    static const double still = 1e-6; /* radians, approximately: a smaller change ends the iteration */
     const fitting *f = context;
     const vg_free_bones *x = f->x;
     size_t width = 4 * x->n;

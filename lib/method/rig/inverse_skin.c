@@ -1,12 +1,12 @@
-/* inverse_skin.c: the motions of the bones of a rig in poses that are known by their vertices only, and weights for such a
+/* inverse_skin.c: inverse skinning: the motions of a rig's bones in poses given as vertices, and weights for such a
  * rig.
  *
- * With the joints together, linear blend skinning is linear in the rotations R_j of the bones: vertex v is at p + sum
- * of R_j q_vj, p the place of the first joint, q_vj made of the weights and the reference pose. So over all vertices
- * the squared distance is a quadratic tr(R G R') - 2 tr(R B') in R = [R_1 R_2 ...], whose G belongs to the rig and
- * whose B is one pass over the pose. It is minimised over rotations: each bone in turn at first, then all at once by
- * damped Gauss-Newton steps.
- * Leaves out how weights are fitted to known motions (skin.c).
+ * With joints connected, linear blend skinning is linear in the rotations R_j of the bones: vertex v is at p + sum of
+ * R_j q_vj, where p is the position of the first joint and q_vj comes from the weights and the reference pose. Summed
+ * over all vertices the squared distance is the quadratic tr(R G R') - 2 tr(R B') in R = [R_1 R_2 ...]. G depends on
+ * the rig alone; B takes one pass over the pose. The quadratic is minimised over rotations: first one bone at a time,
+ * then all at once by damped Gauss-Newton steps.
+ * Weights for known motions are fitted in skin.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
 #include "numeric/lapack.h"
@@ -21,30 +21,28 @@
 
 enum { BLOCK = 8, SHARES = 8, SWEEPS = 8, STEPS = 30, FIRST_STEPS = 8 };
 static const double FIRST_PRIOR = 1e-3,
-                    LAST_PRIOR = 1e-10; /* weight of the pull of a bone towards its parent, relative to its
-                                           vertices */
+                    LAST_PRIOR = 1e-10; /* weight of the pull of a bone towards its parent, relative to its vertices */
 
 struct vg_inverse_skin {
-    size_t nv, n; /* vertices, bones */
+    size_t nv, n; /* number of vertices, of bones */
     int threads;
     double least;     /* radians: smaller rotations count as zero */
     int steps;        /* most steps of each descent */
     uint32_t *parent; /* parent of each bone; parents come first */
-    double *at;       /* 3 n: the joints */
-    double *offset;   /* 3 n: from the parent's joint */
+    double *at;       /* 3 n: positions of the joints */
+    double *offset;   /* 3 n: offset from the parent's joint */
     uint32_t *bone;   /* VG_SKIN per vertex */
     double *weight,
-        *local;    /* per bone of a vertex: its weight, and weight times the vertex relative to the joint: 3
-                      numbers */
+        *local;    /* per bone of a vertex: its weight; weight times the vertex relative to the joint, 3 numbers */
     double *g;     /* 3 n x 3 n */
     double *mean;  /* 3 n: mean of q */
     double *size;  /* n: trace of the diagonal blocks of g */
-    double *own;   /* 4 n: sums over a bone's own vertices of local and of the weight */
+    double *own;   /* 4 n: sums of local and of the weight over a bone's own vertices */
     bool *carries; /* n: whether a bone or a descendant has vertices */
-    double *space; /* BLOCK times working space */
+    double *space; /* BLOCK times the workspace */
 };
 
-/* Working space of one pose. */
+/* Workspace of one pose. */
 typedef struct working {
     double *r, *trial, *b; /* 9 n each: rotations, trial rotations, B */
     double *left;          /* 9 n: B - R G at the last evaluation of the objective */
@@ -86,11 +84,11 @@ static size_t vertex_row(const vg_inverse_skin *x, size_t v, uint32_t *list, dou
     return count;
 }
 
-/* The sums over one share of the vertices. Shares are fixed, so that the number of threads does not change the
- * result. */
+/* The sums over one share of the vertices. Shares are fixed, so that the result does not depend on the number of
+ * threads. */
 typedef struct summing {
     const vg_inverse_skin *x;
-    uint32_t *list; /* n per share, like all others */
+    uint32_t *list; /* n per share, as are the others */
     bool *seen;
     double *q, *mean, *g; /* 3 n, 3 n, 3 n x 3 n: blocks with row >= column */
 } summing;
@@ -234,7 +232,8 @@ void vg_inverse_skin_free(vg_inverse_skin **out)
     *out = NULL;
 }
 
-/* B of a pose relative to its centroid: 3 x 3 per bone, first of its own vertices, then of its descendants. */
+/* B of a pose relative to its centroid, 3 x 3 per bone: first from its own vertices, then including its
+ * descendants. */
 static void load(const vg_inverse_skin *x, const double *pose, const double centre[3], working *w)
 {
     size_t n = x->n;
@@ -278,7 +277,7 @@ static void left_for(const vg_inverse_skin *x, const working *w, size_t j, doubl
     }
 }
 
-/* left = B - R G of all bones, with one product. */
+/* left = B - R G for all bones, with one product. */
 static void find_left(const vg_inverse_skin *x, working *w, const double *r)
 {
     size_t width = 3 * x->n;
@@ -292,7 +291,7 @@ static void find_left(const vg_inverse_skin *x, working *w, const double *r)
                 w->left[9 * j + 3 * c + k] = w->b[9 * j + 3 * c + k] - rg[c * width + 3 * j + k];
 }
 
-/* Leaves B - R G in w->left. */
+/* Returns the objective; leaves B - R G in w->left. */
 static double objective(const vg_inverse_skin *x, working *w, const double *r, double prior)
 {
     double f = 0;
@@ -364,8 +363,8 @@ static void make_rows(const vg_inverse_skin *x, working *w, size_t i)
     }
 }
 
-/* The Gauss-Newton system in small rotations of all bones: the lower triangle of h, and the right-hand side from B
- * - R G at r. */
+/* The Gauss-Newton system in small rotations of all bones: the lower triangle of h, and the right-hand side from B -
+ * R G at r. */
 static void make_system(const vg_inverse_skin *x, working *w, double prior, double damping)
 {
     size_t n = x->n, width = 3 * n;
@@ -405,9 +404,9 @@ static double turn_bones(const vg_inverse_skin *x, working *w)
 
 static void descend(const vg_inverse_skin *x, working *w, double prior)
 {
-    static const double noise = 1e-16; /* of the objective */
+    static const double noise = 1e-16; /* relative rounding error of the objective */
     double damping = 1e-6, f = objective(x, w, w->r, prior), turn = 1;
-    bool moved = true; /* w->left is that of w->r */
+    bool moved = true; /* w->left belongs to w->r */
     for (int step = 0; step < x->steps && turn > x->least && damping < 1e6; step++) {
         if (!moved) find_left(x, w, w->r);
         moved = false;
@@ -426,7 +425,7 @@ static void descend(const vg_inverse_skin *x, working *w, double prior)
         memcpy(w->r, w->trial, 9 * x->n * sizeof *w->r);
         f = now, damping *= 0.1, moved = true;
         if (gain < noise * fabs(f))
-            break; /* the last step that exceeds rounding */
+            break; /* the last step above rounding error */
     }
     for (size_t j = 0; j < x->n; j++) { /* rounding error of the products */
         double m[9];
@@ -443,7 +442,7 @@ typedef struct fitting {
     bool begun;        /* rotations hold initial values */
 } fitting;
 
-/* Start with each bone alone, about the centroid of its own vertices; a bone without vertices takes its parent's
+/* Start with each bone alone, about the centroid of its own vertices. A bone without vertices takes its parent's
  * rotation. */
 static void start(const vg_inverse_skin *x, working *w, size_t j)
 {

@@ -1,8 +1,8 @@
-/* joint_fit.c: the position of the root of a skeleton in a mesh, from poses of both.
+/* joint_fit.c: finds the position of a skeleton's root in a mesh from poses of both.
  *
- * A vertex that is rigid with joint j lies at R (x - at_j) + p in every pose. R, p and x are known, and at_j is
- * known but for a shift that all joints share. So each vertex estimates the shift as x - offset_j - mean of R' (y
- * - p), for the joint that it follows most rigidly.
+ * A vertex that is rigid with joint j lies at R (x - at_j) + p in every pose. R, p and x are known; at_j is known
+ * except for a shift common to all joints. So each vertex estimates the shift as x - offset_j - mean of R' (y - p),
+ * for the joint that it follows most rigidly.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "numeric/stats.h"
@@ -18,8 +18,8 @@ typedef struct locating {
     const double *reference, *rest;
     const double *const *poses, *const *positions;
     double *turns;   /* n x joints rotation matrices */
-    double *opinion; /* 3 per vertex */
-    double *spread;  /* per vertex: root mean square */
+    double *opinion; /* 3 per vertex: its estimate of the shift */
+    double *spread;  /* per vertex: root mean square deviation from rigid motion */
 } locating;
 
 static double try_joint(const locating *x, size_t v, size_t j, double mean[3])
@@ -59,7 +59,7 @@ static void ask_vertices(void *context, size_t task)
     }
 }
 
-/* The median, coordinate by coordinate, of the better half of the vertices. */
+/* Median, per coordinate, of the better half of the vertices. */
 static void agree(const locating *x, double *list, double shift[3], double *spread)
 {
     size_t n = 0;

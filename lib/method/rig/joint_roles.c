@@ -1,6 +1,6 @@
-/* joint_roles.c: what part of a body a joint is: its name is cut into words, prefixes and the side are taken off, and
- * what is left is looked up; then what names leave open is decided by the tree of joints.
- * Leaves out which joint of another skeleton belongs to it (pair_joints.c).
+/* joint_roles.c: the role of a joint in the body. Its name is split into words, prefix and side are removed, and the
+ * remainder is looked up. Joints whose names leave the role open get it from the tree of joints.
+ * Joints of two skeletons are matched in pair_joints.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/joint_roles.h"
 
@@ -10,10 +10,10 @@
 enum { KEY = 40, WORD = 40 };
 static const uint32_t NONE = UINT32_MAX;
 
-/* A name without its prefix and side: letters in lower case, and the first number in it. */
+/* A name without prefix and side: its letters in lower case, and the first number in it. */
 typedef struct key {
     char text[KEY];
-    int number; /* -1: there is none */
+    int number; /* -1: no number */
     int side;
 } key;
 
@@ -47,7 +47,7 @@ static const struct {
              {"foot", VGI_FOOT},          {"ankle", VGI_FOOT},        {"toe", VGI_TOE},
              {"toes", VGI_TOE},           {"toebase", VGI_TOE},       {"ball", VGI_TOE}};
 
-/* What follows the last ':' or '|', and one of the known prefixes. */
+/* The name after the last ':' or '|' and after a known prefix. */
 static const char *without_prefix(const char *name)
 {
     for (const char *c = name; *c; c++)
@@ -60,8 +60,8 @@ static const char *without_prefix(const char *name)
     return name;
 }
 
-/* The next word of a name, in lower case: "LeftUpLeg" has three, "LHipJoint" has three, "upper_arm.L" has three.
- * Returns what follows it; NULL: there is none. */
+/* The next word of a name, in lower case: "LeftUpLeg", "LHipJoint" and "upper_arm.L" have three each. Returns the
+ * position after the word, or NULL at the end. */
 static const char *next_word(const char *at, char word[WORD])
 {
     size_t n = 0;
@@ -78,7 +78,7 @@ static const char *next_word(const char *at, char word[WORD])
     return at;
 }
 
-/* Take "left" or "right" off the front of a word. */
+/* Remove "left" or "right" from the front of a word. */
 static const char *take_side(const char *word, int *side)
 {
     if (!strcmp(word, "l") || !strcmp(word, "r")) {
@@ -118,7 +118,7 @@ static vgi_role look_up(const char *name)
     return role;
 }
 
-/* ---- what names leave open ---- */
+/* ---- ---- roles from the tree of joints ---- */
 
 static bool has(const vgi_role *roles, size_t n, vgi_part part, int side)
 {
@@ -142,7 +142,7 @@ static void decide_side(vgi_role *roles, size_t n, int side)
     rename_part(roles, n, VGI_SIDED_HIP, thigh ? VGI_HIP_JOINT : VGI_THIGH, side);
 }
 
-/* below[j]: is a joint of this part at j or below it? */
+/* below[j]: whether joint j or one below it has this part. */
 static void find_above(const vg_skeleton *s, const vgi_role *roles, vgi_part part, bool *below)
 {
     for (size_t j = s->njoints; j-- > 0;) {
@@ -151,7 +151,8 @@ static void find_above(const vg_skeleton *s, const vgi_role *roles, vgi_part par
     }
 }
 
-/* Rigify: the first of the spine, from which thighs hang, is the hips; what is above the arms is neck and head. */
+/* Rigify: the first spine joint, whose children are the thighs, is the hips; spine joints above the arms are neck and
+ * head. */
 static void divide_spine(const vg_skeleton *s, vgi_role *roles, bool *below)
 {
     size_t n = s->njoints, last = n;

@@ -1,11 +1,11 @@
-/* joint_roles.h: what part of a body a joint is, by its name.
+/* joint_roles.h: the role of a joint in the body, from its name.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_RIG_JOINT_ROLES_H
 #define VG_RIG_JOINT_ROLES_H
 
 #include "core/core.h"
 
-/* The part that a joint turns. Those from VGI_CLAVICLE on are on the left or on the right. */
+/* The body part that a joint rotates. Parts from VGI_CLAVICLE on have a side. */
 typedef enum vgi_part {
     VGI_NO_PART = 0,
     VGI_ROOT,
@@ -27,19 +27,19 @@ typedef enum vgi_part {
     VGI_SHIN,
     VGI_FOOT,
     VGI_TOE,
-    VGI_SHOULDER, /* only while names are read: a clavicle, or an upper arm */
-    VGI_SIDED_HIP /* the same: a thigh, or a joint above it */
+    VGI_SHOULDER, /* only while names are read: clavicle or upper arm */
+    VGI_SIDED_HIP /* only while names are read: thigh, or a joint above it */
 } vgi_part;
 
 typedef struct vgi_role {
     uint8_t part; /* a vgi_part */
-    int8_t side;  /* 1 left, -1 right, 0 the middle */
+    int8_t side;  /* 1 left, -1 right, 0 middle */
 } vgi_role;
 
-/* vgi_joint_roles: the role of each joint (njoints of them), by the names that Mixamo, CMU, Unreal, MakeHuman, Rigify,
- * Biped, Daz and others give, and by which joint is below which. */
+/* vgi_joint_roles: the roles of all joints (njoints), from their names as Mixamo, CMU, Unreal, MakeHuman, Rigify,
+ * Biped, Daz and others write them, and from the hierarchy. */
 int vgi_joint_roles(const vg_skeleton *s, vgi_role *roles, vg_err *e) VG_MUST_CHECK;
-/* vgi_role_is_limb: upper arm, forearm, thigh or shin. */
+/* vgi_role_is_limb: whether it is upper arm, forearm, thigh or shin. */
 bool vgi_role_is_limb(vgi_role r);
 
 #endif

@@ -1,5 +1,5 @@
-/* learn.c: alternate fitting of weights and motions of bones, on all vertices or a subset. Each fit is elsewhere
- * (skin.c, inverse_skin.c, free_bones.c).
+/* learn.c: fits weights and motions of bones alternately, on all vertices or a subset. The fits themselves are in
+ * skin.c, inverse_skin.c and free_bones.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/learn.h"
 #include "method/rig/skin.h"

@@ -8,24 +8,24 @@
 
 typedef struct vgi_learning {
     vg_rig rig;           /* owns its skin, borrows the rest */
-    size_t nv, n;         /* vertices, poses */
+    size_t nv, n;         /* number of vertices, of poses */
     double *reference;    /* nv points */
     double **poses;       /* n times nv points */
     double **transforms;  /* n times 7 per bone; borrowed */
     double *at;           /* 3 per bone; borrowed */
-    double *left;         /* nv: root mean square error of skinning, per vertex */
+    double *left;         /* nv: root mean square error of skinning */
     int threads;
 } vgi_learning;
 
-/* vgi_learning_gather: at most `most` vertices, evenly strided, of the reference and the poses. */
+/* vgi_learning_gather: take at most `most` vertices of the reference and the poses, evenly strided. */
 int vgi_learning_gather(vgi_learning *l, size_t nv, const double *reference, size_t n, const double *const *poses,
                         size_t most, vg_err *e) VG_MUST_CHECK;
-/* vgi_learning_clear: frees what gather has made, and the skin. */
+/* vgi_learning_clear: free what gather allocated, and the skin. */
 void vgi_learning_clear(vgi_learning *l);
-/* vgi_learning_weights: fit the skin to the present motions. miss: the mean of `left`. */
+/* vgi_learning_weights: fit the skin to the current motions. miss: mean of `left`. */
 int vgi_learning_weights(vgi_learning *l, double *miss, vg_err *e) VG_MUST_CHECK;
-/* vgi_learning_alternate: motions(l, context, begun, e) and weights in turn, until a round lowers `miss` by less than
- * 0.4 %. begun: the transforms are there to begin with. */
+/* vgi_learning_alternate: call motions(l, context, begun, e) and fit weights alternately, until a round lowers `miss`
+ * by less than 0.4 %. begun: the transforms hold initial motions. */
 int vgi_learning_alternate(vgi_learning *l, int (*motions)(vgi_learning *, void *, bool, vg_err *), void *context,
                            bool begun, double *miss, vg_err *e) VG_MUST_CHECK;
 /* vgi_learning_keep: move the skin to rig r. */

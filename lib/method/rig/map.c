@@ -1,18 +1,18 @@
-/* map.c: the fit of a map from patch transforms to vertices (T 6.3), by least squares throughout.
+/* map.c: fits a map from patch transforms to vertices (T 6.3), by least squares throughout.
  *
- * In pose k patch p moves by A x + t, the best similarity of its vertices. Corner i of patch p has the vector A u_i
- * with the u_i that fits best over the poses, u_i = (sum A' d) / (sum b^2); it is kept as a quaternion, the reference
- * vector's turn and stretch into u_i: the face's own mean turn H against its patch (which minimises sum |A H - F|, F
- * the face's rotation) and the rest by the smallest rotation, so that it serves other bodies. A few vertices near the
- * centres of the patches go where their patch takes them. Both together are reconstructed once for each number of
- * each A and t (map_parts.c).
+ * In pose k patch p moves by A x + t, the best similarity of its vertices. Corner i of patch p has the vector A u_i,
+ * with the best u_i over the poses: u_i = (sum A' d) / (sum b^2). u_i is stored as a quaternion that rotates and
+ * scales the reference vector into it, so that it applies to other bodies: the mean rotation H of the face relative
+ * to its patch (which minimises sum |A H - F|, F the rotation of the face), then the smallest rotation to u_i. A few
+ * vertices near the centre of each patch move rigidly with the patch. Vectors and held vertices are reconstructed
+ * once for each component of each A and t (map_parts.c).
  *
- * What that leaves of the poses is taken up, vertex by vertex, by a ridge regression on the A of the vertex's own
- * patch and of its neighbours: skin between two bones is where patches do not move rigidly.
+ * The residual of each vertex is fitted by a ridge regression on the A of its own patch and of the neighbours,
+ * because skin between two bones does not move rigidly.
  *
- * Where only the A are known the t follow from hinges, the points that two neighbours move alike, and from what the
- * poses show beyond that: a ridge regression of what hinges miss on the A of all patches, as strong as makes it
- * predict left-out poses best.
+ * If only the A are known, the t follow from hinges (points that two adjacent patches move alike) plus a correction:
+ * a ridge regression of the error of the hinges on the A of all patches. Its strength is the one that predicts
+ * left-out poses best.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/face.h"
 #include "numeric/lapack.h"
@@ -37,13 +37,13 @@ typedef struct vicinity {
 
 struct vg_map_fitter {
     const vg_head *h;
-    vg_patches patches;   /* the connected pieces of those of h */
+    vg_patches patches;   /* the connected pieces of the patches of h */
     vg_graph *g;
     int threads;
     double hold;
     uint32_t *of_face;    /* patch of each face of the graph */
     vgi_shape shape;
-    vgi_turns turns;      /* of the graph's faces */
+    vgi_turns turns;      /* of the faces of the graph */
     double *pull;         /* 3 per corner: sum of A' d */
     double *turn;         /* 9 per face: sum of R' F */
     double *b2;           /* per patch: sum of b^2 */
@@ -51,7 +51,7 @@ struct vg_map_fitter {
     uint32_t *held, *held_patch;
     double *held_pull;    /* 3 per held vertex: sum of A' (x - t) */
     vicinity *near;       /* per patch */
-    uint32_t *owner;      /* per vertex: its patch; NOBODY: none, it is in no face */
+    uint32_t *owner;      /* per vertex: its patch; NOBODY if it is in no face */
     double *want;         /* 3 NEAR per vertex: sum of A' (x - t of the owner), for each patch of the vicinity */
     size_t poses, cap;
     vgi_motion *motion;   /* poses x patches */
@@ -71,7 +71,7 @@ static int split_patches(vg_patches *patches, const vg_mesh *m, vg_err *e)
     uint32_t *size = vgi_array(n, sizeof *size, e), *set = vgi_array(n, sizeof *set, e),
              *best = vgi_array(n, sizeof *best, e);
     if (!size || !set || !best) r = VG_ENOMEM;
-    if (r == VG_OK && n > patches->n) { /* a patch that was connected from the start stays, however small */
+    if (r == VG_OK && n > patches->n) { /* a patch that was connected from the start is kept, however small */
         for (size_t f = 0; f < m->nf; f++) size[piece[f]]++;
         vgi_sets_init(set, n);
         for (size_t i = 0; i < npairs; i++)
@@ -114,7 +114,7 @@ static int by_vertex(const void *a, const void *b)
     return x->vertex < y->vertex ? -1 : x->vertex > y->vertex;
 }
 
-/* The vertices nearest the centre of each patch, inner ones first. A vertex is held by one patch only. */
+/* Hold the vertices nearest the centre of each patch, interior ones first. A vertex is held by one patch only. */
 static int choose_held(vg_map_fitter *f, vg_err *e)
 {
     const vgi_shape *s = &f->shape;
@@ -162,7 +162,7 @@ static void come_near(vicinity *x, uint32_t patch, uint32_t shared)
     if (at < NEAR) x->shared[at] = shared, x->patch[at] = patch;
 }
 
-/* The neighbours of each patch, in descending order of shared vertices. */
+/* Sort the neighbours of each patch in descending order of shared vertices. */
 static int find_near(vg_map_fitter *f, vg_err *e)
 {
     const vg_graph *g = f->g;
@@ -336,7 +336,7 @@ int vg_map_fitter_add(vg_map_fitter *f, size_t n, const double *const *poses, vg
     return VG_OK;
 }
 
-/* ---- finishing ---- */
+/* ---- ---- corners ---- */
 
 static void fit_corners(const vg_map_fitter *f, vg_map *m)
 {
@@ -353,15 +353,15 @@ static void fit_corners(const vg_map_fitter *f, vg_map *m)
                 u[k] = f->pull[3 * c + k] / f->b2[f->of_face[face]];
                 u2 += u[k] * u[k], r2 += r[k] * r[k];
             }
-            /* otherwise it has no direction and turns with its face */
+            /* otherwise it has no direction and rotates with its face */
             if (r2 > 0 && u2 > 1e-18 * r2) vg_quat_between(turned, u, rest);
             vg_quat_multiply(rest, q, m->corner + 4 * c);
         }
     }
 }
 
-/* The point c that patches i and j move alike, by least squares over the poses; near their shared vertices where
- * the poses leave it open. */
+/* The point c that patches i and j move alike, by least squares over the poses. Where the poses do not determine it,
+ * it is near their shared vertices. */
 static void fit_hinge(const vg_map_fitter *f, size_t i, size_t j, const double middle[3], double c[3], double *miss)
 {
     static const double firmness = 0.01;
@@ -394,8 +394,8 @@ static void fit_hinge(const vg_map_fitter *f, size_t i, size_t j, const double m
 
 static int fit_hinges(const vg_map_fitter *f, vg_map *m, vg_err *e)
 {
-    static const double least = 2e-3; /* of D: how exactly a hinge can be known */
-    static const double nothing = 1e-12; /* weight of a hinge that is missed by thousands of D, or by no number at all */
+    static const double least = 2e-3; /* in D: precision with which a hinge can be known */
+    static const double nothing = 1e-12; /* weight of a hinge whose error is thousands of D, or not finite */
     const vg_graph *g = f->g;
     uint32_t (*pair)[2], *shared;
     double d = vg_diagonal(f->h->body.reference, g->nv);
@@ -420,7 +420,7 @@ static int fit_hinges(const vg_map_fitter *f, vg_map *m, vg_err *e)
     return r;
 }
 
-/* What hinges miss in pose k: delta (3 x n): t - root - place A. */
+/* Error of the hinges in pose k: delta (3 x n) = t - root - place A. */
 static void missed(const vg_map_fitter *f, const vg_map *m, size_t k, double *delta)
 {
     size_t n = m->n;
@@ -450,7 +450,7 @@ static void row_of(const vg_map_fitter *f, size_t k, size_t c, double *row)
 typedef struct ridge {
     const vg_map_fitter *f;
     const vg_map *m;
-    size_t n, width; /* patches, 3 n */
+    size_t n, width; /* number of patches; 3 n */
     double *s;       /* width x width: sum of rows' row; lower triangle */
     double *y;       /* width x n: sum of row' delta */
     double *l, *g;   /* factor and solution for one strength */
@@ -516,7 +516,7 @@ static double left_out(ridge *x, size_t k)
     return sum;
 }
 
-/* Correct what hinges say by what the poses show, if that predicts poses better that were left out. */
+/* Correct the positions from hinges by regression, if this predicts left-out poses better. */
 static int correct_place(const vg_map_fitter *f, vg_map *m, vg_err *e)
 {
     static const double strengths[] = {1e-4, 1e-3, 1e-2, 0.1, 1};
@@ -530,7 +530,7 @@ static int correct_place(const vg_map_fitter *f, vg_map *m, vg_err *e)
         double least = 0, best = -1, trace = 0;
         gather(&x);
         for (size_t i = 0; i < w; i++) trace += x.s[i * w + i] / (double)w;
-        for (size_t i = 0; i < tried; i++) { /* without correction */
+        for (size_t i = 0; i < tried; i++) { /* first without correction */
             missed(f, m, i * f->poses / tried, x.delta);
             for (size_t p = 0; p < n; p++)
                 for (size_t c = 0; c < 3; c++) least += m->share[p] * x.delta[c * n + p] * x.delta[c * n + p];
@@ -570,8 +570,7 @@ static void add_block(double *to, size_t stride, const double a[9], const double
         for (size_t j = 0; j < 3; j++) to[i * stride + j] += a[i] * b[j] + a[3 + i] * b[3 + j] + a[6 + i] * b[6 + j];
 }
 
-/* The residual of the map so far, over the poses in `want` and the reference pose; then the regression that takes
- * it up. */
+/* Residual of the map so far, over the poses in `want` and the reference pose; then the regression that fits it. */
 static void skin_patch(void *context, size_t p)
 {
     skinning *x = context;

@@ -1,5 +1,5 @@
-/* map_eval.c: evaluation of a map: transforms of patches or bones measured, placed by joints, interpolated, and
- * turned into vertices by one matrix product. Fitting is in map.c.
+/* map_eval.c: evaluates a map: measures transforms of patches or bones, places them by hinges or joints, interpolates
+ * them, and maps them to vertices by one matrix product. Maps are fitted in map.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
 #include "method/rig/map_parts.h"
@@ -19,17 +19,18 @@ struct vg_player {
     int threads;
     bool single;
     vgi_shape shape;    /* patches of the body on which poses are measured */
-    vg_inverse_skin *inverse; /* bones of a skeleton */
-    vg_free_bones *free;      /* bones without one */
+    vg_inverse_skin *inverse; /* of bones with a skeleton */
+    vg_free_bones *free;      /* of bones without a skeleton */
     float *weights_single;
-    void *columns;      /* 4n x 3 BLOCK: what the product multiplies, float or double */
+    void *columns;      /* 4n x 3 BLOCK: right factor of the product, float or double */
     void *product;      /* nv x 3 BLOCK */
     double *motion;     /* 12 n: A row by row, then t */
-    double *ends;       /* 6 n: what hinges miss at both ends, in each patch's own frame */
-    uint32_t *order, *parent; /* patches along a tree of hinges, parents first; a root is its own parent */
+    double *ends;       /* 6 n: error of the hinges at both ends, in the frame of each patch */
+    uint32_t *order, *parent; /* the patches in the order of a tree of hinges, parents first; a root is its own
+                               * parent */
 };
 
-/* Tree of bones: that of their skeleton. */
+/* Tree of bones: the hierarchy of the skeleton. */
 static int plan_bones(vg_player *p, const vg_rig *r, vg_err *e)
 {
     int code = vgi_rig_parents(r, p->parent, e);
@@ -185,7 +186,7 @@ static void root_of(const vg_player *p, const double *centre, double root[3])
     }
 }
 
-/* Where hinges want patch i, from the root. */
+/* Position of patch i given by the hinges, relative to the root. */
 static void placed(const vg_player *p, size_t i, double t[3])
 {
     size_t n = p->m->n;
@@ -212,7 +213,7 @@ void vg_player_place(vg_player *p, double *transforms)
 
 /* ---- interpolation ---- */
 
-/* What hinges miss in a pose, seen by each patch, and the root. */
+/* Error of the hinges in a pose, in the frame of each patch, and the root. */
 static void remember_end(vg_player *p, const double *transforms, double *miss, double root[3])
 {
     read_motion(p, transforms);
@@ -226,7 +227,7 @@ static void remember_end(vg_player *p, const double *transforms, double *miss, d
     }
 }
 
-/* The logarithm of b a^-1 on the branch nearest to a neighbour's: l[1..3] is half the angle, so branches differ by
+/* Logarithm of b a^-1, on the branch nearest to the neighbour's. l[1..3] is half the angle, so branches differ by
  * half turns. */
 static void difference(const double *a, const double *b, const double *neighbour, double l[4])
 {
@@ -248,7 +249,7 @@ static void difference(const double *a, const double *b, const double *neighbour
 void vg_player_between(vg_player *p, const double *a, const double *b, double t, double *out)
 {
     size_t n = p->m->n;
-    double root_a[3], root_b[3], *logs = p->motion; /* not used before read_motion below; 4 numbers of 12 */
+    double root_a[3], root_b[3], *logs = p->motion; /* free until read_motion below; 4 numbers of 12 */
     remember_end(p, a, p->ends, root_a);
     remember_end(p, b, p->ends + 3 * n, root_b);
     for (size_t k = 0; k < n; k++) {
@@ -271,7 +272,7 @@ void vg_player_between(vg_player *p, const double *a, const double *b, double t,
     }
 }
 
-/* ---- the product ---- */
+/* ---- ---- the matrix product ---- */
 
 typedef struct playing {
     const vg_player *p;

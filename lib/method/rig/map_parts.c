@@ -1,5 +1,5 @@
-/* map_parts.c: geometry of patches, their joints, and the collapse of a map into one matrix (T 6.3; MATH 7).
- * Fitting to poses is in map.c, evaluation in map_eval.c.
+/* map_parts.c: geometry of patches, their hinges, and the collapse of a map into one matrix (T 6.3; MATH 7). Maps are
+ * fitted in map.c and evaluated in map_eval.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/map_parts.h"
 #include "numeric/vec3.h"
@@ -73,14 +73,14 @@ void vgi_shape_clear(vgi_shape *s)
 
 void vgi_shape_measure(const vgi_shape *s, size_t p, const double *pose, vgi_motion *to)
 {
-    static const double least = 1e-6; /* a patch that collapses to a point keeps a scale */
+    static const double least = 1e-6; /* keeps the scale of a patch that collapses to a point above 0 */
     size_t first = s->first[p], last = s->first[p + 1];
     double m[9] = {0}, mean[3] = {0, 0, 0}, r[9], b = 0;
     const double *o = first < last ? pose + 3 * (size_t)s->member[first] : mean;
     for (size_t i = first; i < last; i++) {
         const double *x = pose + 3 * (size_t)s->member[i], *l = s->local + 3 * i;
         for (int k = 0; k < 3; k++) {
-            double d = x[k] - o[k]; /* the local vectors sum to 0: any point serves as the centre */
+            double d = x[k] - o[k]; /* the local vectors sum to 0, so any point serves as the centre */
             mean[k] += d;
             m[3 * k] += d * l[0], m[3 * k + 1] += d * l[1], m[3 * k + 2] += d * l[2];
         }
@@ -100,8 +100,8 @@ void vgi_shape_measure(const vgi_shape *s, size_t p, const double *pose, vgi_mot
 
 /* ---- hinges ---- */
 
-/* Least squares over the hinges: t_i - t_j = A_j c - A_i c, all of them; and sum of share (A centre + t) = 0. Linear
- * in the A. */
+/* Least squares over all hinges: t_i - t_j = A_j c - A_i c, with sum of share (A centre + t) = 0. The solution is
+ * linear in the A. */
 int vgi_place_by_hinges(const vg_map *m, const double *centre, double *place, vg_err *e)
 {
     size_t n = m->n;
@@ -157,7 +157,7 @@ int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *
     uint32_t *parent = vgi_array(n, sizeof *parent, e);
     double *mean = vgi_array(width, sizeof *mean, e);
     int code = parent && mean ? vgi_rig_parents(r, parent, e) : VG_ENOMEM;
-    for (size_t b = 0; code == VG_OK && b < n; b++) { /* where the hinge is, from the first one */
+    for (size_t b = 0; code == VG_OK && b < n; b++) { /* position of the hinge relative to the first one */
         double *row = place + b * width;
         if (b) memcpy(row, place + parent[b] * width, width * sizeof *row);
         else memset(row, 0, width * sizeof *row);
@@ -204,8 +204,8 @@ static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *o
     }
 }
 
-/* The links of a map of bones, between the positions of their ends under the skin. at: of the ends, nv points, or
- * NULL: 1, into number k. */
+/* Vectors of the links of a map of bones, between the skinned positions of their ends. at: nv points, or NULL for a
+ * unit value of component k. */
 static void link_vectors(const vg_rig *r, const vg_graph *g, size_t p, const double *at, size_t k, double *wanted)
 {
     for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
@@ -218,7 +218,7 @@ static void link_vectors(const vg_rig *r, const vg_graph *g, size_t p, const dou
     }
 }
 
-/* The weight of transform p at held vertex i, and the point that it moves. */
+/* Weight of transform p at held vertex i, and the point that it moves. */
 static double hold_of(const vg_map *m, const vgi_map_body *body, size_t i, size_t p, const double **at)
 {
     bool bones = m->kind == VG_MAP_BONES;
@@ -226,8 +226,8 @@ static double hold_of(const vg_map *m, const vgi_map_body *body, size_t i, size_
     return bones ? skin_share(body->rig, m->held[i], p) : m->held_patch[i] == p;
 }
 
-/* Wanted vectors and held vertices for a unit value of entry j of A_p, j = 0 1 2 at once as x y z; or of t of
- * three transforms. */
+/* Vectors and held vertices for a unit value of entry j of A_p, with j = 0 1 2 at once as x y z; or of t of three
+ * transforms. */
 static void column_input(const vg_map *m, const vgi_map_body *body, const vg_graph *g, const uint32_t *of_face,
                          const double *vectors, size_t column, double *wanted, double *anchors)
 {
@@ -276,7 +276,7 @@ void vgi_map_skin_row(vg_map *m, const vgi_map_body *body, size_t v)
     }
 }
 
-/* A vertex in no face follows the patch with the nearest centre, or its skin. */
+/* A vertex without a face follows the patch with the nearest centre, or its skin. */
 static void carry_loose(vg_map *m, const vgi_map_body *body, const vg_graph *g)
 {
     for (size_t v = 0; v < g->nv; v++) {

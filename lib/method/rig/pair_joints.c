@@ -1,5 +1,5 @@
-/* pair_joints.c: which joints of two skeletons belong together: those of one name, then those of one part of the body.
- * Leaves out what names mean (joint_roles.c).
+/* pair_joints.c: matches the joints of two skeletons: first those with equal names, then those with equal roles.
+ * Roles come from joint_roles.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/joint_roles.h"
 
@@ -14,8 +14,8 @@ static uint32_t find_joint(const vg_skeleton *s, const char *name)
     return NONE;
 }
 
-/* The joints of one role, in the order of the skeleton, which goes outwards: how many there are, how many are before
- * joint j, and the one that has k before it. */
+/* The joints of one role in skeleton order, which is outward: their number, the number before joint j, and the joint
+ * with k before it. */
 static size_t count_role(const vgi_role *roles, size_t n, vgi_role role)
 {
     size_t count = 0;
@@ -30,8 +30,8 @@ static uint32_t find_role(const vgi_role *roles, size_t n, vgi_role role, size_t
     return NONE;
 }
 
-/* Joint k of n in a chain belongs to this one of m: fingers are counted from the hand, other chains end together, so
- * that the last of a spine turns as the last of the other does. */
+/* The joint, of m in the chain, that matches joint k of n. Fingers are counted from the hand. Other chains are
+ * aligned at their ends, so that the last spine joints match. */
 static size_t place_in_chain(vgi_role role, size_t k, size_t n, size_t m)
 {
     if (role.part >= VGI_THUMB && role.part <= VGI_PINKY) return k < m ? k : m - 1;
@@ -54,7 +54,7 @@ static void pair_by_roles(const vg_skeleton *of, const vgi_role *a, const vg_ske
     }
 }
 
-/* Do most bones of the smaller skeleton have a namesake? Then equal names mean equal joints. */
+/* Whether most joints of the smaller skeleton have a namesake. If so, equal names mean equal joints. */
 static bool share_names(const vg_skeleton *of, const vg_skeleton *by)
 {
     size_t same = 0, a = 0, b = 0;

@@ -1,6 +1,6 @@
-/* play_kernel.c: the product of a map, spread over the poses.
- * Rows are taken in blocks that stay in the nearest cache while one pose after the other is written. A point is written
- * as four numbers, the last of which is written over by the next point; the last point of a block as three.
+/* play_kernel.c: scatters the product of a map to the poses.
+ * Blocks of rows that fit the first-level cache are written to one pose after the other. A point is written as four
+ * numbers; the next point overwrites the fourth. The last point of a block is written as three.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/play_kernel.h"
 #include "core/wide.h"

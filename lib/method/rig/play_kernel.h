@@ -1,4 +1,4 @@
-/* play_kernel.h: from the product of a map, a row per vertex with x, y and z of each pose, to the poses.
+/* play_kernel.h: from the product of a map (a row per vertex with x, y and z of each pose) to the poses.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_PLAY_KERNEL_H
 #define VG_PLAY_KERNEL_H

@@ -1,5 +1,5 @@
-/* retarget.c: a map for another body of the same faces (T 6.5), or for a body between two (T 6.6). Fitting is in
- * map.c (patches) and envelope.c (bones).
+/* retarget.c: adapts a map to another body with the same faces (T 6.5), or to a body between two (T 6.6). Maps are
+ * fitted in map.c (patches) and envelope.c (bones).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
 #include "method/rig/map_parts.h"
@@ -10,8 +10,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* The body between two: vectors rotated and scaled along geodesics, then reconstructed; its root is on the line
- * between both. */
+/* The body between two: vectors are rotated and scaled along geodesics, then reconstructed. Its root is on the line
+ * between both roots. */
 static int morph_body(const vg_head *h, const vg_graph *g, const double *target, double morph, double *body,
                       int threads, vg_err *e)
 {
@@ -53,14 +53,14 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
     return r;
 }
 
-/* Of each hinge, on one body: the mean of the vertices that both its patches have. */
+/* Per hinge, on one body: the mean of the vertices that both patches share. */
 static int meeting_points(const vg_map *m, const vg_graph *g, const uint32_t *of_face, const double *body,
                           double *mean, vg_err *e)
 {
     return vgi_shared_points(&g->faces, of_face, m->hinge, m->nhinges, body, mean, e);
 }
 
-/* Hinges, centres and held points go with the body; corrections of what hinges say grow with it. */
+/* Move hinges, centres and held points with the body, and scale the corrections of the hinges with it. */
 static int move_points(vg_map *m, const vg_body *b, const vg_graph *g, const uint32_t *of_face, const double *body,
                        double ratio, vg_err *e)
 {
@@ -98,15 +98,15 @@ static int move_points(vg_map *m, const vg_body *b, const vg_graph *g, const uin
 
 /* ---- joints of a rig ---- */
 
-/* A joint follows the vertices around it: those shared by its bone and the parent, or else its own. Near vertices
- * count most, and the joint keeps its position relative to them under scaling. */
+/* A joint follows the vertices around it: those shared by its bone and the parent, or else those of its bone. Near
+ * vertices have the largest weight, and the joint keeps its position relative to them under scaling. */
 static void move_joint(const vg_rig *r, size_t nv, const double *from, const double *to, uint32_t bone,
                        uint32_t above, double *at)
 {
-    static const double soft = 1e-4; /* of D squared */
+    static const double soft = 1e-4; /* relative to D squared */
     double d = vg_diagonal(from, nv), before[3] = {0, 0, 0}, after[3] = {0, 0, 0}, sum = 0, spread[2] = {0, 0};
     double shared = 0, own = 0;
-    for (int round = 0; round < 3; round++) { /* are there shared vertices; their mean; their extent */
+    for (int round = 0; round < 3; round++) { /* whether there are shared vertices; their mean; their extent */
         for (size_t v = 0; v < nv; v++) {
             double w[2] = {0, 0}, near, pull;
             for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++)
@@ -137,7 +137,7 @@ static void move_joint(const vg_rig *r, size_t nv, const double *from, const dou
     for (int k = 0; k < 3; k++) at[k] = after[k] + grown * (at[k] - before[k]);
 }
 
-/* The joints, and the lengths of the bones between them. */
+/* Move the joints, and set the lengths of the bones between them. */
 static int move_joints(vg_rig *r, size_t nv, const double *from, const double *to, vg_err *e)
 {
     size_t n = r->skeleton.njoints;
@@ -170,8 +170,8 @@ static int move_bones(vg_map *m, vg_rig *rig, const double *from, const double *
     return vgi_place_by_bones(rig, m, m->place, e);
 }
 
-/* Regression terms scale with the body. Those of a bone are relative to its joint, so that their addition to the
- * share of a bone is kept. */
+/* Scale the regression terms with the body. Those of a bone are relative to its joint, so that their sum stays in the
+ * share of the bone. */
 static void add_regression(const vg_map *m, const double *skin, const double *joints_before, double ratio)
 {
     for (size_t i = 0; i < m->nv * m->n; i++) {
@@ -186,19 +186,19 @@ static void add_regression(const vg_map *m, const double *skin, const double *jo
     }
 }
 
-/* ---- the whole ---- */
+/* ---- ---- a whole map ---- */
 
 typedef struct retargeting {
-    const vg_head *h; /* with the map as it is */
-    vg_map *m;        /* what it becomes, first a copy; the rig, too */
+    const vg_head *h; /* with the original map */
+    vg_map *m;        /* the result, first a copy of the original, with its rig */
     vg_rig *rig;
-    double *body;     /* nv points: where the vertices go */
-    double ratio;     /* of its size to that of the body before */
+    double *body;     /* nv points: the new body */
+    double ratio;     /* size of the new body relative to the old one */
     int threads;
     vg_graph *g;
     uint32_t *of_face;
-    double *vectors;  /* 3 per corner: room */
-    double *skin;     /* what regression added to the reconstruction; of maps with corners */
+    double *vectors;  /* 3 per corner: workspace */
+    double *skin;     /* what regression added to the reconstruction, for maps with corners */
 } retargeting;
 
 static int collapse(const retargeting *x, const vgi_map_body *body, vg_err *e)
@@ -242,7 +242,7 @@ static int keep_regression(retargeting *x, vg_err *e)
     return r;
 }
 
-/* Patches are measured on the body that the map was fitted on. */
+/* Patches are measured on the body to which the map was fitted. */
 static int keep_home(retargeting *x, vg_err *e)
 {
     const vg_body *b = &x->h->body;

@@ -1,5 +1,5 @@
-/* rig_sums.c: the sums over poses to which weights and corners of a rig are fitted, one matrix product per block
- * of poses. They are used in skin.c and envelope.c.
+/* rig_sums.c: the sums over poses to which weights and corners of a rig are fitted, one matrix product per block of
+ * poses. skin.c and envelope.c use them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/face.h"
 #include "method/rig/rig_sums.h"
@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { BLOCK = 32, ROWS = 128, FACES = 32 }; /* poses, vertices and faces of one product */
+enum { BLOCK = 32, ROWS = 128, FACES = 32 }; /* poses, vertices and faces per product */
 
 int vgi_rig_sums_make(vgi_rig_sums *s, size_t nv, size_t n, const double *at, const vgi_turns *turns, vg_err *e)
 {
@@ -54,7 +54,7 @@ typedef struct adding {
     const double *const *poses;
 } adding;
 
-/* The T of all bones in pose k as three rows of `motions`, and their A. */
+/* Store the T of all bones in pose k as three rows of `motions`, and their A. */
 static void place_motions(vgi_rig_sums *s, size_t k, const double *transforms)
 {
     for (size_t j = 0; j < s->n; j++) {
@@ -89,7 +89,7 @@ static void add_vertices(void *context, size_t task)
     vgi_product_add(rows, 4 * s->n, width, y, width, s->motions, 4 * s->n, s->pull + first * 4 * s->n, 4 * s->n);
 }
 
-/* Squared vectors of a face's corners. */
+/* Add the squared vectors of a face's corners. */
 static void add_lengths(const adding *a, size_t face)
 {
     const vgi_turns *t = a->s->turns;

@@ -1,10 +1,10 @@
-/* skin.c: linear blend skinning fitted to poses: at most four bones per vertex, weights >= 0 that sum to 1, least
- * squares.
+/* skin.c: fits linear blend skinning to poses by least squares: at most four bones per vertex, with weights >= 0 that
+ * sum to 1.
  *
- * For one vertex the squared distance over all poses is the quadratic w' G w - 2 b' w + c, whose numbers are products
- * of the sums with the vertex's place. Bones are taken up one by one, each time the one that helps most, then
- * exchanged as long as that helps.
- * Leaves out where the motions of bones come from (inverse_skin.c).
+ * For one vertex the squared distance over all poses is the quadratic w' G w - 2 b' w + c. Its coefficients are
+ * products of the sums with the position of the vertex. Bones are added one by one, each time the one with the
+ * largest gain, and then exchanged while that gains.
+ * Motions of bones are fitted in inverse_skin.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/skin.h"
 #include "model/rig.h"
@@ -12,8 +12,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { CHUNK = 64, MOST = 20, BEST = 14 }; /* candidate bones per vertex; of these, chosen by how well each does
-                                              alone */
+enum { CHUNK = 64, MOST = 20, BEST = 14 }; /* candidate bones per vertex; of these, chosen by their fit alone */
 
 /* A bone in the reference pose: line segments from its joint to its child joints. */
 typedef struct bones {
@@ -115,17 +114,17 @@ typedef struct quadratic {
     size_t n;
     uint32_t bone[MOST];
     double g[MOST][MOST], b[MOST];
-    double ridge; /* ridge on all weights but that of the last bone chosen */
+    double ridge; /* ridge on all weights except that of the last bone chosen */
 } quadratic;
 
-/* Up to four of a quadratic's bones. */
+/* Up to four bones of a quadratic. */
 typedef struct choice {
     size_t n;
     size_t at[VG_SKIN];
     double w[VG_SKIN], value;
 } choice;
 
-/* a x = b for n <= 3, by elimination with the largest pivot; what has no pivot stays 0. */
+/* Solve a x = b for n <= 3, by elimination with the largest pivot. Unknowns without a pivot stay 0. */
 static void solve_small(double a[3][3], double *b, size_t n)
 {
     bool used[3] = {false, false, false};
@@ -155,7 +154,8 @@ static void solve_small(double a[3][3], double *b, size_t n)
     memcpy(b, x, n * sizeof *b);
 }
 
-/* Weights of the chosen bones, removing one by one those that would be negative, and the value of the quadratic. */
+/* Compute the weights of the chosen bones, removing one by one those that would be negative, and the value of the
+ * quadratic. */
 static void weigh(const quadratic *q, choice *c)
 {
     for (;;) {
@@ -202,7 +202,7 @@ static void choose(const quadratic *q, double least_gain, choice *best)
     for (size_t k = 0; k < q->n; k++)
         if (q->g[k][k] - 2 * q->b[k] < q->g[best->at[0]][best->at[0]] - 2 * q->b[best->at[0]]) best->at[0] = k;
     weigh(q, best);
-    for (int round = 0; round < 2 * VG_SKIN; round++) { /* add a bone, or replace one */
+    for (int round = 0; round < 2 * VG_SKIN; round++) { /* add or replace a bone */
         choice next = *best;
         for (size_t k = 0; k < q->n; k++) {
             if (has(best, k)) continue;
@@ -219,7 +219,7 @@ static void choose(const quadratic *q, double least_gain, choice *best)
     }
 }
 
-/* Move the bone of the largest weight to the end. */
+/* Move the bone with the largest weight to the end. */
 static void first_last(choice *c)
 {
     size_t best = 0, last = c->n - 1;
@@ -235,7 +235,7 @@ typedef struct skinning {
     const double *reference;
     const bones *b;
     uint32_t *mover; /* per joint */
-    double *space;   /* per chunk at work: 3 n */
+    double *space;   /* per chunk in progress: 3 n */
     double diagonal, *miss;
     size_t chunks;
 } skinning;
@@ -271,7 +271,7 @@ static void find_candidates(const skinning *x, const double *alone, quadratic *q
 {
     const vg_rig *r = x->r;
     q->n = 0;
-    for (size_t j = 0; j < r->nbones; j++) { /* the best so far, in order; of equal ones the first found comes
+    for (size_t j = 0; j < r->nbones; j++) { /* the best so far, in order; among equal ones the first found comes
                                                 first */
         size_t i = q->n;
         if (i == BEST && !(alone[j] < alone[q->bone[i - 1]])) continue;
@@ -290,8 +290,8 @@ static void find_candidates(const skinning *x, const double *alone, quadratic *q
 
 static void skin_vertex(const skinning *x, size_t v, double *far, double *alone)
 {
-    /* Least gain of a bone per pose, per squared distance from the vertex, and in D^2; and the least distance, in
-     * D, between its motion and the first bone's for it to count. */
+    /* Least gain of a bone per pose: per squared distance from the vertex, and in D^2. A bone counts only if its
+     * motion differs from the first bone's by at least `apart`, in D. */
     static const double nearness = 1e-8, least_gain = 1e-13, apart = 1e-5;
     const vgi_rig_sums *s = x->s;
     const double *p = x->reference + 3 * v;
