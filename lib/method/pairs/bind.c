@@ -1,5 +1,6 @@
-/* bind.c: a mesh that rides on another one: which faces carry it, and where it is in a pose of these.
- * Leaves out meshes that correspond part by part, which are registered (register.c).
+/* bind.c: binds a mesh to another one: finds the source faces that each target face follows, and computes the bound
+ * mesh in a pose of the source.
+ * Meshes that correspond part by part are registered instead (register.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/surface.h"
 #include "model/incidence.h"
@@ -9,12 +10,13 @@
 #include <stdlib.h>
 
 enum {
-    BLOCK = 64,   /* faces or vertices of a task */
-    AROUND = 96   /* faces of the source that carry one of the target, at most */
+    BLOCK = 64,   /* faces or vertices per task */
+    AROUND = 96   /* most source faces per target face */
 };
-static const double REACH = 1.2; /* faces within this many sizes, or distances from the surface, carry */
+static const double REACH = 1.2; /* radius, in face sizes or distances from the surface, within which source faces are
+                                    used */
 
-/* ---- which faces ---- */
+/* ---- ---- choice of faces ---- */
 
 typedef struct carried { /* of one face of the target */
     uint32_t n, face[AROUND];
@@ -25,9 +27,9 @@ typedef struct binding {
     const vg_mesh *source, *target;
     const double *target_points;
     vgi_surface *surface;
-    vgi_incidence around; /* of the source */
+    vgi_incidence around; /* of the source mesh */
     const bool *take;
-    carried *by; /* of each face of the target */
+    carried *by; /* per target face */
 } binding;
 
 static void centre_of(const vg_mesh *m, const double *points, size_t f, double centre[3])
@@ -35,7 +37,7 @@ static void centre_of(const vg_mesh *m, const double *points, size_t f, double c
     vgi_face_centre(points, m->vert + m->start[f], m->start[f + 1] - m->start[f], centre);
 }
 
-/* From the centre to the farthest vertex. */
+/* Distance from the centre to the farthest vertex. */
 static double radius_of(const vg_mesh *m, const double *points, size_t f, const double centre[3])
 {
     double square = 0;
@@ -51,7 +53,7 @@ static bool has(const carried *c, uint32_t face)
     return false;
 }
 
-/* Faces beside those that are there, over the surface: a hand on a hip does not carry trousers. */
+/* Add faces connected over the surface to those chosen so far, so that a hand on a hip does not move the trousers. */
 static void walk(const binding *b, carried *c, const double at[3], double reach)
 {
     const vg_mesh *m = b->source;
@@ -123,7 +125,7 @@ static int write_pairs(const binding *b, vg_correspondence *c, vg_err *e)
     return VG_OK;
 }
 
-/* Faces with an area, which have a frame. */
+/* Mark the faces with an area, which have a frame. */
 static bool *faces_with_area(const vg_mesh *m, const double *points, size_t *n, vg_err *e)
 {
     bool *take = vgi_array(m->nf, sizeof *take, e);
@@ -169,14 +171,14 @@ bool vg_is_bound(const vg_correspondence *c)
     return c->first && c->target_nf && c->matched[0] == VG_BOUND;
 }
 
-/* ---- where it is in a pose ---- */
+/* ---- ---- positions in a pose ---- */
 
-/* A face of the source that carries something. */
+/* A source face that a vertex follows. */
 typedef struct frame {
     uint32_t face;
-    double centre[3], normal[3]; /* in the rest pose; the normal is as long as the face is wide */
-    double inverse[9];           /* (sum of w w' over the corners, from the centroid, and of n n')^-1 */
-    double now[3], matrix[9];    /* in the pose: its centroid; what turns and stretches directions */
+    double centre[3], normal[3]; /* in the rest pose; the length of the normal is the size of the face */
+    double inverse[9];           /* (sum of w w' over the corners, relative to the centroid, and of n n')^-1 */
+    double now[3], matrix[9];    /* in the pose: its centroid, and the map of directions */
 } frame;
 
 struct vg_rider {
@@ -187,13 +189,13 @@ struct vg_rider {
     uint32_t *first, *by; /* nv + 1; the frames of each vertex, and their weights */
     double *weight;
     vgi_hit *foot;        /* nv: the nearest point of the source at rest */
-    double *above;        /* nv: from there to the vertex */
+    double *above;        /* nv: vector from that point to the vertex */
     const double *source_rest;
-    const double *pose;   /* of the call */
+    const double *pose;   /* argument of the current call */
     double *out;
 };
 
-/* The centroid of a face, and its normal, `length` long; 0 for a face without an area. */
+/* The centroid of a face, and its normal with the given length; 0 for a face without area. */
 static void face_frame(const vg_mesh *m, const double *points, uint32_t f, double length, double centre[3], double normal[3])
 {
     centre_of(m, points, f, centre);
@@ -202,7 +204,7 @@ static void face_frame(const vg_mesh *m, const double *points, uint32_t f, doubl
     vgi_scale(normal, length);
 }
 
-/* The sum of a b' over the corners, from the centroids, and over the normals: a in one pose, b at rest. */
+/* Sum of a b' over the corners, relative to the centroids, and over the normals: a in the pose, b at rest. */
 static void sum_outer(const vg_mesh *m, const frame *x, const double *points, const double *rest, const double centre[3],
                       const double normal[3], double S[9])
 {
@@ -239,7 +241,7 @@ static void pose_block(void *context, size_t block)
     }
 }
 
-/* The foot of a vertex in the pose: where it is in its triangle stays (see vgi_hit). */
+/* The foot of a vertex in the pose, at the same position in its triangle (see vgi_hit). */
 static void foot_in_pose(const vg_rider *r, const vgi_hit *hit, double at[3])
 {
     const vg_mesh *m = r->source;
@@ -252,7 +254,7 @@ static void foot_in_pose(const vg_rider *r, const vgi_hit *hit, double at[3])
     for (int k = 0; k < 3; k++) at[k] = a[k] + hit->u[0] * (b[k] - a[k]) + hit->u[1] * (c[k] - a[k]);
 }
 
-/* What is above the foot follows the frames of the faces around. */
+/* The offset from the foot follows the frames of the surrounding faces. */
 static void vertex_block(void *context, size_t block)
 {
     vg_rider *r = context;
@@ -275,9 +277,9 @@ void vg_rider_apply(vg_rider *r, const double *pose, double *vertices)
     vgi_parallel(r->threads, (r->nv + BLOCK - 1) / BLOCK, vertex_block, r);
 }
 
-/* ---- setting up ---- */
+/* ---- ---- construction ---- */
 
-/* The source faces that are used, each once; number[f] is the place of face f among them. */
+/* The source faces in use, each once; number[f]: index of face f among them. */
 static int make_frames(vg_rider *r, const vg_correspondence *c, uint32_t *number, vg_err *e)
 {
     memset(number, 0xff, c->source_nf * sizeof *number);
@@ -311,7 +313,7 @@ static void find_feet(void *context, size_t block)
     }
 }
 
-/* Feet are on faces that carry something. */
+/* Find the feet on the source faces in use. */
 static int make_feet(vg_rider *r, const uint32_t *number, const double *points, vg_err *e)
 {
     vgi_surface *surface = NULL;
@@ -328,7 +330,7 @@ static int make_feet(vg_rider *r, const uint32_t *number, const double *points, 
     return result;
 }
 
-/* The vertex whose faces carry each vertex: itself, or the nearest that has faces. */
+/* Per vertex: the vertex whose faces it follows: itself, or the nearest one that has faces. */
 static uint32_t *find_hosts(const vgi_incidence *around, const double *points, size_t nv, vg_err *e)
 {
     vgi_kdtree *tree = NULL;
@@ -352,7 +354,8 @@ static uint32_t *find_hosts(const vgi_incidence *around, const double *points, s
     return host;
 }
 
-/* A vertex is carried by what carries its faces, in equal shares. A face that carries several of these is listed for each. */
+/* A vertex follows the drivers of its faces in equal shares. A source face that drives several of them is listed for
+ * each. */
 static int make_weights(vg_rider *r, const vg_correspondence *c, const vg_mesh *target, const double *points,
                         const uint32_t *number, vg_err *e)
 {

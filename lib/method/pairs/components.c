@@ -1,26 +1,26 @@
-/* components.c: which components of the source take part in a registration. A head comes with teeth, gums, lashes and
- * eyes; the target may be its skin alone. If all components were fitted to it, teeth would drive lips.
+/* components.c: chooses which components of the source take part in a registration. A head may come with teeth, gums,
+ * lashes and eyes, while the target is skin alone. If all components were fitted to it, teeth would drive lips.
  *
- * Components that carry ties always take part and are fitted first. Each other component is then placed by the
- * similarity of the whole body. It joins if it explains part of the target: faces with matching normals that no
- * fitted component covers, or that the fitted components cover from much farther away. The fit itself is in fit.c.
+ * Components with ties always take part and are fitted first. Each other component is then placed by the similarity
+ * of the whole body. It joins if it explains part of the target: faces with matching normals that no fitted component
+ * covers, or that the fitted components cover only from much farther away. The fit is in fit.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/register.h"
 
 #include <stdlib.h>
 
 enum { BLOCK = 128 };
-static const double LIES_ON = 0.01;   /* in D: a target face within this distance of a fitted component is
-                                         explained by it */
+static const double LIES_ON = 0.01;   /* in D: a target face within this distance of a fitted component is explained
+                                         by it */
 static const double REACH = 0.05;     /* in D: the largest distance of another component from the faces it explains */
 static const double NEARER = 0.25;    /* ratio of distances below which a fitted component explains the same faces */
 static const double COSINE = 0.5;     /* least cosine of the angle between normals that match */
-static const double SHARE = 0.15;     /* share of its own area that a component must explain */
+static const double SHARE = 0.15;     /* least share of its own area that a component must explain */
 
 typedef struct choice {
     const vgi_component_choice *in;
     vgi_surface *fitted, *riding;
-    uint32_t *best; /* per target face: the face of another component that explains it; UINT32_MAX: none */
+    uint32_t *best; /* per target face: the face of another component that explains it, or UINT32_MAX */
 } choice;
 
 static void look_block(void *context, size_t block)
@@ -43,7 +43,7 @@ static void look_block(void *context, size_t block)
     }
 }
 
-/* Add the components that explain enough to those that are taken. */
+/* Add the components that explain enough to those taken. */
 static int judge(const choice *c, bool *taken, vg_err *e)
 {
     const vgi_component_choice *in = c->in;

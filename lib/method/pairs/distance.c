@@ -1,5 +1,5 @@
-/* distance.c: the distance between two surfaces of any connectivity, both ways, over the frames of a sequence.
- * Leaves out the search for the nearest point (surface.c), and which vertex belongs to which (model/measures.c).
+/* distance.c: distance between two surfaces of any connectivity, in both directions, over the frames of a sequence.
+ * Nearest points are found in surface.c; distances of corresponding vertices are in model/measures.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/surface.h"
 #include "numeric/face.h"
@@ -7,16 +7,16 @@
 #include <stdlib.h>
 
 enum {
-    BLOCK = 256,                  /* points of a task */
-    PER_OCTAVE = 128,             /* bins of the histogram that p95 comes from */
+    BLOCK = 256,                  /* points per task */
+    PER_OCTAVE = 128,             /* bins of the histogram that gives p95 */
     OCTAVES = 80,
     BINS = PER_OCTAVE * OCTAVES
 };
-static const double LEAST_OCTAVE = -60; /* in the scale; distances below fall into the first bin */
-/* Over a triangle, 1/12 of each corner and 3/4 of the centroid integrate what is quadratic. */
+static const double LEAST_OCTAVE = -60; /* relative to the scale; smaller distances fall into the first bin */
+/* Over a triangle, weights 1/12 per corner and 3/4 for the centroid integrate quadratic functions exactly. */
 static const double OF_CORNER = 1.0 / 12, OF_CENTROID = 0.75;
 
-/* The points of one surface that are asked. */
+/* The sample points of one surface. */
 typedef struct samples {
     const vg_mesh *mesh;
     size_t n, triangles;
@@ -34,7 +34,7 @@ struct vg_surface_measures {
     double scale;
     int threads;
     size_t frames;
-    tally all[2], one; /* one: of a frame */
+    tally all[2], one; /* one: of a single frame */
 };
 
 /* ---- points ---- */
@@ -67,7 +67,7 @@ static void clear_samples(samples *s)
     free(s->distance);
 }
 
-/* A triangle of the vertices a and b and a third place, which belongs to the vertices of a face in equal parts. */
+/* A triangle of the vertices a and b and a third point, which is shared equally by the vertices of a face. */
 static void add_triangle(samples *s, size_t at, uint32_t a, uint32_t b, const double *third, const uint32_t *owner, size_t owners)
 {
     const double *x = s->point + 3 * (size_t)a, *y = s->point + 3 * (size_t)b;
@@ -98,7 +98,7 @@ static void place_samples(samples *s, const double *points)
     double total = 0;
     for (size_t i = 0; i < s->n; i++) total += s->weight[i];
     if (total > 0) return;
-    for (size_t i = 0; i < s->n; i++) s->weight[i] = i < m->nv; /* without an area vertices count alike */
+    for (size_t i = 0; i < s->n; i++) s->weight[i] = i < m->nv; /* without area all vertices have the same weight */
 }
 
 /* ---- distances ---- */
@@ -139,7 +139,7 @@ static void add_to(tally *t, const samples *s, double scale, size_t frame)
     }
 }
 
-/* The upper edge of the bin that holds the point below which 95 % of the area are. */
+/* The upper edge of the bin below which 95 % of the area lies. */
 static vg_surface_distance read_tally(const tally *t, double scale)
 {
     vg_surface_distance d = t->found;

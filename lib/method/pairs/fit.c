@@ -1,20 +1,21 @@
-/* fit.c: bend one surface of polygons until it lies on another, from ties (markers, seeds) and nearest points.
+/* fit.c: deforms one polygon surface until it lies on another, from ties (markers, seeds) and nearest points.
  *
- * What is kept small is how much the deformation changes from place to place: with L a graph Laplacian of the source,
- * s its rest, and R_v the turn and mean stretch that the faces around vertex v undergo in the present fit,
+ * The fit minimises how much the deformation changes from place to place. With L a graph Laplacian of the source, s
+ * its rest positions, and R_v the rotation and mean stretch of the faces around vertex v in the current fit, the
+ * objective is
  *
  *     sum over v of |(L x)_v - R_v (L s)_v|^2 / L_vv                     bending
  *       + a * sum over edges of |(x_u - x_v) - R_uv (s_u - s_v)|^2        stretching
- *       + sum of weight * |point of the source - where it belongs|^2      ties, nearest points both ways
+ *       + sum of weight * |point of the source - its target|^2           ties, nearest points in both directions
  *
- * so that a similarity of the whole costs nothing, and one that changes slowly from limb to limb costs little: what
- * Sumner and Popovic (2004, section 5.1) ask of neighbouring triangles, without extra unknowns and for faces of any
- * number of corners. x, y and z share one matrix. It is factorized once per round; inside a round R and the nearest
- * points follow the fit. R comes from the map of each face (its vectors, and its normal stretched as the root of its
- * area), smoothed over a length by (1 + length^2 L)^-1: from single faces it would follow every dent, and nothing
- * would be smooth any more.
+ * A similarity of the whole body costs nothing, and one that changes slowly from limb to limb costs little. Sumner
+ * and Popovic (2004, section 5.1) ask the same of neighbouring triangles; this form has no extra unknowns and takes
+ * faces with any number of corners. x, y and z share one matrix, factorised once per round; within a round R and the
+ * nearest points follow the fit. R comes from the map of each face (its vectors, and its normal stretched by the
+ * square root of its area), smoothed over a length by (1 + length^2 L)^-1: R of single faces would follow every dent
+ * and keep the result rough.
  *
- * Leaves out how the meshes come to lie roughly on one another (register.c), and L with its matrices (springs.c).
+ * Rough alignment of the meshes is in register.c, L with its matrices in springs.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/springs.h"
 #include "numeric/face.h"
@@ -22,32 +23,32 @@
 
 #include <stdlib.h>
 
-static const double REST = 1e-7;           /* pull to the present place, for vertices without other terms */
+static const double REST = 1e-7;           /* pull to the current position, for vertices without other terms */
 static const double IDENTITY_TRUST = 1e-6; /* where no face determines the deformation */
 
-/* Lengths are in D. Within a factor of two of these values the results on real pairs are the same. */
+/* Lengths are in D. Results on real pairs do not change when these values change by up to a factor of two. */
 static const double MARKER = 3;           /* weight of ties, relative to bending */
 static const double STRETCH = 0.03;       /* length above which stretching counts more than bending */
-static const double FIRST_SPAN = 0.075;   /* radius over which a nearest point pulls its neighbourhood, in the
-                                             first round */
-static const double LAST_SPAN = 0.7;      /* and in the last, in mean edge lengths */
+static const double FIRST_SPAN = 0.075;   /* radius over which a nearest point pulls its neighbourhood, in the first
+                                             round */
+static const double LAST_SPAN = 0.7;      /* and in the last round, in mean edge lengths */
 static const double FIRST_LIMIT = 0.1, LAST_LIMIT = 0.02; /* nearest points farther away are ignored */
 static const double COSINE = 0.4;         /* least cosine of the angle between matching normals */
 static const double MAP_SPAN = 0.07;      /* length over which the maps of faces are smoothed */
 static const double KEPT_STRETCH = 0.8;   /* exponent of a map's stretch: parts without constraints return to their
-                                             size */
+                                             own size */
 
 enum {
     BLOCK = 256,     /* vertices per task */
     TIED_SOLVES = 5, /* rounds from the ties alone */
-    ROUNDS = 8,      /* rounds with nearest points; one factorisation each */
-    SOLVES = 4       /* of a round */
+    ROUNDS = 8,      /* rounds with nearest points, one factorisation each */
+    SOLVES = 4       /* per round */
 };
 
 /* A target vertex pulls the nearest point of the source surface. */
 typedef struct reverse {
     uint32_t face; /* of the source */
-    double weight, share[VGI_SMALL_FACE]; /* of the face's corners, all of which are joined by springs */
+    double weight, share[VGI_SMALL_FACE]; /* of the face's corners, which are all joined by springs */
 } reverse;
 
 typedef struct fit {
@@ -57,20 +58,20 @@ typedef struct fit {
     vgi_laplacian L;
     double *laplacian; /* nv x 3: L s */
     double *inverse;   /* nf x 9: (sum r r' + h n n')^-1, see prepare_faces() */
-    double *h_normal;  /* nf x 3: h n, of the rest */
-    double *area;      /* nf: of the rest */
+    double *h_normal;  /* nf x 3: h n, at rest */
+    double *area;      /* nf: at rest */
     double *trust;     /* nf: 1 for a round face, 0 for one without area */
-    double *face_map, *map; /* D of faces; of vertices, smooth and without shear */
+    double *face_map, *map; /* maps D of the faces; of the vertices, smooth and without shear */
     double edge;       /* mean length */
-    vgi_cholesky *smoother; /* of maps */
+    vgi_cholesky *smoother; /* smoothing operator of the maps */
     bool *border;      /* nv: of the source */
-    vgi_smoothness smooth; /* its matrix.value: what is factorized */
+    vgi_smoothness smooth; /* its matrix.value is the matrix to factorise */
     vgi_cholesky *solver;
     double *x, *rhs, *normal, *tmp; /* nv x 3 */
     double *pull;      /* nv: weight of the nearest point in this round; 0: none */
     double *goal;      /* nv x 3: the nearest point */
     double *distance;  /* nv */
-    reverse *reverse;  /* per vertex of the target; weight 0: it pulls nothing */
+    reverse *reverse;  /* per target vertex; weight 0: no pull */
     vgi_surface *now;  /* the source at the start of the round */
     double limit;
     double stretch;    /* weight of first differences */
@@ -114,7 +115,7 @@ static int factorize(fit *t, vg_err *e)
     return vgi_cholesky_factorize(t->solver, A, e);
 }
 
-/* deformation of the faces */
+/* ---- deformation of the faces */
 
 static void prepare_faces(fit *t)
 {
@@ -139,7 +140,7 @@ static void prepare_faces(fit *t)
         for (int k = 0; k < 3; k++) n[k] /= area, t->h_normal[3 * f + (size_t)k] = h * n[k];
         vgi_add_outer(S, h, n, n);
         double det = vgi_cofactors(S, c);
-        t->trust[f] = det / (h * h * h); /* with l1, l2 the eigenvalues in the plane: 4 l1 l2 / (l1 + l2)^2 */
+        t->trust[f] = det / (h * h * h); /* 4 l1 l2 / (l1 + l2)^2, with l1, l2 the eigenvalues in the plane */
         if (!(t->trust[f] > 1e-6)) {
             t->trust[f] = 0;
             continue;
@@ -216,8 +217,8 @@ static int smooth_maps(fit *t, vg_err *e)
     return VG_OK;
 }
 
-/* The rotation nearest to m by Newton's iteration (Higham 1986), times most of the mean stretch; the identity when m
- * turns inside out. */
+/* The rotation nearest to m by Newton's iteration (Higham 1986), times most of the mean stretch. The identity if m
+ * reverses orientation. */
 static void drop_shear(double m[9])
 {
     double q[9], c[9], det = vgi_cofactors(m, c), first = det;
@@ -274,7 +275,7 @@ static int make_smoother(fit *t, vg_err *e)
     return r;
 }
 
-/* ---- a round ---- */
+/* ---- ---- one round ---- */
 
 static void add_smoothness(fit *t)
 {
@@ -354,8 +355,8 @@ static void vertex_normals(const vg_mesh *m, const double *x, double sign, doubl
     }
 }
 
-/* Only a border vertex of the source may use a nearest point on the border of the target: interior vertices would
- * be pulled from beyond it. */
+/* Only border vertices of the source may use a nearest point on the border of the target; interior vertices would be
+ * pulled to it from outside. */
 static void find_near(void *context, size_t block)
 {
     fit *t = context;
@@ -364,7 +365,7 @@ static void find_near(void *context, size_t block)
         vgi_hit hit;
         const double *at = t->x + 3 * v, *normal = t->normal + 3 * v;
         double limit = t->limit * t->limit, known = vgi_square(at, t->goal + 3 * v);
-        /* the previous answer is an upper bound, if its normal still matches */
+        /* the previous result is an upper bound if its normal still matches */
         bool guess = t->distance[v] < INFINITY && known < limit;
         t->distance[v] = INFINITY;
         if (!(t->L.sum[v] > 0) || (t->in->take_vertex && !t->in->take_vertex[v])) continue;
@@ -398,7 +399,7 @@ static void find_reverse(void *context, size_t block)
     }
 }
 
-/* Pulls from target vertices to source points that the source itself would not find: tips and concavities. */
+/* Pulls from target vertices on source points that the source's own search would miss: tips and concavities. */
 static int follow_reverse(fit *t, double weight, vg_err *e)
 {
     size_t n = t->in->target_mesh->nv;
@@ -410,8 +411,8 @@ static int follow_reverse(fit *t, double weight, vg_err *e)
     return VG_OK;
 }
 
-/* first: choose the pulls again. Later in a round the matrix stays, and a vertex that has lost its target keeps
- * its place. */
+/* first: choose the pulls again. Later in a round the matrix is fixed, and a vertex that has lost its target keeps
+ * its position. */
 static void follow_target(fit *t, double weight, bool first)
 {
     vertex_normals(t->m, t->x, t->in->flipped ? -1 : 1, t->normal);
@@ -461,7 +462,7 @@ static int run(fit *t, vg_err *e)
     return r;
 }
 
-/* The mean edge length, which sets the scale of smoothing. */
+/* Measure the mean edge length, which sets the scale of smoothing. */
 static void measure_edges(fit *t)
 {
     const vgi_laplacian *L = &t->L;

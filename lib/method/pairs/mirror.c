@@ -1,5 +1,5 @@
-/* mirror.c: the two halves of a body: which vertices change places when it is mirrored, and mirrored poses.
- * Leaves out bodies whose rest pose is not symmetric: their pairs must be known.
+/* mirror.c: mirror symmetry of a body: pairs of vertices that mirroring exchanges, and mirrored poses.
+ * The rest pose must be symmetric; otherwise the pairs must be given.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/surface.h"
 #include "numeric/kdtree.h"
@@ -9,8 +9,8 @@
 #include <stdlib.h>
 
 enum { NEAREST = 6, ROUNDS = 20 };
-static const double FAR = 0.02;     /* in D: partners are no farther apart, once mirrored */
-static const double TURNED = 1e-3;  /* in D: what the difference of two unit normals counts */
+static const double FAR = 0.02;     /* in D: largest distance between a vertex and its mirrored partner */
+static const double TURNED = 1e-3;  /* in D: weight of the difference of two unit normals */
 
 typedef struct candidate {
     double cost;
@@ -54,7 +54,8 @@ static double middle_of_box(const double *points, size_t nv, size_t axis)
     return (least + most) / 2;
 }
 
-/* From the middle of the box to the median of the middles between vertices and their mirror images. */
+/* Move the plane from the middle of the bounding box to the median midpoint between vertices and their mirror
+ * images. */
 static int find_plane(search *s, vg_err *e)
 {
     vg_mirror *m = s->m;
@@ -110,7 +111,7 @@ static int compare_candidates(const void *x, const void *y)
     return a->b < b->b ? -1 : a->b > b->b;
 }
 
-/* The cheapest pairs first; a vertex has one partner. */
+/* Accept the cheapest pairs first; a vertex has one partner. */
 static void take_candidates(search *s)
 {
     vg_mirror *m = s->m;
@@ -122,7 +123,7 @@ static void take_candidates(search *s)
     }
 }
 
-/* Vertices whose nearest ones went to others: pairs among them. */
+/* Pair the vertices whose nearest candidates were already taken. */
 static int pair_rest(search *s, vg_err *e)
 {
     enum { MOST = 1000 };
@@ -209,7 +210,7 @@ static int take_pairs(search *s, const vg_markers *pairs, vg_err *e)
     return r;
 }
 
-/* ---- how good they are ---- */
+/* ---- ---- quality of the pairs ---- */
 
 static void measure(search *s)
 {

@@ -1,10 +1,10 @@
-/* pair.c: which source faces drive each target face, once the source is fitted to the target (MATH 9).
+/* pair.c: chooses the source faces that drive each target face, once the source is fitted to the target (MATH 9).
  *
- * If a source face with a matching normal lies under the centroid of a target face, that face and nearby source
- * faces drive it. Their weights fall with the distance of the centroids, over a radius equal to the larger of the
- * two face sizes: a fine source is averaged, a coarse one interpolated. Neighbours are found over the surface, so
- * that fingers do not mix. Source faces without a target are given to the target face they lie on. A target face
- * without a source follows matched faces: in a hole the nearest across edges, in a component without matches the
+ * If a source face with a matching normal lies under the centroid of a target face, that face and nearby source faces
+ * drive it. Their weights decrease with the distance of the centroids, over a radius equal to the larger of the two
+ * face sizes: a fine source is averaged, a coarse one interpolated. Neighbours are found over the surface, so that
+ * fingers do not mix. Source faces without a target are assigned to the target face they lie on. A target face
+ * without a source follows matched faces: in a hole the nearest across edges; in a component without matches the
  * nearest in space, the same for the whole component so that it stays rigid. The fit is in fit.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/register.h"
@@ -16,21 +16,21 @@
 
 enum {
     BLOCK = 128,  /* faces per task */
-    MOST = 24,    /* most sources per target face, without source faces that are given to it later */
+    MOST = 24,    /* most source faces per target face, without those assigned to it later */
     AROUND = 512, /* most source faces examined per target face */
-    HOSTS = 4     /* matched faces that a component without counterpart follows */
+    HOSTS = 4     /* matched faces that a component without a counterpart follows */
 };
 static const double COINCIDENT = 1e-6; /* in D */
 static const double COSINE = 0.5;      /* least cosine of the angle between normals that match */
 static const double FAR = 0.03;        /* in D: largest distance of a match */
-static const double REACH = 1.2;       /* radius of the kernel, in sizes of faces */
+static const double REACH = 1.2;       /* radius of the kernel, in face sizes */
 
 struct candidate {
     uint32_t face;
     double weight;
 };
 
-/* The sources of one target face. */
+/* The source faces of one target face. */
 struct drivers {
     uint32_t n;
     struct candidate at[MOST];
@@ -41,7 +41,7 @@ struct pairing {
     vg_correspondence *c;
     vgi_incidence source_around, target_around;
     struct drivers *drivers;           /* per target face */
-    uint32_t *given;                   /* per source face: the target face that it is given to; UINT32_MAX: none */
+    uint32_t *given;                   /* per source face: the target face that it is assigned to, or UINT32_MAX */
     bool *used;                        /* per source face */
     uint32_t *host;                    /* per target face: the matched face that it follows */
 };
@@ -76,7 +76,7 @@ static bool coincide(const struct pairing *p, size_t target, size_t source)
 
 /* ---- from target to source ---- */
 
-/* The faces connected to a first face by shared vertices whose centroids are within a radius of a point. */
+/* The faces connected to a start face by shared vertices whose centroids lie within a radius of a point. */
 struct walk {
     uint32_t face[AROUND];
     size_t n;
@@ -165,10 +165,10 @@ static void match_block(void *context, size_t block)
         struct drivers *d = &p->drivers[g];
         vgi_hit hit;
         d->n = 0;
-        if (g < p->in->source->nf && coincide(p, g, g)) { /* the same mesh: faces may coincide */
+        if (g < p->in->source->nf && coincide(p, g, g)) { /* the same mesh, in which faces may coincide */
             *d = (struct drivers){1, {{(uint32_t)g, 1}}};
         } else if (nearest_source(p, g, &hit)) {
-            /* bones are not mixed, which would bend limbs between joints */
+            /* bones have one driver: mixing would bend limbs between joints */
             bool alone = face_size(p->in->target, g) == 2 || coincide(p, g, hit.face);
             if (alone) *d = (struct drivers){1, {{hit.face, 1}}};
             else find_drivers(p, g, hit.face, d);
@@ -195,8 +195,8 @@ static void give_block(void *context, size_t block)
     }
 }
 
-/* A source face without a target joins the drivers of its target face, weighted by its distance, but at most as
- * the least of them. */
+/* A source face without a target joins the drivers of its target face, weighted by its distance, but at most as much
+ * as the smallest weight there. */
 static double given_weight(const struct pairing *p, size_t f)
 {
     const struct drivers *d = &p->drivers[p->given[f]];
@@ -207,7 +207,7 @@ static double given_weight(const struct pairing *p, size_t f)
 
 /* target faces without a match */
 
-/* A target component with matches for less than half of its faces has no counterpart: the matches belong to other
+/* A target component with matches for less than half of its faces has no counterpart; the matches belong to other
  * components. */
 static int drop_strangers(struct pairing *p, vg_err *e)
 {
@@ -232,7 +232,7 @@ static int drop_strangers(struct pairing *p, vg_err *e)
     return r;
 }
 
-/* Breadth first from the matched faces: each other face takes the host of the face it was reached from. */
+/* Breadth first from the matched faces: each other face takes the host of the face from which it was reached. */
 static void fill_holes(struct pairing *p, uint32_t *queue)
 {
     const vg_mesh *m = p->in->target;
@@ -348,7 +348,7 @@ static int seat_pieces(struct pairing *p, vg_err *e)
     return r;
 }
 
-/* total */
+/* totals */
 
 static void count_pairs(struct pairing *p)
 {

@@ -1,6 +1,5 @@
-/* register.c: from a few pairs of points to the faces of one mesh that drive those of another: one frame for both,
- * contradictions among the pairs, the fit, the pairing. Leaves out the fit itself (fit.c), the choice of pairs
- * (pair.c), and files.
+/* register.c: registration: from a few pairs of points to the source faces that drive each target face. Steps: a
+ * common frame, rejection of inconsistent pairs, the fit (fit.c), the pairing (pair.c). Files are read elsewhere.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/register.h"
 #include "numeric/vec3.h"
@@ -12,8 +11,8 @@
 
 enum { NEIGHBOURS = 4, ROBUST_ROUNDS = 20 };
 
-/* A pair is wrong if it is this many times the typical distance, and at least this far in D, from where its
- * neighbours predict it. */
+/* A pair is wrong if its distance from the place that its neighbours predict is at least this many times the typical
+ * one, and at least this far in D. */
 static const double WRONG_TIMES = 5, WRONG_FAR = 0.08;
 
 struct similarity {
@@ -23,7 +22,7 @@ struct similarity {
 struct registration {
     const vg_register_input *in;
     vg_register_result *out;
-    double unit, centre[3];     /* of the target: lengths are divided by D, its centroid is at 0 */
+    double unit, centre[3];     /* of the target: lengths are divided by D, and its centroid is moved to 0 */
     double *source, *target;    /* points, normalised */
     double *rest;               /* the similarity that aligns source and target */
     vgi_tie *tie;
@@ -40,7 +39,7 @@ struct registration {
 
 /* ---- the similarity ---- */
 
-/* Least squares (Horn 1987): n weighted pairs of points; the scale treats both sides alike. */
+/* Least squares (Horn 1987) for n weighted pairs of points. The scale is symmetric in both sides. */
 static void fit_similarity(struct similarity *s, const double *from, const double *to, const double *weight, size_t n)
 {
     double sum = 0, a[3] = {0}, b[3] = {0}, S[9] = {0}, aa = 0, bb = 0;
@@ -86,7 +85,7 @@ static bool spread_out(const double *x, size_t n)
     return minors > 1e-8 * trace * trace;
 }
 
-/* Reweight pairs: those with much larger residuals than most count less and less (Geman and McClure). */
+/* Reweight pairs: the weight decreases for residuals much larger than most (Geman and McClure). */
 static int robust_similarity(struct similarity *s, const double *from, const double *to, size_t n, vg_err *e)
 {
     double *weight = vgi_array(n, sizeof *weight, e), *miss = vgi_array(n, sizeof *miss, e),
@@ -143,7 +142,7 @@ static void add_seed_ties(struct registration *r)
     }
 }
 
-/* The texture coordinates as a planar mesh: each corner is a vertex of its own. */
+/* The texture coordinates as a planar mesh in which each corner is a separate vertex. */
 static int texture_surface(vgi_surface **s, vg_mesh *flat, double **points, const vg_mesh *m, const vg_attributes *a,
                            vg_err *e)
 {
@@ -161,8 +160,8 @@ static int texture_surface(vgi_surface **s, vg_mesh *flat, double **points, cons
     return vgi_surface_new(s, flat, *points, e);
 }
 
-/* The point of a target face with the same texture coordinates. For triangles it is exact; in larger faces it
- * comes from the affine map that fits the corners best. */
+/* The point of a target face with the same texture coordinates. It is exact for triangles; larger faces use the
+ * affine map that fits the corners best. */
 static bool lift(const vg_mesh *m, uint32_t face, const double *uv, const double *points, const double at[3],
                  double out[3])
 {
@@ -241,9 +240,9 @@ static void tied_point(const vgi_tie *t, const double *x, double p[3])
         for (size_t k = 0; k < 3; k++) p[k] += t->share[a] * x[3 * (size_t)t->vertex[a] + k];
 }
 
-/* pairs inconsistent with the others */
+/* ---- pairs inconsistent with the others */
 
-/* residual[i]: how far the way of tie i to its place differs from what the nearest ones kept say. */
+/* residual[i]: difference between the displacement of tie i and that predicted by the nearest accepted ties. */
 static void neighbour_residuals(const double *from, const double *way, const bool *out, size_t n, double *residual)
 {
     for (size_t i = 0; i < n; i++) {
@@ -268,7 +267,7 @@ static void neighbour_residuals(const double *from, const double *way, const boo
     }
 }
 
-/* Remove the worst pair first, since it raises the residuals of its neighbours; then repeat. */
+/* Remove the worst pair first, because it raises the residuals of its neighbours; then repeat. */
 static int judge_markers(struct registration *r, vg_err *e)
 {
     size_t n = r->nmarkers;
@@ -299,7 +298,7 @@ static int judge_markers(struct registration *r, vg_err *e)
     return code;
 }
 
-/* ---- one after the other ---- */
+/* ---- ---- the steps in order ---- */
 
 static int normalise(struct registration *r, vg_err *e)
 {
@@ -345,13 +344,13 @@ static int align(struct registration *r, vg_err *e)
     return code;
 }
 
-/* Do the two meshes have opposite face orientation? Judged at the ties, or over all faces if there are none. */
+/* Decide whether the two meshes have opposite face orientation: at the ties, or over all faces if there are none. */
 static void find_sides(struct registration *r)
 {
     double votes = 0;
     const double *n = vgi_surface_normals(r->source_surface), *c = vgi_surface_centroids(r->source_surface);
     const vg_mesh *m = r->in->source;
-    /* if memory is short all faces vote: the same answer, but slower */
+    /* if memory is short, all faces vote: the result is the same but slower */
     bool *tied = r->nties ? calloc(m->nv + 1, sizeof *tied) : NULL;
     for (size_t i = 0; i < r->nties && tied; i++) tied[r->tie[i].vertex[0]] = r->tie[i].weight > 0;
     for (size_t f = 0; f < m->nf; f++) {
@@ -397,7 +396,7 @@ static void spread_choice(struct registration *r)
         r->take_vertex[v] = r->component[v] < r->out->components && r->out->taken[r->component[v]];
 }
 
-/* The components that the caller names, or that carry ties; all if there are none. */
+/* Start with the components that the caller names, or those with ties; with all if there are none. */
 static int begin_components(struct registration *r, vg_err *e)
 {
     const vg_mesh *m = r->in->source;
@@ -458,7 +457,7 @@ static int pair_faces(struct registration *r, vg_err *e)
     return vgi_pair(&p, &r->out->pairs, e);
 }
 
-/* Back to the target's units. x -> S((x - c) / D) D + c */
+/* Convert back to the target's units: x -> S((x - c) / D) D + c. */
 static int hand_over(struct registration *r, vg_err *e)
 {
     vg_register_result *out = r->out;

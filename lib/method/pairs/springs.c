@@ -1,13 +1,13 @@
-/* springs.c: the graph Laplacian of polygons, and the matrices of its two smoothness terms, entry by entry.
- * Leaves out what is fitted with them (fit.c).
+/* springs.c: the graph Laplacian of a polygon mesh, and the entries of the matrices of its two smoothness terms. They
+ * are used in fit.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/springs.h"
 
 #include <stdlib.h>
 
-enum { HUB = 100 }; /* neighbours */
+enum { HUB = 100 }; /* number of neighbours */
 
-/* Springs between all corners of a small face; in a large one along edges, to the second neighbour, and across. */
+/* Springs between all corners of a small face; in a large one along edges, to the second neighbours, and across. */
 static int add_face(vgi_edges *l, const uint32_t *vert, size_t r, vg_err *e)
 {
     int code = VG_OK;
@@ -32,7 +32,7 @@ static int gather_springs(vgi_edges *l, const vgi_fitting *in, vg_err *e)
         r = add_face(l, m->vert + m->start[f], m->start[f + 1] - m->start[f], e);
     for (size_t i = 0; i < in->nlinks && r == VG_OK; i++)
         r = vgi_edges_add(l, in->links[2 * i], in->links[2 * i + 1], 0.5, 0, e);
-    /* points joined by a tie: an entry in the matrix without a spring */
+    /* points joined by a tie have an entry in the matrix, without a spring */
     for (size_t i = 0; i < in->nties; i++)
         for (int k = 0; k < 3 && r == VG_OK; k++) {
             uint32_t a = in->tie[i].vertex[k], b = in->tie[i].vertex[(k + 1) % 3];

@@ -1,4 +1,4 @@
-/* surface.c: a bounding volume tree over the triangles of a polygon mesh, searched nearest box first.
+/* surface.c: a bounding volume hierarchy over the triangles of a polygon mesh, searched nearest box first.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/random.h"
 #include "method/pairs/surface.h"
@@ -17,8 +17,7 @@ struct triangle {
     bool flat;       /* no area: only its edges count */
 };
 
-/* Node i has the children 2i and 2i + 1; the node at place k of depth d holds the triangles n k / 2^d to
- * n (k + 1) / 2^d. */
+/* Node i has the children 2i and 2i + 1. Node k of depth d holds the triangles n k / 2^d to n (k + 1) / 2^d. */
 struct box {
     double least[3], most[3];
 };
@@ -47,7 +46,7 @@ static bool find_borders(vgi_surface *s, vg_err *e)
             uint32_t next = c + 1 < m->start[f + 1] ? c + 1 : m->start[f], v = m->vert[c], w = m->vert[next], ends[2];
             bool shared = false;
             if (around.first[v + 1] - around.first[v] > around.first[w + 1] - around.first[w]) {
-                uint32_t swap = v; /* search at the end with fewer faces: the other may be the hub of a large fan */
+                uint32_t swap = v; /* search at the end with fewer faces: the other may be the centre of a large fan */
                 v = w, w = swap;
             }
             for (uint32_t i = around.first[v]; i < around.first[v + 1] && !shared; i++) {
@@ -117,7 +116,7 @@ static void make_vertex_normals(vgi_surface *s)
     for (size_t v = 0; v < m->nv; v++) vgi_make_unit(s->vertex_normal + 3 * v);
 }
 
-/* Compares triangles by their middle along an axis; a total order, so that the tree is always the same. */
+/* Compares triangles by their centre along an axis. The order is total, so that the tree is always the same. */
 struct key {
     double middle[3];
     uint32_t index;
@@ -320,7 +319,7 @@ static double clamp01(double x)
     return x > 0 ? x < 1 ? x : 1 : 0;
 }
 
-/* Nearest point of the segment from o along d to p, as a share of d. */
+/* Nearest point to p on the segment from o along d, as a fraction of d. */
 static double on_segment(const double o[3], const double d[3], const double p[3])
 {
     double dd = vgi_dot(d, d), op[3] = {p[0] - o[0], p[1] - o[1], p[2] - o[2]};
@@ -340,11 +339,11 @@ static void try_edge(const struct triangle *t, const double p[3], int edge, doub
         square += d * d;
     }
     if (square < *best) *best = square, u[0] = x[0], u[1] = x[1], *touched = (uint8_t)(1 << edge);
-    else if (!(square > *best)) *touched |= (uint8_t)(1 << edge); /* a corner touches both edges */
+    else if (!(square > *best)) *touched |= (uint8_t)(1 << edge); /* a corner is on both edges */
 }
 
-/* Squared distance of p from a triangle; u: the nearest point as a + u0 ab + u1 ac; touched: the edges that it is
- * on. */
+/* Squared distance of p from a triangle; u: the nearest point is a + u0 ab + u1 ac; touched: the edges on which it
+ * lies. */
 static double triangle_distance(const struct triangle *t, const double p[3], double u[2], uint8_t *touched)
 {
     double best = INFINITY;
@@ -376,8 +375,8 @@ static const double *corner_normal(const vgi_surface *s, uint32_t corner)
     return s->vertex_normal + 3 * (size_t)s->m->vert[corner];
 }
 
-/* On sharp edges and tips, vertex normals are tested too: those of the adjacent faces do not represent the surface
- * there. */
+/* Whether the normal fits. On sharp edges and tips the vertex normals are tested too, because normals of the adjacent
+ * faces do not represent the surface there. */
 static bool fits(const vgi_surface *s, const struct triangle *t, const double u[2], const double *normal,
                  double cosine)
 {

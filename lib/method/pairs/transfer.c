@@ -1,8 +1,8 @@
-/* transfer.c: deformation transfer between meshes of different connectivity, face by face along a correspondence (MATH
- * 9). Where a face is driven by one face of as many corners, corner follows corner, as between meshes of one
- * connectivity (deform.c): so a mesh paired with itself comes back exactly, bent polygons too. Elsewhere one map of
- * the source faces drives all corners.
- * Leaves out how the correspondence is found (register.c) and the loops over corners (transfer_kernel.c).
+/* transfer.c: deformation transfer between meshes of different connectivity, face by face along a correspondence
+ * (MATH 9). If a target face is driven by one source face with as many corners, corner follows corner, as between
+ * meshes of one connectivity (deform.c); so a mesh paired with itself is reproduced exactly, including bent polygons.
+ * Elsewhere one map of the source faces drives all corners.
+ * The correspondence comes from register.c; the loops over corners are in transfer_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/transfer_kernel.h"
 #include "numeric/face.h"
@@ -22,17 +22,16 @@ struct vg_cross_transfer {
     vg_method method;
     int threads;
     const double *source_reference;
-    double ratio;          /* size of the target over that of the source */
+    double ratio;          /* size of the target relative to the source */
     double *p, *q;         /* see vgi_source */
-    unsigned char *slow;   /* per source face: 1: a line segment, 2: no gradient in the reference pose, never
-                              drives */
+    unsigned char *slow;   /* per source face: 1: a line segment; 2: no gradient in the reference pose, never drives */
     double *segment;       /* reference vector of each source face's first corner */
     double *vectors;       /* the target's reference vectors, per corner of its graph */
-    vgi_incidence around;  /* of the target, only if there are links */
-    /* target faces that go corner by corner: a graph of them over the source's vertices,
-     * and what it gives for eight poses */
+    vgi_incidence around;  /* of the target, only with links */
+    /* Target faces that go corner by corner ("twins"): a graph of them over the source's vertices, and its result for
+     * eight poses. */
     size_t ntwins;
-    uint32_t *twin;        /* the target faces, ascending; then links between vertices of such faces */
+    uint32_t *twin;        /* the target faces, ascending, then links between vertices of such faces */
     unsigned char *is_twin; /* per target face */
     vg_graph *twins;
     vg_deformer *deformer;
@@ -55,7 +54,7 @@ static void note_degenerate(vg_cross_transfer *c, size_t f, unsigned lanes)
     while (f < least && !atomic_compare_exchange_weak(&c->first_face, &least, f)) continue;
 }
 
-/* ---- making ---- */
+/* ---- ---- construction ---- */
 
 static int check_fit(const vg_mesh *source, const vg_correspondence *k, const vg_graph *target, vg_err *e)
 {
@@ -98,8 +97,8 @@ static int measure_source(vg_cross_transfer *c, const double *reference, vg_err 
     return VG_OK;
 }
 
-/* Which corner of source face s goes with the first of target face f:
- * the turn of the cycle in which their vectors agree best. */
+/* The corner of source face s that matches the first corner of target face f: the cyclic shift for which their
+ * vectors agree best. */
 static size_t best_turn(const vg_cross_transfer *c, const double *source_reference, size_t s, size_t f)
 {
     const uint32_t *vert = c->source->vert + c->source->start[s];
@@ -107,7 +106,7 @@ static size_t best_turn(const vg_cross_transfer *c, const double *source_referen
     size_t r = source_size(c, s), best = 0;
     double most = -INFINITY;
     for (size_t turn = 0; turn < r; turn++) {
-        double sum = 0; /* the target's vectors sum to 0, so positions do as well as vectors */
+        double sum = 0; /* the target's vectors sum to 0, so positions work as well as vectors */
         for (size_t i = 0; i < r; i++)
             for (size_t k = 0; k < 3; k++)
                 sum += t[3 * i + k] * source_reference[3 * (size_t)vert[(i + turn) % r] + k];
@@ -116,10 +115,10 @@ static size_t best_turn(const vg_cross_transfer *c, const double *source_referen
     return best;
 }
 
-/* Choose the twins; the number of their corners. */
+/* Choose the twins; returns the number of their corners. */
 static size_t choose_twins(vg_cross_transfer *c)
 {
-    enum { LARGEST = 64 }; /* trying all turns of a face costs the square of its corners */
+    enum { LARGEST = 64 }; /* trying all shifts of a face costs the square of its corners */
     const vg_graph *g = c->target;
     const vg_correspondence *k = c->pairs;
     size_t corners = 0;
@@ -133,8 +132,8 @@ static size_t choose_twins(vg_cross_transfer *c)
     return corners;
 }
 
-/* Fill the twins' mesh over the source's vertices; twin_of[v]: the source's vertex for target vertex v,
- * UINT32_MAX: none. */
+/* Fill the twins' mesh over the source's vertices. twin_of[v]: the source vertex for target vertex v, or
+ * UINT32_MAX. */
 static void fill_twins(const vg_cross_transfer *c, const double *source_reference, vg_mesh *m, uint32_t *twin_of)
 {
     const vg_graph *g = c->target;
@@ -152,8 +151,8 @@ static void fill_twins(const vg_cross_transfer *c, const double *source_referenc
     }
 }
 
-/* Links between vertices that have twins have one themselves. */
-/* The links between twins; how many. */
+/* Links between vertices that have twins are twins as well. */
+/* Collect the links between twins; returns their number. */
 static size_t link_twins(vg_cross_transfer *c, const uint32_t *twin_of, uint32_t *links)
 {
     const vg_graph *g = c->target;
@@ -168,7 +167,7 @@ static size_t link_twins(vg_cross_transfer *c, const uint32_t *twin_of, uint32_t
     return n;
 }
 
-/* The faces that go corner by corner, as a graph over the source's vertices in the order of the target's corners. */
+/* Build the graph of the twins over the source's vertices, in the order of the target's corners. */
 static int find_twins(vg_cross_transfer *c, const double *source_reference, vg_err *e)
 {
     const vg_graph *g = c->target;
@@ -296,7 +295,7 @@ typedef struct carry_job {
     size_t lanes;
 } carry_job;
 
-/* A line segment's map: its smallest rotation and its stretch, lane by lane. */
+/* Map of a line segment: its smallest rotation and its stretch, lane by lane. */
 static void measure_segment(const carry_job *j, size_t f)
 {
     const vg_cross_transfer *c = j->c;
@@ -331,14 +330,14 @@ static void measure_chunk(void *context, size_t i)
     }
 }
 
-/* Add the mean map of a target face's sources to a sum; sources without a direction are left out. */
+/* Add the mean map of a target face's drivers to a sum; drivers without a direction are left out. */
 static void add_sources(const vg_cross_transfer *c, size_t f, vgi_map *sum, vgi_lanes weight)
 {
     const vgi_drivers d = {c->maps, c->bad, c->pairs->source, c->pairs->weight};
     vgi_transfer_kernel_now()->add(&d, c->pairs->first[f], c->pairs->first[f + 1], sum, weight);
 }
 
-/* The centre of the source faces that drive the target faces around a vertex, in eight poses. */
+/* Centre of the source faces that drive the target faces around a vertex, in eight poses. */
 static void centre_beside(const vg_cross_transfer *c, uint32_t v, const double *const *poses, vgi_lanes centre[3])
 {
     const vg_correspondence *k = c->pairs;
@@ -363,8 +362,8 @@ static void centre_beside(const vg_cross_transfer *c, uint32_t v, const double *
         for (size_t lane = 0; lane < VGI_LANES && total > 0; lane++) centre[a][lane] /= total;
 }
 
-/* A link also takes part in how the source's faces at its ends have moved against each other, beyond the map that
- * they share: eyes move in their sockets. In the target's size. */
+/* A link also follows the relative motion of the source's faces at its ends, beyond their common map: eyes move in
+ * their sockets. Scaled to the target's size. */
 static void add_drift(const carry_job *j, size_t f, const vgi_map *map)
 {
     const vg_cross_transfer *c = j->c;
@@ -398,7 +397,7 @@ static void follow(const carry_job *j, size_t f)
     bool rigid = f < faces && !c->pairs->matched[f];
     if (f < faces) {
         add_sources(c, f, &sum, weight);
-    } else { /* a link: the faces at both ends */
+    } else { /* a link uses the faces at both ends */
         for (size_t end = 0; end < 2; end++) {
             uint32_t v = g->vert[begin + end], first = c->around.first[v], last = c->around.first[v + 1];
             if (last - first > ENOUGH) last = first + ENOUGH;
@@ -420,7 +419,7 @@ static void follow_chunk(void *context, size_t i)
         if (!j->c->is_twin[f]) follow(j, f);
 }
 
-/* Corner by corner, and from the order of the twins to that of the target. */
+/* Transfer the twins corner by corner, from the order of the twins to that of the target. */
 static void transfer_twins(const carry_job *j)
 {
     const vg_cross_transfer *c = j->c;

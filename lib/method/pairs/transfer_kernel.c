@@ -1,6 +1,5 @@
-/* transfer_kernel.c: deformation gradients of polygons, their means, their rotations, and vectors that follow them, in
- * lanes of poses.
- * Leaves out which faces drive which (transfer.c).
+/* transfer_kernel.c: deformation gradients of polygons, their means, their rotations, and vectors that follow them,
+ * in lanes of poses. Drivers are chosen in transfer.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/pairs/transfer_kernel.h"
 #include "numeric/wide_face.h"
@@ -100,7 +99,7 @@ VGI_INLINE void apply(const vgi_wide *a, const double *r, vgi_wide d[3])
         d[i] = a[3 * i] * vgi_same(r[0]) + a[3 * i + 1] * vgi_same(r[1]) + a[3 * i + 2] * vgi_same(r[2]);
 }
 
-/* One vector by the map d and its rotation. */
+/* Transform one vector by the map d and its rotation. */
 VGI_INLINE void follow_vector(const vgi_wide *d, const vgi_wide *turn, vgi_follow how, const double *v, vgi_wide w[3])
 {
     if (how == VGI_FOLLOW_RIGID) return apply(turn, v, w);

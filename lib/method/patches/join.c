@@ -1,5 +1,5 @@
-/* join.c: agglomeration after Ward over a graph of neighbours, the cheapest pair on top of a heap.
- * Leaves out what the pieces are and where their features come from (segment.c).
+/* join.c: agglomerative clustering after Ward over a neighbour graph, with the cheapest pair on top of a heap.
+ * Pieces and their features come from segment.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/patches/join.h"
 #include "numeric/sets.h"
@@ -14,10 +14,10 @@ typedef struct state {
     vgi_joining *j;
     uint32_t *set;
     double *cost;
-    uint32_t *heap, *place; /* heap of pairs by cost; position of each pair in it, NONE: removed */
+    uint32_t *heap, *place; /* heap of pairs by cost; position of each pair in it, NONE once removed */
     size_t left;            /* pairs in the heap */
     uint32_t *first, *last, *next;
-    uint32_t *seen;         /* per piece: the pair that joins it with the current piece */
+    uint32_t *seen;         /* per piece: the pair that joins it to the current piece */
 } state;
 
 static double cost_of(const vgi_joining *j, uint32_t a, uint32_t b)
@@ -41,7 +41,7 @@ static void put(state *s, size_t at, uint32_t p)
     s->heap[at] = p, s->place[p] = (uint32_t)at;
 }
 
-/* Restore the heap at position `at`. */
+/* Restore the heap order at position `at`. */
 static void settle(state *s, size_t at)
 {
     uint32_t p = s->heap[at];
@@ -73,21 +73,21 @@ static void append(state *s, uint32_t piece, uint32_t end)
     s->last[piece] = end, s->next[end] = NONE;
 }
 
-/* The piece that pair p joins with piece a; a itself if there is none. */
+/* The piece that pair p joins to piece a; a itself if the pair is inside. */
 static uint32_t beyond(const state *s, uint32_t p, uint32_t a)
 {
     uint32_t x = vgi_sets_find(s->set, s->j->pair[p][0]), y = vgi_sets_find(s->set, s->j->pair[p][1]);
     return x == a ? y : x;
 }
 
-/* Merge b into a. If two pairs now join the same pieces the first one stays. */
+/* Merge b into a. If two pairs now join the same pieces, the first one stays. */
 static void join(state *s, uint32_t a, uint32_t b)
 {
     vgi_joining *j = s->j;
     double sum = j->size[a] + j->size[b], *x = j->mean + a * j->width, *y = j->mean + b * j->width;
     for (size_t i = 0; i < j->width; i++) x[i] = (j->size[a] * x[i] + j->size[b] * y[i]) / sum;
     j->size[a] = sum;
-    vgi_sets_join(s->set, a, b); /* the merged piece is named a, with a < b */
+    vgi_sets_join(s->set, a, b); /* the merged piece takes the lower number, a < b */
     uint32_t lists[2] = {s->first[a], s->first[b]};
     s->first[a] = NONE;
     for (int i = 0; i < 2; i++)

@@ -1,4 +1,4 @@
-/* join.h: pieces that are joined with neighbours that are alike, until few are left.
+/* join.h: merges neighbouring pieces that are similar, until a given number is left.
  * Internal.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_JOIN_H
@@ -6,18 +6,17 @@
 
 #include "core/core.h"
 
-/* Pieces, each with the mean of a feature over its members, and which of them are neighbours. */
+/* Pieces with the mean of a feature over their members, and the pairs of neighbours. */
 typedef struct vgi_joining {
     size_t n, width;
-    double *mean, *size; /* n x width, and the number of members; those of joined pieces become those of both */
-    uint32_t (*pair)[2]; /* npairs of neighbours a < b, none twice */
+    double *mean, *size; /* n x width, and the number of members; merging updates both */
+    uint32_t (*pair)[2]; /* npairs pairs of neighbours a < b, without duplicates */
     size_t npairs;
 } vgi_joining;
 
-/* vgi_join_pieces: again and again join the two neighbours whose union costs the least (Ward 1963: what the sum of
- * squared distances from the means grows by; of several the pair that comes first), until k are left or none has a
- * neighbour. set[i] (n): the lowest piece of those that i is joined with. About O(npairs log npairs) steps, each of
- * O(width). */
+/* vgi_join_pieces: repeatedly merge the two neighbours with the smallest increase of the sum of squared distances
+ * from the means (Ward 1963; ties: the pair that comes first), until k pieces are left or none has a neighbour.
+ * set[i] (n): the lowest piece of the merged set that contains i. About O(npairs log npairs) steps of O(width). */
 int vgi_join_pieces(vgi_joining *j, size_t k, uint32_t *set, vg_err *e) VG_MUST_CHECK;
 
 #endif

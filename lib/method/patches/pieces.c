@@ -1,5 +1,5 @@
-/* pieces.c: connected pieces of labelled faces, adjacent labels, and the points where they meet. Segmentation is
- * in segment.c, components of whole meshes in mesh.c.
+/* pieces.c: connected pieces of labelled faces, adjacent labels, and the points where they meet. Segmentation is in
+ * segment.c, components of whole meshes in mesh.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/patches/pieces.h"
 #include "numeric/vec3.h"
@@ -43,7 +43,7 @@ int vgi_connected_pieces(const vg_mesh *m, const uint32_t *label, size_t nlabels
     return r;
 }
 
-/* The labels of the faces around a vertex, ascending; how many there are. */
+/* The labels of the faces around a vertex, ascending; returns their number. */
 static size_t labels_around(const vgi_incidence *around, size_t v, const uint32_t *label, uint32_t seen[MOST])
 {
     size_t n = 0;
@@ -102,7 +102,7 @@ int vgi_neighbours(const vg_mesh *m, const uint32_t *label, uint32_t (**pair)[2]
     return r;
 }
 
-/* Binary search for a pair; n if it is not there. */
+/* Binary search for a pair; returns n if it is not found. */
 static size_t find_pair(const uint32_t *pairs, size_t n, uint32_t a, uint32_t b)
 {
     size_t low = 0, high = n;

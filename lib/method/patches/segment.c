@@ -1,5 +1,5 @@
-/* segment.c: faces that rotate alike, by K-means over their rotations (T 6.2), and connected patches made of them.
- * Rotations of faces are in polar.c, connected pieces in pieces.c, merging in join.c.
+/* segment.c: segmentation into faces that rotate alike, by K-means over their rotations (T 6.2), and connected
+ * patches made of them. Rotations of faces are in polar.c, connected pieces in pieces.c, merging in join.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/random.h"
 #include "method/patches/join.h"
@@ -13,11 +13,11 @@
 #include <stdlib.h>
 
 enum {
-    WIDTH = 1024,  /* most features per face, */
+    WIDTH = 1024,  /* most features per face */
     NARROW = 128,  /* features per face at first */
     ROUNDS = 40,
-    CHUNK = 256,   /* faces of one task */
-    STRIPE = 64    /* dimensions of one task */
+    CHUNK = 256,   /* faces per task */
+    STRIPE = 64    /* dimensions per task */
 };
 #define NONE UINT32_MAX
 static const double enough = 10; /* degrees, for the choice of the number of patches */
@@ -30,7 +30,7 @@ struct vg_segmenter {
     int threads;
     size_t poses;
     float *feature; /* nf x width */
-    size_t width;   /* grows with the poses; cut to what is used at the end */
+    size_t width;   /* grows with the poses; cut to the used width at the end */
 };
 
 int vg_segmenter_new(vg_segmenter **out, const vg_mesh *m, const double *reference, int threads, vg_err *e)
@@ -64,7 +64,7 @@ typedef struct adding {
     vg_segmenter *s;
     const double *poses[VGI_LANES];
     size_t lanes;
-    uint32_t at[9 * VGI_LANES]; /* the feature that entry i of pose k is added to, and its sign */
+    uint32_t at[9 * VGI_LANES]; /* the feature to which entry i of pose k is added, and its sign */
     float sign[9 * VGI_LANES];
 } adding;
 
@@ -131,21 +131,21 @@ static void cut_down(vg_segmenter *s)
 
 typedef struct clustering {
     const vg_segmenter *s;
-    size_t n, k;           /* faces, patches */
+    size_t n, k;           /* number of faces, of patches */
     uint32_t *label;
     float *nearest;        /* squared distance to the nearest centre */
     float *norm;           /* per face: squared length of its feature */
     float *centre;         /* most x width */
     float *centre_norm;
-    double *total;         /* most x width: sums of features, of the faces as they were ... */
-    uint32_t *counted;     /* ... with these labels; NONE: not counted yet */
-    uint32_t *moved;       /* the faces that have another label now */
+    double *total;         /* most x width: sums of features over the faces, as labelled */
+    uint32_t *counted;     /* in this array; NONE: not counted yet */
+    uint32_t *moved;       /* faces whose label has changed since */
     size_t nmoved;
     double *sums;          /* per chunk of faces */
     uint32_t *sizes;
     float *products;       /* per worker: CHUNK x most */
     size_t workers;
-    atomic_size_t next;    /* first chunk that no worker has taken */
+    atomic_size_t next;    /* next chunk to process */
     size_t most, changed;
     uint32_t *chunk_changed;
     const float *fresh;    /* the most recent centre */
@@ -162,8 +162,8 @@ static float inner(const float *a, const float *b, size_t n)
     return vgi_segment_kernel_now()->inner(a, b, n);
 }
 
-/* Update distances with the most recent centre; sum the nearest distances by chunks, so that the sum does not
- * depend on the number of threads. */
+/* Update distances with the most recent centre, and sum the nearest distances chunk by chunk, so that the sum does
+ * not depend on the number of threads. */
 static void near_chunk(void *context, size_t i)
 {
     clustering *c = context;
@@ -172,7 +172,7 @@ static void near_chunk(void *context, size_t i)
     double sum = 0;
     for (size_t f = first; f < last; f++) {
         float d = c->norm[f] + square - 2 * inner(c->s->feature + f * width, c->fresh, width);
-        if (!(d > 1e-6f * (c->norm[f] + square))) d = 0; /* below this two features are equal but for rounding */
+        if (!(d > 1e-6f * (c->norm[f] + square))) d = 0; /* a smaller distance is rounding error */
         if (d < c->nearest[f]) c->nearest[f] = d, c->label[f] = c->fresh_label;
         sum += (double)c->nearest[f];
     }
@@ -269,7 +269,7 @@ static void mean_stripe(void *context, size_t i)
     }
 }
 
-/* In later rounds few faces change: only those are updated. */
+/* In later rounds few faces change; only those are updated. */
 static void find_means(clustering *c)
 {
     c->nmoved = 0;
@@ -279,7 +279,7 @@ static void find_means(clustering *c)
     memcpy(c->counted, c->label, c->n * sizeof *c->counted);
 }
 
-/* before labels are renumbered */
+/* call before labels are renumbered */
 static void forget_means(clustering *c)
 {
     memset(c->counted, 0xff, c->n * sizeof *c->counted);
@@ -457,7 +457,7 @@ static int cut(clustering *c, size_t k, uint64_t seed, bool connected, vg_segmen
     if (connected) {
         size_t pieces = n;
         r = connect(c->s, c->label, n, k, &pieces, e);
-        if (r == VG_OK && pieces > c->most) { /* more components than requested patches: allocate for all of them */
+        if (r == VG_OK && pieces > c->most) { /* more components than requested patches: make room for all of them */
             clustering larger;
             if ((r = make_clustering(&larger, c->s, pieces, e)) < 0) return r;
             memcpy(larger.label, c->label, c->n * sizeof *c->label);

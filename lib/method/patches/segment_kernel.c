@@ -12,7 +12,7 @@ VGI_INLINE floats load(const float *p)
     return *(const floats_at *)p;
 }
 
-/* 32 sums whatever the width, so that the order of the additions is the same in every set. */
+/* 32 partial sums for any width of vector, so that every instruction set adds in the same order. */
 static float inner(const float *a, const float *b, size_t n)
 {
     floats sum[SUMS] = {{0}};
@@ -39,7 +39,7 @@ static void move(const float *restrict x, size_t n, double *restrict to, double 
 
 static void add(const vgi_lanes *rotation, size_t lanes, const uint32_t *at, const float *sign, float *to)
 {
-    float x[VGI_LANES * 9]; /* as the poses go, so that features next to one another are added one after another */
+    float x[VGI_LANES * 9]; /* in pose order, so that neighbouring features are added consecutively */
     for (size_t n = 0; n < 9; n++)
         for (size_t k = 0; k < VGI_LANES; k++) x[9 * k + n] = (float)(rotation[n][k] - (n % 4 == 0));
     for (size_t i = 0; i < 9 * lanes; i++) to[at[i]] += sign[i] * x[i];

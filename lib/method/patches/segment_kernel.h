@@ -1,4 +1,4 @@
-/* segment_kernel.h: the loops of K-means over features of binary32. Rows of features are whole multiples of 16 numbers.
+/* segment_kernel.h: inner loops of K-means over features of binary32. Rows of features are multiples of 16 numbers.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_SEGMENT_KERNEL_H
 #define VG_SEGMENT_KERNEL_H
@@ -11,8 +11,8 @@ typedef struct vgi_segment_kernel {
     float (*inner)(const float *a, const float *b, size_t n);
     /* move: *to += x, and *from -= x unless it is NULL */
     void (*move)(const float *x, size_t n, double *to, double *from);
-    /* add: what 9 rotation entries of each of the first `lanes` poses add to a feature: entry n of pose k, less that of
-     * the identity, goes to to[at[9 k + n]] with sign[9 k + n] */
+    /* add: the contribution of the 9 rotation entries of the first `lanes` poses to a feature: entry n of pose k,
+     * minus that of the identity, is added to to[at[9 k + n]] with sign[9 k + n] */
     void (*add)(const vgi_lanes *rotation, size_t lanes, const uint32_t *at, const float *sign, float *to);
 } vgi_segment_kernel;
 VGI_KERNEL(vgi_segment_kernel)
