@@ -1,9 +1,9 @@
-/* deform.c: how each vector of a pose has turned and stretched against the reference pose, and the same done to
- * another mesh's vectors (MATH 4 and 5, pose deformation; T 3.3, T 4.2).
+/* deform.c: measures the rotation and stretch of each vector of a pose relative to the reference pose, and applies
+ * them to the vectors of another mesh (MATH 4 and 5, pose deformation; T 3.3, T 4.2).
  *
- * Two ways lead to the same numbers. The kernel (deform_kernel.c) does whole faces in eight poses at once and never
- * forms a quaternion. The scalar way below forms them: for faces with degenerate corners, for line segments, for
- * links, and when quaternions are what is asked for.
+ * There are two implementations with the same results. The kernel (deform_kernel.c) does whole faces in eight poses
+ * at once and never forms a quaternion. The scalar code below does: for faces with degenerate corners, for line
+ * segments, for links, and when quaternions are requested.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/deform.h"
 #include "numeric/vec3.h"
@@ -15,29 +15,28 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 
-enum { CHUNK = 1024, /* faces of one task */
+enum { CHUNK = 1024, /* faces per task */
        ENOUGH = 64 };
-static const double shortest = 1e-9;      /* of D: a vector below has no direction */
+static const double shortest = 1e-9;      /* in D: a shorter vector has no direction */
 static const double flat = 1e-12;         /* see deform_kernel.c */
 
 struct vg_deformer {
     const vg_graph *g;
     int threads;
-    double shortest2; /* mesh units, squared */
-    size_t faces;     /* without links */
+    double shortest2; /* squared, in mesh units */
+    size_t faces;     /* number of faces, without links */
     double *vector;   /* per corner of the reference: the vector */
     double *length;   /* its length, 0 if degenerate */
-    double *frame;    /* per corner: unit quaternion of its frame; of a 2-vertex face unused */
-    unsigned char *slow; /* per face: the kernel cannot do it */
-    vgi_incidence around; /* faces at each vertex, only if there are links */
+    double *frame;    /* per corner: unit quaternion of its frame; unused for 2-vertex faces */
+    unsigned char *slow; /* per face: needs the scalar code */
+    vgi_incidence around; /* faces at each vertex, only with links */
     double *target;   /* per corner: the target's vector */
     vgi_method method;
     double *coordinates; /* see vgi_transfer */
     vgi_gradient *gradient;
     vgi_gradient_face *gradient_face;
     atomic_uint_fast64_t degenerate, first_face;
-    /* one piece per thread: vectors and quaternions of the largest face (work_scalars numbers),
-     * then the kernel's lanes */
+    /* per thread: vectors and quaternions of the largest face (work_scalars numbers), then the kernel's lanes */
     double *work;
     size_t work_size, work_scalars;
 };
@@ -49,7 +48,7 @@ static size_t face_size(const vg_graph *g, size_t f)
 
 /* ---- one face in one pose ---- */
 
-/* The unit quaternion of the frame [u b n] of a corner; false when the corner is degenerate. */
+/* The unit quaternion of the frame [u b n] of a corner; false if the corner is degenerate. */
 static bool corner_frame(const vg_deformer *d, const double w[3], const double n[3], double *length, double q[4])
 {
     *length = vgi_length(w);
@@ -66,7 +65,7 @@ static bool corner_frame(const vg_deformer *d, const double w[3], const double n
     return true;
 }
 
-/* Add unit quaternion q to a sum, in the sign that agrees with the sum so far. */
+/* Add unit quaternion q to a sum, with the sign that agrees with the sum so far. */
 static void add_turn(double sum[4], const double q[4])
 {
     double sign = sum[0] * q[0] + sum[1] * q[1] + sum[2] * q[2] + sum[3] * q[3] < 0 ? -1 : 1;
@@ -83,8 +82,8 @@ static void make_unit(double q[4])
     }
 }
 
-/* Deformation of every corner of a face of 3 or more; returns how many were degenerate. w: its vectors in the
- * pose. */
+/* Deformation of every corner of a face with 3 or more corners. Returns the number of degenerate ones. w: vectors of
+ * the face in the pose. */
 static size_t measure_polygon(const vg_deformer *d, size_t f, const double *w, double *quaternions)
 {
     uint32_t begin = d->g->start[f];
@@ -94,7 +93,7 @@ static size_t measure_polygon(const vg_deformer *d, size_t f, const double *w, d
     for (size_t i = 0; i < r; i++) {
         double *q = quaternions + 4 * i, now[4], length, before = d->length[begin + i];
         if (!has_normal || before == 0 || !corner_frame(d, w + 3 * i, n, &length, now)) {
-            /* to be filled in below; a good corner's Q is never all zero, but its w may be: mark all four */
+            /* filled in below; Q of a valid corner is never all zero but its first number may be, so mark all four */
             q[0] = 0;
             q[1] = q[2] = q[3] = 0;
             bad++;
@@ -116,8 +115,8 @@ static size_t measure_polygon(const vg_deformer *d, size_t f, const double *w, d
     return bad;
 }
 
-/* A 2-vertex face: both corners get the smallest rotation that does it, on top of the turn `base` (a unit quaternion;
- * identity for bones). */
+/* A 2-vertex face: both corners get the smallest rotation after the rotation `base` (a unit quaternion; the identity
+ * for bones). */
 static size_t measure_segment(const vg_deformer *d, size_t f, const double *w, const double base[4],
                               double *quaternions)
 {
@@ -137,7 +136,7 @@ static size_t measure_segment(const vg_deformer *d, size_t f, const double *w, c
     return bad;
 }
 
-/* ---- reading a face's vectors out of a pose ---- */
+/* ---- ---- loading the vectors of a face ---- */
 
 static void face_vectors(const vg_graph *g, size_t f, vg_kind kind, const double *pose, double *w)
 {
@@ -157,7 +156,7 @@ static void face_vectors(const vg_graph *g, size_t f, vg_kind kind, const double
 
 static const double identity[4] = {1, 0, 0, 0};
 
-/* The deformation of face f (no link) in one pose, scalar way. `w` is workspace of its vectors. */
+/* Deformation of face f (not a link) in one pose, by the scalar code. w: workspace for its vectors. */
 static size_t measure_face(const vg_deformer *d, size_t f, vg_kind kind, const double *pose, double *w,
                            double *quaternions)
 {
@@ -166,7 +165,7 @@ static size_t measure_face(const vg_deformer *d, size_t f, vg_kind kind, const d
     return measure_polygon(d, f, w, quaternions);
 }
 
-/* The mean turn of the faces around both ends of a link, links left out, of at most ENOUGH corners each. w, q:
+/* Mean rotation of the faces around both ends of a link, without links, from at most ENOUGH corners per end. w, q:
  * workspace. */
 static void turn_beside(const vg_deformer *d, size_t link, vg_kind kind, const double *pose, double *w, double *q,
                         double mean[4])
@@ -196,7 +195,7 @@ static size_t measure_link(const vg_deformer *d, size_t link, vg_kind kind, cons
     turn_beside(d, link, kind, pose, w, w + 3 * d->g->max_corners, mean);
     face_vectors(d->g, link, kind, pose, w);
     measure_segment(d, link, w, mean, q);
-    return 0; /* a link between coincident vertices has no direction, and needs none */
+    return 0; /* a link between coincident vertices has no direction and needs none */
 }
 
 static size_t measure_any(const vg_deformer *d, size_t f, vg_kind kind, const double *pose, double *w, double *q)
@@ -219,7 +218,7 @@ static void count_degenerate(vg_deformer *d, size_t f, size_t bad)
     while (f < least && !atomic_compare_exchange_weak(&d->first_face, &least, f)) continue;
 }
 
-/* ---- making ---- */
+/* ---- ---- construction ---- */
 
 static void measure_reference(vg_deformer *d)
 {
@@ -250,7 +249,7 @@ static int make_workspace(vg_deformer *d, vg_err *e)
     return d->work ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory for faces of %zu corners", r - 1);
 }
 
-/* All but what the reference says, whose D is `diagonal`. */
+/* Everything that does not depend on the reference. diagonal: its D. */
 static int make_deformer(vg_deformer **out, const vg_graph *g, double diagonal, int threads, vg_err *e)
 {
     size_t corners = vg_graph_corners(g);
@@ -318,7 +317,7 @@ static void make_coordinates(vg_deformer *d)
     }
 }
 
-/* A face whose gradient cannot be had (nearly a line) is done the slow way, by its corners. */
+/* A face without a usable gradient (nearly a line) is done corner by corner by the scalar code. */
 static void make_gradient(vg_deformer *d, size_t f)
 {
     const vg_graph *g = d->g;
@@ -367,7 +366,7 @@ vg_deform_stats vg_deformer_get_stats(const vg_deformer *d)
     return (vg_deform_stats){atomic_load(&d->degenerate), atomic_load(&d->first_face)};
 }
 
-/* ---- many faces, many poses ---- */
+/* ---- ---- many faces and poses ---- */
 
 typedef struct deform_job deform_job;
 typedef void deform_step(deform_job *job, double *work, size_t first, size_t last);
@@ -378,7 +377,7 @@ struct deform_job {
     const double *const *in;
     double *const *out;
     deform_step *step;
-    atomic_size_t next; /* the first face that no worker has taken */
+    atomic_size_t next; /* next face to process */
 };
 
 static void run_worker(void *context, size_t worker)
@@ -434,7 +433,7 @@ static void transfer_slowly(deform_job *j, double *work, size_t f, size_t p)
     apply_face(d, f, quaternions, j->out[p]);
 }
 
-/* What the kernel calls back with: faces that it found degenerate in some poses. */
+/* Context of the kernel's callback for faces that are degenerate in some poses. */
 typedef struct redo {
     deform_job *job;
     double *work;

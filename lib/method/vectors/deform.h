@@ -1,4 +1,4 @@
-/* deform.h: internal part of the measuring of deformations. The public part is in vg/vectors.h.
+/* deform.h: internal part of the measurement of deformations. The public part is in vg/vectors.h.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_DEFORM_H
 #define VG_DEFORM_H

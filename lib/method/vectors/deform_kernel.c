@@ -1,16 +1,16 @@
-/* deform_kernel.c: the inner loop of deformation transfer.
+/* deform_kernel.c: inner loop of deformation transfer.
  *
- * With the frame F = [u b n] of a corner in the deformed pose and the coordinates k of the target's reference vector
- * in the frame of the source's reference corner, the wanted vector a J r_t = (|d|/|r|) F_d F_r' r_t is |d| (k_u u +
- * k_b b + k_n n), k already divided by |r|: one normalisation, one cross product and three multiply-adds a corner.
- * Poses stand side by side in the lanes of a vector, so nothing has to be shuffled. Leaves out degenerate corners: it
- * only finds them (deform.c).
+ * F = [u b n] is the frame of a corner in the deformed pose; k are the coordinates of the target's reference vector
+ * in the frame of the source's reference corner, divided by |r|. The wanted vector a J r_t = (|d|/|r|) F_d F_r' r_t
+ * is |d| (k_u u + k_b b + k_n n): one normalisation, one cross product and three multiply-adds per corner. Each lane
+ * of a vector holds one pose, so nothing is shuffled. Degenerate corners are only detected here; deform.c handles
+ * them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/deform_kernel.h"
 #include "core/wide.h"
 
-/* the face has no normal when |n| <= 1e-12 sum |d|^2, a corner no frame when it stands on its face's normal to
- * 1e-12 */
+/* a face has no normal if |n| <= 1e-12 sum |d|^2; a corner has no frame if its vector is parallel to the face normal
+ * to 1e-12 */
 static const double flat2 = 1e-24;
 
 typedef struct vec {
@@ -62,7 +62,7 @@ VGI_INLINE void load_face(const vgi_transfer *t, const double *const *poses, uin
     w[r] = w[0];
 }
 
-/* Wanted vectors by the corners' frames, w in place; returns which lanes have a corner without a frame. */
+/* Wanted vectors from the frames of the corners, in place in w. Returns the lanes in which a corner has no frame. */
 VGI_INLINE vgi_mask by_pose(const vgi_transfer *t, uint32_t begin, size_t r, vec n, vec *w)
 {
     vgi_mask bad = {0};
@@ -80,7 +80,7 @@ VGI_INLINE vgi_mask by_pose(const vgi_transfer *t, uint32_t begin, size_t r, vec
     return bad;
 }
 
-/* Wanted vectors by the face's deformation gradient, out of w into g. */
+/* Wanted vectors from the deformation gradient of the face, from w into g. */
 VGI_INLINE void by_gradient(const vgi_transfer *t, size_t f, uint32_t begin, size_t r, vec n, const vec *w, vec *g)
 {
     vec y[3] = {{{{0}}}}; /* columns of sum d_k p_k' */
@@ -97,7 +97,7 @@ VGI_INLINE void by_gradient(const vgi_transfer *t, size_t f, uint32_t begin, siz
     }
 }
 
-/* Face f of r corners in the poses of one part; returns which of them have a degenerate corner. */
+/* Face f with r corners in the poses of one part. Returns the lanes with a degenerate corner. */
 VGI_INLINE unsigned transfer_part(const vgi_transfer *t, size_t f, size_t r, size_t part, vec *w, vec *g,
                                   vgi_method method)
 {
@@ -126,7 +126,7 @@ VGI_INLINE unsigned transfer_part(const vgi_transfer *t, size_t f, size_t r, siz
     return (vgi_bits(bad) & ((1u << lanes) - 1)) << first;
 }
 
-/* Called with constant sizes, this becomes straight code for triangles and quads. */
+/* With constant sizes the compiler unrolls this for triangles and quads. */
 VGI_INLINE void transfer_face(const vgi_transfer *t, size_t f, size_t r, vec *w, vec *g, vgi_method method)
 {
     unsigned bad = 0;
@@ -150,7 +150,7 @@ VGI_INLINE void transfer_by(const vgi_transfer *t, size_t first, size_t last, ve
 static void transfer(const vgi_transfer *t, size_t first, size_t last, vgi_lane_point *room, size_t max_corners)
 {
     vec *w = (vec *)(void *)room;
-    switch (t->method) { /* once, so that each loop is compiled for its method */
+    switch (t->method) { /* switch here, so that each loop is compiled for its method */
     case VGI_POSE: return transfer_by(t, first, last, w, max_corners, VGI_POSE);
     case VGI_GRADIENT: return transfer_by(t, first, last, w, max_corners, VGI_GRADIENT);
     case VGI_BLEND: return transfer_by(t, first, last, w, max_corners, VGI_BLEND);

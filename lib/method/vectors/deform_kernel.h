@@ -6,13 +6,13 @@
 #include "core/isa.h"
 #include "core/lanes.h"
 
-/* What is carried over: MATH 5. */
+/* What is transferred: see MATH 5. */
 typedef enum vgi_method { VGI_POSE, VGI_GRADIENT, VGI_BLEND } vgi_method;
 
 /* The deformation gradient of a face is D = (sum d_c r_c' + h n_d n_r') P with P = (sum r_c r_c' + h n_r n_r')^-1.
- * For the target's vector t the wanted vector is D t, plus what a linear map of the face leaves of the source's own
- * vector, at the target's size: rho (d - D r). (Corners of a face that is not flat are no linear image of one
- * another.) With b = t - rho r that is sum d_k (p_k . b) + n_d (q . b) + rho d, p_k = P r_k, q = h P n_r. */
+ * For the target's vector t the wanted vector is D t + rho (d - D r): the second term is the part of the source's
+ * vector that no linear map of the face gives, scaled to the target (corners of a bent face are not linear images of
+ * one another). With b = t - rho r this is sum d_k (p_k . b) + n_d (q . b) + rho d, p_k = P r_k, q = h P n_r. */
 typedef struct vgi_gradient {
     double p[3], b[3];
 } vgi_gradient; /* per corner */
@@ -20,16 +20,16 @@ typedef struct vgi_gradient_face {
     double q[3], rho;
 } vgi_gradient_face;
 
-/* vgi_transfer_faces: faces first .. last-1, each of 3 or more corners.
+/* vgi_transfer_faces: faces first .. last-1, each with 3 or more corners.
  *   start, vert   the graph (vg_graph)
  *   poses         8 poses: positions if `vertices`, else vectors
  *   gradient, gradient_face   for VGI_GRADIENT and VGI_BLEND, see above
  *   coordinates   for VGI_POSE and VGI_BLEND, 3 per corner: the target's vector in the frame of the source's
- *                 reference corner, over the length of the source's reference vector
+ *                 reference corner, divided by the length of the source's reference vector
  *   shortest2     squared length below which a vector is degenerate
  *   skip          1 per face: do nothing
  *   w             workspace of 2 (max corners + 1) points of eight poses
- *   out           lanes of them, vectors of the target
+ *   out           per lane: vectors of the target
  *   bad           called for each face with a degenerate corner in one of the first `lanes` poses, after its vectors
  *                 have been written */
 typedef struct vgi_transfer {

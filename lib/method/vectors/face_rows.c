@@ -1,5 +1,5 @@
-/* face_rows.c: the faces of a graph as rows of a solver's factor. Searches that start from the plain solution
- * (planar.c, robust.c) pass over all faces in every step; in the order of rows neighbours are near in memory.
+/* face_rows.c: the faces of a graph, as rows of a solver's factor. Searches that start from the plain solution
+ * (planar.c, robust.c) visit all faces in every step; in row order neighbours are close in memory.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/face_rows.h"
 
@@ -28,7 +28,7 @@ static uint32_t least_row(const vg_graph *g, const uint32_t *row, size_t f)
     return least;
 }
 
-/* Number the held vertices: from here on every attached vertex has a row. */
+/* Number the held vertices, so that every attached vertex has a row. */
 static void number_held(vgi_face_rows *r, const vgi_solver_view *s, uint32_t *rows)
 {
     size_t n = 0;

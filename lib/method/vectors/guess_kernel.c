@@ -1,10 +1,10 @@
-/* guess_kernel.c: the first guess of a pose, by a walk that adds up vectors, and the right-hand side of what it
- * misses.
+/* guess_kernel.c: the first guess of a pose, by a walk that adds up vectors, and the right-hand side from its
+ * residual.
  *
- * Both are bound by reading the vectors once. A point is one register of four numbers or two of two, so that a face of
- * r corners costs about a dozen instructions each, and sums at vertices are kept in points, whose last number is not
- * used, so that none is stored across another.
- * Leaves out the choice of the walk, and the solve: reconstruct.c.
+ * Both are bound by one read of the vectors. A point is one register of four numbers or two of two, so that a face
+ * with r corners costs about a dozen instructions per corner. Sums at vertices are kept in such points, whose fourth
+ * number is unused, so that stores do not overlap.
+ * The walk is chosen and the system solved in reconstruct.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/guess.h"
 #include "core/wide.h"
@@ -77,7 +77,7 @@ VGI_INLINE void put_anchors(const vgi_guesser *s, const double *anchors, double 
         store(x + 3 * (size_t)s->anchors[i], less(load(anchors + 3 * i), load(anchors)));
 }
 
-/* Move all vertices so that the anchors are where they are to be, on average. */
+/* Translate all vertices so that the mean of the anchors is where it should be. */
 VGI_INLINE void move_to_anchors(const vgi_guesser *s, const double *anchors, double *x)
 {
     point shift = {0};
@@ -107,7 +107,7 @@ VGI_INLINE void add_to(vgi_point *sum, uint32_t v, point a)
     store_sum(sum[v], add(load_sum(sum[v]), a));
 }
 
-/* y[j] = sum over corners of plane_j e; z = S y; each corner pulls by weight (e - mean) + plane . z */
+/* y[j] = sum over corners of plane_j e; z = S y; each corner adds weight (e - mean) + plane . z */
 VGI_INLINE void pull_by_metric(const vgi_guesser *s, size_t f, size_t size, vgi_point *e, point mean, vgi_point *sum)
 {
     const vgi_face_metric *m = &s->metric->face[f];
@@ -129,9 +129,9 @@ VGI_INLINE void pull_by_metric(const vgi_guesser *s, size_t f, size_t size, vgi_
     }
 }
 
-/* What a face of `size` corners misses: G e for e = (w - w0) - (x - x0), e of the first corner being 0. Only
- * differences within a face are formed, so it rounds like vectors. e: room for `size` points. Called with constant
- * sizes, this becomes straight code for triangles and quads. */
+/* Residual of a face with `size` corners: G e for e = (w - w0) - (x - x0), where e of the first corner is 0. Only
+ * differences within the face are formed, so rounding is that of vectors. e: workspace of `size` points. With
+ * constant sizes the compiler unrolls this for triangles and quads. */
 VGI_INLINE void add_pull(const vgi_guesser *s, size_t f, size_t size, const double *w, const double *x, vgi_point *e,
                          vgi_point *sum)
 {

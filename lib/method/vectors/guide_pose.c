@@ -1,9 +1,9 @@
-/* guide_pose.c: guidance over the pose: the offsets of the keys are mixed by how much a pose is like theirs.
+/* guide_pose.c: guidance over the pose: the offsets of the keys are mixed by the similarity of a pose to their poses.
  *
- * The error of a transferred sequence follows the pose, not the time. With V_k the poses of the keys, centroid at 0, and V
- * that of a frame, the weights w, whose sum is 1, make sum w_k V_k the nearest point of the keys' affine span to V; then
- * the frame moves by sum w_k e_k. Weights in time, those of poisson.c, take over in part where sum |w_k| would exceed 2, and
- * completely where the keys' poses do not span: two of them are alike. Leaves out guidance in time (poisson.c).
+ * The error of a transferred sequence depends on the pose, not on time. V_k are the poses of the keys and V that of a
+ * frame, centroids at 0. The weights w (sum 1) make sum w_k V_k the nearest point to V in the affine span of the
+ * keys; the frame moves by sum w_k e_k. Weights in time (poisson.c) are mixed in where sum |w_k| would exceed 2, and
+ * used alone where the keys' poses are affinely dependent (two of them are alike). Guidance in time is in poisson.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/lapack.h"
 
@@ -11,27 +11,27 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double LEAST_PIVOT = 1e-8; /* of the part of V_k - V_0 that the keys before it do not span, squared and
-                                           relative to all of it */
+static const double LEAST_PIVOT = 1e-8; /* least part of V_k - V_0 outside the span of the previous keys, squared,
+                                           relative to the whole */
 static const double MOST_WEIGHT = 2;    /* largest sum of |w| */
 
 typedef struct pose_key {
     uint64_t frame;
     double *given, *offset; /* n each */
-    double *from_first;     /* n: V_k - V_0; of the first key V_0 */
+    double *from_first;     /* n: V_k - V_0; for the first key, V_0 */
     double centre[3];       /* of the pose */
 } pose_key;
 
 struct vg_pose_guide {
-    size_t n;               /* numbers of a pose */
+    size_t n;               /* numbers per pose */
     size_t nkeys, cap;
     pose_key *key;
-    double *product;        /* cap x cap: of V_k - V_0, from key 1 on: the lower triangle */
+    double *product;        /* cap x cap: products of V_k - V_0, from key 1 on; lower triangle */
     double *factor;         /* (nkeys - 1)^2: Cholesky factor of the products */
     bool factored;
     bool spans;             /* the keys' poses are affinely independent */
     double *weight, *timed; /* cap */
-    double *from_pose;      /* n: V - V_0 of the frame at hand */
+    double *from_pose;      /* n: V - V_0 of the current frame */
 };
 
 int vg_pose_guide_new(vg_pose_guide **out, size_t nv, size_t keys, vg_err *e)
@@ -119,7 +119,7 @@ void vg_pose_guide_key(vg_pose_guide *g, uint64_t frame, const double *pose, con
     g->nkeys++, g->factored = false;
 }
 
-/* Linear between the two keys around a frame; all of the nearest key's before the first and after the last. */
+/* Linear between the two keys around a frame; the nearest key alone before the first and after the last. */
 static void weigh_in_time(vg_pose_guide *g, uint64_t frame)
 {
     size_t after = 0;
@@ -134,7 +134,7 @@ static void weigh_in_time(vg_pose_guide *g, uint64_t frame)
     g->timed[after - 1] = 1 - g->timed[after];
 }
 
-/* The coordinates of a pose in the keys, by least squares. */
+/* Coordinates of a pose in the keys, by least squares. */
 static void weigh_over_pose(vg_pose_guide *g, const double *pose)
 {
     double centre[3], *w = g->weight, *d = g->from_pose;
@@ -154,8 +154,8 @@ static double size_at(const vg_pose_guide *g, double share)
     return sum;
 }
 
-/* The largest share of the weights over the pose, beside those in time, with sum |w| at most MOST_WEIGHT. The sum is convex
- * in the share and 1 at 0. */
+/* Largest share of the pose weights, mixed with those in time, for which sum |w| is at most MOST_WEIGHT. The sum is
+ * convex in the share and 1 at share 0. */
 static double share_of_pose(const vg_pose_guide *g)
 {
     if (!g->spans) return 0;

@@ -1,23 +1,23 @@
-/* hold.c: solvers that are like another one and hold more vertices, as poses with pins need them. Most of their factor is
- * that of the other solver, or follows from it (fronts.c), so that a set of vertices that one pose alone holds costs about
- * as much as two solves. Poses are solved one by one: it is seldom that eight in a row hold the same vertices.
- * The first guess is that of the other solver, moved to where the vertices are held.
+/* hold.c: solvers that hold more vertices than another one, as poses with pins need them. Most of their factor is
+ * that of the base solver or follows from it (fronts.c), so that vertices held in a single pose cost about as much as
+ * two solves. Poses are solved one by one, because eight in a row seldom hold the same vertices. The first guess is
+ * that of the base solver, moved to the held positions.
  *
- * Without anchors the other solver holds one vertex at 0, which is free here: its row is behind all others.
+ * Without anchors the base solver holds one vertex at 0. It is free here, and its row comes after all others.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/solver.h"
 
 #include <stdlib.h>
 
-/* ---- what they share ---- */
+/* ---- ---- shared data ---- */
 
 static uint32_t row_of_vertex(const vg_solver *like, size_t v)
 {
     return v == like->pinned ? (uint32_t)like->unknowns : like->row[v];
 }
 
-/* Entries that corner p of face f gives to the row of its vertex. Those of one place add up. star: the row of the face's
- * centroid, if it has one. */
+/* Entries of corner p of face f in the row of its vertex. Entries at one position add up. star: the row of the face's
+ * centroid, if any. */
 static void add_to_border(const vg_solver *s, size_t f, size_t p, size_t star, vgi_border *border)
 {
     const vg_graph *g = s->g;
@@ -84,7 +84,7 @@ void vgi_sharing_free(vgi_sharing **x)
 
 /* ---- one solver ---- */
 
-/* What the other solver holds must be among the anchors. */
+/* The vertices held by the base solver must be among the anchors. */
 static int check_anchors(const vg_solver *s, vg_err *e)
 {
     bool *here = vgi_array(s->g->nv, sizeof *here, e);
@@ -98,7 +98,7 @@ static int check_anchors(const vg_solver *s, vg_err *e)
     return r;
 }
 
-/* held: of all rows of the solver that s is like. */
+/* held: over all rows of the base solver. */
 static int mark_held(const vg_solver *s, bool *held, vg_err *e)
 {
     size_t all = vgi_solver_all_rows(s->like);
@@ -190,7 +190,7 @@ int vg_solver_new_like(vg_solver **s, size_t n, vg_solver *like, const uint32_t 
 
 /* ---- solving ---- */
 
-/* Row i of all rows of the plain solver. */
+/* Row of the plain solver for row i of all rows. */
 static uint32_t row_in_factor(const vg_solver *s, size_t i)
 {
     if (s->like) return s->held.row[i];
@@ -214,7 +214,7 @@ void vgi_solver_solve_lane(const vg_solver *s, size_t lane, const vgi_row *from,
 }
 
 typedef struct solve_job {
-    size_t n, share; /* poses, and how many of them are one task */
+    size_t n, share; /* number of poses; poses per task */
     const vg_solver *s;
     vg_solver *const *each;
     const double *const *rhs;

@@ -1,16 +1,17 @@
-/* interpolate.c: a path through poses: each vector turns and stretches from one key pose to the next along the
- * geodesic (MATH 7; T 6.1), or on a curve whose velocity does not jump at the keys.
- * Leaves out which way round to turn (unwrap.c) and the way back to vertices (reconstruct.c).
+/* interpolate.c: a path through key poses. Each vector rotates and stretches from one key to the next along the
+ * geodesic (MATH 7; T 6.1), or on a curve whose velocity is continuous at the keys. Directions of rotation are chosen
+ * in unwrap.c; vertices are reconstructed in reconstruct.c.
  *
  * Logarithms are those of quaternions: axis times half angle, and half the logarithm of the scale.
  *
- * From key a to key b a corner turns by Q = exp(turn) exp(rest), and at u in [0, 1] by exp(u turn) exp(u rest).
- * Where nothing turns by more than half a turn, turn is the logarithm of Q and rest is 0: the geodesic of (T
- * 6.25). Beyond, the logarithm of single corners is of no use, for near a whole turn its axis is whatever small
- * differences there are between neighbours; there turn is a vector field that varies smoothly over the mesh, and
- * rest, applied first, is what each corner does beside it.
+ * From key a to key b a corner rotates by Q = exp(turn) exp(rest), and at u in [0, 1] by exp(u turn) exp(u rest). If
+ * nothing rotates by more than half a turn, turn is the logarithm of Q and rest is 0: the geodesic of (T 6.25).
+ * Beyond half a turn the logarithms of single corners are unusable, because near a whole turn the axis depends on
+ * small differences between neighbours. There turn is a vector field that varies smoothly over the mesh, and rest,
+ * applied first, is the remaining rotation of each corner.
  *
- * Vectors of anchors, from the anchors' mean, go through all this behind the corners', with the mean turn of all.
+ * The vectors of anchors, relative to the anchors' mean, are treated alike and stored after those of the corners,
+ * with the mean rotation of all.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/vec3.h"
 #include "method/vectors/unwrap.h"
@@ -23,20 +24,20 @@
 
 enum { CHUNK = 1024, /* corners per task */
        SLOTS = 3 };  /* a smooth curve uses the segments before and after its own */
-static const double shortest = 1e-9; /* of D: a shorter vector has no direction */
-static const double exact = 1e-13;   /* of D: smaller residuals of rotation and scale are rounding */
+static const double shortest = 1e-9; /* in D: a shorter vector has no direction */
+static const double exact = 1e-13;   /* in D: smaller residuals of rotation and scale are rounding errors */
 
 /* From one key to the next. */
 typedef struct segment {
-    size_t number; /* SIZE_MAX: none */
+    size_t number; /* SIZE_MAX: unused */
     double *from;  /* 3 per element (corners, then anchors): the vectors at the first key */
     double *turn;  /* 3 */
     double *rest;  /* 3, if has_rest */
     double *scale; /* 1: half the logarithm */
-    double *drift; /* 3, if has_drift: residual of rotation and scale, applied before the rotation: degenerate
-                      corners, anchors */
+    double *drift; /* 3, if has_drift: residual rotation, applied before the rotation, and scale: degenerate corners,
+                      anchors */
     bool has_rest, has_drift;
-    double root[2][3], middle[2][3]; /* at both keys; middle: mean of the anchors */
+    double root[2][3], middle[2][3]; /* root, and mean of the anchors, at both keys */
 } segment;
 
 struct vg_path {
@@ -45,10 +46,10 @@ struct vg_path {
     const vg_key *keys;
     size_t nkeys, corners, elements;
     double diagonal, shortest2, exact; /* mesh units */
-    double *reference; /* vectors, when the keys hold deformations */
+    double *reference; /* vectors, if the keys hold deformations */
     segment slots[SLOTS];
-    double *to, *q;    /* of the segment under construction: vectors at its second key, a quaternion per element */
-    vgi_incidence around; /* if there are line segments */
+    double *to, *q;    /* of the segment under construction: vectors at its second key, one quaternion per element */
+    vgi_incidence around; /* only with line segments */
     vg_path_stats stats;
 };
 
@@ -79,8 +80,9 @@ static double length_of(const vg_path *p, size_t s)
 
 /* ---- line segments ---- */
 
-/* Two vectors do not determine how a line segment turns about itself. It follows the best common rotation of the
- * vectors around it, and where these leave it open, of the whole body; the smallest rotation does the rest. */
+/* Two vectors do not determine the rotation of a line segment about itself. It follows the best common rotation of
+ * the vectors around it, or where these are not sufficient, that of the whole body; then the smallest rotation is
+ * applied. */
 static void add_moment(const vg_path *p, const double *from, size_t f, double b[9], double *size)
 {
     for (size_t c = p->g->start[f]; c < p->g->start[f + 1]; c++) {
@@ -139,7 +141,7 @@ static int measure(vg_path *p, const segment *s, vg_err *e)
     return VG_OK;
 }
 
-/* Q = exp(turn) exp(rest), and half the logarithm of the scale. turn: on input that of the face. */
+/* Q = exp(turn) exp(rest), and half the logarithm of the scale. turn: on input the rotation of the face. */
 static void split(const double *q, const double face[3], bool beyond, double *turn, double *rest, double *scale)
 {
     double length = sqrt(q[0] * q[0] + vgi_dot(q + 1, q + 1)), unit[4];
@@ -229,7 +231,7 @@ static int fill(vg_path *p, segment *s, size_t number, vg_err *e)
     return VG_OK;
 }
 
-/* The distance between segments in use at one time is less than SLOTS. */
+/* Segments in use at one time differ by less than SLOTS in number. */
 static int get_segment(vg_path *p, size_t number, const segment **s, vg_err *e)
 {
     segment *slot = &p->slots[p->o.smooth ? number % SLOTS : 0];
@@ -239,7 +241,7 @@ static int get_segment(vg_path *p, size_t number, const segment **s, vg_err *e)
 
 /* ---- velocities at keys ---- */
 
-/* At a key between segments of lengths h0 and h1 with velocities v0 and v1 (per segment): the velocity of the
+/* A key between segments of lengths h0 and h1 with velocities v0 and v1 (per segment). Its velocity is that of the
  * parabola through three keys, v = before v0 + after v1, per unit of place. At the first and last key: that of the
  * adjacent parabola. */
 typedef struct knot {
@@ -258,23 +260,24 @@ static void make_knot(const vg_path *p, size_t key, knot *x)
 
 /* ---- a pose ---- */
 
-/* Where a pose is. Q(u) = exp(A) exp(along turn) exp(along rest) exp(B). Straight on, A = B = 0. On a curve
- * through keys, with velocities alpha and beta more than the segment has of itself at its last and its first key,
- * A = (u^3 - u^2) alpha and B = u (1 - u)^2 beta: a cubic Hermite curve on the group, and the usual one when all
- * have one axis. Outside of the first and last key it goes on with the velocity there. */
+/* Position in a segment. Q(u) = exp(A) exp(along turn) exp(along rest) exp(B). On the geodesic A = B = 0. On a
+ * curve through keys, let alpha and beta be the differences of the keys' velocities at its last and first key from
+ * the segment's own; then A = (u^3 - u^2) alpha and B = u (1 - u)^2 beta. This is a cubic Hermite curve on the
+ * group, and the ordinary one if all rotations share an axis. Before the first and after the last key the velocity
+ * is constant. */
 typedef struct moment {
     const vg_path *p;
     const segment *s;
     bool bent;
     double along, drift;
-    double alpha, last_own, beta, first_own; /* weights in A and in B: of the difference, and of the segment's own
+    double alpha, last_own, beta, first_own; /* weights in A and B: of the difference, and of the segment's own
                                                 velocity */
     double length; /* of s in places */
     knot first, last;
     double *vectors, *offsets;
 } moment;
 
-/* The change of an element's rotation and scale per unit of u, at the first (0) or last (1) key of a segment. */
+/* Change of an element's rotation and scale per unit of u, at the first (0) or last (1) key of a segment. */
 static void velocity(const segment *s, size_t i, int end, double v[4])
 {
     const double *turn = s->turn + 3 * i;
@@ -289,7 +292,7 @@ static void velocity(const segment *s, size_t i, int end, double v[4])
     for (int k = 0; k < 3; k++) v[k + 1] = turn[k] + r[k];
 }
 
-/* own: the segment's velocity there; excess: by how much the knot's velocity exceeds it. */
+/* own: the segment's velocity there; excess: velocity at the knot minus own. */
 static void look_at_knot(const moment *m, const knot *x, size_t i, int end, double own[4], double excess[4])
 {
     double v0[4], v1[4];
@@ -348,7 +351,7 @@ static void turn_chunk(void *context, size_t chunk)
         turn_element(m, i, i < corners ? m->vectors + 3 * i : m->offsets + 3 * (i - corners));
 }
 
-/* The same for a point that does not rotate: points are those of a segment at both its keys. */
+/* The same for a point that does not rotate. points: the point at both keys of a segment. */
 static void glide(const moment *m, double points(const segment *s, int key, int k), double to[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -416,7 +419,7 @@ int vg_path_at(vg_path *p, double t, double *vectors, double root[3], double *an
     return VG_OK;
 }
 
-/* ---- making ---- */
+/* ---- ---- construction ---- */
 
 static bool has_lines(const vg_graph *g)
 {

@@ -1,7 +1,7 @@
-/* link.c: virtual line segments that join the components of a mesh, so that eyes, teeth and clothes keep their
- * place in the reconstruction (MATH 2): a minimum spanning tree of the components (Boruvka's algorithm over a k-d
- * tree); then links that are too short to rotate steadily are moved on by an edge. Leaves out how links deform
- * (deform.c).
+/* link.c: links: virtual line segments that connect the components of a mesh, so that eyes, teeth and clothes keep
+ * their position in the reconstruction (MATH 2). They form a minimum spanning tree of the components (Boruvka's
+ * algorithm over a k-d tree); links too short to rotate steadily are then moved by one edge. Links are deformed in
+ * deform.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "model/incidence.h"
@@ -13,7 +13,7 @@
 
 static const uint32_t NONE = UINT32_MAX;
 
-/* A pair of points (places in `vertex`), a < b. */
+/* A pair of points (indices into `vertex`), a < b. */
 struct edge {
     double square;
     uint32_t a, b;
@@ -25,9 +25,9 @@ struct joining {
     size_t n;         /* points: the vertices that are in a face */
     uint32_t *vertex; /* n */
     uint32_t *piece;  /* n: component of the point */
-    uint32_t *tree;   /* n: the lowest of the components joined with the point's own so far */
+    uint32_t *tree;   /* n: the lowest component in the point's tree so far */
     uint32_t *sets;   /* per component */
-    vgi_near *near;   /* n: the last answer for the point, see look_around */
+    vgi_near *near;   /* n: the last search result for the point, see look_around */
     vgi_kdtree *points;
     struct edge *best;   /* per component that represents a tree: its shortest connection to another tree */
     struct edge *chosen; /* components - 1 */
@@ -102,8 +102,8 @@ static int prepare(struct joining *j, const double *vertices, const uint32_t *la
 
 /* ---- the minimum spanning tree ---- */
 
-/* A total order of pairs, ties broken by index, so that the shortest connections never close a cycle. Of the
- * points at equal distance from i, the lowest makes the least pair; the k-d tree returns that one. */
+/* A total order of pairs, with ties broken by index, so that the shortest connections never form a cycle. Among the
+ * points at equal distance from i the lowest one makes the smallest pair; the k-d tree returns that one. */
 static bool shorter(const struct edge *p, const struct edge *q)
 {
     if (p->square != q->square) return p->square < q->square;
@@ -117,10 +117,9 @@ static void offer(struct joining *j, uint32_t from, vgi_near to)
     if (shorter(&edge, best)) *best = edge;
 }
 
-/* Find the shortest connection of every tree. near[i] caches what is known about point i: the nearest point of
- * another tree when it was asked, or NONE if there was none within the squared distance. Trees only grow, so that
- * point stays the nearest until it joins i's tree, and its distance stays a lower bound; most points are never
- * asked about again. */
+/* Find the shortest connection of every tree. near[i] caches the last search result for point i: the nearest point of
+ * another tree, or NONE if there was none within the squared distance. Because trees only grow, that point stays the
+ * nearest until it joins i's tree, and its distance stays a lower bound. So most points are searched once. */
 static void look_around(struct joining *j)
 {
     for (size_t c = 0; c < j->components; c++) j->best[c] = (struct edge){INFINITY, NONE, NONE};
@@ -137,8 +136,8 @@ static void look_around(struct joining *j)
     }
 }
 
-/* Boruvka: every tree takes its shortest connection, until one tree is left. Each round at least halves their
- * number. */
+/* Boruvka: every tree takes its shortest connection, until one tree is left. Each round at least halves the number of
+ * trees. */
 static void span(struct joining *j)
 {
     while (j->nchosen < j->components - 1) {
@@ -161,8 +160,7 @@ static double distance(const struct joining *j, uint32_t u, uint32_t v)
     return sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) + (p[2] - q[2]) * (p[2] - q[2]));
 }
 
-/* The corners around v that are examined: not all at a hub with thousands of faces, where thousands of links may
- * end. */
+/* End of the corners around v that are examined: at a hub with thousands of faces, thousands of links may end. */
 static uint32_t last_corner(const struct joining *j, uint32_t v)
 {
     enum { ENOUGH = 64 };
@@ -181,7 +179,7 @@ static double mean_edge(const struct joining *j, uint32_t v)
     return sum / (2.0 * (last - first));
 }
 
-/* Of b and its edge neighbours, the one farthest from a (the first of several). */
+/* Among b and its edge neighbours, the one farthest from a (the first of several). */
 static uint32_t farthest_around(const struct joining *j, uint32_t a, uint32_t b)
 {
     uint32_t last = last_corner(j, b), farthest = b, ends[2];
@@ -196,10 +194,10 @@ static uint32_t farthest_around(const struct joining *j, uint32_t a, uint32_t b)
     return farthest;
 }
 
-/* From nearest points to a link. When two components move apart a little, a link between points that nearly touch
- * turns and stretches wildly, which means nothing on another body. A link shorter than the edges beside it
- * therefore ends one edge further on, at the end with the longer edges, so that it turns about as those edges do.
- * This also covers coinciding points: a link of length 0 could never open. */
+/* Turn a pair of nearest points into a link. When two components separate slightly, a link between points that nearly
+ * touch rotates and stretches wildly, which has no meaning on another body. A link shorter than the adjacent edges
+ * therefore ends one edge further, at the end with the longer edges, so that it rotates about as those edges do. This
+ * also covers coincident points: a link of length 0 could never open. */
 static void place_link(const struct joining *j, const struct edge *edge, uint32_t pair[2])
 {
     uint32_t a = j->vertex[edge->a], b = j->vertex[edge->b];
@@ -258,6 +256,6 @@ int vg_head_prepare_vectors(vg_head *h, vg_err *e)
     h->links = links;
     h->nlinks = n;
     h->has_links = true;
-    if (n && h->map.ncorners) vg_map_clear(&h->map); /* corners are numbered as in a graph without links */
+    if (n && h->map.ncorners) vg_map_clear(&h->map); /* corners are numbered without links */
     return VG_OK;
 }

@@ -1,5 +1,5 @@
-/* metric.c: the area metric of polygons: from the moments of a face's reference vectors in its plane.
- * Leaves out its use: reconstruct.c.
+/* metric.c: the area metric of polygons, from the moments of a face's reference vectors in its plane. Used in
+ * reconstruct.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/metric.h"
 #include "numeric/vec3.h"
@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Thin faces: the lesser moment counts as at least THIN of the greater, the area as at least SMALL of the greater
+/* Thin faces: the smaller moment is at least THIN times the larger one, the area at least SMALL times the larger
  * moment. */
 static const double thin = 1e-4, small = 1e-3;
 
@@ -19,7 +19,7 @@ static void make_face(vgi_face_metric *m, double *plane, const double *w, size_t
     vgi_area_vector(w, r, n);
     double length = sqrt(vgi_dot(n, n));
     if (r < 3 || !(length > 0)) return;
-    /* axes of the plane: along the first vector that is not parallel to the normal, and across */
+    /* axes of the plane: along the first vector that is not parallel to the normal, and perpendicular to it */
     double a[3] = {0, 0, 0}, b[3], most = 0;
     vgi_divide(n, length);
     for (size_t i = 0; i < r; i++) {

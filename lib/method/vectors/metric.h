@@ -1,9 +1,9 @@
-/* metric.h: how a face weighs the differences of its corners in the reconstruction (MATH 2, Weights).
+/* metric.h: weights of the differences of a face's corners in the reconstruction (MATH 2, Weights).
  *
  * The energy of a face is tr((X - W*) G (X - W*)') with G = weight (I - 11'/r) + R' S R, R the 3 x r reference
- * vectors in the face's plane. Uniform: weight 1, S 0: the projector of the printed energy. Area: the surface's own
- * metric, on triangles the cotangent Laplacian. G is positive semidefinite and leaves out only translations, so that
- * consistent vectors are still met exactly, whatever the weights.
+ * vectors in the face's plane. Uniform: weight 1, S 0, the projector of the printed energy. Area: the metric of the
+ * surface, on triangles the cotangent Laplacian. G is positive semidefinite and its null space contains translations
+ * only, so that consistent vectors are reproduced exactly for any weights.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_METRIC_H
 #define VG_METRIC_H
@@ -20,11 +20,11 @@ typedef struct vgi_metric {
     double *plane;         /* 3 per corner: its reference vector in the plane of its face */
 } vgi_metric;
 
-/* vgi_metric_make: the area metric of a graph in its reference pose (nv points). Segments and links have weight 1;
- * a face without extent is uniform; the weight of a thin face is bounded from both sides. */
+/* vgi_metric_make: the area metric of a graph in its reference pose (nv points). Segments and links have weight 1; a
+ * face without extent is uniform; weights of thin faces are bounded on both sides. */
 int vgi_metric_make(vgi_metric *m, const vg_graph *g, const double *reference, vg_err *e) VG_MUST_CHECK;
 void vgi_metric_clear(vgi_metric *m);
-/* vgi_metric_entry: G of face f at its corners p and q. */
+/* vgi_metric_entry: entry of G of face f for its corners p and q. */
 double vgi_metric_entry(const vgi_metric *m, const vg_graph *g, size_t f, size_t p, size_t q);
 double vgi_metric_weight(const vgi_metric *m, size_t f);
 

@@ -5,7 +5,7 @@
 
 static const double flat = 1e-12; /* relative to the sum of squared lengths: see deform_kernel.c */
 
-/* Twice the area along the normal; returns its length, 0 for none. */
+/* The area vector (twice the area along the normal). Returns its length, 0 if there is none. */
 static double area_vector(const double *w, size_t r, double n[3])
 {
     double spread = 0;
@@ -22,7 +22,7 @@ bool vgi_unit_normal(const double *w, size_t r, double n[3])
     return size > 0;
 }
 
-/* false if singular */
+/* Returns false if the matrix is singular. */
 static bool invert(const double a[6], double inverse[6])
 {
     double c0 = a[3] * a[5] - a[4] * a[4], c1 = a[2] * a[4] - a[1] * a[5], c2 = a[1] * a[4] - a[2] * a[3];

@@ -6,11 +6,11 @@
 
 #include "core/core.h"
 
-/* vgi_unit_normal: Newell's, from the r vectors of a face; false when the face has none. */
+/* vgi_unit_normal: Newell's normal from the r vectors of a face; false if the face has none. */
 bool vgi_unit_normal(const double *w, size_t r, double n[3]);
 
-/* vgi_gradient_moments: P = (sum r r' + h n n')^-1 with h half the trace of the sum, and q = h P n (MATH 5), n the
- * unit normal; *size: |N|, twice the area; false when the face has no normal or is nearly a line. */
+/* vgi_gradient_moments: P = (sum r r' + h n n')^-1 and q = h P n (MATH 5), with h half the trace of the sum and n the
+ * unit normal. *size: |N|, twice the area. False if the face has no normal or is nearly a line. */
 bool vgi_gradient_moments(const double *w, size_t r, double P[6], double q[3], double *size);
 
 void vgi_symmetric_times(const double a[6], const double x[3], double y[3]);

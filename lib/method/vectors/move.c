@@ -1,5 +1,5 @@
-/* move.c: the position of the whole body in a transfer to another mesh (MATH 5). Leaves out the vectors (deform.c,
- * transfer.c, shape.c) and vertices that stay (pin.c).
+/* move.c: position of the whole body in a transfer to another mesh (MATH 5). Vectors are in deform.c, transfer.c and
+ * shape.c, vertices that stay in pin.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 
@@ -7,9 +7,9 @@
 
 struct vg_mover {
     const vg_graph *to;
-    double ratio; /* the target's size divided by the source's; 0: the body stays */
+    double ratio; /* size of the target divided by that of the source; 0: the body stays */
     size_t nanchors;
-    double source[3], target[3];             /* roots of the references */
+    double source[3], target[3];             /* roots in the references */
     double *source_anchors, *target_anchors; /* positions in the references */
 };
 

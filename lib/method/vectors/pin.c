@@ -1,22 +1,22 @@
-/* pin.c: the vertices of a target that must stay, because all faces that drive theirs stay. Leaves out holding
- * them: the frame lists them (vg_frame_pin), the reconstruction holds them.
+/* pin.c: pins: vertices of a target that must stay because all faces that drive theirs stay. The frame lists them
+ * (vg_frame_pin) and the reconstruction holds them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-static const double still = 1e-6; /* of D: a vertex nearer than this to its reference position does not move */
+static const double still = 1e-6; /* in D: a vertex nearer to its reference position does not move */
 enum { MUCH = 10 };               /* vertices are pinned only if at least this share of the source stays */
 
 struct vg_pinner {
     const vg_graph *from, *to;
     const vg_correspondence *pairs; /* NULL: face by face */
-    const double *reference;        /* the source's */
+    const double *reference;        /* of the source */
     double least;
     bool always;
     bool *moves, *face_moves; /* in the current pose: per source vertex and face */
-    bool *free;               /* per target vertex */
+    bool *free;               /* per target vertex: not pinned */
     uint32_t *list;
 };
 
@@ -47,7 +47,7 @@ void vg_pinner_free(vg_pinner **p)
     *p = NULL;
 }
 
-/* The number of source vertices that stay. */
+/* Mark the vertices that move. Returns the number of source vertices that stay. */
 static size_t mark_moving(vg_pinner *p, const double *pose)
 {
     size_t n = 0;

@@ -1,15 +1,15 @@
-/* planar.c: poses whose faces of four and more corners are more nearly plane: w1 times the energy of the
- * reconstruction plus w2 times the sum over corners of such faces of (m_f . t_c)^2, m_f the normal of the wanted
- * vectors (MATH 5; T 4.2.3).
+/* planar.c: poses with more nearly planar polygons: minimises w1 times the energy of the reconstruction plus w2 times
+ * the sum over corners of faces with four or more of (m_f . t_c)^2, m_f the normal of the wanted vectors (MATH 5; T
+ * 4.2.3).
  *
- * x, y and z couple, and the matrix M = w1 N + w2 P differs from pose to pose. It is not factorized: P lies between
- * 0 and N (of uniform weights), so that conjugate gradients preconditioned by the one factor of N see eigenvalues
- * between w1 and w1 + w2 only, whatever the mesh. They start from the plain solution V, where the residual is -w2 P
- * V, and look for the difference to it. N itself is never multiplied with: as p := z + beta p with z = N^-1 r, N p
+ * x, y and z are coupled, and the matrix M = w1 N + w2 P differs from pose to pose, so it is not factorised. P lies
+ * between 0 and N (of uniform weights). Hence conjugate gradients preconditioned by the one factor of N see only
+ * eigenvalues between w1 and w1 + w2, on any mesh. They start from the plain solution V, where the residual is -w2 P
+ * V, and solve for the difference from it. Products with N are not needed: with p := z + beta p and z = N^-1 r, N p
  * := r + beta N p.
  *
- * Eight poses go side by side, each with coefficients and an end of its own, so that a pose does not depend on its
- * neighbours. Leaves out the loops over rows: planar_kernel.c.
+ * Eight poses are solved side by side, each with its own coefficients and stopping point, so that a pose does not
+ * depend on its neighbours. The loops over rows are in planar_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/face_rows.h"
 #include "method/vectors/planar_kernel.h"
@@ -19,23 +19,23 @@
 #include <stdlib.h>
 
 enum {
-    CORNERS = 4, /* of the least face that may be bent */
-    LIMIT = 1000 /* steps; 40 are usual for weights of 0.05 and 1 */
+    CORNERS = 4, /* of the smallest face that may be bent */
+    LIMIT = 1000 /* steps; about 40 suffice for weights of 0.05 and 1 */
 };
-static const double enough = 1e-10; /* of the residual at the start, in the norm of N^-1 */
-static const double thin = 1e-12;   /* a face of less area than this part of its vectors' squares has no normal */
+static const double enough = 1e-10; /* relative to the initial residual, in the norm of N^-1 */
+static const double thin = 1e-12;   /* a face with an area below this part of its squared vectors has no normal */
 
-/* What one block of eight poses needs. */
+/* Workspace of one block of eight poses. */
 typedef struct room {
-    vgi_row *x, *r, *z, *p, *s, *y; /* rows of unknowns; p and y also of the held vertices behind them */
+    vgi_row *x, *r, *z, *p, *s, *y; /* rows of unknowns; p and y also have the held vertices after them */
     vgi_row *normals;               /* one per planar face */
     vgi_lanes *h;
 } room;
 
 struct vg_planar {
     vgi_solver_view solver;
-    double ratio;        /* w2 / w1: the search is for N + ratio P */
-    vgi_face_rows faces; /* of four and more corners */
+    double ratio;        /* w2 / w1: the system is N + ratio P */
+    vgi_face_rows faces; /* with four or more corners */
     vgi_row *memory;
     room *rooms;         /* one per thread */
     vg_planar_stats *found; /* per thread */
@@ -46,7 +46,7 @@ static int make_rooms(vg_planar *p, vg_err *e)
 {
     size_t n = p->solver.rows, all = n + p->faces.nheld, largest = (p->solver.g->max_corners + 2) / 3, each, total;
     size_t threads = (size_t)p->solver.threads;
-    each = 4 * n + 2 * all + p->faces.nf + largest + 1; /* of the largest mesh there can be, all are below 2^33 */
+    each = 4 * n + 2 * all + p->faces.nf + largest + 1; /* even for the largest possible mesh all are below 2^33 */
     p->rooms = vgi_array(threads, sizeof *p->rooms, e);
     p->found = vgi_array(threads, sizeof *p->found, e);
     if (!p->rooms || !p->found) return VG_ENOMEM;
@@ -102,9 +102,9 @@ vg_planar_stats vg_planar_get_stats(const vg_planar *p)
     return p->stats;
 }
 
-/* The mean of the cross products of successive vectors, made a unit; 0 if there is none. Moving all vectors of a
- * face by the same changes nothing (they need not sum to 0), so they are taken from the first,
- * and in units of the largest. */
+/* The normalised mean of the cross products of successive vectors; 0 if there is none. Adding a constant to all
+ * vectors of a face changes nothing (they need not sum to 0), so they are taken relative to the first, in units of
+ * the largest. */
 static void face_normal(const double *w, size_t r, double m[3])
 {
     double n[3] = {0, 0, 0}, size = 0, largest = 0;
@@ -131,7 +131,7 @@ void vg_planar_load(const vg_planar *p, const double *vectors, double *normals)
     }
 }
 
-/* ---- the search ---- */
+/* ---- ---- conjugate gradients ---- */
 
 typedef struct plane_job {
     vg_planar *p;
@@ -141,8 +141,8 @@ typedef struct plane_job {
     bool *converged; /* n */
 } plane_job;
 
-/* The residual of the plain solution, -ratio P V, each pose in units of its largest entry,
- * which is returned in `unit`. */
+/* Residual of the plain solution, -ratio P V. Each pose is in units of its largest entry, which is returned in
+ * `unit`. */
 static void load_residual(const vg_planar *p, const room *m, const vgi_planar_faces *f, const double *const *pose,
                           vgi_lanes unit)
 {
@@ -166,7 +166,7 @@ static void load_residual(const vg_planar *p, const room *m, const vgi_planar_fa
     memset(m->p, 0, (n + p->faces.nheld) * sizeof *m->p);
 }
 
-/* What is left of the residual of each pose, relative to the start; whether all of them are done. */
+/* Remaining residual of each pose, relative to the initial one. Returns whether all poses are done. */
 static bool all_done(const vgi_lanes start, const vgi_lanes rz, double *left, bool *active)
 {
     bool all = true;
@@ -178,7 +178,7 @@ static bool all_done(const vgi_lanes start, const vgi_lanes rz, double *left, bo
     return all;
 }
 
-/* Conjugate gradients on (N + ratio P) x = r. left[k]: what is left of the residual, relative, where pose k ended. */
+/* Conjugate gradients on (N + ratio P) x = r. left[k]: relative residual with which pose k ended. */
 static size_t descend(const vg_planar *p, const room *m, const vgi_planar_faces *f, double *left)
 {
     const vgi_planar_kernel *kernel = vgi_planar_kernel_now();
@@ -233,7 +233,7 @@ static void plane_block(void *context, size_t i)
     vgi_planar_kernel_now()->scale(p->solver.rows, unit, m->x, m->x);
     vgi_add_rows(m->x, p->solver.row, p->solver.g->nv, p->solver.rows, j->x + first, lanes);
     for (size_t k = 0; k < lanes; k++) {
-        /* the difference is 0 at the held vertex, but without anchors the mean is what stays */
+        /* the difference is 0 at the held vertex, but without anchors the mean must stay */
         if (!p->solver.anchored) vgi_keep_root(p->solver.g, j->x[first + k], root[k]);
         j->converged[first + k] = left[k] <= enough;
         note(&p->found[i], steps, left[k]);
@@ -242,10 +242,10 @@ static void plane_block(void *context, size_t i)
 
 size_t vg_planar_solve(vg_planar *p, size_t n, const double *const *normals, double *const *x)
 {
-    enum { ROUND = 256 }; /* poses whose outcome is noted at once */
+    enum { ROUND = 256 }; /* poses whose results are recorded together */
     bool converged[ROUND];
     size_t threads = (size_t)p->solver.threads, good = n;
-    if (p->faces.nf == 0 || p->solver.rows == 0 || p->ratio == 0) return n; /* the plain solution, to the bit */
+    if (p->faces.nf == 0 || p->solver.rows == 0 || p->ratio == 0) return n; /* the plain solution, bit for bit */
     size_t most = ROUND / VGI_LANES < threads ? ROUND / VGI_LANES : threads;
     for (size_t done = 0; done < n; done += most * VGI_LANES) {
         size_t some = n - done < most * VGI_LANES ? n - done : most * VGI_LANES;

@@ -1,5 +1,5 @@
 /* planar_kernel.c: the steps of conjugate gradients for eight poses at once (see planar.c). All of them are bound by
- * memory: what can be done while a row is in registers is done in one go.
+ * memory, so work on a row is combined while the row is in registers.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/planar_kernel.h"
 #include "core/wide.h"
@@ -24,8 +24,8 @@ VGI_INLINE vgi_wide dot_part(const vgi_row *a, const vgi_row *b, size_t part)
     return sum + piece(a, 2 * VGI_PARTS + part) * piece(b, 2 * VGI_PARTS + part);
 }
 
-/* One face: h_c = m.p_c less their mean is m.t_c; what it adds to y_c is (m.t_c) m,
- * for the matrix of t in v is a projector. */
+/* One face: m.t_c is h_c = m.p_c minus their mean. It adds (m.t_c) m to y_c, because the matrix from v to t is a
+ * projector. */
 VGI_INLINE void face_part(const uint32_t *row, size_t corners, const vgi_row *m, const vgi_row *p, vgi_row *y,
                           vgi_wide *h, vgi_wide *sum, size_t part)
 {

@@ -1,20 +1,20 @@
 /* poisson.c: guidance in time: a sequence keeps its second differences and meets given poses at its keys (MATH 5; T
  * 4.1.2, 4.2.5).
  *
- * The Poisson equation in time, T_(k-1) - 2 T_k + T_(k+1) = the same of U, T given at the keys, has the same matrix
- * for every coordinate of every vertex, and between two keys its solution is U plus what is linear in k and meets
- * the keys (T 4.16). Leaves out which frames are keys, and where frames wait until the next key is known:
- * vg-poisson, spool.c.
+ * The Poisson equation in time, T_(k-1) - 2 T_k + T_(k+1) = the same of U with T given at the keys, has the same
+ * matrix for every coordinate of every vertex. Between two keys its solution is U plus a function linear in k that
+ * meets the keys (T 4.16). The choice of keys, and the storage of frames until the next key is known, are in
+ * vg-poisson and spool.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 
 #include <stdlib.h>
 
 struct vg_guide {
-    size_t n;               /* numbers of a pose */
-    int keys;               /* number of keys so far, 2 at most: then there is an interval */
+    size_t n;               /* numbers per pose */
+    int keys;               /* number of keys so far, at most 2; with 2 there is an interval */
     uint64_t from, to;      /* frames of the last two keys */
-    double *before, *after; /* the offsets at the keys */
+    double *before, *after; /* offsets at the keys */
 };
 
 int vg_guide_new(vg_guide **out, size_t nv, vg_err *e)
@@ -51,7 +51,7 @@ void vg_guide_apply(const vg_guide *g, uint64_t frame, double *pose)
 {
     const double *a = g->before, *b = g->after;
     if (g->keys == 2 && frame < g->to) {
-        /* written so that equal offsets give exactly that offset, and zero offsets give the pose to the last bit */
+        /* written so that equal offsets give exactly that offset, and zero offsets give the pose bit for bit */
         double t = (double)(frame - g->from) / (double)(g->to - g->from);
         for (size_t i = 0; i < g->n; i++) pose[i] += a[i] + t * (b[i] - a[i]);
     } else if (g->keys) {

@@ -1,18 +1,18 @@
-/* reconstruct.c: a mesh from its vectors: min over V of sum |v(c) - C_f - w*_c|^2 (T 3.7), one factorisation for all
- * poses.
+/* reconstruct.c: reconstructs a mesh from its vectors: min over V of sum |v(c) - C_f - w*_c|^2 (T 3.7), with one
+ * factorisation for all poses.
  *
- * The normal matrix is the sum over faces of I - 11'/r on the face's own vertices (MATH 2): a graph Laplacian with
- * weight 1/r on every pair. A face of many corners would fill r^2/2 entries; there the centroid is an unknown of its
- * own, joined to each corner with weight 1, which has the same minimum (eliminating it gives I - 11'/r back) and r
- * entries.
+ * The normal matrix is the sum over faces of I - 11'/r on the vertices of the face (MATH 2): a graph Laplacian with
+ * weight 1/r on every pair. A face with many corners would fill r^2/2 entries. There the centroid is a separate
+ * unknown, joined to each corner with weight 1: the minimum is the same (eliminating the centroid gives I - 11'/r),
+ * with r entries.
  *
- * What is solved for is not V but its difference from a first guess: the pose that one gets by walking from corner to
- * corner along a spanning tree, adding up vectors. Where the vectors are consistent the guess is right to the last
- * digits and the solve has nothing to do; where they are not, it spreads what does not fit. A solve for V itself
- * would lose two to four digits on long meshes, for its rounding errors are those of positions, not of vectors.
+ * The system is solved not for V but for its difference from a first guess: the pose obtained by walking from corner
+ * to corner along a spanning tree, adding up vectors. If the vectors are consistent, the guess is exact up to
+ * rounding and the solution is 0; if they are not, the solution distributes the residual. Solving for V itself would
+ * lose two to four digits on long meshes, because its rounding errors are those of positions, not of vectors.
  *
- * Without anchors one vertex is held at 0 and the pose is moved to its root in the end. Leaves out the triangular
- * solves (solve_kernel.c), that guess (guess_kernel.c) and the factorisation (sparse.c).
+ * Without anchors one vertex is held at 0, and the pose is moved to its root at the end. Triangular solves are in
+ * solve_kernel.c, the guess in guess_kernel.c, the factorisation in sparse.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/solver.h"
 #include "model/incidence.h"
@@ -22,8 +22,8 @@
 #include <time.h>
 
 enum {
-    STAR = 12,         /* from this many corners on a face gets its centroid as an unknown ... */
-    STAR_METRIC = 200  /* ... or from this many, if it has a metric of its own; then its metric is the weight alone */
+    STAR = 12,         /* from this many corners on the centroid of a face is an unknown ... */
+    STAR_METRIC = 200  /* ... or from this many, if the face has a metric; its metric is then the weight alone */
 };
 
 double vgi_solver_seconds(void)
@@ -43,7 +43,7 @@ bool vgi_solver_is_star(const vg_solver *s, size_t f)
     return face_size(s->g, f) >= (s->metric.face ? STAR_METRIC : STAR);
 }
 
-/* Number the unknowns: row[v] counts up over attached vertices that are not held. */
+/* Number the unknowns: row[v] counts attached vertices that are not held. */
 static int number_unknowns(vg_solver *s, const uint32_t *anchors, size_t n, const double *reference, vg_err *e)
 {
     const vg_graph *g = s->g;
@@ -78,7 +78,7 @@ static int number_unknowns(vg_solver *s, const uint32_t *anchors, size_t n, cons
     return VG_OK;
 }
 
-/* Breadth first from the held vertices, so that paths are short and few roundings add up. */
+/* Breadth first from the held vertices, so that paths are short and few rounding errors add up. */
 static int walk_from_held(vg_solver *s, const vgi_incidence *around, vg_err *e)
 {
     const vg_graph *g = s->g;
@@ -123,7 +123,7 @@ static int plan_walk(vg_solver *s, vg_err *e)
     return r;
 }
 
-/* Upper bound of the entries of the lower triangle, duplicates counted. */
+/* Upper bound of the number of entries in the lower triangle, counting duplicates. */
 static size_t count_entries(const vg_solver *s)
 {
     size_t n = 0;
@@ -195,7 +195,7 @@ static int factorize(vg_solver *s, vg_err *e)
     return r;
 }
 
-/* From now on row[v] is the row in the factor's order. */
+/* Change row[v] to the row in the factor's order. */
 static int permute_rows(vg_solver *s, vg_err *e)
 {
     uint32_t *inverse = vgi_array_raw(s->unknowns, sizeof *inverse, e);
@@ -208,7 +208,7 @@ static int permute_rows(vg_solver *s, vg_err *e)
     return VG_OK;
 }
 
-/* n elements for each thread, aligned for vectors; sizes of elements are multiples of 32 */
+/* n elements per thread, aligned for vectors; element sizes are multiples of 32 */
 void *vgi_solver_for_threads(const vg_solver *s, size_t n, size_t size, vg_err *e)
 {
     size_t all;
@@ -308,8 +308,8 @@ vg_solver_stats vg_solver_get_stats(const vg_solver *s)
 
 typedef struct load_job {
     const vg_solver *s;
-    vg_solver *const *each; /* of the poses; NULL: s */
-    size_t n, share; /* poses, and how many of them are one task */
+    vg_solver *const *each; /* solver of each pose; NULL: s */
+    size_t n, share; /* number of poses; poses per task */
     const double *const *vectors, *const *anchors;
     double *const *x, *const *rhs;
 } load_job;
@@ -355,7 +355,7 @@ typedef struct solve_job {
     size_t first; /* first block of this round */
 } solve_job;
 
-/* What comes in has its held vertex at 0. */
+/* On input the held vertex is at 0. */
 void vgi_solver_place(const vg_solver *s, double *x, const double *anchor, const double *root)
 {
     const vg_graph *g = s->g;
@@ -379,7 +379,8 @@ static void solve_block(void *context, size_t i)
         vgi_row *x = s->x + i * s->unknowns;
         const double *rhs[VGI_LANES];
         for (size_t k = 0; k < VGI_LANES; k++) rhs[k] = j->rhs[first + (k < lanes ? k : lanes - 1)];
-        if (s->unknowns > s->vertices_unknown) memset(x, 0, s->unknowns * sizeof *x); /* the centroids' are 0 */
+        if (s->unknowns > s->vertices_unknown) memset(x, 0, s->unknowns * sizeof *x); /* right-hand sides of centroids
+                                                                                         are 0 */
         vgi_load_rows(x, s->row, s->g->nv, s->unknowns, rhs);
         vgi_factor_solve(&s->factor, x);
         vgi_add_rows(x, s->row, s->g->nv, s->unknowns, j->x + first, lanes);

@@ -1,16 +1,17 @@
-/* robust.c: poses of least absolute misfit: min over V of sum over faces of e_f, e_f^2 = tr((X_f - W_f) G_f (X_f -
- * W_f)'), G_f the metric of the solver (MATH 2, Robust). Least squares spreads what a few inconsistent faces want over
- * the whole body; here they keep it to themselves.
+/* robust.c: poses with the least absolute misfit: min over V of sum over faces of e_f, e_f^2 = tr((X_f - W_f) G_f
+ * (X_f - W_f)'), G_f the metric of the solver (MATH 2, Robust). Least squares spreads the error of a few inconsistent
+ * faces over the whole body; here it stays local.
  *
- * What is minimised is the sum of sqrt(e_f^2 + c^2), c a part of the mean misfit of the plain solution, so that it is
- * smooth. Nothing is factorized again: the search starts from the plain solution and goes by a quasi-Newton method with
- * a memory of one step (BFGS; Nocedal and Wright 2006, chapter 7), whose first Hessian is a multiple of the plain
- * normal matrix. That is one triangular solve and one pass over the faces a round, and steps of length 1 are nearly
- * always right. Beside it were tried: reweighting with a factorisation for each round (8 rounds for the same energy,
- * each as long as 40 solves), more steps in the memory (no fewer rounds), and scaling the factor by the weights (worse).
+ * The objective is the sum of sqrt(e_f^2 + c^2), which is smooth; c is a fraction of the mean misfit of the plain
+ * solution. Nothing is factorised again. The search starts from the plain solution and uses a quasi-Newton method
+ * with a memory of one step (BFGS; Nocedal and Wright 2006, chapter 7), whose initial Hessian is a multiple of the
+ * plain normal matrix. A round costs one triangular solve and one pass over the faces, and a step length of 1 is
+ * nearly always accepted. Also tried: reweighting with one factorisation per round (8 rounds for the same energy,
+ * each as long as 40 solves), more steps in the memory (not fewer rounds), and scaling the factor by the weights
+ * (worse).
  *
- * Eight poses go side by side, each with coefficients and an end of its own, so that a pose does not depend on its
- * neighbours. Leaves out the loops over rows and faces: robust_kernel.c.
+ * Eight poses are solved side by side, each with its own coefficients and stopping point, so that a pose does not
+ * depend on its neighbours. The loops over rows and faces are in robust_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/solver.h"
 #include "method/vectors/robust_kernel.h"
@@ -20,17 +21,18 @@
 #include <stdlib.h>
 
 enum { HALVINGS = 30 };                /* of a step that does not lower the energy */
-static const double enough = 1e-3;     /* of the energy: a round that gains less is the last */
-static const double sufficient = 1e-4; /* of the fall that the slope promises: a step has to bring it */
-static const double exact = 1e-11;     /* of the mean length of the wanted vectors: less is no misfit */
+static const double enough = 1e-3;     /* relative to the energy: the search ends when a round gains less */
+static const double sufficient = 1e-4; /* least decrease, relative to the decrease that the slope predicts */
+static const double exact = 1e-11;     /* relative to the mean length of the wanted vectors: a smaller misfit counts
+                                          as 0 */
 
-/* What one block of eight poses needs. */
+/* Workspace of one block of eight poses. */
 typedef struct room {
     vgi_row *u, *trial, *g, *gn; /* rows of unknowns and of held vertices */
-    vgi_row *z, *zn, *d;         /* rows that may move */
-    vgi_row *corners;                         /* of the largest face */
+    vgi_row *z, *zn, *d;         /* rows that can move */
+    vgi_row *corners;                         /* corners of the largest face */
     vgi_point *points;                        /* all rows of one pose */
-    vgi_row *memory;                          /* all of these */
+    vgi_row *memory;                          /* one block that holds all of these */
     float *misfit;
 } room;
 
@@ -45,14 +47,14 @@ struct vg_robust {
     double *metric;
     unsigned char *star;
     size_t nmisfits;
-    size_t moved; /* rows that a pose may move: those of the solver and, without anchors, the vertex it holds */
-    room *rooms; /* one per thread, nrooms of them made */
+    size_t moved; /* rows that a pose can move: those of the solver and, without anchors, the vertex it holds */
+    room *rooms; /* at most one per thread; nrooms are allocated */
     size_t nrooms;
     vg_robust_stats *found; /* per room */
     vg_robust_stats stats;
 };
 
-/* ---- making ---- */
+/* ---- ---- construction ---- */
 
 static size_t face_size(const vg_graph *g, size_t f)
 {
@@ -69,7 +71,7 @@ static size_t count_entries(const vg_robust *r)
     return n;
 }
 
-/* The metric of the differences to the first corner: what is left of it without its first row and column. */
+/* The metric of the differences from the first corner: the metric without its first row and column. */
 static size_t write_metric(vg_robust *r, size_t i, size_t at)
 {
     const vg_graph *g = r->solver.g;
@@ -127,8 +129,8 @@ static bool make_room(room *m, const vg_robust *r)
     return true;
 }
 
-/* Rooms for as many blocks as there are, at most one per thread: a short sequence on a large mesh needs one. Where
- * memory ends, fewer blocks go side by side. */
+/* Make workspaces for as many blocks as there are, at most one per thread; a short sequence on a large mesh needs
+ * one. If memory runs out, fewer blocks are solved at a time. */
 static int make_rooms(vg_robust *r, size_t blocks, vg_err *e)
 {
     size_t most = blocks < (size_t)r->solver.threads ? blocks : (size_t)r->solver.threads;
@@ -202,7 +204,8 @@ static void load_pose(void *context, size_t pose)
     const double *w = j->vectors[pose], *x = j->guesses[pose];
     float *misfit = j->misfits[pose];
     double size = mean_length(w, vg_graph_corners(g));
-    size = size >= DBL_MIN && size <= 1 / DBL_MIN ? ldexp(1, ilogb(size)) : 0; /* so that scaling rounds nothing */
+    size = size >= DBL_MIN && size <= 1 / DBL_MIN ? ldexp(1, ilogb(size)) : 0; /* a power of two, so that scaling is
+                                                                                  exact */
     double unit = size > 0 ? 1 / size : 0;
     for (size_t i = 0; i < j->r->rows.nf; i++) {
         size_t begin = g->start[j->r->face[i]], end = g->start[j->r->face[i] + 1];
@@ -227,11 +230,11 @@ typedef struct search {
     const vg_robust *r;
     room m;
     vgi_robust_faces faces;
-    vgi_lanes soft2, scale, slope, t, energy; /* scale: of the first Hessian, slope: of the energy along d */
+    vgi_lanes soft2, scale, slope, t, energy; /* scale: of the initial Hessian; slope: of the energy along d */
     bool active[VGI_LANES], falling[VGI_LANES]; /* falling: the last round gained more than enough */
     size_t rounds;
-    size_t lanes;                      /* poses */
-    const vg_solver *other[VGI_LANES]; /* that a pose has instead of r's, or NULL */
+    size_t lanes;                      /* number of poses */
+    const vg_solver *other[VGI_LANES]; /* solver that a pose uses instead of r's, or NULL */
 } search;
 
 static bool any_active(const search *s)
@@ -241,17 +244,17 @@ static bool any_active(const search *s)
     return any;
 }
 
-/* The energy and gradient where the vertices are moved by u. */
+/* Energy and gradient with the vertices displaced by u. */
 static void look(const search *s, const vgi_row *u, vgi_row *g, vgi_robust_sums *sums)
 {
     memset(g, 0, (s->r->solver.rows + s->r->rows.nheld) * sizeof *g);
     vgi_robust_kernel_now()->energy(&s->faces, s->m.misfit, u, s->soft2, g, s->m.corners, sums);
 }
 
-enum { FEW = 5 }; /* so many poses are solved faster one by one than all lanes together */
+enum { FEW = 5 }; /* up to this many poses are solved faster one by one than all lanes together */
 
-/* z := N^-1 g, each pose by its own solver; 0 where that one holds. of: the poses that it is wanted for; the others' z
- * is any number. */
+/* z := N^-1 g, each pose with its own solver; 0 at vertices that it holds. of: the poses to compute; z of the others
+ * is undefined. */
 static void precondition(const search *s, const bool *of, const vgi_row *g, vgi_row *z)
 {
     size_t rows = s->r->solver.rows, plain = 0;
@@ -268,7 +271,8 @@ static void precondition(const search *s, const bool *of, const vgi_row *g, vgi_
         if (of[k] && (s->other[k] || plain)) vgi_solver_solve_lane(s->other[k] ? s->other[k] : s->r->s, k, g, z, s->m.points);
 }
 
-/* How soft the absolute value is at 0, from the misfits of the plain solution; which poses have any. */
+/* Choose the softness c of the absolute value at 0 from the misfits of the plain solution, and mark the poses that
+ * have a misfit. */
 static void choose_softness(search *s)
 {
     vgi_robust_sums sums;
@@ -300,14 +304,15 @@ static void begin(search *s)
     vgi_robust_kernel_now()->turn(n, abc, s->m.z, s->m.z, s->m.d);
 }
 
-/* Where the parabola through the energy at both ends and the slope at the first is least, but not too near to either. */
+/* Step length at the minimum of the parabola through the energies at both ends and the slope at the first, kept away
+ * from both ends. */
 static double shorter(double t, double slope, double rise)
 {
     double least = -slope * t * t / (2 * (rise - slope * t));
     return least > 0.1 * t && least < 0.5 * t ? least : least >= 0.5 * t ? 0.5 * t : 0.1 * t;
 }
 
-/* u := u + t d, where the energy is lower by enough; a pose for which there is no such place is done. */
+/* u := u + t d with sufficient decrease of the energy. A pose for which no such t is found is done. */
 static void advance(search *s, vgi_robust_sums *sums)
 {
     size_t n = s->r->moved;
@@ -403,7 +408,7 @@ static void load_rows(const search *s, const double *const *rhs, vgi_row *g)
             for (size_t k = 0; k < VGI_LANES; k++) g[i].xyz[c][k] = rhs[k][3 * (size_t)s->r->rows.held[i - v->rows] + c];
 }
 
-/* What the poses have moved by. */
+/* Add the displacements to the poses. */
 static void add_rows(const search *s, double *const *x)
 {
     const vgi_solver_view *v = &s->r->solver;
@@ -413,7 +418,7 @@ static void add_rows(const search *s, double *const *x)
             for (size_t k = 0; k < s->lanes; k++) x[k][3 * (size_t)s->r->rows.held[i - v->rows] + c] += s->m.u[i].xyz[c][k];
 }
 
-/* The plain solution, as the way there from the guess, in units of the size of each pose. */
+/* The plain solution as a displacement from the guess, in units of each pose's size. */
 static void solve_plainly(const robust_job *j, search *s, size_t first, vgi_lanes size)
 {
     const vg_robust *r = j->r;

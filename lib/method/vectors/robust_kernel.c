@@ -1,15 +1,15 @@
-/* robust_kernel.c: energy and gradient of the absolute misfit for eight poses at once, and the sums of vectors that the
- * search (robust.c) needs. All of it is bound by memory: misfits are binary32, which is exact enough for what is
- * left of consistent vectors, and what can be done while a row is in registers is done in one go.
+/* robust_kernel.c: energy and gradient of the absolute misfit for eight poses at once, and the vector sums that the
+ * search (robust.c) needs. All of it is bound by memory: misfits are binary32, which is sufficient for the residuals
+ * of nearly consistent vectors, and work on a row is combined while the row is in registers.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/robust_kernel.h"
 
 #include "core/wide.h"
 
-/* As many misfits as a vector has lanes. */
+/* One misfit per lane of a vector. */
 typedef float narrow __attribute__((vector_size(4 * VGI_WIDTH), may_alias));
 
-/* Three numbers of as many poses as a vector has lanes. */
+/* Three numbers per lane of a vector. */
 typedef struct point {
     vgi_wide at[3];
 } point;
@@ -73,11 +73,11 @@ typedef struct face_job {
     const vgi_robust_faces *f;
     const float *misfit;
     const vgi_row *u;
-    const double *soft2; /* NULL: the energy alone */
+    const double *soft2; /* NULL: compute the energy alone */
     vgi_row *g;
 } face_job;
 
-/* Face f of n + 1 corners for one part of the lanes. e, q: room for n points. */
+/* Face f with n + 1 corners for one part of the lanes. e, q: workspace of n points. */
 VGI_INLINE void face(const face_job *j, size_t f, size_t n, size_t i, point *e, point *q, vgi_wide *energy, vgi_wide *weight)
 {
     const uint32_t *row = j->f->row + j->f->start[f];

@@ -5,34 +5,34 @@
 
 #include "numeric/solve_kernel.h"
 
-/* Faces as rows of their vertices, with the metric of each. The misfit of a face of r corners is r - 1 vectors, those of
- * its corners less that of its first: misfit i of face f is number start[f] - f + i. */
+/* Faces as rows of their vertices, with the metric of each. The misfit of a face with r corners is r - 1 vectors:
+ * those of its corners minus that of its first. Misfit i of face f has number start[f] - f + i. */
 typedef struct vgi_robust_faces {
     size_t n;
     const uint32_t *start, *row; /* corners of face f: row[start[f]] .. row[start[f + 1] - 1] */
-    const size_t *entry;         /* per face: where its metric is */
-    const double *metric;        /* of r - 1 corners, the lower triangle by rows; of a star its weight alone */
+    const size_t *entry;         /* per face: start of its metric */
+    const double *metric;        /* for r - 1 corners, the lower triangle by rows; for a star its weight alone */
     const unsigned char *star;   /* per face: its metric is a multiple of the projector */
 } vgi_robust_faces;
 
-/* What is summed up over faces, for each pose. */
+/* Sums over faces, per pose. */
 typedef struct vgi_robust_sums {
-    vgi_lanes energy; /* of sqrt(e^2 + soft^2), e^2 the squared misfit of a face in its metric */
-    vgi_lanes weight; /* of 1 / sqrt(e^2 + soft^2) */
+    vgi_lanes energy; /* sum of sqrt(e^2 + soft^2), e^2 the squared misfit of a face in its metric */
+    vgi_lanes weight; /* sum of 1 / sqrt(e^2 + soft^2) */
 } vgi_robust_sums;
 
-/* The products that the next direction needs. g, z: gradient and N^-1 gradient at the last point, gn, zn: at this one, d:
- * the direction between; dy = d.(gn - g), yv = (gn - g).(zn - z), dg = d.gn, yz = (gn - g).zn, gz = gn.zn. */
+/* The products for the next direction. g, z: gradient and N^-1 gradient at the last point; gn, zn: at this point; d:
+ * the direction between. dy = d.(gn - g), yv = (gn - g).(zn - z), dg = d.gn, yz = (gn - g).zn, gz = gn.zn. */
 typedef struct vgi_robust_products {
     vgi_lanes dy, yv, dg, yz, gz;
 } vgi_robust_products;
 
 typedef struct vgi_robust_kernel {
-    /* interleave: misfits of eight poses (n numbers each) side by side: to[8 i + k] = from[k][i] */
+    /* interleave: the misfits of eight poses (n numbers each) side by side: to[8 i + k] = from[k][i] */
     void (*interleave)(size_t n, const float *const *from, float *to);
-    /* energy: when the vertices move by u from where the misfits were taken, and its gradient, which is added to g.
-     * soft2: soft^2 of each pose; NULL: the energy alone, g and weight are not written. room: for twice the corners of the
-     * largest face. */
+    /* energy: with the vertices displaced by u from where the misfits were measured; its gradient is added to g.
+     * soft2: soft^2 per pose; NULL: the energy alone, g and weight are not written. room: workspace for twice the
+     * corners of the largest face. */
     void (*energy)(const vgi_robust_faces *f, const float *misfit, const vgi_row *u, const double *soft2, vgi_row *g,
                    vgi_row *room, vgi_robust_sums *sums);
     void (*multiply)(size_t n, const vgi_row *g, const vgi_row *gn, const vgi_row *z, const vgi_row *zn,

@@ -1,5 +1,5 @@
 /* select.c: a subset of the faces that still determines the mesh (T 3.2, Algorithm 1), completed so that every
- * component stays connected. The choice depends on the faces and their order alone, not on positions, so that all
+ * component stays connected. The choice depends only on the faces and their order, not on positions, so that all
  * poses of a mesh agree.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/incidence.h"
@@ -37,9 +37,9 @@ static void clear(struct selection *s)
     free(s->sets);
 }
 
-/* Algorithm 1 at one vertex. Two faces around v that share an edge share one that ends at v (unless they are
- * folded onto each other), so it is enough to look at the two edges of each corner at v: the cost is the number of
- * corners at v, whatever the size of the faces. */
+/* Algorithm 1 at one vertex. Two faces around v that share an edge share one that ends at v (unless they are folded
+ * onto each other). So only the two edges of each corner at v are examined: the cost is the number of corners at v,
+ * for any size of faces. */
 static void select_around(struct selection *s, uint32_t v)
 {
     const vg_mesh *m = s->m;
@@ -58,7 +58,7 @@ static void select_around(struct selection *s, uint32_t v)
     }
 }
 
-/* Join the vertices of a face; false if they were in one set already. */
+/* Join the vertices of a face; false if they were already in one set. */
 static bool join_face(struct selection *s, size_t f)
 {
     const uint32_t *vert = s->m->vert;
@@ -68,8 +68,8 @@ static bool join_face(struct selection *s, size_t f)
     return joined;
 }
 
-/* Add faces until every component is connected. A vertex that the chosen faces left out is a set of its own until
- * a face joins it, so this also covers the vertices. */
+/* Add faces until every component is connected. A vertex without chosen faces is a set by itself until a face joins
+ * it, so this also covers all vertices. */
 static void complete(struct selection *s)
 {
     for (size_t f = 0; f < s->m->nf; f++)

@@ -1,5 +1,5 @@
-/* shape.c: transfer by shape deformation (T 4.1): vertices without a linear system. Leaves out the position of the
- * body (move.c).
+/* shape.c: transfer by shape deformation (T 4.1): vertices without a linear system. The position of the body is in
+ * move.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "numeric/vec3.h"
@@ -11,7 +11,7 @@ struct vg_shaper {
     int threads;
     double *quaternion; /* per corner: P_c, source to target in the reference poses */
     double *share;      /* per vertex: 1 / number of its corners */
-    double *reference;  /* the target's, for vertices in no face */
+    double *reference;  /* reference of the target, for vertices without faces */
 };
 
 int vg_shaper_new(vg_shaper **out, const vg_graph *g, const double *source, const double *target, int threads,

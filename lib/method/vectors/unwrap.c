@@ -1,11 +1,10 @@
-/* unwrap.c: how far, and which way round, each face has turned: a rotation by a about an axis is also one by a - 2
- * pi or a + 2 pi, and neighbours have to choose alike (MATH 7). A minimum spanning tree over faces and vertices,
- * whose edges cost what the rotations at their ends differ, from the face that turns least; then sweeps that put
- * right what the tree joined badly; and where something turns by more than half a turn, a smooth field of such
- * vectors that is fitted to the faces.
- * Leaves out what is done with it (interpolate.c).
+/* unwrap.c: unwrapping of face rotations. A rotation by a about an axis is also one by a - 2 pi or a + 2 pi, and
+ * neighbouring faces must choose alike (MATH 7). A minimum spanning tree over faces and vertices, starting from the
+ * face that rotates least, joins the nodes whose rotations differ least. Sweeps then correct what the tree joined
+ * badly. If something rotates by more than half a turn, a smooth field of such vectors is fitted to the faces.
+ * interpolate.c uses the result.
  *
- * Vectors are axis times half the angle, the logarithms of unit quaternions: the next branch along the axis is pi
+ * Vectors are axis times half the angle, the logarithms of unit quaternions; so the next branch along the axis is pi
  * away.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/unwrap.h"
@@ -16,12 +15,12 @@
 #include <stdlib.h>
 
 enum { SWEEPS = 50,       /* at most; sweeps end when no face changes its branch */
-       NEWTON_STEPS = 20, /* of the smooth field, at most, and in each */
+       NEWTON_STEPS = 20, /* of the smooth field: most Newton steps, and most steps in each */
        CG_STEPS = 200 };
-static const double trust = 2.5;        /* see vgi_branch_near: x / sin x for x = 2.15, a turn by 246 degrees */
+static const double trust = 2.5;        /* see vgi_branch_near: x / sin x for x = 2.15, a rotation by 246 degrees */
 /* weight of the faces' axes in the smooth field, relative to their angles */
 static const double sideways = 0.1;
-static const double longest_step = 0.3; /* of a vector's coordinate */
+static const double longest_step = 0.3; /* of one coordinate of a vector */
 static const double usual = 0.3;        /* a face whose half angle relative to the field exceeds this is an
                                            exception */
 
@@ -68,10 +67,10 @@ bool vgi_branch_follow(const double q[4], const double near[3], double l[3])
     return false;
 }
 
-/* ---- what is known of faces and vertices ---- */
+/* ---- ---- rotations of faces and vertices ---- */
 
-/* A candidate edge of the tree, between a face and one of its vertices, in the heap. Nodes are numbered faces
- * first, then vertices. */
+/* A candidate edge of the tree, between a face and one of its vertices, in the heap. Nodes are numbered faces first,
+ * then vertices. */
 typedef struct edge {
     double cost;
     uint32_t from, to;
@@ -82,14 +81,14 @@ typedef struct choice {
     vgi_incidence around;
     double *q;    /* 4 per face, then per vertex: unit quaternions, the mean rotations */
     double *turn; /* 3 per face */
-    double *at;   /* 3 per vertex: of the tree, then sums or means over its faces */
+    double *at;   /* 3 per vertex: from the tree, then sums or means over its faces */
     bool *reached;
     edge *heap;
     size_t n, cap;
     bool beyond;
 } choice;
 
-/* Add to a sum of quaternions with the sign that agrees with it. */
+/* Add to a sum of quaternions, with the sign that agrees with the sum. */
 static void add(double sum[4], const double q[4])
 {
     double along = 0;
@@ -208,7 +207,7 @@ static int by_cost(const void *a_, const void *b_)
     return a->face < b->face ? -1 : a->face > b->face;
 }
 
-/* Start at the face that turns least, and again in each part that links do not join. */
+/* Start at the face that rotates least, and again in each part that no link connects. */
 static int grow_trees(choice *c, vg_err *e)
 {
     size_t nf = c->g->nf;
@@ -239,7 +238,7 @@ static size_t faces_around(const choice *c, size_t v)
     return c->around.first[v + 1] - c->around.first[v];
 }
 
-/* The mean vector of the faces that share a vertex with f; false if there are none. c->at holds sums. */
+/* Mean vector of the faces that share a vertex with f; false if there are none. c->at holds sums. */
 static bool mean_beside(const choice *c, size_t f, double mean[3])
 {
     const vg_graph *g = c->g;
@@ -255,7 +254,7 @@ static bool mean_beside(const choice *c, size_t f, double mean[3])
 }
 
 /* Move each face to the branch with the least sum of squared differences from its neighbours, which is the one
- * nearest to their mean; returns how many changed. */
+ * nearest to their mean. Returns the number of changes. */
 static size_t sweep(choice *c)
 {
     const vg_graph *g = c->g;
@@ -274,7 +273,8 @@ static size_t sweep(choice *c)
     return changed;
 }
 
-/* Beyond half a turn: a face whose vector is not its shortest one, or a corner that follows such a face. */
+/* Whether any face rotates by more than half a turn (its vector is not the shortest one), or a corner does because it
+ * follows such a face. corner: a quaternion per corner. */
 static bool is_beyond(const choice *c, const double *corner)
 {
     const vg_graph *g = c->g;
@@ -300,10 +300,10 @@ static bool is_beyond(const choice *c, const double *corner)
 
 /* ---- a smooth field of vectors (Gauss-Newton, conjugate gradients) ----
  *
- * Minimised is  sum_f rest_f' W_f rest_f + turn' L turn,  exp(rest_f) = exp(-turn_f) q_f, with L the graph
- * Laplacian of faces that share vertices, the n faces at a vertex with weight 1/n each. A step x changes rest by
- * -J x, J = I - (1 - cos a)/a^2 [v] + (a - sin a)/a^3 [v]^2 for the rotation vector v = 2 turn and its length a.
- * Near a whole turn J is singular across the axis: there the axis is that of the neighbours. */
+ * The objective is  sum_f rest_f' W_f rest_f + turn' L turn,  exp(rest_f) = exp(-turn_f) q_f, with L the graph
+ * Laplacian of faces that share vertices; the n faces at a vertex are joined with weight 1/n each. A step x changes
+ * rest by -J x, J = I - (1 - cos a)/a^2 [v] + (a - sin a)/a^3 [v]^2 for the rotation vector v = 2 turn and its length
+ * a. Near a whole turn J is singular perpendicular to the axis; there the neighbours determine the axis. */
 
 typedef struct relaxation {
     double *J;      /* 9 per face */
@@ -338,7 +338,7 @@ static void add_laplacian(choice *c, const double *x, double *y)
             for (size_t k = 0; k < 3; k++) y[3 * f + k] += x[3 * f + k] - c->at[3 * (size_t)g->vert[i] + k];
 }
 
-/* y = J' W rest, W being `weight` along the axis, which J leaves as it is, and `sideways` of that across it. */
+/* y = J' W rest. W is `weight` along the axis, which J preserves, and `sideways` times that perpendicular to it. */
 static void pull(const relaxation *r, size_t f, const double rest[3], double y[3])
 {
     const double *J = r->J + 9 * f, *axis = r->axis + 3 * f;
