@@ -1,5 +1,6 @@
-/* banned.h: included before every file of ours: calls that hide errors, overrun, or follow the locale do not compile.
- * The system headers that declare them come first, so that only our own uses are caught.
+/* banned.h: included before every file of this project; calls that hide errors, overrun buffers or depend on the
+ * locale do not compile. The system headers that declare them are included first, so that only our own uses are
+ * caught.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_BANNED_H
 #define VG_BANNED_H

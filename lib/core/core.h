@@ -1,5 +1,5 @@
-/* core.h: what every layer of libvg uses: checked allocation, growing byte arrays, threads, byte order. Internal;
- * nothing here knows a mesh or a file.
+/* core.h: shared by all layers of libvg: checked allocation, growing byte arrays, threads, byte order. Internal;
+ * independent of meshes and files.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_CORE_H
 #define VG_CORE_H
@@ -8,8 +8,8 @@
 
 #include <string.h>
 
-/* vgi_array: n elements of `size` bytes, zeroed; VG_ENOMEM in *e and NULL when there is no room or n * size
- * overflows. n = 0 gives a valid pointer. Release with free(). */
+/* vgi_array: n elements of `size` bytes, zeroed. NULL with VG_ENOMEM in *e if memory is short or n * size overflows.
+ * n = 0 gives a valid pointer. Release with free(). */
 void *vgi_array(size_t n, size_t size, vg_err *e);
 /* vgi_array_raw: like vgi_array, but the contents are undefined. */
 void *vgi_array_raw(size_t n, size_t size, vg_err *e);
@@ -39,18 +39,18 @@ void vgi_parallel(int threads, size_t n, void (*task)(void *context, size_t i), 
  * items stored there. Memory is bounded by the number of places. Only one thread at a time may call the functions
  * below.
  *
- *     if (vgi_belt_full(b)) use(thing[vgi_belt_take(b)]); fill(thing[vgi_belt_place(b)]); vgi_belt_put(b); */
+ *     if (vgi_belt_full(b)) use(item[vgi_belt_take(b)]); fill(item[vgi_belt_place(b)]); vgi_belt_put(b); */
 typedef struct vgi_belt vgi_belt;
 /* vgi_belt_new: up to `threads` threads call work(context, place), including the caller's thread while it waits in
  * vgi_belt_take. With one thread all work is done inside vgi_belt_take. */
 int vgi_belt_new(vgi_belt **b, int threads, size_t places, void (*work)(void *context, size_t place), void *context,
                  vg_err *e) VG_MUST_CHECK;
-/* vgi_belt_free: waits for items that are being processed and drops those that have not started. */
+/* vgi_belt_free: wait for items that are being processed and drop those that have not started. */
 void vgi_belt_free(vgi_belt **b);
 size_t vgi_belt_things(const vgi_belt *b); /* number of items on the belt */
 bool vgi_belt_full(const vgi_belt *b);
-size_t vgi_belt_place(const vgi_belt *b);  /* where the next item goes; only when the belt is not full */
-void vgi_belt_put(vgi_belt *b);            /* the item at vgi_belt_place is filled */
+size_t vgi_belt_place(const vgi_belt *b);  /* place of the next item; only if the belt is not full */
+void vgi_belt_put(vgi_belt *b);            /* call when the item at vgi_belt_place is filled */
 /* vgi_belt_take: wait for the oldest item and return its place. The belt must not be empty. */
 size_t vgi_belt_take(vgi_belt *b);
 

@@ -13,7 +13,7 @@ static const char *const names[] = {"plain"};
 #endif
 enum { SETS = sizeof names / sizeof *names };
 
-/* How many of the sets this machine has; each one includes those before it. */
+/* Number of instruction sets that this machine supports; each one includes those before it. */
 static size_t sets_here(void)
 {
 #if defined(__x86_64__)

@@ -1,5 +1,5 @@
-/* lanes.h: eight poses side by side in memory, the unit that callers hand to the numeric kernels.
- * Leaves out arithmetic: kernels do it in vectors as wide as their instruction set has (wide.h).
+/* lanes.h: eight poses side by side in memory, the unit that callers pass to the numeric kernels. Kernels compute in
+ * vectors as wide as their instruction set has (wide.h).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_LANES_H
 #define VG_LANES_H

@@ -1,4 +1,5 @@
-/* memory.c: checked allocation, growing byte arrays, and whether text is UTF-8; numbers_kernel.c looks whether numbers are finite.
+/* memory.c: checked allocation, growing byte arrays, validation of UTF-8. Finite numbers are tested in
+ * numbers_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/numbers_kernel.h"
 

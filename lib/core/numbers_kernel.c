@@ -1,9 +1,9 @@
-/* numbers_kernel.c: are all numbers finite; copies without negative zeros, and in binary32.
+/* numbers_kernel.c: test for finite numbers; copies without negative zeros, and in binary32.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/numbers_kernel.h"
 #include "core/wide.h"
 
-/* x - x is 0 for finite x and NaN for others; bits are or-ed so that the loop needs no branch. */
+/* x - x is 0 for finite x and NaN otherwise; bits are or-ed so that the loop needs no branch. */
 VGI_INLINE vgi_mask not_finite(vgi_wide x)
 {
     return (vgi_mask)(x - x); /* NOLINT(misc-redundant-expression) */
@@ -33,7 +33,7 @@ static void plain_zeros(double *to, const double *from, size_t n)
     for (; i < n; i++) to[i] = from[i] + 0.0;
 }
 
-/* The compiler makes vectors of this; the difference is 0 or NaN. */
+/* The compiler vectorises this; the difference is 0 or NaN. */
 static bool to_single(float *restrict to, const double *restrict from, size_t n)
 {
     uint32_t bad = 0;

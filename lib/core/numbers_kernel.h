@@ -18,7 +18,7 @@ static inline void vgi_plain_zeros(double *to, const double *from, size_t n)
     vgi_numbers_kernel_now()->plain_zeros(to, from, n);
 }
 
-/* vgi_to_single: n numbers rounded to binary32; false when one of them is not finite there. */
+/* vgi_to_single: round n numbers to binary32; false if one of them is not finite there. */
 static inline bool vgi_to_single(float *to, const double *from, size_t n)
 {
     return vgi_numbers_kernel_now()->to_single(to, from, n);

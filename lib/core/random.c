@@ -1,5 +1,4 @@
-/* random.c: pseudo-random numbers by seed and counter.
- * Leaves out what they are for.
+/* random.c: pseudo-random numbers from a seed and a counter.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/random.h"
 
@@ -10,7 +9,7 @@ vgi_random vgi_random_start(uint64_t seed, uint64_t stream)
     return (vgi_random){.key = vgi_random_mix(vgi_random_mix(seed) + stream)};
 }
 
-/* Two keys give unrelated sequences: the counter is mixed before it meets the key. */
+/* Two keys give unrelated sequences, because the counter is mixed before it is combined with the key. */
 uint64_t vgi_random_bits(vgi_random *r)
 {
     return vgi_random_mix(r->key ^ vgi_random_mix(r->counter++));
@@ -21,7 +20,8 @@ double vgi_random_uniform(vgi_random *r)
     return (double)(vgi_random_bits(r) >> 11) * 0x1p-53;
 }
 
-/* The upper half of a product of 128 bits; numbers that would make some results likelier are drawn again (Lemire 2019). */
+/* The upper half of a product of 128 bits. Numbers that would make some results more likely are drawn again (Lemire
+ * 2019). */
 size_t vgi_random_below(vgi_random *r, size_t n)
 {
     uint64_t unfair = (0 - (uint64_t)n) % (uint64_t)n;

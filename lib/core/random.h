@@ -1,5 +1,5 @@
-/* random.h: pseudo-random numbers that depend on a seed and a counter and on nothing else: number i of stream s is the
- * same on every machine and in every thread, whatever was drawn before.
+/* random.h: pseudo-random numbers that depend only on a seed and a counter: number i of stream s is the same on every
+ * machine and in every thread, whatever was drawn before.
  * Internal. Not for secrets.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_RANDOM_H
@@ -8,8 +8,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* vgi_random_mix: a bijection of 64-bit numbers whose values look independent (the finaliser of splitmix64; Steele, Lea,
- * Flood 2014). */
+/* vgi_random_mix: a bijection of 64-bit numbers with values that look independent (the finaliser of splitmix64;
+ * Steele, Lea, Flood 2014). */
 static inline uint64_t vgi_random_mix(uint64_t x)
 {
     x += 0x9e3779b97f4a7c15u;
@@ -18,13 +18,13 @@ static inline uint64_t vgi_random_mix(uint64_t x)
     return x ^ (x >> 31);
 }
 
-/* A sequence of numbers. Copying it copies its place; setting `counter` jumps to any place of it. */
+/* A sequence of numbers. A copy continues from the same position; set `counter` to jump to any position. */
 typedef struct vgi_random {
     uint64_t key, counter;
 } vgi_random;
 
-/* vgi_random_start: stream number `stream` of a seed, at its first number. A task that runs in parallel takes the number
- * of the task as its stream. */
+/* vgi_random_start: stream number `stream` of a seed, at its first number. A parallel task uses its task number as
+ * the stream. */
 vgi_random vgi_random_start(uint64_t seed, uint64_t stream);
 uint64_t vgi_random_bits(vgi_random *r);             /* uniform over 0 .. 2^64 - 1 */
 double vgi_random_uniform(vgi_random *r);            /* uniform in [0, 1), multiples of 2^-53 */

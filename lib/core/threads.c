@@ -1,6 +1,5 @@
-/* threads.c: a pool of threads, made once, that waits for work: parallel loops, and belts, on which items are
- * processed while the caller continues. One loop runs at a time; a loop inside a loop runs on its own thread
- * alone.
+/* threads.c: a pool of threads, created once: parallel loops, and belts, on which items are processed while the
+ * caller continues. One loop runs at a time; a nested loop runs on its own thread alone.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 
@@ -11,25 +10,25 @@
 enum { MOST_THREADS = 256 };
 
 struct vgi_belt {
-    vgi_belt *next; /* belts that have work for the pool */
-    bool shared;    /* in the list of those belts */
+    vgi_belt *next; /* list of the belts with work for the pool */
+    bool shared;    /* whether it is in that list */
     void (*work)(void *, size_t);
     void *context;
     size_t places, first, n; /* items are at first, first + 1, ... (mod places) */
-    size_t begun, working;   /* of the n items: started so far; being processed */
+    size_t begun, working;   /* of the n items: started so far; in progress */
     bool *done;              /* by place */
 };
 
 static struct {
     pthread_mutex_t lock;
     pthread_cond_t start, done;
-    int workers;     /* threads made so far */
+    int workers;     /* threads created so far */
     vgi_belt *belts; /* a thread may be waiting for it */
-    /* the loop that is running: */
-    int wanted;      /* how many threads may join it */
-    int running;     /* how many threads are in it */
+    /* the loop in progress: */
+    int wanted;      /* number of threads that may join it */
+    int running;     /* number of threads in it */
     uint64_t loop;   /* its number */
-    bool busy, open; /* a loop is running and may be joined */
+    bool busy, open; /* a loop is in progress, and may be joined */
     atomic_size_t next;
     size_t n;
     void (*task)(void *, size_t);
@@ -116,7 +115,7 @@ static bool open_loop(int threads, size_t n, void (*task)(void *, size_t), void 
     return mine;
 }
 
-/* All tasks have started: wait for those that other threads run. */
+/* All tasks have started: wait for those on other threads. */
 static void close_loop(void)
 {
     pthread_mutex_lock(&pool.lock);

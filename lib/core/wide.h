@@ -1,11 +1,11 @@
-/* wide.h: a vector of doubles as wide as the registers of the instruction set that a kernel is compiled for, and what
- * kernels do with it. Included by *_kernel.c alone.
+/* wide.h: a vector of doubles as wide as the registers of the instruction set that a kernel is compiled for, and the
+ * operations that kernels need. Included by *_kernel.c alone.
  *
- * These are vectors of GCC and Clang of 16, 32 or 64 bytes. A vector type wider than the registers would be lowered to
- * single stores and loads, three to ten times slower, so eight poses are VGI_PARTS vectors, one after another. Highway
- * and xsimd do the same in C++, which nothing else here is written in; SIMDe gives one set's intrinsics on another,
- * where the width is what has to change. Arithmetic needs neither: only the roots, and moving points between poses and
- * lanes, are said for each width.
+ * These are vector types of GCC and Clang, of 16, 32 or 64 bytes. A vector type wider than the registers would be
+ * lowered to single stores and loads, three to ten times slower, so eight poses are VGI_PARTS vectors. Highway and
+ * xsimd do the same in C++, which this project does not use; SIMDe emulates the intrinsics of one set on another, but
+ * here the width has to change. Arithmetic needs neither; only roots, and moves of points between poses and lanes,
+ * are written for each width.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_WIDE_H
 #define VG_WIDE_H
@@ -32,7 +32,7 @@
 #endif
 #define VGI_PARTS (VGI_LANES / VGI_WIDTH)
 
-/* VGI_OF_SET(name): the name of this set's table, name_avx2 where the Makefile compiles with -DVGI_SET=avx2. */
+/* VGI_OF_SET(name): the name of this set's table: name_avx2 where the Makefile compiles with -DVGI_SET=avx2. */
 #define VGI_JOIN2(a, b) a##_##b
 #define VGI_JOIN(a, b) VGI_JOIN2(a, b)
 #define VGI_OF_SET(name) VGI_JOIN(name, VGI_SET)
@@ -40,7 +40,7 @@
 #define VGI_INLINE static inline __attribute__((always_inline))
 
 typedef double vgi_wide __attribute__((vector_size(8 * VGI_WIDTH)));
-typedef int64_t vgi_mask __attribute__((vector_size(8 * VGI_WIDTH))); /* what comparing gives: -1 or 0 */
+typedef int64_t vgi_mask __attribute__((vector_size(8 * VGI_WIDTH))); /* result of a comparison: -1 or 0 per lane */
 typedef double vgi_wide_at __attribute__((vector_size(8 * VGI_WIDTH), aligned(8), may_alias));
 typedef double vgi_pair __attribute__((vector_size(16)));
 typedef double vgi_pair_at __attribute__((vector_size(16), aligned(8), may_alias));
@@ -61,14 +61,14 @@ VGI_INLINE vgi_wide vgi_same(double x)
     return VGI_CHOOSE_WIDTH(((vgi_wide){x, x}), ((vgi_wide){x, x, x, x}), ((vgi_wide){x, x, x, x, x, x, x, x}));
 }
 
-/* vgi_gather: number i of as many arrays as there are lanes. */
+/* vgi_gather: number i of one array per lane. */
 VGI_INLINE vgi_wide vgi_gather(const double *const *p, size_t i)
 {
     return VGI_CHOOSE_WIDTH(((vgi_wide){p[0][i], p[1][i]}), ((vgi_wide){p[0][i], p[1][i], p[2][i], p[3][i]}),
                             ((vgi_wide){p[0][i], p[1][i], p[2][i], p[3][i], p[4][i], p[5][i], p[6][i], p[7][i]}));
 }
 
-/* One pair each of the arrays 0, 2, ... (p), or 1, 3, ... (p + 1). */
+/* One pair from each of the arrays 0, 2, ... (p), or 1, 3, ... (p + 1). */
 VGI_INLINE vgi_wide vgi_pairs(const double *const *p, size_t i)
 {
     vgi_pair a = *(const vgi_pair_at *)(p[0] + i);
@@ -86,7 +86,7 @@ VGI_INLINE vgi_wide vgi_pairs(const double *const *p, size_t i)
 #endif
 }
 
-/* The even lanes of a and b in turns, or the odd ones. */
+/* The even lanes of a and b interleaved, or the odd ones. */
 VGI_INLINE vgi_wide vgi_even(vgi_wide a, vgi_wide b)
 {
     return VGI_CHOOSE_WIDTH(__builtin_shufflevector(a, b, 0, 2), __builtin_shufflevector(a, b, 0, 4, 2, 6),
@@ -99,7 +99,7 @@ VGI_INLINE vgi_wide vgi_odd(vgi_wide a, vgi_wide b)
                             __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15));
 }
 
-/* vgi_gather_point: numbers i, i + 1 and i + 2 of as many arrays as there are lanes. */
+/* vgi_gather_point: numbers i, i + 1 and i + 2 of one array per lane. */
 VGI_INLINE void vgi_gather_point(const double *const *p, size_t i, vgi_wide xyz[3])
 {
     vgi_wide a = vgi_pairs(p, i), b = vgi_pairs(p + 1, i);
@@ -109,7 +109,7 @@ VGI_INLINE void vgi_gather_point(const double *const *p, size_t i, vgi_wide xyz[
 /* Pair k of a vector. */
 #define VGI_PAIR(x, k) __builtin_shufflevector(x, x, 2 * (k), 2 * (k) + 1)
 
-/* vgi_scatter_point: the way back, to the first n arrays. */
+/* vgi_scatter_point: the inverse, for the first n arrays. */
 VGI_INLINE void vgi_scatter_point(double *const *p, size_t n, size_t i, const vgi_wide xyz[3])
 {
     if (n >= VGI_WIDTH) {
@@ -133,14 +133,14 @@ VGI_INLINE void vgi_scatter_point(double *const *p, size_t n, size_t i, const vg
     }
 }
 
-/* vgi_part_lanes: how many of `lanes` are in part `part`. */
+/* vgi_part_lanes: number of lanes in part `part` out of `lanes`. */
 VGI_INLINE size_t vgi_part_lanes(size_t lanes, size_t part)
 {
     size_t first = part * VGI_WIDTH;
     return lanes <= first ? 0 : lanes - first < VGI_WIDTH ? lanes - first : VGI_WIDTH;
 }
 
-/* vgi_roots: the square root of each. */
+/* vgi_roots: square roots. */
 VGI_INLINE vgi_wide vgi_roots(vgi_wide a)
 {
 #if defined(__AVX512F__)
@@ -172,7 +172,7 @@ VGI_INLINE vgi_wide vgi_absolute(vgi_wide x)
     return (vgi_wide)((vgi_mask)x & INT64_MAX);
 }
 
-/* vgi_bits: bit k: is lane k of the mask set? */
+/* vgi_bits: bit k is set if lane k of the mask is. */
 VGI_INLINE unsigned vgi_bits(vgi_mask mask)
 {
 #if defined(__AVX512F__)
@@ -186,13 +186,13 @@ VGI_INLINE unsigned vgi_bits(vgi_mask mask)
 #endif
 }
 
-/* vgi_wide_dot: of two points. */
+/* vgi_wide_dot: dot product of two points. */
 VGI_INLINE vgi_wide vgi_wide_dot(const vgi_wide *a, const vgi_wide *b)
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* 3 x 3 matrices, row-major: the sum of squares; the cofactors (x^-1 = c' / det), and the determinant. */
+/* 3 x 3 matrices, row-major: sum of squares; cofactors (x^-1 = c' / det), and determinant. */
 VGI_INLINE vgi_wide vgi_wide_squares(const vgi_wide *x)
 {
     vgi_wide s = x[0] * x[0];

@@ -1,5 +1,5 @@
-/* artefact.c: operations on the table of header records: find, count, clear, copy, move.
- * Leaves out the table itself (records.c) and its bytes (io/artefact_io.c).
+/* artefact.c: operations on the table of header records: find, count, clear, copy, move. The table is in records.c,
+ * the bytes in io/artefact_io.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/artefact.h"
 
@@ -79,7 +79,7 @@ static void free_texts(const vgi_member *f, char *array, size_t n)
     for (size_t i = 0; array && i < n; i++) free(*(char **)(void *)(array + i * f->size + f->row_at));
 }
 
-/* Texts of a list are released while its length, a number of the struct, is still there. */
+/* The texts of a list must be released before the struct is cleared, because their number is a member of it. */
 static void free_all_texts(const vgi_artefact *t, void *artefact)
 {
     for (size_t i = 0; i < t->nfields; i++) {
@@ -107,7 +107,7 @@ static size_t place_size(const vgi_member *f)
     return f->length || f->type == VGI_TEXT ? sizeof(void *) : f->size;
 }
 
-/* Columns of one array have the same place: all are moved before any is emptied. */
+/* Columns of one array share its pointer: move all of them before clearing any. */
 void vgi_fields_move(const vgi_artefact *t, void *to, void *from)
 {
     vgi_fields_clear(t, to);
@@ -116,7 +116,7 @@ void vgi_fields_move(const vgi_artefact *t, void *to, void *from)
     for (size_t i = 0; i < t->nfields; i++) memset((char *)from + t->fields[i].at, 0, place_size(&t->fields[i]));
 }
 
-/* The texts of a list whose other bytes are copied already: all pointers to the original's are replaced. */
+/* Replace the pointers in a copied list of texts by copies of the texts. */
 static int copy_texts(const vgi_member *f, char *array, size_t n, vg_err *e)
 {
     int r = VG_OK;
@@ -128,7 +128,7 @@ static int copy_texts(const vgi_member *f, char *array, size_t n, vg_err *e)
     return r;
 }
 
-/* A column shares its array with the other columns of the rows: the first to come copies the whole of it. */
+/* A column shares its array with the other columns of the rows: the first one copies the whole array. */
 static int copy_array(const vgi_member *f, void *to, const void *from, const vg_mesh *mesh, vg_err *e)
 {
     void **target = pointer_of(f, to), *source = *pointer_of(f, from);
@@ -140,7 +140,8 @@ static int copy_array(const vgi_member *f, void *to, const void *from, const vg_
     return f->type == VGI_TEXT ? copy_texts(f, *target, n, e) : VG_OK;
 }
 
-/* The last column of rows is their text: the pointers of the original must not outlive a failure before it. */
+/* The last column of the rows is their text. Until then the copy holds pointers of the original, which must not
+ * survive a failure. */
 static int copy_field(const vgi_member *f, void *to, const void *from, const vg_mesh *mesh, vg_err *e)
 {
     if (f->length) return copy_array(f, to, from, mesh, e);
@@ -163,7 +164,7 @@ int vgi_fields_copy(const vgi_artefact *t, void *to, const void *from, const vg_
     return r;
 }
 
-/* ---- what checks share ---- */
+/* ---- ---- shared by checks ---- */
 
 int vgi_wrong(const char *where, const char *what, vg_err *e)
 {

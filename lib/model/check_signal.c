@@ -1,11 +1,11 @@
-/* check_signal.c: what a signal must hold beside what every reader checks, so that it can be evaluated.
+/* check_signal.c: conditions on a signal beyond what every reader checks, so that it can be evaluated.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/artefact.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-static const double farthest = 1e100; /* squares of distances in the plane are finite, and sums of them */
+static const double farthest = 1e100; /* squared distances in the plane, and their sums, stay finite */
 
 static bool within(const double *x, size_t n)
 {
@@ -14,7 +14,7 @@ static bool within(const double *x, size_t n)
     return true;
 }
 
-/* Of shapes that are no vertices; how many turns there are is known of the graph (vg_unshaper_new). */
+/* For shapes that are not vertices. The number of turns is checked against the graph (vg_unshaper_new). */
 static const char *refuse_turns(const vg_signal *s)
 {
     bool homes = s->space == VG_SPACE_VECTORS || s->space == VG_SPACE_GRADIENTS;

@@ -1,11 +1,11 @@
-/* checks.c: what the contents of header records must hold beside what every reader checks: counts that agree with the
- * bytes, finite numbers, texts in UTF-8 (io/artefact_io.c). One function per entry of the table (records.c).
+/* checks.c: conditions on the contents of header records beyond what every reader checks (counts agree with the
+ * bytes, numbers are finite, texts are UTF-8: io/artefact_io.c). One function per entry of the table (records.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/artefact.h"
 
 #include <math.h>
 
-/* A list of n + 1 starts: from 0, never descending. */
+/* Whether a list of n + 1 starts begins with 0 and never descends. */
 static bool are_starts(const uint32_t *start, size_t n)
 {
     if (start[0]) return false;
@@ -61,7 +61,7 @@ int vgi_check_labels(vg_head *h, void *artefact, const char *where, vg_err *e)
     return VG_OK;
 }
 
-/* Nothing is said of its data, which concern only who writes such files. */
+/* Its data are not checked; they matter only to writers of such files. */
 int vgi_check_asset(vg_head *h, void *artefact, const char *where, vg_err *e)
 {
     const vg_asset *a = artefact;
@@ -117,7 +117,7 @@ int vgi_check_skeleton(vg_head *h, void *artefact, const char *where, vg_err *e)
     return check_joints(s, where, e);
 }
 
-/* The bones follow from the joints. */
+/* List the bones, which follow from the joints. */
 static int list_bones(vg_rig *g, vg_err *e)
 {
     size_t bones = 0;
@@ -217,7 +217,7 @@ static const char *refuse_counts(const vg_map *m, const vg_head *h)
     return m->size > 0 ? NULL : "its size is not positive";
 }
 
-/* The counts of a map of bones beside its rig's. */
+/* Counts of a map of bones against those of its rig. */
 static const char *refuse_driver(const vg_map *m, const vg_rig *g)
 {
     if (m->kind == VG_MAP_PATCHES) return m->per_corner == 1 ? NULL : "a corner must have one patch";
@@ -242,7 +242,7 @@ static const char *refuse_parts(const vg_map *m)
     return NULL;
 }
 
-/* What moves corners and held vertices. */
+/* What moves the corners and the held vertices. */
 static const char *refuse_driven_parts(const vg_map *m)
 {
     bool bones = m->kind == VG_MAP_BONES;

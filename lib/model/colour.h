@@ -7,8 +7,8 @@
 #include <stdint.h>
 #include <string.h>
 
-/* vgi_patch_colour: an sRGB colour that differs from those of the preceding and following numbers: hues by the
- * golden ratio, in three shades. */
+/* vgi_patch_colour: an sRGB colour that differs from those of neighbouring numbers: hues by the golden ratio, in
+ * three shades. */
 static inline void vgi_patch_colour(uint32_t patch, unsigned char rgb[3])
 {
     static const unsigned char light[3] = {230, 190, 250}, dark[3] = {90, 50, 140};

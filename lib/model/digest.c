@@ -1,9 +1,9 @@
-/* digest.c: a number that is equal for sequences of equal content, whatever commands and precision made them.
- * Leaves out the checksums of records, which guard bytes (io/record.c).
+/* digest.c: a digest that is equal for sequences with equal content, whatever commands and precision produced them.
+ * Checksums of records, which protect bytes, are in io/record.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/numbers_kernel.h"
 
-/* the XXH64 state by value, so that nothing has to be allocated; its layout is part of the library's ABI */
+/* the XXH64 state by value, so that nothing is allocated; its layout is part of xxHash's ABI */
 #define XXH_STATIC_LINKING_ONLY
 #include <xxhash.h>
 
@@ -12,7 +12,7 @@ struct vg_digest {
     XXH64_state_t state;
 };
 
-/* All data enters as little-endian 64-bit words, each variable-length part preceded by its count, so that
+/* All data enters as little-endian 64-bit words, and each variable-length part is preceded by its count, so that
  * different contents never give the same bytes. */
 enum { WORDS = 512 };
 
@@ -58,7 +58,7 @@ static void mix_text(vg_digest *d, const char *s)
     if (n) XXH64_update(&d->state, s, n);
 }
 
-/* A form whose name does not say its width. */
+/* A form whose name does not determine its width. */
 static void mix_form(vg_digest *d, const vg_head *h)
 {
     mix_text(d, vg_head_form(h));

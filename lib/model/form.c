@@ -1,5 +1,5 @@
-/* form.c: the table of the forms of frames, and what values are counted by. A new form is a line in the table and a
- * number in vg_kind; what its values mean is for the programs that use them.
+/* form.c: the table of the forms of frames, and of the elements that values belong to. A new form is one line in the
+ * table and one number in vg_kind; its meaning is up to the programs that use it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/form.h"
 

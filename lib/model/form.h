@@ -5,19 +5,19 @@
 
 #include "core/core.h"
 
-/* vgi_form_find, vgi_element_find: VG_OTHER, VG_OF_UNKNOWN: unknown. */
+/* vgi_form_find, vgi_element_find: VG_OTHER, VG_OF_UNKNOWN if unknown. */
 vg_kind vgi_form_find(const char *name);
 vg_element vgi_element_find(const char *name);
-/* vgi_form_copy: what a head says of a form that is not known; `to` has none. */
+/* vgi_form_copy: copy the description of an unknown form; `to` has none yet. */
 int vgi_form_copy(vg_head *to, const vg_head *from, vg_err *e) VG_MUST_CHECK;
 
-/* All that frames are read and written by, without the head. */
+/* What reading and writing of frames needs, without the head. */
 typedef struct vgi_form {
     vg_kind kind;
     vg_precision precision;
     size_t width, count;
     bool on_corners;
-    size_t elements[VG_ELEMENTS]; /* vg_head_elements of each */
+    size_t elements[VG_ELEMENTS]; /* vg_head_elements of each element */
 } vgi_form;
 vgi_form vgi_form_of(const vg_head *h);
 

@@ -1,5 +1,5 @@
-/* frame.c: a frame and its channels: making, filling, releasing.
- * Leaves out what forms there are (form.c) and how a frame is written down (io/frame_io.c).
+/* frame.c: a frame and its channels: allocation, filling, release. Forms are in form.c, reading and writing in
+ * io/frame_io.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/frame.h"
 #include "model/form.h"
@@ -30,7 +30,7 @@ int vg_frame_rename(vg_frame *f, const char *name, vg_err *e)
 
 /* ---- channels ---- */
 
-/* All places below channels_cap are zero or hold buffers of a channel that was: they are used again. */
+/* Entries below channels_cap are zero or hold buffers of a former channel, which are reused. */
 static int more_places(vg_frame *f, vg_err *e)
 {
     size_t had = f->channels_cap;
@@ -93,7 +93,7 @@ int vgi_frame_add(vg_frame *f, const vgi_channel_texts *t, size_t width, size_t 
     if (is_new) c = &f->channels[f->nchannels++];
     r = set_texts(c, t, e);
     if (r == VG_OK) r = set_size(c, width, count, e);
-    if (r < 0) f->nchannels = 0; /* texts and numbers may be those of two channels */
+    if (r < 0) f->nchannels = 0; /* texts and numbers may come from two channels */
     *out = c;
     return r;
 }
@@ -107,7 +107,7 @@ int vg_frame_add(vg_frame *f, const char *name, const char *unit, vg_element ele
     return vgi_frame_add(f, &t, width, count, c, e);
 }
 
-/* The dropped channel goes behind the last one, so that its buffers are used again. */
+/* Move the dropped channel behind the last one, so that its buffers are reused. */
 void vg_frame_drop(vg_frame *f, const char *name)
 {
     vg_channel *c = vg_frame_channel(f, name);
@@ -156,7 +156,7 @@ int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e)
     return vg_frame_rename(f, from->name ? from->name : "", e);
 }
 
-/* ---- channels that have a meaning ---- */
+/* ---- ---- known channels ---- */
 
 double *vg_frame_anchors(const vg_frame *f)
 {
@@ -215,7 +215,7 @@ vg_channel *vg_frame_scalars(const vg_frame *f)
     return NULL;
 }
 
-/* The frame has one set of them. */
+/* A frame has one set of scalars. */
 int vg_frame_set_scalars(vg_frame *f, const char *name, const char *unit, const double *numbers, size_t nv, vg_err *e)
 {
     vg_channel *c;

@@ -1,11 +1,11 @@
-/* frame.h: what readers of frames need beside vg.h. Internal.
+/* frame.h: declarations for readers of frames in addition to vg.h. Internal.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_FRAME_H
 #define VG_FRAME_H
 
 #include "core/core.h"
 
-/* vgi_frame_add: vg_frame_add with texts without terminators and an element by name. */
+/* vgi_frame_add: vg_frame_add with texts without terminators and the element by name. */
 typedef struct vgi_channel_texts {
     const char *name, *unit, *element;
     size_t name_bytes, unit_bytes, element_bytes;

@@ -1,5 +1,5 @@
-/* graph.c: the vector graph of a sequence: the faces that carry vectors, and the vectors of a pose (T 3.1). Leaves
- * out the choice of faces and links (select.c, link.c) and their deformation (deform.c).
+/* graph.c: the vector graph of a sequence: the faces that have vectors, and the vectors of a pose (T 3.1). Faces are
+ * chosen in select.c, links in link.c; deformations are in deform.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "numeric/vec3.h"

@@ -1,5 +1,5 @@
-/* groups.c: a skeleton that follows a mesh: its joints are means of vertices (T 5.1). Leaves out the text format
- * that names the vertices (io).
+/* groups.c: a skeleton that follows a mesh: its joints are means of vertices (T 5.1). The text format that names the
+ * vertices is in lib/io.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "numeric/vec3.h"
@@ -44,7 +44,7 @@ int vg_joint_groups_skeleton(const vg_joint_groups *g, size_t nv, const double *
     return VG_OK;
 }
 
-/* b += weight * d r', both made unit vectors */
+/* b += weight * d r', with d and r normalised */
 static void add_pair(double b[9], double weight, const double d[3], const double r[3])
 {
     double x = 0, y = 0;
@@ -93,7 +93,7 @@ static void turn_joint(const vg_joint_groups *g, size_t j, const double *referen
             reject(below[0], d), reject(below[1], r); /* perpendicular to the bone: the frame is met exactly */
         add_pair(b, children == 1 ? 1 : 0.01, d, r);
     }
-    /* what the vertices leave open follows the parent */
+    /* what the vertices leave undetermined follows the parent */
     vgi_best_turn_near(b, 1e-9, group->parent == UINT32_MAX ? unturned : turns + 4 * (size_t)group->parent,
                        turns + 4 * j);
 }

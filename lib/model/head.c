@@ -1,5 +1,5 @@
-/* head.c: what is known of a sequence before its frames, making, copying, releasing.
- * Leaves out frames (frame.c) and their forms (form.c), how it is written down (io) and what is computed from it (method).
+/* head.c: the description of a sequence before its frames: allocation, copying, release. Frames are in frame.c, their
+ * forms in form.c, files in io, computation in method.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/artefact.h"
 #include "model/form.h"
@@ -7,14 +7,14 @@
 #include <assert.h>
 #include <stdlib.h>
 
-/* ---- by the table of records ---- */
+/* ---- ---- loops over the table of records ---- */
 
 static void clear_parts(void *of, const int *entries, size_t n)
 {
     for (size_t i = 0; i < n; i++) vgi_fields_clear(&vgi_artefacts[entries[i]], of);
 }
 
-/* *to is zeroed first and left so on failure. */
+/* *to is zeroed first, and stays zero on failure. */
 static int copy_parts(void *to, const void *from, size_t size, const int *entries, size_t n, const vg_mesh *mesh,
                       vg_err *e)
 {
@@ -135,7 +135,7 @@ static void clear_provenance(vg_provenance *p)
     vgi_fields_clear(&vgi_artefacts[VGI_PROV], p);
 }
 
-/* A copy of s in which bytes that are not part of valid UTF-8 stand as '?'. */
+/* A copy of s with '?' for bytes that are not valid UTF-8. */
 static char *clean_string(const char *s, vg_err *e)
 {
     size_t n = strlen(s);
@@ -176,7 +176,7 @@ static int append_provenance(vg_head *h, vg_provenance *p, vg_err *e)
     return r;
 }
 
-/* Records that no later record names as a parent are the ends of their lines: the new process continues them all. */
+/* The parents of the new process are the records that no later record names as a parent. */
 int vg_head_trace(vg_head *h, const char *program, int argc, char *const *argv, vg_err *e)
 {
     bool *has_child = vgi_array(h->nprovenance, sizeof *has_child, e);
@@ -293,7 +293,7 @@ static bool *mark_of(const vgi_artefact *t, const vg_head *h)
     return (bool *)(uintptr_t)((const char *)h + t->mark_at);
 }
 
-/* what NULL: all that have a name. */
+/* what == NULL: any that has a name. */
 static bool is_called(const vgi_artefact *t, const char *what)
 {
     return t->name && (!what || !strcmp(t->name, what));
@@ -309,7 +309,7 @@ void vg_head_take(vg_head *to, vg_head *from, const char *what)
     }
 }
 
-/* Records of one name, such as RIG and SKIN, have their fields in one struct. */
+/* Records that share a name, such as RIG and SKIN, have their fields in one struct. */
 void vg_head_put(vg_head *to, void *from, const char *what)
 {
     for (size_t i = 0; i < VGI_ARTEFACTS; i++) {

@@ -15,13 +15,13 @@ int vgi_incidence_make(vgi_incidence *x, const vg_mesh *m, vg_err *e)
         return VG_ENOMEM;
     }
     for (size_t c = 0; c < corners; c++) x->first[m->vert[c]]++;
-    uint32_t before = 0; /* corners of the vertices before v */
+    uint32_t before = 0; /* number of corners of the vertices before v */
     for (size_t v = 0; v <= m->nv; v++) {
         uint32_t count = x->first[v];
         x->first[v] = before;
         before += count;
     }
-    /* filling moves first[v] to the end of v's list, which is where the next list begins */
+    /* filling moves first[v] to the end of v's list, where the next list begins */
     for (size_t f = 0; f < m->nf; f++)
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
             uint32_t at = x->first[m->vert[c]]++;

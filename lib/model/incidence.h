@@ -1,24 +1,23 @@
-/* incidence.h: the faces around each vertex, and their corners there. Internal. Edges are not listed: the two at a
- * corner lead to its neighbours in the face.
+/* incidence.h: the faces around each vertex, and their corners there. Internal. Edges are not listed; the two edges
+ * at a corner lead to its neighbours in the face.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_INCIDENCE_H
 #define VG_INCIDENCE_H
 
 #include "core/core.h"
 
-/* The corners of vertex v are corner[first[v]] .. corner[first[v + 1] - 1], ascending; face[] is the face of each. */
+/* The corners of vertex v are corner[first[v]] .. corner[first[v + 1] - 1], ascending; face[] has the face of each. */
 typedef struct vgi_incidence {
     uint32_t *first; /* nv + 1 */
     uint32_t *corner, *face; /* one per corner of the mesh */
 } vgi_incidence;
 
-/* vgi_incidence_make: of a mesh, or of the faces of a graph. O(nv + corners). On failure *x is
- * 0. */
+/* vgi_incidence_make: from a mesh, or the faces of a graph. O(nv + corners). On failure *x is 0. */
 int vgi_incidence_make(vgi_incidence *x, const vg_mesh *m, vg_err *e) VG_MUST_CHECK;
 void vgi_incidence_clear(vgi_incidence *x);
 
-/* vgi_corner_edges: the vertices before and after a corner in its face, which are the other ends of the two edges
- * at the corner (the same vertex twice in a line segment). */
+/* vgi_corner_edges: the vertices before and after a corner in its face: the other ends of the two edges at the corner
+ * (twice the same vertex in a line segment). */
 static inline void vgi_corner_edges(const uint32_t *start, const uint32_t *vert, uint32_t face, uint32_t corner,
                                     uint32_t ends[2])
 {

@@ -22,7 +22,7 @@ static int compare_edges(const void *a, const void *b)
     const struct vgi_edge *x = a, *y = b;
     if (x->a != y->a) return x->a < y->a ? -1 : 1;
     if (x->b != y->b) return x->b < y->b ? -1 : 1;
-    return x->weight < y->weight ? -1 : x->weight > y->weight; /* sums must not depend on the order of sorting */
+    return x->weight < y->weight ? -1 : x->weight > y->weight; /* sums must not depend on the sort order */
 }
 
 static int add_reverses(vgi_edges *edges, vg_err *e)

@@ -1,5 +1,5 @@
-/* laplacian.h: the neighbours of each vertex with weights: a graph Laplacian, (L x)_v = sum of weight (x_v - x_to).
- * Internal. Leaves out which edges there are and what they weigh: net/rings.c has cotangents, pairs/springs.c polygons.
+/* laplacian.h: the weighted neighbours of each vertex: a graph Laplacian, (L x)_v = sum of weight (x_v - x_to).
+ * Internal. Edges and weights come from the caller: cotangents from net/rings.c, polygons from pairs/springs.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_LAPLACIAN_H
 #define VG_LAPLACIAN_H
@@ -10,8 +10,8 @@
 typedef struct vgi_laplacian {
     size_t nv;
     uint32_t *first, *to; /* first: nv + 1 */
-    double *weight;       /* of each */
-    uint8_t *kinds;       /* of each: the kinds of the edges that were united in it, or-ed */
+    double *weight;       /* per entry */
+    uint8_t *kinds;       /* per entry: the kinds of the edges merged into it, or-ed */
     double *sum;          /* nv: L_vv, the weights of v's edges; 0 for a vertex without neighbours */
 } vgi_laplacian;
 
@@ -28,8 +28,8 @@ typedef struct vgi_edges {
 int vgi_edges_add(vgi_edges *edges, uint32_t a, uint32_t b, double weight, uint8_t kind, vg_err *e) VG_MUST_CHECK;
 void vgi_edges_clear(vgi_edges *edges);
 
-/* vgi_laplacian_make: of nv vertices and these edges, which are cleared. Edges between the same vertices are united: their
- * weights add up. VG_EINPUT when there are too many; *L is 0 on failure. O(n log n) of n edges. */
+/* vgi_laplacian_make: from nv vertices and these edges, which are cleared. Edges between the same vertices are merged
+ * by adding their weights. VG_EINPUT if there are too many; *L is 0 on failure. O(n log n) for n edges. */
 int vgi_laplacian_make(vgi_laplacian *L, size_t nv, vgi_edges *edges, vg_err *e) VG_MUST_CHECK;
 void vgi_laplacian_clear(vgi_laplacian *L);
 /* vgi_laplacian_apply: y = L x, nv points */

@@ -1,15 +1,15 @@
-/* measures.c: the distance between two sequences of one connectivity: vertex errors; orientation, area and
- * planarity of faces. Poses are measured independently, several in parallel; their sums are added in the order of
- * the poses, so that the result does not depend on the number of threads. Leaves out the inner loop over faces
- * (measures_kernel.c), pairing and tolerances (vg-diff).
+/* measures.c: the distance between two sequences with one connectivity: vertex errors; orientation, area and
+ * planarity of faces. Poses are measured independently, several in parallel; their sums are added in pose order, so
+ * that the result does not depend on the number of threads. The inner loop over faces is in measures_kernel.c;
+ * pairing and tolerances are in vg-diff.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/measures_kernel.h"
 #include "numeric/vec3.h"
 
 #include <math.h>
 
-/* The histogram for p95 counts by the upper bits of the error: 11 of exponent and 8 of mantissa, so that a bin is at
- * most 1/256 of its value wide; its middle is off by half of that. */
+/* The histogram for p95 bins errors by their upper bits: 11 of exponent and 8 of mantissa. So a bin is at most 1/256
+ * of its value wide, and its middle is off by at most half of that. */
 enum { BIN_SHIFT = 64 - 1 - 11 - 8, NBINS = 1 << (11 + 8) };
 
 const double vg_error_edges[VG_ERROR_BINS] = {
@@ -25,7 +25,7 @@ typedef struct pose {
     vgi_face_sums faces;
 } pose;
 
-/* For each exponent, the last edge below all numbers with that exponent: where a search starts. */
+/* For each exponent, the last edge below all numbers with that exponent: start of the search. */
 enum { EXPONENT_SHIFT = 52, NEXPONENTS = 1 << 11 };
 
 struct vg_measures {
@@ -39,18 +39,18 @@ struct vg_measures {
     double *vertex_mean, *vertex_squares; /* nv: Welford's sums over poses */
     uint64_t *bins;                       /* NBINS */
     uint64_t histogram[VG_ERROR_BINS];
-    double edges[VG_ERROR_BINS];          /* the least error in each bin of the histogram, in mesh units */
+    double edges[VG_ERROR_BINS];          /* the least error of each bin of the histogram, in mesh units */
     unsigned char edge_below[NEXPONENTS];
-    vgi_face_class *classes;              /* of faces of 3 corners or more, by face number */
+    vgi_face_class *classes;              /* of faces with 3 or more corners, by face number */
     size_t nclasses;
     vgi_face_sums faces;
-    pose *poses; /* of one call */
+    pose *poses; /* of the current call */
     size_t poses_cap;
 };
 
-/* ---- setting up ---- */
+/* ---- ---- construction ---- */
 
-/* The least error that is at least `edge` in units of D; if D is 0, any error but 0. */
+/* The least error that is at least `edge` in units of D; if D is 0, any error except 0. */
 static double least_error(double edge, double diagonal)
 {
     double x = edge * diagonal;
@@ -177,7 +177,7 @@ static size_t bin_of(double error)
 
 static double bin_middle(size_t bin)
 {
-    if (bin == 0) return 0; /* zero and its neighbourhood */
+    if (bin == 0) return 0; /* zero and denormals */
     uint64_t low = (uint64_t)bin << BIN_SHIFT, high = ((uint64_t)bin + 1) << BIN_SHIFT;
     double a, b;
     memcpy(&a, &low, sizeof a);
@@ -210,7 +210,7 @@ typedef struct call {
     double *const *errors;
 } call;
 
-/* The shift that centring adds. */
+/* The displacement that centring adds. */
 static void find_shift(const vg_measures *x, const double *truth, const double *result, double shift[3])
 {
     double a[3] = {0, 0, 0}, b[3] = {0, 0, 0};
@@ -264,7 +264,7 @@ static void add_vertices(const call *c, size_t first, size_t last)
     }
 }
 
-/* Work over all poses in disjoint shares: histogram bins first, then vertices. */
+/* One share of the work over all poses; shares are disjoint: first histogram bins, then vertices. */
 static void add_share(void *context, size_t i)
 {
     const call *c = context;
@@ -318,7 +318,7 @@ int vg_measures_add(vg_measures *x, size_t n, const double *const *truth, const 
 
 /* ---- the report ---- */
 
-/* The smallest error that 95 % do not exceed. */
+/* The smallest error that 95 % of the errors do not exceed. */
 static double percentile_95(const vg_measures *x)
 {
     uint64_t n = 0, seen = 0;

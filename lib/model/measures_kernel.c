@@ -1,22 +1,22 @@
-/* measures_kernel.c: the inner loop of measuring: how far the faces of two poses are apart.
- * Eight faces of one size stand side by side in lanes, so nothing but gathering depends on where their vertices are; a
- * face that does not count is a lane of zeros. Each lane has sums of its own, which are merged in the end, so that they
- * do not depend on the width of a vector. Leaves out vertices, and what becomes of the sums (measures.c).
+/* measures_kernel.c: inner loop of the comparison of two poses face by face.
+ * Eight faces of one size are side by side in lanes, so that only gathering depends on where their vertices are. A
+ * face that does not count is a lane of zeros. Each lane has its own sums, which are merged at the end, so that they
+ * do not depend on the vector width. Vertices, and the use of the sums, are in measures.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/measures_kernel.h"
 #include "core/wide.h"
 
-/* A face has a normal when its area exceeds this times D times its perimeter: below, it is rounding. */
+/* A face has a normal if its area exceeds this times D times its perimeter; below that, the area is rounding error. */
 static const double FLAT = 1e-14;
 
 typedef struct wide_running {
     vgi_wide n, mean, squares, max;
 } wide_running;
 
-/* What the faces of one part of eight are in one pose. */
+/* Properties of the faces of one part of eight, in one pose. */
 typedef struct shape {
-    vgi_wide centroid[3], normal[3], area; /* normal and area are 0 without a normal */
-    vgi_mask ok;                           /* have one */
+    vgi_wide centroid[3], normal[3], area; /* normal and area are 0 where undefined */
+    vgi_mask ok;                           /* whether they are defined */
 } shape;
 
 VGI_INLINE vgi_wide at_most(vgi_wide x, double most)
@@ -33,7 +33,7 @@ VGI_INLINE void load(const double *points, const uint32_t *vert, vgi_wide to[3])
     vgi_gather_point(p, 0, to);
 }
 
-/* ones: 1 where the value counts, else 0; share: 1 / n, the value counted. */
+/* ones: 1 where the value counts, else 0; share: 1 / n, n the number of values including this one. */
 VGI_INLINE void add_values(wide_running *l, vgi_wide value, vgi_mask which, vgi_wide ones, vgi_wide share)
 {
     vgi_wide d = vgi_only(which, value - l->mean);
@@ -57,7 +57,7 @@ static void merge_lanes(vgi_running *r, const wide_running *l)
         }
 }
 
-/* Perimeters; most faces do without. */
+/* Perimeters, which most faces do not need. */
 VGI_INLINE vgi_wide perimeters(const uint32_t *vert, size_t r, const double *points)
 {
     vgi_wide sum = {0}, a[3], b[3];
@@ -71,7 +71,7 @@ VGI_INLINE vgi_wide perimeters(const uint32_t *vert, size_t r, const double *poi
     return sum;
 }
 
-/* Normals are Newell's: the sum of the cross products of successive corner vectors, here those from the centroid. */
+/* Newell's normals: the sum of the cross products of successive corner vectors, here relative to the centroid. */
 VGI_INLINE void shape_of(const uint32_t *vert, size_t r, double diagonal, const double *points, shape *s)
 {
     vgi_wide n[3] = {{0}}, edges = {0}, a[3], b[3], sum[3] = {{0}};
@@ -91,7 +91,7 @@ VGI_INLINE void shape_of(const uint32_t *vert, size_t r, double diagonal, const 
     }
     vgi_wide length = vgi_roots(vgi_wide_dot(n, n)), half = 0.5 * length;
     double least = FLAT * diagonal;
-    /* the perimeter is no longer than the root of r times the squared edges */
+    /* the perimeter is at most the square root of r times the sum of squared edges */
     s->ok = half * half > 1.001 * least * least * (double)r * edges;
     if (vgi_bits(~s->ok)) s->ok |= half > least * perimeters(vert, r, points);
     vgi_wide scale = vgi_only(s->ok, 1.0 / length);
@@ -99,7 +99,8 @@ VGI_INLINE void shape_of(const uint32_t *vert, size_t r, double diagonal, const 
     for (int k = 0; k < 3; k++) s->normal[k] = scale * n[k];
 }
 
-/* Mean over the corners of |unit corner vector . normal|; a corner at the centroid has no direction: not counted. */
+/* Mean over the corners of |unit corner vector . normal|. A corner at the centroid has no direction and does not
+ * count. */
 VGI_INLINE vgi_wide planarity_of(const uint32_t *vert, size_t r, const double *points, const shape *s)
 {
     vgi_wide sum = {0}, n = {0}, w[3];
@@ -114,7 +115,8 @@ VGI_INLINE vgi_wide planarity_of(const uint32_t *vert, size_t r, const double *p
     return at_most(vgi_only(n > vgi_same(0), sum / n), 1);
 }
 
-/* 1 - a.b of two unit vectors, as half the squared distance of their ends: exact near 0, and 0 for equal ones. */
+/* 1 - a.b of two unit vectors, as half the squared distance of their ends: accurate near 0, and 0 for equal
+ * vectors. */
 VGI_INLINE vgi_wide normals_apart(const vgi_wide a[3], const vgi_wide b[3])
 {
     vgi_wide d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
@@ -130,7 +132,7 @@ typedef struct sums {
     wide_running orientation, area, planarity[2];
 } sums;
 
-/* The faces of one part; `there`: those that exist. */
+/* The faces of one part; `there`: lanes that hold a face. */
 VGI_INLINE void measure_part(const uint32_t *vert, size_t r, vgi_mask there, double diagonal,
                              const double *const poses[2], sums *now, vgi_face_sums *all)
 {
@@ -144,7 +146,7 @@ VGI_INLINE void measure_part(const uint32_t *vert, size_t r, vgi_mask there, dou
         add_values(&now->planarity[i], p, s[i].ok, vgi_only(s[i].ok, vgi_same(1)), next_share(&now->planarity[i]));
         count_planarity(all->planarity_histogram[i], p, s[i].ok);
     }
-    /* a result that collapsed a face has no normal there: N.N~ is 0, and all of its area is wrong */
+    /* if the result has collapsed a face, it has no normal there: N.N~ is 0, and all of its area is wrong */
     vgi_wide ones = vgi_only(s[0].ok, vgi_same(1)), share = next_share(&now->area);
     vgi_wide change = vgi_absolute(1.0 - s[1].area / s[0].area);
     vgi_wide apart = vgi_either(s[1].ok, normals_apart(s[0].normal, s[1].normal), vgi_same(1));
@@ -152,7 +154,7 @@ VGI_INLINE void measure_part(const uint32_t *vert, size_t r, vgi_mask there, dou
     add_values(&now->area, change, s[0].ok, ones, share);
 }
 
-/* The number of each lane, of those of one part. */
+/* Lane numbers of one part. */
 VGI_INLINE vgi_wide lane_numbers(size_t part)
 {
     static const double number[VGI_LANES] = {0, 1, 2, 3, 4, 5, 6, 7};

@@ -1,4 +1,4 @@
-/* measures_kernel.h: how far the faces of two poses are apart, eight faces of one size at a time.
+/* measures_kernel.h: the comparison of the faces of two poses, eight faces of one size at a time.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_MEASURES_KERNEL_H
 #define VG_MEASURES_KERNEL_H
@@ -7,14 +7,15 @@
 #include "core/lanes.h"
 #include "numeric/stats.h"
 
-/* All faces of r corners: `faces` of them. corners: for each eight faces r times eight vertices, the first corner of
- * each, the second of each; in the last eight, the last face again in the place of those that are not there. */
+/* All faces with r corners: `faces` of them. corners: for each group of eight faces r times eight vertices: the first
+ * corner of each, the second of each, and so on. The last group is filled up with copies of the last face. */
 typedef struct vgi_face_class {
     size_t r, faces;
     uint32_t *corners;
 } vgi_face_class;
 
-/* Over faces that have a normal: in the truth; planarity: each by itself, of four corners and more. */
+/* Sums over the faces that have a normal in the truth; planarity: those with a normal in each pose, with four or more
+ * corners. */
 typedef struct vgi_face_sums {
     vgi_running orientation, area, planarity[2];
     uint64_t planarity_histogram[2][10];

@@ -1,5 +1,5 @@
-/* mesh.c: faces of any mix of sizes as offsets and indices: validity, equality, components, size.
- * Leaves out attributes and poses (head.c) and vectors (graph.c).
+/* mesh.c: a mesh of faces of mixed sizes, as offsets and indices: validity, equality, components, size. Attributes
+ * and poses are in head.c, vectors in graph.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "numeric/vec3.h"
@@ -116,7 +116,7 @@ int vg_mesh_components(const vg_mesh *m, uint32_t *label, size_t *count, vg_err 
             label[m->vert[c]] = 0;
             vgi_sets_join(parent, m->vert[m->start[f]], m->vert[c]);
         }
-    /* a set is named by its lowest vertex, so labels are numbered in order of first vertex */
+    /* a set is named by its lowest vertex, so that labels are in order of first vertex */
     size_t n = 0;
     for (uint32_t v = 0; v < m->nv; v++) {
         if (label[v] == UINT32_MAX) continue;

@@ -1,5 +1,5 @@
-/* network.c: a trained network as an artefact: whether its sizes fit one another, and which mesh it belongs to.
- * Leaves out its layers (lib/net).
+/* network.c: a trained network as an artefact: whether its sizes agree, and which mesh it belongs to. Its layers are
+ * in lib/net.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/artefact.h"
 

@@ -1,5 +1,5 @@
-/* records.c: the table of header records. artefact.h says how to add one.
- * Leaves out what is done with the table (artefact.c, io/artefact_io.c) and what contents must hold (checks.c).
+/* records.c: the table of header records; artefact.h says how to add one. It is used in artefact.c and
+ * io/artefact_io.c; contents are checked in checks.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/artefact.h"
 
@@ -37,7 +37,7 @@ static size_t times(size_t a, size_t b)
     return vgi_mul(a, b, &product) ? product : SIZE_MAX;
 }
 
-/* The last entry of a list of n + 1 starts: the length of what it divides. */
+/* The last entry of a list of n + 1 starts: the length of the list that they divide. */
 static size_t last_of(const uint32_t *start, size_t n)
 {
     return start ? start[n] : 0;

@@ -1,6 +1,5 @@
-/* rig.c: a skeleton in the reference pose of a mesh, its motions as transforms, editing them, and linear blend
- * skinning.
- * Leaves out how weights and transforms are fitted (method/rig/skin.c, method/rig/inverse_skin.c) and other skeletons (drive.c).
+/* rig.c: a skeleton in the reference pose of a mesh; motions as transforms and their editing; linear blend skinning.
+ * Weights and transforms are fitted in method/rig/skin.c and inverse_skin.c; other skeletons are in drive.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/rig.h"
 #include "numeric/vec3.h"
@@ -97,7 +96,7 @@ bool vg_rig_axis(const vg_rig *r, size_t b, double axis[3])
     double sum[3] = {0, 0, 0}, length = 0;
     size_t own = r->bone[b];
     bool ends = false;
-    for (size_t j = 0; j < r->skeleton.njoints; j++) /* an end site, if any, gives the direction */
+    for (size_t j = 0; j < r->skeleton.njoints; j++) /* an end site, if present, gives the direction */
         ends |= r->skeleton.joints[j].parent == own && !r->skeleton.joints[j].nchannels;
     for (size_t j = 0; j < r->skeleton.njoints; j++) {
         const vg_joint *joint = &r->skeleton.joints[j];

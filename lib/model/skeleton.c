@@ -1,5 +1,5 @@
 /* skeleton.c: a skeleton as a mesh of bones; its pose from channel values (forward kinematics), and channel values
- * from a pose. Leaves out the file format (bvh.c) and the deformation of bones (deform.c).
+ * from a pose (inverse kinematics). The file format is in bvh.c, the deformation of bones in deform.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "numeric/vec3.h"
@@ -53,7 +53,7 @@ static void copy_turn(const double from[4], double to[4])
     memcpy(to, from, 4 * sizeof *to);
 }
 
-/* q becomes q times a turn by `degrees` about axis k. */
+/* Multiply q by a rotation of `degrees` about axis k, on the right. */
 static void turn_on(double q[4], int k, double degrees)
 {
     double half = fmod(degrees, 720) * (DEGREE / 2), r[4] = {cos(half), 0, 0, 0};
@@ -61,7 +61,7 @@ static void turn_on(double q[4], int k, double degrees)
     vg_quat_multiply(q, r, q);
 }
 
-/* Position and rotation of joint j from its parent's and its own values. */
+/* Position and rotation of joint j from those of its parent and its channel values. */
 static void place_joint(const vg_skeleton *s, size_t j, const double *values, double *positions, double *turns)
 {
     const vg_joint *joint = &s->joints[j];
@@ -94,8 +94,8 @@ void vg_skeleton_pose(const vg_skeleton *s, const double *values, double *positi
 /* ---- the best rotation for several directions ---- */
 
 /* k: the sum of d o^T over directions o of the reference and d of the pose, divided by the sum of |o|^2. What k
- * leaves open (all directions on one line), or determines less firmly than its own misfit, stays as in q_before:
- * each step pulls towards the last result, so that a well-determined rotation still ends at its optimum. */
+ * leaves undetermined (all directions on one line), or determines less precisely than its own misfit, stays as in
+ * q_before. Each step pulls towards the last result, so that a well-determined rotation still ends at its optimum. */
 static void fit_turn(const double k[9], const double q_before[4], double q[4])
 {
     double m[9], agreement = 0, prior[4];
@@ -109,20 +109,20 @@ static void fit_turn(const double k[9], const double q_before[4], double q[4])
 
 /* ---- Euler angles from a rotation ---- */
 
-/* Angles in degrees, shifted by whole turns to be nearest to those of the previous pose. */
+/* Angle in degrees, shifted by whole turns to be nearest to that of the previous pose. */
 static double near_to(double degrees, double before)
 {
     return degrees + 360 * nearbyint((before - degrees) / 360);
 }
 
-/* Three different axes, or the first again as the third: such angles exist for every rotation. */
+/* Three different axes, or the first and third equal: such angles exist for every rotation. */
 static bool is_euler(const int axis[6], uint32_t n)
 {
     return n == 3 && axis[0] != axis[1] && axis[1] != axis[2];
 }
 
-/* m = R_i(a) R_j(b) R_k(c) with three different axes: 3 angles in radians. false: a and c turn about the same
- * line, and only b is determined. */
+/* m = R_i(a) R_j(b) R_k(c) with three different axes: 3 angles in radians. Returns false if a and c rotate about the
+ * same line (gimbal lock); then only b is determined. */
 static bool angles_of_three(const double m[9], int i, int j, int k, double angle[3])
 {
     double s = (j - i + 3) % 3 == 1 ? 1 : -1; /* even or odd order of axes */
@@ -155,8 +155,8 @@ static void conjugate(const double q[4], double c[4])
     c[0] = q[0], c[1] = -q[1], c[2] = -q[2], c[3] = -q[3];
 }
 
-/* Degrees of the three rotations whose product is q: of the two solutions and all whole turns the one nearest to
- * the previous angles, which are replaced. */
+/* Degrees of the three rotations whose product is q: among the two solutions and all whole turns, those nearest to
+ * the previous angles, which they replace. */
 static void euler_angles(const double q[4], const int axis[3], double *angles)
 {
     double m[9], a[2][3], distance[2] = {0, 0};
@@ -164,7 +164,7 @@ static void euler_angles(const double q[4], const int axis[3], double *angles)
     vg_quat_matrix(q, m);
     bool free = two ? angles_of_two(m, axis[0], axis[1], 3 - axis[0] - axis[1], a[0])
                     : angles_of_three(m, axis[0], axis[1], axis[2], a[0]);
-    if (!free) { /* gimbal lock: keep the first angle and put the rest into the third */
+    if (!free) { /* gimbal lock: keep the first angle and assign the rest to the third */
         double done[4] = {1, 0, 0, 0}, back[4], rest[4];
         angles[1] = near_to(a[0][1] / DEGREE, angles[1]);
         turn_on(done, axis[0], angles[0]);
@@ -199,8 +199,8 @@ static void matrix_of(const int *axis, const double *angles, uint32_t n, double 
     vg_quat_matrix(q, m);
 }
 
-/* For rotations that cannot reach every orientation (a hinge), or reach it in many ways: set each angle in turn to
- * where tr(R^T k) is largest, starting from the previous angles, until nothing changes. */
+/* For rotations that cannot reach every orientation (a hinge joint), or reach it in many ways: set each angle in turn
+ * to the maximum of tr(R^T k), starting from the previous angles, until nothing changes. */
 static void climb_to_angles(const double k[9], const int *axis, uint32_t n, double *angles)
 {
     for (int round = 0; round < 200; round++) {
@@ -226,8 +226,8 @@ static void climb_to_angles(const double k[9], const int *axis, uint32_t n, doub
 
 /* ---- channel values from a pose ---- */
 
-/* An arm: a joint that turns with another and lies away from it (a child, or one behind joints that lie on the
- * other). An arm is loose if a joint in between may turn it elsewhere. */
+/* An arm: a joint that rotates with another and lies away from it (a child, or one behind joints at the same
+ * position). An arm is loose if a joint in between may rotate it independently. */
 typedef struct arm {
     uint32_t joint;
     bool loose;
@@ -239,12 +239,12 @@ struct vg_joint_fitter {
     size_t *first_arm; /* njoints + 1 */
     arm *arms;
     double *values; /* of the previous pose */
-    double *positions, *turns; /* of the joints, by these values */
+    double *positions, *turns; /* of the joints, from these values */
 };
 
-enum { MOST_STEPS = 16 }; /* up a chain of joints at one place */
+enum { MOST_STEPS = 16 }; /* up a chain of joints at one position */
 
-/* The joints that have joint c among their arms, up to MOST_STEPS of them, into `owners`. */
+/* List the joints that have joint c among their arms, at most MOST_STEPS, in `owners`. */
 static size_t list_owners(const vg_skeleton *s, size_t c, double shortest, uint32_t owners[MOST_STEPS])
 {
     size_t n = 0;
@@ -318,8 +318,8 @@ void vg_joint_fitter_free(vg_joint_fitter **fitter)
     *fitter = NULL;
 }
 
-/* What the arms of joint j (all, or the firm ones) say about its rotation: k as fit_turn takes it, the number of
- * arms that say something, and the last of them. */
+/* Contribution of the arms of joint j (all, or the firm ones) to its rotation: k as in fit_turn, the number of arms
+ * that contribute, and the last of them. */
 static size_t gather_arms(const vg_joint_fitter *f, size_t j, const double *pose, bool firm, double k[9],
                           double offset[3], double now[3])
 {
@@ -342,7 +342,7 @@ static size_t gather_arms(const vg_joint_fitter *f, size_t j, const double *pose
     return n;
 }
 
-/* Improve q, a first guess, to the rotation that the arms ask for, keeping what they leave open. */
+/* Improve the first guess q to the rotation that fits the arms, keeping what they leave undetermined. */
 static void turn_by_arms(const vg_joint_fitter *f, size_t j, const double *pose, bool firm, double k[9], double q[4])
 {
     double offset[3], now[3], swing[4], carried[3];
@@ -358,8 +358,8 @@ static void turn_by_arms(const vg_joint_fitter *f, size_t j, const double *pose,
     for (int i = 0; i < 4; i++) q[i] /= l;
 }
 
-/* The rotation of joint j, whose parent is rotated by `parent`. Loose arms can also reach their place by a
- * rotation of their own, so they only decide what the firm ones leave open. k: of the firm arms. */
+/* The rotation of joint j, whose parent is rotated by `parent`. Loose arms can also reach their position by a
+ * rotation of the joint between, so they only decide what the firm ones leave undetermined. k: of the firm arms. */
 static void turn_joint(const vg_joint_fitter *f, size_t j, const double *pose, const double parent[4], double k[9],
                        double q[4])
 {
@@ -370,8 +370,8 @@ static void turn_joint(const vg_joint_fitter *f, size_t j, const double *pose, c
     turn_by_arms(f, j, pose, true, k, q);
 }
 
-/* The angles of joint j's rotations, starting from the previous ones. turn: the rotation of the joint if known;
- * NULL: find it. */
+/* Angles of joint j's rotations, starting from the previous ones. turn: the rotation of the joint, or NULL to find
+ * it. */
 static void fit_angles(const vg_joint_fitter *f, size_t j, const double *pose, const double *turn, double *values)
 {
     static const double unturned[4] = {1, 0, 0, 0};
@@ -393,14 +393,14 @@ static void fit_angles(const vg_joint_fitter *f, size_t j, const double *pose, c
         double m[9], wish[9];
         vg_quat_matrix(back, m);
         vgi_multiply(m, k, k);
-        vg_quat_matrix(local, wish); /* used to decide what the directions leave open */
+        vg_quat_matrix(local, wish); /* decides what the directions leave undetermined */
         for (int i = 0; i < 9; i++) k[i] += (turn ? 1 : 1e-6) * wish[i];
         climb_to_angles(k, axis, n, angles);
     }
     for (uint32_t i = 0; i < n; i++) values[place[i]] = angles[i];
 }
 
-/* The position that joint j's channels give, in its parent's frame. */
+/* Position of joint j from its channels, in its parent's frame. */
 static void fit_offset(const vg_joint_fitter *f, size_t j, const double *pose, double *values)
 {
     const vg_joint *joint = &f->s->joints[j];
