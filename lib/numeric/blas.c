@@ -1,12 +1,12 @@
-/* blas.c: dense products and triangular solves through BLAS. The only file that knows its header.
- * Leaves out what is multiplied, and how the work is shared out among threads.
+/* blas.c: dense products and triangular solves through BLAS. No other file includes its header. Callers decide what
+ * is multiplied, and how work is divided among threads.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 
 #include <cblas.h>
 #include <pthread.h>
 
-/* OpenBLAS's own; with another BLAS they are not there. */
+/* Functions of OpenBLAS; absent with another BLAS. */
 void openblas_set_num_threads(int n) __attribute__((weak));
 int openblas_get_num_threads(void) __attribute__((weak));
 

@@ -1,5 +1,5 @@
-/* blas.h: dense products and triangular solves through BLAS. BLAS runs on one thread here: the threads are ours, and the
- * last digits must not depend on their number.
+/* blas.h: dense products and triangular solves through BLAS. BLAS runs on one thread here, because the library has
+ * its own threads and the last digits must not depend on their number.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_BLAS_H
 #define VG_BLAS_H
@@ -7,8 +7,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* vgi_blas_alone, vgi_blas_shared: around calls of BLAS or LAPACK from several threads at once: from the first _alone to
- * the last _shared BLAS starts no threads of its own. Calls may nest, also across threads. */
+/* vgi_blas_alone, vgi_blas_shared: enclose calls of BLAS or LAPACK from several threads at once. Between the first
+ * _alone and the last _shared BLAS starts no threads. Calls may nest, also across threads. */
 void vgi_blas_alone(void);
 void vgi_blas_shared(void);
 
@@ -32,7 +32,7 @@ void vgi_product_transposed_double(size_t m, size_t n, size_t k, const double *a
 /* c (n x n, its lower triangle) := a a', a n x k */
 void vgi_product_gram(size_t n, size_t k, const double *a, size_t lda, double *c, size_t ldc);
 
-/* c (m x n) := a b + beta c, or a' b, a b', a' b' of matrices that are stored the other way round */
+/* c (m x n) := a b + beta c, or with a' or b' in place of a or b */
 void vgi_gemm_single(bool turn_a, bool turn_b, size_t m, size_t n, size_t k, const float *a, size_t lda,
                      const float *b, size_t ldb, float beta, float *c, size_t ldc);
 void vgi_gemm_double(bool turn_a, bool turn_b, size_t m, size_t n, size_t k, const double *a, size_t lda,

@@ -1,11 +1,11 @@
-/* blas_room.c: is there room for BLAS? A file beside blas.c, so that programs can ask which do not load BLAS at all: to
- * these the answer is yes.
+/* blas_room.c: whether there is memory for BLAS. A separate file, so that programs without BLAS can call it; there
+ * the answer is always yes.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "vg.h"
 
 #include <sys/mman.h>
 
-/* What OpenBLAS sets aside for each thread that calls it: address space, of which it uses little. */
+/* Address space that OpenBLAS reserves for each calling thread; it uses little of it. */
 #define BLAS_ROOM ((size_t)129 << 20)
 
 int openblas_get_num_threads(void) __attribute__((weak));
@@ -16,7 +16,7 @@ static bool has_room(size_t n)
     return p != MAP_FAILED && !munmap(p, n);
 }
 
-/* Half of what there is stays for the rest of the work. */
+/* Half of the available memory is left for the rest of the work. */
 int vg_threads_with_room(int most)
 {
     if (!openblas_get_num_threads) return most;

@@ -1,5 +1,5 @@
 /* face.h: geometry of one polygon: its centre, the vectors of its corners, its normal.
- * Internal. Leaves out whole meshes, and several poses at once (wide_face.h).
+ * Internal. Whole meshes are elsewhere, several poses at once in wide_face.h.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_FACE_H
 #define VG_FACE_H
@@ -24,8 +24,8 @@ static inline void vgi_face_vectors(const double *points, const uint32_t *vert, 
     for (size_t i = 0; i < r; i++) vgi_subtract(points + 3 * (size_t)vert[i], centre, w + 3 * i);
 }
 
-/* vgi_face_area: the vector area, by Newell's formula: the normal, whose length is the area; 0 for line segments.
- * Counted from a corner, so that no digits are lost far from the origin. */
+/* vgi_face_area: the vector area by Newell's formula: a normal whose length is the area; 0 for line segments.
+ * Relative to a corner, so that no digits are lost far from the origin. */
 static inline void vgi_face_area(const double *points, const uint32_t *vert, size_t r, double area[3])
 {
     const double *o = points + 3 * (size_t)vert[0];
@@ -39,7 +39,7 @@ static inline void vgi_face_area(const double *points, const uint32_t *vert, siz
     }
 }
 
-/* vgi_triangle_normal: twice the area long */
+/* vgi_triangle_normal: its length is twice the area */
 static inline void vgi_triangle_normal(const double a[3], const double b[3], const double c[3], double n[3])
 {
     double u[3], v[3];

@@ -1,17 +1,17 @@
 /* fronts.c: Cholesky factors of many principal submatrices of one matrix, by the multifrontal method (Duff and Reid
- * 1983) on the supernodes of a factor that CHOLMOD has made.
+ * 1983) on the supernodes of a CHOLMOD factor.
  *
- * A supernode is eliminated in a dense front: its entries of the matrix, and what is left (the update) of the fronts of
- * its children. A row that is held is left out of all fronts. That changes numbers only in the supernode of the row and
- * its ancestors. Blocks of all others are those of CHOLMOD, and their updates are computed once, for all sets of held
- * rows. Where only rows below a block are held, they are dropped from a copy.
+ * A supernode is eliminated in a dense front: its entries of the matrix plus the updates (remainders) of its
+ * children's fronts. A held row is left out of all fronts. This changes numbers only in the supernode of the row and
+ * its ancestors. Blocks of all other supernodes are those of CHOLMOD, and their updates are computed once for all
+ * sets of held rows. Where only rows below a block are held, they are dropped from a copy.
  *
- * The border is a supernode of its own, the last, and a row of every front above a row that it has an entry in. Blocks
- * and updates of these fronts are made with it, and shared as well; the border's own block is not: unless rows are held,
- * it may be singular.
+ * The border is a separate supernode, the last, and a row of every front above a row in which it has an entry. Blocks
+ * and updates of these fronts include it and are also shared. The border's own block is not, because without held
+ * rows it may be singular.
  *
- * Updates of one set are on a stack, since supernodes are in postorder. Leaves out the dense arithmetic
- * (fronts_kernel.c) and triangular solves (solve_kernel.c).
+ * Updates of one set are on a stack, because supernodes are in postorder. Dense arithmetic is in fronts_kernel.c,
+ * triangular solves in solve_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/fronts.h"
 #include "numeric/fronts_kernel.h"
@@ -19,10 +19,10 @@
 #include <stdlib.h>
 
 #define NONE UINT32_MAX
-enum { MOST_SHARED = 16 << 20 }; /* numbers in shared blocks and updates; a larger matrix shares none */
+enum { MOST_SHARED = 16 << 20 }; /* numbers in shared blocks and updates; above this nothing is shared */
 
 struct vgi_fronts {
-    vgi_factor base; /* as CHOLMOD made it, borrowed */
+    vgi_factor base; /* from CHOLMOD, borrowed */
     vgi_factor f;    /* with the border, without blocks */
     int *super, *pi, *rows; /* of f */
     int *parent;     /* per supernode; -1: root */
@@ -30,24 +30,24 @@ struct vgi_fronts {
     size_t most_rows;  /* of a front */
     int *start, *at; /* the lower triangle by columns, in the order of f */
     double *value;
-    double *shared;  /* updates, and blocks that the border is in; NULL: none */
+    double *shared;  /* updates, and blocks with the border; NULL: none */
     const double **block, **update; /* per supernode; NULL: not shared */
 };
 
 typedef struct front {
-    size_t rows, columns; /* that are not held */
-    bool changed;         /* its numbers are not the shared ones */
+    size_t rows, columns; /* numbers of rows and columns that are not held */
+    bool changed;         /* its numbers differ from the shared ones */
 } front;
 
 /* One set of held rows. */
 typedef struct elimination {
     const vgi_fronts *b;
-    const bool *held; /* per row of f; NULL: nothing, blocks and updates are to be shared */
+    const bool *held; /* per row of f; NULL: none held, blocks and updates are to be shared */
     front *front;     /* per supernode */
-    uint32_t *place;  /* per row of f: its place in the front at hand, or NONE */
+    uint32_t *place;  /* per row of f: its position in the current front, or NONE */
     double *stack;
     const double **update; /* per supernode */
-    uint32_t *at, *to, *run; /* rows of a child's update, their places in the front at hand, runs of them */
+    uint32_t *at, *to, *run; /* rows of a child's update, their positions in the current front, runs of them */
 } elimination;
 
 static size_t rows_of(const vgi_factor *f, size_t s)
@@ -79,7 +79,7 @@ static int find_parents(const vgi_factor *f, int *parent, vg_err *e)
     return VG_OK;
 }
 
-/* The rows in the order of the factor that the border has entries in. */
+/* Mark the rows, in the factor's order, in which the border has entries. */
 static int mark_entries(const vgi_cholesky *c, const vgi_border *border, bool *entry, vg_err *e)
 {
     size_t n = vgi_cholesky_factor(c).n;
@@ -92,7 +92,7 @@ static int mark_entries(const vgi_cholesky *c, const vgi_border *border, bool *e
     return VG_OK;
 }
 
-/* The supernodes of base that get the border as their last row. */
+/* Mark the supernodes of base that get the border as their last row. */
 static int mark_bordered(vgi_fronts *b, const vgi_cholesky *c, const vgi_border *border, bool *bordered, vg_err *e)
 {
     bool *entry = vgi_array(b->base.n, sizeof *entry, e);
@@ -167,7 +167,7 @@ static void put_entry(vgi_fronts *b, int *next, uint32_t p, uint32_t q, double v
 static void copy_entries(vgi_fronts *b, const vgi_sparse *a, const vgi_border *border, const uint32_t *new)
 {
     size_t last = a->n;
-    int *next = b->start + 1; /* becomes the start of the column behind */
+    int *next = b->start + 1; /* moved to the start of the next column below */
     for (size_t j = 0; j < a->n; j++)
         for (int k = a->start[j]; k < a->start[j + 1]; k++) count_entry(next, new[j], new[a->row[k]]);
     for (size_t i = 0; border && i < border->n; i++) count_entry(next, new[border->row[i]], (uint32_t)last);
@@ -195,15 +195,15 @@ static int permute_matrix(vgi_fronts *b, const vgi_sparse *a, const vgi_cholesky
     return r;
 }
 
-/* ---- what is shared: places ---- */
+/* ---- ---- shared data: layout ---- */
 
-/* Whether CHOLMOD has eliminated front s as it is. */
+/* Whether CHOLMOD's elimination of front s is valid. */
 static bool is_of_base(const vgi_fronts *b, size_t s)
 {
     return s < b->base.supernodes && rows_of(&b->f, s) == rows_of(&b->base, s);
 }
 
-/* Numbers of the blocks that are not CHOLMOD's, and of updates. */
+/* Number of values in blocks that are not CHOLMOD's, and in updates. */
 static size_t count_shared(const vgi_fronts *b)
 {
     size_t n = 0;
@@ -227,7 +227,7 @@ static void place_shared(vgi_fronts *b)
 
 /* ---- assembly and elimination ---- */
 
-/* The rows of front s that are not held get their places. */
+/* Assign positions to the rows of front s that are not held. */
 static void open_front(const elimination *x, size_t s)
 {
     const vgi_factor *f = &x->b->f;
@@ -254,8 +254,8 @@ static void add_matrix(const elimination *x, size_t s, double *l)
     }
 }
 
-/* Add the update of child s to the front at hand, of m rows and c columns; l NULL: to u alone. A shared update still has
- * rows of held ones. */
+/* Add the update of child s to the current front with m rows and c columns; l NULL: to u alone. A shared update still
+ * contains held rows. */
 static void add_update(const elimination *x, size_t s, size_t m, size_t c, double *l, double *u)
 {
     const vgi_factor *f = &x->b->f;
@@ -269,7 +269,7 @@ static void add_update(const elimination *x, size_t s, size_t m, size_t c, doubl
     vgi_fronts_kernel_now()->scatter(n, x->at, x->to, x->run, ld, x->update[s], m, c, l, u);
 }
 
-/* Front s: l and u get its block and its update. */
+/* Eliminate front s; l and u receive its block and its update. */
 static int eliminate(const elimination *x, size_t s, double *l, double *u, vg_err *e)
 {
     size_t m = x->front[s].rows, c = x->front[s].columns, left = m - c;
@@ -317,7 +317,7 @@ static void clear_elimination(elimination *x)
     free(x->stack);
 }
 
-/* ---- what is shared: numbers ---- */
+/* ---- ---- shared data: numbers ---- */
 
 static int share(vgi_fronts *b, vg_err *e)
 {
@@ -391,7 +391,7 @@ static void measure_fronts(elimination *x)
     }
 }
 
-/* The numbers on the stack that front s takes from its children. */
+/* Number of values on the stack that front s takes from its children. */
 static size_t count_taken(const elimination *x, size_t s)
 {
     size_t n = 0;
@@ -447,7 +447,7 @@ static int make_factor(const elimination *x, vgi_held_factor *out, vg_err *e)
     return VG_OK;
 }
 
-/* A shared block without the rows that are held, which are below it. */
+/* Copy a shared block without the held rows below its head. */
 static void drop_rows(const elimination *x, size_t s, double *to)
 {
     const vgi_factor *f = &x->b->f;

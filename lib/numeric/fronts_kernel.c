@@ -1,13 +1,12 @@
 /* fronts_kernel.c: dense partial Cholesky factorisation of one front. Fronts of a surface are small, mostly below 100
- * rows: a BLAS spends more time on getting ready for each than on its numbers. Leaves out how fronts are assembled:
- * fronts.c.
+ * rows; for these the overhead of BLAS calls exceeds the arithmetic. Fronts are assembled in fronts.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/fronts_kernel.h"
 #include "core/wide.h"
 
 #include <math.h>
 
-enum { COLUMNS = 4, VECTORS = 3 }; /* columns that are updated together, and vectors of rows: their sums in registers */
+enum { COLUMNS = 4, VECTORS = 3 }; /* columns updated together, and vectors of rows: their sums stay in registers */
 
 /* c[i + q ldc] -= sum over k < depth of a[i + k lda] b[q + k ldb], for `n` columns and `vectors` vectors of rows. */
 VGI_INLINE void update_tile(int vectors, int n, size_t depth, const double *a, size_t lda, const double *b, size_t ldb,
@@ -67,7 +66,7 @@ static void update(size_t n, size_t rows, size_t depth, const double *a, size_t 
     else update_columns(1, rows, depth, a, lda, b, ldb, c, ldc);
 }
 
-/* Columns j .. j + n - 1 of l, those before them being done and taken. */
+/* Finish columns j .. j + n - 1 of l; those before them are done and applied. */
 static bool finish(size_t m, size_t j, size_t n, double *l)
 {
     for (size_t q = 0; q < n; q++) {
@@ -112,7 +111,7 @@ VGI_INLINE void add_run(size_t n, const double *from, double *to)
     for (; i < n; i++) to[i] += from[i];
 }
 
-/* Rows that follow one another on both sides are added together: run[i] is the first behind those. */
+/* Consecutive rows on both sides are added together: run[i] is the first row after the run. */
 static void scatter(size_t n, const uint32_t *at, const uint32_t *to, uint32_t *run, size_t ld, const double *from,
                     size_t m, size_t c, double *l, double *u)
 {

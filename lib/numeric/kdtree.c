@@ -1,6 +1,6 @@
 /* kdtree.c: a balanced k-d tree over a copy of the points, without pointers: node i has the children 2i and 2i + 1,
- * and the node at place k of depth d holds the points n k / 2^d to n (k + 1) / 2^d, so neither is written down.
- * Leaves out insertion and removal: points are given once.
+ * and node k of depth d holds the points n k / 2^d to n (k + 1) / 2^d, so neither is stored. Points cannot be
+ * inserted or removed.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/random.h"
 #include "numeric/kdtree.h"
@@ -20,7 +20,7 @@ struct point {
 };
 
 struct node {
-    double least[3], most[3]; /* tight box: prunes better than the cutting plane when points lie on a surface */
+    double least[3], most[3]; /* tight box: prunes better than the splitting plane if the points lie on a surface */
     uint32_t lowest;          /* lowest index in the box */
     uint32_t label;           /* common label of all points in the box, or MIXED */
 };
@@ -61,7 +61,7 @@ static inline void swap(struct point *a, struct point *b)
     *b = c;
 }
 
-/* The median of three points at pseudo-random places, so that no order of the input makes the selection slow. */
+/* The median of three points at pseudo-random positions, so that no order of the input makes the selection slow. */
 static struct point choose_pivot(const struct point *p, size_t n, int axis, vgi_random *random)
 {
     const struct point *three[3];
@@ -71,7 +71,7 @@ static struct point choose_pivot(const struct point *p, size_t n, int axis, vgi_
     return before(three[2], three[high], axis) ? *three[2] : *three[high];
 }
 
-/* Hoare's selection: move the point of rank `middle` to its place and lesser ones before it. */
+/* Hoare's selection: move the point of rank `middle` to its position, and smaller ones before it. */
 static void select_rank(struct point *p, size_t n, size_t middle, int axis)
 {
     vgi_random random = {.key = n};
@@ -85,8 +85,8 @@ static void select_rank(struct point *p, size_t n, size_t middle, int axis)
             if (i >= j) break;
             swap(&p[i++], &p[j--]);
         }
-        /* now nothing before i is above the pivot and nothing after j is below it; j is i - 1, or i at the pivot
-           itself */
+        /* now no point before i is above the pivot and none after j is below it; j is i - 1, or i at the pivot
+         * itself */
         if (middle < i) end = i;
         else if (middle > j) begin = j + 1;
         else return;
@@ -129,7 +129,7 @@ static void build(vgi_kdtree *t)
     }
 }
 
-/* Summaries, from points to leaves and from children to nodes: lowest index and common label. */
+/* Compute the lowest index and the common label, from points to leaves and from children to nodes. */
 static void summarise(vgi_kdtree *t)
 {
     uint64_t leaves = (uint64_t)1 << t->depth;
@@ -184,17 +184,17 @@ void vgi_kdtree_label(vgi_kdtree *t, const uint32_t *label)
     if (t->n) summarise(t);
 }
 
-/* ---- asking ---- */
+/* ---- ---- search ---- */
 
 struct query {
     double p[3];
     uint64_t not_label; /* or ANY */
     size_t k;
-    vgi_near *near; /* the k nearest so far; entries not found yet are at the limit with index NONE */
+    vgi_near *near; /* the k nearest so far; free entries have the limit as distance and index NONE */
 };
 
-/* The only function that sums a squared distance, always in this order: rounding is then monotone, a box is never
- * farther than a point inside it, and a pair of points has the same distance from both sides. */
+/* The only function that sums a squared distance, always in this order. So rounding is monotone, a box is never
+ * farther than a point inside it, and a pair of points has the same distance in both directions. */
 static inline double square_sum(double x, double y, double z)
 {
     return x * x + y * y + z * z;
@@ -234,7 +234,7 @@ static void search_leaf(const vgi_kdtree *t, uint64_t node, struct query *q)
     }
 }
 
-/* Whether no point of this node can be an answer. */
+/* Whether no point of this node can improve the result. */
 static inline bool hopeless(const struct node *node, double square, const struct query *q)
 {
     return node->label == q->not_label || !nearer(square, node->lowest, &q->near[q->k - 1]);

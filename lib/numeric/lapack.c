@@ -1,6 +1,6 @@
-/* lapack.c: dense linear algebra through LAPACK. The only file that knows its header.
- * A row-major matrix is the transpose of a column-major one: the routines are called for the transpose, without copies.
- * Leaves out products (blas.c) and sparse systems (sparse.c).
+/* lapack.c: dense linear algebra through LAPACK. No other file includes its header. A row-major matrix is the
+ * transpose of a column-major one, so the routines are called for the transpose, without copies. Products are in
+ * blas.c, sparse systems in sparse.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/lapack.h"
 #include "numeric/blas.h"
@@ -10,8 +10,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* What LAPACKE returns to a vg status. Negative numbers other than its two for memory name an argument: the sizes are
- * checked here, so that it is one with a number that is not finite. `failure` says what a positive number means. */
+/* Converts LAPACKE's result to a vg status. Negative values, except its two for memory, name an argument. Sizes are
+ * checked here, so that argument must contain a number that is not finite. `failure` describes positive values. */
 static int status_of(lapack_int info, size_t n, const char *failure, vg_err *e)
 {
     if (!info) return VG_OK;
@@ -69,7 +69,7 @@ int vgi_lu_solve(size_t n, const double *lu, const int *pivot, size_t m, double 
     return status_of(info, n, "", e);
 }
 
-/* The transpose of a = Q R is R' Q': LAPACK's LQ. */
+/* The transpose of a = Q R is R' Q', LAPACK's LQ. */
 int vgi_qr(size_t m, size_t n, double *a, double *r, vg_err *e)
 {
     if (check_size(m, n, e)) return VG_ENOMEM;

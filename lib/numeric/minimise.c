@@ -1,7 +1,7 @@
-/* minimise.c: L-BFGS whose line search looks at eight steps at once.
+/* minimise.c: L-BFGS with a line search that evaluates eight steps at once.
  *
- * Debian's liblbfgs asks for one point at a time; here a point costs as much as eight of them, because eight chains of a
- * network always run side by side. So a round takes one evaluation, and the step that is taken is nearly the best of its
+ * Debian's liblbfgs asks for one point at a time. Here one point costs as much as eight, because eight chains of a
+ * network always run side by side. So a round takes one evaluation, and its step is nearly the best along its
  * direction.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/minimise.h"
@@ -11,13 +11,15 @@
 #include <stdlib.h>
 
 enum { MEMORY = 10, TRIALS = VGI_MINIMISE_TRIALS, SHORTENINGS = 3 };
-static const double sufficient = 1e-4; /* of the fall that the slope promises: a step has to bring it (Armijo) */
-static const double least_curvature = 1e-10; /* of |s| |y|: pairs with less tell nothing of the curvature */
+static const double sufficient = 1e-4; /* least decrease of a step, relative to the decrease that the slope predicts
+                                          (Armijo) */
+static const double least_curvature = 1e-10; /* relative to |s| |y|: pairs with less contain no information on the
+                                                curvature */
 static const double step[TRIALS] = {1, 0.5, 0.25, 2, 0.1, 4, 0.03, 0.01};
 
 typedef struct search {
     const vgi_function *f;
-    double *memory; /* all arrays below */
+    double *memory; /* one block for all arrays below */
     double *g, *d, *x[TRIALS], *gradient[TRIALS], value[TRIALS];
     double *s[MEMORY], *y[MEMORY], curvature[MEMORY]; /* the last changes of x and g, the newest at `pairs - 1` */
     size_t pairs;
@@ -41,7 +43,7 @@ static int make_search(search *s, const vgi_function *f, vg_err *e)
     return VG_OK;
 }
 
-/* d := -H g, H the inverse Hessian that the pairs suggest (the two loops of algorithm 7.4) */
+/* d := -H g, with H the inverse Hessian from the pairs (the two loops of algorithm 7.4) */
 static void find_direction(search *s)
 {
     size_t n = s->f->n;
@@ -61,7 +63,7 @@ static void find_direction(search *s)
     }
 }
 
-/* The lowest of eight points along d that falls as far as the slope promises; TRIALS: none does. */
+/* The lowest of eight points along d with sufficient decrease; TRIALS if none has it. */
 static int try_steps(search *s, const double *x, double value, double slope, double unit)
 {
     int best = TRIALS;
@@ -74,7 +76,7 @@ static int try_steps(search *s, const double *x, double value, double slope, dou
     return best;
 }
 
-/* Record what the step from x to point `taken` says of the curvature. */
+/* Store the pair (s, y) of the step from x to point `taken`. */
 static void remember(search *s, const double *x, int taken)
 {
     size_t n = s->f->n, k = s->pairs < MEMORY ? s->pairs : MEMORY - 1;
@@ -94,7 +96,7 @@ static void remember(search *s, const double *x, int taken)
     s->pairs = s->curvature[k] > least_curvature * size && size > 0 ? k + 1 : k;
 }
 
-/* One round: true when it gained enough to go on. */
+/* One round. Returns true if it gained enough to continue. */
 static bool search_on(search *s, double *x, double gain, vgi_minimum *m)
 {
     size_t n = s->f->n;
@@ -102,7 +104,8 @@ static bool search_on(search *s, double *x, double gain, vgi_minimum *m)
     find_direction(s);
     double slope = dot(s->g, s->d, n);
     if (!(slope < 0)) return false;
-    double unit = s->pairs ? 1 : fmin(1, 1 / sqrt(-slope)); /* at first d is the gradient: at most a step of length 1 */
+    double unit = s->pairs ? 1 : fmin(1, 1 / sqrt(-slope)); /* in the first round d is the gradient: a step of length
+                                                               at most 1 */
     for (int i = 0; taken == TRIALS && i < SHORTENINGS; i++, unit *= step[TRIALS - 1] / 2)
         taken = try_steps(s, x, m->value, slope, unit);
     if (taken == TRIALS) return false;

@@ -1,7 +1,6 @@
-/* polar.c: the rotation nearest to a matrix: Newton's iteration for the polar decomposition (Higham 1986)
- * where it converges to a rotation, the largest eigenvector of a 4 x 4 matrix (Davenport 1968, Horn 1987) where the
- * matrix is flat, thin or turns things inside out.
- * Leaves out the rotations of faces, eight poses at a time (polar_kernel.c).
+/* polar.c: the rotation nearest to a matrix: Newton's iteration for the polar decomposition (Higham 1986) where it
+ * converges to a rotation; otherwise, for flat, thin or orientation-reversing matrices, the largest eigenvector of a
+ * 4 x 4 matrix (Davenport 1968, Horn 1987). Rotations of faces, eight poses at a time, are in polar_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/polar.h"
 #include "numeric/face.h"
@@ -9,7 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* ---- the best rotation, whatever the matrix ---- */
+/* ---- ---- the best rotation, for any matrix ---- */
 
 /* The unit eigenvector of the largest eigenvalue of a symmetric matrix, by cyclic Jacobi rotations. a is
  * overwritten. */
@@ -24,7 +23,7 @@ static void largest_eigenvector(double a[4][4], double x[4])
         for (int p = 0; p < 3; p++) {
             for (int q = p + 1; q < 4; q++) {
                 if (fabs(a[p][q]) <= 1e-19 * (fabs(a[p][p]) + fabs(a[q][q]))) {
-                    a[p][q] = a[q][p] = 0; /* below the last bit of its neighbours */
+                    a[p][q] = a[q][p] = 0; /* smaller than the last bit of its neighbours */
                     continue;
                 }
                 double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
@@ -70,9 +69,9 @@ void vgi_best_turn_near(const double b[9], double weight, const double prior[4],
     vgi_best_turn(m, q);
 }
 
-/* ---- the nearest rotation, fast where it can be ---- */
+/* ---- ---- the nearest rotation, fast where possible ---- ---- */
 
-static const double thin = 1e-3; /* determinant of a matrix of norm 1 below which Newton is not asked */
+static const double thin = 1e-3; /* for a matrix of norm 1, smallest determinant for Newton's iteration */
 
 static double squares(const double x[9])
 {
@@ -96,7 +95,7 @@ static void newton(double x[9])
     }
 }
 
-/* For any m. Of several best rotations the one that turns least. */
+/* For any m. Among several best rotations, the one with the smallest angle. */
 static void best_rotation(const double m[9], double r[9])
 {
     static const double little = 0.25e-12, unturned[4] = {1, 0, 0, 0};

@@ -5,7 +5,8 @@
 
 static const vgi_polar_stop stop = {.scaled = 4, .enough = 1e-12};
 
-/* sum of d r' over the corners, and of the unit normals (times the weight that the reference's carries) */
+/* sum of d r' over the corners, plus the outer product of the unit normals (with the weight contained in the
+ * reference's) */
 VGI_INLINE void face_matrix(const vgi_turns *t, size_t f, const double *const *poses, vgi_wide *m)
 {
     size_t begin = t->start[f];

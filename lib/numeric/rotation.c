@@ -1,5 +1,5 @@
-/* rotation.c: deformations of a vector as quaternions whose squared length is the scale (MATH 4; T 3.19). Leaves
- * out the choice of a corner's rotation (deform.c).
+/* rotation.c: deformations of a vector as quaternions whose squared length is the scale (MATH 4; T 3.19). The
+ * rotation of a corner is chosen in deform.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/core.h"
 #include "numeric/vec3.h"
@@ -72,12 +72,12 @@ void vg_quat_log(const double q[4], double l[4])
 void vg_quat_exp(const double l[4], double q[4])
 {
     double angle = sqrt(l[1] * l[1] + l[2] * l[2] + l[3] * l[3]), length = exp(l[0]);
-    double ratio = angle > 0 ? sin(angle) / angle : 1; /* sin x / x is 1 in double precision long before x is 0 */
+    double ratio = angle > 0 ? sin(angle) / angle : 1; /* in double precision sin x / x is 1 long before x is 0 */
     q[0] = length * cos(angle);
     for (int k = 1; k < 4; k++) q[k] = length * ratio * l[k];
 }
 
-/* A unit vector perpendicular to the unit vector r, chosen the same way every time: perpendicular to the axis of
+/* A unit vector perpendicular to the unit vector r, always chosen in the same way: also perpendicular to the axis of
  * r's smallest component. */
 static void perpendicular(const double r[3], double p[3])
 {

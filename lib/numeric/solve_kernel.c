@@ -1,11 +1,11 @@
 /* solve_kernel.c: L L' x = b over a supernodal factor, 24 right-hand sides (8 poses) interleaved.
  *
- * A sparse triangular solve is bound by loading and storing x: with one column at a time every entry of the factor
- * costs a load and a store of its row of x. Here the columns of a supernode share their rows, so a row is loaded
- * once, takes all the columns of the supernode while it stays in registers, and is stored once; a few rows (forward)
- * or columns (backward) go together, so that what they share is loaded once too. How many depends on the registers:
- * their sums fill most of them. Also copies numbers from poses to rows and back. Leaves out assembly and
- * factorisation: reconstruct.c.
+ * A sparse triangular solve is bound by loads and stores of x: column by column, every entry of the factor costs a
+ * load and a store of its row of x. Here the columns of a supernode share their rows: a row is loaded once, updated
+ * with all columns of the supernode in registers, and stored once. A few rows (forward) or columns (backward) are
+ * processed together, so that their common data is also loaded once. Their number depends on the registers, most of
+ * which hold their sums. This file also copies numbers from poses to rows and back. Assembly and factorisation are in
+ * reconstruct.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/solve_kernel.h"
 #include "core/wide.h"
@@ -39,7 +39,7 @@ VGI_INLINE void store_sums(double *row, const sums *s)
     for (int c = 0; c < SPAN; c++) vgi_store(row + c * VGI_WIDTH, s->at[c]);
 }
 
-/* s[i] -= entry[i * apart] row, for n sums; a number of the row is loaded once for all of them. */
+/* s[i] -= entry[i * apart] row, for n sums. Each number of the row is loaded once for all of them. */
 VGI_INLINE void subtract(sums *s, int n, const double *entry, size_t apart, const double *row)
 {
     vgi_wide factor[TOGETHER];
@@ -72,7 +72,8 @@ VGI_INLINE void eliminate_rows(const double *l, size_t stride, size_t columns, c
     for (int i = 0; i < n; i++) store_sums(target[i], &s[i]);
 }
 
-/* The first rows of a supernode, its own columns: two rows take the columns before them, then the second the first. */
+/* The first rows of a supernode, its own columns: two rows are updated with the columns before them, then the second
+ * with the first. */
 VGI_INLINE void eliminate_head(const double *l, size_t stride, size_t columns, double *head)
 {
     size_t i = 0;
@@ -113,8 +114,8 @@ VGI_INLINE void forward(const vgi_factor *f, double *x)
     }
 }
 
-/* Backward, the rows of a column are taken from the last to the first, however many columns go together, here and for
- * one pose: so both give the same bits. */
+/* Backward, the rows of a column are processed from last to first, for any number of columns together, here and for
+ * one pose. So both give the same bits. */
 
 /* s[k] -= sum over rows below the head of l[k stride + row] x[row], for n columns. */
 VGI_INLINE void gather_below(sums *s, int n, const double *l, size_t stride, size_t columns, const int *rows,
@@ -123,7 +124,7 @@ VGI_INLINE void gather_below(sums *s, int n, const double *l, size_t stride, siz
     for (size_t i = stride; i-- > columns;) subtract(s, n, l + i, stride, x + (size_t)rows[i] * ROW);
 }
 
-/* Columns k .. k + n - 1 of a supernode, those behind them being done: each one is finished in turn. */
+/* Finish columns k .. k + n - 1 of a supernode in turn; those after them are done. */
 VGI_INLINE void finish_columns(const double *l, size_t stride, size_t columns, const int *rows, const double *x,
                                double *head, size_t k, int n)
 {
@@ -176,7 +177,7 @@ enum { PIECES = 2, MANY = 4 };
 #else
 typedef double piece __attribute__((vector_size(32)));
 typedef double piece_at __attribute__((vector_size(32), aligned(8), may_alias));
-enum { PIECES = 1, MANY = 8 }; /* rows or columns together: as many as there are additions under way at a time */
+enum { PIECES = 1, MANY = 8 }; /* rows or columns together: as many as there are additions in flight */
 #endif
 enum { POINT = 4 };
 
@@ -249,7 +250,7 @@ VGI_INLINE void forward_one(const vgi_factor *f, double *x)
     }
 }
 
-/* Columns k .. k + n - 1 of a supernode, those behind them being done. */
+/* Columns k .. k + n - 1 of a supernode; those after them are done. */
 VGI_INLINE void finish_points(const double *l, size_t stride, size_t columns, const int *rows, const double *x,
                               double *head, size_t k, int n)
 {
@@ -292,7 +293,7 @@ static void solve_one(const vgi_factor *f, double *x)
 
 /* ---- from poses to rows and back ---- */
 
-/* Rows are visited in the order of vertices, which is not their own: prefetch them. */
+/* Prefetch rows, which are visited in vertex order instead of their own order. */
 VGI_INLINE void ask(const vgi_row *x, const uint32_t *row, size_t v, size_t nv, size_t rows)
 {
     enum { AHEAD = 8 };

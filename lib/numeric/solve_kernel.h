@@ -6,9 +6,9 @@
 #include "core/isa.h"
 #include "core/lanes.h"
 
-/* A supernodal factor as CHOLMOD lays it out, borrowed. Supernode s holds columns super[s] .. super[s+1]-1; its rows
- * are rows[pi[s]] .. rows[pi[s+1]-1], the first of which are its own columns; its entries are block[s], column-major,
- * of that many rows. Only the lower triangle of the block's head is defined. */
+/* A supernodal factor in CHOLMOD's layout, borrowed. Supernode s holds columns super[s] .. super[s+1]-1. Its rows are
+ * rows[pi[s]] .. rows[pi[s+1]-1]; the first of them are its own columns. Its entries are block[s], column-major, with
+ * that many rows. Only the lower triangle of the block's head is defined. */
 typedef struct vgi_factor {
     size_t n, supernodes;
     const int *super, *pi, *rows;
@@ -34,7 +34,7 @@ static inline void vgi_factor_solve(const vgi_factor *f, vgi_row *x)
     vgi_solve_kernel_now()->solve(f, x);
 }
 
-/* vgi_factor_solve_one: the same for one pose: each row of x is x, y, z and a number that does not matter, say 0. */
+/* vgi_factor_solve_one: the same for one pose: each row of x is x, y, z and an unused number. */
 static inline void vgi_factor_solve_one(const vgi_factor *f, double *x)
 {
     vgi_solve_kernel_now()->solve_one(f, x);
@@ -46,7 +46,7 @@ static inline void vgi_load_rows(vgi_row *x, const uint32_t *row, size_t nv, siz
     vgi_solve_kernel_now()->load(x, row, nv, rows, rhs);
 }
 
-/* vgi_add_rows: the way back, for the first `lanes` poses: pose[k] of v += x[row[v]]. */
+/* vgi_add_rows: the inverse, for the first `lanes` poses: pose[k] of v += x[row[v]]. */
 static inline void vgi_add_rows(const vgi_row *x, const uint32_t *row, size_t nv, size_t rows, double *const *pose,
                                 size_t lanes)
 {

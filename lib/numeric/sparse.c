@@ -1,7 +1,7 @@
 /* sparse.c: symmetric positive definite systems through CHOLMOD: one analysis, many factorisations. BLAS and OpenMP
- * run alone here: fronts of a surface's factor are small, and threads of OpenMP do nothing but spin on processors
- * that the other programs of a pipe could use; nor must the last digits depend on their number. Leaves out what the
- * entries are. The only file that knows CHOLMOD; it calls Core, Cholesky, Partition (LGPL) and Supernodal (GPL).
+ * run on one thread here: fronts of a surface's factor are small, and OpenMP's threads would only spin on processors
+ * that other programs of the pipe could use; nor may the last digits depend on their number. No other file includes
+ * CHOLMOD; it calls Core, Cholesky, Partition (LGPL) and Supernodal (GPL).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/sparse.h"
 #include "numeric/blas.h"
@@ -9,22 +9,22 @@
 #include <cholmod.h>
 #include <stdlib.h>
 
-/* Below this many unknowns a minimum-degree order is as good as nested dissection, and faster. */
+/* Below this many unknowns a minimum-degree order is as good as nested dissection, and faster to find. */
 enum { SMALL = 500 };
 
 struct vgi_cholesky {
     cholmod_common common;
     cholmod_factor *L;
-    cholmod_dense *x, *y, *e; /* what cholmod_solve2 works in */
+    cholmod_dense *x, *y, *e; /* workspace of cholmod_solve2 */
     double *b;                /* n x 3, by columns */
-    const double **block;     /* of each supernode, once it is factorized */
+    const double **block;     /* per supernode, once factorised */
 };
 
-/* Of the libraries below; where they are not, nothing has to be kept back. */
+/* Functions of the libraries below; if absent, nothing needs to be limited. */
 void omp_set_max_active_levels(int n) __attribute__((weak));
 int omp_get_max_active_levels(void) __attribute__((weak));
 
-/* Returns what end_alone takes: the levels that were set before. */
+/* Returns the previous setting, for end_alone. */
 static int begin_alone(void)
 {
     vgi_blas_alone();
@@ -69,7 +69,7 @@ void vgi_triplets_clear(vgi_triplets *t)
     *t = (vgi_triplets){0};
 }
 
-/* order: the entries by `key`, those with the same key in the order of `before` (NULL: as they come). */
+/* order: the entries sorted by `key`; entries with the same key are in the order of `before` (NULL: as given). */
 static void sort_entries(size_t n, const uint32_t *key, size_t keys, const uint32_t *before, uint32_t *first,
                          uint32_t *order)
 {
@@ -82,7 +82,7 @@ static void sort_entries(size_t n, const uint32_t *key, size_t keys, const uint3
     }
 }
 
-/* `by_column`: entries by columns, in a column by rows. */
+/* `by_column`: the entries sorted by column, then by row. */
 static void sum_sorted(const vgi_triplets *t, const uint32_t *by_column, vgi_sparse *a)
 {
     size_t n = 0, columns = 0;
@@ -120,7 +120,7 @@ int vgi_triplets_sum(const vgi_triplets *t, size_t rows, vgi_sparse *a, vg_err *
 
 /* ---- factorisation ---- */
 
-/* a as CHOLMOD sees it, borrowed. */
+/* a as a CHOLMOD matrix, borrowed. */
 static cholmod_sparse view(const vgi_sparse *a)
 {
     return (cholmod_sparse){.nrow = a->n, .ncol = a->n, .nzmax = (size_t)a->start[a->n], .p = a->start, .i = a->row,
@@ -128,11 +128,11 @@ static cholmod_sparse view(const vgi_sparse *a)
                             .dtype = CHOLMOD_DOUBLE, .sorted = 1, .packed = 1};
 }
 
-/* All that a solve needs: CHOLMOD 3.0 does not survive a failed allocation in there. */
+/* Allocate everything that a solve needs, because CHOLMOD 3.0 does not survive a failed allocation there. */
 static bool make_workspace(vgi_cholesky *c)
 {
     size_t n = c->L->n, rows = c->L->maxesize ? c->L->maxesize : 1;
-    if (c->b && c->x && c->y && c->e) return true; /* as it is from the second solve on */
+    if (c->b && c->x && c->y && c->e) return true; /* complete from the second solve on */
     free(c->b);
     cholmod_free_dense(&c->x, &c->common);
     cholmod_free_dense(&c->y, &c->common);

@@ -18,7 +18,7 @@ double vgi_variance(const double *x, size_t n)
     return n ? sum / (double)n : 0;
 }
 
-/* Hoare's selection: only the part that holds the rank is looked at again. */
+/* Hoare's selection: only the part that contains the rank is processed further. */
 double vgi_select(double *x, size_t n, size_t rank)
 {
     size_t low = 0, high = n - 1;

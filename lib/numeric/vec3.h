@@ -1,5 +1,5 @@
 /* vec3.h: vectors of three numbers and 3 x 3 matrices, row-major.
- * Internal. Leaves out quaternions (vg.h) and eight poses side by side (lanes.h).
+ * Internal. Quaternions are in vg.h, eight poses side by side in lanes.h.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_VEC3_H
 #define VG_VEC3_H
@@ -40,7 +40,7 @@ static inline double vgi_length(const double a[3])
 {
     return sqrt(vgi_dot(a, a));
 }
-static inline double vgi_make_unit(double x[3]) /* 0 stays 0; returns the length before */
+static inline double vgi_make_unit(double x[3]) /* 0 stays 0; returns the original length */
 {
     double length = vgi_length(x);
     for (int k = 0; k < 3; k++) x[k] = length > 0 ? x[k] / length : 0;

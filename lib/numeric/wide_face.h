@@ -1,13 +1,13 @@
-/* wide_face.h: a face in every lane: what is summed over its corners. Included by *_kernel.c alone.
+/* wide_face.h: one face per lane: sums over its corners. Included by *_kernel.c alone.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_WIDE_FACE_H
 #define VG_WIDE_FACE_H
 
 #include "core/wide.h"
 
-/* vgi_wide_face: over the corners, whose vertices x are counted from that of the first one: m (row-major) += x r'; the
- * normal, twice the area long; spread, the sum of squares. n corners have the vertices vert[0 ..]; r: three numbers each.
- * Where the r sum to 0, m is the same for any centre. */
+/* vgi_wide_face: sums over the corners, with vertices x relative to that of the first corner: m (row-major) += x r';
+ * the normal, with length twice the area; spread, the sum of squares. The n corners have the vertices vert[0 ..]; r:
+ * three numbers each. If the r sum to 0, m does not depend on the centre. */
 VGI_INLINE void vgi_wide_face(const double *const *poses, const uint32_t *vert, size_t n, const double *r, vgi_wide m[9],
                               vgi_wide normal[3], vgi_wide *spread)
 {

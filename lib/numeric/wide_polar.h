@@ -6,14 +6,14 @@
 #include "core/wide.h"
 #include "numeric/polar.h"
 
-/* When the iteration ends. To be given as a constant. */
+/* Stopping rule of the iteration. Pass a constant. */
 typedef struct vgi_polar_stop {
-    int scaled;    /* steps that are scaled; the others converge quadratically */
-    double enough; /* squared change below which a step is the last: what is left is below it, too */
-    bool alone;    /* each lane ends by itself: its last bits do not depend on its neighbours */
+    int scaled;    /* steps with scaling; later ones converge quadratically */
+    double enough; /* squared change below which a step is the last; the error is then smaller still */
+    bool alone;    /* each lane stops separately, so that its last bits do not depend on its neighbours */
 } vgi_polar_stop;
 
-/* One step of Newton's, in the lanes that are going; scaled to balance the norms of x and x^-T. The squared change. */
+/* One Newton step in the active lanes, scaled to balance the norms of x and x^-T. Returns the squared change. */
 VGI_INLINE vgi_wide vgi_polar_step(vgi_wide *x, bool scaled, bool all, vgi_mask going)
 {
     vgi_wide c[9], det = vgi_wide_cofactors(x, c), a, b, change = {0}; /* c: det x^-T */
@@ -32,12 +32,12 @@ VGI_INLINE vgi_wide vgi_polar_step(vgi_wide *x, bool scaled, bool all, vgi_mask 
     return change;
 }
 
-/* vgi_wide_polar: x := the rotation nearest to m, row-major: Newton's iteration (Higham 1986) where m is far enough from
- * a flat one, vgi_fit_rotation in the other lanes. */
+/* vgi_wide_polar: x := the rotation nearest to m, row-major: Newton's iteration (Higham 1986) where m is not nearly
+ * flat, vgi_fit_rotation in the other lanes. */
 VGI_INLINE void vgi_wide_polar(const vgi_wide *m, vgi_wide *x, vgi_polar_stop stop)
 {
     enum { MOST = 16 };
-    static const double thin = 1e-3; /* determinant of a matrix of norm 1 below which Newton is not asked */
+    static const double thin = 1e-3; /* for a matrix of norm 1, smallest determinant for Newton's iteration */
     vgi_wide size2 = vgi_wide_squares(m), c[9];
     vgi_wide shrink = vgi_roots(3.0 / size2);
 #pragma GCC unroll 9
@@ -45,7 +45,7 @@ VGI_INLINE void vgi_wide_polar(const vgi_wide *m, vgi_wide *x, vgi_polar_stop st
     vgi_mask good = vgi_wide_cofactors(x, c) > vgi_same(5.2 * thin), going = ~(vgi_mask){0}; /* false for NaN */
     unsigned bad = vgi_bits(~good);
     if (bad)
-        for (int i = 0; i < 9; i++) x[i] = vgi_either(good, x[i], vgi_same(i % 4 == 0)); /* they wait */
+        for (int i = 0; i < 9; i++) x[i] = vgi_either(good, x[i], vgi_same(i % 4 == 0)); /* inactive */
     for (int step = 0; step < MOST; step++) {
         vgi_wide change = vgi_polar_step(x, step < stop.scaled, !stop.alone, going);
         vgi_mask more = change >= vgi_same(stop.enough);
