@@ -1,10 +1,9 @@
-/* basis.c: principal components of few poses of many numbers: the eigenvectors of the n x n Gram matrix give them at
- * the cost of two products.
+/* basis.c: principal components of a small number of high-dimensional poses: the eigenvectors of the n x n Gram
+ * matrix give them at the cost of two products.
  *
- * Rounding of the Gram matrix leaves basis vectors of small variance slanted by up to its square root; one pass of
- * Cholesky QR sets them upright (1e-4 becomes 1e-15). Coordinates then follow from the Gram matrix, too, but for those
- * of small variance, which are products of vectors again.
- * Leaves out what the numbers of a pose are.
+ * Rounding of the Gram matrix skews basis vectors of small variance by up to its square root; one pass of Cholesky QR
+ * makes them orthogonal (1e-4 becomes 1e-15). Coordinates also follow from the Gram matrix, except those of small
+ * variance, which are computed as products of vectors. The meaning of the numbers of a pose does not matter here.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "numeric/lapack.h"
@@ -15,8 +14,8 @@
 #include <sys/mman.h>
 
 enum {
-    TILE = 128,    /* rows of a tile of a Gram matrix */
-    STRIPE = 3072  /* numbers of a pose that are worked on at a time: a multiple of 3 */
+    TILE = 128,    /* rows per tile of a Gram matrix */
+    STRIPE = 3072  /* numbers of a pose processed at a time: a multiple of 3 */
 };
 
 void vgi_basis_clear(vgi_basis *b)
@@ -31,14 +30,14 @@ void vgi_basis_clear(vgi_basis *b)
 
 typedef struct job {
     vgi_basis *b;
-    const double *rows; /* of a Gram matrix */
+    const double *rows; /* for a Gram matrix */
     size_t nrows, length;
     double *gram;
     const double *weight; /* rank x n: vectors = weight * centred */
     const double *factor; /* rank x rank, lower */
-    const double *x;      /* of an error */
+    const double *x;      /* for an error */
     size_t stride, m;
-    size_t first;         /* of the stripes that are measured at a time */
+    size_t first;         /* of the stripes measured at a time */
     double *room, *square, *sums;
 } job;
 
@@ -105,7 +104,7 @@ static void straighten_stripe(void *context, size_t s)
     vgi_solve_lower_stripe(b->rank, j->factor, width_of(b->d, s), b->vectors + s * STRIPE, b->d);
 }
 
-/* weight := factor^-1 weight, so that vectors = weight * centred still */
+/* weight := factor^-1 weight, so that still vectors = weight * centred */
 static int make_vectors(vgi_basis *b, double *weight, int threads, vg_err *e)
 {
     size_t rank = b->rank;
@@ -132,7 +131,7 @@ static void make_coordinates(vgi_basis *b, const double *g, const double *weight
                                       b->x + large, b->rank);
 }
 
-/* Few numbers of all poses at a time, so that they are read from memory once. */
+/* Process a stripe of all poses at a time, so that they are read from memory once. */
 static int centre(vgi_basis *b, vg_err *e)
 {
     enum { FEW = 256 };
@@ -148,14 +147,14 @@ static int centre(vgi_basis *b, vg_err *e)
     return VG_OK;
 }
 
-/* Room for the vectors: large pages where the system has them, for a third of the time went into the first touch of
- * small ones. */
+/* Memory for the vectors, on huge pages if available: a third of the time was spent on the first touch of small
+ * ones. */
 static double *large_array(size_t n, vg_err *e)
 {
     enum { LARGE = 1 << 21 };
     double *x = vgi_array_raw(n, sizeof *x, e);
     uintptr_t first = ((uintptr_t)x + LARGE - 1) / LARGE * LARGE, end = ((uintptr_t)x + n * sizeof *x) / LARGE * LARGE;
-    if (x && end > first) (void)madvise((void *)first, end - first, MADV_HUGEPAGE); /* as well without */
+    if (x && end > first) (void)madvise((void *)first, end - first, MADV_HUGEPAGE); /* failure does no harm */
     return x;
 }
 

@@ -1,5 +1,6 @@
-/* branches.c: which of the logarithms of a turn to take: those of neighbours that turn most alike are joined first
- * (Kruskal 1956), and each piece follows the one it is joined to. A breadth-first tree does worse than no tree (MATH 11).
+/* branches.c: chooses branches of the logarithms of rotations: neighbours with the most similar rotations are joined
+ * first (Kruskal 1956), and each piece follows the one it is joined to. A breadth-first tree does worse than no tree
+ * (MATH 11).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/branches.h"
 #include "method/vectors/unwrap.h"
@@ -35,8 +36,8 @@ typedef struct forest {
     const uint32_t *pair;
     ranked *ranks;       /* of pairs, then of pieces */
     uint32_t *set;       /* pieces joined so far */
-    uint32_t *next;      /* lists of kept pairs around a piece: 2 i and 2 i + 1 are the ends of pair i */
-    uint32_t *head;      /* the first of each list; END: there is none */
+    uint32_t *next;      /* linked lists of the kept pairs at each piece: 2 i and 2 i + 1 are the ends of pair i */
+    uint32_t *head;      /* the first of each list; END: empty */
     bool *reached;
 } forest;
 
@@ -124,7 +125,7 @@ int vgi_branches_make(vgi_branches *b, size_t n, const double *share, size_t npa
     return r;
 }
 
-/* ---- the walk ---- */
+/* ---- ---- traversal ---- */
 
 static void follow_parents(const vgi_branches *b, const double *q, double *l)
 {
@@ -134,7 +135,7 @@ static void follow_parents(const vgi_branches *b, const double *q, double *l)
     }
 }
 
-/* The mean over the surface of the steps that pieces would have to make to be nearest to the frame before. */
+/* Mean over the surface of the steps by which pieces would have to move to be nearest to the previous frame. */
 static void mean_step(const vgi_branches *b, const double *q, const double *before, const double *l, double step[3])
 {
     step[0] = step[1] = step[2] = 0;
@@ -154,7 +155,7 @@ void vgi_branches_walk(const vgi_branches *b, const double *q, const double *bef
     follow_parents(b, q, l);
     if (!before) return;
     mean_step(b, q, before, l, step);
-    if (!(vgi_length(step) > M_PI / 2)) return; /* of the half angle: most of the surface is a whole turn off */
+    if (!(vgi_length(step) > M_PI / 2)) return; /* of the half angle: most of the surface differs by a whole turn */
     for (size_t i = 0; i < b->n; i++) {
         double near[3];
         for (size_t k = 0; k < 3; k++) near[k] = l[3 * i + k] + step[k];

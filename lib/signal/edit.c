@@ -1,4 +1,4 @@
-/* edit.c: changes to a signal as lines of text, as a hand, a script or the page of vg-view writes them.
+/* edit.c: changes to a signal as lines of text, typed or written by a script or by the page of vg-view.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/curve.h"
 
@@ -142,7 +142,7 @@ static const struct verb {
              {"remove", 1, remove_control, "'remove NUMBER'"},     {"frame", 3, move_frame, "'frame NUMBER X Y'"},
              {"site", 1, change_site, "'site FRAME' or 'site -FRAME'"}, {"time", 2, add_time, "'time OLD NEW'"}};
 
-/* The word at *p, and what is behind it; 0: there is none. */
+/* The word at *p, and the position after it; 0 if there is none. */
 static size_t next_word(const char **p, const char **word)
 {
     *p += strspn(*p, " \t\r");

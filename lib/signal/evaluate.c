@@ -1,7 +1,7 @@
-/* evaluate.c: a signal at any time: curve, surface, shapes.
+/* evaluate.c: evaluates a signal at any time: curve, surface, shapes.
  *
- * Shapes are products of a batch of coordinates with the basis, always of the same size, so that a shape does not depend
- * on what is computed beside it. Leaves out how a signal is found (fit.c).
+ * Shapes are products of a batch of coordinates with the basis. The batch always has the same size, so that a shape
+ * does not depend on the others in it. Signals are fitted in fit.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "signal/curve.h"
@@ -21,10 +21,10 @@ struct vg_sampler {
     bool single;
     double *basis, *x, *shape;             /* m x d, batch x m, batch x d */
     float *basis_single, *x_single, *shape_single;
-    bool borrowed;                         /* the basis is the signal's */
+    bool borrowed;                         /* the basis is borrowed from the signal */
 };
 
-/* ---- the signal's own numbers ---- */
+/* ---- ---- data of the signal ---- */
 
 int vgi_signal_curve(const vg_signal *s, vgi_curve *c, vg_err *e)
 {
@@ -68,7 +68,7 @@ void vgi_signal_vector(const vg_signal *s, size_t j, double *h)
     }
 }
 
-/* ---- making ---- */
+/* ---- ---- construction ---- */
 
 static int take_basis(vg_sampler *p, vg_err *e)
 {
@@ -154,7 +154,7 @@ void vg_sampler_free(vg_sampler **out)
     *out = NULL;
 }
 
-/* ---- evaluating ---- */
+/* ---- ---- evaluation ---- */
 
 void vg_sampler_position(const vg_sampler *p, double time, double at[2])
 {

@@ -1,10 +1,9 @@
-/* examples.c: transfer that follows a few sculpted poses: plain transfer, corrected by what it misses in them.
+/* examples.c: transfer that reproduces a few sculpted poses: plain transfer plus a correction for its error in them.
  *
- * A pose of the source has coordinates beside the examples: least squares of the logarithms of its corners' turns and
- * stretches (MATH 11), the rigid motion of the body left out. What plain transfer misses in an example is kept per corner
- * of the target in the frame of that corner, and comes back turned as the corner is turned in the pose at hand: examples
- * are met exactly, and everything else keeps its detail.
- * Leaves out the transfer itself.
+ * A pose of the source has coordinates with respect to the examples, by least squares over the logarithms of its
+ * corners' rotations and stretches (MATH 11), without rigid motion of the body. The error of plain transfer in an
+ * example is stored per corner of the target, in the frame of that corner, and rotates with the corner. So examples
+ * are reproduced exactly, and other poses keep their detail. The transfer itself is elsewhere.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/lapack.h"
 #include "numeric/vec3.h"
@@ -15,14 +14,14 @@
 
 struct vg_corrector {
     const vg_graph *source, *target;
-    double *reference;        /* the source's */
+    double *reference;        /* reference of the source */
     vg_deformer *of_source, *of_target;
-    size_t n, from, to;       /* examples; corners of source and target */
-    double *weight;           /* per corner of the source: root of its share of the surface */
+    size_t n, from, to;       /* number of examples; of corners of source and target */
+    double *weight;           /* per corner of the source: square root of its share of the surface */
     double *feature;          /* n x 4 from */
     double *factor;           /* n x n: Cholesky factor of the examples' products */
     double *miss;             /* n x 3 to: in the frames of the corners */
-    double *pose, *quaternions, *now, *x; /* room for one pose: vertices, turns, features, coordinates */
+    double *pose, *quaternions, *now, *x; /* workspace of one pose: vertices, rotations, features, coordinates */
 };
 
 void vg_corrector_free(vg_corrector **out)
@@ -57,7 +56,7 @@ static void set_weights(vg_corrector *c)
     }
 }
 
-/* Turns and stretches of a pose's corners, the body's rigid motion left out. */
+/* Rotations and stretches of a pose's corners, without the rigid motion of the body. */
 static void measure(vg_corrector *c, const double *pose, double *feature)
 {
     size_t nv = c->source->nv;
@@ -92,14 +91,14 @@ static int factor(vg_corrector *c, vg_err *e)
         most = fmax(most, c->factor[i * c->n + i]);
     }
     definite = vgi_spd_factor(c->n, c->factor);
-    for (size_t i = 0; i < c->n && definite; i++) /* what example i says beside those before it */
+    for (size_t i = 0; i < c->n && definite; i++) /* the component of example i outside the span of those before it */
         definite = c->factor[i * c->n + i] * c->factor[i * c->n + i] > 1e-10 * most;
     if (definite) return VG_OK;
     return vg_fail(e, VG_EINPUT, "the examples are not independent: one of them is the reference pose, or follows from the "
                    "others");
 }
 
-/* The turns of the target's corners when these are its vectors. */
+/* Rotations of the target's corners, from its vectors. */
 static void turns_of(vg_corrector *c, const double *vectors)
 {
     vg_deformer_measure(c->of_target, 1, VG_VECTORS, &vectors, &c->quaternions);
@@ -109,7 +108,7 @@ static void turns_of(vg_corrector *c, const double *vectors)
     }
 }
 
-/* What is missed in example j. */
+/* Store the error of plain transfer in example j. */
 static void keep_miss(vg_corrector *c, size_t j, const double *wanted, const double *transferred)
 {
     turns_of(c, transferred);

@@ -1,8 +1,8 @@
-/* fit.c: a sequence to three signals, each as small as the tolerance lets it be.
+/* fit.c: fits the three signals to a sequence, each as small as the tolerance allows.
  *
- * The smallest m whose shapes are within 0.7 of the tolerance, then the smallest l with 0.9, then the smallest k with all
- * of it. Sites and knots are nested, so that each question is one product.
- * Leaves out what the parts do (basis, layout, spline_pose, spline_time).
+ * First the smallest m whose shapes are within 0.7 of the tolerance, then the smallest l within 0.9, then the
+ * smallest k within all of it. Sites and knots are nested, so that each trial is one product. The signals are in
+ * basis, layout, spline_pose and spline_time.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "signal/curve.h"
@@ -13,20 +13,20 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { CROSSING_PARTS = 16 }; /* straight stretches between frames on which crossings are looked for */
+enum { CROSSING_PARTS = 16 }; /* straight segments per frame interval that are searched for crossings */
 
 typedef struct fitting {
     vg_signal *s;
     const vg_signal_options *o;
     vg_signal_stats *report;
     size_t n;
-    double d, tolerance; /* D; the largest distance that is allowed */
+    double d, tolerance; /* D; the largest distance allowed */
     vgi_basis basis;
     vgi_span span;         /* of examples */
-    vgi_unshape unshape;   /* when shapes are no vertices */
-    double limit;          /* an error beyond it need not be known exactly */
-    double *other;         /* with examples: the frames as sums of them when basis has the frames, and the other way
-                              round; NULL: there are none */
+    vgi_unshape unshape;   /* if shapes are not vertices */
+    double limit;          /* larger errors need not be exact */
+    double *other;         /* with examples: the frames as sums of the examples if basis has the frames, and vice
+                              versa; NULL without examples */
     vgi_plate plate;
     double *room, *fitted; /* n x rank each */
     double *coefficients, *functions;
@@ -43,7 +43,7 @@ void vg_signal_stats_clear(vg_signal_stats *r)
     *r = (vg_signal_stats){0};
 }
 
-/* ---- what a choice of m, l, k costs ---- */
+/* ---- ---- cost of a choice of m, l, k ---- */
 
 static bool of_vertices(const fitting *f)
 {
@@ -90,7 +90,7 @@ static int error_of_time(fitting *f, size_t knots, vgi_error *error, vg_err *e)
     return error_of(f, f->fitted, m, m, error, e);
 }
 
-/* Sites and control points are for what examples can say: a search compares with that, a report with the frames. */
+/* Sites and control points approximate what the examples span: searches compare with that, reports with the frames. */
 static void exchange_poses(fitting *f)
 {
     double *poses = f->basis.centred;
@@ -98,7 +98,7 @@ static void exchange_poses(fitting *f)
     f->basis.centred = f->other, f->other = poses;
 }
 
-/* The smallest of low .. high that is within the limit; high if none is. */
+/* The smallest of low .. high within the limit, or high if none is. */
 static int smallest(fitting *f, size_t low, size_t high, double limit,
                     int (*measure)(fitting *f, size_t count, vgi_error *error, vg_err *e), size_t *found, vg_err *e)
 {
@@ -133,7 +133,7 @@ static int fit_root(fitting *f, const vg_body *body, double *poses, vg_err *e)
     return VG_OK;
 }
 
-/* Shapes of the poses, which are kept for the errors. */
+/* Shapes of the poses, stored for the errors. */
 static int fit_space(fitting *f, const vg_body *body, double *poses, vg_err *e)
 {
     vg_signal *s = f->s;
@@ -169,7 +169,7 @@ static int fit_shape(fitting *f, vg_err *e)
     return VG_OK;
 }
 
-/* Distances are of all coordinates, not of the first m: the layout does not depend on the tolerance. */
+/* Distances use all coordinates, not the first m, so that the layout does not depend on the tolerance. */
 static int place_frames(fitting *f, vg_err *e)
 {
     vg_signal *s = f->s;
@@ -281,7 +281,7 @@ static int check(const vg_body *body, size_t n, const vg_signal_options *o, vg_e
     return VG_OK;
 }
 
-/* Examples without the body's rigid motion: *examples is NULL when there are none. */
+/* Examples without rigid motion of the body. *examples is NULL if there are none. */
 static int take_examples(fitting *f, const vg_body *body, double **examples, vg_err *e)
 {
     size_t n = f->o->nexamples, nv = body->mesh.nv;
@@ -299,7 +299,7 @@ static int take_examples(fitting *f, const vg_body *body, double **examples, vg_
     return r;
 }
 
-/* The basis of the poses, which are taken over. */
+/* The basis of the poses; takes ownership of them. */
 static int fit_basis(fitting *f, const vg_body *body, double *poses, vg_err *e)
 {
     double *examples = NULL;

@@ -1,5 +1,5 @@
-/* keep.c: how a signal is kept: the precision of its basis, the numbers it takes.
- * Leaves out the stream (model/records.c).
+/* keep.c: storage of a signal: the precision of its basis, the count of its numbers. The stream is in
+ * model/records.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/curve.h"
 

@@ -1,8 +1,9 @@
-/* layout.c: which distances the positions in the plane shall have, and how good the motion between frames is then.
+/* layout.c: chooses the distances between positions in the plane, and measures how good the motion between frames
+ * then is.
  *
- * Distances of the shapes alone put similar shapes of different moments next to one another, and the surface through
- * them then cannot say how either goes on. A further coordinate pulls them apart: time, or the phase of a cycle.
- * Leaves out how positions follow from distances (plane.c).
+ * If only distances of shapes counted, similar shapes of different moments would lie together, and the surface
+ * through them could not tell how either continues. A further coordinate separates them: time, or the phase of a
+ * cycle. Positions are computed from distances in plane.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "numeric/lapack.h"
@@ -11,8 +12,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { AXES = 30, MORE = 2 }; /* principal coordinates that a start is taken from, and further ones */
-static const double good = 0.6; /* a candidate of this ratio is taken */
+enum { AXES = 30, MORE = 2 }; /* principal coordinates from which a start is computed, and further ones */
+static const double good = 0.6; /* a candidate with at most this ratio is accepted */
 
 /* ---- the length of a cycle ---- */
 
@@ -28,7 +29,7 @@ static double median(double *x, size_t n)
     return n % 2 ? x[n / 2] : (x[n / 2 - 1] + x[n / 2]) / 2;
 }
 
-/* middle[T]: the median distance of frames T apart, beside that of all pairs */
+/* middle[T]: the median distance of frames T apart, relative to that of all pairs */
 static void lag_medians(size_t n, const double *square, double *middle, double *room)
 {
     size_t count = 0;
@@ -68,7 +69,7 @@ int vgi_period(size_t n, const double *square, double *period, vg_err *e)
 
 /* ---- positions ---- */
 
-/* Coordinates beside the shapes', n x MORE; how many. */
+/* Coordinates in addition to those of the shapes, n x MORE. Returns their number. */
 static size_t further_coordinates(const vg_layout_trial *w, double period, size_t n, size_t m, const double *x, double *more)
 {
     double size = 0, length = 0, weight = w->weight;
@@ -133,7 +134,7 @@ static int settle_freely(size_t n, const double *distance, const double *axes, d
     return VG_OK;
 }
 
-/* Move p as a whole, mirrored or not, to where its pinned frames are nearest to their pins. */
+/* Move p rigidly, possibly mirrored, so that its pinned frames are nearest to their pins. */
 static void move_to_pins(size_t n, double *p, const vg_pin *pins, size_t npins)
 {
     double a[2] = {0, 0}, b[2] = {0, 0}, plain[2] = {0, 0}, mirrored[2] = {0, 0};
@@ -197,7 +198,7 @@ out:
     return r;
 }
 
-/* ---- how good a layout is ---- */
+/* ---- ---- quality of a layout ---- */
 
 typedef struct judge {
     size_t n, m;
@@ -236,7 +237,7 @@ static double between(size_t index) /* times i + 1/4, 1/2, 3/4 */
     return 1 + (double)whole + 0.25 * (double)(1 + index % 3);
 }
 
-/* Squares of the deviation at each time in between; returns the mean square of straight lines. */
+/* Squared deviation at each intermediate time. Returns the mean square for straight lines. */
 static double measure(judge *j, double *square)
 {
     size_t n = j->n, m = j->m, l = j->plate.apart, times = 3 * (n - 1);
@@ -295,7 +296,7 @@ typedef struct choice {
     size_t npins;
     double period;
     vg_layout_trial *tried;
-    double *p; /* 2 n for each of those tried */
+    double *p; /* 2 n per candidate tried */
     size_t first;
     int status[VG_LAYOUT_TRIALS];
 } choice;
@@ -327,7 +328,7 @@ static size_t list_candidates(vg_layout_trial *list, double period, const vg_lay
     return count;
 }
 
-/* The first good one, or after the last one the best; SIZE_MAX: go on. */
+/* The first good candidate, or after the last one the best; SIZE_MAX: continue. */
 static size_t decide(const choice *c, size_t done, size_t count)
 {
     size_t best = 0;
@@ -354,7 +355,7 @@ int vgi_layout_choose(size_t n, size_t m, const double *x, const vg_pin *pins, s
     while (found == SIZE_MAX && r == VG_OK) {
         c.first = done;
         size_t now = count - done < wave ? count - done : wave;
-        if (!done) now = 1; /* most need no other */
+        if (!done) now = 1; /* most sequences need only one */
         vgi_parallel(threads, now, try_one, &c);
         for (size_t i = done; i < done + now; i++)
             if (c.status[i] < 0) r = vg_fail(e, c.status[i], "not enough memory for the layout of %zu frames", n);

@@ -1,5 +1,4 @@
-/* natural.c: natural cubic splines through values at whole times.
- * Leaves out splines with knots elsewhere (spline_time.c).
+/* natural.c: natural cubic splines through values at integer times. Splines with other knots are in spline_time.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/signal.h"
 

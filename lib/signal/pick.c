@@ -1,4 +1,4 @@
-/* pick.c: which frames of a sequence say most of the others: pivoted Cholesky of their Gram matrix.
+/* pick.c: chooses the frames that best represent the others: pivoted Cholesky factorisation of their Gram matrix.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "signal/root.h"
@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* The diagonal of what is left of g when the frames chosen so far are known. */
+/* Update the diagonal of the remainder of g, given the frames chosen so far. */
 static void factor_step(size_t n, const double *g, double *l, size_t step, size_t pivot, double *left)
 {
     double root = sqrt(left[pivot]);

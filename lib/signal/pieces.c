@@ -1,7 +1,7 @@
-/* pieces.c: triangles and segments of a vector graph and their neighbourhoods.
+/* pieces.c: the triangles and segments of a vector graph, and their neighbours.
  *
- * A map of a whole polygon does not say where its corners are unless it is a triangle, so polygons are cut into fans, from
- * the corner whose smallest triangle is largest. Neighbours share an edge; pieces that only vertices connect get one pair
+ * A linear map of a whole polygon determines its corners only for a triangle, so polygons are cut into fans, from the
+ * corner whose smallest triangle is largest. Neighbours share an edge; pieces connected only by vertices get one pair
  * per gap.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/pieces.h"
@@ -11,7 +11,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { LARGE_FACE = 64 }; /* corners above which a fan starts anywhere */
+enum { LARGE_FACE = 64 }; /* above this many corners the fan starts anywhere */
 
 void vgi_pieces_clear(vgi_pieces *p)
 {
@@ -52,7 +52,7 @@ static double twice_area(const double *vertices, uint32_t a, uint32_t b, uint32_
 
 /* ---- triangles ---- */
 
-/* The corner whose fan has the largest smallest triangle; of equal ones the first. */
+/* The corner whose fan has the largest smallest triangle; the first of equal ones. */
 static uint32_t choose_apex(const uint32_t *vert, size_t r, const double *reference)
 {
     uint32_t best = 0;
@@ -85,7 +85,7 @@ static void cut_faces(vgi_pieces *p, const double *reference)
     p->first[g->nf] = (uint32_t)n;
 }
 
-/* Areas, at least a thousandth of their mean; of segments alone squared lengths. */
+/* Areas, at least a thousandth of their mean; squared lengths if there are only segments. */
 static void set_shares(vgi_pieces *p, const double *reference)
 {
     double sum = 0, floor, all = 0;
@@ -139,7 +139,7 @@ static void put_pair(vgi_pieces *p, uint32_t *set, uint32_t a, uint32_t b, uint3
     set[find(set, a)] = find(set, b);
 }
 
-/* Pieces that share an edge, then those that a shared vertex connects and no edge has. */
+/* Pair the pieces that share an edge, then those connected by a shared vertex but by no edge. */
 static void pair_pieces(vgi_pieces *p, const vgi_incidence *around, vgi_piece_side *sides, uint32_t *set)
 {
     size_t n = vgi_pieces_sides(p, sides);

@@ -1,8 +1,7 @@
-/* plane.c: positions in the plane whose distances are as near as can be to given ones: stress majorisation.
+/* plane.c: positions in the plane with distances as near as possible to given ones: stress majorisation.
  *
- * A step replaces p_i by the mean over j of p_j + distance_ij (p_i - p_j) / |p_i - p_j| (Guttman). It is done twice as far
- * as long as that lowers the stress, which halves the number of steps.
- * Leaves out which distances (layout.c).
+ * A step replaces p_i by the mean over j of p_j + distance_ij (p_i - p_j) / |p_i - p_j| (Guttman). Steps of double
+ * length are used while they lower the stress, which halves their number. Distances are chosen in layout.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/signal.h"
 #include "signal/signal_kernel.h"
@@ -28,16 +27,16 @@ double vgi_plane_radius(size_t n, const double *p, double centre[2])
     return sqrt(sum / (double)n);
 }
 
-/* What a step looks at: coordinates apart, so that frames lie side by side in registers. */
+/* Input of a step: coordinates separate, so that frames are side by side in registers. */
 typedef struct plane {
     size_t n;
     const double *distance;
-    double least; /* below it a distance in the plane counts as this */
+    double least; /* smaller distances in the plane count as this */
     const bool *held;
     size_t nheld;
 } plane;
 
-/* The stress at p (x then y), and where a step leads. */
+/* The stress at p (x then y), and the result of a step. */
 static double step(const plane *s, const double *p, double *to)
 {
     size_t n = s->n;
@@ -54,7 +53,7 @@ static double step(const plane *s, const double *p, double *to)
         for (size_t i = 0; i < 2 * n; i++) to[i] /= (double)n;
         return stress;
     }
-    /* the others' part of the matrix n I - 1 1' has the inverse (I + 1 1' / nheld) / n */
+    /* the block of the other frames in the matrix n I - 1 1' has the inverse (I + 1 1' / nheld) / n */
     double fixed[2] = {0, 0};
     for (size_t i = 0; i < 2 * n; i++)
         if (s->held[i % n]) fixed[i / n] += p[i];
@@ -71,7 +70,7 @@ static void swap(double **a, double **b)
     *a = *b, *b = t;
 }
 
-/* now: where it is; leads: where a step from there leads. After it, now is the end. */
+/* now: current positions; leads: result of a step from there. The result is in now. */
 static vgi_stress_stats settle(const plane *s, double *room[4])
 {
     enum { MOST_STEPS = 2000 };
@@ -92,7 +91,7 @@ static vgi_stress_stats settle(const plane *s, double *room[4])
         stress = next;
         if (!(less > 1e-7 * stress)) break;
     }
-    swap(now, leads); /* the last one as it is */
+    swap(now, leads); /* the last one is a plain step */
     return (vgi_stress_stats){.stress = step(s, *now, *leads), .steps = steps};
 }
 

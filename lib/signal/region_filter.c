@@ -1,5 +1,5 @@
-/* region_filter.c: noise taken out of each frame by what neighbouring vertices have in common over all frames.
- * Leaves out how regions grow (regions.c).
+/* region_filter.c: removes from each frame the noise, which is what neighbouring vertices do not have in common over
+ * all frames. Regions are grown in regions.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/regions.h"
 #include "numeric/blas.h"
@@ -10,16 +10,16 @@
 #include <stdlib.h>
 
 enum { AFFINE = 4, FEWEST = 8, ROUNDS = 20, BLOCK = 16 }; /* rank of a region that moves affinely; fewest frames;
-                                                             rounds of the search for the noise; frames of a block */
+                                                             rounds of the noise estimate; frames per block */
 
 struct vg_region_filter {
     size_t nv, nregions, nframes;
     int threads;
     vgi_region *region;
-    size_t *matrix;    /* nregions + 1: where the matrix of each begins */
-    double *matrices;  /* n x n: first sums of products over rows, then the filter */
-    double *noise;     /* nregions: standard deviation of a coordinate; negative: not known */
-    double *total;     /* nv: the weights of all regions that a vertex is in */
+    size_t *matrix;    /* nregions + 1: start of each matrix */
+    double *matrices;  /* n x n: first sums of products of rows, then the filter */
+    double *noise;     /* nregions: standard deviation per coordinate; negative: unknown */
+    double *total;     /* nv: sum of the weights of all regions that contain the vertex */
 };
 
 void vg_region_filter_free(vg_region_filter **out)
@@ -35,7 +35,7 @@ void vg_region_filter_free(vg_region_filter **out)
     *out = NULL;
 }
 
-/* weight of vertex i of a region: largest at its centre */
+/* weight of vertex i of a region; largest at its centre */
 static double weight_of(const vgi_region *p, size_t i)
 {
     return 1 - 0.8 * (double)i / (double)p->n;
@@ -106,10 +106,10 @@ void vg_region_filter_look(vg_region_filter *r, size_t n, const double *const *v
     vgi_blas_shared();
 }
 
-/* ---- what a region keeps ---- */
+/* ---- ---- the filter of a region ---- */
 
-/* The variance of the noise is the residual outside the rank, per degree of freedom there; the rank is the number
- * of singular values above those of noise alone. Starts at the rank of an affine motion and repeats until both
+/* Estimate the noise variance as the residual outside the rank, per degree of freedom there; the rank is the number
+ * of singular values above those of noise alone. Starts at the rank of an affine motion and iterates until both
  * agree. */
 static double find_noise(size_t rows, size_t n, const double *square)
 {
@@ -127,7 +127,7 @@ static double find_noise(size_t rows, size_t n, const double *square)
     return variance;
 }
 
-/* the best factor of a singular value for the Frobenius norm; `square` is in units of the noise of a row */
+/* the best factor of a singular value in the Frobenius norm; `square` is in units of the noise of a row */
 static double shrink(double square, double shape)
 {
     double edge = 1 + sqrt(shape), a = square - shape - 1;

@@ -12,7 +12,7 @@ typedef struct growth {
     uint32_t *first, *next;  /* neighbours of v: next[first[v]] .. next[first[v + 1] - 1] */
     double *distance;        /* nv: along edges from the centre; INFINITY outside the region and its front */
     bool *inside, *covered;  /* nv */
-    uint32_t *front;         /* vertices beside the region */
+    uint32_t *front;         /* vertices adjacent to the region */
     size_t nfront;
 } growth;
 
@@ -26,7 +26,7 @@ static void clear(growth *g)
     free(g->front);
 }
 
-/* both directions of every edge; an edge of two faces is listed twice */
+/* store both directions of every edge; an edge of two faces is listed twice */
 static void gather_neighbours(growth *g)
 {
     const vg_mesh *m = g->m;
@@ -54,7 +54,7 @@ static int prepare(growth *g, vg_err *e)
     g->front = vgi_array_raw(m->nv, sizeof *g->front, e);
     if (!g->first || !g->next || !g->distance || !g->inside || !g->covered || !g->front) return VG_ENOMEM;
     for (size_t v = 0; v < m->nv; v++) g->distance[v] = INFINITY;
-    for (size_t f = 0; f < m->nf; f++) /* degrees: each face adds two to each of its vertices; stored one place
+    for (size_t f = 0; f < m->nf; f++) /* degrees: each face adds two to each of its vertices; stored one entry
                                           later */
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) g->first[m->vert[c] + 1] += 2;
     for (size_t v = 0; v < m->nv; v++) g->first[v + 1] += g->first[v];
@@ -73,7 +73,7 @@ static void reach_neighbours(growth *g, uint32_t v)
     }
 }
 
-/* Linear search, because the front is short. Of equal distances the lowest vertex number is taken. */
+/* Linear search, because the front is short. Among equal distances the lowest vertex number wins. */
 static uint32_t take_nearest(growth *g)
 {
     size_t best = 0;

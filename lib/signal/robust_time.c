@@ -1,5 +1,5 @@
-/* robust_time.c: the value at the middle of a parabola through the positions of a point in time, insensitive to
- * outliers: least squares repeated with weights (Cleveland 1979).
+/* robust_time.c: the value at the middle of a parabola through the positions of a point over time, robust against
+ * outliers: iteratively reweighted least squares (Cleveland 1979).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/smooth.h"
 #include "numeric/stats.h"

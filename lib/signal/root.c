@@ -1,4 +1,4 @@
-/* root.c: the rigid motion of a whole body: the rotation and the shift that take its reference nearest to each pose.
+/* root.c: the rigid motion of a body: the rotation and shift that map its reference nearest to each pose.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/root.h"
 #include "numeric/polar.h"

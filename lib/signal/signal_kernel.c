@@ -1,5 +1,5 @@
-/* signal_kernel.c: the inner loops of fitting a signal: pulls between points of a layout, and products of rows.
- * Sums have eight lanes, which are merged in the end, so that they do not depend on the width of a vector.
+/* signal_kernel.c: the inner loops of fitting a signal: pulls between points of a layout, and products of rows. Sums
+ * have eight lanes that are merged at the end, so that they do not depend on the vector width.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/signal_kernel.h"
 #include "core/wide.h"
@@ -55,7 +55,7 @@ static void all_pull(vgi_pull *p)
 
 /* ---- products of rows ---- */
 
-/* Products of four rows, n apart, with v. */
+/* Products with v of four rows, n apart. */
 VGI_INLINE void products_of_four(const double *a, size_t n, const double *v, double t[4])
 {
     eight s[4] = {{{{0}}}};

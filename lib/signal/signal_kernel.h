@@ -5,9 +5,9 @@
 
 #include "core/isa.h"
 
-/* pull: point `at` of a layout against the first `count` others, each pair once. want: distances to them; below `least` a
- * distance in the plane counts as that. With d the distance and u the difference from other j to the point: stress +=
- * (d - want)^2; the point's pull (2 numbers) += want u / d, and that of j (bx, by) -= it. */
+/* pull: point `at` of a layout against the first `count` others, each pair once. want: distances to them. Distances
+ * in the plane below `least` count as `least`. With d the distance and u the difference from other j to the point:
+ * stress += (d - want)^2; the point's pull (2 numbers) += want u / d, and that of j (bx, by) -= it. */
 typedef struct vgi_pull {
     size_t count;
     const double *want, *x, *y;
@@ -17,11 +17,11 @@ typedef struct vgi_pull {
 
 typedef struct vgi_signal_kernel {
     void (*pull)(vgi_pull *p);
-    /* project: v -= sum of the rows of q (n numbers each) times their products with v, which are added to c. */
+    /* project: for each row of q (n numbers): v -= row times (row . v), which is added to c. */
     void (*project)(const double *q, size_t rows, size_t n, double *v, double *c, size_t stride);
-    /* take_out: rest (n x m) -= v v' rest; product (m) := v' rest; square (n): of the rows that are left. */
+    /* take_out: rest (n x m) -= v v' rest; product (m) := v' rest; square (n): squared rows of the result. */
     void (*take_out)(size_t n, size_t m, const double *v, double *rest, double *product, double *square);
-    /* distances: squares of the distances of row x from `count` others, `stride` apart */
+    /* distances: squared distances of row x from `count` others, `stride` apart */
     void (*distances)(const double *x, const double *others, size_t count, size_t stride, size_t m, double *square);
 } vgi_signal_kernel;
 VGI_KERNEL(vgi_signal_kernel)

@@ -1,10 +1,10 @@
-/* sketch.c: a curve through the pose plane that somebody has drawn.
+/* sketch.c: a hand-drawn curve through the pose plane.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/signal.h"
 
 #include <stdlib.h>
 
-/* Uniform knots 0, 1, ..., k + 1; the curve is what lies from knot 2 to knot k - 1. */
+/* Uniform knots 0, 1, ..., k + 1; the curve is defined from knot 2 to knot k - 1. */
 static int from_controls(vgi_curve *c, const double *points, size_t n, vg_err *e)
 {
     *c = (vgi_curve){.k = n};

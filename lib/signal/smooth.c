@@ -1,5 +1,5 @@
-/* smooth.c: a moving window of frames; rigid motion and pose are filtered separately. The filters are in weights.c
- * and robust_time.c.
+/* smooth.c: smoothing over a moving window of frames; rigid motion and pose are filtered separately. The filters are
+ * in weights.c and robust_time.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/smooth.h"
 #include "numeric/polar.h"
@@ -8,18 +8,18 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { ROOT = 7, CHUNK = 3 * 512 }; /* numbers of the rigid motion: quaternion, centroid; numbers of a task */
+enum { ROOT = 7, CHUNK = 3 * 512 }; /* numbers of the rigid motion (quaternion, centroid); numbers per task */
 
 struct vg_smoother {
     vgi_time_filter pose, root;
-    size_t nv, reach, places; /* places: frames of the window */
+    size_t nv, reach, places; /* places: frames in the window */
     int threads;
     const double *reference;
     double centre[3];         /* of the reference */
     double *window;           /* places x (ROOT + 3 nv): root, then the pose without it */
     double *weight;           /* places */
     const double **frame;     /* places: the frames of a window, in order */
-    size_t known, given;      /* frames added, frames given back */
+    size_t known, given;      /* frames added, frames returned */
     bool ended;
 };
 
@@ -147,7 +147,7 @@ static void filter_part(vg_smoother *s, const vgi_time_filter *t, size_t first, 
 bool vg_smoother_next(vg_smoother *s, double *vertices)
 {
     double root[ROOT], m[9], length = 0;
-    /* the first frames wait until the window is full: near the start they depend on all of it */
+    /* the first frames wait until the window is full, because near the start they depend on all of it */
     size_t needs = s->given + s->reach + 1 > s->places ? s->given + s->reach + 1 : s->places;
     if (s->given == s->known || (!s->ended && s->known < needs)) return false;
     filter_part(s, &s->root, 0, 4, 4, root);

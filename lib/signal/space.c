@@ -1,10 +1,9 @@
-/* space.c: the shape spaces in which turns have logarithms.
+/* space.c: the shape spaces in which rotations have logarithms.
  *
- * vectors: 4 numbers a corner of the vector graph, logarithm of its turn and of its scale. gradients: 9 a piece, logarithm
- * of the turn and the stretch of the map that takes its edges and its unit normal from the reference to the pose. Turns are
- * measured from the mean of all frames, which is kept as the home of the turns. Numbers are weighted so that the square of
- * a distance is a mean over the surface.
- * Leaves out what comes of sums of them (basis.c), and positions (vg_solver).
+ * vectors: 4 numbers per corner of the vector graph, logarithms of its rotation and scale. gradients: 9 per piece,
+ * logarithm of the rotation, and the stretch, of the map of its edges and unit normal from the reference to the pose.
+ * Rotations are measured from the mean of all frames, which is stored as their home. Numbers are weighted so that a
+ * squared distance is a mean over the surface. Sums of them are computed in basis.c, positions by vg_solver.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/space.h"
 #include "method/vectors/unwrap.h"
@@ -49,7 +48,7 @@ static size_t node_of(const vgi_space *s, size_t piece)
     return s->kind == VG_SPACE_VECTORS ? s->pieces.face[piece] : piece;
 }
 
-/* ---- making ---- */
+/* ---- ---- construction ---- */
 
 static void invert_frames(vgi_space *s)
 {
@@ -91,7 +90,7 @@ int vgi_space_make(vgi_space *s, vg_space kind, const vg_graph *g, const double 
 
 static const size_t upper[6] = {0, 1, 2, 4, 5, 8};
 
-static double twice(size_t k) /* what stands twice in a symmetric matrix */
+static double twice(size_t k) /* weight of an element of a symmetric matrix: off the diagonal it occurs twice */
 {
     return k == 0 || k == 3 || k == 5 ? 1 : M_SQRT2;
 }
@@ -117,7 +116,7 @@ void vgi_stretch_get(const double in[6], double weight, double m[9])
 typedef struct measuring {
     const vgi_space *s;
     const double *poses;
-    double *const *corners; /* of the frames of a batch: quaternions of the corners */
+    double *const *corners; /* quaternions of the corners in the frames of a batch */
     double *values, *turns; /* n x d, n x 4 nodes */
     size_t first;
 } measuring;
@@ -128,7 +127,7 @@ static void make_unit(const double from[4], double q[4])
     for (int k = 0; k < 4; k++) q[k] = size > 0 ? from[k] / size : k == 0;
 }
 
-/* The turn and stretch of a piece that has no map of its own: those of a corner. */
+/* Rotation and stretch of a piece without a map: those of a corner. */
 static void borrow(const double corner[4], double q[4], double stretch[9])
 {
     double scale = corner[0] * corner[0] + corner[1] * corner[1] + corner[2] * corner[2] + corner[3] * corner[3];
@@ -158,7 +157,7 @@ static void measure_gradient(const vgi_space *s, size_t i, const double *pose, c
         for (size_t b = 0; b < 3; b++) stretch[3 * a + b] = r[a] * m[b] + r[3 + a] * m[3 + b] + r[6 + a] * m[6 + b];
 }
 
-/* lengths: the turn of the frame along the first edge. */
+/* lengths: rotation of the frame along the first edge. */
 static void measure_frame(const vgi_space *s, size_t i, const double *pose, const double corner[4], double q[4])
 {
     double now[9], before[9], edge[6], inverse[9], c[9];
@@ -173,7 +172,7 @@ static void measure_frame(const vgi_space *s, size_t i, const double *pose, cons
     vg_quat_from_matrix(c, q);
 }
 
-/* vectors: the mean turn of a face's corners; their own turns and scales stand in the values. */
+/* vectors: mean rotation of a face's corners; their own rotations and scales go to the values. */
 static void measure_face(const vgi_space *s, size_t f, const double *corners, double *values, double q[4])
 {
     double sum[4] = {0, 0, 0, 0};
@@ -211,8 +210,8 @@ static void measure_pose(void *context, size_t index)
 
 /* ---- homes and branches ---- */
 
-/* The homes of the turns: those of the mean logarithms; the turns are then measured from there. A mean of the turns
- * themselves says nothing where they go round. */
+/* Set the homes of the rotations to the means of their logarithms; rotations are then measured from there. A mean of
+ * the rotations themselves is meaningless if they go full circle. */
 static void move_homes(const vgi_space *s, size_t n, const double *sum, double *turns, double *home)
 {
     for (size_t i = 0; i < s->nodes; i++) {
@@ -227,7 +226,7 @@ static void move_homes(const vgi_space *s, size_t n, const double *sum, double *
     }
 }
 
-/* Pairs of nodes, and for each the largest turn between the two in any frame: 1 - |cosine of half of it|. */
+/* Pairs of nodes, and for each the largest rotation between the two in any frame: 1 - |cosine of half the angle|. */
 static size_t list_pairs(const vgi_space *s, size_t n, const double *turns, uint32_t *pair, double *cost)
 {
     size_t count = 0;
@@ -253,7 +252,7 @@ static size_t count_jumps(size_t npairs, const uint32_t *pair, const double *l)
     return jumps;
 }
 
-/* vectors: those of the corners, next to that of their face. */
+/* vectors: logarithms of the corners, near that of their face. */
 static void put_corner_logs(const vgi_space *s, size_t f, const double home[4], const double near[3], double *values)
 {
     const uint32_t *start = s->g->start;
@@ -270,7 +269,8 @@ static void put_corner_logs(const vgi_space *s, size_t f, const double home[4], 
     }
 }
 
-/* The values of a frame from the vectors that its nodes are near to, which become logarithms. */
+/* The values of a frame, with the logarithms nearest to the given vectors of its nodes; the vectors are replaced by
+ * the logarithms. */
 static void put_logs(const vgi_space *s, const double *q, const double *home, double *l, double *values)
 {
     for (size_t i = 0; i < s->nodes; i++) {
@@ -308,7 +308,7 @@ static void keep_logs(walking *w, size_t f, const double *now)
     *w->jumps += count_jumps(w->npairs, w->pair, w->exact);
 }
 
-/* Give the logarithms of each frame to `take`, one frame after another. */
+/* Pass the logarithms of each frame to `take`, frame by frame. */
 static int walk(walking *w, void (*take)(walking *w, size_t f, const double *now), vg_err *e)
 {
     const vgi_space *s = w->s;
@@ -378,7 +378,7 @@ int vgi_space_measure(const vgi_space *s, const double *reference, size_t n, con
     return r;
 }
 
-/* ---- back ---- */
+/* ---- ---- inverse ---- */
 
 static void corners_of_logs(const vgi_space *s, const double *home, const double *values, double *vectors)
 {

@@ -1,10 +1,10 @@
-/* space_relative.c: the two shape spaces that no rigid motion of the body changes, but for the mean turn of its surface,
- * which is kept as three numbers.
+/* space_relative.c: the two shape spaces that are invariant under rigid motion of the body, except for the mean
+ * rotation of its surface, which is stored as three numbers.
  *
- * rotations: what turn takes a piece to its neighbour's (after Lipman, Sorkine, Levin and Cohen-Or 2005), and stretches.
- * lengths: lengths of edges and angles between neighbours (after Winkler, Drieseberg, Alexa and Hormann 2010). Back by two
- * linear steps: the frames of the pieces by least squares over M_b = M_a Q_ab, one factorisation a shape, each then made a
- * rotation; and the vectors that follow from them.
+ * rotations: the rotation from each piece to its neighbour (after Lipman, Sorkine, Levin and Cohen-Or 2005), and
+ * stretches. lengths: lengths of edges, and angles between neighbours (after Winkler, Drieseberg, Alexa and Hormann
+ * 2010). The inverse takes two linear steps: the frames of the pieces by least squares over M_b = M_a Q_ab, one
+ * factorisation per shape, each then projected to a rotation; and the vectors that follow from them.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/unwrap.h"
 #include "numeric/polar.h"
@@ -16,15 +16,15 @@
 #include <stdlib.h>
 
 struct vgi_relative {
-    size_t root;       /* the piece whose frame is held while the others are found */
+    size_t root;       /* the piece whose frame is held in the solve */
     size_t nedges;     /* lengths: */
     uint32_t *edge;    /* nedges pairs of vertices */
     uint32_t *side;    /* 3 per piece: its edges, from each vertex to the next */
     double *length;    /* of the edges in the reference */
     double *edge_weight;
-    size_t *at;        /* npairs + 1: where in the values each pair begins */
-    double *angle;     /* npairs: in the reference, of pairs of triangles that share an edge */
-    double *axes;      /* lengths: 9 per piece: of the triangle in the reference; the identity where it has none */
+    size_t *at;        /* npairs + 1: index in the values where each pair begins */
+    double *angle;     /* npairs: angle in the reference, for triangles that share an edge */
+    double *axes;      /* lengths: 9 per piece: axes of the triangle in the reference; the identity if it has none */
     vgi_cholesky *cholesky;
     vgi_triplets triplets;
     double *q;         /* 9 per pair */
@@ -66,7 +66,7 @@ void vgi_relative_free(vgi_relative **out)
 
 /* ---- edges and angles ---- */
 
-/* Whether the pair is measured by one angle. */
+/* Whether the pair is measured by one angle (a hinge). */
 static bool is_hinge(const vgi_space *s, size_t i)
 {
     const vgi_neighbours *p = &s->pieces.pair[i];
@@ -80,7 +80,7 @@ static double pair_weight(const vgi_space *s, size_t i)
     return sqrt((s->pieces.share[p->a] + s->pieces.share[p->b]) / 3);
 }
 
-/* The turn about the shared edge that takes the normal of a to that of b; 0 where one has none. */
+/* Rotation about the shared edge from the normal of a to that of b; 0 if one is undefined. */
 static double angle_of(const vgi_space *s, size_t i, const double *vertices)
 {
     const vgi_neighbours *p = &s->pieces.pair[i];
@@ -110,7 +110,7 @@ void vgi_relative_lengths(const vgi_space *s, const double *pose, double *values
         if (is_hinge(s, i)) values[r->at[i]] = angle_of(s, i, pose) - r->angle[i];
 }
 
-/* ---- making ---- */
+/* ---- ---- construction ---- */
 
 static void number_edges(const vgi_pieces *p, vgi_relative *r, const vgi_piece_side *sides, size_t n)
 {
@@ -147,7 +147,7 @@ static int make_edges(const vgi_space *s, const double *reference, vg_err *e)
     return code;
 }
 
-/* Where the numbers of each pair are, and the size of a shape. */
+/* Compute the index of each pair's numbers, and the size of a shape. */
 static void lay_out(vgi_space *s, const double *reference)
 {
     vgi_relative *r = s->relative;
@@ -178,9 +178,9 @@ int vgi_relative_make(vgi_space *s, const double *reference, vg_err *e)
     return VG_OK;
 }
 
-/* ---- to numbers ---- */
+/* ---- ---- from poses to numbers ---- */
 
-/* The turn of the whole surface: the rotation nearest to the mean of its pieces'. */
+/* Rotation of the whole surface: the rotation nearest to the mean of its pieces'. */
 static void mean_turn(const vgi_space *s, const double *turns, double q[4])
 {
     double sum[9] = {0}, m[9];
@@ -192,7 +192,7 @@ static void mean_turn(const vgi_space *s, const double *turns, double q[4])
     vg_quat_from_matrix(m, q);
 }
 
-/* The logarithm on the branch nearest to the one before, times the weight; the one before is replaced. */
+/* The logarithm on the branch nearest to the previous one, times the weight; it replaces the previous one. */
 static void put_log(const double q[4], double weight, double before[3], double *out)
 {
     double l[3];
@@ -201,7 +201,7 @@ static void put_log(const double q[4], double weight, double before[3], double *
     for (int k = 0; k < 3; k++) out[k] = weight * M_SQRT2 * 2 * l[k];
 }
 
-/* An angle in a row of frames, without jumps by a whole turn. */
+/* An angle in a sequence of frames, without jumps by whole turns. */
 static void put_angle(double weight, double *before, double *out)
 {
     *out += 2 * M_PI * nearbyint((*before - *out) / (2 * M_PI));
@@ -230,9 +230,9 @@ void vgi_relative_finish(const vgi_space *s, size_t n, const double *turns, doub
     }
 }
 
-/* ---- back: turns between neighbours ---- */
+/* ---- ---- inverse: rotations between neighbours ---- */
 
-/* The two edges of a triangle with these sides, in its own axes. */
+/* The two edges of a triangle with these side lengths, in its own axes. */
 static void lay_triangle(const double side[3], double edges[6])
 {
     double a = side[0], b = side[1], c = side[2], x = a > 0 ? (a * a + c * c - b * b) / (2 * a) : 0;
@@ -242,7 +242,7 @@ static void lay_triangle(const double side[3], double edges[6])
     edges[4] = sqrt(fmax(c * c - x * x, 0));
 }
 
-/* Lengths: edges of the pieces in their own axes, into s->moved. */
+/* lengths: edges of the pieces in their own axes, written to s->moved. */
 static void lay_pieces(const vgi_space *s, const double *values)
 {
     const vgi_relative *r = s->relative;
@@ -255,7 +255,7 @@ static void lay_pieces(const vgi_space *s, const double *values)
         }
         if (triangle) lay_triangle(side, edges);
         double length = vgi_length(s->edges + 6 * i);
-        for (size_t k = 0; k < 3 && !triangle; k++) /* a segment lies as in the reference */
+        for (size_t k = 0; k < 3 && !triangle; k++) /* a segment is as in the reference */
             edges[k] = length > 0 ? s->edges[6 * i + k] * side[0] / length : 0;
     }
 }
@@ -269,7 +269,7 @@ static void about_axis(size_t axis, double angle, double m[9])
     m[3 * b + a] = sin(angle), m[3 * a + b] = -sin(angle);
 }
 
-/* The direction, in the axes of piece i, of the edge between two of its vertices. */
+/* Direction, in the axes of piece i, of the edge between two of its vertices. */
 static double direction(const vgi_space *s, size_t i, uint32_t from, uint32_t to)
 {
     const uint32_t *v = s->pieces.vert + 3 * i;
@@ -278,7 +278,7 @@ static double direction(const vgi_space *s, size_t i, uint32_t from, uint32_t to
     return atan2(b[1] - a[1], b[0] - a[0]);
 }
 
-/* Axes of a to axes of b by the angles, then between turns since the reference. */
+/* First from axes of a to axes of b by the angles; then relative to the rotations in the reference. */
 static void turn_of_hinge(const vgi_space *s, size_t i, double angle, double q[9])
 {
     const vgi_neighbours *p = &s->pieces.pair[i];
@@ -312,7 +312,7 @@ static void find_turns(const vgi_space *s, const double *values)
     }
 }
 
-/* ---- back: frames by least squares ---- */
+/* ---- ---- inverse: frames by least squares ---- */
 
 static size_t unknown(const vgi_relative *r, size_t piece) /* of all but the root */
 {
@@ -380,7 +380,7 @@ static int factorize(const vgi_space *s, vg_err *e)
     return code;
 }
 
-/* Solve, and once more for what rounding has left. */
+/* Solve, with one step of iterative refinement. */
 static int solve(const vgi_space *s, vg_err *e)
 {
     vgi_relative *r = s->relative;
@@ -394,7 +394,7 @@ static int solve(const vgi_space *s, vg_err *e)
     return code;
 }
 
-/* The frame of piece i before the whole is turned. */
+/* Frame of piece i before the rotation of the whole. */
 static void frame_of(const vgi_space *s, size_t i, double frame[9])
 {
     const vgi_relative *r = s->relative;
@@ -404,7 +404,7 @@ static void frame_of(const vgi_space *s, size_t i, double frame[9])
     vgi_fit_rotation(m, frame);
 }
 
-/* The turn that gives the surface the mean turn that is wanted. */
+/* The rotation that gives the surface the wanted mean rotation. */
 static void turn_whole(const vgi_space *s, const double *values, double whole[9])
 {
     double sum[9] = {0}, m[9], back[9];

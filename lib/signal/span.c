@@ -1,7 +1,7 @@
 /* span.c: shapes as sums of example poses (C 4.3), and the same sums of another body's poses.
  *
- * Fitting wants orthonormal vectors; a signal of examples keeps the differences between examples, so that those of another
- * body can take their place. Cholesky's factor of the differences' products leads from one to the other.
+ * Fitting needs orthonormal vectors; a signal of examples stores the differences between examples, so that those of
+ * another body can replace them. The Cholesky factor of the differences' products converts between both.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/span.h"
 #include "numeric/vec3.h"
@@ -101,7 +101,7 @@ int vgi_span_project(const vgi_basis *b, double **poses, vg_err *e)
     return VG_OK;
 }
 
-/* Rows y of the orthonormal vectors are rows x of the differences: x L = y. */
+/* Rows y of orthonormal coordinates correspond to rows x of coordinates in the differences: x L = y. */
 void vgi_span_coordinates(const vgi_span *s, size_t n, double *x)
 {
     size_t m = s->m;
@@ -114,7 +114,7 @@ void vgi_span_coordinates(const vgi_span *s, size_t n, double *x)
 
 /* ---- another body ---- */
 
-/* The centroid goes as that of the source goes, scaled by the bodies' sizes. */
+/* The centroid moves as that of the source does, scaled by the bodies' sizes. */
 static void move_root(vg_signal *s, const double *from, size_t nfrom, const double *to, size_t nto)
 {
     double a[3], b[3], moved[3], before = vg_diagonal(from, nfrom), ratio = before > 0 ? vg_diagonal(to, nto) / before : 1;
@@ -129,7 +129,7 @@ static void move_root(vg_signal *s, const double *from, size_t nfrom, const doub
     }
 }
 
-/* Each pose is turned back as the example was in whose place it comes, about its centroid, which goes to `home`. */
+/* Rotate each pose back as the example that it replaces was, about its centroid, which moves to `home`. */
 static void turn_back(const vg_signal *s, const double *reference, double *poses, size_t n, size_t nv)
 {
     double home[3], centre[3], moved[3];

@@ -1,11 +1,11 @@
-/* spline_pose.c: the pose signal: a thin-plate spline from the plane to shape coordinates, least squares over all frames.
+/* spline_pose.c: the pose signal: a thin-plate spline from the plane to shape coordinates, by least squares over all
+ * frames.
  *
- * The sites are frames. Coefficients of the radial functions shall be orthogonal to linear functions at the sites (else
- * the fit depends on the scale of the plane), so the function of a site beyond the anchors is
- * phi(|s_j - p|) - sum_a lambda_a(s_j) phi(|s_a - p|), lambda the barycentric coordinates in the anchors. Together with
- * the lambda these span all that the sites can say; they are orthogonalised one by one on the frames, so that a fit with
- * fewer sites is the beginning of one with more.
- * Leaves out how positions are found (layout.c).
+ * The sites are frames. Coefficients of the radial functions must be orthogonal to linear functions at the sites
+ * (otherwise the fit depends on the scale of the plane). So the function of a site beyond the anchors is phi(|s_j -
+ * p|) - sum_a lambda_a(s_j) phi(|s_a - p|), lambda the barycentric coordinates with respect to the anchors. With the
+ * lambda these span all functions of the sites. They are orthogonalised one by one on the frames, so that a fit with
+ * fewer sites is the beginning of one with more. Positions are found in layout.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "signal/signal.h"
@@ -14,8 +14,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double nearest = 1e-3;  /* sites keep this from one another as long as there are others */
-static const double dependent = 1e-9; /* what is left of a function, beside it, that says nothing new */
+static const double nearest = 1e-3;  /* least distance between sites while others are available */
+static const double dependent = 1e-9; /* a function whose remainder is below this, relative to itself, depends on the
+                                         others */
 
 static double phi(double square)
 {
@@ -79,8 +80,8 @@ static void set_barycentric(vgi_plate *s)
     m[0] = 1 - m[3] - m[6], m[1] = -m[4] - m[7], m[2] = -m[5] - m[8];
 }
 
-/* Of `among` (count frames) the one farthest from the origin, the one farthest from that, the one that makes the largest
- * triangle. */
+/* Among `among` (count frames): the one farthest from the origin, the one farthest from that, and the one that makes
+ * the largest triangle. */
 static void choose_anchors(vgi_plate *s, const uint32_t *among, size_t count)
 {
     static const double origin[2] = {0, 0};
@@ -116,8 +117,8 @@ static double norm(const double *v, size_t n)
     return sqrt(sum);
 }
 
-/* The function in the next row of q becomes orthogonal to the others, of norm 1, and counts. false: nothing is left of
- * it beside `size`. */
+/* Orthogonalise and normalise the function in the next row of q, and count it. Returns false if its remainder,
+ * relative to `size`, is negligible. */
 static bool orthogonalise(vgi_plate *s, double size)
 {
     size_t j = s->l;
@@ -144,13 +145,13 @@ static void add_anchors(vgi_plate *s)
             s->anchor[a * s->n + i] = phi(square_between(s->p + 2 * i, at));
         }
         if (!orthogonalise(s, norm(v, s->n))) {
-            s->anchors = a; /* cannot be: they are 0 and 1 at the anchors themselves */
+            s->anchors = a; /* cannot happen: they are 0 and 1 at the anchors themselves */
             return;
         }
     }
 }
 
-/* The function of a site, on all frames. Returns the norm of its radial part. */
+/* The function of a site on all frames. Returns the norm of its radial part. */
 static double write_function(const vgi_plate *s, size_t site, double *v, double lambda[3])
 {
     double sum = 0;
@@ -205,11 +206,11 @@ int vgi_plate_make(vgi_plate *s, size_t n, const double *p, const uint32_t *site
 typedef struct greedy {
     vgi_plate *s;
     size_t m;
-    double *rest;   /* n x m: what is not said yet */
-    double *square; /* n: of its rows */
+    double *rest;   /* n x m: residual */
+    double *square; /* n: squares of its rows */
     double *sums;   /* m */
     bool *used;     /* n */
-    double *left;   /* VGI_GAIN: n x n: the functions of all frames, less what is said; their products with rest */
+    double *left;   /* VGI_GAIN: n x n: remainders of the functions of all frames; their products with rest */
     double *match;  /* n x m */
     double *along;  /* n */
 } greedy;
@@ -243,7 +244,7 @@ static size_t most_gain(const greedy *g)
     return best;
 }
 
-/* What v says is said: of the functions that are left, and of their products with what is not said. */
+/* Remove the direction v from the remaining functions, and from their products with the residual. */
 static void take_out_gain(greedy *g, const double *v)
 {
     size_t n = g->s->n, m = g->m;
@@ -271,7 +272,7 @@ static int start_gain(greedy *g, vg_err *e)
     return VG_OK;
 }
 
-/* All that keep `apart` from those before and say something new, one by one. */
+/* Add one by one all sites that keep `apart` from those before and are independent of them. */
 static void add_others(greedy *g, vgi_site_rule rule, double apart)
 {
     vgi_plate *s = g->s;

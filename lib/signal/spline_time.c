@@ -1,9 +1,9 @@
-/* spline_time.c: the time signal: a cubic B-spline with natural ends, from a parameter that rises with time.
+/* spline_time.c: the time signal: a cubic B-spline with natural ends, over a parameter that increases with time.
  *
- * Control points f_0 .. f_(k-1) over knots U_0 .. U_(k+3), the first and last four alike. Natural ends: f_0 / a - f_1 (1/a
- * + 1/b) + f_2 / b = 0 with a = U_4 - U_1, b = U_5 - U_2, and mirrored; they leave k - 2 unknowns. Inner knots are
- * parameters of frames, so that the least-squares system has full rank for any choice of them.
- * Leaves out splines at whole times (natural.c).
+ * Control points f_0 .. f_(k-1) over knots U_0 .. U_(k+3), the first four equal and the last four equal. Natural
+ * ends: f_0 / a - f_1 (1/a + 1/b) + f_2 / b = 0 with a = U_4 - U_1, b = U_5 - U_2, and the mirror image; they leave k
+ * - 2 unknowns. Inner knots are parameters of frames, so that the least-squares system has full rank for any choice
+ * of them. Splines at integer times are in natural.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/signal.h"
 
@@ -34,13 +34,13 @@ static double secant(const double *x, const double *y, size_t i)
     return (y[i + 1] - y[i]) / (place(x, i + 1) - place(x, i));
 }
 
-/* Slope at an end by the parabola through it and two more: h, d of the step there, g, c of the next. */
+/* Slope at an end, from the parabola through it and the next two points: h, d of the step there, g, c of the next. */
 static double end_slope(double h, double d, double g, double c)
 {
     return ((2 * h + g) * d - h * c) / (h + g);
 }
 
-/* Not more than three times as steep as the secants, taken together. */
+/* Limit the slopes, taken together, to three times those of the secants. */
 static void limit_slopes(double d, double *left, double *right)
 {
     if (!(d > 0)) {
@@ -110,10 +110,10 @@ int vgi_curve_copy(vgi_curve *to, const vgi_curve *from, vg_err *e)
     return VG_OK;
 }
 
-/* The four functions that are not 0 at u; the first is number s - 3, which is returned. */
+/* The four functions that are nonzero at u; the first has number s - 3, which is returned. */
 static size_t basis_at(const double *knot, size_t k, double u, double b[4])
 {
-    size_t low = 3, high = k; /* knot[low] <= u < knot[high], but at the end */
+    size_t low = 3, high = k; /* knot[low] <= u < knot[high], except at the end */
     while (high - low > 1) {
         size_t middle = (low + high) / 2;
         if (u < knot[middle]) high = middle;
@@ -153,7 +153,7 @@ void vgi_curve_at(const vgi_curve *c, double time, double p[2])
 
 /* ---- least squares ---- */
 
-/* f_0 = one f_1 + two f_2, and the same from the other end. */
+/* f_0 = one f_1 + two f_2, and the mirror image at the other end. */
 typedef struct ends {
     double one, two;
 } ends;
@@ -163,7 +163,7 @@ static ends natural_end(double a, double b) /* f_0 / a - f_1 (1 / a + 1 / b) + f
     return (ends){1 + a / b, -a / b};
 }
 
-/* Rows of the system, turned into an upper triangle of width 4 by rotations as they come. */
+/* Rows of the system, reduced to an upper triangle of width 4 by Givens rotations as they arrive. */
 typedef struct band {
     size_t unknowns;
     double *r; /* unknowns x 4: row i holds columns i .. i + 3 */
@@ -192,7 +192,7 @@ static void add_row(band *s, size_t at, double row[4], double right[2])
     }
 }
 
-/* The row of the functions b from number `first` on, with the ends put in: from what unknown it starts. */
+/* The row of the functions b from number `first` on, with the ends eliminated. Returns its first unknown. */
 static size_t reduce(size_t k, size_t first, const double b[4], ends front, ends back, double row[4])
 {
     double all[6] = {0}; /* from function first - 1 on */
@@ -279,7 +279,7 @@ int vgi_curve_fit(vgi_curve *c, size_t n, const double *p, const double *t, cons
     return r;
 }
 
-/* ---- which frames give knots ---- */
+/* ---- ---- choice of knots ---- */
 
 static int by_number(const void *a, const void *b)
 {
@@ -287,7 +287,7 @@ static int by_number(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-/* The frame farthest from the curve, knots not counted; n: all are knots. */
+/* The frame farthest from the curve that is not a knot; n if all are. */
 static size_t farthest_frame(const vgi_curve *c, const double *p, const bool *used)
 {
     size_t best = c->n;
@@ -346,7 +346,7 @@ int vgi_curve_insert(vgi_curve *c, double parameter, vg_err *e)
         free(control);
         return VG_ENOMEM;
     }
-    for (size_t i = 0; i <= k; i++) { /* Boehm */
+    for (size_t i = 0; i <= k; i++) { /* Boehm's algorithm */
         double w = i + 3 <= at ? 1 : i > at ? 0 : (parameter - c->knot[i]) / (c->knot[i + 3] - c->knot[i]);
         for (size_t q = 0; q < 2; q++)
             control[2 * i + q] = (i < k && w > 0 ? w * c->control[2 * i + q] : 0) +

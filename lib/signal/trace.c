@@ -1,6 +1,5 @@
-/* trace.c: the curve of a signal as a fine polyline, with how far its shapes are from a smooth motion, and where it crosses
- * itself.
- * Leaves out drawing (view/plane.c).
+/* trace.c: the curve of a signal as a fine polyline, with the distance of its shapes from a smooth motion, and its
+ * self-crossings. Drawing is in view/plane.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "signal/curve.h"
@@ -35,7 +34,7 @@ int vgi_curve_crossings(const vgi_curve *c, size_t parts, double **times, size_t
     return r;
 }
 
-/* Products of the basis vectors, so that lengths of shapes follow from coordinates. */
+/* Products of the basis vectors, with which lengths of shapes follow from coordinates. */
 static int make_products(const vg_signal *s, double **products, vg_err *e)
 {
     size_t m = s->m, d = s->d;

@@ -1,4 +1,5 @@
-/* unshape.c: shapes that are no vertices: to vectors, and how far the vertices that come of them are from the poses.
+/* unshape.c: shapes that are not vertices: converted to vectors, and the distance of the resulting vertices from the
+ * poses.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/unshape.h"
 #include "numeric/blas.h"
@@ -7,16 +8,16 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { MOST = 64 }; /* poses that are solved at a time, at most */
+enum { MOST = 64 }; /* most poses solved at a time */
 
 /* ---- of a signal ---- */
 
 struct vg_unshaper {
     const vg_signal *s;
     vgi_space space;
-    vg_solver *solver;   /* NULL until vertices are asked for */
+    vg_solver *solver;   /* NULL until vertices are requested */
     double *reference, root[3];
-    double *vectors, *rhs; /* of a pose */
+    double *vectors, *rhs; /* of one pose */
 };
 
 int vg_unshaper_new(vg_unshaper **out, const vg_signal *s, const vg_graph *g, const double *reference, vg_err *e)
@@ -104,7 +105,7 @@ int vgi_unshape_make(vgi_unshape *u, vg_space kind, const vg_graph *g, const dou
            (u->rhs = vgi_array(batch, values * sizeof(double), e)) ? VG_OK : VG_ENOMEM;
 }
 
-/* The vertices of up to a batch of shapes (u->shape). */
+/* The vertices of a batch of shapes (u->shape). */
 static int solve(vgi_unshape *u, size_t n, vg_err *e)
 {
     const vg_graph *g = u->space.g;

@@ -1,5 +1,5 @@
-/* weights.c: the linear filters in time as weights of frames: the low-pass and the polynomial.
- * Leaves out where the frames are (smooth.c) and the robust filter (robust_time.c), whose weights depend on the data.
+/* weights.c: the linear filters in time (low-pass and polynomial) as weights of frames. The window of frames is in
+ * smooth.c; the robust filter, whose weights depend on the data, is in robust_time.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/lapack.h"
 #include "signal/smooth.h"
@@ -10,8 +10,8 @@
 enum { DEGREE = 3 };
 static const double negligible = 1e-7; /* weights of the low-pass below this are dropped */
 
-/* The impulse response of the biquad: a Butterworth low-pass of second order whose amplitude after two passes is
- * 1/sqrt(2) at `frequency` (cycles a frame). */
+/* Impulse response of the biquad: a Butterworth low-pass of second order whose amplitude after two passes is
+ * 1/sqrt(2) at `frequency` (cycles per frame). */
 static void respond(double frequency, size_t n, double *h)
 {
     double w = tan(M_PI * frequency) / pow(sqrt(2) - 1, 0.25), scale = 1 / (1 + sqrt(2) * w + w * w);
@@ -67,8 +67,8 @@ void vgi_time_window(const vgi_time_filter *t, size_t i, size_t known, bool ende
     *n = known - *lo < width ? known - *lo : width;
 }
 
-/* Adds a frame beyond the ends as weights of existing frames: each reflection in an end adds twice the end frame
- * and changes the sign. */
+/* Add a frame beyond the ends as weights of existing frames: each reflection at an end adds twice the end frame and
+ * changes the sign. */
 static void add_reflected(ptrdiff_t at, ptrdiff_t end, double w, size_t lo, double *weight)
 {
     while (at < 0 || at > end) {
@@ -91,7 +91,7 @@ static void weigh_lowpass(const vgi_time_filter *t, size_t i, size_t known, size
         add_reflected((ptrdiff_t)i + k, end, t->kernel[k < 0 ? -k : k], lo, weight);
 }
 
-/* the value at 0 of the polynomial of least squares: with V its powers, row 0 of (V'V)^-1 V' */
+/* the value at 0 of the least-squares polynomial: with V its powers, row 0 of (V'V)^-1 V' */
 static void weigh_polynomial(const vgi_time_filter *t, size_t i, size_t lo, size_t n, double *weight)
 {
     size_t terms = n > DEGREE ? DEGREE + 1 : n;
@@ -103,7 +103,7 @@ static void weigh_polynomial(const vgi_time_filter *t, size_t i, size_t lo, size
         for (size_t r = 0; r < terms; r++)
             for (size_t k = 0; k < terms; k++) a[r * terms + k] += power[r + k];
     }
-    if (!vgi_spd_factor(terms, a)) abort(); /* distinct times: the powers are independent */
+    if (!vgi_spd_factor(terms, a)) abort(); /* times are distinct, so the powers are independent */
     vgi_spd_solve(terms, a, 1, c);
     for (size_t j = 0; j < n; j++) {
         double x = ((double)(lo + j) - (double)i) / (double)t->reach;
