@@ -66,6 +66,7 @@ ALL_CFLAGS += --coverage -O0
 ALL_LDFLAGS := --coverage -Wl,-u,__gcov_dump
 else ifeq ($(CONFIG),fuzz)
 CC := clang
+CXX := clang++
 ALL_CFLAGS += -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined
 ALL_LDFLAGS := -fsanitize=address,undefined
 endif

@@ -370,6 +370,33 @@ END
     must vg-decode without.vgs -o without.glb
 }
 
+@test "a still GLB has no animation and no morph target; a single pose that moves has both" {
+    py <<'END'
+import make_character
+make_character.main("in.glb")
+END
+    must vg-decode "$DATA/trex.rest.obj" -o still.glb
+    must vg-decode still.glb -o again.glb
+    must vg-encode --reference "$DATA/horse.rest.obj" "$DATA/horse-run.tar.xz" -o run.vgs
+    must vg-decode run.vgs -o 'run-%d.obj'
+    must vg-encode --reference "$DATA/horse.rest.obj" run-3.obj -o pose.vgs
+    must vg-decode pose.vgs -o pose.glb
+    pipe 'vg-encode pose.glb | vg-diff -t 1e-6 pose.vgs -'
+    pipe 'vg-encode again.glb | vg-diff -t 1e-6 "$DATA/trex.rest.obj" -'
+    py <<'END'
+import json, struct
+def document(name):
+    data = open(name, "rb").read()
+    return json.loads(data[20:20 + struct.unpack("<I", data[12:16])[0]])
+for name in "still.glb", "again.glb":
+    g = document(name)
+    assert "animations" not in g and "weights" not in g["meshes"][0], name
+    assert all("targets" not in p for p in g["meshes"][0]["primitives"]), name
+g = document("pose.glb")
+assert len(g["animations"]) == 1 and len(g["meshes"][0]["primitives"][0]["targets"]) == 1
+END
+}
+
 @test "several animations: vg-info lists them, vg-decode writes them, each with its own times" {
     py <<'END'
 import make_character

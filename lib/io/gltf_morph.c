@@ -55,16 +55,20 @@ static int begin(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
     return x->packed && x->first ? VG_OK : VG_ENOMEM;
 }
 
+/* A single frame that is the base itself needs no target and no animation. */
 static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
 {
     morphs *x = w->own;
     const size_t n = 3 * w->h->body.mesh.nv;
+    bool moves = false;
     for (size_t i = 0; i < n; i++) {
         float d = (float)(f->values[i] - w->base[i]);
         if ((float)f->values[i] == w->base[i]) d = 0; /* no nearer with what binary32 has lost */
         if (!isfinite(d)) return vg_fail(e, VG_EINPUT, "a position is too large for binary32");
         vgi_gltf_put_single(x->packed + VGI_GLTF_ITEM * i, d);
+        moves |= d != 0;
     }
+    w->still = x->shapes || (w->frames == 0 && !moves && !f->has_time);
     return vgi_output_put(&w->spool, x->packed, VGI_GLTF_ITEM * n, e);
 }
 
@@ -97,7 +101,7 @@ static int take_frames(vgi_gltf_writing *w, vg_err *e)
     morphs *x = w->own;
     if (!(x->chosen = vgi_array(w->frames, sizeof *x->chosen, e))) return VG_ENOMEM;
     int r = load(w, 0, x->first, e);
-    const bool skip = r == VG_OK && x->shapes && moves_nothing(x->first, 3 * w->h->body.mesh.nv);
+    const bool skip = r == VG_OK && w->still && moves_nothing(x->first, 3 * w->h->body.mesh.nv);
     for (size_t i = skip; i < w->frames && r == VG_OK; i++) x->chosen[x->targets++] = i;
     return r;
 }
@@ -106,7 +110,7 @@ static int choose_targets(vgi_gltf_writing *w, vg_err *e)
 {
     morphs *x = w->own;
     const size_t most = x->most ? x->most : USUAL_TARGETS, nv = w->h->body.mesh.nv;
-    if (x->shapes || (w->frames <= most && !x->asked)) return take_frames(w, e);
+    if (w->still || (w->frames <= most && !x->asked)) return take_frames(w, e);
     const vgi_gltf_frames_in in = {w->frames, nv, load_for_basis, w};
     int r = vgi_gltf_basis_make(&x->basis, &in, x->most ? x->most : w->frames,
                                 x->tolerance * vg_diagonal(w->h->body.reference, nv), e);

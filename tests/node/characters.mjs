@@ -1,7 +1,7 @@
 // characters.mjs: three.js as an independent judge of glTF: plays an animation of two files and says how far their vertices,
 // normals, texture coordinates, materials and names are apart.
 //
-//   node characters.mjs BEFORE.glb AFTER.glb [ANIMATION]
+//   node characters.mjs BEFORE.glb AFTER.glb [ANIMATION]       ('*': all of them)
 //
 // Both files are played at the times of the keys of BEFORE's animation (its morph targets when there is none are not
 // played: the rest pose is compared). One line of JSON: {"position": of D, "normal": degrees at rest, "turned": degrees when it
@@ -147,12 +147,21 @@ function names(gltf) {
     gltf.scene.traverse(o => out.push(o.name));
     return out;
 }
-if (name) {
-    const times = key_times(before, name), a = play(before, name, times, positions), b = play(after, name, times, positions);
-    const c = play(before, name, times, normals), e = play(after, name, times, normals);
-    report.frames = times.length;
-    report.moved = Math.max(...a.map(p => farthest(p, at_rest))) / d;
-    report.position = Math.max(...a.map((p, i) => farthest(p, b[i]))) / d;
-    report.turned = Math.max(...c.map((p, i) => widest(p, e[i])));
+// Largest values over the animations; NaN stays.
+function worst(all) {
+    return all.reduce((w, x) => (x <= w ? w : x), 0);
 }
+const played = name === "*" ? before.animations.map(c => c.name) : name ? [name] : [];
+const found = { moved: [], position: [], turned: [] };
+for (const clip of played) {
+    const times = key_times(before, clip), a = play(before, clip, times, positions), b = play(after, clip, times, positions);
+    const c = play(before, clip, times, normals), e = play(after, clip, times, normals);
+    report.frames = (report.frames || 0) + times.length;
+    a.forEach((p, i) => {
+        found.moved.push(farthest(p, at_rest) / d);
+        found.position.push(farthest(p, b[i]) / d);
+        found.turned.push(widest(c[i], e[i]));
+    });
+}
+if (played.length) for (const key in found) report[key] = worst(found[key]);
 console.log(JSON.stringify(report));
