@@ -1,4 +1,4 @@
-/* branch.c: which whole turns belong to a rotation vector (MATH 12). All vectors axis * (angle + 2 pi k) stand for one
+/* branch.c: chooses the whole turns of rotation vectors (MATH 12). All vectors axis * (angle + 2 pi k) represent one
  * rotation; k is chosen so that neighbours agree.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/branch.h"
@@ -10,12 +10,13 @@
 static const double pi = 3.14159265358979323846, none = 1e-9;
 enum { SWEEPS = 20 };
 
-/* the vector of w's rotation that is nearest to target */
+/* the vector of w's rotation nearest to target */
 static void near(const double w[3], const double target[3], double out[3])
 {
     double angle = vgi_length(w), far = vgi_length(target), axis[3];
     if (angle < none) {
-        double turns = far > none ? 2 * pi * round(far / (2 * pi)) / far : 0; /* any axis will do: the target's */
+        double turns = far > none ? 2 * pi * round(far / (2 * pi)) / far : 0; /* any axis is possible: use that of the
+                                                                                 target */
         for (int k = 0; k < 3; k++) out[k] = turns != 0 ? turns * target[k] : w[k];
         return;
     }
@@ -36,7 +37,7 @@ static double between(const double *a, const double *b)
     return 2 * acos(fmin(c, 1));
 }
 
-/* Prim's tree from one centre: each vertex takes the branch nearest to its parent's. */
+/* Prim's tree from the centre: each vertex takes the branch nearest to its parent's. */
 static void grow(const vgi_rings *r, uint32_t centre, double *w, size_t stride, vgi_heap *h, double *key,
                  uint32_t *parent)
 {
@@ -44,7 +45,7 @@ static void grow(const vgi_rings *r, uint32_t centre, double *w, size_t stride, 
     vgi_heap_lower(h, centre);
     while (h->n) {
         uint32_t v = vgi_heap_take(h);
-        key[v] = -1; /* it is in the tree */
+        key[v] = -1; /* in the tree */
         if (parent[v] != v) near(w + stride * v, w + stride * parent[v], w + stride * v);
         for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++) {
             uint32_t to = r->to[i];
@@ -75,7 +76,7 @@ int vgi_branch_first(const vgi_rings *r, double *w, size_t stride, vg_err *e)
 
 /* ---- later poses ---- */
 
-/* what a vector costs beside its neighbours, and beside that of the pose before */
+/* cost of a vector relative to its neighbours, and to that of the previous pose */
 static double cost(const vgi_rings *r, size_t v, const double x[3], const double *w, size_t stride,
                    const double *before)
 {
@@ -84,7 +85,7 @@ static double cost(const vgi_rings *r, size_t v, const double x[3], const double
     return before ? sum + (double)(r->first[v + 1] - r->first[v]) * vgi_square(x, before) : sum;
 }
 
-/* Other whole turns, if they cost less. */
+/* Try other whole turns and keep them if they cost less. */
 static bool improve(const vgi_rings *r, size_t v, double *w, size_t stride, const double *before)
 {
     double mean[3] = {0, 0, 0}, n = (double)(r->first[v + 1] - r->first[v]), x[3], *own = w + stride * v;

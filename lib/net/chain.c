@@ -1,15 +1,15 @@
-/* chain.c: a frame goes through convolutions and a full layer (or scaled coordinates) into recurrent layers and back out
- * as the change to the next frame; backward through time.
+/* chain.c: one step of a chain: a frame passes through convolutions and a full layer (or scaled coordinates) into
+ * recurrent layers, and back out as the change to the next frame; and backpropagation through time.
  *
- * Activations of convolutions are not kept: they are as large as the mesh, and are computed once more on the way back.
- * Leaves out what is done number by number (layer_kernel.c).
+ * Activations of convolutions are not stored, because they are as large as the mesh; they are recomputed in the
+ * backward pass. Elementwise operations are in layer_kernel.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/chain.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-enum { PACK = 8 }; /* steps whose gradients of a full layer are summed by one product */
+enum { PACK = 8 }; /* steps whose gradients of a full layer are summed in one product */
 
 #define FLAT(rows) ((real *)(rows))
 #define FLAT_IN(rows) ((const real *)(rows))
@@ -26,7 +26,7 @@ static size_t frames_of(const vgi_shape *s)
     return s->front == VGI_FRONT_MESH ? 2 * s->convolutions + 12 : 6;
 }
 
-/* Places for all arrays in one block; with base NULL only their sum. */
+/* Lay out all arrays in one block; with base NULL only compute its size. */
 static size_t lay_out(net_chains *c, net_lanes *base)
 {
     const vgi_shape *s = c->shape;
@@ -98,7 +98,7 @@ static net_convolution layer(const net_drive *d, size_t k, bool mirrored)
                              p + (mirrored ? s->bias_back[k] : s->bias[k]), mirrored};
 }
 
-/* frame[0 .. convolutions - 1]: what the convolutions make of x; returns the last */
+/* frame[0 .. convolutions - 1]: outputs of the convolutions of x; returns the last */
 static const net_lanes *convolve_in(net_chains *c, const net_drive *d, const net_lanes *x)
 {
     const vgi_shape *s = c->shape;
@@ -111,7 +111,7 @@ static const net_lanes *convolve_in(net_chains *c, const net_drive *d, const net
     return x;
 }
 
-/* frame[convolutions .. 2 * convolutions]: from h of the last layer out to the change; returns the last */
+/* frame[convolutions .. 2 * convolutions]: from h of the last layer to the change; returns the last */
 static net_lanes *convolve_out(net_chains *c, const net_drive *d, const net_lanes *top)
 {
     const vgi_shape *s = c->shape;
@@ -142,7 +142,7 @@ static void add_spread(net_chains *c, const net_drive *d, size_t t, const net_la
         }
 }
 
-/* what the first recurrent layer sees of frame x */
+/* input of the first recurrent layer for frame x */
 static void encode(net_chains *c, const net_drive *d, size_t t, const net_lanes *x)
 {
     const vgi_shape *s = c->shape;
@@ -175,7 +175,7 @@ static void recur(net_chains *c, const net_drive *d, size_t t)
     }
 }
 
-/* next += what the last recurrent layer says of the change */
+/* next += the change given by the last recurrent layer */
 static void decode(net_chains *c, const net_drive *d, size_t t, net_lanes *next)
 {
     const vgi_shape *s = c->shape;
@@ -192,12 +192,12 @@ static void decode(net_chains *c, const net_drive *d, size_t t, net_lanes *next)
         next[k] += (y[k] + d->parameters[s->full_bias + k]) * d->scale_out[k];
 }
 
-/* y += m' x, or m x, for the lanes that run one way */
+/* y += m' x, or m x, for the lanes that run in one direction */
 static void add_way(const net_drive *d, bool back, const real *m, bool turn, const net_lanes *x, real sign, net_lanes *y)
 {
     size_t n = d->shape->numbers, first = back ? d->forward : 0, lanes = back ? NET_LANES - d->forward : d->forward;
     if (!lanes) return;
-    if (sign < 0) { /* BLAS's alpha is not at hand: y := -(m x - y) */
+    if (sign < 0) { /* the BLAS wrapper has no alpha: y := -(m x - y) */
         for (size_t k = 0; k < n; k++)
             for (size_t i = first; i < first + lanes; i++) y[k][i] = -y[k][i];
     }
@@ -228,7 +228,7 @@ void net_chains_step(net_chains *c, const net_drive *d, size_t t, const net_lane
     if (d->skeleton) add_skeleton(d, x, before, next);
 }
 
-/* the input of step t: given, or the chains' own; given ones are put into `room` */
+/* input of step t: given, or the chains' own output; given frames are copied to `room` */
 static const net_lanes *input(const net_chains *c, const net_drive *d, size_t t, net_lanes *room)
 {
     if (t >= d->given) return c->state + t * c->shape->numbers;
@@ -250,7 +250,7 @@ void net_chains_forward(net_chains *c, const net_drive *d)
 
 /* ---- backward ---- */
 
-/* rows of `count` steps, `stride` rows apart, as one matrix: a row of it is that row in all steps */
+/* `count` steps of rows, `stride` rows apart, as one matrix whose rows are that row in all steps */
 static void pack_rows(const net_lanes *from, size_t stride, size_t rows, size_t count, real *to)
 {
     for (size_t t = 0; t < count; t++)
@@ -267,10 +267,10 @@ static void add_sums(const net_lanes *from, size_t stride, size_t rows, size_t c
     }
 }
 
-/* Products of full layers wait until there are several steps of them. */
+/* Steps collected for one product with a full layer. */
 typedef struct waiting {
     size_t steps;
-    real *in, *out;            /* numbers x (PACK * 8): frames as the full layer sees and gives them */
+    real *in, *out;            /* numbers x (PACK * 8): input and output frames of the full layer */
     real *latent, *top, *spread; /* latent x (PACK * 8): gradients, h, gradients */
 } waiting;
 
@@ -297,9 +297,9 @@ typedef struct backward {
     const net_drive *d;
     real *gradient;
     double divergence;
-    const net_lanes *shares; /* one row: what each lane counts of the divergence */
-    net_lanes *dstate, *dinput; /* numbers */
-    net_lanes *dh[VGI_NET_LAYERS], *dc[VGI_NET_LAYERS]; /* hidden: from the step behind */
+    const net_lanes *shares; /* one row: share of each lane in the divergence */
+    net_lanes *dstate, *dinput; /* numbers each */
+    net_lanes *dh[VGI_NET_LAYERS], *dc[VGI_NET_LAYERS]; /* hidden: from the following step */
     net_lanes *dlatent; /* latent */
     net_lanes *dspread;
     waiting w;
@@ -312,9 +312,10 @@ static void decode_back(backward *b, size_t t, net_lanes *dtop)
     const vgi_shape *s = c->shape;
     net_lanes *dy = c->frame[2 * s->convolutions + 4], *other = c->frame[2 * s->convolutions + 5];
     if (s->front == VGI_FRONT_LINEAR) {
-        dy = c->frame[2]; /* kept until all steps are packed: see below */
+        dy = c->frame[2]; /* stored until all steps are packed: see below */
         for (size_t k = 0; k < s->numbers; k++) dy[k] = b->dstate[k] * b->d->scale_out[k];
-        memcpy(c->latent + t * s->latent, dy, s->numbers * sizeof *dy); /* as many: the mean is not needed */
+        memcpy(c->latent + t * s->latent, dy, s->numbers * sizeof *dy); /* the same number of rows; the mean is no
+                                                                           longer needed */
         NET_GEMM(false, false, s->hidden, NET_LANES, s->numbers, b->d->parameters + s->full, s->numbers, FLAT_IN(dy),
                  NET_LANES, 0, FLAT(dtop), NET_LANES);
         return;
@@ -338,7 +339,7 @@ static void decode_back(backward *b, size_t t, net_lanes *dtop)
              NET_LANES, 0, FLAT(dtop), NET_LANES);
 }
 
-/* dtop: gradient of h of the last layer; gradients of gates take the places of the gates */
+/* dtop: gradient of h of the last layer; gradients of gates overwrite the gates */
 static void recur_back(backward *b, size_t t, net_lanes *dtop)
 {
     net_chains *c = b->c;
@@ -359,7 +360,7 @@ static void recur_back(backward *b, size_t t, net_lanes *dtop)
     }
 }
 
-/* gradients of mean and log variance from those of what the recurrent layers see, and from the divergence */
+/* gradients of mean and log variance, from those of the recurrent layers' input and of the divergence */
 static void spread_back(backward *b, size_t t)
 {
     const vgi_shape *s = b->c->shape;
@@ -375,7 +376,7 @@ static void spread_back(backward *b, size_t t)
         }
 }
 
-/* b->dinput: gradient of the input of step t, from that of what the recurrent layers see */
+/* b->dinput: gradient of the input of step t, from that of the recurrent layers' input */
 static void encode_back(backward *b, size_t t, const net_lanes *x)
 {
     net_chains *c = b->c;
@@ -410,13 +411,13 @@ static void encode_back(backward *b, size_t t, const net_lanes *x)
     if (dx != b->dinput) memcpy(b->dinput, dx, s->numbers * sizeof *dx);
 }
 
-/* The gradients of the recurrent layers, and of the output of coordinates, over all steps at once. */
+/* Gradients of the recurrent layers, and of the output of coordinates, over all steps at once. */
 static void finish(backward *b)
 {
     net_chains *c = b->c;
     const vgi_shape *s = c->shape;
     size_t steps = c->steps - 1, h = s->hidden, k = steps * NET_LANES;
-    if (s->front == VGI_FRONT_MESH) settle(s, &b->w, b->gradient); /* its work is where the next is */
+    if (s->front == VGI_FRONT_MESH) settle(s, &b->w, b->gradient); /* its workspace is where the next one is */
     for (size_t l = 0; l < s->layers; l++) {
         size_t rows = input_rows(s, l);
         real *in = c->pack, *out = in + rows * k;
@@ -452,7 +453,7 @@ static void prepare(backward *b)
     b->w.top = b->w.latent + s->latent * columns, b->w.spread = b->w.top + s->latent * columns;
 }
 
-/* What frame t has of frame t + 1 and, through a skeleton, of frame t + 2: from b->dstate and `later`. */
+/* Gradient of frame t from frame t + 1 and, through a skeleton, from frame t + 2: from b->dstate and `later`. */
 static void pass_back(backward *b, size_t t, const net_lanes *later, net_lanes *to)
 {
     size_t n = b->c->shape->numbers;

@@ -1,8 +1,8 @@
-/* complete.c: from key to key (L 4.4; MATH 12).
+/* complete.c: completion of motion between keys (L 4.4; MATH 12).
  *
- * A way runs from the first key forward, or from the second back; it misses the other key, and the miss is spread over
- * it linearly, so that both keys are met exactly. By default the better of the two ways is taken. Or the initial states
- * are optimised first; or, as printed, random ones are tried until the ways from both keys meet.
+ * A run starts from the first key forward, or from the second backward. Its error at the other key is spread over the
+ * run linearly, so that both keys are met exactly. By default the better of the two runs is taken. Alternatively the
+ * initial states are optimised first; or, as printed, random states are tried until the runs from both keys meet.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/generator.h"
 
@@ -11,18 +11,18 @@
 
 enum { RESTARTS = 64, ROUNDS = 30 };
 
-/* A pose: normalised features, coordinates, what the basis misses, the frame as the layers see it, root. */
+/* A pose: normalised features, coordinates, the part outside the basis, the frame as the layers see it, root. */
 typedef struct station {
     double *x, *c, *kept, *frame, *centroids, root[4];
 } station;
 
-/* A way of n frames of the network between two stations. */
+/* Runs of n network frames between two stations. */
 typedef struct way {
     vg_generator *g;
     size_t n;
     station from, to;
-    double *forward[NET_LANES], *back[NET_LANES]; /* n + 1 frames each: behind the first key, before the second */
-    double *path;      /* n frames that are chosen */
+    double *forward[NET_LANES], *back[NET_LANES]; /* n + 1 frames each: after the first key, before the second */
+    double *path;      /* the n chosen frames */
     double *past;      /* the frames before the second key was given; npast of them */
     size_t npast;
     double *centroids, *roots; /* n + 1 each */
@@ -52,7 +52,7 @@ static void note_station(const vg_generator *g, station *s)
     memcpy(s->centroids, g->centroids, 3 * g->net->parts * sizeof *s->centroids);
 }
 
-/* lanes: how many ways there are in each direction */
+/* lanes: number of runs in each direction */
 static int make_way(way *w, vg_generator *g, size_t n, size_t lanes, vg_err *e)
 {
     size_t numbers = g->net->numbers, parts = g->net->parts, frames, all;
@@ -78,14 +78,14 @@ static double distance(const double *a, const double *b, size_t n)
     return sqrt(sum);
 }
 
-/* a distance of frames as a share of the training's range */
+/* a distance of frames relative to the range of the training data */
 static double share(const way *w, double far)
 {
     double span = vgi_network_span(w->g->net);
     return span > 0 ? far / span : 0;
 }
 
-/* The ways of all lanes from the first key: from it and the poses before it. */
+/* Run all lanes forward from the first key and the poses before it. */
 static int run_forward(way *w, size_t lanes, vg_err *e)
 {
     const double *in[NET_LANES];
@@ -100,8 +100,8 @@ static int run_back(way *w, size_t lanes, vg_err *e)
     return vgi_runner_go(&w->g->runner, true, lanes, 1, in, w->n + 1, w->back, e);
 }
 
-/* The first `count` frames of the way `along` go into the path, with `miss` spread over the first `length` of them. back:
- * the way begins at the second key. */
+/* Copy the first `count` frames of the run `along` into the path, with `miss` spread over the first `length` of them.
+ * back: the run starts at the second key. */
 static void spread(way *w, const double *along, const double *miss, size_t length, size_t count, bool back)
 {
     size_t numbers = w->g->net->numbers;
@@ -116,7 +116,7 @@ static void difference(const double *a, const double *b, size_t n, double *to)
     for (size_t k = 0; k < n; k++) to[k] = a[k] - b[k];
 }
 
-/* The better of the ways there and back. */
+/* Choose the better of the forward and backward runs. */
 static int find_spread(way *w, vg_err *e)
 {
     vg_generator *g = w->g;
@@ -145,7 +145,7 @@ static int find_spread(way *w, vg_err *e)
     return code;
 }
 
-/* Where the two ways of a lane are nearest at the same time: frame at + 1 of n; returns how near. */
+/* Find where the two runs of a lane are nearest at the same time: frame at + 1 of n; returns the distance. */
 static double nearest(const way *w, size_t lane, size_t *at)
 {
     size_t numbers = w->g->net->numbers;
@@ -157,7 +157,7 @@ static double nearest(const way *w, size_t lane, size_t *at)
     return least;
 }
 
-/* Both ways lead to the middle between them at frame `at`. */
+/* Bend both runs to the midpoint between them at frame `at`. */
 static void join(way *w, size_t lane, size_t at)
 {
     size_t numbers = w->g->net->numbers;
@@ -170,7 +170,7 @@ static void join(way *w, size_t lane, size_t at)
     spread(w, w->back[lane], half, w->n - at, w->n - 1 - at, true);
 }
 
-/* As printed: random initial states, until the ways come near enough; else the nearest of all are joined. */
+/* As printed: random initial states until the runs come close enough; otherwise join the nearest ones. */
 static int find_merge(way *w, vg_err *e)
 {
     vg_generator *g = w->g;
@@ -197,7 +197,7 @@ static int find_merge(way *w, vg_err *e)
 
 /* ---- poses ---- */
 
-/* Coordinates of frame t of the path; behind the last one those of the second key. */
+/* Coordinates of frame t of the path; after the last one those of the second key. */
 static const double *coordinates(const way *w, size_t t, double *room)
 {
     const double *frame = w->path + t * w->g->net->numbers;
@@ -207,7 +207,7 @@ static const double *coordinates(const way *w, size_t t, double *room)
     return room;
 }
 
-/* The root along the path, as the body moves it. */
+/* Move the root along the path as the body does. */
 static void move_root(way *w)
 {
     vg_generator *g = w->g;
@@ -225,7 +225,7 @@ static void move_root(way *w)
     }
 }
 
-/* What the root misses at the second key is spread over the way; of a cycle its shift is left as it is. */
+/* Spread the error of the root at the second key over the run; in a cycle its shift is not changed. */
 static void bend_root(way *w, bool loop)
 {
     size_t parts = w->g->net->parts, main_part = w->g->main_part, wide = 3 * parts;
@@ -239,14 +239,14 @@ static void bend_root(way *w, bool loop)
     for (size_t t = 0; t <= w->n; t++) {
         double part = (double)(t + 1) / (double)(w->n + 1), *root = w->roots + 4 * t;
         vgi_turn_towards(end, w->to.root, part, turned);
-        double left[4] = {end[0], -end[1], -end[2], -end[3]}; /* the part of the turn that is missing, behind the root's own */
+        double left[4] = {end[0], -end[1], -end[2], -end[3]}; /* the missing part of the turn, after the root's own */
         vg_quat_multiply(left, turned, back);
         vg_quat_multiply(root, back, root);
         for (size_t i = 0; i < wide; i++) w->centroids[wide * t + i] += part * miss[i];
     }
 }
 
-/* Normalised features at `part` between frame k of the way, 0: the first key, and the next. */
+/* Normalised features at the fraction `part` between frame k of the run (0: the first key) and the next. */
 static void mix_features(way *w, size_t k, double part, double *x)
 {
     vg_generator *g = w->g;
@@ -262,7 +262,7 @@ static void mix_features(way *w, size_t k, double part, double *x)
     for (size_t i = 0; i < g->d; i++) x[i] += (1 - whole) * w->from.kept[i] + whole * w->to.kept[i];
 }
 
-/* n poses from the way, whose frames may be farther apart. */
+/* n poses from the run, whose frames may be farther apart. */
 static int make_poses(way *w, size_t n, double *const *poses, vg_err *e)
 {
     vg_generator *g = w->g;
@@ -281,7 +281,7 @@ static int make_poses(way *w, size_t n, double *const *poses, vg_err *e)
     return code;
 }
 
-/* The second key is the last given pose; what came before it is remembered by a network that looks at several frames. */
+/* Make the second key the last given pose; a network that uses several frames also remembers those before it. */
 static void arrive(way *w)
 {
     vg_generator *g = w->g;
@@ -304,7 +304,8 @@ int vg_generator_between(vg_generator *g, const double *key, bool loop, size_t n
     if (!g->given) return vg_fail(e, VG_EINPUT, "no pose is given to begin from");
     if (g->o.merge > 0 && g->net->direction == VG_FORWARD)
         return vg_fail(e, VG_EINPUT, "the network runs forward only: its ways from two keys cannot meet");
-    size_t frames = g->net->step > 1 ? (n + 1 + g->net->step / 2) / g->net->step : n + 1; /* of the network, the key is the last */
+    size_t frames = g->net->step > 1 ? (n + 1 + g->net->step / 2) / g->net->step : n + 1; /* in network frames; the
+                                                                                             key is the last */
     if (frames < 2) frames = 2;
     int code = make_way(&w, g, frames - 1, g->o.merge > 0 ? NET_LANES : 1, e);
     if (code < 0) return code;

@@ -1,5 +1,5 @@
-/* dataset.c: frames are kept as features in binary32, brought into range, and expressed in principal coordinates.
- * The root's steps are a regression of their own: what the body does says how it moves on.
+/* dataset.c: stores frames as features in binary32, normalises them, and expresses them in principal coordinates. The
+ * steps of the root are a separate regression on the motion of the body.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/dataset.h"
 #include "core/random.h"
@@ -55,7 +55,7 @@ void vgi_dataset_clear(vgi_dataset *s)
     *s = (vgi_dataset){0};
 }
 
-/* ---- dividing ---- */
+/* ---- ---- division ---- */
 
 int vgi_spans_add(vgi_spans *s, vgi_span span, vg_err *e)
 {
@@ -72,7 +72,7 @@ size_t vgi_spans_frames(const vgi_spans *s)
     return n;
 }
 
-/* rows of `size` bytes in another order: row i becomes what row order[i] was */
+/* reorder rows of `size` bytes: new row i is old row order[i] */
 static int reorder(void *rows, size_t size, const size_t *order, size_t n, vg_err *e)
 {
     char *copy = vgi_copy_array(rows, n, size, e);
@@ -105,7 +105,8 @@ static int split_by_step(vgi_dataset *s, size_t step, vg_err *e)
     return VG_OK;
 }
 
-/* Where the block of `held` frames begins. Three frames are left before it: so many are given to judge by. */
+/* First frame of the block of `held` frames. At least three frames are left before it, since that many are given when
+ * judging. */
 static size_t hold_from(size_t length, size_t held, size_t hold_at, uint64_t seed, size_t sequence)
 {
     enum { BEFORE = 3 };
@@ -231,7 +232,7 @@ static int encode_all(vgi_dataset *s, const vg_network *n, int threads, vg_err *
     return j.failed ? vg_fail(e, VG_ENOMEM, "out of memory: coordinates of the frames") : VG_OK;
 }
 
-/* standard deviation of coordinate k, or of its change, and its range */
+/* standard deviation and range of coordinate k, or of its change */
 static double spread(const vgi_dataset *s, size_t k, bool change, double range[2])
 {
     double sum = 0, squares = 0;

@@ -1,6 +1,5 @@
-/* feature.c: features of a sequence of poses, there and back (MATH 12): blocks of eight poses are measured side by
- * side, whole turns are chosen pose after pose.
- * Leaves out the numbers themselves (feature_kernel.c) and the mesh (rings.c).
+/* feature.c: features of a sequence of poses, and poses from features (MATH 12). Blocks of eight poses are measured
+ * side by side; whole turns are chosen pose after pose. The computation is in feature_kernel.c, the mesh in rings.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/feature.h"
 #include "net/branch.h"
@@ -15,9 +14,9 @@ struct vg_featurer {
     bool plain;
     int threads;
     vgi_feature_block *blocks; /* one per thread */
-    double **spill;  /* per thread: a place for the lanes of a block that no pose fills */
-    bool begun;      /* there is a pose before: */
-    double *before;  /* its w, 3 per vertex */
+    double **spill;  /* per thread: target of unused lanes of a block */
+    bool begun;      /* whether there is a previous pose: */
+    double *before;  /* its rotation vectors w, 3 per vertex */
     double before_root[4];
     uint64_t jumps, poses;
 };
@@ -102,7 +101,7 @@ size_t vg_featurer_batch(const vg_featurer *f)
 
 typedef struct job {
     vg_featurer *f;
-    size_t n, first; /* poses; the first block of this round */
+    size_t n, first; /* number of poses; first block of this round */
     const double *const *in, *const *roots_in, *const *centroids_in;
     double *const *out, *const *roots_out, *const *centroids_out;
 } job;
@@ -114,9 +113,9 @@ static void in_rounds(vg_featurer *f, job *j, void (*task)(void *context, size_t
         vgi_parallel(f->threads, blocks - j->first < most ? blocks - j->first : most, task, j);
 }
 
-/* ---- there ---- */
+/* ---- ---- from poses to features ---- */
 
-/* the rotation that the vertices around the centre have in common */
+/* the common rotation of the vertices around the centre */
 static void find_root(const vg_featurer *f, vgi_feature_block *b, size_t lane, double q[4])
 {
     double sum[9] = {0}, *g = b->root[lane];
@@ -126,7 +125,7 @@ static void find_root(const vg_featurer *f, vgi_feature_block *b, size_t lane, d
     if (f->plain)
         for (int k = 0; k < 9; k++) g[k] = k % 4 == 0;
     vg_quat_from_matrix(g, q);
-    vg_quat_matrix(q, g); /* what the way back will have */
+    vg_quat_matrix(q, g); /* as the inverse will compute it */
 }
 
 static void measure_block(void *context, size_t task)
@@ -147,7 +146,7 @@ static void measure_block(void *context, size_t task)
     vgi_feature_put(&f->rings, b, f->width, poses, values, centroids);
 }
 
-/* whole turns of one pose, and the sign of its root */
+/* choose the whole turns of one pose, and the sign of its root */
 static int follow(vg_featurer *f, double *w, double *root, vg_err *e)
 {
     double same = 0;
@@ -172,7 +171,7 @@ int vg_featurer_measure(vg_featurer *f, size_t n, const double *const *poses, do
     return VG_OK;
 }
 
-/* ---- and back ---- */
+/* ---- ---- from features to poses ---- */
 
 static void solve_block(void *context, size_t task)
 {

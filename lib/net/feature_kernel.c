@@ -1,6 +1,6 @@
-/* feature_kernel.c: deformation gradients of rings, their rotations and stretches, and the reconstruction from them,
- * for eight poses at once, in vectors as wide as the registers.
- * Leaves out what is done once (rings.c) and the choice of branches (branch.c).
+/* feature_kernel.c: deformation gradients of vertex rings, their rotations and stretches, and the reconstruction from
+ * them, for eight poses at once, in vectors as wide as the registers. Precomputation is in rings.c, the choice of
+ * branches in branch.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/feature_kernel.h"
 #include "numeric/vec3.h"
@@ -77,7 +77,7 @@ VGI_INLINE void ring_gradient(const vgi_rings *r, vgi_feature_block *b, size_t v
     }
 }
 
-/* d := x times the symmetric part of x' d, which is all that features say of it */
+/* d := x times the symmetric part of x' d, the part that features represent */
 VGI_INLINE void symmetrise(const vgi_wide *x, vgi_wide *d)
 {
     vgi_wide s[9];
@@ -89,7 +89,7 @@ VGI_INLINE void symmetrise(const vgi_wide *x, vgi_wide *d)
         for (int k = 0; k < 3; k++) d[3 * i + k] = x[3 * i] * s[k] + x[3 * i + 1] * s[3 + k] + x[3 * i + 2] * s[6 + k];
 }
 
-/* what is left of a rotation is rounding */
+/* remaining rotations are rounding errors */
 static const vgi_polar_stop stop = {.scaled = 3, .enough = 1e-15, .alone = true};
 
 static void measure(const vgi_rings *r, vgi_feature_block *b, const double *const *poses)
@@ -138,7 +138,7 @@ VGI_INLINE void load_sides(const vgi_rings *r, vgi_feature_block *b)
     }
 }
 
-/* per part the sum of a row per vertex, over the size of the part */
+/* per part the mean of a row over its vertices */
 static void means(const vgi_rings *r, const vgi_row *row, vgi_row *sum)
 {
     memset(sum, 0, r->nparts * sizeof *sum);
@@ -148,7 +148,7 @@ static void means(const vgi_rings *r, const vgi_row *row, vgi_row *sum)
         for (int k = 0; k < 3; k++) add(&sum[p].xyz[k], 1 / (double)r->part_size[p] - 1, &sum[p].xyz[k]);
 }
 
-/* b->normal: the points that fit the gradients, those of each part moved so that the part's centre is at 0 */
+/* b->normal: the points that fit the gradients, with the centre of each part moved to 0 */
 static void reconstruct(const vgi_rings *r, vgi_feature_block *b)
 {
     vgi_factor_solve(&r->factor, b->x);
@@ -213,7 +213,8 @@ VGI_INLINE void put_vertex(const vgi_rings *r, const vgi_feature_block *b, size_
     (void)r;
 }
 
-/* A vertex in no face rides with the root: no rotation of its own, no stretch, and its place in the root's frame. */
+/* A vertex without faces moves with the root: no rotation of its own, no stretch, and its position in the root's
+ * frame. */
 static void put_loose(const vgi_rings *r, const vgi_feature_block *b, size_t v, size_t width, size_t lane,
                       const double *pose, const double *rest_centre, const double *centre, double *values)
 {
@@ -235,7 +236,7 @@ static void rest_centre(const vgi_rings *r, double centre[3])
             centre[k] += r->reference[3 * v + k] / (double)r->part_size[r->main_part];
 }
 
-/* centroids out; points and reconstruction are moved so that each part's centre is at 0 */
+/* output the centroids; move points and reconstruction so that each part's centre is at 0 */
 static void put_centroids(const vgi_rings *r, vgi_feature_block *b, bool both, double *const *centroids)
 {
     means(r, b->point, b->sum);
@@ -251,7 +252,8 @@ static void put_centroids(const vgi_rings *r, vgi_feature_block *b, bool both, d
     }
 }
 
-/* What a ring says nothing about turns as the root does: so the features of a pose that is turned stay as they are. */
+/* Directions that a ring does not determine rotate as the root does, so that features are invariant under rotation of
+ * the pose. */
 static const double leaning = 1e-3;
 
 static void close_open_rings(const vgi_rings *r, vgi_feature_block *b)
@@ -265,7 +267,7 @@ static void close_open_rings(const vgi_rings *r, vgi_feature_block *b)
             for (int i = 0; i < 9; i++) d[i] -= seen[i];
             vgi_multiply(back, d, turned);
             double size = sqrt(vgi_dot(d, d) + vgi_dot(d + 3, d + 3) + vgi_dot(d + 6, d + 6));
-            for (int i = 0; i < 9; i += 4) turned[i] += leaning * size; /* towards no turn beside the root */
+            for (int i = 0; i < 9; i += 4) turned[i] += leaning * size; /* pulls towards the rotation of the root */
             vgi_fit_rotation(turned, seen);
             vgi_multiply(g, seen, turned);
             vgi_multiply(turned, open, seen);
@@ -295,7 +297,7 @@ static void put(const vgi_rings *r, vgi_feature_block *b, size_t width, const do
                 put_loose(r, b, v, width, lane, poses[lane], rest, centroids[lane] + 3 * r->main_part, values[lane]);
 }
 
-/* ---- and back ---- */
+/* ---- ---- from features to poses ---- */
 
 static void exp_rotation(const double w[3], double m[9])
 {
@@ -317,7 +319,7 @@ static void take_turn(const vgi_feature_block *b, const double w[3], size_t lane
     for (size_t i = 0; i < 9; i++) turn[i][lane] = m[i];
 }
 
-/* D = R S of a vertex; what is left goes into b->point */
+/* D = R S of a vertex; the residual goes to b->point */
 VGI_INLINE void take_vertex(vgi_feature_block *b, size_t v, size_t width, const double *const *values)
 {
     static const int at[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};

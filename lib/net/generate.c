@@ -1,9 +1,8 @@
-/* generate.c: poses from a network: some are given, and it goes on from the last (MATH 12).
+/* generate.c: generates poses with a network: some are given, and it continues from the last (MATH 12).
  *
- * A network that corrects a regression was trained on sequences of 32 frames. Longer runs begin again every four frames
- * from the last eight, and coordinates stay within five percent of the training's range: so they neither drift nor
- * freeze.
- * Leaves out the way from key to key (complete.c).
+ * A network that corrects a regression was trained on sequences of 32 frames. Longer runs restart every four frames
+ * from the last eight, and coordinates are kept within five percent of the training range, so that runs neither drift
+ * nor freeze. Completion between keys is in complete.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/generator.h"
 
@@ -11,9 +10,9 @@
 #include <stdlib.h>
 
 enum { KEPT = VGI_LONG_GIVEN, WATCHED = VGI_WATCHED };
-static const double margin = 0.05, lively = 0.3; /* lively: deviation of random states where none is asked for */
+static const double margin = 0.05, lively = 0.3; /* lively: default standard deviation of random states */
 
-/* All arrays of numbers in one block. */
+/* Allocate all arrays in one block. */
 static int make_rooms(vg_generator *g, vg_err *e)
 {
     size_t d = g->d, k = g->net->rank, n = g->net->numbers, roots = vgi_network_roots(g->net);
@@ -71,7 +70,7 @@ void vg_generator_restart(vg_generator *g)
 
 /* ---- given poses ---- */
 
-/* g->x and g->c are those of another frame: how much it changed. */
+/* The change of the frame that g->x and g->c replace. */
 static void note_change(vg_generator *g)
 {
     double change = 0;
@@ -131,7 +130,7 @@ static void put_frame(const double *from, size_t n, net_lanes *to)
     for (size_t i = 0; i < n; i++) to[i] = (net_lanes){0} + (real)from[i];
 }
 
-/* From the frames that are remembered, the chains begin again. */
+/* Restart the chains from the remembered frames. */
 static void begin(vg_generator *g)
 {
     size_t n = g->net->numbers;
@@ -150,7 +149,8 @@ static void begin(vg_generator *g)
     g->begun = true;
 }
 
-/* How far coordinates are outside of the training's range, as a share of it; with `clip` they are brought to its margin. */
+/* Distance of the coordinates outside the training range, relative to its size; with `clip` they are clamped to its
+ * margin. */
 static double keep_in_range(const vg_generator *g, double *c, bool clip)
 {
     double sum = 0, span = vgi_network_span(g->net);
@@ -217,7 +217,7 @@ void vgi_turn_towards(const double a[4], const double b[4], double part, double 
     vg_quat_multiply(a, q, to);
 }
 
-/* The pose on the way from the network's frame before to its last one. */
+/* The pose between the network's last two frames. */
 static int pose_between(vg_generator *g, double part, double *pose, vg_err *e)
 {
     double root[4], *x = g->room, *centroids = g->room + g->d;
@@ -243,7 +243,7 @@ int vg_generator_next(vg_generator *g, double *pose, vg_err *e)
     return pose_between(g, part, pose, e);
 }
 
-/* the mean over the frames that are looked at */
+/* mean over the watched frames */
 static double recent(const vg_generator *g, const double *values)
 {
     double sum = 0;

@@ -1,6 +1,4 @@
-/* heap.h: vertices in the order of a key that may fall while they wait: what shortest paths and spanning trees take
- * the next vertex from.
- * Internal.
+/* heap.h: a priority queue of vertices whose keys may decrease, for shortest paths and spanning trees. Internal.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_HEAP_H
 #define VG_HEAP_H
@@ -8,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* A binary heap. `at` holds n vertices, `place` says where each vertex stands in it, UINT32_MAX: nowhere. */
+/* A binary heap. `at` holds n vertices; `place` is the position of each vertex in it, UINT32_MAX if absent. */
 typedef struct vgi_heap {
     size_t n;
     uint32_t *at, *place;
@@ -21,7 +19,7 @@ static inline void vgi_heap_set(vgi_heap *h, size_t i, uint32_t v)
     h->place[v] = (uint32_t)i;
 }
 
-/* vgi_heap_lower: v's key has fallen, or v is new. */
+/* vgi_heap_lower: the key of v has decreased, or v is new. */
 static inline void vgi_heap_lower(vgi_heap *h, uint32_t v)
 {
     size_t i = h->place[v] == UINT32_MAX ? h->n++ : h->place[v];
@@ -29,7 +27,7 @@ static inline void vgi_heap_lower(vgi_heap *h, uint32_t v)
     vgi_heap_set(h, i, v);
 }
 
-/* vgi_heap_take: the vertex of least key, which is no longer in the heap. */
+/* vgi_heap_take: remove and return the vertex with the smallest key. */
 static inline uint32_t vgi_heap_take(vgi_heap *h)
 {
     uint32_t least = h->at[0], last = h->at[--h->n];

@@ -1,5 +1,5 @@
-/* judge.c: how well a network goes on where it has not been: in its validation block while it learns, and in the frames
- * that are held out, beside repeating, going on in a line or damped, and the regression alone (MATH 12).
+/* judge.c: quality of a network's predictions: on its validation block during training, and on held-out frames,
+ * compared with repeating the last pose, linear and damped continuation, and the regression alone (MATH 12).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/trainer.h"
 
@@ -80,17 +80,17 @@ int vgi_trainer_validate(vg_trainer *t, double *error, vg_err *e)
     return code;
 }
 
-/* ---- what is held out ---- */
+/* ---- ---- held-out frames ---- */
 
 typedef struct judging {
     vg_trainer *t;
     size_t windows, start[MOST_WINDOWS], end[MOST_WINDOWS];
-    double *x, *features, *vertices, *centroids; /* room for eight poses: d, d, 3 nv, 3 parts each */
+    double *x, *features, *vertices, *centroids; /* workspace of eight poses: d, d, 3 nv, 3 parts each */
     size_t waiting, truth[NET_LANES];
-    double *to[NET_LANES]; /* where the errors of the waiting poses go */
+    double *to[NET_LANES]; /* where the errors of the pending poses are written */
 } judging;
 
-/* Windows begin where all frames that are looked at are held out; of many, twelve that are spread evenly. */
+/* Windows start where all their frames are held out; if there are many, twelve evenly spread ones. */
 static void choose_windows(judging *j)
 {
     const vgi_spans *held = &j->t->data.held;
@@ -113,7 +113,7 @@ static void choose_windows(judging *j)
     j->windows = picked;
 }
 
-/* Mean distances of the waiting poses from their truths, in % of D. */
+/* Mean distances of the pending poses from the truth, in % of D. */
 static void settle(judging *j)
 {
     vg_trainer *t = j->t;
@@ -138,7 +138,7 @@ static void settle(judging *j)
     j->waiting = 0;
 }
 
-/* x (d normalised numbers) stands for frame `truth` */
+/* x (d normalised numbers) predicts frame `truth` */
 static double *put(judging *j, size_t truth, double *to)
 {
     if (j->waiting == NET_LANES) settle(j);
@@ -165,7 +165,7 @@ static void simple_methods(judging *j, size_t w, int given, vg_network_errors *e
     }
 }
 
-/* Coordinates of a prediction become a pose; what the basis does not hold of the last given frame is kept. */
+/* Convert predicted coordinates to a pose; the part of the last given frame outside the basis is kept. */
 static void put_coordinates(judging *j, const double *c, const double *kept, size_t truth, double *to)
 {
     double *x = put(j, truth, to);

@@ -1,5 +1,5 @@
-/* layer_kernel.c: curves of gates, mesh convolutions and losses, eight chains side by side: of binary32 one register of AVX2.
- * Sums run in a fixed order. Leaves out products with large matrices, which are BLAS's.
+/* layer_kernel.c: activation functions of gates, mesh convolutions and losses, eight chains side by side (in binary32
+ * one AVX2 register). Sums are in a fixed order. Products with large matrices use BLAS.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/layer_kernel.h"
 #ifndef VGI_NET_DOUBLE
@@ -15,7 +15,7 @@ INLINE net_lanes same(real x)
     return (net_lanes){0} + x;
 }
 
-/* ---- curves ---- */
+/* ---- ---- activation functions ---- */
 
 #ifdef VGI_NET_DOUBLE
 INLINE net_lanes exponential(net_lanes x)
@@ -30,7 +30,7 @@ typedef int32_t net_bits __attribute__((vector_size(NET_LANES * sizeof(int32_t))
 INLINE net_lanes exponential(net_lanes x)
 {
     for (int i = 0; i < NET_LANES; i++) x[i] = x[i] > 87.0f ? 87.0f : x[i] < -87.0f ? -87.0f : x[i];
-    const net_lanes shift = same(12582912.0f); /* 1.5 * 2^23: adding it rounds to whole numbers */
+    const net_lanes shift = same(12582912.0f); /* 1.5 * 2^23: adding it rounds to integers */
     net_lanes k = (x * 1.44269504f + shift) - shift, r = x - k * 0.693359375f + k * 2.12194440e-4f, p = same(1.9875691500e-4f);
     p = p * r + 1.3981999507e-3f;
     p = p * r + 8.3334519073e-3f;
@@ -101,7 +101,7 @@ INLINE void means(const net_neighbours *g, size_t c, const net_lanes *x, net_lan
     }
 }
 
-/* y (+)= x times a matrix of c x c, per vertex; by_rows: its rows belong to the inputs */
+/* y (+)= x times a matrix of c x c, per vertex; by_rows: rows of the matrix belong to the inputs */
 INLINE void times(size_t n, size_t c, const net_lanes *x, const real *matrix, bool by_rows, const real *bias, bool add,
                   net_lanes *y)
 {
@@ -128,7 +128,7 @@ INLINE void convolve_by(const net_neighbours *g, const net_convolution *p, size_
     all_tanh(y, c * g->n);
 }
 
-/* w += sum over vertices and lanes of x d', c x c, in blocks that stay in registers */
+/* w += sum over vertices and lanes of x d' (c x c), in blocks that stay in registers */
 INLINE void add_products(size_t n, size_t c, const net_lanes *x, const net_lanes *d, bool turned, real *w)
 {
     enum { ROWS = 3, COLUMNS = 4 };
@@ -153,7 +153,7 @@ INLINE void add_products(size_t n, size_t c, const net_lanes *x, const net_lanes
         }
 }
 
-/* a vertex gives each neighbour's gradient its share: the mean, turned round */
+/* transpose of the mean: a vertex adds its share to the gradient of each neighbour */
 INLINE void add_shares(const net_neighbours *g, size_t c, const net_lanes *e, net_lanes *dx)
 {
     for (size_t v = 0; v < g->n; v++)
@@ -210,7 +210,7 @@ INLINE net_lanes exchanged(net_lanes x)
     return (net_lanes){x[4], x[5], x[6], x[7], x[0], x[1], x[2], x[3]};
 }
 
-/* Partial sums of a few hundred rows are in reals, the sum of those in binary64. */
+/* Partial sums of a few hundred rows are in `real`, their sum in binary64. */
 static void all_differences(size_t rows, const net_lanes *x, const net_lanes *y, const net_lanes *z, unsigned turn,
                             double *to_y, double *to_z)
 {

@@ -1,5 +1,5 @@
-/* layer_kernel.h: what a network does number by number, for eight chains side by side; the products are BLAS's.
- * Internal.
+/* layer_kernel.h: elementwise operations of a network for eight chains side by side. Internal. Matrix products use
+ * BLAS.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_NET_KERNEL_H
 #define VG_NET_KERNEL_H
@@ -8,9 +8,9 @@
 #include "net/real.h"
 
 /* net_tanh: in place. */
-/* net_gates: gates (4 n rows: i f g o, before their curves) become i f g o; c := f c_before + i g, h := o tanh(c). */
-/* net_gates_back: dh: gradient of h; dc: gradient of c from the step behind, becomes that of c_before; dgates: of the
- * gates before their curves. */
+/* net_gates: gates (4 n rows: i f g o, before activation) become i f g o; c := f c_before + i g, h := o tanh(c). */
+/* net_gates_back: dh: gradient of h; dc: gradient of c from the following step, becomes that of c_before; dgates:
+ * gradients of the gates before activation. */
 
 /* The neighbours of vertex v: to[first[v]] .. to[first[v + 1] - 1]. */
 typedef struct net_neighbours {
@@ -21,21 +21,21 @@ typedef struct net_neighbours {
 /* One mesh convolution y = tanh(x own + mean of neighbours' x times mean + bias). Matrices are channels x channels,
  * row-major, and transposed in a mirrored layer. */
 typedef struct net_convolution {
-    size_t channels; /* 9 or 12 are fast */
+    size_t channels; /* 9 and 12 are optimised */
     const real *own, *mean, *bias;
     bool mirrored;
 } net_convolution;
 
-/* net_convolve: x, y: n * channels rows; work: as many, becomes the means. */
-/* net_convolve_back: dy: gradient of y, destroyed; dx: of x. Adds to the gradients of matrices and bias.
- * work: 2 n * channels rows. */
+/* net_convolve: x, y: n * channels rows; work: the same size, receives the means. */
+/* net_convolve_back: dy: gradient of y, overwritten; dx: of x. Adds to the gradients of matrices and bias. work: 2 n
+ * * channels rows. */
 
-/* net_differences: squared distances of eight chains from eight others, and of those from the mirrored other (NULL:
- * none): x - y and x - z over rows; z's lanes in the order `turn`: 0 as they are, 4: halves exchanged. */
-/* net_pull: g += by[0] (x - y) + by[1] (x - z), z turned as above or NULL. (Vectors are not passed by value: how they
- * are depends on the instruction set.) */
+/* net_differences: squared distances of eight chains from eight others, and from the mirrored others (NULL: none): x
+ * - y and x - z over rows. `turn` is the order of z's lanes: 0 unchanged, 4 halves exchanged. */
+/* net_pull: g += by[0] (x - y) + by[1] (x - z), with z's lanes reordered as above, or NULL. (Vectors are not passed
+ * by value, because that depends on the instruction set.) */
 
-/* What the functions above are, of one instruction set. */
+/* The functions above for one instruction set. */
 typedef struct net_layer_kernel {
     void (*tanh)(net_lanes *x, size_t rows);
     void (*gates)(size_t n, net_lanes *gates, const net_lanes *c_before, net_lanes *c, net_lanes *h);

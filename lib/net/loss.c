@@ -24,21 +24,21 @@ void net_group_clear(net_group *g)
     *g = (net_group){0};
 }
 
-/* One set of chains at work. */
+/* The chains of one direction. */
 typedef struct side {
     net_group *g;
     int which;
-    net_lanes *truth; /* room for a frame */
-    net_lanes ahead;  /* 1 / batch of lanes in use */
+    net_lanes *truth; /* workspace of one frame */
+    net_lanes ahead;  /* 1 / batch for lanes in use */
 } side;
 
-/* the frame that lane i of these chains has at time t */
+/* the frame of lane i of these chains at time t */
 static const real *frame_of(const side *s, size_t lane, size_t t)
 {
     const net_group *g = s->g;
     size_t half = g->direction == VG_SHARED ? NET_LANES / 2 : NET_LANES, sequence = lane % half;
     bool back = s->which == 1 || lane >= half;
-    if (sequence >= g->n) sequence = 0; /* a lane that is not in use */
+    if (sequence >= g->n) sequence = 0; /* an unused lane */
     if (g->before && t < 2) {
         size_t third = g->start[sequence] + (back ? g->steps - 3 : 2);
         return g->before + ((third * 2 + back) * 2 + t) * g->chains[0].shape->numbers;
@@ -60,7 +60,7 @@ static bool in_use(const net_group *g, size_t lane)
     return lane % (g->direction == VG_SHARED ? NET_LANES / 2 : NET_LANES) < g->n;
 }
 
-/* the other chains' frame at the same time of the sequence; NULL: there are none */
+/* the other chains' frame at the same time of the sequence; NULL: none */
 static const net_lanes *other(const side *s, size_t t)
 {
     const net_group *g = s->g;
@@ -74,13 +74,13 @@ static double *norms(const net_group *g, int which, size_t t)
     return g->norm + (3 * t + (size_t)which) * NET_LANES;
 }
 
-/* Is frame t compared with the truth? Those that are put before the first one are not. */
+/* Whether frame t is compared with the truth. Frames inserted before the first one are not. */
 static bool counts(const net_group *g, size_t t)
 {
     return t > (g->before ? 2 : 0);
 }
 
-/* Distances into g->norm; sums into *loss. */
+/* Store distances in g->norm, add their sums to *loss. */
 static void measure(side *s, net_loss *loss)
 {
     net_group *g = s->g;
@@ -110,7 +110,7 @@ static void pull(void *context, size_t t, net_lanes *gradient)
     size_t n = c->shape->numbers;
     net_lanes by[2] = {{0}, {0}};
     for (size_t i = 0; i < NET_LANES; i++) {
-        /* seen from the second of separate chains, time runs the other way */
+        /* for the second of separate chains, time is reversed */
         const double *between = norms(g, 2, s->which ? g->steps - 1 - t : t);
         if (!in_use(g, i)) continue;
         by[0][i] = counts(g, t) ? (real)(1 / (norms(g, s->which, t)[i] * (double)g->batch)) : 0;
@@ -134,7 +134,7 @@ static void begin(net_group *g, int which, double start, uint64_t seed)
         for (int i = 0; i < NET_LANES; i++) c->noise[k][i] = (real)vgi_random_normal(&r);
 }
 
-/* what each lane counts of the mean divergence, and the divergence itself */
+/* share of each lane in the mean divergence, and the divergence itself */
 static double divergence(const net_group *g, int which, net_lanes *shares)
 {
     const net_chains *c = &g->chains[which];
@@ -168,7 +168,7 @@ net_loss net_group_run(net_group *g, const net_drive drives[2], real *const grad
     for (int w = 0; w < sides; w++) {
         net_lanes shares;
         loss.total += g->divergence * divergence(g, w, &shares);
-        /* a frame that the way back does not use while it asks for this */
+        /* a frame that the backward pass does not use at this point */
         s[w].truth = g->chains[w].frame[g->chains[w].shape->front == VGI_FRONT_MESH ? 0 : 4];
         net_chains_backward(&g->chains[w], &d[w], pull, &s[w], g->divergence, &shares, gradient[w], NULL);
     }

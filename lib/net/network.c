@@ -1,5 +1,5 @@
-/* network.c: the layers that a network says it has, and what its numbers mean.
- * Leaves out running it (runner.c), training it (train.c) and the artefact (model/network.c).
+/* network.c: the layers that a network declares, and the meaning of its numbers. It is run in runner.c and trained in
+ * train.c; the artefact is in model/network.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/network.h"
 
@@ -23,7 +23,7 @@ int vgi_network_shape(const vg_network *n, vgi_shape *s, vg_err *e)
     return VG_OK;
 }
 
-/* ---- what the numbers mean ---- */
+/* ---- ---- meaning of the numbers ---- */
 
 void vgi_network_normalise(const vg_network *n, const double *features, double *x)
 {

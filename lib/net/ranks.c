@@ -1,5 +1,5 @@
-/* ranks.c: MPI, or one process. Nothing is summed here: gradients are sent as they are and added in one order by all, so
- * that the number of processes changes no bit.
+/* ranks.c: MPI, or a single process. Nothing is summed here: gradients are sent unchanged, and every process adds
+ * them in the same order, so that the number of processes changes no bit.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/ranks.h"
 

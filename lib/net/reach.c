@@ -1,5 +1,5 @@
-/* reach.c: initial states of the recurrent layers from which a run ends near a wanted frame (L 4.4; MATH 12). The print
- * searches by samples (CMA-ES); with the exact gradient some twenty rounds do.
+/* reach.c: finds initial states of the recurrent layers from which a run ends near a wanted frame (L 4.4; MATH 12).
+ * The print searches by sampling (CMA-ES); with the exact gradient about twenty rounds suffice.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/runner.h"
 #include "numeric/minimise.h"
@@ -7,16 +7,16 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double gain = 1e-4; /* of the distance: a round that gains less is the last */
+static const double gain = 1e-4; /* relative to the distance: the search ends when a round gains less */
 
 typedef struct reaching {
     vgi_runner *r;
     net_chains chains;
     net_drive drive;
-    net_lanes *given, *start, *slope; /* given frames; initial states and the gradient by them */
+    net_lanes *given, *start, *slope; /* given frames; initial states, and the gradient with respect to them */
     const double *target;
     double far[NET_LANES];
-    float *ignored; /* gradient by the parameters */
+    float *ignored; /* gradient with respect to the parameters */
 } reaching;
 
 static void give(const void *context, size_t t, net_lanes *frame)
@@ -26,7 +26,7 @@ static void give(const void *context, size_t t, net_lanes *frame)
     memcpy(frame, j->given + t * n, n * sizeof *frame);
 }
 
-/* the gradient of the distance between the last frame and the target */
+/* gradient of the distance between the last frame and the target */
 static void pull(void *context, size_t t, net_lanes *g)
 {
     const reaching *j = context;
@@ -65,7 +65,7 @@ static void look(void *context, double *const *x, double *f, double *const *g)
     }
 }
 
-/* The given frames in all lanes; before a single one those that the regression puts there. */
+/* Copy the given frames to all lanes; before a single one, insert those that the regression predicts. */
 static size_t take_given(reaching *j, size_t given, const double *in)
 {
     size_t n = j->r->shape.numbers, first = 0;

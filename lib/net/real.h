@@ -1,6 +1,5 @@
-/* real.h: the type of the numbers in a network. The library computes in binary32; the tests compile the same files a
- * second time in binary64 (VGI_NET_DOUBLE) to check gradients against differences.
- * Internal.
+/* real.h: the number type of a network. The library computes in binary32; the tests compile the same files a second
+ * time in binary64 (VGI_NET_DOUBLE) to compare gradients with finite differences. Internal.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_REAL_H
 #define VG_REAL_H
@@ -20,7 +19,7 @@ typedef float real;
 #define NET_GEMM vgi_gemm_single
 #endif
 
-/* Eight chains side by side: a row of every matrix here is a number of a frame, or of a layer, in eight chains. */
+/* Eight chains side by side: a row of every matrix here is one number of a frame, or of a layer, in eight chains. */
 enum { NET_LANES = 8 };
 typedef real net_lanes __attribute__((vector_size(NET_LANES * sizeof(real))));
 

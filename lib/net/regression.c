@@ -1,8 +1,7 @@
 /* regression.c: ridge regression of the change from one frame to the next, on coordinates.
  *
- * The spectral radius of the companion matrix comes from its powers by repeated squaring (Gelfand): exact to 1e-5 after
- * twenty, complex pairs or not.
- * Leaves out the network that corrects it.
+ * The spectral radius of the companion matrix comes from its powers by repeated squaring (Gelfand): accurate to 1e-5
+ * after twenty squarings, also with complex pairs. The network that corrects the regression is elsewhere.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/regression.h"
 #include "numeric/blas.h"
@@ -42,7 +41,7 @@ void vgi_regression_next(const vgi_regression *r, const double *c, const double 
 
 /* ---- stability ---- */
 
-/* m: 2n x 2n, with c and the frame before it as one row */
+/* m: 2n x 2n, acting on c and the previous frame as one row */
 static void companion(const vgi_regression *r, double part, double damping, double *m)
 {
     size_t n = r->numbers, w = 2 * n;
@@ -57,7 +56,7 @@ static void companion(const vgi_regression *r, double part, double damping, doub
     }
 }
 
-/* room: 3 x (2n)^2 */
+/* room: workspace of 3 x (2n)^2 */
 static double radius(const vgi_regression *r, double part, double damping, double *room)
 {
     size_t w = 2 * r->numbers, all = w * w;
@@ -79,7 +78,7 @@ static double radius(const vgi_regression *r, double part, double damping, doubl
     return exp(log_size);
 }
 
-/* towards damped continuation, as far as it takes */
+/* move towards damped continuation until it is stable */
 static int make_stable(vgi_regression *r, double damping, vg_err *e)
 {
     size_t n = r->numbers;
@@ -105,7 +104,7 @@ static int make_stable(vgi_regression *r, double damping, vg_err *e)
 
 /* ---- the fit ---- */
 
-/* Row k of the system: what is known at a frame, and what its change adds to the damped one. */
+/* Row k of the system: the known values at a frame, and its change minus that of damped continuation. */
 static void put_row(const double *before, const double *c, const double *next, size_t n, double size, double *z,
                     double *y, double damping)
 {
@@ -138,7 +137,7 @@ static void put_rows(const vgi_frames *f, bool back, double size, double damping
         }
 }
 
-/* The same without the change: z is made of the first numbers of each row, 1 behind them. */
+/* The same without the change: z consists of the first numbers of each row, followed by 1. */
 static int fit_first(vgi_regression *r, size_t rows, double *z, double *y, double size, const vgi_choice *choice,
                      vg_err *e)
 {
@@ -165,7 +164,7 @@ static int fit_first(vgi_regression *r, size_t rows, double *z, double *y, doubl
     return code;
 }
 
-/* The fit as it is, stable or not. */
+/* The fit before stabilisation. */
 static int fit(vgi_regression *r, const vgi_frames *f, bool back, double size, const vgi_choice *choice, vg_err *e)
 {
     size_t n = f->numbers, w = 2 * n + 1, rows = count_rows(f);
@@ -202,16 +201,16 @@ int vgi_regression_fit(vgi_regression *r, const vgi_frames *f, bool back, double
     return code == VG_OK ? make_stable(r, choice->damping, e) : code;
 }
 
-/* ---- which ridge ---- */
+/* ---- ---- choice of the ridge ---- */
 
-/* A sum of errors and how many there are. */
+/* A sum of errors and their number. */
 typedef struct trial_sum {
     double sum;
     size_t n;
 } trial_sum;
 
-/* distances per frame over runs of up to twelve frames that begin every third; back: the frame before the first is not
- * given, but what this says of it; room: 3 numbers */
+/* distances per frame over runs of up to twelve frames that start at every third frame; back: the frame before the
+ * first is not given but predicted by the regression; room: workspace of 3 numbers */
 static trial_sum try_out(const vgi_regression *r, const vgi_regression *back, const vgi_frames *f, double *room)
 {
     enum { LONGEST = 12, SHORTEST = 5, APART = 3 };
@@ -239,13 +238,13 @@ static trial_sum try_out(const vgi_regression *r, const vgi_regression *back, co
 static const double ridges[] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10}, dampings[] = {0.8, 0.9, 0.95};
 enum { RIDGES = sizeof ridges / sizeof *ridges, DAMPINGS = sizeof dampings / sizeof *dampings, CHOICES = RIDGES * DAMPINGS };
 
-/* Some choices, each in each fold: task i is choice i % n in fold i / n. */
+/* All choices in all folds: task i is choice i % n in fold i / n. */
 typedef struct choosing {
     const vgi_fold *folds;
     double size;
     const vgi_choice *choices;
     size_t n;
-    bool first; /* runs begin from one frame */
+    bool first; /* runs start from one frame */
     trial_sum *found;
     int *code;
 } choosing;
@@ -269,7 +268,7 @@ static void try_one(void *context, size_t task)
     free(room);
 }
 
-/* The best of some choices over all folds; what it was when there is nothing to try it on. */
+/* Pick the best choice over all folds; unchanged if there is nothing to try it on. */
 static int pick(choosing *c, size_t folds, int threads, vgi_choice *best, vg_err *e)
 {
     c->found = vgi_array(folds * c->n, sizeof *c->found, e);

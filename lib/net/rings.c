@@ -1,9 +1,8 @@
-/* rings.c: cotangent rings, components and the factor behind the features of a mesh (MATH 12).
+/* rings.c: cotangent rings, components, and the factor for the features of a mesh (MATH 12).
  *
- * Polygons are cut into the fan whose worst triangle is best. Weights are clamped: those of thin triangles are huge or
- * negative. With the normal as one more direction nearly every ring spans space; where one does not, what it leaves
- * open is taken from the rotation of the rest.
- * Leaves out poses (feature_kernel.c) and rotation vectors (branch.c).
+ * Polygons are cut into the fan whose worst triangle is best. Weights are clamped, because those of thin triangles
+ * are huge or negative. With the normal as one more direction nearly every ring spans space; where one does not, the
+ * missing directions follow the rotation of the others. Poses are in feature_kernel.c, rotation vectors in branch.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/rings.h"
 #include "net/heap.h"
@@ -22,7 +21,7 @@ static const double *point(const vgi_rings *r, size_t v)
 
 /* ---- triangles ---- */
 
-/* twice the area over the sum of squared sides: the larger, the better the triangle */
+/* twice the area divided by the sum of squared sides: larger is better */
 static double quality(const double *a, const double *b, const double *c)
 {
     double n[3];
@@ -158,8 +157,8 @@ void vgi_rings_from(const vgi_rings *r, uint32_t v, double *distance, uint32_t *
     }
 }
 
-/* Sources are spread: each is the vertex that lies farthest from those before. The largest of the distances to them
- * is, for every vertex, nearly the distance to the farthest vertex of all. most, near, from: nv numbers. */
+/* Sources are spread: each is the vertex farthest from those before. The largest distance to them is, for every
+ * vertex, nearly the distance to the farthest vertex. most, near, from: nv numbers. */
 static uint32_t find_centre(const vgi_rings *r, size_t part, double *most, double *near, double *from, uint32_t *heap)
 {
     uint32_t v = 0;
@@ -170,7 +169,7 @@ static uint32_t find_centre(const vgi_rings *r, size_t part, double *most, doubl
         for (size_t i = 0; i < r->nv; i++) {
             if (r->part[i] != (int)part) continue;
             most[i] = fmax(most[i], from[i]);
-            near[i] = sweep ? fmin(near[i], from[i]) : INFINITY; /* the first source is any vertex: it does not count */
+            near[i] = sweep ? fmin(near[i], from[i]) : INFINITY; /* the first source is arbitrary and does not count */
         }
         const double *farthest = sweep ? near : from;
         for (size_t i = 0; i < r->nv; i++)
@@ -188,7 +187,7 @@ static int by_number(const void *x, const void *y)
     return a < b ? -1 : a > b;
 }
 
-/* the vertices within a share of the largest distance from the centre, at least seven; sorted: nv numbers */
+/* the vertices within a fraction of the largest distance from the centre, at least seven; sorted: nv numbers */
 static int find_ball(vgi_rings *r, const double *from, double *sorted, vg_err *e)
 {
     size_t n = 0;
@@ -222,7 +221,7 @@ static int find_centres(vgi_rings *r, vg_err *e)
 
 /* ---- rings ---- */
 
-/* eigenvectors of a symmetric matrix by Jacobi's rotations: the columns of x; a becomes diagonal */
+/* eigenvectors of a symmetric matrix by Jacobi rotations: the columns of x; a becomes diagonal */
 static void diagonalise(double a[9], double x[9])
 {
     for (int i = 0; i < 9; i++) x[i] = i % 4 == 0;
@@ -242,7 +241,7 @@ static void diagonalise(double a[9], double x[9])
             }
 }
 
-/* The inverse of m where it has one, and the projector onto the directions where it has none. True: there are some. */
+/* The pseudo-inverse of m, and the projector onto its null space. Returns true if the null space is not empty. */
 static bool invert_ring(const double m[9], double inverse[9], double open[9])
 {
     double a[9], x[9], most = 0;
@@ -320,7 +319,7 @@ static void list_laplacian(const vgi_rings *r, const uint32_t *number, vgi_tripl
     }
 }
 
-/* Right-hand sides sum to 0 over a component, so adding 1 to the diagonal of one vertex puts it at 0. */
+/* Right-hand sides sum to 0 over a component, so adding 1 to the diagonal of one vertex sets it to 0. */
 static int factorize(vgi_rings *r, vg_err *e)
 {
     vgi_triplets t = {0};
@@ -338,7 +337,7 @@ static int factorize(vgi_rings *r, vg_err *e)
     if (code == VG_OK) {
         r->factor = vgi_cholesky_factor(r->cholesky);
         const int *order = vgi_cholesky_order(r->cholesky);
-        uint32_t *row_of = number; /* its numbers are looked up once more, then it is the inverse of the order */
+        uint32_t *row_of = number; /* read once more below, then reused for the inverse order */
         uint32_t *inverse = vgi_array_raw(n, sizeof *inverse, e);
         if (!inverse) code = VG_ENOMEM;
         for (uint32_t i = 0; code == VG_OK && i < n; i++) inverse[order[i]] = i;

@@ -1,5 +1,5 @@
-/* root.c: a walk walks away: turn and shift of the root from frame to frame are functions of the body's pose and how it
- * changes, learned by ridge regression.
+/* root.c: predicts the root of a locomotion: turn and shift of the root from frame to frame are functions of the
+ * body's pose and its change, fitted by ridge regression.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/root.h"
 #include "numeric/blas.h"

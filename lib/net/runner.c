@@ -1,12 +1,12 @@
-/* runner.c: chains in use: teacher's frames first, then the network's own.
- * Leaves out training (train.c) and completion (complete.c).
+/* runner.c: runs chains: given frames first, then the network's own output. Training is in train.c, completion in
+ * complete.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/runner.h"
 #include "core/random.h"
 
 #include <stdlib.h>
 
-/* The regressions of a network, seen where they lie. */
+/* A view of a network's regression. */
 static vgi_regression view(const vg_network *n, int back)
 {
     return vgi_regression_view(n->rank, n->regression + (size_t)back * vgi_regression_size(n->rank));
@@ -69,7 +69,7 @@ void vgi_runner_clear(vgi_runner *r)
     free(r->scale);
     free(r->matrices);
     free(r->start);
-    net_lanes *first = r->now < r->before ? r->now : r->before; /* they have changed places: one block */
+    net_lanes *first = r->now < r->before ? r->now : r->before; /* they are swapped during a run but are one block */
     if (r->before) free(first < r->next ? first : r->next);
     else free(r->now);
     *r = (vgi_runner){0};
@@ -90,7 +90,7 @@ void vgi_runner_begin(vgi_runner *r, bool back)
     net_chains_begin(&r->chains, r->start);
 }
 
-/* One step from r->now; what the layers remember moves from the second place to the first. */
+/* One step from r->now; the layers' memory moves from the second place to the first. */
 static void advance(vgi_runner *r)
 {
     const vgi_shape *s = &r->shape;
@@ -108,7 +108,7 @@ static void advance(vgi_runner *r)
 
 void vgi_runner_take(vgi_runner *r, const net_lanes *frame)
 {
-    if (r->waiting) advance(r); /* what the network expected is replaced by the frame that is given */
+    if (r->waiting) advance(r); /* the prediction is replaced by the given frame */
     memcpy(r->now, frame, r->shape.numbers * sizeof *frame);
     r->waiting = true;
 }
@@ -138,7 +138,7 @@ bool vgi_runner_reach_back(const vgi_runner *r, const net_lanes *frame, net_lane
     return true;
 }
 
-/* frame t of all lanes; lanes that are not in use repeat the first */
+/* frame t of all lanes; unused lanes repeat the first */
 static void gather(size_t lanes, size_t n, const double *const *in, size_t t, net_lanes *frame)
 {
     for (size_t k = 0; k < n; k++)

@@ -1,4 +1,4 @@
-/* shape.c: the table of a network's parameters and their first values.
+/* shape.c: the table of a network's parameters and their initial values.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/shape.h"
 #include "core/random.h"
@@ -52,7 +52,7 @@ int vgi_shape_plan(vgi_shape *s, vg_err *e)
     return ok ? VG_OK : vg_fail(e, VG_EARG, "a network for %zu numbers is too large", s->numbers);
 }
 
-/* ---- first values ---- */
+/* ---- ---- initial values ---- */
 
 static void fill_normal(float *p, size_t n, double deviation, vgi_random *r)
 {
@@ -95,7 +95,9 @@ int vgi_shape_start(const vgi_shape *s, uint64_t seed, bool quiet, float *parame
     for (size_t l = 0; l < s->layers; l++) {
         fill_uniform(parameters + s->gates[l], (vgi_shape_input(s, l) + s->hidden) * 4 * s->hidden, width, &r);
         fill_uniform(parameters + s->gates_bias[l], 4 * s->hidden, width, &r);
-        for (size_t i = 0; i < s->hidden; i++) parameters[s->gates_bias[l] + s->hidden + i] += 1; /* forget late */
+        for (size_t i = 0; i < s->hidden; i++) parameters[s->gates_bias[l] + s->hidden + i] += 1; /* forget gates
+                                                                                                     start nearly
+                                                                                                     open */
     }
     return VG_OK;
 }

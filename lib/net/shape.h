@@ -1,5 +1,5 @@
-/* shape.h: the sizes of a network and where its parameters lie: one table, one block (MATH 12).
- * Internal. Leaves out the parameters themselves.
+/* shape.h: the sizes of a network and the layout of its parameters: one table, one block (MATH 12). Internal. The
+ * parameters themselves are elsewhere.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_NET_SHAPE_H
 #define VG_NET_SHAPE_H
@@ -8,10 +8,10 @@
 
 enum { VGI_NET_CONVOLUTIONS = 8, VGI_NET_LAYERS = 8, VGI_NET_PARAMETERS = 4 * VGI_NET_CONVOLUTIONS + 3 + 2 * VGI_NET_LAYERS + 2 };
 
-/* What stands between a frame and the recurrent layers. */
+/* What is between a frame and the recurrent layers. */
 typedef enum vgi_front {
-    VGI_FRONT_LINEAR = 1, /* coordinates, scaled; the way back is a full layer */
-    VGI_FRONT_MESH = 2    /* mesh convolutions (perhaps none), then one full layer, tied in the way back */
+    VGI_FRONT_LINEAR = 1, /* scaled coordinates; a full layer decodes */
+    VGI_FRONT_MESH = 2    /* mesh convolutions (possibly none), then one full layer with tied weights in the decoder */
 } vgi_front;
 
 /* A matrix or vector of the block, row-major. */
@@ -24,11 +24,11 @@ typedef struct vgi_shape {
     vgi_front front;
     size_t vertices, channels; /* of a frame; coordinates: 1 channel */
     size_t numbers;            /* of a frame: vertices * channels */
-    size_t latent;             /* numbers that the recurrent layers see; of a mesh: hidden */
+    size_t latent;             /* numbers that the recurrent layers see; for a mesh: hidden */
     size_t hidden, layers, convolutions;
     bool uncertain;            /* the latent numbers come with a variance (KL) */
     const uint32_t *first, *to; /* of a mesh: the neighbours of vertex v are to[first[v]] .. to[first[v + 1] - 1] */
-    /* where the parameters are in the block */
+    /* offsets of the parameters in the block */
     size_t own[VGI_NET_CONVOLUTIONS], mean[VGI_NET_CONVOLUTIONS];     /* channels x channels */
     size_t bias[VGI_NET_CONVOLUTIONS], bias_back[VGI_NET_CONVOLUTIONS]; /* channels; of the mirrored layer */
     size_t full;               /* mesh: numbers x latent; coordinates: hidden x numbers */
@@ -40,16 +40,16 @@ typedef struct vgi_shape {
     vgi_parameter parameter[VGI_NET_PARAMETERS];
 } vgi_shape;
 
-/* vgi_shape_plan: fill in latent, numbers, places and table from the other sizes. VG_EARG when they are out of range or
- * too large. */
+/* vgi_shape_plan: compute latent, numbers, offsets and table from the other sizes. VG_EARG if they are out of range
+ * or too large. */
 int vgi_shape_plan(vgi_shape *s, vg_err *e) VG_MUST_CHECK;
 /* the number of inputs of a recurrent layer */
 static inline size_t vgi_shape_input(const vgi_shape *s, size_t layer)
 {
     return layer ? s->hidden : s->latent;
 }
-/* vgi_shape_start: first values of the parameters (total numbers), by seed. quiet: the output weights of a network that
- * corrects a regression are 0.01 of the usual. */
+/* vgi_shape_start: initial values of the parameters (total numbers), from a seed. quiet: the output weights of a
+ * network that corrects a regression are 0.01 times the usual. */
 int vgi_shape_start(const vgi_shape *s, uint64_t seed, bool quiet, float *parameters, vg_err *e) VG_MUST_CHECK;
 
 #endif

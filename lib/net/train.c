@@ -1,10 +1,10 @@
-/* train.c: a network learns by Adam on sequences drawn from the training frames (MATH 12).
+/* train.c: trains a network by Adam on sequences drawn from the training frames (MATH 12).
  *
- * How long it learns is found out beside a validation block, the last fifth of what there is; a correction of a
- * regression then learns once more from all of it, for as long. What is random depends on the seed and the iteration
- * alone, groups of eight chains are always the same, and their gradients are added in order: the number of threads
- * changes no bit, and training that was interrupted goes on as if it had not been.
- * Leaves out features (feature.c), frames (dataset.c) and the report (judge.c).
+ * The number of iterations is found with a validation block, the last fifth of the data. A correction of a regression
+ * is then trained again on all data, for as many iterations. Random choices depend only on the seed and the
+ * iteration, groups of eight chains are always the same, and their gradients are added in order. So the number of
+ * threads changes no bit, and resumed training gives the same result as uninterrupted training. Features are in
+ * feature.c, frames in dataset.c, the report in judge.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "net/trainer.h"
 #include "net/root.h"
@@ -16,7 +16,7 @@
 #include <stdlib.h>
 
 static const double clip = 5, least_rate = 0.02, repeats = 1e-5;
-enum { VALIDATE_EVERY = 20, FOLDS = 5, SINGLE = 4, /* of so many iterations one begins from single frames */
+enum { VALIDATE_EVERY = 20, FOLDS = 5, SINGLE = 4, /* one in so many iterations starts from single frames */
        CHUNK = 1 << 16, ERRORS = 2 * VG_NETWORK_METHODS * VG_NETWORK_FRAMES };
 
 vg_train_options vg_train_defaults(vg_network_model m)
@@ -108,7 +108,7 @@ void vg_trainer_free(vg_trainer **out)
     vgi_ranks_end();
 }
 
-/* the pose without its root: each component's centroid at 0 */
+/* the pose without root motion: the centroid of each component at 0 */
 static void bring_home(const vg_trainer *t, const double *pose, const double *root, const double *centroids,
                        double *home)
 {
@@ -167,7 +167,7 @@ void vg_trainer_cut(vg_trainer *t)
 
 /* ---- a phase ---- */
 
-/* The last fifth of each span, at least six frames, is tried; nothing when that leaves too few. */
+/* Validate on the last fifth of each span, at least six frames; on nothing if that leaves too few for training. */
 static int choose_block(vg_trainer *t, bool validate, vg_err *e)
 {
     enum { LEAST_TRIED = 6, LEAST_FITTED = 12 };
@@ -189,7 +189,7 @@ static void free_fold(vgi_fold *f)
     free((void *)f->tried.start);
 }
 
-/* Fold k leaves out the k-th fifth of each span; it is continued from the two frames before it. */
+/* Fold k leaves out the k-th fifth of each span and predicts it from the two frames before it. */
 static int make_fold(const vg_trainer *t, size_t k, vgi_fold *f, vg_err *e)
 {
     vgi_spans fitted = {0}, tried = {0};
@@ -211,7 +211,7 @@ static int make_fold(const vg_trainer *t, size_t k, vgi_fold *f, vg_err *e)
     return code;
 }
 
-/* Ridges and damping by five blocks that are left out in turn: one block alone may be like nothing else. */
+/* Choose ridges and damping on five blocks left out in turn; a single block may be unlike all others. */
 static int choose_regression(vg_trainer *t, vg_err *e)
 {
     vgi_fold folds[FOLDS] = {0};
@@ -223,7 +223,7 @@ static int choose_regression(vg_trainer *t, vg_err *e)
     return code;
 }
 
-/* The regressions of both directions by what is learned from. */
+/* Fit the regressions of both directions to the training frames. */
 static int fit_regressions(vg_trainer *t, vg_err *e)
 {
     vgi_frames fitted;
@@ -247,8 +247,8 @@ static int fit_regressions(vg_trainer *t, vg_err *e)
     return VG_OK;
 }
 
-/* The two frames that the regressions put before each frame, of forward chains and of backward ones: so runs from a single
- * frame begin. */
+/* The two frames that the regressions put before each frame, for forward and for backward chains. Runs from a single
+ * frame start with them. */
 static int find_before(vg_trainer *t, vg_err *e)
 {
     size_t n = t->data.rank;
@@ -317,7 +317,7 @@ static int start_parameters(vg_trainer *t, vg_err *e)
     return VG_OK;
 }
 
-/* All that follows from the frames of a phase; parameters start afresh. */
+/* Compute everything that depends on the frames of a phase, and reset the parameters. */
 static int begin_phase(vg_trainer *t, bool validate, vg_err *e)
 {
     const vgi_rings *r = vgi_featurer_rings(t->featurer);
@@ -369,7 +369,8 @@ int vg_trainer_prepare(vg_trainer *t, vg_err *e)
     if (code == VG_OK && !(t->net.errors = vgi_array(ERRORS, sizeof *t->net.errors, e))) code = VG_ENOMEM;
     for (int i = 0; code == VG_OK && i < ERRORS; i++) t->net.errors[i] = -1;
     if (code == VG_OK) code = begin_phase(t, true, e);
-    if (code == VG_OK && !t->tried.n) t->state.phase = 1; /* too short for a block: all of it, for as long as is asked */
+    if (code == VG_OK && !t->tried.n) t->state.phase = 1; /* too short for a block: train on all of it, for as long as
+                                                             requested */
     if (code < 0) return code;
     t->state.parameters = t->net.sets * t->net.nparameters, t->state.coordinates = t->net.rank;
     t->state.frames = t->net.frames, t->state.held = vgi_spans_frames(&t->data.held);
@@ -383,9 +384,9 @@ int vg_trainer_prepare(vg_trainer *t, vg_err *e)
 
 typedef struct working {
     vg_trainer *t;
-    size_t first;  /* the group of the first buffer */
+    size_t first;  /* the group in the first buffer */
     size_t given, *start;
-    bool single; /* the first frames are those that the regression puts before a single one */
+    bool single; /* sequences start with the frames that the regression puts before a single one */
     net_loss loss[64];
 } working;
 
@@ -486,7 +487,7 @@ static void learn(vg_trainer *t)
     if (t->state.gradient < 1e30) vgi_parallel(t->o.threads, (all + CHUNK - 1) / CHUNK, adam_chunk, &a);
 }
 
-/* ---- how long ---- */
+/* ---- ---- number of iterations ---- */
 
 static void keep_best(vg_trainer *t, double error)
 {
@@ -496,7 +497,7 @@ static void keep_best(vg_trainer *t, double error)
     memcpy(t->best, t->net.parameters, t->net.sets * t->net.nparameters * sizeof *t->best);
 }
 
-/* A correction that says nothing: the regression alone. */
+/* Set the correction to zero, so that the regression is used alone. */
 static void silence(vg_trainer *t)
 {
     const vgi_shape *s = &t->shape;
@@ -507,7 +508,7 @@ static void silence(vg_trainer *t)
     }
 }
 
-/* The end of what is learned beside the validation block. */
+/* End of the phase with the validation block. */
 static int end_phase(vg_trainer *t, vg_err *e)
 {
     uint64_t best = t->state.best_iteration;

@@ -1,5 +1,4 @@
-/* trainer.h: what the training of a network holds.
- * Internal; shared by train.c and judge.c.
+/* trainer.h: state of the training of a network. Internal; shared by train.c and judge.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_TRAINER_H
 #define VG_TRAINER_H
@@ -14,20 +13,21 @@ struct vg_trainer {
     vg_featurer *featurer;
     vg_mesh mesh;
     vgi_dataset data;
-    double *last;           /* the pose before, nv points; begun: there is one */
-    bool begun, cut; /* cut: the next pose begins a sequence */
-    vg_network net;         /* as it is now: parameters, basis, regression of this phase */
+    double *last;           /* the previous pose, nv points; begun: whether there is one */
+    bool begun, cut; /* cut: the next pose starts a sequence */
+    vg_network net;         /* current state: parameters, basis, regression of this phase */
     vgi_shape shape;
     /* this phase */
-    vgi_spans fitted, tried; /* frames that are learned from, and the validation block */
+    vgi_spans fitted, tried; /* frames used for training, and the validation block */
     float *frames;          /* n x numbers, as the layers see them */
-    size_t length;          /* frames of a training sequence */
-    size_t *window, nwindows; /* where they may begin */
-    vgi_choice choice;      /* once for both phases */
+    size_t length;          /* frames per training sequence */
+    size_t *window, nwindows; /* possible first frames */
+    vgi_choice choice;      /* chosen once for both phases */
     vgi_regression regression[2]; /* fitted to the frames of this phase */
-    float *before;          /* of a network that corrects a regression: what this puts before each frame: net_group */
+    float *before;          /* for a network that corrects a regression: the frames that it puts before each frame,
+                               see net_group */
     net_group *groups;
-    size_t ngroups, at_once; /* at_once groups are run at a time */
+    size_t ngroups, at_once; /* at_once groups run at a time */
     float **gradient;       /* at_once x sets * nparameters */
     float *total, *moments, *best;
     vgi_runner runner;
