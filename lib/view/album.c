@@ -1,6 +1,6 @@
 /* album.c: keeps evenly spaced frames of a sequence of unknown length in bounded memory. One frame in `stride` is
- * kept; when the memory is full every second one is dropped and the stride doubles. The last frame is always kept.
- * Leaves out what a shot holds.
+ * kept; when the memory is full, every second one is dropped and the stride doubles. The last frame is always kept.
+ * The contents of a shot do not matter here.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
@@ -65,7 +65,7 @@ int vgi_album_next(vgi_album *a, vgi_shot **shot, vg_err *e)
     return VG_OK;
 }
 
-/* Append the last frame to those that were kept; returns its number. */
+/* Append the last frame to those kept; returns its number. */
 static size_t add_last(vgi_album *a)
 {
     if (a->seen == 0) return 0;
@@ -91,8 +91,8 @@ size_t vgi_album_close(vgi_album *a)
     if (a->n == 0) return 0;
     if (a->n <= a->want) return a->n;
     for (size_t i = 0, from = 0; i < a->want; i++) {
-        /* The frame nearest to the i-th of `want` evenly spaced ones. Wanted frames are more than a stride apart,
-         * so none is taken twice. */
+        /* The frame nearest to the i-th of `want` evenly spaced ones. Wanted frames are more than a stride apart, so
+         * that none is chosen twice. */
         double at = a->want > 1 ? (double)i * (double)last / (double)(a->want - 1) : 0;
         while (from + 1 < a->n && (double)a->at[from + 1].index - at < at - (double)a->at[from].index) from++;
         if (from < i) from = i;

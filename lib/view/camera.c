@@ -1,10 +1,10 @@
-/* camera.c: a parallel projection, so that lengths can be compared across the sheet. Leaves out perspective.
+/* camera.c: a parallel projection, so that lengths can be compared across the sheet. There is no perspective.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
 
-/* From y-up axes, in which the viewer turns, to the axes of the mesh (z up: its front is -y). */
+/* From y-up axes, in which the viewer rotates, to the axes of the mesh (z up: its front is -y). */
 static void to_mesh(const double v[3], bool z_up, float out[3])
 {
     out[0] = (float)v[0];

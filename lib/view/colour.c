@@ -1,7 +1,6 @@
-/* colour.c: colour maps, and the conversion of linear light to bytes. The sequential map is a path in OKLab
- * (Ottosson 2020) whose lightness rises evenly from deep indigo over teal to light yellow, so that it also reads
- * in grey and with colour-deficient eyes. The diverging map goes from blue over light grey to orange. Leaves out
- * lights.
+/* colour.c: colour maps, and the conversion of linear light to bytes. The sequential map is a path in OKLab (Ottosson
+ * 2020) whose lightness increases evenly from deep indigo over teal to light yellow, so that it can be read in grey
+ * and by colour-blind people. The diverging map goes from blue over light grey to orange. Lights are in shade.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 

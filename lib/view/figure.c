@@ -1,5 +1,5 @@
-/* figure.c: the drawable form of a mesh: faces around vertices, smooth normals with creases, triangles. Leaves out
- * projection.
+/* figure.c: the drawable form of a mesh: faces around vertices, smooth normals with creases, triangles. Projection is
+ * in camera.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
@@ -112,7 +112,7 @@ static float dot(const float a[3], const float b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Newell: the area vector of a polygon that need not be planar, taken about its first corner so that no digits are
+/* Newell: the area vector of a polygon that need not be planar, relative to its first corner so that no digits are
  * lost far from the origin. */
 static void area_vector(const vg_mesh *m, size_t f, const float *points, float area[3])
 {
@@ -129,8 +129,8 @@ static void area_vector(const vg_mesh *m, size_t f, const float *points, float a
     }
 }
 
-/* The normal of corner c. Where all faces around the vertex are smoothed, it is that of the vertex's first corner,
- * already computed. */
+/* The normal of corner c. If all faces around the vertex are smoothed, it equals that of the vertex's first corner,
+ * which is already computed. */
 static void corner_normal(const vgi_figure *g, size_t f, size_t c, const float *face, float *normals)
 {
     uint32_t v = g->mesh->vert[c];
@@ -168,7 +168,7 @@ void vgi_figure_normals(const vgi_figure *g, const float *points, float *face, f
 typedef struct clipping {
     const double *xy;
     double sign;               /* +1: counter-clockwise */
-    size_t *before, *after;    /* the remaining corners, as a ring */
+    size_t *before, *after;    /* the remaining corners, as doubly linked ring */
     size_t *reflex, nreflex;   /* corners that may lie inside an ear */
 } clipping;
 
@@ -219,6 +219,6 @@ void vgi_ear_clip(const double *xy, size_t n, size_t *work, size_t *triangles)
         triangles[3 * t] = a, triangles[3 * t + 1] = b, triangles[3 * t + 2] = c;
         k.after[a] = c, k.before[c] = a;
         drop_convex(&k, b);
-        b = k.after[c]; /* not the neighbour: thin fans look worse */
+        b = k.after[c]; /* not the neighbour, because thin fans look worse */
     }
 }

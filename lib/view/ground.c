@@ -1,5 +1,5 @@
-/* ground.c: a grid at the height of the reference pose, and a shadow straight below the figure: they show whether
- * a figure walks, jumps or slides. Leaves out shadows cast by the lights.
+/* ground.c: a grid at the height of the reference pose, and a shadow directly below the figure: they show whether a
+ * figure walks, jumps or slides. Shadows of the lights are not drawn.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 

@@ -1,5 +1,5 @@
-/* hull.c: the outermost points of a sequence in 26 directions, over all frames: enough for a camera to fit it.
- * Leaves out the camera (page_draw.js).
+/* hull.c: the outermost points of a sequence in 26 directions, over all frames: enough to fit a camera
+ * (page_draw.js).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/page.h"
 
@@ -15,7 +15,7 @@ static double along(size_t i, const double p[3])
     return directions[i][0] * p[0] + directions[i][1] * p[1] + directions[i][2] * p[2];
 }
 
-/* Take over one of the points when it lies further out in direction i of 26. */
+/* Store one of the points if it lies further out in direction i of 26. */
 static void extend(vgi_hull *h, size_t i, double reach, const double p[3], const double centre[3])
 {
     if (h->n && !(reach > h->reach[i])) return;

@@ -1,4 +1,4 @@
-/* legend.c: the colour bar with its numbers and the lines of text around it. Leaves out its position on the sheet.
+/* legend.c: the colour bar with its numbers, and the lines of text around it. The sheet decides where it is.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 

@@ -1,4 +1,4 @@
-/* look.c: what a sheet looks at, by number or name. Leaves out the camera (sheet.c).
+/* look.c: finds what a sheet is centred on, by number or name. The camera is in sheet.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "vg/look.h"
 
@@ -16,7 +16,7 @@ static int one_vertex(uint32_t v, uint32_t **vertices, size_t *n, vg_err *e)
     return VG_OK;
 }
 
-/* A number, with nothing behind it: *v. Vertices beyond UINT32_MAX are none. */
+/* Parse a number without trailing text. Vertices beyond UINT32_MAX do not exist. */
 static bool is_number(const char *what, size_t *v)
 {
     size_t length = strlen(what);
@@ -36,7 +36,7 @@ static uint32_t nearest(const vg_body *b, const double at[3])
     return found;
 }
 
-/* The vertex of a joint of that name; false: there is none. */
+/* The vertex of the joint with that name; false if there is none. */
 static bool find_joint(const vg_body *b, const char *name, uint32_t *v)
 {
     const bool rigged = b->rig.skeleton.njoints > 0;
@@ -49,7 +49,7 @@ static bool find_joint(const vg_body *b, const char *name, uint32_t *v)
     return false;
 }
 
-/* Mark the vertices of the faces under labels of this kind and name. Returns how many there are. */
+/* Mark the vertices of the faces with labels of this kind and name. Returns their number. */
 static size_t mark_part(const vg_body *b, uint32_t kind, const char *name, bool *marked)
 {
     const vg_attributes *a = &b->attributes;

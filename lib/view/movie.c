@@ -1,5 +1,5 @@
-/* movie.c: an animation of what a sheet shows: the pictures of all sequences side by side, one after another.
- * Leaves out drawing a picture (sheet.c) and the file format (webp.c).
+/* movie.c: an animated sheet: the pictures of all sequences side by side, one after another. Pictures are drawn in
+ * sheet.c and written in webp.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/sheet.h"
 
@@ -13,7 +13,7 @@
 static const double caption_dot = 1.5;
 static const unsigned char ink[3] = {38, 42, 50};
 
-/* When picture i is shown, in milliseconds: by the times of the frames if all have one and they increase. */
+/* Time of picture i in milliseconds: from the times of the frames if all have one and they increase. */
 static int time_of(const vg_sheet *s, const vgi_row *q, size_t i)
 {
     bool timed = true;
@@ -48,7 +48,7 @@ static int compose(const vg_sheet *s, size_t i, vgi_canvas *c, unsigned char *rg
     return VG_OK;
 }
 
-typedef struct movie { /* `threads` pictures are drawn at the same time */
+typedef struct movie { /* `threads` pictures are drawn at a time */
     const vg_sheet *s;
     size_t first;
     vgi_canvas *canvas;

@@ -1,5 +1,5 @@
-/* page.c: writes the page that plays sequences in a browser: takes frames, packs them, measures what the packing
- * loses, and adds the player. Leaves out how numbers are packed (page_data.c) and how they are drawn (page_*.js).
+/* page.c: writes the page that plays sequences in a browser: collects frames, packs them, measures the packing error,
+ * and adds the player. Numbers are packed in page_data.c and drawn by page_*.js.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/page.h"
 
@@ -11,7 +11,7 @@
 enum {
     FLUSH_BYTES = 1 << 18,
     LINE_BYTES = 1 << 20,   /* bytes of a block encoded as text at a time; a multiple of 3 */
-    MOST_CLIPPED = 4096,    /* largest face that is cut by ear clipping */
+    MOST_CLIPPED = 4096,    /* largest face cut by ear clipping */
     MAP_STEPS = 65,         /* samples of the colour map in the page; odd, so that one is its middle */
     DECADES = 60, PER_DECADE = 200, /* of the histogram of the coloured numbers */
 };
@@ -25,7 +25,7 @@ typedef struct sequence {
     vgi_hull path, figure;     /* extent over all frames, and relative to the centroid of each frame */
     vgi_track places, numbers;
     vgi_meter meter;
-    bool tinted, compared;     /* frames have numbers to be coloured; these are errors */
+    bool tinted, compared;     /* whether frames have numbers to be coloured; whether these are errors */
     vgi_chunk chunk;
     vg_bytes names, times, means, minima, maxima; /* per frame, as JSON lists without their closing bracket */
     bool timed;
@@ -69,7 +69,7 @@ static int put_text(vg_page *p, const char *text, vg_err *e)
     return put(p, text, strlen(text), e);
 }
 
-/* Copy the template up to a mark, which is left out, or to its end. */
+/* Copy the template up to a mark, which is skipped, or to its end. */
 static int put_template(vg_page *p, const char *mark, vg_err *e)
 {
     const char *at = mark ? strstr(p->rest, mark) : p->rest + strlen(p->rest);
@@ -268,7 +268,7 @@ static int list_spread(sequence *s, const vgi_tint *t, const vgi_spread *x, vg_e
     return r;
 }
 
-/* The first frame decides whether a sequence has numbers to be coloured. */
+/* The first frame decides whether a sequence has coloured numbers. */
 static int begin_numbers(vg_page *p, sequence *s, const vg_frame *f, const double *truth, vg_err *e)
 {
     s->tinted = vgi_tint_has(&p->tint, f, truth);
@@ -305,7 +305,7 @@ static int add_label(sequence *s, const vg_frame *f, vg_err *e)
 {
     int r = vgi_page_next(&s->names, e);
     if (r == VG_OK) r = vgi_page_string(&s->names, f->name, e);
-    /* times that do not increase are not used for playing */
+    /* times that do not increase are ignored */
     s->timed = s->timed && f->has_time && isfinite(f->time) && f->time > s->last_time;
     s->last_time = f->time;
     if (r < 0 || !s->timed) return r;
@@ -423,7 +423,7 @@ static void end_tint(vg_page *p, vg_page_stats *stats)
     stats->max = vgi_tint_shown(&p->tint, p->spread.most);
 }
 
-/* One process that took part: its command line, and the processes whose output it read. */
+/* One process in the provenance: its command line, and the processes whose output it read. */
 static int json_process(vg_bytes *list, const vg_provenance *p, vg_err *e)
 {
     vg_bytes line = {0}, parents = {0};
@@ -469,7 +469,7 @@ int vgi_page_field_numbers(vg_bytes *b, const char *name, const double *x, size_
     return r;
 }
 
-/* The joints of a skeleton that is the sequence, or of a rig that drives its mesh: names, parents, places at rest. */
+/* The joints of a skeleton sequence, or of a rig that drives the mesh: names, parents, rest positions. */
 static int json_joints(vg_bytes *b, const vg_body *body, vg_err *e)
 {
     const vg_rig *rig = body->rig.skeleton.njoints ? &body->rig : NULL;
@@ -490,7 +490,7 @@ static int json_joints(vg_bytes *b, const vg_body *body, vg_err *e)
     return r;
 }
 
-/* A compared sequence is shown in the place and units of the truth. */
+/* A compared sequence is shown at the position and in the units of the truth. */
 static const sequence *frame_of(const vg_page *p, const sequence *s)
 {
     return s->compared ? p->at + 1 : s;
@@ -540,7 +540,7 @@ static int json_map(vg_bytes *b, bool diverging, vg_err *e)
     return vgi_page_field_text(b, "map", text, e);
 }
 
-/* What the colours mean and where they end; scales are logarithms to base 2. */
+/* What the colours mean, and the ends of the map; scales are logarithms to base 2. */
 static int json_tint(vg_bytes *b, const vg_page *p, vg_err *e)
 {
     static const char *const kinds[] = {"scalars", "errors", "scales", "plain"};

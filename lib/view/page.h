@@ -21,7 +21,7 @@ enum { VGI_PREDICT_FRAME = 1, VGI_PREDICT_MOTION = 2, VGI_PREDICT_NEIGHBOUR = 4 
 
 typedef struct vgi_track { /* frames waiting to become a chunk */
     size_t nv, width, n, cap;
-    double *values;      /* cap frames of nv * width, as given */
+    double *values;      /* cap frames of nv * width, as received */
     uint16_t *q;         /* the same, quantised, axis by axis */
     unsigned char *left; /* residuals: cap + 2 * cap * nv * width */
 } vgi_track;
@@ -35,7 +35,7 @@ typedef struct vgi_chunk {
 
 int vgi_track_init(vgi_track *t, size_t nv, size_t width, vg_err *e) VG_MUST_CHECK;
 void vgi_track_clear(vgi_track *t);
-/* vgi_track_next: where the caller puts the numbers of the next frame. n must be less than cap. */
+/* vgi_track_next: where to store the numbers of the next frame. n must be less than cap. */
 double *vgi_track_next(vgi_track *t);
 /* vgi_track_pack: pack all frames into c and empty the track. c->packed is overwritten; the caller clears it at
  * the end. */
@@ -49,9 +49,9 @@ int vgi_base64(vg_bytes *text, const unsigned char *data, size_t n, vg_err *e) V
 
 int vgi_page_escape(vg_bytes *b, const char *text, vg_err *e) VG_MUST_CHECK; /* for HTML, also between quotes */
 /* JSON for a script element: contains no '<', so that nothing ends the element. */
-int vgi_page_raw(vg_bytes *b, const char *text, vg_err *e) VG_MUST_CHECK; /* as it is */
+int vgi_page_raw(vg_bytes *b, const char *text, vg_err *e) VG_MUST_CHECK; /* unchanged */
 int vgi_page_string(vg_bytes *b, const char *text, vg_err *e) VG_MUST_CHECK;
-int vgi_page_number(vg_bytes *b, double x, vg_err *e) VG_MUST_CHECK; /* all digits; null when not finite */
+int vgi_page_number(vg_bytes *b, double x, vg_err *e) VG_MUST_CHECK; /* all digits; null if not finite */
 int vgi_page_short(vg_bytes *b, double x, vg_err *e) VG_MUST_CHECK;  /* rounded to binary32 */
 /* The next field of an object: its name alone, or name and value. */
 int vgi_page_field(vg_bytes *b, const char *name, vg_err *e) VG_MUST_CHECK;
@@ -62,11 +62,11 @@ int vgi_page_field_flag(vg_bytes *b, const char *name, bool x, vg_err *e) VG_MUS
 int vgi_page_field_list(vg_bytes *b, const char *name, const vg_bytes *open_list, vg_err *e) VG_MUST_CHECK;
 int vgi_page_next(vg_bytes *list, vg_err *e) VG_MUST_CHECK;
 
-/* ---- hull.c: what a camera has to show of a sequence ---- */
+/* ---- ---- hull.c: extent of a sequence, for the camera ---- ---- */
 
 enum { VGI_HULL = 26 };
 typedef struct vgi_hull { /* the outermost points in 26 directions over all frames so far */
-    size_t n;             /* VGI_HULL, or 0 when there are no points */
+    size_t n;             /* VGI_HULL, or 0 without points */
     double reach[VGI_HULL], at[VGI_HULL][3];
 } vgi_hull;
 /* vgi_hull_add: add the drawn vertices of a frame (nv points), relative to `centre`. */
@@ -85,19 +85,20 @@ int vgi_page_list(vg_page *p, size_t i, const char *what, const uint32_t *list, 
                   vg_err *e) VG_MUST_CHECK;
 int vgi_page_field_numbers(vg_bytes *b, const char *name, const double *x, size_t n, vg_err *e) VG_MUST_CHECK;
 
-/* ---- page_skin.c: the materials of a body, when it has an asset ----
+/* ---- page_skin.c: the materials of a body that has an asset ----
  *
- * Lists "materials": of each face the number of its material, from 1 on, 0: none; "coordinates": of each corner u and v as
- * binary32. In the facts "materials", each with name, colour, cutoff and the number of its picture, and "pictures". */
+ * Lists "materials": per face the number of its material, from 1 on, or 0 for none; "coordinates": per corner u and v
+ * as binary32. In the facts: "materials", each with name, colour, cutoff and the number of its picture; and
+ * "pictures". */
 
 int vgi_page_skin_lists(vg_page *p, size_t i, const vg_body *b, vg_err *e) VG_MUST_CHECK;
 int vgi_page_skin_facts(vg_bytes *b, const vg_body *body, vg_err *e) VG_MUST_CHECK;
 
-/* ---- signal_page.c: what a page needs of a signal ----
+/* ---- signal_page.c: the data of a signal in a page ----
  *
- * Lists of 32-bit words: "mean" (d binary64 numbers, the lower word first), "coordinate" (n x m of them), "basis": for
- * each of d numbers of a shape its m numbers of the basis, as binary32, or two int16 in a word when the signal keeps 16
- * bits. All else is in the facts. */
+ * Lists of 32-bit words: "mean" (d binary64 numbers, the lower word first), "coordinate" (n x m of them), "basis":
+ * for each of the d numbers of a shape its m numbers of the basis, as binary32, or as two int16 per word if the
+ * signal stores 16 bits. Everything else is in the facts. */
 
 int vgi_signal_page_lists(vg_page *p, const vg_signal *s, vg_err *e) VG_MUST_CHECK;
 int vgi_signal_page_facts(vg_bytes *b, const vg_signal *s, vg_err *e) VG_MUST_CHECK;

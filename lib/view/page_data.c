@@ -1,5 +1,5 @@
-/* page_data.c: packs poses into few bytes: quantised, predicted, split into byte planes, deflated, base64. Leaves
- * out what the numbers mean. page.h documents the format; page_read.js reads it.
+/* page_data.c: packs poses into few bytes: quantised, predicted, split into byte planes, deflated, base64. page.h
+ * documents the format; page_read.js reads it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/page.h"
 
@@ -121,7 +121,7 @@ static void quantise(vgi_track *t, vgi_chunk *c)
     c->loss = sqrt(worst);
 }
 
-/* The residual of a value whose predecessor stands `frame` values before it; modulo 2^16. */
+/* The residual of a value whose predictor is `frame` values before it; modulo 2^16. */
 static inline uint16_t remainder_of(const uint16_t *q, ptrdiff_t frame, unsigned how)
 {
     unsigned x = *q;
@@ -175,7 +175,7 @@ static unsigned choose(const vgi_track *t, size_t i)
     unsigned best = 0;
     uint64_t least = UINT64_MAX;
     for (size_t j = 0; j < sizeof ways / sizeof *ways; j++) {
-        if ((ways[j] & 3) > i) continue; /* needs more previous frames than there are */
+        if ((ways[j] & 3) > i) continue; /* needs more previous frames than exist */
         uint64_t bits = count_bits(q, t, ways[j]);
         if (bits < least) least = bits, best = ways[j];
     }

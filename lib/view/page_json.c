@@ -1,4 +1,4 @@
-/* page_json.c: escapes text for HTML, and for JSON inside a script element. Leaves out its content.
+/* page_json.c: escapes text for HTML, and for JSON inside a script element.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/page.h"
 

@@ -1,16 +1,16 @@
-/* page_skin.c: the materials of a character for a page: which material each face has, by its labels, texture coordinates of
- * the corners, and of each material its colour and picture, from the asset that the body brings. Leaves out all else that a material says:
- * normal maps, roughness, metal.
+/* page_skin.c: the materials of a character in a page: the material of each face (from its labels), texture
+ * coordinates of the corners, and the colour and picture of each material, from the asset of the body. Normal maps,
+ * roughness and metalness are ignored.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf.h"
 #include "view/page.h"
 
-/* A material that faces have; number 0 is none. */
+/* A material used by faces; number 0 is none. */
 typedef struct look {
     const char *name; /* borrowed from the labels */
     double colour[3]; /* linear */
-    double cutoff;    /* less opaque parts are not drawn; 0: all are */
-    size_t picture;   /* of the pictures of the page; SIZE_MAX: none */
+    double cutoff;    /* less opaque parts are not drawn; 0: all parts are */
+    size_t picture;   /* index into the pictures of the page; SIZE_MAX: none */
 } look;
 
 typedef struct skin {
@@ -28,7 +28,7 @@ static void clear(skin *k)
     free(k->pictures);
 }
 
-/* 1; 0: the body has no asset, or one that does not belong to its mesh or cannot be read. */
+/* 1 if opened; 0 if the body has no asset, or one that does not belong to its mesh or cannot be read. */
 static int open_asset(skin *k, vg_err *e)
 {
     const vg_asset *a = &k->body->asset;
@@ -50,7 +50,7 @@ static const vgi_json *material_of(const skin *k, const char *name)
     return NULL;
 }
 
-/* The type of an image that browsers show and whose bytes are in the asset; NULL: it is none. */
+/* The type of an image that browsers can show and whose bytes are in the asset; NULL if it is not one. */
 static const char *type_of(const skin *k, const vgi_json *image, const unsigned char **data, size_t *n)
 {
     static const char *const types[] = {"image/png", "image/jpeg", "image/webp"};
@@ -62,7 +62,8 @@ static const char *type_of(const skin *k, const vgi_json *image, const unsigned 
     return NULL;
 }
 
-/* The picture of a colour texture that goes by the coordinates that the body keeps: *picture stays where there is none. */
+/* The picture of a colour texture that uses the coordinates stored in the body; *picture is unchanged if there is
+ * none. */
 static int take_picture(skin *k, const vgi_json *texture, size_t *picture, vg_err *e)
 {
     const vgi_json *of, *image;
@@ -100,7 +101,7 @@ static int add_look(skin *k, const char *name, vg_err *e)
     return r;
 }
 
-/* The number of a material, from 1 on; one that has not been there is added. */
+/* The number of a material, from 1 on; a new one is added. */
 static int number_of(skin *k, const char *name, uint32_t *number, vg_err *e)
 {
     size_t i = 0;
@@ -125,7 +126,7 @@ static int find_looks(skin *k, uint32_t *of_face, vg_err *e)
     return r;
 }
 
-/* Two words a corner: its coordinates as binary32, u to the right, v upwards. */
+/* Two words per corner: its coordinates as binary32, u to the right, v upwards. */
 static int put_coordinates(vg_page *p, size_t i, const vg_body *b, vg_err *e)
 {
     const vg_attributes *a = &b->attributes;

@@ -1,4 +1,5 @@
-/* paint.c: smooth lines, discs and rings on a canvas: a pixel is covered by as much as its middle is inside the edge.
+/* paint.c: anti-aliased lines, discs and rings on a canvas: coverage of a pixel is the distance of its centre inside
+ * the edge.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/paint.h"
 
@@ -10,7 +11,7 @@ static void blend(vgi_canvas *c, size_t x, size_t y, double cover, const unsigne
     for (int k = 0; k < 3; k++) to[k] = (unsigned char)lround(to[k] + cover * (colour[k] - (double)to[k]));
 }
 
-/* Pixels from least to most, cut off at the canvas: first and last in each direction; false: there are none. */
+/* Range of pixels from least to most, clipped to the canvas; false if it is empty. */
 static bool pixels_of(const vgi_canvas *c, const double least[2], const double most[2], size_t first[2], size_t last[2])
 {
     const size_t size[2] = {c->w, c->h};
@@ -22,7 +23,7 @@ static bool pixels_of(const vgi_canvas *c, const double least[2], const double m
     return true;
 }
 
-/* All pixels around a segment whose distance from it is at most `outside` and at least `inside`. */
+/* Paint all pixels whose distance from a segment is between `inside` and `outside`. */
 static void paint(vgi_canvas *c, const double a[2], const double b[2], double inside, double outside,
                   const unsigned char colour[3])
 {
