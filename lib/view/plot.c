@@ -1,4 +1,4 @@
-/* plot.c: charts of curves and bars, drawn once as shapes, which become SVG or pixels. Leaves out what the numbers are.
+/* plot.c: charts of curves and bars, drawn once as shapes, which become SVG or pixels.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "vg/plot.h"
 
@@ -12,17 +12,17 @@
 enum { /* lengths in pixels */
     WIDTH = 900, HEIGHT = 340, /* of a chart */
     LEFT = 84, RIGHT = 24, TOP = 44, BOTTOM = 56,
-    TICKS = 40,                /* at most, of an axis */
+    TICKS = 40,                /* most per axis */
     LETTER = 12                /* size of the font */
 };
 static const double dot = 1.25; /* of the stroke font, for LETTER */
 static const unsigned char ink[3] = {38, 42, 50}, soft[3] = {112, 118, 128}, faint[3] = {226, 229, 233};
-/* distinct also for people who do not tell red from green, and in grey */
+/* distinguishable also by colour-blind people, and in grey */
 static const unsigned char colours[VG_PLOT_SERIES][3] = {{31, 95, 168}, {216, 96, 20}, {90, 90, 90}, {20, 140, 110}, {150, 60, 140}, {190, 150, 10}};
 
 enum anchor { START, MIDDLE, END };
 
-typedef struct plot { /* where shapes go: to the SVG text, or else to the canvas */
+typedef struct plot { /* target of shapes: the SVG text, or the canvas */
     bool svg;
     char *text;
     size_t size, room;
@@ -32,7 +32,7 @@ typedef struct plot { /* where shapes go: to the SVG text, or else to the canvas
 } plot;
 
 typedef struct axis {
-    double least, most; /* in units; of a logarithmic axis powers of 10 */
+    double least, most; /* in units; on a logarithmic axis powers of 10 */
     double from, to;    /* in pixels */
     bool log;
     size_t n;
@@ -87,7 +87,7 @@ static void draw_bar(plot *p, double x0, double y0, double x1, double y1, const 
     for (double y = floor(y0) + 0.5; y < y1; y++) vgi_paint_line(&p->canvas, (double[]){x0 + 0.5, y}, (double[]){x1 - 0.5, y}, 1.2, c);
 }
 
-/* A dot; a curve of one number is one. */
+/* A dot, also for a curve of one number. */
 static void draw_dot(plot *p, double x, double y, double radius, const unsigned char c[3])
 {
     char n[3][VGI_NUMBER];
@@ -99,7 +99,7 @@ static void draw_dot(plot *p, double x, double y, double radius, const unsigned 
     say(p, "<circle cx=\"%s\" cy=\"%s\" r=\"%s\" fill=\"#%02x%02x%02x\"/>\n", n[0], n[1], n[2], c[0], c[1], c[2]);
 }
 
-/* Text as XML; control characters, which it has no place for, become blanks. */
+/* Text as XML; control characters, which XML does not allow, become blanks. */
 static void say_text(plot *p, const char *text)
 {
     for (; *text; text++) {
@@ -151,7 +151,8 @@ static double step_of(double range, double want)
     return power * (rest < 1.5 ? 1 : rest < 3.5 ? 2 : rest < 7.5 ? 5 : 10);
 }
 
-/* Ends and ticks: of a linear axis at steps, of a logarithmic one at powers of 10, with 2 and 5 where there are few. */
+/* Ends and ticks: on a linear axis multiples of the step; on a logarithmic one powers of 10, with 2 and 5 if there
+ * are few. */
 static void end_axis(axis *a, bool to_zero, double want)
 {
     if (!(a->least <= a->most)) a->least = 0, a->most = 1;
@@ -206,7 +207,7 @@ static void draw_axes(plot *p, const vg_chart *c, const axis *x, const axis *y, 
     draw_text(p, LEFT, top + 16, START, true, ink, c->title);
 }
 
-/* ---- what is shown ---- */
+/* ---- ---- contents ---- */
 
 static bool drawable(const vg_series *v, size_t i, const axis *x, const axis *y)
 {
@@ -230,7 +231,7 @@ static void draw_bars(plot *p, const vg_series *v, const axis *x, const axis *y,
         if (v->y[i] > 0) draw_bar(p, at(x, v->x[i]) + 0.5, at(y, v->y[i]), at(x, v->x[i + 1]) - 0.5, y->from, colour);
 }
 
-/* Names at the right, beside the title, the last at the edge; each as wide as the stroke font has it. */
+/* Names to the right of the title, the last one at the edge; widths are those of the stroke font. */
 static void draw_legend(plot *p, const vg_chart *c, double top)
 {
     double left = WIDTH - RIGHT;

@@ -1,5 +1,5 @@
-/* png.c: writes a PNG row by row. The only file that includes libpng. Writes no time or text chunks: the same
- * picture gives the same bytes.
+/* png.c: writes a PNG row by row. No other file includes libpng. No time or text chunks are written: the same picture
+ * gives the same bytes.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 

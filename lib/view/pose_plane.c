@@ -1,7 +1,6 @@
-/* pose_plane.c: a picture of a signal: its curve through the pose plane, coloured by how far its shapes are from a smooth
- * motion, frames, sites, control points and crossings, and around it some of its poses (as figures 1 and 5 of the source,
- * Cashman and Hormann 2012).
- * Leaves out the page on which the curve can be moved.
+/* pose_plane.c: a picture of a signal: its curve through the pose plane, coloured by the distance of its shapes from
+ * a smooth motion; frames, sites, control points and crossings; and some of its poses around it (as figures 1 and 5
+ * of the source, Cashman and Hormann 2012). The page on which the curve can be edited is separate.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/paint.h"
 #include "signal/unshape.h"
@@ -16,20 +15,20 @@ enum { /* lengths in pixels */
     POSE = 170,        /* the picture of a pose */
     NAME = 22,         /* under it */
     PLANE = 600,       /* height of the plane */
-    KEY = 26,          /* the line that says what the marks are */
+    KEY = 26,          /* the line that explains the marks */
     GAP = 20,
     ACROSS = 5, ASIDE = 2, /* poses above and below, and at each side */
     SLOTS = 2 * (ACROSS + ASIDE),
     HEIGHT = TITLE + 2 * (POSE + NAME) + PLANE + KEY + VGI_LEGEND,
     OVERSAMPLING = 3,
-    PARTS = 16         /* stretches of the curve between frames */
+    PARTS = 16         /* segments of the curve per frame interval */
 };
 static const double title_dot = 1.75, text_dot = 1.25;
 static const unsigned char ink[3] = {38, 42, 50}, soft_ink[3] = {112, 118, 128}, faint[3] = {206, 210, 216}, white[3] = {255, 255, 255},
                            alarm[3] = {205, 30, 40};
 
 typedef struct place {
-    double x, y, angle; /* of a frame or of a pose's picture, around the middle of the plane */
+    double x, y, angle; /* of a frame or of a pose's picture, relative to the middle of the plane */
     size_t index;
 } place;
 
@@ -41,7 +40,7 @@ typedef struct chart {
     vgi_canvas canvas;
     vgi_palette palette;
     vgi_tint tint;
-    double middle[2], scale; /* of the plane: pixels for 1 */
+    double middle[2], scale; /* of the plane: pixels per unit */
     size_t nposes;
     place slot[SLOTS], frame[SLOTS]; /* picture i shows frame i */
     float *points;           /* nposes x 3 nv */
@@ -55,7 +54,7 @@ static void to_canvas(const chart *c, const double p[2], double at[2])
     at[1] = TITLE + POSE + NAME + PLANE / 2.0 - c->scale * (p[1] - c->middle[1]);
 }
 
-/* All of the curve and all frames fit between the pictures. */
+/* Scale so that the whole curve and all frames fit between the pictures. */
 static void fit_plane(chart *c)
 {
     double least[2] = {INFINITY, INFINITY}, most[2] = {-INFINITY, -INFINITY};
@@ -74,7 +73,7 @@ static int compare_deviations(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-/* The colours end at what 99 % of the curve do not exceed. */
+/* The colour map ends at the 99th percentile over the curve. */
 static int choose_colours(chart *c, vg_err *e)
 {
     bool of_vertices = c->s->space == VG_SPACE_VERTICES;
@@ -90,7 +89,7 @@ static int choose_colours(chart *c, vg_err *e)
     return VG_OK;
 }
 
-/* ---- which poses are shown, and where ---- */
+/* ---- ---- choice of poses and their positions ---- */
 
 static int by_angle(const void *a, const void *b)
 {
@@ -103,7 +102,7 @@ static void set_angle(place *p)
     p->angle = atan2(p->y - (TITLE + POSE + NAME + PLANE / 2.0), p->x - WIDTH / 2.0);
 }
 
-/* The middles of the pictures, in their order around the plane. */
+/* The centres of the pictures, in order around the plane. */
 static void list_slots(place *slot)
 {
     double top = TITLE + POSE / 2.0, bottom = TITLE + POSE + NAME + PLANE + POSE / 2.0;
@@ -121,8 +120,8 @@ static void list_slots(place *slot)
     qsort(slot, SLOTS, sizeof *slot, by_angle);
 }
 
-/* Frames that are even in time, each in a picture on its side of the plane: both go round in the same order, turned against
- * one another so that they are nearest. */
+/* Frames evenly spaced in time, each in a picture on its side of the plane. Both go round in the same order, rotated
+ * to be as near to each other as possible. */
 static void choose_poses(chart *c)
 {
     place all[SLOTS];
@@ -150,7 +149,7 @@ static void choose_poses(chart *c)
 
 /* ---- pictures of poses ---- */
 
-/* Shapes that are no vertices are solved for them. */
+/* Shapes that are not vertices are reconstructed. */
 static int sample_vectors(chart *c, vg_sampler *p, double *x, double *const *points, vg_err *e)
 {
     vg_graph *g = NULL;

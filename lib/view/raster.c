@@ -1,5 +1,5 @@
-/* raster.c: visibility: triangles and round wires against a z-buffer. Leaves out light and colour: a sample keeps
- * depth, normal and value for shade.c.
+/* raster.c: visibility: triangles and round wires against a z-buffer. A sample stores depth, normal and value; light
+ * and colour are in shade.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
@@ -188,7 +188,7 @@ static void load_corner(const work *k, uint32_t v, const float *normal, vgi_corn
     else to->normal[0] = to->normal[1] = 0, to->normal[2] = 1;
 }
 
-/* The mean of the corners: the centre of a fan that treats all corners alike. */
+/* The mean of the corners: the centre of a fan that does not favour any corner. */
 static void load_middle(vgi_corner *corner, size_t n)
 {
     vgi_corner sum = {0};
@@ -203,7 +203,8 @@ static void load_middle(vgi_corner *corner, size_t n)
     corner[n] = sum;
 }
 
-/* Whether the face can be drawn as a fan about its centre: no triangle of the fan turns against the face's normal. */
+/* Whether the face can be drawn as a fan about its centre: no triangle of the fan is reversed relative to the face's
+ * normal. */
 static bool is_fan(const vgi_corner *c, size_t n, const float area[3])
 {
     const vgi_corner *o = c + n;
@@ -292,8 +293,7 @@ static bool is_empty(const vgi_raster *r)
     return true;
 }
 
-/* A flat figure seen from the side, or one that has collapsed to a line or point, covers no sample: draw its
- * edges. */
+/* A flat figure seen from the side, or one collapsed to a line or point, covers no sample: draw its edges. */
 static void draw_edges(work *k, float radius)
 {
     const vg_mesh *m = k->drawing->figure->mesh;
@@ -307,15 +307,15 @@ static void draw_edges(work *k, float radius)
     }
 }
 
-/* Whether the face turns its front to the viewer; false when seen edge-on. */
+/* Whether the face shows its front to the viewer; false if seen edge-on. */
 static bool faces_viewer(const work *k, const vgi_side *s)
 {
     const float *area = k->face + 3 * (size_t)s->face, *toward = k->drawing->camera->toward;
     return area[0] * toward[0] + area[1] * toward[1] + area[2] * toward[2] > 0;
 }
 
-/* An edge is on the contour when a front face meets a back face there, or at a border. Faces that run the same way
- * along their edge have opposite orientation: the front of one is the back of the other. */
+/* An edge is on the contour if a front face meets a back face there, or at a border. Two faces that run in the same
+ * direction along their edge have opposite orientation: the front of one is the back of the other. */
 static bool is_contour(const work *k, const vgi_side *s, size_t n)
 {
     if (n == 1) return true;

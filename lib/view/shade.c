@@ -1,5 +1,5 @@
-/* shade.c: from samples to pixels: clay or mapped colours under fixed lights, ambient occlusion, outlines. The
- * lights move with the viewer, so that every view is lit alike. Leaves out visibility.
+/* shade.c: from samples to pixels: clay or mapped colours under fixed lights, ambient occlusion, outlines. The lights
+ * move with the viewer, so that all views are lit alike. Visibility is in raster.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/colour.h"
 #include "view/view.h"
@@ -45,7 +45,7 @@ static const vgi_sample *middle_sample(const pixels *p, size_t x, size_t y)
 static void unit_normal(const vgi_sample *s, float n[3])
 {
     for (int k = 0; k < 3; k++) n[k] = s->normal[k];
-    if (n[2] < 0) n[2] = 0; /* a smooth normal may point away at the outline */
+    if (n[2] < 0) n[2] = 0; /* a smooth normal may face away at the outline */
     float size = sqrtf(dot(n, n));
     if (!(size > 0)) n[0] = n[1] = 0, n[2] = size = 1;
     for (int k = 0; k < 3; k++) n[k] /= size;
@@ -100,7 +100,7 @@ static float smooth_sky(const pixels *p, const float *raw, size_t x, size_t y, f
 
 static int light_corners(pixels *p, float reach, vg_err *e)
 {
-    size_t n = p->w * p->h; /* fewer than the samples, which are allocated already */
+    size_t n = p->w * p->h; /* smaller than the samples, which are already allocated */
     float taps[TAPS][2], *raw = vgi_array_raw(n, sizeof *raw, e);
     p->light = vgi_array_raw(n, sizeof *p->light, e);
     if (!raw || !p->light) {
@@ -121,7 +121,7 @@ static int light_corners(pixels *p, float reach, vg_err *e)
     return VG_OK;
 }
 
-/* Outline samples of a pixel whose middle is empty take the light of a neighbour. */
+/* Outline samples of a pixel whose centre is empty take the light of a neighbour. */
 static float corner_light(const pixels *p, size_t x, size_t y)
 {
     if (middle_sample(p, x, y)->kind != VGI_EMPTY) return p->light[y * p->w + x];
@@ -134,7 +134,7 @@ static float corner_light(const pixels *p, size_t x, size_t y)
 
 /* ---- outlines ---- */
 
-/* How much nearer a sample is than its two neighbours along one axis suggest. */
+/* By how much a sample is nearer than its two neighbours along one axis predict. */
 static float depth_step(const vgi_raster *r, size_t at, size_t room_before, size_t room_after, size_t stride,
                         size_t reach, float limit)
 {
@@ -249,7 +249,7 @@ static void shade_pixel(const vgi_look *l, const pixels *p, const background *b,
             for (int k = 0; k < 3; k++) sum[k] += fminf(c[k], 1);
         }
     if (empty) {
-        /* the grid is anti-aliased by itself: one evaluation per pixel is enough */
+        /* the grid is already anti-aliased: one evaluation per pixel is enough */
         light_background(b, (double)(x * s) + (double)s / 2, (double)(y * s) + (double)s / 2, page);
         for (int k = 0; k < 3; k++) sum[k] += (float)empty * page[k];
     }

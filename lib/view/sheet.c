@@ -1,6 +1,6 @@
-/* sheet.c: the contact sheet: collects frames of one or more sequences, chooses which to show, draws them row by
- * row and adds captions and a legend. Leaves out rasterisation (raster.c, shade.c), colours (tint.c), and the file
- * format (png.c).
+/* sheet.c: the contact sheet: collects frames of one or more sequences, chooses those to show, draws them row by row,
+ * and adds captions and a legend. Rasterisation is in raster.c and shade.c, colours in tint.c, the file format in
+ * png.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/sheet.h"
 
@@ -12,10 +12,10 @@ static const unsigned char page[3] = {255, 255, 255}, ink[3] = {38, 42, 50}, sof
 
 /* Points further away than this, in D, cannot be drawn together with the figure. */
 #define MOST_DISTANCE 1e9
-/* Sequences whose diagonals differ by less than this factor have one scale. */
+/* Sequences whose diagonals differ by less than this factor share one scale. */
 #define ONE_SCALE 2
 
-/* ---- taking frames ---- */
+/* ---- ---- collecting frames ---- */
 
 static int check_options(const vg_sheet_options *o, vg_err *e)
 {
@@ -62,7 +62,7 @@ void vg_sheet_free(vg_sheet **address)
     *address = NULL;
 }
 
-/* Bodies of about one size are drawn at one scale; others are scaled to D. */
+/* Bodies of similar size are drawn at one scale; others are scaled to D. */
 static void measure_reference(const vg_sheet *s, vgi_row *q, const double *reference, bool z_up)
 {
     size_t nv = q->head->body.mesh.nv, vertical = z_up ? 2 : 1;
@@ -133,7 +133,7 @@ int vg_sheet_add(vg_sheet *s, size_t i, const vg_frame *f, const double *truth, 
     return r == VG_OK ? keep_numbers(s, q, shot, f, truth, e) : r;
 }
 
-/* ---- which frames: those of the longest sequence; shorter ones stay at their last frame ---- */
+/* ---- ---- choice of frames: those of the longest sequence; shorter ones stay at their last frame ---- ---- */
 
 static int choose_frames(vg_sheet *s, vg_err *e)
 {
@@ -194,7 +194,8 @@ static int find_percentile(const vg_sheet *s, double *number, vg_err *e)
     }
     qsort(all, n, sizeof *all, compare_floats);
     *number = all[(size_t)ceil(0.99 * (double)n) - 1];
-    if (!(*number > 0)) *number = all[n - 1]; /* nearly all are exact: use the largest, so that the rest show */
+    if (!(*number > 0)) *number = all[n - 1]; /* nearly all are exact: use the largest, so that the others are
+                                                 visible */
     free(all);
     return VG_OK;
 }
@@ -228,7 +229,7 @@ static size_t title_height(const vg_sheet *s)
     return s->nsequences > 1 ? TITLE : 0;
 }
 
-/* Near to 16 : 9 with few empty places in the last row; with several sequences as many columns as fit, in equal
+/* Close to 16 : 9 with few empty places in the last row; with several sequences as many columns as fit, in equal
  * rows. */
 static size_t choose_columns(const vg_sheet *s)
 {
@@ -253,7 +254,8 @@ static bool follows(const vg_sheet *s)
     return s->o.fit == VG_FIT_FIGURE || s->at[0].look;
 }
 
-/* The middle of a picture when the camera follows: of what it looks at, else the centroid of the shot. */
+/* The centre of a picture if the camera follows: the mean of the vertices that it is centred on, or the centroid of
+ * the shot. */
 static void shot_middle(const vgi_camera *c, const vgi_row *q, const vgi_shot *shot, double middle[2])
 {
     double sum[3] = {0, 0, 0};
@@ -271,7 +273,7 @@ static void shot_middle(const vgi_camera *c, const vgi_row *q, const vgi_shot *s
     }
 }
 
-/* The camera of picture i: in an animation it may turn around the figure. */
+/* The camera of picture i; in an animation it may rotate around the figure. */
 static vgi_camera camera_of(const vg_sheet *s, size_t i)
 {
     vgi_camera c = s->camera;
@@ -280,7 +282,7 @@ static vgi_camera camera_of(const vg_sheet *s, size_t i)
     return c;
 }
 
-/* One scale for all pictures, so that sizes compare; one place too, unless the camera follows. */
+/* One scale for all pictures, so that sizes can be compared; also one position, unless the camera follows. */
 static void place_camera(vg_sheet *s)
 {
     vgi_box box = vgi_box_empty();
@@ -305,7 +307,7 @@ static void place_camera(vg_sheet *s)
 
 /* ---- pictures ---- */
 
-typedef struct row { /* how many pictures are drawn at the same time */
+typedef struct row { /* number of pictures drawn at a time */
     const vg_sheet *s;
     const vgi_row *of;
     size_t first;
@@ -319,7 +321,7 @@ static double nice_spacing(const vgi_row *q)
     return (want / power < 1.5 ? 1 : want / power < 3.5 ? 2 : want / power < 7.5 ? 5 : 10) * power;
 }
 
-/* The grid surrounds the feet in all shots, or in this one when the camera follows. */
+/* The grid surrounds the feet in all shots, or in this one if the camera follows. */
 static void place_ground(const vg_sheet *s, const vgi_row *q, size_t shot, vgi_ground *g)
 {
     *g = (vgi_ground){.height = q->ground_height, .spacing = nice_spacing(q) / q->unit, .across = {1, 0, 0}};
@@ -426,7 +428,7 @@ static void put_caption(const vg_sheet *s, vgi_canvas *c, size_t x, const vgi_sh
     vgi_canvas_centre(c, middle, y + CAPTION - 4, small_dot, soft_ink, text);
 }
 
-/* Where an extreme value occurs: "1.5 in 'pose3'", with several sequences also in which. */
+/* Where an extreme value occurs: "1.5 in 'pose3'"; with several sequences, also in which one. */
 static void print_place(const vg_sheet *s, char *to, size_t size, double number, const vgi_row *q,
                         const vgi_shot *shot)
 {

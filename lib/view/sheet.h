@@ -1,4 +1,4 @@
-/* sheet.h: what sheet.c and movie.c share: a sheet that collects frames, and the drawing of one of its pictures.
+/* sheet.h: shared by sheet.c and movie.c: a sheet that collects frames, and the drawing of one of its pictures.
  * Internal; the public interface is vg_sheet in vg.h.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_SHEET_H
@@ -9,8 +9,8 @@
 enum { /* lengths in pixels */
     MARGIN = 16,      /* margin and gap between pictures, in pixels */
     CAPTION = 22,     /* below a picture */
-    NUMBERS = 18,     /* below the caption, when frames have numbers */
-    TITLE = 24,       /* above each row, when there are several sequences */
+    NUMBERS = 18,     /* below the caption, if frames have numbers */
+    TITLE = 24,       /* above each row, if there are several sequences */
     FOOTER = 24,      /* at the bottom, with a ground */
     TEXT_BYTES = 512,
     LEAST_SIDE = 16, MOST_SIDE = 4096,
@@ -24,11 +24,11 @@ typedef struct vgi_row {
     vgi_figure figure;
     vgi_album album;
     vgi_meter meter;
-    double origin[3], unit;      /* points are kept as (p - origin) / unit: D, or that of the first sequence */
-    double diagonal;             /* D; 0 when all points coincide, and then unit is 1 */
+    double origin[3], unit;      /* points are stored as (p - origin) / unit: D, or that of the first sequence */
+    double diagonal;             /* D; 0 if all points coincide; unit is then 1 */
     double ground_height;        /* in D, along the vertical */
     bool tinted;
-    uint32_t *look;              /* nlook vertices whose mean is in the middle; NULL: none were asked for */
+    uint32_t *look;              /* nlook vertices whose mean is in the middle; NULL: none chosen */
     size_t nlook;
     size_t *shot;                /* index into the album for column i */
 } vgi_row;
@@ -40,7 +40,7 @@ struct vg_sheet {
     vgi_tint tint;
     bool tinted;                 /* at least one sequence has numbers */
     vgi_palette palette;
-    size_t n, columns, oversampling; /* number of frames that are shown */
+    size_t n, columns, oversampling; /* number of frames shown */
     vgi_camera camera;
     const vgi_row *largest_of, *least_of; /* the largest and the least number, and their sequences */
     const vgi_shot *largest, *least;

@@ -1,5 +1,5 @@
-/* signal_page.c: a signal inside a page that edits it: large arrays packed, the rest as JSON.
- * Leaves out the page around it (page.c) and how a browser evaluates it (signal_math.js).
+/* signal_page.c: a signal inside a page that edits it: large arrays packed, everything else as JSON. The page around
+ * it is in page.c; the browser evaluates it in signal_math.js.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/curve.h"
 #include "view/page.h"
@@ -24,7 +24,7 @@ static int put_doubles(vg_page *p, const char *what, const double *x, size_t n, 
     return r;
 }
 
-/* The int16 numbers of the basis, those of one number of a shape side by side. */
+/* The int16 numbers of the basis, grouped by number of the shape. */
 static void gather_short(const vg_signal *s, uint32_t *words)
 {
     size_t m = s->m, d = s->d;
@@ -37,7 +37,7 @@ static void gather_short(const vg_signal *s, uint32_t *words)
         }
 }
 
-/* The same in binary32. h: room for d numbers. */
+/* The same in binary32. h: workspace of d numbers. */
 static void gather_single(const vg_signal *s, double *h, uint32_t *words)
 {
     for (size_t j = 0; j < s->m; j++) {

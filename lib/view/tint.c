@@ -1,13 +1,12 @@
-/* tint.c: the number of each vertex that is mapped to a colour: its distance from a truth, a scalar of the frame,
- * or how much its vectors have grown; and the ends of the colour map. Shared by sheets and pages. Leaves out the
- * colours (colour.c).
+/* tint.c: the number of each vertex that is mapped to a colour: its distance from a truth, a scalar of the frame, or
+ * the growth of its vectors; and the ends of the colour map. Shared by sheets and pages. The colours are in colour.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
 #include <math.h>
 #include <stdio.h>
 
-/* Errors below this, in D, are rounding; the colour map never ends before it. */
+/* Smaller errors, in D, are rounding; the colour map never ends below. */
 #define LEAST_ERROR 1e-9
 /* Scales closer to 1 than this have one colour. */
 #define LEAST_SCALE 0.01
@@ -144,7 +143,7 @@ double vgi_round_up(double x)
     return 10 * power;
 }
 
-/* Where the colours of scales end: the factor that 99 % do not exceed, up or down, rounded up to two digits. */
+/* End of the colours of scales: the factor that 99 % do not exceed, up or down, rounded up to two digits. */
 static double end_of_scales(double doubled)
 {
     double beyond = exp2(doubled) - 1, step = beyond > LEAST_ERROR ? pow(10, floor(log10(beyond)) - 1) : 1;

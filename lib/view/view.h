@@ -34,20 +34,20 @@ int vgi_figure_sides(vgi_figure *g, vg_err *e) VG_MUST_CHECK;
 int vgi_figure_init(vgi_figure *g, const vg_mesh *m, vg_err *e) VG_MUST_CHECK;
 void vgi_figure_clear(vgi_figure *g);
 
-/* vgi_drawn_vertices: which of the nv vertices are visible: those in a face, or all if there is no face. Free with
- * free(). */
+/* vgi_drawn_vertices: which of the nv vertices are visible: those in a face, or all if there are no faces. Release
+ * with free(). */
 bool *vgi_drawn_vertices(const vg_mesh *m, vg_err *e);
 /* vgi_ground_height: the lowest visible vertex along the vertical; 0 if there is none. */
 double vgi_ground_height(const bool *drawn, size_t nv, const double *points, bool z_up);
 
-/* vgi_figure_normals: a unit normal per corner: the area-weighted mean over the faces around the vertex that
- * differ from the corner's own face by less than the crease angle. points: nv, any unit; face: 3 * nf, work;
- * normals: 3 * corners, out. */
+/* vgi_figure_normals: a unit normal per corner: the area-weighted mean over the faces around the vertex that differ
+ * from the corner's own face by less than the crease angle. points: nv, any unit; face: workspace of 3 * nf; normals:
+ * 3 * corners, out. */
 void vgi_figure_normals(const vgi_figure *g, const float *points, float *face, float *normals);
 
 /* vgi_ear_clip: triangulate a polygon of n >= 3 corners in the plane (xy: n pairs; counter-clockwise if its area >
- * 0). It may be concave; if it crosses itself some triangulation comes out. work: 3 * n; triangles: 3 * (n - 2)
- * positions, out. O(n * reflex corners). */
+ * 0). It may be concave; if it crosses itself, the result is some triangulation. work: workspace of 3 * n; triangles:
+ * 3 * (n - 2) positions, out. O(n * reflex corners). */
 void vgi_ear_clip(const double *xy, size_t n, size_t *work, size_t *triangles);
 
 /* ---- camera.c ---- */
@@ -99,7 +99,7 @@ typedef struct vgi_drawing { /* one pose to draw */
     const vgi_camera *camera;
     const float *points; /* nv, in D */
     const float *values; /* nv in [0, 1], or NULL */
-    const uint32_t *patches; /* per face, or NULL: a sample's value is then the number of its face's patch (modulo
+    const uint32_t *patches; /* per face, or NULL: a sample's value is then the patch number of its face (modulo
                                 2^16) */
     float wire;          /* radius of 2-vertex faces, in samples */
     float edge;          /* half the width of drawn edges, in samples; 0: not drawn */
@@ -128,10 +128,10 @@ static inline unsigned char vgi_encode(const vgi_palette *p, float linear)
 
 /* ---- tint.c: the number of each vertex that is mapped to a colour ---- */
 
-typedef struct vgi_tint { /* for all that is on a sheet or page */
+typedef struct vgi_tint { /* for everything on a sheet or page */
     vg_tint what;
     bool centred;
-    char *name, *unit; /* of scalars; NULL until a frame brings any */
+    char *name, *unit; /* of scalars; NULL until a frame has any */
     bool diverging;    /* the map has a middle: 0, or 1 for scales */
     double low, high;  /* the ends of the map; for scales log2, like all their numbers */
     double shown_low, shown_high; /* the part of it that occurs, which the legend shows */
@@ -139,9 +139,9 @@ typedef struct vgi_tint { /* for all that is on a sheet or page */
 
 typedef struct vgi_meter { /* of one sequence */
     const vg_mesh *mesh;
-    double unit;      /* what errors are divided by */
-    double *numbers;  /* nv: of the last frame */
-    double *lengths, *now; /* scales: of the vector of each corner in the reference and the present pose */
+    double unit;      /* unit by which errors are divided */
+    double *numbers;  /* nv: of the latest frame */
+    double *lengths, *now; /* scales: lengths of the corners' vectors in the reference and the current pose */
     uint32_t *count;  /* nv: corners whose reference vector is not zero */
 } vgi_meter;
 
@@ -154,8 +154,8 @@ int vgi_meter_init(vgi_meter *m, const vgi_tint *t, const vg_mesh *mesh, const d
 void vgi_meter_clear(vgi_meter *m);
 /* vgi_tint_has: whether this frame has a number for each vertex. */
 bool vgi_tint_has(const vgi_tint *t, const vg_frame *f, const double *truth);
-/* vgi_tint_read: store the numbers of a frame that has them in m->numbers. VG_EINPUT when their name differs from
- * that of earlier frames. */
+/* vgi_tint_read: store the numbers of a frame that has them in m->numbers. VG_EINPUT if their name differs from that
+ * of earlier frames. */
 int vgi_tint_read(vgi_tint *t, vgi_meter *m, const vg_frame *f, const double *truth, vgi_spread *s,
                   vg_err *e) VG_MUST_CHECK;
 /* vgi_round_up: x > 0 rounded up to 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6 or 8 times a power of ten, whose fifths have
@@ -165,7 +165,7 @@ double vgi_round_up(double x);
  * numbers do not exceed. least, most: of all numbers. */
 void vgi_tint_end(vgi_tint *t, double given, double common, double least, double most);
 double vgi_tint_place(const vgi_tint *t, double x); /* 0 to 1 */
-double vgi_tint_shown(const vgi_tint *t, double x); /* a number as shown to people: a factor, for scales */
+double vgi_tint_shown(const vgi_tint *t, double x); /* a number in the form shown to people: a factor, for scales */
 void vgi_tint_clear(vgi_tint *t);
 enum { VGI_NUMBER = 32 };
 /* Text for them, independent of the locale. */
@@ -182,11 +182,12 @@ typedef struct vgi_ground { /* a grid at the height of the reference pose, and t
     double spacing;  /* of the grid, in D */
     double vertical[3], across[3], along[3]; /* of the world, in the mesh's axes */
     double middle[2], reach; /* where the grid fades out, along `across` and `along`, in D */
-    size_t n;        /* shadow: n x n, NULL when there is none */
+    size_t n;        /* shadow: n x n, NULL if there is none */
     float *shadow, origin[2], step;
 } vgi_ground;
 int vgi_ground_shadow(vgi_ground *g, const vgi_drawing *d, vg_err *e) VG_MUST_CHECK;
-/* vgi_ground_light: the factor of a background sample at (x, y) of the camera, in D; 1 = no grid or shadow there. */
+/* vgi_ground_light: the factor of a background sample at (x, y) of the camera, in D; 1 without grid or shadow
+ * there. */
 float vgi_ground_light(const vgi_ground *g, const vgi_camera *c, double x, double y, double pixel);
 
 typedef struct vgi_look {
@@ -242,12 +243,12 @@ typedef struct vgi_album { /* at most 4 * want shots, `stride` frames apart, plu
 
 int vgi_album_init(vgi_album *a, size_t nv, size_t want, vg_err *e) VG_MUST_CHECK;
 void vgi_album_clear(vgi_album *a);
-/* vgi_album_next: the shot to fill with the next frame. vgi_album_close puts it in its place. */
+/* vgi_album_next: the shot to fill with the next frame. vgi_album_close puts it into its place. */
 int vgi_album_next(vgi_album *a, vgi_shot **shot, vg_err *e) VG_MUST_CHECK;
 /* vgi_album_close: move the best `want` shots to the front and return their number. */
 size_t vgi_album_close(vgi_album *a);
-/* vgi_album_match: in place of vgi_album_close: the shots nearest to n ascending frame numbers; beyond the end,
- * the last. */
+/* vgi_album_match: instead of vgi_album_close: the shots nearest to n ascending frame numbers; beyond the end, the
+ * last. */
 void vgi_album_match(vgi_album *a, const size_t *frames, size_t n, size_t *shots);
 
 /* ---- png.c: the only file that includes libpng ---- */

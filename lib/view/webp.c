@@ -1,5 +1,5 @@
-/* webp.c: writes an animated WebP. The only file that includes libwebp.
- * Lossy at a fixed quality, without metadata: the same pictures give the same bytes.
+/* webp.c: writes an animated WebP. No other file includes libwebp. Lossy at a fixed quality, without metadata: the
+ * same pictures give the same bytes.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/webp.h"
 
