@@ -1,11 +1,10 @@
-/* archive.c: mesh files out of archives. Leaves out what the files mean: contents are bytes here; how a compressed
- * file is unpacked (unpack.c) and writing (pack.c).
+/* archive.c: reads mesh files from archives. Contents are only bytes here. Compressed single files are in unpack.c,
+ * writing is in pack.c.
  *
- * Reading lists the names first. When the archive has its mesh files in natural order, as nearly all do, a second
- * pass hands them out one by one; otherwise they are unpacked once into a file without a name. A compressed archive
- * is read by two readers of libarchive, one behind the other: the first unpacks, and its bytes are summed and read to
- * the last one before anything is handed out, because libarchive neither compares the checksum of gzip nor looks
- * behind the end mark of a tar.
+ * Reading lists the names first. If the archive has its mesh files in natural order, as nearly all do, a second pass
+ * returns them one by one; otherwise they are unpacked once into an unnamed file. A compressed archive is read by two
+ * libarchive readers in series: the first unpacks, and its bytes are summed and read to the end before anything is
+ * returned. The reason is that libarchive neither compares gzip's checksum nor looks beyond the end mark of a tar.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/unpack.h"
 
@@ -47,14 +46,14 @@ struct vgi_archive {
     vgi_limits limits;
     locale_t utf8;
     vgi_tap file;
-    bool packed, gzip, single; /* compressed; by gzip; one file, no archive */
+    bool packed, gzip, single; /* compressed; by gzip; a single file, not an archive */
     vgi_unpacker unpacker;
     struct archive *la;
     vg_bytes path; /* of the current member, with terminator */
     member *members;
     size_t n, cap, next;
     uint64_t total;  /* bytes unpacked in this pass */
-    size_t entries;  /* members passed */
+    size_t entries;  /* members visited */
     int spool; /* -1: members come from a second pass */
 };
 
@@ -140,7 +139,7 @@ static int walk_open(vgi_archive *a, vg_err *e)
     return r < ARCHIVE_WARN ? damaged(a, a->la, NULL, e) : VG_OK;
 }
 
-/* Bytes unpacked so far, with those of skipped members. */
+/* Limit the bytes unpacked so far, including those of skipped members. */
 static int check_total(const vgi_archive *a, vg_err *e)
 {
     uint64_t seen = a->packed ? a->unpacker.sum->bytes : a->total;
@@ -210,7 +209,7 @@ static int judge_member(vgi_archive *a, struct archive_entry *entry, vg_err *e)
     return 1;
 }
 
-/* A skipped member must be unpacked all the same if several are packed as one. */
+/* A skipped member must still be unpacked if several are packed as one. */
 static void pass_over(vgi_archive *a, struct archive_entry *entry)
 {
     switch (archive_format(a->la)) {
@@ -224,7 +223,7 @@ static void pass_over(vgi_archive *a, struct archive_entry *entry)
     }
 }
 
-/* 1: at the next mesh file; 0: there is none. */
+/* 1: at the next mesh file; 0: at the end. */
 static int walk_next(vgi_archive *a, vg_err *e)
 {
     for (;;) {
@@ -257,7 +256,7 @@ static int read_member(vgi_archive *a, vg_bytes *data, vg_err *e)
     }
 }
 
-/* ---- is all of it there? ---- */
+/* ---- ---- completeness ---- */
 
 /* Read the rest of a compressed archive: packed data, and gzip's trailer. */
 static int check_packed_end(vgi_archive *a, vg_err *e)
@@ -282,7 +281,7 @@ static int check_packed_end(vgi_archive *a, vg_err *e)
     return VG_OK;
 }
 
-/* A tar that was cut between two members lacks only the blocks of zeros at the end. */
+/* A tar that was cut between two members lacks only the zero blocks at the end. */
 static int check_tar_end(const vgi_archive *a, vg_err *e)
 {
     if ((archive_format(a->la) & ARCHIVE_FORMAT_BASE_MASK) != ARCHIVE_FORMAT_TAR) return VG_OK;
@@ -440,7 +439,7 @@ int vgi_archive_open_for(vgi_archive **out, int fd, int64_t base, const char *na
 
 /* ---- a compressed stream ---- */
 
-/* Is this a compressed stream? */
+/* Whether this is a compressed stream. */
 static bool begins_like_stream(const vgi_archive *a)
 {
     unsigned char start[8];

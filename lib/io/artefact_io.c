@@ -189,12 +189,12 @@ int vgi_artefact_encode(const vgi_artefact *t, vg_bytes *b, const vg_head *h, si
     return r;
 }
 
-/* The earlier form: two counts of 32 bits, the parents, and texts behind their lengths without padding. */
+/* The earlier form: two counts of 32 bits, the parents, and texts after their lengths without padding. */
 bool vgi_is_earlier_provenance(const vgi_artefact *t, const vgi_payload *p)
 {
     if (strcmp(t->tag, "PROV")) return false;
     cursor c = start(p);
-    uint64_t nparents = take32(&c), texts = (uint64_t)take32(&c) + 2; /* program and version, too */
+    uint64_t nparents = take32(&c), texts = (uint64_t)take32(&c) + 2; /* plus program and version */
     take_array(&c, nparents, 4);
     while (!c.bad && texts--) take(&c, take32(&c));
     return !c.bad && !left(&c);

@@ -8,11 +8,12 @@
 
 /* vgi_artefact_decode: decode and check the payload of a record into h. On failure h may only be cleared. */
 int vgi_artefact_decode(const vgi_artefact *t, const vgi_payload *p, vg_head *h, vg_err *e) VG_MUST_CHECK;
-/* vgi_artefact_encode: append the record of h, number i of those that repeat; b starts at the first byte of the
+/* vgi_artefact_encode: append the record of h (i: number of a repeating record); b starts at the first byte of the
  * payload. */
 int vgi_artefact_encode(const vgi_artefact *t, vg_bytes *b, const vg_head *h, size_t i, vg_err *e) VG_MUST_CHECK;
 
-/* vgi_is_earlier_provenance: does this PROV record have the earlier form, with counts of 32 bits (fmt/CHANGES.md)? */
+/* vgi_is_earlier_provenance: whether this PROV record has the earlier form, with counts of 32 bits
+ * (fmt/CHANGES.md). */
 bool vgi_is_earlier_provenance(const vgi_artefact *t, const vgi_payload *p);
 
 #endif

@@ -1,6 +1,5 @@
-/* asset_text.c: what an asset holds, in words: for reports, and for warnings of writers that cannot keep it.
- * And which vertices of its file are which of the mesh.
- * Leaves out the asset itself (gltf_asset.c).
+/* asset_text.c: describes the contents of an asset in words, for reports and for warnings of writers that cannot keep
+ * it; and matches the vertices of its file to those of the mesh. The asset itself is in gltf_asset.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_scene.h"
 
@@ -11,7 +10,7 @@ static size_t count(const vgi_gltf *g, const char *list)
     return vgi_json_count(vgi_json_get(g->json, list));
 }
 
-/* Of all primitives: how many have such an attribute. */
+/* Number of primitives that have this attribute. */
 static size_t having(const vgi_gltf *g, const char *attribute)
 {
     const vgi_json *meshes = vgi_json_get(g->json, "meshes");
@@ -60,7 +59,7 @@ void vg_asset_text(const vg_asset *a, char *to, size_t room)
 
 /* ---- vertices ---- */
 
-/* Of the pieces of one node, the number of the first one whose vertices are those of this part. */
+/* Among the pieces of one node, the first one with the vertices of this part. */
 static size_t primitive_of(const vgi_gltf_scene *x, size_t part)
 {
     size_t n = 0;

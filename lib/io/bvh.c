@@ -1,5 +1,5 @@
-/* bvh.c: Biovision hierarchies (.bvh): a skeleton and its motion, read frame by frame.
- * Leaves out kinematics, from channels to joints (skeleton.c), and writing (bvh_write.c).
+/* bvh.c: reads Biovision hierarchies (.bvh), a skeleton and its motion, frame by frame. Kinematics (from channels to
+ * joints) are in skeleton.c, writing is in bvh_write.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/bvh.h"
 
@@ -19,7 +19,7 @@ const char vgi_bvh_end[] = ".end";
 const char *const vgi_bvh_channels[] = {"Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation"};
 static const char *const scale_channels[SCALES] = {"Xscale", "Yscale", "Zscale"};
 
-/* What was said of a joint. */
+/* Statements seen for a joint. */
 enum { HAS_OFFSET = 1, HAS_CHANNELS = 2, IS_END = 4 };
 
 typedef struct reading {
@@ -28,14 +28,14 @@ typedef struct reading {
     const char *subject; /* borrowed */
     vg_skeleton skeleton;
     size_t joints_cap;
-    unsigned char *said; /* of each joint */
+    unsigned char *said; /* per joint: statements seen */
     size_t said_cap;
-    uint32_t current;    /* whose braces are open; NONE: between roots */
+    uint32_t current;    /* joint whose braces are open; NONE: between roots */
     size_t depth;
-    vg_bytes kept;       /* of each value of a row: 1, or 0 when it is a scale, which is passed over */
-    size_t scaled;       /* joints that have scales */
-    size_t channels;     /* values of a row that are kept */
-    bool still;          /* there is no motion: one frame at rest */
+    vg_bytes kept;       /* per value of a row: 1, or 0 for scales, which are skipped */
+    size_t scaled;       /* number of joints with scales */
+    size_t channels;     /* values of a row without scales */
+    bool still;          /* no motion: one frame at rest */
     uint64_t frames, next;
     double frame_time;
     double *values, *turns;
@@ -52,7 +52,7 @@ static bool is_line_end(char c)
     return c == '\n' || c == '\r';
 }
 
-/* LF, CR LF and CR end lines. */
+/* LF, CR LF and CR end a line. */
 static size_t line_of(const reading *b, const char *p)
 {
     size_t n = 1;
@@ -65,7 +65,7 @@ static void skip_blanks(reading *b)
     while (b->at < b->end && is_blank(*b->at)) b->at++;
 }
 
-/* The length of the word at p: a brace, or all up to a blank or brace. */
+/* Length of the word at p: a brace, or everything up to a blank or brace. */
 static size_t word_length(const reading *b, const char *p)
 {
     size_t n = 0;
@@ -74,7 +74,7 @@ static size_t word_length(const reading *b, const char *p)
     return n;
 }
 
-/* The file ends, or something else than `expected` comes next. */
+/* Report that the file ends, or that something other than `expected` follows. */
 static int fail_here(reading *b, const char *expected, vg_err *e)
 {
     size_t n = word_length(b, b->at);
@@ -85,7 +85,7 @@ static int fail_here(reading *b, const char *expected, vg_err *e)
                    n > SHOWN ? SHOWN : (int)n, b->at);
 }
 
-/* Take the next word if it is this one; capitals do not matter. */
+/* Take the next word if it is this one, ignoring case. */
 static bool take_word(reading *b, const char *word)
 {
     size_t n = strlen(word);
@@ -103,7 +103,7 @@ static int expect_word(reading *b, const char *word, vg_err *e)
     return fail_here(b, quoted, e);
 }
 
-/* "Frames:", "Frame Time:": a blank in `label` is any number of them, the colon may stand apart or be missing. */
+/* "Frames:", "Frame Time:": a blank in `label` matches any number of blanks; the colon may be separate or missing. */
 static int expect_label(reading *b, const char *label, vg_err *e)
 {
     char quoted[32];
@@ -122,7 +122,7 @@ static int expect_label(reading *b, const char *label, vg_err *e)
     return VG_OK;
 }
 
-/* A finite number, the whole word. */
+/* A finite number that is a whole word. */
 static int take_number(reading *b, const char *what, double *x, vg_err *e)
 {
     skip_blanks(b);
@@ -146,7 +146,7 @@ static int take_count(reading *b, const char *what, int64_t *x, vg_err *e)
 
 /* ---- hierarchy ---- */
 
-/* The rest of the line, or up to a brace in it: names hold blanks. */
+/* The rest of the line, or up to a brace in it, because names may contain blanks. */
 static int take_name(reading *b, char **name, vg_err *e)
 {
     while (b->at < b->end && is_blank(*b->at) && !is_line_end(*b->at)) b->at++;
@@ -170,13 +170,13 @@ static char *end_name(const char *parent, vg_err *e)
     return name;
 }
 
-/* A joint begins: behind its keyword. */
+/* Start a joint, after its keyword. */
 static int open_joint(reading *b, bool is_end, vg_err *e)
 {
     vg_skeleton *s = &b->skeleton;
     char *name = NULL;
     int r = take_name(b, &name, e);
-    if (r == VG_OK && is_end) { /* what stands behind "End Site" is no name that anything refers to */
+    if (r == VG_OK && is_end) { /* nothing refers to a name after "End Site" */
         free(name);
         if (!(name = end_name(s->joints[b->current].name, e))) r = VG_ENOMEM;
     }
@@ -198,7 +198,7 @@ static int open_joint(reading *b, bool is_end, vg_err *e)
     return expect_word(b, "{", e);
 }
 
-/* "joint 'Hips'" and what is wrong with it, at the line being read */
+/* Report what is wrong with "joint 'Hips'", at the current line */
 static int wrong_joint(reading *b, const char *what, vg_err *e)
 {
     const char *kind = b->said[b->current] & IS_END ? "end site" : "joint";
@@ -299,7 +299,7 @@ static int read_motion_head(reading *b, vg_err *e)
     if (!(b->frame_time > 0) || !isfinite((double)b->frames * b->frame_time))
         return vg_fail(e, VG_EINPUT, "%s line %zu: the frame time is %s", b->subject, line_of(b, b->at),
                        b->frame_time > 0 ? "too large" : "not positive");
-    /* a frame is at least a line: without channels there would be no other end to a number that lies */
+    /* a frame is at least one line; without channels nothing else would limit a false count */
     if (b->channels == 0 && b->frames > (uint64_t)(b->end - b->at))
         return vg_fail(e, VG_ETRUNC, "%s has fewer than the %llu frames that it promises", b->subject,
                        (unsigned long long)b->frames);
@@ -308,12 +308,13 @@ static int read_motion_head(reading *b, vg_err *e)
 
 /* ---- rows ---- */
 
-/* How the numbers behind the head lie in lines. */
+/* How the numbers after the header are arranged in lines. */
 typedef struct rows {
     uint64_t values, lines;
-    const char *wrong; /* the first line that does not hold one row; NULL: all do */
-    size_t has;        /* the values in it */
-    bool aligned;      /* no row ends within a line and goes on: one row takes whole lines, or one line whole rows */
+    const char *wrong; /* the first line that does not hold one row; NULL if all do */
+    size_t has;        /* number of values in it */
+    bool aligned;      /* no row starts in mid-line and continues on the next: one row takes whole lines, or one line
+                          whole rows */
 } rows;
 
 static size_t count_words(const char *p, const char *end)
@@ -341,8 +342,8 @@ static rows look_at_rows(const reading *b)
     return k;
 }
 
-/* Rows may be wrapped anywhere, as long as the number of values is right. But where lines are rows, a missing value
- * would shift all that follow. A truncated file is reported when its end is reached. */
+/* Rows may be wrapped anywhere if the number of values is right. But if lines are rows, a missing value would shift
+ * all that follow. A truncated file is reported when its end is reached. */
 static int check_rows(reading *b, vg_err *e)
 {
     const size_t width = b->kept.size;
@@ -410,7 +411,7 @@ static int open_bvh(void **state, vg_head *h, vgi_input *in, const vg_reading *h
     return b->values && b->turns ? fill_head(b, h, e) : VG_ENOMEM;
 }
 
-/* All frames were read: nothing but blanks may follow. */
+/* All frames were read: only blanks may follow. */
 static int end_motion(reading *b, vg_err *e)
 {
     char expected[64];

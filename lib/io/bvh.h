@@ -1,14 +1,14 @@
-/* bvh.h: what bvh.c and bvh_write.c share.
+/* bvh.h: shared by bvh.c and bvh_write.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_BVH_H
 #define VG_BVH_H
 
 #include "io/io.h"
 
-enum { VGI_BVH_NAME = 1024 }; /* bytes of a joint's name, at most */
+enum { VGI_BVH_NAME = 1024 }; /* most bytes in a joint's name */
 
-extern const char vgi_bvh_end[];             /* what an end site has behind its parent's name */
-extern const char *const vgi_bvh_channels[]; /* the words, in the order of vg_joint's numbers */
+extern const char vgi_bvh_end[];             /* suffix of an end site's name, after that of its parent */
+extern const char *const vgi_bvh_channels[]; /* the channel keywords, in the order of vg_joint's numbers */
 
 /* ---- bvh_write.c: for the table in bvh.c ---- */
 int vgi_bvh_check(const vg_head *h, const char *output, vg_err *e);

@@ -1,5 +1,5 @@
-/* bvh_write.c: Biovision hierarchies (.bvh): a skeleton and its motion, written frame by frame.
- * Leaves out kinematics, from joints to channels (skeleton.c).
+/* bvh_write.c: writes Biovision hierarchies (.bvh), a skeleton and its motion, frame by frame. Kinematics (from
+ * joints to channels) are in skeleton.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/bvh.h"
 
@@ -7,33 +7,33 @@
 #include <stdlib.h>
 
 enum {
-    MOST_TABS = 64, /* what is nested deeper is not moved further to the right */
-    FIELD = 26      /* bytes kept free for a number of the head that is known in the end */
+    MOST_TABS = 64, /* deeper nesting is not indented further */
+    FIELD = 26      /* bytes reserved for a number of the header that is known only at the end */
 };
 
 static const uint32_t NONE = UINT32_MAX;
 
-/* The joints below each other: the children of j, or the roots (at njoints), are a list. */
+/* The hierarchy as lists: the children of joint j, or the roots (at njoints). */
 typedef struct kin {
-    uint32_t *first, *next; /* NONE: there is none */
+    uint32_t *first, *next; /* NONE: end of list */
 } kin;
 
 typedef struct writing {
     vgi_output *out;
     vg_skeleton skeleton; /* its offsets are those of the sequence's reference pose */
     kin kin;
-    uint32_t *order;      /* joints as the file has them */
-    size_t *first_value;  /* of each joint */
+    uint32_t *order;      /* joints in file order */
+    size_t *first_value;  /* per joint */
     vg_joint_fitter *fitter;
     double *values;
     int place_decimals, angle_decimals;
     double size;          /* diagonal of the reference pose */
-    vg_bytes text;        /* what is about to be put */
-    uint64_t frames_at, time_at; /* places of the two numbers in the file */
+    vg_bytes text;        /* buffer for the next output */
+    uint64_t frames_at, time_at; /* positions of the two numbers in the file */
     uint64_t frames;
-    bool timed, uneven;   /* all frames so far have times; not at equal distances */
+    bool timed, uneven;   /* all frames so far have times; they are not equally spaced */
     double first_time, step, last_time;
-    double worst;         /* how far a joint lies from where it should */
+    double worst;         /* largest distance of a joint from its true position */
     size_t worst_joint;
     char *worst_frame;
     char warning[400];
@@ -44,7 +44,7 @@ static int say(vg_bytes *b, const char *s, vg_err *e)
     return vgi_bytes_append(b, s, strlen(s), e);
 }
 
-/* x with that many decimals, without "-0". What has too many digits for that is printed as it is. */
+/* Print x with that many decimals, without "-0". A number with too many digits is printed in full. */
 static int say_fixed(vg_bytes *b, double x, int decimals, vg_err *e)
 {
     static const double ten[] = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
@@ -64,7 +64,7 @@ static int say_fixed(vg_bytes *b, double x, int decimals, vg_err *e)
     return vgi_bytes_append(b, text, at + n - whole, e);
 }
 
-/* Decimals for a length: 7 digits of the whole figure's size (15 in full precision), but at least 6. */
+/* Number of decimals for a length: 7 digits of the figure's size (15 in full precision), but at least 6. */
 static int decimals_for(double size, bool full)
 {
     double d = ceil((full ? 14 : 7) - log10(size > 0 ? size : 1));
@@ -87,7 +87,7 @@ static int link_kin(writing *w, vg_err *e)
     return VG_OK;
 }
 
-/* The joint that follows j in the file, and how many braces close between them. */
+/* The joint that follows j in the file, and the number of braces to close in between. */
 static uint32_t step_on(const writing *w, uint32_t j, size_t *closed)
 {
     *closed = 0;
@@ -111,7 +111,7 @@ static int list_order(writing *w, vg_err *e)
     return VG_OK;
 }
 
-/* Offsets as the reference pose has them: it may be another's than the skeleton's. */
+/* Take the offsets from the reference pose, which may differ from the skeleton's. */
 static void take_offsets(vg_skeleton *s, const double *reference)
 {
     for (size_t j = 0; j < s->njoints; j++) {
@@ -172,7 +172,7 @@ static int say_row(writing *w, vg_err *e)
     return r < 0 ? r : say(&w->text, "\n", e);
 }
 
-/* ---- the head of the file ---- */
+/* ---- ---- file header ---- */
 
 static int say_tabs(vg_bytes *b, size_t depth, vg_err *e)
 {
@@ -181,7 +181,7 @@ static int say_tabs(vg_bytes *b, size_t depth, vg_err *e)
     return r;
 }
 
-/* A name must not end its line nor look like a brace. */
+/* A name must not contain a line end or look like a brace. */
 static int say_name(vg_bytes *b, const char *name, vg_err *e)
 {
     size_t from = b->size;
@@ -191,7 +191,7 @@ static int say_name(vg_bytes *b, const char *name, vg_err *e)
     return r;
 }
 
-/* A joint without channels and children that is called like one. */
+/* Whether this is a joint without channels and children that is named like an end site. */
 static bool is_end_site(const writing *w, uint32_t j)
 {
     const vg_joint *joint = &w->skeleton.joints[j];
@@ -201,7 +201,7 @@ static bool is_end_site(const writing *w, uint32_t j)
     return !strncmp(joint->name, parent, n) && !strcmp(joint->name + n, vgi_bvh_end);
 }
 
-/* Is every name one that would be read again? */
+/* Whether all names can be read back. */
 static int check_names(const writing *w, vg_err *e)
 {
     for (uint32_t j = 0; j < w->skeleton.njoints; j++)
@@ -261,7 +261,7 @@ static int say_hierarchy(writing *w, vg_bytes *b, vg_err *e)
     return r;
 }
 
-/* A number that is known in the end: where it is in the text, blank until then. */
+/* Reserve a blank field for a number that is known only at the end, and store its position. */
 static int say_field(vg_bytes *b, uint64_t *at, vg_err *e)
 {
     char blanks[FIELD + 1];
@@ -323,14 +323,14 @@ int vgi_bvh_put(void *state, const vg_frame *f, vg_err *e)
     return r < 0 ? r : put_text(w, e);
 }
 
-/* Seconds from frame to frame: 1 / VG_FPS when nothing is known. Over the whole length: one step may have been rounded. */
+/* Seconds per frame: 1 / VG_FPS if unknown. Computed from the whole duration, because single steps may be rounded. */
 static double frame_time(const writing *w)
 {
     if (w->timed && w->frames > 1 && !w->uneven) return (w->last_time - w->first_time) / (double)(w->frames - 1);
     return w->timed && w->step > 0 ? w->step : 1.0 / VG_FPS;
 }
 
-/* The number in w->text goes to the right end of its field. */
+/* Write the number in w->text right-aligned into its field. */
 static int patch_field(writing *w, uint64_t at, vg_err *e)
 {
     size_t n = w->text.size; /* no number is longer than its field */

@@ -1,7 +1,5 @@
 /* caches.c: the point caches PC2 (3ds Max, Blender) and MDD (LightWave, Blender): binary32 positions, frame after
- * frame.
- * Leaves out the faces, which lie in a mesh file beside the cache (source.c, sink.c), and interpolation between
- * samples.
+ * frame. The faces are in a mesh file beside the cache (source.c, sink.c). Samples are not interpolated.
  *
  * PC2, little-endian: "POINTCACHE2\0", int32 version 1, int32 points, float32 start, float32 rate, int32 samples,
  * then the positions. MDD, big-endian: int32 samples, int32 points, float32 time of each sample, then the positions.
@@ -46,7 +44,7 @@ typedef struct reading {
     const char *subject;
     bool big;
     uint32_t samples, points, next; /* next: number of the next sample */
-    vg_bytes ahead;                 /* its bytes, when have_ahead */
+    vg_bytes ahead;                 /* its bytes, if have_ahead */
     bool have_ahead;
     bool timed;
     float start, rate; /* PC2 */
@@ -74,7 +72,7 @@ static int take_sample(reading *x, vg_err *e)
     return r;
 }
 
-/* 0, the end of the sequence, if the file ends too. */
+/* Returns 0 (end of sequence) if the file ends, too. */
 static int finish(reading *x, vg_err *e)
 {
     int r = vgi_input_ended(x->in, e);
@@ -206,7 +204,7 @@ static bool sniff_pc2(const unsigned char *data, size_t n)
 /* ------------------------------------------------------------------------------------------- writing -- */
 
 typedef struct writing {
-    vgi_output *out; /* MDD: the file; its positions wait in `spool`, because the times come first */
+    vgi_output *out; /* MDD: the file; its positions wait in `spool` because the times come first */
     vgi_output spool;
     bool big;
     size_t points;
@@ -215,7 +213,7 @@ typedef struct writing {
     /* times: */
     bool untimed, uneven; /* some frame has no time; times are not evenly spaced */
     double first, last, step;
-    vg_bytes times; /* MDD: as they are written */
+    vg_bytes times; /* MDD: in file form */
 } writing;
 
 static int check_points(const vg_head *h, const char *output, vg_err *e)
@@ -253,7 +251,7 @@ static int begin_mdd(void **state, const vg_head *h, const vg_sink_options *o, v
     return x->spool.fd < 0 ? x->spool.fd : VG_OK;
 }
 
-/* Are the times evenly spaced, within the precision of binary32? */
+/* Check whether the times are evenly spaced, within the precision of binary32. */
 static void note_time(writing *x, const vg_frame *f)
 {
     uint32_t i = x->samples;

@@ -1,4 +1,5 @@
-/* codec_meshopt.c: buffers compressed with meshoptimizer, for gltf_unpack.c: the one file that knows the library.
+/* codec_meshopt.c: decodes buffers compressed with meshoptimizer, for gltf_unpack.c. No other file includes the
+ * library.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/codecs.h"
 
@@ -7,7 +8,7 @@
 #ifdef VG_MESHOPT
 #include <meshoptimizer.h>
 
-/* false: the filter does not go with such elements */
+/* Returns false if the filter does not apply to such elements. */
 static bool apply_filter(const char *filter, size_t count, size_t stride, void *to)
 {
     if (!strcmp(filter, "NONE")) return true;

@@ -1,4 +1,4 @@
-/* codec_none.c: what stands for the codecs whose library the program was built without.
+/* codec_none.c: stubs for codecs whose library was not available at build time.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/codecs.h"
 

@@ -101,7 +101,7 @@ static inline int put64(vg_bytes *b, uint64_t x, vg_err *e)
     return vgi_bytes_append(b, p, sizeof p, e);
 }
 
-/* Readers refuse numbers that are not finite, so none is written. */
+/* Readers refuse numbers that are not finite, so they must not be written. */
 static inline int put_doubles(vg_bytes *b, const double *x, size_t n, vg_err *e)
 {
     if (!vgi_finite(x, n)) return vg_fail(e, VG_EINPUT, "the result holds a number that is not finite");
@@ -112,7 +112,7 @@ static inline int put_doubles(vg_bytes *b, const double *x, size_t n, vg_err *e)
     return r;
 }
 
-/* zero bytes up to the next multiple of 8, counted from `from` */
+/* zero bytes up to the next multiple of 8 from `from` */
 static inline int put_padding(vg_bytes *b, size_t from, vg_err *e)
 {
     static const unsigned char zeros[8];

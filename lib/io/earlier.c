@@ -1,5 +1,5 @@
-/* earlier.c: finds mesh files of an earlier set where a new set is to be written. A reader would take those that
- * are not overwritten for frames of the new set. sink.c writes.
+/* earlier.c: finds mesh files of an earlier set where a new set is to be written. Those that are not overwritten
+ * would be read as frames of the new set. The set is written in sink.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sink.h"
 
@@ -28,7 +28,7 @@ static size_t literal_length(const char *s, size_t n)
     return length;
 }
 
-/* Is the part of the path between `before` and `after` bytes a number from `first` on? */
+/* Whether the part of the path between `before` and `after` bytes is a number from `first` on. */
 static bool has_number(const char *path, size_t before, size_t after, uint64_t first)
 {
     size_t n = strlen(path);

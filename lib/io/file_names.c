@@ -1,6 +1,6 @@
-/* file_names.c: the file names of frames in a directory or archive. Readers sort files naturally, so names must
- * ascend in that order; if the names of the frames do not, files get a number in front. sink.c writes the files,
- * names.c defines the order.
+/* file_names.c: the file names of frames in a directory or archive. Readers sort files in natural order, so names
+ * must ascend in that order; if the names of the frames do not, files get a number as prefix. Files are written in
+ * sink.c; names.c defines the order.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sink.h"
 
@@ -18,13 +18,13 @@ int vgi_file_name_numbered(vg_bytes *file, uint64_t number, const char *name, co
     return r < 0 ? r : vgi_bytes_append(file, suffix, strlen(suffix) + 1, e);
 }
 
-/* Is this a possible file name, which readers take for a pose? In a zip they may read '\' as '/'. */
+/* Whether this is a possible file name that readers take for a pose. In a zip they may read '\' as '/'. */
 static bool is_file_name(const char *name)
 {
     return *name && *name != '.' && !strpbrk(name, "/\\");
 }
 
-/* Remember `file` as the last one; false: it does not sort behind the one before. */
+/* Remember `file` as the last one; false if it does not sort after the previous one. */
 static int follow(vgi_file_names *t, const char *file, bool *follows, vg_err *e)
 {
     *follows = !t->last.size || vgi_natural_compare((char *)t->last.data, file) < 0;

@@ -6,8 +6,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* By content the first match is taken, so formats with a signature come before STL and OBJ, which have none. By
- * suffix, the first with that suffix. */
+/* Detection by content takes the first match, so formats with a signature come before STL and OBJ, which have none.
+ * Detection by suffix takes the first with that suffix. */
 static const vgi_format *const formats[] = {&vgi_format_ply, &vgi_format_ply_ascii, &vgi_format_ply_be,
                                             &vgi_format_off, &vgi_format_stl,
                                             &vgi_format_stl_ascii, &vgi_format_obj};
@@ -88,7 +88,7 @@ int vg_model_read(vg_model *m, const void *data, size_t n, const char *format, c
     return vgi_model_read(m, data, n, known, name, subject, e);
 }
 
-/* Are n numbers finite in the given precision? */
+/* Check whether n numbers are finite in the given precision. */
 static int check_range(const double *x, size_t n, size_t per_item, const char *what, bool full_precision, vg_err *e)
 {
     for (size_t i = 0; i < n; i++) {
@@ -113,7 +113,7 @@ int vgi_model_write(vg_bytes *out, const char *format, const vgi_writing *w, vg_
     if (result == VG_OK) result = known->write(out, w, e);
     if (result == VG_OK && w->rest) result = vgi_bytes_append(out, w->rest->data, w->rest->size, e);
     else if (result == VG_OK && known->rest) result = known->rest(out, w, e);
-    if (result < 0) out->size = size; /* nothing was appended */
+    if (result < 0) out->size = size; /* append nothing on failure */
     return result;
 }
 

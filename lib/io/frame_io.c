@@ -1,5 +1,5 @@
-/* frame_io.c: reads and writes a frame (fmt/STREAM.md, section 3.12): name, channels, values. record.c has record
- * headers and checksums, stream.c their order.
+/* frame_io.c: reads and writes a frame (fmt/STREAM.md, section 3.12): name, channels, values. Record headers and
+ * checksums are in record.c, their order in stream.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "core/numbers_kernel.h"
 #include "io/cursor.h"
@@ -10,7 +10,7 @@
 enum { AS_INDICES = 1 }; /* Type of a channel; the others are a vg_precision */
 enum { MOST_CHANNELS = 255 };
 
-/* Channels with a meaning, and the forms that may have them. */
+/* Known channels, and the forms that may have them. */
 enum { TIME, ROOT, ANCHORS, PINS, TURNS, MEANINGS };
 static const struct {
     const char *name;
@@ -48,7 +48,7 @@ static bool count_fits(const vgi_form *h, vg_element element, uint64_t count)
 
 /* ---- reading ---- */
 
-typedef struct taken { /* the fields before the numbers of a channel */
+typedef struct taken { /* the fields that precede the numbers of a channel */
     vgi_channel_texts texts;
     uint64_t width, count, type;
 } taken;

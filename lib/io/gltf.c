@@ -1,13 +1,13 @@
-/* gltf.c: glTF 2.0 as a container: GLB chunks, JSON, buffers inside or beside, accessors; the tables of both formats.
- * Leaves out what a scene is (gltf_play.c), how a sequence becomes one (gltf_write.c), and compressed geometry
- * (gltf_unpack.c).
+/* gltf.c: glTF 2.0 as a container: GLB chunks, JSON, embedded and external buffers, accessors; the format tables.
+ * Scenes are in gltf_play.c, writing in gltf_write.c, compressed geometry in gltf_unpack.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf.h"
 
 #include <stdarg.h>
 #include <stdlib.h>
 
-static const uint64_t vgi_gltf_most_elements = (uint64_t)1 << 27; /* of an accessor, which may have no bytes */
+static const uint64_t vgi_gltf_most_elements = (uint64_t)1 << 27; /* per accessor, because accessors may have no
+                                                                     bytes */
 
 int vgi_gltf_bad(const vgi_gltf *g, vg_err *e, const char *format, ...)
 {
@@ -26,7 +26,7 @@ static int cut_short(const vgi_gltf *g, vg_err *e)
     return vg_fail(e, VG_ETRUNC, "%s is cut short", g->subject);
 }
 
-/* One chunk at *off; *off goes behind it. */
+/* One chunk at *off, which moves to the next chunk. */
 static int take_chunk(const vgi_gltf *g, size_t *off, uint32_t *type, const unsigned char **data, size_t *n,
                       vg_err *e)
 {
@@ -65,7 +65,8 @@ static bool starts_with(const char *s, const char *with)
     return !strncmp(s, with, strlen(with));
 }
 
-/* Extensions that change no position, or that are read. A name that ends in _ stands for all that begin so. */
+/* Extensions that change no position, or that are supported. A name ending in _ matches every name with this
+ * prefix. */
 bool vgi_gltf_is_understood(const char *extension)
 {
     static const char *const understood[] = {
@@ -78,7 +79,7 @@ bool vgi_gltf_is_understood(const char *extension)
     return false;
 }
 
-/* Those that could change what is seen of the geometry, and are neither read nor known to be harmless. */
+/* Report extensions that may change visible geometry and are neither supported nor known to be harmless. */
 void vgi_gltf_note_extensions(const vgi_gltf *g, vg_note *note)
 {
     const vgi_json *used = vgi_json_get(g->json, "extensionsUsed");
@@ -124,7 +125,7 @@ static int decode_base64(const vgi_gltf *g, const char *s, vg_bytes *to, vg_err 
         int digit = digit_of((unsigned char)s[i]);
         if (digit < 0) return vgi_gltf_bad(g, e, "a buffer's base64 has a character that does not belong there");
         bits = bits << 6 | (uint32_t)digit;
-        size_t have = i % 4; /* digits before: with 1, 2 and 3 of them this one completes a byte */
+        size_t have = i % 4; /* preceding digits: with 1, 2 and 3 of them this one completes a byte */
         if (have) to->data[to->size++] = (unsigned char)(bits >> (6 - 2 * have));
     }
     return r;
@@ -137,7 +138,7 @@ static int hex_of(char c)
     return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
 }
 
-/* The path of a URI, beside the file `from`: never above or outside of its directory. */
+/* The path of a URI relative to the file `from`; never above or outside its directory. */
 static int path_beside(const vgi_gltf *g, const char *from, const char *uri, vg_bytes *path, vg_err *e)
 {
     int r = vgi_bytes_append(path, from, (size_t)(vgi_base_name(from) - from), e);
@@ -156,7 +157,7 @@ static int path_beside(const vgi_gltf *g, const char *from, const char *uri, vg_
     return VG_OK;
 }
 
-/* n bytes of it, or all: SIZE_MAX. */
+/* Read n bytes of it, or all (SIZE_MAX). */
 static int read_beside(const vgi_gltf *g, vgi_input *in, const char *uri, size_t n, vg_bytes *to, vg_err *e)
 {
     const char *from = vgi_input_path(in);
@@ -194,7 +195,7 @@ static int read_buffer(const vgi_gltf *g, vgi_gltf_buffer *b, const vgi_json *fr
         if (r < 0) return r;
         b->data = b->own.data, b->size = b->own.size;
     }
-    if (n > b->size && vgi_gltf_is_fallback(from)) return VG_OK; /* its views are compressed, elsewhere */
+    if (n > b->size && vgi_gltf_is_fallback(from)) return VG_OK; /* its views are compressed and stored elsewhere */
     if (n > b->size)
         return vgi_gltf_bad(g, e, "a buffer is to have %llu bytes and has %zu", (unsigned long long)n, b->size);
     b->size = (size_t)n;
@@ -255,7 +256,7 @@ int vgi_gltf_item(const vgi_gltf *g, const vgi_json *ref, const char *list, cons
     return VG_OK;
 }
 
-/* A whole number, 0 when it is not there. */
+/* An integer, 0 if absent. */
 static int take_whole(const vgi_gltf *g, const vgi_json *from, const char *key, size_t *x, vg_err *e)
 {
     const vgi_json *j = vgi_json_get(from, key);
@@ -289,7 +290,7 @@ static int take_component(const vgi_gltf *g, const vgi_json *from, int *componen
     return r;
 }
 
-/* Locate count elements of the given size: part of a buffer view, from its byteOffset on. */
+/* Locate count elements of the given size in a buffer view, from its byteOffset on. */
 static int find_bytes(const vgi_gltf *g, const vgi_json *from, size_t count, size_t element,
                       const unsigned char **data, size_t *stride, vg_err *e)
 {
@@ -483,11 +484,11 @@ static int begin_gltf(void **state, const vg_head *h, const vg_sink_options *o, 
     return vgi_gltf_begin(state, h, o, out, false, e);
 }
 
-/* Labels, and texture coordinates of vertices: the writer says itself where it keeps none. */
+/* Labels, and texture coordinates of vertices: the writer reports itself what it drops. */
 enum { KEEPS = VGI_KEEPS_FACES | VGI_KEEPS_POLYGONS | VGI_KEEPS_ORDER | VGI_KEEPS_TEXTURE | VGI_KEEPS_LABELS | VGI_KEEPS_NAMES |
                VGI_KEEPS_TIMES | VGI_KEEPS_ASSET };
 
-enum { KINDS = 1 << VG_VERTICES | 1 << VG_TRANSFORMS }; /* the latter of a rig */
+enum { KINDS = 1 << VG_VERTICES | 1 << VG_TRANSFORMS }; /* transforms: of a rig */
 
 const vgi_sequence_format vgi_sequence_glb = {
     .name = "glb", .suffix = ".glb", .keeps = KEEPS, .bare = true, .sniff = sniff_glb,

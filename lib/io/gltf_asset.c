@@ -1,7 +1,6 @@
-/* gltf_asset.c: what a glTF file holds beside its shape and motion, as a GLB of the character at rest: materials, textures,
- * images, attributes of vertices, skins, nodes, cameras, lights. Animations, morph targets and what nothing refers to stay
- * behind. The stream carries it as it is (record ASST).
- * Leaves out how such an asset is written again (gltf_character.c).
+/* gltf_asset.c: the contents of a glTF file besides shape and motion, as a GLB of the character at rest: materials,
+ * textures, images, attributes of vertices, skins, nodes, cameras, lights. Animations, morph targets and unreferenced
+ * items are dropped. The stream carries the asset unchanged (record ASST). It is written again in gltf_character.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_pack.h"
 #include "io/gltf_scene.h"
@@ -20,7 +19,7 @@ static int align(packing *k, vg_err *e)
     return vgi_bytes_append(&k->data, zeros, (ALIGNED - k->data.size % ALIGNED) % ALIGNED, e);
 }
 
-/* The bytes from `start` on become a view. */
+/* Make a view of the bytes from `start` on. */
 static int add_view(packing *k, size_t start, int target, size_t stride, size_t *number, vg_err *e)
 {
     vgi_json *view = vgi_json_object(e);
@@ -59,8 +58,8 @@ static int describe(packing *k, const vgi_json *old, size_t view, vg_err *e)
     return r < 0 ? r : vgi_json_put(copy, "bufferView", vgi_json_of_whole(view, e), e);
 }
 
-/* Member `key`, a reference to an accessor of `count` elements (0: of any number), gets the number of its copy. 0: it cannot
- * be copied. */
+/* Replace member `key`, a reference to an accessor of `count` elements (0: any number), by the number of its copy.
+ * Returns 0 if it cannot be copied. */
 static int move_accessor(packing *k, vgi_json *holder, const char *key, int target, size_t count, vg_err *e)
 {
     const vgi_json *ref = vgi_json_get(holder, key), *old;
@@ -81,7 +80,7 @@ static int move_accessor(packing *k, vgi_json *holder, const char *key, int targ
     return r < 0 ? r : 1;
 }
 
-/* Move all members that refer to accessors; drop those that cannot be copied. */
+/* Replace all references to accessors in the members; drop those that cannot be copied. */
 static int move_accessors(packing *k, vgi_json *holder, int target, size_t count, vg_err *e)
 {
     for (const char *key = vgi_json_key(holder, NULL), *next; key; key = next) {
@@ -158,7 +157,7 @@ static void drop_unknown(vgi_json *extensions)
     }
 }
 
-/* Extensions that are not known, wherever they are. The depth is what the parser let through. */
+/* Remove unknown extensions at any depth, which the parser has limited. */
 static void strip(vgi_json *j)
 {
     static const char extensions[] = "extensions";
@@ -276,7 +275,7 @@ int vgi_gltf_pack_end(packing *k, vg_bytes *to, vg_err *e)
     int r = align(k, e);
     static const char *const lists[] = {"accessors", "bufferViews"};
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
-        if (!vgi_json_count(vgi_json_get(k->doc, lists[i]))) vgi_json_drop(k->doc, lists[i]); /* none may be empty */
+        if (!vgi_json_count(vgi_json_get(k->doc, lists[i]))) vgi_json_drop(k->doc, lists[i]); /* empty lists are not allowed */
     if (r == VG_OK && k->data.size) r = put_buffer(k, e);
     if (r == VG_OK) r = vgi_json_print(k->doc, &text, e);
     if (r == VG_OK) r = vgi_bytes_append(to, head, sizeof head, e);
@@ -303,14 +302,14 @@ void vgi_gltf_pack_clear(packing *k)
     vg_bytes_clear(&k->data);
 }
 
-/* Does the file hold more than faces, positions, the first texture coordinates and the vertices of the mesh? */
+/* Whether the file holds more than faces, positions, the first texture coordinates and the vertices of the mesh. */
 static bool has_more(const vgi_gltf_scene *x, const vg_mesh *mesh)
 {
     static const char *const lists[] = {"materials", "skins", "cameras", "images"};
     const vgi_json *doc = x->g.json;
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
         if (vgi_json_count(vgi_json_get(doc, lists[i]))) return true;
-    const bool plain = x->own && x->nparts == 1; /* its normals were made by the writer */
+    const bool plain = x->own && x->nparts == 1; /* its normals were computed by the writer */
     if (x->nnodes > 1 || (mesh->nv != x->all && !x->own)) return true;
     for (size_t i = 0; i < x->nparts; i++)
         for (const char *key = vgi_json_key(x->parts[i].attributes, NULL); key;

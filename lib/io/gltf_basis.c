@@ -1,9 +1,9 @@
-/* gltf_basis.c: few morph targets for many frames, by a singular value decomposition.
- * Leaves out where frames come from and what is written (gltf_morph.c).
+/* gltf_basis.c: approximates many frames by few morph targets, with a singular value decomposition. Frames come from,
+ * and are written in, gltf_morph.c.
  *
- * The matrix A has a row for each frame. Eigenvectors u of A A' give orthonormal directions u' A / sigma; each frame is
- * projected onto them. That is best in the mean over vertices; how many are needed is found by the largest error, which
- * is measured.
+ * The matrix A has a row for each frame. Eigenvectors u of A A' give orthonormal directions u' A / sigma, onto which
+ * each frame is projected. This is optimal on average over the vertices; the number of directions is chosen by the
+ * largest error, which is measured.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_basis.h"
 
@@ -13,20 +13,20 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { MOST_ROWS = 2048, BLOCK = 16, CHUNK = 4 << 20 }; /* BLOCK: frames that are met at a time; CHUNK: numbers */
+enum { MOST_ROWS = 2048, BLOCK = 16, CHUNK = 4 << 20 }; /* BLOCK: frames projected at a time; CHUNK: numbers */
 
 typedef struct making {
     const vgi_gltf_frames_in *in;
     vgi_gltf_basis *to;
     size_t width;       /* 3 nv */
-    size_t rows;        /* frames that are looked at for the directions */
+    size_t rows;        /* frames used to find the directions */
     size_t count;       /* directions that may be needed */
     double *gram, *values, *vectors;
     float *frame, *block, *met;
     double tolerance;
 } making;
 
-/* Which frame row r is. */
+/* The frame of row r. */
 static size_t frame_of(const making *k, size_t r)
 {
     return k->rows < 2 ? 0 : r * (k->in->frames - 1) / (k->rows - 1);
@@ -66,7 +66,7 @@ static int add_gram(making *k, vg_err *e)
     return r;
 }
 
-/* As many as leave so little that no vertex of these frames can be off by more than the tolerance. */
+/* Enough directions that no vertex of these frames can be off by more than the tolerance. */
 static void count_directions(making *k, size_t most)
 {
     double left = 0;
@@ -138,7 +138,7 @@ static double distance(const float *a, const float *b, size_t width)
     return sqrt(most);
 }
 
-/* With the first n directions. Stops when it is beyond `enough`. */
+/* Error with the first n directions. Stops once it exceeds `enough`. */
 static int measure(making *k, size_t n, double enough, double *error, vg_err *e)
 {
     int r = VG_OK;
@@ -154,10 +154,10 @@ static int measure(making *k, size_t n, double enough, double *error, vg_err *e)
     return r;
 }
 
-/* The least number that is good enough. */
+/* The smallest sufficient number. */
 static int choose(making *k, vg_err *e)
 {
-    size_t low = 0, high = k->count; /* low is not enough, high may be */
+    size_t low = 0, high = k->count; /* low is insufficient, high may be sufficient */
     double error;
     int r = VG_OK;
     while (high - low > 1 && r == VG_OK) {
@@ -170,7 +170,7 @@ static int choose(making *k, vg_err *e)
     return r < 0 ? r : measure(k, high, HUGE_VAL, &k->to->error, e);
 }
 
-/* Weights close up, and the largest of each target becomes 1. */
+/* Compact the weights, and scale so that the largest weight of each target is 1. */
 static void finish(making *k)
 {
     vgi_gltf_basis *b = k->to;
@@ -192,7 +192,7 @@ static bool are_finite(const float *x, size_t n)
     return true;
 }
 
-/* Sums of displacements near the limit of binary32 overflow. */
+/* Sums of displacements near the limit of binary32 would overflow. */
 static int check(const making *k, vg_err *e)
 {
     const vgi_gltf_basis *b = k->to;

@@ -1,6 +1,6 @@
-/* gltf_cast.c: the file of a character again, with meshes that move: its nodes, skins, materials, textures, images, cameras
- * and lights as they were, and for each node that shows a mesh a mesh of its own, since each moves by itself.
- * Leaves out bytes and accessors (gltf_morph.c), and where vertices are (gltf_character.c).
+/* gltf_cast.c: writes the file of a character again, with meshes that move: nodes, skins, materials, textures,
+ * images, cameras and lights are unchanged, and each node that shows a mesh gets a separate mesh, because each moves
+ * independently. Bytes and accessors are in gltf_morph.c, positions of vertices in gltf_character.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
 
@@ -32,7 +32,7 @@ static int ensure_extras(vgi_json *holder, vg_err *e)
     return vgi_json_put(holder, "extras", vgi_json_object(e), e);
 }
 
-/* Copyright and the like stay; it is written by another program now. */
+/* Copyright and similar members stay; the generator changes. */
 int vgi_gltf_say_cast_asset(vgi_gltf_writing *w, vg_err *e)
 {
     vgi_json *asset = vgi_json_copy(vgi_json_get(w->character->scene.g.json, "asset"), e);
@@ -94,7 +94,7 @@ static int add_names(vgi_json *mesh, const vgi_json *names, vg_err *e)
     return r < 0 ? r : vgi_json_put(vgi_json_inner(mesh, "extras"), "targetNames", vgi_json_copy(names, e), e);
 }
 
-/* The mesh of a node: the original one with the primitives that the node shows. */
+/* The mesh of a node: the original mesh with the primitives that the node shows. */
 static int add_mesh(vgi_json *meshes, const vgi_gltf_scene *x, size_t node, const vgi_gltf_cast *k, vg_err *e)
 {
     const vgi_json *old;
@@ -122,7 +122,7 @@ static bool shows_mesh(const vgi_gltf_scene *x, size_t node)
     return x->nodes[node].shown && vgi_json_get(x->nodes[node].json, "mesh");
 }
 
-/* A mesh for each node that shows one; of other scenes, none. */
+/* A separate mesh for each node that shows one; other scenes get none. */
 static int cast_nodes(vgi_json *doc, const vgi_gltf_scene *x, const vgi_gltf_cast *k, vg_err *e)
 {
     vgi_json *nodes = vgi_json_inner(doc, "nodes"), *meshes = vgi_json_array(e);

@@ -1,11 +1,11 @@
-/* gltf_character.c: a glTF character in other poses than its own: positions and normals of its vertices, in the space
+/* gltf_character.c: a glTF character in poses other than its own: positions and normals of its vertices, in the space
  * of its meshes. Reading and packing are in gltf_asset.c, writing in gltf_morph.c and gltf_cast.c.
  *
  * A vertex at p is shown at M p, where M is the matrix of its node, or the weighted mean of the matrices of its
- * joints. A pose is taken back into the space of the mesh by the inverse of M at rest: skin, nodes and morph targets
- * together then show the pose.
+ * joints. A pose is converted to the space of the mesh by the inverse of M at rest, so that skin, nodes and morph
+ * targets together show the pose.
  *
- * Normals keep their artist's shading: each is rotated as the adjacent faces are, with their normal and about it.
+ * Normals keep the artist's shading: each is rotated as the adjacent faces are, with their normal and about it.
  * Vertices that are one vertex of the mesh and have equal normals share these faces, so that edges stay hard and
  * seams stay smooth.
  * SPDX-License-Identifier: GPL-3.0-or-later */
@@ -27,7 +27,7 @@ static void linear_transposed(const double m[12], const double p[3], double to[3
     for (int i = 0; i < 3; i++) to[i] = m[i] * p[0] + m[4 + i] * p[1] + m[8 + i] * p[2];
 }
 
-/* false: the matrix is singular */
+/* Returns false if the matrix is singular. */
 static bool invert(const double m[12], double to[12])
 {
     const double a[9] = {m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, shift[3] = {m[3], m[7], m[11]};
@@ -48,7 +48,7 @@ static void unit(double p[3])
     for (int k = 0; k < 3; k++) p[k] = l > 0 ? p[k] / l : 0;
 }
 
-/* x by the least rotation that takes a to b; a, b: unit or zero. */
+/* Rotate x by the smallest rotation from a to b; a, b: unit or zero. */
 static void turn(const double a[3], const double b[3], const double x[3], double to[3])
 {
     const double c = vgi_dot(a, b);
@@ -59,9 +59,9 @@ static void turn(const double a[3], const double b[3], const double x[3], double
     for (int i = 0; i < 3; i++) to[i] = c > -0.999999 ? c * x[i] + y[i] + along * k[i] : -x[i];
 }
 
-/* ---- where the vertices are ---- */
+/* ---- ---- positions of the vertices ---- */
 
-/* 1; 0: the matrix of a node or skin is singular */
+/* 1; 0 if the matrix of a node or skin is singular */
 static int place(vgi_gltf_character *c, vg_err *e)
 {
     const vgi_gltf_scene *x = &c->scene;
@@ -86,7 +86,7 @@ static void point_of(const vgi_gltf_character *c, const vgi_gltf_part *p, size_t
     vgi_gltf_move_point(c->out + 12 * (p->first + v), at, shown);
 }
 
-/* Does the file show the reference pose? */
+/* Whether the file shows the reference pose. */
 static bool shows(const vgi_gltf_character *c, const vg_body *b)
 {
     const double near = 1e-7 * vg_diagonal(b->reference, b->mesh.nv);
@@ -130,7 +130,7 @@ typedef struct seat {
     size_t node, instance;
 } seat;
 
-/* By place, then by vertex. */
+/* Order by position, then by vertex. */
 static int by_seat(const void *a, const void *b)
 {
     const seat *s = a, *t = b;
@@ -202,10 +202,10 @@ static int read_normals(vgi_gltf_character *c, vg_err *e)
     return VG_OK;
 }
 
-/* Chains of the vertices of the file that are one vertex of the mesh. */
+/* Lists of the file's vertices that are one vertex of the mesh. */
 static int group_normals(vgi_gltf_character *c, vg_err *e)
 {
-    uint32_t *head = vgi_array(c->nv, sizeof *head, e), *next = vgi_array(c->n, sizeof *next, e); /* + 1 */
+    uint32_t *head = vgi_array(c->nv, sizeof *head, e), *next = vgi_array(c->n, sizeof *next, e); /* file vertex + 1 */
     c->group = vgi_array_raw(c->n, sizeof *c->group, e);
     int r = head && next && c->group ? VG_OK : VG_ENOMEM;
     for (size_t f = 0; f < c->n && r == VG_OK; f++) {
@@ -249,7 +249,7 @@ static void face_normals(const vgi_gltf_character *c, const double *world, doubl
     for (size_t g = 0; g < c->ngroups; g++) unit(to + 3 * g);
 }
 
-/* Of the sides of a face at corner k: how they have turned about the normal of its group. */
+/* Add the rotation of the sides of a face at corner k about the normal of its group. */
 static void add_twist(const vgi_gltf_character *c, const uint32_t *v, int k, const double *world)
 {
     const size_t g = c->group[v[k]];
@@ -283,7 +283,7 @@ static void find_twists(const vgi_gltf_character *c, const double *world)
     }
 }
 
-/* Turn x about the unit vector b, by the angle whose cosine and sine have this ratio. */
+/* Rotate x about the unit vector b by the angle with this cosine and sine (unnormalised). */
 static void twist_about(const double b[3], const double twist[2], double x[3])
 {
     const double l = hypot(twist[0], twist[1]), cosine = l > 0 ? twist[0] / l : 1, sine = l > 0 ? twist[1] / l : 0;
@@ -293,7 +293,7 @@ static void twist_about(const double b[3], const double twist[2], double x[3])
     for (int i = 0; i < 3; i++) x[i] = cosine * x[i] + sine * across[i] + along * b[i];
 }
 
-/* Do the faces around a group lie as they do in the pose of rest? */
+/* Whether the faces around a group are as in the rest pose. */
 static bool is_still(const vgi_gltf_character *c, size_t g)
 {
     return !memcmp(c->rest + 3 * g, c->now + 3 * g, 3 * sizeof *c->now) && c->twist[2 * g + 1] == 0 && c->twist[2 * g] >= 0;

@@ -1,5 +1,5 @@
-/* gltf_clips.c: the animations of glTF: which nodes and weights they move, when, and how.
- * Leaves out animation of anything that moves no vertex.
+/* gltf_clips.c: the animations of a glTF file: which nodes and weights they move, when, and how. Animation that moves
+ * no vertex is ignored.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_scene.h"
 
@@ -46,7 +46,7 @@ static const struct {
 } paths[] = {{"translation", 3}, {"rotation", 4}, {"scale", 3}, {"weights", 0}};
 enum { PATHS = sizeof paths / sizeof *paths };
 
-/* Which of them; PATHS: none. */
+/* Index of the path; PATHS if unknown. */
 static size_t path_named(const char *name, size_t n)
 {
     size_t i = 0;
@@ -54,7 +54,7 @@ static size_t path_named(const char *name, size_t n)
     return i;
 }
 
-/* 1: it moves something that is shown; 0: it does not. */
+/* 1 if it moves something that is shown, else 0. */
 static int aim_at(const vgi_gltf_scene *x, vgi_gltf_channel *c, size_t node, size_t path, vg_err *e)
 {
     const vgi_gltf_node *n = &x->nodes[node];
@@ -82,7 +82,7 @@ static int add_channel(vgi_gltf_scene *x, const vgi_json *animation, const vgi_j
     return r;
 }
 
-/* "12/weights" behind "/nodes/": the number, and the path in it; false: it is something else. */
+/* For "12/weights" after "/nodes/": the number, and the path; false if it has another form. */
 static bool split_pointer(const char *s, size_t *number, size_t *path)
 {
     const char *end = s + strlen(s);
@@ -94,8 +94,8 @@ static bool split_pointer(const char *s, size_t *number, size_t *path)
     return *path < PATHS;
 }
 
-/* KHR_animation_pointer: of what it may point at, these move vertices: a node's place and weights, and the weights of a
- * mesh in all nodes that have none of their own. */
+/* KHR_animation_pointer: these targets move vertices: a node's transform and weights, and the weights of a mesh in
+ * all nodes without weights of their own. */
 static int add_pointed(vgi_gltf_scene *x, const vgi_json *animation, const vgi_json *from, const vgi_json *target,
                        vg_err *e)
 {
@@ -156,7 +156,7 @@ static int add_moments(vgi_gltf_scene *x, const vgi_gltf_channel *c, vg_err *e)
     return r;
 }
 
-/* Moments at one time are one. */
+/* Merge moments at the same time. */
 static size_t unite(vgi_gltf_moment *m, size_t n)
 {
     size_t kept = 0;
@@ -166,7 +166,7 @@ static size_t unite(vgi_gltf_moment *m, size_t n)
     return kept;
 }
 
-/* From the first key to the last, so often a second. */
+/* Sample at the given rate from the first key to the last. */
 static int add_samples(vgi_gltf_scene *x, size_t first, vg_err *e)
 {
     double from = HUGE_VAL, to = -HUGE_VAL, t;
@@ -228,7 +228,7 @@ static int no_such_animation(const vgi_gltf_scene *x, const vgi_json *list, vg_e
                         *names ? names : "none");
 }
 
-/* The one that is asked for by its name, or all. */
+/* The animation requested by name, or all. */
 int vgi_gltf_read_animations(vgi_gltf_scene *x, vg_err *e)
 {
     const vgi_json *list = vgi_json_get(x->g.json, "animations");
@@ -241,9 +241,9 @@ int vgi_gltf_read_animations(vgi_gltf_scene *x, vg_err *e)
     return r == VG_OK && x->wanted && !x->nclips ? no_such_animation(x, list, e) : r;
 }
 
-/* ---- a channel at a time ---- */
+/* ---- ---- evaluation of a channel ---- */
 
-/* Number k of key `key`: its value, or the tangent in front of it or behind it (which 0, 2) of a spline. */
+/* Number k of key `key`: its value, or its in-tangent or out-tangent (which 0, 2) for a spline. */
 static void key_value(const vgi_gltf_channel *c, size_t key, size_t which, double *to)
 {
     const size_t at = c->cubic ? 3 * key + which : key;
@@ -275,7 +275,7 @@ static size_t last_key_before(const vgi_accessor *in, double t)
     return low;
 }
 
-/* work: room for 4 * width numbers. */
+/* work: workspace of 4 * width numbers. */
 static void sample(const vgi_gltf_channel *c, double t, double *to, double *work)
 {
     const size_t key = last_key_before(&c->in, t), n = c->width;

@@ -1,6 +1,5 @@
-/* gltf_faces.c: faces of any size as the triangles and lines of glTF, so that our own reader can put them together
- * again.
- * Leaves out vertices, and where the indices go in a file (gltf_write.c).
+/* gltf_faces.c: faces of any size as the triangles and lines of glTF, in an order from which our own reader can
+ * restore them. Vertices, and the place of the indices in the file, are in gltf_write.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
 #include "io/polygon.h"
@@ -39,11 +38,10 @@ static size_t find_ear(const shaping *x, const uint32_t *ring, size_t n, const d
 {
     for (size_t b = 1; b < n; b++)
         if (vgi_is_ear(x->reference, ring, n, b, normal)) return b;
-    return vgi_is_ear(x->reference, ring, n, 0, normal) ? 0 : 1; /* it touches or crosses itself: any will do */
+    return vgi_is_ear(x->reference, ring, n, 0, normal) ? 0 : 1; /* the polygon touches or crosses itself: take any */
 }
 
-/* The triangle with the face's first corner goes first and begins with it,
- * so that the face can be put together again. */
+/* The triangle with the face's first corner comes first and begins with it, so that the face can be restored. */
 static void begin_with(unsigned char *triangles, size_t n, uint32_t v)
 {
     for (size_t i = 0; i < 3 * n; i++) {
@@ -98,7 +96,7 @@ static int add_run(vgi_gltf_shape *s, const char *material, vg_err *e)
     return r;
 }
 
-/* With face f another material may begin; *label: the next label. */
+/* Update the material at face f; *label: the next label. */
 static int take_material(const shaping *x, size_t f, size_t *label, vg_err *e)
 {
     vgi_gltf_shape *s = x->to;

@@ -1,9 +1,9 @@
-/* gltf_library.c: the materials of a mesh that says only their names, as OBJ does: their looks come from a library, which is an asset
- * without meshes (mtl.c), or else they are plain.
+/* gltf_library.c: materials of a mesh that contains only their names, such as OBJ. They come from a library, which is
+ * an asset without meshes (mtl.c); otherwise default materials are written.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
 
-/* An asset without meshes that belongs to the mesh. One that cannot be read is none. */
+/* Open an asset without meshes that belongs to the mesh. An unreadable one counts as none. */
 static int open_library(vgi_gltf_writing *w, vg_err *e)
 {
     const vg_body *b = &w->h->body;
@@ -40,7 +40,7 @@ int vgi_gltf_describe_library(vgi_gltf_writing *w, vg_err *e)
     return vgi_gltf_say_elements(w->library.json, "bufferViews", &w->views, &w->nviews, e);
 }
 
-/* The library's material of this name; NULL: it has none. */
+/* The library's material with this name, or NULL. */
 static const vgi_json *look_up(const vgi_gltf_writing *w, const char *name)
 {
     const vgi_json *all = vgi_json_get(w->library.json, "materials");

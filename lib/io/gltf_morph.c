@@ -1,8 +1,8 @@
-/* gltf_morph.c: frames as morph targets of glTF, and an animation of their weights that plays them; or shapes without one.
- * Leaves out the rest of the file (gltf_write.c), and how few targets serve many frames (gltf_basis.c).
+/* gltf_morph.c: frames as morph targets of glTF, with an animation of their weights; or shapes without an animation.
+ * The rest of the file is in gltf_write.c; gltf_basis.c finds few targets for many frames.
  *
- * The frames wait as displacements from the reference pose. Up to 100 of them are targets as they are, so that shapes stay
- * what they were; more are met by a basis.
+ * Frames are stored as displacements from the reference pose. Up to 100 of them become targets unchanged; more are
+ * represented by a basis.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_basis.h"
 #include "io/gltf_write.h"
@@ -13,10 +13,10 @@
 
 enum { USUAL_TARGETS = 100, USUAL_PER_MILLE = 1, SPARSE_WORDS = 160 }; /* SPARSE_WORDS: bytes of JSON for a sparse one */
 
-/* Positions or normals of a target, of one list of vertices, as they lie in the file. */
+/* Layout in the file of the positions or normals of a target, for one list of vertices. */
 typedef struct lying {
-    size_t moved;      /* vertices that it moves */
-    bool sparse;       /* only these are there */
+    size_t moved;      /* number of vertices that it moves */
+    bool sparse;       /* only these are stored */
     double bounds[6];
     size_t accessor;
 } lying;
@@ -27,18 +27,18 @@ typedef struct morphs {
     size_t most;
     double tolerance;      /* in D */
     bool asked, shapes;    /* asked: for a tolerance */
-    unsigned char *packed; /* a frame as it waits */
-    float *first;          /* a frame at work */
-    /* at the end: */
-    size_t *chosen, targets; /* chosen: the frames that are targets; NULL: the targets are those of the basis */
+    unsigned char *packed; /* a frame in stored form */
+    float *first;          /* workspace of one frame */
+    /* known at the end: */
+    size_t *chosen, targets; /* chosen: the frames that become targets; NULL: the targets are a basis */
     vgi_gltf_basis basis;
     size_t n, nlists;      /* vertices of the file */
     vgi_gltf_list *lists;
     bool based;            /* the base is that of the character's file */
     const float *base[SORTS];
-    float *file[SORTS];    /* of a target: of all vertices of the file */
+    float *file[SORTS];    /* of one target, over all vertices of the file */
     double *world;         /* a pose of the mesh */
-    float *turned;         /* of a basis, the normals of all targets */
+    float *turned;         /* for a basis, the normals of all targets */
     lying *at;             /* targets x nlists x SORTS */
     size_t weights;        /* number of their accessor */
 } morphs;
@@ -63,7 +63,7 @@ static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
     bool moves = false;
     for (size_t i = 0; i < n; i++) {
         float d = (float)(f->values[i] - w->base[i]);
-        if ((float)f->values[i] == w->base[i]) d = 0; /* no nearer with what binary32 has lost */
+        if ((float)f->values[i] == w->base[i]) d = 0; /* binary32 cannot be nearer */
         if (!isfinite(d)) return vg_fail(e, VG_EINPUT, "a position is too large for binary32");
         vgi_gltf_put_single(x->packed + VGI_GLTF_ITEM * i, d);
         moves |= d != 0;
@@ -72,7 +72,7 @@ static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
     return vgi_output_put(&w->spool, x->packed, VGI_GLTF_ITEM * n, e);
 }
 
-/* ---- which frames become targets ---- */
+/* ---- ---- choice of target frames ---- */
 
 static int load(const vgi_gltf_writing *w, size_t frame, float *to, vg_err *e)
 {
@@ -95,7 +95,7 @@ static bool moves_nothing(const float *d, size_t n)
     return true;
 }
 
-/* Every frame; of shapes not the first one when it is the base itself. */
+/* Every frame; for shapes, without the first one if it equals the base. */
 static int take_frames(vgi_gltf_writing *w, vg_err *e)
 {
     morphs *x = w->own;
@@ -162,7 +162,7 @@ static int list_vertices(vgi_gltf_writing *w, vg_err *e)
     return r == VG_OK && (x->packed = vgi_array_raw(x->n > nv ? x->n : nv, VGI_GLTF_POINT, e)) ? VG_OK : VG_ENOMEM;
 }
 
-/* The pose of displacements, as a whole. */
+/* The whole pose of some displacements. */
 static void find_world(const vgi_gltf_writing *w, const float *moved)
 {
     const morphs *x = w->own;
@@ -206,9 +206,9 @@ static void spread_basis(vgi_gltf_writing *w, size_t t)
     if (x->file[NORMALS]) memcpy(x->file[NORMALS], x->turned + t * 3 * x->n, VGI_GLTF_POINT * x->n);
 }
 
-/* ---- normals of a basis: those that, mixed as the positions are, come nearest to the normals of all frames ---- */
+/* ---- ---- normals of a basis: those whose mixture with the weights of the positions is nearest to the normals of all frames ---- ---- */
 
-/* solved: targets x frames, the least squares of anything that is mixed so. */
+/* solved: targets x frames: weights of the least-squares solution. */
 static int solve_weights(const morphs *x, size_t frames, double **solved, vg_err *e)
 {
     const size_t n = x->targets;
@@ -252,7 +252,7 @@ static int turn_basis(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-/* Of all vertices of the file. */
+/* For all vertices of the file. */
 static int load_target(vgi_gltf_writing *w, size_t t, vg_err *e)
 {
     morphs *x = w->own;
@@ -265,7 +265,7 @@ static int load_target(vgi_gltf_writing *w, size_t t, vg_err *e)
     return VG_OK;
 }
 
-/* ---- how targets lie in the file ---- */
+/* ---- ---- layout of targets in the file ---- */
 
 static lying *lying_of(const morphs *x, size_t t, size_t l, int sort)
 {
@@ -287,7 +287,7 @@ static size_t index_bytes(const vgi_gltf_list *list)
     return list->count <= 65536 ? 2 : 4;
 }
 
-/* Of the indices of n vertices, filled up to whole numbers of 4. */
+/* Size of the indices of n vertices, padded to a multiple of 4. */
 static size_t indices_size(const vgi_gltf_list *list, size_t n)
 {
     return (n * index_bytes(list) + 3) / 4 * 4;
@@ -297,7 +297,7 @@ static void look_at(lying *l, const vgi_gltf_list *list, const float *d)
 {
     const size_t n = list->count;
     for (size_t v = 0; v < n; v++) l->moved += moves(d, v);
-    if (!l->moved) l->moved = 1; /* there must be one: the first vertex */
+    if (!l->moved) l->moved = 1; /* at least one is required: the first vertex */
     l->sparse = indices_size(list, l->moved) + VGI_GLTF_POINT * l->moved + SPARSE_WORDS < VGI_GLTF_POINT * n;
     vgi_gltf_bounds(d, n, l->bounds);
 }
@@ -315,7 +315,7 @@ static int look_at_targets(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-/* ---- what is said ---- */
+/* ---- ---- JSON ---- */
 
 static int say_sparse(vgi_gltf_writing *w, const vgi_gltf_list *list, const lying *l, size_t view, size_t indices,
                       size_t values, vg_err *e)
@@ -332,7 +332,7 @@ static int say_sparse(vgi_gltf_writing *w, const vgi_gltf_list *list, const lyin
     return r;
 }
 
-/* Where the next accessors begin, in the views of points, of indices and of values. */
+/* Start of the next accessors in the views of points, of indices and of values. */
 typedef struct places {
     size_t view, points, indices, values;
 } places;
@@ -390,7 +390,7 @@ static size_t whole_bytes(const morphs *x)
     return bytes;
 }
 
-/* The base and the targets that are there whole are one view; indices and values of the others two more. */
+/* The base and the complete targets are one view; indices and values of the sparse ones two more. */
 static int describe_points(vgi_gltf_writing *w, vg_err *e)
 {
     morphs *x = w->own;
@@ -437,7 +437,7 @@ static int say_primitives(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-/* Frames that are targets have names; what a basis is made of has numbers. */
+/* Targets that are frames have names; those of a basis have numbers. */
 static int name_targets(const vgi_gltf_writing *w, vgi_json **names, vg_err *e)
 {
     const morphs *x = w->own;
@@ -477,7 +477,7 @@ static int say_mesh(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_gltf_say(&w->json, e, "]}}]");
 }
 
-/* All meshes of a character move by the same weights. */
+/* All meshes of a character use the same weights. */
 static int say_channels(vgi_gltf_writing *w, vg_err *e)
 {
     static const char channel[] = "%s{\"sampler\":0,\"target\":{\"node\":%zu,\"path\":\"weights\"}}";
@@ -626,7 +626,7 @@ static int emit_base(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-/* First those that are whole, then the indices of the others, then their values. */
+/* First the complete ones, then the indices of the sparse ones, then their values. */
 static int emit(vgi_gltf_writing *w, vg_err *e)
 {
     const morphs *x = w->own;

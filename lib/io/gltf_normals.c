@@ -1,6 +1,6 @@
-/* gltf_normals.c: normals of a mesh that has none, for glTF, whose viewers would show it faceted: those of the faces around
- * a vertex, weighted by their angles there, where the faces are one smooth surface.
- * Leaves out the normals of a character, which its artist has made (gltf_character.c).
+/* gltf_normals.c: normals for a mesh without any, because glTF viewers would show it faceted: the mean of the faces
+ * around a vertex, weighted by their angles there, within a smooth surface. The normals of a character, made by its
+ * artist, are in gltf_character.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_normals.h"
 #include "numeric/vec3.h"
@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double least_cosine = 0.5; /* of the angle at which faces are still one surface: 60 degrees */
+static const double least_cosine = 0.5; /* cosine of the largest angle, 60 degrees, at which faces form one surface */
 
 static size_t face_size(const vg_mesh *m, size_t f)
 {
@@ -21,7 +21,7 @@ static void unit(double p[3])
     for (int k = 0; k < 3; k++) p[k] = l > 0 ? p[k] / l : 0;
 }
 
-/* The unit normal of a face that may be bent; zero: it has no area. */
+/* The unit normal of a possibly bent face; zero if it has no area. */
 static void face_normal(const vg_mesh *m, size_t f, const double *pose, double n[3])
 {
     const uint32_t *v = m->vert + m->start[f];
@@ -36,7 +36,7 @@ static void face_normal(const vg_mesh *m, size_t f, const double *pose, double n
     unit(n);
 }
 
-/* ---- which corners are one surface ---- */
+/* ---- ---- smooth surfaces ---- */
 
 /* An edge of a face: from corner c to the next one of its face, between the vertices low < high. */
 typedef struct side {
@@ -73,7 +73,7 @@ static uint32_t find_root(uint32_t *parent, uint32_t c)
     return c;
 }
 
-/* The smaller number stays, so that groups do not depend on the order of edges. */
+/* The smaller number is kept, so that groups do not depend on the order of edges. */
 static void unite(uint32_t *parent, uint32_t c, uint32_t d)
 {
     c = find_root(parent, c), d = find_root(parent, d);
@@ -81,7 +81,7 @@ static void unite(uint32_t *parent, uint32_t c, uint32_t d)
     else parent[c] = d;
 }
 
-/* Of each face its smoothing: SMOOTH_BY_ANGLE without any label, 0: flat, else a number that neighbours must share. */
+/* Smoothing of each face: SMOOTH_BY_ANGLE without labels; 0: flat; otherwise a number that neighbours must share. */
 enum { SMOOTH_BY_ANGLE = -1 };
 
 static void read_smoothing(const vg_mesh *m, const vg_attributes *a, int64_t *of)
@@ -90,7 +90,7 @@ static void read_smoothing(const vg_mesh *m, const vg_attributes *a, int64_t *of
     int64_t now = SMOOTH_BY_ANGLE;
     for (size_t f = 0; f < m->nf; f++) {
         for (; a && next < a->nlabels && a->labels[next].face <= f; next++)
-            if (a->labels[next].kind == VG_LABEL_SMOOTHING) now = labs(strtol(a->labels[next].text, NULL, 10)); /* "off": 0 */
+            if (a->labels[next].kind == VG_LABEL_SMOOTHING) now = labs(strtol(a->labels[next].text, NULL, 10)); /* "off" gives 0 */
         of[f] = now;
     }
 }
@@ -192,7 +192,7 @@ static void sum_normals(vgi_gltf_normals *x, const double *pose)
     for (size_t g = 0; g < x->ngroups; g++) unit(x->sum + 3 * g);
 }
 
-/* Without area, and in no face: any unit vector, since glTF has no other. */
+/* Vertices without area or faces: any unit vector, because glTF requires one. */
 static void base_of(const vgi_gltf_normals *x, size_t v, float to[3])
 {
     static const double up[3] = {0, 0, 1};

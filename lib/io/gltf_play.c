@@ -1,6 +1,5 @@
-/* gltf_play.c: a scene of glTF as frames: its animations, or each morph target by itself, with nodes and skins where they
- * take the vertices.
- * Leaves out what the scene shows (gltf_scene.c) and what animations say (gltf_clips.c).
+/* gltf_play.c: evaluates a glTF scene as frames: its animations, or each morph target separately, with nodes and
+ * skins applied. The scene's contents are in gltf_scene.c, animations in gltf_clips.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_scene.h"
 
@@ -10,7 +9,7 @@
 
 static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-/* to = a b; to may be neither. */
+/* to = a b; `to` must differ from both. */
 static void multiply(const double a[12], const double b[12], double to[12])
 {
     for (int i = 0; i < 3; i++)
@@ -54,7 +53,7 @@ static void place_joints(vgi_gltf_scene *x)
 
 /* ---- frames ---- */
 
-/* Nodes as the file has them. morphed: morph targets too, else there are none. */
+/* Reset nodes to the file's values. morphed: keep the file's morph weights, otherwise use none. */
 static void rest(vgi_gltf_scene *x, bool morphed)
 {
     for (size_t i = 0; i < x->nnodes; i++) {
@@ -64,7 +63,7 @@ static void rest(vgi_gltf_scene *x, bool morphed)
     }
 }
 
-/* The position of vertex v under its joints; false: it has no joint of any weight. */
+/* The position of vertex v under its joints; false if no joint has a weight. */
 static bool bend(const vgi_gltf_scene *x, const vgi_gltf_part *p, size_t v, const double at[3], double to[3])
 {
     const vgi_gltf_skin *k = &x->skins[p->skin];
@@ -157,7 +156,7 @@ static int begin_moment(vgi_gltf_scene *x, size_t i, vg_frame *f, vg_err *e)
     const vgi_gltf_moment *m = &x->moments[i];
     const vgi_gltf_clip *c = &x->clips[m->clip];
     const char *name = vgi_json_text(vgi_json_at(c->names, i - c->frames));
-    f->has_time = x->nclips == 1 || c->name; /* names tell animations apart, each with times of its own */
+    f->has_time = x->nclips == 1 || c->name; /* names distinguish animations, each with its own times */
     f->time = f->has_time ? m->time : 0;
     int r = vgi_gltf_animate(x, m, e);
     if (r == VG_OK && name) return vg_frame_rename(f, name, e);
@@ -227,7 +226,7 @@ int vgi_gltf_play(void **state, vg_head *h, vgi_input *in, const vg_reading *how
     if (r == VG_OK) r = vgi_gltf_list_shapes(x, e);
     if (r < 0) return r;
     x->frames = x->nclips ? x->nmoments : x->shapes.names.n ? x->shapes.names.n + 1 : 1;
-    if (!x->strips) vgi_note_dropped(&x->note, x->dropped); /* strips are made of such */
+    if (!x->strips) vgi_note_dropped(&x->note, x->dropped); /* strips contain such triangles */
     vgi_gltf_note_extensions(&x->g, &x->note);
     return take_reference(x, h, e);
 }

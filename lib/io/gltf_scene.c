@@ -1,6 +1,5 @@
-/* gltf_scene.c: what a scene of glTF shows: nodes, skins, and the vertices and faces of its meshes.
- * Leaves out cameras, what materials look like, and normals; welding (gltf_weld.c), and what moves
- * (gltf_clips.c, gltf_play.c).
+/* gltf_scene.c: what a glTF scene shows: nodes, skins, and the vertices and faces of its meshes. Welding is in
+ * gltf_weld.c, motion in gltf_clips.c and gltf_play.c. Cameras, materials and normals are not read.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_scene.h"
 
@@ -29,7 +28,7 @@ void vgi_gltf_from_columns(const double c[16], double m[12])
 
 /* ---- nodes ---- */
 
-/* A list of n numbers that may be missing. */
+/* A list of n numbers that may be absent. */
 static int take_numbers(const vgi_gltf_scene *x, const vgi_json *from, const char *key, size_t n, double *to,
                         vg_err *e)
 {
@@ -89,7 +88,7 @@ static double determinant(const double m[12])
            m[2] * (m[4] * m[9] - m[5] * m[8]);
 }
 
-/* Does it mirror, by itself and with all above it? Rotations do not. */
+/* Whether a node mirrors, by itself and with all above it. Rotations do not. */
 static void find_mirrors(vgi_gltf_scene *x)
 {
     for (size_t i = 0; i < x->nnodes; i++) {
@@ -100,7 +99,7 @@ static void find_mirrors(vgi_gltf_scene *x)
     }
 }
 
-/* What the scene shows; without scenes, everything. */
+/* Mark what the scene shows; without scenes, everything. */
 static int show_nodes(vgi_gltf_scene *x, vg_err *e)
 {
     static const char scenes[] = "scenes";
@@ -138,7 +137,7 @@ static int read_nodes(vgi_gltf_scene *x, vg_err *e)
     return r < 0 ? r : show_nodes(x, e);
 }
 
-/* A node and all above it move a vertex. */
+/* Mark a node and all above it as moving a vertex. */
 static void mark(vgi_gltf_scene *x, size_t i)
 {
     for (; i != SIZE_MAX && !x->nodes[i].matters; i = x->nodes[i].parent) x->nodes[i].matters = true;
@@ -234,9 +233,9 @@ static int read_influences(vgi_gltf_scene *x, vgi_gltf_part *p, vg_err *e)
     return r;
 }
 
-/* Where the instances of a node's mesh are, and whether they mirror it. */
+/* Transforms of the instances of a node's mesh, and whether they mirror it. */
 typedef struct instances {
-    size_t n; /* 0: the node shows its mesh once, as usual */
+    size_t n; /* 0: the node shows its mesh once */
     vgi_accessor translation, rotation, scale;
     bool moved, turned, scaled;
 } instances;
@@ -266,7 +265,8 @@ static int read_instances(vgi_gltf_scene *x, const vgi_json *node, instances *k,
     return VG_OK;
 }
 
-/* Instance number i, from 1, into the place of a part; 0: the mesh itself. Does it mirror? */
+/* Write the transform of instance i (from 1; 0: the mesh itself) to the place of a part. Returns whether it
+ * mirrors. */
 static bool place_instance(const instances *k, size_t i, double place[12])
 {
     vgi_gltf_placed p = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}};
@@ -277,7 +277,7 @@ static bool place_instance(const instances *k, size_t i, double place[12])
     return (p.scale[0] < 0) ^ (p.scale[1] < 0) ^ (p.scale[2] < 0);
 }
 
-/* The first set of texture coordinates. One that is wrong costs nothing but itself. */
+/* The first set of texture coordinates. A malformed set is dropped. */
 static void read_uv(vgi_gltf_scene *x, vgi_gltf_part *p)
 {
     const vgi_json *ref = vgi_json_get(p->attributes, "TEXCOORD_0");
@@ -309,8 +309,8 @@ static int add_part(vgi_gltf_scene *x, size_t at, int64_t skinned, const vgi_jso
     return r < 0 || p->skin == VGI_GLTF_NONE ? r : read_influences(x, p, e);
 }
 
-/* Primitives of a mesh may share their vertices: the part among the last of those from `from` on that has them. What
- * is not found is welded all the same. */
+/* Primitives of a mesh may share their vertices: find the part that has them among the last ones, from `from` on. If
+ * none is found, welding still merges them. */
 static vgi_gltf_part *sharing(const vgi_gltf_scene *x, size_t from, const vgi_json *primitive)
 {
     enum { LOOK_BACK = 64 };
@@ -370,7 +370,7 @@ static int add_faces(const vgi_gltf_scene *x, vgi_gltf_faces *f, size_t n, uint6
     return r;
 }
 
-/* From the next face on it is called so. */
+/* Name for the faces from the next one on. */
 static int add_label(vgi_gltf_scene *x, size_t face, vg_label_kind kind, const char *text, vg_err *e)
 {
     vg_attributes *a = &x->attributes;
@@ -387,7 +387,7 @@ static int add_label(vgi_gltf_scene *x, size_t face, vg_label_kind kind, const c
     return VG_OK;
 }
 
-/* The object is the node, the material that of the primitive, as far as they have names. */
+/* Object: the node; material: that of the primitive; both only if named. */
 static int label_faces(vgi_gltf_scene *x, const vgi_gltf_faces *f, const vgi_gltf_part *p, const vgi_json *primitive,
                        vg_err *e)
 {
@@ -414,7 +414,7 @@ static int read_faces(vgi_gltf_scene *x, vgi_gltf_faces *f, const vgi_gltf_part 
     return r < 0 ? r : add_faces(x, f, indices ? f->index.count : p->count, mode, e);
 }
 
-/* The weights of a node's mesh as long as nothing animates them: the node's own, or else the mesh's. */
+/* Weights of a node's mesh without animation: those of the node, or else of the mesh. */
 static int take_weights(vgi_gltf_scene *x, size_t at, const vgi_json *mesh, vg_err *e)
 {
     vgi_gltf_node *n = &x->nodes[at];
@@ -464,7 +464,7 @@ static int read_mesh(vgi_gltf_scene *x, vgi_gltf_faces *f, size_t at, vg_err *e)
     instances there;
     if (vgi_json_count(primitives) == 0) return vgi_gltf_bad(&x->g, e, "a mesh has no primitives");
     if ((r = read_instances(x, n, &there, e)) < 0) return r;
-    if (k) there.n = 0; /* a skin places the vertices, wherever the node is */
+    if (k) there.n = 0; /* a skin places the vertices independently of the node */
     for (size_t i = there.n ? 1 : 0; i <= there.n && r == VG_OK; i++) {
         double place[12];
         f->turned = (place_instance(&there, i, place) ^ x->nodes[at].mirrors) && !k;

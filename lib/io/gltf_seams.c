@@ -1,6 +1,5 @@
-/* gltf_seams.c: a mesh cut apart at the seams of its texture and at its edges, since a vertex of glTF has one texture
- * coordinate and one normal.
- * Leaves out what the file looks like (gltf_write.c), and the way back (gltf_weld.c).
+/* gltf_seams.c: splits a mesh at the seams of its texture and at its hard edges, because a glTF vertex has one
+ * texture coordinate and one normal. The file is in gltf_write.c, the inverse in gltf_weld.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_seams.h"
 
@@ -8,15 +7,15 @@
 
 enum { UNSET = 0 };
 
-typedef struct look { /* what a vertex of the file has one of; + 1, UNSET: none yet */
+typedef struct look { /* attributes of which a vertex of the file has one; + 1, UNSET: none yet */
     uint32_t tex, group;
 } look;
 
 typedef struct cutting {
     vgi_gltf_seams *to;
     const vg_attributes *a;
-    look *look;     /* of each vertex of the file */
-    uint32_t *next; /* and its next copy; 0: there is none */
+    look *look;     /* per vertex of the file */
+    uint32_t *next; /* its next copy; 0: none */
     size_t from_cap, look_cap, next_cap;
 } cutting;
 
@@ -26,7 +25,7 @@ static bool same_place(const vg_attributes *a, uint32_t s, uint32_t t)
     return s == t || (p[0] == q[0] && p[1] == q[1]);
 }
 
-/* Can a vertex with the look `has` also have `wants`? What is not set takes any. */
+/* Whether a vertex with the attributes `has` can also have `wants`. Unset ones match any. */
 static bool suits(const cutting *k, look has, look wants)
 {
     if (has.group != UNSET && wants.group != UNSET && has.group != wants.group) return false;
@@ -52,7 +51,7 @@ static int add_copy(cutting *k, uint32_t v, look wants, uint32_t *copy, vg_err *
     return VG_OK;
 }
 
-/* The vertex of the file for vertex v of the mesh with this look. */
+/* The file vertex for vertex v of the mesh with these attributes. */
 static int find_vertex(cutting *k, uint32_t v, look wants, uint32_t *to, vg_err *e)
 {
     *to = v;

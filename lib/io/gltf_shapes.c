@@ -1,6 +1,5 @@
-/* gltf_shapes.c: the morph targets of several meshes as shapes of the whole: head, teeth and body of one character have
- * different lists, and a target of each belongs to those of the same name in the others.
- * Leaves out what targets do to vertices (gltf_play.c).
+/* gltf_shapes.c: combines the morph targets of several meshes into shapes of the whole: head, teeth and body of a
+ * character have different lists, and targets with the same name belong together. Targets are applied in gltf_play.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_scene.h"
 
@@ -16,7 +15,7 @@ static const vgi_json *names_of(const vgi_json *mesh)
     return vgi_json_count(names) ? names : NULL;
 }
 
-/* The place of a name, or of number `number` of those called so in one mesh. */
+/* The index of a name, or of occurrence `number` of a name that one mesh uses repeatedly. */
 static int find_shape(vgi_gltf_scene *x, const char *name, size_t number, size_t *shape, vg_err *e)
 {
     char head[32] = "";
@@ -29,7 +28,7 @@ static int find_shape(vgi_gltf_scene *x, const char *name, size_t number, size_t
     return r;
 }
 
-/* Of each shape: the node that last gave it a target, + 1, and how many times. */
+/* Per shape: the last node that gave it a target, + 1, and how many times. */
 typedef struct use {
     size_t node, times;
 } use;
@@ -49,7 +48,7 @@ static int name_targets(vgi_gltf_scene *x, vgi_gltf_node *n, const vgi_json *nam
     return r;
 }
 
-/* Without names the number says which shape it is, among those there are or behind them. */
+/* Without names the number identifies the shape, or appends a new one. */
 static int number_targets(vgi_gltf_scene *x, vgi_gltf_node *n, vg_err *e)
 {
     int r = VG_OK;

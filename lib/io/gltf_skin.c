@@ -1,11 +1,10 @@
-/* gltf_skin.c: transforms of the bones of a rig as a skin of glTF: nodes for the joints, weights, and an animation
- * that turns them.
- * Leaves out the rest of the file (gltf_write.c).
+/* gltf_skin.c: bone transforms of a rig as a glTF skin: nodes for the joints, weights, and an animation. The rest of
+ * the file is in gltf_write.c.
  *
- * At rest a node only stands where the rig has its joint: the global transform of a joint that its bone's
- * transform T moves is T after that translation, and what a node says is beside its parent. All are similarities, so
- * that nothing is lost. A frame waits as a quaternion x y z w, a translation and a scale for each joint, all
- * binary32.
+ * At rest a node is a pure translation to its joint in the rig. If the transform T of a bone moves a joint, the
+ * global transform of its node is T after that translation; the file stores it relative to the parent. All are
+ * similarities, so nothing is lost. A frame is stored as a quaternion x y z w, a translation and a scale for each
+ * joint, all binary32.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
 
@@ -14,15 +13,15 @@
 
 enum { TURN = 0, PLACE = 4, SIZE = 7, LOCAL = 8, NOTHING = UINT32_MAX };
 
-/* Joints that are nearer to where they stand than this part of the skeleton's size do not move, and scales this near
- * to 1 are 1: as near as transforms of binary32 come. */
+/* A joint that moves by less than this fraction of the skeleton's size does not move, and a scale this close to 1 is
+ * 1: the precision of binary32 transforms. */
 static const double still = 1e-6;
 
 /* Frames arrive one after another and channels are written one after another: this many bytes are transposed at a time.
  */
 static const size_t sorting_bytes = (size_t)16 << 20;
 
-/* What an animation has of a joint in each frame: `width` numbers; a scale is the same in all directions. */
+/* A property of a joint that an animation has in each frame: `width` numbers; scales are uniform. */
 typedef struct channel {
     size_t joint, from, width;
     const char *path;
@@ -30,20 +29,22 @@ typedef struct channel {
 
 typedef struct skinning {
     uint32_t *child,
-        *next;        /* of each joint its first child, and its parent's next one; child[njoints]: the first root */
-    uint32_t *bone;   /* which transform moves each joint; NOTHING: none */
-    double *rest;     /* a point each, beside the parent's, such that they add up to those of the rig in binary32 */
+        *next;        /* per joint its first child, and its parent's next child; child[njoints]: the first root */
+    uint32_t *bone;   /* the transform that moves each joint; NOTHING: none */
+    double *rest;     /* a point per joint, relative to the parent's, such that their binary32 sums are the joints of
+                         the rig */
     double *at;       /* the sums */
-    double *now;      /* 8 each: quaternion w x y z, place, scale: in the world */
-    float *local;     /* LOCAL each, beside the parent */
-    float *before;    /* the quaternions of the frame before */
+    double *now;      /* 8 each: quaternion w x y z, position, scale: in the world */
+    float *local;     /* LOCAL each, relative to the parent */
+    float *before;    /* the quaternions of the previous frame */
     double size;
     bool *moves, *grows;
     unsigned char *packed;
-    size_t joint_bytes;   /* of a number in JOINTS_0 */
+    size_t joint_bytes;   /* size of a number in JOINTS_0 */
     channel *channels;
     size_t nchannels;
-    size_t points, normals, joints, weights, inverse, outputs; /* numbers of accessors; outputs: of the first channel */
+    size_t points, normals, joints, weights, inverse, outputs; /* numbers of accessors; outputs: of the first
+                                                                  channel */
 } skinning;
 
 static size_t joints_of(const vgi_gltf_writing *w)
@@ -130,7 +131,7 @@ static int begin(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
 
 /* ---- a frame ---- */
 
-/* Where the joint is in the world: a unit quaternion, a place, a scale. */
+/* Transform of the joint in the world: a unit quaternion, a position, a scale. */
 static int place_joint(const skinning *x, size_t j, const double *transforms, vg_err *e)
 {
     double *now = x->now + LOCAL * j;
@@ -149,7 +150,7 @@ static int place_joint(const skinning *x, size_t j, const double *transforms, vg
     return VG_OK;
 }
 
-/* The same beside its parent. */
+/* The same relative to its parent. */
 static void place_locally(const skinning *x, size_t j, uint32_t parent, float local[LOCAL])
 {
     static const double world[LOCAL] = {1, 0, 0, 0, 0, 0, 0, 1};
@@ -164,7 +165,7 @@ static void place_locally(const skinning *x, size_t j, uint32_t parent, float lo
     local[SIZE] = (float)(now[SIZE] / p[SIZE]);
 }
 
-/* Of a quaternion and its negative, the one that is nearer to that of the frame before. */
+/* Choose the sign of a quaternion that is nearer to the previous frame's. */
 static void go_on(float now[4], float before[4])
 {
     float cosine = now[0] * before[0] + now[1] * before[1] + now[2] * before[2] + now[3] * before[3];
@@ -196,7 +197,7 @@ static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
     return vgi_output_put(&w->spool, x->packed, VGI_GLTF_ITEM * LOCAL * n, e);
 }
 
-/* ---- what is said ---- */
+/* ---- ---- JSON ---- */
 
 static int describe_points(vgi_gltf_writing *w, vg_err *e)
 {
@@ -256,7 +257,7 @@ static int describe_channels(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-/* Node 0 is the mesh, node j + 1 joint j; where there are several roots, the last node is above them. */
+/* Node 0 is the mesh, node j + 1 joint j; with several roots, the last node is their parent. */
 static int say_children(vgi_gltf_writing *w, uint32_t first, vg_err *e)
 {
     const skinning *x = w->own;
@@ -359,7 +360,7 @@ static int describe(vgi_gltf_writing *w, vg_err *e)
 
 /* ---- bytes ---- */
 
-/* The bones of a vertex, each once, and weights whose sum is 1 in binary32; those without weight are bone 0. */
+/* The bones of a vertex, each once, and weights whose sum is 1 in binary32; entries without weight are bone 0. */
 static void influences(const vg_rig *rig, size_t v, uint32_t bone[VG_SKIN], float weight[VG_SKIN])
 {
     const uint32_t *from = rig->skin_bone + VG_SKIN * v;
@@ -377,7 +378,7 @@ static void influences(const vg_rig *rig, size_t v, uint32_t bone[VG_SKIN], floa
     }
 }
 
-/* The vertex of the mesh that vertex v of the file is. */
+/* The vertex of the mesh for vertex v of the file. */
 static size_t vertex_of(const vgi_gltf_writing *w, size_t v)
 {
     return w->seams.from ? w->seams.from[v] : v;
@@ -417,8 +418,7 @@ static int emit_inverse(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-/* Numbers of n channels from first on, of all frames: 4 numbers of a frame for each,
- * the frames of a channel together. */
+/* Numbers of n channels from `first` on, over all frames: 4 numbers per channel and frame, grouped by channel. */
 static int sort_channels(vgi_gltf_writing *w, size_t first, size_t n, float *to, vg_err *e)
 {
     skinning *x = w->own;

@@ -1,5 +1,5 @@
-/* gltf_takes.c: which frames of a sequence are one animation of glTF, what it is called, and when they are.
- * Frames "Walk.0001", "Walk.0002", "Run.0001", "Run.0002" are two, as the reader calls the frames of two animations.
+/* gltf_takes.c: divides the frames of a sequence into glTF animations, with names and times. Frames "Walk.0001",
+ * "Walk.0002", "Run.0001", "Run.0002" are two animations, matching the names that the reader gives.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
 
@@ -13,14 +13,14 @@ static bool same_stem(const char *a, const char *b, size_t n)
     return n && vg_frame_stem(a, &number) == n && vg_frame_stem(b, &number) == n && !memcmp(a, b, n);
 }
 
-/* Does frame i begin an animation, by its name? Numbers count from 1. */
+/* Whether frame i starts an animation, by its name. Numbers count from 1. */
 static bool begins(const vgi_gltf_writing *w, size_t i)
 {
     uint64_t number;
     return i == 0 || (vg_frame_stem(w->names.at[i], &number) && number == 1);
 }
 
-/* Do the names number the frames of each animation from 1 without gaps, with more than one frame each? */
+/* Whether the names number the frames of each animation from 1 without gaps, with more than one frame each. */
 static bool are_counted(const vgi_gltf_writing *w)
 {
     for (size_t i = 0, first = 0; i < w->frames; i++) {
@@ -36,7 +36,7 @@ static bool are_counted(const vgi_gltf_writing *w)
     return true;
 }
 
-/* Times of an animation begin at 0 or later and ascend, in binary32. */
+/* Whether the times of an animation begin at 0 or later and ascend in binary32. */
 static bool times_fit(const vgi_gltf_writing *w, const vgi_gltf_take *t)
 {
     for (size_t i = t->first; i < t->first + t->count; i++) {
@@ -72,7 +72,7 @@ int vgi_gltf_find_takes(vgi_gltf_writing *w, bool split, vg_err *e)
     return VG_OK;
 }
 
-/* ---- what is written ---- */
+/* ---- ---- JSON ---- */
 
 static double time_of(const vgi_gltf_writing *w, const vgi_gltf_take *t, size_t i)
 {
@@ -102,7 +102,7 @@ int vgi_gltf_emit_times(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-/* The name given by the caller, or the stem of the frame names, or "sequence". */
+/* The name given by the caller, or the prefix of the frame names, or "sequence". */
 int vgi_gltf_say_take_name(vgi_gltf_writing *w, const vgi_gltf_take *t, vg_err *e)
 {
     if (w->clip) return vgi_gltf_say_text(&w->json, w->clip, e);

@@ -1,6 +1,5 @@
-/* gltf_unpack.c: compressed glTF (KHR_draco_mesh_compression, EXT_meshopt_compression) as a glTF that is not: what was
- * compressed becomes further buffers, and the JSON refers to them as if they had been in the file.
- * Leaves out the codecs (codecs.h).
+/* gltf_unpack.c: converts compressed glTF (KHR_draco_mesh_compression, EXT_meshopt_compression) to plain glTF:
+ * decompressed data becomes additional buffers, to which the JSON then refers. The codecs are in codecs.h.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/codecs.h"
 #include "io/gltf.h"
@@ -10,8 +9,8 @@
 static const char draco[] = "KHR_draco_mesh_compression";
 static const char *const meshopt[] = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
 
-/* How many times its own size compressed data of meshopt can become: a byte of 256 elements takes at least 4. And all
- * that is compressed, so that a small file cannot fill a machine by naming its data often. */
+/* Largest expansion of meshopt data: a byte for 256 elements takes at least 4. And of all compressed data together,
+ * so that a small file cannot fill the memory by naming its data often. */
 enum { MOST_RATIO = 64, MOST_RATIO_OF_ALL = 1024, LEAST_DATA = 1024 };
 
 static int failed(const vgi_gltf *g, int r, const char *codec, const char *extension, vg_err *e)
@@ -32,7 +31,7 @@ static int whole(const vgi_gltf *g, const vgi_json *from, const char *key, size_
     return VG_OK;
 }
 
-/* May so much more be unpacked? */
+/* Whether that much more may be unpacked. */
 static bool is_plausible(const vgi_gltf *g, size_t more)
 {
     size_t given = 0, made = more;
@@ -40,7 +39,7 @@ static bool is_plausible(const vgi_gltf *g, size_t more)
     return made / MOST_RATIO_OF_ALL <= given + LEAST_DATA;
 }
 
-/* Append a buffer, which takes `own` over, also on failure. */
+/* Append a buffer, which takes ownership of `own`, also on failure. */
 static int add_buffer(vgi_gltf *g, vg_bytes *own, size_t *number, vg_err *e)
 {
     if (!is_plausible(g, own->size)) {
@@ -61,7 +60,7 @@ static int add_buffer(vgi_gltf *g, vg_bytes *own, size_t *number, vg_err *e)
 
 /* ---- meshopt: buffer views ---- */
 
-/* The extension of a buffer view, or of a buffer; NULL: it has none. */
+/* The extension of a buffer view or buffer; NULL if absent. */
 static const vgi_json *meshopt_of(const vgi_json *item, const char **name)
 {
     const vgi_json *all = vgi_json_get(item, "extensions");
@@ -146,7 +145,7 @@ static vgi_json *accessor_of(const vgi_gltf *g, const vgi_json *ref)
     return vgi_json_is_object(a) ? a : NULL;
 }
 
-/* The accessor has these bytes now, which are taken over. */
+/* Give the accessor these bytes; takes ownership. */
 static int put_bytes(vgi_gltf *g, vgi_json *accessor, vg_bytes *bytes, vg_err *e)
 {
     vgi_json *views = vgi_json_inner(g->json, "bufferViews"), *view = vgi_json_object(e);
@@ -216,7 +215,7 @@ static int unpack_mesh(vgi_gltf *g, const vgi_draco *m, const vgi_json *primitiv
     return r;
 }
 
-/* Can the primitive be read without the extension? */
+/* Whether the primitive can be read without the extension. */
 static bool has_fallback(const vgi_gltf *g, const vgi_json *primitive)
 {
     const vgi_json *a = accessor_of(g, vgi_json_get(vgi_json_get(primitive, "attributes"), "POSITION"));
@@ -261,7 +260,7 @@ static bool is_codec(const char *name)
     return name && (!strcmp(name, draco) || !strcmp(name, meshopt[0]) || !strcmp(name, meshopt[1]));
 }
 
-/* The file does not use them any more. */
+/* Remove the extensions from the lists of the file. */
 static int forget_codecs(vgi_gltf *g, const char *key, vg_err *e)
 {
     const vgi_json *names = vgi_json_get(g->json, key);

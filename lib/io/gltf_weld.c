@@ -1,6 +1,5 @@
-/* gltf_weld.c: a mesh of glTF as it was before it was exported: triangles of our own files become the polygons
- * that they were, and vertices that were cut apart become one.
- * Leaves out where vertices and faces come from (gltf_scene.c).
+/* gltf_weld.c: restores a glTF mesh as it was before export: triangles of our own files become polygons, and split
+ * vertices are merged. Vertices and faces come from gltf_scene.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_scene.h"
 #include "io/polygon.h"
@@ -11,7 +10,7 @@
 
 typedef struct restoring {
     const vg_mesh *from;
-    size_t triangle, line; /* the faces of three and two that come next */
+    size_t triangle, line; /* the next faces with three and two corners */
     vg_mesh to;
     size_t start_cap, vert_cap;
     uint32_t edge[3 * VGI_MOST_CLIPPED][2];
@@ -30,7 +29,7 @@ static bool is_inner(const restoring *k, size_t n, size_t edge)
     return false;
 }
 
-/* Once around the triangles, along edges that belong to one of them only. */
+/* Walk once around the triangles, along edges that belong to only one of them. */
 static bool walk_around(const restoring *k, size_t n, uint32_t *face)
 {
     const size_t edges = 3 * (n - 2);
@@ -46,7 +45,7 @@ static bool walk_around(const restoring *k, size_t n, uint32_t *face)
     return v == face[0];
 }
 
-/* One face of n corners from the n - 2 triangles that come next; false: they are not one. */
+/* One face of n corners from the next n - 2 triangles; false if they do not form one. */
 static bool take_polygon(restoring *k, size_t n, uint32_t *face)
 {
     bool fan = true;
@@ -63,7 +62,7 @@ static bool take_polygon(restoring *k, size_t n, uint32_t *face)
     return fan || walk_around(k, n, face);
 }
 
-/* 1: done; 0: it cannot be. The arrays never grow beyond what the triangles fill. */
+/* 1: done; 0: impossible. The arrays never grow beyond what the triangles fill. */
 static int take_face(restoring *k, size_t n, vg_err *e)
 {
     vg_mesh *m = &k->to;
@@ -97,7 +96,7 @@ static int take_runs(restoring *k, const vgi_json *runs, vg_err *e)
     return r;
 }
 
-/* If the extras of the only mesh tell of polygons, and its triangles agree, they become polygons again. */
+/* If the extras of the only mesh describe polygons, and its triangles agree, restore them. */
 static int restore_polygons(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e)
 {
     const vgi_json *mesh, *runs;
@@ -120,12 +119,12 @@ static int restore_polygons(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e)
     return r < 0 ? r : VG_OK;
 }
 
-/* ---- welding: exporters cut a mesh where normals or texture coordinates jump ---- */
+/* ---- ---- welding: exporters split a mesh where normals or texture coordinates are discontinuous ---- ---- */
 
 typedef struct welding {
     const vgi_gltf_scene *x;
     uint32_t *slots;  /* positions among all vertices, + 1; 0: free */
-    uint32_t *number; /* which vertex of the mesh each becomes; the scene's */
+    uint32_t *number; /* the vertex of the mesh for each; owned by the scene */
     size_t nslots;
 } welding;
 
@@ -177,7 +176,7 @@ static bool same_element(const vgi_accessor *a, size_t i, const vgi_accessor *b,
     return true;
 }
 
-/* Do they stay together whatever moves? */
+/* Whether they stay together in any motion. */
 static bool are_one(const vgi_gltf_part *p, size_t v, const vgi_gltf_part *q, size_t w)
 {
     if (p->node != q->node || p->instance != q->instance || p->nsets != q->nsets || p->ntargets != q->ntargets) return false;
@@ -201,8 +200,8 @@ static uint32_t *find_slot(const welding *k, const vgi_gltf_part *p, size_t v)
     return &k->slots[i];
 }
 
-/* Copies that our own writer made: number becomes the vertex that each is. How many vertices there are; 0: they are not
- * told of, or not rightly. */
+/* Copies made by our own writer: `number` becomes the original of each. Returns the number of vertices; 0 if the file
+ * does not describe them, or incorrectly. */
 static size_t own_vertices(const vgi_gltf_scene *x, uint32_t *number)
 {
     const vgi_json *mesh;
@@ -222,7 +221,7 @@ static size_t own_vertices(const vgi_gltf_scene *x, uint32_t *number)
     return (size_t)nv;
 }
 
-/* Positions of vertices v and w, before welding, of one node. */
+/* Whether vertices v and w of one node, before welding, have equal positions. */
 static bool at_one_place(const vgi_gltf_scene *x, size_t v, size_t w)
 {
     const vgi_gltf_part *p = part_of(x, v), *q = part_of(x, w);
@@ -237,7 +236,7 @@ static bool is_whole(const uint32_t *v, size_t n, const uint32_t *number)
     return true;
 }
 
-/* Do these numbers make the faces of `to`, but for those that shrink to nothing? */
+/* Whether these numbers give the faces of `to`, except for those that degenerate. */
 static bool makes_faces(const vg_mesh *m, const uint32_t *number, const vg_mesh *to)
 {
     size_t face = 0;
@@ -253,8 +252,8 @@ static bool makes_faces(const vg_mesh *m, const uint32_t *number, const vg_mesh 
     return face == to->nf;
 }
 
-/* Each vertex of the file becomes the vertex `to` of the mesh, of which the file has those of one number at one place, in the
- * order of their first ones. How many there are; 0: they do not fit. */
+/* Map each vertex of the file to the vertex `to` of the mesh; the file must have those of one number at one position,
+ * in the order of their first ones. Returns the number of vertices; 0 if they do not fit. */
 static size_t number_as(const vgi_gltf_scene *x, const uint32_t *to, uint32_t *number, uint32_t *first)
 {
     size_t n = 0;
@@ -267,7 +266,7 @@ static size_t number_as(const vgi_gltf_scene *x, const uint32_t *to, uint32_t *n
     return n;
 }
 
-/* As the file of a character that we wrote says; 0: it says nothing, or nothing that fits. */
+/* As stated in a character's file that we wrote; 0 if absent or inconsistent. */
 static size_t vertices_of_asset(const vgi_gltf_scene *x, uint32_t *number, uint32_t *first)
 {
     const vgi_json *list = vgi_json_get(vgi_json_get(vgi_json_get(x->g.json, "asset"), "extras"), VGI_GLTF_VERTICES);
@@ -280,8 +279,8 @@ static size_t vertices_of_asset(const vgi_gltf_scene *x, uint32_t *number, uint3
     return number_as(x, number, number, first) == nv ? (size_t)nv : 0;
 }
 
-/* The welding of another file of the same vertices, so that what is one there is one here, and what is not, is not: lips
- * that touch in this pose alone. How many vertices; 0: it does not fit. */
+/* Use the welding of another file with the same vertices, so that the same vertices are merged in both: lips that
+ * touch in this pose alone stay separate. Returns the number of vertices; 0 if it does not fit. */
 static size_t vertices_of_like(const vgi_gltf_scene *x, const vg_mesh *m, uint32_t *number, uint32_t *first)
 {
     const vg_asset *a = x->like && x->like->asset.n ? &x->like->asset : NULL;
@@ -291,7 +290,7 @@ static size_t vertices_of_like(const vgi_gltf_scene *x, const vg_mesh *m, uint32
     return n == x->like->mesh.nv && makes_faces(m, number, &x->like->mesh) ? n : 0;
 }
 
-/* Each vertex as the first of the file's that are it. */
+/* Represent each vertex by the first of the file's vertices that map to it. */
 static int keep_listed(vgi_gltf_scene *x, const uint32_t *first, size_t n, vg_err *e)
 {
     for (size_t i = 0, at = 0; i < x->nparts; i++) {
@@ -332,8 +331,8 @@ static uint32_t uv_of(const vgi_gltf_scene *x, uint32_t v)
     return p->textured ? (uint32_t)(p->first_uv + (v - p->first)) : UINT32_MAX;
 }
 
-/* Faces of the welded vertices; those that have shrunk to nothing are left out, as strips have them too. How many. uv
- * (may be NULL): of each corner its texture coordinate. Labels move along. */
+/* Faces of the welded vertices; degenerate ones are dropped, which strips also contain. Returns their number. uv (may
+ * be NULL): texture coordinate per corner. Labels are adapted. */
 static size_t renumber(vgi_gltf_scene *x, vg_mesh *m, const uint32_t *number, uint32_t *uv)
 {
     size_t nf = 0, corners = 0, label = 0;

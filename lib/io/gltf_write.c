@@ -1,8 +1,8 @@
-/* gltf_write.c: a sequence as a glTF file: a mesh, an animation with a time for each frame, and the bytes of both.
- * Leaves out how the mesh moves: by morph targets (gltf_morph.c) or by a skin (gltf_skin.c); where texture coordinates cut
- * it apart (gltf_seams.c), and normals (gltf_normals.c).
+/* gltf_write.c: writes a sequence as a glTF file: a mesh, an animation with a time for each frame, and the bytes of
+ * both. Motion is in gltf_morph.c (morph targets) or gltf_skin.c (skin), splitting at texture seams in gltf_seams.c,
+ * normals in gltf_normals.c.
  *
- * The frames wait in a file without a name.
+ * The frames wait in an unnamed file.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
 
@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 
-/* ---- what can be written ---- */
+/* ---- ---- supported input ---- */
 
 static int check_skin(const vg_head *h, const char *output, vg_err *e)
 {
@@ -161,7 +161,7 @@ int vgi_gltf_say_mesh_name(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_gltf_say_text(&w->json, *name ? name : "mesh", e);
 }
 
-/* Which vertices the copies are of, so that our own reader can put them together again. */
+/* Extras with the originals of copied vertices, so that our own reader can merge them. */
 int vgi_gltf_say_seams(vgi_gltf_writing *w, vg_err *e)
 {
     const vgi_gltf_seams *s = &w->seams;
@@ -226,7 +226,7 @@ static size_t bytes_before(const vgi_gltf_run *run, bool lines)
     return lines ? run->lines : run->triangles;
 }
 
-/* One view, and an accessor for each run that has some. */
+/* One view, and an accessor for each non-empty run. */
 static int describe_indices(vgi_gltf_writing *w, bool lines, size_t *accessor, vg_err *e)
 {
     const vg_bytes *indices = lines ? &w->shape.lines : &w->shape.triangles;
@@ -249,7 +249,7 @@ static int describe_texture(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_gltf_say_accessor(w, 0, VGI_GLTF_FLOAT, w->seams.n, "VEC2", NULL, 0, e);
 }
 
-/* What the character's file has keeps its numbers. */
+/* Items of the character's file keep their numbers. */
 static int describe_character(vgi_gltf_writing *w, vg_err *e)
 {
     const vgi_gltf_character *c = w->character;
@@ -373,7 +373,7 @@ static int put_text(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_output_put(w->out, "\"}]}\n", 5, e);
 }
 
-/* ---- the end ---- */
+/* ---- ---- completion ---- */
 
 static void note_loss(vgi_gltf_writing *w, const char *what)
 {
@@ -381,7 +381,7 @@ static void note_loss(vgi_gltf_writing *w, const char *what)
     snprintf(w->warning + n, sizeof w->warning - n, "%s; ", what);
 }
 
-/* Groups and objects; groups of smoothing, too, unless normals show them. */
+/* Groups and objects; smoothing groups only if normals do not show them. */
 static bool has_groups(const vgi_gltf_writing *w)
 {
     const vg_attributes *a = &w->h->body.attributes;
@@ -417,7 +417,7 @@ static void note_losses(vgi_gltf_writing *w)
     if (n && !w->warning[n]) w->warning[n - 2] = 0;
 }
 
-/* The faces, of vertices of the file. */
+/* The faces, with vertices of the file. */
 static int make_shape(vgi_gltf_writing *w, vg_err *e)
 {
     const vgi_gltf_seams *s = &w->seams;

@@ -1,5 +1,5 @@
-/* gltf_write.h: what gltf_write.c, gltf_faces.c, gltf_morph.c, gltf_cast.c and gltf_skin.c share: a glTF file that is being made.
- * gltf_write.c is the file; how a mesh moves in it is one of two manners.
+/* gltf_write.h: a glTF file being written; shared by gltf_write.c, gltf_faces.c, gltf_morph.c, gltf_cast.c and
+ * gltf_skin.c. gltf_write.c writes the file; a mesh moves in it in one of two manners.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_GLTF_WRITE_H
 #define VG_GLTF_WRITE_H
@@ -13,7 +13,7 @@ enum { VGI_GLTF_ITEM = 4, VGI_GLTF_POINT = 12 }; /* bytes of a number, and of th
 
 /* ---- gltf_faces.c: faces as triangles and lines ---- */
 typedef struct vgi_gltf_run { /* faces of one material */
-    size_t triangles, lines;  /* bytes of indices before it */
+    size_t triangles, lines;  /* bytes of indices before this run */
     const char *material;     /* its name; NULL: none */
 } vgi_gltf_run;
 
@@ -22,10 +22,11 @@ enum { VGI_GLTF_MOST_RUNS = 256 };
 typedef struct vgi_gltf_shape {
     vg_bytes triangles, lines; /* indices of 32 bits */
     size_t nruns, runs_cap;
-    vgi_gltf_run *run;         /* nruns, and one more behind the last */
+    vgi_gltf_run *run;         /* nruns, plus an end marker */
     vg_bytes runs;             /* for VGI_GLTF_FACES: count, size, count, size, ... as text */
 } vgi_gltf_shape;
-/* vgi_gltf_shape_make: a (may be NULL): whose labels say the materials; of more than VGI_GLTF_MOST_RUNS runs there is one. */
+/* vgi_gltf_shape_make: a (may be NULL): its labels give the materials; more than VGI_GLTF_MOST_RUNS runs become
+ * one. */
 int vgi_gltf_shape_make(vgi_gltf_shape *s, const vg_mesh *m, const double *reference, const vg_attributes *a,
                         vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_shape_clear(vgi_gltf_shape *s);
@@ -33,10 +34,10 @@ void vgi_gltf_shape_clear(vgi_gltf_shape *s);
 /* ---- gltf_write.c ---- */
 typedef struct vgi_gltf_writing vgi_gltf_writing;
 
-/* How the mesh moves. begin makes own, before the first frame; put notes a frame in the spool. describe comes when
- * all frames are there, and behind the views and accessors of faces and times: it adds its own, and says scene,
- * nodes, meshes and animation. emit puts the bytes of its views, in their order. warning (may be NULL) says what was
- * lost. release takes own, NULL too. */
+/* How the mesh moves. begin allocates `own` before the first frame; put stores a frame in the spool. describe is
+ * called once all frames are stored, after the views and accessors of faces and times: it adds its own, and writes
+ * scene, nodes, meshes and animation. emit writes the bytes of its views, in order. warning (may be NULL) reports
+ * what was lost. release frees `own`, which may be NULL. */
 typedef struct vgi_gltf_manner {
     int (*begin)(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e);
     int (*put)(vgi_gltf_writing *w, const vg_frame *f, vg_err *e);
@@ -44,44 +45,44 @@ typedef struct vgi_gltf_manner {
     int (*emit)(vgi_gltf_writing *w, vg_err *e);
     void (*warning)(const vgi_gltf_writing *w, char *to, size_t room);
     void (*release)(void *own);
-    const char *too_big; /* what to do about it */
-    bool splits;         /* there may be several animations */
+    const char *too_big; /* advice for the message */
+    bool splits;         /* several animations are possible */
 } vgi_gltf_manner;
 extern const vgi_gltf_manner vgi_gltf_by_morphs, vgi_gltf_by_skin;
 
 typedef struct vgi_gltf_take {
     size_t first, count;  /* frames */
-    size_t stem;          /* length of what their names begin with; 0: nothing */
-    bool timed;           /* they have times that an animation can have */
+    size_t stem;          /* length of the common prefix of the names; 0: none */
+    bool timed;           /* they have times valid for an animation */
     size_t moments;       /* number of their accessor */
 } vgi_gltf_take;
 
 struct vgi_gltf_writing {
     const vgi_gltf_manner *manner;
     void *own;                 /* of the manner */
-    vgi_output *out, spool;    /* spool: frames as they wait, in a file without a name */
+    vgi_output *out, spool;    /* spool: stored frames, in an unnamed file */
     const vg_head *h;
     bool binary;
     bool still;                /* shapes without an animation */
-    const char *clip;          /* what the animation is called; NULL: after the frames */
+    const char *clip;          /* name of the animation; NULL: from the frames */
     size_t frames;
     vgi_names names;
-    double *times;             /* NaN: it has none */
+    double *times;             /* NaN: none */
     size_t times_cap;
-    vgi_gltf_take *takes;      /* at the end: frames 0 to frames - 1, one after the other */
+    vgi_gltf_take *takes;      /* at the end: frames 0 to frames - 1, divided into animations */
     size_t ntakes;
     bool times_lost;
-    vgi_gltf_character *character; /* whose nodes, materials and attributes are written; NULL: none */
+    vgi_gltf_character *character; /* its nodes, materials and attributes are written; NULL: none */
     vgi_gltf library;          /* of materials, without meshes; json NULL: none */
-    vgi_name_set materials;    /* the names of those that are written */
+    vgi_name_set materials;    /* names of those written */
     vgi_gltf_seams seams;      /* vertices of the file */
-    vgi_gltf_normals normals;  /* n 0: there are none, or they are those of the character */
-    float *base;               /* the reference pose as it will be read, seams.n points */
+    vgi_gltf_normals normals;  /* n == 0: none, or those of the character */
+    float *base;               /* the reference pose as it will be read back, seams.n points */
     vgi_gltf_shape shape;
     vg_bytes json, views, accessors; /* text */
     size_t nviews, naccessors, bytes;
-    size_t triangles, lines, texture; /* numbers of their accessors; those of no bytes have none */
-    unsigned char carry[3];    /* base64: bytes that wait for their third */
+    size_t triangles, lines, texture; /* numbers of their accessors; empty ones have none */
+    unsigned char carry[3];    /* base64: bytes of an incomplete group of three */
     size_t ncarry;
     char warning[400];
 };
@@ -94,9 +95,9 @@ typedef struct vgi_gltf_list {
 } vgi_gltf_list;
 
 /* ---- gltf_cast.c: the nodes, meshes and materials of a character ---- */
-/* vgi_gltf_say_cast: all members of the file that are not made by the writer. A list for each part of the character's
- * scene; target: the accessor of the positions of morph target t of list l, that of its normals follows. names: of the
- * morph targets, a text in brackets. */
+/* vgi_gltf_say_cast: write all members of the file that the writer does not generate. A list for each part of the
+ * character's scene; target: the accessor of the positions of morph target t of list l, followed by that of its
+ * normals. names: of the morph targets, a text in brackets. */
 typedef struct vgi_gltf_cast {
     const vgi_gltf_list *lists;
     size_t targets;
@@ -105,7 +106,7 @@ typedef struct vgi_gltf_cast {
     const vgi_json *names;
 } vgi_gltf_cast;
 int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e) VG_MUST_CHECK;
-/* vgi_gltf_say_elements: the elements of a list of a file, as text. */
+/* vgi_gltf_say_elements: write the elements of a list of a file as text. */
 int vgi_gltf_say_elements(const vgi_json *document, const char *list, vg_bytes *to, size_t *n,
                           vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_say_cast_asset(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
@@ -113,7 +114,7 @@ int vgi_gltf_say_cast_asset(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
 /* ---- gltf_library.c: materials of a mesh that has only their names, and of a library if there is one ---- */
 int vgi_gltf_find_materials(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_describe_library(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
-int vgi_gltf_say_materials(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK; /* "materials":[...], and what they need */
+int vgi_gltf_say_materials(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK; /* "materials":[...], and the lists that they need */
 size_t vgi_gltf_material(const vgi_gltf_writing *w, const char *name);
 
 int vgi_gltf_say(vg_bytes *to, vg_err *e, const char *format, ...) VG_PRINTF(3, 4);
@@ -123,32 +124,32 @@ int vgi_gltf_say_numbers(vg_bytes *to, const char *before, const double *p, size
 /* vgi_gltf_say_names: "KEY":[names of n frames from `first` on]. */
 int vgi_gltf_say_names(vgi_gltf_writing *w, const char *key, size_t first, size_t n, vg_err *e) VG_MUST_CHECK;
 
-/* ---- gltf_takes.c: which frames are one animation, what it is called, and when they are ---- */
-/* vgi_gltf_find_takes: all are one; or, split, as many as their names say: "Walk.0001", "Walk.0002", "Run.0001". */
+/* ---- ---- gltf_takes.c: division into animations, with names and times ---- ---- */
+/* vgi_gltf_find_takes: one for all frames; or, with split, one for each name prefix: "Walk.0001", "Walk.0002",
+ * "Run.0001". */
 int vgi_gltf_find_takes(vgi_gltf_writing *w, bool split, vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_describe_times(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_emit_times(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_say_take_name(vgi_gltf_writing *w, const vgi_gltf_take *t, vg_err *e) VG_MUST_CHECK; /* in quotes */
 
-/* vgi_gltf_say_primitives: "primitives":[...], one for each kind of face; moving: what is said of attributes and
- * targets. */
+/* vgi_gltf_say_primitives: "primitives":[...], one for each kind of face; moving: text for attributes and targets. */
 int vgi_gltf_say_primitives(vgi_gltf_writing *w, const vg_bytes *moving, vg_err *e) VG_MUST_CHECK;
-/* vgi_gltf_say_seams: which vertices the copies are of, for extras, a comma in front; nothing without copies. */
+/* vgi_gltf_say_seams: originals of the copies, for extras, with a leading comma; nothing without copies. */
 int vgi_gltf_say_seams(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_say_mesh_name(vgi_gltf_writing *w, vg_err *e) VG_MUST_CHECK;
-/* vgi_gltf_view: the next bytes of the buffer; more: further JSON. */
+/* vgi_gltf_view: a view of the next bytes of the buffer; more: additional JSON. */
 int vgi_gltf_view(vgi_gltf_writing *w, size_t bytes, const char *more, vg_err *e) VG_MUST_CHECK;
-/* vgi_gltf_say_accessor: one into the last view; bounds (may be NULL): least and most, `width` numbers each. Its
- * number is w->naccessors before the call. */
+/* vgi_gltf_say_accessor: an accessor into the last view; bounds (may be NULL): minimum and maximum, `width` numbers
+ * each. Its number is w->naccessors before the call. */
 int vgi_gltf_say_accessor(vgi_gltf_writing *w, size_t off, int component, size_t count, const char *type,
                           const double *bounds, size_t width, vg_err *e) VG_MUST_CHECK;
 
 void vgi_gltf_put_single(unsigned char *to, float x);
 float vgi_gltf_get_single(const unsigned char *p);
-/* vgi_gltf_emit: bytes of the buffer: as they are, or as base64. */
+/* vgi_gltf_emit: write bytes of the buffer, raw or as base64. */
 int vgi_gltf_emit(vgi_gltf_writing *w, const unsigned char *p, size_t n, vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_emit_singles(vgi_gltf_writing *w, const float *p, size_t n, vg_err *e) VG_MUST_CHECK;
-/* vgi_gltf_load: n bytes of the spool. */
+/* vgi_gltf_load: read n bytes of the spool. */
 int vgi_gltf_load(const vgi_gltf_writing *w, uint64_t off, unsigned char *to, size_t n, vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_bounds(const float *p, size_t points, double bounds[6]); /* least x y z, most x y z */
 
