@@ -256,7 +256,7 @@ static int read_member(vgi_archive *a, vg_bytes *data, vg_err *e)
     }
 }
 
-/* ---- ---- completeness ---- */
+/* ---- completeness ---- */
 
 /* Read the rest of a compressed archive: packed data, and gzip's trailer. */
 static int check_packed_end(vgi_archive *a, vg_err *e)

@@ -172,7 +172,7 @@ static int say_row(writing *w, vg_err *e)
     return r < 0 ? r : say(&w->text, "\n", e);
 }
 
-/* ---- ---- file header ---- */
+/* ---- file header ---- */
 
 static int say_tabs(vg_bytes *b, size_t depth, vg_err *e)
 {

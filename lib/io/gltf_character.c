@@ -59,7 +59,7 @@ static void turn(const double a[3], const double b[3], const double x[3], double
     for (int i = 0; i < 3; i++) to[i] = c > -0.999999 ? c * x[i] + y[i] + along * k[i] : -x[i];
 }
 
-/* ---- ---- positions of the vertices ---- */
+/* ---- positions of the vertices ---- */
 
 /* 1; 0 if the matrix of a node or skin is singular */
 static int place(vgi_gltf_character *c, vg_err *e)

@@ -241,7 +241,7 @@ int vgi_gltf_read_animations(vgi_gltf_scene *x, vg_err *e)
     return r == VG_OK && x->wanted && !x->nclips ? no_such_animation(x, list, e) : r;
 }
 
-/* ---- ---- evaluation of a channel ---- */
+/* ---- evaluation of a channel ---- */
 
 /* Number k of key `key`: its value, or its in-tangent or out-tangent (which 0, 2) for a spline. */
 static void key_value(const vgi_gltf_channel *c, size_t key, size_t which, double *to)

@@ -72,7 +72,7 @@ static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
     return vgi_output_put(&w->spool, x->packed, VGI_GLTF_ITEM * n, e);
 }
 
-/* ---- ---- choice of target frames ---- */
+/* ---- choice of target frames ---- */
 
 static int load(const vgi_gltf_writing *w, size_t frame, float *to, vg_err *e)
 {
@@ -206,7 +206,7 @@ static void spread_basis(vgi_gltf_writing *w, size_t t)
     if (x->file[NORMALS]) memcpy(x->file[NORMALS], x->turned + t * 3 * x->n, VGI_GLTF_POINT * x->n);
 }
 
-/* ---- ---- normals of a basis: those whose mixture with the weights of the positions is nearest to the normals of all frames ---- ---- */
+/* ---- normals of a basis: mixed with the weights of the positions, they are nearest to the normals of all frames ---- */
 
 /* solved: targets x frames: weights of the least-squares solution. */
 static int solve_weights(const morphs *x, size_t frames, double **solved, vg_err *e)
@@ -265,7 +265,7 @@ static int load_target(vgi_gltf_writing *w, size_t t, vg_err *e)
     return VG_OK;
 }
 
-/* ---- ---- layout of targets in the file ---- */
+/* ---- layout of targets in the file ---- */
 
 static lying *lying_of(const morphs *x, size_t t, size_t l, int sort)
 {
@@ -315,7 +315,7 @@ static int look_at_targets(vgi_gltf_writing *w, vg_err *e)
     return r;
 }
 
-/* ---- ---- JSON ---- */
+/* ---- JSON ---- */
 
 static int say_sparse(vgi_gltf_writing *w, const vgi_gltf_list *list, const lying *l, size_t view, size_t indices,
                       size_t values, vg_err *e)

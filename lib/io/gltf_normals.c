@@ -36,7 +36,7 @@ static void face_normal(const vg_mesh *m, size_t f, const double *pose, double n
     unit(n);
 }
 
-/* ---- ---- smooth surfaces ---- */
+/* ---- smooth surfaces ---- */
 
 /* An edge of a face: from corner c to the next one of its face, between the vertices low < high. */
 typedef struct side {

@@ -197,7 +197,7 @@ static int put(vgi_gltf_writing *w, const vg_frame *f, vg_err *e)
     return vgi_output_put(&w->spool, x->packed, VGI_GLTF_ITEM * LOCAL * n, e);
 }
 
-/* ---- ---- JSON ---- */
+/* ---- JSON ---- */
 
 static int describe_points(vgi_gltf_writing *w, vg_err *e)
 {

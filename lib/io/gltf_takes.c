@@ -72,7 +72,7 @@ int vgi_gltf_find_takes(vgi_gltf_writing *w, bool split, vg_err *e)
     return VG_OK;
 }
 
-/* ---- ---- JSON ---- */
+/* ---- JSON ---- */
 
 static double time_of(const vgi_gltf_writing *w, const vgi_gltf_take *t, size_t i)
 {

@@ -119,7 +119,7 @@ static int restore_polygons(vgi_gltf_scene *x, vgi_gltf_faces *f, vg_err *e)
     return r < 0 ? r : VG_OK;
 }
 
-/* ---- ---- welding: exporters split a mesh where normals or texture coordinates are discontinuous ---- ---- */
+/* ---- welding: exporters split a mesh where normals or texture coordinates are discontinuous ---- */
 
 typedef struct welding {
     const vgi_gltf_scene *x;

@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 
-/* ---- ---- supported input ---- */
+/* ---- supported input ---- */
 
 static int check_skin(const vg_head *h, const char *output, vg_err *e)
 {
@@ -373,7 +373,7 @@ static int put_text(vgi_gltf_writing *w, vg_err *e)
     return r < 0 ? r : vgi_output_put(w->out, "\"}]}\n", 5, e);
 }
 
-/* ---- ---- completion ---- */
+/* ---- completion ---- */
 
 static void note_loss(vgi_gltf_writing *w, const char *what)
 {

@@ -124,7 +124,7 @@ int vgi_gltf_say_numbers(vg_bytes *to, const char *before, const double *p, size
 /* vgi_gltf_say_names: "KEY":[names of n frames from `first` on]. */
 int vgi_gltf_say_names(vgi_gltf_writing *w, const char *key, size_t first, size_t n, vg_err *e) VG_MUST_CHECK;
 
-/* ---- ---- gltf_takes.c: division into animations, with names and times ---- ---- */
+/* ---- gltf_takes.c: division into animations, with names and times ---- */
 /* vgi_gltf_find_takes: one for all frames; or, with split, one for each name prefix: "Walk.0001", "Walk.0002",
  * "Run.0001". */
 int vgi_gltf_find_takes(vgi_gltf_writing *w, bool split, vg_err *e) VG_MUST_CHECK;

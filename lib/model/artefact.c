@@ -164,7 +164,7 @@ int vgi_fields_copy(const vgi_artefact *t, void *to, const void *from, const vg_
     return r;
 }
 
-/* ---- ---- shared by checks ---- */
+/* ---- shared by checks ---- */
 
 int vgi_wrong(const char *where, const char *what, vg_err *e)
 {

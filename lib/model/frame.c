@@ -156,7 +156,7 @@ int vg_frame_label(vg_frame *f, vg_frame *from, vg_err *e)
     return vg_frame_rename(f, from->name ? from->name : "", e);
 }
 
-/* ---- ---- known channels ---- */
+/* ---- known channels ---- */
 
 double *vg_frame_anchors(const vg_frame *f)
 {

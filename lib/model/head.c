@@ -7,7 +7,7 @@
 #include <assert.h>
 #include <stdlib.h>
 
-/* ---- ---- loops over the table of records ---- */
+/* ---- loops over the table of records ---- */
 
 static void clear_parts(void *of, const int *entries, size_t n)
 {

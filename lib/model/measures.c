@@ -48,7 +48,7 @@ struct vg_measures {
     size_t poses_cap;
 };
 
-/* ---- ---- construction ---- */
+/* ---- construction ---- */
 
 /* The least error that is at least `edge` in units of D; if D is 0, any error except 0. */
 static double least_error(double edge, double diagonal)

@@ -55,7 +55,7 @@ void vgi_dataset_clear(vgi_dataset *s)
     *s = (vgi_dataset){0};
 }
 
-/* ---- ---- division ---- */
+/* ---- division ---- */
 
 int vgi_spans_add(vgi_spans *s, vgi_span span, vg_err *e)
 {

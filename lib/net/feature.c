@@ -113,7 +113,7 @@ static void in_rounds(vg_featurer *f, job *j, void (*task)(void *context, size_t
         vgi_parallel(f->threads, blocks - j->first < most ? blocks - j->first : most, task, j);
 }
 
-/* ---- ---- from poses to features ---- */
+/* ---- from poses to features ---- */
 
 /* the common rotation of the vertices around the centre */
 static void find_root(const vg_featurer *f, vgi_feature_block *b, size_t lane, double q[4])
@@ -171,7 +171,7 @@ int vg_featurer_measure(vg_featurer *f, size_t n, const double *const *poses, do
     return VG_OK;
 }
 
-/* ---- ---- from features to poses ---- */
+/* ---- from features to poses ---- */
 
 static void solve_block(void *context, size_t task)
 {

@@ -297,7 +297,7 @@ static void put(const vgi_rings *r, vgi_feature_block *b, size_t width, const do
                 put_loose(r, b, v, width, lane, poses[lane], rest, centroids[lane] + 3 * r->main_part, values[lane]);
 }
 
-/* ---- ---- from features to poses ---- */
+/* ---- from features to poses ---- */
 
 static void exp_rotation(const double w[3], double m[9])
 {

@@ -80,7 +80,7 @@ int vgi_trainer_validate(vg_trainer *t, double *error, vg_err *e)
     return code;
 }
 
-/* ---- ---- held-out frames ---- */
+/* ---- held-out frames ---- */
 
 typedef struct judging {
     vg_trainer *t;

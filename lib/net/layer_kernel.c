@@ -15,7 +15,7 @@ INLINE net_lanes same(real x)
     return (net_lanes){0} + x;
 }
 
-/* ---- ---- activation functions ---- */
+/* ---- activation functions ---- */
 
 #ifdef VGI_NET_DOUBLE
 INLINE net_lanes exponential(net_lanes x)

@@ -23,7 +23,7 @@ int vgi_network_shape(const vg_network *n, vgi_shape *s, vg_err *e)
     return VG_OK;
 }
 
-/* ---- ---- meaning of the numbers ---- */
+/* ---- meaning of the numbers ---- */
 
 void vgi_network_normalise(const vg_network *n, const double *features, double *x)
 {

@@ -201,7 +201,7 @@ int vgi_regression_fit(vgi_regression *r, const vgi_frames *f, bool back, double
     return code == VG_OK ? make_stable(r, choice->damping, e) : code;
 }
 
-/* ---- ---- choice of the ridge ---- */
+/* ---- choice of the ridge ---- */
 
 /* A sum of errors and their number. */
 typedef struct trial_sum {

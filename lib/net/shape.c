@@ -52,7 +52,7 @@ int vgi_shape_plan(vgi_shape *s, vg_err *e)
     return ok ? VG_OK : vg_fail(e, VG_EARG, "a network for %zu numbers is too large", s->numbers);
 }
 
-/* ---- ---- initial values ---- */
+/* ---- initial values ---- */
 
 static void fill_normal(float *p, size_t n, double deviation, vgi_random *r)
 {

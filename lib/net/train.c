@@ -487,7 +487,7 @@ static void learn(vg_trainer *t)
     if (t->state.gradient < 1e30) vgi_parallel(t->o.threads, (all + CHUNK - 1) / CHUNK, adam_chunk, &a);
 }
 
-/* ---- ---- number of iterations ---- */
+/* ---- number of iterations ---- */
 
 static void keep_best(vg_trainer *t, double error)
 {

@@ -195,7 +195,7 @@ static int permute_matrix(vgi_fronts *b, const vgi_sparse *a, const vgi_cholesky
     return r;
 }
 
-/* ---- ---- shared data: layout ---- */
+/* ---- shared data: layout ---- */
 
 /* Whether CHOLMOD's elimination of front s is valid. */
 static bool is_of_base(const vgi_fronts *b, size_t s)
@@ -317,7 +317,7 @@ static void clear_elimination(elimination *x)
     free(x->stack);
 }
 
-/* ---- ---- shared data: numbers ---- */
+/* ---- shared data: numbers ---- */
 
 static int share(vgi_fronts *b, vg_err *e)
 {

@@ -184,7 +184,7 @@ void vgi_kdtree_label(vgi_kdtree *t, const uint32_t *label)
     if (t->n) summarise(t);
 }
 
-/* ---- ---- search ---- */
+/* ---- search ---- */
 
 struct query {
     double p[3];

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* ---- ---- the best rotation, for any matrix ---- */
+/* ---- the best rotation, for any matrix ---- */
 
 /* The unit eigenvector of the largest eigenvalue of a symmetric matrix, by cyclic Jacobi rotations. a is
  * overwritten. */
@@ -69,7 +69,7 @@ void vgi_best_turn_near(const double b[9], double weight, const double prior[4],
     vgi_best_turn(m, q);
 }
 
-/* ---- ---- the nearest rotation, fast where possible ---- ---- */
+/* ---- the nearest rotation, fast where possible ---- */
 
 static const double thin = 1e-3; /* for a matrix of norm 1, smallest determinant for Newton's iteration */
 

@@ -125,7 +125,7 @@ int vgi_branches_make(vgi_branches *b, size_t n, const double *share, size_t npa
     return r;
 }
 
-/* ---- ---- traversal ---- */
+/* ---- traversal ---- */
 
 static void follow_parents(const vgi_branches *b, const double *q, double *l)
 {

@@ -24,7 +24,7 @@ struct vg_sampler {
     bool borrowed;                         /* the basis is borrowed from the signal */
 };
 
-/* ---- ---- data of the signal ---- */
+/* ---- data of the signal ---- */
 
 int vgi_signal_curve(const vg_signal *s, vgi_curve *c, vg_err *e)
 {
@@ -68,7 +68,7 @@ void vgi_signal_vector(const vg_signal *s, size_t j, double *h)
     }
 }
 
-/* ---- ---- construction ---- */
+/* ---- construction ---- */
 
 static int take_basis(vg_sampler *p, vg_err *e)
 {
@@ -154,7 +154,7 @@ void vg_sampler_free(vg_sampler **out)
     *out = NULL;
 }
 
-/* ---- ---- evaluation ---- */
+/* ---- evaluation ---- */
 
 void vg_sampler_position(const vg_sampler *p, double time, double at[2])
 {

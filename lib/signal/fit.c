@@ -43,7 +43,7 @@ void vg_signal_stats_clear(vg_signal_stats *r)
     *r = (vg_signal_stats){0};
 }
 
-/* ---- ---- cost of a choice of m, l, k ---- */
+/* ---- cost of a choice of m, l, k ---- */
 
 static bool of_vertices(const fitting *f)
 {

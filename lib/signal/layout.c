@@ -198,7 +198,7 @@ out:
     return r;
 }
 
-/* ---- ---- quality of a layout ---- */
+/* ---- quality of a layout ---- */
 
 typedef struct judge {
     size_t n, m;

@@ -106,7 +106,7 @@ void vg_region_filter_look(vg_region_filter *r, size_t n, const double *const *v
     vgi_blas_shared();
 }
 
-/* ---- ---- the filter of a region ---- */
+/* ---- the filter of a region ---- */
 
 /* Estimate the noise variance as the residual outside the rank, per degree of freedom there; the rank is the number
  * of singular values above those of noise alone. Starts at the rank of an affine motion and iterates until both

@@ -45,7 +45,7 @@ void vgi_natural_make(size_t n, size_t w, const double *x, double *second, doubl
 /* vgi_natural_at: w numbers at time t, clamped to 1 .. n. At t = i they equal row i - 1 of x bit for bit. */
 void vgi_natural_at(size_t n, size_t w, const double *x, const double *second, double t, double *out);
 
-/* ---- ---- plane.c: positions with the distances of the shapes ---- ---- */
+/* ---- plane.c: positions with the distances of the shapes ---- */
 
 /* vgi_distances: squares of the distances between n rows of m numbers (n x n), 0 on the diagonal. */
 void vgi_distances(size_t n, size_t m, const double *x, size_t stride, double *square);
@@ -61,7 +61,7 @@ int vgi_plane_settle(size_t n, const double *distance, const bool *held, double 
 /* vgi_plane_radius: root mean square distance from the centroid; centre (2 numbers) may be NULL. */
 double vgi_plane_radius(size_t n, const double *p, double centre[2]);
 
-/* ---- ---- layout.c: choice of distances ---- */
+/* ---- layout.c: choice of distances ---- */
 
 /* vgi_period: the length of a cycle in frames, 0 if there is none. square: from vgi_distances. */
 int vgi_period(size_t n, const double *square, double *period, vg_err *e) VG_MUST_CHECK;

@@ -48,7 +48,7 @@ static size_t node_of(const vgi_space *s, size_t piece)
     return s->kind == VG_SPACE_VECTORS ? s->pieces.face[piece] : piece;
 }
 
-/* ---- ---- construction ---- */
+/* ---- construction ---- */
 
 static void invert_frames(vgi_space *s)
 {
@@ -378,7 +378,7 @@ int vgi_space_measure(const vgi_space *s, const double *reference, size_t n, con
     return r;
 }
 
-/* ---- ---- inverse ---- */
+/* ---- inverse ---- */
 
 static void corners_of_logs(const vgi_space *s, const double *home, const double *values, double *vectors)
 {

@@ -110,7 +110,7 @@ void vgi_relative_lengths(const vgi_space *s, const double *pose, double *values
         if (is_hinge(s, i)) values[r->at[i]] = angle_of(s, i, pose) - r->angle[i];
 }
 
-/* ---- ---- construction ---- */
+/* ---- construction ---- */
 
 static void number_edges(const vgi_pieces *p, vgi_relative *r, const vgi_piece_side *sides, size_t n)
 {
@@ -178,7 +178,7 @@ int vgi_relative_make(vgi_space *s, const double *reference, vg_err *e)
     return VG_OK;
 }
 
-/* ---- ---- from poses to numbers ---- */
+/* ---- from poses to numbers ---- */
 
 /* Rotation of the whole surface: the rotation nearest to the mean of its pieces'. */
 static void mean_turn(const vgi_space *s, const double *turns, double q[4])
@@ -230,7 +230,7 @@ void vgi_relative_finish(const vgi_space *s, size_t n, const double *turns, doub
     }
 }
 
-/* ---- ---- inverse: rotations between neighbours ---- */
+/* ---- inverse: rotations between neighbours ---- */
 
 /* The two edges of a triangle with these side lengths, in its own axes. */
 static void lay_triangle(const double side[3], double edges[6])
@@ -312,7 +312,7 @@ static void find_turns(const vgi_space *s, const double *values)
     }
 }
 
-/* ---- ---- inverse: frames by least squares ---- */
+/* ---- inverse: frames by least squares ---- */
 
 static size_t unknown(const vgi_relative *r, size_t piece) /* of all but the root */
 {

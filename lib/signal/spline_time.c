@@ -279,7 +279,7 @@ int vgi_curve_fit(vgi_curve *c, size_t n, const double *p, const double *t, cons
     return r;
 }
 
-/* ---- ---- choice of knots ---- */
+/* ---- choice of knots ---- */
 
 static int by_number(const void *a, const void *b)
 {

@@ -62,7 +62,7 @@ int vgi_page_field_flag(vg_bytes *b, const char *name, bool x, vg_err *e) VG_MUS
 int vgi_page_field_list(vg_bytes *b, const char *name, const vg_bytes *open_list, vg_err *e) VG_MUST_CHECK;
 int vgi_page_next(vg_bytes *list, vg_err *e) VG_MUST_CHECK;
 
-/* ---- ---- hull.c: extent of a sequence, for the camera ---- ---- */
+/* ---- hull.c: extent of a sequence, for the camera ---- */
 
 enum { VGI_HULL = 26 };
 typedef struct vgi_hull { /* the outermost points in 26 directions over all frames so far */

@@ -207,7 +207,7 @@ static void draw_axes(plot *p, const vg_chart *c, const axis *x, const axis *y, 
     draw_text(p, LEFT, top + 16, START, true, ink, c->title);
 }
 
-/* ---- ---- contents ---- */
+/* ---- contents ---- */
 
 static bool drawable(const vg_series *v, size_t i, const axis *x, const axis *y)
 {

@@ -89,7 +89,7 @@ static int choose_colours(chart *c, vg_err *e)
     return VG_OK;
 }
 
-/* ---- ---- choice of poses and their positions ---- */
+/* ---- choice of poses and their positions ---- */
 
 static int by_angle(const void *a, const void *b)
 {

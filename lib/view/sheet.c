@@ -15,7 +15,7 @@ static const unsigned char page[3] = {255, 255, 255}, ink[3] = {38, 42, 50}, sof
 /* Sequences whose diagonals differ by less than this factor share one scale. */
 #define ONE_SCALE 2
 
-/* ---- ---- collecting frames ---- */
+/* ---- collecting frames ---- */
 
 static int check_options(const vg_sheet_options *o, vg_err *e)
 {
@@ -133,7 +133,7 @@ int vg_sheet_add(vg_sheet *s, size_t i, const vg_frame *f, const double *truth, 
     return r == VG_OK ? keep_numbers(s, q, shot, f, truth, e) : r;
 }
 
-/* ---- ---- choice of frames: those of the longest sequence; shorter ones stay at their last frame ---- ---- */
+/* ---- choice of frames: those of the longest sequence; shorter ones stay at their last frame ---- */
 
 static int choose_frames(vg_sheet *s, vg_err *e)
 {

@@ -16,7 +16,7 @@ enum {
 static const double REACH = 1.2; /* radius, in face sizes or distances from the surface, within which source faces are
                                     used */
 
-/* ---- ---- choice of faces ---- */
+/* ---- choice of faces ---- */
 
 typedef struct carried { /* of one face of the target */
     uint32_t n, face[AROUND];
@@ -171,7 +171,7 @@ bool vg_is_bound(const vg_correspondence *c)
     return c->first && c->target_nf && c->matched[0] == VG_BOUND;
 }
 
-/* ---- ---- positions in a pose ---- */
+/* ---- positions in a pose ---- */
 
 /* A source face that a vertex follows. */
 typedef struct frame {
@@ -277,7 +277,7 @@ void vg_rider_apply(vg_rider *r, const double *pose, double *vertices)
     vgi_parallel(r->threads, (r->nv + BLOCK - 1) / BLOCK, vertex_block, r);
 }
 
-/* ---- ---- construction ---- */
+/* ---- construction ---- */
 
 /* The source faces in use, each once; number[f]: index of face f among them. */
 static int make_frames(vg_rider *r, const vg_correspondence *c, uint32_t *number, vg_err *e)

@@ -275,7 +275,7 @@ static int make_smoother(fit *t, vg_err *e)
     return r;
 }
 
-/* ---- ---- one round ---- */
+/* ---- one round ---- */
 
 static void add_smoothness(fit *t)
 {

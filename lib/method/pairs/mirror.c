@@ -210,7 +210,7 @@ static int take_pairs(search *s, const vg_markers *pairs, vg_err *e)
     return r;
 }
 
-/* ---- ---- quality of the pairs ---- */
+/* ---- quality of the pairs ---- */
 
 static void measure(search *s)
 {

@@ -298,7 +298,7 @@ static int judge_markers(struct registration *r, vg_err *e)
     return code;
 }
 
-/* ---- ---- the steps in order ---- */
+/* ---- the steps in order ---- */
 
 static int normalise(struct registration *r, vg_err *e)
 {

@@ -54,7 +54,7 @@ static void note_degenerate(vg_cross_transfer *c, size_t f, unsigned lanes)
     while (f < least && !atomic_compare_exchange_weak(&c->first_face, &least, f)) continue;
 }
 
-/* ---- ---- construction ---- */
+/* ---- construction ---- */
 
 static int check_fit(const vg_mesh *source, const vg_correspondence *k, const vg_graph *target, vg_err *e)
 {

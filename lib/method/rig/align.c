@@ -135,7 +135,7 @@ static double agreement(const directions *d, const double q[4])
     return sum;
 }
 
-/* ---- ---- choice of joints, rotations ---- */
+/* ---- choice of joints, rotations ---- */
 
 /* Angle in degrees between the rest directions of joint j if it is a limb, otherwise 0. */
 static double limb_apart(const vgi_rests *x, size_t j, double shortest)

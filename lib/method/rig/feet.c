@@ -124,7 +124,7 @@ static int prepare(feet *f, vg_err *e)
     return f->path && f->stands && f->speed && f->lower ? VG_OK : VG_ENOMEM;
 }
 
-/* ---- ---- contacts ---- */
+/* ---- contacts ---- */
 
 /* Distance between consecutive poses: the mean of those before and after. */
 static void measure_speed(feet *f)
@@ -161,7 +161,7 @@ static void find_stands(feet *f, uint32_t joint, double leg_length)
     drop_short_stands(f);
 }
 
-/* ---- ---- target of the foot ---- */
+/* ---- target of the foot ---- */
 
 /* A contact from pose i to end. If the foot is held already, the joint keeps its position; otherwise it is held at
  * its mean position. */

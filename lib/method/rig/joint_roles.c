@@ -118,7 +118,7 @@ static vgi_role look_up(const char *name)
     return role;
 }
 
-/* ---- ---- roles from the tree of joints ---- */
+/* ---- roles from the tree of joints ---- */
 
 static bool has(const vgi_role *roles, size_t n, vgi_part part, int side)
 {

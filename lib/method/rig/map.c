@@ -336,7 +336,7 @@ int vg_map_fitter_add(vg_map_fitter *f, size_t n, const double *const *poses, vg
     return VG_OK;
 }
 
-/* ---- ---- corners ---- */
+/* ---- corners ---- */
 
 static void fit_corners(const vg_map_fitter *f, vg_map *m)
 {

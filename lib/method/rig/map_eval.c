@@ -272,7 +272,7 @@ void vg_player_between(vg_player *p, const double *a, const double *b, double t,
     }
 }
 
-/* ---- ---- the matrix product ---- */
+/* ---- the matrix product ---- */
 
 typedef struct playing {
     const vg_player *p;

@@ -186,7 +186,7 @@ static void add_regression(const vg_map *m, const double *skin, const double *jo
     }
 }
 
-/* ---- ---- a whole map ---- */
+/* ---- a whole map ---- */
 
 typedef struct retargeting {
     const vg_head *h; /* with the original map */

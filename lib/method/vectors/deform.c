@@ -136,7 +136,7 @@ static size_t measure_segment(const vg_deformer *d, size_t f, const double *w, c
     return bad;
 }
 
-/* ---- ---- loading the vectors of a face ---- */
+/* ---- loading the vectors of a face ---- */
 
 static void face_vectors(const vg_graph *g, size_t f, vg_kind kind, const double *pose, double *w)
 {
@@ -218,7 +218,7 @@ static void count_degenerate(vg_deformer *d, size_t f, size_t bad)
     while (f < least && !atomic_compare_exchange_weak(&d->first_face, &least, f)) continue;
 }
 
-/* ---- ---- construction ---- */
+/* ---- construction ---- */
 
 static void measure_reference(vg_deformer *d)
 {
@@ -366,7 +366,7 @@ vg_deform_stats vg_deformer_get_stats(const vg_deformer *d)
     return (vg_deform_stats){atomic_load(&d->degenerate), atomic_load(&d->first_face)};
 }
 
-/* ---- ---- many faces and poses ---- */
+/* ---- many faces and poses ---- */
 
 typedef struct deform_job deform_job;
 typedef void deform_step(deform_job *job, double *work, size_t first, size_t last);

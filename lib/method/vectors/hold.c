@@ -9,7 +9,7 @@
 
 #include <stdlib.h>
 
-/* ---- ---- shared data ---- */
+/* ---- shared data ---- */
 
 static uint32_t row_of_vertex(const vg_solver *like, size_t v)
 {

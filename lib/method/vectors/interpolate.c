@@ -419,7 +419,7 @@ int vg_path_at(vg_path *p, double t, double *vectors, double root[3], double *an
     return VG_OK;
 }
 
-/* ---- ---- construction ---- */
+/* ---- construction ---- */
 
 static bool has_lines(const vg_graph *g)
 {

@@ -131,7 +131,7 @@ void vg_planar_load(const vg_planar *p, const double *vectors, double *normals)
     }
 }
 
-/* ---- ---- conjugate gradients ---- */
+/* ---- conjugate gradients ---- */
 
 typedef struct plane_job {
     vg_planar *p;

@@ -54,7 +54,7 @@ struct vg_robust {
     vg_robust_stats stats;
 };
 
-/* ---- ---- construction ---- */
+/* ---- construction ---- */
 
 static size_t face_size(const vg_graph *g, size_t f)
 {

@@ -67,7 +67,7 @@ bool vgi_branch_follow(const double q[4], const double near[3], double l[3])
     return false;
 }
 
-/* ---- ---- rotations of faces and vertices ---- */
+/* ---- rotations of faces and vertices ---- */
 
 /* A candidate edge of the tree, between a face and one of its vertices, in the heap. Nodes are numbered faces first,
  * then vertices. */
