@@ -165,7 +165,7 @@ int vgi_input_take(vgi_input *in, vg_bytes *b, size_t n, size_t *got, vg_err *e)
     size_t piece = 1u << 20, have = 0, some = 0;
     int r = VG_OK;
     while (r == VG_OK && have < n) {
-        /* room that the buffer has costs nothing; beyond it, at most double what has arrived */
+        /* spare capacity of the buffer is free; beyond it, at most double what has arrived */
         size_t room = b->cap - b->size, step = room > piece ? room : piece;
         if (step > n - have) step = n - have;
         if ((r = vgi_bytes_reserve(b, b->size + step, e)) < 0) break;
@@ -209,7 +209,7 @@ int vgi_input_slurp(vgi_input *in, vg_bytes *b, vg_err *e)
     return larger_than(in, most, e);
 }
 
-/* ---- files without a name ---- */
+/* ---- unnamed files ---- */
 
 int vgi_nameless_file(vg_err *e)
 {
@@ -217,7 +217,7 @@ int vgi_nameless_file(vg_err *e)
     if (!dir || !*dir) dir = "/tmp";
     int fd = open(dir, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
     if (fd >= 0) return fd;
-    char path[4096]; /* not every file system knows O_TMPFILE */
+    char path[4096]; /* not every file system supports O_TMPFILE */
     int n = snprintf(path, sizeof path, "%s/vg-XXXXXX", dir);
     if (n > 0 && (size_t)n < sizeof path && (fd = mkostemp(path, O_CLOEXEC)) >= 0) {
         unlink(path);

@@ -1,7 +1,7 @@
-/* items.c: input: the files that operands name, and what each holds.
- * Leaves out which files a folder or a pattern stands for (operands.c), and how the content is read (source.c).
+/* items.c: input: the files that operands name, and their kinds. Directories and patterns are expanded in operands.c;
+ * contents are read in source.c.
  *
- * Each item is looked at before any is read. A file is opened again when it is its turn; what can be read only once
+ * Each item is examined before any is read. A file is reopened when it is read; an input that can be read only once
  * (standard input, a pipe named by the shell) stays open in between.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/items.h"
@@ -65,7 +65,7 @@ void vgi_items_clear(vgi_items *items)
     *items = (vgi_items){0};
 }
 
-/* ---- what an item holds ---- */
+/* ---- kind of an item ---- */
 
 int vgi_item_input(const vgi_items *items, vgi_item *it, vgi_input **in, vg_err *e)
 {
@@ -95,9 +95,9 @@ static const vgi_format *mesh_format(const vgi_item *it, const unsigned char *da
     return f || !it->path ? f : vgi_format_by_suffix(it->path);
 }
 
-/* Files that are certainly no meshes are recognised first: a tar may begin with the name of a mesh, and a compressed
- * file may be called like one. Everything unknown is left to libarchive, which knows more kinds than are recognised
- * here; of a pipe it sees only the start, or a disk would fill with it first. */
+/* Files that are certainly not meshes are recognised first, because a tar may begin with the name of a mesh, and a
+ * compressed file may have the name of one. Unknown data is left to libarchive, which knows more formats than are
+ * recognised here. Of a pipe it sees only the start, because otherwise the disk would fill with it first. */
 static int judge_start(const vgi_items *items, vgi_item *it, const unsigned char *data, size_t n, vg_err *e)
 {
     const vgi_sequence_format *named = it->path ? vgi_sequence_by_suffix(it->path) : NULL;
@@ -120,7 +120,7 @@ static int tell_content(const vgi_items *items, vgi_item *it, vgi_input *in, vg_
     const unsigned char *data;
     vg_bytes own = {0};
     size_t n;
-    /* enough for a stream: a program that writes frame by frame is not kept waiting */
+    /* enough for a stream: does not block on a program that writes frame by frame */
     int r = vgi_input_peek(in, 8, &data, &n, e);
     if (r == VG_OK && !vgi_is_stream(data, n)) r = vgi_input_peek(in, 4096, &data, &n, e);
     if (r < 0) return r;
@@ -139,7 +139,7 @@ static int open_file(const vgi_item *it, vg_err *e)
     return fd < 0 ? vg_fail(e, VG_ESYS, "cannot open '%s': %s", vgi_item_name(it), strerror(errno)) : fd;
 }
 
-/* A stream that was compressed becomes one that can be read once: *in (NULL when the file is opened again later). */
+/* Convert a compressed stream to one that can be read once: *in (NULL if the file is reopened later). */
 static int unpack_stream(const vgi_items *items, vgi_item *it, vgi_input **in, vg_err *e)
 {
     int fd = -1, stream, r = VG_OK;
@@ -169,13 +169,13 @@ int vgi_item_look(const vgi_items *items, vgi_item *it, vg_err *e)
     if (r < 0) return r;
     r = tell_content(items, it, in, e);
     if (r == VG_OK && it->content == VGI_ARCHIVE) r = unpack_stream(items, it, &in, e);
-    /* standard input has been read from: its bytes are in `in`, even when the file could be read again */
+    /* standard input was read from: its bytes are in `in`, even if the file could be read again */
     if (r < 0 || (it->regular && it->path)) vgi_input_free(&in);
     else it->input = in;
     return r;
 }
 
-/* ---- its bytes ---- */
+/* ---- contents ---- */
 
 int vgi_item_reader(const vgi_items *items, vgi_item *it, vg_reader **reader, vg_err *e)
 {

@@ -1,8 +1,8 @@
-/* joints_text.c: where the joints of a skeleton are over time, a joint of a frame per line: "FRAME BONE X Y Z". The
- * skeleton comes from elsewhere (--mesh). Joints that are not in the file, the ends of bones, go rigidly with the one
- * above them, which is turned as the joints below it ask. A bone without joints below it, whose end lies at the joint
- * of another bone, reaches for that: so a leg for its foot, where animators have the feet hang on the ground. Leaves
- * out how turns are found (model/skeleton.c).
+/* joints_text.c: positions of the joints of a skeleton over time, one joint of one frame per line: "FRAME BONE X Y
+ * Z". The skeleton comes from elsewhere (--mesh). Joints that are not in the file (ends of bones) move rigidly with
+ * their parent, which is rotated to fit the joints below it. A bone without joints below it whose end is at the joint
+ * of another bone points at that joint: so a leg points at its foot where animators attached the feet to the ground.
+ * Rotations are found in model/skeleton.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 #include "numeric/kdtree.h"
@@ -14,31 +14,32 @@ static const uint32_t NONE = UINT32_MAX;
 
 enum { FIELDS = 5, FIRST_NUMBER = 2, SHOWN = 80 };
 
-/* A joint that is looked for by its name. */
+/* A joint that is looked up by name. */
 typedef struct named {
     const char *name;
-    bool end; /* it has no channels: found only when no other is called so */
+    bool end; /* it has no channels: found only if no other joint has the name */
     uint32_t joint;
 } named;
 
 typedef struct reading {
     vg_bytes text;
     vgi_lines lines;
-    vgi_line line;       /* the first of the next frame */
-    bool waiting;        /* there is one */
-    int64_t number;      /* of the frame before */
+    vgi_line line;       /* the first line of the next frame */
+    bool waiting;        /* whether there is one */
+    int64_t number;      /* of the previous frame */
     uint64_t frames;
     /* of the skeleton, by joint: */
     vg_skeleton skeleton;
     double *reference;
     named *by_name;
-    uint64_t *met;       /* the last frame, from 1, that gave it; all that the first frame gives all others do */
-    uint32_t *guide;     /* itself if the file gives it, else the next one above that the file gives; NONE: none */
-    uint32_t *aim;       /* of an end that the file does not give: the joint at which it lies; NONE: at none */
+    uint64_t *met;       /* number (from 1) of the last frame that contained the joint; every frame contains the
+                            joints of the first */
+    uint32_t *guide;     /* the joint itself if it is in the file, else the nearest one above that is; NONE: none */
+    uint32_t *aim;       /* for an end that is not in the file: the joint at which it is; NONE: none */
     double *turns;
-    /* the joints that are given, and ends with an aim, as a skeleton of their own: */
+    /* the joints in the file, and ends with an aim, as a separate skeleton: */
     vg_skeleton part;
-    uint32_t *place;     /* of each joint: where it is in the part */
+    uint32_t *place;     /* per joint: its index in the part */
     vg_joint_fitter *fitter;
     double *values, *part_places, *part_turns;
 } reading;
@@ -92,12 +93,12 @@ static int join_skeleton(void *state, const vg_head *with, vg_err *e)
 
 static int compare_field(const char *name, const vgi_field *f)
 {
-    size_t n = (size_t)(f->end - f->begin), m = strlen(name); /* a field may hold NUL */
+    size_t n = (size_t)(f->end - f->begin), m = strlen(name); /* a field may contain NUL */
     int order = memcmp(name, f->begin, m < n ? m : n);
     return order ? order : (m > n) - (m < n);
 }
 
-/* The first joint of that name; NONE. */
+/* The first joint with that name, or NONE. */
 static uint32_t find_joint(const reading *b, const vgi_field *f)
 {
     size_t low = 0, high = b->skeleton.njoints;
@@ -109,10 +110,10 @@ static uint32_t find_joint(const reading *b, const vgi_field *f)
     return low < b->skeleton.njoints && !compare_field(b->by_name[low].name, f) ? b->by_name[low].joint : NONE;
 }
 
-/* The joints that the file gives, as points. */
+/* The joints in the file, as points. */
 typedef struct given {
     size_t n;
-    uint32_t *joint; /* of each point */
+    uint32_t *joint; /* per point */
     vgi_kdtree *tree;
 } given;
 
@@ -137,12 +138,13 @@ static double square_distance(const double a[3], const double b[3])
     return x * x + y * y + z * z;
 }
 
-/* The given joint at which the end j of bone `above` lies in the rest pose, or nearly; NONE. */
+/* The joint in the file at which the end j of bone `above` is in the rest pose, within a tolerance; or NONE. */
 static uint32_t find_aim(const reading *b, const given *g, size_t j, size_t above)
 {
-    const double near = 0.05, *at = b->reference + 3 * j; /* of the bone's length: people join by eye */
+    const double near = 0.05, *at = b->reference + 3 * j; /* relative to the bone's length, because artists join bones
+                                                             by eye */
     const double most = near * near * square_distance(at, b->reference + 3 * (size_t)above);
-    vgi_near found; /* never the bone itself, whose joint is all its length away */
+    vgi_near found; /* never the bone itself, whose joint is a whole length away */
     size_t n = vgi_kdtree_nearest(g->tree, at, most, 1, &found);
     return n && found.square < most ? g->joint[found.index] : NONE;
 }
@@ -152,10 +154,10 @@ static int find_aims(reading *b, vg_err *e)
     given g = {0};
     size_t n = b->skeleton.njoints;
     int r = list_given(b, &g, e);
-    for (size_t j = 0; j < n; j++) b->aim[j] = NONE; /* at first: whether a given joint is below it */
+    for (size_t j = 0; j < n; j++) b->aim[j] = NONE; /* initially: whether a joint in the file is below it */
     for (size_t j = 0; j < n; j++)
         if (b->met[j] && b->skeleton.joints[j].parent != NONE) b->aim[b->skeleton.joints[j].parent] = 0;
-    /* children come behind their parents: what those say of themselves is still there */
+    /* children come after their parents, so their own entries are still valid */
     for (size_t j = n; r == VG_OK && j-- > 0;) {
         uint32_t above = b->skeleton.joints[j].parent;
         bool free_end =
@@ -167,7 +169,7 @@ static int find_aims(reading *b, vg_err *e)
     return r;
 }
 
-/* Make the skeleton of the joints in the first frame, which the fitter works on. */
+/* Make the skeleton of the joints in the first frame, for the fitter. */
 static int make_part(reading *b, vg_err *e)
 {
     vg_skeleton *s = &b->part;
@@ -228,7 +230,7 @@ static int take_joint(reading *b, double *places, vg_err *e)
     return r;
 }
 
-/* Read all lines of a frame; report what is missing. */
+/* Read all lines of a frame and report missing ones. */
 static int take_frame(reading *b, vg_frame *f, vg_err *e)
 {
     int64_t number, next;
@@ -256,7 +258,7 @@ static int take_frame(reading *b, vg_frame *f, vg_err *e)
     return vg_frame_rename(f, name, e);
 }
 
-/* How the joints have turned, and where those are that the file does not give. */
+/* Rotations of the joints, and positions of those that are not in the file. */
 static int turn_joints(reading *b, vg_frame *f, vg_err *e)
 {
     size_t joint, n = b->skeleton.njoints;
@@ -319,7 +321,7 @@ static void close_joints(void *state)
     free(b);
 }
 
-/* Is its first line a joint in a frame? */
+/* Whether its first line is a joint in a frame. */
 static bool sniff_joints(const unsigned char *data, size_t n)
 {
     vgi_lines t = vgi_lines_of(data, n, "");

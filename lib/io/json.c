@@ -1,4 +1,4 @@
-/* json.c: reads, looks up, changes and prints JSON through Jansson.
+/* json.c: reads, looks up, modifies and prints JSON through Jansson.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/json.h"
 
@@ -6,7 +6,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 
-/* Jansson reports most failed allocations as wrong JSON, so they are recorded here. */
+/* Jansson reports most failed allocations as malformed JSON, so they are recorded here. */
 static _Thread_local bool out_of_memory;
 
 static void *noting_malloc(size_t n)
@@ -18,7 +18,8 @@ static void *noting_malloc(size_t n)
 
 static void note_memory(void)
 {
-    json_set_alloc_funcs(noting_malloc, free); /* the default seed, as other users of Jansson in the process expect */
+    json_set_alloc_funcs(noting_malloc, free); /* the default seed, which other users of Jansson in the process
+                                                  expect */
 }
 
 int vgi_json_parse(vgi_json **j, const void *text, size_t n, const char *subject, vg_err *e)
@@ -96,12 +97,12 @@ bool vgi_json_same(const vgi_json *a, const vgi_json *b)
 
 const char *vgi_json_key(const vgi_json *object, const char *before)
 {
-    json_t *o = (json_t *)object; /* Jansson walks through objects that could be changed */
+    json_t *o = (json_t *)object; /* Jansson's iteration takes a non-const object */
     void *at = before ? json_object_iter_next(o, json_object_key_to_iter(before)) : json_object_iter(o);
     return at ? json_object_iter_key(at) : NULL;
 }
 
-/* ---- making and changing ---- */
+/* ---- creation and modification ---- */
 
 static vgi_json *made(vgi_json *j, vg_err *e)
 {

@@ -1,5 +1,5 @@
-/* lines.c: text with one item per line, whose fields are separated by blanks, as people write markers and
- * skeletons by hand. markers.c and skeleton_text.c interpret the fields.
+/* lines.c: text with one item per line and fields separated by blanks, as people write markers and skeletons by hand.
+ * Fields are interpreted in markers.c and skeleton_text.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 

@@ -55,7 +55,7 @@ static int take_seed(const vgi_lines *t, const vgi_line *l, int base, vg_seed *s
     for (size_t k = 0; k < 3 && r == VG_OK; k++) {
         r = vgi_line_vertex(t, l, 1 + k, base, &s->on[k], e);
         if (r == VG_OK) r = vgi_line_number(t, l, 4 + k, &s->weight[k], e);
-        /* of a point on or near the triangle; larger ones of both signs could add up to anything */
+        /* of a point on or near the triangle; larger ones of opposite sign could add up to anything */
         if (r == VG_OK && !(s->weight[k] >= -1 && s->weight[k] <= 2))
             r = vg_fail(e, VG_EINPUT, "%s line %zu: weight %g is not from -1 to 2", t->subject, l->number,
                         s->weight[k]);

@@ -1,10 +1,9 @@
-/* mend.c: faces that a file may hold and a mesh may not: those of fewer than 2 corners, and those that name a vertex
- * twice. Every format sends its faces through here, so that all treat them alike.
- * Leaves out which file they come from (format.c and the readers of sequences).
+/* mend.c: repairs faces that are valid in a file but not in a mesh: those with fewer than 2 corners, and those that
+ * name a vertex twice. All formats use it, so that they treat such faces alike.
  *
- * A vertex named twice in a row is kept once. What has no two distinct corners left, or goes out along an edge and
- * back, is dropped. A face with a hole has a bridge to it, whose ends are named twice: ears are cut off as
- * triangles until the rest names no vertex twice.
+ * A vertex named twice in a row is kept once. A face with fewer than two distinct corners, or one that follows an
+ * edge and returns along it, is dropped. A face with a hole has a bridge to the hole, whose ends are named twice:
+ * ears are cut off as triangles until the rest names no vertex twice.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 #include "io/polygon.h"
@@ -29,7 +28,7 @@ void vgi_note_dropped(vg_note *to, size_t n)
                  n == 1 ? "" : "s", n == 1 ? "s" : "", n == 1 ? "s" : "ve");
 }
 
-/* A corner: its vertex, and its place in the old mesh, by which its texture coordinate is found. */
+/* A corner: its vertex, and its index in the old mesh, with which its texture coordinate is found. */
 typedef struct corner {
     uint32_t vertex, old;
 } corner;
@@ -37,12 +36,12 @@ typedef struct corner {
 typedef struct mending {
     const vg_mesh *from;
     const double *points;
-    corner *ring;       /* what is left of the face at hand, n corners */
+    corner *ring;       /* the remainder of the current face, n corners */
     uint32_t *vertices; /* the same as vertices alone, for polygon.h; or sorted */
     size_t n, ring_cap, vertices_cap;
     vg_mesh to;
     size_t start_cap, vert_cap, old_cap;
-    uint32_t *old;      /* of each corner of `to` */
+    uint32_t *old;      /* per corner of `to` */
     size_t dropped, shortened, cut, pieces;
 } mending;
 
@@ -67,10 +66,10 @@ static void remove_corner(mending *k, size_t i)
     k->n--;
 }
 
-/* A vertex twice in a row, and edges that are gone along and back. */
+/* Remove repeated vertices, and edges that are followed in both directions. */
 static void tidy_ring(mending *k)
 {
-    size_t quiet = 0; /* corners passed since the last change */
+    size_t quiet = 0; /* corners visited since the last change */
     for (size_t i = 0; k->n > 1 && quiet <= k->n; i = k->n ? (i + 1) % k->n : 0) {
         size_t next = (i + 1) % k->n, after = (i + 2) % k->n;
         quiet++;
@@ -100,7 +99,7 @@ static int add_face(mending *k, const corner *at, size_t n, vg_err *e)
     return VG_OK;
 }
 
-/* The corner to cut off next: an ear, or when there is none (the face crosses itself) any with three vertices. */
+/* The corner to cut off next: an ear, or if there is none (the face crosses itself) any with three vertices. */
 static size_t find_ear(mending *k, const double normal[3])
 {
     for (size_t i = 0; i < k->n; i++) k->vertices[i] = k->ring[i].vertex;
@@ -148,7 +147,7 @@ static int mend_face(mending *k, size_t face, vg_err *e)
     return add_face(k, k->ring, k->n, e);
 }
 
-/* A label holds from the same face on, or from what came of it. face_at: what each old face begins at. */
+/* A label stays at its face, or at the first one made from it. face_at: new index of each old face. */
 static void move_labels(vg_attributes *a, const uint64_t *face_at, size_t nf)
 {
     for (size_t i = 0; i < a->nlabels; i++)

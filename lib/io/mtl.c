@@ -1,6 +1,6 @@
-/* mtl.c: materials of an OBJ, from the MTL file beside it, as an asset: a GLB of materials, textures and images alone, which
- * the writer of GLB finds by the names of usemtl.
- * Leaves out the OBJ itself (obj.c), and what MTL says of light models, reflections and displacement.
+/* mtl.c: materials of an OBJ, from the MTL file beside it, as an asset: a GLB with only materials, textures and
+ * images, which the GLB writer finds by the names of usemtl. The OBJ itself is read in obj.c. Illumination models,
+ * reflections and displacement are ignored.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_pack.h"
 
@@ -10,13 +10,14 @@
 typedef struct making {
     vgi_gltf_packing pack;
     vgi_json *materials, *textures, *images; /* borrowed from the document */
-    vgi_json *now, *pbr;                     /* the material at work; NULL: none yet */
-    vgi_names files;                         /* of the images, in their order */
+    vgi_json *now, *pbr;                     /* the current material; NULL: none yet */
+    vgi_names files;                         /* of the images, in order */
 } making;
 
 /* ---- images ---- */
 
-/* By the name in the file, or by its last part beside the file: paths are often those of another machine. */
+/* Look for the name in the file, then for its last component beside the file, because paths often refer to another
+ * machine. */
 static int read_image(making *k, const char *name, vg_bytes *to)
 {
     const char *base = name;
@@ -27,7 +28,7 @@ static int read_image(making *k, const char *name, vg_bytes *to)
     return base == name ? VG_EINPUT : vgi_gltf_read_beside(k->pack.g, k->pack.in, base, to, NULL);
 }
 
-/* The number of the texture with this image; -1: it cannot be read. */
+/* The number of the texture with this image; -1 if it cannot be read. */
 static int find_texture(making *k, const char *name, int *number, vg_err *e)
 {
     vg_bytes bytes = {0};
@@ -52,7 +53,7 @@ static int find_texture(making *k, const char *name, int *number, vg_err *e)
     return r;
 }
 
-/* "map_Kd -s 1 1 1 cloth.png": the name follows the options; a name may hold blanks if there are no options. */
+/* "map_Kd -s 1 1 1 cloth.png": the name follows the options; it may contain blanks if there are no options. */
 static char *image_name(const vgi_line *l, vg_err *e)
 {
     const char *at = l->at[0].end, *begin = l->at[1].begin, *end = l->end;
@@ -147,7 +148,7 @@ static int take_line(making *k, const vgi_line *l, vg_err *e)
     return n == 1 && vgi_field_is(word, "Pm") ? put_factor(k->pbr, "metallicFactor", x[0], e) : VG_OK;
 }
 
-/* One library, whose file `in` is of; images are beside it. */
+/* One library, with its file `in`; images are beside it. */
 static int read_library(making *k, const vgi_gltf *g, vgi_input *in, vg_err *e)
 {
     vg_bytes text = {0};
@@ -160,7 +161,7 @@ static int read_library(making *k, const vgi_gltf *g, vgi_input *in, vg_err *e)
     return r;
 }
 
-/* The file of a library beside the OBJ; NULL: there is none. */
+/* The file of a library beside the OBJ; NULL if there is none. */
 static vgi_input *open_library(const char *path, const char *name)
 {
     const size_t n = (size_t)(vgi_base_name(path) - path), size = n + strlen(name) + 1;

@@ -1,4 +1,4 @@
-/* names.c: lists of names, their natural order, and the name of a pose. format.c knows the suffixes of formats.
+/* names.c: lists of names, their natural order, and the name of a pose. Suffixes of formats are in format.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -79,14 +79,13 @@ static bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
-/* Names are compared as lists of characters and numbers. A number is a run of digits; with a point and digits
- * behind it a decimal ("0.25"), unless another point and digits follow, as in a date or version ("1.2.10"), whose
- * parts are integers. It is negative behind a '-' that is not a hyphen: at the start, or after one of
- * `separators`. */
+/* Names are compared as lists of characters and numbers. A number is a run of digits; followed by a point and digits
+ * it is a decimal ("0.25"), unless another point and digits follow, as in a date or version ("1.2.10"), whose parts
+ * are integers. It is negative after a '-' that is not a hyphen: at the start, or after one of `separators`. */
 typedef struct token {
-    int character; /* 0: the end of the name; '0': a number */
+    int character; /* 0: end of the name; '0': a number */
     bool minus;
-    const char *whole, *part; /* digits before and behind the point, without zeros in front and at the end */
+    const char *whole, *part; /* digits before and after the point, without leading and trailing zeros */
     size_t nwhole, npart;
 } token;
 
@@ -103,7 +102,7 @@ static bool is_minus(const char *start, const char *p)
     return *p == '-' && is_digit(p[1]) && (p == start || strchr(separators, p[-1]));
 }
 
-/* The digits behind the point of the number that starts at p and has n digits before it; 0: it is a whole number. */
+/* Number of digits after the point of the number that starts at p and has n digits before it; 0 for an integer. */
 static size_t count_decimals(const char *start, const char *p, size_t n)
 {
     bool within = p - start >= 2 && p[-1] == '.' && is_digit(p[-2]);
@@ -112,7 +111,7 @@ static size_t count_decimals(const char *start, const char *p, size_t n)
     return within || (decimals && *behind == '.' && is_digit(behind[1])) ? 0 : decimals;
 }
 
-/* The token at *p; *p moves behind it. */
+/* The token at *p, which moves past it. */
 static token next_token(const char *start, const char **p)
 {
     token t = {.minus = is_minus(start, *p)};

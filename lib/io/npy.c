@@ -1,5 +1,5 @@
-/* npy.c: NPY, one NumPy array: positions (frames x vertices x 3), or vectors, deformations, transforms when written.
- * Leaves out the faces, which lie in a mesh file beside the array, and several arrays in one file (npz.c).
+/* npy.c: NPY, one NumPy array: positions (frames x vertices x 3); vectors, deformations and transforms can be written
+ * too. The faces are in a mesh file beside the array; several arrays in one file are in npz.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/npy.h"
 
@@ -212,7 +212,7 @@ typedef struct reading {
     vgi_input *in;
     const char *subject;
     size_t frames, points, next;
-    bool whole;     /* Fortran order scatters frames: `data` holds the whole file, else one frame */
+    bool whole;     /* Fortran order scatters frames: `data` holds the whole file, otherwise one frame */
     bool have_data;
     vg_bytes data;
 } reading;
@@ -267,7 +267,7 @@ static int open_npy(void **state, vg_head *h, vgi_input *in, const vg_reading *h
     return r;
 }
 
-/* 0, which ends the sequence, if the file ends too. */
+/* Returns 0 (end of sequence) if the file ends, too. */
 static int finish(reading *x, vg_err *e)
 {
     int r = vgi_input_ended(x->in, e);

@@ -8,7 +8,7 @@
 enum { VGI_NPY_HEADER = 128, VGI_NPY_DIMENSIONS = 4 };
 
 typedef struct vgi_npy {
-    char kind;   /* 'f' 'i' 'u' 'b' 'U' 'S' as NumPy has them */
+    char kind;   /* 'f' 'i' 'u' 'b' 'U' 'S' as in NumPy */
     size_t item; /* bytes of one element */
     bool big, fortran;
     size_t ndim; /* 0: a single element */
@@ -16,7 +16,7 @@ typedef struct vgi_npy {
 } vgi_npy;
 
 /* vgi_npy_read: read magic and header, versions 1 to 3; the elements follow. VG_EINPUT for objects, structures and
- * more than four dimensions. *bytes is the size of the elements, which fits in a size_t. */
+ * more than four dimensions. *bytes: size of the elements, which fits in a size_t. */
 int vgi_npy_read(vgi_npy *a, size_t *bytes, vgi_input *in, const char *subject, vg_err *e) VG_MUST_CHECK;
 /* vgi_npy_write: VGI_NPY_HEADER bytes of version 1. */
 void vgi_npy_write(unsigned char to[VGI_NPY_HEADER], const char *descr, size_t ndim, const uint64_t *shape);
@@ -24,7 +24,7 @@ void vgi_npy_write(unsigned char to[VGI_NPY_HEADER], const char *descr, size_t n
 double vgi_npy_float(const vgi_npy *a, const unsigned char *p);
 /* vgi_npy_stride: the distance between elements along dimension d, in elements. */
 size_t vgi_npy_stride(const vgi_npy *a, size_t d);
-/* vgi_npy_store: write n numbers as little-endian binary32 or binary64. VG_EINPUT for one that does not fit. */
+/* vgi_npy_store: write n numbers as little-endian binary32 or binary64. VG_EINPUT for one that is out of range. */
 int vgi_npy_store(vg_bytes *to, const double *x, size_t n, bool doubles, vg_err *e) VG_MUST_CHECK;
 
 #endif

@@ -1,8 +1,7 @@
-/* npz.c: NPZ, NumPy arrays in a zip, read: the numbers of all frames, and beside them faces, reference, names and
- * times. man/vg-decode.1 lists the arrays.
- * Leaves out the header of an array (npy.c), the zip (archive.c) and writing (npz_write.c).
+/* npz.c: reads NPZ, NumPy arrays in a zip: the numbers of all frames; faces, reference, names and times.
+ * man/vg-decode.1 lists the arrays. Array headers are in npy.c, the zip in archive.c, writing in npz_write.c.
  *
- * The whole file is kept in memory, as NumPy does: the frames may stand in any order of axes.
+ * The whole file is kept in memory, as NumPy does, because the axes of the frames may be in any order.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/npz.h"
 
@@ -15,7 +14,7 @@ const char *const vgi_npz_names[ARRAYS] = {
     "graph_offsets", "graph_vertices", "links", "names", "positions", "reference", "reference_name", "root_turns", "roots",
     "selected", "times", "transforms", "vectors"};
 
-/* Names that other programs use for positions and faces; our own names go before these, and earlier ones before later
+/* Names that other programs use for positions and faces. Our own names take precedence, and earlier ones over later
  * ones. */
 static const struct {
     const char *name;
@@ -24,7 +23,7 @@ static const struct {
                    {"f", FACES},            {"triangles", FACES}};
 enum { OTHER_NAMES = sizeof other_names / sizeof *other_names, OWN_NAME = 0 };
 
-/* What files of SMPL and its kin hold in place of vertices. */
+/* Arrays that files of SMPL and related models contain instead of vertices. */
 static const char *const body_names[] = {"poses", "pose", "betas", "pose_body", "body_pose", "root_orient", "global_orient"};
 
 enum { SHAPE_TEXT = 24 * VGI_NPY_DIMENSIONS + 3 };
@@ -32,21 +31,21 @@ enum { SHAPE_TEXT = 24 * VGI_NPY_DIMENSIONS + 3 };
 struct held {
     bool there;
     const char *name; /* in the file */
-    size_t rank;      /* OWN_NAME, or that of other_names + 1, or, of a name in other letters, beyond those */
+    size_t rank;      /* OWN_NAME, or the rank in other_names + 1; larger for a name in different letter case */
     char shape[SHAPE_TEXT]; /* in the file */
     vgi_npy a;
-    bool strided;     /* the axes have been put in another order: */
+    bool strided;     /* the axes were reordered: */
     size_t stride[VGI_NPY_DIMENSIONS];
     vg_bytes data;
 };
 
 typedef struct reading {
     const char *subject;
-    char inventory[240]; /* all arrays of the file with their shapes, as far as there is room, for messages */
-    bool of_body; /* has an array of body_names */
+    char inventory[240]; /* all arrays of the file with their shapes, as many as fit, for messages */
+    bool of_body; /* contains an array of body_names */
     vg_note note;
     struct held held[ARRAYS];
-    enum array values; /* which of them holds the frames */
+    enum array values; /* the array that holds the frames */
     size_t frames, count, width, nanchors, next;
 } reading;
 
@@ -61,7 +60,7 @@ static bool is_called(const char *path, const char *name)
     return strlen(name) == n && !memcmp(name, path, n);
 }
 
-/* The same, whatever the letters: V and F, Vertices and Faces. */
+/* The same, ignoring case: V and F, Vertices and Faces. */
 static bool is_called_loosely(const char *path, const char *name)
 {
     size_t n = strlen(path) - 4;
@@ -108,7 +107,7 @@ static void list_array(reading *x, const char *path, const vg_bytes *data)
              (int)(strlen(path) - 4 > 30 ? 30 : strlen(path) - 4), path, shape);
 }
 
-/* `in` starts at an array that fills it to its end. */
+/* `in` is at an array that extends to its end. */
 static int hold(reading *x, enum array i, vgi_input *in, const char *subject, vg_err *e)
 {
     struct held *h = &x->held[i];
@@ -133,7 +132,7 @@ static int hold_member(reading *x, const char *path, const vg_bytes *data, vg_er
     char subject[200];
     vgi_input *in;
     list_array(x, path, data);
-    if (i == ARRAYS) return VG_OK; /* a feature of somebody else's */
+    if (i == ARRAYS) return VG_OK; /* a feature array of another program */
     snprintf(subject, sizeof subject, "array '%s' in %.150s", name, x->subject);
     if (x->held[i].there && x->held[i].rank == rank) return vg_fail(e, VG_EINPUT, "%s is there twice", subject);
     if (x->held[i].there && x->held[i].rank < rank) return VG_OK;
@@ -152,7 +151,7 @@ static int hold_all(reading *x, vgi_input *in, vg_err *e)
     vgi_limits limits = *vgi_input_limits(in);
     struct stat st;
     int fd = -1, r = vgi_input_spool(in, &fd, e);
-    if (r == VG_OK && fstat(fd, &st) == 0) { /* an array that is not compressed is no bomb */
+    if (r == VG_OK && fstat(fd, &st) == 0) { /* an uncompressed array cannot be a decompression bomb */
         if ((uint64_t)st.st_size > limits.member_bytes) limits.member_bytes = (uint64_t)st.st_size;
         if ((uint64_t)st.st_size > limits.total_bytes) limits.total_bytes = (uint64_t)st.st_size;
     }
@@ -182,7 +181,7 @@ static int missing(const reading *x, enum array i, enum array because, vg_err *e
                    vgi_npz_names[i]);
 }
 
-/* Is it of this shape? UINT64_MAX: any. */
+/* Whether it has this shape. UINT64_MAX: any. */
 static bool has_shape(const struct held *h, size_t ndim, const uint64_t *shape)
 {
     if (h->a.ndim != ndim) return false;
@@ -203,7 +202,7 @@ static size_t elements(const struct held *h)
     return n;
 }
 
-/* Where element i, counted in C order, lies. */
+/* Address of element i, counted in C order. */
 static const unsigned char *element(const struct held *h, size_t i)
 {
     size_t at = 0;
@@ -223,7 +222,7 @@ static int copy_floats(const reading *x, enum array i, size_t from, size_t n, do
     return VG_OK;
 }
 
-/* An integer of any size; -1 when it is negative or too large for an index. */
+/* An integer of any size; -1 if it is negative or too large for an index. */
 static int64_t integer_at(const struct held *h, size_t i)
 {
     const unsigned char *p = element(h, i);
@@ -233,7 +232,7 @@ static int64_t integer_at(const struct held *h, size_t i)
     return negative || x > UINT32_MAX ? -1 : (int64_t)x;
 }
 
-/* All of an array of indices below `limit`; *list is NULL when it is not there. */
+/* A whole array of indices below `limit`; *list is NULL if it is absent. */
 static int copy_indices(const reading *x, enum array i, uint64_t limit, uint32_t **list, size_t *n, vg_err *e)
 {
     const struct held *h = &x->held[i];
@@ -257,7 +256,7 @@ static int check_ascending(const reading *x, enum array i, const uint32_t *list,
     return VG_OK;
 }
 
-/* Text of 'U' or 'S', without the NULs that fill it up. */
+/* Text of kind 'U' or 'S', without padding NULs. */
 static int text_at(const reading *x, enum array i, size_t k, char **text, vg_err *e)
 {
     const struct held *h = &x->held[i];
@@ -294,9 +293,9 @@ static int holds_no_frames(const reading *x, vg_err *e)
                    x->subject, *x->inventory ? x->inventory : "nothing");
 }
 
-/* ---- axes: frames, vertices and x y z in any order ---- */
+/* ---- axes: frames, vertices and xyz in any order ---- */
 
-/* The vertices that the faces or the reference ask for; exact: there are no more. 0: nothing tells. */
+/* The number of vertices that the faces or the reference require; exact: not a lower bound. 0: unknown. */
 static size_t vertices_wanted(const reading *x, bool *exact)
 {
     const struct held *r = &x->held[REFERENCE];
@@ -315,7 +314,7 @@ static size_t vertices_wanted(const reading *x, bool *exact)
     return most;
 }
 
-/* frames, vertices, x y z: which axis counts each */
+/* frames, vertices, xyz: the axis of each */
 static void order_axes(struct held *h, const int axis[3])
 {
     uint64_t shape[3];
@@ -339,7 +338,7 @@ static int named_axes(reading *x, struct held *h, const char *axes, vg_err *e)
     return VG_OK;
 }
 
-/* 0: these axes cannot be frames, vertices, x y z; 1: they can; 2: the vertices are as many as are wanted. */
+/* 0: these axes cannot be frames, vertices, xyz; 1: they can; 2: the number of vertices is the required one. */
 static int suits(const uint64_t *shape, const int axis[3], size_t wanted, bool exact)
 {
     const uint64_t nv = shape[axis[1]];
@@ -347,7 +346,7 @@ static int suits(const uint64_t *shape, const int axis[3], size_t wanted, bool e
     return wanted && nv == wanted ? 2 : 1;
 }
 
-/* As (frames, vertices, 3) where that can be, else in the only other order that can be. */
+/* As (frames, vertices, 3) if possible, otherwise in the only other order that is possible. */
 static int find_axes(reading *x, struct held *h, vg_err *e)
 {
     static const int orders[6][3] = {{0, 1, 2}, {1, 0, 2}, {2, 0, 1}, {0, 2, 1}, {1, 2, 0}, {2, 1, 0}};
@@ -431,7 +430,7 @@ static int take_reference(reading *x, vg_head *h, vg_err *e)
     return text_at(x, REFERENCE_NAME, 0, &h->body.reference_name, e);
 }
 
-/* face_offsets and face_vertices; checked so far that the source can check the rest. */
+/* face_offsets and face_vertices; checked enough for the source to check the rest. */
 static int take_polygons(reading *x, vg_head *h, vg_err *e)
 {
     size_t n, corners;
@@ -448,7 +447,7 @@ static int take_polygons(reading *x, vg_head *h, vg_err *e)
     return VG_OK;
 }
 
-/* faces: as many rows as faces, all of one size. */
+/* faces: one row per face, all of one size. */
 static int take_equal_faces(reading *x, vg_head *h, vg_err *e)
 {
     const struct held *f = &x->held[FACES];
@@ -488,8 +487,8 @@ static int take_links(reading *x, vg_head *h, vg_err *e)
     return r;
 }
 
-/* The vector graph: which faces carry vectors, links, anchors. What was derived from them when it was written
- * (graph_offsets, graph_vertices) is derived again. */
+/* The vector graph: the faces with vectors, links, anchors. Derived arrays (graph_offsets, graph_vertices) are
+ * computed again. */
 static int take_graph(reading *x, vg_head *h, vg_err *e)
 {
     const uint64_t roots[2] = {x->frames, 3};
@@ -519,7 +518,7 @@ static int take_graph(reading *x, vg_head *h, vg_err *e)
                    vgi_npz_names[x->values], x->subject, x->count, corners);
 }
 
-/* What stands beside features, as far as it is there. */
+/* Check the arrays that accompany features, if present. */
 static int check_features(reading *x, const vg_head *h, vg_err *e)
 {
     const uint64_t turns[2] = {x->frames, 4}, centroids[3] = {x->frames, UINT64_MAX, 3};
@@ -544,7 +543,7 @@ static int check_labels(const reading *x, vg_err *e)
     return VG_OK;
 }
 
-/* Faces that no mesh may have go, unless the frames are counted by their corners. */
+/* Remove faces that are invalid in a mesh, unless the frames have one value per corner. */
 static int mend(reading *x, vg_head *h, vg_err *e)
 {
     if (h->kind != VG_VERTICES || !h->body.mesh.nf) return VG_OK;
@@ -645,7 +644,7 @@ static void close_npz(void *state)
     free(x);
 }
 
-/* A zip whose first member is called "... .npy". */
+/* Whether it is a zip whose first member is named "... .npy". */
 static bool sniff_npz(const unsigned char *data, size_t n)
 {
     enum { LOCAL = 30, NAME_BYTES = 26 };

@@ -1,18 +1,18 @@
-/* npz.h: what npz.c and npz_write.c share, and no other file includes: the arrays.
+/* npz.h: the arrays; shared by npz.c and npz_write.c only.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_NPZ_H
 #define VG_NPZ_H
 
 #include "io/npy.h"
 
-/* In the order in which they are written: that in which archive.c hands out the members. */
+/* In the order in which they are written, which is the order in which archive.c returns the members. */
 enum array {
     ANCHOR_POSITIONS, ANCHORS, CENTROIDS, DEFORMATIONS, FACE_OFFSETS, FACE_VERTICES, FACES, FEATURES, GRAPH_OFFSETS,
     GRAPH_VERTICES, LINKS, NAMES, POSITIONS, REFERENCE, REFERENCE_NAME, ROOT_TURNS, ROOTS, SELECTED, TIMES, TRANSFORMS,
     VECTORS, ARRAYS
 };
 
-/* Channels of frames of features that are arrays here: CENTROIDS and ROOT_TURNS. */
+/* Channels of feature frames that are arrays here: CENTROIDS and ROOT_TURNS. */
 #define VGI_NPZ_CENTROIDS "centroids"
 #define VGI_NPZ_ROOT_TURN "root_turn"
 

@@ -1,8 +1,7 @@
-/* npz_write.c: NPZ, NumPy arrays in a zip, written: all that a sequence holds but attributes and provenance.
- * Leaves out the header of an array (npy.c) and the zip (pack.c).
+/* npz_write.c: writes NPZ, NumPy arrays in a zip: a whole sequence except attributes and provenance. Array headers
+ * are in npy.c, the zip in pack.c.
  *
- * Names, times, roots and anchors are kept in memory; the numbers wait in a file without a name until their count is
- * known.
+ * Names, times, roots and anchors are kept in memory; the numbers wait in an unnamed file until their count is known.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/npz.h"
 
@@ -17,8 +16,8 @@ typedef struct writing {
     size_t per_frame;
     uint64_t frames;
     vg_bytes frame, roots, anchors, times;
-    vg_bytes turns, centroids; /* of features: channels that every frame has */
-    bool turned, placed, lost; /* lost: a frame has one of them that others have not, or of another shape */
+    vg_bytes turns, centroids; /* for features: channels that every frame has */
+    bool turned, placed, lost; /* lost: some frames lack such a channel, or have it in another shape */
     size_t parts;
     vgi_names names;
     vgi_packer *packer;
@@ -132,7 +131,7 @@ static int add_graph(writing *x, vg_err *e)
     return r;
 }
 
-/* The code points of valid UTF-8. */
+/* The next code point of valid UTF-8. */
 static uint32_t next_letter(const unsigned char **s)
 {
     uint32_t c = *(*s)++;
@@ -149,7 +148,7 @@ static size_t count_letters(const char *s)
     return n;
 }
 
-/* Texts of one width, as NumPy has them: UTF-32 filled up with zeros. */
+/* Texts of one width, as in NumPy: UTF-32 padded with zeros. */
 static int add_texts(writing *x, enum array i, size_t ndim, char *const *texts, size_t n, vg_err *e)
 {
     const uint64_t shape = n;
@@ -205,7 +204,7 @@ static int add_reference(writing *x, vg_err *e)
     return r;
 }
 
-/* Is this array part of what is written? */
+/* Whether this array is written. */
 static bool belongs(const writing *x, enum array i)
 {
     const vg_head *h = x->h;

@@ -1,5 +1,5 @@
-/* number.c: numbers as decimal text and back, exactly rounded, whatever the locale.
- * Leaves out hexadecimal numbers and digit grouping.
+/* number.c: numbers as decimal text and back, correctly rounded, independent of the locale. Hexadecimal numbers and
+ * digit grouping are not supported.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -10,8 +10,8 @@
 
 typedef unsigned __int128 wide;
 
-/* 10^k = 5^k 2^k, and 5^27 is the last power of 5 below 2^63: up to there 128 bits hold every product and quotient
- * exactly, so that rounding is decided by integers alone. */
+/* 10^k = 5^k 2^k, and 5^27 is the last power of 5 below 2^63. Up to there 128 bits hold every product and quotient
+ * exactly, so that rounding is decided with integers alone. */
 enum { MOST_FIVES = 27 };
 static const uint64_t five[MOST_FIVES + 1] = {
     /* clang-format off */
@@ -27,7 +27,7 @@ static const uint64_t five[MOST_FIVES + 1] = {
 
 static const double ten[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
                              1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
-/* 10^22 is the last power of ten that is a binary64; where the machine computes in a longer format, rounding twice
+/* 10^22 is the last power of ten that is a binary64. On machines that compute in a longer format, double rounding
  * would make even these inexact. */
 enum { MOST_EXACT_TEN = FLT_EVAL_METHOD == 0 ? 22 : -1 };
 
@@ -35,8 +35,8 @@ enum { MOST_EXACT_TEN = FLT_EVAL_METHOD == 0 ? 22 : -1 };
 
 enum {
     MOST_DIGITS = 19,      /* that many always fit in 64 bits */
-    EXACT_DIGITS = 780,    /* more digits than these decide nothing but a tie: 767 suffice for binary64 */
-    EXPONENT_LIMIT = 99999 /* exponents are cut here, far beyond where a number is 0 or infinite */
+    EXACT_DIGITS = 780,    /* digits beyond these only decide a tie: 767 suffice for binary64 */
+    EXPONENT_LIMIT = 99999 /* exponents are limited here, far beyond where a number is 0 or infinite */
 };
 
 static inline bool is_digit(char c)
@@ -54,8 +54,8 @@ static inline uint64_t load_eight(const char *s)
     return x;
 }
 
-/* The value of the digits at the start of eight characters, without a branch on how many there are: their number in
- * *n. The first character is the lowest byte; shifting left puts zeros before the digits that there are. */
+/* The value of the digits at the start of eight characters, without a branch on their number, which is stored in *n.
+ * The first character is the lowest byte; shifting left puts zeros before the digits. */
 static inline uint64_t eight_digits(uint64_t text, unsigned *n)
 {
     uint64_t x = text ^ 0x3030303030303030ull;
@@ -69,7 +69,7 @@ static inline uint64_t eight_digits(uint64_t text, unsigned *n)
     return (x * 10000 + (x >> 32)) & 0xffffffffull;
 }
 
-/* Append the digits at s to *w (which overflows without harm behind MOST_DIGITS); the first byte behind them. */
+/* Append the digits at s to *w (which overflows harmlessly after MOST_DIGITS); returns the address after them. */
 static inline const char *take_digits(const char *s, const char *end, uint64_t *w)
 {
     static const uint64_t power[9] = {1, 10, 100, 1000, 10000, 100000, 1000000, 10000000, 100000000};
@@ -89,12 +89,12 @@ static inline const char *take_digits(const char *s, const char *end, uint64_t *
     return s;
 }
 
-/* top has its highest bit set and stands for top * 2^power, plus something smaller than one if `more`. */
+/* top has its highest bit set and represents top * 2^power, plus something less than one if `more`. */
 static double round_binary(uint64_t top, bool more, int power)
 {
     uint64_t m = top >> 11, rest = top & 0x7ff;
     if (rest > 0x400 || (rest == 0x400 && (more || (m & 1)))) m++;
-    /* m brings its own leading bit, which counts one in the exponent; a carry out of m goes there too */
+    /* m includes its leading bit, which adds one to the exponent; a carry out of m also goes there */
     return vgi_as_double(((uint64_t)(power + 63 + 1022) << 52) + m);
 }
 
@@ -114,7 +114,7 @@ static double scale_decimal(uint64_t w, int q)
     }
     uint64_t divisor = five[-q];
     int up = __builtin_clzll(w), dup = __builtin_clzll(divisor);
-    wide dividend = (wide)(w << up) << 63; /* its upper half is below the divisor's: the quotient fits */
+    wide dividend = (wide)(w << up) << 63; /* its upper half is below the divisor's, so the quotient fits */
     divisor <<= dup;
     uint64_t quotient = (uint64_t)(dividend / divisor);
     bool more = (wide)quotient * divisor != dividend;
@@ -141,13 +141,13 @@ static double read_exactly(const char *s, const char *end, int64_t q)
     if (q > EXPONENT_LIMIT) q = EXPONENT_LIMIT;
     if (q < -EXPONENT_LIMIT) q = -EXPONENT_LIMIT;
     snprintf(text + n, sizeof text - n, "e%d", (int)q);
-    int saved = errno; /* out of range is no failure here: 0 or infinity is the answer */
+    int saved = errno; /* out of range is not an error here: the result is 0 or infinity */
     double x = strtod(text, NULL);
     errno = saved;
     return x;
 }
 
-/* Digits and perhaps a point in [s, end), times 10^q where q counts the digits behind the point already. */
+/* Digits with an optional point in [s, end), times 10^q, where q already accounts for the digits after the point. */
 static double read_decimal(const char *s, const char *end, int64_t q)
 {
     uint64_t w = 0;
@@ -171,7 +171,7 @@ static double read_decimal(const char *s, const char *end, int64_t q)
     return x;
 }
 
-/* "e5", "E-12" at s adds to *q; s itself comes back when no exponent is there. */
+/* Add "e5", "E-12" at s to *q; returns s itself if there is no exponent. */
 static const char *read_exponent(const char *s, const char *end, int64_t *q)
 {
     const char *p = s + 1;
@@ -240,7 +240,7 @@ const char *vgi_parse_int(const char *s, const char *end, int64_t *x)
     bool negative = false;
     if (s < end && (*s == '-' || *s == '+')) negative = *s++ == '-';
     if (s == end || !is_digit(*s)) return NULL;
-    int64_t value = 0; /* kept negative: there is one more negative number */
+    int64_t value = 0; /* kept negative, because there is one more negative number */
     for (; s < end && is_digit(*s); s++)
         if (__builtin_mul_overflow(value, 10, &value) || __builtin_sub_overflow(value, *s - '0', &value)) return NULL;
     if (!negative && value == INT64_MIN) return NULL;
@@ -250,7 +250,7 @@ const char *vgi_parse_int(const char *s, const char *end, int64_t *x)
 
 /* ------------------------------------------------------------------------------------------- writing -- */
 
-/* A finite number > 0 as m * 2^e, and what makes a text of it. */
+/* A finite number > 0 as m * 2^e, with the parameters of its kind. */
 struct binary {
     uint64_t m;
     int e;
@@ -264,7 +264,7 @@ struct decimal {
     int power; /* digits * 10^power */
 };
 
-/* A few bytes, at most 20: a call of memcpy takes longer than they do. */
+/* At most 20 bytes; a call of memcpy would take longer. */
 static inline void copy_few(char *to, const char *from, size_t n)
 {
     if (n >= 8) {
@@ -297,8 +297,8 @@ size_t vgi_print_uint(char *to, uint64_t x)
     return n;
 }
 
-/* Of the integers in lo .. hi that which ends in the most zeros, and of those the nearest to the true value, which is
- * v plus a fraction, v_rounded when rounded. False when there is none. */
+/* Among the integers in lo .. hi the one with the most trailing zeros, and among those the nearest to the true value,
+ * which is v plus a fraction (v_rounded when rounded). False if there is none. */
 static bool shortest_between(uint64_t lo, uint64_t hi, uint64_t v, uint64_t v_rounded, int power, struct decimal *d)
 {
     if (lo > hi) return false;
@@ -318,15 +318,15 @@ static bool shortest_between(uint64_t lo, uint64_t hi, uint64_t v, uint64_t v_ro
     return true;
 }
 
-/* The shortest decimal by exact integers; false when the number is too large or small for them.
- * With k such that x * 10^k has most_digits digits before the point, all numbers that read back as x lie between lo
- * and hi, half-way to the neighbours, which are counted in quarters of a unit of m: 4m - 2 (or 4m - 1) and 4m + 2.
- * Scaling them is multiplying by `up` and dividing by `down`, one a power of 2, the other of 5. */
+/* The shortest decimal by exact integers; false if the number is too large or small. With k such that x * 10^k has
+ * most_digits digits before the point, all numbers that read back as x lie between lo and hi, half-way to the
+ * neighbours. In quarters of a unit of m these are 4m - 2 (or 4m - 1) and 4m + 2. To scale them, multiply by `up` and
+ * divide by `down`, one a power of 2, the other of 5. */
 static bool shortest_by_integers(const struct binary *x, struct decimal *d)
 {
     int top = 63 - __builtin_clzll(x->m) + x->e; /* x is in [2^top, 2^(top+1)) */
     int tens = (int)((top * 78913ll) >> 18);     /* floor(top * log10(2)), exact for |top| < 1650 */
-    int k = x->most_digits - 1 - tens;           /* one digit too many at times: it does no harm */
+    int k = x->most_digits - 1 - tens;           /* occasionally one digit too many, which does no harm */
     if (k > MOST_FIVES || k < -MOST_FIVES) return false;
     int shift = x->e - 2 + k;
     if (k >= 0 ? (shift > 0 || shift < -100) : (shift < 0 || shift > 64)) return false;
@@ -344,9 +344,9 @@ static bool shortest_by_integers(const struct binary *x, struct decimal *d)
         floor = v / down, rounded = (v + down / 2) / down;
         first_at = first * down, last_at = last * down;
     }
-    if (x->m & 1) { /* a tie goes to the even neighbour, so the bounds themselves are out */
-        /* A text next to the bound of a float can round to the bound itself when read as a double, half of whose unit
-         * is 2^-28 of our quarters: out as well. */
+    if (x->m & 1) { /* a tie goes to the even neighbour, so the bounds are excluded */
+        /* A text next to the bound of a float can round to the bound itself when read as a double. Half a unit of a
+         * double is 2^-28 of our quarters; exclude that as well. */
         wide margin = x->is_float ? up >> 28 : 0;
         if (first_at - lo <= margin) first++;
         if (hi - last_at <= margin) last--;
@@ -363,7 +363,7 @@ static bool reads_back(const struct binary *x, const struct decimal *d)
     return x->is_float ? (double)(float)got == want && (double)strtof(text, NULL) == want : got == want;
 }
 
-/* The same by trial, for the numbers that integers do not reach. */
+/* The same by trial, for numbers out of reach of the integers. */
 static void shortest_by_trial(const struct binary *x, struct decimal *d)
 {
     int saved = errno;
@@ -372,10 +372,11 @@ static void shortest_by_trial(const struct binary *x, struct decimal *d)
         int n = snprintf(text, sizeof text, "%.*e", digits - 1, ldexp((double)x->m, x->e));
         uint64_t nearest = 0;
         int i = 0;
-        for (; i < n && text[i] != 'e'; i++) /* whatever the locale's point is, it is no digit */
+        for (; i < n && text[i] != 'e'; i++) /* the locale's decimal point, whatever it is, is not a digit */
             if (is_digit(text[i])) nearest = nearest * 10 + (uint64_t)(text[i] - '0');
         int power = (int)strtol(text + i + 1, NULL, 10) - (digits - 1);
-        static const int steps[] = {0, 1, -1}; /* at a power of 2 it need not be the nearest that reads back */
+        static const int steps[] = {0, 1, -1}; /* at a power of 2 the nearest text need not be the one that reads
+                                                  back */
         for (int s = 0; s < 3; s++) {
             *d = (struct decimal){nearest + (uint64_t)(int64_t)steps[s], power};
             if (reads_back(x, d)) goto out;
@@ -385,7 +386,7 @@ out:
     errno = saved;
 }
 
-/* d in plain notation from 10^-5 to below 10^most_plain, else with an exponent. */
+/* d in plain notation from 10^-5 to below 10^most_plain, otherwise with an exponent. */
 static size_t print_decimal(char *to, const struct decimal *d, int most_plain)
 {
     char digits[20];
@@ -428,7 +429,7 @@ static size_t print_binary(char *to, const struct binary *x, int most_plain)
     return print_decimal(to, &d, most_plain);
 }
 
-/* "0", "inf" or "nan" for the bits of such a number; 0 for others. */
+/* "0", "inf" or "nan" for such a number; 0 for others. */
 static size_t print_special(char *to, bool zero, bool infinite, bool nan)
 {
     if (zero) return *to = '0', 1;

@@ -1,13 +1,13 @@
-/* obj.c: Wavefront OBJ, read: vertices, texture coordinates, faces, lines, and the names of groups and materials.
- * Leaves out normals (they change with the pose), vertex colours, points, free-form surfaces, the material files, and
- * writing (obj_write.c).
+/* obj.c: reads Wavefront OBJ: vertices, texture coordinates, faces, lines, and the names of groups and materials.
+ * Normals (they change with the pose), vertex colours, points and free-form surfaces are ignored; material files are
+ * read in mtl.c. Writing is in obj_write.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-enum { SHOWN = 40 }; /* bytes of the input that a message shows */
+enum { SHOWN = 40 }; /* bytes of the input shown in a message */
 
 /* A file being read. Arrays are those of the model; these are their capacities. */
 struct reading {
@@ -18,10 +18,10 @@ struct reading {
     vg_model *m;
     size_t vertices_cap, start_cap, vert_cap, tex_cap, labels_cap;
     size_t corners;
-    bool textured;      /* corner_tex is there, vert_cap long */
-    size_t sought_face; /* find_face: stop behind this face ... */
-    const char *found;  /* ... and say where its statement is */
-    size_t bad_tex;     /* texture coordinates that are none */
+    bool textured;      /* corner_tex exists, with capacity vert_cap */
+    size_t sought_face; /* find_face: stop after this face ... */
+    const char *found;  /* ... and store the position of its statement */
+    size_t bad_tex;     /* number of malformed texture coordinates */
 };
 
 static size_t line_of(const struct reading *r, const char *p)
@@ -36,7 +36,7 @@ static bool is_line_end(const struct reading *r, const char *p)
     return p == r->end || *p == r->line_end;
 }
 
-/* A backslash before a line end joins the lines: the first byte of the next line, or NULL. */
+/* A backslash before a line end joins two lines: the first byte of the second line, or NULL. */
 static const char *continuation(const struct reading *r, const char *p)
 {
     if (*p++ != '\\') return NULL;
@@ -50,8 +50,8 @@ static bool is_odd_blank(const struct reading *r, char c)
     return c == ' ' || c == '\t' || (c == '\r' && r->line_end != '\r');
 }
 
-/* Between numbers lines are joined by a backslash with blanks behind it, too, which editors leave there. A name may end
- * like that. */
+/* Between numbers a backslash followed by blanks, which editors leave there, also joins lines. A name may end like
+ * that. */
 static const char *loose_continuation(const struct reading *r, const char *p)
 {
     if (*p++ != '\\') return NULL;
@@ -70,7 +70,7 @@ static const char *skip_odd_blanks(const struct reading *r, const char *p)
     return p;
 }
 
-/* Blanks and joined lines. One blank before something visible is what nearly all files have. */
+/* Skip blanks and joined lines. Nearly all files have one blank before something visible. */
 static inline const char *skip_blanks(const struct reading *r, const char *p)
 {
     if (p < r->end && *p == ' ') p++;
@@ -83,7 +83,7 @@ static inline bool at_end(const struct reading *r, const char *p)
     return is_line_end(r, p) || *p == '#';
 }
 
-/* The next line, which joined lines are part of. */
+/* The next line that does not continue the statement. */
 static const char *skip_statement(const struct reading *r, const char *p)
 {
     while (p < r->end) {
@@ -103,7 +103,7 @@ static const char *skip_comment(const struct reading *r, const char *p)
     return q ? q + 1 : r->end;
 }
 
-/* Does a word end before p? */
+/* Whether a word ends before p. */
 static inline bool ends_word(const struct reading *r, const char *p)
 {
     return is_line_end(r, p) || *p == ' ' || *p == '\t' || *p == '\r' || *p == '\\';
@@ -118,14 +118,14 @@ static const char *skip_words(const struct reading *r, const char *p)
     return p;
 }
 
-/* Does the word at p equal `word`? */
+/* Whether the word at p equals `word`. */
 static bool is_word(const struct reading *r, const char *p, const char *word)
 {
     size_t n = strlen(word);
     return (size_t)(r->end - p) >= n && !memcmp(p, word, n) && ends_word(r, p + n);
 }
 
-/* VG_EINPUT: what stands at p, as the file has it, is not what was expected. */
+/* VG_EINPUT: unexpected text at p, which is quoted from the file. */
 static int fail_at(const struct reading *r, const char *p, const char *expected)
 {
     size_t n = 0;
@@ -135,7 +135,7 @@ static int fail_at(const struct reading *r, const char *p, const char *expected)
                    (int)n, p);
 }
 
-/* VG_EINPUT: the word at p, which begins like a number, is none or not finite; Windows writes NaN as "-1.#IND". */
+/* VG_EINPUT: the word at p begins like a number but is not one, or not finite; Windows writes NaN as "-1.#IND". */
 static int fail_number(const struct reading *r, const char *p)
 {
     size_t n = 0;
@@ -143,7 +143,7 @@ static int fail_number(const struct reading *r, const char *p)
     return vg_fail(r->e, VG_EINPUT, "%s line %zu: '%.*s' is not a finite number", r->subject, line_of(r, p), (int)n, p);
 }
 
-/* One of the numbers of a vertex at p, which blanks stand before; what follows it, or NULL. */
+/* One coordinate of a vertex at p, after blanks; returns the address after it, or NULL. */
 static inline const char *read_coordinate(struct reading *r, const char *p, double *x)
 {
     const char *word = skip_blanks(r, p);
@@ -178,7 +178,7 @@ static const char *read_vertex(struct reading *r, const char *p)
     return skip_words(r, p);
 }
 
-/* One to three finite numbers and nothing else: how many; 0: it is something else. */
+/* One to three finite numbers and nothing else; returns their number, or 0. */
 static uint32_t take_tex(const struct reading *r, const char *p, double x[3])
 {
     for (uint32_t n = 0;; n++) {
@@ -190,7 +190,7 @@ static uint32_t take_tex(const struct reading *r, const char *p, double x[3])
     }
 }
 
-/* Three numbers are kept of each; finish_tex packs them to what the file has. One that is no number is marked by a
+/* Three numbers are stored for each; finish_tex packs them to the width of the file. A malformed one is marked by a
  * NaN. */
 static const char *read_tex(struct reading *r, const char *p)
 {
@@ -209,8 +209,8 @@ static const char *read_tex(struct reading *r, const char *p)
     return skip_words(r, p);
 }
 
-/* An index at p, counted from 1, or from the end when negative, into *index, counted from 0. Whether it is below the
- * final count is seen at the end of the file: it may come before what it names. */
+/* An index at p, counted from 1, or from the end if negative, into *index, counted from 0. It may precede the vertex
+ * that it names, so it is compared with the final count at the end of the file. */
 static inline const char *read_index(const struct reading *r, const char *p, size_t count, uint32_t *index)
 {
     const char *s = p, *end = r->end;
@@ -241,7 +241,7 @@ static inline const char *read_index(const struct reading *r, const char *p, siz
     return NULL;
 }
 
-/* The same for a texture coordinate. One that cannot be there costs the corner nothing else: it is UINT32_MAX - 1. */
+/* The same for a texture coordinate. An impossible one only marks the corner: it becomes UINT32_MAX - 1. */
 static const char *read_tex_index(const struct reading *r, const char *p, uint32_t *index)
 {
     int64_t x;
@@ -268,7 +268,7 @@ static int grow_corners(struct reading *r, size_t need)
     return VG_OK;
 }
 
-/* From now on every corner has a texture coordinate, or UINT32_MAX. */
+/* Give every corner from now on a texture coordinate, or UINT32_MAX. */
 static int start_texture(struct reading *r)
 {
     uint32_t *tex = vgi_array_raw(r->vert_cap, sizeof *tex, r->e);
@@ -279,7 +279,7 @@ static int start_texture(struct reading *r)
     return VG_OK;
 }
 
-/* One corner: v, v/vt, v//vn or v/vt/vn, any of the latter left empty. The normal is read and forgotten. */
+/* One corner: v, v/vt, v//vn or v/vt/vn, where vt and vn may be empty. The normal is read and dropped. */
 static inline const char *read_corner(struct reading *r, const char *p)
 {
     vg_model *m = r->m;
@@ -304,7 +304,7 @@ static inline const char *read_corner(struct reading *r, const char *p)
     return p;
 }
 
-/* The corners from `first` on are a new face. */
+/* Make a face of the corners from `first` on. */
 static inline int end_face(struct reading *r, size_t first, size_t size)
 {
     vg_mesh *mesh = &r->m->mesh;
@@ -315,13 +315,13 @@ static inline int end_face(struct reading *r, size_t first, size_t size)
     return VG_OK;
 }
 
-/* The n >= 2 corners from `first` on are a polyline: every two of them are a face. */
+/* Make a polyline of the n >= 2 corners from `first` on: every two of them are a face. */
 static int end_line(struct reading *r, size_t first, size_t n)
 {
     size_t segments = n - 1;
     if (first + 2 * segments > r->vert_cap && grow_corners(r, first + 2 * segments) < 0) return VG_ENOMEM;
     uint32_t *vert = r->m->mesh.vert + first, *tex = r->textured ? r->m->attributes.corner_tex + first : NULL;
-    for (size_t i = segments; i-- > 0;) { /* backwards, since they move apart in place */
+    for (size_t i = segments; i-- > 0;) { /* backwards, because they move apart in place */
         uint32_t a = vert[i], b = vert[i + 1];
         vert[2 * i] = a, vert[2 * i + 1] = b;
         if (!tex) continue;
@@ -362,7 +362,7 @@ static const char *read_face(struct reading *r, const char *p, bool line)
     return p;
 }
 
-/* The text [p, end) as UTF-8, trimmed, joined lines as one blank. */
+/* The text [p, end) as UTF-8, trimmed, with joined lines as one blank. */
 static char *label_text(struct reading *r, const char *p, const char *end)
 {
     size_t n = 0, first = 0;
@@ -398,7 +398,7 @@ static const char *read_label(struct reading *r, const char *p, vg_label_kind ki
     return next;
 }
 
-/* One statement at p, which is no blank; what follows it. NULL: failed. */
+/* One statement at p, which is not a blank; returns the address after it. NULL: failed. */
 static const char *read_statement(struct reading *r, const char *p)
 {
     static const struct {
@@ -416,7 +416,8 @@ static const char *read_statement(struct reading *r, const char *p)
         break;
     case 'f':
         if (ends_word(r, p + 1)) return read_face(r, p + 1, false);
-        if (is_word(r, p, "fo")) return read_face(r, p + 2, false); /* what version 2 of the format called it */
+        if (is_word(r, p, "fo")) return read_face(r, p + 2, false); /* name of the statement in version 2 of the
+                                                                       format */
         break;
     case 'l':
         if (ends_word(r, p + 1)) return read_face(r, p + 1, true);
@@ -458,7 +459,7 @@ static struct reading start_reading(vg_model *m, const char *data, size_t n, con
                             .sought_face = SIZE_MAX};
 }
 
-/* Find the line of a wrong face by reading the file again, so that good files pay nothing for it. */
+/* Find the line of an invalid face by reading the file again, so that valid files pay nothing for it. */
 static size_t line_of_face(const struct reading *r, size_t face)
 {
     vg_model again = {0};
@@ -481,7 +482,7 @@ static size_t face_of_corner(const vg_mesh *m, size_t corner)
     return low;
 }
 
-/* Every vertex is there. */
+/* Check that all vertices exist. */
 static int check_vertices(const struct reading *r)
 {
     const vg_mesh *m = &r->m->mesh;
@@ -492,7 +493,7 @@ static int check_vertices(const struct reading *r)
     return VG_OK;
 }
 
-/* Texture coordinates that are numbers move up; number_of says where to. */
+/* Compact the valid texture coordinates; number_of: their new indices. */
 static void pack_tex(vg_attributes *a, uint32_t *number_of)
 {
     size_t kept = 0;
@@ -506,7 +507,7 @@ static void pack_tex(vg_attributes *a, uint32_t *number_of)
     a->ntex = kept;
 }
 
-/* How many corners ask for a texture coordinate that is not there: they have none now. */
+/* Number of corners with a missing texture coordinate; they get none. */
 static size_t renumber_tex(const struct reading *r, const uint32_t *number_of, size_t n)
 {
     uint32_t *tex = r->m->attributes.corner_tex;
@@ -518,8 +519,7 @@ static size_t renumber_tex(const struct reading *r, const uint32_t *number_of, s
     return missing;
 }
 
-/* Texture coordinates to as many numbers as the longest has, and an entry for each corner; a bad one costs nothing but
- * itself. */
+/* Reduce texture coordinates to the longest width used, with an entry for each corner; malformed ones are dropped. */
 static int finish_tex(struct reading *r)
 {
     vg_attributes *a = &r->m->attributes;
@@ -563,7 +563,7 @@ static int read_obj(vg_model *m, const char *data, size_t n, const char *subject
     return r;
 }
 
-/* Is the first statement one of OBJ? Text that has comments only is left to its name. */
+/* Whether the first statement is one of OBJ. Text with comments only is left to the suffix. */
 static bool sniff_obj(const unsigned char *data, size_t n)
 {
     static const char *const numeric[] = {"v", "vt", "vn", "vp", "f", "l", "p"};

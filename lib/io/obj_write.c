@@ -1,4 +1,4 @@
-/* obj_write.c: Wavefront OBJ, written: what obj.c reads.
+/* obj_write.c: writes Wavefront OBJ as obj.c reads it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -23,18 +23,18 @@ static int write_label(vg_bytes *out, const vg_label *label, vg_err *e)
 {
     const char *word = label_word(label->kind);
     size_t n = strlen(label->text);
-    if (!word) return VG_OK; /* a kind that OBJ does not have */
+    if (!word) return VG_OK; /* not a kind of label in OBJ */
     if (strpbrk(label->text, "\r\n"))
         return vg_fail(e, VG_EINPUT, "%s '%s' has a line break, which OBJ cannot hold", word, label->text);
     int result = vgi_bytes_append(out, word, strlen(word), e);
     if (result == VG_OK && n) result = vgi_bytes_append(out, " ", 1, e);
     if (result == VG_OK) result = vgi_bytes_append(out, label->text, n, e);
-    /* a blank keeps a backslash at the end from joining the next line */
+    /* a trailing blank keeps a final backslash from joining the next line */
     const char *stop = n && label->text[n - 1] == '\\' ? " \n" : "\n";
     return result == VG_OK ? vgi_bytes_append(out, stop, strlen(stop), e) : result;
 }
 
-/* Lines of `dim` numbers behind a keyword. */
+/* Lines of `dim` numbers after a keyword. */
 static int write_numbers(vg_bytes *out, const char *word, const double *x, size_t n, size_t dim, bool full, vg_err *e)
 {
     size_t length = strlen(word);
@@ -70,7 +70,7 @@ static int write_face(vg_bytes *out, const uint32_t *vert, const uint32_t *tex, 
     return VG_OK;
 }
 
-/* Labels of which the face comes at or before f, from *next on. Libraries stand at the head of the file. */
+/* Labels that apply at or before face f, from *next on. Libraries are at the start of the file. */
 static int write_labels(vg_bytes *out, const vg_attributes *a, size_t f, size_t *next, vg_err *e)
 {
     for (; *next < a->nlabels && a->labels[*next].face <= f; ++*next) {

@@ -1,12 +1,12 @@
-/* objects.c: an OBJ file whose objects are the frames of a sequence: each 'o' begins a mesh with the same number of
- * vertices and the same faces as the first, counted from its own first vertex.
- * Leaves out statements and numbers (obj.c), and files whose objects are parts of one mesh, which is the usual.
+/* objects.c: reads an OBJ file whose objects are the frames of a sequence: each 'o' begins a mesh with the same
+ * number of vertices and the same faces as the first, numbered from its own first vertex. Statements and numbers are
+ * in obj.c. In most files objects are parts of one mesh instead.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
 #include <stdlib.h>
 
-/* How many objects there are, each with faces of its own; 0: a face belongs to none, or an object has none. */
+/* Number of objects if each has faces; 0 if a face is outside all objects, or an object has no faces. */
 static size_t count_objects(const vg_model *m)
 {
     const vg_attributes *a = &m->attributes;
@@ -21,7 +21,7 @@ static size_t count_objects(const vg_model *m)
     return n;
 }
 
-/* Does the object that begins at this face have the faces of the first, `shift` vertices further on? */
+/* Whether the object that begins at this face has the faces of the first one, shifted by `shift` vertices. */
 static bool repeats_first(const vg_mesh *m, size_t face, size_t nf, size_t shift)
 {
     const size_t from = m->start[face];
@@ -32,7 +32,7 @@ static bool repeats_first(const vg_mesh *m, size_t face, size_t nf, size_t shift
     return true;
 }
 
-/* The name of object number i; borrowed. */
+/* The name of object i; borrowed. */
 static const vg_label *find_object(const vg_model *m, size_t i)
 {
     const vg_label *l = m->attributes.labels;
@@ -77,9 +77,9 @@ bool vgi_obj_numbered(const vg_model *m, size_t frames)
 /* ---- the sequence ---- */
 
 typedef struct reading {
-    vg_model m;        /* its mesh is given away; the vertices are those of all frames */
+    vg_model m;        /* its mesh was moved out; the vertices are those of all frames */
     size_t nv, frames, next;
-    char **names;      /* frames */
+    char **names;      /* one per frame */
 } reading;
 
 static int keep_names(reading *x, vg_err *e)
@@ -92,7 +92,7 @@ static int keep_names(reading *x, vg_err *e)
     return VG_OK;
 }
 
-/* What the attributes say of the first object: its name is that of a frame. */
+/* Keep the attributes of the first object, without its name, which is that of a frame. */
 static void cut_attributes(vg_attributes *a, size_t nf, size_t corners)
 {
     size_t labels = 0, ntex = 0;

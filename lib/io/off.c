@@ -1,9 +1,9 @@
-/* off.c: OFF, the object file format of Geomview, as text: vertices and faces.
- * Leaves out normals, colours and texture coordinates (skipped), binary files and other dimensions than 3 (refused).
+/* off.c: OFF, the object file format of Geomview, as text: vertices and faces. Normals, colours and texture
+ * coordinates are skipped; binary files and dimensions other than 3 are refused.
  *
- * OFF is a sequence of words, whatever the lines; only colours, normals and the like, which may or may not be there, end
- * with the line. So up to three readings are tried, until one fits: elements end with their line, whatever else stands
- * there; the vertices are words, three each, and faces end with their line; all are words.
+ * OFF is a sequence of words, independent of lines, but optional data such as colours and normals ends with the line.
+ * So up to three interpretations are tried until one fits: elements end with their line, whatever follows; vertices
+ * are three words each, and faces end with their line; everything is words.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -16,7 +16,7 @@ enum { MOST_NUMBER = 26, MOST_INDEX = 11, SHOWN = 40 };
 
 struct reading {
     const char *data, *end, *p;
-    bool bare_vertices, bare_faces; /* words alone: three to a vertex, no colours */
+    bool bare_vertices, bare_faces; /* words alone: three per vertex, no colours */
     const char *subject;
     vg_err *e;
     vg_model *m;
@@ -33,7 +33,7 @@ static bool is_line_end(char c)
     return c == '\n' || c == '\r';
 }
 
-/* LF, CR LF and CR end lines. */
+/* LF, CR LF and CR end a line. */
 static size_t line_of(const struct reading *r, const char *p)
 {
     size_t n = 1;
@@ -46,7 +46,7 @@ static void skip_line(struct reading *r)
     while (r->p < r->end && !is_line_end(*r->p)) r->p++;
 }
 
-/* To the next word; false at the end of the file. */
+/* Advance to the next word; false at the end of the file. */
 static bool find_word(struct reading *r)
 {
     for (;;) {
@@ -56,7 +56,7 @@ static bool find_word(struct reading *r)
     }
 }
 
-/* Is there another word in this line? */
+/* Whether the line has another word. */
 static bool line_goes_on(struct reading *r)
 {
     while (r->p < r->end && is_blank(*r->p)) r->p++;
@@ -106,13 +106,13 @@ static size_t keyword(const char *s, const char *end)
     }
     if (end - p < 3 || memcmp(p, "OFF", 3)) return 0;
     p += 3;
-    /* some writers forget the line end before the counts */
+    /* some writers omit the line end before the counts */
     bool ends = p == end || is_blank(*p) || is_line_end(*p) || *p == '#' || (*p >= '0' && *p <= '9');
     return ends ? (size_t)(p - s) : 0;
 }
 
-/* The keyword, which a file called .off may lack, and the counts: of vertices, of faces, and of edges, which some writers
- * leave out. */
+/* The keyword, which a file named .off may lack, and the counts: vertices, faces, and edges, which some writers
+ * omit. */
 static int read_header(struct reading *r, size_t *nv, size_t *nf)
 {
     size_t n = find_word(r) ? keyword(r->p, r->end) : 0, edges;
@@ -129,8 +129,8 @@ static int read_header(struct reading *r, size_t *nv, size_t *nf)
     return result == VG_OK && !r->bare_vertices && line_goes_on(r) ? fail_here(r, "end of line") : result;
 }
 
-/* The shortest vertex is "0 0 0", the shortest face "0", with a blank that the last may lack. Counts beyond what is left
- * are refused before there is memory for them. */
+/* The shortest vertex is "0 0 0" and the shortest face "0", followed by a blank except at the end. Larger counts than
+ * the rest of the file can hold are refused before memory is allocated. */
 static int check_counts(const struct reading *r, size_t nv, size_t nf)
 {
     size_t left = (size_t)(r->end - r->p) + 1;
@@ -196,7 +196,7 @@ static int read_elements(struct reading *r, size_t nv, size_t nf)
     return result;
 }
 
-/* What nothing was announced of. */
+/* Refuse data after the last element. */
 static int finish(struct reading *r)
 {
     if (!find_word(r)) return VG_OK;
@@ -205,7 +205,7 @@ static int finish(struct reading *r)
     return VG_OK;
 }
 
-/* bare: nothing, the vertices, or vertices and faces are words alone */
+/* bare: which of nothing, the vertices, or vertices and faces are words alone */
 static int read_as(vg_model *m, int bare, const char *data, size_t n, const char *subject, vg_err *e)
 {
     struct reading r = {.data = data, .end = data + n, .p = data, .subject = subject, .e = e, .m = m};

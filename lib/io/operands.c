@@ -1,5 +1,5 @@
-/* operands.c: the files that an operand names: itself, the mesh files of a directory, or all that match a quoted
- * pattern. source.c reads them.
+/* operands.c: the files that an operand names: the file itself, the mesh files of a directory, or all that match a
+ * quoted pattern. They are read in source.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -22,7 +22,7 @@ static enum worth judge_file(DIR *dir, const char *name)
     return worth && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISREG(st.st_mode) ? worth : NOTHING;
 }
 
-/* Files that hold a sequence are read only if there are no mesh files: a skeleton or an array beside meshes
+/* Files that hold a sequence are used only if there are no mesh files, because a skeleton or an array beside meshes
  * describes the same poses. */
 static int list_files(vgi_names *names, DIR *dir, vg_err *e)
 {

@@ -1,4 +1,4 @@
-/* pack.c: writes archives. The bytes depend on names and contents only. archive.c reads them.
+/* pack.c: writes archives. The bytes depend only on names and contents. Reading is in archive.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/unpack.h"
 
@@ -21,7 +21,7 @@ static const struct packing {
     {".7z", ARCHIVE_FORMAT_7ZIP, ARCHIVE_FILTER_NONE, false},
 };
 
-/* Not chosen by a name; members are uncompressed, as NumPy's savez writes them. */
+/* Not selected by name; members are uncompressed, as NumPy's savez writes them. */
 static const struct packing plain_zip = {"", ARCHIVE_FORMAT_ZIP, ARCHIVE_FILTER_NONE, true};
 
 struct vgi_packer {
@@ -30,7 +30,7 @@ struct vgi_packer {
     locale_t utf8;
     int fd;
     char *name;
-    vg_err failure; /* the error of our own write callback */
+    vg_err failure; /* error of our own write callback */
 };
 
 static const struct packing *find_packing(const char *name, size_t n)
@@ -189,7 +189,8 @@ void vgi_packer_close(vgi_packer **packer)
 {
     vgi_packer *p = *packer;
     if (!p) return;
-    p->failure.code = VG_ESYS; /* freeing writes the end of the archive unless vgi_packer_end has; it is discarded */
+    p->failure.code = VG_ESYS; /* freeing writes the end of the archive unless vgi_packer_end already has; it is
+                                  discarded */
     if (p->la) archive_write_free(p->la);
     archive_entry_free(p->entry);
     if (p->utf8) freelocale(p->utf8);

@@ -1,6 +1,5 @@
-/* payload.c: FORM and FAIL, both directions side by side (fmt/STREAM.md, section 3).
- * Leaves out the other header records (artefact_io.c), frames (frame_io.c), record headers and
- * checksums (record.c) and the order of records (stream.c).
+/* payload.c: reads and writes FORM and FAIL (fmt/STREAM.md, section 3). Other header records are in artefact_io.c,
+ * frames in frame_io.c, record headers and checksums in record.c, the order of records in stream.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/cursor.h"
 #include "model/form.h"
@@ -14,7 +13,7 @@ static bool needs_mesh(vg_element e)
     return e == VG_OF_VERTEX || e == VG_OF_CORNER || e == VG_OF_JOINT;
 }
 
-/* Why frames of h->count elements contradict the records before them; NULL: they do not. */
+/* Why frames with h->count elements contradict the preceding records; NULL if they do not. */
 static const char *refuse_form(const vg_head *h)
 {
     vg_element element = vg_head_element(h);
@@ -29,7 +28,7 @@ static const char *refuse_form(const vg_head *h)
     return h->count != vg_head_elements(h, element) ? "its count does not fit its elements" : NULL;
 }
 
-/* The table says element and width of a known form; of an unknown form they are kept as they are. */
+/* The table gives element and width of a known form; those of an unknown form are stored as read. */
 static const char *take_form(vg_head *h, char *name, char *element, uint64_t width)
 {
     h->kind = vgi_form_find(name);

@@ -1,5 +1,5 @@
 /* plain.c: text files as plain UTF-8: removes a byte order mark and converts UTF-16, which Windows programs call
- * "Unicode". Leaves out other encodings: text in them is passed on, since only names are affected (vgi_to_utf8).
+ * "Unicode". Text in other encodings is not changed, because only names are affected (vgi_to_utf8).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -10,7 +10,7 @@ static uint32_t unit_at(const unsigned char *p, bool big)
     return big ? (uint32_t)p[0] << 8 | p[1] : (uint32_t)p[1] << 8 | p[0];
 }
 
-/* A binary file may begin with the same two bytes: in text an ASCII character follows the mark. */
+/* A binary file may begin with the same two bytes; in text an ASCII character follows the mark. */
 static bool is_utf16(const unsigned char *data, size_t n, bool *big)
 {
     if (n < 4) return false;
@@ -22,7 +22,7 @@ static bool is_utf16(const unsigned char *data, size_t n, bool *big)
 
 size_t vgi_mark_bytes(const void *data, size_t n)
 {
-    enum { START = 84 }; /* a binary STL may begin so, but has a zero in its first bytes */
+    enum { START = 84 }; /* a binary STL may begin so, but contains a zero in its first bytes */
     bool marked = n >= 3 && !memcmp(data, "\xef\xbb\xbf", 3);
     return marked && !memchr(data, 0, n < START ? n : START) ? 3 : 0;
 }

@@ -1,12 +1,12 @@
-/* ply.c: PLY polygon files, text and binary in both byte orders, read: vertices, faces, triangle strips, edges.
- * Leaves out every other element and property (colours, normals, user data: skipped) and writing (ply_write.c).
+/* ply.c: reads PLY polygon files, text and binary in both byte orders: vertices, faces, triangle strips, edges. All
+ * other elements and properties (colours, normals, user data) are skipped. Writing is in ply_write.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-enum { MOST_WORDS = 6, SHOWN = 40 }; /* of a line of the header; bytes of the input that a message shows */
+enum { MOST_WORDS = 6, SHOWN = 40 }; /* words per header line; bytes of the input shown in a message */
 
 enum type { NO_TYPE, I8, U8, I16, U16, I32, U32, F32, F64 };
 static const unsigned char type_bytes[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
@@ -25,7 +25,7 @@ struct element {
     char name[SHOWN + 1];
     uint64_t count;
     size_t first, n; /* its properties */
-    size_t least;    /* bytes that one needs at least */
+    size_t least;    /* least number of bytes per element */
     bool fixed;      /* binary, no lists: exactly `least` bytes each */
 };
 
@@ -71,7 +71,7 @@ static enum type type_named(struct word w)
     return NO_TYPE;
 }
 
-/* One line of the header, cut into words; lines end as the first one does. False at the end of the file. */
+/* One line of the header, split into words; lines end as the first one does. False at the end of the file. */
 static bool next_line(struct reading *r, char line_end, struct word words[MOST_WORDS], size_t *n)
 {
     const char *stop = memchr(r->p, line_end, (size_t)(r->end - r->p));
@@ -172,7 +172,7 @@ static int read_property_line(struct reading *r, const struct word *words, size_
     return VG_OK;
 }
 
-/* Check that the required properties exist; compute how many bytes each element needs at least. */
+/* Check that the required properties exist, and compute the least number of bytes per element. */
 static int finish_element(struct reading *r, struct element *el)
 {
     el->fixed = !r->text;
@@ -210,7 +210,7 @@ static int read_header(struct reading *r)
         if (word_is(words[0], "format")) result = read_encoding(r, words, n), formatted = true;
         else if (word_is(words[0], "element")) result = read_element_line(r, words, n);
         else if (word_is(words[0], "property")) result = read_property_line(r, words, n);
-        else strange++; /* a comment that was broken in two, as old Blenders wrote the name of their file */
+        else strange++; /* a comment broken in two, as old versions of Blender wrote their file name */
         if (result < 0) return result;
     }
     if (strange) vgi_note(&r->m->note, "left out %zu lines of the PLY header that mean nothing", strange);
@@ -277,7 +277,7 @@ static inline double number_at(const char *p, enum type t, bool swap)
     return (double)integer_at(p, t, swap);
 }
 
-/* A whole number written in another way: "3.0", or in a floating-point type. */
+/* An integer written in another way: "3.0", or in a floating-point type. */
 static int read_whole(struct reading *r, enum type t, const struct element *el, uint64_t i, int64_t *x)
 {
     double value = NAN;
@@ -325,7 +325,7 @@ static inline int read_number(struct reading *r, enum type t, const struct eleme
     return VG_OK;
 }
 
-/* Skip n numbers. n comes from the file: it is compared with the bytes that remain. */
+/* Skip n numbers. n comes from the file, so it is compared with the remaining bytes. */
 static int skip_numbers(struct reading *r, enum type t, uint64_t n, const struct element *el, uint64_t i)
 {
     if (r->text) {
@@ -490,7 +490,7 @@ static int read_other(struct reading *r, const struct element *el, uint64_t i)
     return VG_OK;
 }
 
-/* Binary vertices of fixed size: their positions are known, so the loop checks nothing. */
+/* Binary vertices of fixed size: their positions are known, so the loop needs no checks. */
 static void read_fixed_vertices(struct reading *r, const struct element *el)
 {
     size_t offset[3] = {0}, at = 0;
@@ -550,7 +550,7 @@ static int read_body(struct reading *r)
 {
     if (vgi_grow(&r->m->mesh.start, &r->start_cap, 1, sizeof *r->m->mesh.start, r->e) < 0) return VG_ENOMEM;
     r->m->mesh.start[0] = 0;
-    if (r->text) r->p += vgi_mark_bytes(r->p, (size_t)(r->end - r->p)); /* where header and body were put together */
+    if (r->text) r->p += vgi_mark_bytes(r->p, (size_t)(r->end - r->p)); /* where header and body were concatenated */
     for (size_t i = 0; i < r->nelements; i++) {
         int result = read_element(r, &r->elements[i]);
         if (result < 0) return result;

@@ -1,10 +1,10 @@
-/* ply_write.c: PLY polygon files, text and binary in both byte orders, written: vertices, faces with the colours of
+/* ply_write.c: writes PLY polygon files, text and binary in both byte orders: vertices, faces with the colours of
  * their patches, edges.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 #include "model/colour.h"
 
-enum { MOST_NUMBER = 26, MOST_SMALL_FACE = 255 }; /* bytes of a number and what follows it; a length of 8 bits */
+enum { MOST_NUMBER = 26, MOST_SMALL_FACE = 255 }; /* bytes of a number and its separator; a length of 8 bits */
 
 enum encoding { TEXT, LITTLE, BIG };
 
@@ -12,7 +12,7 @@ struct writing {
     vg_bytes *out;
     const vgi_writing *w;
     enum encoding encoding;
-    size_t nfaces;  /* the faces before nfaces are element face, those behind element edge */
+    size_t nfaces;  /* faces before nfaces are element face, those from there on element edge */
     bool long_list; /* list lengths need 32 bits */
     vg_err *e;
 };
@@ -45,7 +45,7 @@ static void put_number(char **to, double x, bool full, enum encoding encoding, c
     }
 }
 
-/* Two-vertex faces become edges when that keeps the order: when all of them come last. */
+/* Two-vertex faces become edges if that keeps the order: if all of them come last. */
 static void divide_faces(struct writing *x)
 {
     const vg_mesh *m = x->w->mesh;
@@ -86,7 +86,7 @@ static int write_header(struct writing *x)
     return result == VG_OK ? vgi_bytes_append(x->out, "end_header\n", 11, x->e) : result;
 }
 
-/* Reserve room for n numbers of at most `most` bytes and return where to write them. NULL: no memory. */
+/* Reserve room for n numbers of at most `most` bytes; returns its address. NULL: out of memory. */
 static char *room(struct writing *x, size_t n, size_t most)
 {
     if (vgi_bytes_reserve(x->out, x->out->size + n * most, x->e) < 0) return NULL;

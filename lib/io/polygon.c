@@ -1,5 +1,5 @@
-/* polygon.c: where a face of more than three corners can be cut into triangles.
- * Leaves out the cutting: each format has its order (stl.c, gltf_faces.c).
+/* polygon.c: where a face with more than three corners can be cut into triangles. Each format cuts in its own order
+ * (stl.c, gltf_faces.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/polygon.h"
 
@@ -13,7 +13,7 @@ void vgi_triangle_normal(const double *points, uint32_t a, uint32_t b, uint32_t 
     normal[2] = u[0] * v[1] - u[1] * v[0];
 }
 
-/* Positive when the triangle has the orientation of the face; 0: it has no area. */
+/* Positive if the triangle has the orientation of the face; 0 if it has no area. */
 static double facing(const double *points, uint32_t a, uint32_t b, uint32_t c, const double normal[3])
 {
     double n[3];

@@ -1,21 +1,21 @@
-/* polygon.h: shared by the writers of triangles: how a face of more than three corners can be cut. A face is a ring of
- * n vertices v; points are those of the mesh.
+/* polygon.h: how a face with more than three corners can be cut; shared by the writers of triangles. A face is a ring
+ * of n vertices v; points are those of the mesh.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_POLYGON_H
 #define VG_POLYGON_H
 
 #include "core/core.h"
 
-/* A face with more corners is split as a fan whatever its shape: clipping takes at least quadratic time. */
+/* A face with more corners is split as a fan, whatever its shape, because clipping takes at least quadratic time. */
 enum { VGI_MOST_CLIPPED = 512 };
 
 /* vgi_triangle_normal: (b - a) x (c - a). */
 void vgi_triangle_normal(const double *points, uint32_t a, uint32_t b, uint32_t c, double normal[3]);
 /* vgi_face_normal: twice the vector area (Newell). */
 void vgi_face_normal(const double *points, const uint32_t *v, size_t n, double normal[3]);
-/* vgi_is_fan: does the fan of triangles around the first vertex cover the face? */
+/* vgi_is_fan: whether the fan of triangles around the first vertex covers the face. */
 bool vgi_is_fan(const double *points, const uint32_t *v, size_t n, const double normal[3]);
-/* vgi_is_ear: is corner i convex, and no other corner inside its triangle? */
+/* vgi_is_ear: whether corner i is convex, with no other corner inside its triangle. */
 bool vgi_is_ear(const double *points, const uint32_t *v, size_t n, size_t i, const double normal[3]);
 
 #endif

@@ -1,22 +1,22 @@
 /* poses.c: a store of all frames of a sequence with random access: in memory up to a limit, beyond it in an unnamed
- * file. The values of a frame are stored apart from its other data, so that passes over the values copy nothing.
- * Leaves out queues of frames (spool.c).
+ * file. The values of a frame are stored separately from its other data, so that passes over the values copy nothing.
+ * Queues of frames are in spool.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/frame_pack.h"
 
 #include <stdlib.h>
 #include <unistd.h>
 
-/* One frame: first its values, then the rest, packed. */
+/* One frame: its values, then its other data, packed. */
 typedef struct kept {
     unsigned char *bytes; /* NULL: they are in the file */
-    uint64_t off;         /* where */
-    size_t packed;        /* bytes of the rest */
+    uint64_t off;         /* offset there */
+    size_t packed;        /* bytes of the other data */
 } kept;
 
 struct vg_poses {
     vgi_packing packing;
-    size_t value_bytes; /* of each frame */
+    size_t value_bytes; /* per frame */
     size_t limit;
     kept *at;
     size_t n, cap;

@@ -1,5 +1,5 @@
-/* record.c: the bytes of the stream's file header, records and END mark, both directions (fmt/STREAM.md).
- * Leaves out the payloads (payload.c) and the order of records (stream.c).
+/* record.c: reads and writes the bytes of the stream's file header, records and END mark (fmt/STREAM.md). Payloads
+ * are in payload.c, the order of records in stream.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/record.h"
 

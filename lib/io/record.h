@@ -6,7 +6,7 @@
 #include "io/io.h"
 #include "model/artefact.h"
 
-/* Counts of either direction. */
+/* Counts for reading or writing. */
 typedef struct vgi_tally {
     uint64_t records;
     void *sum; /* running XXH64 over header checksums */
@@ -17,8 +17,8 @@ void vgi_tally_clear(vgi_tally *t);
 
 /* vgi_record_begin_read: check the file header. */
 int vgi_record_begin_read(vgi_input *in, vg_err *e) VG_MUST_CHECK;
-/* vgi_record_read: read the next record into *r (its payload buffer is reused). Returns 1: a record; 0: the END mark,
- * which was checked and is the last thing in the input. */
+/* vgi_record_read: read the next record into *r, reusing its payload buffer. Returns 1: a record; 0: the END mark,
+ * which was checked and ends the input. */
 int vgi_record_read(vgi_input *in, vgi_tally *t, vg_record *r, vg_err *e) VG_MUST_CHECK;
 
 int vgi_record_begin_write(int fd, const char *name, vg_err *e) VG_MUST_CHECK;

@@ -1,6 +1,5 @@
-/* sequence.c: the table of formats that hold a whole sequence in one file, and the output buffer of such a file.
- * Leaves out the formats themselves (caches.c, npy.c, npz.c, usda.c, skeleton_text.c, ...) and opening files (source.c,
- * sink.c).
+/* sequence.c: the table of formats that hold a whole sequence in one file, and the output buffer of such a file. The
+ * formats are in caches.c, npy.c, npz.c, usda.c, skeleton_text.c and others; files are opened in source.c and sink.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 

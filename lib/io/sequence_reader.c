@@ -1,6 +1,5 @@
-/* sequence_reader.c: reads a file that holds a whole sequence, frame by frame; adds names where the file has none, and
- * faces from the mesh file beside it.
- * Leaves out the formats (sequence.c) and joining several inputs (source.c).
+/* sequence_reader.c: reads a file that holds a whole sequence, frame by frame; adds names if the file has none, and
+ * faces from the mesh file beside it. Formats are in sequence.c; several inputs are joined in source.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sequence_reader.h"
 
@@ -29,7 +28,8 @@ int vgi_play_open(vgi_playing *p, const vgi_sequence_format *format, vgi_input *
 
 /* ---- faces ---- */
 
-/* The mesh file beside the sequence: "walk.obj" or "walk.ply" for "walk.pc2"; free it. NULL with VG_OK: there is none.
+/* The mesh file beside the sequence: "walk.obj" or "walk.ply" for "walk.pc2"; release with free(). NULL with VG_OK if
+ * there is none.
  */
 static int find_beside(const char *file, const char *suffix, char **path, vg_err *e)
 {

@@ -1,9 +1,8 @@
 /* sink.c: output: one mesh file, a numbered series, a directory, an archive, standard output, or one file that holds
- * the whole sequence.
- * Leaves out what the name of an output asks for (sink_plan.c), temporary names (targets.c), the text of a mesh file
- * (format.c), the bytes of a sequence (sequence.c) and those of an archive (pack.c).
+ * the whole sequence. Output names are parsed in sink_plan.c, temporary files are in targets.c, the text of a mesh
+ * file in format.c, the bytes of a sequence in sequence.c and those of an archive in pack.c.
  *
- * Everything is written beside its place under a temporary name and renamed in vg_sink_end; pipes and devices, which
+ * Everything is written to a temporary name beside its final one and renamed in vg_sink_end; pipes and devices, which
  * cannot be replaced, are written directly.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sink.h"
@@ -13,23 +12,23 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* A frame that becomes a mesh file: taken over, formatted and written by any thread; members of an archive, and the one
- * file, are written in the order of the frames, by the caller's thread. */
+/* A frame that becomes a mesh file: any thread can format and write it. Members of an archive, and the single file,
+ * are written by the caller's thread in frame order. */
 typedef struct piece {
     char *name;
     double *values;
     vg_bytes path, text;
-    int fd; /* the file that the text is written to, closed afterwards; -1: none */
+    int fd; /* the file to which the text is written, closed afterwards; -1: none */
     int result;
     vg_err error;
 } piece;
 
-/* Limit of what is in work: this many bytes, but always two pieces. */
+/* Limit for unfinished pieces: this many bytes, but always two pieces. */
 enum { MOST_WAITING = 256 << 20, TEXT_OF_VERTEX = 48 };
 
 struct vg_sink {
     vgi_plan plan;
-    char *output; /* what plan.name points to */
+    char *output; /* storage of plan.name */
     const vg_head *head; /* borrowed */
     bool full_precision;
     uint64_t number; /* of the next file of a series */
@@ -38,23 +37,23 @@ struct vg_sink {
     vgi_file_names names; /* of the files in a directory or archive, or of a series */
     vgi_names earlier;    /* paths that --replace removes */
     vg_targets targets;
-    int fd; /* the one file or archive; -1 */
+    int fd; /* the single file or archive; -1: none */
     vgi_packer *packer;
     /* mesh files: */
-    vgi_belt *belt;      /* of pieces; NULL: no frame has come yet */
+    vgi_belt *belt;      /* of pieces; NULL before the first frame */
     piece *pieces;
     size_t npieces;
-    vg_bytes rest;       /* of every file, the same for all */
+    vg_bytes rest;       /* the part that is the same in every file */
     /* a sequence: */
     vg_sink_options options;
     void *state;
-    vgi_output out;      /* fd: the file itself; of a pipe, which cannot be patched, an unnamed file */
-    char *mesh;          /* where its mesh went; NULL: nowhere */
+    vgi_output out;      /* fd: the file itself; for a pipe, which cannot be patched, an unnamed file */
+    char *mesh;          /* path of its mesh; NULL: none */
     const vgi_format *mesh_format;
-    vgi_slim slim;       /* head points into it when vertices are left out */
-    size_t loose;        /* vertices in no face that are written */
+    vgi_slim slim;       /* head points into it if vertices are dropped */
+    size_t loose;        /* number of written vertices that are in no face */
     bool names_lost, times_lost;
-    char scalars_lost[80]; /* channels of the vertices, which no format keeps */
+    char scalars_lost[80]; /* vertex channels, which no format keeps */
     vgi_names warnings;
 };
 
@@ -115,7 +114,7 @@ static int make_directory(vg_sink *s, vg_err *e)
     return vg_fail(e, VG_ESYS, "cannot make directory '%s': %s", s->output, strerror(errno));
 }
 
-/* A pipe cannot be patched: its bytes are collected in an unnamed file. */
+/* A pipe cannot be patched, so its bytes are collected in an unnamed file. */
 static int open_patchable(vg_sink *s, vg_err *e)
 {
     s->fd = s->plan.to_stdout ? -1 : vg_targets_open(&s->targets, s->output, e);
@@ -219,7 +218,7 @@ static int drop_loose(vg_sink *s, bool drop, vg_err *e)
     return r;
 }
 
-/* ---- what is not kept ---- */
+/* ---- losses ---- */
 
 static bool has_faces_of(const vg_mesh *m, size_t least, size_t most)
 {
@@ -230,7 +229,7 @@ static bool has_faces_of(const vg_mesh *m, size_t least, size_t most)
     return false;
 }
 
-/* An OBJ names its material library, and keeps doing so. */
+/* Whether the OBJ names a material library, which the new file also names. */
 static bool names_library(const vg_body *b)
 {
     for (size_t i = 0; i < b->attributes.nlabels; i++)
@@ -244,7 +243,7 @@ static int add_loss(vg_bytes *line, const char *what, vg_err *e)
     return r < 0 ? r : vgi_bytes_append(line, what, strlen(what), e);
 }
 
-/* What the format itself reports follows what the head tells. */
+/* Report losses: first those that follow from the head, then those that the format reports. */
 static int list_losses(const vg_sink *s, vg_bytes *line, vg_err *e)
 {
     const vgi_sequence_format *f = s->plan.sequence;
@@ -347,7 +346,7 @@ static int more_than_one(const vg_sink *s, vg_err *e)
                    s->output, (int)n, s->output, suffix);
 }
 
-/* Is it the name that a reader would give the next frame, whatever the file? */
+/* Whether a reader would give the next frame this name by counting. */
 static bool is_counted_name(const vg_sink *s, const char *name)
 {
     char number[32];
@@ -386,7 +385,7 @@ static int unwritable(const vg_sink *s, const char *name, int code, const vg_err
     return vg_fail(e, code, "cannot write frame '%s' to '%s': %s", name, s->output, cause->message);
 }
 
-/* The work on a piece. */
+/* Process a piece. */
 static void make_piece(void *context, size_t place)
 {
     const vg_sink *s = context;
@@ -413,7 +412,7 @@ static int make_rest(vg_sink *s, const vg_frame *first, vg_err *e)
     return r < 0 ? unwritable(s, first->name ? first->name : "", r, &cause, e) : r;
 }
 
-/* With one thread each piece is made before the next one comes. */
+/* With one thread each piece is finished before the next one is added. */
 static int start_belt(vg_sink *s, const vg_frame *first, vg_err *e)
 {
     int r = make_rest(s, first, e), threads = s->options.threads;
@@ -438,13 +437,13 @@ static int finish_oldest(vg_sink *s, vg_err *e)
     return vgi_packer_add(s->packer, (char *)p->path.data, p->text.data, p->text.size, e);
 }
 
-/* Choose the output of the piece. Its file is opened here, in the order of the frames. */
+/* Choose the output of the piece. Its file is opened here, in frame order. */
 static int place_piece(vg_sink *s, piece *p, vg_err *e)
 {
     bool series = s->plan.kind == VGI_PLAN_SERIES;
     if (s->plan.kind == VGI_PLAN_FILE)
         return VG_OK; /* its text is kept until vg_sink_end, so that an error in a second frame leaves nothing in the
-                       * pipe */
+                         pipe */
     int r = series ? series_path(s, &p->path, e) : file_path(s, &s->names.file, &p->path, e);
     if (r == VG_OK && series) r = vgi_file_names_series(&s->names, (char *)p->path.data, e);
     s->number += series;
@@ -473,9 +472,9 @@ static int finish_pieces(vg_sink *s, vg_err *e)
     return r;
 }
 
-/* ---- numbers in front of names ---- */
+/* ---- numbers as prefixes of names ---- */
 
-/* Files in a directory have not got their final names yet. */
+/* Rename files of a directory, which still have temporary names. */
 static int renumber_files(vg_sink *s, vg_err *e)
 {
     vg_bytes file = {0}, path = {0};
@@ -490,7 +489,7 @@ static int renumber_files(vg_sink *s, vg_err *e)
     return r;
 }
 
-/* Copy the members written so far, in order, into the archive that is begun anew. */
+/* Copy the members written so far, in order, to the restarted archive. */
 static int pack_again(vg_sink *s, vgi_archive *from, vg_err *e)
 {
     vg_bytes file = {0}, data = {0};
@@ -639,7 +638,7 @@ static void clear_pieces(vg_sink *s)
         free(p->values);
         vg_bytes_clear(&p->path);
         vg_bytes_clear(&p->text);
-        if (p->fd >= 0) close(p->fd); /* it was never made */
+        if (p->fd >= 0) close(p->fd); /* it was never created */
     }
     free(s->pieces);
     vg_bytes_clear(&s->rest);
@@ -651,7 +650,7 @@ void vg_sink_close(vg_sink **sink)
     if (!s) return;
     vgi_belt_free(&s->belt);
     if (!s->ended) remove_files(s);
-    *sink = NULL; /* before anything is freed: vg_sink_discard may be called from a signal handler */
+    *sink = NULL; /* first of all, because vg_sink_discard may be called from a signal handler */
     clear_pieces(s);
     vgi_packer_close(&s->packer);
     if (s->state) s->plan.sequence->release(s->state);

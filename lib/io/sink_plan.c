@@ -1,6 +1,6 @@
-/* sink_plan.c: parses the name of an output: one mesh file, a numbered series, a directory, an archive, standard output
- * or one file for all poses, and its format; and checks before any work that it can be written.
- * Leaves out the writing (sink.c).
+/* sink_plan.c: parses the name of an output (one mesh file, a numbered series, a directory, an archive, standard
+ * output, or one file for all poses) and its format, and checks before any work that it can be written. Writing is in
+ * sink.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sink.h"
 
@@ -17,7 +17,7 @@ bool vgi_is_directory(const char *path)
     return stat(path, &st) == 0 && S_ISDIR(st.st_mode);
 }
 
-/* "NAME:ply": does the name stand for many files, so that the text after the colon is their format? */
+/* "NAME:ply": whether the name stands for many files, so that the text after the colon is their format. */
 static bool holds_many(const char *name, size_t n, vg_err *e)
 {
     if (n == 0) return false;
@@ -64,7 +64,7 @@ static int bad_pattern(const char *output, vg_err *e)
                    output);
 }
 
-/* The one %d or %0Nd of a series. The name is never handed to printf. */
+/* The one %d or %0Nd of a series. The name is never passed to printf. */
 static int find_number(vgi_plan *p, vg_err *e)
 {
     const char *s = p->name;
@@ -90,7 +90,7 @@ static int unknown_kind(const char *output, vg_err *e)
                    vgi_format_names(), vgi_sequence_names(), vgi_packer_suffixes());
 }
 
-/* One file, whatever its name: it is not numbered. */
+/* A single file with any name; it is not numbered. */
 static int tell_sequence(vgi_plan *p, const char *output, vg_err *e)
 {
     p->kind = VGI_PLAN_SEQUENCE;
@@ -174,7 +174,7 @@ int vgi_plan_make(vgi_plan *p, const char *output, const vg_sink_options *o, vg_
     return r < 0 ? r : check_mesh_option(p, o, e);
 }
 
-/* ---- what can be told without writing ---- */
+/* ---- checks before writing ---- */
 
 int vgi_plan_check_place(const vgi_plan *p, vg_err *e)
 {
@@ -188,7 +188,8 @@ int vgi_plan_check_place(const vgi_plan *p, vg_err *e)
         if (!(dir = vgi_parent_directory(name, p->length, e))) r = VG_ENOMEM;
         else
             r = strchr(dir, '%') ? VG_OK
-                                 : vgi_check_directory(dir, name, e); /* numbered directories are met when written */
+                                 : vgi_check_directory(dir, name, e); /* numbered directories are checked when they
+                                                                         are written */
     } else {
         r = vg_target_check(name, e);
     }

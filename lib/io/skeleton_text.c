@@ -1,6 +1,6 @@
 /* skeleton_text.c: skeletons as text, one bone per line: "BONE PARENT HEAD_X HEAD_Y HEAD_Z TAIL_X TAIL_Y TAIL_Z"; and
- * joints as groups of mesh vertices: "JOINT PARENT vertices VERTEX VERTEX ...".
- * Leaves out motion (joints_text.c, bvh.c) and the positions of groups (model/groups.c).
+ * joints as groups of mesh vertices: "JOINT PARENT vertices VERTEX VERTEX ...". Motion is in joints_text.c and bvh.c,
+ * the positions of groups in model/groups.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
@@ -40,7 +40,7 @@ static void clear_entries(entries *s)
     *s = (entries){0};
 }
 
-/* ---- who is below whom ---- */
+/* ---- hierarchy ---- */
 
 static int compare_names(const void *a, const void *b)
 {
@@ -83,7 +83,7 @@ static int find_parents(entries *s, const char *subject, vg_err *e)
     return r;
 }
 
-/* Depth first from the roots, in the order of the file. Entries that are not reached are part of a cycle. */
+/* Depth first from the roots, in file order. Entries that are not reached are part of a cycle. */
 static int order_entries(entries *s, const char *subject, vg_err *e)
 {
     size_t n = s->n, met = 0;
@@ -179,15 +179,15 @@ static int take_group(const vgi_lines *t, const vgi_line *l, int base, entry *b,
     return r < 0 ? r : check_once(t, b, e);
 }
 
-/* All lines, in the order of the file, and their order as joints. groups: of the second kind, with this base; else
- * base is -1. */
+/* Read all lines in file order, and order them as joints. groups: of the second kind, with this base; otherwise base
+ * is -1. */
 static int take_entries(entries *s, vgi_lines *t, int base, vg_err *e)
 {
     vgi_line l;
     int r = VG_OK;
     while (r == VG_OK && vgi_lines_next(t, &l)) {
         if ((r = vgi_grow(&s->at, &s->cap, s->n + 1, sizeof *s->at, e)) < 0) break;
-        entry *b = &s->at[s->n++]; /* counted at once, so that clearing frees it in any case */
+        entry *b = &s->at[s->n++]; /* counted immediately, so that clearing always frees it */
         *b = (entry){0};
         r = base < 0 ? take_bone(t, &l, b, e) : take_group(t, &l, base, b, e);
         if (r == VG_OK && s->n >= UINT32_MAX / 4) r = vg_fail(e, VG_EINPUT, "%s has too many joints", t->subject);
@@ -203,7 +203,7 @@ typedef struct reading {
     vg_bytes text;
     entries bones;
     vg_skeleton skeleton; /* each bone's head, and its tail as an end site */
-    double *places;       /* of its joints */
+    double *places;       /* positions of its joints */
     bool done;
 } reading;
 
@@ -215,7 +215,7 @@ static char *end_name(const char *bone, vg_err *e)
     return name;
 }
 
-/* Append a joint, which takes the name over (NULL: there was no memory for it). */
+/* Append a joint; takes ownership of the name (NULL: out of memory). */
 static int add_joint(reading *b, char *name, uint32_t parent, const double at[3], vg_err *e)
 {
     vg_skeleton *s = &b->skeleton;
@@ -231,7 +231,7 @@ static int add_joint(reading *b, char *name, uint32_t parent, const double at[3]
 
 static int add_head(reading *b, entry *bone, uint32_t parent, vg_err *e)
 {
-    static const uint8_t channels[6] = {1, 2, 3, 6, 4, 5}; /* place, then z x y */
+    static const uint8_t channels[6] = {1, 2, 3, 6, 4, 5}; /* position, then z x y */
     char *name = bone->name;
     bone->name = NULL;
     vg_joint *j = &b->skeleton.joints[b->skeleton.njoints];
@@ -242,7 +242,7 @@ static int add_head(reading *b, entry *bone, uint32_t parent, vg_err *e)
     return r;
 }
 
-/* Append the end sites from bone i up to bone `up`, which is not included: everything below them is there. */
+/* Append the end sites from bone i up to bone `up`, exclusive: all joints below them exist. */
 static int add_ends(reading *b, const uint32_t *place, uint32_t i, uint32_t up, vg_err *e)
 {
     int r = VG_OK;
@@ -254,7 +254,7 @@ static int add_ends(reading *b, const uint32_t *place, uint32_t i, uint32_t up, 
 static int make_skeleton(reading *b, vg_err *e)
 {
     entries *s = &b->bones;
-    uint32_t *place = vgi_array_raw(s->n, sizeof *place, e), last = NONE; /* of each bone: its joint */
+    uint32_t *place = vgi_array_raw(s->n, sizeof *place, e), last = NONE; /* per bone: its joint */
     b->skeleton.joints = vgi_array(2 * s->n, sizeof *b->skeleton.joints, e);
     b->places = vgi_array(2 * s->n, 3 * sizeof *b->places, e);
     int r = place && b->skeleton.joints && b->places ? VG_OK : VG_ENOMEM;
@@ -321,7 +321,7 @@ static void close_skeleton(void *state)
     free(b);
 }
 
-/* Is its first line a bone or a group? Groups are refused with a message of their own. */
+/* Whether its first line is a bone or a group. Groups are refused with a separate message. */
 static bool sniff_skeleton(const unsigned char *data, size_t n)
 {
     vgi_lines t = vgi_lines_of(data, n, "");

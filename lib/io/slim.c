@@ -1,11 +1,10 @@
-/* slim.c: a sequence of vertices without the loose ones, those in no face.
- * Leaves out whether that is wanted (sink.c).
+/* slim.c: a sequence of vertices without the loose ones, which are in no face. sink.c decides when to use it.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sink.h"
 
 #include <stdlib.h>
 
-/* Mark the vertices that are in a face; free it. */
+/* Mark the vertices that are in a face; release with free(). */
 static bool *find_attached(const vg_mesh *m, vg_err *e)
 {
     bool *attached = vgi_array(m->nv, sizeof *attached, e);
@@ -29,7 +28,7 @@ int vgi_count_loose(const vg_mesh *m, size_t *loose, vg_err *e)
     return VG_OK;
 }
 
-/* Renumber the vertices of the asset. Those that are in no face are lost with it. */
+/* Renumber the vertices of the asset. Those that are in no face are dropped from it as well. */
 static void move_asset(vg_body *b, const uint32_t *number, const bool *attached)
 {
     vg_asset *a = &b->asset;
@@ -40,7 +39,7 @@ static void move_asset(vg_body *b, const uint32_t *number, const bool *attached)
     if (a->n) a->digest = vg_mesh_digest(&b->mesh);
 }
 
-/* number: room for one of each vertex of the whole head. */
+/* number: one per vertex of the whole head. */
 static void close_up(vgi_slim *s, const vg_head *h, const bool *attached, uint32_t *number)
 {
     vg_head *to = &s->head;

@@ -1,10 +1,9 @@
-/* source.c: input: joins all operands into one head and a sequence of frames.
- * Leaves out which files operands name and what each holds (items.c), and how a stream, an archive, a mesh file or a
- * sequence (sequence_reader.c) is read.
+/* source.c: input: joins all operands into one head and a sequence of frames. Operands are expanded and examined in
+ * items.c; streams, archives, mesh files and sequences (sequence_reader.c) are read elsewhere.
  *
- * All operands are looked at first, so that a missing file or a stream that does not fit is reported before any work.
- * Mesh files become poses in several threads, some before they are asked for. Pipes are read only when it is their
- * turn. Errors are reported in input order.
+ * All operands are examined first, so that a missing file or an incompatible stream is reported before any work. Mesh
+ * files become poses in several threads, some before they are requested. Pipes are read only when it is their turn.
+ * Errors are reported in input order.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_pack.h"
 #include "io/items.h"
@@ -22,37 +21,37 @@ typedef struct pose {
     vg_err error;
 } pose;
 
-enum { MOST_WAITING = 256 << 20 }; /* bytes of files: above it no further file is read ahead */
+enum { MOST_WAITING = 256 << 20 }; /* bytes of files; beyond this no further file is read ahead */
 
 struct vg_source {
     vgi_items items;
-    size_t next;         /* the item to be opened */
+    size_t next;         /* the next item to open */
     vg_reading reading;
-    bool through;        /* one stream: its head and frames are passed on as they are */
+    bool through;        /* a single stream: its head and frames are passed on unchanged */
     vg_head head;        /* of the joined sequence; the caller may change it */
-    vg_head own;         /* the head of frames: mesh, kind, count; of a skeleton also its joints and reference */
-    char *own_name;      /* the input that the mesh is from, quoted for messages; NULL: none yet */
+    vg_head own;         /* the head of the frames: mesh, kind, count; for a skeleton also its joints and reference */
+    char *own_name;      /* the input that defined the mesh, quoted for messages; NULL: none yet */
     vg_records tail;
-    /* the item being read: */
+    /* the current item: */
     vg_reader *reader;
     vgi_archive *archive;
     const char *archive_name;
     vg_bytes data;       /* a mesh file, or a member that holds a sequence */
     vgi_playing playing;
-    /* poses that wait: */
+    /* pending poses: */
     pose *poses;
     size_t nposes;
     vgi_belt *belt;
-    pose *first;         /* its mesh has been taken over, its frame has not been returned; NULL: there is none */
+    pose *first;         /* it defined the mesh and has not been returned yet; NULL: none */
     uint64_t waiting;    /* bytes of their files */
-    int failed;          /* the error of reading on, to be reported after the poses that wait */
+    int failed;          /* the error of reading ahead, reported after the pending poses */
     vg_err failure;
     char warning[VGI_SUBJECT + 2 * sizeof(vg_note)];
 };
 
 /* ---- one mesh for all inputs ---- */
 
-/* What messages call a file, or a member of an archive. */
+/* Name of a file, or of a member of an archive, in messages. */
 static char *subject_of(const char *archive, const char *path, vg_err *e)
 {
     size_t n = strlen(path) + (archive ? strlen(archive) : 0) + 16;
@@ -62,13 +61,13 @@ static char *subject_of(const char *archive, const char *path, vg_err *e)
     return s;
 }
 
-/* The name of a pose from that file; free it. */
+/* The name of a pose from that file; release with free(). */
 static char *pose_of(const char *path, vg_err *e)
 {
     return path == vgi_standard_input ? vgi_copy_string("stdin", 5, e) : vgi_pose_name(path, e);
 }
 
-/* The mesh that every further pose must have. */
+/* Set the mesh that every further pose must have. */
 static int settle_mesh(vg_source *s, const vg_mesh *mesh, const char *archive, const char *path, vg_err *e)
 {
     int r = vg_mesh_copy(&s->own.body.mesh, mesh, e);
@@ -80,7 +79,7 @@ static int settle_mesh(vg_source *s, const vg_mesh *mesh, const char *archive, c
     return (s->own_name = subject_of(archive, path, e)) ? VG_OK : VG_ENOMEM;
 }
 
-/* Keep the skeleton, for files of joints by name. */
+/* Keep the skeleton, for files that name joints. */
 static int keep_skeleton(vg_source *s, const vg_head *h, vg_err *e)
 {
     if (!h->body.skeleton.njoints) return VG_OK;
@@ -91,7 +90,7 @@ static int keep_skeleton(vg_source *s, const vg_head *h, vg_err *e)
     return r;
 }
 
-/* The head of a stream among several operands: the first one's is taken over, of later ones only the provenance. */
+/* The head of a stream among several operands: the first one is used; of later ones only the provenance. */
 static int join_head(vg_source *s, const vgi_item *it, const vg_head *h, vg_err *e)
 {
     if (h->kind != VG_VERTICES)
@@ -103,7 +102,7 @@ static int join_head(vg_source *s, const vgi_item *it, const vg_head *h, vg_err 
     return r < 0 ? r : keep_skeleton(s, h, e);
 }
 
-/* Of several operands, streams define the mesh when they are looked at. */
+/* Among several operands, streams define the mesh when they are examined. */
 static int look_at_stream(vg_source *s, vgi_item *it, vg_err *e)
 {
     if (s->own_name && s->items.n == 1)
@@ -128,7 +127,7 @@ static int open_archive(vg_source *s, vgi_item *it, vg_err *e)
     return vgi_item_archive(&s->items, it, &s->archive, e);
 }
 
-/* Keep the first note about something that was left out. */
+/* Keep the first note about dropped data. */
 static void note_left_out(vg_source *s, const char *subject, const char *note)
 {
     if (*note && !*s->warning) snprintf(s->warning, sizeof s->warning, "%.290s: %.320s", subject, note);
@@ -151,7 +150,7 @@ static int take_over_model(vg_source *s, pose *p, vg_err *e)
     return s->head.body.reference && s->head.body.reference_name ? VG_OK : VG_ENOMEM;
 }
 
-/* VG_EINPUT when the next input has other faces than those before. */
+/* VG_EINPUT if the next input has other faces than the previous ones. */
 static int check_joins(const vg_source *s, const vg_mesh *next, const char *subject, vg_err *e)
 {
     int r = vg_mesh_same(&s->own.body.mesh, s->own_name, next, subject, e);
@@ -176,7 +175,7 @@ static int read_model(const vg_source *s, pose *p, vg_err *e)
     return r;
 }
 
-/* The work on a pose. */
+/* Process a pose. */
 static void make_pose(void *context, size_t place)
 {
     const vg_source *s = context;
@@ -192,7 +191,7 @@ static int make_belt(vg_source *s, int threads, vg_err *e)
     return vgi_belt_new(&s->belt, threads, n, make_pose, s, e);
 }
 
-/* Release a pose, but keep its buffer when that is no larger than its share. */
+/* Clear a pose, but keep its buffer if it is no larger than its share. */
 static void clear_pose(const vg_source *s, pose *p)
 {
     free(p->path);
@@ -224,7 +223,7 @@ static int take_pose(vg_source *s, pose **out, vg_err *e)
     return p->result;
 }
 
-/* The first one defines the mesh, unless it is known. It stays in place until its frame is returned. */
+/* The first one defines the mesh, unless it is known. It is kept until its frame is returned. */
 static int take_first(vg_source *s, vg_err *e)
 {
     int r = take_pose(s, &s->first, e);
@@ -274,7 +273,7 @@ static int open_stream(vg_source *s, vgi_item *it, vg_err *e)
 
 /* ---- sequences ---- */
 
-/* The sequence has no reference: its first pose becomes the reference, and is a frame, too. */
+/* The sequence has no reference: its first pose becomes the reference and is also a frame. */
 static int reference_from_first(vg_source *s, vg_err *e)
 {
     vg_head *h = &s->head;
@@ -326,7 +325,7 @@ static int join_sequence(const vg_source *s, const vg_head *h, vg_err *e)
                : vgi_different_count(h, subject, s->own.body.mesh.nv, s->own_name, e);
 }
 
-/* Start on a sequence whose bytes are `in`, which is taken over: a file, or a member of an archive. */
+/* Start a sequence with the contents `in` (takes ownership): a file, or a member of an archive. */
 static int play(vg_source *s, const vgi_sequence_format *format, vgi_input *in, const char *archive, const char *path,
                 vg_err *e)
 {
@@ -378,7 +377,7 @@ static int next_member(vg_source *s, vg_err *e)
     return sequence ? play_member(s, sequence, path, e) : put_pose(s, s->archive_name, path, e);
 }
 
-/* ---- the door ---- */
+/* ---- interface ---- */
 
 static int look_at(vg_source *s, vgi_item *it, vg_err *e)
 {
@@ -386,7 +385,7 @@ static int look_at(vg_source *s, vgi_item *it, vg_err *e)
     return r == VG_OK && it->content == VGI_STREAM ? look_at_stream(s, it, e) : r;
 }
 
-/* Open inputs until the mesh is known. Of several operands, streams define it when they are looked at. */
+/* Open inputs until the mesh is known. Among several operands, streams define it when they are examined. */
 static int find_mesh(vg_source *s, vg_err *e)
 {
     int r = VG_OK;
@@ -410,7 +409,7 @@ static int settle_named_mesh(vg_source *s, const char *mesh, vg_err *e)
     return r;
 }
 
-/* first_only: only the first item is wanted; the others are not opened. */
+/* first_only: only the first item is needed; the others are not opened. */
 static int open_source(vg_source **out, const char *const *operands, size_t n, const vg_source_options *o,
                        bool first_only, vg_err *e)
 {
@@ -470,7 +469,7 @@ static int append_records(vg_records *to, vg_records *from, vg_err *e)
     if (r < 0) return r;
     memcpy(to->at + to->n, from->at, from->n * sizeof *to->at);
     to->n += from->n;
-    free(from->at); /* the payloads have moved */
+    free(from->at); /* the payloads were moved */
     *from = (vg_records){0};
     return VG_OK;
 }
@@ -482,7 +481,7 @@ static int end_reader(vg_source *s, vg_err *e)
     return r;
 }
 
-/* May the next input be read ahead? True for members of the open archive, and for regular mesh files. */
+/* Whether the next input may be read ahead: members of the open archive, and regular mesh files. */
 static bool may_read_ahead(const vg_source *s)
 {
     if (s->failed || vgi_belt_full(s->belt) || s->waiting >= MOST_WAITING) return false;
@@ -492,7 +491,7 @@ static bool may_read_ahead(const vg_source *s)
     return next->content == VGI_MESH && next->regular;
 }
 
-/* Advance by one input or frame: 1 and a frame; VG_OK: call again. Something is left to read. */
+/* Advance by one input or frame: 1 with a frame; VG_OK: call again. There must be something left to read. */
 static int step(vg_source *s, vg_frame *f, vg_err *e)
 {
     if (s->playing.format) return vgi_play_next(&s->playing, &s->own, f, e);
@@ -514,7 +513,7 @@ int vg_source_next(vg_source *s, vg_frame *f, vg_err *e)
         if (!s->playing.format && !s->reader && !s->archive && s->next == s->items.n) return 0;
         int r = step(s, f, &s->failure);
         if (r > 0) return r;
-        s->failed = r; /* reported after the poses that wait */
+        s->failed = r; /* reported after the pending poses */
     }
 }
 

@@ -1,5 +1,5 @@
-/* spool.c: a queue of frames, first in, first out: in memory up to a limit, beyond it in an unnamed file. Leaves out
- * the bytes of a frame (frame_pack.c).
+/* spool.c: a queue of frames, first in, first out: in memory up to a limit, beyond it in an unnamed file. The bytes
+ * of a frame are in frame_pack.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/frame_pack.h"
 
@@ -17,8 +17,8 @@ struct vg_spool {
     size_t limit, used;     /* bytes in memory */
     held *first, *last;
     int fd;                 /* -1: not created yet */
-    uint64_t read, written; /* places in the file; equal: nothing is in it */
-    vg_bytes frame;         /* one frame on its way into or out of the file */
+    uint64_t read, written; /* positions in the file; equal: it is empty */
+    vg_bytes frame;         /* one frame on its way to or from the file */
     vg_spool_stats stats;
     uint64_t waiting;
 };
@@ -85,8 +85,8 @@ static int keep_in_file(vg_spool *s, const vg_frame *f, const vgi_packed *head, 
     return VG_OK;
 }
 
-/* Frames in memory are older than those in the file: once the file is begun, all new frames go there until it is empty
- * again. */
+/* Frames in memory are older than those in the file: once the file is in use, all new frames go there until it is
+ * empty again. */
 int vg_spool_put(vg_spool *s, const vg_frame *f, vg_err *e)
 {
     vgi_packed head;

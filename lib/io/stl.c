@@ -1,9 +1,9 @@
-/* stl.c: STL, text and binary: triangles, each with its own three corners.
- * Leaves out normals and colours (skipped), and the names of solids.
+/* stl.c: STL, text and binary: triangles, each with its own three corners. Normals, colours and names of solids are
+ * skipped.
  *
- * A corner has no number in STL. Corners at exactly one place (-0 is 0) become one vertex, numbered in order of
- * first appearance; nothing is guessed from nearness. A triangle of which two corners are at one place is no face:
- * it is left out and counted (vgi_note_dropped).
+ * A corner has no number in STL. Corners at exactly the same position (-0 is 0) become one vertex, numbered in order
+ * of first appearance; near positions are not merged. A triangle with two corners at one position is not a face: it
+ * is dropped and counted (vgi_note_dropped).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 #include "io/polygon.h"
@@ -56,7 +56,7 @@ static int grow_slots(struct reading *r)
     return VG_OK;
 }
 
-/* The vertex at this place, new if need be. */
+/* The vertex at this position, added if it is new. */
 static int weld(struct reading *r, const double x[3], uint32_t *v)
 {
     vg_mesh *m = &r->m->mesh;
@@ -187,7 +187,7 @@ static int read_corner(struct reading *r, double x[3])
     return VG_OK;
 }
 
-/* A normal is not used, whatever stands there: "nan", "-1.#IND", fewer words or more. */
+/* A normal is not used, so anything is accepted: "nan", "-1.#IND", fewer or more words. */
 static int skip_normal(struct reading *r)
 {
     enum { MOST = 8 };
@@ -211,7 +211,7 @@ static int read_facet(struct reading *r)
     return result == VG_OK ? add_triangle(r, x) : result;
 }
 
-/* The name of a solid is the rest of its line, whatever it holds. */
+/* The name of a solid is the rest of its line, whatever it contains. */
 static void skip_line(struct reading *r)
 {
     while (r->p < r->end && *r->p != '\n' && *r->p != '\r') r->p++;
@@ -231,7 +231,7 @@ static int read_solid(struct reading *r)
     return result;
 }
 
-/* One solid after another; what else stands behind the last is left out. */
+/* One solid after another; other text after the last one is ignored. */
 static int read_text(struct reading *r)
 {
     int result;
@@ -244,7 +244,7 @@ static int read_text(struct reading *r)
     return result;
 }
 
-/* ---- which of both ---- */
+/* ---- text or binary ---- */
 
 static bool starts_as_text(const unsigned char *data, size_t n)
 {
@@ -252,15 +252,15 @@ static bool starts_as_text(const unsigned char *data, size_t n)
     return n > 5 && !strncasecmp((const char *)data, "solid", 5) && is_space((char)data[5]);
 }
 
-/* Does it look like binary STL, whose header may begin like text? The count agrees with the size; or, for the start
- * of a larger file, the triangles seen have finite corners and no attribute. */
+/* Whether it looks like binary STL, whose header may begin like text. The count agrees with the size; or, for the
+ * start of a larger file, the triangles seen have finite corners and no attribute. */
 static bool looks_binary(const unsigned char *data, size_t n)
 {
     if (n < HEADER + FACET) return n == HEADER && vgi_get32(data + COUNT_OFF) == 0;
     uint64_t count = vgi_get32(data + COUNT_OFF), seen = (n - HEADER) / FACET;
     if (n - HEADER == count * FACET) return true;
     if (count == 0) return false;
-    if (seen > count) seen = count; /* bytes behind the last triangle */
+    if (seen > count) seen = count; /* bytes after the last triangle */
     if (seen > 80) seen = 80;
     for (uint64_t i = 0; i < seen; i++) {
         const unsigned char *p = data + HEADER + i * FACET;
@@ -302,7 +302,7 @@ struct writing {
     const vgi_writing *w;
     bool text;
     uint64_t triangles;
-    uint32_t *ring; /* what is left of a face that is clipped */
+    uint32_t *ring; /* the remainder of a face that is clipped */
     size_t ring_cap;
     vg_err *e;
 };
@@ -312,7 +312,7 @@ static const double *point(const struct writing *x, uint32_t v)
     return x->w->vertices + 3 * (size_t)v;
 }
 
-/* Words, and behind them the three numbers of p, unless NULL, and the end of the line. */
+/* Words, followed by the three numbers of p unless it is NULL, and the end of the line. */
 static int put_line(struct writing *x, const char *words, const double *p, bool full)
 {
     char numbers[3 * MOST_NUMBER + 1], *to = numbers;
@@ -357,7 +357,7 @@ static int put_fan(struct writing *x, const uint32_t *v, size_t n)
     return r;
 }
 
-/* Cut ears; a face that has none left (it crosses itself) becomes a fan. */
+/* Cut ears; if none is left (the face crosses itself), use a fan. */
 static int clip_ears(struct writing *x, const uint32_t *v, size_t n, const double normal[3])
 {
     int r = vgi_grow(&x->ring, &x->ring_cap, n, sizeof *x->ring, x->e);
@@ -374,7 +374,7 @@ static int clip_ears(struct writing *x, const uint32_t *v, size_t n, const doubl
     return r == VG_OK ? put_fan(x, x->ring, n) : r;
 }
 
-/* A fan where that covers the face. */
+/* A fan if it covers the face. */
 static int put_face(struct writing *x, const uint32_t *v, size_t n)
 {
     double normal[3];

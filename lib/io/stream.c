@@ -1,5 +1,5 @@
-/* stream.c: reader and writer of whole streams: the order of records, what is passed on, what is an error.
- * Leaves out the bytes of records (record.c) and their payloads (payload.c).
+/* stream.c: reader and writer of whole streams: the order of records, what is passed on, what is an error. The bytes
+ * of records are in record.c, payloads in payload.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/artefact_io.h"
 #include "io/payload.h"
@@ -14,7 +14,7 @@ struct vg_reader {
     vgi_tally tally;
     vg_head head;
     bool seen[VGI_ARTEFACTS], formed; /* header records; FORM */
-    vgi_form form; /* of the frames as they come: the caller may change `head` */
+    vgi_form form; /* of the frames as they arrive; the caller may change `head` */
     vg_records tail;
     uint64_t frames;
     bool ended;
@@ -270,7 +270,7 @@ void vg_writer_abandon(vg_writer *w, const char *program, int exit_status, const
 {
     w->front.size = 0;
     if (vgi_fail_encode(&w->front, program, exit_status, message, NULL) == VG_OK)
-        if (write_record(w, "FAIL", VGI_CRITICAL, &w->front, NULL) < 0) return; /* nothing more can be said */
+        if (write_record(w, "FAIL", VGI_CRITICAL, &w->front, NULL) < 0) return; /* nothing more can be reported */
 }
 
 void vg_writer_close(vg_writer **w)

@@ -1,6 +1,6 @@
-/* targets.c: files that are replaced as a whole: each is written beside its place under a temporary name, and all are
- * renamed together, or removed. All output of the library and the programs goes through here.
- * Leaves out what is written into them (sink.c, the writer of streams, the programs).
+/* targets.c: files that are replaced as a whole: each is written to a temporary name beside its final one, and all
+ * are renamed together, or removed. All output of the library and the programs uses this. Contents are written in
+ * sink.c, by the writer of streams and by the programs.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/sink.h"
 
@@ -27,8 +27,8 @@ int vgi_check_directory(const char *dir, const char *output, vg_err *e)
     return VG_OK;
 }
 
-/* 1 and *st when there is something that can be written or replaced, 0 when there is nothing; negative when there is a
- * directory, or a link that leads nowhere, which a file would replace. */
+/* 1 with *st if the path can be written or replaced; 0 if nothing exists there; negative for a directory, or a
+ * dangling link, which a file would replace. */
 static int look(const char *path, struct stat *st, vg_err *e)
 {
     struct stat link;
@@ -55,8 +55,8 @@ int vg_target_check(const char *path, vg_err *e)
     return r;
 }
 
-/* Create a file beside its final place under an unused name. mkstemp would ignore the umask. The target has the name
- * before the file exists, so that vg_targets_remove misses no file. */
+/* Create a file with an unused name beside its final place. mkstemp would ignore the umask. The target stores the
+ * name before the file exists, so that vg_targets_remove misses no file. */
 static int create_beside(vg_targets *t, vg_target *target, vg_err *e)
 {
     const char *final = target->final;
@@ -104,7 +104,7 @@ int vg_targets_open(vg_targets *t, const char *path, vg_err *e)
     } else {
         fd = create_beside(t, target, e);
         if (fd >= 0 && exists && fchmod(fd, st.st_mode & 07777) < 0) {
-            /* a file system without permissions: not worth failing for */
+            /* a file system without permissions: not an error */
         }
     }
     if (fd < 0) t->n--, free(target->final);
@@ -156,7 +156,7 @@ void vg_targets_remove(const vg_targets *t)
 void vg_targets_clear(vg_targets *t)
 {
     vg_targets old = *t;
-    *t = (vg_targets){0}; /* before anything is freed: vg_targets_remove may be called from a signal handler */
+    *t = (vg_targets){0}; /* first of all, because vg_targets_remove may be called from a signal handler */
     for (size_t i = 0; i < old.n; i++) {
         free(old.at[i].final);
         free(old.at[i].temporary);

@@ -1,6 +1,6 @@
-/* unpack.c: decompresses a range of a file for libarchive, and checks that a compressed file is complete: libarchive
- * neither compares the checksum of gzip nor looks beyond the end of what it unpacked.
- * Leaves out archives and their members (archive.c).
+/* unpack.c: decompresses a range of a file for libarchive, and checks that a compressed file is complete, because
+ * libarchive neither compares gzip's checksum nor looks beyond the end of what it unpacked. Archives and their
+ * members are in archive.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/unpack.h"
 
@@ -94,14 +94,14 @@ static void sum_add(vgi_sum *s, const unsigned char *p, size_t n)
     s->crc = c;
 }
 
-/* Does gzip's trailer (CRC, length) say the same? */
+/* Whether gzip's trailer (CRC, length) agrees. */
 bool vgi_sum_agrees(const vgi_sum *s, const unsigned char trailer[8])
 {
     return vgi_get32(trailer) == ~s->crc && vgi_get32(trailer + 4) == (uint32_t)s->bytes;
 }
 
-/* Whatever the input says, no programs are started and no other files opened: neither filters that run a command nor
- * the mtree format. */
+/* Whatever the input contains, no programs are started and no other files opened: neither filters that run a command
+ * nor the mtree format. */
 static void allow_filters(struct archive *la)
 {
     archive_read_support_filter_gzip(la);
@@ -125,7 +125,7 @@ int vgi_unpacker_open(vgi_unpacker *u, vgi_tap *t, vg_err *e)
     archive_read_support_format_empty(u->la);
     if (vgi_tap_open(u->la, t) < ARCHIVE_WARN) return VG_EINPUT;
     int r = archive_read_next_header(u->la, &entry);
-    return r == ARCHIVE_EOF || r >= ARCHIVE_WARN ? VG_OK : VG_EINPUT; /* EOF: nothing is packed in there */
+    return r == ARCHIVE_EOF || r >= ARCHIVE_WARN ? VG_OK : VG_EINPUT; /* EOF: the contents are empty */
 }
 
 void vgi_unpacker_close(vgi_unpacker *u)
@@ -134,7 +134,7 @@ void vgi_unpacker_close(vgi_unpacker *u)
     u->la = NULL;
 }
 
-/* The next bytes; 0 at the end, negative when libarchive finds damage. */
+/* The next bytes; 0 at the end, negative if libarchive finds damage. */
 la_ssize_t vgi_unpack_some(vgi_unpacker *u, const void **data)
 {
     size_t n = 0;
@@ -159,12 +159,12 @@ la_ssize_t vgi_unpacker_read(struct archive *la, void *context, const void **dat
     return n;
 }
 
-/* ---- is all of it there? ---- */
+/* ---- completeness ---- */
 
-/* Enough for files that were joined from several; a block boundary that is none in between costs one attempt. */
+/* Enough for files joined from several; a false match of the signature costs one attempt. */
 enum { ATTEMPTS = 64 };
 
-/* Unpack the range `part` of a gzip file; is it whole and one stream? */
+/* Unpack the range `part` of a gzip file; returns whether it is one complete stream. */
 static bool gzip_part_whole(const vgi_tap *file, int64_t from, int64_t to)
 {
     unsigned char *block = malloc(VGI_BLOCK), trailer[8];
@@ -183,7 +183,7 @@ static bool gzip_part_whole(const vgi_tap *file, int64_t from, int64_t to)
     return whole;
 }
 
-/* The next place behind `from` where a gzip stream could start, or `end`. */
+/* The next position after `from` where a gzip stream could start, or `end`. */
 static int64_t next_gzip(const vgi_tap *file, unsigned char *block, int64_t from, int64_t end)
 {
     for (size_t got; from < end; from += (int64_t)got - 2) {
@@ -195,8 +195,8 @@ static int64_t next_gzip(const vgi_tap *file, unsigned char *block, int64_t from
     return end;
 }
 
-/* Several gzip streams joined into one file: each must agree with its own trailer. Only reached when the file is not
- * one whole stream. */
+/* Several gzip streams joined into one file: each must agree with its own trailer. Called only if the file is not one
+ * complete stream. */
 bool vgi_gzip_parts_whole(const vgi_tap *file, int64_t end)
 {
     enum { SHORTEST = 18 };

@@ -1,15 +1,15 @@
-/* usda.c: USD as text, written only: one mesh whose points have a sample for every frame, polygons as they are.
- * Leaves out texture coordinates, materials and groups, skeletons, and reading.
+/* usda.c: writes USD as text: one mesh whose points have a sample for every frame; polygons are kept. Texture
+ * coordinates, materials, groups and skeletons are not written. There is no reader.
  *
- * Samples are written as they come; what stands before them and is known later (rate, last time) has room to be
- * patched.
+ * Samples are written as they arrive; values before them that are known only later (rate, last time) have reserved
+ * fields that are patched.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-enum { ROOM = 26, PLACES = 4 }; /* bytes kept free for a number; such places */
+enum { ROOM = 26, PLACES = 4 }; /* bytes reserved for a number; such fields */
 
 
 typedef struct writing {
@@ -18,7 +18,7 @@ typedef struct writing {
     vg_bytes text, extents;
     vgi_names names;
     uint64_t frames, first_key_off, place_off[PLACES];
-    bool timed, ignored_times; /* what the first frame says; a later one had a time nevertheless */
+    bool timed, ignored_times; /* set by the first frame; a later one had a time although the first had none */
     double first, last, rate, last_key;
     size_t segments;
 } writing;
@@ -28,7 +28,7 @@ static int put_text(writing *x, const char *s, vg_err *e)
     return vgi_output_put(x->out, s, strlen(s), e);
 }
 
-/* Room for a number, blank at first. */
+/* Reserve a blank field for a number. */
 static int put_room(writing *x, uint64_t *off, vg_err *e)
 {
     char blank[ROOM];
@@ -37,7 +37,7 @@ static int put_room(writing *x, uint64_t *off, vg_err *e)
     return vgi_output_put(x->out, blank, sizeof blank, e);
 }
 
-/* All of it: another number may have been there before. */
+/* Overwrite the whole field, which may have held another number. */
 static int fill_room(writing *x, uint64_t off, double number, vg_err *e)
 {
     char digits[ROOM];
@@ -63,7 +63,7 @@ static int put_layer(writing *x, vg_err *e)
                : r;
 }
 
-/* Numbers with commas between. */
+/* Numbers separated by commas. */
 static int put_integer(writing *x, uint64_t number, bool first, vg_err *e)
 {
     char digits[24] = ", ";
@@ -71,7 +71,7 @@ static int put_integer(writing *x, uint64_t number, bool first, vg_err *e)
     return vgi_output_put(x->out, digits, n + vgi_print_uint(digits + n, number), e);
 }
 
-/* A mesh of USD has faces of three and more. */
+/* A USD mesh has only faces with three or more corners. */
 static int put_faces(writing *x, vg_err *e)
 {
     const vg_mesh *m = &x->h->body.mesh;
@@ -104,7 +104,7 @@ static int begin_usda(void **state, const vg_head *h, const vg_sink_options *o, 
 
 /* ---- time ---- */
 
-/* Whole numbers that binary32 times came from are found again. */
+/* Recover integers that were stored as times in binary32. */
 static double settled(double x)
 {
     return fabs(x - round(x)) <= 1e-4 ? round(x) : x;
@@ -125,7 +125,7 @@ static int check_time(writing *x, const vg_frame *f, vg_err *e)
     return VG_OK;
 }
 
-/* The first step between two frames gives the rate, and with it the time code of the frame before. */
+/* The first step between two frames gives the rate, and so the time code of the previous frame. */
 static int settle_rate(writing *x, const vg_frame *f, vg_err *e)
 {
     double step = f->time - x->first;
@@ -168,7 +168,7 @@ static size_t print_point(char *to, const double p[3])
     return (size_t)(at - to);
 }
 
-/* The box around the points, as "[(..),(..)]" would have it: two points. */
+/* The bounding box of the points as two points, for "[(..),(..)]". */
 static int keep_extent(writing *x, const double *v, vg_err *e)
 {
     double box[6] = {v[0], v[1], v[2], v[0], v[1], v[2]};
