@@ -81,9 +81,9 @@ void report_mesh(report *r, const vg_head *h)
     vg_asset_text(&h->body.asset, asset, sizeof asset);
     report_put(r, "asset", *asset ? "asset" : NULL, h->body.asset.n ? report_text(asset) : report_nothing());
     report_put(r, "labels", a->nlabels ? "labels" : NULL, report_count(a->nlabels));
-    report_put(r, "selected_faces", h->has_selection ? "selected faces" : NULL,
-               h->has_selection ? report_count(h->nselected) : report_nothing());
-    report_put(r, "links", h->has_links ? "links" : NULL, h->has_links ? report_count(h->nlinks) : report_nothing());
+    report_put(r, "selected_faces", h->selection.chosen ? "selected faces" : NULL,
+               h->selection.chosen ? report_count(h->selection.n) : report_nothing());
+    report_put(r, "links", h->links.chosen ? "links" : NULL, h->links.chosen ? report_count(h->links.n) : report_nothing());
     report_put(r, "anchors", h->nanchors ? "anchors" : NULL, report_count(h->nanchors));
     report_end(r);
 }

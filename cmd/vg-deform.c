@@ -252,8 +252,8 @@ static void make_graphs(work *w)
 {
     vg_err e;
     if (opts.correspondence) {
-        w->h->has_selection = false; /* every face may drive one */
-        w->target.has_selection = false;
+        w->h->selection.chosen = false; /* every face may drive one */
+        w->target.selection.chosen = false;
         w->h->nanchors = 0;
         if (vg_head_prepare_vectors(&w->target, &e) < 0 || vg_head_graph(&w->to, &w->target, &e) < 0) cli_die(&e);
     } else if (opts.onto) {
@@ -279,11 +279,12 @@ static vg_graph *sample_graph(const vg_head *h)
 {
     vg_err e;
     vg_graph *g;
-    size_t stride = h->body.mesh.nf / SAMPLE + 1, n = 0;
-    uint32_t *selected = cli_allocate(h->body.mesh.nf / stride + 1, sizeof *selected, "a sample of the faces");
-    for (size_t face = 0; face < h->body.mesh.nf; face += stride) selected[n++] = (uint32_t)face;
-    if (vg_graph_new(&g, &h->body.mesh, n, selected, 0, NULL, &e) < 0) cli_die(&e);
-    free(selected);
+    size_t stride = h->body.mesh.nf / SAMPLE + 1;
+    vg_selection some = {.chosen = true};
+    some.faces = cli_allocate(h->body.mesh.nf / stride + 1, sizeof *some.faces, "a sample of the faces");
+    for (size_t face = 0; face < h->body.mesh.nf; face += stride) some.faces[some.n++] = (uint32_t)face;
+    if (vg_graph_new(&g, &h->body.mesh, &some, NULL, &e) < 0) cli_die(&e);
+    free(some.faces);
     return g;
 }
 

@@ -106,11 +106,11 @@ static void select_all_faces(vg_head *h)
 static void select_faces(vg_head *h)
 {
     vg_err e;
-    if (h->has_selection) return;
-    if (vg_select_faces(&h->body.mesh, &h->selected, &h->nselected, &e) < 0) cli_die(&e);
-    h->has_selection = true;
+    if (h->selection.chosen) return;
+    if (vg_select_faces(&h->body.mesh, &h->selection.faces, &h->selection.n, &e) < 0) cli_die(&e);
+    h->selection.chosen = true;
     vg_map_clear(&h->map);
-    cli_note("%zu of %zu faces carry vectors", h->nselected, h->body.mesh.nf);
+    cli_note("%zu of %zu faces carry vectors", h->selection.n, h->body.mesh.nf);
 }
 
 /* The options that change a sequence need vertices: a stream of anything else is passed on as it is. */

@@ -478,12 +478,12 @@ static int take_links(reading *x, vg_head *h, vg_err *e)
     static const uint64_t pairs[2] = {UINT64_MAX, 2};
     if (!x->held[LINKS].there) return missing(x, LINKS, x->values, e);
     if (!has_shape(&x->held[LINKS], 2, pairs)) return wrong_shape(x, LINKS, "(links, 2)", e);
-    h->has_links = true;
+    h->links.chosen = true;
     size_t n;
-    int r = copy_indices(x, LINKS, h->body.mesh.nv, &h->links, &n, e);
-    h->nlinks = n / 2;
-    for (size_t i = 0; r == VG_OK && i < h->nlinks; i++)
-        if (h->links[2 * i] == h->links[2 * i + 1]) return wrong(x, LINKS, "joins a vertex to itself", e);
+    int r = copy_indices(x, LINKS, h->body.mesh.nv, &h->links.pairs, &n, e);
+    h->links.n = n / 2;
+    for (size_t i = 0; r == VG_OK && i < h->links.n; i++)
+        if (h->links.pairs[2 * i] == h->links.pairs[2 * i + 1]) return wrong(x, LINKS, "joins a vertex to itself", e);
     return r;
 }
 
@@ -494,9 +494,9 @@ static int take_graph(reading *x, vg_head *h, vg_err *e)
     const uint64_t roots[2] = {x->frames, 3};
     if (h->kind == VG_VERTICES) return VG_OK;
     int r = vg_mesh_check(&h->body.mesh, x->subject, e);
-    if (r == VG_OK) r = copy_indices(x, SELECTED, h->body.mesh.nf, &h->selected, &h->nselected, e);
-    h->has_selection = x->held[SELECTED].there;
-    if (r == VG_OK) r = check_ascending(x, SELECTED, h->selected, h->nselected, e);
+    if (r == VG_OK) r = copy_indices(x, SELECTED, h->body.mesh.nf, &h->selection.faces, &h->selection.n, e);
+    h->selection.chosen = x->held[SELECTED].there;
+    if (r == VG_OK) r = check_ascending(x, SELECTED, h->selection.faces, h->selection.n, e);
     if (r == VG_OK) r = take_links(x, h, e);
     if (r == VG_OK) r = copy_indices(x, ANCHORS, h->body.mesh.nv, &h->anchors, &h->nanchors, e);
     if (r == VG_OK) r = check_ascending(x, ANCHORS, h->anchors, h->nanchors, e);

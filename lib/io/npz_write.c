@@ -126,7 +126,7 @@ static int add_graph(writing *x, vg_err *e)
 {
     vg_graph *g;
     int r = vg_head_graph(&g, x->h, e);
-    if (r == VG_OK) r = add_mesh(x, GRAPH_OFFSETS, GRAPH_VERTICES, g->start, g->vert, g->nf, e);
+    if (r == VG_OK) r = add_mesh(x, GRAPH_OFFSETS, GRAPH_VERTICES, g->faces.start, g->faces.vert, g->faces.nf, e);
     vg_graph_free(&g);
     return r;
 }
@@ -214,8 +214,8 @@ static bool belongs(const writing *x, enum array i)
     case CENTROIDS: return x->placed && x->frames;
     case ROOT_TURNS: return x->turned && x->frames;
     case GRAPH_OFFSETS: return is_rooted(h); /* with graph_vertices */
-    case LINKS: return is_rooted(h) && h->has_links;
-    case SELECTED: return is_rooted(h) && h->has_selection;
+    case LINKS: return is_rooted(h) && h->links.chosen;
+    case SELECTED: return is_rooted(h) && h->selection.chosen;
     case ROOTS: return is_rooted(h);
     case FACE_OFFSETS: return h->body.mesh.nv > 0; /* with face_vertices */
     case REFERENCE: return h->body.mesh.nv > 0 && h->body.reference;
@@ -234,9 +234,9 @@ static bool belongs(const writing *x, enum array i)
 static int add(writing *x, enum array i, vg_err *e)
 {
     const vg_head *h = x->h;
-    const uint64_t places[3] = {x->frames, h->nanchors, 3}, roots[2] = {x->frames, 3}, links[2] = {h->nlinks, 2};
+    const uint64_t places[3] = {x->frames, h->nanchors, 3}, roots[2] = {x->frames, 3}, links[2] = {h->links.n, 2};
     const uint64_t parts[3] = {x->frames, x->parts, 3}, turns[2] = {x->frames, 4};
-    const uint64_t anchors = h->nanchors, selected = h->nselected, frames = x->frames;
+    const uint64_t anchors = h->nanchors, selected = h->selection.n, frames = x->frames;
     if (!belongs(x, i)) return VG_OK;
     switch (i) {
     case ANCHOR_POSITIONS: return add_doubles(x, i, 3, places, &x->anchors, e);
@@ -246,12 +246,12 @@ static int add(writing *x, enum array i, vg_err *e)
     case FACE_OFFSETS:
         return add_mesh(x, i, FACE_VERTICES, h->body.mesh.start, h->body.mesh.vert, h->body.mesh.nf, e);
     case GRAPH_OFFSETS: return add_graph(x, e);
-    case LINKS: return add_indices(x, i, 2, links, h->links, 2 * h->nlinks, e);
+    case LINKS: return add_indices(x, i, 2, links, h->links.pairs, 2 * h->links.n, e);
     case NAMES: return add_texts(x, i, 1, x->names.at, x->names.n, e);
     case REFERENCE: return add_reference(x, e);
     case REFERENCE_NAME: return add_texts(x, i, 0, &h->body.reference_name, 1, e);
     case ROOTS: return add_doubles(x, i, 2, roots, &x->roots, e);
-    case SELECTED: return add_indices(x, i, 1, &selected, h->selected, h->nselected, e);
+    case SELECTED: return add_indices(x, i, 1, &selected, h->selection.faces, h->selection.n, e);
     case TIMES: return add_doubles(x, i, 1, &frames, &x->times, e);
     default: return add_values(x, i, e);
     }

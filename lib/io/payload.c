@@ -23,7 +23,7 @@ static const char *refuse_form(const vg_head *h)
         return "record MAP has not as many patches as record PTCH";
     if (vg_head_width(h) == 0) return "its elements have no width";
     if (needs_mesh(element) && !h->body.reference) return "a MESH and a REFP record must come before it";
-    if (element == VG_OF_CORNER && !h->has_links) return "a LINK record must come before it";
+    if (element == VG_OF_CORNER && !h->links.chosen) return "a LINK record must come before it";
     if (element == VG_OF_TRANSFORM || vg_head_elements(h, element) == SIZE_MAX) return NULL;
     return h->count != vg_head_elements(h, element) ? "its count does not fit its elements" : NULL;
 }

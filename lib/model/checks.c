@@ -74,7 +74,7 @@ int vgi_check_asset(vg_head *h, void *artefact, const char *where, vg_err *e)
 int vgi_check_selection(vg_head *h, void *artefact, const char *where, vg_err *e)
 {
     (void)artefact;
-    return vgi_check_ascending(where, h->selected, h->nselected, h->body.mesh.nf, e);
+    return vgi_check_ascending(where, h->selection.faces, h->selection.n, h->body.mesh.nf, e);
 }
 
 int vgi_check_anchors(vg_head *h, void *artefact, const char *where, vg_err *e)
@@ -86,8 +86,8 @@ int vgi_check_anchors(vg_head *h, void *artefact, const char *where, vg_err *e)
 int vgi_check_links(vg_head *h, void *artefact, const char *where, vg_err *e)
 {
     (void)artefact;
-    for (size_t i = 0; i < h->nlinks; i++) {
-        uint32_t a = h->links[2 * i], b = h->links[2 * i + 1];
+    for (size_t i = 0; i < h->links.n; i++) {
+        uint32_t a = h->links.pairs[2 * i], b = h->links.pairs[2 * i + 1];
         if (a >= h->body.mesh.nv || b >= h->body.mesh.nv) return vgi_wrong(where, "an index is out of range", e);
         if (a == b) return vgi_wrong(where, "a link joins a vertex to itself", e);
     }

@@ -78,9 +78,9 @@ int vg_digest_new(vg_digest **out, const vg_head *h, vg_err *e)
     mix_count(d, h->body.mesh.nf);
     for (size_t f = 0; f < h->body.mesh.nf; f++)
         mix_indices(d, h->body.mesh.vert + h->body.mesh.start[f], h->body.mesh.start[f + 1] - h->body.mesh.start[f]);
-    mix_count(d, h->has_selection);
-    mix_indices(d, h->selected, h->has_selection ? h->nselected : 0);
-    mix_indices(d, h->links, 2 * h->nlinks);
+    mix_count(d, h->selection.chosen);
+    mix_indices(d, h->selection.faces, h->selection.chosen ? h->selection.n : 0);
+    mix_indices(d, h->links.pairs, 2 * h->links.n);
     mix_indices(d, h->anchors, h->nanchors);
     if (h->body.reference) mix_doubles(d, h->body.reference, 3 * h->body.mesh.nv);
     return VG_OK;

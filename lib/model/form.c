@@ -79,9 +79,9 @@ vg_element vg_head_element(const vg_head *h)
 static size_t graph_corners(const vg_head *h)
 {
     const vg_mesh *m = &h->body.mesh;
-    size_t corners = 2 * h->nlinks;
-    if (!h->has_selection) return corners + vg_mesh_corners(m);
-    for (size_t i = 0; i < h->nselected; i++) corners += m->start[h->selected[i] + 1] - m->start[h->selected[i]];
+    size_t corners = 2 * h->links.n;
+    if (!h->selection.chosen) return corners + vg_mesh_corners(m);
+    for (size_t i = 0; i < h->selection.n; i++) corners += m->start[h->selection.faces[i] + 1] - m->start[h->selection.faces[i]];
     return corners;
 }
 

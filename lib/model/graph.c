@@ -10,66 +10,65 @@ static void mark_attached(vg_graph *g)
 {
     size_t corners = vg_graph_corners(g);
     for (size_t c = 0; c < corners; c++) {
-        bool *in = &g->in_face[g->vert[c]];
+        bool *in = &g->in_face[g->faces.vert[c]];
         g->attached += !*in;
         *in = true;
     }
-    for (size_t f = 0; f < g->nf; f++) {
-        size_t size = g->start[f + 1] - g->start[f];
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        size_t size = g->faces.start[f + 1] - g->faces.start[f];
         if (size > g->max_corners) g->max_corners = size;
     }
 }
 
-static void fill_faces(vg_graph *g, const vg_mesh *m, const uint32_t *selected, const uint32_t *links)
+/* selected, pairs: NULL for all faces, no links. */
+static void fill_faces(vg_graph *g, const vg_mesh *m, const uint32_t *selected, const uint32_t *pairs)
 {
     uint32_t at = 0;
-    size_t faces = g->nf - g->nlinks;
+    size_t faces = g->faces.nf - g->nlinks;
     for (size_t i = 0; i < faces; i++) {
         size_t f = selected ? selected[i] : i;
-        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) g->vert[at++] = m->vert[c];
-        g->start[i + 1] = at;
+        for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) g->faces.vert[at++] = m->vert[c];
+        g->faces.start[i + 1] = at;
     }
     for (size_t i = 0; i < g->nlinks; i++) {
-        g->vert[at++] = links[2 * i];
-        g->vert[at++] = links[2 * i + 1];
-        g->start[faces + i + 1] = at;
+        g->faces.vert[at++] = pairs[2 * i];
+        g->faces.vert[at++] = pairs[2 * i + 1];
+        g->faces.start[faces + i + 1] = at;
     }
 }
 
-int vg_graph_new(vg_graph **out, const vg_mesh *m, size_t nselected, const uint32_t *selected, size_t nlinks,
-                 const uint32_t *links, vg_err *e)
+int vg_graph_new(vg_graph **out, const vg_mesh *m, const vg_selection *selection, const vg_links *links, vg_err *e)
 {
-    size_t faces = selected ? nselected : m->nf, corners = 2 * nlinks;
+    const bool some = selection && selection->chosen;
+    size_t faces = some ? selection->n : m->nf, nlinks = links ? links->n : 0, corners = 2 * nlinks;
     for (size_t i = 0; i < faces; i++) {
-        size_t f = selected ? selected[i] : i;
+        size_t f = some ? selection->faces[i] : i;
         corners += m->start[f + 1] - m->start[f];
     }
     if (corners >= UINT32_MAX) return vg_fail(e, VG_EINPUT, "too many corners: %zu (the limit is 2^32 - 2)", corners);
 
     vg_graph *g = *out = vgi_array(1, sizeof *g, e);
     if (!g) return VG_ENOMEM;
-    g->nv = m->nv, g->nf = faces + nlinks, g->nlinks = nlinks;
-    g->start = vgi_array(g->nf + 1, sizeof *g->start, e);
-    g->vert = vgi_array(corners, sizeof *g->vert, e);
-    g->in_face = vgi_array(g->nv, sizeof *g->in_face, e);
-    if (!g->start || !g->vert || !g->in_face) return vg_graph_free(out), VG_ENOMEM;
-    fill_faces(g, m, selected, links);
+    g->faces.nv = m->nv, g->faces.nf = faces + nlinks, g->nlinks = nlinks;
+    g->faces.start = vgi_array(g->faces.nf + 1, sizeof *g->faces.start, e);
+    g->faces.vert = vgi_array(corners, sizeof *g->faces.vert, e);
+    g->in_face = vgi_array(g->faces.nv, sizeof *g->in_face, e);
+    if (!g->faces.start || !g->faces.vert || !g->in_face) return vg_graph_free(out), VG_ENOMEM;
+    fill_faces(g, m, some ? selection->faces : NULL, links ? links->pairs : NULL);
     mark_attached(g);
     return VG_OK;
 }
 
 int vg_head_graph(vg_graph **g, const vg_head *h, vg_err *e)
 {
-    static const uint32_t none[1];
-    const uint32_t *selected = h->has_selection ? h->nselected ? h->selected : none : NULL;
-    return vg_graph_new(g, &h->body.mesh, h->nselected, selected, h->nlinks, h->links, e);
+    return vg_graph_new(g, &h->body.mesh, &h->selection, &h->links, e);
 }
 
 void vg_graph_free(vg_graph **g)
 {
     if (!*g) return;
-    free((*g)->start);
-    free((*g)->vert);
+    free((*g)->faces.start);
+    free((*g)->faces.vert);
     free((*g)->in_face);
     free(*g);
     *g = NULL;
@@ -77,27 +76,27 @@ void vg_graph_free(vg_graph **g)
 
 size_t vg_graph_corners(const vg_graph *g)
 {
-    return g->start[g->nf];
+    return g->faces.start[g->faces.nf];
 }
 
 void vg_graph_vectors(const vg_graph *g, const double *vertices, double *vectors)
 {
-    for (size_t f = 0; f < g->nf; f++) {
-        uint32_t begin = g->start[f], end = g->start[f + 1];
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        uint32_t begin = g->faces.start[f], end = g->faces.start[f + 1];
         double centre[3] = {0, 0, 0}, share = 1.0 / (double)(end - begin);
         for (uint32_t c = begin; c < end; c++)
-            vgi_add(centre, vertices + 3 * (size_t)g->vert[c]);
+            vgi_add(centre, vertices + 3 * (size_t)g->faces.vert[c]);
         vgi_scale(centre, share);
         for (uint32_t c = begin; c < end; c++)
             for (int k = 0; k < 3; k++)
-                vectors[3 * (size_t)c + k] = vertices[3 * (size_t)g->vert[c] + k] - centre[k];
+                vectors[3 * (size_t)c + k] = vertices[3 * (size_t)g->faces.vert[c] + k] - centre[k];
     }
 }
 
 void vg_graph_root(const vg_graph *g, const double *vertices, double root[3])
 {
     double sum[3] = {0, 0, 0};
-    for (size_t v = 0; v < g->nv; v++)
+    for (size_t v = 0; v < g->faces.nv; v++)
         if (g->in_face[v])
             vgi_add(sum, vertices + 3 * v);
     for (int k = 0; k < 3; k++) root[k] = g->attached ? sum[k] / (double)g->attached : 0;

@@ -266,7 +266,7 @@ void vg_head_clear(vg_head *h)
 
 int vg_head_copy(vg_head *to, const vg_head *from, vg_err *e)
 {
-    *to = (vg_head){.has_selection = from->has_selection, .has_links = from->has_links, .kind = from->kind,
+    *to = (vg_head){.selection.chosen = from->selection.chosen, .links.chosen = from->links.chosen, .kind = from->kind,
                     .width = from->width, .precision = from->precision, .count = from->count};
     int r = vg_body_copy(&to->body, &from->body, e);
     if (r == VG_OK) r = vgi_form_copy(to, from, e);

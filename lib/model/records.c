@@ -128,12 +128,12 @@ static const vgi_member skin_fields[] = {
 
 /* ---- beside the body ---- */
 
-LENGTH(selected_faces, vg_head, a->nselected)
+LENGTH(selected_faces, vg_head, a->selection.n)
 static const vgi_member sele_fields[] = {
-    NUMBER(vg_head, U64, nselected), ARRAY(vg_head, U32, selected, 1, selected_faces)};
+    NUMBER(vg_head, U64, selection.n), ARRAY(vg_head, U32, selection.faces, 1, selected_faces)};
 
-LENGTH(link_count, vg_head, a->nlinks)
-static const vgi_member link_fields[] = {NUMBER(vg_head, U64, nlinks), ARRAY(vg_head, U32, links, 2, link_count)};
+LENGTH(link_count, vg_head, a->links.n)
+static const vgi_member link_fields[] = {NUMBER(vg_head, U64, links.n), ARRAY(vg_head, U32, links.pairs, 2, link_count)};
 
 LENGTH(anchor_count, vg_head, a->nanchors)
 static const vgi_member anch_fields[] = {NUMBER(vg_head, U64, nanchors), ARRAY(vg_head, U32, anchors, 1, anchor_count)};
@@ -318,9 +318,10 @@ const vgi_artefact vgi_artefacts[VGI_ARTEFACTS] = {
                   FIELDS(labl_fields), .check = vgi_check_labels},
     [VGI_ASST] = {.tag = "ASST", .name = "asset", .needs = "MESH", IN_BODY(asset), PRESENT(body.asset.n),
                   FIELDS(asst_fields), .check = vgi_check_asset},
-    [VGI_SELE] = {.tag = "SELE", .flags = VGI_CRITICAL, .name = "selection", .needs = "MESH", MARKED(has_selection), FIELDS(sele_fields),
+    [VGI_SELE] = {.tag = "SELE", .flags = VGI_CRITICAL, .name = "selection", .needs = "MESH",
+                  MARKED(selection.chosen), FIELDS(sele_fields),
                   .check = vgi_check_selection},
-    [VGI_LINK] = {.tag = "LINK", .flags = VGI_CRITICAL, .name = "links", .needs = "MESH", MARKED(has_links), FIELDS(link_fields),
+    [VGI_LINK] = {.tag = "LINK", .flags = VGI_CRITICAL, .name = "links", .needs = "MESH", MARKED(links.chosen), FIELDS(link_fields),
                   .check = vgi_check_links},
     [VGI_ANCH] = {.tag = "ANCH", .flags = VGI_CRITICAL, .name = "anchors", .needs = "MESH", PRESENT(nanchors), FIELDS(anch_fields),
                   .check = vgi_check_anchors},

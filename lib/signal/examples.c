@@ -48,9 +48,9 @@ static void set_weights(vg_corrector *c)
     const vg_graph *g = c->source;
     double *vectors = c->now;
     vg_graph_vectors(g, c->reference, vectors);
-    for (size_t f = 0; f < g->nf; f++) {
+    for (size_t f = 0; f < g->faces.nf; f++) {
         double normal[3];
-        size_t first = g->start[f], r = g->start[f + 1] - first;
+        size_t first = g->faces.start[f], r = g->faces.start[f + 1] - first;
         vgi_area_vector(vectors + 3 * first, r, normal);
         for (size_t i = first; i < first + r; i++) c->weight[i] = sqrt(vgi_length(normal) / 2 / (double)r);
     }
@@ -59,7 +59,7 @@ static void set_weights(vg_corrector *c)
 /* Rotations and stretches of a pose's corners, without the rigid motion of the body. */
 static void measure(vg_corrector *c, const double *pose, double *feature)
 {
-    size_t nv = c->source->nv;
+    size_t nv = c->source->faces.nv;
     double turn[4], shift[3];
     memcpy(c->pose, pose, 3 * nv * sizeof *pose);
     vgi_root_remove(1, nv, c->reference, c->pose, turn, shift);
@@ -126,7 +126,7 @@ static int make_room(vg_corrector *c, vg_err *e)
            (c->feature = vgi_array(c->n * c->from, 4 * sizeof(double), e)) &&
            (c->factor = vgi_array(c->n * c->n, sizeof(double), e)) &&
            (c->miss = vgi_array(c->n * c->to, 3 * sizeof(double), e)) &&
-           (c->pose = vgi_array(c->source->nv, 3 * sizeof(double), e)) &&
+           (c->pose = vgi_array(c->source->faces.nv, 3 * sizeof(double), e)) &&
            (c->quaternions = vgi_array(most, 4 * sizeof(double), e)) &&
            (c->now = vgi_array(most, 4 * sizeof(double), e)) && (c->x = vgi_array(c->n, sizeof(double), e)) ? VG_OK
                                                                                                            : VG_ENOMEM;
@@ -140,7 +140,7 @@ int vg_corrector_new(vg_corrector **out, const vg_graph *source, const double *s
     c->source = source, c->target = target, c->n = examples->n;
     c->from = vg_graph_corners(source), c->to = vg_graph_corners(target);
     int r = make_room(c, e);
-    if (r == VG_OK && !(c->reference = vgi_copy_array(source_reference, source->nv, 3 * sizeof(double), e))) r = VG_ENOMEM;
+    if (r == VG_OK && !(c->reference = vgi_copy_array(source_reference, source->faces.nv, 3 * sizeof(double), e))) r = VG_ENOMEM;
     if (r == VG_OK) r = vg_deformer_new(&c->of_source, source, source_reference, threads, e);
     if (r == VG_OK) r = vg_deformer_new(&c->of_target, target, target_reference, threads, e);
     if (r == VG_OK) {

@@ -70,9 +70,9 @@ static void cut_faces(vgi_pieces *p, const double *reference)
 {
     const vg_graph *g = p->g;
     size_t n = 0;
-    for (size_t f = 0; f < g->nf; f++) {
-        const uint32_t *vert = g->vert + g->start[f];
-        size_t r = g->start[f + 1] - g->start[f];
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        const uint32_t *vert = g->faces.vert + g->faces.start[f];
+        size_t r = g->faces.start[f + 1] - g->faces.start[f];
         uint32_t s = p->apex[f] = choose_apex(vert, r, reference);
         p->first[f] = (uint32_t)n;
         for (size_t i = 1; i < r && (i + 1 < r || r == 2); i++, n++) {
@@ -82,7 +82,7 @@ static void cut_faces(vgi_pieces *p, const double *reference)
             p->vert[3 * n + 2] = r == 2 ? VGI_NO_EDGE : vert[(s + i + 1) % r];
         }
     }
-    p->first[g->nf] = (uint32_t)n;
+    p->first[g->faces.nf] = (uint32_t)n;
 }
 
 /* Areas, at least a thousandth of their mean; squared lengths if there are only segments. */
@@ -148,7 +148,7 @@ static void pair_pieces(vgi_pieces *p, const vgi_incidence *around, vgi_piece_si
     for (size_t i = 1; i < n; i++)
         if (sides[i].low == sides[i - 1].low && sides[i].high == sides[i - 1].high && sides[i].at / 3 != sides[i - 1].at / 3)
             put_pair(p, set, sides[i - 1].at / 3, sides[i].at / 3, sides[i].low, sides[i].high);
-    for (size_t v = 0; v < p->g->nv; v++)
+    for (size_t v = 0; v < p->g->faces.nv; v++)
         for (size_t i = around->first[v] + (size_t)1; i < around->first[v + 1]; i++) {
             uint32_t a = p->first[around->face[i - 1]], b = p->first[around->face[i]];
             if (find(set, a) != find(set, b)) put_pair(p, set, a, b, VGI_NO_EDGE, VGI_NO_EDGE);
@@ -171,10 +171,13 @@ static int find_neighbours(vgi_pieces *p, vg_err *e)
 int vgi_pieces_make(vgi_pieces *p, const vg_graph *g, const double *reference, vg_err *e)
 {
     *p = (vgi_pieces){.g = g};
-    for (size_t f = 0; f < g->nf; f++) p->n += g->start[f + 1] - g->start[f] > 3 ? g->start[f + 1] - g->start[f] - 2 : 1;
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        size_t size = g->faces.start[f + 1] - g->faces.start[f];
+        p->n += size > 3 ? size - 2 : 1;
+    }
     int r = VG_ENOMEM;
-    if ((p->face = vgi_array(p->n, sizeof *p->face, e)) && (p->first = vgi_array(g->nf + 1, sizeof *p->first, e)) &&
-        (p->apex = vgi_array(g->nf, sizeof *p->apex, e)) && (p->vert = vgi_array(p->n, 3 * sizeof *p->vert, e)) &&
+    if ((p->face = vgi_array(p->n, sizeof *p->face, e)) && (p->first = vgi_array(g->faces.nf + 1, sizeof *p->first, e)) &&
+        (p->apex = vgi_array(g->faces.nf, sizeof *p->apex, e)) && (p->vert = vgi_array(p->n, 3 * sizeof *p->vert, e)) &&
         (p->share = vgi_array(p->n, sizeof *p->share, e))) {
         cut_faces(p, reference);
         set_shares(p, reference);
@@ -189,7 +192,7 @@ int vgi_pieces_make(vgi_pieces *p, const vg_graph *g, const double *reference, v
 static void place_corners(const vgi_pieces *p, size_t f, const double *edges, double *w)
 {
     const vg_graph *g = p->g;
-    size_t r = g->start[f + 1] - g->start[f], s = p->apex[f], first = p->first[f], pieces = p->first[f + 1] - first;
+    size_t r = g->faces.start[f + 1] - g->faces.start[f], s = p->apex[f], first = p->first[f], pieces = p->first[f + 1] - first;
     memset(w, 0, 3 * r * sizeof *w);
     for (size_t i = 0; i < pieces; i++)
         for (size_t k = 0; k < 3; k++) {
@@ -201,9 +204,9 @@ static void place_corners(const vgi_pieces *p, size_t f, const double *edges, do
 void vgi_pieces_vectors(const vgi_pieces *p, const double *edges, double *vectors)
 {
     const vg_graph *g = p->g;
-    for (size_t f = 0; f < g->nf; f++) {
-        double *w = vectors + 3 * (size_t)g->start[f], centre[3];
-        size_t r = g->start[f + 1] - g->start[f];
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        double *w = vectors + 3 * (size_t)g->faces.start[f], centre[3];
+        size_t r = g->faces.start[f + 1] - g->faces.start[f];
         place_corners(p, f, edges, w);
         vg_centroid(w, r, centre);
         for (size_t i = 0; i < 3 * r; i++) w[i] -= centre[i % 3];

@@ -39,12 +39,12 @@ void vgi_root_remove(size_t n, size_t nv, const double *reference, double *poses
 void vgi_root_centre(size_t n, const vg_graph *g, const double centre[3], double *poses, const double *turn, double *shift)
 {
     for (size_t i = 0; i < n; i++) {
-        double *pose = poses + i * 3 * g->nv, at[3], turned[3];
+        double *pose = poses + i * 3 * g->faces.nv, at[3], turned[3];
         vg_graph_root(g, pose, at);
         for (size_t k = 0; k < 3; k++) at[k] -= centre[k];
         vg_quat_apply(turn + 4 * i, at, turned);
         for (size_t k = 0; k < 3; k++) shift[3 * i + k] += turned[k];
-        for (size_t c = 0; c < 3 * g->nv; c++) pose[c] -= at[c % 3];
+        for (size_t c = 0; c < 3 * g->faces.nv; c++) pose[c] -= at[c % 3];
     }
 }
 

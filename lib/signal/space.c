@@ -64,10 +64,10 @@ int vgi_space_make(vgi_space *s, vg_space kind, const vg_graph *g, const double 
 {
     *s = (vgi_space){.kind = kind, .g = g};
     size_t corners = vg_graph_corners(g);
-    int r = g->nf ? vgi_pieces_make(&s->pieces, g, reference, e)
+    int r = g->faces.nf ? vgi_pieces_make(&s->pieces, g, reference, e)
                   : vg_fail(e, VG_EINPUT, "the mesh has no faces: only vertices are a space of shapes then");
     if (r < 0) return r;
-    s->nodes = kind == VG_SPACE_VECTORS ? g->nf : s->pieces.n;
+    s->nodes = kind == VG_SPACE_VECTORS ? g->faces.nf : s->pieces.n;
     s->d = kind == VG_SPACE_VECTORS ? OF_CORNER * corners : OF_PIECE * s->pieces.n;
     if ((s->vectors = vgi_array(corners, 3 * sizeof(double), e)) &&
         (s->edges = vgi_array(s->pieces.n, 6 * sizeof(double), e)) &&
@@ -176,14 +176,14 @@ static void measure_frame(const vgi_space *s, size_t i, const double *pose, cons
 static void measure_face(const vgi_space *s, size_t f, const double *corners, double *values, double q[4])
 {
     double sum[4] = {0, 0, 0, 0};
-    for (size_t i = s->g->start[f]; i < s->g->start[f + 1]; i++) {
+    for (size_t i = s->g->faces.start[f]; i < s->g->faces.start[f + 1]; i++) {
         double unit[4], same = 0;
         make_unit(corners + 4 * i, unit);
         for (int k = 0; k < 4; k++) same += sum[k] * unit[k];
         for (int k = 0; k < 4; k++) sum[k] += same < 0 ? -unit[k] : unit[k];
     }
-    memcpy(values + 4 * (size_t)s->g->start[f], corners + 4 * (size_t)s->g->start[f],
-           4 * (s->g->start[f + 1] - s->g->start[f]) * sizeof *values);
+    memcpy(values + 4 * (size_t)s->g->faces.start[f], corners + 4 * (size_t)s->g->faces.start[f],
+           4 * (s->g->faces.start[f + 1] - s->g->faces.start[f]) * sizeof *values);
     make_unit(sum, q);
 }
 
@@ -192,7 +192,7 @@ static void measure_pose(void *context, size_t index)
     const measuring *m = context;
     const vgi_space *s = m->s;
     size_t frame = m->first + index;
-    const double *pose = m->poses + frame * 3 * s->g->nv, *corners = m->corners[index];
+    const double *pose = m->poses + frame * 3 * s->g->faces.nv, *corners = m->corners[index];
     double *values = m->values + frame * s->d, *turns = m->turns + frame * 4 * s->nodes;
     for (size_t i = 0; i < s->nodes; i++) {
         double stretch[9];
@@ -200,7 +200,7 @@ static void measure_pose(void *context, size_t index)
             measure_face(s, i, corners, values, turns + 4 * i);
             continue;
         }
-        const double *corner = corners + 4 * (size_t)s->g->start[s->pieces.face[i]];
+        const double *corner = corners + 4 * (size_t)s->g->faces.start[s->pieces.face[i]];
         if (s->kind == VG_SPACE_LENGTHS) measure_frame(s, i, pose, corner, turns + 4 * i);
         else measure_gradient(s, i, pose, corner, turns + 4 * i, stretch);
         if (has_gradients(s)) vgi_stretch_put(stretch, sqrt(s->pieces.share[i]), values + vgi_space_stretch_at(s, i));
@@ -255,7 +255,7 @@ static size_t count_jumps(size_t npairs, const uint32_t *pair, const double *l)
 /* vectors: logarithms of the corners, near that of their face. */
 static void put_corner_logs(const vgi_space *s, size_t f, const double home[4], const double near[3], double *values)
 {
-    const uint32_t *start = s->g->start;
+    const uint32_t *start = s->g->faces.start;
     const double back[4] = {home[0], -home[1], -home[2], -home[3]};
     double part = sqrt(s->node_share[f] / (double)(start[f + 1] - start[f]));
     for (size_t c = start[f]; c < start[f + 1]; c++) {
@@ -356,7 +356,7 @@ static int measure_poses(const vgi_space *s, const double *reference, size_t n, 
     m->corners = list;
     for (m->first = 0; r == VG_OK && m->first < n; m->first += BATCH) {
         size_t some = n - m->first < BATCH ? n - m->first : BATCH;
-        for (size_t i = 0; i < some; i++) poses[i] = m->poses + (m->first + i) * 3 * s->g->nv;
+        for (size_t i = 0; i < some; i++) poses[i] = m->poses + (m->first + i) * 3 * s->g->faces.nv;
         vg_deformer_measure(deformer, some, VG_VERTICES, poses, list);
         vgi_parallel(threads, some, measure_pose, m);
     }
@@ -383,8 +383,8 @@ int vgi_space_measure(const vgi_space *s, const double *reference, size_t n, con
 static void corners_of_logs(const vgi_space *s, const double *home, const double *values, double *vectors)
 {
     const vg_graph *g = s->g;
-    for (size_t f = 0; f < g->nf; f++) {
-        size_t first = g->start[f], r = g->start[f + 1] - first;
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        size_t first = g->faces.start[f], r = g->faces.start[f + 1] - first;
         double part = sqrt(s->node_share[f] / (double)r), centre[3], *w = vectors + 3 * first;
         for (size_t i = 0; i < r; i++) {
             const double *x = values + OF_CORNER * (first + i);

@@ -129,7 +129,7 @@ static int make_edges(const vgi_space *s, const double *reference, vg_err *e)
     const vgi_pieces *p = &s->pieces;
     vgi_relative *r = s->relative;
     vgi_piece_side *sides = vgi_array(p->n, 3 * sizeof *sides, e);
-    double least = 1e-9 * vg_diagonal(reference, s->g->nv);
+    double least = 1e-9 * vg_diagonal(reference, s->g->faces.nv);
     int code = sides && (r->edge = vgi_array(p->n, 6 * sizeof *r->edge, e)) &&
                (r->side = vgi_array(p->n, 3 * sizeof *r->side, e)) &&
                (r->length = vgi_array(p->n, 3 * sizeof(double), e)) &&

@@ -29,7 +29,7 @@ int vg_unshaper_new(vg_unshaper **out, const vg_signal *s, const vg_graph *g, co
                                           : vgi_space_make(&u->space, s->space, g, reference, e);
     if (r == VG_OK && (u->space.d != s->d || vgi_space_homes(&u->space) != s->nturns))
         r = vg_fail(e, VG_EINPUT, "the shapes of the signal are not of this mesh");
-    if (r == VG_OK && !(u->reference = vgi_copy_array(reference, g->nv, 3 * sizeof *reference, e))) r = VG_ENOMEM;
+    if (r == VG_OK && !(u->reference = vgi_copy_array(reference, g->faces.nv, 3 * sizeof *reference, e))) r = VG_ENOMEM;
     if (r < 0) vg_unshaper_free(out);
     return r;
 }
@@ -57,7 +57,7 @@ static int make_solver(vg_unshaper *u, vg_err *e)
     if (u->solver) return VG_OK;
     vg_graph_root(g, u->reference, u->root);
     if (!(u->vectors = vgi_array(vg_graph_corners(g), 3 * sizeof(double), e)) ||
-        !(u->rhs = vgi_array(g->nv, 3 * sizeof(double), e)))
+        !(u->rhs = vgi_array(g->faces.nv, 3 * sizeof(double), e)))
         return VG_ENOMEM;
     return vg_solver_new(&u->solver, g, NULL, 0, u->reference, VG_WEIGHTS_AREA, 1, e);
 }
@@ -96,7 +96,7 @@ int vgi_unshape_make(vgi_unshape *u, vg_space kind, const vg_graph *g, const dou
     if (r == VG_OK) r = vg_solver_new(&u->solver, g, NULL, 0, reference, VG_WEIGHTS_AREA, threads, e);
     if (r < 0) return r;
     u->batch = vg_solver_batch(u->solver) < MOST ? vg_solver_batch(u->solver) : MOST;
-    size_t batch = u->batch, values = 3 * g->nv;
+    size_t batch = u->batch, values = 3 * g->faces.nv;
     vg_graph_root(g, reference, u->root);
     return (u->home = vgi_array(vgi_space_homes(&u->space), 4 * sizeof(double), e)) &&
            (u->shape = vgi_array(batch, u->space.d * sizeof(double), e)) &&
@@ -116,7 +116,7 @@ static int solve(vgi_unshape *u, size_t n, vg_err *e)
         int r = vgi_space_vectors(&u->space, u->home, u->shape + i * u->space.d, u->vectors + 3 * i * corners, e);
         if (r < 0) return r;
         vectors[i] = u->vectors + 3 * i * corners;
-        x[i] = u->x + 3 * i * g->nv, rhs[i] = b[i] = u->rhs + 3 * i * g->nv;
+        x[i] = u->x + 3 * i * g->faces.nv, rhs[i] = b[i] = u->rhs + 3 * i * g->faces.nv;
         roots[i] = u->root;
     }
     vg_solver_load(u->solver, n, vectors, NULL, x, b);
@@ -127,9 +127,9 @@ static int solve(vgi_unshape *u, size_t n, vg_err *e)
 static void measure(vgi_unshape *u, size_t frame, const double *x, double *sum)
 {
     const vg_graph *g = u->space.g;
-    const double *pose = u->poses + 3 * frame * g->nv;
+    const double *pose = u->poses + 3 * frame * g->faces.nv;
     double most = 0;
-    for (size_t v = 0; v < g->nv; v++) {
+    for (size_t v = 0; v < g->faces.nv; v++) {
         if (!g->in_face[v]) continue;
         double square = vgi_square(pose + 3 * v, x + 3 * v);
         *sum += square;
@@ -157,7 +157,7 @@ int vgi_unshape_error(vgi_unshape *u, const vgi_basis *b, const double *x, size_
             for (size_t c = 0; c < d; c++) u->shape[i * d + c] += b->mean[c];
         int r = solve(u, some, e);
         if (r < 0) return r;
-        for (size_t i = 0; i < some; i++) measure(u, first + i, u->x + 3 * i * u->space.g->nv, &sum);
+        for (size_t i = 0; i < some; i++) measure(u, first + i, u->x + 3 * i * u->space.g->faces.nv, &sum);
     }
     error->most = sqrt(u->most);
     error->rms = sqrt(sum / (double)n / (double)(u->space.g->attached ? u->space.g->attached : 1));

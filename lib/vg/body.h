@@ -43,6 +43,20 @@ double vg_diagonal(const double *points, size_t n);
 /* vg_centroid: mean of n points; zeros for n = 0. */
 void vg_centroid(const double *points, size_t n, double centroid[3]);
 
+/* The faces of a mesh that carry vectors. */
+typedef struct vg_selection {
+    bool chosen;     /* false: all faces do */
+    size_t n;
+    uint32_t *faces; /* ascending */
+} vg_selection;
+
+/* Virtual faces of two vertices that join the components of a mesh. */
+typedef struct vg_links {
+    bool chosen;     /* perhaps none were needed */
+    size_t n;
+    uint32_t *pairs; /* 2 vertices per link */
+} vg_links;
+
 /* Attributes of a mesh file other than positions and faces, kept so that they can be written again. */
 typedef enum vg_label_kind {
     VG_LABEL_OBJECT = 1,    /* OBJ o */

@@ -134,12 +134,8 @@ typedef struct vg_head {
     vg_map map;           /* a stream of vg-fitmap */
     vg_signal signal;     /* a stream of vg-fitsignal */
     vg_network network;   /* a stream of vg-train */
-    bool has_selection;   /* only the faces `selected` (ascending) carry vectors; else all do */
-    size_t nselected;
-    uint32_t *selected;
-    bool has_links;       /* links were chosen (perhaps none were needed) */
-    size_t nlinks;
-    uint32_t *links;      /* nlinks pairs of vertices: virtual 2-vertex faces that join components */
+    vg_selection selection;
+    vg_links links;
     size_t nanchors;
     uint32_t *anchors;    /* vertices (ascending) whose position each frame of vectors or deformations gives */
     size_t nprovenance;

@@ -12,25 +12,19 @@ extern "C" {
 #endif
 
 /* The vector graph of a sequence: the faces that carry vectors, in order (all or the selected ones), then the
- * links. Layout as in vg_mesh; corner c of the graph is a position in vert. `attached` is the number of vertices
- * in at least one face. */
+ * links. Corner c of the graph is a position in faces.vert. */
 typedef struct vg_graph {
-    union { /* its faces as a mesh, for functions that take one */
-        vg_mesh faces;
-        struct {
-            size_t nv, nf; /* nf includes the links, which are the last */
-            uint32_t *start, *vert;
-        };
-    };
-    size_t nlinks;
-    size_t attached, max_corners;
-    bool *in_face; /* nv */
+    vg_mesh faces;
+    size_t nlinks;      /* the last ones of the faces */
+    size_t attached;    /* vertices in at least one face */
+    size_t max_corners; /* of a face */
+    bool *in_face;      /* faces.nv */
 } vg_graph;
 
-/* vg_graph_new: the graph of nselected faces of m (ascending; NULL: all faces) and nlinks links (pairs of vertices).
- * Links must join all components of m (vg_link_components); this is not checked here. O(corners). */
-int vg_graph_new(vg_graph **g, const vg_mesh *m, size_t nselected, const uint32_t *selected, size_t nlinks,
-                 const uint32_t *links, vg_err *e) VG_MUST_CHECK;
+/* vg_graph_new: the graph of the selected faces of m and the links; NULL: all faces, no links. Links must join all
+ * components of m (vg_link_components); this is not checked here. O(corners). */
+int vg_graph_new(vg_graph **g, const vg_mesh *m, const vg_selection *selection, const vg_links *links,
+                 vg_err *e) VG_MUST_CHECK;
 /* vg_head_graph: the graph of h's mesh, selection and links. */
 int vg_head_graph(vg_graph **g, const vg_head *h, vg_err *e) VG_MUST_CHECK;
 void vg_graph_free(vg_graph **g);

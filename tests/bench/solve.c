@@ -131,24 +131,24 @@ typedef struct theirs {
 /* The sum over faces of I - 11'/r, lower triangle; vertices in no face and the first attached one have a row of I. */
 static void assemble(theirs *t, const vg_graph *g, size_t pinned)
 {
-    size_t most = g->nv;
-    for (size_t f = 0; f < g->nf; f++) {
-        size_t r = g->start[f + 1] - g->start[f];
+    size_t most = g->faces.nv;
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        size_t r = g->faces.start[f + 1] - g->faces.start[f];
         most += r * (r + 1) / 2;
     }
-    cholmod_triplet *a = cholmod_allocate_triplet(g->nv, g->nv, most, -1, CHOLMOD_REAL, &t->common);
+    cholmod_triplet *a = cholmod_allocate_triplet(g->faces.nv, g->faces.nv, most, -1, CHOLMOD_REAL, &t->common);
     if (!a) die("not enough memory for the matrix");
     int *i = a->i, *j = a->j;
     double *x = a->x;
-    for (size_t v = 0; v < g->nv; v++)
+    for (size_t v = 0; v < g->faces.nv; v++)
         if (v == pinned || !g->in_face[v]) i[a->nnz] = j[a->nnz] = (int)v, x[a->nnz++] = 1;
-    for (size_t f = 0; f < g->nf; f++)
-        for (size_t p = g->start[f]; p < g->start[f + 1]; p++)
-            for (size_t q = g->start[f]; q <= p; q++) {
-                size_t u = g->vert[p], v = g->vert[q];
+    for (size_t f = 0; f < g->faces.nf; f++)
+        for (size_t p = g->faces.start[f]; p < g->faces.start[f + 1]; p++)
+            for (size_t q = g->faces.start[f]; q <= p; q++) {
+                size_t u = g->faces.vert[p], v = g->faces.vert[q];
                 if (u == pinned || v == pinned) continue;
                 i[a->nnz] = (int)(u > v ? u : v), j[a->nnz] = (int)(u > v ? v : u);
-                x[a->nnz++] = (p == q) - 1.0 / (g->start[f + 1] - g->start[f]);
+                x[a->nnz++] = (p == q) - 1.0 / (g->faces.start[f + 1] - g->faces.start[f]);
             }
     t->matrix = cholmod_triplet_to_sparse(a, 0, &t->common);
     cholmod_free_triplet(&a, &t->common);
@@ -159,14 +159,14 @@ static void assemble(theirs *t, const vg_graph *g, size_t pinned)
 static void fill(theirs *t, const vg_graph *g, size_t pinned, const double *w)
 {
     double *b = t->b->x;
-    memset(b, 0, 3 * g->nv * sizeof *b);
-    for (size_t f = 0; f < g->nf; f++) {
-        size_t begin = g->start[f], end = g->start[f + 1];
+    memset(b, 0, 3 * g->faces.nv * sizeof *b);
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        size_t begin = g->faces.start[f], end = g->faces.start[f + 1];
         for (size_t k = 0; k < 3; k++) {
             double mean = 0;
             for (size_t c = begin; c < end; c++) mean += w[3 * c + k] / (double)(end - begin);
             for (size_t c = begin; c < end; c++)
-                if (g->vert[c] != pinned) b[k * g->nv + g->vert[c]] += w[3 * c + k] - mean;
+                if (g->faces.vert[c] != pinned) b[k * g->faces.nv + g->faces.vert[c]] += w[3 * c + k] - mean;
         }
     }
 }
@@ -182,11 +182,11 @@ static void solve_theirs(void *context)
 static double distance(const theirs *t, const vg_graph *g, const double *pose, const double root[3])
 {
     const double *x = t->x->x;
-    double *v = numbers(3 * g->nv), mean[3], worst = 0;
-    for (size_t i = 0; i < g->nv; i++)
-        for (size_t k = 0; k < 3; k++) v[3 * i + k] = x[k * g->nv + i];
+    double *v = numbers(3 * g->faces.nv), mean[3], worst = 0;
+    for (size_t i = 0; i < g->faces.nv; i++)
+        for (size_t k = 0; k < 3; k++) v[3 * i + k] = x[k * g->faces.nv + i];
     vg_graph_root(g, v, mean);
-    for (size_t i = 0; i < g->nv; i++) {
+    for (size_t i = 0; i < g->faces.nv; i++) {
         double sum = 0;
         for (size_t k = 0; k < 3; k++) {
             double d = v[3 * i + k] - mean[k] + root[k] - pose[3 * i + k];
@@ -206,7 +206,7 @@ static void make_theirs(theirs *t, const vg_graph *g, size_t pinned, int kind)
     t->common.supernodal = kind;
     assemble(t, g, pinned);
     t->factor = cholmod_analyze(t->matrix, &t->common);
-    t->b = cholmod_zeros(g->nv, 3, CHOLMOD_REAL, &t->common);
+    t->b = cholmod_zeros(g->faces.nv, 3, CHOLMOD_REAL, &t->common);
     if (!t->factor || !t->b || !cholmod_factorize(t->matrix, t->factor, &t->common) ||
         t->factor->minor < t->factor->n)
         die("the reference cannot factorize");
@@ -231,7 +231,7 @@ static void compare(problem *p, double diagonal)
     ours o[2] = {{.p = p}, {.p = p}};
     theirs t[2] = {{.matrix = NULL}, {.matrix = NULL}};
     size_t pinned = 0;
-    while (pinned < p->g->nv && !p->g->in_face[pinned]) pinned++;
+    while (pinned < p->g->faces.nv && !p->g->in_face[pinned]) pinned++;
     for (int i = 0; i < 2; i++) {
         check(vg_solver_new(&o[i].solver, p->g, NULL, 0, p->reference, VG_WEIGHTS_UNIFORM, i + 1, &e), &e);
         make_theirs(&t[i], p->g, pinned, kinds[i]);

@@ -259,8 +259,8 @@ static void links_follow_both_ends(void)
     for (uint32_t f = 0; f < source.body.mesh.nf; f++) k.source[2 * f] = k.source[2 * f + 1] = f;
     carried r = carry(&source, &target, &k, pose, VG_BY_GRADIENT, 1);
     CHECK(r.g->nlinks == 1);
-    const uint32_t *end = r.g->vert + r.g->start[r.g->nf - 1];
-    const double *w = r.vectors + 3 * (size_t)r.g->start[r.g->nf - 1];
+    const uint32_t *end = r.g->faces.vert + r.g->faces.start[r.g->faces.nf - 1];
+    const double *w = r.vectors + 3 * (size_t)r.g->faces.start[r.g->faces.nf - 1];
     double c[2][2][3] = {{{0}}}; /* of both ends: before, now */
     for (int n = 0; n < 2; n++)
         for (size_t f = 0, faces = 4; f < source.body.mesh.nf; f++) {
@@ -517,7 +517,7 @@ static void shape_of_the_reference(void)
     double *truth = room(3 * h.body.mesh.nv, sizeof *truth), *count = room(h.body.mesh.nv, sizeof *count);
     double *w = vectors_of(g, h.body.reference);
     for (size_t c = 0; c < vg_graph_corners(g); c++) {
-        size_t v = g->vert[c];
+        size_t v = g->faces.vert[c];
         count[v]++;
         for (size_t k = 0; k < 3; k++) truth[3 * v + k] += h.body.reference[3 * v + k] + 0.5 * w[3 * c + k];
     }

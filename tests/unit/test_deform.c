@@ -70,19 +70,19 @@ static void cross(const double a[3], const double b[3], double c[3])
  * (y - y')(z + z') etc., made perpendicular to u; b = n x u. */
 static void frame_of(const vg_graph *g, size_t f, uint32_t c, const double *x, double F[9])
 {
-    double n[3] = {0, 0, 0}, u[3], b[3], centre[3] = {0, 0, 0}, r = g->start[f + 1] - g->start[f];
-    for (uint32_t i = g->start[f]; i < g->start[f + 1]; i++)
-        for (int k = 0; k < 3; k++) centre[k] += x[3 * (size_t)g->vert[i] + (size_t)k] / r;
-    for (uint32_t i = g->start[f]; i < g->start[f + 1]; i++) {
-        uint32_t j = i + 1 < g->start[f + 1] ? i + 1 : g->start[f];
+    double n[3] = {0, 0, 0}, u[3], b[3], centre[3] = {0, 0, 0}, r = g->faces.start[f + 1] - g->faces.start[f];
+    for (uint32_t i = g->faces.start[f]; i < g->faces.start[f + 1]; i++)
+        for (int k = 0; k < 3; k++) centre[k] += x[3 * (size_t)g->faces.vert[i] + (size_t)k] / r;
+    for (uint32_t i = g->faces.start[f]; i < g->faces.start[f + 1]; i++) {
+        uint32_t j = i + 1 < g->faces.start[f + 1] ? i + 1 : g->faces.start[f];
         double p[3], s[3];
         for (int k = 0; k < 3; k++) {
-            p[k] = x[3 * (size_t)g->vert[i] + (size_t)k] - centre[k];
-            s[k] = x[3 * (size_t)g->vert[j] + (size_t)k] - centre[k];
+            p[k] = x[3 * (size_t)g->faces.vert[i] + (size_t)k] - centre[k];
+            s[k] = x[3 * (size_t)g->faces.vert[j] + (size_t)k] - centre[k];
         }
         for (int k = 0; k < 3; k++) n[k] += (p[(k + 1) % 3] - s[(k + 1) % 3]) * (p[(k + 2) % 3] + s[(k + 2) % 3]);
     }
-    for (int k = 0; k < 3; k++) u[k] = x[3 * (size_t)g->vert[c] + (size_t)k] - centre[k];
+    for (int k = 0; k < 3; k++) u[k] = x[3 * (size_t)g->faces.vert[c] + (size_t)k] - centre[k];
     double length = sqrt(dot(u, u, 3)), along;
     for (int k = 0; k < 3; k++) u[k] /= length;
     along = dot(n, u, 3);
@@ -110,10 +110,10 @@ static double against_formulas(vg_head *h, const double *pose)
 {
     vg_graph *g = graph_of(h);
     double *q = measure(h, g, pose), *r = vectors_of(g, h->body.reference), *d = vectors_of(g, pose), worst = 0;
-    for (size_t f = 0; f < g->nf - g->nlinks; f++)
-        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
+    for (size_t f = 0; f < g->faces.nf - g->nlinks; f++)
+        for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++) {
             double J[9] = {0}, F[9], R[9], M[9], unit[4], scale = dot(q + 4 * c, q + 4 * c, 4);
-            if (g->start[f + 1] - g->start[f] == 2) {
+            if (g->faces.start[f + 1] - g->faces.start[f] == 2) {
                 rodrigues(r + 3 * c, d + 3 * c, J);
             } else {
                 frame_of(g, f, c, pose, F);
@@ -155,7 +155,7 @@ static double misses(vg_head *h, const double *pose)
     vg_graph *g = graph_of(h);
     double *q = measure(h, g, pose), *r = vectors_of(g, h->body.reference), *d = vectors_of(g, pose);
     size_t n = vg_graph_corners(g);
-    double D = fmax(vg_diagonal(h->body.reference, g->nv), vg_diagonal(pose, g->nv)), worst = 0;
+    double D = fmax(vg_diagonal(h->body.reference, g->faces.nv), vg_diagonal(pose, g->faces.nv)), worst = 0;
     for (size_t c = 0; c < n; c++) {
         double got[3];
         vg_quat_apply(q + 4 * c, r + 3 * c, got);
@@ -203,16 +203,16 @@ static double away(const double q[4], const double s[4])
 static void rotates_all(vg_head *h, const char *name, double angle, double scale)
 {
     vg_graph *g = graph_of(h);
-    motion t = turn(angle, scale, 3 * vg_diagonal(h->body.reference, g->nv)), only = turn(angle, 1, 0);
-    double *pose = move_points(&t, h->body.reference, g->nv), *q = measure(h, g, pose), want[4], worst = 0;
+    motion t = turn(angle, scale, 3 * vg_diagonal(h->body.reference, g->faces.nv)), only = turn(angle, 1, 0);
+    double *pose = move_points(&t, h->body.reference, g->faces.nv), *q = measure(h, g, pose), want[4], worst = 0;
     vg_quat_from_matrix(only.m, want);
     for (int k = 0; k < 4; k++) want[k] *= sqrt(scale);
-    for (size_t f = 0; f < g->nf; f++) {
-        if (f < g->nf - g->nlinks && g->start[f + 1] - g->start[f] == 2) continue; /* a bone has no roll */
-        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
-            const uint32_t *v = g->vert + g->start[f];
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        if (f < g->faces.nf - g->nlinks && g->faces.start[f + 1] - g->faces.start[f] == 2) continue; /* a bone has no roll */
+        for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++) {
+            const uint32_t *v = g->faces.vert + g->faces.start[f];
             /* a link between coincident vertices has no length to scale */
-            bool no_length = f >= g->nf - g->nlinks && farthest(h->body.reference + 3 * (size_t)v[0],
+            bool no_length = f >= g->faces.nf - g->nlinks && farthest(h->body.reference + 3 * (size_t)v[0],
                                                                 h->body.reference + 3 * (size_t)v[1], 1) < 1e-9;
             if (!no_length) worst = fmax(worst, away(q + 4 * c, want) / sqrt(scale));
         }
@@ -251,14 +251,14 @@ static void test_rigid_transfer(void)
         vg_graph *g = graph_of(&s.h);
         size_t n = 3 * vg_graph_corners(g);
         motion by = turn(2, 1.5, 4);
-        double *target = pairs[i].target ? t.pose[0] : warp(t.pose[0], g->nv, 0.3),
-               *pose = move_points(&by, s.pose[0], g->nv);
+        double *target = pairs[i].target ? t.pose[0] : warp(t.pose[0], g->faces.nv, 0.3),
+               *pose = move_points(&by, s.pose[0], g->faces.nv);
         double *w = vectors_of(g, target), *got = room(n, sizeof *got);
         vg_deformer *d = deformer(g, s.h.body.reference, 2);
         aim(d, g, target);
         for (size_t c = 0; c < n / 3; c++) move_vector(&by, w + 3 * c, w + 3 * c);
         vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &got);
-        CHECK_NEAR(farthest(got, w, n / 3) / vg_diagonal(target, g->nv), 0, 1e-11);
+        CHECK_NEAR(farthest(got, w, n / 3) / vg_diagonal(target, g->faces.nv), 0, 1e-11);
         CHECK(vg_deformer_get_stats(d).corners == 0);
         vg_deformer_free(&d);
         vg_graph_free(&g);
@@ -278,7 +278,7 @@ static void test_unit_of_source(void)
     const char *name;
     for (size_t i = 0; make_any(i, &h, &name); i++) {
         vg_graph *g = graph_of(&h);
-        size_t n = 4 * vg_graph_corners(g), nv = g->nv;
+        size_t n = 4 * vg_graph_corners(g), nv = g->faces.nv;
         double *pose = warp(h.body.reference, nv, 0.8), *before = measure(&h, g, pose), worst = 0;
         static const double units[] = {2, 0x1p-70, 0x1p70, 1e-3};
         for (size_t u = 0; u < sizeof units / sizeof *units; u++) {
@@ -306,7 +306,7 @@ static double ways_differ(vg_head *h, size_t n, const double *const *poses, cons
     size_t corners = vg_graph_corners(g);
     double **q = lists(n, 4 * corners), **a = lists(n, 3 * corners), **b = lists(n, 3 * corners),
            **w = lists(n, 3 * corners);
-    double D = vg_diagonal(target, g->nv), worst = 0;
+    double D = vg_diagonal(target, g->faces.nv), worst = 0;
     vg_deformer *d = deformer(g, h->body.reference, 1);
     aim(d, g, target);
     vg_deformer_measure(d, n, VG_VERTICES, poses, q);
@@ -361,7 +361,7 @@ static void test_threads_and_batches(void)
         size_t corners = vg_graph_corners(g);
         double *poses[POSES], **q = lists(POSES, 4 * corners), **w = lists(POSES, 3 * corners);
         double **q1 = lists(POSES, 4 * corners), **w1 = lists(POSES, 3 * corners);
-        for (size_t k = 0; k < POSES; k++) poses[k] = warp(shapes[i].body.reference, g->nv, 0.1 * (double)k);
+        for (size_t k = 0; k < POSES; k++) poses[k] = warp(shapes[i].body.reference, g->faces.nv, 0.1 * (double)k);
         vg_deformer *d = deformer(g, shapes[i].body.reference, 1);
         aim_by(d, g, poses[2], methods[i % 3]);
         for (size_t k = 0; k < POSES; k++) {
@@ -403,7 +403,7 @@ static void test_degenerate(void)
 {
     vg_head h = make_degenerate();
     vg_graph *g = graph_of(&h);
-    size_t corners = vg_graph_corners(g), nv = g->nv;
+    size_t corners = vg_graph_corners(g), nv = g->faces.nv;
     CHECK(g->nlinks == 0);
     motion t = turn(1.1, 1, 2);
     double *pose = move_points(&t, h.body.reference, nv), *q = room(4 * corners, sizeof *q), want[4];
@@ -415,8 +415,8 @@ static void test_degenerate(void)
     /* three on the face without area, three on the point, two on the segment without length,
      * one at its face's centroid */
     CHECK(vg_deformer_get_stats(d).corners == 9 && vg_deformer_get_stats(d).first_face == 1);
-    for (size_t f = 0; f < g->nf; f++)
-        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
+    for (size_t f = 0; f < g->faces.nf; f++)
+        for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++) {
             bool alone = f >= 1 && f <= 3, bone = f == 4;
             if (!bone) CHECK_NEAR(away(q + 4 * c, alone ? identity : want), 0, 1e-12);
         }
@@ -424,8 +424,8 @@ static void test_degenerate(void)
     double *w = vectors_of(g, pose), *got = room(3 * corners, sizeof *got);
     vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &got);
     CHECK(vg_deformer_get_stats(d).corners == 18);
-    for (size_t f = 0; f < g->nf; f++)
-        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++)
+    for (size_t f = 0; f < g->faces.nf; f++)
+        for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++)
             /* face 1 has vectors, but no turn */
             if (f != 1) CHECK_NEAR(farthest(got + 3 * c, w + 3 * c, 1), 0, 1e-12);
     vg_deformer_free(&d);
@@ -445,12 +445,12 @@ static void test_collapsed_in_one_pose(void)
     vg_graph *g = graph_of(&h);
     size_t corners = vg_graph_corners(g);
     double *poses[POSES], **good = lists(POSES, 3 * corners), **bad = lists(POSES, 3 * corners);
-    for (size_t k = 0; k < POSES; k++) poses[k] = warp(h.body.reference, g->nv, 0.1 * (double)k);
+    for (size_t k = 0; k < POSES; k++) poses[k] = warp(h.body.reference, g->faces.nv, 0.1 * (double)k);
     vg_deformer *d = deformer(g, h.body.reference, 1);
     aim(d, g, poses[1]);
     vg_deformer_transfer(d, POSES, VG_VERTICES, CONST(poses), good);
     CHECK(vg_deformer_get_stats(d).corners == 0);
-    for (uint32_t c = 4 * 50; c < 4 * 51; c++) memcpy(poses[BAD] + 3 * g->vert[c], poses[BAD], 3 * sizeof(double));
+    for (uint32_t c = 4 * 50; c < 4 * 51; c++) memcpy(poses[BAD] + 3 * g->faces.vert[c], poses[BAD], 3 * sizeof(double));
     vg_deformer_transfer(d, POSES, VG_VERTICES, CONST(poses), bad);
     CHECK(vg_deformer_get_stats(d).corners >= 4 && vg_deformer_get_stats(d).corners < 40);
     CHECK(vg_deformer_get_stats(d).first_face <= 50 && vg_deformer_get_stats(d).first_face > 20);
@@ -498,11 +498,11 @@ static void test_nothing_but_finite(void)
     static const double values[] = {0, 1, -1, 1e-300, 1e-12, 1e9, 0.5};
     vg_graph *g = graph_of(&h);
     size_t corners = vg_graph_corners(g);
-    double *pose = room(3 * g->nv, sizeof *pose), *q = room(4 * corners, sizeof *q),
+    double *pose = room(3 * g->faces.nv, sizeof *pose), *q = room(4 * corners, sizeof *q),
            *w = room(3 * corners, sizeof *w);
     vg_deformer *d = deformer(g, h.body.reference, 1);
     for (int trial = 0; trial < 3000; trial++) {
-        for (size_t i = 0; i < 3 * g->nv; i++) pose[i] = values[(size_t)((noise() + 1) * 3.4999)];
+        for (size_t i = 0; i < 3 * g->faces.nv; i++) pose[i] = values[(size_t)((noise() + 1) * 3.4999)];
         vg_deformer_measure(d, 1, VG_VERTICES, CONST(&pose), &q);
         if (trial % 1000 == 0) aim_by(d, g, h.body.reference, methods[trial / 1000]);
         vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &w);
@@ -569,17 +569,17 @@ static void test_gradient(void)
     for (size_t i = 0; make_any(i, &h, &name); i++) {
         vg_graph *g = graph_of(&h);
         size_t corners = vg_graph_corners(g);
-        double *pose = warp(h.body.reference, g->nv, 0.6), *target = warp(h.body.reference, g->nv, -0.3), *w[3];
+        double *pose = warp(h.body.reference, g->faces.nv, 0.6), *target = warp(h.body.reference, g->faces.nv, -0.3), *w[3];
         double *r = vectors_of(g, h.body.reference), *p = vectors_of(g, pose), *t = vectors_of(g, target);
-        double *want = room(3 * g->max_corners, sizeof *want), D = vg_diagonal(target, g->nv), worst = 0, apart = 0;
+        double *want = room(3 * g->max_corners, sizeof *want), D = vg_diagonal(target, g->faces.nv), worst = 0, apart = 0;
         vg_deformer *d = deformer(g, h.body.reference, 1);
         for (int k = 0; k < 3; k++) {
             w[k] = room(3 * corners, sizeof(double));
             aim_by(d, g, target, methods[k]);
             vg_deformer_transfer(d, 1, VG_VERTICES, CONST(&pose), &w[k]);
         }
-        for (size_t f = 0; f < g->nf; f++) {
-            size_t c = 3 * (size_t)g->start[f], n = g->start[f + 1] - g->start[f];
+        for (size_t f = 0; f < g->faces.nf; f++) {
+            size_t c = 3 * (size_t)g->faces.start[f], n = g->faces.start[f + 1] - g->faces.start[f];
             if (n > 2) by_gradient(r + c, p + c, t + c, n, want);
             else memcpy(want, w[0] + c, 6 * sizeof *want); /* line segments go by pose */
             worst = fmax(worst, farthest(w[1] + c, want, n));
@@ -603,7 +603,7 @@ static double self_transfer(vg_head *h, size_t n, const double *const *poses, vg
 {
     vg_graph *g = graph_of(h);
     size_t corners = vg_graph_corners(g);
-    double **w = lists(n, 3 * corners), **x = lists(n, 3 * g->nv), **rhs = lists(n, 3 * g->nv), **root = lists(n, 3),
+    double **w = lists(n, 3 * corners), **x = lists(n, 3 * g->faces.nv), **rhs = lists(n, 3 * g->faces.nv), **root = lists(n, 3),
            worst = 0;
     vg_err e;
     vg_solver *s;
@@ -615,9 +615,9 @@ static double self_transfer(vg_head *h, size_t n, const double *const *poses, vg
     vg_solver_load(s, n, CONST(w), NULL, x, rhs);
     vg_solver_solve(s, n, CONST(rhs), x, NULL, CONST(root));
     for (size_t i = 0; i < n; i++) {
-        for (size_t v = 0; v < g->nv; v++)
+        for (size_t v = 0; v < g->faces.nv; v++)
             if (!g->in_face[v]) memcpy(x[i] + 3 * v, poses[i] + 3 * v, 3 * sizeof(double));
-        worst = fmax(worst, farthest(x[i], poses[i], g->nv) / vg_diagonal(poses[i], g->nv));
+        worst = fmax(worst, farthest(x[i], poses[i], g->faces.nv) / vg_diagonal(poses[i], g->faces.nv));
     }
     vg_solver_free(&s);
     vg_deformer_free(&d);

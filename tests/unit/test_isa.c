@@ -317,10 +317,10 @@ static void check_guess(void)
     unsigned char in_face[POINTS];
     memset(in_face, 1, sizeof in_face);
     make_poses(pose, poses);
-    vg_graph g = {.nv = POINTS, .nf = FACES, .max_corners = 5};
+    vg_graph g = {.faces.nv = POINTS, .faces.nf = FACES, .max_corners = 5};
     uint32_t starts[FACES + 1], verts[CORNERS];
     memcpy(starts, start, sizeof start), memcpy(verts, vert, sizeof vert);
-    g.start = starts, g.vert = verts;
+    g.faces.start = starts, g.faces.vert = verts;
     vgi_metric metric = {0};
     vgi_point space[POINTS + 5];
     const vgi_guesser s = {.g = &g, .metric = &metric, .walk = walk, .nsteps = POINTS - 1, .pinned = 0};

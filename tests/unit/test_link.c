@@ -307,15 +307,15 @@ static void a_head_is_prepared_once(void)
     CHECK(vg_mesh_copy(&h.body.mesh, &b.m, NULL) == VG_OK);
     h.body.reference = calloc(3 * 16, sizeof(double));
     memcpy(h.body.reference, b.v, 3 * 8 * sizeof(double));
-    CHECK(vg_head_prepare_vectors(&h, NULL) == VG_OK && h.has_links && h.nlinks == 0);
+    CHECK(vg_head_prepare_vectors(&h, NULL) == VG_OK && h.links.chosen && h.links.n == 0);
     add_box(&b, 3, 0, 0, 1);
     vg_mesh_clear(&h.body.mesh);
     CHECK(vg_mesh_copy(&h.body.mesh, &b.m, NULL) == VG_OK);
     memcpy(h.body.reference, b.v, 3 * 16 * sizeof(double));
-    CHECK(vg_head_prepare_vectors(&h, NULL) == VG_OK && h.nlinks == 0); /* what was chosen stays */
-    h.has_links = false;
-    CHECK(vg_head_prepare_vectors(&h, NULL) == VG_OK && h.has_links && h.nlinks == 1);
-    CHECK(h.links[0] < 8 && h.links[1] >= 8);
+    CHECK(vg_head_prepare_vectors(&h, NULL) == VG_OK && h.links.n == 0); /* what was chosen stays */
+    h.links.chosen = false;
+    CHECK(vg_head_prepare_vectors(&h, NULL) == VG_OK && h.links.chosen && h.links.n == 1);
+    CHECK(h.links.pairs[0] < 8 && h.links.pairs[1] >= 8);
     vg_head_clear(&h);
     clear(&b);
 }

@@ -154,8 +154,8 @@ static void collapsed_is_uncollapsed(void)
     bend(&h, 1.3, pose);
     measure(&p, pose);
     play(&p);
-    for (size_t f = 0; f < g->nf; f++)
-        for (size_t c = g->start[f]; c < g->start[f + 1]; c++) {
+    for (size_t f = 0; f < g->faces.nf; f++)
+        for (size_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++) {
             double u[3];
             vg_quat_apply(h.map.corner + 4 * c, vectors + 3 * c, u);
             vg_quat_apply(p.transforms + 7 * of_face[f], u, wanted + 3 * c);
@@ -369,12 +369,12 @@ static void what_hangs_loose(void)
     of_face[h.body.mesh.nf - 1] = 5, h.body.patches.n = 6;
     free(h.body.patches.of_face);
     h.body.patches.of_face = of_face;
-    h.has_links = false;
-    CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK && h.nlinks == 1);
+    h.links.chosen = false;
+    CHECK(vg_head_prepare_vectors(&h, &e) == VG_OK && h.links.n == 1);
     fit(&h, bend);
     vg_graph *g = graph_of(&h);
     uint32_t *all = vgi_graph_patches(&h, &h.body.patches, g, &e);
-    CHECK(g->nlinks == 1 && all[g->nf - 1] == 4); /* the rod's vertices come first */
+    CHECK(g->nlinks == 1 && all[g->faces.nf - 1] == 4); /* the rod's vertices come first */
     double *pose = room(3 * h.body.mesh.nv, sizeof *pose);
     played x = open_player(&h, false, 1);
     bend(&h, 0.8, pose);
@@ -514,7 +514,7 @@ static void refusals(void)
     CHECK(vg_player_new(&p, &h.body, &h.map, false, 1, &e) == VG_EINPUT && !p);
     CHECK(vg_map_retarget(&h, h.body.reference, 1, 1, &map, &rig, h.body.reference, &e) == VG_EINPUT && !map.n);
     vg_head body = make_body(3);
-    body.has_links = false;
+    body.links.chosen = false;
     CHECK(vg_map_fitter_new(&f, &body, 0.03, 1, &e) == VG_EARG && !f);
     CHECK(vg_head_prepare_vectors(&body, &e) == VG_OK);
     CHECK(vg_map_fitter_new(&f, &body, 0.03, 1, &e) == VG_OK);

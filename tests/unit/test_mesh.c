@@ -183,21 +183,21 @@ static void test_size_and_centre(void)
 static void vectors_hold(vg_head *h, const char *name)
 {
     vg_graph *g = graph_of(h);
-    size_t n = vg_graph_corners(g), nv = g->nv;
+    size_t n = vg_graph_corners(g), nv = g->faces.nv;
     double D = vg_diagonal(h->body.reference, nv), *w = vectors_of(g, h->body.reference), *again, *moved, root[3],
            turned[3], most = 0;
-    for (size_t f = 0; f < g->nf; f++) {
+    for (size_t f = 0; f < g->faces.nf; f++) {
         double sum[3] = {0, 0, 0};
-        for (size_t c = g->start[f]; c < g->start[f + 1]; c++)
+        for (size_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++)
             for (size_t k = 0; k < 3; k++) sum[k] += w[3 * c + k];
         most = fmax(most, farthest(sum, (double[3]){0, 0, 0}, 1));
     }
     CHECK_NEAR(most, 0, 1e-13 * D);
-    for (size_t f = 0; f < g->nf; f++) /* what a vector is: differences within a face are those of its vertices */
-        for (size_t c = g->start[f] + 1; c < g->start[f + 1]; c++)
+    for (size_t f = 0; f < g->faces.nf; f++) /* what a vector is: differences within a face are those of its vertices */
+        for (size_t c = g->faces.start[f] + 1; c < g->faces.start[f + 1]; c++)
             for (size_t k = 0; k < 3; k++) {
                 double want =
-                    h->body.reference[3 * (size_t)g->vert[c] + k] - h->body.reference[3 * (size_t)g->vert[c - 1] + k];
+                    h->body.reference[3 * (size_t)g->faces.vert[c] + k] - h->body.reference[3 * (size_t)g->faces.vert[c - 1] + k];
                 CHECK_NEAR(w[3 * c + k] - w[3 * (c - 1) + k], want, 1e-14 * D);
             }
     motion by = turn(1.3, 2.5, 3 * D), shift = turn(0, 1, 3 * D);
@@ -239,17 +239,18 @@ static void test_graph(void)
     add_isolated(&h);
     vg_err e;
     vg_graph *g = graph_of(&h);
-    CHECK(g->nlinks == 4 && g->nf == h.body.mesh.nf + 4 && g->attached == h.body.mesh.nv - 2 && g->max_corners == 4);
+    CHECK(g->nlinks == 4 && g->faces.nf == h.body.mesh.nf + 4 && g->attached == h.body.mesh.nv - 2 && g->max_corners == 4);
     CHECK(vg_graph_corners(g) == vg_mesh_corners(&h.body.mesh) + 8 && !g->in_face[h.body.mesh.nv - 1] &&
           g->in_face[0]);
-    CHECK(!memcmp(g->vert + vg_mesh_corners(&h.body.mesh), h.links, 8 * sizeof *h.links));
+    CHECK(!memcmp(g->faces.vert + vg_mesh_corners(&h.body.mesh), h.links.pairs, 8 * sizeof *h.links.pairs));
     vg_graph_free(&g);
     CHECK(g == NULL);
-    h.has_selection = true, h.nselected = 2, h.selected = room(2, sizeof *h.selected);
-    h.selected[0] = 3, h.selected[1] = (uint32_t)h.body.mesh.nf - 1;
+    h.selection.chosen = true, h.selection.n = 2, h.selection.faces = room(2, sizeof *h.selection.faces);
+    h.selection.faces[0] = 3, h.selection.faces[1] = (uint32_t)h.body.mesh.nf - 1;
     CHECK(vg_head_graph(&g, &h, &e) == VG_OK);
-    CHECK(g->nf == 6 && vg_graph_corners(g) == 4 + 3 + 8 && g->start[1] == 4 && g->start[2] == 7 && g->start[3] == 9);
-    CHECK(!memcmp(g->vert, h.body.mesh.vert + h.body.mesh.start[3], 4 * sizeof *g->vert));
+    CHECK(g->faces.nf == 6 && vg_graph_corners(g) == 4 + 3 + 8);
+    CHECK(g->faces.start[1] == 4 && g->faces.start[2] == 7 && g->faces.start[3] == 9);
+    CHECK(!memcmp(g->faces.vert, h.body.mesh.vert + h.body.mesh.start[3], 4 * sizeof *g->faces.vert));
     double root[3], sum[3] = {0, 0, 0};
     size_t n = 0;
     for (size_t v = 0; v < h.body.mesh.nv; v++)
@@ -292,9 +293,9 @@ static vg_head full_head(void)
     h.body.attributes.tex[3] = 0.5, h.body.attributes.corner_tex[corners - 1] = UINT32_MAX;
     h.body.attributes.labels[0] = (vg_label){0, VG_LABEL_GROUP, strdup("body")};
     h.body.attributes.labels[1] = (vg_label){2, VG_LABEL_MATERIAL, strdup("skin")};
-    h.has_selection = h.has_links = true;
-    h.nselected = 2, h.selected = room(2, 4), h.selected[1] = 3;
-    h.nlinks = 1, h.links = room(2, 4), h.links[1] = 5;
+    h.selection.chosen = h.links.chosen = true;
+    h.selection.n = 2, h.selection.faces = room(2, 4), h.selection.faces[1] = 3;
+    h.links.n = 1, h.links.pairs = room(2, 4), h.links.pairs[1] = 5;
     h.nanchors = 1, h.anchors = room(1, 4), h.anchors[0] = 4;
     h.extra = (vg_records){1, room(1, sizeof(vg_record))};
     h.extra.at[0] = record("NOTE", "hello");
@@ -316,8 +317,8 @@ static void test_copy(void)
           b.body.attributes.nlabels == 2);
     CHECK(b.body.attributes.labels[1].face == 2 && b.body.attributes.labels[1].kind == VG_LABEL_MATERIAL);
     CHECK_TEXT(b.body.attributes.labels[1].text, "skin");
-    CHECK(b.has_selection && b.nselected == 2 && b.selected[1] == 3 && b.has_links && b.nlinks == 1 &&
-          b.links[1] == 5);
+    CHECK(b.selection.chosen && b.selection.n == 2 && b.selection.faces[1] == 3 && b.links.chosen && b.links.n == 1 &&
+          b.links.pairs[1] == 5);
     CHECK(b.nanchors == 1 && b.anchors[0] == 4 && b.kind == VG_VERTICES && b.precision == VG_F64 &&
           b.count == a.count);
     CHECK(b.nprovenance == 1 && b.provenance[0].nargs == 2 && b.provenance[0].nparents == 0);
@@ -385,10 +386,10 @@ static void test_frame(void)
 static void test_take(void)
 {
     vg_head a = full_head(), b = full_head();
-    uint32_t *selected = a.selected, *vert = a.body.mesh.vert;
+    uint32_t *selected = a.selection.faces, *vert = a.body.mesh.vert;
     double *reference = a.body.reference;
     vg_head_take(&b, &a, "selection");
-    CHECK(b.selected == selected && b.has_selection && !a.selected && !a.has_selection && !a.nselected);
+    CHECK(b.selection.faces == selected && b.selection.chosen && !a.selection.faces && !a.selection.chosen && !a.selection.n);
     vg_head_take(&b, &a, "reference");
     CHECK(b.body.reference == reference && !a.body.reference && !a.body.reference_name && b.body.reference_name);
     vg_head_take(&b, &a, "mesh");

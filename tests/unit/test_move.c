@@ -13,7 +13,7 @@ static void moved(bool stay, double times)
     add_isolated(&h);
     vg_graph *g = graph_of(&h);
     motion far = turn(0, 2, 3), step = turn(0.4, 1, 5);
-    double *target = move_points(&far, h.body.reference, g->nv), *pose = move_points(&step, h.body.reference, g->nv);
+    double *target = move_points(&far, h.body.reference, g->faces.nv), *pose = move_points(&step, h.body.reference, g->faces.nv);
     double roots[3][3], *at, *to;
     vg_frame in = {0}, out = {0};
     vg_mover *m;
@@ -32,12 +32,12 @@ static void moved(bool stay, double times)
             CHECK_NEAR(to[3 * i + k], target[x] + times * (pose[x] - h.body.reference[x]), 1e-12);
         }
     }
-    double *placed = move_points(&step, target, g->nv),
-           *before = vgi_copy_array(placed, 3 * g->nv, sizeof *placed, &e);
+    double *placed = move_points(&step, target, g->faces.nv),
+           *before = vgi_copy_array(placed, 3 * g->faces.nv, sizeof *placed, &e);
     vg_mover_place(m, out.root, placed);
     vg_graph_root(g, placed, roots[2]);
     for (int k = 0; k < 3; k++) CHECK_NEAR(roots[2][k], out.root[k], 1e-12);
-    for (size_t x = 0; x < 3 * g->nv; x++)
+    for (size_t x = 0; x < 3 * g->faces.nv; x++)
         CHECK_NEAR(placed[x] - before[x], g->in_face[x / 3] ? placed[x % 3] - before[x % 3] : 0, 1e-12);
     vg_mover_free(&m);
     CHECK(m == NULL);
@@ -81,15 +81,15 @@ static void test_without_size(void)
 
 static bool face_has(const vg_graph *g, size_t f, uint32_t v)
 {
-    for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++)
-        if (g->vert[c] == v) return true;
+    for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++)
+        if (g->faces.vert[c] == v) return true;
     return false;
 }
 
 /* Does any source vertex that moves lie in a face that drives face f? */
 static bool is_driven(const vg_graph *from, const vg_correspondence *pairs, const bool *moves, size_t f)
 {
-    for (uint32_t v = 0; v < from->nv; v++) {
+    for (uint32_t v = 0; v < from->faces.nv; v++) {
         if (!moves[v]) continue;
         if (!pairs && face_has(from, f, v)) return true;
         for (uint32_t i = pairs ? pairs->first[f] : 0; pairs && i < pairs->first[f + 1]; i++)
@@ -101,18 +101,18 @@ static bool is_driven(const vg_graph *from, const vg_correspondence *pairs, cons
 static void against_counting(const vg_graph *from, const double *reference, const vg_graph *to,
                              const vg_correspondence *pairs, const bool *moves)
 {
-    double *pose = room(3 * from->nv, sizeof *pose), D = vg_diagonal(reference, from->nv);
+    double *pose = room(3 * from->faces.nv, sizeof *pose), D = vg_diagonal(reference, from->faces.nv);
     vg_pinner *p;
     vg_err e;
     const uint32_t *list;
     size_t n, found = 0;
-    memcpy(pose, reference, 3 * from->nv * sizeof *pose);
-    for (size_t v = 0; v < from->nv; v++) pose[3 * v + v % 3] += (moves[v] ? 2e-6 : 0.5e-6) * D;
+    memcpy(pose, reference, 3 * from->faces.nv * sizeof *pose);
+    for (size_t v = 0; v < from->faces.nv; v++) pose[3 * v + v % 3] += (moves[v] ? 2e-6 : 0.5e-6) * D;
     CHECK(vg_pinner_new(&p, from, reference, to, pairs, true, &e) == VG_OK);
     n = vg_pinner_find(p, pose, &list);
-    for (uint32_t v = 0; v < to->nv; v++) {
+    for (uint32_t v = 0; v < to->faces.nv; v++) {
         bool stays = to->in_face[v];
-        for (size_t f = 0; stays && f < to->nf; f++) stays = !face_has(to, f, v) || !is_driven(from, pairs, moves, f);
+        for (size_t f = 0; stays && f < to->faces.nf; f++) stays = !face_has(to, f, v) || !is_driven(from, pairs, moves, f);
         CHECK(stays == (found < n && list[found] == v));
         found += stays;
     }
@@ -127,8 +127,8 @@ static void test_same_faces(void)
     vg_head h = make_torus(12, 9);
     add_isolated(&h);
     vg_graph *g = graph_of(&h);
-    bool *moves = room(g->nv, sizeof *moves);
-    for (size_t v = 0; v < g->nv; v += 31) moves[v] = true;
+    bool *moves = room(g->faces.nv, sizeof *moves);
+    for (size_t v = 0; v < g->faces.nv; v += 31) moves[v] = true;
     against_counting(g, h.body.reference, g, NULL, moves);
     free(moves);
     vg_graph_free(&g);
@@ -140,12 +140,12 @@ static void test_correspondence(void)
 {
     vg_head torus = make_torus(12, 9), rod = make_rod(6, 8, true);
     vg_graph *from = graph_of(&torus), *to = graph_of(&rod);
-    bool *moves = room(from->nv, sizeof *moves);
-    vg_correspondence pairs = {.first = room(to->nf + 1, sizeof *pairs.first),
-                               .source = room(2 * to->nf, sizeof *pairs.source)};
-    for (uint32_t f = 0; f < to->nf; f++) {
+    bool *moves = room(from->faces.nv, sizeof *moves);
+    vg_correspondence pairs = {.first = room(to->faces.nf + 1, sizeof *pairs.first),
+                               .source = room(2 * to->faces.nf, sizeof *pairs.source)};
+    for (uint32_t f = 0; f < to->faces.nf; f++) {
         pairs.first[f + 1] = 2 * f + 2;
-        pairs.source[2 * f] = f % (uint32_t)from->nf, pairs.source[2 * f + 1] = 7 * f % (uint32_t)from->nf;
+        pairs.source[2 * f] = f % (uint32_t)from->faces.nf, pairs.source[2 * f + 1] = 7 * f % (uint32_t)from->faces.nf;
     }
     moves[5] = moves[40] = true;
     against_counting(from, torus.body.reference, to, &pairs, moves);
@@ -163,11 +163,11 @@ static void test_few(void)
     vg_graph *g = graph_of(&h);
     for (int always = 0; always < 2; always++)
         for (size_t rings = 0; rings <= RINGS; rings++) {
-            double *pose = room(3 * g->nv, sizeof *pose);
+            double *pose = room(3 * g->faces.nv, sizeof *pose);
             const uint32_t *list;
             vg_pinner *p;
             vg_err e;
-            for (size_t x = 0; x < 3 * g->nv; x++) pose[x] = h.body.reference[x] + (x / 9 >= rings);
+            for (size_t x = 0; x < 3 * g->faces.nv; x++) pose[x] = h.body.reference[x] + (x / 9 >= rings);
             CHECK(vg_pinner_new(&p, g, h.body.reference, g, NULL, always, &e) == VG_OK);
             size_t want = rings == RINGS ? 3 * RINGS : rings > 2 ? 3 * (rings - 2) : 0;
             if (!always && 10 * rings < RINGS) want = 0;

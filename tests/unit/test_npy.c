@@ -163,8 +163,8 @@ static vg_head make_head(vg_kind kind)
                  .precision = VG_F64,
                  .count = 4};
     if (kind == VG_VERTICES) return h;
-    h.has_selection = true, h.nselected = 1, h.selected = selected;
-    h.has_links = true, h.nlinks = 1, h.links = links;
+    h.selection.chosen = true, h.selection.n = 1, h.selection.faces = selected;
+    h.links.chosen = true, h.links.n = 1, h.links.pairs = links;
     h.nanchors = 2, h.anchors = anchors;
     h.count = 6; /* a face of four and a link */
     return h;
@@ -211,7 +211,7 @@ static void npz_there_and_back(void)
         CHECK(p.h.body.reference && !memcmp(p.h.body.reference, reference, sizeof reference));
         size_t n = h.count * vg_head_width(&h);
         CHECK(p.n == 2 * n && !memcmp(p.values, values[0], n * 8) && !memcmp(p.values + n, values[1], n * 8));
-        CHECK(p.h.nselected == h.nselected && p.h.nlinks == h.nlinks && p.h.nanchors == h.nanchors);
+        CHECK(p.h.selection.n == h.selection.n && p.h.links.n == h.links.n && p.h.nanchors == h.nanchors);
         played_clear(&p);
         vg_bytes_clear(&b);
     }
@@ -226,7 +226,7 @@ static void npz_refuses_damage(void)
     vg_bytes b = record(&vgi_sequence_npz, &h, frames, 2, false, &r, NULL);
     CHECK(r == VG_OK);
     for (size_t n = 0; n < b.size; n += 13) CHECK(refused(&vgi_sequence_npz, b.data, n) < 0 && message[0]);
-    h.selected = NULL, h.nselected = 0; /* no longer the graph that the vectors belong to */
+    h.selection.faces = NULL, h.selection.n = 0; /* no longer the graph that the vectors belong to */
     vg_bytes_clear(&b);
     h.count = 8;
     b = record(&vgi_sequence_npz, &h, frames, 2, false, &r, NULL);

@@ -40,7 +40,7 @@ static answer solve(const problem *q, int threads, size_t batch)
         exit(1);
     }
     for (size_t i = 0; i < q->n; i++) {
-        a.x[i] = room(3 * q->g->nv, sizeof(double)), rhs[i] = room(3 * q->g->nv, sizeof(double));
+        a.x[i] = room(3 * q->g->faces.nv, sizeof(double)), rhs[i] = room(3 * q->g->faces.nv, sizeof(double));
         normals[i] = room(3 * vg_planar_faces(p), sizeof(double));
         vg_planar_load(p, q->w[i], normals[i]);
     }
@@ -48,8 +48,8 @@ static answer solve(const problem *q, int threads, size_t batch)
     vg_solver_load(s, q->n, (const double *const *)q->w, q->nanchors ? at : NULL, a.x, rhs);
     vg_solver_solve(s, q->n, (const double *const *)rhs, a.x, q->nanchors ? at : NULL, q->nanchors ? NULL : at);
     for (size_t i = 0; i < q->n; i++) {
-        a.plain[i] = room(3 * q->g->nv, sizeof(double));
-        memcpy(a.plain[i], a.x[i], 3 * q->g->nv * sizeof(double));
+        a.plain[i] = room(3 * q->g->faces.nv, sizeof(double));
+        memcpy(a.plain[i], a.x[i], 3 * q->g->faces.nv * sizeof(double));
     }
     for (size_t i = 0; i < q->n; i += batch) {
         size_t some = q->n - i < batch ? q->n - i : batch;
@@ -76,9 +76,9 @@ static problem make_problem(const vg_head *h, const vg_graph *g, const uint32_t 
                  .fidelity = 0.05,
                  .planarity = 1,
                  .weights = VG_WEIGHTS_UNIFORM};
-    double D = vg_diagonal(h->body.reference, g->nv);
+    double D = vg_diagonal(h->body.reference, g->faces.nv);
     for (size_t k = 0; k < POSES; k++) {
-        double *pose = warp(h->body.reference, g->nv, 0.15 * (double)k);
+        double *pose = warp(h->body.reference, g->faces.nv, 0.15 * (double)k);
         q.w[k] = vectors_of(g, pose);
         q.at[k] = room(3 * (nanchors + 1), sizeof(double));
         vg_graph_anchors(pose, anchors, nanchors, q.at[k]);
@@ -113,7 +113,7 @@ static bool normalise(double *m)
 /* The r x r matrix of a face's energy: its metric, or the projector that takes the mean away. */
 static void face_energy(const problem *q, const double *rest, size_t f, double *G)
 {
-    size_t begin = q->g->start[f], r = q->g->start[f + 1] - begin;
+    size_t begin = q->g->faces.start[f], r = q->g->faces.start[f + 1] - begin;
     for (size_t i = 0; i < r * r; i++) G[i] = (i % (r + 1) == 0) - 1.0 / (double)r;
     if (q->weights == VG_WEIGHTS_AREA && r > 2) face_metric(rest + 3 * begin, r, G);
 }
@@ -122,11 +122,11 @@ static void face_energy(const problem *q, const double *rest, size_t f, double *
 static double *dense(const problem *q, size_t k)
 {
     const vg_graph *g = q->g;
-    size_t n = 3 * g->nv;
+    size_t n = 3 * g->faces.nv;
     double *M = room(n * n, sizeof *M), *b = room(n, sizeof *b), *w = q->w[k], *rest = vectors_of(g, q->reference);
-    for (size_t f = 0; f < g->nf; f++) {
-        size_t begin = g->start[f], r = g->start[f + 1] - begin;
-        const uint32_t *vert = g->vert + begin;
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        size_t begin = g->faces.start[f], r = g->faces.start[f + 1] - begin;
+        const uint32_t *vert = g->faces.vert + begin;
         double *G = room(r * r, sizeof *G), mean[3] = {0, 0, 0}, m[3] = {0, 0, 0};
         face_energy(q, rest, f, G);
         for (size_t c = 0; c < r; c++)
@@ -149,7 +149,7 @@ static double *dense(const problem *q, size_t k)
                 }
         free(G);
     }
-    for (size_t v = 0, a = 0; v < g->nv; v++) {
+    for (size_t v = 0, a = 0; v < g->faces.nv; v++) {
         bool anchor = a < q->nanchors && q->anchors[a] == v;
         for (size_t i = 0; i < 3; i++) {
             double *row = M + (3 * v + i) * n;
@@ -158,7 +158,7 @@ static double *dense(const problem *q, size_t k)
                 row[3 * v + i] = 1;
                 b[3 * v + i] = anchor ? q->at[k][3 * a + i] : q->reference[3 * v + i];
             } else if (!q->nanchors) { /* the mean is the root */
-                for (size_t u = 0; u < g->nv; u++) row[3 * u + i] += g->in_face[u];
+                for (size_t u = 0; u < g->faces.nv; u++) row[3 * u + i] += g->in_face[u];
                 b[3 * v + i] += q->at[k][i] * (double)g->attached;
             }
         }
@@ -178,11 +178,11 @@ static void against_dense(vg_head *h, const char *name, vg_weights weights, size
     q.weights = weights;
     answer a = solve(&q, 2, POSES);
     CHECK(a.good == POSES && a.stats.worst_residual <= 1e-10);
-    double D = vg_diagonal(h->body.reference, g->nv), worst = 0, moved = 0;
+    double D = vg_diagonal(h->body.reference, g->faces.nv), worst = 0, moved = 0;
     for (size_t k = 0; k < POSES; k += 5) {
         double *want = dense(&q, k);
-        worst = fmax(worst, farthest(a.x[k], want, g->nv) / D);
-        moved = fmax(moved, farthest(a.x[k], a.plain[k], g->nv) / D);
+        worst = fmax(worst, farthest(a.x[k], want, g->faces.nv) / D);
+        moved = fmax(moved, farthest(a.x[k], a.plain[k], g->faces.nv) / D);
         free(want);
     }
     if (!(worst <= 1e-8)) printf("%s, %zu anchors:\n", name, nanchors);
@@ -225,7 +225,7 @@ static void test_nothing_to_do(void)
         if (i == 3) q.planarity = 0; /* has faces of four, but they count for nothing */
         answer a = solve(&q, 1, POSES);
         CHECK(a.good == POSES && (i == 3 || a.stats.faces == 0) && a.stats.most_steps == 0);
-        for (size_t k = 0; k < POSES; k++) CHECK(!memcmp(a.x[k], a.plain[k], 3 * g->nv * sizeof(double)));
+        for (size_t k = 0; k < POSES; k++) CHECK(!memcmp(a.x[k], a.plain[k], 3 * g->faces.nv * sizeof(double)));
         clear(&a, POSES);
         clear_problem(&q);
         vg_graph_free(&g);
@@ -240,12 +240,12 @@ static void test_planar_stays(void)
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
         vg_graph *g = graph_of(&shapes[i]);
         problem q = {.g = g, .reference = shapes[i].body.reference, .n = 1, .fidelity = 0.05, .planarity = 1};
-        double root[3], D = vg_diagonal(q.reference, g->nv);
+        double root[3], D = vg_diagonal(q.reference, g->faces.nv);
         vg_graph_root(g, q.reference, root);
         q.w[0] = vectors_of(g, q.reference), q.at[0] = root;
         answer a = solve(&q, 1, 1);
         CHECK(a.good == 1);
-        CHECK_NEAR(farthest(a.x[0], q.reference, g->nv), 0, 1e-12 * D);
+        CHECK_NEAR(farthest(a.x[0], q.reference, g->faces.nv), 0, 1e-12 * D);
         clear(&a, 1);
         free(q.w[0]);
         vg_graph_free(&g);
@@ -267,8 +267,8 @@ static void test_anchors_roots_isolated(void)
                 CHECK(!memcmp(a.x[k] + 3 * (size_t)anchors[i], q.at[k] + 3 * i, 3 * sizeof(double)));
             vg_graph_root(g, a.x[k], root);
             for (int i = 0; !nanchors && i < 3; i++)
-                CHECK_NEAR(root[i], q.at[k][i], 1e-12 * vg_diagonal(h.body.reference, g->nv));
-            for (size_t v = 0; v < g->nv; v++)
+                CHECK_NEAR(root[i], q.at[k][i], 1e-12 * vg_diagonal(h.body.reference, g->faces.nv));
+            for (size_t v = 0; v < g->faces.nv; v++)
                 CHECK(g->in_face[v] || !memcmp(a.x[k] + 3 * v, h.body.reference + 3 * v, 3 * sizeof(double)));
         }
         clear(&a, POSES);
@@ -305,7 +305,7 @@ static void test_threads_and_batches(void)
         for (size_t batch = 1; batch <= POSES; batch += 2) {
             answer a = solve(&q, threads, batch);
             bool same = true;
-            for (size_t k = 0; k < POSES; k++) same &= !memcmp(a.x[k], one.x[k], 3 * g->nv * sizeof(double));
+            for (size_t k = 0; k < POSES; k++) same &= !memcmp(a.x[k], one.x[k], 3 * g->faces.nv * sizeof(double));
             if (!same) printf("%d threads, %zu poses a call:\n", threads, batch);
             CHECK(same);
             CHECK(a.stats.most_steps == one.stats.most_steps);
@@ -324,7 +324,7 @@ static void test_units(void)
     vg_graph *g = graph_of(&h);
     problem q = make_problem(&h, g, NULL, 0, 0.02);
     answer one = solve(&q, 1, POSES);
-    double D = vg_diagonal(h.body.reference, g->nv), before = 1;
+    double D = vg_diagonal(h.body.reference, g->faces.nv), before = 1;
     static const double units[] = {0x1p-300, 0x1p-60, 0x1p60, 0x1p300};
     for (size_t u = 0; u < sizeof units / sizeof *units; u++) {
         for (size_t k = 0; k < POSES; k++) {
@@ -335,8 +335,8 @@ static void test_units(void)
         answer a = solve(&q, 1, POSES);
         CHECK(a.good == POSES);
         for (size_t k = 0; k < POSES; k++) {
-            for (size_t i = 0; i < 3 * g->nv; i++) a.x[k][i] /= units[u];
-            CHECK_NEAR(farthest(a.x[k], one.x[k], g->nv), 0, 1e-12 * D);
+            for (size_t i = 0; i < 3 * g->faces.nv; i++) a.x[k][i] /= units[u];
+            CHECK_NEAR(farthest(a.x[k], one.x[k], g->faces.nv), 0, 1e-12 * D);
         }
         clear(&a, POSES);
     }
@@ -361,8 +361,8 @@ static void test_degenerate(void)
     }
     answer a = solve(&q, 1, POSES);
     CHECK(a.good == POSES);
-    for (size_t k = 0; k < POSES; k++) CHECK(vgi_finite(a.x[k], 3 * g->nv));
-    for (size_t k = 2; k < 5; k++) CHECK(!memcmp(a.x[k], a.plain[k], 3 * g->nv * sizeof(double)));
+    for (size_t k = 0; k < POSES; k++) CHECK(vgi_finite(a.x[k], 3 * g->faces.nv));
+    for (size_t k = 2; k < 5; k++) CHECK(!memcmp(a.x[k], a.plain[k], 3 * g->faces.nv * sizeof(double)));
     clear(&a, POSES);
     clear_problem(&q);
     vg_graph_free(&g);

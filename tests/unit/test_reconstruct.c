@@ -28,7 +28,7 @@ static answer solve(const vg_graph *g, const double *reference, const uint32_t *
     answer a = {.n = n, .x = room(n, sizeof *a.x)};
     double **rhs = room(n, sizeof *rhs);
     vg_solver *s = NULL;
-    for (size_t i = 0; i < n; i++) a.x[i] = room(3 * g->nv, sizeof(double)), rhs[i] = room(3 * g->nv, sizeof(double));
+    for (size_t i = 0; i < n; i++) a.x[i] = room(3 * g->faces.nv, sizeof(double)), rhs[i] = room(3 * g->faces.nv, sizeof(double));
     a.code = vg_solver_new(&s, g, anchors, nanchors, reference, weights, threads, &a.e);
     for (size_t i = 0; a.code == VG_OK && i < n; i += batch) {
         size_t some = n - i < batch ? n - i : batch;
@@ -48,14 +48,14 @@ static answer solve(const vg_graph *g, const double *reference, const uint32_t *
 static double there_and_back(vg_head *h, const double *pose, vg_weights weights)
 {
     vg_graph *g = graph_of(h);
-    double *w = vectors_of(g, pose), *want = room(3 * g->nv, sizeof *want), root[3];
+    double *w = vectors_of(g, pose), *want = room(3 * g->faces.nv, sizeof *want), root[3];
     const double *at = root;
     vg_graph_root(g, pose, root);
-    for (size_t v = 0; v < g->nv; v++)
+    for (size_t v = 0; v < g->faces.nv; v++)
         memcpy(want + 3 * v, (g->in_face[v] ? pose : h->body.reference) + 3 * v, 3 * sizeof *want);
     answer a = solve(g, h->body.reference, NULL, 0, 1, (const double *const *)&w, &at, weights, 1, 1);
     if (a.code < 0) printf("%s\n", a.e.message);
-    double error = a.code < 0 ? INFINITY : farthest(a.x[0], want, g->nv) / vg_diagonal(want, g->nv);
+    double error = a.code < 0 ? INFINITY : farthest(a.x[0], want, g->faces.nv) / vg_diagonal(want, g->faces.nv);
     clear(&a);
     free(w);
     free(want);
@@ -66,9 +66,9 @@ static double there_and_back(vg_head *h, const double *pose, vg_weights weights)
 static void select_faces(vg_head *h)
 {
     vg_err e;
-    free(h->selected);
-    CHECK(vg_select_faces(&h->body.mesh, &h->selected, &h->nselected, &e) == VG_OK);
-    h->has_selection = true;
+    free(h->selection.faces);
+    CHECK(vg_select_faces(&h->body.mesh, &h->selection.faces, &h->selection.n, &e) == VG_OK);
+    h->selection.chosen = true;
 }
 
 /* the reference and a strongly bent pose, through all faces and through the selected ones, with both weights */
@@ -141,7 +141,7 @@ static void test_data(void)
             if (!(worst <= tight)) printf("%s, pass %d:\n", all[i].poses, pass);
             CHECK_NEAR(worst, 0, tight);
         }
-        CHECK(f.h.nselected < f.h.body.mesh.nf && 2 * f.h.nselected > f.h.body.mesh.nf);
+        CHECK(f.h.selection.n < f.h.body.mesh.nf && 2 * f.h.selection.n > f.h.body.mesh.nf);
         film_clear(&f);
     }
 }
@@ -154,23 +154,23 @@ static void test_data(void)
 static double *least_squares(const vg_graph *g, const double *reference, const double *w, const uint32_t *anchors,
                              size_t nanchors, const double *at, vg_weights weights)
 {
-    size_t q = g->nv;
+    size_t q = g->faces.nv;
     double *A = room(vg_graph_corners(g) * q, sizeof *A), *N = room(q * q, sizeof *N), *b = room(3 * q, sizeof *b);
-    for (size_t f = 0; f < g->nf; f++)
-        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
-            A[c * q + g->vert[c]] += 1;
-            for (uint32_t d = g->start[f]; d < g->start[f + 1]; d++)
-                A[c * q + g->vert[d]] -= 1.0 / (g->start[f + 1] - g->start[f]);
+    for (size_t f = 0; f < g->faces.nf; f++)
+        for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++) {
+            A[c * q + g->faces.vert[c]] += 1;
+            for (uint32_t d = g->faces.start[f]; d < g->faces.start[f + 1]; d++)
+                A[c * q + g->faces.vert[d]] -= 1.0 / (g->faces.start[f + 1] - g->faces.start[f]);
         }
     double *rest = vectors_of(g, reference), *G = room(g->max_corners * g->max_corners, sizeof *G);
-    for (size_t f = 0; f < g->nf; f++) {
-        size_t begin = g->start[f], r = g->start[f + 1] - begin;
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        size_t begin = g->faces.start[f], r = g->faces.start[f + 1] - begin;
         for (size_t k = 0; k < r * r; k++) G[k] = k % (r + 1) == 0;
         if (weights == VG_WEIGHTS_AREA && r > 2) face_metric(rest + 3 * begin, r, G);
         for (size_t k = 0; k < r * r * r; k++) { /* the row of a corner is 0 but at its own face's vertices */
-            size_t c = begin + k / (r * r), d = begin + k / r % r, i = g->vert[begin + k % r];
+            size_t c = begin + k / (r * r), d = begin + k / r % r, i = g->faces.vert[begin + k % r];
             double x = G[k / r] * A[c * q + i];
-            for (size_t j = 0; j < r; j++) N[i * q + g->vert[begin + j]] += x * A[d * q + g->vert[begin + j]];
+            for (size_t j = 0; j < r; j++) N[i * q + g->faces.vert[begin + j]] += x * A[d * q + g->faces.vert[begin + j]];
             for (size_t j = 0; j < 3; j++) b[3 * i + j] += x * w[3 * d + j];
         }
     }
@@ -198,7 +198,7 @@ static double *least_squares(const vg_graph *g, const double *reference, const d
 static void against_dense(vg_head *h, const char *name, const uint32_t *anchors, size_t nanchors, vg_weights weights)
 {
     vg_graph *g = graph_of(h);
-    double D = vg_diagonal(h->body.reference, g->nv), *w = vectors_of(g, h->body.reference);
+    double D = vg_diagonal(h->body.reference, g->faces.nv), *w = vectors_of(g, h->body.reference);
     double at[64] = {0.3 * D, -0.2 * D, D};
     const double *where = at;
     for (size_t i = 0; i < 3 * nanchors; i++) at[i] = 0.4 * D * noise();
@@ -207,7 +207,7 @@ static void against_dense(vg_head *h, const char *name, const uint32_t *anchors,
     double *want = least_squares(g, h->body.reference, w, anchors, nanchors, at, weights);
     answer a = solve(g, h->body.reference, anchors, nanchors, 1, (const double *const *)&w, &where, weights, 1, 1);
     CHECK(a.code == VG_OK);
-    double error = farthest(a.x[0], want, g->nv) / D;
+    double error = farthest(a.x[0], want, g->faces.nv) / D;
     if (!(error <= 1e-10)) printf("%s with %zu anchors, weights %d:\n", name, nanchors, (int)weights);
     CHECK_NEAR(error, 0, 1e-10);
     clear(&a);
@@ -247,22 +247,22 @@ static void test_normal_equations(void)
     for (size_t i = 0; i < 2; i++) {
         if (i == 0) select_faces(shapes[i]);
         vg_graph *g = graph_of(shapes[i]);
-        double D = vg_diagonal(shapes[i]->body.reference, g->nv), *w = vectors_of(g, shapes[i]->body.reference);
-        double root[3] = {D, 2 * D, -D}, mean[3], *left = room(3 * g->nv, sizeof *left);
+        double D = vg_diagonal(shapes[i]->body.reference, g->faces.nv), *w = vectors_of(g, shapes[i]->body.reference);
+        double root[3] = {D, 2 * D, -D}, mean[3], *left = room(3 * g->faces.nv, sizeof *left);
         const double *at = root;
         for (size_t c = 0; c < 3 * vg_graph_corners(g); c++) w[c] *= 1 + 0.3 * noise();
         answer a =
             solve(g, shapes[i]->body.reference, NULL, 0, 1, (const double *const *)&w, &at, VG_WEIGHTS_UNIFORM, 2, 1);
         CHECK(a.code == VG_OK);
         double *x = vectors_of(g, a.x[0]), most = 0;
-        for (size_t face = 0; face < g->nf; face++) {
-            double off[3] = {0, 0, 0}, r = g->start[face + 1] - g->start[face];
-            for (size_t c = g->start[face]; c < g->start[face + 1]; c++)
+        for (size_t face = 0; face < g->faces.nf; face++) {
+            double off[3] = {0, 0, 0}, r = g->faces.start[face + 1] - g->faces.start[face];
+            for (size_t c = g->faces.start[face]; c < g->faces.start[face + 1]; c++)
                 for (size_t k = 0; k < 3; k++) off[k] += (x[3 * c + k] - w[3 * c + k]) / r;
-            for (size_t c = g->start[face]; c < g->start[face + 1]; c++)
-                for (size_t k = 0; k < 3; k++) left[3 * g->vert[c] + k] += x[3 * c + k] - w[3 * c + k] - off[k];
+            for (size_t c = g->faces.start[face]; c < g->faces.start[face + 1]; c++)
+                for (size_t k = 0; k < 3; k++) left[3 * g->faces.vert[c] + k] += x[3 * c + k] - w[3 * c + k] - off[k];
         }
-        for (size_t k = 0; k < 3 * g->nv; k++) most = fmax(most, fabs(left[k]));
+        for (size_t k = 0; k < 3 * g->faces.nv; k++) most = fmax(most, fabs(left[k]));
         CHECK_NEAR(most, 0, 1e-13 * D);
         vg_graph_root(g, a.x[0], mean);
         for (int k = 0; k < 3; k++) CHECK_NEAR(mean[k], root[k], 1e-12 * D);
@@ -282,7 +282,7 @@ static void test_normal_equations(void)
 static size_t spread_anchors(const vg_graph *g, size_t count, uint32_t *anchors)
 {
     size_t n = 0, seen = 0;
-    for (size_t v = 0; v < g->nv; v++)
+    for (size_t v = 0; v < g->faces.nv; v++)
         if (g->in_face[v] && seen++ * count / g->attached >= n && n < count) anchors[n++] = (uint32_t)v;
     return n;
 }
@@ -299,9 +299,9 @@ static void test_anchors(void)
             double *pose[POSES], *w[POSES], *at[POSES], worst = 0;
             CHECK(spread_anchors(g, count, anchors) == count);
             for (size_t k = 0; k < POSES; k++) {
-                pose[k] = warp(h.body.reference, g->nv, 0.2 * (double)k);
+                pose[k] = warp(h.body.reference, g->faces.nv, 0.2 * (double)k);
                 /* each pose has its anchors elsewhere */
-                for (size_t v = 0; v < 3 * g->nv; v++) pose[k][v] += (double)k;
+                for (size_t v = 0; v < 3 * g->faces.nv; v++) pose[k][v] += (double)k;
                 w[k] = vectors_of(g, pose[k]), at[k] = room(3 * count, sizeof(double));
                 vg_graph_anchors(pose[k], anchors, count, at[k]);
             }
@@ -312,18 +312,18 @@ static void test_anchors(void)
                 bool met = true, kept = true;
                 for (size_t j = 0; j < count; j++)
                     met &= !memcmp(a.x[k] + 3 * (size_t)anchors[j], at[k] + 3 * j, 3 * sizeof(double));
-                for (size_t v = 0; v < g->nv; v++) {
+                for (size_t v = 0; v < g->faces.nv; v++) {
                     if (g->in_face[v]) continue;
                     kept &= !memcmp(a.x[k] + 3 * v, h.body.reference + 3 * v, 3 * sizeof(double));
                     memcpy(a.x[k] + 3 * v, pose[k] + 3 * v, 3 * sizeof(double));
                 }
                 CHECK(met);
                 CHECK(kept);
-                worst = fmax(worst, farthest(a.x[k], pose[k], g->nv) / vg_diagonal(pose[k], g->nv));
+                worst = fmax(worst, farthest(a.x[k], pose[k], g->faces.nv) / vg_diagonal(pose[k], g->faces.nv));
                 free(pose[k]), free(w[k]), free(at[k]);
             }
             /* positions of the size of 10 + D are given in 53 bits: that much of D cannot be had back */
-            double D = vg_diagonal(h.body.reference, g->nv), lost = 2e-15 * (10 + D) / D;
+            double D = vg_diagonal(h.body.reference, g->faces.nv), lost = 2e-15 * (10 + D) / D;
             if (!(worst <= tight + lost)) printf("%s, %zu anchors:\n", name, count);
             CHECK_NEAR(worst, 0, tight + lost);
             clear(&a);
@@ -341,13 +341,13 @@ static double apart_from_new(const vg_graph *g, vg_solver *base, const double *r
     enum { MOST = 4 };
     vg_solver *s[MOST + 1];
     vg_err e;
-    double *w = vectors_of(g, reference), *at = room(3 * g->nv, sizeof *at), root[3] = {1, 2, 3}, worst = 0;
+    double *w = vectors_of(g, reference), *at = room(3 * g->faces.nv, sizeof *at), root[3] = {1, 2, 3}, worst = 0;
     double *x[MOST + 1], *rhs[MOST + 1];
     const double *given[MOST + 1], *held[MOST + 1], *roots[MOST + 1];
     const uint32_t *lists[MOST];
     for (size_t c = 0; c < 3 * vg_graph_corners(g); c++) w[c] *= 1 + 0.2 * noise();
     for (size_t i = 0; i <= n; i++) {
-        x[i] = room(3 * g->nv, sizeof **x), rhs[i] = room(3 * g->nv, sizeof **rhs);
+        x[i] = room(3 * g->faces.nv, sizeof **x), rhs[i] = room(3 * g->faces.nv, sizeof **rhs);
         given[i] = w, held[i] = at, roots[i] = root;
     }
     for (size_t i = 0; i < n; i++) lists[i] = anchors;
@@ -360,10 +360,10 @@ static double apart_from_new(const vg_graph *g, vg_solver *base, const double *r
         const double *where = count[i] ? at : root;
         answer fresh = solve(g, reference, anchors, count[i], 1, given, &where, weights, 1, 1);
         CHECK(fresh.code == VG_OK);
-        worst = fmax(worst, farthest(x[i], fresh.x[0], g->nv) / vg_diagonal(reference, g->nv));
+        worst = fmax(worst, farthest(x[i], fresh.x[0], g->faces.nv) / vg_diagonal(reference, g->faces.nv));
         vg_solver_load(s[i], 1, given, held, x, rhs);
         vg_solver_solve(s[i], 1, (const double *const *)rhs, x, held, roots);
-        worst = fmax(worst, farthest(x[0], fresh.x[0], g->nv) / vg_diagonal(reference, g->nv));
+        worst = fmax(worst, farthest(x[0], fresh.x[0], g->faces.nv) / vg_diagonal(reference, g->faces.nv));
         clear(&fresh);
         vg_solver_free(&s[i]);
     }
@@ -425,12 +425,12 @@ static void test_contradicting_anchors(void)
 {
     vg_head h = make_flower(14);
     vg_graph *g = graph_of(&h);
-    double *w = vectors_of(g, h.body.reference), *at = room(3 * g->nv, sizeof *at);
-    uint32_t *all = room(g->nv, sizeof *all);
+    double *w = vectors_of(g, h.body.reference), *at = room(3 * g->faces.nv, sizeof *at);
+    uint32_t *all = room(g->faces.nv, sizeof *all);
     const double *where = at;
-    for (size_t v = 0; v < g->nv; v++) all[v] = (uint32_t)v;
-    for (size_t i = 0; i < 3 * g->nv; i++) at[i] = 1e3 * noise() / 3;
-    for (size_t n = 1; n <= g->nv; n += 9) {
+    for (size_t v = 0; v < g->faces.nv; v++) all[v] = (uint32_t)v;
+    for (size_t i = 0; i < 3 * g->faces.nv; i++) at[i] = 1e3 * noise() / 3;
+    for (size_t n = 1; n <= g->faces.nv; n += 9) {
         answer a = solve(g, h.body.reference, all, n, 1, (const double *const *)&w, &where, all_weights[n % 2], 1, 1);
         CHECK(a.code == VG_OK && !memcmp(a.x[0], at, 3 * n * sizeof *at));
         clear(&a);
@@ -469,7 +469,7 @@ static void test_threads_and_batches(void)
                                  threads, batch);
                 bool same = a.code == VG_OK;
                 for (size_t k = 0; same && k < POSES; k++)
-                    same = !memcmp(a.x[k], one.x[k], 3 * g->nv * sizeof(double));
+                    same = !memcmp(a.x[k], one.x[k], 3 * g->faces.nv * sizeof(double));
                 if (!same) printf("%d threads, %zu poses a call:\n", threads, batch);
                 CHECK(same);
                 clear(&a);
@@ -527,14 +527,14 @@ static void test_refused(void)
     vg_graph *g;
     vg_solver *s;
     vg_err e;
-    h.has_links = true; /* and none are there */
+    h.links.chosen = true; /* and none are there */
     CHECK(vg_head_graph(&g, &h, &e) == VG_OK);
     CHECK(vg_solver_new(&s, g, NULL, 0, h.body.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_EINPUT && !s);
     CHECK(strstr(e.message, "link is missing") != NULL);
     uint32_t anchors[] = {0, 1};
     CHECK(vg_solver_new(&s, g, anchors, 2, h.body.reference, VG_WEIGHTS_UNIFORM, 1, &e) == VG_EINPUT && !s);
     vg_graph_free(&g);
-    h.has_links = false;
+    h.links.chosen = false;
     g = graph_of(&h);
     CHECK(vg_solver_new(&s, g, &lone, 1, h.body.reference, VG_WEIGHTS_AREA, 1, &e) == VG_EINPUT && !s);
     CHECK(strstr(e.message, "in no face") != NULL);

@@ -40,14 +40,14 @@ static answer solve(const problem *q, int threads, size_t batch)
         exit(1);
     }
     for (size_t i = 0; i < POSES; i++) {
-        a.x[i] = room(3 * q->g->nv, sizeof(double)), a.plain[i] = room(3 * q->g->nv, sizeof(double));
-        rhs[i] = room(3 * q->g->nv, sizeof(double)), misfits[i] = room(vg_robust_misfits(r), sizeof(float));
+        a.x[i] = room(3 * q->g->faces.nv, sizeof(double)), a.plain[i] = room(3 * q->g->faces.nv, sizeof(double));
+        rhs[i] = room(3 * q->g->faces.nv, sizeof(double)), misfits[i] = room(vg_robust_misfits(r), sizeof(float));
     }
     const double *const *at = (const double *const *)q->at, *const *b = (const double *const *)rhs;
     const double *const *anchors = q->nanchors ? at : NULL, *const *roots = q->nanchors ? NULL : at;
     vg_solver_load(s, POSES, (const double *const *)q->w, anchors, a.x, rhs);
     vg_robust_load(r, POSES, (const double *const *)q->w, (const double *const *)a.x, misfits, sizes);
-    for (size_t i = 0; i < POSES; i++) memcpy(a.plain[i], a.x[i], 3 * q->g->nv * sizeof(double));
+    for (size_t i = 0; i < POSES; i++) memcpy(a.plain[i], a.x[i], 3 * q->g->faces.nv * sizeof(double));
     vg_solver_solve(s, POSES, b, a.plain, anchors, roots);
     for (size_t i = 0; i < POSES; i += batch) {
         size_t some = POSES - i < batch ? POSES - i : batch;
@@ -71,9 +71,9 @@ static problem make_problem(const vg_head *h, const vg_graph *g, const uint32_t 
 {
     problem q = {.g = g, .reference = h->body.reference, .anchors = anchors, .nanchors = nanchors, .rounds = 200,
                  .eps = 0.3};
-    double D = vg_diagonal(h->body.reference, g->nv);
+    double D = vg_diagonal(h->body.reference, g->faces.nv);
     for (size_t k = 0; k < POSES; k++) {
-        double *pose = warp(h->body.reference, g->nv, 0.15 * (double)k);
+        double *pose = warp(h->body.reference, g->faces.nv, 0.15 * (double)k);
         q.w[k] = vectors_of(g, pose);
         q.at[k] = room(3 * (nanchors + 1), sizeof(double));
         vg_graph_anchors(pose, anchors, nanchors, q.at[k]);
@@ -94,7 +94,7 @@ static void clear_problem(problem *q)
 
 static double *face_matrix(const problem *q, const double *rest, size_t f)
 {
-    size_t begin = q->g->start[f], r = q->g->start[f + 1] - begin;
+    size_t begin = q->g->faces.start[f], r = q->g->faces.start[f + 1] - begin;
     double *G = room(r * r, sizeof *G);
     for (size_t i = 0; i < r * r; i++) G[i] = (i % (r + 1) == 0) - 1.0 / (double)r;
     if (q->weights == VG_WEIGHTS_AREA && r > 2) face_metric(rest + 3 * begin, r, G);
@@ -106,8 +106,8 @@ static void misfits_of(const problem *q, size_t k, const double *rest, const dou
 {
     const vg_graph *g = q->g;
     double *v = vectors_of(g, x);
-    for (size_t f = 0; f < g->nf; f++) {
-        size_t begin = g->start[f], r = g->start[f + 1] - begin;
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        size_t begin = g->faces.start[f], r = g->faces.start[f + 1] - begin;
         double *G = face_matrix(q, rest, f), sum = 0;
         for (size_t a = 0; a < r; a++)
             for (size_t b = 0; b < r; b++)
@@ -132,16 +132,16 @@ static double total(const double *e, size_t n, double c)
 static double *reweighted(const problem *q, size_t k, const double *rest, const double *e, double c)
 {
     const vg_graph *g = q->g;
-    size_t n = g->nv;
+    size_t n = g->faces.nv;
     double *M = room(n * n, sizeof *M), *b = room(3 * n, sizeof *b);
-    for (size_t f = 0; f < g->nf; f++) {
-        size_t begin = g->start[f], r = g->start[f + 1] - begin;
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        size_t begin = g->faces.start[f], r = g->faces.start[f + 1] - begin;
         double *G = face_matrix(q, rest, f), weight = 1 / hypot(e[f], c);
         for (size_t p = 0; p < r; p++)
             for (size_t s = 0; s < r; s++) {
-                M[g->vert[begin + p] * n + g->vert[begin + s]] += weight * G[p * r + s];
+                M[g->faces.vert[begin + p] * n + g->faces.vert[begin + s]] += weight * G[p * r + s];
                 for (size_t i = 0; i < 3; i++)
-                    b[3 * g->vert[begin + p] + i] += weight * G[p * r + s] * q->w[k][3 * (begin + s) + i];
+                    b[3 * g->faces.vert[begin + p] + i] += weight * G[p * r + s] * q->w[k][3 * (begin + s) + i];
             }
         free(G);
     }
@@ -161,14 +161,14 @@ static double *reweighted(const problem *q, size_t k, const double *rest, const 
 
 static double least_energy(const problem *q, size_t k, const double *rest, const double *plain, double c)
 {
-    double *e = room(q->g->nf, sizeof *e);
+    double *e = room(q->g->faces.nf, sizeof *e);
     misfits_of(q, k, rest, plain, e);
     for (int i = 0; i < 60; i++) {
         double *x = reweighted(q, k, rest, e, c);
         misfits_of(q, k, rest, x, e);
         free(x);
     }
-    double least = total(e, q->g->nf, c);
+    double least = total(e, q->g->faces.nf, c);
     free(e);
     return least;
 }
@@ -182,13 +182,13 @@ static void against_dense(vg_head *h, const char *name, vg_weights weights, size
     q.weights = weights;
     answer a = solve(&q, 2, POSES);
     CHECK(a.stats.unfinished == 0 && a.stats.most_rounds > 1);
-    double *rest = vectors_of(g, q.reference), *e = room(g->nf, sizeof *e), worst = 0;
+    double *rest = vectors_of(g, q.reference), *e = room(g->faces.nf, sizeof *e), worst = 0;
     for (size_t k = 0; k < POSES; k += 5) {
         misfits_of(&q, k, rest, a.plain[k], e);
-        double c = q.eps * total(e, g->nf, 0) / (double)g->nf, before = total(e, g->nf, c);
+        double c = q.eps * total(e, g->faces.nf, 0) / (double)g->faces.nf, before = total(e, g->faces.nf, c);
         double least = least_energy(&q, k, rest, a.plain[k], c);
         misfits_of(&q, k, rest, a.x[k], e);
-        double after = total(e, g->nf, c);
+        double after = total(e, g->faces.nf, c);
         CHECK(after >= least * (1 - 1e-6));
         worst = fmax(worst, (after - least) / least);
         CHECK(before > least);
@@ -224,18 +224,18 @@ static void test_wrong_faces(void)
     vg_head h = make_torus(24, 15);
     vg_graph *g = graph_of(&h);
     problem q = make_problem(&h, g, NULL, 0, 0);
-    double D = vg_diagonal(q.reference, g->nv);
+    double D = vg_diagonal(q.reference, g->faces.nv);
     q.eps = 1e-3;
     for (size_t k = 0; k < POSES; k++) {
         vg_graph_root(g, q.reference, q.at[k]);
-        for (size_t f = k; f < g->nf; f += 40)
-            for (uint32_t i = 3 * g->start[f]; i < 3 * g->start[f + 1]; i++) q.w[k][i] += 0.1 * D * noise();
+        for (size_t f = k; f < g->faces.nf; f += 40)
+            for (uint32_t i = 3 * g->faces.start[f]; i < 3 * g->faces.start[f + 1]; i++) q.w[k][i] += 0.1 * D * noise();
     }
     answer a = solve(&q, 1, POSES);
     for (size_t k = 0; k < POSES; k++) {
-        double *pose = warp(q.reference, g->nv, 0.15 * (double)k), root[3], moved[2] = {0, 0};
+        double *pose = warp(q.reference, g->faces.nv, 0.15 * (double)k), root[3], moved[2] = {0, 0};
         vg_graph_root(g, pose, root);
-        for (size_t v = 0; v < g->nv; v++)
+        for (size_t v = 0; v < g->faces.nv; v++)
             for (size_t i = 0; i < 3; i++) {
                 double at = pose[3 * v + i] - root[i] + q.at[k][i];
                 moved[0] += fabs(a.plain[k][3 * v + i] - at), moved[1] += fabs(a.x[k][3 * v + i] - at);
@@ -259,7 +259,7 @@ static void test_consistent(void)
         q.weights = i % 2 ? VG_WEIGHTS_AREA : VG_WEIGHTS_UNIFORM;
         answer a = solve(&q, 1, POSES);
         CHECK(a.stats.most_rounds == 0);
-        for (size_t k = 0; k < POSES; k++) CHECK(!memcmp(a.x[k], a.plain[k], 3 * g->nv * sizeof(double)));
+        for (size_t k = 0; k < POSES; k++) CHECK(!memcmp(a.x[k], a.plain[k], 3 * g->faces.nv * sizeof(double)));
         clear(&a);
         clear_problem(&q);
         vg_graph_free(&g);
@@ -283,8 +283,8 @@ static void test_anchors_roots_isolated(void)
                 CHECK(!memcmp(a.x[k] + 3 * (size_t)anchors[i], q.at[k] + 3 * i, 3 * sizeof(double)));
             vg_graph_root(g, a.x[k], root);
             for (int i = 0; !nanchors && i < 3; i++)
-                CHECK_NEAR(root[i], q.at[k][i], 1e-12 * vg_diagonal(h.body.reference, g->nv));
-            for (size_t v = 0; v < g->nv; v++)
+                CHECK_NEAR(root[i], q.at[k][i], 1e-12 * vg_diagonal(h.body.reference, g->faces.nv));
+            for (size_t v = 0; v < g->faces.nv; v++)
                 CHECK(g->in_face[v] || !memcmp(a.x[k] + 3 * v, h.body.reference + 3 * v, 3 * sizeof(double)));
         }
         clear(&a);
@@ -319,7 +319,7 @@ static void test_threads_and_batches(void)
         for (size_t batch = 1; batch <= POSES; batch += 2) {
             answer a = solve(&q, threads, batch);
             bool same = true;
-            for (size_t k = 0; k < POSES; k++) same &= !memcmp(a.x[k], one.x[k], 3 * g->nv * sizeof(double));
+            for (size_t k = 0; k < POSES; k++) same &= !memcmp(a.x[k], one.x[k], 3 * g->faces.nv * sizeof(double));
             if (!same) printf("%d threads, %zu poses a call:\n", threads, batch);
             CHECK(same);
             CHECK(a.stats.most_rounds == one.stats.most_rounds);
@@ -347,7 +347,7 @@ static void test_units(void)
         before = units[u];
         answer a = solve(&q, 1, POSES);
         for (size_t k = 0; k < POSES; k++)
-            for (size_t i = 0; i < 3 * g->nv; i++) CHECK(a.x[k][i] == units[u] * one.x[k][i]);
+            for (size_t i = 0; i < 3 * g->faces.nv; i++) CHECK(a.x[k][i] == units[u] * one.x[k][i]);
         clear(&a);
     }
     clear(&one);

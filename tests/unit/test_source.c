@@ -311,7 +311,7 @@ static void write_stream(const char *path, const char *from, const char *program
     CHECK(vg_source_open(&s, &from, 1, NULL) == VG_OK);
     vg_head *h = vg_source_head(s);
     CHECK(vg_head_trace(h, program, 1, argv, NULL) == VG_OK);
-    if (kind == VG_VECTORS) h->kind = kind, h->has_links = true, h->count = vg_mesh_corners(&h->body.mesh);
+    if (kind == VG_VECTORS) h->kind = kind, h->links.chosen = true, h->count = vg_mesh_corners(&h->body.mesh);
     int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0666);
     CHECK(fd >= 0 && vg_writer_open(&w, fd, path, h, NULL) == VG_OK);
     while (kind == VG_VERTICES && vg_source_next(s, &f, NULL) > 0) CHECK(vg_writer_put(w, &f, NULL) == VG_OK);

@@ -156,9 +156,9 @@ static void known_numbers(void)
     }
     drop(&x);
     measure(&x, &h, VG_SPACE_VECTORS, 2, poses);
-    for (size_t f = 0; f < x.g->nf; f++)
-        for (size_t c = x.g->start[f]; c < x.g->start[f + 1]; c++) {
-            double w = sqrt(x.s.node_share[f] / (double)(x.g->start[f + 1] - x.g->start[f]));
+    for (size_t f = 0; f < x.g->faces.nf; f++)
+        for (size_t c = x.g->faces.start[f]; c < x.g->faces.start[f + 1]; c++) {
+            double w = sqrt(x.s.node_share[f] / (double)(x.g->faces.start[f + 1] - x.g->faces.start[f]));
             CHECK_NEAR(x.values[x.s.d + 4 * c], w * sqrt(3) * log(2), 1e-13);
             CHECK_NEAR(x.values[x.s.d + 4 * c + 3], w * M_SQRT2 * 0.4, 1e-13);
         }

@@ -258,12 +258,13 @@ static bool same_head(const vg_head *a, const vg_head *b)
     bool same =
         vg_mesh_same(&a->body.mesh, "a", &b->body.mesh, "b", &e) == VG_OK &&
         !a->body.reference == !b->body.reference && same_text(a->body.reference_name, b->body.reference_name) &&
-        a->kind == b->kind && a->precision == b->precision && a->count == b->count && a->nselected == b->nselected &&
-        a->nlinks == b->nlinks && a->nanchors == b->nanchors && a->has_selection == b->has_selection &&
-        a->has_links == b->has_links && a->nprovenance == b->nprovenance && same_records(&a->extra, &b->extra);
+        a->kind == b->kind && a->precision == b->precision && a->count == b->count && a->selection.n == b->selection.n &&
+        a->links.n == b->links.n && a->nanchors == b->nanchors && a->selection.chosen == b->selection.chosen &&
+        a->links.chosen == b->links.chosen && a->nprovenance == b->nprovenance && same_records(&a->extra, &b->extra);
     if (!same) return false;
     same &= same_memory(a->body.reference, b->body.reference, a->body.reference ? 24 * a->body.mesh.nv : 0);
-    same &= same_memory(a->selected, b->selected, 4 * a->nselected) && same_memory(a->links, b->links, 8 * a->nlinks);
+    same &= same_memory(a->selection.faces, b->selection.faces, 4 * a->selection.n);
+    same &= same_memory(a->links.pairs, b->links.pairs, 8 * a->links.n);
     same &= same_memory(a->anchors, b->anchors, 4 * a->nanchors);
     const vg_attributes *p = &a->body.attributes, *q = &b->body.attributes;
     same &= p->ntex == q->ntex && p->nlabels == q->nlabels && (!p->ntex || p->tex_dim == q->tex_dim);
@@ -432,7 +433,7 @@ static content make(vg_kind kind, vg_precision precision, int how)
         add_provenance(h, "vg-encode", "a b.obj", "");
         add_provenance(h, "vg-deform", "--onto", "\xc3\xa4.obj");
         add_attributes(h, kind % 3 + 1);
-        h->has_selection = true, h->nselected = 2, h->selected = room(2, 4), h->selected[1] = 1;
+        h->selection.chosen = true, h->selection.n = 2, h->selection.faces = room(2, 4), h->selection.faces[1] = 1;
         h->nanchors = 2, h->anchors = room(2, 4), h->anchors[0] = 1, h->anchors[1] = 4;
         add_skeleton(h);
         add_rig(h);
@@ -442,7 +443,7 @@ static content make(vg_kind kind, vg_precision precision, int how)
         add_unknown(&c.tail, "LAST", COPY_SAFE, "tail");
     }
     if (how == FULL || kind == VG_VECTORS || kind == VG_DEFORMATIONS) {
-        h->has_links = true, h->nlinks = 1, h->links = room(2, 4), h->links[0] = 3, h->links[1] = 5;
+        h->links.chosen = true, h->links.n = 1, h->links.pairs = room(2, 4), h->links.pairs[0] = 3, h->links.pairs[1] = 5;
     }
     size_t on_graph = (how == FULL ? 7 : 9) + 2;
     h->count = kind == VG_VERTICES ? h->body.mesh.nv : kind == VG_TRANSFORMS ? 3 : on_graph;

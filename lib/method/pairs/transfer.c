@@ -58,7 +58,7 @@ static void note_degenerate(vg_cross_transfer *c, size_t f, unsigned lanes)
 
 static int check_fit(const vg_mesh *source, const vg_correspondence *k, const vg_graph *target, vg_err *e)
 {
-    vg_mesh t = {target->nv, target->nf - target->nlinks, target->start, target->vert};
+    vg_mesh t = {target->faces.nv, target->faces.nf - target->nlinks, target->faces.start, target->faces.vert};
     if (k->source_nv != source->nv || k->source_nf != source->nf || k->source_digest != vg_mesh_digest(source))
         return vg_fail(e, VG_EINPUT,
                        "the correspondence was made for another source: %zu vertices and %zu faces, the sequence "
@@ -102,7 +102,7 @@ static int measure_source(vg_cross_transfer *c, const double *reference, vg_err 
 static size_t best_turn(const vg_cross_transfer *c, const double *source_reference, size_t s, size_t f)
 {
     const uint32_t *vert = c->source->vert + c->source->start[s];
-    const double *t = c->vectors + 3 * (size_t)c->target->start[f];
+    const double *t = c->vectors + 3 * (size_t)c->target->faces.start[f];
     size_t r = source_size(c, s), best = 0;
     double most = -INFINITY;
     for (size_t turn = 0; turn < r; turn++) {
@@ -122,8 +122,8 @@ static size_t choose_twins(vg_cross_transfer *c)
     const vg_graph *g = c->target;
     const vg_correspondence *k = c->pairs;
     size_t corners = 0;
-    for (size_t f = 0; f < g->nf - g->nlinks; f++) {
-        size_t r = g->start[f + 1] - g->start[f], s = k->source[k->first[f]];
+    for (size_t f = 0; f < g->faces.nf - g->nlinks; f++) {
+        size_t r = g->faces.start[f + 1] - g->faces.start[f], s = k->source[k->first[f]];
         if (!k->matched[f] || k->first[f + 1] - k->first[f] != 1 || source_size(c, s) != r || r > LARGEST) continue;
         c->is_twin[f] = 1;
         c->twin[c->ntwins++] = (uint32_t)f;
@@ -138,66 +138,64 @@ static void fill_twins(const vg_cross_transfer *c, const double *source_referenc
 {
     const vg_graph *g = c->target;
     size_t at = 0;
-    for (size_t v = 0; v < g->nv; v++) twin_of[v] = UINT32_MAX;
+    for (size_t v = 0; v < g->faces.nv; v++) twin_of[v] = UINT32_MAX;
     for (size_t i = 0; i < m->nf; i++) {
         size_t f = c->twin[i], s = c->pairs->source[c->pairs->first[f]], r = source_size(c, s);
         size_t turn = best_turn(c, source_reference, s, f);
         for (size_t j = 0; j < r; j++) {
             uint32_t v = c->source->vert[c->source->start[s] + (j + turn) % r];
             m->vert[at++] = v;
-            twin_of[g->vert[g->start[f] + j]] = v;
+            twin_of[g->faces.vert[g->faces.start[f] + j]] = v;
         }
         m->start[i + 1] = (uint32_t)at;
     }
 }
 
-/* Links between vertices that have twins are twins as well. */
-/* Collect the links between twins; returns their number. */
-static size_t link_twins(vg_cross_transfer *c, const uint32_t *twin_of, uint32_t *links)
+/* Collect the links between twins, which are twins as well. */
+static void link_twins(vg_cross_transfer *c, const uint32_t *twin_of, vg_links *links)
 {
     const vg_graph *g = c->target;
-    size_t n = 0;
-    for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
-        uint32_t a = twin_of[g->vert[g->start[f]]], b = twin_of[g->vert[g->start[f] + 1]];
+    for (size_t f = g->faces.nf - g->nlinks; f < g->faces.nf; f++) {
+        uint32_t a = twin_of[g->faces.vert[g->faces.start[f]]], b = twin_of[g->faces.vert[g->faces.start[f] + 1]];
         if (a == UINT32_MAX || b == UINT32_MAX || a == b) continue;
-        links[2 * n] = a, links[2 * n++ + 1] = b;
+        links->pairs[2 * links->n] = a, links->pairs[2 * links->n++ + 1] = b;
         c->is_twin[f] = 1;
         c->twin[c->ntwins++] = (uint32_t)f;
     }
-    return n;
 }
 
 /* Build the graph of the twins over the source's vertices, in the order of the target's corners. */
 static int find_twins(vg_cross_transfer *c, const double *source_reference, vg_err *e)
 {
     const vg_graph *g = c->target;
-    c->twin = vgi_array(g->nf, sizeof *c->twin, e);
-    c->is_twin = vgi_array(g->nf, 1, e);
+    c->twin = vgi_array(g->faces.nf, sizeof *c->twin, e);
+    c->is_twin = vgi_array(g->faces.nf, 1, e);
     if (!c->twin || !c->is_twin) return VG_ENOMEM;
     size_t corners = choose_twins(c);
     if (!c->ntwins) return VG_OK;
     vg_mesh twins = {c->source->nv, c->ntwins, NULL, NULL};
     twins.start = vgi_array(c->ntwins + 1, sizeof *twins.start, e);
     twins.vert = vgi_array(corners, sizeof *twins.vert, e);
-    uint32_t *links = vgi_array(2 * g->nlinks, sizeof *links, e);
-    uint32_t *twin_of = vgi_array(g->nv, sizeof *twin_of, e);
+    vg_links links = {.chosen = true, .pairs = vgi_array(2 * g->nlinks, sizeof *links.pairs, e)};
+    uint32_t *twin_of = vgi_array(g->faces.nv, sizeof *twin_of, e);
     corners += 2 * g->nlinks;
     double *target = vgi_array(3 * corners, sizeof *target, e);
-    int r = twins.start && twins.vert && links && twin_of && target ? VG_OK : VG_ENOMEM;
+    int r = twins.start && twins.vert && links.pairs && twin_of && target ? VG_OK : VG_ENOMEM;
     if (r == VG_OK) {
         fill_twins(c, source_reference, &twins, twin_of);
-        r = vg_graph_new(&c->twins, &twins, 0, NULL, link_twins(c, twin_of, links), links, e);
+        link_twins(c, twin_of, &links);
+        r = vg_graph_new(&c->twins, &twins, NULL, &links, e);
     }
     for (size_t i = 0; r == VG_OK && i < c->ntwins; i++) {
-        size_t at = c->twins->start[i], n = c->twins->start[i + 1] - at;
-        memcpy(target + 3 * at, c->vectors + 3 * (size_t)g->start[c->twin[i]], 3 * n * sizeof *target);
+        size_t at = c->twins->faces.start[i], n = c->twins->faces.start[i + 1] - at;
+        memcpy(target + 3 * at, c->vectors + 3 * (size_t)g->faces.start[c->twin[i]], 3 * n * sizeof *target);
     }
     if (r == VG_OK) r = vg_deformer_new(&c->deformer, c->twins, source_reference, c->threads, e);
     if (r == VG_OK) r = vg_deformer_target(c->deformer, target, c->method, e);
     for (size_t i = 0; r == VG_OK && i < VGI_LANES; i++)
         if (!(c->twin_vectors[i] = vgi_array(3 * corners, sizeof *target, e))) r = VG_ENOMEM;
     vg_mesh_clear(&twins);
-    free(links);
+    free(links.pairs);
     free(twin_of);
     free(target);
     return r;
@@ -230,7 +228,7 @@ int vg_cross_transfer_new(vg_cross_transfer **out, const vg_mesh *source, const 
     atomic_init(&c->first_face, UINT64_MAX);
     double before = vg_diagonal(source_reference, source->nv);
     c->source_reference = source_reference;
-    c->ratio = before > 0 ? vg_diagonal(target_reference, target->nv) / before : 1;
+    c->ratio = before > 0 ? vg_diagonal(target_reference, target->faces.nv) / before : 1;
     r = make_arrays(c, e);
     if (r == VG_OK && target->nlinks)
         r = vgi_incidence_make(&c->around, &target->faces, e);
@@ -249,11 +247,12 @@ double vg_cross_transfer_turned(const vg_cross_transfer *c)
     const vg_correspondence *pairs = c->pairs;
     double sum = 0, n[3];
     size_t count = 0;
-    for (size_t f = 0; f < t->nf - t->nlinks; f++) {
+    for (size_t f = 0; f < t->faces.nf - t->nlinks; f++) {
         size_t s = pairs->source[pairs->first[f]];
         const double *q = c->q + 3 * s; /* along the normal */
         if (!pairs->matched[f] || c->slow[s]) continue;
-        if (!vgi_unit_normal(c->vectors + 3 * (size_t)t->start[f], t->start[f + 1] - t->start[f], n)) continue;
+        size_t first = t->faces.start[f], size = t->faces.start[f + 1] - first;
+        if (!vgi_unit_normal(c->vectors + 3 * first, size, n)) continue;
         sum += (q[0] * n[0] + q[1] * n[1] + q[2] * n[2]) / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
         count++;
     }
@@ -341,7 +340,7 @@ static void add_sources(const vg_cross_transfer *c, size_t f, vgi_map *sum, vgi_
 static void centre_beside(const vg_cross_transfer *c, uint32_t v, const double *const *poses, vgi_lanes centre[3])
 {
     const vg_correspondence *k = c->pairs;
-    size_t faces = c->target->nf - c->target->nlinks;
+    size_t faces = c->target->faces.nf - c->target->nlinks;
     uint32_t first = c->around.first[v], last = c->around.first[v + 1];
     double total = 0;
     if (last - first > ENOUGH) last = first + ENOUGH;
@@ -367,13 +366,13 @@ static void centre_beside(const vg_cross_transfer *c, uint32_t v, const double *
 static void add_drift(const carry_job *j, size_t f, const vgi_map *map)
 {
     const vg_cross_transfer *c = j->c;
-    size_t begin = c->target->start[f];
+    size_t begin = c->target->faces.start[f];
     const double *reference[VGI_LANES];
     for (int k = 0; k < VGI_LANES; k++) reference[k] = c->source_reference;
     vgi_lanes now[2][3], before[2][3];
     for (size_t end = 0; end < 2; end++) {
-        centre_beside(c, c->target->vert[begin + end], j->poses, now[end]);
-        centre_beside(c, c->target->vert[begin + end], reference, before[end]);
+        centre_beside(c, c->target->faces.vert[begin + end], j->poses, now[end]);
+        centre_beside(c, c->target->faces.vert[begin + end], reference, before[end]);
     }
     for (size_t a = 0; a < 3; a++)
         for (size_t k = 0; k < j->lanes; k++) {
@@ -390,7 +389,7 @@ static void follow(const carry_job *j, size_t f)
                                      [VG_BY_BLEND] = VGI_FOLLOW_BLEND};
     const vg_cross_transfer *c = j->c;
     const vg_graph *g = c->target;
-    size_t faces = g->nf - g->nlinks, begin = g->start[f];
+    size_t faces = g->faces.nf - g->nlinks, begin = g->faces.start[f];
     vgi_map sum;
     vgi_lanes weight = {0};
     memset(&sum, 0, sizeof sum);
@@ -399,7 +398,7 @@ static void follow(const carry_job *j, size_t f)
         add_sources(c, f, &sum, weight);
     } else { /* a link uses the faces at both ends */
         for (size_t end = 0; end < 2; end++) {
-            uint32_t v = g->vert[begin + end], first = c->around.first[v], last = c->around.first[v + 1];
+            uint32_t v = g->faces.vert[begin + end], first = c->around.first[v], last = c->around.first[v + 1];
             if (last - first > ENOUGH) last = first + ENOUGH;
             for (uint32_t i = first; i < last; i++)
                 if (c->around.face[i] < faces) add_sources(c, c->around.face[i], &sum, weight);
@@ -407,14 +406,14 @@ static void follow(const carry_job *j, size_t f)
     }
     vgi_transfer_kernel_now()->finish(&sum, weight);
     vgi_transfer_kernel_now()->follow(&sum, rigid ? VGI_FOLLOW_RIGID : how[c->method], c->vectors + 3 * begin,
-                                      g->start[f + 1] - begin, j->out, 3 * begin, j->lanes);
+                                      g->faces.start[f + 1] - begin, j->out, 3 * begin, j->lanes);
     if (f >= faces) add_drift(j, f, &sum);
 }
 
 static void follow_chunk(void *context, size_t i)
 {
     const carry_job *j = context;
-    size_t nf = j->c->target->nf, first = i * CHUNK, last = first + CHUNK < nf ? first + CHUNK : nf;
+    size_t nf = j->c->target->faces.nf, first = i * CHUNK, last = first + CHUNK < nf ? first + CHUNK : nf;
     for (size_t f = first; f < last; f++)
         if (!j->c->is_twin[f]) follow(j, f);
 }
@@ -427,8 +426,8 @@ static void transfer_twins(const carry_job *j)
     vg_deformer_transfer(c->deformer, j->lanes, VG_VERTICES, j->poses, c->twin_vectors);
     for (size_t k = 0; k < j->lanes; k++)
         for (size_t i = 0; i < c->ntwins; i++) {
-            size_t from = c->twins->start[i], n = c->twins->start[i + 1] - from;
-            memcpy(j->out[k] + 3 * (size_t)c->target->start[c->twin[i]], c->twin_vectors[k] + 3 * from,
+            size_t from = c->twins->faces.start[i], n = c->twins->faces.start[i + 1] - from;
+            memcpy(j->out[k] + 3 * (size_t)c->target->faces.start[c->twin[i]], c->twin_vectors[k] + 3 * from,
                    3 * n * sizeof(double));
         }
 }
@@ -440,6 +439,6 @@ void vg_cross_transfer_apply(vg_cross_transfer *c, size_t n, const double *const
         for (size_t k = 0; k < VGI_LANES; k++) j.poses[k] = poses[p + (k < j.lanes ? k : j.lanes - 1)];
         vgi_parallel(c->threads, (c->source->nf + CHUNK - 1) / CHUNK, measure_chunk, &j);
         transfer_twins(&j);
-        vgi_parallel(c->threads, (c->target->nf + CHUNK - 1) / CHUNK, follow_chunk, &j);
+        vgi_parallel(c->threads, (c->target->faces.nf + CHUNK - 1) / CHUNK, follow_chunk, &j);
     }
 }

@@ -31,7 +31,7 @@ int vg_rig_fitter_new(vg_rig_fitter **out, const vg_head *h, const vg_rig_option
     if (!h->body.rig.nbones) return vg_fail(e, VG_EINPUT, "there is no skeleton to fit");
     if (o->bones_per_corner < 1 || o->bones_per_corner > 2)
         return vg_fail(e, VG_EARG, "a corner has 1 or 2 bones, not %zu", o->bones_per_corner);
-    if (!h->has_links) return vg_fail(e, VG_EARG, "the links are not chosen: call vg_head_prepare_vectors first");
+    if (!h->links.chosen) return vg_fail(e, VG_EARG, "the links are not chosen: call vg_head_prepare_vectors first");
     vg_rig_fitter *f = *out = vgi_array(1, sizeof *f, e);
     if (!f) return VG_ENOMEM;
     f->h = h, f->o = *o;
@@ -40,7 +40,7 @@ int vg_rig_fitter_new(vg_rig_fitter **out, const vg_head *h, const vg_rig_option
     for (size_t b = 0; r == VG_OK && b < h->body.rig.nbones; b++)
         memcpy(at + 3 * b, h->body.rig.at + 3 * (size_t)h->body.rig.bone[b], 3 * sizeof *at);
     if (r == VG_OK) r = vg_head_graph(&f->g, h, e);
-    if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->nf, f->g->start, f->g->vert, h->body.reference, e);
+    if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->faces.nf, f->g->faces.start, f->g->faces.vert, h->body.reference, e);
     if (r == VG_OK) r = vgi_rig_sums_make(&f->sums, h->body.mesh.nv, h->body.rig.nbones, at, &f->turns, e);
     if (r == VG_OK && !(f->miss = vgi_array(h->body.mesh.nv, sizeof *f->miss, e))) r = VG_ENOMEM;
     free(at);
@@ -129,8 +129,8 @@ static size_t face_bones(const vg_rig_fitter *f, size_t face, uint32_t *list)
 {
     const vg_rig *r = &f->rig;
     size_t n = 0;
-    for (uint32_t c = f->g->start[face]; c < f->g->start[face + 1]; c++)
-        for (size_t s = VG_SKIN * f->g->vert[c]; s < VG_SKIN * (f->g->vert[c] + 1); s++) {
+    for (uint32_t c = f->g->faces.start[face]; c < f->g->faces.start[face + 1]; c++)
+        for (size_t s = VG_SKIN * f->g->faces.vert[c]; s < VG_SKIN * (f->g->faces.vert[c] + 1); s++) {
             size_t i = 0;
             while (i < n && list[i] != r->skin_bone[s]) i++;
             if (i == n && n < NEAR && r->skin_weight[s] > 0) list[n++] = r->skin_bone[s];
@@ -198,21 +198,21 @@ static void fit_faces(void *context, size_t task)
     const cornering *x = context;
     const vg_graph *g = x->f->g;
     const vgi_rig_sums *s = &x->f->sums;
-    size_t faces = g->nf - g->nlinks, first = task * faces / x->chunks, last = (task + 1) * faces / x->chunks,
+    size_t faces = g->faces.nf - g->nlinks, first = task * faces / x->chunks, last = (task + 1) * faces / x->chunks,
            width = 4 * s->n;
     double *raw = x->space + task * 2 * width, *mean = raw + width;
     for (size_t face = first; face < last; face++) {
         uint32_t list[NEAR];
-        size_t n = face_bones(x->f, face, list), begin = g->start[face], r = g->start[face + 1] - begin;
+        size_t n = face_bones(x->f, face, list), begin = g->faces.start[face], r = g->faces.start[face + 1] - begin;
         for (size_t b = 0; b < n; b++)
             for (size_t i = 4 * list[b]; i < 4 * (size_t)list[b] + 3; i++) {
                 mean[i] = 0;
-                for (size_t c = begin; c < begin + r; c++) mean[i] += s->pull[g->vert[c] * width + i] / (double)r;
+                for (size_t c = begin; c < begin + r; c++) mean[i] += s->pull[g->faces.vert[c] * width + i] / (double)r;
             }
         for (size_t c = begin; c < begin + r; c++) {
             for (size_t b = 0; b < n; b++)
                 for (size_t i = 4 * list[b]; i < 4 * (size_t)list[b] + 3; i++)
-                    raw[i] = s->pull[g->vert[c] * width + i] - mean[i];
+                    raw[i] = s->pull[g->faces.vert[c] * width + i] - mean[i];
             fit_corner(x, face, c, raw, list, n);
         }
     }
@@ -220,10 +220,10 @@ static void fit_faces(void *context, size_t task)
 
 static int fit_corners(const vg_rig_fitter *f, vg_map *m, vg_err *e)
 {
-    cornering x = {f, m, f->g->nf < CHUNK ? 1 : CHUNK, NULL};
+    cornering x = {f, m, f->g->faces.nf < CHUNK ? 1 : CHUNK, NULL};
     if (!(x.space = vgi_array(x.chunks, 8 * m->n * sizeof *x.space, e))) return VG_ENOMEM;
     vgi_parallel(f->o.threads, x.chunks, fit_faces, &x);
-    for (size_t i = m->per_corner * (size_t)f->g->start[f->g->nf - f->g->nlinks]; i < m->per_corner * m->ncorners;
+    for (size_t i = m->per_corner * (size_t)f->g->faces.start[f->g->faces.nf - f->g->nlinks]; i < m->per_corner * m->ncorners;
          i++)
         m->corner[4 * i] = 1; /* a link follows the skin of its ends */
     free(x.space);
@@ -258,7 +258,7 @@ static void hold(choosing *x, size_t v)
 {
     const double *p = x->f->h->body.reference, *at = p + 3 * v;
     x->list[x->n++] = (uint32_t)v;
-    for (size_t i = 0; i < x->f->g->nv; i++, p += 3) {
+    for (size_t i = 0; i < x->f->g->faces.nv; i++, p += 3) {
         double d =
             (p[0] - at[0]) * (p[0] - at[0]) + (p[1] - at[1]) * (p[1] - at[1]) + (p[2] - at[2]) * (p[2] - at[2]);
         if (d < x->distance[i]) x->distance[i] = d;
@@ -298,7 +298,7 @@ static int by_number(const void *a, const void *b)
 static int choose_held(const vg_rig_fitter *f, vg_map *m, vg_err *e)
 {
     static const double tolerance = 1e-3; /* in D; smaller deviations count as zero */
-    size_t nv = f->g->nv, want = (size_t)(f->o.hold * (double)f->g->attached + 0.5);
+    size_t nv = f->g->faces.nv, want = (size_t)(f->o.hold * (double)f->g->attached + 0.5);
     double d = vg_diagonal(f->h->body.reference, nv);
     choosing x = {.f = f,
                   .doubt = vgi_array(nv, sizeof *x.doubt, e),
@@ -454,7 +454,7 @@ static int refine(const vg_rig_fitter *f, vg_map *m, vg_err *e)
 static int make_arrays(const vg_rig_fitter *f, vg_map *m, bool corners, vg_err *e)
 {
     const vg_rig *r = &f->rig;
-    size_t n = r->nbones, nv = f->g->nv;
+    size_t n = r->nbones, nv = f->g->faces.nv;
     *m = (vg_map){.n = n,
                   .nv = nv,
                   .kind = VG_MAP_BONES,
@@ -500,7 +500,7 @@ int vg_rig_fitter_finish(vg_rig_fitter *f, vg_rig_method method, vg_rig *rig, vg
         r = f->base.n ? vg_map_copy(m, &f->base, e) : make_base(f, m, e);
         if (r == VG_OK) r = refine(f, m, e);
     }
-    if (r == VG_OK) r = vg_rig_copy(rig, &f->rig, f->g->nv, e);
+    if (r == VG_OK) r = vg_rig_copy(rig, &f->rig, f->g->faces.nv, e);
     if (r < 0) vg_map_clear(m);
     return r;
 }

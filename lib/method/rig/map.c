@@ -119,9 +119,9 @@ static int choose_held(vg_map_fitter *f, vg_err *e)
 {
     const vgi_shape *s = &f->shape;
     const vg_graph *g = f->g;
-    double d = vg_diagonal(f->h->body.reference, g->nv);
-    unsigned char *used = vgi_array(g->nv, sizeof *used, e), *count = vgi_array(g->nv, sizeof *count, e);
-    candidate *list = vgi_array(g->nv, sizeof *list, e), *chosen = vgi_array(g->nv, sizeof *chosen, e);
+    double d = vg_diagonal(f->h->body.reference, g->faces.nv);
+    unsigned char *used = vgi_array(g->faces.nv, sizeof *used, e), *count = vgi_array(g->faces.nv, sizeof *count, e);
+    candidate *list = vgi_array(g->faces.nv, sizeof *list, e), *chosen = vgi_array(g->faces.nv, sizeof *chosen, e);
     bool ok = used && count && list && chosen;
     for (size_t i = 0; ok && i < s->first[s->n]; i++)
         if (count[s->member[i]] < 2) count[s->member[i]]++;
@@ -168,15 +168,15 @@ static int find_near(vg_map_fitter *f, vg_err *e)
     const vg_graph *g = f->g;
     size_t n = f->shape.n, npairs = 0;
     uint32_t (*pair)[2], *shared;
-    f->near = vgi_array(n, sizeof *f->near, e), f->owner = vgi_array(g->nv, sizeof *f->owner, e);
-    f->want = vgi_array(g->nv, 3 * NEAR * sizeof *f->want, e);
+    f->near = vgi_array(n, sizeof *f->near, e), f->owner = vgi_array(g->faces.nv, sizeof *f->owner, e);
+    f->want = vgi_array(g->faces.nv, 3 * NEAR * sizeof *f->want, e);
     if (!f->near || !f->owner || !f->want) return VG_ENOMEM;
     int r = vgi_neighbours(&g->faces, f->of_face, &pair, &shared, &npairs, e);
     if (r < 0) return r;
     for (size_t p = 0; p < n; p++) f->near[p] = (vicinity){.n = 1, .patch = {(uint32_t)p}};
     for (size_t i = 0; i < npairs; i++)
         for (int k = 0; k < 2; k++) come_near(&f->near[pair[i][k]], pair[i][1 - k], shared[i]);
-    memset(f->owner, 0xff, g->nv * sizeof *f->owner);
+    memset(f->owner, 0xff, g->faces.nv * sizeof *f->owner);
     for (size_t p = n; p-- > 0;)
         for (size_t i = f->shape.first[p]; i < f->shape.first[p + 1]; i++) f->owner[f->shape.member[i]] = (uint32_t)p;
     free(pair);
@@ -189,7 +189,7 @@ int vg_map_fitter_new(vg_map_fitter **out, const vg_head *h, double hold, int th
     *out = NULL;
     if (!h->body.patches.n || !h->body.mesh.nf)
         return vg_fail(e, VG_EINPUT, "there are no patches: make them with vg-segment");
-    if (!h->has_links) return vg_fail(e, VG_EARG, "the links are not chosen: call vg_head_prepare_vectors first");
+    if (!h->links.chosen) return vg_fail(e, VG_EARG, "the links are not chosen: call vg_head_prepare_vectors first");
     vg_map_fitter *f = *out = vgi_array(1, sizeof *f, e);
     if (!f) return VG_ENOMEM;
     f->h = h, f->threads = threads, f->hold = hold;
@@ -198,12 +198,12 @@ int vg_map_fitter_new(vg_map_fitter **out, const vg_head *h, double hold, int th
     if (r == VG_OK) r = vg_head_graph(&f->g, h, e);
     if (r == VG_OK && !(f->of_face = vgi_graph_patches(h, &f->patches, f->g, e))) r = VG_ENOMEM;
     if (r == VG_OK) r = vgi_shape_make(&f->shape, &h->body.mesh, &f->patches, h->body.reference, e);
-    if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->nf, f->g->start, f->g->vert, h->body.reference, e);
+    if (r == VG_OK) r = vgi_turns_make(&f->turns, f->g->faces.nf, f->g->faces.start, f->g->faces.vert, h->body.reference, e);
     if (r == VG_OK) r = choose_held(f, e);
     if (r == VG_OK) r = find_near(f, e);
     if (r == VG_OK) {
         f->pull = vgi_array(3 * vg_graph_corners(f->g), sizeof *f->pull, e);
-        f->turn = vgi_array(9 * f->g->nf, sizeof *f->turn, e);
+        f->turn = vgi_array(9 * f->g->faces.nf, sizeof *f->turn, e);
         f->b2 = vgi_array(f->patches.n, sizeof *f->b2, e);
         if (!f->pull || !f->turn || !f->b2) r = VG_ENOMEM;
     }
@@ -261,16 +261,16 @@ static void add_face(const adding *a, size_t face)
 {
     vg_map_fitter *f = a->f;
     const vg_graph *g = f->g;
-    size_t begin = g->start[face], r = g->start[face + 1] - begin, n = f->shape.n;
+    size_t begin = g->faces.start[face], r = g->faces.start[face + 1] - begin, n = f->shape.n;
     vgi_lanes turn[9];
     vgi_turns_measure(&f->turns, face, a->poses, turn);
     double *sum = f->turn + 9 * face;
     for (size_t k = 0; k < a->lanes; k++) {
         const vgi_motion *m = &a->motion[k * n + f->of_face[face]];
         double centre[3], b = sqrt(m->b2);
-        vgi_face_centre(a->poses[k], g->vert + begin, r, centre);
+        vgi_face_centre(a->poses[k], g->faces.vert + begin, r, centre);
         for (size_t i = 0; i < r; i++) {
-            const double *x = a->poses[k] + 3 * (size_t)g->vert[begin + i];
+            const double *x = a->poses[k] + 3 * (size_t)g->faces.vert[begin + i];
             const double d[3] = {x[0] - centre[0], x[1] - centre[1], x[2] - centre[2]};
             add_back(m->a, d, f->pull + 3 * (begin + i));
         }
@@ -283,7 +283,7 @@ static void add_face(const adding *a, size_t face)
 static void add_chunk(void *context, size_t i)
 {
     const adding *a = context;
-    size_t nf = a->f->g->nf, first = i * CHUNK, last = first + CHUNK < nf ? first + CHUNK : nf;
+    size_t nf = a->f->g->faces.nf, first = i * CHUNK, last = first + CHUNK < nf ? first + CHUNK : nf;
     for (size_t f = first; f < last; f++) add_face(a, f);
 }
 
@@ -303,7 +303,7 @@ static void want_chunk(void *context, size_t i)
 {
     const adding *a = context;
     vg_map_fitter *f = a->f;
-    size_t nv = f->g->nv, first = i * CHUNK, last = first + CHUNK < nv ? first + CHUNK : nv;
+    size_t nv = f->g->faces.nv, first = i * CHUNK, last = first + CHUNK < nv ? first + CHUNK : nv;
     for (size_t v = first; v < last; v++) {
         if (f->owner[v] == NOBODY) continue;
         const vicinity *near = &f->near[f->owner[v]];
@@ -326,8 +326,8 @@ int vg_map_fitter_add(vg_map_fitter *f, size_t n, const double *const *poses, vg
         if (r < 0) return r;
         a.motion = f->motion + f->poses * patches;
         vgi_parallel(f->threads, patches, measure_patch, &a);
-        vgi_parallel(f->threads, (f->g->nf + CHUNK - 1) / CHUNK, add_chunk, &a);
-        vgi_parallel(f->threads, (f->g->nv + CHUNK - 1) / CHUNK, want_chunk, &a);
+        vgi_parallel(f->threads, (f->g->faces.nf + CHUNK - 1) / CHUNK, add_chunk, &a);
+        vgi_parallel(f->threads, (f->g->faces.nv + CHUNK - 1) / CHUNK, want_chunk, &a);
         add_held(&a);
         for (size_t k = 0; k < a.lanes; k++)
             for (size_t q = 0; q < patches; q++) f->b2[q] += a.motion[k * patches + q].b2;
@@ -341,11 +341,11 @@ int vg_map_fitter_add(vg_map_fitter *f, size_t n, const double *const *poses, vg
 static void fit_corners(const vg_map_fitter *f, vg_map *m)
 {
     const vg_graph *g = f->g;
-    for (size_t face = 0; face < g->nf; face++) {
+    for (size_t face = 0; face < g->faces.nf; face++) {
         double h[9], q[4];
         vgi_fit_rotation(f->turn + 9 * face, h);
         vg_quat_from_matrix(h, q);
-        for (size_t c = g->start[face]; c < g->start[face + 1]; c++) {
+        for (size_t c = g->faces.start[face]; c < g->faces.start[face + 1]; c++) {
             const double *r = f->turns.vector + 3 * c;
             double u[3], turned[3], rest[4] = {1, 0, 0, 0}, u2 = 0, r2 = 0;
             vg_quat_apply(q, r, turned);
@@ -398,7 +398,7 @@ static int fit_hinges(const vg_map_fitter *f, vg_map *m, vg_err *e)
     static const double nothing = 1e-12; /* weight of a hinge whose error is thousands of D, or not finite */
     const vg_graph *g = f->g;
     uint32_t (*pair)[2], *shared;
-    double d = vg_diagonal(f->h->body.reference, g->nv);
+    double d = vg_diagonal(f->h->body.reference, g->faces.nv);
     int r = vgi_neighbours(&g->faces, f->of_face, &pair, &shared, &m->nhinges, e);
     if (r < 0) return r;
     m->hinge = (uint32_t *)pair;
@@ -601,7 +601,7 @@ static void skin_patch(void *context, size_t p)
         s[i * w + i] += x->strength * (double)(f->poses + 1);
     }
     bool ok = vgi_spd_factor(w, s);
-    for (size_t v = 0; ok && v < f->g->nv; v++) {
+    for (size_t v = 0; ok && v < f->g->faces.nv; v++) {
         if (f->owner[v] != p || !f->g->in_face[v]) continue;
         double *row = x->m->weights + v * width;
         for (size_t i = 0; i < w; i++) {
@@ -625,7 +625,7 @@ static int make_arrays(vg_map *m, const vg_map_fitter *f, vg_err *e)
 {
     size_t n = f->shape.n;
     *m = (vg_map){.n = n,
-                  .nv = f->g->nv,
+                  .nv = f->g->faces.nv,
                   .kind = VG_MAP_PATCHES,
                   .size = 1,
                   .ncorners = vg_graph_corners(f->g),

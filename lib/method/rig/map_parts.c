@@ -135,14 +135,14 @@ int vgi_place_by_hinges(const vg_map *m, const double *centre, double *place, vg
 
 uint32_t *vgi_graph_patches(const vg_head *h, const vg_patches *patches, const vg_graph *g, vg_err *e)
 {
-    size_t faces = g->nf - g->nlinks;
-    uint32_t *of_face = vgi_array(g->nf, sizeof *of_face, e), *of_vertex = vgi_array(g->nv, sizeof *of_vertex, e);
+    size_t faces = g->faces.nf - g->nlinks;
+    uint32_t *of_face = vgi_array(g->faces.nf, sizeof *of_face, e), *of_vertex = vgi_array(g->faces.nv, sizeof *of_vertex, e);
     if (of_face && of_vertex) {
         for (size_t f = faces; f-- > 0;) {
-            of_face[f] = patches->of_face[h->has_selection ? h->selected[f] : f];
-            for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) of_vertex[g->vert[c]] = of_face[f];
+            of_face[f] = patches->of_face[h->selection.chosen ? h->selection.faces[f] : f];
+            for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++) of_vertex[g->faces.vert[c]] = of_face[f];
         }
-        for (size_t f = faces; f < g->nf; f++) of_face[f] = of_vertex[g->vert[g->start[f]]];
+        for (size_t f = faces; f < g->faces.nf; f++) of_face[f] = of_vertex[g->faces.vert[g->faces.start[f]]];
     } else {
         free(of_face);
         of_face = NULL;
@@ -191,12 +191,12 @@ static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *o
 {
     memset(wanted, 0, 3 * vg_graph_corners(g) * sizeof *wanted);
     if (m->kind == VG_MAP_PATCHES) {
-        for (size_t f = 0; f < g->nf; f++)
-            for (size_t c = g->start[f]; of_face[f] == p && c < g->start[f + 1]; c++)
+        for (size_t f = 0; f < g->faces.nf; f++)
+            for (size_t c = g->faces.start[f]; of_face[f] == p && c < g->faces.start[f + 1]; c++)
                 vg_quat_apply(m->corner + 4 * c, vectors + 3 * c, wanted + 3 * c);
         return;
     }
-    for (size_t i = 0; i < m->per_corner * (size_t)g->start[g->nf - g->nlinks]; i++) {
+    for (size_t i = 0; i < m->per_corner * (size_t)g->faces.start[g->faces.nf - g->nlinks]; i++) {
         if (m->corner_bone[i] != p) continue;
         double *to = wanted + 3 * (i / m->per_corner), d[3];
         vg_quat_apply(m->corner + 4 * i, vectors + 3 * (i / m->per_corner), d);
@@ -208,12 +208,12 @@ static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *o
  * unit value of component k. */
 static void link_vectors(const vg_rig *r, const vg_graph *g, size_t p, const double *at, size_t k, double *wanted)
 {
-    for (size_t f = g->nf - g->nlinks; f < g->nf; f++) {
-        const uint32_t *end = g->vert + g->start[f];
+    for (size_t f = g->faces.nf - g->nlinks; f < g->faces.nf; f++) {
+        const uint32_t *end = g->faces.vert + g->faces.start[f];
         double w[2] = {0.5 * skin_share(r, end[0], p), 0.5 * skin_share(r, end[1], p)};
         for (size_t i = at ? 0 : k; i < (at ? 3 : k + 1); i++) {
             double d = at ? w[0] * at[3 * (size_t)end[0] + i] - w[1] * at[3 * (size_t)end[1] + i] : w[0] - w[1];
-            wanted[3 * (size_t)g->start[f] + i] = d, wanted[3 * (size_t)g->start[f] + 3 + i] = -d;
+            wanted[3 * (size_t)g->faces.start[f] + i] = d, wanted[3 * (size_t)g->faces.start[f] + 3 + i] = -d;
         }
     }
 }
@@ -253,7 +253,7 @@ static void column_input(const vg_map *m, const vgi_map_body *body, const vg_gra
 static void store_column(vg_map *m, const vg_graph *g, size_t column, const double *x)
 {
     size_t n = m->n;
-    for (size_t v = 0; v < g->nv; v++) {
+    for (size_t v = 0; v < g->faces.nv; v++) {
         double *row = m->weights + v * 4 * n;
         if (!g->in_face[v]) continue;
         for (size_t k = 0; k < 3; k++) {
@@ -279,7 +279,7 @@ void vgi_map_skin_row(vg_map *m, const vgi_map_body *body, size_t v)
 /* A vertex without a face follows the patch with the nearest centre, or its skin. */
 static void carry_loose(vg_map *m, const vgi_map_body *body, const vg_graph *g)
 {
-    for (size_t v = 0; v < g->nv; v++) {
+    for (size_t v = 0; v < g->faces.nv; v++) {
         if (g->in_face[v]) continue;
         if (m->kind == VG_MAP_BONES) {
             vgi_map_skin_row(m, body, v);
@@ -304,7 +304,7 @@ int vgi_map_collapse(vg_map *m, const vgi_map_body *body, const vg_graph *g, con
     vg_solver *s;
     int r = vg_solver_new(&s, g, m->held, m->nheld, body->reference, VG_WEIGHTS_UNIFORM, threads, e);
     if (r < 0) return r;
-    size_t batch = vg_solver_batch(s), columns = m->n + (m->n + 2) / 3, nv = g->nv;
+    size_t batch = vg_solver_batch(s), columns = m->n + (m->n + 2) / 3, nv = g->faces.nv;
     double *wanted = vgi_array(3 * vg_graph_corners(g), sizeof *wanted, e);
     double *space = vgi_array(batch, (6 * nv + 3 * m->nheld) * sizeof *space, e);
     double **x = vgi_array(4 * batch, sizeof *x, e), **rhs = x ? x + batch : NULL,

@@ -15,7 +15,7 @@
 static int morph_body(const vg_head *h, const vg_graph *g, const double *target, double morph, double *body,
                       int threads, vg_err *e)
 {
-    size_t corners = vg_graph_corners(g), nv = g->nv;
+    size_t corners = vg_graph_corners(g), nv = g->faces.nv;
     vg_solver *s = NULL;
     double *a = vgi_array(3 * corners, sizeof *a, e), *b = vgi_array(3 * corners, sizeof *b, e);
     double *rhs = vgi_array(3 * nv, sizeof *rhs, e), roots[2][3], root[3];

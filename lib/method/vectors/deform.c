@@ -43,7 +43,7 @@ struct vg_deformer {
 
 static size_t face_size(const vg_graph *g, size_t f)
 {
-    return g->start[f + 1] - g->start[f];
+    return g->faces.start[f + 1] - g->faces.start[f];
 }
 
 /* ---- one face in one pose ---- */
@@ -86,7 +86,7 @@ static void make_unit(double q[4])
  * the face in the pose. */
 static size_t measure_polygon(const vg_deformer *d, size_t f, const double *w, double *quaternions)
 {
-    uint32_t begin = d->g->start[f];
+    uint32_t begin = d->g->faces.start[f];
     size_t r = face_size(d->g, f), bad = 0;
     double n[3], mean[4] = {0, 0, 0, 0};
     bool has_normal = vgi_unit_normal(w, r, n);
@@ -120,7 +120,7 @@ static size_t measure_polygon(const vg_deformer *d, size_t f, const double *w, d
 static size_t measure_segment(const vg_deformer *d, size_t f, const double *w, const double base[4],
                               double *quaternions)
 {
-    uint32_t begin = d->g->start[f];
+    uint32_t begin = d->g->faces.start[f];
     double length = vgi_length(w), before = d->length[begin];
     size_t bad = 0;
     if (before == 0 || !(length * length > d->shortest2)) {
@@ -140,7 +140,7 @@ static size_t measure_segment(const vg_deformer *d, size_t f, const double *w, c
 
 static void face_vectors(const vg_graph *g, size_t f, vg_kind kind, const double *pose, double *w)
 {
-    uint32_t begin = g->start[f];
+    uint32_t begin = g->faces.start[f];
     size_t r = face_size(g, f);
     if (kind == VG_VECTORS) {
         memcpy(w, pose + 3 * (size_t)begin, 3 * r * sizeof *w);
@@ -148,7 +148,7 @@ static void face_vectors(const vg_graph *g, size_t f, vg_kind kind, const double
     }
     double centre[3] = {0, 0, 0};
     for (size_t i = 0; i < r; i++)
-        for (int k = 0; k < 3; k++) centre[k] += w[3 * i + k] = pose[3 * (size_t)g->vert[begin + i] + k];
+        for (int k = 0; k < 3; k++) centre[k] += w[3 * i + k] = pose[3 * (size_t)g->faces.vert[begin + i] + k];
     vgi_divide(centre, (double)r);
     for (size_t i = 0; i < r; i++)
         for (int k = 0; k < 3; k++) w[3 * i + k] -= centre[k];
@@ -173,7 +173,7 @@ static void turn_beside(const vg_deformer *d, size_t link, vg_kind kind, const d
     const vg_graph *g = d->g;
     memset(mean, 0, 4 * sizeof *mean);
     for (int end = 0; end < 2; end++) {
-        uint32_t v = g->vert[g->start[link] + (uint32_t)end];
+        uint32_t v = g->faces.vert[g->faces.start[link] + (uint32_t)end];
         uint32_t first = d->around.first[v], last = d->around.first[v + 1];
         if (last - first > ENOUGH) last = first + ENOUGH;
         for (uint32_t i = first; i < last; i++) {
@@ -205,7 +205,7 @@ static size_t measure_any(const vg_deformer *d, size_t f, vg_kind kind, const do
 
 static void apply_face(const vg_deformer *d, size_t f, const double *quaternions, double *vectors)
 {
-    uint32_t begin = d->g->start[f];
+    uint32_t begin = d->g->faces.start[f];
     for (size_t i = 0; i < face_size(d->g, f); i++)
         vg_quat_apply(quaternions + 4 * i, d->target + 3 * (size_t)(begin + i), vectors + 3 * (size_t)(begin + i));
 }
@@ -223,14 +223,14 @@ static void count_degenerate(vg_deformer *d, size_t f, size_t bad)
 static void measure_reference(vg_deformer *d)
 {
     const vg_graph *g = d->g;
-    for (size_t f = 0; f < g->nf; f++) {
+    for (size_t f = 0; f < g->faces.nf; f++) {
         size_t r = face_size(g, f);
-        const double *w = d->vector + 3 * (size_t)g->start[f];
+        const double *w = d->vector + 3 * (size_t)g->faces.start[f];
         double n[3];
         bool good = r == 2 || vgi_unit_normal(w, r, n);
         d->slow[f] = r == 2 || !good;
         for (size_t i = 0; i < r; i++) {
-            size_t c = g->start[f] + i;
+            size_t c = g->faces.start[f] + i;
             double *length = &d->length[c];
             *length = vgi_length(d->vector + 3 * c);
             bool usable = good && *length * *length > d->shortest2;
@@ -255,14 +255,14 @@ static int make_deformer(vg_deformer **out, const vg_graph *g, double diagonal, 
     size_t corners = vg_graph_corners(g);
     vg_deformer *d = *out = vgi_array(1, sizeof *d, e);
     if (!d) return VG_ENOMEM;
-    d->g = g, d->threads = threads, d->faces = g->nf - g->nlinks;
+    d->g = g, d->threads = threads, d->faces = g->faces.nf - g->nlinks;
     atomic_init(&d->first_face, UINT64_MAX);
     double least = shortest * diagonal;
     d->shortest2 = least * least;
     d->vector = vgi_array_raw(3 * corners, sizeof *d->vector, e);
     d->length = vgi_array_raw(corners, sizeof *d->length, e);
     d->frame = vgi_array(4 * corners, sizeof *d->frame, e);
-    d->slow = vgi_array(g->nf, sizeof *d->slow, e);
+    d->slow = vgi_array(g->faces.nf, sizeof *d->slow, e);
     bool ok = d->vector && d->length && d->frame && d->slow && make_workspace(d, e) == VG_OK;
     if (ok && g->nlinks) {
         ok = vgi_incidence_make(&d->around, &g->faces, e) == VG_OK;
@@ -273,7 +273,7 @@ static int make_deformer(vg_deformer **out, const vg_graph *g, double diagonal, 
 
 int vg_deformer_new(vg_deformer **d, const vg_graph *g, const double *reference, int threads, vg_err *e)
 {
-    if (make_deformer(d, g, vg_diagonal(reference, g->nv), threads, e) < 0) return VG_ENOMEM;
+    if (make_deformer(d, g, vg_diagonal(reference, g->faces.nv), threads, e) < 0) return VG_ENOMEM;
     vg_graph_vectors(g, reference, (*d)->vector);
     measure_reference(*d);
     return VG_OK;
@@ -321,7 +321,7 @@ static void make_coordinates(vg_deformer *d)
 static void make_gradient(vg_deformer *d, size_t f)
 {
     const vg_graph *g = d->g;
-    size_t begin = g->start[f], r = face_size(g, f);
+    size_t begin = g->faces.start[f], r = face_size(g, f);
     double P[6], size, source2 = 0, target2 = 0;
     vgi_gradient_face *face = &d->gradient_face[f];
     if (!vgi_gradient_moments(d->vector + 3 * begin, r, P, face->q, &size)) {
@@ -342,7 +342,7 @@ static void make_gradient(vg_deformer *d, size_t f)
 static int make_gradients(vg_deformer *d, vg_err *e)
 {
     if (!d->gradient) d->gradient = vgi_array(vg_graph_corners(d->g), sizeof *d->gradient, e);
-    if (!d->gradient_face) d->gradient_face = vgi_array(d->g->nf, sizeof *d->gradient_face, e);
+    if (!d->gradient_face) d->gradient_face = vgi_array(d->g->faces.nf, sizeof *d->gradient_face, e);
     if (!d->gradient || !d->gradient_face) return VG_ENOMEM;
     for (size_t f = 0; f < d->faces; f++)
         if (!d->slow[f]) make_gradient(d, f);
@@ -383,7 +383,7 @@ struct deform_job {
 static void run_worker(void *context, size_t worker)
 {
     deform_job *j = context;
-    size_t nf = j->d->g->nf;
+    size_t nf = j->d->g->faces.nf;
     double *work = j->d->work + worker * j->d->work_size;
     for (size_t first; (first = atomic_fetch_add(&j->next, CHUNK)) < nf;)
         j->step(j, work, first, first + CHUNK < nf ? first + CHUNK : nf);
@@ -401,7 +401,7 @@ static void measure_step(deform_job *j, double *work, size_t first, size_t last)
     for (size_t f = first; f < last; f++)
         for (size_t p = 0; p < j->n; p++)
             count_degenerate(d, f,
-                             measure_any(d, f, j->kind, j->in[p], work, j->out[p] + 4 * (size_t)d->g->start[f]));
+                             measure_any(d, f, j->kind, j->in[p], work, j->out[p] + 4 * (size_t)d->g->faces.start[f]));
 }
 
 void vg_deformer_measure(vg_deformer *d, size_t n, vg_kind kind, const double *const *poses,
@@ -416,7 +416,7 @@ static void apply_step(deform_job *j, double *work, size_t first, size_t last)
     (void)work;
     const vg_graph *g = j->d->g;
     for (size_t f = first; f < last; f++)
-        for (size_t p = 0; p < j->n; p++) apply_face(j->d, f, j->in[p] + 4 * (size_t)g->start[f], j->out[p]);
+        for (size_t p = 0; p < j->n; p++) apply_face(j->d, f, j->in[p] + 4 * (size_t)g->faces.start[f], j->out[p]);
 }
 
 void vg_deformer_apply(vg_deformer *d, size_t n, const double *const *quaternions, double *const *vectors)
@@ -456,8 +456,8 @@ static void transfer_step(deform_job *j, double *work, size_t first, size_t last
         const double *poses[VGI_LANES];
         for (size_t k = 0; k < VGI_LANES; k++) poses[k] = j->in[p + (k < n ? k : n - 1)];
         redo again = {j, work, p};
-        const vgi_transfer t = {.start = d->g->start,
-                                .vert = d->g->vert,
+        const vgi_transfer t = {.start = d->g->faces.start,
+                                .vert = d->g->faces.vert,
                                 .poses = poses,
                                 .vertices = j->kind == VG_VERTICES,
                                 .method = d->method,

@@ -17,14 +17,14 @@ static int compare_places(const void *a, const void *b)
 
 static size_t face_size(const vg_graph *g, size_t f)
 {
-    return g->start[f + 1] - g->start[f];
+    return g->faces.start[f + 1] - g->faces.start[f];
 }
 
 static uint32_t least_row(const vg_graph *g, const uint32_t *row, size_t f)
 {
     uint32_t least = UINT32_MAX;
-    for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++)
-        if (row[g->vert[c]] < least) least = row[g->vert[c]];
+    for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++)
+        if (row[g->faces.vert[c]] < least) least = row[g->faces.vert[c]];
     return least;
 }
 
@@ -32,7 +32,7 @@ static uint32_t least_row(const vg_graph *g, const uint32_t *row, size_t f)
 static void number_held(vgi_face_rows *r, const vgi_solver_view *s, uint32_t *rows)
 {
     size_t n = 0;
-    for (size_t v = 0; v < s->g->nv; v++) {
+    for (size_t v = 0; v < s->g->faces.nv; v++) {
         if (!s->g->in_face[v] || rows[v] < s->rows) continue;
         rows[v] = (uint32_t)(s->rows + n);
         r->held[n++] = (uint32_t)v;
@@ -42,7 +42,7 @@ static void number_held(vgi_face_rows *r, const vgi_solver_view *s, uint32_t *ro
 static void list_faces(vgi_face_rows *r, const vg_graph *g, size_t least, const uint32_t *rows, place *places)
 {
     size_t n = 0;
-    for (size_t f = 0; f < g->nf; f++) {
+    for (size_t f = 0; f < g->faces.nf; f++) {
         if (face_size(g, f) < least) continue;
         r->face[n] = (uint32_t)f;
         places[n] = (place){least_row(g, rows, f), (uint32_t)n};
@@ -53,7 +53,7 @@ static void list_faces(vgi_face_rows *r, const vg_graph *g, size_t least, const 
         size_t f = r->face[places[i].face];
         r->order[places[i].face] = (uint32_t)i;
         r->start[i + 1] = r->start[i];
-        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) r->row[r->start[i + 1]++] = rows[g->vert[c]];
+        for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++) r->row[r->start[i + 1]++] = rows[g->faces.vert[c]];
     }
 }
 
@@ -62,10 +62,10 @@ int vgi_face_rows_make(vgi_face_rows *r, const vgi_solver_view *s, size_t least,
     const vg_graph *g = s->g;
     size_t corners = 0;
     *r = (vgi_face_rows){0};
-    for (size_t f = 0; f < g->nf; f++)
+    for (size_t f = 0; f < g->faces.nf; f++)
         if (face_size(g, f) >= least) r->nf++, corners += face_size(g, f);
-    for (size_t v = 0; v < g->nv; v++) r->nheld += g->in_face[v] && s->row[v] >= s->rows;
-    uint32_t *rows = vgi_copy_array(s->row, g->nv, sizeof *rows, e);
+    for (size_t v = 0; v < g->faces.nv; v++) r->nheld += g->in_face[v] && s->row[v] >= s->rows;
+    uint32_t *rows = vgi_copy_array(s->row, g->faces.nv, sizeof *rows, e);
     place *places = vgi_array_raw(r->nf, sizeof *places, e);
     r->held = vgi_array_raw(r->nheld, sizeof *r->held, e);
     r->face = vgi_array_raw(r->nf, sizeof *r->face, e);
@@ -96,6 +96,6 @@ void vgi_keep_root(const vg_graph *g, double *x, const double root[3])
 {
     double now[3];
     vg_graph_root(g, x, now);
-    for (size_t v = 0; v < g->nv; v++)
+    for (size_t v = 0; v < g->faces.nv; v++)
         for (size_t k = 0; g->in_face[v] && k < 3; k++) x[3 * v + k] += root[k] - now[k];
 }

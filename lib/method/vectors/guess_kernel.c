@@ -84,13 +84,13 @@ VGI_INLINE void move_to_anchors(const vgi_guesser *s, const double *anchors, dou
     for (size_t i = 0; i < s->nanchors; i++)
         shift = add(shift, less(less(load(anchors + 3 * i), load(anchors)), load(x + 3 * (size_t)s->anchors[i])));
     shift = times(1.0 / (double)s->nanchors, shift);
-    for (size_t v = 0; v < s->g->nv; v++) store(x + 3 * v, add(load(x + 3 * v), shift));
+    for (size_t v = 0; v < s->g->faces.nv; v++) store(x + 3 * v, add(load(x + 3 * v), shift));
 }
 
 VGI_INLINE void walk(const vgi_guesser *s, const double *w, const double *anchors, double *x)
 {
-    const uint32_t *vert = s->g->vert;
-    bool from_one = s->pinned < s->g->nv;
+    const uint32_t *vert = s->g->faces.vert;
+    bool from_one = s->pinned < s->g->faces.nv;
     if (from_one) memset(x + 3 * (size_t)s->pinned, 0, 3 * sizeof *x);
     else put_anchors(s, anchors, x);
     for (size_t i = 0; i < s->nsteps; i++) {
@@ -111,9 +111,9 @@ VGI_INLINE void add_to(vgi_point *sum, uint32_t v, point a)
 VGI_INLINE void pull_by_metric(const vgi_guesser *s, size_t f, size_t size, vgi_point *e, point mean, vgi_point *sum)
 {
     const vgi_face_metric *m = &s->metric->face[f];
-    size_t begin = s->g->start[f];
+    size_t begin = s->g->faces.start[f];
     const double *plane = s->metric->plane + 3 * begin;
-    const uint32_t *vert = s->g->vert + begin;
+    const uint32_t *vert = s->g->faces.vert + begin;
     point y[3] = {0}, z[3];
     for (size_t i = 0; i < size; i++)
 #pragma GCC unroll 3
@@ -135,8 +135,8 @@ VGI_INLINE void pull_by_metric(const vgi_guesser *s, size_t f, size_t size, vgi_
 VGI_INLINE void add_pull(const vgi_guesser *s, size_t f, size_t size, const double *w, const double *x, vgi_point *e,
                          vgi_point *sum)
 {
-    size_t begin = s->g->start[f];
-    const uint32_t *vert = s->g->vert + begin;
+    size_t begin = s->g->faces.start[f];
+    const uint32_t *vert = s->g->faces.vert + begin;
     const double *wf = w + 3 * begin;
     point w0 = load(wf), x0 = load(x + 3 * (size_t)vert[0]), mean = {0};
     store_sum(e[0], mean);
@@ -154,14 +154,14 @@ VGI_INLINE void fold(const vgi_guesser *s, const double *w, const double *x, vgi
 {
     const vg_graph *g = s->g;
     vgi_point e[4];
-    memset(sum, 0, g->nv * sizeof *sum);
-    for (size_t f = 0; f < g->nf; f++) {
-        size_t size = g->start[f + 1] - g->start[f];
+    memset(sum, 0, g->faces.nv * sizeof *sum);
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        size_t size = g->faces.start[f + 1] - g->faces.start[f];
         if (size == 3) add_pull(s, f, 3, w, x, e, sum);
         else if (size == 4) add_pull(s, f, 4, w, x, e, sum);
-        else add_pull(s, f, size, w, x, sum + g->nv, sum);
+        else add_pull(s, f, size, w, x, sum + g->faces.nv, sum);
     }
-    for (size_t v = 0; v < g->nv; v++) store(rhs + 3 * v, load_sum(sum[v]));
+    for (size_t v = 0; v < g->faces.nv; v++) store(rhs + 3 * v, load_sum(sum[v]));
 }
 
 static void guess(const vgi_guesser *s, const double *w, const double *anchors, double *x, double *rhs,

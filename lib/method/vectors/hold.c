@@ -22,14 +22,14 @@ static void add_to_border(const vg_solver *s, size_t f, size_t p, size_t star, v
 {
     const vg_graph *g = s->g;
     const int *order = vgi_cholesky_order(s->cholesky);
-    const uint32_t *vert = g->vert + g->start[f];
+    const uint32_t *vert = g->faces.vert + g->faces.start[f];
     if (vgi_solver_is_star(s, f)) {
         double weight = vgi_metric_weight(&s->metric, f);
         border->row[border->n] = (uint32_t)star, border->value[border->n++] = -weight;
         border->diagonal += weight;
         return;
     }
-    for (size_t q = 0; q < g->start[f + 1] - g->start[f]; q++) {
+    for (size_t q = 0; q < g->faces.start[f + 1] - g->faces.start[f]; q++) {
         double entry = vgi_metric_entry(&s->metric, g, f, p, q);
         if (vert[q] == vert[p]) border->diagonal += entry;
         else border->row[border->n] = (uint32_t)order[s->row[vert[q]]], border->value[border->n++] = entry;
@@ -41,15 +41,15 @@ static int make_border(const vg_solver *s, vgi_border *border, vg_err *e)
 {
     const vg_graph *g = s->g;
     size_t most = 0, star = s->vertices_unknown;
-    for (size_t f = 0; f < g->nf; f++)
-        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++)
-            if (g->vert[c] == s->pinned) most += g->start[f + 1] - g->start[f];
+    for (size_t f = 0; f < g->faces.nf; f++)
+        for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++)
+            if (g->faces.vert[c] == s->pinned) most += g->faces.start[f + 1] - g->faces.start[f];
     border->row = vgi_array_raw(most, sizeof *border->row, e);
     border->value = vgi_array_raw(most, sizeof *border->value, e);
     if (!border->row || !border->value) return VG_ENOMEM;
-    for (size_t f = 0; f < g->nf; f++) {
-        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++)
-            if (g->vert[c] == s->pinned) add_to_border(s, f, c - g->start[f], star, border);
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++)
+            if (g->faces.vert[c] == s->pinned) add_to_border(s, f, c - g->faces.start[f], star, border);
         star += vgi_solver_is_star(s, f);
     }
     return VG_OK;
@@ -65,7 +65,7 @@ int vgi_solver_share(vg_solver *s, vg_err *e)
         vgi_border border = {0};
         x->points = vgi_solver_for_threads(s, vgi_solver_all_rows(s), sizeof *x->points, e);
         r = x->points ? make_border(s, &border, e) : VG_ENOMEM;
-        if (r == VG_OK) r = vgi_fronts_new(&x->fronts, &s->matrix, s->cholesky, s->pinned < s->g->nv ? &border : NULL, e);
+        if (r == VG_OK) r = vgi_fronts_new(&x->fronts, &s->matrix, s->cholesky, s->pinned < s->g->faces.nv ? &border : NULL, e);
         free(border.row);
         free(border.value);
     }
@@ -87,7 +87,7 @@ void vgi_sharing_free(vgi_sharing **x)
 /* The vertices held by the base solver must be among the anchors. */
 static int check_anchors(const vg_solver *s, vg_err *e)
 {
-    bool *here = vgi_array(s->g->nv, sizeof *here, e);
+    bool *here = vgi_array(s->g->faces.nv, sizeof *here, e);
     if (!here) return VG_ENOMEM;
     for (size_t i = 0; i < s->nanchors; i++) here[s->anchors[i]] = true;
     int r = VG_OK;
@@ -107,7 +107,7 @@ static int mark_held(const vg_solver *s, bool *held, vg_err *e)
         if (!s->g->in_face[v]) return vg_fail(e, VG_EINPUT, "anchor %u is in no face", v);
         if (row < all) held[row] = true;
     }
-    if (s->pinned < s->g->nv) held[s->like->unknowns] = true;
+    if (s->pinned < s->g->faces.nv) held[s->like->unknowns] = true;
     return check_anchors(s, e);
 }
 
@@ -115,8 +115,8 @@ static int number_rows(vg_solver *s, vg_err *e)
 {
     const vg_solver *like = s->like;
     size_t all = vgi_solver_all_rows(like);
-    if (!(s->row = vgi_array_raw(s->g->nv, sizeof *s->row, e))) return VG_ENOMEM;
-    for (size_t v = 0; v < s->g->nv; v++) {
+    if (!(s->row = vgi_array_raw(s->g->faces.nv, sizeof *s->row, e))) return VG_ENOMEM;
+    for (size_t v = 0; v < s->g->faces.nv; v++) {
         uint32_t row = row_of_vertex(like, v);
         s->row[v] = row < all && like->sharing->fronts ? s->held.row[row] : NO_ROW;
     }
@@ -144,7 +144,7 @@ static int make_like(vg_solver **out, const vg_solver *like, const uint32_t *anc
     if (!s) return VG_ENOMEM;
     s->like = like, s->g = like->g, s->walk = like->walk, s->nsteps = like->nsteps, s->threads = like->threads, s->metric = like->metric, s->spare = like->spare;
     s->nisolated = like->nisolated, s->isolated = like->isolated, s->isolated_at = like->isolated_at;
-    s->pinned = n ? (uint32_t)s->g->nv : like->pinned;
+    s->pinned = n ? (uint32_t)s->g->faces.nv : like->pinned;
     s->nanchors = n;
     s->anchors = vgi_copy_array(anchors, n, sizeof *anchors, e);
     int r = s->anchors ? hold(s, e) : VG_ENOMEM;
@@ -225,10 +225,10 @@ typedef struct solve_job {
 static void solve_pose(const vg_solver *s, const double *rhs, double *x, vgi_point *points)
 {
     memset(points, 0, s->unknowns * sizeof *points);
-    for (size_t v = 0; v < s->g->nv; v++)
+    for (size_t v = 0; v < s->g->faces.nv; v++)
         if (s->row[v] != NO_ROW) memcpy(points[s->row[v]], rhs + 3 * v, 3 * sizeof *rhs);
     vgi_factor_solve_one(&s->factor, *points);
-    for (size_t v = 0; v < s->g->nv; v++)
+    for (size_t v = 0; v < s->g->faces.nv; v++)
         for (size_t k = 0; s->row[v] != NO_ROW && k < 3; k++) x[3 * v + k] += points[s->row[v]][k];
 }
 

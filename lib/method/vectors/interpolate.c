@@ -85,7 +85,7 @@ static double length_of(const vg_path *p, size_t s)
  * applied. */
 static void add_moment(const vg_path *p, const double *from, size_t f, double b[9], double *size)
 {
-    for (size_t c = p->g->start[f]; c < p->g->start[f + 1]; c++) {
+    for (size_t c = p->g->faces.start[f]; c < p->g->faces.start[f + 1]; c++) {
         const double *was = from + 3 * c, *is = p->to + 3 * c;
         for (int i = 0; i < 9; i++) b[i] += is[i / 3] * was[i % 3];
         *size += sqrt(vgi_dot(was, was) * vgi_dot(is, is));
@@ -96,12 +96,12 @@ static void turn_line(vg_path *p, const double *from, size_t f, const double bod
 {
     static const double little = 0.01;
     const vg_graph *g = p->g;
-    double b[9] = {0}, size = 0, base[4], turned[3], more[4], *q = p->q + 4 * (size_t)g->start[f];
-    const double *was = from + 3 * (size_t)g->start[f], *is = p->to + 3 * (size_t)g->start[f];
-    for (size_t end = g->start[f]; end < g->start[f + 1]; end++) {
-        uint32_t v = g->vert[end];
+    double b[9] = {0}, size = 0, base[4], turned[3], more[4], *q = p->q + 4 * (size_t)g->faces.start[f];
+    const double *was = from + 3 * (size_t)g->faces.start[f], *is = p->to + 3 * (size_t)g->faces.start[f];
+    for (size_t end = g->faces.start[f]; end < g->faces.start[f + 1]; end++) {
+        uint32_t v = g->faces.vert[end];
         for (uint32_t i = p->around.first[v]; i < p->around.first[v + 1]; i++)
-            if (p->around.face[i] < g->nf - g->nlinks) add_moment(p, from, p->around.face[i], b, &size);
+            if (p->around.face[i] < g->faces.nf - g->nlinks) add_moment(p, from, p->around.face[i], b, &size);
     }
     for (int i = 0; i < 9; i++) b[i] = (size > 0 ? b[i] / size : 0) + little * body[i];
     vgi_best_turn(b, base);
@@ -118,10 +118,10 @@ static void turn_lines(vg_path *p, const double *from)
 {
     double body[9] = {0}, size = 0;
     if (!p->around.first) return;
-    for (size_t f = 0; f < p->g->nf - p->g->nlinks; f++) add_moment(p, from, f, body, &size);
+    for (size_t f = 0; f < p->g->faces.nf - p->g->nlinks; f++) add_moment(p, from, f, body, &size);
     for (int i = 0; i < 9; i++) body[i] = size > 0 ? body[i] / size : i % 4 == 0;
-    for (size_t f = 0; f < p->g->nf; f++)
-        if (p->g->start[f + 1] - p->g->start[f] == 2) turn_line(p, from, f, body);
+    for (size_t f = 0; f < p->g->faces.nf; f++)
+        if (p->g->faces.start[f + 1] - p->g->faces.start[f] == 2) turn_line(p, from, f, body);
 }
 
 /* ---- a segment ---- */
@@ -214,11 +214,11 @@ static int fill(vg_path *p, segment *s, size_t number, vg_err *e)
         memcpy(s->root[k], key[k].root, sizeof s->root[k]);
         load_anchors(p, key + k, k ? p->to : s->from, s->middle[k]);
     }
-    double *face = vgi_array_raw(g->nf, 3 * sizeof *face, e);
+    double *face = vgi_array_raw(g->faces.nf, 3 * sizeof *face, e);
     int r = face ? measure(p, s, e) : VG_ENOMEM;
     if (r == VG_OK) r = vgi_choose_turns(g, p->q, face, &beyond, e);
-    for (size_t f = 0; r == VG_OK && f < g->nf; f++)
-        for (size_t c = g->start[f]; c < g->start[f + 1]; c++)
+    for (size_t f = 0; r == VG_OK && f < g->faces.nf; f++)
+        for (size_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++)
             split(p->q + 4 * c, face + 3 * f, beyond, s->turn + 3 * c, s->rest + 3 * c, s->scale + c);
     free(face);
     if (r < 0) return r;
@@ -423,8 +423,8 @@ int vg_path_at(vg_path *p, double t, double *vectors, double root[3], double *an
 
 static bool has_lines(const vg_graph *g)
 {
-    for (size_t f = 0; f < g->nf; f++)
-        if (g->start[f + 1] - g->start[f] == 2) return true;
+    for (size_t f = 0; f < g->faces.nf; f++)
+        if (g->faces.start[f + 1] - g->faces.start[f] == 2) return true;
     return false;
 }
 
@@ -466,7 +466,7 @@ int vg_path_new(vg_path **out, const vg_graph *g, const double *reference, const
         if (!(keys[i + 1].place > keys[i].place)) return vg_fail(e, VG_EARG, "the places of a path's keys must grow");
     vg_path *p = *out = vgi_array(1, sizeof *p, e);
     if (!p) return VG_ENOMEM;
-    double D = vg_diagonal(reference, g->nv);
+    double D = vg_diagonal(reference, g->faces.nv);
     p->g = g, p->o = *o, p->keys = keys, p->nkeys = nkeys;
     p->diagonal = D;
     p->corners = vg_graph_corners(g), p->elements = p->corners + o->nanchors;

@@ -247,15 +247,15 @@ out:
 
 int vg_head_prepare_vectors(vg_head *h, vg_err *e)
 {
-    if (h->has_links) return VG_OK;
+    if (h->links.chosen) return VG_OK;
     uint32_t *links;
     size_t n;
     int r = vg_link_components(&h->body.mesh, h->body.reference, &links, &n, e);
     if (r < 0) return r;
-    free(h->links);
-    h->links = links;
-    h->nlinks = n;
-    h->has_links = true;
+    free(h->links.pairs);
+    h->links.pairs = links;
+    h->links.n = n;
+    h->links.chosen = true;
     if (n && h->map.ncorners) vg_map_clear(&h->map); /* corners are numbered without links */
     return VG_OK;
 }

@@ -53,7 +53,7 @@ int vgi_metric_make(vgi_metric *m, const vg_graph *g, const double *reference, v
 {
     size_t corners = vg_graph_corners(g);
     double *w = vgi_array_raw(3 * corners, sizeof *w, e);
-    m->face = vgi_array(g->nf, sizeof *m->face, e);
+    m->face = vgi_array(g->faces.nf, sizeof *m->face, e);
     m->plane = vgi_array(3 * corners, sizeof *m->plane, e);
     if (!w || !m->face || !m->plane) {
         free(w);
@@ -65,9 +65,9 @@ int vgi_metric_make(vgi_metric *m, const vg_graph *g, const double *reference, v
     double sum = 0;
     for (size_t i = 0; i < 3 * corners; i++) sum += fabs(w[i]);
     for (size_t i = 0; i < 3 * corners && sum > 0; i++) w[i] *= (double)corners / sum;
-    for (size_t f = 0; f < g->nf; f++) {
-        size_t begin = 3 * (size_t)g->start[f];
-        make_face(&m->face[f], m->plane + begin, w + begin, g->start[f + 1] - g->start[f]);
+    for (size_t f = 0; f < g->faces.nf; f++) {
+        size_t begin = 3 * (size_t)g->faces.start[f];
+        make_face(&m->face[f], m->plane + begin, w + begin, g->faces.start[f + 1] - g->faces.start[f]);
     }
     free(w);
     return VG_OK;
@@ -87,7 +87,7 @@ double vgi_metric_weight(const vgi_metric *m, size_t f)
 
 double vgi_metric_entry(const vgi_metric *m, const vg_graph *g, size_t f, size_t p, size_t q)
 {
-    size_t begin = g->start[f], r = g->start[f + 1] - begin;
+    size_t begin = g->faces.start[f], r = g->faces.start[f + 1] - begin;
     double weight = vgi_metric_weight(m, f), x = (p == q ? weight : 0) - weight / (double)r;
     if (!m->face) return x;
     const double *s = m->face[f].s, *a = m->plane + 3 * (begin + p), *b = m->plane + 3 * (begin + q);

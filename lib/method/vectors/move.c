@@ -16,7 +16,7 @@ struct vg_mover {
 int vg_mover_new(vg_mover **out, const vg_graph *from, const double *source, const vg_graph *to, const double *target,
                  const uint32_t *anchors, size_t nanchors, bool stay, vg_err *e)
 {
-    double before = vg_diagonal(source, from->nv), after = vg_diagonal(target, to->nv);
+    double before = vg_diagonal(source, from->faces.nv), after = vg_diagonal(target, to->faces.nv);
     vg_mover *m = *out = vgi_array(1, sizeof *m, e);
     if (!m) return VG_ENOMEM;
     m->to = to, m->nanchors = nanchors;
@@ -61,6 +61,6 @@ void vg_mover_place(const vg_mover *m, const double root[3], double *vertices)
 {
     double now[3];
     vg_graph_root(m->to, vertices, now);
-    for (size_t v = 0; v < m->to->nv; v++)
+    for (size_t v = 0; v < m->to->faces.nv; v++)
         for (size_t k = 0; k < 3 && m->to->in_face[v]; k++) vertices[3 * v + k] += root[k] - now[k];
 }

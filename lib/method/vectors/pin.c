@@ -26,11 +26,11 @@ int vg_pinner_new(vg_pinner **out, const vg_graph *from, const double *source, c
     vg_pinner *p = *out = vgi_array(1, sizeof *p, e);
     if (!p) return VG_ENOMEM;
     p->from = from, p->to = to, p->pairs = pairs, p->reference = source, p->always = always;
-    p->least = still * vg_diagonal(source, from->nv);
-    p->moves = vgi_array(from->nv, sizeof *p->moves, e);
-    p->face_moves = vgi_array(from->nf, sizeof *p->face_moves, e);
-    p->free = vgi_array(to->nv, sizeof *p->free, e);
-    p->list = vgi_array(to->nv, sizeof *p->list, e);
+    p->least = still * vg_diagonal(source, from->faces.nv);
+    p->moves = vgi_array(from->faces.nv, sizeof *p->moves, e);
+    p->face_moves = vgi_array(from->faces.nf, sizeof *p->face_moves, e);
+    p->free = vgi_array(to->faces.nv, sizeof *p->free, e);
+    p->list = vgi_array(to->faces.nv, sizeof *p->list, e);
     if (p->moves && p->face_moves && p->free && p->list) return VG_OK;
     vg_pinner_free(out);
     return VG_ENOMEM;
@@ -51,7 +51,7 @@ void vg_pinner_free(vg_pinner **p)
 static size_t mark_moving(vg_pinner *p, const double *pose)
 {
     size_t n = 0;
-    for (size_t v = 0; v < p->from->nv; v++) {
+    for (size_t v = 0; v < p->from->faces.nv; v++) {
         p->moves[v] = false;
         for (size_t k = 3 * v; k < 3 * v + 3; k++) p->moves[v] |= !(fabs(pose[k] - p->reference[k]) <= p->least);
         n += !p->moves[v];
@@ -62,9 +62,9 @@ static size_t mark_moving(vg_pinner *p, const double *pose)
 static void mark_moving_faces(vg_pinner *p)
 {
     const vg_graph *g = p->from;
-    for (size_t f = 0; f < g->nf; f++) {
+    for (size_t f = 0; f < g->faces.nf; f++) {
         p->face_moves[f] = false;
-        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) p->face_moves[f] |= p->moves[g->vert[c]];
+        for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++) p->face_moves[f] |= p->moves[g->faces.vert[c]];
     }
 }
 
@@ -82,14 +82,14 @@ size_t vg_pinner_find(vg_pinner *p, const double *pose, const uint32_t **vertice
     const vg_graph *g = p->to;
     size_t n = 0, staying = mark_moving(p, pose);
     *vertices = p->list;
-    if (!staying || (!p->always && staying < p->from->nv / MUCH)) return 0;
+    if (!staying || (!p->always && staying < p->from->faces.nv / MUCH)) return 0;
     mark_moving_faces(p);
-    memset(p->free, 0, g->nv * sizeof *p->free);
-    for (size_t f = 0; f < g->nf - g->nlinks; f++) {
+    memset(p->free, 0, g->faces.nv * sizeof *p->free);
+    for (size_t f = 0; f < g->faces.nf - g->nlinks; f++) {
         if (!driven_by_moving(p, f)) continue;
-        for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) p->free[g->vert[c]] = true;
+        for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++) p->free[g->faces.vert[c]] = true;
     }
-    for (size_t v = 0; v < g->nv; v++)
+    for (size_t v = 0; v < g->faces.nv; v++)
         if (g->in_face[v] && !p->free[v]) p->list[n++] = (uint32_t)v;
     return n;
 }

@@ -127,7 +127,7 @@ void vg_planar_load(const vg_planar *p, const double *vectors, double *normals)
     const vg_graph *g = p->solver.g;
     for (size_t i = 0; i < p->faces.nf; i++) {
         size_t f = p->faces.face[i];
-        face_normal(vectors + 3 * (size_t)g->start[f], g->start[f + 1] - g->start[f], normals + 3 * i);
+        face_normal(vectors + 3 * (size_t)g->faces.start[f], g->faces.start[f + 1] - g->faces.start[f], normals + 3 * i);
     }
 }
 
@@ -151,7 +151,7 @@ static void load_residual(const vg_planar *p, const room *m, const vgi_planar_fa
     vgi_lanes none, most, factor;
     memset(m->y, 0, (n + p->faces.nheld) * sizeof *m->y);
     memset(m->p, 0, (n + p->faces.nheld) * sizeof *m->p); /* rows of centroids stay 0 */
-    vgi_load_rows(m->p, p->solver.row, p->solver.g->nv, n, pose);
+    vgi_load_rows(m->p, p->solver.row, p->solver.g->faces.nv, n, pose);
     for (size_t i = 0; i < p->faces.nheld; i++)
         for (size_t c = 0; c < 3; c++)
             for (int k = 0; k < VGI_LANES; k++) m->p[n + i].xyz[c][k] = pose[k][3 * (size_t)p->faces.held[i] + c];
@@ -231,7 +231,7 @@ static void plane_block(void *context, size_t i)
     load_residual(p, m, &f, pose, unit);
     size_t steps = descend(p, m, &f, left);
     vgi_planar_kernel_now()->scale(p->solver.rows, unit, m->x, m->x);
-    vgi_add_rows(m->x, p->solver.row, p->solver.g->nv, p->solver.rows, j->x + first, lanes);
+    vgi_add_rows(m->x, p->solver.row, p->solver.g->faces.nv, p->solver.rows, j->x + first, lanes);
     for (size_t k = 0; k < lanes; k++) {
         /* the difference is 0 at the held vertex, but without anchors the mean must stay */
         if (!p->solver.anchored) vgi_keep_root(p->solver.g, j->x[first + k], root[k]);

@@ -35,7 +35,7 @@ double vgi_solver_seconds(void)
 
 static size_t face_size(const vg_graph *g, size_t f)
 {
-    return g->start[f + 1] - g->start[f];
+    return g->faces.start[f + 1] - g->faces.start[f];
 }
 
 bool vgi_solver_is_star(const vg_solver *s, size_t f)
@@ -47,33 +47,33 @@ bool vgi_solver_is_star(const vg_solver *s, size_t f)
 static int number_unknowns(vg_solver *s, const uint32_t *anchors, size_t n, const double *reference, vg_err *e)
 {
     const vg_graph *g = s->g;
-    s->row = vgi_array_raw(g->nv, sizeof *s->row, e);
+    s->row = vgi_array_raw(g->faces.nv, sizeof *s->row, e);
     s->anchors = vgi_copy_array(anchors, n, sizeof *anchors, e);
-    s->isolated = vgi_array_raw(g->nv - g->attached, sizeof *s->isolated, e);
-    s->isolated_at = vgi_array_raw(3 * (g->nv - g->attached), sizeof *s->isolated_at, e);
+    s->isolated = vgi_array_raw(g->faces.nv - g->attached, sizeof *s->isolated, e);
+    s->isolated_at = vgi_array_raw(3 * (g->faces.nv - g->attached), sizeof *s->isolated_at, e);
     if (!s->row || !s->anchors || !s->isolated || !s->isolated_at) return VG_ENOMEM;
     s->nanchors = n;
-    for (size_t v = 0; v < g->nv; v++) s->row[v] = 0;
+    for (size_t v = 0; v < g->faces.nv; v++) s->row[v] = 0;
     for (size_t i = 0; i < n; i++) {
         if (!g->in_face[anchors[i]]) return vg_fail(e, VG_EINPUT, "anchor %u is in no face", anchors[i]);
         s->row[anchors[i]] = NO_ROW;
     }
-    size_t pinned = g->nv;
-    for (size_t v = 0; v < g->nv; v++) {
+    size_t pinned = g->faces.nv;
+    for (size_t v = 0; v < g->faces.nv; v++) {
         if (!g->in_face[v]) {
             s->row[v] = NO_ROW;
             for (int k = 0; k < 3; k++) s->isolated_at[3 * s->nisolated + (size_t)k] = reference[3 * v + (size_t)k];
             s->isolated[s->nisolated++] = (uint32_t)v;
-        } else if (n == 0 && pinned == g->nv) {
+        } else if (n == 0 && pinned == g->faces.nv) {
             pinned = v;
         } else if (s->row[v] != NO_ROW) {
             s->row[v] = (uint32_t)s->unknowns++;
         }
     }
     s->vertices_unknown = s->unknowns;
-    for (size_t f = 0; f < g->nf; f++) s->unknowns += vgi_solver_is_star(s, f);
+    for (size_t f = 0; f < g->faces.nf; f++) s->unknowns += vgi_solver_is_star(s, f);
     if (s->unknowns > INT32_MAX / 2) return vg_fail(e, VG_EINPUT, "a mesh of %zu unknowns is too large", s->unknowns);
-    if (pinned < g->nv) s->row[pinned] = NO_ROW;
+    if (pinned < g->faces.nv) s->row[pinned] = NO_ROW;
     s->pinned = (uint32_t)pinned;
     return VG_OK;
 }
@@ -82,24 +82,24 @@ static int number_unknowns(vg_solver *s, const uint32_t *anchors, size_t n, cons
 static int walk_from_held(vg_solver *s, const vgi_incidence *around, vg_err *e)
 {
     const vg_graph *g = s->g;
-    bool *reached = vgi_array(g->nv, sizeof *reached, e), *used = vgi_array(g->nf, sizeof *used, e);
-    uint32_t *queue = vgi_array_raw(g->nv, sizeof *queue, e);
+    bool *reached = vgi_array(g->faces.nv, sizeof *reached, e), *used = vgi_array(g->faces.nf, sizeof *used, e);
+    uint32_t *queue = vgi_array_raw(g->faces.nv, sizeof *queue, e);
     s->walk = vgi_array_raw(g->attached, sizeof *s->walk, e);
     size_t head = 0, tail = 0;
     int r = reached && used && queue && s->walk ? VG_OK : VG_ENOMEM;
     for (size_t i = 0; r == VG_OK && i < s->nanchors; i++)
         queue[tail++] = s->anchors[i], reached[s->anchors[i]] = true;
-    if (r == VG_OK && s->pinned < g->nv) queue[tail++] = s->pinned, reached[s->pinned] = true;
+    if (r == VG_OK && s->pinned < g->faces.nv) queue[tail++] = s->pinned, reached[s->pinned] = true;
     while (r == VG_OK && head < tail) {
         uint32_t v = queue[head++];
         for (uint32_t i = around->first[v]; i < around->first[v + 1]; i++) {
             uint32_t f = around->face[i];
             if (used[f]) continue;
             used[f] = true;
-            for (uint32_t c = g->start[f]; c < g->start[f + 1]; c++) {
-                if (reached[g->vert[c]]) continue;
-                reached[g->vert[c]] = true;
-                queue[tail++] = g->vert[c];
+            for (uint32_t c = g->faces.start[f]; c < g->faces.start[f + 1]; c++) {
+                if (reached[g->faces.vert[c]]) continue;
+                reached[g->faces.vert[c]] = true;
+                queue[tail++] = g->faces.vert[c];
                 s->walk[s->nsteps++] = (vgi_step){c, around->corner[i]};
             }
         }
@@ -127,7 +127,7 @@ static int plan_walk(vg_solver *s, vg_err *e)
 static size_t count_entries(const vg_solver *s)
 {
     size_t n = 0;
-    for (size_t f = 0; f < s->g->nf; f++) {
+    for (size_t f = 0; f < s->g->faces.nf; f++) {
         size_t r = face_size(s->g, f);
         n += vgi_solver_is_star(s, f) ? 2 * r + 1 : r * (r + 1) / 2;
     }
@@ -136,8 +136,8 @@ static size_t count_entries(const vg_solver *s)
 
 static void assemble_pairs(vgi_triplets *t, const vg_solver *s, size_t f)
 {
-    size_t begin = s->g->start[f], r = face_size(s->g, f);
-    const uint32_t *vert = s->g->vert + begin;
+    size_t begin = s->g->faces.start[f], r = face_size(s->g, f);
+    const uint32_t *vert = s->g->faces.vert + begin;
     for (size_t p = 0; p < r; p++) {
         size_t i = s->row[vert[p]];
         if (i == NO_ROW) continue;
@@ -151,7 +151,7 @@ static void assemble_pairs(vgi_triplets *t, const vg_solver *s, size_t f)
 static void assemble_star(vgi_triplets *t, const vg_solver *s, size_t f, size_t centre)
 {
     size_t r = face_size(s->g, f);
-    const uint32_t *vert = s->g->vert + s->g->start[f];
+    const uint32_t *vert = s->g->faces.vert + s->g->faces.start[f];
     double weight = vgi_metric_weight(&s->metric, f);
     vgi_triplets_put(t, centre, centre, weight * (double)r);
     for (size_t p = 0; p < r; p++) {
@@ -169,7 +169,7 @@ static int assemble(const vg_solver *s, vgi_sparse *N, vg_err *e)
     vgi_triplets t;
     int r = vgi_triplets_make(&t, count_entries(s), e);
     if (r < 0) return r;
-    for (size_t f = 0; f < s->g->nf; f++) {
+    for (size_t f = 0; f < s->g->faces.nf; f++) {
         if (vgi_solver_is_star(s, f)) assemble_star(&t, s, f, centre++);
         else assemble_pairs(&t, s, f);
     }
@@ -202,7 +202,7 @@ static int permute_rows(vg_solver *s, vg_err *e)
     if (!inverse) return VG_ENOMEM;
     const int *perm = vgi_cholesky_order(s->cholesky);
     for (size_t i = 0; i < s->unknowns; i++) inverse[perm[i]] = (uint32_t)i;
-    for (size_t v = 0; v < s->g->nv; v++)
+    for (size_t v = 0; v < s->g->faces.nv; v++)
         if (s->row[v] != NO_ROW) s->row[v] = inverse[s->row[v]];
     free(inverse);
     return VG_OK;
@@ -221,7 +221,7 @@ void *vgi_solver_for_threads(const vg_solver *s, size_t n, size_t size, vg_err *
 
 static int make_spare(vg_solver *s, vg_err *e)
 {
-    s->spare = vgi_solver_for_threads(s, s->g->nv + s->g->max_corners, sizeof *s->spare, e);
+    s->spare = vgi_solver_for_threads(s, s->g->faces.nv + s->g->max_corners, sizeof *s->spare, e);
     return s->spare ? VG_OK : VG_ENOMEM;
 }
 
@@ -234,7 +234,7 @@ static int make_workspace(vg_solver *s, vg_err *e)
 static int make_metric(vg_solver *s, const double *reference, vg_err *e)
 {
     int r = vgi_metric_make(&s->metric, s->g, reference, e);
-    for (size_t f = 0; r == VG_OK && f < s->g->nf; f++)
+    for (size_t f = 0; r == VG_OK && f < s->g->faces.nf; f++)
         if (vgi_solver_is_star(s, f)) memset(s->metric.face[f].s, 0, sizeof s->metric.face[f].s);
     return r;
 }
@@ -317,7 +317,7 @@ typedef struct load_job {
 static void load_share(void *context, size_t task)
 {
     const load_job *j = context;
-    vgi_point *spare = j->s->spare + task * (j->s->g->nv + j->s->g->max_corners);
+    vgi_point *spare = j->s->spare + task * (j->s->g->faces.nv + j->s->g->max_corners);
     for (size_t i = task * j->share; i < j->n && i < (task + 1) * j->share; i++) {
         const vg_solver *s = j->each ? j->each[i] : j->s;
         vgi_guesser g = {.g = s->g, .metric = &s->metric, .walk = s->walk, .nsteps = s->nsteps,
@@ -363,7 +363,7 @@ void vgi_solver_place(const vg_solver *s, double *x, const double *anchor, const
     if (!s->nanchors) vg_graph_root(g, x, mean);
     double shift[3];
     for (int k = 0; k < 3; k++) shift[k] = s->nanchors ? anchor[k] : root[k] - mean[k];
-    for (size_t v = 0; v < g->nv; v++)
+    for (size_t v = 0; v < g->faces.nv; v++)
         vgi_add(x + 3 * v, shift);
     for (size_t i = 0; i < s->nanchors; i++) memcpy(x + 3 * (size_t)s->anchors[i], anchor + 3 * i, 3 * sizeof *x);
     for (size_t i = 0; i < s->nisolated; i++)
@@ -381,9 +381,9 @@ static void solve_block(void *context, size_t i)
         for (size_t k = 0; k < VGI_LANES; k++) rhs[k] = j->rhs[first + (k < lanes ? k : lanes - 1)];
         if (s->unknowns > s->vertices_unknown) memset(x, 0, s->unknowns * sizeof *x); /* right-hand sides of centroids
                                                                                          are 0 */
-        vgi_load_rows(x, s->row, s->g->nv, s->unknowns, rhs);
+        vgi_load_rows(x, s->row, s->g->faces.nv, s->unknowns, rhs);
         vgi_factor_solve(&s->factor, x);
-        vgi_add_rows(x, s->row, s->g->nv, s->unknowns, j->x + first, lanes);
+        vgi_add_rows(x, s->row, s->g->faces.nv, s->unknowns, j->x + first, lanes);
     }
     for (size_t k = first; k < first + lanes; k++)
         vgi_solver_place(s, j->x[k], s->nanchors ? j->anchors[k] : NULL, s->nanchors ? NULL : j->roots[k]);

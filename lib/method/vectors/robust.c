@@ -58,13 +58,13 @@ struct vg_robust {
 
 static size_t face_size(const vg_graph *g, size_t f)
 {
-    return g->start[f + 1] - g->start[f];
+    return g->faces.start[f + 1] - g->faces.start[f];
 }
 
 static size_t count_entries(const vg_robust *r)
 {
     size_t n = 0;
-    for (size_t f = 0; f < r->solver.g->nf; f++) {
+    for (size_t f = 0; f < r->solver.g->faces.nf; f++) {
         size_t corners = face_size(r->solver.g, f);
         n += vgi_solver_is_star(r->s, f) ? 1 : corners * (corners - 1) / 2;
     }
@@ -92,14 +92,14 @@ static int prepare_faces(vg_robust *r, vg_err *e)
     const vg_graph *g = r->solver.g;
     int code = vgi_face_rows_make(&r->rows, &r->solver, 2, e);
     if (code < 0) return code;
-    r->face = vgi_array_raw(g->nf, sizeof *r->face, e);
-    r->entry = vgi_array_raw(g->nf, sizeof *r->entry, e);
-    r->star = vgi_array_raw(g->nf, sizeof *r->star, e);
+    r->face = vgi_array_raw(g->faces.nf, sizeof *r->face, e);
+    r->entry = vgi_array_raw(g->faces.nf, sizeof *r->entry, e);
+    r->star = vgi_array_raw(g->faces.nf, sizeof *r->star, e);
     r->metric = vgi_array_raw(count_entries(r), sizeof *r->metric, e);
     if (!r->face || !r->entry || !r->star || !r->metric) return VG_ENOMEM;
     for (size_t i = 0; i < r->rows.nf; i++) r->face[r->rows.order[i]] = r->rows.face[i];
     for (size_t i = 0, at = 0; i < r->rows.nf; i++) at = write_metric(r, i, at);
-    r->nmisfits = 3 * (vg_graph_corners(g) - g->nf);
+    r->nmisfits = 3 * (vg_graph_corners(g) - g->faces.nf);
     r->moved = r->solver.rows + (r->solver.anchored ? 0 : r->rows.nheld);
     return VG_OK;
 }
@@ -208,11 +208,11 @@ static void load_pose(void *context, size_t pose)
                                                                                   exact */
     double unit = size > 0 ? 1 / size : 0;
     for (size_t i = 0; i < j->r->rows.nf; i++) {
-        size_t begin = g->start[j->r->face[i]], end = g->start[j->r->face[i] + 1];
-        const double *x0 = x + 3 * (size_t)g->vert[begin], *w0 = w + 3 * begin;
+        size_t begin = g->faces.start[j->r->face[i]], end = g->faces.start[j->r->face[i] + 1];
+        const double *x0 = x + 3 * (size_t)g->faces.vert[begin], *w0 = w + 3 * begin;
         for (size_t c = begin + 1; c < end; c++)
             for (size_t k = 0; k < 3; k++)
-                *misfit++ = (float)(unit * ((x[3 * (size_t)g->vert[c] + k] - x0[k]) - (w[3 * c + k] - w0[k])));
+                *misfit++ = (float)(unit * ((x[3 * (size_t)g->faces.vert[c] + k] - x0[k]) - (w[3 * c + k] - w0[k])));
     }
     j->sizes[pose] = size;
 }
@@ -402,7 +402,7 @@ static void load_rows(const search *s, const double *const *rhs, vgi_row *g)
 {
     const vgi_solver_view *v = &s->r->solver;
     memset(g, 0, (v->rows + s->r->rows.nheld) * sizeof *g); /* those of centroids are 0 */
-    vgi_load_rows(g, v->row, v->g->nv, v->rows, rhs);
+    vgi_load_rows(g, v->row, v->g->faces.nv, v->rows, rhs);
     for (size_t i = v->rows; i < s->r->moved; i++)
         for (size_t c = 0; c < 3; c++)
             for (size_t k = 0; k < VGI_LANES; k++) g[i].xyz[c][k] = rhs[k][3 * (size_t)s->r->rows.held[i - v->rows] + c];
@@ -412,7 +412,7 @@ static void load_rows(const search *s, const double *const *rhs, vgi_row *g)
 static void add_rows(const search *s, double *const *x)
 {
     const vgi_solver_view *v = &s->r->solver;
-    vgi_add_rows(s->m.u, v->row, v->g->nv, v->rows, x, s->lanes);
+    vgi_add_rows(s->m.u, v->row, v->g->faces.nv, v->rows, x, s->lanes);
     for (size_t i = v->rows; i < s->r->moved; i++)
         for (size_t c = 0; c < 3; c++)
             for (size_t k = 0; k < s->lanes; k++) x[k][3 * (size_t)s->r->rows.held[i - v->rows] + c] += s->m.u[i].xyz[c][k];

@@ -47,7 +47,7 @@ double vgi_solver_seconds(void);
 /* vgi_solver_all_rows: number of all rows, as above. */
 static inline size_t vgi_solver_all_rows(const vg_solver *s)
 {
-    return s->unknowns + (s->pinned < s->g->nv);
+    return s->unknowns + (s->pinned < s->g->faces.nv);
 }
 
 void *vgi_solver_for_threads(const vg_solver *s, size_t n, size_t size, vg_err *e);

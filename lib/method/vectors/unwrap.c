@@ -107,9 +107,9 @@ static void make_unit(double q[4])
 static void make_means(choice *c, const double *corner)
 {
     const vg_graph *g = c->g;
-    for (size_t f = 0; f < g->nf; f++) {
+    for (size_t f = 0; f < g->faces.nf; f++) {
         double *mean = c->q + 4 * f;
-        for (size_t i = g->start[f]; i < g->start[f + 1]; i++) {
+        for (size_t i = g->faces.start[f]; i < g->faces.start[f + 1]; i++) {
             double unit[4];
             memcpy(unit, corner + 4 * i, sizeof unit);
             make_unit(unit);
@@ -117,8 +117,8 @@ static void make_means(choice *c, const double *corner)
         }
         make_unit(mean);
     }
-    for (size_t v = 0; v < g->nv; v++) {
-        double *mean = c->q + 4 * (g->nf + v);
+    for (size_t v = 0; v < g->faces.nv; v++) {
+        double *mean = c->q + 4 * (g->faces.nf + v);
         for (size_t i = c->around.first[v]; i < c->around.first[v + 1]; i++)
             add(mean, c->q + 4 * (size_t)c->around.face[i]);
         make_unit(mean);
@@ -161,19 +161,19 @@ static edge pop(choice *c)
 
 static double *vector_of(choice *c, size_t node)
 {
-    return node < c->g->nf ? c->turn + 3 * node : c->at + 3 * (node - c->g->nf);
+    return node < c->g->faces.nf ? c->turn + 3 * node : c->at + 3 * (node - c->g->faces.nf);
 }
 
 static int push_neighbours(choice *c, size_t node, vg_err *e)
 {
     const vg_graph *g = c->g;
     int r = VG_OK;
-    if (node < g->nf) {
-        for (size_t i = g->start[node]; r == VG_OK && i < g->start[node + 1]; i++)
-            r = push(c, node, g->nf + g->vert[i], e);
+    if (node < g->faces.nf) {
+        for (size_t i = g->faces.start[node]; r == VG_OK && i < g->faces.start[node + 1]; i++)
+            r = push(c, node, g->faces.nf + g->faces.vert[i], e);
     } else {
         const vgi_incidence *x = &c->around;
-        size_t v = node - g->nf;
+        size_t v = node - g->faces.nf;
         for (size_t i = x->first[v]; r == VG_OK && i < x->first[v + 1]; i++) r = push(c, node, x->face[i], e);
     }
     return r;
@@ -210,7 +210,7 @@ static int by_cost(const void *a_, const void *b_)
 /* Start at the face that rotates least, and again in each part that no link connects. */
 static int grow_trees(choice *c, vg_err *e)
 {
-    size_t nf = c->g->nf;
+    size_t nf = c->g->faces.nf;
     seed *seeds = vgi_array_raw(nf, sizeof *seeds, e);
     if (!seeds) return VG_ENOMEM;
     for (size_t f = 0; f < nf; f++) seeds[f] = (seed){1 - fabs(c->q[4 * f]), f};
@@ -227,10 +227,10 @@ static int grow_trees(choice *c, vg_err *e)
 static void sum_around(choice *c)
 {
     const vg_graph *g = c->g;
-    memset(c->at, 0, 3 * g->nv * sizeof *c->at);
-    for (size_t f = 0; f < g->nf; f++)
-        for (size_t i = g->start[f]; i < g->start[f + 1]; i++)
-            vgi_add(c->at + 3 * (size_t)g->vert[i], c->turn + 3 * f);
+    memset(c->at, 0, 3 * g->faces.nv * sizeof *c->at);
+    for (size_t f = 0; f < g->faces.nf; f++)
+        for (size_t i = g->faces.start[f]; i < g->faces.start[f + 1]; i++)
+            vgi_add(c->at + 3 * (size_t)g->faces.vert[i], c->turn + 3 * f);
 }
 
 static size_t faces_around(const choice *c, size_t v)
@@ -244,8 +244,8 @@ static bool mean_beside(const choice *c, size_t f, double mean[3])
     const vg_graph *g = c->g;
     size_t n = 0;
     memset(mean, 0, 3 * sizeof *mean);
-    for (size_t i = g->start[f]; i < g->start[f + 1]; i++) {
-        size_t v = g->vert[i];
+    for (size_t i = g->faces.start[f]; i < g->faces.start[f + 1]; i++) {
+        size_t v = g->faces.vert[i];
         n += faces_around(c, v) - 1;
         for (size_t k = 0; k < 3; k++) mean[k] += c->at[3 * v + k] - c->turn[3 * f + k];
     }
@@ -259,14 +259,14 @@ static size_t sweep(choice *c)
 {
     const vg_graph *g = c->g;
     size_t changed = 0;
-    for (size_t f = 0; f < g->nf; f++) {
+    for (size_t f = 0; f < g->faces.nf; f++) {
         double mean[3], l[3], step[3], *now = c->turn + 3 * f;
         if (!mean_beside(c, f, mean)) continue;
         vgi_branch_follow(c->q + 4 * f, mean, l);
         vgi_subtract(l, now, step);
         if (!(vgi_dot(step, step) > M_PI * M_PI / 4)) continue;
-        for (size_t i = g->start[f]; i < g->start[f + 1]; i++)
-            vgi_add(c->at + 3 * (size_t)g->vert[i], step);
+        for (size_t i = g->faces.start[f]; i < g->faces.start[f + 1]; i++)
+            vgi_add(c->at + 3 * (size_t)g->faces.vert[i], step);
         memcpy(now, l, sizeof l);
         changed++;
     }
@@ -279,13 +279,13 @@ static bool is_beyond(const choice *c, const double *corner)
 {
     const vg_graph *g = c->g;
     static const double none[3] = {0, 0, 0}, rounding = 1e-6;
-    for (size_t f = 0; f < g->nf; f++) {
+    for (size_t f = 0; f < g->faces.nf; f++) {
         const double *turn = c->turn + 3 * f;
         double l[3], shortest[3], off[3];
         vgi_branch_near(c->q + 4 * f, turn, l);
         vgi_subtract(l, turn, off);
         if (!(vgi_dot(off, off) <= rounding) || !(sqrt(vgi_dot(turn, turn)) <= M_PI / 2 + rounding)) return true;
-        for (size_t i = g->start[f]; i < g->start[f + 1]; i++) {
+        for (size_t i = g->faces.start[f]; i < g->faces.start[f + 1]; i++) {
             double q[4];
             memcpy(q, corner + 4 * i, sizeof q);
             make_unit(q);
@@ -327,15 +327,15 @@ static void make_jacobian(const double turn[3], double J[9])
 static void add_laplacian(choice *c, const double *x, double *y)
 {
     const vg_graph *g = c->g;
-    memset(c->at, 0, 3 * g->nv * sizeof *c->at);
-    for (size_t f = 0; f < g->nf; f++)
-        for (size_t i = g->start[f]; i < g->start[f + 1]; i++)
-            vgi_add(c->at + 3 * (size_t)g->vert[i], x + 3 * f);
-    for (size_t v = 0; v < g->nv; v++)
+    memset(c->at, 0, 3 * g->faces.nv * sizeof *c->at);
+    for (size_t f = 0; f < g->faces.nf; f++)
+        for (size_t i = g->faces.start[f]; i < g->faces.start[f + 1]; i++)
+            vgi_add(c->at + 3 * (size_t)g->faces.vert[i], x + 3 * f);
+    for (size_t v = 0; v < g->faces.nv; v++)
         for (size_t k = 0; k < 3 && faces_around(c, v); k++) c->at[3 * v + k] /= (double)faces_around(c, v);
-    for (size_t f = 0; f < g->nf; f++)
-        for (size_t i = g->start[f]; i < g->start[f + 1]; i++)
-            for (size_t k = 0; k < 3; k++) y[3 * f + k] += x[3 * f + k] - c->at[3 * (size_t)g->vert[i] + k];
+    for (size_t f = 0; f < g->faces.nf; f++)
+        for (size_t i = g->faces.start[f]; i < g->faces.start[f + 1]; i++)
+            for (size_t k = 0; k < 3; k++) y[3 * f + k] += x[3 * f + k] - c->at[3 * (size_t)g->faces.vert[i] + k];
 }
 
 /* y = J' W rest. W is `weight` along the axis, which J preserves, and `sideways` times that perpendicular to it. */
@@ -352,7 +352,7 @@ static void pull(const relaxation *r, size_t f, const double rest[3], double y[3
 /* y = J' W (J x) + L x */
 static void apply(choice *c, const relaxation *r, const double *x, double *y)
 {
-    for (size_t f = 0; f < c->g->nf; f++) {
+    for (size_t f = 0; f < c->g->faces.nf; f++) {
         const double *J = r->J + 9 * f, *xf = x + 3 * f;
         const double Jx[3] = {vgi_dot(J, xf), vgi_dot(J + 3, xf), vgi_dot(J + 6, xf)};
         pull(r, f, Jx, y + 3 * f);
@@ -362,10 +362,10 @@ static void apply(choice *c, const relaxation *r, const double *x, double *y)
 
 static void linearise(choice *c, relaxation *r)
 {
-    size_t n = 3 * c->g->nf;
+    size_t n = 3 * c->g->faces.nf;
     memset(r->b, 0, n * sizeof *r->b);
     add_laplacian(c, c->turn, r->b);
-    for (size_t f = 0; f < c->g->nf; f++) {
+    for (size_t f = 0; f < c->g->faces.nf; f++) {
         double *turn = c->turn + 3 * f, *J = r->J + 9 * f, *b = r->b + 3 * f;
         double back[4] = {0, -turn[0], -turn[1], -turn[2]}, rest[4], l[4];
         vg_quat_exp(back, back);
@@ -390,7 +390,7 @@ static double product(const double *a, const double *b, size_t n)
 
 static void solve_step(choice *c, relaxation *r)
 {
-    size_t n = 3 * c->g->nf;
+    size_t n = 3 * c->g->faces.nf;
     memset(r->x, 0, n * sizeof *r->x);
     memcpy(r->r, r->b, n * sizeof *r->b);
     memcpy(r->p, r->b, n * sizeof *r->b);
@@ -406,7 +406,7 @@ static void solve_step(choice *c, relaxation *r)
 
 static int relax(choice *c, vg_err *e)
 {
-    size_t nf = c->g->nf;
+    size_t nf = c->g->faces.nf;
     double *room = vgi_array_raw(nf, 28 * sizeof *room, e);
     if (!room) return VG_ENOMEM;
     relaxation r = {.J = room,
@@ -434,9 +434,9 @@ int vgi_choose_turns(const vg_graph *g, const double *q, double *turn, bool *bey
     choice c = {.g = g, .turn = turn};
     int r = vgi_incidence_make(&c.around, &g->faces, e);
     if (r == VG_OK) {
-        c.q = vgi_array(g->nf + g->nv, 4 * sizeof *c.q, e);
-        c.at = vgi_array(g->nv, 3 * sizeof *c.at, e);
-        c.reached = vgi_array(g->nf + g->nv, sizeof *c.reached, e);
+        c.q = vgi_array(g->faces.nf + g->faces.nv, 4 * sizeof *c.q, e);
+        c.at = vgi_array(g->faces.nv, 3 * sizeof *c.at, e);
+        c.reached = vgi_array(g->faces.nf + g->faces.nv, sizeof *c.reached, e);
         r = c.q && c.at && c.reached ? VG_OK : VG_ENOMEM;
     }
     if (r == VG_OK) {
