@@ -1,4 +1,4 @@
-/* vg-generate: go on from a few poses, or lead from key to key, by what a network has learned.
+/* vg-generate: continue poses, or fill in between keys, with a network.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
 
@@ -45,7 +45,7 @@ static const cli_option options[] = {
 static const cli_program program = {
     .name = "vg-generate",
     .synopsis = "[options] NETWORK [FILE ...]",
-    .summary = "go on from a few poses, or from key to key, by a network",
+    .summary = "continue poses, or fill in between keys, with a network",
     .options = options,
     .most_operands = SIZE_MAX,
     .writes_stream = true,

@@ -1,4 +1,4 @@
-/* vg-train: learn how a sequence of poses goes on.
+/* vg-train: train a network to continue a sequence of poses.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "fitting.h"
 
@@ -96,7 +96,7 @@ static const cli_option options[] = {
 static const cli_program program = {
     .name = "vg-train",
     .synopsis = "[options] [FILE ...]",
-    .summary = "learn how a sequence of poses goes on",
+    .summary = "train a network to continue a sequence of poses",
     .options = options,
     .most_operands = SIZE_MAX,
     .writes_stream = true,
