@@ -44,6 +44,7 @@ typedef struct cli_program {
     size_t most_operands;
     bool writes_stream;   /* has -o --output and --no-provenance */
     bool writes_vectors;  /* the stream is for vg-solve */
+    const size_t *vectors_if; /* ... or it is if this choice is not the first one; NULL: there is no such option */
     bool writes_map;      /* the stream holds a map and no frames: it is for vg-play */
     bool writes_text;     /* has -o --output and --json */
     bool writes_file;     /* has -o --output, written through cli_text_open */

@@ -101,11 +101,16 @@ static bool names_meshes(const char *name)
     return (!exists && vg_sink_check(name, &(vg_sink_options){.replace = true}, NULL) == VG_OK) || ends_with_one(name, foreign);
 }
 
+static bool writes_vectors(void)
+{
+    return cli.program->writes_vectors || (cli.program->vectors_if && *cli.program->vectors_if);
+}
+
 static void refuse_terminal(void) __attribute__((noreturn));
 static void refuse_terminal(void)
 {
     cli_usage("a stream is not written to a terminal: use -o FILE or pipe it into %s",
-              cli.program->writes_vectors ? "'vg-solve | vg-decode -o NAME'"
+              writes_vectors()            ? "'vg-solve | vg-decode -o NAME'"
               : cli.program->writes_map   ? "a file for vg-play"
                                           : "'vg-decode -o NAME'");
 }
@@ -117,7 +122,7 @@ static void refuse_stream(const char *name)
     if (cli.program->writes_map)
         cli_usage("the output is a map, not poses: write it with -o MAP, then 'vg-play MAP POSES | %s -o %s'", last,
                   name);
-    cli_usage("the output is a stream: pipe it into '%s%s -o %s'", cli.program->writes_vectors ? "vg-solve | " : "",
+    cli_usage("the output is a stream: pipe it into '%s%s -o %s'", writes_vectors() ? "vg-solve | " : "",
               last, name);
 }
 

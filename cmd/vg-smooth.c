@@ -1,5 +1,5 @@
-/* vg-smooth: remove noise from a sequence, by filters in time or by what neighbouring vertices have in common. The
- * filters are in lib/signal.
+/* vg-smooth: remove noise from a sequence, by filters in time of the vertices or the vector graph, or by the motion that
+ * neighbouring vertices share. The filters are in lib/signal.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "batch.h"
 
@@ -8,9 +8,10 @@
 #include <string.h>
 
 enum { TOGETHER = 3, BATCH = 16 }; /* choice of --filter after those of vg_filter; frames of a batch */
+enum { ON_VERTICES, ON_VECTORS };  /* choices of --on */
 
 static struct {
-    size_t filter;
+    size_t filter, on;
     double seconds, frames, root;
     uint64_t memory; /* bytes */
 } opts = {.memory = 256 << 20};
@@ -25,6 +26,8 @@ static const cli_option options[] = {
     {"filter", 0, "lowpass|polynomial|robust|together",
      "Butterworth forward and back (default), Savitzky-Golay, one without outliers, or what neighbours have in common",
      .choice = &opts.filter},
+    {"on", 0, "vertices|vectors", "filter positions (default), or how vectors turn and stretch, which keeps volumes; then vg-solve",
+     .choice = &opts.on},
     {"seconds", 0, "X", "span of the filter in time (default: 0.1)", .number = &opts.seconds, .least = 1e-9, .most = 1e9,
      .excludes = "frames"},
     {"frames", 0, "X", "the same in frames, whatever their times", .number = &opts.frames, .least = 1e-9, .most = 1000},
@@ -41,17 +44,22 @@ static const cli_program program = {
     .options = options,
     .most_operands = 1,
     .writes_stream = true,
+    .vectors_if = &opts.on,
     .threaded = true};
 
 /* ---- filters in time ---- */
 
 typedef struct timing {
-    const vg_head *h;
-    vg_smoother *smoother; /* made once the second frame gives the time step */
+    vg_head *h;
+    vg_kind kind;          /* what comes in */
+    vg_smoother *smoother; /* made once the second frame gives the time step; of vertices, or of vectors: */
+    vg_vector_smoother *vectors;
+    vg_graph *graph;       /* of vectors */
+    vg_frame out;          /* of vectors */
     vg_frame first;        /* held until then */
     bool begun;            /* a frame has come */
     double step, last;     /* seconds between frames (0: frames have no times); time of the last frame */
-    vg_frame *label;       /* ring: what goes with the frames of the window */
+    vg_frame *label;       /* ring: name and time of the frames of the window, and of vertices their values */
     size_t places, put, given;
 } timing;
 
@@ -66,22 +74,32 @@ static double span_in_frames(double span, double each)
     return cli_given("frames") ? span : span / each;
 }
 
-static void make_smoother(timing *t, double each)
+static size_t make_filter(timing *t, const vg_smoother_options *o)
 {
     vg_err e;
+    const double *reference = t->h->body.reference;
+    if (opts.on == ON_VERTICES) {
+        if (vg_smoother_new(&t->smoother, o, t->h->body.mesh.nv, reference, &e) < 0) cli_die(&e);
+        return vg_smoother_reach(t->smoother);
+    }
+    if (vg_vector_smoother_new(&t->vectors, o, t->graph, reference, t->h->nanchors, &e) < 0) cli_die(&e);
+    return vg_vector_smoother_reach(t->vectors);
+}
+
+static void make_smoother(timing *t, double each)
+{
     double fallback = 1.0 / VG_FPS, span = cli_given("frames") ? opts.frames : cli_given("seconds") ? opts.seconds : 0.1;
     if (!cli_given("frames") && each < 0) cli_stop(VG_EINPUT, "the times of the frames do not increase: use '--frames'");
     vg_smoother_options o = {.filter = (vg_filter)opts.filter, .threads = cli.threads};
     o.span = span_in_frames(span, each > 0 ? each : fallback);
     o.root_span = cli_given("root") ? span_in_frames(opts.root, each > 0 ? each : fallback) : o.span;
-    if (vg_smoother_new(&t->smoother, &o, t->h->body.mesh.nv, t->h->body.reference, &e) < 0) cli_die(&e);
-    t->places = 2 * vg_smoother_reach(t->smoother) + 2;
+    size_t reach = make_filter(t, &o);
+    t->places = 2 * reach + 2;
     t->label = cli_allocate(t->places, sizeof *t->label, "the frames of the window");
-    cli_note("a span of %g frames, of the root %g; %zu frames on either side count", o.span, o.root_span,
-             vg_smoother_reach(t->smoother));
+    cli_note("a span of %g frames, of the root %g; %zu frames on either side count", o.span, o.root_span, reach);
 }
 
-static void write_ready(timing *t)
+static void write_vertices(timing *t)
 {
     vg_frame *out = &t->label[t->given % t->places];
     while (t->given < t->put && vg_smoother_next(t->smoother, out->values)) {
@@ -90,15 +108,48 @@ static void write_ready(timing *t)
     }
 }
 
+static void write_vectors(timing *t)
+{
+    vg_err e;
+    vg_frame *out = &t->out;
+    while (t->given < t->put && vg_vector_smoother_next(t->vectors, out->values, out->root, vg_frame_anchors(out))) {
+        if (vg_frame_label(out, &t->label[t->given++ % t->places], &e) < 0) cli_die(&e);
+        cli_stream_put(out);
+    }
+}
+
 /* Swap the frame into the ring, so that its arrays are used again. */
-static void add_frame(timing *t, vg_frame *f)
+static void add_vertices(timing *t, vg_frame *f)
 {
     vg_frame *place = &t->label[t->put % t->places], old = *place;
     vg_frame_drop_all(f); /* the channels belong to the vertices before filtering */
     vg_smoother_add(t->smoother, f->values);
     *place = *f, *f = old;
     t->put++;
-    write_ready(t);
+    write_vertices(t);
+}
+
+static void add_vectors(timing *t, vg_frame *f)
+{
+    vg_err e;
+    double *vectors = t->out.values, *anchors = vg_frame_anchors(&t->out);
+    if (t->kind == VG_VERTICES) {
+        vg_graph_vectors(t->graph, f->values, vectors);
+        vg_graph_root(t->graph, f->values, f->root);
+        vg_graph_anchors(f->values, t->h->anchors, t->h->nanchors, anchors);
+        vg_vector_smoother_add(t->vectors, vectors, f->root, anchors);
+    } else {
+        vg_vector_smoother_add(t->vectors, f->values, f->root, vg_frame_anchors(f));
+    }
+    vg_frame_drop_all(f);
+    if (vg_frame_label(&t->label[t->put++ % t->places], f, &e) < 0) cli_die(&e);
+    write_vectors(t);
+}
+
+static void add_frame(timing *t, vg_frame *f)
+{
+    if (opts.on == ON_VECTORS) add_vectors(t, f);
+    else add_vertices(t, f);
 }
 
 static void check_times(timing *t, const vg_frame *f)
@@ -119,7 +170,7 @@ static void filter_in_time(void *context, size_t n, vg_frame *in)
             t->first = in[i], in[i] = (vg_frame){0}, t->begun = true;
             continue;
         }
-        if (!t->smoother) {
+        if (!t->places) {
             t->step = step_between(&t->first, &in[i]);
             t->last = t->first.time;
             make_smoother(t, t->step);
@@ -130,23 +181,44 @@ static void filter_in_time(void *context, size_t n, vg_frame *in)
     }
 }
 
+static void warn_degenerate(const timing *t)
+{
+    vg_deform_stats c = vg_vector_smoother_get_stats(t->vectors);
+    if (c.corners)
+        cli_warn("%llu corners without a direction took the turn of their face (the first in face %llu)",
+                 (unsigned long long)c.corners, (unsigned long long)c.first_face);
+}
+
 static void finish_in_time(void *context)
 {
     timing *t = context;
     if (!t->begun) return;
-    if (!t->smoother) { /* one frame: nothing to filter, but check the options */
+    if (!t->places) { /* one frame: nothing to filter, but check the options */
         make_smoother(t, 0);
         add_frame(t, &t->first);
     }
-    vg_smoother_end(t->smoother);
-    write_ready(t);
+    if (opts.on == ON_VERTICES) {
+        vg_smoother_end(t->smoother);
+        write_vertices(t);
+    } else {
+        vg_vector_smoother_end(t->vectors);
+        write_vectors(t);
+        warn_degenerate(t);
+    }
 }
 
 static void prepare_in_time(void *context, vg_head *h, vg_frame *in)
 {
+    timing *t = context;
+    vg_err e;
     (void)in;
-    ((timing *)context)->h = h;
-    cli_need_vertices(h, "the input");
+    t->h = h, t->kind = h->kind;
+    if (opts.on == ON_VERTICES || h->kind != VG_VECTORS) cli_need_vertices(h, "the input");
+    if (opts.on == ON_VERTICES) return;
+    if (vg_head_prepare_vectors(h, &e) < 0 || vg_head_graph(&t->graph, h, &e) < 0) cli_die(&e);
+    h->kind = VG_VECTORS;
+    h->count = vg_graph_corners(t->graph);
+    if (vg_frame_shape(&t->out, h, &e) < 0) cli_die(&e);
 }
 
 static void smooth_in_time(vg_source *s)
@@ -158,7 +230,10 @@ static void smooth_in_time(vg_source *s)
     for (size_t i = 0; i < t.places; i++) vg_frame_clear(&t.label[i]);
     free(t.label);
     vg_frame_clear(&t.first);
+    vg_frame_clear(&t.out);
     vg_smoother_free(&t.smoother);
+    vg_vector_smoother_free(&t.vectors);
+    vg_graph_free(&t.graph);
 }
 
 /* ---- what moves together ---- */
@@ -245,6 +320,8 @@ int main(int argc, char **argv)
     size_t n = cli_start(&program, argc, argv, &operands);
     if (opts.filter == TOGETHER && (cli_given("seconds") || cli_given("frames") || cli_given("root")))
         cli_usage("'--filter together' looks at no time: it takes no '--seconds', '--frames' or '--root'");
+    if (opts.filter == TOGETHER && opts.on == ON_VECTORS)
+        cli_usage("'--filter together' works on vertices: it takes no '--on vectors'");
     if (opts.filter != TOGETHER && cli_given("memory")) cli_usage("option '--memory' needs '--filter together'");
     vg_source *s = cli_source(operands, n);
     if (opts.filter == TOGETHER) smooth_together(s);

@@ -4,7 +4,7 @@
 #ifndef VG_PART_SMOOTH_H
 #define VG_PART_SMOOTH_H
 
-#include "vg/body.h"
+#include "vg/vectors.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -40,6 +40,22 @@ size_t vg_smoother_reach(const vg_smoother *s); /* frames on either side that a 
 void vg_smoother_add(vg_smoother *s, const double *vertices);
 void vg_smoother_end(vg_smoother *s);
 bool vg_smoother_next(vg_smoother *s, double *vertices);
+
+/* The same filters on the vector graph: what is filtered is how each vector turns and stretches against the reference pose,
+ * in the logarithm. Parts that swing keep their size, where the filters of vertices make them smaller. */
+typedef struct vg_vector_smoother vg_vector_smoother;
+/* vg_vector_smoother_new: g is borrowed until free; reference: nv points. VG_EARG: a span out of range. Memory: as above
+ * with 40 bytes a corner and frame. */
+int vg_vector_smoother_new(vg_vector_smoother **s, const vg_smoother_options *o, const vg_graph *g,
+                           const double *reference, size_t nanchors, vg_err *e) VG_MUST_CHECK;
+void vg_vector_smoother_free(vg_vector_smoother **s);
+size_t vg_vector_smoother_reach(const vg_vector_smoother *s);
+/* As above, with the vectors of a frame (one per corner), its root and its anchors (nanchors points; may be NULL if there
+ * are none). */
+void vg_vector_smoother_add(vg_vector_smoother *s, const double *vectors, const double root[3], const double *anchors);
+void vg_vector_smoother_end(vg_vector_smoother *s);
+bool vg_vector_smoother_next(vg_vector_smoother *s, double *vectors, double root[3], double *anchors);
+vg_deform_stats vg_vector_smoother_get_stats(const vg_vector_smoother *s); /* of the frames added */
 
 /* A filter of the body in place of time: neighbouring vertices move nearly alike, noise does not. For overlapping regions
  * of up to 100 vertices the coordinates of all frames make a matrix of low rank (4 for a region that moves affinely); its

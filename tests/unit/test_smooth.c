@@ -131,6 +131,111 @@ static void test_rigid(void)
     vg_smoother_free(&s);
 }
 
+/* ---- vectors ---- */
+
+/* Three regular tetrahedra: two that turn by opposite angles about parallel axes, and a larger one that stands, so that the
+ * body as a whole does not turn. */
+static vg_head make_wings(void)
+{
+    static const double corner[4][3] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+    vg_head h = {0};
+    for (size_t v = 0; v < 12; v++) {
+        const double *x = corner[v % 4], size = v < 8 ? 1 : 3;
+        add_vertex(&h, size * x[0] + (v < 4 ? -9 : v < 8 ? 9 : 0), size * x[1], size * x[2]);
+    }
+    for (uint32_t v = 0; v < 12; v += 4) {
+        add_face(&h, 3, (uint32_t[]){v, v + 1, v + 2});
+        add_face(&h, 3, (uint32_t[]){v, v + 3, v + 1});
+        add_face(&h, 3, (uint32_t[]){v, v + 2, v + 3});
+        add_face(&h, 3, (uint32_t[]){v + 1, v + 3, v + 2});
+    }
+    return h;
+}
+
+/* vectors: those of the reference, of which the first wing turns about z by `angle`, the second by -angle; all grow */
+static void turn_wings(size_t corners, const double *reference, double angle, double scale, double *vectors)
+{
+    for (size_t c = 0; c < corners; c++) {
+        const double *r = reference + 3 * c;
+        double a = c < 12 ? angle : c < 24 ? -angle : 0;
+        vectors[3 * c] = scale * (cos(a) * r[0] - sin(a) * r[1]);
+        vectors[3 * c + 1] = scale * (sin(a) * r[0] + cos(a) * r[1]);
+        vectors[3 * c + 2] = scale * r[2];
+    }
+}
+
+/* The distance of the filtered vectors from those of the angles `expected`, in frames from `skip` to n - skip. In frame i the
+ * scale is 1.01^i; root and one anchor move in a line. */
+static double filter_wings(vg_filter filter, double span, size_t n, const double *angle, const double *expected, size_t skip)
+{
+    vg_head h = make_wings();
+    vg_graph *g = graph_of(&h);
+    size_t corners = vg_graph_corners(g), got = 0;
+    double *reference = vectors_of(g, h.body.reference), *in = room(3 * corners, sizeof *in),
+           *out = room(3 * corners, sizeof *out), *truth = room(3 * corners, sizeof *truth), worst = 0, root[3], anchor[3];
+    const vg_smoother_options o = {.filter = filter, .span = span, .root_span = span, .threads = 2};
+    vg_vector_smoother *s;
+    vg_err e;
+    if (vg_vector_smoother_new(&s, &o, g, h.body.reference, 1, &e) < 0) abort();
+    for (size_t i = 0; i <= n; i++) {
+        double x = 0.5 * (double)i;
+        if (i < n) turn_wings(corners, reference, angle[i], pow(1.01, (double)i), in);
+        if (i < n) vg_vector_smoother_add(s, in, (double[]){x, 1, -x}, (double[]){x + 2, 4, -x});
+        else vg_vector_smoother_end(s);
+        while (vg_vector_smoother_next(s, out, root, anchor)) {
+            turn_wings(corners, reference, expected[got], pow(1.01, (double)got), truth);
+            if (got >= skip && got < n - skip) worst = fmax(worst, farthest(out, truth, corners) / pow(1.01, (double)got));
+            CHECK_NEAR(root[0], 0.5 * (double)got, 1e-11);
+            CHECK_NEAR(anchor[0], 0.5 * (double)got + 2, 1e-11);
+            CHECK_NEAR(anchor[1], 4, 1e-11);
+            got++;
+        }
+    }
+    CHECK(got == n);
+    CHECK(vg_vector_smoother_get_stats(s).corners == 0);
+    vg_vector_smoother_free(&s);
+    CHECK(s == NULL);
+    free(reference), free(in), free(out), free(truth);
+    vg_graph_free(&g);
+    vg_head_clear(&h);
+    return worst;
+}
+
+/* A swing by a radian loses what the filter takes from its angle and nothing of its length. */
+static void test_swing(void)
+{
+    static const double frequency[] = {0.02, 0.08, 0.125, 0.2};
+    double angle[FRAMES], expected[FRAMES];
+    for (size_t k = 0; k < 4; k++) {
+        for (size_t i = 0; i < FRAMES; i++) {
+            angle[i] = sin(2 * M_PI * frequency[k] * (double)i + 0.3);
+            expected[i] = lowpass_gain(frequency[k], 4) * angle[i];
+        }
+        CHECK_NEAR(filter_wings(VG_LOWPASS, 4, FRAMES, angle, expected, 60), 0, 2e-6);
+    }
+}
+
+/* A wheel that spins at constant speed, 40 degrees a frame, spins on, at the ends too. */
+static void test_wheel(void)
+{
+    double angle[FRAMES];
+    for (size_t i = 0; i < FRAMES; i++) angle[i] = 0.7 * (double)i - 30;
+    for (size_t n = 1; n < FRAMES; n = 3 * n + 4)
+        for (int filter = VG_LOWPASS; filter <= VG_ROBUST; filter++)
+            CHECK_NEAR(filter_wings((vg_filter)filter, 5, n, angle, angle, 0), 0, 1e-10);
+}
+
+/* One frame in which the wings are elsewhere has no influence on the robust filter. */
+static void test_robust_swing(void)
+{
+    double angle[FRAMES], expected[FRAMES];
+    for (size_t i = 0; i < 60; i++) {
+        expected[i] = 1e-3 * (double)(i * i) - 1;
+        angle[i] = expected[i] + (i % 9 == 4 ? 2 : 0);
+    }
+    CHECK_NEAR(filter_wings(VG_ROBUST, 4, 60, angle, expected, 0), 0, 1e-5);
+}
+
 /* ---- what moves together ---- */
 
 static void make_grid(vg_head *h)
@@ -223,5 +328,6 @@ static void test_regions_refuse(void)
 TESTS({"low-pass: gain of the closed form", test_lowpass}, {"lines stay lines", test_lines},
       {"polynomial: cubics stay, weights of 1964", test_polynomial}, {"robust: outliers do not count", test_robust},
       {"spans out of range", test_spans}, {"a rigid body stays rigid", test_rigid},
-      {"regions: noise is found and goes", test_regions}, {"regions: clean motion stays", test_regions_clean},
+      {"vectors: a swing loses of its angle, not its length", test_swing}, {"vectors: a wheel spins on", test_wheel},
+      {"vectors: robust", test_robust_swing}, {"regions: noise is found and goes", test_regions}, {"regions: clean motion stays", test_regions_clean},
       {"regions: too few frames", test_regions_refuse})
