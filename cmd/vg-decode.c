@@ -96,36 +96,72 @@ static void decode_raw(vg_source *s, size_t width)
     cli_text_end();
 }
 
-/* An artefact has no poses: its reference pose is written. */
-static bool put_reference(const vg_head *h)
+/* ---- an artefact, which has no poses: its reference pose ---- */
+
+/* What the input is instead of poses; NULL: no artefact. advice: which program takes it. */
+static const char *artefact_of(const vg_head *h, const char **advice)
 {
     static const char *const artefacts[] = {"map", "signal", "network", "patches"},
-                      *const advice[] = {"vg-play plays it", "vg-sample evaluates it", "vg-generate uses it", "vg-view colours them"};
+                      *const takers[] = {"vg-play plays it", "vg-sample evaluates it", "vg-generate uses it", "vg-view colours them"};
+    if (h->kind != VG_VERTICES || !h->body.mesh.nv) return NULL;
+    for (size_t i = 0; i < sizeof artefacts / sizeof *artefacts; i++)
+        if (vg_head_need(h, artefacts[i], "it", NULL) == VG_OK) return *advice = takers[i], artefacts[i];
+    return NULL;
+}
+
+static bool writes_gltf(void)
+{
+    const char *end = sink_options.format ? sink_options.format : strrchr(output, '.');
+    if (!end) return false;
+    end += *end == '.';
+    return !strcmp(end, "glb") || !strcmp(end, "gltf");
+}
+
+/* A rig with weights is written to glTF with its joints: as transforms, which do nothing in the reference pose. */
+static bool write_as_skin(vg_head *h)
+{
+    const vg_rig *rig = &h->body.rig;
+    if (!rig->skin_bone || !writes_gltf()) return false;
+    h->kind = VG_TRANSFORMS, h->count = rig->nbones;
+    return true;
+}
+
+static void put_reference(const vg_head *h)
+{
     vg_err e;
     vg_frame f = {0};
-    size_t i = 0, n = sizeof artefacts / sizeof *artefacts;
-    while (i < n && vg_head_need(h, artefacts[i], "it", NULL) < 0) i++;
-    if (i == n || h->kind != VG_VERTICES || !h->body.mesh.nv) return false;
     if (vg_frame_shape(&f, h, &e) < 0 || vg_frame_rename(&f, h->body.reference_name, &e) < 0) cli_die(&e);
-    memcpy(f.values, h->body.reference, 3 * h->body.mesh.nv * sizeof *f.values);
+    if (h->kind == VG_VERTICES) memcpy(f.values, h->body.reference, 3 * h->body.mesh.nv * sizeof *f.values);
+    for (size_t i = 0; h->kind == VG_TRANSFORMS && i < 7 * h->count; i++) f.values[i] = i % 7 == 0;
     if (vg_sink_put(sink, &f, &e) < 0) cli_die(&e);
     vg_frame_clear(&f);
-    cli_warn("the input holds no poses but a %s: its reference pose is written; %s", artefacts[i], advice[i]);
-    return true;
+}
+
+static void warn_empty(const char *artefact, const char *advice, bool skin)
+{
+    if (!artefact) cli_warn("the input has no poses: '%s' holds none", output);
+    else if (skin) cli_warn("the input holds no poses but a rig: it is written in its reference pose; vg-play moves it");
+    else cli_warn("the input holds no poses but a %s: its reference pose is written; %s", artefact, advice);
 }
 
 static void decode(vg_source *s)
 {
     static const step writing = {.batch = 1, .unit = "poses", .process = put_frames};
     vg_err e;
-    cli_discard_by(discard);
-    if (vg_sink_open(&sink, output, vg_source_head(s), &sink_options, &e) < 0) cli_die(&e);
+    vg_head *h = vg_source_head(s);
     vg_frame *in = batch_frames(&writing);
-    uint64_t frames = batch_read(&writing, NULL, s, in);
-    bool reference = !frames && put_reference(vg_source_head(s));
+    bool empty = !cli_next(s, in);
+    const char *advice = NULL, *artefact = empty ? artefact_of(h, &advice) : NULL;
+    bool skin = artefact && write_as_skin(h);
+    cli_discard_by(discard);
+    if (vg_sink_open(&sink, output, h, &sink_options, &e) < 0) cli_die(&e);
+    if (!empty) {
+        put_frames(NULL, 1, in);
+        batch_read(&writing, NULL, s, in);
+    }
+    if (artefact) put_reference(h);
     if (vg_sink_end(sink, &e) < 0) cli_die(&e);
-    if (!frames && !reference)
-        cli_warn("the input has no poses: '%s' holds none", output);
+    if (empty) warn_empty(artefact, advice, skin);
     for (size_t i = 0; vg_sink_warning(sink, i); i++) cli_warn("%s", vg_sink_warning(sink, i));
     vg_sink_close(&sink);
     batch_frames_free(&writing, in);

@@ -179,6 +179,23 @@ END
     vg-fitmap -v --bones 20 fit.vgs -o many.rig 2>many
     must_fail 2 vg-fitmap --bones 3 --skeleton fit.bvh fit.vgs -o no.rig
     must_fail 2 vg-fitmap --bones 0 fit.vgs -o no.rig
+    # the rig alone: its joints and weights in the reference pose, which comes back
+    must_warn vg-decode free.rig -o rest.glb
+    says "it is written in its reference pose; vg-play moves it"
+    must vg-encode rest.glb -o rest.vgs
+    must vg-encode --reference free.rig --take 0 fit.vgs -o one.vgs
+    py <<'END'
+import json, read_stream, struct
+def part(name):
+    b = open(name, "rb").read()
+    return json.loads(b[20:20 + struct.unpack_from("<I", b, 12)[0]])
+rest, played = part("rest.glb"), part("free.glb")
+names = [[x["nodes"][j]["name"] for j in x["skins"][0]["joints"]] for x in (rest, played)]
+assert names[0] == names[1] and len(names[0]) > 1, names
+assert {"JOINTS_0", "WEIGHTS_0"} <= set(rest["meshes"][0]["primitives"][0]["attributes"])
+a, b = read_stream.read_stream("rest.vgs"), read_stream.read_stream("one.vgs")
+assert len(a.frames) == 1 and max(abs(x - y) for x, y in zip(a.frames[0].values, b.reference)) < 1e-5
+END
 }
 
 @test "--bones: 40 bones on a man in 15 poses: what is left is below what Dem Bones leaves, 0.57e-3 D fitted and 1.49e-3 left out" {
