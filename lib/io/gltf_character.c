@@ -42,12 +42,6 @@ static bool invert(const double m[12], double to[12])
     return true;
 }
 
-static void unit(double p[3])
-{
-    const double l = vgi_length(p);
-    for (int k = 0; k < 3; k++) p[k] = l > 0 ? p[k] / l : 0;
-}
-
 /* Rotate x by the smallest rotation from a to b; a, b: unit or zero. */
 static void turn(const double a[3], const double b[3], const double x[3], double to[3])
 {
@@ -169,14 +163,14 @@ static void normal_out(const vgi_gltf_character *c, size_t f, const double n[3],
 {
     if (c->skinned[f]) linear(c->out + 12 * f, n, to);
     else linear_transposed(c->in + 12 * f, n, to);
-    unit(to);
+    vgi_make_unit(to);
 }
 
 static void normal_in(const vgi_gltf_character *c, size_t f, const double n[3], double to[3])
 {
     if (c->skinned[f]) linear(c->in + 12 * f, n, to);
     else linear_transposed(c->out + 12 * f, n, to);
-    unit(to);
+    vgi_make_unit(to);
 }
 
 static int read_normals(vgi_gltf_character *c, vg_err *e)
@@ -234,19 +228,19 @@ static void face_normals(const vgi_gltf_character *c, const double *world, doubl
         double side[3][3], n[3];
         for (int k = 0; k < 3; k++) p[k] = world + 3 * (size_t)c->vertex[v[k]];
         for (int k = 0; k < 3; k++) {
-            for (int i = 0; i < 3; i++) side[k][i] = p[(k + 1) % 3][i] - p[k][i];
-            unit(side[k]);
+            vgi_subtract(p[(k + 1) % 3], p[k], side[k]);
+            vgi_make_unit(side[k]);
         }
         vgi_cross(side[0], side[1], n);
-        unit(n);
+        vgi_make_unit(n);
         for (int k = 0; k < 3; k++) {
             const double *s = side[k], *t = side[(k + 2) % 3];
             const double angle = acos(fmax(-1, fmin(1, -vgi_dot(s, t))));
             if (c->group[v[k]] == UINT32_MAX) continue;
-            for (int i = 0; i < 3; i++) to[3 * (size_t)c->group[v[k]] + i] += angle * n[i];
+            vgi_add_scaled(to + 3 * (size_t)c->group[v[k]], angle, n);
         }
     }
-    for (size_t g = 0; g < c->ngroups; g++) unit(to + 3 * g);
+    for (size_t g = 0; g < c->ngroups; g++) vgi_make_unit(to + 3 * g);
 }
 
 /* Add the rotation of the sides of a face at corner k about the normal of its group. */
@@ -258,11 +252,9 @@ static void add_twist(const vgi_gltf_character *c, const uint32_t *v, int k, con
     for (int next = 1; next <= 2; next++) {
         const size_t from = 3 * (size_t)c->vertex[v[k]], to = 3 * (size_t)c->vertex[v[(k + next) % 3]];
         double before[3], now[3], turned[3], across[3];
-        for (size_t i = 0; i < 3; i++) {
-            before[i] = c->rest_world[to + i] - c->rest_world[from + i];
-            now[i] = world[to + i] - world[from + i];
-        }
-        unit(before), unit(now);
+        vgi_subtract(c->rest_world + to, c->rest_world + from, before);
+        vgi_subtract(world + to, world + from, now);
+        vgi_make_unit(before), vgi_make_unit(now);
         if (still) memcpy(turned, before, sizeof turned);
         else turn(a, b, before, turned);
         vgi_cross(turned, now, across);

@@ -3,6 +3,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
 #include "io/polygon.h"
+#include "numeric/face.h"
 
 #include <stdlib.h>
 
@@ -77,7 +78,7 @@ static int put_face(const shaping *x, const uint32_t *v, size_t n, vg_err *e)
         int r = put_index(&x->to->lines, v[0], e);
         return r < 0 ? r : put_index(&x->to->lines, v[1], e);
     }
-    vgi_face_normal(x->reference, v, n, normal);
+    vgi_face_area(x->reference, v, n, normal);
     if (n == 3 || n > VGI_MOST_CLIPPED || vgi_is_fan(x->reference, v, n, normal)) return put_fan(x, v, n, e);
     return put_ears(x, v, n, normal, e);
 }

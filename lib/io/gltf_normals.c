@@ -3,7 +3,7 @@
  * artist, are in gltf_character.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_normals.h"
-#include "numeric/vec3.h"
+#include "numeric/face.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -15,25 +15,11 @@ static size_t face_size(const vg_mesh *m, size_t f)
     return m->start[f + 1] - m->start[f];
 }
 
-static void unit(double p[3])
-{
-    const double l = vgi_length(p);
-    for (int k = 0; k < 3; k++) p[k] = l > 0 ? p[k] / l : 0;
-}
-
 /* The unit normal of a possibly bent face; zero if it has no area. */
 static void face_normal(const vg_mesh *m, size_t f, const double *pose, double n[3])
 {
-    const uint32_t *v = m->vert + m->start[f];
-    const double *o = pose + 3 * (size_t)v[0];
-    n[0] = n[1] = n[2] = 0;
-    for (size_t i = 1; i + 1 < face_size(m, f); i++) {
-        double a[3], b[3], c[3];
-        for (int k = 0; k < 3; k++) a[k] = pose[3 * (size_t)v[i] + (size_t)k] - o[k], b[k] = pose[3 * (size_t)v[i + 1] + (size_t)k] - o[k];
-        vgi_cross(a, b, c);
-        for (int k = 0; k < 3; k++) n[k] += c[k];
-    }
-    unit(n);
+    vgi_face_area(pose, m->vert + m->start[f], face_size(m, f), n);
+    vgi_make_unit(n);
 }
 
 /* ---- smooth surfaces ---- */
@@ -171,7 +157,7 @@ static double angle_at(const vg_mesh *m, size_t f, size_t i, const double *pose)
         arm[0][k] = pose[3 * (size_t)v[(i + 1) % size] + (size_t)k] - at;
         arm[1][k] = pose[3 * (size_t)v[(i + size - 1) % size] + (size_t)k] - at;
     }
-    unit(arm[0]), unit(arm[1]);
+    vgi_make_unit(arm[0]), vgi_make_unit(arm[1]);
     return acos(fmax(-1, fmin(1, vgi_dot(arm[0], arm[1]))));
 }
 
@@ -186,10 +172,10 @@ static void sum_normals(vgi_gltf_normals *x, const double *pose)
         for (size_t i = 0; i < face_size(m, f); i++) {
             const double angle = angle_at(m, f, i, pose);
             double *to = x->sum + 3 * (size_t)x->corner[m->start[f] + i];
-            for (int k = 0; k < 3; k++) to[k] += angle * n[k];
+            vgi_add_scaled(to, angle, n);
         }
     }
-    for (size_t g = 0; g < x->ngroups; g++) unit(x->sum + 3 * g);
+    for (size_t g = 0; g < x->ngroups; g++) vgi_make_unit(x->sum + 3 * g);
 }
 
 /* Vertices without area or faces: any unit vector, because glTF requires one. */

@@ -2,6 +2,7 @@
  * skins applied. The scene's contents are in gltf_scene.c, animations in gltf_clips.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_scene.h"
+#include "numeric/vec3.h"
 
 #include <stdlib.h>
 
@@ -75,11 +76,11 @@ static bool bend(const vgi_gltf_scene *x, const vgi_gltf_part *p, size_t v, cons
             double moved[3];
             if (shares[i] == 0) continue;
             vgi_gltf_move_point(k->matrices + 12 * (size_t)joints[i], at, moved);
-            for (int c = 0; c < 3; c++) total[c] += shares[i] * moved[c];
+            vgi_add_scaled(total, shares[i], moved);
             sum += shares[i];
         }
     }
-    for (int c = 0; c < 3; c++) to[c] = total[c] / sum;
+    vgi_divided(total, sum, to);
     return sum != 0;
 }
 
@@ -116,7 +117,7 @@ static void pose_part(const vgi_gltf_scene *x, const vgi_gltf_part *p, double *t
         if (n->weights[t] == 0) continue;
         for (size_t i = 0; i < p->nkept; i++) {
             vgi_accessor_get(&p->moved[t], p->kept[i], d);
-            for (int k = 0; k < 3; k++) to[3 * i + k] += n->weights[t] * d[k];
+            vgi_add_scaled(to + 3 * i, n->weights[t], d);
         }
     }
     double world[12];

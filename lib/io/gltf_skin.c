@@ -7,6 +7,7 @@
  * joint, all binary32.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_write.h"
+#include "numeric/vec3.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -146,7 +147,7 @@ static int place_joint(const skinning *x, size_t j, const double *transforms, vg
     if (!(now[SIZE] > 0)) return vg_fail(e, VG_EINPUT, "the transform of bone %u shrinks it to a point", x->bone[j]);
     for (int k = 0; k < 4; k++) now[k] = t[k] / sqrt(now[SIZE]);
     vg_quat_apply(t, x->at + 3 * j, now + PLACE);
-    for (int k = 0; k < 3; k++) now[PLACE + k] += t[4 + k];
+    vgi_add(now + PLACE, t + 4);
     return VG_OK;
 }
 

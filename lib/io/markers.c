@@ -2,6 +2,7 @@
  * vertices exist.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
+#include "numeric/vec3.h"
 
 #include <stdlib.h>
 
@@ -64,7 +65,7 @@ static int take_seed(const vgi_lines *t, const vgi_line *l, int base, vg_seed *s
     if (r < 0) return r;
     if (!(sum > 0.5 && sum < 2))
         return vg_fail(e, VG_EINPUT, "%s line %zu: the weights add up to %g, not 1", t->subject, l->number, sum);
-    for (int k = 0; k < 3; k++) s->weight[k] /= sum;
+    vgi_divide(s->weight, sum);
     return VG_OK;
 }
 

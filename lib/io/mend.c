@@ -7,6 +7,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 #include "io/polygon.h"
+#include "numeric/face.h"
 
 #include <stdarg.h>
 #include <stdlib.h>
@@ -116,7 +117,7 @@ static int cut_ears(mending *k, vg_err *e)
     double normal[3];
     int r = VG_OK;
     for (size_t i = 0; i < k->n; i++) k->vertices[i] = k->ring[i].vertex;
-    vgi_face_normal(k->points, k->vertices, k->n, normal);
+    vgi_face_area(k->points, k->vertices, k->n, normal);
     k->cut++;
     for (bool more = true; more && r == VG_OK; tidy_ring(k), more = k->n > 2 && ring_repeats(k)) {
         size_t i = find_ear(k, normal);

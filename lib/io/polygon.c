@@ -2,33 +2,14 @@
  * (stl.c, gltf_faces.c).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/polygon.h"
-
-void vgi_triangle_normal(const double *points, uint32_t a, uint32_t b, uint32_t c, double normal[3])
-{
-    const double *p = points + 3 * (size_t)a, *q = points + 3 * (size_t)b, *r = points + 3 * (size_t)c;
-    double u[3], v[3];
-    for (int k = 0; k < 3; k++) u[k] = q[k] - p[k], v[k] = r[k] - p[k];
-    normal[0] = u[1] * v[2] - u[2] * v[1];
-    normal[1] = u[2] * v[0] - u[0] * v[2];
-    normal[2] = u[0] * v[1] - u[1] * v[0];
-}
+#include "numeric/face.h"
 
 /* Positive if the triangle has the orientation of the face; 0 if it has no area. */
 static double facing(const double *points, uint32_t a, uint32_t b, uint32_t c, const double normal[3])
 {
     double n[3];
-    vgi_triangle_normal(points, a, b, c, n);
-    return n[0] * normal[0] + n[1] * normal[1] + n[2] * normal[2];
-}
-
-void vgi_face_normal(const double *points, const uint32_t *v, size_t n, double normal[3])
-{
-    normal[0] = normal[1] = normal[2] = 0;
-    for (size_t i = 1; i + 1 < n; i++) {
-        double t[3];
-        vgi_triangle_normal(points, v[0], v[i], v[i + 1], t);
-        for (int k = 0; k < 3; k++) normal[k] += t[k];
-    }
+    vgi_triangle_normal(points + 3 * (size_t)a, points + 3 * (size_t)b, points + 3 * (size_t)c, n);
+    return vgi_dot(n, normal);
 }
 
 bool vgi_is_fan(const double *points, const uint32_t *v, size_t n, const double normal[3])

@@ -9,11 +9,7 @@
 /* A face with more corners is split as a fan, whatever its shape, because clipping takes at least quadratic time. */
 enum { VGI_MOST_CLIPPED = 512 };
 
-/* vgi_triangle_normal: (b - a) x (c - a). */
-void vgi_triangle_normal(const double *points, uint32_t a, uint32_t b, uint32_t c, double normal[3]);
-/* vgi_face_normal: twice the vector area (Newell). */
-void vgi_face_normal(const double *points, const uint32_t *v, size_t n, double normal[3]);
-/* vgi_is_fan: whether the fan of triangles around the first vertex covers the face. */
+/* vgi_is_fan: whether the fan of triangles around the first vertex covers the face. normal: vgi_face_area. */
 bool vgi_is_fan(const double *points, const uint32_t *v, size_t n, const double normal[3]);
 /* vgi_is_ear: whether corner i is convex, with no other corner inside its triangle. */
 bool vgi_is_ear(const double *points, const uint32_t *v, size_t n, size_t i, const double normal[3]);

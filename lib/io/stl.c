@@ -7,6 +7,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
 #include "io/polygon.h"
+#include "numeric/face.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -338,9 +339,8 @@ static int put_triangle(struct writing *x, uint32_t a, uint32_t b, uint32_t c)
 {
     const uint32_t v[3] = {a, b, c};
     double n[3];
-    vgi_triangle_normal(x->w->vertices, a, b, c, n);
-    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    for (int k = 0; k < 3; k++) n[k] = length > 0 && isfinite(length) ? n[k] / length : 0;
+    vgi_triangle_normal(point(x, a), point(x, b), point(x, c), n);
+    if (!isfinite(vgi_make_unit(n))) n[0] = n[1] = n[2] = 0;
     x->triangles++;
     if (x->text) return put_text(x, n, v);
     unsigned char facet[FACET] = {0};
@@ -379,7 +379,7 @@ static int put_face(struct writing *x, const uint32_t *v, size_t n)
 {
     double normal[3];
     if (n <= 3 || n > VGI_MOST_CLIPPED) return put_fan(x, v, n);
-    vgi_face_normal(x->w->shape, v, n, normal);
+    vgi_face_area(x->w->shape, v, n, normal);
     return vgi_is_fan(x->w->shape, v, n, normal) ? put_fan(x, v, n) : clip_ears(x, v, n, normal);
 }
 

@@ -88,8 +88,7 @@ void vg_graph_vectors(const vg_graph *g, const double *vertices, double *vectors
             vgi_add(centre, vertices + 3 * (size_t)g->faces.vert[c]);
         vgi_scale(centre, share);
         for (uint32_t c = begin; c < end; c++)
-            for (int k = 0; k < 3; k++)
-                vectors[3 * (size_t)c + k] = vertices[3 * (size_t)g->faces.vert[c] + k] - centre[k];
+            vgi_subtract(vertices + 3 * (size_t)g->faces.vert[c], centre, vectors + 3 * (size_t)c);
     }
 }
 

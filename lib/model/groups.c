@@ -39,7 +39,7 @@ int vg_joint_groups_skeleton(const vg_joint_groups *g, size_t nv, const double *
         memcpy(joint->channels, root ? channels : channels + 3, joint->nchannels);
         place(group, reference, joint->offset);
         if (!root) place(&g->at[group->parent], reference, above);
-        for (int k = 0; k < 3; k++) joint->offset[k] -= above[k];
+        vgi_deduct(joint->offset, above);
     }
     return VG_OK;
 }
@@ -47,24 +47,17 @@ int vg_joint_groups_skeleton(const vg_joint_groups *g, size_t nv, const double *
 /* b += weight * d r', with d and r normalised */
 static void add_pair(double b[9], double weight, const double d[3], const double r[3])
 {
-    double x = 0, y = 0;
-    for (int k = 0; k < 3; k++) x += d[k] * d[k], y += r[k] * r[k];
+    double x = vgi_dot(d, d), y = vgi_dot(r, r);
     if (!(x > 0 && y > 0)) return;
     for (int k = 0; k < 3; k++)
         for (int l = 0; l < 3; l++) b[3 * k + l] += weight * d[k] * r[l] / sqrt(x * y);
 }
 
-static void subtract(const double *a, const double *b, double d[3])
-{
-    vgi_subtract(a, b, d);
-}
-
 /* the part of x perpendicular to u */
 static void reject(const double u[3], double x[3])
 {
-    double along = 0, square = 0;
-    for (int k = 0; k < 3; k++) along += u[k] * x[k], square += u[k] * u[k];
-    for (int k = 0; k < 3 && square > 0; k++) x[k] -= along / square * u[k];
+    double along = vgi_dot(u, x), square = vgi_dot(u, u);
+    if (square > 0) vgi_add_scaled(x, -(along / square), u);
 }
 
 static void turn_joint(const vg_joint_groups *g, size_t j, const double *reference, const double *pose,
@@ -79,16 +72,16 @@ static void turn_joint(const vg_joint_groups *g, size_t j, const double *referen
         double at[3];
         if (g->at[c].parent != j) continue;
         place(&g->at[c], reference, at);
-        subtract(at, rest, r);
-        subtract(positions + 3 * c, positions + 3 * j, d);
+        vgi_subtract(at, rest, r);
+        vgi_subtract(positions + 3 * c, positions + 3 * j, d);
         add_pair(b, 1, d, r);
         memcpy(below[0], d, sizeof d);
         memcpy(below[1], r, sizeof r);
         children++;
     }
     for (size_t i = 0; i < (children == 1 ? 1 : group->nvertices); i++) {
-        subtract(pose + 3 * (size_t)group->vertices[i], positions + 3 * j, d);
-        subtract(reference + 3 * (size_t)group->vertices[i], rest, r);
+        vgi_subtract(pose + 3 * (size_t)group->vertices[i], positions + 3 * j, d);
+        vgi_subtract(reference + 3 * (size_t)group->vertices[i], rest, r);
         if (children == 1)
             reject(below[0], d), reject(below[1], r); /* perpendicular to the bone: the frame is met exactly */
         add_pair(b, children == 1 ? 1 : 0.01, d, r);

@@ -1,6 +1,7 @@
 /* laplacian.c: the graph Laplacian of weighted edges.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "model/laplacian.h"
+#include "numeric/vec3.h"
 
 #include <stdlib.h>
 
@@ -90,8 +91,9 @@ void vgi_laplacian_apply(const vgi_laplacian *L, const double *x, double *y)
         const double *at = x + 3 * v;
         to[0] = to[1] = to[2] = 0;
         for (uint32_t i = L->first[v]; i < L->first[v + 1]; i++) {
-            const double *from = x + 3 * (size_t)L->to[i];
-            for (int k = 0; k < 3; k++) to[k] += L->weight[i] * (at[k] - from[k]);
+            double way[3];
+            vgi_subtract(at, x + 3 * (size_t)L->to[i], way);
+            vgi_add_scaled(to, L->weight[i], way);
         }
     }
 }

@@ -76,7 +76,8 @@ void vg_rig_skin(const vg_rig *r, size_t nv, const double *reference, const doub
             if (!(w > 0)) break;
             const double *t = transforms + 7 * (size_t)r->skin_bone[VG_SKIN * v + i];
             vg_quat_apply(t, reference + 3 * v, moved);
-            for (int k = 0; k < 3; k++) sum[k] += w * (moved[k] + t[4 + k]);
+            vgi_add(moved, t + 4);
+            vgi_add_scaled(sum, w, moved);
         }
         memcpy(vertices + 3 * v, sum, sizeof sum);
     }
@@ -93,7 +94,7 @@ size_t vg_rig_find(const vg_rig *r, const char *name)
 
 bool vg_rig_axis(const vg_rig *r, size_t b, double axis[3])
 {
-    double sum[3] = {0, 0, 0}, length = 0;
+    double sum[3] = {0, 0, 0}, way[3];
     size_t own = r->bone[b];
     bool ends = false;
     for (size_t j = 0; j < r->skeleton.njoints; j++) /* an end site, if present, gives the direction */
@@ -101,11 +102,11 @@ bool vg_rig_axis(const vg_rig *r, size_t b, double axis[3])
     for (size_t j = 0; j < r->skeleton.njoints; j++) {
         const vg_joint *joint = &r->skeleton.joints[j];
         if (joint->parent != own || (ends && joint->nchannels)) continue;
-        for (size_t k = 0; k < 3; k++) sum[k] += r->at[3 * j + k] - r->at[3 * own + k];
+        vgi_subtract(r->at + 3 * j, r->at + 3 * own, way);
+        vgi_add(sum, way);
     }
-    for (int k = 0; k < 3; k++) length += sum[k] * sum[k];
-    for (int k = 0; k < 3; k++) axis[k] = length > 0 ? sum[k] / sqrt(length) : 0;
-    return length > 0;
+    memcpy(axis, sum, sizeof sum);
+    return vgi_make_unit(axis) > 0;
 }
 
 static bool hangs_on(const vg_rig *r, size_t joint, size_t above)

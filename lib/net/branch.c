@@ -20,7 +20,7 @@ static void near(const double w[3], const double target[3], double out[3])
         for (int k = 0; k < 3; k++) out[k] = turns != 0 ? turns * target[k] : w[k];
         return;
     }
-    for (int k = 0; k < 3; k++) axis[k] = w[k] / angle;
+    vgi_divided(w, angle, axis);
     double k = round((vgi_dot(target, axis) - angle) / (2 * pi)), length = angle + 2 * pi * k;
     for (int i = 0; i < 3; i++) out[i] = k != 0 ? axis[i] * length : w[i];
 }

@@ -4,6 +4,7 @@
 #include "net/root.h"
 #include "numeric/blas.h"
 #include "numeric/lapack.h"
+#include "numeric/vec3.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -41,7 +42,7 @@ void vgi_root_move(const vg_network *n, size_t main_part, const double *steps, d
 {
     double l[4] = {0, steps[0] / 2, steps[1] / 2, steps[2] / 2}, q[4], shift[3], length = 0;
     vg_quat_apply(root, steps + 3, shift);
-    for (size_t k = 0; k < 3; k++) centroids[3 * main_part + k] += n->diagonal * shift[k];
+    vgi_add_scaled(centroids + 3 * main_part, n->diagonal, shift);
     vg_quat_exp(l, q);
     vg_quat_multiply(root, q, root);
     for (int k = 0; k < 4; k++) length += root[k] * root[k];

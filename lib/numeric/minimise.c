@@ -5,6 +5,7 @@
  * direction.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/minimise.h"
+#include "numeric/vec3.h"
 
 #include <float.h>
 #include <math.h>
@@ -25,13 +26,6 @@ typedef struct search {
     size_t pairs;
 } search;
 
-static double dot(const double *a, const double *b, size_t n)
-{
-    double sum = 0;
-    for (size_t i = 0; i < n; i++) sum += a[i] * b[i];
-    return sum;
-}
-
 static int make_search(search *s, const vgi_function *f, vg_err *e)
 {
     *s = (search){.f = f};
@@ -50,15 +44,15 @@ static void find_direction(search *s)
     double by[MEMORY];
     for (size_t i = 0; i < n; i++) s->d[i] = -s->g[i];
     for (size_t k = s->pairs; k-- > 0;) {
-        by[k] = dot(s->s[k], s->d, n) / s->curvature[k];
+        by[k] = vgi_inner(s->s[k], s->d, n) / s->curvature[k];
         for (size_t i = 0; i < n; i++) s->d[i] -= by[k] * s->y[k][i];
     }
     if (!s->pairs) return;
     const double *y = s->y[s->pairs - 1];
-    double scale = s->curvature[s->pairs - 1] / dot(y, y, n);
+    double scale = s->curvature[s->pairs - 1] / vgi_inner(y, y, n);
     for (size_t i = 0; i < n; i++) s->d[i] *= scale;
     for (size_t k = 0; k < s->pairs; k++) {
-        double more = by[k] - dot(s->y[k], s->d, n) / s->curvature[k];
+        double more = by[k] - vgi_inner(s->y[k], s->d, n) / s->curvature[k];
         for (size_t i = 0; i < n; i++) s->d[i] += more * s->s[k][i];
     }
 }
@@ -91,8 +85,8 @@ static void remember(search *s, const double *x, int taken)
         s->s[k][i] = s->x[taken][i] - x[i];
         s->y[k][i] = s->gradient[taken][i] - s->g[i];
     }
-    s->curvature[k] = dot(s->s[k], s->y[k], n);
-    double size = sqrt(dot(s->s[k], s->s[k], n) * dot(s->y[k], s->y[k], n));
+    s->curvature[k] = vgi_inner(s->s[k], s->y[k], n);
+    double size = sqrt(vgi_inner(s->s[k], s->s[k], n) * vgi_inner(s->y[k], s->y[k], n));
     s->pairs = s->curvature[k] > least_curvature * size && size > 0 ? k + 1 : k;
 }
 
@@ -102,7 +96,7 @@ static bool search_on(search *s, double *x, double gain, vgi_minimum *m)
     size_t n = s->f->n;
     int taken = TRIALS;
     find_direction(s);
-    double slope = dot(s->g, s->d, n);
+    double slope = vgi_inner(s->g, s->d, n);
     if (!(slope < 0)) return false;
     double unit = s->pairs ? 1 : fmin(1, 1 / sqrt(-slope)); /* in the first round d is the gradient: a step of length
                                                                at most 1 */

@@ -1,4 +1,4 @@
-/* vec3.h: vectors of three numbers and 3 x 3 matrices, row-major.
+/* vec3.h: vectors of three numbers, 3 x 3 matrices, row-major, and the inner product.
  * Internal. Quaternions are in vg.h, eight poses side by side in lanes.h.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_VEC3_H
@@ -8,33 +8,56 @@
 #include <stddef.h>
 #include <string.h>
 
+/* Written without loops, which gcc's analyser reads wrongly. */
 static inline void vgi_subtract(const double a[3], const double b[3], double d[3]) /* d = a - b */
 {
-    for (int k = 0; k < 3; k++) d[k] = a[k] - b[k];
+    d[0] = a[0] - b[0], d[1] = a[1] - b[1], d[2] = a[2] - b[2];
 }
 static inline void vgi_sum(const double a[3], const double b[3], double s[3])
 {
-    for (int k = 0; k < 3; k++) s[k] = a[k] + b[k];
+    s[0] = a[0] + b[0], s[1] = a[1] + b[1], s[2] = a[2] + b[2];
 }
 static inline void vgi_add(double x[3], const double y[3]) /* x += y */
 {
-    for (int k = 0; k < 3; k++) x[k] += y[k];
+    x[0] += y[0], x[1] += y[1], x[2] += y[2];
+}
+static inline void vgi_deduct(double x[3], const double y[3]) /* x -= y */
+{
+    x[0] -= y[0], x[1] -= y[1], x[2] -= y[2];
 }
 static inline void vgi_add_scaled(double x[3], double s, const double y[3]) /* x += s y */
 {
-    for (int k = 0; k < 3; k++) x[k] += s * y[k];
+    x[0] += s * y[0], x[1] += s * y[1], x[2] += s * y[2];
 }
 static inline void vgi_scale(double x[3], double s)
 {
-    for (int k = 0; k < 3; k++) x[k] *= s;
+    x[0] *= s, x[1] *= s, x[2] *= s;
+}
+static inline void vgi_scaled(double s, const double x[3], double y[3]) /* y = s x */
+{
+    y[0] = s * x[0], y[1] = s * x[1], y[2] = s * x[2];
 }
 static inline void vgi_divide(double x[3], double s)
 {
-    for (int k = 0; k < 3; k++) x[k] /= s;
+    x[0] /= s, x[1] /= s, x[2] /= s;
+}
+static inline void vgi_divided(const double x[3], double s, double y[3]) /* y = x / s */
+{
+    y[0] = x[0] / s, y[1] = x[1] / s, y[2] = x[2] / s;
+}
+static inline void vgi_mix(const double a[3], const double b[3], double t, double c[3]) /* c = a + t (b - a) */
+{
+    c[0] = a[0] + t * (b[0] - a[0]), c[1] = a[1] + t * (b[1] - a[1]), c[2] = a[2] + t * (b[2] - a[2]);
 }
 static inline double vgi_dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+static inline double vgi_inner(const double *a, const double *b, size_t n) /* the same for n numbers, in order */
+{
+    double sum = 0;
+    for (size_t i = 0; i < n; i++) sum += a[i] * b[i];
+    return sum;
 }
 static inline double vgi_length(const double a[3])
 {
@@ -64,7 +87,7 @@ static inline void vgi_area_vector(const double *w, size_t r, double n[3])
     for (size_t i = 0; i < r; i++) {
         double part[3];
         vgi_cross(w + 3 * i, w + 3 * (i + 1 < r ? i + 1 : 0), part);
-        for (int k = 0; k < 3; k++) n[k] += part[k];
+        vgi_add(n, part);
     }
 }
 
@@ -79,6 +102,12 @@ static inline void vgi_multiply(const double a[9], const double b[9], double ab[
 static inline void vgi_multiply_vector(const double m[9], const double x[3], double y[3])
 {
     double a = vgi_dot(m, x), b = vgi_dot(m + 3, x), c = vgi_dot(m + 6, x);
+    y[0] = a, y[1] = b, y[2] = c;
+}
+static inline void vgi_transposed_vector(const double m[9], const double x[3], double y[3]) /* y = m' x */
+{
+    double a = m[0] * x[0] + m[3] * x[1] + m[6] * x[2], b = m[1] * x[0] + m[4] * x[1] + m[7] * x[2],
+           c = m[2] * x[0] + m[5] * x[1] + m[8] * x[2];
     y[0] = a, y[1] = b, y[2] = c;
 }
 /* m += scale a b' */

@@ -158,7 +158,7 @@ void vgi_branches_walk(const vgi_branches *b, const double *q, const double *bef
     if (!(vgi_length(step) > M_PI / 2)) return; /* of the half angle: most of the surface differs by a whole turn */
     for (size_t i = 0; i < b->n; i++) {
         double near[3];
-        for (size_t k = 0; k < 3; k++) near[k] = l[3 * i + k] + step[k];
+        vgi_sum(l + 3 * i, step, near);
         if (b->parent[i] == i) vgi_branch_near(q + 4 * i, near, l + 3 * i);
     }
     follow_parents(b, q, l);

@@ -74,20 +74,13 @@ static void measure(vg_corrector *c, const double *pose, double *feature)
     }
 }
 
-static double product(const double *a, const double *b, size_t n)
-{
-    double sum = 0;
-    for (size_t i = 0; i < n; i++) sum += a[i] * b[i];
-    return sum;
-}
-
 static int factor(vg_corrector *c, vg_err *e)
 {
     double most = 0;
     bool definite;
     for (size_t i = 0; i < c->n; i++) {
         for (size_t j = 0; j <= i; j++)
-            c->factor[i * c->n + j] = product(c->feature + 4 * c->from * i, c->feature + 4 * c->from * j, 4 * c->from);
+            c->factor[i * c->n + j] = vgi_inner(c->feature + 4 * c->from * i, c->feature + 4 * c->from * j, 4 * c->from);
         most = fmax(most, c->factor[i * c->n + i]);
     }
     definite = vgi_spd_factor(c->n, c->factor);
@@ -103,7 +96,7 @@ static void turns_of(vg_corrector *c, const double *vectors)
 {
     vg_deformer_measure(c->of_target, 1, VG_VECTORS, &vectors, &c->quaternions);
     for (size_t i = 0; i < c->to; i++) {
-        double *q = c->quaternions + 4 * i, size = sqrt(product(q, q, 4));
+        double *q = c->quaternions + 4 * i, size = sqrt(vgi_inner(q, q, 4));
         for (int k = 0; k < 4; k++) q[k] = size > 0 ? q[k] / size : k == 0;
     }
 }
@@ -159,13 +152,13 @@ int vg_corrector_new(vg_corrector **out, const vg_graph *source, const double *s
 void vg_corrector_apply(vg_corrector *c, const double *pose, double *vectors)
 {
     measure(c, pose, c->now);
-    for (size_t j = 0; j < c->n; j++) c->x[j] = product(c->now, c->feature + 4 * c->from * j, 4 * c->from);
+    for (size_t j = 0; j < c->n; j++) c->x[j] = vgi_inner(c->now, c->feature + 4 * c->from * j, 4 * c->from);
     vgi_spd_solve(c->n, c->factor, 1, c->x);
     turns_of(c, vectors);
     for (size_t i = 0; i < c->to; i++) {
         double sum[3] = {0, 0, 0}, turned[3];
         for (size_t j = 0; j < c->n; j++)
-            for (size_t k = 0; k < 3; k++) sum[k] += c->x[j] * c->miss[3 * (j * c->to + i) + k];
+            vgi_add_scaled(sum, c->x[j], c->miss + 3 * (j * c->to + i));
         vg_quat_apply(c->quaternions + 4 * i, sum, turned);
         vgi_add(vectors + 3 * i, turned);
     }

@@ -41,9 +41,9 @@ void vgi_root_centre(size_t n, const vg_graph *g, const double centre[3], double
     for (size_t i = 0; i < n; i++) {
         double *pose = poses + i * 3 * g->faces.nv, at[3], turned[3];
         vg_graph_root(g, pose, at);
-        for (size_t k = 0; k < 3; k++) at[k] -= centre[k];
+        vgi_deduct(at, centre);
         vg_quat_apply(turn + 4 * i, at, turned);
-        for (size_t k = 0; k < 3; k++) shift[3 * i + k] += turned[k];
+        vgi_add(shift + 3 * i, turned);
         for (size_t c = 0; c < 3 * g->faces.nv; c++) pose[c] -= at[c % 3];
     }
 }

@@ -198,7 +198,7 @@ static void put_log(const double q[4], double weight, double before[3], double *
     double l[3];
     vgi_branch_near(q, before, l);
     memcpy(before, l, sizeof l);
-    for (int k = 0; k < 3; k++) out[k] = weight * M_SQRT2 * 2 * l[k];
+    vgi_scaled(weight * M_SQRT2 * 2, l, out);
 }
 
 /* An angle in a sequence of frames, without jumps by whole turns. */

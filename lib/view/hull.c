@@ -2,6 +2,7 @@
  * (page_draw.js).
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/page.h"
+#include "numeric/vec3.h"
 
 #include <math.h>
 
@@ -20,7 +21,7 @@ static void extend(vgi_hull *h, size_t i, double reach, const double p[3], const
 {
     if (h->n && !(reach > h->reach[i])) return;
     h->reach[i] = reach;
-    for (size_t k = 0; k < 3; k++) h->at[i][k] = p[k] - centre[k];
+    vgi_subtract(p, centre, h->at[i]);
 }
 
 void vgi_hull_add(vgi_hull *h, const double *points, const bool *drawn, size_t nv, const double centre[3])

@@ -4,6 +4,7 @@
 #include "view/page.h"
 
 #include "io/io.h"
+#include "numeric/face.h"
 #include "view/view.h"
 
 #include <math.h>
@@ -117,14 +118,9 @@ int vgi_page_list(vg_page *p, size_t i, const char *what, const uint32_t *list, 
 /* Project a face along the axis nearest to its normal. This distorts angles, which does not matter here. */
 static bool flatten_face(const uint32_t *v, size_t n, const double *points, double *xy)
 {
-    double normal[3] = {0, 0, 0};
+    double normal[3];
     const double *o = points + 3 * (size_t)v[0];
-    for (size_t i = 1; i + 1 < n; i++) {
-        double a[3], b[3];
-        for (size_t k = 0; k < 3; k++)
-            a[k] = points[3 * (size_t)v[i] + k] - o[k], b[k] = points[3 * (size_t)v[i + 1] + k] - o[k];
-        for (size_t k = 0; k < 3; k++) normal[k] += a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
-    }
+    vgi_face_area(points, v, n, normal);
     size_t along = 0;
     for (size_t k = 1; k < 3; k++)
         if (fabs(normal[k]) > fabs(normal[along])) along = k;

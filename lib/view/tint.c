@@ -2,6 +2,7 @@
  * the growth of its vectors; and the ends of the colour map. Shared by sheets and pages. The colours are in colour.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
+#include "numeric/vec3.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -21,7 +22,7 @@ static void corner_lengths(const vg_mesh *m, const double *points, double *lengt
     for (size_t f = 0; f < m->nf; f++) {
         double centre[3] = {0, 0, 0}, share = 1 / (double)(m->start[f + 1] - m->start[f]);
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++)
-            for (size_t k = 0; k < 3; k++) centre[k] += share * points[3 * (size_t)m->vert[c] + k];
+            vgi_add_scaled(centre, share, points + 3 * (size_t)m->vert[c]);
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
             const double *p = points + 3 * (size_t)m->vert[c];
             lengths[c] = hypot(hypot(p[0] - centre[0], p[1] - centre[1]), p[2] - centre[2]);
@@ -84,7 +85,7 @@ static void measure_errors(vgi_meter *m, bool centred, const double *points, con
     if (centred) {
         vg_centroid(points, nv, a);
         vg_centroid(truth, nv, b);
-        for (int k = 0; k < 3; k++) shift[k] = a[k] - b[k];
+        vgi_subtract(a, b, shift);
     }
     for (size_t v = 0; v < nv; v++) {
         double d[3];

@@ -6,6 +6,7 @@
 
 #include "io/io.h"
 #include "io/polygon.h"
+#include "numeric/face.h"
 
 static int read_bytes(vg_model *m, const void *data, size_t n, const char *name, char message[480])
 {
@@ -105,8 +106,8 @@ static double area(const vg_model *m)
     double sum = 0;
     for (size_t f = 0; f < m->mesh.nf; f++) {
         double n[3];
-        vgi_face_normal(m->vertices, m->mesh.vert + m->mesh.start[f], m->mesh.start[f + 1] - m->mesh.start[f], n);
-        sum += n[2];
+        vgi_face_area(m->vertices, m->mesh.vert + m->mesh.start[f], m->mesh.start[f + 1] - m->mesh.start[f], n);
+        sum += 2 * n[2];
     }
     return sum;
 }

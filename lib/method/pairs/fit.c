@@ -137,7 +137,8 @@ static void prepare_faces(fit *t)
             t->trust[f] = r == 2 && h > 0;
             continue;
         }
-        for (int k = 0; k < 3; k++) n[k] /= area, t->h_normal[3 * f + (size_t)k] = h * n[k];
+        vgi_divide(n, area);
+        vgi_scaled(h, n, t->h_normal + 3 * f);
         vgi_add_outer(S, h, n, n);
         double det = vgi_cofactors(S, c);
         t->trust[f] = det / (h * h * h); /* 4 l1 l2 / (l1 + l2)^2, with l1, l2 the eigenvalues in the plane */
@@ -153,10 +154,8 @@ static void prepare_faces(fit *t)
 static void bone_map(const double *x, const double *rest, const uint32_t *vert, double D[9])
 {
     double r[3], d[3], q[4], unit[4];
-    for (int k = 0; k < 3; k++) {
-        r[k] = rest[3 * (size_t)vert[1] + (size_t)k] - rest[3 * (size_t)vert[0] + (size_t)k];
-        d[k] = x[3 * (size_t)vert[1] + (size_t)k] - x[3 * (size_t)vert[0] + (size_t)k];
-    }
+    vgi_subtract(rest + 3 * (size_t)vert[1], rest + 3 * (size_t)vert[0], r);
+    vgi_subtract(x + 3 * (size_t)vert[1], x + 3 * (size_t)vert[0], d);
     double a = vgi_length(d) / vgi_length(r);
     if (!(a > 0)) d[0] = r[0], d[1] = r[1], d[2] = r[2], a = 1e-6;
     vg_quat_between(r, d, q);
@@ -206,7 +205,7 @@ static int smooth_maps(fit *t, vg_err *e)
             for (size_t k = 0; k < 3; k++) to[k] = k == row ? IDENTITY_TRUST : 0;
             for (uint32_t i = t->around.first[v]; i < t->around.first[v + 1]; i++) {
                 size_t f = t->around.face[i];
-                for (size_t k = 0; k < 3; k++) to[k] += t->trust[f] * t->face_map[9 * f + 3 * row + k];
+                vgi_add_scaled(to, t->trust[f], t->face_map + 9 * f + 3 * row);
             }
         }
         int r = vgi_cholesky_solve(t->smoother, D, e);
@@ -295,7 +294,8 @@ static void add_smoothness(fit *t)
             vgi_subtract(t->in->rest + 3 * v, t->in->rest + 3 * u, d);
             vgi_multiply_vector(t->map + 9 * v, d, a);
             vgi_multiply_vector(t->map + 9 * u, d, b);
-            for (int k = 0; k < 3; k++) to[k] += t->stretch * L->weight[i] * 0.5 * (a[k] + b[k]);
+            vgi_add(a, b);
+            vgi_add_scaled(to, t->stretch * L->weight[i] * 0.5, a);
         }
     }
 }
@@ -311,8 +311,7 @@ static void add_pulls(fit *t)
     for (size_t i = 0; i < t->in->nties; i++) {
         const vgi_tie *tie = &t->in->tie[i];
         for (int a = 0; a < 3; a++)
-            for (size_t k = 0; k < 3; k++)
-                t->rhs[3 * (size_t)tie->vertex[a] + k] += MARKER * tie->weight * tie->share[a] * tie->point[k];
+            vgi_add_scaled(t->rhs + 3 * (size_t)tie->vertex[a], MARKER * tie->weight * tie->share[a], tie->point);
     }
 }
 
@@ -323,8 +322,7 @@ static void add_reverse_pulls(fit *t)
         if (!(p->weight > 0)) continue;
         const uint32_t *vert = t->m->vert + t->m->start[p->face];
         for (size_t a = 0; a < t->m->start[p->face + 1] - t->m->start[p->face]; a++)
-            for (size_t k = 0; k < 3; k++)
-                t->rhs[3 * (size_t)vert[a] + k] += p->weight * p->share[a] * t->in->target_points[3 * i + k];
+            vgi_add_scaled(t->rhs + 3 * (size_t)vert[a], p->weight * p->share[a], t->in->target_points + 3 * i);
     }
 }
 

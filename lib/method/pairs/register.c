@@ -50,10 +50,8 @@ static void fit_similarity(struct similarity *s, const double *from, const doubl
     vgi_divide(a, sum), vgi_divide(b, sum);
     for (size_t i = 0; i < n; i++) {
         double x[3], y[3];
-        for (size_t k = 0; k < 3; k++) {
-            x[k] = from[3 * i + k] - a[k], y[k] = to[3 * i + k] - b[k];
-            aa += weight[i] * x[k] * x[k], bb += weight[i] * y[k] * y[k];
-        }
+        vgi_subtract(from + 3 * i, a, x), vgi_subtract(to + 3 * i, b, y);
+        for (size_t k = 0; k < 3; k++) aa += weight[i] * x[k] * x[k], bb += weight[i] * y[k] * y[k];
         vgi_add_outer(S, weight[i], y, x);
     }
     double q[4], turned[3];
@@ -61,14 +59,13 @@ static void fit_similarity(struct similarity *s, const double *from, const doubl
     vg_quat_matrix(q, s->rotation);
     s->scale = sqrt(bb / aa);
     vgi_multiply_vector(s->rotation, a, turned);
-    for (int k = 0; k < 3; k++) s->shift[k] = b[k] - s->scale * turned[k];
+    memcpy(s->shift, b, sizeof s->shift), vgi_add_scaled(s->shift, -s->scale, turned);
 }
 
 static void apply_similarity(const struct similarity *s, const double x[3], double y[3])
 {
-    double t[3];
-    vgi_multiply_vector(s->rotation, x, t);
-    for (int k = 0; k < 3; k++) y[k] = s->scale * t[k] + s->shift[k];
+    vgi_multiply_vector(s->rotation, x, y);
+    vgi_scale(y, s->scale), vgi_add(y, s->shift);
 }
 
 /* False if the points coincide or lie on one line: the covariance needs a second non-zero eigenvalue. */
@@ -132,8 +129,7 @@ static void add_seed_ties(struct registration *r)
         vgi_tie *t = &r->tie[r->nties++];
         *t = (vgi_tie){{s->vertex, s->vertex, s->vertex}, {1, 0, 0}, {0}, 1};
         if (in->seeds_of_source) {
-            for (int a = 0; a < 3; a++)
-                for (size_t k = 0; k < 3; k++) t->point[k] += s->weight[a] * r->target[3 * (size_t)s->on[a] + k];
+            for (int a = 0; a < 3; a++) vgi_add_scaled(t->point, s->weight[a], r->target + 3 * (size_t)s->on[a]);
         } else {
             memcpy(t->vertex, s->on, sizeof t->vertex);
             memcpy(t->share, s->weight, sizeof t->share);
@@ -173,17 +169,16 @@ static bool lift(const vg_mesh *m, uint32_t face, const double *uv, const double
             P[k] += points[3 * (size_t)m->vert[c] + k] / (double)r;
         }
     for (size_t c = begin; c < begin + r; c++) {
-        double u = uv[3 * c] - C[0], v = uv[3 * c + 1] - C[1];
+        double u = uv[3 * c] - C[0], v = uv[3 * c + 1] - C[1], x[3];
         S[0] += u * u, S[1] += u * v, S[2] += v * v;
-        for (size_t k = 0; k < 3; k++) {
-            double x = points[3 * (size_t)m->vert[c] + k] - P[k];
-            T[k] += u * x, T[3 + k] += v * x;
-        }
+        vgi_subtract(points + 3 * (size_t)m->vert[c], P, x);
+        vgi_add_scaled(T, u, x), vgi_add_scaled(T + 3, v, x);
     }
     double det = S[0] * S[2] - S[1] * S[1], u = at[0] - C[0], v = at[1] - C[1];
     if (!(det > 1e-9 * (S[0] + S[2]) * (S[0] + S[2]))) return false;
     double a = (S[2] * u - S[1] * v) / det, b = (S[0] * v - S[1] * u) / det;
-    for (size_t k = 0; k < 3; k++) out[k] = P[k] + a * T[k] + b * T[3 + k];
+    memcpy(out, P, sizeof P);
+    vgi_add_scaled(out, a, T), vgi_add_scaled(out, b, T + 3);
     return true;
 }
 
@@ -236,8 +231,7 @@ static int make_ties(struct registration *r, vg_err *e)
 static void tied_point(const vgi_tie *t, const double *x, double p[3])
 {
     p[0] = p[1] = p[2] = 0;
-    for (int a = 0; a < 3; a++)
-        for (size_t k = 0; k < 3; k++) p[k] += t->share[a] * x[3 * (size_t)t->vertex[a] + k];
+    for (int a = 0; a < 3; a++) vgi_add_scaled(p, t->share[a], x + 3 * (size_t)t->vertex[a]);
 }
 
 /* ---- pairs inconsistent with the others */
@@ -262,7 +256,7 @@ static void neighbour_residuals(const double *from, const double *way, const boo
             sum += w;
             vgi_add_scaled(mean, w, way + 3 * near[k]);
         }
-        for (int l = 0; l < 3; l++) mean[l] = found ? mean[l] / sum : 0;
+        if (found) vgi_divide(mean, sum);
         residual[i] = sqrt(vgi_square(mean, way + 3 * i));
     }
 }
@@ -279,7 +273,7 @@ static int judge_markers(struct registration *r, vg_err *e)
     int code = out->residual && out->left_out && from && way && room ? VG_OK : VG_ENOMEM;
     for (size_t i = 0; i < n && code == VG_OK; i++) {
         memcpy(from + 3 * i, r->rest + 3 * (size_t)r->tie[i].vertex[0], 3 * sizeof *from);
-        for (size_t k = 0; k < 3; k++) way[3 * i + k] = r->tie[i].point[k] - from[3 * i + k];
+        vgi_subtract(r->tie[i].point, from + 3 * i, way + 3 * i);
     }
     for (size_t left = 0; code == VG_OK && n > 0 && left <= n / 4; left++) {
         neighbour_residuals(from, way, out->left_out, n, out->residual);
@@ -300,6 +294,14 @@ static int judge_markers(struct registration *r, vg_err *e)
 
 /* ---- the steps in order ---- */
 
+static void to_units(const struct registration *r, const double *from, size_t n, double *to)
+{
+    for (size_t i = 0; i < n; i++) {
+        vgi_subtract(from + 3 * i, r->centre, to + 3 * i);
+        vgi_divide(to + 3 * i, r->unit);
+    }
+}
+
 static int normalise(struct registration *r, vg_err *e)
 {
     const vg_register_input *in = r->in;
@@ -313,10 +315,8 @@ static int normalise(struct registration *r, vg_err *e)
     if (!(r->unit > 0) || !(vg_diagonal(in->source_points, ns) > 0))
         return vg_fail(e, VG_EINPUT, "a mesh without extent cannot be registered");
     vg_centroid(in->target_points, nt, r->centre);
-    for (size_t i = 0; i < nt; i++)
-        for (size_t k = 0; k < 3; k++) r->target[3 * i + k] = (in->target_points[3 * i + k] - r->centre[k]) / r->unit;
-    for (size_t i = 0; i < ns; i++)
-        for (size_t k = 0; k < 3; k++) r->source[3 * i + k] = (in->source_points[3 * i + k] - r->centre[k]) / r->unit;
+    to_units(r, in->target_points, nt, r->target);
+    to_units(r, in->source_points, ns, r->source);
     return VG_OK;
 }
 
@@ -465,14 +465,15 @@ static int hand_over(struct registration *r, vg_err *e)
     out->fitted = vgi_array_raw(n, 3 * sizeof *out->fitted, e);
     if (!out->fitted) return VG_ENOMEM;
     for (size_t i = 0; i < n; i++)
-        for (size_t k = 0; k < 3; k++) out->fitted[3 * i + k] = r->x[3 * i + k] * r->unit + r->centre[k];
+        vgi_scaled(r->unit, r->x + 3 * i, out->fitted + 3 * i), vgi_add(out->fitted + 3 * i, r->centre);
     for (size_t f = 0; f < out->pairs.target_nf; f++) out->pairs.distance[f] *= r->unit;
     out->flipped = r->flipped;
     out->scale = r->s.scale;
     memcpy(out->rotation, r->s.rotation, sizeof out->rotation);
     double turned[3];
     vgi_multiply_vector(r->s.rotation, r->centre, turned);
-    for (int k = 0; k < 3; k++) out->shift[k] = r->s.shift[k] * r->unit - r->s.scale * turned[k] + r->centre[k];
+    vgi_scaled(r->unit, r->s.shift, out->shift);
+    vgi_add_scaled(out->shift, -r->s.scale, turned), vgi_add(out->shift, r->centre);
     return VG_OK;
 }
 

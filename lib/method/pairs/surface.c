@@ -64,10 +64,9 @@ static void set_triangle(struct triangle *t, const double *a, const double *b, c
                          size_t corner, uint8_t borders)
 {
     double area[3];
-    for (int k = 0; k < 3; k++) t->a[k] = a[k], t->ab[k] = b[k] - a[k], t->ac[k] = c[k] - a[k];
-    area[0] = t->ab[1] * t->ac[2] - t->ab[2] * t->ac[1];
-    area[1] = t->ab[2] * t->ac[0] - t->ab[0] * t->ac[2];
-    area[2] = t->ab[0] * t->ac[1] - t->ab[1] * t->ac[0];
+    memcpy(t->a, a, sizeof t->a);
+    vgi_subtract(b, a, t->ab), vgi_subtract(c, a, t->ac);
+    vgi_cross(t->ab, t->ac, area);
     t->face = (uint32_t)face, t->corner = (uint32_t)corner, t->borders = borders;
     t->flat = !(vgi_dot(area, area) > 1e-24 * vgi_dot(t->ab, t->ab) * vgi_dot(t->ac, t->ac));
 }
@@ -388,7 +387,7 @@ static bool fits(const vgi_surface *s, const struct triangle *t, const double u[
                  *c = r == 3 ? corner_normal(s, begin + 2) : n;
     double smooth[3];
     for (int k = 0; k < 3; k++) smooth[k] = (1 - u[0] - u[1]) * a[k] + u[0] * b[k] + u[1] * c[k];
-    double length = sqrt(vgi_dot(smooth, smooth));
+    double length = vgi_length(smooth);
     return length > 0 && vgi_dot(smooth, normal) >= cosine * length;
 }
 

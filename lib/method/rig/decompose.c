@@ -260,7 +260,7 @@ static void merge_pair(merging *m, size_t i, size_t j)
     size_t n = m->d->n;
     m->gone[j] = true;
     m->of[i].n += m->of[j].n, m->of[i].square += m->of[j].square;
-    for (size_t c = 0; c < 3; c++) m->of[i].p[c] += m->of[j].p[c];
+    vgi_add(m->of[i].p, m->of[j].p);
     for (size_t q = 0; q < m->d->l->n * PER_POSE; q++) pose_sums(m, i, 0)[q] += pose_sums(m, j, 0)[q];
     m->own[i] = cost_together(m, i, i);
     for (size_t v = 0; v < m->d->l->nv; v++)

@@ -118,7 +118,7 @@ static void read_slip(const vg_driver *d, size_t k, const double *positions, con
     double at[3] = {0, 0, 0};
     if (parent == NONE) return;
     vg_quat_apply(turns + 4 * (size_t)parent, d->by->joints[k].offset, at);
-    for (size_t i = 0; i < 3; i++) slip[i] = positions[3 * k + i] - at[i] - positions[3 * (size_t)parent + i];
+    vgi_subtract(positions + 3 * k, at, slip), vgi_deduct(slip, positions + 3 * (size_t)parent);
 }
 
 static void turn_joint(vg_driver *d, size_t j, const double *turns)
@@ -137,7 +137,7 @@ static void place_joint(vg_driver *d, size_t j, const double *positions, const d
     double *p = d->positions + 3 * j, slip[3] = {0, 0, 0};
     uint32_t from = d->from[j];
     if (d->carried[j]) {
-        for (size_t i = 0; i < 3; i++) p[i] = d->scale * positions[3 * (size_t)from + i];
+        vgi_scaled(d->scale, positions + 3 * (size_t)from, p);
         return;
     }
     if (joint->parent == NONE) {

@@ -174,7 +174,7 @@ static void fit_corner(const cornering *x, size_t face, size_t c, const double *
         double explained = vgi_dot(own, own) / weight_of(s, list[i]);
         if (explained > most) most = explained, best = list[i];
     }
-    for (size_t k = 0; k < 3; k++) u[k] = raw[4 * best + k] / weight_of(s, best);
+    vgi_divided(raw + 4 * best, weight_of(s, best), u);
     if (per == 2) {
         size_t second = best;
         double more = -INFINITY, p[3], q[3];

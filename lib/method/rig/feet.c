@@ -221,7 +221,7 @@ static double lower_by(const feet *f, const leg *l, size_t p)
     double hip[3], foot[3], d[3], flat = 0, reach = STRETCH * (l->length[0] + l->length[1]);
     joint_at(f->r, l->thigh, f->transforms[p], hip);
     joint_at(f->r, l->foot, f->transforms[p], foot);
-    for (size_t k = 0; k < 3; k++) d[k] = hip[k] - foot[k] - l->shift[3 * p + k];
+    vgi_subtract(hip, foot, d), vgi_deduct(d, l->shift + 3 * p);
     for (int k = 0; k < 3; k++) flat += k == f->up ? 0 : d[k] * d[k];
     double now = vgi_length(d);
     if (!(now > reach) || !(flat < reach * reach)) return 0;
@@ -270,10 +270,11 @@ static void place_knee(const leg *l, const double hip[3], const double knee[3], 
     double d = vgi_length(u), reach = fmin(fmax(d, fabs(a - b) / STRETCH), STRETCH * (a + b));
     vgi_turn_between(old, u, q);
     vg_quat_apply(q, thigh, side);
-    for (int k = 0; k < 3; k++) u[k] /= d, foot[k] = hip[k] + reach * u[k];
+    vgi_divide(u, d);
+    memcpy(foot, hip, 3 * sizeof *foot), vgi_add_scaled(foot, reach, u);
     for (int pass = 0; pass < 2; pass++) { /* perpendicular to the leg: the thigh, or `forward` for a straight leg */
         double along = vgi_dot(side, u);
-        for (int k = 0; k < 3; k++) side[k] -= along * u[k];
+        vgi_add_scaled(side, -along, u);
         if (vgi_length(side) > 1e-3 * a) break;
         memcpy(side, forward, sizeof side);
     }
@@ -291,7 +292,7 @@ static void bend_leg(const feet *f, const leg *l, size_t p)
     else forward[2] = 1;
     if (l->toe != NONE) {
         joint_at(f->r, l->toe, t, forward);
-        for (int k = 0; k < 3; k++) forward[k] -= foot[k];
+        vgi_deduct(forward, foot);
     }
     vgi_sum(foot, l->shift + 3 * p, to);
     to[f->up] += f->sign * f->lower[p]; /* the body was lowered, the foot stays */

@@ -257,7 +257,7 @@ static void carry(const vg_inverse_skin *x, working *w)
         size_t up = x->parent[j];
         for (size_t c = 0; c < 3; c++) {
             w->sum[3 * up + c] += w->sum[3 * j + c];
-            for (size_t k = 0; k < 3; k++) w->b[9 * up + 3 * c + k] += w->sum[3 * j + c] * x->offset[3 * j + k];
+            vgi_add_scaled(w->b + 9 * up + 3 * c, w->sum[3 * j + c], x->offset + 3 * j);
         }
     }
 }

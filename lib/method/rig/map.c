@@ -254,7 +254,9 @@ static void measure_patch(void *context, size_t p)
 /* to += A' x */
 static void add_back(const double a[9], const double x[3], double *to)
 {
-    for (int k = 0; k < 3; k++) to[k] += a[k] * x[0] + a[3 + k] * x[1] + a[6 + k] * x[2];
+    double back[3];
+    vgi_transposed_vector(a, x, back);
+    vgi_add(to, back);
 }
 
 static void add_face(const adding *a, size_t face)
@@ -429,7 +431,7 @@ static void missed(const vg_map_fitter *f, const vg_map *m, size_t k, double *de
     for (size_t p = 0; p < n; p++) {
         double at[3];
         vgi_move_point(&motion[p], m->centre + 3 * p, at);
-        for (int c = 0; c < 3; c++) root[c] += m->share[p] * at[c];
+        vgi_add_scaled(root, m->share[p], at);
     }
     for (size_t p = 0; p < n; p++)
         for (size_t c = 0; c < 3; c++) {
@@ -645,7 +647,7 @@ static int make_arrays(vg_map *m, const vg_map_fitter *f, vg_err *e)
     for (size_t p = 0; p < n; p++)
         m->share[p] = (double)(f->shape.first[p + 1] - f->shape.first[p]) / (double)f->shape.first[n];
     for (size_t i = 0; i < f->nheld; i++)
-        for (size_t k = 0; k < 3; k++) m->held_at[3 * i + k] = f->held_pull[3 * i + k] / f->b2[f->held_patch[i]];
+        vgi_divided(f->held_pull + 3 * i, f->b2[f->held_patch[i]], m->held_at + 3 * i);
     return VG_OK;
 }
 

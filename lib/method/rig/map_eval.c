@@ -182,7 +182,8 @@ static void root_of(const vg_player *p, const double *centre, double root[3])
     for (size_t i = 0; i < p->m->n; i++) {
         double at[3];
         vgi_multiply_vector(p->motion + 12 * i, centre + 3 * i, at);
-        for (int k = 0; k < 3; k++) root[k] += p->m->share[i] * (at[k] + p->motion[12 * i + 9 + (size_t)k]);
+        vgi_add(at, p->motion + 12 * i + 9);
+        vgi_add_scaled(root, p->m->share[i], at);
     }
 }
 
@@ -193,9 +194,9 @@ static void placed(const vg_player *p, size_t i, double t[3])
     const double *g = p->m->place + 3 * n * i;
     t[0] = t[1] = t[2] = 0;
     for (size_t j = 0; j < n; j++) {
-        const double *a = p->motion + 12 * j;
-        for (int k = 0; k < 3; k++)
-            t[k] += a[3 * k] * g[3 * j] + a[3 * k + 1] * g[3 * j + 1] + a[3 * k + 2] * g[3 * j + 2];
+        double part[3];
+        vgi_multiply_vector(p->motion + 12 * j, g + 3 * j, part);
+        vgi_add(t, part);
     }
 }
 
@@ -220,10 +221,11 @@ static void remember_end(vg_player *p, const double *transforms, double *miss, d
     root_of(p, p->m->home_centre, root);
     for (size_t i = 0; i < p->m->n; i++) {
         const double *a = p->motion + 12 * i;
-        double t[3] = {0, 0, 0}, d[3], b2 = (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+        double t[3] = {0, 0, 0}, d[3];
         if (!p->m->has_home) placed(p, i, t);
-        for (int k = 0; k < 3; k++) d[k] = a[9 + k] - root[k] - t[k];
-        for (int k = 0; k < 3; k++) miss[3 * i + (size_t)k] = (a[k] * d[0] + a[3 + k] * d[1] + a[6 + k] * d[2]) / b2;
+        vgi_subtract(a + 9, root, d), vgi_deduct(d, t);
+        vgi_transposed_vector(a, d, miss + 3 * i);
+        vgi_divide(miss + 3 * i, vgi_dot(a, a));
     }
 }
 
@@ -238,12 +240,11 @@ static void difference(const double *a, const double *b, const double *neighbour
         for (int k = 0; k < 4; k++) q[k] = -q[k];
     vg_quat_log(q, l);
     if (!neighbour) return;
-    double angle = sqrt(l[1] * l[1] + l[2] * l[2] + l[3] * l[3]), axis[3], along = 0;
-    double far = sqrt(neighbour[1] * neighbour[1] + neighbour[2] * neighbour[2] + neighbour[3] * neighbour[3]);
-    for (int k = 0; k < 3; k++) axis[k] = angle > 1e-9 ? l[k + 1] / angle : far > 0 ? neighbour[k + 1] / far : 0;
-    for (int k = 0; k < 3; k++) along += axis[k] * neighbour[k + 1];
-    double turns = round((along - angle) / half_turn);
-    for (int k = 0; k < 3; k++) l[k + 1] += turns * half_turn * axis[k];
+    double angle = vgi_length(l + 1), far = vgi_length(neighbour + 1), axis[3] = {0, 0, 0};
+    if (angle > 1e-9) vgi_divided(l + 1, angle, axis);
+    else if (far > 0) vgi_divided(neighbour + 1, far, axis);
+    double turns = round((vgi_dot(axis, neighbour + 1) - angle) / half_turn);
+    vgi_add_scaled(l + 1, turns * half_turn, axis);
 }
 
 void vg_player_between(vg_player *p, const double *a, const double *b, double t, double *out)
@@ -264,8 +265,7 @@ void vg_player_between(vg_player *p, const double *a, const double *b, double t,
     for (size_t i = 0; i < n; i++) {
         double at[3] = {0, 0, 0}, miss[3], turned[3];
         if (!p->m->has_home) placed(p, i, at);
-        for (size_t k = 0; k < 3; k++)
-            miss[k] = p->ends[3 * i + k] + t * (p->ends[3 * n + 3 * i + k] - p->ends[3 * i + k]);
+        vgi_mix(p->ends + 3 * i, p->ends + 3 * (n + i), t, miss);
         vgi_multiply_vector(p->motion + 12 * i, miss, turned);
         for (size_t k = 0; k < 3; k++)
             out[7 * i + 4 + k] = at[k] + root_a[k] + t * (root_b[k] - root_a[k]) + turned[k];

@@ -167,7 +167,7 @@ int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *
     }
     for (size_t b = 0; code == VG_OK && b < n; b++) {
         for (size_t i = 0; i < width; i++) place[b * width + i] -= mean[i];
-        for (size_t k = 0; k < 3; k++) place[b * width + 3 * b + k] -= m->centre[3 * b + k];
+        vgi_deduct(place + b * width + 3 * b, m->centre + 3 * b);
     }
     free(parent);
     free(mean);
@@ -238,7 +238,7 @@ static void column_input(const vg_map *m, const vgi_map_body *body, const vg_gra
         if (bones) link_vectors(body->rig, g, column, body->reference, 0, wanted);
         for (size_t i = 0; i < m->nheld; i++) {
             double w = hold_of(m, body, i, column, &at);
-            for (size_t k = 0; k < 3; k++) anchors[3 * i + k] = w * at[k];
+            vgi_scaled(w, at, anchors + 3 * i);
         }
         return;
     }

@@ -5,6 +5,7 @@
 #define VG_MAP_PARTS_H
 
 #include "core/core.h"
+#include "numeric/vec3.h"
 
 /* The vertices of each patch on one body. */
 typedef struct vgi_shape {
@@ -29,7 +30,8 @@ void vgi_shape_measure(const vgi_shape *s, size_t p, const double *pose, vgi_mot
 /* vgi_move_point: y = A x + t */
 static inline void vgi_move_point(const vgi_motion *m, const double x[3], double y[3])
 {
-    for (int i = 0; i < 3; i++) y[i] = m->a[3 * i] * x[0] + m->a[3 * i + 1] * x[1] + m->a[3 * i + 2] * x[2] + m->t[i];
+    vgi_multiply_vector(m->a, x, y);
+    vgi_add(y, m->t);
 }
 
 /* vgi_place_by_hinges: compute place (n x 3n) of the map from its hinges, centres and shares. */

@@ -29,7 +29,7 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
         for (size_t c = 0; c < corners; c++) {
             double *x = a + 3 * c, *y = b + 3 * c, q[4], l[4];
             if (!(vgi_dot(x, x) > 0 && vgi_dot(y, y) > 0)) { /* no direction: interpolate linearly */
-                for (size_t k = 0; k < 3; k++) x[k] += morph * (y[k] - x[k]);
+                vgi_mix(x, y, morph, x);
                 continue;
             }
             vg_quat_between(x, y, q);
@@ -40,7 +40,7 @@ static int morph_body(const vg_head *h, const vg_graph *g, const double *target,
         }
         vg_graph_root(g, h->body.reference, roots[0]);
         vg_graph_root(g, target, roots[1]);
-        for (int k = 0; k < 3; k++) root[k] = roots[0][k] + morph * (roots[1][k] - roots[0][k]);
+        vgi_mix(roots[0], roots[1], morph, root);
         const double *rhs_list[1] = {rhs}, *root_list[1] = {root};
         double *body_list[1] = {body};
         vg_solver_load(s, 1, (const double *const *)&a, NULL, body_list, &rhs);
@@ -130,7 +130,7 @@ static void move_joint(const vg_rig *r, size_t nv, const double *from, const dou
                 spread[1] += pull * (y[k] - after[k]) * (y[k] - after[k]);
             }
         }
-        for (int k = 0; k < 3 && round == 1 && sum > 0; k++) before[k] /= sum, after[k] /= sum;
+        if (round == 1 && sum > 0) vgi_divide(before, sum), vgi_divide(after, sum);
     }
     if (!(sum > 0)) return;
     double grown = spread[0] > 0 ? sqrt(spread[1] / spread[0]) : 1;

@@ -8,6 +8,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/rig/skin.h"
 #include "model/rig.h"
+#include "numeric/vec3.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -59,15 +60,11 @@ static int make_bones(bones *b, const vg_rig *r, vg_err *e)
 
 static double squared_distance(const double a[3], const double b[3], const double x[3])
 {
-    double d[3], y[3], along = 0, length = 0, sum = 0;
-    for (int k = 0; k < 3; k++) {
-        d[k] = b[k] - a[k], y[k] = x[k] - a[k];
-        along += d[k] * y[k], length += d[k] * d[k];
-    }
-    double t = length > 0 ? along / length : 0;
-    t = t < 0 ? 0 : t > 1 ? 1 : t;
-    for (int k = 0; k < 3; k++) sum += (y[k] - t * d[k]) * (y[k] - t * d[k]);
-    return sum;
+    double d[3], y[3];
+    vgi_subtract(b, a, d), vgi_subtract(x, a, y);
+    double length = vgi_dot(d, d), t = length > 0 ? vgi_dot(d, y) / length : 0;
+    vgi_add_scaled(y, -(t < 0 ? 0 : t > 1 ? 1 : t), d);
+    return vgi_dot(y, y);
 }
 
 /* far (n): squared distance of a point from each bone */

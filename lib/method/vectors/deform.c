@@ -53,9 +53,9 @@ static bool corner_frame(const vg_deformer *d, const double w[3], const double n
 {
     *length = vgi_length(w);
     if (!(*length * *length > d->shortest2)) return false;
-    double u[3], m[3], b[3], along = 0;
-    for (int k = 0; k < 3; k++) u[k] = w[k] / *length, along += u[k] * n[k];
-    for (int k = 0; k < 3; k++) m[k] = n[k] - along * u[k];
+    double u[3], m[3], b[3];
+    vgi_divided(w, *length, u);
+    memcpy(m, n, sizeof m), vgi_add_scaled(m, -vgi_dot(u, n), u);
     double sine = vgi_length(m);
     if (!(sine > flat)) return false;
     vgi_divide(m, sine);
@@ -151,7 +151,7 @@ static void face_vectors(const vg_graph *g, size_t f, vg_kind kind, const double
         for (int k = 0; k < 3; k++) centre[k] += w[3 * i + k] = pose[3 * (size_t)g->faces.vert[begin + i] + k];
     vgi_divide(centre, (double)r);
     for (size_t i = 0; i < r; i++)
-        for (int k = 0; k < 3; k++) w[3 * i + k] -= centre[k];
+        vgi_deduct(w + 3 * i, centre);
 }
 
 static const double identity[4] = {1, 0, 0, 0};
@@ -313,7 +313,7 @@ static void make_coordinates(vg_deformer *d)
     for (size_t c = 0; c < corners; c++) {
         const double *q = d->frame + 4 * c, back[4] = {q[0], -q[1], -q[2], -q[3]};
         vg_quat_apply(back, d->target + 3 * c, d->coordinates + 3 * c);
-        for (int k = 0; k < 3 && d->length[c] > 0; k++) d->coordinates[3 * c + k] /= d->length[c];
+        if (d->length[c] > 0) vgi_divide(d->coordinates + 3 * c, d->length[c]);
     }
 }
 

@@ -2,6 +2,7 @@
  * (planar.c, robust.c) visit all faces in every step; in row order neighbours are close in memory.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/face_rows.h"
+#include "numeric/vec3.h"
 
 #include <stdlib.h>
 
@@ -94,8 +95,9 @@ void vgi_face_rows_clear(vgi_face_rows *r)
 
 void vgi_keep_root(const vg_graph *g, double *x, const double root[3])
 {
-    double now[3];
+    double now[3], shift[3];
     vg_graph_root(g, x, now);
+    vgi_subtract(root, now, shift);
     for (size_t v = 0; v < g->faces.nv; v++)
-        for (size_t k = 0; g->in_face[v] && k < 3; k++) x[3 * v + k] += root[k] - now[k];
+        if (g->in_face[v]) vgi_add(x + 3 * v, shift);
 }

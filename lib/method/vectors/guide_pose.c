@@ -6,6 +6,7 @@
  * used alone where the keys' poses are affinely dependent (two of them are alike). Guidance in time is in poisson.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/lapack.h"
+#include "numeric/vec3.h"
 
 #include <assert.h>
 #include <math.h>
@@ -84,13 +85,6 @@ static double away(const vg_pose_guide *g, const double *pose, const double cent
     return pose[i] - centre[i % 3] - (g->nkeys ? g->key[0].from_first[i] : 0);
 }
 
-static double dot(const double *a, const double *b, size_t n)
-{
-    double sum = 0;
-    for (size_t i = 0; i < n; i++) sum += a[i] * b[i];
-    return sum;
-}
-
 static void factor_products(vg_pose_guide *g)
 {
     size_t m = g->nkeys - 1; /* key 0 has no row */
@@ -115,7 +109,7 @@ void vg_pose_guide_key(vg_pose_guide *g, uint64_t frame, const double *pose, con
         x->given[i] = given[i];
     }
     for (size_t j = 1; j <= g->nkeys; j++)
-        g->product[(g->nkeys - 1) * g->cap + j - 1] = dot(x->from_first, g->key[j].from_first, g->n);
+        g->product[(g->nkeys - 1) * g->cap + j - 1] = vgi_inner(x->from_first, g->key[j].from_first, g->n);
     g->nkeys++, g->factored = false;
 }
 
@@ -141,7 +135,7 @@ static void weigh_over_pose(vg_pose_guide *g, const double *pose)
     size_t m = g->nkeys - 1;
     vg_centroid(pose, g->n / 3, centre);
     for (size_t i = 0; i < g->n; i++) d[i] = away(g, pose, centre, i);
-    for (size_t j = 1; j <= m; j++) w[j] = dot(g->key[j].from_first, d, g->n);
+    for (size_t j = 1; j <= m; j++) w[j] = vgi_inner(g->key[j].from_first, d, g->n);
     if (m) vgi_spd_solve(m, g->factor, 1, w + 1);
     w[0] = 1;
     for (size_t j = 1; j <= m; j++) w[0] -= w[j];

@@ -167,7 +167,7 @@ static void turn_anchors(const vg_path *p, segment *s)
     for (size_t c = 0; c < p->corners; c++) {
         double w = vgi_dot(s->from + 3 * c, s->from + 3 * c);
         weight += w;
-        for (size_t k = 0; k < 3; k++) mean[k + 1] += w * s->turn[3 * c + k];
+        vgi_add_scaled(mean + 1, w, s->turn + 3 * c);
     }
     for (int k = 1; k < 4 && weight > 0; k++) mean[k] /= weight;
     for (size_t i = p->corners; i < p->elements; i++) {
@@ -181,7 +181,7 @@ static void find_drift(vg_path *p, segment *s)
 {
     s->has_drift = false;
     for (size_t i = 0; i < p->elements; i++) {
-        double a[4] = {s->scale[i]}, b[4] = {0}, q[4], got[3], miss2 = 0;
+        double a[4] = {s->scale[i]}, b[4] = {0}, q[4], got[3];
         const double *want = p->to + 3 * i;
         memcpy(a + 1, s->turn + 3 * i, 3 * sizeof *a);
         vg_quat_exp(a, q);
@@ -191,13 +191,12 @@ static void find_drift(vg_path *p, segment *s)
             vg_quat_multiply(q, b, q);
         }
         vg_quat_apply(q, s->from + 3 * i, got);
-        for (int k = 0; k < 3; k++) miss2 += (got[k] - want[k]) * (got[k] - want[k]);
         memset(s->drift + 3 * i, 0, 3 * sizeof *s->drift);
-        if (miss2 <= p->exact * p->exact) continue;
+        if (vgi_square(got, want) <= p->exact * p->exact) continue;
         double length2 = exp(2 * s->scale[i]), *drift = s->drift + 3 * i;
         const double back[4] = {q[0] / length2, -q[1] / length2, -q[2] / length2, -q[3] / length2};
         vg_quat_apply(back, want, drift);
-        for (size_t k = 0; k < 3; k++) drift[k] -= s->from[3 * i + k];
+        vgi_deduct(drift, s->from + 3 * i);
         s->has_drift = true;
     }
 }
@@ -289,7 +288,7 @@ static void velocity(const segment *s, size_t i, int end, double v[4])
         vg_quat_apply(q, s->rest + 3 * i, r);
     }
     v[0] = s->scale[i];
-    for (int k = 0; k < 3; k++) v[k + 1] = turn[k] + r[k];
+    vgi_sum(turn, r, v + 1);
 }
 
 /* own: the segment's velocity there; excess: velocity at the knot minus own. */
@@ -330,12 +329,12 @@ static void turn_element(const moment *m, size_t i, double *to)
     const segment *s = m->s;
     double q[4], w[3];
     memcpy(w, s->from + 3 * i, sizeof w);
-    for (size_t k = 0; k < 3 && s->has_drift; k++) w[k] += m->drift * s->drift[3 * i + k];
+    if (s->has_drift) vgi_add_scaled(w, m->drift, s->drift + 3 * i);
     if (m->bent) {
         turn_bent(m, i, q);
     } else {
         double l[4] = {m->along * s->scale[i]};
-        for (size_t k = 0; k < 3; k++) l[k + 1] = m->along * s->turn[3 * i + k];
+        vgi_scaled(m->along, s->turn + 3 * i, l + 1);
         vg_quat_exp(l, q);
         if (s->has_rest) turn_by(m->along, s->rest + 3 * i, q);
     }

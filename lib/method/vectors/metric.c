@@ -17,14 +17,15 @@ static void make_face(vgi_face_metric *m, double *plane, const double *w, size_t
     *m = (vgi_face_metric){.weight = 1};
     memset(plane, 0, 3 * r * sizeof *plane);
     vgi_area_vector(w, r, n);
-    double length = sqrt(vgi_dot(n, n));
+    double length = vgi_length(n);
     if (r < 3 || !(length > 0)) return;
     /* axes of the plane: along the first vector that is not parallel to the normal, and perpendicular to it */
     double a[3] = {0, 0, 0}, b[3], most = 0;
     vgi_divide(n, length);
     for (size_t i = 0; i < r; i++) {
         double t[3], along = vgi_dot(n, w + 3 * i);
-        for (size_t k = 0; k < 3; k++) plane[3 * i + k] = t[k] = w[3 * i + k] - along * n[k];
+        memcpy(t, w + 3 * i, sizeof t), vgi_add_scaled(t, -along, n);
+        memcpy(plane + 3 * i, t, sizeof t);
         if (vgi_dot(t, t) > most) most = vgi_dot(t, t), memcpy(a, t, sizeof a);
     }
     if (!(most > 0)) return;

@@ -18,7 +18,7 @@ static double area_vector(const double *w, size_t r, double n[3])
 bool vgi_unit_normal(const double *w, size_t r, double n[3])
 {
     double size = area_vector(w, r, n);
-    for (int k = 0; k < 3 && size > 0; k++) n[k] /= size;
+    if (size > 0) vgi_divide(n, size);
     return size > 0;
 }
 

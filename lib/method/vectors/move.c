@@ -1,7 +1,7 @@
 /* move.c: position of the whole body in a transfer to another mesh (MATH 5). Vectors are in deform.c, transfer.c and
  * shape.c, vertices that stay in pin.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "core/core.h"
+#include "method/vectors/face_rows.h"
 
 #include <stdlib.h>
 
@@ -59,8 +59,5 @@ void vg_mover_move(const vg_mover *m, const vg_frame *in, vg_frame *out)
 
 void vg_mover_place(const vg_mover *m, const double root[3], double *vertices)
 {
-    double now[3];
-    vg_graph_root(m->to, vertices, now);
-    for (size_t v = 0; v < m->to->faces.nv; v++)
-        for (size_t k = 0; k < 3 && m->to->in_face[v]; k++) vertices[3 * v + k] += root[k] - now[k];
+    vgi_keep_root(m->to, vertices, root);
 }

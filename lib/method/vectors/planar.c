@@ -13,6 +13,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/face_rows.h"
 #include "method/vectors/planar_kernel.h"
+#include "numeric/vec3.h"
 
 #include <float.h>
 #include <math.h>
@@ -111,14 +112,14 @@ static void face_normal(const double *w, size_t r, double m[3])
     for (size_t i = 3; i < 3 * r; i++) largest = fmax(largest, fabs(w[i] - w[i % 3]));
     double scale = largest >= DBL_MIN && largest < INFINITY ? 1 / largest : 0;
     for (size_t i = 1; i + 1 < r; i++) {
-        double a[3], b[3];
-        for (size_t k = 0; k < 3; k++) a[k] = scale * (w[3 * i + k] - w[k]), b[k] = scale * (w[3 * i + 3 + k] - w[k]);
-        n[0] += a[1] * b[2] - a[2] * b[1];
-        n[1] += a[2] * b[0] - a[0] * b[2];
-        n[2] += a[0] * b[1] - a[1] * b[0];
-        size += a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
+        double a[3], b[3], c[3];
+        vgi_subtract(w + 3 * i, w, a), vgi_scale(a, scale);
+        vgi_subtract(w + 3 * (i + 1), w, b), vgi_scale(b, scale);
+        vgi_cross(a, b, c);
+        vgi_add(n, c);
+        size += vgi_dot(a, a);
     }
-    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    double length = vgi_length(n);
     for (int k = 0; k < 3; k++) m[k] = length > thin * size ? n[k] / length : 0;
 }
 

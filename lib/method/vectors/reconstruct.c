@@ -362,7 +362,8 @@ void vgi_solver_place(const vg_solver *s, double *x, const double *anchor, const
     double mean[3] = {0, 0, 0};
     if (!s->nanchors) vg_graph_root(g, x, mean);
     double shift[3];
-    for (int k = 0; k < 3; k++) shift[k] = s->nanchors ? anchor[k] : root[k] - mean[k];
+    if (s->nanchors) memcpy(shift, anchor, sizeof shift);
+    else vgi_subtract(root, mean, shift);
     for (size_t v = 0; v < g->faces.nv; v++)
         vgi_add(x + 3 * v, shift);
     for (size_t i = 0; i < s->nanchors; i++) memcpy(x + 3 * (size_t)s->anchors[i], anchor + 3 * i, 3 * sizeof *x);

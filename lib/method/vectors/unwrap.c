@@ -30,7 +30,7 @@ static double half_angle_between(const double q[4], const double l[3])
     double to[4], log[4] = {0, -l[0], -l[1], -l[2]}, rest[4];
     vg_quat_exp(log, to);
     vg_quat_multiply(to, q, rest);
-    return atan2(sqrt(vgi_dot(rest + 1, rest + 1)), fabs(rest[0]));
+    return atan2(vgi_length(rest + 1), fabs(rest[0]));
 }
 
 void vgi_shorter(double q[4])
@@ -42,16 +42,14 @@ void vgi_shorter(double q[4])
 bool vgi_branch_near(const double q[4], const double near[3], double l[3])
 {
     static const double tiny = 1e-9;
-    double sine = sqrt(vgi_dot(q + 1, q + 1)), length = sqrt(vgi_dot(near, near)), axis[3], gap2 = 0;
+    double sine = vgi_length(q + 1), length = vgi_length(near), axis[3] = {0, 0, 0};
     double angle = atan2(sine, q[0]);
-    for (int k = 0; k < 3; k++) axis[k] = sine > tiny ? q[k + 1] / sine : length > tiny ? near[k] / length : 0;
+    if (sine > tiny) vgi_divided(q + 1, sine, axis);
+    else if (length > tiny) vgi_divided(near, length, axis);
     if (!(sine > tiny)) angle = 0; /* equal for q and -q, and about any axis */
     angle += M_PI * nearbyint((vgi_dot(near, axis) - angle) / M_PI);
-    for (int k = 0; k < 3; k++) {
-        l[k] = angle * axis[k];
-        gap2 += (l[k] - near[k]) * (l[k] - near[k]);
-    }
-    return sqrt(gap2) <= trust * half_angle_between(q, near) + tiny;
+    vgi_scaled(angle, axis, l);
+    return sqrt(vgi_square(l, near)) <= trust * half_angle_between(q, near) + tiny;
 }
 
 bool vgi_branch_follow(const double q[4], const double near[3], double l[3])
@@ -63,7 +61,7 @@ bool vgi_branch_follow(const double q[4], const double near[3], double l[3])
     vgi_shorter(rest);
     vg_quat_log(rest, more);
     double along = length2 > 0 ? vgi_dot(more + 1, near) / length2 : 0;
-    for (int k = 0; k < 3; k++) l[k] = (1 + along) * near[k];
+    vgi_scaled(1 + along, near, l);
     return false;
 }
 
@@ -249,7 +247,7 @@ static bool mean_beside(const choice *c, size_t f, double mean[3])
         n += faces_around(c, v) - 1;
         for (size_t k = 0; k < 3; k++) mean[k] += c->at[3 * v + k] - c->turn[3 * f + k];
     }
-    for (int k = 0; k < 3 && n; k++) mean[k] /= (double)n;
+    if (n) vgi_divide(mean, (double)n);
     return n > 0;
 }
 
@@ -284,7 +282,7 @@ static bool is_beyond(const choice *c, const double *corner)
         double l[3], shortest[3], off[3];
         vgi_branch_near(c->q + 4 * f, turn, l);
         vgi_subtract(l, turn, off);
-        if (!(vgi_dot(off, off) <= rounding) || !(sqrt(vgi_dot(turn, turn)) <= M_PI / 2 + rounding)) return true;
+        if (!(vgi_dot(off, off) <= rounding) || !(vgi_length(turn) <= M_PI / 2 + rounding)) return true;
         for (size_t i = g->faces.start[f]; i < g->faces.start[f + 1]; i++) {
             double q[4];
             memcpy(q, corner + 4 * i, sizeof q);
@@ -292,7 +290,7 @@ static bool is_beyond(const choice *c, const double *corner)
             vgi_branch_near(q, turn, l);
             vgi_branch_near(q, none, shortest);
             vgi_subtract(l, shortest, off);
-            if (vgi_dot(off, off) > 1 && !(sqrt(vgi_dot(l, l)) <= M_PI / 2 + rounding)) return true;
+            if (vgi_dot(off, off) > 1 && !(vgi_length(l) <= M_PI / 2 + rounding)) return true;
         }
     }
     return false;
@@ -332,7 +330,7 @@ static void add_laplacian(choice *c, const double *x, double *y)
         for (size_t i = g->faces.start[f]; i < g->faces.start[f + 1]; i++)
             vgi_add(c->at + 3 * (size_t)g->faces.vert[i], x + 3 * f);
     for (size_t v = 0; v < g->faces.nv; v++)
-        for (size_t k = 0; k < 3 && faces_around(c, v); k++) c->at[3 * v + k] /= (double)faces_around(c, v);
+        if (faces_around(c, v)) vgi_divide(c->at + 3 * v, (double)faces_around(c, v));
     for (size_t f = 0; f < g->faces.nf; f++)
         for (size_t i = g->faces.start[f]; i < g->faces.start[f + 1]; i++)
             for (size_t k = 0; k < 3; k++) y[3 * f + k] += x[3 * f + k] - c->at[3 * (size_t)g->faces.vert[i] + k];
@@ -343,10 +341,8 @@ static void pull(const relaxation *r, size_t f, const double rest[3], double y[3
 {
     const double *J = r->J + 9 * f, *axis = r->axis + 3 * f;
     double along = (1 - sideways) * vgi_dot(axis, rest);
-    for (int k = 0; k < 3; k++) {
-        double turned = J[k] * rest[0] + J[3 + k] * rest[1] + J[6 + k] * rest[2];
-        y[k] = r->weight[f] * (sideways * turned + along * axis[k]);
-    }
+    vgi_transposed_vector(J, rest, y);
+    vgi_scale(y, sideways), vgi_add_scaled(y, along, axis), vgi_scale(y, r->weight[f]);
 }
 
 /* y = J' W (J x) + L x */
@@ -374,18 +370,12 @@ static void linearise(choice *c, relaxation *r)
         vg_quat_log(rest, l);
         make_jacobian(turn, J);
         r->weight[f] = 1 / (1 + vgi_dot(l + 1, l + 1) / (usual * usual)); /* limits the pull of a face that flips */
-        double length = sqrt(vgi_dot(turn, turn)), y[3];
-        for (int k = 0; k < 3; k++) r->axis[3 * f + (size_t)k] = length > 0 ? turn[k] / length : 0;
+        double y[3];
+        memcpy(r->axis + 3 * f, turn, 3 * sizeof *turn);
+        vgi_make_unit(r->axis + 3 * f);
         pull(r, f, l + 1, y);
         vgi_subtract(y, b, b);
     }
-}
-
-static double product(const double *a, const double *b, size_t n)
-{
-    double sum = 0;
-    for (size_t i = 0; i < n; i++) sum += a[i] * b[i];
-    return sum;
 }
 
 static void solve_step(choice *c, relaxation *r)
@@ -394,12 +384,12 @@ static void solve_step(choice *c, relaxation *r)
     memset(r->x, 0, n * sizeof *r->x);
     memcpy(r->r, r->b, n * sizeof *r->b);
     memcpy(r->p, r->b, n * sizeof *r->b);
-    double rr = product(r->r, r->r, n), enough = 1e-4 * rr;
+    double rr = vgi_inner(r->r, r->r, n), enough = 1e-4 * rr;
     for (int i = 0; i < CG_STEPS && rr > enough; i++) {
         apply(c, r, r->p, r->Ap);
-        double alpha = rr / product(r->p, r->Ap, n), before_rr = rr;
+        double alpha = rr / vgi_inner(r->p, r->Ap, n), before_rr = rr;
         for (size_t k = 0; k < n; k++) r->x[k] += alpha * r->p[k], r->r[k] -= alpha * r->Ap[k];
-        rr = product(r->r, r->r, n);
+        rr = vgi_inner(r->r, r->r, n);
         for (size_t k = 0; k < n; k++) r->p[k] = r->r[k] + rr / before_rr * r->p[k];
     }
 }
