@@ -60,10 +60,10 @@ static int read_plain(vg_model *m, const void *data, size_t n, const vgi_format 
     if (!format) format = vgi_format_by_content(data, n);
     if (!format) format = vgi_format_by_suffix(file_name);
     if (!format) return vg_fail(e, VG_EINPUT, "%s is no mesh file (read: OBJ, PLY, OFF, STL)", subject);
-    int result = format->read(m, data, n, subject, e);
-    if (result == VG_OK) result = vgi_mend_faces(&m->mesh, m->vertices, &m->attributes, &m->note, subject, e);
-    if (result < 0) vg_model_clear(m);
-    return result;
+    int r = format->read(m, data, n, subject, e);
+    if (r == VG_OK) r = vgi_mend_faces(&m->mesh, m->vertices, &m->attributes, &m->note, subject, e);
+    if (r < 0) vg_model_clear(m);
+    return r;
 }
 
 int vgi_model_read(vg_model *m, const void *data, size_t n, const vgi_format *format, const char *file_name,
@@ -107,14 +107,14 @@ int vgi_model_write(vg_bytes *out, const char *format, const vgi_writing *w, vg_
     const vg_attributes *a = w->attributes;
     if (!known) return unknown_format(format, e);
     size_t size = out->size;
-    int result = check_range(w->vertices, 3 * w->mesh->nv, 3, "vertex", w->full_precision, e);
-    if (result == VG_OK && a)
-        result = check_range(a->tex, a->ntex * a->tex_dim, a->tex_dim, "texture coordinate", w->full_precision, e);
-    if (result == VG_OK) result = known->write(out, w, e);
-    if (result == VG_OK && w->rest) result = vgi_bytes_append(out, w->rest->data, w->rest->size, e);
-    else if (result == VG_OK && known->rest) result = known->rest(out, w, e);
-    if (result < 0) out->size = size; /* append nothing on failure */
-    return result;
+    int r = check_range(w->vertices, 3 * w->mesh->nv, 3, "vertex", w->full_precision, e);
+    if (r == VG_OK && a)
+        r = check_range(a->tex, a->ntex * a->tex_dim, a->tex_dim, "texture coordinate", w->full_precision, e);
+    if (r == VG_OK) r = known->write(out, w, e);
+    if (r == VG_OK && w->rest) r = vgi_bytes_append(out, w->rest->data, w->rest->size, e);
+    else if (r == VG_OK && known->rest) r = known->rest(out, w, e);
+    if (r < 0) out->size = size; /* append nothing on failure */
+    return r;
 }
 
 int vg_model_write(vg_bytes *out, const char *format, const vg_mesh *mesh, const double *vertices,

@@ -412,19 +412,19 @@ static int choose_values(reading *x, vg_head *h, const vg_reading *how, vg_err *
 
 static int take_reference(reading *x, vg_head *h, vg_err *e)
 {
-    const struct held *r = &x->held[REFERENCE];
+    const struct held *given = &x->held[REFERENCE];
     bool vertices = h->kind == VG_VERTICES || h->kind == VG_FEATURES;
     const uint64_t shape[2] = {vertices ? x->count : UINT64_MAX, 3};
     h->body.mesh.nv = x->count;
-    if (!r->there) return h->kind == VG_VERTICES ? VG_OK : missing(x, REFERENCE, x->values, e);
-    if (!is_float(r) || !has_shape(r, 2, shape) || r->a.shape[0] == 0 || r->a.shape[0] >= UINT32_MAX - 1)
+    if (!given->there) return h->kind == VG_VERTICES ? VG_OK : missing(x, REFERENCE, x->values, e);
+    if (!is_float(given) || !has_shape(given, 2, shape) || given->a.shape[0] == 0 || given->a.shape[0] >= UINT32_MAX - 1)
         return wrong(x, REFERENCE, "is not of shape (vertices, 3) with float32 or float64", e);
-    h->body.mesh.nv = (size_t)r->a.shape[0];
+    h->body.mesh.nv = (size_t)given->a.shape[0];
     h->body.reference = vgi_array_raw(h->body.mesh.nv, 3 * sizeof *h->body.reference, e);
-    int result =
-        h->body.reference ? copy_floats(x, REFERENCE, 0, 3 * h->body.mesh.nv, h->body.reference, e) : VG_ENOMEM;
+    int r = h->body.reference ? copy_floats(x, REFERENCE, 0, 3 * h->body.mesh.nv, h->body.reference, e)
+                               : VG_ENOMEM;
     const struct held *name = &x->held[REFERENCE_NAME];
-    if (result < 0 || !name->there) return result;
+    if (r < 0 || !name->there) return r;
     if ((name->a.kind != 'U' && name->a.kind != 'S') || elements(name) != 1)
         return wrong(x, REFERENCE_NAME, "is not one text", e);
     return text_at(x, REFERENCE_NAME, 0, &h->body.reference_name, e);

@@ -26,12 +26,12 @@ static int write_label(vg_bytes *out, const vg_label *label, vg_err *e)
     if (!word) return VG_OK; /* not a kind of label in OBJ */
     if (strpbrk(label->text, "\r\n"))
         return vg_fail(e, VG_EINPUT, "%s '%s' has a line break, which OBJ cannot hold", word, label->text);
-    int result = vgi_bytes_append(out, word, strlen(word), e);
-    if (result == VG_OK && n) result = vgi_bytes_append(out, " ", 1, e);
-    if (result == VG_OK) result = vgi_bytes_append(out, label->text, n, e);
+    int r = vgi_bytes_append(out, word, strlen(word), e);
+    if (r == VG_OK && n) r = vgi_bytes_append(out, " ", 1, e);
+    if (r == VG_OK) r = vgi_bytes_append(out, label->text, n, e);
     /* a trailing blank keeps a final backslash from joining the next line */
     const char *stop = n && label->text[n - 1] == '\\' ? " \n" : "\n";
-    return result == VG_OK ? vgi_bytes_append(out, stop, strlen(stop), e) : result;
+    return r == VG_OK ? vgi_bytes_append(out, stop, strlen(stop), e) : r;
 }
 
 /* Lines of `dim` numbers after a keyword. */
@@ -75,8 +75,8 @@ static int write_labels(vg_bytes *out, const vg_attributes *a, size_t f, size_t 
 {
     for (; *next < a->nlabels && a->labels[*next].face <= f; ++*next) {
         if (a->labels[*next].kind == VG_LABEL_LIBRARY) continue;
-        int result = write_label(out, &a->labels[*next], e);
-        if (result < 0) return result;
+        int r = write_label(out, &a->labels[*next], e);
+        if (r < 0) return r;
     }
     return VG_OK;
 }
@@ -84,8 +84,8 @@ static int write_labels(vg_bytes *out, const vg_attributes *a, size_t f, size_t 
 static int write_libraries(vg_bytes *out, const vg_attributes *a, vg_err *e)
 {
     for (size_t i = 0; i < a->nlabels; i++) {
-        int result = a->labels[i].kind == VG_LABEL_LIBRARY ? write_label(out, &a->labels[i], e) : VG_OK;
-        if (result < 0) return result;
+        int r = a->labels[i].kind == VG_LABEL_LIBRARY ? write_label(out, &a->labels[i], e) : VG_OK;
+        if (r < 0) return r;
     }
     return VG_OK;
 }
@@ -98,8 +98,8 @@ static const vg_attributes *attributes_of(const vgi_writing *w)
 
 int vgi_obj_write(vg_bytes *out, const vgi_writing *w, vg_err *e)
 {
-    int result = write_libraries(out, attributes_of(w), e);
-    return result < 0 ? result : write_numbers(out, "v", w->vertices, w->mesh->nv, 3, w->full_precision, e);
+    int r = write_libraries(out, attributes_of(w), e);
+    return r < 0 ? r : write_numbers(out, "v", w->vertices, w->mesh->nv, 3, w->full_precision, e);
 }
 
 int vgi_obj_rest(vg_bytes *out, const vgi_writing *w, vg_err *e)
@@ -107,13 +107,13 @@ int vgi_obj_rest(vg_bytes *out, const vgi_writing *w, vg_err *e)
     const vg_attributes *a = attributes_of(w);
     const vg_mesh *m = w->mesh;
     const uint32_t *tex = a->ntex ? a->corner_tex : NULL;
-    int result = write_numbers(out, "vt", a->tex, a->ntex, a->tex_dim, w->full_precision, e);
+    int r = write_numbers(out, "vt", a->tex, a->ntex, a->tex_dim, w->full_precision, e);
     size_t next_label = 0;
-    for (size_t f = 0; f < m->nf && result == VG_OK; f++) {
+    for (size_t f = 0; f < m->nf && r == VG_OK; f++) {
         uint32_t first = m->start[f];
-        result = write_labels(out, a, f, &next_label, e);
-        if (result == VG_OK)
-            result = write_face(out, m->vert + first, tex ? tex + first : NULL, m->start[f + 1] - first, e);
+        r = write_labels(out, a, f, &next_label, e);
+        if (r == VG_OK)
+            r = write_face(out, m->vert + first, tex ? tex + first : NULL, m->start[f + 1] - first, e);
     }
-    return result == VG_OK ? write_labels(out, a, SIZE_MAX, &next_label, e) : result;
+    return r == VG_OK ? write_labels(out, a, SIZE_MAX, &next_label, e) : r;
 }

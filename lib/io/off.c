@@ -34,64 +34,64 @@ static bool is_line_end(char c)
 }
 
 /* LF, CR LF and CR end a line. */
-static size_t line_of(const struct reading *r, const char *p)
+static size_t line_of(const struct reading *in, const char *p)
 {
     size_t n = 1;
-    for (const char *q = r->data; q < p; q++) n += *q == '\n' || (*q == '\r' && (q + 1 == r->end || q[1] != '\n'));
+    for (const char *q = in->data; q < p; q++) n += *q == '\n' || (*q == '\r' && (q + 1 == in->end || q[1] != '\n'));
     return n;
 }
 
-static void skip_line(struct reading *r)
+static void skip_line(struct reading *in)
 {
-    while (r->p < r->end && !is_line_end(*r->p)) r->p++;
+    while (in->p < in->end && !is_line_end(*in->p)) in->p++;
 }
 
 /* Advance to the next word; false at the end of the file. */
-static bool find_word(struct reading *r)
+static bool find_word(struct reading *in)
 {
     for (;;) {
-        while (r->p < r->end && (is_blank(*r->p) || is_line_end(*r->p))) r->p++;
-        if (r->p == r->end || *r->p != '#') return r->p < r->end;
-        skip_line(r);
+        while (in->p < in->end && (is_blank(*in->p) || is_line_end(*in->p))) in->p++;
+        if (in->p == in->end || *in->p != '#') return in->p < in->end;
+        skip_line(in);
     }
 }
 
 /* Whether the line has another word. */
-static bool line_goes_on(struct reading *r)
+static bool line_goes_on(struct reading *in)
 {
-    while (r->p < r->end && is_blank(*r->p)) r->p++;
-    return r->p < r->end && !is_line_end(*r->p) && *r->p != '#';
+    while (in->p < in->end && is_blank(*in->p)) in->p++;
+    return in->p < in->end && !is_line_end(*in->p) && *in->p != '#';
 }
 
-static bool ends_word(const struct reading *r, const char *p)
+static bool ends_word(const struct reading *in, const char *p)
 {
-    return p == r->end || is_blank(*p) || is_line_end(*p);
+    return p == in->end || is_blank(*p) || is_line_end(*p);
 }
 
-static int fail_here(const struct reading *r, const char *expected)
+static int fail_here(const struct reading *in, const char *expected)
 {
     int n = 0;
-    while (n < SHOWN && !ends_word(r, r->p + n)) n++;
-    if (n == 0) return vg_fail(r->e, VG_ETRUNC, "%s ends where %s is expected", r->subject, expected);
-    return vg_fail(r->e, VG_EINPUT, "%s line %zu: %s expected, not '%.*s'", r->subject, line_of(r, r->p), expected, n,
-                   r->p);
+    while (n < SHOWN && !ends_word(in, in->p + n)) n++;
+    if (n == 0) return vg_fail(in->e, VG_ETRUNC, "%s ends where %s is expected", in->subject, expected);
+    return vg_fail(in->e, VG_EINPUT, "%s line %zu: %s expected, not '%.*s'", in->subject, line_of(in, in->p), expected, n,
+                   in->p);
 }
 
-static int read_count(struct reading *r, size_t *n)
+static int read_count(struct reading *in, size_t *n)
 {
     int64_t x = 0;
-    const char *after = find_word(r) ? vgi_parse_int(r->p, r->end, &x) : NULL;
-    if (!after || !ends_word(r, after) || x < 0) return fail_here(r, "a count");
-    r->p = after;
+    const char *after = find_word(in) ? vgi_parse_int(in->p, in->end, &x) : NULL;
+    if (!after || !ends_word(in, after) || x < 0) return fail_here(in, "a count");
+    in->p = after;
     *n = (size_t)x;
     return VG_OK;
 }
 
-static int read_coordinate(struct reading *r, double *x)
+static int read_coordinate(struct reading *in, double *x)
 {
-    const char *after = find_word(r) ? vgi_parse_double(r->p, r->end, x) : NULL;
-    if (!after || !ends_word(r, after) || !isfinite(*x)) return fail_here(r, "a finite number");
-    r->p = after;
+    const char *after = find_word(in) ? vgi_parse_double(in->p, in->end, x) : NULL;
+    if (!after || !ends_word(in, after) || !isfinite(*x)) return fail_here(in, "a finite number");
+    in->p = after;
     return VG_OK;
 }
 
@@ -113,119 +113,119 @@ static size_t keyword(const char *s, const char *end)
 
 /* The keyword, which a file named .off may lack, and the counts: vertices, faces, and edges, which some writers
  * omit. */
-static int read_header(struct reading *r, size_t *nv, size_t *nf)
+static int read_header(struct reading *in, size_t *nv, size_t *nf)
 {
-    size_t n = find_word(r) ? keyword(r->p, r->end) : 0, edges;
-    if (n == 0 && (r->p == r->end || *r->p < '0' || *r->p > '9')) return fail_here(r, "OFF");
-    if (memchr(r->p, 'n', n) || memchr(r->p, '4', n))
-        return vg_fail(r->e, VG_EINPUT, "%s is %.*s, with vertices of other than 3 coordinates, which is not read",
-                       r->subject, (int)n, r->p);
-    r->p += n;
-    if (line_goes_on(r) && r->end - r->p >= 6 && !memcmp(r->p, "BINARY", 6))
-        return vg_fail(r->e, VG_EINPUT, "%s is binary OFF, which is not read: write it as text", r->subject);
-    int result = read_count(r, nv);
-    if (result == VG_OK) result = read_count(r, nf);
-    if (result == VG_OK && (r->bare_faces || line_goes_on(r))) result = read_count(r, &edges);
-    return result == VG_OK && !r->bare_vertices && line_goes_on(r) ? fail_here(r, "end of line") : result;
+    size_t n = find_word(in) ? keyword(in->p, in->end) : 0, edges;
+    if (n == 0 && (in->p == in->end || *in->p < '0' || *in->p > '9')) return fail_here(in, "OFF");
+    if (memchr(in->p, 'n', n) || memchr(in->p, '4', n))
+        return vg_fail(in->e, VG_EINPUT, "%s is %.*s, with vertices of other than 3 coordinates, which is not read",
+                       in->subject, (int)n, in->p);
+    in->p += n;
+    if (line_goes_on(in) && in->end - in->p >= 6 && !memcmp(in->p, "BINARY", 6))
+        return vg_fail(in->e, VG_EINPUT, "%s is binary OFF, which is not read: write it as text", in->subject);
+    int r = read_count(in, nv);
+    if (r == VG_OK) r = read_count(in, nf);
+    if (r == VG_OK && (in->bare_faces || line_goes_on(in))) r = read_count(in, &edges);
+    return r == VG_OK && !in->bare_vertices && line_goes_on(in) ? fail_here(in, "end of line") : r;
 }
 
 /* The shortest vertex is "0 0 0" and the shortest face "0", followed by a blank except at the end. Larger counts than
  * the rest of the file can hold are refused before memory is allocated. */
-static int check_counts(const struct reading *r, size_t nv, size_t nf)
+static int check_counts(const struct reading *in, size_t nv, size_t nf)
 {
-    size_t left = (size_t)(r->end - r->p) + 1;
+    size_t left = (size_t)(in->end - in->p) + 1;
     if (nv > left / 6 || nf > (left - 6 * nv) / 2)
-        return vg_fail(r->e, VG_ETRUNC, "%s announces %zu vertices and %zu faces, but ends before", r->subject, nv,
+        return vg_fail(in->e, VG_ETRUNC, "%s announces %zu vertices and %zu faces, but ends before", in->subject, nv,
                        nf);
     if (nv >= UINT32_MAX || nf >= UINT32_MAX)
-        return vg_fail(r->e, VG_EINPUT, "%s has too many vertices or faces (the limit is 2^32 - 2)", r->subject);
-    if (nv == 0) return vg_fail(r->e, VG_EINPUT, "%s has no vertices", r->subject);
+        return vg_fail(in->e, VG_EINPUT, "%s has too many vertices or faces (the limit is 2^32 - 2)", in->subject);
+    if (nv == 0) return vg_fail(in->e, VG_EINPUT, "%s has no vertices", in->subject);
     return VG_OK;
 }
 
-static int read_corner(struct reading *r, uint32_t *to)
+static int read_corner(struct reading *in, uint32_t *to)
 {
     int64_t v = -1;
-    const char *after = find_word(r) ? vgi_parse_int(r->p, r->end, &v) : NULL;
-    if (!after || !ends_word(r, after) || v < 0) return fail_here(r, "the index of a vertex");
-    if ((uint64_t)v >= r->m->mesh.nv) return fail_here(r, "the index of a vertex below their count");
-    r->p = after;
+    const char *after = find_word(in) ? vgi_parse_int(in->p, in->end, &v) : NULL;
+    if (!after || !ends_word(in, after) || v < 0) return fail_here(in, "the index of a vertex");
+    if ((uint64_t)v >= in->m->mesh.nv) return fail_here(in, "the index of a vertex below their count");
+    in->p = after;
     *to = (uint32_t)v;
     return VG_OK;
 }
 
 /* A count, followed by that many indices. */
-static int read_face(struct reading *r)
+static int read_face(struct reading *in)
 {
-    vg_mesh *m = &r->m->mesh;
+    vg_mesh *m = &in->m->mesh;
     size_t n;
-    int result = read_count(r, &n);
-    if (result < 0) return result;
-    if (n > (size_t)(r->end - r->p) / 2)
-        return vg_fail(r->e, VG_EINPUT, "%s line %zu: face with less than the %zu vertices announced", r->subject,
-                       line_of(r, r->p), n);
-    if (n >= UINT32_MAX - r->corners)
-        return vg_fail(r->e, VG_EINPUT, "%s has too many corners of faces (the limit is 2^32 - 2)", r->subject);
-    if (vgi_grow(&m->vert, &r->vert_cap, r->corners + n, sizeof *m->vert, r->e) < 0) return VG_ENOMEM;
-    for (size_t k = 0; k < n && result == VG_OK; k++) result = read_corner(r, m->vert + r->corners++);
-    if (result < 0) return result;
-    if (vgi_grow(&m->start, &r->start_cap, m->nf + 2, sizeof *m->start, r->e) < 0) return VG_ENOMEM;
-    m->start[++m->nf] = (uint32_t)r->corners;
+    int r = read_count(in, &n);
+    if (r < 0) return r;
+    if (n > (size_t)(in->end - in->p) / 2)
+        return vg_fail(in->e, VG_EINPUT, "%s line %zu: face with less than the %zu vertices announced", in->subject,
+                       line_of(in, in->p), n);
+    if (n >= UINT32_MAX - in->corners)
+        return vg_fail(in->e, VG_EINPUT, "%s has too many corners of faces (the limit is 2^32 - 2)", in->subject);
+    if (vgi_grow(&m->vert, &in->vert_cap, in->corners + n, sizeof *m->vert, in->e) < 0) return VG_ENOMEM;
+    for (size_t k = 0; k < n && r == VG_OK; k++) r = read_corner(in, m->vert + in->corners++);
+    if (r < 0) return r;
+    if (vgi_grow(&m->start, &in->start_cap, m->nf + 2, sizeof *m->start, in->e) < 0) return VG_ENOMEM;
+    m->start[++m->nf] = (uint32_t)in->corners;
     return VG_OK;
 }
 
-static int fail_short(struct reading *r, const char *what, size_t i, size_t n)
+static int fail_short(struct reading *in, const char *what, size_t i, size_t n)
 {
-    return vg_fail(r->e, VG_ETRUNC, "%s ends before %s %zu of %zu", r->subject, what, i, n);
+    return vg_fail(in->e, VG_ETRUNC, "%s ends before %s %zu of %zu", in->subject, what, i, n);
 }
 
-static int read_elements(struct reading *r, size_t nv, size_t nf)
+static int read_elements(struct reading *in, size_t nv, size_t nf)
 {
-    vg_model *m = r->m;
-    int result = VG_OK;
-    for (size_t v = 0; v < nv && result == VG_OK; v++) {
-        if (!find_word(r)) return fail_short(r, "vertex", v, nv);
-        for (int k = 0; k < 3 && result == VG_OK; k++) result = read_coordinate(r, m->vertices + 3 * v + k);
-        if (!r->bare_vertices) skip_line(r);
+    vg_model *m = in->m;
+    int r = VG_OK;
+    for (size_t v = 0; v < nv && r == VG_OK; v++) {
+        if (!find_word(in)) return fail_short(in, "vertex", v, nv);
+        for (int k = 0; k < 3 && r == VG_OK; k++) r = read_coordinate(in, m->vertices + 3 * v + k);
+        if (!in->bare_vertices) skip_line(in);
     }
-    for (size_t f = 0; f < nf && result == VG_OK; f++) {
-        if (!find_word(r)) return fail_short(r, "face", f, nf);
-        result = read_face(r);
-        if (!r->bare_faces) skip_line(r);
+    for (size_t f = 0; f < nf && r == VG_OK; f++) {
+        if (!find_word(in)) return fail_short(in, "face", f, nf);
+        r = read_face(in);
+        if (!in->bare_faces) skip_line(in);
     }
-    return result;
+    return r;
 }
 
 /* Refuse data after the last element. */
-static int finish(struct reading *r)
+static int finish(struct reading *in)
 {
-    if (!find_word(r)) return VG_OK;
-    if (r->bare_vertices) return fail_here(r, "the end of the file");
-    vgi_note(&r->m->note, "left out what stands behind the last face, from line %zu on", line_of(r, r->p));
+    if (!find_word(in)) return VG_OK;
+    if (in->bare_vertices) return fail_here(in, "the end of the file");
+    vgi_note(&in->m->note, "left out what stands behind the last face, from line %zu on", line_of(in, in->p));
     return VG_OK;
 }
 
 /* bare: which of nothing, the vertices, or vertices and faces are words alone */
 static int read_as(vg_model *m, int bare, const char *data, size_t n, const char *subject, vg_err *e)
 {
-    struct reading r = {.data = data, .end = data + n, .p = data, .subject = subject, .e = e, .m = m};
-    r.bare_vertices = bare > 0, r.bare_faces = bare > 1;
+    struct reading in = {.data = data, .end = data + n, .p = data, .subject = subject, .e = e, .m = m};
+    in.bare_vertices = bare > 0, in.bare_faces = bare > 1;
     size_t nv = 0, nf = 0;
-    int result = read_header(&r, &nv, &nf);
-    if (result == VG_OK) result = check_counts(&r, nv, nf);
-    if (result < 0) return result;
+    int r = read_header(&in, &nv, &nf);
+    if (r == VG_OK) r = check_counts(&in, nv, nf);
+    if (r < 0) return r;
     m->vertices = vgi_array_raw(nv, 3 * sizeof *m->vertices, e);
-    if (!m->vertices || vgi_grow(&m->mesh.start, &r.start_cap, 1, sizeof *m->mesh.start, e) < 0) return VG_ENOMEM;
+    if (!m->vertices || vgi_grow(&m->mesh.start, &in.start_cap, 1, sizeof *m->mesh.start, e) < 0) return VG_ENOMEM;
     m->mesh.start[0] = 0;
     m->mesh.nv = nv;
-    result = read_elements(&r, nv, nf);
-    return result == VG_OK ? finish(&r) : result;
+    r = read_elements(&in, nv, nf);
+    return r == VG_OK ? finish(&in) : r;
 }
 
 static int read_off(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
 {
-    int result = read_as(m, 0, data, n, subject, e);
-    for (int bare = 1; bare <= 2 && (result == VG_EINPUT || result == VG_ETRUNC); bare++) {
+    int r = read_as(m, 0, data, n, subject, e);
+    for (int bare = 1; bare <= 2 && (r == VG_EINPUT || r == VG_ETRUNC); bare++) {
         vg_model words = {0};
         int again = read_as(&words, bare, data, n, subject, NULL);
         if (again == VG_OK) {
@@ -234,9 +234,9 @@ static int read_off(vg_model *m, const char *data, size_t n, const char *subject
             return VG_OK;
         }
         vg_model_clear(&words);
-        if (again == VG_ENOMEM) result = vg_fail(e, again, "not enough memory");
+        if (again == VG_ENOMEM) r = vg_fail(e, again, "not enough memory");
     }
-    return result;
+    return r;
 }
 
 static bool sniff_off(const unsigned char *data, size_t n)

@@ -77,13 +77,13 @@ static int write_header(struct writing *x)
                      "element face %zu\nproperty list %s %s vertex_indices\n%s",
                      names[x->encoding], m->nv, real, real, real, x->nfaces, x->long_list ? "uint" : "uchar", index,
                      has_colours(x) ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "");
-    int result = vgi_bytes_append(x->out, text, (size_t)n, x->e);
-    if (result == VG_OK && x->nfaces < m->nf) {
+    int r = vgi_bytes_append(x->out, text, (size_t)n, x->e);
+    if (r == VG_OK && x->nfaces < m->nf) {
         n = snprintf(text, sizeof text, "element edge %zu\nproperty %s vertex1\nproperty %s vertex2\n",
                      m->nf - x->nfaces, index, index);
-        result = vgi_bytes_append(x->out, text, (size_t)n, x->e);
+        r = vgi_bytes_append(x->out, text, (size_t)n, x->e);
     }
-    return result == VG_OK ? vgi_bytes_append(x->out, "end_header\n", 11, x->e) : result;
+    return r == VG_OK ? vgi_bytes_append(x->out, "end_header\n", 11, x->e) : r;
 }
 
 /* Reserve room for n numbers of at most `most` bytes; returns its address. NULL: out of memory. */
@@ -136,8 +136,8 @@ static int write_ply(vg_bytes *out, const vgi_writing *w, enum encoding encoding
 {
     struct writing x = {.out = out, .w = w, .encoding = encoding, .e = e};
     divide_faces(&x);
-    int result = write_header(&x);
-    return result == VG_OK ? write_vertices(&x) : result;
+    int r = write_header(&x);
+    return r == VG_OK ? write_vertices(&x) : r;
 }
 
 static int write_rest(vg_bytes *out, const vgi_writing *w, enum encoding encoding, vg_err *e)

@@ -73,55 +73,55 @@ static int cut_short(const char *name, const vgi_tally *t, const char *where, vg
                    (unsigned long long)t->records);
 }
 
-static int check_end(vgi_input *in, const vgi_tally *t, const vg_record *r, vg_err *e)
+static int check_end(vgi_input *in, const vgi_tally *t, const vg_record *record, vg_err *e)
 {
     const char *name = vgi_input_name(in);
-    if (r->payload.size != END_PAYLOAD) return vg_fail(e, VG_EINPUT, "'%s': the END record has a wrong length", name);
-    uint64_t count = vgi_get64(r->payload.data);
+    if (record->payload.size != END_PAYLOAD) return vg_fail(e, VG_EINPUT, "'%s': the END record has a wrong length", name);
+    uint64_t count = vgi_get64(record->payload.data);
     if (count != t->records)
         return vg_fail(e, VG_EINPUT, "'%s': the END mark counts %llu records, %llu came", name,
                        (unsigned long long)count, (unsigned long long)t->records);
-    if (vgi_get64(r->payload.data + 8) != XXH64_digest(t->sum))
+    if (vgi_get64(record->payload.data + 8) != XXH64_digest(t->sum))
         return vg_fail(e, VG_EINPUT, "'%s': the END mark's checksum is wrong: records were changed or moved", name);
     int ended = vgi_input_ended(in, e);
     if (ended != 0) return ended < 0 ? ended : 0;
     return vg_fail(e, VG_EINPUT, "'%s' has data after the END mark: join streams with vg-encode, not cat", name);
 }
 
-int vgi_record_read(vgi_input *in, vgi_tally *t, vg_record *r, vg_err *e)
+int vgi_record_read(vgi_input *in, vgi_tally *t, vg_record *record, vg_err *e)
 {
     const char *name = vgi_input_name(in);
     unsigned char h[RECORD_HEADER], padding[8];
     size_t got = 0;
-    int code = vgi_input_read(in, h, sizeof h, &got, e);
-    if (code == VG_ETRUNC)
+    int r = vgi_input_read(in, h, sizeof h, &got, e);
+    if (r == VG_ETRUNC)
         return got ? cut_short(name, t, "inside the header of record", e) : cut_short(name, t, "before record", e);
-    if (code < 0) return code;
+    if (r < 0) return r;
     unsigned long long index = t->records;
     if (vgi_get64(h + 24) != XXH64(h, 24, 0))
         return vg_fail(e, VG_EINPUT, "'%s': the header of record %llu is damaged (checksum)", name, index);
     if (!is_tag(h)) return vg_fail(e, VG_EINPUT, "'%s': the tag of record %llu is malformed", name, index);
-    memcpy(r->tag, h, 4);
-    r->tag[4] = 0;
-    r->flags = vgi_get32(h + 4);
+    memcpy(record->tag, h, 4);
+    record->tag[4] = 0;
+    record->flags = vgi_get32(h + 4);
     uint64_t length = vgi_get64(h + 8);
-    if (r->flags & reserved_flags)
-        return vg_fail(e, VG_EINPUT, "'%s': record %llu (%s) has reserved flags set", name, index, r->tag);
+    if (record->flags & reserved_flags)
+        return vg_fail(e, VG_EINPUT, "'%s': record %llu (%s) has reserved flags set", name, index, record->tag);
     if (length > longest_payload)
-        return vg_fail(e, VG_EINPUT, "'%s': record %llu (%s) claims %llu bytes", name, index, r->tag,
+        return vg_fail(e, VG_EINPUT, "'%s': record %llu (%s) claims %llu bytes", name, index, record->tag,
                        (unsigned long long)length);
 
-    r->payload.size = 0;
-    code = vgi_input_take(in, &r->payload, (size_t)length, NULL, e);
-    if (code == VG_OK) code = vgi_input_read(in, padding, (size_t)(-length & 7), NULL, e);
-    if (code == VG_ETRUNC) return cut_short(name, t, "inside record", e);
-    if (code < 0) return code;
+    record->payload.size = 0;
+    r = vgi_input_take(in, &record->payload, (size_t)length, NULL, e);
+    if (r == VG_OK) r = vgi_input_read(in, padding, (size_t)(-length & 7), NULL, e);
+    if (r == VG_ETRUNC) return cut_short(name, t, "inside record", e);
+    if (r < 0) return r;
     for (size_t i = 0; i < (size_t)(-length & 7); i++)
         if (padding[i])
-            return vg_fail(e, VG_EINPUT, "'%s': the padding of record %llu (%s) is not zero", name, index, r->tag);
-    if (vgi_get64(h + 16) != XXH64(r->payload.data, (size_t)length, 0))
-        return vg_fail(e, VG_EINPUT, "'%s': record %llu (%s) is damaged (checksum)", name, index, r->tag);
-    if (!strcmp(r->tag, "END ")) return check_end(in, t, r, e);
+            return vg_fail(e, VG_EINPUT, "'%s': the padding of record %llu (%s) is not zero", name, index, record->tag);
+    if (vgi_get64(h + 16) != XXH64(record->payload.data, (size_t)length, 0))
+        return vg_fail(e, VG_EINPUT, "'%s': record %llu (%s) is damaged (checksum)", name, index, record->tag);
+    if (!strcmp(record->tag, "END ")) return check_end(in, t, record, e);
     tally(t, h);
     return 1;
 }

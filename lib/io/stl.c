@@ -37,67 +37,67 @@ static size_t hash_point(const double x[3])
     return (size_t)h;
 }
 
-static size_t find_slot(const struct reading *r, const double x[3])
+static size_t find_slot(const struct reading *in, const double x[3])
 {
-    size_t i = hash_point(x) & (r->nslots - 1);
-    while (r->slots[i] && memcmp(r->m->vertices + 3 * (size_t)(r->slots[i] - 1), x, 3 * sizeof *x) != 0)
-        i = (i + 1) & (r->nslots - 1);
+    size_t i = hash_point(x) & (in->nslots - 1);
+    while (in->slots[i] && memcmp(in->m->vertices + 3 * (size_t)(in->slots[i] - 1), x, 3 * sizeof *x) != 0)
+        i = (i + 1) & (in->nslots - 1);
     return i;
 }
 
-static int grow_slots(struct reading *r)
+static int grow_slots(struct reading *in)
 {
-    if (2 * (r->m->mesh.nv + 1) <= r->nslots) return VG_OK;
-    size_t n = r->nslots ? 2 * r->nslots : 256;
-    uint32_t *slots = vgi_array(n, sizeof *slots, r->e);
+    if (2 * (in->m->mesh.nv + 1) <= in->nslots) return VG_OK;
+    size_t n = in->nslots ? 2 * in->nslots : 256;
+    uint32_t *slots = vgi_array(n, sizeof *slots, in->e);
     if (!slots) return VG_ENOMEM;
-    free(r->slots);
-    r->slots = slots, r->nslots = n;
-    for (size_t v = 0; v < r->m->mesh.nv; v++) slots[find_slot(r, r->m->vertices + 3 * v)] = (uint32_t)(v + 1);
+    free(in->slots);
+    in->slots = slots, in->nslots = n;
+    for (size_t v = 0; v < in->m->mesh.nv; v++) slots[find_slot(in, in->m->vertices + 3 * v)] = (uint32_t)(v + 1);
     return VG_OK;
 }
 
 /* The vertex at this position, added if it is new. */
-static int weld(struct reading *r, const double x[3], uint32_t *v)
+static int weld(struct reading *in, const double x[3], uint32_t *v)
 {
-    vg_mesh *m = &r->m->mesh;
-    int result = grow_slots(r);
-    if (result < 0) return result;
-    size_t slot = find_slot(r, x);
-    if (!r->slots[slot]) {
-        if (m->nv >= UINT32_MAX - 1) return vg_fail(r->e, VG_EINPUT, "%s has too many vertices", r->subject);
-        if ((result = vgi_grow(&r->m->vertices, &r->vertices_cap, 3 * (m->nv + 1), sizeof *x, r->e)) < 0)
-            return result;
-        memcpy(r->m->vertices + 3 * m->nv, x, 3 * sizeof *x);
-        r->slots[slot] = (uint32_t)++m->nv;
+    vg_mesh *m = &in->m->mesh;
+    int r = grow_slots(in);
+    if (r < 0) return r;
+    size_t slot = find_slot(in, x);
+    if (!in->slots[slot]) {
+        if (m->nv >= UINT32_MAX - 1) return vg_fail(in->e, VG_EINPUT, "%s has too many vertices", in->subject);
+        if ((r = vgi_grow(&in->m->vertices, &in->vertices_cap, 3 * (m->nv + 1), sizeof *x, in->e)) < 0)
+            return r;
+        memcpy(in->m->vertices + 3 * m->nv, x, 3 * sizeof *x);
+        in->slots[slot] = (uint32_t)++m->nv;
     }
-    *v = r->slots[slot] - 1;
+    *v = in->slots[slot] - 1;
     return VG_OK;
 }
 
-static int add_triangle(struct reading *r, double x[9])
+static int add_triangle(struct reading *in, double x[9])
 {
-    vg_mesh *m = &r->m->mesh;
+    vg_mesh *m = &in->m->mesh;
     uint32_t v[3];
     for (int k = 0; k < 9; k++) {
         if (!isfinite(x[k]))
-            return vg_fail(r->e, VG_EINPUT, "%s: corner %d of triangle %zu is not finite", r->subject, k / 3,
-                           r->triangles);
+            return vg_fail(in->e, VG_EINPUT, "%s: corner %d of triangle %zu is not finite", in->subject, k / 3,
+                           in->triangles);
         x[k] += 0.0; /* -0 becomes 0 */
     }
     for (int k = 0; k < 3; k++) {
-        int result = weld(r, x + 3 * k, &v[k]);
-        if (result < 0) return result;
+        int r = weld(in, x + 3 * k, &v[k]);
+        if (r < 0) return r;
     }
-    r->triangles++;
+    in->triangles++;
     if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) {
-        r->dropped++;
+        in->dropped++;
         return VG_OK;
     }
-    if (3 * (m->nf + 1) >= UINT32_MAX) return vg_fail(r->e, VG_EINPUT, "%s has too many triangles", r->subject);
-    int result = vgi_grow(&m->vert, &r->vert_cap, 3 * (m->nf + 1), sizeof *m->vert, r->e);
-    if (result == VG_OK) result = vgi_grow(&m->start, &r->start_cap, m->nf + 2, sizeof *m->start, r->e);
-    if (result < 0) return result;
+    if (3 * (m->nf + 1) >= UINT32_MAX) return vg_fail(in->e, VG_EINPUT, "%s has too many triangles", in->subject);
+    int r = vgi_grow(&m->vert, &in->vert_cap, 3 * (m->nf + 1), sizeof *m->vert, in->e);
+    if (r == VG_OK) r = vgi_grow(&m->start, &in->start_cap, m->nf + 2, sizeof *m->start, in->e);
+    if (r < 0) return r;
     memcpy(m->vert + 3 * m->nf, v, sizeof v);
     m->nf++;
     m->start[0] = 0;
@@ -110,25 +110,25 @@ static float float_at(const char *p)
     return vgi_as_float(vgi_get32((const unsigned char *)p));
 }
 
-static int read_binary(struct reading *r)
+static int read_binary(struct reading *in)
 {
-    size_t n = (size_t)(r->end - r->data);
-    if (n < HEADER) return vg_fail(r->e, VG_ETRUNC, "%s ends within its header", r->subject);
-    uint64_t count = vgi_get32((const unsigned char *)r->data + COUNT_OFF), there = (n - HEADER) / FACET;
+    size_t n = (size_t)(in->end - in->data);
+    if (n < HEADER) return vg_fail(in->e, VG_ETRUNC, "%s ends within its header", in->subject);
+    uint64_t count = vgi_get32((const unsigned char *)in->data + COUNT_OFF), there = (n - HEADER) / FACET;
     if (there < count)
-        return vg_fail(r->e, VG_ETRUNC, "%s announces %llu triangles, but ends after %llu", r->subject,
+        return vg_fail(in->e, VG_ETRUNC, "%s announces %llu triangles, but ends after %llu", in->subject,
                        (unsigned long long)count, (unsigned long long)there);
     if (n - HEADER > count * FACET)
-        vgi_note(&r->m->note, "left out %llu bytes behind the last triangle",
+        vgi_note(&in->m->note, "left out %llu bytes behind the last triangle",
                  (unsigned long long)(n - HEADER - count * FACET));
-    int result = VG_OK;
-    const char *p = r->data + HEADER;
-    for (uint64_t i = 0; i < count && result == VG_OK; i++, p += FACET) {
+    int r = VG_OK;
+    const char *p = in->data + HEADER;
+    for (uint64_t i = 0; i < count && r == VG_OK; i++, p += FACET) {
         double x[9];
         for (int k = 0; k < 9; k++) x[k] = float_at(p + 12 + 4 * k);
-        result = add_triangle(r, x);
+        r = add_triangle(in, x);
     }
-    return result;
+    return r;
 }
 
 /* ---- text ---- */
@@ -138,17 +138,17 @@ static bool is_space(char c)
     return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == '\v' || c == '\f';
 }
 
-static void skip_spaces(struct reading *r)
+static void skip_spaces(struct reading *in)
 {
-    while (r->p < r->end && is_space(*r->p)) r->p++;
+    while (in->p < in->end && is_space(*in->p)) in->p++;
 }
 
-static const char *next_word(struct reading *r, size_t *n)
+static const char *next_word(struct reading *in, size_t *n)
 {
-    skip_spaces(r);
-    const char *word = r->p;
-    while (r->p < r->end && !is_space(*r->p)) r->p++;
-    *n = (size_t)(r->p - word);
+    skip_spaces(in);
+    const char *word = in->p;
+    while (in->p < in->end && !is_space(*in->p)) in->p++;
+    *n = (size_t)(in->p - word);
     return word;
 }
 
@@ -157,92 +157,92 @@ static bool is(const char *word, size_t n, const char *what)
     return n == strlen(what) && !strncasecmp(word, what, n);
 }
 
-static size_t line_of(const struct reading *r, const char *p)
+static size_t line_of(const struct reading *in, const char *p)
 {
     size_t n = 1;
-    for (const char *q = r->data; q < p && (q = memchr(q, '\n', (size_t)(p - q))); q++) n++;
+    for (const char *q = in->data; q < p && (q = memchr(q, '\n', (size_t)(p - q))); q++) n++;
     return n;
 }
 
-static int unexpected(const struct reading *r, const char *word, size_t n, const char *wanted)
+static int unexpected(const struct reading *in, const char *word, size_t n, const char *wanted)
 {
-    if (n == 0) return vg_fail(r->e, VG_ETRUNC, "%s ends where '%s' should come", r->subject, wanted);
-    return vg_fail(r->e, VG_EINPUT, "%s, line %zu: '%.*s' where '%s' should come", r->subject, line_of(r, word),
+    if (n == 0) return vg_fail(in->e, VG_ETRUNC, "%s ends where '%s' should come", in->subject, wanted);
+    return vg_fail(in->e, VG_EINPUT, "%s, line %zu: '%.*s' where '%s' should come", in->subject, line_of(in, word),
                    (int)(n < SHOWN ? n : SHOWN), word, wanted);
 }
 
-static int expect(struct reading *r, const char *what)
+static int expect(struct reading *in, const char *what)
 {
     size_t n;
-    const char *word = next_word(r, &n);
-    return is(word, n, what) ? VG_OK : unexpected(r, word, n, what);
+    const char *word = next_word(in, &n);
+    return is(word, n, what) ? VG_OK : unexpected(in, word, n, what);
 }
 
-static int read_corner(struct reading *r, double x[3])
+static int read_corner(struct reading *in, double x[3])
 {
     for (int k = 0; k < 3; k++) {
         size_t n;
-        const char *word = next_word(r, &n);
-        if (n == 0 || vgi_parse_double(word, word + n, &x[k]) != word + n) return unexpected(r, word, n, "a number");
+        const char *word = next_word(in, &n);
+        if (n == 0 || vgi_parse_double(word, word + n, &x[k]) != word + n) return unexpected(in, word, n, "a number");
     }
     return VG_OK;
 }
 
 /* A normal is not used, so anything is accepted: "nan", "-1.#IND", fewer or more words. */
-static int skip_normal(struct reading *r)
+static int skip_normal(struct reading *in)
 {
     enum { MOST = 8 };
     size_t n;
-    const char *word = next_word(r, &n);
-    for (int i = 0; i < MOST && n && !is(word, n, "outer"); i++) word = next_word(r, &n);
-    return is(word, n, "outer") ? VG_OK : unexpected(r, word, n, "outer");
+    const char *word = next_word(in, &n);
+    for (int i = 0; i < MOST && n && !is(word, n, "outer"); i++) word = next_word(in, &n);
+    return is(word, n, "outer") ? VG_OK : unexpected(in, word, n, "outer");
 }
 
-static int read_facet(struct reading *r)
+static int read_facet(struct reading *in)
 {
     double x[9];
-    int result = skip_normal(r);
-    if (result == VG_OK) result = expect(r, "loop");
-    for (int k = 0; k < 3 && result == VG_OK; k++) {
-        result = expect(r, "vertex");
-        if (result == VG_OK) result = read_corner(r, x + 3 * k);
+    int r = skip_normal(in);
+    if (r == VG_OK) r = expect(in, "loop");
+    for (int k = 0; k < 3 && r == VG_OK; k++) {
+        r = expect(in, "vertex");
+        if (r == VG_OK) r = read_corner(in, x + 3 * k);
     }
-    if (result == VG_OK) result = expect(r, "endloop");
-    if (result == VG_OK) result = expect(r, "endfacet");
-    return result == VG_OK ? add_triangle(r, x) : result;
+    if (r == VG_OK) r = expect(in, "endloop");
+    if (r == VG_OK) r = expect(in, "endfacet");
+    return r == VG_OK ? add_triangle(in, x) : r;
 }
 
 /* The name of a solid is the rest of its line, whatever it contains. */
-static void skip_line(struct reading *r)
+static void skip_line(struct reading *in)
 {
-    while (r->p < r->end && *r->p != '\n' && *r->p != '\r') r->p++;
+    while (in->p < in->end && *in->p != '\n' && *in->p != '\r') in->p++;
 }
 
-static int read_solid(struct reading *r)
+static int read_solid(struct reading *in)
 {
-    int result = expect(r, "solid");
-    skip_line(r);
-    while (result == VG_OK) {
+    int r = expect(in, "solid");
+    skip_line(in);
+    while (r == VG_OK) {
         size_t n;
-        const char *word = next_word(r, &n);
+        const char *word = next_word(in, &n);
         if (is(word, n, "endsolid")) break;
-        result = is(word, n, "facet") ? read_facet(r) : unexpected(r, word, n, "facet");
+        r = is(word, n, "facet") ? read_facet(in) : unexpected(in, word, n, "facet");
     }
-    skip_line(r);
-    return result;
+    skip_line(in);
+    return r;
 }
 
 /* One solid after another; other text after the last one is ignored. */
-static int read_text(struct reading *r)
+static int read_text(struct reading *in)
 {
-    int result;
+    int r;
     do {
-        result = read_solid(r);
-        skip_spaces(r);
-    } while (result == VG_OK && r->end - r->p >= 5 && !strncasecmp(r->p, "solid", 5));
-    if (result == VG_OK && r->p < r->end)
-        vgi_note(&r->m->note, "left out what stands behind the last solid, from line %zu on", line_of(r, r->p));
-    return result;
+        r = read_solid(in);
+        skip_spaces(in);
+    } while (r == VG_OK && in->end - in->p >= 5 && !strncasecmp(in->p, "solid", 5));
+    if (r == VG_OK && in->p < in->end)
+        vgi_note(&in->m->note, "left out what stands behind the last solid, from line %zu on", line_of(in, in->p));
+    return r;
 }
 
 /* ---- text or binary ---- */
@@ -285,15 +285,15 @@ static bool sniff_stl(const unsigned char *data, size_t n)
 static int read_stl(vg_model *m, const char *data, size_t n, const char *subject, vg_err *e)
 {
     const unsigned char *bytes = (const unsigned char *)data;
-    struct reading r = {.data = data, .p = data, .end = data + n, .subject = subject, .e = e, .m = m};
+    struct reading in = {.data = data, .p = data, .end = data + n, .subject = subject, .e = e, .m = m};
     bool text = starts_as_text(bytes, n) && !has_zero_byte(bytes, n);
-    int result = text ? read_text(&r) : read_binary(&r);
-    free(r.slots);
-    vgi_note_dropped(&m->note, r.dropped);
-    if (result == VG_OK && r.triangles == 0) return vg_fail(e, VG_EINPUT, "%s has no triangles", subject);
-    if (result == VG_OK && m->mesh.nf == 0)
+    int r = text ? read_text(&in) : read_binary(&in);
+    free(in.slots);
+    vgi_note_dropped(&m->note, in.dropped);
+    if (r == VG_OK && in.triangles == 0) return vg_fail(e, VG_EINPUT, "%s has no triangles", subject);
+    if (r == VG_OK && m->mesh.nf == 0)
         return vg_fail(e, VG_EINPUT, "%s has no triangle whose three corners are apart", subject);
-    return result;
+    return r;
 }
 
 /* ------------------------------------------------------------------------------------------- writing -- */

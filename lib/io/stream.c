@@ -21,169 +21,169 @@ struct vg_reader {
     vg_failure failure;
 };
 
-static int keep_unknown(vg_reader *r, vg_record *record, vg_records *list, vg_err *e)
+static int keep_unknown(vg_reader *s, vg_record *record, vg_records *list, vg_err *e)
 {
     if (record->flags & VGI_CRITICAL)
         return vg_fail(e, VG_EINPUT,
                        "'%s' needs a newer version of this program: it has a record '%s' that must be understood",
-                       vgi_input_name(r->in), record->tag);
+                       vgi_input_name(s->in), record->tag);
     if (!(record->flags & VGI_COPY_SAFE)) return VG_OK;
     size_t cap = list->n;
-    int code = vgi_grow(&list->at, &cap, list->n + 1, sizeof *list->at, e);
-    if (code < 0) return code;
+    int r = vgi_grow(&list->at, &cap, list->n + 1, sizeof *list->at, e);
+    if (r < 0) return r;
     list->at[list->n++] = *record;
     record->payload = (vg_bytes){0};
     return VG_OK;
 }
 
-static int stopped_by_failure(vg_reader *r, const vg_record *record, vg_err *e)
+static int stopped_by_failure(vg_reader *s, const vg_record *record, vg_err *e)
 {
     char where[200];
-    snprintf(where, sizeof where, "'%.150s': record FAIL", vgi_input_name(r->in));
+    snprintf(where, sizeof where, "'%.150s': record FAIL", vgi_input_name(s->in));
     vgi_payload p = {record->payload.data, record->payload.size, where};
-    vgi_failure_clear(&r->failure);
-    return vgi_fail_decode(&r->failure, &p, vgi_input_name(r->in), e);
+    vgi_failure_clear(&s->failure);
+    return vgi_fail_decode(&s->failure, &p, vgi_input_name(s->in), e);
 }
 
-static bool seen(const vg_reader *r, const vgi_artefact *t)
+static bool seen(const vg_reader *s, const vgi_artefact *t)
 {
-    return r->seen[t - vgi_artefacts];
+    return s->seen[t - vgi_artefacts];
 }
 
-static int read_known(vg_reader *r, const vgi_artefact *t, const vgi_payload *p, vg_err *e)
+static int read_known(vg_reader *s, const vgi_artefact *t, const vgi_payload *p, vg_err *e)
 {
-    const char *name = vgi_input_name(r->in);
-    if (seen(r, t) && !t->each) return vg_fail(e, VG_EINPUT, "'%s' has two %s records", name, t->tag);
-    if (t->needs && !seen(r, vgi_artefact_by_tag(t->needs)))
+    const char *name = vgi_input_name(s->in);
+    if (seen(s, t) && !t->each) return vg_fail(e, VG_EINPUT, "'%s' has two %s records", name, t->tag);
+    if (t->needs && !seen(s, vgi_artefact_by_tag(t->needs)))
         return vg_fail(e, VG_EINPUT, "'%s': record %s must come after %s", name, t->tag, t->needs);
-    r->seen[t - vgi_artefacts] = true;
-    int code = vgi_artefact_decode(t, p, &r->head, e);
-    if (code == VG_EINPUT && vgi_is_earlier_provenance(t, p))
+    s->seen[t - vgi_artefacts] = true;
+    int r = vgi_artefact_decode(t, p, &s->head, e);
+    if (r == VG_EINPUT && vgi_is_earlier_provenance(t, p))
         return vg_fail(e, VG_EINPUT, "'%s' was written by an earlier version of this program, whose streams are laid "
                        "out in another way: make it again from its sources", name);
-    return code;
+    return r;
 }
 
-static int read_head_record(vg_reader *r, vg_record *record, vg_err *e)
+static int read_head_record(vg_reader *s, vg_record *record, vg_err *e)
 {
-    const char *name = vgi_input_name(r->in);
+    const char *name = vgi_input_name(s->in);
     char where[200];
     snprintf(where, sizeof where, "'%.150s': record %s", name, record->tag);
     vgi_payload p = {record->payload.data, record->payload.size, where};
     const vgi_artefact *t = vgi_artefact_by_tag(record->tag);
-    if (t) return read_known(r, t, &p, e);
+    if (t) return read_known(s, t, &p, e);
     if (!strcmp(record->tag, "FORM")) {
-        r->formed = true;
-        return vgi_form_decode(&p, &r->head, e);
+        s->formed = true;
+        return vgi_form_decode(&p, &s->head, e);
     }
-    if (!strcmp(record->tag, "FAIL")) return stopped_by_failure(r, record, e);
+    if (!strcmp(record->tag, "FAIL")) return stopped_by_failure(s, record, e);
     if (!strcmp(record->tag, "FRAM")) return vg_fail(e, VG_EINPUT, "'%s' has a frame before its FORM record", name);
-    return keep_unknown(r, record, &r->head.extra, e);
+    return keep_unknown(s, record, &s->head.extra, e);
 }
 
-static int read_head(vg_reader *r, vg_err *e)
+static int read_head(vg_reader *s, vg_err *e)
 {
-    int code = vgi_tally_init(&r->tally, e);
-    if (code == VG_OK) code = vgi_record_begin_read(r->in, e);
+    int r = vgi_tally_init(&s->tally, e);
+    if (r == VG_OK) r = vgi_record_begin_read(s->in, e);
     vg_record record = {.payload = {0}};
-    while (code == VG_OK && !r->formed) {
-        code = vgi_record_read(r->in, &r->tally, &record, e);
-        if (code == 0) code = vg_fail(e, VG_EINPUT, "'%s' has no FORM record", vgi_input_name(r->in));
-        else if (code > 0) code = read_head_record(r, &record, e);
+    while (r == VG_OK && !s->formed) {
+        r = vgi_record_read(s->in, &s->tally, &record, e);
+        if (r == 0) r = vg_fail(e, VG_EINPUT, "'%s' has no FORM record", vgi_input_name(s->in));
+        else if (r > 0) r = read_head_record(s, &record, e);
     }
     vg_bytes_clear(&record.payload);
-    if (code < 0) return code;
-    if (r->seen[VGI_MESH] && !r->head.body.reference)
-        return vg_fail(e, VG_EINPUT, "'%s' has a MESH but no REFP record before FORM", vgi_input_name(r->in));
-    if (!r->head.body.reference_name && !(r->head.body.reference_name = vgi_copy_string("", 0, e))) return VG_ENOMEM;
-    r->form = vgi_form_of(&r->head);
+    if (r < 0) return r;
+    if (s->seen[VGI_MESH] && !s->head.body.reference)
+        return vg_fail(e, VG_EINPUT, "'%s' has a MESH but no REFP record before FORM", vgi_input_name(s->in));
+    if (!s->head.body.reference_name && !(s->head.body.reference_name = vgi_copy_string("", 0, e))) return VG_ENOMEM;
+    s->form = vgi_form_of(&s->head);
     return VG_OK;
 }
 
 int vgi_reader_open_input(vg_reader **out, vgi_input *in, vg_err *e)
 {
-    vg_reader *r = *out = vgi_array(1, sizeof *r, e);
-    if (!r) return vgi_input_free(&in), VG_ENOMEM;
-    r->in = in;
-    int code = read_head(r, e);
-    if (code < 0) vg_reader_close(out);
-    return code;
+    vg_reader *s = *out = vgi_array(1, sizeof *s, e);
+    if (!s) return vgi_input_free(&in), VG_ENOMEM;
+    s->in = in;
+    int r = read_head(s, e);
+    if (r < 0) vg_reader_close(out);
+    return r;
 }
 
-int vg_reader_open(vg_reader **r, int fd, const char *name, vg_err *e)
+int vg_reader_open(vg_reader **s, int fd, const char *name, vg_err *e)
 {
     vgi_input *in;
-    *r = NULL;
-    int code = vgi_input_fd(&in, fd, false, name, e);
-    return code < 0 ? code : vgi_reader_open_input(r, in, e);
+    *s = NULL;
+    int r = vgi_input_fd(&in, fd, false, name, e);
+    return r < 0 ? r : vgi_reader_open_input(s, in, e);
 }
 
-int vg_reader_open_memory(vg_reader **r, const void *data, size_t n, const char *name, vg_err *e)
+int vg_reader_open_memory(vg_reader **s, const void *data, size_t n, const char *name, vg_err *e)
 {
     vgi_input *in;
-    *r = NULL;
-    int code = vgi_input_memory(&in, data, n, name, e);
-    return code < 0 ? code : vgi_reader_open_input(r, in, e);
+    *s = NULL;
+    int r = vgi_input_memory(&in, data, n, name, e);
+    return r < 0 ? r : vgi_reader_open_input(s, in, e);
 }
 
-vg_head *vg_reader_head(vg_reader *r)
+vg_head *vg_reader_head(vg_reader *s)
 {
-    return &r->head;
+    return &s->head;
 }
 
-vg_records *vg_reader_tail(vg_reader *r)
+vg_records *vg_reader_tail(vg_reader *s)
 {
-    return &r->tail;
+    return &s->tail;
 }
 
 /* A large payload is read directly into the frame's raw buffer, where it stays. */
-int vg_reader_next(vg_reader *r, vg_frame *f, vg_err *e)
+int vg_reader_next(vg_reader *s, vg_frame *f, vg_err *e)
 {
     vg_records_clear(&f->extra);
-    if (r->ended) return 0;
+    if (s->ended) return 0;
     vg_record record = {.payload = f->raw};
     vg_records before = {0};
-    int code;
-    while ((code = vgi_record_read(r->in, &r->tally, &record, e)) > 0) {
+    int r;
+    while ((r = vgi_record_read(s->in, &s->tally, &record, e)) > 0) {
         if (!strcmp(record.tag, "FRAM")) break;
-        if (!strcmp(record.tag, "FAIL")) code = stopped_by_failure(r, &record, e);
+        if (!strcmp(record.tag, "FAIL")) r = stopped_by_failure(s, &record, e);
         else if (!strcmp(record.tag, "FORM"))
-            code = vg_fail(e, VG_EINPUT, "'%s' has two FORM records", vgi_input_name(r->in));
+            r = vg_fail(e, VG_EINPUT, "'%s' has two FORM records", vgi_input_name(s->in));
         else if (vgi_artefact_by_tag(record.tag))
-            code = vg_fail(e, VG_EINPUT, "'%s': record %s must come before FORM", vgi_input_name(r->in), record.tag);
-        else code = keep_unknown(r, &record, &before, e);
-        if (code < 0) break;
+            r = vg_fail(e, VG_EINPUT, "'%s': record %s must come before FORM", vgi_input_name(s->in), record.tag);
+        else r = keep_unknown(s, &record, &before, e);
+        if (r < 0) break;
     }
     f->raw = record.payload;
-    if (code <= 0) {
-        if (code == 0) r->ended = true, r->tail = before;
+    if (r <= 0) {
+        if (r == 0) s->ended = true, s->tail = before;
         else vg_records_clear(&before);
-        return code;
+        return r;
     }
     f->extra = before;
     char where[200];
-    snprintf(where, sizeof where, "'%.150s': frame %llu", vgi_input_name(r->in), (unsigned long long)r->frames);
-    code = vgi_fram_decode(f, &r->form, where, e);
-    if (code < 0) return code;
-    r->frames++;
+    snprintf(where, sizeof where, "'%.150s': frame %llu", vgi_input_name(s->in), (unsigned long long)s->frames);
+    r = vgi_fram_decode(f, &s->form, where, e);
+    if (r < 0) return r;
+    s->frames++;
     return 1;
 }
 
-const vg_failure *vg_reader_failure(const vg_reader *r)
+const vg_failure *vg_reader_failure(const vg_reader *s)
 {
-    return r->failure.program ? &r->failure : NULL;
+    return s->failure.program ? &s->failure : NULL;
 }
 
-void vg_reader_close(vg_reader **r)
+void vg_reader_close(vg_reader **s)
 {
-    if (!*r) return;
-    vgi_failure_clear(&(*r)->failure);
-    vgi_input_free(&(*r)->in);
-    vgi_tally_clear(&(*r)->tally);
-    vg_head_clear(&(*r)->head);
-    vg_records_clear(&(*r)->tail);
-    free(*r);
-    *r = NULL;
+    if (!*s) return;
+    vgi_failure_clear(&(*s)->failure);
+    vgi_input_free(&(*s)->in);
+    vgi_tally_clear(&(*s)->tally);
+    vg_head_clear(&(*s)->head);
+    vg_records_clear(&(*s)->tail);
+    free(*s);
+    *s = NULL;
 }
 
 /* ---- writer ---- */

@@ -61,8 +61,8 @@ int vg_mesh_check(const vg_mesh *m, const char *subject, vg_err *e)
         return vg_fail(e, VG_EINPUT, "%s has too many vertices, faces or corners (the limit is 2^32 - 2)", subject);
     uint32_t *sorted = NULL;
     size_t cap = 0;
-    int result = VG_OK;
-    for (size_t f = 0; f < m->nf && result == VG_OK; f++) {
+    int r = VG_OK;
+    for (size_t f = 0; f < m->nf && r == VG_OK; f++) {
         size_t size = m->start[f + 1] - m->start[f];
         const uint32_t *vert = m->vert + m->start[f];
         if (m->start[f + 1] < m->start[f] || size < 2)
@@ -71,12 +71,12 @@ int vg_mesh_check(const vg_mesh *m, const char *subject, vg_err *e)
             if (vert[i] >= m->nv)
                 return free(sorted),
                        vg_fail(e, VG_EINPUT, "%s: face %zu names vertex %u of %zu", subject, f, vert[i], m->nv);
-        if (size > SMALL) result = vgi_grow(&sorted, &cap, size, sizeof *sorted, e);
-        if (result == VG_OK && repeats(vert, size, size > SMALL ? sorted : NULL))
-            result = vg_fail(e, VG_EINPUT, "%s: face %zu names a vertex twice", subject, f);
+        if (size > SMALL) r = vgi_grow(&sorted, &cap, size, sizeof *sorted, e);
+        if (r == VG_OK && repeats(vert, size, size > SMALL ? sorted : NULL))
+            r = vg_fail(e, VG_EINPUT, "%s: face %zu names a vertex twice", subject, f);
     }
     free(sorted);
-    return result;
+    return r;
 }
 
 int vg_mesh_same(const vg_mesh *a, const char *a_name, const vg_mesh *b, const char *b_name, vg_err *e)

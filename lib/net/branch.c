@@ -38,7 +38,7 @@ static double between(const double *a, const double *b)
 }
 
 /* Prim's tree from the centre: each vertex takes the branch nearest to its parent's. */
-static void grow(const vgi_rings *r, uint32_t centre, double *w, size_t stride, vgi_heap *h, double *key,
+static void grow(const vgi_rings *g, uint32_t centre, double *w, size_t stride, vgi_heap *h, double *key,
                  uint32_t *parent)
 {
     key[centre] = 0, parent[centre] = centre;
@@ -47,8 +47,8 @@ static void grow(const vgi_rings *r, uint32_t centre, double *w, size_t stride, 
         uint32_t v = vgi_heap_take(h);
         key[v] = -1; /* in the tree */
         if (parent[v] != v) near(w + stride * v, w + stride * parent[v], w + stride * v);
-        for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++) {
-            uint32_t to = r->to[i];
+        for (uint32_t i = g->first[v]; i < g->first[v + 1]; i++) {
+            uint32_t to = g->to[i];
             if (key[to] < 0) continue;
             double angle = between(w + stride * v, w + stride * to);
             if (!(angle < key[to])) continue;
@@ -58,72 +58,72 @@ static void grow(const vgi_rings *r, uint32_t centre, double *w, size_t stride, 
     }
 }
 
-int vgi_branch_first(const vgi_rings *r, double *w, size_t stride, vg_err *e)
+int vgi_branch_first(const vgi_rings *g, double *w, size_t stride, vg_err *e)
 {
-    double *key = vgi_array_raw(r->nv, sizeof *key, e);
-    uint32_t *heap = vgi_array_raw(vgi_rings_heap(r), sizeof *heap, e), *parent = vgi_array_raw(r->nv, sizeof *parent, e);
-    int code = key && heap && parent ? VG_OK : VG_ENOMEM;
-    if (code == VG_OK) {
-        vgi_heap h = {0, heap, heap + r->nv, key};
-        for (size_t v = 0; v < r->nv; v++) key[v] = INFINITY, h.place[v] = UINT32_MAX;
-        for (size_t p = 0; p < r->nparts; p++) grow(r, r->centre[p], w, stride, &h, key, parent);
+    double *key = vgi_array_raw(g->nv, sizeof *key, e);
+    uint32_t *heap = vgi_array_raw(vgi_rings_heap(g), sizeof *heap, e), *parent = vgi_array_raw(g->nv, sizeof *parent, e);
+    int r = key && heap && parent ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) {
+        vgi_heap h = {0, heap, heap + g->nv, key};
+        for (size_t v = 0; v < g->nv; v++) key[v] = INFINITY, h.place[v] = UINT32_MAX;
+        for (size_t p = 0; p < g->nparts; p++) grow(g, g->centre[p], w, stride, &h, key, parent);
     }
     free(key);
     free(heap);
     free(parent);
-    return code;
+    return r;
 }
 
 /* ---- later poses ---- */
 
 /* cost of a vector relative to its neighbours, and to that of the previous pose */
-static double cost(const vgi_rings *r, size_t v, const double x[3], const double *w, size_t stride,
+static double cost(const vgi_rings *g, size_t v, const double x[3], const double *w, size_t stride,
                    const double *before)
 {
     double sum = 0;
-    for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++) sum += vgi_square(x, w + stride * r->to[i]);
-    return before ? sum + (double)(r->first[v + 1] - r->first[v]) * vgi_square(x, before) : sum;
+    for (uint32_t i = g->first[v]; i < g->first[v + 1]; i++) sum += vgi_square(x, w + stride * g->to[i]);
+    return before ? sum + (double)(g->first[v + 1] - g->first[v]) * vgi_square(x, before) : sum;
 }
 
 /* Try other whole turns and keep them if they cost less. */
-static bool improve(const vgi_rings *r, size_t v, double *w, size_t stride, const double *before)
+static bool improve(const vgi_rings *g, size_t v, double *w, size_t stride, const double *before)
 {
-    double mean[3] = {0, 0, 0}, n = (double)(r->first[v + 1] - r->first[v]), x[3], *own = w + stride * v;
+    double mean[3] = {0, 0, 0}, n = (double)(g->first[v + 1] - g->first[v]), x[3], *own = w + stride * v;
     if (!(n > 0)) return false;
-    for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++)
-        for (size_t k = 0; k < 3; k++) mean[k] += w[stride * r->to[i] + k] / n;
+    for (uint32_t i = g->first[v]; i < g->first[v + 1]; i++)
+        for (size_t k = 0; k < 3; k++) mean[k] += w[stride * g->to[i] + k] / n;
     near(own, mean, x);
     if (vgi_square(x, own) < 1) return false;
-    if (!(cost(r, v, x, w, stride, before) < cost(r, v, own, w, stride, before) - 1e-9)) return false;
+    if (!(cost(g, v, x, w, stride, before) < cost(g, v, own, w, stride, before) - 1e-9)) return false;
     memcpy(own, x, sizeof x);
     return true;
 }
 
-static size_t jumps(const vgi_rings *r, const double *w, size_t stride)
+static size_t jumps(const vgi_rings *g, const double *w, size_t stride)
 {
     size_t n = 0;
-    for (size_t v = 0; v < r->nv; v++)
-        for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++)
-            n += r->to[i] > v && vgi_square(w + stride * v, w + stride * r->to[i]) > pi * pi;
+    for (size_t v = 0; v < g->nv; v++)
+        for (uint32_t i = g->first[v]; i < g->first[v + 1]; i++)
+            n += g->to[i] > v && vgi_square(w + stride * v, w + stride * g->to[i]) > pi * pi;
     return n;
 }
 
-size_t vgi_branch_settle(const vgi_rings *r, double *w, size_t stride, const double *before, size_t before_stride)
+size_t vgi_branch_settle(const vgi_rings *g, double *w, size_t stride, const double *before, size_t before_stride)
 {
     double most = 0;
-    for (size_t v = 0; v < r->nv; v++) most = fmax(most, vgi_dot(w + stride * v, w + stride * v));
+    for (size_t v = 0; v < g->nv; v++) most = fmax(most, vgi_dot(w + stride * v, w + stride * v));
     if (most < pi * pi / 4) return 0; /* no mean of neighbours can be nearer to another branch */
     bool changed = true;
     for (int sweep = 0; sweep < SWEEPS && changed; sweep++) {
         changed = false;
-        for (size_t v = 0; v < r->nv; v++)
-            changed |= improve(r, v, w, stride, before ? before + before_stride * v : NULL);
+        for (size_t v = 0; v < g->nv; v++)
+            changed |= improve(g, v, w, stride, before ? before + before_stride * v : NULL);
     }
-    return jumps(r, w, stride);
+    return jumps(g, w, stride);
 }
 
-size_t vgi_branch_next(const vgi_rings *r, double *w, size_t stride, const double *before, size_t before_stride)
+size_t vgi_branch_next(const vgi_rings *g, double *w, size_t stride, const double *before, size_t before_stride)
 {
-    for (size_t v = 0; v < r->nv; v++) near(w + stride * v, before + before_stride * v, w + stride * v);
-    return vgi_branch_settle(r, w, stride, before, before_stride);
+    for (size_t v = 0; v < g->nv; v++) near(w + stride * v, before + before_stride * v, w + stride * v);
+    return vgi_branch_settle(g, w, stride, before, before_stride);
 }

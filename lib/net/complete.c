@@ -123,18 +123,18 @@ static int find_spread(way *w, vg_err *e)
     size_t n = w->n, numbers = g->net->numbers;
     double *miss = g->numbers, far[2] = {0, INFINITY};
     vgi_reach reach;
-    int code = VG_OK;
+    int r = VG_OK;
     vgi_generator_states(g, false, 0);
     if (g->o.optimise) {
-        code = vgi_runner_reach(&g->runner, w->npast, w->past, n + 1, w->to.frame, ROUNDS, &reach, e);
-        if (code == VG_OK) w->found.tries = reach.rounds;
+        r = vgi_runner_reach(&g->runner, w->npast, w->past, n + 1, w->to.frame, ROUNDS, &reach, e);
+        if (r == VG_OK) w->found.tries = reach.rounds;
     }
-    if (code == VG_OK) code = run_forward(w, 1, e);
-    if (code < 0) return code;
+    if (r == VG_OK) r = run_forward(w, 1, e);
+    if (r < 0) return r;
     far[0] = distance(w->to.frame, w->forward[0] + n * numbers, numbers);
     if (g->net->direction != VG_FORWARD) {
         vgi_generator_states(g, true, 0);
-        code = run_back(w, 1, e);
+        r = run_back(w, 1, e);
         far[1] = distance(w->from.frame, w->back[0] + n * numbers, numbers);
     }
     w->found.backward = far[1] < far[0];
@@ -142,7 +142,7 @@ static int find_spread(way *w, vg_err *e)
     difference(w->found.backward ? w->from.frame : w->to.frame, along + n * numbers, numbers, miss);
     w->found.miss = share(w, fmin(far[0], far[1]));
     spread(w, along, miss, n + 1, n, w->found.backward);
-    return code;
+    return r;
 }
 
 /* Find where the two runs of a lane are nearest at the same time: frame at + 1 of n; returns the distance. */
@@ -176,13 +176,13 @@ static int find_merge(way *w, vg_err *e)
     vg_generator *g = w->g;
     size_t at = 0;
     double best = INFINITY;
-    int code = VG_OK;
-    for (uint64_t batch = 0; code == VG_OK && batch < RESTARTS / NET_LANES && !w->found.merged; batch++) {
+    int r = VG_OK;
+    for (uint64_t batch = 0; r == VG_OK && batch < RESTARTS / NET_LANES && !w->found.merged; batch++) {
         vgi_generator_states(g, false, 2 * batch);
-        code = run_forward(w, NET_LANES, e);
+        r = run_forward(w, NET_LANES, e);
         vgi_generator_states(g, true, 2 * batch + 1);
-        if (code == VG_OK) code = run_back(w, NET_LANES, e);
-        for (size_t i = 0; code == VG_OK && i < NET_LANES && !w->found.merged; i++) {
+        if (r == VG_OK) r = run_back(w, NET_LANES, e);
+        for (size_t i = 0; r == VG_OK && i < NET_LANES && !w->found.merged; i++) {
             double far = share(w, nearest(w, i, &at));
             w->found.tries++;
             if (!(far < best)) continue;
@@ -192,7 +192,7 @@ static int find_merge(way *w, vg_err *e)
         }
     }
     w->found.miss = best;
-    return code;
+    return r;
 }
 
 /* ---- poses ---- */
@@ -267,8 +267,8 @@ static int make_poses(way *w, size_t n, double *const *poses, vg_err *e)
 {
     vg_generator *g = w->g;
     size_t wide = 3 * g->net->parts;
-    int code = VG_OK;
-    for (size_t i = 0; code == VG_OK && i < n; i++) {
+    int r = VG_OK;
+    for (size_t i = 0; r == VG_OK && i < n; i++) {
         double at = (double)((i + 1) * (w->n + 1)) / (double)(n + 1), part = at - floor(at), root[4];
         size_t k = (size_t)at;
         const double *a = k ? w->roots + 4 * (k - 1) : w->from.root, *c = k ? w->centroids + wide * (k - 1) : w->from.centroids;
@@ -276,9 +276,9 @@ static int make_poses(way *w, size_t n, double *const *poses, vg_err *e)
         if (part > 0) vgi_turn_towards(a, w->roots + 4 * k, part, root);
         else memcpy(root, a, sizeof root);
         for (size_t j = 0; j < wide; j++) g->centroids[j] = (1 - part) * c[j] + part * w->centroids[wide * k + j];
-        code = vgi_generator_pose(g, g->x, root, g->centroids, poses[i], e);
+        r = vgi_generator_pose(g, g->x, root, g->centroids, poses[i], e);
     }
-    return code;
+    return r;
 }
 
 /* Make the second key the last given pose; a network that uses several frames also remembers those before it. */
@@ -307,22 +307,22 @@ int vg_generator_between(vg_generator *g, const double *key, bool loop, size_t n
     size_t frames = g->net->step > 1 ? (n + 1 + g->net->step / 2) / g->net->step : n + 1; /* in network frames; the
                                                                                              key is the last */
     if (frames < 2) frames = 2;
-    int code = make_way(&w, g, frames - 1, g->o.merge > 0 ? NET_LANES : 1, e);
-    if (code < 0) return code;
+    int r = make_way(&w, g, frames - 1, g->o.merge > 0 ? NET_LANES : 1, e);
+    if (r < 0) return r;
     note_station(g, &w.from);
     vgi_generator_thin(g);
     memcpy(w.past, g->past, g->npast * g->net->numbers * sizeof *w.past);
     w.npast = g->npast;
-    code = vg_generator_give(g, key, e);
+    r = vg_generator_give(g, key, e);
     note_station(g, &w.to);
-    if (code == VG_OK) code = g->o.merge > 0 ? find_merge(&w, e) : find_spread(&w, e);
-    if (code == VG_OK) {
+    if (r == VG_OK) r = g->o.merge > 0 ? find_merge(&w, e) : find_spread(&w, e);
+    if (r == VG_OK) {
         move_root(&w);
         bend_root(&w, loop);
-        code = make_poses(&w, n, poses, e);
+        r = make_poses(&w, n, poses, e);
         arrive(&w);
     }
     if (found) *found = w.found;
     free(w.memory);
-    return code;
+    return r;
 }

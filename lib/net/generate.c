@@ -36,17 +36,17 @@ int vg_generator_new(vg_generator **out, const vg_network *n, const vg_mesh *m, 
     vg_feature_options f = {.nine = n->width == 9, .threads = o->threads};
     g->net = n, g->o = *o, g->nv = n->nv, g->d = n->nv * n->width;
     if (o->merge > 0 && !(o->diversity > 0)) g->o.diversity = lively;
-    int code = vg_featurer_new(&g->featurer, m, reference, &f, e);
-    if (code == VG_OK) {
+    int r = vg_featurer_new(&g->featurer, m, reference, &f, e);
+    if (r == VG_OK) {
         vg_feature_stats stats = vg_featurer_get_stats(g->featurer);
-        const vgi_rings *r = vgi_featurer_rings(g->featurer);
+        const vgi_rings *rings = vgi_featurer_rings(g->featurer);
         g->main_part = stats.main_part;
-        code = stats.parts == n->parts ? vgi_runner_make(&g->runner, n, r->first, r->to, 2, e)
+        r = stats.parts == n->parts ? vgi_runner_make(&g->runner, n, rings->first, rings->to, 2, e)
                                        : vg_fail(e, VG_EINPUT, "the network has another number of components");
     }
-    if (code == VG_OK) code = make_rooms(g, e);
-    if (code < 0) vg_generator_free(out);
-    return code;
+    if (r == VG_OK) r = make_rooms(g, e);
+    if (r < 0) vg_generator_free(out);
+    return r;
 }
 
 void vg_generator_free(vg_generator **out)

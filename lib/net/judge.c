@@ -23,25 +23,25 @@ typedef struct runs {
     double **in, **out;
 } runs;
 
-static void runs_clear(runs *r)
+static void runs_clear(runs *x)
 {
-    for (size_t i = 0; r->in && i < NET_LANES; i++) free(r->in[i]);
-    for (size_t i = 0; r->out && i < NET_LANES; i++) free(r->out[i]);
-    free(r->in);
-    free(r->out);
+    for (size_t i = 0; x->in && i < NET_LANES; i++) free(x->in[i]);
+    for (size_t i = 0; x->out && i < NET_LANES; i++) free(x->out[i]);
+    free(x->in);
+    free(x->out);
 }
 
-static int runs_make(runs *r, size_t given, size_t length, size_t numbers, vg_err *e)
+static int runs_make(runs *x, size_t given, size_t length, size_t numbers, vg_err *e)
 {
-    *r = (runs){.given = given, .length = length};
-    r->in = vgi_array(NET_LANES, sizeof *r->in, e), r->out = vgi_array(NET_LANES, sizeof *r->out, e);
-    int code = r->in && r->out ? VG_OK : VG_ENOMEM;
-    for (size_t i = 0; code == VG_OK && i < NET_LANES; i++)
-        if (!(r->in[i] = vgi_array(given * numbers, sizeof **r->in, e)) ||
-            !(r->out[i] = vgi_array(length * numbers, sizeof **r->out, e)))
-            code = VG_ENOMEM;
-    if (code < 0) runs_clear(r);
-    return code;
+    *x = (runs){.given = given, .length = length};
+    x->in = vgi_array(NET_LANES, sizeof *x->in, e), x->out = vgi_array(NET_LANES, sizeof *x->out, e);
+    int r = x->in && x->out ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; r == VG_OK && i < NET_LANES; i++)
+        if (!(x->in[i] = vgi_array(given * numbers, sizeof **x->in, e)) ||
+            !(x->out[i] = vgi_array(length * numbers, sizeof **x->out, e)))
+            r = VG_ENOMEM;
+    if (r < 0) runs_clear(x);
+    return r;
 }
 
 /* frame i as the layers see it */
@@ -53,31 +53,31 @@ static void take_frame(const vg_trainer *t, size_t i, double *to)
 int vgi_trainer_validate(vg_trainer *t, double *error, vg_err *e)
 {
     enum { GIVEN = 3, LONGEST = 12, SHORTEST = 5, APART = 3 };
-    runs r;
+    runs x;
     size_t n = t->net.numbers, total = 0, starts[NET_LANES], lengths[NET_LANES], lanes = 0;
     double sum = 0;
-    if (runs_make(&r, GIVEN, LONGEST, n, e) < 0) return VG_ENOMEM;
-    int code = VG_OK;
+    if (runs_make(&x, GIVEN, LONGEST, n, e) < 0) return VG_ENOMEM;
+    int r = VG_OK;
     vgi_blas_alone();
-    for (size_t i = 0; code == VG_OK && i <= t->tried.n; i++) {
+    for (size_t i = 0; r == VG_OK && i <= t->tried.n; i++) {
         size_t first = i < t->tried.n ? t->tried.at[i].first : 0, end = i < t->tried.n ? t->tried.at[i].end : 0;
         for (size_t s = first; s + SHORTEST <= end || (i == t->tried.n && lanes); s += APART) {
             if (i < t->tried.n) starts[lanes] = s, lengths[lanes++] = end - s < LONGEST ? end - s : LONGEST;
             if (lanes < NET_LANES && i < t->tried.n) continue;
             for (size_t l = 0; l < lanes; l++)
-                for (size_t g = 0; g < GIVEN; g++) take_frame(t, starts[l] - GIVEN + g, r.in[l] + g * n);
-            code = vgi_runner_go(&t->runner, false, lanes, GIVEN, (const double *const *)r.in, LONGEST, r.out, e);
-            for (size_t l = 0; code == VG_OK && l < lanes; l++, total++)
+                for (size_t g = 0; g < GIVEN; g++) take_frame(t, starts[l] - GIVEN + g, x.in[l] + g * n);
+            r = vgi_runner_go(&t->runner, false, lanes, GIVEN, (const double *const *)x.in, LONGEST, x.out, e);
+            for (size_t l = 0; r == VG_OK && l < lanes; l++, total++)
                 for (size_t g = 0; g < lengths[l]; g++)
-                    sum += distance(t->frames + (starts[l] + g) * n, r.out[l] + g * n, n) / (double)lengths[l];
+                    sum += distance(t->frames + (starts[l] + g) * n, x.out[l] + g * n, n) / (double)lengths[l];
             lanes = 0;
-            if (i == t->tried.n || code < 0) break;
+            if (i == t->tried.n || r < 0) break;
         }
     }
     vgi_blas_shared();
-    runs_clear(&r);
+    runs_clear(&x);
     *error = total ? sum / (double)total : INFINITY;
-    return code;
+    return r;
 }
 
 /* ---- held-out frames ---- */
@@ -198,20 +198,20 @@ static void regression_alone(judging *j, size_t w, int given, vg_network_errors 
     }
 }
 
-static int network_alone(judging *j, size_t first, size_t lanes, int given, runs *r, vg_network_errors *errors,
+static int network_alone(judging *j, size_t first, size_t lanes, int given, runs *x, vg_network_errors *errors,
                          double *room, vg_err *e)
 {
     vg_trainer *t = j->t;
     size_t n = t->net.numbers;
     for (size_t l = 0; l < lanes; l++)
-        for (size_t g = 0; g < r->given; g++) take_frame(t, j->start[first + l] - r->given + g, r->in[l] + g * n);
-    if (vgi_runner_go(&t->runner, false, lanes, r->given, (const double *const *)r->in, AHEAD, r->out, e) < 0) return VG_ENOMEM;
+        for (size_t g = 0; g < x->given; g++) take_frame(t, j->start[first + l] - x->given + g, x->in[l] + g * n);
+    if (vgi_runner_go(&t->runner, false, lanes, x->given, (const double *const *)x->in, AHEAD, x->out, e) < 0) return VG_ENOMEM;
     for (size_t l = 0; l < lanes; l++) {
         size_t s = j->start[first + l];
         find_kept(t, s - 1, room, room + t->data.d);
         for (int i = 0; i < VG_NETWORK_FRAMES; i++) {
             if (s + looked_at[i] > j->end[first + l]) continue;
-            const double *c = r->out[l] + (looked_at[i] - 1) * n;
+            const double *c = x->out[l] + (looked_at[i] - 1) * n;
             if (vgi_network_is_linear(&t->net)) put_coordinates(j, c, room, s + looked_at[i] - 1, &errors->at[given][4][i]);
             else memcpy(put(j, s + looked_at[i] - 1, &errors->at[given][4][i]), c, n * sizeof *c);
         }
@@ -221,20 +221,20 @@ static int network_alone(judging *j, size_t first, size_t lanes, int given, runs
 
 static int judge_all(judging *j, vg_network_errors *errors, double *room, vg_err *e)
 {
-    int code = VG_OK;
-    for (int given = 0; code == VG_OK && given < 2; given++) {
-        runs r;
+    int r = VG_OK;
+    for (int given = 0; r == VG_OK && given < 2; given++) {
+        runs x;
         for (size_t w = 0; w < j->windows; w++) {
             simple_methods(j, w, given, errors, room);
             regression_alone(j, w, given, errors, room);
         }
-        code = runs_make(&r, given ? 3 : 1, AHEAD, j->t->net.numbers, e);
-        for (size_t w = 0; code == VG_OK && w < j->windows; w += NET_LANES)
-            code = network_alone(j, w, j->windows - w < NET_LANES ? j->windows - w : NET_LANES, given, &r, errors, room, e);
+        r = runs_make(&x, given ? 3 : 1, AHEAD, j->t->net.numbers, e);
+        for (size_t w = 0; r == VG_OK && w < j->windows; w += NET_LANES)
+            r = network_alone(j, w, j->windows - w < NET_LANES ? j->windows - w : NET_LANES, given, &x, errors, room, e);
         settle(j);
-        runs_clear(&r);
+        runs_clear(&x);
     }
-    return code;
+    return r;
 }
 
 static void take_means(const judging *j, vg_network_errors *errors)

@@ -80,41 +80,41 @@ static size_t take_given(reaching *j, size_t given, const double *in)
 
 static int prepare(reaching *j, size_t given, const double *in, size_t n, vg_err *e)
 {
-    vgi_runner *r = j->r;
-    size_t rows = 2 * r->shape.layers * r->shape.hidden;
-    j->given = net_array((given + 2) * r->shape.numbers + 2 * rows, e);
-    j->ignored = vgi_array(r->net->nparameters, sizeof *j->ignored, e);
+    vgi_runner *runner = j->r;
+    size_t rows = 2 * runner->shape.layers * runner->shape.hidden;
+    j->given = net_array((given + 2) * runner->shape.numbers + 2 * rows, e);
+    j->ignored = vgi_array(runner->net->nparameters, sizeof *j->ignored, e);
     if (!j->given || !j->ignored) return VG_ENOMEM;
-    j->start = j->given + (given + 2) * r->shape.numbers, j->slope = j->start + rows;
-    vgi_runner_begin(r, false);
-    j->drive = r->drive;
+    j->start = j->given + (given + 2) * runner->shape.numbers, j->slope = j->start + rows;
+    vgi_runner_begin(runner, false);
+    j->drive = runner->drive;
     j->drive.given = take_given(j, given, in);
     j->drive.truth = give, j->drive.context = j;
-    return net_chains_make(&j->chains, &r->shape, j->drive.given + n, e);
+    return net_chains_make(&j->chains, &runner->shape, j->drive.given + n, e);
 }
 
-int vgi_runner_reach(vgi_runner *r, size_t given, const double *in, size_t n, const double *target, size_t rounds,
+int vgi_runner_reach(vgi_runner *runner, size_t given, const double *in, size_t n, const double *target, size_t rounds,
                      vgi_reach *found, vg_err *e)
 {
-    reaching j = {.r = r, .target = target};
-    size_t rows = 2 * r->shape.layers * r->shape.hidden;
+    reaching j = {.r = runner, .target = target};
+    size_t rows = 2 * runner->shape.layers * runner->shape.hidden;
     vgi_function f = {.n = rows, .look = look, .context = &j};
     vgi_minimum m;
     double *x = vgi_array_raw(rows, sizeof *x, e);
-    int code = x ? prepare(&j, given, in, n, e) : VG_ENOMEM;
-    if (code == VG_OK) {
-        for (size_t k = 0; k < rows; k++) x[k] = (double)r->start[k][0];
+    int r = x ? prepare(&j, given, in, n, e) : VG_ENOMEM;
+    if (r == VG_OK) {
+        for (size_t k = 0; k < rows; k++) x[k] = (double)runner->start[k][0];
         vgi_blas_alone();
-        code = vgi_minimise(&f, x, rounds, gain, &m, e);
+        r = vgi_minimise(&f, x, rounds, gain, &m, e);
         vgi_blas_shared();
     }
-    if (code == VG_OK) {
-        for (size_t k = 0; k < rows; k++) r->start[k] = (net_lanes){0} + (real)x[k];
+    if (r == VG_OK) {
+        for (size_t k = 0; k < rows; k++) runner->start[k] = (net_lanes){0} + (real)x[k];
         *found = (vgi_reach){m.first, m.value, m.rounds};
     }
     net_chains_clear(&j.chains);
     free(j.given);
     free(j.ignored);
     free(x);
-    return code;
+    return r;
 }

@@ -13,55 +13,55 @@
 static const double most_radius = 1.0005, change_weight = 10, free_shift = 1e-6;
 enum { SQUARINGS = 20, BISECTIONS = 10 };
 
-int vgi_regression_make(vgi_regression *r, size_t n, vg_err *e)
+int vgi_regression_make(vgi_regression *g, size_t n, vg_err *e)
 {
     double *block = vgi_array(vgi_regression_size(n), sizeof *block, e);
-    *r = (vgi_regression){0};
+    *g = (vgi_regression){0};
     if (!block) return VG_ENOMEM;
-    *r = vgi_regression_view(n, block);
+    *g = vgi_regression_view(n, block);
     return VG_OK;
 }
 
-void vgi_regression_clear(vgi_regression *r)
+void vgi_regression_clear(vgi_regression *g)
 {
-    free(r->turn);
-    *r = (vgi_regression){0};
+    free(g->turn);
+    *g = (vgi_regression){0};
 }
 
-void vgi_regression_next(const vgi_regression *r, const double *c, const double *before, double *next)
+void vgi_regression_next(const vgi_regression *g, const double *c, const double *before, double *next)
 {
-    size_t n = r->numbers;
-    const double *turn = before ? r->turn : r->first, *shift = before ? r->shift : r->first_shift;
+    size_t n = g->numbers;
+    const double *turn = before ? g->turn : g->first, *shift = before ? g->shift : g->first_shift;
     for (size_t j = 0; j < n; j++) next[j] = c[j] + shift[j];
     for (size_t i = 0; i < n; i++) {
         double d = before ? c[i] - before[i] : 0;
-        for (size_t j = 0; j < n; j++) next[j] += c[i] * turn[i * n + j] + d * r->change[i * n + j];
+        for (size_t j = 0; j < n; j++) next[j] += c[i] * turn[i * n + j] + d * g->change[i * n + j];
     }
 }
 
 /* ---- stability ---- */
 
 /* m: 2n x 2n, acting on c and the previous frame as one row */
-static void companion(const vgi_regression *r, double part, double damping, double *m)
+static void companion(const vgi_regression *g, double part, double damping, double *m)
 {
-    size_t n = r->numbers, w = 2 * n;
+    size_t n = g->numbers, w = 2 * n;
     memset(m, 0, w * w * sizeof *m);
     for (size_t i = 0; i < n; i++) {
         m[i * w + n + i] = 1;
         for (size_t j = 0; j < n; j++) {
-            double keep = i == j ? damping : 0, change = keep + part * (r->change[i * n + j] - keep);
-            m[i * w + j] = part * r->turn[i * n + j] + change + (i == j);
+            double keep = i == j ? damping : 0, change = keep + part * (g->change[i * n + j] - keep);
+            m[i * w + j] = part * g->turn[i * n + j] + change + (i == j);
             m[(n + i) * w + j] = -change;
         }
     }
 }
 
 /* room: workspace of 3 x (2n)^2 */
-static double radius(const vgi_regression *r, double part, double damping, double *room)
+static double radius(const vgi_regression *g, double part, double damping, double *room)
 {
-    size_t w = 2 * r->numbers, all = w * w;
+    size_t w = 2 * g->numbers, all = w * w;
     double *a = room, *b = room + all, log_size = 0, power = 1;
-    companion(r, part, damping, a);
+    companion(g, part, damping, a);
     for (int step = 0; step <= SQUARINGS; step++) {
         double size = 0;
         for (size_t i = 0; i < all; i++) size += a[i] * a[i];
@@ -79,22 +79,22 @@ static double radius(const vgi_regression *r, double part, double damping, doubl
 }
 
 /* move towards damped continuation until it is stable */
-static int make_stable(vgi_regression *r, double damping, vg_err *e)
+static int make_stable(vgi_regression *g, double damping, vg_err *e)
 {
-    size_t n = r->numbers;
+    size_t n = g->numbers;
     double low = 0, high = 1, *room = vgi_array_raw(12 * n * n, sizeof *room, e);
     if (!room) return VG_ENOMEM;
-    bool stable = radius(r, 1, damping, room) <= most_radius;
+    bool stable = radius(g, 1, damping, room) <= most_radius;
     for (int i = 0; !stable && i < BISECTIONS; i++) {
         double middle = (low + high) / 2;
-        if (radius(r, middle, damping, room) <= most_radius) low = middle;
+        if (radius(g, middle, damping, room) <= most_radius) low = middle;
         else high = middle;
     }
     for (size_t i = 0; !stable && i < n; i++) {
-        r->shift[i] *= low;
+        g->shift[i] *= low;
         for (size_t j = 0; j < n; j++) {
-            double keep = i == j ? damping : 0, *c = &r->change[i * n + j];
-            r->turn[i * n + j] *= low;
+            double keep = i == j ? damping : 0, *c = &g->change[i * n + j];
+            g->turn[i * n + j] *= low;
             *c = keep + low * (*c - keep);
         }
     }
@@ -138,10 +138,10 @@ static void put_rows(const vgi_frames *f, bool back, double size, double damping
 }
 
 /* The same without the change: z consists of the first numbers of each row, followed by 1. */
-static int fit_first(vgi_regression *r, size_t rows, double *z, double *y, double size, const vgi_choice *choice,
+static int fit_first(vgi_regression *g, size_t rows, double *z, double *y, double size, const vgi_choice *choice,
                      vg_err *e)
 {
-    size_t n = r->numbers, w = n + 1;
+    size_t n = g->numbers, w = n + 1;
     double ridge = choice->first_ridge, damping = choice->damping;
     double *a = vgi_array(w * w + w * n, sizeof *a, e);
     if (!a) return VG_ENOMEM;
@@ -154,18 +154,18 @@ static int fit_first(vgi_regression *r, size_t rows, double *z, double *y, doubl
         vgi_product_transposed_double(w, n, rows, z, 2 * n + 1, y, n, x, n);
     }
     for (size_t i = 0; i < w; i++) a[i * w + i] += ridge * (double)(rows ? rows : 1) * (i < n ? 1 : free_shift);
-    int code = vgi_spd_factor(w, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames leave a regression open");
-    if (code == VG_OK) {
+    int r = vgi_spd_factor(w, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames leave a regression open");
+    if (r == VG_OK) {
         vgi_spd_solve(w, a, n, x);
-        memcpy(r->first, x, n * n * sizeof *x);
-        for (size_t j = 0; j < n; j++) r->first_shift[j] = size * x[n * n + j];
+        memcpy(g->first, x, n * n * sizeof *x);
+        for (size_t j = 0; j < n; j++) g->first_shift[j] = size * x[n * n + j];
     }
     free(a);
-    return code;
+    return r;
 }
 
 /* The fit before stabilisation. */
-static int fit(vgi_regression *r, const vgi_frames *f, bool back, double size, const vgi_choice *choice, vg_err *e)
+static int fit(vgi_regression *g, const vgi_frames *f, bool back, double size, const vgi_choice *choice, vg_err *e)
 {
     size_t n = f->numbers, w = 2 * n + 1, rows = count_rows(f);
     double damping = choice->damping, *z = vgi_array_raw(rows * (w + n) + w * w + w * n, sizeof *z, e);
@@ -179,26 +179,26 @@ static int fit(vgi_regression *r, const vgi_frames *f, bool back, double size, c
     }
     for (size_t i = 0; i < w; i++)
         a[i * w + i] += choice->ridge * (double)(rows ? rows : 1) * (i < 2 * n ? 1 : free_shift);
-    int code = vgi_spd_factor(w, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames leave a regression open");
-    if (code == VG_OK) {
+    int r = vgi_spd_factor(w, a) ? VG_OK : vg_fail(e, VG_EINPUT, "the frames leave a regression open");
+    if (r == VG_OK) {
         vgi_spd_solve(w, a, n, x);
         for (size_t i = 0; i < n; i++)
             for (size_t j = 0; j < n; j++) {
-                r->turn[i * n + j] = x[i * n + j];
-                r->change[i * n + j] = change_weight * x[(n + i) * n + j] + (i == j ? damping : 0);
+                g->turn[i * n + j] = x[i * n + j];
+                g->change[i * n + j] = change_weight * x[(n + i) * n + j] + (i == j ? damping : 0);
             }
-        for (size_t j = 0; j < n; j++) r->shift[j] = size * x[2 * n * n + j];
-        code = fit_first(r, rows, z, y, size, choice, e);
+        for (size_t j = 0; j < n; j++) g->shift[j] = size * x[2 * n * n + j];
+        r = fit_first(g, rows, z, y, size, choice, e);
     }
     free(z);
-    return code;
+    return r;
 }
 
-int vgi_regression_fit(vgi_regression *r, const vgi_frames *f, bool back, double size, const vgi_choice *choice,
+int vgi_regression_fit(vgi_regression *g, const vgi_frames *f, bool back, double size, const vgi_choice *choice,
                        vg_err *e)
 {
-    int code = fit(r, f, back, size, choice, e);
-    return code == VG_OK ? make_stable(r, choice->damping, e) : code;
+    int r = fit(g, f, back, size, choice, e);
+    return r == VG_OK ? make_stable(g, choice->damping, e) : r;
 }
 
 /* ---- choice of the ridge ---- */
@@ -211,10 +211,10 @@ typedef struct trial_sum {
 
 /* distances per frame over runs of up to twelve frames that start at every third frame; back: the frame before the
  * first is not given but predicted by the regression; room: workspace of 3 numbers */
-static trial_sum try_out(const vgi_regression *r, const vgi_regression *back, const vgi_frames *f, double *room)
+static trial_sum try_out(const vgi_regression *g, const vgi_regression *back, const vgi_frames *f, double *room)
 {
     enum { LONGEST = 12, SHORTEST = 5, APART = 3 };
-    size_t n = r->numbers;
+    size_t n = g->numbers;
     trial_sum all = {0, 0};
     for (size_t s = 0; s < f->nsequences; s++)
         for (size_t t = f->start[s] + 2; t + SHORTEST <= f->start[s + 1]; t += APART, all.n++) {
@@ -223,7 +223,7 @@ static trial_sum try_out(const vgi_regression *r, const vgi_regression *back, co
             memcpy(room, f->row + (t - 2) * n, 2 * n * sizeof *room);
             if (back) vgi_regression_next(back, c, NULL, before);
             for (size_t i = 0; i < length; i++) {
-                vgi_regression_next(r, c, before, next);
+                vgi_regression_next(g, c, before, next);
                 double far = 0;
                 for (size_t k = 0; k < n; k++) far += (next[k] - f->row[(t + i) * n + k]) * (next[k] - f->row[(t + i) * n + k]);
                 run += sqrt(far) / (double)length;
@@ -255,15 +255,15 @@ static void try_one(void *context, size_t task)
     const vgi_fold *f = &c->folds[task / c->n];
     const vgi_choice *choice = &c->choices[task % c->n];
     size_t n = f->fitted.numbers;
-    vgi_regression r = {0}, back = {0};
+    vgi_regression g = {0}, back = {0};
     double *room = vgi_array_raw(3 * n, sizeof *room, NULL);
-    int code = room ? vgi_regression_make(&r, n, NULL) : VG_ENOMEM;
-    if (code == VG_OK) code = fit(&r, &f->fitted, false, c->size, choice, NULL);
-    if (code == VG_OK && c->first) code = vgi_regression_make(&back, n, NULL);
-    if (code == VG_OK && c->first) code = fit(&back, &f->fitted, true, c->size, choice, NULL);
-    c->found[task] = code == VG_OK ? try_out(&r, c->first ? &back : NULL, &f->tried, room) : (trial_sum){INFINITY, 1};
-    c->code[task] = code;
-    vgi_regression_clear(&r);
+    int r = room ? vgi_regression_make(&g, n, NULL) : VG_ENOMEM;
+    if (r == VG_OK) r = fit(&g, &f->fitted, false, c->size, choice, NULL);
+    if (r == VG_OK && c->first) r = vgi_regression_make(&back, n, NULL);
+    if (r == VG_OK && c->first) r = fit(&back, &f->fitted, true, c->size, choice, NULL);
+    c->found[task] = r == VG_OK ? try_out(&g, c->first ? &back : NULL, &f->tried, room) : (trial_sum){INFINITY, 1};
+    c->code[task] = r;
+    vgi_regression_clear(&g);
     vgi_regression_clear(&back);
     free(room);
 }
@@ -296,17 +296,17 @@ int vgi_regression_choose(const vgi_fold *folds, size_t n, double size, int thre
 {
     vgi_choice all[CHOICES];
     *choice = (vgi_choice){ridges[RIDGES - 1], 0.9, ridges[RIDGES - 1]}; /* nearly damped continuation */
-    int code = VG_OK;
-    for (int first = 0; code == VG_OK && first < 2; first++) {
+    int r = VG_OK;
+    for (int first = 0; r == VG_OK && first < 2; first++) {
         choosing c = {.folds = folds, .size = size, .choices = all, .n = first ? RIDGES : CHOICES, .first = first};
         for (size_t i = 0; i < c.n; i++) {
             all[i] = *choice;
             if (first) all[i].first_ridge = ridges[i];
             else all[i].ridge = ridges[i / DAMPINGS], all[i].damping = dampings[i % DAMPINGS], all[i].first_ridge = all[i].ridge;
         }
-        code = pick(&c, n, threads, choice, e);
+        r = pick(&c, n, threads, choice, e);
         free(c.found);
         free(c.code);
     }
-    return code;
+    return r;
 }

@@ -12,118 +12,118 @@ static vgi_regression view(const vg_network *n, int back)
     return vgi_regression_view(n->rank, n->regression + (size_t)back * vgi_regression_size(n->rank));
 }
 
-static void take_skeletons(vgi_runner *r)
+static void take_skeletons(vgi_runner *u)
 {
-    size_t k = r->net->rank, square = k * k, all = 3 * square + k;
+    size_t k = u->net->rank, square = k * k, all = 3 * square + k;
     for (int back = 0; back < 2; back++) {
-        vgi_regression v = view(r->net, back);
-        float *m = r->matrices + (size_t)back * all;
+        vgi_regression v = view(u->net, back);
+        float *m = u->matrices + (size_t)back * all;
         for (size_t i = 0; i < square; i++) {
             m[i] = (float)v.turn[i], m[square + i] = (float)v.change[i];
             m[2 * square + i] = (float)(v.turn[i] + v.change[i]);
         }
         for (size_t i = 0; i < k; i++) m[3 * square + i] = (float)v.shift[i];
-        r->skeleton[back] = (net_skeleton){.turn = m, .change = m + square, .sum = m + 2 * square, .shift = m + 3 * square};
+        u->skeleton[back] = (net_skeleton){.turn = m, .change = m + square, .sum = m + 2 * square, .shift = m + 3 * square};
     }
-    r->drive.skeleton = r->skeleton;
-    r->forward = view(r->net, 0), r->backward = view(r->net, 1);
+    u->drive.skeleton = u->skeleton;
+    u->forward = view(u->net, 0), u->backward = view(u->net, 1);
 }
 
-static int take_numbers(vgi_runner *r, vg_err *e)
+static int take_numbers(vgi_runner *u, vg_err *e)
 {
-    const vg_network *n = r->net;
+    const vg_network *n = u->net;
     if (!vgi_network_is_linear(n)) return VG_OK;
     size_t k = n->rank;
-    r->scale = vgi_array_raw(2 * k, sizeof *r->scale, e);
-    if (!r->scale) return VG_ENOMEM;
-    for (size_t i = 0; i < k; i++) r->scale[i] = (float)(1 / n->scale[i]), r->scale[k + i] = (float)n->scale[k + i];
-    r->drive.scale_in = r->scale, r->drive.scale_out = r->scale + k;
+    u->scale = vgi_array_raw(2 * k, sizeof *u->scale, e);
+    if (!u->scale) return VG_ENOMEM;
+    for (size_t i = 0; i < k; i++) u->scale[i] = (float)(1 / n->scale[i]), u->scale[k + i] = (float)n->scale[k + i];
+    u->drive.scale_in = u->scale, u->drive.scale_out = u->scale + k;
     if (n->model != VG_NETWORK_AUTO) return VG_OK;
-    r->matrices = vgi_array_raw(2 * (3 * k * k + k), sizeof *r->matrices, e);
-    if (!r->matrices) return VG_ENOMEM;
-    take_skeletons(r);
+    u->matrices = vgi_array_raw(2 * (3 * k * k + k), sizeof *u->matrices, e);
+    if (!u->matrices) return VG_ENOMEM;
+    take_skeletons(u);
     return VG_OK;
 }
 
-int vgi_runner_make(vgi_runner *r, const vg_network *n, const uint32_t *first, const uint32_t *to, size_t steps,
+int vgi_runner_make(vgi_runner *u, const vg_network *n, const uint32_t *first, const uint32_t *to, size_t steps,
                     vg_err *e)
 {
-    *r = (vgi_runner){.net = n};
-    int code = vgi_network_shape(n, &r->shape, e);
-    r->shape.first = first, r->shape.to = to;
-    r->drive.shape = &r->shape;
-    if (code == VG_OK) code = take_numbers(r, e);
-    if (code == VG_OK) code = net_chains_make(&r->chains, &r->shape, steps, e);
-    if (code == VG_OK && (!(r->start = net_array(2 * n->layers * n->hidden, e)) ||
-                          !(r->now = net_array(3 * n->numbers, e))))
-        code = VG_ENOMEM;
-    if (code < 0) return vgi_runner_clear(r), code;
-    r->before = r->now + n->numbers, r->next = r->before + n->numbers;
-    vgi_runner_states(r, 0.1, false, 0);
+    *u = (vgi_runner){.net = n};
+    int r = vgi_network_shape(n, &u->shape, e);
+    u->shape.first = first, u->shape.to = to;
+    u->drive.shape = &u->shape;
+    if (r == VG_OK) r = take_numbers(u, e);
+    if (r == VG_OK) r = net_chains_make(&u->chains, &u->shape, steps, e);
+    if (r == VG_OK && (!(u->start = net_array(2 * n->layers * n->hidden, e)) ||
+                          !(u->now = net_array(3 * n->numbers, e))))
+        r = VG_ENOMEM;
+    if (r < 0) return vgi_runner_clear(u), r;
+    u->before = u->now + n->numbers, u->next = u->before + n->numbers;
+    vgi_runner_states(u, 0.1, false, 0);
     return VG_OK;
 }
 
-void vgi_runner_clear(vgi_runner *r)
+void vgi_runner_clear(vgi_runner *u)
 {
-    net_chains_clear(&r->chains);
-    free(r->scale);
-    free(r->matrices);
-    free(r->start);
-    net_lanes *first = r->now < r->before ? r->now : r->before; /* they are swapped during a run but are one block */
-    if (r->before) free(first < r->next ? first : r->next);
-    else free(r->now);
-    *r = (vgi_runner){0};
+    net_chains_clear(&u->chains);
+    free(u->scale);
+    free(u->matrices);
+    free(u->start);
+    net_lanes *first = u->now < u->before ? u->now : u->before; /* they are swapped during a run but are one block */
+    if (u->before) free(first < u->next ? first : u->next);
+    else free(u->now);
+    *u = (vgi_runner){0};
 }
 
-void vgi_runner_states(vgi_runner *r, double value, bool random, uint64_t seed)
+void vgi_runner_states(vgi_runner *u, double value, bool random, uint64_t seed)
 {
     vgi_random numbers = vgi_random_start(seed, 3);
-    for (size_t i = 0; i < 2 * r->shape.layers * r->shape.hidden; i++)
-        for (int k = 0; k < NET_LANES; k++) r->start[i][k] = (real)(random ? value * vgi_random_normal(&numbers) : value);
+    for (size_t i = 0; i < 2 * u->shape.layers * u->shape.hidden; i++)
+        for (int k = 0; k < NET_LANES; k++) u->start[i][k] = (real)(random ? value * vgi_random_normal(&numbers) : value);
 }
 
-void vgi_runner_begin(vgi_runner *r, bool back)
+void vgi_runner_begin(vgi_runner *u, bool back)
 {
-    r->begun = r->waiting = false, r->back = back;
-    r->drive.parameters = r->net->parameters + (back && r->net->sets > 1 ? r->net->nparameters : 0);
-    r->drive.forward = back ? 0 : NET_LANES;
-    net_chains_begin(&r->chains, r->start);
+    u->begun = u->waiting = false, u->back = back;
+    u->drive.parameters = u->net->parameters + (back && u->net->sets > 1 ? u->net->nparameters : 0);
+    u->drive.forward = back ? 0 : NET_LANES;
+    net_chains_begin(&u->chains, u->start);
 }
 
-/* One step from r->now; the layers' memory moves from the second place to the first. */
-static void advance(vgi_runner *r)
+/* One step from u->now; the layers' memory moves from the second place to the first. */
+static void advance(vgi_runner *u)
 {
-    const vgi_shape *s = &r->shape;
-    net_chains *c = &r->chains;
-    net_chains_step(c, &r->drive, 0, r->now, r->begun ? r->before : NULL, r->next);
+    const vgi_shape *s = &u->shape;
+    net_chains *c = &u->chains;
+    net_chains_step(c, &u->drive, 0, u->now, u->begun ? u->before : NULL, u->next);
     for (size_t l = 0; l < s->layers; l++) {
         size_t in = vgi_shape_input(s, l);
         memcpy(c->input[l] + in, c->input[l] + in + s->hidden + in, s->hidden * sizeof *c->state);
         memcpy(c->cell[l], c->cell[l] + s->hidden, s->hidden * sizeof *c->state);
     }
-    r->begun = true;
-    net_lanes *swap = r->before;
-    r->before = r->now, r->now = r->next, r->next = swap;
+    u->begun = true;
+    net_lanes *swap = u->before;
+    u->before = u->now, u->now = u->next, u->next = swap;
 }
 
-void vgi_runner_take(vgi_runner *r, const net_lanes *frame)
+void vgi_runner_take(vgi_runner *u, const net_lanes *frame)
 {
-    if (r->waiting) advance(r); /* the prediction is replaced by the given frame */
-    memcpy(r->now, frame, r->shape.numbers * sizeof *frame);
-    r->waiting = true;
+    if (u->waiting) advance(u); /* the prediction is replaced by the given frame */
+    memcpy(u->now, frame, u->shape.numbers * sizeof *frame);
+    u->waiting = true;
 }
 
-const net_lanes *vgi_runner_give(vgi_runner *r)
+const net_lanes *vgi_runner_give(vgi_runner *u)
 {
-    advance(r);
-    return r->now;
+    advance(u);
+    return u->now;
 }
 
-bool vgi_runner_reach_back(const vgi_runner *r, const net_lanes *frame, net_lanes *before, net_lanes *before_that)
+bool vgi_runner_reach_back(const vgi_runner *u, const net_lanes *frame, net_lanes *before, net_lanes *before_that)
 {
-    if (!r->matrices) return false;
-    const vgi_regression *v = r->back ? &r->forward : &r->backward;
-    size_t n = r->shape.numbers;
+    if (!u->matrices) return false;
+    const vgi_regression *v = u->back ? &u->forward : &u->backward;
+    size_t n = u->shape.numbers;
     for (size_t j = 0; j < n; j++) {
         net_lanes sum = frame[j] + (real)v->first_shift[j];
         for (size_t i = 0; i < n; i++) sum += frame[i] * (real)v->first[i * n + j];
@@ -145,24 +145,24 @@ static void gather(size_t lanes, size_t n, const double *const *in, size_t t, ne
         for (size_t i = 0; i < NET_LANES; i++) frame[k][i] = (real)in[i < lanes ? i : 0][t * n + k];
 }
 
-int vgi_runner_go(vgi_runner *r, bool back, size_t lanes, size_t given, const double *const *in, size_t n,
+int vgi_runner_go(vgi_runner *u, bool back, size_t lanes, size_t given, const double *const *in, size_t n,
                   double *const *out, vg_err *e)
 {
-    size_t w = r->shape.numbers;
+    size_t w = u->shape.numbers;
     net_lanes *frame = net_array(3 * w, e);
     if (!frame) return VG_ENOMEM;
-    vgi_runner_begin(r, back);
+    vgi_runner_begin(u, back);
     gather(lanes, w, in, 0, frame);
-    if (given == 1 && vgi_runner_reach_back(r, frame, frame + w, frame + 2 * w)) {
-        vgi_runner_take(r, frame + 2 * w);
-        vgi_runner_take(r, frame + w);
+    if (given == 1 && vgi_runner_reach_back(u, frame, frame + w, frame + 2 * w)) {
+        vgi_runner_take(u, frame + 2 * w);
+        vgi_runner_take(u, frame + w);
     }
     for (size_t t = 0; t < given; t++) {
         gather(lanes, w, in, t, frame);
-        vgi_runner_take(r, frame);
+        vgi_runner_take(u, frame);
     }
     for (size_t t = 0; t < n; t++) {
-        const net_lanes *x = vgi_runner_give(r);
+        const net_lanes *x = vgi_runner_give(u);
         for (size_t k = 0; k < w; k++)
             for (size_t i = 0; i < lanes; i++) out[i][t * w + k] = (double)x[k][i];
     }

@@ -112,10 +112,10 @@ void vg_trainer_free(vg_trainer **out)
 static void bring_home(const vg_trainer *t, const double *pose, const double *root, const double *centroids,
                        double *home)
 {
-    const vgi_rings *r = vgi_featurer_rings(t->featurer);
+    const vgi_rings *rings = vgi_featurer_rings(t->featurer);
     const double back[4] = {root[0], -root[1], -root[2], -root[3]};
-    for (size_t v = 0; v < r->nv; v++) {
-        size_t part = r->part[v] < 0 ? r->main_part : (size_t)r->part[v];
+    for (size_t v = 0; v < rings->nv; v++) {
+        size_t part = rings->part[v] < 0 ? rings->main_part : (size_t)rings->part[v];
         double x[3];
         vgi_subtract(pose + 3 * v, centroids + 3 * part, x);
         vg_quat_apply(back, x, home + 3 * v);
@@ -193,8 +193,8 @@ static void free_fold(vgi_fold *f)
 static int make_fold(const vg_trainer *t, size_t k, vgi_fold *f, vg_err *e)
 {
     vgi_spans fitted = {0}, tried = {0};
-    int code = VG_OK;
-    for (size_t i = 0; code == VG_OK && i < t->data.train.n; i++) {
+    int r = VG_OK;
+    for (size_t i = 0; r == VG_OK && i < t->data.train.n; i++) {
         vgi_span s = t->data.train.at[i], before = s, block = s, behind = s;
         size_t length = s.end - s.first;
         before.end = block.first = s.first + k * length / FOLDS;
@@ -202,25 +202,25 @@ static int make_fold(const vg_trainer *t, size_t k, vgi_fold *f, vg_err *e)
         if (k) block.first -= block.first - s.first < 2 ? 0 : 2;
         if (vgi_spans_add(&fitted, before, e) < 0 || vgi_spans_add(&fitted, behind, e) < 0 ||
             vgi_spans_add(&tried, block, e) < 0)
-            code = VG_ENOMEM;
+            r = VG_ENOMEM;
     }
-    if (code == VG_OK) code = vgi_spans_coordinates(&fitted, &t->data, &f->fitted, e);
-    if (code == VG_OK) code = vgi_spans_coordinates(&tried, &t->data, &f->tried, e);
+    if (r == VG_OK) r = vgi_spans_coordinates(&fitted, &t->data, &f->fitted, e);
+    if (r == VG_OK) r = vgi_spans_coordinates(&tried, &t->data, &f->tried, e);
     free(fitted.at);
     free(tried.at);
-    return code;
+    return r;
 }
 
 /* Choose ridges and damping on five blocks left out in turn; a single block may be unlike all others. */
 static int choose_regression(vg_trainer *t, vg_err *e)
 {
     vgi_fold folds[FOLDS] = {0};
-    int code = VG_OK;
-    for (size_t k = 0; code == VG_OK && k < FOLDS; k++) code = make_fold(t, k, &folds[k], e);
-    if (code == VG_OK) code = vgi_regression_choose(folds, FOLDS, t->data.sigma, t->o.threads, &t->choice, e);
+    int r = VG_OK;
+    for (size_t k = 0; r == VG_OK && k < FOLDS; k++) r = make_fold(t, k, &folds[k], e);
+    if (r == VG_OK) r = vgi_regression_choose(folds, FOLDS, t->data.sigma, t->o.threads, &t->choice, e);
     for (size_t k = 0; k < FOLDS; k++) free_fold(&folds[k]);
     t->net.ridge = t->choice.ridge, t->net.damping = t->choice.damping;
-    return code;
+    return r;
 }
 
 /* Fit the regressions of both directions to the training frames. */
@@ -258,11 +258,11 @@ static int find_before(vg_trainer *t, vg_err *e)
     if (!one || !t->before) return free(one), VG_ENOMEM;
     for (size_t i = 0; i < t->data.n; i++)
         for (size_t back = 0; back < 2; back++) {
-            const vgi_regression *r = &t->regression[1 - back];
+            const vgi_regression *rings = &t->regression[1 - back];
             const double *c = t->data.coordinates + i * n;
             float *to = t->before + (2 * i + back) * 2 * n;
-            vgi_regression_next(r, c, NULL, one);
-            vgi_regression_next(r, one, c, one + n);
+            vgi_regression_next(rings, c, NULL, one);
+            vgi_regression_next(rings, one, c, one + n);
             for (size_t k = 0; k < n; k++) to[k] = (float)one[n + k], to[n + k] = (float)one[k];
         }
     free(one);
@@ -320,16 +320,16 @@ static int start_parameters(vg_trainer *t, vg_err *e)
 /* Compute everything that depends on the frames of a phase, and reset the parameters. */
 static int begin_phase(vg_trainer *t, bool validate, vg_err *e)
 {
-    const vgi_rings *r = vgi_featurer_rings(t->featurer);
+    const vgi_rings *rings = vgi_featurer_rings(t->featurer);
     clear_phase(t);
-    int code = choose_block(t, validate, e);
-    if (code == VG_OK) code = fit_regressions(t, e);
-    if (code == VG_OK) code = find_before(t, e);
-    if (code == VG_OK) code = find_windows(t, e);
-    if (code == VG_OK) code = start_parameters(t, e);
-    if (code == VG_OK) code = make_groups(t, e);
-    if (code == VG_OK) code = vgi_runner_make(&t->runner, &t->net, r->first, r->to, 2, e);
-    if (code < 0) return code;
+    int r = choose_block(t, validate, e);
+    if (r == VG_OK) r = fit_regressions(t, e);
+    if (r == VG_OK) r = find_before(t, e);
+    if (r == VG_OK) r = find_windows(t, e);
+    if (r == VG_OK) r = start_parameters(t, e);
+    if (r == VG_OK) r = make_groups(t, e);
+    if (r == VG_OK) r = vgi_runner_make(&t->runner, &t->net, rings->first, rings->to, 2, e);
+    if (r < 0) return r;
     t->state.iteration = 0;
     t->state.phase = validate ? 0 : 1;
     return VG_OK;
@@ -353,25 +353,25 @@ static int make_frames(vg_trainer *t, vg_err *e)
 
 int vg_trainer_prepare(vg_trainer *t, vg_err *e)
 {
-    const vgi_rings *r = vgi_featurer_rings(t->featurer);
-    int code = vgi_dataset_divide(&t->data, t->o.step, t->o.hold, t->o.hold_at, t->o.seed, e);
-    if (code == VG_OK) code = vgi_dataset_find_coordinates(&t->data, &t->net, t->o.coordinates, t->o.threads, e);
-    if (code == VG_OK) code = vgi_root_fit(&t->data, &t->net, e);
-    if (code < 0) return code;
+    const vgi_rings *rings = vgi_featurer_rings(t->featurer);
+    int r = vgi_dataset_divide(&t->data, t->o.step, t->o.hold, t->o.hold_at, t->o.seed, e);
+    if (r == VG_OK) r = vgi_dataset_find_coordinates(&t->data, &t->net, t->o.coordinates, t->o.threads, e);
+    if (r == VG_OK) r = vgi_root_fit(&t->data, &t->net, e);
+    if (r < 0) return r;
     t->net.numbers = vgi_network_is_linear(&t->net) ? t->net.rank : t->data.d;
     t->net.data_digest = t->data.digest;
     t->net.frames = vgi_spans_frames(&t->data.train);
-    code = vgi_network_shape(&t->net, &t->shape, e);
-    if (code < 0) return code;
-    t->shape.first = r->first, t->shape.to = r->to;
+    r = vgi_network_shape(&t->net, &t->shape, e);
+    if (r < 0) return r;
+    t->shape.first = rings->first, t->shape.to = rings->to;
     t->net.nparameters = t->shape.total;
-    code = make_frames(t, e);
-    if (code == VG_OK && !(t->net.errors = vgi_array(ERRORS, sizeof *t->net.errors, e))) code = VG_ENOMEM;
-    for (int i = 0; code == VG_OK && i < ERRORS; i++) t->net.errors[i] = -1;
-    if (code == VG_OK) code = begin_phase(t, true, e);
-    if (code == VG_OK && !t->tried.n) t->state.phase = 1; /* too short for a block: train on all of it, for as long as
+    r = make_frames(t, e);
+    if (r == VG_OK && !(t->net.errors = vgi_array(ERRORS, sizeof *t->net.errors, e))) r = VG_ENOMEM;
+    for (int i = 0; r == VG_OK && i < ERRORS; i++) t->net.errors[i] = -1;
+    if (r == VG_OK) r = begin_phase(t, true, e);
+    if (r == VG_OK && !t->tried.n) t->state.phase = 1; /* too short for a block: train on all of it, for as long as
                                                              requested */
-    if (code < 0) return code;
+    if (r < 0) return r;
     t->state.parameters = t->net.sets * t->net.nparameters, t->state.coordinates = t->net.rank;
     t->state.frames = t->net.frames, t->state.held = vgi_spans_frames(&t->data.held);
     t->state.iterations = t->o.iterations;
@@ -419,13 +419,13 @@ static void run_group(void *context, size_t number)
 static int run_groups(vg_trainer *t, double *loss, vg_err *e)
 {
     size_t all = t->net.sets * t->net.nparameters;
-    vgi_random r = vgi_random_start(t->o.seed, t->state.iteration + 1);
+    vgi_random rings = vgi_random_start(t->o.seed, t->state.iteration + 1);
     working w = {.t = t, .start = vgi_array_raw(t->o.batch, sizeof *w.start, e)};
     if (!w.start) return VG_ENOMEM;
-    for (size_t i = 0; i < t->o.batch; i++) w.start[i] = t->window[vgi_random_below(&r, t->nwindows)];
-    w.given = t->o.given_least + vgi_random_below(&r, t->o.given_most - t->o.given_least + 1);
+    for (size_t i = 0; i < t->o.batch; i++) w.start[i] = t->window[vgi_random_below(&rings, t->nwindows)];
+    w.given = t->o.given_least + vgi_random_below(&rings, t->o.given_most - t->o.given_least + 1);
     if (w.given >= t->length) w.given = t->length - 1;
-    w.single = t->before && t->length > 3 && vgi_random_below(&r, SINGLE) == 0;
+    w.single = t->before && t->length > 3 && vgi_random_below(&rings, SINGLE) == 0;
     if (w.single) w.given = 3;
     memset(t->total, 0, all * sizeof *t->total);
     *loss = 0;
@@ -552,18 +552,18 @@ vg_train_state vg_trainer_get_state(const vg_trainer *t)
 int vg_trainer_step(vg_trainer *t, vg_train_state *state, vg_err *e)
 {
     double loss;
-    int r = t->ended ? VG_OK : validate(t, e);
+    int rings = t->ended ? VG_OK : validate(t, e);
     bool last = t->state.iteration >= t->state.iterations || (!t->state.phase && has_waited(t));
-    if (r == VG_OK && !t->ended && last) {
+    if (rings == VG_OK && !t->ended && last) {
         if (t->state.phase) t->ended = true;
-        else r = end_phase(t, e);
+        else rings = end_phase(t, e);
     }
-    if (r < 0 || t->ended) {
+    if (rings < 0 || t->ended) {
         *state = t->state;
-        return r;
+        return rings;
     }
-    r = run_groups(t, &loss, e);
-    if (r < 0) return r;
+    rings = run_groups(t, &loss, e);
+    if (rings < 0) return rings;
     learn(t);
     t->state.loss = loss;
     if (!(t->state.gradient < 1e30))

@@ -24,14 +24,14 @@ struct vg_region_filter {
 
 void vg_region_filter_free(vg_region_filter **out)
 {
-    vg_region_filter *r = *out;
-    if (!r) return;
-    free(r->region);
-    free(r->matrix);
-    free(r->matrices);
-    free(r->noise);
-    free(r->total);
-    free(r);
+    vg_region_filter *x = *out;
+    if (!x) return;
+    free(x->region);
+    free(x->matrix);
+    free(x->matrices);
+    free(x->noise);
+    free(x->total);
+    free(x);
     *out = NULL;
 }
 
@@ -41,30 +41,30 @@ static double weight_of(const vgi_region *p, size_t i)
     return 1 - 0.8 * (double)i / (double)p->n;
 }
 
-static int make_room(vg_region_filter *r, vg_err *e)
+static int make_room(vg_region_filter *x, vg_err *e)
 {
-    r->matrix = vgi_array(r->nregions + 1, sizeof *r->matrix, e);
-    r->noise = vgi_array(r->nregions, sizeof *r->noise, e);
-    r->total = vgi_array(r->nv, sizeof *r->total, e);
-    if (!r->matrix || !r->noise || !r->total) return VG_ENOMEM;
-    for (size_t i = 0; i < r->nregions; i++) {
-        const vgi_region *p = &r->region[i];
-        r->matrix[i + 1] = r->matrix[i] + p->n * p->n;
-        for (size_t k = 0; k < p->n; k++) r->total[p->vertex[k]] += weight_of(p, k);
+    x->matrix = vgi_array(x->nregions + 1, sizeof *x->matrix, e);
+    x->noise = vgi_array(x->nregions, sizeof *x->noise, e);
+    x->total = vgi_array(x->nv, sizeof *x->total, e);
+    if (!x->matrix || !x->noise || !x->total) return VG_ENOMEM;
+    for (size_t i = 0; i < x->nregions; i++) {
+        const vgi_region *p = &x->region[i];
+        x->matrix[i + 1] = x->matrix[i] + p->n * p->n;
+        for (size_t k = 0; k < p->n; k++) x->total[p->vertex[k]] += weight_of(p, k);
     }
-    r->matrices = vgi_array(r->matrix[r->nregions], sizeof *r->matrices, e);
-    return r->matrices ? VG_OK : VG_ENOMEM;
+    x->matrices = vgi_array(x->matrix[x->nregions], sizeof *x->matrices, e);
+    return x->matrices ? VG_OK : VG_ENOMEM;
 }
 
 int vg_region_filter_new(vg_region_filter **out, const vg_mesh *m, const double *reference, int threads, vg_err *e)
 {
-    vg_region_filter *r = *out = vgi_array(1, sizeof *r, e);
-    if (!r) return VG_ENOMEM;
-    *r = (vg_region_filter){.nv = m->nv, .threads = threads};
-    int code = vgi_regions_grow(m, reference, &r->region, &r->nregions, e);
-    if (code == VG_OK) code = make_room(r, e);
-    if (code < 0) vg_region_filter_free(out);
-    return code;
+    vg_region_filter *x = *out = vgi_array(1, sizeof *x, e);
+    if (!x) return VG_ENOMEM;
+    *x = (vg_region_filter){.nv = m->nv, .threads = threads};
+    int r = vgi_regions_grow(m, reference, &x->region, &x->nregions, e);
+    if (r == VG_OK) r = make_room(x, e);
+    if (r < 0) vg_region_filter_free(out);
+    return r;
 }
 
 /* ---- the first pass ---- */
@@ -94,14 +94,14 @@ static void look_at_region(void *context, size_t i)
     }
 }
 
-void vg_region_filter_look(vg_region_filter *r, size_t n, const double *const *vertices)
+void vg_region_filter_look(vg_region_filter *x, size_t n, const double *const *vertices)
 {
-    r->nframes += n;
+    x->nframes += n;
     vgi_blas_alone();
     for (size_t from = 0; from < n; from += BLOCK) {
-        looking l = {.r = r, .n = n - from < BLOCK ? n - from : BLOCK, .vertices = vertices + from};
-        for (size_t f = 0; f < l.n; f++) vg_centroid(l.vertices[f], r->nv, l.origin[f]);
-        vgi_parallel(r->threads, r->nregions, look_at_region, &l);
+        looking l = {.r = x, .n = n - from < BLOCK ? n - from : BLOCK, .vertices = vertices + from};
+        for (size_t f = 0; f < l.n; f++) vg_centroid(l.vertices[f], x->nv, l.origin[f]);
+        vgi_parallel(x->threads, x->nregions, look_at_region, &l);
     }
     vgi_blas_shared();
 }
@@ -151,44 +151,44 @@ static void keep_all(size_t n, double *filter)
     for (size_t i = 0; i < n; i++) filter[i * n + i] = 1;
 }
 
-static int learn_region(vg_region_filter *r, size_t i, double *values, double *vectors, double *scaled, vg_err *e)
+static int learn_region(vg_region_filter *x, size_t i, double *values, double *vectors, double *scaled, vg_err *e)
 {
-    size_t n = r->region[i].n, rows = 3 * r->nframes;
-    double *filter = r->matrices + r->matrix[i];
-    r->noise[i] = -1;
+    size_t n = x->region[i].n, rows = 3 * x->nframes;
+    double *filter = x->matrices + x->matrix[i];
+    x->noise[i] = -1;
     if (n < 2 * AFFINE) { /* too few vertices to separate noise from motion */
         keep_all(n, filter);
         return VG_OK;
     }
-    int code = vgi_eigen(n, filter, VGI_LARGEST, n, values, vectors, e);
-    if (code < 0) return code;
+    int r = vgi_eigen(n, filter, VGI_LARGEST, n, values, vectors, e);
+    if (r < 0) return r;
     double variance = find_noise(rows, n, values);
-    r->noise[i] = sqrt(variance);
+    x->noise[i] = sqrt(variance);
     compose(n, vectors, values, rows, variance, filter, scaled);
     return VG_OK;
 }
 
-int vg_region_filter_learn(vg_region_filter *r, vg_err *e)
+int vg_region_filter_learn(vg_region_filter *x, vg_err *e)
 {
-    if (r->nframes < FEWEST)
+    if (x->nframes < FEWEST)
         return vg_fail(e, VG_EINPUT, "%zu frames are too few to separate motion from noise: at least %d are needed",
-                       r->nframes, FEWEST);
+                       x->nframes, FEWEST);
     double *room = vgi_array_raw(2 * VGI_REGION * VGI_REGION + VGI_REGION, sizeof *room, e);
     double *values = room, *vectors = room + VGI_REGION;
-    int code = room ? VG_OK : VG_ENOMEM;
-    for (size_t i = 0; i < r->nregions && code == VG_OK; i++)
-        code = learn_region(r, i, values, vectors, vectors + VGI_REGION * VGI_REGION, e);
+    int r = room ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; i < x->nregions && r == VG_OK; i++)
+        r = learn_region(x, i, values, vectors, vectors + VGI_REGION * VGI_REGION, e);
     free(room);
-    return code;
+    return r;
 }
 
-double vg_region_filter_noise(const vg_region_filter *r)
+double vg_region_filter_noise(const vg_region_filter *x)
 {
     vg_err e;
     size_t n = 0;
-    double *known = vgi_array_raw(r->nregions, sizeof *known, &e);
-    for (size_t i = 0; known && i < r->nregions; i++)
-        if (r->noise[i] >= 0) known[n++] = r->noise[i];
+    double *known = vgi_array_raw(x->nregions, sizeof *known, &e);
+    for (size_t i = 0; known && i < x->nregions; i++)
+        if (x->noise[i] >= 0) known[n++] = x->noise[i];
     double middle = vgi_median(known, n);
     free(known);
     return sqrt(3) * middle;
@@ -202,12 +202,12 @@ typedef struct applying {
     double *const *out;
 } applying;
 
-static void add_region(const vg_region_filter *r, size_t i, const double *in, const double origin[3], double *sum)
+static void add_region(const vg_region_filter *x, size_t i, const double *in, const double origin[3], double *sum)
 {
-    const vgi_region *p = &r->region[i];
+    const vgi_region *p = &x->region[i];
     double rows[3 * VGI_REGION], kept[3 * VGI_REGION];
     gather(p, in, origin, rows);
-    vgi_product_double(3, p->n, p->n, rows, p->n, r->matrices + r->matrix[i], p->n, kept, p->n);
+    vgi_product_double(3, p->n, p->n, rows, p->n, x->matrices + x->matrix[i], p->n, kept, p->n);
     for (size_t k = 0; k < p->n; k++)
         for (size_t c = 0; c < 3; c++) sum[3 * p->vertex[k] + c] += weight_of(p, k) * kept[c * p->n + k];
 }
@@ -215,19 +215,19 @@ static void add_region(const vg_region_filter *r, size_t i, const double *in, co
 static void filter_frame(void *context, size_t f)
 {
     const applying *a = context;
-    const vg_region_filter *r = a->r;
+    const vg_region_filter *x = a->r;
     double origin[3], *out = a->out[f];
-    vg_centroid(a->in[f], r->nv, origin);
-    memset(out, 0, 3 * r->nv * sizeof *out);
-    for (size_t i = 0; i < r->nregions; i++) add_region(r, i, a->in[f], origin, out);
-    for (size_t v = 0; v < r->nv; v++)
-        for (size_t k = 0; k < 3; k++) out[3 * v + k] = out[3 * v + k] / r->total[v] + origin[k];
+    vg_centroid(a->in[f], x->nv, origin);
+    memset(out, 0, 3 * x->nv * sizeof *out);
+    for (size_t i = 0; i < x->nregions; i++) add_region(x, i, a->in[f], origin, out);
+    for (size_t v = 0; v < x->nv; v++)
+        for (size_t k = 0; k < 3; k++) out[3 * v + k] = out[3 * v + k] / x->total[v] + origin[k];
 }
 
-void vg_region_filter_apply(const vg_region_filter *r, size_t n, const double *const *in, double *const *out)
+void vg_region_filter_apply(const vg_region_filter *x, size_t n, const double *const *in, double *const *out)
 {
-    applying a = {r, in, out};
+    applying a = {x, in, out};
     vgi_blas_alone();
-    vgi_parallel(r->threads, n, filter_frame, &a);
+    vgi_parallel(x->threads, n, filter_frame, &a);
     vgi_blas_shared();
 }

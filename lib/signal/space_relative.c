@@ -45,22 +45,22 @@ bool vgi_triangle_axes(const double edges[6], double m[9])
 
 void vgi_relative_free(vgi_relative **out)
 {
-    vgi_relative *r = *out;
-    if (!r) return;
-    free(r->edge);
-    free(r->side);
-    free(r->length);
-    free(r->edge_weight);
-    free(r->at);
-    free(r->angle);
-    free(r->axes);
-    vgi_cholesky_free(&r->cholesky);
-    vgi_triplets_clear(&r->triplets);
-    free(r->q);
-    free(r->x);
-    free(r->b);
-    free(r->rest);
-    free(r);
+    vgi_relative *w = *out;
+    if (!w) return;
+    free(w->edge);
+    free(w->side);
+    free(w->length);
+    free(w->edge_weight);
+    free(w->at);
+    free(w->angle);
+    free(w->axes);
+    vgi_cholesky_free(&w->cholesky);
+    vgi_triplets_clear(&w->triplets);
+    free(w->q);
+    free(w->x);
+    free(w->b);
+    free(w->rest);
+    free(w);
     *out = NULL;
 }
 
@@ -103,75 +103,75 @@ static double distance(const double *vertices, const uint32_t *edge)
 
 void vgi_relative_lengths(const vgi_space *s, const double *pose, double *values)
 {
-    const vgi_relative *r = s->relative;
-    for (size_t i = 0; i < r->nedges; i++)
-        values[i] = (distance(pose, r->edge + 2 * i) - r->length[i]) * r->edge_weight[i];
+    const vgi_relative *w = s->relative;
+    for (size_t i = 0; i < w->nedges; i++)
+        values[i] = (distance(pose, w->edge + 2 * i) - w->length[i]) * w->edge_weight[i];
     for (size_t i = 0; i < s->pieces.npairs; i++)
-        if (is_hinge(s, i)) values[r->at[i]] = angle_of(s, i, pose) - r->angle[i];
+        if (is_hinge(s, i)) values[w->at[i]] = angle_of(s, i, pose) - w->angle[i];
 }
 
 /* ---- construction ---- */
 
-static void number_edges(const vgi_pieces *p, vgi_relative *r, const vgi_piece_side *sides, size_t n)
+static void number_edges(const vgi_pieces *p, vgi_relative *w, const vgi_piece_side *sides, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
         if (!i || sides[i].low != sides[i - 1].low || sides[i].high != sides[i - 1].high) {
-            r->edge[2 * r->nedges] = sides[i].low, r->edge[2 * r->nedges + 1] = sides[i].high;
-            r->nedges++;
+            w->edge[2 * w->nedges] = sides[i].low, w->edge[2 * w->nedges + 1] = sides[i].high;
+            w->nedges++;
         }
-        r->side[sides[i].at] = (uint32_t)(r->nedges - 1);
-        r->edge_weight[r->nedges - 1] += p->share[sides[i].at / 3] / 3;
+        w->side[sides[i].at] = (uint32_t)(w->nedges - 1);
+        w->edge_weight[w->nedges - 1] += p->share[sides[i].at / 3] / 3;
     }
 }
 
 static int make_edges(const vgi_space *s, const double *reference, vg_err *e)
 {
     const vgi_pieces *p = &s->pieces;
-    vgi_relative *r = s->relative;
+    vgi_relative *w = s->relative;
     vgi_piece_side *sides = vgi_array(p->n, 3 * sizeof *sides, e);
     double least = 1e-9 * vg_diagonal(reference, s->g->faces.nv);
-    int code = sides && (r->edge = vgi_array(p->n, 6 * sizeof *r->edge, e)) &&
-               (r->side = vgi_array(p->n, 3 * sizeof *r->side, e)) &&
-               (r->length = vgi_array(p->n, 3 * sizeof(double), e)) &&
-               (r->edge_weight = vgi_array(p->n, 3 * sizeof(double), e)) &&
-               (r->axes = vgi_array(p->n, 9 * sizeof(double), e)) ? VG_OK : VG_ENOMEM;
-    if (code == VG_OK) number_edges(p, r, sides, vgi_pieces_sides(p, sides));
-    for (size_t i = 0; code == VG_OK && i < r->nedges; i++) {
-        r->length[i] = distance(reference, r->edge + 2 * i);
-        r->edge_weight[i] = sqrt(r->edge_weight[i]) / fmax(r->length[i], least > 0 ? least : 1);
+    int r = sides && (w->edge = vgi_array(p->n, 6 * sizeof *w->edge, e)) &&
+               (w->side = vgi_array(p->n, 3 * sizeof *w->side, e)) &&
+               (w->length = vgi_array(p->n, 3 * sizeof(double), e)) &&
+               (w->edge_weight = vgi_array(p->n, 3 * sizeof(double), e)) &&
+               (w->axes = vgi_array(p->n, 9 * sizeof(double), e)) ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) number_edges(p, w, sides, vgi_pieces_sides(p, sides));
+    for (size_t i = 0; r == VG_OK && i < w->nedges; i++) {
+        w->length[i] = distance(reference, w->edge + 2 * i);
+        w->edge_weight[i] = sqrt(w->edge_weight[i]) / fmax(w->length[i], least > 0 ? least : 1);
     }
-    for (size_t i = 0; code == VG_OK && i < p->n; i++)
-        if (!vgi_is_triangle(p, i) || !vgi_triangle_axes(s->edges + 6 * i, r->axes + 9 * i))
-            for (size_t k = 0; k < 3; k++) r->axes[9 * i + 4 * k] = 1;
+    for (size_t i = 0; r == VG_OK && i < p->n; i++)
+        if (!vgi_is_triangle(p, i) || !vgi_triangle_axes(s->edges + 6 * i, w->axes + 9 * i))
+            for (size_t k = 0; k < 3; k++) w->axes[9 * i + 4 * k] = 1;
     free(sides);
-    return code;
+    return r;
 }
 
 /* Compute the index of each pair's numbers, and the size of a shape. */
 static void lay_out(vgi_space *s, const double *reference)
 {
-    vgi_relative *r = s->relative;
-    size_t at = s->kind == VG_SPACE_LENGTHS ? r->nedges : 0;
+    vgi_relative *w = s->relative;
+    size_t at = s->kind == VG_SPACE_LENGTHS ? w->nedges : 0;
     for (size_t i = 0; i < s->pieces.npairs; i++) {
-        r->at[i] = at;
+        w->at[i] = at;
         at += is_hinge(s, i) ? 1 : 3;
-        if (is_hinge(s, i)) r->angle[i] = angle_of(s, i, reference);
+        if (is_hinge(s, i)) w->angle[i] = angle_of(s, i, reference);
     }
-    r->at[s->pieces.npairs] = at;
+    w->at[s->pieces.npairs] = at;
     s->d = at + (s->kind == VG_SPACE_ROTATIONS ? 6 * s->pieces.n : 0) + 3;
     for (size_t i = 1; i < s->pieces.n; i++)
-        if (s->pieces.share[i] > s->pieces.share[r->root]) r->root = i;
+        if (s->pieces.share[i] > s->pieces.share[w->root]) w->root = i;
 }
 
 int vgi_relative_make(vgi_space *s, const double *reference, vg_err *e)
 {
     size_t n = s->pieces.n, npairs = s->pieces.npairs;
-    vgi_relative *r = s->relative = vgi_array(1, sizeof *r, e);
-    if (!r) return VG_ENOMEM;
+    vgi_relative *w = s->relative = vgi_array(1, sizeof *w, e);
+    if (!w) return VG_ENOMEM;
     if (s->pieces.parts != 1) return vg_fail(e, VG_EINPUT, "the mesh has %zu parts that no links join", s->pieces.parts);
-    if (!(r->at = vgi_array(npairs + 1, sizeof *r->at, e)) || !(r->angle = vgi_array(npairs, sizeof(double), e)) ||
-        !(r->q = vgi_array(npairs, 9 * sizeof(double), e)) || !(r->x = vgi_array(n, 9 * sizeof(double), e)) ||
-        !(r->b = vgi_array(n, 9 * sizeof(double), e)) || !(r->rest = vgi_array(n, 9 * sizeof(double), e)))
+    if (!(w->at = vgi_array(npairs + 1, sizeof *w->at, e)) || !(w->angle = vgi_array(npairs, sizeof(double), e)) ||
+        !(w->q = vgi_array(npairs, 9 * sizeof(double), e)) || !(w->x = vgi_array(n, 9 * sizeof(double), e)) ||
+        !(w->b = vgi_array(n, 9 * sizeof(double), e)) || !(w->rest = vgi_array(n, 9 * sizeof(double), e)))
         return VG_ENOMEM;
     if (s->kind == VG_SPACE_LENGTHS && make_edges(s, reference, e) < 0) return VG_ENOMEM;
     lay_out(s, reference);
@@ -211,13 +211,13 @@ static void put_angle(double weight, double *before, double *out)
 
 void vgi_relative_finish(const vgi_space *s, size_t n, const double *turns, double *values, size_t *jumps)
 {
-    const vgi_relative *r = s->relative;
+    const vgi_relative *w = s->relative;
     for (size_t i = 0; i <= s->pieces.npairs; i++) {
         bool last = i == s->pieces.npairs, hinge = !last && is_hinge(s, i);
         double before[3] = {0, 0, 0}, angle = 0, weight = last ? 1 : pair_weight(s, i), q[4];
         for (size_t f = 0; f < n; f++) {
             const double *t = turns + 4 * f * s->nodes;
-            double *out = values + f * s->d + (last ? s->d - 3 : r->at[i]);
+            double *out = values + f * s->d + (last ? s->d - 3 : w->at[i]);
             if (hinge) put_angle(weight, &angle, out);
             else if (last) mean_turn(s, t, q), put_log(q, weight, before, out);
             else {
@@ -245,13 +245,13 @@ static void lay_triangle(const double side[3], double edges[6])
 /* lengths: edges of the pieces in their own axes, written to s->moved. */
 static void lay_pieces(const vgi_space *s, const double *values)
 {
-    const vgi_relative *r = s->relative;
+    const vgi_relative *w = s->relative;
     for (size_t i = 0; i < s->pieces.n; i++) {
         double side[3] = {0, 0, 0}, *edges = s->moved + 6 * i;
         bool triangle = vgi_is_triangle(&s->pieces, i);
         for (size_t k = 0; k < (triangle ? 3u : 1u); k++) {
-            size_t j = r->side[3 * i + k];
-            side[k] = fmax(r->length[j] + values[j] / r->edge_weight[j], 1e-3 * r->length[j]);
+            size_t j = w->side[3 * i + k];
+            side[k] = fmax(w->length[j] + values[j] / w->edge_weight[j], 1e-3 * w->length[j]);
         }
         if (triangle) lay_triangle(side, edges);
         double length = vgi_length(s->edges + 6 * i);
@@ -304,11 +304,11 @@ static void turn_of_log(const double *values, double weight, double q[9])
 
 static void find_turns(const vgi_space *s, const double *values)
 {
-    const vgi_relative *r = s->relative;
+    const vgi_relative *w = s->relative;
     for (size_t i = 0; i < s->pieces.npairs; i++) {
         double weight = pair_weight(s, i);
-        if (is_hinge(s, i)) turn_of_hinge(s, i, r->angle[i] + values[r->at[i]] / weight, r->q + 9 * i);
-        else turn_of_log(values + r->at[i], weight, r->q + 9 * i);
+        if (is_hinge(s, i)) turn_of_hinge(s, i, w->angle[i] + values[w->at[i]] / weight, w->q + 9 * i);
+        else turn_of_log(values + w->at[i], weight, w->q + 9 * i);
     }
 }
 
@@ -322,21 +322,21 @@ static size_t unknown(const vgi_relative *r, size_t piece) /* of all but the roo
 /* Unknowns are the frames, transposed: X_b = Q' X_a. */
 static void fill_system(const vgi_space *s)
 {
-    vgi_relative *r = s->relative;
-    r->triplets.n = 0;
-    memset(r->b, 0, 9 * s->pieces.n * sizeof *r->b);
+    vgi_relative *w = s->relative;
+    w->triplets.n = 0;
+    memset(w->b, 0, 9 * s->pieces.n * sizeof *w->b);
     for (size_t i = 0; i < s->pieces.npairs; i++) {
         const vgi_neighbours *p = &s->pieces.pair[i];
-        const double *q = r->q + 9 * i;
-        bool a = p->a != r->root, b = p->b != r->root;
-        size_t at_a = 3 * unknown(r, p->a), at_b = 3 * unknown(r, p->b);
+        const double *q = w->q + 9 * i;
+        bool a = p->a != w->root, b = p->b != w->root;
+        size_t at_a = 3 * unknown(w, p->a), at_b = 3 * unknown(w, p->b);
         for (size_t k = 0; k < 3; k++) {
-            if (a) vgi_triplets_put(&r->triplets, at_a + k, at_a + k, 1);
-            if (b) vgi_triplets_put(&r->triplets, at_b + k, at_b + k, 1);
+            if (a) vgi_triplets_put(&w->triplets, at_a + k, at_a + k, 1);
+            if (b) vgi_triplets_put(&w->triplets, at_b + k, at_b + k, 1);
             for (size_t c = 0; c < 3; c++) {
-                if (a && b) vgi_triplets_put(&r->triplets, at_a + k, at_b + c, -q[3 * k + c]);
-                else if (b) r->b[3 * (at_b + c) + k] += q[3 * k + c];
-                else r->b[3 * (at_a + k) + c] += q[3 * k + c];
+                if (a && b) vgi_triplets_put(&w->triplets, at_a + k, at_b + c, -q[3 * k + c]);
+                else if (b) w->b[3 * (at_b + c) + k] += q[3 * k + c];
+                else w->b[3 * (at_a + k) + c] += q[3 * k + c];
             }
         }
     }
@@ -345,16 +345,16 @@ static void fill_system(const vgi_space *s)
 /* rest := b - N x, pair by pair */
 static void find_rest(const vgi_space *s)
 {
-    vgi_relative *r = s->relative;
-    memcpy(r->rest, r->b, 9 * s->pieces.n * sizeof *r->b);
+    vgi_relative *w = s->relative;
+    memcpy(w->rest, w->b, 9 * s->pieces.n * sizeof *w->b);
     for (size_t i = 0; i < s->pieces.npairs; i++) {
         const vgi_neighbours *p = &s->pieces.pair[i];
-        const double *q = r->q + 9 * i;
-        bool both = p->a != r->root && p->b != r->root;
-        double *xa = r->x + 9 * unknown(r, p->a), *xb = r->x + 9 * unknown(r, p->b);
-        double *ra = r->rest + 9 * unknown(r, p->a), *rb = r->rest + 9 * unknown(r, p->b);
-        for (size_t k = 0; k < 9 && p->a != r->root; k++) ra[k] -= xa[k];
-        for (size_t k = 0; k < 9 && p->b != r->root; k++) rb[k] -= xb[k];
+        const double *q = w->q + 9 * i;
+        bool both = p->a != w->root && p->b != w->root;
+        double *xa = w->x + 9 * unknown(w, p->a), *xb = w->x + 9 * unknown(w, p->b);
+        double *ra = w->rest + 9 * unknown(w, p->a), *rb = w->rest + 9 * unknown(w, p->b);
+        for (size_t k = 0; k < 9 && p->a != w->root; k++) ra[k] -= xa[k];
+        for (size_t k = 0; k < 9 && p->b != w->root; k++) rb[k] -= xb[k];
         for (size_t k = 0; k < 3 && both; k++)
             for (size_t c = 0; c < 3; c++)
                 for (size_t m = 0; m < 3; m++) {
@@ -366,41 +366,41 @@ static void find_rest(const vgi_space *s)
 
 static int factorize(const vgi_space *s, vg_err *e)
 {
-    vgi_relative *r = s->relative;
+    vgi_relative *w = s->relative;
     vgi_sparse a = {0};
     size_t n = 3 * (s->pieces.n - 1);
-    int code = r->triplets.row ? VG_OK : vgi_triplets_make(&r->triplets, 15 * s->pieces.npairs, e);
-    if (code == VG_OK) {
+    int r = w->triplets.row ? VG_OK : vgi_triplets_make(&w->triplets, 15 * s->pieces.npairs, e);
+    if (r == VG_OK) {
         fill_system(s);
-        code = vgi_triplets_sum(&r->triplets, n, &a, e);
+        r = vgi_triplets_sum(&w->triplets, n, &a, e);
     }
-    if (code == VG_OK && !r->cholesky) code = vgi_cholesky_new(&r->cholesky, &a, NULL, e);
-    if (code == VG_OK) code = vgi_cholesky_factorize(r->cholesky, &a, e);
+    if (r == VG_OK && !w->cholesky) r = vgi_cholesky_new(&w->cholesky, &a, NULL, e);
+    if (r == VG_OK) r = vgi_cholesky_factorize(w->cholesky, &a, e);
     vgi_sparse_clear(&a);
-    return code;
+    return r;
 }
 
 /* Solve, with one step of iterative refinement. */
 static int solve(const vgi_space *s, vg_err *e)
 {
-    vgi_relative *r = s->relative;
+    vgi_relative *w = s->relative;
     size_t n = 9 * (s->pieces.n - 1);
-    memcpy(r->x, r->b, n * sizeof *r->x);
-    int code = vgi_cholesky_solve(r->cholesky, r->x, e);
-    if (code < 0) return code;
+    memcpy(w->x, w->b, n * sizeof *w->x);
+    int r = vgi_cholesky_solve(w->cholesky, w->x, e);
+    if (r < 0) return r;
     find_rest(s);
-    code = vgi_cholesky_solve(r->cholesky, r->rest, e);
-    for (size_t i = 0; i < n && code == VG_OK; i++) r->x[i] += r->rest[i];
-    return code;
+    r = vgi_cholesky_solve(w->cholesky, w->rest, e);
+    for (size_t i = 0; i < n && r == VG_OK; i++) w->x[i] += w->rest[i];
+    return r;
 }
 
 /* Frame of piece i before the rotation of the whole. */
 static void frame_of(const vgi_space *s, size_t i, double frame[9])
 {
-    const vgi_relative *r = s->relative;
+    const vgi_relative *w = s->relative;
     double m[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-    const double *x = r->x + 9 * unknown(r, i);
-    for (size_t k = 0; k < 9 && i != r->root; k++) m[k] = x[3 * (k % 3) + k / 3];
+    const double *x = w->x + 9 * unknown(w, i);
+    for (size_t k = 0; k < 9 && i != w->root; k++) m[k] = x[3 * (k % 3) + k / 3];
     vgi_fit_rotation(m, frame);
 }
 
@@ -420,12 +420,12 @@ static void turn_whole(const vgi_space *s, const double *values, double whole[9]
 
 int vgi_relative_edges(vgi_space *s, const double *values, vg_err *e)
 {
-    vgi_relative *r = s->relative;
+    vgi_relative *w = s->relative;
     double whole[9];
-    int code = VG_OK;
+    int r = VG_OK;
     if (s->kind == VG_SPACE_LENGTHS) lay_pieces(s, values);
     find_turns(s, values);
-    if (s->pieces.n > 1 && ((code = factorize(s, e)) < 0 || (code = solve(s, e)) < 0)) return code;
+    if (s->pieces.n > 1 && ((r = factorize(s, e)) < 0 || (r = solve(s, e)) < 0)) return r;
     turn_whole(s, values, whole);
     for (size_t i = 0; i < s->pieces.n; i++) {
         double m[9], stretch[9], *edges = s->moved + 6 * i;
@@ -435,9 +435,9 @@ int vgi_relative_edges(vgi_space *s, const double *values, vg_err *e)
             vgi_stretch_get(values + vgi_space_stretch_at(s, i), sqrt(s->pieces.share[i]), stretch);
             vgi_multiply(m, stretch, m);
             memcpy(edges, s->edges + 6 * i, 6 * sizeof *edges);
-        } else if (vgi_is_triangle(&s->pieces, i)) vgi_multiply(m, r->axes + 9 * i, m);
+        } else if (vgi_is_triangle(&s->pieces, i)) vgi_multiply(m, w->axes + 9 * i, m);
         vgi_multiply_vector(m, edges, edges);
         vgi_multiply_vector(m, edges + 3, edges + 3);
     }
-    return code;
+    return r;
 }

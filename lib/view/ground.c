@@ -50,24 +50,24 @@ int vgi_ground_shadow(vgi_ground *g, const vgi_drawing *d, vg_err *e)
     vgi_camera_measure(&below, d->figure, d->points, (double[2]){0, 0}, &box);
     vgi_camera_fit(&below, &box, 0.12);
     vgi_drawing drawing = {.figure = d->figure, .camera = &below, .points = d->points, .wire = 0.6f};
-    vgi_raster r = {0};
+    vgi_raster raster = {0};
     g->shadow = vgi_array(SHADOW_SIZE * SHADOW_SIZE, sizeof *g->shadow, e);
-    int code = g->shadow ? vgi_raster_init(&r, SHADOW_SIZE, SHADOW_SIZE, e) : VG_ENOMEM;
-    if (code == VG_OK) code = vgi_draw(&r, &drawing, e);
-    if (code == VG_OK) {
+    int r = g->shadow ? vgi_raster_init(&raster, SHADOW_SIZE, SHADOW_SIZE, e) : VG_ENOMEM;
+    if (r == VG_OK) r = vgi_draw(&raster, &drawing, e);
+    if (r == VG_OK) {
         g->n = SHADOW_SIZE;
         g->step = (float)(1 / below.scale);
         g->origin[0] = (float)(below.x - 0.5 * SHADOW_SIZE / below.scale);
         g->origin[1] = (float)(below.y + 0.5 * SHADOW_SIZE / below.scale); /* rows go down */
         for (size_t i = 0; i < SHADOW_SIZE * SHADOW_SIZE; i++) {
-            if (r.at[i].kind == VGI_EMPTY) continue;
-            double height = -r.at[i].z / below.scale - g->height;
+            if (raster.at[i].kind == VGI_EMPTY) continue;
+            double height = -raster.at[i].z / below.scale - g->height;
             g->shadow[i] = (float)exp(-fmax(height, 0) / SHADOW_HEIGHT);
         }
         blur(g->shadow, SHADOW_SIZE);
     }
-    vgi_raster_clear(&r);
-    return code;
+    vgi_raster_clear(&raster);
+    return r;
 }
 
 static float shadow_at(const vgi_ground *g, double across, double along)

@@ -26,11 +26,11 @@ static int deflate_all(vg_bytes *packed, const unsigned char *data, size_t n, vg
     packed->size = 0;
     /* the lower bytes of residuals are noise: searching them for repetitions only costs time */
     if (deflateInit2(&z, 4, Z_DEFLATED, 15, 9, Z_FILTERED) != Z_OK) return zlib_fails(&z, e);
-    int r, code = VG_OK;
+    int r = VG_OK, state;
     size_t at = 0;
     do {
-        code = vgi_bytes_reserve(packed, packed->size + (1 << 16), e);
-        if (code < 0) break;
+        r = vgi_bytes_reserve(packed, packed->size + (1 << 16), e);
+        if (r < 0) break;
         if (z.avail_in == 0 && at < n) {
             size_t take = n - at < DEFLATE_STEP ? n - at : DEFLATE_STEP;
             z.next_in = (unsigned char *)(uintptr_t)(data + at);
@@ -41,12 +41,12 @@ static int deflate_all(vg_bytes *packed, const unsigned char *data, size_t n, vg
         if (room > DEFLATE_STEP) room = DEFLATE_STEP;
         z.next_out = packed->data + packed->size;
         z.avail_out = (uInt)room;
-        r = deflate(&z, at < n ? Z_NO_FLUSH : Z_FINISH);
+        state = deflate(&z, at < n ? Z_NO_FLUSH : Z_FINISH);
         packed->size += room - z.avail_out;
-        if (r != Z_OK && r != Z_STREAM_END && r != Z_BUF_ERROR) code = zlib_fails(&z, e);
-    } while (code == VG_OK && r != Z_STREAM_END);
+        if (state != Z_OK && state != Z_STREAM_END && state != Z_BUF_ERROR) r = zlib_fails(&z, e);
+    } while (r == VG_OK && state != Z_STREAM_END);
     deflateEnd(&z);
-    return code;
+    return r;
 }
 
 /* ---- frames ---- */

@@ -14,22 +14,22 @@ enum { GRID = 256 };
 /* A concave face with more corners than this is drawn as if it were convex. */
 enum { MOST_EARS = 4096 };
 
-int vgi_raster_init(vgi_raster *r, size_t w, size_t h, vg_err *e)
+int vgi_raster_init(vgi_raster *raster, size_t w, size_t h, vg_err *e)
 {
     size_t n;
-    *r = (vgi_raster){.w = w, .h = h};
+    *raster = (vgi_raster){.w = w, .h = h};
     if (!vgi_mul(w, h, &n)) return vg_fail(e, VG_ENOMEM, "not enough memory for %zu x %zu samples", w, h);
-    r->at = vgi_array_raw(n, sizeof *r->at, e);
-    if (!r->at) return VG_ENOMEM;
+    raster->at = vgi_array_raw(n, sizeof *raster->at, e);
+    if (!raster->at) return VG_ENOMEM;
     const vgi_sample empty = {.z = -INFINITY};
-    for (size_t i = 0; i < n; i++) r->at[i] = empty;
+    for (size_t i = 0; i < n; i++) raster->at[i] = empty;
     return VG_OK;
 }
 
-void vgi_raster_clear(vgi_raster *r)
+void vgi_raster_clear(vgi_raster *raster)
 {
-    free(r->at);
-    *r = (vgi_raster){0};
+    free(raster->at);
+    *raster = (vgi_raster){0};
 }
 
 static int16_t pack(float x)
@@ -62,10 +62,10 @@ typedef struct span { /* the range of samples to test, end excluded */
     size_t x0, x1, y0, y1;
 } span;
 
-static bool clip_span(const vgi_raster *r, double x0, double x1, double y0, double y1, span *s)
+static bool clip_span(const vgi_raster *raster, double x0, double x1, double y0, double y1, span *s)
 {
     x0 = fmax(floor(x0), 0), y0 = fmax(floor(y0), 0);
-    x1 = fmin(ceil(x1) + 1, (double)r->w), y1 = fmin(ceil(y1) + 1, (double)r->h);
+    x1 = fmin(ceil(x1) + 1, (double)raster->w), y1 = fmin(ceil(y1) + 1, (double)raster->h);
     if (!(x0 < x1 && y0 < y1)) return false;
     *s = (span){(size_t)x0, (size_t)x1, (size_t)y0, (size_t)y1};
     return true;
@@ -87,7 +87,7 @@ static bool near_edge(const float w[3], const float height[3], unsigned edges, f
 }
 
 /* edges: bit i marks the side opposite corner i as an edge of the face. */
-static void draw_triangle(vgi_raster *r, const vgi_corner *const corner[3], unsigned edges, float edge_width)
+static void draw_triangle(vgi_raster *raster, const vgi_corner *const corner[3], unsigned edges, float edge_width)
 {
     const vgi_corner *c[3] = {corner[0], corner[1], corner[2]};
     int64_t p[3][2];
@@ -99,7 +99,7 @@ static void draw_triangle(vgi_raster *r, const vgi_corner *const corner[3], unsi
     span s;
     double x0 = fmin(fmin(c[0]->x, c[1]->x), c[2]->x), x1 = fmax(fmax(c[0]->x, c[1]->x), c[2]->x);
     double y0 = fmin(fmin(c[0]->y, c[1]->y), c[2]->y), y1 = fmax(fmax(c[0]->y, c[1]->y), c[2]->y);
-    if (area == 0 || !clip_span(r, x0 - 1, x1, y0 - 1, y1, &s)) return;
+    if (area == 0 || !clip_span(raster, x0 - 1, x1, y0 - 1, y1, &s)) return;
     /* y points down: a face that is counter-clockwise for the viewer has a negative area here */
     float facing = area < 0 ? 1 : -1;
     int64_t sign = area < 0 ? -1 : 1;
@@ -113,7 +113,7 @@ static void draw_triangle(vgi_raster *r, const vgi_corner *const corner[3], unsi
     }
     for (size_t y = s.y0; y < s.y1; y++) {
         int64_t w0 = e[0].at, w1 = e[1].at, w2 = e[2].at;
-        vgi_sample *row = r->at + y * r->w;
+        vgi_sample *row = raster->at + y * raster->w;
         for (size_t x = s.x0; x < s.x1; x++, w0 += e[0].dx, w1 += e[1].dx, w2 += e[2].dx) {
             if ((w0 | w1 | w2) < 0) continue;
             float w[3] = {(float)w0 * inverse, (float)w1 * inverse, (float)w2 * inverse};
@@ -138,11 +138,11 @@ static void strip(const vgi_corner *a, float dx, float dy, float reach, double y
     if (middle + half < (double)*x1) *x1 = (size_t)fmax(ceil(middle + half), (double)*x0);
 }
 
-static void draw_wire(vgi_raster *r, const vgi_corner *a, const vgi_corner *b, float radius, int kind)
+static void draw_wire(vgi_raster *raster, const vgi_corner *a, const vgi_corner *b, float radius, int kind)
 {
     span s;
     if (!(fabsf(a->x) < FAR_OUT && fabsf(a->y) < FAR_OUT && fabsf(b->x) < FAR_OUT && fabsf(b->y) < FAR_OUT)) return;
-    if (!clip_span(r, fminf(a->x, b->x) - radius, fmaxf(a->x, b->x) + radius, fminf(a->y, b->y) - radius,
+    if (!clip_span(raster, fminf(a->x, b->x) - radius, fmaxf(a->x, b->x) + radius, fminf(a->y, b->y) - radius,
                    fmaxf(a->y, b->y) + radius, &s))
         return;
     float dx = b->x - a->x, dy = b->y - a->y, square = dx * dx + dy * dy;
@@ -156,7 +156,7 @@ static void draw_wire(vgi_raster *r, const vgi_corner *a, const vgi_corner *b, f
             float ox = (px - a->x - t * dx) / radius, oy = (py - a->y - t * dy) / radius, off = ox * ox + oy * oy;
             if (off > 1) continue;
             float n[3] = {ox, -oy, sqrtf(1 - off)}, z = a->z + t * (b->z - a->z) + radius * n[2];
-            vgi_sample *sample = r->at + y * r->w + x;
+            vgi_sample *sample = raster->at + y * raster->w + x;
             if (z > sample->z) put(sample, z, n, a->value + t * (b->value - a->value), kind);
         }
     }
@@ -286,10 +286,10 @@ static void draw_face(work *k, size_t f)
     }
 }
 
-static bool is_empty(const vgi_raster *r)
+static bool is_empty(const vgi_raster *raster)
 {
-    for (size_t i = 0; i < r->w * r->h; i++)
-        if (r->at[i].kind != VGI_EMPTY) return false;
+    for (size_t i = 0; i < raster->w * raster->h; i++)
+        if (raster->at[i].kind != VGI_EMPTY) return false;
     return true;
 }
 
@@ -362,22 +362,22 @@ static void free_work(work *k)
     free(k->triangles);
 }
 
-int vgi_draw(vgi_raster *r, const vgi_drawing *d, vg_err *e)
+int vgi_draw(vgi_raster *raster, const vgi_drawing *d, vg_err *e)
 {
     const vg_mesh *m = d->figure->mesh;
-    work k = {.raster = r, .drawing = d};
-    int code = make_work(&k, e);
-    if (code == VG_OK) {
+    work k = {.raster = raster, .drawing = d};
+    int r = make_work(&k, e);
+    if (r == VG_OK) {
         vgi_camera_project(d->camera, d->points, m->nv, k.seen);
         vgi_figure_normals(d->figure, d->points, k.face, k.normals);
         for (size_t f = 0; f < m->nf; f++) draw_face(&k, f);
-        if (m->nf > 0 && is_empty(r)) draw_edges(&k, d->wire);
+        if (m->nf > 0 && is_empty(raster)) draw_edges(&k, d->wire);
         else if (d->contour > 0) draw_contours(&k, d->contour);
         for (size_t v = 0; m->nf == 0 && v < m->nv; v++) {
             load_corner(&k, (uint32_t)v, NULL, k.corner);
-            draw_wire(r, k.corner, k.corner, 1.6f * d->wire, VGI_WIRE);
+            draw_wire(raster, k.corner, k.corner, 1.6f * d->wire, VGI_WIRE);
         }
     }
     free_work(&k);
-    return code;
+    return r;
 }

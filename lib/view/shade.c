@@ -135,20 +135,20 @@ static float corner_light(const pixels *p, size_t x, size_t y)
 /* ---- outlines ---- */
 
 /* By how much a sample is nearer than its two neighbours along one axis predict. */
-static float depth_step(const vgi_raster *r, size_t at, size_t room_before, size_t room_after, size_t stride,
+static float depth_step(const vgi_raster *raster, size_t at, size_t room_before, size_t room_after, size_t stride,
                         size_t reach, float limit)
 {
-    float z = r->at[at].z, floor = z - 4 * limit;
-    float a = room_before >= reach ? r->at[at - reach * stride].z : floor;
-    float b = room_after >= reach ? r->at[at + reach * stride].z : floor;
+    float z = raster->at[at].z, floor = z - 4 * limit;
+    float a = room_before >= reach ? raster->at[at - reach * stride].z : floor;
+    float b = room_after >= reach ? raster->at[at + reach * stride].z : floor;
     return 2 * z - fmaxf(a, floor) - fmaxf(b, floor);
 }
 
-static float outline(const vgi_raster *r, size_t x, size_t y, size_t reach, float limit)
+static float outline(const vgi_raster *raster, size_t x, size_t y, size_t reach, float limit)
 {
-    size_t at = y * r->w + x;
-    float step = fmaxf(depth_step(r, at, x, r->w - 1 - x, 1, reach, limit),
-                       depth_step(r, at, y, r->h - 1 - y, r->w, reach, limit));
+    size_t at = y * raster->w + x;
+    float step = fmaxf(depth_step(raster, at, x, raster->w - 1 - x, 1, reach, limit),
+                       depth_step(raster, at, y, raster->h - 1 - y, raster->w, reach, limit));
     float t = clamp01((step - 0.5f * limit) / limit);
     return t * t * (3 - 2 * t);
 }
@@ -231,20 +231,20 @@ static void light_background(const background *b, double x, double y, float out[
 static void shade_pixel(const vgi_look *l, const pixels *p, const background *b, size_t x, size_t y,
                         unsigned char rgb[3])
 {
-    const vgi_raster *r = p->r;
+    const vgi_raster *raster = p->r;
     float sum[3] = {0, 0, 0}, page[3], sky = -1;
     size_t empty = 0, s = p->step;
     for (size_t j = 0; j < s; j++)
         for (size_t i = 0; i < s; i++) {
             size_t sx = x * s + i, sy = y * s + j;
-            const vgi_sample *sample = r->at + sy * r->w + sx;
+            const vgi_sample *sample = raster->at + sy * raster->w + sx;
             float c[3];
             if (sample->kind == VGI_EMPTY) {
                 empty++;
                 continue;
             }
             if (sky < 0) sky = corner_light(p, x, y);
-            float line = sample->kind >= VGI_WIRE ? 0 : outline(r, sx, sy, s > 2 ? s - 1 : 1, l->outline);
+            float line = sample->kind >= VGI_WIRE ? 0 : outline(raster, sx, sy, s > 2 ? s - 1 : 1, l->outline);
             light_sample(l, sample, sky, line, c);
             for (int k = 0; k < 3; k++) sum[k] += fminf(c[k], 1);
         }
@@ -256,13 +256,13 @@ static void shade_pixel(const vgi_look *l, const pixels *p, const background *b,
     for (int k = 0; k < 3; k++) rgb[k] = vgi_encode(l->palette, sum[k] / (float)(s * s));
 }
 
-int vgi_shade(const vgi_look *l, const vgi_raster *r, const vgi_camera *c, unsigned char *rgb, vg_err *e)
+int vgi_shade(const vgi_look *l, const vgi_raster *raster, const vgi_camera *c, unsigned char *rgb, vg_err *e)
 {
-    pixels p = {.r = r, .w = r->w / l->oversampling, .h = r->h / l->oversampling, .step = l->oversampling};
-    background b = {l, c, (double)r->h};
-    int code = light_corners(&p, l->reach, e);
-    for (size_t y = 0; code == VG_OK && y < p.h; y++)
+    pixels p = {.r = raster, .w = raster->w / l->oversampling, .h = raster->h / l->oversampling, .step = l->oversampling};
+    background b = {l, c, (double)raster->h};
+    int r = light_corners(&p, l->reach, e);
+    for (size_t y = 0; r == VG_OK && y < p.h; y++)
         for (size_t x = 0; x < p.w; x++) shade_pixel(l, &p, &b, x, y, rgb + 3 * (y * p.w + x));
     free(p.light);
-    return code;
+    return r;
 }

@@ -231,67 +231,67 @@ static void rest_frame(const vg_mesh *m, frame *x, const double *rest)
 
 static void pose_block(void *context, size_t block)
 {
-    vg_rider *r = context;
-    for (size_t i = BLOCK * block; i < BLOCK * (block + 1) && i < r->nframes; i++) {
-        frame *x = &r->frames[i];
+    vg_rider *rider = context;
+    for (size_t i = BLOCK * block; i < BLOCK * (block + 1) && i < rider->nframes; i++) {
+        frame *x = &rider->frames[i];
         double normal[3], S[9];
-        face_frame(r->source, r->pose, x->face, vgi_length(x->normal), x->now, normal);
-        sum_outer(r->source, x, r->pose, r->source_rest, x->now, normal, S);
+        face_frame(rider->source, rider->pose, x->face, vgi_length(x->normal), x->now, normal);
+        sum_outer(rider->source, x, rider->pose, rider->source_rest, x->now, normal, S);
         vgi_multiply(S, x->inverse, x->matrix);
     }
 }
 
 /* The foot of a vertex in the pose, at the same position in its triangle (see vgi_hit). */
-static void foot_in_pose(const vg_rider *r, const vgi_hit *hit, double at[3])
+static void foot_in_pose(const vg_rider *rider, const vgi_hit *hit, double at[3])
 {
-    const vg_mesh *m = r->source;
+    const vg_mesh *m = rider->source;
     uint32_t begin = m->start[hit->face], end = m->start[hit->face + 1], next = hit->corner + 1 < end ? hit->corner + 1 : begin,
              last = next + 1 < end ? next + 1 : begin;
-    const double *a = r->pose + 3 * (size_t)m->vert[hit->corner], *b = r->pose + 3 * (size_t)m->vert[next];
+    const double *a = rider->pose + 3 * (size_t)m->vert[hit->corner], *b = rider->pose + 3 * (size_t)m->vert[next];
     double centre[3];
-    const double *c = r->pose + 3 * (size_t)m->vert[last];
-    if (end - begin > 3) centre_of(m, r->pose, hit->face, centre), c = centre;
+    const double *c = rider->pose + 3 * (size_t)m->vert[last];
+    if (end - begin > 3) centre_of(m, rider->pose, hit->face, centre), c = centre;
     for (int k = 0; k < 3; k++) at[k] = a[k] + hit->u[0] * (b[k] - a[k]) + hit->u[1] * (c[k] - a[k]);
 }
 
 /* The offset from the foot follows the frames of the surrounding faces. */
 static void vertex_block(void *context, size_t block)
 {
-    vg_rider *r = context;
-    for (size_t v = BLOCK * block; v < BLOCK * (block + 1) && v < r->nv; v++) {
+    vg_rider *rider = context;
+    for (size_t v = BLOCK * block; v < BLOCK * (block + 1) && v < rider->nv; v++) {
         double at[3];
-        foot_in_pose(r, &r->foot[v], at);
-        for (uint32_t i = r->first[v]; i < r->first[v + 1]; i++) {
+        foot_in_pose(rider, &rider->foot[v], at);
+        for (uint32_t i = rider->first[v]; i < rider->first[v + 1]; i++) {
             double above[3];
-            vgi_multiply_vector(r->frames[r->by[i]].matrix, r->above + 3 * v, above);
-            vgi_add_scaled(at, r->weight[i], above);
+            vgi_multiply_vector(rider->frames[rider->by[i]].matrix, rider->above + 3 * v, above);
+            vgi_add_scaled(at, rider->weight[i], above);
         }
-        memcpy(r->out + 3 * v, at, sizeof at);
+        memcpy(rider->out + 3 * v, at, sizeof at);
     }
 }
 
-void vg_rider_apply(vg_rider *r, const double *pose, double *vertices)
+void vg_rider_apply(vg_rider *rider, const double *pose, double *vertices)
 {
-    r->pose = pose, r->out = vertices;
-    vgi_parallel(r->threads, (r->nframes + BLOCK - 1) / BLOCK, pose_block, r);
-    vgi_parallel(r->threads, (r->nv + BLOCK - 1) / BLOCK, vertex_block, r);
+    rider->pose = pose, rider->out = vertices;
+    vgi_parallel(rider->threads, (rider->nframes + BLOCK - 1) / BLOCK, pose_block, rider);
+    vgi_parallel(rider->threads, (rider->nv + BLOCK - 1) / BLOCK, vertex_block, rider);
 }
 
 /* ---- construction ---- */
 
 /* The source faces in use, each once; number[f]: index of face f among them. */
-static int make_frames(vg_rider *r, const vg_correspondence *c, uint32_t *number, vg_err *e)
+static int make_frames(vg_rider *rider, const vg_correspondence *c, uint32_t *number, vg_err *e)
 {
     memset(number, 0xff, c->source_nf * sizeof *number);
     for (uint32_t i = 0; i < c->first[c->target_nf]; i++)
-        if (number[c->source[i]] == UINT32_MAX) number[c->source[i]] = (uint32_t)r->nframes++;
-    r->frames = vgi_array(r->nframes, sizeof *r->frames, e);
-    if (!r->frames) return VG_ENOMEM;
+        if (number[c->source[i]] == UINT32_MAX) number[c->source[i]] = (uint32_t)rider->nframes++;
+    rider->frames = vgi_array(rider->nframes, sizeof *rider->frames, e);
+    if (!rider->frames) return VG_ENOMEM;
     for (size_t f = 0; f < c->source_nf; f++) {
         if (number[f] == UINT32_MAX) continue;
-        frame *x = &r->frames[number[f]];
+        frame *x = &rider->frames[number[f]];
         x->face = (uint32_t)f;
-        rest_frame(r->source, x, r->source_rest);
+        rest_frame(rider->source, x, rider->source_rest);
     }
     return VG_OK;
 }
@@ -305,29 +305,29 @@ typedef struct feet {
 static void find_feet(void *context, size_t block)
 {
     const feet *x = context;
-    vg_rider *r = x->r;
-    for (size_t v = BLOCK * block; v < BLOCK * (block + 1) && v < r->nv; v++) {
-        vgi_hit *hit = &r->foot[v];
+    vg_rider *rider = x->r;
+    for (size_t v = BLOCK * block; v < BLOCK * (block + 1) && v < rider->nv; v++) {
+        vgi_hit *hit = &rider->foot[v];
         if (!vgi_surface_nearest(x->surface, x->points + 3 * v, NULL, 0, INFINITY, hit)) continue;
-        vgi_subtract(x->points + 3 * v, hit->point, r->above + 3 * v);
+        vgi_subtract(x->points + 3 * v, hit->point, rider->above + 3 * v);
     }
 }
 
 /* Find the feet on the source faces in use. */
-static int make_feet(vg_rider *r, const uint32_t *number, const double *points, vg_err *e)
+static int make_feet(vg_rider *rider, const uint32_t *number, const double *points, vg_err *e)
 {
     vgi_surface *surface = NULL;
-    bool *take = vgi_array(r->source->nf, sizeof *take, e);
-    r->foot = vgi_array(r->nv, sizeof *r->foot, e);
-    r->above = vgi_array(3 * r->nv, sizeof *r->above, e);
-    int result = take && r->foot && r->above ? VG_OK : VG_ENOMEM;
-    for (size_t f = 0; result == VG_OK && f < r->source->nf; f++) take[f] = number[f] != UINT32_MAX;
-    if (result == VG_OK) result = vgi_surface_of(&surface, r->source, r->source_rest, take, e);
-    feet x = {r, surface, points};
-    if (result == VG_OK) vgi_parallel(r->threads, (r->nv + BLOCK - 1) / BLOCK, find_feet, &x);
+    bool *take = vgi_array(rider->source->nf, sizeof *take, e);
+    rider->foot = vgi_array(rider->nv, sizeof *rider->foot, e);
+    rider->above = vgi_array(3 * rider->nv, sizeof *rider->above, e);
+    int r = take && rider->foot && rider->above ? VG_OK : VG_ENOMEM;
+    for (size_t f = 0; r == VG_OK && f < rider->source->nf; f++) take[f] = number[f] != UINT32_MAX;
+    if (r == VG_OK) r = vgi_surface_of(&surface, rider->source, rider->source_rest, take, e);
+    feet x = {rider, surface, points};
+    if (r == VG_OK) vgi_parallel(rider->threads, (rider->nv + BLOCK - 1) / BLOCK, find_feet, &x);
     vgi_surface_free(&surface);
     free(take);
-    return result;
+    return r;
 }
 
 /* Per vertex: the vertex whose faces it follows: itself, or the nearest one that has faces. */
@@ -356,31 +356,31 @@ static uint32_t *find_hosts(const vgi_incidence *around, const double *points, s
 
 /* A vertex follows the drivers of its faces in equal shares. A source face that drives several of them is listed for
  * each. */
-static int make_weights(vg_rider *r, const vg_correspondence *c, const vg_mesh *target, const double *points,
+static int make_weights(vg_rider *rider, const vg_correspondence *c, const vg_mesh *target, const double *points,
                         const uint32_t *number, vg_err *e)
 {
     vgi_incidence around = {0};
     uint32_t *host = NULL;
     size_t cap = 0, weight_cap = 0, n = 0;
-    int result = vgi_incidence_make(&around, target, e);
-    r->first = vgi_array(r->nv + 1, sizeof *r->first, e);
-    if (result == VG_OK && (!r->first || !(host = find_hosts(&around, points, r->nv, e)))) result = VG_ENOMEM;
-    for (size_t v = 0; result == VG_OK && v < r->nv; v++) {
+    int r = vgi_incidence_make(&around, target, e);
+    rider->first = vgi_array(rider->nv + 1, sizeof *rider->first, e);
+    if (r == VG_OK && (!rider->first || !(host = find_hosts(&around, points, rider->nv, e)))) r = VG_ENOMEM;
+    for (size_t v = 0; r == VG_OK && v < rider->nv; v++) {
         uint32_t begin = around.first[host[v]], end = around.first[host[v] + 1];
-        for (uint32_t j = begin; j < end && result == VG_OK; j++) {
+        for (uint32_t j = begin; j < end && r == VG_OK; j++) {
             uint32_t f = around.face[j];
             size_t more = c->first[f + 1] - c->first[f];
-            result = vgi_grow(&r->by, &cap, n + more, sizeof *r->by, e);
-            if (result == VG_OK) result = vgi_grow(&r->weight, &weight_cap, n + more, sizeof *r->weight, e);
-            for (uint32_t i = c->first[f]; result == VG_OK && i < c->first[f + 1]; i++, n++)
-                r->by[n] = number[c->source[i]], r->weight[n] = c->weight[i] / (end - begin);
+            r = vgi_grow(&rider->by, &cap, n + more, sizeof *rider->by, e);
+            if (r == VG_OK) r = vgi_grow(&rider->weight, &weight_cap, n + more, sizeof *rider->weight, e);
+            for (uint32_t i = c->first[f]; r == VG_OK && i < c->first[f + 1]; i++, n++)
+                rider->by[n] = number[c->source[i]], rider->weight[n] = c->weight[i] / (end - begin);
         }
-        if (n >= UINT32_MAX) result = vg_fail(e, VG_EINPUT, "there are too many faces to ride on");
-        r->first[v + 1] = (uint32_t)n;
+        if (n >= UINT32_MAX) r = vg_fail(e, VG_EINPUT, "there are too many faces to ride on");
+        rider->first[v + 1] = (uint32_t)n;
     }
     vgi_incidence_clear(&around);
     free(host);
-    return result;
+    return r;
 }
 
 static int check_fit(const vg_correspondence *c, const vg_mesh *source, const vg_mesh *target, vg_err *e)
@@ -400,28 +400,28 @@ int vg_rider_new(vg_rider **out, const vg_mesh *source, const double *source_poi
 {
     *out = NULL;
     if (check_fit(c, source, target, e) < 0) return VG_EINPUT;
-    vg_rider *r = vgi_array(1, sizeof *r, e);
+    vg_rider *rider = vgi_array(1, sizeof *rider, e);
     uint32_t *number = vgi_array_raw(source->nf, sizeof *number, e);
-    int result = r && number ? VG_OK : VG_ENOMEM;
-    if (result == VG_OK) r->source = source, r->source_rest = source_points, r->nv = target->nv, r->threads = threads;
-    if (result == VG_OK) result = make_frames(r, c, number, e);
-    if (result == VG_OK) result = make_weights(r, c, target, target_points, number, e);
-    if (result == VG_OK) result = make_feet(r, number, target_points, e);
+    int r = rider && number ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) rider->source = source, rider->source_rest = source_points, rider->nv = target->nv, rider->threads = threads;
+    if (r == VG_OK) r = make_frames(rider, c, number, e);
+    if (r == VG_OK) r = make_weights(rider, c, target, target_points, number, e);
+    if (r == VG_OK) r = make_feet(rider, number, target_points, e);
     free(number);
-    if (result < 0 && r) vg_rider_free(&r);
-    *out = r;
-    return result;
+    if (r < 0 && rider) vg_rider_free(&rider);
+    *out = rider;
+    return r;
 }
 
-void vg_rider_free(vg_rider **r)
+void vg_rider_free(vg_rider **rider)
 {
-    if (!*r) return;
-    free((*r)->frames);
-    free((*r)->first);
-    free((*r)->by);
-    free((*r)->weight);
-    free((*r)->foot);
-    free((*r)->above);
-    free(*r);
-    *r = NULL;
+    if (!*rider) return;
+    free((*rider)->frames);
+    free((*rider)->first);
+    free((*rider)->by);
+    free((*rider)->weight);
+    free((*rider)->foot);
+    free((*rider)->above);
+    free(*rider);
+    *rider = NULL;
 }

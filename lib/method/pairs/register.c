@@ -110,30 +110,30 @@ static int robust_similarity(struct similarity *s, const double *from, const dou
 
 /* ---- ties ---- */
 
-static void add_marker_ties(struct registration *r)
+static void add_marker_ties(struct registration *g)
 {
-    const vg_markers *m = r->in->markers;
+    const vg_markers *m = g->in->markers;
     for (size_t i = 0; m && i < m->n; i++) {
-        vgi_tie *t = &r->tie[r->nties++];
+        vgi_tie *t = &g->tie[g->nties++];
         *t = (vgi_tie){{m->at[i].source, m->at[i].source, m->at[i].source}, {1, 0, 0}, {0}, 1};
-        memcpy(t->point, r->target + 3 * (size_t)m->at[i].target, sizeof t->point);
+        memcpy(t->point, g->target + 3 * (size_t)m->at[i].target, sizeof t->point);
     }
-    r->nmarkers = r->nties;
+    g->nmarkers = g->nties;
 }
 
-static void add_seed_ties(struct registration *r)
+static void add_seed_ties(struct registration *g)
 {
-    const vg_register_input *in = r->in;
+    const vg_register_input *in = g->in;
     for (size_t i = 0; i < in->nseeds; i++) {
         const vg_seed *s = &in->seeds[i];
-        vgi_tie *t = &r->tie[r->nties++];
+        vgi_tie *t = &g->tie[g->nties++];
         *t = (vgi_tie){{s->vertex, s->vertex, s->vertex}, {1, 0, 0}, {0}, 1};
         if (in->seeds_of_source) {
-            for (int a = 0; a < 3; a++) vgi_add_scaled(t->point, s->weight[a], r->target + 3 * (size_t)s->on[a]);
+            for (int a = 0; a < 3; a++) vgi_add_scaled(t->point, s->weight[a], g->target + 3 * (size_t)s->on[a]);
         } else {
             memcpy(t->vertex, s->on, sizeof t->vertex);
             memcpy(t->share, s->weight, sizeof t->share);
-            memcpy(t->point, r->target + 3 * (size_t)s->vertex, sizeof t->point);
+            memcpy(t->point, g->target + 3 * (size_t)s->vertex, sizeof t->point);
         }
     }
 }
@@ -182,10 +182,10 @@ static bool lift(const vg_mesh *m, uint32_t face, const double *uv, const double
     return true;
 }
 
-static void find_texture_ties(struct registration *r, const vgi_surface *texture, const double *uv, bool *done)
+static void find_texture_ties(struct registration *g, const vgi_surface *texture, const double *uv, bool *done)
 {
-    const vg_mesh *m = r->in->source;
-    const vg_attributes *a = r->in->source_uv;
+    const vg_mesh *m = g->in->source;
+    const vg_attributes *a = g->in->source_uv;
     for (size_t c = 0; c < vg_mesh_corners(m); c++) {
         uint32_t v = m->vert[c], t = a->corner_tex[c];
         if (done[v] || t == UINT32_MAX) continue;
@@ -194,38 +194,38 @@ static void find_texture_ties(struct registration *r, const vgi_surface *texture
         vgi_hit hit;
         done[v] = true;
         if (!vgi_surface_nearest(texture, at, NULL, 0, 1e-3 * 1e-3, &hit)) continue;
-        if (!lift(r->in->target, hit.face, uv, r->target, at, point)) continue;
-        vgi_tie *tie = &r->tie[r->nties++];
+        if (!lift(g->in->target, hit.face, uv, g->target, at, point)) continue;
+        vgi_tie *tie = &g->tie[g->nties++];
         *tie = (vgi_tie){{v, v, v}, {1, 0, 0}, {point[0], point[1], point[2]}, 1};
-        r->out->uv_pairs++;
+        g->out->uv_pairs++;
     }
 }
 
-static int add_texture_ties(struct registration *r, vg_err *e)
+static int add_texture_ties(struct registration *g, vg_err *e)
 {
-    if (!r->in->source_uv) return VG_OK;
+    if (!g->in->source_uv) return VG_OK;
     vg_mesh flat = {0};
     double *uv = NULL;
     vgi_surface *texture = NULL;
-    bool *done = vgi_array(r->in->source->nv, sizeof *done, e);
-    int code = done ? texture_surface(&texture, &flat, &uv, r->in->target, r->in->target_uv, e) : VG_ENOMEM;
-    if (code == VG_OK) find_texture_ties(r, texture, uv, done);
+    bool *done = vgi_array(g->in->source->nv, sizeof *done, e);
+    int r = done ? texture_surface(&texture, &flat, &uv, g->in->target, g->in->target_uv, e) : VG_ENOMEM;
+    if (r == VG_OK) find_texture_ties(g, texture, uv, done);
     vgi_surface_free(&texture);
     vg_mesh_clear(&flat);
     free(uv);
     free(done);
-    return code;
+    return r;
 }
 
-static int make_ties(struct registration *r, vg_err *e)
+static int make_ties(struct registration *g, vg_err *e)
 {
     size_t most =
-        (r->in->markers ? r->in->markers->n : 0) + r->in->nseeds + (r->in->source_uv ? r->in->source->nv : 0);
-    r->tie = vgi_array(most, sizeof *r->tie, e);
-    if (!r->tie) return VG_ENOMEM;
-    add_marker_ties(r);
-    add_seed_ties(r);
-    return add_texture_ties(r, e);
+        (g->in->markers ? g->in->markers->n : 0) + g->in->nseeds + (g->in->source_uv ? g->in->source->nv : 0);
+    g->tie = vgi_array(most, sizeof *g->tie, e);
+    if (!g->tie) return VG_ENOMEM;
+    add_marker_ties(g);
+    add_seed_ties(g);
+    return add_texture_ties(g, e);
 }
 
 static void tied_point(const vgi_tie *t, const double *x, double p[3])
@@ -262,20 +262,20 @@ static void neighbour_residuals(const double *from, const double *way, const boo
 }
 
 /* Remove the worst pair first, because it raises the residuals of its neighbours; then repeat. */
-static int judge_markers(struct registration *r, vg_err *e)
+static int judge_markers(struct registration *g, vg_err *e)
 {
-    size_t n = r->nmarkers;
-    vg_register_result *out = r->out;
+    size_t n = g->nmarkers;
+    vg_register_result *out = g->out;
     out->residual = vgi_array(n, sizeof *out->residual, e);
     out->left_out = vgi_array(n, sizeof *out->left_out, e);
     double *from = vgi_array(n, 3 * sizeof *from, e), *way = vgi_array(n, 3 * sizeof *way, e),
            *room = vgi_array(n, sizeof *room, e);
-    int code = out->residual && out->left_out && from && way && room ? VG_OK : VG_ENOMEM;
-    for (size_t i = 0; i < n && code == VG_OK; i++) {
-        memcpy(from + 3 * i, r->rest + 3 * (size_t)r->tie[i].vertex[0], 3 * sizeof *from);
-        vgi_subtract(r->tie[i].point, from + 3 * i, way + 3 * i);
+    int r = out->residual && out->left_out && from && way && room ? VG_OK : VG_ENOMEM;
+    for (size_t i = 0; i < n && r == VG_OK; i++) {
+        memcpy(from + 3 * i, g->rest + 3 * (size_t)g->tie[i].vertex[0], 3 * sizeof *from);
+        vgi_subtract(g->tie[i].point, from + 3 * i, way + 3 * i);
     }
-    for (size_t left = 0; code == VG_OK && n > 0 && left <= n / 4; left++) {
+    for (size_t left = 0; r == VG_OK && n > 0 && left <= n / 4; left++) {
         neighbour_residuals(from, way, out->left_out, n, out->residual);
         out->typical_residual = vgi_median(memcpy(room, out->residual, n * sizeof *room), n);
         size_t worst = n;
@@ -284,144 +284,144 @@ static int judge_markers(struct registration *r, vg_err *e)
         if (!(out->residual[worst] > WRONG_FAR && out->residual[worst] > WRONG_TIMES * out->typical_residual)) break;
         out->left_out[worst] = true;
     }
-    for (size_t i = 0; i < n && code == VG_OK && !r->in->keep_all; i++)
-        if (out->left_out[i]) r->tie[i].weight = 0;
+    for (size_t i = 0; i < n && r == VG_OK && !g->in->keep_all; i++)
+        if (out->left_out[i]) g->tie[i].weight = 0;
     free(from);
     free(way);
     free(room);
-    return code;
+    return r;
 }
 
 /* ---- the steps in order ---- */
 
-static void to_units(const struct registration *r, const double *from, size_t n, double *to)
+static void to_units(const struct registration *g, const double *from, size_t n, double *to)
 {
     for (size_t i = 0; i < n; i++) {
-        vgi_subtract(from + 3 * i, r->centre, to + 3 * i);
-        vgi_divide(to + 3 * i, r->unit);
+        vgi_subtract(from + 3 * i, g->centre, to + 3 * i);
+        vgi_divide(to + 3 * i, g->unit);
     }
 }
 
-static int normalise(struct registration *r, vg_err *e)
+static int normalise(struct registration *g, vg_err *e)
 {
-    const vg_register_input *in = r->in;
+    const vg_register_input *in = g->in;
     size_t ns = in->source->nv, nt = in->target->nv;
-    r->source = vgi_array_raw(ns, 3 * sizeof *r->source, e);
-    r->target = vgi_array_raw(nt, 3 * sizeof *r->target, e);
-    r->rest = vgi_array_raw(ns, 3 * sizeof *r->rest, e);
-    r->x = vgi_array_raw(ns, 3 * sizeof *r->x, e);
-    if (!r->source || !r->target || !r->rest || !r->x) return VG_ENOMEM;
-    r->unit = vg_diagonal(in->target_points, nt);
-    if (!(r->unit > 0) || !(vg_diagonal(in->source_points, ns) > 0))
+    g->source = vgi_array_raw(ns, 3 * sizeof *g->source, e);
+    g->target = vgi_array_raw(nt, 3 * sizeof *g->target, e);
+    g->rest = vgi_array_raw(ns, 3 * sizeof *g->rest, e);
+    g->x = vgi_array_raw(ns, 3 * sizeof *g->x, e);
+    if (!g->source || !g->target || !g->rest || !g->x) return VG_ENOMEM;
+    g->unit = vg_diagonal(in->target_points, nt);
+    if (!(g->unit > 0) || !(vg_diagonal(in->source_points, ns) > 0))
         return vg_fail(e, VG_EINPUT, "a mesh without extent cannot be registered");
-    vg_centroid(in->target_points, nt, r->centre);
-    to_units(r, in->target_points, nt, r->target);
-    to_units(r, in->source_points, ns, r->source);
+    vg_centroid(in->target_points, nt, g->centre);
+    to_units(g, in->target_points, nt, g->target);
+    to_units(g, in->source_points, ns, g->source);
     return VG_OK;
 }
 
-static int align(struct registration *r, vg_err *e)
+static int align(struct registration *g, vg_err *e)
 {
-    r->s = (struct similarity){1, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
-    int code = VG_OK;
-    if (!r->in->aligned) {
-        double *from = vgi_array(r->nties, 3 * sizeof *from, e), *to = vgi_array(r->nties, 3 * sizeof *to, e);
-        code = from && to ? VG_OK : VG_ENOMEM;
-        for (size_t i = 0; i < r->nties && code == VG_OK; i++) {
-            tied_point(&r->tie[i], r->source, from + 3 * i);
-            memcpy(to + 3 * i, r->tie[i].point, 3 * sizeof *to);
+    g->s = (struct similarity){1, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
+    int r = VG_OK;
+    if (!g->in->aligned) {
+        double *from = vgi_array(g->nties, 3 * sizeof *from, e), *to = vgi_array(g->nties, 3 * sizeof *to, e);
+        r = from && to ? VG_OK : VG_ENOMEM;
+        for (size_t i = 0; i < g->nties && r == VG_OK; i++) {
+            tied_point(&g->tie[i], g->source, from + 3 * i);
+            memcpy(to + 3 * i, g->tie[i].point, 3 * sizeof *to);
         }
-        if (code == VG_OK && (r->nties < 3 || !spread_out(from, r->nties) || !spread_out(to, r->nties)))
-            code = vg_fail(e, VG_EINPUT,
+        if (r == VG_OK && (g->nties < 3 || !spread_out(from, g->nties) || !spread_out(to, g->nties)))
+            r = vg_fail(e, VG_EINPUT,
                          "%zu pairs do not say how the meshes lie: give at least three that are not in line",
-                         r->nties);
-        if (code == VG_OK) code = robust_similarity(&r->s, from, to, r->nties, e);
+                         g->nties);
+        if (r == VG_OK) r = robust_similarity(&g->s, from, to, g->nties, e);
         free(from);
         free(to);
     }
-    for (size_t v = 0; v < r->in->source->nv && code == VG_OK; v++)
-        apply_similarity(&r->s, r->source + 3 * v, r->rest + 3 * v);
-    return code;
+    for (size_t v = 0; v < g->in->source->nv && r == VG_OK; v++)
+        apply_similarity(&g->s, g->source + 3 * v, g->rest + 3 * v);
+    return r;
 }
 
 /* Decide whether the two meshes have opposite face orientation: at the ties, or over all faces if there are none. */
-static void find_sides(struct registration *r)
+static void find_sides(struct registration *g)
 {
     double votes = 0;
-    const double *n = vgi_surface_normals(r->source_surface), *c = vgi_surface_centroids(r->source_surface);
-    const vg_mesh *m = r->in->source;
+    const double *n = vgi_surface_normals(g->source_surface), *c = vgi_surface_centroids(g->source_surface);
+    const vg_mesh *m = g->in->source;
     /* if memory is short, all faces vote: the result is the same but slower */
-    bool *tied = r->nties ? calloc(m->nv + 1, sizeof *tied) : NULL;
-    for (size_t i = 0; i < r->nties && tied; i++) tied[r->tie[i].vertex[0]] = r->tie[i].weight > 0;
+    bool *tied = g->nties ? calloc(m->nv + 1, sizeof *tied) : NULL;
+    for (size_t i = 0; i < g->nties && tied; i++) tied[g->tie[i].vertex[0]] = g->tie[i].weight > 0;
     for (size_t f = 0; f < m->nf; f++) {
         bool asked = !tied;
         for (uint32_t k = m->start[f]; k < m->start[f + 1] && !asked; k++) asked = tied[m->vert[k]];
         vgi_hit hit;
-        if (!asked || !vgi_surface_nearest(r->target_surface, c + 3 * f, NULL, 0, INFINITY, &hit)) continue;
-        const double *o = vgi_surface_normals(r->target_surface) + 3 * (size_t)hit.face;
+        if (!asked || !vgi_surface_nearest(g->target_surface, c + 3 * f, NULL, 0, INFINITY, &hit)) continue;
+        const double *o = vgi_surface_normals(g->target_surface) + 3 * (size_t)hit.face;
         votes += n[3 * f] * o[0] + n[3 * f + 1] * o[1] + n[3 * f + 2] * o[2];
     }
-    r->flipped = votes < 0;
+    g->flipped = votes < 0;
     free(tied);
 }
 
-static int bend(struct registration *r, void (*step)(void *, const vg_register_step *), void *context, vg_err *e)
+static int bend(struct registration *g, void (*step)(void *, const vg_register_step *), void *context, vg_err *e)
 {
-    const vgi_fitting f = {.source = r->in->source,
-                           .rest = r->rest,
-                           .source_surface = r->source_surface,
-                           .target_mesh = r->in->target,
-                           .target_points = r->target,
-                           .target = r->target_surface,
-                           .flipped = r->flipped,
-                           .take = r->take,
-                           .take_vertex = r->take_vertex,
-                           .links = r->links,
-                           .nlinks = r->nlinks,
-                           .tie = r->tie,
-                           .nties = r->nties,
-                           .threads = r->in->threads,
+    const vgi_fitting f = {.source = g->in->source,
+                           .rest = g->rest,
+                           .source_surface = g->source_surface,
+                           .target_mesh = g->in->target,
+                           .target_points = g->target,
+                           .target = g->target_surface,
+                           .flipped = g->flipped,
+                           .take = g->take,
+                           .take_vertex = g->take_vertex,
+                           .links = g->links,
+                           .nlinks = g->nlinks,
+                           .tie = g->tie,
+                           .nties = g->nties,
+                           .threads = g->in->threads,
                            .step = step,
                            .context = context};
-    return vgi_fit(&f, r->x, e);
+    return vgi_fit(&f, g->x, e);
 }
 
 /* ---- which components take part ---- */
 
-static void spread_choice(struct registration *r)
+static void spread_choice(struct registration *g)
 {
-    const vg_mesh *m = r->in->source;
-    vgi_take_faces(m, r->component, r->out->taken, r->take);
+    const vg_mesh *m = g->in->source;
+    vgi_take_faces(m, g->component, g->out->taken, g->take);
     for (size_t v = 0; v < m->nv; v++) /* isolated vertices belong to no component */
-        r->take_vertex[v] = r->component[v] < r->out->components && r->out->taken[r->component[v]];
+        g->take_vertex[v] = g->component[v] < g->out->components && g->out->taken[g->component[v]];
 }
 
 /* Start with the components that the caller names, or those with ties; with all if there are none. */
-static int begin_components(struct registration *r, vg_err *e)
+static int begin_components(struct registration *g, vg_err *e)
 {
-    const vg_mesh *m = r->in->source;
-    vg_register_result *out = r->out;
-    r->component = vgi_array(m->nv, sizeof *r->component, e);
-    r->take = vgi_array(m->nf, sizeof *r->take, e);
-    r->take_vertex = vgi_array(m->nv, sizeof *r->take_vertex, e);
-    int code = r->component && r->take && r->take_vertex ? VG_OK : VG_ENOMEM;
-    if (code == VG_OK) code = vg_mesh_components(m, r->component, &out->components, e);
-    if (code == VG_OK && !(out->taken = vgi_array(out->components, sizeof *out->taken, e))) code = VG_ENOMEM;
-    if (code < 0) return code;
+    const vg_mesh *m = g->in->source;
+    vg_register_result *out = g->out;
+    g->component = vgi_array(m->nv, sizeof *g->component, e);
+    g->take = vgi_array(m->nf, sizeof *g->take, e);
+    g->take_vertex = vgi_array(m->nv, sizeof *g->take_vertex, e);
+    int r = g->component && g->take && g->take_vertex ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK) r = vg_mesh_components(m, g->component, &out->components, e);
+    if (r == VG_OK && !(out->taken = vgi_array(out->components, sizeof *out->taken, e))) r = VG_ENOMEM;
+    if (r < 0) return r;
     bool any = false;
-    for (size_t i = 0; i < r->in->ncomponents; i++) {
-        if (r->in->components[i] >= out->components)
+    for (size_t i = 0; i < g->in->ncomponents; i++) {
+        if (g->in->components[i] >= out->components)
             return vg_fail(e, VG_EINPUT, "the source has no component %u: it has %zu, counted from 0",
-                           r->in->components[i], out->components);
-        any = out->taken[r->in->components[i]] = true;
+                           g->in->components[i], out->components);
+        any = out->taken[g->in->components[i]] = true;
     }
-    for (size_t i = 0; i < r->nties && !r->in->ncomponents && !r->in->all_components; i++)
+    for (size_t i = 0; i < g->nties && !g->in->ncomponents && !g->in->all_components; i++)
         for (int a = 0; a < 3; a++)
-            if (r->tie[i].weight > 0 && r->tie[i].share[a] > 0 &&
-                r->component[r->tie[i].vertex[a]] < out->components)
-                any = out->taken[r->component[r->tie[i].vertex[a]]] = true;
+            if (g->tie[i].weight > 0 && g->tie[i].share[a] > 0 &&
+                g->component[g->tie[i].vertex[a]] < out->components)
+                any = out->taken[g->component[g->tie[i].vertex[a]]] = true;
     for (size_t k = 0; k < out->components && !any; k++) out->taken[k] = true;
-    spread_choice(r);
+    spread_choice(g);
     return VG_OK;
 }
 
@@ -433,74 +433,74 @@ static size_t count_taken(const vg_register_result *out)
 }
 
 /* Fit the components that take part; if other components explain part of the target, fit again with them. */
-static int bend_components(struct registration *r, void (*step)(void *, const vg_register_step *), void *context,
+static int bend_components(struct registration *g, void (*step)(void *, const vg_register_step *), void *context,
                            vg_err *e)
 {
-    int code = bend(r, step, context, e);
-    size_t before = count_taken(r->out);
-    if (code < 0 || before == r->out->components || r->in->ncomponents) return code;
-    const vgi_component_choice c = {.source = r->in->source, .target = r->in->target, .points = r->x,
-                                    .rest = r->rest,
-                                    .target_surface = r->target_surface, .label = r->component,
-                                    .n = r->out->components, .flipped = r->flipped, .threads = r->in->threads};
-    code = vgi_choose_components(&c, r->out->taken, e);
-    if (code < 0 || count_taken(r->out) == before) return code;
-    spread_choice(r);
-    return bend(r, step, context, e);
+    int r = bend(g, step, context, e);
+    size_t before = count_taken(g->out);
+    if (r < 0 || before == g->out->components || g->in->ncomponents) return r;
+    const vgi_component_choice c = {.source = g->in->source, .target = g->in->target, .points = g->x,
+                                    .rest = g->rest,
+                                    .target_surface = g->target_surface, .label = g->component,
+                                    .n = g->out->components, .flipped = g->flipped, .threads = g->in->threads};
+    r = vgi_choose_components(&c, g->out->taken, e);
+    if (r < 0 || count_taken(g->out) == before) return r;
+    spread_choice(g);
+    return bend(g, step, context, e);
 }
 
-static int pair_faces(struct registration *r, vg_err *e)
+static int pair_faces(struct registration *g, vg_err *e)
 {
-    const vgi_pairing p = {.source = r->in->source, .target = r->in->target, .source_surface = r->fitted_surface,
-                           .target_surface = r->target_surface, .take = r->take, .flipped = r->flipped,
-                           .threads = r->in->threads};
-    return vgi_pair(&p, &r->out->pairs, e);
+    const vgi_pairing p = {.source = g->in->source, .target = g->in->target, .source_surface = g->fitted_surface,
+                           .target_surface = g->target_surface, .take = g->take, .flipped = g->flipped,
+                           .threads = g->in->threads};
+    return vgi_pair(&p, &g->out->pairs, e);
 }
 
 /* Convert back to the target's units: x -> S((x - c) / D) D + c. */
-static int hand_over(struct registration *r, vg_err *e)
+static int hand_over(struct registration *g, vg_err *e)
 {
-    vg_register_result *out = r->out;
-    size_t n = r->in->source->nv;
+    vg_register_result *out = g->out;
+    size_t n = g->in->source->nv;
     out->fitted = vgi_array_raw(n, 3 * sizeof *out->fitted, e);
     if (!out->fitted) return VG_ENOMEM;
     for (size_t i = 0; i < n; i++)
-        vgi_scaled(r->unit, r->x + 3 * i, out->fitted + 3 * i), vgi_add(out->fitted + 3 * i, r->centre);
-    for (size_t f = 0; f < out->pairs.target_nf; f++) out->pairs.distance[f] *= r->unit;
-    out->flipped = r->flipped;
-    out->scale = r->s.scale;
-    memcpy(out->rotation, r->s.rotation, sizeof out->rotation);
+        vgi_scaled(g->unit, g->x + 3 * i, out->fitted + 3 * i), vgi_add(out->fitted + 3 * i, g->centre);
+    for (size_t f = 0; f < out->pairs.target_nf; f++) out->pairs.distance[f] *= g->unit;
+    out->flipped = g->flipped;
+    out->scale = g->s.scale;
+    memcpy(out->rotation, g->s.rotation, sizeof out->rotation);
     double turned[3];
-    vgi_multiply_vector(r->s.rotation, r->centre, turned);
-    vgi_scaled(r->unit, r->s.shift, out->shift);
-    vgi_add_scaled(out->shift, -r->s.scale, turned), vgi_add(out->shift, r->centre);
+    vgi_multiply_vector(g->s.rotation, g->centre, turned);
+    vgi_scaled(g->unit, g->s.shift, out->shift);
+    vgi_add_scaled(out->shift, -g->s.scale, turned), vgi_add(out->shift, g->centre);
     return VG_OK;
 }
 
-static void clear(struct registration *r)
+static void clear(struct registration *g)
 {
-    free(r->source);
-    free(r->target);
-    free(r->rest);
-    free(r->tie);
-    free(r->links);
-    free(r->component);
-    free(r->take);
-    free(r->take_vertex);
-    free(r->x);
-    vgi_surface_free(&r->source_surface);
-    vgi_surface_free(&r->target_surface);
-    vgi_surface_free(&r->fitted_surface);
+    free(g->source);
+    free(g->target);
+    free(g->rest);
+    free(g->tie);
+    free(g->links);
+    free(g->component);
+    free(g->take);
+    free(g->take_vertex);
+    free(g->x);
+    vgi_surface_free(&g->source_surface);
+    vgi_surface_free(&g->target_surface);
+    vgi_surface_free(&g->fitted_surface);
 }
 
-void vg_register_result_clear(vg_register_result *r)
+void vg_register_result_clear(vg_register_result *g)
 {
-    vg_correspondence_clear(&r->pairs);
-    free(r->fitted);
-    free(r->residual);
-    free(r->left_out);
-    free(r->taken);
-    *r = (vg_register_result){0};
+    vg_correspondence_clear(&g->pairs);
+    free(g->fitted);
+    free(g->residual);
+    free(g->left_out);
+    free(g->taken);
+    *g = (vg_register_result){0};
 }
 
 static int check_input(const vg_register_input *in, vg_err *e)
@@ -533,23 +533,23 @@ static int check_input(const vg_register_input *in, vg_err *e)
 int vg_register(vg_register_result *out, const vg_register_input *in,
                 void (*step)(void *context, const vg_register_step *step), void *context, vg_err *e)
 {
-    struct registration r = {.in = in, .out = out};
+    struct registration g = {.in = in, .out = out};
     *out = (vg_register_result){0};
-    int code = check_input(in, e);
-    if (code == VG_OK) code = normalise(&r, e);
-    if (code == VG_OK) code = make_ties(&r, e);
-    if (code == VG_OK) code = align(&r, e);
-    if (code == VG_OK) code = judge_markers(&r, e);
-    if (code == VG_OK) code = vg_link_components(in->source, r.rest, &r.links, &r.nlinks, e);
-    if (code == VG_OK) code = vgi_surface_new(&r.target_surface, in->target, r.target, e);
-    if (code == VG_OK) code = vgi_surface_new(&r.source_surface, in->source, r.rest, e);
-    if (code == VG_OK) find_sides(&r);
-    if (code == VG_OK) code = begin_components(&r, e);
-    if (code == VG_OK) code = bend_components(&r, step, context, e);
-    if (code == VG_OK) code = vgi_surface_of(&r.fitted_surface, in->source, r.x, r.take, e);
-    if (code == VG_OK) code = pair_faces(&r, e);
-    if (code == VG_OK) code = hand_over(&r, e);
-    clear(&r);
-    if (code < 0) vg_register_result_clear(out);
-    return code;
+    int r = check_input(in, e);
+    if (r == VG_OK) r = normalise(&g, e);
+    if (r == VG_OK) r = make_ties(&g, e);
+    if (r == VG_OK) r = align(&g, e);
+    if (r == VG_OK) r = judge_markers(&g, e);
+    if (r == VG_OK) r = vg_link_components(in->source, g.rest, &g.links, &g.nlinks, e);
+    if (r == VG_OK) r = vgi_surface_new(&g.target_surface, in->target, g.target, e);
+    if (r == VG_OK) r = vgi_surface_new(&g.source_surface, in->source, g.rest, e);
+    if (r == VG_OK) find_sides(&g);
+    if (r == VG_OK) r = begin_components(&g, e);
+    if (r == VG_OK) r = bend_components(&g, step, context, e);
+    if (r == VG_OK) r = vgi_surface_of(&g.fitted_surface, in->source, g.x, g.take, e);
+    if (r == VG_OK) r = pair_faces(&g, e);
+    if (r == VG_OK) r = hand_over(&g, e);
+    clear(&g);
+    if (r < 0) vg_register_result_clear(out);
+    return r;
 }

@@ -8,20 +8,20 @@
 enum { HUB = 100 }; /* number of neighbours */
 
 /* Springs between all corners of a small face; in a large one along edges, to the second neighbours, and across. */
-static int add_face(vgi_edges *l, const uint32_t *vert, size_t r, vg_err *e)
+static int add_face(vgi_edges *l, const uint32_t *vert, size_t size, vg_err *e)
 {
-    int code = VG_OK;
-    if (r <= VGI_SMALL_FACE) {
-        for (size_t i = 1; i < r && code == VG_OK; i++)
-            for (size_t j = 0; j < i && code == VG_OK; j++) code = vgi_edges_add(l, vert[i], vert[j], 1.0 / (double)r, 0, e);
-        return code;
+    int r = VG_OK;
+    if (size <= VGI_SMALL_FACE) {
+        for (size_t i = 1; i < size && r == VG_OK; i++)
+            for (size_t j = 0; j < i && r == VG_OK; j++) r = vgi_edges_add(l, vert[i], vert[j], 1.0 / (double)size, 0, e);
+        return r;
     }
-    for (size_t i = 0; i < r && code == VG_OK; i++) {
-        code = vgi_edges_add(l, vert[i], vert[(i + 1) % r], 0.25, 0, e);
-        if (code == VG_OK) code = vgi_edges_add(l, vert[i], vert[(i + 2) % r], 0.125, 0, e);
-        if (code == VG_OK && i < r / 2) code = vgi_edges_add(l, vert[i], vert[i + r / 2], 0.125, 0, e);
+    for (size_t i = 0; i < size && r == VG_OK; i++) {
+        r = vgi_edges_add(l, vert[i], vert[(i + 1) % size], 0.25, 0, e);
+        if (r == VG_OK) r = vgi_edges_add(l, vert[i], vert[(i + 2) % size], 0.125, 0, e);
+        if (r == VG_OK && i < size / 2) r = vgi_edges_add(l, vert[i], vert[i + size / 2], 0.125, 0, e);
     }
-    return code;
+    return r;
 }
 
 static int gather_springs(vgi_edges *l, const vgi_fitting *in, vg_err *e)

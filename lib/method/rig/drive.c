@@ -71,20 +71,20 @@ static int pair_joints(vg_driver *d, const uint32_t *partner, vg_err *e)
                    s->joints[d->r->bone[0]].name);
 }
 
-int vg_driver_new(vg_driver **out, const vg_rig *r, const vg_skeleton *by, const vg_driver_options *o, vg_err *e)
+int vg_driver_new(vg_driver **out, const vg_rig *g, const vg_skeleton *by, const vg_driver_options *o, vg_err *e)
 {
-    size_t n = r->skeleton.njoints;
+    size_t n = g->skeleton.njoints;
     vg_driver *d = *out = vgi_array(1, sizeof *d, e);
     if (!d) return VG_ENOMEM;
-    d->r = r, d->by = by;
+    d->r = g, d->by = by;
     d->from = vgi_array(n, sizeof *d->from, e), d->before = vgi_array(4 * n, sizeof *d->before, e);
     d->carried = vgi_array(n, sizeof *d->carried, e), d->degrees = vgi_array(n, sizeof *d->degrees, e);
     d->positions = vgi_array(3 * n, sizeof *d->positions, e), d->turns = vgi_array(4 * n, sizeof *d->turns, e);
     bool all = d->from && d->before && d->carried && d->degrees && d->positions && d->turns;
-    int code = all ? pair_joints(d, o->partner, e) : VG_ENOMEM;
-    if (code == VG_OK) code = compare_rests(d, o, e);
-    if (code < 0) vg_driver_free(out);
-    return code;
+    int r = all ? pair_joints(d, o->partner, e) : VG_ENOMEM;
+    if (r == VG_OK) r = compare_rests(d, o, e);
+    if (r < 0) vg_driver_free(out);
+    return r;
 }
 
 void vg_driver_free(vg_driver **out)

@@ -43,44 +43,44 @@ typedef struct feet {
     double *lower; /* per pose: how far the body is lowered */
 } feet;
 
-static size_t bone_of(const vg_rig *r, uint32_t joint)
+static size_t bone_of(const vg_rig *g, uint32_t joint)
 {
     size_t b = 0;
-    while (b < r->nbones && r->bone[b] != joint) b++;
+    while (b < g->nbones && g->bone[b] != joint) b++;
     return b;
 }
 
-static void joint_at(const vg_rig *r, uint32_t joint, const double *transforms, double at[3])
+static void joint_at(const vg_rig *g, uint32_t joint, const double *transforms, double at[3])
 {
-    const double *t = transforms + 7 * bone_of(r, joint);
-    vg_quat_apply(t, r->at + 3 * (size_t)joint, at);
+    const double *t = transforms + 7 * bone_of(g, joint);
+    vg_quat_apply(t, g->at + 3 * (size_t)joint, at);
     vgi_add(at, t + 4);
 }
 
-static void group_bones(const vg_rig *r, leg *l)
+static void group_bones(const vg_rig *g, leg *l)
 {
-    for (size_t b = 0; b < r->nbones; b++)
-        for (uint32_t j = r->bone[b]; j != NONE && !l->group[b]; j = r->skeleton.joints[j].parent)
+    for (size_t b = 0; b < g->nbones; b++)
+        for (uint32_t j = g->bone[b]; j != NONE && !l->group[b]; j = g->skeleton.joints[j].parent)
             l->group[b] = j == l->foot ? FOOT : j == l->shin ? SHIN : j == l->thigh ? THIGH : BODY;
 }
 
-static double rest_distance(const vg_rig *r, uint32_t a, uint32_t b)
+static double rest_distance(const vg_rig *g, uint32_t a, uint32_t b)
 {
     double d[3];
-    vgi_between(r->at, a, b, d);
+    vgi_between(g->at, a, b, d);
     return vgi_length(d);
 }
 
 /* Find the leg of a side. Returns false if the rig has none. */
-static bool find_leg(const vg_rig *r, const vgi_role *roles, int side, leg *l)
+static bool find_leg(const vg_rig *g, const vgi_role *roles, int side, leg *l)
 {
     uint32_t *joint[4] = {&l->thigh, &l->shin, &l->foot, &l->toe};
     for (int i = 0; i < 4; i++) {
-        *joint[i] = vgi_find_role(&r->skeleton, roles, (vgi_part)(VGI_THIGH + i), side);
-        if (*joint[i] != NONE && bone_of(r, *joint[i]) == r->nbones) *joint[i] = NONE;
+        *joint[i] = vgi_find_role(&g->skeleton, roles, (vgi_part)(VGI_THIGH + i), side);
+        if (*joint[i] != NONE && bone_of(g, *joint[i]) == g->nbones) *joint[i] = NONE;
     }
     if (l->thigh == NONE || l->shin == NONE || l->foot == NONE) return false;
-    l->length[0] = rest_distance(r, l->thigh, l->shin), l->length[1] = rest_distance(r, l->shin, l->foot);
+    l->length[0] = rest_distance(g, l->thigh, l->shin), l->length[1] = rest_distance(g, l->shin, l->foot);
     return l->length[0] > 0 && l->length[1] > 0;
 }
 
@@ -316,17 +316,17 @@ static void move_pose(const feet *f, size_t p)
     for (size_t i = 0; i < f->nlegs; i++) bend_leg(f, &f->legs[i], p);
 }
 
-int vg_feet_hold(const vg_rig *r, size_t n, double *const *transforms, vg_err *e)
+int vg_feet_hold(const vg_rig *g, size_t n, double *const *transforms, vg_err *e)
 {
-    feet f = {.r = r, .n = n, .transforms = transforms};
-    int code = prepare(&f, e);
-    for (size_t i = 0; code == VG_OK && i < f.nlegs; i++) {
+    feet f = {.r = g, .n = n, .transforms = transforms};
+    int r = prepare(&f, e);
+    for (size_t i = 0; r == VG_OK && i < f.nlegs; i++) {
         hold_joint(&f, &f.legs[i], f.legs[i].toe);
         hold_joint(&f, &f.legs[i], f.legs[i].foot);
         fill_shifts(&f, &f.legs[i]);
     }
-    if (code == VG_OK) lower_body(&f);
-    for (size_t p = 0; code == VG_OK && p < n; p++) move_pose(&f, p);
+    if (r == VG_OK) lower_body(&f);
+    for (size_t p = 0; r == VG_OK && p < n; p++) move_pose(&f, p);
     for (size_t i = 0; i < 2; i++) {
         free(f.legs[i].group);
         free(f.legs[i].shift);
@@ -336,5 +336,5 @@ int vg_feet_hold(const vg_rig *r, size_t n, double *const *transforms, vg_err *e
     free(f.stands);
     free(f.speed);
     free(f.lower);
-    return code;
+    return r;
 }

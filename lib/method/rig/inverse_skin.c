@@ -156,13 +156,13 @@ static int make_quadratic(vg_inverse_skin *x, vg_err *e)
     return ok ? VG_OK : VG_ENOMEM;
 }
 
-static int make_arrays(vg_inverse_skin *x, const vg_rig *r, vg_err *e)
+static int make_arrays(vg_inverse_skin *x, const vg_rig *g, vg_err *e)
 {
     size_t n = x->n, nv = x->nv;
     x->parent = vgi_array(n, sizeof *x->parent, e);
     x->at = vgi_array(3 * n, sizeof *x->at, e), x->offset = vgi_array(3 * n, sizeof *x->offset, e);
-    x->bone = vgi_copy_array(r->skin_bone, VG_SKIN * nv, sizeof *x->bone, e);
-    x->weight = vgi_copy_array(r->skin_weight, VG_SKIN * nv, sizeof *x->weight, e);
+    x->bone = vgi_copy_array(g->skin_bone, VG_SKIN * nv, sizeof *x->bone, e);
+    x->weight = vgi_copy_array(g->skin_weight, VG_SKIN * nv, sizeof *x->weight, e);
     x->local = vgi_array(VG_SKIN * nv, 3 * sizeof *x->local, e);
     x->g = vgi_array(3 * n, 3 * n * sizeof *x->g, e), x->mean = vgi_array(3 * n, sizeof *x->mean, e);
     x->size = vgi_array(n, sizeof *x->size, e), x->own = vgi_array(4 * n, sizeof *x->own, e);
@@ -174,11 +174,11 @@ static int make_arrays(vg_inverse_skin *x, const vg_rig *r, vg_err *e)
 }
 
 /* The reference pose of the bones, and the vertices relative to them. */
-static void read_rest(vg_inverse_skin *x, const vg_rig *r, const double *reference)
+static void read_rest(vg_inverse_skin *x, const vg_rig *g, const double *reference)
 {
     for (size_t b = 0; b < x->n; b++)
         for (size_t k = 0; k < 3; k++) {
-            x->at[3 * b + k] = r->at[3 * (size_t)r->bone[b] + k];
+            x->at[3 * b + k] = g->at[3 * (size_t)g->bone[b] + k];
             if (b) x->offset[3 * b + k] = x->at[3 * b + k] - x->at[3 * (size_t)x->parent[b] + k];
         }
     for (size_t s = 0; s < VG_SKIN * x->nv; s++) {
@@ -195,21 +195,21 @@ static void read_rest(vg_inverse_skin *x, const vg_rig *r, const double *referen
     }
 }
 
-int vg_inverse_skin_new(vg_inverse_skin **out, const vg_rig *r, size_t nv, const double *reference, int threads, vg_err *e)
+int vg_inverse_skin_new(vg_inverse_skin **out, const vg_rig *g, size_t nv, const double *reference, int threads, vg_err *e)
 {
     *out = NULL;
-    if (!r->nbones || !r->skin_bone) return vg_fail(e, VG_EINPUT, "there is no rig with weights");
+    if (!g->nbones || !g->skin_bone) return vg_fail(e, VG_EINPUT, "there is no rig with weights");
     vg_inverse_skin *x = *out = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
-    x->n = r->nbones, x->nv = nv, x->threads = threads, x->least = 1e-7, x->steps = STEPS;
-    int code = make_arrays(x, r, e);
-    if (code == VG_OK) code = vgi_rig_parents(r, x->parent, e);
-    if (code == VG_OK) {
-        read_rest(x, r, reference);
-        code = make_quadratic(x, e);
+    x->n = g->nbones, x->nv = nv, x->threads = threads, x->least = 1e-7, x->steps = STEPS;
+    int r = make_arrays(x, g, e);
+    if (r == VG_OK) r = vgi_rig_parents(g, x->parent, e);
+    if (r == VG_OK) {
+        read_rest(x, g, reference);
+        r = make_quadratic(x, e);
     }
-    if (code < 0) vg_inverse_skin_free(out);
-    return code;
+    if (r < 0) vg_inverse_skin_free(out);
+    return r;
 }
 
 void vg_inverse_skin_free(vg_inverse_skin **out)
@@ -278,12 +278,12 @@ static void left_for(const vg_inverse_skin *x, const working *w, size_t j, doubl
 }
 
 /* left = B - R G for all bones, with one product. */
-static void find_left(const vg_inverse_skin *x, working *w, const double *r)
+static void find_left(const vg_inverse_skin *x, working *w, const double *g)
 {
     size_t width = 3 * x->n;
     double *rg = w->rows + 3 * width;
     for (size_t j = 0; j < x->n; j++)
-        for (size_t c = 0; c < 3; c++) memcpy(w->rows + c * width + 3 * j, r + 9 * j + 3 * c, 3 * sizeof *r);
+        for (size_t c = 0; c < 3; c++) memcpy(w->rows + c * width + 3 * j, g + 9 * j + 3 * c, 3 * sizeof *g);
     vgi_product_double(3, width, width, w->rows, width, x->g, width, rg, width);
     for (size_t j = 0; j < x->n; j++)
         for (size_t c = 0; c < 3; c++)

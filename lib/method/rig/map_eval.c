@@ -31,14 +31,14 @@ struct vg_player {
 };
 
 /* Tree of bones: the hierarchy of the skeleton. */
-static int plan_bones(vg_player *p, const vg_rig *r, vg_err *e)
+static int plan_bones(vg_player *p, const vg_rig *g, vg_err *e)
 {
-    int code = vgi_rig_parents(r, p->parent, e);
-    for (size_t b = 0; code == VG_OK && b < r->nbones; b++) {
+    int r = vgi_rig_parents(g, p->parent, e);
+    for (size_t b = 0; r == VG_OK && b < g->nbones; b++) {
         p->order[b] = (uint32_t)b;
         if (p->parent[b] == VGI_NO_BONE) p->parent[b] = (uint32_t)b;
     }
-    return code;
+    return r;
 }
 
 /* Tree of patches: breadth first from the largest; patches not reached start a new tree. */

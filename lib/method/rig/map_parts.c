@@ -151,13 +151,13 @@ uint32_t *vgi_graph_patches(const vg_head *h, const vg_patches *patches, const v
     return of_face;
 }
 
-int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *e)
+int vgi_place_by_bones(const vg_rig *rig, const vg_map *m, double *place, vg_err *e)
 {
-    size_t n = r->nbones, width = 3 * n;
+    size_t n = rig->nbones, width = 3 * n;
     uint32_t *parent = vgi_array(n, sizeof *parent, e);
     double *mean = vgi_array(width, sizeof *mean, e);
-    int code = parent && mean ? vgi_rig_parents(r, parent, e) : VG_ENOMEM;
-    for (size_t b = 0; code == VG_OK && b < n; b++) { /* position of the hinge relative to the first one */
+    int r = parent && mean ? vgi_rig_parents(rig, parent, e) : VG_ENOMEM;
+    for (size_t b = 0; r == VG_OK && b < n; b++) { /* position of the hinge relative to the first one */
         double *row = place + b * width;
         if (b) memcpy(row, place + parent[b] * width, width * sizeof *row);
         else memset(row, 0, width * sizeof *row);
@@ -165,23 +165,23 @@ int vgi_place_by_bones(const vg_rig *r, const vg_map *m, double *place, vg_err *
             row[3 * parent[b] + k] += m->centre[3 * b + k] - m->centre[3 * (size_t)parent[b] + k];
         for (size_t i = 0; i < width; i++) mean[i] += m->share[b] * row[i];
     }
-    for (size_t b = 0; code == VG_OK && b < n; b++) {
+    for (size_t b = 0; r == VG_OK && b < n; b++) {
         for (size_t i = 0; i < width; i++) place[b * width + i] -= mean[i];
         vgi_deduct(place + b * width + 3 * b, m->centre + 3 * b);
     }
     free(parent);
     free(mean);
-    return code;
+    return r;
 }
 
 /* ---- collapse ---- */
 
 /* The skin weight of bone p at vertex v. */
-static double skin_share(const vg_rig *r, size_t v, size_t p)
+static double skin_share(const vg_rig *rig, size_t v, size_t p)
 {
     double w = 0;
     for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++)
-        if (r->skin_bone[s] == p) w += r->skin_weight[s];
+        if (rig->skin_bone[s] == p) w += rig->skin_weight[s];
     return w;
 }
 
@@ -206,11 +206,11 @@ static void driven_vectors(const vg_map *m, const vg_graph *g, const uint32_t *o
 
 /* Vectors of the links of a map of bones, between the skinned positions of their ends. at: nv points, or NULL for a
  * unit value of component k. */
-static void link_vectors(const vg_rig *r, const vg_graph *g, size_t p, const double *at, size_t k, double *wanted)
+static void link_vectors(const vg_rig *rig, const vg_graph *g, size_t p, const double *at, size_t k, double *wanted)
 {
     for (size_t f = g->faces.nf - g->nlinks; f < g->faces.nf; f++) {
         const uint32_t *end = g->faces.vert + g->faces.start[f];
-        double w[2] = {0.5 * skin_share(r, end[0], p), 0.5 * skin_share(r, end[1], p)};
+        double w[2] = {0.5 * skin_share(rig, end[0], p), 0.5 * skin_share(rig, end[1], p)};
         for (size_t i = at ? 0 : k; i < (at ? 3 : k + 1); i++) {
             double d = at ? w[0] * at[3 * (size_t)end[0] + i] - w[1] * at[3 * (size_t)end[1] + i] : w[0] - w[1];
             wanted[3 * (size_t)g->faces.start[f] + i] = d, wanted[3 * (size_t)g->faces.start[f] + 3 + i] = -d;
@@ -266,11 +266,11 @@ static void store_column(vg_map *m, const vg_graph *g, size_t column, const doub
 
 void vgi_map_skin_row(vg_map *m, const vgi_map_body *body, size_t v)
 {
-    const vg_rig *r = body->rig;
+    const vg_rig *rig = body->rig;
     double *row = m->weights + v * 4 * m->n;
     memset(row, 0, 4 * m->n * sizeof *row);
     for (size_t s = VG_SKIN * v; s < VG_SKIN * v + VG_SKIN; s++) {
-        double w = r->skin_weight[s], *to = row + 4 * (size_t)r->skin_bone[s];
+        double w = rig->skin_weight[s], *to = row + 4 * (size_t)rig->skin_bone[s];
         vgi_add_scaled(to, w, body->reference + 3 * v);
         to[3] += w;
     }

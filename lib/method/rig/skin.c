@@ -30,11 +30,11 @@ static void clear_bones(bones *b)
     free(b->to);
 }
 
-static int make_bones(bones *b, const vg_rig *r, vg_err *e)
+static int make_bones(bones *b, const vg_rig *g, vg_err *e)
 {
-    size_t joints = r->skeleton.njoints;
+    size_t joints = g->skeleton.njoints;
     uint32_t *mover = vgi_array(joints, sizeof *mover, e);
-    *b = (bones){.r = r};
+    *b = (bones){.r = g};
     b->of = vgi_array(2 * joints, sizeof *b->of, e);
     b->from = vgi_array(2 * joints, 3 * sizeof *b->from, e), b->to = vgi_array(2 * joints, 3 * sizeof *b->to, e);
     if (!mover || !b->of || !b->from || !b->to) {
@@ -42,16 +42,16 @@ static int make_bones(bones *b, const vg_rig *r, vg_err *e)
         clear_bones(b);
         return VG_ENOMEM;
     }
-    vgi_rig_movers(r, mover);
+    vgi_rig_movers(g, mover);
     for (size_t j = 0; j < joints; j++) { /* a segment from the parent, and a point at the joint */
-        uint32_t parent = r->skeleton.joints[j].parent;
+        uint32_t parent = g->skeleton.joints[j].parent;
         for (int own = 0; own < 2; own++) {
             uint32_t from = own ? (uint32_t)j : parent, bone = from == UINT32_MAX ? UINT32_MAX : mover[from];
             if (bone == UINT32_MAX) continue;
             size_t i = b->nsegments++;
             b->of[i] = bone;
-            memcpy(b->from + 3 * i, r->at + 3 * (size_t)from, 3 * sizeof(double));
-            memcpy(b->to + 3 * i, r->at + 3 * j, 3 * sizeof(double));
+            memcpy(b->from + 3 * i, g->at + 3 * (size_t)from, 3 * sizeof(double));
+            memcpy(b->to + 3 * i, g->at + 3 * j, 3 * sizeof(double));
         }
     }
     free(mover);
@@ -77,32 +77,32 @@ static void distances(const bones *b, const double x[3], double *far)
     }
 }
 
-static int make_skin(vg_rig *r, size_t nv, vg_err *e)
+static int make_skin(vg_rig *g, size_t nv, vg_err *e)
 {
-    free(r->skin_bone);
-    free(r->skin_weight);
-    r->skin_bone = vgi_array(nv, VG_SKIN * sizeof *r->skin_bone, e);
-    r->skin_weight = vgi_array(nv, VG_SKIN * sizeof *r->skin_weight, e);
-    return r->skin_bone && r->skin_weight ? VG_OK : VG_ENOMEM;
+    free(g->skin_bone);
+    free(g->skin_weight);
+    g->skin_bone = vgi_array(nv, VG_SKIN * sizeof *g->skin_bone, e);
+    g->skin_weight = vgi_array(nv, VG_SKIN * sizeof *g->skin_weight, e);
+    return g->skin_bone && g->skin_weight ? VG_OK : VG_ENOMEM;
 }
 
-int vgi_skin_near(vg_rig *r, size_t nv, const double *reference, vg_err *e)
+int vgi_skin_near(vg_rig *g, size_t nv, const double *reference, vg_err *e)
 {
     bones b;
-    int code = make_skin(r, nv, e);
-    if (code < 0 || (code = make_bones(&b, r, e)) < 0) return code;
-    double *far = vgi_array(r->nbones, sizeof *far, e);
-    if (!far) code = VG_ENOMEM;
+    int r = make_skin(g, nv, e);
+    if (r < 0 || (r = make_bones(&b, g, e)) < 0) return r;
+    double *far = vgi_array(g->nbones, sizeof *far, e);
+    if (!far) r = VG_ENOMEM;
     for (size_t v = 0; v < nv && far; v++) {
         size_t best = 0;
         distances(&b, reference + 3 * v, far);
-        for (size_t j = 1; j < r->nbones; j++)
+        for (size_t j = 1; j < g->nbones; j++)
             if (far[j] < far[best]) best = j;
-        r->skin_bone[VG_SKIN * v] = (uint32_t)best, r->skin_weight[VG_SKIN * v] = 1;
+        g->skin_bone[VG_SKIN * v] = (uint32_t)best, g->skin_weight[VG_SKIN * v] = 1;
     }
     free(far);
     clear_bones(&b);
-    return code;
+    return r;
 }
 
 /* ---- the quadratic of one vertex ---- */
@@ -266,9 +266,9 @@ static void take_up(quadratic *q, size_t bone)
 /* The bones that fit best alone, then the neighbours in the skeleton of the best two. */
 static void find_candidates(const skinning *x, const double *alone, quadratic *q)
 {
-    const vg_rig *r = x->r;
+    const vg_rig *g = x->r;
     q->n = 0;
-    for (size_t j = 0; j < r->nbones; j++) { /* the best so far, in order; among equal ones the first found comes
+    for (size_t j = 0; j < g->nbones; j++) { /* the best so far, in order; among equal ones the first found comes
                                                 first */
         size_t i = q->n;
         if (i == BEST && !(alone[j] < alone[q->bone[i - 1]])) continue;
@@ -278,10 +278,10 @@ static void find_candidates(const skinning *x, const double *alone, quadratic *q
         q->bone[i] = (uint32_t)j;
     }
     for (size_t i = 0; i < 2 && i < q->n; i++) {
-        uint32_t parent = r->skeleton.joints[r->bone[q->bone[i]]].parent;
+        uint32_t parent = g->skeleton.joints[g->bone[q->bone[i]]].parent;
         if (parent != UINT32_MAX && x->mover[parent] != UINT32_MAX) take_up(q, x->mover[parent]);
-        for (size_t j = 0; j < r->nbones; j++)
-            if (r->skeleton.joints[r->bone[j]].parent == r->bone[q->bone[i]]) take_up(q, j);
+        for (size_t j = 0; j < g->nbones; j++)
+            if (g->skeleton.joints[g->bone[j]].parent == g->bone[q->bone[i]]) take_up(q, j);
     }
 }
 
@@ -334,28 +334,28 @@ static void skin_chunk(void *context, size_t task)
     for (size_t v = first; v < last; v++) skin_vertex(x, v, far, far + x->s->n);
 }
 
-int vgi_skin_fit(vg_rig *r, const vgi_rig_sums *s, const double *reference, int threads, double *miss, vg_err *e)
+int vgi_skin_fit(vg_rig *g, const vgi_rig_sums *s, const double *reference, int threads, double *miss, vg_err *e)
 {
     bones b;
-    int code = make_skin(r, s->nv, e);
-    if (code < 0 || (code = make_bones(&b, r, e)) < 0) return code;
-    skinning x = {.r = r,
+    int r = make_skin(g, s->nv, e);
+    if (r < 0 || (r = make_bones(&b, g, e)) < 0) return r;
+    skinning x = {.r = g,
                   .s = s,
                   .reference = reference,
                   .b = &b,
                   .diagonal = vg_diagonal(reference, s->nv),
                   .miss = miss,
                   .chunks = s->nv < CHUNK ? 1 : CHUNK};
-    x.mover = vgi_array(r->skeleton.njoints, sizeof *x.mover, e);
+    x.mover = vgi_array(g->skeleton.njoints, sizeof *x.mover, e);
     x.space = vgi_array(x.chunks, 2 * s->n * sizeof *x.space, e);
     if (x.mover && x.space) {
-        vgi_rig_movers(r, x.mover);
+        vgi_rig_movers(g, x.mover);
         vgi_parallel(threads, x.chunks, skin_chunk, &x);
     } else {
-        code = VG_ENOMEM;
+        r = VG_ENOMEM;
     }
     free(x.mover);
     free(x.space);
     clear_bones(&b);
-    return code;
+    return r;
 }

@@ -61,46 +61,46 @@ static size_t face_size(const vg_graph *g, size_t f)
     return g->faces.start[f + 1] - g->faces.start[f];
 }
 
-static size_t count_entries(const vg_robust *r)
+static size_t count_entries(const vg_robust *b)
 {
     size_t n = 0;
-    for (size_t f = 0; f < r->solver.g->faces.nf; f++) {
-        size_t corners = face_size(r->solver.g, f);
-        n += vgi_solver_is_star(r->s, f) ? 1 : corners * (corners - 1) / 2;
+    for (size_t f = 0; f < b->solver.g->faces.nf; f++) {
+        size_t corners = face_size(b->solver.g, f);
+        n += vgi_solver_is_star(b->s, f) ? 1 : corners * (corners - 1) / 2;
     }
     return n;
 }
 
 /* The metric of the differences from the first corner: the metric without its first row and column. */
-static size_t write_metric(vg_robust *r, size_t i, size_t at)
+static size_t write_metric(vg_robust *b, size_t i, size_t at)
 {
-    const vg_graph *g = r->solver.g;
-    size_t f = r->face[i], corners = face_size(g, f);
-    r->entry[i] = at;
-    r->star[i] = vgi_solver_is_star(r->s, f);
-    if (r->star[i]) {
-        r->metric[at++] = vgi_metric_weight(r->solver.metric, f);
+    const vg_graph *g = b->solver.g;
+    size_t f = b->face[i], corners = face_size(g, f);
+    b->entry[i] = at;
+    b->star[i] = vgi_solver_is_star(b->s, f);
+    if (b->star[i]) {
+        b->metric[at++] = vgi_metric_weight(b->solver.metric, f);
         return at;
     }
     for (size_t p = 1; p < corners; p++)
-        for (size_t q = 1; q <= p; q++) r->metric[at++] = vgi_metric_entry(r->solver.metric, g, f, p, q);
+        for (size_t q = 1; q <= p; q++) b->metric[at++] = vgi_metric_entry(b->solver.metric, g, f, p, q);
     return at;
 }
 
-static int prepare_faces(vg_robust *r, vg_err *e)
+static int prepare_faces(vg_robust *b, vg_err *e)
 {
-    const vg_graph *g = r->solver.g;
-    int code = vgi_face_rows_make(&r->rows, &r->solver, 2, e);
-    if (code < 0) return code;
-    r->face = vgi_array_raw(g->faces.nf, sizeof *r->face, e);
-    r->entry = vgi_array_raw(g->faces.nf, sizeof *r->entry, e);
-    r->star = vgi_array_raw(g->faces.nf, sizeof *r->star, e);
-    r->metric = vgi_array_raw(count_entries(r), sizeof *r->metric, e);
-    if (!r->face || !r->entry || !r->star || !r->metric) return VG_ENOMEM;
-    for (size_t i = 0; i < r->rows.nf; i++) r->face[r->rows.order[i]] = r->rows.face[i];
-    for (size_t i = 0, at = 0; i < r->rows.nf; i++) at = write_metric(r, i, at);
-    r->nmisfits = 3 * (vg_graph_corners(g) - g->faces.nf);
-    r->moved = r->solver.rows + (r->solver.anchored ? 0 : r->rows.nheld);
+    const vg_graph *g = b->solver.g;
+    int r = vgi_face_rows_make(&b->rows, &b->solver, 2, e);
+    if (r < 0) return r;
+    b->face = vgi_array_raw(g->faces.nf, sizeof *b->face, e);
+    b->entry = vgi_array_raw(g->faces.nf, sizeof *b->entry, e);
+    b->star = vgi_array_raw(g->faces.nf, sizeof *b->star, e);
+    b->metric = vgi_array_raw(count_entries(b), sizeof *b->metric, e);
+    if (!b->face || !b->entry || !b->star || !b->metric) return VG_ENOMEM;
+    for (size_t i = 0; i < b->rows.nf; i++) b->face[b->rows.order[i]] = b->rows.face[i];
+    for (size_t i = 0, at = 0; i < b->rows.nf; i++) at = write_metric(b, i, at);
+    b->nmisfits = 3 * (vg_graph_corners(g) - g->faces.nf);
+    b->moved = b->solver.rows + (b->solver.anchored ? 0 : b->rows.nheld);
     return VG_OK;
 }
 
@@ -111,13 +111,13 @@ static void free_room(room *m)
     *m = (room){0};
 }
 
-static bool make_room(room *m, const vg_robust *r)
+static bool make_room(room *m, const vg_robust *b)
 {
-    size_t n = r->moved, all = r->solver.rows + r->rows.nheld, bytes;
+    size_t n = b->moved, all = b->solver.rows + b->rows.nheld, bytes;
     size_t point_rows = all * sizeof *m->points / sizeof *m->memory + 1;
-    if (vgi_mul(4 * all + 3 * n + 2 * r->solver.g->max_corners + point_rows, sizeof *m->memory, &bytes))
+    if (vgi_mul(4 * all + 3 * n + 2 * b->solver.g->max_corners + point_rows, sizeof *m->memory, &bytes))
         m->memory = aligned_alloc(sizeof(vgi_lanes), bytes);
-    if (vgi_mul(r->nmisfits + 2, VGI_LANES * sizeof *m->misfit, &bytes)) m->misfit = aligned_alloc(64, bytes / 64 * 64);
+    if (vgi_mul(b->nmisfits + 2, VGI_LANES * sizeof *m->misfit, &bytes)) m->misfit = aligned_alloc(64, bytes / 64 * 64);
     if (!m->memory || !m->misfit) {
         free_room(m);
         return false;
@@ -125,60 +125,60 @@ static bool make_room(room *m, const vg_robust *r)
     vgi_row *at = m->memory;
     m->u = at, m->trial = m->u + all, m->g = m->trial + all, m->gn = m->g + all, m->z = m->gn + all;
     m->zn = m->z + n, m->d = m->zn + n, m->corners = m->d + n;
-    m->points = (vgi_point *)(m->corners + 2 * r->solver.g->max_corners);
+    m->points = (vgi_point *)(m->corners + 2 * b->solver.g->max_corners);
     return true;
 }
 
 /* Make workspaces for as many blocks as there are, at most one per thread; a short sequence on a large mesh needs
  * one. If memory runs out, fewer blocks are solved at a time. */
-static int make_rooms(vg_robust *r, size_t blocks, vg_err *e)
+static int make_rooms(vg_robust *b, size_t blocks, vg_err *e)
 {
-    size_t most = blocks < (size_t)r->solver.threads ? blocks : (size_t)r->solver.threads;
-    while (r->nrooms < most && make_room(&r->rooms[r->nrooms], r)) r->nrooms++;
-    return r->nrooms ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory for the misfits of %zu faces", r->rows.nf);
+    size_t most = blocks < (size_t)b->solver.threads ? blocks : (size_t)b->solver.threads;
+    while (b->nrooms < most && make_room(&b->rooms[b->nrooms], b)) b->nrooms++;
+    return b->nrooms ? VG_OK : vg_fail(e, VG_ENOMEM, "not enough memory for the misfits of %zu faces", b->rows.nf);
 }
 
 int vg_robust_new(vg_robust **out, const vg_solver *s, size_t rounds, double eps, vg_err *e)
 {
     *out = NULL;
     if (!(eps > 0) || !isfinite(eps)) return vg_fail(e, VG_EARG, "eps is a number above 0, not %g", eps);
-    vg_robust *r = *out = vgi_array(1, sizeof *r, e);
-    if (!r) return VG_ENOMEM;
-    r->s = s, r->solver = vgi_solver_look(s), r->rounds = rounds, r->eps = eps;
-    int code = prepare_faces(r, e);
-    if (code == VG_OK) {
-        r->rooms = vgi_array((size_t)r->solver.threads, sizeof *r->rooms, e);
-        r->found = vgi_array((size_t)r->solver.threads, sizeof *r->found, e);
-        if (!r->rooms || !r->found) code = VG_ENOMEM;
+    vg_robust *b = *out = vgi_array(1, sizeof *b, e);
+    if (!b) return VG_ENOMEM;
+    b->s = s, b->solver = vgi_solver_look(s), b->rounds = rounds, b->eps = eps;
+    int r = prepare_faces(b, e);
+    if (r == VG_OK) {
+        b->rooms = vgi_array((size_t)b->solver.threads, sizeof *b->rooms, e);
+        b->found = vgi_array((size_t)b->solver.threads, sizeof *b->found, e);
+        if (!b->rooms || !b->found) r = VG_ENOMEM;
     }
-    if (code < 0) vg_robust_free(out);
-    return code;
+    if (r < 0) vg_robust_free(out);
+    return r;
 }
 
 void vg_robust_free(vg_robust **out)
 {
-    vg_robust *r = *out;
-    if (!r) return;
-    vgi_face_rows_clear(&r->rows);
-    free(r->face);
-    free(r->entry);
-    free(r->metric);
-    free(r->star);
-    for (size_t i = 0; i < r->nrooms; i++) free_room(&r->rooms[i]);
-    free(r->rooms);
-    free(r->found);
-    free(r);
+    vg_robust *b = *out;
+    if (!b) return;
+    vgi_face_rows_clear(&b->rows);
+    free(b->face);
+    free(b->entry);
+    free(b->metric);
+    free(b->star);
+    for (size_t i = 0; i < b->nrooms; i++) free_room(&b->rooms[i]);
+    free(b->rooms);
+    free(b->found);
+    free(b);
     *out = NULL;
 }
 
-size_t vg_robust_misfits(const vg_robust *r)
+size_t vg_robust_misfits(const vg_robust *b)
 {
-    return r->nmisfits;
+    return b->nmisfits;
 }
 
-vg_robust_stats vg_robust_get_stats(const vg_robust *r)
+vg_robust_stats vg_robust_get_stats(const vg_robust *b)
 {
-    return r->stats;
+    return b->stats;
 }
 
 /* ---- loading ---- */
@@ -217,11 +217,11 @@ static void load_pose(void *context, size_t pose)
     j->sizes[pose] = size;
 }
 
-void vg_robust_load(const vg_robust *r, size_t n, const double *const *vectors, const double *const *guesses,
+void vg_robust_load(const vg_robust *b, size_t n, const double *const *vectors, const double *const *guesses,
                     float *const *misfits, double *sizes)
 {
-    load_job j = {r, vectors, guesses, misfits, sizes};
-    vgi_parallel(r->solver.threads, n, load_pose, &j);
+    load_job j = {b, vectors, guesses, misfits, sizes};
+    vgi_parallel(b->solver.threads, n, load_pose, &j);
 }
 
 /* ---- the search ---- */
@@ -421,8 +421,8 @@ static void add_rows(const search *s, double *const *x)
 /* The plain solution as a displacement from the guess, in units of each pose's size. */
 static void solve_plainly(const robust_job *j, search *s, size_t first, vgi_lanes size)
 {
-    const vg_robust *r = j->r;
-    size_t all = r->solver.rows + r->rows.nheld;
+    const vg_robust *b = j->r;
+    size_t all = b->solver.rows + b->rows.nheld;
     const double *rhs[VGI_LANES];
     const float *misfit[VGI_LANES];
     vgi_lanes unit;
@@ -437,8 +437,8 @@ static void solve_plainly(const robust_job *j, search *s, size_t first, vgi_lane
     bool every[VGI_LANES];
     for (size_t k = 0; k < VGI_LANES; k++) every[k] = true;
     precondition(s, every, s->m.g, s->m.u);
-    vgi_robust_kernel_now()->scale(r->moved, unit, s->m.u);
-    vgi_robust_kernel_now()->interleave(r->nmisfits, misfit, s->m.misfit);
+    vgi_robust_kernel_now()->scale(b->moved, unit, s->m.u);
+    vgi_robust_kernel_now()->interleave(b->nmisfits, misfit, s->m.misfit);
 }
 
 static void choose_solvers(const robust_job *j, search *s, size_t first)
@@ -449,45 +449,45 @@ static void choose_solvers(const robust_job *j, search *s, size_t first)
 static void robust_block(void *context, size_t i)
 {
     const robust_job *j = context;
-    const vg_robust *r = j->r;
+    const vg_robust *b = j->r;
     size_t first = i * VGI_LANES, lanes = j->n - first < VGI_LANES ? j->n - first : VGI_LANES;
-    search s = {.r = r, .m = r->rooms[i], .lanes = lanes,
-                .faces = {r->rows.nf, r->rows.start, r->rows.row, r->entry, r->metric, r->star}};
+    search s = {.r = b, .m = b->rooms[i], .lanes = lanes,
+                .faces = {b->rows.nf, b->rows.start, b->rows.row, b->entry, b->metric, b->star}};
     vgi_lanes size;
     choose_solvers(j, &s, first);
-    if (r->moved) {
+    if (b->moved) {
         solve_plainly(j, &s, first, size);
         descend(&s);
-        vgi_robust_kernel_now()->scale(r->moved, size, s.m.u);
+        vgi_robust_kernel_now()->scale(b->moved, size, s.m.u);
         add_rows(&s, j->x + first);
     }
-    vg_robust_stats *found = &r->found[i];
+    vg_robust_stats *found = &b->found[i];
     if (s.rounds > found->most_rounds) found->most_rounds = s.rounds;
     for (size_t k = 0; k < lanes; k++) {
-        const vg_solver *own = s.other[k] ? s.other[k] : r->s;
+        const vg_solver *own = s.other[k] ? s.other[k] : b->s;
         bool held = own->nanchors > 0;
         vgi_solver_place(own, j->x[first + k], held ? j->anchors[first + k] : NULL, held ? NULL : j->roots[first + k]);
         found->unfinished += s.falling[k];
     }
 }
 
-int vg_robust_solve(vg_robust *r, size_t n, vg_solver *const *each, const double *const *rhs, const float *const *misfits, const double *sizes,
+int vg_robust_solve(vg_robust *b, size_t n, vg_solver *const *each, const double *const *rhs, const float *const *misfits, const double *sizes,
                     double *const *x, const double *const *anchors, const double *const *roots, vg_err *e)
 {
     if (!n) return VG_OK;
-    int code = make_rooms(r, (n + VGI_LANES - 1) / VGI_LANES, e);
-    if (code < 0) return code;
-    size_t most = VGI_LANES * r->nrooms;
+    int r = make_rooms(b, (n + VGI_LANES - 1) / VGI_LANES, e);
+    if (r < 0) return r;
+    size_t most = VGI_LANES * b->nrooms;
     for (size_t done = 0; done < n; done += most) {
         size_t some = n - done < most ? n - done : most;
-        robust_job j = {r, some, each ? each + done : NULL, rhs + done, misfits + done, sizes + done, x + done,
+        robust_job j = {b, some, each ? each + done : NULL, rhs + done, misfits + done, sizes + done, x + done,
                         anchors ? anchors + done : NULL, roots ? roots + done : NULL};
-        vgi_parallel(r->solver.threads, (some + VGI_LANES - 1) / VGI_LANES, robust_block, &j);
+        vgi_parallel(b->solver.threads, (some + VGI_LANES - 1) / VGI_LANES, robust_block, &j);
     }
-    r->stats = (vg_robust_stats){0};
-    for (size_t i = 0; i < r->nrooms; i++) {
-        if (r->found[i].most_rounds > r->stats.most_rounds) r->stats.most_rounds = r->found[i].most_rounds;
-        r->stats.unfinished += r->found[i].unfinished;
+    b->stats = (vg_robust_stats){0};
+    for (size_t i = 0; i < b->nrooms; i++) {
+        if (b->found[i].most_rounds > b->stats.most_rounds) b->stats.most_rounds = b->found[i].most_rounds;
+        b->stats.unfinished += b->found[i].unfinished;
     }
     return VG_OK;
 }
