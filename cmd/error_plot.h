@@ -4,7 +4,6 @@
 #define ERROR_PLOT_H
 
 #include "cli.h"
-#include "vg/plot.h"
 
 enum { ERROR_CURVES = 3 }; /* mean, p95, max */
 

@@ -2,7 +2,6 @@
  * Leaves out how a pose becomes pixels, and what is in a page: that is lib/view.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
-#include "vg/look.h"
 
 #include <math.h>
 #include <stdlib.h>

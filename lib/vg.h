@@ -7,9 +7,10 @@
  *   vg/body.h      mesh, skeleton, rig         vg/rig.h       skeletons that drive a mesh
  *   vg/frames.h    head, artefacts, frames     vg/measures.h  errors, digest
  *   vg/vectors.h   the vector graph            vg/io.h        streams, mesh files, archives
- *   vg/markers.h   small text files            vg/view.h      pictures
- *   vg/signal.h    continuous signals             vg/smooth.h    noise taken out of a sequence
- *   vg/network.h   a trained network              vg/net.h       features, training, generation
+ *   vg/markers.h   small text files            vg/view.h      pictures and pages of sequences
+ *   vg/signal.h    continuous signals          vg/plot.h      charts of numbers
+ *   vg/network.h   a trained network           vg/net.h       features, training, generation
+ *   vg/smooth.h    noise taken out of a sequence
  *
  * Conventions. Arrays of points and vectors are interleaved: xyzxyz... Index base is 0. Lengths are in the unit of
  * the mesh. D is the diagonal of the bounding box of the reference pose. Functions that can fail return an int:
@@ -42,5 +43,6 @@
 #include "vg/net.h"
 #include "vg/io.h"
 #include "vg/view.h"
+#include "vg/plot.h"
 
 #endif

@@ -1,5 +1,5 @@
 /* vg/plot.h: charts of numbers: curves and bars, as PNG or SVG.
- * Included by itself: vg.h says what holds for all of lib/vg.
+ * A part of vg.h, which says what holds for all parts.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_PART_PLOT_H
 #define VG_PART_PLOT_H

@@ -61,6 +61,14 @@ int vg_sheet_sequence(vg_sheet *s, const char *label, const vg_head *h, const vg
  * 1 while they fit and at most half the spacing of the pictures otherwise, so the spacing is even to within half a
  * stride at each end. */
 int vg_sheet_add(vg_sheet *s, size_t i, const vg_frame *f, const double *truth, vg_err *e) VG_MUST_CHECK;
+/* vg_look_find: the vertices that `what` names: the number of a vertex; else the name of a joint of the skeleton that
+ * the body is, or of a rig (the vertex nearest to it in the reference pose); else of an object, group or material (the
+ * vertices of its faces). *n of them, at least one; free with free(). VG_EARG when nothing has that name. */
+int vg_look_find(const vg_body *b, const char *what, uint32_t **vertices, size_t *n, vg_err *e) VG_MUST_CHECK;
+
+/* vg_sheet_look_at: centre each picture of sequence i on the mean of these vertices (copied). Call it for all
+ * sequences of a sheet or for none, before vg_sheet_write. */
+int vg_sheet_look_at(vg_sheet *s, size_t i, const uint32_t *vertices, size_t n, vg_err *e) VG_MUST_CHECK;
 /* vg_sheet_write: draw the sheet and write it to fd (borrowed); call it once. `name` is used in messages.
  * VG_EINPUT if there are no frames, VG_EARG if the sheet exceeds the limits of PNG. A shorter sequence stays at
  * its last frame. */

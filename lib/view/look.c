@@ -1,7 +1,5 @@
 /* look.c: finds what a sheet is centred on, by number or name. The camera is in sheet.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "vg/look.h"
-
 #include "view/sheet.h"
 
 #include <math.h>

@@ -1,7 +1,5 @@
 /* plot.c: charts of curves and bars, drawn once as shapes, which become SVG or pixels.
  * SPDX-License-Identifier: GPL-3.0-or-later */
-#include "vg/plot.h"
-
 #include "io/io.h"
 #include "view/paint.h"
 

@@ -4,7 +4,6 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/paint.h"
 #include "signal/unshape.h"
-#include "vg/signal.h"
 
 #include <math.h>
 #include <stdio.h>
