@@ -103,8 +103,11 @@ typedef struct vgi_plate {
     uint32_t *site;  /* l frames; the first `anchors` are the anchors */
     double *weight;  /* l x 3: barycentric coordinates of the sites */
     double *anchor;  /* 3 x n: radial functions of the anchors on the frames */
-    double *q;       /* l x n: orthonormal functions on the frames; the first r span the functions of r sites */
+    size_t stride;   /* numbers of a row of q: n and zeros, so that rows begin at multiples of 64 bytes */
+    double *q;       /* l x stride: orthonormal functions on the frames; the first r span the functions of r sites */
+    double *q_room;  /* the allocation that q lies in */
     double *r;       /* most x most, row-major, upper triangle: function j itself is sum_i q_i r_ij */
+    double *column;  /* most: of r, while it is found */
 } vgi_plate;
 
 typedef enum vgi_site_rule { VGI_FARTHEST, VGI_GAIN } vgi_site_rule;

@@ -13,12 +13,10 @@ typedef struct eight {
 
 VGI_INLINE double sum_of(const eight *e)
 {
-    double lane[VGI_LANES], sum = 0;
+    double lane[VGI_LANES];
 #pragma GCC unroll 8
     for (int p = 0; p < VGI_PARTS; p++) vgi_store(lane + VGI_WIDTH * p, e->part[p]);
-#pragma GCC unroll 8
-    for (int i = 0; i < VGI_LANES; i++) sum += lane[i];
-    return sum;
+    return ((lane[0] + lane[1]) + (lane[2] + lane[3])) + ((lane[4] + lane[5]) + (lane[6] + lane[7]));
 }
 
 /* ---- layouts ---- */
@@ -58,8 +56,13 @@ static void all_pull(vgi_pull *p)
 /* Products with v of four rows, n apart. */
 VGI_INLINE void products_of_four(const double *a, size_t n, const double *v, double t[4])
 {
-    eight s[4] = {{{{0}}}};
+    const vgi_wide zero = vgi_same(0);
+    eight s[4];
     size_t i = 0;
+#pragma GCC unroll 4
+    for (size_t r = 0; r < 4; r++)
+#pragma GCC unroll 8
+        for (size_t k = 0; k < VGI_PARTS; k++) s[r].part[k] = zero;
     for (; i + VGI_LANES <= n; i += VGI_LANES)
 #pragma GCC unroll 8
         for (size_t k = 0; k < VGI_PARTS; k++) {
@@ -73,57 +76,57 @@ VGI_INLINE void products_of_four(const double *a, size_t n, const double *v, dou
     }
 }
 
-static void all_project(const double *q, size_t rows, size_t n, double *v, double *c, size_t stride)
+/* sum += the four rows, n apart, times t; the four after them are fetched meanwhile. */
+VGI_INLINE void add_four(const double *a, size_t n, const double t[4], double *restrict sum)
+{
+    size_t i = 0;
+    for (; i + VGI_LANES <= n; i += VGI_LANES) {
+#pragma GCC unroll 4
+        for (size_t r = 4; r < 8; r++) __builtin_prefetch(a + r * n + i);
+#pragma GCC unroll 8
+        for (size_t k = 0; k < VGI_PARTS; k++) {
+            const double *at = a + i + VGI_WIDTH * k;
+            vgi_wide s = vgi_load(sum + i + VGI_WIDTH * k);
+#pragma GCC unroll 4
+            for (size_t r = 0; r < 4; r++) s += vgi_same(t[r]) * vgi_load(at + r * n);
+            vgi_store(sum + i + VGI_WIDTH * k, s);
+        }
+    }
+    for (; i < n; i++)
+        for (size_t r = 0; r < 4; r++) sum[i] += t[r] * a[r * n + i];
+}
+
+static void all_project(const double *q, size_t rows, size_t n, double *v, double *c)
 {
     size_t j = 0;
     for (; j + 4 <= rows; j += 4) {
-        const double *a = q + j * n;
-        double t[4];
-        products_of_four(a, n, v, t);
-        for (size_t k = 0; k < 4; k++) c[(j + k) * stride] += t[k];
-        for (size_t i = 0; i < n; i++)
-            v[i] -= (t[0] * a[i] + t[1] * a[n + i]) + (t[2] * a[2 * n + i] + t[3] * a[3 * n + i]);
+        double t[4], back[4];
+        products_of_four(q + j * n, n, v, t);
+        for (size_t k = 0; k < 4; k++) c[j + k] += t[k], back[k] = -t[k];
+        add_four(q + j * n, n, back, v);
     }
     for (; j < rows; j++) {
         const double *a = q + j * n;
         double t = 0;
         for (size_t i = 0; i < n; i++) t += a[i] * v[i];
-        c[j * stride] += t;
+        c[j] += t;
         for (size_t i = 0; i < n; i++) v[i] -= t * a[i];
     }
 }
 
-/* w := v' rest, four rows at a time */
-VGI_INLINE void multiply(size_t n, size_t m, const double *v, const double *rest, double *restrict w)
+/* Rows are read from memory once: the four are still near when they are added. */
+static void all_through(size_t n, size_t m, const double *v, const double *a, double *product, double *sum)
 {
-    size_t i = 0;
-    memset(w, 0, m * sizeof *w);
-    for (; i + 4 <= n; i += 4) {
-        const double *a = rest + i * m, *b = a + m, *d = b + m, *f = d + m;
-        for (size_t c = 0; c < m; c++) w[c] += (v[i] * a[c] + v[i + 1] * b[c]) + (v[i + 2] * d[c] + v[i + 3] * f[c]);
+    size_t c = 0;
+    memset(sum, 0, n * sizeof *sum);
+    for (; c + 4 <= m; c += 4) {
+        products_of_four(a + c * n, n, v, product + c);
+        add_four(a + c * n, n, product + c, sum);
     }
-    for (; i < n; i++)
-        for (size_t c = 0; c < m; c++) w[c] += v[i] * rest[i * m + c];
-}
-
-static void all_take_out(size_t n, size_t m, const double *v, double *rest, double *product, double *square)
-{
-    multiply(n, m, v, rest, product);
-    for (size_t i = 0; i < n; i++) {
-        double *row = rest + i * m;
-        const vgi_wide f = vgi_same(v[i]);
-        eight sum = {{{0}}};
-        size_t c = 0;
-        for (; c + VGI_LANES <= m; c += VGI_LANES)
-#pragma GCC unroll 8
-            for (size_t k = 0; k < VGI_PARTS; k++) {
-                double *at = row + c + VGI_WIDTH * k;
-                vgi_wide x = vgi_load(at) - f * vgi_load(product + c + VGI_WIDTH * k);
-                vgi_store(at, x);
-                sum.part[k] += x * x;
-            }
-        square[i] = sum_of(&sum);
-        for (; c < m; c++) row[c] -= v[i] * product[c], square[i] += row[c] * row[c];
+    for (; c < m; c++) {
+        product[c] = 0;
+        for (size_t i = 0; i < n; i++) product[c] += a[c * n + i] * v[i];
+        for (size_t i = 0; i < n; i++) sum[i] += product[c] * a[c * n + i];
     }
 }
 
@@ -144,4 +147,4 @@ static void all_distances(const double *x, const double *others, size_t count, s
     }
 }
 
-const vgi_signal_kernel VGI_OF_SET(vgi_signal_kernel) = {all_pull, all_project, all_take_out, all_distances};
+const vgi_signal_kernel VGI_OF_SET(vgi_signal_kernel) = {all_pull, all_project, all_through, all_distances};

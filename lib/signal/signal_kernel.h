@@ -18,9 +18,9 @@ typedef struct vgi_pull {
 typedef struct vgi_signal_kernel {
     void (*pull)(vgi_pull *p);
     /* project: for each row of q (n numbers): v -= row times (row . v), which is added to c. */
-    void (*project)(const double *q, size_t rows, size_t n, double *v, double *c, size_t stride);
-    /* take_out: rest (n x m) -= v v' rest; product (m) := v' rest; square (n): squared rows of the result. */
-    void (*take_out)(size_t n, size_t m, const double *v, double *rest, double *product, double *square);
+    void (*project)(const double *q, size_t rows, size_t n, double *v, double *c);
+    /* through: product (m) := a v, sum (n) := a' a v; a is m x n. */
+    void (*through)(size_t n, size_t m, const double *v, const double *a, double *product, double *sum);
     /* distances: squared distances of row x from `count` others, `stride` apart */
     void (*distances)(const double *x, const double *others, size_t count, size_t stride, size_t m, double *square);
 } vgi_signal_kernel;

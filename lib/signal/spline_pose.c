@@ -34,17 +34,28 @@ void vgi_plate_clear(vgi_plate *s)
     free(s->site);
     free(s->weight);
     free(s->anchor);
-    free(s->q);
+    free(s->q_room);
     free(s->r);
+    free(s->column);
     *s = (vgi_plate){0};
+}
+
+enum { LINE = 64 / sizeof(double) }; /* numbers of a line of the cache */
+
+/* Rows of zeros that begin at whole lines of the cache; *room is what is freed. */
+static double *rows_of_lines(size_t rows, size_t stride, double **room, vg_err *e)
+{
+    size_t size;
+    if (!vgi_mul(rows, stride, &size) || !(*room = vgi_array(size + LINE, sizeof **room, e))) return NULL;
+    return *room + (LINE - (uintptr_t)*room / sizeof **room % LINE) % LINE;
 }
 
 static int start(vgi_plate *s, size_t n, size_t most, const double *p, vg_err *e)
 {
-    *s = (vgi_plate){.n = n, .most = most};
+    *s = (vgi_plate){.n = n, .most = most, .stride = (n + LINE - 1) / LINE * LINE};
     if (!(s->p = vgi_array(n, 2 * sizeof *s->p, e)) || !(s->site = vgi_array(most, sizeof *s->site, e)) ||
         !(s->weight = vgi_array(most, 3 * sizeof *s->weight, e)) || !(s->anchor = vgi_array(n, 3 * sizeof(double), e)) ||
-        !(s->q = vgi_array(most * n, sizeof *s->q, e)) || !(s->r = vgi_array(most * most, sizeof *s->r, e)))
+        !(s->q = rows_of_lines(most, s->stride, &s->q_room, e)) || !(s->r = vgi_array(most * most, sizeof *s->r, e)) || !(s->column = vgi_array(most, sizeof *s->column, e)))
         return VG_ENOMEM;
     s->scale = vgi_plane_radius(n, p, s->centre);
     if (!(s->scale > 0)) s->scale = 1;
@@ -121,13 +132,14 @@ static double norm(const double *v, size_t n)
  * relative to `size`, is negligible. */
 static bool orthogonalise(vgi_plate *s, double size)
 {
-    size_t j = s->l;
-    double *v = s->q + j * s->n, *column = s->r + j;
-    for (size_t i = 0; i < j; i++) column[i * s->most] = 0;
-    for (int pass = 0; pass < 2; pass++) vgi_signal_kernel_now()->project(s->q, j, s->n, v, column, s->most);
+    size_t j = s->l, n = s->stride;
+    double *v = s->q + j * n, *column = s->column;
+    memset(column, 0, j * sizeof *column);
+    for (int pass = 0; pass < 2; pass++) vgi_signal_kernel_now()->project(s->q, j, n, v, column);
+    for (size_t i = 0; i < j; i++) s->r[i * s->most + j] = column[i];
     double left = norm(v, s->n);
     if (!(left > dependent * size)) return false;
-    column[j * s->most] = left;
+    s->r[j * s->most + j] = left;
     for (size_t i = 0; i < s->n; i++) v[i] /= left;
     s->l = j + 1;
     return true;
@@ -137,7 +149,7 @@ static void add_anchors(vgi_plate *s)
 {
     set_barycentric(s);
     for (size_t a = 0; a < s->anchors; a++) {
-        double *v = s->q + a * s->n, lambda[3];
+        double *v = s->q + a * s->stride, lambda[3];
         const double *at = s->p + 2 * s->site[a];
         for (size_t i = 0; i < s->n; i++) {
             barycentric(s, s->p + 2 * i, lambda);
@@ -175,7 +187,7 @@ static bool near_others(const vgi_plate *s, size_t site, double apart)
 static bool add_site(vgi_plate *s, size_t site)
 {
     if (s->l == s->most) return false;
-    double *lambda = s->weight + 3 * s->l, size = write_function(s, site, s->q + s->l * s->n, lambda);
+    double *lambda = s->weight + 3 * s->l, size = write_function(s, site, s->q + s->l * s->stride, lambda);
     s->site[s->l] = (uint32_t)site;
     return orthogonalise(s, size);
 }
@@ -203,22 +215,65 @@ int vgi_plate_make(vgi_plate *s, size_t n, const double *p, const uint32_t *site
 
 /* ---- the order of all sites ---- */
 
+enum { BLOCK = 32 }; /* functions that are projected out of the residual at a time */
+
 typedef struct greedy {
     vgi_plate *s;
     size_t m;
-    double *rest;   /* n x m: residual */
-    double *square; /* n: squares of its rows */
-    double *sums;   /* m */
-    bool *used;     /* n */
-    double *left;   /* VGI_GAIN: n x n: remainders of the functions of all frames; their products with rest */
-    double *match;  /* n x m */
-    double *along;  /* n */
+    double *rest;    /* m x stride: residual, but for the last `waiting` functions */
+    double *room;    /* the allocation that rest lies in */
+    double *square;  /* n: squared residuals of the frames */
+    double *product; /* m: rest times the last function */
+    size_t waiting;
+    double *block;   /* BLOCK x m: products of the waiting functions, negated */
+    double *sum;     /* stride */
+    bool *used;      /* n */
+    double *left;    /* VGI_GAIN: n x stride: remainders of the functions of all frames; their products with rest */
+    double *match;   /* n x m */
+    double *along;   /* n */
 } greedy;
 
-/* rest -= v v' rest */
-static void take_out(greedy *g, const double *v)
+static void measure_rest(greedy *g)
 {
-    vgi_signal_kernel_now()->take_out(g->s->n, g->m, v, g->rest, g->sums, g->square);
+    size_t n = g->s->n;
+    memset(g->square, 0, n * sizeof *g->square);
+    for (size_t c = 0; c < g->m; c++) {
+        const double *row = g->rest + c * g->s->stride;
+        for (size_t i = 0; i < n; i++) g->square[i] += row[i] * row[i];
+    }
+}
+
+/* Subtract the projections on the waiting functions from rest. */
+static void take_out_block(greedy *g)
+{
+    const vgi_plate *s = g->s;
+    if (g->waiting)
+        vgi_gemm_double(true, false, g->m, s->stride, g->waiting, g->block, g->m, s->q + (s->l - g->waiting) * s->stride,
+                        s->stride, 1, g->rest, s->stride);
+    g->waiting = 0;
+    measure_rest(g);
+}
+
+/* Project function j, the last one, out: with v its values, w = rest v and t = rest' w, the squared residual of frame i
+ * falls by 2 t_i v_i - v_i^2 w'w. rest itself is updated for a block of functions at a time: writing it for each one takes
+ * twice the time. */
+static void take_out(greedy *g, size_t j)
+{
+    const vgi_plate *s = g->s;
+    const double *v = s->q + j * s->stride;
+    double match[BLOCK], size = 0;
+    vgi_signal_kernel_now()->through(s->stride, g->m, v, g->rest, g->product, g->sum);
+    if (g->waiting && g->m) {
+        vgi_product_double_transposed(1, g->waiting, g->m, g->product, g->m, g->block, g->m, match, g->waiting);
+        vgi_product_add(1, s->stride, g->waiting, match, g->waiting, v - g->waiting * s->stride, s->stride, g->sum, s->stride);
+    }
+    for (size_t c = 0; c < g->m; c++) {
+        size += g->product[c] * g->product[c];
+        g->block[g->waiting * g->m + c] = -g->product[c];
+    }
+    for (size_t i = 0; i < s->n; i++)
+        g->square[i] = fmax(0, g->square[i] - v[i] * (2 * g->sum[i] - v[i] * size));
+    if (++g->waiting == BLOCK) take_out_block(g);
 }
 
 static size_t farthest(const greedy *g)
@@ -231,13 +286,14 @@ static size_t farthest(const greedy *g)
 
 static size_t most_gain(const greedy *g)
 {
-    size_t n = g->s->n, m = g->m, best = SIZE_MAX;
+    const vgi_plate *s = g->s;
+    size_t n = s->n, m = g->m, best = SIZE_MAX;
     double most = -1;
     for (size_t i = 0; i < n; i++) {
         double match = 0, size = 0;
         if (g->used[i]) continue;
         for (size_t c = 0; c < m; c++) match += g->match[i * m + c] * g->match[i * m + c];
-        for (size_t c = 0; c < n; c++) size += g->left[i * n + c] * g->left[i * n + c];
+        for (size_t c = 0; c < n; c++) size += g->left[i * s->stride + c] * g->left[i * s->stride + c];
         double gain = size > 0 ? match / size : 0;
         if (gain > most) most = gain, best = i;
     }
@@ -249,26 +305,27 @@ static void take_out_gain(greedy *g, const double *v)
 {
     size_t n = g->s->n, m = g->m;
     for (size_t i = 0; i < n; i++) {
-        double along = 0;
-        for (size_t c = 0; c < n; c++) along += g->left[i * n + c] * v[c];
-        for (size_t c = 0; c < n; c++) g->left[i * n + c] -= along * v[c];
-        for (size_t c = 0; c < m; c++) g->match[i * m + c] -= along * g->sums[c];
+        double along = 0, *left = g->left + i * g->s->stride;
+        for (size_t c = 0; c < n; c++) along += left[c] * v[c];
+        for (size_t c = 0; c < n; c++) left[c] -= along * v[c];
+        for (size_t c = 0; c < m; c++) g->match[i * m + c] -= along * g->product[c];
     }
 }
 
 static int start_gain(greedy *g, vg_err *e)
 {
-    size_t n = g->s->n, m = g->m;
+    size_t n = g->s->n, m = g->m, stride = g->s->stride;
     double lambda[3];
-    if (!(g->left = vgi_array(n * n, sizeof *g->left, e)) || !(g->match = vgi_array(n * m, sizeof *g->match, e)) ||
+    take_out_block(g);
+    if (!(g->left = vgi_array(n * stride, sizeof *g->left, e)) || !(g->match = vgi_array(n * m, sizeof *g->match, e)) ||
         !(g->along = vgi_array(n, sizeof *g->along, e)))
         return VG_ENOMEM;
-    for (size_t i = 0; i < n; i++) write_function(g->s, i, g->left + i * n, lambda);
+    for (size_t i = 0; i < n; i++) write_function(g->s, i, g->left + i * stride, lambda);
     for (size_t i = 0; i < n; i++) {
         memset(g->along, 0, n * sizeof *g->along);
-        vgi_signal_kernel_now()->project(g->s->q, g->s->l, n, g->left + i * n, g->along, 1);
+        vgi_signal_kernel_now()->project(g->s->q, g->s->l, stride, g->left + i * stride, g->along);
     }
-    vgi_product_double(n, m, n, g->left, n, g->rest, m, g->match, m);
+    vgi_product_double_transposed(n, m, n, g->left, stride, g->rest, stride, g->match, m);
     return VG_OK;
 }
 
@@ -279,18 +336,18 @@ static void add_others(greedy *g, vgi_site_rule rule, double apart)
     for (size_t next; (next = rule == VGI_GAIN ? most_gain(g) : farthest(g)) != SIZE_MAX;) {
         g->used[next] = true;
         if (near_others(s, next, apart) || !add_site(s, next)) continue;
-        const double *v = s->q + (s->l - 1) * s->n;
-        take_out(g, v);
-        if (rule == VGI_GAIN) take_out_gain(g, v);
+        take_out(g, s->l - 1);
+        if (rule == VGI_GAIN) take_out_gain(g, s->q + (s->l - 1) * s->stride);
     }
 }
 
 static int run(greedy *g, vgi_site_rule rule, vg_err *e)
 {
     vgi_plate *s = g->s;
-    for (size_t j = 0; j < s->l; j++) {
-        take_out(g, s->q + j * s->n);
-        g->used[s->site[j]] = true;
+    size_t anchors = s->l;
+    for (s->l = 0; s->l < anchors;) {
+        g->used[s->site[s->l]] = true;
+        take_out(g, s->l++);
     }
     if (rule == VGI_GAIN && start_gain(g, e) < 0) return VG_ENOMEM;
     add_others(g, rule, nearest);
@@ -301,34 +358,47 @@ static int run(greedy *g, vgi_site_rule rule, vg_err *e)
     return VG_OK;
 }
 
+static int start_greedy(greedy *g, const double *x, size_t stride, vg_err *e)
+{
+    const size_t n = g->s->n, m = g->m, width = g->s->stride;
+    if (!(g->rest = rows_of_lines(m, width, &g->room, e)) || !(g->square = vgi_array(n, sizeof *g->square, e)) ||
+        !(g->product = vgi_array(m, sizeof *g->product, e)) || !(g->block = vgi_array(BLOCK * m, sizeof *g->block, e)) ||
+        !(g->sum = vgi_array(width, sizeof *g->sum, e)) || !(g->used = vgi_array(n, sizeof *g->used, e)))
+        return VG_ENOMEM;
+    for (size_t i = 0; i < n; i++)
+        for (size_t c = 0; c < m; c++) g->rest[c * width + i] = x[i * stride + c];
+    measure_rest(g);
+    return VG_OK;
+}
+
+static void end_greedy(greedy *g)
+{
+    free(g->room);
+    free(g->square);
+    free(g->product);
+    free(g->block);
+    free(g->sum);
+    free(g->used);
+    free(g->left);
+    free(g->match);
+    free(g->along);
+}
+
 int vgi_plate_order(vgi_plate *s, size_t n, size_t m, const double *p, const double *x, size_t stride,
                     vgi_site_rule rule, vg_err *e)
 {
     greedy g = {.s = s, .m = m};
     int r = start(s, n, n < 3 ? 3 : n, p, e);
     uint32_t *all = vgi_array(n, sizeof *all, e);
-    if (r < 0 || !all || !(g.rest = vgi_array(n * m, sizeof *g.rest, e)) ||
-        !(g.square = vgi_array(n, sizeof *g.square, e)) || !(g.sums = vgi_array(m, sizeof *g.sums, e)) ||
-        !(g.used = vgi_array(n, sizeof *g.used, e))) {
-        r = VG_ENOMEM;
-        goto out;
+    if (r == VG_OK) r = all ? start_greedy(&g, x, stride, e) : VG_ENOMEM;
+    if (r == VG_OK) {
+        for (size_t i = 0; i < n; i++) all[i] = (uint32_t)i;
+        choose_anchors(s, all, n);
+        add_anchors(s);
+        r = run(&g, rule, e);
     }
-    for (size_t i = 0; i < n; i++) {
-        all[i] = (uint32_t)i;
-        memcpy(g.rest + i * m, x + i * stride, m * sizeof *x);
-    }
-    choose_anchors(s, all, n);
-    add_anchors(s);
-    r = run(&g, rule, e);
-out:
     free(all);
-    free(g.rest);
-    free(g.square);
-    free(g.sums);
-    free(g.used);
-    free(g.left);
-    free(g.match);
-    free(g.along);
+    end_greedy(&g);
     if (r < 0) vgi_plate_clear(s);
     return r;
 }
@@ -338,13 +408,13 @@ out:
 void vgi_plate_fitted(const vgi_plate *s, size_t l, size_t m, const double *x, size_t stride, double *fitted,
                       double *room)
 {
-    vgi_product_double(l, m, s->n, s->q, s->n, x, stride, room, m);
-    vgi_product_transposed_double(s->n, m, l, s->q, s->n, room, m, fitted, m);
+    vgi_product_double(l, m, s->n, s->q, s->stride, x, stride, room, m);
+    vgi_product_transposed_double(s->n, m, l, s->q, s->stride, room, m, fitted, m);
 }
 
 void vgi_plate_solve(const vgi_plate *s, size_t l, size_t m, const double *x, size_t stride, double *coefficients)
 {
-    if (m) vgi_product_double(l, m, s->n, s->q, s->n, x, stride, coefficients, m);
+    if (m) vgi_product_double(l, m, s->n, s->q, s->stride, x, stride, coefficients, m);
     for (size_t i = l; i-- > 0;) {
         double *row = coefficients + i * m;
         for (size_t k = i + 1; k < l; k++) {

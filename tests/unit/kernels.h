@@ -59,59 +59,66 @@ static void check_layout_pull(void)
 /* What is left is at right angles to the rows, which are a basis; what was taken is in the coefficients. */
 static void check_projection(void)
 {
-    enum { N = 19, STRIDE = 2 };
+    enum { N = 19 };
     for (size_t rows = 0; rows <= 9; rows++) {
-        double q[9 * N] = {0}, v[N], c[9 * STRIDE];
+        double q[9 * N] = {0}, v[N], c[9];
         for (size_t j = 0; j < rows; j++) q[j * N + (7 * j + 3) % N] = j % 2 ? 1 : -1;
         for (size_t i = 0; i < N; i++) v[i] = ripple(i);
-        for (size_t j = 0; j < rows * STRIDE; j++) c[j] = 3;
-        vgi_signal_kernel_now()->project(q, rows, N, v, c, STRIDE);
+        for (size_t j = 0; j < rows; j++) c[j] = 3;
+        vgi_signal_kernel_now()->project(q, rows, N, v, c);
         bool taken[N] = {false};
         for (size_t j = 0; j < rows; j++) {
             size_t at = (7 * j + 3) % N;
             taken[at] = true;
-            CHECK_NEAR(c[j * STRIDE], 3 + (j % 2 ? 1 : -1) * ripple(at), 1e-15);
-            CHECK(c[j * STRIDE + 1] == 3);
+            CHECK_NEAR(c[j], 3 + (j % 2 ? 1 : -1) * ripple(at), 1e-15);
         }
         for (size_t i = 0; i < N; i++) CHECK_NEAR(v[i], taken[i] ? 0 : ripple(i), 1e-15);
     }
 }
 
-static void check_distances_and_rest(void)
+static void check_distances(void)
 {
     enum { N = 7, MOST = 20 };
-    double v[N], rest[N * MOST], product[MOST], square[N], far[N];
+    double v[MOST], others[N * MOST], far[N];
+    for (size_t i = 0; i < MOST; i++) v[i] = ripple(50 + i);
+    for (size_t i = 0; i < N * MOST; i++) others[i] = ripple(i);
     for (size_t m = 1; m <= MOST; m++) {
-        for (size_t i = 0; i < N; i++) v[i] = ripple(50 + i);
-        for (size_t i = 0; i < N * m; i++) rest[i] = ripple(i);
-        vgi_signal_kernel_now()->distances(v, rest, m < N ? N - m + 1 : 1, m, m < N ? m : N, far);
-        for (size_t j = 0; j < (m < N ? N - m + 1 : 1); j++) {
+        vgi_signal_kernel_now()->distances(v, others, N, MOST, m, far);
+        for (size_t j = 0; j < N; j++) {
             double sum = 0;
-            for (size_t c = 0; c < (m < N ? m : N); c++) sum += (v[c] - ripple(j * m + c)) * (v[c] - ripple(j * m + c));
+            for (size_t c = 0; c < m; c++) sum += (v[c] - ripple(j * MOST + c)) * (v[c] - ripple(j * MOST + c));
             CHECK_NEAR(far[j], sum, 1e-14);
         }
-        vgi_signal_kernel_now()->take_out(N, m, v, rest, product, square);
-        for (size_t c = 0; c < m; c++) {
-            double sum = 0;
-            for (size_t i = 0; i < N; i++) sum += v[i] * ripple(i * m + c);
-            CHECK_NEAR(product[c], sum, 1e-14);
-        }
-        for (size_t i = 0; i < N; i++) {
-            double sum = 0;
-            for (size_t c = 0; c < m; c++) {
-                CHECK_NEAR(rest[i * m + c], ripple(i * m + c) - v[i] * product[c], 1e-15);
-                sum += rest[i * m + c] * rest[i * m + c];
-            }
-            CHECK_NEAR(square[i], sum, 1e-14 * (1 + sum));
-        }
     }
+}
+
+/* Widths with and without numbers over, rows with and without rows over. */
+static void check_through(void)
+{
+    enum { N = 21, MOST = 11 };
+    double v[N], a[N * MOST], product[MOST], sum[N];
+    for (size_t i = 0; i < N; i++) v[i] = ripple(50 + i);
+    for (size_t i = 0; i < N * MOST; i++) a[i] = ripple(i);
+    for (size_t n = 1; n <= N; n++)
+        for (size_t m = 0; m <= MOST; m++) {
+            double expect[N] = {0};
+            vgi_signal_kernel_now()->through(n, m, v, a, product, sum);
+            for (size_t c = 0; c < m; c++) {
+                double t = 0;
+                for (size_t i = 0; i < n; i++) t += v[i] * ripple(c * n + i);
+                CHECK_NEAR(product[c], t, 1e-14);
+                for (size_t i = 0; i < n; i++) expect[i] += t * ripple(c * n + i);
+            }
+            for (size_t i = 0; i < n; i++) CHECK_NEAR(sum[i], expect[i], 1e-13);
+        }
 }
 
 static void check_signals(void)
 {
     check_layout_pull();
     check_projection();
-    check_distances_and_rest();
+    check_distances();
+    check_through();
 }
 
 /* ---- networks ---- */
