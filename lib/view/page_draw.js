@@ -154,6 +154,27 @@ void main() {
     if (length(gl_PointCoord - 0.5) > 0.5) discard;
     colour = mode == 1 ? vec4(texture(map, vec2(clamp(value, 0.0, 1.0), 0.5)).rgb, 1.0) : ink;
 }`];
+/* The shadow with soft edges: once for its few pixels, not for each pixel of the ground. */
+const SOFTEN = [HEAD + `
+out vec2 at;
+void main() {
+    vec2 corner = vec2(gl_VertexID % 2, gl_VertexID / 2);
+    at = corner;
+    gl_Position = vec4(2.0 * corner - 1.0, 0.0, 1.0);
+}`, HEAD + `
+uniform sampler2D shadow;
+in vec2 at;
+out vec4 colour;
+void main() {
+    float sum = 0.0, total = 0.0;
+    for (int i = -3; i <= 3; i++)
+        for (int j = -3; j <= 3; j++) {
+            float w = exp(-float(i * i + j * j) / 6.0);
+            sum += w * texture(shadow, at + vec2(i, j) / 160.0).r;
+            total += w;
+        }
+    colour = vec4(sum / total);
+}`];
 const GROUND = [HEAD + `
 uniform mat4 view, projection;
 uniform float height, reach;
@@ -174,20 +195,10 @@ float lines(vec2 p) {
     vec2 off = abs(p - round(p)) / max(fwidth(p), vec2(1e-6));
     return clamp(1.2 - min(off.x, off.y), 0.0, 1.0) * clamp(2.0 - 4.0 * max(fwidth(p).x, fwidth(p).y), 0.0, 1.0);
 }
-float shadowAt(vec2 p) {
-    float sum = 0.0, total = 0.0;
-    for (int i = -3; i <= 3; i++)
-        for (int j = -3; j <= 3; j++) {
-            float w = exp(-float(i * i + j * j) / 6.0);
-            sum += w * texture(shadow, p + vec2(i, j) / 160.0).r;
-            total += w;
-        }
-    return sum / total;
-}
 void main() {
     float fade = 1.0 - smoothstep(0.4, 1.0, length(at - about) / reach);
     vec2 p = (at - about) / shadowReach;
-    float dark = max(abs(p.x), abs(p.y)) < 1.0 ? 0.45 * shadowAt(0.5 + 0.5 * p) : 0.0;
+    float dark = max(abs(p.x), abs(p.y)) < 1.0 ? 0.45 * texture(shadow, 0.5 + 0.5 * p).r : 0.0;
     float line = grid * ink.a * fade * max(0.6 * lines(at / spacing), lines(at / spacing / 5.0));
     colour = vec4(mix(ink.rgb * line, vec3(0.0), dark) / max(line + dark - line * dark, 1e-4), line + dark - line * dark);
 }`];
@@ -336,7 +347,7 @@ function makeShadow() {
 /* All that lives in the graphics memory but the sequences. */
 function makePrograms() {
     programs = {surface: compile(SURFACE), outline: compile(OUTLINE), shadow: compile(SHADOW), line: compile(LINE),
-                point: compile(POINT), ground: compile(GROUND), backdrop: compile(BACKDROP), cast: makeShadow()};
+                point: compile(POINT), ground: compile(GROUND), backdrop: compile(BACKDROP), soften: compile(SOFTEN), cast: makeShadow(), soft: makeShadow()};
     const colours = mapColours(), bytes = new Uint8Array(4 * colours.length).fill(255);
     colours.forEach((c, i) => [1, 3, 5].forEach((at, k) => { bytes[4 * i + k] = parseInt(c.slice(at, at + 2), 16); }));
     programs.map = makeTexture();
@@ -501,10 +512,22 @@ function castShadow(s, cam) {
     gl.bindVertexArray(s.slots[0].surface);
     gl.drawElements(gl.TRIANGLES, s.index.length, gl.UNSIGNED_INT, 0);
     gl.blendEquation(gl.FUNC_ADD);
+    softenShadow();
     blendNormally();
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.enable(gl.SCISSOR_TEST);
     gl.enable(gl.DEPTH_TEST);
+}
+
+function softenShadow() {
+    gl.bindFramebuffer(gl.FRAMEBUFFER, programs.soft.buffer);
+    gl.useProgram(programs.soften.program);
+    gl.activeTexture(gl.TEXTURE3);
+    gl.bindTexture(gl.TEXTURE_2D, programs.cast.texture);
+    gl.uniform1i(programs.soften.at.shadow, 3);
+    gl.blendFunc(gl.ONE, gl.ZERO);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    gl.activeTexture(gl.TEXTURE0);
 }
 
 function blendNormally() {
@@ -516,7 +539,7 @@ function drawGround(cam, s, ink) {
     let spacing = 10 ** Math.floor(Math.log10(s.unit / 8));
     spacing = [1, 2, 5, 10].map((x) => x * spacing).find((x) => x >= s.unit / 12) / s.unit;
     gl.activeTexture(gl.TEXTURE3);
-    gl.bindTexture(gl.TEXTURE_2D, programs.cast.texture);
+    gl.bindTexture(gl.TEXTURE_2D, programs.soft.texture);
     gl.uniform1i(at.shadow, 3);
     gl.uniform1f(at.grid, state.ground ? 1 : 0);
     gl.uniform1f(at.shadowReach, reach);

@@ -7,7 +7,7 @@
 const $ = (id) => document.getElementById(id);
 const facts = JSON.parse($("facts").textContent);
 const canvas = $("canvas");
-const CREASE = Math.cos(50 * Math.PI / 180), MOST_RING = 64, TEXTURE_WIDTH = 2048, FRAMES_PER_SECOND = 24;
+const CREASE = Math.cos(50 * Math.PI / 180), HALF_CREASE = Math.cos(25 * Math.PI / 180), MOST_RING = 64, TEXTURE_WIDTH = 2048, FRAMES_PER_SECOND = 24;
 const TINT = facts.tint || null; /* what colours say: numbers of vertices, of scales their logarithms to base 2 */
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 const state = {
@@ -172,7 +172,7 @@ function findEdges(s, sizes) {
     s.bones = new Uint32Array(bones);
 }
 
-/* The faces around each vertex, and the face of each corner. */
+/* The faces and corners around each vertex, and the face of each corner. */
 function findRings(s) {
     s.ringStart = new Uint32Array(s.nv + 1);
     s.faceOf = new Uint32Array(s.corners.length);
@@ -181,38 +181,66 @@ function findRings(s) {
     for (let v = 0; v < s.nv; v++) s.ringStart[v + 1] += s.ringStart[v];
     const at = s.ringStart.slice();
     s.ring = new Uint32Array(s.corners.length);
-    for (let c = 0; c < s.corners.length; c++) s.ring[at[s.corners[c]]++] = s.faceOf[c];
+    s.ringCorner = new Uint32Array(s.corners.length);
+    for (let c = 0; c < s.corners.length; c++) s.ringCorner[at[s.corners[c]]] = c, s.ring[at[s.corners[c]]++] = s.faceOf[c];
 }
 
-/* Area-weighted normals of the faces, and for each corner the mean of those around the vertex that turn less than the crease. */
-function findNormals(s, {xyz, normals}) {
-    const {corners, start, faceNormals: fn, ring, ringStart} = s;
-    for (let f = 0; f < s.nf; f++) {
+/* Normals of length 1 of the faces, and their areas. */
+function findFaceNormals({corners, start, nf, faceNormals: fn}, xyz) {
+    for (let f = 0, c = 0; f < nf; f++) {
         let x = 0, y = 0, z = 0;
-        const end = start[f + 1], o = 4 * corners[start[f]];
-        for (let c = start[f] + 1; c + 1 < end; c++) {
-            const a = 4 * corners[c], b = 4 * corners[c + 1];
-            const ax = xyz[a] - xyz[o], ay = xyz[a + 1] - xyz[o + 1], az = xyz[a + 2] - xyz[o + 2];
-            const bx = xyz[b] - xyz[o], by = xyz[b + 1] - xyz[o + 1], bz = xyz[b + 2] - xyz[o + 2];
+        const end = start[f + 1], o = 4 * corners[c], ox = xyz[o], oy = xyz[o + 1], oz = xyz[o + 2];
+        let b = 4 * corners[c + 1], bx = xyz[b] - ox, by = xyz[b + 1] - oy, bz = xyz[b + 2] - oz;
+        for (c += 2; c < end; c++) {
+            const ax = bx, ay = by, az = bz;
+            b = 4 * corners[c], bx = xyz[b] - ox, by = xyz[b + 1] - oy, bz = xyz[b + 2] - oz;
             x += ay * bz - az * by, y += az * bx - ax * bz, z += ax * by - ay * bx;
         }
-        const size = Math.hypot(x, y, z), scale = size > 0 ? 1 / size : 0;
+        const size = Math.sqrt(x * x + y * y + z * z), scale = size > 0 ? 1 / size : 0;
         fn[4 * f] = x * scale, fn[4 * f + 1] = y * scale, fn[4 * f + 2] = z * scale, fn[4 * f + 3] = size;
+        c = end;
     }
-    for (let c = 0; c < corners.length; c++) {
-        const v = corners[c], own = 4 * s.faceOf[c], from = ringStart[v], to = ringStart[v + 1], all = to - from > MOST_RING;
-        const ux = fn[own], uy = fn[own + 1], uz = fn[own + 2];
-        let x = 0, y = 0, z = 0;
-        for (let i = from; i < to; i++) {
-            const g = 4 * ring[i];
-            if (all || fn[g] * ux + fn[g + 1] * uy + fn[g + 2] * uz >= CREASE) {
-                const area = fn[g + 3];
-                x += area * fn[g], y += area * fn[g + 1], z += area * fn[g + 2];
-            }
+}
+
+/* The normal of a corner where faces meet in an edge: the mean of those that turn less than the crease from its own. */
+function creasedNormal({faceNormals: fn, faceOf, ring}, c, from, to, normals) {
+    const own = 4 * faceOf[c], all = to - from > MOST_RING, ux = fn[own], uy = fn[own + 1], uz = fn[own + 2];
+    let x = 0, y = 0, z = 0;
+    for (let i = from; i < to; i++) {
+        const g = 4 * ring[i];
+        if (all || fn[g] * ux + fn[g + 1] * uy + fn[g + 2] * uz >= CREASE) {
+            const area = fn[g + 3];
+            x += area * fn[g], y += area * fn[g + 1], z += area * fn[g + 2];
         }
-        if (x * x + y * y + z * z < 1e-24 * fn[own + 3] * fn[own + 3]) x = ux, y = uy, z = uz;
-        const size = Math.hypot(x, y, z) || 1;
-        normals[3 * c] = x / size, normals[3 * c + 1] = y / size, normals[3 * c + 2] = z / size;
+    }
+    if (x * x + y * y + z * z < 1e-24 * fn[own + 3] * fn[own + 3]) x = ux, y = uy, z = uz;
+    const size = Math.sqrt(x * x + y * y + z * z) || 1;
+    normals[3 * c] = x / size, normals[3 * c + 1] = y / size, normals[3 * c + 2] = z / size;
+}
+
+/* Area-weighted normals of the corners. Where all faces around a vertex are within half the crease of their mean, they
+ * are within the crease of one another, and the corners share the mean. */
+function findNormals(s, {xyz, normals}) {
+    const {faceNormals: fn, ring, ringCorner, ringStart, nv} = s;
+    findFaceNormals(s, xyz);
+    for (let v = 0; v < nv; v++) {
+        const from = ringStart[v], to = ringStart[v + 1];
+        let x = 0, y = 0, z = 0, smooth = true;
+        for (let i = from; i < to; i++) {
+            const g = 4 * ring[i], area = fn[g + 3];
+            x += area * fn[g], y += area * fn[g + 1], z += area * fn[g + 2];
+        }
+        const size = Math.sqrt(x * x + y * y + z * z), least = HALF_CREASE * size;
+        for (let i = from; i < to && smooth; i++) {
+            const g = 4 * ring[i];
+            smooth = fn[g] * x + fn[g + 1] * y + fn[g + 2] * z > least;
+        }
+        if (smooth) x /= size, y /= size, z /= size;
+        for (let i = from; i < to; i++) {
+            const c = ringCorner[i];
+            if (smooth) normals[3 * c] = x, normals[3 * c + 1] = y, normals[3 * c + 2] = z;
+            else creasedNormal(s, c, from, to, normals);
+        }
     }
 }
 

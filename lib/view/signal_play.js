@@ -46,7 +46,7 @@ function setTime(t) {
     $("outside").hidden = true;
     showTime();
     showHead();
-    showStrip();
+    showStripHead();
     drawPose();
 }
 
@@ -64,7 +64,7 @@ function tick(moment) {
         time = firstTime() + Math.min(gone % length, lastTime() - firstTime());
         showTime();
         showHead();
-        showStrip();
+        showStripHead();
         drawPose();
     }
     clock = moment;

@@ -3,6 +3,7 @@
 
 const strip = $("speed-curve");
 let chosenTime = -1, dragTime = -1, timeMoved = false;
+let onStrip = null; /* what the playhead needs of the strip: scales, speeds, its line and text */
 const PAD = 30;
 
 /* The pairs of times; without a retiming, those that leave everything as it is. */
@@ -28,9 +29,17 @@ function showStrip() {
     }
     element("path", {class: "map", d: points.map((t, i) => `${i ? "L" : "M"}${toX(t).toFixed(1)} ${toY(oldTime(t)).toFixed(1)}`).join("")}, strip);
     pairsNow().forEach(([old, t], i) => element("circle", {class: i === chosenTime ? "time chosen" : "time", cx: toX(t), cy: toY(old), r: i === chosenTime ? 7 : 5}, strip));
-    element("line", {class: "head", x1: toX(time), x2: toX(time), y1: 2, y2: bottom}, strip);
-    const now_ = speed[Math.max(0, Math.min(speed.length - 1, Math.floor((time - first) / (last - first || 1) * steps)))];
-    element("text", {x: PAD + 4, y: 12}, strip).textContent = `speed here ${short(now_)}\u00d7${now.retime ? "" : "; two clicks add a time"}`;
+    onStrip = {first, last, toX, speed, line: element("line", {class: "head", y1: 2, y2: bottom}, strip), text: element("text", {x: PAD + 4, y: 12}, strip)};
+    showStripHead();
+}
+
+/* The playhead alone: the rest of the strip stays while the time goes. */
+function showStripHead() {
+    const {first, last, toX, speed, line, text} = onStrip, x = toX(time);
+    const here = speed[Math.max(0, Math.min(speed.length - 1, Math.floor((time - first) / (last - first || 1) * speed.length)))];
+    line.setAttribute("x1", x);
+    line.setAttribute("x2", x);
+    text.textContent = `speed here ${short(here)}\u00d7${now.retime ? "" : "; two clicks add a time"}`;
 }
 
 /* The first new time at which an old one is reached. */
