@@ -247,7 +247,7 @@ static void measure_rest(greedy *g)
 static void take_out_block(greedy *g)
 {
     const vgi_plate *s = g->s;
-    if (g->waiting)
+    if (g->waiting && g->m)
         vgi_gemm_double(true, false, g->m, s->stride, g->waiting, g->block, g->m, s->q + (s->l - g->waiting) * s->stride,
                         s->stride, 1, g->rest, s->stride);
     g->waiting = 0;
