@@ -109,6 +109,12 @@ typedef struct cli_line {
 } cli_line;
 FILE *cli_line_open(cli_line *line, const char *what);
 char *cli_line_close(cli_line *line);
+/* cli_by_number: for qsort: uint32_t in ascending order. */
+int cli_by_number(const void *a, const void *b);
+/* cli_ends_with: compare the end of a name with a suffix; case does not matter. */
+bool cli_ends_with(const char *name, const char *suffix);
+/* cli_seconds: since some moment in the past. */
+double cli_seconds(void);
 /* cli_strip_controls: replace control characters by '?', because names from files may contain terminal escapes. */
 void cli_strip_controls(char *s);
 /* cli_progress: show "label n" on standard error, if it is a terminal, a second has passed, and no other program

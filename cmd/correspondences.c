@@ -12,12 +12,6 @@ typedef struct coverage {
     double sum, largest; /* distances of matched faces */
 } coverage;
 
-static int ascending(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return (x > y) - (x < y);
-}
-
 /* How many faces of the source drive anything: counted among the pairs, for how many it has is the stream's word only. */
 static uint64_t count_sources(const vg_correspondence *c)
 {
@@ -25,7 +19,7 @@ static uint64_t count_sources(const vg_correspondence *c)
     uint32_t *faces = cli_allocate(n, sizeof *faces, "the pairs of a correspondence");
     uint64_t used = n > 0;
     if (n) memcpy(faces, c->source, n * sizeof *faces);
-    qsort(faces, n, sizeof *faces, ascending);
+    qsort(faces, n, sizeof *faces, cli_by_number);
     for (size_t i = 1; i < n; i++) used += faces[i] != faces[i - 1];
     free(faces);
     return used;

@@ -6,17 +6,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
-
-static bool ends_with(const char *name, const char *suffix)
-{
-    size_t n = strlen(name), k = strlen(suffix);
-    return n > k && !strcasecmp(name + n - k, suffix);
-}
 
 void error_plot_check(const char *file, const char *report, const char *stream)
 {
-    if (!ends_with(file, ".svg") && !ends_with(file, ".png"))
+    if (!cli_ends_with(file, ".svg") && !cli_ends_with(file, ".png"))
         cli_usage("--plot '%s': the name must end in .svg or .png", file);
     if (report && cli_same_output(file, report)) cli_usage("'%s' cannot be both the plot and the report", file);
     if (stream && cli_same_output(file, stream)) cli_usage("'%s' cannot be both the plot and the stream", file);
@@ -77,6 +70,6 @@ void error_plot_write(const error_curves *c, const vg_measure_stats *m, const ch
     vg_err e;
     cli_redirect(file, false);
     FILE *out = cli_text_open();
-    if (vg_plot_write(charts, 2, ends_with(file, ".svg"), fileno(out), file, &e) < 0) cli_die(&e);
+    if (vg_plot_write(charts, 2, cli_ends_with(file, ".svg"), fileno(out), file, &e) < 0) cli_die(&e);
     cli_text_end();
 }

@@ -422,12 +422,6 @@ uint64_t cli_parse_size(const char *option, const char *text)
     return x;
 }
 
-static int compare_vertices(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return (x > y) - (x < y);
-}
-
 size_t cli_parse_vertices(const char *option, const char *text, uint32_t **vertices)
 {
     size_t n = 0, unique = 0;
@@ -443,7 +437,7 @@ size_t cli_parse_vertices(const char *option, const char *text, uint32_t **verti
         p = end;
         if (!*p) break;
     }
-    qsort(*vertices, n, sizeof **vertices, compare_vertices);
+    qsort(*vertices, n, sizeof **vertices, cli_by_number);
     for (size_t i = 0; i < n; i++)
         if (i == 0 || (*vertices)[i] != (*vertices)[unique - 1]) (*vertices)[unique++] = (*vertices)[i];
     return unique;

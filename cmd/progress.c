@@ -12,7 +12,6 @@
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
 static const double first_after = 1, interval = 0.2; /* seconds */
@@ -26,16 +25,9 @@ static struct {
     uint64_t phase_first; /* count at its start */
 } progress = {.fd = STDERR_FILENO};
 
-static double now_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 void progress_start(void)
 {
-    progress.started = now_seconds();
+    progress.started = cli_seconds();
 }
 
 void progress_take(const char *value, void *context)
@@ -133,7 +125,7 @@ void cli_progress_of(const char *label, uint64_t n, uint64_t total)
     static int terminal = -1;
     if (terminal < 0) terminal = isatty(STDERR_FILENO) && !cli.quiet;
     if (!terminal && !progress.json) return;
-    double now = now_seconds();
+    double now = cli_seconds();
     if (!progress.label || strcmp(progress.label, label)) {
         progress.label = label, progress.phase_first = n;
         progress.phase_started = now;

@@ -176,12 +176,6 @@ static void say(const vg_signal *s, const vg_signal_stats *r)
 
 /* ---- which frames to sculpt ---- */
 
-static int by_number(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* The frames as vg-encode --take wants them: "3,17,40". */
 static char *list_frames(const uint32_t *frame, size_t n)
 {
@@ -189,7 +183,7 @@ static char *list_frames(const uint32_t *frame, size_t n)
     char *list = cli_allocate(size, 1, "frames");
     uint32_t *sorted = cli_allocate(n, sizeof *sorted, "frames");
     memcpy(sorted, frame, n * sizeof *sorted);
-    qsort(sorted, n, sizeof *sorted, by_number);
+    qsort(sorted, n, sizeof *sorted, cli_by_number);
     for (size_t i = 0; i < n; i++) at += (size_t)snprintf(list + at, size - at, "%s%u", i ? "," : "", sorted[i]);
     free(sorted);
     return list;

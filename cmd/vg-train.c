@@ -7,7 +7,6 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 static struct {
@@ -260,17 +259,10 @@ static void write_log(FILE *log, const vg_train_state *s)
 
 /* ---- learning ---- */
 
-static double seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static void show(const vg_train_state *s, double since)
 {
     static double last;
-    double now = seconds();
+    double now = cli_seconds();
     if (cli.quiet || now - last < 1 || !isatty(STDERR_FILENO)) return;
     last = now;
     double left = (double)(s->iterations - s->iteration) * since / (double)(s->iteration ? s->iteration : 1);
@@ -283,18 +275,18 @@ static bool learn(vg_trainer *t, vg_head *h, vg_train_state *s)
 {
     vg_err e;
     int r = 0;
-    double start = seconds();
+    double start = cli_seconds();
     *s = vg_trainer_get_state(t);
     FILE *log = is_first ? open_log(s) : NULL;
     bool stopped;
     while (!(stopped = vg_train_any(interrupted)) && (r = vg_trainer_step(t, s, &e)) > 0) {
         write_log(log, s);
-        show(s, seconds() - start);
+        show(s, cli_seconds() - start);
         if (opts.checkpoint && is_first && s->iteration % (uint64_t)opts.every == 0) write_checkpoint(t, h);
     }
     if (log && fclose(log)) log_failed();
     if (!stopped && r < 0) cli_die(&e);
-    cli_note("learned in %.1f s", seconds() - start);
+    cli_note("learned in %.1f s", cli_seconds() - start);
     return !stopped;
 }
 

@@ -6,7 +6,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -149,20 +148,14 @@ static vg_sheet_options sheet_options(void)
     return o;
 }
 
-static bool ends_with(const char *name, const char *suffix)
-{
-    size_t n = strlen(name), k = strlen(suffix);
-    return n > k && !strcasecmp(name + n - k, suffix);
-}
-
 /* The name of the output decides between page and sheet; options of the other kind are refused. */
 static void choose_kind(void)
 {
     struct stat st;
     bool named = cli.output && (stat(cli.output, &st) || S_ISREG(st.st_mode)); /* not a pipe or device */
-    bool html = named && (ends_with(cli.output, ".html") || ends_with(cli.output, ".htm"));
-    bool webp = named && ends_with(cli.output, ".webp");
-    if (named && !html && !webp && !ends_with(cli.output, ".png") && !opts.format)
+    bool html = named && (cli_ends_with(cli.output, ".html") || cli_ends_with(cli.output, ".htm"));
+    bool webp = named && cli_ends_with(cli.output, ".webp");
+    if (named && !html && !webp && !cli_ends_with(cli.output, ".png") && !opts.format)
         cli_usage("cannot write '%s': the name must end in .html, .png or .webp, or be '-' for standard output",
                   cli.output);
     opts.page = opts.format ? opts.kind == 1 : html;

@@ -52,12 +52,9 @@ static bool is_line_end(char c)
     return c == '\n' || c == '\r';
 }
 
-/* LF, CR LF and CR end a line. */
 static size_t line_of(const reading *b, const char *p)
 {
-    size_t n = 1;
-    for (const char *q = b->data; q < p; q++) n += *q == '\n' || (*q == '\r' && (q + 1 == b->end || q[1] != '\n'));
-    return n;
+    return vgi_line_number_of(b->data, b->end, p);
 }
 
 static void skip_blanks(reading *b)

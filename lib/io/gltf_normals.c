@@ -3,22 +3,19 @@
  * artist, are in gltf_character.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/gltf_normals.h"
+#include "model/incidence.h"
 #include "numeric/face.h"
+#include "numeric/sets.h"
 
 #include <math.h>
 #include <stdlib.h>
 
 static const double least_cosine = 0.5; /* cosine of the largest angle, 60 degrees, at which faces form one surface */
 
-static size_t face_size(const vg_mesh *m, size_t f)
-{
-    return m->start[f + 1] - m->start[f];
-}
-
 /* The unit normal of a possibly bent face; zero if it has no area. */
 static void face_normal(const vg_mesh *m, size_t f, const double *pose, double n[3])
 {
-    vgi_face_area(pose, m->vert + m->start[f], face_size(m, f), n);
+    vgi_face_area(pose, m->vert + m->start[f], vgi_face_size(m, f), n);
     vgi_make_unit(n);
 }
 
@@ -41,7 +38,7 @@ static size_t list_sides(const vg_mesh *m, side *to)
 {
     size_t n = 0;
     for (size_t f = 0; f < m->nf; f++) {
-        const uint32_t first = m->start[f], size = (uint32_t)face_size(m, f);
+        const uint32_t first = m->start[f], size = (uint32_t)vgi_face_size(m, f);
         for (uint32_t i = 0; i < size && size > 2; i++) {
             const uint32_t c = first + i, d = first + (i + 1) % size;
             const bool rising = m->vert[c] < m->vert[d];
@@ -53,16 +50,10 @@ static size_t list_sides(const vg_mesh *m, side *to)
     return n;
 }
 
-static uint32_t find_root(uint32_t *parent, uint32_t c)
-{
-    while (parent[c] != c) c = parent[c] = parent[parent[c]];
-    return c;
-}
-
 /* The smaller number is kept, so that groups do not depend on the order of edges. */
 static void unite(uint32_t *parent, uint32_t c, uint32_t d)
 {
-    c = find_root(parent, c), d = find_root(parent, d);
+    c = vgi_sets_find(parent, c), d = vgi_sets_find(parent, d);
     if (c < d) parent[d] = c;
     else parent[c] = d;
 }
@@ -104,8 +95,8 @@ static void number_groups(vgi_gltf_normals *x, uint32_t *parent)
     const vg_mesh *m = x->mesh;
     for (size_t f = 0; f < m->nf; f++)
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) {
-            const uint32_t root = find_root(parent, c);
-            x->corner[c] = face_size(m, f) < 3 ? UINT32_MAX : root == c ? (uint32_t)x->ngroups++ : x->corner[root];
+            const uint32_t root = vgi_sets_find(parent, c);
+            x->corner[c] = vgi_face_size(m, f) < 3 ? UINT32_MAX : root == c ? (uint32_t)x->ngroups++ : x->corner[root];
         }
 }
 
@@ -149,7 +140,7 @@ void vgi_gltf_normals_clear(vgi_gltf_normals *x)
 /* The angle of a face at corner number i of its size. */
 static double angle_at(const vg_mesh *m, size_t f, size_t i, const double *pose)
 {
-    const size_t size = face_size(m, f);
+    const size_t size = vgi_face_size(m, f);
     const uint32_t *v = m->vert + m->start[f];
     double arm[2][3];
     for (int k = 0; k < 3; k++) {
@@ -167,9 +158,9 @@ static void sum_normals(vgi_gltf_normals *x, const double *pose)
     memset(x->sum, 0, 3 * x->ngroups * sizeof *x->sum);
     for (size_t f = 0; f < m->nf; f++) {
         double n[3];
-        if (face_size(m, f) < 3) continue;
+        if (vgi_face_size(m, f) < 3) continue;
         face_normal(m, f, pose, n);
-        for (size_t i = 0; i < face_size(m, f); i++) {
+        for (size_t i = 0; i < vgi_face_size(m, f); i++) {
             const double angle = angle_at(m, f, i, pose);
             double *to = x->sum + 3 * (size_t)x->corner[m->start[f] + i];
             vgi_add_scaled(to, angle, n);

@@ -112,6 +112,8 @@ const char *vgi_quote(const char *name, char subject[VGI_SUBJECT]);
 /* vgi_lines_next: advance to the next line with content; false at the end. Blanks are space, tab, CR, comma and
  * semicolon. */
 bool vgi_lines_next(vgi_lines *t, vgi_line *l);
+/* vgi_line_number_of: the number of the line that p is in; LF, CR LF and CR end a line. */
+size_t vgi_line_number_of(const char *data, const char *end, const char *p);
 /* vgi_line_more: the next field at or after *at, which moves past it; for lines with any number of fields. */
 bool vgi_line_more(const vgi_line *l, const char **at, vgi_field *f);
 bool vgi_field_is(const vgi_field *f, const char *word);

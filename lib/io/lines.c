@@ -23,6 +23,13 @@ static bool is_blank(char c)
     return c == ' ' || c == '\t' || c == '\r' || c == ',' || c == ';';
 }
 
+size_t vgi_line_number_of(const char *data, const char *end, const char *p)
+{
+    size_t n = 1;
+    for (const char *q = data; q < p; q++) n += *q == '\n' || (*q == '\r' && (q + 1 == end || q[1] != '\n'));
+    return n;
+}
+
 bool vgi_line_more(const vgi_line *l, const char **at, vgi_field *f)
 {
     const char *p = *at;

@@ -8,6 +8,7 @@
 #include "io/io.h"
 #include "io/polygon.h"
 #include "numeric/face.h"
+#include "numeric/stats.h"
 
 #include <stdarg.h>
 #include <stdlib.h>
@@ -46,16 +47,10 @@ typedef struct mending {
     size_t dropped, shortened, cut, pieces;
 } mending;
 
-static int compare_numbers(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return (x > y) - (x < y);
-}
-
 static bool ring_repeats(mending *k)
 {
     for (size_t i = 0; i < k->n; i++) k->vertices[i] = k->ring[i].vertex;
-    qsort(k->vertices, k->n, sizeof *k->vertices, compare_numbers);
+    qsort(k->vertices, k->n, sizeof *k->vertices, vgi_by_index);
     for (size_t i = 1; i < k->n; i++)
         if (k->vertices[i] == k->vertices[i - 1]) return true;
     return false;

@@ -33,12 +33,9 @@ static bool is_line_end(char c)
     return c == '\n' || c == '\r';
 }
 
-/* LF, CR LF and CR end a line. */
 static size_t line_of(const struct reading *in, const char *p)
 {
-    size_t n = 1;
-    for (const char *q = in->data; q < p; q++) n += *q == '\n' || (*q == '\r' && (q + 1 == in->end || q[1] != '\n'));
-    return n;
+    return vgi_line_number_of(in->data, in->end, p);
 }
 
 static void skip_line(struct reading *in)

@@ -3,6 +3,7 @@
  * the positions of groups in model/groups.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "io/io.h"
+#include "numeric/stats.h"
 
 #include <stdlib.h>
 
@@ -144,17 +145,11 @@ static int take_bone(const vgi_lines *t, const vgi_line *l, entry *b, vg_err *e)
     return r;
 }
 
-static int compare_vertices(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return (x > y) - (x < y);
-}
-
 static int check_once(const vgi_lines *t, const entry *b, vg_err *e)
 {
     uint32_t *sorted = vgi_copy_array(b->vertices, b->nvertices, sizeof *sorted, e);
     if (!sorted) return VG_ENOMEM;
-    qsort(sorted, b->nvertices, sizeof *sorted, compare_vertices);
+    qsort(sorted, b->nvertices, sizeof *sorted, vgi_by_index);
     int r = VG_OK;
     for (size_t i = 1; r == VG_OK && i < b->nvertices; i++)
         if (sorted[i] == sorted[i - 1])

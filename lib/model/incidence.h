@@ -6,6 +6,12 @@
 
 #include "core/core.h"
 
+/* vgi_face_size: how many corners face f has. */
+static inline size_t vgi_face_size(const vg_mesh *m, size_t f)
+{
+    return m->start[f + 1] - m->start[f];
+}
+
 /* The corners of vertex v are corner[first[v]] .. corner[first[v + 1] - 1], ascending; face[] has the face of each. */
 typedef struct vgi_incidence {
     uint32_t *first; /* nv + 1 */

@@ -4,6 +4,7 @@
 #include "core/core.h"
 #include "numeric/vec3.h"
 #include "numeric/sets.h"
+#include "numeric/stats.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -31,12 +32,6 @@ int vg_mesh_copy(vg_mesh *to, const vg_mesh *from, vg_err *e)
     return VG_ENOMEM;
 }
 
-static int compare_indices(const void *p, const void *q)
-{
-    uint32_t a = *(const uint32_t *)p, b = *(const uint32_t *)q;
-    return (a > b) - (a < b);
-}
-
 /* Whether a vertex occurs twice in this face: small faces by comparing pairs, large ones by sorting into `sorted`.
  * No array over all vertices is used, since nv may still be wrong. */
 static bool repeats(const uint32_t *vert, size_t size, uint32_t *sorted)
@@ -48,7 +43,7 @@ static bool repeats(const uint32_t *vert, size_t size, uint32_t *sorted)
         return false;
     }
     memcpy(sorted, vert, size * sizeof *vert);
-    qsort(sorted, size, sizeof *sorted, compare_indices);
+    qsort(sorted, size, sizeof *sorted, vgi_by_index);
     for (size_t i = 1; i < size; i++)
         if (sorted[i] == sorted[i - 1]) return true;
     return false;

@@ -8,6 +8,7 @@
 #include "net/heap.h"
 #include "model/laplacian.h"
 #include "numeric/face.h"
+#include "numeric/stats.h"
 
 #include <stdlib.h>
 
@@ -181,12 +182,6 @@ static uint32_t find_centre(const vgi_rings *x, size_t part, double *most, doubl
     return best;
 }
 
-static int by_number(const void *x, const void *y)
-{
-    double a = *(const double *)x, b = *(const double *)y;
-    return a < b ? -1 : a > b;
-}
-
 /* the vertices within a fraction of the largest distance from the centre, at least seven; sorted: nv numbers */
 static int find_ball(vgi_rings *x, const double *from, double *sorted, vg_err *e)
 {
@@ -194,7 +189,7 @@ static int find_ball(vgi_rings *x, const double *from, double *sorted, vg_err *e
     double farthest = 0;
     for (size_t v = 0; v < x->nv; v++)
         if (x->part[v] == (int)x->main_part) sorted[n++] = from[v], farthest = fmax(farthest, from[v]);
-    qsort(sorted, n, sizeof *sorted, by_number);
+    qsort(sorted, n, sizeof *sorted, vgi_by_number);
     double radius = fmax(ball_share * farthest, sorted[n < BALL_LEAST ? n - 1 : BALL_LEAST - 1]);
     if (!(x->ball = vgi_array_raw(n, sizeof *x->ball, e))) return VG_ENOMEM;
     for (size_t v = 0; v < x->nv; v++)

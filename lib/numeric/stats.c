@@ -3,6 +3,19 @@
 #include "numeric/stats.h"
 
 #include <math.h>
+#include <stdint.h>
+
+int vgi_by_number(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+int vgi_by_index(const void *a, const void *b)
+{
+    const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
 
 double vgi_mean(const double *x, size_t n)
 {

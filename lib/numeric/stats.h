@@ -1,10 +1,14 @@
-/* stats.h: mean, spread, median and percentiles of numbers.
+/* stats.h: order, mean, spread, median and percentiles of numbers.
  * Internal. For data that does not fit into memory, measures.c has histograms.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #ifndef VG_STATS_H
 #define VG_STATS_H
 
 #include <stddef.h>
+
+/* vgi_by_number, vgi_by_index: for qsort: doubles (no NaN), uint32_t in ascending order. */
+int vgi_by_number(const void *a, const void *b);
+int vgi_by_index(const void *a, const void *b);
 
 double vgi_mean(const double *x, size_t n);               /* 0 if n is 0 */
 double vgi_variance(const double *x, size_t n);           /* sum (x - mean)^2 / n, in two passes; 0 if n is 0 */

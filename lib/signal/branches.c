@@ -4,6 +4,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/branches.h"
 #include "method/vectors/unwrap.h"
+#include "numeric/sets.h"
 #include "numeric/vec3.h"
 
 #include <math.h>
@@ -43,12 +44,6 @@ typedef struct forest {
 
 enum { END = 0xffffffff };
 
-static uint32_t find(uint32_t *set, uint32_t i)
-{
-    while (set[i] != i) i = set[i] = set[set[i]];
-    return i;
-}
-
 static void keep_pair(forest *f, uint32_t i)
 {
     for (uint32_t side = 0; side < 2; side++) {
@@ -64,7 +59,7 @@ static void join(forest *f, const double *cost)
     qsort(f->ranks, f->npairs, sizeof *f->ranks, by_key);
     for (uint32_t i = 0; i < f->b->n; i++) f->set[i] = i, f->head[i] = END;
     for (size_t k = 0; k < f->npairs; k++) {
-        uint32_t i = f->ranks[k].index, a = find(f->set, f->pair[2 * (size_t)i]), b = find(f->set, f->pair[2 * (size_t)i + 1]);
+        uint32_t i = f->ranks[k].index, a = vgi_sets_find(f->set, f->pair[2 * (size_t)i]), b = vgi_sets_find(f->set, f->pair[2 * (size_t)i + 1]);
         if (a == b) continue;
         f->set[a] = b;
         keep_pair(f, i);

@@ -5,6 +5,7 @@
  * basis, layout, spline_pose and spline_time.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
+#include "numeric/stats.h"
 #include "signal/curve.h"
 #include "signal/root.h"
 #include "signal/span.h"
@@ -68,18 +69,12 @@ static int error_of_pose(fitting *f, size_t l, vgi_error *error, vg_err *e)
     return error_of(f, f->fitted, m, m, error, e);
 }
 
-static int by_number(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return x < y ? -1 : x > y;
-}
-
 static int error_of_time(fitting *f, size_t knots, vgi_error *error, vg_err *e)
 {
     size_t m = f->s->m, l = f->s->l;
     double p[2];
     memcpy(f->sorted, f->order, knots * sizeof *f->order);
-    qsort(f->sorted, knots, sizeof *f->sorted, by_number);
+    qsort(f->sorted, knots, sizeof *f->sorted, vgi_by_index);
     vgi_curve_clear(&f->curve);
     if (vgi_curve_fit(&f->curve, f->n, f->s->position, f->t, f->sorted, knots, e) < 0) return VG_ENOMEM;
     for (size_t i = 0; i < f->n; i++) {

@@ -7,6 +7,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/blas.h"
 #include "numeric/lapack.h"
+#include "numeric/stats.h"
 #include "signal/signal.h"
 
 #include <math.h>
@@ -17,15 +18,9 @@ static const double good = 0.6; /* a candidate with at most this ratio is accept
 
 /* ---- the length of a cycle ---- */
 
-static int by_size(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
 static double median(double *x, size_t n)
 {
-    qsort(x, n, sizeof *x, by_size);
+    qsort(x, n, sizeof *x, vgi_by_number);
     return n % 2 ? x[n / 2] : (x[n / 2 - 1] + x[n / 2]) / 2;
 }
 

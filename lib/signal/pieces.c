@@ -6,6 +6,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/pieces.h"
 #include "model/incidence.h"
+#include "numeric/sets.h"
 #include "numeric/vec3.h"
 
 #include <math.h>
@@ -126,17 +127,11 @@ size_t vgi_pieces_sides(const vgi_pieces *p, vgi_piece_side *sides)
     return n;
 }
 
-static uint32_t find(uint32_t *set, uint32_t i)
-{
-    while (set[i] != i) i = set[i] = set[set[i]];
-    return i;
-}
-
 static void put_pair(vgi_pieces *p, uint32_t *set, uint32_t a, uint32_t b, uint32_t from, uint32_t to)
 {
     p->pair[p->npairs++] = (vgi_neighbours){a, b, from, to};
-    p->parts -= find(set, a) != find(set, b);
-    set[find(set, a)] = find(set, b);
+    p->parts -= vgi_sets_find(set, a) != vgi_sets_find(set, b);
+    set[vgi_sets_find(set, a)] = vgi_sets_find(set, b);
 }
 
 /* Pair the pieces that share an edge, then those connected by a shared vertex but by no edge. */
@@ -151,7 +146,7 @@ static void pair_pieces(vgi_pieces *p, const vgi_incidence *around, vgi_piece_si
     for (size_t v = 0; v < p->g->faces.nv; v++)
         for (size_t i = around->first[v] + (size_t)1; i < around->first[v + 1]; i++) {
             uint32_t a = p->first[around->face[i - 1]], b = p->first[around->face[i]];
-            if (find(set, a) != find(set, b)) put_pair(p, set, a, b, VGI_NO_EDGE, VGI_NO_EDGE);
+            if (vgi_sets_find(set, a) != vgi_sets_find(set, b)) put_pair(p, set, a, b, VGI_NO_EDGE, VGI_NO_EDGE);
         }
 }
 

@@ -6,6 +6,7 @@
  * of them. Splines at integer times are in natural.c.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "signal/signal.h"
+#include "numeric/stats.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -281,12 +282,6 @@ int vgi_curve_fit(vgi_curve *c, size_t n, const double *p, const double *t, cons
 
 /* ---- choice of knots ---- */
 
-static int by_number(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* The frame farthest from the curve that is not a knot; n if all are. */
 static size_t farthest_frame(const vgi_curve *c, const double *p, const bool *used)
 {
@@ -317,7 +312,7 @@ int vgi_curve_order(size_t n, const double *p, const double *t, uint32_t *order,
     used[0] = used[n - 1] = true;
     for (size_t count = 2; count < n; count++) {
         memcpy(sorted, order, count * sizeof *order);
-        qsort(sorted, count, sizeof *sorted, by_number);
+        qsort(sorted, count, sizeof *sorted, vgi_by_index);
         set_knots(&c, sorted, count);
         solve_control(&c, p, &s);
         size_t next = farthest_frame(&c, p, used);

@@ -3,6 +3,7 @@
  * of the source, Cashman and Hormann 2012). The page on which the curve can be edited is separate.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/paint.h"
+#include "numeric/stats.h"
 #include "signal/unshape.h"
 
 #include <math.h>
@@ -66,12 +67,6 @@ static void fit_plane(chart *c)
     c->scale = fmin((WIDTH - 2 * (POSE + 3 * GAP)) / fmax(w, 1e-9), (PLANE - 4 * GAP) / fmax(h, 1e-9));
 }
 
-static int compare_deviations(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* The colour map ends at the 99th percentile over the curve. */
 static int choose_colours(chart *c, vg_err *e)
 {
@@ -80,7 +75,7 @@ static int choose_colours(chart *c, vg_err *e)
     for (size_t i = 0; i < c->trace.n; i++) c->trace.deviation[i] /= unit > 0 ? unit : 1;
     double *sorted = vgi_copy_array(c->trace.deviation, c->trace.n, sizeof *sorted, e);
     if (!sorted) return VG_ENOMEM;
-    qsort(sorted, c->trace.n, sizeof *sorted, compare_deviations);
+    qsort(sorted, c->trace.n, sizeof *sorted, vgi_by_number);
     c->tint.what = VG_TINT_ERRORS;
     vgi_tint_end(&c->tint, 0, sorted[(size_t)(0.99 * (double)(c->trace.n - 1))], 0, sorted[c->trace.n - 1]);
     vgi_palette_init(&c->palette, false);

@@ -7,6 +7,7 @@
 #include "method/rig/map_parts.h"
 #include "method/rig/skin.h"
 #include "model/rig.h"
+#include "numeric/stats.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -288,12 +289,6 @@ static int hold_groups(choosing *x, vg_err *e)
     return r;
 }
 
-static int by_number(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* Then choose vertices with small deviations far from all chosen ones, until the share is reached. */
 static int choose_held(const vg_rig_fitter *f, vg_map *m, vg_err *e)
 {
@@ -321,7 +316,7 @@ static int choose_held(const vg_rig_fitter *f, vg_map *m, vg_err *e)
         hold(&x, best);
     }
     if (r == VG_OK) {
-        qsort(x.list, x.n, sizeof *x.list, by_number);
+        qsort(x.list, x.n, sizeof *x.list, vgi_by_index);
         m->held = x.list, m->nheld = x.n, x.list = NULL;
     }
     free(x.doubt);

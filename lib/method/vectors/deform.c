@@ -41,11 +41,6 @@ struct vg_deformer {
     size_t work_size, work_scalars;
 };
 
-static size_t face_size(const vg_graph *g, size_t f)
-{
-    return g->faces.start[f + 1] - g->faces.start[f];
-}
-
 /* ---- one face in one pose ---- */
 
 /* The unit quaternion of the frame [u b n] of a corner; false if the corner is degenerate. */
@@ -87,7 +82,7 @@ static void make_unit(double q[4])
 static size_t measure_polygon(const vg_deformer *d, size_t f, const double *w, double *quaternions)
 {
     uint32_t begin = d->g->faces.start[f];
-    size_t r = face_size(d->g, f), bad = 0;
+    size_t r = vgi_face_size(&d->g->faces, f), bad = 0;
     double n[3], mean[4] = {0, 0, 0, 0};
     bool has_normal = vgi_unit_normal(w, r, n);
     for (size_t i = 0; i < r; i++) {
@@ -141,7 +136,7 @@ static size_t measure_segment(const vg_deformer *d, size_t f, const double *w, c
 static void face_vectors(const vg_graph *g, size_t f, vg_kind kind, const double *pose, double *w)
 {
     uint32_t begin = g->faces.start[f];
-    size_t r = face_size(g, f);
+    size_t r = vgi_face_size(&g->faces, f);
     if (kind == VG_VECTORS) {
         memcpy(w, pose + 3 * (size_t)begin, 3 * r * sizeof *w);
         return;
@@ -161,7 +156,7 @@ static size_t measure_face(const vg_deformer *d, size_t f, vg_kind kind, const d
                            double *quaternions)
 {
     face_vectors(d->g, f, kind, pose, w);
-    if (face_size(d->g, f) == 2) return measure_segment(d, f, w, identity, quaternions);
+    if (vgi_face_size(&d->g->faces, f) == 2) return measure_segment(d, f, w, identity, quaternions);
     return measure_polygon(d, f, w, quaternions);
 }
 
@@ -180,7 +175,7 @@ static void turn_beside(const vg_deformer *d, size_t link, vg_kind kind, const d
             size_t f = d->around.face[i];
             if (f >= d->faces) continue;
             measure_face(d, f, kind, pose, w, q);
-            for (size_t c = 0; c < face_size(g, f); c++) {
+            for (size_t c = 0; c < vgi_face_size(&g->faces, f); c++) {
                 make_unit(q + 4 * c);
                 add_turn(mean, q + 4 * c);
             }
@@ -206,7 +201,7 @@ static size_t measure_any(const vg_deformer *d, size_t f, vg_kind kind, const do
 static void apply_face(const vg_deformer *d, size_t f, const double *quaternions, double *vectors)
 {
     uint32_t begin = d->g->faces.start[f];
-    for (size_t i = 0; i < face_size(d->g, f); i++)
+    for (size_t i = 0; i < vgi_face_size(&d->g->faces, f); i++)
         vg_quat_apply(quaternions + 4 * i, d->target + 3 * (size_t)(begin + i), vectors + 3 * (size_t)(begin + i));
 }
 
@@ -224,7 +219,7 @@ static void measure_reference(vg_deformer *d)
 {
     const vg_graph *g = d->g;
     for (size_t f = 0; f < g->faces.nf; f++) {
-        size_t r = face_size(g, f);
+        size_t r = vgi_face_size(&g->faces, f);
         const double *w = d->vector + 3 * (size_t)g->faces.start[f];
         double n[3];
         bool good = r == 2 || vgi_unit_normal(w, r, n);
@@ -321,7 +316,7 @@ static void make_coordinates(vg_deformer *d)
 static void make_gradient(vg_deformer *d, size_t f)
 {
     const vg_graph *g = d->g;
-    size_t begin = g->faces.start[f], r = face_size(g, f);
+    size_t begin = g->faces.start[f], r = vgi_face_size(&g->faces, f);
     double P[6], size, source2 = 0, target2 = 0;
     vgi_gradient_face *face = &d->gradient_face[f];
     if (!vgi_gradient_moments(d->vector + 3 * begin, r, P, face->q, &size)) {

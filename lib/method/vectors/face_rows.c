@@ -2,6 +2,7 @@
  * (planar.c, robust.c) visit all faces in every step; in row order neighbours are close in memory.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/face_rows.h"
+#include "model/incidence.h"
 #include "numeric/vec3.h"
 
 #include <stdlib.h>
@@ -14,11 +15,6 @@ static int compare_places(const void *a, const void *b)
 {
     const place *x = a, *y = b;
     return x->row != y->row ? (x->row > y->row) - (x->row < y->row) : (x->face > y->face) - (x->face < y->face);
-}
-
-static size_t face_size(const vg_graph *g, size_t f)
-{
-    return g->faces.start[f + 1] - g->faces.start[f];
 }
 
 static uint32_t least_row(const vg_graph *g, const uint32_t *row, size_t f)
@@ -44,7 +40,7 @@ static void list_faces(vgi_face_rows *r, const vg_graph *g, size_t least, const 
 {
     size_t n = 0;
     for (size_t f = 0; f < g->faces.nf; f++) {
-        if (face_size(g, f) < least) continue;
+        if (vgi_face_size(&g->faces, f) < least) continue;
         r->face[n] = (uint32_t)f;
         places[n] = (place){least_row(g, rows, f), (uint32_t)n};
         n++;
@@ -64,7 +60,7 @@ int vgi_face_rows_make(vgi_face_rows *r, const vgi_solver_view *s, size_t least,
     size_t corners = 0;
     *r = (vgi_face_rows){0};
     for (size_t f = 0; f < g->faces.nf; f++)
-        if (face_size(g, f) >= least) r->nf++, corners += face_size(g, f);
+        if (vgi_face_size(&g->faces, f) >= least) r->nf++, corners += vgi_face_size(&g->faces, f);
     for (size_t v = 0; v < g->faces.nv; v++) r->nheld += g->in_face[v] && s->row[v] >= s->rows;
     uint32_t *rows = vgi_copy_array(s->row, g->faces.nv, sizeof *rows, e);
     place *places = vgi_array_raw(r->nf, sizeof *places, e);

@@ -33,14 +33,9 @@ double vgi_solver_seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static size_t face_size(const vg_graph *g, size_t f)
-{
-    return g->faces.start[f + 1] - g->faces.start[f];
-}
-
 bool vgi_solver_is_star(const vg_solver *s, size_t f)
 {
-    return face_size(s->g, f) >= (s->metric.face ? STAR_METRIC : STAR);
+    return vgi_face_size(&s->g->faces, f) >= (s->metric.face ? STAR_METRIC : STAR);
 }
 
 /* Number the unknowns: row[v] counts attached vertices that are not held. */
@@ -128,7 +123,7 @@ static size_t count_entries(const vg_solver *s)
 {
     size_t n = 0;
     for (size_t f = 0; f < s->g->faces.nf; f++) {
-        size_t r = face_size(s->g, f);
+        size_t r = vgi_face_size(&s->g->faces, f);
         n += vgi_solver_is_star(s, f) ? 2 * r + 1 : r * (r + 1) / 2;
     }
     return n;
@@ -136,7 +131,7 @@ static size_t count_entries(const vg_solver *s)
 
 static void assemble_pairs(vgi_triplets *t, const vg_solver *s, size_t f)
 {
-    size_t begin = s->g->faces.start[f], r = face_size(s->g, f);
+    size_t begin = s->g->faces.start[f], r = vgi_face_size(&s->g->faces, f);
     const uint32_t *vert = s->g->faces.vert + begin;
     for (size_t p = 0; p < r; p++) {
         size_t i = s->row[vert[p]];
@@ -150,7 +145,7 @@ static void assemble_pairs(vgi_triplets *t, const vg_solver *s, size_t f)
 
 static void assemble_star(vgi_triplets *t, const vg_solver *s, size_t f, size_t centre)
 {
-    size_t r = face_size(s->g, f);
+    size_t r = vgi_face_size(&s->g->faces, f);
     const uint32_t *vert = s->g->faces.vert + s->g->faces.start[f];
     double weight = vgi_metric_weight(&s->metric, f);
     vgi_triplets_put(t, centre, centre, weight * (double)r);

@@ -15,6 +15,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "method/vectors/solver.h"
 #include "method/vectors/robust_kernel.h"
+#include "model/incidence.h"
 
 #include <float.h>
 #include <math.h>
@@ -56,16 +57,11 @@ struct vg_robust {
 
 /* ---- construction ---- */
 
-static size_t face_size(const vg_graph *g, size_t f)
-{
-    return g->faces.start[f + 1] - g->faces.start[f];
-}
-
 static size_t count_entries(const vg_robust *b)
 {
     size_t n = 0;
     for (size_t f = 0; f < b->solver.g->faces.nf; f++) {
-        size_t corners = face_size(b->solver.g, f);
+        size_t corners = vgi_face_size(&b->solver.g->faces, f);
         n += vgi_solver_is_star(b->s, f) ? 1 : corners * (corners - 1) / 2;
     }
     return n;
@@ -75,7 +71,7 @@ static size_t count_entries(const vg_robust *b)
 static size_t write_metric(vg_robust *b, size_t i, size_t at)
 {
     const vg_graph *g = b->solver.g;
-    size_t f = b->face[i], corners = face_size(g, f);
+    size_t f = b->face[i], corners = vgi_face_size(&g->faces, f);
     b->entry[i] = at;
     b->star[i] = vgi_solver_is_star(b->s, f);
     if (b->star[i]) {
