@@ -36,6 +36,7 @@ static const cli_moved moved[] = {{"interpolate", "is now the program vg-interpo
                                   {"map", "is now the program vg-play: vg-play MAP"},
                                   {"edit", "is now an option of vg-play: vg-play MAP --edit 'BONE x 45'"},
                                   {"align", "is now an option of vg-play: vg-play MAP --align all"},
+                                  {"joints", "is now --rotations of vg-play: vg-play MAP --rotations"},
                                   {"rotations", "is now an option of vg-play: vg-play MAP --rotations"},
                                   {"transforms", "is now an option of vg-play: vg-play MAP --transforms"},
                                   {"live", "is now an option of vg-play: vg-play MAP --live"},
