@@ -118,9 +118,9 @@ static bool hangs_on(const vg_rig *r, size_t joint, size_t above)
 void vg_rig_edit(const vg_rig *r, size_t b, const double axis[3], double degrees, double *transforms)
 {
     const double *own = transforms + 7 * b;
-    double now[3], centre[3], half = degrees * (3.14159265358979323846 / 360), q[4] = {cos(half)}, size = 0;
+    double now[3], centre[3], half = degrees * (3.14159265358979323846 / 360), q[4] = {cos(half)};
     vg_quat_apply(own, axis, now);
-    for (int k = 0; k < 3; k++) size += now[k] * now[k];
+    double size = vgi_dot(now, now);
     for (int k = 0; k < 3 && size > 0; k++) q[k + 1] = sin(half) * now[k] / sqrt(size);
     vg_quat_apply(own, r->at + 3 * (size_t)r->bone[b], centre);
     vgi_add(centre, own + 4);

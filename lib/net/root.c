@@ -25,7 +25,7 @@ void vgi_root_steps(const vg_network *n, size_t main_part, const double root[4],
     if (q[0] < 0)
         for (int k = 0; k < 4; k++) q[k] = -q[k];
     vg_quat_log(q, l);
-    for (int k = 0; k < 3; k++) steps[k] = 2 * l[k + 1];
+    vgi_scaled(2, l + 1, steps);
     for (size_t k = 0; k < 3; k++)
         shift[k] = (next_centroids[3 * main_part + k] - centroids[3 * main_part + k]) / n->diagonal;
     unturn(root, shift, steps + 3);

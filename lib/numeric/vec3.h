@@ -66,7 +66,8 @@ static inline double vgi_length(const double a[3])
 static inline double vgi_make_unit(double x[3]) /* 0 stays 0; returns the original length */
 {
     double length = vgi_length(x);
-    for (int k = 0; k < 3; k++) x[k] = length > 0 ? x[k] / length : 0;
+    if (length > 0) vgi_divide(x, length);
+    else x[0] = x[1] = x[2] = 0;
     return length;
 }
 static inline double vgi_square(const double a[3], const double b[3]) /* squared distance */

@@ -137,7 +137,8 @@ static void mean_step(const vgi_branches *b, const double *q, const double *befo
     for (size_t i = 0; i < b->n; i++) {
         double wanted[3];
         vgi_branch_near(q + 4 * i, before + 3 * i, wanted);
-        for (size_t k = 0; k < 3; k++) step[k] += b->share[i] * (wanted[k] - l[3 * i + k]);
+        vgi_deduct(wanted, l + 3 * i);
+        vgi_add_scaled(step, b->share[i], wanted);
     }
 }
 

@@ -30,7 +30,7 @@ void vgi_piece_edges(const vgi_pieces *p, size_t i, const double *vertices, doub
     const uint32_t *v = p->vert + 3 * i;
     const double *a = vertices + 3 * (size_t)v[0], *b = vertices + 3 * (size_t)v[1];
     const double *c = vgi_is_triangle(p, i) ? vertices + 3 * (size_t)v[2] : a;
-    for (int k = 0; k < 3; k++) first[k] = b[k] - a[k], second[k] = c[k] - a[k];
+    vgi_subtract(b, a, first), vgi_subtract(c, a, second);
 }
 
 bool vgi_piece_frame(const double first[3], const double second[3], double m[9])

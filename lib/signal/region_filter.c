@@ -5,6 +5,7 @@
 #include "numeric/blas.h"
 #include "numeric/lapack.h"
 #include "numeric/stats.h"
+#include "numeric/vec3.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -221,7 +222,7 @@ static void filter_frame(void *context, size_t f)
     memset(out, 0, 3 * x->nv * sizeof *out);
     for (size_t i = 0; i < x->nregions; i++) add_region(x, i, a->in[f], origin, out);
     for (size_t v = 0; v < x->nv; v++)
-        for (size_t k = 0; k < 3; k++) out[3 * v + k] = out[3 * v + k] / x->total[v] + origin[k];
+        vgi_divide(out + 3 * v, x->total[v]), vgi_add(out + 3 * v, origin);
 }
 
 void vg_region_filter_apply(const vg_region_filter *x, size_t n, const double *const *in, double *const *out)

@@ -163,7 +163,7 @@ static void log_rotation(const double q[4], const double before[3], double l[3])
     double sine2 = q[1] * q[1] + q[2] * q[2] + q[3] * q[3], ratio = 0, all[4], angle;
     if (q[0] > 0 && sine2 < 0.02) {
         for (int k = 8; k-- > 0;) ratio = ratio * sine2 + series[k];
-        for (int k = 0; k < 3; k++) l[k] = ratio * q[k + 1];
+        vgi_scaled(ratio, q + 1, l);
         if (vgi_dot(before, before) < 1) return;
     } else {
         vg_quat_log(q, all);

@@ -216,7 +216,7 @@ static void move_homes(const vgi_space *s, size_t n, const double *sum, double *
 {
     for (size_t i = 0; i < s->nodes; i++) {
         double l[4] = {0}, *h = home + 4 * i;
-        for (size_t k = 0; k < 3; k++) l[k + 1] = sum[3 * i + k] / (double)n;
+        vgi_divided(sum + 3 * i, (double)n, l + 1);
         vg_quat_exp(l, h);
         const double back[4] = {h[0], -h[1], -h[2], -h[3]};
         for (size_t f = 0; f < n; f++) {
@@ -265,7 +265,7 @@ static void put_corner_logs(const vgi_space *s, size_t f, const double home[4], 
         vg_quat_multiply(unit, back, unit);
         vgi_branch_near(unit, near, turn);
         x[0] = part * sqrt(3) * 2 * scale[0];
-        for (size_t k = 0; k < 3; k++) x[k + 1] = part * M_SQRT2 * 2 * turn[k];
+        vgi_scaled(part * M_SQRT2 * 2, turn, x + 1);
     }
 }
 
@@ -404,7 +404,7 @@ static void edges_of_logs(vgi_space *s, const double *home, const double *values
     for (size_t i = 0; i < s->pieces.n; i++) {
         const double *x = values + OF_PIECE * i;
         double weight = sqrt(s->pieces.share[i]), l[4] = {0}, q[4], m[9], turn[9];
-        for (int k = 0; k < 3; k++) l[k + 1] = x[k] / (weight * M_SQRT2 * 2);
+        vgi_divided(x, weight * M_SQRT2 * 2, l + 1);
         vg_quat_exp(l, q);
         vg_quat_multiply(q, home + 4 * i, q);
         vg_quat_matrix(q, turn);

@@ -37,7 +37,7 @@ bool vgi_triangle_axes(const double edges[6], double m[9])
     vgi_cross(edges, edges + 3, n);
     size = vgi_length(n);
     if (!(size > 1e-12 * length * vgi_length(edges + 3))) return false;
-    for (int k = 0; k < 3; k++) u[k] = edges[k] / length, n[k] /= size;
+    vgi_divided(edges, length, u), vgi_divide(n, size);
     vgi_cross(n, u, across);
     for (int k = 0; k < 3; k++) m[3 * k] = u[k], m[3 * k + 1] = across[k], m[3 * k + 2] = n[k];
     return true;
@@ -297,7 +297,7 @@ static void turn_of_hinge(const vgi_space *s, size_t i, double angle, double q[9
 static void turn_of_log(const double *values, double weight, double q[9])
 {
     double l[4] = {0}, turn[4];
-    for (int k = 0; k < 3; k++) l[k + 1] = values[k] / (weight * M_SQRT2 * 2);
+    vgi_divided(values, weight * M_SQRT2 * 2, l + 1);
     vg_quat_exp(l, turn);
     vg_quat_matrix(turn, q);
 }

@@ -123,9 +123,9 @@ static void move_root(vg_signal *s, const double *from, size_t nfrom, const doub
     for (size_t i = 0; i < s->n; i++) {
         double *shift = s->shift + 3 * i, way[3];
         vg_quat_apply(s->turn + 4 * i, a, moved);
-        for (int k = 0; k < 3; k++) way[k] = ratio * (moved[k] + shift[k] - a[k]);
+        vgi_sum(moved, shift, way), vgi_deduct(way, a), vgi_scale(way, ratio);
         vg_quat_apply(s->turn + 4 * i, b, moved);
-        for (int k = 0; k < 3; k++) shift[k] = b[k] + way[k] - moved[k];
+        vgi_sum(b, way, shift), vgi_deduct(shift, moved);
     }
 }
 

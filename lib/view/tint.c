@@ -89,8 +89,8 @@ static void measure_errors(vgi_meter *m, bool centred, const double *points, con
     }
     for (size_t v = 0; v < nv; v++) {
         double d[3];
-        for (size_t k = 0; k < 3; k++) d[k] = (points[3 * v + k] - truth[3 * v + k] - shift[k]) / m->unit;
-        m->numbers[v] = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        vgi_subtract(points + 3 * v, truth + 3 * v, d), vgi_deduct(d, shift), vgi_divide(d, m->unit);
+        m->numbers[v] = vgi_length(d);
     }
 }
 

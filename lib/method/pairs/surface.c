@@ -221,7 +221,7 @@ static int grow_tree(vgi_surface *s, vg_err *e)
     if (!key || !sorted || !s->box) return free(key), free(sorted), VG_ENOMEM;
     for (size_t i = 0; i < s->n; i++) {
         const struct triangle *t = &s->triangle[i];
-        for (int k = 0; k < 3; k++) key[i].middle[k] = t->a[k] + (t->ab[k] + t->ac[k]) / 3;
+        vgi_sum(t->ab, t->ac, key[i].middle), vgi_divide(key[i].middle, 3), vgi_add(key[i].middle, t->a);
         key[i].index = (uint32_t)i;
     }
     if (s->n) sort_keys(key, s->n, s->depth);
@@ -404,7 +404,8 @@ static void try_leaf(const vgi_surface *s, size_t begin, size_t end, const doubl
         *best = square;
         *hit = (vgi_hit){.face = t->face, .square = square, .border = touched & t->borders,
                          .corner = t->corner, .u = {u[0], u[1]}};
-        for (int k = 0; k < 3; k++) hit->point[k] = t->a[k] + u[0] * t->ab[k] + u[1] * t->ac[k];
+        memcpy(hit->point, t->a, sizeof t->a);
+        vgi_add_scaled(hit->point, u[0], t->ab), vgi_add_scaled(hit->point, u[1], t->ac);
     }
 }
 

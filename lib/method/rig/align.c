@@ -89,7 +89,7 @@ static void add_direction(directions *x, const double ours[3], const double thei
 {
     double a = vgi_length(ours), b = vgi_length(theirs);
     if (!(a > 0 && b > 0)) return;
-    for (int k = 0; k < 3; k++) x->ours[k] = ours[k] / a, x->theirs[k] = theirs[k] / b;
+    vgi_divided(ours, a, x->ours), vgi_divided(theirs, b, x->theirs);
     for (int k = 0; k < 9; k++) x->b[k] += x->theirs[k / 3] * x->ours[k % 3];
     x->length = a;
     x->n++;

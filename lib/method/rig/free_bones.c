@@ -77,7 +77,7 @@ int vg_free_bones_new(vg_free_bones **out, const vg_rig *r, size_t nv, const dou
     for (size_t b = 0; b < n; b++) memcpy(x->at + 3 * b, r->at + 3 * (size_t)r->bone[b], 3 * sizeof *x->at);
     for (size_t s = 0; s < VG_SKIN * nv; s++) {
         const double *p = reference + 3 * (s / VG_SKIN), *at = x->at + 3 * (size_t)x->bone[s], w = r->skin_weight[s];
-        for (size_t k = 0; k < 3; k++) x->local[4 * s + k] = w * (p[k] - at[k]);
+        vgi_subtract(p, at, x->local + 4 * s), vgi_scale(x->local + 4 * s, w);
         x->local[4 * s + 3] = w;
     }
     make_quadratic(x, r->skin_weight);

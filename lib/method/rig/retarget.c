@@ -134,7 +134,7 @@ static void move_joint(const vg_rig *r, size_t nv, const double *from, const dou
     }
     if (!(sum > 0)) return;
     double grown = spread[0] > 0 ? sqrt(spread[1] / spread[0]) : 1;
-    for (int k = 0; k < 3; k++) at[k] = after[k] + grown * (at[k] - before[k]);
+    vgi_deduct(at, before), vgi_scale(at, grown), vgi_add(at, after);
 }
 
 /* Move the joints, and set the lengths of the bones between them. */
