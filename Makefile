@@ -39,6 +39,8 @@ XXHASH_LIBS ?= -lxxhash
 PNG_CFLAGS ?= $(shell $(PKG_CONFIG) --cflags libpng 2>/dev/null)
 PNG_LIBS ?= $(shell $(PKG_CONFIG) --libs libpng 2>/dev/null || echo -lpng)
 WEBP_LIBS ?= $(shell $(PKG_CONFIG) --libs libwebpmux libwebp 2>/dev/null || echo -lwebpmux -lwebp)
+FONT_CFLAGS ?= $(shell $(PKG_CONFIG) --cflags freetype2 fontconfig 2>/dev/null || echo -I/usr/include/freetype2)
+FONT_LIBS ?= $(shell $(PKG_CONFIG) --libs freetype2 fontconfig 2>/dev/null || echo -lfreetype -lfontconfig)
 ZLIB_LIBS ?= $(shell $(PKG_CONFIG) --libs zlib 2>/dev/null || echo -lz)
 JANSSON_LIBS ?= $(shell $(PKG_CONFIG) --libs jansson 2>/dev/null || echo -ljansson)
 
@@ -87,7 +89,7 @@ FAST := -O3 -fno-math-errno -fno-trapping-math
 FAST_SRC := $(addprefix lib/,method/vectors/reconstruct method/pairs/transfer method/patches/segment signal/plane signal/spline_pose model/graph model/measures)
 # what a program does not call is not loaded: OpenBLAS starts threads that spin for a while as soon as it is there
 ALL_LDFLAGS += -Wl,--as-needed $(LDFLAGS)
-ALL_LIBS := $(CHOLMOD_LIBS) $(LAPACKE_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(WEBP_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) $(MPI_LIBS) -lpthread -lm $(LDLIBS)
+ALL_LIBS := $(CHOLMOD_LIBS) $(LAPACKE_LIBS) $(BLAS_LIBS) $(ARCHIVE_LIBS) $(XXHASH_LIBS) $(PNG_LIBS) $(WEBP_LIBS) $(FONT_LIBS) $(ZLIB_LIBS) $(JANSSON_LIBS) $(MPI_LIBS) -lpthread -lm $(LDLIBS)
 
 KERNEL_SRC := $(sort $(wildcard lib/*/*_kernel.c lib/*/*/*_kernel.c))
 LIB_SRC := $(filter-out $(KERNEL_SRC),$(sort $(wildcard lib/*/*.c lib/*/*/*.c)))
@@ -124,6 +126,7 @@ $(B)/codecs: FORCE
 CODEC_C_OBJ := $(addprefix $(B)/lib/io/,codec_meshopt.o codec_none.o)
 $(CODEC_C_OBJ): $(B)/codecs
 $(CODEC_C_OBJ): ALL_CPPFLAGS += $(CODEC_CPPFLAGS)
+$(B)/lib/view/text.o: ALL_CPPFLAGS += $(FONT_CFLAGS)
 $(B)/%.o: %.cc $(B)/flags $(B)/codecs
 	@mkdir -p $(@D)
 	$(CXX) -Ilib $(CPPFLAGS) $(CODEC_CPPFLAGS) -std=c++17 -fPIC -Wall -Wextra $(filter -Werror -O% -g% -fsanitize% -fno-% --coverage,$(ALL_CFLAGS)) -MMD -MP -c -o $@ $<

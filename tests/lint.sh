@@ -7,7 +7,7 @@
 set -u
 cd "$(dirname "$0")/.." || exit 4
 LINT=${LINT:-shellcheck cppcheck clang-tidy analyzer}
-flags="-std=gnu11 -D_GNU_SOURCE -Ilib -Icmd -include lib/core/banned.h -I/usr/include/suitesparse ${CPPFLAGS:-}"
+flags="-std=gnu11 -D_GNU_SOURCE -Ilib -Icmd -include lib/core/banned.h -I/usr/include/suitesparse -I/usr/include/freetype2 ${CPPFLAGS:-}"
 failed=0
 
 # run NAME COMMAND...: one of them, if it is asked for and there

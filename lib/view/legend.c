@@ -5,7 +5,7 @@
 #include <math.h>
 
 enum { BAR_WIDTH = 420, BAR_HEIGHT = 14 };
-static const double dot = 1.25;
+static const double size = 12; /* of the font, in pixels */
 static const unsigned char ink[3] = {38, 42, 50}, soft_ink[3] = {112, 118, 128};
 
 static double number_at(const vgi_tint *t, double share)
@@ -33,21 +33,17 @@ static void put_ticks(vgi_canvas *c, const vgi_tint *t, size_t x, size_t y, size
         double share = (double)i / (double)parts, at = (double)x + (double)(w - 1) * share;
         vgi_tint_number(t, number_at(t, share), text);
         for (size_t j = 0; j < 4; j++) memcpy(c->rgb + 3 * ((y + j) * c->w + (size_t)at), soft_ink, 3);
-        double left = fmax(at - vgi_text_width(dot, text) / 2, (double)x);
-        left = fmin(left, (double)(x + w) - vgi_text_width(dot, text));
-        vgi_text(c, floor(left), (double)y + 7, dot, ink, text);
+        double width = vgi_text_width(c->font, size, text), left = fmax(at - width / 2, (double)x);
+        vgi_text(c, fmin(left, (double)(x + w) - width), (double)y + 16, &(vgi_lettering){ink, size, 0, 0}, text);
     }
 }
 
 void vgi_legend(vgi_canvas *c, const vgi_tint *t, const vgi_palette *p, size_t margin, const char *title,
                 const char *note)
 {
-    char text[512];
     size_t room = c->w - 2 * margin, w = room < BAR_WIDTH ? room : BAR_WIDTH;
-    vgi_text_fit(text, sizeof text, dot, (double)room, title);
-    vgi_text(c, (double)margin, 4, dot, ink, text);
+    vgi_text(c, (double)margin, 13, &(vgi_lettering){ink, size, 0, (double)room}, title);
     put_bar(c, t, p, margin, 20, w);
     put_ticks(c, t, margin, 20 + BAR_HEIGHT, w);
-    vgi_text_fit(text, sizeof text, dot, (double)room, note);
-    vgi_text(c, (double)margin, 20 + BAR_HEIGHT + 24, dot, soft_ink, text);
+    vgi_text(c, (double)margin, 20 + BAR_HEIGHT + 33, &(vgi_lettering){soft_ink, size, 0, (double)room}, note);
 }

@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static const double caption_dot = 1.5;
+static const double caption_size = 14;
 static const unsigned char ink[3] = {38, 42, 50};
 
 /* Time of picture i in milliseconds: from the times of the frames if all have one and they increase. */
@@ -33,19 +33,18 @@ static const vgi_row *longest_of(const vg_sheet *s)
 /* Picture i of all sequences, side by side. */
 static int compose(const vg_sheet *s, size_t i, vgi_canvas *c, unsigned char *rgb, vg_err *e)
 {
-    vgi_canvas_clear(c);
+    vgi_canvas_wipe(c);
     for (size_t k = 0; k < s->nsequences; k++) {
         int r = vgi_sheet_draw(s, s->at + k, i, rgb, e);
         if (r < 0) return r;
         size_t x = MARGIN + k * (s->o.width + MARGIN);
         vgi_canvas_paste(c, x, 0, rgb, s->o.width, s->o.height);
         if (s->nsequences > 1) {
-            char text[TEXT_BYTES];
-            vgi_text_fit(text, sizeof text, caption_dot, (double)s->o.width, s->at[k].label);
-            vgi_canvas_centre(c, (double)x + (double)s->o.width / 2, (double)s->o.height + 8, caption_dot, ink, text);
+            double width = (double)s->o.width;
+            vgi_text(c, (double)x + width / 2, (double)s->o.height + 18, &(vgi_lettering){ink, caption_size, 0.5, width}, s->at[k].label);
         }
     }
-    return VG_OK;
+    return vgi_font_check(c->font, e);
 }
 
 typedef struct movie { /* `threads` pictures are drawn at a time */
@@ -89,15 +88,14 @@ int vgi_movie_write(const vg_sheet *s, int fd, const char *name, vg_err *e)
     vg_bytes file = {0};
     int r = m.canvas && m.rgb && m.err ? vgi_webp_open(&webp, w, h, e) : VG_ENOMEM;
     for (size_t i = 0; i < threads && r == VG_OK; i++) {
-        m.canvas[i] = (vgi_canvas){w, h, vgi_array_raw(w * h, 3, e)};
-        m.rgb[i] = vgi_array_raw(s->o.width * s->o.height, 3, e);
-        if (!m.canvas[i].rgb || !m.rgb[i]) r = VG_ENOMEM;
+        r = vgi_canvas_init(m.canvas + i, w, h, e);
+        if (r == VG_OK && !(m.rgb[i] = vgi_array_raw(s->o.width * s->o.height, 3, e))) r = VG_ENOMEM;
     }
     if (r == VG_OK) r = encode_pictures(&m, webp, threads, e);
     int last = r == VG_OK ? time_of(s, longest_of(s), s->n - 1) : 0;
     if (r == VG_OK) r = vgi_webp_end(webp, s->n > 1 ? last + last / (int)(s->n - 1) : 1000, &file, e);
     if (r == VG_OK) r = vgi_write_all(fd, file.data, file.size, name, e);
-    for (size_t i = 0; i < threads && m.canvas && m.rgb; i++) free(m.canvas[i].rgb), free(m.rgb[i]);
+    for (size_t i = 0; i < threads && m.canvas && m.rgb; i++) vgi_canvas_clear(m.canvas + i), free(m.rgb[i]);
     free(m.canvas);
     free(m.rgb);
     free(m.err);

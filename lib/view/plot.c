@@ -13,7 +13,6 @@ enum { /* lengths in pixels */
     TICKS = 40,                /* most per axis */
     LETTER = 12                /* size of the font */
 };
-static const double dot = 1.25; /* of the stroke font, for LETTER */
 static const unsigned char ink[3] = {38, 42, 50}, soft[3] = {112, 118, 128}, faint[3] = {226, 229, 233};
 /* distinguishable also by colour-blind people, and in grey */
 static const unsigned char colours[VG_PLOT_SERIES][3] = {{31, 95, 168}, {216, 96, 20}, {90, 90, 90}, {20, 140, 110}, {150, 60, 140}, {190, 150, 10}};
@@ -115,8 +114,8 @@ static void draw_text(plot *p, double x, double y, enum anchor anchor, bool stro
     static const char *const anchors[] = {"start", "middle", "end"};
     char n[2][VGI_NUMBER];
     if (!p->svg) {
-        double size = strong ? 1.2 * dot : dot, width = vgi_text_width(size, text);
-        vgi_text(&p->canvas, x - (anchor == MIDDLE ? width / 2 : anchor == END ? width : 0), y - VGI_TEXT_HEIGHT * size, size, c, text);
+        double share = anchor == MIDDLE ? 0.5 : anchor == END ? 1 : 0;
+        vgi_text(&p->canvas, x, y, &(vgi_lettering){c, strong ? 1.2 * LETTER : LETTER, share, 0}, text);
         return;
     }
     place(x, n[0]), place(y, n[1]);
@@ -229,12 +228,12 @@ static void draw_bars(plot *p, const vg_series *v, const axis *x, const axis *y,
         if (v->y[i] > 0) draw_bar(p, at(x, v->x[i]) + 0.5, at(y, v->y[i]), at(x, v->x[i + 1]) - 0.5, y->from, colour);
 }
 
-/* Names to the right of the title, the last one at the edge; widths are those of the stroke font. */
+/* Names to the right of the title, the last one at the edge; widths are those of the font of PNG pictures. */
 static void draw_legend(plot *p, const vg_chart *c, double top)
 {
     double left = WIDTH - RIGHT;
     for (size_t s = c->n; s-- > 0; left -= 46) {
-        left -= vgi_text_width(dot, c->series[s].name);
+        left -= vgi_text_width(p->canvas.font, LETTER, c->series[s].name);
         draw_text(p, left, top + 34, START, false, ink, c->series[s].name);
         draw_line(p, left - 26, top + 30, left - 8, top + 30, 3, colours[s]);
     }
@@ -270,21 +269,19 @@ int vg_plot_write(const vg_chart *charts, size_t n, bool svg, int fd, const char
     for (size_t i = 0; i < n; i++)
         if (charts[i].n > VG_PLOT_SERIES || (charts[i].bars && charts[i].n > 1))
             return vg_fail(e, VG_EARG, "a chart has at most %d curves, or one row of bars", VG_PLOT_SERIES);
-    plot p = {.svg = svg, .e = e, .canvas = {.w = WIDTH, .h = n * HEIGHT}};
-    if (svg) {
+    plot p = {.svg = svg, .e = e};
+    int r = vgi_canvas_init(&p.canvas, WIDTH, n * HEIGHT, e); /* of an SVG only the font is used */
+    if (r < 0) goto out;
+    if (svg)
         say(&p, "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%zu\" viewBox=\"0 0 %d %zu\" "
             "font-family=\"sans-serif\" font-size=\"%d\" fill=\"none\">\n<rect width=\"100%%\" height=\"100%%\" fill=\"#fff\"/>\n",
             WIDTH, p.canvas.h, WIDTH, p.canvas.h, LETTER);
-    } else {
-        p.canvas.rgb = vgi_array(3 * p.canvas.w * p.canvas.h, 1, e);
-        if (!p.canvas.rgb) return VG_ENOMEM;
-        memset(p.canvas.rgb, 255, 3 * p.canvas.w * p.canvas.h);
-    }
     for (size_t i = 0; i < n; i++) draw_chart(&p, charts + i, (double)(i * HEIGHT));
     if (svg) say(&p, "</svg>\n");
-    int r = p.failed;
-    if (r >= 0) r = svg ? vgi_write_all(fd, p.text, p.size, name, e) : write_png(&p, fd, name, e);
+    r = p.failed < 0 ? p.failed : vgi_font_check(p.canvas.font, e);
+    if (r == VG_OK) r = svg ? vgi_write_all(fd, p.text, p.size, name, e) : write_png(&p, fd, name, e);
+out:
     free(p.text);
-    free(p.canvas.rgb);
+    vgi_canvas_clear(&p.canvas);
     return r;
 }

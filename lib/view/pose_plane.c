@@ -23,7 +23,7 @@ enum { /* lengths in pixels */
     OVERSAMPLING = 3,
     PARTS = 16         /* segments of the curve per frame interval */
 };
-static const double title_dot = 1.75, text_dot = 1.25;
+static const double title_size = 17, text_size = 12; /* of the font, in pixels */
 static const unsigned char ink[3] = {38, 42, 50}, soft_ink[3] = {112, 118, 128}, faint[3] = {206, 210, 216}, white[3] = {255, 255, 255},
                            alarm[3] = {205, 30, 40};
 
@@ -218,24 +218,18 @@ static int draw_pose(const chart *c, size_t i, unsigned char *rgb, vg_err *e)
     return r;
 }
 
-static void put_centred(vgi_canvas *c, double middle, double y, double dot, const unsigned char colour[3], const char *text)
-{
-    vgi_text(c, floor(middle - vgi_text_width(dot, text) / 2), floor(y), dot, colour, text);
-}
-
 static int put_poses(chart *c, vg_err *e)
 {
     unsigned char *rgb = vgi_array(POSE * POSE, 3, e);
     int r = rgb ? VG_OK : VG_ENOMEM;
     for (size_t i = 0; r == VG_OK && i < c->nposes; i++) {
-        char text[300], name[300];
+        char name[300];
         size_t left = (size_t)(c->slot[i].x - POSE / 2.0), top = (size_t)(c->slot[i].y - POSE / 2.0);
         if ((r = draw_pose(c, i, rgb, e)) < 0) break;
         for (size_t y = 0; y < POSE; y++)
             memcpy(c->canvas.rgb + 3 * ((top + y) * WIDTH + left), rgb + 3 * y * POSE, 3 * POSE);
         snprintf(name, sizeof name, "%zu: %.200s", c->frame[i].index + 1, c->s->names[c->frame[i].index]);
-        vgi_text_fit(text, sizeof text, text_dot, POSE + 2 * GAP, name);
-        put_centred(&c->canvas, c->slot[i].x, c->slot[i].y + POSE / 2.0 + 3, text_dot, soft_ink, text);
+        vgi_text(&c->canvas, c->slot[i].x, c->slot[i].y + POSE / 2.0 + 12, &(vgi_lettering){soft_ink, text_size, 0.5, POSE + 2 * GAP}, name);
     }
     free(rgb);
     return r;
@@ -322,7 +316,7 @@ static void put_ends(chart *c)
         to_canvas(c, c->trace.position + (i ? 2 * (c->trace.n - 1) : 0), at);
         vgi_paint_disc(&c->canvas, at, 6, ink);
         vgi_paint_disc(&c->canvas, at, 3, white);
-        vgi_text(&c->canvas, floor(at[0]) + 10, floor(at[1]) + (i ? 8 : -14), text_dot, ink, words[i]);
+        vgi_text(&c->canvas, at[0] + 10, at[1] + (i ? 17 : -5), &(vgi_lettering){ink, text_size, 0, 0}, words[i]);
     }
 }
 
@@ -331,15 +325,15 @@ static void put_words(chart *c)
     const vg_signal *s = c->s;
     char text[400];
     snprintf(text, sizeof text, "%zu frames, %zu control points, %zu sites, %zu shape coordinates", s->n, s->k, s->l, s->m);
-    put_centred(&c->canvas, WIDTH / 2.0, 14, title_dot, ink, text);
+    vgi_text(&c->canvas, WIDTH / 2.0, 27, &(vgi_lettering){ink, title_size, 0.5, WIDTH}, text);
     snprintf(text, sizeof text, "dots: frames, ringed: sites; squares: control points; crosses: where the curve crosses itself, %zu times",
              c->trace.ncrossings);
-    put_centred(&c->canvas, WIDTH / 2.0, HEIGHT - VGI_LEGEND - KEY + 8, text_dot, soft_ink, text);
+    vgi_text(&c->canvas, WIDTH / 2.0, HEIGHT - VGI_LEGEND - KEY + 17, &(vgi_lettering){soft_ink, text_size, 0.5, WIDTH}, text);
 }
 
 static void put_legend(chart *c)
 {
-    vgi_canvas strip = {.w = WIDTH, .h = VGI_LEGEND, .rgb = c->canvas.rgb + 3 * WIDTH * (HEIGHT - VGI_LEGEND)};
+    vgi_canvas strip = {.w = WIDTH, .h = VGI_LEGEND, .font = c->canvas.font, .rgb = c->canvas.rgb + 3 * WIDTH * (HEIGHT - VGI_LEGEND)};
     vgi_legend(&strip, &c->tint, &c->palette, GAP, c->s->space == VG_SPACE_VERTICES ? "rms distance of the vertices from a cubic spline through the frames, D"
                                                 : "distance of the shapes from a cubic spline through the frames", "");
 }
@@ -353,7 +347,6 @@ static int draw(chart *c, vg_err *e)
     if (r == VG_OK) r = sample_poses(c, e);
     if (r < 0) return r;
     place_camera(c);
-    memset(c->canvas.rgb, 255, 3 * WIDTH * HEIGHT);
     put_leaders(c);
     if ((r = put_poses(c, e)) < 0) return r;
     put_controls(c);
@@ -363,7 +356,7 @@ static int draw(chart *c, vg_err *e)
     put_ends(c);
     put_words(c);
     put_legend(c);
-    return VG_OK;
+    return vgi_font_check(c->canvas.font, e);
 }
 
 static int write_picture(const chart *c, int fd, const char *name, vg_err *e)
@@ -378,16 +371,16 @@ static int write_picture(const chart *c, int fd, const char *name, vg_err *e)
 
 int vg_plane_write(const vg_head *h, const vg_plane_options *o, int fd, const char *name, vg_err *e)
 {
-    chart c = {.h = h, .s = &h->signal, .o = o, .canvas = {.w = WIDTH, .h = HEIGHT}};
+    chart c = {.h = h, .s = &h->signal, .o = o};
     if (!h->signal.n) return vg_fail(e, VG_EINPUT, "there is no signal to be drawn");
     int r = vg_signal_trace(&c.trace, c.s, PARTS, e);
-    if (r == VG_OK && !(c.canvas.rgb = vgi_array(WIDTH * HEIGHT, 3, e))) r = VG_ENOMEM;
+    if (r == VG_OK) r = vgi_canvas_init(&c.canvas, WIDTH, HEIGHT, e);
     if (r == VG_OK) r = draw(&c, e);
     if (r == VG_OK) r = write_picture(&c, fd, name, e);
     vg_trace_clear(&c.trace);
     vgi_figure_clear(&c.figure);
     vgi_tint_clear(&c.tint);
-    free(c.canvas.rgb);
+    vgi_canvas_clear(&c.canvas);
     free(c.points);
     return r;
 }

@@ -7,8 +7,8 @@
 #include <math.h>
 #include <stdio.h>
 
-static const double title_dot = 1.75, caption_dot = 1.5, small_dot = 1.25;
-static const unsigned char page[3] = {255, 255, 255}, ink[3] = {38, 42, 50}, soft_ink[3] = {112, 118, 128};
+static const double title_size = 17, caption_size = 14, small_size = 12; /* of the font, in pixels */
+static const unsigned char ink[3] = {38, 42, 50}, soft_ink[3] = {112, 118, 128};
 
 /* Points further away than this, in D, cannot be drawn together with the figure. */
 #define MOST_DISTANCE 1e9
@@ -390,17 +390,6 @@ static void draw_task(void *context, size_t i)
 
 /* ---- the page ---- */
 
-void vgi_canvas_clear(vgi_canvas *c)
-{
-    for (size_t i = 0; i < c->w * c->h; i++) memcpy(c->rgb + 3 * i, page, 3);
-}
-
-void vgi_canvas_centre(vgi_canvas *c, double middle, double y, double dot, const unsigned char colour[3],
-                        const char *text)
-{
-    vgi_text(c, floor(middle - vgi_text_width(dot, text) / 2), y, dot, colour, text);
-}
-
 void vgi_canvas_paste(vgi_canvas *c, size_t x, size_t y, const unsigned char *rgb, size_t w, size_t h)
 {
     for (size_t j = 0; j < h; j++) memcpy(c->rgb + 3 * ((y + j) * c->w + x), rgb + 3 * j * w, 3 * w);
@@ -417,15 +406,13 @@ static void print_label(char *to, size_t size, const vgi_shot *shot)
 
 static void put_caption(const vg_sheet *s, vgi_canvas *c, size_t x, const vgi_shot *shot)
 {
-    char text[TEXT_BYTES], line[TEXT_BYTES];
-    double middle = (double)x + (double)s->o.width / 2, y = (double)s->o.height + 8;
+    char line[TEXT_BYTES];
+    double width = (double)s->o.width, middle = (double)x + width / 2, y = (double)s->o.height + 18;
     print_label(line, sizeof line, shot);
-    vgi_text_fit(text, sizeof text, caption_dot, (double)s->o.width, line);
-    vgi_canvas_centre(c, middle, y, caption_dot, ink, text);
+    vgi_text(c, middle, y, &(vgi_lettering){ink, caption_size, 0.5, width}, line);
     if (!shot->has_numbers) return;
     vgi_tint_caption(&s->tint, &shot->spread, line, sizeof line);
-    vgi_text_fit(text, sizeof text, small_dot, (double)s->o.width, line);
-    vgi_canvas_centre(c, middle, y + CAPTION - 4, small_dot, soft_ink, text);
+    vgi_text(c, middle, y + CAPTION - 5, &(vgi_lettering){soft_ink, small_size, 0.5, width}, line);
 }
 
 /* Where an extreme value occurs: "1.5 in 'pose3'"; with several sequences, also in which one. */
@@ -454,19 +441,16 @@ static void put_legend(const vg_sheet *s, vgi_canvas *c)
 
 static void put_title(vgi_canvas *c, const vgi_row *q)
 {
-    char text[TEXT_BYTES];
-    vgi_text_fit(text, sizeof text, title_dot, (double)(c->w - 2 * MARGIN), q->label);
-    vgi_text(c, MARGIN, 2, title_dot, ink, text);
+    vgi_text(c, MARGIN, 15, &(vgi_lettering){ink, title_size, 0, (double)(c->w - 2 * MARGIN)}, q->label);
 }
 
 static void put_footer(const vg_sheet *s, vgi_canvas *c)
 {
-    char text[TEXT_BYTES], line[TEXT_BYTES], spacing[32];
+    char line[TEXT_BYTES], spacing[32];
     vgi_print_number(spacing, sizeof spacing, "%.3g", nice_spacing(s->at));
     snprintf(line, sizeof line, "grid lines are %s apart%s%s", spacing, s->nsequences > 1 ? " in " : "",
              s->nsequences > 1 ? s->at->label : "");
-    vgi_text_fit(text, sizeof text, small_dot, (double)(c->w - 2 * MARGIN), line);
-    vgi_text(c, MARGIN, 4, small_dot, soft_ink, text);
+    vgi_text(c, MARGIN, 13, &(vgi_lettering){soft_ink, small_size, 0, (double)(c->w - 2 * MARGIN)}, line);
 }
 
 /* ---- the sheet ---- */
@@ -490,11 +474,10 @@ static int open_press(press *p, const vg_sheet *s, int fd, const char *name, vg_
     size_t h = MARGIN + rows * (line + title_height(s)) + footer_height(s);
     int r = vgi_png_open(&p->png, fd, name, w, h, e);
     if (r < 0) return r;
-    p->canvas = (vgi_canvas){w, line > VGI_LEGEND ? line : VGI_LEGEND, NULL};
-    p->canvas.rgb = vgi_array_raw(p->canvas.w * p->canvas.h, 3, e); /* both below 2^20 */
+    if ((r = vgi_canvas_init(&p->canvas, w, line > VGI_LEGEND ? line : VGI_LEGEND, e)) < 0) return r; /* both below 2^20 */
     p->row = (row){.s = s, .rgb = vgi_array(s->columns, sizeof *p->row.rgb, e),
                    .err = vgi_array(s->columns, sizeof *p->row.err, e)};
-    if (!p->canvas.rgb || !p->row.rgb || !p->row.err) return VG_ENOMEM;
+    if (!p->row.rgb || !p->row.err) return VG_ENOMEM;
     for (size_t i = 0; i < s->columns; i++)
         if (!(p->row.rgb[i] = vgi_array_raw(s->o.width * s->o.height, 3, e))) return VG_ENOMEM;
     return VG_OK;
@@ -506,7 +489,7 @@ static void close_press(press *p, size_t columns)
     for (size_t i = 0; p->row.rgb && i < columns; i++) free(p->row.rgb[i]);
     free(p->row.rgb);
     free(p->row.err);
-    free(p->canvas.rgb);
+    vgi_canvas_clear(&p->canvas);
 }
 
 static int print_row(press *p, const vg_sheet *s, const vgi_row *q, size_t first, vg_err *e)
@@ -514,12 +497,12 @@ static int print_row(press *p, const vg_sheet *s, const vgi_row *q, size_t first
     size_t n = s->n - first < s->columns ? s->n - first : s->columns;
     p->row.first = first, p->row.of = q;
     vgi_parallel(s->o.threads, n, draw_task, &p->row);
-    vgi_canvas_clear(&p->canvas);
+    vgi_canvas_wipe(&p->canvas);
     if (title_height(s)) {
         put_title(&p->canvas, q);
         int r = vgi_png_rows(p->png, p->canvas.rgb, TITLE, e);
         if (r < 0) return r;
-        vgi_canvas_clear(&p->canvas);
+        vgi_canvas_wipe(&p->canvas);
     }
     for (size_t i = 0; i < n; i++) {
         size_t x = MARGIN + i * (s->o.width + MARGIN);
@@ -535,20 +518,21 @@ static int print_row(press *p, const vg_sheet *s, const vgi_row *q, size_t first
 
 static int print_sheet(press *p, const vg_sheet *s, vg_err *e)
 {
-    vgi_canvas_clear(&p->canvas);
+    vgi_canvas_wipe(&p->canvas);
     int r = vgi_png_rows(p->png, p->canvas.rgb, MARGIN, e);
     for (size_t first = 0; r == VG_OK && first < s->n; first += s->columns)
         for (size_t k = 0; r == VG_OK && k < s->nsequences; k++) r = print_row(p, s, s->at + k, first, e);
     if (r == VG_OK && s->o.ground) {
-        vgi_canvas_clear(&p->canvas);
+        vgi_canvas_wipe(&p->canvas);
         put_footer(s, &p->canvas);
         r = vgi_png_rows(p->png, p->canvas.rgb, FOOTER, e);
     }
     if (r == VG_OK && s->tinted) {
-        vgi_canvas_clear(&p->canvas);
+        vgi_canvas_wipe(&p->canvas);
         put_legend(s, &p->canvas);
         r = vgi_png_rows(p->png, p->canvas.rgb, VGI_LEGEND, e);
     }
+    if (r == VG_OK) r = vgi_font_check(p->canvas.font, e);
     return r == VG_OK ? vgi_png_end(p->png, e) : r;
 }
 

@@ -53,9 +53,6 @@ static inline const vgi_shot *shot_of(const vgi_row *q, size_t i)
 
 /* vgi_sheet_draw: picture i of a sequence, o.width x o.height pixels, RGB. */
 int vgi_sheet_draw(const vg_sheet *s, const vgi_row *q, size_t i, unsigned char *rgb, vg_err *e) VG_MUST_CHECK;
-void vgi_canvas_clear(vgi_canvas *c); /* white */
-void vgi_canvas_centre(vgi_canvas *c, double middle, double y, double dot, const unsigned char colour[3],
-                       const char *text);
 void vgi_canvas_paste(vgi_canvas *c, size_t x, size_t y, const unsigned char *rgb, size_t w, size_t h);
 
 /* vgi_movie_write: the pictures of all sequences one after another, as an animated WebP. */

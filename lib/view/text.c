@@ -1,213 +1,226 @@
-/* text.c: a small stroke font for captions: dots on a 5 x 9 grid joined to strokes, drawable at any size. ASCII
- * only.
+/* text.c: lines of text in a real font, in any script for which the machine has one. The only file that includes FreeType
+ * and Fontconfig. Leaves out what the scripts of India and Arabic need beyond one glyph after another.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "view/view.h"
 
+#include <fontconfig/fontconfig.h>
+#include <limits.h>
 #include <math.h>
+/* In place of FreeType's table of library functions, which names some that banned.h bans. */
+#define FT_CONFIG_STANDARD_LIBRARY_H <stddef.h>
+#define ft_ptrdiff_t ptrdiff_t
+#define FT_CHAR_BIT CHAR_BIT
+#define FT_INT_MAX INT_MAX
+#define FT_UINT_MAX UINT_MAX
+#define FT_LONG_MAX LONG_MAX
+#define FT_ULONG_MAX ULONG_MAX
+#include <ft2build.h>
+#include FT_FREETYPE_H
+#include FT_ERRORS_H
 
-enum { COLUMNS = 5, ROWS = 9, FIRST = 32, LAST = 126 };
+enum { FACES = 6 };
+/* The package fonts-dejavu-core. Opened without Fontconfig, so that most pictures look the same on every machine. */
+static const char first_choice[] = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
+static const char ellipsis[] = "\xe2\x80\xa6";
 
-/* A row of a glyph is five bits, the highest on the left. Capitals stand on row 6; rows 7 and 8 are below the
- * baseline. */
-static const unsigned char glyphs[LAST - FIRST + 1][ROWS] = {
-    {0},                                    /* space */
-    {4, 4, 4, 4, 4, 0, 4},                  /* ! */
-    {10, 10, 10},                           /* " */
-    {10, 10, 31, 10, 31, 10, 10},           /* # */
-    {4, 15, 20, 14, 5, 30, 4},              /* $ */
-    {24, 25, 2, 4, 8, 19, 3},               /* % */
-    {12, 18, 20, 8, 21, 18, 13},            /* & */
-    {4, 4, 4},                              /* ' */
-    {2, 4, 8, 8, 8, 4, 2},                  /* ( */
-    {8, 4, 2, 2, 2, 4, 8},                  /* ) */
-    {0, 4, 21, 14, 21, 4},                  /* * */
-    {0, 4, 4, 31, 4, 4},                    /* + */
-    {0, 0, 0, 0, 0, 0, 4, 8},               /* , */
-    {0, 0, 0, 14},                          /* - */
-    {0, 0, 0, 0, 0, 0, 4},                  /* . */
-    {1, 1, 2, 4, 8, 16, 16},                /* / */
-    {14, 17, 17, 21, 17, 17, 14},           /* 0 */
-    {4, 12, 4, 4, 4, 4, 14},                /* 1 */
-    {14, 17, 1, 2, 4, 8, 31},               /* 2 */
-    {14, 17, 1, 6, 1, 17, 14},              /* 3 */
-    {2, 4, 8, 18, 31, 2, 2},                /* 4 */
-    {31, 16, 30, 1, 1, 17, 14},             /* 5 */
-    {6, 8, 16, 30, 17, 17, 14},             /* 6 */
-    {31, 1, 2, 2, 4, 4, 4},                 /* 7 */
-    {14, 17, 17, 14, 17, 17, 14},           /* 8 */
-    {14, 17, 17, 15, 1, 2, 12},             /* 9 */
-    {0, 0, 4, 0, 0, 0, 4},                  /* : */
-    {0, 0, 4, 0, 0, 0, 4, 8},               /* ; */
-    {0, 2, 4, 8, 4, 2},                     /* < */
-    {0, 0, 31, 0, 31},                      /* = */
-    {0, 8, 4, 2, 4, 8},                     /* > */
-    {14, 17, 1, 2, 4, 0, 4},                /* ? */
-    {14, 17, 23, 21, 23, 16, 14},           /* @ */
-    {4, 10, 17, 17, 31, 17, 17},            /* A */
-    {30, 17, 17, 30, 17, 17, 30},           /* B */
-    {14, 17, 16, 16, 16, 17, 14},           /* C */
-    {30, 17, 17, 17, 17, 17, 30},           /* D */
-    {31, 16, 16, 30, 16, 16, 31},           /* E */
-    {31, 16, 16, 30, 16, 16, 16},           /* F */
-    {14, 17, 16, 19, 17, 17, 14},           /* G */
-    {17, 17, 17, 31, 17, 17, 17},           /* H */
-    {14, 4, 4, 4, 4, 4, 14},                /* I */
-    {7, 2, 2, 2, 2, 18, 12},                /* J */
-    {17, 18, 20, 24, 20, 18, 17},           /* K */
-    {16, 16, 16, 16, 16, 16, 31},           /* L */
-    {17, 27, 21, 17, 17, 17, 17},           /* M */
-    {17, 17, 25, 21, 19, 17, 17},           /* N */
-    {14, 17, 17, 17, 17, 17, 14},           /* O */
-    {30, 17, 17, 30, 16, 16, 16},           /* P */
-    {14, 17, 17, 17, 21, 18, 13},           /* Q */
-    {30, 17, 17, 30, 20, 18, 17},           /* R */
-    {14, 17, 16, 14, 1, 17, 14},            /* S */
-    {31, 4, 4, 4, 4, 4, 4},                 /* T */
-    {17, 17, 17, 17, 17, 17, 14},           /* U */
-    {17, 17, 17, 17, 17, 10, 4},            /* V */
-    {17, 17, 17, 17, 21, 27, 17},           /* W */
-    {17, 17, 10, 4, 10, 17, 17},            /* X */
-    {17, 17, 10, 4, 4, 4, 4},               /* Y */
-    {31, 1, 2, 4, 8, 16, 31},               /* Z */
-    {14, 8, 8, 8, 8, 8, 14},                /* [ */
-    {16, 16, 8, 4, 2, 1, 1},                /* \ */
-    {14, 2, 2, 2, 2, 2, 14},                /* ] */
-    {4, 10, 17},                            /* ^ */
-    {0, 0, 0, 0, 0, 0, 0, 31},              /* _ */
-    {8, 4},                                 /* ` */
-    {0, 0, 14, 1, 15, 17, 15},              /* a */
-    {16, 16, 30, 17, 17, 17, 30},           /* b */
-    {0, 0, 14, 17, 16, 17, 14},             /* c */
-    {1, 1, 15, 17, 17, 17, 15},             /* d */
-    {0, 0, 14, 17, 31, 16, 15},             /* e */
-    {3, 4, 14, 4, 4, 4, 4},                 /* f */
-    {0, 0, 15, 17, 17, 17, 15, 1, 14},      /* g */
-    {16, 16, 30, 17, 17, 17, 17},           /* h */
-    {4, 0, 12, 4, 4, 4, 14},                /* i */
-    {2, 0, 6, 2, 2, 2, 2, 2, 12},           /* j */
-    {16, 16, 17, 18, 28, 18, 17},           /* k */
-    {12, 4, 4, 4, 4, 4, 14},                /* l */
-    {0, 0, 30, 21, 21, 21, 21},             /* m */
-    {0, 0, 30, 17, 17, 17, 17},             /* n */
-    {0, 0, 14, 17, 17, 17, 14},             /* o */
-    {0, 0, 30, 17, 17, 17, 30, 16, 16},     /* p */
-    {0, 0, 15, 17, 17, 17, 15, 1, 1},       /* q */
-    {0, 0, 11, 12, 8, 8, 8},                /* r */
-    {0, 0, 15, 16, 14, 1, 30},              /* s */
-    {4, 4, 14, 4, 4, 4, 3},                 /* t */
-    {0, 0, 17, 17, 17, 17, 15},             /* u */
-    {0, 0, 17, 17, 17, 10, 4},              /* v */
-    {0, 0, 17, 17, 21, 21, 10},             /* w */
-    {0, 0, 17, 10, 4, 10, 17},              /* x */
-    {0, 0, 17, 17, 17, 17, 15, 1, 14},      /* y */
-    {0, 0, 31, 2, 4, 8, 31},                /* z */
-    {2, 4, 4, 8, 4, 4, 2},                  /* { */
-    {4, 4, 4, 4, 4, 4, 4},                  /* | */
-    {8, 4, 4, 2, 4, 4, 8},                  /* } */
-    {0, 0, 8, 21, 2},                       /* ~ */
+struct vgi_font {
+    FT_Library library;
+    FcConfig *config;   /* NULL until a character is missing in the faces so far */
+    FT_Face face[FACES];
+    size_t n;
+    uint32_t missing;   /* the last character that no font has */
+    int failed;         /* VG_OK, or the first error */
 };
-static const unsigned char unknown[ROWS] = {31, 17, 17, 17, 17, 17, 31};
 
-/* The glyph of the next code point; advances the position. */
-static const unsigned char *next_glyph(const char **text)
+static void remember(vgi_font *f, FT_Error error)
 {
-    unsigned char c = (unsigned char)*(*text)++;
-    if (c >= FIRST && c <= LAST) return glyphs[c - FIRST];
-    while (((unsigned char)**text & 0xc0) == 0x80) (*text)++;
-    return unknown;
+    if (error && f->failed == VG_OK) f->failed = FT_ERROR_BASE(error) == FT_Err_Out_Of_Memory ? VG_ENOMEM : VG_ESYS;
 }
 
-static size_t glyph_count(const char *text)
+static void open_face(vgi_font *f, const char *file, long index)
 {
-    size_t n = 0;
-    for (; *text; n++) next_glyph(&text);
-    return n;
+    FT_Error error = FT_New_Face(f->library, file, index, f->face + f->n);
+    if (FT_ERROR_BASE(error) == FT_Err_Out_Of_Memory) remember(f, error);
+    if (!error) f->n++;
 }
 
-static bool lit(const unsigned char *glyph, int x, int y)
+/* The font of the system that has the character, after the fonts opened so far. */
+static void find_face(vgi_font *f, uint32_t character)
 {
-    return x >= 0 && x < COLUMNS && y >= 0 && y < ROWS && glyph[y] >> (COLUMNS - 1 - x) & 1;
-}
-
-static double to_stroke(double x, double y, int dx, int dy)
-{
-    double t = fmin(fmax((x * dx + y * dy) / (double)(dx * dx + dy * dy), 0), 1);
-    return hypot(x - t * dx, y - t * dy);
-}
-
-/* Distance, in dots, from a point to the nearest stroke. Neighbouring dots are joined; diagonal ones only if no
- * dot beside them already joins them, which keeps corners sharp. */
-static double to_glyph(const unsigned char *glyph, double x, double y)
-{
-    double least = 9;
-    for (int j = 0; j < ROWS; j++)
-        for (int i = 0; i < COLUMNS; i++) {
-            double ox = x - i, oy = y - j;
-            if (!lit(glyph, i, j) || fabs(ox) > 2.5 || fabs(oy) > 2.5) continue;
-            least = fmin(least, hypot(ox, oy));
-            if (lit(glyph, i + 1, j)) least = fmin(least, to_stroke(ox, oy, 1, 0));
-            if (lit(glyph, i, j + 1)) least = fmin(least, to_stroke(ox, oy, 0, 1));
-            for (int side = -1; side <= 1; side += 2)
-                if (lit(glyph, i + side, j + 1) && !lit(glyph, i + side, j) && !lit(glyph, i, j + 1))
-                    least = fmin(least, to_stroke(ox, oy, side, 1));
-        }
-    return least;
-}
-
-static void draw_glyph(vgi_canvas *c, double x, double y, double dot, const unsigned char colour[3],
-                       const unsigned char *glyph)
-{
-    double thick = fmax(0.5 * dot, 0.55); /* half the stroke width, in pixels */
-    long x0 = (long)floor(x - 1), x1 = (long)ceil(x + COLUMNS * dot + 1);
-    long y0 = (long)floor(y - 1), y1 = (long)ceil(y + ROWS * dot + 1);
-    for (long py = y0 < 0 ? 0 : y0; py < y1 && py < (long)c->h; py++)
-        for (long px = x0 < 0 ? 0 : x0; px < x1 && px < (long)c->w; px++) {
-            double off =
-                to_glyph(glyph, ((double)px + 0.5 - x) / dot - 0.5, ((double)py + 0.5 - y) / dot - 0.5) * dot;
-            double cover = fmin(fmax(thick + 0.5 - off, 0), 1);
-            unsigned char *p = c->rgb + 3 * ((size_t)py * c->w + (size_t)px);
-            for (int k = 0; k < 3 && cover > 0; k++) p[k] = (unsigned char)(p[k] + cover * (colour[k] - p[k]) + 0.5);
-        }
-}
-
-void vgi_text(vgi_canvas *c, double x, double y, double dot, const unsigned char colour[3], const char *text)
-{
-    for (; *text; x += VGI_TEXT_ADVANCE * dot) draw_glyph(c, x, y, dot, colour, next_glyph(&text));
-}
-
-double vgi_text_width(double dot, const char *text)
-{
-    size_t n = glyph_count(text);
-    return n ? dot * (double)(n * VGI_TEXT_ADVANCE - 1) : 0;
-}
-
-/* Copy n glyphs after the first `skip`, as far as they fit. Returns the end. */
-static char *copy_glyphs(char *to, const char *end, const char *text, size_t skip, size_t n)
-{
-    for (; skip > 0 && *text; skip--) next_glyph(&text);
-    for (; n > 0 && *text; n--) {
-        const char *from = text;
-        next_glyph(&text);
-        if (text - from >= end - to) break;
-        memcpy(to, from, (size_t)(text - from));
-        to += text - from;
+    FcResult result;
+    FcChar8 *file;
+    int index = 0;
+    if (!f->config && !(f->config = FcInitLoadConfigAndFonts())) return;
+    FcPattern *pattern = FcPatternCreate(), *match = NULL;
+    FcCharSet *set = FcCharSetCreate();
+    if (pattern && set && FcCharSetAddChar(set, character) && FcPatternAddCharSet(pattern, FC_CHARSET, set) &&
+        FcPatternAddBool(pattern, FC_SCALABLE, FcTrue) && FcConfigSubstitute(f->config, pattern, FcMatchPattern)) {
+        FcDefaultSubstitute(pattern);
+        match = FcFontMatch(f->config, pattern, &result);
     }
-    *to = 0;
-    return to;
+    if (match && FcPatternGetString(match, FC_FILE, 0, &file) == FcResultMatch) {
+        FcPatternGetInteger(match, FC_INDEX, 0, &index);
+        open_face(f, (const char *)file, index);
+    }
+    if (match) FcPatternDestroy(match);
+    if (pattern) FcPatternDestroy(pattern);
+    if (set) FcCharSetDestroy(set);
 }
 
-void vgi_text_fit(char *to, size_t size, double dot, double width, const char *text)
+int vgi_font_check(const vgi_font *f, vg_err *e)
 {
-    size_t n = glyph_count(text), most = (size_t)fmax((width / dot + 1) / VGI_TEXT_ADVANCE, 3);
-    const char *end = to + size;
-    if (n <= most && strlen(text) < size) {
-        memcpy(to, text, strlen(text) + 1);
-        return;
+    if (f->failed == VG_ENOMEM) return vg_fail(e, VG_ENOMEM, "out of memory");
+    return f->failed < 0 ? vg_fail(e, f->failed, "a font cannot be read") : VG_OK;
+}
+
+int vgi_font_open(vgi_font **font, vg_err *e)
+{
+    vgi_font *f = vgi_array(1, sizeof *f, e);
+    if (!f) return VG_ENOMEM;
+    *font = f;
+    if (FT_Init_FreeType(&f->library)) return vg_fail(e, VG_ENOMEM, "out of memory");
+    open_face(f, first_choice, 0);
+    if (!f->n && f->failed == VG_OK) find_face(f, 'a');
+    if (f->failed < 0) return vgi_font_check(f, e);
+    return f->n ? VG_OK : vg_fail(e, VG_ESYS, "there is no font for the captions: install fonts-dejavu-core");
+}
+
+void vgi_font_close(vgi_font **font)
+{
+    vgi_font *f = *font;
+    if (!f) return;
+    for (size_t i = 0; i < f->n; i++) FT_Done_Face(f->face[i]);
+    FT_Done_FreeType(f->library);
+    if (f->config) FcConfigDestroy(f->config);
+    free(f);
+    *font = NULL;
+}
+
+/* The next character of UTF-8; a byte that belongs to none is U+FFFD. */
+static uint32_t next_character(const char **text)
+{
+    const unsigned char *t = (const unsigned char *)*text;
+    size_t n = *t < 0x80 ? 1 : *t < 0xc2 ? 0 : *t < 0xe0 ? 2 : *t < 0xf0 ? 3 : *t < 0xf5 ? 4 : 0;
+    uint32_t c = n == 1 ? *t : *t & (0xffu >> (n + 1));
+    for (size_t i = 1; i < n; i++) {
+        if ((t[i] & 0xc0) != 0x80) n = 0;
+        c = c << 6 | (t[i] & 0x3f);
     }
-    if (most > size / 4 - 1) most = size / 4 - 1; /* a code point has at most 4 bytes */
-    if (most < 3) most = 3;
-    size_t tail = (most - 2) / 2, head = most - 2 - tail;
-    to = copy_glyphs(to, end - 3, text, 0, head);
-    *to++ = '.', *to++ = '.';
-    copy_glyphs(to, end, text, n - tail, tail);
+    *text += n ? n : 1;
+    return n ? c : 0xfffd;
+}
+
+/* The face and the glyph of a character; glyph 0, a box, if no font has it. */
+static FT_Face face_of(vgi_font *f, uint32_t character, FT_UInt *glyph)
+{
+    if (character < 32 || character == 127) character = ' ';
+    for (size_t i = 0; i < f->n; i++)
+        if ((*glyph = FT_Get_Char_Index(f->face[i], character))) return f->face[i];
+    size_t n = f->n;
+    if (n < FACES && character != f->missing) find_face(f, character);
+    if (f->n > n && (*glyph = FT_Get_Char_Index(f->face[n], character))) return f->face[n];
+    while (f->n > n) FT_Done_Face(f->face[--f->n]);
+    f->missing = character;
+    return f->face[0];
+}
+
+static void blend(vgi_canvas *c, long x, long y, const FT_Bitmap *b, const unsigned char colour[3])
+{
+    for (long j = 0; j < (long)b->rows; j++)
+        for (long i = 0; i < (long)b->width; i++) {
+            if (x + i < 0 || y + j < 0 || x + i >= (long)c->w || y + j >= (long)c->h) continue;
+            unsigned char *p = c->rgb + 3 * ((size_t)(y + j) * c->w + (size_t)(x + i));
+            int cover = b->buffer[j * b->pitch + i];
+            for (int k = 0; k < 3; k++) p[k] = (unsigned char)((p[k] * (255 - cover) + colour[k] * cover + 127) / 255);
+        }
+}
+
+/* Draw a character at the pen and return how far the pen moves, in pixels; without a canvas only measure it. */
+static double set_character(vgi_font *f, uint32_t character, double size, vgi_canvas *c, double x, double y, const unsigned char *colour)
+{
+    FT_UInt glyph;
+    FT_Face face = face_of(f, character, &glyph);
+    double left = floor(x);
+    FT_Vector part = {(FT_Pos)((x - left) * 64), 0};
+    FT_Error error = FT_Set_Char_Size(face, 0, (FT_F26Dot6)(size * 64 + 0.5), 72, 72);
+    FT_Set_Transform(face, NULL, c ? &part : NULL);
+    if (!error) error = FT_Load_Glyph(face, glyph, FT_LOAD_TARGET_LIGHT | FT_LOAD_NO_BITMAP | (c ? FT_LOAD_RENDER : 0));
+    remember(f, error);
+    if (error) return 0;
+    const FT_GlyphSlot g = face->glyph;
+    if (c && g->bitmap.pixel_mode == FT_PIXEL_MODE_GRAY)
+        blend(c, (long)left + g->bitmap_left, (long)floor(y + 0.5) - g->bitmap_top, &g->bitmap, colour);
+    return (double)g->linearHoriAdvance / 65536;
+}
+
+double vgi_text_width(vgi_font *f, double size, const char *text)
+{
+    double width = 0;
+    while (*text) width += set_character(f, next_character(&text), size, NULL, 0, 0, NULL);
+    return width;
+}
+
+/* Draw what lies between two places of a text. Returns where the pen ends. */
+static double set_part(vgi_canvas *c, double x, double y, const vgi_lettering *l, const char *from, const char *to)
+{
+    while (from < to) x += set_character(c->font, next_character(&from), l->size, c, x, y, l->colour);
+    return x;
+}
+
+/* How much of the text fits into this width. */
+static const char *head_of(vgi_font *f, double size, double width, const char *text)
+{
+    while (*text) {
+        const char *next = text;
+        width -= set_character(f, next_character(&next), size, NULL, 0, 0, NULL);
+        if (width < 0) break;
+        text = next;
+    }
+    return text;
+}
+
+/* Where the end of the text starts that fits into this width. */
+static const char *tail_of(vgi_font *f, double size, double width, const char *text)
+{
+    double all = vgi_text_width(f, size, text);
+    while (*text && all > width) all -= set_character(f, next_character(&text), size, NULL, 0, 0, NULL);
+    return text;
+}
+
+void vgi_text(vgi_canvas *c, double x, double y, const vgi_lettering *l, const char *text)
+{
+    double width = vgi_text_width(c->font, l->size, text);
+    const char *end = text + strlen(text), *head = end, *tail = end;
+    if (l->room > 0 && width > l->room) {
+        double half = fmax(l->room - vgi_text_width(c->font, l->size, ellipsis), 0) / 2;
+        head = head_of(c->font, l->size, half, text);
+        tail = tail_of(c->font, l->size, half, head);
+        width = l->room;
+    }
+    x -= l->anchor * width;
+    x = set_part(c, x, y, l, text, head);
+    if (head < end) x = set_part(c, x, y, l, ellipsis, ellipsis + strlen(ellipsis));
+    set_part(c, x, y, l, tail, end);
+}
+
+/* ---- canvas ---- */
+
+int vgi_canvas_init(vgi_canvas *c, size_t w, size_t h, vg_err *e)
+{
+    *c = (vgi_canvas){.w = w, .h = h, .rgb = vgi_array_raw(w * h, 3, e)};
+    if (!c->rgb) return VG_ENOMEM;
+    vgi_canvas_wipe(c);
+    return vgi_font_open(&c->font, e);
+}
+
+void vgi_canvas_wipe(vgi_canvas *c)
+{
+    memset(c->rgb, 255, 3 * c->w * c->h);
+}
+
+void vgi_canvas_clear(vgi_canvas *c)
+{
+    vgi_font_close(&c->font);
+    free(c->rgb);
+    *c = (vgi_canvas){0};
 }

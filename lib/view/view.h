@@ -206,17 +206,30 @@ int vgi_shade(const vgi_look *l, const vgi_raster *r, const vgi_camera *c, unsig
 
 /* ---- text.c ---- */
 
-typedef struct vgi_canvas {
+typedef struct vgi_font vgi_font;
+typedef struct vgi_canvas { /* a picture with its own font: no two threads use one font */
     size_t w, h;
-    unsigned char *rgb;
+    unsigned char *rgb; /* w x h x 3 */
+    vgi_font *font;
 } vgi_canvas;
-enum { VGI_TEXT_ADVANCE = 6, VGI_TEXT_HEIGHT = 7 }; /* in dots */
-/* vgi_text: draw UTF-8 text with its top left at (x, y), dots `dot` pixels apart; characters beyond ASCII become a
- * box. */
-void vgi_text(vgi_canvas *c, double x, double y, double dot, const unsigned char colour[3], const char *text);
-double vgi_text_width(double dot, const char *text);
-/* vgi_text_fit: copy text, replacing its middle by ".." if it is wider than `width` pixels. size >= 4. */
-void vgi_text_fit(char *to, size_t size, double dot, double width, const char *text);
+typedef struct vgi_lettering {
+    const unsigned char *colour; /* RGB */
+    double size;   /* of the font, in pixels; a capital is 0.73 of it high */
+    double anchor; /* the share of the line left of x: 0 starts at x, 0.5 is centred, 1 ends at x */
+    double room;   /* a line wider than this loses its middle; 0: any width */
+} vgi_lettering;
+int vgi_font_open(vgi_font **f, vg_err *e) VG_MUST_CHECK;
+void vgi_font_close(vgi_font **f);
+/* vgi_font_check: whether all text so far could be drawn. */
+int vgi_font_check(const vgi_font *f, vg_err *e) VG_MUST_CHECK;
+/* vgi_canvas_init: white. */
+int vgi_canvas_init(vgi_canvas *c, size_t w, size_t h, vg_err *e) VG_MUST_CHECK;
+void vgi_canvas_wipe(vgi_canvas *c);
+void vgi_canvas_clear(vgi_canvas *c);
+/* vgi_text: draw a line of UTF-8 text; y is its baseline. Characters that no font of the machine has become a box. */
+void vgi_text(vgi_canvas *c, double x, double y, const vgi_lettering *l, const char *text);
+/* vgi_text_width: in pixels. */
+double vgi_text_width(vgi_font *f, double size, const char *text);
 
 /* ---- legend.c: on a canvas of at least VGI_LEGEND rows ---- */
 

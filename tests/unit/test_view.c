@@ -736,37 +736,113 @@ static void contours_are_where_fronts_end(void)
 
 /* ---- text ---- */
 
+enum { LINE_W = 240, LINE_H = 24 };
+
+static const unsigned char black[3] = {0, 0, 0};
+
+/* A line of text on a canvas of its own. */
+static void set_line(vgi_canvas *c, double anchor, double room, const char *text)
+{
+    vg_err e = {0};
+    CHECK(vgi_canvas_init(c, LINE_W, LINE_H, &e) == VG_OK);
+    vgi_text(c, anchor * LINE_W, 16, &(vgi_lettering){black, 12, anchor, room}, text);
+    CHECK(vgi_font_check(c->font, &e) == VG_OK);
+}
+
+static bool same_picture(const vgi_canvas *a, const vgi_canvas *b)
+{
+    return memcmp(a->rgb, b->rgb, 3 * LINE_W * LINE_H) == 0;
+}
+
+/* The first and the last column that is not white; first > last: none. */
+static void find_ink(const vgi_canvas *c, size_t *first, size_t *last)
+{
+    *first = LINE_W, *last = 0;
+    for (size_t y = 0; y < LINE_H; y++)
+        for (size_t x = 0; x < LINE_W; x++) {
+            if (c->rgb[3 * (y * LINE_W + x)] == 255) continue;
+            if (x < *first) *first = x;
+            if (x > *last) *last = x;
+        }
+}
+
 static void every_character_has_its_own_shape(void)
 {
-    enum { W = 20, H = 30, N = 127 - 32 };
-    static unsigned char glyph[N][3 * W * H];
-    const unsigned char black[3] = {0, 0, 0};
-    for (int i = 0; i < N; i++) {
-        memset(glyph[i], 255, sizeof glyph[i]);
-        vgi_canvas c = {W, H, glyph[i]};
-        vgi_text(&c, 2, 2, 2.5, black, (char[]){(char)(32 + i), 0});
-        for (int j = 0; j < i; j++) CHECK(memcmp(glyph[i], glyph[j], sizeof glyph[i]) != 0);
+    enum { N = 127 - 33 };
+    static const char *const foreign[] = {"\xc3\xa4", "\xc3\xa9", "\xd0\xb6", "\xce\xbb", "\xc4\xb0"}; /* a-umlaut e-acute zhe lambda I-dot */
+    enum { ALL = N + sizeof foreign / sizeof *foreign };
+    vgi_canvas c[ALL];
+    for (int i = 0; i < ALL; i++) {
+        size_t first, last;
+        set_line(c + i, 0, 0, i < N ? (char[]){(char)(33 + i), 0} : foreign[i - N]);
+        find_ink(c + i, &first, &last);
+        CHECK(first <= last);
+        for (int j = 0; j < i; j++) CHECK(!same_picture(c + i, c + j));
     }
-    vgi_canvas c = {W, H, glyph[0]};
-    vgi_text(&c, -500, -500, 2.5, black, "off"); /* outside, on all sides: no harm */
-    vgi_text(&c, 15, 25, 2.5, black, "off");
+    for (int i = 0; i < ALL; i++) vgi_canvas_clear(c + i);
+}
+
+static void text_outside_of_the_canvas_is_cut_off(void)
+{
+    vgi_canvas c;
+    size_t first, last;
+    set_line(&c, 0, 0, "");
+    for (int i = -1; i <= 1; i++)
+        for (int j = -1; j <= 1; j++)
+            if (i || j) vgi_text(&c, i * 500, j * 500, &(vgi_lettering){black, 12, 0, 0}, "off");
+    find_ink(&c, &first, &last);
+    CHECK(first > last);
+    vgi_canvas_clear(&c);
+}
+
+/* A byte that belongs to no character is drawn as U+FFFD, wherever it stands. */
+static void text_that_is_no_utf8_is_drawn(void)
+{
+    static const char *const wrong[] = {"a\xff" "b", "a\xc3" "b", "a\xe2\x80" "b", "ab\xc3", "ab\xf0\x9f", "\x80", "\xc0\xaf"};
+    static const char *const right[] = {"a\xef\xbf\xbd" "b", "a\xef\xbf\xbd" "b", "a\xef\xbf\xbd\xef\xbf\xbd" "b", "ab\xef\xbf\xbd",
+                                        "ab\xef\xbf\xbd\xef\xbf\xbd", "\xef\xbf\xbd", "\xef\xbf\xbd\xef\xbf\xbd"};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        vgi_canvas a, b;
+        set_line(&a, 0, 0, wrong[i]);
+        set_line(&b, 0, 0, right[i]);
+        CHECK(same_picture(&a, &b));
+        vgi_canvas_clear(&a);
+        vgi_canvas_clear(&b);
+    }
 }
 
 static void long_names_lose_their_middle(void)
 {
-    char to[64];
-    vgi_text_fit(to, sizeof to, 1, 1000, "short");
-    CHECK_TEXT(to, "short");
-    vgi_text_fit(to, sizeof to, 1, 60, "a-very-long-name_001");
-    CHECK_TEXT(to, "a-ve.._001");
-    CHECK(vgi_text_width(1, to) <= 60);
-    vgi_text_fit(to, sizeof to, 1, 0, "a-very-long-name_001");
-    CHECK(strlen(to) <= 3);
-    vgi_text_fit(to, 16, 1, 1000, "a-name-that-is-longer-than-its-room");
-    CHECK(strlen(to) < 16);
-    vgi_text_fit(to, sizeof to, 1, 24,
-                 "\xc3\xa4\xc3\xb6\xc3\xbc\xc3\xa4\xc3\xb6\xc3\xbc"); /* code points stay whole */
-    CHECK_TEXT(to, "\xc3\xa4..\xc3\xbc");
+    vgi_canvas a, b;
+    size_t first, last;
+    set_line(&a, 0, 0, "short");
+    set_line(&b, 0, 200, "short");
+    CHECK(same_picture(&a, &b));
+    vgi_canvas_clear(&a);
+    vgi_canvas_clear(&b);
+    for (int i = 0; i <= 2; i++) {
+        set_line(&a, i / 2.0, 100, "a-very-long-name-of-a-frame-in-a-sequence_001");
+        find_ink(&a, &first, &last);
+        double left = i / 2.0 * LINE_W - i / 2.0 * 100;
+        CHECK((double)first >= left - 1 && (double)last <= left + 101 && last - first > 80);
+        vgi_canvas_clear(&a);
+    }
+    set_line(&a, 0, 2, "nothing fits");
+    find_ink(&a, &first, &last);
+    CHECK(last < 16); /* the ellipsis alone */
+    vgi_canvas_clear(&a);
+}
+
+static void text_is_as_wide_as_its_parts(void)
+{
+    vg_err e = {0};
+    vgi_font *f = NULL;
+    CHECK(vgi_font_open(&f, &e) == VG_OK);
+    double all = vgi_text_width(f, 12, "frame_001"), parts = vgi_text_width(f, 12, "frame_") + vgi_text_width(f, 12, "001");
+    CHECK(all > 40 && fabs(all - parts) < 1e-9);
+    CHECK(fabs(vgi_text_width(f, 24, "frame_001") - 2 * all) < 0.01 * all);
+    CHECK(vgi_text_width(f, 12, "") == 0);
+    vgi_font_close(&f);
 }
 
 TESTS({"cube covers its area", cube_covers_its_area}, {"views show their side", views_show_their_side},
@@ -789,4 +865,7 @@ TESTS({"cube covers its area", cube_covers_its_area}, {"views show their side", 
       {"scales are geometric means", scales_are_geometric_means},
       {"contours are where fronts end", contours_are_where_fronts_end},
       {"every character has its own shape", every_character_has_its_own_shape},
-      {"long names lose their middle", long_names_lose_their_middle})
+      {"text outside of the canvas is cut off", text_outside_of_the_canvas_is_cut_off},
+      {"text that is no UTF-8 is drawn", text_that_is_no_utf8_is_drawn},
+      {"long names lose their middle", long_names_lose_their_middle},
+      {"text is as wide as its parts", text_is_as_wide_as_its_parts})
