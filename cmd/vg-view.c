@@ -318,7 +318,7 @@ static void read_cast(cast *c, bool shows_truth, take_frame *put, void *context)
 
 static void refuse_count(const side *s, const side *truth)
 {
-    cli_stop(VG_EINPUT, "%s has %zu frames and %s has %zu: --against compares frame by frame, and needs as many", s->name, s->frames,
+    cli_stop(VG_EINPUT, "%s has %zu frames where %s has %zu: --against compares frame by frame", s->name, s->frames,
              truth->name, truth->frames);
 }
 
