@@ -40,7 +40,7 @@ static void read_align(const driving_options *o, const vg_skeleton *s, const cha
 }
 
 /* "LeftArm (49 degrees), LeftForeArm (60) and 4 more" */
-static void note_aligned(const vg_driver *d, const vg_skeleton *s)
+static void note_aligned(const vg_driver *d, const vg_skeleton *s, const char *map)
 {
     char list[400] = "";
     size_t n = 0, at = 0;
@@ -51,7 +51,7 @@ static void note_aligned(const vg_driver *d, const vg_skeleton *s)
                                degrees, n > 1 ? "" : " degrees");
     }
     if (n > NAMED) snprintf(list + at, sizeof list - at, " and %zu more", n - NAMED);
-    if (n) cli_warn("the skeleton rests in another pose than the rig: aligned %s; --align none leaves them", list);
+    if (n) cli_warn("the skeleton of the input rests in another pose than '%s': aligned %s; --align none leaves them", map, list);
 }
 
 /* ---- --joints ---- */
@@ -96,7 +96,7 @@ vg_driver *driving_start(const driving_options *o, const vg_rig *rig, const char
     if (missing)
         cli_warn("%zu of %zu bones have no joint of the skeleton that belongs to them: they follow those above them",
                  missing, rig->nbones);
-    note_aligned(d, &rig->skeleton);
+    note_aligned(d, &rig->skeleton, map);
     free(chosen);
     free(partner);
     return d;

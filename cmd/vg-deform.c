@@ -1,6 +1,7 @@
 /* vg-deform: measure how each vector of a sequence deforms, and do the same to another mesh.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "batch.h"
+#include "joint_transfer.h"
 #include "poses.h"
 
 #include <math.h>
@@ -11,6 +12,7 @@
 static struct {
     const char *onto, *correspondence, *root, *examples, *sculpted;
     size_t by_choice, pin_choice; /* of enum by and enum pin */
+    driving_options driving;
 } opts;
 
 static const cli_option options[] = {
@@ -28,6 +30,12 @@ static const cli_option options[] = {
      .choice = &opts.pin_choice, .needs = "onto"},
     {"examples", 0, "POSES SCULPTED", "poses of the sequence's body, and the same ones of the target: the transfer meets them",
      .text = &opts.examples, .second = &opts.sculpted, .reads = true, .needs = "onto"},
+    {"align", 0, "auto|none|all|NAMES",
+     "two skeletons: make limbs that rest in other directions point alike: those of arms and legs that do (default), none, "
+     "all joints, or joints of these names",
+     .text = &opts.driving.align, .needs = "onto", .excludes = "correspondence"},
+    {"joints", 0, "FILE", "two skeletons: pairs of a joint of the target and one of the sequence, a line each (default: by their names)",
+     .text = &opts.driving.joints, .reads = true, .needs = "onto", .excludes = "correspondence"},
     {.name = NULL}};
 
 static const cli_moved moved[] = {{"interpolate", "is now the program vg-interpolate: vg-interpolate 30"},
@@ -35,8 +43,6 @@ static const cli_moved moved[] = {{"interpolate", "is now the program vg-interpo
                                   {"smooth", "is now an option of vg-interpolate: vg-interpolate --smooth 30"},
                                   {"map", "is now the program vg-play: vg-play MAP"},
                                   {"edit", "is now an option of vg-play: vg-play MAP --edit 'BONE x 45'"},
-                                  {"align", "is now an option of vg-play: vg-play MAP --align all"},
-                                  {"joints", "is now --rotations of vg-play: vg-play MAP --rotations"},
                                   {"rotations", "is now an option of vg-play: vg-play MAP --rotations"},
                                   {"transforms", "is now an option of vg-play: vg-play MAP --transforms"},
                                   {"live", "is now an option of vg-play: vg-play MAP --live"},
@@ -57,7 +63,7 @@ static const cli_program program = {
 enum { BATCH = 8, MOST_EXAMPLES = 1000 }; /* poses of one call: the lanes of the kernels */
 
 /* How poses become what is written. */
-typedef enum way { MEASURE, APPLY, TRANSFER, CARRY, SHAPE, RIDE } way;
+typedef enum way { MEASURE, APPLY, TRANSFER, CARRY, SHAPE, RIDE, JOINTS } way;
 typedef enum by { BY_BLEND, BY_POSE, BY_GRADIENT, BY_SHAPE } by;
 typedef enum pin { PIN_AUTO, PIN_ALWAYS, PIN_NONE } pin;
 
@@ -75,6 +81,7 @@ typedef struct work {
     vg_cross_transfer *carrier;
     vg_shaper *shaper;
     vg_rider *rider;
+    joint_transfer *joints;   /* from one skeleton to another */
     vg_mover *mover;          /* NULL: poses are measured */
     vg_pinner *pinner;        /* NULL: nothing is held */
     vg_corrector *corrector;  /* NULL: there are no examples */
@@ -128,6 +135,7 @@ static void run_batch(work *w, size_t n, const double *const *in, double *const 
     case TRANSFER: vg_deformer_transfer(w->deformer, n, w->kind, in, out); break;
     case CARRY: vg_cross_transfer_apply(w->carrier, n, in, out); break;
     case SHAPE: vg_shaper_transfer(w->shaper, n, in, out); break;
+    case JOINTS: break; /* with what a frame says beside its values */
     case RIDE:
         for (size_t i = 0; i < n; i++) vg_rider_apply(w->rider, in[i], out[i]);
         break;
@@ -149,7 +157,8 @@ static void finish_frame(work *w, vg_frame *in, vg_frame *out)
     vg_err e;
     const uint32_t *still;
     if (vg_frame_label(out, in, &e) < 0) cli_die(&e);
-    if (w->way == RIDE) return;
+    if (w->way == JOINTS) joint_transfer_apply(w->joints, in, out);
+    if (w->way == RIDE || w->way == JOINTS) return;
     if (w->mover) {
         vg_mover_move(w->mover, in, out);
     } else {
@@ -168,7 +177,7 @@ static void fill_body(const work *w, vg_frame *f)
 {
     vg_err e;
     double *anchors;
-    if (w->kind != VG_VERTICES || w->way == RIDE) return;
+    if (w->kind != VG_VERTICES || w->way == RIDE || w->way == JOINTS) return;
     vg_graph_root(w->from, f->values, f->root);
     if (vg_frame_make_anchors(f, w->h->nanchors, &anchors, &e) < 0) cli_die(&e);
     vg_graph_anchors(f->values, w->h->anchors, w->h->nanchors, anchors);
@@ -262,10 +271,7 @@ static void make_graphs(work *w)
         snprintf(name, sizeof name, "'%.190s'", opts.onto);
         if (vg_mesh_same(&w->h->body.mesh, "the sequence", &w->target.body.mesh, name, &e) < 0) {
             size_t n = strlen(e.message);
-            bool skeletons = w->h->body.skeleton.njoints && w->target.body.skeleton.njoints;
-            snprintf(e.message + n, sizeof e.message - n,
-                     skeletons ? ": vg-play drives a rig by a skeleton of other joints"
-                               : ": pair them with vg-register and --correspondence");
+            snprintf(e.message + n, sizeof e.message - n, ": pair them with vg-register and --correspondence");
             cli_die(&e);
         }
     }
@@ -435,12 +441,12 @@ static void make_head(work *w)
         vg_head_take(h, t, "skeleton");
     }
     vg_head_drop(h, "map"); /* it is no property of the mesh */
-    if (w->way == CARRY || w->way == RIDE) {
+    if (w->way == CARRY || w->way == RIDE || w->way == JOINTS) {
         vg_head_drop(h, "patches");
         vg_head_take(h, t, "mesh");
         vg_head_take(h, t, "links");
     }
-    h->kind = w->way == MEASURE ? VG_DEFORMATIONS : w->way == SHAPE || w->way == RIDE ? VG_VERTICES : VG_VECTORS;
+    h->kind = w->way == MEASURE ? VG_DEFORMATIONS : w->way == SHAPE || w->way == RIDE || w->way == JOINTS ? VG_VERTICES : VG_VECTORS;
     h->count = h->kind == VG_VERTICES ? h->body.mesh.nv : vg_graph_corners(w->to);
 }
 
@@ -462,6 +468,32 @@ static void make_rider(work *w)
     vg_head_drop(h, "anchors");
 }
 
+/* Two skeletons, unless they have the same joints and nothing is asked of their pairs. */
+static bool pairs_joints(const work *w)
+{
+    const vg_skeleton *a = &w->h->body.skeleton, *b = &w->target.body.skeleton;
+    bool asked = opts.driving.align || opts.driving.joints;
+    if (!a->njoints || !b->njoints || w->kind != VG_VERTICES || opts.correspondence) {
+        if (asked) cli_usage("--align and --joints are for a skeleton and poses of another one");
+        return false;
+    }
+    bool same = a->njoints == b->njoints && fits(w, &w->target);
+    for (size_t j = 0; same && j < a->njoints; j++) same = !strcmp(a->joints[j].name, b->joints[j].name);
+    return asked || !same;
+}
+
+static void make_joints(work *w)
+{
+    vg_head *h = w->h;
+    if (opts.examples || cli_given("by") || cli_given("pin") || (opts.root && !root_stays() && strcmp(opts.root, "centroid")))
+        cli_usage("'%s' has other joints than the sequence: --by, --pin, --examples and --root V have no meaning", opts.onto);
+    w->way = JOINTS;
+    vg_head_drop(h, "selection");
+    vg_head_drop(h, "links");
+    vg_head_drop(h, "anchors");
+    w->joints = joint_transfer_new(&opts.driving, &h->body.skeleton, &w->target.body, opts.onto, root_stays());
+}
+
 static void prepare_steps(work *w)
 {
     weld_like_sequence(w);
@@ -478,6 +510,7 @@ static void prepare(void *context, vg_head *h, vg_frame *in)
     w->h = h, w->kind = h->kind;
     check_kind(w);
     if (vg_is_bound(&w->pairs.correspondence)) make_rider(w);
+    else if (pairs_joints(w)) make_joints(w);
     else prepare_steps(w);
     (void)in;
     make_head(w);

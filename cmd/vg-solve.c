@@ -336,6 +336,15 @@ static void place_held(const work *w, const vg_frame *f, waiting *p)
     }
 }
 
+/* Joints of a skeleton come out where they went in, so that their rotations are still right. */
+static void keep_turns(const work *w, const vg_frame *in, vg_frame *out)
+{
+    vg_err e;
+    size_t n;
+    const double *turns = vg_frame_turns(in, &n);
+    if (w->kind == VG_VERTICES && n && vg_frame_turn(out, turns, n, &e) < 0) cli_die(&e);
+}
+
 /* Frame i of a batch. Its vectors stay until load_taken. */
 static void take_frame(work *w, size_t i, vg_frame *in, const machine *m)
 {
@@ -352,6 +361,7 @@ static void take_frame(work *w, size_t i, vg_frame *in, const machine *m)
     waiting *p = &w->waiting[w->n++];
     if (vg_frame_label(&p->frame, in, &e) < 0) cli_die(&e);
     memcpy(p->frame.root, in->root, sizeof in->root);
+    keep_turns(w, in, &p->frame);
     p->machine = m;
     place_held(w, in, p);
     p->vectors = vectors;

@@ -191,10 +191,113 @@ END
     must vg-diff -t 1e-6 walk.bvh out.bvh
 }
 
-@test "a target skeleton of other joints is refused with vg-play as the way, not vg-register" {
-    walk 3 >walk.bvh
-    must_fail 3 vg-deform --onto "$DATA/human-man-poses.bvh.xz" walk.bvh -o no.vgs
-    says "vg-play drives a rig by a skeleton of other joints"
+# other_joints IN OUT: the same skeleton and motion as BVH with other names, children in reverse order, and all lengths doubled
+other_joints() {
+    py "$1" "$2" <<'END'
+import sys
+lines = [l.split() for l in open(sys.argv[1])]
+at = 1
+class Joint: pass
+def read():
+    global at
+    j = Joint()
+    j.kind, j.name, j.children, j.channels = lines[at][0], lines[at][-1], [], ["0"]
+    at += 2
+    while lines[at] != ["}"]:
+        word, *rest = lines[at]
+        if word == "OFFSET": j.offset = [2 * float(x) for x in rest]
+        if word == "CHANNELS": j.channels = rest
+        if word in ("JOINT", "End"): j.children.append(read())
+        else: at += 1
+    at += 1
+    return j
+root = read()
+order, span, n = [], {}, 0
+def number(j):
+    global n
+    span[id(j)] = range(n, n + int(j.channels[0]))
+    n += int(j.channels[0])
+    for c in j.children: number(c)
+number(root)
+out = open(sys.argv[2], "w")
+def write(j):
+    end = j.kind == "End"
+    print("End Site" if end else j.kind + " other_" + j.name[::-1], "{", "OFFSET %g %g %g" % tuple(j.offset), sep="\n", file=out)
+    if not end: print("CHANNELS", *j.channels, file=out)
+    order.extend(span[id(j)])
+    for c in reversed(j.children): write(c)
+    print("}", file=out)
+print("HIERARCHY", file=out)
+write(root)
+print(*map(" ".join, lines[at:at + 3]), sep="\n", file=out)
+for row in lines[at + 3:]:
+    row = [2 * float(x) if k < 3 else float(x) for k, x in enumerate(row)]
+    print(*("%.9g" % row[k] for k in order), file=out)
+def pairs(j):
+    if j.kind != "End":
+        print("other_" + j.name[::-1], j.name)
+        for c in j.children: pairs(c)
+with open("pairs.txt", "w") as sys.stdout: pairs(root)
+END
+}
+
+@test "an action goes to a skeleton of other joints, in another order: by a file of pairs, and by name" {
+    walk 20 >walk.bvh
+    other_joints walk.bvh other.bvh
+    must_fail 3 vg-deform --onto other.bvh walk.bvh -o no.vgs # neither names nor what they mean agree
+    says "no joint of the skeleton has the name of a bone"
     [[ $stderr != *vg-register* ]]
     [ ! -e no.vgs ]
+    pipe 'vg-deform -q --onto other.bvh --joints pairs.txt walk.bvh | vg-solve | vg-decode -q -o out.bvh'
+    must vg-diff -t 1e-6 other.bvh out.bvh
+    # how joints have turned arrives, too: about their own bones as well
+    must vg-encode other.bvh -o truth.vgs
+    pipe 'vg-deform -q --onto other.bvh --joints pairs.txt walk.bvh | vg-solve -o got.vgs'
+    py <<'END'
+import read_stream
+truth, got = read_stream.read_stream("truth.vgs").frames, read_stream.read_stream("got.vgs").frames
+assert len(truth) == len(got) == 20
+for a, b in zip(truth, got):
+    assert len(a.turns) == len(b.turns) > 0
+    for k in range(0, len(a.turns), 4):
+        assert abs(abs(sum(x * y for x, y in zip(a.turns[k:k + 4], b.turns[k:k + 4]))) - 1) < 1e-9, (a.name, k // 4)
+END
+    sed 's/other_//' other.bvh | awk '$1 == "ROOT" || $1 == "JOINT" {n = ""; for (i = length($2); i; i--) n = n substr($2, i, 1); $2 = n} 1' >named.bvh
+    pipe 'vg-deform -q --onto named.bvh walk.bvh | vg-solve | vg-decode -q -o out.bvh'
+    must vg-diff -t 1e-6 other.bvh out.bvh
+    # --root stay: the mean of the joints does not move
+    pipe 'vg-deform -q --onto named.bvh --root stay walk.bvh | vg-solve -o stays.vgs'
+    must vg-diff --centred -t 1e-6 other.bvh stays.vgs
+    py <<'END'
+import read_stream
+s = read_stream.read_stream("stays.vgs")
+def mean(values): return [sum(values[k::3]) / len(values[k::3]) for k in range(3)]
+home = mean(s.reference)
+assert all(abs(a - b) < 1e-9 for f in s.frames for a, b in zip(mean(f.values), home))
+END
+    must_fail 2 vg-deform --onto named.bvh --by pose walk.bvh -o no.vgs
+    must_fail 2 vg-deform --onto other.bvh --align none <<<"$(mesh cube)" -o no.vgs
+}
+
+@test "an action of motion capture goes to a body of another convention: arms that rest elsewhere are aligned" {
+    [ -d "${VG_DATA:-}/mocap" ] || skip "VG_DATA does not name the data kit"
+    must vg-encode --take 0-300/4 "$VG_DATA/mocap/cmu-02_01.bvh" -o cmu.vgs
+    must_warn vg-deform --onto "$VG_DATA/skeletons/walk-man.bvh" cmu.vgs -o vectors.vgs
+    says 'aligned LeftArm (49 degrees)'
+    must vg-solve vectors.vgs -o man.vgs
+    # limbs point where those of the captured person do
+    py <<'END'
+import read_stream
+a, b = read_stream.read_stream("cmu.vgs"), read_stream.read_stream("man.vgs")
+def direction(s, f, bone):
+    j = next(i for i, x in enumerate(s.skeleton) if x.name == bone[0])
+    k = next(i for i, x in enumerate(s.skeleton) if x.name == bone[1])
+    d = [f.values[3 * k + i] - f.values[3 * j + i] for i in range(3)]
+    n = sum(x * x for x in d) ** 0.5
+    return [x / n for x in d]
+for f, g in zip(a.frames, b.frames):
+    for bone in (("LeftArm", "LeftForeArm"), ("LeftForeArm", "LeftHand"), ("RightArm", "RightForeArm"), ("RightUpLeg", "RightLeg"), ("LeftLeg", "LeftFoot")):
+        cosine = sum(x * y for x, y in zip(direction(a, f, bone), direction(b, g, bone)))
+        assert cosine > 0.99, (f.name, bone, cosine)
+END
 }

@@ -52,7 +52,7 @@ setup() {
         refused "vg-deform $option walk.vgs -o out" "${option%%[ =]*} is now " 'vg-interpolate'
     done
     refused 'vg-deform --interpolate 30 walk.vgs -o out' '--interpolate is now the program vg-interpolate: vg-interpolate 30'
-    for option in '--map map.vgs' '--edit "a x 1"' --align --joints --rotations --transforms --live; do
+    for option in '--map map.vgs' '--edit "a x 1"' --rotations --transforms --live; do
         refused "vg-deform $option walk.vgs -o out" "${option%% *} is now " "vg-play MAP"
     done
     refused 'vg-fitmap --retarget target.obj map.vgs -o out' '--retarget is now the program vg-retarget: vg-retarget --onto MESH MAP'

@@ -41,7 +41,9 @@ size_t vg_driver_missing(const vg_driver *d); /* bones of the rig that follow th
 double vg_driver_aligned(const vg_driver *d, size_t joint);
 /* vg_driver_pose: positions and turns of the other skeleton's joints to nbones transforms. */
 void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, double *transforms);
-
+/* vg_driver_joints: to positions and turns of the rig's own joints; both are borrowed until the next call. */
+void vg_driver_joints(vg_driver *d, const double *positions, const double *turns, const double **own_positions,
+                      const double **own_turns);
 
 /* vg_feet_hold: keep standing feet from sliding, in n consecutive poses of a rig, as nbones transforms each.
  * VG_EINPUT if no bones have names of thigh, shin and foot. */

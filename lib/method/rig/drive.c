@@ -149,11 +149,19 @@ static void place_joint(vg_driver *d, size_t j, const double *positions, const d
     for (size_t i = 0; i < 3; i++) p[i] += d->positions[3 * (size_t)joint->parent + i] + d->scale * slip[i];
 }
 
-void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, double *transforms)
+void vg_driver_joints(vg_driver *d, const double *positions, const double *turns, const double **own_positions,
+                      const double **own_turns)
 {
     for (size_t j = 0; j < d->r->skeleton.njoints; j++) {
         turn_joint(d, j, turns);
         place_joint(d, j, positions, turns);
     }
-    vg_rig_transforms(d->r, d->positions, d->turns, transforms);
+    *own_positions = d->positions, *own_turns = d->turns;
+}
+
+void vg_driver_pose(vg_driver *d, const double *positions, const double *turns, double *transforms)
+{
+    const double *own_positions, *own_turns;
+    vg_driver_joints(d, positions, turns, &own_positions, &own_turns);
+    vg_rig_transforms(d->r, own_positions, own_turns, transforms);
 }
