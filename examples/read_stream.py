@@ -16,6 +16,7 @@ SPDX-License-Identifier: GPL-3.0-or-later
 """
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import struct
@@ -75,6 +76,14 @@ class Mesh:
 
     def faces(self):
         return [list(self.face(f)) for f in range(self.nf)]
+
+    def components(self) -> int:
+        """How many sets of connected vertices there are, without those in no face."""
+        groups = list(range(self.nv))
+        for face in self.faces():
+            for v in face:
+                groups[find(groups, v)] = find(groups, face[0])
+        return sum(find(groups, v) == v for v in set(self.vert))
 
 
 @dataclass
@@ -286,6 +295,19 @@ class Stream:
         links = self.links if self.links is not None else ()
         return [list(self.mesh.face(f)) for f in chosen] + [list(links[i:i + 2]) for i in range(0, len(links), 2)]
 
+    def fan(self, face: list) -> list:
+        """The triangles of a face, from the corner whose smallest triangle in the reference is largest; a segment stays."""
+        n, at, most = len(face), 0, -1.0
+        for s in range(n if 3 < n <= 64 else 0):
+            least = min(area(self.reference, [face[(s + i) % n] for i in (0, j, j + 1)]) for j in range(1, n - 1))
+            if least > most * (1 + 1e-9):
+                at, most = s, least
+        return [[face[(at + i) % n] for i in (0, j, j + 1)] for j in range(1, n - 1)] if n > 2 else [face]
+
+    def pieces(self) -> list:
+        """The triangles and segments of the graph, as lists of lists of vertices: those of each face."""
+        return [self.fan(face) for face in self.graph()]
+
     def digest(self) -> int:
         """What a correspondence calls this mesh: XXH64 over its counts and faces as 64-bit words."""
         words = [self.mesh.nv, self.mesh.nf]
@@ -307,6 +329,46 @@ class Stream:
         """The mean position of the vertices that are in a face of the graph."""
         used = sorted({v for face in self.graph() for v in face})
         return [math.fsum(positions[3 * v + k] for v in used) / max(len(used), 1) for k in range(3)]
+
+
+def area(positions, triangle) -> float:
+    """Twice the area of a triangle."""
+    p, q, r = (positions[3 * v:3 * v + 3] for v in triangle)
+    u, v = ([b - a for a, b in zip(p, x)] for x in (q, r))
+    return math.hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+
+
+def find(groups: list, i: int) -> int:
+    while groups[i] != i:
+        groups[i] = i = groups[groups[i]]
+    return i
+
+
+def neighbours(faces: list) -> tuple:
+    """Pairs of pieces as (a, b, edge), the edge None where vertices alone connect them; all edges; how many parts are left."""
+    pieces, first = [piece for face in faces for piece in face], list(itertools.accumulate(map(len, faces), initial=0))
+    sides = sorted((min(a, b), max(a, b), i) for i, p in enumerate(pieces)
+                   for a, b in zip(p, p[1:] + (p[:1] if len(p) > 2 else [])))
+    pairs = [(x[2], y[2], x[:2]) for x, y in zip(sides, sides[1:]) if x[:2] == y[:2]]
+    groups, around = list(range(len(pieces))), {}
+    for a, b, _ in pairs:
+        groups[find(groups, a)] = find(groups, b)
+    for f, face in enumerate(faces):
+        for v in {v for piece in face for v in piece}:
+            around.setdefault(v, []).append(first[f])
+    for v in sorted(around):
+        for a, b in zip(around[v], around[v][1:]):
+            if find(groups, a) != find(groups, b):
+                pairs.append((a, b, None))
+                groups[find(groups, a)] = find(groups, b)
+    return pairs, {x[:2] for x in sides}, sum(find(groups, i) == i for i in range(len(pieces)))
+
+
+def parameters_of(c: dict, linear: bool) -> int:
+    """How many parameters the layers of a network have, in one set."""
+    w, n, h = c["width"], c["numbers"], c["hidden"]
+    front = (h + 1) * n if linear else 2 * c["convolutions"] * (w * w + w) + n * h + ((n + 1) * h if c["uncertain"] else 0)
+    return front + sum(((n if linear and not layer else h) + h + 1) * 4 * h for layer in range(c["layers"]))
 
 
 def rotate(q, r) -> list:
@@ -838,6 +900,8 @@ class _Reader:
     def check_signal(self, p: _Payload, n: int, space: int, d: int, sites: int, k: int, bits: int, layout: int):
         if n < 2:
             p.fail("it has fewer than 2 frames")
+        if n > 1 << 20:
+            p.fail("it has too many frames")
         if k < 4:
             p.fail("its curve has fewer than 4 control points")
         if not 1 <= sites <= n:
@@ -897,6 +961,7 @@ class _Reader:
             basis = array("d", (int.from_bytes(bytes(short[i:i + 2]), "little", signed=True) for i in range(0, len(short), 2)))
         self.stream.signal = Signal(n, space, d, m, bits, examples, layout, numbers, mean, basis, unit, coordinate, position,
                                     site, parameter, knot, control, turn, shift, times, names)
+        self.shape_turns = turns
 
     def netw(self, p: _Payload):
         c = {name: int(p.flag()) if name in ("open", "uncertain") else p.u64() for name in NETWORK_COUNTS}
@@ -911,27 +976,35 @@ class _Reader:
             lists.append(p.f64s(n, code="f"))
             p.pad()
         p.end()
-        for wrong, why in self.wrong_network(c, features, numbers, scale, range_):
+        for wrong, why in self.wrong_network(c, features, numbers, errors, scale, range_):
             if wrong:
                 p.fail(why)
         self.stream.network = Network(c, numbers, errors, mean, scale, range_, regression, root, *lists)
 
-    def wrong_network(self, c: dict, features: int, numbers: array, scale: array, range_: array):
+    def wrong_network(self, c: dict, features: int, numbers: array, errors: array, scale: array, range_: array):
         """What may be wrong with a network whose fields have the right sizes."""
         linear, k, low, high = c["model"] in (1, 2), c["rank"], numbers[2:4], numbers[4:6]
-        yield c["model"] > 4, "its model is not known"
+        yield not 1 <= c["model"] <= 4, "its model is not known"
         yield c["direction"] > 2, "its direction is not known"
         yield c["width"] not in (9, 12), "its features are not 9 or 12 numbers"
         yield 0 in (k, c["parts"], c["step"]), "a count is 0"
         yield c["numbers"] != (k if linear else features), "its frames have a wrong number of numbers"
         yield c["sets"] != (2 if c["direction"] == 1 else 1), "its sets of parameters do not suit its direction"
         yield linear and c["uncertain"], "a network of coordinates has no variance"
+        yield c["step"] > 1 << 16, "its step is too large"
+        yield c["numbers"] > (1 << 27) - 2, "its frames have too many numbers"
+        yield not 1 <= c["layers"] <= 8, "its layers are not 1 to 8"
+        yield not 1 <= c["hidden"] <= 4096, "its layers have not 1 to 4096 cells"
+        yield c["convolutions"] > (8 if c["model"] == 4 else 0), "it has too many convolutions"
+        yield c["parameters"] != parameters_of(c, linear), "its parameters are not those of its layers"
+        yield any(x < 0 and x != -1 for x in [numbers[0], *errors]), "an error is below 0"
         yield numbers[1] <= 0, "the diagonal is not above 0"
         yield any(a >= b for a, b in zip(low, high)), "a range is empty"
         yield any(x <= 0 for x in scale), "a scale is not above 0"
         yield any(a > b for a, b in zip(range_[:k], range_[k:])), "a range of coordinates is empty"
         yield c["phase"] > 1, "its phase of training is not known"
         yield c["vertices"] != self.stream.mesh.nv or c["mesh_digest"] != self.stream.digest(), "the network's mesh"
+        yield c["parts"] != self.stream.mesh.components(), "the mesh has another number of components"
 
     def elements(self, element: str):
         """How many elements of that sort there are; None: that is not known."""
@@ -965,6 +1038,8 @@ class _Reader:
             p.fail("the corners of record MAP do not fit the mesh")
         if s.map and s.map.kind == "patches" and (s.patches is None or s.patches[0] != len(s.map.centre) // 3):
             p.fail("record MAP has not as many patches as record PTCH")
+        if s.signal and s.signal.space > 1 and s.links is None:
+            p.fail("record SIGN needs a LINK record")
         if s.width == 0:
             p.fail("its elements have no width")
         if s.reference is None and (s.mesh is not None or s.element in ("vertex", "corner", "joint")):
@@ -973,6 +1048,23 @@ class _Reader:
             p.fail("a LINK record must come before it")
         if self.elements(s.element) not in (None, s.count):
             p.fail("its count does not fit its elements")
+        if s.signal and s.signal.space > 1:
+            self.fits_shapes(p, s.signal)
+
+    def fits_shapes(self, p: _Payload, g: Signal):
+        """Whether the numbers of a shape and its turns are those of the graph."""
+        faces = self.stream.pieces()
+        if not faces:
+            p.fail("the mesh has no faces")
+        pieces = [piece for face in faces for piece in face]
+        pairs, edges, parts = neighbours(faces)
+        if g.space > 3 and parts > 1:
+            p.fail("parts that no links join")
+        hinges = sum(edge is not None and len(pieces[a]) == len(pieces[b]) == 3 for a, b, edge in pairs)
+        numbers = {2: 4 * self.elements("corner"), 3: 9 * len(pieces), 4: 3 * len(pairs) + 6 * len(pieces) + 3,
+                   5: len(edges) + 3 * len(pairs) - 2 * hinges + 3}
+        if g.d != numbers[g.space] or self.shape_turns != {2: len(faces), 3: len(pieces)}.get(g.space, 0):
+            p.fail("the shapes of the signal are not of this mesh")
 
     def channel(self, p: _Payload, seen: dict) -> Channel:
         name, unit, element = p.text(), p.text(), p.text()

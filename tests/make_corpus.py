@@ -510,7 +510,16 @@ def signal_content(**changes):
          "control": [[-1, 0], [-0.25, 0.5], [0.25, 0.5], [1, 0]], "turn": [[1, 0, 0, 0]] * 3, "shift": [[0, 0, 0], [0, 0, 1], [0, 0, 2]],
          "times": [0, 0.5, 1], "names": ["one", "tw\u00f6", ""]}
     s.update(changes)
-    return content(frames=[], signal=s)
+    return content(frames=[], signal=s, links=None if s["space"] == 1 else [])
+
+
+MIXED = {"mesh": {"vertices": 6, "faces": [[0, 1, 2, 3], [0, 3, 4], [4, 5]]}, "count": 6,
+         "reference": {"name": "", "positions": POINTS[:4] + [[-1, 0.5, 0], [-2, 0, 0]]}}
+
+
+def shapes(space, d, turns=0, **changes):
+    """A signal of shapes that are not vertices: d numbers each, measured from so many turns."""
+    return dict(signal_content(space=space, mean=[0] * d, basis=[[0] * d] * 2, home=[[1, 0, 0, 0]] * turns), **changes)
 
 
 def network_content(counts=(), **changes):
@@ -650,7 +659,11 @@ def accept():
         "sign-int16": whole(signal_content(bits=16, unit=[1e-4, 2.5], basis=[[32767] + [0] * 11, [0, 0, -32768] + [0] * 9])),
         "sign-examples": whole(signal_content(examples=True, home=[[1, 0, 0, 0], [0.6, 0, 0.8, 0], [0, 0, 0, -1]])),
         "sign-of-vectors": whole(signal_content(space=2, mean=[0] * 24, basis=[[0] * 24] * 2, home=[[1, 0, 0, 0]] * 2)),
-        "sign-of-lengths": whole(signal_content(space=5, mean=[0] * 9, basis=[[0] * 9] * 2)),
+        "sign-of-gradients": whole(shapes(3, 18, 2)),
+        "sign-of-rotations": whole(shapes(4, 18)),
+        "sign-of-lengths": whole(shapes(5, 9)),
+        "sign-of-rotations-of-mixed-faces": whole(shapes(4, 36, **MIXED)),
+        "sign-of-lengths-of-mixed-faces": whole(shapes(5, 16, **MIXED)),
         "sign-no-coordinates": whole(signal_content(basis=[], coordinate=[[], [], []])),
         "map-with-home-and-names": whole(map_content(home=True)),
         "map-of-bones-one-per-corner": whole(bone_map_content(per_corner=1)),
@@ -944,7 +957,7 @@ def reject_attachments():
     def driving(*faces):
         return whole(dict(r, correspondence=dict(r["correspondence"], faces=list(faces))))
 
-    g, b = rig_content(), bone_map_content()
+    g, b, c = rig_content(), bone_map_content(), shapes(2, 24, 2, selection=[0])
 
     def rigged(**fields):
         return whole(dict(g, rig=dict(g["rig"], skin=None, **fields)))
@@ -1013,6 +1026,21 @@ def reject_attachments():
         "netw-model-5": patched(network_content({"model": 4, "numbers": 36}), "NETW", 0, u64(5)),
         "netw-direction-3": patched(network_content(), "NETW", 8, u64(3)),
         "netw-other-mesh": patched(network_content(), "NETW", 16, u64(1)),
+        "netw-model-0": whole(network_content({"model": 0, "numbers": 36})),
+        "netw-parts-0": whole(network_content({"parts": 0}, root=[0.0] * 9)),
+        "netw-parts-2": whole(network_content({"parts": 2}, root=[0.0] * 27)),
+        "netw-layers-0": whole(network_content({"layers": 0, "parameters": 2})),
+        "netw-layers-9": whole(network_content({"layers": 9, "parameters": 110})),
+        "netw-layers-2-63": patched(network_content(), "NETW", 72, u64(1 << 63)),
+        "netw-hidden-0": whole(network_content({"hidden": 0, "parameters": 1})),
+        "netw-hidden-2-62": patched(network_content(), "NETW", 80, u64(1 << 62)),
+        "netw-convolutions-1": whole(network_content({"convolutions": 1})),
+        "netw-convolutions-9": whole(network_content({"model": 4, "numbers": 36, "convolutions": 9, "parameters": 1668})),
+        "netw-parameters-0": whole(network_content({"parameters": 0})),
+        "netw-parameters-13": whole(network_content({"parameters": 13})),
+        "netw-step-2-16-and-1": whole(network_content({"step": (1 << 16) + 1})),
+        "netw-error-below-0": whole(network_content(errors=[-1.0] * 29 + [-0.5])),
+        "netw-best-error-below-0": whole(network_content(numbers=[-2, 2.5, -1, -2, 1, 2, 0.125, 0.01, 0.8])),
         "netw-width-10": whole(network_content({"width": 10})),
         "netw-numbers": patched(network_content(), "NETW", 56, u64(2)),
         "netw-rank-2-32": patched(network_content(), "NETW", 64, u64(1 << 32)),
@@ -1060,6 +1088,15 @@ def reject_attachments():
         "sign-vectors-without-root": whole(signal_content(space=2, mean=[0] * 24, basis=[[0] * 24] * 2, home=[[1, 0, 0, 0]] * 2, turn=[], shift=[])),
         "sign-vectors-without-turns": whole(signal_content(space=2, mean=[0] * 24, basis=[[0] * 24] * 2)),
         "sign-lengths-with-turns": whole(signal_content(space=5, mean=[0] * 9, basis=[[0] * 9] * 2, home=[[1, 0, 0, 0]])),
+        "sign-vectors-dimension": whole(shapes(2, 1, 2)),
+        "sign-vectors-turns": whole(shapes(2, 24, 5)),
+        "sign-vectors-before-selection": whole(c, sorted(records_of(c), key=lambda r: {"SELE": 1, "FORM": 2}.get(r.tag, 0))),
+        "sign-gradients-turns": whole(shapes(3, 18, 1)),
+        "sign-rotations-dimension": whole(shapes(4, 21)),
+        "sign-lengths-dimension": whole(shapes(5, 10)),
+        "sign-of-no-faces": whole(shapes(4, 3, selection=[])),
+        "sign-of-two-parts": whole(shapes(4, 15, mesh={"vertices": 4, "faces": [[0, 1], [2, 3]]})),
+        "sign-without-links": whole(shapes(2, 24, 2, links=None)),
         "sign-unit-0": whole(signal_content(bits=16, unit=[1, 0])),
         "rig-cut": lie(g, "RIG ", payload=lambda record: record.payload[:-8]),
         "rig-long": lie(g, "RIG ", payload=lambda record: record.payload + bytes(8)),

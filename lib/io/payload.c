@@ -21,6 +21,8 @@ static const char *refuse_form(const vg_head *h)
         return "the corners of record MAP do not fit the mesh";
     if (h->map.n && h->map.kind == VG_MAP_PATCHES && h->map.n != h->body.patches.n)
         return "record MAP has not as many patches as record PTCH";
+    if (h->signal.n && h->signal.space != VG_SPACE_VERTICES && !h->links.chosen)
+        return "record SIGN needs a LINK record";
     if (vg_head_width(h) == 0) return "its elements have no width";
     if (needs_mesh(element) && !h->body.reference) return "a MESH and a REFP record must come before it";
     if (element == VG_OF_CORNER && !h->links.chosen) return "a LINK record must come before it";

@@ -81,6 +81,22 @@ static int read_head_record(vg_reader *s, vg_record *record, vg_err *e)
     return keep_unknown(s, record, &s->head.extra, e);
 }
 
+/* The numbers of a shape, other than vertices, and its turns follow from the graph, which any order of records gives. */
+static int check_shapes(const vg_reader *s, vg_err *e)
+{
+    const vg_head *h = &s->head;
+    vg_graph *g = NULL;
+    vg_unshaper *u = NULL;
+    vg_err why = {0};
+    if (!h->signal.n || h->signal.space == VG_SPACE_VERTICES) return VG_OK;
+    int r = vg_head_graph(&g, h, e);
+    if (r == VG_OK && (r = vg_unshaper_new(&u, &h->signal, g, h->body.reference, &why)) < 0)
+        r = vg_fail(e, why.code, "'%.150s': record SIGN: %.300s", vgi_input_name(s->in), why.message);
+    vg_unshaper_free(&u);
+    vg_graph_free(&g);
+    return r;
+}
+
 static int read_head(vg_reader *s, vg_err *e)
 {
     int r = vgi_tally_init(&s->tally, e);
@@ -97,7 +113,7 @@ static int read_head(vg_reader *s, vg_err *e)
         return vg_fail(e, VG_EINPUT, "'%s' has a MESH but no REFP record before FORM", vgi_input_name(s->in));
     if (!s->head.body.reference_name && !(s->head.body.reference_name = vgi_copy_string("", 0, e))) return VG_ENOMEM;
     s->form = vgi_form_of(&s->head);
-    return VG_OK;
+    return check_shapes(s, e);
 }
 
 int vgi_reader_open_input(vg_reader **out, vgi_input *in, vg_err *e)

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+enum { MOST_FRAMES = 1 << 20 }; /* the thin plate needs a matrix of frames by sites */
 static const double farthest = 1e100; /* squared distances in the plane, and their sums, stay finite */
 
 static bool within(const double *x, size_t n)
@@ -26,6 +27,7 @@ static const char *refuse_turns(const vg_signal *s)
 static const char *refuse_counts(const vg_signal *s, const vg_mesh *mesh)
 {
     if (s->n < 2) return "it has fewer than 2 frames";
+    if (s->n > MOST_FRAMES) return "it has too many frames";
     if (s->k < 4) return "its curve has fewer than 4 control points";
     if (s->l < 1 || s->l > s->n) return "it has no sites, or more than frames";
     if (s->space < VG_SPACE_VERTICES || s->space > VG_SPACE_LENGTHS) return "its shape space is not known";

@@ -170,6 +170,7 @@ int vgi_pieces_make(vgi_pieces *p, const vg_graph *g, const double *reference, v
         size_t size = g->faces.start[f + 1] - g->faces.start[f];
         p->n += size > 3 ? size - 2 : 1;
     }
+    if (p->n >= VGI_NO_EDGE / 3) return vg_fail(e, VG_EINPUT, "a graph of %zu triangles is too large", p->n);
     int r = VG_ENOMEM;
     if ((p->face = vgi_array(p->n, sizeof *p->face, e)) && (p->first = vgi_array(g->faces.nf + 1, sizeof *p->first, e)) &&
         (p->apex = vgi_array(g->faces.nf, sizeof *p->apex, e)) && (p->vert = vgi_array(p->n, 3 * sizeof *p->vert, e)) &&

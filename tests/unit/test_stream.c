@@ -5,6 +5,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "frames.h"
 #include "io/io.h"
+#include "model/artefact.h"
 #include "meshes.h"
 
 #include <fcntl.h>
@@ -1115,6 +1116,21 @@ static void test_abandon(void)
     content_clear(&c);
 }
 
+/* Counts that are out of range whatever their arrays hold; a file of such a size is no test. */
+static void test_count_ranges(void)
+{
+    content c = make(VG_VERTICES, VG_F64, PLAIN);
+    vg_err e = {0, ""};
+    vg_signal s = {.n = (1 << 20) + 1, .space = VG_SPACE_VERTICES, .d = 3 * c.head.body.mesh.nv, .l = 1, .k = 4, .bits = 64};
+    CHECK(vgi_check_signal(&c.head, &s, "SIGN", &e) == VG_EINPUT && strstr(e.message, "too many frames"));
+    vg_network n = {.model = VG_NETWORK_PCA, .parts = 1, .width = 9, .numbers = (1 << 27) - 1, .rank = (1 << 27) - 1,
+                    .layers = 1, .hidden = 1, .sets = 1, .step = 1};
+    CHECK(vgi_check_network(&c.head, &n, "NETW", &e) == VG_EINPUT && strstr(e.message, "too many numbers"));
+    n.hidden = 4096, n.layers = 8, n.numbers = --n.rank;
+    CHECK(vgi_check_network(&c.head, &n, "NETW", &e) == VG_EINPUT && strstr(e.message, "not those of its layers"));
+    content_clear(&c);
+}
+
 static void test_full_device(void)
 {
     content c = make(VG_VERTICES, VG_F64, PLAIN);
@@ -1134,4 +1150,4 @@ TESTS({"every kind there and back", test_there_and_back}, {"extreme numbers", te
       {"the reader takes finite numbers only", test_not_finite_in}, {"the writer, too", test_not_finite_out},
       {"lengths that lie cost no memory", test_lying_lengths}, {"counts that lie", test_lying_counts},
       {"from a descriptor in pieces", test_descriptor}, {"many megabytes", test_large},
-      {"a failure is passed on", test_abandon}, {"a full device", test_full_device})
+      {"counts out of range", test_count_ranges}, {"a failure is passed on", test_abandon}, {"a full device", test_full_device})
