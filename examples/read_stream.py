@@ -791,6 +791,7 @@ class _Reader:
         p.end()
         if first[0] != 0 or any(a > b for a, b in zip(first, first[1:])):
             p.fail("its lists of pairs are not in order")
+        bound = all(m == 2 for m in matched)  # the target rides on the source
         for f in range(nf):
             mine = slice(first[f], first[f + 1])
             if first[f] == first[f + 1]:
@@ -801,7 +802,7 @@ class _Reader:
                 p.fail("a weight is not positive")
             if abs(sum(weight[mine]) - 1) >= 1e-9:
                 p.fail("the weights of a face do not sum to 1")
-            if distance[f] < 0 or matched[f] > 1:
+            if distance[f] < 0 or matched[f] > 1 and not bound:
                 p.fail("a distance or mark is out of range")
         self.stream.correspondence = Correspondence(source, target, first, source_face, weight, distance, matched)
 
