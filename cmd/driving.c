@@ -15,14 +15,30 @@ static size_t find_joint(const vg_skeleton *s, const char *name, size_t length)
     return j;
 }
 
+static const char *joint_name(const void *skeleton, size_t i)
+{
+    return ((const vg_skeleton *)skeleton)->joints[i].name;
+}
+
+/* ": did you mean 'Head'?", or nothing when no joint has a name like this one */
+static const char *advise(char to[120], const vg_skeleton *s, const char *name, size_t length)
+{
+    size_t likely = cli_likely(name, length, s->njoints, joint_name, s);
+    to[0] = 0;
+    if (likely < s->njoints) snprintf(to, 120, ": did you mean '%.80s'?", s->joints[likely].name);
+    return to;
+}
+
 /* ---- --align ---- */
 
 static bool *choose_bones(const char *names, const vg_skeleton *s, const char *map)
 {
     bool *chosen = cli_allocate(s->njoints, sizeof *chosen, "the joints");
+    char advice[120];
     for (const char *at = names;; at++) {
         size_t n = strcspn(at, ","), j = find_joint(s, at, n);
-        if (j == s->njoints) cli_usage("--align: '%s' has no bone '%.*s'", map, (int)n, at);
+        if (j == s->njoints)
+            cli_usage("--align: '%s' has no bone '%.*s'%s", map, (int)(n < 80 ? n : 80), at, advise(advice, s, at, n));
         chosen[j] = true;
         at += n;
         if (!*at) return chosen;
@@ -60,7 +76,9 @@ static uint32_t take_joint(lines *l, const vg_skeleton *s, const char *whose)
 {
     size_t n = strcspn(l->now, " \t\r\n"), j = find_joint(s, l->now, n);
     if (!n) lines_stop(l, "a line is a bone of the rig and a joint of the skeleton");
-    if (j == s->njoints) lines_stop(l, "%s has no joint '%.*s'", whose, (int)(n < 80 ? n : 80), l->now);
+    char advice[120];
+    if (j == s->njoints)
+        lines_stop(l, "%s has no joint '%.*s'%s", whose, (int)(n < 80 ? n : 80), l->now, advise(advice, s, l->now, n));
     l->now += n;
     l->now += strspn(l->now, " \t\r\n");
     return (uint32_t)j;

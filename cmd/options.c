@@ -104,7 +104,7 @@ static void print_help(const cli_program *p)
         if (!fits) printf("%s\n", text);
         printf("%-*s  %s\n", width, fits ? text : "", known.at[i]->help);
     }
-    printf("\nFor programs that wait: --progress json[:DESCRIPTOR], see vg(7).\n");
+    printf("\nProgress as lines of JSON, for other programs: --progress json[:DESCRIPTOR], see vg(7).\n");
 }
 
 /* strtod also accepts leading blanks, hexadecimal numbers and names. */

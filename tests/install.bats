@@ -31,6 +31,10 @@ flags() {
     must root/usr/bin/vg info --check "$GOLDEN/smallest.vgs"
     must_fail 2 root/usr/bin/vg nonsense
     must_fail 2 root/usr/bin/vg help nonsense
+    must_fail 2 root/usr/bin/vg solv
+    says "there is no program 'solv': did you mean 'solve'?"
+    must_fail 2 root/usr/bin/vg help transferr
+    says "there is no page for 'transferr': did you mean 'transfer'?"
     grep -q 'id="vg_solver_new"' root/usr/share/doc/vg/vg-api.html
     for file in README.md examples/tutorial.md examples/farm/shot examples/c/transfer.c examples/blender/vg_tools/__init__.py \
         examples/python/vgstream.py examples/data/trex.rest.obj; do

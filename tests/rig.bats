@@ -570,6 +570,11 @@ END
     must_fail 2 vg-play chain.rig --align all fit/ -o no.vgs
     must_fail 2 vg-play chain.rig --align knee,elbow fit.bvh -o no.vgs
     says "'chain.rig' has no bone 'elbow'"
+    must_fail 2 vg-play chain.rig --align Knee fit.bvh -o no.vgs
+    says "'chain.rig' has no bone 'Knee': did you mean 'knee'?"
+    echo 'kneee knee' >pairs.txt
+    must_fail 3 vg-play chain.rig --joints pairs.txt fit.bvh -o no.vgs
+    says "has no joint 'kneee': did you mean 'knee'?"
     must_fail 3 vg-play chain.rig --feet fit.bvh -o no.vgs
     says 'there are no feet to hold'
     must_fail 2 vg-play trex.rig --feet --live trex.vgs -o no.vgs
