@@ -81,8 +81,9 @@ static void say_line(const char *kind, const char *format, va_list ap)
     vsnprintf(body, sizeof body, format, ap);
     cli_strip_controls(body);
     int n = snprintf(line, sizeof line, "%s: %s%s\n", cli.program->name, kind, body);
-    progress_erase();
+    progress_pause();
     if (n > 0) print_error(line, (size_t)n < sizeof line ? (size_t)n : sizeof line - 1);
+    progress_go_on();
 }
 
 void cli_warn(const char *format, ...)
@@ -116,6 +117,7 @@ static void say_error(const char *format, ...) VG_PRINTF(1, 2);
 static void say_error(const char *format, ...)
 {
     va_list ap;
+    progress_end();
     va_start(ap, format);
     say_line("", format, ap);
     va_end(ap);
@@ -186,7 +188,7 @@ void cli_usage(const char *format, ...)
 
 void cli_finish(int status)
 {
-    progress_erase();
+    progress_end();
     output_remove(); /* the temporary file of an unfinished output */
     output_flush();
     leave(status);

@@ -123,6 +123,11 @@ void cli_strip_controls(char *s);
 void cli_progress(const char *label, uint64_t n);
 /* cli_progress_of: the same with a total (0: not known) and the time left. */
 void cli_progress_of(const char *label, uint64_t n, uint64_t total);
+/* cli_progress_detail: what the next line of cli_progress_of on a terminal ends with, such as ", loss 0.02". */
+void cli_progress_detail(const char *format, ...) VG_PRINTF(1, 2);
+/* cli_working: show "doing, 12 s" in the same way until the next call of these functions, for work that does not say how
+ * far it is. doing is borrowed for the rest of the run. */
+void cli_working(const char *doing);
 
 /* cli_parse_number: parse the whole text as a finite number; else cli_usage with the name of the option. */
 double cli_parse_number(const char *option, const char *text);

@@ -1,4 +1,6 @@
 /* progress.c: shows progress on a terminal or to another program. Messages are in cli.c.
+ * Loops report counts (cli_progress_of). Of a phase whose steps are not known (cli_working), a thread shows how long it has
+ * taken.
  *
  * In a pipe only the slowest program draws its line: its input pipe is full and its output pipe is not.
  * SPDX-License-Identifier: GPL-3.0-or-later */
@@ -8,6 +10,9 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
@@ -23,7 +28,11 @@ static struct {
     const char *label; /* of the phase */
     double phase_started;
     uint64_t phase_first; /* count at its start */
-} progress = {.fd = STDERR_FILENO};
+    char detail[80];      /* of the next line */
+    bool working;         /* a phase without counts */
+    bool ticking, ended;  /* the thread is there; it shall stop */
+    pthread_mutex_t lock; /* the thread and the messages share the terminal and all of this */
+} progress = {.fd = STDERR_FILENO, .lock = PTHREAD_MUTEX_INITIALIZER};
 
 void progress_start(void)
 {
@@ -73,10 +82,28 @@ static void write_some(int fd, const char *text, int n)
     while (done < 0 && errno == EINTR);
 }
 
-void progress_erase(void)
+static void erase(void)
 {
     if (progress.drawn) write_some(STDERR_FILENO, "\r\033[K", 4);
     progress.drawn = false;
+}
+
+void progress_pause(void)
+{
+    pthread_mutex_lock(&progress.lock);
+    erase();
+}
+
+void progress_go_on(void)
+{
+    pthread_mutex_unlock(&progress.lock);
+}
+
+void progress_end(void)
+{
+    progress_pause();
+    progress.ended = true;
+    progress_go_on();
 }
 
 /* "12 s", "3 min 20 s", "2 h 5 min" */
@@ -90,11 +117,21 @@ static void print_duration(char *to, size_t size, double seconds)
 
 static void draw(const char *label, uint64_t n, uint64_t total, double left)
 {
-    char line[192], duration[40];
+    char line[256], duration[40];
     int k = snprintf(line, sizeof line, "\r\033[K%s: %.64s %llu", cli.program->name, label, (unsigned long long)n);
     if (total) k += snprintf(line + k, sizeof line - (size_t)k, " of %llu", (unsigned long long)total);
     print_duration(duration, sizeof duration, left);
     if (left >= 1) k += snprintf(line + k, sizeof line - (size_t)k, ", %s left", duration);
+    k += snprintf(line + k, sizeof line - (size_t)k, "%s", progress.detail);
+    progress.drawn = true;
+    write_some(STDERR_FILENO, line, k);
+}
+
+static void draw_working(double since)
+{
+    char line[192], duration[40];
+    print_duration(duration, sizeof duration, since);
+    int k = snprintf(line, sizeof line, "\r\033[K%s: %.64s, %s", cli.program->name, progress.label, duration);
     progress.drawn = true;
     write_some(STDERR_FILENO, line, k);
 }
@@ -120,25 +157,101 @@ static double time_left(uint64_t n, uint64_t total, double now)
     return (now - progress.phase_started) / (double)done * (double)(total - n);
 }
 
-void cli_progress_of(const char *label, uint64_t n, uint64_t total)
+static bool is_watched(void)
 {
     static int terminal = -1;
     if (terminal < 0) terminal = isatty(STDERR_FILENO) && !cli.quiet;
-    if (!terminal && !progress.json) return;
-    double now = cli_seconds();
-    if (!progress.label || strcmp(progress.label, label)) {
-        progress.label = label, progress.phase_first = n;
-        progress.phase_started = now;
-    }
-    if (now - progress.last < interval || (!progress.json && now - progress.started < first_after)) return;
+    return terminal || progress.json;
+}
+
+static void begin_phase(const char *label, uint64_t first, double now)
+{
+    if (progress.label && !strcmp(progress.label, label)) return;
+    progress.label = label, progress.phase_first = first;
+    progress.phase_started = now;
+    if (progress.json) progress.last = -interval; /* a program is told at once */
+}
+
+/* Is it time for another line? */
+static bool is_due(double now)
+{
+    if (now - progress.last < interval || (!progress.json && now - progress.started < first_after)) return false;
     progress.last = now;
-    double left = time_left(n, total, now);
-    if (progress.json) print_json(label, n, total, left, now);
-    else if (is_slowest()) draw(label, n, total, left);
-    else progress_erase();
+    return true;
+}
+
+void cli_progress_of(const char *label, uint64_t n, uint64_t total)
+{
+    if (!is_watched()) return;
+    double now = cli_seconds();
+    pthread_mutex_lock(&progress.lock);
+    progress.working = false;
+    begin_phase(label, n, now);
+    if (is_due(now)) {
+        double left = time_left(n, total, now);
+        if (progress.json) print_json(label, n, total, left, now);
+        else if (is_slowest()) draw(label, n, total, left);
+        else erase();
+    }
+    progress.detail[0] = 0;
+    pthread_mutex_unlock(&progress.lock);
 }
 
 void cli_progress(const char *label, uint64_t n)
 {
     cli_progress_of(label, n, 0);
+}
+
+void cli_progress_detail(const char *format, ...)
+{
+    va_list ap;
+    va_start(ap, format);
+    vsnprintf(progress.detail, sizeof progress.detail, format, ap);
+    va_end(ap);
+}
+
+/* ---- phases without counts ---- */
+
+static void show_working(double now)
+{
+    if (!progress.working || !is_due(now)) return;
+    if (progress.json) print_json(progress.label, 0, 0, -1, now);
+    else if (is_slowest()) draw_working(now - progress.phase_started);
+    else erase();
+}
+
+static void *tick(void *unused)
+{
+    (void)unused;
+    for (bool ended = false; !ended;) {
+        nanosleep(&(struct timespec){.tv_nsec = (long)(interval * 1e9)}, NULL);
+        pthread_mutex_lock(&progress.lock);
+        ended = progress.ended;
+        if (!ended) show_working(cli_seconds());
+        pthread_mutex_unlock(&progress.lock);
+    }
+    return NULL;
+}
+
+/* Signals go to the thread that started the program. Without a thread there are fewer lines. */
+static void start_ticking(void)
+{
+    pthread_t thread;
+    sigset_t all, before;
+    sigfillset(&all);
+    if (progress.ticking || pthread_sigmask(SIG_SETMASK, &all, &before)) return;
+    progress.ticking = !pthread_create(&thread, NULL, tick, NULL) && !pthread_detach(thread);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+}
+
+void cli_working(const char *doing)
+{
+    if (!is_watched()) return;
+    double now = cli_seconds();
+    pthread_mutex_lock(&progress.lock);
+    progress.working = true;
+    begin_phase(doing, 0, now);
+    show_working(now);
+    start_ticking();
+    pthread_mutex_unlock(&progress.lock);
 }

@@ -7,7 +7,10 @@
 void progress_start(void);
 /* progress_take: the value of --progress; to be given to cli_option. */
 void progress_take(const char *value, void *context);
-/* progress_erase: clear the line on the terminal, if there is one. */
-void progress_erase(void);
+/* progress_pause: clear the line on the terminal, if there is one, and draw none until progress_go_on. */
+void progress_pause(void);
+void progress_go_on(void);
+/* progress_end: clear the line; there will be no other in the background. */
+void progress_end(void);
 
 #endif

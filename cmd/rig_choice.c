@@ -177,7 +177,7 @@ void rig_choose(const fitting *f, double *const *transforms, const vg_rig_option
         for (size_t i = 0; i < FITTING_BATCH; i++) x.out[way][i] = room(3 * nv, sizeof(double));
     list_candidates(&x, o, corners_given, refine_given);
     for (x.fold = 0; x.fold < x.folds && x.folds > 1; x.fold++) {
-        cli_progress("folds", x.fold + 1);
+        cli_progress_of("folds", x.fold, x.folds);
         try_fold(&x, o);
     }
     choose_best(&x, choice);

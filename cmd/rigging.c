@@ -211,6 +211,7 @@ static void place_skeleton(work *w)
     warn_outside(w);
     if (known) return;
     double miss, d = vg_diagonal(w->h->body.reference, w->h->body.mesh.nv);
+    cli_working("learning how bones move");
     if (vg_rig_learn(&w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, w->nsample, (const double *const *)w->sample, cli.threads, &miss, &e) < 0 ||
         vg_inverse_skin_new(&w->inverse, &w->h->body.rig, w->h->body.mesh.nv, w->h->body.reference, cli.threads, &e) < 0)
         cli_die(&e);
@@ -380,6 +381,7 @@ static void finish(work *w, vg_rig_method method)
 {
     vg_err e;
     vg_rig rig;
+    cli_working("solving for the weights");
     if (vg_rig_fitter_finish(rig_fitter, method, &rig, &w->maps[method], &e) < 0) cli_die(&e);
     vg_head_put(w->h, &rig, "rig");
 }

@@ -157,6 +157,7 @@ static void fit(vg_source *s)
         cli_die(&e);
     fitting_collect(&f, s, opts.rig.holdout, "fit a map to");
     fitting_pass(&f, is_fitted, add_batch, &x);
+    cli_working("solving for the map");
     if (vg_map_fitter_finish(x.fitter, &pieces, &map, &e) < 0) cli_die(&e);
     vg_map_fitter_free(&x.fitter);
     if (pieces.n != h->body.patches.n)

@@ -201,6 +201,7 @@ static void pick(const vg_head *h, poses *p)
     if (n > p->n) cli_stop(VG_EARG, "there are %zu frames to pick from, not %zu", p->n, n);
     frame = cli_allocate(n, sizeof *frame, "frames");
     left = cli_allocate(n, sizeof *left, "frames");
+    cli_working("choosing poses");
     if (vg_signal_pick(&h->body, p->values, p->n, n, cli.threads, frame, left, &e) < 0) cli_die(&e);
     report *t = report_new();
     char *list = list_frames(frame, n);
@@ -240,6 +241,7 @@ int main(int argc, char **argv)
     vg_graph *graph = NULL;
     if (o.space != VG_SPACE_VERTICES && (vg_head_prepare_vectors(h, &e) < 0 || vg_head_graph(&graph, h, &e) < 0)) cli_die(&e);
     o.graph = graph;
+    cli_working("fitting the signal");
     if (vg_signal_fit(&h->signal, &h->body, p.values, p.n, &o, &r, &e) < 0) cli_die(&e);
     poses_name(&p, &h->signal);
     poses_clear(&x);

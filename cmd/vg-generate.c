@@ -116,6 +116,7 @@ static void cross(gap *w, vg_generator *g, const double *key, bool loop, const c
 {
     vg_err e;
     vg_way way;
+    cli_working("looking for a way");
     if (vg_generator_between(g, key, loop, w->n, w->poses, &way, &e) < 0) cli_die(&e);
     say_way(&way, to);
     for (size_t i = 0; i < w->n; i++) put(&w->frame[i], ++w->number);

@@ -247,6 +247,7 @@ static void bind_target(vg_head *source, vg_head *target)
     vg_err e;
     vg_correspondence c;
     const vg_body *s = &source->body, *t = &target->body;
+    cli_working("binding");
     if (vg_bind(&c, &s->mesh, s->reference, &t->mesh, t->reference, cli.threads, &e) < 0) cli_die(&e);
     double farthest = 0, D = vg_diagonal(s->reference, s->mesh.nv);
     for (size_t f = 0; f < c.target_nf; f++) farthest = c.distance[f] > farthest ? c.distance[f] : farthest;
@@ -275,6 +276,7 @@ static void pair_meshes(vg_head *source, vg_head *target)
     read_pairs(&in, &markers, &seeds);
     warn_shared(&markers, false);
     warn_shared(&markers, true);
+    cli_working("aligning");
     if (vg_register(&r, &in, note_step, NULL, &e) < 0) cli_die(&e);
     note_alignment(&r);
     report_markers(&markers, &r);

@@ -37,6 +37,7 @@ static void retarget(vg_head *h)
     snprintf(name, sizeof name, "'%.190s'", opts.onto);
     if (vg_head_need(h, "map", "the input", &e) < 0) cli_die(&e);
     cli_load(&target, opts.onto, "mesh");
+    cli_working("retargeting");
     if (vg_mesh_same(&h->body.mesh, "the map", &target.body.mesh, name, &e) < 0 ||
         vg_map_retarget(h, target.body.reference, opts.morph, cli.threads, &map, &rig, target.body.reference, &e) < 0 ||
         vg_head_merge_trace(h, &target, &e) < 0)

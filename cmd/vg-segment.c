@@ -59,6 +59,7 @@ int main(int argc, char **argv)
         cli_stop(VG_EINPUT, "the input has no poses: rotations cannot be compared");
     vg_head_drop(h, "patches");
     vg_head_drop(h, "map");
+    cli_working("finding patches");
     if (vg_segmenter_cut(s, k, (uint64_t)opts.seed, opts.connected, &h->body.patches, &report, &e) < 0) cli_die(&e);
     vg_segmenter_free(&s);
     if (k && report.patches < k)

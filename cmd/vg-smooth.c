@@ -296,6 +296,7 @@ static void write_together(void *context)
     vg_frame in[BATCH] = {{0}};
     vg_err e;
     if (n == 0) return;
+    cli_working("finding the common motion");
     if (vg_region_filter_learn(t->filter, &e) < 0) cli_die(&e);
     cli_note("noise of %.3g D (root mean square of a vertex)", d > 0 ? vg_region_filter_noise(t->filter) / d : 0);
     room = cli_allocate(BATCH * 3 * nv, sizeof *room, "a batch of frames");

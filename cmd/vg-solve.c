@@ -119,6 +119,7 @@ static void make_plain(work *w, uint32_t *held, size_t nheld)
     vg_err e;
     machine *m = &w->plain;
     *m = (machine){.held = held, .nheld = nheld};
+    cli_working("factorising");
     if (vg_solver_new(&m->solver, w->g, held, nheld, w->h->body.reference, w->weights, cli.threads, &e) < 0 ||
         (opts.fit == 0 && vg_robust_new(&w->robust, m->solver, (size_t)opts.rounds, opts.eps, &e) < 0))
         cli_die(&e);

@@ -259,15 +259,11 @@ static void write_log(FILE *log, const vg_train_state *s)
 
 /* ---- learning ---- */
 
-static void show(const vg_train_state *s, double since)
+static void show(const vg_train_state *s)
 {
-    static double last;
-    double now = cli_seconds();
-    if (cli.quiet || now - last < 1 || !isatty(STDERR_FILENO)) return;
-    last = now;
-    double left = (double)(s->iterations - s->iteration) * since / (double)(s->iteration ? s->iteration : 1);
-    cli_say("%s, iteration %llu of %llu: loss %.4g, held-out error %.4g, %.0f s left", s->phase ? "all frames" : "validation",
-            (unsigned long long)s->iteration, (unsigned long long)s->iterations, s->loss, s->validation, left);
+    if (isnan(s->validation)) cli_progress_detail(", loss %.4g", s->loss);
+    else cli_progress_detail(", loss %.4g, held-out error %.4g", s->loss, s->validation);
+    cli_progress_of(s->phase ? "iterations on all frames" : "iterations of validation", s->iteration, s->iterations);
 }
 
 /* True: to the end. */
@@ -281,7 +277,7 @@ static bool learn(vg_trainer *t, vg_head *h, vg_train_state *s)
     bool stopped;
     while (!(stopped = vg_train_any(interrupted)) && (r = vg_trainer_step(t, s, &e)) > 0) {
         write_log(log, s);
-        show(s, cli_seconds() - start);
+        show(s);
         if (opts.checkpoint && is_first && s->iteration % (uint64_t)opts.every == 0) write_checkpoint(t, h);
     }
     if (log && fclose(log)) log_failed();
@@ -324,6 +320,7 @@ static void report(vg_trainer *t, const vg_train_state *s)
                                                           "the regression alone", "the network"};
     vg_network_errors x;
     vg_err e;
+    cli_working("measuring held-out frames");
     if (vg_trainer_judge(t, &x, &e) < 0) cli_die(&e);
     if (!x.windows) {
         cli_note("nothing is held out that could be judged");
@@ -368,6 +365,7 @@ int main(int argc, char **argv)
     if (vg_trainer_new(&t, &h->body.mesh, h->body.reference, &o, &e) < 0) cli_die(&e);
     read_sequence(t, s);
     read_others(t, h, operands, n);
+    cli_working("preparing");
     if (vg_trainer_prepare(t, &e) < 0) cli_die(&e);
     resume(t);
     vg_network_clear(&h->network);

@@ -17,14 +17,15 @@ import json
 def read(name):
     lines = [json.loads(line) for line in open(name)]
     assert lines, name
-    assert all(line["seconds"] >= 0 and line["done"] >= 1 for line in lines)
+    assert all(line["seconds"] >= 0 and (line["done"] >= 1 or line["doing"] == "aligning") for line in lines)
     return lines
 for line in read("lines"):
     assert line["program"] == "vg-interpolate" and line["doing"] in ("keys", "poses")
     assert ("total" in line) == (line["doing"] == "poses") and line.get("total", 200) == 200
 assert "total" not in read("plain")[0] and "left" not in read("plain")[0]
-first = read("register")[0]
-assert first["doing"] == "rounds" and 1 <= first["done"] <= first["total"]
+first, second = read("register")[:2]
+assert first["doing"] == "aligning" and first["done"] == 0 and "total" not in first
+assert second["doing"] == "rounds" and 1 <= second["done"] <= second["total"]
 END
     for value in xml json: json:x json:3x json:1 json:99; do
         must_fail 2 vg-encode --progress "$value" in.vgs -o out2.vgs
@@ -70,4 +71,66 @@ assert b"vg-encode: poses " in alone, alone
 assert b"poses" not in waiting.split(b"\r\033[K")[0] and b"vg-encode: poses 5" not in waiting, waiting
 END
     must python3 feed.py
+}
+
+# doing FILE: what the lines of JSON in FILE say is done, each once
+doing() {
+    sed -n 's/.*"doing":"\([^"]*\)".*/\1/p' "$1" | uniq | tr '\n' ';'
+}
+
+@test "every fit says what it does" {
+    vg-encode --take 0-11 "$DATA/horse-run.tar.xz" -o in.vgs
+    vg-decode --replace in.vgs -o 'pose%d.obj'
+    must vg-segment -q --progress json:3 -k 12 in.vgs -o in.patches 3>segment
+    [[ $(doing segment) = *'finding patches;'* ]] || fail "$(cat segment)"
+    must vg-fitmap -q --progress json:3 --patches in.patches in.vgs -o in.map 3>map
+    [[ $(doing map) = *'solving for the map;'* ]] || fail "$(cat map)"
+    must vg-retarget -q --progress json:3 --onto pose2.obj in.map -o to.map 3>retarget
+    [[ $(doing retarget) = 'retargeting;' ]] || fail "$(cat retarget)"
+    must vg-fitsignal -q --progress json:3 in.vgs -o in.signal 3>signal
+    [[ $(doing signal) = *'fitting the signal;' ]] || fail "$(cat signal)"
+    must vg-smooth -q --progress json:3 --filter together in.vgs -o out.vgs 3>smooth
+    [[ $(doing smooth) = *'finding the common motion;'* ]] || fail "$(cat smooth)"
+    must vg-train -q --progress json:3 --iterations 300 in.vgs -o in.net 3>train
+    [[ $(doing train) = *'iterations'* ]] || fail "$(cat train)"
+    py <<'END'
+import json
+for name in ("segment", "map", "retarget", "signal", "smooth", "train"):
+    for line in open(name):
+        x = json.loads(line)
+        assert x["seconds"] >= 0 and x["done"] >= 0 and ("total" in x) == x["doing"].startswith(("iterations", "frames written")), x
+END
+}
+
+@test "on a terminal a fit shows how long it takes, its line goes when it has ended, and with -q there is none" {
+    needs_terminal
+    must vg-encode "$DATA/horse-run.tar.xz" -o horse.vgs
+    cat >watch.py <<'END'
+import os, re, subprocess
+def watch(*command):
+    main, side = os.openpty()
+    p = subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=side)
+    os.close(side)
+    shown = b""
+    try:
+        while more := os.read(main, 65536):
+            shown += more
+    except OSError:
+        pass
+    assert p.wait() == 0
+    return shown
+fit = ["vg-fitsignal", "-j1", "--space", "gradients", "horse.vgs", "-o", "horse.signal"]
+for _ in range(5): # a fast machine needs more than this to take a second
+    shown = watch(*fit)
+    if b"fitting the signal" in shown: break
+    subprocess.run(["vg-encode", "horse.vgs", "horse.vgs", "-o", "more.vgs"], check=True)
+    os.replace("more.vgs", "horse.vgs")
+else:
+    raise SystemExit("nothing was shown: %r" % shown)
+assert re.search(rb"vg-fitsignal: fitting the signal, \d+ s", shown), shown
+tail = shown[shown.rindex(b"fitting the signal"):]
+assert b"\r\033[K" in tail, tail
+assert b"fitting the signal" not in watch(*fit[:1], "-q", *fit[1:])
+END
+    must python3 watch.py
 }
