@@ -19,7 +19,7 @@ static const double OF_CORNER = 1.0 / 12, OF_CENTROID = 0.75;
 /* The sample points of one surface. */
 typedef struct samples {
     const vg_mesh *mesh;
-    size_t n, triangles;
+    size_t n; /* vertices, then centroids */
     double *point, *weight, *distance;
 } samples;
 
@@ -39,12 +39,13 @@ struct vg_surface_measures {
 
 /* ---- points ---- */
 
-static size_t count_triangles(const vg_mesh *m)
+/* The centroids of triangles, and of a face of four or more corners its own: the middle of the fan. */
+static size_t count_centroids(const vg_mesh *m)
 {
     size_t n = 0;
     for (size_t f = 0; f < m->nf; f++) {
         size_t r = m->start[f + 1] - m->start[f];
-        n += r == 3 ? 1 : r > 3 ? r : 0;
+        n += r == 3 ? 1 : r > 3 ? r + 1 : 0;
     }
     return n;
 }
@@ -52,8 +53,7 @@ static size_t count_triangles(const vg_mesh *m)
 static int make_samples(samples *s, const vg_mesh *m, vg_err *e)
 {
     s->mesh = m;
-    s->triangles = count_triangles(m);
-    s->n = m->nv + s->triangles;
+    s->n = m->nv + count_centroids(m);
     s->point = vgi_array(3 * s->n, sizeof *s->point, e);
     s->weight = vgi_array(s->n, sizeof *s->weight, e);
     s->distance = vgi_array(s->n, sizeof *s->distance, e);
@@ -67,17 +67,16 @@ static void clear_samples(samples *s)
     free(s->distance);
 }
 
-/* A triangle of the vertices a and b and a third point, which is shared equally by the vertices of a face. */
-static void add_triangle(samples *s, size_t at, uint32_t a, uint32_t b, const double *third, const uint32_t *owner, size_t owners)
+/* A triangle of three samples. Its centroid is the sample `at`. */
+static void add_triangle(samples *s, size_t at, size_t a, size_t b, size_t c)
 {
-    const double *x = s->point + 3 * (size_t)a, *y = s->point + 3 * (size_t)b;
+    const double *x = s->point + 3 * a, *y = s->point + 3 * b, *z = s->point + 3 * c;
     double n[3];
-    for (size_t k = 0; k < 3; k++) s->point[3 * at + k] = (x[k] + y[k] + third[k]) / 3;
-    vgi_triangle_normal(x, y, third, n);
+    for (size_t k = 0; k < 3; k++) s->point[3 * at + k] = (x[k] + y[k] + z[k]) / 3;
+    vgi_triangle_normal(x, y, z, n);
     double area = vgi_length(n) / 2;
     s->weight[at] = OF_CENTROID * area;
-    s->weight[a] += OF_CORNER * area, s->weight[b] += OF_CORNER * area;
-    for (size_t i = 0; i < owners; i++) s->weight[owner[i]] += OF_CORNER * area / (double)owners;
+    s->weight[a] += OF_CORNER * area, s->weight[b] += OF_CORNER * area, s->weight[c] += OF_CORNER * area;
 }
 
 static void place_samples(samples *s, const double *points)
@@ -89,11 +88,11 @@ static void place_samples(samples *s, const double *points)
     for (size_t f = 0; f < m->nf; f++) {
         const uint32_t *v = m->vert + m->start[f];
         size_t r = m->start[f + 1] - m->start[f];
-        double centre[3];
-        if (r == 3) add_triangle(s, at++, v[0], v[1], points + 3 * (size_t)v[2], v + 2, 1);
+        if (r == 3) add_triangle(s, at++, v[0], v[1], v[2]);
         if (r <= 3) continue;
-        vgi_face_centre(points, v, r, centre);
-        for (size_t i = 0; i < r; i++) add_triangle(s, at++, v[i], v[i + 1 < r ? i + 1 : 0], centre, v, r);
+        const size_t centre = at++;
+        vgi_face_centre(points, v, r, s->point + 3 * centre);
+        for (size_t i = 0; i < r; i++) add_triangle(s, at++, v[i], v[i + 1 < r ? i + 1 : 0], centre);
     }
     double total = 0;
     for (size_t i = 0; i < s->n; i++) total += s->weight[i];
