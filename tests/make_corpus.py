@@ -477,13 +477,15 @@ def driven(by, distance=0.0, matched=True):
     return {"driven_by": by, "distance": distance, "matched": matched}
 
 
-def register_content(**changes):
-    """Like what vg-register writes: source mesh and reference, one frame of it fitted to the target (three faces)."""
+def register_content(matched=None, **changes):
+    """Like what vg-register writes: source mesh and reference, one frame of it fitted to the target (three faces).
+    matched: of all faces; 2: the target rides on the source."""
     c = content(frames=[pose("fitted", BENT[:4])])
     target = {"vertices": 5, "faces": [[0, 1, 2], [0, 2, 3], [0, 3, 4]]}
     ends = [{"vertices": m["vertices"], "faces": len(m["faces"]), "digest": f"{digest(m):016x}"}
             for m in (c["mesh"], target)]
     faces = [driven([[0, 1.0]], 0.25), driven([[1, 0.75], [0, 0.25]]), driven([[1, 1.0]], 2.5, False)]
+    faces = [f if matched is None else dict(f, matched=matched) for f in faces]
     return dict(c, correspondence={"source": ends[0], "target": ends[1], "faces": faces}, **changes)
 
 
@@ -654,6 +656,7 @@ def accept():
                                              reference={"name": "", "positions": []})),
         "correspondence-without-mesh": whole(content(mesh=None, reference=None, kind="transforms", count=0, frames=[],
                                                      correspondence=register_content()["correspondence"])),
+        "correspondence-bound": whole(register_content(matched=2)),
         "correspondence-of-nothing": whole(content(correspondence={"source": nobody, "target": nobody, "faces": []})),
         "sign-single": whole(signal_content(bits=32, times=[], turn=[], shift=[])),
         "sign-int16": whole(signal_content(bits=16, unit=[1e-4, 2.5], basis=[[32767] + [0] * 11, [0, 0, -32768] + [0] * 9])),
