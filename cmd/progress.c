@@ -223,11 +223,11 @@ static void show_working(double now)
 static void *tick(void *unused)
 {
     (void)unused;
-    for (bool ended = false; !ended;) {
+    for (bool done = false; !done;) {
         nanosleep(&(struct timespec){.tv_nsec = (long)(interval * 1e9)}, NULL);
         pthread_mutex_lock(&progress.lock);
-        ended = progress.ended;
-        if (!ended) show_working(cli_seconds());
+        done = progress.ended;
+        if (!done) show_working(cli_seconds());
         pthread_mutex_unlock(&progress.lock);
     }
     return NULL;
