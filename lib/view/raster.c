@@ -40,8 +40,8 @@ static int16_t pack(float x)
 static void put(vgi_sample *s, float z, const float n[3], float value, int kind)
 {
     s->z = z;
-    for (int k = 0; k < 3; k++) s->normal[k] = pack(fminf(fmaxf(n[k], -1), 1));
-    s->value = (uint16_t)(fminf(fmaxf(value, 0), 1) * 65535 + 0.5f);
+    for (int k = 0; k < 3; k++) s->normal[k] = pack(vgi_least(vgi_most(n[k], -1), 1));
+    s->value = (uint16_t)(vgi_least(vgi_most(value, 0), 1) * 65535 + 0.5f);
     s->kind = (uint8_t)kind;
     s->edge = 0;
 }
@@ -71,6 +71,22 @@ static bool clip_span(const vgi_raster *raster, double x0, double x1, double y0,
     return true;
 }
 
+/* The samples whose middles are in the box around a triangle. */
+static bool cover(const vgi_raster *raster, int64_t p[3][2], span *s)
+{
+    int64_t end[2] = {(int64_t)raster->w, (int64_t)raster->h}, low[2], high[2];
+    for (int k = 0; k < 2; k++) {
+        int64_t a = p[0][k], b = p[1][k], c = p[2][k];
+        int64_t least = a < b ? (a < c ? a : c) : b < c ? b : c, most = a > b ? (a > c ? a : c) : b > c ? b : c;
+        least = least > GRID / 2 ? (least + GRID / 2 - 1) / GRID : 0;
+        most = most < GRID / 2 ? 0 : (most + GRID / 2) / GRID;
+        low[k] = least, high[k] = most < end[k] ? most : end[k];
+        if (low[k] >= high[k]) return false;
+    }
+    *s = (span){(size_t)low[0], (size_t)high[0], (size_t)low[1], (size_t)high[1]};
+    return true;
+}
+
 static void fill_sample(vgi_sample *s, const vgi_corner *const c[3], const float w[3], float z, float facing)
 {
     float n[3];
@@ -97,19 +113,18 @@ static void draw_triangle(vgi_raster *raster, const vgi_corner *const corner[3],
     }
     int64_t area = (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]);
     span s;
-    double x0 = fmin(fmin(c[0]->x, c[1]->x), c[2]->x), x1 = fmax(fmax(c[0]->x, c[1]->x), c[2]->x);
-    double y0 = fmin(fmin(c[0]->y, c[1]->y), c[2]->y), y1 = fmax(fmax(c[0]->y, c[1]->y), c[2]->y);
-    if (area == 0 || !clip_span(raster, x0 - 1, x1, y0 - 1, y1, &s)) return;
+    if (area == 0 || !cover(raster, p, &s)) return;
     /* y points down: a face that is counter-clockwise for the viewer has a negative area here */
     float facing = area < 0 ? 1 : -1;
     int64_t sign = area < 0 ? -1 : 1;
-    float inverse = 1 / (float)(area * sign), height[3];
+    float inverse = 1 / (float)(area * sign), height[3] = {0};
+    if (!(edge_width > 0)) edges = 0;
     side e[3];
     for (int k = 0; k < 3; k++) {
         const int64_t *a = p[(k + 1) % 3], *b = p[(k + 2) % 3];
         e[k] = side_of(a, b, (int64_t)s.x0 * GRID + GRID / 2, (int64_t)s.y0 * GRID + GRID / 2);
         e[k] = (side){sign * e[k].at, sign * e[k].dx, sign * e[k].dy};
-        height[k] = 1 / (inverse * hypotf((float)(b[0] - a[0]), (float)(b[1] - a[1])) * GRID);
+        if (edges) height[k] = 1 / (inverse * hypotf((float)(b[0] - a[0]), (float)(b[1] - a[1])) * GRID);
     }
     for (size_t y = s.y0; y < s.y1; y++) {
         int64_t w0 = e[0].at, w1 = e[1].at, w2 = e[2].at;
@@ -120,7 +135,7 @@ static void draw_triangle(vgi_raster *raster, const vgi_corner *const corner[3],
             float z = w[0] * c[0]->z + w[1] * c[1]->z + w[2] * c[2]->z;
             if (!(z > row[x].z)) continue;
             fill_sample(row + x, c, w, z, facing);
-            if (edges && edge_width > 0) row[x].edge = near_edge(w, height, edges, edge_width);
+            if (edges) row[x].edge = near_edge(w, height, edges, edge_width);
         }
         for (int k = 0; k < 3; k++) e[k].at += e[k].dy;
     }
@@ -152,7 +167,7 @@ static void draw_wire(vgi_raster *raster, const vgi_corner *a, const vgi_corner 
         strip(a, dx, dy, radius * sqrtf(square), py, &x0, &x1);
         for (size_t x = x0; x < x1; x++) {
             float px = (float)x + 0.5f;
-            float t = square > 0 ? fminf(fmaxf(((px - a->x) * dx + (py - a->y) * dy) / square, 0), 1) : 0;
+            float t = square > 0 ? vgi_least(vgi_most(((px - a->x) * dx + (py - a->y) * dy) / square, 0), 1) : 0;
             float ox = (px - a->x - t * dx) / radius, oy = (py - a->y - t * dy) / radius, off = ox * ox + oy * oy;
             if (off > 1) continue;
             float n[3] = {ox, -oy, sqrtf(1 - off)}, z = a->z + t * (b->z - a->z) + radius * n[2];

@@ -5,6 +5,7 @@
 #include "view/view.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 enum { TAPS = 24, PATTERN = 4 };
 
@@ -31,16 +32,21 @@ static float clamp01(float x)
 
 /* ---- ambient occlusion in the plane of the picture ---- */
 
+/* A neighbour that is looked at: so many pixels away, to the right and down; the same in samples, y up. */
+typedef struct tap {
+    int x, y;
+    float dx, dy;
+} tap;
+
 typedef struct pixels {
     const vgi_raster *r;
-    size_t w, h, step; /* step: samples per pixel */
-    float *light;      /* w * h */
+    size_t w, h, step;   /* step: samples per pixel */
+    float reach;         /* of occlusion, in samples */
+    int far;             /* in pixels, of every tap */
+    tap taps[PATTERN * PATTERN][TAPS];
+    vgi_sample *middle;  /* w * h: the sample in the middle of each pixel, close together */
+    float *raw, *light;  /* w * h: the share of the sky that is seen; its mean over the pattern */
 } pixels;
-
-static const vgi_sample *middle_sample(const pixels *p, size_t x, size_t y)
-{
-    return p->r->at + (y * p->step + p->step / 2) * p->r->w + x * p->step + p->step / 2;
-}
 
 static void unit_normal(const vgi_sample *s, float n[3])
 {
@@ -51,84 +57,90 @@ static void unit_normal(const vgi_sample *s, float n[3])
     for (int k = 0; k < 3; k++) n[k] /= size;
 }
 
-/* One tap: how much of the sky of sample s its neighbour t hides. */
-static float hidden(const vgi_sample *s, const float n[3], const vgi_sample *t, float dx, float dy, float reach)
+/* Few taps would show as rings: their start turns from pixel to pixel, and what they give is blurred. */
+static void turn_taps(pixels *p)
 {
-    if (t->kind == VGI_EMPTY) return 0;
-    float d[3] = {dx, dy, t->z - s->z}, square = dot(d, d), near = 1 - square / (reach * reach);
-    if (near <= 0 || square <= 0) return 0;
-    float cosine = dot(n, d) / sqrtf(square) - 0.12f;
+    for (int i = 0; i < TAPS; i++) { /* sunflower pattern: even in area, denser inside by the exponent */
+        float radius = p->reach * powf(((float)i + 0.5f) / TAPS, 0.75f), angle = 2.39996323f * (float)i;
+        for (int turn = 0; turn < PATTERN * PATTERN; turn++) {
+            float all = angle + (float)turn * (float)(2 * M_PI / (PATTERN * PATTERN));
+            tap *t = &p->taps[turn][i];
+            t->x = (int)lrintf(radius * cosf(all) / (float)p->step), t->y = -(int)lrintf(radius * sinf(all) / (float)p->step);
+            t->dx = (float)(t->x * (int)p->step), t->dy = (float)(-t->y * (int)p->step);
+        }
+    }
+    p->far = (int)(p->reach / (float)p->step) + 1;
+}
+
+/* How much of the sky of sample s its neighbour, d away from it, hides. Nothing where that is empty: d is infinite. */
+static float hidden(const float n[3], const float d[3], float reach)
+{
+    float square = dot(d, d), near = 1 - square / (reach * reach), above = dot(n, d);
+    if (!(near > 0 && above > 0)) return 0;
+    float cosine = above / sqrtf(square) - 0.12f;
     return cosine > 0 ? cosine * near : 0;
 }
 
-static float sky_seen(const pixels *p, size_t x, size_t y, const float taps[][2], float reach)
+static float sky_seen(const pixels *p, size_t x, size_t y)
 {
-    const vgi_sample *s = middle_sample(p, x, y);
+    const vgi_sample *s = p->middle + y * p->w + x;
     if (s->kind == VGI_EMPTY || s->kind >= VGI_WIRE) return 1;
+    long far = p->far, left = (long)x, above = (long)y, w = (long)p->w, h = (long)p->h;
+    bool inside = left >= far && above >= far && left + far < w && above + far < h;
     float n[3], sum = 0;
     unit_normal(s, n);
-    /* few taps would show as rings: rotate their start from pixel to pixel, and blur */
-    float angle = (float)((x % PATTERN) * PATTERN + y % PATTERN) * (float)(2 * M_PI / (PATTERN * PATTERN));
-    float cosine = cosf(angle), sine = sinf(angle);
-    for (int i = 0; i < TAPS; i++) {
-        float dx = reach * (taps[i][0] * cosine - taps[i][1] * sine),
-              dy = reach * (taps[i][0] * sine + taps[i][1] * cosine);
-        long px = (long)x + lrintf(dx / (float)p->step), py = (long)y - lrintf(dy / (float)p->step);
-        if (px < 0 || py < 0 || px >= (long)p->w || py >= (long)p->h) continue;
-        sum += hidden(s, n, middle_sample(p, (size_t)px, (size_t)py), (float)(px - (long)x) * (float)p->step,
-                      (float)((long)y - py) * (float)p->step, reach);
+    const tap *t = p->taps[x % PATTERN * PATTERN + y % PATTERN];
+    for (int i = 0; i < TAPS; i++, t++) {
+        if (!inside && (left + t->x < 0 || above + t->y < 0 || left + t->x >= w || above + t->y >= h)) continue;
+        float d[3] = {t->dx, t->dy, s[t->y * w + t->x].z - s->z};
+        sum += hidden(n, d, p->reach);
     }
     return clamp01(1 - 2.1f * sum / TAPS);
 }
 
 /* Mean over the pattern, within the same surface only. */
-static float smooth_sky(const pixels *p, const float *raw, size_t x, size_t y, float step_limit)
+static float smooth_sky(const pixels *p, size_t x, size_t y)
 {
-    const vgi_sample *s = middle_sample(p, x, y);
+    const vgi_sample *s = p->middle + y * p->w + x;
+    size_t half = PATTERN / 2, x0 = x > half ? x - half : 0, y0 = y > half ? y - half : 0,
+           x1 = x + half < p->w ? x + half : p->w, y1 = y + half < p->h ? y + half : p->h;
     float sum = 0, weight = 0;
-    for (int j = -PATTERN / 2; j < PATTERN / 2; j++)
-        for (int i = -PATTERN / 2; i < PATTERN / 2; i++) {
-            long px = (long)x + i, py = (long)y + j;
-            if (px < 0 || py < 0 || px >= (long)p->w || py >= (long)p->h) continue;
-            const vgi_sample *t = middle_sample(p, (size_t)px, (size_t)py);
-            if (t->kind == VGI_EMPTY || fabsf(t->z - s->z) > step_limit) continue;
-            sum += raw[(size_t)py * p->w + (size_t)px];
+    for (size_t j = y0; j < y1; j++)
+        for (size_t i = x0; i < x1; i++) {
+            if (!(fabsf(p->middle[j * p->w + i].z - s->z) <= p->reach * 0.25f)) continue;
+            sum += p->raw[j * p->w + i];
             weight++;
         }
     return weight > 0 ? sum / weight : 1;
 }
 
-static int light_corners(pixels *p, float reach, vg_err *e)
+static int light_corners(pixels *p, vg_err *e)
 {
     size_t n = p->w * p->h; /* smaller than the samples, which are already allocated */
-    float taps[TAPS][2], *raw = vgi_array_raw(n, sizeof *raw, e);
+    p->middle = vgi_array_raw(n, sizeof *p->middle, e);
+    p->raw = vgi_array_raw(n, sizeof *p->raw, e);
     p->light = vgi_array_raw(n, sizeof *p->light, e);
-    if (!raw || !p->light) {
-        free(raw);
-        return VG_ENOMEM;
-    }
-    for (int i = 0; i < TAPS; i++) { /* sunflower pattern: even in area, denser inside by the exponent */
-        float radius = powf(((float)i + 0.5f) / TAPS, 0.75f), angle = 2.39996323f * (float)i;
-        taps[i][0] = radius * cosf(angle), taps[i][1] = radius * sinf(angle);
-    }
-    for (size_t y = 0; y < p->h; y++)
-        for (size_t x = 0; x < p->w; x++) raw[y * p->w + x] = sky_seen(p, x, y, taps, reach);
+    if (!p->middle || !p->raw || !p->light) return VG_ENOMEM;
+    turn_taps(p);
     for (size_t y = 0; y < p->h; y++)
         for (size_t x = 0; x < p->w; x++)
-            p->light[y * p->w + x] =
-                middle_sample(p, x, y)->kind == VGI_EMPTY ? 1 : smooth_sky(p, raw, x, y, reach * 0.25f);
-    free(raw);
+            p->middle[y * p->w + x] = p->r->at[(y * p->step + p->step / 2) * p->r->w + x * p->step + p->step / 2];
+    for (size_t y = 0; y < p->h; y++)
+        for (size_t x = 0; x < p->w; x++) p->raw[y * p->w + x] = sky_seen(p, x, y);
+    for (size_t y = 0; y < p->h; y++)
+        for (size_t x = 0; x < p->w; x++)
+            p->light[y * p->w + x] = p->middle[y * p->w + x].kind == VGI_EMPTY ? 1 : smooth_sky(p, x, y);
     return VG_OK;
 }
 
 /* Outline samples of a pixel whose centre is empty take the light of a neighbour. */
 static float corner_light(const pixels *p, size_t x, size_t y)
 {
-    if (middle_sample(p, x, y)->kind != VGI_EMPTY) return p->light[y * p->w + x];
+    if (p->middle[y * p->w + x].kind != VGI_EMPTY) return p->light[y * p->w + x];
     float least = 1;
     for (size_t j = y ? y - 1 : 0; j <= y + 1 && j < p->h; j++)
         for (size_t i = x ? x - 1 : 0; i <= x + 1 && i < p->w; i++)
-            least = fminf(least, p->light[j * p->w + i]);
+            least = vgi_least(least, p->light[j * p->w + i]);
     return least;
 }
 
@@ -141,14 +153,14 @@ static float depth_step(const vgi_raster *raster, size_t at, size_t room_before,
     float z = raster->at[at].z, floor = z - 4 * limit;
     float a = room_before >= reach ? raster->at[at - reach * stride].z : floor;
     float b = room_after >= reach ? raster->at[at + reach * stride].z : floor;
-    return 2 * z - fmaxf(a, floor) - fmaxf(b, floor);
+    return 2 * z - vgi_most(a, floor) - vgi_most(b, floor);
 }
 
 static float outline(const vgi_raster *raster, size_t x, size_t y, size_t reach, float limit)
 {
     size_t at = y * raster->w + x;
-    float step = fmaxf(depth_step(raster, at, x, raster->w - 1 - x, 1, reach, limit),
-                       depth_step(raster, at, y, raster->h - 1 - y, raster->w, reach, limit));
+    float step = vgi_most(depth_step(raster, at, x, raster->w - 1 - x, 1, reach, limit),
+                          depth_step(raster, at, y, raster->h - 1 - y, raster->w, reach, limit));
     float t = clamp01((step - 0.5f * limit) / limit);
     return t * t * (3 - 2 * t);
 }
@@ -176,7 +188,7 @@ static void light_clay(const float n[3], const float albedo[3], float sky_seen_h
 static float light_error(const float n[3], float sky_seen_here)
 {
     float facing = (key[2] + 0.3f) / 1.3f, k = clamp01((dot(n, key) + 0.3f) / 1.3f) / facing;
-    return (0.38f + 0.62f * fminf(k, 1.12f)) * (0.25f + 0.75f * sky_seen_here);
+    return (0.38f + 0.62f * vgi_least(k, 1.12f)) * (0.25f + 0.75f * sky_seen_here);
 }
 
 static void patch_colour(uint32_t number, float linear[3])
@@ -186,7 +198,7 @@ static void patch_colour(uint32_t number, float linear[3])
     for (int k = 0; k < 3; k++) linear[k] = vgi_linear(rgb[k]);
 }
 
-static void light_sample(const vgi_look *l, const vgi_sample *s, float sky_seen_here, float line, float out[3])
+static void light_sample(const vgi_look *l, const vgi_sample *s, float sky_seen_here, float out[3])
 {
     float n[3];
     if (s->kind == VGI_CONTOUR) {
@@ -204,8 +216,6 @@ static void light_sample(const vgi_look *l, const vgi_sample *s, float sky_seen_
         const float *albedo = s->kind == VGI_FRONT ? clay_front : s->kind == VGI_BACK ? clay_back : wire_colour;
         light_clay(n, albedo, sky_seen_here, out);
     }
-    float dark = (1 - 0.62f * line) * (s->edge ? 1 - l->edge_strength : 1);
-    for (int k = 0; k < 3; k++) out[k] *= dark;
 }
 
 /* ---- pixels ---- */
@@ -214,6 +224,7 @@ typedef struct background {
     const vgi_look *look;
     const vgi_camera *camera;
     double height;
+    unsigned char row[3]; /* the pixels of one row that show it, where there is no ground */
 } background;
 
 static void light_background(const background *b, double x, double y, float out[3])
@@ -228,26 +239,69 @@ static void light_background(const background *b, double x, double y, float out[
     for (int k = 0; k < 3; k++) out[k] = light * (page_top[k] + down * down * (page_bottom[k] - page_top[k]));
 }
 
-static void shade_pixel(const vgi_look *l, const pixels *p, const background *b, size_t x, size_t y,
-                        unsigned char rgb[3])
+/* What is left of the light of a sample where it is on an outline or an edge. */
+static float brightness(const vgi_look *l, const vgi_raster *raster, size_t x, size_t y, size_t step)
+{
+    const vgi_sample *s = raster->at + y * raster->w + x;
+    if (s->kind == VGI_CONTOUR) return 1;
+    float line = s->kind >= VGI_WIRE ? 0 : outline(raster, x, y, step > 2 ? step - 1 : 1, l->outline);
+    return (1 - 0.62f * line) * (s->edge ? 1 - l->edge_strength : 1);
+}
+
+/* The mean of a pixel's samples where one surface fills it that is nearly flat there, which is lit once. Else false:
+ * each sample is lit by itself. */
+static bool mean_sample(const vgi_raster *raster, const vgi_sample *first, size_t step, bool patches, vgi_sample *mean)
+{
+    int32_t value = 0, normal[3] = {0}, n = (int32_t)(step * step);
+    if (first->kind == VGI_EMPTY) return false;
+    for (size_t j = 0; j < step; j++)
+        for (const vgi_sample *s = first + j * raster->w, *end = s + step; s < end; s++) {
+            if (s->kind != first->kind || (patches && s->value != first->value)) return false;
+            value += s->value;
+            for (int k = 0; k < 3; k++) normal[k] += s->normal[k];
+        }
+    *mean = *first;
+    mean->value = (uint16_t)(value / n);
+    for (int k = 0; k < 3; k++) mean->normal[k] = (int16_t)(normal[k] / n);
+    float size[3] = {mean->normal[0], mean->normal[1], mean->normal[2]};
+    return dot(size, size) > 0.98f * 0.98f * 32767 * 32767;
+}
+
+/* The sum of the colours of a pixel's samples; returns how many are empty. */
+static size_t light_samples(const vgi_look *l, const pixels *p, size_t x, size_t y, float sum[3])
 {
     const vgi_raster *raster = p->r;
-    float sum[3] = {0, 0, 0}, page[3], sky = -1;
-    size_t empty = 0, s = p->step;
-    for (size_t j = 0; j < s; j++)
-        for (size_t i = 0; i < s; i++) {
-            size_t sx = x * s + i, sy = y * s + j;
-            const vgi_sample *sample = raster->at + sy * raster->w + sx;
-            float c[3];
-            if (sample->kind == VGI_EMPTY) {
+    size_t empty = 0, step = p->step, at = y * step * raster->w + x * step;
+    float c[3], sky = -1;
+    vgi_sample mean;
+    bool once = mean_sample(raster, raster->at + at, step, l->patches, &mean);
+    if (once) light_sample(l, &mean, corner_light(p, x, y), c);
+    for (size_t j = 0; j < step; j++)
+        for (size_t i = 0; i < step; i++) {
+            const vgi_sample *s = raster->at + at + j * raster->w + i;
+            if (s->kind == VGI_EMPTY) {
                 empty++;
                 continue;
             }
-            if (sky < 0) sky = corner_light(p, x, y);
-            float line = sample->kind >= VGI_WIRE ? 0 : outline(raster, sx, sy, s > 2 ? s - 1 : 1, l->outline);
-            light_sample(l, sample, sky, line, c);
-            for (int k = 0; k < 3; k++) sum[k] += fminf(c[k], 1);
+            if (!once) {
+                if (sky < 0) sky = corner_light(p, x, y);
+                light_sample(l, s, sky, c);
+            }
+            float bright = brightness(l, raster, x * step + i, y * step + j, step);
+            for (int k = 0; k < 3; k++) sum[k] += vgi_least(c[k] * bright, 1);
         }
+    return empty;
+}
+
+static void shade_pixel(const vgi_look *l, const pixels *p, const background *b, size_t x, size_t y,
+                        unsigned char rgb[3])
+{
+    float sum[3] = {0, 0, 0}, page[3];
+    size_t s = p->step, empty = light_samples(l, p, x, y, sum);
+    if (empty == s * s && !l->ground) {
+        memcpy(rgb, b->row, 3);
+        return;
+    }
     if (empty) {
         /* the grid is already anti-aliased: one evaluation per pixel is enough */
         light_background(b, (double)(x * s) + (double)s / 2, (double)(y * s) + (double)s / 2, page);
@@ -256,13 +310,23 @@ static void shade_pixel(const vgi_look *l, const pixels *p, const background *b,
     for (int k = 0; k < 3; k++) rgb[k] = vgi_encode(l->palette, sum[k] / (float)(s * s));
 }
 
+static void shade_row(const vgi_look *l, const pixels *p, background *b, size_t y, unsigned char *rgb)
+{
+    float page[3];
+    light_background(b, 0, (double)(y * p->step) + (double)p->step / 2, page);
+    for (int k = 0; k < 3; k++) b->row[k] = vgi_encode(l->palette, page[k]);
+    for (size_t x = 0; x < p->w; x++) shade_pixel(l, p, b, x, y, rgb + 3 * x);
+}
+
 int vgi_shade(const vgi_look *l, const vgi_raster *raster, const vgi_camera *c, unsigned char *rgb, vg_err *e)
 {
-    pixels p = {.r = raster, .w = raster->w / l->oversampling, .h = raster->h / l->oversampling, .step = l->oversampling};
-    background b = {l, c, (double)raster->h};
-    int r = light_corners(&p, l->reach, e);
-    for (size_t y = 0; r == VG_OK && y < p.h; y++)
-        for (size_t x = 0; x < p.w; x++) shade_pixel(l, &p, &b, x, y, rgb + 3 * (y * p.w + x));
+    pixels p = {.r = raster, .w = raster->w / l->oversampling, .h = raster->h / l->oversampling, .step = l->oversampling,
+                .reach = l->reach};
+    background b = {.look = l, .camera = c, .height = (double)raster->h};
+    int r = light_corners(&p, e);
+    for (size_t y = 0; r == VG_OK && y < p.h; y++) shade_row(l, &p, &b, y, rgb + 3 * y * p.w);
+    free(p.middle);
+    free(p.raw);
     free(p.light);
     return r;
 }

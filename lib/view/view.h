@@ -10,6 +10,17 @@
 
 #include "core/core.h"
 
+/* The lesser and the greater of two numbers, b when one is NaN. Unlike fminf and fmaxf these are no calls. */
+static inline float vgi_least(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+static inline float vgi_most(float a, float b)
+{
+    return a > b ? a : b;
+}
+
 /* ---- figure.c: the drawable form of a mesh ---- */
 
 typedef struct vgi_figure {
