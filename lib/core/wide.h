@@ -156,6 +156,22 @@ VGI_INLINE vgi_wide vgi_roots(vgi_wide a)
 #endif
 }
 
+/* As many numbers of binary32, where an estimate will do: their roots and quotients take a third of the time. */
+typedef float vgi_rough __attribute__((vector_size(4 * VGI_WIDTH)));
+
+VGI_INLINE vgi_rough vgi_rough_roots(vgi_rough a)
+{
+#if defined(__AVX512F__)
+    return (vgi_rough)_mm256_sqrt_ps((__m256)a);
+#elif defined(__AVX2__)
+    return (vgi_rough)_mm_sqrt_ps((__m128)a);
+#elif defined(__aarch64__)
+    return (vgi_rough)vsqrt_f32((float32x2_t)a);
+#else
+    return (vgi_rough){__builtin_sqrtf(a[0]), __builtin_sqrtf(a[1])};
+#endif
+}
+
 /* vgi_only: x where the mask is set, else 0; vgi_either: x where it is set, else y. */
 VGI_INLINE vgi_wide vgi_only(vgi_mask which, vgi_wide x)
 {

@@ -13,13 +13,22 @@ typedef struct vgi_polar_stop {
     bool alone;    /* each lane stops separately, so that its last bits do not depend on its neighbours */
 } vgi_polar_stop;
 
-/* One Newton step in the active lanes, scaled to balance the norms of x and x^-T. Returns the squared change. */
+/* The factors of x and of its cofactors c in a step that balances the norms of x and x^-T. In binary32: an inexact scale
+ * leads to the same rotation, for the last steps are not scaled. */
+VGI_INLINE void vgi_polar_scale(const vgi_wide *x, const vgi_wide *c, vgi_wide det, vgi_wide *a, vgi_wide *b)
+{
+    vgi_rough xx = __builtin_convertvector(vgi_wide_squares(x), vgi_rough),
+              cc = __builtin_convertvector(vgi_wide_squares(c), vgi_rough), d = __builtin_convertvector(det, vgi_rough),
+              g = vgi_rough_roots(vgi_rough_roots(cc / xx) / d);
+    *a = __builtin_convertvector(0.5f * g, vgi_wide), *b = __builtin_convertvector(0.5f / (g * d), vgi_wide);
+}
+
+/* One Newton step in the active lanes, scaled or not. Returns the squared change. */
 VGI_INLINE vgi_wide vgi_polar_step(vgi_wide *x, bool scaled, bool all, vgi_mask going)
 {
     vgi_wide c[9], det = vgi_wide_cofactors(x, c), a, b, change = {0}; /* c: det x^-T */
     if (scaled) {
-        vgi_wide g = vgi_roots(vgi_roots(vgi_wide_squares(c) / vgi_wide_squares(x)) / det);
-        a = 0.5 * g, b = 0.5 / (g * det);
+        vgi_polar_scale(x, c, det, &a, &b);
     } else {
         a = vgi_same(0.5), b = 0.5 / det;
     }

@@ -60,25 +60,31 @@ void vg_segmenter_free(vg_segmenter **s)
 
 /* ---- features ---- */
 
-typedef struct adding {
+enum { GROUPS = 4 }; /* of lanes that are added together */
+
+typedef struct adding { /* up to GROUPS x VGI_LANES poses */
     vg_segmenter *s;
-    const double *poses[VGI_LANES];
-    size_t lanes;
-    uint32_t at[9 * VGI_LANES]; /* the feature to which entry i of pose k is added, and its sign */
-    float sign[9 * VGI_LANES];
+    const double *const *poses;
+    size_t n;
+    uint32_t at[9 * VGI_LANES * GROUPS]; /* the feature to which entry i of pose k is added, and its sign */
+    float sign[9 * VGI_LANES * GROUPS];
 } adding;
 
+/* All poses of a face one after another: its row of features, of 4 KiB, stays near. */
 static void add_chunk(void *context, size_t i)
 {
     const adding *a = context;
     const vg_segmenter *s = a->s;
     size_t first = i * CHUNK, last = first + CHUNK < s->turns.nf ? first + CHUNK : s->turns.nf;
-    for (size_t f = first; f < last; f++) {
-        vgi_lanes r[9];
-        float *to = s->feature + f * s->width;
-        vgi_turns_measure(&s->turns, f, a->poses, r);
-        vgi_segment_kernel_now()->add(r, a->lanes, a->at, a->sign, to);
-    }
+    for (size_t f = first; f < last; f++)
+        for (size_t p = 0; p < a->n; p += VGI_LANES) {
+            size_t lanes = a->n - p < VGI_LANES ? a->n - p : VGI_LANES;
+            const double *poses[VGI_LANES];
+            vgi_lanes r[9];
+            for (size_t k = 0; k < VGI_LANES; k++) poses[k] = a->poses[p + (k < lanes ? k : lanes - 1)];
+            vgi_turns_measure(&s->turns, f, poses, r);
+            vgi_segment_kernel_now()->add(r, lanes, a->at + 9 * p, a->sign + 9 * p, s->feature + f * s->width);
+        }
 }
 
 /* Width of rows: at least `numbers`, at least WIDTH. */
@@ -102,16 +108,15 @@ int vg_segmenter_add(vg_segmenter *s, size_t n, const double *const *poses, vg_e
 {
     int r = widen(s, 9 * ((uint64_t)s->poses + n), e);
     if (r < 0) return r;
-    for (size_t p = 0; p < n; p += VGI_LANES) {
-        adding a = {.s = s, .lanes = n - p < VGI_LANES ? n - p : VGI_LANES};
-        for (size_t k = 0; k < VGI_LANES; k++) a.poses[k] = poses[p + (k < a.lanes ? k : a.lanes - 1)];
-        for (size_t k = 0; k < 9 * a.lanes; k++) {
+    for (size_t p = 0; p < n; p += VGI_LANES * GROUPS) {
+        adding a = {.s = s, .poses = poses + p, .n = n - p < VGI_LANES * GROUPS ? n - p : VGI_LANES * GROUPS};
+        for (size_t k = 0; k < 9 * a.n; k++) {
             uint64_t index = 9 * (uint64_t)s->poses + k, chance = vgi_random_mix(index);
             a.at[k] = (uint32_t)(index < WIDTH ? index : chance % WIDTH);
             a.sign[k] = index < WIDTH || chance >> 63 ? 1 : -1;
         }
         vgi_parallel(s->threads, (s->turns.nf + CHUNK - 1) / CHUNK, add_chunk, &a);
-        s->poses += a.lanes;
+        s->poses += a.n;
     }
     return VG_OK;
 }
