@@ -16,6 +16,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "numeric/face.h"
 #include "numeric/lapack.h"
+#include "method/rig/map_kernel.h"
 #include "method/rig/map_parts.h"
 #include "method/patches/pieces.h"
 #include "numeric/blas.h"
@@ -55,6 +56,7 @@ struct vg_map_fitter {
     double *want;         /* 3 NEAR per vertex: sum of A' (x - t of the owner), for each patch of the vicinity */
     size_t poses, cap;
     vgi_motion *motion;   /* poses x patches */
+    vgi_map_motion *lanes; /* per patch: the same of eight poses that are added */
 };
 
 /* ---- patches ---- */
@@ -205,7 +207,8 @@ int vg_map_fitter_new(vg_map_fitter **out, const vg_head *h, double hold, int th
         f->pull = vgi_array(3 * vg_graph_corners(f->g), sizeof *f->pull, e);
         f->turn = vgi_array(9 * f->g->faces.nf, sizeof *f->turn, e);
         f->b2 = vgi_array(f->patches.n, sizeof *f->b2, e);
-        if (!f->pull || !f->turn || !f->b2) r = VG_ENOMEM;
+        f->lanes = vgi_array(f->patches.n, sizeof *f->lanes, e);
+        if (!f->pull || !f->turn || !f->b2 || !f->lanes) r = VG_ENOMEM;
     }
     if (r < 0) vg_map_fitter_free(out);
     return r;
@@ -223,6 +226,7 @@ void vg_map_fitter_free(vg_map_fitter **out)
     free(f->pull);
     free(f->turn);
     free(f->b2);
+    free(f->lanes);
     free(f->held);
     free(f->held_patch);
     free(f->held_pull);
@@ -247,8 +251,18 @@ static void measure_patch(void *context, size_t p)
 {
     const adding *a = context;
     size_t n = a->f->shape.n;
-    for (size_t k = 0; k < a->lanes; k++)
-        vgi_shape_measure(&a->f->shape, p, a->poses[k], &a->motion[k * n + p]);
+    vgi_map_motion *to = &a->f->lanes[p];
+    for (size_t k = 0; k < a->lanes; k++) {
+        vgi_motion *m = &a->motion[k * n + p];
+        vgi_shape_measure(&a->f->shape, p, a->poses[k], m);
+        double share = 1 / sqrt(m->b2);
+        for (size_t i = 0; i < 9; i++) to->a[i][k] = m->a[i], to->rotation[i][k] = m->a[i] * share;
+        for (size_t i = 0; i < 3; i++) to->t[i][k] = m->t[i];
+    }
+    for (size_t k = a->lanes; k < VGI_LANES; k++) {
+        for (size_t i = 0; i < 9; i++) to->a[i][k] = to->rotation[i][k] = 0;
+        for (size_t i = 0; i < 3; i++) to->t[i][k] = 0;
+    }
 }
 
 /* to += A' x */
@@ -261,25 +275,13 @@ static void add_back(const double a[9], const double x[3], double *to)
 
 static void add_face(const adding *a, size_t face)
 {
-    vg_map_fitter *f = a->f;
-    const vg_graph *g = f->g;
-    size_t begin = g->faces.start[face], r = g->faces.start[face + 1] - begin, n = f->shape.n;
+    const vg_map_fitter *f = a->f;
+    const uint32_t *start = f->g->faces.start;
+    size_t begin = start[face];
     vgi_lanes turn[9];
     vgi_turns_measure(&f->turns, face, a->poses, turn);
-    double *sum = f->turn + 9 * face;
-    for (size_t k = 0; k < a->lanes; k++) {
-        const vgi_motion *m = &a->motion[k * n + f->of_face[face]];
-        double centre[3], b = sqrt(m->b2);
-        vgi_face_centre(a->poses[k], g->faces.vert + begin, r, centre);
-        for (size_t i = 0; i < r; i++) {
-            const double *x = a->poses[k] + 3 * (size_t)g->faces.vert[begin + i];
-            const double d[3] = {x[0] - centre[0], x[1] - centre[1], x[2] - centre[2]};
-            add_back(m->a, d, f->pull + 3 * (begin + i));
-        }
-        for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++)
-                for (int q = 0; q < 3; q++) sum[3 * i + j] += m->a[3 * q + i] / b * turn[3 * q + j][k];
-    }
+    vgi_map_kernel_now()->face(&f->lanes[f->of_face[face]], a->poses, f->g->faces.vert + begin, start[face + 1] - begin,
+                               (const vgi_lanes *)turn, f->pull + 3 * begin, f->turn + 9 * face);
 }
 
 static void add_chunk(void *context, size_t i)
@@ -309,12 +311,7 @@ static void want_chunk(void *context, size_t i)
     for (size_t v = first; v < last; v++) {
         if (f->owner[v] == NOBODY) continue;
         const vicinity *near = &f->near[f->owner[v]];
-        for (size_t k = 0; k < a->lanes; k++) {
-            const vgi_motion *m = a->motion + k * f->shape.n;
-            const double *x = a->poses[k] + 3 * v, *t = m[f->owner[v]].t;
-            const double d[3] = {x[0] - t[0], x[1] - t[1], x[2] - t[2]};
-            for (size_t s = 0; s < near->n; s++) add_back(m[near->patch[s]].a, d, f->want + 3 * (NEAR * v + s));
-        }
+        vgi_map_kernel_now()->vertex(f->lanes, f->owner[v], near->patch, near->n, a->poses, v, f->want + 3 * NEAR * v);
     }
 }
 
