@@ -13,14 +13,16 @@ typedef struct vgi_polar_stop {
     bool alone;    /* each lane stops separately, so that its last bits do not depend on its neighbours */
 } vgi_polar_stop;
 
-/* The factors of x and of its cofactors c in a step that balances the norms of x and x^-T. In binary32: an inexact scale
- * leads to the same rotation, for the last steps are not scaled. */
+/* The factors g / 2 of x and 1 / (2 g det) of its cofactors c in a step that balances the norms of x and x^-T. g is found
+ * in binary32, since any near it does; 1 / g is refined to rounding, since the two belong together. */
 VGI_INLINE void vgi_polar_scale(const vgi_wide *x, const vgi_wide *c, vgi_wide det, vgi_wide *a, vgi_wide *b)
 {
     vgi_rough xx = __builtin_convertvector(vgi_wide_squares(x), vgi_rough),
-              cc = __builtin_convertvector(vgi_wide_squares(c), vgi_rough), d = __builtin_convertvector(det, vgi_rough),
-              g = vgi_rough_roots(vgi_rough_roots(cc / xx) / d);
-    *a = __builtin_convertvector(0.5f * g, vgi_wide), *b = __builtin_convertvector(0.5f / (g * d), vgi_wide);
+              cc = __builtin_convertvector(vgi_wide_squares(c), vgi_rough),
+              g = vgi_rough_roots(vgi_rough_roots(cc / xx) / __builtin_convertvector(det, vgi_rough));
+    vgi_wide scale = __builtin_convertvector(g, vgi_wide), inverse = __builtin_convertvector(1 / g, vgi_wide);
+    inverse *= 2 - scale * inverse;
+    *a = 0.5 * scale, *b = inverse * (0.5 / det);
 }
 
 /* One Newton step in the active lanes, scaled or not. Returns the squared change. */

@@ -6,6 +6,7 @@
 #include "kernels.h"
 #include "method/pairs/transfer_kernel.h"
 #include "method/patches/segment_kernel.h"
+#include "method/rig/map_kernel.h"
 #include "method/rig/play_kernel.h"
 #include "method/vectors/deform_kernel.h"
 #include "method/vectors/guess.h"
@@ -624,6 +625,63 @@ static void features_are_summed(void)
     under_each(check_features);
 }
 
+/* ---- fits of maps ---- */
+
+enum { MAP_POSES = 5, MAP_CORNERS = 4, MAP_PATCHES = 2, MAP_VERTICES = 6 };
+
+/* Sum over poses and rows of a[q][k] d[q] */
+static double back_of(const double a[9][VGI_LANES], const double d[][VGI_LANES], size_t k)
+{
+    double sum = 0;
+    for (size_t i = 0; i < MAP_POSES; i++)
+        for (size_t q = 0; q < 3; q++) sum += a[3 * q + k][i] * d[q][i];
+    return sum;
+}
+
+/* Sums of what poses add, by the formula; lanes beyond the poses carry no motion and count for nothing. */
+static void check_map_sums(void)
+{
+    static const uint32_t corner[MAP_CORNERS] = {4, 0, 3, 1}, near[2] = {1, 0};
+    vgi_map_motion m[MAP_PATCHES] = {0};
+    vgi_lanes turn[9];
+    double x[VGI_LANES][3 * MAP_VERTICES], d[3][VGI_LANES], pull[3 * MAP_CORNERS], sums[9], want[6];
+    const double *poses[VGI_LANES];
+    for (size_t k = 0; k < VGI_LANES; k++) {
+        poses[k] = x[k];
+        for (size_t i = 0; i < 3 * MAP_VERTICES; i++) x[k][i] = wave(20 * k + i);
+        for (size_t i = 0; i < 9; i++) turn[i][k] = wave(300 + 9 * k + i);
+        for (size_t p = 0; p < MAP_PATCHES && k < MAP_POSES; p++)
+            for (size_t i = 0; i < 9; i++) {
+                m[p].a[i][k] = wave(400 + 20 * k + 9 * p + i), m[p].rotation[i][k] = wave(600 + 20 * k + 9 * p + i);
+                if (i < 3) m[p].t[i][k] = wave(800 + 20 * k + 9 * p + i);
+            }
+    }
+    for (size_t i = 0; i < 3 * MAP_CORNERS; i++) pull[i] = wave(900 + i);
+    for (size_t i = 0; i < 9; i++) sums[i] = wave(950 + i);
+    for (size_t i = 0; i < 6; i++) want[i] = wave(970 + i);
+    vgi_map_kernel_now()->face(m + 1, poses, corner, MAP_CORNERS, (const vgi_lanes *)turn, pull, sums);
+    vgi_map_kernel_now()->vertex(m, 1, near, 2, poses, 2, want);
+    for (size_t c = 0; c < MAP_CORNERS; c++) {
+        for (size_t i = 0; i < 3 * VGI_LANES; i++) {
+            const double *p = x[i / 3] + i % 3;
+            d[i % 3][i / 3] = p[3 * corner[c]] - (p[12] + p[0] + p[9] + p[3]) / 4;
+        }
+        for (size_t k = 0; k < 3; k++) CHECK_NEAR(pull[3 * c + k], wave(900 + 3 * c + k) + back_of(m[1].a, d, k), 1e-13);
+    }
+    for (size_t j = 0; j < 3; j++) {
+        for (size_t q = 0; q < 3; q++) memcpy(d[q], turn[3 * q + j], sizeof d[q]);
+        for (size_t k = 0; k < 3; k++)
+            CHECK_NEAR(sums[3 * k + j], wave(950 + 3 * k + j) + back_of(m[1].rotation, d, k), 1e-13);
+    }
+    for (size_t i = 0; i < 3 * VGI_LANES; i++) d[i % 3][i / 3] = x[i / 3][6 + i % 3] - m[1].t[i % 3][i / 3];
+    for (size_t i = 0; i < 6; i++) CHECK_NEAR(want[i], wave(970 + i) + back_of(m[near[i / 3]].a, d, i % 3), 1e-13);
+}
+
+static void sums_of_maps(void)
+{
+    under_each(check_map_sums);
+}
+
 /* ---- maps at work ---- */
 
 /* Every number arrives at its place, and nothing is written beside it. */
@@ -663,5 +721,6 @@ TESTS({"choose by name", choose_by_name}, {"numbers are scanned", numbers_are_sc
       {"rotations are found", rotations_are_found}, {"maps are followed", maps_are_followed},
       {"planes are sought", planes_are_sought}, {"faces are measured", faces_are_measured},
       {"features are summed", features_are_summed},
+      {"sums of maps", sums_of_maps},
       {"products are spread", products_are_spread}, {"signals are fitted", signals_are_fitted},
       {"layers are passed", layers_are_passed}, {"fronts are eliminated", fronts_are_eliminated})
