@@ -6,7 +6,8 @@
 # make check-aarch64   the kernels' tests on an emulated ARM processor, where its tools are installed
 # make lint        the static analysers that are installed
 # make bench-train accuracy and speed of networks on the kit (VG_DATA) beside their bounds: some minutes; ONLY="walk keys": parts
-# make bench       throughput of every stage beside its limit; BENCH=full: up to 1,000,002 vertices; JSON=FILE: also as JSON
+# make bench       throughput of every stage beside its limit; BENCH=full: up to 1,000,002 vertices; JSON=FILE: also as JSON;
+#                 PAGE=BENCHMARKS.md: put its tables there; VG_DATA=DIR: rows of pins, on the kit
 # make fuzz        search for input that breaks the readers (clang; FUZZ_SECONDS=60 each)
 # make install     PREFIX=/usr/local LIBDIR=$(PREFIX)/lib DESTDIR=   make uninstall, make clean
 # make dist        build/vg-VERSION.tar.xz, the same bytes each time; make distcheck builds and tests from it (TESTS=)
@@ -255,7 +256,7 @@ demo: all
 
 .PHONY: bench
 bench: all $(BENCHES:%=$(B)/bench/%)
-	@BUILD=$(B) BENCH='$(BENCH)' RUNS='$(RUNS)' JSON='$(JSON)' sh tests/bench/run.sh
+	@BUILD=$(B) BENCH='$(BENCH)' RUNS='$(RUNS)' JSON='$(JSON)' PAGE='$(PAGE)' sh tests/bench/run.sh
 
 .PHONY: bench-train
 bench-train: all

@@ -1,7 +1,9 @@
 #!/bin/sh
 # make bench: how fast every stage is, beside a limit measured in the same run, and how much memory it holds.
 # Quick by default: 6,890 and 50,002 vertices; BENCH=full adds 200,002 and 1,000,002. RUNS=2: a row is the best of so many.
-# JSON=FILE: the rows, the goals and the limits also as JSON. Inputs are generated into a directory of its own below TMPDIR
+# JSON=FILE: the rows, the goals and the limits also as JSON. PAGE=FILE: a Markdown page, of which what is between the lines
+# <!-- bench --> and <!-- end of bench --> is replaced by the tables of instruction sets, pins, load and goals. VG_DATA: the
+# folder of the kit, for the rows of pins. Inputs are generated into a directory of its own below TMPDIR
 # (2 GB; full: 5 GB) and removed at the end. Leaves out accuracy: make check.
 # SPDX-License-Identifier: GPL-3.0-or-later
 set -eu
@@ -17,6 +19,11 @@ case ${JSON:=} in
 '' | /*) ;;
 *) JSON=$PWD/$JSON ;;
 esac
+case ${PAGE:=} in
+'' | /*) ;;
+*) PAGE=$PWD/$PAGE ;;
+esac
+kit=${VG_DATA:+$(cd "$VG_DATA" && pwd)}
 W=$(mktemp -d "${TMPDIR:-/tmp}/vg-bench.XXXXXX")
 others= # processes that only take processors; see busy()
 # shellcheck disable=SC2086 # a list of process numbers
@@ -194,7 +201,9 @@ transfer() {
     stage "$3" "vg-solve --fit absolute $1-w.vgs >/dev/null" "vg-solve --fit absolute $1-1w.vgs >/dev/null"
     by_cholmod "$2"
     row 'vg-solve --fit absolute' "$2" $((in + between))
-    absolute_rate=${later:-$rate} absolute_times=$(calc "$squares_rate / $absolute_rate")
+    absolute_rate=$(calc "int(${later:-$rate})")
+    # 8 plain solves a pose or 150 poses/s at 13,380 vertices, whichever is slower
+    absolute_least=$(calc "int($squares_rate / 8 < 150 ? $squares_rate / 8 : 150)")
     stage "$3" "$ulimit vg-deform $1.vgs --onto $1-b.vgs | vg-solve --fit squares >/dev/null" \
         "vg-deform $1-1.vgs --onto $1-b.vgs | vg-solve --fit squares >/dev/null"
     by_cholmod "$2"
@@ -257,7 +266,7 @@ every_stage() {
         rm -f out/*
     done
     best "$runs" "vg-view $n-some.vgs -o out/sheet.png"
-    by_pipe "$few"
+    by_memory $((8 * 360 * 360 * 9 * 16)) # what its samples take; compressing the picture takes twice as long as they do
     row 'vg-view, sheet of 8' "$some" "$few"
     best "$runs" "vg-view -q $n-some.vgs -o out/page.html"
     by_pipe "$few"
@@ -276,7 +285,8 @@ patches() {
     best "$runs" "vg-segment $in -k $k -q -o $n.patches"
     segment_seconds=$seconds
     rounds=$(vg-segment "$in" -k $k -v 2>&1 >/dev/null | sed -n 's/.* \([0-9]*\) rounds.*/\1/p')
-    by_sgemm "2 * $k * $6 * $rounds * $(calc "9 * $poses < 1024 ? 9 * $poses : 1024")"
+    segment_flops="2 * $k * $6 * $rounds * $(calc "9 * $poses < 1024 ? 9 * $poses : 1024")"
+    by_sgemm "$segment_flops"
     row vg-segment "$poses" "$data"
     best "$runs" "vg-segment --connected $in -k $k -q >/dev/null"
     connected_seconds=$seconds
@@ -341,6 +351,7 @@ under_sets() {
     n=$1 poses=$3 some=$4 runs=$5 k=50 input_before=$input gflops_before=$gflops cholmod_before=$cholmod
     vg-segment "$n-11.vgs" -k $k -q -o "$n.patches"
     vg-fitmap -q --patches "$n.patches" "$n-11.vgs" -o "$n.map"
+    vg-segment many.vgs -k $k -q -o "$n-many.patches"
     # shellcheck disable=SC2046
     vg-encode --f32 $(repeat 440 "$n-11.vgs") | vg-play "$n.map" --transforms -o motions.vgs
     vg-register -q --aligned "$n-1.vgs" "$n-q.vgs" -o "$n-c.vgs"
@@ -349,6 +360,8 @@ under_sets() {
         OPENBLAS_CORETYPE=$(core_of "$set")
         export VG_ISA="$set" OPENBLAS_CORETYPE
         [ "$OPENBLAS_CORETYPE" ] || unset OPENBLAS_CORETYPE
+        took=$(product 50 6890)
+        gflops=$(calc "${took% *} * 2 * 3 * 200 * 6890 / 1e9")
         input="$2, $set"
         solver "$n" "$2, $set"
         stage "$runs" "vg-deform $n.vgs --onto $n-b.vgs >/dev/null" "vg-deform $n-1.vgs --onto $n-b.vgs >/dev/null"
@@ -364,6 +377,10 @@ under_sets() {
         by_cholmod "$poses"
         row 'vg-deform --onto | vg-solve' "$poses" $((2 * in + between)) >/dev/null
         of_set 'vg-deform --onto | vg-solve'
+        stage "$runs" "vg-solve --fit absolute $n-w.vgs >/dev/null" "vg-solve --fit absolute $n-1w.vgs >/dev/null"
+        by_cholmod "$poses"
+        row 'vg-solve --fit absolute' "$poses" $((in + between)) >/dev/null
+        of_set 'vg-solve --fit absolute'
         best "$runs" "vg-deform $n-some.vgs --onto $n-q.vgs --correspondence $n-c.vgs >/dev/null"
         by_pipe $((3 * $(bytes "$n-some.vgs")))
         row 'vg-deform --correspondence' "$some" "$(bytes "$n-some.vgs")" >/dev/null
@@ -376,6 +393,18 @@ under_sets() {
         by_pipe $((2 * in))
         row vg-diff "$poses" $((2 * in)) >/dev/null
         of_set vg-diff
+        best "$runs" "vg-info --check $n.vgs >/dev/null"
+        by_pipe "$in"
+        row 'vg-info --check' "$poses" "$in" >/dev/null
+        of_set 'vg-info --check'
+        best "$runs" "vg-segment many.vgs -k $k -q >/dev/null"
+        by_sgemm "$segment_flops"
+        row vg-segment 484 "$(bytes many.vgs)" >/dev/null
+        of_set 'vg-segment, 484 poses'
+        best "$runs" "vg-fitmap -q --patches $n-many.patches many.vgs >/dev/null"
+        by_cholmod $(((4 * k + 2) / 3))
+        row vg-fitmap 484 "$(bytes many.vgs)" >/dev/null
+        of_set 'vg-fitmap, 484 poses'
         product=$(product "$k" "$6")
         best "$runs" "vg-play $n.map motions.vgs >/dev/null"
         limit=sgemm least=$(calc "4840 / ${product% *}")
@@ -384,6 +413,7 @@ under_sets() {
     done
     unset VG_ISA OPENBLAS_CORETYPE
     rm -f "$n.map" "$n.patches" "$n-c.vgs" motions.vgs
+    rm -f "$n-many.patches"
     input=$input_before gflops=$gflops_before cholmod=$cholmod_before
 }
 
@@ -407,6 +437,50 @@ print_sets() {
     }' sets
 }
 
+# page_sets: the same in Markdown
+page_sets() {
+    awk -F '\t' -v sets="$sets" '
+    !($1 in limit) { order[++n] = $1 }
+    { rate[$1, $2] = $3; limit[$1] = $4; ratio[$1, $2] = $5 }
+    END {
+        k = split(sets, set, " ")
+        printf "| 6,890 vertices | limit |"
+        for (i = k; i > 0; i--) printf " %s, poses/s | ratio |", toupper(set[i])
+        printf "\n| --- | --- |"
+        for (i = k; i > 0; i--) printf " ---: | ---: |"
+        print ""
+        for (j = 1; j <= n; j++) {
+            name = order[j]
+            gsub(/\|/, "\\|", name)
+            printf "| `%s` | %s |", name, limit[order[j]]
+            for (i = k; i > 0; i--) printf " %s | %s |", rate[order[j], set[i]], ratio[order[j], set[i]]
+            print ""
+        }
+    }' sets
+}
+
+# block HEADING FILE: lines of a file as they are, below a heading and a blank line
+block() {
+    # shellcheck disable=SC2016 # these are no commands
+    printf '\n%s\n\n```\n' "$1"
+    cat "$2"
+    # shellcheck disable=SC2016
+    printf '```\n'
+}
+
+# page_tables: what goes between the lines of PAGE
+page_tables() {
+    printf 'One run of `make bench`, load before %s, best of %s; limits: %s MB/s through a pipe of 1 MiB, %s MB/s copied in memory, ' \
+        "$before" "$RUNS" "$pipe" "$memory"
+    printf 'sgemm %s GFLOP/s.\n\n' "$(rounded "$all_gflops")"
+    page_sets
+    block 'The solve alone, in memory, poses/s: vg_solver_load and the solve on one thread, the solve on two; cholmod_solve2 simplicial and
+supernodal; both ratios; the largest difference in D:' solves
+    [ ! -s pins ] || block 'Pins: seconds of `vg-encode | vg-deform | vg-solve` with `--pin none`, with `--pin auto`, and their ratio:' pins
+    block 'Beside so many busy processes: poses/s, the part of the speed alone that is kept, the part that is fair, their ratio:' shares
+    block 'What it must reach:' goals
+}
+
 # ratio_of STAGE SET, rate_of STAGE SET: out of the table of sets
 ratio_of() {
     awk -F '\t' -v stage="$1" -v set="$2" '$1 == stage && $2 == set { print $5 }' sets
@@ -422,7 +496,7 @@ busy() {
         sh -c 'while :; do :; done' &
         others="$others $!"
     done
-    best 1 "$2"
+    best "$RUNS" "$2"
     # shellcheck disable=SC2086 # a list of process numbers
     kill $others
     # shellcheck disable=SC2086
@@ -442,6 +516,24 @@ share() {
             "$fair" "$(calc "$kept / $fair")" >>shares
         least_share=$(awk "BEGIN { x = $kept / $fair; print x < ${least_share:-9} ? x : ${least_share:-9} }")
     done
+}
+
+# least ROUNDS COMMAND OTHER: the shortest times of two commands that take turns, into $seconds and $other
+least() {
+    seconds='' other=''
+    for _ in $(repeat "$1" x); do
+        took=$(measure 1 "$2") took=${took% *} rival=$(measure 1 "$3") rival=${rival% *}
+        seconds=$(calc "${seconds:-$took} < $took ? ${seconds:-$took} : $took")
+        other=$(calc "${other:-$rival} < $rival ? ${other:-$rival} : $rival")
+    done
+}
+
+# pinned NAME TRANSFER FIT: the pipe with pins of each pose beside that without, on parts of the kit that do not ship
+pinned() {
+    least 9 "vg-deform -q $2 --pin none | vg-solve -q $3 >/dev/null" "vg-deform -q $2 --pin auto | vg-solve -q $3 >/dev/null"
+    pins_ratio=$(calc "$other / $seconds")
+    printf '%-42s %8.3f %8.3f %8.2f\n' "$1" "$seconds" "$other" "$pins_ratio" >>pins
+    goal "pins beside none, $1" "$pins_ratio" times '<=' 1.3
 }
 
 # setup NAME TEXT: from files to the first pose; the whole of vg-solve into $seconds
@@ -494,7 +586,7 @@ pipe=$(pipe 1048576 2000)
 pipe_small=$(pipe 65536 2000)
 memory=$(bandwidth 400)
 took=$(product 50 6890)
-gflops=$(calc "${took% *} * 2 * 3 * 200 * 6890 / 1e9")
+gflops=$(calc "${took% *} * 2 * 3 * 200 * 6890 / 1e9") all_gflops=$gflops
 printf 'vg bench (%s), %s processors, load before %s, best of %s\n\n' "$BENCH" "$processors" "$before" "$RUNS"
 printf 'Limits: %s MB/s through a pipe of 1 MiB (%s at 64 KiB), %s MB/s copied in memory, sgemm %s GFLOP/s\n' "$pipe" \
     "$pipe_small" "$memory" "$(rounded "$gflops")"
@@ -504,7 +596,7 @@ human
 solver human '13,380 vertices, quads'
 head_of '13,380 vertices, 13,378 quads: a body'
 transfer human 540 "$RUNS"
-human_rate=$rate human_absolute_times=$absolute_times
+human_rate=$rate human_absolute=$absolute_rate human_least=$absolute_least
 setup human '13,380 / 13,378 quads'
 human_setup=$seconds
 # shellcheck disable=SC2046
@@ -525,6 +617,18 @@ grows 'vg-diff' "vg-diff human-quarter.vgs quarter-result.vgs >/dev/null" \
 grows 'vg-info --check' "vg-info --check human-quarter.vgs >/dev/null" "vg-info --check human.vgs >/dev/null"
 grows 'vg-view' "vg-view human-quarter.vgs -o sheet.png" "vg-view human.vgs -o sheet.png"
 rm -rf out obj sheet.png human* quarter-result.vgs
+
+: >pins
+if [ "$kit" ]; then
+    vg-encode "$kit/face/faceA.tar.gz" -o faces.vgs
+    vg-encode "$kit/face/faceB.tar.gz" -o faces-b.vgs
+    vg-encode "$kit/face/head-shapes.tar.xz" -o heads.vgs
+    pinned '15 faces, --fit absolute' 'faces.vgs --onto faces-b.vgs' '--fit absolute'
+    pinned '15 faces, --fit squares' 'faces.vgs --onto faces-b.vgs' '--fit squares'
+    pinned '11 heads, --fit absolute' 'heads.vgs --onto heads.vgs' '--fit absolute'
+    pinned '11 heads, --fit squares' 'heads.vgs --onto heads.vgs' '--fit squares'
+    rm -f faces* heads.vgs
+fi
 
 rods rod 84 82 49 9
 solver rod '6,890 vertices'
@@ -588,6 +692,11 @@ cat solves
 printf '\nUnder each instruction set, 6,890 vertices: poses/s, and the ratio beside the limit under the same set\n\n'
 print_sets
 
+if [ -s pins ]; then
+    printf '\nPins: seconds of vg-deform | vg-solve without and with, least of 9 in turns, and the ratio\n\n'
+    cat pins
+fi
+
 printf '\nBeside busy processes: poses/s, the part of the speed alone that is kept, and the part that is fair\n\n'
 printf '%-28s %6s %9s %8s %8s %8s\n' stage others poses/s kept fair ratio ----- ------ ------- ---- ---- -----
 cat shares
@@ -619,7 +728,7 @@ case " $sets " in
 esac
 goal 'the fair share of the pipe that it keeps beside 2 and 6 busy processes' "$least_share" times '>=' 0.75
 goal 'vg-deform | vg-solve, 13,380 vertices' "$(calc "int($human_rate)")" poses/s '>=' 300
-goal 'vg-solve --fit absolute, a pose at 13,380 vertices beside squares' "$human_absolute_times" times '<=' 8
+goal 'vg-solve --fit absolute, 13,380 vertices' "$human_absolute" poses/s '>=' "$human_least"
 goal 'vg-deform | vg-solve, 6,890 vertices' "$(calc "int($rod_rate)")" poses/s '>=' 1000
 goal 'solve alone, 50,002 vertices, 2 threads, beside CHOLMOD' "$tube_gain" times '>=' "$least_gain"
 goal 'set-up, 13,380 vertices' "$human_setup" s '<=' 0.2
@@ -638,6 +747,11 @@ if [ "$busy" = yes ]; then
     printf 'Something else was running when this began: a verdict here says little about the programs.\n\n'
 fi
 cat goals
+if [ -n "$PAGE" ]; then
+    page_tables >tables.md
+    sed -e '/^<!-- bench -->$/r tables.md' -e '/^<!-- bench -->$/,/^<!-- end of bench -->$/{/^<!--/!d}' "$PAGE" >page.md
+    cat page.md >"$PAGE"
+fi
 if [ -n "$JSON" ]; then
     {
         printf '{\n  "bench": "%s", "version": "%s", "processors": %s, "load_before": "%s", "runs": %s,\n' "$BENCH" \
