@@ -39,7 +39,7 @@ static const double KEPT_STRETCH = 0.8;   /* exponent of a map's stretch: parts 
                                              own size */
 
 enum {
-    BLOCK = 256,     /* vertices per task */
+    BLOCK = 256,     /* vertices or faces per task */
     TIED_SOLVES = 5, /* rounds from the ties alone */
     ROUNDS = 8,      /* rounds with nearest points, one factorisation each */
     SOLVES = 4       /* per round */
@@ -61,6 +61,7 @@ typedef struct fit {
     double *h_normal;  /* nf x 3: h n, at rest */
     double *area;      /* nf: at rest */
     double *trust;     /* nf: 1 for a round face, 0 for one without area */
+    size_t row;        /* of the maps that is being smoothed */
     double *face_map, *map; /* maps D of the faces; of the vertices, smooth and without shear */
     double edge;       /* mean length */
     vgi_cholesky *smoother; /* smoothing operator of the maps */
@@ -165,31 +166,48 @@ static void bone_map(const double *x, const double *rest, const uint32_t *vert, 
     for (int k = 0; k < 9; k++) D[k] *= a;
 }
 
-static void face_maps(fit *t, const double *x)
+static void map_face(fit *t, size_t f)
 {
     const vg_mesh *m = t->m;
-    for (size_t f = 0; f < m->nf; f++) {
-        const uint32_t *vert = m->vert + m->start[f];
-        size_t r = m->start[f + 1] - m->start[f];
-        double *D = t->face_map + 9 * f, C[3], S[9] = {0}, n[3];
-        if (!(t->trust[f] > 0)) continue;
-        if (r == 2) {
-            bone_map(x, t->in->rest, vert, D);
-            continue;
+    const uint32_t *vert = m->vert + m->start[f];
+    const double *x = t->x, *P = t->inverse + 9 * f;
+    size_t r = m->start[f + 1] - m->start[f];
+    double *D = t->face_map + 9 * f, C[3], S[9] = {0}, n[3];
+    if (!(t->trust[f] > 0)) return;
+    if (r == 2) {
+        bone_map(x, t->in->rest, vert, D);
+        return;
+    }
+    vgi_face_centre(x, vert, r, C);
+    for (size_t i = 0; i < r; i++) {
+        double d[3];
+        vgi_subtract(x + 3 * (size_t)vert[i], C, d);
+        vgi_add_outer(S, 1, d, t->in->rest + 3 * (size_t)vert[i]);
+    }
+    vgi_face_area(x, vert, r, n);
+    double area = vgi_length(n);
+    if (area > 0) vgi_add_outer(S, sqrt(area / t->area[f]) / area, n, t->h_normal + 3 * f);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) D[3 * i + k] = S[3 * i] * P[k] + S[3 * i + 1] * P[3 + k] + S[3 * i + 2] * P[6 + k];
+}
+
+static void map_faces(void *context, size_t block)
+{
+    fit *t = context;
+    for (size_t f = block * BLOCK; f < t->m->nf && f < (block + 1) * BLOCK; f++) map_face(t, f);
+}
+
+/* Row t->row of the maps around each vertex, into tmp. */
+static void add_maps(void *context, size_t block)
+{
+    const fit *t = context;
+    for (size_t v = block * BLOCK; v < t->m->nv && v < (block + 1) * BLOCK; v++) {
+        double *to = t->tmp + 3 * v;
+        for (size_t k = 0; k < 3; k++) to[k] = k == t->row ? IDENTITY_TRUST : 0;
+        for (uint32_t i = t->around.first[v]; i < t->around.first[v + 1]; i++) {
+            size_t f = t->around.face[i];
+            vgi_add_scaled(to, t->trust[f], t->face_map + 9 * f + 3 * t->row);
         }
-        vgi_face_centre(x, vert, r, C);
-        for (size_t i = 0; i < r; i++) {
-            double d[3];
-            vgi_subtract(x + 3 * (size_t)vert[i], C, d);
-            vgi_add_outer(S, 1, d, t->in->rest + 3 * (size_t)vert[i]);
-        }
-        vgi_face_area(x, vert, r, n);
-        double area = vgi_length(n);
-        if (area > 0) vgi_add_outer(S, sqrt(area / t->area[f]) / area, n, t->h_normal + 3 * f);
-        const double *P = t->inverse + 9 * f;
-        for (int i = 0; i < 3; i++)
-            for (int k = 0; k < 3; k++)
-                D[3 * i + k] = S[3 * i] * P[k] + S[3 * i + 1] * P[3 + k] + S[3 * i + 2] * P[6 + k];
     }
 }
 
@@ -198,20 +216,12 @@ static void face_maps(fit *t, const double *x)
 static int smooth_maps(fit *t, vg_err *e)
 {
     size_t nv = t->m->nv;
-    for (size_t row = 0; row < 3; row++) {
-        double *D = t->tmp;
-        for (size_t v = 0; v < nv; v++) {
-            double *to = D + 3 * v;
-            for (size_t k = 0; k < 3; k++) to[k] = k == row ? IDENTITY_TRUST : 0;
-            for (uint32_t i = t->around.first[v]; i < t->around.first[v + 1]; i++) {
-                size_t f = t->around.face[i];
-                vgi_add_scaled(to, t->trust[f], t->face_map + 9 * f + 3 * row);
-            }
-        }
-        int r = vgi_cholesky_solve(t->smoother, D, e);
+    for (t->row = 0; t->row < 3; t->row++) {
+        vgi_parallel(t->in->threads, (nv + BLOCK - 1) / BLOCK, add_maps, t);
+        int r = vgi_cholesky_solve(t->smoother, t->tmp, e);
         if (r < 0) return r;
         for (size_t v = 0; v < nv; v++)
-            for (size_t k = 0; k < 3; k++) t->map[9 * v + 3 * row + k] = D[3 * v + k];
+            for (size_t k = 0; k < 3; k++) t->map[9 * v + 3 * t->row + k] = t->tmp[3 * v + k];
     }
     return VG_OK;
 }
@@ -226,9 +236,9 @@ static void drop_shear(double m[9])
     memcpy(m, identity, sizeof identity);
     if (!(det > 1e-12)) return;
     for (int round = 0; round < 20; round++) {
-        double change = 0, scale = 1 / cbrt(det);
+        double change = 0, scale = 1 / cbrt(det), other = 1 / (det * scale);
         for (int k = 0; k < 9; k++) {
-            double next = 0.5 * (q[k] * scale + c[k] * scale * scale / (det * scale * scale * scale));
+            double next = 0.5 * (q[k] * scale + c[k] * other);
             change += fabs(next - q[k]);
             q[k] = next;
         }
@@ -240,11 +250,17 @@ static void drop_shear(double m[9])
     for (int k = 0; k < 9; k++) m[k] = q[k] * scale;
 }
 
+static void drop_shears(void *context, size_t block)
+{
+    const fit *t = context;
+    for (size_t v = block * BLOCK; v < t->m->nv && v < (block + 1) * BLOCK; v++) drop_shear(t->map + 9 * v);
+}
+
 static int update_maps(fit *t, vg_err *e)
 {
-    face_maps(t, t->x);
+    vgi_parallel(t->in->threads, (t->m->nf + BLOCK - 1) / BLOCK, map_faces, t);
     int r = smooth_maps(t, e);
-    for (size_t v = 0; v < t->m->nv && r == VG_OK; v++) drop_shear(t->map + 9 * v);
+    if (r == VG_OK) vgi_parallel(t->in->threads, (t->m->nv + BLOCK - 1) / BLOCK, drop_shears, t);
     return r;
 }
 
