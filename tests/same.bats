@@ -34,6 +34,10 @@ same() {
     same other.vgs vg-retarget --no-provenance --onto "$DATA/horse.rest.obj" --morph 0.5 first.map.vgs
     same mapped.vgs vg-play --no-provenance first.map.vgs --interpolate 9 first.poses.vgs
     same signal.vgs vg-fitsignal -q --no-provenance first.poses.vgs
+    for space in vectors gradients rotations lengths; do
+        same $space.vgs vg-fitsignal -q --no-provenance --space $space first.poses.vgs
+        same sampled-$space.vgs vg-sample --no-provenance --speed 0.5 first.$space.vgs
+    done
     same features.vgs vg-features --no-provenance first.poses.vgs
     same sampled.vgs vg-sample --no-provenance --speed 0.5 first.signal.vgs
     same net.vgs vg-train -q --no-provenance --layers 1 --hidden 16 --iterations 20 first.poses.vgs

@@ -20,6 +20,13 @@ trex() { echo "$BATS_FILE_TMPDIR/trex.$1"; }
 value() { printf '%s' "$output" | python3 -c "import json, sys; print(json.load(sys.stdin)['$1'])"; }
 # within A B TOL: numbers
 within() { python3 -c "import sys; a, b, t = map(float, sys.argv[1:]); sys.exit(not abs(a - b) <= t)" "$@"; }
+# with_rest REST POSES: the rest pose becomes the first of the poses
+with_rest() {
+    mkdir -p rest && rm -f rest/*
+    cp "$1" rest/0.obj
+    must vg-decode -q "$2" -o 'rest/1%03d.obj'
+    must vg-encode rest/*.obj -o "$2"
+}
 # positions FILE: the poses as text, to be compared to the last bit
 positions() {
     py "$1" <<'END'
@@ -49,6 +56,28 @@ fits_like() {
     fits_like "$(trex vgs)" 5e-3 13 16 11
     fits_like "$(trex vgs)" 1e-3 24 30 16
     vg-sample out.signal | vg-diff -t 1e-3 "$(trex vgs)" -
+}
+
+# doc/MATH.md, section 11, the table of fidelity: frames, and k l m at 1e-2, 5e-3 and 1e-3
+@test "control points, sites and coordinates on the kit are those of the table (needs VG_DATA, the data kit)" {
+    [ -d "${VG_DATA:-}/human" ] || skip "VG_DATA does not name the data kit"
+    while read -r sequence rest coarse middle fine; do
+        vg-encode ${rest:+--reference "$VG_DATA/${sequence%/*}/$rest"} "$VG_DATA/$sequence.tar.gz" -o poses.vgs
+        fits_like poses.vgs 1e-2 ${coarse//,/ }
+        fits_like poses.vgs 5e-3 ${middle//,/ }
+        fits_like poses.vgs 1e-3 ${fine//,/ }
+    done <<'END'
+hybrid/horse-run horse.rest.obj 13,13,11 15,19,12 21,20,18
+hybrid/cow-run cow.rest.obj 16,21,13 19,28,17 26,32,25
+hybrid/trex-walk trex.rest.obj 10,14,8 13,16,11 24,30,16
+hybrid/velociraptor-walk velociraptor.rest.obj 10,15,8 12,19,9 27,25,17
+human/walk-man walk-man.rest.obj 28,52,16 35,71,20 57,86,41
+human/dance-man dance-man.rest.obj 105,208,61 134,237,90 233,293,115
+END
+    vg-encode "$VG_DATA/cloth/cloth-drop.tar.gz" -o poses.vgs
+    fits_like poses.vgs 1e-2 18 22 19
+    fits_like poses.vgs 5e-3 17 35 28
+    fits_like poses.vgs 1e-3 26 53 54
 }
 
 @test "with as many of everything as there can be, frames come back; twice the same bytes with any threads" {
@@ -293,6 +322,31 @@ END
     [ ! -e out.vgs ]
 }
 
+@test "names with quotes, tabs, line ends and letters of other languages go through edits and retimings" {
+    python3 - <<'END'
+for i, name in enumerate(('a "quoted" one', "tab\there", "<b>größe 日本語", "new\nline", "%s back\\slash & <i>", "$(id)")):
+    with open(f"{i}{name}.obj", "w") as f:
+        for v in range(4):
+            f.write(f"v {(v & 1) + i * i / 10} {(v >> 1) - i / 7} {v * i / 5}\n")
+        f.write("f 1 2 4 3\n")
+END
+    must vg-encode ./*.obj -o poses.vgs
+    must vg-fitsignal -q poses.vgs -o hostile.signal
+    printf 'control 2 0.3 0.4\nframe 3 0.1 0.2\ntime 1 1\ntime 6 11\n' >edits.txt
+    printf '1 1\n6 11\n' >retime.txt
+    must vg-sample --edit edits.txt hostile.signal -o edited.vgs
+    must vg-sample --retime retime.txt hostile.signal -o slow.vgs
+    py <<'END'
+from read_stream import read_stream
+names = [f.name for f in read_stream("poses.vgs").frames]
+assert names[1] == "1tab\there" and names[3] == "3new\nline" and names[2].endswith("größe 日本語"), names
+for file in ("edited.vgs", "slow.vgs"):
+    seen = [f.name for f in read_stream(file).frames]
+    assert len(seen) == 11 and seen[::2] == names, seen
+    assert all(s.startswith(n + "+") for s, n in zip(seen[1::2], names)), seen
+END
+}
+
 @test "--curve: through places of frames their shapes come; control points of a line give a line" {
     must vg-fitsignal -q --report - --json --root none -m 1000 -l 1000 -k 1002 "$(trex vgs)" -o full.signal
     printf '%s' "$output" | python3 -c "
@@ -478,6 +532,29 @@ END
     pipe "vg-deform --onto $kit/walk-woman.rest.obj --correspondence pairs.vgs --examples some-man.vgs some-woman.vgs man.vgs |
         vg-solve -o out.vgs"
     below "$(mean_of woman.vgs out.vgs ${take//,/ })" "$(python3 -c "print($(mean_of woman.vgs plain.vgs) / 8)")"
+}
+
+# the form as printed, beside the correction: the bounds are the figures of section 11 and 5 %
+@test "--examples and --onto: the printed form on a walk and on far poses (needs VG_DATA, the data kit)" {
+    [ -d "${VG_DATA:-}/human" ] || skip "VG_DATA does not name the data kit"
+    for body in man heavy; do
+        vg-encode --reference "$VG_DATA/human/walk-$body.rest.obj" "$VG_DATA/human/walk-$body.tar.gz" -o walk-$body.vgs
+        vg-encode "$VG_DATA/human/human-$body-poses.tar.gz" -o poses-$body.vgs
+    done
+    for set in walk:4:9.87e-3 walk:8:3.57e-3 walk:16:1.13e-3 poses:4:64.05e-3 poses:7:39.9e-3 poses:11:15.75e-3; do
+        IFS=: read -r name count most <<<"$set"
+        must vg-fitsignal --pick "$count" --json $name-man.vgs
+        take=$(value take)
+        first=
+        [ $name = walk ] || [[ ,$take, = *,0,* ]] || first=0, # the first of these poses is the rest pose
+        for body in man heavy; do
+            vg-encode --take "$first$take" $name-$body.vgs -o some-$body.vgs
+            [ $name = poses ] || with_rest "$VG_DATA/human/walk-$body.rest.obj" some-$body.vgs
+        done
+        must vg-fitsignal -q -t 1e-9 --examples some-man.vgs $name-man.vgs -o of-some.signal
+        must vg-sample --onto some-heavy.vgs of-some.signal -o out.vgs
+        below "$(mean_of $name-heavy.vgs out.vgs ${take//,/ })" "$most"
+    done
 }
 
 @test "vg-deform --examples: poses of a man onto a heavy one" {

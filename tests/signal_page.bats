@@ -192,6 +192,45 @@ assert page.picture()[2] == before[2]
 END
 }
 
+@test "browser: names of frames are shown as they are, whatever is in them" {
+    python3 - <<'END'
+for i, name in enumerate(('a "quoted" one', "tab\there", "</title><b>größe 日本語".replace("/", "∕"), "back\\slash & <i>", "$(id)")):
+    with open(f"{i}{name}.obj", "w") as f:
+        for v in range(120):
+            f.write(f"v {v % 2 + i * i / 10} {v // 2 % 2 - i / 7 + v / 50} {v * i / 500}\n")
+        for v in range(0, 118, 2):
+            f.write(f"f {v + 1} {v + 2} {v + 3}\n")
+END
+    must vg-encode ./*.obj -o poses.vgs
+    must vg-fitsignal -q poses.vgs -o hostile.signal
+    must vg-view hostile.signal -o hostile.html
+    browse hostile.html '#play=0&time=1' <<'END'
+import glob
+for name in sorted(glob.glob("[0-9]*.obj")):
+    assert page.value("document.querySelector('#frame').textContent").endswith(": " + name[:-4]), name
+    page.key("ArrowRight")
+page.key("Home")
+x, y = marks("control")[1]
+page.drag(x, y, x + 30, y - 20)
+text = page.saved("#save")
+same(page, "hostile.signal", "--edit", text, "--at", "1")
+END
+}
+
+@test "browser: a pose of 13,380 vertices with its normals is made in a sixtieth of a second" {
+    vg-encode "$DATA/human-man-poses.tar.xz" | vg-fitsignal -q --tolerance 1e-3 -o man.signal
+    must vg-view man.signal -o man.html
+    browse man.html '#play=0&time=1' <<'END'
+assert page.value("document.querySelector('#about').textContent").endswith("13380 vertices")
+spent = []
+for _ in range(12):  # the first ones wait for the compiler of the browser
+    page.key("ArrowRight")
+    page.settle()
+    spent.append(float(data("spent")))
+assert min(spent) < 1000 / 60, spent
+END
+}
+
 @test "browser: on a phone nothing is wider than the screen, and a finger moves a control point" {
     fetch horse.html
     browse horse.html '#play=0&time=4' <<'END'
@@ -200,6 +239,13 @@ page.call("Emulation.setTouchEmulationEnabled", enabled=True)
 page.wait("document.querySelector('#plane').clientWidth <= 360")
 page.settle()
 assert page.value("document.documentElement.scrollWidth") <= 360
+for width, height in ((320, 640), (640, 320)):  # upright and on its side
+    page.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=True)
+    page.settle()
+    assert page.value("document.documentElement.scrollWidth") <= width
+    assert all(page.value(f"document.querySelector('{at}').clientHeight") >= 200 for at in ("#plane", "#canvas"))
+page.call("Emulation.setDeviceMetricsOverride", width=360, height=700, deviceScaleFactor=1, mobile=True)
+page.settle()
 assert page.value("document.querySelector('#plane').clientHeight") > 200 and page.value("document.querySelector('#canvas').clientHeight") > 200
 x, y = marks("control")[5]
 page.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=[dict(x=x + 2, y=y)])
