@@ -87,6 +87,7 @@ void vgi_unshape_clear(vgi_unshape *u)
     free(u->x);
     free(u->rhs);
     free(u->distance);
+    free(u->squares);
     *u = (vgi_unshape){0};
 }
 
@@ -124,11 +125,12 @@ static int solve(vgi_unshape *u, size_t n, vg_err *e)
     return VG_OK;
 }
 
-static void measure(vgi_unshape *u, size_t frame, const double *x, double *sum)
+static void measure(vgi_unshape *u, size_t frame, const double *x)
 {
     const vg_graph *g = u->space.g;
     const double *pose = u->poses + 3 * frame * g->faces.nv;
-    double most = 0;
+    double most = 0, *sum = u->squares + frame;
+    *sum = 0;
     for (size_t v = 0; v < g->faces.nv; v++) {
         if (!g->in_face[v]) continue;
         double square = vgi_square(pose + 3 * v, x + 3 * v);
@@ -146,6 +148,7 @@ int vgi_unshape_error(vgi_unshape *u, const vgi_basis *b, const double *x, size_
     size_t start = u->worst / batch;
     double sum = 0;
     if (!u->distance && !(u->distance = vgi_array(n, sizeof *u->distance, e))) return VG_ENOMEM;
+    if (!u->squares && !(u->squares = vgi_array(n, sizeof *u->squares, e))) return VG_ENOMEM;
     u->most = 0;
     for (size_t group = 0; group < groups && !(sqrt(u->most) > limit); group++) {
         size_t first = (start + group) % groups * batch, some = n - first < batch ? n - first : batch;
@@ -157,8 +160,9 @@ int vgi_unshape_error(vgi_unshape *u, const vgi_basis *b, const double *x, size_
             for (size_t c = 0; c < d; c++) u->shape[i * d + c] += b->mean[c];
         int r = solve(u, some, e);
         if (r < 0) return r;
-        for (size_t i = 0; i < some; i++) measure(u, first + i, u->x + 3 * i * u->space.g->faces.nv, &sum);
+        for (size_t i = 0; i < some; i++) measure(u, first + i, u->x + 3 * i * u->space.g->faces.nv);
     }
+    for (size_t i = 0; i < n; i++) sum += u->squares[i]; /* in the order of frames: batches depend on the threads */
     error->most = sqrt(u->most);
     error->rms = sqrt(sum / (double)n / (double)(u->space.g->attached ? u->space.g->attached : 1));
     if (error->of_frame) memcpy(error->of_frame, u->distance, n * sizeof *u->distance);

@@ -15,6 +15,7 @@ typedef struct vgi_unshape {
     double *home;
     double *shape, *vectors, *x, *rhs; /* of one batch */
     double *distance;    /* n: largest distance per frame */
+    double *squares;     /* n: sums over the points of each frame */
     double most;         /* its square */
     size_t worst;        /* the frame with the largest error, evaluated first */
 } vgi_unshape;
