@@ -20,8 +20,8 @@ static void mark_attached(vg_graph *g)
     }
 }
 
-/* selected, pairs: NULL for all faces, no links. */
-static void fill_faces(vg_graph *g, const vg_mesh *m, const uint32_t *selected, const uint32_t *pairs)
+/* selected, links: NULL for all faces, no links. */
+static void fill_faces(vg_graph *g, const vg_mesh *m, const uint32_t *selected, const vg_links *links)
 {
     uint32_t at = 0;
     size_t faces = g->faces.nf - g->nlinks;
@@ -30,9 +30,9 @@ static void fill_faces(vg_graph *g, const vg_mesh *m, const uint32_t *selected, 
         for (uint32_t c = m->start[f]; c < m->start[f + 1]; c++) g->faces.vert[at++] = m->vert[c];
         g->faces.start[i + 1] = at;
     }
-    for (size_t i = 0; i < g->nlinks; i++) {
-        g->faces.vert[at++] = pairs[2 * i];
-        g->faces.vert[at++] = pairs[2 * i + 1];
+    for (size_t i = 0; links && i < links->n; i++) {
+        g->faces.vert[at++] = links->pairs[2 * i];
+        g->faces.vert[at++] = links->pairs[2 * i + 1];
         g->faces.start[faces + i + 1] = at;
     }
 }
@@ -54,7 +54,7 @@ int vg_graph_new(vg_graph **out, const vg_mesh *m, const vg_selection *selection
     g->faces.vert = vgi_array(corners, sizeof *g->faces.vert, e);
     g->in_face = vgi_array(g->faces.nv, sizeof *g->in_face, e);
     if (!g->faces.start || !g->faces.vert || !g->in_face) return vg_graph_free(out), VG_ENOMEM;
-    fill_faces(g, m, some ? selection->faces : NULL, links ? links->pairs : NULL);
+    fill_faces(g, m, some ? selection->faces : NULL, links);
     mark_attached(g);
     return VG_OK;
 }
