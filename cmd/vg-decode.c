@@ -37,6 +37,8 @@ static const cli_option options[] = {
      .flag = &sink_options.no_normals},
     {"shapes", 0, NULL, "each frame is a morph target of a GLB or glTF, and there is no animation",
      .flag = &sink_options.shapes},
+    {"quantize", 0, NULL, "positions of a GLB or glTF of 16 bits, normals of 8: about half the size",
+     .flag = &sink_options.quantize},
     {"name", 0, "NAME", "what the animation of a GLB or glTF is called", .text = &sink_options.name},
     {.name = NULL}};
 
@@ -144,6 +146,15 @@ static void warn_empty(const char *artefact, const char *advice, bool skin)
     else cli_warn("the input holds no poses but a %s: its reference pose is written; %s", artefact, advice);
 }
 
+/* Said when the caller chose how exact the file is. */
+static void say_report(void)
+{
+    bool inexact;
+    const bool chosen = sink_options.quantize || sink_options.morph_tolerance > 0;
+    const char *report = vg_sink_report(sink, &inexact);
+    if (report && (cli.verbose || (inexact && chosen))) cli_say("%s", report);
+}
+
 static void decode(vg_source *s)
 {
     static const step writing = {.batch = 1, .unit = "poses", .process = put_frames};
@@ -163,6 +174,7 @@ static void decode(vg_source *s)
     if (vg_sink_end(sink, &e) < 0) cli_die(&e);
     if (empty) warn_empty(artefact, advice, skin);
     for (size_t i = 0; vg_sink_warning(sink, i); i++) cli_warn("%s", vg_sink_warning(sink, i));
+    say_report();
     vg_sink_close(&sink);
     batch_frames_free(&writing, in);
 }

@@ -106,6 +106,7 @@ int vgi_gltf_begin(void **state, const vg_head *h, const vg_sink_options *o, vgi
 int vgi_gltf_put(void *state, const vg_frame *f, vg_err *e);
 int vgi_gltf_end(void *state, vg_err *e);
 const char *vgi_gltf_warning(void *state);
+const char *vgi_gltf_report(void *state, bool *inexact);
 void vgi_gltf_release(void *state);
 
 #endif

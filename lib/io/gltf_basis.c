@@ -233,6 +233,28 @@ int vgi_gltf_basis_make(vgi_gltf_basis *b, const vgi_gltf_frames_in *in, size_t 
     return r;
 }
 
+int vgi_gltf_basis_solve(const vgi_gltf_basis *b, size_t frames, double **solved, vg_err *e)
+{
+    const size_t n = b->n;
+    const float *weights = b->weights;
+    double *gram = vgi_array(n, n * sizeof *gram, e), *to = vgi_array(n, frames * sizeof *to, e), trace = 0;
+    int r = gram && to ? VG_OK : VG_ENOMEM;
+    for (size_t f = 0; f < frames && r == VG_OK; f++)
+        for (size_t s = 0; s < n; s++) {
+            const double a = weights[f * n + s];
+            to[s * frames + f] = a;
+            for (size_t t = 0; t <= s; t++) gram[s * n + t] += a * weights[f * n + t];
+        }
+    for (size_t s = 0; s < n && r == VG_OK; s++) trace += gram[s * n + s];
+    for (size_t s = 0; s < n && r == VG_OK; s++) gram[s * n + s] += 1e-12 * trace;
+    if (r == VG_OK && n && !vgi_spd_factor(n, gram)) r = vg_fail(e, VG_EINPUT, "the frames cannot be mixed");
+    if (r == VG_OK) vgi_spd_solve(n, gram, frames, to);
+    free(gram);
+    if (r < 0) free(to);
+    else *solved = to;
+    return r;
+}
+
 void vgi_gltf_basis_clear(vgi_gltf_basis *b)
 {
     free(b->targets);

@@ -26,6 +26,9 @@ typedef struct vgi_gltf_frames_in {
  * VG_EINPUT if the frames are too large for sums in binary32. */
 int vgi_gltf_basis_make(vgi_gltf_basis *b, const vgi_gltf_frames_in *in, size_t most, double tolerance,
                         vg_err *e) VG_MUST_CHECK;
+/* vgi_gltf_basis_solve: n x frames numbers, to be freed: by how much frame f of anything that is mixed by these weights counts
+ * in its target t, by least squares. */
+int vgi_gltf_basis_solve(const vgi_gltf_basis *b, size_t frames, double **solved, vg_err *e) VG_MUST_CHECK;
 void vgi_gltf_basis_clear(vgi_gltf_basis *b);
 
 #endif

@@ -179,6 +179,7 @@ int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e)
     if (r == VG_OK) r = drop_from_list(doc, "extensionsUsed", instancing, e);
     if (r == VG_OK) r = drop_from_list(doc, "extensionsRequired", instancing, e);
     if (r == VG_OK) r = cast_nodes(doc, &w->character->scene, k, e);
+    if (r == VG_OK && k->ngrids) r = vgi_gltf_put_grids(doc, k->grids, k->ngrids, e);
     if (r == VG_OK) r = say_members(w, doc, e);
     vgi_json_free(&doc);
     return r;

@@ -107,9 +107,9 @@ static int check_weights(const vgi_gltf_writing *w, vg_err *e)
 static int begin(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e)
 {
     const size_t n = joints_of(w);
-    if (o->most_targets || o->morph_tolerance > 0 || o->shapes)
+    if (o->most_targets || o->morph_tolerance > 0 || o->shapes || o->quantize)
         return vg_fail(e, VG_EARG, "transforms become a skin, without morph targets: leave out %s",
-                       o->most_targets ? "--max-targets" : o->shapes ? "--shapes" : "--morph-tolerance");
+                       o->most_targets ? "--max-targets" : o->shapes ? "--shapes" : o->quantize ? "--quantize" : "--morph-tolerance");
     skinning *x = w->own = vgi_array(1, sizeof *x, e);
     if (!x) return VG_ENOMEM;
     x->bone = vgi_array(n, sizeof *x->bone, e), x->channels = vgi_array(n, 3 * sizeof *x->channels, e);
@@ -473,4 +473,11 @@ static void release(void *own)
     free(x);
 }
 
-const vgi_gltf_manner vgi_gltf_by_skin = {begin, put, describe, emit, NULL, release, "write fewer frames", false};
+static bool report(const vgi_gltf_writing *w, char *to, size_t room)
+{
+    snprintf(to, room, "a skin of %zu joints in %zu frame%s", w->h->body.rig.skeleton.njoints, w->frames,
+             w->frames == 1 ? "" : "s");
+    return false;
+}
+
+const vgi_gltf_manner vgi_gltf_by_skin = {begin, put, describe, emit, NULL, report, release, "write fewer frames", false};

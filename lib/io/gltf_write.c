@@ -319,6 +319,29 @@ int vgi_gltf_emit_singles(vgi_gltf_writing *w, const float *p, size_t n, vg_err 
     return r;
 }
 
+static void pack_point(vgi_gltf_numbers kind, const float *p, unsigned char *to)
+{
+    for (int k = 0; k < 3; k++) {
+        const unsigned whole = (unsigned)(int)(kind == VGI_GLTF_FLOATS ? 0 : p[k]);
+        if (kind == VGI_GLTF_FLOATS) vgi_gltf_put_single(to + VGI_GLTF_ITEM * k, p[k]);
+        else if (kind == VGI_GLTF_BYTES) to[k] = (unsigned char)whole;
+        else to[2 * k] = (unsigned char)whole, to[2 * k + 1] = (unsigned char)(whole >> 8);
+    }
+}
+
+int vgi_gltf_emit_points(vgi_gltf_writing *w, vgi_gltf_numbers kind, const float *p, size_t n, bool apart, vg_err *e)
+{
+    static const unsigned char zeros[VGI_GLTF_ITEM];
+    const vgi_gltf_kind *k = &vgi_gltf_kinds[kind];
+    int r = VG_OK;
+    for (size_t i = 0; i < n && r == VG_OK; i++) {
+        unsigned char packed[VGI_GLTF_POINT + VGI_GLTF_ITEM] = {0};
+        pack_point(kind, p + 3 * i, packed);
+        r = vgi_gltf_emit(w, packed, apart ? k->stride : k->bytes, e);
+    }
+    return r < 0 || apart ? r : vgi_gltf_emit(w, zeros, (4 - n * k->bytes % 4) % 4, e);
+}
+
 static int emit_all(vgi_gltf_writing *w, vg_err *e)
 {
     const vgi_gltf *g = w->character ? &w->character->scene.g : &w->library;
@@ -451,6 +474,13 @@ const char *vgi_gltf_warning(void *state)
 {
     const vgi_gltf_writing *w = state;
     return *w->warning ? w->warning : NULL;
+}
+
+const char *vgi_gltf_report(void *state, bool *inexact)
+{
+    vgi_gltf_writing *w = state;
+    *inexact = w->manner->report(w, w->report, sizeof w->report);
+    return *w->report ? w->report : NULL;
 }
 
 void vgi_gltf_release(void *state)

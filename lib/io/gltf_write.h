@@ -7,6 +7,7 @@
 #include "io/gltf.h"
 #include "io/gltf_character.h"
 #include "io/gltf_normals.h"
+#include "io/gltf_quantize.h"
 #include "io/gltf_seams.h"
 
 enum { VGI_GLTF_ITEM = 4, VGI_GLTF_POINT = 12 }; /* bytes of a number, and of three */
@@ -37,13 +38,14 @@ typedef struct vgi_gltf_writing vgi_gltf_writing;
 /* How the mesh moves. begin allocates `own` before the first frame; put stores a frame in the spool. describe is
  * called once all frames are stored, after the views and accessors of faces and times: it adds its own, and writes
  * scene, nodes, meshes and animation. emit writes the bytes of its views, in order. warning (may be NULL) reports
- * what was lost. release frees `own`, which may be NULL. */
+ * lost; report how exact the file is, true: not to binary32. release takes own, NULL too. */
 typedef struct vgi_gltf_manner {
     int (*begin)(vgi_gltf_writing *w, const vg_sink_options *o, vg_err *e);
     int (*put)(vgi_gltf_writing *w, const vg_frame *f, vg_err *e);
     int (*describe)(vgi_gltf_writing *w, vg_err *e);
     int (*emit)(vgi_gltf_writing *w, vg_err *e);
     void (*warning)(const vgi_gltf_writing *w, char *to, size_t room);
+    bool (*report)(const vgi_gltf_writing *w, char *to, size_t room);
     void (*release)(void *own);
     const char *too_big; /* advice for the message */
     bool splits;         /* several animations are possible */
@@ -84,26 +86,37 @@ struct vgi_gltf_writing {
     size_t triangles, lines, texture; /* numbers of their accessors; empty ones have none */
     unsigned char carry[3];    /* base64: bytes of an incomplete group of three */
     size_t ncarry;
-    char warning[400];
+    char warning[400], report[200];
 };
+
+/* How the three numbers of a point lie in the file: binary32, or normalised whole numbers of 16 or 8 bits. */
+typedef enum vgi_gltf_numbers { VGI_GLTF_FLOATS, VGI_GLTF_SHORTS, VGI_GLTF_BYTES, VGI_GLTF_KINDS } vgi_gltf_numbers;
+typedef struct vgi_gltf_kind {
+    int component;
+    size_t bytes, stride; /* of a point, and with what fills it up to a multiple of 4 */
+} vgi_gltf_kind;
+static const vgi_gltf_kind vgi_gltf_kinds[VGI_GLTF_KINDS] = {{VGI_GLTF_FLOAT, 12, 12}, {VGI_GLTF_SHORT, 6, 8}, {VGI_GLTF_BYTE, 3, 4}};
 
 /* Vertices of the file that a primitive of a mesh refers to. */
 typedef struct vgi_gltf_list {
     size_t first, count;
     bool normals;
     size_t position, normal; /* their accessors */
+    const vgi_gltf_grid *grid; /* its positions are whole numbers; NULL: they are binary32 */
 } vgi_gltf_list;
 
 /* ---- gltf_cast.c: the nodes, meshes and materials of a character ---- */
 /* vgi_gltf_say_cast: write all members of the file that the writer does not generate. A list for each part of the
  * character's scene; target: the accessor of the positions of morph target t of list l, followed by that of its
- * normals. names: of the morph targets, a text in brackets. */
+ * morph targets, a text in brackets. grids: that nodes and skins apply; ngrids may be 0. */
 typedef struct vgi_gltf_cast {
     const vgi_gltf_list *lists;
     size_t targets;
     size_t (*target)(const void *context, size_t t, size_t l);
     const void *context;
     const vgi_json *names;
+    const vgi_gltf_grid *grids;
+    size_t ngrids;
 } vgi_gltf_cast;
 int vgi_gltf_say_cast(vgi_gltf_writing *w, const vgi_gltf_cast *k, vg_err *e) VG_MUST_CHECK;
 /* vgi_gltf_say_elements: write the elements of a list of a file as text. */
@@ -146,6 +159,10 @@ int vgi_gltf_say_accessor(vgi_gltf_writing *w, size_t off, int component, size_t
 
 void vgi_gltf_put_single(unsigned char *to, float x);
 float vgi_gltf_get_single(const unsigned char *p);
+/* vgi_gltf_emit_points: n points of three numbers each, as numbers of this kind. apart: each starts at a multiple of 4 bytes;
+ * else only the end is filled up to one. */
+int vgi_gltf_emit_points(vgi_gltf_writing *w, vgi_gltf_numbers kind, const float *p, size_t n, bool apart,
+                         vg_err *e) VG_MUST_CHECK;
 /* vgi_gltf_emit: write bytes of the buffer, raw or as base64. */
 int vgi_gltf_emit(vgi_gltf_writing *w, const unsigned char *p, size_t n, vg_err *e) VG_MUST_CHECK;
 int vgi_gltf_emit_singles(vgi_gltf_writing *w, const float *p, size_t n, vg_err *e) VG_MUST_CHECK;

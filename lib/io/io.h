@@ -249,6 +249,9 @@ typedef struct vgi_sequence_format {
     int (*put)(void *state, const vg_frame *f, vg_err *e);
     int (*end)(void *state, vg_err *e);
     const char *(*warning)(void *state);
+    /* report (may be NULL): what was written, after end, in that state; *inexact: values were mixed or rounded beyond
+     * binary32. */
+    const char *(*report)(void *state, bool *inexact);
     void (*release)(void *state);
 } vgi_sequence_format;
 

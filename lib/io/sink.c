@@ -8,6 +8,7 @@
 #include "io/sink.h"
 
 #include <errno.h>
+#include <inttypes.h>
 #include <stdlib.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -55,6 +56,8 @@ struct vg_sink {
     bool names_lost, times_lost;
     char scalars_lost[80]; /* vertex channels, which no format keeps */
     vgi_names warnings;
+    char *report; /* NULL: nothing to say */
+    bool inexact;
 };
 
 /* ---- the paths of files ---- */
@@ -303,6 +306,24 @@ static int warn_of_loose(vg_sink *s, vg_err *e)
                      "does, then refuse the cache (--drop-loose)",
                      s->loose);
     return vgi_names_add(&s->warnings, text, (size_t)n, e);
+}
+
+/* The bytes as they are written; what the format says of them follows. */
+static int make_report(vg_sink *s, vg_err *e)
+{
+    const vgi_sequence_format *f = s->plan.sequence;
+    const char *own = f && f->report ? f->report(s->state, &s->inexact) : NULL;
+    if (!own) return VG_OK;
+    const size_t room = strlen(s->output) + strlen(own) + 60;
+    if (!(s->report = vgi_array_raw(room, 1, e))) return VG_ENOMEM;
+    snprintf(s->report, room, "'%s' has %" PRIu64 " bytes, %s", s->output, s->out.size, own);
+    return VG_OK;
+}
+
+const char *vg_sink_report(const vg_sink *s, bool *inexact)
+{
+    *inexact = s->inexact;
+    return s->report;
 }
 
 const char *vg_sink_warning(const vg_sink *s, size_t i)
@@ -617,6 +638,7 @@ int vg_sink_end(vg_sink *s, vg_err *e)
         s->fd = -1;
     }
     if (r == VG_OK && s->frames) r = warn_of_losses(s, e);
+    if (r == VG_OK && s->frames) r = make_report(s, e);
     if (r == VG_OK) r = warn_of_loose(s, e);
     if (r == VG_OK && s->names.numbered) r = vgi_file_names_warn(&s->names, s->plan.format->suffix, &s->warnings, e);
     if (r == VG_OK) r = vg_targets_rename(&s->targets, e);
@@ -663,6 +685,7 @@ void vg_sink_close(vg_sink **sink)
     vgi_names_clear(&s->warnings);
     vgi_slim_clear(&s->slim);
     free(s->mesh);
+    free(s->report);
     free(s->output);
     free(s);
 }

@@ -142,6 +142,7 @@ static int check_gltf_options(const vgi_plan *p, const char *output, const vg_si
                         : o->morph_tolerance > 0 ? "--morph-tolerance"
                         : o->no_normals          ? "--no-normals"
                         : o->shapes              ? "--shapes"
+                        : o->quantize            ? "--quantize"
                                                  : NULL;
     if (p->sequence == &vgi_sequence_glb || p->sequence == &vgi_sequence_gltf)
         return o->shapes && (o->most_targets || o->morph_tolerance > 0 || o->name)

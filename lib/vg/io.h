@@ -184,6 +184,7 @@ typedef struct vg_sink_options {
                                targets, in D. 0: 0.001 */
     bool no_normals;     /* GLB, glTF: leave out normals that the input does not have; viewers show such a mesh faceted */
     bool shapes;         /* GLB, glTF: each frame is a morph target, without an animation */
+    bool quantize;       /* GLB, glTF: positions of 16 bits and normals of 8 (KHR_mesh_quantization); vertices only */
     const char *name;    /* GLB, glTF: the name of the animation; NULL: from its frames */
     bool replace;        /* if a directory or a pattern has mesh files of an earlier set, remove those that are not
                             overwritten once all is written; otherwise such files are an error before any work */
@@ -202,6 +203,9 @@ int vg_sink_end(vg_sink *s, vg_err *e) VG_MUST_CHECK;
 void vg_sink_discard(const vg_sink *s);
 /* vg_sink_warning: line i of what the output cannot hold, after vg_sink_end; NULL: no more. Borrowed until close. */
 const char *vg_sink_warning(const vg_sink *s, size_t i);
+/* vg_sink_report: one line on the file that was written, after vg_sink_end: its bytes, and how exact it is; NULL: nothing to
+ * say. *inexact: frames were mixed, or numbers rounded beyond binary32. Borrowed until close. */
+const char *vg_sink_report(const vg_sink *s, bool *inexact);
 void vg_sink_close(vg_sink **s); /* without _end, nothing is left behind */
 
 /* A mesh file in memory, read or written as a whole. */

@@ -73,7 +73,7 @@ static void read_again(const run *x, uint64_t frames)
 /* What can be written in binary32 is, but for sums of frames that overflow there. */
 static void write_run(run *x, size_t most_targets)
 {
-    const vg_sink_options o = {.most_targets = most_targets};
+    const vg_sink_options o = {.most_targets = most_targets, .quantize = most_targets % 2};
     vg_err e = {0};
     uint64_t n = 0;
     demand((x->out.fd = vgi_nameless_file(&e)) >= 0);
@@ -83,7 +83,7 @@ static void write_run(run *x, size_t most_targets)
     demand(r == VG_OK || r == VG_EINPUT);
     if (r < 0 || n == 0) return;
     r = x->format->end(x->written, &e);
-    if (r == VG_EINPUT && strstr(e.message, "too large to be mixed in binary32")) return;
+    if (r == VG_EINPUT && strstr(e.message, "in binary32")) return;
     demand(r == VG_OK && vgi_output_flush(&x->out, &e) == VG_OK);
     x->format->warning(x->written);
     read_again(x, n);

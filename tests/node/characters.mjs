@@ -113,8 +113,14 @@ function materials(gltf) {
         !!m.material.map, !!m.material.normalMap, m.material.roughness, m.material.metalness, m.material.side].join("|"));
 }
 
+// three.js calls an animation without a name animation_0; vg calls it after the file.
+function find_clip(gltf, name) {
+    const all = gltf.animations;
+    return all.find(c => c.name === name) || (all.length === 1 && before.animations[0].name === "animation_0" ? all[0] : null);
+}
+
 function play(gltf, name, times, look) {
-    const clip = gltf.animations.find(c => c.name === name);
+    const clip = find_clip(gltf, name);
     if (!clip) throw new Error(`no animation ${name}: ${gltf.animations.map(c => c.name)}`);
     const mixer = new THREE.AnimationMixer(gltf.scene), action = mixer.clipAction(clip);
     action.setLoop(THREE.LoopOnce);

@@ -1,0 +1,131 @@
+#!/usr/bin/env bats
+# characters.bats: what becomes of characters in glTF: whole numbers, the report of the file, and every sample that is at hand,
+# with three.js as the judge.
+# SPDX-License-Identifier: GPL-3.0-or-later
+load lib
+
+make_in() {
+    py <<'END'
+import make_character
+make_character.main("in.glb")
+END
+}
+
+@test "whole numbers: Python decodes them as the extension says, and the error is the one that is said" {
+    must vg-encode --reference "$DATA/horse.rest.obj" "$DATA/horse-run.tar.xz" -o run.vgs
+    must vg-decode run.vgs -o whole.glb
+    must_warn vg-decode -v --quantize run.vgs -o small.glb
+    says "'small.glb' has $(stat -c %s small.glb) bytes, 21 morph targets for 21 frames; no vertex is off by more than"
+    printf '%s\n' "$stderr" >said
+    must vg-decode -q --f64 --no-mesh run.vgs -o run.npy
+    must vg-decode -q "$DATA/horse.rest.obj" --f64 --no-mesh -o rest.npy
+    [ "$(stat -c %s small.glb)" -lt $(($(stat -c %s whole.glb) * 7 / 10)) ]
+    py <<'END'
+import json, math, re, struct
+data = open("small.glb", "rb").read()
+n = struct.unpack("<I", data[12:16])[0]
+g, binary = json.loads(data[20:20 + n]), data[28 + n:]
+assert g["extensionsRequired"] == g["extensionsUsed"] == ["KHR_mesh_quantization"]
+types = {5120: ("3b", 127, 4), 5122: ("<3h", 32767, 8)}
+def values(number):
+    a = g["accessors"][number]
+    assert a["normalized"] and "sparse" not in a
+    kind, most, stride = types[a["componentType"]]
+    view = g["bufferViews"][a["bufferView"]]
+    assert view["byteStride"] == stride and a["byteOffset"] % 4 == 0
+    off = view["byteOffset"] + a["byteOffset"]
+    whole = [struct.unpack_from(kind, binary, off + stride * i) for i in range(a["count"])]
+    assert [min(c) for c in zip(*whole)] == a["min"] and [max(c) for c in zip(*whole)] == a["max"]
+    return [[x / most for x in p] for p in whole]
+def array(name):
+    b = open(name, "rb").read()
+    start = 10 + struct.unpack_from("<H", b, 8)[0]
+    x = struct.unpack("<%dd" % ((len(b) - start) // 8), b[start:])
+    return [x[i:i + 3] for i in range(0, len(x), 3)]
+node, primitive = g["nodes"][0], g["meshes"][0]["primitives"][0]
+nv = g["meshes"][0]["extras"]["vg_vertices"][0]
+reference, poses = array("rest.npy"), array("run.npy")
+assert len(reference) == nv and len(poses) == 21 * nv
+D = math.dist([min(c) for c in zip(*reference)], [max(c) for c in zip(*reference)])
+assert g["accessors"][primitive["attributes"]["POSITION"]]["componentType"] == 5122
+base = values(primitive["attributes"]["POSITION"])
+def off(d, truth):
+    return max(math.dist([o + s * (x + y) for o, s, x, y in zip(node["translation"], node["scale"], b, c)], t)
+               for b, c, t in zip(base, d, truth))
+worst = off([[0, 0, 0]] * nv, reference)
+for i, target in enumerate(primitive["targets"]):
+    worst = max(worst, off(values(target["POSITION"]), poses[i * nv:][:nv]))
+said = float(re.search(r"off by more than ([0-9.e-]+) % of D", open("said").read()).group(1)) / 100
+assert 0.9 * said < worst / D < 1.06 * said and said < 1e-4, (worst / D, said)
+assert g["accessors"][primitive["attributes"]["NORMAL"]]["componentType"] == 5120
+assert all(abs(math.hypot(*x) - 1) < 0.02 for x in values(primitive["attributes"]["NORMAL"]))
+END
+    pipe 'vg-encode small.glb | vg-diff -t 1e-4 run.vgs -'
+    must_warn vg-decode --quantize --shapes run.vgs -o shapes.gltf
+    pipe 'vg-encode --shapes shapes.gltf | vg-info -'
+}
+
+@test "whole numbers of a character: nodes, skin and normals; the same in three.js to 1e-4 D" {
+    make_in
+    must vg-decode in.glb -o exact.glb
+    must_warn vg-decode --quantize in.glb -o small.glb
+    says "no vertex is off by more than"
+    must vg-encode in.glb -o in.vgs
+    pipe 'vg-encode small.glb | vg-diff -t 1e-4 in.vgs -'
+    must_warn vg-decode --quantize small.glb -o again.glb
+    pipe 'vg-encode again.glb | vg-diff -t 2e-4 in.vgs -'
+    command -v node >/dev/null || return 0
+    if node -e 'require("three")' 2>/dev/null; then
+        must node "$ROOT/tests/node/characters.mjs" in.glb small.glb '*'
+        printf '%s\n' "$output" >small.json
+        py <<'END'
+import json
+r = json.load(open("small.json"))
+assert r["vertices"] == 72 and r["frames"] > 1 and r["moved"] > 0.3, r
+assert 0 < r["rest"] < 1e-4 and 0 < r["position"] < 1e-4 and r["uv"] == 0 and r["normal"] < 0.7 and r["turned"] < 1, r
+assert r["materials"], r
+END
+    fi
+    node -e 'require("gltf-validator")' 2>/dev/null || return 0
+    node -e 'require("gltf-validator").validateBytes(new Uint8Array(require("fs").readFileSync("small.glb"))).then(r =>
+        console.log(r.issues.numErrors, r.issues.numWarnings))' >counts
+    [ "$(cat counts)" = "0 0" ]
+}
+
+@test "the file's size and error are said when frames are mixed, and with -v" {
+    must vg-decode "$DATA/horse-run.tar.xz" -o run.glb
+    must_warn vg-decode -v "$DATA/horse-run.tar.xz" -o run.glb
+    says "'run.glb' has $(stat -c %s run.glb) bytes, 21 morph targets for 21 frames, positions as they are in binary32"
+    must_warn vg-decode --morph-tolerance 0.01 "$DATA/horse-run.tar.xz" -o run.glb
+    says "'run.glb' has $(stat -c %s run.glb) bytes"
+    says "no vertex is off by more than"
+    must vg-decode -q --morph-tolerance 0.01 "$DATA/horse-run.tar.xz" -o run.glb
+    must_fail 2 vg-decode --quantize "$DATA/horse-run.tar.xz" -o run.pc2
+    says "--quantize is for GLB and glTF"
+}
+
+# Each sample as it is and as vg writes it, with all its animations, must be the same to three.js. Samples are those of the
+# packages that NODE_PATH names (such as @webxr-input-profiles/assets), and of the folder VG_SAMPLES.
+@test "three.js sees in every sample of the installed packages what vg read, to 1e-6 D" {
+    command -v node >/dev/null || skip "node is not installed"
+    node -e 'require("three")' 2>/dev/null || skip "the node module three is not installed"
+    make_in
+    find ${NODE_PATH//:/ } ${VG_SAMPLES:-} -name '*.gl[bt]*' -size -1500k 2>/dev/null | grep -E '\.(glb|gltf)$' | sort >samples
+    printf '%s\n' "$PWD/in.glb" "$DATA/character-draco.glb" >>samples
+    local file
+    while read -r file; do
+        case $file in *draco.glb) continue ;; esac # three.js has no decoder here
+        must vg-decode -q --max-targets 100000 "$file" -o out.glb
+        must node "$ROOT/tests/node/characters.mjs" "$file" out.glb '*'
+        printf '%s\n' "$output" | tail -n 1 >>reports
+    done <samples
+    py <<'END'
+import json
+worst = 0
+for line in open("reports"):
+    r = json.loads(line)
+    assert r["uv"] == 0 and r["normal"] < 0.1 and r["materials"], r
+    worst = max(worst, r.get("position", r["rest"]))
+    assert worst < 1e-6, r
+END
+}
