@@ -5,9 +5,10 @@
 #include <inttypes.h>
 #include <stdio.h>
 
+const char *const network_methods[VG_NETWORK_METHODS] = {"repeat", "linear", "damped", "regression", "network"};
+
 static void report_errors(report *r, const vg_network *n)
 {
-    static const char *const methods[VG_NETWORK_METHODS] = {"repeat", "linear", "damped", "regression", "network"};
     static const report_column columns[] = {{"method", "error, % of D", false}, {"given", "given", false},
                                             {"frame_5", "frame 5", false}, {"frame_10", "frame 10", false},
                                             {"frame_15", "frame 15", false}};
@@ -16,7 +17,7 @@ static void report_errors(report *r, const vg_network *n)
     for (size_t given = 0; given < 2; given++)
         for (size_t m = 0; m < VG_NETWORK_METHODS; m++) {
             const double *x = n->errors + (given * VG_NETWORK_METHODS + m) * VG_NETWORK_FRAMES;
-            report_value cells[] = {report_text(methods[m]), report_count(given ? 3 : 1), report_nothing(),
+            report_value cells[] = {report_text(network_methods[m]), report_count(given ? 3 : 1), report_nothing(),
                                     report_nothing(), report_nothing()};
             for (int i = 0; i < VG_NETWORK_FRAMES; i++)
                 if (x[i] >= 0) cells[2 + i] = report_number(x[i]);

@@ -5,6 +5,9 @@
 
 #include "report.h"
 
+/* network_methods: what a network is measured beside, and it. */
+extern const char *const network_methods[VG_NETWORK_METHODS];
+
 /* report_network: layers, parameters, what it was trained on, and its errors in frames that were held out. */
 void report_network(report *r, const vg_network *n);
 

@@ -2,6 +2,7 @@
  * Leaves out how a pose becomes pixels, and what is in a page: that is lib/view.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "cli.h"
+#include "network_plot.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -16,8 +17,8 @@ static struct {
     size_t nbeside;
     double scale, zoom, turn, fps;
     bool edges, ground, centred, silhouettes, scales, plain, pick;
-    size_t kind, up, fit; /* 1: html, z, figure */
-    bool page, animated; /* what is made, else a sheet */
+    size_t kind, up, fit; /* 1: html, z, figure; kind 2: webp, 3: svg */
+    bool page, animated, svg; /* what is made, else a sheet */
 } opts = {.view = "30,15"};
 
 static void take_beside(const char *value, void *context)
@@ -30,7 +31,7 @@ static void take_beside(const char *value, void *context)
 }
 
 static const cli_option options[] = {
-    {.name = "format", .value = "png|html|webp", .text = &opts.format, .choice = &opts.kind,
+    {.name = "format", .value = "png|html|webp|svg", .text = &opts.format, .choice = &opts.kind,
      .help = "format of the output (default: from its name, else png)"},
     {.name = "frames", .value = "N",
      .help = "sheet: N evenly spaced frames, or all when there are fewer (default: 8; animation: 1000)",
@@ -155,8 +156,9 @@ static void choose_kind(void)
     bool named = cli.output && (stat(cli.output, &st) || S_ISREG(st.st_mode)); /* not a pipe or device */
     bool html = named && (cli_ends_with(cli.output, ".html") || cli_ends_with(cli.output, ".htm"));
     bool webp = named && cli_ends_with(cli.output, ".webp");
-    if (named && !html && !webp && !cli_ends_with(cli.output, ".png") && !opts.format)
-        cli_usage("cannot write '%s': the name must end in .html, .png or .webp, or be '-' for standard output",
+    opts.svg = opts.format ? opts.kind == 3 : named && cli_ends_with(cli.output, ".svg");
+    if (named && !html && !webp && !opts.svg && !cli_ends_with(cli.output, ".png") && !opts.format)
+        cli_usage("cannot write '%s': the name must end in .html, .png, .webp or, of a network, .svg, or be '-' for standard output",
                   cli.output);
     opts.page = opts.format ? opts.kind == 1 : html;
     opts.animated = opts.format ? opts.kind == 2 : webp;
@@ -428,12 +430,23 @@ static void sheet_frame(void *sheet, size_t i, const side *s, const double *trut
     if (vg_sheet_add(sheet, i, &s->frame, truth, &e) < 0) cli_die(&e);
 }
 
-/* Options that are about frames or several sequences do not go with a signal. */
-static void refuse_beside_signal(const char *what)
+/* Options that are about frames or several sequences do not go with an artefact of which something else is drawn. */
+static void refuse_options(const char *const *strange, size_t n, const char *what)
+{
+    for (size_t i = 0; i < n; i++)
+        if (cli_given(strange[i])) cli_usage("option '--%s' is about a sequence: of a %s", strange[i], what);
+}
+
+static void refuse_sequence_options(const char *what)
 {
     static const char *const strange[] = {"frames", "columns", "size", "silhouettes", "look-at", "beside", "against", "scales", "scale", "turn", "fps"};
-    for (size_t i = 0; i < sizeof strange / sizeof *strange; i++)
-        if (cli_given(strange[i])) cli_usage("option '--%s' is about a sequence: of a signal %s", strange[i], what);
+    refuse_options(strange, sizeof strange / sizeof *strange, what);
+}
+
+static void refuse_camera_options(const char *what)
+{
+    static const char *const strange[] = {"zoom", "fit", "ground", "edges"};
+    refuse_options(strange, sizeof strange / sizeof *strange, what);
 }
 
 /* A signal is drawn as its curve through the pose plane. */
@@ -442,17 +455,32 @@ static void make_plane(cast *c)
     vg_err e;
     vg_sheet_options o = sheet_options();
     vg_plane_options plane = {.azimuth = o.azimuth, .elevation = o.elevation, .z_up = o.z_up};
-    static const char *const strange[] = {"zoom", "fit", "ground", "edges"};
-    for (size_t i = 0; i < sizeof strange / sizeof *strange; i++)
-        if (cli_given(strange[i]))
-            cli_usage("option '--%s' is about a sequence: of a signal the pose plane is drawn", strange[i]);
-    refuse_beside_signal("the pose plane is drawn");
+    refuse_camera_options("signal the pose plane is drawn");
+    refuse_sequence_options("signal the pose plane is drawn");
     if (opts.animated) cli_usage("a signal is drawn as PNG: an animation is made of the poses of vg-sample");
     if (opts.patches) take_patches(&c->result);
     while (next(&c->result)) continue; /* to the end, so that damage is seen */
     FILE *out = cli_text_open();
     if (vg_plane_write(c->result.head, &plane, fileno(out), cli.output ? cli.output : "standard output", &e) < 0) cli_die(&e);
     cli_text_end();
+}
+
+/* A network is drawn as the curves of its training. */
+static bool has_curves(const cast *c)
+{
+    const vg_network *n = &c->result.head->network;
+    return n->model && n->ncurve && !opts.page && !opts.animated;
+}
+
+static void make_curves(cast *c)
+{
+    static const char *const strange[] = {"view", "up", "patches"};
+    const char *what = "network its curves are drawn";
+    refuse_options(strange, sizeof strange / sizeof *strange, what);
+    refuse_camera_options(what);
+    refuse_sequence_options(what);
+    while (next(&c->result)) continue; /* to the end, so that damage is seen */
+    network_plot_write(&c->result.head->network, c->result.label, opts.svg);
 }
 
 static void make_sheet(cast *c)
@@ -544,7 +572,7 @@ static void make_signal_page(cast *c)
     vg_page *page;
     vg_page_stats stats;
     vg_err e;
-    refuse_beside_signal("the pose plane is shown");
+    refuse_sequence_options("signal the pose plane is shown");
     if (c->result.head->signal.space != VG_SPACE_VERTICES)
         cli_stop(VG_EINPUT, "a page shows signals whose shapes are vertices: pipe 'vg-sample | vg-solve | vg-view', or fit it "
                  "with 'vg-fitsignal --space vertices'");
@@ -591,7 +619,9 @@ int main(int argc, char **argv)
     choose_kind();
     open_cast(&c, operands, n);
     colour_bones(c.result.head);
-    if (opts.page && c.result.head->signal.n) make_signal_page(&c);
+    if (opts.svg && !has_curves(&c)) cli_usage("an SVG is made of the curves of a network, which %s does not hold: use .html, .png or .webp", c.result.name);
+    if (has_curves(&c)) make_curves(&c);
+    else if (opts.page && c.result.head->signal.n) make_signal_page(&c);
     else if (opts.page) make_page(&c);
     else if (c.result.head->signal.n) make_plane(&c);
     else make_sheet(&c);

@@ -38,7 +38,7 @@ INDICES, F32, F64 = 1, 4, 8  # Type of a channel
 LABEL_KINDS = {1: "object", 2: "group", 3: "material", 4: "smoothing", 5: "library"}
 NETWORK_COUNTS = ("model", "direction", "mesh_digest", "data_digest", "vertices", "parts", "width", "numbers", "rank", "layers",
                   "hidden", "convolutions", "uncertain", "sets", "parameters", "seed", "frames", "iterations", "step", "windows",
-                  "open", "phase", "best_iteration")
+                  "open", "phase", "best_iteration", "curve_length", "curve_block")
 NO_PARENT = 0xFFFFFFFF
 NEEDS = {**dict.fromkeys(("TEXC", "LABL", "ASST", "SELE", "LINK", "ANCH", "REFP", "SKEL", "PTCH", "RIG ", "MAP ", "SIGN", "NETW"), "MESH"), "SKIN": "RIG "}
 TAG_BYTES = frozenset(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 ")
@@ -155,7 +155,7 @@ class Map:
 class Network:
     """A network that has learned how a sequence goes on."""
     counts: dict         # by the names of NETWORK_COUNTS
-    numbers: array       # best error; diagonal, low (2), high (2), change, ridge, damping
+    numbers: array       # best error, curve start; diagonal, low (2), high (2), change, ridge, damping
     errors: array
     mean: array
     scale: array
@@ -164,6 +164,7 @@ class Network:
     root: array
     parameters: array
     basis: array
+    curve: array         # of each iteration: loss, length of the gradient, validation error or -1
     moments: array
     best: array
 
@@ -967,24 +968,24 @@ class _Reader:
     def netw(self, p: _Payload):
         c = {name: int(p.flag()) if name in ("open", "uncertain") else p.u64() for name in NETWORK_COUNTS}
         features, k = c["vertices"] * c["width"], c["rank"]
-        numbers, errors, mean = p.f64s(9), p.f64s(30), p.f64s(features)
+        numbers, errors, mean = p.f64s(10), p.f64s(30), p.f64s(features)
         scale, range_ = p.f64s(2 * k), p.f64s(2 * k)
         regression = p.f64s(2 * (3 * k * k + 2 * k) if c["model"] == 1 else 0)
         root = p.f64s(3 * (2 * k + 1) * (c["parts"] + 1))
         count = c["sets"] * c["parameters"]
         lists = []
-        for n in (count, k * features, 2 * count if c["open"] else 0, count if c["open"] else 0):
+        for n in (count, k * features, 3 * c["curve_length"], 2 * count if c["open"] else 0, count if c["open"] else 0):
             lists.append(p.f64s(n, code="f"))
             p.pad()
         p.end()
-        for wrong, why in self.wrong_network(c, features, numbers, errors, scale, range_):
+        for wrong, why in self.wrong_network(c, features, numbers, errors, scale, range_, lists[2]):
             if wrong:
                 p.fail(why)
         self.stream.network = Network(c, numbers, errors, mean, scale, range_, regression, root, *lists)
 
-    def wrong_network(self, c: dict, features: int, numbers: array, errors: array, scale: array, range_: array):
+    def wrong_network(self, c: dict, features: int, numbers: array, errors: array, scale: array, range_: array, curve: array):
         """What may be wrong with a network whose fields have the right sizes."""
-        linear, k, low, high = c["model"] in (1, 2), c["rank"], numbers[2:4], numbers[4:6]
+        linear, k, low, high = c["model"] in (1, 2), c["rank"], numbers[3:5], numbers[5:7]
         yield not 1 <= c["model"] <= 4, "its model is not known"
         yield c["direction"] > 2, "its direction is not known"
         yield c["width"] not in (9, 12), "its features are not 9 or 12 numbers"
@@ -999,11 +1000,13 @@ class _Reader:
         yield c["convolutions"] > (8 if c["model"] == 4 else 0), "it has too many convolutions"
         yield c["parameters"] != parameters_of(c, linear), "its parameters are not those of its layers"
         yield any(x < 0 and x != -1 for x in [numbers[0], *errors]), "an error is below 0"
-        yield numbers[1] <= 0, "the diagonal is not above 0"
+        yield numbers[2] <= 0, "the diagonal is not above 0"
         yield any(a >= b for a, b in zip(low, high)), "a range is empty"
         yield any(x <= 0 for x in scale), "a scale is not above 0"
         yield any(a > b for a, b in zip(range_[:k], range_[k:])), "a range of coordinates is empty"
         yield c["phase"] > 1, "its phase of training is not known"
+        yield c["curve_block"] > c["curve_length"], "its curve is shorter than its part beside a validation block"
+        yield any(x < 0 and (i % 3 < 2 or x != -1) for i, x in enumerate(curve)) or (numbers[1] < 0 and numbers[1] != -1), "a number of its curve is below 0"
         yield c["vertices"] != self.stream.mesh.nv or c["mesh_digest"] != self.stream.digest(), "the network's mesh"
         yield c["parts"] != self.stream.mesh.components(), "the mesh has another number of components"
 

@@ -483,11 +483,15 @@ types:
         type: u8
       - id: best_iteration
         type: u8
+      - id: curve_length
+        type: u8
+      - id: curve_block
+        type: u8
       - id: numbers
         type: f8
         repeat: expr
-        repeat-expr: 9
-        doc: best error, diagonal, low (2), high (2), change, ridge, damping
+        repeat-expr: 10
+        doc: best error, curve start, diagonal, low (2), high (2), change, ridge, damping
       - id: errors
         type: f8
         repeat: expr
@@ -514,7 +518,7 @@ types:
         repeat-expr: 3 * (2 * rank + 1) * (num_parts + 1)
       - id: rest
         size-eos: true
-        doc: parameters, basis, moments, best, each an array of f4 with its padding (STREAM.md 3.21)
+        doc: parameters, basis, curve, moments, best, each an array of f4 with its padding (STREAM.md 3.21)
   form:
     seq:
       - id: name

@@ -226,7 +226,7 @@ def signals(s):
 def network(n):
     c, lists = n["counts"], [n["numbers"], n["errors"], n["mean"], n["scale"], n["range"], n["regression"], n["root"]]
     head = u64(*(int(x, 16) if isinstance(x, str) else x for x in c.values())) + b"".join(f64(*x) for x in lists)
-    return Record("NETW", head + b"".join(pad(struct.pack(f"<{len(n[k])}f", *n[k])) for k in ("parameters", "basis", "moments", "best")),
+    return Record("NETW", head + b"".join(pad(struct.pack(f"<{len(n[k])}f", *n[k])) for k in ("parameters", "basis", "curve", "moments", "best")),
                   CRITICAL)
 
 
@@ -529,12 +529,13 @@ def network_content(counts=(), **changes):
     c = {"model": 1, "direction": 0, "mesh_digest": f"{digest(content()['mesh']):016x}", "data_digest": "0123456789abcdef", "vertices": 4,
          "parts": 1, "width": 9, "numbers": 1, "rank": 1, "layers": 1, "hidden": 1, "convolutions": 0, "uncertain": 0, "sets": 1,
          "parameters": 14, "seed": 7, "frames": 32, "iterations": 300, "step": 2, "windows": 8, "open": 1, "phase": 0,
-         "best_iteration": 200}
+         "best_iteration": 200, "curve_length": 3, "curve_block": 2}
     c.update(counts)
     features, p = c["vertices"] * c["width"], c["sets"] * c["parameters"]
-    n = {"counts": c, "numbers": [0.5, 2.5, -1, -2, 1, 2, 0.125, 0.01, 0.8], "errors": [-1.0] * 29 + [1.5], "mean": [0.25] * features,
+    n = {"counts": c, "numbers": [0.5, 0.625, 2.5, -1, -2, 1, 2, 0.125, 0.01, 0.8], "errors": [-1.0] * 29 + [1.5], "mean": [0.25] * features,
          "scale": [1.5, 0.5], "range": [-1, 1], "regression": [0.5] * 10 if c["model"] == 1 else [], "root": [0.0] * 17 + [1.0],
-         "parameters": [0.5] * p, "basis": [1.0] + [0.0] * (c["rank"] * features - 1), "moments": [0.25] * (2 * p if c["open"] else 0),
+         "parameters": [0.5] * p, "basis": [1.0] + [0.0] * (c["rank"] * features - 1),
+         "curve": [0.5, 2.0, 0.25, 0.375, 1.5, -1, 0.625, 3.0, -1], "moments": [0.25] * (2 * p if c["open"] else 0),
          "best": [0.75] * (p if c["open"] else 0)}
     n.update(changes)
     return content(frames=[], network=n)
@@ -1043,7 +1044,7 @@ def reject_attachments():
         "netw-parameters-13": whole(network_content({"parameters": 13})),
         "netw-step-2-16-and-1": whole(network_content({"step": (1 << 16) + 1})),
         "netw-error-below-0": whole(network_content(errors=[-1.0] * 29 + [-0.5])),
-        "netw-best-error-below-0": whole(network_content(numbers=[-2, 2.5, -1, -2, 1, 2, 0.125, 0.01, 0.8])),
+        "netw-best-error-below-0": whole(network_content(numbers=[-2, 0.625, 2.5, -1, -2, 1, 2, 0.125, 0.01, 0.8])),
         "netw-width-10": whole(network_content({"width": 10})),
         "netw-numbers": patched(network_content(), "NETW", 56, u64(2)),
         "netw-rank-2-32": patched(network_content(), "NETW", 64, u64(1 << 32)),
@@ -1055,8 +1056,14 @@ def reject_attachments():
         "netw-step-0": patched(network_content(), "NETW", 144, u64(0)),
         "netw-open-2": patched(network_content(), "NETW", 160, u64(2)),
         "netw-phase-2": patched(network_content(), "NETW", 168, u64(2)),
-        "netw-diagonal-0": whole(network_content(numbers=[0.5, 0, -1, -2, 1, 2, 0.125, 0.01, 0.8])),
-        "netw-range-empty": whole(network_content(numbers=[0.5, 2.5, 1, -2, 1, 2, 0.125, 0.01, 0.8])),
+        "netw-diagonal-0": whole(network_content(numbers=[0.5, 0.5, 0, -1, -2, 1, 2, 0.125, 0.01, 0.8])),
+        "netw-range-empty": whole(network_content(numbers=[0.5, 0.5, 2.5, 1, -2, 1, 2, 0.125, 0.01, 0.8])),
+        "netw-curve-block-4": whole(network_content({"curve_block": 4})),
+        "netw-curve-2-63": patched(network_content(), "NETW", 184, u64(1 << 63)),
+        "netw-curve-negative": whole(network_content(curve=[0.5, 2.0, 0.25, -0.375, 1.5, -1, 0.625, 3.0, -1])),
+        "netw-curve-validation": whole(network_content(curve=[0.5, 2.0, -0.25, 0.375, 1.5, -1, 0.625, 3.0, -1])),
+        "netw-curve-nan": whole(network_content(curve=[0.5, 2.0, NAN, 0.375, 1.5, -1, 0.625, 3.0, -1])),
+        "netw-curve-start": whole(network_content(numbers=[0.5, -0.5, 2.5, -1, -2, 1, 2, 0.125, 0.01, 0.8])),
         "netw-scale-0": whole(network_content(scale=[1.5, 0])),
         "netw-coordinates-empty": whole(network_content(range=[1, -1])),
         "netw-parameter-nan": whole(network_content(parameters=[NAN] * 14)),

@@ -180,6 +180,69 @@ assert whole["training"] == half["training"] and len(whole["training"]) == 16
 END
 }
 
+@test "the curves of a training are in the network, the numbers of its log, also when it was resumed; vg-view draws them" {
+    must vg-encode "$(horse vgs)" "$(horse vgs)" -o twice.vgs
+    must vg-train $small --iterations 60 --checkpoint half.net --every 50 --log log.tsv twice.vgs -o whole.net
+    must vg-train $small --iterations 60 --resume half.net twice.vgs -o resumed.net
+    must cmp whole.net resumed.net
+    py <<'END'
+from read_stream import read_stream
+n = read_stream("whole.net").network
+rows = [line.split("\t") for line in open("log.tsv").read().splitlines()[1:]]
+c = n.counts
+assert len(rows) == c["curve_length"] == len(n.curve) // 3, (len(rows), c)
+assert sum(r[0] == "0" for r in rows) == c["curve_block"] == 60
+for i, (phase, iteration, loss, gradient, validation) in enumerate(rows):
+    x, g, v = n.curve[3 * i:3 * i + 3]
+    assert abs(x - float(loss)) <= 1e-5 * x and abs(g - float(gradient)) <= 1e-5 * g, (i, x, g)
+    # measured behind each 20th iteration of the first phase
+    assert (v == -1) == (validation == "") == (phase == "1" or int(iteration) % 20 != 0), (i, v, validation)
+    assert v == -1 or abs(v - float(validation)) <= 1e-5 * v, (i, v, validation)
+assert n.numbers[1] > 0
+END
+    must vg-view whole.net -o curves.svg
+    must vg-view whole.net -o curves.png
+    must vg-view --format svg whole.net
+    [ "$output" = "$(cat curves.svg)" ]
+    for text in "whole.net: what it learns from (auto, seed 1)" "all frames" "validation block: least after"; do
+        grep -qF "$text" curves.svg || fail "no '$text'"
+    done
+    py <<'END'
+import xml.etree.ElementTree as x
+lines = [e.get("d") for e in x.parse("curves.svg").iter() if e.tag.endswith("path")]
+assert len(lines) > 60, len(lines)
+assert open("curves.png", "rb").read(4) == b"\x89PNG"
+END
+    must vg-view whole.net -o mesh.html
+    must_fail 2 vg-view "$(horse vgs)" -o no.svg
+    says "an SVG is made of the curves of a network"
+    must_fail 2 vg-view --zoom 2 whole.net -o no.png
+    says "option '--zoom' is about a sequence: of a network its curves are drawn"
+    [ ! -e no.svg ] && [ ! -e no.png ]
+}
+
+@test "frames that are held out are not learned from, whatever the step" {
+    must vg-encode "$(horse vgs)" --take 6 -o six.vgs
+    must vg-encode "$(horse vgs)" --take 7 -o seven.vgs
+    must vg-encode "$(horse vgs)" --take 8 -o eight.vgs
+    must vg-encode "$(horse vgs)" --take 0-5 -o before.vgs
+    must vg-encode "$(horse vgs)" --take 9-15 -o behind.vgs
+    must vg-encode before.vgs six.vgs seven.vgs eight.vgs behind.vgs -o one.vgs
+    must vg-encode before.vgs eight.vgs seven.vgs six.vgs behind.vgs -o two.vgs
+    for step in 1 2; do
+        for which in one two; do
+            must vg-train -q --model pca --layers 1 --hidden 8 --frames 4 --given 1 --iterations 9 --step $step --hold 0.2 --hold-at 6 $which.vgs -o $which.net
+        done
+        py <<'END'
+from read_stream import read_stream
+one, two = (read_stream(n + ".net").network for n in ("one", "two"))
+assert one.counts["data_digest"] != two.counts["data_digest"]
+for name in ("mean", "range", "basis", "parameters"):
+    assert getattr(one, name) == getattr(two, name), name
+END
+    done
+}
+
 @test "wrong usage of vg-train" {
     must_fail 2 vg-train --given 8-3 "$(horse vgs)" -o no.net
     must_fail 2 vg-train --given 32 "$(horse vgs)" -o no.net

@@ -101,11 +101,22 @@ static int check_parts(const vg_network *n, const vg_mesh *m, const char *where,
     return r == VG_OK && parts != n->parts ? vgi_wrong(where, "the mesh has another number of components", e) : r;
 }
 
+static const char *refuse_curve(const vg_network *n)
+{
+    if (n->ncurve_block > n->ncurve) return "its curve is shorter than its part beside a validation block";
+    for (size_t i = 0; i < n->ncurve; i++) {
+        const float *x = n->curve + 3 * i;
+        if (x[0] < 0 || x[1] < 0 || !is_error(x[2])) return "a number of its curve is below 0";
+    }
+    return is_error(n->curve_start) ? NULL : "a number of its curve is below 0";
+}
+
 int vgi_check_network(vg_head *h, void *artefact, const char *where, vg_err *e)
 {
     const vg_network *n = artefact;
     const char *why = refuse_sizes(n);
     if (!why) why = refuse_numbers(n);
+    if (!why) why = refuse_curve(n);
     if (why) return vgi_wrong(where, why, e);
     int r = vg_network_fits(n, &h->body.mesh, where, e);
     return r == VG_OK ? check_parts(n, &h->body.mesh, where, e) : r;

@@ -252,6 +252,7 @@ LENGTH(net_regression, vg_network, a->model == VG_NETWORK_AUTO ? times(a->rank, 
 LENGTH(net_root, vg_network, times(one_more(times(a->rank, 2)), one_more(a->parts)))
 LENGTH(net_parameters, vg_network, of_network(1, a))
 LENGTH(net_basis, vg_network, times(a->rank, times(a->nv, a->width)))
+LENGTH(net_curve, vg_network, a->ncurve)
 LENGTH(net_moments, vg_network, a->open ? of_network(1, a) : 0)
 static const vgi_member netw_fields[] = {
     NUMBER(vg_network, U64, model),
@@ -277,7 +278,10 @@ static const vgi_member netw_fields[] = {
     NUMBER(vg_network, U64, open),
     NUMBER(vg_network, U64, phase),
     NUMBER(vg_network, U64, best_iteration),
+    NUMBER(vg_network, U64, ncurve),
+    NUMBER(vg_network, U64, ncurve_block),
     NUMBER(vg_network, F64, best_error),
+    NUMBER(vg_network, F64, curve_start),
     NUMBER(vg_network, F64, diagonal),
     NUMBER(vg_network, F64, low[0]),
     NUMBER(vg_network, F64, low[1]),
@@ -294,6 +298,7 @@ static const vgi_member netw_fields[] = {
     ARRAY(vg_network, F64, root, 3, net_root),
     ARRAY(vg_network, F32, parameters, 1, net_parameters),
     ARRAY(vg_network, F32, basis, 1, net_basis),
+    OPTIONAL(vg_network, F32, curve, 3, net_curve),
     OPTIONAL(vg_network, F32, moments, 2, net_moments),
     OPTIONAL(vg_network, F32, best, 1, net_moments)};
 

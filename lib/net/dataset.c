@@ -105,30 +105,48 @@ static int split_by_step(vgi_dataset *s, size_t step, vg_err *e)
     return VG_OK;
 }
 
-/* First frame of the block of `held` frames. At least three frames are left before it, since that many are given when
+/* First frame of the block of `held` frames. At least `before` frames are left before it, since that many are given when
  * judging. */
-static size_t hold_from(size_t length, size_t held, size_t hold_at, uint64_t seed, size_t sequence)
+static size_t hold_from(size_t length, size_t held, size_t before, size_t hold_at, uint64_t seed, size_t sequence)
 {
-    enum { BEFORE = 3 };
     size_t end = length - held;
     if (hold_at != VG_HOLD_BY_SEED) return hold_at < end ? hold_at : end;
-    if (end <= BEFORE) return end;
+    if (end <= before) return end;
     vgi_random r = vgi_random_start(seed, UINT64_MAX - sequence);
-    return BEFORE + vgi_random_below(&r, end - BEFORE + 1);
+    return before + vgi_random_below(&r, end - before + 1);
+}
+
+/* Frames begin to end are every step-th one of a sequence, from its frame `phase`; block: what of that sequence is held out.
+ * The block is the same in all phases, so that no frame between those that are held is learned from. */
+static int divide_phase(vgi_dataset *s, size_t begin, size_t end, size_t phase, size_t step, const vgi_span *block, vg_err *e)
+{
+    size_t at = begin + (block->first > phase ? (block->first - phase + step - 1) / step : 0);
+    size_t behind = begin + (block->end > phase ? (block->end - phase + step - 1) / step : 0);
+    vgi_span whole[3] = {{begin, at, begin}, {at, behind, begin}, {behind, end, behind}};
+    for (int i = 0; i < 3; i++)
+        if (vgi_spans_add(i == 1 ? &s->held : &s->train, whole[i], e) < 0) return VG_ENOMEM;
+    return VG_OK;
 }
 
 int vgi_dataset_divide(vgi_dataset *s, size_t step, double hold, size_t hold_at, uint64_t seed, vg_err *e)
 {
-    if (step > 1 && split_by_step(s, step, e) < 0) return VG_ENOMEM;
-    for (size_t q = 0; q < s->nsequences; q++) {
-        size_t begin = s->sequence[q], end = q + 1 < s->nsequences ? s->sequence[q + 1] : s->n, length = end - begin;
-        size_t held = (size_t)(hold * (double)length + 0.5), at = hold_from(length, held, hold_at, seed, q);
-        vgi_span whole[3] = {{begin, begin + at, begin}, {begin + at, begin + at + held, begin},
-                             {begin + at + held, end, begin + at + held}};
-        for (int i = 0; i < 3; i++)
-            if (vgi_spans_add(i == 1 ? &s->held : &s->train, whole[i], e) < 0) return VG_ENOMEM;
+    enum { BEFORE = 3 };
+    size_t n = s->nsequences, number = 0, *start = vgi_array_raw(n + 1, sizeof *start, e);
+    int r = start ? VG_OK : VG_ENOMEM;
+    if (r == VG_OK && n) memcpy(start, s->sequence, n * sizeof *start);
+    if (r == VG_OK) start[n] = s->n;
+    if (r == VG_OK && step > 1) r = split_by_step(s, step, e);
+    for (size_t q = 0; r == VG_OK && q < n; q++) {
+        size_t length = start[q + 1] - start[q], held = (size_t)(hold * (double)length + 0.5);
+        vgi_span block = {.first = hold_from(length, held, BEFORE * step, hold_at, seed, q)};
+        block.end = block.first + held;
+        for (size_t phase = 0; r == VG_OK && phase < step && phase < length; phase++, number++) {
+            size_t end = number + 1 < s->nsequences ? s->sequence[number + 1] : s->n;
+            r = divide_phase(s, s->sequence[number], end, phase, step, &block, e);
+        }
     }
-    return VG_OK;
+    free(start);
+    return r;
 }
 
 int vgi_spans_coordinates(const vgi_spans *spans, const vgi_dataset *s, vgi_frames *f, vg_err *e)

@@ -44,8 +44,8 @@ int vgi_dataset_cut(vgi_dataset *s, vg_err *e) VG_MUST_CHECK; /* start another s
 void vgi_dataset_clear(vgi_dataset *s);
 
 /* vgi_dataset_divide: make a sequence of every step-th frame, starting at each of the first `step` frames. Hold out a
- * share of each sequence as one block: from frame hold_at on, at its end (SIZE_MAX), or chosen by the seed
- * (VG_HOLD_BY_SEED). */
+ * share of each sequence as one block: from its frame hold_at on, at its end (SIZE_MAX), or chosen by the seed
+ * (VG_HOLD_BY_SEED). The block does not depend on step. */
 int vgi_dataset_divide(vgi_dataset *s, size_t step, double hold, size_t hold_at, uint64_t seed, vg_err *e) VG_MUST_CHECK;
 /* vgi_dataset_find_coordinates: range and change of n's features, mean, basis, scales, and range of the coordinates,
  * from the frames in s->train. VG_EINPUT with fewer than 4. */

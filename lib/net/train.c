@@ -258,11 +258,11 @@ static int find_before(vg_trainer *t, vg_err *e)
     if (!one || !t->before) return free(one), VG_ENOMEM;
     for (size_t i = 0; i < t->data.n; i++)
         for (size_t back = 0; back < 2; back++) {
-            const vgi_regression *rings = &t->regression[1 - back];
+            const vgi_regression *linear = &t->regression[1 - back];
             const double *c = t->data.coordinates + i * n;
             float *to = t->before + (2 * i + back) * 2 * n;
-            vgi_regression_next(rings, c, NULL, one);
-            vgi_regression_next(rings, one, c, one + n);
+            vgi_regression_next(linear, c, NULL, one);
+            vgi_regression_next(linear, one, c, one + n);
             for (size_t k = 0; k < n; k++) to[k] = (float)one[n + k], to[n + k] = (float)one[k];
         }
     free(one);
@@ -368,6 +368,7 @@ int vg_trainer_prepare(vg_trainer *t, vg_err *e)
     r = make_frames(t, e);
     if (r == VG_OK && !(t->net.errors = vgi_array(ERRORS, sizeof *t->net.errors, e))) r = VG_ENOMEM;
     for (int i = 0; r == VG_OK && i < ERRORS; i++) t->net.errors[i] = -1;
+    t->net.curve_start = -1;
     if (r == VG_OK) r = begin_phase(t, true, e);
     if (r == VG_OK && !t->tried.n) t->state.phase = 1; /* too short for a block: train on all of it, for as long as
                                                              requested */
@@ -419,13 +420,13 @@ static void run_group(void *context, size_t number)
 static int run_groups(vg_trainer *t, double *loss, vg_err *e)
 {
     size_t all = t->net.sets * t->net.nparameters;
-    vgi_random rings = vgi_random_start(t->o.seed, t->state.iteration + 1);
+    vgi_random random = vgi_random_start(t->o.seed, t->state.iteration + 1);
     working w = {.t = t, .start = vgi_array_raw(t->o.batch, sizeof *w.start, e)};
     if (!w.start) return VG_ENOMEM;
-    for (size_t i = 0; i < t->o.batch; i++) w.start[i] = t->window[vgi_random_below(&rings, t->nwindows)];
-    w.given = t->o.given_least + vgi_random_below(&rings, t->o.given_most - t->o.given_least + 1);
+    for (size_t i = 0; i < t->o.batch; i++) w.start[i] = t->window[vgi_random_below(&random, t->nwindows)];
+    w.given = t->o.given_least + vgi_random_below(&random, t->o.given_most - t->o.given_least + 1);
     if (w.given >= t->length) w.given = t->length - 1;
-    w.single = t->before && t->length > 3 && vgi_random_below(&rings, SINGLE) == 0;
+    w.single = t->before && t->length > 3 && vgi_random_below(&random, SINGLE) == 0;
     if (w.single) w.given = 3;
     memset(t->total, 0, all * sizeof *t->total);
     *loss = 0;
@@ -549,28 +550,51 @@ vg_train_state vg_trainer_get_state(const vg_trainer *t)
     return t->state;
 }
 
+/* The error before the first iteration: of a correction that is still small, about that of the regression alone. */
+static int begin_curve(vg_trainer *t, vg_err *e)
+{
+    if (t->state.iteration || t->state.phase) return VG_OK;
+    int r = validate(t, e);
+    if (r == VG_OK && isfinite(t->state.validation)) t->net.curve_start = t->state.validation;
+    return r;
+}
+
+/* Adds the iteration that was done to the curve. */
+static int add_to_curve(vg_trainer *t, vg_err *e)
+{
+    float row[3] = {(float)t->state.loss, (float)t->state.gradient, isfinite(t->state.validation) ? (float)t->state.validation : -1};
+    int r = vgi_grow(&t->net.curve, &t->curve_cap, t->net.ncurve + 1, sizeof row, e);
+    if (r < 0) return r;
+    memcpy(t->net.curve + 3 * t->net.ncurve++, row, sizeof row);
+    if (!t->state.phase) t->net.ncurve_block++;
+    return VG_OK;
+}
+
 int vg_trainer_step(vg_trainer *t, vg_train_state *state, vg_err *e)
 {
     double loss;
-    int rings = t->ended ? VG_OK : validate(t, e);
+    int r = t->ended ? VG_OK : begin_curve(t, e);
     bool last = t->state.iteration >= t->state.iterations || (!t->state.phase && has_waited(t));
-    if (rings == VG_OK && !t->ended && last) {
+    if (r == VG_OK && !t->ended && last) {
         if (t->state.phase) t->ended = true;
-        else rings = end_phase(t, e);
+        else r = end_phase(t, e);
     }
-    if (rings < 0 || t->ended) {
+    if (r < 0 || t->ended) {
         *state = t->state;
-        return rings;
+        return r;
     }
-    rings = run_groups(t, &loss, e);
-    if (rings < 0) return rings;
+    r = run_groups(t, &loss, e);
+    if (r < 0) return r;
     learn(t);
     t->state.loss = loss;
-    if (!(t->state.gradient < 1e30))
+    if (!(t->state.gradient < 1e30) || !(loss < 1e30))
         return vg_fail(e, VG_EINPUT, "the numbers run away at iteration %llu: choose a smaller --rate",
                        (unsigned long long)t->state.iteration);
     t->state.iteration++;
     t->net.iterations = t->state.iteration;
+    r = validate(t, e);
+    if (r == VG_OK) r = add_to_curve(t, e);
+    if (r < 0) return r;
     *state = t->state;
     return 1;
 }
@@ -615,6 +639,11 @@ int vg_trainer_resume(vg_trainer *t, const vg_network *from, vg_err *e)
     memcpy(t->net.parameters, from->parameters, all * sizeof *t->best);
     memcpy(t->moments, from->moments, 2 * all * sizeof *t->best);
     memcpy(t->best, from->best, all * sizeof *t->best);
+    free(t->net.curve);
+    t->net.curve = vgi_copy_array(from->curve, 3 * from->ncurve, sizeof *from->curve, e);
+    if (!t->net.curve) return t->net.ncurve = 0, VG_ENOMEM;
+    t->net.ncurve = t->curve_cap = from->ncurve, t->net.ncurve_block = from->ncurve_block;
+    t->net.curve_start = from->curve_start;
     t->state.iteration = t->net.iterations = from->iterations;
     t->state.best_iteration = from->best_iteration;
     t->best_error = from->best_error < 0 ? INFINITY : from->best_error;

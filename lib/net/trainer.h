@@ -15,7 +15,8 @@ struct vg_trainer {
     vgi_dataset data;
     double *last;           /* the previous pose, nv points; begun: whether there is one */
     bool begun, cut; /* cut: the next pose starts a sequence */
-    vg_network net;         /* current state: parameters, basis, regression of this phase */
+    vg_network net;         /* current state: parameters, basis, regression of this phase, curve */
+    size_t curve_cap;
     vgi_shape shape;
     /* this phase */
     vgi_spans fitted, tried; /* frames used for training, and the validation block */

@@ -73,7 +73,7 @@ typedef struct vg_train_state {
     int phase;            /* 0: beside a validation block, to find out how long; 1: on all frames */
     double loss;          /* mean distance per frame of the forward chains, in the numbers of a frame */
     double gradient;      /* its length before it was clipped */
-    double validation;    /* mean distance in the validation block; NaN: not measured at this iteration */
+    double validation;    /* mean distance in the validation block behind this iteration; NaN: not measured */
     uint64_t best_iteration;
     size_t parameters, coordinates, frames, held;
 } vg_train_state;

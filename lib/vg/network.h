@@ -57,6 +57,9 @@ typedef struct vg_network {
     double *regression;     /* auto, forward and backward: turn, change (rank x rank), shift, and of a first frame turn
                                and shift: 2 x (3 rank^2 + 2 rank); else none */
     double *root;           /* (2 rank + 1) x nroot: the root's steps from coordinates and their change */
+    size_t ncurve, ncurve_block; /* iterations of the training; the first ncurve_block beside a validation block */
+    float *curve;           /* 3 of each: loss, length of the gradient, error then in the validation block */
+    double curve_start;     /* that error before the first iteration; -1: not measured */
     bool open;              /* training has not ended: */
     uint64_t phase, best_iteration;
     double best_error;
