@@ -11,7 +11,7 @@
 #include <stdlib.h>
 
 static const double most_radius = 1.0005, change_weight = 10, free_shift = 1e-6;
-enum { SQUARINGS = 20, BISECTIONS = 10 };
+enum { SQUARINGS = 20 };
 
 int vgi_regression_make(vgi_regression *g, size_t n, vg_err *e)
 {
@@ -42,26 +42,25 @@ void vgi_regression_next(const vgi_regression *g, const double *c, const double 
 /* ---- stability ---- */
 
 /* m: 2n x 2n, acting on c and the previous frame as one row */
-static void companion(const vgi_regression *g, double part, double damping, double *m)
+static void companion(const vgi_regression *g, double *m)
 {
     size_t n = g->numbers, w = 2 * n;
     memset(m, 0, w * w * sizeof *m);
     for (size_t i = 0; i < n; i++) {
         m[i * w + n + i] = 1;
         for (size_t j = 0; j < n; j++) {
-            double keep = i == j ? damping : 0, change = keep + part * (g->change[i * n + j] - keep);
-            m[i * w + j] = part * g->turn[i * n + j] + change + (i == j);
-            m[(n + i) * w + j] = -change;
+            m[i * w + j] = g->turn[i * n + j] + g->change[i * n + j] + (i == j);
+            m[(n + i) * w + j] = -g->change[i * n + j];
         }
     }
 }
 
-/* room: workspace of 3 x (2n)^2 */
-static double radius(const vgi_regression *g, double part, double damping, double *room)
+/* room: workspace of 2 x (2n)^2 */
+static double radius(const vgi_regression *g, double *room)
 {
     size_t w = 2 * g->numbers, all = w * w;
     double *a = room, *b = room + all, log_size = 0, power = 1;
-    companion(g, part, damping, a);
+    companion(g, a);
     for (int step = 0; step <= SQUARINGS; step++) {
         double size = 0;
         for (size_t i = 0; i < all; i++) size += a[i] * a[i];
@@ -78,27 +77,22 @@ static double radius(const vgi_regression *g, double part, double damping, doubl
     return exp(log_size);
 }
 
-/* move towards damped continuation until it is stable */
-static int make_stable(vgi_regression *g, double damping, vg_err *e)
+/* Multiplies all eigenvalues of the companion matrix by one factor, so that none is above the limit: of next = c P + before Q,
+ * P becomes s P and Q becomes s^2 Q. A regression that is hardly unstable hardly changes. */
+static int make_stable(vgi_regression *g, vg_err *e)
 {
     size_t n = g->numbers;
-    double low = 0, high = 1, *room = vgi_array_raw(12 * n * n, sizeof *room, e);
+    double *room = vgi_array_raw(8 * n * n, sizeof *room, e);
     if (!room) return VG_ENOMEM;
-    bool stable = radius(g, 1, damping, room) <= most_radius;
-    for (int i = 0; !stable && i < BISECTIONS; i++) {
-        double middle = (low + high) / 2;
-        if (radius(g, middle, damping, room) <= most_radius) low = middle;
-        else high = middle;
-    }
-    for (size_t i = 0; !stable && i < n; i++) {
-        g->shift[i] *= low;
-        for (size_t j = 0; j < n; j++) {
-            double keep = i == j ? damping : 0, *c = &g->change[i * n + j];
-            g->turn[i * n + j] *= low;
-            *c = keep + low * (*c - keep);
-        }
-    }
+    double shrink = most_radius / radius(g, room);
     free(room);
+    for (size_t i = 0; shrink < 1 && i < n; i++)
+        for (size_t j = 0; j < n; j++) {
+            double *turn = &g->turn[i * n + j], *change = &g->change[i * n + j], same = i == j;
+            double next = shrink * (same + *turn + *change);
+            *change *= shrink * shrink;
+            *turn = next - same - *change;
+        }
     return VG_OK;
 }
 
@@ -198,7 +192,7 @@ int vgi_regression_fit(vgi_regression *g, const vgi_frames *f, bool back, double
                        vg_err *e)
 {
     int r = fit(g, f, back, size, choice, e);
-    return r == VG_OK ? make_stable(g, choice->damping, e) : r;
+    return r == VG_OK ? make_stable(g, e) : r;
 }
 
 /* ---- choice of the ridge ---- */

@@ -420,13 +420,13 @@ static void run_group(void *context, size_t number)
 static int run_groups(vg_trainer *t, double *loss, vg_err *e)
 {
     size_t all = t->net.sets * t->net.nparameters;
-    vgi_random random = vgi_random_start(t->o.seed, t->state.iteration + 1);
+    vgi_random numbers = vgi_random_start(t->o.seed, t->state.iteration + 1);
     working w = {.t = t, .start = vgi_array_raw(t->o.batch, sizeof *w.start, e)};
     if (!w.start) return VG_ENOMEM;
-    for (size_t i = 0; i < t->o.batch; i++) w.start[i] = t->window[vgi_random_below(&random, t->nwindows)];
-    w.given = t->o.given_least + vgi_random_below(&random, t->o.given_most - t->o.given_least + 1);
+    for (size_t i = 0; i < t->o.batch; i++) w.start[i] = t->window[vgi_random_below(&numbers, t->nwindows)];
+    w.given = t->o.given_least + vgi_random_below(&numbers, t->o.given_most - t->o.given_least + 1);
     if (w.given >= t->length) w.given = t->length - 1;
-    w.single = t->before && t->length > 3 && vgi_random_below(&random, SINGLE) == 0;
+    w.single = t->before && t->length > 3 && vgi_random_below(&numbers, SINGLE) == 0;
     if (w.single) w.given = 3;
     memset(t->total, 0, all * sizeof *t->total);
     *loss = 0;
@@ -562,7 +562,7 @@ static int begin_curve(vg_trainer *t, vg_err *e)
 /* Adds the iteration that was done to the curve. */
 static int add_to_curve(vg_trainer *t, vg_err *e)
 {
-    float row[3] = {(float)t->state.loss, (float)t->state.gradient, isfinite(t->state.validation) ? (float)t->state.validation : -1};
+    float row[3] = {(float)t->state.loss, (float)t->state.gradient, t->state.validation < 1e30 ? (float)t->state.validation : -1};
     int r = vgi_grow(&t->net.curve, &t->curve_cap, t->net.ncurve + 1, sizeof row, e);
     if (r < 0) return r;
     memcpy(t->net.curve + 3 * t->net.ncurve++, row, sizeof row);

@@ -1,0 +1,52 @@
+/* test_regression.c: the regression of a sequence's next frame against closed forms.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "net/regression.h"
+#include "test.h"
+
+#include <math.h>
+
+enum { FRAMES = 60 };
+static const double turn[2] = {0.2, 0.33}, most_radius = 1.0005;
+
+/* Frames growth^t (cos a t, cos b t), for which next = 2 growth cos(a) c - growth^2 before holds exactly. */
+static vgi_regression fit_frames(double growth)
+{
+    static double row[2 * FRAMES];
+    static const size_t start[2] = {0, FRAMES};
+    const vgi_frames frames = {2, FRAMES, 1, row, start};
+    const vgi_choice choice = {.ridge = 1e-13, .damping = 0.8, .first_ridge = 1e-3};
+    vgi_regression r;
+    vg_err e;
+    for (int t = 0; t < FRAMES; t++)
+        for (int k = 0; k < 2; k++) row[2 * t + k] = pow(growth, t) * cos(turn[k] * t);
+    CHECK(vgi_regression_make(&r, 2, &e) == VG_OK);
+    CHECK(vgi_regression_fit(&r, &frames, false, 1, &choice, &e) == VG_OK);
+    return r;
+}
+
+/* The factors of number i of the last frame, and of the one before it, in number j of the next. */
+static void check_recursion(const vgi_regression *r, double last, double before)
+{
+    for (size_t i = 0; i < 2; i++)
+        for (size_t j = 0; j < 2; j++) {
+            CHECK_NEAR((i == j) + r->turn[2 * i + j] + r->change[2 * i + j], i == j ? last * 2 * cos(turn[i]) : 0, 1e-5);
+            CHECK_NEAR(-r->change[2 * i + j], i == j ? -before : 0, 1e-5);
+        }
+}
+
+static void stable_motion_is_learned(void)
+{
+    vgi_regression r = fit_frames(0.99);
+    check_recursion(&r, 0.99, 0.99 * 0.99);
+    vgi_regression_clear(&r);
+}
+
+/* All eigenvalues, growth exp(+-ia) and growth exp(+-ib), are shrunk by one factor: the rhythm stays. */
+static void growing_motion_keeps_its_rhythm(void)
+{
+    vgi_regression r = fit_frames(1.02);
+    check_recursion(&r, most_radius, most_radius * most_radius);
+    vgi_regression_clear(&r);
+}
+
+TESTS({"stable motion is learned", stable_motion_is_learned}, {"growing motion keeps its rhythm", growing_motion_keeps_its_rhythm})
