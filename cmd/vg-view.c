@@ -158,7 +158,7 @@ static void choose_kind(void)
     bool webp = named && cli_ends_with(cli.output, ".webp");
     opts.svg = opts.format ? opts.kind == 3 : named && cli_ends_with(cli.output, ".svg");
     if (named && !html && !webp && !opts.svg && !cli_ends_with(cli.output, ".png") && !opts.format)
-        cli_usage("cannot write '%s': the name must end in .html, .png, .webp or, of a network, .svg, or be '-' for standard output",
+        cli_usage("cannot write '%s': the name must end in .html, .png or .webp, of a network also in .svg, or be '-' for standard output",
                   cli.output);
     opts.page = opts.format ? opts.kind == 1 : html;
     opts.animated = opts.format ? opts.kind == 2 : webp;
